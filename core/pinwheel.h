@@ -51,7 +51,7 @@ PW_BEGIN
 typedef enum {
   PW_OK = 0,        /* success */
   PW_RETRY = 1,     /* step rejected; a smaller one may succeed */
-  PW_STOPPED = 2,   /* pw_settings.stop stopped the run; its state is unchanged and it can continue */
+  PW_STOPPED = 2,   /* pw_settings.stop stopped the run after its last accepted step; it can continue */
   PW_RESOURCE = -1, /* out of memory, or a file cannot be written */
   PW_INPUT = -2,    /* the description or an option is wrong */
   PW_INITIAL = -3,  /* no consistent initial state found */
@@ -169,7 +169,7 @@ typedef struct {
   unsigned specified;   /* PW_SPECIFIES_X | ...: which initial values are specified; 0: those that are not 0 */
 } pw_body;
 
-/* Initial values that a body specifies; the others may change to satisfy the constraints.  NOTHING: all may change. */
+/* Initial values that a body specifies: they change only if changes of the others cannot satisfy the constraints. */
 enum {
   PW_SPECIFIES_X = 1,
   PW_SPECIFIES_Y = 2,
@@ -483,6 +483,7 @@ typedef struct {
 
 /* ---- What an element type provides ---- */
 
+/* PW_POINT: fixed in a body; point i of a definition is in the frame of its body i.  PW_VECTOR: any other pair. */
 typedef enum { PW_NUMBER, PW_POINT, PW_VECTOR, PW_BODY, PW_SIGNAL, PW_CHOICE } pw_field_type;
 
 /* One field of a definition structure: used by validation, text models, `show`, `list kinds` and the manual. */
@@ -532,7 +533,7 @@ typedef struct {
   const pw_configuration *configuration; /* of all bodies of the system and the ground */
   const double *q;                       /* count x kind->internal: internal coordinates */
   const double *v;                       /* count x kind->internal: their velocities */
-  const double *u;      /* count x kind->signals x 3: value, first and second time derivative of each signal */
+  const double *u;      /* count x kind->signals x 3: value; only of a constraint's signal: two time derivatives */
   const double *w;      /* count x cols: the vector w, for jw_q only */
   const double *lambda; /* count x kind->rows: multipliers, for power and loss (the core: also (J^T lambda)_q) */
 } pw_batch;
@@ -631,14 +632,15 @@ extern const pw_kind *const pw_kinds[];
 /* ---- Creating and modifying models ---- */
 
 /* Creates a model with default parameters.  `name` is copied; the table must outlive the model.  NULL and the error if
- * the table does not match this library, or if out of memory. */
+ * the table fails pw_plugin_check, or if out of memory. */
 pw_model *pw_model_new (const char *name, const pw_plugin_table *table, pw_error *error);
 void pw_model_free (pw_model *m);
 
 /* Sets a parameter before pw_model_build.  Errors: PW_INPUT for an unknown name or a value outside its domain. */
 int pw_model_set (pw_model *m, const char *parameter, double value, pw_error *error);
 
-/* Runs the model's build function.  Errors: the first one of a body or element added. */
+/* Runs the model's build function.  Errors: the model's first one, which may be of a body or element added; PW_INPUT
+ * for a second call.  Values are checked by pw_system_compile. */
 int pw_model_build (pw_model *m, pw_error *error);
 
 /* Replaces a signal of a built model; pw_system_compile checks it.  PW_INPUT for an unknown element or field. */
@@ -687,8 +689,8 @@ int pw_model_keep (pw_model *m, void *object, void (*free_object) (void *object)
 /* The first error of a model; a build function may set it. */
 pw_error *pw_model_error (pw_model *m);
 
-/* Check a body and an element as pw_system_compile does, except whether the bodies of the element exist.  Errors:
- * PW_INPUT, beginning with "model NAME: ". */
+/* Check a body and an element as pw_system_compile does, except whether names are unique, whether the bodies of the
+ * element exist, and what `prepare` checks.  Errors: PW_INPUT, beginning with "model NAME: ". */
 int pw_model_check_body (const pw_model *m, const pw_body *body, pw_error *error);
 int pw_model_check_element (const pw_model *m, const pw_element *element, pw_error *error);
 
@@ -803,7 +805,7 @@ typedef struct {
   int row;             /* its first constraint equation, of kind->rows */
   int coordinate;      /* its first internal coordinate, of kind->internal */
   int contact;         /* index of its contact point; -1: no contact point */
-  int force;           /* index of its first force in pw_workspace_forces */
+  int force;           /* index in `out` of pw_workspace_forces of its first number */
 } pw_element_info;
 int pw_system_elements (const pw_system *s);
 pw_element_info pw_system_element (const pw_system *s, int element);
@@ -821,7 +823,7 @@ int pw_workspace_contact_points (pw_workspace *w, double t, const double *q, con
                                  pw_error *error);
 
 /* The force (Fx, Fy [N], M [N m] about the centre of mass) of each element on each of its bodies: -J^T lambda plus the
- * applied force.  Entries of the ground are meaningless. */
+ * applied force; meaningless for the ground.  out: pw_system_force_size numbers, three per body of each element. */
 int pw_system_force_size (const pw_system *s);
 int pw_workspace_forces (pw_workspace *w, double t, const double *q, const double *v, const double *lambda, double *out,
                          pw_error *error);

@@ -45,7 +45,8 @@ typedef struct {
 /* Scales of a system in its initial state.  "Units of the scene", in which thresholds and scaled numbers are given, are
  * L for lengths, 1 rad for angles, T for times. */
 typedef struct {
-  double length; /* L: largest distance of an attachment from its body's centre of mass, else radius of gyration [m] */
+  double length; /* L [m]: largest distance of an attachment from its body's centre of mass, else a radius of gyration
+                  * other than 0, else 1 */
   double time; /* T: 1 / max (1 / span, largest velocity, square root of the largest acceleration), in units of L [s] */
 } pw_scale;
 

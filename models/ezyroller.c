@@ -1,7 +1,8 @@
 /* EzyRoller: a ride-on of two segments that moves because its rider swings the steering hinge.
  *
  * The frame has the rider and a wheel A at the rear; the steering assembly has a wheel C in front and is
- * hinged to the frame at B; a torque acts between the two.  By default the steering assembly is massless.
+ * hinged to the frame at B; a torque acts between the two.  Initially the assembly is turned by pi, so that C is behind
+ * B.  By default it is massless.
  * (TU Delft ME41055, Multibody Dynamics B, 2018, homework 8.) */
 #include "pinwheel.h"
 

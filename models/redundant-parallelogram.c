@@ -52,7 +52,7 @@ static void reference (const void *parameter, double t, double *q, double *v) {
   double am = pw_jacobi_am (pw_elliptic_K (k * k) - w * t, k * k);
   double theta = 2 * asin (k * sin (am)) - PW_PI / 2, rate = -2 * k * w * cos (am);
   double x = p->l * cos (theta), y = p->l * sin (theta);
-  if (fabs (p->theta + PW_PI / 2) >= PW_PI) return; /* not within one turn of the lowest point: no reference */
+  if (fabs (p->theta + PW_PI / 2) >= PW_PI) return; /* half a turn or more from the lowest point: no reference */
   for (int i = 0; i < 4; i++, q += 3, v += 3) {     /* the coupler, then the cranks */
     double part = i == 0 ? 1 : 0.5;
     q[0] = p->l * (i == 0 ? 1 : i - 1) + part * x, q[1] = part * y, q[2] = i == 0 ? 0 : theta;

@@ -44,7 +44,7 @@ const char *pw_domain_check (pw_domain domain, double value);
 int pw_utf8_size (const char *text);
 /* Code of the control character at the beginning of a text; 0 if there is none, or a line end or tab. */
 int pw_control (const char *text);
-/* 1 if a text is UTF-8 without control characters. */
+/* 1 if a text is UTF-8 without control characters other than line ends and tabs. */
 int pw_is_text (const char *text);
 /* Replaces control characters and invalid bytes by question marks. */
 void pw_text_sanitise (char *text);

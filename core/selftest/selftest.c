@@ -197,7 +197,7 @@ static double selftest_change (pw_probe *probe, int e, int c, double v, const do
 }
 
 /* From rest, a hundredth of the declared saturation velocity, or of a large velocity if none is declared, must
- * change the force by less than half of the change by the whole velocity. */
+ * change the force by at most half of the change by the whole velocity. */
 static void selftest_saturation (pw_probe *probe) {
   const double large = 1000;
   selftest_numbers declared, rest;

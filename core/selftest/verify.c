@@ -1,5 +1,5 @@
-/* The independent verifier: plain loops over elements, rows and columns; it shares only the element types with the
- * solvers.
+/* The independent verifier: plain loops over elements, rows and columns; it shares only the element types and the
+ * kinematics (configurations, signals) with the solvers.
  *
  * Residuals of velocities and accelerations are divided by the sum of the absolute values of their terms plus L / T or
  * L / T^2, with the length L and time T of the run, so that round-off is about 1e-16 in any units.  A position residual

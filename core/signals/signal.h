@@ -25,7 +25,7 @@ int pw_signal_eval (const pw_source *source, double t, pw_signal_order order, do
 
 /* Times at which a step must end. */
 typedef enum {
-  PW_JUMPS,          /* jumps of the signal or of its first or second derivative */
+  PW_JUMPS,          /* jumps of the signal or of its first or second derivative; start and end of a smooth-step */
   PW_JUMPS_AND_KINKS /* also kinks of the second derivative: the points of a cubic table */
 } pw_breakpoints;
 
@@ -40,7 +40,8 @@ static inline double pw_table_value (const pw_signal *s, int i) {
   return s->table.offset + scale * s->table.value[i];
 }
 
-/* Computes the spline of a checked table, 2 count numbers: the first derivative just after each point (after the last
+/* pw_table_spline and pw_table_eval ignore scale and offset, which compilation has applied to the values.
+ * Computes the spline of a checked table, 2 count numbers: the first derivative just after each point (after the last
  * one meaningless), then the second derivatives. */
 void pw_table_spline (const pw_signal *s, double *spline);
 void pw_table_eval (const pw_signal *s, const double *spline, double t, double u[3]);

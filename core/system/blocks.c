@@ -6,7 +6,8 @@
 #include <string.h>
 #include "system.h"
 
-/* Each block: `function` of the type's table is the derivative of `original`, or of its product with w or lambda. */
+/* Each block is the derivative of `original` of the type's table, or of its product with w or lambda.  `function`: the
+ * type's function for it; for PW_JTL_Q jw_q, from which blocks_transpose computes the block. */
 #define BLOCKS_ENTRY(f, g) .function = offsetof (pw_kind, f), .original = offsetof (pw_kind, g)
 static const struct {
   size_t function, original;

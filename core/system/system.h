@@ -11,7 +11,7 @@
 #include "signal.h"
 
 /* One element type in use: its batch, and the indices of its constraint equations and coordinates.  What a run modifies
- * (J, block, u, and the configurations, velocities and signals of b) is NULL in a system: workspaces have it. */
+ * (J, block, u, and q, v, u, w, lambda and the configurations of b) is NULL in a system: workspaces have it. */
 typedef struct {
   pw_batch b; /* the argument of the type's functions */
   const pw_kind *kind;
@@ -132,7 +132,7 @@ double pw_potential (pw_workspace *w);
 /* The potential energy of each element [J], in the order of the batches; entries of types without one are not set. */
 void pw_evaluate_energies (pw_workspace *w, double *out);
 double pw_kinetic (const pw_system *s, const double *v);
-/* Power of each entry of the ledger [W]; needs J and lambda. */
+/* Power of each entry of the ledger [W]; does not need J. */
 void pw_evaluate_ledger (pw_workspace *w, const double *lambda, double *rate);
 
 /* out = J x; out += J^T lambda; with J as evaluated last. */
@@ -176,7 +176,7 @@ static inline pw_batch_function *pw_kind_function (const pw_kind *kind, size_t o
  * lambda)/dq; ETA_Q: d eta/dq; ... */
 typedef enum { PW_JW_Q, PW_JTL_Q, PW_ETA_Q, PW_GAMMA_Q, PW_GAMMA_V, PW_FORCE_Q, PW_FORCE_V, PW_BLOCKS } pw_block;
 
-/* The type's function for a block: NULL if identically zero, or pw_by_differences. */
+/* The type's function for a block (PW_JTL_Q: its jw_q): NULL if identically zero, or pw_by_differences. */
 pw_batch_function *pw_block_function (const pw_kind *kind, pw_block block);
 
 /* Rows of a block per element: kind->rows or the number of local columns. */

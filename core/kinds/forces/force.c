@@ -26,7 +26,7 @@ typedef struct {
 static inline force_state force_at (const pw_batch *batch, int e) {
   const force *element = (const force *)batch->element + e;
   const pw_configuration *body = batch_body (batch, e);
-  const double *ux = batch->u + 6 * e, *uy = ux + 3; /* the signals, each with two time derivatives */
+  const double *ux = batch->u + 6 * e, *uy = ux + 3; /* three numbers for each signal, the first is its value */
   force_state now = { element, body, .cos = element->body_axes > 0 ? body->cos : 1,
                       .sin = element->body_axes > 0 ? body->sin : 0 };
   to_world (body, element->at, now.arm);

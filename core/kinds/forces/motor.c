@@ -24,7 +24,7 @@ typedef struct {
 static inline motor_state motor_at (const pw_batch *batch, int e) {
   const motor *element = (const motor *)batch->element + e;
   const pw_configuration *body1 = batch_body (batch, 2 * e), *body2 = batch_body (batch, 2 * e + 1);
-  const double *angle = batch->u + 6 * e, *rate = angle + 3; /* the signals u1, u2, each with two time derivatives */
+  const double *angle = batch->u + 6 * e, *rate = angle + 3; /* signals u1, u2: of three numbers each, the value */
   motor_state now = { element, body1, body2,
                       .y = element->stiffness * (angle[0] - body1->phi + body2->phi) +
                            element->damping * (rate[0] - body1->omega + body2->omega) };
