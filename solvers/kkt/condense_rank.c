@@ -6,7 +6,8 @@
  * uncondensed body, and both its ends were at rest, the matrix would be singular where the leg is stretched.  So the
  * nodes at one end have rank 2.  Then multipliers of rank 0 that exert no force on the bodies of a leg exert none on
  * the body at its other end either, since the forces of a joint on its two bodies are opposite: dependent equations of
- * rank 0 are dependent in the whole mechanism. */
+ * rank 0 are dependent in the whole mechanism.  Nodes of uncondensed bodies alone have rank 2, too: with these at rest
+ * their equations would be empty. */
 #include "condense.h"
 
 typedef struct {
