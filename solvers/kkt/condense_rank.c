@@ -74,7 +74,7 @@ int pw_condense_rank (pw_plan *plan) {
   if (memory == NULL) return PW_RESOURCE;
   rank_plan x = { .plan = plan, .parent = memory, .leg = memory + n, .surplus = memory + 2 * n };
   rank_find_legs (&x);
-  for (int fewer = 0; fewer < 2; fewer++) /* the end of a leg with fewer equations comes last */
+  for (int fewer = 0; fewer < 2; fewer++) /* of a leg to the ground, the end with fewer equations comes last */
     for (int i = 0; i < plan->nodes; i++) {
       int group = rank_leg_group (plan, i, &touches);
       if (!touches && (group < 0 || !plan->node[i].grounded)) continue;
