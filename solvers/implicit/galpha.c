@@ -134,7 +134,8 @@ static int galpha_correct (pw_run *r, double h, double *correction, double *roun
 }
 
 /* Computes the new state at t1 = t + h with its accelerations and multipliers; kinematics and J are left there.
- * PW_RETRY if the iteration does not converge, PW_INPUT if its matrix is singular, PW_METHOD if a signal failed.
+ * PW_RETRY if the iteration does not converge; PW_INPUT if its matrix is singular; PW_METHOD if a signal failed;
+ * PW_RESOURCE.
  *
  * The matrix is evaluated at the prediction, and again while convergence is slow.  The remaining error in multipliers,
  * 1/h^2 times that of positions, must be small against the method's own, which is of order h^2: hence the target of
@@ -235,7 +236,7 @@ static int galpha_trial_jerk (pw_run *r, double h, double *jerk) {
 }
 
 /* Adds to the velocities the error with which the method starts without loss of order in index3: the dv with
- * G dv = C h^2 G a-dot that is least in the metric of M. */
+ * G dv = C h^2 G a-dot and S dv = 0 that is least in the metric of M. */
 static int galpha_add_velocity_error (pw_run *r, double h, const double *jerk) {
   pw_method_data *d = r->data;
   const pw_system *s = r->s;

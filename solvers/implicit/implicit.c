@@ -77,8 +77,9 @@ int pw_implicit_fail (pw_run *r, int status, double h, pw_error *error) {
                   r->settings.rtol);
 }
 
-/* Makes a step of size h to *t1.  If it fails because its end is near a singular configuration, where the Newton matrix
- * is singular, longer ones are tried, up to `stop`; *t1: the end of the step made. */
+/* Makes a step of size h to *t1.  If it fails and its beginning or, in leapfrog, its end is near a singular
+ * configuration, where the Newton matrix is singular, longer ones are tried, up to `stop`; *t1: the end of the step
+ * made. */
 static int implicit_step_around (pw_run *r, pw_implicit_step *step, double h, double stop, double *t1) {
   static const double longer[] = { 1.38, 1.76, 2.62 }; /* in units of h; irregular, since configurations may recur */
   int status = step (r, h, *t1);

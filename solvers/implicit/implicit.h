@@ -15,7 +15,7 @@ typedef enum { PW_ITERATE, PW_CONVERGED, PW_DIVERGED } pw_convergence;
 typedef struct {
   pw_step_counter counter;
   double h;             /* size of the last step; 0: there is none, or it failed */
-  double *q1, *v1;      /* coords + 3: the new state */
+  double *q1, *v1;      /* coords: the new state */
   pw_dae dae;           /* the equations and the pattern of the Newton matrix; leapfrog uses only its tangent */
   double *value;        /* nonzero values of the matrix */
   pw_sparse sparse;     /* its factors */
@@ -34,11 +34,12 @@ int pw_implicit_open_matrix (pw_implicit *x, int size);
 int pw_implicit_complete (pw_run *r, int status, pw_dense_projection projection, pw_error *error);
 
 /* Factors of the rows and columns of the matrix of pw_dae_matrix with q_dot_factor c and v_dot_factor e: with them its
- * entries are of about the same size for every step size (equations in galpha.c). */
+ * entries are of about the same size for every step size (equations in galpha.c).  radau uses them, too. */
 void pw_implicit_scale (const pw_dae *x, double c, double e, double *row_factor, double *column_factor);
 
 /* A step from the state reached to the new state q1, v1 at t1 = t + h; kinematics are left there.  Returns PW_RETRY if
- * the iteration does not converge, PW_INPUT if its matrix is singular, PW_METHOD if a signal failed, PW_RESOURCE. */
+ * the iteration does not converge, or a singular configuration prevents the solution for velocities or accelerations;
+ * PW_INPUT if the Newton matrix is singular; PW_METHOD if a signal failed; PW_RESOURCE. */
 typedef int pw_implicit_step (pw_run *r, double h, double t1);
 
 /* Advances by one step: makes q1, v1 the state reached, and calls `accept`, which sets its accelerations and
@@ -46,7 +47,7 @@ typedef int pw_implicit_step (pw_run *r, double h, double t1);
 int pw_implicit_advance (pw_run *r, double t_end, pw_implicit_step *step, void (*accept) (pw_run *r), pw_error *error);
 
 /* Reports a failed step of size h from the state reached, also of radau; status: what the step returned, PW_OK if its
- * error is too large.  The reason may be a singular configuration at its beginning. */
+ * error is too large.  The reason may be a singular configuration at its beginning or, in leapfrog, at its end. */
 int pw_implicit_fail (pw_run *r, int status, double h, pw_error *error);
 
 /* For the table of the method: PW_IMPLICIT_FUNCTIONS. */

@@ -160,8 +160,8 @@ static int radau_accept (pw_run *r, double h, double t1) {
   return PW_OK;
 }
 
-/* The size of the next step, from the errors of this and the previous one; constants as in RADAU5.  rejected: 1 if this
- * one was rejected at least once. */
+/* The size of the next step, from the errors of this and the previous one; constants as in RADAU5.  rejected: not 0 if
+ * this one was rejected at least once. */
 static double radau_next_h (const pw_method_data *d, double h, double error, int rejected) {
   double safety = 0.9 * fmin (1, (1. + 2 * PW_RADAU_MOST) / (d->iterations + 2 * PW_RADAU_MOST));
   double quotient = fmin (5, fmax (1. / 8, pow (error, 0.25) / safety));
@@ -292,8 +292,8 @@ static void radau_fill_sample (pw_run *r, double x) {
   memcpy (r->v_at, v, (size_t)n * sizeof *v);
 }
 
-/* Projects the sample onto the constraints that the steps satisfy, and computes accelerations and multipliers from
- * it. */
+/* Projects the sample onto the constraints that the steps satisfy, in index3 onto g = 0 only, and computes
+ * accelerations and multipliers from it. */
 static int radau_interpolate (void *method, pw_run *r, double t) {
   pw_method_data *d = method;
   int status;

@@ -34,7 +34,7 @@ struct pw_method_data {
   double *unit;                                    /* 2 coords: units of the states */
   double *tolerance, *newton_tolerance;            /* 2 coords: of the error test; of corrections */
   double *round_off;                               /* 2 coords: of the states */
-  double contraction;                              /* ratio of successive corrections in the last iteration */
+  double contraction;                              /* mean ratio of successive corrections, when last known */
   double remaining;                                /* remaining error over the last correction */
   int iterations;                                  /* of the last step */
   double reduction;                                /* factor of the step size if the iteration does not converge */

@@ -36,8 +36,9 @@ void pw_dae_close (pw_dae *x);
  * mu after them; a: NULL for 0, except in none and baumgarte. */
 void pw_dae_residual (pw_dae *x, const double *v, const double *a, const double *lambda, double *F);
 
-/* Adds dF/dy + q_dot_factor dF/dq' + v_dot_factor dF/dv' to the matrix of x->tangent.  In si1, F depends on the
- * derivatives of the unknowns lambda and mu: their columns are those times v_dot_factor. */
+/* Adds dF/dy + q_dot_factor dF/dq' + v_dot_factor dF/dv', with q' - v included, to the matrix that x->tangent.scatter
+ * fills; arguments and requirements as for pw_dae_residual.  In si1, F depends on the derivatives of the unknowns
+ * lambda and mu: their columns are those times v_dot_factor. */
 void pw_dae_matrix (pw_dae *x, const double *v, const double *a, const double *lambda, double q_dot_factor,
                     double v_dot_factor);
 

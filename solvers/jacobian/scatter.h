@@ -21,7 +21,7 @@ typedef struct {
   int failed;    /* 1: out of memory while recording */
 } pw_scatter_map;
 
-/* From now on contributions are recorded; their values are ignored. */
+/* From now on contributions are recorded; their values are ignored.  *t: new or closed; it is overwritten. */
 void pw_scatter_begin_record (pw_scatter_map *t);
 
 /* Ends the recording, of a matrix with n columns.  PW_OK or PW_RESOURCE; free colptr (n + 1) and rowind (nonzeros) in

@@ -22,7 +22,7 @@ typedef struct {
 int pw_sparse_open (pw_sparse *x, pw_sparse_numbers numbers, int n, int64_t *colptr, int64_t *rowind);
 void pw_sparse_close (pw_sparse *x);
 
-/* PW_OK, PW_INPUT if the matrix is singular, PW_RESOURCE. */
+/* value: the nonzeros in the order of rowind.  PW_OK, PW_INPUT if the matrix is singular, PW_RESOURCE. */
 int pw_sparse_factor (pw_sparse *x, double *value);
 
 /* The next factorisation selects its pivots again. */

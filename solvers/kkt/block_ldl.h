@@ -24,8 +24,8 @@
  *   L = K D_c^-1,   D_(c+1) = K_(c+1)(c+1) - L K^T,   y_(c+1) -= L y_c
  *   backwards:   y_c = -D_c^-1 (y_c + K^T y_(c+1)),   K^T y = s s' m y + i (b . y) a
  *
- * where D and y are passed from pin to pin, and only the factors of D are stored.  If the last pin's column has no rows
- * below the diagonal, the elimination proceeds from both ends to the middle. */
+ * where D and y are passed from pin to pin, and only the factors of D are stored.  If a chain has two bodies or more
+ * and its last pin's column has no rows below the diagonal, the elimination proceeds from both ends to the middle. */
 #ifndef PW_BLOCK_LDL_H
 #define PW_BLOCK_LDL_H
 
@@ -103,14 +103,14 @@ typedef struct {
 typedef struct {
   int size;               /* unknowns */
   int rank;               /* 0 to PW_BLOCK_RANKS - 1 */
-  int grounded;           /* 1: touches the ground or prescribed coordinates (pw_is_grounded) */
+  int grounded;           /* 1: touches prescribed coordinates, or pw_is_grounded (massless.h) */
   int unknown;            /* index in y of its first unknown: its first row, or beyond the rows for -a_k */
   int first_contribution; /* index of the first one; they end at that of the next node */
 } pw_plan_node;
 
 /* Orders the nodes and determines the pattern.  pair: 2 x pairs numbers of nodes that are coupled, in any order, with
  * repetition; pairs < 2^30.  The order is that of the nodes if it fills in no more than minimum degree does (AMD:
- * Amestoy, Davis & Duff 1996).  NULL if out of memory. */
+ * Amestoy, Davis & Duff 1996).  NULL if out of memory, or if L has 2^30 blocks or more below the diagonal. */
 pw_block_ldl *pw_block_open (int nodes, const pw_plan_node *node, long pairs, const int *pair);
 void pw_block_close (pw_block_ldl *l); /* l may be NULL */
 

@@ -12,7 +12,8 @@ static void condense_add_node (pw_plan *plan, pw_plan_node node) {
   if (!plan->failed) plan->node[plan->nodes++] = node;
 }
 
-/* Adds the contribution of the last node to the group that begins with coordinate j. */
+/* Adds the contribution of the last node to the group that begins with coordinate j, unless these coordinates are all
+ * prescribed or massless; a prescribed one makes the node `grounded`. */
 static void condense_contribute (pw_plan *plan, const double *J, int row_stride, int j, int is_pin) {
   int moves = 0;
   if (plan->failed) return;

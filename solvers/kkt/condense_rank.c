@@ -6,7 +6,8 @@
  * uncondensed body, and both its ends were at rest, the matrix would be singular where the leg is stretched.  So the
  * nodes at one end have rank 2.  Then multipliers of rank 0 that exert no force on the bodies of a leg exert none on
  * the body at its other end either, since the forces of a joint on its two bodies are opposite: dependent equations of
- * rank 0 are dependent in the whole mechanism. */
+ * rank 0 are dependent in the whole mechanism.  Nodes of uncondensed bodies alone have rank 2, too: with these at rest
+ * their equations would be empty. */
 #include "condense.h"
 
 typedef struct {
@@ -73,7 +74,7 @@ int pw_condense_rank (pw_plan *plan) {
   if (memory == NULL) return PW_RESOURCE;
   rank_plan x = { .plan = plan, .parent = memory, .leg = memory + n, .surplus = memory + 2 * n };
   rank_find_legs (&x);
-  for (int fewer = 0; fewer < 2; fewer++) /* the end of a leg with fewer equations comes last */
+  for (int fewer = 0; fewer < 2; fewer++) /* of a leg to the ground, the end with fewer equations comes last */
     for (int i = 0; i < plan->nodes; i++) {
       int group = rank_leg_group (plan, i, &touches);
       if (!touches && (group < 0 || !plan->node[i].grounded)) continue;

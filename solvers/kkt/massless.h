@@ -89,7 +89,7 @@ typedef struct {
 typedef struct {
   int components;
   pw_component *component, *end;
-  int *component_of_row; /* -1: without massless coordinates */
+  int *component_of_row; /* s->rows; -1: inactive, or without massless coordinates */
   char *memory;
 } pw_massless;
 

@@ -13,8 +13,9 @@
 typedef struct pw_saddle pw_saddle;
 
 /* rows: number of rows of J included (all, or the holonomic ones); of these only those with active[i] != 0 if active is
- * given.  J must be evaluated at a typical configuration.  weight: coords, copied.  Errors: PW_RESOURCE; PW_INPUT if a
- * coordinate without weight is determined by no row. */
+ * given.  J must be evaluated at a typical configuration.  weight: coords.  The saddle refers to w, but not to weight
+ * and active, after opening.  NULL on errors: PW_RESOURCE; PW_INPUT if a coordinate without weight is determined by no
+ * row. */
 pw_saddle *pw_saddle_open (pw_workspace *w, const double *weight, int rows, const unsigned char *active,
                            pw_error *error);
 void pw_saddle_close (pw_saddle *saddle);

@@ -144,7 +144,7 @@ static int ida_interpolate (pw_method_data *d, double t) {
   long steps = 0;
   int flag = IDAGetNumSteps (d->ida, &steps);
   if (flag == IDA_SUCCESS && (steps == 0 ? t != r->t : t > r->t)) flag = IDA_BAD_T;
-  if (steps == 0) ida_fill_vectors (d); /* the initial state */
+  if (steps == 0) ida_fill_vectors (d); /* the state at the start or the last restart */
   if (flag == IDA_SUCCESS && steps > 0) flag = IDAGetDky (d->ida, t, 1, d->yp);
   if (flag == IDA_SUCCESS && steps > 0) flag = IDAGetDky (d->ida, t, 0, d->sun.y);
   if (flag != IDA_SUCCESS) return flag;

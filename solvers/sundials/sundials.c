@@ -16,9 +16,9 @@ static_assert (CV_ERR_FAILURE == IDA_ERR_FAIL && CV_CONV_FAILURE == IDA_CONV_FAI
                    CV_LSETUP_FAIL == IDA_LSETUP_FAIL && CV_TOO_MUCH_ACC == IDA_TOO_MUCH_ACC,
                "CVODES and IDAS have the same flags");
 
-/* SUNDIALS 6.4 dereferences vectors and loggers whose allocation failed, so enough memory is reserved first: for at
- * most 60 vectors (13 of a Nordsieck array of order 12, a dozen more, as many for quadratures, and those of a restart),
- * each with a table of operations, and for the rest. */
+/* SUNDIALS 6.4 dereferences vectors and loggers whose allocation failed, so it is tested first whether there is enough
+ * memory: for at most 60 vectors (13 of a Nordsieck array of order 12, a dozen more, as many for quadratures, and those
+ * of a restart), each with a table of operations, and for the rest. */
 int pw_sun_open (pw_sun *x, pw_run *r, int unknowns) {
   enum { VECTORS = 60, TABLE = 1024, REST = 1 << 17 };
   x->run = r;

@@ -12,8 +12,8 @@
 #include "quadrature.h"
 
 /* Attempts at a step, each about a quarter of the one before, if the iteration does not converge or the error is too
- * large: from 1 s down to the round-off of the time.  SUNDIALS' default of 10, down to a millionth of the step, does
- * not resolve the moment at which friction stops a body. */
+ * large: from 1 s down to the round-off of the time.  SUNDIALS' defaults of 7 and 10, down to a millionth of the
+ * step, do not resolve the moment at which friction stops a body. */
 enum { PW_SUN_ATTEMPTS = 27 };
 
 typedef struct {
@@ -43,7 +43,8 @@ N_Vector pw_sun_vector (sunindextype length, SUNContext context);
 
 /* Open x->matrix, of this pattern in compressed columns, and x->solver, which refuses an outdated matrix (tolerances.c)
  * so that the integrator requests a new one.  right: a vector of the size of the matrix; content: the method's data,
- * beginning with x, which `solve` finds in its solver; solve: NULL for KLU's. */
+ * beginning with x, which `solve` finds in its solver; solve: NULL for KLU's; any other must itself refuse an outdated
+ * matrix. */
 typedef int pw_sun_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector x, N_Vector b, realtype tolerance);
 int pw_sun_open_matrix (pw_sun *x, int size, const int64_t *colptr, const int64_t *rowind);
 int pw_sun_open_solver (pw_sun *x, N_Vector right, void *content, pw_sun_solve *solve);

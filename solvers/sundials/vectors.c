@@ -2,8 +2,8 @@
  * vectors of a dozen entries, in libraries that distributions may build without optimisation.  These operations are
  * plain loops, including the fused operations on several vectors.
  *
- * Linear sums round like those of SUNDIALS, except that SUNDIALS computes a x + a y as a (x + y); norms add even and
- * odd entries separately. */
+ * Linear sums round like those of SUNDIALS, except that SUNDIALS computes a x + a y as a (x + y) and a x - a y as
+ * a (x - y); norms add even and odd entries separately. */
 #include <math.h>
 #include "sundials.h"
 #include "unroll.h"
