@@ -68,7 +68,7 @@ enum {
 enum { PLOT_GROUND = -1, PLOT_HIDDEN = -2 };
 
 /* Columns of a sample: these, then x, y, phi, vx, vy, omega of each body drawn, then x, y, heading of each wheel drawn,
- * then Fx, Fy of each link. */
+ * then, with forces, Fx, Fy of each link. */
 enum { PLOT_T, PLOT_KINETIC, PLOT_POTENTIAL, PLOT_WORK, PLOT_LOSS, PLOT_PROJECTION, PLOT_BALANCE, PLOT_FIRST };
 
 /* The motions of bodies, or of "wheels": all elements with a contact point, which include markers. */

@@ -6,7 +6,7 @@
 
 /* ---- Warnings on standard error ---- */
 
-/* Angles of more than a turn, which are probably degrees, and expressions that may jump as states change. */
+/* Initial phi and headings of more than a turn, which are probably degrees; expressions that may jump with states. */
 void pw_report_model (const pw_model *model);
 
 /* Options without effect, long fixed steps, an absolute tolerance within which a force saturates. */
