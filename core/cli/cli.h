@@ -58,7 +58,7 @@ int pw_limit_status (const pw_limit *limit, double t, pw_error *error);
 /* A command line: its arguments and the options shared by several commands, NULL if not given.  The structure of
  * options of every command begins with one. */
 typedef struct {
-  const char **argument; /* ended by NULL */
+  const char **argument; /* ended by NULL; NULL if there are none */
   int arguments;
   const char **sets, **starts; /* "NAME=VALUE" of each --set and --start; ended by NULL */
   const char *max_file;
@@ -145,7 +145,8 @@ int pw_cli_number (const char *option, const char *text, pw_domain domain, doubl
 /* Reads a range "FIRST:LAST".  PW_INPUT, without an error, if it is not two finite numbers. */
 int pw_cli_range (const char *text, double *first, double *last);
 
-/* Final time, settings except `ledger`, and limit of a run, from options and defaults.  The limit must outlive it. */
+/* Final time, settings except `ledger` and `specialised`, and limit of a run, from options and defaults.  The limit must
+ * outlive the run. */
 int pw_cli_settings (const pw_cli_line *line, const pw_run_defaults *defaults, double *t_end, pw_settings *settings,
                      pw_limit *limit, pw_error *error);
 

@@ -31,7 +31,7 @@ typedef struct {
   int runs;                     /* that have reached the end */
   double progress;              /* part of its runs that is done, 0 to 1 */
   double t;                     /* time reached [s] */
-  double cpu;                   /* processor time of the last run; of compare, then the median of timed runs [s] */
+  double cpu;                   /* processor time of the last run; at last, of compare, the median of timed runs [s] */
   double balance;               /* largest |energy balance| of the samples [J] */
   pw_statistics statistics;     /* of the last run */
   char reason[500];             /* of any state but ROW_DONE; else "" */
