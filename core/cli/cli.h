@@ -145,8 +145,8 @@ int pw_cli_number (const char *option, const char *text, pw_domain domain, doubl
 /* Reads a range "FIRST:LAST".  PW_INPUT, without an error, if it is not two finite numbers. */
 int pw_cli_range (const char *text, double *first, double *last);
 
-/* Final time, settings except `ledger` and `specialised`, and limit of a run, from options and defaults.  The limit must
- * outlive the run. */
+/* Final time, settings except `ledger` and `specialised`, and limit of a run, from options and defaults.  The limit
+ * must outlive the run. */
 int pw_cli_settings (const pw_cli_line *line, const pw_run_defaults *defaults, double *t_end, pw_settings *settings,
                      pw_limit *limit, pw_error *error);
 

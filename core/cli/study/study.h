@@ -15,14 +15,14 @@ enum {
   STUDY_COORDINATES = 5 /* of a point in a figure, at most */
 };
 
-/* Done; failed; refused when the run was opened; stopped at the limit; not run, since it would exceed the limit. */
+/* Done, or not begun; failed; refused when the run was opened; stopped at the limit; not run, since it would exceed the limit. */
 typedef enum { ROW_DONE, ROW_FAILED, ROW_REFUSED, ROW_STOPPED, ROW_SKIPPED } pw_row_state;
 
 typedef struct {
   char method[STUDY_NAME]; /* with options */
   char label[STUDY_NAME];  /* of its curve in the figure: at first the method */
   int group;               /* the part of the table that contains it, which has a figure of its own */
-  int curve;               /* the curve of this figure that contains its points */
+  int curve;               /* the curve of this figure that contains its points; of compare, the index of its method */
   int adaptive;            /* 1: the step size follows a tolerance */
   double level;            /* of compare: tolerance, or step size [s] */
   int coarser_levels;      /* of compare: number of rows of its method before it */
