@@ -14,7 +14,7 @@ typedef struct pw_plots pw_plots;
 
 /* Prepares to store samples of a run from t = 0 to t_end [s] for figures in a folder, which is created if necessary;
  * folder NULL: for an animation alone.  forces: 1 if the animation shows the forces of elements.  Folder, model and
- * system must outlive the result.  NULL and PW_RESOURCE if the folder cannot be written or memory is exhausted. */
+ * system must outlive the result.  NULL and the error if the folder cannot be written or memory is exhausted. */
 pw_plots *pw_plots_open (const char *folder, int forces, const pw_model *model, const pw_system *system, double t_end,
                          pw_error *error);
 void pw_plots_close (pw_plots *plots);

@@ -15,7 +15,7 @@ enum {
   STUDY_COORDINATES = 5 /* of a point in a figure, at most */
 };
 
-/* Done, or not begun; failed; refused when the run was opened; stopped at the limit; not run, since it would exceed the limit. */
+/* Done, or not begun; failed; refused on opening; stopped at the limit; not run, since it would exceed the limit. */
 typedef enum { ROW_DONE, ROW_FAILED, ROW_REFUSED, ROW_STOPPED, ROW_SKIPPED } pw_row_state;
 
 typedef struct {
