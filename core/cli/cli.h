@@ -58,7 +58,7 @@ int pw_limit_status (const pw_limit *limit, double t, pw_error *error);
 /* A command line: its arguments and the options shared by several commands, NULL if not given.  The structure of
  * options of every command begins with one. */
 typedef struct {
-  const char **argument; /* ended by NULL */
+  const char **argument; /* ended by NULL; NULL if there are none */
   int arguments;
   const char **sets, **starts; /* "NAME=VALUE" of each --set and --start; ended by NULL */
   const char *max_file;
@@ -138,14 +138,15 @@ int pw_cli_at_most (const pw_command *command, const pw_cli_line *line, int most
 /* PW_INPUT if an option ("--every") is given (its value is not NULL) without the one that it requires ("-o DIR"). */
 int pw_cli_requires (const char *option, const char *value, const char *required, int is_given, pw_error *error);
 
-/* Reads the value of an option ("--step") in any locale; a NULL text leaves *value unchanged.  PW_INPUT if it is not a
- * number in the domain. */
+/* Reads the value of an option ("--step"), a number or an expression, in any locale; a NULL text leaves *value
+ * unchanged.  PW_INPUT if it is neither or lies outside the domain. */
 int pw_cli_number (const char *option, const char *text, pw_domain domain, double *value, pw_error *error);
 
 /* Reads a range "FIRST:LAST".  PW_INPUT, without an error, if it is not two finite numbers. */
 int pw_cli_range (const char *text, double *first, double *last);
 
-/* Final time, settings except `ledger`, and limit of a run, from options and defaults.  The limit must outlive it. */
+/* Final time, settings except `ledger` and `specialised`, and limit of a run, from options and defaults.  The limit
+ * must outlive the run. */
 int pw_cli_settings (const pw_cli_line *line, const pw_run_defaults *defaults, double *t_end, pw_settings *settings,
                      pw_limit *limit, pw_error *error);
 
@@ -168,7 +169,7 @@ typedef struct {
   pw_system *system;
 } pw_cli_model;
 
-/* Opens the model file of a command line, whose first argument is its name or path. */
+/* Opens the model file of a command line, whose first argument is its name or path.  NULL and the error. */
 pw_file *pw_cli_file (const pw_cli_line *line, pw_error *error);
 
 /* Opens, builds and compiles the model of a command line with its --set and --start.  Returns a status; close the model
@@ -222,9 +223,9 @@ char *pw_cli_source (const pw_system *s, pw_error *error);
 void pw_cli_engine_open (pw_cli_engine *e, const pw_system *s, pw_specialise when, double steps);
 void pw_cli_engine_close (pw_cli_engine *e);
 
-/* The code that advances `lanes` runs at once, by a method of fixed step size; NULL: one run after the other.  With
- * `lanes` 0, as many as fill a vector register, but only if all runs together have PW_LANES_STEPS steps or more, which
- * repay the compilation. */
+/* The code that advances `lanes` runs at once, by a method of fixed step size; the caller closes it.  NULL: one run
+ * after the other.  With `lanes` 0, as many as fill a vector register, but only if all runs together have
+ * PW_LANES_STEPS steps or more, which repay the compilation. */
 #define PW_LANES_STEPS 1e7
 pw_scene_code *pw_cli_engine_lanes (const pw_cli_engine *e, const pw_system *s, const char *method, int lanes,
                                     double steps);
@@ -249,8 +250,8 @@ typedef struct {
   int locked, lock;            /* 1: a folder is locked; the descriptor of the lock */
 } pw_files;
 
-/* Checks a list of at most PW_FILES uses (pw_cli_check_uses), then opens what is written: use[i] becomes output[i].
- * Close them in every case. */
+/* Checks a list of at most PW_FILES uses (pw_cli_check_uses), then opens each file that is written, use[i] as
+ * output[i], and makes and locks the folder that is written into.  Close them in every case. */
 int pw_files_open (pw_files *files, const pw_cli_line *line, const pw_cli_model *m, pw_use *use, int count,
                    pw_error *error);
 FILE *pw_files_stream (const pw_files *files, int i); /* NULL: not requested */
@@ -276,7 +277,7 @@ void pw_cli_print_wrapped (const char *text, int indent, int width);
 const char *pw_cli_status_word (int status);
 
 /* Prints an error, if there is one, as "pinwheel: TEXT" on standard error, without "pinwheel:" if TEXT begins with a
- * file and line; returns the exit status. */
+ * file and line; returns the exit status.  A closed pipe on standard output is not reported: PW_CLOSED_PIPE. */
 int pw_cli_report_error (const pw_error *error);
 
 #endif

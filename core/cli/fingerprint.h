@@ -15,7 +15,7 @@ void pw_fingerprint_number (pw_text *t, const char *key, const char *name, doubl
 /* Adds a line with the name of a file and a checksum of its contents.  PW_INPUT or PW_RESOURCE if it cannot be read. */
 int pw_fingerprint_file (pw_text *t, const char *key, const char *name, const char *path, pw_error *error);
 /* Adds the first lines of the fingerprint of a run or sweep: `magic`, version, model, the checksum of its tables
- * (pw_fingerprint_tables) unless it is 0, method and settings.  Errors as of pw_fingerprint_file. */
+ * (pw_fingerprint_tables) unless it is 0, method, span, step and tolerances.  Errors as of pw_fingerprint_file. */
 int pw_fingerprint_run (pw_text *t, const char *magic, const pw_file *file, uint64_t table_sum, const char *method,
                         const pw_settings *settings, pw_error *error);
 /* Continues a checksum, 0 at first, with the tables in the signals of a model. */

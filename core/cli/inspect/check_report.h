@@ -33,7 +33,7 @@ typedef struct {
   pw_cli_model model;
   pw_run *run; /* NULL: initialisation failed with `run_error` */
   pw_error run_error;
-  pw_linear linear;       /* at the initial state; zero without a run */
+  pw_linear linear;       /* at the initial state; A is NULL if it was not computed */
   const char **redundant; /* a description of each redundant constraint equation, ended by NULL; or NULL */
   pw_checked_kind *kind;  /* kinds: the element types in use */
   int kinds;
@@ -41,7 +41,7 @@ typedef struct {
   double step;          /* the model's step size [s] */
   int uses_rk4;         /* 1: the model's method is rk4 */
   double rk4_limit;     /* the largest stable step of RK4 [s]; INFINITY: all are stable */
-  int fastest;          /* the eigenvalue of largest modulus except rigid displacements; -1: all are 0 */
+  int fastest;          /* the eigenvalue of largest modulus except rigid displacements; -1: none, or all 0 */
   double doubling_time; /* of the fastest growing perturbation of a steady motion [s]; INFINITY: none grows */
   pw_check_list problem, finding;
 } pw_check;

@@ -114,7 +114,7 @@ static void show_model (const pw_cli_model *m) {
 
 /* ---- The equations of motion in numbers ----
  *
- * M a + J^T lambda = f,  J a = gamma;  constraints on velocities J v = eta, on positions g (q, t) = 0. */
+ * M a + J^T lambda = f,  J a = gamma,  J v = eta;  for constraints on positions also g (q, t) = 0. */
 
 enum { MATRICES_DIGITS = 7, MATRICES_PANEL = 6 /* columns of J side by side */ };
 

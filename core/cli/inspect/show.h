@@ -8,8 +8,8 @@
  * abridged. */
 void pw_show_field (const pw_field *f, const void *at, int digits);
 
-/* Writes a built model to standard output as text, with 17 digits.  PW_INPUT if a text model cannot express it: signals
- * that are C functions, element types of a plug-in. */
+/* Writes a built model to standard output as text, with 17 digits, without a reference solution in C.  PW_INPUT if a
+ * text model cannot express it: signals that are C functions, element types of a plug-in, values of --start. */
 int pw_show_yaml (const pw_cli_model *opened, pw_error *error);
 
 #endif

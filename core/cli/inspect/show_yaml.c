@@ -1,4 +1,4 @@
-/* pinwheel show --yaml: a model as text with a bit-identical trajectory.
+/* pinwheel show --yaml: a model as text with a bit-identical trajectory, if its initial values are consistent.
  *
  * Numbers are written with 17 digits, and omitted if they are the default, 0. */
 #include <math.h>

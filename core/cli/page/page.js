@@ -1,6 +1,7 @@
 /* The script of interactive pages: runs the model in the browser and shows the result.  It follows the script of
  * animate.html, which draws `run` at the time state.t: begin() shows the first run, load() another one, key() the legend
- * of its curves, seek() a time; $, number, raised, size, place, placement, save, colours, palette are from there too. */
+ * of its curves, seek() a time; $, number, raised, size, place, placement, save, count, bodies, colours, palette are
+ * from there too. */
 
 /* ---- The engine: the model and the integrators, compiled to WebAssembly ---- */
 

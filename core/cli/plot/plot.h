@@ -14,7 +14,7 @@ typedef struct pw_plots pw_plots;
 
 /* Prepares to store samples of a run from t = 0 to t_end [s] for figures in a folder, which is created if necessary;
  * folder NULL: for an animation alone.  forces: 1 if the animation shows the forces of elements.  Folder, model and
- * system must outlive the result.  NULL and PW_RESOURCE if the folder cannot be written or memory is exhausted. */
+ * system must outlive the result.  NULL and the error if the folder cannot be written or memory is exhausted. */
 pw_plots *pw_plots_open (const char *folder, int forces, const pw_model *model, const pw_system *system, double t_end,
                          pw_error *error);
 void pw_plots_close (pw_plots *plots);
@@ -68,7 +68,7 @@ enum {
 enum { PLOT_GROUND = -1, PLOT_HIDDEN = -2 };
 
 /* Columns of a sample: these, then x, y, phi, vx, vy, omega of each body drawn, then x, y, heading of each wheel drawn,
- * then Fx, Fy of each link. */
+ * then, with forces, Fx, Fy of each link. */
 enum { PLOT_T, PLOT_KINETIC, PLOT_POTENTIAL, PLOT_WORK, PLOT_LOSS, PLOT_PROJECTION, PLOT_BALANCE, PLOT_FIRST };
 
 /* The motions of bodies, or of "wheels": all elements with a contact point, which include markers. */

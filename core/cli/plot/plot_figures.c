@@ -70,7 +70,7 @@ static int data_table (const pw_plots *plots, const char *name, const char *head
   return pw_output_finish (o, error);
 }
 
-/* ---- The mechanism: lines of "x y t body", blank lines between polygons; bodies are numbered from 1 ---- */
+/* ---- The mechanism: lines of "x y t body", blank lines between polygons; bodies from 1, 0: an element ---- */
 
 static void data_vertex (FILE *f, const double *at, double t, int body, const char *end) {
   data_row (f, (const double[]){ at[0], at[1], t, body + 1 }, 4, end);

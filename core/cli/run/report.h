@@ -6,7 +6,7 @@
 
 /* ---- Warnings on standard error ---- */
 
-/* Angles of more than a turn, which are probably degrees, and expressions that may jump as states change. */
+/* Initial phi and headings of more than a turn, which are probably degrees; expressions that may jump with states. */
 void pw_report_model (const pw_model *model);
 
 /* Options without effect, long fixed steps, an absolute tolerance within which a force saturates. */
@@ -33,7 +33,7 @@ void pw_report_end (const pw_summary *summary, const pw_system *system, const pw
 /* ---- The tables of --profile (profile.c) ---- */
 
 /* Measures a finished run (pw_run_profile) and prints the cost of each element type and of each stage of an evaluation.
- * cpu: processor time of the run [s].  Errors: PW_RESOURCE. */
+ * cpu: processor time of the run [s].  Afterwards the run can only be closed.  Errors: PW_RESOURCE. */
 int pw_print_profile (const pw_system *system, pw_run *run, double cpu, FILE *out, pw_error *error);
 
 #endif

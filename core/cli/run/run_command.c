@@ -11,7 +11,7 @@
 
 #define RUN_SHORT 0.01     /* processor time of a batch [s] below which the next one is longer */
 #define RUN_LONG 0.04      /* above which it is shorter: the progress bar waits for its end */
-enum { RUN_BATCH = 4096 }; /* steps of a batch, at most */
+enum { RUN_BATCH = 4096 }; /* calls of pw_run_advance_towards in a batch, at most */
 
 /* ---- Before the run ---- */
 
@@ -241,7 +241,7 @@ static int run_integrate (pw_run_cli *command, pw_error *error) {
 
 /* ---- After the run ---- */
 
-/* Completes the table, or keeps its rows as NAME.part; a run without steps leaves no file. */
+/* Writes the table to the disk for run_name_files, or keeps its rows as NAME.part; without rows it leaves no file. */
 static void run_close_table (pw_run_cli *command, int complete, pw_error *error) {
   char *kept_path = command->kept_path[PW_RUN_TABLE];
   pw_output **output = &command->output[PW_RUN_TABLE];
@@ -279,7 +279,7 @@ static void run_write_json (pw_run_cli *command, const pw_summary *summary, cons
 }
 
 /* Gives table, summary and page their final names together; after a failure to write all keep their temporary ones.
- * The summary of a failed run reports that the table is incomplete. */
+ * The incomplete table of a run that ended early has been closed already; the summary has the reason. */
 static void run_name_files (pw_run_cli *command, pw_error *error) {
   pw_error finish_error = { 0 };
   for (int i = 0; command->write_failed && i < PW_RUN_OUTPUTS; i++) {

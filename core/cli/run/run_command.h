@@ -7,7 +7,7 @@
 #include "text.h"
 
 typedef struct {
-  /* as given, or NULL */
+  /* as given, or NULL; without --checkpoint, `path` is that of --resume */
   const char *path, *interval_text, *resume_path;
   /* as understood */
   double interval;       /* simulated time between two checkpoints [s]; 0: there are none */
@@ -46,9 +46,9 @@ typedef struct {
   pw_progress progress;
   /* in progress */
   long rows;                            /* written to the table */
-  int limited;                          /* 1: --limit, --max-steps or a signal has stopped the run */
+  int limited;                          /* 1: --limit, --max-steps or a signal during a step has stopped the run */
   int loaded;                           /* 1: the state of the checkpoint has been loaded */
-  long batch;                           /* steps between updates of the progress, at most */
+  long batch;                           /* calls of pw_run_advance_towards between updates of the progress, at most */
   double cpu;                           /* processor time of the method [s] */
   int write_failed;                     /* 1: the table or the summary could not be written */
   char kept_path[PW_RUN_OUTPUTS][4200]; /* of incomplete files that are kept, PATH_MAX and an ending, or "" */
@@ -57,7 +57,8 @@ typedef struct {
 /* Reads the options and the checkpoint that is resumed, whose engine is used if *specialise is
  * PW_SPECIALISE_AUTO. */
 int pw_checkpoints_open (pw_run_cli *command, pw_specialise *specialise, pw_error *error);
-/* Before anything is written: verifies that the checkpoint belongs to this run, and opens its table. */
+/* Before anything is written: locks the checkpoint file, verifies that a resumed checkpoint belongs to this run and
+ * opens its table; without --resume, refuses a table that could not be continued. */
 int pw_checkpoints_prepare (pw_run_cli *command, pw_error *error);
 /* After everything is open: loads the state of the checkpoint that is resumed, if any. */
 int pw_checkpoints_resume (pw_run_cli *command, pw_error *error);

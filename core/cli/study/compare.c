@@ -6,8 +6,8 @@
 #include <string.h>
 #include "reference.h"
 
-enum { COMPARE_REPEATS = 99 }; /* timed runs of a row, at most */
-#define COMPARE_FEW 3          /* timed runs of a row, at least, unless they exceed the limit */
+enum { COMPARE_REPEATS = 99 }; /* the largest value of --repeats */
+#define COMPARE_FEW 3          /* timed runs of a row, at least, unless --repeats is less or they exceed the limit */
 #define COMPARE_ENOUGH 0.5     /* total processor time [s] of a row after which no further run is timed */
 #define COMPARE_REFINEMENT 1.2 /* smallest ratio of numbers of steps from which an order is computed */
 #define COMPARE_CLEAR 10   /* error over uncertainty of the reference, so that orders are accurate to log2 1.1 = 0.14 */
@@ -176,8 +176,8 @@ static void compare_set_errors (const pw_compare *compare, const pw_motion *moti
 }
 
 /* The order p of a row and the coarser one before it, from error ~ steps^-p: log (coarser error / error) over
- * log (steps / coarser steps).  NaN if an error is unknown or less than COMPARE_CLEAR times the uncertainty of the
- * reference, or if the numbers of steps are nearly equal. */
+ * log (steps / coarser steps), with the largest error of lengths or, if that is unknown, of angles.  NaN if an error is
+ * unknown, if that of the row is less than COMPARE_CLEAR times the uncertainty, or if the steps are nearly equal. */
 static double compare_pair_order (const pw_compare *compare, const pw_row *row) {
   const pw_row *coarser = row - 1;
   const double *error = &row->value[COLUMN_ERROR];
@@ -219,7 +219,7 @@ static int compare_measure_times (pw_compare *compare, pw_row *row, pw_error *er
 
 /* The processor time [s] of a row, predicted from the coarser levels of its method: a halved step doubles it; a
  * tolerance divided by ten costs the factor that the last one did, at first COMPARE_DECADE.  INFINITY after a run that
- * was stopped. */
+ * was stopped or skipped; 0, not predicted, for the first level and after a failure. */
 static double compare_predicted_time (const pw_row *row) {
   const pw_row *coarser = row - 1;
   if (row->coarser_levels == 0 || coarser->state == ROW_FAILED || coarser->state == ROW_REFUSED) return 0;

@@ -15,7 +15,7 @@ typedef struct {
   int from_table;                    /* 1: it is the table of --reference */
   double uncertainty[MOTION_ERRORS]; /* 0 where nothing is compared */
   double size[MOTION_UNITS];         /* largest coordinate or velocity */
-  char name[300];                    /* "erk8+projection, rtol 3e-14" or the path of the table */
+  char name[300];                    /* "erk8+projection, rtol 3e-14", "the exact solution of the model" or a path */
   int partners;                      /* number of other computed solutions; their errors relative to this one */
   struct {
     char name[100];
@@ -33,7 +33,8 @@ int pw_reference_find (pw_reference *reference, pw_study *study, double step, pw
 
 /* Prints the reference, its uncertainty and its distances from the first `partners` other solutions. */
 void pw_reference_print (const pw_reference *reference, int partners);
-/* Writes FOLDER/truth.csv: the uncertainty of the reference, and its distances from all other solutions. */
+/* Writes FOLDER/truth.csv: the uncertainty of the reference, and its distances from all other solutions, under the
+ * names and units of error_columns[0 to MOTION_ERRORS - 1]. */
 int pw_reference_write (const pw_reference *reference, const char *folder, const pw_study_column *error_columns,
                         pw_error *error);
 

@@ -10,7 +10,7 @@
  * which it has fewer. */
 #define STUDY_SHORT 0.005
 #define STUDY_LONG 0.02
-enum { STUDY_FIRST_BATCH = 8, STUDY_LONGEST_BATCH = 65536 }; /* steps */
+enum { STUDY_FIRST_BATCH = 8, STUDY_LONGEST_BATCH = 65536 }; /* calls of pw_run_advance_towards */
 
 /* ---- Methods ---- */
 

@@ -15,14 +15,14 @@ enum {
   STUDY_COORDINATES = 5 /* of a point in a figure, at most */
 };
 
-/* Done; failed; refused when the run was opened; stopped at the limit; not run, since it would exceed the limit. */
+/* Done, or not begun; failed; refused on opening; stopped at the limit; not run, since it would exceed the limit. */
 typedef enum { ROW_DONE, ROW_FAILED, ROW_REFUSED, ROW_STOPPED, ROW_SKIPPED } pw_row_state;
 
 typedef struct {
   char method[STUDY_NAME]; /* with options */
   char label[STUDY_NAME];  /* of its curve in the figure: at first the method */
   int group;               /* the part of the table that contains it, which has a figure of its own */
-  int curve;               /* the curve of this figure that contains its points */
+  int curve;               /* the curve of this figure that contains its points; of compare, the index of its method */
   int adaptive;            /* 1: the step size follows a tolerance */
   double level;            /* of compare: tolerance, or step size [s] */
   int coarser_levels;      /* of compare: number of rows of its method before it */
@@ -31,10 +31,10 @@ typedef struct {
   int runs;                     /* that have reached the end */
   double progress;              /* part of its runs that is done, 0 to 1 */
   double t;                     /* time reached [s] */
-  double cpu;                   /* processor time of the last run [s] */
+  double cpu;                   /* processor time of the last run; at last, of compare, the median of timed runs [s] */
   double balance;               /* largest |energy balance| of the samples [J] */
   pw_statistics statistics;     /* of the last run */
-  char reason[500];             /* of a failure */
+  char reason[500];             /* of any state but ROW_DONE; else "" */
   double value[STUDY_COLUMNS];  /* NaN: unknown */
   unsigned upper_bounds;        /* bit i: value[i] is an upper bound */
   char bound_names[STUDY_NAME]; /* names of the columns of upper bounds */
@@ -126,7 +126,8 @@ int pw_study_command (pw_study *study, const pw_study_type *type, pw_error *erro
  * used once.  PW_INPUT with the nearest valid name. */
 int pw_study_read_methods (pw_study *study, const char *otherwise, pw_error *error);
 
-/* Adds a row whose values and points are NaN; rows of a curve follow each other.  NULL and PW_RESOURCE. */
+/* Adds a row whose values and points are NaN; rows of a curve follow each other.  The pointer is valid until the next
+ * row is added.  NULL and PW_RESOURCE. */
 pw_row *pw_study_add (pw_study *study, int group, int curve, const char *method, int points, pw_error *error);
 
 /* An observer of a run: `visit` is called after each step that reaches time `due`, which it may change. */
@@ -161,10 +162,11 @@ int pw_study_write_row (pw_study *study, const pw_row *row, pw_error *error);
 /* 1 if this coordinate of some point of a group is positive. */
 int pw_study_positive (const pw_study *study, int group, int coordinate);
 /* Writes NAME.dat: a block for each curve of a group that has points, two empty lines between them; `heading` names the
- * coordinates, `count` of them. */
+ * coordinates, `count` of them, which are written as NaN unless they are positive. */
 int pw_study_write_data (const pw_study *study, int group, const char *name, const char *heading, int count,
                          pw_error *error);
-/* Writes NAME.gp: `variables` in gnuplot's language, the labels of the group's curves, the template. */
+/* Writes NAME.gp, to be drawn at the end, so NAME must outlive the study: `variables` in gnuplot's language, the labels
+ * of the group's curves, the template. */
 int pw_study_write_script (pw_study *study, int group, const char *name, const char *template_name,
                            const char *variables, pw_error *error);
 

@@ -12,13 +12,14 @@ typedef struct {
   char *path;       /* of the journal: that of the table and ".part" */
   int descriptor;   /* of the journal, locked; -1: not open */
   int created;      /* 1: by this process */
-  off_t *offset;    /* in the journal, of the line of each row that is to be computed; 0: missing */
+  off_t *offset;    /* in the journal, of the line of row r of the part: offset[r / parts]; 0: missing */
   long rows, done;  /* numbers of these rows; of those in the journal */
   off_t size;       /* bytes of the journal's complete lines */
   pw_text line;     /* the line that is written */
 } pw_journal;
 
-/* Opens the journal of the table at `path`, or creates it.  It is truncated at the first incomplete or damaged line.
+/* Opens the journal of the table at `path`, or creates it.  It is truncated at the first line that is incomplete,
+ * damaged, repeated or of another part.  Close it in every case.
  * Errors: PW_RESOURCE if it cannot be written or another process has it, PW_INPUT if it belongs to another sweep. */
 int pw_journal_open (pw_journal *journal, const pw_plan *plan, const char *path, pw_error *error);
 /* Appends a row of the grid: the exit status of its run, 0 to 4, and its line of the table, `text`, without a newline.

@@ -129,8 +129,8 @@ static int plan_scan_row (pw_plan *plan, long row, plan_scan *scan, pw_error *er
 }
 
 /* The bodies, and so the states, may depend on integer parameters: models are built for the first row, for each value
- * of an integer with all else as in the first row, and for the last row.  Without integers, rows are tried until a
- * model can be built. */
+ * of an integer with all else as in the first row, and for the last row.  Values of other axes are tried in the same
+ * way until a model can be built; without integers the last row is not tried. */
 static int plan_find_columns (pw_plan *plan, pw_error *error) {
   plan_scan scan = { .built = 0 };
   int any_count = 0, status = plan_scan_row (plan, 0, &scan, error);

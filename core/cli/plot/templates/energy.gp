@@ -1,6 +1,7 @@
 # include look.gp
 
 # ---- Energies and work; the error of the energy balance, with a power of ten of its own ----
+# Above: t_end [s].
 
 title = 'energy, work and their balance'
 stats 'energy.dat' using 2 name 'kinetic' nooutput

@@ -3,8 +3,8 @@
 # ---- A periodic motion, paths and phase curves over a period; or a branch over the parameter; with multipliers ----
 # Above: branch (0: a single motion), bodies (number of those shown), body[i], largest (modulus of a multiplier); for a
 # branch label_of_x, first and last (range of the parameter), low[k] and high[k] (range of column 1 + k of the data).
-# Blocks of the data: of a motion, the motion, its multipliers, the trivial ones; of a branch, its stable parts, its
-# unstable parts, events, multipliers, the trivial ones.
+# Blocks of the data: of a motion, the motion (t / T, then x, y, phi, omega of each body), its multipliers, the trivial
+# ones; of a branch, its stable parts, its unstable parts, events, multipliers, the trivial ones.
 
 data = name.'.dat'
 title = branch ? 'periodic motions' : 'periodic motion over one period, Floquet multipliers'
