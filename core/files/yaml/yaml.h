@@ -26,10 +26,10 @@ typedef struct pw_node {
     const char *text;      /* of a scalar */
     struct pw_node *first; /* of a list or map */
   };
-  unsigned at;        /* offset in the source, of the opening quote or bracket if there is one */
-  int count;          /* entries of a list, pairs of a map */
-  unsigned char type; /* pw_yaml_type */
-  unsigned char quoted;
+  unsigned at;          /* offset in the source, of the opening quote or bracket if there is one */
+  int count;            /* entries of a list, pairs of a map */
+  unsigned char type;   /* pw_yaml_type */
+  unsigned char quoted; /* 1: in quotes, or a block after | or > */
 } pw_node;
 
 struct pw_yaml {
@@ -85,7 +85,7 @@ int pw_yaml_line (const pw_yaml *y, size_t at);
 
 int pw_yaml_read_tree (pw_yaml *y, pw_error *error);
 
-/* Loads what pw_yaml_write_tree wrote (yaml_stored.c).  PW_INPUT if it is incomplete. */
+/* Loads what pw_yaml_write_tree wrote (yaml_stored.c).  PW_INPUT if it is incomplete or memory is exhausted. */
 int pw_yaml_load_tree (pw_yaml *y, const char *bytes, size_t size, pw_error *error);
 
 /* ---- Reading the tree (yaml_read.c) ---- */
@@ -118,7 +118,7 @@ int pw_yaml_choice (const pw_reader *r, const pw_node *node, const char *label, 
 /* The first name of the time t or of a state, BODY.phi, in an expression, or NULL. */
 const char *pw_yaml_find_variable (const char *text);
 
-/* Converts an offset in a scalar's text to an offset in the source. */
+/* Converts an offset in a scalar's text to one in the source; that of the node if the source spells it otherwise. */
 size_t pw_yaml_offset (const pw_yaml *y, const pw_node *node, size_t offset);
 
 /* Adds the names of all bodies so far to the valid names of a suggestion. */
