@@ -62,7 +62,7 @@ char *pw_temporary_folder (pw_error *error);
 /* ---- The cache (cache.c) ---- */
 
 /* Creates the cache's folder if it does not exist, and returns its path, malloced; NULL if there is none, with a
- * notice in the buffer (otherwise unchanged) if one exists but others could have written to it, or it cannot be used. */
+ * notice in the buffer (otherwise unchanged) if one exists but others could have written to it, or it is unusable. */
 char *pw_cache_folder (char *notice, size_t size);
 /* Deletes the least recently used files until the rest is within the limit; each use must set st_mtime. */
 void pw_cache_trim (const char *folder);

@@ -92,8 +92,8 @@ typedef struct pw_scene_steps {
 } pw_scene_steps;
 
 /* Functions return 0, or 1 if the general engine has to do the work: for an angle from PW_SINE_LIMIT on, a small pivot,
- * values that are not finite, a signal or projection that failed, `stages` with stabilisation.  The state from which they
- * begin is unchanged then. */
+ * values that are not finite, a signal or projection that failed, `stages` with stabilisation.  The state from which
+ * they begin is unchanged then. */
 typedef struct pw_specialised {
   int abi, constants;               /* constants: entries of pw_scene.constant */
   unsigned long shape;              /* hash of the system's structure */

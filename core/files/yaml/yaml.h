@@ -126,7 +126,8 @@ void pw_yaml_suggest_bodies (const pw_reader *r, pw_nearest *near);
 
 /* ---- Building ---- */
 
-/* Makes a signal from expressions of time: value, rate or NULL, acceleration or NULL (yaml_expression.c). */
+/* Makes a signal from expressions of time and, in forces, of states: value; rate and acceleration, or NULL
+ * (yaml_expression.c). */
 int pw_yaml_time_signal (pw_reader *r, const pw_kind *kind, const char *label, const pw_node *const v[3],
                          pw_signal *signal);
 
