@@ -287,7 +287,7 @@ typedef struct {
   double t;           /* of the last one [s] */
   double end[4];      /* at t: of lengths [m], angles [rad], velocities [m/s], angular velocities [rad/s] */
   double most[4];     /* the largest of the run, in the same order */
-  double reactions;   /* the largest, relative to the largest reaction of the same unit */
+  double reactions;   /* the largest, not at jumps, relative to the largest reaction of the same unit, or to 1 for 0 */
 } pw_reference_error;
 
 /* What a run was and how it ended; `reason` is "" when the status is ok. */
