@@ -19,7 +19,7 @@ typedef struct {
   pw_found *found;
   int count;
   size_t room;       /* entries of `found` allocated */
-  char folders[400]; /* the folders searched, "/first:/second", also for messages */
+  char folders[400]; /* the folders searched, "/first:/second", as many as fit; also for messages */
   char unread[160];  /* folders of PINWHEEL_MODELS that cannot be searched: "/nowhere (No such file or directory)" */
 } pw_search;
 
@@ -40,7 +40,7 @@ int pw_ends_with (const char *name, const char *ending);
 /* What is done with the compiled object at a path; it is deleted afterwards. */
 typedef int pw_object_user (void *context, const char *object, pw_error *error);
 
-/* Compiles a C file to a shared object or, unless `engine` is NULL, to WebAssembly linked with that object file, in a
+/* Compiles a C file to a shared object or, unless `engine` is NULL, to WebAssembly linked with that archive, in a
  * private temporary folder; returns what `use` returns for the result.  PW_INPUT if it does not compile or there is no
  * compiler; PW_RESOURCE. */
 int pw_compile_file (const char *path, const char *engine, pw_object_user *use, void *context, pw_error *error);
@@ -62,9 +62,9 @@ char *pw_temporary_folder (pw_error *error);
 /* ---- The cache (cache.c) ---- */
 
 /* Creates the cache's folder if it does not exist, and returns its path, malloced; NULL if there is none, with a
- * notice in the buffer if one exists but others could have written to it, or it cannot be used. */
+ * notice in the buffer (otherwise unchanged) if one exists but others could have written to it, or it is unusable. */
 char *pw_cache_folder (char *notice, size_t size);
-/* Deletes the least recently used files until the rest is within the limit. */
+/* Deletes the least recently used files until the rest is within the limit; each use must set st_mtime. */
 void pw_cache_trim (const char *folder);
 
 /* ---- Models in YAML (yaml.c) ---- */
@@ -155,7 +155,7 @@ int pw_output_text (pw_output *o, const char *text, size_t size, pw_error *error
 /* PW_RESOURCE if a write to its stream has failed; set errno to 0 before writing, for the reason. */
 int pw_output_check (pw_output *o, pw_error *error);
 
-/* Whether the output continues a file that is not empty. */
+/* Whether the output was opened by pw_output_continue. */
 int pw_output_continued (const pw_output *o);
 /* 1 if its path has this ending. */
 int pw_output_named (const pw_output *o, const char *ending);

@@ -40,7 +40,8 @@ const char *pw_file_path (const pw_file *f);
 /* The path of the file that a model's name or path refers to, malloced; NULL and an error as from pw_file_open. */
 char *pw_file_find (const char *model, pw_error *error);
 
-/* Calls `each` with the path of each table of a text model until it returns non-zero; returns that, or PW_RESOURCE. */
+/* Calls `each` with the path of each table of a text model, once for each signal that reads it, until it returns
+ * non-zero; returns that, 0, or PW_RESOURCE. */
 int pw_file_tables (const pw_file *f, int (*each) (void *context, const char *path), void *context);
 
 /* Calls `each` with the name and path of every model on the search path, sorted by name, until it returns non-zero. */
@@ -58,7 +59,7 @@ typedef struct {
   pw_page_file *file;
   int files;
 } pw_page;
-/* Errors: PW_INPUT if the model is a .so without its source, does not compile to WebAssembly, or tools for that are
+/* Errors: PW_INPUT if the model is a .so instead of its source, does not compile to WebAssembly, or tools for that are
  * missing, with the command that installs them; PW_RESOURCE. */
 int pw_page_open (pw_page *p, const pw_file *f, pw_error *error);
 void pw_page_close (pw_page *p); /* in every case */
@@ -92,7 +93,7 @@ void pw_scene_code_close (pw_scene_code *c);
 /* "%.17g" (or fewer digits) with a decimal point; non-finite as nan, inf, -inf.  Returns the buffer. */
 char *pw_format (char buffer[32], double value, int digits);
 
-/* Reads a number that fills the whole text, nan and inf included; PW_INPUT otherwise, and *value stays. */
+/* Reads a number that fills the whole text, nan and inf included; else PW_INPUT or PW_RESOURCE, and *value stays. */
 int pw_read_number (const char *text, double *value);
 
 /* The same for numbers and expressions of numbers, as in text models: "30*deg", "2*pi/3". */
@@ -127,7 +128,8 @@ int pw_unit_check (const char *cell, const char *wanted, double *factor, char *w
 
 /* Reads columns of a table by their names or numbers, in SI units: `unit` of each, or NULL for any.  The first one is
  * the time, which increases; in the others empty cells and nan are gaps, NaN.  Returns `width` arrays of *rows
- * numbers, one after the other; free it.  NULL and PW_INPUT with file, line and nearest name, or PW_RESOURCE. */
+ * numbers (0 if the table has only names), one after the other; free it.  NULL and PW_INPUT with file, line and nearest
+ * name, or PW_RESOURCE. */
 double *pw_read_columns (const char *path, const char *const *column, const char *const *unit, int width, int *rows,
                          pw_error *error);
 
@@ -158,11 +160,11 @@ int pw_check_paths (const pw_use *use, int count, pw_error *error);
 /* A file written under a temporary name, NAME.part, and renamed when complete; "-" is standard output.
  *
  * The temporary file is new, locked against other processes, and never a symbolic link; if the name itself is one, the
- * file it leads to is replaced.  The replacement keeps mode and owner.  Files that are not regular (a pipe, a device)
- * and open descriptors (/dev/stdout, /dev/fd/N), are written directly. */
+ * file it leads to is replaced.  The replacement keeps mode and owner if permitted.  Files that are not regular (a
+ * pipe, a device) and open descriptors (/dev/stdout, /dev/fd/N) are written directly. */
 typedef struct pw_output pw_output;
 
-/* Errors: PW_RESOURCE with the path and the reason, also if another process is writing it. */
+/* Errors: PW_RESOURCE with the path and the reason, also if another process is writing it; PW_INPUT if it is "". */
 pw_output *pw_output_open (const char *path, pw_error *error);
 /* The same with another ending than ".part"; incomplete files are removed. */
 pw_output *pw_output_open_as (const char *path, const char *ending, pw_error *error);
@@ -172,7 +174,7 @@ int pw_output_is_file (const pw_output *o);
 /* Writes all output to the disk and closes the stream; only the renaming is missing.  PW_RESOURCE. */
 int pw_output_ready (pw_output *o, pw_error *error);
 /* Completes and frees: the file is written to the disk, then renamed, then its folder is written to the disk.
- * PW_RESOURCE if anything failed: NAME.part remains and the text names it. */
+ * PW_RESOURCE if one of these fails; before the renaming, NAME.part remains and the text names it. */
 int pw_output_finish (pw_output *o, pw_error *error);
 /* The same for several outputs, some of which may be NULL: completes all, or leaves all under their temporary names. */
 int pw_output_finish_all (pw_output *const *o, int count, pw_error *error);
@@ -198,8 +200,8 @@ typedef struct {
 
 /* Writes all output to the disk, and marks its end.  Errors: PW_RESOURCE; PW_INPUT if it is not a regular file. */
 int pw_output_mark (pw_output *o, pw_mark *mark, pw_error *error);
-/* Reopens NAME.part and truncates it at the mark.  A table continues without a header.  PW_INPUT if the file is missing
- * or differs from the marked contents; PW_RESOURCE. */
+/* Reopens NAME.part or, if only NAME exists, renames that to NAME.part; truncates it at the mark.  A table continues
+ * without a header.  PW_INPUT if the file is missing, not regular, or differs from the marked contents; PW_RESOURCE. */
 pw_output *pw_output_continue (const char *path, const pw_mark *mark, pw_error *error);
 
 /* ---- Checkpoints ----
@@ -237,8 +239,8 @@ typedef struct {
   FILE *f;
   struct pw_npz_entry *entry;
   size_t room;
-  int count, failed;
-  unsigned long at; /* bytes written */
+  int count, failed; /* arrays; 1: memory was exhausted, which pw_npz_end reports */
+  unsigned long at;  /* bytes written */
 } pw_npz;
 
 /* Adds an array of rows x columns numbers, row by row, or a vector if columns = 0; each number is 1 double, or 2 if it
@@ -256,7 +258,7 @@ int pw_npz_end (pw_npz *z, pw_error *error);
 typedef struct pw_csv pw_csv;
 pw_csv *pw_csv_open (const pw_system *s, int ledger, pw_output *o, pw_error *error);
 int pw_csv_write (pw_csv *c, const pw_system *s, const pw_sample *sample, pw_error *error);
-int pw_csv_close (pw_csv *c, pw_error *error); /* c may be NULL */
+int pw_csv_close (pw_csv *c, pw_error *error); /* the output stays open; c may be NULL */
 
 /* ---- JSON ---- */
 
@@ -267,7 +269,7 @@ typedef struct {
   FILE *f;
   int lines;        /* outermost levels whose items have separate lines */
   int line;         /* 1: the next item, or the end of the container, begins a line */
-  int depth, items; /* containers that are open; items of the innermost so far */
+  int depth, items; /* containers that are open; 0: the innermost has no items yet */
   int digits;       /* of numbers; 0: 17 */
 } pw_json;
 void pw_json_open (pw_json *j, const char *key, char bracket); /* '{' or '[' */
@@ -285,7 +287,7 @@ typedef struct {
   double t;           /* of the last one [s] */
   double end[4];      /* at t: of lengths [m], angles [rad], velocities [m/s], angular velocities [rad/s] */
   double most[4];     /* the largest of the run, in the same order */
-  double reactions;   /* the largest, relative to the largest reaction of the same unit */
+  double reactions;   /* the largest, not at jumps, relative to the largest reaction of the same unit, or to 1 for 0 */
 } pw_reference_error;
 
 /* What a run was and how it ended; `reason` is "" when the status is ok. */

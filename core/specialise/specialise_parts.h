@@ -39,7 +39,7 @@ static inline int pw_specialise_is_independent (const pw_generator *gen, int row
 enum { SPECIALISE_CONSTANT = 1, SPECIALISE_CHANGING = 2 };
 int pw_specialise_force (const pw_generator *gen, int j);
 
-/* Write the functions of the elements: Jacobian, right-hand sides, forces, ledger; the function of the signals. */
+/* Write the functions of the elements: J, g, sizes of g, right-hand sides, forces, ledger; that of the signals. */
 void pw_specialise_elements (const pw_generator *gen);
 void pw_specialise_signals (const pw_generator *gen);
 

@@ -17,7 +17,7 @@ typedef struct pw_scene {
   const pw_signal *const *signal; /* signals */
   const double *mass;             /* coordinates: diagonal of M */
   const double *force;            /* coordinates: sum of the constant forces */
-  double *u;                      /* signals x 3: values, first and second time derivatives */
+  double *u;                      /* signals x 3: value; first and second time derivatives, unless it is of a force */
   double *constant;               /* what `prepare` computes */
   double *t_signal;               /* time of the last evaluation of u; NaN: none */
   int (*update) (void *workspace, double t, const double *q, const double *v); /* evaluates u; non-zero: failed */
@@ -85,20 +85,22 @@ typedef struct pw_scene_steps {
   double *rate, *rate0;        /* their powers [W] */
   double *const *V, *const *A; /* stages: scratch */
   double *const *R;
-  pw_configuration *configuration; /* of the state reached */
-  double *J;
+  pw_configuration *configuration; /* of the state reached; if done < count, perhaps of the refused step */
+  double *J;                       /* of the same state */
   pw_scene_watch watch;
   long iterations; /* of all projections */
 } pw_scene_steps;
 
 /* Functions return 0, or 1 if the general engine has to do the work: for an angle from PW_SINE_LIMIT on, a small pivot,
- * values that are not finite, a signal that failed.  The state from which they begin is unchanged then. */
+ * values that are not finite, a signal or projection that failed, `stages` with stabilisation.  The state from which
+ * they begin is unchanged then. */
 typedef struct pw_specialised {
   int abi, constants;               /* constants: entries of pw_scene.constant */
   unsigned long shape;              /* hash of the system's structure */
   const unsigned char *independent; /* rows: 0 for redundant equations, which have the multiplier 0 */
   int (*prepare) (pw_scene *s);     /* 1: a constant pivot is too small */
-  /* Accelerations and multipliers at a state; configurations c (bodies + 1, with the ground); entries of J. */
+  /* Accelerations and multipliers at a state; configurations c of the bodies, then of the ground, which the caller
+   * sets; entries of J. */
   int (*evaluate) (pw_scene *s, double t, const double *q, const double *v, double *a, double *lambda,
                    pw_configuration *c, double *J);
   /* Projects a state onto the constraints in the metric of M, then evaluates it. */
@@ -116,7 +118,8 @@ typedef struct pw_specialised {
 struct pw_specialised_lanes {
   int abi, lanes;
   unsigned long shape, size; /* as in pw_specialised; bytes of `memory` */
-  /* The same for `lanes` runs with the same step size and tableau; memory: scratch, aligned to 64 bytes. */
+  /* The same for `lanes` runs with the same step size, tableau and `project`, without stabilisation or redundant
+   * equations; memory: scratch, aligned to 64 bytes. */
   void (*steps) (pw_scene *const *s, pw_scene_steps *const *x, void *memory);
 };
 

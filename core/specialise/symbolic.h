@@ -6,7 +6,7 @@
 
 typedef enum { PW_TERM_ZERO, PW_TERM_ONE, PW_TERM_CONSTANT, PW_TERM_VARIABLE } pw_term_type;
 
-/* sign times 0, 1, a constant, which `prepare` computes once per run, or a variable. */
+/* sign times 0, 1, a value that is constant during a run (M[0], J[3], or C[2] computed by `prepare`), or a variable. */
 typedef struct {
   pw_term_type type;
   int sign;

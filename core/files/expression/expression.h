@@ -30,7 +30,7 @@ typedef struct {
   pw_names index;    /* the index of each name */
 } pw_scope;
 
-/* Opens a scope with room for `room` names, in an arena.  PW_OK or PW_RESOURCE. */
+/* Opens a scope, which must be { 0 }, with room for `room` names, in an arena.  PW_OK or PW_RESOURCE. */
 int pw_scope_open (pw_scope *s, int room, pw_arena *arena);
 void pw_scope_close (pw_scope *s); /* names and numbers stay in the arena */
 
@@ -39,7 +39,7 @@ void pw_scope_add (pw_scope *s, const char *name, double value);
 
 /* One operation of an expression; it replaces its operands, the last ones on a stack, by its value. */
 typedef struct {
-  short op;     /* pw_expression_op */
+  short op;     /* pw_expression_op (expression_parts.h) */
   short index;  /* of the variable or function */
   double value; /* of a constant */
 } pw_expression_code;
@@ -48,7 +48,7 @@ typedef struct {
 typedef struct {
   int codes;        /* operations */
   int breaks;       /* 1: may have jumps or kinks in time */
-  const char *jump; /* part of the text that may jump as states change, of jump_size bytes, or NULL */
+  const char *jump; /* part, of jump_size bytes, of the caller's text that may jump as states change; or NULL */
   int jump_size;
   pw_expression_code code[];
 } pw_expression;
@@ -56,7 +56,8 @@ typedef struct {
 /* Size of an expression in bytes, by which it may be copied. */
 size_t pw_expression_size (const pw_expression *expression);
 
-/* Reads an expression of a scope and variables, which end with NULL, into an arena.  PW_INPUT, error; PW_RESOURCE. */
+/* Reads an expression of a scope and at most 32 variables, which end with NULL, into an arena; scope and `variable` may
+ * be NULL.  PW_INPUT, error; PW_RESOURCE. */
 int pw_expression_read (const pw_scope *s, const char *const *variable, const char *text, pw_arena *arena,
                         const pw_expression **expression, pw_expression_error *error);
 
@@ -73,8 +74,8 @@ double pw_expression_value (const pw_expression *expression, const double *varia
 void pw_expression_derivatives (const pw_expression *expression, const double *variable, int by, double u[3]);
 
 /* The first time after t at which the value, or a time derivative, may jump for any values of the other variables;
- * INFINITY if there is none.  If the search would take too long: a time after t up to which there is none.  Jumps whose
- * times depend on other variables are not found. */
+ * INFINITY if there is none.  If the search would take too long: a time after t up to which there is none.  Not found
+ * are jumps whose times depend on other variables, and kinks at the end of a function's domain, as of sqrt (t^2). */
 double pw_expression_breakpoint (const pw_expression *expression, double t);
 
 /* ---- Words ---- */

@@ -84,7 +84,7 @@ typedef struct {
   short least, most; /* arguments; most = 0: any number */
   double (*of_one) (double);
   double (*of_two) (double, double);
-  pw_partials (*partials) (double x, double y, double f);
+  pw_partials (*partials) (double x, double y, double f); /* f: the value at (x, y) */
   pw_trend trend;
   double from, to; /* domain of a function of one argument, NaN outside */
 } pw_expression_function;

@@ -272,7 +272,7 @@ static pw_range range_select (const pw_range *condition, const pw_range *x, cons
 
 /* ---- Operations ---- */
 
-/* The operations of one or two operands, without NaN among these. */
+/* The operations of one or two operands; of these only sign and comparisons consider NaN (range_result). */
 static pw_range range_operation (const pw_expression_code *c, const pw_range *x) {
   const pw_range *y = x + 1;
   switch (c->op) {

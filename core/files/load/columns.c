@@ -1,8 +1,9 @@
 /* Reads columns of numbers from a CSV file.
  *
- * The separator is the first of , ; and tab that the first line contains outside quotes.  A cell in double quotes may
- * contain it, and "" for a quote (RFC 4180), but no line end.  A first line without numbers names the columns, "NAME"
- * or "NAME [unit]"; columns are converted to the unit requested.  Blank lines and comments (#) are skipped. */
+ * The separator is a comma if the first line has one outside quotes, else a semicolon if it has one, else a tab.  A
+ * cell in double quotes may contain it, and "" for a quote (RFC 4180), but no line end.  A first line without numbers
+ * names the columns, "NAME" or "NAME [unit]"; numbers are converted to SI units.  Blank lines and lines that begin with
+ * # are skipped. */
 #include <math.h>
 #include <stdarg.h>
 #include <stdlib.h>

@@ -18,7 +18,7 @@ struct pw_output {
   int file;      /* keeps the temporary file locked; -1: written directly */
   int folder;    /* that contains it; -1: written directly, or the folder is not readable */
   int code;      /* errno of the first failed write; -1: unknown; 0: none has failed */
-  int continued; /* 1: continues a file that is not empty */
+  int continued; /* 1: opened by pw_output_continue */
   int discard;   /* 1: the temporary file is removed unless the output is finished */
 };
 

@@ -26,10 +26,10 @@ typedef struct pw_node {
     const char *text;      /* of a scalar */
     struct pw_node *first; /* of a list or map */
   };
-  unsigned at;        /* offset in the source, of the opening quote or bracket if there is one */
-  int count;          /* entries of a list, pairs of a map */
-  unsigned char type; /* pw_yaml_type */
-  unsigned char quoted;
+  unsigned at;          /* offset in the source, of the opening quote or bracket if there is one */
+  int count;            /* entries of a list, pairs of a map */
+  unsigned char type;   /* pw_yaml_type */
+  unsigned char quoted; /* 1: in quotes, or a block after | or > */
 } pw_node;
 
 struct pw_yaml {
@@ -85,7 +85,7 @@ int pw_yaml_line (const pw_yaml *y, size_t at);
 
 int pw_yaml_read_tree (pw_yaml *y, pw_error *error);
 
-/* Loads what pw_yaml_write_tree wrote (yaml_stored.c).  PW_INPUT if it is incomplete. */
+/* Loads what pw_yaml_write_tree wrote (yaml_stored.c).  PW_INPUT if it is incomplete or memory is exhausted. */
 int pw_yaml_load_tree (pw_yaml *y, const char *bytes, size_t size, pw_error *error);
 
 /* ---- Reading the tree (yaml_read.c) ---- */
@@ -118,7 +118,7 @@ int pw_yaml_choice (const pw_reader *r, const pw_node *node, const char *label, 
 /* The first name of the time t or of a state, BODY.phi, in an expression, or NULL. */
 const char *pw_yaml_find_variable (const char *text);
 
-/* Converts an offset in a scalar's text to an offset in the source. */
+/* Converts an offset in a scalar's text to one in the source; that of the node if the source spells it otherwise. */
 size_t pw_yaml_offset (const pw_yaml *y, const pw_node *node, size_t offset);
 
 /* Adds the names of all bodies so far to the valid names of a suggestion. */
@@ -126,7 +126,8 @@ void pw_yaml_suggest_bodies (const pw_reader *r, pw_nearest *near);
 
 /* ---- Building ---- */
 
-/* Makes a signal from expressions of time: value, rate or NULL, acceleration or NULL (yaml_expression.c). */
+/* Makes a signal from expressions of time and, in forces, of states: value; rate and acceleration, or NULL
+ * (yaml_expression.c). */
 int pw_yaml_time_signal (pw_reader *r, const pw_kind *kind, const char *label, const pw_node *const v[3],
                          pw_signal *signal);
 

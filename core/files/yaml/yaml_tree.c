@@ -209,7 +209,7 @@ static const char *tree_hint (const pw_yaml *y, size_t at, const char *message) 
   return "";
 }
 
-/* Reports an unterminated node at its start. */
+/* Reports the first syntax error; that of a list or map which is not closed, at its opening bracket. */
 static int tree_syntax (tree *x) {
   void *first = NULL;
   struct fy_diag_error *e = fy_diag_errors_iterate (x->diag, &first);
