@@ -33,7 +33,7 @@ typedef struct {
   double last_breakpoint; /* that has been passed [s] */
   double *before;         /* F + F P: values and derivatives before a jump */
   double *q;              /* coordinates: scratch */
-  char *memory;           /* of these arrays */
+  char *memory;           /* of value, slope, run_slope, their errors, before and q */
   size_t room;            /* rows allocated */
 } pw_sensitivity;
 
