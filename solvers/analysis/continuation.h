@@ -72,7 +72,7 @@ typedef struct {
   char *memory;
 } pw_branch;
 
-/* Looks for events between the last two points, other than folds, and queues them (pw_branch_queue). */
+/* Finds events between the last two points, without folds; queues them (pw_branch_queue).  PW_RETRY ends the branch. */
 typedef int pw_branch_find_events (void *context, pw_error *error);
 /* Sets *value to a function of the branch whose zero is an event; PW_RETRY where it cannot be evaluated. */
 typedef int pw_branch_test (void *context, const pw_branch_point *point, double *value, pw_error *error);
