@@ -72,7 +72,7 @@ typedef struct {
   char *memory;
 } pw_branch;
 
-/* Looks for events between the last two points, other than folds, and queues them (pw_branch_queue). */
+/* Finds events between the last two points, without folds; queues them (pw_branch_queue).  PW_RETRY ends the branch. */
 typedef int pw_branch_find_events (void *context, pw_error *error);
 /* Sets *value to a function of the branch whose zero is an event; PW_RETRY where it cannot be evaluated. */
 typedef int pw_branch_test (void *context, const pw_branch_point *point, double *value, pw_error *error);
@@ -86,8 +86,8 @@ void pw_branch_close (pw_branch *b);
  * PW_RETRY if it does not converge: u is where it stopped. */
 int pw_branch_solve (pw_branch *b, double *u, pw_error *error);
 
-/* Starts a branch at a solution, the first point: p increases along the tangent if direction > 0.  PW_RETRY at a
- * fold. */
+/* Starts a branch at a solution, the last of pw_branch_solve: p increases along the tangent if direction > 0.  PW_RETRY
+ * at a fold. */
 int pw_branch_start (pw_branch *b, const double *u, double direction, pw_error *error);
 
 /* Moves to the next point.  The step length adapts to the curvature of the branch.  PW_RETRY if no step of length
@@ -95,8 +95,8 @@ int pw_branch_start (pw_branch *b, const double *u, double direction, pw_error *
 int pw_branch_step (pw_branch *b, pw_error *error);
 
 /* The next point or event of the branch in p = 0 to 1, or NULL after its last one: at an end of the range or, with the
- * reason in *why, at the first point of a closed branch, or where no step succeeds; evaluations may leave their reason
- * in *why.  find_events is called with problem.context. */
+ * reason in *why, at the first point of a closed branch, after max_points, or where no step succeeds; evaluations may
+ * leave their reason in *why.  find_events is called with problem.context. */
 int pw_branch_next (pw_branch *b, pw_branch_find_events *find_events, pw_error *why, const pw_branch_event **next,
                     pw_error *error);
 
@@ -106,7 +106,7 @@ int pw_branch_next (pw_branch *b, pw_branch_find_events *find_events, pw_error *
 int pw_branch_locate (pw_branch *b, pw_branch_test *test, void *context, pw_error *error);
 /* Where a point between the last two is: pw_branch_event.fraction. */
 double pw_branch_fraction (const pw_branch *b, const pw_branch_point *point);
-/* Queues b->found as an event. */
+/* Queues b->found as an event; only if queued < PW_BRANCH_QUEUE - 1: the point reached follows. */
 void pw_branch_queue (pw_branch *b, int event, int tag);
 
 #endif

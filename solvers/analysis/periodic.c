@@ -13,7 +13,7 @@ enum {
 static const double PERIODIC_EXACT = 1e-9, /* largest residual of a solution, in units of the scene */
     PERIODIC_RANK = 1e-7,                  /* smaller singular values of the derivatives count as 0 */
     PERIODIC_CIRCLE = 1e-6,                /* distance from the unit circle that is not round-off */
-    PERIODIC_MIN_STEP = 1e-5,              /* relative to the range of the parameter */
+    PERIODIC_MIN_STEP = 1e-5,              /* in scaled unknowns; the range of the parameter is 1 */
     PERIODIC_EVENT = 1e-7,                 /* accuracy of events, relative to the step */
     PERIODIC_FOLD = 1e-3, /* largest distance of a fold from the crossing of a multiplier there, relative to the step */
     PERIODIC_REAL = 1e-3; /* imaginary part, after location, of a pair that is about to become real */

@@ -57,11 +57,12 @@ static inline double pw_periodic_parameter (const pw_periodic *x, const double *
 
 /* The system at a value of the parameter.  NULL, with x->why, if there is none. */
 const pw_system *pw_periodic_system (pw_periodic *x, pw_place place, double value);
-/* Opens a run at a value of the parameter from the consistent state nearest to y, or if that is NULL from the initial
- * state, and determines the period of x->system[place].  NULL, with x->why, if it fails. */
+/* Opens a run, which the caller closes, at a value of the parameter from the consistent state nearest to y, or if that
+ * is NULL from the initial state, and determines the period of x->system[place].  rtol 0: the default of pw_settings.
+ * NULL, with x->why, if it fails. */
 pw_run *pw_periodic_run (pw_periodic *x, pw_place place, double value, double rtol, const double *y);
-/* Integrates one period from the state of u: sets y0, a0 and y1, a1, or with derivatives basis, dual, Phi.  A status;
- * PW_RETRY: there is no such motion, perhaps with x->why, or the search has been stopped. */
+/* Integrates one period from the state of u: sets y0, a0, and then y1, a1, or with derivatives instead of these size,
+ * basis, dual, Phi.  A status; PW_RETRY: there is no such motion, perhaps with x->why, or the search was stopped. */
 int pw_periodic_flow (pw_periodic *x, const double *u, pw_flow_accuracy accuracy, pw_place place, pw_error *error);
 /* Sets x->state to the state after some periods of the motion from the initial state, and a free period that is not
  * given to a guess.  A status; x->why contains the reason of a failure, unless the search has been stopped. */

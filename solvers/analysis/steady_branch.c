@@ -3,7 +3,7 @@
 #include "steady_parts.h"
 #include "util.h"
 
-static const double BRANCH_MIN_STEP = 1e-7, /* relative to the range of the parameter */
+static const double BRANCH_MIN_STEP = 1e-7, /* in scaled unknowns; the range of the parameter is 1 */
     BRANCH_ACCURACY = 1e-9,                 /* of events, relative to the step */
     BRANCH_FOLD = 1e-3; /* largest distance of a fold from the change of an eigenvalue there, relative to the step */
 enum { BRANCH_MAX_POINTS = 100 /* as a multiple of those that the settings ask for */ };

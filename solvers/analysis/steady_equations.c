@@ -21,7 +21,7 @@
 #include "steady_parts.h"
 
 /* Step of central differences by a parameter of the model, relative to its range: its round-off is 1e-11, its
- * truncation error 1e-10 of the third derivative. */
+ * truncation error 2e-11 of the third derivative. */
 static const double STEADY_DIFFERENCE = 1e-5;
 
 double pw_steady_parameter (const pw_steady *x, const double *u) {

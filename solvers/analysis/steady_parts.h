@@ -55,12 +55,12 @@ struct pw_steady {
 /* ---- steady_symmetries.c ---- */
 
 /* The rates of a displacement [L/s, rad/s]: of the whole along x and y, its rotation about the origin; then of the
- * angle of each body alone; then of each internal coordinate. */
+ * angle of each body alone; then of each internal coordinate [its unit/s]. */
 enum { PW_RATE_X, PW_RATE_Y, PW_RATE_TURN, PW_RATE_ANGLES };
 static inline int pw_steady_rate_count (const pw_system *s) {
   return PW_RATE_ANGLES + s->coords - 2 * s->bodies;
 }
-/* The index of the rate that changes the angle of coordinate j alone. */
+/* The index of the rate that changes alone the angle of the body with coordinate j, or internal coordinate j. */
 static inline int pw_steady_angle_rate (const pw_system *s, int j) {
   return PW_RATE_ANGLES + (j < 3 * s->bodies ? j / 3 : j - 2 * s->bodies);
 }
@@ -101,7 +101,8 @@ int pw_steady_evaluate (void *steady, const double *u, double *F, double *dF, pw
 int pw_steady_same_motion (void *steady, const double *u, const double *other);
 /* Sets x->q, x->v and x->rates to those of the unknowns u, and in x->hold the value that varies. */
 void pw_steady_state (pw_steady *x, const double *u);
-/* Sets u to the unknowns of the steady motion at q whose velocities are nearest to v.  PW_METHOD if LAPACK fails. */
+/* Sets u, except the parameter, to the motion along symmetries at q with velocities nearest to v, by least squares.
+ * PW_METHOD if LAPACK fails. */
 int pw_steady_nearest (pw_steady *x, const double *q, const double *v, double *u, pw_error *error);
 double pw_steady_parameter (const pw_steady *x, const double *u);
 
@@ -126,9 +127,10 @@ double pw_hold_slope (const pw_steady *x, const pw_initial_value *hold);
 
 /* ---- steady_start.c ---- */
 
-/* The unknowns with which an attempt begins: 0, the initial state; 1, a state to which forces lead from there; then
- * random states, even attempts near the initial one, odd ones anywhere.  By attempt modulo 4: 0 and 1 need not be
- * consistent; 2, a state to which forces lead as in attempt 1; 3, consistent. */
+/* The unknowns, except the parameter, with which an attempt begins; x->system[PW_HERE] is open.  Attempt 0: the initial
+ * state; 1: a state to which forces lead from there; then random states, even attempts near the initial one, odd ones
+ * anywhere.  Of these, by attempt modulo 4: 0 and 1 need not be consistent; 2: a state to which forces lead as in
+ * attempt 1; 3: consistent. */
 int pw_steady_start (pw_steady *x, int attempt, double *u, pw_error *error);
 
 /* ---- signal_change.c ---- */

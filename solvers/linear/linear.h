@@ -102,14 +102,14 @@ int pw_linear_eigenvalues (pw_linearisation *x, pw_linear *l, pw_error *error);
 
 /* ---- linear_modes.c ---- */
 
-/* Fills B and basis. */
+/* Allocates B, basis and shape, and fills B and basis. */
 int pw_linear_matrices (pw_linearisation *x, pw_linear *l);
 /* Fills the shapes after k rigid displacements have been split off; eigenvalues are not yet sorted. */
 int pw_linear_shapes (pw_linearisation *x, int k, pw_linear *l);
 
 /* ---- linear_frame.c ---- */
 
-/* Chooses the frame in which the accelerations of the evaluated state are smallest. */
+/* Chooses a frame with small accelerations of the evaluated state; one that rotates only if it halves them. */
 void pw_linear_choose_frame (pw_linearisation *x);
 /* What the variation dx changes, in units of the scene, 0 for a symmetry: residuals of the constraints, then n
  * accelerations; turns: 1 if dx is a rotation of the whole by 1 rad, with which accelerations rotate. */

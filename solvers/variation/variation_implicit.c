@@ -13,7 +13,7 @@
  *     err = N_3 (gamma/h - N_3^+ A_3)^-1 N_3^+ (F + sum_i e_i (Y_i - Y)/h),
  *
  * has gamma, the real eigenvalue of the inverse of (a_ij), and e_i from there.  With r = |err|/|Y|, (10 r)^(3/2) is
- * about the error of the method, of order h^6 (step_scale_error), as in RADAU5. */
+ * about the error of the method, of order h^6 (step_scale_error in variation_step.c), as in RADAU5. */
 #include <lapacke.h>
 #include <stdlib.h>
 #include <string.h>

@@ -9,7 +9,7 @@ enum {
   PW_VARIATION_NEIGHBOURS = 4, /* neighbouring runs of a direction */
   PW_VARIATION_STAGES = 3,     /* of an implicit step */
   PW_VARIATION_RATES = 7,      /* stages of an explicit step, and the time derivative at its end */
-  PW_VARIATION_POINTS = 256,   /* most states of the run between the derivatives' time and its own */
+  PW_VARIATION_POINTS = 256,   /* recorded states of the run at which it waits for the derivatives */
   PW_VARIATION_DENSE = 100     /* most coordinates for implicit steps, which need dense matrices */
 };
 
@@ -150,7 +150,7 @@ double pw_variation_least_effect (const pw_direction_copy *d);
 /* The step of differences along a column: the state changes by at most 1e-5 in units of the scene. */
 double pw_variation_step_along (const pw_variation_column *c);
 /* Derivatives of kinetic and potential energy, the ledger's rates, multipliers (of least norm) along a column whose
- * state is Y: 2 + entries + m numbers.  Non-zero if a signal fails. */
+ * state is Y: 2 + entries + m numbers.  J is left at another state.  Non-zero if a signal fails. */
 int pw_variation_outputs (pw_variation *x, const pw_variation_column *c, const double *Y, double *out);
 /* Time derivatives of the work and losses of every column at its `trial`, into K[k].  Non-zero if a signal fails. */
 int pw_variation_ledger_rates (pw_variation *x, int k);

@@ -12,7 +12,7 @@ typedef struct {
   const char *page_path;                    /* of --animate, or NULL */
   const char **hold_texts;                  /* of --hold */
   int steady;                               /* 1: --steady */
-  const char **input_names, **output_names; /* of --input and --output, ended by NULL; or NULL: all */
+  const char **input_names, **output_names; /* ended by NULL; or NULL: all signals of forces, all states */
   pw_cli_model m;
   pw_files files;
   pw_run *r;

@@ -1,4 +1,4 @@
-/* Outputs of analyses: columns of the table of `run` by name, and texts of outputs; functional.c has the values. */
+/* Outputs of analyses: columns of the table of `run` by name, and texts of outputs; functionals: functional.c. */
 #define _POSIX_C_SOURCE 200809L
 #include <math.h>
 #include <stddef.h>

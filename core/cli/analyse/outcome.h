@@ -40,7 +40,7 @@ typedef struct {
 int pw_column_find (const pw_system *s, const char *name, const char *origin, pw_column *c, pw_error *error);
 const char *pw_column_unit (const pw_system *s, pw_column c);
 /* Its value in a sample, or its derivative if the sample contains derivatives, as columns are linear in the sample; NaN
- * for contact points, which are not. */
+ * for contact points, which are not, and for entries of the ledger without pw_settings.ledger. */
 double pw_column_value (const pw_system *s, pw_column c, const pw_sample *sample);
 
 typedef enum { PW_FINAL, PW_MAX, PW_MIN, PW_MEAN, PW_INTEGRAL, PW_RMS } pw_functional_type;

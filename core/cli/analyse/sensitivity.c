@@ -12,7 +12,7 @@
 enum {
   SENSITIVITY_DIGITS = 9,   /* of numbers in the text */
   SENSITIVITY_UNIT = 64,    /* longest unit, its end included */
-  SENSITIVITY_NAME = 10000, /* likewise the name of a column of the table; a formula has 4000 characters at most */
+  SENSITIVITY_NAME = 10000, /* likewise the name of a column of the table; longer names are cut off */
   SENSITIVITY_ROWS = 1000,  /* of the table, unless --every is given */
   SENSITIVITY_REPEATED = 5  /* computations with better steps of the differences, at most */
 };
@@ -309,7 +309,7 @@ static int sensitivity_repeat (pw_sensitivity *sens, pw_progress *progress, pw_e
 
 #define SENSITIVITY_LOOSE 10. /* factor of the larger tolerances with which the error of a run is estimated */
 
-/* Computes the derivatives with larger tolerances.  They are NaN if that fails; PW_RETRY after a signal. */
+/* Computes the derivatives with larger tolerances.  They are NaN if that fails; PW_RETRY after Ctrl-C. */
 static int sensitivity_loosen (pw_sensitivity *sens, pw_progress *progress, pw_error *error) {
   int outputs = sens->outcomes.outcomes, unknowns = sens->unknowns.count;
   pw_sensitivity other = sensitivity_copy (sens);

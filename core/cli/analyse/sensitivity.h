@@ -30,10 +30,10 @@ typedef struct {
   pw_unknown_run *neighbours; /* 4 P: those of each direction */
   pw_variation *variation;
   pw_run *sampled;        /* the run of which samples are taken; NULL: base.run */
-  double last_breakpoint; /* that has been passed [s] */
+  double last_breakpoint; /* that has been reached [s] */
   double *before;         /* F + F P: values and derivatives before a jump */
   double *q;              /* coordinates: scratch */
-  char *memory;           /* of these arrays */
+  char *memory;           /* of value, slope, run_slope, their errors, before and q */
   size_t room;            /* rows allocated */
 } pw_sensitivity;
 

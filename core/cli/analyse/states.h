@@ -9,14 +9,14 @@
 
 enum { PW_HOLDS = 40 }; /* quantities held at given values (pw_system_find_held), at most */
 
-enum { PW_STEADY_NOT_RANDOM = 2 }; /* attempts of pw_steady_solve that begin at the initial state or near it */
+enum { PW_STEADY_NOT_RANDOM = 2 }; /* attempts of pw_steady_solve, 0 and 1, that do not begin at a random state */
 
 #define PW_HOLD_OPTION(type, member)                      \
   PW_LIST_OPTION (type, member, "hold", 0, "STATE=VALUE", \
                   "Seek motions with this value of a state, or of BODY.speed, .radius or .curvature; repeatable")
 
 /* Adds the quantity of this name to the list of those held, which has room for PW_HOLDS; `option` and `text` begin
- * messages.  PW_INPUT if there is none, with the nearest name, or it is held already. */
+ * messages.  PW_INPUT if there is none, with the nearest name, it is held already, or the list is full. */
 int pw_hold_add (const pw_system *s, const char *option, const char *text, const char *name, double value,
                  pw_initial_value *hold, int *holds, pw_error *error);
 /* Adds the quantity of each --hold "STATE=VALUE"; `texts` ends with NULL, or is NULL. */

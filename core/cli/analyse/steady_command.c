@@ -238,8 +238,8 @@ static double steady_model_value (const pw_steady_command *cmd) {
                                pw_system_initial_v (s));
 }
 
-/* The motion nearest to the initial state at the value of the model or where the range begins; at a value within the
- * range if the family is smaller there. */
+/* The motion nearest to the initial state: at the initial value of the held quantity that varies, or for a parameter of
+ * the model where the range begins; at a value within the range if the family is smaller there. */
 static int steady_nearest_motion (pw_steady_command *cmd, pw_steady_motion *m, pw_error *error) {
   const double first = cmd->settings.first, held = cmd->settings.vary < 0 ? NAN : steady_model_value (cmd),
                begin = isfinite (held) ? held : first, within = first + STEADY_WITHIN * (cmd->settings.last - first);

@@ -12,7 +12,7 @@ typedef struct {
   pw_steady_motion motion; /* its arrays are in `state`; motion.linear is NULL */
   pw_linear linear;        /* twist, unknowns, and in `state` re, im, rigid; the other members are not set */
   double *state;           /* q, v, re, im, rigid */
-  char advice[1000];       /* options that select it within its family, " --hold NAME=VALUE..."; "" if too long */
+  char advice[1000];       /* options that select it in its family, " --hold NAME=VALUE..."; "" if none or too long */
 } pw_steady_point;
 
 enum { PW_STEADY_REASON = 200 }; /* longest reason, its end included */

@@ -63,7 +63,7 @@ typedef struct {
   pw_workspace *workspace; /* for contact points; NULL: not needed yet */
 } pw_unknown_run;
 /* Compiles the model and sets m and settings, with the engine and a limit of its own, whose clock starts; the caller
- * opens `run`.  Close it in every case. */
+ * opens `run`.  *to must not move, since settings points to its limit.  Close it in every case. */
 int pw_unknown_run_prepare (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error);
 void pw_unknown_run_close (pw_unknown_run *run);
 

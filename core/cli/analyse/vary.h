@@ -14,8 +14,8 @@ typedef struct {
   pw_unknowns unknowns; /* this one, for pw_unknowns_system */
 } pw_vary;
 
-/* Reads the option.  PW_INPUT if it is malformed, or the parameter cannot vary in the range or is also given by
- * --set. */
+/* Reads the option into *v, which is zero-initialised and must not move later: it points to itself.  PW_INPUT if it is
+ * malformed, or the parameter cannot vary in the range or is also given by --set. */
 int pw_vary_read (pw_vary *v, const pw_cli_line *line, const pw_cli_model *m, const char *text, pw_error *error);
 /* Shows the progress of a branch at a value between `from` and `to`; starts a progress that is zero-initialised. */
 void pw_vary_progress (const pw_vary *v, pw_progress *p, double from, double value, double to);
