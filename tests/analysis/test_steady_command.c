@@ -415,6 +415,22 @@ static void test_more_symmetries (void **state) {
   steady_shows ("knife-edge-incline: 4 branches of steady motions up to 2 symmetries, alpha from 0 to 3.14159265\n");
 }
 
+/* An oscillator on a car that turns at 1 rad/s: the frequency of a Hopf event is its own, not that of the frame. */
+static void test_hopf_in_a_turn (void **state) {
+  (void)state;
+  cli_write ("turn.yaml", "pinwheel: 1\nparameters: [{name: p, value: 0.2}]\nbodies:\n"
+                          "  - {name: car, mass: 2, inertia: 1, rate: {vx: 3, omega: 1}}\n"
+                          "  - {name: arm, mass: 1, inertia: 1, rate: {vx: 3, omega: 1}}\nelements:\n"
+                          "  - {pin: P, body: [car, arm], at: [[0, 0], [0, 0]]}\n"
+                          "  - {wheel: rear, body: car, at: [0, 0]}\n"
+                          "  - {wheel: front, body: car, at: [1, 0], heading: atan(1/3)}\n"
+                          "  - {speed: engine, body: car, at: [0, 0], value: 3}\n"
+                          "  - {torque: s, body: [arm, car], "
+                          "value: \"-0.25*(arm.phi - car.phi) - (p - 0.1)*(arm.omega - car.omega)\"}\n");
+  cli_good ("pinwheel steady @/turn.yaml --vary p=-0.2:0.3 --starts 0");
+  steady_shows ("        0                0       0.0795775\n");
+}
+
 /* A parameter of a model in C need not have a unit. */
 static void test_without_unit (void **state) {
   (void)state;
@@ -455,6 +471,7 @@ int main (void) {
     cmocka_unit_test (test_one_body),
     cmocka_unit_test (test_without_unit),
     cmocka_unit_test (test_more_symmetries),
+    cmocka_unit_test (test_hopf_in_a_turn),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

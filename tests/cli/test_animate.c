@@ -78,6 +78,19 @@ static void test_forces (void **state) {
   free (page);
 }
 
+/* A drive without points is drawn at the joint of its bodies, whichever is the ground, with an end that exists. */
+static void test_joint (void **state) {
+  (void)state;
+  cli_write ("crank.yaml", "pinwheel: 1\nbodies: [{name: crank, mass: 1, inertia: 0.1, start: {x: 1}}]\nelements:\n"
+                           "  - {pin: O, body: [ground, crank], at: [[0, 0], [-1, 0]]}\n"
+                           "  - {drive: d, body: [ground, crank], what: angle, value: 0}\n");
+  cli_good ("pinwheel run @/crank.yaml --t-end 0.1 --animate @/crank.html");
+  char *page = animate_page ("crank.html");
+  assert_non_null (strstr (page, "{\"name\": \"O\", \"force_end\": 1, \"ends\": [{\"body\": -1"));
+  assert_non_null (strstr (page, "{\"name\": \"d\", \"force_end\": -1, \"ends\": [{\"body\": -1"));
+  free (page);
+}
+
 static void test_names (void **state) {
   (void)state;
   cli_good ("cp tests/models/arm.yaml '@/a<b>&.yaml'");
@@ -98,10 +111,8 @@ static void test_refusals (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_motion),
-    cmocka_unit_test (test_forces),
-    cmocka_unit_test (test_names),
-    cmocka_unit_test (test_refusals),
+    cmocka_unit_test (test_motion), cmocka_unit_test (test_forces),   cmocka_unit_test (test_joint),
+    cmocka_unit_test (test_names),  cmocka_unit_test (test_refusals),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

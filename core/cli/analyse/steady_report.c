@@ -28,7 +28,7 @@ static void steady_cells_rightmost (pw_table *t, const pw_steady_point *p) {
   const pw_linear *l = &p->linear;
   int best = -1, crossing = p->motion.event != PW_STEADY_POINT;
   for (int i = 0; i < l->unknowns; i++) {
-    if (!crossing && (l->rigid[i] || (l->re[i] == 0 && l->im[i] == 0))) continue;
+    if (crossing ? l->rigid[i] && l->im[i] != 0 : l->rigid[i] || (l->re[i] == 0 && l->im[i] == 0)) continue;
     if ((l->im[i] != 0) != (p->motion.event == PW_STEADY_OSCILLATION) && crossing) continue;
     if (best < 0 || (crossing && fabs (l->re[i]) < fabs (l->re[best]))) best = i;
   }

@@ -122,6 +122,7 @@ static int shapes_link (const pw_plots *plots, const pw_element *e, int element,
   joint.ends = 0;
   if ((link->ends == 0 || shapes_without_points (e)) && shapes_at_joints (plots, e, info.body, &joint)) {
     *link = joint;
+    if (link->force_end >= link->ends) link->force_end = -1; /* the end that is not at the joint */
     return 1;
   }
   return link->force_end >= 0;
