@@ -111,6 +111,8 @@ static int periodic_open (pw_periodic *x, pw_error *error) {
 }
 
 pw_periodic *pw_periodic_open (const pw_system *s, const pw_periodic_settings *settings, pw_error *error) {
+  pw_error ignored = { 0 };
+  if (error == NULL) error = &ignored;
   if (pw_require (s, "a system", error) != PW_OK || pw_require (settings, "settings", error) != PW_OK) return NULL;
   pw_periodic *x = calloc (1, sizeof *x);
   if (x == NULL) return pw_fail_memory (s, error), NULL;

@@ -10,6 +10,8 @@ enum { BRANCH_MAX_POINTS = 100 /* as a multiple of those that the settings ask f
 
 int pw_steady_follow (pw_steady *x, const double *q, const double *v, double parameter, int direction,
                       pw_error *error) {
+  pw_error ignored = { 0 };
+  if (error == NULL) error = &ignored;
   if (pw_require (x, "a search", error) != PW_OK) return PW_INPUT;
   int unknowns = pw_steady_unknowns (x);
   double range = x->settings.last - x->settings.first;

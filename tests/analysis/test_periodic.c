@@ -432,6 +432,7 @@ static void test_missing (void **state) {
   pw_system *s = mathieu_at (NULL, 1, NULL);
   assert_null (pw_periodic_open (s, NULL, &e[1]));
   check_error (&e[1], PW_INPUT, "settings is missing");
+  assert_null (pw_periodic_open (s, &(pw_periodic_settings){ .method = "x" }, NULL)); /* no error is wanted */
   pw_system_free (s);
   assert_int_equal (pw_periodic_solve (NULL, 0, 0, &o, &e[2]), PW_INPUT);
   assert_int_equal (pw_periodic_follow (NULL, 1, &e[3]), PW_INPUT);
