@@ -163,21 +163,9 @@ void *pw_specialised_lanes_memory (const pw_specialised_lanes *code) {
   return aligned_alloc (64, (code->size + 63) / 64 * 64);
 }
 
-static int specialise_check_limits (const pw_system *s, pw_error *error) {
-  int elements = 0;
-  for (int k = 0; k < s->batches; k++) elements += s->batch[k].b.count;
-  if (s->rows > SPECIALISE_ROWS)
-    return pw_fail (error, PW_INPUT, "model %s: %d constraint equations: specialised code has at most %d", s->model,
-                    s->rows, SPECIALISE_ROWS);
-  if (elements > SPECIALISE_ELEMENTS)
-    return pw_fail (error, PW_INPUT, "model %s: %d elements: specialised code has at most %d", s->model, elements,
-                    SPECIALISE_ELEMENTS);
-  return PW_OK;
-}
-
 char *pw_system_source (const pw_system *s, const unsigned char *independent, pw_error *error) {
   pw_stream text;
-  if (pw_require (s, "a system", error) != PW_OK || specialise_check_limits (s, error) != PW_OK) return NULL;
+  if (pw_require (s, "a system", error) != PW_OK || pw_specialise_check_limits (s, error) != PW_OK) return NULL;
   pw_generator gen = { .s = s, .independent = independent, .out = pw_stream_open (&text) };
   int status = gen.out ? specialise_open (&gen) : PW_RESOURCE;
   if (status == PW_OK) status = specialise_write (&gen);

@@ -177,10 +177,22 @@ void pw_specialise_signals (const pw_generator *gen) {
 
 /* ---- Lanes ---- */
 
+int pw_specialise_check_limits (const pw_system *s, pw_error *error) {
+  int elements = 0;
+  for (int k = 0; k < s->batches; k++) elements += s->batch[k].b.count;
+  if (s->rows > SPECIALISE_ROWS)
+    return pw_fail (error, PW_INPUT, "model %s: %d constraint equations: specialised code has at most %d", s->model,
+                    s->rows, SPECIALISE_ROWS);
+  if (elements > SPECIALISE_ELEMENTS)
+    return pw_fail (error, PW_INPUT, "model %s: %d elements: specialised code has at most %d", s->model, elements,
+                    SPECIALISE_ELEMENTS);
+  return PW_OK;
+}
+
 int pw_system_has_lanes (const pw_system *s) {
   for (int k = 0; k < s->batches; k++)
     if (!pw_kind_is_built_in (s->batch[k].kind) || s->batch[k].kind->element % sizeof (double)) return 0;
-  return s->rows <= SPECIALISE_ROWS && s->state_dependent == 0;
+  return s->state_dependent == 0 && pw_specialise_check_limits (s, NULL) == PW_OK;
 }
 
 /* A run's data, as doubles: the elements of all batches, then for each signal a pw_harmonic, or a constant, then 0. */

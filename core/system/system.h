@@ -20,8 +20,8 @@ typedef struct {
   const int *column; /* count x bodies: first coordinate of each body; s->coords for the ground */
   const char **name; /* count */
   double *J;         /* count x rows x cols */
-  double *block;     /* count x cols: scratch for forces, energies, powers; count x 2 cols for saturation */
-  double *u;         /* count x signals x 3, as b.u */
+  double *block; /* count x cols, at least count: scratch for forces, energies, powers; count x 2 cols for saturation */
+  double *u;     /* count x signals x 3, as b.u */
   pw_source *source; /* count x signals, part of the array of all sources */
 } pw_element_batch;
 

@@ -16,7 +16,7 @@
 #define LEAST_WIDTH 0x1p-36          /* of bisected intervals, at first, relative to |t| */
 #define GREATEST_LEAST_WIDTH 0x1p-10 /* to which it grows */
 #define SMALLEST_INTERVAL 1e-18      /* [s]: not bisected either, for t near 0 */
-enum { NOISE_CHANGES = 8 };          /* an operation with more changes in such an interval and just after it is noisy */
+enum { NOISE_CHANGES = 8 };          /* more changes in an interval of the least width and just after it are noise */
 enum { NOISE_SAMPLES = 256 };        /* at which they are counted, in the interval, and as many after it */
 #define NOISE_WIDTH 1e-6             /* of the time after the interval, relative to 1 s + |t| */
 #define NOISE_DURATION 1e-2          /* for which changes of a noisy operation are ignored, relative to 1 s + |t| */
