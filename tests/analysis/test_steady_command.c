@@ -383,8 +383,7 @@ static void test_bad (void **state) {
 }
 
 /* Where the range begins there may be more symmetries: without stiffness or slope a body can be anywhere or have any
- * direction.  Branches have the symmetries within the range, and begin at its other end, or within
- * it. */
+ * direction.  Branches have the symmetries within the range, and begin at its other end, or within it. */
 static void test_more_symmetries (void **state) {
   (void)state;
   cli_write ("held.yaml", "pinwheel: 1\nparameters: [{name: k, value: 0}]\n"
@@ -409,6 +408,12 @@ static void test_more_symmetries (void **state) {
   steady_shows ("knife-edge-incline: 2 branches of steady motions up to 2 symmetries, alpha from 0 to 0.3\n");
   steady_shows ("       1  begins                    0.3        0                                 \n");
   steady_shows ("       2  ends                        0        0                                 \n");
+  cli_write ("step.yaml", "pinwheel: 1\nparameters: [{name: k, value: 0}]\n"
+                          "bodies: [{name: bob, mass: 1, inertia: 1, start: {x: 0.3}, rate: {vx: 0.1}}]\nelements:\n"
+                          "  - {spring: s, body: [bob, ground], at: [[0, 0], [-2, 0]], stiffness: 'k > 0.9 ? 1 : 0', "
+                          "length: 2}\n");
+  cli_shell ("pinwheel steady @/step.yaml --hold bob.speed=0.1 --vary k=1:0 --starts 0"); /* more where it begins */
+  steady_shows ("Branch 1 ends: the equations change along the motion\n");
   assert_int_equal (cli_run ("pinwheel steady chaplygin-sleigh --vary a=0:0.2"), 0);
   steady_shows ("       1  begins                      0.2        1 ");
   cli_shell ("pinwheel steady knife-edge-incline --set w=0 --start skate.phi=1.5 --vary alpha=0:pi");

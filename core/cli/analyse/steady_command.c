@@ -222,7 +222,8 @@ static int steady_branches_from (pw_steady_command *cmd, double parameter, int d
     const pw_steady_motion *m = &start[i].motion;
     const int known = steady_is_known (cmd, m, 0), first = cmd->points;
     if (status == PW_OK && !known && !cmd->stopped) status = steady_follow (cmd, start + i, direction, error);
-    if (status == PW_OK && !known && !cmd->stopped && inside && !steady_is_known (cmd, m, first + 1))
+    const int begun = cmd->points > first; /* 0: steady_omit has removed the branch */
+    if (status == PW_OK && !known && !cmd->stopped && inside && begun && !steady_is_known (cmd, m, first + 1))
       status = steady_follow (cmd, start + i, -direction, error);
     free (start[i].state);
   }
