@@ -60,6 +60,7 @@ static int periodic_signal_period (pw_periodic *x, double *period) {
   *period = 0;
   for (int i = 0; i < 2 && *period == 0; i++) {
     const pw_system *s = pw_periodic_system (x, PW_HERE, value[i]);
+    if (s == NULL && i > 0 && x->why.status != PW_RESOURCE) return x->why = (pw_error){ 0 }, PW_OK;
     if (s == NULL) return x->why.status;
     *period = pw_system_period (s);
   }
@@ -81,10 +82,10 @@ static int periodic_open (pw_periodic *x, pw_error *error) {
     return pw_fail (error, PW_INPUT, "model %s has %d coordinates; periodic motions are sought with at most %d",
                     s->model, x->n, PERIODIC_MAX_COORDINATES);
   double period = x->settings.period;
-  if (period <= 0 && periodic_signal_period (x, &period) != PW_OK)
+  if (period <= 0 && !x->settings.free && periodic_signal_period (x, &period) != PW_OK)
     return pw_fail (error, x->why.status, "%s", x->why.text);
   /* At a time at which no signal is likely to vanish: then the system would have more symmetries. */
-  const pw_steady_settings settings = { .t = x->settings.t + 0.317 * period,
+  const pw_steady_settings settings = { .t = x->settings.t + 0.317 * fmax (period, 0),
                                         .span = period > 0 ? period : 1,
                                         .first = x->settings.first,
                                         .last = x->settings.last,

@@ -260,7 +260,7 @@ static void test_many_unknowns (void **state) {
   cli_shell (full);
   check_close ("a0", optimise_value (cli_file ("o.json"), "a0"), 1, 1e-6, "last steps of 1e-7");
   strstr (full, "--starts 1")[9] = '2';
-  cli_bad (full, 2, "--starts: at most 40 unknowns");
+  cli_bad (full, 2, "at most 40 unknowns with more than one start; give --starts 1");
 }
 
 /* Outputs without a largest value: linear in an unknown without bounds. */

@@ -100,7 +100,8 @@ static int periodic_find (pw_periodic_command *cmd, pw_periodic_orbit *o, pw_err
 /* The error if no attempt succeeded. */
 static int periodic_fail (pw_periodic_command *cmd, pw_error *error) {
   char period[60] = "a free period", tried[200] = "";
-  pw_system *first = cmd->vary_text ? pw_vary_compile (&cmd->vary, cmd->settings.first, error) : NULL;
+  pw_error ignored = { 0 };
+  pw_system *first = cmd->vary_text ? pw_vary_compile (&cmd->vary, cmd->settings.first, &ignored) : NULL;
   double signals = pw_system_period (first ? first : cmd->m.system);
   double T = cmd->settings.period > 0 ? cmd->settings.period : cmd->settings.periods * signals;
   pw_system_free (first);
