@@ -156,8 +156,8 @@ int pw_rk_fail (pw_run *r, int status, double t, double h, int divided, pw_error
   if (!finite && h < 1e-12 * fabs (t)) /* some 4000 eps */
     return pw_fail (error, PW_METHOD, "t = %.6g s: the next state is not finite, however small the step", t);
   return pw_fail (error, PW_METHOD, "t = %.6g s: the step of %.6g s is too large: %s", t, h,
-                  divided   ? "near a singular configuration, and dividing it in different ways gives different results"
-                  : !finite ? "the state is no longer finite"
+                  divided                   ? "near a singular configuration, where no two divisions of it agree"
+                  : !finite                 ? "the state is no longer finite"
                   : r->data->uses_nullspace ? "the basis of the velocities does not stay valid"
                   : r->data->projects       ? "the projection does not converge"
                                             : "a stage of it lands in a singular configuration");

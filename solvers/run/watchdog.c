@@ -100,7 +100,8 @@ static int watchdog_fail_lost (pw_run *r, int contradicts, pw_error *error) {
   pw_residuals now;
   char element[120] = "a constraint", cause[60] = "constraint drift";
   pw_evaluate_residuals (r->w, NULL, &now);
-  int in_position = now.position > now.velocity, row = in_position ? now.row_position : now.row_velocity;
+  int in_position = isnan (now.position) || now.position > now.velocity;
+  int row = in_position ? now.row_position : now.row_velocity;
   if (row >= 0) pw_system_row_name (r->s, row, element, sizeof element);
   const char *advice = "";
   if (contradicts)
