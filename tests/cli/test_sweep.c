@@ -213,7 +213,7 @@ static void test_bad_input (void **state) {
       "model ezyroller has no state \"frame.q\"; valid are x, y, phi, vx, vy, omega" },
     { "--vary omega=1,2 --jobs 0", "--jobs 0: expected a whole number >= 1" },
     { "--vary omega=1,2 --part 3/2", "--part 3/2: expected I/N, whole numbers with 1 <= I <= N <= 1000000" },
-    { "--vary omega=1,2 --part 1/3", "--part 1/3: more parts than rows, 2" },
+    { "--vary omega=1,2 --part 1/3", "--part 1/3: more parts than the 2 rows of the grid" },
     { "--vary omega=1,2 --step 0", "--step 0: expected a number > 0" },
     { "--vary omega=1,2 --stp 1", "sweep has no option \"--stp\"; did you mean \"--step\"?" },
   };

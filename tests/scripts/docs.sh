@@ -1,5 +1,5 @@
 #!/bin/sh
-# The pages of docs/ show what the program prints: each block that begins with "$ build/pinwheel" is run, and its lines must
+# README.md and docs/ show what the program prints: each block that begins with "$ build/pinwheel" is run, and its lines must
 # be in the output, in their order.  Numbers agree to 1 %, or both are below 1e-6 in size, or the line depends on the machine:
 # times, and results of a drifting method at a singular configuration.
 # A YAML block after "save as `NAME`:" becomes a file for the commands after it.  Run from the top folder; reads PINWHEEL.

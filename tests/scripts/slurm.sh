@@ -1,7 +1,7 @@
 #!/bin/sh
 # The manual's Slurm job array on a cluster of two virtual nodes on this machine: six parts, one node fails during the work,
-# its parts are requeued, a dependent job merges them.  The table is, byte for byte, that of a single sweep.  Skipped without Slurm
-# (`make deps TOOLS=slurm`).  Reads PINWHEEL.
+# its parts are requeued, a dependent job merges them.  The table is, byte for byte, that of a single sweep.  Skipped without
+# Slurm (`make deps TOOLS=slurm`).  Reads PINWHEEL.
 
 for program in slurmctld slurmd munged sbatch scontrol; do
   command -v $program >/dev/null || [ -x /usr/sbin/$program ] || {

@@ -19,7 +19,7 @@ typedef struct {
   double *row;                         /* rows x columns */
   double *loose;                       /* outputs x P: derivatives with larger tolerances; NULL: not computed */
   int stopped;                         /* 1: stopped before t_end, by Ctrl-C or the limit */
-  pw_limit limit;                      /* of all runs together */
+  pw_limit limit;                      /* of all runs of one computation together */
   pw_unknown_run base;                 /* the run, at the given values of the unknowns */
   pw_direction *direction;             /* P */
   /* at the time last evaluated: */

@@ -163,7 +163,8 @@ static int fit_open_data (pw_fit *fit, pw_error *error) {
     return pw_fail (error, PW_INPUT, "--data %s has fewer data (%d) than there are unknowns (%d)", fit->data_path,
                     fit->residuals, fit->unknowns.count);
   if (fit->starts > 1 && fit->unknowns.count > PW_UNKNOWNS_SOBOL_MOST)
-    return pw_fail (error, PW_INPUT, "--starts: at most %d unknowns", PW_UNKNOWNS_SOBOL_MOST);
+    return pw_fail (error, PW_INPUT, "at most %d unknowns with more than one start; give --starts 1",
+                    PW_UNKNOWNS_SOBOL_MOST);
   fit->unknowns.t_end = fit->unknowns.settings.span = fit->t[fit->rows - 1];
   pw_unknowns_engine (&fit->unknowns, FIT_RUNS);
   return PW_OK;

@@ -1,7 +1,7 @@
 /* The script of interactive pages: runs the model in the browser and shows the result.  It follows the script of
  * animate.html, which draws `run` at the time state.t: begin() shows the first run, load() another one, key() the legend
- * of its curves, seek() a time; $, number, raised, size, place, placement, save, count, bodies, colours, palette are
- * from there too. */
+ * of its curves, seek() a time; $, number, raised, size, place, placement, save, count, bodies, colours, palette and circle
+ * are from there, too. */
 
 /* ---- The engine: the model and the integrators, compiled to WebAssembly ---- */
 
@@ -339,7 +339,7 @@ function plotRuns () {
   points.forEach((p, i) => {
     g.strokeStyle = g.fillStyle = colour(p.method);
     g.beginPath();
-    g.arc(X(Math.log10(p.ms)), Y(Math.log10(p.error)), i === points.length - 1 ? 5 : 3.5, 0, 7);
+    g.arc(X(Math.log10(p.ms)), Y(Math.log10(p.error)), i === points.length - 1 ? 5 : 3.5, 0, circle);
     i === points.length - 1 ? g.fill() : g.stroke();
   });
 }

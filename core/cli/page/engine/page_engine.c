@@ -138,8 +138,9 @@ static int page_integrate (pw_run *r, double t_end) {
   return status;
 }
 
-/* Runs the model with the parameters and initial values given, for at most `limit` ms of computing time.  0, or a negative
- * status with the error set; the samples so far are kept.  With keep_samples 0 it only integrates, to be timed. */
+/* Runs the model with the parameters and initial values given, for at most `limit` ms of computing time.  0, or a
+ * negative status with the error set; the samples so far are kept.  With keep_samples 0 it only integrates, to be
+ * timed. */
 PAGE_EXPORT (run)
 int page_run (const char *method, double step, double rtol, double t_end, double limit, int keep_samples,
               const double *parameter, const pw_initial_value *initial, int initials) {
