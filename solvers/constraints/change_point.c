@@ -1,9 +1,9 @@
 /* Change points: configurations at which branches of a motion cross, or nearly do.
  *
- * In suitable coordinates the constraints near one are x y = e; the sine of the smallest angle between their rows
- * (watchdog.h) is |(x, y)|.  For e = 0 the branches cross and the motion goes straight on; for e != 0 it turns within a
- * distance of sqrt (e), and a step that is longer than that can go straight on to the other branch, where all
- * constraints hold again.  Neither residuals nor energies reveal this.
+ * In suitable coordinates the constraints near one are x y = e; the sine (watchdog.h) is |(x, y)|.  For e = 0 the
+ * branches cross and the motion goes straight on; for e != 0 it turns within a distance of sqrt (|e|), and a step that
+ * is longer than that can go straight on to the other branch, where all constraints hold again.  Neither residuals nor
+ * energies reveal this.
  *
  * So where the sine may have had a minimum within a step, a walk on the constraint manifold leads from its beginning to
  * its end, in strides proportional to the sine, each followed by a projection.  If the walk does not get closer to the
@@ -31,7 +31,7 @@ typedef struct {
   double *target;      /* the end of the step */
   double *entry;       /* 2 coords: the last coordinates before a crossing of branches, and the first ones in it */
   double sine;         /* at q */
-  double sine_slope;   /* fastest change of the sine per unit of motion so far */
+  double sine_slope;   /* fastest change of the sine per unit of motion so far, at least largest_sine */
   double least_sine;   /* smallest sine so far */
   int least_row;       /* the row that had it */
   int in_crossing;     /* 1: stepping over a crossing of branches */
@@ -52,7 +52,7 @@ static double change_distance (const pw_system *s, const double *a, const double
   return sqrt (change_dot (s, a, b, a, b));
 }
 
-/* Projects q onto the constraints; *sine: the sine there. */
+/* Projects q onto the constraints; *sine: that of the holonomic rows there, 0 if they are dependent. */
 static int change_project (change_walk *walk, double t, double *q, double *sine) {
   pw_run *r = walk->r;
   int row, status = pw_project_positions (&walk->projector, r, t, q, r->v);

@@ -68,8 +68,8 @@ static int initial_positions (pw_projector *p, pw_run *r, initial_failure *failu
   return status;
 }
 
-/* Projects velocities; kinematics must be up to date.  A second linear solve removes the round-off of a large first
- * correction. */
+/* Projects velocities; kinematics and J must be up to date.  A second linear solve removes the round-off of a large
+ * first correction. */
 static int initial_velocities (pw_projector *p, pw_run *r, initial_failure *failure) {
   double *Jv = r->scratch, *eta = Jv + r->s->rows;
   pw_residuals now;
@@ -135,7 +135,7 @@ static int initial_project_reduced (pw_projector *p, pw_run *r, initial_level le
 }
 
 /* Projects the positions `from` and the given velocities, with prescribed states (2 coords, or NULL); reduce_free: 1:
- * projections are reduced.  The velocity metric is the mass matrix; if that does not determine all velocities, or
+ * by initial_project_reduced.  The velocity metric is the mass matrix; if that does not determine all velocities, or
  * their projection fails, the position metric. */
 static int initial_attempt (pw_run *r, const unsigned char *prescribed, int reduce_free, const double *from,
                             initial_failure *failure, pw_error *error) {
@@ -293,8 +293,9 @@ static const struct initial_set {
   { 0, 0, INITIAL_FREE },
 };
 
-/* The states that a set prescribes (2 coords); returns 0 if the set does not apply, since it prescribes no coordinate
- * because of its mass, or leaves no massless one that can move.  origin may be NULL: nothing is given or specified. */
+/* The states that a set prescribes (2 coords); returns 0 if the set does not apply: it is to prescribe coordinates
+ * because of their mass, but there are none (INITIAL_MASS_UNSPECIFIED: none of PW_ZERO_POSITION), or it leaves no
+ * massless one that can move.  origin may be NULL: nothing is given or specified. */
 static int initial_prescribe (const pw_system *s, const unsigned char *origin, const struct initial_set *set,
                               unsigned char *prescribed) {
   int n = s->coords, massless = 0, massive = 0, unspecified = 0;

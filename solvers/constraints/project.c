@@ -120,8 +120,9 @@ int pw_project_velocities (pw_projector *p, pw_run *r, double *v) {
   return pw_update_velocities (r->w, v);
 }
 
-/* 1 if the velocities satisfy J v = eta to round-off and need no correction; J must be evaluated.  0 also near a
- * singular configuration and with redundant equations, where small residuals do not imply small errors. */
+/* 1 if the velocities satisfy J v = eta to round-off and need no correction; J must be evaluated.  0 also with another
+ * metric than M; and near a singular configuration and with redundant equations, where small residuals do not imply
+ * small errors. */
 static int project_accepts_velocities (const pw_projector *p, pw_run *r) {
   r->residuals.velocity = NAN;
   if (p->owns_velocity || p->active || r->near_singular) return 0;

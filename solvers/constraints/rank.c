@@ -63,7 +63,7 @@ double pw_row_basis_orthogonalise (const pw_row_basis *b, double *vector, int fi
 }
 
 /* The next row to keep of rows first .. end - 1: the first whose norm is at least 0.9 of the largest, so that equal
- * rows keep their order whatever their round-off. */
+ * rows keep their order whatever their round-off; -1 if none is left. */
 static int rank_pivot (const pw_row_basis *b, int first, int end) {
   double most = 0;
   for (int i = first; i < end; i++)

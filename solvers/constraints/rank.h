@@ -42,9 +42,9 @@ void pw_row_basis_close (pw_row_basis *b);
 
 /* Selects at most `max_holonomic` holonomic equations, and at most `max_rows` in all, by Gram-Schmidt on the J last
  * evaluated, rows of length 1: those of which a part longer than tol is independent of the ones kept before.  Holonomic
- * equations come first, since a nonholonomic one must not replace a holonomic one; of these the most independent ones,
- * in order where they are about equal.  fixed (coords, or NULL): 1 for coordinates that are left out.  Returns the
- * rank. */
+ * equations come first, since a nonholonomic one must not replace a holonomic one; of each kind the most independent
+ * ones, in order where they are about equal.  fixed (coords, or NULL): 1 for coordinates that are left out, after the
+ * rows have been scaled.  Returns the rank. */
 int pw_row_basis_select (pw_row_basis *b, const pw_workspace *w, double tol, const unsigned char *fixed,
                          int max_holonomic, int max_rows);
 
@@ -56,8 +56,8 @@ double pw_row_basis_orthogonalise (const pw_row_basis *b, double *vector, int fi
 int pw_rank_select (const pw_workspace *w, double tol, const unsigned char *fixed, unsigned char *active);
 
 /* Selects r->active, a maximal set of independent rows, for the run at its consistent initial state.  It stays NULL if
- * all rows are independent.  Errors: PW_RESOURCE; PW_INITIAL if the rank is higher nearby: the initial configuration is
- * singular. */
+ * all rows are independent: then pw_rank_reselect, _independence and _least_norm must not be called.  Errors:
+ * PW_RESOURCE; PW_INITIAL if the rank is higher nearby: the initial configuration is singular. */
 int pw_rank_open (struct pw_run *r, pw_error *error);
 
 /* Selects r->active again with the J last evaluated.  Returns 1 if another set of the same rank is now active, else 0.
@@ -65,7 +65,7 @@ int pw_rank_open (struct pw_run *r, pw_error *error);
 int pw_rank_reselect (struct pw_run *r);
 
 /* Conditioning of the active equations: 1 over their largest coefficient in a sum of the redundant ones with irregular
- * weights (rows of length 1).  Residuals of the redundant equations are about those of the active ones divided by this.
+ * weights (rows of length 1); 0 if NaN.  Redundant equations have about the residuals of the active ones over this.
  * J must be evaluated and the run's saddle factorised at the configuration. */
 double pw_rank_independence (struct pw_run *r);
 

@@ -14,7 +14,7 @@ const pw_thresholds pw_watchdog_limits = {
   .lost = 1e-2,
   .lost_unstabilised = 0.1,
 
-  /* A redundant row follows from the others up to a round-off of some 1e6 eps, or up to their residuals divided by a
+  /* A redundant row follows from the others up to a round-off of some 5e6 eps, or up to their residuals divided by a
    * sine as small as 1e-4. */
   .redundant_residual = 1e-9,
   .redundant_ratio = 1e4,
@@ -110,8 +110,8 @@ static int singular_body (const pw_system *s, const pw_element_batch *k, int e, 
   return j < s->coords ? j / 3 : s->bodies;
 }
 
-/* 1 if an element connects bodies that are already connected; -1 if out of memory.  The ground is a body, to which an
- * element on one body connects it. */
+/* 1 if a holonomic constraint connects bodies that are already connected; -1 if out of memory.  The ground is a body,
+ * to which an element on one body connects it. */
 static int singular_has_loops (const pw_system *s) {
   int loops = 0, *set = malloc (((size_t)s->bodies + 1) * sizeof *set);
   if (set == NULL) return -1;

@@ -15,7 +15,7 @@ typedef struct {
   klu_l_symbolic *symbolic;
   klu_l_numeric *factors;   /* NULL: none, or forgotten */
   int64_t *colptr, *rowind; /* the pattern, the caller's */
-  double least_rcond;       /* reciprocal condition number below which pivots are selected again */
+  double least_rcond;       /* ratio of the least to the largest pivot (KLU) below which pivots are selected again */
 } pw_sparse;
 
 /* n columns in compressed form.  PW_OK or PW_RESOURCE. */

@@ -29,8 +29,8 @@ void pw_tangent_close (pw_tangent *x);
 
 /* ---- From values of the active equations to those of all, and back ---- */
 
-/* Multipliers of all equations, valid until the next call and while `active` is: lambda; mu, of which `active` has
- * `count`, or NULL if that is 0. */
+/* Multipliers of all equations, valid until the next call (or pw_tangent_multiply_JT) and while `active` is: lambda;
+ * mu, of which `active` has `count`, or NULL if that is 0. */
 const double *pw_tangent_expand_lambda (const pw_tangent *x, const double *active);
 const double *pw_tangent_expand_mu (const pw_tangent *x, const double *active, int count);
 /* The same lambda in an array of all equations. */

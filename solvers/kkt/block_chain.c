@@ -150,7 +150,8 @@ PW_INLINE void chain_pivot (chain_lanes *D, pw_block_ldl *l, const chain_sweep *
   D[1] = D[1] * D[0], D[2] = a / minor;
 }
 
-/* Eliminates the pins with the diagonal blocks D, which become those of the next ones. */
+/* Eliminates the pins.  D: their diagonal blocks without the contributions of the bodies of s, which are added; then
+ * those of the next pins, without the contributions of the next bodies. */
 PW_INLINE void chain_eliminate (pw_block_ldl *l, chain_sweep *s, int sign, chain_lanes *D) {
   const chain_body p = chain_read (l, s);
   const chain_square K = chain_coupling (p);

@@ -1,6 +1,6 @@
 /* Assembly and elimination of the block L D L^T; see block_ldl.h.
  *
- *   for each body:      K_ba += J_b W^-1 J_a^T  for its contributions a and those after a, b
+ *   for each body:      K_ba += J_b W^-1 J_a^T  for its contributions a, and b from a on
  *   for each column j:  D = K_jj,  L_pj = K_pj D^-1,  K_pq -= L_pj K_qj^T  for all p >= q below j
  *
  * The elimination is right-looking, with all positions known in advance.  The rows p are in descending order, so that
@@ -110,7 +110,7 @@ static inline void block_subtract (int kq, double *T, block_square L, const doub
 }
 
 /* Eliminates row p of a column j: subtracts L_pj K_qj^T from the blocks K_pq, then replaces K_pj by L_pj.  A: K_pj; B:
- * the column's first block; target: indices in `value` of K_pq. */
+ * the column's first block below the diagonal; target: indices in `value` of K_pq. */
 PW_INLINE void block_eliminate_row (int ki, const pw_block_ldl *l, const pw_block_column *c, int p, double *A,
                                     const double *B, const double *D, const int *target, int kj) {
   const pw_block_column *column = l->column;

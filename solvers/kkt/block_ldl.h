@@ -12,8 +12,8 @@
  *     [ S      J_k ] [ lambda ]   [ J W^-1 f - gamma ]
  *     [ J_k^T -W_k ] [ -a_k   ] = [ f_k              ]      with S of all other bodies,
  *
- * quasi-definite, so that L D L^T needs no pivoting (Vanderbei 1995, Symmetric quasi-definite matrices), with the nodes
- * of -a_k (rank 1) after the equations of rank 0 and before those of rank 2 (condense_rank.c).
+ * quasi-definite, so that L D L^T needs no pivoting (Vanderbei 1995, Symmetric quasi-definite matrices), with two nodes
+ * of -a_k (x and y; the angle; rank 1) after the equations of rank 0 and before those of rank 2 (condense_rank.c).
  *
  * Chains are bodies one after another, each pinned to the one before and the one after.  Nothing else touches the pins
  * inside a chain, so their part of the matrix is block tridiagonal and need not be stored.  In a body's columns, J is
@@ -89,7 +89,7 @@ typedef struct {
   const double *inverse_weight; /* diagonal of W^-1 */
   pw_body_block *body;          /* bodies + 1: the last one ends the ranges */
   pw_contribution *contribution;
-  int *coupling;        /* index in `value` of K_ba */
+  int *coupling;        /* index in `value` of the block of nodes a and b */
   pw_chain *chain;      /* chains + 1, by ascending columns, the last one a sentinel; their bodies have no block */
   double *chain_factor; /* factors of D in the chains' columns */
   int bodies;
@@ -109,8 +109,9 @@ typedef struct {
 } pw_plan_node;
 
 /* Orders the nodes and determines the pattern.  pair: 2 x pairs numbers of nodes that are coupled, in any order, with
- * repetition; pairs < 2^30.  The order is that of the nodes if it fills in no more than minimum degree does (AMD:
- * Amestoy, Davis & Duff 1996).  NULL if out of memory, or if L has 2^30 blocks or more below the diagonal. */
+ * repetition; pairs < 2^30.  Within each rank, the order is that of the nodes if L then has no more blocks than with
+ * minimum degree in rank 0 (AMD: Amestoy, Davis & Duff 1996).  NULL if out of memory, or if minimum degree leaves
+ * 2^30 blocks or more below the diagonal. */
 pw_block_ldl *pw_block_open (int nodes, const pw_plan_node *node, long pairs, const int *pair);
 void pw_block_close (pw_block_ldl *l); /* l may be NULL */
 
@@ -118,7 +119,7 @@ void pw_block_close (pw_block_ldl *l); /* l may be NULL */
  * or more. */
 int pw_block_lay_out (pw_block_ldl *l);
 
-/* Index in `value` of the block that couples two nodes. */
+/* Index in `value` of the block of two coupled nodes: rows of the one eliminated later.  After pw_block_lay_out. */
 int pw_block_find (const pw_block_ldl *l, int a, int b);
 
 /* Number of values of a diagonal block: its lower triangle, and its diagonal before elimination. */

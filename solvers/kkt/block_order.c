@@ -96,7 +96,7 @@ static int order_fill (const order_search *x, int most, order_variant *v) {
   return v->below ? order_pass (x, most, v) : PW_RESOURCE;
 }
 
-/* The order with less fill-in, that of minimum degree or the natural one; NULL if out of memory. */
+/* The natural order or, if that has less fill-in, minimum degree in rank 0; NULL if out of memory or L is too large. */
 static const order_variant *order_choose (order_search *x) {
   if (order_open (x) != PW_OK) return NULL;
   order_list_neighbours (x, 0);

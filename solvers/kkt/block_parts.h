@@ -15,7 +15,7 @@ typedef struct {
   double x, y, angle;
 } block_row;
 
-/* A row of J W^-1 of `width` columns; w: diagonal of W^-1. */
+/* A row of J, or the forces f on a body, times W^-1: `width` numbers; w: diagonal of W^-1. */
 static inline block_row block_weigh (int width, const double *J, const double *w) {
   return width == 3 ? (block_row){ J[0] * w[0], J[1] * w[1], J[2] * w[2] } : (block_row){ .x = J[0] * w[0] };
 }

@@ -40,8 +40,8 @@ static void condense_element (pw_plan *plan, const pw_element_batch *b, int n, i
   }
 }
 
-/* 1 for row n of a batch that becomes part of a node: active, not in a massless component, and not one of prescribed
- * coordinates alone. */
+/* 1 for row n of a batch that becomes part of a node: active, not in a massless component, and with an entry other than
+ * 0 at a coordinate that is not prescribed, or without prescribed coordinates. */
 static int condense_takes_part (const pw_plan *plan, const pw_element_batch *b, int n, const unsigned char *active) {
   const double *J = b->J + n * b->b.cols, *inverse = plan->saddle->inverse_weight;
   int i = b->row + n, prescribed = 0;
@@ -80,7 +80,8 @@ static void condense_elements (pw_plan *plan, const unsigned char *active) {
     }
 }
 
-/* 1 for an unmatched row i that becomes a node: it has massive coordinates, and not only prescribed ones. */
+/* 1 for an unmatched row i that becomes a node: it has an entry other than round-off at a massive coordinate that is
+ * not prescribed, or its component has massive coordinates and none is prescribed. */
 static int condense_remains (const pw_plan *plan, const pw_component *p, int i) {
   int prescribed = 0;
   for (int n = 0; n < p->cols; n++) {

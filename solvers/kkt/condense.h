@@ -23,8 +23,8 @@ struct pw_saddle {
   pw_block_ldl *block;
   int *inactive; /* rows whose multiplier is 0 */
   int inactive_count;
-  double pivot;  /* smallest pivot of `massless` and `block` when last factorised: the squared sine of the angle between
-                  * a row and those before it */
+  double pivot;  /* smallest when last factorised: of `block`, the squared sine of the angle between a row and those
+                  * before it; of `massless`, see pw_massless_factor */
   int pivot_row; /* that row; -1: none, or one of a massless component */
   char *memory;
 };

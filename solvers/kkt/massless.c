@@ -43,7 +43,7 @@ static void massless_swap (pw_component *c, int a, int b) {
   }
 }
 
-/* Entries below this, relative to the terms of their row, are what round-off leaves of 0: some 1e3 eps. */
+/* Entries below this, relative to the terms or the largest entry of their row, are what round-off leaves of 0. */
 #define MASSLESS_ROUND_OFF 1e-12
 
 int pw_massless_is_entry (const pw_component *c, int i, int column) {

@@ -1,5 +1,5 @@
-/* Elimination of coordinates without weight (saddle.h), called massless; the others are massive.  Each is matched to a
- * constraint row and substituted out of the other rows.
+/* Elimination of coordinates without weight (saddle.h), called massless; the others are massive.  Each massless one is
+ * matched to a constraint row and substituted out of the other rows.
  *
  * The rows and coordinates concerned form independent components, such as a massless body and its joints.  In each,
  * Gaussian elimination of the massless columns, with the matched rows p as pivot rows, leaves
@@ -48,7 +48,7 @@ static inline int pw_is_grounded (const pw_system *s, const pw_element_batch *k,
   return grounded;
 }
 
-/* A group of a component. */
+/* A group of a component, whose coordinates are numbered as its local columns. */
 typedef struct {
   int j, width; /* first global coordinate; 3 of a body, or 1 */
   int column;   /* first local column */

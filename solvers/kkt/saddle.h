@@ -21,7 +21,7 @@ pw_saddle *pw_saddle_open (pw_workspace *w, const double *weight, int rows, cons
 void pw_saddle_close (pw_saddle *saddle);
 
 /* Factorises with the J last evaluated.  Returns PW_OK, or PW_RETRY if the smallest pivot is the round-off of a
- * dependent row. */
+ * dependent row, or NaN. */
 int pw_saddle_factor (pw_saddle *saddle);
 
 /* J has been evaluated by specialised code, which found pivots of at least `pivot`, a squared sine: the saddle will be
@@ -35,9 +35,9 @@ void pw_saddle_solve (pw_saddle *saddle, const double *f, const double *gamma, d
 /* 1 if pw_saddle_sine is below this sine. */
 int pw_saddle_sine_below (pw_saddle *saddle, double sine);
 
-/* The square root of the smallest pivot of the last factorisation, which is the sine of the angle between a row and
- * those before it: small near a singular configuration; *row (unless NULL): that row, or -1 for one that contains
- * coordinates without weight, or if there is none. */
+/* The square root of the smallest pivot, at most 1; 0 if that is not positive.  It is the sine of the angle between a
+ * row and those before it, or a relative pivot of a coordinate without weight: small near a singular configuration.
+ * *row (unless NULL): that row, or -1 for one that contains coordinates without weight, or if there is none. */
 double pw_saddle_sine (pw_saddle *saddle, int *row);
 
 #endif

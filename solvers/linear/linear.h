@@ -75,9 +75,9 @@ void pw_linear_close (pw_linearisation *x);
 
 /* Records the scatter map of the derivatives.  PW_OK or PW_RESOURCE. */
 int pw_linear_derivatives (pw_linearisation *x);
-/* The smallest singular value of the independent rows of J, each of length 1; NaN if there are none. */
+/* The smallest singular value of the independent rows of J, as from pw_rank_rows; NaN: no rows, or LAPACK failed. */
 double pw_linear_least (pw_linearisation *x);
-/* J^T = Q R of the independent constraint equations at the state evaluated. */
+/* J^T = Q R of the same rows, at the state evaluated. */
 void pw_linear_bases (pw_linearisation *x);
 /* Evaluates accelerations and derivatives at a state; kinematics are left there.  Returns as pw_run_accelerate. */
 int pw_linear_evaluate (pw_linearisation *x, double t, const double *q, const double *v);
@@ -115,7 +115,7 @@ void pw_linear_choose_frame (pw_linearisation *x);
  * accelerations; turns: 1 if dx is a rotation of the whole by 1 rad, with which accelerations rotate. */
 void pw_linear_asymmetry (pw_linearisation *x, int turns, double *out);
 /* Number of rigid displacements of the whole (x, y, phi) under which the equations are invariant to first order; stores
- * their directions in `symmetry`. */
+ * their directions in `symmetry`.  Needs A, for the tolerance. */
 int pw_linear_symmetries (pw_linearisation *x);
 /* Determines whether A is constant along the motion; see pw_linear.  Leaves the workspace at the current state. */
 pw_steadiness pw_linear_steady (pw_linearisation *x);

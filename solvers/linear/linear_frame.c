@@ -122,7 +122,7 @@ void pw_linear_asymmetry (pw_linearisation *x, int turns, double *out) {
   for (int j = 0; j < x->n; j++) out[j] = x->da[j] * pw_length_factor (x->r->s, j) / linear_unit (x);
 }
 
-/* The largest asymmetry of a symmetry: round-off, which grows by 1e-4 of the largest derivative of an acceleration. */
+/* The largest asymmetry of a symmetry: round-off, relative to 1 + 1e-4 x the largest derivative of an acceleration. */
 static double linear_tolerance (const pw_linearisation *x) {
   double most = 0, T = x->r->w->scale.time;
   for (int i = x->positions; i < x->size; i++)

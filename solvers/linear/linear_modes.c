@@ -61,7 +61,7 @@ int pw_linear_matrices (pw_linearisation *x, pw_linear *l) {
 
 /* ---- Shapes ---- */
 
-/* 1 if mu is about an eigenvalue of the k rigid displacements: 0 for a rotation, +- i w for two translations. */
+/* 1 if mu is about an eigenvalue of the k rigid displacements: +- i w for two translations, 0 for any other one. */
 static int modes_near_rigid (const pw_linearisation *x, int k, double complex mu) {
   double bound = MODES_APART / x->r->w->scale.time, w = x->frame.twist[2];
   return (k != 2 && cabs (mu) <= bound) || (k >= 2 && (cabs (mu - I * w) <= bound || cabs (mu + I * w) <= bound));

@@ -2,7 +2,7 @@
  *
  * A state obeys g (q, t) = 0 and J v = eta, so that variations obey  G dq = 0,  J dv = -B dq,  B = (J v)_q - eta_q.
  * With orthonormal bases N_q of the null space of G and N_v of that of J (both from one QR factorisation of J^T,
- * holonomic equations first, in units of the scene) the variations are
+ * holonomic equations first, angles times L) the variations are
  *
  *     dq = N_q z,   dv = N_v u / T - J^+ B N_q z,
  *
