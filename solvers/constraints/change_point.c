@@ -7,10 +7,10 @@
  *
  * So where the sine may have had a minimum within a step, a walk on the constraint manifold leads from its beginning to
  * its end, in strides proportional to the sine, each followed by a projection.  If the walk does not get closer to the
- * end, the end is on another branch.  Where the sine is below the threshold `crossing`, the branches cross to
- * round-off: the walk steps over such a point, and the motion must continue straight on.  (Following a solution curve
- * by predictor and projection: Allgower & Georg 2003, Introduction to numerical continuation methods, chapters 2 and
- * 8.) */
+ * end after a low sine, the end is on another branch.  Where the sine is below the threshold `crossing`, the branches
+ * cross to round-off: the walk steps over such a point, and the motion must continue straight on.  (Following a
+ * solution curve by predictor and projection: Allgower & Georg 2003, Introduction to numerical continuation methods,
+ * chapters 2 and 8.) */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -311,7 +311,7 @@ static int initial_prescribe (const pw_system *s, const unsigned char *origin, c
 }
 
 /* Makes attempts with one set after another, except those that prescribe the same as the last one (the same positions,
- * if these failed).  *released: 1 if the last set does not prescribe all values given by the user.
+ * if these failed) and are reduced alike.  *released: 1 if the last set does not prescribe all that the user gives.
  *
  * In large scenes attempts are not reduced while states specified by the model are prescribed, since they usually fail
  * for sketches of linkages, which specify all positions; nor in the free coordinates unless the user gives values. */

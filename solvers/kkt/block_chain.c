@@ -22,8 +22,8 @@ typedef struct {
 
 typedef struct {
   chain_lane first, second;
-  ptrdiff_t J_stride, j_stride, unknown_stride; /* from body to body in the first lane; `sign` times those in the
-                                                 * second one */
+  ptrdiff_t J_stride, j_stride, unknown_stride; /* from body to body in the first lane; in the second one times
+                                                 * 1 or -1, the argument `sign` of functions */
   ptrdiff_t row_stride;                         /* from row to row of J */
 } chain_sweep;
 

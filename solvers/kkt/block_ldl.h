@@ -50,7 +50,7 @@ typedef struct {
 
 /* The contribution of a node to a body. */
 typedef struct {
-  const double *J; /* its entry in the first row and column */
+  const double *J; /* its entry in the first row and column; NULL: a node of -a_k */
   int unknown;     /* index in y of the node's first unknown */
   int diagonal;    /* index in `value` of the node's diagonal block */
   int row_stride;  /* from row to row of J */
@@ -62,7 +62,7 @@ typedef struct {
   int first_contribution;    /* index of the first one, by column; they end at that of the next block */
   int first_coupling;        /* index of the first one: for each contribution a, for each b after it */
   unsigned char width;       /* columns: 3, or 1 of an internal coordinate */
-  unsigned char uncondensed; /* 1: its last contributions are the nodes of -a_k; couplings are with these only */
+  unsigned char uncondensed; /* 1: its last two contributions are the nodes of -a_k; couplings are with these only */
 } pw_body_block;
 
 /* Pointers and indices are those of the first body and its pins; the others follow at equal strides. */
@@ -86,7 +86,7 @@ typedef struct {
   int *column_of_node;
   double *value;                /* K, then its factors */
   int values;                   /* length of `value` */
-  const double *inverse_weight; /* diagonal of W^-1 */
+  const double *inverse_weight; /* diagonal of W^-1, owned by the saddle */
   pw_body_block *body;          /* bodies + 1: the last one ends the ranges */
   pw_contribution *contribution;
   int *coupling;        /* index in `value` of the block of nodes a and b */

@@ -18,7 +18,7 @@ typedef struct pw_saddle pw_saddle;
  * row. */
 pw_saddle *pw_saddle_open (pw_workspace *w, const double *weight, int rows, const unsigned char *active,
                            pw_error *error);
-void pw_saddle_close (pw_saddle *saddle);
+void pw_saddle_close (pw_saddle *saddle); /* may be NULL */
 
 /* Factorises with the J last evaluated.  Returns PW_OK, or PW_RETRY if the smallest pivot is the round-off of a
  * dependent row, or NaN. */

@@ -97,7 +97,7 @@ void pw_linear_rotate (const pw_linearisation *x, double angle, const double *in
 
 /* Fills re, im and rigid, sorted, and with modes the shapes.  Rigid displacements of the whole are split off, an
  * invariant subspace with known eigenvalues (in a rotating frame a displaced motion rotates at -w), so that they do not
- * cause defective zeros.  Errors: PW_METHOD, PW_RESOURCE. */
+ * cause defective zeros; if that fails, l->symmetries becomes 0.  Errors: PW_METHOD, PW_RESOURCE. */
 int pw_linear_eigenvalues (pw_linearisation *x, pw_linear *l, pw_error *error);
 
 /* ---- linear_modes.c ---- */

@@ -11,8 +11,9 @@
  *
  *     [ M J^T ; J 0 ] (da, dlambda) = ( (f_q - (J^T lambda)_q) dq + f_v dv,  (gamma_q - (J a)_q) dq + gamma_v dv ),
  *
- * at constant time.  In a steady motion every body moves with the twist (vx, vy, w) of one frame, in which the state
- * and the constraint manifold are at rest.  The components of vectors in that frame rotate at -w, hence
+ * at constant time.  In a steady motion every body moves with the twist (vx, vy, w) of one frame (exceptions:
+ * linear_frame.c), in which the state and the constraint manifold are at rest.  The components of vectors in that frame
+ * rotate at -w, hence
  *
  *     z' = N_q^T (dv - W dq),   u' = T N_v^T (da - W dv),   W (x, y, phi) = w (-y, x, 0) for each body.
  *
