@@ -58,7 +58,8 @@ void pw_run_accelerate_updated (pw_run *r, const double *v, double *a, double *l
   if (pw_saddle_sine_below (r->saddle, r->limits.refine)) dynamics_refine (r, v, a, lambda);
 }
 
-/* Factorises and solves, with gamma in the array of lambda; *near = 1 near a singular configuration. */
+/* Factorises and solves, with gamma in the array of lambda; *near = 1 near a singular configuration, where the status
+ * is PW_RETRY if the sine is at most r->refused_sine. */
 static inline int dynamics_solve (pw_run *r, const double *v, double *a, double *lambda, int *near) {
   const double *f = dynamics_right_side (r, v, r->scratch, lambda);
   r->statistics.rhs++;

@@ -48,7 +48,7 @@ void pw_row_basis_close (pw_row_basis *b);
 int pw_row_basis_select (pw_row_basis *b, const pw_workspace *w, double tol, const unsigned char *fixed,
                          int max_holonomic, int max_rows);
 
-/* Orthogonalises a vector against the rows kept, from number `first` of them on; returns its norm afterwards. */
+/* Orthogonalises a vector (coords) against the rows kept from number `first` on; returns its norm afterwards. */
 double pw_row_basis_orthogonalise (const pw_row_basis *b, double *vector, int first);
 
 /* Sets active[i] to 1 for a maximal set of independent equations, selected as by pw_row_basis_select, else to 0.

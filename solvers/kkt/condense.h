@@ -1,8 +1,8 @@
 /* Condensation of a saddle-point system to its constraint equations: planned by condense*.c, carried out by block_*.c.
  *
  * Equations are grouped into nodes of 1 or 2 with the same columns.  A node contributes to each group (massless.h) of
- * its coordinates of which at least one has a finite weight other than 0.  Two nodes that contribute to the same group
- * are coupled: they have a block in S = J W^-1 J^T. */
+ * its coordinates of which at least one has a finite weight other than 0.  Two nodes that contribute to the same group,
+ * unless it is an uncondensed body, are coupled: they have a block in S = J W^-1 J^T. */
 #ifndef PW_CONDENSE_H
 #define PW_CONDENSE_H
 

@@ -102,7 +102,7 @@ int pw_linear_eigenvalues (pw_linearisation *x, pw_linear *l, pw_error *error);
 
 /* ---- linear_modes.c ---- */
 
-/* Allocates B, basis and shape, and fills B and basis. */
+/* Allocates B, basis and shape, and fills B and basis.  PW_OK or PW_RESOURCE, as the next one. */
 int pw_linear_matrices (pw_linearisation *x, pw_linear *l);
 /* Fills the shapes after k rigid displacements have been split off; eigenvalues are not yet sorted. */
 int pw_linear_shapes (pw_linearisation *x, int k, pw_linear *l);
@@ -111,7 +111,7 @@ int pw_linear_shapes (pw_linearisation *x, int k, pw_linear *l);
 
 /* Chooses a frame with small accelerations of the evaluated state; one that rotates only if it halves them. */
 void pw_linear_choose_frame (pw_linearisation *x);
-/* What the variation dx changes, in units of the scene, 0 for a symmetry: residuals of the constraints, then n
+/* What the variation dx changes, in units of the scene, 0 for a symmetry: `holonomic` + `rank` residuals, then n
  * accelerations; turns: 1 if dx is a rotation of the whole by 1 rad, with which accelerations rotate. */
 void pw_linear_asymmetry (pw_linearisation *x, int turns, double *out);
 /* Number of rigid displacements of the whole (x, y, phi) under which the equations are invariant to first order; stores

@@ -102,7 +102,7 @@ static double *linear_column (const pw_linearisation *x, int j) {
 }
 
 /* The rows of J of the independent equations, of length 1, to Q. */
-static void linear_independent (pw_linearisation *x) {
+static void linear_independent_rows (pw_linearisation *x) {
   size_t n = (size_t)x->n;
   pw_rank_rows (x->r->w, x->R, x->norm);
   for (int k = 0; k < x->rank; k++) memcpy (linear_column (x, k), x->R + (size_t)x->row[k] * n, n * sizeof *x->R);
@@ -111,7 +111,7 @@ static void linear_independent (pw_linearisation *x) {
 double pw_linear_least (pw_linearisation *x) {
   int n = x->n, rank = x->rank;
   double least = INFINITY;
-  linear_independent (x);
+  linear_independent_rows (x);
   int failed = rank && LAPACKE_dgesvj_work (LAPACK_COL_MAJOR, 'G', 'N', 'N', n, rank, x->Q, n, x->row_scratch, 0, NULL,
                                             1, x->scratch, n + x->m + 3) != 0;
   for (int k = 0; k < rank; k++) least = fmin (least, x->scratch[0] * x->row_scratch[k]);
@@ -121,7 +121,7 @@ double pw_linear_least (pw_linearisation *x) {
 void pw_linear_bases (pw_linearisation *x) {
   int n = x->n, rank = x->rank;
   double *tau = x->da;
-  linear_independent (x);
+  linear_independent_rows (x);
   LAPACKE_dgeqrf_work (LAPACK_COL_MAJOR, n, rank, x->Q, n, tau, x->scratch, n);
   for (int k = 0; k < rank; k++)
     memcpy (x->R + (size_t)k * (size_t)rank, linear_column (x, k), (size_t)(k + 1) * sizeof *x->R);
