@@ -25,7 +25,7 @@ void pw_saddle_close (pw_saddle *saddle); /* may be NULL */
 int pw_saddle_factor (pw_saddle *saddle);
 
 /* J has been evaluated by specialised code, which found pivots of at least `pivot`, a squared sine: the saddle will be
- * factorised when the factors are needed. */
+ * factorised when the factors are needed, with the J evaluated last by then. */
 void pw_saddle_postpone (pw_saddle *saddle, double pivot);
 
 /* Solves for a (coords) and lambda (rows; 0 for inactive ones).  f may be NULL: zero.  a and f may be the same array,

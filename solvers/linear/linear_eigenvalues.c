@@ -22,7 +22,7 @@ static int eigen_values (int n, double *A, double *re, double *im, double *left,
   return failed ? PW_RETRY : PW_OK;
 }
 
-/* Perturbs each row of B by EIGEN_ROUND_OFF times its largest entry, or times `least` if that is larger. */
+/* Perturbs each row of B by up to EIGEN_ROUND_OFF times its largest entry, or times `least` if that is larger. */
 static void eigen_perturb (int n, double least, double *B) {
   for (int i = 0; i < n; i++, B += n) {
     double most = least;
