@@ -9,7 +9,7 @@
 #define PW_UNROLL
 #endif
 
-/* Replaces `static` of a function that is compiled once per constant size. */
+/* Replaces `static` of a function that is compiled once per set of constant arguments, such as a size. */
 #define PW_INLINE static inline __attribute__ ((always_inline))
 
 /* Replaces `static` of a rarely called function, so that the frequent path of its caller saves no registers. */

@@ -125,7 +125,7 @@ static int check_field (const pw_model *m, const pw_element *e, const pw_field *
   return PW_OK;
 }
 
-/* bodies NULL: names of bodies are not checked. */
+/* bodies NULL: whether the bodies exist is not checked. */
 static int check_element (const pw_model *m, const pw_element *e, const pw_names *bodies, pw_error *error) {
   if (check_name (m, e->kind->name, pw_element_name (e), error) != PW_OK) return PW_INPUT;
   for (const pw_field *f = e->kind->fields; f->name; f++)

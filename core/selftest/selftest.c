@@ -1,4 +1,4 @@
-/* The self-test of an element type in random scenes: each check compares one function of its table with differences of
+/* The self-test of an element type in random scenes: most checks compare one function of its table with differences of
  * another. */
 #include <float.h>
 #include <math.h>

@@ -103,7 +103,7 @@ static void form_check_points (const pw_signal *s, int *point, char *text, size_
   if (!*text) *point = -1;
 }
 
-/* The form of a signal that jumps or has kinks, for messages; NULL if it has neither. */
+/* The form of a signal that jumps or has kinks, for messages; NULL if it has neither or is a function. */
 static const char *form_with_kinks (const pw_signal *s) {
   if (s->type == PW_PULSE) return "a pulse";
   if (s->type == PW_RAMP) return "a ramp";

@@ -110,7 +110,7 @@ typedef struct pw_specialised {
   int (*stages) (pw_scene *s, const pw_scene_step *x);
   /* Residuals of an evaluated state. */
   void (*residuals) (pw_scene *s, const double *q, const double *v, const pw_configuration *c, const double *J);
-  /* Takes steps until one has to be made by the general engine. */
+  /* Takes `count` steps, or fewer if one has to be made by the general engine. */
   void (*steps) (pw_scene *s, pw_scene_steps *x);
 } pw_specialised;
 
