@@ -4,7 +4,7 @@
 #include "model.h"
 #include "signal.h"
 
-/* Texts must be UTF-8 without control characters, since they are printed and written to JSON. */
+/* Texts must pass pw_is_text, since they are printed and written to JSON. */
 static int check_parameter (const pw_plugin_table *t, const pw_parameter *p, const char *what, pw_error *error) {
   const char *expected = pw_domain_check (p->domain, p->value);
   if (!pw_is_text (p->name) || (p->unit && !pw_is_text (p->unit)) || (p->about && !pw_is_text (p->about)))

@@ -116,7 +116,7 @@ typedef struct pw_specialised {
 
 /* The same code for several runs at once, in the lanes of vector registers. */
 struct pw_specialised_lanes {
-  int abi, lanes;
+  int abi, lanes;            /* lanes: runs at once; 0: none, the compiler does not vectorise the code */
   unsigned long shape, size; /* as in pw_specialised; bytes of `memory` */
   /* The same for `lanes` runs with the same step size, tableau and `project`, without stabilisation or redundant
    * equations; memory: scratch, aligned to 64 bytes. */
