@@ -1,4 +1,4 @@
-/* Attributes and pragmas for functions that are compiled once per constant size, with unrolled loops. */
+/* Attributes and pragmas that control unrolling, inlining and vectorisation. */
 #ifndef PW_UNROLL_H
 #define PW_UNROLL_H
 

@@ -1,4 +1,4 @@
-/* A random scene of three elements of one type, for the self-test. */
+/* Random numbers, and random scenes of elements of one type, for the self-test and sparsity.c. */
 #ifndef PW_RANDOM_SCENE_H
 #define PW_RANDOM_SCENE_H
 

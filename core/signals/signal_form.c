@@ -64,7 +64,7 @@ const pw_signal_form *pw_signal_form_of (const pw_signal *s) {
 
 /* ---- Checks: each writes the fault to `text`, or leaves it empty ---- */
 
-/* Each field is a number or a choice between 0 and 1. */
+/* Each field is a number, or a choice that is 0 or 1. */
 static void form_check_fields (const pw_signal *s, const pw_signal_form *form, char *text, size_t size) {
   for (const pw_field *f = form->fields; f->name && !*text; f++) {
     const void *at = (const char *)s + f->offset;

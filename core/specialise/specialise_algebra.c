@@ -1,4 +1,5 @@
-/* Writes the linear algebra of specialised code: products with J, factorisations, solutions. */
+/* Writes the linear algebra of specialised code, with macros of specialise.c and scene_head.inc: products with J,
+ * factorisations, solutions. */
 #define _POSIX_C_SOURCE 200809L
 #include <stdlib.h>
 #include "specialise_parts.h"

@@ -71,7 +71,7 @@ typedef struct {
 
 /* Consecutive steps of size h of a Runge-Kutta method, with watchdog and ledger.  The arrays belong to the run. */
 typedef struct pw_scene_steps {
-  int count, done; /* steps to take; taken */
+  int count, done; /* steps to take, >= 1; taken */
   int project;     /* 1: onto the constraints after each step */
   int stages;
   const pw_rk_row *row; /* as in pw_scene_step */

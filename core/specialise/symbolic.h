@@ -11,7 +11,7 @@ typedef struct {
   pw_term_type type;
   int sign;
   char name[20]; /* as printed without the sign: "C[3]", "x12", "J[7]" */
-  double value;  /* at the initial state, including the sign */
+  double value;  /* at the initial state, including the sign, to choose pivots; 1 for f and g of solutions */
 } pw_term;
 
 /* Where statements go. */
