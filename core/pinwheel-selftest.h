@@ -42,7 +42,7 @@ int pw_selftest_scene (const pw_system *s, double T, const pw_kind *kind, double
 /* Residuals of one set of equations. */
 typedef struct {
   double scaled;   /* worst residual over its size: the sum of the absolute values of its terms, plus L/T or L/T^2; of
-                    * positions g_size, at least L; of forces the largest in the scene, or M L/T^2; inf: not finite */
+                    * positions g_size, at least L; of forces the largest, or mass x L/T^2, of all; inf: not finite */
   double absolute; /* largest residual, in the units of its equation; inf: not finite */
   char name[80];   /* the equation with the worst scaled residual: "B.Fx", "frame.vx" */
 } pw_worst_residual;

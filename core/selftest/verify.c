@@ -11,7 +11,7 @@
 #include "system.h"
 #include "pinwheel-selftest.h"
 
-/* For each equation of a set: its residual, the sum of its terms; the sum of their absolute values, or g_size. */
+/* For each equation of a set: the residual, a sum of terms; its size, the sum of their absolute values or g_size. */
 typedef struct {
   double *sum, *size;
 } verify_terms;

@@ -20,7 +20,8 @@ typedef struct pw_scene {
   double *u;                      /* signals x 3: value; first and second time derivatives, unless it is of a force */
   double *constant;               /* what `prepare` computes */
   double *t_signal;               /* time of the last evaluation of u; NaN: none */
-  int (*update) (void *workspace, double t, const double *q, const double *v); /* evaluates u; non-zero: failed */
+  /* Evaluates u; non-zero: failed.  q, v may be NULL if no signal reads states. */
+  int (*update) (void *workspace, double t, const double *q, const double *v);
   void *workspace;
   double length, speed;      /* scales of residuals [m], [m/s] */
   double alpha, beta;        /* of Baumgarte's stabilisation [1/s]; 0: none */
