@@ -1,5 +1,5 @@
-/* Verification: the self-test of an element type, which compares each function of its table with differences of
- * another one; and the residuals of the equations of motion at a sample. */
+/* Verification: the self-test of an element type, which compares most functions of its table with differences of
+ * others; and the residuals of the equations of motion at a sample. */
 #ifndef PINWHEEL_SELFTEST_H
 #define PINWHEEL_SELFTEST_H
 
@@ -13,7 +13,7 @@ enum { PW_SELFTEST_CHECKS = 24 }; /* room for checks in a report */
 typedef struct {
   const char *name;   /* the function checked: "gamma_q" */
   const char *about;  /* the identity checked: "J a - gamma = d(J v - eta)/dt" */
-  double error;       /* worst deviation relative to the largest term; inf: NaN */
+  double error;       /* worst deviation, relative as `reason` says, or absolute if "exact"; inf: not finite */
   double bound;       /* largest permitted error */
   const char *reason; /* origin of the bound */
   int failed;         /* 1: an error exceeded the bound */
@@ -27,13 +27,13 @@ typedef struct {
 
 /* Tests an element type, built-in or from a plug-in, using only its table, in a random scene and state generated
  * from the seed.  Start with a zero-initialised report; further calls with other seeds keep the worst result of each
- * check.  Failed checks are only in the report: the status is PW_OK.  Errors: PW_INPUT if the type rejects every
- * random definition that its field table permits, PW_RESOURCE. */
+ * check.  Failed checks are only in the report: the status is PW_OK.  Errors: PW_INPUT if the type rejects 50
+ * random definitions that its field table permits, PW_RESOURCE. */
 int pw_selftest (const pw_kind *kind, unsigned seed, pw_selftest_report *report, pw_error *error);
 
 /* Tests an element type in a scene that uses it: its derivatives along a random motion near the state q, v at time
  * t, with the scene's elements and signals, in units of its length scale and the time T.  Use a separate report.
- * Errors: PW_RESOURCE; PW_METHOD if a signal fails along this motion. */
+ * Errors: PW_RESOURCE; PW_METHOD if a signal fails along this motion, which clears the report. */
 int pw_selftest_scene (const pw_system *s, double T, const pw_kind *kind, double t, const double *q, const double *v,
                        unsigned seed, pw_selftest_report *report, pw_error *error);
 
@@ -42,7 +42,7 @@ int pw_selftest_scene (const pw_system *s, double T, const pw_kind *kind, double
 /* Residuals of one set of equations. */
 typedef struct {
   double scaled;   /* worst residual over its size: the sum of the absolute values of its terms, plus L/T or L/T^2; of
-                    * positions g_size, at least L; of forces the largest in the scene; inf: not finite */
+                    * positions g_size, at least L; of forces the largest, or mass x L/T^2, of all; inf: not finite */
   double absolute; /* largest residual, in the units of its equation; inf: not finite */
   char name[80];   /* the equation with the worst scaled residual: "B.Fx", "frame.vx" */
 } pw_worst_residual;

@@ -5,7 +5,7 @@
 #include <string.h>
 #include "util.h"
 
-/* Edit distance (Levenshtein 1966), keeping one row of the table; for a candidate longer than the row, its length. */
+/* Edit distance (Levenshtein 1966), keeping one row of the table; the length of b if b is too long for the row. */
 static size_t nearest_distance (const char *a, const char *b) {
   size_t row[64], n = strlen (b);
   if (n >= sizeof row / sizeof *row) return n;

@@ -3,8 +3,8 @@
  * x = n pi/2 + y + lo, where n is an integer, |y| <= pi/4 and lo is below the round-off of y: pi/2 is the sum of three
  * parts of 33 bits, whose products with n are exact, and a tail (Cody & Waite 1980), and lo collects the tail and the
  * round-off of the differences, so that y + lo is accurate next to multiples of pi/2 too.  Sine and cosine of y + lo
- * are the polynomials of fdlibm (Sun Microsystems 1993, k_sin.c and k_cos.c).  There are no branches and no fused
- * multiply-adds, so that the bits do not depend on the C library, the compiler or the processor. */
+ * are the polynomials of fdlibm (Sun Microsystems 1993, k_sin.c and k_cos.c).  There are no branches and, with
+ * -ffp-contract=off, no fused multiply-adds, so that the bits do not depend on C library, compiler or processor. */
 #ifndef PW_SINE_H
 #define PW_SINE_H
 

@@ -1,4 +1,4 @@
-/* Attributes and pragmas for functions that are compiled once per constant size, with unrolled loops. */
+/* Attributes and pragmas that control unrolling, inlining and vectorisation. */
 #ifndef PW_UNROLL_H
 #define PW_UNROLL_H
 
@@ -9,7 +9,7 @@
 #define PW_UNROLL
 #endif
 
-/* Replaces `static` of a function that is compiled once per constant size. */
+/* Replaces `static` of a function that is compiled once per set of constant arguments, such as a size. */
 #define PW_INLINE static inline __attribute__ ((always_inline))
 
 /* Replaces `static` of a rarely called function, so that the frequent path of its caller saves no registers. */

@@ -46,7 +46,7 @@ int pw_utf8_size (const char *text);
 int pw_control (const char *text);
 /* 1 if a text is UTF-8 without control characters other than line ends and tabs. */
 int pw_is_text (const char *text);
-/* Replaces control characters and invalid bytes by question marks. */
+/* Replaces invalid bytes, and control characters other than line ends and tabs, by question marks. */
 void pw_text_sanitise (char *text);
 
 /* ---- Streams into memory (stream.c) ---- */
@@ -56,7 +56,7 @@ typedef struct {
   size_t size, room; /* bytes of the text; allocated */
 } pw_stream;
 FILE *pw_stream_open (pw_stream *t); /* NULL if out of memory */
-/* Closes f, which may be NULL.  PW_RESOURCE, and t->text is NULL, if any part of it is missing.  Free t->text. */
+/* Closes f.  PW_RESOURCE, and t->text is NULL, if f is NULL or any part of the text is missing.  Free t->text. */
 int pw_stream_close (FILE *f, pw_stream *t);
 
 /* ---- Checksums, tables of names, memory (store.c) ---- */

@@ -109,7 +109,7 @@ static inline const pw_configuration *batch_body (const pw_batch *batch, int i) 
   return &batch->configuration[batch->body[i]];
 }
 
-/* eta of a velocity constraint equation that prescribes the element's only signal. */
+/* eta of a velocity constraint equation whose right-hand side is the element's only signal. */
 static inline void batch_eta_of_signal (const pw_batch *batch, double *out) {
   for (int e = 0; e < batch->count; e++) out[e] = batch->u[3 * e];
 }

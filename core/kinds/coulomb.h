@@ -5,7 +5,7 @@
  *
  * (Andersson, Soderberg & Bjorklund 2007, Tribology International 40, 580-587, for the smoothing by tanh.)
  * The limit L (friction coefficient times normal load) is constant, since forces cannot depend on multipliers.  The
- * regularised law cannot stick: under a load M < L it creeps at v0 atanh (M / L). */
+ * regularised law cannot stick: under a load M < L it creeps, for c = 0 at v0 atanh (M / L). */
 #ifndef PW_COULOMB_H
 #define PW_COULOMB_H
 
@@ -34,7 +34,7 @@ static inline double coulomb_slope (const coulomb *law, double v) {
 }
 
 /* The change of a coordinate or velocity x that changes v by v0 + |v|, which reverses the force; derivative: dv/dx.
- * INFINITY if the force does not saturate. */
+ * INFINITY if the force does not saturate or x does not change v. */
 static inline double coulomb_saturation (const coulomb *law, double v, double derivative) {
   return derivative != 0 && law->inverse > 0 ? (1 / law->inverse + fabs (v)) / fabs (derivative) : INFINITY;
 }

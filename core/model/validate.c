@@ -4,7 +4,7 @@
 #include "model.h"
 #include "signal.h"
 
-/* Texts must be UTF-8 without control characters, since they are printed and written to JSON. */
+/* Texts must pass pw_is_text, since they are printed and written to JSON. */
 static int check_parameter (const pw_plugin_table *t, const pw_parameter *p, const char *what, pw_error *error) {
   const char *expected = pw_domain_check (p->domain, p->value);
   if (!pw_is_text (p->name) || (p->unit && !pw_is_text (p->unit)) || (p->about && !pw_is_text (p->about)))
@@ -125,7 +125,7 @@ static int check_field (const pw_model *m, const pw_element *e, const pw_field *
   return PW_OK;
 }
 
-/* bodies NULL: names of bodies are not checked. */
+/* bodies NULL: whether the bodies exist is not checked. */
 static int check_element (const pw_model *m, const pw_element *e, const pw_names *bodies, pw_error *error) {
   if (check_name (m, e->kind->name, pw_element_name (e), error) != PW_OK) return PW_INPUT;
   for (const pw_field *f = e->kind->fields; f->name; f++)

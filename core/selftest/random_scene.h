@@ -1,4 +1,4 @@
-/* A random scene of three elements of one type, for the self-test. */
+/* Random numbers, and random scenes of elements of one type, for the self-test and sparsity.c. */
 #ifndef PW_RANDOM_SCENE_H
 #define PW_RANDOM_SCENE_H
 
@@ -20,7 +20,7 @@ double pw_random_between (pw_random *r, double low, double high);
 
 /* Compiles a scene of bodies b0 to b3 and elements e0 to e2, with random definitions within the domains of the
  * type's fields.  If e2 has several bodies, one is the ground.  A type that acts on every body has one element only.
- * NULL and the error if the type rejects 50 such definitions, or if out of memory. */
+ * NULL and the error if the type rejects 50 such definitions, or if out of memory.  error: not NULL; cleared first. */
 pw_system *pw_random_scene (const pw_kind *kind, pw_random *random, pw_error *error);
 
 #endif

@@ -1,4 +1,4 @@
-/* The self-test of an element type in random scenes: each check compares one function of its table with differences of
+/* The self-test of an element type in random scenes: most checks compare one function of its table with differences of
  * another. */
 #include <float.h>
 #include <math.h>
@@ -212,7 +212,7 @@ static void selftest_saturation (pw_probe *probe) {
     if (!isfinite (velocity)) velocity = large;
     double all = selftest_change (probe, e, c, velocity, rest);
     double part = selftest_change (probe, e, c, velocity / 100, rest);
-    if (all < 1e-9 * (1 + selftest_largest (probe->elements * cols, rest))) continue;
+    if (all < 1e-9 * (1 + selftest_largest (probe->elements * cols, rest))) continue; /* round-off */
     pw_probe_record (probe->report, PW_CHECK_saturation, part / all, 0.5,
                      "a hundredth of the velocity, half of the change", probe->batch->name[e]);
   }
@@ -243,7 +243,7 @@ static int selftest_satisfy (pw_probe *probe, int e) {
       for (int c = 0; c <= n; c++) row[r][c] -= along * row[p][c];
     }
     square[r] = selftest_dot (n, row[r], row[r]);
-    if (!(square[r] > 1e-6)) return 0;
+    if (!(square[r] > 1e-6)) return 0; /* entries of J are of the order 1 */
     for (int c = 0; c < n; c++)
       if (!pw_probe_ground (probe, e, c)) probe->v[pw_global (probe->batch, e, c)] -= row[r][c] * row[r][n] / square[r];
   }

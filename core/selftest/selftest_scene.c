@@ -18,7 +18,7 @@ typedef struct {
   int width; /* largest number of values per element in any comparison; arrays have elements x width entries */
   double *plus, *minus, *derivative; /* a function after steps forwards and backwards; its derivative by differences */
   double *value, *terms;             /* what is compared with it; the sum of the absolute values of its terms */
-  double *size;                      /* sum of the absolute values of the terms of the function */
+  double *size;                      /* of g: g_size; of other functions: 0 */
   double *error, *expected;          /* the least error of all steps; the derivative by differences of that step */
   double *block;                     /* elements x width x width */
   char *memory;
@@ -158,7 +158,7 @@ static void scene_randomise (pw_probe *probe, const double *q, const double *v, 
   for (int i = 0; i < probe->elements * probe->cols; i++)
     probe->w[i] = pw_probe_local (probe, w, i / probe->cols, i % probe->cols);
   for (int i = 0; i < probe->elements * probe->rows; i++) probe->lambda[i] = pw_random_between (r, -1, 1);
-  /* no breakpoint of a signal between the times used, which follow one too near for differences */
+  /* no signal has a breakpoint between the times used, which are later than one that is too near for differences */
   double next = pw_next_breakpoint (probe->workspace, 0, probe->t);
   if (next - probe->t < 1e-6 * fabs (probe->t)) probe->t = next, next = pw_next_breakpoint (probe->workspace, 0, next);
   probe->failed = isnan (next);

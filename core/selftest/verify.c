@@ -11,7 +11,7 @@
 #include "system.h"
 #include "pinwheel-selftest.h"
 
-/* For each equation of a set: the sum of its terms, which is its residual, and the sum of their absolute values. */
+/* For each equation of a set: the residual, a sum of terms; its size, the sum of their absolute values or g_size. */
 typedef struct {
   double *sum, *size;
 } verify_terms;
@@ -124,7 +124,7 @@ static void verify_all (verified_scene *scene, const double *v, const double *a,
   verify_worst (s, s->coords, &scene->force, 0, pw_system_state_name, s->coords, &result->force);
 }
 
-/* The largest array that a function of an element type in use fills. */
+/* The largest array that one of the functions evaluated above fills. */
 static size_t verify_block_size (const pw_system *s) {
   size_t largest = 1;
   for (int i = 0; i < s->batches; i++) {

@@ -29,7 +29,7 @@ typedef enum {
   PW_JUMPS_AND_KINKS /* also kinks of the second derivative: the points of a cubic table */
 } pw_breakpoints;
 
-/* The first such time after t, or INFINITY. */
+/* The first such time after t, or INFINITY; of a function signal, what its breakpoint function returns. */
 double pw_signal_breakpoint (const pw_signal *s, pw_breakpoints which, double t);
 
 /* ---- Tables (table.c) ---- */

@@ -64,7 +64,7 @@ const pw_signal_form *pw_signal_form_of (const pw_signal *s) {
 
 /* ---- Checks: each writes the fault to `text`, or leaves it empty ---- */
 
-/* Each field is a number or a choice between 0 and 1. */
+/* Each field is a number, or a choice that is 0 or 1. */
 static void form_check_fields (const pw_signal *s, const pw_signal_form *form, char *text, size_t size) {
   for (const pw_field *f = form->fields; f->name && !*text; f++) {
     const void *at = (const char *)s + f->offset;
@@ -103,7 +103,7 @@ static void form_check_points (const pw_signal *s, int *point, char *text, size_
   if (!*text) *point = -1;
 }
 
-/* The form of a signal that jumps or has kinks, for messages; NULL if it has neither. */
+/* The form of a signal that jumps or has kinks, for messages; NULL if it has neither or is a function. */
 static const char *form_with_kinks (const pw_signal *s) {
   if (s->type == PW_PULSE) return "a pulse";
   if (s->type == PW_RAMP) return "a ramp";

@@ -54,9 +54,9 @@ static void elimination_place (pw_elimination *ldl, int p, int partner) {
 /* ---- Guards ---- */
 
 /* The general engine takes over if the pivot of an equation is not larger than this part of its diagonal entry, or if
- * the square of the pivot of a massless coordinate is not larger than this part of the sum of squares of its column. */
+ * the square of a variable pivot in a massless coordinate's column is not above this part of its sum of squares. */
 #define ELIMINATION_ROW "PW_SCENE_PIVOT"
-#define ELIMINATION_COLUMN "0.04" /* (1/5)^2; elimination_is_large demands twice as much of the pivot */
+#define ELIMINATION_COLUMN "0.04" /* (1/5)^2; elimination_is_large demands 2/5 of the largest entry */
 
 static void elimination_guard_row (pw_emitter *emitter, pw_term pivot, pw_term diagonal) {
   char a[24], b[24];
@@ -264,7 +264,8 @@ void pw_elimination_close (pw_elimination *ldl) {
 /* ---- Solution ---- */
 
 /* Divides by the m-th pivot, and eliminates its unknowns from the later rows.  Row p of a pivot [ 0 d ; d 0 ]
- * determines the multiplier of equation r, and row r the coordinate p: their entries of y are exchanged. */
+ * determines the multiplier of equation r, and row r the coordinate p: their entries of y are exchanged.
+ * elimination_backward divides that of the coordinate. */
 static void elimination_forward (const pw_elimination *ldl, pw_emitter *emitter, pw_term *y, int m) {
   int p = ldl->order[m], r = ldl->partner[m];
   if (r >= 0) {

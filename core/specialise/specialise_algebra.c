@@ -1,4 +1,5 @@
-/* Writes the linear algebra of specialised code: products with J, factorisations, solutions. */
+/* Writes the linear algebra of specialised code, with macros of specialise.c and scene_head.inc: products with J,
+ * factorisations, solutions. */
 #define _POSIX_C_SOURCE 200809L
 #include <stdlib.h>
 #include "specialise_parts.h"
@@ -85,7 +86,7 @@ static int specialise_solve (pw_generator *gen, const pw_elimination *ldl, speci
   return PW_OK;
 }
 
-/* Writes a function that factorises K with the first `rows` constraint equations; ldl serves specialise_solve. */
+/* Writes a function that factorises K with the independent equations among the first `rows`; ldl: for its solution. */
 static int specialise_factor (pw_generator *gen, pw_elimination *ldl, const pw_term *K, const unsigned char *length,
                               const char *name, int rows) {
   unsigned char takes_part[SPECIALISE_ROWS + 1];

@@ -195,7 +195,7 @@ int pw_system_has_lanes (const pw_system *s) {
   return s->state_dependent == 0 && pw_specialise_check_limits (s, NULL) == PW_OK;
 }
 
-/* A run's data, as doubles: the elements of all batches, then for each signal a pw_harmonic, or a constant, then 0. */
+/* A run's data, as doubles: the elements of all batches, then for each signal a pw_harmonic or a constant and zeros. */
 void pw_specialise_data (const pw_generator *gen) {
   const pw_system *s = gen->s;
   const int per_signal = sizeof (pw_harmonic) / sizeof (double);

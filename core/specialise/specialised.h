@@ -20,7 +20,8 @@ typedef struct pw_scene {
   double *u;                      /* signals x 3: value; first and second time derivatives, unless it is of a force */
   double *constant;               /* what `prepare` computes */
   double *t_signal;               /* time of the last evaluation of u; NaN: none */
-  int (*update) (void *workspace, double t, const double *q, const double *v); /* evaluates u; non-zero: failed */
+  /* Evaluates u; non-zero: failed.  q, v may be NULL if no signal reads states. */
+  int (*update) (void *workspace, double t, const double *q, const double *v);
   void *workspace;
   double length, speed;      /* scales of residuals [m], [m/s] */
   double alpha, beta;        /* of Baumgarte's stabilisation [1/s]; 0: none */
@@ -71,7 +72,7 @@ typedef struct {
 
 /* Consecutive steps of size h of a Runge-Kutta method, with watchdog and ledger.  The arrays belong to the run. */
 typedef struct pw_scene_steps {
-  int count, done; /* steps to take; taken */
+  int count, done; /* steps to take, >= 1; taken */
   int project;     /* 1: onto the constraints after each step */
   int stages;
   const pw_rk_row *row; /* as in pw_scene_step */
@@ -110,13 +111,13 @@ typedef struct pw_specialised {
   int (*stages) (pw_scene *s, const pw_scene_step *x);
   /* Residuals of an evaluated state. */
   void (*residuals) (pw_scene *s, const double *q, const double *v, const pw_configuration *c, const double *J);
-  /* Takes steps until one has to be made by the general engine. */
+  /* Takes `count` steps, or fewer if one has to be made by the general engine. */
   void (*steps) (pw_scene *s, pw_scene_steps *x);
 } pw_specialised;
 
 /* The same code for several runs at once, in the lanes of vector registers. */
 struct pw_specialised_lanes {
-  int abi, lanes;
+  int abi, lanes;            /* lanes: runs at once; 0: none, the compiler does not vectorise the code */
   unsigned long shape, size; /* as in pw_specialised; bytes of `memory` */
   /* The same for `lanes` runs with the same step size, tableau and `project`, without stabilisation or redundant
    * equations; memory: scratch, aligned to 64 bytes. */

@@ -11,7 +11,7 @@ typedef struct {
   pw_term_type type;
   int sign;
   char name[20]; /* as printed without the sign: "C[3]", "x12", "J[7]" */
-  double value;  /* at the initial state, including the sign */
+  double value;  /* at the initial state, including the sign, to choose pivots; 1 for f and g of solutions */
 } pw_term;
 
 /* Where statements go. */
@@ -36,10 +36,10 @@ pw_term pw_emit_product (pw_emitter *emitter, pw_term a, pw_term b);            
 pw_term pw_emit_difference (pw_emitter *emitter, pw_term a, pw_term b, pw_term c); /* a - b c */
 pw_term pw_emit_quotient (pw_emitter *emitter, pw_term a, pw_term b);              /* a / b */
 
-/* Writes a name as part of a comment: characters that could end the comment become ?. */
+/* Writes a name as part of a comment: all but ASCII letters and digits, spaces and _-.[]() become ?. */
 void pw_emit_name (FILE *out, const char *name);
 
-/* "-x3": the term with its sign, in the buffer. */
+/* "-x3": the term with its sign, in the buffer unless it is 0. */
 const char *pw_term_text (pw_term a, char buffer[24]);
 
 #endif

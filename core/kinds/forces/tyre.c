@@ -8,7 +8,7 @@
  *   loss  = -F v_n >= 0
  *
  * (Pacejka 2012, Tire and Vehicle Dynamics, chapter 1, for slip and cornering stiffness; the regularising v0 keeps the
- * slip smooth at rest.)  As C grows, v_n = -F R / C vanishes like 1/C: the tyre approaches a knife edge. */
+ * slip smooth at rest.)  As C grows, v_n of the linear law, -F R / C, vanishes: the tyre approaches a knife edge. */
 #include <string.h>
 #include "contact.h"
 

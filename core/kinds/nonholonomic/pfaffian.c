@@ -5,8 +5,8 @@
  *   gamma = u' - omega1 (p(A).r1' + p(B).r2')           so that S v' = gamma; p(A) = A turned by +90 degrees
  *
  * (Neimark & Fufaev 1972, Dynamics of Nonholonomic Systems, chapter I.)
- * The reaction F = -lambda acts on body 1 as the force F A and the moment F a3, on body 2 as F B and F b3.  The two
- * forces need not balance: their sum is an external force.  The power is F u. */
+ * The reaction F = -lambda, [N] if A and B have no unit, acts on body 1 as the force F A and the moment F a3, on body 2
+ * as F B and F b3.  The two forces need not balance: their sum is an external force.  The power is F u. */
 #include <string.h>
 #include "batch.h"
 
