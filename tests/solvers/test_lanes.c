@@ -125,6 +125,31 @@ static void test_models (void **state) {
     }
 }
 
+/* A run that waits for the others has the configurations of its own state, and so its potential energy. */
+static void test_waiting (void **state) {
+  (void)state;
+  if (!has_lanes ()) skip ();
+  several x;
+  several_open (&x, scene_named ("slider-crank", NULL, 0), 4, 4, "rk4+projection", 1e-3);
+  void *memory = pw_specialised_lanes_memory (pw_scene_code_lanes (x.lanes));
+  for (int k = 0; k < x.n; k++) /* then the next multiple of PW_CHECK_INTERVAL is at different distances */
+    check_ok (pw_run_advance_to (x.together[k], 0.1 + 0.01 * k, 0.1 + 0.01 * k, NULL), NULL);
+  int status[MOST];
+  pw_error error[MOST] = { { 0 } };
+  pw_runs_advance (x.together, x.n, 1, pw_scene_code_lanes (x.lanes), memory, status, error);
+  for (int k = 0; k < x.n; k++) {
+    const pw_run *r = x.together[k];
+    check_ok (status[k], &error[k]);
+    for (int b = 0; b < x.s->bodies; b++) {
+      const pw_configuration *c = &r->w->configuration[b];
+      check_close ("cosine", c->cos, cos (r->q[3 * b + 2]), CHECK_EPS, "rounding of our own cosine");
+      check_close ("sine", c->sin, sin (r->q[3 * b + 2]), CHECK_EPS, "rounding of our own sine");
+    }
+  }
+  free (memory);
+  several_close (&x);
+}
+
 /* A few runs leave lanes empty; one run is faster alone. */
 static void test_empty_lanes (void **state) {
   (void)state;
@@ -148,7 +173,7 @@ static void test_excluded (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_models), cmocka_unit_test (test_empty_lanes),
-                                      cmocka_unit_test (test_excluded) };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_models), cmocka_unit_test (test_waiting),
+                                      cmocka_unit_test (test_empty_lanes), cmocka_unit_test (test_excluded) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }
