@@ -13,7 +13,7 @@ typedef struct {
   char *path; /* of the file itself, links resolved */
 } pw_found;
 
-/* All model files on the search path, sorted by name, then by path. */
+/* All .so and .yaml files on the search path, sorted by name, then by path. */
 typedef struct {
   pw_arena arena;
   pw_found *found;
@@ -41,15 +41,15 @@ int pw_ends_with (const char *name, const char *ending);
 typedef int pw_object_user (void *context, const char *object, pw_error *error);
 
 /* Compiles a C file to a shared object or, unless `engine` is NULL, to WebAssembly linked with that archive, in a
- * private temporary folder; returns what `use` returns for the result.  PW_INPUT if it does not compile or there is no
- * compiler; PW_RESOURCE. */
+ * private temporary folder; returns what `use` returns for the result.  PW_INPUT if it does not compile, or without
+ * compiler or pinwheel.h; PW_RESOURCE. */
 int pw_compile_file (const char *path, const char *engine, pw_object_user *use, void *context, pw_error *error);
 #define PW_PAGE_TOOLS "clang, lld, wasi-libc and libclang-rt-14-dev-wasm32 (make deps TOOLS=page)"
 
-/* Compiles generated code with all messages in a log, for `lanes` runs at once; 0: for single runs.  PW_INPUT if there
- * is no compiler; PW_METHOD if it does not compile; PW_RESOURCE. */
+/* Compiles generated code with all messages in a log, for `lanes` runs at once; 0: for single runs.  PW_INPUT without
+ * compiler or pinwheel.h; PW_METHOD if it does not compile; PW_RESOURCE. */
 int pw_compile_scene (const char *path, const char *object, const char *log, int lanes, pw_error *error);
-/* The compiler's options for generated code, ending with NULL: the instructions of this processor, except fused
+/* The compiler's options for generated code, ending with NULL: vector instructions of this processor, no fused
  * multiply-add, so that results have the same bits. */
 const char *const *pw_scene_options (int lanes);
 
@@ -69,7 +69,7 @@ void pw_cache_trim (const char *folder);
 
 /* ---- Models in YAML (yaml.c) ---- */
 
-/* A text model in memory, with a plug-in's table.  `shown` is the path in messages, `max_bytes` the limit.
+/* A text model in memory, with a plug-in's table.  `path`: absolute, links resolved; `shown`: the path in messages.
  * PW_INPUT with the position of the error; PW_RESOURCE.  Bodies and elements are read when a model is built. */
 typedef struct pw_yaml pw_yaml;
 pw_yaml *pw_yaml_open (const char *path, const char *shown, size_t max_bytes, pw_error *error);
@@ -86,7 +86,7 @@ const pw_yaml *pw_file_yaml (const pw_file *f);
 
 /* ---- Tables of numbers (columns.c) ---- */
 
-/* Whether empty cells and nan are errors, or become NaN. */
+/* Whether empty cells and nan are errors, or become NaN; in the first column, the time, they are errors. */
 typedef enum { PW_GAPS_REFUSED, PW_GAPS_ALLOWED } pw_gaps;
 
 /* As pw_read_columns, from a stream; `shown` is its path in messages, "SHOWN:LINE: REASON". */
@@ -102,7 +102,7 @@ typedef struct {
 
 extern const pw_unit_name pw_unit_names[]; /* ends with a NULL name */
 
-/* ---- Reading (read.c) ---- */
+/* ---- Paths (path.c), reading (read.c) ---- */
 
 /* folder + "/" + name + ending, malloced; NULL if out of memory. */
 char *pw_path_join (const char *folder, const char *name, const char *ending);
@@ -126,7 +126,7 @@ char *pw_folder_of (const char *path);
 
 /* The location of an existing or future file, links followed. */
 typedef struct {
-  char *path;     /* of the file itself; malloced */
+  char *path;     /* of the file itself, or naming the descriptor; malloced */
   int descriptor; /* descriptor of this process that the path names ("-", /dev/stdout, /dev/fd/3), or -1 */
   int exists;     /* 1: `info` is known */
   struct stat info;

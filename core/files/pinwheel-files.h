@@ -15,7 +15,7 @@ typedef struct pw_file pw_file;
 /* Opens a model, given its name or path.
  *
  * A name ("ezyroller") is searched as NAME.so, NAME.yaml in the folders of the environment variable PINWHEEL_MODELS
- * (separated by ":"), then in those that belong to the running program and this library: models/ next to it or one
+ * (separated by ":"), and in those that belong to the running program and this library: models/ next to them or one
  * up, lib/pinwheel/models/ of the installation.  A path has a "/" or an ending: a .so is loaded, a .c compiled by $CC
  * or cc in a private temporary folder, its messages passed through on standard error; a .yaml is read
  * (docs/model-format.md).  Files in the current directory must be given as paths.
@@ -44,7 +44,8 @@ char *pw_file_find (const char *model, pw_error *error);
  * non-zero; returns that, 0, or PW_RESOURCE. */
 int pw_file_tables (const pw_file *f, int (*each) (void *context, const char *path), void *context);
 
-/* Calls `each` with the name and path of every model on the search path, sorted by name, until it returns non-zero. */
+/* Calls `each` with the name and path of every model on the search path, sorted by name, until it returns non-zero.
+ * PW_OK, also then, or PW_RESOURCE. */
 int pw_file_list (int (*each) (void *context, const char *name, const char *path), void *context, pw_error *error);
 
 /* ---- Interactive pages ---- */
@@ -73,18 +74,18 @@ typedef struct pw_scene_code pw_scene_code;
  * ~/.cache, or compiled; without a cache in a temporary folder.  Systems of the same structure share code
  * (pw_specialised_fits), and so may processes at the same time.
  *
- * NULL and PW_INPUT if there is no compiler; PW_METHOD if the text does not compile, with the path at which it is kept;
- * PW_RESOURCE. */
+ * NULL and PW_INPUT without compiler or pinwheel.h; PW_METHOD if the text does not compile, with the path at which it
+ * is kept; PW_RESOURCE. */
 pw_scene_code *pw_scene_code_open (const char *text, const pw_system *s, pw_error *error);
-/* The same for 2, 4 or 8 runs at once (pw_runs_advance). */
+/* The same for 2, 4 or 8 runs at once (pw_runs_advance), if pw_system_has_lanes. */
 pw_scene_code *pw_scene_lanes_open (const char *text, const pw_system *s, int lanes, pw_error *error);
 const pw_specialised_lanes *
 pw_scene_code_lanes (const pw_scene_code *c); /* NULL if it is for single runs, or compiled by clang */
 /* The number of runs whose lanes fill a vector register of this processor; 1 if several runs at once are not faster. */
 int pw_processor_lanes (void);
-/* For pw_settings.specialised; NULL if c is NULL. */
+/* For pw_settings.specialised; NULL if c is NULL or for several runs at once. */
 const pw_specialised *pw_scene_code_table (const pw_scene_code *c);
-/* A line about a cache that was ignored, or ""; lives as long as the code. */
+/* A line about a cache, or a file in it, that was ignored, or ""; lives as long as the code. */
 const char *pw_scene_code_notice (const pw_scene_code *c);
 void pw_scene_code_close (pw_scene_code *c);
 
@@ -116,7 +117,7 @@ void pw_formula_close (pw_formula *f);
 /* ---- Tables of numbers: units in their headers, "NAME [UNIT]" (units.c), and columns (columns.c) ---- */
 
 /* Finds the factor from a unit to SI units.  PW_INPUT if it is unknown, PW_RETRY if its dimension is not that of
- * `wanted`, unless that is NULL. */
+ * `wanted`, unless that is NULL or unknown. */
 int pw_unit_factor (const char *unit, const char *wanted, double *factor);
 
 /* Returns the length of the name in a header's cell, and stores its unit: what is between brackets at its end, or a
@@ -126,10 +127,10 @@ size_t pw_unit_split (const char *cell, char *unit, size_t size);
 /* Finds the factor of a column from its header's cell, 1 without a unit.  PW_INPUT, and `why`: column, unit, reason. */
 int pw_unit_check (const char *cell, const char *wanted, double *factor, char *why, size_t size);
 
-/* Reads columns of a table by their names or numbers, in SI units: `unit` of each, or NULL for any.  The first one is
- * the time, which increases; in the others empty cells and nan are gaps, NaN.  Returns `width` arrays of *rows
- * numbers (0 if the table has only names), one after the other; free it.  NULL and PW_INPUT with file, line and nearest
- * name, or PW_RESOURCE. */
+/* Reads columns of a table by their names or numbers ("1", ...), in SI units: `unit` of each, or NULL for any.  The
+ * first one is the time, which increases; in the others empty cells and nan are gaps, NaN.  Returns `width` arrays of
+ * *rows numbers (0 if the table has only names), one after the other; free it.  NULL and PW_INPUT with file, line and
+ * nearest name, or PW_RESOURCE. */
 double *pw_read_columns (const char *path, const char *const *column, const char *const *unit, int width, int *rows,
                          pw_error *error);
 
@@ -138,7 +139,7 @@ double *pw_read_columns (const char *path, const char *const *column, const char
 /* Opens a regular file for reading.  NULL, and the reason in *why, if that fails or it is a file of another type. */
 FILE *pw_open_input (const char *path, const char **why);
 
-/* After pw_open_input has failed: PW_RESOURCE if memory or file descriptors did not suffice, else PW_INPUT. */
+/* Right after pw_open_input has failed: PW_RESOURCE if, by errno, memory or descriptors were short, else PW_INPUT. */
 int pw_open_input_status (void);
 
 /* ---- What a command reads and writes ---- */
@@ -166,19 +167,19 @@ typedef struct pw_output pw_output;
 
 /* Errors: PW_RESOURCE with the path and the reason, also if another process is writing it; PW_INPUT if it is "". */
 pw_output *pw_output_open (const char *path, pw_error *error);
-/* The same with another ending than ".part"; incomplete files are removed. */
+/* The same with another ending than ".part"; if pw_output_finish fails, the temporary file is removed. */
 pw_output *pw_output_open_as (const char *path, const char *ending, pw_error *error);
-FILE *pw_output_stream (pw_output *o); /* stdout for "-", /dev/stdout, /dev/fd/1 */
+FILE *pw_output_stream (pw_output *o); /* stdout for "-", /dev/stdout, /dev/fd/1; NULL after pw_output_ready */
 /* Whether it is a regular file, not written directly. */
 int pw_output_is_file (const pw_output *o);
 /* Writes all output to the disk and closes the stream; only the renaming is missing.  PW_RESOURCE. */
 int pw_output_ready (pw_output *o, pw_error *error);
 /* Completes and frees: the file is written to the disk, then renamed, then its folder is written to the disk.
- * PW_RESOURCE if one of these fails; before the renaming, NAME.part remains and the text names it. */
+ * PW_RESOURCE if one of these fails; unless the renaming was done, NAME.part remains and the error names it. */
 int pw_output_finish (pw_output *o, pw_error *error);
 /* The same for several outputs, some of which may be NULL: completes all, or leaves all under their temporary names. */
 int pw_output_finish_all (pw_output *const *o, int count, pw_error *error);
-/* Gives up and frees: NAME.part remains, of a text with complete lines.  Its path is written to the buffer, which is
+/* Gives up and frees: NAME.part remains, of a text its complete lines.  Its path is written to the buffer, which is
  * returned; NULL, and "" in the buffer, if there is no such file (standard output, a device). */
 char *pw_output_abandon (pw_output *o, char *buffer, size_t size);
 /* Gives up and frees, and removes NAME.part. */
@@ -287,7 +288,7 @@ typedef struct {
   double t;           /* of the last one [s] */
   double end[4];      /* at t: of lengths [m], angles [rad], velocities [m/s], angular velocities [rad/s] */
   double most[4];     /* the largest of the run, in the same order */
-  double reactions;   /* the largest, not at jumps, relative to the largest reaction of the same unit, or to 1 for 0 */
+  double reactions;   /* the largest, not at jumps, relative to the reference's largest of the unit, to 1 if that is 0 */
 } pw_reference_error;
 
 /* What a run was and how it ended; `reason` is "" when the status is ok. */

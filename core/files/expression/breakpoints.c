@@ -1,7 +1,7 @@
 /* Breakpoints: times at which an expression jumps or has a kink.
  *
  * An interval of time is excluded if interval arithmetic proves that no comparison or other discontinuous operation
- * changes in it, and that no operand leaves the domain of a function, where comparisons with NaN become false.
+ * changes in it, not even because an operand becomes NaN at the end of a function's domain.
  * Otherwise it is bisected, the earlier half first, down to a least relative width, at first 2^-36 (Moore, Kearfott &
  * Cloud 2009, Introduction to Interval Analysis, chapter 8).  If an operation differs between the ends of such an
  * interval, bisection finds the two adjacent floating-point numbers between which it changes: steps must end there.
@@ -32,7 +32,7 @@ typedef struct {
   unsigned char noisy[PW_EXPRESSION_CODES]; /* 1: this operation is noisy */
 } search;
 
-/* Evaluates the discrete part of all operations at time t (pw_expression_run_jet). */
+/* Evaluates the discrete part of all operations at time t, with states 0 (pw_expression_run_jet). */
 static void search_evaluate (const search *s, double t, double *discrete) {
   double variable[PW_EXPRESSION_VARIABLES] = { t }, u[3];
   pw_expression_run_jet (s->expression, variable, PW_EXPRESSION_TIME, u, discrete);

@@ -69,13 +69,14 @@ int pw_expression_constant (const pw_scope *s, const char *text, double *value, 
 /* The value, which may be non-finite; at a jump in time, that just after it. */
 double pw_expression_value (const pw_expression *expression, const double *variable);
 
-/* The value and its first two derivatives with respect to variable `by`; at a jump, those just after it, as this
+/* The value and its first two derivatives with respect to variable `by`; just after it at a jump or kink, as this
  * variable grows.  NaN or infinite are derivatives that those of operands do not determine: of sqrt and atan2 at 0. */
 void pw_expression_derivatives (const pw_expression *expression, const double *variable, int by, double u[3]);
 
-/* The first time after t at which the value, or a time derivative, may jump for any values of the other variables;
- * INFINITY if there is none.  If the search would take too long: a time after t up to which there is none.  Not found
- * are jumps whose times depend on other variables, and kinks at the end of a function's domain, as of sqrt (t^2). */
+/* The first time after t at which the value, or a time derivative, may jump whatever the other variables are; INFINITY
+ * if there is none.  If the search would take too long: a time after t up to which there is none.  Not found are jumps
+ * whose times depend on other variables, jumps too frequent for steps to end at each (breakpoints.c), and kinks at the
+ * end of a function's domain, as of sqrt (t^2). */
 double pw_expression_breakpoint (const pw_expression *expression, double t);
 
 /* ---- Words ---- */

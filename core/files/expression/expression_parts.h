@@ -100,7 +100,7 @@ extern const pw_expression_named_constant pw_expression_constants[];
 
 /* The index of a function, or -1. */
 int pw_expression_find_function (const char *name);
-/* A constant, or NULL. */
+/* A constant, or NULL (words.c). */
 const pw_expression_named_constant *pw_expression_find_constant (const char *name);
 
 /* The length of the name at p, which may contain dots (frame.phi), or of the number: digits, perhaps with a decimal

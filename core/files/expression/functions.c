@@ -29,6 +29,7 @@ PARTIALS_OF_ONE (sqrt, 0.5 / f, -0.25 / (f * x))
 
 /* ---- Functions of two arguments ---- */
 
+/* Of atan2 (y, x): member x of the result belongs to the first argument, which is y here. */
 static pw_partials partials_atan2 (double y, double x, double f) {
   double r = x * x + y * y;
   (void)f;

@@ -55,7 +55,7 @@ typedef struct {
 
 typedef struct {
   size_t from;   /* offset in the text */
-  int first;     /* its first operation; the last one is that of the parser */
+  int first;     /* its first operation; its last one is the last of parser.code */
   int depends;   /* DEPENDS_ON_TIME | DEPENDS_ON_STATES */
   int condition; /* 1: its value is 1 or 0 */
 } parser_part;

@@ -194,7 +194,7 @@ static pw_range range_sign (const pw_range *x) {
                      .breaks = range_contains (x, 0) || x->nan };
 }
 
-/* x - n y with n = floor (x / y), which is between 0 and y. */
+/* The remainder, between 0 and y: x - n y with n = floor (x / y). */
 static pw_range range_mod (const pw_range *x, const pw_range *y) {
   pw_range quotient = range_divide (x, y), n = range_integer (PW_OP_FLOOR, &quotient);
   double most = fmax (fabs (y->lo), fabs (y->hi));
@@ -272,7 +272,7 @@ static pw_range range_select (const pw_range *condition, const pw_range *x, cons
 
 /* ---- Operations ---- */
 
-/* The operations of one or two operands; of these only sign and comparisons consider NaN (range_result). */
+/* Operations of one or two operands but && || min max; only sign and comparisons consider NaN (range_result). */
 static pw_range range_operation (const pw_expression_code *c, const pw_range *x) {
   const pw_range *y = x + 1;
   switch (c->op) {

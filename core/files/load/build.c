@@ -25,7 +25,7 @@ const char *pw_compiler (void) {
   return cc && cc[strspn (cc, " \t")] ? cc : "cc";
 }
 
-/* Starts the compiler with its messages on standard error, or in a log, and default signal handling. */
+/* Starts the compiler, its messages on standard error or in a log, SIGPIPE not ignored.  0 or an errno value. */
 static int build_spawn (const build_command *command, char *const *word, pid_t *child) {
   posix_spawn_file_actions_t files;
   posix_spawnattr_t attributes;

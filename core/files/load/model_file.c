@@ -10,7 +10,7 @@ struct pw_file {
   char *name, *path; /* the name without its ending; the path with links resolved */
   void *handle;      /* of dlopen; NULL for a text model */
   pw_yaml *yaml;     /* the text model; NULL for a plug-in */
-  size_t max_bytes;  /* of a text model */
+  size_t max_bytes;  /* limit for a text model */
   const pw_plugin_table *table;
 };
 

@@ -26,7 +26,7 @@ typedef struct {
   const pw_system *system;
   const char *text;
   int lanes;           /* 0: for single runs */
-  char identity[2000]; /* what determines the object: versions, compiler, options, checksum of the header */
+  char identity[2000]; /* what else determines the object: version, compiler, options, checksum of pinwheel.h */
   char key[17];        /* checksum of text and identity, in hexadecimal */
   char *folder, *source, *log, *part, *object; /* paths: KEY.c, KEY.log, the object while written, KEY.so */
   pw_scene_code *code;                         /* the result */

@@ -19,7 +19,7 @@ struct pw_output {
   int folder;    /* that contains it; -1: written directly, or the folder is not readable */
   int code;      /* errno of the first failed write; -1: unknown; 0: none has failed */
   int continued; /* 1: opened by pw_output_continue */
-  int discard;   /* 1: the temporary file is removed unless the output is finished */
+  int discard;   /* 1: the temporary file is removed if finishing fails */
 };
 
 static void output_free (pw_output *o) {

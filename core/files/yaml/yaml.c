@@ -6,7 +6,7 @@
 #include <string.h>
 #include "yaml.h"
 
-#define YAML_MAX_AHEAD 1e6 /* pw_yaml.max_ahead of a file of the default size; libfyaml takes 350 bytes for each */
+#define YAML_MAX_AHEAD 1e6 /* pw_yaml.max_ahead for the default limit of bytes; libfyaml takes 350 bytes for each */
 
 /* ---- Parameters ---- */
 
@@ -41,7 +41,7 @@ static const char *yaml_find_word (const char *text, const char *name) {
   return NULL;
 }
 
-/* Reads the unit of a parameter and refuses those other than SI units: 40 with the unit deg would mean 40 rad. */
+/* Reads the unit of a parameter and refuses a known one that is no SI unit: 40 with the unit deg would mean 40 rad. */
 static int yaml_unit (const pw_reader *r, const pw_node *node, const pw_node *value, const char **unit) {
   if (node == NULL || pw_yaml_text (r, node, "unit", unit) != PW_OK) return r->error->status;
   int number = value->type == PW_YAML_SCALAR && pw_expression_number (value->text, &(double){ 0 });

@@ -9,8 +9,8 @@
  *   yaml_build.c       bodies and elements, through the field tables of their types
  *   yaml.c             the head of a model: parameters and default run settings, stored in a plug-in's table
  *
- * Functions with a reader return the status of its first error; after an error they do nothing, so that a sequence of
- * calls needs one check.  `label` ("torque T: value") begins their messages.  A NULL node is absent. */
+ * After an error, functions with the same reader return an error status, and only the first error is recorded: a
+ * sequence of calls needs one check.  `label` ("torque T: value") begins their messages.  A NULL node is absent. */
 #ifndef PW_YAML_H
 #define PW_YAML_H
 
@@ -70,7 +70,7 @@ enum { PW_YAML_MAX_ITEMS = 1000000, PW_YAML_MAX_POINTS = 20000000, PW_YAML_MAX_O
 
 /* ---- The text (yaml_source.c) ---- */
 
-/* Reads a file of at most `max_bytes` bytes into y->source and y->size. */
+/* Reads a file of at most `max_bytes` bytes into y->source and y->size, and checks its characters. */
 int pw_yaml_read_source (pw_yaml *y, const char *path, size_t max_bytes, pw_error *error);
 
 /* Fails with "PATH:LINE:COLUMN: error: TEXT", the line of the source at an offset, and a caret below. */

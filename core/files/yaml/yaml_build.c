@@ -186,7 +186,7 @@ static int build_element (pw_reader *r, const pw_node *node) {
 
 /* ---- The model ---- */
 
-/* Reads `let`: numbers that are defined by parameters and preceding numbers. */
+/* Defines the parameters, then the numbers of `let`, which may depend on parameters and preceding numbers. */
 static int build_let (pw_reader *r, const double *parameter) {
   const pw_yaml *y = r->y;
   char label[100];

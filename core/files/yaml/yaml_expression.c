@@ -105,7 +105,7 @@ static int state_check (const reading *e, const char *name, size_t at) {
 
 /* ---- Evaluation of signals ---- */
 
-/* Value and derivatives u; those not given are derivatives of the highest one given, and u[2] is 0 unless required. */
+/* Value and derivatives u; what is not given is computed from the last one given before; u[2] is 0 unless required. */
 static void time_derivatives (const time_function *f, const double *variable, double u[3]) {
   pw_expression_derivatives (f->expression[0], variable, PW_EXPRESSION_TIME, u);
   for (int i = 1; i <= f->derivatives; i++) {
@@ -228,7 +228,7 @@ static double time_magnitude (const time_function *f, double t, int i) {
 }
 
 /* Refuses signals that a constraint cannot follow: a jump of the value or, for positions, of its derivative, at one of
- * the first breakpoints, beyond round-off and the change between adjacent times. */
+ * the first breakpoints after t = 0, beyond round-off and the change between adjacent times. */
 static int time_check_continuity (const reading *e) {
   static const char *const name[] = { "its value", "its rate" };
   double t = 0, before[3], after[3];

@@ -4,7 +4,7 @@
  *   {constant: 3}                                  the same
  *   {harmonic: {amplitude, omega, phase, offset}}  and the other forms made of numbers (signal_form.c)
  *   "M0 * cos (omega * t)"                         an expression of the time t; in forces also of states: BODY.phi
- *   {expression: .., rate: .., acceleration: ..}   the same for constraints, which need time derivatives
+ *   {expression: .., rate: .., acceleration: ..}   the same; constraints may give its time derivatives
  */
 #define _XOPEN_SOURCE 700 /* realpath */
 #include <errno.h>
