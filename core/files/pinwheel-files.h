@@ -288,7 +288,7 @@ typedef struct {
   double t;           /* of the last one [s] */
   double end[4];      /* at t: of lengths [m], angles [rad], velocities [m/s], angular velocities [rad/s] */
   double most[4];     /* the largest of the run, in the same order */
-  double reactions;   /* the largest, not at jumps, relative to the reference's largest of the unit, to 1 if that is 0 */
+  double reactions;   /* the largest, not at jumps, relative to the reference's largest of the unit, to 1 if it is 0 */
 } pw_reference_error;
 
 /* What a run was and how it ended; `reason` is "" when the status is ok. */

@@ -136,7 +136,7 @@ static pw_partials partials_jacobi_am (double u, double m, double phi) {
   { #name, PW_OP_FUNCTION_OF_ONE, 1, 1, f, NULL, partials_##name, trend, from, to }
 #define FUNCTION_OF_TWO(name, op, f) \
   { #name, op, 2, 2, NULL, f, partials_##name, PW_NOT_MONOTONIC, 0, 0 }
-#define FUNCTION_WITH_BREAKPOINTS(name, op, least, most) \
+#define FUNCTION_WITHOUT_PARTIALS(name, op, least, most) \
   { #name, op, least, most, NULL, NULL, NULL, PW_NOT_MONOTONIC, 0, 0 }
 
 const pw_expression_function pw_expression_functions[] = {
@@ -153,18 +153,18 @@ const pw_expression_function pw_expression_functions[] = {
   FUNCTION_OF_ONE (log, log, PW_INCREASING, 0, INFINITY),
   FUNCTION_OF_ONE (log10, log10, PW_INCREASING, 0, INFINITY),
   FUNCTION_OF_ONE (sqrt, sqrt, PW_INCREASING, 0, INFINITY),
-  FUNCTION_WITH_BREAKPOINTS (abs, PW_OP_ABS, 1, 1),
-  FUNCTION_WITH_BREAKPOINTS (floor, PW_OP_FLOOR, 1, 1),
-  FUNCTION_WITH_BREAKPOINTS (ceil, PW_OP_CEIL, 1, 1),
-  FUNCTION_WITH_BREAKPOINTS (round, PW_OP_ROUND, 1, 1),
-  FUNCTION_WITH_BREAKPOINTS (sign, PW_OP_SIGN, 1, 1),
+  FUNCTION_WITHOUT_PARTIALS (abs, PW_OP_ABS, 1, 1),
+  FUNCTION_WITHOUT_PARTIALS (floor, PW_OP_FLOOR, 1, 1),
+  FUNCTION_WITHOUT_PARTIALS (ceil, PW_OP_CEIL, 1, 1),
+  FUNCTION_WITHOUT_PARTIALS (round, PW_OP_ROUND, 1, 1),
+  FUNCTION_WITHOUT_PARTIALS (sign, PW_OP_SIGN, 1, 1),
   FUNCTION_OF_TWO (atan2, PW_OP_ATAN2, atan2),
   FUNCTION_OF_TWO (hypot, PW_OP_HYPOT, hypot),
   FUNCTION_OF_TWO (jacobi_am, PW_OP_FUNCTION_OF_TWO, pw_jacobi_am),
   FUNCTION_OF_ONE (elliptic_K, pw_elliptic_K, PW_INCREASING, -INFINITY, 1),
-  FUNCTION_WITH_BREAKPOINTS (mod, PW_OP_MOD, 2, 2),
-  FUNCTION_WITH_BREAKPOINTS (min, PW_OP_MIN, 1, 0),
-  FUNCTION_WITH_BREAKPOINTS (max, PW_OP_MAX, 1, 0),
+  FUNCTION_WITHOUT_PARTIALS (mod, PW_OP_MOD, 2, 2),
+  FUNCTION_WITHOUT_PARTIALS (min, PW_OP_MIN, 1, 0),
+  FUNCTION_WITHOUT_PARTIALS (max, PW_OP_MAX, 1, 0),
   { .name = NULL },
 };
 

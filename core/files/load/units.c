@@ -9,6 +9,7 @@
 #include <string.h>
 #include "files.h"
 
+/* The name km/h, and parentheses, are for messages of yaml.c, which take the first name found in a text. */
 const pw_unit_name pw_unit_names[] = {
   { "m", "1", "m" },
   { "kg", "1", "kg" },
