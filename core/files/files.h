@@ -70,7 +70,7 @@ void pw_cache_trim (const char *folder);
 /* ---- Models in YAML (yaml.c) ---- */
 
 /* A text model in memory, with a plug-in's table.  `path`: absolute, links resolved; `shown`: the path in messages.
- * PW_INPUT with the position of the error; PW_RESOURCE.  Bodies and elements are read when a model is built. */
+ * `error` is not NULL: PW_INPUT with the position; PW_RESOURCE.  Bodies and elements are read when a model is built. */
 typedef struct pw_yaml pw_yaml;
 pw_yaml *pw_yaml_open (const char *path, const char *shown, size_t max_bytes, pw_error *error);
 void pw_yaml_close (pw_yaml *y);
@@ -89,7 +89,7 @@ const pw_yaml *pw_file_yaml (const pw_file *f);
 /* Whether empty cells and nan are errors, or become NaN; in the first column, the time, they are errors. */
 typedef enum { PW_GAPS_REFUSED, PW_GAPS_ALLOWED } pw_gaps;
 
-/* As pw_read_columns, from a stream; `shown` is its path in messages, "SHOWN:LINE: REASON". */
+/* As pw_read_columns, from a stream, which stays open; `shown` is its path in messages, "SHOWN:LINE: REASON". */
 double *pw_columns_from_stream (FILE *f, const char *shown, const char *const *column, const char *const *unit,
                                 int width, pw_gaps gaps, int *rows, pw_error *error);
 

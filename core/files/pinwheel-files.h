@@ -303,7 +303,8 @@ typedef struct {
   double energy_defect;                /* relative, as pw_run_energy_defect says; NaN: not known */
 } pw_summary;
 
-/* Writes the JSON summary; unknown (model and method may be NULL) and non-finite values become null. */
+/* Writes the JSON summary; unknown values (model, method, s, sample, statistics may be NULL) and non-finite ones become
+ * null.  The output stays open.  PW_RESOURCE. */
 int pw_json_write (const pw_summary *summary, const pw_system *s, const pw_sample *sample, int ledger,
                    const pw_statistics *statistics, pw_output *o, pw_error *error);
 
