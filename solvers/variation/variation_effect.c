@@ -238,7 +238,7 @@ void pw_variation_accelerate (pw_variation *x, int c, int k) {
   }
 }
 
-/* Positions first; the velocities' equations contain them. */
+/* Positions first, by a correction that leaves S dq as it is; the velocities' equations contain them. */
 void pw_variation_project (pw_variation *x, pw_variation_column *c) {
   pw_linearisation *l = &x->linear;
   int n = x->n, m = x->m, holonomic = x->r->s->holonomic;
