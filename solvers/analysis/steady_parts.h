@@ -79,7 +79,7 @@ int pw_steady_find_symmetries (pw_steady *x);
 /* Finds the symmetries that leave what is held unchanged, at the state x->q, x->v.  A status. */
 int pw_steady_find_free_symmetries (pw_steady *x);
 /* The largest difference of two states up to symmetries and whole turns, in units of the scene; of numbers above 1 in
- * these units, relative to them. */
+ * these units, except angles of bodies, relative to them. */
 double pw_steady_distance (pw_steady *x, const double *q1, const double *v1, const double *q2, const double *v2);
 /* Displaces a state by symmetries, to the same state for all that differ by symmetries only. */
 void pw_steady_canonical (const pw_steady *x, double *q, double *v);

@@ -138,8 +138,7 @@ static int variation_find_changes (const pw_variation *x, pw_direction_copy *d) 
   return PW_OK;
 }
 
-/* Adds the round-off of the differences of initial states, 4 eps |weight value| each, to their error; sums
- * of all into d->start. */
+/* Adds the round-off of differences of initial states, 4 eps |weight value| each, to their error; sets d->start. */
 static void variation_add_round_off (const pw_variation *x, pw_direction_copy *d) {
   const pw_run *near = d->given.neighbour[1], *r = x->r;
   const double relative = 4 * DBL_EPSILON * fabs (pw_direction_weight (&d->given, 0, 1)), *Y = d->column[0].trial;

@@ -161,8 +161,8 @@ int pw_variation_time_derivatives (pw_variation *x, int k, pw_error *error);
 
 /* Continues from `trial` of every column, projected, at the state evaluated.  A status. */
 int pw_variation_restart (pw_variation *x, pw_error *error);
-/* Tries a step that passes neither t1 nor the time that the run has reached.  If its error is too large, the next call
- * tries a smaller one.  A status. */
+/* Tries a step that passes neither t1 nor the time that the run has reached.  If its error is too large, it is not
+ * made: PW_OK, and the next call tries a smaller one.  A status. */
 int pw_variation_step (pw_variation *x, double t1, pw_error *error);
 
 /* ---- variation_explicit.c ---- */
