@@ -553,7 +553,8 @@ typedef enum {
   PW_NONHOLONOMIC /* S (q, t) v = eta (t, q) */
 } pw_level;
 
-/* An element type: one const table.  A NULL function is zero (the self-test verifies this).  Sizes are per element. */
+/* An element type: one const table.  A NULL function is zero (the self-test verifies this).  Sizes are per element; at
+ * most 4 bodies, 4 internal coordinates, 6 constraint equations, 4 signals. */
 struct pw_kind {
   const char *name;       /* "pin" */
   const char *about;      /* one line */
@@ -798,7 +799,7 @@ int pw_system_may_jump (const pw_system *s);
 
 /* ---- Elements of a system, in the order of its constraint equations ---- */
 
-/* An element that acts on every body appears once per body. */
+/* An element that acts on every body appears once per body with mass. */
 typedef struct {
   const char *name;
   const pw_kind *kind; /* kind->level is the type of its constraint equations */
