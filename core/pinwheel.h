@@ -86,8 +86,9 @@ typedef struct {
 
 /* A signal computed by the caller.  `eval` stores the value in value[0] and, for a signal of a constraint, its time
  * derivatives in value[1] and value[2].  x contains the states named in `reads`; gradient, unless NULL, receives the
- * derivatives of value[0] with respect to x.  A non-zero return stops the run.  Equal t and x must give equal values;
- * if the function changes between steps (a controller sets a new torque), call pw_run_restart. */
+ * derivatives of value[0] with respect to x.  A non-zero return stops the run (radau may try shorter steps first).
+ * Equal t and x must give equal values; if the function changes between steps (a controller sets a new torque), call
+ * pw_run_restart. */
 typedef struct {
   int (*eval) (void *context, double t, const double *x, double value[3], double *gradient);
   void *context;            /* passed to eval and breakpoint; must outlive the systems, unless open replaces it */
@@ -169,7 +170,7 @@ typedef struct {
   unsigned specified;   /* PW_SPECIFIES_X | ...: which initial values are specified; 0: those that are not 0 */
 } pw_body;
 
-/* Initial values that a body specifies: they change only if changes of the others cannot satisfy the constraints. */
+/* Initial values that a body specifies: to satisfy the constraints they change less readily than the others. */
 enum {
   PW_SPECIFIES_X = 1,
   PW_SPECIFIES_Y = 2,
@@ -552,7 +553,8 @@ typedef enum {
   PW_NONHOLONOMIC /* S (q, t) v = eta (t, q) */
 } pw_level;
 
-/* An element type: one const table.  A NULL function is zero (the self-test verifies this).  Sizes are per element. */
+/* An element type: one const table.  A NULL function is zero (the self-test verifies this).  Sizes are per element; at
+ * most 4 bodies, 4 internal coordinates, 6 constraint equations, 4 signals. */
 struct pw_kind {
   const char *name;       /* "pin" */
   const char *about;      /* one line */
@@ -572,7 +574,7 @@ struct pw_kind {
 
   /* Converts a checked definition into a prepared element.  bodies: those it names or acts on, in order; the ground
    * is a body without mass.  internal: receives mass and initial values of each internal coordinate; zero before.
-   * Returns a status. */
+   * Returns a status.  May be NULL if element and internal are 0. */
   int (*prepare) (const void *definition, const pw_body *const *bodies, void *element, pw_internal *internal,
                   pw_error *error);
 
@@ -587,7 +589,7 @@ struct pw_kind {
   pw_batch_function *eta_q, *gamma_q, *gamma_v; /* rows x cols */
   pw_batch_function *force_q, *force_v;         /* cols x cols */
   pw_batch_function *energy;                    /* 1: potential energy [J] */
-  pw_batch_function *power;                     /* 1: power supplied to the system [W] */
+  pw_batch_function *power;                     /* 1: power supplied to the system [W]; NULL: -lambda . eta */
   pw_batch_function *loss;                      /* 1: dissipated power [W], >= 0 */
   pw_batch_function *contact;                   /* 3: contact point on the ground [m] and heading [rad], for output */
   /* 2 cols, for forces that saturate, such as friction: the smallest change of each coordinate, then of each velocity,
@@ -766,7 +768,7 @@ const char *pw_system_body_name (const pw_system *s, int body);
 const double *pw_system_mass (const pw_system *s);
 double pw_system_length (const pw_system *s);
 
-/* The initial conditions as described: coordinates and velocities. */
+/* The initial conditions as described, or set by pw_model_set_initial: coordinates and velocities. */
 const double *pw_system_initial_q (const pw_system *s);
 const double *pw_system_initial_v (const pw_system *s);
 
@@ -797,7 +799,7 @@ int pw_system_may_jump (const pw_system *s);
 
 /* ---- Elements of a system, in the order of its constraint equations ---- */
 
-/* An element that acts on every body appears once per body. */
+/* An element that acts on every body appears once per body with mass. */
 typedef struct {
   const char *name;
   const pw_kind *kind; /* kind->level is the type of its constraint equations */

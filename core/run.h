@@ -17,7 +17,8 @@ typedef struct {
 /* How to integrate; zeros select the defaults. */
 typedef struct {
   double t; /* initial time [s] */
-  /* Approximate duration of the run [s], for the scales of energy and, from rest, time; default 1 s or 1000 steps. */
+  /* Approximate duration of the run [s], for the scale of energy, and an upper bound of the time scale; default 1 s, or
+   * 1000 steps of a fixed size. */
   double span;
   double step; /* fixed-step methods: step size [s]; default 1e-3 */
   double rtol; /* adaptive methods: relative tolerance; default 1e-6 */
@@ -94,14 +95,14 @@ typedef struct {
   int moved;                       /* number of states that differ by more than round-off */
   const unsigned char *origin;     /* for pw_initial_specified */
   int released;                    /* 1: some of the user's values could not be kept */
-  int changed;                     /* number of moved states that the model specifies */
+  int changed;                     /* number of moved states that the model specifies and the user does not give */
   double position, velocity;       /* scaled residuals of the described state */
   double time;                     /* time scale of the run [s] */
 } pw_initial_report;
 
 /* ---- Saved states ---- */
 
-/* A buffer that a state is saved to or loaded from; zero-initialised. */
+/* A buffer that a state is saved to or loaded from; zero-initialised.  Saving allocates `at`. */
 typedef struct {
   unsigned char *at;
   size_t used; /* bytes saved or loaded so far */

@@ -1,7 +1,7 @@
 /* Second-order blocks, by formulas or by differences.
  *
- * Central differences with step h = eps^(1/3) in units of the scene: truncation and round-off are both of the order
- * eps^(2/3) (Dennis & Schnabel 1983, section 5.6). */
+ * Central differences with step h = eps^(1/3) in units of the scene (more for values above 1, see blocks_step):
+ * truncation and round-off are both of the order eps^(2/3) (Dennis & Schnabel 1983, section 5.6). */
 #include <math.h>
 #include <string.h>
 #include "system.h"

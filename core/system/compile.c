@@ -350,8 +350,8 @@ static int compile_initial (const compilation *job) {
   return PW_OK;
 }
 
-/* The largest distance of an element's point from the origin of its body; without any, the radius of gyration of the
- * first body that has one, or 1 m. */
+/* The largest distance of an element's point, markers excepted, from the origin of its body; if 0, the radius of
+ * gyration of the first body where it is not 0, or 1 m. */
 static double compile_length (const compilation *job) {
   const pw_model *m = job->m;
   double L = 0;

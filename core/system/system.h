@@ -48,7 +48,7 @@ struct pw_system {
   double *mass;            /* coords: diagonal of M */
   double *constant;        /* coords + 3: sum of the constant forces */
   double *metric;          /* coords: M, and small weights where M is zero */
-  double *q0, *v0;         /* coords: the described initial state */
+  double *q0, *v0;         /* coords: the described initial state, or values of pw_model_set_initial */
   unsigned char *origin;   /* 2 coords: origin of initial values: PW_GIVEN | ... */
   pw_element_batch *batch; /* batches: holonomic types, then nonholonomic ones, then forces */
   pw_source *source;       /* sources, ordered by batch */
@@ -100,12 +100,12 @@ static inline double pw_larger (double a, double b) {
 
 /* ---- Kinematics: configurations and signals at (t, q, v), which all evaluations below use ---- */
 
-/* Returns PW_METHOD if a signal fails. */
+/* The workspace refers to the internal coordinates in q and v from now on.  Returns PW_METHOD if a signal fails. */
 int pw_update_kinematics (pw_workspace *w, double t, const double *q, const double *v);
 /* Updates velocities, and signals that read them, at unchanged time and positions.  Returns as pw_update_kinematics. */
 int pw_update_velocities (pw_workspace *w, const double *v);
 
-/* Evaluates signals whose time or states have changed.  Returns as pw_update_kinematics. */
+/* Evaluates signals of time alone if t has changed, and state-dependent ones.  Returns as pw_update_kinematics. */
 int pw_update_signals (pw_workspace *w, double t, const double *q, const double *v);
 /* Points the batches to the internal coordinates in q, v; q NULL: only to their velocities. */
 void pw_point_to_internal (pw_workspace *w, const double *q, const double *v);
@@ -126,7 +126,7 @@ void pw_evaluate_constant (pw_workspace *w, double *f); /* adds the constant for
  * INFINITY if there is none. */
 void pw_evaluate_saturation (pw_workspace *w, double *least);
 /* The smallest of these changes of velocities, and its element ("friction hinge").  Returns the state, numbered as in
- * pw_system_find_state, or -1 if no force saturates. */
+ * pw_system_find_state, or -1 if all are INFINITY. */
 int pw_find_saturation (pw_workspace *w, double *least, char *element, size_t size);
 double pw_potential (pw_workspace *w);
 /* The potential energy of each element [J], in the order of the batches; entries of types without one are not set. */
@@ -161,7 +161,7 @@ void pw_worst_position (const pw_system *s, const double *g, const double *size,
                         pw_residuals *r);
 
 /* The first time after t at which a step must end because of a signal, or INFINITY: PW_JUMPS of all signals; kinks: 1:
- * PW_JUMPS_AND_KINKS of those of constraints.  NaN if the breakpoint function of a signal returned a time <= t. */
+ * PW_JUMPS_AND_KINKS of those of constraints.  NaN if the breakpoint function of a signal returned no time > t. */
 double pw_next_breakpoint (pw_workspace *w, int kinks, double t);
 
 /* 1 if a force, J or gamma is not finite at the current state; writes "force of spring S" to the buffer. */
@@ -194,7 +194,7 @@ int pw_block_missing (const pw_workspace *w, const pw_element_batch *k, int e, p
  * 0 if there is none; PW_RESOURCE.  Update the kinematics afterwards. */
 int pw_find_missing_block (pw_workspace *w, double t, const double *q, const double *v, char *buffer, size_t size);
 
-/* A block of element e by central differences, whatever the type provides; also for the self-test. */
+/* A block of element e by central differences, whatever the type provides, but 0 in columns of the ground. */
 void pw_difference (const pw_workspace *w, const pw_element_batch *k, int e, pw_block block, double *out);
 
 #endif

@@ -121,7 +121,7 @@ static int branch_descend (pw_branch *b, double *u, pw_error *error) {
 }
 
 /* Newton's method at constant c . u, or if c is NULL at constant p, then with the Levenberg-Marquardt parameter
- * damping |F|, which leads to the nearest of solutions that are not isolated (Yamashita & Fukushima 2001). */
+ * damping min (|F|, 1), which leads to the nearest of solutions that are not isolated (Yamashita & Fukushima 2001). */
 static int branch_iterate (pw_branch *b, double *u, const double *c, double damping, pw_error *error) {
   int n = b->problem.unknowns + 1, status;
   double before = b->residual = INFINITY;

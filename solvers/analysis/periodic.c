@@ -54,7 +54,7 @@ static int periodic_arrays (pw_periodic *x) {
 }
 
 /* The period of the signals where the range of the parameter begins, or if none has one there, where their amplitudes
- * may be 0, within the range; 0 without one. */
+ * may be 0, within the range; 0 without one.  Sets x->last_period to `periods` of these. */
 static int periodic_signal_period (pw_periodic *x, double *period) {
   const double value[] = { x->settings.first, pw_value_within (x->settings.first, x->settings.last) };
   *period = 0;

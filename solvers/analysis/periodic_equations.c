@@ -151,6 +151,7 @@ static int equations_by_parameter (pw_periodic *x, const double *u, double *colu
   return distance > 0 ? PW_OK : PW_RETRY;
 }
 
+/* The flows beside u come first, and that without derivatives last: the equations need its x->y0 to x->a1. */
 int pw_periodic_evaluate (void *periodic, const double *u, double *F, double *dF, pw_error *error) {
   pw_periodic *x = periodic;
   int rows = x->branch.problem.equations, states = 2 * x->n, unknowns = pw_periodic_unknowns (x), status = PW_OK;

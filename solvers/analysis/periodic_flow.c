@@ -15,7 +15,7 @@ enum {
   RETURN_STEPS = 20       /* samples per scale of time T */
 };
 static const double FLOW_SETTLE_RTOL = 1e-9, /* of the run that settles */
-    FLOW_FAR = 4,                            /* largest ratio of a free period to the last one known */
+    FLOW_FAR = 4,                            /* largest ratio of a free period to the last one known, or reverse */
     RETURN_NEAR = 0.2,   /* distance of a return from the first state, relative to the largest one on the way */
     RETURN_MOVED = 1e-6; /* least distance that counts as motion, in units of the scene */
 

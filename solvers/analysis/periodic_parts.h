@@ -5,7 +5,7 @@
 #include "continuation.h"
 #include "steady_parts.h"
 
-/* What pw_periodic_flow computes besides the motion: nothing; derivatives accurate enough for Newton's method, or for
+/* What pw_periodic_flow computes: the motion; or its derivatives only, accurate enough for Newton's method, or for
  * multipliers. */
 typedef enum { PW_FLOW, PW_FLOW_DERIVATIVES, PW_FLOW_MULTIPLIERS } pw_flow_accuracy;
 
@@ -40,6 +40,7 @@ struct pw_periodic {
   char *memory;
 };
 
+/* The number of unknowns, without the parameter. */
 static inline int pw_periodic_unknowns (const pw_periodic *x) {
   return 2 * x->n + x->symmetries + x->settings.free;
 }
@@ -64,8 +65,9 @@ pw_run *pw_periodic_run (pw_periodic *x, pw_place place, double value, double rt
 /* Integrates one period from the state of u: sets y0, a0, and then y1, a1, or with derivatives instead of these size,
  * basis, dual, Phi.  A status; PW_RETRY: there is no such motion, perhaps with x->why, or the search was stopped. */
 int pw_periodic_flow (pw_periodic *x, const double *u, pw_flow_accuracy accuracy, pw_place place, pw_error *error);
-/* Sets x->state to the state after some periods of the motion from the initial state, and a free period that is not
- * given to a guess.  A status; x->why contains the reason of a failure, unless the search has been stopped. */
+/* Sets x->state to the state after some periods of the motion from the initial state, displaced as by
+ * pw_steady_move_to_start, and a free period that is not given to a guess.  A status; x->why contains the reason of a
+ * failure, unless the search has been stopped. */
 int pw_periodic_settle (pw_periodic *x, double value, int periods);
 
 /* ---- periodic_equations.c ---- */

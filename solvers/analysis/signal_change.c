@@ -15,8 +15,8 @@ typedef struct {
   int count;                    /* value and two derivatives of each signal */
 } signal_comparison;
 
-/* Compares signals at two times, in the run's state (number 0) or in one near it (number 1), since a signal may be
- * multiplied by a state that is 0.  A status; signals may fail in the state near the run's. */
+/* Compares signals at two times, in the run's state (number 0) or one up to a unit of the scene away (number 1), since
+ * a signal may be multiplied by a state that is 0.  A status; in the second state signals may fail. */
 static int signals_compare (signal_comparison *x, int number, double t0, double t1) {
   pw_run *r = x->r;
   pw_workspace *w = r->w;

@@ -71,14 +71,15 @@ void pw_steady_velocities (const pw_steady *x, const double *rates, const double
 /* out: orthonormal rows of length n that span the null space of M (rows x n, by columns, destroyed; rows >= n).
  * Singular values up to the tolerance, or up to round-off, count as 0.  Returns the number of rows, or a status < 0. */
 int pw_null_space (int rows, int n, double *M, double tolerance, double *out);
-/* A state near the run's, at most `distance` units of the scene away: an irregular one for each `number`. */
+/* A state at most `distance` units of the scene from the run's, perhaps off the constraints: an irregular one for each
+ * `number`. */
 void pw_irregular_state (const pw_run *r, double distance, int number, double *q, double *v);
 /* Finds the symmetries of the system.  A status; PW_RETRY and PW_METHOD: the equations are singular. */
 int pw_steady_find_symmetries (pw_steady *x);
 /* Finds the symmetries that leave what is held unchanged, at the state x->q, x->v.  A status. */
 int pw_steady_find_free_symmetries (pw_steady *x);
 /* The largest difference of two states up to symmetries and whole turns, in units of the scene; of numbers above 1 in
- * these units, relative to them. */
+ * these units, except angles of bodies, relative to them. */
 double pw_steady_distance (pw_steady *x, const double *q1, const double *v1, const double *q2, const double *v2);
 /* Displaces a state by symmetries, to the same state for all that differ by symmetries only. */
 void pw_steady_canonical (const pw_steady *x, double *q, double *v);
@@ -110,7 +111,8 @@ double pw_steady_parameter (const pw_steady *x, const double *u);
 
 enum { PW_STEADY_MAX_COORDINATES = 400 }; /* since the cost is cubic */
 
-/* Opens x->system[place] for a value of the parameter, unless it is open.  A status, with x->why if it fails. */
+/* Opens x->system[place] for a value of the parameter, unless it is open.  A status, with x->why if it fails; PW_RETRY:
+ * none at this value (x->why has the status of the error). */
 int pw_steady_open_system (pw_steady *x, pw_place place, double value);
 void pw_steady_close_system (pw_steady *x, pw_place place);
 /* PW_INPUT and the reason unless both systems have as many bodies, coordinates and constraint equations. */
@@ -135,9 +137,9 @@ int pw_steady_start (pw_steady *x, int attempt, double *u, pw_error *error);
 
 /* ---- signal_change.c ---- */
 
-/* *changed: the first signal whose value changes within the span after time t, or if period > 0, that differs between
- * times in this span and one period later; -1: none.  Signals are compared in the run's state and in one near it.  A
- * status. */
+/* *changed: the first signal that (or a derivative of which) changes within the span after time t, or if period > 0,
+ * differs between times in this span and one period later; -1: none.  Signals are compared in the run's state and in
+ * one up to a unit of the scene away.  A status. */
 int pw_signals_change (pw_run *r, double t, double period, double span, int *changed, pw_error *error);
 
 /* ---- steady.c ---- */
@@ -147,10 +149,10 @@ static inline double pw_value_within (double first, double last) {
   return first + 0.382 * (last - first);
 }
 
-/* Opens only scales and symmetries, for other searches: signals may change. */
+/* As pw_steady_open, for searches that need only scales and symmetries: signals may change. */
 pw_steady *pw_steady_open_symmetries (const pw_system *s, const pw_steady_settings *settings, pw_error *error);
 
-/* The motion of the unknowns u, a solution, with its linearisation. */
+/* The motion of the unknowns u, which become x->solution, with its linearisation; sets x->neutral.  A status. */
 int pw_steady_motion_at (pw_steady *x, const double *u, pw_steady_motion *out, pw_error *error);
 
 #endif

@@ -138,7 +138,7 @@ static int variation_find_changes (const pw_variation *x, pw_direction_copy *d) 
   return PW_OK;
 }
 
-/* Adds the round-off of the differences of initial states, 4 eps |weight value| each, to their error. */
+/* Adds the round-off of differences of initial states, 4 eps |weight value| each, to their error; sets d->start. */
 static void variation_add_round_off (const pw_variation *x, pw_direction_copy *d) {
   const pw_run *near = d->given.neighbour[1], *r = x->r;
   const double relative = 4 * DBL_EPSILON * fabs (pw_direction_weight (&d->given, 0, 1)), *Y = d->column[0].trial;
@@ -316,7 +316,7 @@ double pw_variation_jump_slope (const pw_variation *x, int i) {
 
 /* ---- Samples ---- */
 
-/* Column c as a sample; zeros if there is none. */
+/* Column c as a sample, as pw_variation_sample; zeros if there is none. */
 static int variation_column_sample (pw_variation *x, const pw_direction_copy *d, int c, pw_sample *sample) {
   int n = x->n, m = x->m, entries = x->entries;
   const pw_variation_column *from = &d->column[c];

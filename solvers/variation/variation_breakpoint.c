@@ -22,8 +22,8 @@ static double breakpoint_derivative (const pw_direction_copy *d, int c) {
   return sum;
 }
 
-/* 1 if the neighbours' breakpoints lie smoothly around the run's: they surround it evenly, and the derivatives with the
- * two steps, whose difference is 3 times the error, agree. */
+/* 1 if the neighbours' breakpoints lie smoothly around the run's: they surround it evenly (unless one_sided), and the
+ * derivatives with the two steps, whose difference is 3 times the error, agree. */
 static int breakpoint_smooth (const pw_direction_copy *d, double next) {
   double most = 0, mean = 0, step = fabs (d->given.step), round = 64 * DBL_EPSILON * (1 + fabs (next));
   for (int i = 0; i < PW_VARIATION_NEIGHBOURS; i++) {

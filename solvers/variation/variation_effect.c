@@ -120,8 +120,8 @@ static int effect_neighbour (pw_variation *x, pw_direction_copy *d, int i) {
   return PW_OK;
 }
 
-/* The factor that makes entry i of an effect dimensionless: of forces, in units of the accelerations that they cause;
- * of residuals, in units of the scene. */
+/* The factor that makes entry i of an effect dimensionless: of forces, in units of the accelerations that they cause,
+ * 0 without mass; of residuals, in units of the scene as if all were of lengths. */
 static double effect_unit (const pw_variation *x, int i) {
   double T = x->r->w->scale.time;
   if (i < x->n) return x->r->s->mass[i] > 0 ? T * T / x->r->s->mass[i] / pw_unit (x->r->s, i) : 0;
@@ -238,7 +238,7 @@ void pw_variation_accelerate (pw_variation *x, int c, int k) {
   }
 }
 
-/* Positions first; the velocities' equations contain them. */
+/* Positions first, by a correction that leaves S dq as it is; the velocities' equations contain them. */
 void pw_variation_project (pw_variation *x, pw_variation_column *c) {
   pw_linearisation *l = &x->linear;
   int n = x->n, m = x->m, holonomic = x->r->s->holonomic;

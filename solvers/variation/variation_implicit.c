@@ -194,7 +194,7 @@ static void implicit_filter (pw_variation *x, double *e) {
   for (int k = 0; k < size; k++) pw_variation_add (e, p->N[2] + (size_t)k * (size_t)length, p->z[k], length);
 }
 
-/* The errors of the derivatives; those of work and losses need no filter, since their A_i is 0. */
+/* The errors of the derivatives; those of work and losses, on which no time derivative depends, need no filter. */
 static void implicit_errors (pw_variation *x, double h) {
   for (pw_direction_copy *d = x->direction; d < x->direction + x->count; d++) {
     const pw_variation_column *c = d->column;

@@ -192,7 +192,7 @@ static int jump_side (const jump_neighbour *k, double delay, int *after) {
   return status;
 }
 
-/* The time at which the motion meets the surface, minus t_s; NaN if it does not, or cannot be evaluated. */
+/* The time at which the motion meets the surface, minus t_s, to 12 digits; NaN: never, or it cannot be evaluated. */
 static double jump_time (const jump_neighbour *k) {
   double T = k->x->r->w->scale.time, lo, hi, middle;
   int before = 1, after = 0, side;

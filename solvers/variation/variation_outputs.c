@@ -1,5 +1,5 @@
 /* Derivatives of energies, powers and multipliers along a column: exact, or by differences along the derivative of the
- * state. */
+ * state and between the neighbours. */
 #include <float.h>
 #include <math.h>
 #include <string.h>

@@ -17,10 +17,10 @@ enum {
 typedef struct {
   const struct pw_direction_copy *direction;
   double *Y;                     /* size: dq, dv, d ledger, the latter only with `ledger` */
-  double *K[PW_VARIATION_RATES]; /* size: time derivatives of Y at the stages; implicit steps: F, then F_i, then Y_i */
+  double *K[PW_VARIATION_RATES]; /* size: F = Y' at stages and end; implicit steps: F, F_i, Y_i (Y_3, then F at end) */
   double *lambda;                /* m: d lambda at the state last evaluated */
   double *trial;                 /* size: Y at a stage, or at the end of a step */
-  double slope;                  /* derivative of the time of the breakpoint or jump being passed */
+  double slope;                  /* derivative of the time of the breakpoint or jump passed last */
   double largest;                /* norm of Y so far, in units of the scene */
   double energy;                 /* largest derivative of work and losses so far */
 } pw_variation_column;
@@ -41,15 +41,15 @@ typedef struct pw_direction_copy {
   double *terms;                     /* n + 3 m: magnitudes of the terms of which these are differences */
   pw_difference_sums start, effects; /* of the initial state; of the effects at all evaluations */
   double *local_error;               /* size: error of the derivative in the last step */
-  int signals;                       /* 1: some signals differ in the neighbours */
-  /* batches + 1: 1 if the batch differs in the neighbours; the last one: masses or constant forces */
+  int signals;                       /* 1: some signals may differ in the neighbours */
+  /* batches + 1: 1 if the batch may differ in the neighbours; the last one: masses or constant forces */
   unsigned char *changes;
   char *memory;
 } pw_direction_copy;
 
 /* A state of the run. */
 typedef struct {
-  double t, *x; /* 3 n + 3: q, v, a, and 0 for the ground */
+  double t, *x; /* 3 n + 3: q, v, a, and room for the ground's entries of a */
   int jumps;    /* 1: accelerations jump between this state and the next one, at the same time up to round-off */
 } pw_variation_point;
 
@@ -86,7 +86,7 @@ struct pw_variation {
   int may_jump;              /* 1: accelerations may jump with the state */
   double begun;              /* the beginning of the run's last step */
   int points, room;          /* recorded states, allocated ones */
-  pw_variation_point *point; /* room: states of the run from t on, in the order of time */
+  pw_variation_point *point; /* room: the last state of the run up to t, and all later ones */
   double passed;             /* the last breakpoint that the derivatives have passed */
   pw_variation_hold hold[2]; /* just before and just after the jump approached last */
   char *memory;
@@ -117,7 +117,7 @@ int pw_variation_append (pw_variation *x, double t, pw_error *error);
 int pw_variation_refine (pw_variation *x, int i, pw_error *error);
 /* Adds a last point, whose state the caller stores.  PW_OK or PW_RESOURCE. */
 int pw_variation_add_point (pw_variation *x, pw_error *error);
-/* Accelerations by the run's equations at a state; at a breakpoint, those before it.  A status. */
+/* Accelerations (a: n + 3) by the run's equations at a state; at a breakpoint, those before it.  A status. */
 int pw_variation_accelerations (pw_variation *x, double t, const double *q, const double *v, double *a,
                                 pw_error *error);
 /* Discards the states that precede the last one up to x->t. */
@@ -161,8 +161,8 @@ int pw_variation_time_derivatives (pw_variation *x, int k, pw_error *error);
 
 /* Continues from `trial` of every column, projected, at the state evaluated.  A status. */
 int pw_variation_restart (pw_variation *x, pw_error *error);
-/* Tries a step that passes neither t1 nor the time that the run has reached.  If its error is too large, the next call
- * tries a smaller one.  A status. */
+/* Tries a step that passes neither t1 nor the time that the run has reached.  If its error is too large, it is not
+ * made: PW_OK, and the next call tries a smaller one.  A status. */
 int pw_variation_step (pw_variation *x, double t1, pw_error *error);
 
 /* ---- variation_explicit.c ---- */
@@ -205,7 +205,8 @@ int pw_variation_jump (pw_variation *x, double t, const double *state, pw_error 
 int pw_variation_find_jumps (pw_variation *x, int first, pw_error *error);
 /* The time of the first of these jumps that has not been passed, or INFINITY. */
 double pw_variation_recorded_jump (const pw_variation *x);
-/* Determines the times around the first of these jumps at which neighbours are held.  A status. */
+/* Determines the times around the first of these jumps at which neighbours are held; restarts if the derivatives are
+ * within them.  A status. */
 int pw_variation_approach_jump (pw_variation *x, pw_error *error);
 /* Passes the jump at which the derivatives have arrived.  A status. */
 int pw_variation_pass_jump (pw_variation *x, pw_error *error);

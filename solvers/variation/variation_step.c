@@ -75,7 +75,7 @@ static const double STEP_CHANGE = 1e-6, STEP_CHANGE_RTOL = 1000;
 
 /* The difference between the change of the run's velocities and the integral of its accelerations over a step, relative
  * to h times the largest acceleration, at most 1: large where the run does not resolve the motion.  The error of the
- * formula (step_motion_error), and step_noise multiplied by x->reversal, are subtracted. */
+ * formula (x->motion_error), and step_noise multiplied by x->reversal, are subtracted. */
 static double step_defect (const pw_variation *x, double h) {
   int stages = x->implicit ? 1 + PW_VARIATION_STAGES : PW_VARIATION_RATES - 1;
   double most =
