@@ -38,7 +38,7 @@ int pw_unknowns_open (pw_unknowns *u, const pw_cli_line *line, const pw_cli_mode
   if (status == PW_OK) status = pw_cli_specialise (line->specialise, &u->when, error);
   if (status != PW_OK) return status;
   u->settings.stop = NULL;
-  if (u->settings.rtol == 0) u->settings.rtol = 1e-6; /* the default, from which errors are estimated */
+  if (u->settings.rtol == 0) u->settings.rtol = PW_RTOL; /* from which errors are estimated */
   u->limit = limit.seconds;
   pw_cli_report_unused (u->method, line);
   return PW_OK;

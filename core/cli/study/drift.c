@@ -7,7 +7,6 @@
 #include "util.h"
 
 #define DRIFT_ROUND_OFF 1e-14                   /* scaled residuals below it are round-off: they have no growth */
-#define DRIFT_RTOL 1e-6                         /* of adaptive methods, unless the model or --rtol gives another one */
 enum { DRIFT_PARTS = 200, DRIFT_ROWS = 10000 }; /* parts of a run, each a point in the figures; rows at most */
 
 /* What is measured: the scaled residuals of positions and velocities, and |balance| of a sample [J], the energy defect.
@@ -159,7 +158,7 @@ static int drift_plan_rows (pw_drift *drift, pw_error *error) {
 static int drift_plan (pw_study *study, pw_error *error) {
   pw_drift *drift = (pw_drift *)study;
   pw_run_defaults defaults = pw_cli_defaults (pw_file_table (study->compiled.file));
-  if (defaults.rtol == 0) defaults.rtol = DRIFT_RTOL;
+  if (defaults.rtol == 0) defaults.rtol = PW_RTOL;
   int status = pw_cli_settings (&study->line, &defaults, &study->t_end, &study->settings, &study->limit, error);
   study->settings.ledger = 1;
   if (status == PW_OK) status = pw_study_read_methods (study, "rk4+all,ida+all,galpha+all", error);
