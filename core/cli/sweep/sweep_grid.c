@@ -96,8 +96,11 @@ double pw_axis_value (const pw_axis *axis, long i) {
   double intervals = (double)(axis->count - 1), k = (double)i;
   if (i == 0 || axis->first == axis->last) return axis->first;
   if (i == axis->count - 1) return axis->last;
-  if (axis->type == PW_AXIS_LIN) return (axis->first * (intervals - k) + axis->last * k) / intervals;
-  return pow (10, (log10 (axis->first) * (intervals - k) + log10 (axis->last) * k) / intervals);
+  if (axis->type == PW_AXIS_LOG)
+    return pow (10, (log10 (axis->first) * (intervals - k) + log10 (axis->last) * k) / intervals);
+  double value = (axis->first * (intervals - k) + axis->last * k) / intervals;
+  if (isfinite (value)) return value;
+  return axis->first / intervals * (intervals - k) + axis->last / intervals * k; /* the products were too large */
 }
 
 /* ---- The grid ---- */
