@@ -33,14 +33,15 @@ static int optimise_open_searches (pw_optimise *problem, pw_error *error) {
   return status;
 }
 
-/* The search with the best result, the first one of equal ones, among the first `count` searches without those
- * `excluded`, which may be NULL.  NULL: none has a result. */
+/* The search with the best result among the first `count` searches without those `excluded`, which may be NULL; of
+ * equal ones the first that converged, or else the first.  NULL: none has a result. */
 static const pw_search *optimise_best (const pw_optimise *problem, int count, const unsigned char *excluded) {
   const pw_search *best = NULL;
   for (int i = 0; i < count; i++) {
     const pw_search *search = problem->search + i;
     if (!search->feasible || (excluded && excluded[i])) continue;
-    if (best == NULL || problem->sign[0] * search->output[0] < problem->sign[0] * best->output[0]) best = search;
+    double gain = best ? problem->sign[0] * (best->output[0] - search->output[0]) : INFINITY;
+    if (gain > 0 || (gain == 0 && search->converged && !best->converged)) best = search;
   }
   return best;
 }
