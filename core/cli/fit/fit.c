@@ -210,12 +210,15 @@ static int fit_search (pw_fit *fit, pw_error *error) {
 
 static int fit_finish (pw_fit *fit, pw_error *error) {
   FILE *table = pw_files_stream (&fit->files, FIT_TABLE), *summary = pw_files_stream (&fit->files, FIT_SUMMARY);
+  pw_error drawing = { 0 };
   pw_fit_print (fit);
   pw_unknowns_report (&fit->unknowns, fit->estimate);
+  if (fit->plots_path) pw_fit_draw (fit, &drawing);
+  const char *word = drawing.status ? pw_cli_status_word (drawing.status) : fit->converged ? "ok" : "method";
   int status = table ? pw_fit_table (fit, table, error) : PW_OK;
-  if (summary) pw_fit_json (fit, fit->interrupted ? "interrupted" : fit->converged ? "ok" : "method", summary);
+  if (summary) pw_fit_json (fit, fit->interrupted ? "interrupted" : word, summary);
   if (status == PW_OK) status = pw_files_finish (&fit->files, error);
-  if (status == PW_OK && fit->plots_path) status = pw_fit_draw (fit, error);
+  if (status == PW_OK && drawing.status) status = pw_fail (error, drawing.status, "%s", drawing.text);
   if (fit->interrupted) pw_cli_say ("pinwheel: interrupted; these are the values so far, without their errors\n");
   if (status == PW_OK && fit->interrupted) return PW_INTERRUPTED;
   if (status == PW_OK && !fit->converged)

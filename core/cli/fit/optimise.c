@@ -227,14 +227,16 @@ static int optimise_finish (pw_optimise *problem, pw_error *error) {
   if (problem->best == NULL && interrupted)
     pw_cli_say ("pinwheel: interrupted before any run satisfied the constraints\n");
   if (problem->best == NULL) return interrupted ? PW_INTERRUPTED : optimise_infeasible (problem, error);
-  pw_error unconverged = { 0 };
+  pw_error unconverged = { 0 }, drawing = { 0 };
   int converged = optimise_converged (problem, &unconverged) == PW_OK;
   pw_optimise_print (problem);
   pw_unknowns_report (&problem->unknowns, problem->best->to);
   if (result) pw_optimise_yaml (problem, result);
-  if (summary) pw_optimise_json (problem, interrupted ? "interrupted" : converged ? "ok" : "method", summary);
+  if (problem->plots_path) pw_optimise_draw (problem, &drawing);
+  const char *word = drawing.status ? pw_cli_status_word (drawing.status) : converged ? "ok" : "method";
+  if (summary) pw_optimise_json (problem, interrupted ? "interrupted" : word, summary);
   int status = pw_files_finish (&problem->files, error);
-  if (status == PW_OK && problem->plots_path) status = pw_optimise_draw (problem, error);
+  if (status == PW_OK && drawing.status) status = pw_fail (error, drawing.status, "%s", drawing.text);
   if (interrupted) pw_cli_say ("pinwheel: interrupted; this is the best result so far\n");
   if (status == PW_OK && interrupted) return PW_INTERRUPTED;
   return status == PW_OK && !converged ? pw_fail (error, unconverged.status, "%s", unconverged.text) : status;

@@ -340,8 +340,9 @@ static int run_finish (pw_run_cli *command, pw_error *error) {
   if (last && command->table_path == NULL && command->summary_path == NULL)
     pw_report_end (&summary, system, last, command->with_energies, pw_run_statistics (run));
   if (error->status == PW_OK) pw_report_warnings (run, system, summary.energy_defect);
-  run_write_json (command, &summary, last, error);
   run_finish_figures (command, summary.reason, error);
+  if (!interrupted) summary.status = pw_cli_status_word (error->status); /* summary.reason is the text of the error */
+  run_write_json (command, &summary, last, error);
   run_name_files (command, error);
   if (command->profile && last && error->status == PW_OK && !interrupted)
     pw_print_profile (system, run, command->cpu, prints_file ? stderr : stdout, error);
