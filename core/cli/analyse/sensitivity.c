@@ -413,8 +413,6 @@ const pw_command pw_cli_sensitivity = {
   .help = "Differentiate outputs of a run with respect to parameters and initial values, at the end and along the run, "
           "by the variational equations: exact in the states, by differences of compiled models in the parameters, "
           "with the error of these and, if the method controls its error, of the run.",
-  .min_arguments = 1,
-  .max_arguments = 1,
   .options_size = sizeof (sensitivity),
   .function = sensitivity_command,
   .options = sensitivity_options,

@@ -339,8 +339,6 @@ const pw_command pw_cli_steady = {
       "Find steady motions, in which every body moves with one frame at constant speed and angular velocity, and "
       "equilibria; with --vary, follow them over a parameter, through folds, with eigenvalues and the values at which "
       "stability changes.",
-  .min_arguments = 1,
-  .max_arguments = 1,
   .options_size = sizeof (pw_steady_command),
   .function = steady_command,
   .options = steady_options_table,

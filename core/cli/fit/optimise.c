@@ -285,8 +285,6 @@ const pw_command pw_cli_optimise = {
   .summary = "find the parameters for which an output is largest or smallest",
   .help = "Vary parameters and initial values of a model until an output of its runs is largest or smallest, by local "
           "searches from several starts. Runs that fail count as infeasible.",
-  .min_arguments = 1,
-  .max_arguments = 1,
   .options_size = sizeof (pw_optimise),
   .function = optimise_command,
   .options = optimise_options,

@@ -187,8 +187,6 @@ const pw_command pw_cli_page = {
           "for parameters, initial values, tolerance and final time, the animation, curves, and the error at the "
           "end next to the cost. The options set what the page begins with. A model in C is compiled to WebAssembly by "
           "clang.",
-  .min_arguments = 1,
-  .max_arguments = 1,
   .options_size = sizeof (page),
   .function = page_command,
   .options = page_options,

@@ -410,8 +410,6 @@ const pw_command pw_cli_run = {
   .summary = "integrate a model; write a table, a summary, figures, an animation",
   .help = "Integrate the equations of motion of a model and show the final state, reactions and constraint residuals. "
           "Options that are not given have the model's own defaults, see `pinwheel show MODEL`.",
-  .min_arguments = 1,
-  .max_arguments = 1,
   .options_size = sizeof (pw_run_cli),
   .function = run_command,
   .options = run_options,

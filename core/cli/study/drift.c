@@ -322,8 +322,6 @@ const pw_command pw_cli_drift = {
   .help =
       "Compare how constraint residuals and the energy defect grow during a long run, by method and stabilisation, and "
       "how they depend on the parameters of Baumgarte stabilisation and projection.",
-  .min_arguments = 1,
-  .max_arguments = 1,
   .options_size = sizeof (pw_drift),
   .function = drift_command,
   .options = drift_options,
