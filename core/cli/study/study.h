@@ -104,8 +104,8 @@ struct pw_study {
   double t_end;     /* [s] */
   pw_figures figures;
   /* in progress */
-  int lock;  /* descriptor of the locked folder; -1: none */
-  int quiet; /* 1: rows are not printed */
+  pw_files files; /* the locked folder */
+  int quiet;      /* 1: rows are not printed */
   pw_row *row;
   int rows, written; /* all; those written to the table */
   pthread_mutex_t mutex;
