@@ -78,7 +78,7 @@ static int optimise_search (pw_optimise *problem, pw_error *error) {
     problem->runs += search->runs, problem->failed += search->failed, problem->derivatives += search->derivatives;
     if (problem->first_error == NULL && search->failed) problem->first_error = &search->first_error;
   }
-  return problem->fatal.status != PW_OK ? pw_fail (error, problem->fatal.status, "%s", problem->fatal.text) : status;
+  return status;
 }
 
 /* ---- Before the search ---- */
