@@ -317,7 +317,7 @@ static int sensitivity_loosen (pw_sensitivity *sens, pw_progress *progress, pw_e
   other.row_interval = 0;
   other.unknowns.settings.rtol = fmin (0.1, SENSITIVITY_LOOSE * sens->unknowns.settings.rtol); /* must be below 1 */
   other.unknowns.settings.atol *= SENSITIVITY_LOOSE;
-  sens->loose = malloc ((size_t)(outputs * unknowns) * sizeof *sens->loose);
+  sens->loose = pw_arena_alloc (&sens->arena, (size_t)(outputs * unknowns) * sizeof *sens->loose);
   if (sens->loose == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   int status = pw_sensitivity_compute (&other, NULL, progress, error);
   if (status == PW_OK && other.stopped) status = pw_limit_status (&other.limit, pw_run_time (other.base.run), error);

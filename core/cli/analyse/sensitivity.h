@@ -6,6 +6,7 @@
 #include "outcome.h"
 #include "progress.h"
 #include "unknowns.h"
+#include "util.h"
 
 typedef struct {
   const char **of; /* the texts of the outputs, ended by NULL */
@@ -34,6 +35,7 @@ typedef struct {
   double *before;         /* F + F P: values and derivatives before a jump */
   double *q;              /* coordinates: scratch */
   char *memory;           /* of value, slope, run_slope, their errors, before and q */
+  pw_arena arena;         /* of loose, direction, unknown_value and neighbours */
   size_t room;            /* rows allocated */
 } pw_sensitivity;
 

@@ -295,9 +295,9 @@ static int sensitivity_prepare (pw_sensitivity *sens, const double *values, pw_e
   sens->limit.seconds = sens->unknowns.limit;
   sens->unknowns.settings.stop = pw_limit_over;
   sens->unknowns.settings.stop_context = &sens->limit;
-  sens->unknown_value = malloc (P * sizeof *sens->unknown_value);
-  sens->neighbours = calloc (4 * P, sizeof *sens->neighbours);
-  sens->direction = calloc (P, sizeof *sens->direction);
+  sens->unknown_value = pw_arena_alloc (&sens->arena, P * sizeof *sens->unknown_value);
+  sens->neighbours = pw_arena_alloc (&sens->arena, 4 * P * sizeof *sens->neighbours);
+  sens->direction = pw_arena_alloc (&sens->arena, P * sizeof *sens->direction);
   if (sens->unknown_value == NULL || sens->neighbours == NULL || sens->direction == NULL)
     return pw_fail (error, PW_RESOURCE, "out of memory");
   for (size_t p = 0; p < P; p++) sens->unknown_value[p] = values ? values[p] : sens->unknowns.list[p].value;
@@ -392,10 +392,7 @@ void pw_sensitivity_close (pw_sensitivity *sens) {
   pw_outcomes_close (&sens->outcomes);
   for (int i = 0; sens->neighbours && i < 4 * sens->unknowns.count; i++) pw_unknown_run_close (&sens->neighbours[i]);
   pw_unknown_run_close (&sens->base);
-  free (sens->neighbours);
-  free (sens->direction);
-  free (sens->unknown_value);
+  pw_arena_free (&sens->arena);
   free (sens->memory);
-  free (sens->loose);
   free (sens->row);
 }

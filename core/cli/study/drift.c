@@ -4,7 +4,6 @@
 #include <string.h>
 #include "study.h"
 #include "sweep_grid.h"
-#include "util.h"
 
 #define DRIFT_ROUND_OFF 1e-14                   /* scaled residuals below it are round-off: they have no growth */
 enum { DRIFT_PARTS = 200, DRIFT_ROWS = 10000 }; /* parts of a run, each a point in the figures; rows at most */
@@ -73,8 +72,7 @@ static int drift_read_values (pw_drift *drift, const char *text, pw_error *error
   int option = pw_find_name (drift_option, sizeof *drift_option, name, hint);
   if (option < 0) return pw_fail (error, PW_INPUT, "--vary %.100s: alpha, beta and every can be varied%s", text, hint);
   pw_axis *axis = &drift->axis[option];
-  pw_axis_free (axis);
-  int status = pw_axis_read (axis, text, error);
+  int status = pw_axis_read (axis, text, &drift->study.arena, error);
   for (long i = 0; status == PW_OK && i < axis->count; i++) {
     const char *expected = pw_domain_check (option == DRIFT_EVERY ? PW_COUNT : PW_NONNEGATIVE, pw_axis_value (axis, i));
     if (*expected)
@@ -275,10 +273,6 @@ static int drift_figures (pw_study *study, pw_error *error) {
   return status;
 }
 
-static void drift_close (pw_study *study) {
-  for (int i = 0; i < DRIFT_OPTIONS; i++) pw_axis_free (&((pw_drift *)study)->axis[i]);
-}
-
 static int drift_command (void *options, pw_error *error) {
   static const char *const group[] = { "methods", "alpha and beta of Baumgarte", "metric and frequency of projection" };
   static const pw_study_type type = { .table_names = { "drift.csv", "drift-time.csv" },
@@ -294,8 +288,7 @@ static int drift_command (void *options, pw_error *error) {
                                       .plan = drift_plan,
                                       .begin = drift_begin,
                                       .measure = drift_measure,
-                                      .figures = drift_figures,
-                                      .close = drift_close };
+                                      .figures = drift_figures };
   return pw_study_command (options, &type, error);
 }
 

@@ -3,7 +3,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include "study.h"
-#include "util.h"
 
 /* Clocks are read after a batch of steps: its processor time [s] below which the next batch has more steps, and above
  * which it has fewer. */
@@ -69,9 +68,9 @@ int pw_study_read_methods (pw_study *study, const char *otherwise, pw_error *err
 
 pw_row *pw_study_add (pw_study *study, int group, int curve, const char *method, int points, pw_error *error) {
   pw_row *row = realloc (study->row, (size_t)(study->rows + 1) * sizeof *row);
-  double (*point)[STUDY_COORDINATES] = malloc ((size_t)points * sizeof *point);
+  double (*point)[STUDY_COORDINATES] = pw_arena_alloc (&study->arena, (size_t)points * sizeof *point);
   if (row) study->row = row;
-  if (row == NULL || point == NULL) return free (point), pw_fail (error, PW_RESOURCE, "out of memory"), NULL;
+  if (row == NULL || point == NULL) return pw_fail (error, PW_RESOURCE, "out of memory"), NULL;
   row += study->rows++;
   *row = (pw_row){ .group = group, .curve = curve, .points = points, .point = point };
   snprintf (row->method, sizeof row->method, "%s", method);
@@ -288,8 +287,8 @@ int pw_study_command (pw_study *study, const pw_study_type *type, pw_error *erro
   status = study_finish (study, status, error);
   if (status == PW_OK) status = study_require_success (study, error);
   pw_files_close (&study->files);
-  type->close (study);
-  for (int i = 0; i < study->rows; i++) free (study->row[i].point);
+  if (type->close) type->close (study);
+  pw_arena_free (&study->arena);
   free (study->row);
   free (study->method);
   pthread_mutex_destroy (&study->mutex);
