@@ -1,8 +1,10 @@
-/* Utilities of all parts of Pinwheel: suggestions of names, checks of texts, streams into memory, tables, memory. */
+/* Utilities of all parts of Pinwheel: suggestions of names, numbers, checks of texts, streams into memory, tables,
+ * memory. */
 #ifndef PW_UTIL_H
 #define PW_UTIL_H
 
 #include <stddef.h>
+#include <stdint.h>
 #include <stdio.h>
 #include "pinwheel.h"
 
@@ -37,6 +39,21 @@ int pw_find_name (const void *table, size_t entry_size, const char *name, char h
 const char *pw_domain_text (pw_domain domain);
 /* "" if a value lies in the domain, else the expected one ("a number >= 0"). */
 const char *pw_domain_check (pw_domain domain, double value);
+
+/* ---- Numbers ---- */
+
+/* The next 64 random bits: SplitMix64 (Steele, Lea & Flood 2014, Fast splittable pseudorandom number generators). */
+static inline uint64_t pw_random_bits (uint64_t *state) {
+  uint64_t z = *state += 0x9e3779b97f4a7c15;
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111eb;
+  return z ^ (z >> 31);
+}
+
+/* A value of a parameter within a range, at which no parameter is likely to vanish. */
+static inline double pw_value_within (double first, double last) {
+  return first + 0.382 * (last - first);
+}
 
 /* ---- Zero-terminated texts (characters.c) ---- */
 

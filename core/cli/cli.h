@@ -70,12 +70,12 @@ typedef struct {
 } pw_cli_line;
 
 typedef struct {
-  const char *name;                 /* "run" */
-  const char *synopsis;             /* "MODEL [OPTION...]" */
-  const char *summary;              /* one line, for `pinwheel --help` */
-  const char *help;                 /* sentences for `pinwheel run --help` */
-  int min_arguments, max_arguments; /* max_arguments 0: any number */
-  size_t options_size;              /* of the structure of options, which begins with a pw_cli_line */
+  const char *name;     /* "run" */
+  const char *synopsis; /* "MODEL [OPTION...]" */
+  const char *summary;  /* one line, for `pinwheel --help` */
+  const char *help;     /* sentences for `pinwheel run --help` */
+  int any_arguments;    /* 1: any number of arguments, 0: exactly one */
+  size_t options_size;  /* of the structure of options, which begins with a pw_cli_line */
   int (*function) (void *options, pw_error *error);
   const struct poptOption *options; /* entries defined below, ended by POPT_TABLEEND */
 } pw_command;
@@ -132,8 +132,8 @@ PW_COMMANDS (PW_COMMAND)
 /* Reads the command line (argv[0] is not read), runs the command and reports its error; returns the exit status. */
 int pw_cli_main (const pw_command *command, int argc, const char **argv);
 
-/* Refuses more than `most` arguments. */
-int pw_cli_at_most (const pw_command *command, const pw_cli_line *line, int most, pw_error *error);
+/* Refuses more than one argument. */
+int pw_cli_at_most_one (const pw_command *command, const pw_cli_line *line, pw_error *error);
 
 /* PW_INPUT if an option ("--every") is given (its value is not NULL) without the one that it requires ("-o DIR"). */
 int pw_cli_requires (const char *option, const char *value, const char *required, int is_given, pw_error *error);

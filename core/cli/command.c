@@ -106,9 +106,9 @@ static int command_refuse (const pw_command *command, const pw_cli_line *line, i
   return pw_fail (error, PW_INPUT, "%s: option %s: %s", command->name, option, poptStrerror (code));
 }
 
-int pw_cli_at_most (const pw_command *command, const pw_cli_line *line, int most, pw_error *error) {
-  if (line->arguments <= most) return PW_OK;
-  return pw_fail (error, PW_INPUT, "unexpected argument \"%s\"; usage: pinwheel %s %s", line->argument[most],
+int pw_cli_at_most_one (const pw_command *command, const pw_cli_line *line, pw_error *error) {
+  if (line->arguments <= 1) return PW_OK;
+  return pw_fail (error, PW_INPUT, "unexpected argument \"%s\"; usage: pinwheel %s %s", line->argument[1],
                   command->name, command->synopsis);
 }
 
@@ -129,9 +129,10 @@ static int command_read (const pw_command *command, pw_cli_line *line, int argc,
   if (number < -1) return command_refuse (command, line, number, error); /* -1: no more options */
   line->argument = poptGetArgs (line->popt);
   while (line->argument && line->argument[line->arguments]) line->arguments++;
-  if (line->arguments < command->min_arguments)
+  if (command->any_arguments) return PW_OK;
+  if (line->arguments == 0)
     return pw_fail (error, PW_INPUT, "missing argument; usage: pinwheel %s %s", command->name, command->synopsis);
-  return command->max_arguments ? pw_cli_at_most (command, line, command->max_arguments, error) : PW_OK;
+  return pw_cli_at_most_one (command, line, error);
 }
 
 static void command_close (pw_cli_line *line) {

@@ -4,16 +4,8 @@
 #include "model.h"
 #include "random_scene.h"
 
-/* splitmix64 (Steele, Lea, Flood 2014). */
-static uint64_t scene_next (pw_random *r) {
-  uint64_t z = (r->state += 0x9e3779b97f4a7c15u);
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-  return z ^ (z >> 31);
-}
-
 double pw_random_between (pw_random *r, double low, double high) {
-  return low + (high - low) * ldexp ((double)(scene_next (r) >> 11), -53);
+  return low + (high - low) * ldexp ((double)(pw_random_bits (&r->state) >> 11), -53);
 }
 
 /* ---- Random definitions ---- */

@@ -144,11 +144,6 @@ int pw_signals_change (pw_run *r, double t, double period, double span, int *cha
 
 /* ---- steady.c ---- */
 
-/* A value of the parameter within the range, at which no parameter is likely to vanish. */
-static inline double pw_value_within (double first, double last) {
-  return first + 0.382 * (last - first);
-}
-
 /* As pw_steady_open, for searches that need only scales and symmetries: signals may change. */
 pw_steady *pw_steady_open_symmetries (const pw_system *s, const pw_steady_settings *settings, pw_error *error);
 

@@ -3,18 +3,15 @@
 #include <stdint.h>
 #include <string.h>
 #include "steady_parts.h"
+#include "util.h"
 
 enum { START_STEPS = 300 };               /* of a relaxation, at most */
 static const double START_FAR = 0.2,      /* longest of its steps, in units of the scene */
     START_GROW = 1.1, START_SHRINK = 0.4; /* factors of the next step */
 
-/* A random number between -1 and 1: SplitMix64 (Steele, Lea & Flood 2014, Fast splittable pseudorandom number
- * generators). */
+/* A random number between -1 and 1. */
 static double start_random (uint64_t *state) {
-  uint64_t z = *state += 0x9e3779b97f4a7c15;
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111eb;
-  return (double)(int64_t)(z ^ (z >> 31)) * 0x1p-63;
+  return (double)(int64_t)pw_random_bits (state) * 0x1p-63;
 }
 
 /* Makes the positions x->q consistent, if possible. */

@@ -158,5 +158,5 @@ double pw_method_steps (const char *method, const pw_settings *s, double step, d
   int stabilisation;
   if (pw_method_parse (method, &integrator, &stabilisation, NULL) != PW_OK) return 0;
   if (!pw_method_adaptive (integrator, method)) return t_end / (s->step > 0 ? s->step : step);
-  return t_end / (METHODS_STEP_RATIO * step) * pow (1e-6 / (s->rtol > 0 ? s->rtol : 1e-6), 1 / METHODS_ORDER);
+  return t_end / (METHODS_STEP_RATIO * step) * pow (1e-6 / (s->rtol > 0 ? s->rtol : PW_RTOL), 1 / METHODS_ORDER);
 }

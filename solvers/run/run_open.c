@@ -30,7 +30,7 @@ static int run_settings (pw_settings *to, const pw_settings *from, int fixed_ste
     return pw_fail (error, PW_INPUT, "setting max_steps = %ld: expected a number > 0", from->max_steps);
   *to = *from;
   if (to->step == 0) to->step = 1e-3;
-  if (to->rtol == 0) to->rtol = 1e-6;
+  if (to->rtol == 0) to->rtol = PW_RTOL;
   if (to->max_steps == 0) to->max_steps = PW_MAX_STEPS;
   if (to->span == 0) to->span = fixed_steps ? 1000 * to->step : 1;
   double least_step = (fabs (to->t) + to->span) / RUN_MOST_STEPS;

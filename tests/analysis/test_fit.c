@@ -257,6 +257,19 @@ static void test_without_derivatives (void **state) {
   check_close ("k", fit_value (cli_file ("half.json"), "k", "value"), fit_k, 0.1, "inputs held over 0.02 s");
 }
 
+/* At the estimate, a bound, the run on the inner side of c fails: there is no difference. */
+static void test_bound_without_derivative (void **state) {
+  char text[1000];
+  const char *torque = strstr (model, "-s*k*w.phi");
+  (void)state;
+  fit_write (0);
+  snprintf (text, sizeof text, "%.*s0*sqrt((c - 0.349997)*(c - 0.3499985)) %s", (int)(torque - model), model, torque);
+  cli_write ("gap.yaml", text);
+  cli_bad (
+      "pinwheel fit @/gap.yaml --set k=5 --data @/data.csv --columns w.phi --free c=0:0.35 --method rk4:inputs=held", 4,
+      "t = 0 s: a signal failed: torque T: value is not a finite number");
+}
+
 /* A sum of squares that overflows. */
 static void test_overflow (void **state) {
   (void)state;
@@ -393,6 +406,7 @@ int main (void) {
     cmocka_unit_test (test_changed_values),
     cmocka_unit_test (test_engine),
     cmocka_unit_test (test_without_derivatives),
+    cmocka_unit_test (test_bound_without_derivative),
     cmocka_unit_test (test_overflow),
   };
   return cmocka_run_group_tests (tests, fit_setup, cli_teardown);

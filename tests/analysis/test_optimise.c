@@ -277,6 +277,18 @@ static void test_unbounded (void **state) {
   }
 }
 
+/* A search ends at its limit of 500 runs.  The derivatives there are 0: its refinement ends at once, with the same
+ * value. */
+static void test_equal_refinement (void **state) {
+  (void)state;
+  cli_shell ("pinwheel optimise @/point.yaml --minimise 'floor(1e4*(100*(p.y - p.x^2)^2 + (1 - p.x)^2 + 100*(p.phi - "
+             "p.y^2)^2 + (1 - p.y)^2))' --free a --free b --free p.omega --subject-to 'p.y<=9' --starts 2 --json "
+             "@/o.json");
+  const char *json = cli_file ("o.json");
+  assert_true (cli_says (json, "status", "ok"));
+  assert_non_null (strstr (json, "\"runs\": 500,"));
+}
+
 /* A pendulum at rest without gravity. */
 static void test_no_effect (void **state) {
   (void)state;
@@ -300,13 +312,13 @@ static void test_changed_values (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_valley),     cmocka_unit_test (test_derivatives),
-                                      cmocka_unit_test (test_constraint), cmocka_unit_test (test_bound),
-                                      cmocka_unit_test (test_command),    cmocka_unit_test (test_failing),
-                                      cmocka_unit_test (test_sweep),      cmocka_unit_test (test_edge),
-                                      cmocka_unit_test (test_starts),     cmocka_unit_test (test_jobs),
-                                      cmocka_unit_test (test_interrupt),  cmocka_unit_test (test_bad),
-                                      cmocka_unit_test (test_unbounded),  cmocka_unit_test (test_changed_values),
-                                      cmocka_unit_test (test_no_effect),  cmocka_unit_test (test_many_unknowns) };
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_valley),    cmocka_unit_test (test_derivatives),    cmocka_unit_test (test_constraint),
+    cmocka_unit_test (test_bound),     cmocka_unit_test (test_command),        cmocka_unit_test (test_failing),
+    cmocka_unit_test (test_sweep),     cmocka_unit_test (test_edge),           cmocka_unit_test (test_starts),
+    cmocka_unit_test (test_jobs),      cmocka_unit_test (test_interrupt),      cmocka_unit_test (test_bad),
+    cmocka_unit_test (test_unbounded), cmocka_unit_test (test_changed_values), cmocka_unit_test (test_equal_refinement),
+    cmocka_unit_test (test_no_effect), cmocka_unit_test (test_many_unknowns)
+  };
   return cmocka_run_group_tests (tests, optimise_setup, cli_teardown);
 }

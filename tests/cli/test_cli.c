@@ -100,8 +100,9 @@ static void test_own_columns (void **state) {
 
 static void test_defaults (void **state) {
   (void)state;
-  /* without the notice that the frame was moved */
-  cli_good ("pinwheel run ezyroller --set a=0.6 --start frame.phi=0.25 --t-end 0.001 --json - 2>/dev/null");
+  /* the last value of a name counts; without the notice that the frame was moved */
+  cli_good ("pinwheel run ezyroller --set a=0.6 --start frame.phi=1 --start frame.phi=0.25 --t-end 0.001 --json - "
+            "2>/dev/null");
   check_close ("phi", cli_number (cli_out, "bodies", "frame", "phi", NULL), 0.25, 1e-6, "half of 1 rad/s^2 x 1e-6 s^2");
   assert_true (cli_says (cli_out, "method", "rk4+projection")); /* the model's own */
 }

@@ -109,7 +109,7 @@ static void test_outline (void **state) {
   assert_non_null (strstr (page, "\"outline\": []}"));
 }
 
-/* What gnuplot says when it fails is passed on. */
+/* What gnuplot says when it fails is passed on, and summaries say that the command has failed. */
 static void test_gnuplot_fails (void **state) {
   (void)state;
   cli_good ("mkdir @/bin && printf '#!/bin/sh\\necho no such colour >&2; exit 3\\n' >@/bin/gnuplot && chmod +x "
@@ -118,6 +118,19 @@ static void test_gnuplot_fails (void **state) {
   assert_non_null (strstr (cli_err, "no such colour\n"));
   assert_non_null (strstr (cli_err, "pinwheel: gnuplot failed with exit status 3"));
   assert_null (cli_file ("fails/paths.svg"));
+  assert_int_equal (cli_run ("PATH=@/bin pinwheel run pendulum -t 0.1 --plots @/fails --json @/run.json"), 1);
+  assert_true (cli_says (cli_file ("run.json"), "status", "machine"));
+  assert_non_null (strstr (cli_file ("run.json"), "\"reason\": \"gnuplot failed with exit status 3; "));
+  assert_int_equal (cli_run ("PATH=@/bin pinwheel optimise pendulum --minimise bob.y --free I=0:1 --set g=0 -t 0.1 "
+                             "--starts 1 --plots @/fails --json @/optimise.json"),
+                    1);
+  assert_true (cli_says (cli_file ("optimise.json"), "status", "machine"));
+  cli_good ("pinwheel run pendulum -t 1 --every 0.1 -o @/data.csv");
+  assert_int_equal (cli_run ("PATH=@/bin pinwheel fit pendulum --data @/data.csv --columns bob.phi --free g --plots "
+                             "@/fails -o @/fit.csv --json @/fit.json"),
+                    1);
+  assert_true (cli_says (cli_file ("fit.json"), "status", "machine"));
+  assert_non_null (cli_file ("fit.csv"));
 }
 
 static void test_data (void **state) {

@@ -23,7 +23,8 @@ static void test_order (void **state) {
   assert_string_equal (cli_out, "1\n13\n");
 }
 
-/* The fourth value of lin:0:1:11 is 0.3, ends are exact, and decades of a logarithmic range are. */
+/* The fourth value of lin:0:1:11 is 0.3, ends are exact, and decades of a logarithmic range are; large numbers do not
+ * overflow. */
 static void test_ranges (void **state) {
   (void)state;
   cli_good (
@@ -40,6 +41,11 @@ static void test_ranges (void **state) {
   assert_string_equal (cli_out, "2,ok\n3,ok\n");
   cli_good ("pinwheel sweep ezyroller --vary M0=lin:-1:-1:1 --t-end 0.001 -o @/one.csv && wc -l <@/one.csv");
   assert_string_equal (cli_out, "2\n");
+  cli_write ("unused.yaml", "pinwheel: 1\nabout: a parameter without effect\nparameters: [{name: a, value: 1}]\n"
+                            "bodies: [{name: p, mass: 1, inertia: 1}]\n");
+  cli_good ("pinwheel sweep @/unused.yaml --vary a=lin:1e308:1.5e308:3 -t 0.1 -o @/large.csv && cut -d, -f1,2 "
+            "@/large.csv | sed -n 3p");
+  assert_string_equal (cli_out, "1.25e+308,ok\n");
 }
 
 /* A row is what the run says, digit by digit. */

@@ -207,8 +207,6 @@ const pw_command pw_cli_linearise = {
   .help = "Linearise the equations of motion in minimal coordinates on the constraints, in a frame that moves with the "
           "motion: x' = A x + B u, y = C x + D u. Prints eigenvalues with frequency, damping and time to double or "
           "halve, and mode shapes.",
-  .min_arguments = 1,
-  .max_arguments = 1,
   .options_size = sizeof (pw_linearise_command),
   .function = linearise_command,
   .options = linearise_options,

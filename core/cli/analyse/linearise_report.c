@@ -34,11 +34,10 @@ static double linearise_doubling_time (double rate) {
 /* Prints a row for each real eigenvalue and each conjugate pair. */
 static void linearise_print_eigenvalues (const pw_linear *l) {
   static const char *const head[] = { "mode",    "real [1/s]",     "imaginary [1/s]", "frequency [Hz]",
-                                      "damping", "doubles in [s]", "halves in [s]" };
+                                      "damping", "doubles in [s]", "halves in [s]",   NULL };
   puts ("\nEigenvalues, rightmost first");
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
-    for (int k = 0; k < 7; k++) pw_cell (&t, k ? 12 : 4, head[k]);
-    pw_row_end (&t);
+    pw_head (&t, 4, 12, head);
     for (int i = 0; i < l->unknowns; i++) {
       const double im = l->im[i], value[] = { l->re[i],
                                               im != 0 ? im : NAN,
@@ -92,9 +91,8 @@ static void linearise_print_mode (const pw_linearise_command *cmd, int mode) {
   char name[300];
   printf ("\nMode %d\n", mode + 1);
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
-    static const char *const head[] = { "", "x [m]", "y [m]", "phi [rad]" };
-    for (int k = 0; k < 4; k++) pw_cell (&t, k ? 12 : -12, head[k]);
-    pw_row_end (&t);
+    static const char *const head[] = { "", "x [m]", "y [m]", "phi [rad]", NULL };
+    pw_head (&t, -12, 12, head);
     for (int b = 0; b < bodies && b < LINEARISE_ROWS; b++) {
       pw_cell (&t, -12, pw_system_body_name (s, b));
       for (int k = 0; k < 3; k++) linearise_print_component (&t, &cmd->linear, mode, 3 * b + k);

@@ -196,8 +196,6 @@ const pw_command pw_cli_periodic = {
   .help = "Find a motion that repeats after one period but for a displacement in the plane, such as a gait, with the "
           "displacement per period and Floquet multipliers, which say how perturbations change in one period; with "
           "--vary, follow it over a parameter.",
-  .min_arguments = 1,
-  .max_arguments = 1,
   .options_size = sizeof (pw_periodic_command),
   .function = periodic_command,
   .options = periodic_options_table,

@@ -89,8 +89,8 @@ static void periodic_print_motion (const pw_periodic_command *cmd, const pw_peri
 
 /* Prints a row for each event and about PERIODIC_SHOWN other points. */
 static void periodic_print_branch (const pw_periodic_command *cmd) {
-  static const char *const head[] = { "period [s]", "displacement [m]", "rotation [rad]", "growing",
-                                      "largest multiplier" };
+  static const char *const head[] = { "period [s]", "displacement [m]",   "rotation [rad]",
+                                      "growing",    "largest multiplier", NULL };
   char text[40];
   printf ("%s: a branch of periodic motions%s, %s from %.9g to %.9g, %d points\n\n", pw_file_name (cmd->m.file),
           pw_states_symmetries (pw_periodic_symmetries (cmd->search), text), cmd->vary.name, cmd->settings.first,
@@ -98,8 +98,7 @@ static void periodic_print_branch (const pw_periodic_command *cmd) {
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     pw_cell (&t, -15, "event");
     pw_cell_unit (&t, 12, cmd->vary.name, cmd->vary.unit);
-    for (int k = 0; k < 5; k++) pw_cell (&t, 12, head[k]);
-    pw_row_end (&t);
+    pw_head (&t, 12, 12, head);
     for (int i = 0; i < cmd->points; i++) {
       const pw_periodic_orbit *o = &cmd->point[i].orbit;
       int stride = cmd->points / PERIODIC_SHOWN + 1;

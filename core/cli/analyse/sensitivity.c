@@ -317,7 +317,7 @@ static int sensitivity_loosen (pw_sensitivity *sens, pw_progress *progress, pw_e
   other.row_interval = 0;
   other.unknowns.settings.rtol = fmin (0.1, SENSITIVITY_LOOSE * sens->unknowns.settings.rtol); /* must be below 1 */
   other.unknowns.settings.atol *= SENSITIVITY_LOOSE;
-  sens->loose = malloc ((size_t)(outputs * unknowns) * sizeof *sens->loose);
+  sens->loose = pw_arena_alloc (&sens->arena, (size_t)(outputs * unknowns) * sizeof *sens->loose);
   if (sens->loose == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   int status = pw_sensitivity_compute (&other, NULL, progress, error);
   if (status == PW_OK && other.stopped) status = pw_limit_status (&other.limit, pw_run_time (other.base.run), error);
@@ -413,8 +413,6 @@ const pw_command pw_cli_sensitivity = {
   .help = "Differentiate outputs of a run with respect to parameters and initial values, at the end and along the run, "
           "by the variational equations: exact in the states, by differences of compiled models in the parameters, "
           "with the error of these and, if the method controls its error, of the run.",
-  .min_arguments = 1,
-  .max_arguments = 1,
   .options_size = sizeof (sensitivity),
   .function = sensitivity_command,
   .options = sensitivity_options,

@@ -6,6 +6,7 @@
 #include "outcome.h"
 #include "progress.h"
 #include "unknowns.h"
+#include "util.h"
 
 typedef struct {
   const char **of; /* the texts of the outputs, ended by NULL */
@@ -29,12 +30,14 @@ typedef struct {
   double *unknown_value;      /* P: the given values */
   pw_unknown_run *neighbours; /* 4 P: those of each direction */
   pw_variation *variation;
-  pw_run *sampled;        /* the run of which samples are taken; NULL: base.run */
-  double last_breakpoint; /* that has been reached [s] */
-  double *before;         /* F + F P: values and derivatives before a jump */
-  double *q;              /* coordinates: scratch */
-  char *memory;           /* of value, slope, run_slope, their errors, before and q */
-  size_t room;            /* rows allocated */
+  pw_run *sampled;                    /* the run of which samples are taken; NULL: base.run */
+  double last_breakpoint;             /* that has been reached [s] */
+  double *before;                     /* F + F P: values and derivatives before a jump */
+  double *q;                          /* coordinates: scratch */
+  struct pw_sensitivity_point *point; /* F + PW_GAUSS_NODES: the times of the current interval */
+  char *memory;                       /* of value, slope, run_slope, their errors, before and q */
+  pw_arena arena;                     /* of loose, direction, unknown_value, neighbours and point */
+  size_t room;                        /* rows allocated */
 } pw_sensitivity;
 
 /* Begins the run with its derivatives at these values of the unknowns; NULL: their own.  Set the members up to

@@ -168,7 +168,7 @@ static int sensitivity_add_row (pw_sensitivity *sens, double t, pw_error *error)
 
 /* ---- Along the run ---- */
 
-typedef struct {
+typedef struct pw_sensitivity_point {
   double t;      /* [s] */
   double weight; /* of a node [s] */
   int extremum;  /* the functional whose extremum is at t; -1: t is a node of the integrals */
@@ -180,7 +180,8 @@ static int sensitivity_compare_times (const void *a, const void *b) {
 }
 
 /* Lists the times of nodes and extrema in (t0, t1] in order; returns their number. */
-static int sensitivity_points (const pw_sensitivity *sens, double t0, double t1, sensitivity_point *list) {
+static int sensitivity_points (pw_sensitivity *sens, double t0, double t1) {
+  sensitivity_point *list = sens->point;
   int count = 0, integrals = 0;
   for (int i = 0; i < sens->outcomes.functionals; i++) {
     const pw_functional *f = &sens->outcomes.functional[i];
@@ -194,8 +195,9 @@ static int sensitivity_points (const pw_sensitivity *sens, double t0, double t1,
 }
 
 /* Advances from t0, where the columns have been evaluated, to t1. */
-static int sensitivity_interval (pw_sensitivity *sens, double t0, double t1, sensitivity_point *list, pw_error *error) {
-  int count = sensitivity_points (sens, t0, t1, list), status = PW_OK;
+static int sensitivity_interval (pw_sensitivity *sens, double t0, double t1, pw_error *error) {
+  const sensitivity_point *list = sens->point;
+  int count = sensitivity_points (sens, t0, t1), status = PW_OK;
   for (int i = 0; i < count && status == PW_OK; i++) {
     status = pw_sensitivity_at (sens, list[i].t, error);
     if (status == PW_OK && list[i].extremum < 0) sensitivity_add_node (sens, list[i].weight);
@@ -246,8 +248,7 @@ static double sensitivity_next (pw_sensitivity *sens, double t, double to, sensi
 }
 
 /* Advances from t to `to`: in intervals without jumps, and across jumps from just before to just after them. */
-static int sensitivity_advance (pw_sensitivity *sens, double t, double to, sensitivity_point *list,
-                                pw_progress *progress, pw_error *error) {
+static int sensitivity_advance (pw_sensitivity *sens, double t, double to, pw_progress *progress, pw_error *error) {
   /* time before and after a jump at which the columns are evaluated [s] */
   const double aside = 1e-9 * fmin (sens->row_interval, sens->unknowns.t_end / SENSITIVITY_PARTS);
   sensitivity_jump_type jump;
@@ -256,7 +257,7 @@ static int sensitivity_advance (pw_sensitivity *sens, double t, double to, sensi
     double next = sensitivity_next (sens, t, to, &jump, error);
     if (isnan (next)) return error->status;
     double end = jump ? next - fmin (aside, next - t) : next;
-    status = sensitivity_interval (sens, t, end, list, error);
+    status = sensitivity_interval (sens, t, end, error);
     if (jump == JUMP_AT_BREAKPOINT) sens->last_breakpoint = next, next = fmin (next + aside, sens->unknowns.t_end);
     if (status == PW_OK && jump) status = sensitivity_jump (sens, end, next, jump == JUMP_AT_STATE, error);
     pw_progress_at (progress, t = next);
@@ -265,8 +266,7 @@ static int sensitivity_advance (pw_sensitivity *sens, double t, double to, sensi
 }
 
 /* Advances to the end, with a row of the table at the beginning and after every row_interval. */
-static int sensitivity_advance_to_end (pw_sensitivity *sens, sensitivity_point *list, pw_progress *progress,
-                                       pw_error *error) {
+static int sensitivity_advance_to_end (pw_sensitivity *sens, pw_progress *progress, pw_error *error) {
   const double t_end = sens->unknowns.t_end;
   double t = 0, to;
   sens->last_breakpoint = -INFINITY;
@@ -278,7 +278,7 @@ static int sensitivity_advance_to_end (pw_sensitivity *sens, sensitivity_point *
   for (long k = 1; t < t_end && status == PW_OK; k++, t = to) {
     to = (double)k * sens->row_interval;
     if (to >= t_end * (1 - 1e-12)) to = t_end; /* no row beside the last one due to round-off */
-    status = sensitivity_advance (sens, t, to, list, progress, error);
+    status = sensitivity_advance (sens, t, to, progress, error);
     if (status == PW_OK) status = sensitivity_add_row (sens, to, error);
   }
   for (int i = 0; i < sens->outcomes.functionals; i++)
@@ -295,9 +295,9 @@ static int sensitivity_prepare (pw_sensitivity *sens, const double *values, pw_e
   sens->limit.seconds = sens->unknowns.limit;
   sens->unknowns.settings.stop = pw_limit_over;
   sens->unknowns.settings.stop_context = &sens->limit;
-  sens->unknown_value = malloc (P * sizeof *sens->unknown_value);
-  sens->neighbours = calloc (4 * P, sizeof *sens->neighbours);
-  sens->direction = calloc (P, sizeof *sens->direction);
+  sens->unknown_value = pw_arena_alloc (&sens->arena, P * sizeof *sens->unknown_value);
+  sens->neighbours = pw_arena_alloc (&sens->arena, 4 * P * sizeof *sens->neighbours);
+  sens->direction = pw_arena_alloc (&sens->arena, P * sizeof *sens->direction);
   if (sens->unknown_value == NULL || sens->neighbours == NULL || sens->direction == NULL)
     return pw_fail (error, PW_RESOURCE, "out of memory");
   for (size_t p = 0; p < P; p++) sens->unknown_value[p] = values ? values[p] : sens->unknowns.list[p].value;
@@ -317,7 +317,8 @@ static int sensitivity_arrays (pw_sensitivity *sens, pw_error *error) {
   for (int o = 0; o < sens->outcomes.outcomes; o++)
     if (pw_sensitivity_in_table (sens, o)) sens->columns += 1 + sens->unknowns.count;
   sens->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
-  return sens->memory ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+  sens->point = pw_arena_alloc (&sens->arena, (F + PW_GAUSS_NODES) * sizeof *sens->point);
+  return sens->memory && sens->point ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
 }
 
 /* Refuses initial values that the constraints determine: then making the state of a neighbour consistent changes them
@@ -378,10 +379,7 @@ int pw_sensitivity_compute (pw_sensitivity *sens, const double *values, pw_progr
     status =
         pw_outcomes_run (&sens->outcomes, sens->unknowns.method, &sens->unknowns.settings, sens->unknowns.t_end, error);
   if (status != PW_OK) return status;
-  sensitivity_point *list = malloc (((size_t)sens->outcomes.functionals + PW_GAUSS_NODES) * sizeof *list);
-  if (list == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  status = sensitivity_advance_to_end (sens, list, progress, error);
-  free (list);
+  status = sensitivity_advance_to_end (sens, progress, error);
   sens->stopped = status == PW_STOPPED;
   return sens->stopped ? PW_OK : status;
 }
@@ -392,10 +390,7 @@ void pw_sensitivity_close (pw_sensitivity *sens) {
   pw_outcomes_close (&sens->outcomes);
   for (int i = 0; sens->neighbours && i < 4 * sens->unknowns.count; i++) pw_unknown_run_close (&sens->neighbours[i]);
   pw_unknown_run_close (&sens->base);
-  free (sens->neighbours);
-  free (sens->direction);
-  free (sens->unknown_value);
+  pw_arena_free (&sens->arena);
   free (sens->memory);
-  free (sens->loose);
   free (sens->row);
 }

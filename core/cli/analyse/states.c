@@ -29,11 +29,12 @@ int pw_hold_read (const pw_system *s, const char **texts, pw_initial_value *hold
 }
 
 void pw_states_print (const pw_system *s, const double *q, const double *v, int digits, double smallest) {
-  static const char *const head[] = { "", "x [m]", "y [m]", "phi [rad]", "vx [m/s]", "vy [m/s]", "omega [rad/s]" };
+  static const char *const head[] = {
+    "", "x [m]", "y [m]", "phi [rad]", "vx [m/s]", "vy [m/s]", "omega [rad/s]", NULL
+  };
   int bodies = pw_system_bodies (s);
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
-    for (int k = 0; k < 7; k++) pw_cell (&t, k ? 12 : -12, head[k]);
-    pw_row_end (&t);
+    pw_head (&t, -12, 12, head);
     for (int b = 0; b < bodies && b < STATES_BODIES; b++) {
       pw_cell (&t, -12, pw_system_body_name (s, b));
       for (int k = 0; k < 6; k++)

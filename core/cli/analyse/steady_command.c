@@ -7,8 +7,7 @@
 #include "report.h"
 #include "util.h"
 
-enum { STEADY_STARTS = 30 };               /* default of --starts */
-static const double STEADY_WITHIN = 0.382; /* a fraction of the range at which no parameter is likely to vanish */
+enum { STEADY_STARTS = 30 }; /* default of --starts */
 
 /* Directions of pw_steady_follow: towards the first or the last value of the range. */
 enum { TO_FIRST = -1, TO_LAST = 1 };
@@ -243,7 +242,7 @@ static double steady_model_value (const pw_steady_command *cmd) {
  * the model where the range begins; at a value within the range if the family is smaller there. */
 static int steady_nearest_motion (pw_steady_command *cmd, pw_steady_motion *m, pw_error *error) {
   const double first = cmd->settings.first, held = cmd->settings.vary < 0 ? NAN : steady_model_value (cmd),
-               begin = isfinite (held) ? held : first, within = first + STEADY_WITHIN * (cmd->settings.last - first);
+               begin = isfinite (held) ? held : first, within = pw_value_within (first, cmd->settings.last);
   pw_error none = { 0 };
   int status = pw_steady_solve (cmd->search, 0, begin, m, error), family = m->family;
   if (status != PW_OK || family == 0) return status;
@@ -277,7 +276,7 @@ static int steady_branches (pw_steady_command *cmd, pw_error *error) {
   const double first = cmd->settings.first, last = cmd->settings.last;
   int status = steady_hold_more (cmd, error);
   double own = steady_model_value (cmd), fraction = (own - first) / (last - first);
-  if (!(fraction > 0 && fraction < 1)) own = first + STEADY_WITHIN * (last - first);
+  if (!(fraction > 0 && fraction < 1)) own = pw_value_within (first, last);
   if (status == PW_OK) status = steady_branches_from (cmd, first, TO_LAST, error);
   if (status == PW_OK && !cmd->stopped) status = steady_branches_from (cmd, last, TO_FIRST, error);
   if (status == PW_OK && !cmd->stopped && cmd->points == 0) status = steady_branches_from (cmd, own, TO_LAST, error);
@@ -340,8 +339,6 @@ const pw_command pw_cli_steady = {
       "Find steady motions, in which every body moves with one frame at constant speed and angular velocity, and "
       "equilibria; with --vary, follow them over a parameter, through folds, with eigenvalues and the values at which "
       "stability changes.",
-  .min_arguments = 1,
-  .max_arguments = 1,
   .options_size = sizeof (pw_steady_command),
   .function = steady_command,
   .options = steady_options_table,

@@ -46,9 +46,7 @@ static void steady_print_motions (const pw_steady_command *cmd) {
     pw_cell (&t, 6, "motion");
     for (int k = 0; k < 2; k++)
       pw_cell_unit (&t, 12, pw_system_held_name (s, held[k], name, sizeof name), pw_system_held_unit (s, held[k]));
-    for (int k = 0; k < 5; k++)
-      pw_cell (&t, 7, (const char *[]){ "family", "growing", "rightmost [1/s]", "frequency [Hz]", "residual" }[k]);
-    pw_row_end (&t);
+    pw_head (&t, 7, 7, (const char *[]){ "family", "growing", "rightmost [1/s]", "frequency [Hz]", "residual", NULL });
     for (int i = 0; i < cmd->points && i < STEADY_SHOWN; i++) {
       const pw_steady_point *p = cmd->point + i;
       pw_cell_number (&t, 6, i + 1, 6);
@@ -71,8 +69,7 @@ static void steady_print_branches (const pw_steady_command *cmd) {
     pw_cell (&t, 6, "branch");
     pw_cell (&t, -15, "event");
     pw_cell_unit (&t, 12, cmd->vary.name, cmd->vary.unit);
-    for (int k = 0; k < 3; k++) pw_cell (&t, 7, (const char *[]){ "growing", "rightmost [1/s]", "frequency [Hz]" }[k]);
-    pw_row_end (&t);
+    pw_head (&t, 7, 7, (const char *[]){ "growing", "rightmost [1/s]", "frequency [Hz]", NULL });
     for (const pw_steady_point *p = cmd->point; p < cmd->point + cmd->points; p++) {
       int first = p == cmd->point || p[-1].branch != p->branch,
           last = p == cmd->point + cmd->points - 1 || p[1].branch != p->branch;

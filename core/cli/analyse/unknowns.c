@@ -38,7 +38,7 @@ int pw_unknowns_open (pw_unknowns *u, const pw_cli_line *line, const pw_cli_mode
   if (status == PW_OK) status = pw_cli_specialise (line->specialise, &u->when, error);
   if (status != PW_OK) return status;
   u->settings.stop = NULL;
-  if (u->settings.rtol == 0) u->settings.rtol = 1e-6; /* the default, from which errors are estimated */
+  if (u->settings.rtol == 0) u->settings.rtol = PW_RTOL; /* from which errors are estimated */
   u->limit = limit.seconds;
   pw_cli_report_unused (u->method, line);
   return PW_OK;
@@ -242,11 +242,11 @@ double *pw_unknowns_starts (const pw_unknowns *u, int count, double seed) {
   return NULL;
 }
 
-int pw_unknowns_options (const pw_unknowns *u, const double *x, char *text, size_t size) {
-  size_t used = 0;
+const char *pw_unknowns_options (const pw_unknowns *u, const double *x, char text[PW_UNKNOWNS_OPTIONS]) {
+  size_t used = 0, size = PW_UNKNOWNS_OPTIONS;
   *text = 0;
   for (int i = 0; i < u->count && used < size; i++)
     used += (size_t)snprintf (text + used, size - used, "%s--%s %s=%.12g", i ? " " : "",
                               u->list[i].parameter ? "set" : "start", u->list[i].name, x[i]);
-  return used < size;
+  return used < size ? text : NULL;
 }

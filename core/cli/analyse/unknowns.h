@@ -83,7 +83,9 @@ double *pw_unknowns_starts (const pw_unknowns *u, int count, double seed);
  * satisfy the constraints. */
 void pw_unknowns_report (const pw_unknowns *u, const double *x);
 
-/* Writes the options that set the values, "--set a=1 --start frame.vx=2", to a text.  1, or 0 if they do not fit. */
-int pw_unknowns_options (const pw_unknowns *u, const double *x, char *text, size_t size);
+/* Writes the options that set the values, "--set a=1 --start frame.vx=2", to a text and returns it; NULL if they do not
+ * fit. */
+enum { PW_UNKNOWNS_OPTIONS = 4000 };
+const char *pw_unknowns_options (const pw_unknowns *u, const double *x, char text[PW_UNKNOWNS_OPTIONS]);
 
 #endif

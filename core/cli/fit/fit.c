@@ -19,11 +19,11 @@ typedef struct {
 static int data_read_columns (pw_fit *fit, pw_error *error) {
   size_t count = 2; /* one name more than commas, and NULL at the end */
   for (const char *text = fit->columns_text; *text; text++) count += *text == ',';
-  fit->columns_copy = strdup (fit->columns_text);
-  fit->column_name = calloc (2 * count, sizeof *fit->column_name);
-  if (fit->columns_copy == NULL || fit->column_name == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  char *name = pw_arena_copy (&fit->arena, fit->columns_text);
+  fit->column_name = pw_arena_alloc (&fit->arena, 2 * count * sizeof *fit->column_name);
+  if (name == NULL || fit->column_name == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   fit->column_unit = fit->column_name + count;
-  for (char *name = fit->columns_copy; name;) {
+  while (name) {
     char *comma = strchr (name, ',');
     pw_column column;
     if (comma) *comma = 0;
@@ -71,7 +71,7 @@ static int data_check_sigma (pw_fit *fit, const fit_sigma *sigma, pw_error *erro
 /* Reads times, data, and columns of standard deviations. */
 static int data_read_table (pw_fit *fit, const fit_sigma *sigma, pw_error *error) {
   const size_t most = 1 + 2 * (size_t)fit->columns;
-  const char **column = calloc (2 * most, sizeof *column), **unit = column + most;
+  const char **column = pw_arena_alloc (&fit->arena, 2 * most * sizeof *column), **unit = column + most;
   int count = 1;
   if (column == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   column[0] = "t", unit[0] = "s";
@@ -79,7 +79,6 @@ static int data_read_table (pw_fit *fit, const fit_sigma *sigma, pw_error *error
   for (int i = 0; i < fit->columns; i++)
     if (isnan (sigma[i].number)) column[count] = sigma[i].text, unit[count++] = fit->column_unit[i];
   fit->table = pw_read_columns (fit->data_path, column, unit, count, &fit->rows, error);
-  free (column);
   return fit->table ? PW_OK : error->status;
 }
 
@@ -88,7 +87,7 @@ static int data_read (pw_fit *fit, const fit_sigma *sigma, pw_error *error) {
   if (data_read_table (fit, sigma, error) != PW_OK) return error->status;
   size_t rows = (size_t)fit->rows, cells = (size_t)fit->columns * rows;
   fit->t = fit->table, fit->data = fit->table + rows;
-  fit->sigma = malloc ((cells + 1) * sizeof *fit->sigma);
+  fit->sigma = pw_arena_alloc (&fit->arena, (cells + 1) * sizeof *fit->sigma);
   if (fit->sigma == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   const double *next = fit->data + cells;
   for (int i = 0; i < fit->columns; i++) {
@@ -117,15 +116,13 @@ static int data_check (pw_fit *fit, pw_error *error) {
 
 static int fit_read_data (pw_fit *fit, pw_error *error) {
   if (data_read_columns (fit, error) != PW_OK) return error->status;
-  fit_sigma *sigma = calloc ((size_t)fit->columns, sizeof *sigma);
+  fit_sigma *sigma = pw_arena_alloc (&fit->arena, (size_t)fit->columns * sizeof *sigma);
   int status = sigma ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
   for (const char **text = fit->sigma_texts; status == PW_OK && text && *text; text++)
     status = data_read_sigma (fit, *text, sigma, error);
   if (status == PW_OK) status = data_check_sigma (fit, sigma, error);
   if (status == PW_OK) status = data_read (fit, sigma, error);
-  if (status == PW_OK) status = data_check (fit, error);
-  free (sigma);
-  return status;
+  return status == PW_OK ? data_check (fit, error) : status;
 }
 
 /* ---- The command ---- */
@@ -210,12 +207,15 @@ static int fit_search (pw_fit *fit, pw_error *error) {
 
 static int fit_finish (pw_fit *fit, pw_error *error) {
   FILE *table = pw_files_stream (&fit->files, FIT_TABLE), *summary = pw_files_stream (&fit->files, FIT_SUMMARY);
+  pw_error drawing = { 0 };
   pw_fit_print (fit);
   pw_unknowns_report (&fit->unknowns, fit->estimate);
+  if (fit->plots_path) pw_fit_draw (fit, &drawing);
+  const char *word = drawing.status ? pw_cli_status_word (drawing.status) : fit->converged ? "ok" : "method";
   int status = table ? pw_fit_table (fit, table, error) : PW_OK;
-  if (summary) pw_fit_json (fit, fit->interrupted ? "interrupted" : fit->converged ? "ok" : "method", summary);
+  if (summary) pw_fit_json (fit, fit->interrupted ? "interrupted" : word, summary);
   if (status == PW_OK) status = pw_files_finish (&fit->files, error);
-  if (status == PW_OK && fit->plots_path) status = pw_fit_draw (fit, error);
+  if (status == PW_OK && drawing.status) status = pw_fail (error, drawing.status, "%s", drawing.text);
   if (fit->interrupted) pw_cli_say ("pinwheel: interrupted; these are the values so far, without their errors\n");
   if (status == PW_OK && fit->interrupted) return PW_INTERRUPTED;
   if (status == PW_OK && !fit->converged)
@@ -231,12 +231,8 @@ static int fit_command (void *options, pw_error *error) {
   if (status == PW_OK) status = fit_search (fit, error);
   if (status == PW_OK) status = fit_finish (fit, error);
   pw_files_close (&fit->files);
-  free (fit->columns_copy);
-  free (fit->column_name);
+  pw_arena_free (&fit->arena);
   free (fit->table);
-  free (fit->sigma);
-  free (fit->estimate);
-  free (fit->minima);
   pw_unknowns_close (&fit->unknowns);
   pw_cli_close_model (&fit->model);
   return status;
@@ -278,8 +274,6 @@ const pw_command pw_cli_fit = {
   .help = "Determine parameters and initial values of a model by least squares, so that it agrees with measured data. "
           "Prints estimates with standard errors, confidence intervals and correlations, and unknowns that the data do "
           "not determine.",
-  .min_arguments = 1,
-  .max_arguments = 1,
   .options_size = sizeof (pw_fit),
   .function = fit_command,
   .options = fit_options_table,

@@ -4,6 +4,7 @@
 #define PW_FIT_H
 
 #include "sensitivity.h"
+#include "util.h"
 
 typedef struct {
   pw_cli_line line;
@@ -16,7 +17,7 @@ typedef struct {
   double confidence; /* probability of confidence intervals */
   int jobs, starts;
   /* data */
-  char *columns_copy;                      /* copy of columns_text, split into names */
+  pw_arena arena;                          /* of all arrays but the table */
   const char **column_name, **column_unit; /* columns, ended by NULL */
   double *table;                           /* as read: times, data, columns of standard deviations */
   int columns, rows;                       /* of the data */
@@ -61,8 +62,7 @@ int pw_fit_jacobian (pw_fit *fit, const double *unknowns, const double *values, 
 /* Relative error of these derivatives. */
 double pw_fit_derivative_error (const pw_fit *fit);
 
-/* Minimises the sum of squares from all starts and sets the results.  Free fit->minima and fit->estimate, whose memory
- * the arrays after it share, in every case.  A status; PW_RETRY after Ctrl-C. */
+/* Minimises the sum of squares from all starts and sets the results.  A status; PW_RETRY after Ctrl-C. */
 int pw_fit_solve (pw_fit *fit, pw_error *error);
 
 static inline int pw_fit_degrees_of_freedom (const pw_fit *fit) {

@@ -10,8 +10,7 @@
 enum {
   REPORT_DIGITS = 7,
   REPORT_CORRELATIONS = 9, /* unknowns whose correlations fit in a line, at most */
-  REPORT_PANELS = 4,       /* of a figure, at most: one for each column */
-  REPORT_OPTIONS = 4000    /* bytes of the options that set the unknowns */
+  REPORT_PANELS = 4        /* of a figure, at most: one for each column */
 };
 
 static double report_covariance (const pw_fit *fit, int i, int j) {
@@ -60,11 +59,10 @@ static double report_rms (const pw_fit *fit, int column, int *count) {
 
 static void report_unknowns (const pw_fit *fit) {
   char from[80];
-  const char *const head[] = { "free", "initially", "estimate", "standard error", from, "to" };
+  const char *const head[] = { "free", "initially", "estimate", "standard error", from, "to", NULL };
   snprintf (from, sizeof from, "%g %% confidence:  from", 100 * fit->confidence);
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
-    for (int k = 0; k < 6; k++) pw_cell (&t, k ? 12 : -12, head[k]);
-    pw_row_end (&t);
+    pw_head (&t, -12, 12, head);
     for (int i = 0; i < fit->unknowns.count; i++) {
       pw_cell_unit (&t, -12, fit->unknowns.list[i].name, fit->unknowns.list[i].unit);
       pw_cell_number (&t, 12, fit->unknowns.list[i].value, REPORT_DIGITS);
@@ -152,7 +150,7 @@ static int report_is_best (const pw_fit *fit, const double *minimum) {
 
 /* Prints how many searches ended at the best minimum, and the next best one. */
 static void report_minima (const pw_fit *fit) {
-  char options[REPORT_OPTIONS];
+  char options[PW_UNKNOWNS_OPTIONS];
   const double *next = NULL;
   int equal = 0;
   for (int i = 0; i < fit->starts; i++) {
@@ -161,13 +159,13 @@ static void report_minima (const pw_fit *fit) {
     if (!report_is_best (fit, minimum) && isfinite (*minimum) && (next == NULL || *minimum < *next)) next = minimum;
   }
   if (fit->starts > 1) printf ("%d of %d searches end at this minimum", equal, fit->starts);
-  if (next && pw_unknowns_options (&fit->unknowns, next + 1, options, sizeof options))
+  if (next && pw_unknowns_options (&fit->unknowns, next + 1, options))
     printf ("; the next one is %.6g at %s", *next, options);
   if (fit->starts > 1) putchar ('\n');
 }
 
 void pw_fit_print (const pw_fit *fit) {
-  char options[REPORT_OPTIONS];
+  char options[PW_UNKNOWNS_OPTIONS];
   int freedom = pw_fit_degrees_of_freedom (fit);
   report_unknowns (fit);
   report_columns (fit);
@@ -182,7 +180,7 @@ void pw_fit_print (const pw_fit *fit) {
   printf ("\n%ld runs, %d iterations, derivatives by %s\n", fit->runs, fit->iterations,
           fit->by_differences ? "differences of runs" : "the variational equations");
   report_minima (fit);
-  if (pw_unknowns_options (&fit->unknowns, fit->estimate, options, sizeof options)) printf ("\n%s\n", options);
+  if (pw_unknowns_options (&fit->unknowns, fit->estimate, options)) printf ("\n%s\n", options);
 }
 
 /* ---- Files ---- */
@@ -253,14 +251,13 @@ static void report_json_minima (const pw_fit *fit, pw_json *j) {
 
 void pw_fit_json (const pw_fit *fit, const char *status, FILE *f) {
   pw_json json = { .f = f, .lines = 2 }, *j = &json;
-  char options[REPORT_OPTIONS];
+  char options[PW_UNKNOWNS_OPTIONS];
   pw_json_open (j, NULL, '{');
   pw_json_number (j, "schema", 1);
   pw_json_text (j, "model", pw_file_name (fit->model.file));
   pw_json_text (j, "status", status);
   pw_json_text (j, "data", fit->data_path);
-  pw_json_text (j, "options",
-                pw_unknowns_options (&fit->unknowns, fit->estimate, options, sizeof options) ? options : NULL);
+  pw_json_text (j, "options", pw_unknowns_options (&fit->unknowns, fit->estimate, options));
   pw_json_text (j, "method", fit->unknowns.method);
   pw_json_number (j, "residuals", fit->residuals);
   pw_json_number (j, "freedom", pw_fit_degrees_of_freedom (fit));

@@ -75,16 +75,16 @@ static int jacobian_side (void *context, int task, pw_error *error) {
   return PW_OK; /* see jacobian_column */
 }
 
-/* Derivatives with respect to unknown j by central differences; by one-sided ones if the run on one side failed.
- * middle: the values of the model between both sides. */
+/* Derivatives with respect to unknown j by central differences; by one-sided ones if the run on one side failed and no
+ * bound leaves less than a tenth of the step on the other side.  middle: the values of the model between both sides. */
 static int jacobian_column (const jacobian_differences *d, int j, const double *middle, double *out, pw_error *error) {
   size_t cells = (size_t)d->fit->columns * (size_t)d->fit->rows;
   const double *side[2];
   double step[2];
   for (int k = 0; k < 2; k++) {
     const pw_error *own = d->error + 2 * j + k, *other = d->error + 2 * j + !k;
-    int failed = own->status != PW_OK;
-    if (failed && (own->status == PW_RETRY || own->status == PW_RESOURCE || other->status != PW_OK))
+    int failed = own->status != PW_OK, pinched = fabs (d->step[2 * j + !k]) < fabs (d->step[2 * j + k]) / 10;
+    if (failed && (own->status == PW_RETRY || own->status == PW_RESOURCE || other->status != PW_OK || pinched))
       return *error = *own, error->status;
     side[k] = failed ? middle : d->values + (size_t)(2 * j + k) * cells;
     step[k] = failed ? 0 : d->step[2 * j + k];

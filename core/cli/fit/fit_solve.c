@@ -207,7 +207,7 @@ static void solve_minima (fit_solver *solver) {
   gsl_multifit_nlinear_workspace *w =
       gsl_multifit_nlinear_alloc (gsl_multifit_nlinear_trust, &parameters, (size_t)fit->residuals, n);
   double *start = pw_unknowns_starts (&fit->unknowns, fit->starts, 1);
-  fit->minima = malloc (starts * (1 + n) * sizeof *fit->minima);
+  fit->minima = pw_arena_alloc (&fit->arena, starts * (1 + n) * sizeof *fit->minima);
   if (w == NULL || start == NULL || fit->minima == NULL)
     solver->status = pw_fail (solver->error, PW_RESOURCE, "out of memory");
   solver->least = INFINITY;
@@ -305,8 +305,8 @@ static void solve_errors (fit_solver *solver) {
 static int solve_open (fit_solver *solver) {
   pw_fit *fit = solver->fit;
   size_t n = (size_t)fit->unknowns.count, cells = (size_t)fit->columns * (size_t)fit->rows;
-  solver->unknowns = calloc (2 * n + (1 + n) * cells, sizeof *solver->unknowns);
-  fit->estimate = calloc (4 * n + 2 * n * n + cells, sizeof *fit->estimate);
+  solver->unknowns = pw_arena_alloc (&fit->arena, (2 * n + (1 + n) * cells) * sizeof *solver->unknowns);
+  fit->estimate = pw_arena_alloc (&fit->arena, (4 * n + 2 * n * n + cells) * sizeof *fit->estimate);
   if (solver->unknowns == NULL || fit->estimate == NULL) return pw_fail (solver->error, PW_RESOURCE, "out of memory");
   solver->u = solver->unknowns + n, solver->values = solver->u + n, solver->jacobian = solver->values + cells;
   fit->standard_error = fit->estimate + n, fit->singular_value = fit->standard_error + n,
@@ -320,6 +320,5 @@ int pw_fit_solve (pw_fit *fit, pw_error *error) {
   solver.status = solve_open (&solver);
   if (solver.status == PW_OK) solve_minima (&solver);
   if (solver.status == PW_OK) solve_errors (&solver);
-  free (solver.unknowns);
   return solver.status;
 }

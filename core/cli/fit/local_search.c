@@ -31,6 +31,7 @@ typedef struct {
   int failed;         /* 1: the last run failed */
   int slopes_failed;  /* 1: derivatives could not be computed, though the run succeeded */
   double least, most; /* extrema of sign x objective in the runs that succeeded */
+  pw_error fatal;     /* of a run that ended all searches, out of memory */
 } local_search;
 
 /* The value of an unknown.  If the user gives bounds, `scaled` runs from 0 to 1 between them; otherwise it is the value
@@ -159,15 +160,6 @@ static int search_try (local_search *local, int slopes, pw_error *error) {
   return status;
 }
 
-/* Ends all searches with an error. */
-static void search_end_all (local_search *local, const pw_error *error) {
-  pthread_mutex_lock (&local->problem->lock);
-  if (local->problem->fatal.status == PW_OK) local->problem->fatal = *error;
-  pthread_mutex_unlock (&local->problem->lock);
-  pw_stop = pw_stop ? pw_stop : 1;
-  nlopt_force_stop (local->optimiser);
-}
-
 /* Makes the run with these scaled unknowns the last one unless it already is, with derivatives if `slopes`. */
 static void search_evaluate (local_search *local, const double *scaled, int slopes) {
   const pw_unknowns *unknowns = &local->problem->unknowns;
@@ -187,7 +179,10 @@ static void search_evaluate (local_search *local, const double *scaled, int slop
   if (local->failed && local->search->failed++ == 0) local->search->first_error = error;
   if (search_store (local) != PW_OK) status = pw_fail (&error, PW_RESOURCE, "out of memory");
   if (!local->failed) search_keep (local);
-  if (status == PW_RESOURCE) search_end_all (local, &error);
+  if (status != PW_RESOURCE) return;
+  local->fatal = error;
+  pw_stop = pw_stop ? pw_stop : 1; /* ends the other searches, too */
+  nlopt_force_stop (local->optimiser);
 }
 
 /* Stores the derivatives of factor x output i, 0 if they are unknown, unless `gradient` is NULL. */
@@ -305,7 +300,8 @@ static int search_task (pw_optimise *problem, int i, int slopes, double first, d
   pthread_mutex_lock (&problem->lock);
   pw_progress_at (&problem->progress, ++problem->searches_done);
   pthread_mutex_unlock (&problem->lock);
-  return status == PW_OK ? PW_OK : pw_fail (error, status, "out of memory");
+  if (local.fatal.status != PW_OK) *error = local.fatal;
+  return status == PW_OK ? error->status : pw_fail (error, status, "out of memory");
 }
 
 int pw_search_rough (void *context, int i, pw_error *error) {

@@ -33,14 +33,15 @@ static int optimise_open_searches (pw_optimise *problem, pw_error *error) {
   return status;
 }
 
-/* The search with the best result, the first one of equal ones, among the first `count` searches without those
- * `excluded`, which may be NULL.  NULL: none has a result. */
+/* The search with the best result among the first `count` searches without those `excluded`, which may be NULL; of
+ * equal ones the first that converged, or else the first.  NULL: none has a result. */
 static const pw_search *optimise_best (const pw_optimise *problem, int count, const unsigned char *excluded) {
   const pw_search *best = NULL;
   for (int i = 0; i < count; i++) {
     const pw_search *search = problem->search + i;
     if (!search->feasible || (excluded && excluded[i])) continue;
-    if (best == NULL || problem->sign[0] * search->output[0] < problem->sign[0] * best->output[0]) best = search;
+    double gain = best ? problem->sign[0] * (best->output[0] - search->output[0]) : INFINITY;
+    if (gain > 0 || (gain == 0 && search->converged && !best->converged)) best = search;
   }
   return best;
 }
@@ -77,7 +78,7 @@ static int optimise_search (pw_optimise *problem, pw_error *error) {
     problem->runs += search->runs, problem->failed += search->failed, problem->derivatives += search->derivatives;
     if (problem->first_error == NULL && search->failed) problem->first_error = &search->first_error;
   }
-  return problem->fatal.status != PW_OK ? pw_fail (error, problem->fatal.status, "%s", problem->fatal.text) : status;
+  return status;
 }
 
 /* ---- Before the search ---- */
@@ -226,14 +227,16 @@ static int optimise_finish (pw_optimise *problem, pw_error *error) {
   if (problem->best == NULL && interrupted)
     pw_cli_say ("pinwheel: interrupted before any run satisfied the constraints\n");
   if (problem->best == NULL) return interrupted ? PW_INTERRUPTED : optimise_infeasible (problem, error);
-  pw_error unconverged = { 0 };
+  pw_error unconverged = { 0 }, drawing = { 0 };
   int converged = optimise_converged (problem, &unconverged) == PW_OK;
   pw_optimise_print (problem);
   pw_unknowns_report (&problem->unknowns, problem->best->to);
   if (result) pw_optimise_yaml (problem, result);
-  if (summary) pw_optimise_json (problem, interrupted ? "interrupted" : converged ? "ok" : "method", summary);
+  if (problem->plots_path) pw_optimise_draw (problem, &drawing);
+  const char *word = drawing.status ? pw_cli_status_word (drawing.status) : converged ? "ok" : "method";
+  if (summary) pw_optimise_json (problem, interrupted ? "interrupted" : word, summary);
   int status = pw_files_finish (&problem->files, error);
-  if (status == PW_OK && problem->plots_path) status = pw_optimise_draw (problem, error);
+  if (status == PW_OK && drawing.status) status = pw_fail (error, drawing.status, "%s", drawing.text);
   if (interrupted) pw_cli_say ("pinwheel: interrupted; this is the best result so far\n");
   if (status == PW_OK && interrupted) return PW_INTERRUPTED;
   return status == PW_OK && !converged ? pw_fail (error, unconverged.status, "%s", unconverged.text) : status;
@@ -282,8 +285,6 @@ const pw_command pw_cli_optimise = {
   .summary = "find the parameters for which an output is largest or smallest",
   .help = "Vary parameters and initial values of a model until an output of its runs is largest or smallest, by local "
           "searches from several starts. Runs that fail count as infeasible.",
-  .min_arguments = 1,
-  .max_arguments = 1,
   .options_size = sizeof (pw_optimise),
   .function = optimise_command,
   .options = optimise_options,

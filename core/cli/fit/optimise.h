@@ -43,8 +43,7 @@ typedef struct {
   pthread_mutex_t lock;           /* of the members below */
   pw_progress progress;
   int searches_done;
-  double least;   /* sign x best objective so far */
-  pw_error fatal; /* an error that ends all searches */
+  double least; /* sign x best objective so far */
 } pw_optimise;
 
 /* ---- Searches (local_search.c) ---- */

@@ -12,8 +12,7 @@
 
 enum {
   REPORT_DIGITS = 9,
-  REPORT_PANELS = 6,    /* of a figure, at most: one for each unknown */
-  REPORT_OPTIONS = 4000 /* bytes of the options that set the unknowns */
+  REPORT_PANELS = 6 /* of a figure, at most: one for each unknown */
 };
 
 int pw_optimise_same (const pw_optimise *problem, const pw_search *a, const pw_search *b) {
@@ -68,8 +67,7 @@ static int report_bound (const pw_optimise *problem, int i) {
 static void report_unknowns (const pw_optimise *problem) {
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     static const char *const head[] = { "free", "initially", "best", "from", "to", NULL };
-    for (int i = 0; head[i]; i++) pw_cell (&t, i ? 12 : -12, head[i]);
-    pw_row_end (&t);
+    pw_head (&t, -12, 12, head);
     for (int i = 0; i < problem->unknowns.count; i++) {
       const pw_unknown *u = problem->unknowns.list + i;
       pw_cell_unit (&t, -12, u->name, u->unit);
@@ -108,7 +106,7 @@ static void report_outputs (const pw_optimise *problem) {
 }
 
 void pw_optimise_print (const pw_optimise *problem) {
-  char options[REPORT_OPTIONS];
+  char options[PW_UNKNOWNS_OPTIONS];
   int same = 0;
   for (int i = 0; i < problem->starts; i++) same += pw_optimise_same (problem, problem->search + i, problem->best);
   report_unknowns (problem);
@@ -122,7 +120,7 @@ void pw_optimise_print (const pw_optimise *problem) {
                   problem->first_error->text);
   if (report_is_constant (problem))
     pw_cli_say ("pinwheel: %s is the same in all runs: no free value has an effect on it\n", problem->output[0]);
-  if (pw_unknowns_options (&problem->unknowns, problem->best->to, options, sizeof options)) printf ("\n%s\n", options);
+  if (pw_unknowns_options (&problem->unknowns, problem->best->to, options)) printf ("\n%s\n", options);
 }
 
 /* ---- JSON ---- */
@@ -164,7 +162,7 @@ static void report_json_constraint (const pw_optimise *problem, pw_json *j, int 
 
 void pw_optimise_json (const pw_optimise *problem, const char *status, FILE *f) {
   pw_json json = { .f = f, .lines = 2 }, *j = &json;
-  char options[REPORT_OPTIONS];
+  char options[PW_UNKNOWNS_OPTIONS];
   pw_json_open (j, NULL, '{');
   pw_json_number (j, "schema", 1);
   pw_json_text (j, "model", pw_file_name (problem->model.file));
@@ -172,8 +170,7 @@ void pw_optimise_json (const pw_optimise *problem, const char *status, FILE *f) 
   pw_json_text (j, problem->maximise ? "maximise" : "minimise", problem->output[0]);
   pw_json_number (j, "value", problem->best->output[0]);
   pw_json_number (j, "initial", report_initial (problem));
-  pw_json_text (j, "options",
-                pw_unknowns_options (&problem->unknowns, problem->best->to, options, sizeof options) ? options : NULL);
+  pw_json_text (j, "options", pw_unknowns_options (&problem->unknowns, problem->best->to, options));
   pw_json_text (j, "method", problem->unknowns.method);
   pw_json_number (j, "t_end", problem->unknowns.t_end);
   pw_json_number (j, "seed", problem->seed);
@@ -228,10 +225,9 @@ static void report_yaml_text (FILE *f, const char *key, const char *text) {
 }
 
 void pw_optimise_yaml (const pw_optimise *problem, FILE *f) {
-  char values[REPORT_OPTIONS];
+  char values[PW_UNKNOWNS_OPTIONS];
   const pw_search *best = problem->best;
-  if (pw_unknowns_options (&problem->unknowns, best->to, values, sizeof values) &&
-      strpbrk (problem->line.argument[0], "\r\n") == NULL)
+  if (pw_unknowns_options (&problem->unknowns, best->to, values) && strpbrk (problem->line.argument[0], "\r\n") == NULL)
     report_command (problem, values, f);
   report_yaml_text (f, "model", pw_file_name (problem->model.file));
   report_yaml_text (f, problem->maximise ? "maximise" : "minimise", problem->output[0]);

@@ -230,8 +230,6 @@ const pw_command pw_cli_check = {
       "Check a model before running it: degrees of freedom, redundant constraint equations, massless bodies, "
       "consistency of the initial conditions, derivatives of every element type in use (against differences), and the "
       "eigenvalues of the linearised equations of motion. The exit status is non-zero if there is a problem.",
-  .min_arguments = 1,
-  .max_arguments = 1,
   .options_size = sizeof (pw_check),
   .function = check_command,
   .options = check_options,

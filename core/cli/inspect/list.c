@@ -275,6 +275,7 @@ const pw_command pw_cli_list = {
   .name = "list",
   .synopsis = "[models | methods [NAME...] | kinds [NAME...] | signals]",
   .summary = "list models, integration methods, element types and signals",
+  .any_arguments = 1,
   .help =
       "List the names of models, integration methods, element types (kinds) and forms of signals, or describe "
       "those of one sort. With a NAME or \"all\", describe the options of a method or the fields of an element type.",

@@ -260,8 +260,6 @@ const pw_command pw_cli_show = {
   .summary = "show the bodies, elements and parameters of a model, or its matrices",
   .help = "Show the bodies, elements, parameters and default run settings of a model, or the matrices of its equations "
           "of motion.",
-  .min_arguments = 1,
-  .max_arguments = 1,
   .options_size = sizeof (show_line),
   .function = show_command,
   .options = show_options,

@@ -90,7 +90,7 @@ static void page_data_json (const page *cmd, FILE *f) {
   pw_json_text (&j, "method", cmd->method);
   pw_json_number (&j, "t_end", cmd->t_end);
   pw_json_number (&j, "step", cmd->settings.step);
-  pw_json_number (&j, "rtol", cmd->settings.rtol > 0 ? cmd->settings.rtol : 1e-6); /* the default of pw_settings */
+  pw_json_number (&j, "rtol", cmd->settings.rtol > 0 ? cmd->settings.rtol : PW_RTOL);
   page_methods_json (&j);
   pw_animation_parameters (&j, cmd->compiled.model);
   page_states_json (cmd, &j);
@@ -187,8 +187,6 @@ const pw_command pw_cli_page = {
           "for parameters, initial values, tolerance and final time, the animation, curves, and the error at the "
           "end next to the cost. The options set what the page begins with. A model in C is compiled to WebAssembly by "
           "clang.",
-  .min_arguments = 1,
-  .max_arguments = 1,
   .options_size = sizeof (page),
   .function = page_command,
   .options = page_options,

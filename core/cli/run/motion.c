@@ -6,13 +6,9 @@
 
 int pw_motion_open (pw_motion *motion, const pw_system *system, int samples, double t_end, pw_error *error) {
   int width = 2 * pw_system_coordinates (system) + pw_system_rows (system);
-  *motion = (pw_motion){ .samples = samples, .width = width };
-  motion->t = calloc ((size_t)samples, sizeof *motion->t);
-  motion->value = calloc ((size_t)samples * (size_t)width, sizeof *motion->value);
-  if (motion->t == NULL || motion->value == NULL) {
-    pw_motion_close (motion);
-    return pw_fail (error, PW_RESOURCE, "out of memory");
-  }
+  *motion = (pw_motion){ .t = calloc ((size_t)samples * (size_t)(1 + width), sizeof *motion->t) };
+  if (motion->t == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  motion->samples = samples, motion->width = width, motion->value = motion->t + samples;
   for (int k = 0; k < samples; k++) motion->t[k] = k + 1 < samples ? t_end * (k + 1) / samples : t_end;
   return PW_OK;
 }
@@ -25,7 +21,6 @@ int pw_motion_open_at (pw_motion *motion, const pw_system *system, const pw_moti
 
 void pw_motion_close (pw_motion *motion) {
   free (motion->t);
-  free (motion->value);
   *motion = (pw_motion){ .samples = 0 };
 }
 

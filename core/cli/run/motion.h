@@ -18,7 +18,7 @@ typedef struct {
   int samples;   /* number of times */
   int width;     /* numbers of a sample: coordinates, velocities, multipliers */
   int taken;     /* samples stored so far */
-  double *t;     /* [s], samples */
+  double *t;     /* [s], samples; owns the memory of `value` */
   double *value; /* samples x width; NaN: not known */
 } pw_motion;
 

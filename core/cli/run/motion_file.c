@@ -2,7 +2,6 @@
  * may be missing. */
 #include <errno.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 #include "motion.h"
 #include "util.h"
@@ -25,7 +24,7 @@ typedef struct {
   file_column *column;
   int columns, states; /* columns after the first; those of them that are states of the model */
   pw_names indices;    /* in a sample, of the names of states and reactions */
-  pw_arena names;
+  pw_arena arena;      /* of line, column and names */
 } file_reader;
 
 /* ---- Lines ---- */
@@ -87,7 +86,7 @@ static int file_list_names (file_reader *reader, const pw_system *system) {
       pw_system_state_name (system, i, name, sizeof name);
     else
       pw_system_reaction_name (system, i - states, name, sizeof name);
-    const char *copy = pw_arena_copy (&reader->names, name);
+    const char *copy = pw_arena_copy (&reader->arena, name);
     if (copy == NULL) return PW_RESOURCE;
     pw_names_add (&reader->indices, copy, i);
   }
@@ -120,7 +119,7 @@ static int file_read_columns (file_reader *reader, const pw_system *system, pw_e
   if (status == PW_RETRY) return pw_fail (error, PW_INPUT, "--reference %s: the file is empty", reader->path);
   if (status != PW_OK) return status;
   for (const char *c = reader->line; *c; c++) reader->columns += *c == ',';
-  reader->column = calloc ((size_t)reader->columns + 1, sizeof *reader->column);
+  reader->column = pw_arena_alloc (&reader->arena, ((size_t)reader->columns + 1) * sizeof *reader->column);
   if (reader->column == NULL || file_list_names (reader, system) != PW_OK)
     return pw_fail (error, PW_RESOURCE, "out of memory");
   char *rest = reader->line + (strncmp (reader->line, "\xEF\xBB\xBF", 3) ? 0 : 3); /* without a byte order mark */
@@ -234,8 +233,9 @@ int pw_motion_open_reference (pw_motion *motion, const pw_cli_model *compiled, c
                               pw_error *error) {
   if (path == NULL) return motion_of_model (motion, compiled, *t_end, error);
   const char *why;
-  file_reader reader = { .path = path, .f = pw_open_input (path, &why), .line = malloc (FILE_LINE + 1) };
+  file_reader reader = { .path = path, .f = pw_open_input (path, &why) };
   int status = PW_OK;
+  reader.line = pw_arena_alloc (&reader.arena, FILE_LINE + 1);
   if (reader.f == NULL)
     status = pw_fail (error, pw_open_input_status (), "--reference %s: cannot be read: %s", path, why);
   else if (reader.line == NULL)
@@ -243,9 +243,7 @@ int pw_motion_open_reference (pw_motion *motion, const pw_cli_model *compiled, c
   if (status == PW_OK) status = file_read (&reader, motion, compiled->system, t_end, error);
   if (status == PW_RETRY) status = file_unreadable (&reader, "another program has changed it", error);
   if (reader.f) fclose (reader.f);
-  free (reader.line);
-  free (reader.column);
   pw_names_close (&reader.indices);
-  pw_arena_free (&reader.names);
+  pw_arena_free (&reader.arena);
   return status;
 }

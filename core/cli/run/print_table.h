@@ -25,7 +25,7 @@ int pw_cell_number (pw_table *table, int width, double value, int digits);
 /* A cell "NAME [UNIT]". */
 int pw_cell_unit (pw_table *table, int width, const char *name, const char *unit);
 void pw_row_end (pw_table *table);
-/* A row of headings, ended by NULL: the first one in a cell of width `first`, the others of `width`. */
+/* A row of headings, or the rest of one, ended by NULL: the first in a cell of width `first`, others of `width`. */
 void pw_head (pw_table *table, int first, int width, const char *const *heading);
 
 #endif

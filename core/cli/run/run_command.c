@@ -340,8 +340,9 @@ static int run_finish (pw_run_cli *command, pw_error *error) {
   if (last && command->table_path == NULL && command->summary_path == NULL)
     pw_report_end (&summary, system, last, command->with_energies, pw_run_statistics (run));
   if (error->status == PW_OK) pw_report_warnings (run, system, summary.energy_defect);
-  run_write_json (command, &summary, last, error);
   run_finish_figures (command, summary.reason, error);
+  if (!interrupted) summary.status = pw_cli_status_word (error->status); /* summary.reason is the text of the error */
+  run_write_json (command, &summary, last, error);
   run_name_files (command, error);
   if (command->profile && last && error->status == PW_OK && !interrupted)
     pw_print_profile (system, run, command->cpu, prints_file ? stderr : stdout, error);
@@ -409,8 +410,6 @@ const pw_command pw_cli_run = {
   .summary = "integrate a model; write a table, a summary, figures, an animation",
   .help = "Integrate the equations of motion of a model and show the final state, reactions and constraint residuals. "
           "Options that are not given have the model's own defaults, see `pinwheel show MODEL`.",
-  .min_arguments = 1,
-  .max_arguments = 1,
   .options_size = sizeof (pw_run_cli),
   .function = run_command,
   .options = run_options,

@@ -380,8 +380,6 @@ const pw_command pw_cli_compare = {
   .summary = "compare the accuracy and cost of methods against a reference solution",
   .help = "Run a model by several methods, each with a ladder of tolerances or step sizes, and compare their errors "
           "against a reference solution with their processor times.",
-  .min_arguments = 1,
-  .max_arguments = 1,
   .options_size = sizeof (pw_compare),
   .function = compare_command,
   .options = compare_options,

@@ -4,10 +4,8 @@
 #include <string.h>
 #include "study.h"
 #include "sweep_grid.h"
-#include "util.h"
 
 #define DRIFT_ROUND_OFF 1e-14                   /* scaled residuals below it are round-off: they have no growth */
-#define DRIFT_RTOL 1e-6                         /* of adaptive methods, unless the model or --rtol gives another one */
 enum { DRIFT_PARTS = 200, DRIFT_ROWS = 10000 }; /* parts of a run, each a point in the figures; rows at most */
 
 /* What is measured: the scaled residuals of positions and velocities, and |balance| of a sample [J], the energy defect.
@@ -74,8 +72,7 @@ static int drift_read_values (pw_drift *drift, const char *text, pw_error *error
   int option = pw_find_name (drift_option, sizeof *drift_option, name, hint);
   if (option < 0) return pw_fail (error, PW_INPUT, "--vary %.100s: alpha, beta and every can be varied%s", text, hint);
   pw_axis *axis = &drift->axis[option];
-  pw_axis_free (axis);
-  int status = pw_axis_read (axis, text, error);
+  int status = pw_axis_read (axis, text, &drift->study.arena, error);
   for (long i = 0; status == PW_OK && i < axis->count; i++) {
     const char *expected = pw_domain_check (option == DRIFT_EVERY ? PW_COUNT : PW_NONNEGATIVE, pw_axis_value (axis, i));
     if (*expected)
@@ -159,7 +156,7 @@ static int drift_plan_rows (pw_drift *drift, pw_error *error) {
 static int drift_plan (pw_study *study, pw_error *error) {
   pw_drift *drift = (pw_drift *)study;
   pw_run_defaults defaults = pw_cli_defaults (pw_file_table (study->compiled.file));
-  if (defaults.rtol == 0) defaults.rtol = DRIFT_RTOL;
+  if (defaults.rtol == 0) defaults.rtol = PW_RTOL;
   int status = pw_cli_settings (&study->line, &defaults, &study->t_end, &study->settings, &study->limit, error);
   study->settings.ledger = 1;
   if (status == PW_OK) status = pw_study_read_methods (study, "rk4+all,ida+all,galpha+all", error);
@@ -276,10 +273,6 @@ static int drift_figures (pw_study *study, pw_error *error) {
   return status;
 }
 
-static void drift_close (pw_study *study) {
-  for (int i = 0; i < DRIFT_OPTIONS; i++) pw_axis_free (&((pw_drift *)study)->axis[i]);
-}
-
 static int drift_command (void *options, pw_error *error) {
   static const char *const group[] = { "methods", "alpha and beta of Baumgarte", "metric and frequency of projection" };
   static const pw_study_type type = { .table_names = { "drift.csv", "drift-time.csv" },
@@ -295,8 +288,7 @@ static int drift_command (void *options, pw_error *error) {
                                       .plan = drift_plan,
                                       .begin = drift_begin,
                                       .measure = drift_measure,
-                                      .figures = drift_figures,
-                                      .close = drift_close };
+                                      .figures = drift_figures };
   return pw_study_command (options, &type, error);
 }
 
@@ -323,8 +315,6 @@ const pw_command pw_cli_drift = {
   .help =
       "Compare how constraint residuals and the energy defect grow during a long run, by method and stabilisation, and "
       "how they depend on the parameters of Baumgarte stabilisation and projection.",
-  .min_arguments = 1,
-  .max_arguments = 1,
   .options_size = sizeof (pw_drift),
   .function = drift_command,
   .options = drift_options,

@@ -2,9 +2,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 #include "study.h"
-#include "util.h"
 
 /* Clocks are read after a batch of steps: its processor time [s] below which the next batch has more steps, and above
  * which it has fewer. */
@@ -70,9 +68,9 @@ int pw_study_read_methods (pw_study *study, const char *otherwise, pw_error *err
 
 pw_row *pw_study_add (pw_study *study, int group, int curve, const char *method, int points, pw_error *error) {
   pw_row *row = realloc (study->row, (size_t)(study->rows + 1) * sizeof *row);
-  double (*point)[STUDY_COORDINATES] = malloc ((size_t)points * sizeof *point);
+  double (*point)[STUDY_COORDINATES] = pw_arena_alloc (&study->arena, (size_t)points * sizeof *point);
   if (row) study->row = row;
-  if (row == NULL || point == NULL) return free (point), pw_fail (error, PW_RESOURCE, "out of memory"), NULL;
+  if (row == NULL || point == NULL) return pw_fail (error, PW_RESOURCE, "out of memory"), NULL;
   row += study->rows++;
   *row = (pw_row){ .group = group, .curve = curve, .points = points, .point = point };
   snprintf (row->method, sizeof row->method, "%s", method);
@@ -171,11 +169,9 @@ static int study_open_folder (pw_study *study, pw_error *error) {
                    { "--reference", study->reference_path, PW_READS, NULL },
                    { "-o", study->folder, PW_WRITES_INTO, names } };
   if (study->folder == NULL) return pw_cli_requires ("--width", study->line.width, "-o DIR", 0, error);
-  if (pw_figures_of (&study->figures, &study->line, &study->compiled, study->folder, error) != PW_OK ||
-      pw_cli_check_uses (&study->line, study->compiled.file, use, sizeof use / sizeof *use, error) != PW_OK)
-    return error->status;
-  study->lock = pw_cli_lock_folder (study->folder, error);
-  return study->lock < 0 ? error->status : pw_study_open_table (study, error);
+  if (pw_figures_of (&study->figures, &study->line, &study->compiled, study->folder, error) != PW_OK) return PW_INPUT;
+  int status = pw_files_open (&study->files, &study->line, &study->compiled, use, sizeof use / sizeof *use, error);
+  return status == PW_OK ? pw_study_open_table (study, error) : status;
 }
 
 /* Estimated number of steps of all runs. */
@@ -192,7 +188,6 @@ static double study_steps_of_all (const pw_study *study) {
 
 static int study_open (pw_study *study, pw_error *error) {
   pw_specialise when;
-  study->lock = -1;
   study->run_share = 1;
   study->cpu_limit = INFINITY;
   pthread_mutex_init (&study->mutex, NULL);
@@ -291,9 +286,9 @@ int pw_study_command (pw_study *study, const pw_study_type *type, pw_error *erro
   if (status == PW_OK) status = study_perform (study, error);
   status = study_finish (study, status, error);
   if (status == PW_OK) status = study_require_success (study, error);
-  if (study->lock >= 0) close (study->lock);
-  type->close (study);
-  for (int i = 0; i < study->rows; i++) free (study->row[i].point);
+  pw_files_close (&study->files);
+  if (type->close) type->close (study);
+  pw_arena_free (&study->arena);
   free (study->row);
   free (study->method);
   pthread_mutex_destroy (&study->mutex);

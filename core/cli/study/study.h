@@ -8,6 +8,7 @@
 #include "figure.h"
 #include "parallel.h"
 #include "text.h"
+#include "util.h"
 
 enum {
   STUDY_NAME = 200,     /* longest name of a method with its options, end included */
@@ -84,7 +85,7 @@ typedef struct {
   void (*conclude) (const pw_study *study);
   /* After the last row, if there is a folder: further tables, data and scripts of figures. */
   int (*figures) (pw_study *study, pw_error *error);
-  void (*close) (pw_study *study);
+  void (*close) (pw_study *study); /* NULL: nothing */
 } pw_study_type;
 
 struct pw_study {
@@ -103,9 +104,10 @@ struct pw_study {
   double cpu_limit; /* of the processor time of a run, checked between batches of steps: ROW_STOPPED [s] */
   double t_end;     /* [s] */
   pw_figures figures;
+  pw_arena arena; /* of the points of rows, and of what a command keeps there */
   /* in progress */
-  int lock;  /* descriptor of the locked folder; -1: none */
-  int quiet; /* 1: rows are not printed */
+  pw_files files; /* the locked folder */
+  int quiet;      /* 1: rows are not printed */
   pw_row *row;
   int rows, written; /* all; those written to the table */
   pthread_mutex_t mutex;

@@ -33,7 +33,7 @@ static int sweep_check_options (const pw_sweep *sweep, pw_error *error) {
   if (pw_cli_check_csv (sweep->path, error) != PW_OK) return PW_INPUT;
   if (!sweep->merge && sweep->ranges == NULL)
     return pw_fail (error, PW_INPUT, "nothing is varied: add --vary NAME=lin:FIRST:LAST:COUNT, log:..., or V1,V2,...");
-  return sweep->merge ? PW_OK : pw_cli_at_most (&pw_cli_sweep, &sweep->line, 1, error);
+  return sweep->merge ? PW_OK : pw_cli_at_most_one (&pw_cli_sweep, &sweep->line, error);
 }
 
 /* The first option given that cannot be combined with --merge; NULL if there is none. */
@@ -186,6 +186,7 @@ const pw_command pw_cli_sweep = {
   .name = "sweep",
   .synopsis = "MODEL --vary NAME=RANGE... -o FILE.csv [OPTION...]",
   .summary = "tabulate runs for all combinations of varied parameters",
+  .any_arguments = 1, /* --merge takes several */
   .help =
       "Run a model for all combinations of varied parameters and initial values, and write a table with one row per "
       "run. A sweep that was interrupted is continued by the same command. A sweep may be divided into parts, which "

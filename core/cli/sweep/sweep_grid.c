@@ -1,10 +1,8 @@
 /* Reads the ranges of a sweep, and numbers the rows of the grid that they span. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 #include "pinwheel-files.h"
 #include "sweep_grid.h"
-#include "util.h"
 
 /* ---- Axes ---- */
 
@@ -29,11 +27,11 @@ static size_t axis_value_length (const char *list) {
 }
 
 /* "V1,V2,..." */
-static int axis_read_list (pw_axis *axis, pw_error *error) {
+static int axis_read_list (pw_axis *axis, pw_arena *arena, pw_error *error) {
   char why[140];
   axis->count = 1;
   for (const char *c = axis->range; *(c += axis_value_length (c)); c++) axis->count++;
-  axis->value = calloc ((size_t)axis->count, sizeof *axis->value);
+  axis->value = pw_arena_alloc (arena, (size_t)axis->count * sizeof *axis->value);
   if (axis->value == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   char *c = axis->range;
   for (long i = 0; i < axis->count; i++) {
@@ -67,8 +65,8 @@ static int axis_read_range (pw_axis *axis, pw_error *error) {
   return PW_OK;
 }
 
-int pw_axis_read (pw_axis *axis, const char *text, pw_error *error) {
-  *axis = (pw_axis){ .name = strdup (text) };
+int pw_axis_read (pw_axis *axis, const char *text, pw_arena *arena, pw_error *error) {
+  *axis = (pw_axis){ .name = pw_arena_copy (arena, text) };
   if (axis->name == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   char *equals = strchr (axis->name, '=');
   if (equals == NULL || equals == axis->name || equals[1] == 0)
@@ -80,13 +78,7 @@ int pw_axis_read (pw_axis *axis, const char *text, pw_error *error) {
                                                        : PW_AXIS_LIST;
   if (axis->type != PW_AXIS_LIST) return axis_read_range (axis, error);
   if (strchr (axis->range, ':')) return axis_fail (axis, "a range begins with lin: or log:", error);
-  return axis_read_list (axis, error);
-}
-
-void pw_axis_free (pw_axis *axis) {
-  free (axis->value);
-  free (axis->name);
-  *axis = (pw_axis){ .name = NULL };
+  return axis_read_list (axis, arena, error);
 }
 
 /* The ends are exact.  Values between them are divided only once, so that they are rounded as little as possible: the
@@ -96,8 +88,11 @@ double pw_axis_value (const pw_axis *axis, long i) {
   double intervals = (double)(axis->count - 1), k = (double)i;
   if (i == 0 || axis->first == axis->last) return axis->first;
   if (i == axis->count - 1) return axis->last;
-  if (axis->type == PW_AXIS_LIN) return (axis->first * (intervals - k) + axis->last * k) / intervals;
-  return pow (10, (log10 (axis->first) * (intervals - k) + log10 (axis->last) * k) / intervals);
+  if (axis->type == PW_AXIS_LOG)
+    return pow (10, (log10 (axis->first) * (intervals - k) + log10 (axis->last) * k) / intervals);
+  double value = (axis->first * (intervals - k) + axis->last * k) / intervals;
+  if (isfinite (value)) return value;
+  return axis->first / intervals * (intervals - k) + axis->last / intervals * k; /* the products were too large */
 }
 
 /* ---- The grid ---- */
@@ -140,23 +135,17 @@ static int grid_count_rows (pw_grid *grid, pw_error *error) {
   return PW_OK;
 }
 
-int pw_grid_read (pw_grid *grid, const char *const *ranges, pw_error *error) {
+int pw_grid_read (pw_grid *grid, const char *const *ranges, pw_arena *arena, pw_error *error) {
   int n = 0, status = PW_OK;
   while (ranges && ranges[n]) n++;
-  *grid = (pw_grid){ .axis = calloc ((size_t)n + 1, sizeof *grid->axis) };
+  *grid = (pw_grid){ .axis = pw_arena_alloc (arena, ((size_t)n + 1) * sizeof *grid->axis) };
   if (grid->axis == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   while (grid->axes < n && status == PW_OK) {
     pw_axis *axis = grid->axis + grid->axes++;
-    status = pw_axis_read (axis, ranges[axis - grid->axis], error);
+    status = pw_axis_read (axis, ranges[axis - grid->axis], arena, error);
     for (const pw_axis *other = grid->axis; other < axis && status == PW_OK; other++)
       if (strcmp (other->name, axis->name) == 0)
         status = pw_fail (error, PW_INPUT, "--vary %.200s is given twice", axis->name);
   }
   return status == PW_OK ? grid_count_rows (grid, error) : status;
-}
-
-void pw_grid_free (pw_grid *grid) {
-  for (int i = 0; i < grid->axes; i++) pw_axis_free (grid->axis + i);
-  free (grid->axis);
-  *grid = (pw_grid){ .axis = NULL };
 }

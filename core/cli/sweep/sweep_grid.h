@@ -3,13 +3,13 @@
 #ifndef PW_SWEEP_GRID_H
 #define PW_SWEEP_GRID_H
 
-#include "pinwheel.h"
+#include "util.h"
 
 #define PW_GRID_MAX_ROWS 1e8 /* larger grids are refused: a journal needs 8 bytes of memory per row */
 
 /* A varied quantity: a parameter of the model or the initial value of a state. */
 typedef struct {
-  char *name;  /* allocated together with `range` */
+  char *name;
   char *range; /* "lin:1:10:100", as written */
   enum { PW_AXIS_LIST, PW_AXIS_LIN, PW_AXIS_LOG } type;
   double first, last;            /* of PW_AXIS_LIN and PW_AXIS_LOG */
@@ -26,15 +26,12 @@ typedef struct {
   long rows;
 } pw_grid;
 
-/* Reads "NAME=RANGE".  PW_INPUT with the reason, PW_RESOURCE.  Free the axis in every case. */
-int pw_axis_read (pw_axis *axis, const char *text, pw_error *error);
-void pw_axis_free (pw_axis *axis);
+/* Reads "NAME=RANGE"; the arrays of the axis are in the arena.  PW_INPUT with the reason, PW_RESOURCE. */
+int pw_axis_read (pw_axis *axis, const char *text, pw_arena *arena, pw_error *error);
 double pw_axis_value (const pw_axis *axis, long i); /* i from 0 */
 
-/* Reads a NULL-terminated list of "NAME=RANGE".  PW_INPUT also if there are too many rows.  Free the grid in every
- * case. */
-int pw_grid_read (pw_grid *grid, const char *const *ranges, pw_error *error);
-void pw_grid_free (pw_grid *grid);
+/* Reads a NULL-terminated list of "NAME=RANGE", likewise.  PW_INPUT also if there are too many rows. */
+int pw_grid_read (pw_grid *grid, const char *const *ranges, pw_arena *arena, pw_error *error);
 double pw_grid_value (const pw_grid *grid, int i, long row); /* of axis i */
 
 /* The row that is computed k-th, from 0: rows with the same parameters follow each other and share a compiled model. */

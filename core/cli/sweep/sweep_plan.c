@@ -212,7 +212,7 @@ static int plan_fingerprint (pw_plan *plan, const pw_model *model, pw_error *err
 int pw_plan_open (pw_plan *plan, const char **ranges, pw_error *error) {
   const pw_method *method;
   int stabilisation, status = pw_method_parse (plan->method, &method, &stabilisation, error);
-  if (status == PW_OK) status = pw_grid_read (&plan->grid, (const char *const *)ranges, error);
+  if (status == PW_OK) status = pw_grid_read (&plan->grid, (const char *const *)ranges, &plan->arena, error);
   if (status != PW_OK) return status;
   pw_model *model = pw_file_model (plan->file, error);
   if (model == NULL) return error->status;
@@ -229,7 +229,6 @@ int pw_plan_open (pw_plan *plan, const char **ranges, pw_error *error) {
 void pw_plan_close (pw_plan *plan) {
   pw_cli_engine_close (&plan->engine);
   pw_scene_code_close (plan->lanes_code);
-  pw_grid_free (&plan->grid);
   pw_names_close (&plan->column_of);
   pw_arena_free (&plan->arena);
   pw_text_free (&plan->heading);

@@ -35,7 +35,7 @@ typedef struct {
   int columns;
   size_t column_room;  /* entries of `column` that are allocated */
   pw_names column_of;  /* from a state's name to the index of its column */
-  pw_arena arena;      /* names */
+  pw_arena arena;      /* of the grid and of names */
   uint64_t tables_sum; /* a checksum of the points of all tables of models built so far; 0: there are none */
   pw_text heading;     /* the table's first line, without its end */
   pw_text fingerprint; /* the first lines of a journal or part: everything that determines the rows */
