@@ -81,7 +81,7 @@ int pw_method_parse (const char *method, const pw_method **integrator, int *stab
  * integrator: that of pw_method_parse; method: the text. */
 int pw_method_adaptive (const pw_method *integrator, const char *method);
 
-/* Estimated number of steps of a run of a model with this default step [s]; 0 for an unknown method.  From
+/* Estimated number of steps of a run from time 0 of a model with this default step [s]; 0 for an unknown method.  From
  * PW_SPECIALISE_STEPS steps on, compiling specialised code saves time. */
 enum { PW_SPECIALISE_STEPS = 1000000 };
 double pw_method_steps (const char *method, const pw_settings *s, double step, double t_end);

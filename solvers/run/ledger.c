@@ -1,6 +1,6 @@
 /* The energy of a run and its ledger of work and losses: scales, tolerance, energy defect.  Every run keeps a ledger,
- * since samples contain the total work and loss; in adaptive Runge-Kutta methods, with radau, its error takes part in
- * step-size control. */
+ * since samples contain the total work and loss; in adaptive Runge-Kutta methods, radau included, its error takes part
+ * in step-size control. */
 #include <float.h>
 #include <math.h>
 #include <string.h>

@@ -7,7 +7,7 @@
 enum { PW_QUADRATURE_POINTS = 7 }; /* at most: a polynomial through more would cost more than nodes inside the step */
 
 /* The rates of the ledger's entries at a time inside the last step, by the method's interpolation; changes the run's
- * sample arrays, kinematics, J and factors.  PW_OK, or another status if they cannot be evaluated. */
+ * sample arrays, the kinematics, J and the saddle's factors.  PW_OK, or another status if they cannot be evaluated. */
 typedef int pw_rates_at (pw_run *r, double t, double *rate);
 
 typedef struct {
