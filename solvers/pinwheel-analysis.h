@@ -39,7 +39,7 @@ typedef struct {
   double *basis; /* 2 coordinates x unknowns, by rows: change of each state, numbered as in pw_system_find_state, by
                     each x [1, rad/m, 1/s, rad/(m s)] */
   double *shape; /* unknowns x 2 coordinates complex numbers (re, im): the perturbation of the states in each mode; the
-                    largest of the positions, angles times L, is 1 m; if all are 0, of the velocities times T; 0 for rigid
+                    largest of the positions, angles times L, is 1 m; if all are 0, of velocities times T; 0 for rigid
                     displacements and for eigenvalues 0, of which it is not unique */
 } pw_linear;
 
@@ -137,7 +137,7 @@ typedef struct {
   const pw_initial_value *hold; /* what is held, numbered as in pw_system_find_held */
   int holds;
   double t;           /* time at which signals are evaluated [s] */
-  double span;        /* as in pw_settings */
+  double span;        /* as in pw_settings, but > 0: signals must be constant in it */
   double first, last; /* range of the parameter */
   int vary;           /* the parameter is the value of hold[vary]; -1: it is that of `compile`, if any */
   /* Compiles the system for a value of the parameter.  The search frees it.  NULL and the error: there is no

@@ -44,8 +44,7 @@ typedef struct {
   pw_stabilisation_kind kind;
 } pw_stabilisation;
 
-/* An integrator: one const table in one file.  All methods of Pinwheel are such tables; for your own, see
- * pinwheel-method.h. */
+/* An integrator.  All of Pinwheel's are const tables of this type; for your own, see pinwheel-method.h. */
 struct pw_method {
   const char *name;                         /* "rk4" */
   const char *about;                        /* one line, with its source (author, year) */
@@ -74,7 +73,7 @@ extern const pw_method *const pw_methods[];
  * PW_RESOURCE. */
 pw_run *pw_run_open (const pw_system *s, const char *method, const pw_settings *settings, pw_error *error);
 
-/* Checks a method's name and options without a system; returns the integrator and the index of the stabilisation. */
+/* Checks name and options of a built-in method without a system; returns integrator and index of the stabilisation. */
 int pw_method_parse (const char *method, const pw_method **integrator, int *stabilisation, pw_error *error);
 
 /* 1 if a method controls its step size; 0 if steps are fixed, by the integrator or by the option steps=fixed.
