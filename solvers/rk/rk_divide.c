@@ -37,9 +37,9 @@ static int divide_two_parts (pw_run *r, const pw_step_start *from, double betwee
 }
 
 /* Divides the step to t1 at several times after `earliest`, until two successive results differ by at most `best`;
- * *between: the time of division with the least difference.  PW_RETRY if that exceeds `acceptable`; PW_STOPPED; errors.
- * status: of the undivided step, whose result is in d->q.  In a step from the state reached, energy added by projections
- * is an error, too. */
+ * *between: the time of division with the least difference.  PW_RETRY if that exceeds `acceptable`; PW_STOPPED or
+ * PW_METHOD.  status: of the undivided step, whose result is in d->q.  In a step from the state reached, energy added
+ * by projections is an error, too. */
 static int divide (pw_run *r, const pw_step_start *from, int status, double t1, int project, double earliest,
                    double *between) {
   /* fractions of the step; irregular, since configurations may recur */
