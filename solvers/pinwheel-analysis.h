@@ -225,7 +225,7 @@ typedef enum {
   PW_PERIODIC_REAL,  /* a multiplier passes 1 elsewhere: branches cross */
   PW_PERIODIC_FLIP,  /* a multiplier passes -1: period doubling */
   PW_PERIODIC_TORUS, /* a conjugate pair crosses the unit circle (Neimark-Sacker) */
-  PW_PERIODIC_END    /* the end, as of a branch of steady motions; after 50 times `points` points */
+  PW_PERIODIC_END    /* of the range or a closed branch; Newton's method fails at the smallest step; 50 x `points` */
 } pw_periodic_event;
 
 /* A relative periodic motion: after one period the state is the initial one up to symmetries of the system
