@@ -225,7 +225,7 @@ typedef enum {
   PW_PERIODIC_REAL,  /* a multiplier passes 1 elsewhere: branches cross */
   PW_PERIODIC_FLIP,  /* a multiplier passes -1: period doubling */
   PW_PERIODIC_TORUS, /* a conjugate pair crosses the unit circle (Neimark-Sacker) */
-  PW_PERIODIC_END    /* of the range or a closed branch; Newton's method fails at the smallest step; 50 x `points` */
+  PW_PERIODIC_END    /* the end of the range or of a closed branch; or pw_periodic_reason says why no points follow */
 } pw_periodic_event;
 
 /* A relative periodic motion: after one period the state is the initial one up to symmetries of the system
