@@ -58,7 +58,7 @@ struct pw_run {
   double *lambda;    /* rows; contiguous with q, v, a: pw_state_length numbers */
   double *ledger;    /* entries: work and losses up to t */
   double *rate;      /* entries: powers at t */
-  double projected;  /* energy added by projections up to t; only with settings.ledger */
+  double projected;  /* energy added by projections up to t; only with settings.ledger; 0 in bdf */
 
   /* The state requested from pw_run_sample. */
   double *q_at, *v_at, *a_at, *lambda_at, *ledger_at; /* same layout */
@@ -177,9 +177,9 @@ static inline double pw_least_step (const pw_run *r) {
   return 16 * DBL_EPSILON * fmax (fabs (r->t), 1e-6 * r->w->scale.time);
 }
 
-/* ---- Parts of opening and advancing a run (run.c) ---- */
+/* ---- Parts of opening and advancing a run (run.c, run_open.c) ---- */
 
-/* Adds the name of the signal that failed in the last attempted step, if any, to the error.  Returns status. */
+/* Adds the name of r->w->failed, the last signal that failed, if any, to the error.  Returns status. */
 int pw_run_annotate_error (const pw_run *r, int status, pw_error *error);
 
 /* PW_INPUT if an element type leaves out a derivative that is not zero, so that results would be wrong: "USER NEEDS
@@ -259,7 +259,7 @@ int pw_run_watchdog (pw_run *r, pw_error *error);
 
 /* ---- Limits (limits.c) ---- */
 
-/* 1 if the caller requests a stop. */
+/* 1 if the caller requests a stop, or has done so since r->stopped, which this sets, was last cleared. */
 static inline int pw_run_stop_requested (pw_run *r) {
   if (r->settings.stop && r->settings.stop (r->settings.stop_context)) r->stopped = 1;
   return r->stopped;
@@ -295,7 +295,7 @@ int pw_ledger_uses_multipliers (const pw_system *s);
 
 /* Tolerance of the total work and loss of a step of size h [J]: 5 rtol (5 atol / max (L, 1), if larger) times the
  * largest of r->scene_energy, r->exchanged and the work and losses so far, at most those of a time T; plus round-off.
- * DBL_MAX if that is zero. */
+ * DBL_MAX if that is zero or not finite. */
 double pw_ledger_tolerance (const pw_run *r, double h);
 
 /* ---- Dynamics ---- */

@@ -39,8 +39,8 @@ typedef struct {
   double *basis; /* 2 coordinates x unknowns, by rows: change of each state, numbered as in pw_system_find_state, by
                     each x [1, rad/m, 1/s, rad/(m s)] */
   double *shape; /* unknowns x 2 coordinates complex numbers (re, im): the perturbation of the states in each mode; the
-                    largest of the positions, angles times L, is 1 m; 0 for rigid displacements and for eigenvalues 0,
-                    of which it is not unique */
+                    largest of the positions, angles times L, is 1 m; if all are 0, of velocities times T; 0 for rigid
+                    displacements and for eigenvalues 0, of which it is not unique */
 } pw_linear;
 
 /* Linearises at the state reached.  With more than `most` coordinates only the numbers of coordinates, positions,
@@ -83,10 +83,10 @@ double pw_direction_weight (const pw_direction *d, int of_error, int i);
 typedef struct pw_variation pw_variation;
 
 /* Begins at the state reached; with neighbours, the run must not have advanced.  It must outlive the derivatives, and
- * only pw_variation_advance may advance it from now on.  ledger: 1: with derivatives of work and losses, at about twice
- * the cost.  Errors: PW_INPUT if a system differs in its bodies or elements, the run has the option inputs=held, or an
- * element type leaves out a derivative that is not zero; PW_METHOD if the state or a breakpoint is not differentiable;
- * PW_RESOURCE. */
+ * only pw_variation_advance and _next_jump may advance it from now on.  ledger: 1: with derivatives of work and losses,
+ * at about twice the cost.  Errors: PW_INPUT if a system differs in its bodies or elements, the run has the option
+ * inputs=held, or an element type leaves out a derivative that is not zero; PW_METHOD if the state or a breakpoint is
+ * not differentiable; PW_RESOURCE. */
 pw_variation *pw_variation_open (pw_run *r, const pw_direction *d, int count, int ledger, pw_error *error);
 
 /* Advances the run and the derivatives to time t <= t_end, which is then in the last step of the run; but where
@@ -108,7 +108,7 @@ double pw_variation_breakpoint (const pw_variation *x, int i, double *slope);
  * after the first jump of its accelerations with the state after the time reached, or INFINITY.  NAN and the error if
  * that fails. */
 double pw_variation_next_jump (pw_variation *x, double t, double t_end, pw_error *error);
-/* The derivative along direction i of the time of the last jump passed. */
+/* The derivative along direction i of the time of the last jump or breakpoint passed. */
 double pw_variation_jump_slope (const pw_variation *x, int i);
 
 /* The size of the next step of the derivatives [s], over which they are smooth. */
@@ -137,7 +137,7 @@ typedef struct {
   const pw_initial_value *hold; /* what is held, numbered as in pw_system_find_held */
   int holds;
   double t;           /* time at which signals are evaluated [s] */
-  double span;        /* as in pw_settings */
+  double span;        /* as in pw_settings, but > 0: signals must be constant in it */
   double first, last; /* range of the parameter */
   int vary;           /* the parameter is the value of hold[vary]; -1: it is that of `compile`, if any */
   /* Compiles the system for a value of the parameter.  The search frees it.  NULL and the error: there is no
@@ -163,7 +163,7 @@ typedef struct {
   const double *q, *v; /* pw_system_coordinates */
   double residual;     /* the largest, in units of the scene (pw_scale): L, L/T, L/T^2 */
   int iterations;
-  int family;   /* number of further quantities to hold so that it is isolated, up to symmetries */
+  int family;   /* from pw_steady_solve: further quantities to hold so that it is isolated, up to symmetries */
   int unstable; /* growing modes; at an event, without those that change */
   pw_steady_event event;
   const pw_linear *linear; /* NULL if it is not a solution */
@@ -178,8 +178,8 @@ void pw_steady_close (pw_steady *x);
 
 /* Newton's method at a value of the parameter, with corrections of least norm, from the initial state (attempt 0), a
  * state to which forces lead from there (1), or a random one (2, 3, ...).  PW_RETRY, without an error, if it finds
- * none: residual and state are where it ended.  Errors: PW_INPUT if a parameter changes the number of coordinates;
- * PW_RESOURCE; PW_METHOD. */
+ * none: residual and state are where it ended.  Errors: as `compile` and pw_run_open; PW_INPUT also if the
+ * parameter changes the number of bodies or constraint equations. */
 int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_motion *out, pw_error *error);
 /* Why the system could last not be evaluated during the search, or why a branch ended within the range; or "". */
 const char *pw_steady_reason (const pw_steady *x);
@@ -187,13 +187,14 @@ const char *pw_steady_reason (const pw_steady *x);
 int pw_steady_symmetries (const pw_steady *x);
 /* Whether two states differ by symmetries only. */
 int pw_steady_same (pw_steady *x, const double *q1, const double *v1, const double *q2, const double *v2);
-/* Quantities to hold so that the motion last returned becomes isolated, with their values there.  Returns their number,
- * at most `most`, or a status; the motion stays in a family if they are not enough. */
+/* Quantities to hold so that the motion last found by pw_steady_solve becomes isolated, with their values there.
+ * Returns their number, at most `most`, or a status; the motion stays in a family if they are not enough. */
 int pw_steady_suggest (pw_steady *x, pw_initial_value *hold, int most);
 
 /* Follows the branch of a solution, initially towards the end of the range (direction 1) or its beginning (-1).
  * pw_steady_next returns its points, the first one included, and events in between, then PW_STEADY_END: at an end of
- * the range, the start of a closed branch, or where Newton's method fails at the smallest step (pw_steady_reason). */
+ * the range or the start of a closed branch, where Newton's method fails at the smallest step, or after 100 times
+ * `points` points (pw_steady_reason). */
 int pw_steady_follow (pw_steady *x, const double *q, const double *v, double parameter, int direction, pw_error *error);
 int pw_steady_next (pw_steady *x, pw_steady_motion *out, pw_error *error);
 
@@ -206,7 +207,7 @@ double pw_system_period (const pw_system *s);
 typedef struct {
   const char *method;          /* default "erk8+projection" */
   double rtol;                 /* default 1e-12 */
-  int (*stop) (void *context); /* as in pw_settings; or NULL */
+  int (*stop) (void *context); /* as in pw_settings, but a stop counts as PW_RETRY; or NULL */
   void *stop_context;
   double t;           /* initial time [s] */
   double period;      /* [s]; 0: that of the signals at each value of the parameter; with `free` the first guess */
@@ -224,7 +225,7 @@ typedef enum {
   PW_PERIODIC_REAL,  /* a multiplier passes 1 elsewhere: branches cross */
   PW_PERIODIC_FLIP,  /* a multiplier passes -1: period doubling */
   PW_PERIODIC_TORUS, /* a conjugate pair crosses the unit circle (Neimark-Sacker) */
-  PW_PERIODIC_END    /* the end of the range, of a closed branch, or where Newton's method fails at the smallest step */
+  PW_PERIODIC_END    /* the end of the range or of a closed branch; or pw_periodic_reason says why no points follow */
 } pw_periodic_event;
 
 /* A relative periodic motion: after one period the state is the initial one up to symmetries of the system

@@ -44,12 +44,11 @@ typedef struct {
   pw_stabilisation_kind kind;
 } pw_stabilisation;
 
-/* An integrator: one const table in one file.  All methods of Pinwheel are such tables; for your own, see
- * pinwheel-method.h. */
+/* An integrator.  All of Pinwheel's are const tables of this type; for your own, see pinwheel-method.h. */
 struct pw_method {
   const char *name;                         /* "rk4" */
   const char *about;                        /* one line, with its source (author, year) */
-  int adaptive;                             /* 1: uses rtol and atol; 0: uses step */
+  int adaptive;                             /* 1: uses rtol and atol, unless steps=fixed; 0: uses step */
   int order;                                /* of convergence; 0: variable */
   const pw_stabilisation *stabilisations;   /* ended by a NULL name; the first is the default */
   const pw_option *options;                 /* ended by a NULL name */
@@ -74,14 +73,14 @@ extern const pw_method *const pw_methods[];
  * PW_RESOURCE. */
 pw_run *pw_run_open (const pw_system *s, const char *method, const pw_settings *settings, pw_error *error);
 
-/* Checks a method's name and options without a system; returns the integrator and the index of the stabilisation. */
+/* Checks name and options of a built-in method without a system; returns integrator and index of the stabilisation. */
 int pw_method_parse (const char *method, const pw_method **integrator, int *stabilisation, pw_error *error);
 
 /* 1 if a method controls its step size; 0 if steps are fixed, by the integrator or by the option steps=fixed.
  * integrator: that of pw_method_parse; method: the text. */
 int pw_method_adaptive (const pw_method *integrator, const char *method);
 
-/* Estimated number of steps of a run of a model with this default step [s]; 0 for an unknown method.  From
+/* Estimated number of steps of a run from time 0 of a model with this default step [s]; 0 for an unknown method.  From
  * PW_SPECIALISE_STEPS steps on, compiling specialised code saves time. */
 enum { PW_SPECIALISE_STEPS = 1000000 };
 double pw_method_steps (const char *method, const pw_settings *s, double step, double t_end);
@@ -140,9 +139,9 @@ void pw_run_close (pw_run *r);
 /* ---- Checkpoints ---- */
 
 /* Appends the state reached to the archive, and continues as a run loaded from it would: matrices are planned again,
- * and a multistep method restarts, which the statistics count.  Take samples of the last step before.  PW_RETRY near
- * a singular configuration, where nothing is done: try after the next step.  Errors: PW_METHOD or PW_INPUT if the
- * state cannot be evaluated; PW_RESOURCE. */
+ * and a method without `serialise` restarts, which the statistics count.  Take samples of the last step before.
+ * PW_RETRY near a singular configuration, where nothing is done: try after the next step.  Errors: PW_METHOD or
+ * PW_INPUT if the state cannot be evaluated; PW_RESOURCE. */
 int pw_run_save (pw_run *r, pw_archive *a, pw_error *error);
 
 /* Loads a saved state into a run opened with the same system, method and settings that has not advanced; it continues
@@ -159,10 +158,10 @@ char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size);
 
 /* The smallest velocity scale [m/s] or [rad/s] of a saturating force, at the configuration reached and at rest:
  * returns the velocity (numbered as in pw_system_find_state), or -1 if no force saturates, and the element,
- * "friction hinge".  Methods with Newton iterations keep their tolerances below it, whatever the settings. */
+ * "friction hinge".  adams, bdf, ida and radau keep their tolerances below it, whatever the settings. */
 int pw_run_saturation (pw_run *r, double *least, char *element, size_t size);
 
-/* These belong to the run. */
+/* These belong to the run.  After pw_run_restart, pw_run_initial reports on the state given there. */
 const pw_statistics *pw_run_statistics (const pw_run *r);
 const pw_initial_report *pw_run_initial (const pw_run *r);
 const pw_scale *pw_run_scale (const pw_run *r);
@@ -188,12 +187,12 @@ typedef struct {
 typedef struct {
   int kinds;
   pw_profile_kind *kind;
-  double configurations; /* kinematics of the bodies alone */
-  double kinematics;     /* and signals */
+  double configurations; /* kinematics of the bodies, and signals that depend on states */
+  double kinematics;     /* the same with all signals */
   double equations;      /* J, gamma, f */
   double stabilisation;  /* Baumgarte's terms */
   double factorisation, solution;
-  double evaluation;  /* all stages in one call */
+  double evaluation;  /* all stages in one call, or by specialised code */
   double evaluations; /* per step, without those that projections contain; 0: not applicable to this method */
   double projection;  /* with the evaluation after it */
   double projections; /* per step */
@@ -209,10 +208,10 @@ void pw_profile_free (pw_profile *p);
 
 /* Advances to t_end and stores samples in rows of pw_run_record_width numbers, at most `count`: at the given times,
  * increasing, from the time reached on; or after every accepted step (times: NULL).  Returns PW_OK with *recorded rows
- * when t_end is reached, the rows are full, or after `steps` calls of pw_run_advance_towards: call it again, with the
- * rest of the times; otherwise as pw_run_advance.  A row is t, scaled residuals of g = 0 and J v = eta, kinetic and
- * potential energy, work, loss, energy added by projections, balance (PW_RECORD_STATES numbers), then q, v, a,
- * reactions (-lambda) and, with pw_settings.ledger, the ledger's entries. */
+ * when t_end is reached, the rows are full, or after `steps` calls of pw_run_advance_towards (times: NULL: of
+ * pw_run_advance): call it again, with the rest of the times; otherwise as pw_run_advance.  A row is t, scaled
+ * residuals of g = 0 and J v = eta, kinetic and potential energy, work, loss, energy added by projections, balance
+ * (PW_RECORD_STATES numbers), then q, v, a, reactions (-lambda) and, with pw_settings.ledger, the ledger's entries. */
 enum { PW_RECORD_STATES = 9 }; /* index of the first coordinate in a row */
 int pw_run_record_width (const pw_run *r);
 int pw_run_record (pw_run *r, double t_end, const double *times, long count, long steps, double *rows, long *recorded,

@@ -90,7 +90,7 @@ int pw_watchdog_check_values (const struct pw_run *r, pw_error *error);
 int pw_watchdog_near (struct pw_run *r);
 
 /* Checks that the motion has come from watchdog.previous_q to the state reached without leaving its branch; sine: that
- * at the state reached (change_point.c). */
+ * at the state reached (change_point.c).  PW_METHOD; PW_RESOURCE. */
 int pw_change_point_check (struct pw_run *r, double sine, pw_error *error);
 
 /* Checks that a step of fixed size resolves a change point that the motion has passed at a small distance; last_sine:

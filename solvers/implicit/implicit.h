@@ -37,13 +37,13 @@ int pw_implicit_complete (pw_run *r, int status, pw_dense_projection projection,
  * entries are of about the same size for every step size (equations in galpha.c).  radau uses them, too. */
 void pw_implicit_scale (const pw_dae *x, double c, double e, double *row_factor, double *column_factor);
 
-/* A step from the state reached to the new state q1, v1 at t1 = t + h; kinematics are left there.  Returns PW_RETRY if
+/* A step from the state reached to the new state q1, v1 at t1 = t + h; kinematics and J are left there.  PW_RETRY if
  * the iteration does not converge, or a singular configuration prevents the solution for velocities or accelerations;
  * PW_INPUT if the Newton matrix is singular; PW_METHOD if a signal failed; PW_RESOURCE. */
 typedef int pw_implicit_step (pw_run *r, double h, double t1);
 
 /* Advances by one step: makes q1, v1 the state reached, and calls `accept`, which sets its accelerations and
- * multipliers. */
+ * multipliers, before r->t changes. */
 int pw_implicit_advance (pw_run *r, double t_end, pw_implicit_step *step, void (*accept) (pw_run *r), pw_error *error);
 
 /* Reports a failed step of size h from the state reached, also of radau; status: what the step returned, PW_OK if its

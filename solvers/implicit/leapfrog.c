@@ -35,8 +35,8 @@ struct pw_method_data {
 
 /* Convergence of an iteration, from the sizes of its corrections. */
 typedef struct {
-  double size;    /* of the last correction: the largest relative change of a coordinate */
-  double largest; /* the largest coordinate in units of the scene: its round-off may affect others */
+  double size;    /* of the last correction: the largest relative change of a coordinate (kick: velocity) */
+  double largest; /* the largest of these in units of the scene: its round-off may affect others */
   double before;  /* size of the previous correction */
   double rate;    /* ratio of the last size to the previous one */
   int done;       /* corrections before the last one */

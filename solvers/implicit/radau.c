@@ -13,8 +13,8 @@
  *
  *   (gamma/h B - F_y) dW_1 = r_1,    ((alpha + i beta)/h B - F_y) (dW_2 + i dW_3) = r_2 + i r_3
  *
- * with F_y at y: a real and a complex sparse matrix.  F_y is reused while each correction is less than a hundredth of
- * the previous one, its factors while in addition the step size stays the same.  The error estimate is
+ * with F_y at y: a real and a complex sparse matrix.  F_y is reused while corrections are on average less than a
+ * hundredth of the previous ones, its factors while in addition the step size stays the same.  The error estimate is
  *
  *   err = (gamma/h B - F_y)^-1 (F (t, y) + B sum_i e_i Z_i / h)            of order h^4
  *

@@ -183,7 +183,7 @@ static double radau_time (const pw_run *r, int k, double h, double t1) {
   return k == STAGES - 1 ? t1 : r->t + radau_c[k] * h;
 }
 
-/* One correction; *size, *round_offs: its largest entry in q and v, in units of newton_tolerance and of round_off. */
+/* One correction of W; *size, *round_offs: its largest entry in q, v, in units of newton_tolerance and of round_off. */
 static int radau_correct (pw_run *r, double h, double t1, double *size, double *round_offs) {
   pw_method_data *d = r->data;
   double *const *W = d->W, *const *F = d->F;

@@ -4,13 +4,13 @@
 
 #include "method.h"
 
-enum { PW_RK_STAGES = 16 };
+enum { PW_RK_STAGES = 16 }; /* the most, including the new state */
 
 /* The coefficients of a method, named as by Hairer, Norsett & Wanner 1993. */
 typedef struct {
   int stages;
   const double *c, *b; /* stages: nodes, weights */
-  const double *A;     /* the rows of the lower triangle, one after the other */
+  const double *A;     /* rows 1, 2, ... (counted from 0) below the diagonal, one after the other */
   const double *e;     /* stages + 1: weights of the error estimate, the last at the new state; NULL: fixed steps */
   const double *e3;    /* the same of an estimate of lower order (rk_adapt.c); NULL: there is only e */
   const double *e6;    /* the same of an estimate of higher order, together with e3 only */

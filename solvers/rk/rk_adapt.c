@@ -28,7 +28,7 @@
 #define ADAPT_SAFETY 0.9       /* in the factor from one step size to the next */
 #define ADAPT_GROWTH 5.        /* upper bound of that factor */
 #define ADAPT_REDUCTION 0.2    /* its lower bound */
-#define ADAPT_LEAST_ERROR 1e-4 /* least err_last: smaller errors are accidental and would predict too large a step */
+#define ADAPT_LEAST_ERROR 1e-4 /* least err_last: smaller errors are accidental and would predict too small a step */
 
 void pw_rk_reset_step_size (pw_run *r) {
   pw_method_data *d = r->data;

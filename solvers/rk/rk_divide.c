@@ -2,7 +2,8 @@
  *
  * Fixed steps end at multiples of the step size, at t_end and at breakpoints.  A sample is a step from the beginning of
  * the last step, as accurate as the method.  If a stage of a step or sample lands near a singular configuration, its
- * accelerations are inaccurate.  Then the step is divided in two parts, at different times, until two results agree. */
+ * accelerations are inaccurate.  Then the step, unless it follows a divided one, is divided in two parts, at different
+ * times, until two results agree. */
 #include <math.h>
 #include <string.h>
 #include "dense_output.h"
@@ -36,9 +37,9 @@ static int divide_two_parts (pw_run *r, const pw_step_start *from, double betwee
 }
 
 /* Divides the step to t1 at several times after `earliest`, until two successive results differ by at most `best`;
- * *between: the time of division with the least difference.  PW_RETRY if that exceeds `acceptable`.  status: of the
- * undivided step, whose result is in d->q.  In a step from the state reached, energy added by projections is an error,
- * too. */
+ * *between: the time of division with the least difference.  PW_RETRY if that exceeds `acceptable`; PW_STOPPED or
+ * PW_METHOD.  status: of the undivided step, whose result is in d->q.  In a step from the state reached, energy added
+ * by projections is an error, too. */
 static int divide (pw_run *r, const pw_step_start *from, int status, double t1, int project, double earliest,
                    double *between) {
   /* fractions of the step; irregular, since configurations may recur */
@@ -80,7 +81,7 @@ int pw_rk_at (pw_run *r, double t, pw_error *error) {
   const int near_singular = r->near_singular;
   double between;
   r->near_singular = 0;
-  r->refused_sine = 0;
+  r->refused_sine = 0; /* a sample is divided, not refused, near a singular configuration */
   int status = divide_step (r, from, t, d->projects, r->settings.ledger), divided = r->near_singular && status >= 0;
   if (divided) {
     status = divide (r, from, status, t, d->projects, from->t, &between);

@@ -77,7 +77,7 @@ static inline int rk_evaluate_stage (pw_run *r, double t, double *v, double *a, 
   return status;
 }
 
-/* Does what rk_stages does by specialised code: 1; 0 if there is none, or it refuses a stage. */
+/* Does what rk_stages does by specialised code: 1; 0 if none suits, or it refuses a stage. */
 static int rk_stages_specialised (pw_run *r, double h) {
   pw_method_data *d = r->data;
   double t[PW_RK_STAGES];

@@ -36,7 +36,7 @@ struct pw_method_data {
   int off_grid;            /* 1: the last step was divided and ended between the multiples of the step size */
   /* velocities, accelerations, and rates of the ledger's entries at the stages, then at the new state */
   double *stage_v[PW_RK_STAGES], *stage_a[PW_RK_STAGES], *stage_rate[PW_RK_STAGES];
-  double *q, *v, *a, *lambda; /* state of a stage, then the new state: laid out as in pw_run */
+  double *q, *v, *a, *lambda; /* the new state, laid out as in pw_run; before: q, lambda of a stage */
   double h, last_error;       /* adaptive: size of the next step, error of the last one */
   double *weight;             /* adaptive: reciprocal tolerances of each position and its velocity */
   pw_step_start last, second; /* of the last step, for samples inside it; of the second part of a divided step */
@@ -48,7 +48,7 @@ struct pw_method_data {
  * PW_RETRY if a smaller step may succeed; PW_METHOD if a signal failed. */
 int pw_rk_step (pw_run *r, double h, double t1, int project, double *added_energy);
 
-/* 1 if the next step ends with a projection. */
+/* 1 if the next step ends with a coordinate projection. */
 static inline int pw_rk_projects_next (const pw_run *r) {
   return r->data->projects && (r->statistics.steps + 1) % r->data->every == 0;
 }
@@ -62,8 +62,8 @@ void pw_rk_ledger (const pw_run *r, double *end, const double *beginning, double
 /* The distance of the new state from the sample (q_at, v_at): the largest difference in units of the scene. */
 double pw_rk_distance (const pw_run *r);
 
-/* Reports why no step from the state at t succeeds; h, status: size and result of the last attempt; divided: 1 if it
- * was divided near a singular configuration. */
+/* Reports why no step from the state at t succeeds; h: the size reported; status: result of the last attempt; divided:
+ * 1 if it was divided near a singular configuration. */
 int pw_rk_fail (pw_run *r, int status, double t, double h, int divided, pw_error *error);
 
 int pw_rk_advance_fixed (pw_run *r, double t_end, pw_error *error);

@@ -1,5 +1,6 @@
 /* The energy of a run and its ledger of work and losses: scales, tolerance, energy defect.  Every run keeps a ledger,
- * since its error takes part in step-size control. */
+ * since samples contain the total work and loss; in adaptive Runge-Kutta methods, radau included, its error takes part
+ * in step-size control. */
 #include <float.h>
 #include <math.h>
 #include <string.h>
@@ -103,7 +104,7 @@ double pw_run_energy_defect (const pw_run *r, const pw_sample *sample) {
 }
 
 const char *pw_run_energy_advice (const pw_run *r, double defect) {
-  const double least_rtol = 1e-12; /* that round-off allows */
+  const double least_rtol = 1e-12; /* smaller ones gain little over round-off */
   const double per_step = 10;      /* acceptable defect of a step over rtol */
   const pw_statistics *now = &r->statistics;
   int projects = pw_stabilised_by (r, PW_PROJECTION);

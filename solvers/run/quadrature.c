@@ -1,6 +1,6 @@
 /* Work and losses along the steps of a multistep method: the integral of a polynomial through the rates at the
- * states reached, one order above that of the step, at negligible cost; where that is not accurate enough, Gauss
- * quadrature inside the step.
+ * states reached, of a degree one above the order of the step if enough are stored, at negligible cost; where that is
+ * not accurate enough, Gauss quadrature inside the step.
  *
  *   p (t) = sum_j [t_0 ... t_j] prod_(i < j) (t - t_i),   t_0 the end of the step, t_1 its beginning, ...
  *

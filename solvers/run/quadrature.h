@@ -6,8 +6,8 @@
 
 enum { PW_QUADRATURE_POINTS = 7 }; /* at most: a polynomial through more would cost more than nodes inside the step */
 
-/* The rates of the ledger's entries at a time inside the last step, by the method's interpolation; changes only the
- * run's sample arrays and the kinematics.  Returns as pw_update_kinematics. */
+/* The rates of the ledger's entries at a time inside the last step, by the method's interpolation; changes the run's
+ * sample arrays, the kinematics, J and the saddle's factors.  PW_OK, or another status if they cannot be evaluated. */
 typedef int pw_rates_at (pw_run *r, double t, double *rate);
 
 typedef struct {
@@ -35,7 +35,8 @@ void pw_quadrature_restart (pw_quadrature *x, pw_run *r);
  * to date, and stay so.  Returns as pw_update_kinematics. */
 int pw_quadrature_step (pw_quadrature *x, pw_run *r, int order);
 
-/* Stores the ledger at a time inside the last step in r->ledger_at. */
+/* Stores the ledger at a time inside the last step in r->ledger_at; call it before the interpolation of the sample,
+ * since pw_rates_at may overwrite the other sample arrays and the kinematics. */
 void pw_quadrature_at (pw_quadrature *x, pw_run *r, double t);
 
 #endif

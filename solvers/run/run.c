@@ -113,7 +113,7 @@ static int run_has_no_method (const pw_run *r, pw_error *error) {
 }
 
 /* If the active rows have become nearly dependent, looks for another set that is not, with which the method is
- * reopened.  This is done only before the next step, since until then the last one may be sampled. */
+ * reopened.  This is done only before the next step or in a restart, since until then the last step may be sampled. */
 static int run_reselect (pw_run *r, pw_error *error) {
   if (r->redundant == 0 || r->independence >= r->reselect_below) return PW_OK;
   r->reselect_below = r->independence / 2;

@@ -13,7 +13,7 @@ enum { PROFILE_REPETITIONS = 5 }; /* of a measurement, of which the median count
 #define PROFILE_MEASUREMENT 0.005 /* minimum processor time of a measurement [s] */
 #define PROFILE_DISTANCE 1e-10    /* displacement off the constraints before a projection, in units of the scene */
 
-/* What is measured: PROFILE_STAGES stages of an evaluation, then other parts. */
+/* What is measured: the stages of an evaluation and the whole (PROFILE_STAGES in number), then other parts. */
 typedef enum {
   PROFILE_KINEMATICS,
   PROFILE_EQUATIONS,
@@ -172,7 +172,7 @@ static void profile_projection (profile *p, pw_profile *x) {
 
 static void profile_measure (profile *p, pw_profile *x) {
   profile_stages (p, x);
-  /* explicit methods only: their steps consist of these evaluations */
+  /* only without Newton matrices: the steps then consist of these evaluations */
   if (p->of_run.jacobians == 0 && p->of_run.steps > 0) {
     if (p->projector.position) profile_projection (p, x);
     x->evaluations = (double)p->of_run.rhs / (double)p->of_run.steps - x->projections;

@@ -68,8 +68,8 @@ void pw_watchdog_begin (pw_run *r) {
   memcpy (watch->previous_q, r->q, (size_t)r->s->coords * sizeof *watch->previous_q);
 }
 
-/* Checks the step to the state reached, where J is evaluated.  PW_METHOD if it has passed a change point without
- * resolving it. */
+/* Checks the step to the state reached, where J is evaluated.  PW_METHOD if it has left its branch, or passed a change
+ * point without resolving it; PW_RESOURCE. */
 static int watchdog_follow (pw_run *r, pw_error *error) {
   pw_watchdog *watch = &r->watchdog;
   int status = PW_OK;

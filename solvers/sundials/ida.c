@@ -136,7 +136,7 @@ static void ida_read (const pw_method_data *d, double *q, double *v, double *a, 
   pw_tangent_expand (&d->dae.tangent, ida_lambda (d, y, yp), lambda);
 }
 
-/* Interpolates the state at t into the sample arrays and updates kinematics.  Accelerations and multipliers are
+/* Interpolates the state at t into the sample arrays and updates kinematics and J.  Accelerations and multipliers are
  * computed from the state, since IDA's error test does not control those of IDA, which remain only in singular
  * configurations.  Returns an IDA flag. */
 static int ida_interpolate (pw_method_data *d, double t) {

@@ -35,7 +35,7 @@ typedef struct {
 int pw_sun_open (pw_sun *x, pw_run *r, int unknowns);
 void pw_sun_close (pw_sun *x);
 
-/* Restarts at the state reached. */
+/* Stores the state reached in y, t0 and `before`; the method then restarts its integrator. */
 void pw_sun_restart (pw_sun *x);
 
 /* A vector with the operations of vectors.c, as have its clones; NULL: out of memory. */
