@@ -11,7 +11,7 @@ static int check_parameter (const pw_plugin_table *t, const pw_parameter *p, con
     return pw_fail (error, PW_INPUT,
                     "%s: name, unit or meaning of parameter %s is not text: expected UTF-8 without control characters",
                     what, p->name);
-  if (p->offset + sizeof (double) > t->parameters_size)
+  if (p->offset > t->parameters_size || t->parameters_size - p->offset < sizeof (double))
     return pw_fail (error, PW_INPUT,
                     "%s: parameter %s lies outside the model's structure: set .parameters_size to its sizeof", what,
                     p->name);
