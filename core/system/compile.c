@@ -267,75 +267,6 @@ static int compile_batches (const compilation *job) {
   return PW_OK;
 }
 
-/* ---- Signals ---- */
-
-/* Copies the points of a table and computes its spline. */
-static int compile_table (const compilation *job, pw_source *source) {
-  pw_signal *s = &source->signal;
-  size_t n = (size_t)s->table.count;
-  double *t = compile_alloc (job, 4 * n, sizeof *t), *value = t + n;
-  if (t == NULL) return PW_RESOURCE;
-  memcpy (t, s->table.t, n * sizeof *t);
-  for (size_t i = 0; i < n; i++) value[i] = pw_table_value (s, (int)i);
-  s->table.t = t;
-  s->table.value = value;
-  s->table.scale = s->table.offset = 0;
-  source->spline = value + n;
-  pw_table_spline (s, source->spline);
-  return PW_OK;
-}
-
-/* Converts the names of the states that a function reads to indices. */
-static int compile_reads (const compilation *job, pw_source *source, const char *element) {
-  const char *const *reads = source->signal.function.reads;
-  int count = 0;
-  while (reads && reads[count]) count++;
-  int *state = compile_alloc (job, (size_t)count, sizeof *state);
-  if (state == NULL) return PW_RESOURCE;
-  for (int i = 0; i < count; i++) {
-    pw_error cause = { 0 };
-    state[i] = pw_system_find_state (job->s, reads[i], &cause);
-    if (state[i] < 0)
-      return pw_fail (job->error, PW_INPUT, "model %s: element %s reads a state: %s", job->m->name, element,
-                      cause.text);
-  }
-  source->state = state;
-  source->reads = count;
-  job->s->reads += count;
-  job->s->state_dependent += count > 0;
-  return PW_OK;
-}
-
-static int compile_source (const compilation *job, pw_source *source, const pw_signal *signal, const char *element) {
-  const pw_function *opens = signal->type == PW_FUNCTION && signal->function.open ? &signal->function : NULL;
-  void *context = opens ? opens->open (opens->context) : NULL;
-  if (opens && context == NULL) return compile_no_memory (job);
-  source->signal = *signal;
-  if (context) source->signal.function.context = context;
-  if (signal->type == PW_TABLE) return compile_table (job, source);
-  return signal->type == PW_FUNCTION ? compile_reads (job, source, element) : PW_OK;
-}
-
-/* Runs after all elements are stored, because signals may read their internal coordinates. */
-static int compile_signals (const compilation *job) {
-  int *next = job->count; /* reused: the number of elements of each batch whose signals are stored */
-  memset (next, 0, (size_t)job->s->batches * sizeof *next);
-  for (int n = 0; n < job->m->elements; n++) {
-    const pw_element *from = &job->m->element[n];
-    const pw_element_batch *k = &job->s->batch[job->batch_of[n]];
-    for (int copy = compile_copies (job->m, k->kind); copy > 0; copy--) {
-      int e = next[job->batch_of[n]]++;
-      for (int u = 0; u < k->kind->signals; u++) {
-        pw_source *source = &k->source[e * k->kind->signals + u];
-        source->of_force = pw_kind_signals_force (k->kind);
-        if (compile_source (job, source, pw_field_at (k->kind, from->definition, PW_SIGNAL, u), k->name[e]) != PW_OK)
-          return PW_INPUT;
-      }
-    }
-  }
-  return PW_OK;
-}
-
 /* ---- Initial values, scales ---- */
 
 /* Values of pw_model_set_initial. */
@@ -413,7 +344,7 @@ static int compile_all (compilation *job) {
   if (status == PW_OK) status = compile_arrays (job);
   if (status == PW_OK) status = compile_bodies (job);
   if (status == PW_OK) status = compile_batches (job);
-  if (status == PW_OK) status = compile_signals (job);
+  if (status == PW_OK) status = pw_compile_signals (job->s, job->m, job->batch_of, job->count, job->error);
   if (status == PW_OK) status = compile_initial (job);
   if (status != PW_OK) return status;
   job->s->scale = (pw_scale){ compile_length (job), 1 };
