@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes as c
+import functools
 import json
 import math
 import pathlib
@@ -17,7 +18,7 @@ import numpy as np
 from . import _library as lib
 from . import _program, studies
 from .results import Result, _nearest
-from .simulation import Simulation
+from .simulation import Simulation, specialised
 
 
 class _System:
@@ -429,11 +430,9 @@ class Model:
                       np.array(linear.twist))
 
 
-def specialised(when: str, steps: float) -> bool:
-    """Whether runs with this number of steps use compiled code."""
-    if when not in ("auto", "always", "never"):
-        raise lib.InputError(f"specialise = {when!r:.60}: expected auto, always or never")
-    return when == "always" or (when == "auto" and steps >= lib.PW_SPECIALISE_STEPS)
+@functools.wraps(studies.sweep)
+def sweep(model, *arguments, **settings):
+    return studies.sweep(model if isinstance(model, Model) else Model(model), *arguments, **settings)
 
 
 def _restore(origin, start, parameters):
