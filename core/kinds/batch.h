@@ -11,13 +11,8 @@
 #include "pinwheel.h"
 
 /* Inlines all calls in a function, so that it computes no part of a state that it does not use. */
-#if defined(__GNUC__)
 #define FLATTEN __attribute__ ((flatten))
 #define MAYBE_UNUSED __attribute__ ((unused))
-#else
-#define FLATTEN
-#define MAYBE_UNUSED
-#endif
 
 /* WHERE (condition, x): x where the condition holds, else an arbitrary number.  Code for several runs at once
  * (PW_LANES) has no branches; functions of libm are called for one run after the other, by the names that the x86-64
