@@ -316,10 +316,9 @@ static void compile_metric (pw_system *s) {
 static int compile_totals (const compilation *job) {
   pw_system *s = job->s;
   int constant = 0;
-  s->entries = pw_ledger_list (s, NULL);
-  s->entry = compile_alloc (job, (size_t)s->entries, sizeof *s->entry);
+  s->entry = compile_alloc (job, 2 * (size_t)pw_system_elements (s), sizeof *s->entry);
   if (s->entry == NULL) return PW_RESOURCE;
-  pw_ledger_list (s, s->entry);
+  s->entries = pw_ledger_list (s, s->entry);
   for (int i = 0; i < s->batches; i++) {
     const pw_kind *kind = s->batch[i].kind;
     s->constraints += kind->rows > 0;

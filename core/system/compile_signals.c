@@ -2,16 +2,12 @@
 #include <string.h>
 #include "system.h"
 
-static int signals_no_memory (const pw_system *s, pw_error *error) {
-  return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
-}
-
 /* Copies the points of a table and computes its spline. */
 static int signals_table (pw_system *s, pw_source *source, pw_error *error) {
   pw_points *table = &source->signal.table;
   size_t n = (size_t)table->count;
   double *t = pw_arena_alloc (&s->arena, 4 * n * sizeof *t), *value = t + n;
-  if (t == NULL) return signals_no_memory (s, error);
+  if (t == NULL) return pw_fail_memory (s, error);
   memcpy (t, table->t, n * sizeof *t);
   for (size_t i = 0; i < n; i++) value[i] = pw_table_value (&source->signal, (int)i);
   table->t = t;
@@ -28,7 +24,7 @@ static int signals_reads (pw_system *s, pw_source *source, const char *element, 
   int count = 0;
   while (reads && reads[count]) count++;
   int *state = pw_arena_alloc (&s->arena, (size_t)count * sizeof *state);
-  if (state == NULL) return signals_no_memory (s, error);
+  if (state == NULL) return pw_fail_memory (s, error);
   for (int i = 0; i < count; i++) {
     pw_error cause = { 0 };
     state[i] = pw_system_find_state (s, reads[i], &cause);
@@ -46,7 +42,7 @@ static int signals_source (pw_system *s, pw_source *source, const pw_signal *sig
                            pw_error *error) {
   const pw_function *opens = signal->type == PW_FUNCTION && signal->function.open ? &signal->function : NULL;
   void *context = opens ? opens->open (opens->context) : NULL;
-  if (opens && context == NULL) return signals_no_memory (s, error);
+  if (opens && context == NULL) return pw_fail_memory (s, error);
   source->signal = *signal;
   if (context) source->signal.function.context = context;
   if (signal->type == PW_TABLE) return signals_table (s, source, error);

@@ -90,7 +90,7 @@ pw_workspace *pw_workspace_new (const pw_system *s, pw_error *error) {
     if (workspace_open_signals (w) == PW_OK) return w;
   }
   pw_workspace_free (w);
-  pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
+  pw_fail_memory (s, error);
   return NULL;
 }
 
