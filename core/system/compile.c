@@ -1,6 +1,7 @@
 /* Compiles a model: names become indices, the elements of each type become one batch.
  *
- * All arrays of the system are in its arena.  Data needed only during compilation are in `scratch`. */
+ * All arrays of the system but that of the batches are in its arena.  Data needed only during compilation are in
+ * `scratch`. */
 #include <limits.h>
 #include <math.h>
 #include <stdlib.h>
@@ -19,8 +20,6 @@ typedef struct {
   pw_error *error;
   pw_arena scratch;
   pw_names body, element;
-  const pw_kind **kind;    /* element types in use, in the order of the batches */
-  int *count;              /* number of elements of each of them */
   int *batch_of;           /* for each element of the model: index of its batch */
   size_t bytes;            /* of the largest element and its guard */
   unsigned char *prepared; /* bytes: memory in which an element is prepared */
@@ -77,27 +76,29 @@ static int compile_copies (const pw_model *m, const pw_kind *kind) {
   return massive;
 }
 
-/* Batches: holonomic types in order of appearance, then nonholonomic ones, then forces. */
+/* Counts the elements of each batch: holonomic types in order of appearance, then nonholonomic ones, then forces. */
 static int compile_types (compilation *job) {
   static const pw_level order[] = { PW_HOLONOMIC, PW_NONHOLONOMIC, PW_FORCE };
   const pw_model *m = job->m;
-  size_t types = (size_t)m->elements + 1;
+  pw_system *s = job->s;
+  size_t room = 0;
   double elements = 0;
-  job->kind = pw_arena_alloc (&job->scratch, types * sizeof *job->kind);
-  job->count = pw_arena_alloc (&job->scratch, types * sizeof *job->count);
-  job->batch_of = pw_arena_alloc (&job->scratch, types * sizeof *job->batch_of);
-  if (job->kind == NULL || job->count == NULL || job->batch_of == NULL) return compile_no_memory (job);
+  job->batch_of = pw_arena_alloc (&job->scratch, (size_t)m->elements * sizeof *job->batch_of);
+  if (job->batch_of == NULL || pw_grow (&s->batch, 0, &room, sizeof *s->batch) != PW_OK) return compile_no_memory (job);
   for (int l = 0; l < 3; l++)
     for (int i = 0; i < m->elements; i++) {
       const pw_kind *kind = m->element[i].kind;
       if (kind->level != order[l]) continue;
       int k = 0;
-      while (k < job->s->batches && job->kind[k] != kind) k++;
-      if (k == job->s->batches) job->kind[job->s->batches++] = kind;
+      while (k < s->batches && s->batch[k].kind != kind) k++;
+      if (k == s->batches) {
+        if (pw_grow (&s->batch, (size_t)k, &room, sizeof *s->batch) != PW_OK) return compile_no_memory (job);
+        s->batch[s->batches++] = (pw_element_batch){ .kind = kind };
+      }
       int copies = compile_copies (m, kind);
       elements += copies;
       if (elements > COMPILE_MOST) return compile_too_large (job);
-      job->count[k] += copies;
+      s->batch[k].b.count += copies;
       job->batch_of[i] = k;
       if (job->bytes < kind->element + COMPILE_GUARD) job->bytes = kind->element + COMPILE_GUARD;
     }
@@ -110,11 +111,11 @@ static int compile_count (const compilation *job) {
   pw_system *s = job->s;
   double coords = 3.0 * m->bodies;
   if (m->bodies == 0) return pw_fail (job->error, PW_INPUT, "model %s has no body", m->name);
-  for (int k = 0; k < s->batches; k++) {
-    coords += (double)job->count[k] * job->kind[k]->internal;
-    s->rows += job->count[k] * job->kind[k]->rows;
-    if (job->kind[k]->level == PW_HOLONOMIC) s->holonomic = s->rows; /* these batches come first */
-    s->sources += job->count[k] * job->kind[k]->signals;
+  for (const pw_element_batch *k = s->batch; k < s->batch + s->batches; k++) {
+    coords += (double)k->b.count * k->kind->internal;
+    s->rows += k->b.count * k->kind->rows;
+    if (k->kind->level == PW_HOLONOMIC) s->holonomic = s->rows; /* these batches come first */
+    s->sources += k->b.count * k->kind->signals;
   }
   if (coords > COMPILE_MOST || s->rows > COMPILE_MOST) return compile_too_large (job);
   s->bodies = m->bodies;
@@ -125,7 +126,6 @@ static int compile_count (const compilation *job) {
 static int compile_arrays (const compilation *job) {
   pw_system *s = job->s;
   size_t coords = (size_t)s->coords, bodies = (size_t)s->bodies;
-  s->batch = compile_alloc (job, (size_t)s->batches, sizeof *s->batch);
   s->source = compile_alloc (job, (size_t)s->sources, sizeof *s->source);
   s->body_name = compile_alloc (job, bodies, sizeof *s->body_name);
   s->mass = compile_alloc (job, coords, sizeof *s->mass);
@@ -134,7 +134,7 @@ static int compile_arrays (const compilation *job) {
   s->q0 = compile_alloc (job, coords, sizeof *s->q0);
   s->v0 = compile_alloc (job, coords, sizeof *s->v0);
   s->origin = compile_alloc (job, 2 * coords, 1);
-  int complete = s->batch && s->source && s->body_name && s->mass && s->metric && s->constant && s->q0 && s->v0;
+  int complete = s->source && s->body_name && s->mass && s->metric && s->constant && s->q0 && s->v0;
   return complete && s->origin ? PW_OK : PW_RESOURCE;
 }
 
@@ -249,19 +249,20 @@ static int compile_batches (const compilation *job) {
   int row = 0, internal = 3 * s->bodies;
   pw_source *source = s->source;
   for (int i = 0; i < s->batches; i++) {
-    const pw_kind *kind = job->kind[i];
-    size_t n = (size_t)job->count[i], bodies = n * (size_t)kind->bodies;
+    pw_element_batch *k = &s->batch[i];
+    const pw_kind *kind = k->kind;
+    int count = k->b.count;
+    size_t n = (size_t)count, bodies = n * (size_t)kind->bodies;
     batch_arrays a = { compile_alloc (job, n, kind->element), compile_alloc (job, bodies, sizeof (int)),
                        compile_alloc (job, bodies, sizeof (int)), compile_alloc (job, n, sizeof (char *)) };
     if (!a.element || !a.body || !a.column || !a.name) return PW_RESOURCE;
-    pw_element_batch *k = &s->batch[i];
     *k = (pw_element_batch){
       .kind = kind, .row = row, .internal = internal, .column = a.column, .name = a.name, .source = source
     };
-    k->b = (pw_batch){ job->count[i], 3 * kind->bodies + kind->internal, .element = a.element, .body = a.body };
-    row += job->count[i] * kind->rows;
-    internal += job->count[i] * kind->internal;
-    source += job->count[i] * kind->signals;
+    k->b = (pw_batch){ count, 3 * kind->bodies + kind->internal, .element = a.element, .body = a.body };
+    row += count * kind->rows;
+    internal += count * kind->internal;
+    source += count * kind->signals;
     if (compile_batch (job, i, &a) != PW_OK) return PW_INPUT;
   }
   return PW_OK;
@@ -343,7 +344,7 @@ static int compile_all (compilation *job) {
   if (status == PW_OK) status = compile_arrays (job);
   if (status == PW_OK) status = compile_bodies (job);
   if (status == PW_OK) status = compile_batches (job);
-  if (status == PW_OK) status = pw_compile_signals (job->s, job->m, job->batch_of, job->count, job->error);
+  if (status == PW_OK) status = pw_compile_signals (job->s, job->m, job->batch_of, job->error);
   if (status == PW_OK) status = compile_initial (job);
   if (status != PW_OK) return status;
   job->s->scale = (pw_scale){ compile_length (job), 1 };
@@ -373,5 +374,6 @@ void pw_system_free (pw_system *s) {
   if (s == NULL) return;
   pw_close_signals (s->source, s->source ? s->sources : 0);
   pw_arena_free (&s->arena);
+  free (s->batch);
   free (s);
 }

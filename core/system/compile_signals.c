@@ -60,8 +60,9 @@ static int signals_element (pw_system *s, const pw_element_batch *k, int e, cons
   return PW_OK;
 }
 
-int pw_compile_signals (pw_system *s, const pw_model *m, const int *batch_of, int *next, pw_error *error) {
-  memset (next, 0, (size_t)s->batches * sizeof *next);
+int pw_compile_signals (pw_system *s, const pw_model *m, const int *batch_of, pw_error *error) {
+  int *next = pw_arena_alloc (&s->arena, (size_t)s->batches * sizeof *next); /* next element of each batch */
+  if (next == NULL) return pw_fail_memory (s, error);
   for (int n = 0; n < m->elements; n++) {
     const pw_element *from = &m->element[n];
     const pw_element_batch *k = &s->batch[batch_of[n]];

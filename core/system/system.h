@@ -33,7 +33,7 @@ typedef struct {
 
 /* Constant after pw_system_compile: any number of runs and threads may share it. */
 struct pw_system {
-  pw_arena arena; /* contains all arrays */
+  pw_arena arena; /* contains all arrays but `batch` */
   const char *model;
   int bodies, coords, rows, holonomic, batches, entries;
   int constraints;         /* batches with constraint equations */
@@ -74,8 +74,8 @@ struct pw_workspace {
 int pw_ledger_list (const pw_system *s, pw_entry *entry);
 
 /* Compiles the signals of all elements, which must be stored, because signals may read their internal coordinates.
- * batch_of: the batch of each element of the model; next: batches, scratch.  PW_INPUT, PW_RESOURCE. */
-int pw_compile_signals (pw_system *s, const pw_model *m, const int *batch_of, int *next, pw_error *error);
+ * batch_of: the batch of each element of the model.  PW_INPUT, PW_RESOURCE. */
+int pw_compile_signals (pw_system *s, const pw_model *m, const int *batch_of, pw_error *error);
 
 static inline int pw_fail_memory (const pw_system *s, pw_error *error) {
   return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);

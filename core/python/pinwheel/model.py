@@ -215,7 +215,7 @@ class Model:
     def __reduce__(self):
         if self.signals:
             raise TypeError("a model with functions as signals cannot be sent to other processes")
-        return _restore, (self._origin, self.start, self._given)
+        return functools.partial(Model, self._origin, start=self.start, **self._given), ()
 
     def __copy__(self) -> Model:
         return self.replace()
@@ -433,10 +433,6 @@ class Model:
 @functools.wraps(studies.sweep)
 def sweep(model, *arguments, **settings):
     return studies.sweep(model if isinstance(model, Model) else Model(model), *arguments, **settings)
-
-
-def _restore(origin, start, parameters):
-    return Model(origin, start=start, **parameters)
 
 
 def _functions(signals):
