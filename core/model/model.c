@@ -210,16 +210,6 @@ pw_error *pw_model_error (pw_model *m) {
   return &m->error;
 }
 
-/* The element of this name, or NULL; *near collects the names. */
-static const pw_element *model_find_element (const pw_model *m, const char *name, pw_nearest *near) {
-  for (const pw_element *e = m->element; e < m->element + m->elements; e++) {
-    if (pw_element_name (e) == NULL) continue;
-    pw_nearest_try (near, pw_element_name (e));
-    if (strcmp (pw_element_name (e), name) == 0) return e;
-  }
-  return NULL;
-}
-
 /* The signal of this name in an element, or NULL; *near collects the names. */
 static pw_signal *model_find_signal (const pw_element *e, const char *name, pw_nearest *near) {
   char known[80];
@@ -240,7 +230,12 @@ int pw_model_set_signal (pw_model *m, const char *element, const char *field, co
                     : field == NULL ? "the name of a field"
                                     : "a signal");
   pw_nearest elements = { .sought = element }, fields = { .sought = field };
-  const pw_element *e = model_find_element (m, element, &elements);
+  const pw_element *e = NULL;
+  for (int i = 0; i < m->elements && e == NULL; i++) {
+    const char *name = pw_element_name (&m->element[i]);
+    if (name) pw_nearest_try (&elements, name);
+    if (name && strcmp (name, element) == 0) e = &m->element[i];
+  }
   if (e == NULL)
     return pw_fail (error, PW_INPUT, "model %s has no element \"%s\"%s", m->name, element, pw_nearest_text (&elements));
   pw_signal *replaced = model_find_signal (e, field, &fields);

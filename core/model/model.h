@@ -40,8 +40,9 @@ struct pw_model {
 /* The longest name [bytes]: "KIND ELEMENT" and "ELEMENT.REACTION" fit in a buffer of 120. */
 enum { PW_NAME_MAX = 50 };
 
-/* Checks every body and element: names, numbers, signals, and whether the bodies of elements are in the table. */
-int pw_check_model (const pw_model *m, const pw_names *bodies, pw_error *error);
+/* Checks every body and element: names, numbers, signals, and whether the table has the bodies of elements: numbers
+ * below m->bodies. */
+int pw_check_model (const pw_model *m, const pw_names *names, pw_error *error);
 
 /* Returns what is wrong with an element type's table (in the buffer, or a constant), or "".  No other function may be
  * called with a table that has not passed. */

@@ -19,7 +19,7 @@ typedef struct {
   pw_system *s;
   pw_error *error;
   pw_arena scratch;
-  pw_names body, element;
+  pw_names name;           /* of bodies: their indices; of elements: theirs plus the number of bodies */
   int *batch_of;           /* for each element of the model: index of its batch */
   size_t bytes;            /* of the largest element and its guard */
   unsigned char *prepared; /* bytes: memory in which an element is prepared */
@@ -50,20 +50,18 @@ static const char *compile_text (const compilation *job, const char *text) {
 
 static int compile_names (compilation *job) {
   const pw_model *m = job->m;
-  if (pw_names_open (&job->body, (size_t)m->bodies) != PW_OK ||
-      pw_names_open (&job->element, (size_t)m->elements) != PW_OK)
-    return compile_no_memory (job);
+  if (pw_names_open (&job->name, (size_t)m->bodies + (size_t)m->elements) != PW_OK) return compile_no_memory (job);
   for (int i = 0; i < m->bodies; i++)
-    if (m->body[i].name && pw_names_add (&job->body, m->body[i].name, i) >= 0)
+    if (m->body[i].name && pw_names_add (&job->name, m->body[i].name, i) >= 0)
       return pw_fail (job->error, PW_INPUT, "model %s: two bodies are named \"%s\"", m->name, m->body[i].name);
   for (int i = 0; i < m->elements; i++) {
     const char *name = pw_element_name (&m->element[i]);
-    if (name == NULL) continue;
-    if (pw_names_find (&job->body, name) >= 0)
+    int other = name ? pw_names_add (&job->name, name, m->bodies + i) : -1;
+    if (other >= m->bodies)
+      return pw_fail (job->error, PW_INPUT, "model %s: two elements are named \"%s\"", m->name, name);
+    if (other >= 0)
       return pw_fail (job->error, PW_INPUT, "model %s: a body and a %s are both named \"%s\"", m->name,
                       m->element[i].kind->name, name);
-    if (pw_names_add (&job->element, name, i) >= 0)
-      return pw_fail (job->error, PW_INPUT, "model %s: two elements are named \"%s\"", m->name, name);
   }
   return PW_OK;
 }
@@ -128,14 +126,11 @@ static int compile_arrays (const compilation *job) {
   size_t coords = (size_t)s->coords, bodies = (size_t)s->bodies;
   s->source = compile_alloc (job, (size_t)s->sources, sizeof *s->source);
   s->body_name = compile_alloc (job, bodies, sizeof *s->body_name);
-  s->mass = compile_alloc (job, coords, sizeof *s->mass);
-  s->metric = compile_alloc (job, coords, sizeof *s->metric);
-  s->constant = compile_alloc (job, coords + 3, sizeof *s->constant);
-  s->q0 = compile_alloc (job, coords, sizeof *s->q0);
-  s->v0 = compile_alloc (job, coords, sizeof *s->v0);
+  s->mass = compile_alloc (job, 5 * coords + 3, sizeof *s->mass); /* and those after it */
   s->origin = compile_alloc (job, 2 * coords, 1);
-  int complete = s->source && s->body_name && s->mass && s->metric && s->constant && s->q0 && s->v0;
-  return complete && s->origin ? PW_OK : PW_RESOURCE;
+  if (s->source == NULL || s->body_name == NULL || s->mass == NULL || s->origin == NULL) return PW_RESOURCE;
+  s->metric = s->mass + coords, s->q0 = s->metric + coords, s->v0 = s->q0 + coords, s->constant = s->v0 + coords;
+  return PW_OK;
 }
 
 /* ---- Bodies and elements ---- */
@@ -204,7 +199,7 @@ static int compile_element (const compilation *job, const pw_element_batch *k, c
   for (int n = 0; n < kind->bodies; n++) {
     int index =
         body >= 0 ? body
-                  : pw_names_find (&job->body, *(const char *const *)pw_field_at (kind, from->definition, PW_BODY, n));
+                  : pw_names_find (&job->name, *(const char *const *)pw_field_at (kind, from->definition, PW_BODY, n));
     bodies[n] = index < 0 ? &ground : &job->m->body[index];
     a->body[e * kind->bodies + n] = index < 0 ? s->bodies : index;
     a->column[e * kind->bodies + n] = index < 0 ? s->coords : 3 * index;
@@ -338,7 +333,7 @@ static int compile_totals (const compilation *job) {
 
 static int compile_all (compilation *job) {
   int status = compile_names (job);
-  if (status == PW_OK) status = pw_check_model (job->m, &job->body, job->error);
+  if (status == PW_OK) status = pw_check_model (job->m, &job->name, job->error);
   if (status == PW_OK) status = compile_types (job);
   if (status == PW_OK) status = compile_count (job);
   if (status == PW_OK) status = compile_arrays (job);
@@ -362,8 +357,7 @@ pw_system *pw_system_compile (const pw_model *m, pw_error *error) {
     status = pw_fail (error, m->error.status, "%s", m->error.text);
   else
     status = job.s ? compile_all (&job) : compile_no_memory (&job);
-  pw_names_close (&job.body);
-  pw_names_close (&job.element);
+  pw_names_close (&job.name);
   pw_arena_free (&job.scratch);
   if (status == PW_OK) return job.s;
   pw_system_free (job.s);

@@ -69,6 +69,7 @@ static void test_bad_references (void **state) {
   BAD (": pin B: there is no body \"ster\"; did you mean \"steer\"?", PIN (.name = "B", .body = { "frame", "ster" }));
   BAD (": pin B: there is no body \"Ground\"; did you mean \"ground\"?",
        PIN (.name = "B", .body = { "frame", "Ground" }));
+  BAD (": wheel A: there is no body \"A\"; valid are frame, steer, ground", WHEEL (.name = "A", .body = "A"));
   BAD (": pin B: a body is missing (the ground is \"ground\")", PIN (.name = "B", .body = { "frame" }));
   BAD (": wheel A: a body is missing (the ground is \"ground\")", WHEEL (.name = "A", .body = ""));
   BAD (": pin B: both of its bodies are \"frame\": expected different ones",
