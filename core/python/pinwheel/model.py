@@ -21,7 +21,18 @@ from .results import Result, _nearest
 from .simulation import Simulation, specialised
 
 
-class _System:
+class _Handle:
+    """A C object and the function that deletes it."""
+
+    def __init__(self, pointer, free):
+        self.pointer, self._free = pointer, free
+
+    def __del__(self):
+        if self.pointer:
+            self._free(self.pointer)
+
+
+class _System(_Handle):
     """A compiled system, which simulations share.
 
     keep: objects to which the system refers; raised: exceptions raised by signals in Python, by thread, see _callback.
@@ -30,13 +41,10 @@ class _System:
     _compiling = threading.Lock()  # one specialised code at a time
 
     def __init__(self, pointer, keep, raised):
-        self.pointer, self._keep, self._raised = pointer, keep, raised
+        super().__init__(pointer, lib.core.pw_system_free)
+        self._keep, self._raised = keep, raised
         self._code = _Handle(None, lib.files.pw_scene_code_close)
         self._code_tried = False
-
-    def __del__(self):
-        if self.pointer:
-            lib.core.pw_system_free(self.pointer)
 
     def code(self) -> int | None:
         """Specialised code, compiled or from the cache; None if there cannot be any."""
@@ -88,17 +96,6 @@ class _Described:
 
     def __reduce__(self):
         return _Described, (self._name, self._text)
-
-
-class _Handle:
-    """A C object and the function that deletes it."""
-
-    def __init__(self, pointer, free):
-        self.pointer, self._free = pointer, free
-
-    def __del__(self):
-        if self.pointer:
-            self._free(self.pointer)
 
 
 @dataclass(frozen=True)
