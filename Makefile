@@ -151,8 +151,8 @@ $(call obj,core/cli/page/page.c): $(BUILD)/obj/core/cli/page/page.inc
 $(call obj,core/cli/page/page.c): INCLUDE += -iquote $(BUILD)/obj/core/cli/page
 $(call obj,core/cli/plot/animate.c): $(BUILD)/obj/core/cli/plot/animate.inc
 $(call obj,core/cli/plot/figure.c): $(BUILD)/obj/core/cli/plot/templates.inc
-$(call obj,core/specialise/sources.c): $(BUILD)/obj/core/specialise/sources.inc
-$(call obj,core/specialise/sources.c): INCLUDE += -iquote $(BUILD)/obj/core/specialise
+$(call obj,core/specialise/specialise.c): $(BUILD)/obj/core/specialise/source_texts.inc
+$(call obj,core/specialise/specialise.c): INCLUDE += -iquote $(BUILD)/obj/core/specialise
 $(call obj,core/cli/parallel.c core/cli/sweep/sweep_rows.c $(wildcard core/cli/fit/*.c)) $(BUILD)/pinwheel: private THREADS = -pthread
 ALL_LAYERS := $(CORE_LAYERS) $(FILE_LAYERS) $(SOLVER_LAYERS)
 # Functions of tests that replace those of other libraries must be visible to these.
@@ -207,7 +207,7 @@ WASM       := $(filter-out solvers/jacobian/sparse.c solvers/analysis/% solvers/
   $(wildcard core/cli/page/engine/*.c)
 WASM_OBJ   := $(WASM:%.c=$(BUILD)/wasm/%.o)
 
-$(BUILD)/wasm/%.o: %.c $(BUILD)/obj/core/cli/plot/animate.inc $(BUILD)/obj/core/specialise/sources.inc | $(FIRST)
+$(BUILD)/wasm/%.o: %.c $(BUILD)/obj/core/cli/plot/animate.inc $(BUILD)/obj/core/specialise/source_texts.inc | $(FIRST)
 	@mkdir -p $(@D)
 	$(call say,WASM)
 	$(Q)$(WASM_CC) $(WASM_FLAGS) -MMD -MP -c $< -o $@
@@ -224,11 +224,11 @@ $(BUILD)/page/pinwheel.wasm: $(BUILD)/page/pinwheel-page.objects core/cli/page/e
 
 # Texts of the sources that specialised scenes contain.
 SPECIALISED := core/specialise/specialised.h core/base/sine.h $(wildcard core/specialise/*.inc core/kinds/*.h core/kinds/*/*.c)
-$(BUILD)/obj/core/specialise/sources.inc: $(SPECIALISED)
+$(BUILD)/obj/core/specialise/source_texts.inc: $(SPECIALISED)
 	@mkdir -p $(@D)
 	@for f in $^; do echo "static const char *const source_$$(basename $$f | tr .- __)[] = {"; \
 	  sed 's/^const pw_kind pw_kind_/static const pw_kind scene_/' $$f | $(AS_STRINGS); echo 'NULL };'; done >$@
-	@echo 'const pw_source_text pw_source_texts[] = {' >>$@
+	@echo 'static const source_text source_texts[] = {' >>$@
 	@for f in $^; do n=$$(basename $$f); echo "{ \"$$n\", source_$$(echo $$n | tr .- __) },"; done >>$@
 	@echo '{ NULL, NULL } };' >>$@
 

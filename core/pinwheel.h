@@ -645,7 +645,8 @@ int pw_model_set (pw_model *m, const char *parameter, double value, pw_error *er
  * for a second call.  Values are checked by pw_system_compile. */
 int pw_model_build (pw_model *m, pw_error *error);
 
-/* Replaces a signal of a built model; pw_system_compile checks it.  PW_INPUT for an unknown element or field. */
+/* Replaces a signal of a built model; pw_system_compile checks it.  field: "value", or "value[1]" if it has several
+ * signals.  PW_INPUT for an unknown element or field. */
 int pw_model_set_signal (pw_model *m, const char *element, const char *field, const pw_signal *signal, pw_error *error);
 
 /* Prescribes the initial value of a state, "frame.vx" or "wheel.spin", which the consistent initial state keeps if

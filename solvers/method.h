@@ -219,9 +219,6 @@ static inline size_t pw_state_length (const pw_system *s) {
   return 3 * ((size_t)s->coords + 3) + (size_t)s->rows;
 }
 
-static inline int pw_fail_memory (const pw_system *s, pw_error *error) {
-  return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
-}
 static inline int pw_fail_signal (double t, pw_error *error) {
   return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", t);
 }

@@ -1,4 +1,5 @@
 /* Checksums, arrays that grow, tables of names, arenas, and arrays in one allocation. */
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 #include "util.h"
@@ -66,6 +67,7 @@ static size_t store_round (size_t bytes, size_t align) {
 
 static void *store_alloc (pw_arena *a, size_t bytes, size_t align) {
   size_t used = a->chunk ? store_round (a->chunk->used, align) : 0;
+  if (bytes > PTRDIFF_MAX) return NULL; /* sizes below would overflow */
   if (a->chunk == NULL || a->chunk->size < used || a->chunk->size - used < bytes) {
     size_t size = bytes > STORE_CHUNK ? bytes : STORE_CHUNK;
     struct pw_chunk *c = calloc (1, sizeof *c + size);

@@ -11,13 +11,8 @@
 #include "pinwheel.h"
 
 /* Inlines all calls in a function, so that it computes no part of a state that it does not use. */
-#if defined(__GNUC__)
 #define FLATTEN __attribute__ ((flatten))
 #define MAYBE_UNUSED __attribute__ ((unused))
-#else
-#define FLATTEN
-#define MAYBE_UNUSED
-#endif
 
 /* WHERE (condition, x): x where the condition holds, else an arbitrary number.  Code for several runs at once
  * (PW_LANES) has no branches; functions of libm are called for one run after the other, by the names that the x86-64
@@ -91,6 +86,7 @@ LIBM (libm_hypot (libm_lanes x, libm_lanes y)) {
 #define POSITION(type) .g = type##_g, .g_size = type##_g_size
 #define DERIVATIVES(type) .jw_q = type##_jw_q, .gamma_q = type##_gamma_q, .gamma_v = type##_gamma_v
 #define CONSTRAINT(type) .J = type##_J, .gamma = type##_gamma, DERIVATIVES (type)
+#define EACH_DERIVATIVE(X) X (jw_q) X (gamma_q) X (gamma_v) /* X: a macro that defines the function of one */
 #define FORCE(type) .force = type##_force, .force_q = type##_force_q, .force_v = type##_force_v
 
 /* The only reaction of a type: its name, unit and meaning. */

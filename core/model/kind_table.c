@@ -1,5 +1,6 @@
 /* Element types: the list of built-in ones, the fields of a definition, and checks of a type's table.  A table is
  * checked before use, so that a mistake in a plug-in is reported instead of crashing the program. */
+#include <limits.h>
 #include <stdio.h>
 #include <string.h>
 #include "model.h"
@@ -32,6 +33,14 @@ const void *pw_field_at (const pw_kind *kind, const void *definition, pw_field_t
     index -= pw_field_count (f);
   }
   return NULL;
+}
+
+char *pw_signal_field_name (const pw_field *f, int i, char *buffer, size_t size) {
+  if (pw_field_count (f) > 1)
+    snprintf (buffer, size, "%s[%d]", f->name, i);
+  else
+    snprintf (buffer, size, "%s", f->name);
+  return buffer;
 }
 
 _Static_assert(PW_NAME_MAX == 50, "as in FAULT_TEXT");
@@ -116,6 +125,7 @@ const char *pw_kind_check (const pw_kind *kind, char *buffer, size_t size) {
     return "rows and level are inconsistent";
   if ((kind->internal > 0 || kind->element > 0) && kind->prepare == NULL)
     return "a prepared element (.element > 0) or internal coordinates, but no prepare function";
+  if (kind->element > INT_MAX) return "a prepared element of more than 2147483647 bytes";
   const char *fault = fault_names (kind);
   if (*fault == 0) fault = fault_fields (kind, buffer, size);
   return *fault ? fault : fault_functions (kind);

@@ -34,7 +34,7 @@ pw_model *pw_model_new (const char *name, const pw_plugin_table *table, pw_error
   if (m) {
     m->table = table;
     m->name = pw_arena_copy (&m->arena, name);
-    m->parameters = pw_arena_alloc (&m->arena, table->parameters_size + 1);
+    m->parameters = pw_arena_alloc (&m->arena, table->parameters_size);
   }
   if (m == NULL || m->name == NULL || m->parameters == NULL) {
     pw_model_free (m);
@@ -210,6 +210,17 @@ pw_error *pw_model_error (pw_model *m) {
   return &m->error;
 }
 
+/* The signal of this name in an element, or NULL; *near collects the names. */
+static pw_signal *model_find_signal (const pw_element *e, const char *name, pw_nearest *near) {
+  char known[80];
+  for (const pw_field *f = e->kind->fields; f->name; f++)
+    for (int i = 0; f->type == PW_SIGNAL && i < pw_field_count (f); i++) {
+      pw_nearest_try (near, pw_signal_field_name (f, i, known, sizeof known));
+      if (strcmp (known, name) == 0) return (pw_signal *)(void *)((char *)e->definition + f->offset) + i;
+    }
+  return NULL;
+}
+
 int pw_model_set_signal (pw_model *m, const char *element, const char *field, const pw_signal *signal,
                          pw_error *error) {
   if (pw_require (m, "a model", error) != PW_OK) return PW_INPUT;
@@ -227,13 +238,12 @@ int pw_model_set_signal (pw_model *m, const char *element, const char *field, co
   }
   if (e == NULL)
     return pw_fail (error, PW_INPUT, "model %s has no element \"%s\"%s", m->name, element, pw_nearest_text (&elements));
-  const pw_field *f = e->kind->fields;
-  for (; f->name && !(f->type == PW_SIGNAL && strcmp (f->name, field) == 0); f++)
-    if (f->type == PW_SIGNAL) pw_nearest_try (&fields, f->name);
-  if (f->name == NULL)
+  pw_signal *replaced = model_find_signal (e, field, &fields);
+  if (replaced == NULL)
     return pw_fail (error, PW_INPUT, "model %s: %s %s has no signal \"%s\"%s", m->name, e->kind->name, element, field,
                     pw_nearest_text (&fields));
-  model_copy_signal (m, memcpy ((char *)e->definition + f->offset, signal, sizeof *signal));
+  *replaced = *signal;
+  model_copy_signal (m, replaced);
   return model_status (m, error);
 }
 

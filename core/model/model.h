@@ -40,8 +40,9 @@ struct pw_model {
 /* The longest name [bytes]: "KIND ELEMENT" and "ELEMENT.REACTION" fit in a buffer of 120. */
 enum { PW_NAME_MAX = 50 };
 
-/* Checks every body and element: names, numbers, signals, and whether the bodies of elements are in the table. */
-int pw_check_model (const pw_model *m, const pw_names *bodies, pw_error *error);
+/* Checks every body and element: names, numbers, signals, and whether the table has the bodies of elements: numbers
+ * below m->bodies. */
+int pw_check_model (const pw_model *m, const pw_names *names, pw_error *error);
 
 /* Returns what is wrong with an element type's table (in the buffer, or a constant), or "".  No other function may be
  * called with a table that has not passed. */
@@ -49,6 +50,9 @@ const char *pw_kind_check (const pw_kind *kind, char *buffer, size_t size);
 
 /* 1 for the library's own element types, 0 for those of plug-ins. */
 int pw_kind_is_built_in (const pw_kind *kind);
+
+/* The name of signal i of a field, "torque", or "u[1]" if the field has several; writes it to the buffer. */
+char *pw_signal_field_name (const pw_field *f, int i, char *buffer, size_t size);
 
 /* As pw_field_at, for a definition that will be modified. */
 static inline void *pw_field_mutable (const pw_kind *kind, void *definition, pw_field_type type, int index) {

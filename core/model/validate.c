@@ -11,7 +11,7 @@ static int check_parameter (const pw_plugin_table *t, const pw_parameter *p, con
     return pw_fail (error, PW_INPUT,
                     "%s: name, unit or meaning of parameter %s is not text: expected UTF-8 without control characters",
                     what, p->name);
-  if (p->offset + sizeof (double) > t->parameters_size)
+  if (p->offset > t->parameters_size || t->parameters_size - p->offset < sizeof (double))
     return pw_fail (error, PW_INPUT,
                     "%s: parameter %s lies outside the model's structure: set .parameters_size to its sizeof", what,
                     p->name);
@@ -81,13 +81,14 @@ static int check_signal (const pw_model *m, const pw_element *e, const pw_field 
                   fault);
 }
 
-static int check_body_name (const pw_model *m, const pw_element *e, const char *body, const pw_names *bodies,
+static int check_body_name (const pw_model *m, const pw_element *e, const char *body, const pw_names *names,
                             pw_error *error) {
   const char *kind = e->kind->name, *name = pw_element_name (e);
   if (body == NULL || *body == 0)
     return pw_fail (error, PW_INPUT, "model %s: %s %s: a body is missing (the ground is \"ground\")", m->name, kind,
                     name);
-  if (strcmp (body, "ground") == 0 || bodies == NULL || pw_names_find (bodies, body) >= 0) return PW_OK;
+  int found = names ? pw_names_find (names, body) : -1;
+  if (strcmp (body, "ground") == 0 || names == NULL || (found >= 0 && found < m->bodies)) return PW_OK;
   pw_nearest near = { .sought = body };
   for (int i = 0; i < m->bodies; i++) pw_nearest_try (&near, m->body[i].name);
   pw_nearest_try (&near, "ground");
@@ -110,14 +111,14 @@ static int check_choice (const pw_model *m, const pw_element *e, const pw_field 
                   pw_element_name (e), f->name, value, choices - 1);
 }
 
-static int check_field (const pw_model *m, const pw_element *e, const pw_field *f, const pw_names *bodies,
+static int check_field (const pw_model *m, const pw_element *e, const pw_field *f, const pw_names *names,
                         pw_error *error) {
   for (int i = 0; i < pw_field_count (f); i++) {
     const void *at = (const char *)e->definition + f->offset + (size_t)i * pw_field_bytes (f->type);
     int status = PW_OK, numbers = f->type == PW_NUMBER ? 1 : f->type == PW_POINT || f->type == PW_VECTOR ? 2 : 0;
     for (int k = 0; k < numbers && status == PW_OK; k++)
       status = check_number (m, e, f, ((const double *)at)[k], error);
-    if (f->type == PW_BODY) status = check_body_name (m, e, *(const char *const *)at, bodies, error);
+    if (f->type == PW_BODY) status = check_body_name (m, e, *(const char *const *)at, names, error);
     if (f->type == PW_SIGNAL) status = check_signal (m, e, f, at, error);
     if (f->type == PW_CHOICE) status = check_choice (m, e, f, *(const int *)at, error);
     if (status != PW_OK) return status;
@@ -125,11 +126,11 @@ static int check_field (const pw_model *m, const pw_element *e, const pw_field *
   return PW_OK;
 }
 
-/* bodies NULL: whether the bodies exist is not checked. */
-static int check_element (const pw_model *m, const pw_element *e, const pw_names *bodies, pw_error *error) {
+/* names NULL: whether the bodies exist is not checked. */
+static int check_element (const pw_model *m, const pw_element *e, const pw_names *names, pw_error *error) {
   if (check_name (m, e->kind->name, pw_element_name (e), error) != PW_OK) return PW_INPUT;
   for (const pw_field *f = e->kind->fields; f->name; f++)
-    if (check_field (m, e, f, bodies, error) != PW_OK) return PW_INPUT;
+    if (check_field (m, e, f, names, error) != PW_OK) return PW_INPUT;
   for (int i = 0; i < e->kind->bodies && !e->kind->each_body; i++) {
     const char *body = *(const char *const *)pw_field_at (e->kind, e->definition, PW_BODY, i);
     for (int n = 0; n < i; n++)
@@ -147,10 +148,10 @@ int pw_model_check_element (const pw_model *m, const pw_element *e, pw_error *er
   return check_element (m, e, NULL, error);
 }
 
-int pw_check_model (const pw_model *m, const pw_names *bodies, pw_error *error) {
+int pw_check_model (const pw_model *m, const pw_names *names, pw_error *error) {
   for (int i = 0; i < m->bodies; i++)
     if (pw_model_check_body (m, &m->body[i], error) != PW_OK) return PW_INPUT;
   for (int i = 0; i < m->elements; i++)
-    if (check_element (m, &m->element[i], bodies, error) != PW_OK) return PW_INPUT;
+    if (check_element (m, &m->element[i], names, error) != PW_OK) return PW_INPUT;
   return PW_OK;
 }

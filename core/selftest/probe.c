@@ -50,7 +50,7 @@ int pw_probe_open (pw_probe *probe, pw_error *error) {
   };
   probe->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   probe->batch->b.w = probe->w, probe->batch->b.lambda = probe->lambda;
-  return probe->memory ? PW_OK : pw_fail (error, PW_RESOURCE, "model %s: out of memory", probe->s->model);
+  return probe->memory ? PW_OK : pw_fail_memory (probe->s, error);
 }
 
 void pw_probe_update (pw_probe *probe, pw_probe_move move, double h) {

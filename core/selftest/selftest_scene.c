@@ -177,7 +177,7 @@ static int scene_open (scene_test *test, pw_error *error) {
     { &test->size, n },  { &test->expected, n }, { &test->block, values * (size_t)test->width + PW_PROBE_GUARD },
   };
   test->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
-  return test->memory ? PW_OK : pw_fail (error, PW_RESOURCE, "model %s: out of memory", test->probe.s->model);
+  return test->memory ? PW_OK : pw_fail_memory (test->probe.s, error);
 }
 
 /* Reports the signal and discards the checks, which mean nothing after its failure. */

@@ -20,7 +20,6 @@ typedef struct {
   const pw_system *s;
   const pw_workspace *workspace;
   verify_terms position, velocity, acceleration, force;
-  double *block; /* results of one function of an element type */
 } verified_scene;
 
 static void verify_add (const verify_terms *terms, int i, double term) {
@@ -28,18 +27,18 @@ static void verify_add (const verify_terms *terms, int i, double term) {
   terms->size[i] += fabs (term);
 }
 
-/* Fills the block by a function of n numbers; NULL gives zeros. */
-static const double *verify_evaluate (verified_scene *scene, const pw_element_batch *k, pw_batch_function *f, int n) {
-  memset (scene->block, 0, (size_t)n * sizeof *scene->block);
-  if (f) f (&k->b, scene->block);
-  return scene->block;
+/* Fills n numbers by a function of an element type; NULL gives zeros. */
+static const double *verify_evaluate (const pw_element_batch *k, pw_batch_function *f, double *out, int n) {
+  memset (out, 0, (size_t)n * sizeof *out);
+  if (f) f (&k->b, out);
+  return out;
 }
 
 /* Adds J v, J a and J^T lambda of a batch. */
 static void verify_products (verified_scene *scene, const pw_element_batch *k, const double *v, const double *a,
                              const double *lambda) {
   int rows = k->kind->rows, cols = k->b.cols;
-  const double *J = verify_evaluate (scene, k, k->kind->J, k->b.count * rows * cols);
+  const double *J = verify_evaluate (k, k->kind->J, k->J, k->b.count * rows * cols);
   for (int e = 0; e < k->b.count; e++)
     for (int r = 0; r < rows; r++)
       for (int c = 0; c < cols; c++, J++) {
@@ -56,19 +55,20 @@ static void verify_rows (verified_scene *scene, const pw_element_batch *k, const
   const pw_kind *kind = k->kind;
   int n = k->b.count * kind->rows;
   verify_products (scene, k, v, a, lambda);
-  const double *y = verify_evaluate (scene, k, kind->eta, n);
+  double *scratch = scene->workspace->scratch;
+  const double *y = verify_evaluate (k, kind->eta, scratch, n);
   for (int i = 0; i < n; i++) verify_add (&scene->velocity, k->row + i, -y[i]);
-  y = verify_evaluate (scene, k, kind->gamma, n);
+  y = verify_evaluate (k, kind->gamma, scratch, n);
   for (int i = 0; i < n; i++) verify_add (&scene->acceleration, k->row + i, -y[i]);
   if (kind->level != PW_HOLONOMIC) return;
-  y = verify_evaluate (scene, k, kind->g, n);
+  y = verify_evaluate (k, kind->g, scratch, n);
   for (int i = 0; i < n; i++) scene->position.sum[k->row + i] = y[i];
-  y = verify_evaluate (scene, k, kind->g_size, n);
+  y = verify_evaluate (k, kind->g_size, scratch, n);
   for (int i = 0; i < n; i++) scene->position.size[k->row + i] = fmax (y[i], scene->workspace->scale.length);
 }
 
 static void verify_forces (verified_scene *scene, const pw_element_batch *k) {
-  const double *y = verify_evaluate (scene, k, k->kind->force, k->b.count * k->b.cols);
+  const double *y = verify_evaluate (k, k->kind->force, k->block, k->b.count * k->b.cols);
   for (int i = 0; i < k->b.count * k->b.cols; i++) {
     int j = pw_global (k, i / k->b.cols, i % k->b.cols);
     if (j < scene->s->coords) verify_add (&scene->force, j, -y[i]);
@@ -124,17 +124,6 @@ static void verify_all (verified_scene *scene, const double *v, const double *a,
   verify_worst (s, s->coords, &scene->force, 0, pw_system_state_name, s->coords, &result->force);
 }
 
-/* The largest array that one of the functions evaluated above fills. */
-static size_t verify_block_size (const pw_system *s) {
-  size_t largest = 1;
-  for (int i = 0; i < s->batches; i++) {
-    const pw_element_batch *k = &s->batch[i];
-    size_t n = (size_t)k->b.count * (size_t)k->b.cols * (size_t)(k->kind->rows > 0 ? k->kind->rows : 1);
-    if (n > largest) largest = n;
-  }
-  return largest;
-}
-
 int pw_verify (const pw_system *s, const pw_scale *scale, double t, const double *q, const double *v, const double *a,
                const double *lambda, pw_verification *result) {
   size_t rows = (size_t)s->rows, coords = (size_t)s->coords;
@@ -142,7 +131,7 @@ int pw_verify (const pw_system *s, const pw_scale *scale, double t, const double
   const pw_array array[] = {
     { &scene.position.sum, rows },  { &scene.position.size, rows },    { &scene.velocity.sum, rows },
     { &scene.velocity.size, rows }, { &scene.acceleration.sum, rows }, { &scene.acceleration.size, rows },
-    { &scene.force.sum, coords },   { &scene.force.size, coords },     { &scene.block, verify_block_size (s) },
+    { &scene.force.sum, coords },   { &scene.force.size, coords },
   };
   char *memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   pw_workspace *w = memory ? pw_workspace_new (s, NULL) : NULL;

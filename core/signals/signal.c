@@ -71,32 +71,34 @@ static double signal_pulse_breakpoint (const pw_signal *s, double t) {
 /* ---- All signals ---- */
 
 /* Fails if a number that is needed is not finite. */
-static int signal_function (const pw_source *source, double t, pw_signal_order order, double u[3]) {
+static int signal_function (const pw_source *source, double t) {
   const pw_function *f = &source->signal.function;
+  double *u = source->u;
   int status = f->eval (f->context, t, source->x, u, source->reads ? source->x + source->reads : NULL);
   if (status != 0) return status;
-  return !isfinite (u[0]) || (order == PW_SIGNAL_DERIVATIVES && !(isfinite (u[1]) && isfinite (u[2])));
+  return !isfinite (u[0]) || (!source->of_force && !(isfinite (u[1]) && isfinite (u[2])));
 }
 
 /* offset + A cos (omega t + phase) and its derivatives, A the amplitude */
-static void signal_harmonic (const pw_signal *s, double t, pw_signal_order order, double u[3]) {
+static void signal_harmonic (const pw_signal *s, double t, int derivatives, double u[3]) {
   double A = s->harmonic.amplitude, omega = s->harmonic.omega, sine, cosine;
   pw_sin_cos (omega * t + s->harmonic.phase, &sine, &cosine);
   u[0] = s->harmonic.offset + A * cosine;
-  if (order == PW_SIGNAL_VALUE) return;
+  if (!derivatives) return;
   u[1] = -A * omega * sine;
   u[2] = -omega * omega * (A * cosine);
 }
 
-int pw_signal_eval (const pw_source *source, double t, pw_signal_order order, double u[3]) {
+int pw_signal_eval (const pw_source *source, double t) {
   const pw_signal *s = &source->signal;
+  double *u = source->u;
   u[0] = u[1] = u[2] = 0;
   if (s->type == PW_HARMONIC)
-    signal_harmonic (s, t, order, u);
+    signal_harmonic (s, t, !source->of_force, u);
   else if (s->type == PW_CONSTANT)
     u[0] = s->constant;
   else if (s->type == PW_FUNCTION)
-    return signal_function (source, t, order, u);
+    return signal_function (source, t);
   else if (s->type == PW_TABLE)
     pw_table_eval (s, source->spline, t, u);
   else if (s->type == PW_PULSE)

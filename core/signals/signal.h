@@ -15,13 +15,10 @@ typedef struct {
   int of_force;     /* 1: belongs to a force, which needs no derivatives */
 } pw_source;
 
-/* What is needed: the value, or also the first and second time derivative. */
-typedef enum { PW_SIGNAL_VALUE, PW_SIGNAL_DERIVATIVES } pw_signal_order;
-
-/* Stores value, first and second time derivative at time t in u; u[1] and u[2] are meaningless for PW_SIGNAL_VALUE.
- * source->x: the states that a function reads.  Returns non-zero, which stops the run, if the user's function returns
- * it or computes values that are not finite. */
-int pw_signal_eval (const pw_source *source, double t, pw_signal_order order, double u[3]);
+/* Stores value, first and second time derivative at time t in source->u; of a force's signal the derivatives are
+ * meaningless.  source->x: the states that a function reads.  Returns non-zero, which stops the run, if the user's
+ * function returns it or computes values that are not finite. */
+int pw_signal_eval (const pw_source *source, double t);
 
 /* Times at which a step must end. */
 typedef enum {

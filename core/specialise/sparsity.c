@@ -7,14 +7,9 @@
 enum { SPARSITY_SCENES = 12, SPARSITY_STATES = 4 };
 #define SPARSITY_ROUND_OFF 1e-12 /* of entries of J */
 
+/* The type of an entry with this value that has not changed. */
 static unsigned char sparsity_of_value (double value) {
   return value == 0 ? PW_ENTRY_ZERO : value == 1 ? PW_ENTRY_ONE : value == -1 ? PW_ENTRY_MINUS_ONE : PW_ENTRY_CONSTANT;
-}
-
-/* Updates an entry with its value at a state; `first` is its value at the first state of the scene. */
-static unsigned char sparsity_merge (unsigned char type, double value, double first) {
-  if (value != first || type == PW_ENTRY_VARIABLE) return PW_ENTRY_VARIABLE;
-  return sparsity_of_value (value) == type ? type : PW_ENTRY_CONSTANT;
 }
 
 /* 1 if one of the element's bodies is the ground. */
@@ -32,7 +27,9 @@ static void sparsity_state (const pw_element_batch *k, int e, int is_first, int 
   for (int i = 0; i < n; i++) {
     double value = k->J[e * n + i];
     if (is_first) first[i] = value;
-    out->J[i] = known ? sparsity_merge (out->J[i], value, first[i]) : sparsity_of_value (value);
+    if (!known) out->J[i] = sparsity_of_value (value);
+    if (value != first[i]) out->J[i] = PW_ENTRY_VARIABLE;
+    if (out->J[i] < PW_ENTRY_CONSTANT && out->J[i] != sparsity_of_value (value)) out->J[i] = PW_ENTRY_CONSTANT;
   }
   for (int i = 0; i < k->kind->rows * k->kind->bodies; i++) {
     int at = i / k->kind->bodies * k->b.cols + i % k->kind->bodies * 3;

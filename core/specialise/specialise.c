@@ -3,23 +3,29 @@
 #define _POSIX_C_SOURCE 200809L
 #include <stdlib.h>
 #include <string.h>
-#include "sources.h"
 #include "specialise_parts.h"
 
 /* ---- Text ---- */
 
-enum { SPECIALISE_TEXTS = 64 }; /* more than there are in pw_source_texts */
+/* The text of a source file. */
+typedef struct {
+  const char *name;        /* "pin.c" */
+  const char *const *line; /* each with its line end; ends with NULL */
+} source_text;
+#include "source_texts.inc" /* written by the build: source_texts, which ends with a NULL name */
+
+enum { SPECIALISE_TEXTS = 64 }; /* more than there are in source_texts */
 
 /* Writes the text of a source file, unless it is marked in `done`, after the texts of the headers that it includes. */
 static void specialise_text (FILE *out, const char *name, unsigned char done[SPECIALISE_TEXTS]) {
   char header[80], hint[PW_HINT];
-  const int i = pw_find_name (pw_source_texts, sizeof *pw_source_texts, name, hint);
+  const int i = pw_find_name (source_texts, sizeof *source_texts, name, hint);
   if (i < 0 || i >= SPECIALISE_TEXTS || done[i]) return;
   done[i] = 1;
-  for (const char *const *line = pw_source_texts[i].line; *line; line++)
+  for (const char *const *line = source_texts[i].line; *line; line++)
     if (sscanf (*line, "#include \"%79[a-z_0-9.]\"", header) == 1) specialise_text (out, header, done);
   fprintf (out, "\n/* ---- %s ---- */\n\n", name);
-  for (const char *const *line = pw_source_texts[i].line; *line; line++)
+  for (const char *const *line = source_texts[i].line; *line; line++)
     if (strncmp (*line, "#include \"", 10) != 0) fputs (*line, out);
 }
 
@@ -179,6 +185,6 @@ char *pw_system_source (const pw_system *s, const unsigned char *independent, pw
     pw_fail (error, PW_INPUT, "model %s: no fixed order of elimination: redundant constraints, or a massless body",
              s->model);
   else
-    pw_fail (error, status, "model %s: out of memory", s->model);
+    pw_fail_memory (s, error);
   return NULL;
 }

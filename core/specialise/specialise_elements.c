@@ -178,8 +178,7 @@ void pw_specialise_signals (const pw_generator *gen) {
 /* ---- Lanes ---- */
 
 int pw_specialise_check_limits (const pw_system *s, pw_error *error) {
-  int elements = 0;
-  for (int k = 0; k < s->batches; k++) elements += s->batch[k].b.count;
+  const int elements = pw_system_elements (s);
   if (s->rows > SPECIALISE_ROWS)
     return pw_fail (error, PW_INPUT, "model %s: %d constraint equations: specialised code has at most %d", s->model,
                     s->rows, SPECIALISE_ROWS);

@@ -1,6 +1,7 @@
 /* Compiles a model: names become indices, the elements of each type become one batch.
  *
- * All arrays of the system are in its arena.  Data needed only during compilation are in `scratch`. */
+ * All arrays of the system but that of the batches are in its arena.  Data needed only during compilation are in
+ * `scratch`. */
 #include <limits.h>
 #include <math.h>
 #include <stdlib.h>
@@ -18,9 +19,7 @@ typedef struct {
   pw_system *s;
   pw_error *error;
   pw_arena scratch;
-  pw_names body, element;
-  const pw_kind **kind;    /* element types in use, in the order of the batches */
-  int *count;              /* number of elements of each of them */
+  pw_names name;           /* of bodies: their indices; of elements: theirs plus the number of bodies */
   int *batch_of;           /* for each element of the model: index of its batch */
   size_t bytes;            /* of the largest element and its guard */
   unsigned char *prepared; /* bytes: memory in which an element is prepared */
@@ -51,20 +50,18 @@ static const char *compile_text (const compilation *job, const char *text) {
 
 static int compile_names (compilation *job) {
   const pw_model *m = job->m;
-  if (pw_names_open (&job->body, (size_t)m->bodies) != PW_OK ||
-      pw_names_open (&job->element, (size_t)m->elements) != PW_OK)
-    return compile_no_memory (job);
+  if (pw_names_open (&job->name, (size_t)m->bodies + (size_t)m->elements) != PW_OK) return compile_no_memory (job);
   for (int i = 0; i < m->bodies; i++)
-    if (m->body[i].name && pw_names_add (&job->body, m->body[i].name, i) >= 0)
+    if (m->body[i].name && pw_names_add (&job->name, m->body[i].name, i) >= 0)
       return pw_fail (job->error, PW_INPUT, "model %s: two bodies are named \"%s\"", m->name, m->body[i].name);
   for (int i = 0; i < m->elements; i++) {
     const char *name = pw_element_name (&m->element[i]);
-    if (name == NULL) continue;
-    if (pw_names_find (&job->body, name) >= 0)
+    int other = name ? pw_names_add (&job->name, name, m->bodies + i) : -1;
+    if (other >= m->bodies)
+      return pw_fail (job->error, PW_INPUT, "model %s: two elements are named \"%s\"", m->name, name);
+    if (other >= 0)
       return pw_fail (job->error, PW_INPUT, "model %s: a body and a %s are both named \"%s\"", m->name,
                       m->element[i].kind->name, name);
-    if (pw_names_add (&job->element, name, i) >= 0)
-      return pw_fail (job->error, PW_INPUT, "model %s: two elements are named \"%s\"", m->name, name);
   }
   return PW_OK;
 }
@@ -77,27 +74,29 @@ static int compile_copies (const pw_model *m, const pw_kind *kind) {
   return massive;
 }
 
-/* Batches: holonomic types in order of appearance, then nonholonomic ones, then forces. */
+/* Counts the elements of each batch: holonomic types in order of appearance, then nonholonomic ones, then forces. */
 static int compile_types (compilation *job) {
   static const pw_level order[] = { PW_HOLONOMIC, PW_NONHOLONOMIC, PW_FORCE };
   const pw_model *m = job->m;
-  size_t types = (size_t)m->elements + 1;
+  pw_system *s = job->s;
+  size_t room = 0;
   double elements = 0;
-  job->kind = pw_arena_alloc (&job->scratch, types * sizeof *job->kind);
-  job->count = pw_arena_alloc (&job->scratch, types * sizeof *job->count);
-  job->batch_of = pw_arena_alloc (&job->scratch, types * sizeof *job->batch_of);
-  if (job->kind == NULL || job->count == NULL || job->batch_of == NULL) return compile_no_memory (job);
+  job->batch_of = pw_arena_alloc (&job->scratch, (size_t)m->elements * sizeof *job->batch_of);
+  if (job->batch_of == NULL || pw_grow (&s->batch, 0, &room, sizeof *s->batch) != PW_OK) return compile_no_memory (job);
   for (int l = 0; l < 3; l++)
     for (int i = 0; i < m->elements; i++) {
       const pw_kind *kind = m->element[i].kind;
       if (kind->level != order[l]) continue;
       int k = 0;
-      while (k < job->s->batches && job->kind[k] != kind) k++;
-      if (k == job->s->batches) job->kind[job->s->batches++] = kind;
+      while (k < s->batches && s->batch[k].kind != kind) k++;
+      if (k == s->batches) {
+        if (pw_grow (&s->batch, (size_t)k, &room, sizeof *s->batch) != PW_OK) return compile_no_memory (job);
+        s->batch[s->batches++] = (pw_element_batch){ .kind = kind };
+      }
       int copies = compile_copies (m, kind);
       elements += copies;
       if (elements > COMPILE_MOST) return compile_too_large (job);
-      job->count[k] += copies;
+      s->batch[k].b.count += copies;
       job->batch_of[i] = k;
       if (job->bytes < kind->element + COMPILE_GUARD) job->bytes = kind->element + COMPILE_GUARD;
     }
@@ -110,11 +109,11 @@ static int compile_count (const compilation *job) {
   pw_system *s = job->s;
   double coords = 3.0 * m->bodies;
   if (m->bodies == 0) return pw_fail (job->error, PW_INPUT, "model %s has no body", m->name);
-  for (int k = 0; k < s->batches; k++) {
-    coords += (double)job->count[k] * job->kind[k]->internal;
-    s->rows += job->count[k] * job->kind[k]->rows;
-    if (job->kind[k]->level == PW_HOLONOMIC) s->holonomic = s->rows; /* these batches come first */
-    s->sources += job->count[k] * job->kind[k]->signals;
+  for (const pw_element_batch *k = s->batch; k < s->batch + s->batches; k++) {
+    coords += (double)k->b.count * k->kind->internal;
+    s->rows += k->b.count * k->kind->rows;
+    if (k->kind->level == PW_HOLONOMIC) s->holonomic = s->rows; /* these batches come first */
+    s->sources += k->b.count * k->kind->signals;
   }
   if (coords > COMPILE_MOST || s->rows > COMPILE_MOST) return compile_too_large (job);
   s->bodies = m->bodies;
@@ -125,17 +124,13 @@ static int compile_count (const compilation *job) {
 static int compile_arrays (const compilation *job) {
   pw_system *s = job->s;
   size_t coords = (size_t)s->coords, bodies = (size_t)s->bodies;
-  s->batch = compile_alloc (job, (size_t)s->batches, sizeof *s->batch);
   s->source = compile_alloc (job, (size_t)s->sources, sizeof *s->source);
   s->body_name = compile_alloc (job, bodies, sizeof *s->body_name);
-  s->mass = compile_alloc (job, coords, sizeof *s->mass);
-  s->metric = compile_alloc (job, coords, sizeof *s->metric);
-  s->constant = compile_alloc (job, coords + 3, sizeof *s->constant);
-  s->q0 = compile_alloc (job, coords, sizeof *s->q0);
-  s->v0 = compile_alloc (job, coords, sizeof *s->v0);
+  s->mass = compile_alloc (job, 5 * coords + 3, sizeof *s->mass); /* and those after it */
   s->origin = compile_alloc (job, 2 * coords, 1);
-  int complete = s->batch && s->source && s->body_name && s->mass && s->metric && s->constant && s->q0 && s->v0;
-  return complete && s->origin ? PW_OK : PW_RESOURCE;
+  if (s->source == NULL || s->body_name == NULL || s->mass == NULL || s->origin == NULL) return PW_RESOURCE;
+  s->metric = s->mass + coords, s->q0 = s->metric + coords, s->v0 = s->q0 + coords, s->constant = s->v0 + coords;
+  return PW_OK;
 }
 
 /* ---- Bodies and elements ---- */
@@ -204,7 +199,7 @@ static int compile_element (const compilation *job, const pw_element_batch *k, c
   for (int n = 0; n < kind->bodies; n++) {
     int index =
         body >= 0 ? body
-                  : pw_names_find (&job->body, *(const char *const *)pw_field_at (kind, from->definition, PW_BODY, n));
+                  : pw_names_find (&job->name, *(const char *const *)pw_field_at (kind, from->definition, PW_BODY, n));
     bodies[n] = index < 0 ? &ground : &job->m->body[index];
     a->body[e * kind->bodies + n] = index < 0 ? s->bodies : index;
     a->column[e * kind->bodies + n] = index < 0 ? s->coords : 3 * index;
@@ -249,89 +244,21 @@ static int compile_batches (const compilation *job) {
   int row = 0, internal = 3 * s->bodies;
   pw_source *source = s->source;
   for (int i = 0; i < s->batches; i++) {
-    const pw_kind *kind = job->kind[i];
-    size_t n = (size_t)job->count[i], bodies = n * (size_t)kind->bodies;
+    pw_element_batch *k = &s->batch[i];
+    const pw_kind *kind = k->kind;
+    int count = k->b.count;
+    size_t n = (size_t)count, bodies = n * (size_t)kind->bodies;
     batch_arrays a = { compile_alloc (job, n, kind->element), compile_alloc (job, bodies, sizeof (int)),
                        compile_alloc (job, bodies, sizeof (int)), compile_alloc (job, n, sizeof (char *)) };
     if (!a.element || !a.body || !a.column || !a.name) return PW_RESOURCE;
-    pw_element_batch *k = &s->batch[i];
     *k = (pw_element_batch){
       .kind = kind, .row = row, .internal = internal, .column = a.column, .name = a.name, .source = source
     };
-    k->b = (pw_batch){ job->count[i], 3 * kind->bodies + kind->internal, .element = a.element, .body = a.body };
-    row += job->count[i] * kind->rows;
-    internal += job->count[i] * kind->internal;
-    source += job->count[i] * kind->signals;
+    k->b = (pw_batch){ count, 3 * kind->bodies + kind->internal, .element = a.element, .body = a.body };
+    row += count * kind->rows;
+    internal += count * kind->internal;
+    source += count * kind->signals;
     if (compile_batch (job, i, &a) != PW_OK) return PW_INPUT;
-  }
-  return PW_OK;
-}
-
-/* ---- Signals ---- */
-
-/* Copies the points of a table and computes its spline. */
-static int compile_table (const compilation *job, pw_source *source) {
-  pw_signal *s = &source->signal;
-  size_t n = (size_t)s->table.count;
-  double *t = compile_alloc (job, 4 * n, sizeof *t), *value = t + n;
-  if (t == NULL) return PW_RESOURCE;
-  memcpy (t, s->table.t, n * sizeof *t);
-  for (size_t i = 0; i < n; i++) value[i] = pw_table_value (s, (int)i);
-  s->table.t = t;
-  s->table.value = value;
-  s->table.scale = s->table.offset = 0;
-  source->spline = value + n;
-  pw_table_spline (s, source->spline);
-  return PW_OK;
-}
-
-/* Converts the names of the states that a function reads to indices. */
-static int compile_reads (const compilation *job, pw_source *source, const char *element) {
-  const char *const *reads = source->signal.function.reads;
-  int count = 0;
-  while (reads && reads[count]) count++;
-  int *state = compile_alloc (job, (size_t)count, sizeof *state);
-  if (state == NULL) return PW_RESOURCE;
-  for (int i = 0; i < count; i++) {
-    pw_error cause = { 0 };
-    state[i] = pw_system_find_state (job->s, reads[i], &cause);
-    if (state[i] < 0)
-      return pw_fail (job->error, PW_INPUT, "model %s: element %s reads a state: %s", job->m->name, element,
-                      cause.text);
-  }
-  source->state = state;
-  source->reads = count;
-  job->s->reads += count;
-  job->s->state_dependent += count > 0;
-  return PW_OK;
-}
-
-static int compile_source (const compilation *job, pw_source *source, const pw_signal *signal, const char *element) {
-  const pw_function *opens = signal->type == PW_FUNCTION && signal->function.open ? &signal->function : NULL;
-  void *context = opens ? opens->open (opens->context) : NULL;
-  if (opens && context == NULL) return compile_no_memory (job);
-  source->signal = *signal;
-  if (context) source->signal.function.context = context;
-  if (signal->type == PW_TABLE) return compile_table (job, source);
-  return signal->type == PW_FUNCTION ? compile_reads (job, source, element) : PW_OK;
-}
-
-/* Runs after all elements are stored, because signals may read their internal coordinates. */
-static int compile_signals (const compilation *job) {
-  int *next = job->count; /* reused: the number of elements of each batch whose signals are stored */
-  memset (next, 0, (size_t)job->s->batches * sizeof *next);
-  for (int n = 0; n < job->m->elements; n++) {
-    const pw_element *from = &job->m->element[n];
-    const pw_element_batch *k = &job->s->batch[job->batch_of[n]];
-    for (int copy = compile_copies (job->m, k->kind); copy > 0; copy--) {
-      int e = next[job->batch_of[n]]++;
-      for (int u = 0; u < k->kind->signals; u++) {
-        pw_source *source = &k->source[e * k->kind->signals + u];
-        source->of_force = pw_kind_signals_force (k->kind);
-        if (compile_source (job, source, pw_field_at (k->kind, from->definition, PW_SIGNAL, u), k->name[e]) != PW_OK)
-          return PW_INPUT;
-      }
-    }
   }
   return PW_OK;
 }
@@ -385,10 +312,9 @@ static void compile_metric (pw_system *s) {
 static int compile_totals (const compilation *job) {
   pw_system *s = job->s;
   int constant = 0;
-  s->entries = pw_ledger_list (s, NULL);
-  s->entry = compile_alloc (job, (size_t)s->entries, sizeof *s->entry);
+  s->entry = compile_alloc (job, 2 * (size_t)pw_system_elements (s), sizeof *s->entry);
   if (s->entry == NULL) return PW_RESOURCE;
-  pw_ledger_list (s, s->entry);
+  s->entries = pw_ledger_list (s, s->entry);
   for (int i = 0; i < s->batches; i++) {
     const pw_kind *kind = s->batch[i].kind;
     s->constraints += kind->rows > 0;
@@ -407,13 +333,13 @@ static int compile_totals (const compilation *job) {
 
 static int compile_all (compilation *job) {
   int status = compile_names (job);
-  if (status == PW_OK) status = pw_check_model (job->m, &job->body, job->error);
+  if (status == PW_OK) status = pw_check_model (job->m, &job->name, job->error);
   if (status == PW_OK) status = compile_types (job);
   if (status == PW_OK) status = compile_count (job);
   if (status == PW_OK) status = compile_arrays (job);
   if (status == PW_OK) status = compile_bodies (job);
   if (status == PW_OK) status = compile_batches (job);
-  if (status == PW_OK) status = compile_signals (job);
+  if (status == PW_OK) status = pw_compile_signals (job->s, job->m, job->batch_of, job->error);
   if (status == PW_OK) status = compile_initial (job);
   if (status != PW_OK) return status;
   job->s->scale = (pw_scale){ compile_length (job), 1 };
@@ -431,8 +357,7 @@ pw_system *pw_system_compile (const pw_model *m, pw_error *error) {
     status = pw_fail (error, m->error.status, "%s", m->error.text);
   else
     status = job.s ? compile_all (&job) : compile_no_memory (&job);
-  pw_names_close (&job.body);
-  pw_names_close (&job.element);
+  pw_names_close (&job.name);
   pw_arena_free (&job.scratch);
   if (status == PW_OK) return job.s;
   pw_system_free (job.s);
@@ -443,5 +368,6 @@ void pw_system_free (pw_system *s) {
   if (s == NULL) return;
   pw_close_signals (s->source, s->source ? s->sources : 0);
   pw_arena_free (&s->arena);
+  free (s->batch);
   free (s);
 }

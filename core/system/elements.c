@@ -119,8 +119,7 @@ static int elements_allocate (const pw_workspace *w, pw_equations *out, pw_error
                              { &out->value, entries }, { &indices, entries } }; /* two indices fit in one double */
   *out =
       (pw_equations){ .coordinates = s->coords, .rows = s->rows, .holonomic = s->holonomic, .entries = (int)entries };
-  if (pw_alloc_arrays (array, sizeof array / sizeof *array) == NULL)
-    return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
+  if (pw_alloc_arrays (array, sizeof array / sizeof *array) == NULL) return pw_fail_memory (s, error);
   out->row = (int *)(void *)indices;
   out->column = out->row + entries;
   return PW_OK;

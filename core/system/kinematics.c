@@ -49,8 +49,7 @@ PW_INLINE int kinematics_evaluate_signals (pw_workspace *w, int state_dependent,
   for (pw_source *source = w->source, *end = source + w->s->sources; source < end; source++) {
     if ((source->reads > 0) != state_dependent || (w->hold && source->of_force)) continue;
     if (state_dependent && kinematics_copy_states (w, source, q, v) == 0) continue;
-    if (pw_signal_eval (source, t, source->of_force ? PW_SIGNAL_VALUE : PW_SIGNAL_DERIVATIVES, source->u) == 0)
-      continue;
+    if (pw_signal_eval (source, t) == 0) continue;
     w->failed = source;
     return PW_METHOD;
   }

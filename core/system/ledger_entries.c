@@ -19,11 +19,9 @@ int pw_ledger_list (const pw_system *s, pw_entry *entry) {
   for (int i = 0; i < s->batches; i++) {
     const pw_element_batch *k = &s->batch[i];
     for (int loss = 0; loss < 2; loss++)
-      for (int e = 0; e < k->b.count; e++) {
-        if (loss ? k->kind->loss == NULL : !ledger_has_work (k, e)) continue;
-        if (entry) entry[count] = (pw_entry){ i, e, loss ? PW_LOSS : PW_WORK };
-        count++;
-      }
+      for (int e = 0; e < k->b.count; e++)
+        if (loss ? k->kind->loss != NULL : ledger_has_work (k, e))
+          entry[count++] = (pw_entry){ i, e, loss ? PW_LOSS : PW_WORK };
   }
   return count;
 }

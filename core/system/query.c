@@ -170,9 +170,9 @@ int pw_system_signal_forced (const pw_system *s, int signal) {
 char *pw_system_signal_name (const pw_system *s, int signal, char *buffer, size_t size) {
   int e, n;
   const pw_field *f;
+  char field[80];
   const pw_element_batch *k = query_signal (s, signal, &e, &f, &n);
-  int length = snprintf (buffer, size, "%s.%s", k->name[e], f->name);
-  if (pw_field_count (f) > 1 && (size_t)length < size) snprintf (buffer + length, size - (size_t)length, "[%d]", n);
+  snprintf (buffer, size, "%s.%s", k->name[e], pw_signal_field_name (f, n, field, sizeof field));
   return buffer;
 }
 
@@ -197,8 +197,9 @@ char *pw_failed_signal (const pw_workspace *w, char *buffer, size_t size) {
   if (w->failed == NULL) return buffer;
   int e, n;
   const pw_field *f;
+  char field[80];
   const pw_element_batch *k = query_signal (w->s, (int)(w->failed - w->source), &e, &f, &n);
-  snprintf (buffer, size, "%s %s: %s", k->kind->name, k->name[e], f->name);
+  snprintf (buffer, size, "%s %s: %s", k->kind->name, k->name[e], pw_signal_field_name (f, n, field, sizeof field));
   return buffer;
 }
 

@@ -33,7 +33,7 @@ typedef struct {
 
 /* Constant after pw_system_compile: any number of runs and threads may share it. */
 struct pw_system {
-  pw_arena arena; /* contains all arrays */
+  pw_arena arena; /* contains all arrays but `batch` */
   const char *model;
   int bodies, coords, rows, holonomic, batches, entries;
   int constraints;         /* batches with constraint equations */
@@ -70,8 +70,16 @@ struct pw_workspace {
   const pw_source *failed;         /* the last signal that failed, or NULL */
 };
 
-/* Stores the entries of the ledger, unless entry is NULL.  Returns their number.  Signals must be compiled. */
+/* Stores the entries of the ledger, at most two for each element.  Returns their number.  Signals must be compiled. */
 int pw_ledger_list (const pw_system *s, pw_entry *entry);
+
+/* Compiles the signals of all elements, which must be stored, because signals may read their internal coordinates.
+ * batch_of: the batch of each element of the model.  PW_INPUT, PW_RESOURCE. */
+int pw_compile_signals (pw_system *s, const pw_model *m, const int *batch_of, pw_error *error);
+
+static inline int pw_fail_memory (const pw_system *s, pw_error *error) {
+  return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
+}
 
 /* Closes the contexts made by `open`.  Signals that have not been stored yet may be all zero. */
 void pw_close_signals (const pw_source *source, int count);

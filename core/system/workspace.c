@@ -45,24 +45,23 @@ static void workspace_layout (pw_layout *layout, pw_workspace *w) {
   double *x = pw_layout_alloc (layout, 2 * (size_t)s->reads, sizeof *x);
   for (int i = 0; layout->base && i < s->sources; i++) {
     w->source[i] = s->source[i];
+    w->source[i].u = w->u + 3 * i;
     w->source[i].x = x;
     x += 2 * s->source[i].reads; /* values, gradient */
   }
 }
 
-/* Sets where signals store their values; opens a context of this workspace for each function signal with `open`. */
+/* Opens a context of this workspace for each function signal with `open`. */
 static int workspace_open_signals (pw_workspace *w) {
   int status = PW_OK;
-  for (pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++)
-    for (int i = 0; i < k->b.count * k->kind->signals; i++) {
-      pw_function *f = &k->source[i].signal.function;
-      k->source[i].u = k->u + 3 * i;
-      if (k->source[i].signal.type != PW_FUNCTION || f->open == NULL) continue;
-      f->context = status == PW_OK ? f->open (f->context) : NULL;
-      if (f->context) continue;
-      status = PW_RESOURCE; /* pw_close_signals must skip this signal and the following ones, which are not opened */
-      f->close = NULL;
-    }
+  for (pw_source *source = w->source; source < w->source + w->s->sources; source++) {
+    pw_function *f = &source->signal.function;
+    if (source->signal.type != PW_FUNCTION || f->open == NULL) continue;
+    f->context = status == PW_OK ? f->open (f->context) : NULL;
+    if (f->context) continue;
+    status = PW_RESOURCE; /* pw_close_signals must skip this signal and the following ones, which are not opened */
+    f->close = NULL;
+  }
   return status;
 }
 
@@ -90,7 +89,7 @@ pw_workspace *pw_workspace_new (const pw_system *s, pw_error *error) {
     if (workspace_open_signals (w) == PW_OK) return w;
   }
   pw_workspace_free (w);
-  pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
+  pw_fail_memory (s, error);
   return NULL;
 }
 

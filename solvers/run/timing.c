@@ -48,9 +48,7 @@ static void profile_do_batch (profile *p, profile_part part) {
   const pw_element_batch *k = p->k;
   const pw_kind *kind = k->kind;
   if (part == PROFILE_SIGNALS)
-    for (int i = 0; i < k->b.count * kind->signals; i++)
-      pw_signal_eval (&k->source[i], p->t, pw_kind_signals_force (kind) ? PW_SIGNAL_VALUE : PW_SIGNAL_DERIVATIVES,
-                      k->u + 3 * i);
+    for (int i = 0; i < k->b.count * kind->signals; i++) pw_signal_eval (&k->source[i], p->t);
   else if (part == PROFILE_J_GAMMA) {
     kind->J (&k->b, k->J);
     if (kind->gamma) kind->gamma (&k->b, p->gamma + k->row);

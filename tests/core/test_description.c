@@ -203,6 +203,37 @@ static void test_bad_set_signal (void **state) {
   description_no_signal ("A", "value", "model ezyroller: wheel A has no signal \"value\"");
 }
 
+/* An element type whose field has two signals. */
+typedef struct {
+  const char *name, *body;
+  pw_signal u[2];
+} description_pair;
+
+static const pw_field description_fields[] = {
+  { PW_AT (description_pair, body), PW_BODY },
+  { PW_AT (description_pair, u), PW_SIGNAL, .count = 2 },
+  { .name = NULL },
+};
+static const pw_kind description_kind = {
+  .name = "pair", .definition = sizeof (description_pair), .fields = description_fields, .bodies = 1, .signals = 2
+};
+
+static void test_set_one_of_two (void **state) {
+  (void)state;
+  pw_error error = { 0 };
+  pw_model *m = scene_model (&scene_ezyroller, NULL);
+  pw_add (m, &description_kind, &(description_pair){ "pair", "frame", { { .constant = 1 }, { .constant = 2 } } });
+  check_ok (pw_model_set_signal (m, "pair", "u[1]", &(pw_signal){ .constant = 5 }, &error), &error);
+  pw_system *s = pw_system_compile (m, &error);
+  int first = pw_system_find_signal (s, "pair.u[0]", &error), second = pw_system_find_signal (s, "pair.u[1]", &error);
+  check_ok (error.status, &error);
+  assert_true (s->source[first].signal.constant == 1 && s->source[second].signal.constant == 5);
+  assert_int_equal (pw_model_set_signal (m, "pair", "u", &(pw_signal){ 0 }, &error), PW_INPUT);
+  check_error (&error, PW_INPUT, "model ezyroller: pair pair has no signal \"u\"; did you mean \"u[0]\"?");
+  pw_system_free (s);
+  pw_model_free (m);
+}
+
 static void test_initial (void **state) {
   (void)state;
   pw_error error = { 0 };
@@ -359,7 +390,7 @@ int main (void) {
     cmocka_unit_test (test_bad_query),           cmocka_unit_test (test_internal_coordinates),
     cmocka_unit_test (test_find_reaction),       cmocka_unit_test (test_copies),
     cmocka_unit_test (test_missing_system),      cmocka_unit_test (test_missing),
-    cmocka_unit_test (test_missing_definitions),
+    cmocka_unit_test (test_missing_definitions), cmocka_unit_test (test_set_one_of_two),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

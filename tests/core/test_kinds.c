@@ -206,6 +206,7 @@ static void test_faults (void **state) {
   KINDS_FAULT (reaction, NULL, "constraint equations without names of their reactions");
   KINDS_FAULT (internal, 1, "internal coordinates without names");
   KINDS_FAULT (prepare, NULL, "a prepared element (.element > 0) or internal coordinates, but no prepare function");
+  KINDS_FAULT (element, SIZE_MAX, "a prepared element of more than 2147483647 bytes");
   KINDS_FAULT (fields, NULL, "no table of fields");
   KINDS_FAULT (fields, kinds_typeless, "field mode: its type does not exist");
   KINDS_FAULT (fields, kinds_domain, "field mode: its domain does not exist");

@@ -1,5 +1,6 @@
 /* Invalid descriptions: every message of the core about bodies, elements, fields, signals and element types. */
 #include <math.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <string.h>
 #include "check.h"
@@ -68,6 +69,7 @@ static void test_bad_references (void **state) {
   BAD (": pin B: there is no body \"ster\"; did you mean \"steer\"?", PIN (.name = "B", .body = { "frame", "ster" }));
   BAD (": pin B: there is no body \"Ground\"; did you mean \"ground\"?",
        PIN (.name = "B", .body = { "frame", "Ground" }));
+  BAD (": wheel A: there is no body \"A\"; valid are frame, steer, ground", WHEEL (.name = "A", .body = "A"));
   BAD (": pin B: a body is missing (the ground is \"ground\")", PIN (.name = "B", .body = { "frame" }));
   BAD (": wheel A: a body is missing (the ground is \"ground\")", WHEEL (.name = "A", .body = ""));
   BAD (": pin B: both of its bodies are \"frame\": expected different ones",
@@ -267,7 +269,18 @@ static void test_bad_parameters (void **state) {
   assert_null (pw_model_new ("scene", &table, &error));
   check_error (&error, PW_INPUT,
                "model scene: parameter a lies outside the model's structure: set .parameters_size to its sizeof");
+  table.parameters = (pw_parameter[]){ { "a", SIZE_MAX, 1, "m", "a length", PW_REAL }, { .name = NULL } };
   error = (pw_error){ 0 };
+  assert_null (pw_model_new ("scene", &table, &error));
+  check_error (&error, PW_INPUT,
+               "model scene: parameter a lies outside the model's structure: set .parameters_size to its sizeof");
+  error = (pw_error){ 0 };
+  table.parameters = NULL;
+  table.parameters_size = SIZE_MAX;
+  assert_null (pw_model_new ("scene", &table, &error));
+  check_error (&error, PW_RESOURCE, "model scene: out of memory");
+  error = (pw_error){ 0 };
+  table.parameters_size = 8;
   table.parameters = messages_domain;
   assert_null (pw_model_new ("scene", &table, &error));
   check_error (&error, PW_INPUT, "model scene: parameter a: its domain does not exist");

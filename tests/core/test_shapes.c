@@ -35,8 +35,9 @@ static pw_source shapes_source (const pw_signal *s) {
   return source;
 }
 
-static void shapes_at (const pw_source *source, double t, double u[3]) {
-  assert_int_equal (pw_signal_eval (source, t, PW_SIGNAL_DERIVATIVES, u), 0);
+static void shapes_at (pw_source *source, double t, double u[3]) {
+  source->u = u;
+  assert_int_equal (pw_signal_eval (source, t), 0);
 }
 
 /* Between breakpoints, rate and acceleration are the derivatives of the value. */

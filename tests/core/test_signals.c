@@ -10,9 +10,9 @@
 
 static void test_constant (void **state) {
   (void)state;
-  pw_source source = { .signal = { .constant = 2.5 } };
   double u[3];
-  assert_int_equal (pw_signal_eval (&source, 7, PW_SIGNAL_DERIVATIVES, u), 0);
+  pw_source source = { .signal = { .constant = 2.5 }, .u = u };
+  assert_int_equal (pw_signal_eval (&source, 7), 0);
   assert_true (u[0] == 2.5 && u[1] == 0 && u[2] == 0);
   assert_true (isinf (pw_signal_breakpoint (&source.signal, PW_JUMPS, 0)));
 }
@@ -20,13 +20,15 @@ static void test_constant (void **state) {
 static void test_harmonic (void **state) {
   (void)state;
   double A = 1.7, w = 2.3, p = 0.4, c = -0.6, t = 1.1, u[3], only[3];
-  pw_source source = { .signal = { PW_HARMONIC, .harmonic = { .amplitude = A, .omega = w, .phase = p, .offset = c } } };
-  assert_int_equal (pw_signal_eval (&source, t, PW_SIGNAL_DERIVATIVES, u), 0);
+  pw_source source = { .signal = { PW_HARMONIC, .harmonic = { .amplitude = A, .omega = w, .phase = p, .offset = c } },
+                       .u = u };
+  assert_int_equal (pw_signal_eval (&source, t), 0);
   double bound = 8 * CHECK_EPS * (A * w * w + fabs (c));
   check_close ("value", u[0], c + A * cos (w * t + p), bound, "round-off: 8 eps of the largest term");
   check_close ("rate", u[1], -A * w * sin (w * t + p), bound, "round-off: 8 eps of the largest term");
   check_close ("acceleration", u[2], -A * w * w * cos (w * t + p), bound, "round-off: 8 eps of the largest term");
-  assert_int_equal (pw_signal_eval (&source, t, PW_SIGNAL_VALUE, only), 0);
+  source.u = only, source.of_force = 1;
+  assert_int_equal (pw_signal_eval (&source, t), 0);
   assert_true (only[0] == u[0] && only[1] == 0 && only[2] == 0);
 }
 

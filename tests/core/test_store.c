@@ -59,6 +59,7 @@ static void test_arena (void **state) {
   assert_string_equal (second, "");
   assert_ptr_equal (second, first + 2); /* texts are packed, arrays after them aligned */
   assert_int_equal ((uintptr_t)pw_arena_alloc (&arena, sizeof (double)) % 16, 0);
+  assert_null (pw_arena_alloc (&arena, SIZE_MAX));
   pw_arena_free (&arena);
   assert_null (arena.chunk);
 }

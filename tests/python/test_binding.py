@@ -178,3 +178,9 @@ def test_versions_agree():
     assert f'PW_VERSION "{lib.VERSION}"' in header
     for file in ("pyproject.toml", "backend.py"):
         assert f'"{lib.VERSION}"' in (TOP / "core/python" / file).read_text(), file
+
+
+def test_modules_import_each_other_at_their_top():
+    for path in sorted(pathlib.Path(lib.__file__).parent.glob("*.py")):
+        late = re.findall(r"^ +from \..*", path.read_text(encoding="utf-8"), re.M)
+        assert not late, f"{path.name}: {late}: a cycle?"

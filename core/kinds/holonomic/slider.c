@@ -39,9 +39,7 @@ PER_ELEMENT (slider_gamma, line, 2) {
     line_##member##_one (now, out);         \
     memset (out + 6, 0, 6 * sizeof *out);   \
   }
-SLIDER_DERIVATIVE (jw_q)
-SLIDER_DERIVATIVE (gamma_q)
-SLIDER_DERIVATIVE (gamma_v)
+EACH_DERIVATIVE (SLIDER_DERIVATIVE)
 
 static const pw_field slider_fields[] = {
   { PW_AT (pw_slider, body), PW_BODY, .count = 2, .required = 1,

@@ -55,9 +55,7 @@ PER_ELEMENT (weld_gamma, weld, 3) {
     points_##member##_one (now.points, out); \
     memset (out + 12, 0, 6 * sizeof *out);   \
   }
-WELD_DERIVATIVE (jw_q)
-WELD_DERIVATIVE (gamma_q)
-WELD_DERIVATIVE (gamma_v)
+EACH_DERIVATIVE (WELD_DERIVATIVE)
 
 static const pw_field weld_fields[] = {
   { PW_AT (pw_weld, body), PW_BODY, .count = 2, .required = 1, .about = "the two bodies; one may be ground" },

@@ -62,9 +62,7 @@ PER_ELEMENT (rolling_gamma, rolling, 2) {
     contact_##member##_one (now.along, out + 4); \
     out[3] = out[7] = 0;                         \
   }
-ROLLING_DERIVATIVE (jw_q)
-ROLLING_DERIVATIVE (gamma_q)
-ROLLING_DERIVATIVE (gamma_v)
+EACH_DERIVATIVE (ROLLING_DERIVATIVE)
 
 static void rolling_force (const pw_batch *batch, double *out) {
   for (int e = 0; e < batch->count; e++, out += 4) out[0] = out[1] = out[2] = 0, out[3] = batch->u[3 * e];

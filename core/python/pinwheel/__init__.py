@@ -13,10 +13,10 @@ from . import elements
 from ._library import VERSION as __version__
 from ._library import Error, InitialError, InputError, MethodError, ResourceError
 from .elements import Body, Element
-from .model import Linear, Model, describe, models
+from .model import Linear, Model, describe, models, sweep
 from .results import Result
 from .simulation import Inputs, Simulation
-from .studies import command, help_of, sweep
+from .studies import command, help_of
 
 __all__ = ["Body", "Element", "Error", "InitialError", "InputError", "Inputs", "Linear", "MethodError", "Model",
            "ResourceError", "Result", "Simulation", "command", "describe", "elements", "help_of", "models", "sweep",

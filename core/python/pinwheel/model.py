@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes as c
+import functools
 import json
 import math
 import pathlib
@@ -17,10 +18,21 @@ import numpy as np
 from . import _library as lib
 from . import _program, studies
 from .results import Result, _nearest
-from .simulation import Simulation
+from .simulation import Simulation, specialised
 
 
-class _System:
+class _Handle:
+    """A C object and the function that deletes it."""
+
+    def __init__(self, pointer, free):
+        self.pointer, self._free = pointer, free
+
+    def __del__(self):
+        if self.pointer:
+            self._free(self.pointer)
+
+
+class _System(_Handle):
     """A compiled system, which simulations share.
 
     keep: objects to which the system refers; raised: exceptions raised by signals in Python, by thread, see _callback.
@@ -29,13 +41,10 @@ class _System:
     _compiling = threading.Lock()  # one specialised code at a time
 
     def __init__(self, pointer, keep, raised):
-        self.pointer, self._keep, self._raised = pointer, keep, raised
+        super().__init__(pointer, lib.core.pw_system_free)
+        self._keep, self._raised = keep, raised
         self._code = _Handle(None, lib.files.pw_scene_code_close)
         self._code_tried = False
-
-    def __del__(self):
-        if self.pointer:
-            lib.core.pw_system_free(self.pointer)
 
     def code(self) -> int | None:
         """Specialised code, compiled or from the cache; None if there cannot be any."""
@@ -87,17 +96,6 @@ class _Described:
 
     def __reduce__(self):
         return _Described, (self._name, self._text)
-
-
-class _Handle:
-    """A C object and the function that deletes it."""
-
-    def __init__(self, pointer, free):
-        self.pointer, self._free = pointer, free
-
-    def __del__(self):
-        if self.pointer:
-            self._free(self.pointer)
 
 
 @dataclass(frozen=True)
@@ -214,7 +212,7 @@ class Model:
     def __reduce__(self):
         if self.signals:
             raise TypeError("a model with functions as signals cannot be sent to other processes")
-        return _restore, (self._origin, self.start, self._given)
+        return functools.partial(Model, self._origin, start=self.start, **self._given), ()
 
     def __copy__(self) -> Model:
         return self.replace()
@@ -429,15 +427,9 @@ class Model:
                       np.array(linear.twist))
 
 
-def specialised(when: str, steps: float) -> bool:
-    """Whether runs with this number of steps use compiled code."""
-    if when not in ("auto", "always", "never"):
-        raise lib.InputError(f"specialise = {when!r:.60}: expected auto, always or never")
-    return when == "always" or (when == "auto" and steps >= lib.PW_SPECIALISE_STEPS)
-
-
-def _restore(origin, start, parameters):
-    return Model(origin, start=start, **parameters)
+@functools.wraps(studies.sweep)
+def sweep(model, *arguments, **settings):
+    return studies.sweep(model if isinstance(model, Model) else Model(model), *arguments, **settings)
 
 
 def _functions(signals):

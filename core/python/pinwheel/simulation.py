@@ -90,6 +90,13 @@ class _Rows:
         return self._rows[:self.count]
 
 
+def specialised(when: str, steps: float) -> bool:
+    """Whether runs with this number of steps use compiled code."""
+    if when not in ("auto", "always", "never"):
+        raise lib.InputError(f"specialise = {when!r:.60}: expected auto, always or never")
+    return when == "always" or (when == "auto" and steps >= lib.PW_SPECIALISE_STEPS)
+
+
 class Simulation:
     """An open run of a model, advanced by its caller: for controllers, or to look at every step.
 

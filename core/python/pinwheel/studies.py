@@ -17,6 +17,7 @@ import numpy as np
 from . import _library as lib
 from . import _program
 from ._progress import watched
+from .simulation import specialised
 
 # ---- Sweeps ----
 
@@ -51,7 +52,6 @@ def _points(vary):
 
 def _specialise(model, runs, method, t_end, settings):
     """The setting ``specialise`` of all runs, which depends on the steps of the whole sweep, as in the program."""
-    from .model import specialised
     when, given = settings.pop("specialise", "auto"), lib.pw_settings()
     for name in ("step", "rtol"):
         setattr(given, name, model._setting(name, settings.get(name)))
@@ -88,8 +88,6 @@ def sweep(model, vary: dict, *, method: str | None = None, t_end: float | None =
     InputError
         For a value that the model refuses; runs that fail only leave NaN.
     """
-    from .model import Model
-    model = model if isinstance(model, Model) else Model(model)
     names, values, points = _points(vary)
     t_end = None if t_end is None else lib.number(t_end, "t_end")
     settings["specialise"] = _specialise(model, len(points), method, t_end, dict(settings))

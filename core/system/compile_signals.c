@@ -1,0 +1,74 @@
+/* Compiles the signals of all elements: their tables, the states that they read, the contexts of functions. */
+#include <string.h>
+#include "system.h"
+
+/* Copies the points of a table and computes its spline. */
+static int signals_table (pw_system *s, pw_source *source, pw_error *error) {
+  pw_points *table = &source->signal.table;
+  size_t n = (size_t)table->count;
+  double *t = pw_arena_alloc (&s->arena, 4 * n * sizeof *t), *value = t + n;
+  if (t == NULL) return pw_fail_memory (s, error);
+  memcpy (t, table->t, n * sizeof *t);
+  for (size_t i = 0; i < n; i++) value[i] = pw_table_value (&source->signal, (int)i);
+  table->t = t;
+  table->value = value;
+  table->scale = table->offset = 0;
+  source->spline = value + n;
+  pw_table_spline (&source->signal, source->spline);
+  return PW_OK;
+}
+
+/* Converts the names of the states that a function reads to indices. */
+static int signals_reads (pw_system *s, pw_source *source, const char *element, pw_error *error) {
+  const char *const *reads = source->signal.function.reads;
+  int count = 0;
+  while (reads && reads[count]) count++;
+  int *state = pw_arena_alloc (&s->arena, (size_t)count * sizeof *state);
+  if (state == NULL) return pw_fail_memory (s, error);
+  for (int i = 0; i < count; i++) {
+    pw_error cause = { 0 };
+    state[i] = pw_system_find_state (s, reads[i], &cause);
+    if (state[i] < 0)
+      return pw_fail (error, PW_INPUT, "model %s: element %s reads a state: %s", s->model, element, cause.text);
+  }
+  source->state = state;
+  source->reads = count;
+  s->reads += count;
+  s->state_dependent += count > 0;
+  return PW_OK;
+}
+
+static int signals_source (pw_system *s, pw_source *source, const pw_signal *signal, const char *element,
+                           pw_error *error) {
+  const pw_function *opens = signal->type == PW_FUNCTION && signal->function.open ? &signal->function : NULL;
+  void *context = opens ? opens->open (opens->context) : NULL;
+  if (opens && context == NULL) return pw_fail_memory (s, error);
+  source->signal = *signal;
+  if (context) source->signal.function.context = context;
+  if (signal->type == PW_TABLE) return signals_table (s, source, error);
+  return signal->type == PW_FUNCTION ? signals_reads (s, source, element, error) : PW_OK;
+}
+
+/* Compiles the signals of element e of a batch. */
+static int signals_element (pw_system *s, const pw_element_batch *k, int e, const void *definition, pw_error *error) {
+  pw_source *source = k->source + e * k->kind->signals;
+  for (int u = 0; u < k->kind->signals; u++, source++) {
+    source->of_force = pw_kind_signals_force (k->kind);
+    if (signals_source (s, source, pw_field_at (k->kind, definition, PW_SIGNAL, u), k->name[e], error) != PW_OK)
+      return PW_INPUT;
+  }
+  return PW_OK;
+}
+
+int pw_compile_signals (pw_system *s, const pw_model *m, const int *batch_of, pw_error *error) {
+  int *next = pw_arena_alloc (&s->arena, (size_t)s->batches * sizeof *next); /* next element of each batch */
+  if (next == NULL) return pw_fail_memory (s, error);
+  for (int n = 0; n < m->elements; n++) {
+    const pw_element *from = &m->element[n];
+    const pw_element_batch *k = &s->batch[batch_of[n]];
+    int *e = &next[batch_of[n]];
+    for (; *e < k->b.count && strcmp (k->name[*e], pw_element_name (from)) == 0; ++*e)
+      if (signals_element (s, k, *e, from->definition, error) != PW_OK) return PW_INPUT;
+  }
+  return PW_OK;
+}
