@@ -134,9 +134,12 @@ static int run_is_at (const pw_run *r, double t) {
   return t - r->t <= 8 * DBL_EPSILON * fmax (fabs (r->t), r->w->scale.time);
 }
 
-/* If an evaluation fails at the next time, SUNDIALS repeats steps below the round-off of time endlessly. */
+/* If an evaluation fails at the next time, SUNDIALS repeats steps below the round-off of time endlessly.  Fixed steps
+ * may be that short. */
 static int run_check_progress (pw_run *r, double before, pw_error *error) {
-  r->stalled = r->t - before > 64 * DBL_EPSILON * fabs (r->t) ? 0 : r->stalled + 1;
+  double least = 64 * DBL_EPSILON * fabs (r->t);
+  if (r->fixed_steps) least = fmin (least, r->settings.step / 2);
+  r->stalled = r->t - before > least ? 0 : r->stalled + 1;
   if (r->stalled < r->limits.stalled) return PW_OK;
   return pw_fail (error, PW_METHOD,
                   "t = %.6g s: no step succeeds, however small: the next state cannot be evaluated, or not to within "
@@ -250,6 +253,20 @@ static int run_energy (pw_run *r, double *energy, pw_error *error) {
   return PW_OK;
 }
 
+/* Continues from r->q and r->v, made consistent; *energy: that of the state reached. */
+static int run_continue_at (pw_run *r, double *energy, pw_error *error) {
+  r->near_singular = 0;
+  r->watchdog.singular_ahead = 1;
+  int status = run_select_rows (r, error);
+  if (status == PW_OK) status = pw_run_make_consistent (r, NULL, error);
+  if (status == PW_OK) status = pw_run_evaluate (r, error);
+  if (status == PW_OK) status = run_energy (r, energy, error);
+  if (status != PW_OK) return status;
+  status = r->method->restart (r, error);
+  if (status != PW_OK) r->interrupted = 1; /* the method is restarted before the next step */
+  return status;
+}
+
 /* A change of energy by the caller is not an error of the method: it is added to the initial energy.  The caller's
  * functions may return other values and breakpoints than before. */
 int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error) {
@@ -264,19 +281,14 @@ int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error
   const double reselect_below = r->reselect_below;
   r->w->t_signal = NAN;
   run_exchange (r, q, v);
-  r->near_singular = 0;
-  r->watchdog.singular_ahead = 1;
-  status = run_select_rows (r, error);
-  if (status == PW_OK) status = pw_run_make_consistent (r, NULL, error);
-  if (status == PW_OK) status = pw_run_evaluate (r, error);
-  if (status == PW_OK) status = run_energy (r, &after, error);
+  status = run_continue_at (r, &after, error);
   if (status == PW_OK) {
     pw_run_count_moved (r);
     pw_watchdog_begin (r);
     if (!r->near_singular)
       pw_run_set_reference_level (r); /* accelerations near a singular configuration are no reference */
     r->energy0 += after - before;
-    return r->method->restart (r, error);
+    return PW_OK;
   }
   memcpy (r->q, r->q_at, pw_state_length (r->s) * sizeof *r->q);
   r->reselect_below = reselect_below;
