@@ -240,6 +240,13 @@ static inline int pw_evaluate_J_at (pw_workspace *w, double t, const double *q, 
   return status;
 }
 
+/* to += factor * from, two numbers at a time */
+static inline void pw_add_scaled (double *restrict to, const double *restrict from, double factor, int n) {
+  int i = 0;
+  for (; i + 1 < n; i += 2) to[i] += factor * from[i], to[i + 1] += factor * from[i + 1];
+  if (i < n) to[i] += factor * from[i];
+}
+
 /* For qsort: numbers in ascending order. */
 static inline int pw_ascending (const void *a, const void *b) {
   double x = *(const double *)a, y = *(const double *)b;

@@ -16,9 +16,8 @@ int pw_implicit_open (pw_implicit *x, pw_run *r, const pw_array *array, size_t c
 }
 
 int pw_implicit_open_matrix (pw_implicit *x, int size) {
-  const pw_tangent *t = &x->dae.tangent;
-  x->value = malloc (((size_t)t->colptr[size] + 1) * sizeof *x->value);
-  return x->value ? pw_sparse_open (&x->sparse, PW_SPARSE_REAL, size, t->colptr, t->rowind) : PW_RESOURCE;
+  const pw_scatter_map *pattern = &x->dae.tangent.scatter;
+  return pw_sparse_open (&x->sparse, PW_SPARSE_REAL, size, pattern->colptr, pattern->rowind);
 }
 
 int pw_implicit_complete (pw_run *r, int status, pw_dense_projection projection, pw_error *error) {
@@ -32,7 +31,6 @@ void pw_implicit_close (pw_run *r) {
   pw_dense_output_close (&x->last);
   pw_sparse_close (&x->sparse);
   pw_dae_close (&x->dae);
-  free (x->value);
   free (x->memory);
   free (r->data);
 }

@@ -106,7 +106,6 @@ static void radau_close (pw_run *r) {
   pw_sparse_close (&d->real);
   pw_sparse_close (&d->complex);
   pw_dae_close (&d->dae);
-  free (d->minus_F_y);
   free (d->value);
   free (d->diagonal);
   free (d->memory);

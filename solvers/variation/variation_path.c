@@ -85,7 +85,7 @@ static int path_differentiate (pw_variation *x, const pw_variation_point *p, dou
   for (int k = 0; k < 2 && status == PW_OK; k++) {
     pw_sample s;
     status = pw_run_sample (x->r, p->t + at[inside][k] * d, &s, error);
-    if (status == PW_OK) pw_variation_add (a, s.v, weight[inside][k] / d, x->n);
+    if (status == PW_OK) pw_add_scaled (a, s.v, weight[inside][k] / d, x->n);
   }
   return status;
 }
