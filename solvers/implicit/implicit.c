@@ -68,7 +68,7 @@ int pw_implicit_fail (pw_run *r, int status, double h, pw_error *error) {
   const char *reason = status == PW_INPUT ? "the Newton matrix is singular"
                        : status == PW_OK  ? "the error test fails"
                                           : "the iteration does not converge";
-  if (pw_fixed_steps (r))
+  if (r->fixed_steps)
     return pw_fail (error, PW_METHOD, "t = %.6g s: %s; the step of %.6g s may be too large", r->t, reason, h);
   if (status == PW_INPUT) return pw_fail (error, PW_METHOD, "t = %.6g s: %s", r->t, reason);
   return pw_fail (error, PW_METHOD, "t = %.6g s: %s however small the step (rtol %.3g)", r->t, reason,

@@ -131,7 +131,7 @@ static void radau_set_tolerances (pw_run *r, double h) {
     double typical = index3 && i >= n ? fmax (d->unit[i], largest * d->unit[i - n] / h) : d->unit[i];
     d->tolerance[i] = fmin (rtol * (size + offset), r->saturation[i]);
     d->round_off[i] = fmin (8 * DBL_EPSILON * (size + typical), 0.1 * r->saturation[i]);
-    d->newton_tolerance[i] = pw_fixed_steps (r) ? d->round_off[i] : fmax (newton * d->tolerance[i], d->round_off[i]);
+    d->newton_tolerance[i] = r->fixed_steps ? d->round_off[i] : fmax (newton * d->tolerance[i], d->round_off[i]);
   }
 }
 
@@ -217,7 +217,7 @@ static int radau_correct (pw_run *r, double h, double t1, double *size, double *
  * configuration, which magnifies it. */
 static pw_convergence radau_test (pw_run *r, int done, double size, double before, double round_offs) {
   pw_method_data *d = r->data;
-  const int fixed = pw_fixed_steps (r);
+  const int fixed = r->fixed_steps;
   const int most = fixed ? 50 : PW_RADAU_MOST; /* corrections after the first; a fixed step cannot be made shorter */
   d->reduction = 0.5;
   if (!isfinite (size)) return PW_DIVERGED;

@@ -75,11 +75,10 @@ void pw_run_close (pw_run *r) {
   run_close_method (r);
   pw_saddle_close (r->saddle);
   pw_saddle_close (r->watchdog.saddle);
-  free (r->rank_memory);
-  free (r->scene_memory);
   pw_workspace_free (r->w);
   free (r->memory);
   free (r->origin);
+  pw_arena_free (&r->arena);
   free (r);
 }
 
@@ -90,14 +89,11 @@ static int run_restart_method (pw_run *r, pw_error *error) {
   return status == PW_OK ? r->method->restart (r, error) : status;
 }
 
-int pw_run_renew (pw_run *r, pw_references references, pw_error *error) {
+int pw_run_renew (pw_run *r, pw_error *error) {
   int status = pw_run_open_saddle (r, error);
   r->watchdog.singular_ahead = 1;
   if (status == PW_OK) status = pw_run_evaluate (r, error);
-  if (status == PW_OK && references == PW_NEW_REFERENCES)
-    pw_run_set_references (r);
-  else if (status == PW_OK)
-    pw_watchdog_begin (r);
+  if (status == PW_OK) pw_watchdog_begin (r);
   run_close_method (r); /* it may use the previous saddle */
   if (status == PW_RESOURCE || r->saddle == NULL) return status;
   int opened = r->method->open (r, error);
@@ -120,7 +116,10 @@ static int run_reselect (pw_run *r, pw_error *error) {
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   int other = pw_rank_reselect (r);
   if (other < 0) return pw_fail_memory (r->s, error);
-  return other ? pw_run_renew (r, PW_NEW_REFERENCES, error) : PW_OK;
+  if (other == 0) return PW_OK;
+  int status = pw_run_renew (r, error);
+  if (status == PW_OK) pw_run_set_references (r);
+  return status;
 }
 
 /* Computes r->independence with the J last evaluated. */
