@@ -158,8 +158,9 @@ int pw_run_advance (pw_run *r, double t_end, pw_error *error) {
   if (status != PW_OK) return status;
   pw_forget_residuals (r);
   if (r->stalled == 0) r->w->failed = NULL; /* otherwise it is the signal that stops the run */
-  if (r->t >= r->breakpoint || r->interrupted) status = run_restart_method (r, error);
-  r->interrupted = 0;
+  r->interrupted |= r->t >= r->breakpoint;
+  if (r->interrupted) status = run_restart_method (r, error);
+  if (status == PW_OK) r->interrupted = 0;
   if (status == PW_OK) status = run_reselect (r, error);
   const double stop = fmin (t_end, r->breakpoint);
   if (status == PW_OK && run_is_at (r, stop)) {
@@ -262,7 +263,7 @@ static int run_continue_at (pw_run *r, double *energy, pw_error *error) {
   if (status == PW_OK) status = run_energy (r, energy, error);
   if (status != PW_OK) return status;
   status = r->method->restart (r, error);
-  if (status != PW_OK) r->interrupted = 1; /* the method is restarted before the next step */
+  r->interrupted = status != PW_OK; /* then the method is restarted before the next step */
   return status;
 }
 

@@ -103,9 +103,10 @@ static void test_refused (void **state) {
 }
 
 static const pw_method *restart_built_in;
-static int restart_fails;
+static int restart_fails, restart_calls;
 
 static int restart_or_fail (pw_run *r, pw_error *error) {
+  restart_calls++;
   return restart_fails ? pw_fail (error, PW_METHOD, "no restart") : restart_built_in->restart (r, error);
 }
 
@@ -126,11 +127,15 @@ static void test_refused_by_method (void **state) {
   restart_fails = 1;
   assert_int_equal (pw_run_restart (r, NULL, v, &error), PW_METHOD);
   check_error (&error, PW_METHOD, "no restart");
+  error = (pw_error){ 0 };
+  assert_int_equal (pw_run_advance (r, 2, &error), PW_METHOD);
+  check_error (&error, PW_METHOD, "no restart");
   restart_fails = 0, now = runs_to (r, 1);
   check_bits ("velocities", now.v, before.v, 6);
   check_bits ("accelerations", now.a, before.a, 6);
   check_bits ("balance", &now.balance, &before.balance, 1);
   now = runs_to (r, 2), before = runs_to (left, 2);
+  assert_int_equal (restart_calls, 3); /* the last one before the first step that succeeds */
   for (int j = 0; j < 6; j++)
     check_close ("positions", now.q[j], before.q[j], 1e-12, "steps end at other times by round-off");
   pw_run_close (r), pw_run_close (left);
