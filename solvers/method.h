@@ -63,7 +63,7 @@ struct pw_run {
   double projected_at;
 
   int stopped;     /* 1: settings.stop has requested a stop */
-  int interrupted; /* 1: the method must be restarted: at a breakpoint, after a failure to, or a stop inside SUNDIALS */
+  int interrupted; /* 1: the method must be restarted: at a breakpoint, after a failed restart or an interrupted step */
   struct {
     double time, speed; /* time since the start [s]; the largest speed then, in units of the scene (limits.c) */
   } speed_record, earlier_record; /* the last record; the one before, at half its time or less */

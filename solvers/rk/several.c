@@ -146,11 +146,6 @@ static void several_take (several_lanes *x, const pw_specialised_lanes *code, vo
   code->steps (scene, steps, memory);
 }
 
-/* The error of run i; errors may be NULL. */
-static pw_error *several_error (pw_error *errors, int i) {
-  return errors ? errors + i : NULL;
-}
-
 void pw_runs_advance (pw_run *const *runs, int count, double t_end, const pw_specialised_lanes *code, void *memory,
                       int *status, pw_error *error) {
   several_lanes x = { .run = runs };
@@ -167,13 +162,13 @@ void pw_runs_advance (pw_run *const *runs, int count, double t_end, const pw_spe
     several_take (&x, code, memory);
     for (int k = 0; k < x.used; k++) {
       int i = x.index[k];
-      status[i] = several_finish (runs[i], &x.steps[k], several_error (error, i));
+      status[i] = several_finish (runs[i], &x.steps[k], error ? &error[i] : NULL);
       done[i] = x.steps[k].done > 0 || status[i] != PW_OK;
     }
   }
   for (int i = 0; i < count; i++)
     if (i >= PW_LANES_MOST || !done[i])
-      status[i] = pw_run_advance_towards (runs[i], t_end, t_end, several_error (error, i));
+      status[i] = pw_run_advance_towards (runs[i], t_end, t_end, error ? &error[i] : NULL);
 }
 
 int pw_run_advance_to (pw_run *r, double t, double t_end, pw_error *error) {
