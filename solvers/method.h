@@ -7,6 +7,7 @@
 #include "pinwheel-method.h"
 #include "saddle.h"
 #include "system.h"
+#include "util.h"
 #include "watchdog.h"
 
 enum { PW_MAX_OPTIONS = 12 };
@@ -31,19 +32,16 @@ struct pw_run {
   unsigned char *active_array; /* rows: what `active` points to */
   double *coefficient;         /* redundant x rows: each redundant row as a combination of active rows */
   double *normal;              /* redundant x (redundant + 1): normal equations in redundancy.c, right side last */
-  double *row_force, *zero;    /* coords + 3, rows: right-hand sides for the coefficients of a redundant row */
+  double *row_force;           /* coords + 3: right-hand side for the coefficients of a redundant row */
   double *least_norm;          /* rows: least-norm multipliers for the ledger */
-  char *rank_memory;           /* of these arrays */
   double independence;         /* of the active rows at the state reached (rank.h) */
   double reselect_below;       /* independence below which other active rows are tried */
   const struct pw_specialised *specialised; /* compiled code of the scene in use, or NULL */
-  struct pw_scene *scene;                   /* data of that code */
-  char *scene_memory;
-  int scene_ready;        /* 1: its constants have been computed */
-  pw_thresholds limits;   /* thresholds of the watchdog */
-  pw_watchdog watchdog;   /* the sine, which measures the distance from a singular configuration */
-  double refused_sine;    /* sine below which an evaluation is refused */
-  int near_singular;      /* 1 after an evaluation near a singular configuration */
+  struct pw_scene *scene;                   /* its data; NULL: none, or a constant pivot is too small */
+  pw_thresholds limits;                     /* thresholds of the watchdog */
+  pw_watchdog watchdog;                     /* the sine, which measures the distance from a singular configuration */
+  double refused_sine;                      /* sine below which an evaluation is refused */
+  int near_singular;                        /* 1 after an evaluation near a singular configuration */
   double reference_level; /* largest acceleration norm away from singular configurations, in units of L / T^2; >= 1 */
   double previous_norm;   /* acceleration norm of the last such state */
   int uses_derivatives;   /* 1: the method uses the derivatives of the equations (tangent.h) */
@@ -64,8 +62,8 @@ struct pw_run {
   double *q_at, *v_at, *a_at, *lambda_at, *ledger_at; /* same layout */
   double projected_at;
 
-  int stopped;     /* 1: settings.stop has requested a stop, */
-  int interrupted; /* 1: which has interrupted a step of SUNDIALS: the method must be restarted */
+  int stopped;     /* 1: settings.stop has requested a stop */
+  int interrupted; /* 1: the method must be restarted: at a breakpoint, after a failed restart or an interrupted step */
   struct {
     double time, speed; /* time since the start [s]; the largest speed then, in units of the scene (limits.c) */
   } speed_record, earlier_record; /* the last record; the one before, at half its time or less */
@@ -84,7 +82,8 @@ struct pw_run {
   pw_initial_report initial;
   pw_statistics statistics;
   pw_method_data *data; /* private to the integrator */
-  char *memory;
+  char *memory;         /* of the state, samples and scratch */
+  pw_arena arena;       /* of redundant rows and specialised code */
 };
 
 /* ---- Tolerances ---- */
@@ -109,9 +108,6 @@ void pw_matrix_evaluated (pw_run *r, const double *q, const double *v);
  * otherwise an iteration could converge to any value of the force. */
 static inline double pw_tolerance (const pw_run *r, int state, double value) {
   return fmin (r->settings.rtol * fabs (value) + pw_atol (r, state), r->saturation[state]);
-}
-static inline int pw_fixed_steps (const pw_run *r) {
-  return r->fixed_steps;
 }
 
 /* ---- Fixed steps, which end at multiples of the step size after a time `base` ---- */
@@ -208,11 +204,8 @@ int pw_run_look_ahead (pw_run *r, pw_error *error);
 /* Makes the norm of the accelerations at the state reached the reference level for later ones. */
 void pw_run_set_reference_level (pw_run *r);
 
-/* Whether pw_run_renew sets the references anew or keeps them (pw_run_set_references). */
-typedef enum { PW_KEEP_REFERENCES, PW_NEW_REFERENCES } pw_references;
-
 /* Opens the saddle and the method anew at the state reached, where J is evaluated. */
-int pw_run_renew (pw_run *r, pw_references references, pw_error *error);
+int pw_run_renew (pw_run *r, pw_error *error);
 
 /* The length of q, v, a and lambda of a state together. */
 static inline size_t pw_state_length (const pw_system *s) {
@@ -237,10 +230,11 @@ static inline int pw_evaluate_J_at (pw_workspace *w, double t, const double *q, 
   return status;
 }
 
-/* For qsort: numbers in ascending order. */
-static inline int pw_ascending (const void *a, const void *b) {
-  double x = *(const double *)a, y = *(const double *)b;
-  return (x > y) - (x < y);
+/* to += factor * from, two numbers at a time */
+static inline void pw_add_scaled (double *restrict to, const double *restrict from, double factor, int n) {
+  int i = 0;
+  for (; i + 1 < n; i += 2) to[i] += factor * from[i], to[i + 1] += factor * from[i + 1];
+  if (i < n) to[i] += factor * from[i];
 }
 
 /* The larger of two values; NaN if either is NaN, unlike pw_larger. */
@@ -333,11 +327,10 @@ typedef struct {
   pw_saddle *position;         /* of the metric of positions and the holonomic rows; or the run's saddle */
   int owns_position;           /* 1: position is not the run's saddle */
   pw_saddle *velocity;         /* of the metric of velocities and all rows */
-  int owns_velocity;           /* 1: velocity is not the run's saddle */
+  int owns_velocity;           /* 1: velocity is not the run's saddle, since its metric is not the mass matrix */
   int iterations;              /* of the last projection of positions */
   const unsigned char *active; /* rows that are enforced; NULL: all */
   int ignores_inactive;        /* 1: the residuals of the other rows are not checked */
-  int mass_metric;             /* 1: both metrics are the mass matrix */
   int worst_row;               /* with the largest residual in the last projection of positions */
   int contradictory_row;       /* redundant row that is violated after it, or -1 */
 } pw_projector;
@@ -359,12 +352,10 @@ int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const
 int pw_project_velocities (pw_projector *p, pw_run *r, double *v);
 
 /* Both, then accelerations and multipliers of the projected state, with the run's saddle factorised there.
- * Velocities that satisfy J v = eta to round-off may stay unchanged. */
-int pw_project_state (pw_projector *p, pw_run *r, double t, double *q, double *v, double *a, double *lambda);
-
-/* The same; *added_energy, unless it is NULL, grows by the energy [J] that the projection adds (ledger.c). */
-int pw_project_with_energy (pw_projector *p, pw_run *r, double t, double *q, double *v, double *a, double *lambda,
-                            double *added_energy);
+ * Velocities that satisfy J v = eta to round-off may stay unchanged.  *added_energy, unless it is NULL, grows by the
+ * energy [J] that the projection adds. */
+int pw_project_state (pw_projector *p, pw_run *r, double t, double *q, double *v, double *a, double *lambda,
+                      double *added_energy);
 
 /* Removes from an error e of positions or velocities the part that a projection onto the first `rows` equations
  * removes, in the metric of `saddle` (all rows), which must be factorised at the current configuration. */

@@ -1,22 +1,13 @@
-/* Newton's method by least squares, pseudo-arclength steps along a branch, and the location of events. */
+/* Pseudo-arclength steps along a branch, and the location of events. */
 #include "continuation.h"
-#include <lapacke.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "util.h"
 
-enum {
-  NEWTON_MOST = 60,     /* iterations of a solution */
-  BRANCH_MOST = 8,      /* iterations of a point of a branch: a shorter step is the better remedy */
-  NEWTON_HALVINGS = 10, /* of a correction */
-  NEWTON_SLOW = 4,      /* an iteration that reduces |F| by less has reached round-off, below the tolerance */
-  LOCATE_MOST = 60      /* iterations that locate an event */
-};
-static const double NEWTON_EXACT = 1e-4, /* |F| relative to the tolerance that needs no further iteration */
-    NEWTON_DAMPING = 0.1,                /* factor of |F| in the square of the damping */
-    BRANCH_STEEP = 1e-3,                 /* smallest slope of p along a branch that limits steps by max_change */
-    BRANCH_GROW = 1.5,                   /* factor of the next step, if half of BRANCH_MOST iterations were enough */
+enum { LOCATE_MOST = 60 };               /* iterations that locate an event */
+static const double BRANCH_STEEP = 1e-3, /* smallest slope of p along a branch that limits steps by max_change */
+    BRANCH_GROW = 1.5,                   /* factor of the next step, if half of PW_BRANCH_MOST iterations were enough */
     BRANCH_TURN = 0.96,   /* cosine of the largest angle between the tangents of successive points, 16 degrees */
     BRANCH_APART = 0.3,   /* largest correction of a predictor, relative to the step */
     BRANCH_ASIDE = 0.002, /* largest correction of an interpolated point, relative to the distance of the two points */
@@ -28,6 +19,7 @@ static const double NEWTON_EXACT = 1e-4, /* |F| relative to the tolerance that n
 int pw_branch_open (pw_branch *b, const pw_branch_problem *problem, pw_error *error) {
   size_t n = (size_t)problem->unknowns + 1, m = (size_t)problem->equations + n, large = n > m ? n : m;
   *b = (pw_branch){ .problem = *problem,
+                    .bytes = n * sizeof (double),
                     .work_size = (int)(42 * large + 200) }; /* dgelsy needs 35 large + 32, with blocks of 32 */
   if (!(b->problem.rank_tolerance > 0)) b->problem.rank_tolerance = 1e-9;
   pw_branch_point *const point[] = {
@@ -52,128 +44,11 @@ void pw_branch_close (pw_branch *b) {
   free (b->pivot);
 }
 
-/* ---- Newton's method ---- */
-
-/* The largest |F_i|; NaN if one is not finite. */
-static double branch_residual (const pw_branch *b) {
-  double most = 0;
-  for (int i = 0; i < b->problem.equations; i++)
-    if (fabs (b->F[i]) > most || isnan (b->F[i])) most = fabs (b->F[i]);
-  return most;
-}
-
-static double branch_norm (int n, const double *x) {
-  double sum = 0;
-  for (int i = 0; i < n; i++) sum += x[i] * x[i];
-  return sqrt (sum);
-}
-
-static int branch_evaluate (pw_branch *b, const double *u, int derivatives, pw_error *error) {
-  size_t m = (size_t)b->problem.equations, n = (size_t)b->problem.unknowns + 1;
-  memset (b->F, 0, m * sizeof *b->F);
-  if (derivatives) memset (b->J, 0, m * n * sizeof *b->J);
-  return b->problem.evaluate (b->problem.context, u, b->F, derivatives ? b->J : NULL, error);
-}
-
-/* Adds `extra` rows to the n columns of J: the row c, or if c is NULL rows with `diagonal` on their diagonal. */
-static void branch_extend (pw_branch *b, int n, int extra, const double *c, double diagonal) {
-  size_t m = (size_t)b->problem.equations, rows = m + (size_t)extra;
-  for (size_t j = (size_t)n; j-- > 0;) {
-    double *column = b->J + j * rows;
-    memmove (column, b->J + j * m, m * sizeof *column);
-    memset (column + m, 0, (size_t)extra * sizeof *column);
-    column[m + (c ? 0 : j)] = c ? c[j] : diagonal;
-  }
-}
-
-/* du = the shortest least-squares solution of J du = right and c . du = value.  If c is NULL, p is constant, and
- * damping^2 |du|^2 is added to the sum of squares.  J is destroyed. */
-static int branch_least_squares (pw_branch *b, const double *right, const double *c, double value, double damping) {
-  int m = b->problem.equations, n = b->problem.unknowns + (c != NULL), extra = c ? 1 : damping > 0 ? n : 0;
-  int rows = m + extra, large = rows > n ? rows : n, rank;
-  if (extra) branch_extend (b, n, extra, c, damping);
-  for (int i = 0; i < large; i++) b->du[i] = i < m ? right[i] : 0;
-  if (c) b->du[m] = value;
-  for (int i = 0; i < rows * n; i++)
-    if (!isfinite (b->J[i])) return PW_RETRY;
-  memset (b->pivot, 0, (size_t)n * sizeof *b->pivot);
-  if (LAPACKE_dgelsy_work (LAPACK_COL_MAJOR, rows, n, 1, b->J, rows, b->du, large, b->pivot, b->problem.rank_tolerance,
-                           &rank, b->work, b->work_size))
-    return PW_RETRY;
-  if (!c) b->du[n] = 0;
-  return PW_OK;
-}
-
-/* Moves u along du by the largest of the factors 1, 1/2, ... with which |F| decreases by at least a tenth of what the
- * linear equations predict. */
-static int branch_descend (pw_branch *b, double *u, pw_error *error) {
-  int n = b->problem.unknowns + 1;
-  double before = branch_norm (b->problem.equations, b->F), factor = 1;
-  for (int i = 0; i < NEWTON_HALVINGS; i++, factor /= 2) {
-    for (int j = 0; j < n; j++) b->trial[j] = u[j] + factor * b->du[j];
-    int status = branch_evaluate (b, b->trial, 0, error);
-    if (status != PW_OK && status != PW_RETRY) return status;
-    if (status != PW_OK || !(branch_norm (b->problem.equations, b->F) < before * (1 - factor / 10))) continue;
-    memcpy (u, b->trial, (size_t)n * sizeof *u);
-    return PW_OK;
-  }
-  return PW_RETRY;
-}
-
-/* Newton's method at constant c . u, or if c is NULL at constant p, then with the Levenberg-Marquardt parameter
- * damping min (|F|, 1), which leads to the nearest of solutions that are not isolated (Yamashita & Fukushima 2001). */
-static int branch_iterate (pw_branch *b, double *u, const double *c, double damping, pw_error *error) {
-  int n = b->problem.unknowns + 1, status;
-  double before = b->residual = INFINITY;
-  for (b->iterations = 0;; b->iterations++) {
-    status = branch_evaluate (b, u, 1, error);
-    if (status != PW_OK) return status;
-    b->residual = branch_residual (b);
-    int slow = b->residual > before / NEWTON_SLOW;
-    if (b->residual <= b->problem.tolerance && (slow || b->residual <= b->problem.tolerance * NEWTON_EXACT))
-      return PW_OK;
-    if (b->iterations >= (c ? BRANCH_MOST : NEWTON_MOST) || !isfinite (b->residual)) return PW_RETRY;
-    before = b->residual;
-    for (int i = 0; i < b->problem.equations; i++) b->F[i] = -b->F[i];
-    status = branch_least_squares (b, b->F, c, 0, sqrt (damping * fmin (b->residual, 1)));
-    if (status != PW_OK) return status;
-    if (!c && b->residual > b->problem.tolerance)
-      status = branch_descend (b, u, error);
-    else
-      for (int j = 0; j < n; j++) u[j] += b->du[j];
-    if (status != PW_OK) return status;
-  }
-}
-
-int pw_branch_solve (pw_branch *b, double *u, pw_error *error) {
-  size_t bytes = ((size_t)b->problem.unknowns + 1) * sizeof *u;
-  memcpy (b->next.u, u, bytes);
-  int status = branch_iterate (b, u, NULL, NEWTON_DAMPING, error);
-  if (status != PW_RETRY) return status;
-  memcpy (u, b->next.u, bytes);
-  return branch_iterate (b, u, NULL, 0, error);
-}
-
 /* ---- Branches ---- */
 
-/* The unit tangent t at u with c . t > 0.  PW_RETRY if c is orthogonal to the branch. */
-static int branch_tangent (pw_branch *b, const double *u, const double *c, double *tangent, pw_error *error) {
-  int n = b->problem.unknowns + 1;
-  double dot = 0;
-  int status = branch_evaluate (b, u, 1, error);
-  if (status != PW_OK) return status;
-  memset (b->F, 0, (size_t)b->problem.equations * sizeof *b->F);
-  status = branch_least_squares (b, b->F, c, 1, 0);
-  if (status != PW_OK) return status;
-  double norm = branch_norm (n, b->du);
-  for (int j = 0; j < n; j++) tangent[j] = b->du[j] / norm, dot += b->du[j] * c[j];
-  return isfinite (norm) && norm > 0 && fabs (dot - 1) < 1e-3 ? PW_OK : PW_RETRY;
-}
-
 static void branch_copy (const pw_branch *b, const pw_branch_point *from, pw_branch_point *to) {
-  size_t bytes = ((size_t)b->problem.unknowns + 1) * sizeof *from->u;
-  memcpy (to->u, from->u, bytes);
-  memcpy (to->tangent, from->tangent, bytes);
+  memcpy (to->u, from->u, b->bytes);
+  memcpy (to->tangent, from->tangent, b->bytes);
   to->residual = from->residual, to->interpolated = from->interpolated;
 }
 
@@ -191,12 +66,12 @@ static void branch_insert (pw_branch *b, const pw_branch_point *point, int event
 
 int pw_branch_start (pw_branch *b, const double *u, double direction, pw_error *error) {
   size_t n = (size_t)b->problem.unknowns + 1;
-  memset (b->condition, 0, n * sizeof *b->condition);
+  memset (b->condition, 0, b->bytes);
   b->condition[n - 1] = direction > 0 ? 1 : -1;
   b->folded = b->steps = b->ended = b->queued = b->returned = 0;
   b->reached.residual = b->residual, b->reached.interpolated = 0;
-  memmove (b->reached.u, u, n * sizeof *u);
-  int status = branch_tangent (b, b->reached.u, b->condition, b->reached.tangent, error);
+  memmove (b->reached.u, u, b->bytes);
+  int status = pw_branch_tangent (b, b->reached.u, b->condition, b->reached.tangent, error);
   if (status != PW_OK) return status;
   branch_copy (b, &b->reached, &b->first);
   branch_insert (b, &b->reached, PW_BRANCH_POINT, 0, 0);
@@ -213,22 +88,21 @@ static double branch_distance (const pw_branch *b, const double *x, const double
  * PW_RETRY if the correction is longer than max_distance. */
 static int branch_correct (pw_branch *b, const double *tangent, double max_distance, pw_branch_point *to,
                            pw_error *error) {
-  size_t bytes = ((size_t)b->problem.unknowns + 1) * sizeof *tangent;
-  memcpy (b->condition, tangent ? tangent : b->reached.tangent, bytes);
-  memcpy (b->predicted, to->u, bytes);
-  int status = branch_iterate (b, to->u, tangent ? b->condition : NULL, 0, error);
+  memcpy (b->condition, tangent ? tangent : b->reached.tangent, b->bytes);
+  memcpy (b->predicted, to->u, b->bytes);
+  int status = pw_branch_iterate (b, to->u, tangent ? b->condition : NULL, 0, error);
   if (status != PW_OK) return status;
   if (branch_distance (b, to->u, b->predicted) > max_distance) return PW_RETRY;
   to->residual = b->residual, to->interpolated = 0;
-  return branch_tangent (b, to->u, b->condition, to->tangent, error);
+  return pw_branch_tangent (b, to->u, b->condition, to->tangent, error);
 }
 
 /* Whether p changes around a fold as its slopes at two points predict, by their mean: p of solutions that scatter at a
- * cusp does not.  A solution is accurate to about NEWTON_EXACT times the tolerance. */
+ * cusp does not.  A solution is accurate to about PW_BRANCH_EXACT times the tolerance. */
 static int branch_parabolic (const pw_branch *b, const pw_branch_point *from, const pw_branch_point *to, double chord) {
   int p = b->problem.unknowns;
   double slope = from->tangent[p], end = to->tangent[p], change = (to->u[p] - from->u[p]) / chord;
-  double error = BRANCH_BENT * (fabs (slope) + fabs (end)) / 2 + NEWTON_EXACT * b->problem.tolerance / chord;
+  double error = BRANCH_BENT * (fabs (slope) + fabs (end)) / 2 + PW_BRANCH_EXACT * b->problem.tolerance / chord;
   return slope * end >= 0 || fabs (change - (slope + end) / 2) <= error;
 }
 
@@ -297,7 +171,7 @@ int pw_branch_step (pw_branch *b, pw_error *error) {
   for (int status; (status = branch_try (b, error)) != PW_OK; b->step /= 2)
     if (status != PW_RETRY || b->step < 2 * b->min_step) return status;
   branch_accept (b);
-  if (b->iterations <= BRANCH_MOST / 2) b->step *= BRANCH_GROW;
+  if (b->iterations <= PW_BRANCH_MOST / 2) b->step *= BRANCH_GROW;
   return PW_OK;
 }
 
@@ -305,18 +179,16 @@ int pw_branch_step (pw_branch *b, pw_error *error) {
  * Newton's method if this converges nearby. */
 static int branch_between (pw_branch *b, const pw_branch_point *from, const pw_branch_point *to, double s,
                            pw_branch_point *point, pw_error *error) {
-  size_t bytes = ((size_t)b->problem.unknowns + 1) * sizeof *point->u;
   double chord = branch_distance (b, to->u, from->u), r = 1 - s;
   for (int j = 0; j <= b->problem.unknowns; j++)
     point->u[j] = r * r * ((1 + 2 * s) * from->u[j] + s * chord * from->tangent[j]) +
                   s * s * ((1 + 2 * r) * to->u[j] - r * chord * to->tangent[j]);
   int status = branch_correct (b, from->tangent, BRANCH_ASIDE * chord, point, error);
   if (status != PW_RETRY) return status;
-  memcpy (point->u, b->predicted, bytes);
-  memcpy (point->tangent, from->tangent, bytes);
-  status = branch_evaluate (b, point->u, 0, error);
-  point->residual = branch_residual (b), point->interpolated = 1;
-  return status;
+  memcpy (point->u, b->predicted, b->bytes);
+  memcpy (point->tangent, from->tangent, b->bytes);
+  point->interpolated = 1;
+  return pw_branch_residual (b, point->u, &point->residual, error);
 }
 
 /* The Illinois variant of regula falsi (Dowell & Jarratt 1971), every fourth step a bisection.  The bracket s[0], s[1]

@@ -68,6 +68,7 @@ typedef struct {
   pw_branch_point first, next, side[2];
   int bounded; /* 1: steps beyond p = 0 to 1 or past p of the first point are refused */
   double *F, *J, *du, *trial, *work, *condition, *predicted;
+  size_t bytes; /* of u */
   int *pivot, work_size;
   char *memory;
 } pw_branch;
@@ -108,5 +109,18 @@ int pw_branch_locate (pw_branch *b, pw_branch_test *test, void *context, pw_erro
 double pw_branch_fraction (const pw_branch *b, const pw_branch_point *point);
 /* Queues b->found as an event; only if queued < PW_BRANCH_QUEUE - 1: the point reached follows. */
 void pw_branch_queue (pw_branch *b, int event, int tag);
+
+/* ---- continuation_newton.c, for continuation.c only ---- */
+
+enum { PW_BRANCH_MOST = 8 };                /* iterations of a point of a branch: a shorter step is the better remedy */
+static const double PW_BRANCH_EXACT = 1e-4; /* |F| relative to the tolerance that needs no further iteration */
+
+/* Newton's method at constant c . u, or if c is NULL at constant p, then with the Levenberg-Marquardt parameter
+ * damping |F|, which leads to the nearest of solutions that are not isolated (Yamashita & Fukushima 2001). */
+int pw_branch_iterate (pw_branch *b, double *u, const double *c, double damping, pw_error *error);
+/* The unit tangent t at u with c . t > 0.  PW_RETRY if c is orthogonal to the branch. */
+int pw_branch_tangent (pw_branch *b, const double *u, const double *c, double *tangent, pw_error *error);
+/* The largest |F_i| at u.  A status. */
+int pw_branch_residual (pw_branch *b, const double *u, double *residual, pw_error *error);
 
 #endif

@@ -127,7 +127,7 @@ static int flow_nearest (pw_periodic *x, pw_run *r, int j) {
  * x->state, by the change of the nearest consistent state; 0: for changes that satisfy the constraints. */
 static int flow_basis (pw_periodic *x, pw_run *r, int nearest) {
   pw_linearisation l;
-  int n = x->n, status = pw_linear_open (&l, r, PW_WITHOUT_MODES, n);
+  int n = x->n, status = pw_linear_open (&l, r, PW_LINEAR_BASES);
   if (status == PW_OK) status = pw_linear_evaluate (&l, r->t, r->q, r->v);
   if (status == PW_OK) pw_linear_bases (&l);
   x->size = l.size;

@@ -28,8 +28,7 @@ static int steady_open_run (pw_steady *x, pw_place place, const pw_system *s) {
     x->system[place].run = pw_run_open (s, "rk4+projection", &settings, &x->why);
   }
   if (x->system[place].run == NULL) return x->why.status;
-  int status = pw_linear_open (&x->system[place].linearisation, x->system[place].run, PW_WITHOUT_MODES,
-                               PW_STEADY_MAX_COORDINATES);
+  int status = pw_linear_open (&x->system[place].linearisation, x->system[place].run, PW_LINEAR_BASES);
   return status == PW_OK ? PW_OK : pw_fail_memory (s, &x->why);
 }
 

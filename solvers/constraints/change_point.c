@@ -193,14 +193,14 @@ static int change_fail (pw_run *r, int row, double apart, const char *finding, d
   return pw_fail (error, PW_METHOD,
                   "t = %.6g s: change point at %s: %s; branches come within %.2g of each other, the step is "
                   "%.2g long (scaled); use a smaller %s",
-                  r->t, element, finding, apart, length, pw_fixed_steps (r) ? "step" : "tolerance");
+                  r->t, element, finding, apart, length, r->fixed_steps ? "step" : "tolerance");
 }
 
 int pw_change_point_resolve (pw_run *r, double last_sine, pw_error *error) {
   pw_watchdog *watch = &r->watchdog;
   if (isnan (last_sine) || watch->step_length == 0) return PW_OK;
   watch->sine_slope = fmax (watch->sine_slope, fabs (watch->checked_sine - last_sine) / watch->step_length);
-  if (!watch->loops || !pw_fixed_steps (r) || watch->crossed || watch->dependent_row >= r->s->holonomic) return PW_OK;
+  if (!watch->loops || !r->fixed_steps || watch->crossed || watch->dependent_row >= r->s->holonomic) return PW_OK;
   const int is_minimum = last_sine < watch->sine_before_checked && last_sine < watch->checked_sine;
   if (!is_minimum || watch->step_length * watch->sine_slope <= r->limits.resolved * last_sine) return PW_OK;
   return change_fail (r, watch->dependent_row, last_sine / watch->sine_slope, "the step does not resolve it",

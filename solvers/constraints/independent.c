@@ -67,17 +67,14 @@ static void independent_activate (pw_run *r, const unsigned char *active) {
 
 /* Allocates what the run needs for its redundant rows, `redundant` in number, and activates the others. */
 static int independent_store (pw_run *r, const unsigned char *active, size_t redundant) {
-  size_t rows = (size_t)r->s->rows;
-  for (pw_layout l = { 0 }; pw_layout_pass (&l, &r->rank_memory);) {
-    r->active_array = pw_layout_alloc (&l, rows, 1);
-    r->redundant_row = pw_layout_alloc (&l, redundant, sizeof *r->redundant_row);
-    r->coefficient = pw_layout_alloc (&l, redundant * rows, sizeof *r->coefficient);
-    r->normal = pw_layout_alloc (&l, redundant * (redundant + 1), sizeof *r->normal);
-    r->row_force = pw_layout_alloc (&l, (size_t)r->s->coords + 3, sizeof *r->row_force);
-    r->zero = pw_layout_alloc (&l, rows, sizeof *r->zero);
-    r->least_norm = pw_layout_alloc (&l, rows, sizeof *r->least_norm);
-  }
-  if (r->rank_memory == NULL) return PW_RESOURCE;
+  size_t rows = (size_t)r->s->rows, number = sizeof *r->coefficient;
+  r->active_array = pw_arena_alloc (&r->arena, rows);
+  r->redundant_row = pw_arena_alloc (&r->arena, redundant * sizeof *r->redundant_row);
+  r->coefficient = pw_arena_alloc (&r->arena, redundant * rows * number);
+  r->normal = pw_arena_alloc (&r->arena, redundant * (redundant + 1) * number);
+  r->row_force = pw_arena_alloc (&r->arena, ((size_t)r->s->coords + 3 + rows) * number);
+  if (!r->active_array || !r->redundant_row || !r->coefficient || !r->normal || !r->row_force) return PW_RESOURCE;
+  r->least_norm = r->row_force + r->s->coords + 3;
   independent_activate (r, active);
   return PW_OK;
 }

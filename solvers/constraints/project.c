@@ -28,8 +28,7 @@ int pw_projector_open (pw_projector *p, pw_run *r, const double *weight_q, const
                        .velocity = weight_v ? NULL : r->saddle,
                        .active = r->active,
                        .worst_row = -1,
-                       .contradictory_row = -1,
-                       .mass_metric = weight_q == NULL && weight_v == NULL };
+                       .contradictory_row = -1 };
   p->position =
       weight_q ? pw_saddle_open (r->w, weight_q, s->holonomic, r->active, error) : project_open_mass_metric (r, error);
   p->owns_position = p->position != r->saddle;
@@ -133,7 +132,7 @@ static int project_accepts_velocities (const pw_projector *p, pw_run *r) {
   return 1;
 }
 
-int pw_project_state (pw_projector *p, pw_run *r, double t, double *q, double *v, double *a, double *lambda) {
+static int project_state (pw_projector *p, pw_run *r, double t, double *q, double *v, double *a, double *lambda) {
   if (pw_specialised_project (p, r, t, q, v, a, lambda)) {
     p->iterations = r->scene->iterations, p->contradictory_row = -1;
     return PW_OK;
@@ -149,6 +148,16 @@ int pw_project_state (pw_projector *p, pw_run *r, double t, double *q, double *v
     }
   }
   return pw_run_accelerate_evaluated (r, v, a, lambda);
+}
+
+int pw_project_state (pw_projector *p, pw_run *r, double t, double *q, double *v, double *a, double *lambda,
+                      double *added_energy) {
+  int status = added_energy ? pw_update_kinematics (r->w, t, q, v) : PW_OK;
+  if (status != PW_OK) return status;
+  double before = added_energy ? pw_energy (r, v) : 0;
+  status = project_state (p, r, t, q, v, a, lambda);
+  if (status == PW_OK && added_energy) *added_energy += pw_energy (r, v) - before;
+  return status;
 }
 
 /* e += de with W de + J^T mu = 0 and J (e + de) = 0; J de = 0 for the equations after the first `rows`. */

@@ -53,7 +53,8 @@ static void redundancy_add_row (const pw_workspace *w, int row, double weight, d
 
 /* Solves r->row_force = J^T c for the multipliers c and clears the force. */
 static void redundancy_solve (pw_run *r, double *c) {
-  pw_saddle_solve (r->saddle, r->row_force, r->zero, r->row_force, c);
+  memset (c, 0, (size_t)r->s->rows * sizeof *c);
+  pw_saddle_solve (r->saddle, r->row_force, c, r->row_force, c);
   memset (r->row_force, 0, (size_t)r->s->coords * sizeof *r->row_force);
 }
 

@@ -156,7 +156,7 @@ double pw_watchdog_sine (pw_run *r, int *row) {
 int pw_watchdog_near (pw_run *r) {
   pw_watchdog *watch = &r->watchdog;
   if (!watch->singular_ahead || watch->saddle == NULL) return 0;
-  if (!pw_fixed_steps (r) && !pw_saddle_sine_below (r->saddle, r->limits.refine)) return 0;
+  if (!r->fixed_steps && !pw_saddle_sine_below (r->saddle, r->limits.refine)) return 0;
   watch->evaluated_sine = pw_watchdog_sine (r, NULL);
   return watch->evaluated_sine < r->limits.near * watch->largest_sine;
 }

@@ -13,18 +13,12 @@ static int specialised_update (void *workspace, double t, const double *q, const
 /* Makes r->scene, the data of the compiled code; PW_OK or PW_RESOURCE. */
 static int specialised_allocate (pw_run *r, int constants) {
   const pw_system *s = r->s;
-  const void **element = NULL;
-  const pw_kind **kind = NULL;
-  const pw_signal **signal = NULL;
-  double *constant = NULL; /* filled by the code's `prepare` */
-  for (pw_layout l = { 0 }; pw_layout_pass (&l, &r->scene_memory);) {
-    r->scene = pw_layout_alloc (&l, 1, sizeof *r->scene);
-    element = pw_layout_alloc (&l, (size_t)s->batches, sizeof *element);
-    kind = pw_layout_alloc (&l, (size_t)s->batches, sizeof *kind);
-    signal = pw_layout_alloc (&l, (size_t)s->sources, sizeof *signal);
-    constant = pw_layout_alloc (&l, (size_t)constants, sizeof *constant);
-  }
-  if (r->scene_memory == NULL) return PW_RESOURCE;
+  const void **element = pw_arena_alloc (&r->arena, (size_t)s->batches * sizeof *element);
+  const pw_kind **kind = pw_arena_alloc (&r->arena, (size_t)s->batches * sizeof *kind);
+  const pw_signal **signal = pw_arena_alloc (&r->arena, (size_t)s->sources * sizeof *signal);
+  double *constant = pw_arena_alloc (&r->arena, (size_t)constants * sizeof *constant); /* filled by `prepare` */
+  r->scene = pw_arena_alloc (&r->arena, sizeof *r->scene);
+  if (!element || !kind || !signal || !constant || !r->scene) return PW_RESOURCE;
   for (int i = 0; i < s->batches; i++) element[i] = s->batch[i].b.element, kind[i] = s->batch[i].kind;
   for (int i = 0; i < s->sources; i++) signal[i] = &r->w->source[i].signal;
   *r->scene = (pw_scene){ .element = element,
@@ -49,14 +43,14 @@ int pw_specialised_open (pw_run *r, pw_error *error) {
   r->scene->length = r->w->scale.length, r->scene->speed = r->scene->length / r->w->scale.time;
   r->scene->redundant_residual = r->limits.redundant_residual;
   r->scene->alpha = r->alpha, r->scene->beta = r->beta;
-  r->scene_ready = code->prepare (r->scene) == 0;
+  if (code->prepare (r->scene) != 0) r->scene = NULL;
   pw_specialised_select (r);
   return PW_OK;
 }
 
 void pw_specialised_select (pw_run *r) {
   const pw_specialised *code = r->settings.specialised;
-  int suits = r->scene_ready;
+  int suits = r->scene != NULL;
   for (int i = 0; suits && i < r->s->rows; i++) suits = code->independent[i] == (r->active == NULL || r->active[i]);
   r->specialised = suits ? code : NULL;
 }
@@ -65,7 +59,7 @@ void pw_specialised_select (pw_run *r) {
  * of every stage.  Adaptive methods need it only below the pivots that the specialised code accepts. */
 int pw_specialised_suits (const pw_run *r) {
   const pw_watchdog *watch = &r->watchdog;
-  return r->specialised && !r->redundant_drive && !(watch->singular_ahead && watch->saddle && pw_fixed_steps (r)) &&
+  return r->specialised && !r->redundant_drive && !(watch->singular_ahead && watch->saddle && r->fixed_steps) &&
          !r->near_singular && !r->w->hold;
 }
 
@@ -103,7 +97,7 @@ static void specialised_copy_residuals (pw_run *r) {
 
 int pw_specialised_project (const pw_projector *p, pw_run *r, double t, double *q, double *v, double *a,
                             double *lambda) {
-  if (!p->mass_metric || p->ignores_inactive || !pw_specialised_suits (r)) return 0;
+  if (p->owns_velocity || !pw_specialised_suits (r)) return 0;
   if (r->specialised->project (r->scene, t, q, v, a, lambda, r->w->configuration, r->w->J)) return 0;
   specialised_finish (r, q, v, r->scene->iterations);
   if (r->active)

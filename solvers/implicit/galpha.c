@@ -83,15 +83,15 @@ static int galpha_residual (pw_run *r, double h, double t1) {
 static int galpha_factor (pw_run *r, double h) {
   pw_method_data *d = r->data;
   pw_dae *x = &d->common.dae;
-  const int64_t *colptr = x->tangent.colptr, *rowind = x->tangent.rowind;
-  pw_scatter_begin_fill (&x->tangent.scatter, d->common.value);
+  pw_scatter_map *matrix = &x->tangent.scatter;
+  pw_scatter_begin_fill (matrix, matrix->value);
   pw_dae_matrix (x, d->common.v1, d->a1, d->y + 2 * x->n, galpha_c (d, h), galpha_e (d, h));
   for (int c = 0; c < x->size; c++)
-    for (int64_t i = colptr[c]; i < colptr[c + 1]; i++)
-      d->common.value[i] *= d->row_factor[rowind[i]] * d->column_factor[c];
+    for (int64_t i = matrix->colptr[c]; i < matrix->colptr[c + 1]; i++)
+      matrix->value[i] *= d->row_factor[matrix->rowind[i]] * d->column_factor[c];
   r->statistics.jacobians++;
   r->statistics.factorisations++;
-  return pw_sparse_factor (&d->common.sparse, d->common.value);
+  return pw_sparse_factor (&d->common.sparse, matrix->value);
 }
 
 /* The prediction: the accelerations stay constant. */

@@ -16,9 +16,8 @@ int pw_implicit_open (pw_implicit *x, pw_run *r, const pw_array *array, size_t c
 }
 
 int pw_implicit_open_matrix (pw_implicit *x, int size) {
-  const pw_tangent *t = &x->dae.tangent;
-  x->value = malloc (((size_t)t->colptr[size] + 1) * sizeof *x->value);
-  return x->value ? pw_sparse_open (&x->sparse, PW_SPARSE_REAL, size, t->colptr, t->rowind) : PW_RESOURCE;
+  const pw_scatter_map *pattern = &x->dae.tangent.scatter;
+  return pw_sparse_open (&x->sparse, PW_SPARSE_REAL, size, pattern->colptr, pattern->rowind);
 }
 
 int pw_implicit_complete (pw_run *r, int status, pw_dense_projection projection, pw_error *error) {
@@ -32,7 +31,6 @@ void pw_implicit_close (pw_run *r) {
   pw_dense_output_close (&x->last);
   pw_sparse_close (&x->sparse);
   pw_dae_close (&x->dae);
-  free (x->value);
   free (x->memory);
   free (r->data);
 }
@@ -70,7 +68,7 @@ int pw_implicit_fail (pw_run *r, int status, double h, pw_error *error) {
   const char *reason = status == PW_INPUT ? "the Newton matrix is singular"
                        : status == PW_OK  ? "the error test fails"
                                           : "the iteration does not converge";
-  if (pw_fixed_steps (r))
+  if (r->fixed_steps)
     return pw_fail (error, PW_METHOD, "t = %.6g s: %s; the step of %.6g s may be too large", r->t, reason, h);
   if (status == PW_INPUT) return pw_fail (error, PW_METHOD, "t = %.6g s: %s", r->t, reason);
   return pw_fail (error, PW_METHOD, "t = %.6g s: %s however small the step (rtol %.3g)", r->t, reason,

@@ -16,9 +16,8 @@ typedef struct {
   pw_step_counter counter;
   double h;             /* size of the last step; 0: there is none, or it failed */
   double *q1, *v1;      /* coords: the new state */
-  pw_dae dae;           /* the equations and the pattern of the Newton matrix; leapfrog uses only its tangent */
-  double *value;        /* nonzero values of the matrix */
-  pw_sparse sparse;     /* its factors */
+  pw_dae dae;           /* the equations and the Newton matrix; leapfrog uses only its tangent */
+  pw_sparse sparse;     /* factors of the matrix */
   pw_dense_output last; /* of the last step */
   char *memory;         /* of the method's arrays */
 } pw_implicit;
@@ -26,7 +25,7 @@ typedef struct {
 /* Allocates the method's arrays, `count` of them, and opens x->dae: PW_OK or PW_RESOURCE. */
 int pw_implicit_open (pw_implicit *x, pw_run *r, const pw_array *array, size_t count);
 
-/* Opens the Newton matrix of this size, with the pattern in x->dae.tangent: PW_OK or PW_RESOURCE. */
+/* Opens the Newton matrix of this size, with the pattern in x->dae.tangent.scatter: PW_OK or PW_RESOURCE. */
 int pw_implicit_open_matrix (pw_implicit *x, int size);
 
 /* Completes the opening with a dense output of this projection; if `status`, of the functions before, is not PW_OK,

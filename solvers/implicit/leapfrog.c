@@ -115,13 +115,14 @@ static int drift_open_matrix (pw_run *r) {
   drift_put_momentum (r);
   drift_put_middle (r, 1);
   drift_put_end (r);
-  if (pw_scatter_lay_out (&x->scatter, size, &x->colptr, &x->rowind) != PW_OK) return PW_RESOURCE;
+  if (pw_scatter_lay_out (&x->scatter, size) != PW_OK) return PW_RESOURCE;
   return pw_implicit_open_matrix (&d->common, size);
 }
 
 static int drift_factor (pw_run *r, double h, double t1) {
   pw_method_data *d = r->data;
-  pw_scatter_begin_fill (&d->common.dae.tangent.scatter, d->common.value);
+  pw_scatter_map *matrix = &d->common.dae.tangent.scatter;
+  pw_scatter_begin_fill (matrix, matrix->value);
   int status = pw_evaluate_J_at (r->w, r->t, r->q, r->v);
   if (status != PW_OK) return status;
   drift_put_momentum (r);
@@ -133,7 +134,7 @@ static int drift_factor (pw_run *r, double h, double t1) {
   drift_put_end (r);
   r->statistics.jacobians++;
   r->statistics.factorisations++;
-  return pw_sparse_factor (&d->common.sparse, d->common.value);
+  return pw_sparse_factor (&d->common.sparse, matrix->value);
 }
 
 /* Residuals of the constraints on u and q'. */

@@ -106,7 +106,6 @@ static void radau_close (pw_run *r) {
   pw_sparse_close (&d->real);
   pw_sparse_close (&d->complex);
   pw_dae_close (&d->dae);
-  free (d->minus_F_y);
   free (d->value);
   free (d->diagonal);
   free (d->memory);
@@ -180,9 +179,8 @@ static int radau_try (pw_run *r, double h, double t1, int filter_twice, double *
   *error = INFINITY;
   r->near_singular = 0;
   int status = pw_radau_solve (r, h, t1);
-  if (status == PW_OK && !pw_fixed_steps (r)) status = pw_radau_estimate (r, h, filter_twice, error);
-  if (status == PW_OK && r->s->entries > 0 && (*error < 1 || pw_fixed_steps (r)))
-    status = pw_radau_work (r, h, t1, error);
+  if (status == PW_OK && !r->fixed_steps) status = pw_radau_estimate (r, h, filter_twice, error);
+  if (status == PW_OK && r->s->entries > 0 && (*error < 1 || r->fixed_steps)) status = pw_radau_work (r, h, t1, error);
   return status;
 }
 
@@ -221,7 +219,7 @@ static void radau_project_start (pw_run *r) {
 
 static int radau_advance (pw_run *r, double t_end, pw_error *error) {
   pw_method_data *d = r->data;
-  if (pw_fixed_steps (r)) return radau_advance_fixed (r, t_end, error);
+  if (r->fixed_steps) return radau_advance_fixed (r, t_end, error);
   double stop = fmin (t_end, r->breakpoint), err;
   for (int rejected = 0, status = PW_OK;; rejected++) {
     int shortened = r->t + d->h > stop - 0.01 * d->h; /* no tiny step remains */
@@ -264,7 +262,7 @@ static int radau_quintic_agrees (const pw_run *r, const double *q, const double 
   for (int i = 0; i < 2 * d->dae.n; i++) {
     double difference = i < d->dae.n ? q[i] - r->q_at[i] : v[i - d->dae.n] - r->v_at[i - d->dae.n];
     double allowed = d->tolerance[i];
-    if (pw_fixed_steps (r)) {
+    if (r->fixed_steps) {
       allowed = d->round_off[i];
       for (int k = 0; k < STAGES; k++) allowed = fmax (allowed, 0.1 * fabs (d->last.Z[k][i]));
     }

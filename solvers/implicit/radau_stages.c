@@ -36,14 +36,12 @@ static int radau_evaluate (pw_run *r, double t, const double *y, double *F) {
 
 int pw_radau_open_matrices (pw_run *r) {
   pw_method_data *d = r->data;
-  pw_tangent *x = &d->dae.tangent;
+  const pw_scatter_map *x = &d->dae.tangent.scatter;
   const double *y = d->now.y;
   if (pw_dae_lay_out (&d->dae, y + d->dae.n, NULL, y + 2 * d->dae.n) != PW_OK) return PW_RESOURCE;
-  size_t nonzeros = (size_t)x->colptr[d->dae.size] + 1; /* + 1: never 0, for which malloc may return NULL */
-  d->minus_F_y = malloc (nonzeros * sizeof *d->minus_F_y);
-  d->value = malloc (2 * nonzeros * sizeof *d->value);
+  d->value = malloc ((2 * x->nonzeros + 1) * sizeof *d->value); /* + 1: never 0, for which malloc may return NULL */
   d->diagonal = malloc (((size_t)(2 * d->dae.n) + 1) * sizeof *d->diagonal);
-  if (!d->minus_F_y || !d->value || !d->diagonal) return PW_RESOURCE;
+  if (!d->value || !d->diagonal) return PW_RESOURCE;
   for (int j = 0; j < 2 * d->dae.n; j++)
     for (d->diagonal[j] = x->colptr[j]; x->rowind[d->diagonal[j]] != j;) d->diagonal[j]++;
   int status = pw_sparse_open (&d->real, PW_SPARSE_REAL, d->dae.size, x->colptr, x->rowind);
@@ -56,7 +54,7 @@ static int radau_linearise (pw_run *r) {
   const double *y = d->now.y;
   int status = pw_evaluate_J_at (r->w, r->t, y, y + d->dae.n);
   if (status != PW_OK) return status;
-  pw_scatter_begin_fill (&d->dae.tangent.scatter, d->minus_F_y);
+  pw_scatter_begin_fill (&d->dae.tangent.scatter, d->dae.tangent.scatter.value);
   pw_dae_matrix (&d->dae, y + d->dae.n, NULL, y + 2 * d->dae.n, 0, 0);
   pw_matrix_evaluated (r, y, y + d->dae.n);
   r->statistics.jacobians++;
@@ -68,12 +66,12 @@ static int radau_linearise (pw_run *r) {
 
 /* Fills `value` with the real (parts: 1) or complex (parts: 2) matrix (re + i im) B - F_y, scaled. */
 static void radau_fill_matrix (pw_method_data *d, int parts, double re, double im) {
-  const int64_t *colptr = d->dae.tangent.colptr, *rowind = d->dae.tangent.rowind;
+  const pw_scatter_map *minus_F_y = &d->dae.tangent.scatter;
   for (int c = 0; c < d->dae.size; c++)
-    for (int64_t i = colptr[c]; i < colptr[c + 1]; i++) {
-      double scale = d->row_factor[rowind[i]] * d->column_factor[c];
+    for (int64_t i = minus_F_y->colptr[c]; i < minus_F_y->colptr[c + 1]; i++) {
+      double scale = d->row_factor[minus_F_y->rowind[i]] * d->column_factor[c];
       double b = c < 2 * d->dae.n && i == d->diagonal[c] ? d->B[c] : 0;
-      d->value[parts * i] = scale * (d->minus_F_y[i] + re * b);
+      d->value[parts * i] = scale * (minus_F_y->value[i] + re * b);
       if (parts == 2) d->value[2 * i + 1] = scale * im * b;
     }
 }
@@ -133,7 +131,7 @@ static void radau_set_tolerances (pw_run *r, double h) {
     double typical = index3 && i >= n ? fmax (d->unit[i], largest * d->unit[i - n] / h) : d->unit[i];
     d->tolerance[i] = fmin (rtol * (size + offset), r->saturation[i]);
     d->round_off[i] = fmin (8 * DBL_EPSILON * (size + typical), 0.1 * r->saturation[i]);
-    d->newton_tolerance[i] = pw_fixed_steps (r) ? d->round_off[i] : fmax (newton * d->tolerance[i], d->round_off[i]);
+    d->newton_tolerance[i] = r->fixed_steps ? d->round_off[i] : fmax (newton * d->tolerance[i], d->round_off[i]);
   }
 }
 
@@ -219,7 +217,7 @@ static int radau_correct (pw_run *r, double h, double t1, double *size, double *
  * configuration, which magnifies it. */
 static pw_convergence radau_test (pw_run *r, int done, double size, double before, double round_offs) {
   pw_method_data *d = r->data;
-  const int fixed = pw_fixed_steps (r);
+  const int fixed = r->fixed_steps;
   const int most = fixed ? 50 : PW_RADAU_MOST; /* corrections after the first; a fixed step cannot be made shorter */
   d->reduction = 0.5;
   if (!isfinite (size)) return PW_DIVERGED;

@@ -16,12 +16,11 @@ typedef struct {
 } radau_step;
 
 struct pw_method_data {
-  pw_dae dae;
+  pw_dae dae;                         /* the matrix in dae.tangent.scatter is -F_y */
   pw_sparse real, complex;            /* factors of gamma/h B - F_y and (alpha + i beta)/h B - F_y */
-  double *minus_F_y;                  /* nonzero values of -F_y */
   double *value;                      /* of the real matrix; of the complex one, in pairs */
   double *row_factor, *column_factor; /* unknowns: by which rows and columns of both are multiplied */
-  int64_t *diagonal;                  /* 2 coords: index in minus_F_y of the diagonal entry, to which B is added */
+  int64_t *diagonal;                  /* 2 coords: index in -F_y of the diagonal entry, to which B is added */
   double *B;                          /* 2 coords: diagonal of B */
   double factored_h;                  /* step size for which both are factorised; 0: none */
   int choose_pivots;                  /* 1: select pivots anew */

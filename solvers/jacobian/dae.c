@@ -120,5 +120,5 @@ int pw_dae_lay_out (pw_dae *x, const double *v, const double *a, const double *l
   pw_tangent *t = &x->tangent;
   pw_scatter_begin_record (&t->scatter);
   pw_dae_matrix (x, v, a, lambda, 1, 1);
-  return pw_scatter_lay_out (&t->scatter, x->size, &t->colptr, &t->rowind);
+  return pw_scatter_lay_out (&t->scatter, x->size);
 }

@@ -42,7 +42,7 @@ void pw_dae_residual (pw_dae *x, const double *v, const double *a, const double 
 void pw_dae_matrix (pw_dae *x, const double *v, const double *a, const double *lambda, double q_dot_factor,
                     double v_dot_factor);
 
-/* Determines the pattern of this matrix, in x->tangent.  PW_OK or PW_RESOURCE. */
+/* Determines the pattern of this matrix, in x->tangent.scatter.  PW_OK or PW_RESOURCE. */
 int pw_dae_lay_out (pw_dae *x, const double *v, const double *a, const double *lambda);
 
 #endif

@@ -20,31 +20,33 @@ static int scatter_compare (const void *a, const void *b) {
   return x->col != y->col ? (x->col > y->col) - (x->col < y->col) : (x->row > y->row) - (x->row < y->row);
 }
 
-int pw_scatter_lay_out (pw_scatter_map *t, int n, int64_t **colptr, int64_t **rowind) {
-  int64_t nonzeros = 0;
+int pw_scatter_lay_out (pw_scatter_map *t, int n) {
   t->place = malloc ((t->count + 1) * sizeof *t->place);
-  *colptr = malloc (((size_t)n + 1) * sizeof **colptr);
-  *rowind = malloc ((t->count + 1) * sizeof **rowind);
-  if (t->failed || !t->place || !*colptr || !*rowind) return PW_RESOURCE;
+  t->colptr = malloc (((size_t)n + 1) * sizeof *t->colptr);
+  t->rowind = malloc ((t->count + 1) * sizeof *t->rowind);
+  if (t->failed || !t->place || !t->colptr || !t->rowind) return PW_RESOURCE;
   const struct pw_scatter_entry *e = t->entry;
   if (t->count > 0) qsort (t->entry, t->count, sizeof *t->entry, scatter_compare);
   for (int c = 0; c < n; c++) {
-    (*colptr)[c] = nonzeros;
+    t->colptr[c] = (int64_t)t->nonzeros;
     for (int last_row = -1; e < t->entry + t->count && e->col == c; e++) {
-      if (e->row != last_row) (*rowind)[nonzeros++] = last_row = e->row;
-      t->place[e->number] = (size_t)nonzeros - 1;
+      if (e->row != last_row) t->rowind[t->nonzeros++] = last_row = e->row;
+      t->place[e->number] = t->nonzeros - 1;
     }
   }
-  (*colptr)[n] = nonzeros;
-  t->length = (size_t)nonzeros;
+  t->colptr[n] = (int64_t)t->nonzeros;
   free (t->entry);
   t->entry = NULL;
   t->recording = 0;
-  return PW_OK;
+  t->value = malloc ((t->nonzeros + 1) * sizeof *t->value);
+  return t->value ? PW_OK : PW_RESOURCE;
 }
 
 void pw_scatter_close (pw_scatter_map *t) {
   free (t->entry);
   free (t->place);
+  free (t->colptr);
+  free (t->rowind);
+  free (t->value);
   *t = (pw_scatter_map){ 0 };
 }

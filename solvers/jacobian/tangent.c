@@ -37,8 +37,6 @@ void pw_tangent_close (pw_tangent *x) {
   pw_scatter_close (&x->scatter);
   pw_newton_close (&x->newton);
   free (x->memory);
-  free (x->colptr);
-  free (x->rowind);
 }
 
 /* Values of all equations from those of the first `count` active ones: `active` itself if these are all, else `all`,

@@ -20,7 +20,6 @@ typedef struct {
   double *D;           /* coords: 1 for lengths, 1/L^2 for angles (dae.h) */
   pw_newton_scratch newton;
   pw_scatter_map scatter;
-  int64_t *colptr, *rowind; /* the pattern, in compressed columns */
   char *memory;
 } pw_tangent;
 

@@ -15,13 +15,14 @@ static void linear_column_of_A (pw_linearisation *x, int c) {
   pw_linear_coordinates (x, dv, x->da, x->size, x->A + c);
 }
 
-static int linear_arrays (pw_linearisation *x) {
+/* bases: 1, or 0 without room for R and Q. */
+static int linear_arrays (pw_linearisation *x, size_t bases) {
   size_t n = (size_t)x->n, m = (size_t)x->m, size = (size_t)x->size;
   const pw_array array[] = { { &x->a, n + 3 },
                              { &x->lambda, m },
                              { &x->norm, m },
-                             { &x->R, m * n },
-                             { &x->Q, n * n },
+                             { &x->R, bases * m * n },
+                             { &x->Q, bases * n * n },
                              { &x->dx, 2 * n },
                              { &x->product, n + 2 * m },
                              { &x->da, n + 3 },
@@ -40,28 +41,9 @@ static int linear_arrays (pw_linearisation *x) {
 }
 
 void pw_linear_close (pw_linearisation *x) {
-  pw_newton_close (&x->newton);
-  pw_scatter_close (&x->scatter);
-  free (x->colptr);
-  free (x->rowind);
-  free (x->value);
+  pw_tangent_close (&x->tangent);
   free (x->entry);
-  free (x->row);
   free (x->memory);
-}
-
-/* Lists the independent constraint equations and counts the minimal coordinates. */
-static int linear_rows (pw_linearisation *x) {
-  x->row = malloc (((size_t)x->m + 1) * sizeof *x->row);
-  for (int i = 0; x->row && i < x->m; i++) {
-    if (x->r->active && !x->r->active[i]) continue;
-    x->holonomic += i < x->r->s->holonomic;
-    x->row[x->rank++] = i;
-  }
-  x->positions = x->n - x->holonomic;
-  x->velocities = x->n - x->rank;
-  x->size = x->positions + x->velocities;
-  return x->row ? PW_OK : PW_RESOURCE;
 }
 
 static int linear_results (pw_linearisation *x, pw_linear *l) {
@@ -75,12 +57,16 @@ static int linear_results (pw_linearisation *x, pw_linear *l) {
   return PW_OK;
 }
 
-int pw_linear_open (pw_linearisation *x, pw_run *r, pw_linear_extent extent, int most) {
-  *x = (pw_linearisation){ .r = r, .n = r->s->coords, .m = r->s->rows, .modes = extent == PW_WITH_MODES };
-  int status = linear_rows (x);
-  if (status == PW_OK && x->n <= most) status = linear_arrays (x);
-  if (status == PW_OK && x->n <= most) status = pw_linear_derivatives (x);
-  return status;
+int pw_linear_open (pw_linearisation *x, pw_run *r, pw_linear_extent extent) {
+  *x = (pw_linearisation){ .r = r, .n = r->s->coords, .m = r->s->rows, .modes = extent == PW_LINEAR_MODES };
+  int status = pw_tangent_open (&x->tangent, r);
+  x->holonomic = x->tangent.holonomic, x->rank = x->tangent.rows, x->row = x->tangent.row;
+  x->positions = x->n - x->holonomic;
+  x->velocities = x->n - x->rank;
+  x->size = x->positions + x->velocities;
+  if (status != PW_OK || extent == PW_LINEAR_COUNTS) return status;
+  status = linear_arrays (x, extent >= PW_LINEAR_BASES);
+  return status == PW_OK ? pw_linear_derivatives (x) : status;
 }
 
 /* In units of the scene: two changes of a state, and the least change of the accelerations that counts as a jump. */
@@ -139,16 +125,19 @@ static int linear_compute (pw_linearisation *x, pw_linear *l, pw_error *error) {
   return status;
 }
 
+/* With more than `most` coordinates only the counts. */
 static int linear_run (pw_run *r, int most, pw_linear_extent extent, pw_linear *l, pw_error *error) {
   pw_linearisation x;
   *l = (pw_linear){ .least = NAN };
   if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
+  if (r->s->coords > most) extent = PW_LINEAR_COUNTS;
   pw_statistics before = r->statistics;
-  int near_singular = r->near_singular, status = pw_linear_open (&x, r, extent, most);
+  int near_singular = r->near_singular, status = pw_linear_open (&x, r, extent);
   l->coordinates = x.n, l->rank = x.rank;
   l->positions = x.positions, l->velocities = x.velocities, l->unknowns = x.size;
-  if (status == PW_OK && x.n <= most) status = pw_run_check_derivatives (r, "the linearisation", "needs", error);
-  if (status == PW_OK && x.n <= most) status = linear_compute (&x, l, error);
+  if (status == PW_OK && extent > PW_LINEAR_COUNTS)
+    status = pw_run_check_derivatives (r, "the linearisation", "needs", error);
+  if (status == PW_OK && extent > PW_LINEAR_COUNTS) status = linear_compute (&x, l, error);
   pw_linear_close (&x);
   r->statistics = before;
   r->near_singular = near_singular;
@@ -156,11 +145,11 @@ static int linear_run (pw_run *r, int most, pw_linear_extent extent, pw_linear *
 }
 
 int pw_run_linearise (pw_run *r, int most, pw_linear *l, pw_error *error) {
-  return linear_run (r, most, PW_WITHOUT_MODES, l, error);
+  return linear_run (r, most, PW_LINEAR_BASES, l, error);
 }
 
 int pw_run_linear_modes (pw_run *r, int most, pw_linear *l, pw_error *error) {
-  return linear_run (r, most, PW_WITH_MODES, l, error);
+  return linear_run (r, most, PW_LINEAR_MODES, l, error);
 }
 
 void pw_linear_free (pw_linear *l) {

@@ -6,7 +6,7 @@
 
 #include "method.h"
 #include "pinwheel-analysis.h"
-#include "newton.h"
+#include "tangent.h"
 
 /* The co-moving frame (linear_frame.c). */
 typedef struct {
@@ -25,9 +25,10 @@ typedef struct {
 typedef struct {
   pw_run *r;
   int n, m;
-  int holonomic, rank;             /* independent constraint equations: holonomic ones; all, those first */
+  pw_tangent tangent;  /* independent equations; in tangent.scatter the derivatives: columns q, v; rows as `product` */
+  int holonomic, rank; /* independent constraint equations: holonomic ones; all, those first */
   int positions, velocities, size; /* minimal coordinates: of positions, of velocities, all */
-  int *row;                        /* rank: indices of the independent equations */
+  const int *row;                  /* rank: indices of the independent equations */
   pw_linear_frame frame;
   double *a, *lambda;            /* n + 3, m: at the state last evaluated */
   double *norm;                  /* m: lengths of the rows of J, columns of angles divided by L */
@@ -43,14 +44,10 @@ typedef struct {
   double *probe, *probe_da;      /* 2 n, n: a variation at the current state, and its da (linear_frame.c) */
   double *probe_a;               /* n: accelerations at the current state */
   double *later;                 /* 2 n: a later state */
-  pw_newton_scratch newton;
-  pw_scatter_map scatter;
-  int64_t *colptr, *rowind; /* the derivatives: columns q, v; rows as `product` */
-  double *value;
-  pw_linear_entry *entry; /* entries: those that are not 0 */
+  pw_linear_entry *entry;        /* entries: derivatives that are not 0 */
   int entries;
   char *memory;
-  int modes;            /* 1: PW_WITH_MODES, which needs the following */
+  int modes;            /* 1: PW_LINEAR_MODES, which needs the following */
   double *left_vectors; /* size^2 + size: left eigenvectors of A22^T, then imaginary parts of its eigenvalues */
   double *upper_rows;   /* 3 x size: [ A11 A12 ] (linear_modes.c); then scratch, size */
   double tau[3];        /* scalars of the reflections in `symmetry` */
@@ -64,11 +61,11 @@ enum { PW_LINEAR_SVD_WORK = 15 };
 
 /* ---- linear.c ---- */
 
-typedef enum { PW_WITHOUT_MODES, PW_WITH_MODES /* B, basis, shapes */ } pw_linear_extent;
+/* What is computed, each with those before: numbers; derivatives; bases and A, dense matrices; B, basis, shapes. */
+typedef enum { PW_LINEAR_COUNTS, PW_LINEAR_DERIVATIVES, PW_LINEAR_BASES, PW_LINEAR_MODES } pw_linear_extent;
 
-/* Opens a linearisation of the run's system; with more than `most` coordinates it only counts.  PW_OK or PW_RESOURCE;
- * close it in every case. */
-int pw_linear_open (pw_linearisation *x, pw_run *r, pw_linear_extent extent, int most);
+/* Opens a linearisation of the run's system.  PW_OK or PW_RESOURCE; close it in every case. */
+int pw_linear_open (pw_linearisation *x, pw_run *r, pw_linear_extent extent);
 void pw_linear_close (pw_linearisation *x);
 
 /* ---- linear_variation.c ---- */

@@ -42,7 +42,7 @@ static void eigen_shift (int n, const double *re, const double *im, double *re2,
     shift[i] = fmax (shift[i], least);
   }
   for (int k = 0; k < n; k++) re2[k] = hypot (re2[k], im2[k]);
-  qsort (re2, (size_t)n, sizeof *re2, pw_ascending);
+  LAPACKE_dlasrt_work ('I', n, re2);
   for (int i = 0; i < n; i++) {
     double size = hypot (re[i], im[i]);
     int rank = 0;

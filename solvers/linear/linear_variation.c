@@ -43,7 +43,7 @@ static void linear_put (pw_linearisation *x, const double *v) {
                { PW_GAMMA_Q, n, 0, 1, NULL }, { PW_GAMMA_V, n, n, 1, NULL },  { PW_JW_Q, n, 0, -1, x->a },
                { PW_JW_Q, of_J, 0, 1, v },    { PW_ETA_Q, of_J, 0, -1, NULL } };
   for (size_t i = 0; i < sizeof part / sizeof *part; i++)
-    pw_newton_add_block (&x->newton, x->r->w, &x->scatter, part[i].block,
+    pw_newton_add_block (&x->tangent.newton, x->r->w, &x->tangent.scatter, part[i].block,
                          &(pw_placement){ .row = part[i].row,
                                           .col = part[i].col,
                                           .rows = x->m,
@@ -51,32 +51,32 @@ static void linear_put (pw_linearisation *x, const double *v) {
                                           .factor_nonholonomic = part[i].factor,
                                           .direction = part[i].w,
                                           .lambda = x->lambda });
-  pw_newton_add_signals (&x->newton, x->r->w, &x->scatter, 0, 0, n);
+  pw_newton_add_signals (&x->tangent.newton, x->r->w, &x->tangent.scatter, 0, 0, n);
 }
 
 int pw_linear_derivatives (pw_linearisation *x) {
-  if (pw_newton_open (&x->newton, x->r->s) != PW_OK) return PW_RESOURCE;
-  pw_scatter_begin_record (&x->scatter);
+  pw_scatter_map *t = &x->tangent.scatter;
+  pw_scatter_begin_record (t);
   linear_put (x, x->r->v);
   int size = 2 * x->n > x->n + 2 * x->m ? 2 * x->n : x->n + 2 * x->m;
-  if (pw_scatter_lay_out (&x->scatter, size, &x->colptr, &x->rowind) != PW_OK) return PW_RESOURCE;
-  x->value = calloc ((size_t)x->colptr[size] + 1, sizeof *x->value);
-  x->entry = calloc ((size_t)x->colptr[size] + 1, sizeof *x->entry);
-  return x->value && x->entry ? PW_OK : PW_RESOURCE;
+  if (pw_scatter_lay_out (t, size) != PW_OK) return PW_RESOURCE;
+  x->entry = calloc (t->nonzeros + 1, sizeof *x->entry);
+  return x->entry ? PW_OK : PW_RESOURCE;
 }
 
 /* Lists the entries that are not 0, often one in five. */
 static void linear_pack (pw_linearisation *x) {
+  const pw_scatter_map *t = &x->tangent.scatter;
   x->entries = 0;
   for (int j = 0; j < 2 * x->n; j++)
-    for (int64_t i = x->colptr[j]; i < x->colptr[j + 1]; i++)
-      if (x->value[i] != 0) x->entry[x->entries++] = (pw_linear_entry){ (int)x->rowind[i], j, x->value[i] };
+    for (int64_t i = t->colptr[j]; i < t->colptr[j + 1]; i++)
+      if (t->value[i] != 0) x->entry[x->entries++] = (pw_linear_entry){ (int)t->rowind[i], j, t->value[i] };
 }
 
 int pw_linear_evaluate (pw_linearisation *x, double t, const double *q, const double *v) {
   int status = pw_run_accelerate (x->r, t, q, v, x->a, x->lambda);
   if (status != PW_OK) return status;
-  pw_scatter_begin_fill (&x->scatter, x->value);
+  pw_scatter_begin_fill (&x->tangent.scatter, x->tangent.scatter.value);
   linear_put (x, v);
   linear_pack (x);
   return PW_OK;

@@ -23,6 +23,7 @@
  * At the stability limit of a damped motion e5 may be blind to the instability while e3 is large for other reasons:
  * without e6 the error may then be many times the tolerances and remain undetected. */
 #include <math.h>
+#include <string.h>
 #include "rk_step.h"
 
 #define ADAPT_SAFETY 0.9       /* in the factor from one step size to the next */
@@ -36,21 +37,10 @@ void pw_rk_reset_step_size (pw_run *r) {
   d->last_error = ADAPT_LEAST_ERROR;
 }
 
-/* out = sum_j weight_j slope_j, two entries at a time: an error estimate from n derivatives at the stages, over h. */
+/* out = sum_j weight_j slope_j: an error estimate from n derivatives at the stages, over h. */
 static void adapt_estimate (const pw_rk_row *e, double *const *slope, int n, double *out) {
-  int i = 0;
-  for (; i + 1 < n; i += 2) {
-    double even = 0, odd = 0;
-    for (int j = 0; j < e->count; j++) {
-      const double *from = slope[e->stage[j]];
-      even += e->weight[j] * from[i];
-      odd += e->weight[j] * from[i + 1];
-    }
-    out[i] = even, out[i + 1] = odd;
-  }
-  if (i == n) return;
-  out[i] = 0;
-  for (int j = 0; j < e->count; j++) out[i] += e->weight[j] * slope[e->stage[j]][i];
+  memset (out, 0, (size_t)n * sizeof *out);
+  for (int j = 0; j < e->count; j++) pw_add_scaled (out, slope[e->stage[j]], e->weight[j], n);
 }
 
 /* Reciprocal tolerances of positions and velocities for the step from the state reached to the new state. */

@@ -100,7 +100,7 @@ int pw_rk_restart (pw_run *r, pw_error *error) {
   (void)error;
   d->counter = (pw_step_counter){ .base = r->t };
   d->off_grid = 0;
-  if (!pw_fixed_steps (r)) pw_rk_reset_step_size (r);
+  if (!r->fixed_steps) pw_rk_reset_step_size (r);
   pw_store_start (&d->last, r);
   return PW_OK;
 }
@@ -114,5 +114,5 @@ void pw_rk_serialise (pw_run *r, pw_archive *a) {
 }
 
 int pw_rk_advance (pw_run *r, double t_end, pw_error *error) {
-  return pw_fixed_steps (r) ? pw_rk_advance_fixed (r, t_end, error) : pw_rk_advance_adaptive (r, t_end, error);
+  return r->fixed_steps ? pw_rk_advance_fixed (r, t_end, error) : pw_rk_advance_adaptive (r, t_end, error);
 }

@@ -115,7 +115,7 @@ int pw_rk_step (pw_run *r, double h, double t1, int project, double *added_energ
   int status = d->uses_nullspace ? pw_nullspace_begin (&d->nullspace, r) : PW_OK;
   if (status == PW_OK) status = rk_stages (r, h);
   if (status != PW_OK) return status;
-  if (project) return pw_project_with_energy (&d->projector, r, t1, d->q, d->v, d->a, d->lambda, added_energy);
+  if (project) return pw_project_state (&d->projector, r, t1, d->q, d->v, d->a, d->lambda, added_energy);
   if (!d->uses_nullspace) return pw_run_accelerate (r, t1, d->q, d->v, d->a, d->lambda);
   status = pw_nullspace_finalise (&d->nullspace, d->projects_positions ? &d->projector : NULL, r, t1, d->q, d->v,
                                   added_energy);

@@ -11,10 +11,10 @@
  * steps one by one (ledger.c). */
 static int several_possible (const pw_run *r) {
   const pw_method_data *d = r->data;
-  if (r->method->advance != pw_rk_advance || d == NULL || !pw_fixed_steps (r) || d->holds_signals ||
-      d->uses_nullspace || d->off_grid)
+  if (r->method->advance != pw_rk_advance || d == NULL || !r->fixed_steps || d->holds_signals || d->uses_nullspace ||
+      d->off_grid)
     return 0;
-  if (d->projects && !(d->every == 1 && d->projector.mass_metric && !d->projector.ignores_inactive)) return 0;
+  if (d->projects && (d->every > 1 || d->projector.owns_velocity)) return 0;
   return pw_specialised_suits (r) && r->redundant == 0 && r->alpha + r->beta == 0 && !r->settings.ledger &&
          !r->interrupted && r->stalled == 0 && !(r->watchdog.saddle && r->watchdog.singular_ahead) &&
          r->statistics.steps >= PW_CHECK_INTERVAL;
@@ -162,12 +162,13 @@ void pw_runs_advance (pw_run *const *runs, int count, double t_end, const pw_spe
     several_take (&x, code, memory);
     for (int k = 0; k < x.used; k++) {
       int i = x.index[k];
-      status[i] = several_finish (runs[i], &x.steps[k], &error[i]);
+      status[i] = several_finish (runs[i], &x.steps[k], error ? &error[i] : NULL);
       done[i] = x.steps[k].done > 0 || status[i] != PW_OK;
     }
   }
   for (int i = 0; i < count; i++)
-    if (i >= PW_LANES_MOST || !done[i]) status[i] = pw_run_advance_towards (runs[i], t_end, t_end, &error[i]);
+    if (i >= PW_LANES_MOST || !done[i])
+      status[i] = pw_run_advance_towards (runs[i], t_end, t_end, error ? &error[i] : NULL);
 }
 
 int pw_run_advance_to (pw_run *r, double t, double t_end, pw_error *error) {

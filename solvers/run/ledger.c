@@ -65,17 +65,6 @@ void pw_ledger_rates (pw_run *r, const double *lambda, double *rate) {
   pw_evaluate_ledger (r->w, lambda, rate);
 }
 
-int pw_project_with_energy (pw_projector *p, pw_run *r, double t, double *q, double *v, double *a, double *lambda,
-                            double *added_energy) {
-  if (added_energy == NULL) return pw_project_state (p, r, t, q, v, a, lambda);
-  int status = pw_update_kinematics (r->w, t, q, v);
-  if (status != PW_OK) return status;
-  double before = pw_energy (r, v);
-  status = pw_project_state (p, r, t, q, v, a, lambda);
-  if (status == PW_OK) *added_energy += pw_energy (r, v) - before;
-  return status;
-}
-
 int pw_ledger_uses_multipliers (const pw_system *s) {
   int reacts = 0;
   for (int i = 0; i < s->entries; i++) reacts |= s->batch[s->entry[i].batch].kind->rows > 0;
@@ -110,7 +99,7 @@ const char *pw_run_energy_advice (const pw_run *r, double defect) {
   int projects = pw_stabilised_by (r, PW_PROJECTION);
   if (!projects && fmax (now->position, now->velocity) > 0.1 * defect)
     return "the constraints have drifted; a method with projection satisfies them";
-  if (pw_fixed_steps (r)) return "a smaller step, or another method, follows the motion better";
+  if (r->fixed_steps) return "a smaller step, or another method, follows the motion better";
   if (r->settings.rtol <= least_rtol) return "the tolerance cannot be much smaller; compare with another method";
   if (defect > per_step * r->settings.rtol * (double)now->steps)
     return "that is more than the tolerance explains; compare with another method";

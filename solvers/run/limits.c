@@ -64,7 +64,7 @@ static int limits_fail_steps (const pw_run *r, pw_error *error) {
 
 int pw_run_check_limits (pw_run *r, pw_error *error) {
   if (pw_run_stop_requested (r)) return PW_STOPPED;
-  if (r->statistics.steps + r->statistics.rejected < r->settings.max_steps || pw_fixed_steps (r)) return PW_OK;
+  if (r->statistics.steps + r->statistics.rejected < r->settings.max_steps || r->fixed_steps) return PW_OK;
   return limits_fail_steps (r, error);
 }
 
@@ -75,7 +75,7 @@ int pw_run_check_resolution (pw_run *r, pw_error *error) {
   for (int j = 0; j < s->coords; j++) {
     double round_off = fabs (r->q[j]) * DBL_EPSILON;
     if (!(round_off > LIMITS_RESOLVED * pw_unit (s, j))) continue;
-    if (pw_fixed_steps (r) && fabs (r->v[j]) * r->settings.step > 0.1 * fabs (r->q[j])) /* within a few steps */
+    if (r->fixed_steps && fabs (r->v[j]) * r->settings.step > 0.1 * fabs (r->q[j])) /* within a few steps */
       return pw_fail (error, PW_METHOD,
                       "t = %.6g s: the step of %.6g s is too large: the state grows beyond all bounds", r->t,
                       r->settings.step);

@@ -79,7 +79,7 @@ static int step_evaluate (pw_run *r, double t, double *q, double *v) {
   if (!pw_is_finite_state (r, q, v)) return PW_RETRY;
   if (!d->projects) return pw_run_accelerate (r, t, q, v, d->a, d->lambda);
   double *added_energy = r->settings.ledger ? &r->projected : NULL;
-  return pw_project_with_energy (&d->last.projector, r, t, q, v, d->a, d->lambda, added_energy);
+  return pw_project_state (&d->last.projector, r, t, q, v, d->a, d->lambda, added_energy);
 }
 
 static int step_fail (pw_run *r, int status, double h, pw_error *error) {

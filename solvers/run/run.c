@@ -75,11 +75,10 @@ void pw_run_close (pw_run *r) {
   run_close_method (r);
   pw_saddle_close (r->saddle);
   pw_saddle_close (r->watchdog.saddle);
-  free (r->rank_memory);
-  free (r->scene_memory);
   pw_workspace_free (r->w);
   free (r->memory);
   free (r->origin);
+  pw_arena_free (&r->arena);
   free (r);
 }
 
@@ -90,14 +89,11 @@ static int run_restart_method (pw_run *r, pw_error *error) {
   return status == PW_OK ? r->method->restart (r, error) : status;
 }
 
-int pw_run_renew (pw_run *r, pw_references references, pw_error *error) {
+int pw_run_renew (pw_run *r, pw_error *error) {
   int status = pw_run_open_saddle (r, error);
   r->watchdog.singular_ahead = 1;
   if (status == PW_OK) status = pw_run_evaluate (r, error);
-  if (status == PW_OK && references == PW_NEW_REFERENCES)
-    pw_run_set_references (r);
-  else if (status == PW_OK)
-    pw_watchdog_begin (r);
+  if (status == PW_OK) pw_watchdog_begin (r);
   run_close_method (r); /* it may use the previous saddle */
   if (status == PW_RESOURCE || r->saddle == NULL) return status;
   int opened = r->method->open (r, error);
@@ -120,7 +116,10 @@ static int run_reselect (pw_run *r, pw_error *error) {
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   int other = pw_rank_reselect (r);
   if (other < 0) return pw_fail_memory (r->s, error);
-  return other ? pw_run_renew (r, PW_NEW_REFERENCES, error) : PW_OK;
+  if (other == 0) return PW_OK;
+  int status = pw_run_renew (r, error);
+  if (status == PW_OK) pw_run_set_references (r);
+  return status;
 }
 
 /* Computes r->independence with the J last evaluated. */
@@ -134,9 +133,12 @@ static int run_is_at (const pw_run *r, double t) {
   return t - r->t <= 8 * DBL_EPSILON * fmax (fabs (r->t), r->w->scale.time);
 }
 
-/* If an evaluation fails at the next time, SUNDIALS repeats steps below the round-off of time endlessly. */
+/* If an evaluation fails at the next time, SUNDIALS repeats steps below the round-off of time endlessly.  Fixed steps
+ * may be that short. */
 static int run_check_progress (pw_run *r, double before, pw_error *error) {
-  r->stalled = r->t - before > 64 * DBL_EPSILON * fabs (r->t) ? 0 : r->stalled + 1;
+  double least = 64 * DBL_EPSILON * fabs (r->t);
+  if (r->fixed_steps) least = fmin (least, r->settings.step / 2);
+  r->stalled = r->t - before > least ? 0 : r->stalled + 1;
   if (r->stalled < r->limits.stalled) return PW_OK;
   return pw_fail (error, PW_METHOD,
                   "t = %.6g s: no step succeeds, however small: the next state cannot be evaluated, or not to within "
@@ -156,8 +158,9 @@ int pw_run_advance (pw_run *r, double t_end, pw_error *error) {
   if (status != PW_OK) return status;
   pw_forget_residuals (r);
   if (r->stalled == 0) r->w->failed = NULL; /* otherwise it is the signal that stops the run */
-  if (r->t >= r->breakpoint || r->interrupted) status = run_restart_method (r, error);
-  r->interrupted = 0;
+  r->interrupted |= r->t >= r->breakpoint;
+  if (r->interrupted) status = run_restart_method (r, error);
+  if (status == PW_OK) r->interrupted = 0;
   if (status == PW_OK) status = run_reselect (r, error);
   const double stop = fmin (t_end, r->breakpoint);
   if (status == PW_OK && run_is_at (r, stop)) {
@@ -250,6 +253,20 @@ static int run_energy (pw_run *r, double *energy, pw_error *error) {
   return PW_OK;
 }
 
+/* Continues from r->q and r->v, made consistent; *energy: that of the state reached. */
+static int run_continue_at (pw_run *r, double *energy, pw_error *error) {
+  r->near_singular = 0;
+  r->watchdog.singular_ahead = 1;
+  int status = run_select_rows (r, error);
+  if (status == PW_OK) status = pw_run_make_consistent (r, NULL, error);
+  if (status == PW_OK) status = pw_run_evaluate (r, error);
+  if (status == PW_OK) status = run_energy (r, energy, error);
+  if (status != PW_OK) return status;
+  status = r->method->restart (r, error);
+  r->interrupted = status != PW_OK; /* then the method is restarted before the next step */
+  return status;
+}
+
 /* A change of energy by the caller is not an error of the method: it is added to the initial energy.  The caller's
  * functions may return other values and breakpoints than before. */
 int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error) {
@@ -264,19 +281,14 @@ int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error
   const double reselect_below = r->reselect_below;
   r->w->t_signal = NAN;
   run_exchange (r, q, v);
-  r->near_singular = 0;
-  r->watchdog.singular_ahead = 1;
-  status = run_select_rows (r, error);
-  if (status == PW_OK) status = pw_run_make_consistent (r, NULL, error);
-  if (status == PW_OK) status = pw_run_evaluate (r, error);
-  if (status == PW_OK) status = run_energy (r, &after, error);
+  status = run_continue_at (r, &after, error);
   if (status == PW_OK) {
     pw_run_count_moved (r);
     pw_watchdog_begin (r);
     if (!r->near_singular)
       pw_run_set_reference_level (r); /* accelerations near a singular configuration are no reference */
     r->energy0 += after - before;
-    return r->method->restart (r, error);
+    return PW_OK;
   }
   memcpy (r->q, r->q_at, pw_state_length (r->s) * sizeof *r->q);
   r->reselect_below = reselect_below;

@@ -50,7 +50,7 @@ static int checkpoint_continue (pw_run *r, pw_archive *a, pw_error *error) {
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   r->near_singular = 0;
   if (r->method->serialise == NULL) r->statistics.restarts++;
-  int status = pw_run_renew (r, PW_KEEP_REFERENCES, error);
+  int status = pw_run_renew (r, error);
   if (status == PW_OK && r->method->serialise) r->method->serialise (r, a);
   if (status == PW_OK && a->failed) return pw_fail (error, PW_INPUT, "the saved state is not of this run");
   return status;

@@ -2,6 +2,7 @@
  *
  * Measurements are made after the run: each part of an evaluation is repeated at the last state, often enough for the
  * clock.  So a profile changes neither the results nor the cost of the run. */
+#include <lapacke.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -91,7 +92,7 @@ static void profile_do (profile *p, profile_part part, double t) {
   case PROFILE_PROJECT:
     memcpy (p->q, p->from, bytes);
     memcpy (p->v, r->v, bytes);
-    pw_project_state (&p->projector, r, t, p->q, p->v, r->a_at, r->lambda_at);
+    pw_project_state (&p->projector, r, t, p->q, p->v, r->a_at, r->lambda_at, NULL);
     break;
   default:
     profile_do_batch (p, part);
@@ -123,7 +124,7 @@ static void profile_times (profile *p, profile_part first, int parts, double *ns
   for (int j = 0; j < PROFILE_REPETITIONS; j++)
     for (int i = 0; i < parts; i++) time[i][j] = profile_repeat (p, first + (profile_part)i, n[i]);
   for (int i = 0; i < parts; i++) {
-    qsort (time[i], PROFILE_REPETITIONS, sizeof **time, pw_ascending);
+    LAPACKE_dlasrt_work ('I', PROFILE_REPETITIONS, time[i]);
     ns[i] = 1e9 * time[i][PROFILE_REPETITIONS / 2] / (double)n[i];
   }
 }

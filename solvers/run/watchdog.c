@@ -107,9 +107,9 @@ static int watchdog_fail_lost (pw_run *r, int contradicts, pw_error *error) {
   if (contradicts)
     snprintf (cause, sizeof cause, "constraints contradict each other");
   else if (pw_stabilised_by (r, PW_UNSTABILISED))
-    advice = pw_fixed_steps (r) ? "; a smaller step or a stabilisation reduces it"
-                                : "; a smaller tolerance or a stabilisation reduces it";
-  else if (pw_fixed_steps (r))
+    advice = r->fixed_steps ? "; a smaller step or a stabilisation reduces it"
+                            : "; a smaller tolerance or a stabilisation reduces it";
+  else if (r->fixed_steps)
     snprintf (cause, sizeof cause, "the step of %.6g s is too large", r->settings.step);
   return pw_fail (error, PW_METHOD, "t = %.6g s: %s: %s is violated by %.3g in %s (scaled)%s", r->t, cause, element,
                   in_position ? now.position : now.velocity, in_position ? "position" : "velocity", advice);

@@ -35,12 +35,12 @@ static void newton_fill_T (pw_method_data *d) {
 
 /* Adds all entries of the matrix (T_a + gamma T_v + gamma^2 T_q, T_lambda) from those of T. */
 static void newton_fill_matrix (pw_bdf_newton *w, int n) {
-  const pw_tangent *x = &w->tangent;
+  const pw_scatter_map *T = &w->tangent.scatter;
   const double power[] = { w->gamma * w->gamma, w->gamma, 1 };
-  for (int c = 0; c < 3 * n + x->rows; c++) {
+  for (int c = 0; c < 3 * n + w->tangent.rows; c++) {
     int part = c < 2 * n ? c / n : 2, column = c < 2 * n ? c % n : c - 2 * n; /* parts: q; v; a and lambda */
-    for (int64_t i = x->colptr[c]; i < x->colptr[c + 1]; i++)
-      pw_scatter_add (&w->scatter, (int)x->rowind[i], column, w->scatter.recording ? 0 : power[part] * w->value[i]);
+    for (int64_t i = T->colptr[c]; i < T->colptr[c + 1]; i++)
+      pw_scatter_add (&w->scatter, (int)T->rowind[i], column, w->scatter.recording ? 0 : power[part] * T->value[i]);
   }
 }
 
@@ -57,14 +57,13 @@ static int newton_set_up (realtype t, N_Vector y, N_Vector derivative, SUNMatrix
     int status = pw_multistep_accelerate (d, t, N_VGetArrayPointer (y));
     if (status != 0) return status;
     memcpy (d->v, N_VGetArrayPointer (y) + d->n, (size_t)d->n * sizeof *d->v);
-    pw_scatter_begin_fill (&w->tangent.scatter, w->value);
+    pw_scatter_begin_fill (&w->tangent.scatter, w->tangent.scatter.value);
     newton_fill_T (d);
     pw_matrix_evaluated (d->sun.run, N_VGetArrayPointer (y), d->v);
     d->sun.run->statistics.jacobians++;
   }
   w->gamma = gamma;
-  pw_sun_restore_pattern (matrix, w->colptr, w->rowind);
-  pw_scatter_begin_fill (&w->scatter, SUNSparseMatrix_Data (matrix));
+  pw_sun_begin_fill (matrix, &w->scatter);
   newton_fill_matrix (w, d->n);
   d->sun.run->statistics.factorisations++; /* CVODES factorises next */
   return 0;
@@ -75,12 +74,12 @@ static int newton_set_up (realtype t, N_Vector y, N_Vector derivative, SUNMatrix
 /* right = - T_q (b_q + gamma b_v) - T_v b_v */
 static void newton_right_side (const pw_method_data *d, const double *b, double *right) {
   const pw_bdf_newton *w = &d->newton;
-  const pw_tangent *x = &w->tangent;
+  const pw_scatter_map *T = &w->tangent.scatter;
   int n = d->n;
-  memset (right, 0, (size_t)(n + x->rows) * sizeof *right);
+  memset (right, 0, (size_t)(n + w->tangent.rows) * sizeof *right);
   for (int c = 0; c < 2 * n; c++) {
     double factor = c < n ? b[c] + w->gamma * b[n + c] : b[c];
-    for (int64_t i = x->colptr[c]; i < x->colptr[c + 1]; i++) right[x->rowind[i]] -= w->value[i] * factor;
+    for (int64_t i = T->colptr[c]; i < T->colptr[c + 1]; i++) right[T->rowind[i]] -= T->value[i] * factor;
   }
 }
 
@@ -110,12 +109,10 @@ static int newton_lay_out (pw_method_data *d) {
   int columns = 3 * d->n + x->rows, size = d->n + x->rows;
   pw_scatter_begin_record (&x->scatter);
   newton_fill_T (d);
-  if (pw_scatter_lay_out (&x->scatter, columns, &x->colptr, &x->rowind) != PW_OK) return PW_RESOURCE;
+  if (pw_scatter_lay_out (&x->scatter, columns) != PW_OK) return PW_RESOURCE;
   pw_scatter_begin_record (&w->scatter);
   newton_fill_matrix (w, d->n);
-  if (pw_scatter_lay_out (&w->scatter, size, &w->colptr, &w->rowind) != PW_OK) return PW_RESOURCE;
-  w->value = calloc ((size_t)x->colptr[columns] + 1, sizeof *w->value);
-  return w->value ? PW_OK : PW_RESOURCE;
+  return pw_scatter_lay_out (&w->scatter, size);
 }
 
 int pw_bdf_open_newton (pw_method_data *d) {
@@ -125,7 +122,7 @@ int pw_bdf_open_newton (pw_method_data *d) {
   int size = d->n + w->tangent.rows;
   w->right = pw_sun_vector (size, x->context);
   w->change = pw_sun_vector (size, x->context);
-  if (!w->right || !w->change || pw_sun_open_matrix (x, size, w->colptr, w->rowind) != PW_OK ||
+  if (!w->right || !w->change || pw_sun_open_matrix (x, size, &w->scatter) != PW_OK ||
       pw_sun_open_solver (x, w->right, d, newton_solve) != PW_OK)
     return PW_RESOURCE;
   int failed = CVodeSetLinearSolver (d->cvode, x->solver, x->matrix) || CVodeSetLinSysFn (d->cvode, newton_set_up);
@@ -138,7 +135,4 @@ void pw_bdf_close_newton (pw_method_data *d) {
   if (w->change) N_VDestroy (w->change);
   pw_scatter_close (&w->scatter);
   pw_tangent_close (&w->tangent);
-  free (w->value);
-  free (w->colptr);
-  free (w->rowind);
 }

@@ -7,12 +7,10 @@
 
 /* Named as at the top of bdf_newton.c. */
 typedef struct {
-  pw_tangent tangent;       /* its pattern is that of T */
-  double *value;            /* nonzero values of T */
-  double gamma;             /* that of the matrix last set up */
-  pw_scatter_map scatter;   /* from the entries of T, in order, to the matrix */
-  int64_t *colptr, *rowind; /* pattern of the matrix, in compressed columns */
-  N_Vector right, change;   /* coords and active rows: right-hand side; da, dlambda */
+  pw_tangent tangent;     /* the matrix in tangent.scatter is T */
+  double gamma;           /* that of the matrix last set up */
+  pw_scatter_map scatter; /* from the entries of T, in order, to the matrix */
+  N_Vector right, change; /* coords and active rows: right-hand side; da, dlambda */
 } pw_bdf_newton;
 
 struct pw_method_data {

@@ -51,8 +51,7 @@ static int ida_matrix (realtype t, realtype c, N_Vector vy, N_Vector vyp, N_Vect
   const double *y = N_VGetArrayPointer (vy), *yp = N_VGetArrayPointer (vyp), *v = y + d->dae.n;
   (void)residual, (void)tmp1, (void)tmp2, (void)tmp3;
   if (ida_update (d, t, y) != PW_OK) return -1;
-  pw_sun_restore_pattern (matrix, x->colptr, x->rowind);
-  pw_scatter_begin_fill (&x->scatter, SUNSparseMatrix_Data (matrix));
+  pw_sun_begin_fill (matrix, &x->scatter);
   pw_dae_matrix (&d->dae, v, yp + d->dae.n, ida_lambda (d, y, yp), c, c);
   pw_matrix_evaluated (d->sun.run, y, v);
   return 0;
@@ -61,7 +60,7 @@ static int ida_matrix (realtype t, realtype c, N_Vector vy, N_Vector vyp, N_Vect
 static int ida_open_matrix (pw_method_data *d) {
   const double *y = N_VGetArrayPointer (d->sun.y), *yp = N_VGetArrayPointer (d->yp);
   if (pw_dae_lay_out (&d->dae, y + d->dae.n, yp + d->dae.n, ida_lambda (d, y, yp)) != PW_OK) return PW_RESOURCE;
-  return pw_sun_open_matrix (&d->sun, d->dae.size, d->dae.tangent.colptr, d->dae.tangent.rowind);
+  return pw_sun_open_matrix (&d->sun, d->dae.size, &d->dae.tangent.scatter);
 }
 
 /* ---- Error weights ---- */

@@ -51,15 +51,16 @@ void pw_sun_restart (pw_sun *x) {
 
 /* ---- Linear solver ---- */
 
-void pw_sun_restore_pattern (SUNMatrix matrix, const int64_t *colptr, const int64_t *rowind) {
-  size_t size = (size_t)SUNSparseMatrix_Columns (matrix), nonzeros = (size_t)colptr[size];
-  memcpy (SUNSparseMatrix_IndexPointers (matrix), colptr, (size + 1) * sizeof *colptr);
-  memcpy (SUNSparseMatrix_IndexValues (matrix), rowind, nonzeros * sizeof *rowind);
+void pw_sun_begin_fill (SUNMatrix matrix, pw_scatter_map *t) {
+  size_t columns = (size_t)SUNSparseMatrix_Columns (matrix);
+  memcpy (SUNSparseMatrix_IndexPointers (matrix), t->colptr, (columns + 1) * sizeof *t->colptr);
+  memcpy (SUNSparseMatrix_IndexValues (matrix), t->rowind, t->nonzeros * sizeof *t->rowind);
+  pw_scatter_begin_fill (t, SUNSparseMatrix_Data (matrix));
 }
 
-int pw_sun_open_matrix (pw_sun *x, int size, const int64_t *colptr, const int64_t *rowind) {
-  x->matrix = SUNSparseMatrix (size, size, colptr[size], CSC_MAT, x->context);
-  if (x->matrix) pw_sun_restore_pattern (x->matrix, colptr, rowind);
+int pw_sun_open_matrix (pw_sun *x, int size, pw_scatter_map *t) {
+  x->matrix = SUNSparseMatrix (size, size, (sunindextype)t->nonzeros, CSC_MAT, x->context);
+  if (x->matrix) pw_sun_begin_fill (x->matrix, t);
   return x->matrix ? PW_OK : PW_RESOURCE;
 }
 

@@ -10,6 +10,7 @@
 #include <sunmatrix/sunmatrix_sparse.h>
 #include <sunnonlinsol/sunnonlinsol_newton.h>
 #include "quadrature.h"
+#include "scatter.h"
 
 /* Attempts at a step, each about a quarter of the one before, if the iteration does not converge or the error is too
  * large: from 1 s down to the round-off of the time.  SUNDIALS' defaults of 7 and 10, down to a millionth of the
@@ -41,16 +42,16 @@ void pw_sun_restart (pw_sun *x);
 /* A vector with the operations of vectors.c, as have its clones; NULL: out of memory. */
 N_Vector pw_sun_vector (sunindextype length, SUNContext context);
 
-/* Open x->matrix, of this pattern in compressed columns, and x->solver, which refuses an outdated matrix (tolerances.c)
+/* Open x->matrix, of the pattern of a scatter map, and x->solver, which refuses an outdated matrix (tolerances.c)
  * so that the integrator requests a new one.  right: a vector of the size of the matrix; content: the method's data,
  * beginning with x, which `solve` finds in its solver; solve: NULL for KLU's; any other must itself refuse an outdated
  * matrix. */
 typedef int pw_sun_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector x, N_Vector b, realtype tolerance);
-int pw_sun_open_matrix (pw_sun *x, int size, const int64_t *colptr, const int64_t *rowind);
+int pw_sun_open_matrix (pw_sun *x, int size, pw_scatter_map *t);
 int pw_sun_open_solver (pw_sun *x, N_Vector right, void *content, pw_sun_solve *solve);
 
-/* Restores the pattern, which SUNDIALS clears together with the values. */
-void pw_sun_restore_pattern (SUNMatrix matrix, const int64_t *colptr, const int64_t *rowind);
+/* From now on contributions are added to this matrix.  Restores its pattern, which SUNDIALS clears with the values. */
+void pw_sun_begin_fill (SUNMatrix matrix, pw_scatter_map *t);
 
 /* Replaces the convergence test of x->iteration, a Newton iteration that the integrator uses already.  The test of
  * SUNDIALS multiplies the first correction by the convergence rate of previous steps, which is meaningless if a force

@@ -37,23 +37,6 @@ static const double VARIATION_FIRST_STEP = 1e-3; /* of the derivatives, in units
 
 /* ---- Opening ---- */
 
-/* With more than PW_VARIATION_DENSE coordinates only the arrays that explicit steps need. */
-static int variation_open_linear (pw_variation *x) {
-  pw_linearisation *l = &x->linear;
-  size_t n = (size_t)x->n, m = (size_t)x->m;
-  int status = pw_linear_open (l, x->r, PW_WITHOUT_MODES, PW_VARIATION_DENSE);
-  if (status != PW_OK || x->n <= PW_VARIATION_DENSE) return status;
-  const pw_array array[] = { { &l->a, n + 3 },
-                             { &l->lambda, m },
-                             { &l->dx, 2 * n },
-                             { &l->product, n + 2 * m },
-                             { &l->da, n + 3 },
-                             { &l->row_scratch, m },
-                             { &l->scratch, n + 3 * m + 3 } };
-  l->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
-  return l->memory ? pw_linear_derivatives (l) : PW_RESOURCE;
-}
-
 static int variation_open_arrays (pw_variation *x) {
   size_t n = (size_t)x->n, m = (size_t)x->m, entries = (size_t)x->r->s->entries, size = (size_t)x->size;
   size_t all = 3 * n + 4 * m + entries + 9, sample = 3 * n + m + entries;
@@ -210,7 +193,8 @@ static int variation_open (pw_variation *x, const pw_direction *d, pw_error *err
   if (status != PW_OK) return status;
   x->reversal = variation_reversal (r);
   x->direction = calloc ((size_t)x->count + 1, sizeof *x->direction);
-  if (x->direction == NULL || variation_open_arrays (x) != PW_OK || variation_open_linear (x) != PW_OK)
+  const pw_linear_extent extent = x->n > PW_VARIATION_DENSE ? PW_LINEAR_DERIVATIVES : PW_LINEAR_BASES;
+  if (x->direction == NULL || variation_open_arrays (x) != PW_OK || pw_linear_open (&x->linear, r, extent) != PW_OK)
     return pw_fail_memory (r->s, error);
   status = variation_record (x, x->t, error);
   for (int i = 0; i < x->count && status == PW_OK; i++) status = variation_start (x, &x->direction[i], &d[i], error);

@@ -246,11 +246,11 @@ void pw_variation_project (pw_variation *x, pw_variation_column *c) {
   pw_mul_J (x->r->w, c->trial, l->scratch);
   for (int i = 0; i < m; i++) l->scratch[i] = i < holonomic ? -l->scratch[i] - row[i] : 0;
   pw_saddle_solve (x->r->saddle, NULL, l->scratch, l->da, l->scratch);
-  pw_variation_add (c->trial, l->da, 1, n);
+  pw_add_scaled (c->trial, l->da, 1, n);
   memcpy (l->dx, c->trial, 2 * (size_t)n * sizeof *l->dx);
   pw_linear_multiply (l);
   pw_mul_J (x->r->w, c->trial + n, l->scratch);
   for (int i = 0; i < m; i++) l->scratch[i] = -l->scratch[i] - l->product[n + m + i] - row[m + i];
   pw_saddle_solve (x->r->saddle, NULL, l->scratch, l->da, l->scratch);
-  pw_variation_add (c->trial + n, l->da, 1, n);
+  pw_add_scaled (c->trial + n, l->da, 1, n);
 }

@@ -8,7 +8,7 @@
 /* Adds h sum weight_k K_k to `out`: entries from `first` to `end` - 1. */
 static void explicit_combine (const pw_variation_column *c, const double *weight, int count, double h, int first,
                               int end, double *out) {
-  for (int k = 0; k < count; k++) pw_variation_add (out + first, c->K[k] + first, h * weight[k], end - first);
+  for (int k = 0; k < count; k++) pw_add_scaled (out + first, c->K[k] + first, h * weight[k], end - first);
 }
 
 /* `trial` = Y + h sum weight_k K_k of every column, over `count` stages. */
@@ -34,8 +34,8 @@ int pw_variation_explicit_stages (pw_variation *x, double h, double t1, pw_error
   memset (x->motion_error, 0, (size_t)x->n * sizeof *x->motion_error);
   for (int k = 0; k < PW_VARIATION_RATES; k++) {
     const double *a = k < b->stages ? x->a[k] : x->linear.a;
-    pw_variation_add (x->motion_error, a, h * b->e[k], x->n);
-    if (k < b->stages) pw_variation_add (x->motion_defect, a, h * b->b[k], x->n);
+    pw_add_scaled (x->motion_error, a, h * b->e[k], x->n);
+    if (k < b->stages) pw_add_scaled (x->motion_defect, a, h * b->b[k], x->n);
   }
   return PW_OK;
 }

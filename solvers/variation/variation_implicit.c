@@ -145,7 +145,7 @@ static void implicit_rhs (pw_variation *x, const pw_variation_column *c, double 
   double *sum = x->values;
   for (int i = 0; i < STAGES; i++, z += x->implicit->size) {
     for (int j = 0; j < length; j++) sum[j] = c->Y[j] - c->K[STATE + i][j];
-    for (int k = 0; k < STAGES; k++) pw_variation_add (sum, c->K[RATE + k], h * radau_A[i][k], length);
+    for (int k = 0; k < STAGES; k++) pw_add_scaled (sum, c->K[RATE + k], h * radau_A[i][k], length);
     implicit_coordinates (x, i, sum, z);
   }
 }
@@ -160,7 +160,7 @@ static void implicit_solve (pw_variation *x, double h) {
   PW_EACH_COLUMN (c, x)
   for (int i = 0; i < STAGES; i++)
     for (int k = 0; k < p->size; k++, z++)
-      pw_variation_add (c->K[STATE + i], p->N[i] + (size_t)k * (size_t)length, *z, length);
+      pw_add_scaled (c->K[STATE + i], p->N[i] + (size_t)k * (size_t)length, *z, length);
 }
 
 /* F_i and Y_i of work and losses, for which the stages Y_i of dq and dv must be known. */
@@ -177,7 +177,7 @@ static int implicit_powers (pw_variation *x, double h, double t1, pw_error *erro
   for (int i = 0; i < STAGES; i++) {
     memcpy (c->K[STATE + i] + from, c->Y + from, (size_t)length * sizeof *c->Y);
     for (int k = 0; k < STAGES; k++)
-      pw_variation_add (c->K[STATE + i] + from, c->K[RATE + k] + from, h * radau_A[i][k], length);
+      pw_add_scaled (c->K[STATE + i] + from, c->K[RATE + k] + from, h * radau_A[i][k], length);
   }
   return PW_OK;
 }
@@ -191,7 +191,7 @@ static void implicit_filter (pw_variation *x, double *e) {
   implicit_coordinates (x, 2, e, p->z);
   LAPACKE_dgetrs_work (LAPACK_COL_MAJOR, 'N', size, 1, p->filter, size, p->pivot + STAGES * size, p->z, size);
   memset (e, 0, (size_t)length * sizeof *e);
-  for (int k = 0; k < size; k++) pw_variation_add (e, p->N[2] + (size_t)k * (size_t)length, p->z[k], length);
+  for (int k = 0; k < size; k++) pw_add_scaled (e, p->N[2] + (size_t)k * (size_t)length, p->z[k], length);
 }
 
 /* The errors of the derivatives; those of work and losses, on which no time derivative depends, need no filter. */
@@ -215,8 +215,8 @@ static void implicit_motion (pw_variation *x, double h) {
   memcpy (e + n, x->a[0], (size_t)n * sizeof *e);
   memcpy (defect + n, x->motion_defect, (size_t)n * sizeof *e);
   for (int k = 0; k < STAGES; k++) {
-    for (int i = 0; i < STAGES; i++) pw_variation_add (e + n, x->a[1 + k], radau_e[i] * radau_A[i][k], n);
-    pw_variation_add (defect + n, x->a[1 + k], h * radau_A[2][k], n);
+    for (int i = 0; i < STAGES; i++) pw_add_scaled (e + n, x->a[1 + k], radau_e[i] * radau_A[i][k], n);
+    pw_add_scaled (defect + n, x->a[1 + k], h * radau_A[2][k], n);
   }
   implicit_filter (x, e);
   implicit_filter (x, defect);

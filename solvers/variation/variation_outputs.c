@@ -69,7 +69,7 @@ static int output_by_state (pw_variation *x, const pw_variation_column *c, pw_va
     for (int j = 0; j < n; j++) q[j] = at.q[j] + side * step * Y[j], v[j] = at.v[j] + side * step * Y[n + j];
     for (int i = 0; i < m; i++) lambda[i] = x->linear.lambda[i] + side * step * c->lambda[i];
     status = output_values (x, x->r, at.held ? at.t : x->at, q, v, lambda);
-    pw_variation_add (out, x->values, side / (2 * step), 2 + x->entries + m);
+    pw_add_scaled (out, x->values, side / (2 * step), 2 + x->entries + m);
   }
   if (pw_variation_column_index (c) == 1) /* round-off of the differences of the derivative itself */
     out[1] += copysign (output_round (x) / pw_variation_step_along (c->direction->column), out[1]);
@@ -85,7 +85,7 @@ int pw_variation_outputs (pw_variation *x, const pw_variation_column *c, const d
     double weight = pw_direction_weight (&d->given, pw_variation_column_index (c), i);
     if (weight == 0) continue;
     status = output_values (x, d->given.neighbour[i], at.t, at.q, at.v, x->linear.lambda);
-    pw_variation_add (out, x->values, weight, length);
+    pw_add_scaled (out, x->values, weight, length);
   }
   if (status == PW_OK) status = output_by_state (x, c, at, Y, out);
   out[0] = output_kinetic (x, c, at.v, Y + x->n);

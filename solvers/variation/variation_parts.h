@@ -103,11 +103,6 @@ typedef struct {
   int held; /* 1: time and state of a pw_variation_hold */
 } pw_variation_place;
 
-/* to += weight * from */
-static inline void pw_variation_add (double *restrict to, const double *restrict from, double weight, int n) {
-  for (int i = 0; i < n; i++) to[i] += weight * from[i];
-}
-
 /* ---- variation_path.c ---- */
 
 /* Appends the state of the run at time t, in its last step.  A status. */

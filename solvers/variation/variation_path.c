@@ -11,7 +11,7 @@ static const double PATH_SHORTEST = 1. / 50;
  * fixed steps v is the derivative of q.  Otherwise the errors of q and v may differ, and v is of degree 3 from v and a
  * at both ends; the points are dense enough. */
 static void path_interpolate (const pw_variation *x, const pw_variation_point *p, double t, double *out) {
-  int n = x->n, fixed = pw_fixed_steps (x->r);
+  int n = x->n, fixed = x->r->fixed_steps;
   double h = p[1].t - p[0].t, u = (t - p[0].t) / h, up = u * u * (3 - 2 * u), w = u * (1 - u);
   for (int j = 0; j < n; j++) {
     const double *l = p[0].x + j, *r = p[1].x + j;
@@ -85,7 +85,7 @@ static int path_differentiate (pw_variation *x, const pw_variation_point *p, dou
   for (int k = 0; k < 2 && status == PW_OK; k++) {
     pw_sample s;
     status = pw_run_sample (x->r, p->t + at[inside][k] * d, &s, error);
-    if (status == PW_OK) pw_variation_add (a, s.v, weight[inside][k] / d, x->n);
+    if (status == PW_OK) pw_add_scaled (a, s.v, weight[inside][k] / d, x->n);
   }
   return status;
 }
@@ -103,7 +103,7 @@ int pw_variation_append (pw_variation *x, double t, pw_error *error) {
   memcpy (p->x + n, s.v, n * sizeof (double));
   memcpy (p->x + 2 * n, s.a, n * sizeof (double));
   /* differences are wrong across a jump of accelerations; steps of fixed size have no error to magnify */
-  if (x->implicit && h > 0 && !pw_fixed_steps (x->r) && !x->may_jump) return path_differentiate (x, p, h, error);
+  if (x->implicit && h > 0 && !x->r->fixed_steps && !x->may_jump) return path_differentiate (x, p, h, error);
   /* at a breakpoint just reached, the run's accelerations may be those after it */
   return t < x->r->breakpoint ? PW_OK : pw_variation_accelerations (x, t, s.q, s.v, p->x + 2 * n, error);
 }
@@ -123,7 +123,7 @@ static int path_is_accurate (const pw_variation *x, int i) {
 /* Inserts the state at the midpoint; if interpolation was not accurate there, does so in both halves, too. */
 int pw_variation_refine (pw_variation *x, int i, pw_error *error) {
   double t0 = x->point[i].t, t1 = x->point[i + 1].t, middle = t0 + (t1 - t0) / 2;
-  if (pw_fixed_steps (x->r) || t1 - t0 < PATH_SHORTEST * (x->r->t - x->begun) || !(t0 < middle && middle < t1))
+  if (x->r->fixed_steps || t1 - t0 < PATH_SHORTEST * (x->r->t - x->begun) || !(t0 < middle && middle < t1))
     return PW_OK;
   int status = pw_variation_append (x, middle, error);
   if (status != PW_OK) return status;

@@ -58,7 +58,7 @@ static double step_motion_error (const pw_variation *x) {
  * each of two velocities to a tenth of rtol (pw_variation_refine). */
 static double step_noise (const pw_variation *x) {
   double most = 1;
-  if (!pw_fixed_steps (x->r)) return 2 * 0.1 * x->r->settings.rtol * fmax (1, x->speed);
+  if (!x->r->fixed_steps) return 2 * 0.1 * x->r->settings.rtol * fmax (1, x->speed);
   for (int j = 0; j < x->n; j++) most = fmax (most, fabs (x->q[j]) / pw_unit (x->r->s, j));
   return STEP_ROUND * most * x->r->w->scale.time / fmin (x->r->settings.step, x->r->w->scale.time);
 }
@@ -78,8 +78,7 @@ static const double STEP_CHANGE = 1e-6, STEP_CHANGE_RTOL = 1000;
  * formula (x->motion_error), and step_noise multiplied by x->reversal, are subtracted. */
 static double step_defect (const pw_variation *x, double h) {
   int stages = x->implicit ? 1 + PW_VARIATION_STAGES : PW_VARIATION_RATES - 1;
-  double most =
-      fmax (STEP_CHANGE, pw_fixed_steps (x->r) ? 0 : STEP_CHANGE_RTOL * x->r->settings.rtol) * fmax (1, x->speed);
+  double most = fmax (STEP_CHANGE, x->r->fixed_steps ? 0 : STEP_CHANGE_RTOL * x->r->settings.rtol) * fmax (1, x->speed);
   for (int k = 0; k < stages; k++) most = fmax (most, h * step_largest_velocity (x, x->a[k]));
   double defect = step_largest_velocity (x, x->motion_defect) - step_noise (x) * x->reversal -
                   step_largest_velocity (x, x->motion_error);
@@ -233,7 +232,7 @@ static int step_check_stiffness (pw_variation *x, double h, pw_error *error) {
 }
 
 int pw_variation_step (pw_variation *x, double t1, pw_error *error) {
-  int fixed = pw_fixed_steps (x->r);
+  int fixed = x->r->fixed_steps;
   double tolerance = fixed ? STEP_TOLERANCE : fmax (STEP_TOLERANCE, 0.1 * x->r->settings.rtol),
          loose_size = fixed && x->implicit == NULL ? STEP_LINEARISATIONS * x->r->settings.step : 0;
   if (x->h <= fmax (STEP_SMALLEST * x->r->w->scale.time, pw_least_step (x->r))) return step_fail (x, error);

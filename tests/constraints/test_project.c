@@ -25,7 +25,7 @@ static void project_try (const char *model, const char *parameter, double value,
   memcpy (v, x.v, (size_t)n * sizeof *v);
   check_ok (pw_projector_open_by_options (&p, r, &error), &error);
   v[1] += off;
-  assert_int_equal (pw_project_state (&p, r, x.t, q, v, a, lambda), PW_OK);
+  assert_int_equal (pw_project_state (&p, r, x.t, q, v, a, lambda, NULL), PW_OK);
   pw_evaluate_residuals (r->w, NULL, &now);
   check_below (model, now.position, 4 * CHECK_EPS, "round-off");
   check_below (model, now.velocity, 4 * CHECK_EPS, "round-off");
@@ -72,7 +72,7 @@ static double project_length (const char *method) {
   check_ok (pw_projector_open_by_options (&p, r, &error), &error);
   v[1] += 1e-3;
   memcpy (before, v, (size_t)n * sizeof *v);
-  assert_int_equal (pw_project_state (&p, r, x.t, q, v, a, lambda), PW_OK);
+  assert_int_equal (pw_project_state (&p, r, x.t, q, v, a, lambda, NULL), PW_OK);
   for (int j = 0; j < n; j++) square += (v[j] - before[j]) * (v[j] - before[j]);
   pw_projector_close (&p);
   runs_close (r, s);

@@ -102,7 +102,7 @@ static double galpha_condition (const char *model, const char *method, double h)
   runs_to (r, 3 * h);
   pw_implicit *x = (pw_implicit *)r->data;
   pw_sparse *k = &x->sparse;
-  klu_l_condest (k->colptr, x->value, k->symbolic, k->factors, &k->common);
+  klu_l_condest (k->colptr, x->dae.tangent.scatter.value, k->symbolic, k->factors, &k->common);
   double condition = k->common.condest;
   pw_run_close (r);
   pw_system_free (s);

@@ -102,6 +102,46 @@ static void test_refused (void **state) {
   pw_system_free (s), pw_system_free (same);
 }
 
+static const pw_method *restart_built_in;
+static int restart_fails, restart_calls;
+
+static int restart_or_fail (pw_run *r, pw_error *error) {
+  restart_calls++;
+  return restart_fails ? pw_fail (error, PW_METHOD, "no restart") : restart_built_in->restart (r, error);
+}
+
+/* One that the method refuses does so, too. */
+static void test_refused_by_method (void **state) {
+  (void)state;
+  for (int i = 0; strcmp ((restart_built_in = pw_methods[i])->name, "rk4") != 0;) i++;
+  pw_method refusing = *restart_built_in;
+  refusing.name = "refusing", refusing.restart = restart_or_fail;
+  const pw_method *const own[] = { &refusing, NULL };
+  pw_system *s = scene_system (&scene_ezyroller, NULL);
+  pw_settings settings = { .step = 1e-3, .span = 2, .ledger = 1, .methods = own };
+  pw_run *r = runs_open (s, "refusing+projection", &settings), *left = runs_open (s, "rk4+projection", &settings);
+  pw_sample now = runs_to (r, 1), before = runs_to (left, 1);
+  pw_error error = { 0 };
+  double v[6];
+  for (int j = 0; j < 6; j++) v[j] = 3 * now.v[j];
+  restart_fails = 1;
+  assert_int_equal (pw_run_restart (r, NULL, v, &error), PW_METHOD);
+  check_error (&error, PW_METHOD, "no restart");
+  error = (pw_error){ 0 };
+  assert_int_equal (pw_run_advance (r, 2, &error), PW_METHOD);
+  check_error (&error, PW_METHOD, "no restart");
+  restart_fails = 0, now = runs_to (r, 1);
+  check_bits ("velocities", now.v, before.v, 6);
+  check_bits ("accelerations", now.a, before.a, 6);
+  check_bits ("balance", &now.balance, &before.balance, 1);
+  now = runs_to (r, 2), before = runs_to (left, 2);
+  assert_int_equal (restart_calls, 3); /* the last one before the first step that succeeds */
+  for (int j = 0; j < 6; j++)
+    check_close ("positions", now.q[j], before.q[j], 1e-12, "steps end at other times by round-off");
+  pw_run_close (r), pw_run_close (left);
+  pw_system_free (s);
+}
+
 /* Energy added by the caller is not an error of the method: the balance contains only the latter, before and after.
  * */
 static void test_kick (void **state) {
@@ -181,9 +221,10 @@ static void test_controlled (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_onwards), cmocka_unit_test (test_slower),      cmocka_unit_test (test_refused),
-    cmocka_unit_test (test_kick),    cmocka_unit_test (test_kick_unkept), cmocka_unit_test (test_controlled),
-    cmocka_unit_test (test_lost),
+    cmocka_unit_test (test_onwards),     cmocka_unit_test (test_slower),
+    cmocka_unit_test (test_refused),     cmocka_unit_test (test_kick),
+    cmocka_unit_test (test_kick_unkept), cmocka_unit_test (test_controlled),
+    cmocka_unit_test (test_lost),        cmocka_unit_test (test_refused_by_method),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -224,6 +224,10 @@ static void test_missing (void **state) {
   assert_int_equal (pw_run_sample (NULL, 1, &sample, &e[3]), PW_INPUT);
   assert_int_equal (pw_run_restart (NULL, NULL, NULL, &e[4]), PW_INPUT);
   for (int i = 1; i < 5; i++) check_error (&e[i], PW_INPUT, "a run is missing");
+  pw_run *none[] = { NULL, NULL };
+  int status[] = { PW_OK, PW_OK };
+  pw_runs_advance (none, 2, 1, NULL, NULL, status, NULL);
+  assert_true (status[0] == PW_INPUT && status[1] == PW_INPUT);
   pw_system *s = scene_system (&scene_ezyroller, NULL);
   pw_run *r = runs_open (s, "rk4", NULL);
   assert_int_equal (pw_run_sample (r, 0, NULL, &e[5]), PW_INPUT);

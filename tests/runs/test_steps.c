@@ -260,6 +260,19 @@ static void test_breakpoints_told (void **state) {
   pw_system_free (s);
 }
 
+/* Fixed steps as short as a run accepts at a large time make progress. */
+static void test_short_steps (void **state) {
+  (void)state;
+  const double t = 1e6, step = 2e-9;
+  pw_error error = { 0 };
+  pw_system *s = scene_named ("pendulum", NULL, 0);
+  pw_run *r = runs_open (s, "rk4", &(pw_settings){ .t = t, .step = step, .span = 1 });
+  check_ok (pw_run_advance_to (r, t + 1500 * step, INFINITY, &error), &error);
+  assert_int_equal (pw_run_statistics (r)->steps, 1500);
+  pw_run_close (r);
+  pw_system_free (s);
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_looks),
@@ -270,6 +283,7 @@ int main (void) {
     cmocka_unit_test (test_adjacent_in_motion),
     cmocka_unit_test (test_not_a_number),
     cmocka_unit_test (test_breakpoints_told),
+    cmocka_unit_test (test_short_steps),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }
