@@ -116,7 +116,7 @@ enum { PW_BRANCH_MOST = 8 };                /* iterations of a point of a branch
 static const double PW_BRANCH_EXACT = 1e-4; /* |F| relative to the tolerance that needs no further iteration */
 
 /* Newton's method at constant c . u, or if c is NULL at constant p, then with the Levenberg-Marquardt parameter
- * damping |F|, which leads to the nearest of solutions that are not isolated (Yamashita & Fukushima 2001). */
+ * damping min (|F|, 1), which leads to the nearest of solutions that are not isolated (Yamashita & Fukushima 2001). */
 int pw_branch_iterate (pw_branch *b, double *u, const double *c, double damping, pw_error *error);
 /* The unit tangent t at u with c . t > 0.  PW_RETRY if c is orthogonal to the branch. */
 int pw_branch_tangent (pw_branch *b, const double *u, const double *c, double *tangent, pw_error *error);
