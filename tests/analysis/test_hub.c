@@ -177,43 +177,30 @@ static void hub_everywhere (const pw_plugin_table *table) {
   assert_true (hypot (first[3], first[4]) > 1e-3); /* it moves */
 }
 
-static void test_carousel (void **state) {
+TEST (carousel) {
   static const pw_plugin_table table = HUB_TABLE (hub_carousel);
-  (void)state;
   hub_everywhere (&table);
 }
 
-static void test_table (void **state) {
+TEST (table) {
   static const pw_plugin_table table = HUB_TABLE (hub_table);
-  (void)state;
   hub_everywhere (&table);
 }
 
 /* Redundant rows are found at every angle, whatever the round-off. */
-static void test_leaning (void **state) {
+TEST (leaning) {
   static const pw_plugin_table table = HUB_TABLE (hub_leaning);
   double hub[6];
-  (void)state;
   for (int place = 1; place <= 12; place++) hub_run (&table, place, hub);
 }
 
-static void test_platform (void **state) {
+TEST (platform) {
   static const pw_plugin_table table = HUB_TABLE (hub_platform);
-  (void)state;
   hub_everywhere (&table);
 }
 
-static void test_frame (void **state) {
+TEST (frame) {
   static const pw_plugin_table table = HUB_TABLE (hub_frame);
   double hub[6];
-  (void)state;
   hub_run (&table, 0, hub);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_carousel), cmocka_unit_test (test_table), cmocka_unit_test (test_leaning),
-    cmocka_unit_test (test_platform), cmocka_unit_test (test_frame),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -32,9 +32,8 @@ static void linear_pendulum (pw_model *m, const void *parameters) {
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 } });
 }
 
-static void test_pendulum (void **state) {
+TEST (pendulum) {
   static const pw_plugin_table table = TRIAL_TABLE (linear_pendulum);
-  (void)state;
   pw_linear l = linear_of (&table);
   assert_int_equal (l.positions, 1);
   assert_int_equal (l.velocities, 1);
@@ -53,9 +52,8 @@ static void linear_oscillator (pw_model *m, const void *parameters) {
       m, &(pw_spring){ .name = "S", .body = { "ground", "block" }, .stiffness = 60, .damping = 2.4, .length = 0.8 });
 }
 
-static void test_oscillator (void **state) {
+TEST (oscillator) {
   static const pw_plugin_table table = TRIAL_TABLE (linear_oscillator);
-  (void)state;
   pw_linear l = linear_of (&table);
   assert_int_equal (l.unknowns, 6);
   assert_true (isnan (l.least));
@@ -80,9 +78,8 @@ static void linear_rotor (pw_model *m, const void *parameters) {
              .name = "turn", .body = "arm", .at = { 1, 0 }, .heading = PW_PI / 2, .value = { PW_CONSTANT, { W } } });
 }
 
-static void test_rotor (void **state) {
+TEST (rotor) {
   static const pw_plugin_table table = TRIAL_TABLE (linear_rotor);
-  (void)state;
   pw_linear l = linear_of (&table);
   assert_int_equal (l.positions, 2);
   assert_int_equal (l.velocities, 1);
@@ -99,9 +96,8 @@ static void linear_sleigh (pw_model *m, const void *parameters) {
   pw_add_speed (m, &(pw_speed){ .name = "tow", .body = "sleigh", .at = { -0.2, 0 }, .value = { PW_CONSTANT, { -4 } } });
 }
 
-static void test_sleigh (void **state) {
+TEST (sleigh) {
   static const pw_plugin_table table = TRIAL_TABLE (linear_sleigh);
-  (void)state;
   pw_linear l = linear_of (&table);
   assert_int_equal (l.positions, 3);
   assert_int_equal (l.velocities, 1);
@@ -118,9 +114,8 @@ static void linear_twins (pw_model *m, const void *parameters) {
     pw_add_wheel (m, &(pw_wheel){ .name = i ? "right" : "left", .body = "axle", .at = { 0, 0.5 - i } });
 }
 
-static void test_rank (void **state) {
+TEST (rank) {
   static const pw_plugin_table table = TRIAL_TABLE (linear_twins);
-  (void)state;
   pw_linear l = linear_of (&table);
   assert_int_equal (l.positions, 3);
   assert_int_equal (l.velocities, 2);
@@ -134,11 +129,10 @@ static void test_rank (void **state) {
   pw_linear_free (&l);
 }
 
-static void test_large (void **state) {
+TEST (large) {
   static const pw_plugin_table table = TRIAL_TABLE (linear_pendulum);
   pw_error error = { 0 };
   pw_linear l;
-  (void)state;
   pw_system *s = scene_system (&table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", NULL);
   check_ok (pw_run_linearise (r, 2, &l, &error), &error);
@@ -183,9 +177,8 @@ static void linear_one_sided (pw_model *m, const void *parameters) {
 }
 
 /* Neither state has a linearisation; the workspace is left at it, not at a state beside it. */
-static void test_jump (void **state) {
+TEST (jump) {
   static const pw_plugin_table table[] = { TRIAL_TABLE (linear_jumping), TRIAL_TABLE (linear_one_sided) };
-  (void)state;
   for (int i = 0; i < 2; i++) {
     pw_error error = { 0 };
     pw_linear l;
@@ -201,20 +194,10 @@ static void test_jump (void **state) {
 
 /* ---- RK4 ---- */
 
-static void test_rk4_limit (void **state) {
-  (void)state;
+TEST (rk4_limit) {
   check_close ("damped", pw_rk4_limit (-2, 0), 2.785293563405282 / 2, 1e-9, "root of |R| = 1 on the negative axis");
   check_close ("undamped", pw_rk4_limit (0, 10), sqrt (8) / 10, 1e-6, "root 2 sqrt 2, which is flat: 1e-12 in |R|");
   check_close ("growing and turning", pw_rk4_limit (3, 10), sqrt (8) / 10, 1e-6, "as undamped");
   assert_true (isinf (pw_rk4_limit (3, 0)) && isinf (pw_rk4_limit (0, 0)));
   assert_true (pw_rk4_limit (-1, 1) > 1.5 && pw_rk4_limit (-1, 1) < 3);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_pendulum),  cmocka_unit_test (test_oscillator), cmocka_unit_test (test_rotor),
-    cmocka_unit_test (test_sleigh),    cmocka_unit_test (test_rank),       cmocka_unit_test (test_large),
-    cmocka_unit_test (test_rk4_limit), cmocka_unit_test (test_jump),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -151,8 +151,7 @@ static void modes_spread (const char *model) {
   modes_close (&x);
 }
 
-static void test_spread (void **state) {
-  (void)state;
+TEST (spread) {
   modes_spread ("n-trailer");
   modes_spread ("car");
 }
@@ -183,16 +182,14 @@ static void modes_decay (pw_system *s, int modes_expected) {
   modes_close (&x);
 }
 
-static void test_decay (void **state) {
-  (void)state;
+TEST (decay) {
   modes_decay (scene_named ("n-trailer", NULL, 0), 2);
   modes_decay (scene_system (&modes_table, "w", 0.8, "stiffness", 3.0, NULL), 2);
 }
 
 /* A torque drives the states as x' = A x + B u, in a straight motion and a turn, whose frame rotates. */
-static void test_torque (void **state) {
+TEST (torque) {
   const double eps = 1e-3, t = 1.3;
-  (void)state;
   for (int turn = 0; turn < 2; turn++) {
     double plus[MOST], minus[MOST], y[MOST] = { 0 }, w = 0.8 * turn;
     pw_system *up = scene_system (&modes_table, "amplitude", eps, "w", w, NULL),
@@ -237,9 +234,8 @@ static void modes_rotor (pw_model *m, const void *parameters) {
   pw_add_pin (m, &(pw_pin){ .name = "P", .body = { "rotor", "bob" }, .at = { { 0.5, 0 }, { -1, 0 } } });
 }
 
-static void test_rotor (void **state) {
+TEST (rotor) {
   static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = modes_rotor };
-  (void)state;
   modes x = modes_of (scene_system (&table, NULL));
   int mode = -1;
   for (int i = 0; i < x.l.unknowns; i++)
@@ -261,10 +257,9 @@ static void modes_pendulum (pw_model *m, const void *parameters) {
   pw_add_torque (m, &(pw_torque){ .name = "T", .body = { "bob", "ground" } });
 }
 
-static void test_transfer (void **state) {
+TEST (transfer) {
   static const pw_plugin_table table = TRIAL_TABLE (modes_pendulum);
   const double frequency[] = { 0.1, 3.05, 40 }, k = 2 * 9.81 * 0.7, J = 0.5 + 2 * 0.49, d = 0.6;
-  (void)state;
   modes x = modes_of (scene_system (&table, NULL));
   assert_int_equal (x.l.unknowns, 2);
   for (int i = 0; i < 3; i++) {
@@ -284,9 +279,8 @@ static void test_transfer (void **state) {
 }
 
 /* Signals of constraints have no column of B. */
-static void test_constraint_signal (void **state) {
+TEST (constraint_signal) {
   pw_error error = { 0 };
-  (void)state;
   modes x = modes_of (scene_system (&modes_table, NULL));
   int pull = pw_system_find_signal (x.s, "pull", &error),
       torque = pw_system_find_signal (x.s, "actuator.value", &error);
@@ -297,12 +291,4 @@ static void test_constraint_signal (void **state) {
   assert_int_equal (pw_system_find_signal (x.s, "actuator.valve", &error), PW_INPUT);
   assert_non_null (strstr (error.text, "has no signal \"actuator.valve\"; did you mean \"actuator.value\"?"));
   modes_close (&x);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_spread), cmocka_unit_test (test_decay),    cmocka_unit_test (test_torque),
-    cmocka_unit_test (test_rotor),  cmocka_unit_test (test_transfer), cmocka_unit_test (test_constraint_signal),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

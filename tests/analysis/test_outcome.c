@@ -26,10 +26,10 @@ static pw_file *file;
 static pw_model *built;
 static pw_system *s;
 
-static int outcome_setup (void **state) {
+static int outcome_setup (void) {
   char path[4096];
   pw_error error = { 0 };
-  if (cli_setup (state) != 0) return 1;
+  if (cli_setup () != 0) return 1;
   cli_write ("functionals.yaml", model);
   cli_expand ("@/functionals.yaml", path, sizeof path);
   file = pw_file_open (path, &error);
@@ -39,11 +39,11 @@ static int outcome_setup (void **state) {
   return s == NULL;
 }
 
-static int outcome_teardown (void **state) {
+static int outcome_teardown (void) {
   pw_system_free (s);
   pw_model_free (built);
   pw_file_close (file);
-  return cli_teardown (state);
+  return cli_teardown ();
 }
 
 static double outcome_run (const char *text, const char *method, double step, double rtol, double t_end) {
@@ -60,8 +60,7 @@ static double outcome_run (const char *text, const char *method, double step, do
 /* ---- Values ---- */
 
 /* At t = 4, w = 3. */
-static void test_functionals (void **state) {
-  (void)state;
+TEST (functionals) {
   const double w = 3, t = 4, phi = (1 - cos (w * t)) / (w * w), area = (t - sin (w * t) / w) / (w * w);
   const struct {
     const char *text;
@@ -99,8 +98,7 @@ static void test_functionals (void **state) {
 }
 
 /* Each step ends at the jump, where the value has its limit from the right. */
-static void test_jump (void **state) {
-  (void)state;
+TEST (jump) {
   static const char *const method[] = { "rk4", "erk8", "radau" };
   for (int i = 0; i < 3; i++) {
     check_close ("least reaction", outcome_run ("min:Q.Fx", method[i], 0.03, 1e-9, 2), -0.7, 1e-9,
@@ -110,20 +108,17 @@ static void test_jump (void **state) {
 }
 
 /* A drop so small that the ends of a step and its middle lie nearly on a line. */
-static void test_small_jump (void **state) {
-  (void)state;
+TEST (small_jump) {
   check_close ("least reaction", outcome_run ("min:Q.Fy", "rk4", 0.03, 0, 2), -1.7, 1e-9, "1e-8 of a step, refined");
 }
 
 /* Steps of 0.2 s and more contain more than a period of sin (40 t). */
-static void test_fast (void **state) {
-  (void)state;
+TEST (fast) {
   check_close ("rms", outcome_run ("rms:R.Fx", "erk8", 0, 1e-6, 4), sqrt ((2 - sin (320.) / 160) / 4), 1e-8,
                "divided until two formulas agree to 1e-3, which makes one of them accurate to 3e-11 of a part");
 }
 
-static void test_gradient (void **state) {
-  (void)state;
+TEST (gradient) {
   const char *text = "integral:wheel.phi * 2 + max:wheel.phi";
   pw_outcomes x;
   pw_error error = { 0 };
@@ -140,8 +135,7 @@ static void test_gradient (void **state) {
 
 /* ---- Texts ---- */
 
-static void test_bad (void **state) {
-  (void)state;
+TEST (bad) {
   static const struct {
     const char *text, *message;
   } bad[] = {
@@ -161,9 +155,4 @@ static void test_bad (void **state) {
   }
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_functionals), cmocka_unit_test (test_jump),
-                                      cmocka_unit_test (test_gradient),    cmocka_unit_test (test_bad),
-                                      cmocka_unit_test (test_small_jump),  cmocka_unit_test (test_fast) };
-  return cmocka_run_group_tests (tests, outcome_setup, outcome_teardown);
-}
+const check_fixture fixture = { outcome_setup, outcome_teardown };

@@ -109,9 +109,8 @@ static void stability_train (pw_model *m, const void *parameters) {
                                 .value = { PW_CONSTANT, { train.w } } });
 }
 
-static void test_trailers (void **state) {
+TEST (trailers) {
   static const double motion[][2] = { { 2, 0 }, { -2, 0 }, { 3, 0.5 }, { 3, 1e-3 }, { 0.02, 0.004 } };
-  (void)state;
   for (size_t k = 0; k < sizeof motion / sizeof *motion; k++)
     for (train.axle = WHEEL; train.axle <= LIGHT; train.axle++) {
       double L[3] = { 0.6, 0.8, 2.5 }, u = motion[k][0], w = motion[k][1], R = w != 0 ? u / w : 0;
@@ -132,8 +131,7 @@ static void test_trailers (void **state) {
 }
 
 /* Trailers of equal length, straight ahead: a defective eigenvalue, which round-off would split. */
-static void test_defective (void **state) {
-  (void)state;
+TEST (defective) {
   train.axle = WHEEL, train.u = 2, train.w = 0;
   for (int i = 0; i < 3; i++) train.L[i] = 2;
   pw_linear l = stability_of (stability_train);
@@ -158,8 +156,7 @@ static void stability_sleigh (pw_model *m, const void *parameters) {
   pw_add_wheel (m, &(pw_wheel){ .name = "blade", .body = "sleigh", .at = { -sleigh, 0 } });
 }
 
-static void test_sleigh (void **state) {
-  (void)state;
+TEST (sleigh) {
   for (int side = -1; side <= 1; side += 2) {
     sleigh = 0.2 * side;
     pw_linear l = stability_of (stability_sleigh);
@@ -185,10 +182,9 @@ static void stability_car (pw_model *m, const void *parameters) {
 
 /* Sideslip and yaw: the eigenvalues of a 2 x 2 matrix.  The tyre's regularising speed changes them by (1e-3 / v)^2 =
  * 4e-9. */
-static void test_car (void **state) {
+TEST (car) {
   double L = car_a + car_b, moment = car_C * (car_a - car_b);
   double critical = sqrt (car_C * car_C * L * L / (car_m * moment));
-  (void)state;
   for (int k = -1; k <= 1; k++) {
     double v = car_v = critical * (1 + 0.1 * k), a = -2 * car_C / (car_m * v), b = -moment / (car_m * v) - v;
     double c = -moment / (car_I * v), d = -car_C * (car_a * car_a + car_b * car_b) / (car_I * v);
@@ -257,7 +253,7 @@ static void stability_scene (pw_model *m, const void *parameters) {
         m, &(pw_torque){ .name = "torque", .body = { "body", "ground" }, .value = stability_torques[scene.torque] });
 }
 
-static void test_scenes (void **state) {
+TEST (scenes) {
   const double J = 2 + 2 * 0.49, g = 9.81;
   const struct {
     int pinned, gravity, spring, torque, drag;
@@ -282,7 +278,6 @@ static void test_scenes (void **state) {
     { .torque = 5, .phi = 0.3, .v = 2, .steady = PW_CHANGING, .symmetries = 3 },
     { .torque = 3, .phi = 0, .v = 1, .steady = PW_STEADY, .symmetries = 2, .square = -1 },
   };
-  (void)state;
   for (size_t i = 0; i < sizeof each / sizeof *each; i++) {
     scene.pinned = each[i].pinned, scene.gravity = each[i].gravity, scene.spring = each[i].spring;
     scene.torque = each[i].torque, scene.drag = each[i].drag;
@@ -321,11 +316,10 @@ static void stability_hinges (double disturbance, double out[2][5]) {
 
 /* Differences of runs with opposite perturbations satisfy d'' - s d' + p d = 0 over equal time intervals, with s
  * and p the sum and the product of both exponentials; permanent changes cancel in the differences (Prony 1795). */
-static void test_disturbed (void **state) {
+TEST (disturbed) {
   double up[2][5], down[2][5], d[2][4];
   pw_error error = { 0 };
   pw_linear l;
-  (void)state;
   stability_hinges (1e-4, up);
   stability_hinges (-1e-4, down);
   for (int i = 0; i < 2; i++)
@@ -344,12 +338,4 @@ static void test_disturbed (void **state) {
   pw_linear_free (&l);
   pw_run_close (r);
   pw_system_free (s);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_trailers), cmocka_unit_test (test_defective), cmocka_unit_test (test_sleigh),
-    cmocka_unit_test (test_car),      cmocka_unit_test (test_scenes),    cmocka_unit_test (test_disturbed),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -59,10 +59,9 @@ static void steady_expect (const pw_linear *l, double re, double im) {
 /* ---- Trailers ---- */
 
 /* From a turn of another radius and speed: R_i^2 = R_(i-1)^2 - L_i^2. */
-static void test_turn (void **state) {
+TEST (turn) {
   const double L[] = { 0.6, 0.8 };
   double R = 2, w = 1.5;
-  (void)state;
   steady t = { .s = gallery_open ("n-trailer", "w", 0.7, "R", 5., NULL), .set.vary = -1 };
   steady_hold (&t, "tractor.omega", w);
   steady_hold (&t, "tractor.radius", R);
@@ -82,8 +81,7 @@ static void test_turn (void **state) {
 }
 
 /* Straight ahead hinges decay at u / L_i, backwards they grow. */
-static void test_straight (void **state) {
-  (void)state;
+TEST (straight) {
   for (double u = -3; u < 4; u += 6) {
     steady t = { .s = gallery_open ("n-trailer", "R", 5., NULL), .set.vary = -1 };
     steady_hold (&t, "tractor.speed", u);
@@ -98,9 +96,8 @@ static void test_straight (void **state) {
 }
 
 /* Each trailer is stable or folded back: four motions, with 0, 1, 1, 2 growing modes. */
-static void test_folded (void **state) {
+TEST (folded) {
   int found[2][2] = { { 0 } };
-  (void)state;
   steady t = { .s = gallery_open ("n-trailer", NULL), .set.vary = -1 };
   steady_hold (&t, "tractor.speed", 2);
   steady_hold (&t, "tractor.radius", 2);
@@ -122,9 +119,8 @@ static void test_folded (void **state) {
 }
 
 /* Speed and turn rate are free: the nearest motion is that of the model, and both are suggested, with their values. */
-static void test_family (void **state) {
+TEST (family) {
   pw_initial_value more[4];
-  (void)state;
   steady t = { .s = gallery_open ("n-trailer", NULL), .set.vary = -1 };
   steady_open (&t);
   pw_steady_motion m = steady_solve (&t, 0, 0);
@@ -138,11 +134,10 @@ static void test_family (void **state) {
 }
 
 /* Derivatives of what is held: by the state against central differences, and by its value. */
-static void test_held (void **state) {
+TEST (held) {
   static const char *const names[] = { "trailer1.speed", "trailer1.radius", "trailer1.curvature", "trailer1.vx" };
   const double step = 1e-6;
   double dq[9], dv[9], r[3];
-  (void)state;
   steady t = { .s = gallery_open ("n-trailer", NULL), .set.vary = -1 };
   steady_open (&t);
   pw_steady *x = t.x;
@@ -163,9 +158,8 @@ static void test_held (void **state) {
 }
 
 /* Mirrored turns differ; displaced ones do not. */
-static void test_same (void **state) {
+TEST (same) {
   double q[9], v[9], other[9], turned[9], c = cos (1.2), s = sin (1.2);
-  (void)state;
   steady t = { .s = gallery_open ("n-trailer", NULL), .set.vary = -1 };
   steady_open (&t);
   pw_steady_motion m = steady_solve (&t, 0, 0);
@@ -186,9 +180,8 @@ static void test_same (void **state) {
 
 /* In a turn so slight that it is linear: u / (L + K u^2) per steering angle, with the understeer gradient
  * K = m (b Cr - a Cf) / (L Cf Cr). */
-static void test_understeer (void **state) {
+TEST (understeer) {
   double C = 8e4, a = 1.2, b = 1.4, L = a + b, u = 30, steer = 1e-5, K = 1000 * (b * C - a * C) / (L * C * C);
-  (void)state;
   steady t = { .s = gallery_open ("car-tyres", "steer", steer, "u", u, NULL), .set.vary = -1 };
   steady_open (&t);
   pw_steady_motion m = steady_solve (&t, 0, 0);
@@ -228,9 +221,8 @@ static branch_events steady_follow (steady *t, const pw_steady_motion *from, int
 }
 
 /* v sqrt (v^2 + s^2) = L^2 Cf Cr / (m (Cf a - Cr b)) = 52^2, with the tyre's speed constant s = 0.01 m/s. */
-static void test_critical_speed (void **state) {
+TEST (critical_speed) {
   double s2 = 1e-4, exact = sqrt ((sqrt (s2 * s2 + 4 * pow (52, 4)) - s2) / 2);
-  (void)state;
   steady t = { .s = car_at (NULL, 20, NULL), .set = { .vary = -1, .compile = car_at, .first = 20, .last = 60 } };
   steady_open (&t);
   pw_steady_motion m = steady_solve (&t, 0, 20);
@@ -288,10 +280,9 @@ static steady whirl_open (double *beta) {
 }
 
 /* Without the free angle: a pitchfork at W^2 = k / (m d l), after which the rod is stable on both sides. */
-static void test_pitchfork (void **state) {
+TEST (pitchfork) {
   double beta = 0;
   int sides = 0;
-  (void)state;
   steady t = whirl_open (&beta);
   pw_steady_motion m = steady_solve (&t, 0, 0.5);
   branch_events e = steady_follow (&t, &m, 1);
@@ -325,8 +316,7 @@ static pw_system *twins_at (void *context, double W, pw_error *error) {
 }
 
 /* Two changes between two points, of which there are few. */
-static void test_two_changes (void **state) {
-  (void)state;
+TEST (two_changes) {
   steady t = { .s = twins_at (NULL, 2, NULL),
                .set = { .vary = -1, .compile = twins_at, .first = 0.5, .last = 8, .points = 1 } };
   steady_open (&t);
@@ -341,10 +331,9 @@ static void test_two_changes (void **state) {
 
 /* With it: a branch that turns where tan theta = theta - beta.  AUTO-07p, on the equation above as two of first order,
  * has its limit point at W = 3.5200604503, theta = -0.631659. */
-static void test_fold (void **state) {
+TEST (fold) {
   double beta = 0.1, W, theta;
   pw_steady_motion m;
-  (void)state;
   steady t = whirl_open (&beta);
   for (int k = 1, unstable = 0; !unstable; k++) {
     m = steady_solve (&t, k, 8);
@@ -362,9 +351,8 @@ static void test_fold (void **state) {
 }
 
 /* Eigenvalues of a steady motion in closed form: (I + m l^2) mu^2 + c mu + k - m d l W^2 cos theta = 0. */
-static void test_whirl_eigenvalues (void **state) {
+TEST (whirl_eigenvalues) {
   double beta = 0.1, J = 0.1 + 2 * 0.09;
-  (void)state;
   steady t = whirl_open (&beta);
   pw_steady_motion m = steady_solve (&t, 0, 2.5);
   double theta = m.q[5] - m.q[2] - PW_PI, k = 3 - 0.3 * 6.25 * cos (theta);
@@ -425,9 +413,8 @@ static void caster_boundaries (double V[2]) {
   V[0] = -half - root, V[1] = -half + root;
 }
 
-static void test_shimmy (void **state) {
+TEST (shimmy) {
   double exact[2];
-  (void)state;
   caster_boundaries (exact);
   steady t = { .s = caster_at (NULL, 0.05, NULL),
                .set = { .vary = -1, .compile = caster_at, .first = 0.05, .last = 30, .points = 1 } };
@@ -457,9 +444,8 @@ static double caster_growth (double V, double frequency) {
 }
 
 /* On both sides of a boundary runs grow and decay at the rate of the eigenvalue. */
-static void test_shimmy_runs (void **state) {
+TEST (shimmy_runs) {
   double exact[2];
-  (void)state;
   caster_boundaries (exact);
   for (int i = 0; i < 4; i++) {
     double V = exact[1] * (i < 2 ? 0.85 + 0.1 * i : 0.85 + 0.1 * i);
@@ -477,10 +463,9 @@ static void test_shimmy_runs (void **state) {
 
 /* ---- Refusals ---- */
 
-static void test_refused (void **state) {
+TEST (refused) {
   pw_error error = { 0 };
   pw_steady_motion m;
-  (void)state;
   pw_system *s = gallery_open ("snakeboard", NULL);
   const pw_steady_settings set = { .vary = -1, .span = 10 };
   assert_null (pw_steady_open (s, &set, &error));
@@ -503,10 +488,9 @@ static pw_system *trailers_at (void *context, double n, pw_error *error) {
   return gallery_open ("n-trailer", "n", n, NULL);
 }
 
-static void test_bodies (void **state) {
+TEST (bodies) {
   pw_error error = { 0 };
   pw_steady_motion m;
-  (void)state;
   steady t = { .s = trailers_at (NULL, 2, NULL), .set = { .vary = -1, .compile = trailers_at, .first = 2, .last = 4 } };
   steady_open (&t);
   assert_int_equal (pw_steady_solve (t.x, 0, 3, &m, &error), PW_INPUT);
@@ -545,12 +529,11 @@ static const pw_plugin_table discs_table = { .abi = PW_ABI,
 
 /* A rotation of the whole about the axis less those of the discs displaces nothing and is no symmetry.  Symmetries: the
  * angle of each disc without a spring; x, y and the angle of a free disc. */
-static void test_concentric (void **state) {
+TEST (concentric) {
   static const struct {
     double count, pinned, k;
     int symmetries;
   } scene[] = { { 1, 1, 3, 0 }, { 1, 1, 0, 1 }, { 2, 1, 3, 1 }, { 2, 1, 0, 2 }, { 1, 0, 0, 3 } };
-  (void)state;
   for (size_t i = 0; i < sizeof scene / sizeof *scene; i++) {
     steady t = { .s = scene_system (&discs_table, "count", scene[i].count, "pinned", scene[i].pinned, "k", scene[i].k,
                                     NULL),
@@ -562,12 +545,11 @@ static void test_concentric (void **state) {
 }
 
 /* The result NULL of a failed call is refused by the next, and the first error stays. */
-static void test_missing (void **state) {
+TEST (missing) {
   pw_error error = { 0 };
   pw_steady_motion m;
   pw_linear l;
   pw_sample sample;
-  (void)state;
   assert_null (pw_steady_open (NULL, &(pw_steady_settings){ .vary = -1 }, &error));
   check_error (&error, PW_INPUT, "a system is missing");
   assert_int_equal (pw_steady_solve (NULL, 0, 0, &m, &error), PW_INPUT);
@@ -580,19 +562,4 @@ static void test_missing (void **state) {
   assert_int_equal (pw_variation_sample (NULL, 0, &sample, NULL, &error), PW_INPUT);
   assert_int_equal (pw_system_find_state (NULL, "x", &error), PW_INPUT);
   check_error (&error, PW_INPUT, "a system is missing");
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_turn),           cmocka_unit_test (test_straight),
-    cmocka_unit_test (test_folded),         cmocka_unit_test (test_family),
-    cmocka_unit_test (test_same),           cmocka_unit_test (test_understeer),
-    cmocka_unit_test (test_critical_speed), cmocka_unit_test (test_pitchfork),
-    cmocka_unit_test (test_fold),           cmocka_unit_test (test_whirl_eigenvalues),
-    cmocka_unit_test (test_shimmy),         cmocka_unit_test (test_shimmy_runs),
-    cmocka_unit_test (test_refused),        cmocka_unit_test (test_bodies),
-    cmocka_unit_test (test_concentric),     cmocka_unit_test (test_missing),
-    cmocka_unit_test (test_held),           cmocka_unit_test (test_two_changes),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -15,8 +15,7 @@ static double bench_evaluations (const char *scene, const char *method, const ch
 }
 
 /* Stability decides on an explicit method's steps, whatever the tolerance; an implicit one takes far fewer. */
-static void test_stiff (void **state) {
-  (void)state;
+TEST (stiff) {
   static const char *const scene[] = { "tyres", "steering", "bushings" };
   for (int i = 0; i < 3; i++) {
     double loose = bench_evaluations (scene[i], "erk5+projection", "1e-3"),
@@ -27,12 +26,8 @@ static void test_stiff (void **state) {
   }
 }
 
-static void test_scripts (void **state) {
-  (void)state;
+TEST (scripts) {
   cli_good ("for f in benchmarks/*.sh benchmarks/report/*.sh; do sh -n $f || exit 1; done");
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_stiff), cmocka_unit_test (test_scripts) };
-  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
-}
+const check_fixture fixture = { cli_setup, cli_teardown };

@@ -14,8 +14,7 @@ static const char *const limits_adaptive[] = { "erk5+projection", "erk8+projecti
 /* ---- Attempted steps ---- */
 
 /* The run ends after that many attempted steps, with a message; SUNDIALS finishes the step it is in. */
-static void test_max_steps (void **state) {
-  (void)state;
+TEST (max_steps) {
   for (const char *const *method = limits_adaptive; *method; method++) {
     pw_error error = { 0 };
     pw_system *s = scene_system (&scene_ezyroller, NULL);
@@ -31,9 +30,8 @@ static void test_max_steps (void **state) {
   }
 }
 
-static void test_max_steps_of_fixed_steps (void **state) {
+TEST (max_steps_of_fixed_steps) {
   static const char *const method[] = { "rk4+projection", "erk5+projection:steps=fixed", "galpha", "leapfrog" };
-  (void)state;
   for (int i = 0; i < 4; i++) {
     pw_system *s = scene_system (&scene_ezyroller, NULL);
     pw_run *r = runs_open (s, method[i], &(pw_settings){ .step = 0.01, .max_steps = 10 });
@@ -44,8 +42,7 @@ static void test_max_steps_of_fixed_steps (void **state) {
   }
 }
 
-static void test_bad_max_steps (void **state) {
-  (void)state;
+TEST (bad_max_steps) {
   pw_error error = { 0 };
   pw_system *s = scene_system (&scene_ezyroller, NULL);
   assert_null (pw_run_open (s, "erk5", &(pw_settings){ .max_steps = -1 }, &error));
@@ -62,9 +59,8 @@ static int limits_stop (void *context) {
 
 /* Wherever a run is stopped, it goes on when it is advanced again, and nothing but the last digits of a method that has
  * to start anew, or of steps that were tried with another size, shows it. */
-static void test_stop (void **state) {
+TEST (stop) {
   static const char *const one_step[] = { "rk4+projection", "galpha", "leapfrog", "erk8+projection", NULL };
-  (void)state;
   for (int k = 0; k < 2; k++)
     for (const char *const *method = k ? limits_adaptive : one_step; *method; method++)
       for (int stop = 1; stop < 400; stop = 2 * stop + 1) {
@@ -99,9 +95,8 @@ static int limits_asked (void *context) {
 }
 
 /* A sample inside a step is refused, the state reached is there. */
-static void test_stop_samples (void **state) {
+TEST (stop_samples) {
   char name[40];
-  (void)state;
   for (int i = 0; runs_method (i, name); i++) {
     int asked = 0;
     pw_sample sample;
@@ -126,8 +121,7 @@ static int limits_inside (void *context) {
   return ++*(int *)context > 1;
 }
 
-static void test_stop_inside (void **state) {
-  (void)state;
+TEST (stop_inside) {
   for (const char *const *method = limits_adaptive + 2; *method; method++) {
     int calls = 0;
     pw_error error = { 0 };
@@ -158,9 +152,8 @@ static const pw_plugin_table limits_table = { .abi = PW_ABI,
                                               .build = limits_rotor };
 
 /* T is 1 s: after t seconds the speed is t times its scale, and it grows with t. */
-static void test_growth (void **state) {
+TEST (growth) {
   static const char *const method[] = { "rk4+projection", "erk8+projection", "bdf+projection", NULL };
-  (void)state;
   for (const char *const *k = method; *k; k++)
     for (int spins = 0; spins < 2; spins++) {
       int which;
@@ -192,13 +185,12 @@ static void limits_swung (pw_model *m, const void *parameters) {
 }
 
 /* Growth is that since a mark at 8192 s or so, not that of the last step. */
-static void test_no_growth (void **state) {
+TEST (no_growth) {
   static const pw_plugin_table table = { .abi = PW_ABI,
                                          .size = sizeof (pw_plugin_table),
                                          .parameters = limits_list,
                                          .parameters_size = sizeof (double),
                                          .build = limits_swung };
-  (void)state;
   int which;
   const double omega = 3 * PW_PI / 8192, t = (6 * PW_PI + 2.2) / omega;
   double power;
@@ -211,8 +203,7 @@ static void test_no_growth (void **state) {
 }
 
 /* At 4.5e13 rad an angle is known to 0.01 rad. */
-static void test_beyond_numbers (void **state) {
-  (void)state;
+TEST (beyond_numbers) {
   pw_error error = { 0 };
   pw_system *s = scene_system (&limits_table, "torque", 0., NULL);
   pw_run *r = runs_open (s, "erk5+projection", &(pw_settings){ .span = 1 });
@@ -222,15 +213,4 @@ static void test_beyond_numbers (void **state) {
                pw_run_time (r) < 5 * 4.6e13 / 5000); /* a step grows fivefold at most */
   pw_run_close (r);
   pw_system_free (s);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_max_steps),     cmocka_unit_test (test_max_steps_of_fixed_steps),
-    cmocka_unit_test (test_bad_max_steps), cmocka_unit_test (test_stop),
-    cmocka_unit_test (test_stop_samples),  cmocka_unit_test (test_stop_inside),
-    cmocka_unit_test (test_growth),        cmocka_unit_test (test_no_growth),
-    cmocka_unit_test (test_beyond_numbers)
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

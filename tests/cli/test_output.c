@@ -20,8 +20,7 @@
 
 /* ---- One use of each file ---- */
 
-static void test_uses (void **state) {
-  (void)state;
+TEST (uses) {
   cli_good ("mkdir -p @/u/D && cd @/u && cp $OLDPWD/tests/models/signals.yaml m.yaml && : >none");
   cli_good ("cp models/car.yaml @/u/car.yaml; printf 't,M\\n0,1\\n1,2\\n' >@/u/M.csv");
   cli_write ("u/table.yaml", "pinwheel: 1\nbodies:\n  - {name: a, mass: 1, inertia: 1}\nelements:\n"
@@ -64,8 +63,7 @@ static void test_uses (void **state) {
 
 /* ---- Links ---- */
 
-static void test_links (void **state) {
-  (void)state;
+TEST (links) {
   cli_good (
       "mkdir -p @/k; cd @/k; mkdir sub; echo mine >mine; for f in a.csv a.json a.ck t.csv; do ln -s mine $f.part; "
       "done; "
@@ -113,8 +111,7 @@ static void output_locked (const char *lock, int flags, const char *command, con
   assert_string_equal (cli_out, "");
 }
 
-static void test_lock (void **state) {
-  (void)state;
+TEST (lock) {
 #define OUTPUT_OTHER ": another process is writing it"
   int file = O_RDWR | O_CREAT, folder = O_RDONLY | O_DIRECTORY;
   output_locked ("@/l/a.csv.part", file, "pinwheel run ezyroller -t 0.1 -o @/l/a.csv",
@@ -142,8 +139,7 @@ static void test_lock (void **state) {
 }
 
 /* A run keeps its files locked from its beginning to its end, its checkpoint between two of them. */
-static void test_keeps_lock (void **state) {
-  (void)state;
+TEST (keeps_lock) {
   cli_good ("rm -rf @/l; mkdir @/l");
   cli_run ("\"${PINWHEEL:-build/pinwheel}\" run ezyroller -t 1e6 --every 100 --json @/l/a.json --animate @/l/a.html "
            "--checkpoint @/l/a.ck --checkpoint-every 1 -o @/l/a.csv >@/log 2>&1 & p=$!\n"
@@ -159,16 +155,14 @@ static void test_keeps_lock (void **state) {
 }
 
 /* What a killed process has left under the temporary name is no part of the new file. */
-static void test_left_over (void **state) {
-  (void)state;
+TEST (left_over) {
   cli_good ("pinwheel run pendulum -t 0.1 --every 0.1 -o @/fresh.csv\n"
             "seq 10000 >@/left.csv.part; pinwheel run pendulum -t 0.1 --every 0.1 -o @/left.csv\n"
             "cmp @/left.csv @/fresh.csv");
 }
 
 /* A table that ends early, here for a limit on its size, ends with a whole line. */
-static void test_whole_lines (void **state) {
-  (void)state;
+TEST (whole_lines) {
   assert_int_equal (cli_run ("(ulimit -f 8; pinwheel run pendulum -t 10 --every 0.01 -o @/cut.csv)"), 1);
   cli_good ("tail -c 1 @/cut.csv.part | od -An -c | tr -d ' '; wc -l <@/cut.csv.part");
   assert_memory_equal (cli_out, "\\n\n", 3);
@@ -179,8 +173,7 @@ static void test_whole_lines (void **state) {
 }
 
 /* The other files of a run whose table is incomplete are incomplete too, and named. */
-static void test_kept (void **state) {
-  (void)state;
+TEST (kept) {
   assert_int_equal (
       cli_run ("(ulimit -f 400; pinwheel run ezyroller -t 5 -o @/k.csv --animate @/k.html --json @/k.json)"), 1);
   assert_non_null (strstr (cli_err, "the table so far is kept in "));
@@ -191,8 +184,7 @@ static void test_kept (void **state) {
 
 /* ---- Outputs that are not regular files ---- */
 
-static void test_direct (void **state) {
-  (void)state;
+TEST (direct) {
 #define OUTPUT_RUN "pinwheel run ezyroller -t 0.01 -o "
   for (const char *const *n = (const char *const[]){ "-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1", NULL }; *n;
        n++) {
@@ -224,10 +216,9 @@ static void test_direct (void **state) {
 
 /* ---- What is replaced ---- */
 
-static void test_mode (void **state) {
+TEST (mode) {
   struct stat info;
   char path[300];
-  (void)state;
   cli_expand ("@/mode.csv", path, sizeof path);
   for (int mode = 0600; mode <= 0664; mode += 064) {
     cli_good ("rm -f @/mode.csv; echo old >@/mode.csv");
@@ -242,8 +233,7 @@ static void test_mode (void **state) {
 }
 
 /* Of two outputs both are complete or none: the summary's folder goes away during the run. */
-static void test_together (void **state) {
-  (void)state;
+TEST (together) {
   cli_run ("mkdir -p @/t/sub; cd @/t; mkfifo go\n"
            "\"$OLDPWD/${PINWHEEL:-build/pinwheel}\" run ezyroller -t 20 -o a.csv --json sub/a.json >log 2>&1 & p=$!\n"
            "while kill -0 $! 2>/dev/null && [ ! -s a.csv.part ]; do sleep 0.01; done; rm -r sub; wait $p; echo $?; ls");
@@ -257,11 +247,10 @@ static void output_put (pw_output *o, const char *text) {
 
 /* A user who may give the new file the group of the old one, but not its owner, gets no program that runs as the
  * latter. */
-static void test_set_user (void **state) {
+TEST (set_user) {
   struct stat info;
   char path[300];
   int how;
-  (void)state;
   if (getuid () != 0) skip ();
   cli_good ("mkdir @/s && chmod 777 @/s && echo old >@/s/a && chown 12345:23456 @/s/a && chmod 6775 @/s/a");
   cli_expand ("@/s", path, sizeof path);
@@ -280,10 +269,9 @@ static void test_set_user (void **state) {
 }
 
 /* If the second of two outputs cannot be renamed, the first one's predecessor keeps its name. */
-static void test_predecessor (void **state) {
+TEST (predecessor) {
   char path[300];
   pw_output *o[3] = { NULL };
-  (void)state;
   for (int fails = 1; fails >= 0; fails--) {
     pw_error error = { 0 };
     cli_good ("rm -rf @/p; mkdir @/p; echo old >@/p/a; echo old >@/p/b; echo old >@/p/a.part.old");
@@ -300,8 +288,7 @@ static void test_predecessor (void **state) {
 
 /* ---- What is read ---- */
 
-static void test_types (void **state) {
-  (void)state;
+TEST (types) {
   cli_good ("rm -rf @/r; mkdir -p @/r/D; mkfifo @/r/pipe @/r/p.yaml; ln -s /dev/zero @/r/z.yaml; "
             ": >@/r/x.cpp");
 #define OUTPUT_PIPE ": it is a FIFO or pipe, not a regular file"
@@ -330,8 +317,7 @@ static void test_types (void **state) {
 
 /* Five megabytes that open brackets, in less memory than the 340 bytes that libfyaml keeps for each; as many entries
  * of a list that may be a key; a line without an end.  An address sanitizer needs more by itself. */
-static void test_bounded (void **state) {
-  (void)state;
+TEST (bounded) {
 #ifdef __SANITIZE_ADDRESS__
   skip ();
 #endif
@@ -398,8 +384,7 @@ static void output_forge (int number, double value) {
   assert_non_null (strstr (cli_err, "is not that of a run"));
 }
 
-static void test_forged (void **state) {
-  (void)state;
+TEST (forged) {
   output_forge (0, NAN);
   output_forge (0, -0.25);
   output_forge (0, 0.75);
@@ -412,11 +397,10 @@ static void test_forged (void **state) {
 }
 
 /* A checkpoint that cannot be written leaves nothing, and the message names nothing. */
-static void test_not_written (void **state) {
+TEST (not_written) {
   char path[300], head[6000];
   struct rlimit before;
   pw_error error = { 0 };
-  (void)state;
   cli_expand ("@/full.ck", path, sizeof path);
   memset (head, 'a', sizeof head - 1);
   head[sizeof head - 1] = 0;
@@ -433,8 +417,7 @@ static void test_not_written (void **state) {
 
 /* ---- The process ---- */
 
-static void test_process (void **state) {
-  (void)state;
+TEST (process) {
   cli_good ("POSIXLY_CORRECT=1 pinwheel run ezyroller -t 0.01 -o - | wc -l");
   assert_string_equal (cli_out, "12\n");
   cli_run (
@@ -465,10 +448,9 @@ static void output_terminal (const char *program, const char *command, const cha
   waitpid (child, &how, 0);
 }
 
-static void test_terminal (void **state) {
+TEST (terminal) {
   const char *program = getenv ("PINWHEEL");
   char path[300], text[10000];
-  (void)state;
   cli_expand ("@/odd\033[31m", path, sizeof path);
   assert_int_equal (mkdir (path, 0700), 0);
   strcat (path, "/x.yaml");
@@ -482,9 +464,8 @@ static void test_terminal (void **state) {
 }
 
 /* A test program that takes too long ends its children, says its name and fails (limit.c). */
-static void test_limit (void **state) {
+TEST (limit) {
   char text[500];
-  (void)state;
   snprintf (text, sizeof text, "LIMIT=1 %s @/child", program_invocation_name);
   assert_int_not_equal (cli_run (text), 0);
   assert_non_null (strstr (cli_out, "[  FAILED  ] test_output: takes longer than its time limit\n"));
@@ -492,16 +473,9 @@ static void test_limit (void **state) {
             "[ $n -lt 100 ]");
 }
 
+const check_fixture fixture = { cli_setup, cli_teardown };
+
 int main (int argc, char **argv) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_left_over),   cmocka_unit_test (test_whole_lines), cmocka_unit_test (test_kept),
-    cmocka_unit_test (test_uses),        cmocka_unit_test (test_links),       cmocka_unit_test (test_lock),
-    cmocka_unit_test (test_direct),      cmocka_unit_test (test_keeps_lock),  cmocka_unit_test (test_mode),
-    cmocka_unit_test (test_types),       cmocka_unit_test (test_together),    cmocka_unit_test (test_bounded),
-    cmocka_unit_test (test_process),     cmocka_unit_test (test_forged),      cmocka_unit_test (test_terminal),
-    cmocka_unit_test (test_limit),       cmocka_unit_test (test_not_written), cmocka_unit_test (test_set_user),
-    cmocka_unit_test (test_predecessor),
-  };
   if (argc > 1) return setenv ("CHILD", argv[1], 1) || system ("echo $$ >\"$CHILD\"; sleep 600");
-  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
+  return check_run ();
 }

@@ -71,8 +71,7 @@ static void terminal_bar (const char *model, const char *title, const char *t_en
   assert_true (wiped && message && message > wiped);
 }
 
-static void test_bar (void **state) {
-  (void)state;
+TEST (bar) {
   char path[300];
   terminal_bar ("ezyroller", "\rezyroller [", "3e4", " of 3e+04 s  ");  /* most of a minute */
   terminal_bar ("ezyroller", "\rezyroller [", "1e7", " of 1e+07 s  ");  /* hours */
@@ -84,8 +83,7 @@ static void test_bar (void **state) {
 }
 
 /* A model that never answers: the first two Ctrl-C ask it to stop, the third ends the program. */
-static void test_insist (void **state) {
-  (void)state;
+TEST (insist) {
   cli_write ("hang.c", "#include <stdio.h>\n#include <unistd.h>\n#include \"pinwheel.h\"\n"
                        "static int wait (void *c, double t, const double *x, double *u, double *g) {\n"
                        "  (void)c, (void)t, (void)x, (void)g;\n"
@@ -106,10 +104,4 @@ static void test_insist (void **state) {
   assert_string_equal (cli_out, "143\n");
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_bar),
-    cmocka_unit_test (test_insist),
-  };
-  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
-}
+const check_fixture fixture = { cli_setup, cli_teardown };

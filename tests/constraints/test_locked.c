@@ -33,7 +33,7 @@ static const pw_plugin_table locked_cart_table =
     TRIAL_TABLE_WITH (locked_build_cart, locked_cart_list, sizeof (locked_cart));
 
 /* The cart stays at rest under a torque. */
-static void test_locked (void **state) {
+TEST (locked) {
   static const char *const method[] = {
     "rk4+none",       "rk4+baumgarte", "rk4+projection", "rk4+projection:metric=identity",
     "ida+none",       "ida+baumgarte", "ida+ggl",        "ida+index2",
@@ -41,7 +41,6 @@ static void test_locked (void **state) {
     "bdf+projection", "rk4+nullspace", "galpha+index3",  "galpha+ggl",
     "leapfrog",       "radau+ggl",     "radau+index2",   "radau+index3"
   };
-  (void)state;
   for (int wheels = 3; wheels <= 4; wheels++)
     for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
       pw_system *s = scene_system (&locked_cart_table, "wheels", (double)wheels, NULL);
@@ -57,8 +56,7 @@ static void test_locked (void **state) {
     }
 }
 
-static void test_locked_with_velocity (void **state) {
-  (void)state;
+TEST (locked_with_velocity) {
   for (int wheels = 3; wheels <= 4; wheels++) {
     pw_error error = { 0 };
     pw_system *s = scene_system (&locked_cart_table, "wheels", (double)wheels, "speed", 1.5, NULL);
@@ -83,9 +81,8 @@ static void locked_spin (pw_model *m, const void *parameters) {
   pw_add_rolling_wheel (m, &(pw_rolling_wheel){ .name = "wheel", .body = "cart", .radius = 1, .rate = 1 });
 }
 
-static void test_spinning_wheel_locked (void **state) {
+TEST (spinning_wheel_locked) {
   static const pw_plugin_table table = TRIAL_TABLE (locked_spin);
-  (void)state;
   pw_error error = { 0 };
   pw_system *s = scene_system (&table, NULL);
   assert_null (pw_run_open (s, "rk4", NULL, &error));
@@ -102,9 +99,8 @@ static void locked_build_skidding (pw_model *m, const void *parameter) {
   pw_add_wheel (m, &(pw_wheel){ .name = "edge", .body = "skate" });
 }
 
-static void test_skidding (void **state) {
+TEST (skidding) {
   static const pw_plugin_table table = TRIAL_TABLE (locked_build_skidding);
-  (void)state;
   pw_system *s = scene_system (&table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", NULL);
   pw_sample x = runs_to (r, 1);
@@ -138,14 +134,13 @@ static void locked_build_steered (pw_model *m, const void *parameters) {
 }
 
 /* Wheels that lock during the motion stop the run with the name of a wheel. */
-static void test_locks_in_motion (void **state) {
+TEST (locks_in_motion) {
   static const pw_plugin_table table = TRIAL_TABLE (locked_build_steered);
   static const char *const method[] = { "rk4+projection", "rk4+baumgarte",  "rk4+none",      "ida+baumgarte",
                                         "ida+ggl",        "rk4+nullspace",  "galpha+index3", "galpha+ggl",
                                         "adams+none",     "ida+si1",        "ida+index2",    "adams+baumgarte",
                                         "bdf+baumgarte",  "bdf+projection", "leapfrog",      "radau+ggl",
                                         "radau+index2",   "radau+index3" };
-  (void)state;
   for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
     pw_error error = { 0 };
     pw_system *s = scene_system (&table, NULL);
@@ -174,9 +169,8 @@ static void locked_build_gap (pw_model *m, const void *parameters) {
   pw_add_weld (m, &(pw_weld){ .name = "joint", .body = { "left", "right" }, .at = { { 0.5, 0 }, { -0.5, 0 } } });
 }
 
-static void test_open_weld (void **state) {
+TEST (open_weld) {
   static const pw_plugin_table table = TRIAL_TABLE (locked_build_gap);
-  (void)state;
   pw_error error = { 0 };
   double open = 0;
   pw_system *s = scene_system (&table, NULL);
@@ -212,11 +206,10 @@ static void locked_build_drives (pw_model *m, const void *parameter) {
 static const pw_plugin_table locked_drives_table =
     TRIAL_TABLE_WITH (locked_build_drives, locked_offset_list, sizeof (locked_offset));
 
-static void test_contradictory_drives (void **state) {
+TEST (contradictory_drives) {
   static const char *const method[] = { "rk4+projection", "rk4+baumgarte",   "ida+ggl",    "ida+baumgarte",
                                         "rk4+nullspace",  "galpha+index3",   "galpha+ggl", "ida+si1",
                                         "bdf+projection", "adams+baumgarte", "leapfrog" };
-  (void)state;
   for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
     pw_error error = { 0 };
     pw_system *s = scene_system (&locked_drives_table, "offset", 0.1, NULL);
@@ -235,15 +228,4 @@ static void test_contradictory_drives (void **state) {
     if (r) pw_run_close (r);
     pw_system_free (s);
   }
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_locked),
-                                      cmocka_unit_test (test_locked_with_velocity),
-                                      cmocka_unit_test (test_skidding),
-                                      cmocka_unit_test (test_spinning_wheel_locked),
-                                      cmocka_unit_test (test_locks_in_motion),
-                                      cmocka_unit_test (test_open_weld),
-                                      cmocka_unit_test (test_contradictory_drives) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -13,8 +13,7 @@
 
 /* ---- Given values are kept ---- */
 
-static void test_given_values_kept (void **state) {
-  (void)state;
+TEST (given_values_kept) {
   static const char *const name[] = { "frame.phi", "steer.phi", "frame.vx", NULL };
   static const double value[] = { 0.3, 2, 1.5 };
   pw_system *s;
@@ -31,8 +30,7 @@ static void test_given_values_kept (void **state) {
 }
 
 /* All states of the frame are given; they satisfy the row of wheel A, which has no other coordinates. */
-static void test_given_body_kept (void **state) {
-  (void)state;
+TEST (given_body_kept) {
   static const char *const name[] = { "frame.x",  "frame.y",     "frame.phi", "frame.vx",
                                       "frame.vy", "frame.omega", "steer.phi", NULL };
   static const double value[] = { 1, 2, 0, 1, 0.1, 0.2, PW_PI / 2 };
@@ -66,12 +64,11 @@ static void start_chain (pw_model *m, const void *parameters) {
 
 /* Given values are kept if they satisfy a constraint without other coordinates, in scenes of any size: all coordinates
  * of a body pinned to the ground, both angles of a gear. */
-static void test_given_satisfied_rows (void **state) {
+TEST (given_satisfied_rows) {
   static const char *const name[] = { "link0.x", "link0.y", "link0.phi", "link2.phi" };
   static const double value[] = { 0.5, 0, 0, 0 };
   static const pw_parameter list[] = { { .name = "links", .value = 3 }, { .name = NULL } };
   static const pw_plugin_table table = TRIAL_TABLE_WITH (start_chain, list, sizeof (double));
-  (void)state;
   for (int links = 3; links <= 16; links++) {
     pw_error error = { 0 };
     pw_model *m = scene_model (&table, "links", (double)links, NULL);
@@ -106,12 +103,11 @@ static void start_arms (pw_model *m, const void *parameters) {
   }
 }
 
-static void test_given_centre_kept (void **state) {
+TEST (given_centre_kept) {
   static const char *const name[] = { "disc0.x", "disc0.y", "disc0.vx", "disc0.vy" };
   static const double value[] = { 0.6, 0.8, -0.8, 0.6 };
   static const pw_parameter list[] = { { .name = "arms", .value = 1 }, { .name = NULL } };
   static const pw_plugin_table table = TRIAL_TABLE_WITH (start_arms, list, sizeof (double));
-  (void)state;
   for (int arms = 1; arms <= 40; arms += 13) {
     pw_error error = { 0 };
     pw_model *m = scene_model (&table, "arms", (double)arms, NULL);
@@ -128,8 +124,7 @@ static void test_given_centre_kept (void **state) {
 }
 
 /* A given angle of the massless steering assembly does not change the frame. */
-static void test_massive_body_kept (void **state) {
-  (void)state;
+TEST (massive_body_kept) {
   static const char *const name[] = { "steer.phi", NULL };
   static const double value[] = { 2 };
   pw_system *s;
@@ -152,9 +147,8 @@ static void start_slipping (pw_model *m, const void *parameters) {
   pw_add_wheel (m, &(pw_wheel){ .name = "C", .body = "steer" });
 }
 
-static void test_velocities_change (void **state) {
+TEST (velocities_change) {
   static const pw_plugin_table table = TRIAL_TABLE (start_slipping);
-  (void)state;
   pw_system *s = scene_system (&table, NULL);
   pw_run *r = runs_open (s, "rk4", NULL);
   const pw_initial_report *start = pw_run_initial (r);
@@ -165,8 +159,7 @@ static void test_velocities_change (void **state) {
 }
 
 /* If given positions are released, given velocities are kept. */
-static void test_velocities_kept (void **state) {
-  (void)state;
+TEST (velocities_kept) {
   static const char *const name[] = { "frame.x", "steer.x", "steer.vy", NULL };
   static const double value[] = { 0, 5.375, 5 };
   pw_system *s;
@@ -178,8 +171,7 @@ static void test_velocities_kept (void **state) {
 }
 
 /* Given values that contradict each other are all released. */
-static void test_released (void **state) {
-  (void)state;
+TEST (released) {
   static const char *const name[] = { "frame.x", "frame.y", "frame.phi", "steer.x", NULL };
   static const double value[] = { 0, 0, 0, 3 };
   pw_system *s;
@@ -202,8 +194,7 @@ static void start_massive (pw_model *m, const void *parameters) {
   pw_add_wheel (m, &(pw_wheel){ .name = "A", .body = "frame", .at = { -0.5, 0 } });
 }
 
-static void test_least_change (void **state) {
-  (void)state;
+TEST (least_change) {
   static const pw_parameter list[] = { { .name = "vx" },
                                        { .name = "omega", .offset = sizeof (double) },
                                        { .name = NULL } };
@@ -241,8 +232,7 @@ static void start_driven (pw_model *m, const void *parameters) {
                         .angle = { PW_HARMONIC, .harmonic = { .amplitude = 0.5, .omega = 2, .phase = 1 } } });
 }
 
-static void test_driven_constraint (void **state) {
-  (void)state;
+TEST (driven_constraint) {
   static const pw_plugin_table table = TRIAL_TABLE (start_driven);
   pw_system *s = scene_system (&table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .t = 3, .span = 1 });
@@ -293,8 +283,7 @@ static void start_expect_error (void (*build) (pw_model *, const void *), const 
   pw_system_free (s);
 }
 
-static void test_inconsistent (void **state) {
-  (void)state;
+TEST (inconsistent) {
   start_expect_error (start_too_far,
                       "model scene: the initial state cannot be made consistent: pin left is open by 1 m; if it "
                       "can close, begin nearer to where it does");
@@ -303,16 +292,4 @@ static void test_inconsistent (void **state) {
       "model scene: the initial state cannot be made consistent: drive other is violated by 1.26221 rad/s");
   start_expect_error (start_speeds,
                       "model scene: the initial state cannot be made consistent: speed two is violated by 2 m/s");
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_given_values_kept),    cmocka_unit_test (test_given_body_kept),
-    cmocka_unit_test (test_given_satisfied_rows), cmocka_unit_test (test_released),
-    cmocka_unit_test (test_given_centre_kept),    cmocka_unit_test (test_massive_body_kept),
-    cmocka_unit_test (test_velocities_change),    cmocka_unit_test (test_velocities_kept),
-    cmocka_unit_test (test_least_change),         cmocka_unit_test (test_driven_constraint),
-    cmocka_unit_test (test_inconsistent),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

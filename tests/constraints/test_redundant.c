@@ -38,16 +38,14 @@ static const char *const redundant_cranks[] = { "coupler.x",    "coupler.y",    
                                                 "crank1.phi",   "crank2.phi",   "crank3.phi",
                                                 "crank1.omega", "crank3.omega", NULL };
 
-static void test_parallelogram_twins (void **state) {
-  (void)state;
+TEST (parallelogram_twins) {
   redundant_twins (&redundant_parallelogram, &redundant_slotted_table, 1, 1e-3, redundant_cranks);
 }
 
 /* The initial angle of one crank differs from the others: where constraints are violated, all rows are independent. */
-static void test_parallelogram_start (void **state) {
+TEST (parallelogram_start) {
   static const char *const crank[] = { "crank1.phi", "crank2.phi", "crank3.phi" };
   static const double off[] = { 1e-5, 1e-3, 0.1, 0.4, 0.6, 1.0 };
-  (void)state;
   for (int i = 0; i < 3; i++)
     for (int k = 0; k < 6; k++) {
       pw_error error = { 0 };
@@ -101,10 +99,9 @@ static void redundant_drives (pw_model *m, const void *parameter) {
 
 static const pw_plugin_table redundant_drives_table = TRIAL_TABLE (redundant_drives);
 
-static void test_drives (void **state) {
+TEST (drives) {
   static const char *const method[] = { "rk4+projection", "erk8+projection", "ida+ggl", "bdf+projection",
                                         "galpha+ggl" };
-  (void)state;
   for (int i = 0; i < 5; i++) {
     pw_system *s = scene_system (&redundant_drives_table, NULL);
     pw_run *r = runs_open (s, method[i], &(pw_settings){ .rtol = 1e-8, .step = 1e-3, .span = 1, .ledger = 1 });
@@ -116,8 +113,7 @@ static void test_drives (void **state) {
   }
 }
 
-static void test_axle (void **state) {
-  (void)state;
+TEST (axle) {
   static const char *const name[] = { "frame.x",     "frame.y", "frame.phi", "fork.phi",   "frame.vx", "frame.vy",
                                       "frame.omega", "fork.vx", "fork.vy",   "fork.omega", NULL };
   redundant_twins (&redundant_three_table, &redundant_two_table, 3, 1e-3, name);
@@ -125,8 +121,7 @@ static void test_axle (void **state) {
 }
 
 /* Two wheels on one axle have half of the reaction of a single one each. */
-static void test_axle_forces (void **state) {
-  (void)state;
+TEST (axle_forces) {
   pw_system *s = scene_system (&redundant_three_table, NULL), *twin = scene_system (&redundant_two_table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", NULL), *one = runs_open (twin, "rk4+projection", NULL);
   for (int i = 1; i <= 4; i++) {
@@ -168,8 +163,7 @@ static void redundant_frame (pw_model *m, int pins) {
 REDUNDANT_SCENE (redundant_bolted, redundant_frame (m, 2));
 REDUNDANT_SCENE (redundant_welded, redundant_frame (m, 0));
 
-static void test_frame (void **state) {
-  (void)state;
+TEST (frame) {
   static const char *const name[] = {
     "left.phi", "right.phi", "right.x", "right.y", "left.omega", "right.omega", NULL
   };
@@ -191,8 +185,7 @@ static void redundant_plate (pw_model *m, const void *parameter) {
 
 static const pw_plugin_table redundant_plate_table = TRIAL_TABLE (redundant_plate);
 
-static void test_names (void **state) {
-  (void)state;
+TEST (names) {
   static const char *const corner[] = { "pins A and B: the same x constraint",
                                         "pin B (B.Fy) follows from pin A, drive D", NULL };
   static const char *const axle[] = { "wheels rear_left and rear_right: the same lateral constraint", NULL };
@@ -224,8 +217,7 @@ static void redundant_oblique_drive (pw_model *m, const void *parameter) {
   pw_add_wheel (m, &(pw_wheel){ .name = "edge", .body = "disc", .heading = 0.005 });
 }
 
-static void test_kept (void **state) {
-  (void)state;
+TEST (kept) {
   static const pw_plugin_table fixed = TRIAL_TABLE (redundant_fixed_disc),
                                oblique = TRIAL_TABLE (redundant_oblique_drive);
   static const char *const of_fixed[] = { "wheel edge (edge.N) follows from drive across, rod rod", NULL };
@@ -244,8 +236,7 @@ static void redundant_hung (pw_model *m, const void *parameter) {
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -10 } });
 }
 
-static void test_moments (void **state) {
-  (void)state;
+TEST (moments) {
   static const pw_plugin_table hung = TRIAL_TABLE (redundant_hung);
   pw_system *s = scene_system (&hung, NULL);
   pw_run *r = runs_open (s, "rk4+projection", NULL);
@@ -269,10 +260,9 @@ static void redundant_two_pins (pw_model *m, const void *parameter) {
 }
 
 /* After a restart with this line turned by 90 degrees other equations are redundant. */
-static void test_restart (void **state) {
+TEST (restart) {
   static const pw_plugin_table pins = TRIAL_TABLE (redundant_two_pins);
   static const double turned[] = { 0, 0, PW_PI / 2, 0, 0, PW_PI / 2 };
-  (void)state;
   char method[40];
   pw_system *s = scene_system (&pins, NULL);
   for (int i = 0; runs_method (i, method); i++) {
@@ -285,18 +275,4 @@ static void test_restart (void **state) {
     pw_run_close (r);
   }
   pw_system_free (s);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_parallelogram_twins),
-                                      cmocka_unit_test (test_parallelogram_start),
-                                      cmocka_unit_test (test_drives),
-                                      cmocka_unit_test (test_axle),
-                                      cmocka_unit_test (test_axle_forces),
-                                      cmocka_unit_test (test_frame),
-                                      cmocka_unit_test (test_names),
-                                      cmocka_unit_test (test_kept),
-                                      cmocka_unit_test (test_moments),
-                                      cmocka_unit_test (test_restart) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

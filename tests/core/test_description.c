@@ -38,8 +38,7 @@ static void description_build (pw_model *m, const void *parameters) {
 static const pw_plugin_table description_table =
     TRIAL_TABLE_WITH (description_build, description_list, sizeof (description_parameters));
 
-static void test_parameters (void **state) {
-  (void)state;
+TEST (parameters) {
   pw_system *s = scene_system (&description_table, NULL);
   assert_true (s->q0[0] == 2 && s->mass[0] == 3); /* the defaults */
   pw_system_free (s);
@@ -57,8 +56,7 @@ static void description_not_set (const char *name, double value, const char *tex
   pw_model_free (m);
 }
 
-static void test_bad_parameters (void **state) {
-  (void)state;
+TEST (bad_parameters) {
   description_not_set ("lenght", 1, "model cart has no parameter \"lenght\"; did you mean \"length\"?");
   description_not_set ("length", NAN, "model cart: parameter length = nan: expected a finite number");
   description_not_set ("length", INFINITY, "model cart: parameter length = inf: expected a finite number");
@@ -67,8 +65,7 @@ static void test_bad_parameters (void **state) {
   description_not_set ("links", 1.5, "model cart: parameter links = 1.5: expected a whole number >= 1");
 }
 
-static void test_no_parameters (void **state) {
-  (void)state;
+TEST (no_parameters) {
   pw_plugin_table table = TRIAL_TABLE (description_build);
   pw_error error = { 0 };
   pw_model *m = pw_model_new ("cart", &table, &error);
@@ -77,8 +74,7 @@ static void test_no_parameters (void **state) {
   pw_model_free (m);
 }
 
-static void test_refused (void **state) {
-  (void)state;
+TEST (refused) {
   pw_error error = { 0 };
   pw_model *m = pw_model_new ("cart", &description_table, &error);
   check_ok (pw_model_set (m, "links", 7, &error), &error);
@@ -87,8 +83,7 @@ static void test_refused (void **state) {
   pw_model_free (m);
 }
 
-static void test_bad_tables (void **state) {
-  (void)state;
+TEST (bad_tables) {
   pw_error error = { 0 };
   pw_plugin_table table = description_table;
   char text[200];
@@ -106,8 +101,7 @@ static void test_bad_tables (void **state) {
   check_error (&error, PW_INPUT, "model cart has no build function: PW_MODEL (...) at its end must set .build");
 }
 
-static void test_order_of_calls (void **state) {
-  (void)state;
+TEST (order_of_calls) {
   pw_error error = { 0 };
   pw_model *m = pw_model_new ("cart", &description_table, &error);
   assert_null (pw_system_compile (m, &error));
@@ -123,8 +117,7 @@ static void test_order_of_calls (void **state) {
 }
 
 /* NULL, the result of a failed call, is an error of every function that takes it. */
-static void test_missing (void **state) {
-  (void)state;
+TEST (missing) {
   pw_error e[] = { { 0 }, { 0 }, { 0 }, { 0 }, { 0 }, { 0 } };
   assert_int_equal (pw_model_set (NULL, "length", 1, &e[0]), PW_INPUT);
   assert_int_equal (pw_model_build (NULL, &e[1]), PW_INPUT);
@@ -138,8 +131,7 @@ static void test_missing (void **state) {
   check_error (&e[5], PW_INPUT, "a model file is missing");
 }
 
-static void test_missing_system (void **state) {
-  (void)state;
+TEST (missing_system) {
   pw_error e[6] = { { 0 } };
   double q[3] = { 0 };
   pw_equations equations;
@@ -169,8 +161,7 @@ static void description_add_no_pin (pw_model *m, const void *parameters) {
   pw_add_pin (m, NULL);
 }
 
-static void test_missing_definitions (void **state) {
-  (void)state;
+TEST (missing_definitions) {
   static void (*const build[]) (pw_model * m, const void *parameters) = { description_add_no_body,
                                                                           description_add_no_pin };
   static const char *const text[] = { "model cart: pw_add_body without a body",
@@ -195,16 +186,14 @@ static void description_no_signal (const char *element, const char *field, const
   pw_model_free (m);
 }
 
-static void test_bad_set_signal (void **state) {
-  (void)state;
+TEST (bad_set_signal) {
   description_no_signal ("ridder", "value", "model ezyroller has no element \"ridder\"; did you mean \"rider\"?");
   description_no_signal ("rider", "values",
                          "model ezyroller: torque rider has no signal \"values\"; did you mean \"value\"?");
   description_no_signal ("A", "value", "model ezyroller: wheel A has no signal \"value\"");
 }
 
-static void test_initial (void **state) {
-  (void)state;
+TEST (initial) {
   pw_error error = { 0 };
   pw_model *m = scene_model (&scene_ezyroller, NULL);
   check_ok (pw_model_set_initial (m, "frame.phi", 0.5, &error), &error);
@@ -217,8 +206,7 @@ static void test_initial (void **state) {
   pw_system_free (s);
 }
 
-static void test_bad_initial (void **state) {
-  (void)state;
+TEST (bad_initial) {
   pw_error error = { 0 };
   pw_model *m = scene_model (&scene_ezyroller, NULL);
   assert_int_equal (pw_model_set_initial (m, "frame.phi", NAN, &error), PW_INPUT);
@@ -230,8 +218,7 @@ static void test_bad_initial (void **state) {
 
 /* ---- Names and sizes in the compiled system ---- */
 
-static void test_query (void **state) {
-  (void)state;
+TEST (query) {
   pw_system *s = scene_system (&scene_ezyroller, NULL);
   char text[100];
   assert_int_equal (pw_system_bodies (s), 2);
@@ -267,8 +254,7 @@ static void description_no_state (const pw_system *s, const char *name, const ch
   check_error (&error, PW_INPUT, text);
 }
 
-static void test_bad_query (void **state) {
-  (void)state;
+TEST (bad_query) {
   pw_system *s = scene_system (&scene_ezyroller, NULL);
   description_no_state (s, "steer.omga", "model ezyroller has no state \"steer.omga\"; did you mean \"steer.omega\"?");
   description_no_state (s, "ster.phi", "model ezyroller has no state \"ster.phi\"; did you mean \"steer.phi\"?");
@@ -277,8 +263,7 @@ static void test_bad_query (void **state) {
 }
 
 /* Names of internal coordinates and losses of elements. */
-static void test_internal_coordinates (void **state) {
-  (void)state;
+TEST (internal_coordinates) {
   pw_model *m = scene_model (&description_table, NULL);
   pw_add (m, &toy_kind_roller,
           &(toy_roller){ .name = "left", .body = "frame", .at = { 0, 1 }, .radius = 0.1, .inertia = 0.2 });
@@ -311,8 +296,7 @@ static int description_spin (void *context, double t, const double *x, double va
 }
 
 /* The description may be changed after it has been handed over: the model keeps copies. */
-static void test_copies (void **state) {
-  (void)state;
+TEST (copies) {
   char body[] = "cart", name[] = "W", read[] = "cart.omega";
   const char *reads[] = { read, NULL };
   pw_model *m = scene_model (&description_table, NULL);
@@ -334,8 +318,7 @@ static void test_copies (void **state) {
 }
 
 /* Reactions are found by their names. */
-static void test_find_reaction (void **state) {
-  (void)state;
+TEST (find_reaction) {
   pw_system *s = scene_system (&scene_ezyroller, NULL);
   char name[40];
   for (int row = 0; row < pw_system_rows (s); row++)
@@ -347,19 +330,4 @@ static void test_find_reaction (void **state) {
   assert_int_equal (pw_system_find_reaction (s, NULL, &error), PW_INPUT);
   check_error (&error, PW_INPUT, "model ezyroller: the name of a reaction is missing");
   pw_system_free (s);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_parameters),          cmocka_unit_test (test_bad_parameters),
-    cmocka_unit_test (test_no_parameters),       cmocka_unit_test (test_refused),
-    cmocka_unit_test (test_bad_tables),          cmocka_unit_test (test_order_of_calls),
-    cmocka_unit_test (test_bad_set_signal),      cmocka_unit_test (test_initial),
-    cmocka_unit_test (test_bad_initial),         cmocka_unit_test (test_query),
-    cmocka_unit_test (test_bad_query),           cmocka_unit_test (test_internal_coordinates),
-    cmocka_unit_test (test_find_reaction),       cmocka_unit_test (test_copies),
-    cmocka_unit_test (test_missing_system),      cmocka_unit_test (test_missing),
-    cmocka_unit_test (test_missing_definitions),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -35,8 +35,7 @@ static void locale_write (const char *model, const char *name) {
   runs_close (r, s);
 }
 
-static void test_comma (void **state) {
-  (void)state;
+TEST (comma) {
   static const char *const model[] = { "tests/models/arm.yaml", "tests/models/ezyroller.yaml", "models/chain.c" };
   if (cli_run ("localedef -i de_DE -f UTF-8 @/de_DE.UTF-8") != 0) skip ();
   for (size_t i = 0; i < sizeof model / sizeof *model; i++) {
@@ -52,7 +51,4 @@ static void test_comma (void **state) {
   }
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_comma) };
-  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
-}
+const check_fixture fixture = { cli_setup, cli_teardown };

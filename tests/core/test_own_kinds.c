@@ -48,8 +48,7 @@ static void own_planet (double t, double p[2]) {
 }
 
 /* With the speed of a planet the bead moves like one, without a force on the wire. */
-static void test_planet (void **state) {
-  (void)state;
+TEST (planet) {
   own x = own_open (1);
   pw_run *r = runs_open (x.s, "rk4+projection", &(pw_settings){ .step = 1e-3, .ledger = 1 });
   for (int t = 1; t <= 10; t++) {
@@ -69,8 +68,7 @@ static void test_planet (void **state) {
 
 /* A faster bead presses on the wire with m (v^2 - v_p^2) / rho, v_p the speed of a planet; v^2 - v_p^2 is constant, and
  * (1.2^2 - 1) 2^2 at perihelion. */
-static void test_faster (void **state) {
-  (void)state;
+TEST (faster) {
   own x = own_open (1.2);
   pw_run *r = runs_open (x.s, "rk4+projection", &(pw_settings){ .step = 1e-3 });
   for (int t = 1; t <= 10; t++) {
@@ -86,8 +84,7 @@ static void test_faster (void **state) {
 
 /* ---- Every method ---- */
 
-static void test_methods (void **state) {
-  (void)state;
+TEST (methods) {
   double p[2];
   own_planet (2, p);
   char method[40];
@@ -185,8 +182,7 @@ static void guide_build (pw_model *m, const void *parameters) {
 static const pw_plugin_table guide_table = TRIAL_TABLE (guide_build);
 
 /* Methods with Newton's iteration have its complete matrix: few steps are rejected. */
-static void test_guide (void **state) {
-  (void)state;
+TEST (guide) {
   char method[40];
   for (int i = 0; runs_method (i, method); i++) {
     pw_system *s = scene_system (&guide_table, NULL);
@@ -208,8 +204,7 @@ static void slotted_build (pw_model *m, const void *parameters) {
 static const pw_plugin_table slotted_table = TRIAL_TABLE (slotted_build);
 
 /* A guide connects its body to the ground: together with another such element it can be redundant. */
-static void test_redundant_guide (void **state) {
-  (void)state;
+TEST (redundant_guide) {
   pw_system *s = scene_system (&slotted_table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 2 });
   assert_int_equal (pw_run_redundant (r), 1);
@@ -221,9 +216,8 @@ static void test_redundant_guide (void **state) {
 /* ---- The program ---- */
 
 /* One notice, by every method. */
-static void test_notice (void **state) {
+TEST (notice) {
   static const char *const method[] = { "rk4+projection", "erk8+projection", "ida+ggl" };
-  (void)state;
   for (int i = 0; i < 3; i++) {
     char line[200];
     snprintf (line, sizeof line, "pinwheel run elliptic-wire --t-end 0.5 -m %s --json @/wire.json", method[i]);
@@ -235,8 +229,7 @@ static void test_notice (void **state) {
   assert_non_null (strstr (cli_file ("none.json"), "\"differences\": []"));
 }
 
-static void test_show (void **state) {
-  (void)state;
+TEST (show) {
   cli_good ("pinwheel show elliptic-wire");
   assert_non_null (strstr (cli_out, "attraction sun: body [bead, ground]; strength 1 N m^2"));
   assert_non_null (strstr (cli_out, "Derivatives by differences"));
@@ -252,8 +245,7 @@ static void test_show (void **state) {
 }
 
 /* A force that is an expression of states has exact derivatives. */
-static void test_expression (void **state) {
-  (void)state;
+TEST (expression) {
   cli_write ("follow.yaml", "pinwheel: 1\nbodies:\n  - {name: arm, mass: 1, inertia: 1}\nelements:\n"
                             "  - {torque: T, body: [arm, ground], value: -3*arm.phi}\n"
                             "  - {torque: U, body: [arm, ground], value: sin(t)}\n");
@@ -264,8 +256,7 @@ static void test_expression (void **state) {
 
 /* ---- The self-test ---- */
 
-static void test_selftest (void **state) {
-  (void)state;
+TEST (selftest) {
   own x = own_open (1);
   assert_int_equal (x.s->batches, 2);
   for (int i = 0; i < 2; i++) {
@@ -283,11 +274,4 @@ static void test_selftest (void **state) {
   assert_non_null (strstr (cli_out, "attraction (1 element)"));
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_planet),  cmocka_unit_test (test_faster),
-                                      cmocka_unit_test (test_methods), cmocka_unit_test (test_notice),
-                                      cmocka_unit_test (test_show),    cmocka_unit_test (test_expression),
-                                      cmocka_unit_test (test_guide),   cmocka_unit_test (test_redundant_guide),
-                                      cmocka_unit_test (test_selftest) };
-  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
-}
+const check_fixture fixture = { cli_setup, cli_teardown };

@@ -45,8 +45,7 @@ static void queries_close (queries *k) {
 
 /* M a = sum of the forces of all elements, for each body (Newton, Euler): reactions and applied forces, independently
  * of the solver's sums. */
-static void test_forces (void **state) {
-  (void)state;
+TEST (forces) {
   for (int i = 0; i < SCENES; i++) {
     queries k = queries_open (queries_scene[i]);
     int bodies = pw_system_bodies (k.s);
@@ -70,8 +69,7 @@ static void test_forces (void **state) {
 }
 
 /* M a + J^T lambda = f and J a = gamma at a sample; J v = eta and g = 0 after projection. */
-static void test_equations (void **state) {
-  (void)state;
+TEST (equations) {
   for (int i = 0; i < SCENES; i++) {
     queries k = queries_open (queries_scene[i]);
     pw_equations e;
@@ -100,8 +98,7 @@ static void test_equations (void **state) {
 }
 
 /* Elements are those of the model, in the order of their rows; a reaction's name begins with its element's. */
-static void test_elements (void **state) {
-  (void)state;
+TEST (elements) {
   for (int i = 0; i < SCENES; i++) {
     queries k = queries_open (queries_scene[i]);
     int rows = 0, contacts = 0, described, found = 0, bodies;
@@ -138,9 +135,8 @@ static void test_elements (void **state) {
 }
 
 /* Contact points are displaced with their bodies and keep their headings. */
-static void test_contacts (void **state) {
+TEST (contacts) {
   static const double at[2] = { 0.3, -0.2 };
-  (void)state;
   pw_error error = { 0 };
   queries k = queries_open ("ezyroller");
   double out[4][3], *q = malloc ((size_t)pw_system_coordinates (k.s) * sizeof *q);
@@ -156,10 +152,4 @@ static void test_contacts (void **state) {
   }
   free (q);
   queries_close (&k);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_forces), cmocka_unit_test (test_equations),
-                                      cmocka_unit_test (test_elements), cmocka_unit_test (test_contacts) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

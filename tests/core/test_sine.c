@@ -72,8 +72,7 @@ static double sine_angle (uint64_t *state) {
   return (*state >> 63 ? -1e6 : 1e6) * part * (double)(*state >> 40 & 0xff) / (double)(1u << (*state >> 50 & 0x1f));
 }
 
-static void test_table (void **unused) {
-  (void)unused;
+TEST (table) {
   for (size_t i = 0; i < sizeof sine_table / sizeof *sine_table; i++) {
     double s, c;
     pw_sin_cos (sine_table[i].x, &s, &c);
@@ -82,8 +81,7 @@ static void test_table (void **unused) {
   }
 }
 
-static void test_random (void **unused) {
-  (void)unused;
+TEST (random) {
   uint64_t state = 1, hash = 14695981039346656037u; /* FNV-1a of all bits */
   for (int i = 0; i < SINE_RANDOM; i++) {
     double x = fmod (sine_angle (&state), 1e6), value[2];
@@ -102,8 +100,7 @@ static void test_random (void **unused) {
 }
 
 /* Every lane of the vectorised function gives the bits of pw_sin_cos. */
-static void test_lanes (void **unused) {
-  (void)unused;
+TEST (lanes) {
   uint64_t state = 2;
   for (int i = 0; i < 1000; i++) {
     pw_lanes x, s, c;
@@ -117,8 +114,7 @@ static void test_lanes (void **unused) {
   }
 }
 
-static void test_special (void **unused) {
-  (void)unused;
+TEST (special) {
   const double beyond[] = { 1e6, -1e6, 1234567.5, 1e22, 1.7e308 };
   for (size_t i = 0; i < sizeof beyond / sizeof *beyond; i++) {
     assert_true (pw_sin (beyond[i]) == sin (beyond[i]));
@@ -127,10 +123,4 @@ static void test_special (void **unused) {
   assert_true (isnan (pw_sin (NAN)) && isnan (pw_cos (NAN)) && isnan (pw_sin (INFINITY)) && isnan (pw_cos (-INFINITY)));
   assert_true (pw_sin (0.) == 0 && !signbit (pw_sin (0.)) && signbit (pw_sin (-0.)) && pw_cos (-0.) == 1);
   assert_true (pw_sin (5e-324) == 5e-324);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_table), cmocka_unit_test (test_random),
-                                      cmocka_unit_test (test_lanes), cmocka_unit_test (test_special) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -154,12 +154,12 @@ void faults_begin (const char *start, const char *command) {
   cli_good ("cp -r @/o @/whole");
 }
 
-int faults_setup (void **state) {
+int faults_setup (void) {
   static const char gnuplot[] = "#!/bin/sh\n",
                     compiler[] = "#!/bin/sh\nwhile [ \"$1\" != -o ]; do shift; done\n/bin/cp \"$MODEL\" \"$2\"\n";
   char text[400];
   const char *build = getenv ("BUILD");
-  if (cli_setup (state) != 0) return -1;
+  if (cli_setup () != 0) return -1;
   cli_write ("gnuplot", gnuplot);
   cli_write ("cc", compiler);
   cli_run ("chmod +x @/gnuplot @/cc");

@@ -49,8 +49,7 @@ static void machine_check_whole (const char *writer) {
 }
 
 /* As on a disk that is full: no file may grow beyond so many blocks of 512 bytes. */
-static void test_full (void **state) {
-  (void)state;
+TEST (full) {
   for (int i = 0; i < MACHINE_WRITERS; i++) {
     machine_whole (machine_writers[i]);
     int failed = 0;
@@ -70,8 +69,7 @@ static void test_full (void **state) {
 }
 
 /* /dev/full takes nothing; a folder that cannot be written; a folder in the place of a file. */
-static void test_unwritable (void **state) {
-  (void)state;
+TEST (unwritable) {
   const char *folder = getuid () == 0 ? "@/file" : "@/closed"; /* root may write everywhere but below a file */
   const char *const option[] = { "run ezyroller -o %s/x.csv",
                                  "run ezyroller --json %s/x.json",
@@ -102,8 +100,7 @@ static void test_unwritable (void **state) {
 }
 
 /* A reader that has seen enough: nothing is said, the status is that of a process ended by SIGPIPE. */
-static void test_closed_pipe (void **state) {
-  (void)state;
+TEST (closed_pipe) {
   const char *const command[] = { "run ezyroller -o -", "run ezyroller --json -", "run ezyroller", "list",
                                   "show chain",         "show --yaml pendulum",   "list methods" };
   for (size_t i = 0; i < sizeof command / sizeof *command; i++) {
@@ -120,8 +117,7 @@ static void test_closed_pipe (void **state) {
 }
 
 /* Ctrl-C after any time: files under their own names are whole, and the status is 130 unless all was done. */
-static void test_interrupted (void **state) {
-  (void)state;
+TEST (interrupted) {
   for (int i = 0; i + 1 < MACHINE_WRITERS; i++) {
     machine_whole (machine_writers[i]);
     for (int after = 1; after < 100; after = 3 * after + 2) {
@@ -142,15 +138,13 @@ static void test_interrupted (void **state) {
 
 /* ---- Programs that are missing or fail ---- */
 
-static void test_no_compiler (void **state) {
-  (void)state;
+TEST (no_compiler) {
   cli_good ("pinwheel new @/own.c >@/log");
   assert_int_equal (cli_run ("unset CC; PATH=/none pinwheel run @/own.c"), 2);
   assert_non_null (strstr (cli_err, "cannot run the C compiler \"cc\" that the model file "));
 }
 
-static void test_gnuplot (void **state) {
-  (void)state;
+TEST (gnuplot) {
   const struct {
     const char *program, *message;
     int status;
@@ -179,8 +173,7 @@ static void test_gnuplot (void **state) {
 
 /* ---- Names ---- */
 
-static void test_names (void **state) {
-  (void)state;
+TEST (names) {
   cli_good (
       "mkdir -p '@/ein Ordner/größer & \"so\"'; cp tests/models/arm.yaml '@/ein Ordner/größer & \"so\"/der Arm.yaml'");
   cli_run (
@@ -196,11 +189,4 @@ static void test_names (void **state) {
   assert_string_equal (cli_out, "5\n");
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_full),        cmocka_unit_test (test_unwritable),  cmocka_unit_test (test_closed_pipe),
-    cmocka_unit_test (test_interrupted), cmocka_unit_test (test_no_compiler), cmocka_unit_test (test_gnuplot),
-    cmocka_unit_test (test_names),
-  };
-  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
-}
+const check_fixture fixture = { cli_setup, cli_teardown };

@@ -49,7 +49,7 @@ static const pw_signal *scene_signal (const scene *x) {
 
 /* 100 N for 0.01 s give 1 kg a speed of 1 m/s, however long the steps and however the times are written: a
  * constant force is integrated without an error of the method. */
-static void test_push (void **state) {
+TEST (push) {
   static const char *const value[] = { "t > 7.0003 && t < 7.0103 ? 100 : 0",
                                        "100*(7.0003 < t && 7.0103 >= t)",
                                        "2*t - 1 > 13.0006 && 3*t < 21.0309 ? 100 : 0",
@@ -61,7 +61,6 @@ static void test_push (void **state) {
                                        "t^2 > 7.0003^2 && exp(t) < exp(7.0103) ? 100 : 0" };
   char method[40];
   double q[6], v[6];
-  (void)state;
   for (size_t i = 0; i < sizeof value / sizeof *value; i++) {
     scene x = scene_of ("  - {force: F, body: a, fx: \"@\"}\n", value[i]);
     for (int k = 0; runs_method (k, method); k++) {
@@ -73,7 +72,7 @@ static void test_push (void **state) {
 }
 
 /* An expression in place of a built-in signal: the same motion but for round-off. */
-static void test_built_in (void **state) {
+TEST (built_in) {
   static const char drive[] = "  - {drive: D, body: [a, ground], what: angle, value: @}\n"
                               "  - {pin: P, body: [a, b], at: [[0.5, 0], [-0.5, 0]]}\n";
   static const char steered[] = "  - {steered-wheel: W, body: b, at: [0.4, 0.1], heading: @}\n"
@@ -94,7 +93,6 @@ static void test_built_in (void **state) {
     { speed, "{ramp: {from: 1, to: 2, start: 0.4, duration: T}}", "\"1 + max(0, min(1, (t - 0.4)/T))\"" },
   };
   static const char *const method[] = { "rk4+projection", "erk8+projection", "ida+ggl", "bdf+projection", "galpha" };
-  (void)state;
   for (size_t i = 0; i < sizeof pair / sizeof *pair; i++)
     for (size_t m = 0; m < sizeof method / sizeof *method; m++) {
       double q[2][6], v[2][6];
@@ -111,14 +109,13 @@ static void test_built_in (void **state) {
 }
 
 /* The gradient by states is that of the formula. */
-static void test_gradient (void **state) {
+TEST (gradient) {
   scene x = scene_of ("  - {torque: T, body: [b, ground], value: \"@\"}\n",
                       "t*sin(b.phi)*exp(-b.omega^2) + abs(a.x)*(b.omega > 0 ? 2 : 3)");
   const pw_signal *s = scene_signal (&x);
   void *own = s->function.open (s->function.context);
   double t = 1.3, phi = 0.4, omega = 0.7, ax = -2, value[3], gradient[3];
   const double states[] = { phi, omega, ax };
-  (void)state;
   assert_string_equal (s->function.reads[0], "b.phi");
   assert_int_equal (s->function.eval (own, t, states, value, gradient), 0);
   double e = exp (-omega * omega);
@@ -132,12 +129,11 @@ static void test_gradient (void **state) {
 }
 
 /* At a jump in time it is that just after it, as the value is. */
-static void test_gradient_after (void **state) {
+TEST (gradient_after) {
   scene x = scene_of ("  - {torque: T, body: [b, ground], value: \"@\"}\n", "t <= 1 ? b.phi : 2*b.phi + a.x*floor(-t)");
   const pw_signal *s = scene_signal (&x);
   void *own = s->function.open (s->function.context);
   double value[3], gradient[2];
-  (void)state;
   assert_int_equal (s->function.eval (own, 1, (double[]){ 3, 5 }, value, gradient), 0);
   assert_true (value[0] == 6 - 10 && gradient[0] == 2 && gradient[1] == -2);
   assert_int_equal (s->function.eval (own, 0.5, (double[]){ 3, 5 }, value, gradient), 0);
@@ -147,10 +143,9 @@ static void test_gradient_after (void **state) {
 }
 
 /* A derivative without a value stops the run with its reason; one that is given in its place does not. */
-static void test_no_derivative (void **state) {
+TEST (no_derivative) {
   static const char *const value[] = { "sqrt(t^4)", "{expression: sqrt(t^4), rate: 2*t, acceleration: 2}",
                                        "{expression: sqrt(t^4), rate: 2*t}" };
-  (void)state;
   for (int i = 0; i < 3; i++) {
     pw_error error = { 0 };
     scene x = scene_of ("  - {drive: D, body: [a, ground], what: angle, value: @}\n", value[i]);
@@ -167,10 +162,9 @@ static void test_no_derivative (void **state) {
 
 /* Constraints take what is continuous where it breaks, however fast it changes; what is not is refused
  * (tests/bad-models). */
-static void test_continuous (void **state) {
+TEST (continuous) {
   static const char *const value[] = { "t < 1 ? t^3 : 3*t - 2",        "abs(sin(3*t))^3",           "max(0, t - 1)^2",
                                        "sin(1e9*t) + max(0, t - 1)^2", "1e8*max(0, t - 1)^3 + 1e8", "t > 5 || 1" };
-  (void)state;
   for (size_t i = 0; i < sizeof value / sizeof *value; i++) {
     scene x = scene_of ("  - {drive: D, body: [a, ground], what: angle, value: \"@\"}\n", value[i]);
     scene_close (&x);
@@ -178,13 +172,12 @@ static void test_continuous (void **state) {
 }
 
 /* No name of a formula is the time: at a jump its value is that of the jump, whichever name comes first. */
-static void test_formula (void **state) {
+TEST (formula) {
   static const struct {
     const char *text;
     double value;
   } formula[] = { { "ceil(a)", 2 }, { "ceil(b)", 2 }, { "a <= 2", 1 }, { "a == b", 1 }, { "sign(a - b)", 0 } };
   const char *const names[] = { "a", "b", NULL };
-  (void)state;
   for (size_t i = 0; i < sizeof formula / sizeof *formula; i++) {
     pw_error error = { 0 };
     pw_formula *f = pw_formula_open (formula[i].text, names, &error);
@@ -194,21 +187,13 @@ static void test_formula (void **state) {
   }
 }
 
-static int setup (void **state) {
-  (void)state;
+static int setup (void) {
   int file = mkstemps (path, 5);
   return file < 0 ? -1 : close (file);
 }
 
-static int teardown (void **state) {
-  (void)state;
+static int teardown (void) {
   return remove (path);
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_push),       cmocka_unit_test (test_built_in),
-                                      cmocka_unit_test (test_gradient),   cmocka_unit_test (test_gradient_after),
-                                      cmocka_unit_test (test_continuous), cmocka_unit_test (test_no_derivative),
-                                      cmocka_unit_test (test_formula) };
-  return cmocka_run_group_tests (tests, setup, teardown);
-}
+const check_fixture fixture = { setup, teardown };

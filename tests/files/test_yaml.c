@@ -61,16 +61,14 @@ static void text_same (const char *parameter, double value, const char *method, 
   check_bits ("the EzyRoller as text", state[0], state[1], 12);
 }
 
-static void test_ezyroller (void **state) {
-  (void)state;
+TEST (ezyroller) {
   text_same (NULL, 0, "rk4+projection", 20);
   text_same ("b", 0.7, "rk4+projection", 5);
   text_same ("m2", 0.2, "ida+ggl", 5);
 }
 
 /* Parameters, run defaults and the line about it are those of the C file. */
-static void test_table (void **state) {
-  (void)state;
+TEST (table) {
   text c = text_open ("ezyroller", NULL, 0), y = text_open ("tests/models/ezyroller.yaml", NULL, 0);
   const pw_plugin_table *a = pw_file_table (c.file), *b = pw_file_table (y.file);
   assert_string_equal (a->about, b->about);
@@ -91,9 +89,8 @@ static void test_table (void **state) {
   text_close (&y);
 }
 
-static void test_parameters (void **state) {
+TEST (parameters) {
   pw_error error = { 0 };
-  (void)state;
   pw_file *f = pw_file_open ("tests/models/ezyroller.yaml", &error);
   check_ok (f ? PW_OK : error.status, &error);
   pw_model *m = pw_file_model (f, &error);
@@ -108,12 +105,11 @@ static void test_parameters (void **state) {
 
 /* ---- What is built ---- */
 
-static void test_let (void **state) {
+TEST (let) {
   static const char source[] = "pinwheel: 1\n"
                                "parameters:\n  - {name: l, value: 2}\n"
                                "let: {half: l/2, area: half^2*pi}\n"
                                "bodies:\n  - {name: b, mass: area, start: {x: half, phi: 90*deg}}\n";
-  (void)state;
   for (int i = 0; i < 2; i++) {
     double l = i ? 6 : 2, half = l / 2, mass = half * half * PW_PI, phi = 90 * (PW_PI / 180);
     text x = text_of (source, "l", l);
@@ -136,12 +132,11 @@ static const pw_signal *text_signal (const text *x, int element) {
 }
 
 /* A torque as an expression of time is the harmonic one but for round-off. */
-static void test_time (void **state) {
+TEST (time) {
   static const char *const value[] = { "{harmonic: {amplitude: A, omega: w, phase: 0.5, offset: k}}",
                                        "k + A*cos(w*t + 0.5)" };
   double q[2][6], v[2][6];
   char source[600];
-  (void)state;
   for (int i = 0; i < 2; i++) {
     snprintf (source, sizeof source, TWO_BODIES "elements:\n  - {torque: T, body: [a, b], value: %s}\n", value[i]);
     text x = text_of (source, NULL, 0);
@@ -154,13 +149,12 @@ static void test_time (void **state) {
 }
 
 /* A torque that reads states: the derivative is what it should be, and the motion that of a spring. */
-static void test_states (void **state) {
+TEST (states) {
   text x = text_of (TWO_BODIES "elements:\n  - {torque: T, body: [a, ground], value: -w*a.phi - A*a.omega*a.phi^2}\n",
                     NULL, 0);
   const pw_function *f = &text_signal (&x, 0)->function;
   void *own = f->open (f->context);
   double value[3] = { 0 }, gradient[2] = { 0 };
-  (void)state;
   assert_string_equal (f->reads[0], "a.phi");
   assert_string_equal (f->reads[1], "a.omega");
   assert_null (f->reads[2]);
@@ -175,9 +169,8 @@ static void test_states (void **state) {
 
 /* A cart on a wheel whose spin pulls it back, by a force that is written before the wheel and by a torque of its own:
  * (I + m r^2) spin'' = -(r 0.54 + 0.054) spin. */
-static void test_own_states (void **state) {
+TEST (own_states) {
   static const char *const method[] = { "rk4+projection", "ida+ggl" };
-  (void)state;
   for (int i = 0; i < 2; i++) {
     double q[4], v[4], bound = i == 0 ? 1e-10 : 1e-6;
     const char *reason = i == 0 ? "(h k)^4 at h = 1e-3 and k = 3/s" : "1e4 rtol";
@@ -196,7 +189,7 @@ static void test_own_states (void **state) {
 
 /* The signal of a drive with its derivatives: value, rate and acceleration at a time; a system's context outlives the
  * model. */
-static void test_drive (void **state) {
+TEST (drive) {
   text x =
       text_of (TWO_BODIES "elements:\n"
                           "  - drive: D\n    body: [a, ground]\n    at: [[0, 0], [0, 0]]\n    what: angle\n"
@@ -205,7 +198,6 @@ static void test_drive (void **state) {
   const pw_signal s = *text_signal (&x, 0);
   void *own = s.function.open (s.function.context);
   double value[3];
-  (void)state;
   pw_model_free (x.model);
   x.model = NULL;
   assert_int_equal (s.function.eval (own, 0.7, NULL, value, NULL), 0);
@@ -220,9 +212,8 @@ static void test_drive (void **state) {
 }
 
 /* The derivatives are compared with differences, whether the signal is slow, fast, far from zero, or at rest. */
-static void test_derivatives (void **state) {
+TEST (derivatives) {
   static const double scale[][3] = { { 1e-3, 2e-4, 0 }, { 1, 1, 0 }, { 0.1, 900, 1e6 }, { 1e4, 1e5, 3 }, { 0, 1, 0 } };
-  (void)state;
   for (size_t i = 0; i < sizeof scale / sizeof *scale; i++) {
     char source[800];
     const double *s = scale[i];
@@ -239,10 +230,9 @@ static void test_derivatives (void **state) {
 }
 
 /* A signal without a value stops the run. */
-static void test_no_value (void **state) {
+TEST (no_value) {
   text x = text_of (TWO_BODIES "elements:\n  - {torque: T, body: [a, b], value: sqrt(1 - t)}\n", NULL, 0);
   pw_error error = { 0 };
-  (void)state;
   pw_run *r = runs_open (x.system, "rk4", &(pw_settings){ .step = 1e-2 });
   assert_int_equal (pw_run_advance_to (r, 2, 2, &error), PW_METHOD);
   pw_run_close (r);
@@ -250,34 +240,23 @@ static void test_no_value (void **state) {
 }
 
 /* A value over fifty lines is one expression. */
-static void test_lines (void **state) {
+TEST (lines) {
   char source[2000] = TWO_BODIES "elements:\n  - torque: T\n    body: [a, b]\n    value:\n      1";
   double q[6], v[6];
   for (int i = 1; i < 50; i++) strcat (source, "\n      + 1");
   text x = text_of (source, NULL, 0);
-  (void)state;
   runs_state (x.system, "rk4", &(pw_settings){ .step = 1e-2 }, 1, q, v, NULL);
   check_close ("angular velocity", v[2], 500, 1e-10, "50 N m on 0.1 kg m^2 for a second");
   text_close (&x);
 }
 
-static int text_setup (void **state) {
-  (void)state;
+static int text_setup (void) {
   int file = mkstemps (text_path, 5);
   return file < 0 ? -1 : close (file);
 }
 
-static int text_teardown (void **state) {
-  (void)state;
+static int text_teardown (void) {
   return remove (text_path);
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_ezyroller),  cmocka_unit_test (test_table), cmocka_unit_test (test_parameters),
-    cmocka_unit_test (test_let),        cmocka_unit_test (test_time),  cmocka_unit_test (test_states),
-    cmocka_unit_test (test_own_states), cmocka_unit_test (test_drive), cmocka_unit_test (test_derivatives),
-    cmocka_unit_test (test_no_value),   cmocka_unit_test (test_lines),
-  };
-  return cmocka_run_group_tests (tests, text_setup, text_teardown);
-}
+const check_fixture fixture = { text_setup, text_teardown };

@@ -56,11 +56,10 @@ static int bad_file (const char *path) {
   return 0;
 }
 
-static void test_bad_models (void **state) {
+TEST (bad_models) {
   int files = 0, failed = 0;
   struct dirent *entry;
   DIR *d = opendir (BAD_FOLDER);
-  (void)state;
   assert_non_null (d);
   while ((entry = readdir (d)) != NULL) {
     char path[300];
@@ -78,14 +77,12 @@ static void test_bad_models (void **state) {
 
 static char bad_path[] = "/tmp/pinwheel-bad-XXXXXX.yaml";
 
-static int bad_setup (void **state) {
-  (void)state;
+static int bad_setup (void) {
   int file = mkstemps (bad_path, 5);
   return file < 0 ? -1 : close (file);
 }
 
-static int bad_teardown (void **state) {
-  (void)state;
+static int bad_teardown (void) {
   return remove (bad_path);
 }
 
@@ -97,10 +94,9 @@ static void bad_write (const char *text, size_t size) {
 }
 
 /* Columns of the first line do not count a byte order mark. */
-static void test_byte_order_mark (void **state) {
+TEST (byte_order_mark) {
   static const char *const bad[] = { "about: a: b\n", "pinwheel: 2\n", "pinwheel: 1, x: [\n", "{pinwheel: 1, x: 3}\n",
                                      "%YAML 1.2\n---\npinwheel: 1\n" };
-  (void)state;
   for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
     char text[100];
     bad_write (bad[i], strlen (bad[i]));
@@ -114,11 +110,10 @@ static void test_byte_order_mark (void **state) {
 }
 
 /* A good model with one byte changed, or cut off somewhere, is read or refused with a text, never more. */
-static void test_damage (void **state) {
+TEST (damage) {
   static const char byte[] = "{}[],:#&*!|>'\"%@ \n-t.=(1\xC3";
   static char text[4000], copy[4000];
   FILE *f = fopen ("tests/models/ezyroller.yaml", "rb");
-  (void)state;
   assert_non_null (f);
   size_t size = fread (text, 1, sizeof text, f);
   fclose (f);
@@ -133,9 +128,8 @@ static void test_damage (void **state) {
   }
 }
 
-static void test_size (void **state) {
+TEST (size) {
   char expected[200];
-  (void)state;
   bad_write ("pinwheel: 1\n", 12);
   assert_int_equal (truncate (bad_path, (64L << 20) + 1), 0);
   pw_error error = bad_open (bad_path);
@@ -149,8 +143,4 @@ static void test_size (void **state) {
   check_error (&error, PW_INPUT, expected);
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_bad_models), cmocka_unit_test (test_byte_order_mark),
-                                      cmocka_unit_test (test_damage), cmocka_unit_test (test_size) };
-  return cmocka_run_group_tests (tests, bad_setup, bad_teardown);
-}
+const check_fixture fixture = { bad_setup, bad_teardown };

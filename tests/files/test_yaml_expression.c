@@ -33,7 +33,7 @@ static double expression_at (const char *text, double t, double phi) {
 }
 
 /* The same operations in C, in the same order, give the same bits. */
-static void test_values (void **state) {
+TEST (values) {
   const double e = exp (1), a = 3, pi = PW_PI;
   const struct {
     const char *text;
@@ -74,7 +74,6 @@ static void test_values (void **state) {
     { "log10(1000)", log10 (1000) },
     { "sinh(1) + cosh(1) + tanh(1) + atan(1)", sinh (1) + cosh (1) + tanh (1) + atan (1) },
   };
-  (void)state;
   for (size_t i = 0; i < sizeof good / sizeof *good; i++) {
     double value = expression_at (good[i].text, 0, 0.25);
     check_bits (good[i].text, &value, &good[i].value, 1);
@@ -83,7 +82,7 @@ static void test_values (void **state) {
   check_close ("e", expression_at ("e", 0, 0), e, 4 * CHECK_EPS, "round-off of exp");
 }
 
-static void test_troubles (void **state) {
+TEST (troubles) {
   static const struct {
     const char *text;
     size_t at;
@@ -122,7 +121,6 @@ static void test_troubles (void **state) {
   };
   const pw_expression *x;
   pw_expression_error trouble;
-  (void)state;
   for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
     assert_int_equal (expression_read (bad[i].text, &x, &trouble), PW_INPUT);
     if (trouble.at != bad[i].at) print_error ("%s: at %zu, not %zu\n", bad[i].text, trouble.at, bad[i].at);
@@ -132,7 +130,7 @@ static void test_troubles (void **state) {
 }
 
 /* Texts that are too long, or in which too much is nested, are refused; long sums are not. */
-static void test_limits (void **state) {
+TEST (limits) {
   static const struct {
     const char *piece;
     int count, status;
@@ -143,7 +141,6 @@ static void test_limits (void **state) {
   const pw_expression *x;
   pw_expression_error trouble;
   double value = 0;
-  (void)state;
   for (size_t i = 0; i < sizeof text / sizeof *text; i++) {
     *source = 0;
     for (int k = 0; k < text[i].count; k++) strcat (source, text[i].piece);
@@ -156,9 +153,8 @@ static void test_limits (void **state) {
 }
 
 /* && and || are logical, whatever of them is known when the expression is read. */
-static void test_truths (void **state) {
+TEST (truths) {
   static const double value[] = { 0, 0.5, 1, -2 };
-  (void)state;
   for (int i = 0; i < 64; i++) {
     double a = value[i & 3], b = value[i >> 2 & 3], known[2] = { i & 16, i & 32 };
     char left[20] = "t", right[20] = "frame.phi", text[100];
@@ -246,11 +242,10 @@ static double difference (const pw_expression *x, const double at[2], int by, in
 }
 
 /* Each derivative is that of the one before it.  Two step sizes tell how far differences can be trusted. */
-static void test_derivatives (void **state) {
+TEST (derivatives) {
   const int expressions = 3000;
   pw_random r = { 12 };
   int sharp = 0;
-  (void)state;
   for (int i = 0; i < expressions; i++) {
     char text[1600];
     random_text (&r, 1 + i % 3, text, sizeof text);
@@ -274,7 +269,7 @@ static void test_derivatives (void **state) {
 }
 
 /* What jumps or bends has the value and derivatives just after. */
-static void test_after (void **state) {
+TEST (after) {
   static const struct {
     const char *text;
     double t, u[3];
@@ -317,7 +312,6 @@ static void test_after (void **state) {
     { "frame.phi >= 1", 1, { 1, 0, 0 } },
     { "frame.phi > 1", 1, { 0, 0, 0 } },
   };
-  (void)state;
   for (size_t i = 0; i < sizeof at / sizeof *at; i++) {
     const pw_expression *x = expression_of (at[i].text);
     double u[3], variable[] = { at[i].t, 1 }, value = pw_expression_value (x, variable);
@@ -329,7 +323,7 @@ static void test_after (void **state) {
 
 /* ---- Breakpoints ---- */
 
-static void test_breakpoints (void **state) {
+TEST (breakpoints) {
   static const struct {
     const char *text;
     double first, next; /* 0: none */
@@ -423,7 +417,6 @@ static void test_breakpoints (void **state) {
     { "1/(2 + sin(t)) + t/3 + t^2", 0, 0 },
     { "(sin(acos(frame.phi)) < 2) + (t > 3)", 3, 0 },
   };
-  (void)state;
   for (size_t i = 0; i < sizeof at / sizeof *at; i++) {
     const pw_expression *x = expression_of (at[i].text);
     double first = pw_expression_breakpoint (x, 0),
@@ -443,7 +436,7 @@ static void test_breakpoints (void **state) {
 /* Numbers that ought to be equal differ by round-off again and again: no breakpoints, and none of the others is
  * lost. */
 #define TEN_TIMES(x) x x x x x x x x x x
-static void test_round_off (void **state) {
+TEST (round_off) {
   static const char *const noisy[] = { "min(sin(t)^2 + cos(t)^2, 1)",
                                        "abs(sin(t)^2 + cos(t)^2 - 1)",
                                        "max(sin(t), 2*sin(t/2)*cos(t/2))",
@@ -451,7 +444,6 @@ static void test_round_off (void **state) {
                                        "(t*t > (t - 1)*(t + 1) + 1)",
                                        "max(t, t)" TEN_TIMES (
                                            " + max(t, t) + max(t, t) + max(t, t)") /* equal, and many operations */ };
-  (void)state;
   for (size_t i = 0; i < sizeof noisy / sizeof *noisy; i++) {
     char text[500];
     int steps = 0, found = 0;
@@ -470,9 +462,8 @@ static void test_round_off (void **state) {
 
 /* (t - 1)/(2 t) is a whole number at t = 1/(2 k + 1): too many of these lie just after 0, none after 0.01 may be
  * missed. */
-static void test_accumulating (void **state) {
+TEST (accumulating) {
   const pw_expression *x = expression_of ("mod(t - 1, t ? 2*t : 1)");
-  (void)state;
   double t = 0;
   for (int k = 49; k >= 0;) {
     double jump = 1. / (2 * k + 1);
@@ -483,10 +474,9 @@ static void test_accumulating (void **state) {
 }
 
 /* Where enclosures never decide, jumps a thousandth of the time apart are found all the same. */
-static void test_undecided (void **state) {
+TEST (undecided) {
   static const char *const text[] = { "-0.5 - t > deg/((t < t) ? t - 1 : sin(t))",
                                       "-jacobi_am(t, atan2(t, t))/(2*t) > deg/sin(t)" };
-  (void)state;
   for (size_t i = 0; i < sizeof text / sizeof *text; i++) {
     const pw_expression *x = expression_of (text[i]);
     int found = 0;
@@ -501,10 +491,9 @@ static void test_undecided (void **state) {
 
 /* am (u | m) = u - m S/2 + m^2 (S sin^2 u / 4 - 3 R / 8) + ..., S and R the integrals of sin^2 and sin^4 from 0 to u
  * (Abramowitz & Stegun 16.13.4): derivatives by m where the means have converged. */
-static void test_amplitude (void **state) {
+TEST (amplitude) {
   double u[3], small = 2, S = small / 2 - sin (2 * small) / 4;
   double R = 3 * small / 8 - sin (2 * small) / 4 + sin (4 * small) / 32, s = sin (small);
-  (void)state;
   pw_expression_derivatives (expression_of ("jacobi_am(2, t)"), (double[]){ 0, 0 }, 0, u);
   check_close ("d am/dm", u[1], -S / 2, 4 * CHECK_EPS, "round-off");
   for (double m = 0; m < 1e-7; m += 3e-8) {
@@ -514,10 +503,9 @@ static void test_amplitude (void **state) {
 }
 
 /* A whole number that bisection meets exactly is a break, too, whichever way it is passed. */
-static void test_whole (void **state) {
+TEST (whole) {
   static const char *const jumping[] = { "ceil(t)",    "2*ceil(t)",      "floor(-t)", "3 - floor(-t)",
                                          "mod(-t, 1)", "round(0.5 - t)", "floor(t)" };
-  (void)state;
   for (size_t i = 0; i < sizeof jumping / sizeof *jumping; i++) {
     const pw_expression *x = expression_of (jumping[i]);
     double t = 0;
@@ -529,9 +517,8 @@ static void test_whole (void **state) {
 }
 
 /* Between breakpoints nothing jumps: random thresholds on random curves, scanned at many times. */
-static void test_scanned (void **state) {
+TEST (scanned) {
   pw_random r = { 5 };
-  (void)state;
   for (int i = 0; i < 100; i++) {
     char text[200];
     snprintf (text, sizeof text, "(sin(%g*t + %g) + %g*t > %g) + 2*(mod(%g*t, %g) < %g) + 4*floor(%g*t)",
@@ -554,19 +541,9 @@ static void test_scanned (void **state) {
   }
 }
 
-static int expression_teardown (void **state) {
-  (void)state;
+static int expression_teardown (void) {
   pw_arena_free (&expression_arena);
   return 0;
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_values),      cmocka_unit_test (test_troubles),    cmocka_unit_test (test_limits),
-    cmocka_unit_test (test_truths),      cmocka_unit_test (test_derivatives), cmocka_unit_test (test_after),
-    cmocka_unit_test (test_breakpoints), cmocka_unit_test (test_round_off),   cmocka_unit_test (test_amplitude),
-    cmocka_unit_test (test_undecided),   cmocka_unit_test (test_whole),       cmocka_unit_test (test_accumulating),
-    cmocka_unit_test (test_scanned),
-  };
-  return cmocka_run_group_tests (tests, NULL, expression_teardown);
-}
+const check_fixture fixture = { NULL, expression_teardown };

@@ -41,9 +41,8 @@ static void format_run (void) {
   pw_file_close (f);
 }
 
-static void test_examples (void **state) {
+TEST (examples) {
   int examples = 0;
-  (void)state;
   FILE *document = fopen ("docs/model-format.md", "r");
   assert_non_null (document);
   for (; format_next (document); examples++) format_run ();
@@ -51,18 +50,13 @@ static void test_examples (void **state) {
   assert_true (examples >= 4);
 }
 
-static int format_setup (void **state) {
-  (void)state;
+static int format_setup (void) {
   int file = mkstemps (format_path, 5);
   return file < 0 ? -1 : close (file);
 }
 
-static int format_teardown (void **state) {
-  (void)state;
+static int format_teardown (void) {
   return remove (format_path);
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_examples) };
-  return cmocka_run_group_tests (tests, format_setup, format_teardown);
-}
+const check_fixture fixture = { format_setup, format_teardown };

@@ -58,8 +58,7 @@ static void table_good (const char *csv, const char *table) {
   assert_true (point[1][0] == 1 && point[1][1] == -2 && point[1][2] == 0.3);
 }
 
-static void test_forms (void **state) {
-  (void)state;
+TEST (forms) {
   table_good ("", "{points: [[0, 1], [1/2, -2], [2, 0.3]]}");
   table_good ("0,1\n0.5,-2\n2,3e-1\n", "{file: data.csv}");
   table_good ("0,1\n0.5,-2\n2,3e-1", "{file: ./data.csv, columns: [1, 2]}");
@@ -84,10 +83,9 @@ static void table_bad (const char *table, const char *text) {
 }
 
 /* A header's unit converts its column, however it is written. */
-static void test_units (void **state) {
+TEST (units) {
   static const char *const unit[] = { "[N mm]", "[mN m]", "[N*mm]", "[kN um]", "[g m^2/s^2]", "[Nmm]", "(N mm)" };
   char csv[200];
-  (void)state;
   for (size_t i = 0; i < sizeof unit / sizeof *unit; i++) {
     snprintf (csv, sizeof csv, "t [ms],u %s\n0,1000\n500,-2000\n2000,300\n", unit[i]);
     table_good (csv, "{file: data.csv}");
@@ -100,9 +98,8 @@ static void test_units (void **state) {
 }
 
 /* What is not known, or measures something else, is refused with column and unit. */
-static void test_bad_units (void **state) {
+TEST (bad_units) {
   static const char csv[] = "t [s],u [dyn cm],w [deg],f [N],z [N m/],h [%]\n0,1,2,3,4,5\n1,2,3,4,5,6\n";
-  (void)state;
   table_write ("model/u.csv", csv, strlen (csv));
   table_bad ("{file: u.csv}", "u.csv:1: column \"u [dyn cm]\": the unit \"dyn cm\" is not known; expected N m");
   table_bad ("{file: u.csv, columns: [t, w]}", "column \"w [deg]\": the unit \"deg\" does not measure what N m does");
@@ -113,9 +110,8 @@ static void test_bad_units (void **state) {
 }
 
 /* What overflows as it is converted is refused. */
-static void test_too_large (void **state) {
+TEST (too_large) {
   static const char csv[] = "t [h],u [kN km]\n0,1\n1,-1e303\n1e305,2\n";
-  (void)state;
   table_write ("model/large.csv", csv, sizeof csv - 1);
   table_bad ("{file: large.csv}", "large.csv:3: column 2: \"-1e303\" is too large in SI units");
   table_write ("model/large.csv", "t [h],u\n0,1\n1e305,2\n", 20);
@@ -123,9 +119,8 @@ static void test_too_large (void **state) {
 }
 
 /* Cells are not cut: neither a number before its exponent nor a name before its unit. */
-static void test_long_cells (void **state) {
+TEST (long_cells) {
   char csv[3000];
-  (void)state;
   snprintf (csv, sizeof csv, "t,%0150d [N mm]\n0,1.%0150de3\n0.5,-2e3\n2,300\n", 0, 0);
   csv[2] = 'M'; /* a name */
   table_good (csv, "{file: data.csv}");
@@ -164,12 +159,11 @@ static void table_unit (const char *element, const char *header, double expected
   pw_file_close (f);
 }
 
-static void test_unit_of_signal (void **state) {
+TEST (unit_of_signal) {
   static const char angle[] = "drive: D, body: [a, ground], at: [[0, 0], [0, 0]], what: angle, value",
                     x[] = "drive: D, body: [a, ground], at: [[0, 0], [0, 0]], what: x, value",
                     speed[] = "speed: V, body: a, at: [0, 0], value",
                     pfaffian[] = "pfaffian: P, body: [a, ground], a: [1, 0, 0], b: [0, 0, 0], value";
-  (void)state;
   table_unit (angle, "deg", PW_PI / 2, NULL);
   table_unit (angle, "\xC2\xB0", PW_PI / 2, NULL);
   table_unit (angle, "rev", 180 * PW_PI, NULL);
@@ -185,7 +179,7 @@ static void test_unit_of_signal (void **state) {
 }
 
 /* 90 of each unit, in SI units. */
-static void test_unit_factors (void **state) {
+TEST (unit_factors) {
   static const struct {
     const char *unit;
     double si;
@@ -233,16 +227,14 @@ static void test_unit_factors (void **state) {
     { "cm^2", 9e-3 },
     { "1/ms", 9e4 },
   };
-  (void)state;
   for (size_t i = 0; i < sizeof units / sizeof *units; i++)
     table_unit ("pfaffian: P, body: [a, ground], a: [1, 0, 0], b: [0, 0, 0], value", units[i].unit, units[i].si, NULL);
 }
 
 /* offset + scale value, at the compiled signal; the points stay as they are. */
-static void test_scale (void **state) {
+TEST (scale) {
   pw_signal s = { 0 };
   double point[2][3];
-  (void)state;
   table_write ("model/data.csv", "0,1\n2,3\n", 8);
   pw_error error = table_build ("{file: data.csv, scale: 2*deg, offset: -1}", &s, point);
   check_ok (error.status, &error);
@@ -251,8 +243,7 @@ static void test_scale (void **state) {
   table_bad ("{points: [[0, 1], [1, 1e300]], scale: 1e300}", "point 2: offset + scale * 1e+300 is not finite");
 }
 
-static void test_contents (void **state) {
-  (void)state;
+TEST (contents) {
   table_write ("model/nul.csv", "0,1\n1,\0002\n", 9);
   table_bad ("{file: nul.csv}", "value: nul.csv: a table is text, and this has a byte 0\n");
   table_write ("model/twice.csv", "t,u,u [m]\n0,1,2\n1,2,3\n", 22);
@@ -262,9 +253,8 @@ static void test_contents (void **state) {
 }
 
 /* Nothing outside the model's folder is read, however it is named. */
-static void test_places (void **state) {
+TEST (places) {
   char outside[200];
-  (void)state;
   table_write ("data.csv", "0,1\n1,2\n", 8);
   snprintf (outside, sizeof outside, "{file: %s/data.csv}", table_folder);
 #define OWN "a table must be in the model's folder: its path is relative and has no \"..\""
@@ -292,9 +282,8 @@ static void test_places (void **state) {
   table_good ("0,1\n0.5,-2\n2,3e-1\n", "{file: sub/..data.csv}");
 }
 
-static void test_limits (void **state) {
+TEST (limits) {
   char message[200];
-  (void)state;
   table_write ("model/large.csv", "0,1\n", 4);
   assert_int_equal (truncate (table_in ("model/large.csv"), (64L << 20) + 1), 0);
   table_bad ("{file: large.csv}", "large.csv: the file has more than 64 MB, the limit for a table");
@@ -310,14 +299,13 @@ static void test_limits (void **state) {
 }
 
 /* A page has a table once, although two signals read it, and takes no definition for a table. */
-static void test_page (void **state) {
+TEST (page) {
   static const char text[] =
       "pinwheel: 1\nlet: {file: 3}\nbodies: [{name: a, mass: file, inertia: 1}]\n"
       "elements: [{force: F, body: a, fx: {table: {file: t.csv}}, fy: {table: {file: t.csv}}}]\n";
   pw_error error = { 0 };
   pw_page page;
   int tables = 0;
-  (void)state;
   table_write ("model/m.yaml", text, strlen (text));
   table_write ("model/t.csv", "0,1\n1,2\n", 8);
   pw_file *f = pw_file_open (table_in ("model/m.yaml"), &error);
@@ -340,25 +328,15 @@ static void test_page (void **state) {
   pw_file_close (f);
 }
 
-static int table_setup (void **state) {
-  (void)state;
+static int table_setup (void) {
   if (mkdtemp (table_folder) == NULL || mkdir (table_in ("model"), 0700) != 0) return -1;
   return mkdir (table_in ("model/sub"), 0700) == 0 ? symlink ("../data.csv", table_in ("model/sub/..data.csv")) : -1;
 }
 
-static int table_teardown (void **state) {
+static int table_teardown (void) {
   char command[100];
-  (void)state;
   snprintf (command, sizeof command, "rm -r %s", table_folder);
   return system (command);
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_forms),        cmocka_unit_test (test_units),
-                                      cmocka_unit_test (test_bad_units),    cmocka_unit_test (test_too_large),
-                                      cmocka_unit_test (test_long_cells),   cmocka_unit_test (test_unit_of_signal),
-                                      cmocka_unit_test (test_unit_factors), cmocka_unit_test (test_scale),
-                                      cmocka_unit_test (test_contents),     cmocka_unit_test (test_places),
-                                      cmocka_unit_test (test_limits),       cmocka_unit_test (test_page) };
-  return cmocka_run_group_tests (tests, table_setup, table_teardown);
-}
+const check_fixture fixture = { table_setup, table_teardown };

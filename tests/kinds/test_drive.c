@@ -78,8 +78,7 @@ static void drive_shake (const char *method, double bound, const char *reason) {
   runs_close (r, s);
 }
 
-static void test_shaken (void **state) {
-  (void)state;
+TEST (shaken) {
   drive_shake ("rk4+projection", 1e-9, "(h w)^4 at h = 1e-3 and w = 5/s");
   drive_shake ("rk4+baumgarte", 1e-9, "(h w)^4 at h = 1e-3 and w = 5/s");
   drive_shake ("ida+ggl", 1e-6, "1e4 rtol");
@@ -117,8 +116,7 @@ static void drive_bead (pw_model *m, const void *parameters) {
 
 static const pw_plugin_table drive_bead_table = TRIAL_TABLE (drive_bead);
 
-static void test_bead (void **state) {
-  (void)state;
+TEST (bead) {
   pw_system *s = scene_system (&drive_bead_table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .ledger = 1 });
   check_below ("start", pw_run_initial (r)->velocity, 16 * CHECK_EPS, "given consistently");
@@ -158,8 +156,7 @@ static void drive_flywheel (pw_model *m, const void *parameters) {
                                 .value = DRIVE_HARMONIC (-3, 2, 0, 3) });
 }
 
-static void test_flywheel (void **state) {
-  (void)state;
+TEST (flywheel) {
   static const pw_plugin_table table = TRIAL_TABLE (drive_flywheel);
   pw_system *s = scene_system (&table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .ledger = 1 });
@@ -181,8 +178,7 @@ static void test_flywheel (void **state) {
 /* ---- Initial states, invalid signals ---- */
 
 /* A run that begins at t = 0.7 s has the drive's position and velocity at that time. */
-static void test_start (void **state) {
-  (void)state;
+TEST (start) {
   pw_system *s = scene_system (&drive_shaken_table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .t = 0.7 });
   pw_sample x = runs_to (r, 0.7);
@@ -198,9 +194,8 @@ static int drive_follow (void *context, double t, const double *x, double value[
   return 0;
 }
 
-static void test_refused (void **state) {
+TEST (refused) {
   static const char *const reads[] = { "bob.phi", NULL };
-  (void)state;
   pw_error error = { 0 };
   pw_signal follow = { PW_FUNCTION, .function = { .eval = drive_follow, .reads = reads } };
   pw_model *m = scene_model (&drive_shaken_table, NULL);
@@ -208,15 +203,7 @@ static void test_refused (void **state) {
   scene_refused (m, "model scene: drive shaker: value: a constraint's signal may depend on time only");
 }
 
-static void test_methods (void **state) {
-  (void)state;
+TEST (methods) {
   trial (&drive_shaken_table, 2);
   trial (&drive_bead_table, 2);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_shaken),   cmocka_unit_test (test_bead),
-                                      cmocka_unit_test (test_flywheel), cmocka_unit_test (test_start),
-                                      cmocka_unit_test (test_refused),  cmocka_unit_test (test_methods) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -65,9 +65,8 @@ static void feedback_run (const char *method, double signals, double step, doubl
   runs_close (r, s);
 }
 
-static void test_methods (void **state) {
+TEST (methods) {
   char name[40];
-  (void)state;
   for (int i = 0; runs_method (i, name); i++) {
     int adaptive = runs_method (i, name)->adaptive;
     double with[24], without[24], step = adaptive ? 1e-6 : 0.01; /* adaptive: less than the last step of any method */
@@ -80,17 +79,11 @@ static void test_methods (void **state) {
 }
 
 /* leapfrog would be of order 1 if signals at the end of a step were evaluated with the velocities of its middle. */
-static void test_order (void **state) {
+TEST (order) {
   double exact[24], coarse[24], fine[24];
-  (void)state;
   feedback_run ("erk8+projection", 0, 1e-6, exact);
   feedback_run ("leapfrog+rattle", 1, 0.01, coarse);
   feedback_run ("leapfrog+rattle", 1, 0.005, fine);
   double order = log2 (fabs (coarse[2] - exact[2]) / fabs (fine[2] - exact[2]));
   check_close ("order of leapfrog", order, 2, 0.1, "over one halving");
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_methods), cmocka_unit_test (test_order) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

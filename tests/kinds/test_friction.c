@@ -64,8 +64,7 @@ static void friction_rub (const char *method, double viscous, double limit, doub
   runs_close (r, s);
 }
 
-static void test_discs (void **state) {
-  (void)state;
+TEST (discs) {
   friction_rub ("rk4+projection", 0.4, 0, 1e-10, "(h k)^4 at h = 1e-3 and k = 2/s");
   friction_rub ("rk4+projection", 0, 0.3, 1e-10, "(h k)^4 at h = 1e-3 and k = 3/s");
   friction_rub ("ida+ggl", 0, 0.3, 1e-6, "1e4 rtol");
@@ -111,15 +110,13 @@ static void friction_slide (const char *method, double viscous, double limit, do
   runs_close (r, s);
 }
 
-static void test_slide (void **state) {
-  (void)state;
+TEST (slide) {
   friction_slide ("rk4+projection", 0.5, 0, 1e-10, "(h k)^4 at h = 1e-3 and k = 1/s");
   friction_slide ("rk4+projection", 0, 0.6, 1e-10, "(h k)^4 at h = 1e-3 and k = 4/s");
   friction_slide ("ida+ggl", 0, 0.6, 1e-6, "1e4 rtol");
 }
 
-static void test_refused (void **state) {
-  (void)state;
+TEST (refused) {
   scene_refused (scene_model (&friction_discs_table, "limit", 0.2, "speed", 0.0, NULL),
                  "model scene: friction rub: speed = 0: expected > 0, since below it the limit is smoothed");
 }
@@ -164,8 +161,7 @@ static void friction_fly (const char *method, double linear, double quadratic, d
   runs_close (r, s);
 }
 
-static void test_flight (void **state) {
-  (void)state;
+TEST (flight) {
   friction_fly ("rk4", 0, 0.4, 1e-10, "(h k)^4 at h = 1e-3 and k = 2/s");
   friction_fly ("rk4", 0.5, 0, 1e-10, "(h k)^4 at h = 1e-3 and k = 2/s");
   friction_fly ("rk4", 0.3, 0.4, 1e-10, "(h k)^4 at h = 1e-3 and k = 2/s");
@@ -208,8 +204,7 @@ static void friction_coast (const char *method, double bound, const char *reason
   runs_close (r, s);
 }
 
-static void test_coast (void **state) {
-  (void)state;
+TEST (coast) {
   friction_coast ("rk4+projection", 1e-10, "(h k)^4 at h = 1e-3 and k = 1.5/s");
   friction_coast ("ida+ggl", 1e-6, "1e4 rtol");
 }
@@ -245,15 +240,7 @@ static void friction_car (pw_model *m, const void *parameters) {
       m, &(pw_rolling_resistance){ .name = "F", .body = "car", .at = { 0.4, -0.2 }, .limit = 0.5, .speed = 0.3 });
 }
 
-static void test_methods (void **state) {
+TEST (methods) {
   static const pw_plugin_table car = TRIAL_TABLE (friction_car);
-  (void)state;
   trial (&car, 2);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_discs),   cmocka_unit_test (test_slide),
-                                      cmocka_unit_test (test_refused), cmocka_unit_test (test_flight),
-                                      cmocka_unit_test (test_coast),   cmocka_unit_test (test_methods) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -56,8 +56,7 @@ static void gear_turn (double ratio, double held) {
   runs_close (r, s);
 }
 
-static void test_turn (void **state) {
-  (void)state;
+TEST (turn) {
   gear_turn (-3, 0);
   gear_turn (2.5, 0);
   gear_turn (-3, 1);
@@ -65,8 +64,7 @@ static void test_turn (void **state) {
 }
 
 /* The initial angles do not have the given offset: both are changed to satisfy the constraint. */
-static void test_offset (void **state) {
-  (void)state;
+TEST (offset) {
   pw_system *s = scene_system (&gear_table, "from", (double)PW_GEAR_OFFSET, "offset", 0.25, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-2 });
   const double *q = pw_run_initial (r)->q;
@@ -83,9 +81,8 @@ static void gear_twice (pw_model *m, const void *parameters) {
   pw_add_gear (m, &(pw_gear){ .name = "gear", .body = { "a", "b", "a" }, .ratio = 2 });
 }
 
-static void test_refused (void **state) {
+TEST (refused) {
   static const pw_plugin_table twice = TRIAL_TABLE (gear_twice);
-  (void)state;
   scene_refused (scene_model (&gear_table, "ratio", 0.0, NULL),
                  "model scene: gear gear: ratio = 0: expected another number, positive or negative");
   scene_refused (scene_model (&twice, NULL),
@@ -110,14 +107,7 @@ static void gear_planetary (pw_model *m, const void *parameters) {
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 } });
 }
 
-static void test_methods (void **state) {
+TEST (methods) {
   static const pw_plugin_table planetary = TRIAL_TABLE (gear_planetary);
-  (void)state;
   trial (&planetary, 1.5);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_turn), cmocka_unit_test (test_offset),
-                                      cmocka_unit_test (test_refused), cmocka_unit_test (test_methods) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -16,8 +16,7 @@ static void gravity_fall (pw_model *m, const void *parameters) {
 }
 
 /* The centre of mass moves on a parabola, which rk4 integrates exactly; the wing is massless. */
-static void test_fall (void **state) {
-  (void)state;
+TEST (fall) {
   static const pw_plugin_table table = TRIAL_TABLE (gravity_fall);
   pw_system *s = scene_system (&table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 0.01, .ledger = 1 });
@@ -60,8 +59,7 @@ static void gravity_skate (const char *method, double bound, const char *reason)
   runs_close (r, s);
 }
 
-static void test_incline (void **state) {
-  (void)state;
+TEST (incline) {
   gravity_skate ("rk4+projection", 1e-10, "100 h^4 at h = 1e-3");
   gravity_skate ("ida+ggl", 1e-6, "1e4 rtol");
   gravity_skate ("ida+baumgarte", 1e-6, "1e4 rtol");
@@ -78,8 +76,7 @@ static void gravity_pendulum (pw_model *m, const void *parameters) {
 
 static const pw_plugin_table gravity_pendulum_table = TRIAL_TABLE (gravity_pendulum);
 
-static void test_pendulum (void **state) {
-  (void)state;
+TEST (pendulum) {
   pw_system *s = scene_system (&gravity_pendulum_table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .ledger = 1 });
   pw_sample x = runs_to (r, 10);
@@ -154,8 +151,7 @@ static void gravity_rain (pw_model *m, const void *parameters) {
 static const pw_plugin_table gravity_rain_table = TRIAL_TABLE (gravity_rain);
 
 /* Each body has its own terminal velocity, v = m g / c (exp (-c t / m) - 1) from rest, and its own ledger entry. */
-static void test_each_body (void **state) {
-  (void)state;
+TEST (each_body) {
   static const double mass[] = { 0.5, 2 }, up[] = { 3, 0 };
   static const char *const entry[] = { "air.drop.loss", "air.hail.loss" };
   pw_system *s = scene_system (&gravity_rain_table, NULL);
@@ -173,15 +169,7 @@ static void test_each_body (void **state) {
   runs_close (r, s);
 }
 
-static void test_methods (void **state) {
-  (void)state;
+TEST (methods) {
   trial (&gravity_pendulum_table, 3);
   trial (&gravity_rain_table, 1);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_fall), cmocka_unit_test (test_incline),
-                                      cmocka_unit_test (test_pendulum), cmocka_unit_test (test_each_body),
-                                      cmocka_unit_test (test_methods) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -72,8 +72,7 @@ static void motor_swing (const char *method, double driven, double bound, const 
   runs_close (r, s);
 }
 
-static void test_oscillator (void **state) {
-  (void)state;
+TEST (oscillator) {
   for (int driven = 0; driven < 2; driven++) {
     motor_swing ("rk4", driven, 1e-9, "(h w)^4 at h = 1e-3 and w = 4/s");
     motor_swing ("ida", driven, 1e-6, "1e4 rtol");
@@ -109,8 +108,7 @@ static void motor_run_up (const char *method, double limit, double bound, const 
   runs_close (r, s);
 }
 
-static void test_limit (void **state) {
-  (void)state;
+TEST (limit) {
   motor_run_up ("rk4", 0, 1e-9, "(h k)^4 at h = 1e-3 and k = 5/s");
   motor_run_up ("rk4", 1.5, 1e-9, "(h k)^4 at h = 1e-3 and k = 5/s");
   motor_run_up ("ida", 1.5, 1e-6, "1e4 rtol");
@@ -168,8 +166,7 @@ static void motor_fly (const char *method, double bound, const char *reason) {
   runs_close (r, s);
 }
 
-static void test_force (void **state) {
-  (void)state;
+TEST (force) {
   motor_fly ("rk4", 1e-10, "(h w)^4 at h = 1e-3 and w = 2/s");
   motor_fly ("ida", 1e-6, "1e4 rtol");
 }
@@ -236,15 +233,8 @@ static void motor_leader (pw_model *m, const void *parameters) {
   pw_add_rotational_spring (m, &(pw_rotational_spring){ .name = "k", .body = { "leader", "ground" }, .stiffness = 2 });
 }
 
-static void test_methods (void **state) {
+TEST (methods) {
   static const pw_plugin_table arm = TRIAL_TABLE (motor_arm), leader = TRIAL_TABLE (motor_leader);
-  (void)state;
   trial (&arm, 1.5);
   trial (&leader, 1.5);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_oscillator), cmocka_unit_test (test_limit),
-                                      cmocka_unit_test (test_force), cmocka_unit_test (test_methods) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -39,8 +39,7 @@ static void rod_whirl (const char *method, double bound, const char *reason) {
   runs_close (r, s);
 }
 
-static void test_whirl (void **state) {
-  (void)state;
+TEST (whirl) {
   rod_whirl ("rk4+projection", 1e-10, "(h w)^4 at h = 1e-3 and w = 3/s");
   rod_whirl ("ida+ggl", 1e-6, "1e4 rtol");
 }
@@ -77,8 +76,7 @@ static void rod_fourbar (pw_model *m, const void *parameters) {
 
 static const pw_plugin_table rod_fourbar_table = TRIAL_TABLE_WITH (rod_fourbar, rod_list, sizeof (rod_parameters));
 
-static void test_link (void **state) {
-  (void)state;
+TEST (link) {
   const char *reason = "(h w)^4 at h = 1e-3 and w = 10/s: two projections";
   pw_system *s = scene_system (&rod_fourbar_table, NULL), *p = scene_system (&rod_fourbar_table, "link", 1.0, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3 }),
@@ -111,14 +109,7 @@ static void rod_chain (pw_model *m, const void *parameters) {
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -4 } });
 }
 
-static void test_methods (void **state) {
+TEST (methods) {
   static const pw_plugin_table chain = TRIAL_TABLE (rod_chain);
-  (void)state;
   trial (&chain, 1.5);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_whirl), cmocka_unit_test (test_link),
-                                      cmocka_unit_test (test_methods) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

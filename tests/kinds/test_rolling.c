@@ -54,9 +54,8 @@ static void rolling_turn (const char *method, double inertia, double bound, cons
   runs_close (run, system);
 }
 
-static void test_unicycle (void **state) {
+TEST (unicycle) {
   static const double inertia[] = { 0.03, 0 };
-  (void)state;
   for (int i = 0; i < 2; i++) {
     rolling_turn ("rk4+projection", inertia[i], 1e-11, "10 h^4 at h = 1e-3");
     rolling_turn ("rk4+baumgarte", inertia[i], 1e-11, "10 h^4 at h = 1e-3");
@@ -140,9 +139,8 @@ static void rolling_every_method (const pw_plugin_table *table, const double sha
       rolling_circle (table, shares, method, 100 * pow (1e-3, m->order), "100 h^order at h = 1e-3");
 }
 
-static void test_robot (void **state) {
+TEST (robot) {
   static const double halves[] = { 0.5, 0.5 };
-  (void)state;
   char text[200];
   rolling_every_method (&rolling_robot_table, halves);
   pw_system *s = scene_system (&rolling_robot_table, NULL);
@@ -153,9 +151,8 @@ static void test_robot (void **state) {
   runs_close (r, s);
 }
 
-static void test_hub (void **state) {
+TEST (hub) {
   static const double all[] = { 1, 0 };
-  (void)state;
   rolling_every_method (&rolling_hub_table, all);
 }
 
@@ -183,8 +180,7 @@ static void rolling_speed (const char *method, double bound, const char *reason)
   runs_close (run, s);
 }
 
-static void test_motor (void **state) {
-  (void)state;
+TEST (motor) {
   rolling_speed ("rk4+projection", 1e-11, "(h k / J)^4 at h = 1e-3");
   rolling_speed ("ida+ggl", 1e-6, "1e4 rtol");
 }
@@ -204,8 +200,7 @@ static void rolling_coast (pw_model *m, const void *parameters) {
 }
 
 /* A wheel without a given spin rate takes that with which it rolls; the velocity of the body does not change. */
-static void test_start (void **state) {
-  (void)state;
+TEST (start) {
   static const pw_plugin_table table = TRIAL_TABLE (rolling_coast);
   pw_system *s = scene_system (&table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", NULL);
@@ -215,8 +210,7 @@ static void test_start (void **state) {
 }
 
 /* A spin rate set by pw_model_set_initial is kept; the velocity of the body changes. */
-static void test_given (void **state) {
-  (void)state;
+TEST (given) {
   pw_error error = { 0 };
   pw_model *m = scene_model (&rolling_unicycle_table, NULL);
   check_ok (pw_model_set_initial (m, "wheel.spin_rate", 4, &error), &error);
@@ -247,17 +241,8 @@ static void rolling_bicycle (pw_model *m, const void *parameters) {
       m, &(pw_rolling_wheel){ .name = "front", .body = "fork", .at = { -0.05, 0 }, .heading = 0.1, .radius = 0.25 });
 }
 
-static void test_methods (void **state) {
-  (void)state;
+TEST (methods) {
   static const pw_plugin_table bicycle = TRIAL_TABLE (rolling_bicycle);
   trial (&bicycle, 2);
   trial (&rolling_hub_table, 2);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_unicycle), cmocka_unit_test (test_robot),
-                                      cmocka_unit_test (test_hub),      cmocka_unit_test (test_motor),
-                                      cmocka_unit_test (test_start),    cmocka_unit_test (test_given),
-                                      cmocka_unit_test (test_methods) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

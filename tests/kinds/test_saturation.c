@@ -116,19 +116,17 @@ static const char *const saturation_methods[] = { "bdf+none",   "bdf+projection"
 enum { SATURATION_METHODS = sizeof saturation_methods / sizeof *saturation_methods };
 
 /* Without bounds of the tolerances, bdf+projection ends at wrong positions, without an error. */
-static void test_block (void **state) {
+TEST (block) {
   static const double setting[][2] = { { 1e-6, 1e-8 }, { 1e-6, 1e-7 }, { 1e-4, 1e-8 },
                                        { 1e-4, 1e-7 }, { 1e-2, 1e-8 }, { 1e-8, 1e-10 } };
-  (void)state;
   for (int m = 0; m < SATURATION_METHODS; m++)
     for (size_t k = 0; k < sizeof setting / sizeof *setting; k++)
       for (int i = 0; i < 12; i++)
         saturation_stops (0, saturation_methods[m], setting[k][0], 0, setting[k][1], 0.2 + 0.15 * i);
 }
 
-static void test_kinds (void **state) {
+TEST (kinds) {
   static const double setting[][2] = { { 1e-6, 1e-9 }, { 1e-5, 1e-7 }, { 1e-3, 1e-8 } };
-  (void)state;
   for (int scene = 1; scene < SATURATION_SCENES; scene++)
     for (int m = 0; m < SATURATION_METHODS; m++)
       for (size_t k = 0; k < sizeof setting / sizeof *setting; k++)
@@ -137,9 +135,8 @@ static void test_kinds (void **state) {
 }
 
 /* Explicit methods oscillate about rest, with an amplitude that the tolerance permits. */
-static void test_explicit (void **state) {
+TEST (explicit) {
   static const char *const methods[] = { "erk5+none", "erk5+projection", "erk8+projection" };
-  (void)state;
   for (int m = 0; m < 3; m++)
     for (int k = 2; k <= 3; k++)
       for (int i = 0; i < 12; i++) {
@@ -154,8 +151,7 @@ static void test_explicit (void **state) {
 }
 
 /* The same with an absolute tolerance above the velocity scale, which pw_run_saturation returns. */
-static void test_atol (void **state) {
-  (void)state;
+TEST (atol) {
   for (int m = 0; m < SATURATION_METHODS; m++)
     for (int i = 0; i < 4; i++) saturation_stops (0, saturation_methods[m], 1e-4, 1e-3, 1e-8, 0.25 + 0.45 * i);
   for (int scene = 0; scene < SATURATION_SCENES; scene++) {
@@ -188,21 +184,13 @@ static void saturation_driven (pw_model *m, const void *parameters) {
 }
 
 /* pw_run_saturation finds the velocity scale although a signal has no value at rest. */
-static void test_no_rest (void **state) {
+TEST (no_rest) {
   const pw_plugin_table table = SATURATION_TABLE (saturation_driven);
   char element[100];
   double least;
   pw_system *s = scene_system (&table, "speed", 1e-3, NULL);
   pw_run *r = runs_open (s, "erk5+projection", NULL);
-  (void)state;
   assert_int_equal (pw_run_saturation (r, &least, element, sizeof element), pw_system_coordinates (s));
   check_close ("driven block", least, 1e-3, 1e-3 * 8 * CHECK_EPS, "round-off");
   runs_close (r, s);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_block), cmocka_unit_test (test_kinds),
-                                      cmocka_unit_test (test_explicit), cmocka_unit_test (test_atol),
-                                      cmocka_unit_test (test_no_rest) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

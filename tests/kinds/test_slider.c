@@ -31,9 +31,8 @@ static void slider_incline (pw_model *m, const void *parameters) {
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -slider_i.g } });
 }
 
-static void test_incline (void **state) {
+TEST (incline) {
   static const pw_plugin_table table = TRIAL_TABLE (slider_incline);
-  (void)state;
   pw_system *s = scene_system (&table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-2, .ledger = 1 });
   const double t = 2, c = cos (slider_i.beta), si = sin (slider_i.beta), ca = cos (slider_i.alpha),
@@ -88,8 +87,7 @@ static void slider_turn (const char *method, double bound, const char *reason) {
   runs_close (r, s);
 }
 
-static void test_yoke (void **state) {
-  (void)state;
+TEST (yoke) {
   slider_turn ("rk4+projection", 1e-10, "(h w)^4 at h = 1e-3 and w = 3/s");
   slider_turn ("ida+ggl", 1e-7, "1e3 rtol");
 }
@@ -149,9 +147,8 @@ static void slider_state (double by, const char *force, const char *moment, doub
   runs_close (r, s);
 }
 
-static void test_drives (void **state) {
+TEST (drives) {
   double a[14], b[14];
-  (void)state;
   slider_state (0, "S.N", "S.M", a);
   slider_state (1, "aside.F", "turn.F", b);
   for (int i = 0; i < 14; i++) check_close ("slider", a[i], b[i], 1e6 * CHECK_EPS, "round-off of 2000 steps");
@@ -181,15 +178,8 @@ static void slider_train (pw_model *m, const void *parameters) {
              .name = "l", .body = { "cam", "ram" }, .at = { { 0, 0 }, { 0, 1 } }, .stiffness = 6, .damping = 0.1 });
 }
 
-static void test_methods (void **state) {
+TEST (methods) {
   static const pw_plugin_table train = TRIAL_TABLE (slider_train), yoke = TRIAL_TABLE (slider_yoke);
-  (void)state;
   trial (&train, 2);
   trial (&yoke, 2);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_incline), cmocka_unit_test (test_yoke),
-                                      cmocka_unit_test (test_drives), cmocka_unit_test (test_methods) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -73,8 +73,7 @@ static void speed_follow (const char *method, double pfaffian, double bound, con
   runs_close (r, s);
 }
 
-static void test_sled (void **state) {
-  (void)state;
+TEST (sled) {
   for (int pfaffian = 0; pfaffian < 2; pfaffian++) {
     speed_follow ("rk4+projection", pfaffian, 1e-10, "(h w)^4 at h = 1e-3 and w = 2/s");
     speed_follow ("ida+ggl", pfaffian, 1e-6, "1e4 rtol");
@@ -98,11 +97,10 @@ static void speed_pair (pw_model *m, const void *parameters) {
   pw_add_torque (m, &(pw_torque){ .name = "T", .body = { "b", "ground" }, .value = { PW_CONSTANT, .constant = 0.5 } });
 }
 
-static void test_pair (void **state) {
+TEST (pair) {
   static const pw_plugin_table pair = TRIAL_TABLE (speed_pair);
   const double t = 2, i = speed_p.ratio, bound = 1e-11;
   const char *reason = "(h w)^4 at h = 1e-3 and w = 1.5/s";
-  (void)state;
   pw_system *s = scene_system (&pair, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .ledger = 1 });
   pw_sample x = runs_to (r, t);
@@ -123,9 +121,8 @@ static void speed_nothing (pw_model *m, const void *parameters) {
   pw_add_pfaffian (m, &(pw_pfaffian){ .name = "none", .body = { "a", "ground" } });
 }
 
-static void test_refused (void **state) {
+TEST (refused) {
   static const pw_plugin_table nothing = TRIAL_TABLE (speed_nothing);
-  (void)state;
   scene_refused (scene_model (&nothing, NULL),
                  "model scene: pfaffian none: a and b are all zero: expected at least one other number");
 }
@@ -153,14 +150,7 @@ static void speed_tow (pw_model *m, const void *parameters) {
                                   .length = 0.4 });
 }
 
-static void test_methods (void **state) {
+TEST (methods) {
   static const pw_plugin_table tow = TRIAL_TABLE (speed_tow);
-  (void)state;
   trial (&tow, 1.5);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_sled), cmocka_unit_test (test_pair),
-                                      cmocka_unit_test (test_refused), cmocka_unit_test (test_methods) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

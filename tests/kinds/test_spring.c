@@ -43,8 +43,7 @@ static void spring_swing (const char *method, double bound, const char *reason) 
   runs_close (r, s);
 }
 
-static void test_oscillator (void **state) {
-  (void)state;
+TEST (oscillator) {
   spring_swing ("rk4+projection", 1e-10, "(h w)^4 / 10 at h = 1e-3 and w = 6/s");
   spring_swing ("ida", 1e-6, "1e4 rtol");
 }
@@ -67,8 +66,7 @@ static void spring_ellipse (pw_model *m, const void *parameters) {
 static const pw_parameter spring_which[] = { { .name = "which", .value = 0, .domain = PW_NONNEGATIVE },
                                              { .name = NULL } };
 
-static void test_ellipse (void **state) {
-  (void)state;
+TEST (ellipse) {
   static const pw_plugin_table table = TRIAL_TABLE_WITH (spring_ellipse, spring_which, sizeof (double));
   const double w = 3, t = 4;
   for (int i = 0; i < 2; i++) {
@@ -98,8 +96,7 @@ static void spring_meeting (pw_model *m, const void *parameters) {
                                     .length = i ? 0.3 : 0 });
 }
 
-static void test_meeting (void **state) {
-  (void)state;
+TEST (meeting) {
   static const pw_plugin_table table = TRIAL_TABLE (spring_meeting);
   pw_system *s = scene_system (&table, NULL);
   pw_workspace *w = pw_workspace_new (s, NULL);
@@ -130,8 +127,7 @@ static void spring_settling (pw_model *m, const void *parameters) {
   pw_add_spring (m, &(pw_spring){ .name = "S", .body = { "bead", "ground" }, .stiffness = 5, .damping = 2 });
 }
 
-static void test_settling (void **state) {
-  (void)state;
+TEST (settling) {
   static const pw_plugin_table table = TRIAL_TABLE (spring_settling);
   pw_system *s = scene_system (&table, NULL);
   pw_workspace *w = pw_workspace_new (s, NULL);
@@ -171,15 +167,7 @@ static void spring_web (pw_model *m, const void *parameters) {
           .name = "hook", .body = { "ground", "b" }, .at = { { 3, 3 }, { 0, 0.1 } }, .stiffness = 4, .damping = 0.2 });
 }
 
-static void test_methods (void **state) {
-  (void)state;
+TEST (methods) {
   static const pw_plugin_table web = TRIAL_TABLE (spring_web);
   trial (&web, 2);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_oscillator), cmocka_unit_test (test_ellipse),
-                                      cmocka_unit_test (test_meeting), cmocka_unit_test (test_settling),
-                                      cmocka_unit_test (test_methods) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -72,8 +72,7 @@ static void steered_drive (const char *method, double bound, const char *reason)
   runs_close (r, s);
 }
 
-static void test_car (void **state) {
-  (void)state;
+TEST (car) {
   steered_drive ("rk4+projection", 1e-10, "(h w)^4 at h = 1e-3 and w = 2/s, over 4 s");
   steered_drive ("rk4+baumgarte", 1e-10, "(h w)^4 at h = 1e-3 and w = 2/s, over 4 s");
   steered_drive ("ida+ggl", 1e-6, "1e4 rtol");
@@ -140,23 +139,15 @@ static void steered_compare (double one, double other, double bound, const char 
   pw_system_free (s), pw_system_free (p);
 }
 
-static void test_fork (void **state) {
-  (void)state;
+TEST (fork) {
   steered_compare (0, 1, 1e-9, "(h w)^4 at h = 1e-3 and w = 2/s: two projections");
   steered_compare (2, 3, 1e5 * CHECK_EPS, "round-off of 2000 steps");
 }
 
 /* ---- By all methods ---- */
 
-static void test_methods (void **state) {
+TEST (methods) {
   static const pw_plugin_table car = TRIAL_TABLE (steered_car);
-  (void)state;
   trial (&steered_truck_table, 2);
   trial (&car, 2);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_car), cmocka_unit_test (test_fork),
-                                      cmocka_unit_test (test_methods) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

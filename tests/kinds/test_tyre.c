@@ -51,8 +51,7 @@ static void tyre_stop (const char *method, double load, double bound, const char
   runs_close (r, s);
 }
 
-static void test_slide (void **state) {
-  (void)state;
+TEST (slide) {
   tyre_stop ("rk4", 0, 1e-10, "(h k)^4 at h = 1e-3 and k = 3/s");
   tyre_stop ("rk4", 5, 1e-10, "(h k)^4 at h = 1e-3 and k = 3/s");
   tyre_stop ("ida", 0, 1e-7, "1e3 rtol");
@@ -93,9 +92,8 @@ static void tyre_vehicle (pw_model *m, const void *parameters) {
 static const pw_plugin_table tyre_vehicle_table =
     TRIAL_TABLE_WITH (tyre_vehicle, tyre_vehicle_list, sizeof (tyre_vehicle_parameters));
 
-static void test_limit (void **state) {
+TEST (limit) {
   enum { STEPS = 5 }; /* stiffnesses, from 100 N over two decades */
-  (void)state;
   double wheel[6], rate[6], q[6], v[6], distance[STEPS], stiffness = 100;
   pw_settings settings = { .rtol = 1e-10, .span = 2 };
   pw_system *s = scene_system (&tyre_vehicle_table, NULL);
@@ -116,8 +114,7 @@ static void test_limit (void **state) {
 
 /* ---- Load and friction: both are given, or neither ---- */
 
-static void test_refused (void **state) {
-  (void)state;
+TEST (refused) {
   scene_refused (scene_model (&tyre_slide_table, "load", 5.0, NULL),
                  "model scene: tyre T: friction = 0: expected > 0, since a load limits the force to friction x load");
   scene_refused (scene_model (&tyre_slide_table, "friction", 0.4, NULL),
@@ -149,14 +146,7 @@ static void tyre_car (pw_model *m, const void *parameters) {
                               .friction = 0.5 });
 }
 
-static void test_methods (void **state) {
-  (void)state;
+TEST (methods) {
   static const pw_plugin_table car = TRIAL_TABLE (tyre_car);
   trial (&car, 2);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_slide), cmocka_unit_test (test_limit),
-                                      cmocka_unit_test (test_refused), cmocka_unit_test (test_methods) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

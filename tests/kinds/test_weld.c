@@ -70,8 +70,7 @@ static void weld_compare (const char *method, double bound, const char *reason) 
   pw_system_free (one), pw_system_free (two);
 }
 
-static void test_one_body (void **state) {
-  (void)state;
+TEST (one_body) {
   weld_compare ("rk4+projection", 1e-12, "the same steps: round-off of 3000");
   weld_compare ("ida+ggl", 1e-6, "1e4 rtol");
   weld_compare ("ida+baumgarte", 1e-6, "1e4 rtol");
@@ -119,10 +118,9 @@ static void weld_pendulum (pw_model *m, const void *parameters) {
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 } });
 }
 
-static void test_points (void **state) {
+TEST (points) {
   static const pw_plugin_table points = TRIAL_TABLE (weld_string), one = TRIAL_TABLE (weld_pendulum);
   static const char *const method[] = { "rk4+projection", "rk4+nullspace", "leapfrog", "galpha+ggl" };
-  (void)state;
   for (int i = 0; i < 4; i++) {
     pw_system *s = scene_system (&points, NULL), *t = scene_system (&one, NULL);
     pw_run *r = runs_open (s, method[i], &(pw_settings){ .step = 2e-3, .span = 1 });
@@ -146,8 +144,7 @@ static void weld_beam (pw_model *m, const void *parameters) {
 }
 
 /* The described position is half a metre too far to the left; the initial state satisfies the weld. */
-static void test_beam (void **state) {
-  (void)state;
+TEST (beam) {
   static const pw_plugin_table table = TRIAL_TABLE (weld_beam);
   pw_system *s = scene_system (&table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 0.01 });
@@ -162,13 +159,6 @@ static void test_beam (void **state) {
   runs_close (r, s);
 }
 
-static void test_methods (void **state) {
-  (void)state;
+TEST (methods) {
   trial (&weld_two_table, 3);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_one_body), cmocka_unit_test (test_points),
-                                      cmocka_unit_test (test_beam), cmocka_unit_test (test_methods) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

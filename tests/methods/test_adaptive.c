@@ -38,9 +38,8 @@ static void adaptive_order (const char *integrator, int order, const double step
   }
 }
 
-static void test_orders (void **state) {
+TEST (orders) {
   static const double step5[] = { 0.04, 0.02, 0.01 }, step8[] = { 0.2, 0.1, 0.05 };
-  (void)state;
   adaptive_order ("erk5", 5, step5, 0.3, "order 5, and the next power of h");
   adaptive_order ("erk8", 8, step8, 0.75, "order 8, and the next power of h: steps are large, or round-off shows");
 }
@@ -51,8 +50,7 @@ static const char *const adaptive_methods[] = { "erk5+none", "erk5+projection", 
                                                 "erk8+none", "erk8+projection", "erk8+projection:metric=identity" };
 enum { ADAPT_METHODS = sizeof adaptive_methods / sizeof *adaptive_methods };
 
-static void test_tolerances (void **state) {
-  (void)state;
+TEST (tolerances) {
   for (int i = 0; i < ADAPT_METHODS; i++) {
     double error[13];
     long steps = 0;
@@ -78,8 +76,7 @@ static void test_tolerances (void **state) {
 }
 
 /* The work grows with rtol^(-1/order): erk8 becomes cheaper relative to erk5 at tight tolerances. */
-static void test_work (void **state) {
-  (void)state;
+TEST (work) {
   const double rtol[] = { 1e-6, 1e-9, 1e-12 };
   double before = 1;
   for (int i = 0; i < 3; i++) {
@@ -119,8 +116,7 @@ static const pw_parameter adaptive_edge_list[] = {
   { .name = NULL },
 };
 
-static void test_edge (void **state) {
-  (void)state;
+TEST (edge) {
   static const pw_plugin_table table = { .abi = PW_ABI,
                                          .size = sizeof table,
                                          .parameters = adaptive_edge_list,
@@ -228,8 +224,7 @@ static double adaptive_estimate (double t, double h, const pw_sample *x, const p
 
 /* h_new / h = 0.9 err^-(1/5 - 3/4 0.04) err_before^0.04, unless the error of the work is larger than that of the state
  * (Hairer, Norsett & Wanner 1993, section II.4). */
-static void test_norm (void **state) {
-  (void)state;
+TEST (norm) {
   const double rtol = 1e-8, round_off = 1e-6;
   double before = 0, predicted = 0;
   int equal = 0;
@@ -255,8 +250,7 @@ static void test_norm (void **state) {
 
 /* A narrow bump causes rejected steps, after which a step may be far smaller than needed: the next one is not
  * longer. */
-static void test_after_rejection (void **state) {
-  (void)state;
+TEST (after_rejection) {
   int found = 0;
   for (adaptive_height = 1e-3; adaptive_height < 1e6; adaptive_height *= 3) {
     pw_system *s = scene_system (&adaptive_bump_table, NULL);
@@ -276,8 +270,7 @@ static void test_after_rejection (void **state) {
 }
 
 /* A step shortened at the requested time does not shorten later steps. */
-static void test_after_cut (void **state) {
-  (void)state;
+TEST (after_cut) {
   pw_system *s = scene_system (&scene_ezyroller, NULL);
   pw_run *r = runs_open (s, "erk5+projection", &(pw_settings){ .rtol = 1e-8, .span = 10 });
   double h = 0;
@@ -318,8 +311,7 @@ static double adaptive_steps (const char *method, double rtol, double t_end) {
   return (double)cost.steps;
 }
 
-static void test_prescribed (void **state) {
-  (void)state;
+TEST (prescribed) {
   double few = adaptive_steps ("erk5+projection", 1e-4, 50), many = adaptive_steps ("erk5+projection", 1e-10, 50);
   check_close ("growth of steps", log10 (many / few) / 6, 0.15, 0.02, "rtol^(3/20); rtol^(1/10) without the root");
   check_below ("steps of bdf+projection", 300, adaptive_steps ("bdf+projection", 1e-4, 50),
@@ -384,8 +376,7 @@ static void adaptive_stops (const char *method, const pw_plugin_table *table, do
   pw_system_free (s);
 }
 
-static void test_stops (void **state) {
-  (void)state;
+TEST (stops) {
   for (int i = 0; i < ADAPT_METHODS; i++) {
     adaptive_stops (adaptive_methods[i], &adaptive_tables[0], 1 + 100 * 1e-8, "the tolerances require a step below ");
     adaptive_stops (adaptive_methods[i], &adaptive_tables[1], 0.7, "a signal failed");
@@ -393,9 +384,8 @@ static void test_stops (void **state) {
 }
 
 /* Tolerances that accept everything: the run ends at t_end, or with an error. */
-static void test_useless_tolerances (void **state) {
+TEST (useless_tolerances) {
   static const double atol[] = { 0, 1e6 };
-  (void)state;
   for (int i = 0; i < ADAPT_METHODS; i++)
     for (int k = 0; k < 2; k++) {
       pw_error error = { 0 };
@@ -407,20 +397,4 @@ static void test_useless_tolerances (void **state) {
       pw_run_close (r);
       pw_system_free (s);
     }
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_orders),
-    cmocka_unit_test (test_tolerances),
-    cmocka_unit_test (test_work),
-    cmocka_unit_test (test_norm),
-    cmocka_unit_test (test_after_rejection),
-    cmocka_unit_test (test_after_cut),
-    cmocka_unit_test (test_prescribed),
-    cmocka_unit_test (test_edge),
-    cmocka_unit_test (test_stops),
-    cmocka_unit_test (test_useless_tolerances),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -92,8 +92,7 @@ static const struct {
                       { "bdf+projection", 1e3 },
                       { "bdf+projection:metric=identity:every=3", 1e3 } };
 
-static void test_integrators (void **state) {
-  (void)state;
+TEST (integrators) {
   const double rtol = 1e-9;
   for (int scene = 0; scene < AGREE_SCENES; scene++) {
     double q[AGREE_MOST], v[AGREE_MOST], Q[AGREE_MOST], V[AGREE_MOST];
@@ -117,12 +116,11 @@ static void test_integrators (void **state) {
 /* ---- The ledger ---- */
 
 /* The energy balances, and the ledger does not change the run. */
-static void test_ledger (void **state) {
+TEST (ledger) {
   static const char *const method[] = { "rk4+projection", "rk4+none",      "rk4+baumgarte",  "ida+ggl",
                                         "ida+baumgarte",  "ida+index2",    "ida+si1",        "adams+baumgarte",
                                         "bdf+none",       "bdf+baumgarte", "bdf+projection", "radau+ggl",
                                         "radau+index2",   "radau+index3" };
-  (void)state;
   for (int scene = 0; scene < AGREE_SCENES; scene++)
     for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
       pw_system *s = agree_scene (scene);
@@ -155,10 +153,9 @@ static void test_ledger (void **state) {
 /* ---- Sampling ---- */
 
 /* Samples at any time do not change the run, and satisfy the constraints as accurately as its steps. */
-static void test_sampling (void **state) {
+TEST (sampling) {
   static const char *const method[] = { "rk4+projection", "bdf+projection", "ida+ggl",    "radau+ggl",    "ida+si1",
                                         "rk4+none",       "ida+baumgarte",  "adams+none", "bdf+baumgarte" };
-  (void)state;
   for (int scene = 0; scene < AGREE_SCENES; scene++)
     for (int i = 0; i < 9; i++) {
       pw_system *s = agree_scene (scene);
@@ -191,9 +188,8 @@ static void test_sampling (void **state) {
 }
 
 /* Samples inside steps are as accurate as the ends of steps. */
-static void test_dense (void **state) {
+TEST (dense) {
   static const char *const method[] = { "rk4+projection", "ida+ggl", "radau+ggl" };
-  (void)state;
   for (int scene = 0; scene < AGREE_SCENES; scene++)
     for (int i = 0; i < 3; i++) {
       pw_system *s = agree_scene (scene);
@@ -261,7 +257,7 @@ static void agree_verify (int scene, const agree_bound *bound) {
   pw_system_free (s);
 }
 
-static void test_verifier (void **state) {
+TEST (verifier) {
   static const agree_bound bounds[] = {
     { "rk4+projection", 16 * CHECK_EPS, 16 * CHECK_EPS, 64 * CHECK_EPS, 64 * CHECK_EPS,
       "round-off of the projection and of one solve" },
@@ -269,14 +265,12 @@ static void test_verifier (void **state) {
     { "radau+ggl", 1e-8, 1e-8, 64 * CHECK_EPS, 64 * CHECK_EPS, "10 rtol; round-off of one solve" },
     { "ida+ggl", 1e-8, 1e-8, 1e-4, 1e-4, "10 rtol; accelerations are one derivative up: 1e5 rtol" },
   };
-  (void)state;
   for (int scene = 0; scene < AGREE_SCENES; scene++)
     for (int i = 0; i < 4; i++) agree_verify (scene, &bounds[i]);
 }
 
 /* The verifier detects an error of 1e-6 in any number. */
-static void test_verifier_detects_errors (void **state) {
-  (void)state;
+TEST (verifier_detects_errors) {
   pw_system *s = agree_scene (AGREE_CART);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 1 });
   pw_sample now = runs_to (r, 0.5);
@@ -308,8 +302,7 @@ static void test_verifier_detects_errors (void **state) {
 /* ---- Units ---- */
 
 /* The EzyRoller in units of 1/1024 m and 1/8 kg: all numbers differ only in the exponent. */
-static void test_units (void **state) {
-  (void)state;
+TEST (units) {
   const double L = 1024, m = 8, I = L * L * m;
   static const char *const method[] = { "rk4+projection", "rk4+none",  "rk4+baumgarte", "ida+ggl",
                                         "ida+baumgarte",  "radau+ggl", "radau+index3" };
@@ -350,10 +343,9 @@ static void agree_swing (pw_model *m, const void *parameters) {
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 * L } });
 }
 
-static void test_units_of_moments (void **state) {
+TEST (units_of_moments) {
   static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = agree_swing };
   static const char *const method[] = { "ida+si1", "ida+ggl", "ida+baumgarte", "radau+ggl" };
-  (void)state;
   for (int i = 0; i < 4; i++) {
     pw_settings settings = { .rtol = 1e-8, .span = 1 };
     double q[6], v[6], Q[6], V[6];
@@ -369,14 +361,4 @@ static void test_units_of_moments (void **state) {
     pw_system_free (s);
     pw_system_free (S);
   }
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_integrators), cmocka_unit_test (test_ledger),
-    cmocka_unit_test (test_sampling),    cmocka_unit_test (test_dense),
-    cmocka_unit_test (test_verifier),    cmocka_unit_test (test_verifier_detects_errors),
-    cmocka_unit_test (test_units),       cmocka_unit_test (test_units_of_moments),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

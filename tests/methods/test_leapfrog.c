@@ -19,16 +19,14 @@ static const struct {
                        { "car-tyres", 0.002, 1 } };
 enum { LEAPFROG_SCENES = sizeof leapfrog_scene / sizeof *leapfrog_scene };
 
-static void test_order (void **state) {
-  (void)state;
+TEST (order) {
   for (int i = 0; i < LEAPFROG_SCENES; i++)
     ladder_expect (leapfrog_scene[i].model, "leapfrog", leapfrog_scene[i].h, leapfrog_scene[i].t, 2, 0.25,
                    LADDER_LAMBDA);
   ladder_expect ("tractor", "leapfrog", 0.01, 1, 2, 0.25, LADDER_Q); /* prescribed motion */
 }
 
-static void test_residuals (void **state) {
-  (void)state;
+TEST (residuals) {
   for (int i = 0; i < LEAPFROG_SCENES; i++) {
     double h = leapfrog_scene[i].h;
     pw_statistics cost = ladder_run (leapfrog_scene[i].model, "leapfrog", h, 20 * h).cost;
@@ -121,8 +119,7 @@ static const struct {
 };
 enum { LEAPFROG_CONSERVATIVE = sizeof leapfrog_conservative / sizeof *leapfrog_conservative };
 
-static void test_way_back (void **state) {
-  (void)state;
+TEST (way_back) {
   for (int i = 0; i < LEAPFROG_CONSERVATIVE; i++) {
     const char *model = leapfrog_conservative[i].model;
     double h = leapfrog_conservative[i].h, n = leapfrog_conservative[i].steps;
@@ -152,8 +149,7 @@ static double leapfrog_drift_of (const char *model, const char *method, double h
   return fabs (mean[3] - mean[0]) / most;
 }
 
-static void test_energy (void **state) {
-  (void)state;
+TEST (energy) {
   for (int i = 0; i < LEAPFROG_CONSERVATIVE; i++) {
     const char *model = leapfrog_conservative[i].model;
     double h = leapfrog_conservative[i].h, transient = i == 4 ? 0.1 : 0.05;
@@ -169,9 +165,8 @@ static void test_energy (void **state) {
 /* ---- Step sizes and settings ---- */
 
 /* The last step is shortened; the order is unchanged. */
-static void test_last_step (void **state) {
+TEST (last_step) {
   static const char *const model[] = { "arm", "n-four-bar", "ezyroller" };
-  (void)state;
   for (int k = 0; k < 3; k++) {
     double h = 0.004, t = 0.3 + h / 12;
     ladder_error coarse = ladder_run (model[k], "leapfrog", h, t), fine = ladder_run (model[k], "leapfrog", h / 4, t);
@@ -196,9 +191,8 @@ static void leapfrog_stops (pw_system *s, double step, const char *cause) {
   pw_system_free (s);
 }
 
-static void test_large_steps (void **state) {
+TEST (large_steps) {
   static const pw_plugin_table damped = TRIAL_TABLE (leapfrog_damped);
-  (void)state;
   leapfrog_stops (ladder_open ("ezyroller"), 3, "the step of 3 s may be too large");
   leapfrog_stops (ladder_open ("pendulum"), 1, "the step of 1 s may be too large");
   leapfrog_stops (scene_system (&damped, NULL), 0.01,
@@ -244,17 +238,7 @@ static void leapfrog_beyond_edge (pw_model *m, const void *parameters) {
 }
 
 /* The step that meets it is refused, although the corrections of y and phi are 0. */
-static void test_undefined_force (void **state) {
+TEST (undefined_force) {
   static const pw_plugin_table undefined = TRIAL_TABLE (leapfrog_beyond_edge);
-  (void)state;
   leapfrog_stops (scene_system (&undefined, NULL), 0.01, "t = 0.04 s: the iteration does not converge");
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_order),           cmocka_unit_test (test_residuals), cmocka_unit_test (test_way_back),
-    cmocka_unit_test (test_energy),          cmocka_unit_test (test_last_step), cmocka_unit_test (test_large_steps),
-    cmocka_unit_test (test_undefined_force),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -12,8 +12,7 @@
 
 /* ---- The table ---- */
 
-static void test_table (void **state) {
-  (void)state;
+TEST (table) {
   for (int i = 0; pw_methods[i]; i++) {
     const pw_method *m = pw_methods[i];
     assert_true (m->name && m->about && m->open && m->advance && m->at && m->restart && m->close);
@@ -29,8 +28,7 @@ static void test_table (void **state) {
 }
 
 /* Every integrator with every stabilisation opens and makes a step. */
-static void test_every_pair (void **state) {
-  (void)state;
+TEST (every_pair) {
   pw_system *s = scene_system (&scene_ezyroller, NULL);
   char name[40];
   for (int i = 0; runs_method (i, name); i++) {
@@ -42,8 +40,7 @@ static void test_every_pair (void **state) {
   pw_system_free (s);
 }
 
-static void test_parse (void **state) {
-  (void)state;
+TEST (parse) {
   const pw_method *m;
   int stabilisation;
   double value[PW_MAX_OPTIONS];
@@ -74,8 +71,7 @@ static void methods_refused (const char *name, const char *text) {
     assert_memory_equal (error.text, text, (size_t)(open - text));
 }
 
-static void test_refused (void **state) {
-  (void)state;
+TEST (refused) {
   methods_refused ("rk5", "there is no integrator \"rk5\"; did you mean \"erk5\"?");
   methods_refused ("idas+ggl", "there is no integrator \"idas\"; did you mean \"ida\"?");
   methods_refused ("", "there is no integrator \"\"; valid are rk4, ...");
@@ -110,8 +106,7 @@ static void test_refused (void **state) {
   methods_refused ("rk4+none+ggl", "method \"rk4+none+ggl\": expected INTEGRATOR+STABILISATION:OPTION=VALUE");
 }
 
-static void test_long_names (void **state) {
-  (void)state;
+TEST (long_names) {
   char name[200] = "rk4+";
   memset (name + 4, 'x', 150);
   char text[400];
@@ -133,8 +128,7 @@ static void methods_bad_setting (const pw_settings *settings, const char *text) 
   pw_system_free (s);
 }
 
-static void test_settings (void **state) {
-  (void)state;
+TEST (settings) {
   methods_bad_setting (&(pw_settings){ .step = -1 }, "setting step = -1: expected a number > 0");
   methods_bad_setting (&(pw_settings){ .step = NAN }, "setting step = nan: expected a number > 0");
   methods_bad_setting (&(pw_settings){ .rtol = -1 }, "setting rtol = -1: expected a number > 0");
@@ -150,10 +144,9 @@ static void methods_build_disc (pw_model *m, const void *parameters) {
 
 /* The option steps=fixed makes an adaptive integrator use the step size in place of the tolerances: the default span is
  * 1000 steps, which is the time scale of a scene at rest, and rtol may have any value. */
-static void test_fixed_steps (void **state) {
+TEST (fixed_steps) {
   static const pw_plugin_table methods_at_rest = TRIAL_TABLE (methods_build_disc);
   static const char *const method[] = { "rk4", "erk5:steps=fixed", "erk8:steps=fixed", "radau:steps=fixed" };
-  (void)state;
   pw_system *s = scene_system (&methods_at_rest, NULL);
   for (int i = 0; i < 4; i++) {
     pw_run *r = runs_open (s, method[i], &(pw_settings){ .step = 0.01, .rtol = 1e-20 });
@@ -161,13 +154,4 @@ static void test_fixed_steps (void **state) {
     pw_run_close (r);
   }
   pw_system_free (s);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_table),       cmocka_unit_test (test_every_pair), cmocka_unit_test (test_parse),
-    cmocka_unit_test (test_refused),     cmocka_unit_test (test_long_names), cmocka_unit_test (test_settings),
-    cmocka_unit_test (test_fixed_steps),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

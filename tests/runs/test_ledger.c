@@ -156,9 +156,8 @@ static void ledger_run (int scene, const char *method, const pw_settings *settin
   pw_system_free (s);
 }
 
-static void test_closed_forms (void **state) {
+TEST (closed_forms) {
   char name[40];
-  (void)state;
   for (int scene = 0; scene < LEDGER_SCENES; scene++)
     for (int i = 0; runs_method (i, name); i++) {
       double size = ledger_scene[scene].size;
@@ -176,9 +175,8 @@ static void test_closed_forms (void **state) {
 }
 
 /* Work, losses and energy defect of a run are bit-identical with and without the option `ledger`. */
-static void test_always_kept (void **state) {
+TEST (always_kept) {
   char name[40];
-  (void)state;
   for (int scene = 0; scene < LEDGER_SCENES; scene++)
     for (int i = 0; runs_method (i, name); i++) {
       double kept[2][9];
@@ -200,8 +198,7 @@ static void test_always_kept (void **state) {
 /* ---- The energy defect ---- */
 
 /* The defect is relative to the energy exchanged, not to 1200 J of losses. */
-static void test_exchanged (void **state) {
-  (void)state;
+TEST (exchanged) {
   pw_system *s = scene_system (&ledger_scene[4].table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 0.1, .span = 100 });
   pw_sample x = runs_to (r, 100);
@@ -213,8 +210,7 @@ static void test_exchanged (void **state) {
 }
 
 /* A position prescribed by a constant does no work and has no account. */
-static void test_constant_drive (void **state) {
-  (void)state;
+TEST (constant_drive) {
   pw_system *s = scene_named ("slider-crank", "l2", 1);
   assert_int_equal (pw_system_ledger_entries (s), 0);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 1 });
@@ -235,19 +231,10 @@ static void ledger_advise (const char *model, const char *method, double rtol, d
 }
 
 /* The advice recommends a smaller tolerance only where it helps. */
-static void test_advice (void **state) {
-  (void)state;
+TEST (advice) {
   ledger_advise ("n-four-bar", "rk4+projection", 0, 0.1, "a smaller step");
   ledger_advise ("n-four-bar", "erk5+projection", 1e-3, 0.02, "a smaller tolerance");
   ledger_advise ("n-four-bar", "erk5+projection", 1e-9, 0.5, "more than the tolerance explains");
   ledger_advise ("n-four-bar", "erk8+projection", 1e-13, 0.5, "cannot be much smaller");
   ledger_advise ("pendulum", "adams+none", 1e-2, 0.02, "the constraints have drifted");
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_closed_forms),   cmocka_unit_test (test_always_kept), cmocka_unit_test (test_exchanged),
-    cmocka_unit_test (test_constant_drive), cmocka_unit_test (test_advice),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -123,9 +123,8 @@ static void chains_run (int variant, int bars, double end[8]) {
   pw_system_free (s);
 }
 
-static void test_same (void **state) {
+TEST (same) {
   double first[8], other[8];
-  (void)state;
   for (size_t k = 0; k < sizeof chains_bars / sizeof *chains_bars; k++) {
     chains_run (CHAINS_PLAIN, chains_bars[k], first);
     assert_true (fabs (first[5]) > 0.1); /* it moves */
@@ -137,17 +136,8 @@ static void test_same (void **state) {
   }
 }
 
-static void test_others (void **state) {
+TEST (others) {
   double end[8];
-  (void)state;
   for (size_t k = 0; k < sizeof chains_bars / sizeof *chains_bars; k++)
     for (int variant = CHAINS_OTHERS; variant < CHAINS_ALL; variant++) chains_run (variant, chains_bars[k], end);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_same),
-    cmocka_unit_test (test_others),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

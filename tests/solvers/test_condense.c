@@ -36,8 +36,7 @@ static const pw_plugin_table condense_arm_table = { .abi = PW_ABI,
 
 /* The equation that remains after the elimination of the arm contains the position of the disc only, not its angle.
  * It has no multiplier, also after the arm has turned so far that another equation remains. */
-static void test_prescribed_centre (void **state) {
-  (void)state;
+TEST (prescribed_centre) {
   pw_system *s = scene_system (&condense_arm_table, NULL);
   pw_workspace *w = pw_workspace_new (s, NULL);
   const double weight[] = { INFINITY, INFINITY, 0.5, 0, 0, 0 }, gamma[4] = { 0 }, f[9] = { 0, 0, 3, 5, 7, 2 };
@@ -141,8 +140,7 @@ static void platform_compare (const char *what, const double *a, const double *b
 }
 
 /* Accelerations, multipliers, the smallest pivot and the verdict do not depend on the order of the bodies. */
-static void test_order_of_bodies (void **state) {
-  (void)state;
+TEST (order_of_bodies) {
   for (double mass = 1e-3; mass < 2e3; mass *= 10)
     for (int feet = 1; feet <= 4; feet++) {
       const solution x = platform_solve (mass, 0, feet), y = platform_solve (mass, 1, feet);
@@ -179,8 +177,7 @@ static const pw_plugin_table bent_leg_table = { .abi = PW_ABI,
                                                 .build = bent_leg_build };
 
 /* A stretched leg is singular for a platform at rest, not for one that moves. */
-static void test_stretched_leg (void **state) {
-  (void)state;
+TEST (stretched_leg) {
   pw_system *s = scene_system (&bent_leg_table, NULL);
   pw_workspace *w = pw_workspace_new (s, NULL);
   double *q = calloc ((size_t)s->coords, sizeof *q);
@@ -195,10 +192,4 @@ static void test_stretched_leg (void **state) {
   pw_saddle_close (k);
   pw_workspace_free (w);
   pw_system_free (s);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_prescribed_centre),
-                                      cmocka_unit_test (test_order_of_bodies), cmocka_unit_test (test_stretched_leg) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -116,15 +116,7 @@ static void linkage_each (const char *what, const pw_plugin_table *table, int se
   }
 }
 
-static void test_linkages (void **state) {
-  (void)state;
+TEST (linkages) {
   linkage_each ("a linkage", &linkage_table, 200, 1);
   linkage_each ("a linkage with massless links", &linkage_massless_table, 300, 0);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_linkages),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -62,10 +62,9 @@ static double massless_turned (const char *method, double length, double mass, d
   return fmax (fabs (q[2] - 1), fmax (hypot (q[0] / length - cos (1), q[1] / length - sin (1)), fabs (v[2] - 1)));
 }
 
-static void test_disc (void **state) {
+TEST (disc) {
   static const double units[][3] = { { 1, 1, 0 },      { 1, 1, 1 },   { 1, 1, 1e6 },   { 1e-3, 1, 0 },   { 1e3, 1, 0 },
                                      { 1, 1e-6, 1e3 }, { 1, 1e6, 0 }, { 1e3, 1e6, 1 }, { 1e-3, 1e-6, 0 } };
-  (void)state;
   for (size_t i = 0; i < sizeof massless_methods / sizeof *massless_methods; i++)
     for (size_t k = 0; k < sizeof units / sizeof *units; k++)
       check_below (massless_methods[i], massless_turned (massless_methods[i], units[k][0], units[k][1], units[k][2]),
@@ -73,8 +72,7 @@ static void test_disc (void **state) {
 }
 
 /* With the mass metric there is no error, since only the angle changes, linearly. */
-static void test_exact (void **state) {
-  (void)state;
+TEST (exact) {
   check_below ("bdf+projection", massless_turned ("bdf+projection", 1, 1, 0), 16 * CHECK_EPS, "round-off");
   check_below ("bdf+projection:every=3", massless_turned ("bdf+projection:every=3", 1, 1, 0), 16 * CHECK_EPS,
                "round-off");
@@ -134,22 +132,12 @@ static void massless_agree (const pw_plugin_table *table, const char *method) {
   }
 }
 
-static void test_agree (void **state) {
+TEST (agree) {
   static const pw_plugin_table chain = MASSLESS_TABLE (massless_chain), car = MASSLESS_TABLE (massless_car);
   static const char *const methods[] = { "bdf+projection", "bdf+projection:every=3", "erk5+projection",
                                          "erk8+nullspace", "ida+ggl" };
-  (void)state;
   for (size_t i = 0; i < sizeof methods / sizeof *methods; i++) {
     massless_agree (&chain, methods[i]);
     massless_agree (&car, methods[i]);
   }
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_disc),
-    cmocka_unit_test (test_exact),
-    cmocka_unit_test (test_agree),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

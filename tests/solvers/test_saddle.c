@@ -15,7 +15,7 @@
 #include "saddle_scene.h"
 #include "scene.h"
 
-static void test_models (void **state) {
+TEST (models) {
   static const struct {
     const char *model, *parameter;
     double value;
@@ -26,7 +26,6 @@ static void test_models (void **state) {
     { "ezyroller", NULL, 0 },    { "ezyroller", "m2", 0.1 },        { "car", NULL, 0 },
     { "snakeboard", NULL, 0 },   { "differential-drive", NULL, 0 }, { "redundant-parallelogram", NULL, 0 }
   };
-  (void)state;
   for (size_t i = 0; i < sizeof scene / sizeof *scene; i++) {
     double e = saddle_scene (scene_named (scene[i].model, scene[i].parameter, scene[i].value), 0.02, 1);
     assert_true (e >= 0);
@@ -73,8 +72,7 @@ static pw_saddle *saddle_turned (pw_workspace *w, int body, int held) {
 }
 
 /* Pins between two prescribed bodies, or one and the ground, are inactive; all others are satisfied. */
-static void test_prescribed_bodies (void **state) {
-  (void)state;
+TEST (prescribed_bodies) {
   for (int body = 0; body + 1 < SADDLE_LINKS;
        body += body > 0 ? 1 : 2) { /* one link between a prescribed body and the ground could not move */
     double a[SADDLE_COORDS + 3], lambda[2 * SADDLE_LINKS], Ja[2 * SADDLE_LINKS], gamma[2 * SADDLE_LINKS];
@@ -98,8 +96,7 @@ static void test_prescribed_bodies (void **state) {
 }
 
 /* A row without entries is singular at every place in the order: 0/0 is not a pivot. */
-static void test_empty_row (void **state) {
-  (void)state;
+TEST (empty_row) {
   for (int rod = 0; rod < SADDLE_LINKS; rod++) {
     pw_system *s = scene_system (&saddle_rods_table, NULL);
     pw_workspace *w = pw_workspace_new (s, NULL);
@@ -167,9 +164,8 @@ static void bolted_many (pw_model *m, const void *parameters) {
   }
 
 /* Round-off of a dependent row is not accepted as a pivot at any angle, with and without massless coordinates. */
-static void test_dependent_rows (void **state) {
+TEST (dependent_rows) {
   static const pw_plugin_table table[] = { BOLTED_TABLE (bolted_pair), BOLTED_TABLE (bolted_many) };
-  (void)state;
   for (int i = 0; i < 60; i++)
     for (int which = 0; which < 4; which++) {
       pw_error error = { 0 };
@@ -225,9 +221,8 @@ static double pairs_sine (const pw_plugin_table *table, double angle) {
 }
 
 /* The sine between the rows of a pin does not depend on how many other pins there are. */
-static void test_sine (void **state) {
+TEST (sine) {
   static const pw_plugin_table one = BOLTED_TABLE (pairs_one), many = BOLTED_TABLE (pairs_many);
-  (void)state;
   for (int i = 0; i < 16; i++) {
     double sine = pairs_sine (&one, 0.1 * i);
     assert_true (sine > 0.1 && sine < 1);
@@ -235,10 +230,9 @@ static void test_sine (void **state) {
   }
 }
 
-static void test_random (void **state) {
+TEST (random) {
   int tried = 0;
   double worst = 0;
-  (void)state;
   for (unsigned seed = 1; seed <= 200; seed++) {
     mechanism x;
     pw_error error = { 0 };
@@ -255,8 +249,7 @@ static void test_random (void **state) {
 }
 
 /* Norms are NaN if any entry is NaN. */
-static void test_not_a_number (void **state) {
-  (void)state;
+TEST (not_a_number) {
   pw_error error = { 0 };
   pw_system *s = scene_named ("theo-jansen", NULL, 0);
   pw_run *r = pw_run_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 1 }, &error);
@@ -275,14 +268,4 @@ static void test_not_a_number (void **state) {
   assert_true (isfinite (pw_run_acceleration_norm (r)) && isfinite (pw_rk_distance (r)));
   pw_run_close (r);
   pw_system_free (s);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_models),       cmocka_unit_test (test_prescribed_bodies),
-    cmocka_unit_test (test_empty_row),    cmocka_unit_test (test_dependent_rows),
-    cmocka_unit_test (test_sine),         cmocka_unit_test (test_random),
-    cmocka_unit_test (test_not_a_number),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

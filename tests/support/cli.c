@@ -121,14 +121,12 @@ int cli_says (const char *json, const char *key, const char *value) {
   return json && strncmp (json, quoted, (size_t)length) == 0;
 }
 
-int cli_setup (void **state) {
-  (void)state;
+int cli_setup (void) {
   return mkdtemp (cli_folder) && setenv ("XDG_CACHE_HOME", cli_folder, 1) == 0 ? 0 : -1;
 }
 
-int cli_teardown (void **state) {
+int cli_teardown (void) {
   char command[200];
-  (void)state;
   snprintf (command, sizeof command, "rm -rf '%s'", cli_folder);
   return system (command);
 }

@@ -10,8 +10,8 @@ extern char cli_folder[];                    /* temporary folder for the files o
 extern char cli_out[200000], cli_err[20000]; /* standard output and error of the last command */
 
 /* Makes and removes the folder. */
-int cli_setup (void **state);
-int cli_teardown (void **state);
+int cli_setup (void);
+int cli_teardown (void);
 
 /* Runs a shell command in which `pinwheel` is the program and @ the folder; returns its exit status. */
 int cli_run (const char *command);
