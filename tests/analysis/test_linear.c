@@ -25,16 +25,14 @@ static void linear_expect (const pw_linear *l, int i, double re, double im) {
   check_close ("im", l->im[i], im, bound, "exact blocks; 0 may be defective at a distance");
 }
 
-static void linear_pendulum (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (linear_pendulum) {
   pw_add_body (m, &(pw_body){ .name = "bob", .mass = 2, .inertia = 0.5, .start = { 0, -0.7, -PW_PI / 2 } });
   pw_add_pin (m, &(pw_pin){ .name = "A", .body = { "bob", "ground" }, .at = { { -0.7, 0 } } });
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 } });
 }
 
 TEST (pendulum) {
-  static const pw_plugin_table table = TRIAL_TABLE (linear_pendulum);
-  pw_linear l = linear_of (&table);
+  pw_linear l = linear_of (&linear_pendulum_table);
   assert_int_equal (l.positions, 1);
   assert_int_equal (l.velocities, 1);
   assert_int_equal (l.unknowns, 2);
@@ -45,16 +43,14 @@ TEST (pendulum) {
   pw_linear_free (&l);
 }
 
-static void linear_oscillator (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (linear_oscillator) {
   pw_add_body (m, &(pw_body){ .name = "block", .mass = 1.5, .inertia = 0.1, .start = { 0.8 } });
   pw_add_spring (
       m, &(pw_spring){ .name = "S", .body = { "ground", "block" }, .stiffness = 60, .damping = 2.4, .length = 0.8 });
 }
 
 TEST (oscillator) {
-  static const pw_plugin_table table = TRIAL_TABLE (linear_oscillator);
-  pw_linear l = linear_of (&table);
+  pw_linear l = linear_of (&linear_oscillator_table);
   assert_int_equal (l.unknowns, 6);
   assert_true (isnan (l.least));
   linear_expect (&l, 4, -0.8, sqrt (60 / 1.5 - 0.64));
@@ -64,9 +60,8 @@ TEST (oscillator) {
 }
 
 /* A link pinned to an arm that turns steadily oscillates about the radius: w^2 = m R l W^2 / (I + m l^2). */
-static void linear_rotor (pw_model *m, const void *parameters) {
+SCENE (linear_rotor) {
   const double R = 0.9, l = 0.4, W = 7;
-  (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "arm", .mass = 1, .inertia = 1, .rate = { 0, 0, W } });
   pw_add_body (
       m,
@@ -79,8 +74,7 @@ static void linear_rotor (pw_model *m, const void *parameters) {
 }
 
 TEST (rotor) {
-  static const pw_plugin_table table = TRIAL_TABLE (linear_rotor);
-  pw_linear l = linear_of (&table);
+  pw_linear l = linear_of (&linear_rotor_table);
   assert_int_equal (l.positions, 2);
   assert_int_equal (l.velocities, 1);
   linear_expect (&l, 0, 0, 7 * sqrt (2 * 0.9 * 0.4 / (0.1 + 2 * 0.16)));
@@ -89,16 +83,14 @@ TEST (rotor) {
 }
 
 /* The Chaplygin sleigh runs straight, centre of mass behind the wheel: (I + m a^2) w' = -m a u w grows. */
-static void linear_sleigh (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (linear_sleigh) {
   pw_add_body (m, &(pw_body){ .name = "sleigh", .mass = 3, .inertia = 0.5, .start = { 0, 0, 0.3 } });
   pw_add_wheel (m, &(pw_wheel){ .name = "blade", .body = "sleigh", .at = { -0.2, 0 } });
   pw_add_speed (m, &(pw_speed){ .name = "tow", .body = "sleigh", .at = { -0.2, 0 }, .value = { PW_CONSTANT, { -4 } } });
 }
 
 TEST (sleigh) {
-  static const pw_plugin_table table = TRIAL_TABLE (linear_sleigh);
-  pw_linear l = linear_of (&table);
+  pw_linear l = linear_of (&linear_sleigh_table);
   assert_int_equal (l.positions, 3);
   assert_int_equal (l.velocities, 1);
   linear_expect (&l, 0, 3 * 0.2 * 4 / (0.5 + 3 * 0.04), 0);
@@ -107,16 +99,14 @@ TEST (sleigh) {
 }
 
 /* Twin wheels count as one row; massless bodies add no eigenvalues. */
-static void linear_twins (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (linear_twins) {
   pw_add_body (m, &(pw_body){ .name = "axle", .mass = 1, .inertia = 1 });
   for (int i = 0; i < 2; i++)
     pw_add_wheel (m, &(pw_wheel){ .name = i ? "right" : "left", .body = "axle", .at = { 0, 0.5 - i } });
 }
 
 TEST (rank) {
-  static const pw_plugin_table table = TRIAL_TABLE (linear_twins);
-  pw_linear l = linear_of (&table);
+  pw_linear l = linear_of (&linear_twins_table);
   assert_int_equal (l.positions, 3);
   assert_int_equal (l.velocities, 2);
   assert_int_equal (l.rank, 1);
@@ -130,10 +120,9 @@ TEST (rank) {
 }
 
 TEST (large) {
-  static const pw_plugin_table table = TRIAL_TABLE (linear_pendulum);
   pw_error error = { 0 };
   pw_linear l;
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (&linear_pendulum_table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", NULL);
   check_ok (pw_run_linearise (r, 2, &l, &error), &error);
   assert_true (l.re == NULL && l.velocities == 1);
@@ -166,23 +155,21 @@ static void linear_add_block (pw_model *m, pw_function force) {
 
 static const char *const linear_reads[] = { "block.vx", NULL };
 
-static void linear_jumping (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (linear_jumping) {
   linear_add_block (m, (pw_function){ .eval = linear_sign, .reads = linear_reads });
 }
 
-static void linear_one_sided (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (linear_one_sided) {
   linear_add_block (m, (pw_function){ .eval = linear_half, .reads = linear_reads });
 }
 
 /* Neither state has a linearisation; the workspace is left at it, not at a state beside it. */
 TEST (jump) {
-  static const pw_plugin_table table[] = { TRIAL_TABLE (linear_jumping), TRIAL_TABLE (linear_one_sided) };
+  static const pw_plugin_table *const table[] = { &linear_jumping_table, &linear_one_sided_table };
   for (int i = 0; i < 2; i++) {
     pw_error error = { 0 };
     pw_linear l;
-    pw_system *s = scene_system (&table[i], NULL);
+    pw_system *s = scene_system (table[i], NULL);
     pw_run *r = runs_open (s, "rk4", NULL);
     assert_int_equal (pw_run_linearise (r, 100, &l, &error), PW_METHOD);
     assert_non_null (strstr (error.text, "accelerations jump with block.vx"));

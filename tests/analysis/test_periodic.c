@@ -60,8 +60,7 @@ static const pw_parameter pendulum_parameters[] = { { PW_AT (pendulum, A), 0.2, 
                                                     { PW_AT (pendulum, om), 0, "rad/s", "", PW_REAL },
                                                     { .name = NULL } };
 
-static void pendulum_build (pw_model *m, const void *parameters) {
-  const pendulum *p = parameters;
+SCENE_WITH (pendulum_build, pendulum_parameters, pendulum) {
   double s = sin (p->th), c = cos (p->th);
   const pw_signal torque = { PW_HARMONIC, .harmonic = { .amplitude = p->A, .omega = 0.8 } };
   pw_add_body (
@@ -72,15 +71,9 @@ static void pendulum_build (pw_model *m, const void *parameters) {
   pw_add_torque (m, &(pw_torque){ .name = "drive", .body = { "bob", "ground" }, .value = torque });
 }
 
-static const pw_plugin_table pendulum_table = { .abi = PW_ABI,
-                                                .size = sizeof (pw_plugin_table),
-                                                .parameters = pendulum_parameters,
-                                                .parameters_size = sizeof (pendulum),
-                                                .build = pendulum_build };
-
 static pw_system *pendulum_at (void *context, double A, pw_error *error) {
   (void)context, (void)error;
-  return scene_system (&pendulum_table, "A", A, NULL);
+  return scene_system (&pendulum_build_table, "A", A, NULL);
 }
 
 /* Three orbits at A = 0.2: shooting with 30 digits (Taylor series), confirmed by AUTO-07p. */
@@ -92,7 +85,7 @@ TEST (pendulum) {
                 { -1.2305856526574, 1.2572101436741, { 0.205346676608, 0.205346676608 }, 0.643250239154 } };
   for (int i = 0; i < 3; i++) {
     double th = round (100 * orbit[i].th) / 100, om = round (100 * orbit[i].om) / 100;
-    pw_system *s = scene_system (&pendulum_table, "th", th, "om", om, NULL);
+    pw_system *s = scene_system (&pendulum_build_table, "th", th, "om", om, NULL);
     pw_periodic *x = periodic_open (s, &(pw_periodic_settings){ .period = 0 });
     pw_periodic_orbit o = periodic_solve (x, 0, 0);
     assert_int_equal (pw_periodic_symmetries (x), 0);
@@ -144,27 +137,21 @@ static int oscillator_torque (void *context, double t, const double *x, double v
 }
 
 /* The parameters of a system outlive it: more than exist at a time. */
-static void oscillator_build (pw_model *m, const void *parameters) {
+SCENE_WITH (oscillator_build, oscillator_parameters, oscillator) {
   static const char *const reads[] = { "disc.phi", "disc.omega", NULL };
   static oscillator kept[16];
   static int next;
   oscillator *o = &kept[next++ % 16];
-  *o = *(const oscillator *)parameters;
+  *o = *p;
   const pw_signal torque = { PW_FUNCTION, .function = { .eval = oscillator_torque, .context = o, .reads = reads } };
   pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 1, .start = { 0, 0, o->x } });
   pw_add_pin (m, &(pw_pin){ .name = "axle", .body = { "disc", "ground" } });
   pw_add_torque (m, &(pw_torque){ .name = "torque", .body = { "disc", "ground" }, .value = torque });
 }
 
-static const pw_plugin_table oscillator_table = { .abi = PW_ABI,
-                                                  .size = sizeof (pw_plugin_table),
-                                                  .parameters = oscillator_parameters,
-                                                  .parameters_size = sizeof (oscillator),
-                                                  .build = oscillator_build };
-
 static pw_system *mathieu_at (void *context, double a, pw_error *error) {
   (void)context, (void)error;
-  return scene_system (&oscillator_table, "a", a, "q", 1., NULL);
+  return scene_system (&oscillator_build_table, "a", a, "q", 1., NULL);
 }
 
 /* Mathieu's equation: characteristic values (DLMF 28.2), where the multipliers are -1, -1 or 1, 1, and between them. */
@@ -214,7 +201,7 @@ TEST (boundaries) {
 
 static pw_system *growing_at (void *context, double p, pw_error *error) {
   (void)context, (void)error;
-  return scene_system (&oscillator_table, "p", p, "c", 1., NULL);
+  return scene_system (&oscillator_build_table, "p", p, "c", 1., NULL);
 }
 
 /* Rest of the undriven oscillator, seen with any period: multipliers exp ((p / 2 +- i w) T). */
@@ -238,7 +225,7 @@ TEST (van_der_pol) {
   pw_error error = { 0 };
   pw_periodic_orbit o;
   double sum = 0;
-  pw_system *s = scene_system (&oscillator_table, "p", 1., "c", 1., "x", 2., NULL);
+  pw_system *s = scene_system (&oscillator_build_table, "p", 1., "c", 1., "x", 2., NULL);
   for (int given = 0; given < 2; given++) {
     pw_periodic *x = periodic_open (s, &(pw_periodic_settings){ .free = 1, .period = given * 6 });
     o = periodic_solve (x, given ? 10 : 0, 0);
@@ -257,7 +244,7 @@ TEST (van_der_pol) {
     pw_periodic_close (x);
   }
   pw_system_free (s);
-  s = scene_system (&oscillator_table, "p", -1., "c", 1., "x", 0.1, NULL); /* decays */
+  s = scene_system (&oscillator_build_table, "p", -1., "c", 1., "x", 0.1, NULL); /* decays */
   pw_periodic *x = periodic_open (s, &(pw_periodic_settings){ .free = 1, .period = 6 });
   assert_int_equal (pw_periodic_solve (x, 10, 0, &o, &error), PW_RETRY);
   assert_int_equal (error.status, PW_OK);

@@ -8,12 +8,11 @@
 #include "scene.h"
 #include "trial.h"
 
-static pw_linear stability_of (void (*build) (pw_model *, const void *)) {
-  const pw_plugin_table table = TRIAL_TABLE (build);
+static pw_linear stability_of (const pw_plugin_table *table) {
   const pw_settings settings = { .span = 10 };
   pw_error error = { 0 };
   pw_linear l;
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &settings);
   check_ok (pw_run_linearise (r, 100, &l, &error), &error);
   for (int i = 1; i < l.unknowns; i++) assert_true (l.re[i] <= l.re[i - 1]);
@@ -82,10 +81,9 @@ static void stability_vehicle (pw_model *m, int i, const double start[3]) {
   pw_add_weld (m, &(pw_weld){ .name = weld, .body = { name, load } });
 }
 
-static void stability_train (pw_model *m, const void *parameters) {
+SCENE (stability_train) {
   double R = train.w != 0 ? train.u / train.w : 0, turned = -PW_PI / 2, x = 0, radius = R;
   char hitch[20], body[2][20];
-  (void)parameters;
   for (int i = 0; i < 4; i++) {
     if (i > 0 && train.w == 0) x -= train.L[i - 1];
     if (i > 0 && train.w != 0) {
@@ -116,7 +114,7 @@ TEST (trailers) {
       double L[3] = { 0.6, 0.8, 2.5 }, u = motion[k][0], w = motion[k][1], R = w != 0 ? u / w : 0;
       train.u = u, train.w = w;
       memcpy (train.L, L, sizeof L);
-      pw_linear l = stability_of (stability_train);
+      pw_linear l = stability_of (&stability_train_table);
       assert_int_equal (l.steady, PW_STEADY);
       assert_int_equal (l.symmetries, 3);
       check_close ("rate of turn", l.twist[2], w, 1e-12 * fabs (w), "round-off");
@@ -134,7 +132,7 @@ TEST (trailers) {
 TEST (defective) {
   train.axle = WHEEL, train.u = 2, train.w = 0;
   for (int i = 0; i < 3; i++) train.L[i] = 2;
-  pw_linear l = stability_of (stability_train);
+  pw_linear l = stability_of (&stability_train_table);
   for (int i = 3; i < 6; i++) {
     check_close ("re", l.re[i], -1, 1e-4, "a Jordan block of three: eps^(1/3)");
     assert_true (l.im[i] == 0);
@@ -146,8 +144,7 @@ TEST (defective) {
 
 static double sleigh;
 
-static void stability_sleigh (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (stability_sleigh) {
   pw_add_body (m, &(pw_body){ .name = "sleigh",
                               .mass = 3,
                               .inertia = 0.5,
@@ -159,7 +156,7 @@ static void stability_sleigh (pw_model *m, const void *parameters) {
 TEST (sleigh) {
   for (int side = -1; side <= 1; side += 2) {
     sleigh = 0.2 * side;
-    pw_linear l = stability_of (stability_sleigh);
+    pw_linear l = stability_of (&stability_sleigh_table);
     assert_int_equal (l.steady, PW_STEADY);
     assert_int_equal (l.symmetries, 3);
     assert_int_equal (stability_zeros (&l), 1);
@@ -173,8 +170,7 @@ TEST (sleigh) {
 static const double car_m = 1500, car_I = 2500, car_a = 1.6, car_b = 1, car_C = 40000;
 static double car_v;
 
-static void stability_car (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (stability_car) {
   pw_add_body (m, &(pw_body){ .name = "car", .mass = car_m, .inertia = car_I, .rate = { car_v, 0, 0 } });
   pw_add_tyre (m, &(pw_tyre){ .name = "front", .body = "car", .at = { car_a, 0 }, .stiffness = car_C, .speed = 1e-3 });
   pw_add_tyre (m, &(pw_tyre){ .name = "rear", .body = "car", .at = { -car_b, 0 }, .stiffness = car_C, .speed = 1e-3 });
@@ -189,7 +185,7 @@ TEST (car) {
     double v = car_v = critical * (1 + 0.1 * k), a = -2 * car_C / (car_m * v), b = -moment / (car_m * v) - v;
     double c = -moment / (car_I * v), d = -car_C * (car_a * car_a + car_b * car_b) / (car_I * v);
     double half = (a + d) / 2, root = sqrt (half * half - a * d + b * c);
-    pw_linear l = stability_of (stability_car);
+    pw_linear l = stability_of (&stability_car_table);
     assert_int_equal (l.steady, PW_STEADY);
     assert_int_equal (l.symmetries, 3);
     stability_has (&l, half + root, 0, 1e-7, "10 times the change by the regularising speed");
@@ -232,8 +228,7 @@ static const pw_signal stability_torques[] = {
   { PW_PULSE, .pulse = { .height = 100, .start = 7.0003, .width = 0.01 } },
 };
 
-static void stability_scene (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (stability_scene) {
   pw_add_body (m, &(pw_body){ .name = "body",
                               .mass = 2,
                               .inertia = 2,
@@ -282,7 +277,7 @@ TEST (scenes) {
     scene.pinned = each[i].pinned, scene.gravity = each[i].gravity, scene.spring = each[i].spring;
     scene.torque = each[i].torque, scene.drag = each[i].drag;
     scene.phi = each[i].phi, scene.v = each[i].v, scene.omega = each[i].omega;
-    pw_linear l = stability_of (stability_scene);
+    pw_linear l = stability_of (&stability_scene_table);
     if ((int)l.steady != (int)each[i].steady || l.symmetries != each[i].symmetries)
       fail_msg ("scene %zu: steady %d, %d symmetries", i, l.steady, l.symmetries);
     double s = sqrt (fabs (each[i].square));

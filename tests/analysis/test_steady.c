@@ -247,8 +247,7 @@ static const pw_parameter whirl_parameters[] = { { PW_AT (whirl, W), 2, "rad/s",
 
 /* The rod (m = 2, I = 0.1, l = 0.3) points inwards from its hinge at d = 0.5, with a torsion spring (k = 3, c = 0.3):
  * with the angle theta from there,  (I + m l^2) theta'' = -c theta' - k (theta - beta) + m d l W^2 sin theta. */
-static void whirl_build (pw_model *m, const void *parameters) {
-  const whirl *p = parameters;
+SCENE_WITH (whirl_build, whirl_parameters, whirl) {
   pw_add_body (m, &(pw_body){ .name = "hub", .mass = 1, .inertia = 1, .rate = { 0, 0, p->W } });
   pw_add_body (m, &(pw_body){ .name = "rod", .mass = 2, .inertia = 0.1, .start = { 0.2, 0, PW_PI } });
   pw_add_pin (m, &(pw_pin){ .name = "centre", .body = { "hub", "ground" } });
@@ -261,15 +260,9 @@ static void whirl_build (pw_model *m, const void *parameters) {
              .name = "twist", .body = { "rod", "hub" }, .stiffness = 3, .damping = 0.3, .angle = PW_PI + p->beta });
 }
 
-static const pw_plugin_table whirl_table = { .abi = PW_ABI,
-                                             .size = sizeof (pw_plugin_table),
-                                             .parameters = whirl_parameters,
-                                             .parameters_size = sizeof (whirl),
-                                             .build = whirl_build };
-
 static pw_system *whirl_at (void *beta, double W, pw_error *error) {
   (void)error;
-  return scene_system (&whirl_table, "W", W, "beta", *(double *)beta, NULL);
+  return scene_system (&whirl_build_table, "W", W, "beta", *(double *)beta, NULL);
 }
 
 static steady whirl_open (double *beta) {
@@ -309,7 +302,7 @@ static void twins_build (pw_model *m, const void *parameters) {
 }
 
 static pw_system *twins_at (void *context, double W, pw_error *error) {
-  pw_plugin_table table = whirl_table;
+  pw_plugin_table table = whirl_build_table;
   (void)context, (void)error;
   table.build = twins_build;
   return scene_system (&table, "W", W, "beta", 0., NULL);
@@ -376,8 +369,7 @@ static const pw_parameter caster_parameters[] = { { PW_AT (caster, c), 0.5, "N s
  * - e)^2 m + l^2 0.2, small motions have
  *
  *     I mu^3 + (A V + l^2 c) mu^2 + (l^2 k + l c V) mu + l k V = 0. */
-static void caster_build (pw_model *m, const void *parameters) {
-  const caster *p = parameters;
+SCENE_WITH (caster_build, caster_parameters, caster) {
   pw_add_body (m, &(pw_body){ .name = "cart", .mass = 1, .inertia = 1, .rate = { p->V } });
   pw_add_body (m, &(pw_body){ .name = "king", .mass = 0.2, .inertia = 1, .start = { 0, p->y }, .rate = { p->V } });
   pw_add_body (m,
@@ -395,15 +387,9 @@ static void caster_build (pw_model *m, const void *parameters) {
   pw_add_wheel (m, &(pw_wheel){ .name = "contact", .body = "wheel", .at = { -0.08, 0 } });
 }
 
-static const pw_plugin_table caster_table = { .abi = PW_ABI,
-                                              .size = sizeof (pw_plugin_table),
-                                              .parameters = caster_parameters,
-                                              .parameters_size = sizeof (caster),
-                                              .build = caster_build };
-
 static pw_system *caster_at (void *context, double V, pw_error *error) {
   (void)context, (void)error;
-  return scene_system (&caster_table, "V", V, NULL);
+  return scene_system (&caster_build_table, "V", V, NULL);
 }
 
 /* The polynomial has imaginary roots where (A V + l^2 c) (l k + c V) = I k V, of frequency^2 = l (l k + c V) / I. */
@@ -430,7 +416,7 @@ TEST (shimmy) {
 
 /* The growth rate of a run that begins beside the straight motion, from its deflections in two spans of ten periods. */
 static double caster_growth (double V, double frequency) {
-  pw_system *s = scene_system (&caster_table, "V", V, "y", 1e-6, NULL);
+  pw_system *s = scene_system (&caster_build_table, "V", V, "y", 1e-6, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3 });
   double most[2] = { 0 }, span = 10 / frequency;
   for (int i = 0; i < 2; i++)
@@ -509,9 +495,8 @@ static const pw_parameter discs_parameters[] = { { PW_AT (discs, count), 1, "", 
                                                  { PW_AT (discs, k), 0, "N m/rad", "", PW_REAL },
                                                  { .name = NULL } };
 
-static void discs_build (pw_model *m, const void *parameters) {
+SCENE_WITH (discs_build, discs_parameters, discs) {
   static const char *const name[] = { "one", "two" };
-  const discs *p = parameters;
   for (int i = 0; i < p->count; i++) {
     pw_add_body (m, &(pw_body){ .name = name[i], .mass = 1, .inertia = 1 });
     if (p->pinned != 0) pw_add_pin (m, &(pw_pin){ .name = i ? "pin2" : "pin1", .body = { name[i], "ground" } });
@@ -521,12 +506,6 @@ static void discs_build (pw_model *m, const void *parameters) {
         m, &(pw_rotational_spring){ .name = "spring", .body = { "one", "ground" }, .stiffness = p->k });
 }
 
-static const pw_plugin_table discs_table = { .abi = PW_ABI,
-                                             .size = sizeof (pw_plugin_table),
-                                             .parameters = discs_parameters,
-                                             .parameters_size = sizeof (discs),
-                                             .build = discs_build };
-
 /* A rotation of the whole about the axis less those of the discs displaces nothing and is no symmetry.  Symmetries: the
  * angle of each disc without a spring; x, y and the angle of a free disc. */
 TEST (concentric) {
@@ -535,8 +514,8 @@ TEST (concentric) {
     int symmetries;
   } scene[] = { { 1, 1, 3, 0 }, { 1, 1, 0, 1 }, { 2, 1, 3, 1 }, { 2, 1, 0, 2 }, { 1, 0, 0, 3 } };
   for (size_t i = 0; i < sizeof scene / sizeof *scene; i++) {
-    steady t = { .s = scene_system (&discs_table, "count", scene[i].count, "pinned", scene[i].pinned, "k", scene[i].k,
-                                    NULL),
+    steady t = { .s = scene_system (&discs_build_table, "count", scene[i].count, "pinned", scene[i].pinned, "k",
+                                    scene[i].k, NULL),
                  .set.vary = -1 };
     steady_open (&t);
     assert_int_equal (pw_steady_symmetries (t.x), scene[i].symmetries);

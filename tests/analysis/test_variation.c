@@ -66,11 +66,7 @@ static pw_system *block_make (const void *context, double value) {
     { PW_AT (block, height), 0, "", "", 0 }, { PW_AT (block, start), 1, "", "", 0 },
     { PW_AT (block, width), 1, "", "", 0 },  { 0 }
   };
-  static const pw_plugin_table table = { .abi = PW_ABI,
-                                         .size = sizeof (pw_plugin_table),
-                                         .parameters = parameters,
-                                         .parameters_size = sizeof (block),
-                                         .build = block_build };
+  static const pw_plugin_table table = SCENE_TABLE_WITH (block_build, parameters, sizeof (block));
   const block *b = context;
   return scene_system (&table, "k", b->k, "c", b->c, "m", b->m, "x0", b->x0, "height", b->height, "start", b->start,
                        "width", b->width, b->name, value, NULL);

@@ -251,21 +251,18 @@ static int check_ends (void *context, double t, const double *x, double value[3]
   return 0;
 }
 
-static void check_build_ending (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (check_build_ending) {
   pw_add_body (m, &(pw_body){ .name = "rotor", .mass = 1, .inertia = 1 });
   pw_add_torque (m, &(pw_torque){ .name = "T",
                                   .body = { "rotor", "ground" },
                                   .value = { PW_FUNCTION, .function = { .eval = check_ends } } });
 }
 
-static const pw_plugin_table check_ending_table = TRIAL_TABLE (check_build_ending);
-
 TEST (failing_signal) {
   const double q[3] = { 0 }, v[3] = { 0 };
   pw_error error = { 0 };
   pw_selftest_report report = { 0 };
-  pw_system *s = scene_system (&check_ending_table, NULL);
+  pw_system *s = scene_system (&check_build_ending_table, NULL);
   assert_int_equal (pw_selftest_scene (s, 1, &pw_kind_torque, 0, q, v, 1, &report, &error), PW_METHOD);
   check_error (&error, PW_METHOD,
                "t = 0.5 s: a signal failed: torque T: value is not a finite number, or its function failed");
@@ -288,8 +285,7 @@ static int check_sine (void *context, double t, const double *x, double value[3]
   return 0;
 }
 
-static void check_build_driven (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (check_build_driven) {
   pw_add_body (m, &(pw_body){ .name = "rotor", .mass = 1, .inertia = 1 });
   pw_add_drive (m, &(pw_drive){ .name = "D",
                                 .body = { "rotor", "ground" },
@@ -297,14 +293,12 @@ static void check_build_driven (pw_model *m, const void *parameters) {
                                 .value = { PW_FUNCTION, .function = { check_sine, .breakpoint = check_break } } });
 }
 
-static const pw_plugin_table check_driven_table = TRIAL_TABLE (check_build_driven);
-
 TEST (breakpoint) {
   const double q[3] = { 0, 0, sin (1) }, v[3] = { 0, 0, cos (1) };
   pw_error error = { 0 };
   pw_selftest_report report = { 0 };
   check_breakpoint = 1 + 1e-11;
-  pw_system *s = scene_system (&check_driven_table, NULL);
+  pw_system *s = scene_system (&check_build_driven_table, NULL);
   check_ok (pw_selftest_scene (s, 1, &pw_kind_drive, 1, q, v, 1, &report, &error), &error);
   for (int i = 0; i < report.checks; i++)
     if (report.check[i].failed) fail_msg ("%s: %s", report.check[i].name, report.check[i].where);

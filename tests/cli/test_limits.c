@@ -136,20 +136,14 @@ TEST (stop_inside) {
 
 /* ---- Growth ---- */
 
-/* A rotor on a pin with a constant torque; without it, as fast as it gets, it only turns. */
-static void limits_rotor (pw_model *m, const void *parameters) {
-  const double *torque = parameters;
-  pw_add_body (m, &(pw_body){ .name = "rotor", .mass = 1, .inertia = 1, .rate = { 0, 0, *torque != 0 ? 0 : 5000 } });
-  pw_add_pin (m, &(pw_pin){ .name = "P", .body = { "rotor", "ground" } });
-  pw_add_torque (m, &(pw_torque){ .name = "T", .body = { "rotor", "ground" }, .value = { .constant = *torque } });
-}
-
 static const pw_parameter limits_list[] = { { .name = "torque" }, { .name = NULL } };
-static const pw_plugin_table limits_table = { .abi = PW_ABI,
-                                              .size = sizeof (pw_plugin_table),
-                                              .parameters = limits_list,
-                                              .parameters_size = sizeof (double),
-                                              .build = limits_rotor };
+
+/* A rotor on a pin with a constant torque; without it, as fast as it gets, it only turns. */
+SCENE_WITH (limits_rotor, limits_list, double) {
+  pw_add_body (m, &(pw_body){ .name = "rotor", .mass = 1, .inertia = 1, .rate = { 0, 0, *p != 0 ? 0 : 5000 } });
+  pw_add_pin (m, &(pw_pin){ .name = "P", .body = { "rotor", "ground" } });
+  pw_add_torque (m, &(pw_torque){ .name = "T", .body = { "rotor", "ground" }, .value = { .constant = *p } });
+}
 
 /* T is 1 s: after t seconds the speed is t times its scale, and it grows with t. */
 TEST (growth) {
@@ -158,7 +152,7 @@ TEST (growth) {
     for (int spins = 0; spins < 2; spins++) {
       int which;
       double power;
-      pw_system *s = scene_system (&limits_table, "torque", spins ? 0. : 1., NULL);
+      pw_system *s = scene_system (&limits_rotor_table, "torque", spins ? 0. : 1., NULL);
       pw_run *r = runs_open (s, *k, &(pw_settings){ .step = 0.1, .span = 1 });
       runs_to (r, 900);
       assert_true (pw_run_growth (r, &which, &power) == 0);
@@ -174,8 +168,8 @@ TEST (growth) {
 }
 
 /* A torque that changes sign: the speed, (1 - cos w t) / w, was as large at half of the time as it is again. */
-static void limits_swung (pw_model *m, const void *parameters) {
-  const double omega = *(const double *)parameters;
+SCENE_WITH (limits_swung, limits_list, double) {
+  const double omega = *p;
   pw_add_body (m, &(pw_body){ .name = "rotor", .mass = 1, .inertia = 1 });
   pw_add_pin (m, &(pw_pin){ .name = "P", .body = { "rotor", "ground" } });
   pw_add_torque (
@@ -186,15 +180,10 @@ static void limits_swung (pw_model *m, const void *parameters) {
 
 /* Growth is that since a mark at 8192 s or so, not that of the last step. */
 TEST (no_growth) {
-  static const pw_plugin_table table = { .abi = PW_ABI,
-                                         .size = sizeof (pw_plugin_table),
-                                         .parameters = limits_list,
-                                         .parameters_size = sizeof (double),
-                                         .build = limits_swung };
   int which;
   const double omega = 3 * PW_PI / 8192, t = (6 * PW_PI + 2.2) / omega;
   double power;
-  pw_system *s = scene_system (&table, "torque", omega, NULL);
+  pw_system *s = scene_system (&limits_swung_table, "torque", omega, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1, .span = 1 });
   check_close ("speed", runs_to (r, t).v[2], (1 - cos (2.2)) / omega, 1e-6 / omega, "1e-6: (w h)^4, with room");
   assert_true (pw_run_growth (r, &which, &power) == 0 && power < 0);
@@ -205,7 +194,7 @@ TEST (no_growth) {
 /* At 4.5e13 rad an angle is known to 0.01 rad. */
 TEST (beyond_numbers) {
   pw_error error = { 0 };
-  pw_system *s = scene_system (&limits_table, "torque", 0., NULL);
+  pw_system *s = scene_system (&limits_rotor_table, "torque", 0., NULL);
   pw_run *r = runs_open (s, "erk5+projection", &(pw_settings){ .span = 1 });
   assert_int_equal (pw_run_advance_to (r, 1e12, 1e12, &error), PW_METHOD);
   assert_non_null (strstr (error.text, "s: the motion has grown beyond what numbers resolve: rotor.phi = "));

@@ -14,8 +14,7 @@
 
 /* The third crank is connected to the coupler in x only; the others determine y.  The rows are independent unless the
  * cranks are horizontal. */
-static void redundant_slotted (pw_model *m, const void *parameter) {
-  (void)parameter;
+SCENE (redundant_slotted) {
   double c = cos (-PW_PI / 4), s = sin (-PW_PI / 4);
   pw_add_body (m, &(pw_body){ .name = "coupler", .mass = 2, .inertia = 2. / 3, .start = { 1 + c, s, 0 } });
   for (int i = 0; i < 3; i++) {
@@ -31,8 +30,6 @@ static void redundant_slotted (pw_model *m, const void *parameter) {
       &(pw_drive){ .name = "B3", .body = { "crank3", "coupler" }, .at = { { 0.5, 0 }, { 1, 0 } }, .what = PW_DRIVE_X });
   pw_add_gravity (m, &(pw_gravity){ .name = "gravity", .acceleration = { 0, -9.81 } });
 }
-
-static const pw_plugin_table redundant_slotted_table = TRIAL_TABLE (redundant_slotted);
 
 static const char *const redundant_cranks[] = { "coupler.x",    "coupler.y",    "coupler.phi",
                                                 "crank1.phi",   "crank2.phi",   "crank3.phi",
@@ -87,8 +84,7 @@ REDUNDANT_SCENE (redundant_three, redundant_tricycle (m, 2));
 REDUNDANT_SCENE (redundant_two, redundant_tricycle (m, 1));
 
 /* Two equal drives turn a crank against its weight: each has half of the reaction and half of the work. */
-static void redundant_drives (pw_model *m, const void *parameter) {
-  (void)parameter;
+SCENE (redundant_drives) {
   const pw_signal turn = { PW_SMOOTH_STEP, .ramp = { .to = 1, .duration = 1 } };
   pw_add_body (m, &(pw_body){ .name = "crank", .mass = 1, .inertia = 0.1, .start = { 1 } });
   pw_add_pin (m, &(pw_pin){ .name = "axle", .body = { "crank", "ground" }, .at = { { -1, 0 }, { 0, 0 } } });
@@ -96,8 +92,6 @@ static void redundant_drives (pw_model *m, const void *parameter) {
   pw_add_drive (m, &(pw_drive){ .name = "b", .body = { "crank", "ground" }, .what = PW_DRIVE_ANGLE, .value = turn });
   pw_add_gravity (m, &(pw_gravity){ .name = "gravity", .acceleration = { 0, -10 } });
 }
-
-static const pw_plugin_table redundant_drives_table = TRIAL_TABLE (redundant_drives);
 
 TEST (drives) {
   static const char *const method[] = { "rk4+projection", "erk8+projection", "ida+ggl", "bdf+projection",
@@ -174,16 +168,13 @@ TEST (frame) {
 /* ---- Messages ---- */
 
 /* A plate of 1 nm, held by pins at two corners and an angle. */
-static void redundant_plate (pw_model *m, const void *parameter) {
+SCENE (redundant_plate) {
   const double size = 1e-9;
-  (void)parameter;
   pw_add_body (m, &(pw_body){ .name = "plate", .mass = 1, .inertia = size * size });
   pw_add_pin (m, &(pw_pin){ .name = "A", .body = { "plate", "ground" } });
   pw_add_drive (m, &(pw_drive){ .name = "D", .body = { "plate", "ground" }, .what = PW_DRIVE_ANGLE });
   pw_add_pin (m, &(pw_pin){ .name = "B", .body = { "plate", "ground" }, .at = { { size, 0 }, { size, 0 } } });
 }
-
-static const pw_plugin_table redundant_plate_table = TRIAL_TABLE (redundant_plate);
 
 TEST (names) {
   static const char *const corner[] = { "pins A and B: the same x constraint",
@@ -199,8 +190,7 @@ TEST (names) {
 
 /* A disc on a rod and a drive cannot move.  The wheel's row has a larger angle to the drive's row than the rod's row
  * has, but holonomic rows are selected first. */
-static void redundant_fixed_disc (pw_model *m, const void *parameter) {
-  (void)parameter;
+SCENE (redundant_fixed_disc) {
   pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 1, .start = { 1, 1, 0 }, .rate = { 0, 0, 1 } });
   pw_add_drive (
       m, &(pw_drive){ .name = "across", .body = { "disc", "ground" }, .what = PW_DRIVE_X, .value = { .constant = 1 } });
@@ -209,8 +199,7 @@ static void redundant_fixed_disc (pw_model *m, const void *parameter) {
 }
 
 /* The cosine between the wheel's row and that of the drive along it is 1/200. */
-static void redundant_oblique_drive (pw_model *m, const void *parameter) {
-  (void)parameter;
+SCENE (redundant_oblique_drive) {
   pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 1 });
   pw_add_drive (m, &(pw_drive){ .name = "ahead", .body = { "disc", "ground" }, .what = PW_DRIVE_X });
   pw_add_drive (m, &(pw_drive){ .name = "aside", .body = { "disc", "ground" }, .what = PW_DRIVE_Y });
@@ -218,18 +207,15 @@ static void redundant_oblique_drive (pw_model *m, const void *parameter) {
 }
 
 TEST (kept) {
-  static const pw_plugin_table fixed = TRIAL_TABLE (redundant_fixed_disc),
-                               oblique = TRIAL_TABLE (redundant_oblique_drive);
   static const char *const of_fixed[] = { "wheel edge (edge.N) follows from drive across, rod rod", NULL };
   static const char *const of_oblique[] = { "wheel edge (edge.N) follows from drive ahead, drive aside", NULL };
-  redundant_expect_reports (&fixed, of_fixed);
-  redundant_expect_reports (&oblique, of_oblique);
+  redundant_expect_reports (&redundant_fixed_disc_table, of_fixed);
+  redundant_expect_reports (&redundant_oblique_drive_table, of_oblique);
 }
 
 /* A body with a weld at its centre and a pin at the distance d.  The pin has the part p of the weight W that minimises
  * p^2 + (W - p)^2 + (d p / L)^2, moments in units of force times the scene's length. */
-static void redundant_hung (pw_model *m, const void *parameter) {
-  (void)parameter;
+SCENE (redundant_hung) {
   pw_add_body (m, &(pw_body){ .name = "sign", .mass = 3, .inertia = 2 });
   pw_add_weld (m, &(pw_weld){ .name = "weld", .body = { "sign", "ground" } });
   pw_add_pin (m, &(pw_pin){ .name = "pin", .body = { "sign", "ground" }, .at = { { 4, 0 }, { 4, 0 } } });
@@ -237,8 +223,7 @@ static void redundant_hung (pw_model *m, const void *parameter) {
 }
 
 TEST (moments) {
-  static const pw_plugin_table hung = TRIAL_TABLE (redundant_hung);
-  pw_system *s = scene_system (&hung, NULL);
+  pw_system *s = scene_system (&redundant_hung_table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", NULL);
   pw_sample x = runs_to (r, 0);
   double L = pw_run_scale (r)->length, W = 30, d = 4, p = W / (2 + d * d / (L * L));
@@ -250,9 +235,8 @@ TEST (moments) {
 }
 
 /* Two bodies with two common pins: the redundant equation is the one along the line between them. */
-static void redundant_two_pins (pw_model *m, const void *parameter) {
+SCENE (redundant_two_pins) {
   static const char *const name[] = { "one", "two" };
-  (void)parameter;
   for (int i = 0; i < 2; i++)
     pw_add_body (m, &(pw_body){ .name = name[i], .mass = 1, .inertia = 0.1, .rate = { 0, 0, 1 } });
   for (int i = 0; i < 2; i++)
@@ -261,10 +245,9 @@ static void redundant_two_pins (pw_model *m, const void *parameter) {
 
 /* After a restart with this line turned by 90 degrees other equations are redundant. */
 TEST (restart) {
-  static const pw_plugin_table pins = TRIAL_TABLE (redundant_two_pins);
   static const double turned[] = { 0, 0, PW_PI / 2, 0, 0, PW_PI / 2 };
   char method[40];
-  pw_system *s = scene_system (&pins, NULL);
+  pw_system *s = scene_system (&redundant_two_pins_table, NULL);
   for (int i = 0; runs_method (i, method); i++) {
     pw_error error = { 0 };
     pw_run *r = runs_open (s, method, &(pw_settings){ .step = 0.01, .rtol = 1e-6 });

@@ -141,8 +141,7 @@ TEST (ida) {
 }
 
 /* A four-bar linkage that is initially flat has two branches. */
-static void singular_flat (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (singular_flat) {
   pw_add_body (m,
                &(pw_body){ .name = "left", .mass = 1, .inertia = 0.1, .start = { 0.5, 0, 0 }, .rate = { 0, 0.5, 1 } });
   pw_add_body (m, &(pw_body){ .name = "rod", .mass = 1, .inertia = 0.1, .start = { 1.5, 0, 0 }, .rate = { 0, 1, 0 } });
@@ -155,11 +154,10 @@ static void singular_flat (pw_model *m, const void *parameters) {
 }
 
 TEST (flat_start) {
-  static const pw_plugin_table table = TRIAL_TABLE (singular_flat);
   static const char *const method[] = { "rk4+projection", "ida+ggl" };
   for (int i = 0; i < 2; i++) {
     pw_error error = { 0 };
-    pw_system *s = scene_system (&table, NULL);
+    pw_system *s = scene_system (&singular_flat_table, NULL);
     assert_null (pw_run_open (s, method[i], NULL, &error));
     check_error (&error, PW_INITIAL,
                  "model scene: the initial configuration is singular: 7 constraint equations are independent there, 8 "
@@ -181,8 +179,7 @@ static const pw_parameter singular_angle_list[] = {
 };
 
 /* A parallelogram of bars of 1 m. */
-static void singular_rhombus (pw_model *m, const void *parameter) {
-  const singular_angle *p = parameter;
+SCENE_WITH (singular_rhombus, singular_angle_list, singular_angle) {
   double c = cos (p->angle), n = sin (p->angle);
   pw_add_body (m, &(pw_body){ .name = "left", .mass = 1, .inertia = 0.1, .start = { 0.5 * c, 0.5 * n, p->angle } });
   pw_add_body (m, &(pw_body){ .name = "rod", .mass = 1, .inertia = 0.1, .start = { 0.5 + c, n, 0 } });
@@ -196,14 +193,12 @@ static void singular_rhombus (pw_model *m, const void *parameter) {
 
 /* A restart in a singular configuration is refused with the name of a pin; the run continues from its former state. */
 TEST (restart_there) {
-  static const pw_plugin_table table =
-      TRIAL_TABLE_WITH (singular_rhombus, singular_angle_list, sizeof (singular_angle));
   static const double flat[9] = { 0.5, 0, 0, 1.5, 0, 0, 1.5, 0, 0 }, rest[9] = { 0 };
   static const char *const method[] = { "rk4+projection", "galpha+ggl", "bdf+projection" };
   for (int i = 0; i < 3; i++) {
     pw_error error = { 0 };
     char pin = 0;
-    pw_system *s = scene_system (&table, NULL);
+    pw_system *s = scene_system (&singular_rhombus_table, NULL);
     pw_run *r = runs_open (s, method[i], NULL);
     double start[9];
     memcpy (start, pw_run_initial (r)->q, sizeof start);

@@ -111,25 +111,24 @@ TEST (reached_state_unchanged) {
 
 /* ---- Specified values are kept ---- */
 
+typedef struct {
+  double phi, x, omega, vy, specified;
+} start_given;
+
+static const pw_parameter start_rod_list[] = { { PW_AT (start_given, phi) },       { PW_AT (start_given, x) },
+                                               { PW_AT (start_given, omega) },     { PW_AT (start_given, vy) },
+                                               { PW_AT (start_given, specified) }, { .name = NULL } };
+
 /* A rod on a pin with one or two specified states. */
-static void start_rod (pw_model *m, const void *parameters) {
-  const double *p = parameters;
+SCENE_WITH (start_rod, start_rod_list, start_given) {
   pw_add_body (m, &(pw_body){ .name = "rod",
                               .mass = 1,
                               .inertia = 1. / 12,
-                              .start = { p[1], 0, p[0] },
-                              .rate = { 0, p[3], p[2] },
-                              .specified = (unsigned)p[4] });
+                              .start = { p->x, 0, p->phi },
+                              .rate = { 0, p->vy, p->omega },
+                              .specified = (unsigned)p->specified });
   pw_add_pin (m, &(pw_pin){ .name = "O", .body = { "ground", "rod" }, .at = { { 0 }, { -0.5, 0 } } });
 }
-
-static const pw_parameter start_rod_list[] = { { .name = "phi" },
-                                               { .name = "x", .offset = 8 },
-                                               { .name = "omega", .offset = 16 },
-                                               { .name = "vy", .offset = 24 },
-                                               { .name = "specified", .offset = 32 },
-                                               { .name = NULL } };
-static const pw_plugin_table start_rod_table = TRIAL_TABLE_WITH (start_rod, start_rod_list, 40);
 
 static const pw_initial_report *start_of_rod (pw_system **s, pw_run **r, double phi, double x, double omega, double vy,
                                               double specified) {
@@ -192,8 +191,8 @@ TEST (given_before_specified) {
 }
 
 /* A body on two wheels, or in two slots, one behind the other, pinned to an arm without given values. */
-static void start_axles (pw_model *m, const void *parameters) {
-  const int slots = ((const double *)parameters)[4] != 0;
+SCENE_WITH (start_axles, start_rod_list, start_given) {
+  const int slots = p->specified != 0;
   pw_add_body (m, &(pw_body){ .name = "car", .mass = 1, .inertia = 1 });
   pw_add_body (m, &(pw_body){ .name = "arm", .mass = 1, .inertia = 1 });
   for (int i = 0; i < 2; i++) {
@@ -209,11 +208,10 @@ static void start_axles (pw_model *m, const void *parameters) {
 /* Given values that satisfy the constraints are kept, though they leave two equations for one unknown: with y, or vy,
  * only the angle, or omega, of the car is left. */
 TEST (given_consistent) {
-  static const pw_plugin_table table = TRIAL_TABLE_WITH (start_axles, start_rod_list, 40);
   static const char *const name[2][3] = { { "car.vx", "car.vy", "car.omega" }, { "car.x", "car.y", "car.phi" } };
   for (int slots = 0; slots < 2; slots++)
     for (int given = 1; given < 8; given++) {
-      pw_model *m = scene_model (&table, "specified", (double)slots, NULL);
+      pw_model *m = scene_model (&start_axles_table, "specified", (double)slots, NULL);
       for (int j = 0; j < 3; j++)
         if (given >> j & 1) check_ok (pw_model_set_initial (m, name[slots][j], j == 0 ? 10 : 0, NULL), NULL);
       pw_system *s = scene_compile (m);

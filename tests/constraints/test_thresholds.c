@@ -231,7 +231,7 @@ static void watchdog_build_disc (pw_model *m, const void *parameter) {
 
 TEST (acceleration_norm) {
   static const pw_parameter list[] = { { .name = "torque", .value = 1 }, { .name = NULL } };
-  static const pw_plugin_table table = TRIAL_TABLE_WITH (watchdog_build_disc, list, sizeof (double));
+  static const pw_plugin_table table = SCENE_TABLE_WITH (watchdog_build_disc, list, sizeof (double));
   for (int k = 0; k <= 6; k += 2) {
     pw_system *s = scene_system (&table, "torque", pow (10, k), NULL);
     pw_run *r = runs_open (s, "rk4+projection", NULL);

@@ -25,8 +25,7 @@ static const pw_parameter watchdog_cart_list[] = {
   { .name = NULL },
 };
 
-static void watchdog_build_cart (pw_model *m, const void *parameter) {
-  const watchdog_cart *p = parameter;
+SCENE_WITH (watchdog_build_cart, watchdog_cart_list, watchdog_cart) {
   double cart = p->cart * p->scale;
   pw_add_body (m, &(pw_body){ .name = "cart", .mass = cart, .inertia = cart });
   pw_add_body (m, &(pw_body){ .name = "bob", .mass = p->scale, .start = { cos (p->phi), sin (p->phi), p->phi } });
@@ -34,9 +33,6 @@ static void watchdog_build_cart (pw_model *m, const void *parameter) {
   pw_add_pin (m, &(pw_pin){ .name = "hinge", .body = { "bob", "cart" }, .at = { { -1, 0 }, { 0, 0 } } });
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 } });
 }
-
-static const pw_plugin_table watchdog_cart_table =
-    TRIAL_TABLE_WITH (watchdog_build_cart, watchdog_cart_list, sizeof (watchdog_cart));
 
 /* ---- Regular scenes with very different masses ---- */
 
@@ -66,7 +62,7 @@ static double watchdog_angle (double cart, double t) {
 }
 
 static void watchdog_try_cart (const char *method, double cart, double scale, double exact, double bound) {
-  pw_system *s = scene_system (&watchdog_cart_table, "cart", cart, "scale", scale, NULL);
+  pw_system *s = scene_system (&watchdog_build_cart_table, "cart", cart, "scale", scale, NULL);
   pw_run *r = runs_open (s, method, &(pw_settings){ .rtol = 1e-9, .span = 10 });
   pw_sample x = runs_to (r, 10);
   check_close (method, trial_state (s, &x, "cart.x"), (1 - cos (exact)) / (1 + cart), bound, "1e4 rtol");
@@ -339,7 +335,7 @@ static void watchdog_build_small (pw_model *m, const void *parameter) {
 /* The bounds in the message are in the units of the value, which is outside them. */
 static void watchdog_try_inertia (double inertia) {
   static const pw_parameter list[] = { { .name = "inertia", .value = 1 }, { .name = NULL } };
-  static const pw_plugin_table table = TRIAL_TABLE_WITH (watchdog_build_small, list, sizeof (double));
+  static const pw_plugin_table table = SCENE_TABLE_WITH (watchdog_build_small, list, sizeof (double));
   double value, low, high;
   pw_error error = { 0 };
   pw_system *s = scene_system (&table, "inertia", inertia, NULL);
@@ -354,7 +350,7 @@ static void watchdog_try_inertia (double inertia) {
 TEST (extreme) {
   static const double mass[] = { 1e200, 1e-200 };
   pw_error error = { 0 }, beyond = { 0 };
-  pw_system *far = scene_system (&watchdog_cart_table, "phi", 1e308, NULL);
+  pw_system *far = scene_system (&watchdog_build_cart_table, "phi", 1e308, NULL);
   assert_null (pw_run_open (far, "bdf", NULL, &beyond));
   check_error (&beyond, PW_INPUT,
                "model scene: values too extreme: bob.phi is initially 1e+308: expected a magnitude below 1e+100");
@@ -369,7 +365,7 @@ TEST (extreme) {
     assert_non_null (strstr (refused.text, "values too extreme: the mass or inertia that goes with crank0.x is"));
     pw_system_free (s);
   }
-  pw_system *s = scene_system (&watchdog_cart_table, "cart", 1e-15, "phi", -PW_PI / 2, NULL);
+  pw_system *s = scene_system (&watchdog_build_cart_table, "cart", 1e-15, "phi", -PW_PI / 2, NULL);
   pw_run *r = pw_run_open (s, "rk4+projection", NULL, &error);
   if (r) pw_run_advance_to (r, 1, 1, &error);
   assert_int_equal (error.status, PW_METHOD);

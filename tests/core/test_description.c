@@ -26,17 +26,13 @@ static const pw_parameter description_list[] = {
   { .name = NULL },
 };
 
-static void description_build (pw_model *m, const void *parameters) {
-  const description_parameters *p = parameters;
+SCENE_WITH (description, description_list, description_parameters) {
   if (p->links > 5) pw_model_refuse (m, "links = %g: at most %d", p->links, 5);
   pw_add_body (
       m,
       &(pw_body){ .name = "frame", .mass = p->mass, .inertia = 1, .start = { p->length, 1, 2 }, .rate = { 3, 4, 5 } });
   pw_add_body (m, &(pw_body){ .name = "steer", .mass = 1, .inertia = 1 });
 }
-
-static const pw_plugin_table description_table =
-    TRIAL_TABLE_WITH (description_build, description_list, sizeof (description_parameters));
 
 TEST (parameters) {
   pw_system *s = scene_system (&description_table, NULL);
@@ -66,7 +62,7 @@ TEST (bad_parameters) {
 }
 
 TEST (no_parameters) {
-  pw_plugin_table table = TRIAL_TABLE (description_build);
+  pw_plugin_table table = SCENE_TABLE (description);
   pw_error error = { 0 };
   pw_model *m = pw_model_new ("cart", &table, &error);
   assert_int_equal (pw_model_set (m, "length", 1, &error), PW_INPUT);
@@ -151,25 +147,21 @@ TEST (missing_system) {
   pw_model_free (m);
 }
 
-static void description_add_no_body (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (description_add_no_body) {
   pw_add_body (m, NULL);
 }
 
-static void description_add_no_pin (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (description_add_no_pin) {
   pw_add_pin (m, NULL);
 }
 
 TEST (missing_definitions) {
-  static void (*const build[]) (pw_model * m, const void *parameters) = { description_add_no_body,
-                                                                          description_add_no_pin };
+  static const pw_plugin_table *const table[] = { &description_add_no_body_table, &description_add_no_pin_table };
   static const char *const text[] = { "model cart: pw_add_body without a body",
                                       "model cart: pw_add of element type pin without a definition" };
   for (int i = 0; i < 2; i++) {
-    pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = build[i] };
     pw_error error = { 0 };
-    pw_model *m = pw_model_new ("cart", &table, &error);
+    pw_model *m = pw_model_new ("cart", table[i], &error);
     assert_int_equal (pw_model_build (m, &error), PW_INPUT);
     check_error (&error, PW_INPUT, text[i]);
     pw_model_free (m);

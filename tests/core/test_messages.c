@@ -7,22 +7,19 @@
 #include "toys.h"
 #include "trial.h"
 
-static void messages_build (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (messages_build) {
   pw_add_body (m, &(pw_body){ .name = "frame", .mass = 1, .inertia = 1 });
   pw_add_body (m, &(pw_body){ .name = "steer", .mass = 1, .inertia = 1 });
 }
 
-static const pw_plugin_table messages_table = TRIAL_TABLE (messages_build);
-
 /* ---- Invalid bodies and elements ---- */
 
 /* Executes statements that make the valid model m invalid, and expects "model scene" with this text. */
-#define BAD(text, ...)                                 \
-  do {                                                 \
-    pw_model *m = scene_model (&messages_table, NULL); \
-    __VA_ARGS__;                                       \
-    scene_refused (m, "model scene" text);             \
+#define BAD(text, ...)                                       \
+  do {                                                       \
+    pw_model *m = scene_model (&messages_build_table, NULL); \
+    __VA_ARGS__;                                             \
+    scene_refused (m, "model scene" text);                   \
   } while (0)
 #define BODY(...) pw_add_body (m, &(pw_body){ __VA_ARGS__ })
 #define PIN(...) pw_add_pin (m, &(pw_pin){ __VA_ARGS__ })
@@ -156,7 +153,7 @@ TEST (bad_kinds) {
 TEST (too_large) {
   enum { COUNT = 6000 };
   static char name[COUNT][2][8];
-  pw_model *m = scene_model (&messages_table, NULL);
+  pw_model *m = scene_model (&messages_build_table, NULL);
   for (int i = 0; i < COUNT; i++) {
     snprintf (name[i][0], sizeof name[i][0], "b%d", i);
     snprintf (name[i][1], sizeof name[i][1], "g%d", i);
@@ -215,7 +212,7 @@ TEST (bad_internal) {
        pw_add (m, &kind, &(messages_chooser){ "f", "frame", 0 }));
   kind.coordinate = angle;
   pw_error error = { 0 };
-  pw_model *m = scene_model (&messages_table, NULL);
+  pw_model *m = scene_model (&messages_build_table, NULL);
   pw_add (m, &kind, &(messages_chooser){ "f", "frame", 0 });
   assert_null (pw_system_compile (m, &error));
   check_error (&error, PW_RESOURCE, "model scene: flywheel f: prepare refuses it");
@@ -224,7 +221,7 @@ TEST (bad_internal) {
 
 /* A missing name is an error. */
 TEST (missing_names) {
-  pw_model *m = scene_model (&messages_table, NULL);
+  pw_model *m = scene_model (&messages_build_table, NULL);
   const pw_signal nothing = { 0 };
   pw_error error = { 0 };
   assert_int_equal (pw_model_set (m, NULL, 1, &error), PW_INPUT);
@@ -248,7 +245,7 @@ static const pw_parameter messages_domain[] = { { "a", 0, 1, "m", "a length", (p
 
 TEST (bad_parameters) {
   pw_error error = { 0 };
-  pw_plugin_table table = messages_table;
+  pw_plugin_table table = messages_build_table;
   table.parameters = messages_outside;
   table.parameters_size = 8;
   assert_null (pw_model_new ("scene", &table, &error));
@@ -265,6 +262,6 @@ static void messages_empty (pw_model *m, const void *parameters) {
 }
 
 TEST (no_body) {
-  pw_plugin_table table = TRIAL_TABLE (messages_empty);
+  pw_plugin_table table = SCENE_TABLE (messages_empty);
   scene_refused (scene_model (&table, NULL), "model scene has no body");
 }

@@ -173,19 +173,16 @@ static const pw_kind guide_kind = {
   .force_q = guide_force_q,
 };
 
-static void guide_build (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (guide_build) {
   pw_add_body (m, &(pw_body){ .name = "bead", .mass = 1, .inertia = 1, .start = { 0.1, 0.2, 0 } });
   pw_add (m, &guide_kind, &(guide){ .name = "line", .body = "bead" });
 }
-
-static const pw_plugin_table guide_table = TRIAL_TABLE (guide_build);
 
 /* Methods with Newton's iteration have its complete matrix: few steps are rejected. */
 TEST (guide) {
   char method[40];
   for (int i = 0; runs_method (i, method); i++) {
-    pw_system *s = scene_system (&guide_table, NULL);
+    pw_system *s = scene_system (&guide_build_table, NULL);
     pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-8, .span = 2 });
     pw_sample now = runs_to (r, 2);
     const pw_statistics *n = pw_run_statistics (r);
@@ -196,16 +193,14 @@ TEST (guide) {
 }
 
 /* A slot along the same line. */
-static void slotted_build (pw_model *m, const void *parameters) {
-  guide_build (m, parameters);
+SCENE (slotted_build) {
+  guide_build (m, parameter);
   pw_add_slot (m, &(pw_slot){ .name = "slot", .body = { "bead", "ground" }, .heading = atan2 (2, 1) });
 }
 
-static const pw_plugin_table slotted_table = TRIAL_TABLE (slotted_build);
-
 /* A guide connects its body to the ground: together with another such element it can be redundant. */
 TEST (redundant_guide) {
-  pw_system *s = scene_system (&slotted_table, NULL);
+  pw_system *s = scene_system (&slotted_build_table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 2 });
   assert_int_equal (pw_run_redundant (r), 1);
   pw_sample now = runs_to (r, 2);

@@ -187,9 +187,8 @@ TEST (rest) {
 
 /* A car: steered by a ramp, its speed a table; a trailer turned by a motor with pulses, a disc turned by a smooth step,
  * a boom by a cubic table. */
-static void shapes_car (pw_model *m, const void *parameters) {
+SCENE (shapes_car) {
   static const double t[] = { 0.15, 0.8, 1.3 }, y[] = { 1, 1.6, 1.2 };
-  (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "car", .mass = 3, .inertia = 0.4, .rate = { 1 } });
   pw_add_body (m, &(pw_body){ .name = "trailer", .mass = 1, .inertia = 0.1, .start = { -1.2 }, .rate = { 1 } });
   pw_add_body (m, &(pw_body){ .name = "disc", .mass = 0.2, .inertia = 0.05 });
@@ -221,8 +220,7 @@ static void shapes_car (pw_model *m, const void *parameters) {
 }
 
 TEST (methods) {
-  static const pw_plugin_table car = TRIAL_TABLE (shapes_car);
-  trial (&car, 2);
+  trial (&shapes_car_table, 2);
 }
 
 /* The signal of a torque, of a velocity constraint, of a position constraint. */

@@ -176,8 +176,7 @@ TEST (jumps) {
 
 static signals_context signals_driven;
 
-static void signals_build (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (signals_build) {
   pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 1 });
   pw_add (
       m, &toy_kind_drive,
@@ -187,9 +186,8 @@ static void signals_build (pw_model *m, const void *parameters) {
 }
 
 TEST (drive) {
-  static const pw_plugin_table table = TRIAL_TABLE (signals_build);
   signals_driven = (signals_context){ 0 };
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (&signals_build_table, NULL);
   pw_workspace *w = pw_workspace_new (s, NULL);
   double q[3] = { 0, 0, 10 }, v[3] = { 0 }, y;
   pw_update_kinematics (w, 3, q, v);

@@ -16,8 +16,7 @@
 
 static const struct { double M, m, I, l, g, A, w, th; } drive_p = { 3, 0.8, 0.02, 0.4, 9.81, 0.15, 5, 0.3 };
 
-static void drive_shaken (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (drive_shaken) {
   pw_add_body (m, &(pw_body){ .name = "cart", .mass = drive_p.M, .inertia = 1, .start = { drive_p.A } });
   pw_add_body (m, &(pw_body){ .name = "bob",
                               .mass = drive_p.m,
@@ -33,8 +32,6 @@ static void drive_shaken (pw_model *m, const void *parameters) {
   pw_add_drive (m, &(pw_drive){ .name = "guide", .body = { "cart", "ground" }, .what = PW_DRIVE_ANGLE });
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -drive_p.g } });
 }
-
-static const pw_plugin_table drive_shaken_table = TRIAL_TABLE (drive_shaken);
 
 /* th'' */
 static long double drive_swing (long double t, long double th) {
@@ -92,8 +89,7 @@ TEST (shaken) {
 
 static const struct { double I, m, i, r, A, s, w; } drive_b = { 0.6, 0.5, 0.03, 0.7, 0.3, 4, 2 };
 
-static void drive_bead (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (drive_bead) {
   pw_add_body (m, &(pw_body){ .name = "rod", .mass = 1, .inertia = drive_b.I, .rate = { 0, 0, drive_b.w } });
   pw_add_body (m, &(pw_body){ .name = "bead",
                               .mass = drive_b.m,
@@ -113,8 +109,6 @@ static void drive_bead (pw_model *m, const void *parameters) {
       m,
       &(pw_drive){ .name = "turn", .body = { "bead", "rod" }, .what = PW_DRIVE_ANGLE, .value = { .constant = 0.5 } });
 }
-
-static const pw_plugin_table drive_bead_table = TRIAL_TABLE (drive_bead);
 
 TEST (bead) {
   pw_system *s = scene_system (&drive_bead_table, NULL);
@@ -145,8 +139,7 @@ TEST (bead) {
 
 /* ---- A flywheel driven relative to a free platform: the sum of their angular momenta is 0 ---- */
 
-static void drive_flywheel (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (drive_flywheel) {
   pw_add_body (m, &(pw_body){ .name = "flywheel", .mass = 1, .inertia = 0.2, .start = { 0.3 } });
   pw_add_body (m, &(pw_body){ .name = "platform", .mass = 4, .inertia = 0.6, .start = { 0.3 } });
   pw_add_pin (m, &(pw_pin){ .name = "axle", .body = { "flywheel", "platform" } });
@@ -157,8 +150,7 @@ static void drive_flywheel (pw_model *m, const void *parameters) {
 }
 
 TEST (flywheel) {
-  static const pw_plugin_table table = TRIAL_TABLE (drive_flywheel);
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (&drive_flywheel_table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .ledger = 1 });
   pw_sample x = runs_to (r, 1.3);
   double angle = 3 - 3 * cos (2.6), bound = 1e-11;

@@ -92,13 +92,10 @@ TEST (tolerances) {
   }
 }
 
-static void driven_disc (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (driven_disc) {
   pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 2 });
   pw_add_torque (m, &(pw_torque){ .name = "push", .body = { "disc", "ground" } });
 }
-
-static const pw_plugin_table driven_disc_table = TRIAL_TABLE (driven_disc);
 
 /* A pulse is not stepped over, however short it is and however large the steps before it are. */
 TEST (short_pulse) {
@@ -133,10 +130,9 @@ TEST (copies) {
 }
 
 /* A crank driven through the points of a cubic table, at which its acceleration has kinks. */
-static void driven_crank (pw_model *m, const void *parameters) {
+SCENE (driven_crank) {
   enum { POINTS = 41 };
   double t[POINTS], angle[POINTS];
-  (void)parameters;
   for (int i = 0; i < POINTS; i++) {
     double x = 2 * PW_PI * i / (POINTS - 1);
     t[i] = 0.1 * i;
@@ -160,10 +156,9 @@ static void driven_crank (pw_model *m, const void *parameters) {
 /* Methods of order > 2 end their steps at the kinks: few steps are rejected, and the error is below rtol = 1e-10.
  * Without that, a hundred would be rejected, and the error would be 2e-9. */
 TEST (knots) {
-  static const pw_plugin_table table = TRIAL_TABLE (driven_crank);
   double exact[6], q[6], v[6];
   pw_statistics cost;
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (&driven_crank_table, NULL);
   runs_state (s, "erk8+projection", &(pw_settings){ .rtol = 1e-13, .span = 4 }, 4, exact, v, NULL);
   runs_state (s, "erk8+projection", &(pw_settings){ .rtol = 1e-10, .span = 4 }, 4, q, v, &cost);
   assert_true (cost.rejected < 5 && cost.steps >= 40);

@@ -29,10 +29,9 @@ static const pw_parameter feedback_list[] = { { PW_AT (feedback_parameters, sign
 
 /* Two rods: the hinge of the first one is damped, and air resists the motion of the second one.  The described initial
  * velocities are inconsistent. */
-static void feedback_build (pw_model *m, const void *parameters) {
+SCENE_WITH (feedback_build, feedback_list, feedback_parameters) {
   static const char *const omega[] = { "a.omega", NULL }, *const vx[] = { "b.vx", NULL },
                            *const vy[] = { "b.vy", NULL };
-  const feedback_parameters *p = parameters;
   pw_add_body (m, &(pw_body){ .name = "a", .mass = 1, .inertia = 1. / 12, .start = { 0.5 }, .rate = { 0, 0, 1 } });
   pw_add_body (m, &(pw_body){ .name = "b", .mass = 1, .inertia = 1. / 12, .start = { 1.5 } });
   pw_add_pin (m, &(pw_pin){ .name = "A", .body = { "a", "ground" }, .at = { { -0.5 } } });
@@ -47,14 +46,11 @@ static void feedback_build (pw_model *m, const void *parameters) {
   }
 }
 
-static const pw_plugin_table feedback_table =
-    TRIAL_TABLE_WITH (feedback_build, feedback_list, sizeof (feedback_parameters));
-
 /* q and a at 1 s and, from state[12] on, 0.3 steps earlier. */
 static void feedback_run (const char *method, double signals, double step, double state[24]) {
   pw_error error = { 0 };
   pw_sample x;
-  pw_system *s = scene_system (&feedback_table, "signals", signals, NULL);
+  pw_system *s = scene_system (&feedback_build_table, "signals", signals, NULL);
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = step, .rtol = 1e-8, .span = 1 });
   runs_to (r, 1);
   for (int i = 0; i < 2; i++, state += 12) {

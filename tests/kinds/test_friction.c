@@ -33,10 +33,7 @@ static const pw_parameter friction_list[] = {
   { .name = NULL },
 };
 
-#define FRICTION_TABLE(build) TRIAL_TABLE_WITH (build, friction_list, sizeof (friction_parameters))
-
-static void friction_discs (pw_model *m, const void *parameters) {
-  const friction_parameters *p = parameters;
+SCENE_WITH (friction_discs, friction_list, friction_parameters) {
   pw_add_body (m, &(pw_body){ .name = "a", .mass = 1, .inertia = friction_d.I[0], .rate = { 0, 0, friction_d.w } });
   pw_add_body (m, &(pw_body){ .name = "b", .mass = 1, .inertia = friction_d.I[1] });
   pw_add_pin (m, &(pw_pin){ .name = "O", .body = { "a", "b" } });
@@ -44,8 +41,6 @@ static void friction_discs (pw_model *m, const void *parameters) {
       m, &(pw_friction){
              .name = "rub", .body = { "b", "a" }, .viscous = p->viscous, .limit = p->limit, .speed = p->speed });
 }
-
-static const pw_plugin_table friction_discs_table = FRICTION_TABLE (friction_discs);
 
 static void friction_rub (const char *method, double viscous, double limit, double bound, const char *reason) {
   pw_system *s = scene_system (&friction_discs_table, "viscous", viscous, "limit", limit, NULL);
@@ -74,8 +69,7 @@ TEST (discs) {
 
 static const struct { double m[2], v, psi, w0; } friction_b = { { 0.7, 2.1 }, 1.8, 0.4, 0.3 };
 
-static void friction_beam (pw_model *m, const void *parameters) {
-  const friction_parameters *p = parameters;
+SCENE_WITH (friction_beam, friction_list, friction_parameters) {
   double c = cos (friction_b.psi), s = sin (friction_b.psi);
   pw_add_body (m, &(pw_body){ .name = "block",
                               .mass = friction_b.m[0],
@@ -94,8 +88,7 @@ static void friction_beam (pw_model *m, const void *parameters) {
 
 /* The line passes through both centres of mass: nothing turns, the relative velocity is that of the reduced mass. */
 static void friction_slide (const char *method, double viscous, double limit, double bound, const char *reason) {
-  static const pw_plugin_table table = FRICTION_TABLE (friction_beam);
-  pw_system *s = scene_system (&table, "viscous", viscous, "limit", limit, "speed", friction_b.w0, NULL);
+  pw_system *s = scene_system (&friction_beam_table, "viscous", viscous, "limit", limit, "speed", friction_b.w0, NULL);
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-10, .span = 2, .ledger = 1 });
   double M = friction_b.m[0] * friction_b.m[1] / (friction_b.m[0] + friction_b.m[1]);
   for (int i = 1; i <= 4; i++) {
@@ -125,8 +118,7 @@ TEST (refused) {
 
 static const struct { double m, I, v, w, turning, turning_quadratic; } friction_a = { 1.4, 0.2, 3, -5, 0.1, 0.05 };
 
-static void friction_flight (pw_model *m, const void *parameters) {
-  const friction_parameters *p = parameters;
+SCENE_WITH (friction_flight, friction_list, friction_parameters) {
   pw_add_body (m, &(pw_body){ .name = "ball",
                               .mass = friction_a.m,
                               .inertia = friction_a.I,
@@ -138,8 +130,6 @@ static void friction_flight (pw_model *m, const void *parameters) {
                               .turning = friction_a.turning,
                               .turning_quadratic = friction_a.turning_quadratic });
 }
-
-static const pw_plugin_table friction_flight_table = FRICTION_TABLE (friction_flight);
 
 static void friction_fly (const char *method, double linear, double quadratic, double bound, const char *reason) {
   pw_system *s = scene_system (&friction_flight_table, "linear", linear, "quadratic", quadratic, NULL);
@@ -172,9 +162,8 @@ TEST (flight) {
 
 static const struct { double m, v, psi, L, v0; } friction_c = { 2, 1.5, 0.7, 1.2, 0.4 };
 
-static void friction_cart (pw_model *m, const void *parameters) {
+SCENE (friction_cart) {
   double c = cos (friction_c.psi), s = sin (friction_c.psi);
-  (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "cart",
                               .mass = friction_c.m,
                               .inertia = 0.2,
@@ -190,8 +179,7 @@ static void friction_cart (pw_model *m, const void *parameters) {
 }
 
 static void friction_coast (const char *method, double bound, const char *reason) {
-  static const pw_plugin_table table = TRIAL_TABLE (friction_cart);
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (&friction_cart_table, NULL);
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-10, .span = 3, .ledger = 1 });
   for (int i = 1; i <= 4; i++) {
     double t = i, v = friction_coulomb (friction_c.v, t, friction_c.m, friction_c.L, friction_c.v0);
@@ -211,8 +199,7 @@ TEST (coast) {
 
 /* ---- By all methods: a car and a trailer that are slowed down by all of these elements ---- */
 
-static void friction_car (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (friction_car) {
   pw_add_body (m, &(pw_body){ .name = "car", .mass = 3, .inertia = 0.4, .rate = { 2, 0.2, 0.5 } });
   pw_add_body (m, &(pw_body){ .name = "trailer", .mass = 1, .inertia = 0.1, .start = { -1 }, .rate = { 2 } });
   pw_add_pin (m, &(pw_pin){ .name = "H", .body = { "car", "trailer" }, .at = { { -0.5, 0 }, { 0.5, 0 } } });
@@ -241,6 +228,5 @@ static void friction_car (pw_model *m, const void *parameters) {
 }
 
 TEST (methods) {
-  static const pw_plugin_table car = TRIAL_TABLE (friction_car);
-  trial (&car, 2);
+  trial (&friction_car_table, 2);
 }

@@ -19,8 +19,7 @@ static const pw_parameter rolling_list[] = {
 
 static const struct { double m, r, u, w, heading; } rolling_u = { 2, 0.15, 0.4, 0.9, 0.6 };
 
-static void rolling_unicycle (pw_model *m, const void *parameters) {
-  const rolling_parameters *p = parameters;
+SCENE_WITH (rolling_unicycle, rolling_list, rolling_parameters) {
   pw_add_body (m, &(pw_body){ .name = "body", .mass = rolling_u.m, .inertia = 0.1, .rate = { 0, 0, rolling_u.w } });
   pw_add_rolling_wheel (m, &(pw_rolling_wheel){ .name = "wheel",
                                                 .body = "body",
@@ -30,9 +29,6 @@ static void rolling_unicycle (pw_model *m, const void *parameters) {
                                                 .start = 0.5,
                                                 .torque = { .constant = rolling_u.u } });
 }
-
-static const pw_plugin_table rolling_unicycle_table =
-    TRIAL_TABLE_WITH (rolling_unicycle, rolling_list, sizeof (rolling_parameters));
 
 static void rolling_turn (const char *method, double inertia, double bound, const char *reason) {
   const double t = 3, w = rolling_u.w, r = rolling_u.r;
@@ -90,21 +86,16 @@ static void rolling_two (pw_model *m, int hub) {
   pw_add_rolling_wheel (m, &wheel);
 }
 
-static void rolling_robot (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (rolling_robot) {
   rolling_two (m, 0);
 }
 
-static void rolling_hub (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (rolling_hub) {
   rolling_two (m, 1);
   pw_add_body (m, &(pw_body){ .name = "hub", .start = { 0, -rolling_r.c } });
   pw_add_drive (m, &(pw_drive){ .name = "slot", .body = { "hub", "robot" }, .what = PW_DRIVE_X });
   pw_add_drive (m, &(pw_drive){ .name = "key", .body = { "hub", "robot" }, .what = PW_DRIVE_ANGLE });
 }
-
-static const pw_plugin_table rolling_robot_table = TRIAL_TABLE (rolling_robot);
-static const pw_plugin_table rolling_hub_table = TRIAL_TABLE (rolling_hub);
 
 /* shares: the parts of the lateral force that the left and the right wheel have. */
 static void rolling_circle (const pw_plugin_table *table, const double shares[2], const char *method, double bound,
@@ -187,8 +178,7 @@ TEST (motor) {
 
 /* ---- Initial states ---- */
 
-static void rolling_coast (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (rolling_coast) {
   pw_add_body (m, &(pw_body){ .name = "body",
                               .mass = 1,
                               .inertia = 0.1,
@@ -201,8 +191,7 @@ static void rolling_coast (pw_model *m, const void *parameters) {
 
 /* A wheel without a given spin rate takes that with which it rolls; the velocity of the body does not change. */
 TEST (start) {
-  static const pw_plugin_table table = TRIAL_TABLE (rolling_coast);
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (&rolling_coast_table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", NULL);
   assert_int_equal (pw_run_initial (r)->moved, 0);
   check_close ("spin rate", pw_run_initial (r)->v[3], 2 / 0.2, 64 * CHECK_EPS, "speed of the contact point / radius");
@@ -224,8 +213,7 @@ TEST (given) {
 
 /* ---- By all methods: a planar bicycle with a driven rear wheel and a free fork with trail ---- */
 
-static void rolling_bicycle (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (rolling_bicycle) {
   pw_add_body (m, &(pw_body){ .name = "frame", .mass = 8, .inertia = 1.2, .rate = { 1, 0, 0 } });
   pw_add_body (m,
                &(pw_body){ .name = "fork", .mass = 1, .inertia = 0.02, .start = { 0.57, 0.03, 0.3 }, .rate = { 1 } });
@@ -242,7 +230,6 @@ static void rolling_bicycle (pw_model *m, const void *parameters) {
 }
 
 TEST (methods) {
-  static const pw_plugin_table bicycle = TRIAL_TABLE (rolling_bicycle);
-  trial (&bicycle, 2);
+  trial (&rolling_bicycle_table, 2);
   trial (&rolling_hub_table, 2);
 }

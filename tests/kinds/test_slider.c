@@ -14,10 +14,9 @@ static const struct {
   double m, g, alpha, beta, v, at[2], foot[2];
 } slider_i = { 1.7, 9.81, 0.4, 0.9, 3, { 0.2, -0.3 }, { 1, 2 } };
 
-static void slider_incline (pw_model *m, const void *parameters) {
+SCENE (slider_incline) {
   double c = cos (slider_i.beta), s = sin (slider_i.beta), X = c * slider_i.at[0] - s * slider_i.at[1],
          Y = s * slider_i.at[0] + c * slider_i.at[1];
-  (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "block",
                               .mass = slider_i.m,
                               .inertia = 0.3,
@@ -32,8 +31,7 @@ static void slider_incline (pw_model *m, const void *parameters) {
 }
 
 TEST (incline) {
-  static const pw_plugin_table table = TRIAL_TABLE (slider_incline);
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (&slider_incline_table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-2, .ledger = 1 });
   const double t = 2, c = cos (slider_i.beta), si = sin (slider_i.beta), ca = cos (slider_i.alpha),
                sa = sin (slider_i.alpha), bound = 1e4 * CHECK_EPS;
@@ -57,8 +55,7 @@ TEST (incline) {
 
 static const struct { double I, m, r, w, c; } slider_y = { 0.4, 1.5, 0.5, 3, 0.3 };
 
-static void slider_yoke (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (slider_yoke) {
   pw_add_body (m, &(pw_body){ .name = "crank", .mass = 1, .inertia = slider_y.I, .rate = { 0, 0, slider_y.w } });
   pw_add_body (
       m, &(pw_body){ .name = "yoke", .mass = slider_y.m, .inertia = 0.2, .start = { slider_y.r - slider_y.c, 0.1 } });
@@ -71,8 +68,7 @@ static void slider_yoke (pw_model *m, const void *parameters) {
 }
 
 static void slider_turn (const char *method, double bound, const char *reason) {
-  static const pw_plugin_table table = TRIAL_TABLE (slider_yoke);
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (&slider_yoke_table, NULL);
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-10, .span = 2, .ledger = 1 });
   double mr = slider_y.m * slider_y.r;
   for (int i = 1; i <= 8; i++) {
@@ -103,8 +99,8 @@ static const pw_parameter slider_list[] = {
   { .name = NULL },
 };
 
-static void slider_bead (pw_model *m, const void *parameters) {
-  int by = (int)((const slider_parameters *)parameters)->by;
+SCENE_WITH (slider_bead, slider_list, slider_parameters) {
+  int by = (int)p->by;
   pw_add_body (m, &(pw_body){ .name = "arm", .mass = 2, .inertia = 0.5, .start = { 0.3 }, .rate = { 0, 0.6, 2 } });
   pw_add_body (
       m,
@@ -134,9 +130,6 @@ static void slider_bead (pw_model *m, const void *parameters) {
     pw_add_drive (m, &(pw_drive){ .name = "aside", .body = { "bead", "arm" }, .at = SLIDER_AT, .what = PW_DRIVE_Y });
 }
 
-static const pw_plugin_table slider_bead_table =
-    TRIAL_TABLE_WITH (slider_bead, slider_list, sizeof (slider_parameters));
-
 static void slider_state (double by, const char *force, const char *moment, double out[14]) {
   pw_system *s = scene_system (&slider_bead_table, "by", by, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3 });
@@ -159,8 +152,7 @@ TEST (drives) {
 
 /* ---- By all methods: oblique lines on moving bodies ---- */
 
-static void slider_train (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (slider_train) {
   pw_add_body (m, &(pw_body){ .name = "base", .mass = 3, .inertia = 0.5, .rate = { 0.3, 0, 0.8 } });
   pw_add_body (m, &(pw_body){ .name = "ram", .mass = 1, .inertia = 0.1, .start = { 0.6, 0.4, 0.3 }, .rate = { 1, 1 } });
   pw_add_body (m, &(pw_body){ .name = "cam", .mass = 0.5, .inertia = 0.05, .start = { 1.2, 0.6, -0.5 } });
@@ -179,7 +171,6 @@ static void slider_train (pw_model *m, const void *parameters) {
 }
 
 TEST (methods) {
-  static const pw_plugin_table train = TRIAL_TABLE (slider_train), yoke = TRIAL_TABLE (slider_yoke);
-  trial (&train, 2);
-  trial (&yoke, 2);
+  trial (&slider_train_table, 2);
+  trial (&slider_yoke_table, 2);
 }

@@ -100,8 +100,13 @@ typedef struct {
   double swing; /* [rad/s] */
 } adaptive_edge;
 
-static void adaptive_build_edge (pw_model *m, const void *parameters) {
-  const double k = ADAPTIVE_DAMPING, w = ADAPTIVE_DRIVE, swing = ((const adaptive_edge *)parameters)->swing;
+static const pw_parameter adaptive_edge_list[] = {
+  { PW_AT (adaptive_edge, swing), 20, "rad/s", "of the spring", PW_POSITIVE },
+  { .name = NULL },
+};
+
+SCENE_WITH (adaptive_build_edge, adaptive_edge_list, adaptive_edge) {
+  const double k = ADAPTIVE_DAMPING, w = ADAPTIVE_DRIVE, swing = p->swing;
   pw_add_body (m, &(pw_body){ .name = "led", .mass = 1, .inertia = 1, .rate = { k * k / (k * k + w * w) } });
   pw_add_body (m, &(pw_body){ .name = "swung", .mass = 1, .inertia = 1, .start = { 1 } });
   pw_add_drag (m, &(pw_drag){ .name = "oil", .body = "led", .linear = k });
@@ -111,21 +116,11 @@ static void adaptive_build_edge (pw_model *m, const void *parameters) {
   pw_add_spring (m, &(pw_spring){ .name = "spring", .body = { "swung", "ground" }, .stiffness = swing * swing });
 }
 
-static const pw_parameter adaptive_edge_list[] = {
-  { PW_AT (adaptive_edge, swing), 20, "rad/s", "of the spring", PW_POSITIVE },
-  { .name = NULL },
-};
-
 TEST (edge) {
-  static const pw_plugin_table table = { .abi = PW_ABI,
-                                         .size = sizeof table,
-                                         .parameters = adaptive_edge_list,
-                                         .parameters_size = sizeof (adaptive_edge),
-                                         .build = adaptive_build_edge };
   const double k = ADAPTIVE_DAMPING, w = ADAPTIVE_DRIVE, t_end = 5;
   for (double swing = 10; swing < 25; swing += 1) {
     pw_error error = { 0 };
-    pw_system *s = scene_system (&table, "swing", swing, NULL);
+    pw_system *s = scene_system (&adaptive_build_edge_table, "swing", swing, NULL);
     pw_run *r = runs_open (s, "erk8+none", &(pw_settings){ .rtol = 1e-10, .span = t_end });
     double worst = 0;
     while (pw_run_time (r) < t_end) {
@@ -183,22 +178,13 @@ static void adaptive_pushed (pw_model *m, int (*eval) (void *, double, const dou
   pw_add_force (m, &(pw_force){ .name = "push", .body = "puck", .fx = { PW_FUNCTION, .function = { .eval = eval } } });
 }
 
-static void adaptive_by_power (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (adaptive_by_power) {
   adaptive_pushed (m, adaptive_power);
 }
 
-static void adaptive_by_bump (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (adaptive_by_bump) {
   adaptive_pushed (m, adaptive_bump);
 }
-
-static const pw_plugin_table adaptive_power_table = { .abi = PW_ABI,
-                                                      .size = sizeof (pw_plugin_table),
-                                                      .build = adaptive_by_power };
-static const pw_plugin_table adaptive_bump_table = { .abi = PW_ABI,
-                                                     .size = sizeof (pw_plugin_table),
-                                                     .build = adaptive_by_bump };
 
 static double adaptive_step (pw_run *r, double t_end) {
   pw_error error = { 0 };
@@ -228,7 +214,7 @@ TEST (norm) {
   const double rtol = 1e-8, round_off = 1e-6;
   double before = 0, predicted = 0;
   int equal = 0;
-  pw_system *s = scene_system (&adaptive_power_table, NULL);
+  pw_system *s = scene_system (&adaptive_by_power_table, NULL);
   pw_run *r = runs_open (s, "erk5+none", &(pw_settings){ .rtol = rtol, .span = 1 });
   for (int n = 0; n < 40; n++) {
     double t = pw_run_time (r);
@@ -253,7 +239,7 @@ TEST (norm) {
 TEST (after_rejection) {
   int found = 0;
   for (adaptive_height = 1e-3; adaptive_height < 1e6; adaptive_height *= 3) {
-    pw_system *s = scene_system (&adaptive_bump_table, NULL);
+    pw_system *s = scene_system (&adaptive_by_bump_table, NULL);
     pw_run *r = runs_open (s, "erk5+none", &(pw_settings){ .rtol = 1e-8, .span = 2 });
     for (double last = INFINITY; pw_run_time (r) < 1.5;) {
       long rejected = pw_run_statistics (r)->rejected;
@@ -288,8 +274,7 @@ TEST (after_cut) {
  * the size of the projection limits steps, at rtol^(3/4).  With an estimate of order h^5, h is proportional to
  * rtol^(3/20). */
 
-static void adaptive_turned (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (adaptive_turned) {
   pw_add_body (m, &(pw_body){ .name = "arm", .start = { 1 } });
   pw_add_pin (m, &(pw_pin){ .name = "O", .body = { "ground", "arm" }, .at = { { 0, 0 }, { -1, 0 } } });
   pw_add_drive (m, &(pw_drive){ .name = "motor",
@@ -297,10 +282,6 @@ static void adaptive_turned (pw_model *m, const void *parameters) {
                                 .what = PW_DRIVE_ANGLE,
                                 .value = { PW_HARMONIC, .harmonic = { .amplitude = 5, .omega = 0.5, .offset = -5 } } });
 }
-
-static const pw_plugin_table adaptive_turned_table = { .abi = PW_ABI,
-                                                       .size = sizeof (pw_plugin_table),
-                                                       .build = adaptive_turned };
 
 static double adaptive_steps (const char *method, double rtol, double t_end) {
   double q[3], v[3];
@@ -341,21 +322,14 @@ static void adaptive_rotor (pw_model *m, pw_signal torque) {
   pw_add_torque (m, &(pw_torque){ .name = "motor", .body = { "rotor", "ground" }, .value = torque });
 }
 
-static void adaptive_exploding (pw_model *m, const void *parameters) {
+SCENE (adaptive_exploding) {
   static const char *const reads[] = { "rotor.omega", NULL };
-  (void)parameters;
   adaptive_rotor (m, (pw_signal){ PW_FUNCTION, .function = { .eval = adaptive_square, .reads = reads } });
 }
 
-static void adaptive_ending (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (adaptive_ending) {
   adaptive_rotor (m, (pw_signal){ PW_FUNCTION, .function = { .eval = adaptive_failing } });
 }
-
-static const pw_plugin_table adaptive_tables[] = {
-  { .abi = PW_ABI, .size = sizeof (pw_plugin_table), .build = adaptive_exploding },
-  { .abi = PW_ABI, .size = sizeof (pw_plugin_table), .build = adaptive_ending },
-};
 
 /* The run fails with the time reached, at most `last`; the state there can be sampled. */
 static void adaptive_stops (const char *method, const pw_plugin_table *table, double last, const char *cause) {
@@ -378,8 +352,9 @@ static void adaptive_stops (const char *method, const pw_plugin_table *table, do
 
 TEST (stops) {
   for (int i = 0; i < ADAPT_METHODS; i++) {
-    adaptive_stops (adaptive_methods[i], &adaptive_tables[0], 1 + 100 * 1e-8, "the tolerances require a step below ");
-    adaptive_stops (adaptive_methods[i], &adaptive_tables[1], 0.7, "a signal failed");
+    adaptive_stops (adaptive_methods[i], &adaptive_exploding_table, 1 + 100 * 1e-8,
+                    "the tolerances require a step below ");
+    adaptive_stops (adaptive_methods[i], &adaptive_ending_table, 0.7, "a signal failed");
   }
 }
 

@@ -13,8 +13,7 @@
 
 /* A cart on a rolling wheel with an internal coordinate, with a damped spring to the ground, an arm driven by a
  * motor, and a free pendulum at its end. */
-static void agree_cart (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (agree_cart) {
   pw_add_body (m, &(pw_body){ .name = "cart", .mass = 2, .inertia = 0.3, .rate = { 0.5, 0, 0.4 } });
   pw_add_body (m, &(pw_body){ .name = "arm", .mass = 0.5, .inertia = 0.05, .start = { 0.8, 0, 0.3 } });
   pw_add_body (m, &(pw_body){ .name = "bob", .mass = 0.3, .inertia = 0.01, .start = { 1.3, 0.1, -0.4 } });
@@ -44,15 +43,13 @@ static int agree_steering (void *context, double t, const double *x, double valu
   return 0;
 }
 
-static const pw_plugin_table agree_table = { .abi = PW_ABI, .size = sizeof agree_table, .build = agree_cart };
-
 enum { AGREE_MASSLESS, AGREE_MASSIVE, AGREE_STATE_TORQUE, AGREE_CART, AGREE_SCENES };
 static const char *const agree_names[] = { "massless", "massive", "state-dependent torque", "cart" };
 
 static pw_system *agree_scene (int scene) {
   static const char *const reads[] = { "frame.phi", "steer.phi", "frame.omega", "steer.omega", NULL };
   pw_error error = { 0 };
-  if (scene == AGREE_CART) return scene_system (&agree_table, NULL);
+  if (scene == AGREE_CART) return scene_system (&agree_cart_table, NULL);
   if (scene == AGREE_MASSLESS) return scene_system (&scene_ezyroller, NULL);
   pw_model *m = scene_model (&scene_ezyroller, "m2", 0.1, "I2", 0.01, NULL);
   pw_signal torque = { PW_FUNCTION, .function = { .eval = agree_steering, .reads = reads } };
@@ -333,9 +330,8 @@ TEST (units) {
 /* The same with moments among the multipliers: two welded bodies, one a point mass, swing, in units of 1/1024 m. */
 static double agree_length;
 
-static void agree_swing (pw_model *m, const void *parameters) {
+SCENE (agree_swing) {
   const double L = agree_length;
-  (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "arm", .mass = 1, .inertia = 0.1 * L * L, .start = { 0.5 * L } });
   pw_add_body (m, &(pw_body){ .name = "tip", .mass = 0.5, .start = { L, 0.2 * L } });
   pw_add_pin (m, &(pw_pin){ .name = "pin", .body = { "arm", "ground" }, .at = { { -0.5 * L } } });
@@ -344,16 +340,15 @@ static void agree_swing (pw_model *m, const void *parameters) {
 }
 
 TEST (units_of_moments) {
-  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = agree_swing };
   static const char *const method[] = { "ida+si1", "ida+ggl", "ida+baumgarte", "radau+ggl" };
   for (int i = 0; i < 4; i++) {
     pw_settings settings = { .rtol = 1e-8, .span = 1 };
     double q[6], v[6], Q[6], V[6];
     pw_statistics cost, Cost;
     agree_length = 1;
-    pw_system *s = scene_system (&table, NULL);
+    pw_system *s = scene_system (&agree_swing_table, NULL);
     agree_length = 1024;
-    pw_system *S = scene_system (&table, NULL);
+    pw_system *S = scene_system (&agree_swing_table, NULL);
     runs_state (s, method[i], &settings, 1, q, v, &cost);
     runs_state (S, method[i], &settings, 1, Q, V, &Cost);
     check_close ("angle", Q[2], q[2], 1e-4, "1e4 rtol");

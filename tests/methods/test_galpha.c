@@ -216,8 +216,7 @@ TEST (breakpoint) {
 }
 
 /* A pendulum whose torque jumps: the multipliers have order 2 from the first step after the jump on. */
-static void galpha_pushed (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (galpha_pushed) {
   pw_add_body (m, &(pw_body){ .name = "arm", .mass = 1, .inertia = 0.5, .start = { 0.5 } });
   pw_add_pin (m, &(pw_pin){ .name = "pivot", .body = { "arm", "ground" }, .at = { { -0.5, 0 }, { 0, 0 } } });
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 } });
@@ -227,8 +226,7 @@ static void galpha_pushed (pw_model *m, const void *parameters) {
 }
 
 TEST (restart) {
-  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof (pw_plugin_table), .build = galpha_pushed };
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (&galpha_pushed_table, NULL);
   for (int i = 0; i < 2; i++) {
     const char *method = i ? "galpha+ggl" : "galpha+index3";
     double off[2] = { 0 };
@@ -247,8 +245,7 @@ TEST (restart) {
 
 /* ---- Damping ---- */
 
-static void galpha_stiff (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (galpha_stiff) {
   pw_add_body (m, &(pw_body){ .name = "rotor", .mass = 1, .inertia = 1, .start = { 0, 0, 0.01 } });
   pw_add_rotational_spring (m, &(pw_rotational_spring){ .name = "k", .body = { "rotor", "ground" }, .stiffness = 1e8 });
 }
@@ -256,9 +253,8 @@ static void galpha_stiff (pw_model *m, const void *parameters) {
 /* A vibration of 1e4 rad/s at a step of 0.01 s is reduced to about rho by each step; with rho = 1 it is not damped.
  * */
 TEST (damping) {
-  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof (pw_plugin_table), .build = galpha_stiff };
   static const double rho[] = { 0.2, 0.6, 1 };
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (&galpha_stiff_table, NULL);
   for (int i = 0; i < 3; i++) {
     char method[40];
     snprintf (method, sizeof method, "galpha:rho=%g", rho[i]);
@@ -277,8 +273,7 @@ TEST (damping) {
 
 /* ---- A vibration of 1000 times the frequency that the step resolves ---- */
 
-static void galpha_fast (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (galpha_fast) {
   pw_add_body (m, &(pw_body){ .name = "arm", .mass = 1, .inertia = 1, .start = { 0, 0, 1e-3 } });
   pw_add_rotational_spring (m, &(pw_rotational_spring){ .name = "k", .body = { "arm", "ground" }, .stiffness = 1e10 });
 }
@@ -288,9 +283,8 @@ TEST (no_overshoot) {
   static const char *const method[] = { "galpha+ggl:rho=0.3", "galpha+ggl:rho=0.5", "galpha+index3:rho=0.8",
                                         "galpha+ggl:rho=1" };
   static const double rho[] = { 0.3, 0.5, 0.8, 1 };
-  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = galpha_fast };
   for (int i = 0; i < 4; i++) {
-    pw_system *s = scene_system (&table, NULL);
+    pw_system *s = scene_system (&galpha_fast_table, NULL);
     pw_run *r = runs_open (s, method[i], &(pw_settings){ .step = 0.01, .span = 1 });
     double before = 0, most = 0;
     for (int k = 1; k <= 60; k++) {
@@ -329,9 +323,7 @@ static void failing_build (pw_model *m, const void *parameters) {
 /* The next step, of another size, does not begin with what the failed one has computed. */
 TEST (failing) {
   static const pw_parameter none[] = { { .name = NULL } };
-  static const pw_plugin_table table = {
-    .abi = PW_ABI, .size = sizeof (pw_plugin_table), .parameters = none, .build = failing_build
-  };
+  static const pw_plugin_table table = SCENE_TABLE_WITH (failing_build, none, 0);
   double phi[2];
   for (int fails = 0; fails < 2; fails++) {
     pw_error error = { 0 };

@@ -40,8 +40,7 @@ TEST (residuals) {
 
 /* A board on two skewed knife edges held by springs, with a sprung rider: three nonholonomic rows, five pins, light
  * trucks, conservative. */
-static void leapfrog_board (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (leapfrog_board) {
   pw_add_body (m, &(pw_body){ .name = "board", .mass = 6, .inertia = 0.1, .rate = { 1, 0, 0 } });
   pw_add_body (m, &(pw_body){ .name = "rotor", .inertia = 0.2, .start = { 0, 0, 0.7 }, .rate = { 1, 0, 0 } });
   pw_add_body (
@@ -62,8 +61,7 @@ static void leapfrog_board (pw_model *m, const void *parameters) {
 }
 
 /* An EzyRoller steered by a spring; its steering assembly is massless. */
-static void leapfrog_roller (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (leapfrog_roller) {
   pw_add_body (m, &(pw_body){ .name = "frame", .mass = 10, .inertia = 2, .rate = { 1, 0, 0 } });
   pw_add_body (m, &(pw_body){ .name = "steer", .start = { 0.6, 0, 0.1 }, .rate = { 1, 0, 0 } });
   pw_add_pin (m, &(pw_pin){ .name = "B", .body = { "frame", "steer" }, .at = { { 0.5, 0 }, { -0.1, 0 } } });
@@ -71,9 +69,6 @@ static void leapfrog_roller (pw_model *m, const void *parameters) {
   pw_add_wheel (m, &(pw_wheel){ .name = "C", .body = "steer", .at = { -0.2, 0 } });
   pw_add_rotational_spring (m, &(pw_rotational_spring){ .name = "k", .body = { "steer", "frame" }, .stiffness = 1 });
 }
-
-static const pw_plugin_table leapfrog_board_table = TRIAL_TABLE (leapfrog_board),
-                             leapfrog_roller_table = TRIAL_TABLE (leapfrog_roller);
 
 static pw_system *leapfrog_open (const char *model) {
   if (strcmp (model, "board") == 0) return scene_system (&leapfrog_board_table, NULL);
@@ -176,8 +171,7 @@ TEST (last_step) {
   }
 }
 
-static void leapfrog_damped (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (leapfrog_damped) {
   pw_add_body (m, &(pw_body){ .name = "rotor", .mass = 1, .inertia = 1, .rate = { 0, 0, 1 } });
   pw_add_rotational_spring (m, &(pw_rotational_spring){ .name = "c", .body = { "rotor", "ground" }, .damping = 1000 });
 }
@@ -192,10 +186,9 @@ static void leapfrog_stops (pw_system *s, double step, const char *cause) {
 }
 
 TEST (large_steps) {
-  static const pw_plugin_table damped = TRIAL_TABLE (leapfrog_damped);
   leapfrog_stops (ladder_open ("ezyroller"), 3, "the step of 3 s may be too large");
   leapfrog_stops (ladder_open ("pendulum"), 1, "the step of 1 s may be too large");
-  leapfrog_stops (scene_system (&damped, NULL), 0.01,
+  leapfrog_stops (scene_system (&leapfrog_damped_table, NULL), 0.01,
                   "t = 0 s: the iteration does not converge; the step of 0.01 s may be too large");
 }
 
@@ -231,14 +224,13 @@ static const pw_kind leapfrog_edge_kind = {
   .force_q = leapfrog_edge_force_q,
 };
 
-static void leapfrog_beyond_edge (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (leapfrog_beyond_edge) {
   pw_add_body (m, &(pw_body){ .name = "puck", .mass = 1, .inertia = 1, .rate = { 1, 0, 0 } });
   pw_add (m, &leapfrog_edge_kind, &(leapfrog_edge){ .name = "edge", .body = "puck" });
 }
 
 /* The step that meets it is refused, although the corrections of y and phi are 0. */
 TEST (undefined_force) {
-  static const pw_plugin_table undefined = TRIAL_TABLE (leapfrog_beyond_edge);
-  leapfrog_stops (scene_system (&undefined, NULL), 0.01, "t = 0.04 s: the iteration does not converge");
+  leapfrog_stops (scene_system (&leapfrog_beyond_edge_table, NULL), 0.01,
+                  "t = 0.04 s: the iteration does not converge");
 }

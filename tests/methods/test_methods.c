@@ -137,17 +137,15 @@ TEST (settings) {
   methods_bad_setting (&(pw_settings){ .t = NAN }, "setting t = nan: expected a finite number");
 }
 
-static void methods_build_disc (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (methods_build_disc) {
   pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 1 });
 }
 
 /* The option steps=fixed makes an adaptive integrator use the step size in place of the tolerances: the default span is
  * 1000 steps, which is the time scale of a scene at rest, and rtol may have any value. */
 TEST (fixed_steps) {
-  static const pw_plugin_table methods_at_rest = TRIAL_TABLE (methods_build_disc);
   static const char *const method[] = { "rk4", "erk5:steps=fixed", "erk8:steps=fixed", "radau:steps=fixed" };
-  pw_system *s = scene_system (&methods_at_rest, NULL);
+  pw_system *s = scene_system (&methods_build_disc_table, NULL);
   for (int i = 0; i < 4; i++) {
     pw_run *r = runs_open (s, method[i], &(pw_settings){ .step = 0.01, .rtol = 1e-20 });
     assert_true (pw_run_initial (r)->time == 10);

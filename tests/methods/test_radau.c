@@ -176,16 +176,14 @@ TEST (switched) {
 
 /* ---- Stiff scenes ---- */
 
-static void radau_stiff (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (radau_stiff) {
   pw_add_body (m, &(pw_body){ .name = "rotor", .mass = 1, .inertia = 1, .start = { 0, 0, 0.01 } });
   pw_add_rotational_spring (m, &(pw_rotational_spring){ .name = "k", .body = { "rotor", "ground" }, .stiffness = 1e8 });
 }
 
 /* A vibration of 1e4 rad/s at a step of 0.01 s: y = 100, of which a step leaves |R (i y)| -> 3 / y. */
 TEST (damping) {
-  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = radau_stiff };
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (&radau_stiff_table, NULL);
   pw_run *r = runs_open (s, "radau:steps=fixed", &(pw_settings){ .step = 0.01, .span = 1 });
   double phi = runs_to (r, 0.04).q[2];
   check_below ("angle after four steps", fabs (phi), 0.01 * pow (6. / 100, 4), "twice 3 / y in each step");
@@ -194,17 +192,15 @@ TEST (damping) {
 }
 
 /* Samples stay between the values at the ends of steps that do not resolve a decay of 1e8 /s. */
-static void radau_brake (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (radau_brake) {
   pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 1, .rate = { 0, 0, 1 } });
   pw_add_friction (m, &(pw_friction){ .name = "f", .body = { "disc", "ground" }, .viscous = 1e8 });
 }
 
 TEST (unresolved_samples) {
-  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = radau_brake };
   static const char *const method[] = { "radau", "radau:steps=fixed" };
   for (int i = 0; i < 2; i++) {
-    pw_system *s = scene_system (&table, NULL);
+    pw_system *s = scene_system (&radau_brake_table, NULL);
     pw_run *r = runs_open (s, method[i], &(pw_settings){ .step = 0.01, .span = 1 });
     for (int k = 1; k <= 200; k++) {
       pw_error error = { 0 };

@@ -291,9 +291,8 @@ static int saved_torque (void *context, double t, const double *x, double value[
   return 0;
 }
 
-static void saved_build (pw_model *m, const void *parameters) {
+SCENE (saved_build) {
   static const char *const reads[] = { "arm.omega", NULL };
-  (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "arm", .mass = 1, .inertia = 0.5, .start = { 0.5 } });
   pw_add_pin (m, &(pw_pin){ .name = "pivot", .body = { "arm", "ground" }, .at = { { -0.5, 0 }, { 0, 0 } } });
   pw_add_torque (m, &(pw_torque){ .name = "M",
@@ -328,10 +327,9 @@ static void saved_fail (pw_system *s, const char *method, double phi) {
 }
 
 TEST (failing) {
-  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof (pw_plugin_table), .build = saved_build };
   char name[40];
   double q[3], v[3];
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (&saved_build_table, NULL);
   saved_failing = 0;
   runs_state (s, "erk8+projection", &(pw_settings){ .rtol = 1e-10 }, 1, q, v, NULL);
   for (int i = 0; runs_method (i, name); i++) saved_fail (s, name, q[2]);
@@ -350,9 +348,7 @@ static void undetermined_build (pw_model *m, const void *parameters) {
 /* Matrices cannot be planned again there. */
 TEST (undetermined) {
   static const pw_parameter none[] = { { .name = NULL } };
-  static const pw_plugin_table table = {
-    .abi = PW_ABI, .size = sizeof (pw_plugin_table), .parameters = none, .build = undetermined_build
-  };
+  static const pw_plugin_table table = SCENE_TABLE_WITH (undetermined_build, none, 0);
   pw_error error = { 0 };
   pw_archive a = { 0 };
   pw_system *s = scene_system (&table, NULL);

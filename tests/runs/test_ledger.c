@@ -21,8 +21,7 @@ static double ledger_step (double t, double *rate) {
 
 /* ---- Scenes, their work and losses until t, and the energy they exchange ---- */
 
-static void ledger_turned (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (ledger_turned) {
   pw_add_body (m, &(pw_body){ .name = "b", .mass = 1, .inertia = 1, .rate = { 1 } });
   pw_add_drive (m, &(pw_drive){ .name = "d", .body = { "b", "ground" }, .what = PW_DRIVE_ANGLE, .value = LEDGER_STEP });
 }
@@ -33,8 +32,7 @@ static void ledger_turned_exact (double t, double *work, double *loss) {
   *work = rate * rate / 2, *loss = 0;
 }
 
-static void ledger_lifted (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (ledger_lifted) {
   pw_add_body (m, &(pw_body){ .name = "b", .mass = 2, .inertia = 1, .rate = { 1 } });
   pw_add_drive (m, &(pw_drive){ .name = "d", .body = { "b", "ground" }, .what = PW_DRIVE_Y, .value = LEDGER_STEP });
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 } });
@@ -45,8 +43,7 @@ static void ledger_lifted_exact (double t, double *work, double *loss) {
   *work = rate * rate + 2 * 9.81 * y, *loss = 0;
 }
 
-static void ledger_shaken (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (ledger_shaken) {
   pw_add_body (m, &(pw_body){ .name = "b", .mass = 2, .inertia = 1, .rate = { 0, 1 } });
   pw_add_drive (m, &(pw_drive){ .name = "d",
                                 .body = { "b", "ground" },
@@ -59,8 +56,7 @@ static void ledger_shaken_exact (double t, double *work, double *loss) {
 }
 
 /* All work is dissipated at once: the energy is always 0. */
-static void ledger_massless (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (ledger_massless) {
   pw_add_body (m, &(pw_body){ .name = "b" });
   pw_add_pin (m, &(pw_pin){ .name = "P", .body = { "b", "ground" }, .at = { { -1 } } });
   pw_add_drive (m, &(pw_drive){ .name = "d", .body = { "b", "ground" }, .what = PW_DRIVE_ANGLE, .value = LEDGER_STEP });
@@ -74,8 +70,7 @@ static void ledger_massless_exact (double t, double *work, double *loss) {
 }
 
 /* A constant speed against drag, which also slows the transverse motion. */
-static void ledger_towed (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (ledger_towed) {
   pw_add_body (m, &(pw_body){ .name = "b", .mass = 1, .inertia = 1, .rate = { 2, 1 } });
   pw_add_speed (m, &(pw_speed){ .name = "s", .body = "b", .value = { .constant = 2 } });
   pw_add_drag (m, &(pw_drag){ .name = "f", .body = "b", .linear = 3 });
@@ -93,9 +88,8 @@ static int ledger_limited (void *context, double t, const double *x, double valu
   return 0;
 }
 
-static void ledger_driven (pw_model *m, const void *parameters) {
+SCENE (ledger_driven) {
   static const char *const reads[] = { "b.omega", NULL };
-  (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "b", .mass = 1, .inertia = 1 });
   pw_add_torque (m, &(pw_torque){ .name = "T",
                                   .body = { "b", "ground" },
@@ -108,18 +102,12 @@ static void ledger_driven_exact (double t, double *work, double *loss) {
   *work = 2 * one - square, *loss = square;
 }
 
-#define LEDGER_SCENE(what, moved)                                                \
-  {                                                                              \
-    .name = #what, .reference = ledger_##what##_exact, .size = moved, .table = { \
-      .abi = PW_ABI,                                                             \
-      .size = sizeof (pw_plugin_table),                                          \
-      .build = ledger_##what                                                     \
-    }                                                                            \
-  }
+#define LEDGER_SCENE(what, moved) \
+  { .name = #what, .table = &ledger_##what##_table, .reference = ledger_##what##_exact, .size = moved }
 
 static const struct {
   const char *name;
-  pw_plugin_table table;
+  const pw_plugin_table *table;
   void (*reference) (double t, double *work, double *loss);
   double size; /* energy exchanged [J] */
 } ledger_scene[] = { LEDGER_SCENE (turned, 2),   LEDGER_SCENE (lifted, 25), LEDGER_SCENE (shaken, 3),
@@ -139,7 +127,7 @@ static void ledger_compare (int scene, const char *method, const pw_sample *x, d
 /* At 0.8 s the power of `turned` is as large as at 0.3 s. */
 static void ledger_run (int scene, const char *method, const pw_settings *settings, double bound, const char *reason) {
   static const double t[] = { 0.2, 0.55, 0.8, 1, 1.7 };
-  pw_system *s = scene_system (&ledger_scene[scene].table, NULL);
+  pw_system *s = scene_system (ledger_scene[scene].table, NULL);
   for (int i = 0; i < 2; i++) {
     pw_error error = { 0 };
     pw_run *r = runs_open (s, method, settings);
@@ -181,7 +169,7 @@ TEST (always_kept) {
     for (int i = 0; runs_method (i, name); i++) {
       double kept[2][9];
       for (int asked = 0; asked < 2; asked++) {
-        pw_system *s = scene_system (&ledger_scene[scene].table, NULL);
+        pw_system *s = scene_system (ledger_scene[scene].table, NULL);
         pw_run *r = runs_open (s, name, &(pw_settings){ .step = 1e-2, .span = 2, .ledger = asked });
         pw_sample x = runs_to (r, 1);
         memcpy (kept[asked], (const double[]){ x.work, x.loss, pw_run_energy_defect (r, &x) }, 3 * sizeof (double));
@@ -199,7 +187,7 @@ TEST (always_kept) {
 
 /* The defect is relative to the energy exchanged, not to 1200 J of losses. */
 TEST (exchanged) {
-  pw_system *s = scene_system (&ledger_scene[4].table, NULL);
+  pw_system *s = scene_system (ledger_scene[4].table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 0.1, .span = 100 });
   pw_sample x = runs_to (r, 100);
   assert_true (x.loss > 1000);

@@ -64,8 +64,7 @@ TEST (signal_fails_at_once) {
 }
 
 /* A spring too stiff for the step size. */
-static void runs_stiff (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (runs_stiff) {
   pw_add_body (m, &(pw_body){ .name = "a", .mass = 1, .inertia = 1, .start = { 2, 0, 0 } });
   pw_add_body (m, &(pw_body){ .name = "b", .mass = 1, .inertia = 1, .start = { 2, 0, 0 } });
   pw_add_pin (m, &(pw_pin){ .name = "P", .body = { "a", "b" } });
@@ -75,9 +74,8 @@ static void runs_stiff (pw_model *m, const void *parameters) {
 }
 
 TEST (too_large_a_step) {
-  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = runs_stiff };
   pw_error error = { 0 };
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (&runs_stiff_table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 0.1 });
   assert_int_equal (pw_run_advance_to (r, 100, 100, &error), PW_METHOD);
   assert_non_null (strstr (error.text, "s: the step of 0.1 s is too large: the "));
@@ -88,31 +86,30 @@ TEST (too_large_a_step) {
 
 /* ---- An undetermined body ---- */
 
-static void runs_loose (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (runs_loose) {
   pw_add_body (m, &(pw_body){ .name = "loose" });
 }
 
-static void runs_hanging (pw_model *m, const void *parameters) {
-  runs_loose (m, parameters);
+SCENE (runs_hanging) {
+  runs_loose (m, parameter);
   pw_add_pin (m, &(pw_pin){ .name = "P", .body = { "loose", "ground" } });
 }
 
 /* Of a pinned body only the angle is not determined. */
 TEST (massless) {
   static const struct {
-    pw_plugin_table table;
+    const pw_plugin_table *table;
     const char *reports;
   } scene[] = {
-    { { .abi = PW_ABI, .size = sizeof scene->table, .build = runs_loose },
+    { &runs_loose_table,
       "model scene: loose.x has no mass, and no constraint determines how it moves; give it mass, or constrain it" },
-    { { .abi = PW_ABI, .size = sizeof scene->table, .build = runs_hanging },
+    { &runs_hanging_table,
       "model scene: loose.phi has no inertia, and no constraint determines how it moves; give it inertia, or constrain "
       "it" },
   };
   for (size_t k = 0; k < sizeof scene / sizeof *scene; k++) {
     pw_error error = { 0 };
-    pw_system *s = scene_system (&scene[k].table, NULL);
+    pw_system *s = scene_system (scene[k].table, NULL);
     assert_null (pw_run_open (s, "rk4", NULL, &error));
     check_error (&error, PW_INPUT, scene[k].reports);
     pw_system_free (s);
@@ -134,9 +131,7 @@ TEST (few_rows) {
   static const pw_parameter list[] = { { .name = "pin" },
                                        { .name = "wheel", .offset = sizeof (double) },
                                        { .name = NULL } };
-  static const pw_plugin_table table = {
-    .abi = PW_ABI, .size = sizeof table, .parameters = list, .parameters_size = 2 * sizeof (double), .build = runs_free
-  };
+  static const pw_plugin_table table = SCENE_TABLE_WITH (runs_free, list, 2 * sizeof (double));
   for (int with = 0; with < 3; with++) {
     pw_system *s = scene_system (&table, "pin", with & 1 ? 1.0 : 0.0, "wheel", with & 2 ? 1.0 : 0.0, NULL);
     const pw_method *m;
@@ -157,17 +152,15 @@ TEST (few_rows) {
 
 /* ---- Redundant constraints ---- */
 
-static void runs_twice (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (runs_twice) {
   pw_add_body (m, &(pw_body){ .name = "disc", .mass = 2, .inertia = 0.5 });
   pw_add_pin (m, &(pw_pin){ .name = "P", .body = { "disc", "ground" } });
   pw_add_pin (m, &(pw_pin){ .name = "Q", .body = { "ground", "disc" } });
 }
 
 TEST (twice) {
-  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = runs_twice };
   char text[200];
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (&runs_twice_table, NULL);
   pw_run *r = runs_open (s, "rk4", NULL);
   assert_int_equal (pw_run_redundant (r), 2);
   assert_string_equal (pw_run_redundancy (r, 0, text, sizeof text), "pins P and Q: the same x constraint");
@@ -294,33 +287,29 @@ TEST (wild) {
 }
 
 /* A force that is initially infinite. */
-static void runs_strong (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (runs_strong) {
   pw_add_body (m, &(pw_body){ .name = "a", .mass = 1, .inertia = 1, .start = { 100, 0, 0 } });
   pw_add_spring (m, &(pw_spring){ .name = "k", .body = { "a", "ground" }, .stiffness = 1e308 });
 }
 
 /* A mass too small for a force. */
-static void runs_weak (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (runs_weak) {
   pw_add_body (m, &(pw_body){ .name = "a", .mass = 1, .inertia = 1 });
   pw_add_body (m, &(pw_body){ .name = "b", .mass = 1, .inertia = 1e-309 });
   pw_add_torque (m, &(pw_torque){ .name = "T", .body = { "b", "ground" }, .value = { .constant = 1 } });
 }
 
 TEST (weak_start) {
-  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = runs_weak };
   pw_error error = { 0 };
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (&runs_weak_table, NULL);
   assert_null (pw_run_open (s, "rk4", NULL, &error));
   check_error (&error, PW_METHOD, "t = 0 s: the acceleration of b.phi is not finite");
   pw_system_free (s);
 }
 
 TEST (wild_start) {
-  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = runs_strong };
   pw_error error = { 0 };
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (&runs_strong_table, NULL);
   assert_null (pw_run_open (s, "erk8+projection", NULL, &error));
   check_error (&error, PW_METHOD, "t = 0 s: force of spring k is not finite");
   pw_system_free (s);

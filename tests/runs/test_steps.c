@@ -27,20 +27,17 @@ static const char *steps_method (int i, char name[STEPS_NAME]) {
 /* A pendulum, initially hanging, with a given torque. */
 static pw_signal steps_torque[2];
 
-static void steps_build (pw_model *m, const void *parameters) {
+SCENE (steps_build) {
   static const char *const name[] = { "T", "U" };
-  (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "bob", .mass = 1, .inertia = 0.1, .start = { 0, -1, 0 } });
   pw_add_pin (m, &(pw_pin){ .name = "P", .body = { "ground", "bob" }, .at = { { 0, 0 }, { 0, 1 } } });
   for (int i = 0; i < 2; i++)
     pw_add_torque (m, &(pw_torque){ .name = name[i], .body = { "bob", "ground" }, .value = steps_torque[i] });
 }
 
-static const pw_plugin_table steps_table = TRIAL_TABLE (steps_build);
-
 static pw_system *steps_open (pw_signal one, pw_signal two) {
   steps_torque[0] = one, steps_torque[1] = two;
-  return scene_system (&steps_table, NULL);
+  return scene_system (&steps_build_table, NULL);
 }
 
 static const pw_signal steps_swing = { PW_HARMONIC, .harmonic = { .amplitude = 1, .omega = 30 } };

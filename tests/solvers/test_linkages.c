@@ -34,9 +34,14 @@ static void linkage_pin (pw_model *m, const double (*at)[3], int number, int a, 
   pw_add_pin (m, &pin);
 }
 
+static const pw_parameter linkage_list[] = {
+  { PW_AT (linkage, seed), .domain = PW_NONNEGATIVE, .about = "number of the linkage" },
+  { .name = NULL },
+};
+
 /* Most bars are pinned to the end of the previous one, so that there are chains. */
-static void linkage_build (pw_model *m, const void *parameters) {
-  unsigned random = (unsigned)((const linkage *)parameters)->seed * 2654435761U;
+SCENE_WITH (linkage_build, linkage_list, linkage) {
+  unsigned random = (unsigned)p->seed * 2654435761U;
   double at[LINKAGE_MOST][3] = { { 0 } };
   int n = 6 + (int)((LINKAGE_MOST - 6) * fabs (saddle_number (&random))), loops = n / 5;
   for (int i = 0; i < n; i++) {
@@ -60,8 +65,8 @@ static void linkage_build (pw_model *m, const void *parameters) {
 }
 
 /* Bars with mass, connected by massless links: one with a wheel, one as a rod, or two in series. */
-static void linkage_build_massless (pw_model *m, const void *parameters) {
-  unsigned random = (unsigned)((const linkage *)parameters)->seed * 2654435761U;
+SCENE_WITH (linkage_build_massless, linkage_list, linkage) {
+  unsigned random = (unsigned)p->seed * 2654435761U;
   double at[LINKAGE_MOST][3] = { { 0 } };
   const double (*there)[3] = (const double (*)[3])at;
   int massive = 2 + (int)(2 * fabs (saddle_number (&random))), links = 1 + (int)(5 * fabs (saddle_number (&random)));
@@ -91,23 +96,6 @@ static void linkage_build_massless (pw_model *m, const void *parameters) {
   }
 }
 
-static const pw_parameter linkage_list[] = {
-  { PW_AT (linkage, seed), .domain = PW_NONNEGATIVE, .about = "number of the linkage" },
-  { .name = NULL },
-};
-
-static const pw_plugin_table linkage_table = { .abi = PW_ABI,
-                                               .size = sizeof (pw_plugin_table),
-                                               .parameters = linkage_list,
-                                               .parameters_size = sizeof (linkage),
-                                               .build = linkage_build };
-
-static const pw_plugin_table linkage_massless_table = { .abi = PW_ABI,
-                                                        .size = sizeof (pw_plugin_table),
-                                                        .parameters = linkage_list,
-                                                        .parameters_size = sizeof (linkage),
-                                                        .build = linkage_build_massless };
-
 static void linkage_each (const char *what, const pw_plugin_table *table, int seeds, int all) {
   for (int seed = 1; seed <= seeds; seed++) {
     double e = saddle_scene (scene_system (table, "seed", (double)seed, NULL), 0, all);
@@ -117,6 +105,6 @@ static void linkage_each (const char *what, const pw_plugin_table *table, int se
 }
 
 TEST (linkages) {
-  linkage_each ("a linkage", &linkage_table, 200, 1);
-  linkage_each ("a linkage with massless links", &linkage_massless_table, 300, 0);
+  linkage_each ("a linkage", &linkage_build_table, 200, 1);
+  linkage_each ("a linkage with massless links", &linkage_build_massless_table, 300, 0);
 }

@@ -17,12 +17,6 @@ static const pw_parameter massless_list[] = {
   { .name = NULL },
 };
 
-#define MASSLESS_TABLE(f)                                                         \
-  {                                                                               \
-    .abi = PW_ABI, .size = sizeof (pw_plugin_table), .parameters = massless_list, \
-    .parameters_size = sizeof (massless), .build = f                              \
-  }
-
 static const char *const massless_methods[] = { "rk4+projection",
                                                 "rk4+nullspace",
                                                 "erk5+projection",
@@ -45,8 +39,7 @@ static void massless_other (pw_model *m, const massless *p) {
 }
 
 /* A disc on a massless arm turns at 1 rad/s. */
-static void massless_disc (pw_model *m, const void *parameters) {
-  const massless *p = parameters;
+SCENE_WITH (massless_disc, massless_list, massless) {
   double L = p->length;
   pw_add_body (m, &(pw_body){ .name = "disc", .inertia = p->mass * L * L, .start = { L, 0, 0 }, .rate = { 0, L, 1 } });
   pw_add_pin (m, &(pw_pin){ .name = "O", .body = { "disc", "ground" }, .at = { { -L, 0 }, { 0, 0 } } });
@@ -54,9 +47,8 @@ static void massless_disc (pw_model *m, const void *parameters) {
 }
 
 static double massless_turned (const char *method, double length, double mass, double other) {
-  static const pw_plugin_table table = MASSLESS_TABLE (massless_disc);
   double q[6], v[6];
-  pw_system *s = scene_system (&table, "length", length, "mass", mass, "other", other, NULL);
+  pw_system *s = scene_system (&massless_disc_table, "length", length, "mass", mass, "other", other, NULL);
   runs_state (s, method, &(pw_settings){ .rtol = 1e-6, .step = 1e-3, .span = 1 }, 1, q, v, NULL);
   pw_system_free (s);
   return fmax (fabs (q[2] - 1), fmax (hypot (q[0] / length - cos (1), q[1] / length - sin (1)), fabs (v[2] - 1)));
@@ -79,8 +71,7 @@ TEST (exact) {
 }
 
 /* Bars with inertia and with mass only, a massless coupler between bars with both, and a massless wheel carrier. */
-static void massless_chain (pw_model *m, const void *parameters) {
-  const massless *p = parameters;
+SCENE_WITH (massless_chain, massless_list, massless) {
   double L = p->length, M = p->mass;
   pw_add_body (m, &(pw_body){ .name = "a", .inertia = M * L * L, .start = { L, 0, 0 }, .rate = { 0, L, 1 } });
   pw_add_body (m, &(pw_body){ .name = "b", .start = { 2.5 * L, 0, 0 } });
@@ -95,8 +86,7 @@ static void massless_chain (pw_model *m, const void *parameters) {
   massless_other (m, p);
 }
 
-static void massless_car (pw_model *m, const void *parameters) {
-  const massless *p = parameters;
+SCENE_WITH (massless_car, massless_list, massless) {
   double L = p->length, M = p->mass;
   pw_add_body (m, &(pw_body){ .name = "frame", .inertia = M * L * L, .rate = { L, 0, 0.3 } });
   pw_add_body (
@@ -133,11 +123,10 @@ static void massless_agree (const pw_plugin_table *table, const char *method) {
 }
 
 TEST (agree) {
-  static const pw_plugin_table chain = MASSLESS_TABLE (massless_chain), car = MASSLESS_TABLE (massless_car);
   static const char *const methods[] = { "bdf+projection", "bdf+projection:every=3", "erk5+projection",
                                          "erk8+nullspace", "ida+ggl" };
   for (size_t i = 0; i < sizeof methods / sizeof *methods; i++) {
-    massless_agree (&chain, methods[i]);
-    massless_agree (&car, methods[i]);
+    massless_agree (&massless_chain_table, methods[i]);
+    massless_agree (&massless_car_table, methods[i]);
   }
 }

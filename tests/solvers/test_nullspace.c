@@ -81,9 +81,8 @@ TEST (ledger) {
 
 /* ---- Refused scenes ---- */
 
-static void nullspace_chain (pw_model *m, const void *parameters) {
+SCENE (nullspace_chain) {
   static char body[200][8], pin[200][8];
-  (void)parameters;
   for (int i = 0; i < 129; i++) {
     snprintf (body[i], sizeof body[i], "b%d", i);
     snprintf (pin[i], sizeof pin[i], "p%d", i);
@@ -95,9 +94,8 @@ static void nullspace_chain (pw_model *m, const void *parameters) {
 }
 
 TEST (refused) {
-  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof (pw_plugin_table), .build = nullspace_chain };
   pw_error error = { 0 };
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (&nullspace_chain_table, NULL);
   assert_null (pw_run_open (s, "erk5+nullspace", NULL, &error));
   check_error (
       &error, PW_INPUT,
@@ -149,19 +147,16 @@ static void nullspace_cart (pw_model *m, int parts) {
   pw_add_pin (m, &(pw_pin){ .name = "bolt2", .body = { "rest", "bracket" }, .at = { { 0.1, -0.2 }, { 0.1, -0.2 } } });
 }
 
-static void nullspace_whole (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (nullspace_whole) {
   nullspace_cart (m, 0);
 }
 
-static void nullspace_parts (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (nullspace_parts) {
   nullspace_cart (m, 1);
 }
 
 TEST (parts) {
-  static const pw_plugin_table whole = TRIAL_TABLE (nullspace_whole), parts = TRIAL_TABLE (nullspace_parts);
-  pw_system *s = scene_system (&whole, NULL), *twin = scene_system (&parts, NULL);
+  pw_system *s = scene_system (&nullspace_whole_table, NULL), *twin = scene_system (&nullspace_parts_table, NULL);
   double q[12], v[12], Q[12], V[12];
   runs_state (s, "rk4+nullspace", &(pw_settings){ .step = 0.01, .span = 1 }, 1, q, v, NULL);
   runs_state (twin, "rk4+nullspace", &(pw_settings){ .step = 0.01, .span = 1 }, 1, Q, V, NULL);

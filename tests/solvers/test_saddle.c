@@ -38,9 +38,8 @@ TEST (models) {
 enum { SADDLE_LINKS = 26, SADDLE_COORDS = 3 * SADDLE_LINKS };
 
 /* A chain with rods instead of pins. */
-static void saddle_rods (pw_model *m, const void *parameters) {
+SCENE (saddle_rods) {
   char name[20], rod[20], before[20] = "ground";
-  (void)parameters;
   for (int i = 0; i < SADDLE_LINKS; i++) {
     snprintf (name, sizeof name, "body%d", i);
     snprintf (rod, sizeof rod, "rod%d", i);
@@ -49,10 +48,6 @@ static void saddle_rods (pw_model *m, const void *parameters) {
     memcpy (before, name, sizeof before);
   }
 }
-
-static const pw_plugin_table saddle_rods_table = { .abi = PW_ABI,
-                                                   .size = sizeof (pw_plugin_table),
-                                                   .build = saddle_rods };
 
 /* The saddle-point system of a scene in a configuration without aligned bodies; `held` coordinates are prescribed,
  * beginning with those of a body. */
@@ -149,27 +144,21 @@ static void bolted_build (pw_model *m, const bolted *p, int pairs) {
   }
 }
 
-static void bolted_pair (pw_model *m, const void *parameters) {
-  bolted_build (m, parameters, 1);
+SCENE_WITH (bolted_pair, bolted_list, bolted) {
+  bolted_build (m, p, 1);
 }
 
-static void bolted_many (pw_model *m, const void *parameters) {
-  bolted_build (m, parameters, SADDLE_LINKS);
+SCENE_WITH (bolted_many, bolted_list, bolted) {
+  bolted_build (m, p, SADDLE_LINKS);
 }
-
-#define BOLTED_TABLE(f)                                                                                             \
-  {                                                                                                                 \
-    .abi = PW_ABI, .size = sizeof (pw_plugin_table), .parameters = bolted_list, .parameters_size = sizeof (bolted), \
-    .build = f                                                                                                      \
-  }
 
 /* Round-off of a dependent row is not accepted as a pivot at any angle, with and without massless coordinates. */
 TEST (dependent_rows) {
-  static const pw_plugin_table table[] = { BOLTED_TABLE (bolted_pair), BOLTED_TABLE (bolted_many) };
+  static const pw_plugin_table *const table[] = { &bolted_pair_table, &bolted_many_table };
   for (int i = 0; i < 60; i++)
     for (int which = 0; which < 4; which++) {
       pw_error error = { 0 };
-      pw_system *s = scene_system (&table[which / 2], "angle", 0.1 * i, "mass", (double)(which % 2), NULL);
+      pw_system *s = scene_system (table[which / 2], "angle", 0.1 * i, "mass", (double)(which % 2), NULL);
       pw_workspace *w = pw_workspace_new (s, NULL);
       assert_int_equal (pw_update_kinematics (w, 0, s->q0, s->v0), PW_OK);
       pw_evaluate_J (w);
@@ -195,12 +184,12 @@ static void pairs_build (pw_model *m, double angle, int pairs) {
   }
 }
 
-static void pairs_one (pw_model *m, const void *parameters) {
-  pairs_build (m, ((const bolted *)parameters)->angle, 1);
+SCENE_WITH (pairs_one, bolted_list, bolted) {
+  pairs_build (m, p->angle, 1);
 }
 
-static void pairs_many (pw_model *m, const void *parameters) {
-  pairs_build (m, ((const bolted *)parameters)->angle, SADDLE_LINKS);
+SCENE_WITH (pairs_many, bolted_list, bolted) {
+  pairs_build (m, p->angle, SADDLE_LINKS);
 }
 
 static double pairs_sine (const pw_plugin_table *table, double angle) {
@@ -222,11 +211,11 @@ static double pairs_sine (const pw_plugin_table *table, double angle) {
 
 /* The sine between the rows of a pin does not depend on how many other pins there are. */
 TEST (sine) {
-  static const pw_plugin_table one = BOLTED_TABLE (pairs_one), many = BOLTED_TABLE (pairs_many);
   for (int i = 0; i < 16; i++) {
-    double sine = pairs_sine (&one, 0.1 * i);
+    double sine = pairs_sine (&pairs_one_table, 0.1 * i);
     assert_true (sine > 0.1 && sine < 1);
-    check_close ("sine", pairs_sine (&many, 0.1 * i), sine, 1e3 * CHECK_EPS, "round-off, over a sine above 0.1");
+    check_close ("sine", pairs_sine (&pairs_many_table, 0.1 * i), sine, 1e3 * CHECK_EPS,
+                 "round-off, over a sine above 0.1");
   }
 }
 

@@ -335,18 +335,16 @@ static const pw_kind wall_kind = {
   .force_q = PW_BY_DIFFERENCES,
 };
 
-static void wall_build (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (wall_build) {
   pw_add_body (m, &(pw_body){ .name = "ball", .mass = 1, .inertia = 1, .rate = { 2 } });
   pw_add (m, &wall_kind, &(wall){ .name = "end", .body = "ball" });
 }
 
 /* A scene without any element type of the library, whose force is 0 at the initial state and at all random ones. */
 TEST (plug_in) {
-  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = wall_build };
   const double w = sqrt (WALL_STIFFNESS), t = 6;
   both x;
-  both_open (&x, scene_system (&table, NULL), "rk4+none", &(pw_settings){ .step = 1e-3, .span = t });
+  both_open (&x, scene_system (&wall_build_table, NULL), "rk4+none", &(pw_settings){ .step = 1e-3, .span = t });
   both_run (&x, t);
   check_close ("x", runs_to (x.special, t).q[0], WALL_AT - 2 * (t - WALL_AT / 2 - PW_PI / w), 1e-6,
                "second order where the force begins");
