@@ -67,12 +67,11 @@ TEST (internal) {
 
 /* The archive begins with A.npy, whose 128 bytes of head describe a 2 x 2 matrix: trace and determinant as above. */
 TEST (npz) {
-  char path[300], head[30 + 5 + 128];
+  char head[30 + 5 + 128];
   double A[4];
   cli_write ("block.yaml", linearise_block);
   cli_good ("pinwheel linearise @/block.yaml -o @/block");
-  cli_expand ("@/block.npz", path, sizeof path);
-  FILE *f = fopen (path, "rb");
+  FILE *f = fopen (cli_path ("block.npz"), "rb");
   assert_non_null (f);
   assert_int_equal (fread (head, sizeof head, 1, f), 1);
   assert_int_equal (fread (A, sizeof A, 1, f), 1);

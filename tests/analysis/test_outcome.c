@@ -3,6 +3,7 @@
 #include <math.h>
 #include "check.h"
 #include "cli.h"
+#include "gallery.h"
 #include "outcome.h"
 
 /* A wheel turned by cos (w t): phi = (1 - cos (w t)) / w^2, omega = sin (w t) / w.  A slider on which a force acts
@@ -22,27 +23,19 @@ static const char model[] = "pinwheel: 1\n"
                             "  - {pin: R, body: [block-b, ground], at: [[0, 0], [0, 0]]}\n"
                             "  - {force: shake, body: block-b, at: [0, 0], fx: {expression: 'sin(40*t)'}}\n";
 
-static pw_file *file;
-static pw_model *built;
-static pw_system *s;
+static gallery_scene scene;
+static pw_system *s; /* of the scene */
 
 static int outcome_setup (void) {
-  char path[4096];
-  pw_error error = { 0 };
   if (cli_setup () != 0) return 1;
   cli_write ("functionals.yaml", model);
-  cli_expand ("@/functionals.yaml", path, sizeof path);
-  file = pw_file_open (path, &error);
-  built = file ? pw_file_model (file, &error) : NULL;
-  if (built && pw_model_build (built, &error) == PW_OK) s = pw_system_compile (built, &error);
-  if (s == NULL) print_message ("%s\n", error.text);
-  return s == NULL;
+  scene = gallery_load (cli_path ("functionals.yaml"), NULL);
+  s = scene.system;
+  return 0;
 }
 
 static int outcome_teardown (void) {
-  pw_system_free (s);
-  pw_model_free (built);
-  pw_file_close (file);
+  gallery_close (&scene);
   return cli_teardown ();
 }
 

@@ -7,9 +7,7 @@
 
 /* A page written in the folder, whole; to be released. */
 static char *animate_page (const char *name) {
-  char path[4200];
-  snprintf (path, sizeof path, "%s/%s", cli_folder, name);
-  FILE *f = fopen (path, "rb");
+  FILE *f = fopen (cli_path (name), "rb");
   assert_non_null (f);
   char *page = calloc (1, 4000000);
   assert_non_null (page);

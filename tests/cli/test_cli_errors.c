@@ -238,11 +238,8 @@ TEST (found_twice) {
                              "@/one/twin.so @/two/twin.so"),
                     0);
   assert_int_equal (cli_run ("PINWHEEL_MODELS=@/one:@/two pinwheel run twin"), 2);
-  char one[300], two[300];
-  cli_expand ("@/one/twin.so", one, sizeof one);
-  cli_expand ("@/two/twin.so", two, sizeof two);
-  assert_non_null (strstr (cli_err, one));
-  assert_non_null (strstr (cli_err, two));
+  assert_non_null (strstr (cli_err, cli_path ("one/twin.so")));
+  assert_non_null (strstr (cli_err, cli_path ("two/twin.so")));
   assert_non_null (strstr (cli_err, "several files match \"twin\", such as "));
   cli_good ("mkdir @/three && cp @/one/twin.so @/three/twin.so");
   assert_int_equal (cli_run ("PINWHEEL_MODELS=@/one:@/two:@/three pinwheel run twin"), 2);

@@ -104,10 +104,9 @@ TEST (rows_of_a_step) {
 
 /* Standard error as a file: no bar, and a line only when a minute has passed. */
 TEST (lines) {
-  char path[200], text[400];
+  char text[400];
   pw_progress p;
-  cli_expand ("@/lines", path, sizeof path);
-  int before = dup (STDERR_FILENO), file = open (path, O_RDWR | O_CREAT | O_TRUNC, 0600);
+  int before = dup (STDERR_FILENO), file = open (cli_path ("lines"), O_RDWR | O_CREAT | O_TRUNC, 0600);
   assert_true (before >= 0 && file >= 0);
   dup2 (file, STDERR_FILENO);
   pw_progress_start (&p, "ezyroller", "s", 0, 10);

@@ -91,9 +91,7 @@ TEST (links) {
 
 /* Locks a file or folder as another process would. */
 static int output_lock (const char *name, int flags) {
-  char path[300];
-  cli_expand (name, path, sizeof path);
-  int file = open (path, flags, 0666);
+  int file = open (cli_path (name), flags, 0666);
   assert_true (file >= 0 && flock (file, LOCK_EX | LOCK_NB) == 0);
   return file;
 }
@@ -114,25 +112,25 @@ static void output_locked (const char *lock, int flags, const char *command, con
 TEST (lock) {
 #define OUTPUT_OTHER ": another process is writing it"
   int file = O_RDWR | O_CREAT, folder = O_RDONLY | O_DIRECTORY;
-  output_locked ("@/l/a.csv.part", file, "pinwheel run ezyroller -t 0.1 -o @/l/a.csv",
+  output_locked ("l/a.csv.part", file, "pinwheel run ezyroller -t 0.1 -o @/l/a.csv",
                  "cannot write @/l/a.csv" OUTPUT_OTHER);
-  output_locked ("@/l/a.json.part", file, "pinwheel run ezyroller -t 0.1 --json @/l/a.json",
+  output_locked ("l/a.json.part", file, "pinwheel run ezyroller -t 0.1 --json @/l/a.json",
                  "cannot write @/l/a.json" OUTPUT_OTHER);
-  output_locked ("@/l/a.html.part", file, "pinwheel run ezyroller -t 0.1 --animate @/l/a.html >@/log",
+  output_locked ("l/a.html.part", file, "pinwheel run ezyroller -t 0.1 --animate @/l/a.html >@/log",
                  "cannot write @/l/a.html" OUTPUT_OTHER);
-  output_locked ("@/l/a.ck.part", file, "pinwheel run ezyroller -t 0.1 --checkpoint @/l/a.ck >@/log",
+  output_locked ("l/a.ck.part", file, "pinwheel run ezyroller -t 0.1 --checkpoint @/l/a.ck >@/log",
                  "cannot write @/l/a.ck" OUTPUT_OTHER);
-  output_locked ("@/l/a.json.part", file, "pinwheel check ezyroller --json @/l/a.json >@/log",
+  output_locked ("l/a.json.part", file, "pinwheel check ezyroller --json @/l/a.json >@/log",
                  "cannot write @/l/a.json" OUTPUT_OTHER);
 #define OUTPUT_INTO "cannot write into @/l/D: another process is writing into it"
-  output_locked ("@/l/D", folder, "PATH=/none pinwheel run ezyroller -t 0.1 --plots @/l/D >@/log", OUTPUT_INTO);
-  output_locked ("@/l/D", folder,
+  output_locked ("l/D", folder, "PATH=/none pinwheel run ezyroller -t 0.1 --plots @/l/D >@/log", OUTPUT_INTO);
+  output_locked ("l/D", folder,
                  "PATH=/none pinwheel compare ezyroller -m rk4 -t 0.1 --step-ladder 0.1:0.05 -o @/l/D >@/log",
                  OUTPUT_INTO);
-  output_locked ("@/l/D", folder,
-                 "PATH=/none pinwheel drift ezyroller -m rk4+none --only-methods -t 0.1 -o @/l/D >@/log", OUTPUT_INTO);
+  output_locked ("l/D", folder, "PATH=/none pinwheel drift ezyroller -m rk4+none --only-methods -t 0.1 -o @/l/D >@/log",
+                 OUTPUT_INTO);
   cli_good ("rm -rf @/l; mkdir @/l");
-  int journal = output_lock ("@/l/s.csv.part", file);
+  int journal = output_lock ("l/s.csv.part", file);
   cli_bad ("pinwheel sweep ezyroller -t 0.1 --vary a=0.5,0.6 -o @/l/s.csv", 1,
            "cannot write @/l/s.csv.part" OUTPUT_OTHER);
   close (journal);
@@ -218,15 +216,13 @@ TEST (direct) {
 
 TEST (mode) {
   struct stat info;
-  char path[300];
-  cli_expand ("@/mode.csv", path, sizeof path);
   for (int mode = 0600; mode <= 0664; mode += 064) {
     cli_good ("rm -f @/mode.csv; echo old >@/mode.csv");
-    assert_int_equal (chmod (path, (mode_t)mode), 0);
-    if (getuid () == 0) assert_int_equal (chown (path, 12345, 23456), 0);
+    assert_int_equal (chmod (cli_path ("mode.csv"), (mode_t)mode), 0);
+    if (getuid () == 0) assert_int_equal (chown (cli_path ("mode.csv"), 12345, 23456), 0);
     cli_good (OUTPUT_RUN "@/mode.csv; wc -l <@/mode.csv");
     assert_string_equal (cli_out, "12\n");
-    assert_int_equal (stat (path, &info), 0);
+    assert_int_equal (stat (cli_path ("mode.csv"), &info), 0);
     assert_int_equal (info.st_mode & 07777, mode);
     if (getuid () == 0) assert_true (info.st_uid == 12345 && info.st_gid == 23456);
   }
@@ -249,36 +245,29 @@ static void output_put (pw_output *o, const char *text) {
  * latter. */
 TEST (set_user) {
   struct stat info;
-  char path[300];
   int how;
   if (getuid () != 0) skip ();
   cli_good ("mkdir @/s && chmod 777 @/s && echo old >@/s/a && chown 12345:23456 @/s/a && chmod 6775 @/s/a");
-  cli_expand ("@/s", path, sizeof path);
   pid_t child = fork ();
   if (child == 0) {
-    if (chdir (path) || setgroups (1, (gid_t[]){ 23456 }) || setgid (34567) || setuid (34567)) _exit (2);
+    if (chdir (cli_path ("s")) || setgroups (1, (gid_t[]){ 23456 }) || setgid (34567) || setuid (34567)) _exit (2);
     pw_output *o = pw_output_open ("a", NULL);
     _exit (o && pw_output_finish (o, NULL) == PW_OK ? 0 : 3); /* empty: writing would remove the bits anyway */
   }
   waitpid (child, &how, 0);
   assert_int_equal (how, 0);
-  cli_expand ("@/s/a", path, sizeof path);
-  assert_int_equal (stat (path, &info), 0);
+  assert_int_equal (stat (cli_path ("s/a"), &info), 0);
   assert_true (info.st_uid == 34567 && info.st_gid == 23456);
   assert_int_equal (info.st_mode & 07777, 02775);
 }
 
 /* If the second of two outputs cannot be renamed, the first one's predecessor keeps its name. */
 TEST (predecessor) {
-  char path[300];
   pw_output *o[3] = { NULL };
   for (int fails = 1; fails >= 0; fails--) {
     pw_error error = { 0 };
     cli_good ("rm -rf @/p; mkdir @/p; echo old >@/p/a; echo old >@/p/b; echo old >@/p/a.part.old");
-    for (int i = 0; i < 2; i++) {
-      cli_expand (i ? "@/p/b" : "@/p/a", path, sizeof path);
-      output_put (o[i] = pw_output_open (path, &error), "new\n");
-    }
+    for (int i = 0; i < 2; i++) output_put (o[i] = pw_output_open (cli_path (i ? "p/b" : "p/a"), &error), "new\n");
     if (fails) cli_good ("rm @/p/b; mkdir @/p/b");
     assert_int_equal (pw_output_finish_all (o, 3, &error), fails ? PW_RESOURCE : PW_OK);
     cli_good ("cd @/p; grep -s . * || true");
@@ -365,17 +354,15 @@ static double *output_find (const pw_checkpoint *c, double value) {
 static void output_forge (int number, double value) {
   pw_checkpoint c;
   pw_error error = { 0 };
-  char path[300];
-  cli_expand ("@/f.ck", path, sizeof path);
   cli_good ("pinwheel run n-trailer -m rk4 --step 0.01 -t 0.6 --checkpoint @/f.ck --checkpoint-every 0.25 >@/log");
-  check_ok (pw_checkpoint_read (path, &c, &error), &error);
+  check_ok (pw_checkpoint_read (cli_path ("f.ck"), &c, &error), &error);
   double *t = output_find (&c, 0.5);
   assert_non_null (t);
   unsigned char *place = number < 0 ? c.state.at + 2 * sizeof value : (unsigned char *)t;
   memcpy (place + number * (int)sizeof value, &value, sizeof value);
   char *head = strndup (c.text, (size_t)(c.head_end - c.text));
   pw_archive state = { .at = c.state.at, .used = c.state.size };
-  check_ok (pw_checkpoint_write (path, head, &state, &error), &error);
+  check_ok (pw_checkpoint_write (cli_path ("f.ck"), head, &state, &error), &error);
   free (head);
   pw_checkpoint_free (&c);
   int status = cli_run ("pinwheel run n-trailer -m rk4 --step 0.01 -t 0.6 --resume @/f.ck --checkpoint-every 0.25");
@@ -398,16 +385,15 @@ TEST (forged) {
 
 /* A checkpoint that cannot be written leaves nothing, and the message names nothing. */
 TEST (not_written) {
-  char path[300], head[6000];
+  char head[6000];
   struct rlimit before;
   pw_error error = { 0 };
-  cli_expand ("@/full.ck", path, sizeof path);
   memset (head, 'a', sizeof head - 1);
   head[sizeof head - 1] = 0;
   void (*handler) (int) = signal (SIGXFSZ, SIG_IGN);
   getrlimit (RLIMIT_FSIZE, &before);
   setrlimit (RLIMIT_FSIZE, &(struct rlimit){ 4096, before.rlim_max });
-  int status = pw_checkpoint_write (path, head, &(pw_archive){ .used = 0 }, &error);
+  int status = pw_checkpoint_write (cli_path ("full.ck"), head, &(pw_archive){ .used = 0 }, &error);
   setrlimit (RLIMIT_FSIZE, &before);
   signal (SIGXFSZ, handler);
   assert_int_equal (status, PW_RESOURCE);
@@ -450,10 +436,9 @@ static void output_terminal (const char *program, const char *command, const cha
 
 TEST (terminal) {
   const char *program = getenv ("PINWHEEL");
-  char path[300], text[10000];
-  cli_expand ("@/odd\033[31m", path, sizeof path);
-  assert_int_equal (mkdir (path, 0700), 0);
-  strcat (path, "/x.yaml");
+  char text[10000];
+  assert_int_equal (mkdir (cli_path ("odd\033[31m"), 0700), 0);
+  const char *path = cli_path ("odd\033[31m/x.yaml");
   if (program == NULL) program = "build/pinwheel";
   output_terminal (program, "new", path, text, sizeof text);
   assert_null (strchr (text, '\033'));

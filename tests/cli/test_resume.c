@@ -146,10 +146,8 @@ TEST (summary) {
 /* Cut anywhere, or with any one bit changed, it is refused. */
 TEST (damaged) {
   static char text[20000], other[20000];
-  char path[300];
   resume_prepare ();
-  snprintf (path, sizeof path, "%s/good.ck", cli_folder);
-  FILE *f = fopen (path, "rb");
+  FILE *f = fopen (cli_path ("good.ck"), "rb");
   assert_non_null (f);
   size_t size = fread (text, 1, sizeof text, f);
   fclose (f);
@@ -157,11 +155,7 @@ TEST (damaged) {
     size_t at = size * (size_t)i / 40, length = i % 2 ? at : size;
     memcpy (other, text, size);
     other[at] = (char)(other[at] ^ (1 << i % 8));
-    snprintf (path, sizeof path, "%s/b.ck", cli_folder);
-    f = fopen (path, "wb");
-    assert_non_null (f);
-    fwrite (other, 1, length, f);
-    assert_int_equal (fclose (f), 0);
+    cli_write_bytes ("b.ck", other, length);
     int status = cli_run ("pinwheel " RESUME_SHORT "--resume @/b.ck");
     if (status != 2) print_error ("byte %zu, %zu bytes: status %d, %s", at, length, status, cli_err);
     assert_int_equal (status, 2);

@@ -72,14 +72,12 @@ static void terminal_bar (const char *model, const char *title, const char *t_en
 }
 
 TEST (bar) {
-  char path[300];
   terminal_bar ("ezyroller", "\rezyroller [", "3e4", " of 3e+04 s  ");  /* most of a minute */
   terminal_bar ("ezyroller", "\rezyroller [", "1e7", " of 1e+07 s  ");  /* hours */
   terminal_bar ("ezyroller", "\rezyroller [", "1e12", " of 1e+12 s  "); /* nobody knows */
   /* the 16 bytes that are shown would end within the umlaut */
   cli_write ("fifteen-lettersü.yaml", "pinwheel: 1\nabout: free\nbodies:\n  - {name: b, mass: 1, inertia: 1}\n");
-  cli_expand ("@/fifteen-lettersü.yaml", path, sizeof path);
-  terminal_bar (path, "\rfifteen-letters [", "1e7", " of 1e+07 s  ");
+  terminal_bar (cli_path ("fifteen-lettersü.yaml"), "\rfifteen-letters [", "1e7", " of 1e+07 s  ");
 }
 
 /* A model that never answers: the first two Ctrl-C ask it to stop, the third ends the program. */

@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 #include "check.h"
+#include "gallery.h"
 #include "cli.h"
 #include "pinwheel-files.h"
 #include "scene.h"
@@ -15,26 +16,9 @@
 /* Eccentricity and semi-minor axis of the ellipse; the semi-major axis is 1 m, the attraction 1 N m^2 / r^2. */
 static const double own_e = 0.6, own_b = 0.8;
 
-/* A system of models/elliptic-wire.c, whose file must stay open; factor: of the speed of a planet. */
-typedef struct {
-  pw_file *file;
-  pw_system *s;
-} own;
-
-static own own_open (double factor) {
-  pw_error error = { 0 };
-  own x = { .file = pw_file_open ("elliptic-wire", &error) };
-  check_ok (x.file ? PW_OK : error.status, &error);
-  pw_model *m = pw_file_model (x.file, &error);
-  check_ok (m ? pw_model_set (m, "factor", factor, &error) : error.status, &error);
-  check_ok (pw_model_build (m, &error), &error);
-  x.s = scene_compile (m);
-  return x;
-}
-
-static void own_close (own *x) {
-  pw_system_free (x->s);
-  pw_file_close (x->file);
+/* models/elliptic-wire.c; factor: of the speed of a planet. */
+static gallery_scene own_open (double factor) {
+  return gallery_load ("elliptic-wire", "factor", factor, NULL);
 }
 
 /* ---- The reference ---- */
@@ -49,37 +33,37 @@ static void own_planet (double t, double p[2]) {
 
 /* With the speed of a planet the bead moves like one, without a force on the wire. */
 TEST (planet) {
-  own x = own_open (1);
-  pw_run *r = runs_open (x.s, "rk4+projection", &(pw_settings){ .step = 1e-3, .ledger = 1 });
+  gallery_scene x = own_open (1);
+  pw_run *r = runs_open (x.system, "rk4+projection", &(pw_settings){ .step = 1e-3, .ledger = 1 });
   for (int t = 1; t <= 10; t++) {
     double p[2];
     pw_sample now = runs_to (r, t);
     own_planet (t, p);
-    check_close ("x", trial_state (x.s, &now, "bead.x"), p[0], 5e-9,
+    check_close ("x", trial_state (x.system, &now, "bead.x"), p[0], 5e-9,
                  "t (h w)^4 at h = 1 ms and w = 5/s, at perihelion");
-    check_close ("y", trial_state (x.s, &now, "bead.y"), p[1], 5e-9,
+    check_close ("y", trial_state (x.system, &now, "bead.y"), p[1], 5e-9,
                  "t (h w)^4 at h = 1 ms and w = 5/s, at perihelion");
-    check_close ("N", trial_reaction (x.s, &now, "orbit.N"), 0, 5e-9, "(h w)^4 times the attraction");
+    check_close ("N", trial_reaction (x.system, &now, "orbit.N"), 0, 5e-9, "(h w)^4 times the attraction");
     check_close ("balance", now.balance, 0, 5e-9, "(h w)^4");
   }
   pw_run_close (r);
-  own_close (&x);
+  gallery_close (&x);
 }
 
 /* A faster bead presses on the wire with m (v^2 - v_p^2) / rho, v_p the speed of a planet; v^2 - v_p^2 is constant, and
  * (1.2^2 - 1) 2^2 at perihelion. */
 TEST (faster) {
-  own x = own_open (1.2);
-  pw_run *r = runs_open (x.s, "rk4+projection", &(pw_settings){ .step = 1e-3 });
+  gallery_scene x = own_open (1.2);
+  pw_run *r = runs_open (x.system, "rk4+projection", &(pw_settings){ .step = 1e-3 });
   for (int t = 1; t <= 10; t++) {
     pw_sample now = runs_to (r, t);
-    double X = trial_state (x.s, &now, "bead.x") + own_e, Y = trial_state (x.s, &now, "bead.y");
+    double X = trial_state (x.system, &now, "bead.x") + own_e, Y = trial_state (x.system, &now, "bead.y");
     double s = hypot (X, Y / (own_b * own_b)), rho = own_b * own_b * s * s * s;
-    check_close ("force", -s * trial_reaction (x.s, &now, "orbit.N"), (1.2 * 1.2 - 1) * 4 / rho, 1e-7,
+    check_close ("force", -s * trial_reaction (x.system, &now, "orbit.N"), (1.2 * 1.2 - 1) * 4 / rho, 1e-7,
                  "t (h w)^4 times the force at perihelion");
   }
   pw_run_close (r);
-  own_close (&x);
+  gallery_close (&x);
 }
 
 /* ---- Every method ---- */
@@ -89,13 +73,13 @@ TEST (methods) {
   own_planet (2, p);
   char method[40];
   for (int i = 0; runs_method (i, method); i++) {
-    own x = own_open (1);
-    pw_run *r = runs_open (x.s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-8, .span = 2 });
+    gallery_scene x = own_open (1);
+    pw_run *r = runs_open (x.system, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-8, .span = 2 });
     pw_sample now = runs_to (r, 2);
-    double off = hypot (trial_state (x.s, &now, "bead.x") - p[0], trial_state (x.s, &now, "bead.y") - p[1]);
+    double off = hypot (trial_state (x.system, &now, "bead.x") - p[0], trial_state (x.system, &now, "bead.y") - p[1]);
     check_below (method, off, 1e-4, "(h w)^2 for the methods of lowest order, 1e4 rtol for the others");
     pw_run_close (r);
-    own_close (&x);
+    gallery_close (&x);
   }
 }
 
@@ -252,10 +236,10 @@ TEST (expression) {
 /* ---- The self-test ---- */
 
 TEST (selftest) {
-  own x = own_open (1);
-  assert_int_equal (x.s->batches, 2);
+  gallery_scene x = own_open (1);
+  assert_int_equal (x.system->batches, 2);
   for (int i = 0; i < 2; i++) {
-    const pw_kind *kind = x.s->batch[i].kind;
+    const pw_kind *kind = x.system->batch[i].kind;
     pw_selftest_report report = { 0 };
     pw_error error = { 0 };
     for (unsigned seed = 1; seed <= 100; seed++) check_ok (pw_selftest (kind, seed, &report, &error), &error);
@@ -263,7 +247,7 @@ TEST (selftest) {
     for (int c = 0; c < report.checks; c++)
       check_below (report.check[c].name, report.check[c].error, report.check[c].bound, report.check[c].reason);
   }
-  own_close (&x);
+  gallery_close (&x);
   cli_good ("pinwheel check elliptic-wire");
   assert_non_null (strstr (cli_out, "wire (1 element)"));
   assert_non_null (strstr (cli_out, "attraction (1 element)"));

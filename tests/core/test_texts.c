@@ -52,9 +52,7 @@ TEST (message) {
 TEST (summary) {
   pw_error error = { 0 };
   pw_summary summary = { .model = "a\033\xff\"\\\n", .method = "1", .status = "ok", .reason = "\xC3" };
-  char path[300];
-  cli_expand ("@/a.json", path, sizeof path);
-  pw_output *o = pw_output_open (path, &error);
+  pw_output *o = pw_output_open (cli_path ("a.json"), &error);
   check_ok (pw_json_write (&summary, NULL, NULL, 0, NULL, o, &error), &error);
   check_ok (pw_output_finish (o, &error), &error);
   const char *text = cli_file ("a.json");

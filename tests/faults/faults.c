@@ -58,10 +58,7 @@ static int faults_whole (const char *o, const char *whole, const char *name) {
 
 const char *faults_broken (void) {
   static char name[300];
-  char o[300], whole[300];
-  const char *broken = NULL;
-  snprintf (o, sizeof o, "%s/o", cli_folder);
-  snprintf (whole, sizeof whole, "%s/whole", cli_folder);
+  const char *broken = NULL, *o = cli_path ("o"), *whole = cli_path ("whole");
   DIR *d = opendir (o);
   for (const struct dirent *e; d && (e = readdir (d)) != NULL;) {
     if (*e->d_name == '.' || broken) continue;
@@ -86,9 +83,8 @@ static void faults_empty (const char *folder) {
 
 void faults_prepare (void) {
   static char text[1 << 20];
-  char o[300], start[300], path[600];
-  snprintf (o, sizeof o, "%s/o", cli_folder);
-  snprintf (start, sizeof start, "%s/start", cli_folder);
+  char path[600];
+  const char *o = cli_path ("o"), *start = cli_path ("start");
   faults_empty (o);
   DIR *d = opendir (start);
   for (const struct dirent *e; d && (e = readdir (d)) != NULL;) {
@@ -113,9 +109,7 @@ static const pw_command *faults_command (const char *name) {
 
 /* Sends what goes to a descriptor into a file of the folder; returns another one for where it went before. */
 static int faults_redirect (int fd, const char *name) {
-  char path[300];
-  snprintf (path, sizeof path, "%s/%s", cli_folder, name);
-  int before = dup (fd), file = creat (path, 0666);
+  int before = dup (fd), file = creat (cli_path (name), 0666);
   dup2 (file, fd);
   close (file);
   return before;
@@ -163,8 +157,7 @@ int faults_setup (void) {
   cli_write ("gnuplot", gnuplot);
   cli_write ("cc", compiler);
   cli_run ("chmod +x @/gnuplot @/cc");
-  cli_expand ("@/cc", text, sizeof text);
-  setenv ("CC", text, 1);
+  setenv ("CC", cli_path ("cc"), 1);
   snprintf (text, sizeof text, "%s/models/ezyroller.so", build ? build : "build");
   setenv ("MODEL", text, 1);
   const char *path = getenv ("PATH");

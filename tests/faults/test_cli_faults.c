@@ -19,9 +19,7 @@ static int faults_bad; /* calls after whose failure something was not as it shou
 static int faults_pair; /* 1: the command writes a table and a summary */
 
 static int faults_exists (const char *name) {
-  char path[300];
-  cli_expand (name, path, sizeof path);
-  return access (path, F_OK) == 0;
+  return access (cli_path (name), F_OK) == 0;
 }
 
 /* The command once more with one call failing; 1 if it came so far. */
@@ -38,7 +36,7 @@ static int faults_try (const char *command, long *count, long *fail, long n) {
   *fail = 0;
   const char *said = cli_file ("log"), *broken = faults_broken ();
   int good = !reached ? status == 0 : (status == 1 || (call.reading && status == 2)) && strstr (said, "pinwheel: ");
-  if (faults_exists ("@/o/a.csv") != faults_exists ("@/o/a.json") && faults_pair) broken = "one of a.csv and a.json";
+  if (faults_exists ("o/a.csv") != faults_exists ("o/a.json") && faults_pair) broken = "one of a.csv and a.json";
   if (good && reached && fail == &alloc.fail) good = strstr (said, "out of memory") || strstr (said, strerror (ENOMEM));
   int fd = dup (0);
   close (fd);

@@ -1,49 +1,30 @@
 /* Signals given by expressions: they agree with built-in signals, steps end where they jump, derivatives are exact. */
-#define _GNU_SOURCE /* mkstemps */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 #include "check.h"
+#include "cli.h"
+#include "gallery.h"
 #include "model.h"
-#include "pinwheel-files.h"
 #include "runs.h"
 
-static char path[] = "/tmp/pinwheel-expression-XXXXXX.yaml";
-
-typedef struct {
-  pw_file *file;
-  pw_model *model;
-  pw_system *system;
-} scene;
-
 /* A model whose elements are given by a format and a value in it. */
-static scene scene_of (const char *elements, const char *value) {
-  pw_error error = { 0 };
-  FILE *f = fopen (path, "w");
-  assert_non_null (f);
-  fputs ("pinwheel: 1\nparameters: [{name: A, value: 0.3}, {name: w, value: 2}, {name: T, value: 1.5}]\n"
-         "bodies: [{name: a, mass: 1, inertia: 0.1}, {name: b, mass: 2, inertia: 0.3, rate: {vx: 1}}]\nelements:\n",
-         f);
-  for (const char *p = elements; *p; p++) *p == '@' ? fputs (value, f) : fputc (*p, f);
-  assert_int_equal (fclose (f), 0);
-  scene x = { .file = pw_file_open (path, &error) };
-  check_ok (x.file ? PW_OK : error.status, &error);
-  x.model = pw_file_model (x.file, &error);
-  check_ok (pw_model_build (x.model, &error), &error);
-  x.system = pw_system_compile (x.model, &error);
-  check_ok (x.system ? PW_OK : error.status, &error);
-  return x;
+static gallery_scene scene_of (const char *elements, const char *value) {
+  char text[2000];
+  int n = snprintf (text, sizeof text, "%s",
+                    "pinwheel: 1\nparameters: [{name: A, value: 0.3}, {name: w, value: 2}, {name: T, value: 1.5}]\n"
+                    "bodies: [{name: a, mass: 1, inertia: 0.1}, {name: b, mass: 2, inertia: 0.3, rate: {vx: 1}}]\n"
+                    "elements:\n");
+  for (const char *p = elements; *p; p++)
+    n += *p == '@' ? snprintf (text + n, sizeof text - (size_t)n, "%s", value)
+                   : snprintf (text + n, sizeof text - (size_t)n, "%c", *p);
+  assert_true (n < (int)sizeof text);
+  cli_write ("m.yaml", text);
+  return gallery_load (cli_path ("m.yaml"), NULL);
 }
 
-static void scene_close (scene *x) {
-  pw_system_free (x->system);
-  pw_model_free (x->model);
-  pw_file_close (x->file);
-}
-
-static const pw_signal *scene_signal (const scene *x) {
+static const pw_signal *scene_signal (const gallery_scene *x) {
   return pw_field_at (x->model->element[0].kind, x->model->element[0].definition, PW_SIGNAL, 0);
 }
 
@@ -62,12 +43,12 @@ TEST (push) {
   char method[40];
   double q[6], v[6];
   for (size_t i = 0; i < sizeof value / sizeof *value; i++) {
-    scene x = scene_of ("  - {force: F, body: a, fx: \"@\"}\n", value[i]);
+    gallery_scene x = scene_of ("  - {force: F, body: a, fx: \"@\"}\n", value[i]);
     for (int k = 0; runs_method (k, method); k++) {
       runs_state (x.system, method, &(pw_settings){ .step = 0.25, .rtol = 1e-6 }, 10, q, v, NULL);
       check_close (method, v[0], 1, 1e-11, "100 N, two times with round-off, restarts");
     }
-    scene_close (&x);
+    gallery_close (&x);
   }
 }
 
@@ -97,9 +78,9 @@ TEST (built_in) {
     for (size_t m = 0; m < sizeof method / sizeof *method; m++) {
       double q[2][6], v[2][6];
       for (int k = 0; k < 2; k++) {
-        scene x = scene_of (pair[i].elements, k ? pair[i].expression : pair[i].form);
+        gallery_scene x = scene_of (pair[i].elements, k ? pair[i].expression : pair[i].form);
         runs_state (x.system, method[m], &(pw_settings){ .step = 0.05, .rtol = 1e-7 }, 3, q[k], v[k], NULL);
-        scene_close (&x);
+        gallery_close (&x);
       }
       for (int j = 0; j < 6; j++) {
         check_close (pair[i].expression, q[1][j], q[0][j], 1e-11, "round-off, which adaptive steps carry on");
@@ -110,8 +91,8 @@ TEST (built_in) {
 
 /* The gradient by states is that of the formula. */
 TEST (gradient) {
-  scene x = scene_of ("  - {torque: T, body: [b, ground], value: \"@\"}\n",
-                      "t*sin(b.phi)*exp(-b.omega^2) + abs(a.x)*(b.omega > 0 ? 2 : 3)");
+  gallery_scene x = scene_of ("  - {torque: T, body: [b, ground], value: \"@\"}\n",
+                              "t*sin(b.phi)*exp(-b.omega^2) + abs(a.x)*(b.omega > 0 ? 2 : 3)");
   const pw_signal *s = scene_signal (&x);
   void *own = s->function.open (s->function.context);
   double t = 1.3, phi = 0.4, omega = 0.7, ax = -2, value[3], gradient[3];
@@ -125,12 +106,13 @@ TEST (gradient) {
   check_close ("by x", gradient[2], -2, 0, "exact");
   assert_string_equal (s->function.text->jump, "b.omega > 0");
   s->function.close (own);
-  scene_close (&x);
+  gallery_close (&x);
 }
 
 /* At a jump in time it is that just after it, as the value is. */
 TEST (gradient_after) {
-  scene x = scene_of ("  - {torque: T, body: [b, ground], value: \"@\"}\n", "t <= 1 ? b.phi : 2*b.phi + a.x*floor(-t)");
+  gallery_scene x =
+      scene_of ("  - {torque: T, body: [b, ground], value: \"@\"}\n", "t <= 1 ? b.phi : 2*b.phi + a.x*floor(-t)");
   const pw_signal *s = scene_signal (&x);
   void *own = s->function.open (s->function.context);
   double value[3], gradient[2];
@@ -139,7 +121,7 @@ TEST (gradient_after) {
   assert_int_equal (s->function.eval (own, 0.5, (double[]){ 3, 5 }, value, gradient), 0);
   assert_true (value[0] == 3 && gradient[0] == 1 && gradient[1] == 0);
   s->function.close (own);
-  scene_close (&x);
+  gallery_close (&x);
 }
 
 /* A derivative without a value stops the run with its reason; one that is given in its place does not. */
@@ -148,7 +130,7 @@ TEST (no_derivative) {
                                        "{expression: sqrt(t^4), rate: 2*t}" };
   for (int i = 0; i < 3; i++) {
     pw_error error = { 0 };
-    scene x = scene_of ("  - {drive: D, body: [a, ground], what: angle, value: @}\n", value[i]);
+    gallery_scene x = scene_of ("  - {drive: D, body: [a, ground], what: angle, value: @}\n", value[i]);
     pw_run *r = pw_run_open (x.system, "rk4+projection", &(pw_settings){ .step = 0.1 }, &error);
     if (i == 0)
       check_error (&error, PW_METHOD,
@@ -156,7 +138,7 @@ TEST (no_derivative) {
     else
       check_close ("angle", runs_to (r, 2).q[2], 4, 1e-13, "round-off");
     pw_run_close (r);
-    scene_close (&x);
+    gallery_close (&x);
   }
 }
 
@@ -166,8 +148,8 @@ TEST (continuous) {
   static const char *const value[] = { "t < 1 ? t^3 : 3*t - 2",        "abs(sin(3*t))^3",           "max(0, t - 1)^2",
                                        "sin(1e9*t) + max(0, t - 1)^2", "1e8*max(0, t - 1)^3 + 1e8", "t > 5 || 1" };
   for (size_t i = 0; i < sizeof value / sizeof *value; i++) {
-    scene x = scene_of ("  - {drive: D, body: [a, ground], what: angle, value: \"@\"}\n", value[i]);
-    scene_close (&x);
+    gallery_scene x = scene_of ("  - {drive: D, body: [a, ground], what: angle, value: \"@\"}\n", value[i]);
+    gallery_close (&x);
   }
 }
 
@@ -187,13 +169,4 @@ TEST (formula) {
   }
 }
 
-static int setup (void) {
-  int file = mkstemps (path, 5);
-  return file < 0 ? -1 : close (file);
-}
-
-static int teardown (void) {
-  return remove (path);
-}
-
-const check_fixture fixture = { setup, teardown };
+const check_fixture fixture = { cli_setup, cli_teardown };

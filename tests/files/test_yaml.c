@@ -1,51 +1,18 @@
 /* Text models give the same bits as models in C: the EzyRoller both ways, parameters, what `let` defines, signals. */
-#define _GNU_SOURCE /* mkstemps */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 #include "check.h"
+#include "cli.h"
+#include "gallery.h"
 #include "model.h"
-#include "pinwheel-files.h"
 #include "runs.h"
 
-/* ---- Opening ---- */
-
-typedef struct {
-  pw_file *file;
-  pw_model *model;
-  pw_system *system;
-} text;
-
-static text text_open (const char *name, const char *parameter, double value) {
-  pw_error error = { 0 };
-  text x = { .file = pw_file_open (name, &error) };
-  check_ok (x.file ? PW_OK : error.status, &error);
-  x.model = pw_file_model (x.file, &error);
-  check_ok (x.model ? PW_OK : error.status, &error);
-  if (parameter) check_ok (pw_model_set (x.model, parameter, value, &error), &error);
-  check_ok (pw_model_build (x.model, &error), &error);
-  x.system = pw_system_compile (x.model, &error);
-  check_ok (x.system ? PW_OK : error.status, &error);
-  return x;
-}
-
-static void text_close (text *x) {
-  pw_system_free (x->system);
-  pw_model_free (x->model);
-  pw_file_close (x->file);
-}
-
-static char text_path[] = "/tmp/pinwheel-yaml-XXXXXX.yaml";
-
-/* A model from its text. */
-static text text_of (const char *source, const char *parameter, double value) {
-  FILE *f = fopen (text_path, "w");
-  assert_non_null (f);
-  fputs (source, f);
-  assert_int_equal (fclose (f), 0);
-  return text_open (text_path, parameter, value);
+/* A model from its text, with a parameter set. */
+static gallery_scene text_of (const char *source, const char *parameter, double value) {
+  cli_write ("m.yaml", source);
+  return gallery_load (cli_path ("m.yaml"), parameter, value, NULL);
 }
 
 /* ---- The EzyRoller ---- */
@@ -54,9 +21,9 @@ static void text_same (const char *parameter, double value, const char *method, 
   double state[2][12];
   const char *name[] = { "ezyroller", "tests/models/ezyroller.yaml" };
   for (int i = 0; i < 2; i++) {
-    text x = text_open (name[i], parameter, value);
+    gallery_scene x = gallery_load (name[i], parameter, value, NULL);
     runs_state (x.system, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-8 }, t, state[i], state[i] + 6, NULL);
-    text_close (&x);
+    gallery_close (&x);
   }
   check_bits ("the EzyRoller as text", state[0], state[1], 12);
 }
@@ -69,7 +36,7 @@ TEST (ezyroller) {
 
 /* Parameters, run defaults and the line about it are those of the C file. */
 TEST (table) {
-  text c = text_open ("ezyroller", NULL, 0), y = text_open ("tests/models/ezyroller.yaml", NULL, 0);
+  gallery_scene c = gallery_load ("ezyroller", NULL), y = gallery_load ("tests/models/ezyroller.yaml", NULL);
   const pw_plugin_table *a = pw_file_table (c.file), *b = pw_file_table (y.file);
   assert_string_equal (a->about, b->about);
   assert_string_equal (a->run.method, b->run.method);
@@ -85,8 +52,8 @@ TEST (table) {
   }
   assert_null (q->name);
   assert_string_equal (pw_file_name (y.file), "ezyroller");
-  text_close (&c);
-  text_close (&y);
+  gallery_close (&c);
+  gallery_close (&y);
 }
 
 TEST (parameters) {
@@ -112,11 +79,11 @@ TEST (let) {
                                "bodies:\n  - {name: b, mass: area, start: {x: half, phi: 90*deg}}\n";
   for (int i = 0; i < 2; i++) {
     double l = i ? 6 : 2, half = l / 2, mass = half * half * PW_PI, phi = 90 * (PW_PI / 180);
-    text x = text_of (source, "l", l);
+    gallery_scene x = text_of (source, "l", l);
     check_bits ("mass", &x.model->body[0].mass, &mass, 1);
     check_bits ("x", &x.model->body[0].start[0], &half, 1);
     check_bits ("phi", &x.model->body[0].start[2], &phi, 1);
-    text_close (&x);
+    gallery_close (&x);
   }
 }
 
@@ -126,7 +93,7 @@ TEST (let) {
   "let: {k: 2*A}\n"                                            \
   "bodies: [{name: a, mass: 1, inertia: 0.1}, {name: b, mass: 2, inertia: 0.3, start: {x: 1}}]\n"
 
-static const pw_signal *text_signal (const text *x, int element) {
+static const pw_signal *text_signal (const gallery_scene *x, int element) {
   const pw_element *e = &x->model->element[element];
   return pw_field_at (e->kind, e->definition, PW_SIGNAL, 0);
 }
@@ -139,10 +106,10 @@ TEST (time) {
   char source[600];
   for (int i = 0; i < 2; i++) {
     snprintf (source, sizeof source, TWO_BODIES "elements:\n  - {torque: T, body: [a, b], value: %s}\n", value[i]);
-    text x = text_of (source, NULL, 0);
+    gallery_scene x = text_of (source, NULL, 0);
     assert_int_equal (text_signal (&x, 0)->type, i ? PW_FUNCTION : PW_HARMONIC);
     runs_state (x.system, "rk4", &(pw_settings){ .step = 1e-2 }, 3, q[i], v[i], NULL);
-    text_close (&x);
+    gallery_close (&x);
   }
   for (int j = 0; j < 6; j++)
     check_close ("state", q[1][j], q[0][j], 1000 * CHECK_EPS * (1 + fabs (q[0][j])), "300 steps of round-off");
@@ -150,8 +117,8 @@ TEST (time) {
 
 /* A torque that reads states: the derivative is what it should be, and the motion that of a spring. */
 TEST (states) {
-  text x = text_of (TWO_BODIES "elements:\n  - {torque: T, body: [a, ground], value: -w*a.phi - A*a.omega*a.phi^2}\n",
-                    NULL, 0);
+  gallery_scene x = text_of (
+      TWO_BODIES "elements:\n  - {torque: T, body: [a, ground], value: -w*a.phi - A*a.omega*a.phi^2}\n", NULL, 0);
   const pw_function *f = &text_signal (&x, 0)->function;
   void *own = f->open (f->context);
   double value[3] = { 0 }, gradient[2] = { 0 };
@@ -164,7 +131,7 @@ TEST (states) {
   check_close ("derivative with respect to phi", gradient[0], -2 + 2 * 0.1 * 2 * 1.5, bound, "differences");
   check_close ("derivative with respect to omega", gradient[1], -0.1 * 1.5 * 1.5, bound, "differences");
   f->close (own);
-  text_close (&x);
+  gallery_close (&x);
 }
 
 /* A cart on a wheel whose spin pulls it back, by a force that is written before the wheel and by a torque of its own:
@@ -174,23 +141,23 @@ TEST (own_states) {
   for (int i = 0; i < 2; i++) {
     double q[4], v[4], bound = i == 0 ? 1e-10 : 1e-6;
     const char *reason = i == 0 ? "(h k)^4 at h = 1e-3 and k = 3/s" : "1e4 rtol";
-    text x = text_of ("pinwheel: 1\nbodies: [{name: cart, mass: 1, inertia: 1, rate: {vx: 0.2}}]\nelements:\n"
-                      "  - {force: F, body: cart, fx: -0.54*W.spin}\n"
-                      "  - {rolling-wheel: W, body: cart, at: [0, 0], radius: 0.1, inertia: 0.002,\n"
-                      "     torque: -0.05*W.spin - 0.004*W.spin - 0*W.spin_rate}\n",
-                      NULL, 0);
+    gallery_scene x = text_of ("pinwheel: 1\nbodies: [{name: cart, mass: 1, inertia: 1, rate: {vx: 0.2}}]\nelements:\n"
+                               "  - {force: F, body: cart, fx: -0.54*W.spin}\n"
+                               "  - {rolling-wheel: W, body: cart, at: [0, 0], radius: 0.1, inertia: 0.002,\n"
+                               "     torque: -0.05*W.spin - 0.004*W.spin - 0*W.spin_rate}\n",
+                               NULL, 0);
     runs_state (x.system, method[i], &(pw_settings){ .step = 1e-3, .rtol = 1e-10, .span = 2 }, 2, q, v, NULL);
     check_close ("spin", q[3], 2 / 3. * sin (3 * 2), bound, reason);
     check_close ("its rate", v[3], 2 * cos (3 * 2), bound, reason);
     check_close ("x", q[0], 0.1 * q[3], bound, reason);
-    text_close (&x);
+    gallery_close (&x);
   }
 }
 
 /* The signal of a drive with its derivatives: value, rate and acceleration at a time; a system's context outlives the
  * model. */
 TEST (drive) {
-  text x =
+  gallery_scene x =
       text_of (TWO_BODIES "elements:\n"
                           "  - drive: D\n    body: [a, ground]\n    at: [[0, 0], [0, 0]]\n    what: angle\n"
                           "    value: {expression: k*sin(w*t), rate: k*w*cos(w*t), acceleration: -k*w^2*sin(w*t)}\n",
@@ -208,7 +175,7 @@ TEST (drive) {
   double q[6], v[6];
   runs_state (x.system, "rk4+projection", &(pw_settings){ .step = 1e-2 }, 1, q, v, NULL);
   check_close ("the driven angle", q[2], 0.6 * sin (2), 100 * CHECK_EPS, "projected: round-off");
-  text_close (&x);
+  gallery_close (&x);
 }
 
 /* The derivatives are compared with differences, whether the signal is slow, fast, far from zero, or at rest. */
@@ -224,19 +191,19 @@ TEST (derivatives) {
                          "      rate: %g*%g*cos(%g*t)\n"
                          "      acceleration: -%g*%g^2*sin(%g*t)\n",
               s[0], s[1], s[2], s[0], s[1], s[1], s[0], s[1], s[1]);
-    text x = text_of (source, NULL, 0);
-    text_close (&x);
+    gallery_scene x = text_of (source, NULL, 0);
+    gallery_close (&x);
   }
 }
 
 /* A signal without a value stops the run. */
 TEST (no_value) {
-  text x = text_of (TWO_BODIES "elements:\n  - {torque: T, body: [a, b], value: sqrt(1 - t)}\n", NULL, 0);
+  gallery_scene x = text_of (TWO_BODIES "elements:\n  - {torque: T, body: [a, b], value: sqrt(1 - t)}\n", NULL, 0);
   pw_error error = { 0 };
   pw_run *r = runs_open (x.system, "rk4", &(pw_settings){ .step = 1e-2 });
   assert_int_equal (pw_run_advance_to (r, 2, 2, &error), PW_METHOD);
   pw_run_close (r);
-  text_close (&x);
+  gallery_close (&x);
 }
 
 /* A value over fifty lines is one expression. */
@@ -244,19 +211,10 @@ TEST (lines) {
   char source[2000] = TWO_BODIES "elements:\n  - torque: T\n    body: [a, b]\n    value:\n      1";
   double q[6], v[6];
   for (int i = 1; i < 50; i++) strcat (source, "\n      + 1");
-  text x = text_of (source, NULL, 0);
+  gallery_scene x = text_of (source, NULL, 0);
   runs_state (x.system, "rk4", &(pw_settings){ .step = 1e-2 }, 1, q, v, NULL);
   check_close ("angular velocity", v[2], 500, 1e-10, "50 N m on 0.1 kg m^2 for a second");
-  text_close (&x);
+  gallery_close (&x);
 }
 
-static int text_setup (void) {
-  int file = mkstemps (text_path, 5);
-  return file < 0 ? -1 : close (file);
-}
-
-static int text_teardown (void) {
-  return remove (text_path);
-}
-
-const check_fixture fixture = { text_setup, text_teardown };
+const check_fixture fixture = { cli_setup, cli_teardown };

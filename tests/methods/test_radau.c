@@ -3,8 +3,8 @@
 #include <stdio.h>
 #include <string.h>
 #include "check.h"
+#include "gallery.h"
 #include "ladder.h"
-#include "pinwheel-files.h"
 #include "scene.h"
 #include "system.h"
 #include "trial.h"
@@ -218,14 +218,7 @@ TEST (unresolved_samples) {
 /* A block pulled by slightly more than dry friction, smoothed over 1e-8 m/s, begins to slide at the right time:
  * while it rests, corrections are small because of an inaccurate matrix, not of a small residual. */
 static double radau_pulled (double pull, double rtol) {
-  pw_error error = { 0 };
-  pw_file *f = pw_file_open ("benchmarks/hard/models/sliding-block.yaml", &error);
-  pw_model *m = pw_file_model (f, &error);
-  pw_model_set (m, "v0", 0, &error);
-  pw_model_set (m, "pull", pull, &error);
-  check_ok (pw_model_build (m, &error), &error);
-  pw_system *s = scene_compile (m);
-  pw_file_close (f);
+  pw_system *s = gallery_open ("benchmarks/hard/models/sliding-block.yaml", "v0", 0., "pull", pull, NULL);
   double q[3], v[3];
   runs_state (s, "radau", &(pw_settings){ .rtol = rtol, .span = 6 }, 6, q, v, NULL);
   pw_system_free (s);

@@ -36,8 +36,8 @@ SCENE (ladder_tractor) {
 }
 
 pw_system *ladder_open (const char *model) {
-  if (strcmp (model, "ladder_arm_table") == 0) return scene_system (&ladder_arm_table, NULL);
-  if (strcmp (model, "ladder_tractor_table") == 0) return scene_system (&ladder_tractor_table, NULL);
+  if (strcmp (model, "arm") == 0) return scene_system (&ladder_arm_table, NULL);
+  if (strcmp (model, "tractor") == 0) return scene_system (&ladder_tractor_table, NULL);
   return scene_named (model, NULL, 0);
 }
 
