@@ -33,15 +33,12 @@ TEST (finding) {
   static const char *const body =
       "pinwheel: 1\nbodies:\n  - {name: rod, mass: 1, inertia: 1, start: {%s}, rate: {%s}}\n"
       "elements:\n  - {pin: P, body: [rod, ground], at: [[-1, 0], [0, 0]]}\n";
-  char text[400];
-  snprintf (text, sizeof text, body, "x: 1", "vy: 3, vx: 0.25, omega: 3");
-  cli_write ("rod.yaml", text);
+  cli_write ("rod.yaml", check_text (body, "x: 1", "vy: 3, vx: 0.25, omega: 3"));
   cli_good ("pinwheel check @/rod.yaml");
   stability_shows ("\n1 finding\n  the model specifies rod.vx = 0.25 m/s, but the constraints require 0 m/s\n");
   cli_good ("pinwheel check @/rod.yaml --json -");
   stability_shows ("\"findings\": [\"the model specifies rod.vx");
-  snprintf (text, sizeof text, body, "x: 1", "vy: 3, omega: 3");
-  cli_write ("rod.yaml", text);
+  cli_write ("rod.yaml", check_text (body, "x: 1", "vy: 3, omega: 3"));
   cli_good ("pinwheel check @/rod.yaml");
   stability_shows ("\nNo problems found\n");
   cli_good ("pinwheel check @/rod.yaml --start rod.vx=0.25");

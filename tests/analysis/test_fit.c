@@ -78,9 +78,7 @@ TEST (exact) {
                                      "--free k --free c --free w.phi --method erk5 --rtol 1e-6" };
   fit_write (0);
   for (int i = 0; i < 4; i++) {
-    char command[400];
-    snprintf (command, sizeof command, FIT "%s", way[i]);
-    cli_shell (command);
+    cli_shell (check_text (FIT "%s", way[i]));
     const char *json = cli_file ("fit.json");
     check_close ("k", fit_value (json, "k", "value"), fit_k, 1e-5, "(w h)^4, 4e-6");
     check_close ("c", fit_value (json, "c", "value"), fit_c, 1e-5, "the same");
@@ -101,16 +99,12 @@ TEST (derivatives) {
   static const char *const columns[] = { "frame.y", "A.x", "frame.y" }, *const method[] = { "rk4", "rk4",
                                                                                             "rk4:inputs=held" };
   for (int i = 0; i < 3; i++) {
-    char command[400];
-    snprintf (command, sizeof command,
-              "pinwheel run ezyroller --set omega=3 --t-end 4 --every 0.1 --step 0.01 --method %s -o @/e.csv",
-              method[i]);
-    cli_shell (command);
-    snprintf (command, sizeof command,
-              "pinwheel fit ezyroller --data @/e.csv --columns %s --free omega --free M0 --step 0.01 --method %s "
-              "--json @/e.json",
-              columns[i], method[i]);
-    cli_shell (command);
+    cli_shell (check_text (
+        "pinwheel run ezyroller --set omega=3 --t-end 4 --every 0.1 --step 0.01 --method %s -o @/e.csv", method[i]));
+    cli_shell (
+        check_text ("pinwheel fit ezyroller --data @/e.csv --columns %s --free omega --free M0 --step 0.01 --method %s "
+                    "--json @/e.json",
+                    columns[i], method[i]));
     const char *json = cli_file ("e.json");
     assert_true (cli_says (json, "derivatives", i == 2 ? "differences" : "variational"));
     check_close ("omega", fit_value (json, "omega", "value"), 3, 1e-7, "the data are exact; the last step is 1e-10");
@@ -220,12 +214,11 @@ TEST (undetermined) {
 /* Runs fail with k < 4.95: steps into that region are shortened.  With k < 5.3 they do so at the minimum, too: the fit
  * ends at the edge, and says that it has not converged. */
 TEST (failing) {
-  char text[1000];
   fit_write (0);
   for (int i = 0; i < 2; i++) {
     const char *torque = strstr (model, "-s*k*w.phi");
-    snprintf (text, sizeof text, "%.*s0*sqrt(k - %s) %s", (int)(torque - model), model, i ? "5.3" : "4.95", torque);
-    cli_write ("edge.yaml", text);
+    cli_write ("edge.yaml",
+               check_text ("%.*s0*sqrt(k - %s) %s", (int)(torque - model), model, i ? "5.3" : "4.95", torque));
     int status =
         cli_run ("pinwheel fit @/edge.yaml --data @/data.csv --columns w.phi --json @/edge.json --free k --set k=12 "
                  "--set c=0.4");
@@ -238,11 +231,9 @@ TEST (failing) {
 /* Above k = 10 about half of the runs fail, so that for some starts there the differences on both sides of an unknown
  * do: this ends these searches only. */
 TEST (without_derivatives) {
-  char text[1000];
   const char *torque = strstr (model, "-s*k*w.phi");
   fit_write (0);
-  snprintf (text, sizeof text, "%.*s0*sqrt(exp(10 - k) + sin(1e7*k)) %s", (int)(torque - model), model, torque);
-  cli_write ("half.yaml", text);
+  cli_write ("half.yaml", check_text ("%.*s0*sqrt(exp(10 - k) + sin(1e7*k)) %s", (int)(torque - model), model, torque));
   cli_shell ("pinwheel fit @/half.yaml --data @/data.csv --columns w.phi --free k=1:100 --set k=6 --set c=0.4 "
              "--starts 12 --method rk4:inputs=held --json @/half.json");
   check_close ("k", fit_value (cli_file ("half.json"), "k", "value"), fit_k, 0.1, "inputs held over 0.02 s");
@@ -345,14 +336,14 @@ TEST (engine) {
 
 /* After Ctrl-C the values reached are written, without their errors. */
 TEST (interrupt) {
-  char command[1000];
   const char *program = getenv ("PINWHEEL");
   fit_write (0);
-  snprintf (command, sizeof command,
-            "timeout --preserve-status -s INT 1 '%s' fit @/wheel.yaml --data @/data.csv --columns w.phi --free k=1:100 "
-            "--set k=60 --starts 100000 --json @/stop.json -o @/stop.csv",
-            program ? program : "build/pinwheel");
-  assert_int_equal (cli_run (command), 130);
+  assert_int_equal (
+      cli_run (check_text (
+          "timeout --preserve-status -s INT 1 '%s' fit @/wheel.yaml --data @/data.csv --columns w.phi --free k=1:100 "
+          "--set k=60 --starts 100000 --json @/stop.json -o @/stop.csv",
+          program ? program : "build/pinwheel")),
+      130);
   assert_non_null (strstr (cli_err, "interrupted; these are the values so far, without their errors"));
   assert_true (cli_says (cli_file ("stop.json"), "status", "interrupted"));
   assert_non_null (strstr (cli_file ("stop.json"), "\"standard_error\": null"));

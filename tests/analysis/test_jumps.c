@@ -25,16 +25,13 @@ TEST (closed_form) {
   const double F = 0.3, s = 1,
                expected[] = { 2 - F, -0.5, F, -F * (2 - F), -(1 - F), F * (1 - F), -0.2025, -0.2, 0.1275 };
   double x[JUMPS_MOST];
-  char command[400];
   cli_write ("jump.yaml", "pinwheel: 1\nparameters: [{name: F, value: 0.3}, {name: w, value: 1}]\n"
                           "bodies:\n  - {name: a, mass: 1, inertia: 1, rate: {vx: 1}}\n"
                           "elements:\n  - {force: f, body: a, fx: 'a.x > w ? -F : 0'}\n");
   for (size_t i = 0; i < sizeof methods / sizeof *methods; i++) {
-    snprintf (command, sizeof command,
-              "pinwheel sensitivity @/jump.yaml --of a.x --of f.work --of mean:f.work --by a.vx --by F "
-              "--by w -t 2 -o @/sens -m %s",
-              methods[i]);
-    cli_shell (command);
+    cli_shell (check_text ("pinwheel sensitivity @/jump.yaml --of a.x --of f.work --of mean:f.work --by a.vx --by F "
+                           "--by w -t 2 -o @/sens -m %s",
+                           methods[i]));
     assert_string_equal (cli_err,
                          "pinwheel: force f: fx: \"a.x > w\" may jump as states change; steps do not end there, "
                          "which costs accuracy\n");
@@ -57,17 +54,15 @@ TEST (extremum) {
 TEST (breakpoint) {
   static const char *const methods[] = { "rk4", "erk8", "adams", "bdf", "ida", "radau", "galpha" };
   double x[JUMPS_MOST];
-  char command[300];
   cli_write ("rod.yaml", "pinwheel: 1\nrun: {t_end: 2}\nparameters: [{name: s, value: 0.5, unit: s}]\n"
                          "bodies:\n  - {name: rod, mass: 1, inertia: 0.1, start: {x: 1}}\n"
                          "elements:\n  - {pin: A, body: [ground, rod], at: [[0, 0], [-1, 0]]}\n"
                          "  - {force: F, body: rod, fx: 't > s ? 300*exp (-20*(t - s)) : 0'}\n"
                          "  - {gravity: g, acceleration: [0, -9.81]}\n");
   for (size_t i = 0; i < sizeof methods / sizeof *methods; i++) {
-    snprintf (command, sizeof command,
-              "pinwheel sensitivity @/rod.yaml --of max:A.Fx --of min:rod.omega --of max:A.Fy --by s -o @/sens -m %s",
-              methods[i]);
-    cli_shell (command);
+    cli_shell (check_text (
+        "pinwheel sensitivity @/rod.yaml --of max:A.Fx --of min:rod.omega --of max:A.Fy --by s -o @/sens -m %s",
+        methods[i]));
     assert_int_equal (jumps_json ("\"derivative\": n", x), 2);
     assert_int_equal (jumps_json ("\"derivative\": ", x), 3);
     check_close (methods[i], x[2], 156.387, 1, "differences of runs, 6 digits; steps of 1 ms with order 2");
@@ -80,14 +75,11 @@ static void jumps_compare (const char *file, const char *outputs, const char *by
       "pinwheel sensitivity @/%s %s --by %s --set %s=%.17g -o @/sens -m erk8 --rtol 1e-11 --atol "
       "1e-13";
   double derivative[JUMPS_MOST], x[4][JUMPS_MOST];
-  char text[600];
-  snprintf (text, sizeof text, command, file, outputs, by, by, value);
-  cli_shell (text);
+  cli_shell (check_text (command, file, outputs, by, by, value));
   int count = jumps_json ("\"derivative\": ", derivative);
   assert_true (count > 0);
   for (int k = 0; k < 4; k++) {
-    snprintf (text, sizeof text, command, file, outputs, by, by, value + (k < 2 ? k - 2 : k - 1) * step);
-    cli_shell (text);
+    cli_shell (check_text (command, file, outputs, by, by, value + (k < 2 ? k - 2 : k - 1) * step));
     assert_int_equal (jumps_json ("\"value\": ", x[k]), 2 * count);
   }
   for (int i = 0; i < count; i++) {
@@ -127,7 +119,6 @@ TEST (narrow_friction) {
                                          "leapfrog", "bdf",  "adams", "bdf --rtol 1e-4 --atol 1e-4",
                                          "galpha",   "ida",  "radau", "radau --rtol 1e-4 --atol 1e-4" };
   double expected, x, error;
-  char command[300];
   cli_write ("friction.yaml",
              "pinwheel: 1\nrun: {t_end: 20}\nparameters: [{name: k, value: 100}]\n"
              "bodies:\n  - {name: a, mass: 1, inertia: 1, start: {x: 1}}\nelements:\n"
@@ -138,9 +129,7 @@ TEST (narrow_friction) {
   cli_shell ("pinwheel sensitivity @/friction.yaml --of a.x --by k -o @/sens -m erk8 --rtol 1e-11 --atol 1e-13");
   assert_int_equal (jumps_json ("\"derivative\": ", &expected), 1);
   for (size_t i = 0; i < sizeof methods / sizeof *methods; i++) {
-    snprintf (command, sizeof command, "pinwheel sensitivity @/friction.yaml --of a.x --by k -o @/sens -m %s",
-              methods[i]);
-    cli_shell (command);
+    cli_shell (check_text ("pinwheel sensitivity @/friction.yaml --of a.x --by k -o @/sens -m %s", methods[i]));
     assert_int_equal (jumps_json ("\"derivative\": ", &x), 1);
     assert_int_equal (jumps_json ("\"error\": ", &error), 1);
     check_below (methods[i], fabs (x - expected), 10 * error + 0.01 * expected,
@@ -149,12 +138,10 @@ TEST (narrow_friction) {
 }
 
 static void jumps_bad (const char *command, const char *text) {
-  char all[400];
-  snprintf (all, sizeof all,
-            "pinwheel: force f: fx: \"sign(a.vx)\" may jump as states change; steps do not end there, which "
-            "costs accuracy\npinwheel: %s",
-            text);
-  cli_bad (command, 4, all + strlen ("pinwheel: "));
+  cli_bad (command, 4,
+           check_text ("force f: fx: \"sign(a.vx)\" may jump as states change; steps do not end there, which "
+                       "costs accuracy\npinwheel: %s",
+                       text));
 }
 
 /* A motion that ends sliding along a jump, or starts at one. */
@@ -182,7 +169,6 @@ TEST (refusals) {
 TEST (crossings) {
   static const char *const methods[] = { "erk8 --rtol 1e-9", "erk8 --rtol 1e-6", "erk5 --rtol 1e-4",
                                          "bdf --rtol 1e-7" };
-  char command[400];
   double expected, x;
   cli_write ("turns.yaml", "pinwheel: 1\nbodies:\n  - {name: a, mass: 1, inertia: 1, start: {x: 0.44}}\nelements:\n"
                            "  - {slider: s, body: [a, ground], at: [[0, 0], [0, 0]]}\n"
@@ -190,10 +176,9 @@ TEST (crossings) {
                            "  - {force: g, body: a, fx: {harmonic: {amplitude: 5, omega: 3}}}\n");
   for (int i = 0; i < 20; i++)
     for (size_t k = 0; k < sizeof methods / sizeof *methods; k++) {
-      snprintf (command, sizeof command,
-                "pinwheel sensitivity @/turns.yaml -t 2 --of a.x --by a.vx --start a.vx=%.17g -m %s -o @/sens",
-                0.24 + 1e-3 * i, methods[k]);
-      cli_shell (command);
+      cli_shell (
+          check_text ("pinwheel sensitivity @/turns.yaml -t 2 --of a.x --by a.vx --start a.vx=%.17g -m %s -o @/sens",
+                      0.24 + 1e-3 * i, methods[k]));
       assert_int_equal (jumps_json ("\"derivative\": ", &x), 1);
       if (k == 0) expected = x;
       check_close (methods[k], x, expected, 1e-3 * fabs (expected), "ten times the largest tolerance");

@@ -23,9 +23,7 @@ static int optimise_setup (void) {
 
 /* The value of an unknown in the summary. */
 static double optimise_value (const char *json, const char *name) {
-  char key[100];
-  snprintf (key, sizeof key, "{\"name\": \"%s\"", name);
-  const char *at = strstr (json, key);
+  const char *at = strstr (json, check_text ("{\"name\": \"%s\"", name));
   assert_non_null (at);
   return strtod (strstr (at, "\"value\": ") + 9, NULL);
 }
@@ -128,13 +126,11 @@ TEST (failing) {
 TEST (edge) {
   static const char *const options[] = { "", "--free b=-1:1", "--subject-to 'p.y<=1'",
                                          "--free b=-1:1 --subject-to 'p.y<=1'" };
-  char command[500];
   for (size_t i = 0; i < sizeof options / sizeof *options; i++) {
-    snprintf (command, sizeof command,
-              "pinwheel optimise @/point.yaml --minimise '(p.x - 0.25)^2 + p.y^2 + 0*sqrt(0.3 - p.x)' --free a=-2:2 %s "
-              "--starts 1 --set b=0.1 --json @/o.json",
-              options[i]);
-    cli_shell (command);
+    cli_shell (check_text (
+        "pinwheel optimise @/point.yaml --minimise '(p.x - 0.25)^2 + p.y^2 + 0*sqrt(0.3 - p.x)' --free a=-2:2 %s "
+        "--starts 1 --set b=0.1 --json @/o.json",
+        options[i]));
     check_close ("a", optimise_value (cli_file ("o.json"), "a"), 0.25, 1e-3, "square root of 1e-6");
   }
 }
@@ -167,12 +163,10 @@ TEST (sweep) {
 TEST (jobs) {
   char first[20000] = "";
   for (int jobs = 1; jobs <= 3; jobs++) {
-    char command[300];
-    snprintf (command, sizeof command,
-              "pinwheel optimise ezyroller --maximise frame.x/max:work --free omega=2:6 --free M0=0.05:0.2 --t-end 1 "
-              "--step 0.01 --starts 5 --seed 3 --jobs %d --json @/o.json",
-              jobs);
-    cli_shell (command);
+    cli_shell (check_text (
+        "pinwheel optimise ezyroller --maximise frame.x/max:work --free omega=2:6 --free M0=0.05:0.2 --t-end 1 "
+        "--step 0.01 --starts 5 --seed 3 --jobs %d --json @/o.json",
+        jobs));
     if (jobs == 1) snprintf (first, sizeof first, "%s", cli_file ("o.json"));
     assert_string_equal (cli_file ("o.json"), first);
   }
@@ -253,10 +247,9 @@ TEST (many_unknowns) {
 /* Outputs without a largest value: linear in an unknown without bounds. */
 TEST (unbounded) {
   static const char *const without[] = { "--free a --maximise p.x", "--free a --free b=-1:1 --maximise 'p.x - p.y^2'" };
-  char command[200];
   for (int i = 0; i < 2; i++) {
-    snprintf (command, sizeof command, "pinwheel optimise @/point.yaml %s --starts 2 --json @/o.json", without[i]);
-    assert_int_equal (cli_run (command), 4);
+    assert_int_equal (cli_run (check_text ("pinwheel optimise @/point.yaml %s --starts 2 --json @/o.json", without[i])),
+                      4);
     assert_null (strstr (cli_err, " runs")); /* those of a refinement are only a part */
     assert_non_null (strstr (cli_err, "perhaps there is no optimum unless bounds are given, as in --free a=LOW:HIGH"));
     assert_true (cli_says (cli_file ("o.json"), "status", "method"));

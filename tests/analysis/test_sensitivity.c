@@ -102,9 +102,7 @@ static void sensitivity_values (const char *name, double value, double *out) {
 
 static void sensitivity_compare (const char *by, const char *name, double value, double step) {
   double derivative[SENSITIVITY_MOST], x[4][13];
-  char command[800];
-  snprintf (command, sizeof command, "pinwheel sensitivity ezyroller -t 3%s--by %s -o @/sens", sensitivity_outputs, by);
-  cli_good (command);
+  cli_good (check_text ("pinwheel sensitivity ezyroller -t 3%s--by %s -o @/sens", sensitivity_outputs, by));
   assert_int_equal (sensitivity_json ("\"derivative\": ", derivative), 13);
   for (int k = 0; k < 4; k++) sensitivity_values (name, value + (k < 2 ? k - 2 : k - 1) * step, x[k]);
   for (int i = 0; i < 13; i++) {
@@ -288,7 +286,7 @@ TEST (files) {
  * the force is not linear: other steps are found, and the error contains what remains. */
 TEST (steps) {
   static const char *const value[] = { "1e-6", "1e-8", "1e-10", "1e-12" }, *const place[] = { "1e3", "1e4", "1e5" };
-  char command[300], text[600];
+  char command[300];
   double x, error, expected = 0;
   cli_write ("small.yaml",
              "pinwheel: 1\nrun: {t_end: 2, method: erk8, rtol: 1e-11}\n"
@@ -309,12 +307,12 @@ TEST (steps) {
       check_close ("within its error", x, expected, error + 1e-8, "the claim");
     }
   for (int i = 0; i < 3; i++) {
-    snprintf (text, sizeof text,
-              "pinwheel: 1\nrun: {t_end: 2, method: erk8, rtol: 1e-11}\nparameters: [{name: x0, value: %s}]\n"
-              "bodies: [{name: b, mass: 1, inertia: 1, start: {x: %s}}]\n"
-              "elements:\n  - {force: F, body: b, fx: '-sin(20*(b.x - x0))'}\n",
-              place[i], place[i]);
-    cli_write ("large.yaml", text);
+    cli_write (
+        "large.yaml",
+        check_text ("pinwheel: 1\nrun: {t_end: 2, method: erk8, rtol: 1e-11}\nparameters: [{name: x0, value: %s}]\n"
+                    "bodies: [{name: b, mass: 1, inertia: 1, start: {x: %s}}]\n"
+                    "elements:\n  - {force: F, body: b, fx: '-sin(20*(b.x - x0))'}\n",
+                    place[i], place[i]));
     cli_shell ("pinwheel sensitivity @/large.yaml --of b.x --by x0 -o @/sens");
     sensitivity_json ("\"derivative\": ", &x);
     check_close (place[i], x, 1 - cos (2 * sqrt (20)), 1e-6, "a linear oscillation near x0");
@@ -380,7 +378,6 @@ TEST (run_error) {
   double expected = (8 * (damped_position (m + h) - damped_position (m - h)) -
                      (damped_position (m + 2 * h) - damped_position (m - 2 * h))) /
                     (12 * h);
-  char command[200];
   cli_write (
       "damped.yaml",
       "pinwheel: 1\nrun: {t_end: 1}\nparameters: [{name: m, value: 0.3}]\n"
@@ -389,9 +386,7 @@ TEST (run_error) {
       "  - {spring: S, body: [ground, B], at: [[-10, 0], [0, 0]], stiffness: 350.7, damping: 31.1, length: 10}\n");
   for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
     double x, error;
-    snprintf (command, sizeof command, "pinwheel sensitivity @/damped.yaml --of B.x --by m -o @/sens --method %s",
-              method[i]);
-    cli_shell (command);
+    cli_shell (check_text ("pinwheel sensitivity @/damped.yaml --of B.x --by m -o @/sens --method %s", method[i]));
     sensitivity_json ("\"derivative\": ", &x);
     sensitivity_json ("\"error\": ", &error);
     check_close (method[i], x, expected, error, "the claim");
@@ -406,7 +401,6 @@ TEST (run_error) {
  * of the equations instead of those of the run it would be 0.004 at rtol 1e-6, 0.06 at 1e-4. */
 TEST (light_body) {
   static const char *const method[] = { "bdf --rtol 1e-6", "bdf --rtol 1e-4", "radau+ggl --rtol 1e-8" };
-  char command[200];
   cli_write (
       "light.yaml",
       "pinwheel: 1\nrun: {t_end: 1}\nparameters: [{name: m, value: 0.0286}]\n"
@@ -415,9 +409,7 @@ TEST (light_body) {
       "  - {spring: S, body: [ground, B], at: [[-10, 0], [0, 0]], stiffness: 1.9e5, damping: 4430, length: 10}\n");
   for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
     double x;
-    snprintf (command, sizeof command, "pinwheel sensitivity @/light.yaml --of B.x --by m -o @/sens --method %s",
-              method[i]);
-    cli_shell (command);
+    cli_shell (check_text ("pinwheel sensitivity @/light.yaml --of B.x --by m -o @/sens --method %s", method[i]));
     sensitivity_json ("\"derivative\": ", &x);
     check_below (method[i], fabs (x), 1e-4, "the error of the run's velocities, over m");
   }
@@ -427,10 +419,8 @@ TEST (light_body) {
 TEST (long_names) {
   char sum[600] = "bob.phi";
   while (strlen (sum) < 400) strcat (sum, "+bob.phi");
-  char command[2000], column[2000];
-  snprintf (command, sizeof command, "pinwheel sensitivity pendulum --of %s --of %s-1 --by m -t 0.1 -o @/sens", sum,
-            sum);
-  cli_good (command);
+  char column[2000];
+  cli_good (check_text ("pinwheel sensitivity pendulum --of %s --of %s-1 --by m -t 0.1 -o @/sens", sum, sum));
   snprintf (column, sizeof column, "t [s],%s,d(%s)/d(m),%s-1,d(%s-1)/d(m)\n", sum, sum, sum, sum);
   assert_int_equal (strncmp (cli_file ("sens/sensitivity.csv"), column, strlen (column)), 0);
 }

@@ -87,9 +87,7 @@ TEST (curved_pitchfork) {
                           "  - {rotational-spring: s, body: [b, ground], stiffness: 3, damping: 0.2}\n");
   for (size_t k = 0; k < sizeof last / sizeof *last; k++) {
     int events = 0;
-    char command[200];
-    snprintf (command, sizeof command, "pinwheel steady @/fork.yaml --vary p=0.2:%g -o @/fork", last[k]);
-    cli_good (command);
+    cli_good (check_text ("pinwheel steady @/fork.yaml --vary p=0.2:%g -o @/fork", last[k]));
     for (const char *line = strchr (cli_file ("fork/steady.csv"), '\n') + 1; *line; line = strchr (line, '\n') + 1) {
       double p = table_number (line, 2);
       check_close ("residual", table_number (line, 4), 0, 1e-9, "Newton's tolerance, or the cubic near the pitchfork");
@@ -185,10 +183,8 @@ TEST (standstill) {
              "bodies: [{name: s, mass: 2, inertia: 0.4, rate: {vx: u}}]\nelements:\n"
              "  - {speed: e, body: s, at: [-0.3, 0], value: u}\n  - {wheel: w, body: s, at: [-0.3, 0]}\n");
   for (size_t k = 0; k < sizeof each / sizeof *each; k++) {
-    char command[200];
     int events = 0;
-    snprintf (command, sizeof command, "pinwheel steady @/%s --starts 0 -o @/still", each[k]);
-    cli_good (command);
+    cli_good (check_text ("pinwheel steady @/%s --starts 0 -o @/still", each[k]));
     for (const char *line = strchr (cli_file ("still/steady.csv"), '\n') + 1; *line; line = strchr (line, '\n') + 1) {
       if (strncmp (line, "1,point,", 8) == 0) continue;
       assert_int_equal (strncmp (line, "1,zero eigenvalue,", 18), 0);
@@ -219,14 +215,12 @@ TEST (spin) {
   static const char *const body[] = { "  - {name: disc, mass: 1, inertia: 0.1, rate: {vx: 1, omega: 2}}\n",
                                       "  - {name: car, mass: 2, inertia: 1, start: {x: -0.2}, rate: {vx: 1}}\n" };
   for (int k = 0; k < 2; k++) {
-    char text[1000];
-    snprintf (text, sizeof text,
-              "pinwheel: 1\nbodies:\n%s%selements:\n  - {wheel: rear, body: car, at: [0, 0]}\n"
-              "  - {wheel: front, body: car, at: [0.5, 0], heading: 0.2}\n"
-              "  - {speed: engine, body: car, at: [0, 0], value: 1}\n"
-              "  - {pin: P, body: [disc, car], at: [[0, 0], [0.2, 0]]}\n",
-              body[k], body[1 - k]);
-    cli_write ("spin.yaml", text);
+    cli_write ("spin.yaml",
+               check_text ("pinwheel: 1\nbodies:\n%s%selements:\n  - {wheel: rear, body: car, at: [0, 0]}\n"
+                           "  - {wheel: front, body: car, at: [0.5, 0], heading: 0.2}\n"
+                           "  - {speed: engine, body: car, at: [0, 0], value: 1}\n"
+                           "  - {pin: P, body: [disc, car], at: [[0, 0], [0.2, 0]]}\n",
+                           body[k], body[1 - k]));
     cli_good ("pinwheel steady @/spin.yaml --hold disc.omega=2 --starts 10");
     steady_shows ("spin: 1 steady motion up to 4 symmetries, ");
   }

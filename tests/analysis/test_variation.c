@@ -253,7 +253,6 @@ static void gallery_check (const gallery_name *g, double value, const pw_setting
   double step = 1e-5 * (value != 0 ? fabs (value) : 1), most = 0;
   pw_error error = { 0 };
   pw_sample x;
-  char what[200];
   variation_case c = variation_open (gallery_make, g, value, step, method, settings);
   int n = pw_system_coordinates (c.s);
   double *by_runs = calloc (2 * (size_t)n, sizeof *by_runs);
@@ -264,8 +263,8 @@ static void gallery_check (const gallery_name *g, double value, const pw_setting
   check_ok (pw_variation_sample (v, 0, &x, NULL, &error), &error);
   for (int j = 0; j < 2 * n; j++) most = fmax (most, fabs (by_runs[j]));
   for (int j = 0; j < 2 * n; j++) {
-    snprintf (what, sizeof what, "%s, state %d by %s", g->model, j, g->parameter);
-    check_close (what, j < n ? x.q[j] : x.v[j - n], by_runs[j], 10 * off + 1e-6 * most + 1e-8 / (1e5 * step),
+    check_close (check_text ("%s, state %d by %s", g->model, j, g->parameter), j < n ? x.q[j] : x.v[j - n], by_runs[j],
+                 10 * off + 1e-6 * most + 1e-8 / (1e5 * step),
                  "error of the differences, and of a run with steps of 1 ms");
   }
   pw_variation_close (v);

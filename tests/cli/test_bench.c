@@ -6,11 +6,8 @@
 /* Evaluations of a run of a stiff scene to the end.  At a loose tolerance what tyres lose is not resolved where
  * stability decides on the steps, and the run says so. */
 static double bench_evaluations (const char *scene, const char *method, const char *rtol) {
-  char command[300];
-  snprintf (command, sizeof command,
-            "pinwheel run ./benchmarks/scenes/stiff-%s.yaml --method %s --rtol %s --t-end 1 --json -", scene, method,
-            rtol);
-  cli_shell (command);
+  cli_shell (check_text ("pinwheel run ./benchmarks/scenes/stiff-%s.yaml --method %s --rtol %s --t-end 1 --json -",
+                         scene, method, rtol));
   return cli_number (cli_out, "statistics", "rhs", NULL);
 }
 

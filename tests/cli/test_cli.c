@@ -58,12 +58,9 @@ TEST (degrees) {
   static const char model[] = "pinwheel: 1\nbodies:\n  - {name: skate, mass: 1, inertia: 1, start: {phi: %s}}\n"
                               "elements:\n  - {wheel: W, body: skate, at: [0, 0], heading: %s}\n"
                               "  - {steered-wheel: S, body: skate, at: [1, 0], heading: %s}\n";
-  char text[400];
-  snprintf (text, sizeof text, model, "2*pi", "-90*deg", "pi/4");
-  cli_write ("skate.yaml", text);
+  cli_write ("skate.yaml", check_text (model, "2*pi", "-90*deg", "pi/4"));
   cli_good ("pinwheel run @/skate.yaml --t-end 0.01");
-  snprintf (text, sizeof text, model, "30", "-90", "45");
-  cli_write ("skate.yaml", text);
+  cli_write ("skate.yaml", check_text (model, "30", "-90", "45"));
   assert_int_equal (cli_run ("pinwheel check @/skate.yaml"), 0);
   assert_non_null (strstr (cli_err, "pinwheel: body skate: initial phi = 30 rad is more than a turn"));
   assert_non_null (strstr (cli_err,
@@ -205,10 +202,8 @@ static double cli_cell (const char *csv, int row, const char *heading) {
 }
 
 static const char *cli_columns (const char *options) {
-  char command[300];
   cli_write ("columns.yaml", CLI_COLUMNS);
-  snprintf (command, sizeof command, "pinwheel run @/columns.yaml --energy -o @/columns.csv %s", options);
-  cli_good (command);
+  cli_good (check_text ("pinwheel run @/columns.yaml --energy -o @/columns.csv %s", options));
   return cli_file ("columns.csv");
 }
 
@@ -375,9 +370,7 @@ TEST (help) {
     assert_true (sscanf (at + strlen (library), "%lf", &major) == 1 && major > 0);
   }
   for (int i = 0; i < 4; i++) {
-    char line[60];
-    snprintf (line, sizeof line, "pinwheel %s --help", command[i]);
-    cli_good (line);
+    cli_good (check_text ("pinwheel %s --help", command[i]));
     assert_non_null (strstr (cli_out, "--help"));
   }
 }

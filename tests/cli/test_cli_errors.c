@@ -200,9 +200,7 @@ TEST (bad_tables) {
       " has no build function: PW_MODEL (...) at its end must set .build" },
   };
   for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
-    char text[3000];
-    snprintf (text, sizeof text, "%s%s", bad[i].defines, model);
-    cli_write ("table.c", text);
+    cli_write ("table.c", check_text ("%s%s", bad[i].defines, model));
     assert_int_equal (cli_run ("pinwheel run @/table.c"), 2);
     if (strstr (cli_err, bad[i].message) == NULL) print_error ("%s", cli_err);
     assert_non_null (strstr (cli_err, bad[i].message));
@@ -317,9 +315,7 @@ TEST (one_voice) {
   cli_write ("root.yaml", "pinwheel: 1\nbodies: [{name: a, mass: 1, inertia: 1}]\n"
                           "elements:\n  - {torque: m, body: [a, ground], value: sqrt(0.1-t)}\n");
   for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
-    char text[200];
-    snprintf (text, sizeof text, "pinwheel run @/root.yaml -t 1 -m %s", method[i]);
-    assert_int_equal (cli_run (text), 4);
+    assert_int_equal (cli_run (check_text ("pinwheel run @/root.yaml -t 1 -m %s", method[i])), 4);
     assert_true (strncmp (cli_err, "pinwheel: t = 0.", 16) == 0);
     assert_true (strchr (cli_err, '\n')[1] == 0);
   }

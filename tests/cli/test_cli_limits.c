@@ -30,12 +30,12 @@ TEST (max_steps) {
 
 TEST (limit) {
   static const char *const method[] = { "rk4", "erk8", "bdf", "ida+ggl", "galpha", "leapfrog" };
-  char command[200];
   for (int i = 0; i < 6; i++) {
-    snprintf (command, sizeof command,
-              "pinwheel run ezyroller --method %s --t-end 1e9 --limit 0.02 --max-steps 1e9 --every 1 -o @/l.csv",
-              method[i]);
-    assert_int_equal (cli_run (command), 4);
+    assert_int_equal (
+        cli_run (check_text (
+            "pinwheel run ezyroller --method %s --t-end 1e9 --limit 0.02 --max-steps 1e9 --every 1 -o @/l.csv",
+            method[i])),
+        4);
     assert_non_null (strstr (cli_err, "s: the limit of 0.02 s of processor time is reached (--limit)"));
     assert_non_null (strstr (cli_err, "the table so far is kept in "));
   }
@@ -90,14 +90,14 @@ TEST (bad) {
 /* A signal that comes while one step is written as a thousand million rows. */
 TEST (rows_of_a_step) {
   static const char *const method[] = { "rk4", "erk8", "bdf", "galpha" };
-  char command[300];
   for (int i = 0; i < 4; i++) {
-    snprintf (command, sizeof command,
-              "\"${PINWHEEL:-build/pinwheel}\" run ezyroller --method %s --every 1e-12 -o @/e.csv & p=$!; "
-              "while kill -0 $! 2>/dev/null && [ ! -s @/e.csv.part ]; do sleep 0.01; done; kill -TERM $p; wait $p; "
-              "s=$?; rm -f @/e.csv.part; exit $s",
-              method[i]);
-    assert_int_equal (cli_run (command), 130);
+    assert_int_equal (
+        cli_run (check_text (
+            "\"${PINWHEEL:-build/pinwheel}\" run ezyroller --method %s --every 1e-12 -o @/e.csv & p=$!; "
+            "while kill -0 $! 2>/dev/null && [ ! -s @/e.csv.part ]; do sleep 0.01; done; kill -TERM $p; wait $p; "
+            "s=$?; rm -f @/e.csv.part; exit $s",
+            method[i])),
+        130);
     assert_non_null (strstr (cli_err, "interrupted at t = "));
   }
 }

@@ -138,13 +138,11 @@ TEST (repeats) {
 TEST (row_is_run) {
   static const char *const method[] = { "rk4+projection", "erk8+projection", "ida+baumgarte" };
   for (int m = 0; m < 3; m++) {
-    char command[600];
-    snprintf (command, sizeof command,
-              "pinwheel compare ezyroller --methods %s --t-end 2 --rtol-ladder 1e-6 --step-ladder 0.01 --repeats 2 "
-              "--reference @/known.csv -o @/as-run "
-              ">@/table\npinwheel run ezyroller --method %s --t-end 2 --rtol 1e-6 --step 0.01 --json -",
-              method[m], method[m]);
-    cli_good (command);
+    cli_good (check_text (
+        "pinwheel compare ezyroller --methods %s --t-end 2 --rtol-ladder 1e-6 --step-ladder 0.01 --repeats 2 "
+        "--reference @/known.csv -o @/as-run "
+        ">@/table\npinwheel run ezyroller --method %s --t-end 2 --rtol 1e-6 --step 0.01 --json -",
+        method[m], method[m]));
     const struct {
       const char *group, *key;
       int column;
@@ -310,13 +308,13 @@ TEST (presets) {
 TEST (multiplier_scale) {
   double error[2];
   for (int i = 0; i < 2; i++) {
-    char text[600];
-    snprintf (text, sizeof text,
-              "pinwheel: 1\nbodies:\n  - {name: a, mass: %d, start: {x: 1}}\n  - {name: b, mass: %d, start: {x: 2}}\n"
-              "elements:\n  - {pin: A, body: [a, ground], at: [[-1, 0], [0, 0]]}\n"
-              "  - {pin: B, body: [a, b], at: [[0, 0], [-1, 0]]}\n  - {gravity: g, acceleration: [0, -10]}\n",
-              i ? 1024 : 1, i ? 1024 : 1);
-    cli_write ("double.yaml", text);
+    cli_write (
+        "double.yaml",
+        check_text (
+            "pinwheel: 1\nbodies:\n  - {name: a, mass: %d, start: {x: 1}}\n  - {name: b, mass: %d, start: {x: 2}}\n"
+            "elements:\n  - {pin: A, body: [a, ground], at: [[-1, 0], [0, 0]]}\n"
+            "  - {pin: B, body: [a, b], at: [[0, 0], [-1, 0]]}\n  - {gravity: g, acceleration: [0, -10]}\n",
+            i ? 1024 : 1, i ? 1024 : 1));
     cli_good ("pinwheel compare @/double.yaml --methods rk4+projection --t-end 0.5 --step-ladder 0.02 --repeats 1 "
               "-o @/double >@/table");
     error[i] = compare_number ("double/compare.csv", 0, MULTIPLIER);

@@ -49,12 +49,12 @@ TEST (uses) {
     { "check ./car.yaml --json car.yaml", "--json car.yaml would overwrite the model, @/u/car.yaml" },
   };
   for (size_t i = 0; i < sizeof each / sizeof *each; i++) {
-    char text[500];
-    snprintf (text, sizeof text,
-              "p=$PWD/; case $PINWHEEL in /*) p= ;; esac; p=$p${PINWHEEL:-build/pinwheel}; cd @/u; : >D/compare.csv; "
-              "\"$p\" %s",
-              each[i].arguments);
-    cli_bad (text, 2, each[i].message);
+    cli_bad (
+        check_text (
+            "p=$PWD/; case $PINWHEEL in /*) p= ;; esac; p=$p${PINWHEEL:-build/pinwheel}; cd @/u; : >D/compare.csv; "
+            "\"$p\" %s",
+            each[i].arguments),
+        2, each[i].message);
     cli_good ("cd @/u; cat *.yaml M.csv | cmp - ../before; ls | grep -c 'part$\\|^o.csv\\|^new\\|^c$' || true");
     assert_string_equal (cli_out, "0\n");
   }
@@ -146,9 +146,7 @@ TEST (keeps_lock) {
            "  pinwheel run ezyroller -t 0.1 $f; echo $?\ndone; kill -KILL $p");
   assert_string_equal (cli_out, "1\n1\n1\n1\n");
   for (const char *const *n = (const char *const[]){ "a.csv", "a.json", "a.html", "a.ck", NULL }; *n; n++) {
-    char message[100];
-    snprintf (message, sizeof message, "/l/%s" OUTPUT_OTHER, *n);
-    assert_non_null (strstr (cli_err, message));
+    assert_non_null (strstr (cli_err, check_text ("/l/%s" OUTPUT_OTHER, *n)));
   }
 }
 
@@ -186,11 +184,9 @@ TEST (direct) {
 #define OUTPUT_RUN "pinwheel run ezyroller -t 0.01 -o "
   for (const char *const *n = (const char *const[]){ "-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1", NULL }; *n;
        n++) {
-    char text[300];
     if (**n == '/' && access ("/proc/self/fd/1", F_OK) != 0) continue;
-    snprintf (text, sizeof text,
-              "echo old >@/all; " OUTPUT_RUN "%s >>@/all; cat @/all | wc -l; " OUTPUT_RUN "%s | wc -l", *n, *n);
-    cli_good (text);
+    cli_good (
+        check_text ("echo old >@/all; " OUTPUT_RUN "%s >>@/all; cat @/all | wc -l; " OUTPUT_RUN "%s | wc -l", *n, *n));
     assert_string_equal (cli_out, "13\n12\n");
   }
   if (access ("/dev/fd/1", F_OK) == 0) {
@@ -298,9 +294,7 @@ TEST (types) {
     { "run @/r/x.cpp", "@/r/x.cpp: a model is compiled as C, not as C++: write it in C, in a file that ends in .c" },
   };
   for (size_t i = 0; i < sizeof each / sizeof *each; i++) {
-    char text[300];
-    snprintf (text, sizeof text, "pinwheel %s", each[i].arguments);
-    cli_bad (text, 2, each[i].message);
+    cli_bad (check_text ("pinwheel %s", each[i].arguments), 2, each[i].message);
   }
 }
 
@@ -450,9 +444,7 @@ TEST (terminal) {
 
 /* A test program that takes too long ends its children, says its name and fails (limit.c). */
 TEST (limit) {
-  char text[500];
-  snprintf (text, sizeof text, "LIMIT=1 %s @/child", program_invocation_name);
-  assert_int_not_equal (cli_run (text), 0);
+  assert_int_not_equal (cli_run (check_text ("LIMIT=1 %s @/child", program_invocation_name)), 0);
   assert_non_null (strstr (cli_out, "[  FAILED  ] test_output: takes longer than its time limit\n"));
   cli_good ("n=0; while kill -0 $(cat @/child) 2>/dev/null && [ $n -lt 100 ]; do n=$((n + 1)); sleep 0.05; done; "
             "[ $n -lt 100 ]");

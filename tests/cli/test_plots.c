@@ -14,9 +14,8 @@ static int plots_has (const char *name) {
 /* Draws all figures of a model; gnuplot has nothing to report. */
 static void plots_draw (const char *model) {
   static const char *const figures[] = { "paths", "velocities", "angular", "energy", "mechanism" };
-  char command[200], name[80];
-  snprintf (command, sizeof command, "pinwheel run %s --plots @/drawn", model);
-  cli_good (command);
+  char name[80];
+  cli_good (check_text ("pinwheel run %s --plots @/drawn", model));
   assert_null (strstr (cli_err, ".gp"));
   for (size_t i = 0; i < sizeof figures / sizeof *figures; i++) {
     snprintf (name, sizeof name, "drawn/%s.svg", figures[i]);
@@ -34,13 +33,14 @@ static void plots_draw (const char *model) {
 /* After Ctrl-C data and scripts are written; the figures of an earlier run are removed. */
 TEST (interrupted) {
   const char *program = getenv ("PINWHEEL");
-  char command[1000], expected[400];
+  char expected[400];
   cli_run ("mkdir @/stopped; touch @/stopped/paths.svg");
-  snprintf (command, sizeof command,
-            "timeout --preserve-status -s INT 1 '%s' run ezyroller --t-end 300 --step 1e-5 --specialise never --plots "
-            "@/stopped",
-            program ? program : "build/pinwheel");
-  assert_int_equal (cli_run (command), 130);
+  assert_int_equal (
+      cli_run (check_text (
+          "timeout --preserve-status -s INT 1 '%s' run ezyroller --t-end 300 --step 1e-5 --specialise never --plots "
+          "@/stopped",
+          program ? program : "build/pinwheel")),
+      130);
   cli_expand ("pinwheel: the run was interrupted, so no figures are drawn; data and scripts are in @/stopped: gnuplot "
               "FILE.gp draws them there\n",
               expected, sizeof expected);
@@ -55,9 +55,7 @@ TEST (drawn) {
 
 /* The data and scripts of a model without gnuplot. */
 static void plots_write (const char *model) {
-  char command[300];
-  snprintf (command, sizeof command, "PATH=/none pinwheel run %s --plots @/written >/dev/null", model);
-  assert_int_equal (cli_run (command), 0);
+  assert_int_equal (cli_run (check_text ("PATH=/none pinwheel run %s --plots @/written >/dev/null", model)), 0);
   assert_true (plots_has ("written/mechanism.gp") && plots_has ("written/energy.gp"));
 }
 
@@ -130,13 +128,13 @@ TEST (ground) {
 
 /* The lines of symbols in a model's last snapshot. */
 static const char *plots_symbols (const char *elements) {
-  char text[1200];
-  snprintf (text, sizeof text,
-            "pinwheel: 1\nbodies:\n  - {name: a, mass: 1, inertia: 1, rate: {omega: 1}}\n"
-            "  - {name: b, mass: 1, inertia: 1, start: {x: 0.6}}\n  - {name: c, mass: 1, inertia: 1, start: {y: -1}, "
-            "rate: {vx: 2}}\nelements:\n%s",
-            elements);
-  cli_write ("symbols.yaml", text);
+  cli_write (
+      "symbols.yaml",
+      check_text (
+          "pinwheel: 1\nbodies:\n  - {name: a, mass: 1, inertia: 1, rate: {omega: 1}}\n"
+          "  - {name: b, mass: 1, inertia: 1, start: {x: 0.6}}\n  - {name: c, mass: 1, inertia: 1, start: {y: -1}, "
+          "rate: {vx: 2}}\nelements:\n%s",
+          elements));
   assert_int_equal (cli_run ("PATH=/none pinwheel run @/symbols.yaml -t 1 --plots @/symbols >/dev/null 2>&1"), 0);
   const char *data = strstr (cli_file ("symbols/mechanism.dat"), "# symbols");
   assert_non_null (data);

@@ -73,11 +73,8 @@ TEST (unbound) {
 TEST (literals) {
   static const char *const name[] = { "null", "true", "1e3" };
   for (int i = 0; i < 3; i++) {
-    char text[200];
-    snprintf (text, sizeof text,
-              "cp models/pendulum.yaml @/%s.yaml && pinwheel run @/%s.yaml -t 0.01 --json @/it.json >@/log", name[i],
-              name[i]);
-    cli_good (text);
+    cli_good (check_text ("cp models/pendulum.yaml @/%s.yaml && pinwheel run @/%s.yaml -t 0.01 --json @/it.json >@/log",
+                          name[i], name[i]));
     assert_true (cli_says (cli_file ("it.json"), "model", name[i]));
   }
 }
@@ -148,14 +145,11 @@ TEST (failures) {
 /* A table of a sweep that cannot be put in order: all its rows are kept, and the next start has only to sort them. */
 TEST (sorted) {
   const char *sweep = "pinwheel sweep pendulum -t 0.1 --vary m=1,2 -o @/sorted.csv >@/log";
-  char text[200];
-  snprintf (text, sizeof text, "mkdir @/sorted.csv.sorted; %s", sweep);
-  assert_int_equal (cli_run (text), 1);
+  assert_int_equal (cli_run (check_text ("mkdir @/sorted.csv.sorted; %s", sweep)), 1);
   assert_non_null (strstr (cli_err, "so the same command only has to sort them\n"));
   assert_null (cli_file ("sorted.csv"));
   assert_non_null (cli_file ("sorted.csv.part"));
-  snprintf (text, sizeof text, "rmdir @/sorted.csv.sorted; %s; wc -l <@/sorted.csv", sweep);
-  assert_int_equal (cli_run (text), 0);
+  assert_int_equal (cli_run (check_text ("rmdir @/sorted.csv.sorted; %s; wc -l <@/sorted.csv", sweep)), 0);
   assert_string_equal (cli_out, "3\n");
 }
 

@@ -97,10 +97,8 @@ static void resume_prepare (void) {
 }
 
 static void resume_bad (const char *change, const char *option, const char *message) {
-  char command[1500];
   resume_prepare ();
-  snprintf (command, sizeof command, "%s; pinwheel " RESUME_SHORT "%s --resume @/b.ck", change, option);
-  cli_bad (command, 2, message);
+  cli_bad (check_text ("%s; pinwheel " RESUME_SHORT "%s --resume @/b.ck", change, option), 2, message);
   cli_good ("test -s @/b.csv.part");
 }
 

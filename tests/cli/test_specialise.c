@@ -53,9 +53,7 @@ TEST (damaged) {
   };
   cli_good (FRESH RUN ">/dev/null");
   for (size_t i = 0; i < sizeof damage / sizeof *damage; i++) {
-    char command[900];
-    snprintf (command, sizeof command, CACHED "f=$(echo @/c/pinwheel/*.so); %s\n" RUN, damage[i]);
-    cli_shell (command);
+    cli_shell (check_text (CACHED "f=$(echo @/c/pinwheel/*.so); %s\n" RUN, damage[i]));
     specialise_says ("code specialised for this scene");
     assert_non_null (strstr (cli_err, ".so is replaced: it is damaged\n"));
     assert_ptr_equal (strchr (cli_err, '\n'), cli_err + strlen (cli_err) - 1);
@@ -156,11 +154,9 @@ TEST (no_compiler) {
 TEST (bad_compiler) {
   static const char *const bad[] = { "echo message >&2; exit 1", "kill -9 $$" };
   for (int i = 0; i < 2; i++) {
-    char command[900];
-    snprintf (command, sizeof command,
-              FRESH "printf '#!/bin/sh\\n%s\\n' >@/cc\n" RUN "&& head -c 3 @/c/pinwheel/*.c && cat @/c/pinwheel/*.log",
-              bad[i]);
-    cli_shell (command);
+    cli_shell (check_text (FRESH "printf '#!/bin/sh\\n%s\\n' >@/cc\n" RUN
+                                 "&& head -c 3 @/c/pinwheel/*.c && cat @/c/pinwheel/*.log",
+                           bad[i]));
     specialise_says ("general engine: the generated code does not compile\n");
     specialise_says (i == 0 ? "/* message\n" : "/* ");
     assert_non_null (strstr (cli_err, "pinwheel: general engine: "));
@@ -183,10 +179,8 @@ TEST (strange_compiler) {
       "it belongs to another scene or version\n" }
   };
   for (int i = 0; i < 3; i++) {
-    char command[900];
-    snprintf (command, sizeof command, FRESH "cat >@/cc <<'X'\n#!/bin/sh\n%s\nX\n" RUN "&& ls @/c/pinwheel @/tmp",
-              strange[i].does);
-    cli_shell (command);
+    cli_shell (
+        check_text (FRESH "cat >@/cc <<'X'\n#!/bin/sh\n%s\nX\n" RUN "&& ls @/c/pinwheel @/tmp", strange[i].does));
     specialise_says ("general engine: the compiled code cannot be loaded\n");
     assert_null (strstr (cli_out, ".so\n"));
     assert_non_null (strstr (cli_err, strange[i].notice));

@@ -44,15 +44,13 @@ TEST (ranges) {
 TEST (row_is_run) {
   static const char *const method[] = { "rk4+projection --step 2e-3", "ida+ggl --rtol 1e-8" };
   for (int i = 0; i < 2; i++) {
-    char command[900];
-    snprintf (command, sizeof command,
-              "o='--method %s --t-end 1.5 --set M0=0.2 --start frame.vx=0.3'\n"
-              "pinwheel sweep ezyroller --vary omega=2,3 --vary frame.omega=0.1,0.4 $o -o @/row.csv || exit 1\n"
-              "pinwheel run ezyroller --set omega=3 --start frame.omega=0.1 $o --every 1.5 -o @/run.csv 2>/dev/null\n"
-              "sed -n '1p;4p' @/row.csv | cut -d, -f4-16 >@/a\n sed -n '1p;$p' @/run.csv | cut -d, -f1-13 >@/b\n"
-              "cmp @/a @/b && pinwheel run ezyroller --set omega=3 --start frame.omega=0.1 $o --json - 2>/dev/null",
-              method[i]);
-    cli_shell (command);
+    cli_shell (check_text (
+        "o='--method %s --t-end 1.5 --set M0=0.2 --start frame.vx=0.3'\n"
+        "pinwheel sweep ezyroller --vary omega=2,3 --vary frame.omega=0.1,0.4 $o -o @/row.csv || exit 1\n"
+        "pinwheel run ezyroller --set omega=3 --start frame.omega=0.1 $o --every 1.5 -o @/run.csv 2>/dev/null\n"
+        "sed -n '1p;4p' @/row.csv | cut -d, -f4-16 >@/a\n sed -n '1p;$p' @/run.csv | cut -d, -f1-13 >@/b\n"
+        "cmp @/a @/b && pinwheel run ezyroller --set omega=3 --start frame.omega=0.1 $o --json - 2>/dev/null",
+        method[i]));
     const char *row = cli_file ("row.csv");
     for (int line = 0; line < 3; line++) row = strchr (row, '\n') + 1;
     for (int comma = 0; comma < 17; comma++) row = strchr (row, ',') + 1;

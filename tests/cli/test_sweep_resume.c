@@ -48,26 +48,21 @@ TEST (odd_journal) {
 TEST (kills) {
   const char *sweep = "p=\"${PINWHEEL:-build/pinwheel}\"\n"
                       "s='sweep ezyroller --vary omega=lin:1:4:10 --vary M0=0.05,0.1,0.2,0.3 --t-end 4'\n";
-  char command[1500];
-  snprintf (command, sizeof command,
-            "%s\"$p\" $s -j 1 -o @/whole.csv || exit 1\n"
-            "\"$p\" $s -o @/kill.csv &\n"
-            "while kill -0 $! && ! grep -q '^[0-9]' @/kill.csv.part; do sleep 0.01; done 2>/dev/null; "
-            "kill -TERM $!; wait $!; "
-            "echo $?; ls @/kill.csv*",
-            sweep);
-  cli_shell (command);
+  cli_shell (check_text ("%s\"$p\" $s -j 1 -o @/whole.csv || exit 1\n"
+                         "\"$p\" $s -o @/kill.csv &\n"
+                         "while kill -0 $! && ! grep -q '^[0-9]' @/kill.csv.part; do sleep 0.01; done 2>/dev/null; "
+                         "kill -TERM $!; wait $!; "
+                         "echo $?; ls @/kill.csv*",
+                         sweep));
   char expected[200];
   cli_expand ("130\n@/kill.csv.part\n", expected, sizeof expected);
   assert_string_equal (cli_out, expected);
   assert_non_null (strstr (cli_err, "; the same command continues from there\n"));
-  snprintf (command, sizeof command,
-            "%si=3; while [ $i -lt 60 ]; do i=$((i + 1))\n"
-            "\"$p\" $s -o @/kill.csv 2>/dev/null & sleep $(printf 0.%%02d $i)\n"
-            "kill -KILL $! 2>/dev/null; wait $! 2>/dev/null && break\n"
-            "done; \"$p\" $s -o @/kill.csv; cmp @/kill.csv @/whole.csv && [ ! -e @/kill.csv.part ]",
-            sweep);
-  cli_shell (command);
+  cli_shell (check_text ("%si=3; while [ $i -lt 60 ]; do i=$((i + 1))\n"
+                         "\"$p\" $s -o @/kill.csv 2>/dev/null & sleep $(printf 0.%%02d $i)\n"
+                         "kill -KILL $! 2>/dev/null; wait $! 2>/dev/null && break\n"
+                         "done; \"$p\" $s -o @/kill.csv; cmp @/kill.csv @/whole.csv && [ ! -e @/kill.csv.part ]",
+                         sweep));
 }
 
 TEST (journal_of_another) {

@@ -82,14 +82,14 @@ TEST (refused) {
 TEST (bad_tables) {
   pw_error error = { 0 };
   pw_plugin_table table = description_table;
-  char text[200];
   table.abi = PW_ABI + 6;
   assert_null (pw_model_new ("cart", &table, &error));
-  snprintf (text, sizeof text,
-            "model cart was compiled for another Pinwheel (ABI %d, this one has %d; table of %zu bytes, here %zu): "
-            "recompile it",
-            PW_ABI + 6, PW_ABI, sizeof table, sizeof table);
-  check_error (&error, PW_INPUT, text);
+  check_error (
+      &error, PW_INPUT,
+      check_text (
+          "model cart was compiled for another Pinwheel (ABI %d, this one has %d; table of %zu bytes, here %zu): "
+          "recompile it",
+          PW_ABI + 6, PW_ABI, sizeof table, sizeof table));
   table = description_table;
   table.build = NULL;
   error.status = PW_OK;

@@ -39,7 +39,7 @@ TEST (embed) {
   static const char *const reads[] = { "frame.omega", "steer.omega", NULL };
   const pw_signal torque = { PW_FUNCTION, .function = { .eval = embed_torque, .reads = reads } };
   pw_error error = { 0 };
-  char command[300], printed[300], expected[300];
+  char command[300], printed[300];
   snprintf (command, sizeof command, "'%s/docs/embed'", embed_build ());
   assert_int_equal (embed_run (command, printed, sizeof printed), 0);
   pw_model *m = scene_model (&scene_ezyroller, "a", 0.6, NULL);
@@ -47,9 +47,8 @@ TEST (embed) {
   pw_system *s = scene_compile (m);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3 });
   pw_sample now = runs_to (r, 10);
-  snprintf (expected, sizeof expected, "frame at t = %g s: x = %.6f m, y = %.6f m, phi = %.6f rad\n", now.t, now.q[0],
-            now.q[1], now.q[2]);
-  assert_string_equal (printed, expected);
+  assert_string_equal (printed, check_text ("frame at t = %g s: x = %.6f m, y = %.6f m, phi = %.6f rad\n", now.t,
+                                            now.q[0], now.q[1], now.q[2]));
   runs_close (r, s);
 }
 

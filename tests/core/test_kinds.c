@@ -27,9 +27,7 @@ static void kinds_pass (const pw_kind *const *kinds) {
     assert_true (report.checks >= (pw_kind_acts (*kinds) ? 5 : 4));
     for (int i = 0; i < report.checks; i++) {
       const pw_selftest_check *c = &report.check[i];
-      char what[100];
-      snprintf (what, sizeof what, "%s %s", (*kinds)->name, c->name);
-      check_below (what, c->error, c->bound, c->reason);
+      check_below (check_text ("%s %s", (*kinds)->name, c->name), c->error, c->bound, c->reason);
     }
   }
 }

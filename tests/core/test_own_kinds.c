@@ -198,9 +198,8 @@ TEST (redundant_guide) {
 TEST (notice) {
   static const char *const method[] = { "rk4+projection", "erk8+projection", "ida+ggl" };
   for (int i = 0; i < 3; i++) {
-    char line[200];
-    snprintf (line, sizeof line, "pinwheel run elliptic-wire --t-end 0.5 -m %s --json @/wire.json", method[i]);
-    assert_int_equal (cli_run (line), 0);
+    assert_int_equal (
+        cli_run (check_text ("pinwheel run elliptic-wire --t-end 0.5 -m %s --json @/wire.json", method[i])), 0);
     assert_string_equal (cli_err, OWN_NOTICE);
     assert_non_null (strstr (cli_file ("wire.json"), "\"force_q of element type attraction\""));
   }

@@ -63,18 +63,17 @@ TEST (summary) {
 
 /* A model in C with this `about`, unit of its parameter and name of its body is rejected with the message. */
 static void texts_model (const char *about, const char *unit, const char *body, const char *message) {
-  char text[700];
-  snprintf (text, sizeof text,
-            "#include <pinwheel.h>\n"
-            "typedef struct { double a; } P;\n"
-            "static const pw_parameter p[] = { { PW_AT (P, a), .unit = \"%s\" }, { .name = NULL } };\n"
-            "static void build (pw_model *m, const void *p) {\n"
-            "  (void)p;\n"
-            "  pw_add_body (m, &(pw_body){ .name = \"%s\", .mass = 1, .inertia = 1 });\n"
-            "}\n"
-            "PW_MODEL (.about = \"%s\", .parameters = p, .parameters_size = sizeof (P), .build = build);\n",
-            unit, body, about);
-  cli_write ("own.c", text);
+  cli_write (
+      "own.c",
+      check_text ("#include <pinwheel.h>\n"
+                  "typedef struct { double a; } P;\n"
+                  "static const pw_parameter p[] = { { PW_AT (P, a), .unit = \"%s\" }, { .name = NULL } };\n"
+                  "static void build (pw_model *m, const void *p) {\n"
+                  "  (void)p;\n"
+                  "  pw_add_body (m, &(pw_body){ .name = \"%s\", .mass = 1, .inertia = 1 });\n"
+                  "}\n"
+                  "PW_MODEL (.about = \"%s\", .parameters = p, .parameters_size = sizeof (P), .build = build);\n",
+                  unit, body, about));
   cli_bad ("pinwheel show @/own.c", 2, message);
 }
 

@@ -15,9 +15,7 @@
 /* ---- Files ---- */
 
 static size_t faults_slurp (const char *folder, const char *name, char *text, size_t room) {
-  char path[600];
-  snprintf (path, sizeof path, "%s/%s", folder, name);
-  FILE *f = fopen (path, "rb");
+  FILE *f = fopen (check_text ("%s/%s", folder, name), "rb");
   if (f == NULL) return room; /* as no file has it */
   size_t size = fread (text, 1, room - 1, f);
   text[size] = 0;
@@ -38,7 +36,6 @@ static int faults_lines (const char *text) {
 
 static int faults_whole (const char *o, const char *whole, const char *name) {
   static char text[1 << 20], same[1 << 20];
-  char path[600];
   pw_checkpoint c;
   size_t size = faults_slurp (o, name, text, sizeof text);
   if (faults_ends (name, ".part")) return 1;
@@ -50,8 +47,7 @@ static int faults_whole (const char *o, const char *whole, const char *name) {
   if (!faults_ends (name, ".ck"))
     return faults_slurp (whole, name, same, sizeof same) > 0 && faults_lines (text) == faults_lines (same) &&
            text[size - 1] == '\n';
-  snprintf (path, sizeof path, "%s/%s", o, name);
-  int status = pw_checkpoint_read (path, &c, &(pw_error){ 0 });
+  int status = pw_checkpoint_read (check_text ("%s/%s", o, name), &c, &(pw_error){ 0 });
   pw_checkpoint_free (&c);
   return status == PW_OK;
 }
@@ -138,9 +134,7 @@ int faults_run (const char *command) {
 }
 
 void faults_begin (const char *start, const char *command) {
-  char text[1500];
-  snprintf (text, sizeof text, "rm -rf @/o @/start; mkdir -p @/o @/start; %s; rm -rf @/whole", start);
-  cli_good (text);
+  cli_good (check_text ("rm -rf @/o @/start; mkdir -p @/o @/start; %s; rm -rf @/whole", start));
   faults_prepare ();
   int status = faults_run (command);
   if (status != 0) print_error ("%s: %s", command, cli_file ("log"));
@@ -151,15 +145,13 @@ void faults_begin (const char *start, const char *command) {
 int faults_setup (void) {
   static const char gnuplot[] = "#!/bin/sh\n",
                     compiler[] = "#!/bin/sh\nwhile [ \"$1\" != -o ]; do shift; done\n/bin/cp \"$MODEL\" \"$2\"\n";
-  char text[400];
   const char *build = getenv ("BUILD");
   if (cli_setup () != 0) return -1;
   cli_write ("gnuplot", gnuplot);
   cli_write ("cc", compiler);
   cli_run ("chmod +x @/gnuplot @/cc");
   setenv ("CC", cli_path ("cc"), 1);
-  snprintf (text, sizeof text, "%s/models/ezyroller.so", build ? build : "build");
-  setenv ("MODEL", text, 1);
+  setenv ("MODEL", check_text ("%s/models/ezyroller.so", build ? build : "build"), 1);
   const char *path = getenv ("PATH");
   size_t size = strlen (cli_folder) + strlen (path ? path : "") + 2;
   char *longer = malloc (size);

@@ -104,9 +104,7 @@ TEST (closed_pipe) {
   const char *const command[] = { "run ezyroller -o -", "run ezyroller --json -", "run ezyroller", "list",
                                   "show chain",         "show --yaml pendulum",   "list methods" };
   for (size_t i = 0; i < sizeof command / sizeof *command; i++) {
-    char text[300];
-    snprintf (text, sizeof text, "{ sleep 0.05; pinwheel %s; echo $? >@/status; } | true", command[i]);
-    cli_good (text);
+    cli_good (check_text ("{ sleep 0.05; pinwheel %s; echo $? >@/status; } | true", command[i]));
     if (strcmp (cli_file ("status"), "141\n") != 0) print_error ("%s: %s", command[i], cli_file ("status"));
     assert_string_equal (cli_file ("status"), "141\n");
   }
@@ -155,13 +153,12 @@ TEST (gnuplot) {
     { "echo >@/bin/gnuplot; chmod a-x @/bin/gnuplot", "cannot run gnuplot: ", 1 },
   };
   for (size_t i = 0; i < sizeof each / sizeof *each; i++) {
-    char text[900], message[300];
-    snprintf (text, sizeof text,
-              "rm -rf @/bin @/p; mkdir -p @/bin @/p; echo old >@/p/paths.svg; touch @/bin/gnuplot; chmod +x "
-              "@/bin/gnuplot\n%s\n"
-              "PATH=@/bin pinwheel run ezyroller --t-end 1 --plots @/p >@/log",
-              each[i].program);
-    int status = cli_run (text);
+    char message[300];
+    int status = cli_run (
+        check_text ("rm -rf @/bin @/p; mkdir -p @/bin @/p; echo old >@/p/paths.svg; touch @/bin/gnuplot; chmod +x "
+                    "@/bin/gnuplot\n%s\n"
+                    "PATH=@/bin pinwheel run ezyroller --t-end 1 --plots @/p >@/log",
+                    each[i].program));
     cli_expand (each[i].message, message, sizeof message);
     if (strstr (cli_err, message) == NULL) print_error ("%s: %s", each[i].program, cli_err);
     assert_non_null (strstr (cli_err, message));

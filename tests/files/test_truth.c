@@ -36,10 +36,8 @@ static const char truth_c[] =
     "          .run = { .t_end = 1, .step = 0.1 }, .build = build, .reference = truth);\n";
 
 static void truth_write_c (const char *off) {
-  char text[3000];
   const char *at = strstr (truth_c, "OFF");
-  snprintf (text, sizeof text, "%.*s%s%s", (int)(at - truth_c), truth_c, off, at + 3);
-  cli_write ("particles.c", text);
+  cli_write ("particles.c", check_text ("%.*s%s%s", (int)(at - truth_c), truth_c, off, at + 3));
 }
 
 static double truth_error (const char *when, const char *what) {
@@ -190,11 +188,9 @@ TEST (gallery) {
     { "peaucellier --set swing=1.7", 1e-12, "prescribed: round-off; the crank turns by more than pi" },
     { "peaucellier --set swing=2.4 --set a=0.74", 1e-12, "prescribed: round-off; so do bars of the rhombus" },
   };
-  char command[300];
   for (size_t i = 0; i < sizeof trial / sizeof *trial; i++) {
-    snprintf (command, sizeof command, "pinwheel check %s >@/check && pinwheel run %s -t 2 --json - 2>@/said",
-              trial[i].model, trial[i].model);
-    cli_good (command);
+    cli_good (check_text ("pinwheel check %s >@/check && pinwheel run %s -t 2 --json - 2>@/said", trial[i].model,
+                          trial[i].model));
     double length = truth_error ("largest", "length"), angle = truth_error ("largest", "angle");
     check_below (trial[i].model, fmax (length, angle), trial[i].bound, trial[i].reason);
     check_close ("samples", cli_number (cli_out, "truth", "samples", NULL), 100, 0, "all of them");

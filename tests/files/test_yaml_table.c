@@ -12,13 +12,10 @@
 /* Builds a model in the subfolder "model" whose torque is this table; the signal goes to *signal, its first points to
  * `point`. */
 static pw_error table_build (const char *table, pw_signal *signal, double point[2][3]) {
-  char text[400];
   pw_error error = { 0 };
-  snprintf (text, sizeof text,
-            "pinwheel: 1\nbodies: [{name: a, mass: 1, inertia: 1}]\n"
-            "elements: [{torque: T, body: [a, ground], value: {table: %s}}]\n",
-            table);
-  cli_write ("model/m.yaml", text);
+  cli_write ("model/m.yaml", check_text ("pinwheel: 1\nbodies: [{name: a, mass: 1, inertia: 1}]\n"
+                                         "elements: [{torque: T, body: [a, ground], value: {table: %s}}]\n",
+                                         table));
   pw_file *f = pw_file_open (cli_path ("model/m.yaml"), &error);
   pw_model *m = f ? pw_file_model (f, &error) : NULL;
   if (m && pw_model_build (m, &error) == PW_OK) {
@@ -120,15 +117,12 @@ TEST (long_cells) {
 
 /* The unit a signal has: of a drive, that of what it drives. */
 static void table_unit (const char *element, const char *header, double expected, const char *text) {
-  char yaml[500], csv[100];
   pw_error error = { 0 };
-  snprintf (csv, sizeof csv, "t,u [%s]\n0,0\n1,90\n", header);
-  cli_write ("model/data.csv", csv);
-  snprintf (yaml, sizeof yaml,
-            "pinwheel: 1\nbodies: [{name: a, mass: 1, inertia: 1}]\n"
-            "elements: [{%s: {table: {file: data.csv, interpolation: cubic, ends: rest}}}]\n",
-            element);
-  cli_write ("model/m.yaml", yaml);
+  cli_write ("model/data.csv", check_text ("t,u [%s]\n0,0\n1,90\n", header));
+  cli_write ("model/m.yaml",
+             check_text ("pinwheel: 1\nbodies: [{name: a, mass: 1, inertia: 1}]\n"
+                         "elements: [{%s: {table: {file: data.csv, interpolation: cubic, ends: rest}}}]\n",
+                         element));
   pw_file *f = pw_file_open (cli_path ("model/m.yaml"), &error);
   pw_model *m = f ? pw_file_model (f, &error) : NULL;
   assert_non_null (m);

@@ -25,15 +25,15 @@ static double adaptive_error (const char *method, pw_settings settings, pw_stati
 static void adaptive_order (const char *integrator, int order, const double step[3], double band, const char *reason) {
   static const char *const rest[] = { "none", "projection", "projection:metric=identity" };
   for (int k = 0; k < 3; k++) {
-    char method[80], what[160];
+    char method[80];
     double error[3];
     snprintf (method, sizeof method, "%s+%s:steps=fixed", integrator, rest[k]);
     for (int i = 0; i < 3; i++) error[i] = adaptive_error (method, (pw_settings){ .step = step[i] }, NULL);
     check_below ("round-off in the last error", 10 / step[2] * CHECK_EPS, error[2],
                  "one eps of each of 10 s / h steps");
     for (int i = 0; i < 2; i++) {
-      snprintf (what, sizeof what, "slope of %s from h = %g to %g", method, step[i], step[i + 1]);
-      check_close (what, log2 (error[i] / error[i + 1]), order, band, reason);
+      check_close (check_text ("slope of %s from h = %g to %g", method, step[i], step[i + 1]),
+                   log2 (error[i] / error[i + 1]), order, band, reason);
     }
   }
 }

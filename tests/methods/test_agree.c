@@ -100,10 +100,10 @@ TEST (integrators) {
       double bound = agree_methods[i].factor > 0 ? agree_methods[i].factor * rtol : agree_order_4 (1e-3);
       const char *reason = agree_methods[i].factor > 0 ? "1e3 rtol" : agree_reason;
       for (int j = 0; j < pw_system_coordinates (s); j++) {
-        char what[100], name[60];
-        snprintf (what, sizeof what, "%s, %s, %s", agree_names[scene], agree_methods[i].name,
-                  pw_system_state_name (s, j, name, sizeof name));
-        check_close (what, Q[j], q[j], bound, reason);
+        char name[60];
+        check_close (check_text ("%s, %s, %s", agree_names[scene], agree_methods[i].name,
+                                 pw_system_state_name (s, j, name, sizeof name)),
+                     Q[j], q[j], bound, reason);
       }
     }
     pw_system_free (s);
@@ -232,7 +232,6 @@ static void agree_verify (int scene, const agree_bound *bound) {
     pw_sample now = runs_to (r, 0.1 * k);
     pw_verification v;
     assert_int_equal (pw_verify (s, pw_run_scale (r), now.t, now.q, now.v, now.a, now.lambda, &v), PW_OK);
-    char what[120];
     const struct {
       const char *name;
       const pw_worst_residual *verdict;
@@ -242,9 +241,9 @@ static void agree_verify (int scene, const agree_bound *bound) {
                  { "J a", &v.acceleration, bound->acceleration },
                  { "M a", &v.force, bound->force } };
     for (int i = 0; i < 4; i++) {
-      snprintf (what, sizeof what, "%s %s, %s at %s, t = %g", agree_names[scene], bound->method, each[i].name,
-                each[i].verdict->name, now.t);
-      check_below (what, each[i].verdict->scaled, each[i].bound, bound->reason);
+      check_below (check_text ("%s %s, %s at %s, t = %g", agree_names[scene], bound->method, each[i].name,
+                               each[i].verdict->name, now.t),
+                   each[i].verdict->scaled, each[i].bound, bound->reason);
       assert_true (each[i].verdict->name[0] != 0);
     }
     check_close ("the run's own position residual", now.position, v.position.scaled, 8 * CHECK_EPS + 0.5 * now.position,

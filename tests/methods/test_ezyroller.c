@@ -16,13 +16,11 @@ static double ezy_torque (double t) {
 
 /* The four states of the table, and the position of the other body, which follows from them. */
 static void ezy_compare (const pw_sample *s, const double *line, double bound, const char *reason) {
-  char what[60];
   const double *x = line + 1;
   double steer[2] = { x[0] + 0.5 * cos (x[2]) + 0.125 * cos (x[3]), x[1] + 0.5 * sin (x[2]) + 0.125 * sin (x[3]) };
   const double reference[6] = { x[0], x[1], x[2], steer[0], steer[1], x[3] };
   for (int j = 0; j < 6; j++) {
-    snprintf (what, sizeof what, "coordinate %d at t = %g s", j, line[0]);
-    check_close (what, s->q[j], reference[j], bound, reason);
+    check_close (check_text ("coordinate %d at t = %g s", j, line[0]), s->q[j], reference[j], bound, reason);
   }
 }
 

@@ -31,12 +31,11 @@ TEST (tolerances) {
       ladder_error e[2];
       for (int k = 0; k < 2; k++) {
         double rtol = k ? 1e-10 : 1e-6;
-        char what[100];
         e[k] = multi_error (i, multi_methods[m], rtol);
-        snprintf (what, sizeof what, "%s, %s, rtol %g: positions", multi_scenes[i].model, multi_methods[m], rtol);
-        check_below (what, e[k].q, 3e3 * rtol, "3000 rtol: errors of some hundred steps, and their growth");
-        snprintf (what, sizeof what, "%s, %s, rtol %g: velocities", multi_scenes[i].model, multi_methods[m], rtol);
-        check_below (what, e[k].v, 3e3 * rtol, "3000 rtol");
+        check_below (check_text ("%s, %s, rtol %g: positions", multi_scenes[i].model, multi_methods[m], rtol), e[k].q,
+                     3e3 * rtol, "3000 rtol: errors of some hundred steps, and their growth");
+        check_below (check_text ("%s, %s, rtol %g: velocities", multi_scenes[i].model, multi_methods[m], rtol), e[k].v,
+                     3e3 * rtol, "3000 rtol");
       }
       check_below (multi_methods[m], e[1].q, e[0].q / 100, "four decades of tolerance give two of error at the least");
     }

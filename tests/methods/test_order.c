@@ -23,9 +23,8 @@ static void order_expect (const char *method, const double *step, double ratio, 
   double error[3];
   for (int i = 0; i < 3; i++) error[i] = order_error (method, step[i]);
   for (int i = 0; i < 2; i++) {
-    char what[100];
-    snprintf (what, sizeof what, "%s, error at h = %g over error at h = %g", method, step[i], step[i + 1]);
-    check_close (what, error[i] / error[i + 1], ratio, margin, reason);
+    check_close (check_text ("%s, error at h = %g over error at h = %g", method, step[i], step[i + 1]),
+                 error[i] / error[i + 1], ratio, margin, reason);
   }
 }
 

@@ -46,9 +46,8 @@ static double tableaus_row (const pw_tableau *b, int i, int k, double *size) {
 
 static void tableaus_check (const char *name, const char *what, int l, int k, double value, double reference,
                             double size) {
-  char text[100];
-  snprintf (text, sizeof text, "%s: %s, l = %d, k = %d", name, what, l, k);
-  check_close (text, value, reference, 4 * CHECK_EPS * (size + fabs (reference)), "4 eps of each term");
+  check_close (check_text ("%s: %s, l = %d, k = %d", name, what, l, k), value, reference,
+               4 * CHECK_EPS * (size + fabs (reference)), "4 eps of each term");
 }
 
 TEST (rows) {

@@ -115,13 +115,12 @@ static const struct {
 enum { LEDGER_SCENES = sizeof ledger_scene / sizeof *ledger_scene };
 
 static void ledger_compare (int scene, const char *method, const pw_sample *x, double bound, const char *reason) {
-  char what[100];
   double work, loss;
   ledger_scene[scene].reference (x->t, &work, &loss);
-  snprintf (what, sizeof what, "%s, %s, work at %g s", ledger_scene[scene].name, method, x->t);
-  check_close (what, x->work, work, bound, reason);
-  snprintf (what, sizeof what, "%s, %s, loss at %g s", ledger_scene[scene].name, method, x->t);
-  check_close (what, x->loss, loss, bound, reason);
+  check_close (check_text ("%s, %s, work at %g s", ledger_scene[scene].name, method, x->t), x->work, work, bound,
+               reason);
+  check_close (check_text ("%s, %s, loss at %g s", ledger_scene[scene].name, method, x->t), x->loss, loss, bound,
+               reason);
 }
 
 /* At 0.8 s the power of `turned` is as large as at 0.3 s. */

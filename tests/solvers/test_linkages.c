@@ -78,7 +78,7 @@ SCENE_WITH (linkage_build_massless, linkage_list, linkage) {
            mass = i < massive ? 1 + i : 0;
     int a = (int)(massive * fabs (saddle_number (&random))), b = (int)(massive * fabs (saddle_number (&random)));
     int what = i < massive ? -1 : (int)(3 * fabs (saddle_number (&random))), body = i < massive ? i : next++;
-    char name[12], wheel[12];
+    char name[12];
     for (int n = body; n <= body + (what == 2); n++) {
       snprintf (name, sizeof name, "b%d", n);
       pw_add_body (
@@ -86,8 +86,9 @@ SCENE_WITH (linkage_build_massless, linkage_list, linkage) {
           &(pw_body){ .name = name, .mass = mass, .inertia = 0.1 * mass, .start = { at[n][0], at[n][1], at[n][2] } });
     }
     if (what >= 0) linkage_pin (m, there, pins++, body, a, x, y);
-    snprintf (wheel, sizeof wheel, "w%d", body);
-    if (what == 0) pw_add_wheel (m, &(pw_wheel){ .name = wheel, .body = name, .at = { 0.3, 0.1 * y }, .heading = x });
+    if (what == 0)
+      pw_add_wheel (
+          m, &(pw_wheel){ .name = check_text ("w%d", body), .body = name, .at = { 0.3, 0.1 * y }, .heading = x });
     if (what == 1) linkage_pin (m, there, pins++, body, b, 1 - 0.7 * y, 1.3 * x * y);
     if (what == 2) {
       linkage_pin (m, there, pins++, body, next, x + y, x - y);

@@ -1,5 +1,6 @@
 /* Running tests, and comparisons of numbers, arrays and errors; see check.h. */
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "check.h"
@@ -26,6 +27,17 @@ static int check_teardown (void **state) {
 
 int check_run (void) {
   return _cmocka_run_group_tests ("tests", check_tests, check_count, check_setup, check_teardown);
+}
+
+const char *check_text (const char *format, ...) {
+  static char text[8][4000];
+  static int next;
+  va_list list;
+  next = (next + 1) % 8;
+  va_start (list, format);
+  vsnprintf (text[next], sizeof text[next], format, list);
+  va_end (list);
+  return text[next];
 }
 
 static double check_scale (void) {

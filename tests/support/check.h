@@ -32,6 +32,9 @@ extern const check_fixture fixture;
 void check_add (const char *name, CMUnitTestFunction test);
 int check_run (void);
 
+/* A text as by printf, until the eighth call after this one. */
+const char *check_text (const char *format, ...) __attribute__ ((format (printf, 1, 2)));
+
 /* |value - reference| <= bound */
 #define check_close(what, value, reference, bound, reason) \
   check_close_at (what, value, reference, bound, reason, __FILE__, __LINE__)

@@ -80,9 +80,7 @@ void cli_bad (const char *command, int status, const char *message) {
 
 void cli_bad_each (const char *command, const cli_wrong *each, size_t count) {
   for (size_t i = 0; i < count; i++) {
-    char text[400];
-    snprintf (text, sizeof text, "pinwheel %s %s", command, each[i].arguments);
-    cli_bad (text, 2, each[i].message);
+    cli_bad (check_text ("pinwheel %s %s", command, each[i].arguments), 2, each[i].message);
     assert_string_equal (cli_out, "");
   }
 }

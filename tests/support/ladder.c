@@ -68,9 +68,8 @@ ladder_error ladder_solve (const char *model, const char *method, const pw_setti
 
 static void ladder_check (const char *model, const char *method, const char *quantity, double coarse, double fine,
                           double h, int order, double band) {
-  char what[160];
-  snprintf (what, sizeof what, "%s, %s: order of %s at h = %g", model, method, quantity, h);
-  check_close (what, log2 (coarse / fine), order, band, "the order, and the next power of h");
+  check_close (check_text ("%s, %s: order of %s at h = %g", model, method, quantity, h), log2 (coarse / fine), order,
+               band, "the order, and the next power of h");
 }
 
 void ladder_expect (const char *model, const char *method, double h, double t, int order, double band,
