@@ -1,4 +1,4 @@
-/* `pinwheel sensitivity`: closed forms, outputs against differences of runs, files, bad input. */
+/* `pinwheel sensitivity`: closed forms, outputs against differences of runs, files, steps of differences, refusals. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -280,7 +280,7 @@ TEST (files) {
   assert_non_null (strstr (cli_file ("sens/sensitivity.gp"), "label[1] = 'l × ∂/∂l'\n"));
 }
 
-/* ---- Bad input ---- */
+/* ---- Steps and errors of differences ---- */
 
 /* A parameter that is small compared with what it is added to, in a force or a length, and one over whose usual step
  * the force is not linear: other steps are found, and the error contains what remains. */
@@ -414,6 +414,8 @@ TEST (light_body) {
     check_below (method[i], fabs (x), 1e-4, "the error of the run's velocities, over m");
   }
 }
+
+/* ---- The command ---- */
 
 /* Outputs that differ after 400 characters have different columns. */
 TEST (long_names) {
