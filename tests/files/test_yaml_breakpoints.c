@@ -111,8 +111,9 @@ TEST (breakpoints) {
     if (at[i].next > 0)
       check_close (at[i].text, next, expected[1], 8 * CHECK_EPS * next, "round-off of the comparison");
   }
-  double t = -1e-9 / (1 - 1e-9); /* the first interval, from t, ends at the kink */
-  check_close ("abs(t)", pw_expression_breakpoint (expression_of ("abs(t)"), t), 0, 1e-24, "exact");
+  double width = 0; /* of the first interval from -width, which ends at the kink, exactly */
+  while (width != 1e-9 * (1 + width)) width = 1e-9 * (1 + width);
+  check_close ("abs(t)", pw_expression_breakpoint (expression_of ("abs(t)"), -width), 0, 1e-24, "exact");
 }
 
 /* Numbers that ought to be equal differ by round-off again and again: no breakpoints, and none of the others is
