@@ -227,4 +227,13 @@ TEST (peaucellier) {
            "model peaucellier: a = 0.8: arms and rhombus do not reach the crank at the angle 0");
 }
 
+/* Quantities without a column in the reference have no error. */
+TEST (not_compared) {
+  cli_write ("speed.csv", "t,frame.vx\n1,0\n2,0\n");
+  cli_good ("pinwheel run ezyroller -t 2 --reference @/speed.csv --json -");
+  assert_true (truth_error ("end", "speed") > 0.1);
+  truth_shows ("\"end\": {\n      \"length\": null,\n      \"angle\": null,\n");
+  truth_shows ("\"largest\": {\n      \"length\": null,\n      \"angle\": null,\n");
+}
+
 const check_fixture fixture = { cli_setup, cli_teardown };
