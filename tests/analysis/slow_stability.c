@@ -7,10 +7,9 @@
 enum { NET = 130 };
 
 /* The QR algorithm converges; exceptional shifts after every tenth step would prevent that. */
-static void test_net (void **state) {
+TEST (net) {
   static char text[40000];
   size_t n = (size_t)snprintf (text, sizeof text, "pinwheel: 1\nbodies:\n");
-  (void)state;
   for (int i = 1; i <= NET; i++)
     n += (size_t)snprintf (text + n, sizeof text - n,
                            "  - {name: b%d, mass: 1, inertia: 1, start: {x: %d, y: 0.1*%d*%d}}\n", i, i, i, i);
@@ -28,7 +27,4 @@ static void test_net (void **state) {
   assert_non_null (strstr (cli_out, "  fastest eigenvalue "));
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_net) };
-  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
-}
+const check_fixture fixture = { cli_setup, cli_teardown };

@@ -9,8 +9,7 @@ static void stability_shows (const char *text) {
   if (strstr (cli_out, text) == NULL) fail_msg ("\"%s\" is not in\n%s", text, cli_out);
 }
 
-static void test_text (void **state) {
-  (void)state;
+TEST (text) {
   cli_good ("pinwheel check pendulum --set I=2 --set theta=1.5707963267948966");
   stability_shows ("  stability                          unstable, doubles in 0.38331 s\n");
   stability_shows ("\n1 finding\n  the motion is unstable: a perturbation doubles in 0.38331 s\n");
@@ -30,20 +29,16 @@ static void test_text (void **state) {
 }
 
 /* Initial conditions whose given angle cannot be kept, and others whose omitted values follow. */
-static void test_finding (void **state) {
+TEST (finding) {
   static const char *const body =
       "pinwheel: 1\nbodies:\n  - {name: rod, mass: 1, inertia: 1, start: {%s}, rate: {%s}}\n"
       "elements:\n  - {pin: P, body: [rod, ground], at: [[-1, 0], [0, 0]]}\n";
-  char text[400];
-  (void)state;
-  snprintf (text, sizeof text, body, "x: 1", "vy: 3, vx: 0.25, omega: 3");
-  cli_write ("rod.yaml", text);
+  cli_write ("rod.yaml", check_text (body, "x: 1", "vy: 3, vx: 0.25, omega: 3"));
   cli_good ("pinwheel check @/rod.yaml");
   stability_shows ("\n1 finding\n  the model specifies rod.vx = 0.25 m/s, but the constraints require 0 m/s\n");
   cli_good ("pinwheel check @/rod.yaml --json -");
   stability_shows ("\"findings\": [\"the model specifies rod.vx");
-  snprintf (text, sizeof text, body, "x: 1", "vy: 3, omega: 3");
-  cli_write ("rod.yaml", text);
+  cli_write ("rod.yaml", check_text (body, "x: 1", "vy: 3, omega: 3"));
   cli_good ("pinwheel check @/rod.yaml");
   stability_shows ("\nNo problems found\n");
   cli_good ("pinwheel check @/rod.yaml --start rod.vx=0.25");
@@ -52,17 +47,9 @@ static void test_finding (void **state) {
 
 /* Hundreds of defective zeros, which round-off spreads over a circle: the QR algorithm converges, and they are
  * shown as 0. */
-static void test_many_zeros (void **state) {
-  (void)state;
+TEST (many_zeros) {
   cli_good ("pinwheel check chain --set n=130");
   stability_shows ("  eigenvalues                        all 0: nothing vibrates, grows or decays\n");
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_text),
-    cmocka_unit_test (test_finding),
-    cmocka_unit_test (test_many_zeros),
-  };
-  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
-}
+const check_fixture fixture = { cli_setup, cli_teardown };

@@ -38,12 +38,11 @@ static int slope_of_p (void *context, const pw_branch_point *point, double *valu
 }
 
 /* The branch passes both folds, at p = +- 2 / sqrt (27), x = -+ 1 / sqrt (3). */
-static void test_folds (void **state) {
+TEST (folds) {
   double u[3] = { -2, 0.7, -5 }, next = 1;
   pw_error error = { 0 };
   pw_branch b;
   int folds = 0, points = 0;
-  (void)state;
   continuation_open (&b, &cubic_equations);
   check_ok (pw_branch_solve (&b, u, &error), &error);
   check_close ("x", u[0] * u[0] * u[0] - u[0], -5, 1e-12, "the tolerance");
@@ -84,13 +83,12 @@ static int pitchfork_sign (void *context, const pw_branch_point *point, double *
 }
 
 /* Steps of any length pass pitchforks on the same branch, and the pitchfork is located. */
-static void test_pitchforks (void **state) {
+TEST (pitchforks) {
   double where, F;
   const pw_branch_problem problem = {
     .unknowns = 1, .equations = 1, .tolerance = 1e-9, .rank_tolerance = 1e-7, .evaluate = pitchfork, .context = &where
   };
   pw_error error = { 0 };
-  (void)state;
   for (int k = 0; k < 300; k++) {
     double u[2] = { 0, 0 };
     int passed = 0;
@@ -131,12 +129,11 @@ static int gap_middle (void *context, const pw_branch_point *point, double *valu
 }
 
 /* Where Newton's method fails, events are interpolated from the nearest points. */
-static void test_interpolated (void **state) {
+TEST (interpolated) {
   const pw_branch_problem problem = { .unknowns = 1, .equations = 1, .tolerance = 1e-12, .evaluate = gap };
   double u[2] = { 0, 0 };
   pw_error error = { 0 };
   pw_branch b;
-  (void)state;
   check_ok (pw_branch_open (&b, &problem, &error), &error);
   b.max_change = b.step = 0.2, b.min_step = 1e-6, b.event_accuracy = 1e-9;
   check_ok (pw_branch_start (&b, u, 1, &error), &error);
@@ -155,10 +152,9 @@ static int puncture (void *context, const double *u, double *F, double *dF, pw_e
 }
 
 /* An event where the equations cannot be evaluated is located all the same, though the secant leads there at once. */
-static void test_punctured (void **state) {
+TEST (punctured) {
   const pw_branch_problem problem = { .unknowns = 1, .equations = 1, .tolerance = 1e-12, .evaluate = puncture };
   pw_error error = { 0 };
-  (void)state;
   for (int k = 0; k < 20; k++) {
     double u[2] = { sin (0.01 * k), 0.01 * k };
     pw_branch b;
@@ -173,11 +169,10 @@ static void test_punctured (void **state) {
 }
 
 /* With p decreasing from the same point x decreases, and steps grow without curvature. */
-static void test_direction (void **state) {
+TEST (direction) {
   double u[3] = { -2, 0, -6 };
   pw_error error = { 0 };
   pw_branch b;
-  (void)state;
   continuation_open (&b, &cubic_equations);
   check_ok (pw_branch_start (&b, u, -1, &error), &error);
   check_ok (pw_branch_step (&b, &error), &error);
@@ -186,23 +181,21 @@ static void test_direction (void **state) {
 }
 
 /* dF/dx vanishes at a fold: the branch cannot start there by its parameter. */
-static void test_start_at_fold (void **state) {
+TEST (start_at_fold) {
   double u[3] = { -1 / sqrt (3), 0, 2 / sqrt (27) };
   pw_error error = { 0 };
   pw_branch b;
-  (void)state;
   continuation_open (&b, &cubic_equations);
   assert_int_equal (pw_branch_start (&b, u, 1, &error), PW_RETRY);
   pw_branch_close (&b);
 }
 
 /* Where F cannot be evaluated, the branch ends with PW_RETRY, just before. */
-static void test_end (void **state) {
+TEST (end) {
   double u[3] = { 4.8, 0, 4.8 * 4.8 * 4.8 - 4.8 };
   pw_error error = { 0 };
   pw_branch b;
   int status = PW_OK;
-  (void)state;
   continuation_open (&b, &cubic_equations);
   b.max_change = 100;
   check_ok (pw_branch_start (&b, u, 1, &error), &error);
@@ -213,11 +206,10 @@ static void test_end (void **state) {
 }
 
 /* Where F cannot be evaluated at the beginning, there is no residual: not that of an earlier solution. */
-static void test_not_begun (void **state) {
+TEST (not_begun) {
   double u[3] = { 1, 0, 0 }, outside[3] = { 6, 0, 0 };
   pw_error error = { 0 };
   pw_branch b;
-  (void)state;
   continuation_open (&b, &cubic_equations);
   check_ok (pw_branch_solve (&b, u, &error), &error);
   assert_int_equal (pw_branch_solve (&b, outside, &error), PW_RETRY);
@@ -239,10 +231,9 @@ static int no_events (void *context, pw_error *error) {
 }
 
 /* From p = 0.5 through the fold up to p = 1, which no point exceeds though tangents predict too little. */
-static void test_range (void **state) {
+TEST (range) {
   const pw_branch_problem problem = { .unknowns = 1, .equations = 1, .tolerance = 1e-12, .evaluate = parabola };
   pw_error error = { 0 }, why;
-  (void)state;
   for (int k = 0; k < 100; k++) {
     double u[2] = { -1, 0.5 }, p = 0;
     int folds = 0;
@@ -278,14 +269,13 @@ static int wave_same (void *context, const double *u, const double *other) {
 
 /* A branch is closed after a whole turn, also if it begins beside a fold, from one point to the same; but not if p
  * increases from turn to turn. */
-static void test_turns (void **state) {
+TEST (turns) {
   static const double begin[] = { 0.3, 2, PW_PI / 2 - 1e-3, PW_PI / 2 + 1e-2, -PW_PI / 2 + 2e-3 };
   double climb;
   const pw_branch_problem problem = {
     .unknowns = 1, .equations = 1, .tolerance = 1e-12, .evaluate = wave, .same = wave_same, .context = &climb
   };
   pw_error error = { 0 }, why;
-  (void)state;
   for (size_t k = 0; k < 2 * sizeof begin / sizeof *begin; k++) {
     double x = begin[k / 2], u[2];
     int folds = 0;
@@ -318,12 +308,11 @@ static int without_solution (void *context, const double *u, double *F, double *
 }
 
 /* No solution: the residual where it stopped is that of the nearest miss. */
-static void test_without_solution (void **state) {
+TEST (without_solution) {
   const pw_branch_problem problem = { .unknowns = 1, .equations = 1, .tolerance = 1e-12, .evaluate = without_solution };
   double u[2] = { 3, 0 };
   pw_error error = { 0 };
   pw_branch b;
-  (void)state;
   continuation_open (&b, &problem);
   assert_int_equal (pw_branch_solve (&b, u, &error), PW_RETRY);
   assert_true (b.residual >= 1 && b.residual < 2);
@@ -339,12 +328,11 @@ static int steep (void *context, const double *u, double *F, double *dF, pw_erro
   return PW_OK;
 }
 
-static void test_damping (void **state) {
+TEST (damping) {
   const pw_branch_problem problem = { .unknowns = 1, .equations = 1, .tolerance = 1e-12, .evaluate = steep };
   double u[2] = { 5, 0.5 };
   pw_error error = { 0 };
   pw_branch b;
-  (void)state;
   continuation_open (&b, &problem);
   check_ok (pw_branch_solve (&b, u, &error), &error);
   check_close ("x", u[0], 0.5, 1e-12, "the tolerance; slope 1");
@@ -362,10 +350,9 @@ static int cusp (void *context, const double *u, double *F, double *dF, pw_error
 
 /* A branch ends at a cusp, where solutions within the tolerance are noise of 1e-3 in x: none of it is taken for a
  * fold. */
-static void test_cusp (void **state) {
+TEST (cusp) {
   const pw_branch_problem problem = { .unknowns = 1, .equations = 1, .tolerance = 1e-9, .evaluate = cusp };
   pw_error error = { 0 }, why;
-  (void)state;
   for (int k = 0; k < 100; k++) {
     double u[2] = { cbrt (0.25), 0 };
     pw_branch b;
@@ -380,15 +367,4 @@ static void test_cusp (void **state) {
     check_close ("x", b.reached.u[0], 0, 1e-3, "the third root of the tolerance");
     pw_branch_close (&b);
   }
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_folds),         cmocka_unit_test (test_pitchforks),
-                                      cmocka_unit_test (test_interpolated),  cmocka_unit_test (test_direction),
-                                      cmocka_unit_test (test_start_at_fold), cmocka_unit_test (test_end),
-                                      cmocka_unit_test (test_range),         cmocka_unit_test (test_without_solution),
-                                      cmocka_unit_test (test_damping),       cmocka_unit_test (test_punctured),
-                                      cmocka_unit_test (test_turns),         cmocka_unit_test (test_cusp),
-                                      cmocka_unit_test (test_not_begun) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

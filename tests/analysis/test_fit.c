@@ -51,8 +51,8 @@ static void fit_write (double noise) {
   cli_write ("data.csv", text);
 }
 
-static int fit_setup (void **state) {
-  if (cli_setup (state) != 0) return 1;
+static int fit_setup (void) {
+  if (cli_setup () != 0) return 1;
   cli_write ("wheel.yaml", model);
   fit_write (0);
   return 0;
@@ -72,16 +72,13 @@ static double fit_value (const char *json, const char *name, const char *key) {
 
 /* ---- Estimates ---- */
 
-static void test_exact (void **state) {
-  (void)state;
+TEST (exact) {
   static const char *const way[] = { "--free k --free c --free w.phi", "--free k=1:20 --free c=0:2 --free w.phi=0.1:1",
                                      "--free k --free c --free w.phi --method erk8 --rtol 1e-10 --sigma w.phi=0.01",
                                      "--free k --free c --free w.phi --method erk5 --rtol 1e-6" };
   fit_write (0);
   for (int i = 0; i < 4; i++) {
-    char command[400];
-    snprintf (command, sizeof command, FIT "%s", way[i]);
-    cli_shell (command);
+    cli_shell (check_text (FIT "%s", way[i]));
     const char *json = cli_file ("fit.json");
     check_close ("k", fit_value (json, "k", "value"), fit_k, 1e-5, "(w h)^4, 4e-6");
     check_close ("c", fit_value (json, "c", "value"), fit_c, 1e-5, "the same");
@@ -90,8 +87,7 @@ static void test_exact (void **state) {
 }
 
 /* A search that begins at the answer, with residuals of round-off, has found it. */
-static void test_at_the_answer (void **state) {
-  (void)state;
+TEST (at_the_answer) {
   cli_shell ("pinwheel run car -o @/drive.csv --every 0.5");
   cli_shell ("pinwheel fit car --data @/drive.csv --columns car.x,car.y --sigma car.x=0.02 --sigma car.y=0.02 "
              "--free a --free car.vx --json @/fit.json");
@@ -99,21 +95,16 @@ static void test_at_the_answer (void **state) {
 }
 
 /* States and contact points have derivatives by the variational equations, methods with held inputs have not. */
-static void test_derivatives (void **state) {
+TEST (derivatives) {
   static const char *const columns[] = { "frame.y", "A.x", "frame.y" }, *const method[] = { "rk4", "rk4",
                                                                                             "rk4:inputs=held" };
-  (void)state;
   for (int i = 0; i < 3; i++) {
-    char command[400];
-    snprintf (command, sizeof command,
-              "pinwheel run ezyroller --set omega=3 --t-end 4 --every 0.1 --step 0.01 --method %s -o @/e.csv",
-              method[i]);
-    cli_shell (command);
-    snprintf (command, sizeof command,
-              "pinwheel fit ezyroller --data @/e.csv --columns %s --free omega --free M0 --step 0.01 --method %s "
-              "--json @/e.json",
-              columns[i], method[i]);
-    cli_shell (command);
+    cli_shell (check_text (
+        "pinwheel run ezyroller --set omega=3 --t-end 4 --every 0.1 --step 0.01 --method %s -o @/e.csv", method[i]));
+    cli_shell (
+        check_text ("pinwheel fit ezyroller --data @/e.csv --columns %s --free omega --free M0 --step 0.01 --method %s "
+                    "--json @/e.json",
+                    columns[i], method[i]));
     const char *json = cli_file ("e.json");
     assert_true (cli_says (json, "derivatives", i == 2 ? "differences" : "variational"));
     check_close ("omega", fit_value (json, "omega", "value"), 3, 1e-7, "the data are exact; the last step is 1e-10");
@@ -150,9 +141,8 @@ static const char *fit_again (double factor) {
   return cli_file ("again.json");
 }
 
-static void test_errors (void **state) {
+TEST (errors) {
   double error[2];
-  (void)state;
   fit_errors (1, error);
   fit_write (1);
   cli_shell (FIT "--free k --free c --sigma w.phi=error --confidence 0.9");
@@ -171,8 +161,7 @@ static void test_errors (void **state) {
 
 /* The true value lies in the 95 % interval in about 95 of 100 draws: with this probability, 88 or fewer have the
  * binomial probability 0.004, all 100 have 0.006. */
-static void test_coverage (void **state) {
-  (void)state;
+TEST (coverage) {
   int covered[2] = { 0 };
   for (int draw = 0; draw < FIT_DRAWS; draw++) {
     fit_write (1);
@@ -186,8 +175,7 @@ static void test_coverage (void **state) {
 }
 
 /* Without standard deviations, they follow from the residuals. */
-static void test_unweighted (void **state) {
-  (void)state;
+TEST (unweighted) {
   fit_write (1);
   cli_shell (FIT "--free k --free c -o @/fit.csv");
   const char *json = cli_file ("fit.json");
@@ -204,8 +192,7 @@ static void test_unweighted (void **state) {
 }
 
 /* Only s k has an effect, and n has none. */
-static void test_undetermined (void **state) {
-  (void)state;
+TEST (undetermined) {
   fit_write (1);
   cli_shell (FIT "--free k --free s --free c --free w.x");
   const char *json = cli_file ("fit.json");
@@ -226,14 +213,12 @@ static void test_undetermined (void **state) {
 
 /* Runs fail with k < 4.95: steps into that region are shortened.  With k < 5.3 they do so at the minimum, too: the fit
  * ends at the edge, and says that it has not converged. */
-static void test_failing (void **state) {
-  char text[1000];
-  (void)state;
+TEST (failing) {
   fit_write (0);
   for (int i = 0; i < 2; i++) {
     const char *torque = strstr (model, "-s*k*w.phi");
-    snprintf (text, sizeof text, "%.*s0*sqrt(k - %s) %s", (int)(torque - model), model, i ? "5.3" : "4.95", torque);
-    cli_write ("edge.yaml", text);
+    cli_write ("edge.yaml",
+               check_text ("%.*s0*sqrt(k - %s) %s", (int)(torque - model), model, i ? "5.3" : "4.95", torque));
     int status =
         cli_run ("pinwheel fit @/edge.yaml --data @/data.csv --columns w.phi --json @/edge.json --free k --set k=12 "
                  "--set c=0.4");
@@ -245,23 +230,19 @@ static void test_failing (void **state) {
 
 /* Above k = 10 about half of the runs fail, so that for some starts there the differences on both sides of an unknown
  * do: this ends these searches only. */
-static void test_without_derivatives (void **state) {
-  char text[1000];
+TEST (without_derivatives) {
   const char *torque = strstr (model, "-s*k*w.phi");
-  (void)state;
   fit_write (0);
-  snprintf (text, sizeof text, "%.*s0*sqrt(exp(10 - k) + sin(1e7*k)) %s", (int)(torque - model), model, torque);
-  cli_write ("half.yaml", text);
+  cli_write ("half.yaml", check_text ("%.*s0*sqrt(exp(10 - k) + sin(1e7*k)) %s", (int)(torque - model), model, torque));
   cli_shell ("pinwheel fit @/half.yaml --data @/data.csv --columns w.phi --free k=1:100 --set k=6 --set c=0.4 "
              "--starts 12 --method rk4:inputs=held --json @/half.json");
   check_close ("k", fit_value (cli_file ("half.json"), "k", "value"), fit_k, 0.1, "inputs held over 0.02 s");
 }
 
 /* At the estimate, a bound, the run on the inner side of c fails: there is no difference. */
-static void test_bound_without_derivative (void **state) {
+TEST (bound_without_derivative) {
   char text[1000];
   const char *torque = strstr (model, "-s*k*w.phi");
-  (void)state;
   fit_write (0);
   snprintf (text, sizeof text, "%.*s0*sqrt((c - 0.349997)*(c - 0.3499985)) %s", (int)(torque - model), model, torque);
   cli_write ("gap.yaml", text);
@@ -271,15 +252,13 @@ static void test_bound_without_derivative (void **state) {
 }
 
 /* A sum of squares that overflows. */
-static void test_overflow (void **state) {
-  (void)state;
+TEST (overflow) {
   fit_write (0);
   assert_int_equal (cli_run (FIT "--free k --sigma w.phi=1e-200"), 4);
   assert_non_null (strstr (cli_err, "the sum of the squares of the residuals is not finite"));
 }
 
-static void test_bound (void **state) {
-  (void)state;
+TEST (bound) {
   fit_write (0);
   cli_shell (FIT "--free k --free c=0:0.35");
   assert_non_null (strstr (cli_out, "at its upper bound"));
@@ -289,8 +268,7 @@ static void test_bound (void **state) {
 
 /* ---- Wrong input ---- */
 
-static void test_bad (void **state) {
-  (void)state;
+TEST (bad) {
   static const cli_wrong bad[] = {
     { "@/wheel.yaml --columns w.phi --free k", "no data: add --data FILE.csv" },
     { "@/wheel.yaml --data @/data.csv --free k",
@@ -337,8 +315,7 @@ static void test_bad (void **state) {
 
 /* A frequency has many minima: from k = 60 the search ends at another one than k = 5, of several searches some end
  * there. */
-static void test_starts (void **state) {
-  (void)state;
+TEST (starts) {
   fit_write (0);
   cli_shell (FIT "--free k=1:100 --set k=60 --set c=0.4");
   assert_true (fabs (fit_value (cli_file ("fit.json"), "k", "value") - fit_k) > 1);
@@ -352,8 +329,7 @@ static void test_starts (void **state) {
 }
 
 /* Given initial values that the fitted run does not have. */
-static void test_changed_values (void **state) {
-  (void)state;
+TEST (changed_values) {
   cli_shell ("pinwheel run ezyroller --t-end 1 --every 0.1 -o @/e.csv");
   assert_int_equal (cli_run ("pinwheel fit ezyroller --data @/e.csv --columns frame.y --free M0 --start frame.vy=0 "
                              "--start frame.omega=7"),
@@ -363,8 +339,7 @@ static void test_changed_values (void **state) {
 }
 
 /* The engine is chosen for runs to the last datum, not to the final time of the model. */
-static void test_engine (void **state) {
-  (void)state;
+TEST (engine) {
   cli_shell ("pinwheel run pendulum --t-end 30 --every 15 -o @/long.csv");
   cli_shell ("export CC=/nonexistent XDG_CACHE_HOME=@/none\n"
              "pinwheel fit pendulum --data @/long.csv --columns bob.phi --free l=0.9:1.2 2>@/engine.txt");
@@ -372,16 +347,15 @@ static void test_engine (void **state) {
 }
 
 /* After Ctrl-C the values reached are written, without their errors. */
-static void test_interrupt (void **state) {
-  (void)state;
-  char command[1000];
+TEST (interrupt) {
   const char *program = getenv ("PINWHEEL");
   fit_write (0);
-  snprintf (command, sizeof command,
-            "timeout --preserve-status -s INT 1 '%s' fit @/wheel.yaml --data @/data.csv --columns w.phi --free k=1:100 "
-            "--set k=60 --starts 100000 --json @/stop.json -o @/stop.csv",
-            program ? program : "build/pinwheel");
-  assert_int_equal (cli_run (command), 130);
+  assert_int_equal (
+      cli_run (check_text (
+          "timeout --preserve-status -s INT 1 '%s' fit @/wheel.yaml --data @/data.csv --columns w.phi --free k=1:100 "
+          "--set k=60 --starts 100000 --json @/stop.json -o @/stop.csv",
+          program ? program : "build/pinwheel")),
+      130);
   assert_non_null (strstr (cli_err, "interrupted; these are the values so far, without their errors"));
   assert_true (cli_says (cli_file ("stop.json"), "status", "interrupted"));
   assert_non_null (strstr (cli_file ("stop.json"), "\"standard_error\": null"));
@@ -389,25 +363,4 @@ static void test_interrupt (void **state) {
   assert_int_equal (strncmp (cli_file ("stop.csv"), "t [s],w.phi [rad],w.phi.model [rad]", 35), 0);
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_exact),
-    cmocka_unit_test (test_at_the_answer),
-    cmocka_unit_test (test_derivatives),
-    cmocka_unit_test (test_errors),
-    cmocka_unit_test (test_coverage),
-    cmocka_unit_test (test_unweighted),
-    cmocka_unit_test (test_undetermined),
-    cmocka_unit_test (test_failing),
-    cmocka_unit_test (test_bound),
-    cmocka_unit_test (test_bad),
-    cmocka_unit_test (test_starts),
-    cmocka_unit_test (test_interrupt),
-    cmocka_unit_test (test_changed_values),
-    cmocka_unit_test (test_engine),
-    cmocka_unit_test (test_without_derivatives),
-    cmocka_unit_test (test_bound_without_derivative),
-    cmocka_unit_test (test_overflow),
-  };
-  return cmocka_run_group_tests (tests, fit_setup, cli_teardown);
-}
+const check_fixture fixture = { fit_setup, cli_teardown };

@@ -130,7 +130,7 @@ static growth growth_model (const growth_case *c, pw_system *s) {
 }
 
 /* Drives are at rest. */
-static void test_gallery (void **state) {
+TEST (gallery) {
   static const growth_case scene[] = {
     { "car-tyres", NULL, 0, 2, { NULL }, { 0 } },
     { "car-two-trailers", NULL, 0, 2, { "k" }, { 0 } },
@@ -149,16 +149,10 @@ static void test_gallery (void **state) {
   };
   pw_error error = { 0 };
   pw_file *wire = pw_file_open ("elliptic-wire", &error); /* its own element type stays in memory */
-  (void)state;
   for (const growth_case *c = scene; c < scene + sizeof scene / sizeof *scene; c++) {
     growth g = growth_model (c, growth_open (c));
     assert_true (g.modes >= c->modes);
     check_below (c->model, g.worst, 1e-6, "runs to 1e-12, divided by displacements of 1e-5");
   }
   pw_file_close (wire);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_gallery) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

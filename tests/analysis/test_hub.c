@@ -13,6 +13,11 @@ typedef struct {
   double place; /* number of arms before the hub */
 } hub_parameters;
 
+static const pw_parameter hub_list[] = {
+  { PW_AT (hub_parameters, place), .domain = PW_NONNEGATIVE, .about = "arms before the hub" },
+  { .name = NULL },
+};
+
 static void hub_body (pw_model *m) {
   pw_add_body (m, &(pw_body){ .name = "hub", .mass = 3, .inertia = 0.7, .rate = { 0.2, 0.1, 0.5 } });
 }
@@ -41,8 +46,7 @@ static void hub_seat (pw_model *m, const char *arm, double x, double y, double a
 }
 
 /* Seats that swing freely about a hub that turns and drifts. */
-static void hub_carousel (pw_model *m, const void *parameters) {
-  const hub_parameters *p = parameters;
+SCENE_WITH (hub_carousel, hub_list, hub_parameters) {
   hub_build (m, p, hub_seat);
   pw_add_force (m, &(pw_force){ .name = "push", .body = "hub", .at = { 0.1, 0 }, .fx = { .constant = 2 } });
 }
@@ -58,15 +62,14 @@ static void hub_leg (pw_model *m, const char *arm, double x, double y, double an
 }
 
 /* Parallel legs: each leg beyond two adds a redundant row. */
-static void hub_table (pw_model *m, const void *parameters) {
-  const hub_parameters *p = parameters;
+SCENE_WITH (hub_table, hub_list, hub_parameters) {
   hub_build (m, p, hub_leg);
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 } });
 }
 
 /* The same at an angle of 0.1 place: rows are redundant up to round-off. */
-static void hub_leaning (pw_model *m, const void *parameters) {
-  const double angle = 0.1 * ((const hub_parameters *)parameters)->place, c = cos (angle), s = sin (angle);
+SCENE_WITH (hub_leaning, hub_list, hub_parameters) {
+  const double angle = 0.1 * p->place, c = cos (angle), s = sin (angle);
   for (int i = 0; i < HUB_ARMS; i++) {
     char leg[20], foot[20], knee[20];
     double x = cos (i);
@@ -90,8 +93,7 @@ static void hub_caster (pw_model *m, const char *arm, double x, double y, double
   pw_add_wheel (m, &(pw_wheel){ .name = wheel, .body = arm, .at = { -0.2, 0 } });
 }
 
-static void hub_platform (pw_model *m, const void *parameters) {
-  const hub_parameters *p = parameters;
+SCENE_WITH (hub_platform, hub_list, hub_parameters) {
   hub_build (m, p, hub_caster);
   pw_add_force (m, &(pw_force){ .name = "push", .body = "hub", .at = { 0.1, 0.4 }, .fx = { .constant = 2 } });
 }
@@ -104,10 +106,9 @@ static void hub_join (double at[2][2], const double *one, const double *two, dou
 
 /* A frame whose parts are joined to it and to each other.  For a prescribed frame, which is what their elimination
  * before the frame amounts to, several of their rows are dependent. */
-static void hub_frame (pw_model *m, const void *parameters) {
+SCENE_WITH (hub_frame, hub_list, hub_parameters) {
   const double hub[] = { 1.33, 0.32 }, rail[] = { 1.07, 1.8 }, bar[] = { 1.99, 1.23 }, tail[] = { 0.87, -0.78 };
   const double side[] = { 0.57, 1.86 }, world[] = { 0, 0 };
-  (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "side", .mass = 0.7, .inertia = 0.21, .start = { side[0], side[1] } });
   pw_add_body (m, &(pw_body){ .name = "hub", .mass = 2, .inertia = 0.44, .start = { hub[0], hub[1] } });
   pw_add_body (m, &(pw_body){ .name = "rail", .mass = 2.2, .inertia = 0.5, .start = { rail[0], rail[1] } });
@@ -142,17 +143,6 @@ static void hub_frame (pw_model *m, const void *parameters) {
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 1.6, -4.1 } });
 }
 
-static const pw_parameter hub_list[] = {
-  { PW_AT (hub_parameters, place), .domain = PW_NONNEGATIVE, .about = "arms before the hub" },
-  { .name = NULL },
-};
-
-#define HUB_TABLE(f)                                                         \
-  {                                                                          \
-    .abi = PW_ABI, .size = sizeof (pw_plugin_table), .parameters = hub_list, \
-    .parameters_size = sizeof (hub_parameters), .build = f                   \
-  }
-
 /* ---- Tests ---- */
 
 /* Verifies a short run with the hub at index `place`; returns the hub's final state. */
@@ -177,43 +167,25 @@ static void hub_everywhere (const pw_plugin_table *table) {
   assert_true (hypot (first[3], first[4]) > 1e-3); /* it moves */
 }
 
-static void test_carousel (void **state) {
-  static const pw_plugin_table table = HUB_TABLE (hub_carousel);
-  (void)state;
-  hub_everywhere (&table);
+TEST (carousel) {
+  hub_everywhere (&hub_carousel_table);
 }
 
-static void test_table (void **state) {
-  static const pw_plugin_table table = HUB_TABLE (hub_table);
-  (void)state;
-  hub_everywhere (&table);
+TEST (table) {
+  hub_everywhere (&hub_table_table);
 }
 
 /* Redundant rows are found at every angle, whatever the round-off. */
-static void test_leaning (void **state) {
-  static const pw_plugin_table table = HUB_TABLE (hub_leaning);
+TEST (leaning) {
   double hub[6];
-  (void)state;
-  for (int place = 1; place <= 12; place++) hub_run (&table, place, hub);
+  for (int place = 1; place <= 12; place++) hub_run (&hub_leaning_table, place, hub);
 }
 
-static void test_platform (void **state) {
-  static const pw_plugin_table table = HUB_TABLE (hub_platform);
-  (void)state;
-  hub_everywhere (&table);
+TEST (platform) {
+  hub_everywhere (&hub_platform_table);
 }
 
-static void test_frame (void **state) {
-  static const pw_plugin_table table = HUB_TABLE (hub_frame);
+TEST (frame) {
   double hub[6];
-  (void)state;
-  hub_run (&table, 0, hub);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_carousel), cmocka_unit_test (test_table), cmocka_unit_test (test_leaning),
-    cmocka_unit_test (test_platform), cmocka_unit_test (test_frame),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
+  hub_run (&hub_frame_table, 0, hub);
 }

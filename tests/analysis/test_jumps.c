@@ -19,23 +19,19 @@ static int jumps_json (const char *key, double *value) {
 
 /* Without force up to x = w, then with -F: with the time s = t - w/v after that, x = w + v s - F s^2 / 2, the work
  * -F (v s - F s^2 / 2) and the mean of the work (1/t) times the integral of that, by v, F and w. */
-static void test_closed_form (void **state) {
+TEST (closed_form) {
   static const char *const methods[] = { "rk4 --step 1e-4",   "erk5 --rtol 1e-9",  "erk8 --rtol 1e-9",
                                          "radau --rtol 1e-9", "adams --rtol 1e-9", "bdf --rtol 1e-9" };
   const double F = 0.3, s = 1,
                expected[] = { 2 - F, -0.5, F, -F * (2 - F), -(1 - F), F * (1 - F), -0.2025, -0.2, 0.1275 };
   double x[JUMPS_MOST];
-  char command[400];
-  (void)state;
   cli_write ("jump.yaml", "pinwheel: 1\nparameters: [{name: F, value: 0.3}, {name: w, value: 1}]\n"
                           "bodies:\n  - {name: a, mass: 1, inertia: 1, rate: {vx: 1}}\n"
                           "elements:\n  - {force: f, body: a, fx: 'a.x > w ? -F : 0'}\n");
   for (size_t i = 0; i < sizeof methods / sizeof *methods; i++) {
-    snprintf (command, sizeof command,
-              "pinwheel sensitivity @/jump.yaml --of a.x --of f.work --of mean:f.work --by a.vx --by F "
-              "--by w -t 2 -o @/sens -m %s",
-              methods[i]);
-    cli_shell (command);
+    cli_shell (check_text ("pinwheel sensitivity @/jump.yaml --of a.x --of f.work --of mean:f.work --by a.vx --by F "
+                           "--by w -t 2 -o @/sens -m %s",
+                           methods[i]));
     assert_string_equal (cli_err,
                          "pinwheel: force f: fx: \"a.x > w\" may jump as states change; steps do not end there, "
                          "which costs accuracy\n");
@@ -45,8 +41,7 @@ static void test_closed_form (void **state) {
 }
 
 /* The smallest velocity, at the jump of a force from -1 to 1: it has no derivative by the state there. */
-static void test_extremum (void **state) {
-  (void)state;
+TEST (extremum) {
   cli_write ("least.yaml", "pinwheel: 1\nbodies:\n  - {name: a, mass: 1, inertia: 1, rate: {vx: 2}}\n"
                            "elements:\n  - {force: f, body: a, fx: 'a.x > 1 ? 1 : -1'}\n");
   cli_shell ("pinwheel sensitivity @/least.yaml --of min:a.vx --of a.vx --by a.vx -t 2 -o @/sens");
@@ -56,21 +51,18 @@ static void test_extremum (void **state) {
 
 /* A reaction that is largest just after a breakpoint that moves, and a velocity with a kink there, have no derivative,
  * by methods of every family, some of which leave residuals in the velocities; another extremum has. */
-static void test_breakpoint (void **state) {
+TEST (breakpoint) {
   static const char *const methods[] = { "rk4", "erk8", "adams", "bdf", "ida", "radau", "galpha" };
   double x[JUMPS_MOST];
-  char command[300];
-  (void)state;
   cli_write ("rod.yaml", "pinwheel: 1\nrun: {t_end: 2}\nparameters: [{name: s, value: 0.5, unit: s}]\n"
                          "bodies:\n  - {name: rod, mass: 1, inertia: 0.1, start: {x: 1}}\n"
                          "elements:\n  - {pin: A, body: [ground, rod], at: [[0, 0], [-1, 0]]}\n"
                          "  - {force: F, body: rod, fx: 't > s ? 300*exp (-20*(t - s)) : 0'}\n"
                          "  - {gravity: g, acceleration: [0, -9.81]}\n");
   for (size_t i = 0; i < sizeof methods / sizeof *methods; i++) {
-    snprintf (command, sizeof command,
-              "pinwheel sensitivity @/rod.yaml --of max:A.Fx --of min:rod.omega --of max:A.Fy --by s -o @/sens -m %s",
-              methods[i]);
-    cli_shell (command);
+    cli_shell (check_text (
+        "pinwheel sensitivity @/rod.yaml --of max:A.Fx --of min:rod.omega --of max:A.Fy --by s -o @/sens -m %s",
+        methods[i]));
     assert_int_equal (jumps_json ("\"derivative\": n", x), 2);
     assert_int_equal (jumps_json ("\"derivative\": ", x), 3);
     check_close (methods[i], x[2], 156.387, 1, "differences of runs, 6 digits; steps of 1 ms with order 2");
@@ -83,14 +75,11 @@ static void jumps_compare (const char *file, const char *outputs, const char *by
       "pinwheel sensitivity @/%s %s --by %s --set %s=%.17g -o @/sens -m erk8 --rtol 1e-11 --atol "
       "1e-13";
   double derivative[JUMPS_MOST], x[4][JUMPS_MOST];
-  char text[600];
-  snprintf (text, sizeof text, command, file, outputs, by, by, value);
-  cli_shell (text);
+  cli_shell (check_text (command, file, outputs, by, by, value));
   int count = jumps_json ("\"derivative\": ", derivative);
   assert_true (count > 0);
   for (int k = 0; k < 4; k++) {
-    snprintf (text, sizeof text, command, file, outputs, by, by, value + (k < 2 ? k - 2 : k - 1) * step);
-    cli_shell (text);
+    cli_shell (check_text (command, file, outputs, by, by, value + (k < 2 ? k - 2 : k - 1) * step));
     assert_int_equal (jumps_json ("\"value\": ", x[k]), 2 * count);
   }
   for (int i = 0; i < count; i++) {
@@ -102,9 +91,8 @@ static void jumps_compare (const char *file, const char *outputs, const char *by
 
 /* A vehicle whose steering torque switches; a block with friction by sign (vx), at rest at the start; a bouncing ball,
  * of which only the derivative of the force jumps. */
-static void test_differences (void **state) {
+TEST (differences) {
   static const char outputs[] = "--of b.y --of t.work --of mean:p.Fx --of rms:a.vx --of max:a.vx --of kinetic";
-  (void)state;
   cli_write ("switch.yaml",
              "pinwheel: 1\nrun: {t_end: 0.6}\nparameters: [{name: amp, value: 5}, {name: h, value: 0.2}]\nbodies:\n"
              "  - {name: a, mass: 1, inertia: 1, start: {x: 0}, rate: {vx: 1}}\n"
@@ -126,13 +114,11 @@ static void test_differences (void **state) {
 }
 
 /* Friction that reverses within 1 mm/s: each method resolves it, or the error shows that it does not. */
-static void test_narrow_friction (void **state) {
+TEST (narrow_friction) {
   static const char *const methods[] = { "rk4",      "erk5", "erk8",  "erk8 --rtol 1e-4 --atol 1e-4",
                                          "leapfrog", "bdf",  "adams", "bdf --rtol 1e-4 --atol 1e-4",
                                          "galpha",   "ida",  "radau", "radau --rtol 1e-4 --atol 1e-4" };
   double expected, x, error;
-  char command[300];
-  (void)state;
   cli_write ("friction.yaml",
              "pinwheel: 1\nrun: {t_end: 20}\nparameters: [{name: k, value: 100}]\n"
              "bodies:\n  - {name: a, mass: 1, inertia: 1, start: {x: 1}}\nelements:\n"
@@ -143,9 +129,7 @@ static void test_narrow_friction (void **state) {
   cli_shell ("pinwheel sensitivity @/friction.yaml --of a.x --by k -o @/sens -m erk8 --rtol 1e-11 --atol 1e-13");
   assert_int_equal (jumps_json ("\"derivative\": ", &expected), 1);
   for (size_t i = 0; i < sizeof methods / sizeof *methods; i++) {
-    snprintf (command, sizeof command, "pinwheel sensitivity @/friction.yaml --of a.x --by k -o @/sens -m %s",
-              methods[i]);
-    cli_shell (command);
+    cli_shell (check_text ("pinwheel sensitivity @/friction.yaml --of a.x --by k -o @/sens -m %s", methods[i]));
     assert_int_equal (jumps_json ("\"derivative\": ", &x), 1);
     assert_int_equal (jumps_json ("\"error\": ", &error), 1);
     check_below (methods[i], fabs (x - expected), 10 * error + 0.01 * expected,
@@ -154,17 +138,14 @@ static void test_narrow_friction (void **state) {
 }
 
 static void jumps_bad (const char *command, const char *text) {
-  char all[400];
-  snprintf (all, sizeof all,
-            "pinwheel: force f: fx: \"sign(a.vx)\" may jump as states change; steps do not end there, which "
-            "costs accuracy\npinwheel: %s",
-            text);
-  cli_bad (command, 4, all + strlen ("pinwheel: "));
+  cli_bad (command, 4,
+           check_text ("force f: fx: \"sign(a.vx)\" may jump as states change; steps do not end there, which "
+                       "costs accuracy\npinwheel: %s",
+                       text));
 }
 
 /* A motion that ends sliding along a jump, or starts at one. */
-static void test_refusals (void **state) {
-  (void)state;
+TEST (refusals) {
   cli_write ("stop.yaml", "pinwheel: 1\nparameters: [{name: F, value: 0}, {name: v, value: 0.5}]\n"
                           "bodies:\n  - {name: a, mass: 1, inertia: 1, rate: {vx: v}}\nelements:\n"
                           "  - {slider: s, body: [a, ground], at: [[0, 0], [0, 0]]}\n"
@@ -185,22 +166,19 @@ static void test_refusals (void **state) {
 
 /* A motion that turns around twice, from many initial velocities and with steps of many sizes: whether a state lies on
  * the surface, or samples near it are accurate, must not matter. */
-static void test_crossings (void **state) {
+TEST (crossings) {
   static const char *const methods[] = { "erk8 --rtol 1e-9", "erk8 --rtol 1e-6", "erk5 --rtol 1e-4",
                                          "bdf --rtol 1e-7" };
-  char command[400];
   double expected, x;
-  (void)state;
   cli_write ("turns.yaml", "pinwheel: 1\nbodies:\n  - {name: a, mass: 1, inertia: 1, start: {x: 0.44}}\nelements:\n"
                            "  - {slider: s, body: [a, ground], at: [[0, 0], [0, 0]]}\n"
                            "  - {force: f, body: a, fx: '-20*a.x - 0.5*sign(a.vx) - 0.3*a.vx'}\n"
                            "  - {force: g, body: a, fx: {harmonic: {amplitude: 5, omega: 3}}}\n");
   for (int i = 0; i < 20; i++)
     for (size_t k = 0; k < sizeof methods / sizeof *methods; k++) {
-      snprintf (command, sizeof command,
-                "pinwheel sensitivity @/turns.yaml -t 2 --of a.x --by a.vx --start a.vx=%.17g -m %s -o @/sens",
-                0.24 + 1e-3 * i, methods[k]);
-      cli_shell (command);
+      cli_shell (
+          check_text ("pinwheel sensitivity @/turns.yaml -t 2 --of a.x --by a.vx --start a.vx=%.17g -m %s -o @/sens",
+                      0.24 + 1e-3 * i, methods[k]));
       assert_int_equal (jumps_json ("\"derivative\": ", &x), 1);
       if (k == 0) expected = x;
       check_close (methods[k], x, expected, 1e-3 * fabs (expected), "ten times the largest tolerance");
@@ -208,11 +186,10 @@ static void test_crossings (void **state) {
 }
 
 /* Floquet multipliers of a forced oscillator with friction, against differences of the map over a period. */
-static void test_periodic (void **state) {
+TEST (periodic) {
   double map[4][2], J[2][2];
   const double x0 = 0.43974888, v0 = 0.24544215, step = 1e-4;
   char command[400];
-  (void)state;
   cli_write ("forced.yaml", "pinwheel: 1\nbodies:\n  - {name: a, mass: 1, inertia: 1, start: {x: 1}}\nelements:\n"
                             "  - {slider: s, body: [a, ground], at: [[0, 0], [0, 0]]}\n"
                             "  - {force: f, body: a, fx: '-20*a.x - 0.5*sign(a.vx) - 0.3*a.vx'}\n"
@@ -242,8 +219,7 @@ static void test_periodic (void **state) {
 }
 
 /* Accelerations that jump at a state have no linearisation there. */
-static void test_linearise (void **state) {
-  (void)state;
+TEST (linearise) {
   jumps_bad ("pinwheel linearise @/forced.yaml --start a.vx=0",
              "t = 0 s: accelerations jump with a.vx at this state, or fail beside it: it has no linearisation");
   cli_shell ("pinwheel linearise @/forced.yaml --start a.vx=1");
@@ -251,11 +227,4 @@ static void test_linearise (void **state) {
   assert_non_null (strstr (cli_out, "accelerations jump with a.vx at this state"));
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_closed_form), cmocka_unit_test (test_differences), cmocka_unit_test (test_narrow_friction),
-    cmocka_unit_test (test_refusals),    cmocka_unit_test (test_crossings),   cmocka_unit_test (test_periodic),
-    cmocka_unit_test (test_linearise),   cmocka_unit_test (test_extremum),    cmocka_unit_test (test_breakpoint),
-  };
-  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
-}
+const check_fixture fixture = { cli_setup, cli_teardown };

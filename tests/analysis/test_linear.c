@@ -25,17 +25,14 @@ static void linear_expect (const pw_linear *l, int i, double re, double im) {
   check_close ("im", l->im[i], im, bound, "exact blocks; 0 may be defective at a distance");
 }
 
-static void linear_pendulum (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (linear_pendulum) {
   pw_add_body (m, &(pw_body){ .name = "bob", .mass = 2, .inertia = 0.5, .start = { 0, -0.7, -PW_PI / 2 } });
   pw_add_pin (m, &(pw_pin){ .name = "A", .body = { "bob", "ground" }, .at = { { -0.7, 0 } } });
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 } });
 }
 
-static void test_pendulum (void **state) {
-  static const pw_plugin_table table = TRIAL_TABLE (linear_pendulum);
-  (void)state;
-  pw_linear l = linear_of (&table);
+TEST (pendulum) {
+  pw_linear l = linear_of (&linear_pendulum_table);
   assert_int_equal (l.positions, 1);
   assert_int_equal (l.velocities, 1);
   assert_int_equal (l.unknowns, 2);
@@ -46,17 +43,14 @@ static void test_pendulum (void **state) {
   pw_linear_free (&l);
 }
 
-static void linear_oscillator (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (linear_oscillator) {
   pw_add_body (m, &(pw_body){ .name = "block", .mass = 1.5, .inertia = 0.1, .start = { 0.8 } });
   pw_add_spring (
       m, &(pw_spring){ .name = "S", .body = { "ground", "block" }, .stiffness = 60, .damping = 2.4, .length = 0.8 });
 }
 
-static void test_oscillator (void **state) {
-  static const pw_plugin_table table = TRIAL_TABLE (linear_oscillator);
-  (void)state;
-  pw_linear l = linear_of (&table);
+TEST (oscillator) {
+  pw_linear l = linear_of (&linear_oscillator_table);
   assert_int_equal (l.unknowns, 6);
   assert_true (isnan (l.least));
   linear_expect (&l, 4, -0.8, sqrt (60 / 1.5 - 0.64));
@@ -66,9 +60,8 @@ static void test_oscillator (void **state) {
 }
 
 /* A link pinned to an arm that turns steadily oscillates about the radius: w^2 = m R l W^2 / (I + m l^2). */
-static void linear_rotor (pw_model *m, const void *parameters) {
+SCENE (linear_rotor) {
   const double R = 0.9, l = 0.4, W = 7;
-  (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "arm", .mass = 1, .inertia = 1, .rate = { 0, 0, W } });
   pw_add_body (
       m,
@@ -80,10 +73,8 @@ static void linear_rotor (pw_model *m, const void *parameters) {
              .name = "turn", .body = "arm", .at = { 1, 0 }, .heading = PW_PI / 2, .value = { PW_CONSTANT, { W } } });
 }
 
-static void test_rotor (void **state) {
-  static const pw_plugin_table table = TRIAL_TABLE (linear_rotor);
-  (void)state;
-  pw_linear l = linear_of (&table);
+TEST (rotor) {
+  pw_linear l = linear_of (&linear_rotor_table);
   assert_int_equal (l.positions, 2);
   assert_int_equal (l.velocities, 1);
   linear_expect (&l, 0, 0, 7 * sqrt (2 * 0.9 * 0.4 / (0.1 + 2 * 0.16)));
@@ -92,17 +83,14 @@ static void test_rotor (void **state) {
 }
 
 /* The Chaplygin sleigh runs straight, centre of mass behind the wheel: (I + m a^2) w' = -m a u w grows. */
-static void linear_sleigh (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (linear_sleigh) {
   pw_add_body (m, &(pw_body){ .name = "sleigh", .mass = 3, .inertia = 0.5, .start = { 0, 0, 0.3 } });
   pw_add_wheel (m, &(pw_wheel){ .name = "blade", .body = "sleigh", .at = { -0.2, 0 } });
   pw_add_speed (m, &(pw_speed){ .name = "tow", .body = "sleigh", .at = { -0.2, 0 }, .value = { PW_CONSTANT, { -4 } } });
 }
 
-static void test_sleigh (void **state) {
-  static const pw_plugin_table table = TRIAL_TABLE (linear_sleigh);
-  (void)state;
-  pw_linear l = linear_of (&table);
+TEST (sleigh) {
+  pw_linear l = linear_of (&linear_sleigh_table);
   assert_int_equal (l.positions, 3);
   assert_int_equal (l.velocities, 1);
   linear_expect (&l, 0, 3 * 0.2 * 4 / (0.5 + 3 * 0.04), 0);
@@ -111,17 +99,14 @@ static void test_sleigh (void **state) {
 }
 
 /* Twin wheels count as one row; massless bodies add no eigenvalues. */
-static void linear_twins (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (linear_twins) {
   pw_add_body (m, &(pw_body){ .name = "axle", .mass = 1, .inertia = 1 });
   for (int i = 0; i < 2; i++)
     pw_add_wheel (m, &(pw_wheel){ .name = i ? "right" : "left", .body = "axle", .at = { 0, 0.5 - i } });
 }
 
-static void test_rank (void **state) {
-  static const pw_plugin_table table = TRIAL_TABLE (linear_twins);
-  (void)state;
-  pw_linear l = linear_of (&table);
+TEST (rank) {
+  pw_linear l = linear_of (&linear_twins_table);
   assert_int_equal (l.positions, 3);
   assert_int_equal (l.velocities, 2);
   assert_int_equal (l.rank, 1);
@@ -134,12 +119,10 @@ static void test_rank (void **state) {
   pw_linear_free (&l);
 }
 
-static void test_large (void **state) {
-  static const pw_plugin_table table = TRIAL_TABLE (linear_pendulum);
+TEST (large) {
   pw_error error = { 0 };
   pw_linear l;
-  (void)state;
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (&linear_pendulum_table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", NULL);
   check_ok (pw_run_linearise (r, 2, &l, &error), &error);
   assert_true (l.re == NULL && l.velocities == 1);
@@ -172,24 +155,21 @@ static void linear_add_block (pw_model *m, pw_function force) {
 
 static const char *const linear_reads[] = { "block.vx", NULL };
 
-static void linear_jumping (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (linear_jumping) {
   linear_add_block (m, (pw_function){ .eval = linear_sign, .reads = linear_reads });
 }
 
-static void linear_one_sided (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (linear_one_sided) {
   linear_add_block (m, (pw_function){ .eval = linear_half, .reads = linear_reads });
 }
 
 /* Neither state has a linearisation; the workspace is left at it, not at a state beside it. */
-static void test_jump (void **state) {
-  static const pw_plugin_table table[] = { TRIAL_TABLE (linear_jumping), TRIAL_TABLE (linear_one_sided) };
-  (void)state;
+TEST (jump) {
+  static const pw_plugin_table *const table[] = { &linear_jumping_table, &linear_one_sided_table };
   for (int i = 0; i < 2; i++) {
     pw_error error = { 0 };
     pw_linear l;
-    pw_system *s = scene_system (&table[i], NULL);
+    pw_system *s = scene_system (table[i], NULL);
     pw_run *r = runs_open (s, "rk4", NULL);
     assert_int_equal (pw_run_linearise (r, 100, &l, &error), PW_METHOD);
     assert_non_null (strstr (error.text, "accelerations jump with block.vx"));
@@ -201,20 +181,10 @@ static void test_jump (void **state) {
 
 /* ---- RK4 ---- */
 
-static void test_rk4_limit (void **state) {
-  (void)state;
+TEST (rk4_limit) {
   check_close ("damped", pw_rk4_limit (-2, 0), 2.785293563405282 / 2, 1e-9, "root of |R| = 1 on the negative axis");
   check_close ("undamped", pw_rk4_limit (0, 10), sqrt (8) / 10, 1e-6, "root 2 sqrt 2, which is flat: 1e-12 in |R|");
   check_close ("growing and turning", pw_rk4_limit (3, 10), sqrt (8) / 10, 1e-6, "as undamped");
   assert_true (isinf (pw_rk4_limit (3, 0)) && isinf (pw_rk4_limit (0, 0)));
   assert_true (pw_rk4_limit (-1, 1) > 1.5 && pw_rk4_limit (-1, 1) < 3);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_pendulum),  cmocka_unit_test (test_oscillator), cmocka_unit_test (test_rotor),
-    cmocka_unit_test (test_sleigh),    cmocka_unit_test (test_rank),       cmocka_unit_test (test_large),
-    cmocka_unit_test (test_rk4_limit), cmocka_unit_test (test_jump),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

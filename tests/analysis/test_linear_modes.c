@@ -99,8 +99,13 @@ typedef struct {
   double amplitude, w, stiffness;
 } modes_parameters;
 
-static void modes_vehicle (pw_model *m, const void *parameters) {
-  const modes_parameters *p = parameters;
+static const pw_parameter modes_list[] = { { PW_AT (modes_parameters, amplitude), 0, "N m", "amplitude", PW_REAL },
+                                           { PW_AT (modes_parameters, w), 0, "rad/s", "turn rate", PW_REAL },
+                                           { PW_AT (modes_parameters, stiffness), 0, "N m/rad", "at the hitch",
+                                             PW_REAL },
+                                           { .name = NULL } };
+
+SCENE_WITH (modes_vehicle, modes_list, modes_parameters) {
   const double u = 1.3, L = 0.7, heading = -asin (p->w * L / u);
   pw_add_body (m, &(pw_body){ .name = "tractor", .mass = 2, .inertia = 0.3, .rate = { u, 0, p->w } });
   pw_add_body (m, &(pw_body){ .name = "trailer",
@@ -119,18 +124,6 @@ static void modes_vehicle (pw_model *m, const void *parameters) {
                                   .body = { "tractor", "trailer" },
                                   .value = { PW_HARMONIC, .harmonic = { .amplitude = p->amplitude, .omega = 3 } } });
 }
-
-static const pw_parameter modes_list[] = { { PW_AT (modes_parameters, amplitude), 0, "N m", "amplitude", PW_REAL },
-                                           { PW_AT (modes_parameters, w), 0, "rad/s", "turn rate", PW_REAL },
-                                           { PW_AT (modes_parameters, stiffness), 0, "N m/rad", "at the hitch",
-                                             PW_REAL },
-                                           { .name = NULL } };
-
-static const pw_plugin_table modes_table = { .abi = PW_ABI,
-                                             .size = sizeof (pw_plugin_table),
-                                             .build = modes_vehicle,
-                                             .parameters = modes_list,
-                                             .parameters_size = sizeof (modes_parameters) };
 
 /* ---- Tests ---- */
 
@@ -151,8 +144,7 @@ static void modes_spread (const char *model) {
   modes_close (&x);
 }
 
-static void test_spread (void **state) {
-  (void)state;
+TEST (spread) {
   modes_spread ("n-trailer");
   modes_spread ("car");
 }
@@ -183,21 +175,19 @@ static void modes_decay (pw_system *s, int modes_expected) {
   modes_close (&x);
 }
 
-static void test_decay (void **state) {
-  (void)state;
+TEST (decay) {
   modes_decay (scene_named ("n-trailer", NULL, 0), 2);
-  modes_decay (scene_system (&modes_table, "w", 0.8, "stiffness", 3.0, NULL), 2);
+  modes_decay (scene_system (&modes_vehicle_table, "w", 0.8, "stiffness", 3.0, NULL), 2);
 }
 
 /* A torque drives the states as x' = A x + B u, in a straight motion and a turn, whose frame rotates. */
-static void test_torque (void **state) {
+TEST (torque) {
   const double eps = 1e-3, t = 1.3;
-  (void)state;
   for (int turn = 0; turn < 2; turn++) {
     double plus[MOST], minus[MOST], y[MOST] = { 0 }, w = 0.8 * turn;
-    pw_system *up = scene_system (&modes_table, "amplitude", eps, "w", w, NULL),
-              *down = scene_system (&modes_table, "amplitude", -eps, "w", w, NULL);
-    modes x = modes_of (scene_system (&modes_table, "w", w, NULL));
+    pw_system *up = scene_system (&modes_vehicle_table, "amplitude", eps, "w", w, NULL),
+              *down = scene_system (&modes_vehicle_table, "amplitude", -eps, "w", w, NULL);
+    modes x = modes_of (scene_system (&modes_vehicle_table, "w", w, NULL));
     check_close ("twist", x.l.twist[2], w, 1e-9, "the described turn is steady");
     check_close ("hinge", x.l.re[x.l.unknowns - 1], -sqrt (1.3 * 1.3 / 0.49 - w * w), 1e-9,
                  "-w R/L, R the turning radius of the trailer's axle");
@@ -229,18 +219,15 @@ static double complex modes_transfer (const pw_linear *l, double omega, int j) {
  *
  * With I = 2.25 kg m^2 they oscillate at 1 rad/s, as fast as the rotor turns, with u = -b/2.  That is no eigenvalue of
  * a rigid rotation, which is the only symmetry. */
-static void modes_rotor (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (modes_rotor) {
   pw_add_body (m, &(pw_body){ .name = "rotor", .mass = 1, .inertia = 2.25, .rate = { 0, 0, 1 } });
   pw_add_body (m, &(pw_body){ .name = "bob", .mass = 1, .start = { 1.5 }, .rate = { 0, 1.5, 1 } });
   pw_add_pin (m, &(pw_pin){ .name = "O", .body = { "rotor", "ground" } });
   pw_add_pin (m, &(pw_pin){ .name = "P", .body = { "rotor", "bob" }, .at = { { 0.5, 0 }, { -1, 0 } } });
 }
 
-static void test_rotor (void **state) {
-  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = modes_rotor };
-  (void)state;
-  modes x = modes_of (scene_system (&table, NULL));
+TEST (rotor) {
+  modes x = modes_of (scene_system (&modes_rotor_table, NULL));
   int mode = -1;
   for (int i = 0; i < x.l.unknowns; i++)
     if (fabs (x.l.im[i] - 1) < 1e-6) mode = i;
@@ -252,8 +239,7 @@ static void test_rotor (void **state) {
   modes_close (&x);
 }
 
-static void modes_pendulum (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (modes_pendulum) {
   pw_add_body (m, &(pw_body){ .name = "bob", .mass = 2, .inertia = 0.5, .start = { 0, -0.7, -PW_PI / 2 } });
   pw_add_pin (m, &(pw_pin){ .name = "A", .body = { "bob", "ground" }, .at = { { -0.7, 0 } } });
   pw_add_rotational_spring (m, &(pw_rotational_spring){ .name = "D", .body = { "bob", "ground" }, .damping = 0.6 });
@@ -261,11 +247,9 @@ static void modes_pendulum (pw_model *m, const void *parameters) {
   pw_add_torque (m, &(pw_torque){ .name = "T", .body = { "bob", "ground" } });
 }
 
-static void test_transfer (void **state) {
-  static const pw_plugin_table table = TRIAL_TABLE (modes_pendulum);
+TEST (transfer) {
   const double frequency[] = { 0.1, 3.05, 40 }, k = 2 * 9.81 * 0.7, J = 0.5 + 2 * 0.49, d = 0.6;
-  (void)state;
-  modes x = modes_of (scene_system (&table, NULL));
+  modes x = modes_of (scene_system (&modes_pendulum_table, NULL));
   assert_int_equal (x.l.unknowns, 2);
   for (int i = 0; i < 3; i++) {
     double w = frequency[i];
@@ -284,10 +268,9 @@ static void test_transfer (void **state) {
 }
 
 /* Signals of constraints have no column of B. */
-static void test_constraint_signal (void **state) {
+TEST (constraint_signal) {
   pw_error error = { 0 };
-  (void)state;
-  modes x = modes_of (scene_system (&modes_table, NULL));
+  modes x = modes_of (scene_system (&modes_vehicle_table, NULL));
   int pull = pw_system_find_signal (x.s, "pull", &error),
       torque = pw_system_find_signal (x.s, "actuator.value", &error);
   assert_true (pull >= 0 && torque >= 0 && pw_system_signals (x.s) == 2);
@@ -297,12 +280,4 @@ static void test_constraint_signal (void **state) {
   assert_int_equal (pw_system_find_signal (x.s, "actuator.valve", &error), PW_INPUT);
   assert_non_null (strstr (error.text, "has no signal \"actuator.valve\"; did you mean \"actuator.value\"?"));
   modes_close (&x);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_spread), cmocka_unit_test (test_decay),    cmocka_unit_test (test_torque),
-    cmocka_unit_test (test_rotor),  cmocka_unit_test (test_transfer), cmocka_unit_test (test_constraint_signal),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

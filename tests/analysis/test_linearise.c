@@ -16,10 +16,9 @@ static const char *const linearise_block =
     "  - {force: F, body: block, at: [0, 0]}\n";
 
 /* An oscillator: c = 0.8/s, m = 1.5 kg, k = 60 N/m. */
-static void test_oscillator (void **state) {
+TEST (oscillator) {
   double x[4], y[4];
   char head[100], rows[3][40];
-  (void)state;
   cli_write ("block.yaml", linearise_block);
   cli_good ("pinwheel linearise @/block.yaml --input F.fx --output block.x -o @/block");
   linearise_shows ("The motion is steady\n");
@@ -53,11 +52,10 @@ static void test_oscillator (void **state) {
 }
 
 /* A body on 22 wheels, whose spins the text does not show all. */
-static void test_internal (void **state) {
+TEST (internal) {
   char text[4000] = "pinwheel: 1\nbodies: [{name: car, mass: 1, inertia: 1}]\nelements:\n"
                     "  - {spring: S, body: [ground, car], at: [[-10, 0], [0, 0]], stiffness: 350, length: 10}\n";
   size_t used = strlen (text);
-  (void)state;
   for (int i = 0; i < 22; i++)
     used += (size_t)snprintf (text + used, sizeof text - used,
                               "  - {rolling-wheel: w%d, body: car, at: [%d, 0], radius: 0.1, inertia: 0.01}\n", i, i);
@@ -68,14 +66,12 @@ static void test_internal (void **state) {
 }
 
 /* The archive begins with A.npy, whose 128 bytes of head describe a 2 x 2 matrix: trace and determinant as above. */
-static void test_npz (void **state) {
-  char path[300], head[30 + 5 + 128];
+TEST (npz) {
+  char head[30 + 5 + 128];
   double A[4];
-  (void)state;
   cli_write ("block.yaml", linearise_block);
   cli_good ("pinwheel linearise @/block.yaml -o @/block");
-  cli_expand ("@/block.npz", path, sizeof path);
-  FILE *f = fopen (path, "rb");
+  FILE *f = fopen (cli_path ("block.npz"), "rb");
   assert_non_null (f);
   assert_int_equal (fread (head, sizeof head, 1, f), 1);
   assert_int_equal (fread (A, sizeof A, 1, f), 1);
@@ -90,8 +86,7 @@ static void test_npz (void **state) {
 }
 
 /* The eigenvalues are those of `check`; a steady motion has them at every time; the inverted pendulum grows. */
-static void test_times (void **state) {
-  (void)state;
+TEST (times) {
   cli_good ("pinwheel check n-trailer");
   linearise_shows (" -3.2056 1/s\n");
   cli_good ("pinwheel linearise n-trailer");
@@ -109,8 +104,7 @@ static void test_times (void **state) {
 
 /* Two masses on a spring that whirl at W = 1.5 rad/s, neither of which turns: the frame is that of their positions,
  * and the frequency of the only mode is (3 W^2 + k/mu)^(1/2), k/mu = 15 1/s^2. */
-static void test_whirl (void **state) {
-  (void)state;
+TEST (whirl) {
   cli_write ("whirl.yaml",
              "pinwheel: 1\nlet: {mu: 2/3, r: '10*0.5/(10 - mu*1.5^2)'}\nbodies:\n"
              "  - {name: a, mass: 1, inertia: 0.1, start: {x: 2*r/3}, rate: {vy: r}}\n"
@@ -121,7 +115,7 @@ static void test_whirl (void **state) {
   assert_non_null (strstr (cli_out, "     1             0           4.6637         0.74225"));
 }
 
-static void test_bad (void **state) {
+TEST (bad) {
   static const cli_wrong each[] = {
     { "n-trailer --output tractor.q",
       "model n-trailer has no state \"tractor.q\"; valid are x, y, phi, vx, vy, omega" },
@@ -135,7 +129,6 @@ static void test_bad (void **state) {
     { "peaucellier -o @/none", "peaucellier has no degrees of freedom: there is nothing to linearise" },
     { "chain --set n=200", "chain has 600 coordinates; linearise takes at most 400" },
   };
-  (void)state;
   cli_bad_each ("linearise", each, sizeof each / sizeof *each);
   assert_null (cli_file ("none.json"));
   assert_null (cli_file ("none.csv"));
@@ -155,9 +148,8 @@ static void test_bad (void **state) {
 }
 
 /* One run for each mode that moves, a pair once, of finite numbers; no file without such modes. */
-static void test_page (void **state) {
+TEST (page) {
   int runs = 0;
-  (void)state;
   cli_write ("block.yaml", linearise_block);
   cli_good ("pinwheel linearise @/block.yaml --animate @/modes.html");
   const char *page = cli_file ("modes.html");
@@ -182,11 +174,4 @@ static void test_page (void **state) {
            "--animate @/none.gif: expected a name that ends in .html");
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_internal), cmocka_unit_test (test_oscillator), cmocka_unit_test (test_npz),
-    cmocka_unit_test (test_page),     cmocka_unit_test (test_times),      cmocka_unit_test (test_bad),
-    cmocka_unit_test (test_whirl),
-  };
-  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
-}
+const check_fixture fixture = { cli_setup, cli_teardown };

@@ -15,25 +15,22 @@ static const char model[] =
     "bodies: [{name: p, mass: 1, inertia: 1, rate: {vx: a, vy: b}}]\n"
     "elements: [{force: none, body: p, at: [0, 0]}]\n";
 
-static int optimise_setup (void **state) {
-  if (cli_setup (state) != 0) return 1;
+static int optimise_setup (void) {
+  if (cli_setup () != 0) return 1;
   cli_write ("point.yaml", model);
   return 0;
 }
 
 /* The value of an unknown in the summary. */
 static double optimise_value (const char *json, const char *name) {
-  char key[100];
-  snprintf (key, sizeof key, "{\"name\": \"%s\"", name);
-  const char *at = strstr (json, key);
+  const char *at = strstr (json, check_text ("{\"name\": \"%s\"", name));
   assert_non_null (at);
   return strtod (strstr (at, "\"value\": ") + 9, NULL);
 }
 
 /* ---- Optima ---- */
 
-static void test_valley (void **state) {
-  (void)state;
+TEST (valley) {
   cli_shell (
       "pinwheel optimise @/point.yaml --minimise '100*(p.y - p.x^2)^2 + (1 - p.x)^2' --free a=-3:3 --free b=-3:3 "
       "--json @/o.json");
@@ -45,9 +42,8 @@ static void test_valley (void **state) {
 }
 
 /* Three unknowns: smooth outputs have derivatives, unless the method has none; with an extremum they have not. */
-static void test_derivatives (void **state) {
+TEST (derivatives) {
   static const char *const more[] = { "", " + 0*max:p.x", "' --method 'rk4:inputs=held" };
-  (void)state;
   for (int i = 0; i < 3; i++) {
     char command[500];
     snprintf (
@@ -65,8 +61,7 @@ static void test_derivatives (void **state) {
 }
 
 /* The highest point of a line over a disc; b has no bounds. */
-static void test_constraint (void **state) {
-  (void)state;
+TEST (constraint) {
   cli_shell ("pinwheel optimise @/point.yaml --maximise p.x+p.y --free a=-3:3 --free b --subject-to 'p.x^2+p.y^2 <= 2' "
              "--subject-to 'max:p.x>=-5' --json @/o.json");
   const char *json = cli_file ("o.json");
@@ -76,8 +71,7 @@ static void test_constraint (void **state) {
   assert_non_null (strstr (cli_out, "at least -5"));
 }
 
-static void test_bound (void **state) {
-  (void)state;
+TEST (bound) {
   cli_shell (
       "pinwheel optimise @/point.yaml --maximise p.x --free a=-2:0.5 --free p.vy=0:1 --json @/o.json -o @/o.yaml");
   const char *json = cli_file ("o.json");
@@ -93,8 +87,7 @@ static void test_bound (void **state) {
 }
 
 /* The run of a result repeats all options that have an effect on it, in words for a shell. */
-static void test_command (void **state) {
-  (void)state;
+TEST (command) {
   cli_shell ("pinwheel optimise pendulum --maximise bob.vx --free g=5:8 --set g=6 --set 'l=1*2' -t 0.5 -o @/o.yaml");
   static const char given[] = "# pinwheel run 'pendulum' --set 'g=6' --set 'l=1*2' --t-end '0.5' --set g=";
   assert_int_equal (strncmp (cli_file ("o.yaml"), given, sizeof given - 1), 0);
@@ -114,8 +107,7 @@ static void test_command (void **state) {
 }
 
 /* Beyond p.x = 0.3 every run fails. */
-static void test_failing (void **state) {
-  (void)state;
+TEST (failing) {
   cli_shell ("pinwheel optimise @/point.yaml --maximise 'p.x + 0*sqrt(0.3 - p.x)' --free a=-2:2 --json @/o.json "
              "--plots @/failing");
   int failed = 0;
@@ -131,32 +123,27 @@ static void test_failing (void **state) {
 }
 
 /* Runs that fail are worse than others, for each of the algorithms: the optimum is near the edge. */
-static void test_edge (void **state) {
+TEST (edge) {
   static const char *const options[] = { "", "--free b=-1:1", "--subject-to 'p.y<=1'",
                                          "--free b=-1:1 --subject-to 'p.y<=1'" };
-  char command[500];
-  (void)state;
   for (size_t i = 0; i < sizeof options / sizeof *options; i++) {
-    snprintf (command, sizeof command,
-              "pinwheel optimise @/point.yaml --minimise '(p.x - 0.25)^2 + p.y^2 + 0*sqrt(0.3 - p.x)' --free a=-2:2 %s "
-              "--starts 1 --set b=0.1 --json @/o.json",
-              options[i]);
-    cli_shell (command);
+    cli_shell (check_text (
+        "pinwheel optimise @/point.yaml --minimise '(p.x - 0.25)^2 + p.y^2 + 0*sqrt(0.3 - p.x)' --free a=-2:2 %s "
+        "--starts 1 --set b=0.1 --json @/o.json",
+        options[i]));
     check_close ("a", optimise_value (cli_file ("o.json"), "a"), 0.25, 1e-3, "square root of 1e-6");
   }
 }
 
 /* Four maxima, of which starts in all of the range find the highest. */
-static void test_starts (void **state) {
-  (void)state;
+TEST (starts) {
   cli_shell ("pinwheel optimise @/point.yaml --maximise 'cos(9*p.x) - 0.05*(p.x - 1.4)^2' --free a=-1.5:2 --starts 12 "
              "--json @/o.json");
   check_close ("a", optimise_value (cli_file ("o.json"), "a"), 1.3963, 1e-3, "2 pi 2/9, displaced by 1e-6");
 }
 
 /* No point of a sweep is better, and the nearest ones are worse by the curvature alone. */
-static void test_sweep (void **state) {
-  (void)state;
+TEST (sweep) {
   cli_shell ("pinwheel sweep ezyroller --vary omega=lin:2:6:161 --t-end 5 --step 5e-3 -o @/s.csv");
   char *copy = strdup (cli_file ("s.csv")), *line = strchr (copy, '\n');
   double best = -INFINITY, at = 0;
@@ -173,23 +160,19 @@ static void test_sweep (void **state) {
   check_close ("value", cli_number (json, "value", NULL), best, 1e-2 * best, "curvature over a step");
 }
 
-static void test_jobs (void **state) {
-  (void)state;
+TEST (jobs) {
   char first[20000] = "";
   for (int jobs = 1; jobs <= 3; jobs++) {
-    char command[300];
-    snprintf (command, sizeof command,
-              "pinwheel optimise ezyroller --maximise frame.x/max:work --free omega=2:6 --free M0=0.05:0.2 --t-end 1 "
-              "--step 0.01 --starts 5 --seed 3 --jobs %d --json @/o.json",
-              jobs);
-    cli_shell (command);
+    cli_shell (check_text (
+        "pinwheel optimise ezyroller --maximise frame.x/max:work --free omega=2:6 --free M0=0.05:0.2 --t-end 1 "
+        "--step 0.01 --starts 5 --seed 3 --jobs %d --json @/o.json",
+        jobs));
     if (jobs == 1) snprintf (first, sizeof first, "%s", cli_file ("o.json"));
     assert_string_equal (cli_file ("o.json"), first);
   }
 }
 
-static void test_interrupt (void **state) {
-  (void)state;
+TEST (interrupt) {
   char command[1000];
   const char *program = getenv ("PINWHEEL");
   snprintf (
@@ -204,8 +187,7 @@ static void test_interrupt (void **state) {
 
 /* ---- Wrong input ---- */
 
-static void test_bad (void **state) {
-  (void)state;
+TEST (bad) {
   static const cli_wrong bad[] = {
     { "@/point.yaml --free a", "expected one of --maximise OUTPUT and --minimise OUTPUT" },
     { "@/point.yaml --free a --maximise p.x --minimise p.x",
@@ -242,9 +224,8 @@ static void test_bad (void **state) {
 }
 
 /* Sobol points exist for 40 unknowns; the search from the model's values needs none. */
-static void test_many_unknowns (void **state) {
+TEST (many_unknowns) {
   char text[3000] = "pinwheel: 1\nrun: {t_end: 1, step: 1}\nparameters: [", command[1000] = "", name[40];
-  (void)state;
   for (int i = 0; i < 41; i++) {
     snprintf (name, sizeof name, "%s{name: a%d, value: 0.5}", i ? ", " : "", i);
     strcat (text, name);
@@ -264,13 +245,11 @@ static void test_many_unknowns (void **state) {
 }
 
 /* Outputs without a largest value: linear in an unknown without bounds. */
-static void test_unbounded (void **state) {
+TEST (unbounded) {
   static const char *const without[] = { "--free a --maximise p.x", "--free a --free b=-1:1 --maximise 'p.x - p.y^2'" };
-  char command[200];
-  (void)state;
   for (int i = 0; i < 2; i++) {
-    snprintf (command, sizeof command, "pinwheel optimise @/point.yaml %s --starts 2 --json @/o.json", without[i]);
-    assert_int_equal (cli_run (command), 4);
+    assert_int_equal (cli_run (check_text ("pinwheel optimise @/point.yaml %s --starts 2 --json @/o.json", without[i])),
+                      4);
     assert_null (strstr (cli_err, " runs")); /* those of a refinement are only a part */
     assert_non_null (strstr (cli_err, "perhaps there is no optimum unless bounds are given, as in --free a=LOW:HIGH"));
     assert_true (cli_says (cli_file ("o.json"), "status", "method"));
@@ -279,8 +258,7 @@ static void test_unbounded (void **state) {
 
 /* A search ends at its limit of 500 runs.  The derivatives there are 0: its refinement ends at once, with the same
  * value. */
-static void test_equal_refinement (void **state) {
-  (void)state;
+TEST (equal_refinement) {
   cli_shell ("pinwheel optimise @/point.yaml --minimise 'floor(1e4*(100*(p.y - p.x^2)^2 + (1 - p.x)^2 + 100*(p.phi - "
              "p.y^2)^2 + (1 - p.y)^2))' --free a --free b --free p.omega --subject-to 'p.y<=9' --starts 2 --json "
              "@/o.json");
@@ -290,8 +268,7 @@ static void test_equal_refinement (void **state) {
 }
 
 /* A pendulum at rest without gravity. */
-static void test_no_effect (void **state) {
-  (void)state;
+TEST (no_effect) {
   cli_shell ("pinwheel optimise pendulum --maximise bob.y --free I=0:1 --set g=0 -t 0.1 --starts 2");
   assert_string_equal (cli_err, "pinwheel: bob.y is the same in all runs: no free value has an effect on it\n");
   cli_shell ("pinwheel optimise @/point.yaml --minimise p.x --free b=-3:3 --free a=-1:3 --json @/o.json");
@@ -301,8 +278,7 @@ static void test_no_effect (void **state) {
 }
 
 /* Given initial values that the best run does not have. */
-static void test_changed_values (void **state) {
-  (void)state;
+TEST (changed_values) {
   assert_int_equal (
       cli_run ("pinwheel optimise ezyroller --t-end 0.1 --maximise frame.x --free frame.vx=0:1 --starts 1 "
                "--start frame.vy=0 --start frame.omega=7"),
@@ -311,14 +287,4 @@ static void test_changed_values (void **state) {
                                 "frame.omega from 7 to 2 rad/s\n");
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_valley),    cmocka_unit_test (test_derivatives),    cmocka_unit_test (test_constraint),
-    cmocka_unit_test (test_bound),     cmocka_unit_test (test_command),        cmocka_unit_test (test_failing),
-    cmocka_unit_test (test_sweep),     cmocka_unit_test (test_edge),           cmocka_unit_test (test_starts),
-    cmocka_unit_test (test_jobs),      cmocka_unit_test (test_interrupt),      cmocka_unit_test (test_bad),
-    cmocka_unit_test (test_unbounded), cmocka_unit_test (test_changed_values), cmocka_unit_test (test_equal_refinement),
-    cmocka_unit_test (test_no_effect), cmocka_unit_test (test_many_unknowns)
-  };
-  return cmocka_run_group_tests (tests, optimise_setup, cli_teardown);
-}
+const check_fixture fixture = { optimise_setup, cli_teardown };

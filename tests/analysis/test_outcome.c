@@ -3,6 +3,7 @@
 #include <math.h>
 #include "check.h"
 #include "cli.h"
+#include "gallery.h"
 #include "outcome.h"
 
 /* A wheel turned by cos (w t): phi = (1 - cos (w t)) / w^2, omega = sin (w t) / w.  A slider on which a force acts
@@ -22,28 +23,20 @@ static const char model[] = "pinwheel: 1\n"
                             "  - {pin: R, body: [block-b, ground], at: [[0, 0], [0, 0]]}\n"
                             "  - {force: shake, body: block-b, at: [0, 0], fx: {expression: 'sin(40*t)'}}\n";
 
-static pw_file *file;
-static pw_model *built;
-static pw_system *s;
+static gallery_scene scene;
+static pw_system *s; /* of the scene */
 
-static int outcome_setup (void **state) {
-  char path[4096];
-  pw_error error = { 0 };
-  if (cli_setup (state) != 0) return 1;
+static int outcome_setup (void) {
+  if (cli_setup () != 0) return 1;
   cli_write ("functionals.yaml", model);
-  cli_expand ("@/functionals.yaml", path, sizeof path);
-  file = pw_file_open (path, &error);
-  built = file ? pw_file_model (file, &error) : NULL;
-  if (built && pw_model_build (built, &error) == PW_OK) s = pw_system_compile (built, &error);
-  if (s == NULL) print_message ("%s\n", error.text);
-  return s == NULL;
+  scene = gallery_load (cli_path ("functionals.yaml"), NULL);
+  s = scene.system;
+  return 0;
 }
 
-static int outcome_teardown (void **state) {
-  pw_system_free (s);
-  pw_model_free (built);
-  pw_file_close (file);
-  return cli_teardown (state);
+static int outcome_teardown (void) {
+  gallery_close (&scene);
+  return cli_teardown ();
 }
 
 static double outcome_run (const char *text, const char *method, double step, double rtol, double t_end) {
@@ -60,8 +53,7 @@ static double outcome_run (const char *text, const char *method, double step, do
 /* ---- Values ---- */
 
 /* At t = 4, w = 3. */
-static void test_functionals (void **state) {
-  (void)state;
+TEST (functionals) {
   const double w = 3, t = 4, phi = (1 - cos (w * t)) / (w * w), area = (t - sin (w * t) / w) / (w * w);
   const struct {
     const char *text;
@@ -99,8 +91,7 @@ static void test_functionals (void **state) {
 }
 
 /* Each step ends at the jump, where the value has its limit from the right. */
-static void test_jump (void **state) {
-  (void)state;
+TEST (jump) {
   static const char *const method[] = { "rk4", "erk8", "radau" };
   for (int i = 0; i < 3; i++) {
     check_close ("least reaction", outcome_run ("min:Q.Fx", method[i], 0.03, 1e-9, 2), -0.7, 1e-9,
@@ -110,20 +101,17 @@ static void test_jump (void **state) {
 }
 
 /* A drop so small that the ends of a step and its middle lie nearly on a line. */
-static void test_small_jump (void **state) {
-  (void)state;
+TEST (small_jump) {
   check_close ("least reaction", outcome_run ("min:Q.Fy", "rk4", 0.03, 0, 2), -1.7, 1e-9, "1e-8 of a step, refined");
 }
 
 /* Steps of 0.2 s and more contain more than a period of sin (40 t). */
-static void test_fast (void **state) {
-  (void)state;
+TEST (fast) {
   check_close ("rms", outcome_run ("rms:R.Fx", "erk8", 0, 1e-6, 4), sqrt ((2 - sin (320.) / 160) / 4), 1e-8,
                "divided until two formulas agree to 1e-3, which makes one of them accurate to 3e-11 of a part");
 }
 
-static void test_gradient (void **state) {
-  (void)state;
+TEST (gradient) {
   const char *text = "integral:wheel.phi * 2 + max:wheel.phi";
   pw_outcomes x;
   pw_error error = { 0 };
@@ -140,8 +128,7 @@ static void test_gradient (void **state) {
 
 /* ---- Texts ---- */
 
-static void test_bad (void **state) {
-  (void)state;
+TEST (bad) {
   static const struct {
     const char *text, *message;
   } bad[] = {
@@ -161,9 +148,4 @@ static void test_bad (void **state) {
   }
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_functionals), cmocka_unit_test (test_jump),
-                                      cmocka_unit_test (test_gradient),    cmocka_unit_test (test_bad),
-                                      cmocka_unit_test (test_small_jump),  cmocka_unit_test (test_fast) };
-  return cmocka_run_group_tests (tests, outcome_setup, outcome_teardown);
-}
+const check_fixture fixture = { outcome_setup, outcome_teardown };

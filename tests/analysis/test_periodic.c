@@ -60,8 +60,7 @@ static const pw_parameter pendulum_parameters[] = { { PW_AT (pendulum, A), 0.2, 
                                                     { PW_AT (pendulum, om), 0, "rad/s", "", PW_REAL },
                                                     { .name = NULL } };
 
-static void pendulum_build (pw_model *m, const void *parameters) {
-  const pendulum *p = parameters;
+SCENE_WITH (pendulum_build, pendulum_parameters, pendulum) {
   double s = sin (p->th), c = cos (p->th);
   const pw_signal torque = { PW_HARMONIC, .harmonic = { .amplitude = p->A, .omega = 0.8 } };
   pw_add_body (
@@ -72,28 +71,21 @@ static void pendulum_build (pw_model *m, const void *parameters) {
   pw_add_torque (m, &(pw_torque){ .name = "drive", .body = { "bob", "ground" }, .value = torque });
 }
 
-static const pw_plugin_table pendulum_table = { .abi = PW_ABI,
-                                                .size = sizeof (pw_plugin_table),
-                                                .parameters = pendulum_parameters,
-                                                .parameters_size = sizeof (pendulum),
-                                                .build = pendulum_build };
-
 static pw_system *pendulum_at (void *context, double A, pw_error *error) {
   (void)context, (void)error;
-  return scene_system (&pendulum_table, "A", A, NULL);
+  return scene_system (&pendulum_build_table, "A", A, NULL);
 }
 
 /* Three orbits at A = 0.2: shooting with 30 digits (Taylor series), confirmed by AUTO-07p. */
-static void test_pendulum (void **state) {
+TEST (pendulum) {
   static const struct {
     double th, om, re[2], im;
   } orbit[] = { { 0.5982763426814, 0.1196106484219, { 0.265099104796, 0.265099104796 }, 0.621015774681 },
                 { 1.2066430427563, 0.6718812719357, { 1.79476852725, 0.254037287173 }, 0 },
                 { -1.2305856526574, 1.2572101436741, { 0.205346676608, 0.205346676608 }, 0.643250239154 } };
-  (void)state;
   for (int i = 0; i < 3; i++) {
     double th = round (100 * orbit[i].th) / 100, om = round (100 * orbit[i].om) / 100;
-    pw_system *s = scene_system (&pendulum_table, "th", th, "om", om, NULL);
+    pw_system *s = scene_system (&pendulum_build_table, "th", th, "om", om, NULL);
     pw_periodic *x = periodic_open (s, &(pw_periodic_settings){ .period = 0 });
     pw_periodic_orbit o = periodic_solve (x, 0, 0);
     assert_int_equal (pw_periodic_symmetries (x), 0);
@@ -109,8 +101,7 @@ static void test_pendulum (void **state) {
 }
 
 /* The folds of the same two sources. */
-static void test_folds (void **state) {
-  (void)state;
+TEST (folds) {
   pw_system *s = pendulum_at (NULL, 0.1, NULL);
   pw_periodic *x = periodic_open (s, &(pw_periodic_settings){ .compile = pendulum_at, .first = 0.1, .last = 0.35 });
   periodic_solve (x, 0, 0.1);
@@ -146,31 +137,25 @@ static int oscillator_torque (void *context, double t, const double *x, double v
 }
 
 /* The parameters of a system outlive it: more than exist at a time. */
-static void oscillator_build (pw_model *m, const void *parameters) {
+SCENE_WITH (oscillator_build, oscillator_parameters, oscillator) {
   static const char *const reads[] = { "disc.phi", "disc.omega", NULL };
   static oscillator kept[16];
   static int next;
   oscillator *o = &kept[next++ % 16];
-  *o = *(const oscillator *)parameters;
+  *o = *p;
   const pw_signal torque = { PW_FUNCTION, .function = { .eval = oscillator_torque, .context = o, .reads = reads } };
   pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 1, .start = { 0, 0, o->x } });
   pw_add_pin (m, &(pw_pin){ .name = "axle", .body = { "disc", "ground" } });
   pw_add_torque (m, &(pw_torque){ .name = "torque", .body = { "disc", "ground" }, .value = torque });
 }
 
-static const pw_plugin_table oscillator_table = { .abi = PW_ABI,
-                                                  .size = sizeof (pw_plugin_table),
-                                                  .parameters = oscillator_parameters,
-                                                  .parameters_size = sizeof (oscillator),
-                                                  .build = oscillator_build };
-
 static pw_system *mathieu_at (void *context, double a, pw_error *error) {
   (void)context, (void)error;
-  return scene_system (&oscillator_table, "a", a, "q", 1., NULL);
+  return scene_system (&oscillator_build_table, "a", a, "q", 1., NULL);
 }
 
 /* Mathieu's equation: characteristic values (DLMF 28.2), where the multipliers are -1, -1 or 1, 1, and between them. */
-static void test_mathieu (void **state) {
+TEST (mathieu) {
   static const struct {
     double a, re[2], im, accuracy;
   } row[] = { { 1.8591080725143634, { -1, -1 }, 0, 1e-4 },
@@ -179,7 +164,6 @@ static void test_mathieu (void **state) {
               { 3.917024772998471, { 1, 1 }, 0, 1e-4 },
               { 2.5, { -0.0483762, -0.0483762 }, 0.998829, 1e-6 },
               { 1, { -4.15605494, -0.2406128 }, 0, 6e-8 } };
-  (void)state;
   for (int i = 0; i < 6; i++) {
     pw_system *s = mathieu_at (NULL, row[i].a, NULL);
     pw_periodic *x = periodic_open (s, &(pw_periodic_settings){ .period = PW_PI });
@@ -197,8 +181,7 @@ static void test_mathieu (void **state) {
 }
 
 /* At the boundaries period doubles, or branches with the period of the forcing begin. */
-static void test_boundaries (void **state) {
-  (void)state;
+TEST (boundaries) {
   pw_system *s = mathieu_at (NULL, 3, NULL);
   const double end[] = { -0.3, 4.2 },
                exact[][2] = { { 1.8591080725143634, -0.11024881699209521 }, { 3.917024772998471 } };
@@ -218,12 +201,11 @@ static void test_boundaries (void **state) {
 
 static pw_system *growing_at (void *context, double p, pw_error *error) {
   (void)context, (void)error;
-  return scene_system (&oscillator_table, "p", p, "c", 1., NULL);
+  return scene_system (&oscillator_build_table, "p", p, "c", 1., NULL);
 }
 
 /* Rest of the undriven oscillator, seen with any period: multipliers exp ((p / 2 +- i w) T). */
-static void test_torus (void **state) {
-  (void)state;
+TEST (torus) {
   pw_system *s = growing_at (NULL, -0.5, NULL);
   pw_periodic_settings set = { .period = 2, .compile = growing_at, .first = -0.5, .last = 0.5 };
   pw_periodic *x = periodic_open (s, &set);
@@ -238,13 +220,12 @@ static void test_torus (void **state) {
 }
 
 /* Van der Pol's oscillator: the period by other authors' digits, the multiplier by Liouville's formula. */
-static void test_van_der_pol (void **state) {
+TEST (van_der_pol) {
   enum { SAMPLES = 800 };
   pw_error error = { 0 };
   pw_periodic_orbit o;
   double sum = 0;
-  (void)state;
-  pw_system *s = scene_system (&oscillator_table, "p", 1., "c", 1., "x", 2., NULL);
+  pw_system *s = scene_system (&oscillator_build_table, "p", 1., "c", 1., "x", 2., NULL);
   for (int given = 0; given < 2; given++) {
     pw_periodic *x = periodic_open (s, &(pw_periodic_settings){ .free = 1, .period = given * 6 });
     o = periodic_solve (x, given ? 10 : 0, 0);
@@ -263,7 +244,7 @@ static void test_van_der_pol (void **state) {
     pw_periodic_close (x);
   }
   pw_system_free (s);
-  s = scene_system (&oscillator_table, "p", -1., "c", 1., "x", 0.1, NULL); /* decays */
+  s = scene_system (&oscillator_build_table, "p", -1., "c", 1., "x", 0.1, NULL); /* decays */
   pw_periodic *x = periodic_open (s, &(pw_periodic_settings){ .free = 1, .period = 6 });
   assert_int_equal (pw_periodic_solve (x, 10, 0, &o, &error), PW_RETRY);
   assert_int_equal (error.status, PW_OK);
@@ -315,19 +296,16 @@ static void gait_compare (double bias, int settled) {
   pw_system_free (s);
 }
 
-static void test_gait (void **state) {
-  (void)state;
+TEST (gait) {
   gait_compare (0, 110);
 }
 
-static void test_turning_gait (void **state) {
-  (void)state;
+TEST (turning_gait) {
   gait_compare (0.002, 110);
 }
 
 /* The period follows the frequency. */
-static void test_frequency (void **state) {
-  (void)state;
+TEST (frequency) {
   pw_error error = { 0 };
   pw_system *s = gait_open (0, 3);
   pw_periodic *x = periodic_open (s, &(pw_periodic_settings){ .compile = gait_at, .first = 3, .last = 4, .points = 4 });
@@ -351,9 +329,8 @@ static void test_frequency (void **state) {
 
 /* ---- Periods and refusals ---- */
 
-static void test_refused (void **state) {
+TEST (refused) {
   pw_error error = { 0 };
-  (void)state;
   pw_system *s = gallery_open ("snakeboard", NULL);
   check_close ("period", pw_system_period (s), 2, 1e-14, "2 pi / omega");
   assert_null (pw_periodic_open (s, &(pw_periodic_settings){ .period = 1.9 }, &error));
@@ -379,9 +356,8 @@ static pw_system *snake_at (void *context, double n, pw_error *error) {
 }
 
 /* A parameter that changes the number of bodies is refused every time. */
-static void test_bodies (void **state) {
+TEST (bodies) {
   pw_periodic_orbit o;
-  (void)state;
   pw_system *s = snake_at (NULL, 3, NULL);
   pw_periodic *x = periodic_open (s, &(pw_periodic_settings){ .compile = snake_at, .first = 3, .last = 5 });
   for (int i = 0; i < 2; i++) {
@@ -395,8 +371,7 @@ static void test_bodies (void **state) {
 }
 
 /* A common period does not depend on the order of the signals. */
-static void test_common_period (void **state) {
-  (void)state;
+TEST (common_period) {
   for (int i = 0; i < 2; i++) {
     pw_model *m = scene_model (&scene_ezyroller, "omega", i == 0 ? 2 * PW_PI : 2 * PW_PI / 30, NULL);
     const pw_harmonic other = { .amplitude = 1, .omega = i == 0 ? 2 * PW_PI / 30 : 2 * PW_PI };
@@ -409,10 +384,9 @@ static void test_common_period (void **state) {
 }
 
 /* A trial far away is repeated nearer, instead of ending the search. */
-static void test_wild (void **state) {
+TEST (wild) {
   double u[40] = { 1e200 };
   pw_error error = { 0 };
-  (void)state;
   pw_system *s = gallery_open ("snakeboard", NULL);
   pw_periodic *x = periodic_open (s, &(pw_periodic_settings){ .period = 4 });
   assert_true (pw_periodic_unknowns (x) < 40);
@@ -422,10 +396,9 @@ static void test_wild (void **state) {
 }
 
 /* A search that could not be opened is refused. */
-static void test_missing (void **state) {
+TEST (missing) {
   pw_error e[5] = { { 0 } };
   pw_periodic_orbit o;
-  (void)state;
   assert_null (pw_periodic_open (NULL, &(pw_periodic_settings){ .period = 1 }, &e[0]));
   check_error (&e[0], PW_INPUT, "a system is missing");
   pw_system *s = mathieu_at (NULL, 1, NULL);
@@ -439,15 +412,4 @@ static void test_missing (void **state) {
   for (int i = 2; i < 5; i++) check_error (&e[i], PW_INPUT, "a search is missing");
   assert_string_equal (pw_periodic_reason (NULL), "");
   assert_int_equal (pw_periodic_symmetries (NULL), 0);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_pendulum),   cmocka_unit_test (test_folds),         cmocka_unit_test (test_mathieu),
-    cmocka_unit_test (test_boundaries), cmocka_unit_test (test_torus),         cmocka_unit_test (test_van_der_pol),
-    cmocka_unit_test (test_gait),       cmocka_unit_test (test_turning_gait),  cmocka_unit_test (test_frequency),
-    cmocka_unit_test (test_refused),    cmocka_unit_test (test_bodies),        cmocka_unit_test (test_missing),
-    cmocka_unit_test (test_wild),       cmocka_unit_test (test_common_period),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -26,8 +26,7 @@ static void periodic_shows (const char *text) {
   if (strstr (cli_out, text) == NULL) fail_msg ("\"%s\" is not in\n%s", text, cli_out);
 }
 
-static void test_motion (void **state) {
-  (void)state;
+TEST (motion) {
   cli_write ("oscillator.yaml", oscillator);
   cli_good ("pinwheel periodic @/oscillator.yaml -o @/one");
   periodic_shows ("oscillator: a periodic motion\n");
@@ -45,8 +44,7 @@ static void test_motion (void **state) {
 }
 
 /* A vehicle without multipliers but those of symmetries: a figure of its path. */
-static void test_without_multipliers (void **state) {
-  (void)state;
+TEST (without_multipliers) {
   cli_write ("tricycle.yaml", "pinwheel: 1\nparameters: [{name: steer, value: 0.2}]\n"
                               "bodies: [{name: car, mass: 2, inertia: 1, rate: {vx: 1}}]\nelements:\n"
                               "  - {wheel: rear, body: car, at: [-0.4, 0]}\n"
@@ -61,8 +59,7 @@ static void test_without_multipliers (void **state) {
 }
 
 /* Twice the period: the multipliers are squared. */
-static void test_periods (void **state) {
-  (void)state;
+TEST (periods) {
   cli_good ("pinwheel periodic @/oscillator.yaml --periods 2 -o @/two");
   const char *json = cli_file ("two/periodic.json");
   check_close ("re", cli_number (json, "motions", "multipliers", "re", NULL),
@@ -70,8 +67,7 @@ static void test_periods (void **state) {
                "steps of the derivatives: 1e-9 each");
 }
 
-static void test_free_period (void **state) {
-  (void)state;
+TEST (free_period) {
   cli_good ("pinwheel periodic @/oscillator.yaml --set A=0 --set mu=1 --start rod.phi=2 --period free");
   periodic_shows ("  period                       6.66328686 s, found\n");
   periodic_shows ("  trivial multipliers          1, of a shift in time\n");
@@ -80,8 +76,7 @@ static void test_free_period (void **state) {
 }
 
 /* A disc beside a pendulum that runs round: its angle is a symmetry. */
-static void test_trivial (void **state) {
-  (void)state;
+TEST (trivial) {
   cli_write ("disc.yaml", "pinwheel: 1\n"
                           "bodies:\n"
                           "  - {name: bob, mass: 1, start: {x: 0, y: -1}, rate: {vx: 5, omega: 5}}\n"
@@ -98,8 +93,7 @@ static void test_trivial (void **state) {
 }
 
 /* A pendulum that runs round: its multiplier is exp (-0.1 T) (Liouville).  A spring counts the turns. */
-static void test_turns (void **state) {
-  (void)state;
+TEST (turns) {
   cli_write ("running.yaml", "pinwheel: 1\n"
                              "parameters: [{name: k, value: 0}]\n"
                              "bodies:\n"
@@ -124,9 +118,8 @@ static void test_turns (void **state) {
 }
 
 /* The branch through both folds, and one row of the table for each point. */
-static void test_branch (void **state) {
+TEST (branch) {
   int rows = 0, folds = 0;
-  (void)state;
   cli_good ("pinwheel periodic @/oscillator.yaml --vary A=0.1:0.35 -o @/branch");
   periodic_shows ("  fold              0.255190316 ");
   periodic_shows ("  fold              0.146046589 ");
@@ -141,10 +134,9 @@ static void test_branch (void **state) {
 }
 
 /* All seven pairs of multipliers of seven oscillators are shown. */
-static void test_pairs (void **state) {
+TEST (pairs) {
   char text[4000];
   int n = snprintf (text, sizeof text, "pinwheel: 1\nbodies:\n");
-  (void)state;
   for (int i = 1; i <= 7; i++)
     n += snprintf (text + n, sizeof text - (size_t)n, "  - {name: b%d, mass: 1, inertia: 1}\n", i);
   n += snprintf (text + n, sizeof text - (size_t)n, "elements:\n");
@@ -164,8 +156,7 @@ static void test_pairs (void **state) {
 }
 
 /* A branch over the damping of a driven oscillator from 0 to 1, the end of its domain, and back. */
-static void test_domain (void **state) {
-  (void)state;
+TEST (domain) {
   cli_write ("damped.yaml", "pinwheel: 1\nparameters: [{name: c, value: 0.5, domain: nonnegative}]\n"
                             "bodies: [{name: rod, mass: 1, inertia: 1}]\nelements:\n"
                             "  - {pin: O, body: [ground, rod], at: [[0, 0], [0, 0]]}\n"
@@ -178,8 +169,7 @@ static void test_domain (void **state) {
 }
 
 /* A driven pendulum loses its symmetry at A = 1.00431948, where det (M - 1) of its own equation, by RK4, vanishes. */
-static void test_pitchfork (void **state) {
-  (void)state;
+TEST (pitchfork) {
   cli_write ("driven.yaml",
              "pinwheel: 1\n"
              "parameters: [{name: A, value: 0.5}]\n"
@@ -199,9 +189,8 @@ static void test_pitchfork (void **state) {
 }
 
 /* The dampings of two oscillators vanish within one step, at p = 0.31 and 0.33. */
-static void test_two_events (void **state) {
+TEST (two_events) {
   int events = 0;
-  (void)state;
   cli_write ("two.yaml", "pinwheel: 1\n"
                          "parameters: [{name: p, value: 0.1}]\n"
                          "bodies: [{name: a, mass: 1, inertia: 1}, {name: b, mass: 1, inertia: 1}]\n"
@@ -222,8 +211,7 @@ static void test_two_events (void **state) {
 }
 
 /* The heading of a wheel, and with it the consistent initial states, depend on the parameter. */
-static void test_constraint (void **state) {
-  (void)state;
+TEST (constraint) {
   cli_write (
       "gait.yaml",
       "pinwheel: 1\n"
@@ -240,8 +228,7 @@ static void test_constraint (void **state) {
 }
 
 /* Where the drive vanishes, no signal has a period: the branch keeps that of the motion before. */
-static void test_vanishing_drive (void **state) {
-  (void)state;
+TEST (vanishing_drive) {
   cli_good ("pinwheel periodic @/oscillator.yaml --vary A=0.2:0");
   periodic_shows ("  ends                        0      7.853982                 0               0             0 ");
   cli_write ("still.yaml", "pinwheel: 1\nparameters: [{name: A, value: 0}]\n"
@@ -265,8 +252,7 @@ static void test_vanishing_drive (void **state) {
 }
 
 /* Symmetries are those of the range: without the stiffness of the model's own value the body could be anywhere. */
-static void test_symmetries_of_range (void **state) {
-  (void)state;
+TEST (symmetries_of_range) {
   cli_write ("held.yaml", "pinwheel: 1\nparameters: [{name: k, value: 0}]\n"
                           "bodies: [{name: bob, mass: 1, inertia: 1, start: {x: 0.3}, rate: {vx: 0.1}}]\nelements:\n"
                           "  - {spring: s, body: [bob, ground], at: [[0, 0], [-2, 0]], stiffness: k, length: 2}\n"
@@ -278,8 +264,7 @@ static void test_symmetries_of_range (void **state) {
   periodic_shows ("  ends                        1      3.141593                 0 ");
 }
 
-static void test_limit (void **state) {
-  (void)state;
+TEST (limit) {
   cli_bad ("pinwheel periodic snakeboard --limit 1e-9 -o @/limit", 4, "--limit 1e-9: stopped; results are incomplete");
   /* in the search, and on the branch: by far less than the 0.6 s and 1.3 s that these take without a limit */
   cli_bad ("pinwheel periodic snakeboard --limit 0.01", 4, "--limit 0.01: stopped; results are incomplete");
@@ -287,7 +272,7 @@ static void test_limit (void **state) {
            "--limit 0.03: stopped; results are incomplete");
 }
 
-static void test_bad (void **state) {
+TEST (bad) {
   static const cli_wrong each[] = {
     { "snakeboard --period 1.9", "model snakeboard: signal swing.value does not repeat after 1.9 s" },
     { "snakeboard --period free",
@@ -308,7 +293,6 @@ static void test_bad (void **state) {
     { "snakeboard --vary mm=1:3", "model snakeboard has no parameter \"mm\"; did you mean \"m\"?" },
     { "chain --set n=200 --period 1", "model chain has 600 coordinates; periodic motions are sought with at most 100" },
   };
-  (void)state;
   cli_bad_each ("periodic", each, sizeof each / sizeof *each);
   cli_write ("two.yaml", "pinwheel: 1\nbodies: [{name: b, mass: 1, inertia: 1}]\nelements:\n"
                          "  - {force: f, body: b, fx: {harmonic: {amplitude: 1, omega: 1}}}\n"
@@ -322,8 +306,7 @@ static void test_bad (void **state) {
 }
 
 /* Without losses the snakeboard is faster after each period; a pendulum at rest stays there. */
-static void test_none (void **state) {
-  (void)state;
+TEST (none) {
   assert_int_equal (cli_run ("pinwheel periodic snakeboard -o @/none"), 4);
   assert_non_null (strstr (cli_err,
                            "snakeboard: no periodic motion with period 2 s found: Newton's method, begun after this "
@@ -340,8 +323,7 @@ static void test_none (void **state) {
 }
 
 /* A force that changes with time, except in the initial state, and one that acts for a short time. */
-static void test_vanishing (void **state) {
-  (void)state;
+TEST (vanishing) {
   cli_write ("grow.yaml", "pinwheel: 1\nbodies: [{name: m, mass: 1, inertia: 1, rate: {vx: 1}}]\nelements:\n"
                           "  - {force: f, body: m, fx: '-(1 + 0.5*cos (1.7*t))*m.x'}\n");
   cli_bad ("pinwheel periodic @/grow.yaml --period pi", 2,
@@ -354,26 +336,4 @@ static void test_vanishing (void **state) {
   cli_bad ("pinwheel periodic @/short.yaml --period 1", 2, "model short: signal g.fx does not repeat after 1 s");
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_motion),
-    cmocka_unit_test (test_periods),
-    cmocka_unit_test (test_free_period),
-    cmocka_unit_test (test_pitchfork),
-    cmocka_unit_test (test_two_events),
-    cmocka_unit_test (test_constraint),
-    cmocka_unit_test (test_branch),
-    cmocka_unit_test (test_trivial),
-    cmocka_unit_test (test_turns),
-    cmocka_unit_test (test_limit),
-    cmocka_unit_test (test_bad),
-    cmocka_unit_test (test_domain),
-    cmocka_unit_test (test_pairs),
-    cmocka_unit_test (test_none),
-    cmocka_unit_test (test_vanishing),
-    cmocka_unit_test (test_without_multipliers),
-    cmocka_unit_test (test_vanishing_drive),
-    cmocka_unit_test (test_symmetries_of_range),
-  };
-  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
-}
+const check_fixture fixture = { cli_setup, cli_teardown };

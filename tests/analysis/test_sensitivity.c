@@ -1,4 +1,4 @@
-/* `pinwheel sensitivity`: closed forms, outputs against differences of runs, files, bad input. */
+/* `pinwheel sensitivity`: closed forms, outputs against differences of runs, files, steps of differences, refusals. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -35,12 +35,11 @@ static int sensitivity_json (const char *key, double *value) {
 
 /* theta = (k/a) (gd (s t + c) - gd (c)), k^2 = I/m + a^2, A^2 = u0^2 + k^2 w0^2, s = a A/k^2, c = artanh (u0/A), at t
  * = 20, differentiated with 30 digits. */
-static void test_sleigh (void **state) {
+TEST (sleigh) {
   static const double expected[] = { -2.19064940477924161196941078323, 4.38129880955848322393882156646,
                                      -23.1682436429820667965804011701, -3.52690525296758368801569681518,
                                      -1.6156668371657765493636643037 };
   double x[SENSITIVITY_MOST], error[SENSITIVITY_MOST];
-  (void)state;
   cli_good ("pinwheel sensitivity chaplygin-sleigh --of sleigh.phi --by m --by I --by a --by u0 --by w0 -o @/sens");
   assert_int_equal (sensitivity_last (x), 7);
   for (int i = 0; i < 5; i++)
@@ -55,9 +54,8 @@ static void test_sleigh (void **state) {
 }
 
 /* The motion of a pendulum is a function of t sqrt (g/l): dphi/dl = -omega t / (2 l), dphi/dg = omega t / (2 g). */
-static void test_pendulum (void **state) {
+TEST (pendulum) {
   double x[SENSITIVITY_MOST];
-  (void)state;
   cli_good (
       "pinwheel sensitivity pendulum --of bob.phi --of bob.omega --by l --by g -o @/sens --method erk8+projection "
       "--rtol 1e-11");
@@ -67,9 +65,8 @@ static void test_pendulum (void **state) {
 }
 
 /* x = g sin (alpha) sin^2 (w t) / (2 w^2) on the incline: blade and gravity. */
-static void test_incline (void **state) {
+TEST (incline) {
   double x[SENSITIVITY_MOST], s = sin (10), k = s * s / 2, y = (10 - sin (20) / 2) / 2;
-  (void)state;
   cli_good ("pinwheel sensitivity knife-edge-incline --of skate.x --of skate.y --by g --by alpha --by w -o @/sens");
   assert_int_equal (sensitivity_last (x), 9);
   check_close ("dx/dg", x[2], 0.5 * k, 1e-8, "steps of 1e-9, 10 s");
@@ -79,8 +76,7 @@ static void test_incline (void **state) {
 }
 
 /* A torque that no step resolves, so late that steps vanish in the round-off of the time before they are 1e-12 T. */
-static void test_late (void **state) {
-  (void)state;
+TEST (late) {
   cli_write ("late.yaml", "pinwheel: 1\nrun: {t_end: 2e5, method: rk4, step: 1e3}\nparameters: [{name: p, value: 1}]\n"
                           "bodies: [{name: b, mass: 1, inertia: 1, rate: {omega: 1e4}}]\nelements:\n"
                           "  - {torque: T, body: [b, ground], value: \"p*1e12*max(0, t - 1e5)*sin(1e15*t)\"}\n");
@@ -106,9 +102,7 @@ static void sensitivity_values (const char *name, double value, double *out) {
 
 static void sensitivity_compare (const char *by, const char *name, double value, double step) {
   double derivative[SENSITIVITY_MOST], x[4][13];
-  char command[800];
-  snprintf (command, sizeof command, "pinwheel sensitivity ezyroller -t 3%s--by %s -o @/sens", sensitivity_outputs, by);
-  cli_good (command);
+  cli_good (check_text ("pinwheel sensitivity ezyroller -t 3%s--by %s -o @/sens", sensitivity_outputs, by));
   assert_int_equal (sensitivity_json ("\"derivative\": ", derivative), 13);
   for (int k = 0; k < 4; k++) sensitivity_values (name, value + (k < 2 ? k - 2 : k - 1) * step, x[k]);
   for (int i = 0; i < 13; i++) {
@@ -119,8 +113,7 @@ static void sensitivity_compare (const char *by, const char *name, double value,
   }
 }
 
-static void test_outputs (void **state) {
-  (void)state;
+TEST (outputs) {
   sensitivity_compare ("a", "set=a", 0.5, 1e-3);
   sensitivity_compare ("M0", "set=M0", 0.1, 1e-4);
   sensitivity_compare ("frame.phi", "start=frame.phi", 0, 1e-3);
@@ -128,9 +121,8 @@ static void test_outputs (void **state) {
 
 /* phi = exp (s - 40 + z) t^2 / 2: differences are extrapolated, on both sides of s, and on one side of z = 0, the end
  * of its domain.  A drive along cos t does the work I sin^2 (t) / 2: by the derivative of its multiplier. */
-static void test_parameters (void **state) {
+TEST (parameters) {
   double x[SENSITIVITY_MOST], error[SENSITIVITY_MOST];
-  (void)state;
   cli_write (
       "wheels.yaml",
       "pinwheel: 1\nparameters:\n  - {name: s, value: 40}\n  - {name: z, value: 0, domain: nonnegative}\n"
@@ -148,9 +140,8 @@ static void test_parameters (void **state) {
 }
 
 /* Integrals over 200 periods, against differences. */
-static void test_oscillation (void **state) {
+TEST (oscillation) {
   double x[2], value[2][SENSITIVITY_MOST];
-  (void)state;
   cli_write ("fast.yaml",
              "pinwheel: 1\nparameters:\n  - {name: c, value: 0.05, unit: N s/m}\n"
              "bodies:\n  - {name: a, mass: 1, inertia: 1, start: {x: 1.1}}\n"
@@ -170,13 +161,12 @@ static void test_oscillation (void **state) {
 }
 
 /* Integrals of reactions, which jump at breakpoints that move, against differences. */
-static void test_jumping_integrals (void **state) {
+TEST (jumping_integrals) {
   static const char command[] =
       "pinwheel sensitivity @/rod.yaml --of integral:A.Fx --of rms:A.Fx --of mean:A.Fy --of F.work "
       "--by s --by w -o @/sens -m erk8+projection --rtol 1e-11 --set s=%g --set w=%g";
   double x[SENSITIVITY_MOST], value[2][SENSITIVITY_MOST];
   char text[400];
-  (void)state;
   cli_write ("rod.yaml", "pinwheel: 1\nrun: {t_end: 2}\nparameters:\n  - {name: s, value: 0.5, unit: s}\n"
                          "  - {name: w, value: 0.7, unit: s}\n"
                          "bodies:\n  - {name: rod, mass: 1, inertia: 0.1, start: {x: 1}}\n"
@@ -210,9 +200,8 @@ static void test_jumping_integrals (void **state) {
 }
 
 /* A chain of ten rods amplifies errors of integration, which differ with the rows of the table, by 1e9 in 3 s. */
-static void test_chaos (void **state) {
+TEST (chaos) {
   double x[2], error[2];
-  (void)state;
   for (int i = 0; i < 2; i++) {
     cli_shell (i ? "pinwheel sensitivity chain --of link1.x --by l --every 0.1 -o @/sens"
                  : "pinwheel sensitivity chain --of link1.x --by l -o @/sens");
@@ -226,9 +215,8 @@ static void test_chaos (void **state) {
 }
 
 /* A breakpoint that moves: the accelerations before it and after it differ, whatever the times of rows. */
-static void test_pulse (void **state) {
+TEST (pulse) {
   double x[2][SENSITIVITY_MOST];
-  (void)state;
   cli_write (
       "pulse.yaml",
       "pinwheel: 1\nparameters:\n  - {name: s, value: 0.5, unit: s}\n"
@@ -252,10 +240,9 @@ static void test_pulse (void **state) {
 
 /* A maximum between two breakpoints, however near the next one is: for p < t < q the motion is x = 0.1 cos 2t + 0.25
  * sin 2t + (1 - cos 2 (t - p)) / 4, so that dx/dp = -sin (2 (t - p)) / 2. */
-static void test_extremum (void **state) {
+TEST (extremum) {
   const double p = 0.4, t = (PW_PI - atan ((1 - sin (2 * p)) / (cos (2 * p) - 0.4))) / 2;
   double slope[2];
-  (void)state;
   cli_write ("steps.yaml", "pinwheel: 1\nparameters: [{name: p, value: 0.4}, {name: q, value: 1.2}]\n"
                            "bodies: [{name: a, mass: 1, inertia: 1, start: {x: 0.1}, rate: {vx: 0.5}}]\nelements:\n"
                            "  - {force: s, body: a, fx: -4*a.x}\n"
@@ -272,8 +259,7 @@ static void test_extremum (void **state) {
 
 /* ---- Files ---- */
 
-static void test_files (void **state) {
-  (void)state;
+TEST (files) {
   cli_good ("pinwheel sensitivity pendulum --of bob.x --of max:bob.x --by l -t 1 --every 0.25 -o @/sens");
   const char *csv = cli_file ("sens/sensitivity.csv"), *head = "t [s],bob.x [m],d(bob.x)/d(l) [m per m]\n";
   int lines = 0;
@@ -294,15 +280,14 @@ static void test_files (void **state) {
   assert_non_null (strstr (cli_file ("sens/sensitivity.gp"), "label[1] = 'l × ∂/∂l'\n"));
 }
 
-/* ---- Bad input ---- */
+/* ---- Steps and errors of differences ---- */
 
 /* A parameter that is small compared with what it is added to, in a force or a length, and one over whose usual step
  * the force is not linear: other steps are found, and the error contains what remains. */
-static void test_steps (void **state) {
+TEST (steps) {
   static const char *const value[] = { "1e-6", "1e-8", "1e-10", "1e-12" }, *const place[] = { "1e3", "1e4", "1e5" };
-  char command[300], text[600];
+  char command[300];
   double x, error, expected = 0;
-  (void)state;
   cli_write ("small.yaml",
              "pinwheel: 1\nrun: {t_end: 2, method: erk8, rtol: 1e-11}\n"
              "parameters: [{name: p, value: 0}, {name: dl, value: 0, unit: m}]\n"
@@ -322,12 +307,12 @@ static void test_steps (void **state) {
       check_close ("within its error", x, expected, error + 1e-8, "the claim");
     }
   for (int i = 0; i < 3; i++) {
-    snprintf (text, sizeof text,
-              "pinwheel: 1\nrun: {t_end: 2, method: erk8, rtol: 1e-11}\nparameters: [{name: x0, value: %s}]\n"
-              "bodies: [{name: b, mass: 1, inertia: 1, start: {x: %s}}]\n"
-              "elements:\n  - {force: F, body: b, fx: '-sin(20*(b.x - x0))'}\n",
-              place[i], place[i]);
-    cli_write ("large.yaml", text);
+    cli_write (
+        "large.yaml",
+        check_text ("pinwheel: 1\nrun: {t_end: 2, method: erk8, rtol: 1e-11}\nparameters: [{name: x0, value: %s}]\n"
+                    "bodies: [{name: b, mass: 1, inertia: 1, start: {x: %s}}]\n"
+                    "elements:\n  - {force: F, body: b, fx: '-sin(20*(b.x - x0))'}\n",
+                    place[i], place[i]));
     cli_shell ("pinwheel sensitivity @/large.yaml --of b.x --by x0 -o @/sens");
     sensitivity_json ("\"derivative\": ", &x);
     check_close (place[i], x, 1 - cos (2 * sqrt (20)), 1e-6, "a linear oscillation near x0");
@@ -336,9 +321,8 @@ static void test_steps (void **state) {
 
 /* A mass on which initial velocities depend by round-off only, which no longer step would show better; a parameter
  * without effect on a stiff motion, whose error must not grow. */
-static void test_no_effect (void **state) {
+TEST (no_effect) {
   double x[2], error[2];
-  (void)state;
   cli_write ("mass.yaml",
              "pinwheel: 1\nrun: {t_end: 0.3, method: erk8, rtol: 1e-9}\nparameters: [{name: m, value: 1}]\n"
              "bodies: [{name: A, mass: m, inertia: 0.1, start: {phi: 0.5}, rate: {omega: 1}}]\n"
@@ -357,9 +341,8 @@ static void test_no_effect (void **state) {
 }
 
 /* A fast or heavy body whose energy does not depend on the parameter. */
-static void test_energies (void **state) {
+TEST (energies) {
   double x[2];
-  (void)state;
   cli_write ("energy.yaml",
              "pinwheel: 1\nrun: {t_end: 2, method: erk8, rtol: 1e-11}\nparameters: [{name: F, value: 0.001, unit: N}]\n"
              "bodies:\n  - {name: heavy, mass: 1e5, inertia: 1, start: {y: 100}, rate: {vx: 100}}\n"
@@ -388,15 +371,13 @@ static double damped_position (double m) {
 
 /* The error contains that of the run: mass and stiffness act through the run's accelerations, whose errors stiffness
  * magnifies. */
-static void test_run_error (void **state) {
+TEST (run_error) {
   static const char *const method[] = { "bdf+projection --rtol 1e-6", "bdf --rtol 1e-5",  "radau+ggl --rtol 1e-8",
                                         "ida+ggl --rtol 1e-6",        "erk5 --rtol 1e-4", "bdf" };
   const double m = 0.3, h = 1e-4 * m;
   double expected = (8 * (damped_position (m + h) - damped_position (m - h)) -
                      (damped_position (m + 2 * h) - damped_position (m - 2 * h))) /
                     (12 * h);
-  char command[200];
-  (void)state;
   cli_write (
       "damped.yaml",
       "pinwheel: 1\nrun: {t_end: 1}\nparameters: [{name: m, value: 0.3}]\n"
@@ -405,9 +386,7 @@ static void test_run_error (void **state) {
       "  - {spring: S, body: [ground, B], at: [[-10, 0], [0, 0]], stiffness: 350.7, damping: 31.1, length: 10}\n");
   for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
     double x, error;
-    snprintf (command, sizeof command, "pinwheel sensitivity @/damped.yaml --of B.x --by m -o @/sens --method %s",
-              method[i]);
-    cli_shell (command);
+    cli_shell (check_text ("pinwheel sensitivity @/damped.yaml --of B.x --by m -o @/sens --method %s", method[i]));
     sensitivity_json ("\"derivative\": ", &x);
     sensitivity_json ("\"error\": ", &error);
     check_close (method[i], x, expected, error, "the claim");
@@ -420,10 +399,8 @@ static void test_run_error (void **state) {
 
 /* A light body that follows its force within 1e-5 s, as the derivative (2 x 9 / k^2 at most) shows: by accelerations
  * of the equations instead of those of the run it would be 0.004 at rtol 1e-6, 0.06 at 1e-4. */
-static void test_light_body (void **state) {
+TEST (light_body) {
   static const char *const method[] = { "bdf --rtol 1e-6", "bdf --rtol 1e-4", "radau+ggl --rtol 1e-8" };
-  char command[200];
-  (void)state;
   cli_write (
       "light.yaml",
       "pinwheel: 1\nrun: {t_end: 1}\nparameters: [{name: m, value: 0.0286}]\n"
@@ -432,31 +409,27 @@ static void test_light_body (void **state) {
       "  - {spring: S, body: [ground, B], at: [[-10, 0], [0, 0]], stiffness: 1.9e5, damping: 4430, length: 10}\n");
   for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
     double x;
-    snprintf (command, sizeof command, "pinwheel sensitivity @/light.yaml --of B.x --by m -o @/sens --method %s",
-              method[i]);
-    cli_shell (command);
+    cli_shell (check_text ("pinwheel sensitivity @/light.yaml --of B.x --by m -o @/sens --method %s", method[i]));
     sensitivity_json ("\"derivative\": ", &x);
     check_below (method[i], fabs (x), 1e-4, "the error of the run's velocities, over m");
   }
 }
 
+/* ---- The command ---- */
+
 /* Outputs that differ after 400 characters have different columns. */
-static void test_long_names (void **state) {
+TEST (long_names) {
   char sum[600] = "bob.phi";
-  (void)state;
   while (strlen (sum) < 400) strcat (sum, "+bob.phi");
-  char command[2000], column[2000];
-  snprintf (command, sizeof command, "pinwheel sensitivity pendulum --of %s --of %s-1 --by m -t 0.1 -o @/sens", sum,
-            sum);
-  cli_good (command);
+  char column[2000];
+  cli_good (check_text ("pinwheel sensitivity pendulum --of %s --of %s-1 --by m -t 0.1 -o @/sens", sum, sum));
   snprintf (column, sizeof column, "t [s],%s,d(%s)/d(m),%s-1,d(%s-1)/d(m)\n", sum, sum, sum, sum);
   assert_int_equal (strncmp (cli_file ("sens/sensitivity.csv"), column, strlen (column)), 0);
 }
 
 /* Ctrl-C at a certain evaluation, in each part of the computation: it is no failure of that part. */
-static void test_interrupt (void **state) {
+TEST (interrupt) {
   int status = 130, interrupted = 0, without_errors = 0;
-  (void)state;
   cli_write ("stop.c",
              "#include <signal.h>\n#include <stdlib.h>\n#include \"pinwheel.h\"\n"
              "typedef struct { double k; } numbers;\n"
@@ -490,7 +463,7 @@ static void test_interrupt (void **state) {
   assert_true (interrupted > 5 && without_errors > 0);
 }
 
-static void test_refusals (void **state) {
+TEST (refusals) {
   static const cli_wrong each[] = {
     { "pendulum --by l", "--of is missing: expected an output, such as frame.x" },
     { "pendulum --of bob.x", "--by is missing: expected a parameter or an initial value" },
@@ -506,7 +479,6 @@ static void test_refusals (void **state) {
     { "pendulum --of bob.x --by l --method rk4:inputs=held",
       "derivatives need inputs=stage: held inputs depend on the steps" },
   };
-  (void)state;
   cli_bad_each ("sensitivity", each, sizeof each / sizeof *each);
   cli_bad ("pinwheel sensitivity pendulum --of 'sqrt(-bob.x^2-1)' --by l -t 1", 4,
            "sqrt(-bob.x^2-1) is not a finite number at the end of the run");
@@ -514,28 +486,4 @@ static void test_refusals (void **state) {
   assert_string_equal (cli_err, "pinwheel: --rtol has no effect: rk4+none takes steps of --step\n");
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_sleigh),
-    cmocka_unit_test (test_pendulum),
-    cmocka_unit_test (test_incline),
-    cmocka_unit_test (test_late),
-    cmocka_unit_test (test_outputs),
-    cmocka_unit_test (test_pulse),
-    cmocka_unit_test (test_files),
-    cmocka_unit_test (test_steps),
-    cmocka_unit_test (test_no_effect),
-    cmocka_unit_test (test_energies),
-    cmocka_unit_test (test_refusals),
-    cmocka_unit_test (test_interrupt),
-    cmocka_unit_test (test_long_names),
-    cmocka_unit_test (test_parameters),
-    cmocka_unit_test (test_chaos),
-    cmocka_unit_test (test_oscillation),
-    cmocka_unit_test (test_jumping_integrals),
-    cmocka_unit_test (test_extremum),
-    cmocka_unit_test (test_run_error),
-    cmocka_unit_test (test_light_body),
-  };
-  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
-}
+const check_fixture fixture = { cli_setup, cli_teardown };

@@ -8,12 +8,11 @@
 #include "scene.h"
 #include "trial.h"
 
-static pw_linear stability_of (void (*build) (pw_model *, const void *)) {
-  const pw_plugin_table table = TRIAL_TABLE (build);
+static pw_linear stability_of (const pw_plugin_table *table) {
   const pw_settings settings = { .span = 10 };
   pw_error error = { 0 };
   pw_linear l;
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &settings);
   check_ok (pw_run_linearise (r, 100, &l, &error), &error);
   for (int i = 1; i < l.unknowns; i++) assert_true (l.re[i] <= l.re[i - 1]);
@@ -82,10 +81,9 @@ static void stability_vehicle (pw_model *m, int i, const double start[3]) {
   pw_add_weld (m, &(pw_weld){ .name = weld, .body = { name, load } });
 }
 
-static void stability_train (pw_model *m, const void *parameters) {
+SCENE (stability_train) {
   double R = train.w != 0 ? train.u / train.w : 0, turned = -PW_PI / 2, x = 0, radius = R;
   char hitch[20], body[2][20];
-  (void)parameters;
   for (int i = 0; i < 4; i++) {
     if (i > 0 && train.w == 0) x -= train.L[i - 1];
     if (i > 0 && train.w != 0) {
@@ -109,15 +107,14 @@ static void stability_train (pw_model *m, const void *parameters) {
                                 .value = { PW_CONSTANT, { train.w } } });
 }
 
-static void test_trailers (void **state) {
+TEST (trailers) {
   static const double motion[][2] = { { 2, 0 }, { -2, 0 }, { 3, 0.5 }, { 3, 1e-3 }, { 0.02, 0.004 } };
-  (void)state;
   for (size_t k = 0; k < sizeof motion / sizeof *motion; k++)
     for (train.axle = WHEEL; train.axle <= LIGHT; train.axle++) {
       double L[3] = { 0.6, 0.8, 2.5 }, u = motion[k][0], w = motion[k][1], R = w != 0 ? u / w : 0;
       train.u = u, train.w = w;
       memcpy (train.L, L, sizeof L);
-      pw_linear l = stability_of (stability_train);
+      pw_linear l = stability_of (&stability_train_table);
       assert_int_equal (l.steady, PW_STEADY);
       assert_int_equal (l.symmetries, 3);
       check_close ("rate of turn", l.twist[2], w, 1e-12 * fabs (w), "round-off");
@@ -132,11 +129,10 @@ static void test_trailers (void **state) {
 }
 
 /* Trailers of equal length, straight ahead: a defective eigenvalue, which round-off would split. */
-static void test_defective (void **state) {
-  (void)state;
+TEST (defective) {
   train.axle = WHEEL, train.u = 2, train.w = 0;
   for (int i = 0; i < 3; i++) train.L[i] = 2;
-  pw_linear l = stability_of (stability_train);
+  pw_linear l = stability_of (&stability_train_table);
   for (int i = 3; i < 6; i++) {
     check_close ("re", l.re[i], -1, 1e-4, "a Jordan block of three: eps^(1/3)");
     assert_true (l.im[i] == 0);
@@ -148,8 +144,7 @@ static void test_defective (void **state) {
 
 static double sleigh;
 
-static void stability_sleigh (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (stability_sleigh) {
   pw_add_body (m, &(pw_body){ .name = "sleigh",
                               .mass = 3,
                               .inertia = 0.5,
@@ -158,11 +153,10 @@ static void stability_sleigh (pw_model *m, const void *parameters) {
   pw_add_wheel (m, &(pw_wheel){ .name = "blade", .body = "sleigh", .at = { -sleigh, 0 } });
 }
 
-static void test_sleigh (void **state) {
-  (void)state;
+TEST (sleigh) {
   for (int side = -1; side <= 1; side += 2) {
     sleigh = 0.2 * side;
-    pw_linear l = stability_of (stability_sleigh);
+    pw_linear l = stability_of (&stability_sleigh_table);
     assert_int_equal (l.steady, PW_STEADY);
     assert_int_equal (l.symmetries, 3);
     assert_int_equal (stability_zeros (&l), 1);
@@ -176,8 +170,7 @@ static void test_sleigh (void **state) {
 static const double car_m = 1500, car_I = 2500, car_a = 1.6, car_b = 1, car_C = 40000;
 static double car_v;
 
-static void stability_car (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (stability_car) {
   pw_add_body (m, &(pw_body){ .name = "car", .mass = car_m, .inertia = car_I, .rate = { car_v, 0, 0 } });
   pw_add_tyre (m, &(pw_tyre){ .name = "front", .body = "car", .at = { car_a, 0 }, .stiffness = car_C, .speed = 1e-3 });
   pw_add_tyre (m, &(pw_tyre){ .name = "rear", .body = "car", .at = { -car_b, 0 }, .stiffness = car_C, .speed = 1e-3 });
@@ -185,15 +178,14 @@ static void stability_car (pw_model *m, const void *parameters) {
 
 /* Sideslip and yaw: the eigenvalues of a 2 x 2 matrix.  The tyre's regularising speed changes them by (1e-3 / v)^2 =
  * 4e-9. */
-static void test_car (void **state) {
+TEST (car) {
   double L = car_a + car_b, moment = car_C * (car_a - car_b);
   double critical = sqrt (car_C * car_C * L * L / (car_m * moment));
-  (void)state;
   for (int k = -1; k <= 1; k++) {
     double v = car_v = critical * (1 + 0.1 * k), a = -2 * car_C / (car_m * v), b = -moment / (car_m * v) - v;
     double c = -moment / (car_I * v), d = -car_C * (car_a * car_a + car_b * car_b) / (car_I * v);
     double half = (a + d) / 2, root = sqrt (half * half - a * d + b * c);
-    pw_linear l = stability_of (stability_car);
+    pw_linear l = stability_of (&stability_car_table);
     assert_int_equal (l.steady, PW_STEADY);
     assert_int_equal (l.symmetries, 3);
     stability_has (&l, half + root, 0, 1e-7, "10 times the change by the regularising speed");
@@ -236,8 +228,7 @@ static const pw_signal stability_torques[] = {
   { PW_PULSE, .pulse = { .height = 100, .start = 7.0003, .width = 0.01 } },
 };
 
-static void stability_scene (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (stability_scene) {
   pw_add_body (m, &(pw_body){ .name = "body",
                               .mass = 2,
                               .inertia = 2,
@@ -257,7 +248,7 @@ static void stability_scene (pw_model *m, const void *parameters) {
         m, &(pw_torque){ .name = "torque", .body = { "body", "ground" }, .value = stability_torques[scene.torque] });
 }
 
-static void test_scenes (void **state) {
+TEST (scenes) {
   const double J = 2 + 2 * 0.49, g = 9.81;
   const struct {
     int pinned, gravity, spring, torque, drag;
@@ -282,12 +273,11 @@ static void test_scenes (void **state) {
     { .torque = 5, .phi = 0.3, .v = 2, .steady = PW_CHANGING, .symmetries = 3 },
     { .torque = 3, .phi = 0, .v = 1, .steady = PW_STEADY, .symmetries = 2, .square = -1 },
   };
-  (void)state;
   for (size_t i = 0; i < sizeof each / sizeof *each; i++) {
     scene.pinned = each[i].pinned, scene.gravity = each[i].gravity, scene.spring = each[i].spring;
     scene.torque = each[i].torque, scene.drag = each[i].drag;
     scene.phi = each[i].phi, scene.v = each[i].v, scene.omega = each[i].omega;
-    pw_linear l = stability_of (stability_scene);
+    pw_linear l = stability_of (&stability_scene_table);
     if ((int)l.steady != (int)each[i].steady || l.symmetries != each[i].symmetries)
       fail_msg ("scene %zu: steady %d, %d symmetries", i, l.steady, l.symmetries);
     double s = sqrt (fabs (each[i].square));
@@ -321,11 +311,10 @@ static void stability_hinges (double disturbance, double out[2][5]) {
 
 /* Differences of runs with opposite perturbations satisfy d'' - s d' + p d = 0 over equal time intervals, with s
  * and p the sum and the product of both exponentials; permanent changes cancel in the differences (Prony 1795). */
-static void test_disturbed (void **state) {
+TEST (disturbed) {
   double up[2][5], down[2][5], d[2][4];
   pw_error error = { 0 };
   pw_linear l;
-  (void)state;
   stability_hinges (1e-4, up);
   stability_hinges (-1e-4, down);
   for (int i = 0; i < 2; i++)
@@ -344,12 +333,4 @@ static void test_disturbed (void **state) {
   pw_linear_free (&l);
   pw_run_close (r);
   pw_system_free (s);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_trailers), cmocka_unit_test (test_defective), cmocka_unit_test (test_sleigh),
-    cmocka_unit_test (test_car),      cmocka_unit_test (test_scenes),    cmocka_unit_test (test_disturbed),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -5,14 +5,8 @@
 #include "gallery.h"
 #include "runs.h"
 #include "scene.h"
+#include "steady_case.h"
 #include "steady_parts.h"
-
-typedef struct {
-  pw_system *s;
-  pw_steady *x;
-  pw_initial_value hold[4];
-  pw_steady_settings set;
-} steady;
 
 static int held (const pw_system *s, const char *name) {
   pw_error error = { 0 };
@@ -25,44 +19,16 @@ static void steady_hold (steady *t, const char *name, double value) {
   t->hold[t->set.holds++] = (pw_initial_value){ held (t->s, name), value };
 }
 
-static void steady_open (steady *t) {
-  pw_error error = { 0 };
-  t->set.hold = t->hold;
-  t->set.span = 10;
-  t->x = pw_steady_open (t->s, &t->set, &error);
-  check_ok (t->x ? PW_OK : error.status, &error);
-}
-
-static void steady_close (steady *t) {
-  pw_steady_close (t->x);
-  pw_system_free (t->s);
-}
-
-static pw_steady_motion steady_solve (steady *t, int attempt, double parameter) {
-  pw_error error = { 0 };
-  pw_steady_motion m;
-  check_ok (pw_steady_solve (t->x, attempt, parameter, &m, &error), &error);
-  return m;
-}
-
 static double value_of (const steady *t, const char *name, const pw_steady_motion *m) {
   return pw_system_held_value (t->s, held (t->s, name), m->q, m->v);
-}
-
-/* 1 if `re` is among the real eigenvalues, to 1e-9 of its size. */
-static void steady_expect (const pw_linear *l, double re, double im) {
-  double least = INFINITY;
-  for (int i = 0; i < l->unknowns; i++) least = fmin (least, hypot (l->re[i] - re, l->im[i] - im));
-  check_below ("distance to the nearest eigenvalue", least, 1e-9 * (hypot (re, im) + 1), "exact derivatives");
 }
 
 /* ---- Trailers ---- */
 
 /* From a turn of another radius and speed: R_i^2 = R_(i-1)^2 - L_i^2. */
-static void test_turn (void **state) {
+TEST (turn) {
   const double L[] = { 0.6, 0.8 };
   double R = 2, w = 1.5;
-  (void)state;
   steady t = { .s = gallery_open ("n-trailer", "w", 0.7, "R", 5., NULL), .set.vary = -1 };
   steady_hold (&t, "tractor.omega", w);
   steady_hold (&t, "tractor.radius", R);
@@ -82,8 +48,7 @@ static void test_turn (void **state) {
 }
 
 /* Straight ahead hinges decay at u / L_i, backwards they grow. */
-static void test_straight (void **state) {
-  (void)state;
+TEST (straight) {
   for (double u = -3; u < 4; u += 6) {
     steady t = { .s = gallery_open ("n-trailer", "R", 5., NULL), .set.vary = -1 };
     steady_hold (&t, "tractor.speed", u);
@@ -98,9 +63,8 @@ static void test_straight (void **state) {
 }
 
 /* Each trailer is stable or folded back: four motions, with 0, 1, 1, 2 growing modes. */
-static void test_folded (void **state) {
+TEST (folded) {
   int found[2][2] = { { 0 } };
-  (void)state;
   steady t = { .s = gallery_open ("n-trailer", NULL), .set.vary = -1 };
   steady_hold (&t, "tractor.speed", 2);
   steady_hold (&t, "tractor.radius", 2);
@@ -122,9 +86,8 @@ static void test_folded (void **state) {
 }
 
 /* Speed and turn rate are free: the nearest motion is that of the model, and both are suggested, with their values. */
-static void test_family (void **state) {
+TEST (family) {
   pw_initial_value more[4];
-  (void)state;
   steady t = { .s = gallery_open ("n-trailer", NULL), .set.vary = -1 };
   steady_open (&t);
   pw_steady_motion m = steady_solve (&t, 0, 0);
@@ -138,11 +101,10 @@ static void test_family (void **state) {
 }
 
 /* Derivatives of what is held: by the state against central differences, and by its value. */
-static void test_held (void **state) {
+TEST (held) {
   static const char *const names[] = { "trailer1.speed", "trailer1.radius", "trailer1.curvature", "trailer1.vx" };
   const double step = 1e-6;
   double dq[9], dv[9], r[3];
-  (void)state;
   steady t = { .s = gallery_open ("n-trailer", NULL), .set.vary = -1 };
   steady_open (&t);
   pw_steady *x = t.x;
@@ -163,9 +125,8 @@ static void test_held (void **state) {
 }
 
 /* Mirrored turns differ; displaced ones do not. */
-static void test_same (void **state) {
+TEST (same) {
   double q[9], v[9], other[9], turned[9], c = cos (1.2), s = sin (1.2);
-  (void)state;
   steady t = { .s = gallery_open ("n-trailer", NULL), .set.vary = -1 };
   steady_open (&t);
   pw_steady_motion m = steady_solve (&t, 0, 0);
@@ -186,9 +147,8 @@ static void test_same (void **state) {
 
 /* In a turn so slight that it is linear: u / (L + K u^2) per steering angle, with the understeer gradient
  * K = m (b Cr - a Cf) / (L Cf Cr). */
-static void test_understeer (void **state) {
+TEST (understeer) {
   double C = 8e4, a = 1.2, b = 1.4, L = a + b, u = 30, steer = 1e-5, K = 1000 * (b * C - a * C) / (L * C * C);
-  (void)state;
   steady t = { .s = gallery_open ("car-tyres", "steer", steer, "u", u, NULL), .set.vary = -1 };
   steady_open (&t);
   pw_steady_motion m = steady_solve (&t, 0, 0);
@@ -202,35 +162,9 @@ static pw_system *car_at (void *context, double u, pw_error *error) {
   return gallery_open ("car-tyres", "steer", 0., "a", 1.4, "b", 1.2, "u", u, NULL);
 }
 
-typedef struct {
-  int count[5];
-  double at[5][3];
-} branch_events;
-
-/* Follows a branch to its end: events by type. */
-static branch_events steady_follow (steady *t, const pw_steady_motion *from, int direction) {
-  branch_events e = { .count = { 0 } };
-  pw_error error = { 0 };
-  double q[60], v[60];
-  pw_steady_motion m;
-  size_t bytes = (size_t)pw_system_coordinates (t->s) * sizeof *q;
-  memcpy (q, from->q, bytes), memcpy (v, from->v, bytes);
-  check_ok (pw_steady_follow (t->x, q, v, from->parameter, direction, &error), &error);
-  for (;;) {
-    check_ok (pw_steady_next (t->x, &m, &error), &error);
-    if (e.count[m.event] < 3) e.at[m.event][e.count[m.event]] = m.parameter;
-    e.count[m.event]++;
-    if (m.event == PW_STEADY_END) break;
-    assert_true (e.count[PW_STEADY_POINT] < 5000);
-  }
-  assert_string_equal (pw_steady_reason (t->x), "");
-  return e;
-}
-
 /* v sqrt (v^2 + s^2) = L^2 Cf Cr / (m (Cf a - Cr b)) = 52^2, with the tyre's speed constant s = 0.01 m/s. */
-static void test_critical_speed (void **state) {
+TEST (critical_speed) {
   double s2 = 1e-4, exact = sqrt ((sqrt (s2 * s2 + 4 * pow (52, 4)) - s2) / 2);
-  (void)state;
   steady t = { .s = car_at (NULL, 20, NULL), .set = { .vary = -1, .compile = car_at, .first = 20, .last = 60 } };
   steady_open (&t);
   pw_steady_motion m = steady_solve (&t, 0, 20);
@@ -243,244 +177,11 @@ static void test_critical_speed (void **state) {
   steady_close (&t);
 }
 
-/* ---- A rod on a turning hub ---- */
-
-typedef struct {
-  double W, beta;
-} whirl;
-
-static const pw_parameter whirl_parameters[] = { { PW_AT (whirl, W), 2, "rad/s", "", PW_REAL },
-                                                 { PW_AT (whirl, beta), 0.1, "rad", "", PW_REAL },
-                                                 { .name = NULL } };
-
-/* The rod (m = 2, I = 0.1, l = 0.3) points inwards from its hinge at d = 0.5, with a torsion spring (k = 3, c = 0.3):
- * with the angle theta from there,  (I + m l^2) theta'' = -c theta' - k (theta - beta) + m d l W^2 sin theta. */
-static void whirl_build (pw_model *m, const void *parameters) {
-  const whirl *p = parameters;
-  pw_add_body (m, &(pw_body){ .name = "hub", .mass = 1, .inertia = 1, .rate = { 0, 0, p->W } });
-  pw_add_body (m, &(pw_body){ .name = "rod", .mass = 2, .inertia = 0.1, .start = { 0.2, 0, PW_PI } });
-  pw_add_pin (m, &(pw_pin){ .name = "centre", .body = { "hub", "ground" } });
-  pw_add_speed (
-      m, &(pw_speed){
-             .name = "spin", .body = "hub", .at = { 1, 0 }, .heading = PW_PI / 2, .value = { .constant = p->W } });
-  pw_add_pin (m, &(pw_pin){ .name = "hinge", .body = { "hub", "rod" }, .at = { { 0.5, 0 }, { -0.3, 0 } } });
-  pw_add_rotational_spring (
-      m, &(pw_rotational_spring){
-             .name = "twist", .body = { "rod", "hub" }, .stiffness = 3, .damping = 0.3, .angle = PW_PI + p->beta });
-}
-
-static const pw_plugin_table whirl_table = { .abi = PW_ABI,
-                                             .size = sizeof (pw_plugin_table),
-                                             .parameters = whirl_parameters,
-                                             .parameters_size = sizeof (whirl),
-                                             .build = whirl_build };
-
-static pw_system *whirl_at (void *beta, double W, pw_error *error) {
-  (void)error;
-  return scene_system (&whirl_table, "W", W, "beta", *(double *)beta, NULL);
-}
-
-static steady whirl_open (double *beta) {
-  steady t = { .s = whirl_at (beta, 2, NULL),
-               .set = { .vary = -1, .compile = whirl_at, .context = beta, .first = 0.5, .last = 8 } };
-  steady_open (&t);
-  return t;
-}
-
-/* Without the free angle: a pitchfork at W^2 = k / (m d l), after which the rod is stable on both sides. */
-static void test_pitchfork (void **state) {
-  double beta = 0;
-  int sides = 0;
-  (void)state;
-  steady t = whirl_open (&beta);
-  pw_steady_motion m = steady_solve (&t, 0, 0.5);
-  branch_events e = steady_follow (&t, &m, 1);
-  assert_int_equal (e.count[PW_STEADY_REAL], 1);
-  check_close ("pitchfork", e.at[PW_STEADY_REAL][0], sqrt (10), 1e-8, "located to 1e-9 of a step of 0.15 rad/s");
-  for (int k = 0; k <= 30; k++) {
-    m = steady_solve (&t, k, 5);
-    double theta = remainder (m.q[5] - m.q[2] - PW_PI, 2 * PW_PI);
-    check_close ("equilibrium", 3 * theta, 0.3 * 25 * sin (theta), 1e-9, "Newton to round-off");
-    assert_int_equal (m.unstable, fabs (theta) < 0.1);
-    sides |= theta > 0.1 ? 1 : theta < -0.1 ? 2 : 4;
-  }
-  assert_int_equal (sides, 7);
-  steady_close (&t);
-}
-
-/* A second rod, with a stiffer spring. */
-static void twins_build (pw_model *m, const void *parameters) {
-  whirl_build (m, parameters);
-  pw_add_body (m, &(pw_body){ .name = "second", .mass = 2, .inertia = 0.1, .start = { -0.2, 0, 0 } });
-  pw_add_pin (m, &(pw_pin){ .name = "joint", .body = { "hub", "second" }, .at = { { -0.5, 0 }, { -0.3, 0 } } });
-  pw_add_rotational_spring (
-      m, &(pw_rotational_spring){ .name = "bend", .body = { "second", "hub" }, .stiffness = 3.2, .damping = 0.3 });
-}
-
-static pw_system *twins_at (void *context, double W, pw_error *error) {
-  pw_plugin_table table = whirl_table;
-  (void)context, (void)error;
-  table.build = twins_build;
-  return scene_system (&table, "W", W, "beta", 0., NULL);
-}
-
-/* Two changes between two points, of which there are few. */
-static void test_two_changes (void **state) {
-  (void)state;
-  steady t = { .s = twins_at (NULL, 2, NULL),
-               .set = { .vary = -1, .compile = twins_at, .first = 0.5, .last = 8, .points = 1 } };
-  steady_open (&t);
-  pw_steady_motion m = steady_solve (&t, 0, 0.5);
-  branch_events e = steady_follow (&t, &m, 1);
-  assert_int_equal (e.count[PW_STEADY_REAL], 2);
-  assert_int_equal (e.count[PW_STEADY_OSCILLATION], 0);
-  check_close ("first", e.at[PW_STEADY_REAL][0], sqrt (10), 1e-8, "located to 1e-9 of a step of 5 rad/s");
-  check_close ("second", e.at[PW_STEADY_REAL][1], sqrt (3.2 / 0.3), 1e-8, "located to 1e-9 of a step of 5 rad/s");
-  steady_close (&t);
-}
-
-/* With it: a branch that turns where tan theta = theta - beta.  AUTO-07p, on the equation above as two of first order,
- * has its limit point at W = 3.5200604503, theta = -0.631659. */
-static void test_fold (void **state) {
-  double beta = 0.1, W, theta;
-  pw_steady_motion m;
-  (void)state;
-  steady t = whirl_open (&beta);
-  for (int k = 1, unstable = 0; !unstable; k++) {
-    m = steady_solve (&t, k, 8);
-    unstable = m.unstable;
-    assert_true (k < 30);
-  }
-  branch_events e = steady_follow (&t, &m, -1);
-  assert_int_equal (e.count[PW_STEADY_FOLD], 1);
-  assert_int_equal (e.count[PW_STEADY_REAL] + e.count[PW_STEADY_OSCILLATION], 0);
-  theta = -0.6316594726612051; /* a root of tan theta = theta - 0.1 */
-  W = sqrt (3 * (theta - beta) / (0.3 * sin (theta)));
-  check_close ("fold", e.at[PW_STEADY_FOLD][0], W, 1e-9, "quadratic in the distance along the branch");
-  check_close ("fold", e.at[PW_STEADY_FOLD][0], 3.5200604503, 1e-9, "the digits of AUTO-07p");
-  steady_close (&t);
-}
-
-/* Eigenvalues of a steady motion in closed form: (I + m l^2) mu^2 + c mu + k - m d l W^2 cos theta = 0. */
-static void test_whirl_eigenvalues (void **state) {
-  double beta = 0.1, J = 0.1 + 2 * 0.09;
-  (void)state;
-  steady t = whirl_open (&beta);
-  pw_steady_motion m = steady_solve (&t, 0, 2.5);
-  double theta = m.q[5] - m.q[2] - PW_PI, k = 3 - 0.3 * 6.25 * cos (theta);
-  steady_expect (m.linear, -0.3 / (2 * J), sqrt (k / J - pow (0.3 / (2 * J), 2)));
-  steady_close (&t);
-}
-
-/* ---- A caster that shimmies ---- */
-
-typedef struct {
-  double c, V, y;
-} caster;
-
-static const pw_parameter caster_parameters[] = { { PW_AT (caster, c), 0.5, "N s/m", "", PW_REAL },
-                                                  { PW_AT (caster, V), 5, "m/s", "", PW_REAL },
-                                                  { PW_AT (caster, y), 0, "m", "", PW_REAL },
-                                                  { .name = NULL } };
-
-/* A cart with constant speed V draws a caster (m = 1, J = 0.01) whose kingpin (mass 0.2) gives way sideways (k = 100,
- * c); its wheel is l = 0.1 after the kingpin, its centre of mass e = 0.02.  With A = (l - e) m + l 0.2 and I = J + (l
- * - e)^2 m + l^2 0.2, small motions have
- *
- *     I mu^3 + (A V + l^2 c) mu^2 + (l^2 k + l c V) mu + l k V = 0. */
-static void caster_build (pw_model *m, const void *parameters) {
-  const caster *p = parameters;
-  pw_add_body (m, &(pw_body){ .name = "cart", .mass = 1, .inertia = 1, .rate = { p->V } });
-  pw_add_body (m, &(pw_body){ .name = "king", .mass = 0.2, .inertia = 1, .start = { 0, p->y }, .rate = { p->V } });
-  pw_add_body (m,
-               &(pw_body){ .name = "wheel", .mass = 1, .inertia = 0.01, .start = { -0.02, p->y }, .rate = { p->V } });
-  pw_add_slider (m, &(pw_slider){ .name = "road", .body = { "cart", "ground" } });
-  pw_add_speed (m, &(pw_speed){ .name = "drive", .body = "cart", .value = { .constant = p->V } });
-  pw_add_slider (m, &(pw_slider){ .name = "rail", .body = { "king", "cart" }, .heading = PW_PI / 2 });
-  pw_add_spring (m, &(pw_spring){ .name = "side",
-                                  .body = { "cart", "king" },
-                                  .at = { { 0, -1 } },
-                                  .stiffness = 100,
-                                  .damping = p->c,
-                                  .length = 1 });
-  pw_add_pin (m, &(pw_pin){ .name = "kingpin", .body = { "king", "wheel" }, .at = { { 0 }, { 0.02, 0 } } });
-  pw_add_wheel (m, &(pw_wheel){ .name = "contact", .body = "wheel", .at = { -0.08, 0 } });
-}
-
-static const pw_plugin_table caster_table = { .abi = PW_ABI,
-                                              .size = sizeof (pw_plugin_table),
-                                              .parameters = caster_parameters,
-                                              .parameters_size = sizeof (caster),
-                                              .build = caster_build };
-
-static pw_system *caster_at (void *context, double V, pw_error *error) {
-  (void)context, (void)error;
-  return scene_system (&caster_table, "V", V, NULL);
-}
-
-/* The polynomial has imaginary roots where (A V + l^2 c) (l k + c V) = I k V, of frequency^2 = l (l k + c V) / I. */
-static void caster_boundaries (double V[2]) {
-  double k = 100, c = 0.5, l = 0.1, A = 0.08 + 0.02, I = 0.01 + 0.0064 + 0.002;
-  double half = (A * l * k + l * l * c * c - I * k) / (2 * A * c), root = sqrt (half * half - l * l * l * k / A);
-  V[0] = -half - root, V[1] = -half + root;
-}
-
-static void test_shimmy (void **state) {
-  double exact[2];
-  (void)state;
-  caster_boundaries (exact);
-  steady t = { .s = caster_at (NULL, 0.05, NULL),
-               .set = { .vary = -1, .compile = caster_at, .first = 0.05, .last = 30, .points = 1 } };
-  steady_open (&t);
-  assert_int_equal (pw_steady_symmetries (t.x), 1);
-  pw_steady_motion m = steady_solve (&t, 0, 0.05);
-  branch_events e = steady_follow (&t, &m, 1);
-  assert_int_equal (e.count[PW_STEADY_OSCILLATION], 2);
-  for (int i = 0; i < 2; i++)
-    check_close ("boundary", e.at[PW_STEADY_OSCILLATION][i], exact[i], 1e-8, "located to 1e-9 of a step of 0.3 m/s");
-  steady_close (&t);
-}
-
-/* The growth rate of a run that begins beside the straight motion, from its deflections in two spans of ten periods. */
-static double caster_growth (double V, double frequency) {
-  pw_system *s = scene_system (&caster_table, "V", V, "y", 1e-6, NULL);
-  pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3 });
-  double most[2] = { 0 }, span = 10 / frequency;
-  for (int i = 0; i < 2; i++)
-    for (double t = (i + 1) * span; t < (i + 1.3) * span; t += 1e-3) {
-      pw_sample x = runs_to (r, t);
-      most[i] = fmax (most[i], fabs (x.q[4]));
-    }
-  pw_run_close (r);
-  pw_system_free (s);
-  return log (most[1] / most[0]) / span;
-}
-
-/* On both sides of a boundary runs grow and decay at the rate of the eigenvalue. */
-static void test_shimmy_runs (void **state) {
-  double exact[2];
-  (void)state;
-  caster_boundaries (exact);
-  for (int i = 0; i < 4; i++) {
-    double V = exact[1] * (i < 2 ? 0.85 + 0.1 * i : 0.85 + 0.1 * i);
-    steady t = { .s = caster_at (NULL, V, NULL), .set.vary = -1 };
-    steady_open (&t);
-    pw_steady_motion m = steady_solve (&t, 0, 0);
-    assert_int_equal (m.unstable, V < exact[1] ? 2 : 0);
-    int k = 0;
-    while (k + 1 < m.linear->unknowns && m.linear->im[k] == 0) k++;
-    check_close ("growth rate", caster_growth (V, m.linear->im[k] / (2 * PW_PI)), m.linear->re[k],
-                 3e-3 * fabs (m.linear->re[k]) + 1e-3, "samples of a maximum: 1e-3 s of its period of 0.1 s, squared");
-    steady_close (&t);
-  }
-}
-
 /* ---- Refusals ---- */
 
-static void test_refused (void **state) {
+TEST (refused) {
   pw_error error = { 0 };
   pw_steady_motion m;
-  (void)state;
   pw_system *s = gallery_open ("snakeboard", NULL);
   const pw_steady_settings set = { .vary = -1, .span = 10 };
   assert_null (pw_steady_open (s, &set, &error));
@@ -503,10 +204,9 @@ static pw_system *trailers_at (void *context, double n, pw_error *error) {
   return gallery_open ("n-trailer", "n", n, NULL);
 }
 
-static void test_bodies (void **state) {
+TEST (bodies) {
   pw_error error = { 0 };
   pw_steady_motion m;
-  (void)state;
   steady t = { .s = trailers_at (NULL, 2, NULL), .set = { .vary = -1, .compile = trailers_at, .first = 2, .last = 4 } };
   steady_open (&t);
   assert_int_equal (pw_steady_solve (t.x, 0, 3, &m, &error), PW_INPUT);
@@ -525,9 +225,8 @@ static const pw_parameter discs_parameters[] = { { PW_AT (discs, count), 1, "", 
                                                  { PW_AT (discs, k), 0, "N m/rad", "", PW_REAL },
                                                  { .name = NULL } };
 
-static void discs_build (pw_model *m, const void *parameters) {
+SCENE_WITH (discs_build, discs_parameters, discs) {
   static const char *const name[] = { "one", "two" };
-  const discs *p = parameters;
   for (int i = 0; i < p->count; i++) {
     pw_add_body (m, &(pw_body){ .name = name[i], .mass = 1, .inertia = 1 });
     if (p->pinned != 0) pw_add_pin (m, &(pw_pin){ .name = i ? "pin2" : "pin1", .body = { name[i], "ground" } });
@@ -537,23 +236,16 @@ static void discs_build (pw_model *m, const void *parameters) {
         m, &(pw_rotational_spring){ .name = "spring", .body = { "one", "ground" }, .stiffness = p->k });
 }
 
-static const pw_plugin_table discs_table = { .abi = PW_ABI,
-                                             .size = sizeof (pw_plugin_table),
-                                             .parameters = discs_parameters,
-                                             .parameters_size = sizeof (discs),
-                                             .build = discs_build };
-
 /* A rotation of the whole about the axis less those of the discs displaces nothing and is no symmetry.  Symmetries: the
  * angle of each disc without a spring; x, y and the angle of a free disc. */
-static void test_concentric (void **state) {
+TEST (concentric) {
   static const struct {
     double count, pinned, k;
     int symmetries;
   } scene[] = { { 1, 1, 3, 0 }, { 1, 1, 0, 1 }, { 2, 1, 3, 1 }, { 2, 1, 0, 2 }, { 1, 0, 0, 3 } };
-  (void)state;
   for (size_t i = 0; i < sizeof scene / sizeof *scene; i++) {
-    steady t = { .s = scene_system (&discs_table, "count", scene[i].count, "pinned", scene[i].pinned, "k", scene[i].k,
-                                    NULL),
+    steady t = { .s = scene_system (&discs_build_table, "count", scene[i].count, "pinned", scene[i].pinned, "k",
+                                    scene[i].k, NULL),
                  .set.vary = -1 };
     steady_open (&t);
     assert_int_equal (pw_steady_symmetries (t.x), scene[i].symmetries);
@@ -562,12 +254,11 @@ static void test_concentric (void **state) {
 }
 
 /* The result NULL of a failed call is refused by the next, and the first error stays. */
-static void test_missing (void **state) {
+TEST (missing) {
   pw_error error = { 0 };
   pw_steady_motion m;
   pw_linear l;
   pw_sample sample;
-  (void)state;
   assert_null (pw_steady_open (NULL, &(pw_steady_settings){ .vary = -1 }, &error));
   check_error (&error, PW_INPUT, "a system is missing");
   assert_int_equal (pw_steady_solve (NULL, 0, 0, &m, &error), PW_INPUT);
@@ -580,19 +271,4 @@ static void test_missing (void **state) {
   assert_int_equal (pw_variation_sample (NULL, 0, &sample, NULL, &error), PW_INPUT);
   assert_int_equal (pw_system_find_state (NULL, "x", &error), PW_INPUT);
   check_error (&error, PW_INPUT, "a system is missing");
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_turn),           cmocka_unit_test (test_straight),
-    cmocka_unit_test (test_folded),         cmocka_unit_test (test_family),
-    cmocka_unit_test (test_same),           cmocka_unit_test (test_understeer),
-    cmocka_unit_test (test_critical_speed), cmocka_unit_test (test_pitchfork),
-    cmocka_unit_test (test_fold),           cmocka_unit_test (test_whirl_eigenvalues),
-    cmocka_unit_test (test_shimmy),         cmocka_unit_test (test_shimmy_runs),
-    cmocka_unit_test (test_refused),        cmocka_unit_test (test_bodies),
-    cmocka_unit_test (test_concentric),     cmocka_unit_test (test_missing),
-    cmocka_unit_test (test_held),           cmocka_unit_test (test_two_changes),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -11,8 +11,7 @@ static void steady_shows (const char *text) {
 }
 
 /* A turn of the n-trailer, and what to hold to select it. */
-static void test_motion (void **state) {
-  (void)state;
+TEST (motion) {
   cli_good ("pinwheel steady n-trailer --starts 0 -o @/turn");
   steady_shows ("n-trailer: 1 steady motion up to 3 symmetries, from the initial state and 0 random ones\n");
   steady_shows (
@@ -29,10 +28,9 @@ static void test_motion (void **state) {
 }
 
 /* Options that select a motion are given in full. */
-static void test_long_advice (void **state) {
+TEST (long_advice) {
   char text[1000];
   size_t n = (size_t)snprintf (text, sizeof text, "pinwheel: 1\nabout: free bodies\nbodies:\n");
-  (void)state;
   for (int i = 0; i < 6; i++)
     n +=
         (size_t)snprintf (text + n, sizeof text - n,
@@ -49,9 +47,8 @@ static double table_number (const char *line, int column) {
 }
 
 /* The car of the manual: the row of the event, and one row for each point. */
-static void test_branch (void **state) {
+TEST (branch) {
   int rows = 0, events = 0;
-  (void)state;
   cli_good ("pinwheel steady car-tyres --set steer=0 --set a=1.4 --set b=1.2 --vary u=20:60 --starts 2 -o @/car");
   steady_shows ("car-tyres: 1 branch of steady motions up to 3 symmetries, u from 20 to 60\n");
   steady_shows ("       1  zero eigenvalue    51.9999995        0                0                \n");
@@ -72,8 +69,7 @@ static void test_branch (void **state) {
 }
 
 /* What is held is varied; the rest is held as in the initial motion, which is reported. */
-static void test_vary_held (void **state) {
-  (void)state;
+TEST (vary_held) {
   assert_int_equal (cli_run ("pinwheel steady n-trailer --vary tractor.curvature=0.1:0.5 --starts 0 -o @/held"), 0);
   assert_string_equal (cli_err, "pinwheel: holding tractor.speed=2, as in the motion nearest to the initial state\n");
   const char *json = cli_file ("held/steady.json");
@@ -82,9 +78,8 @@ static void test_vary_held (void **state) {
 }
 
 /* A pitchfork at p = 1 of two curved branches, x = 3 sin p and (x - 3 sin p)^2 = p - 1. */
-static void test_curved_pitchfork (void **state) {
+TEST (curved_pitchfork) {
   static const double last[] = { 1.5, 5, 9 };
-  (void)state;
   cli_write ("fork.yaml", "pinwheel: 1\nparameters: [{name: p, value: 0.2}]\n"
                           "bodies: [{name: b, mass: 1, inertia: 1, start: {x: 3*sin(p)}}]\nelements:\n"
                           "  - {force: f, body: b, fy: -b.y - b.vy, "
@@ -92,9 +87,7 @@ static void test_curved_pitchfork (void **state) {
                           "  - {rotational-spring: s, body: [b, ground], stiffness: 3, damping: 0.2}\n");
   for (size_t k = 0; k < sizeof last / sizeof *last; k++) {
     int events = 0;
-    char command[200];
-    snprintf (command, sizeof command, "pinwheel steady @/fork.yaml --vary p=0.2:%g -o @/fork", last[k]);
-    cli_good (command);
+    cli_good (check_text ("pinwheel steady @/fork.yaml --vary p=0.2:%g -o @/fork", last[k]));
     for (const char *line = strchr (cli_file ("fork/steady.csv"), '\n') + 1; *line; line = strchr (line, '\n') + 1) {
       double p = table_number (line, 2);
       check_close ("residual", table_number (line, 4), 0, 1e-9, "Newton's tolerance, or the cubic near the pitchfork");
@@ -107,10 +100,9 @@ static void test_curved_pitchfork (void **state) {
 }
 
 /* Equilibria on the circle x^2 + p^2 = 1, which reaches neither end of the range: followed once around. */
-static void test_closed_branch (void **state) {
+TEST (closed_branch) {
   int points = 0, folds = 0;
   double beyond[2] = { 0 };
-  (void)state;
   cli_write ("circle.yaml", "pinwheel: 1\nparameters: [{name: p, value: 0.5}]\n"
                             "bodies: [{name: b, mass: 1, inertia: 1, start: {x: -0.8}}]\nelements:\n"
                             "  - {slider: rail, body: [b, ground], at: [[0, 0], [0, 0]]}\n"
@@ -143,8 +135,7 @@ static int steady_lines (const char *start) {
 /* Branches are closed though the vehicle has moved, or a body turned, in a circuit; all motions at the value in the
  * model are on the same one.  A trailer of 1 m behind an axle: tan steer = 0.5 at the folds.  Where a spring winds up,
  * none is closed, and it is followed in both directions. */
-static void test_turned_branch (void **state) {
-  (void)state;
+TEST (turned_branch) {
   cli_write ("turned.yaml", "pinwheel: 1\nparameters: [{name: steer, value: 0}]\nbodies:\n"
                             "  - {name: tractor, mass: 2, inertia: 1, rate: {vx: 1}}\n"
                             "  - {name: trailer, mass: 1, inertia: 0.5, start: {phi: 0}}\nelements:\n"
@@ -175,11 +166,10 @@ static void test_turned_branch (void **state) {
 
 /* Where the speed is 0, any angle of the trailer is an equilibrium, and no velocities are left: there the eigenvalue
  * -u/1.3 of the trailer changes its sign, and -m a u/(I + m a^2) of the sleigh, whatever the range. */
-static void test_standstill (void **state) {
+TEST (standstill) {
   static const char *const each[] = { "trailer.yaml --vary u=-3:3", "trailer.yaml --vary u=3:-2",
                                       "trailer.yaml --vary u=-5:1", "sleigh.yaml --vary u=-1:2",
                                       "sleigh.yaml --vary u=-3:1" };
-  (void)state;
   cli_write ("trailer.yaml", "pinwheel: 1\nparameters: [{name: u, value: -1}]\nbodies:\n"
                              "  - {name: tractor, mass: 2, inertia: 1, rate: {vx: u}}\n"
                              "  - {name: trailer, mass: 1, inertia: 0.5, start: {phi: 0}}\nelements:\n"
@@ -193,10 +183,8 @@ static void test_standstill (void **state) {
              "bodies: [{name: s, mass: 2, inertia: 0.4, rate: {vx: u}}]\nelements:\n"
              "  - {speed: e, body: s, at: [-0.3, 0], value: u}\n  - {wheel: w, body: s, at: [-0.3, 0]}\n");
   for (size_t k = 0; k < sizeof each / sizeof *each; k++) {
-    char command[200];
     int events = 0;
-    snprintf (command, sizeof command, "pinwheel steady @/%s --starts 0 -o @/still", each[k]);
-    cli_good (command);
+    cli_good (check_text ("pinwheel steady @/%s --starts 0 -o @/still", each[k]));
     for (const char *line = strchr (cli_file ("still/steady.csv"), '\n') + 1; *line; line = strchr (line, '\n') + 1) {
       if (strncmp (line, "1,point,", 8) == 0) continue;
       assert_int_equal (strncmp (line, "1,zero eigenvalue,", 18), 0);
@@ -211,8 +199,7 @@ static void test_standstill (void **state) {
 }
 
 /* Without modes but rigid displacements there is a figure, too, and no message of gnuplot. */
-static void test_without_modes (void **state) {
-  (void)state;
+TEST (without_modes) {
   cli_write ("tricycle.yaml", "pinwheel: 1\nparameters: [{name: steer, value: 0.2}]\n"
                               "bodies: [{name: car, mass: 2, inertia: 1, rate: {vx: 1}}]\nelements:\n"
                               "  - {wheel: rear, body: car, at: [-0.4, 0]}\n"
@@ -224,27 +211,23 @@ static void test_without_modes (void **state) {
 }
 
 /* A disc that spins freely on a car, listed first or last: its angle makes no other motion. */
-static void test_spin (void **state) {
+TEST (spin) {
   static const char *const body[] = { "  - {name: disc, mass: 1, inertia: 0.1, rate: {vx: 1, omega: 2}}\n",
                                       "  - {name: car, mass: 2, inertia: 1, start: {x: -0.2}, rate: {vx: 1}}\n" };
-  (void)state;
   for (int k = 0; k < 2; k++) {
-    char text[1000];
-    snprintf (text, sizeof text,
-              "pinwheel: 1\nbodies:\n%s%selements:\n  - {wheel: rear, body: car, at: [0, 0]}\n"
-              "  - {wheel: front, body: car, at: [0.5, 0], heading: 0.2}\n"
-              "  - {speed: engine, body: car, at: [0, 0], value: 1}\n"
-              "  - {pin: P, body: [disc, car], at: [[0, 0], [0.2, 0]]}\n",
-              body[k], body[1 - k]);
-    cli_write ("spin.yaml", text);
+    cli_write ("spin.yaml",
+               check_text ("pinwheel: 1\nbodies:\n%s%selements:\n  - {wheel: rear, body: car, at: [0, 0]}\n"
+                           "  - {wheel: front, body: car, at: [0.5, 0], heading: 0.2}\n"
+                           "  - {speed: engine, body: car, at: [0, 0], value: 1}\n"
+                           "  - {pin: P, body: [disc, car], at: [[0, 0], [0.2, 0]]}\n",
+                           body[k], body[1 - k]));
     cli_good ("pinwheel steady @/spin.yaml --hold disc.omega=2 --starts 10");
     steady_shows ("spin: 1 steady motion up to 4 symmetries, ");
   }
 }
 
 /* Signals that stop changing: from then on there are steady motions. */
-static void test_ramp (void **state) {
-  (void)state;
+TEST (ramp) {
   cli_write ("ramp.yaml", "pinwheel: 1\nrun: {t_end: 5}\nbodies: [{name: car, mass: 2, inertia: 1, rate: {vx: 1}}]\n"
                           "elements:\n  - {wheel: rear, body: car, at: [-0.4, 0]}\n"
                           "  - {steered-wheel: front, body: car, at: [0.5, 0], "
@@ -261,8 +244,7 @@ static void test_ramp (void **state) {
 
 /* The ends of branches are those of the range to the last bit; the motion is found once, whatever angle it is found
  * at. */
-static void test_ends (void **state) {
-  (void)state;
+TEST (ends) {
   cli_good ("pinwheel steady pendulum --vary l=0.7:1.3 --starts 0 -o @/ends");
   const char *line = strchr (cli_file ("ends/steady.csv"), '\n') + 1;
   assert_true (table_number (line, 2) == 0.7);
@@ -287,10 +269,9 @@ static void test_ends (void **state) {
 }
 
 /* Seventy discs that turn freely: a symmetry each. */
-static void test_many_symmetries (void **state) {
+TEST (many_symmetries) {
   char text[12000];
   int n = snprintf (text, sizeof text, "pinwheel: 1\nbodies:\n");
-  (void)state;
   for (int i = 0; i < 70; i++)
     n += snprintf (text + n, sizeof text - (size_t)n, "  - {name: d%d, mass: 1, inertia: 1}\n", i);
   n += snprintf (text + n, sizeof text - (size_t)n, "elements:\n");
@@ -303,8 +284,7 @@ static void test_many_symmetries (void **state) {
 }
 
 /* At rest the resistance and its derivative are 0: the velocity is exactly 0 as well. */
-static void test_rest (void **state) {
-  (void)state;
+TEST (rest) {
   cli_write ("rest.yaml", "pinwheel: 1\nbodies: [{name: b, mass: 1, inertia: 1, rate: {vx: 1}}]\nelements:\n"
                           "  - {slider: rail, body: [b, ground], at: [[0, 0], [0, 0]]}\n"
                           "  - {drag: air, body: b, quadratic: 1}\n");
@@ -314,8 +294,7 @@ static void test_rest (void **state) {
 }
 
 /* Straight ahead the hinges decay at u / L; the motion of the model is a turn. */
-static void test_linearise (void **state) {
-  (void)state;
+TEST (linearise) {
   cli_good ("pinwheel linearise n-trailer --steady --hold tractor.speed=3 --hold tractor.omega=0");
   steady_shows ("n-trailer, steady motion at t = 0 s: 7 minimal coordinates");
   steady_shows ("     6         -3.75 ");
@@ -329,15 +308,13 @@ static void test_linearise (void **state) {
   assert_null (cli_file ("none.json"));
 }
 
-static void test_limit (void **state) {
-  (void)state;
+TEST (limit) {
   cli_bad ("pinwheel steady n-trailer --limit 1e-9 -o @/limit", 4, "--limit 1e-9: stopped; results are incomplete");
 }
 
 /* One body on two springs, the truss of von Mises: it has fewer equations than a plane has displacements, and no
  * symmetry.  With k = 100 N/m, h = 3 m: fold and zero eigenvalues in closed form. */
-static void test_one_body (void **state) {
-  (void)state;
+TEST (one_body) {
   cli_write (
       "truss.yaml",
       "pinwheel: 1\nparameters: [{name: F, value: 0}]\nbodies: [{name: m, mass: 1, inertia: 1, start: {y: 3}}]\n"
@@ -352,7 +329,7 @@ static void test_one_body (void **state) {
   assert_non_null (strstr (cli_out, "zero eigenvalue    238.6312"));
 }
 
-static void test_bad (void **state) {
+TEST (bad) {
   static const cli_wrong each[] = {
     { "n-trailer --hold tractor.radus=1",
       "model n-trailer has no state \"tractor.radus\"; did you mean \"tractor.radius\"?" },
@@ -370,7 +347,6 @@ static void test_bad (void **state) {
                     "`pinwheel periodic` finds periodic ones" },
     { "chain --set n=200", "model chain has 600 coordinates; steady motions are sought with at most 400" },
   };
-  (void)state;
   cli_bad_each ("steady", each, sizeof each / sizeof *each);
   cli_bad (
       "pinwheel steady theo-jansen --starts 3", 4,
@@ -384,8 +360,7 @@ static void test_bad (void **state) {
 
 /* Where the range begins there may be more symmetries: without stiffness or slope a body can be anywhere or have any
  * direction.  Branches have the symmetries within the range, and begin at its other end, or within it. */
-static void test_more_symmetries (void **state) {
-  (void)state;
+TEST (more_symmetries) {
   cli_write ("held.yaml", "pinwheel: 1\nparameters: [{name: k, value: 0}]\n"
                           "bodies: [{name: bob, mass: 1, inertia: 1, start: {x: 0.3}, rate: {vx: 0.1}}]\nelements:\n"
                           "  - {spring: s, body: [bob, ground], at: [[0, 0], [-2, 0]], stiffness: k, length: 2}\n");
@@ -421,8 +396,7 @@ static void test_more_symmetries (void **state) {
 }
 
 /* An oscillator on a car that turns at 1 rad/s: the frequency of a Hopf event is its own, not that of the frame. */
-static void test_hopf_in_a_turn (void **state) {
-  (void)state;
+TEST (hopf_in_a_turn) {
   cli_write ("turn.yaml", "pinwheel: 1\nparameters: [{name: p, value: 0.2}]\nbodies:\n"
                           "  - {name: car, mass: 2, inertia: 1, rate: {vx: 3, omega: 1}}\n"
                           "  - {name: arm, mass: 1, inertia: 1, rate: {vx: 3, omega: 1}}\nelements:\n"
@@ -437,8 +411,7 @@ static void test_hopf_in_a_turn (void **state) {
 }
 
 /* A parameter of a model in C need not have a unit. */
-static void test_without_unit (void **state) {
-  (void)state;
+TEST (without_unit) {
   cli_write ("unitless.c", "#include \"pinwheel.h\"\ntypedef struct { double v; } numbers;\n"
                            "static const pw_parameter list[] = { { PW_AT (numbers, v), 1 }, { .name = NULL } };\n"
                            "static void build (pw_model *m, const void *p) {\n"
@@ -454,29 +427,4 @@ static void test_without_unit (void **state) {
   steady_shows ("  v                          1             1  m ");
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_motion),
-    cmocka_unit_test (test_long_advice),
-    cmocka_unit_test (test_branch),
-    cmocka_unit_test (test_vary_held),
-    cmocka_unit_test (test_linearise),
-    cmocka_unit_test (test_limit),
-    cmocka_unit_test (test_bad),
-    cmocka_unit_test (test_curved_pitchfork),
-    cmocka_unit_test (test_closed_branch),
-    cmocka_unit_test (test_turned_branch),
-    cmocka_unit_test (test_standstill),
-    cmocka_unit_test (test_without_modes),
-    cmocka_unit_test (test_ramp),
-    cmocka_unit_test (test_spin),
-    cmocka_unit_test (test_ends),
-    cmocka_unit_test (test_rest),
-    cmocka_unit_test (test_many_symmetries),
-    cmocka_unit_test (test_one_body),
-    cmocka_unit_test (test_without_unit),
-    cmocka_unit_test (test_more_symmetries),
-    cmocka_unit_test (test_hopf_in_a_turn),
-  };
-  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
-}
+const check_fixture fixture = { cli_setup, cli_teardown };

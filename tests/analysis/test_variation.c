@@ -66,11 +66,7 @@ static pw_system *block_make (const void *context, double value) {
     { PW_AT (block, height), 0, "", "", 0 }, { PW_AT (block, start), 1, "", "", 0 },
     { PW_AT (block, width), 1, "", "", 0 },  { 0 }
   };
-  static const pw_plugin_table table = { .abi = PW_ABI,
-                                         .size = sizeof (pw_plugin_table),
-                                         .parameters = parameters,
-                                         .parameters_size = sizeof (block),
-                                         .build = block_build };
+  static const pw_plugin_table table = SCENE_TABLE_WITH (block_build, parameters, sizeof (block));
   const block *b = context;
   return scene_system (&table, "k", b->k, "c", b->c, "m", b->m, "x0", b->x0, "height", b->height, "start", b->start,
                        "width", b->width, b->name, value, NULL);
@@ -108,12 +104,11 @@ static void block_derive (block b, const char *name, const char *method, double 
 }
 
 /* x = x0 cos (w t), w^2 = k / m; by methods of every family. */
-static void test_oscillator (void **state) {
+TEST (oscillator) {
   static const char *const methods[] = {
     "rk4", "erk5", "erk8", "adams", "bdf", "radau", "ida+ggl", "galpha", "leapfrog"
   };
   const double t = 3, w = 2;
-  (void)state;
   for (size_t i = 0; i < sizeof methods / sizeof *methods; i++) {
     block b = { .k = 8, .m = 2, .x0 = 0.3, .start = 99, .width = 1 };
     double d[3], bound = strcmp (methods[i], "galpha") && strcmp (methods[i], "leapfrog") ? 2e-8 : 1e-5;
@@ -139,10 +134,9 @@ static void stiff_closed (double k, double c, double t, double out[3]) {
 
 /* A rate of 2e4/s beside one of 1/s, by adaptive methods and by rk4: the derivatives
  * are as accurate as those of slow motions, and their steps are much longer than an explicit method could make. */
-static void test_stiff (void **state) {
+TEST (stiff) {
   static const char *const methods[] = { "radau", "bdf", "ida+ggl", "rk4" };
   const double t = 1, k = 4e4, c = 4e4;
-  (void)state;
   for (int i = 0; i < 8; i++) {
     const char *method = methods[i / 2];
     double value = i % 2 ? c : k, step = 1e-4 * value, plus[3], minus[3];
@@ -172,9 +166,8 @@ static void test_stiff (void **state) {
 
 /* Differences with a step that changes nothing, or little: their errors contain the result, and a few better steps
  * lead to an accurate one. */
-static void test_steps (void **state) {
+TEST (steps) {
   const double t = 3, steps[] = { 1e-19, 1e-15 };
-  (void)state;
   for (int i = 0; i < 2; i++) {
     block b = { .name = "x0", .k = 8, .m = 2, .x0 = 1e-12, .start = 99, .width = 1 };
     double step, next = steps[i], got;
@@ -201,10 +194,9 @@ static void test_steps (void **state) {
 }
 
 /* A free block pushed from `start` on for `width`: afterwards v = F width / m, x = v (t - start - width / 2). */
-static void test_breakpoints (void **state) {
+TEST (breakpoints) {
   block b = { .m = 2, .height = 3, .start = 0.5, .width = 0.7 };
   double d[3];
-  (void)state;
   for (int i = 0; i < 3; i++) {
     const char *method = (const char *[]){ "rk4", "erk8", "bdf" }[i];
     block_derive (b, "start", method, 2, d);
@@ -261,7 +253,6 @@ static void gallery_check (const gallery_name *g, double value, const pw_setting
   double step = 1e-5 * (value != 0 ? fabs (value) : 1), most = 0;
   pw_error error = { 0 };
   pw_sample x;
-  char what[200];
   variation_case c = variation_open (gallery_make, g, value, step, method, settings);
   int n = pw_system_coordinates (c.s);
   double *by_runs = calloc (2 * (size_t)n, sizeof *by_runs);
@@ -272,8 +263,8 @@ static void gallery_check (const gallery_name *g, double value, const pw_setting
   check_ok (pw_variation_sample (v, 0, &x, NULL, &error), &error);
   for (int j = 0; j < 2 * n; j++) most = fmax (most, fabs (by_runs[j]));
   for (int j = 0; j < 2 * n; j++) {
-    snprintf (what, sizeof what, "%s, state %d by %s", g->model, j, g->parameter);
-    check_close (what, j < n ? x.q[j] : x.v[j - n], by_runs[j], 10 * off + 1e-6 * most + 1e-8 / (1e5 * step),
+    check_close (check_text ("%s, state %d by %s", g->model, j, g->parameter), j < n ? x.q[j] : x.v[j - n], by_runs[j],
+                 10 * off + 1e-6 * most + 1e-8 / (1e5 * step),
                  "error of the differences, and of a run with steps of 1 ms");
   }
   pw_variation_close (v);
@@ -299,11 +290,10 @@ static void gallery_derive (const gallery_name *g, double value, const char *met
 }
 
 /* x^2 + y^2 = l^2 and its time derivative, differentiated by l; the steps alone leave the constraints. */
-static void test_tangent (void **state) {
+TEST (tangent) {
   const gallery_name g = { "pendulum", "l" };
   pw_settings settings = { .step = 1e-3, .span = 20 };
   double d[6], q[3], v[3];
-  (void)state;
   gallery_derive (&g, 1, "rk4+projection", &settings, 20, d);
   pw_system *s = gallery_make (&g, 1);
   runs_state (s, "rk4+projection", &settings, 20, q, v, NULL);
@@ -313,10 +303,9 @@ static void test_tangent (void **state) {
 }
 
 /* Without an error the result is the same, at steps of 1 % of the frequency, where the extrapolation matters. */
-static void test_no_error (void **state) {
+TEST (no_error) {
   const gallery_name g = { "ezyroller", "omega" };
   double value[2];
-  (void)state;
   for (int no_error = 0; no_error < 2; no_error++) {
     pw_sample x, e;
     pw_error error = { 0 };
@@ -336,24 +325,22 @@ static void test_no_error (void **state) {
 }
 
 /* Few steps of a method of high order: the states inside them are found to its tolerance. */
-static void test_few_steps (void **state) {
+TEST (few_steps) {
   const gallery_name g = { "chaplygin-sleigh", "a" };
   double few[6], many[6];
-  (void)state;
   gallery_derive (&g, 0.25, "erk8", &(pw_settings){ .rtol = 1e-5, .span = 20 }, 20, few);
   gallery_derive (&g, 0.25, "erk8", &(pw_settings){ .rtol = 1e-10, .span = 20 }, 20, many);
   check_close ("dphi/da", few[2], many[2], 1e-6 * fabs (many[2]), "a tenth of the tolerance");
 }
 
 /* Methods of every family agree on a vehicle. */
-static void test_methods (void **state) {
+TEST (methods) {
   static const char *const methods[] = { "rk4+nullspace", "rk4+baumgarte",  "erk5+projection", "erk8+projection",
                                          "adams",         "bdf+projection", "ida+ggl",         "radau+ggl",
                                          "galpha+ggl",    "leapfrog+rattle" };
   double expected[24], x[24];
   const gallery_name g = { "snakeboard", "steer" };
   pw_settings settings = { .step = 5e-4, .rtol = 1e-9, .span = 2 };
-  (void)state;
   gallery_derive (&g, 0.4, "rk4+projection", &settings, 2, expected);
   for (size_t i = 0; i < sizeof methods / sizeof *methods; i++) {
     gallery_derive (&g, 0.4, methods[i], &settings, 2, x);
@@ -391,20 +378,18 @@ static int gallery_model (void *context, const char *name, const char *path) {
   return 0;
 }
 
-static void test_gallery (void **state) {
+TEST (gallery) {
   pw_error error = { 0 };
   int count = 0;
-  (void)state;
   check_ok (pw_file_list (gallery_model, &count, &error), &error);
   assert_true (count > 100);
 }
 
 /* ---- Refusals, the run itself ---- */
 
-static void test_refusals (void **state) {
+TEST (refusals) {
   pw_error error = { 0 };
   block b = { .name = "k", .k = 8, .m = 2, .x0 = 0.3, .start = 99, .width = 1 };
-  (void)state;
   variation_case c = variation_open (block_make, &b, 8, 1e-4, "rk4:inputs=held", NULL);
   assert_null (pw_variation_open (c.r, &c.d, 1, 0, &error));
   check_error (&error, PW_INPUT, "derivatives need inputs=stage: held inputs depend on the steps");
@@ -419,12 +404,11 @@ static void test_refusals (void **state) {
 }
 
 /* The run makes the same steps with derivatives and without. */
-static void test_run (void **state) {
+TEST (run) {
   static const char *const methods[] = { "rk4+projection", "erk8+projection", "bdf+projection", "ida", "radau" };
   pw_error error = { 0 };
   double q[12], v[12];
   gallery_name g = { "ezyroller", "a" };
-  (void)state;
   for (int i = 0; i < 5; i++) {
     pw_settings settings = { .span = 2, .step = 1e-3 };
     variation_case c = variation_open (gallery_make, &g, 0.5, 1e-5, methods[i], &settings);
@@ -438,14 +422,4 @@ static void test_run (void **state) {
     pw_variation_close (x);
     variation_free (&c);
   }
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_no_error), cmocka_unit_test (test_few_steps), cmocka_unit_test (test_oscillator),
-    cmocka_unit_test (test_stiff),    cmocka_unit_test (test_steps),     cmocka_unit_test (test_breakpoints),
-    cmocka_unit_test (test_tangent),  cmocka_unit_test (test_methods),   cmocka_unit_test (test_gallery),
-    cmocka_unit_test (test_refusals), cmocka_unit_test (test_run),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -7,9 +7,7 @@
 
 /* A page written in the folder, whole; to be released. */
 static char *animate_page (const char *name) {
-  char path[4200];
-  snprintf (path, sizeof path, "%s/%s", cli_folder, name);
-  FILE *f = fopen (path, "rb");
+  FILE *f = fopen (cli_path (name), "rb");
   assert_non_null (f);
   char *page = calloc (1, 4000000);
   assert_non_null (page);
@@ -44,9 +42,8 @@ static int animate_numbers (const char *page, const char *key, double *first, do
 }
 
 /* The end of the motion is that of the summary; every sample has two bodies of six numbers. */
-static void test_motion (void **state) {
+TEST (motion) {
   double first, last, omega;
-  (void)state;
   cli_good ("pinwheel run ezyroller --t-end 3 --animate @/run.html --json -");
   omega = cli_number (cli_out, "bodies", "steer", "omega", NULL);
   char *page = animate_page ("run.html");
@@ -61,9 +58,8 @@ static void test_motion (void **state) {
 }
 
 /* The pin B and the wheels A and C have points; C carries M / (c + d), here at t = 0. */
-static void test_forces (void **state) {
+TEST (forces) {
   double first, last;
-  (void)state;
   cli_good ("pinwheel run ezyroller --t-end 1 --animate @/run.html");
   char *page = animate_page ("run.html");
   assert_non_null (strstr (page, "{\"name\": \"B\", \"force_end\": 0, \"ends\": [{\"body\": 0"));
@@ -79,8 +75,7 @@ static void test_forces (void **state) {
 }
 
 /* A drive without points is drawn at the joint of its bodies, whichever is the ground, with an end that exists. */
-static void test_joint (void **state) {
-  (void)state;
+TEST (joint) {
   cli_write ("crank.yaml", "pinwheel: 1\nbodies: [{name: crank, mass: 1, inertia: 0.1, start: {x: 1}}]\nelements:\n"
                            "  - {pin: O, body: [ground, crank], at: [[0, 0], [-1, 0]]}\n"
                            "  - {drive: d, body: [ground, crank], what: angle, value: 0}\n");
@@ -91,8 +86,7 @@ static void test_joint (void **state) {
   free (page);
 }
 
-static void test_names (void **state) {
-  (void)state;
+TEST (names) {
   cli_good ("cp tests/models/arm.yaml '@/a<b>&.yaml'");
   cli_good (
       "pinwheel run '@/a<b>&.yaml' --t-end 0.1 --animate @/odd.html 2>/dev/null"); /* a notice: its start was moved */
@@ -102,17 +96,10 @@ static void test_names (void **state) {
   free (page);
 }
 
-static void test_refusals (void **state) {
-  (void)state;
+TEST (refusals) {
   cli_bad ("pinwheel run ezyroller --animate @/x.avi", 2, "--animate @/x.avi: expected a name that ends in .html");
   cli_bad ("pinwheel run ezyroller --t-end 1 --animate @/no/folder.html >/dev/null", 1,
            "cannot write @/no/folder.html: No such file or directory");
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_motion), cmocka_unit_test (test_forces),   cmocka_unit_test (test_joint),
-    cmocka_unit_test (test_names),  cmocka_unit_test (test_refusals),
-  };
-  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
-}
+const check_fixture fixture = { cli_setup, cli_teardown };

@@ -6,17 +6,13 @@
 /* Evaluations of a run of a stiff scene to the end.  At a loose tolerance what tyres lose is not resolved where
  * stability decides on the steps, and the run says so. */
 static double bench_evaluations (const char *scene, const char *method, const char *rtol) {
-  char command[300];
-  snprintf (command, sizeof command,
-            "pinwheel run ./benchmarks/scenes/stiff-%s.yaml --method %s --rtol %s --t-end 1 --json -", scene, method,
-            rtol);
-  cli_shell (command);
+  cli_shell (check_text ("pinwheel run ./benchmarks/scenes/stiff-%s.yaml --method %s --rtol %s --t-end 1 --json -",
+                         scene, method, rtol));
   return cli_number (cli_out, "statistics", "rhs", NULL);
 }
 
 /* Stability decides on an explicit method's steps, whatever the tolerance; an implicit one takes far fewer. */
-static void test_stiff (void **state) {
-  (void)state;
+TEST (stiff) {
   static const char *const scene[] = { "tyres", "steering", "bushings" };
   for (int i = 0; i < 3; i++) {
     double loose = bench_evaluations (scene[i], "erk5+projection", "1e-3"),
@@ -27,12 +23,8 @@ static void test_stiff (void **state) {
   }
 }
 
-static void test_scripts (void **state) {
-  (void)state;
+TEST (scripts) {
   cli_good ("for f in benchmarks/*.sh benchmarks/report/*.sh; do sh -n $f || exit 1; done");
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_stiff), cmocka_unit_test (test_scripts) };
-  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
-}
+const check_fixture fixture = { cli_setup, cli_teardown };

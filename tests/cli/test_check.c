@@ -17,8 +17,7 @@ static double check_number (const char *part, const char *key) {
   return cli_number (cli_out, part, key, NULL);
 }
 
-static void test_ezyroller (void **state) {
-  (void)state;
+TEST (ezyroller) {
   cli_good ("pinwheel check ezyroller");
   check_shows ("degrees of freedom, configuration  4\n");
   check_shows ("degrees of freedom, velocity       2\n");
@@ -30,8 +29,7 @@ static void test_ezyroller (void **state) {
 }
 
 /* Hanging, a compound pendulum: w^2 = m g l / (I + m l^2). */
-static void test_pendulum (void **state) {
-  (void)state;
+TEST (pendulum) {
   cli_good ("pinwheel check pendulum --set theta=-1.5707963267948966 --set I=0.5 --set m=2 --set l=0.7 --json -");
   double w = sqrt (2 * 9.81 * 0.7 / (0.5 + 2 * 0.49));
   check_close ("frequency", check_number ("linearisation", "frequency_hz"), w / (2 * PW_PI), 1e-12, "1e4 eps");
@@ -39,8 +37,7 @@ static void test_pendulum (void **state) {
   check_close ("velocity", check_number ("mobility", "velocity"), 1, 0, "exact");
 }
 
-static void test_spring (void **state) {
-  (void)state;
+TEST (spring) {
   cli_write ("spring.yaml", "pinwheel: 1\nrun: {step: 1}\n"
                             "bodies:\n  - {name: block, mass: 1.5, inertia: 0.1, start: {x: 0.8}}\n"
                             "elements:\n  - {slider: rail, body: [block, ground], at: [[0, 0], [0, 0]], heading: 0}\n"
@@ -56,8 +53,7 @@ static void test_spring (void **state) {
                0.8 / sqrt (60 / 1.5), 1e-12, "1e4 eps");
 }
 
-static void test_redundant (void **state) {
-  (void)state;
+TEST (redundant) {
   cli_good ("pinwheel check car");
   check_shows ("constraint equations               4 (0 on positions, 4 on velocities)");
   check_shows ("rank of J                          2\n");
@@ -65,8 +61,7 @@ static void test_redundant (void **state) {
   check_shows ("  saddle-point matrix                regular without the redundant constraint equations\n");
 }
 
-static void test_start (void **state) {
-  (void)state;
+TEST (start) {
   cli_good ("pinwheel check ezyroller --start frame.vy=0.5");
   check_shows ("Initial conditions\n  ");
   check_shows (" changed");
@@ -79,10 +74,9 @@ static void test_start (void **state) {
 }
 
 /* The first 8 of 12 findings, and how many more there are; all of them in JSON. */
-static void test_many_findings (void **state) {
+TEST (many_findings) {
   char text[2000];
   int n = snprintf (text, sizeof text, "pinwheel: 1\nbodies:\n");
-  (void)state;
   for (int i = 0; i < 12; i++)
     n += snprintf (text + n, sizeof text - (size_t)n, "  - {name: b%d, mass: 1, inertia: 1, start: {x: 1}}\n", i);
   n += snprintf (text + n, sizeof text - (size_t)n, "elements:\n");
@@ -97,8 +91,7 @@ static void test_many_findings (void **state) {
   check_shows ("b11.x = 1 m, but the constraints require 0 m\"]");
 }
 
-static void test_singular (void **state) {
-  (void)state;
+TEST (singular) {
   cli_write ("loose.yaml", "pinwheel: 1\nbodies:\n  - {name: a, mass: 1, inertia: 1}\n  - {name: ghost}\n"
                            "elements:\n  - {pin: A, body: [a, ghost], at: [[1, 0], [0, 0]]}\n");
   assert_int_equal (cli_run ("pinwheel check @/loose.yaml"), 2);
@@ -113,8 +106,7 @@ static void test_singular (void **state) {
 }
 
 /* A plug-in's own kind whose force is not the gradient of its energy, and whose force_q is missing. */
-static void test_broken_kind (void **state) {
-  (void)state;
+TEST (broken_kind) {
   cli_write ("broken.c",
              "#include \"pinwheel.h\"\n"
              "typedef struct { const char *name, *body; double k; } well;\n"
@@ -147,14 +139,15 @@ static void test_broken_kind (void **state) {
   check_shows ("{\"check\": \"force_q\", \"in\": \"this model\"");
   check_shows ("\"status\": \"failed\"");
   static const char *const implicit[] = { "ida+ggl", "bdf", "radau", "galpha+ggl", "leapfrog" };
-  char command[100], message[300];
+  char command[100];
   for (size_t i = 0; i < sizeof implicit / sizeof *implicit; i++) {
     snprintf (command, sizeof command, "pinwheel run @/broken.c --method %s --t-end 0.1", implicit[i]);
-    snprintf (message, sizeof message,
-              "model broken: force_q of element type well is left out, but it is not zero, and %s needs it: add it, or "
-              "PW_BY_DIFFERENCES in its place",
-              implicit[i]);
-    cli_bad (command, 2, message);
+    cli_bad (
+        command, 2,
+        check_text (
+            "model broken: force_q of element type well is left out, but it is not zero, and %s needs it: add it, or "
+            "PW_BY_DIFFERENCES in its place",
+            implicit[i]));
   }
   cli_shell ("pinwheel run @/broken.c --method rk4 --t-end 0.1");
   cli_bad (
@@ -171,8 +164,7 @@ static void test_broken_kind (void **state) {
 }
 
 /* The derivatives of a signal that reads states: the function's own, wrong by a factor. */
-static void test_broken_gradient (void **state) {
-  (void)state;
+TEST (broken_gradient) {
   cli_write ("gradient.c", "#include \"pinwheel.h\"\n"
                            "static const char *const reads[] = { \"a.phi\", \"a.omega\", NULL };\n"
                            "static int pull (void *c, double t, const double *x, double *u, double *gradient) {\n"
@@ -193,15 +185,13 @@ static void test_broken_gradient (void **state) {
   check_shows ("in this model: gradient = d signal/d state does not hold");
 }
 
-static void test_large (void **state) {
-  (void)state;
+TEST (large) {
   cli_good ("pinwheel check chain --set n=200");
   check_shows ("not computed: 600 coordinates, the limit is 400");
   check_shows ("rank of J                          400\n");
 }
 
-static void test_bad_options (void **state) {
-  (void)state;
+TEST (bad_options) {
   cli_bad ("pinwheel check", 2, "missing argument; usage: pinwheel check MODEL [OPTION...]");
   cli_bad ("pinwheel check ezyroller --jsn x", 2, "check has no option \"--jsn\"; did you mean \"--json\"?");
 }
@@ -235,8 +225,7 @@ static void check_scene_expect (const pw_kind *kind, const char *what) {
   pw_system_free (s);
 }
 
-static void test_scene (void **state) {
-  (void)state;
+TEST (scene) {
   for (const pw_kind *const *k = pw_kinds; *k; k++) check_scene_expect (*k, NULL);
   for (const pw_kind *const *k = toy_kinds; *k; k++) check_scene_expect (*k, NULL);
   check_original = &pw_kind_pin;
@@ -263,22 +252,18 @@ static int check_ends (void *context, double t, const double *x, double value[3]
   return 0;
 }
 
-static void check_build_ending (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (check_build_ending) {
   pw_add_body (m, &(pw_body){ .name = "rotor", .mass = 1, .inertia = 1 });
   pw_add_torque (m, &(pw_torque){ .name = "T",
                                   .body = { "rotor", "ground" },
                                   .value = { PW_FUNCTION, .function = { .eval = check_ends } } });
 }
 
-static const pw_plugin_table check_ending_table = TRIAL_TABLE (check_build_ending);
-
-static void test_failing_signal (void **state) {
-  (void)state;
+TEST (failing_signal) {
   const double q[3] = { 0 }, v[3] = { 0 };
   pw_error error = { 0 };
   pw_selftest_report report = { 0 };
-  pw_system *s = scene_system (&check_ending_table, NULL);
+  pw_system *s = scene_system (&check_build_ending_table, NULL);
   assert_int_equal (pw_selftest_scene (s, 1, &pw_kind_torque, 0, q, v, 1, &report, &error), PW_METHOD);
   check_error (&error, PW_METHOD,
                "t = 0.5 s: a signal failed: torque T: value is not a finite number, or its function failed");
@@ -301,8 +286,7 @@ static int check_sine (void *context, double t, const double *x, double value[3]
   return 0;
 }
 
-static void check_build_driven (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (check_build_driven) {
   pw_add_body (m, &(pw_body){ .name = "rotor", .mass = 1, .inertia = 1 });
   pw_add_drive (m, &(pw_drive){ .name = "D",
                                 .body = { "rotor", "ground" },
@@ -310,15 +294,12 @@ static void check_build_driven (pw_model *m, const void *parameters) {
                                 .value = { PW_FUNCTION, .function = { check_sine, .breakpoint = check_break } } });
 }
 
-static const pw_plugin_table check_driven_table = TRIAL_TABLE (check_build_driven);
-
-static void test_breakpoint (void **state) {
-  (void)state;
+TEST (breakpoint) {
   const double q[3] = { 0, 0, sin (1) }, v[3] = { 0, 0, cos (1) };
   pw_error error = { 0 };
   pw_selftest_report report = { 0 };
   check_breakpoint = 1 + 1e-11;
-  pw_system *s = scene_system (&check_driven_table, NULL);
+  pw_system *s = scene_system (&check_build_driven_table, NULL);
   check_ok (pw_selftest_scene (s, 1, &pw_kind_drive, 1, q, v, 1, &report, &error), &error);
   for (int i = 0; i < report.checks; i++)
     if (report.check[i].failed) fail_msg ("%s: %s", report.check[i].name, report.check[i].where);
@@ -327,15 +308,4 @@ static void test_breakpoint (void **state) {
   pw_system_free (s);
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_breakpoint),      cmocka_unit_test (test_ezyroller),
-    cmocka_unit_test (test_pendulum),        cmocka_unit_test (test_spring),
-    cmocka_unit_test (test_redundant),       cmocka_unit_test (test_start),
-    cmocka_unit_test (test_singular),        cmocka_unit_test (test_broken_kind),
-    cmocka_unit_test (test_broken_gradient), cmocka_unit_test (test_large),
-    cmocka_unit_test (test_bad_options),     cmocka_unit_test (test_scene),
-    cmocka_unit_test (test_failing_signal),  cmocka_unit_test (test_many_findings),
-  };
-  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
-}
+const check_fixture fixture = { cli_setup, cli_teardown };

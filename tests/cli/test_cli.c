@@ -9,8 +9,7 @@
 
 /* ---- Runs ---- */
 
-static void test_summary (void **state) {
-  (void)state;
+TEST (summary) {
   double table[4 * 6];
   assert_int_equal (runs_reference ("tests/reference/ezyroller.txt", 4, 6, table), 4);
   const double *x = table + 18;
@@ -38,8 +37,7 @@ static void test_summary (void **state) {
 }
 
 /* Numbers may be expressions, as in text models. */
-static void test_numbers (void **state) {
-  (void)state;
+TEST (numbers) {
   cli_good ("pinwheel run pendulum --set l=3/2 --t-end pi/10 --json -");
   check_close ("t", cli_number (cli_out, "t", NULL), 0.31415926535897932, CHECK_EPS, "pi / 10");
   cli_good ("pinwheel sweep knife-edge-incline --vary skate.phi=0,30*deg --t-end 0.01 -o @/turned.csv");
@@ -47,8 +45,7 @@ static void test_numbers (void **state) {
 }
 
 /* A step across the motion is said to be one; one that is the whole run, of something slow, is not. */
-static void test_long_step (void **state) {
-  (void)state;
+TEST (long_step) {
   assert_int_equal (cli_run ("pinwheel run pendulum --step 0.4 --t-end 4"), 0);
   assert_non_null (strstr (cli_err, "pinwheel: a step of 0.4 s is long for a motion that changes within 0.3"));
   cli_good ("pinwheel run pendulum --step 0.1 --t-end 1");
@@ -57,17 +54,13 @@ static void test_long_step (void **state) {
 }
 
 /* Degrees where radians belong are noticed. */
-static void test_degrees (void **state) {
+TEST (degrees) {
   static const char model[] = "pinwheel: 1\nbodies:\n  - {name: skate, mass: 1, inertia: 1, start: {phi: %s}}\n"
                               "elements:\n  - {wheel: W, body: skate, at: [0, 0], heading: %s}\n"
                               "  - {steered-wheel: S, body: skate, at: [1, 0], heading: %s}\n";
-  char text[400];
-  (void)state;
-  snprintf (text, sizeof text, model, "2*pi", "-90*deg", "pi/4");
-  cli_write ("skate.yaml", text);
+  cli_write ("skate.yaml", check_text (model, "2*pi", "-90*deg", "pi/4"));
   cli_good ("pinwheel run @/skate.yaml --t-end 0.01");
-  snprintf (text, sizeof text, model, "30", "-90", "45");
-  cli_write ("skate.yaml", text);
+  cli_write ("skate.yaml", check_text (model, "30", "-90", "45"));
   assert_int_equal (cli_run ("pinwheel check @/skate.yaml"), 0);
   assert_non_null (strstr (cli_err, "pinwheel: body skate: initial phi = 30 rad is more than a turn"));
   assert_non_null (strstr (cli_err,
@@ -76,8 +69,7 @@ static void test_degrees (void **state) {
   assert_non_null (strstr (cli_err, "pinwheel: steered-wheel S: heading = 45 rad is more than a turn"));
 }
 
-static void test_no_energy (void **state) {
-  (void)state;
+TEST (no_energy) {
   cli_good ("pinwheel run ezyroller --t-end 0.1 --json @/summary.json");
   const char *json = cli_file ("summary.json");
   assert_non_null (json);
@@ -88,8 +80,7 @@ static void test_no_energy (void **state) {
 }
 
 /* Spin angles and rates stand below each other, whatever their wheels' names. */
-static void test_own_columns (void **state) {
-  (void)state;
+TEST (own_columns) {
   cli_good ("pinwheel run differential-drive --t-end 0.1 2>/dev/null"); /* its wheels are on one axle */
   const char *left = strstr (cli_out, "\n  left.spin"), *right = strstr (cli_out, "\n  right.spin");
   assert_true (left != NULL && right != NULL);
@@ -98,8 +89,7 @@ static void test_own_columns (void **state) {
   assert_int_equal (strstr (left, " rad/s") - left, strstr (right, " rad/s") - right);
 }
 
-static void test_defaults (void **state) {
-  (void)state;
+TEST (defaults) {
   /* the last value of a name counts; without the notice that the frame was moved */
   cli_good ("pinwheel run ezyroller --set a=0.6 --start frame.phi=1 --start frame.phi=0.25 --t-end 0.001 --json - "
             "2>/dev/null");
@@ -108,8 +98,7 @@ static void test_defaults (void **state) {
 }
 
 /* Energy that comes from nowhere is reported, with --energy or without. */
-static void test_unbalanced (void **state) {
-  (void)state;
+TEST (unbalanced) {
   assert_int_equal (cli_run ("pinwheel run n-four-bar --method galpha+ggl --step 0.1 --json -"), 0);
   double part = cli_number (cli_out, "unbalanced", NULL);
   assert_true (part > 0.05 && part < 0.5);
@@ -131,8 +120,7 @@ static int cli_lines (const char *text) {
   return lines;
 }
 
-static void test_table (void **state) {
-  (void)state;
+TEST (table) {
   cli_good ("pinwheel run ezyroller --t-end 1 --every 0.1 --energy -o @/run.csv");
   const char *csv = cli_file ("run.csv");
   assert_non_null (csv);
@@ -158,8 +146,7 @@ static void test_table (void **state) {
 }
 
 /* With -o - the table alone is on standard output, the same to the byte; everything else is on standard error. */
-static void test_table_on_stdout (void **state) {
-  (void)state;
+TEST (table_on_stdout) {
   cli_good ("pinwheel run ezyroller --t-end 0.5 --every 0.05 -o @/a.csv");
   cli_good ("pinwheel run ezyroller --t-end 0.5 --every 0.05 -o -");
   assert_string_equal (cli_out, cli_file ("a.csv"));
@@ -167,8 +154,7 @@ static void test_table_on_stdout (void **state) {
 }
 
 /* Sampling alters no step: common rows are the same to the byte, however many there are between them. */
-static void test_every (void **state) {
-  (void)state;
+TEST (every) {
   cli_good ("pinwheel run ezyroller --method ida+ggl --t-end 2 --every 0.5 -o @/few.csv\n"
             "pinwheel run ezyroller --method ida+ggl --t-end 2 --every 0.0625 -o @/many.csv\n"
             "grep -cxFf @/few.csv @/many.csv");
@@ -176,8 +162,7 @@ static void test_every (void **state) {
 }
 
 /* A locale with a decimal comma changes nothing. */
-static void test_locale (void **state) {
-  (void)state;
+TEST (locale) {
   cli_good ("LC_ALL=C pinwheel run ezyroller --t-end 0.1 --every 0.05 -o @/c.csv");
   cli_good ("LC_ALL=de_DE.UTF-8 LC_NUMERIC=de_DE.UTF-8 pinwheel run ezyroller --t-end 0.1 --every 0.05 -o "
             "@/de.csv\ncmp @/c.csv @/de.csv");
@@ -218,21 +203,18 @@ static double cli_cell (const char *csv, int row, const char *heading) {
 }
 
 static const char *cli_columns (const char *options) {
-  char command[300];
   cli_write ("columns.yaml", CLI_COLUMNS);
-  snprintf (command, sizeof command, "pinwheel run @/columns.yaml --energy -o @/columns.csv %s", options);
-  cli_good (command);
+  cli_good (check_text ("pinwheel run @/columns.yaml --energy -o @/columns.csv %s", options));
   return cli_file ("columns.csv");
 }
 
 /* Velocities are what coordinates change by. */
-static void test_state_columns (void **state) {
+TEST (state_columns) {
   static const char *const pairs[][2] = {
     { "arm.x [m]", "arm.vx [m/s]" },           { "arm.y [m]", "arm.vy [m/s]" },
     { "arm.phi [rad]", "arm.omega [rad/s]" },  { "cart.x [m]", "cart.vx [m/s]" },
     { "W.spin [rad]", "W.spin_rate [rad/s]" },
   };
-  (void)state;
   const char *csv = cli_columns ("-t 0.1 --every 0.01");
   for (int i = 0; i < 5; i++)
     for (int row = 1; row < 10; row++) {
@@ -243,8 +225,7 @@ static void test_state_columns (void **state) {
 }
 
 /* A bob at rest hangs by its weight: the reaction is the force on the first body.  The summary has the same sign. */
-static void test_reaction_columns (void **state) {
-  (void)state;
+TEST (reaction_columns) {
   const char *csv = cli_columns ("-t 0.1 --every 0.1 --json @/columns.json");
   check_close ("H.Fx", cli_cell (csv, 1, "H.Fx [N]"), 0, 1e-12, "round-off");
   check_close ("H.Fy", cli_cell (csv, 1, "H.Fy [N]"), 3 * 9.81, 1e-12, "the weight of 3 kg, upwards");
@@ -253,8 +234,7 @@ static void test_reaction_columns (void **state) {
 }
 
 /* K + V - (K + V)_0 = work - loss + projection + balance, of which steps too large leave something to the last two. */
-static void test_ledger_columns (void **state) {
-  (void)state;
+TEST (ledger_columns) {
   const char *csv = cli_columns ("-m rk4+projection --step 0.05 -t 0.3 --every 0.1");
   double start = cli_cell (csv, 0, "kinetic [J]") + cli_cell (csv, 0, "potential [J]");
   for (int row = 1; row < 4; row++) {
@@ -270,8 +250,7 @@ static void test_ledger_columns (void **state) {
 }
 
 /* Numbers are read back as they were, and the last row is at t_end: 3 times 0.1 is not 0.3. */
-static void test_last_row (void **state) {
-  (void)state;
+TEST (last_row) {
   const char *csv = cli_columns ("-t 0.3 --every 0.1");
   assert_int_equal (cli_lines (csv), 5);
   assert_true (cli_cell (csv, 3, "t [s]") == 0.3);
@@ -280,8 +259,7 @@ static void test_last_row (void **state) {
 }
 
 /* Nobody reads on: the exit status says so, nothing is said, and no temporary file is left. */
-static void test_closed_pipe (void **state) {
-  (void)state;
+TEST (closed_pipe) {
   cli_run ("{ pinwheel run pendulum -t 100 --json @/pipe.json -o -; echo $? >@/status; } | head -1 >@/head\n"
            "ls @ | grep -c '^pipe.*[.]part$'");
   assert_string_equal (cli_file ("status"), "141\n");
@@ -295,8 +273,7 @@ static void test_closed_pipe (void **state) {
 }
 
 /* Steps and rejected ones are not mixed up. */
-static void test_statistics (void **state) {
-  (void)state;
+TEST (statistics) {
   cli_good ("pinwheel run ezyroller -m erk5+projection --rtol 1e-6 -t 10 --json -");
   double steps = cli_number (cli_out, "statistics", "steps", NULL);
   check_below ("rejected", cli_number (cli_out, "statistics", "rejected", NULL), steps / 3 + 5, "a third of the steps");
@@ -304,8 +281,7 @@ static void test_statistics (void **state) {
 
 /* ---- Other commands ---- */
 
-static void test_list (void **state) {
-  (void)state;
+TEST (list) {
   cli_good ("pinwheel list");
   static const char *const expected[] = { "ezyroller", "rk4", "ida",   "projection", "ggl",     "baumgarte",
                                           "galpha",    "pin", "wheel", "torque",     "harmonic" };
@@ -341,8 +317,7 @@ static void test_list (void **state) {
 }
 
 /* All kinds: no line is too long, and whatever stands below each other begins in one column. */
-static void test_list_columns (void **state) {
-  (void)state;
+TEST (list_columns) {
   cli_good ("pinwheel list kinds all");
   int column = 0, rows = 0;
   for (char *line = strtok (cli_out, "\n"); line; line = strtok (NULL, "\n")) {
@@ -361,8 +336,7 @@ static void test_list_columns (void **state) {
   assert_true (rows > 100);
 }
 
-static void test_show (void **state) {
-  (void)state;
+TEST (show) {
   cli_good ("pinwheel show ezyroller --set a=0.75");
   static const char *const expected[] = { "frame",        "steer", "pin B", "wheel A", "wheel C",
                                           "torque rider", "omega", "rad/s", "0.75",    "N m" };
@@ -375,8 +349,7 @@ static void test_show (void **state) {
 }
 
 /* gnuplot runs in a locale that knows all characters of the scripts, whatever the user's is. */
-static void test_gnuplot_locale (void **state) {
-  (void)state;
+TEST (gnuplot_locale) {
   cli_write ("gnuplot", "#!/bin/sh\necho \"$LC_ALL\"\n");
   assert_int_equal (cli_run ("chmod +x @/gnuplot; PATH=\"@:$PATH\"; export LC_ALL=C; "
                              "pinwheel run ezyroller --t-end 0.1 --plots @/figures"),
@@ -384,9 +357,8 @@ static void test_gnuplot_locale (void **state) {
   assert_string_equal (cli_err, "C.UTF-8\n");
 }
 
-static void test_help (void **state) {
+TEST (help) {
   static const char *const command[] = { "list", "show", "run", "new" };
-  (void)state;
   cli_good ("pinwheel");
   cli_good ("pinwheel --help");
   cli_good ("pinwheel --version");
@@ -399,16 +371,13 @@ static void test_help (void **state) {
     assert_true (sscanf (at + strlen (library), "%lf", &major) == 1 && major > 0);
   }
   for (int i = 0; i < 4; i++) {
-    char line[60];
-    snprintf (line, sizeof line, "pinwheel %s --help", command[i]);
-    cli_good (line);
+    cli_good (check_text ("pinwheel %s --help", command[i]));
     assert_non_null (strstr (cli_out, "--help"));
   }
 }
 
 /* `new` writes a model that runs as it is, and never over a file. */
-static void test_new (void **state) {
-  (void)state;
+TEST (new) {
   cli_good ("pinwheel new @/mine.c");
   cli_good ("pinwheel show @/mine.c");
   cli_good ("pinwheel run @/mine.c --t-end 1 --json -");
@@ -416,20 +385,4 @@ static void test_new (void **state) {
   cli_bad ("pinwheel new @/mine.c", 2, "@/mine.c exists already and was not changed");
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_summary),        cmocka_unit_test (test_numbers),
-    cmocka_unit_test (test_long_step),      cmocka_unit_test (test_degrees),
-    cmocka_unit_test (test_no_energy),      cmocka_unit_test (test_unbalanced),
-    cmocka_unit_test (test_own_columns),    cmocka_unit_test (test_defaults),
-    cmocka_unit_test (test_table),          cmocka_unit_test (test_table_on_stdout),
-    cmocka_unit_test (test_state_columns),  cmocka_unit_test (test_reaction_columns),
-    cmocka_unit_test (test_ledger_columns), cmocka_unit_test (test_last_row),
-    cmocka_unit_test (test_closed_pipe),    cmocka_unit_test (test_statistics),
-    cmocka_unit_test (test_every),          cmocka_unit_test (test_locale),
-    cmocka_unit_test (test_list),           cmocka_unit_test (test_list_columns),
-    cmocka_unit_test (test_show),           cmocka_unit_test (test_gnuplot_locale),
-    cmocka_unit_test (test_help),           cmocka_unit_test (test_new),
-  };
-  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
-}
+const check_fixture fixture = { cli_setup, cli_teardown };

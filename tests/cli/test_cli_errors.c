@@ -8,7 +8,7 @@
 
 /* ---- Command lines that are wrong ---- */
 
-static void test_bad_lines (void **state) {
+TEST (bad_lines) {
   static const cli_wrong bad[] = {
     { "shew", "there is no command \"shew\"; did you mean \"show\"?" },
     { "--verbose", "there is no option \"--verbose\"; did you mean \"--version\"?" },
@@ -83,13 +83,11 @@ static void test_bad_lines (void **state) {
     { "new 'a b.c'", "\"a b.c\": a model file's name has at most 99 letters, digits, _ and -, does not begin with -, "
                      "and ends in .c or .yaml" },
   };
-  (void)state;
   cli_bad_each ("", bad, sizeof bad / sizeof *bad);
 }
 
 /* A folder of the search path that is not there is named if a model is missing, and only then. */
-static void test_search_path (void **state) {
-  (void)state;
+TEST (search_path) {
   assert_int_equal (cli_run ("PINWHEEL_MODELS=@/nowhere pinwheel run pendulu"), 2);
   char expected[300];
   cli_expand ("; PINWHEEL_MODELS has @/nowhere (No such file or directory); did you mean \"pendulum\"?\n", expected,
@@ -100,11 +98,10 @@ static void test_search_path (void **state) {
 }
 
 /* A tolerance that the method does not follow, a step it does not take; if both are given there is no message. */
-static void test_useless_options (void **state) {
+TEST (useless_options) {
   static const char step[] = "pinwheel: --step has no effect: erk5+projection chooses its steps by --rtol, --atol\n",
                     rtol[] = "pinwheel: --rtol has no effect: rk4+none takes steps of --step\n",
                     atol[] = "pinwheel: --atol has no effect: erk8+none:steps=fixed takes steps of --step\n";
-  (void)state;
   assert_int_equal (cli_run ("pinwheel run pendulum --t-end 0.1 --method erk5+projection --step 0.1"), 0);
   assert_string_equal (cli_err, step);
   assert_int_equal (cli_run ("pinwheel run pendulum --t-end 0.1 --method rk4+none --rtol 1e-9"), 0);
@@ -120,8 +117,7 @@ static void test_useless_options (void **state) {
 }
 
 /* Whatever cannot be written is said before the run starts. */
-static void test_unwritable (void **state) {
-  (void)state;
+TEST (unwritable) {
   cli_bad ("pinwheel run ezyroller --t-end 1e9 -o @/no/x.csv", 1, "cannot write @/no/x.csv: No such file or directory");
   cli_bad ("pinwheel run ezyroller --t-end 1e9 -o @", 1, "cannot write @: Is a directory");
   cli_bad ("pinwheel run ezyroller --t-end 1e9 --json @/no/x.json", 1,
@@ -131,8 +127,7 @@ static void test_unwritable (void **state) {
   cli_bad ("pinwheel new @/no/mine.c", 1, "cannot write @/no/mine.c: No such file or directory");
 }
 
-static void test_full_disk (void **state) {
-  (void)state;
+TEST (full_disk) {
   if (access ("/dev/full", W_OK) != 0) skip ();
   cli_bad ("pinwheel run ezyroller --t-end 10 -o /dev/full", 1, "cannot write /dev/full: No space left on device");
   cli_bad ("pinwheel list >/dev/full", 1, "cannot write to standard output: No space left on device");
@@ -144,8 +139,7 @@ static void test_full_disk (void **state) {
   "#include \"pinwheel.h\"\nstatic void build (pw_model *m, const void *p) {\n  (void)p;\n" body \
   "}\nPW_MODEL (.about = \"wrong\", .build = build);\n"
 
-static void test_bad_models (void **state) {
-  (void)state;
+TEST (bad_models) {
   cli_write (
       "torn.c",
       CLI_MODEL ("  pw_add_body (m, &(pw_body){ .name = \"rod\", .mass = 1, .inertia = 1, .start = { 1.5, 0, 0 } });\n"
@@ -182,7 +176,7 @@ static void test_bad_models (void **state) {
 }
 
 /* Tables that do not hold together are refused before they are used. */
-static void test_bad_tables (void **state) {
+TEST (bad_tables) {
   static const char model[] = "#include \"pinwheel.h\"\n"
                               "typedef struct { double a; } numbers;\n"
                               "static const pw_parameter list[] = { { PW_AT (numbers, a), VALUE, \"m\", \"a\", "
@@ -205,11 +199,8 @@ static void test_bad_tables (void **state) {
     { "#define ABI PW_ABI\n#define VALUE 1\n#define SIZE sizeof (numbers)\n#define BUILD NULL\n",
       " has no build function: PW_MODEL (...) at its end must set .build" },
   };
-  (void)state;
   for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
-    char text[3000];
-    snprintf (text, sizeof text, "%s%s", bad[i].defines, model);
-    cli_write ("table.c", text);
+    cli_write ("table.c", check_text ("%s%s", bad[i].defines, model));
     assert_int_equal (cli_run ("pinwheel run @/table.c"), 2);
     if (strstr (cli_err, bad[i].message) == NULL) print_error ("%s", cli_err);
     assert_non_null (strstr (cli_err, bad[i].message));
@@ -217,8 +208,7 @@ static void test_bad_tables (void **state) {
 }
 
 /* Files that are no models, and compilers that are none. */
-static void test_bad_files (void **state) {
-  (void)state;
+TEST (bad_files) {
   cli_write ("notes.txt", "nothing\n");
   cli_bad ("pinwheel run @/notes.txt", 2, "@/notes.txt: a model file ends in .c, .so or .yaml");
   cli_bad ("pinwheel run ''", 2, "a model's name or path is missing");
@@ -241,17 +231,13 @@ static void test_bad_files (void **state) {
 }
 
 /* A name that two files could answer is refused with both paths. */
-static void test_found_twice (void **state) {
-  (void)state;
+TEST (found_twice) {
   assert_int_equal (cli_run ("mkdir -p @/one @/two && cp ${BUILD:-build}/models/ezyroller.so @/one/twin.so && cp "
                              "@/one/twin.so @/two/twin.so"),
                     0);
   assert_int_equal (cli_run ("PINWHEEL_MODELS=@/one:@/two pinwheel run twin"), 2);
-  char one[300], two[300];
-  cli_expand ("@/one/twin.so", one, sizeof one);
-  cli_expand ("@/two/twin.so", two, sizeof two);
-  assert_non_null (strstr (cli_err, one));
-  assert_non_null (strstr (cli_err, two));
+  assert_non_null (strstr (cli_err, cli_path ("one/twin.so")));
+  assert_non_null (strstr (cli_err, cli_path ("two/twin.so")));
   assert_non_null (strstr (cli_err, "several files match \"twin\", such as "));
   cli_good ("mkdir @/three && cp @/one/twin.so @/three/twin.so");
   assert_int_equal (cli_run ("PINWHEEL_MODELS=@/one:@/two:@/three pinwheel run twin"), 2);
@@ -262,8 +248,7 @@ static void test_found_twice (void **state) {
 
 /* A folder is searched although its path begins that of another one, which does not fit into the list for messages
  * (399 bytes). */
-static void test_long_search_path (void **state) {
-  (void)state;
+TEST (long_search_path) {
   cli_good ("d=$(cd @ && pwd -P); m=$d/m; long=$d/$(printf %0200d 0)/; rest=$((398 - ${#m} - ${#long}))\n"
             "long=$long$(printf %0${rest}d 0); mkdir -p $long ${m}m $m\n"
             "cp ${BUILD:-build}/models/ezyroller.so $m/other.so\n"
@@ -273,8 +258,7 @@ static void test_long_search_path (void **state) {
 /* ---- Runs that end early ---- */
 
 /* A row inside a step at which the force overflows, but not at the stages of the step: the time is its beginning. */
-static void test_failing_sample (void **state) {
-  (void)state;
+TEST (failing_sample) {
   cli_write ("burst.yaml", "pinwheel: 1\nabout: a burst\nrun: {t_end: 2, step: 1}\n"
                            "bodies: [{name: p, mass: 1e-3, inertia: 1}]\n"
                            "elements: [{force: f, body: p, at: [0, 0], fx: \"1e307*exp(-4e4*(t - 0.25)^2)\"}]\n");
@@ -283,8 +267,7 @@ static void test_failing_sample (void **state) {
 }
 
 /* A step with which the method fails: the time reached and the reason, the rows so far in NAME.part, status 4. */
-static void test_failing_step (void **state) {
-  (void)state;
+TEST (failing_step) {
   assert_int_equal (cli_run ("pinwheel run ezyroller --step 0.5 --set M0=1e9 -o @/fail.csv --json @/fail.json"), 4);
   assert_non_null (strstr (cli_err, "\npinwheel: t = "));
   assert_non_null (strstr (cli_err, "the step of 0.5 s is too large"));
@@ -301,8 +284,7 @@ static void test_failing_step (void **state) {
   assert_string_equal (cli_out, "PK");
 }
 
-static void test_interrupted (void **state) {
-  (void)state;
+TEST (interrupted) {
   if (cli_run ("timeout --preserve-status 5 true") != 0) skip ();
   const char *program = getenv ("PINWHEEL");
   char command[1000];
@@ -320,8 +302,7 @@ static void test_interrupted (void **state) {
 }
 
 /* A start that had to move says what moved, on standard error, and goes on. */
-static void test_moved (void **state) {
-  (void)state;
+TEST (moved) {
   assert_int_equal (cli_run ("pinwheel run ezyroller --start frame.phi=0.3 --t-end 0.01 --json -"), 0);
   assert_non_null (strstr (cli_err, "steer.x from "));
   assert_null (strstr (cli_err, "frame.phi"));
@@ -329,15 +310,12 @@ static void test_moved (void **state) {
 }
 
 /* What the integrators say when they give up is in our message, not beside it. */
-static void test_one_voice (void **state) {
-  (void)state;
+TEST (one_voice) {
   static const char *const method[] = { "ida+ggl", "bdf+projection", "adams+baumgarte" };
   cli_write ("root.yaml", "pinwheel: 1\nbodies: [{name: a, mass: 1, inertia: 1}]\n"
                           "elements:\n  - {torque: m, body: [a, ground], value: sqrt(0.1-t)}\n");
   for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
-    char text[200];
-    snprintf (text, sizeof text, "pinwheel run @/root.yaml -t 1 -m %s", method[i]);
-    assert_int_equal (cli_run (text), 4);
+    assert_int_equal (cli_run (check_text ("pinwheel run @/root.yaml -t 1 -m %s", method[i])), 4);
     assert_true (strncmp (cli_err, "pinwheel: t = 0.", 16) == 0);
     assert_true (strchr (cli_err, '\n')[1] == 0);
   }
@@ -345,8 +323,7 @@ static void test_one_voice (void **state) {
 
 /* Nothing stays of what was compiled, whether that works, fails or is interrupted: Ctrl-C waits until the folder is
  * gone. */
-static void test_compiled (void **state) {
-  (void)state;
+TEST (compiled) {
   cli_good ("mkdir @/tmp && TMPDIR=@/tmp pinwheel run models/ezyroller.c -t 0.1 --json @/compiled.json && ls @/tmp");
   assert_string_equal (cli_out, "");
   cli_write ("wrong.c", "int x = ;\n");
@@ -358,16 +335,4 @@ static void test_compiled (void **state) {
   assert_string_equal (cli_out, "143\n");
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_bad_lines),       cmocka_unit_test (test_search_path),
-    cmocka_unit_test (test_useless_options), cmocka_unit_test (test_unwritable),
-    cmocka_unit_test (test_full_disk),       cmocka_unit_test (test_bad_models),
-    cmocka_unit_test (test_bad_tables),      cmocka_unit_test (test_bad_files),
-    cmocka_unit_test (test_found_twice),     cmocka_unit_test (test_long_search_path),
-    cmocka_unit_test (test_failing_sample),  cmocka_unit_test (test_failing_step),
-    cmocka_unit_test (test_interrupted),     cmocka_unit_test (test_moved),
-    cmocka_unit_test (test_one_voice),       cmocka_unit_test (test_compiled),
-  };
-  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
-}
+const check_fixture fixture = { cli_setup, cli_teardown };

@@ -10,8 +10,7 @@
 #include "cli/parallel.h"
 
 /* What there is so far is kept, the exit status is 4, and the limit is named. */
-static void test_max_steps (void **state) {
-  (void)state;
+TEST (max_steps) {
   assert_int_equal (cli_run ("pinwheel run ezyroller --method erk5 --max-steps 50 -o @/m.csv --json @/m.json"), 4);
   assert_non_null (strstr (cli_err, "s: the limit max-steps is reached: 50 attempted steps"));
   assert_non_null (strstr (cli_err, "the table so far is kept in "));
@@ -29,15 +28,14 @@ static void test_max_steps (void **state) {
   assert_null (strstr (cli_err, "--resume"));
 }
 
-static void test_limit (void **state) {
+TEST (limit) {
   static const char *const method[] = { "rk4", "erk8", "bdf", "ida+ggl", "galpha", "leapfrog" };
-  char command[200];
-  (void)state;
   for (int i = 0; i < 6; i++) {
-    snprintf (command, sizeof command,
-              "pinwheel run ezyroller --method %s --t-end 1e9 --limit 0.02 --max-steps 1e9 --every 1 -o @/l.csv",
-              method[i]);
-    assert_int_equal (cli_run (command), 4);
+    assert_int_equal (
+        cli_run (check_text (
+            "pinwheel run ezyroller --method %s --t-end 1e9 --limit 0.02 --max-steps 1e9 --every 1 -o @/l.csv",
+            method[i])),
+        4);
     assert_non_null (strstr (cli_err, "s: the limit of 0.02 s of processor time is reached (--limit)"));
     assert_non_null (strstr (cli_err, "the table so far is kept in "));
   }
@@ -48,8 +46,7 @@ static void test_limit (void **state) {
 }
 
 /* Runs of a sweep and of a drift end each by itself, as rows with the reason. */
-static void test_rows (void **state) {
-  (void)state;
+TEST (rows) {
   assert_int_equal (cli_run ("pinwheel sweep ezyroller --vary M0=0.05,0.1 --t-end 1e9 --limit 0.02 -o @/s.csv"), 4);
   assert_non_null (strstr (cli_err, "all 2 runs failed, the first one: t = "));
   const char *table = cli_file ("s.csv");
@@ -63,10 +60,9 @@ static void test_rows (void **state) {
 }
 
 /* A checkpoint from before the limit goes on, under a larger one, to the same bytes. */
-static void test_resume (void **state) {
+TEST (resume) {
   static const char *const method[] = { "erk8+projection", "bdf+projection" };
   char command[800];
-  (void)state;
   for (int i = 0; i < 2; i++) {
     snprintf (
         command, sizeof command,
@@ -81,40 +77,36 @@ static void test_resume (void **state) {
   }
 }
 
-static void test_bad (void **state) {
+TEST (bad) {
   static const cli_wrong wrong[] = {
     { "ezyroller --limit 0", "--limit 0: expected a number > 0" },
     { "ezyroller --limit soon", "--limit: \"soon\" is not a number" },
     { "ezyroller --max-steps 0", "--max-steps 0: expected a whole number >= 1" },
     { "ezyroller --max-steps 1.5", "--max-steps 1.5: expected a whole number >= 1" },
   };
-  (void)state;
   cli_bad_each ("run", wrong, sizeof wrong / sizeof *wrong);
 }
 
 /* A signal that comes while one step is written as a thousand million rows. */
-static void test_rows_of_a_step (void **state) {
+TEST (rows_of_a_step) {
   static const char *const method[] = { "rk4", "erk8", "bdf", "galpha" };
-  char command[300];
-  (void)state;
   for (int i = 0; i < 4; i++) {
-    snprintf (command, sizeof command,
-              "\"${PINWHEEL:-build/pinwheel}\" run ezyroller --method %s --every 1e-12 -o @/e.csv & p=$!; "
-              "while kill -0 $! 2>/dev/null && [ ! -s @/e.csv.part ]; do sleep 0.01; done; kill -TERM $p; wait $p; "
-              "s=$?; rm -f @/e.csv.part; exit $s",
-              method[i]);
-    assert_int_equal (cli_run (command), 130);
+    assert_int_equal (
+        cli_run (check_text (
+            "\"${PINWHEEL:-build/pinwheel}\" run ezyroller --method %s --every 1e-12 -o @/e.csv & p=$!; "
+            "while kill -0 $! 2>/dev/null && [ ! -s @/e.csv.part ]; do sleep 0.01; done; kill -TERM $p; wait $p; "
+            "s=$?; rm -f @/e.csv.part; exit $s",
+            method[i])),
+        130);
     assert_non_null (strstr (cli_err, "interrupted at t = "));
   }
 }
 
 /* Standard error as a file: no bar, and a line only when a minute has passed. */
-static void test_lines (void **state) {
-  char path[200], text[400];
+TEST (lines) {
+  char text[400];
   pw_progress p;
-  (void)state;
-  cli_expand ("@/lines", path, sizeof path);
-  int before = dup (STDERR_FILENO), file = open (path, O_RDWR | O_CREAT | O_TRUNC, 0600);
+  int before = dup (STDERR_FILENO), file = open (cli_path ("lines"), O_RDWR | O_CREAT | O_TRUNC, 0600);
   assert_true (before >= 0 && file >= 0);
   dup2 (file, STDERR_FILENO);
   pw_progress_start (&p, "ezyroller", "s", 0, 10);
@@ -136,8 +128,7 @@ static void test_lines (void **state) {
 }
 
 /* Speeds that have grown a thousand times beyond the scene's are reported; the same speed from the start is not. */
-static void test_growth (void **state) {
-  (void)state;
+TEST (growth) {
   cli_write ("spin.yaml", "pinwheel: 1\nabout: a rotor\nrun: {t_end: 3000, method: erk8+projection}\n"
                           "parameters: [{name: T, value: 1}, {name: w, value: 0}, {name: a, value: 0}]\n"
                           "bodies: [{name: rotor, mass: 1, inertia: 1, start: {x: a}, rate: {omega: w}}]\n"
@@ -154,8 +145,7 @@ static void test_growth (void **state) {
 }
 
 /* A signal during the last step interrupts nothing. */
-static void test_last_step (void **state) {
-  (void)state;
+TEST (last_step) {
   cli_write ("raise.c", "#include <signal.h>\n#include \"pinwheel.h\"\n"
                         "static int value (void *c, double t, const double *x, double *u, double *g) {\n"
                         "  (void)c, (void)x, (void)g;\n  u[0] = u[1] = u[2] = 0;\n"
@@ -175,20 +165,11 @@ static int limits_no_task (void *context, int i, pw_error *error) {
 }
 
 /* Without tasks the threads, timed or not, end at once. */
-static void test_no_tasks (void **state) {
+TEST (no_tasks) {
   pw_error error = { 0 };
   char text[] = "a task was called";
-  (void)state;
   assert_int_equal (pw_parallel (2, 0, limits_no_task, text, &error), PW_OK);
   assert_int_equal (pw_parallel_timed (2, 0, limits_no_task, text, &error), PW_OK);
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_max_steps), cmocka_unit_test (test_limit),  cmocka_unit_test (test_rows),
-    cmocka_unit_test (test_resume),    cmocka_unit_test (test_bad),    cmocka_unit_test (test_rows_of_a_step),
-    cmocka_unit_test (test_lines),     cmocka_unit_test (test_growth), cmocka_unit_test (test_last_step),
-    cmocka_unit_test (test_no_tasks),
-  };
-  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
-}
+const check_fixture fixture = { cli_setup, cli_teardown };

@@ -5,60 +5,15 @@
 #include <string.h>
 #include "check.h"
 #include "cli.h"
-
-/* Columns of compare.csv, from 0. */
-enum {
-  METHOD,
-  LADDER,
-  LEVEL,
-  STATUS,
-  TIME,
-  END,
-  MOST = END + 4,
-  MULTIPLIER = END + 8,
-  BELOW,
-  ORDER,
-  POSITION,
-  VELOCITY,
-  BALANCE,
-  STEPS,
-  REJECTED,
-  RHS,
-  JACOBIANS,
-  FACTORISATIONS,
-  CPU,
-  SPREAD,
-  REPEATS,
-  REASON
-};
+#include "compare_table.h"
 
 /* Rows are run once on the clock, and errors taken against the table that compare_setup makes, where neither
  * matters. */
 #define ONCE " --repeats 1 --reference @/known.csv "
 #define SHORT "--repeats 1 --t-end 2 --step-ladder 0.1:0.02 --rtol-ladder 1e-5:1e-7"
 
-/* The cell of a row, from 0, of compare.csv in a folder; no text in quotes comes before it. */
-static const char *compare_cell (const char *file, int row, int column) {
-  static char cell[600];
-  const char *at = cli_file (file);
-  assert_non_null (at);
-  for (int i = 0; i <= row; i++) {
-    at = strchr (at, '\n');
-    assert_non_null (at);
-    at++;
-  }
-  for (int i = 0; i < column; i++) at = strchr (at, ',') + 1;
-  snprintf (cell, sizeof cell, "%.*s", (int)strcspn (at, column == REASON ? "\n" : ",\n"), at);
-  return cell;
-}
-
-static double compare_number (const char *file, int row, int column) {
-  return strtod (compare_cell (file, row, column), NULL);
-}
-
 /* Rows come in the order of the methods, decades of tolerances, halves of steps. */
-static void test_rows (void **state) {
-  (void)state;
+TEST (rows) {
   cli_good ("pinwheel compare ezyroller --methods rk4+projection,ida+ggl,erk5:steps=fixed " SHORT
             " -o @/rows && cut -d, -f1-4 @/rows/compare.csv && ls @/rows");
   const char *table = strstr (cli_out, "method,ladder");
@@ -81,8 +36,7 @@ static void test_rows (void **state) {
 }
 
 /* Fixed-step methods converge at their order, against a reference that is better than all of them. */
-static void test_orders (void **state) {
-  (void)state;
+TEST (orders) {
   cli_good ("pinwheel compare ezyroller --methods rk4+none,rk4+projection,erk5+projection:steps=fixed --t-end 2 "
             "--step-ladder 0.1:0.02 --repeats 3 -o @/order");
   const double order[3] = { 4, 4, 5 };
@@ -105,8 +59,7 @@ static void test_orders (void **state) {
 }
 
 /* Outside the asymptotic range, here next to the reference's uncertainty, levels disagree and no order is given. */
-static void test_no_order (void **state) {
-  (void)state;
+TEST (no_order) {
   cli_good ("pinwheel compare ezyroller --methods erk5+projection:steps=fixed --t-end 2 --step-ladder 0.05:0.0125 "
             "--repeats 3 -o @/round");
   assert_string_equal (compare_cell ("round/compare.csv", 2, BELOW), "");
@@ -115,8 +68,7 @@ static void test_no_order (void **state) {
 
 /* The last row knows the reference's uncertainty only: what is not ten times that has no order, however well it
  * fits. */
-static void test_uncertain_order (void **state) {
-  (void)state;
+TEST (uncertain_order) {
   cli_good ("pinwheel compare ezyroller --methods rk4+projection --t-end 2 --step-ladder 0.02:0.0003 --repeats 1 "
             "-o @/uncertain >@/table");
   double uncertainty = compare_number ("uncertain/compare.csv", 6, MOST);
@@ -130,8 +82,7 @@ static void test_uncertain_order (void **state) {
 
 /* However long a run takes, it is repeated: one number has no spread.  (On a machine that does this one in less than a
  * sixth of a second, more repeats follow anyway.) */
-static void test_repeats (void **state) {
-  (void)state;
+TEST (repeats) {
   cli_good ("pinwheel compare ezyroller --methods rk4+projection -t 2 --reference @/known.csv --step-ladder 4e-6:4e-6 "
             "--limit 1000 "
             "-o @/long >@/table");
@@ -140,17 +91,14 @@ static void test_repeats (void **state) {
 }
 
 /* What a row says about cost is what a run says: neither samples nor accounts are counted. */
-static void test_row_is_run (void **state) {
-  (void)state;
+TEST (row_is_run) {
   static const char *const method[] = { "rk4+projection", "erk8+projection", "ida+baumgarte" };
   for (int m = 0; m < 3; m++) {
-    char command[600];
-    snprintf (command, sizeof command,
-              "pinwheel compare ezyroller --methods %s --t-end 2 --rtol-ladder 1e-6 --step-ladder 0.01 --repeats 2 "
-              "--reference @/known.csv -o @/as-run "
-              ">@/table\npinwheel run ezyroller --method %s --t-end 2 --rtol 1e-6 --step 0.01 --json -",
-              method[m], method[m]);
-    cli_good (command);
+    cli_good (check_text (
+        "pinwheel compare ezyroller --methods %s --t-end 2 --rtol-ladder 1e-6 --step-ladder 0.01 --repeats 2 "
+        "--reference @/known.csv -o @/as-run "
+        ">@/table\npinwheel run ezyroller --method %s --t-end 2 --rtol 1e-6 --step 0.01 --json -",
+        method[m], method[m]));
     const struct {
       const char *group, *key;
       int column;
@@ -166,8 +114,7 @@ static void test_row_is_run (void **state) {
 
 /* A run's own table as reference: the same method and level has no error but round-off; another one has that between
  * them. */
-static void test_reference (void **state) {
-  (void)state;
+TEST (reference) {
   cli_good ("pinwheel compare ezyroller --methods rk4+projection --reference @/known.csv --repeats 1 --step-ladder "
             "0.05:0.025 "
             "-o @/t");
@@ -191,8 +138,7 @@ static void test_reference (void **state) {
 
 /* Where a signal jumps multipliers have two values.  Runge-Kutta methods show that behind, others that before: such a
  * sample is no error of theirs, and does not keep the reference from telling those at the other samples. */
-static void test_jump (void **state) {
-  (void)state;
+TEST (jump) {
   cli_good ("pinwheel compare tests/scenes/shove.yaml --methods rk4+projection,ida+ggl --step-ladder 0.01 "
             "--rtol-ladder 1e-6 --repeats 1 -o @/jump >@/table");
   for (int i = 0; i < 2; i++) {
@@ -201,117 +147,8 @@ static void test_jump (void **state) {
   }
 }
 
-/* A word, from 0, of the line of the conclusion that begins with a name. */
-static const char *compare_word (const char *name, int word) {
-  static char text[80];
-  char line[100];
-  snprintf (line, sizeof line, "\n%s ", name);
-  const char *at = strstr (cli_out, line);
-  assert_non_null (at);
-  at += strlen (line);
-  for (int i = 0;; i++) {
-    at += strspn (at, " ");
-    size_t n = strcspn (at, " \n");
-    snprintf (text, sizeof text, "%.*s", (int)n, at);
-    if (i == word) return text;
-    at += n;
-  }
-}
-
-/* The processor time of the method with rows `from` to `to` - 1 for an error, in a pendulum of 1 m: errors of lengths
- * and angles count alike.  NaN if it is not reached. */
-static double compare_cost (const char *file, int from, int to, double error) {
-  double before = 0, least = NAN;
-  for (int row = from; row < to; row++) {
-    double length = compare_number (file, row, MOST), angle = compare_number (file, row, MOST + 1),
-           here = fmax (length, angle), cpu = compare_number (file, row, CPU), cost = cpu;
-    if (here <= error && before > error) {
-      double cpu_before = compare_number (file, row - 1, CPU), part = log (error / before) / log (here / before);
-      cost = fmin (cpu, exp (log (cpu_before) + part * log (cpu / cpu_before)));
-    }
-    if (here <= error) least = fmin (least, cost); /* NaN: none so far */
-    before = here;
-  }
-  return least;
-}
-
-/* Costs are interpolated between rows and relative to the cheapest; rows appear only on demand. */
-static void test_conclusion (void **state) {
-  (void)state;
-  static const char *const error[] = { "1e-3", "1e-6", "1e-9" };
-  const int rows = 6; /* of each method; the second one does not reach 6 digits, none reaches 9 */
-  cli_good ("pinwheel compare pendulum --methods erk5+projection,ida+ggl --t-end 10 --rtol-ladder 1e-3:1e-8 "
-            "--repeats 1 -o @/end");
-  assert_null (strstr (cli_out, "residual of"));
-  assert_non_null (strstr (cli_out, "the largest error of a coordinate at 100 times up to 10 s, relative to\n1 m "
-                                    "(lengths), 1 rad (angles). The reference has 14."));
-  for (int k = 0; k < 3; k++) {
-    double erk5 = compare_cost ("end/compare.csv", 0, rows, strtod (error[k], NULL));
-    assert_string_equal (compare_word ("cheapest", k), k < 2 ? "erk5+projection" : "-");
-    assert_string_equal (compare_word ("erk5+projection", k), k < 2 ? "1.0" : "not");
-    if (k < 2) check_close ("time", strtod (compare_word ("its time", 2 * k), NULL), 1e3 * erk5, 51 * erk5, "2 digits");
-  }
-  double ratio = strtod (compare_word ("ida+ggl", 0), NULL),
-         known =
-             compare_cost ("end/compare.csv", rows, 2 * rows, 1e-3) / compare_cost ("end/compare.csv", 0, rows, 1e-3);
-  check_close ("ratio", ratio, known, known < 9.95 ? 0.0501 : 0.501, "the digits printed");
-  assert_string_equal (compare_word ("ida+ggl", 1), "not");
-  assert_string_equal (compare_word ("ida+ggl", 3), "not");
-  cli_good ("pinwheel compare pendulum --methods rk4+projection --table --t-end 1 --step-ladder 0.1:0.05 --repeats 1");
-  assert_non_null (strstr (cli_out, "residual of"));
-  assert_non_null (strstr (cli_out, "\nrk4+projection      0.05 "));
-  assert_non_null (strstr (cli_out, "\ncheapest "));
-}
-
-/* Nothing is extrapolated: a cost below the loosest level is a bound, and what the limit ends keeps the levels
- * before. */
-static void test_conclusion_bounds (void **state) {
-  (void)state;
-  cli_good ("pinwheel compare pendulum --methods rk4+projection --t-end 1 --step-ladder 0.01:1e-9 --limit 0.05 "
-            "--repeats 1");
-  assert_string_equal (compare_word ("rk4+projection", 0), "<1.0");
-  assert_string_equal (compare_word ("rk4+projection", 2), "1.0");
-  assert_non_null (strstr (cli_out, "\n<: at most"));
-  assert_non_null (strstr (cli_out, "\nstopped by the limit of 0.05 s: rk4+projection from "));
-}
-
-/* A chaotic motion is not known to 9 digits: the conclusion does not compare methods there. */
-static void test_conclusion_uncertain (void **state) {
-  (void)state;
-  cli_write ("chaos.yaml", "pinwheel: 1\nbodies:\n  - {name: a, mass: 1, start: {x: 1}}\n"
-                           "  - {name: b, mass: 1, start: {x: 2}}\nelements:\n"
-                           "  - {pin: A, body: [a, ground], at: [[-1, 0], [0, 0]]}\n"
-                           "  - {pin: B, body: [a, b], at: [[0, 0], [-1, 0]]}\n"
-                           "  - {gravity: g, acceleration: [0, -10]}\n");
-  cli_good ("pinwheel compare @/chaos.yaml --methods erk8+projection --t-end 20 --rtol-ladder 1e-12 --repeats 1");
-  assert_string_equal (compare_word ("cheapest", 2), "-");
-  assert_non_null (strstr (cli_out, " uncertain\n"));
-  assert_non_null (strstr (cli_out, "not accurate enough to distinguish methods"));
-}
-
-/* One line for each method with failures. */
-static void test_conclusion_failures (void **state) {
-  (void)state;
-  cli_good ("pinwheel compare pendulum --methods erk5+none,erk5+projection --t-end 20 --rtol-ladder 1e-3:1e-5 "
-            "--repeats 1");
-  const char *line = strstr (cli_out, "\nerk5+none: 1 of 3 runs fail, first at rtol 0.001: t = 7.0");
-  assert_non_null (line);
-  assert_non_null (strstr (line, "pin pivot"));
-  assert_null (strstr (cli_out, "\nerk5+projection: "));
-}
-
-/* Without a coordinate to compare there is no conclusion, but rows. */
-static void test_no_conclusion (void **state) {
-  (void)state;
-  cli_write ("speed.csv", "t,frame.vx\n1,0\n2,0\n");
-  cli_good ("pinwheel compare ezyroller --methods rk4 --reference @/speed.csv --repeats 1 --step-ladder 0.1");
-  assert_null (strstr (cli_out, "cheapest"));
-  assert_non_null (strstr (cli_out, "\nrk4          0.1 "));
-}
-
 /* Eight methods by default; every integrator with one stabilisation. */
-static void test_presets (void **state) {
-  (void)state;
+TEST (presets) {
   cli_good ("pinwheel compare ezyroller" ONCE "--t-end 0.5 --step-ladder 0.01 --rtol-ladder 1e-6 -o @/usual >@/table; "
             "pinwheel compare ezyroller --methods all+ggl,rk4+all,all+ggl" ONCE "--t-end 0.5 --step-ladder 0.01 "
             "--rtol-ladder 1e-6 -o @/ggl >@/table; tail -n +2 @/usual/compare.csv | wc -l; "
@@ -321,17 +158,16 @@ static void test_presets (void **state) {
 }
 
 /* Errors of multipliers are relative to the largest of their unit: masses a power of 2 as large change no digit. */
-static void test_multiplier_scale (void **state) {
+TEST (multiplier_scale) {
   double error[2];
-  (void)state;
   for (int i = 0; i < 2; i++) {
-    char text[600];
-    snprintf (text, sizeof text,
-              "pinwheel: 1\nbodies:\n  - {name: a, mass: %d, start: {x: 1}}\n  - {name: b, mass: %d, start: {x: 2}}\n"
-              "elements:\n  - {pin: A, body: [a, ground], at: [[-1, 0], [0, 0]]}\n"
-              "  - {pin: B, body: [a, b], at: [[0, 0], [-1, 0]]}\n  - {gravity: g, acceleration: [0, -10]}\n",
-              i ? 1024 : 1, i ? 1024 : 1);
-    cli_write ("double.yaml", text);
+    cli_write (
+        "double.yaml",
+        check_text (
+            "pinwheel: 1\nbodies:\n  - {name: a, mass: %d, start: {x: 1}}\n  - {name: b, mass: %d, start: {x: 2}}\n"
+            "elements:\n  - {pin: A, body: [a, ground], at: [[-1, 0], [0, 0]]}\n"
+            "  - {pin: B, body: [a, b], at: [[0, 0], [-1, 0]]}\n  - {gravity: g, acceleration: [0, -10]}\n",
+            i ? 1024 : 1, i ? 1024 : 1));
     cli_good ("pinwheel compare @/double.yaml --methods rk4+projection --t-end 0.5 --step-ladder 0.02 --repeats 1 "
               "-o @/double >@/table");
     error[i] = compare_number ("double/compare.csv", 0, MULTIPLIER);
@@ -341,8 +177,7 @@ static void test_multiplier_scale (void **state) {
 
 /* The reference of its own making agrees with digits computed in quadruple precision (tests/reference) as far as it
  * claims. */
-static void test_own_reference (void **state) {
-  (void)state;
+TEST (own_reference) {
   const double x[3] = { 0.122485077560987708, -0.0509563103339871023, -0.0717230785643341303 };
   cli_good ("pinwheel compare ezyroller --methods rk4 --step-ladder 0.1 --t-end 2 --repeats 1 -o @/own >@/table && "
             "head -2 @/own/truth.csv | tail -1 | cut -d, -f4,5; "
@@ -360,8 +195,7 @@ static void test_own_reference (void **state) {
 }
 
 /* All methods there are: each is a row, with a reason if it does not reach the end. */
-static void test_all (void **state) {
-  (void)state;
+TEST (all) {
   cli_good (
       "pinwheel compare ezyroller --methods all" ONCE "--t-end 0.5 --step-ladder 0.01 --rtol-ladder 1e-6 -o @/all "
       ">@/table; pinwheel "
@@ -373,8 +207,7 @@ static void test_all (void **state) {
 }
 
 /* The former name of an option still works, but is not documented. */
-static void test_alias (void **state) {
-  (void)state;
+TEST (alias) {
   cli_good ("pinwheel compare ezyroller --methods rk4 --truth @/known.csv --repeats 1 --step-ladder 0.1");
   assert_non_null (strstr (cli_out, "known.csv, as if it were exact"));
   cli_good ("pinwheel run ezyroller -t 2 --truth @/known.csv --json - | grep known.csv");
@@ -384,8 +217,7 @@ static void test_alias (void **state) {
   cli_bad ("pinwheel compare ezyroller --truht x", 2, "compare has no option \"--truht\"; see pinwheel compare --help");
 }
 
-static void test_limit (void **state) {
-  (void)state;
+TEST (limit) {
   int status =
       cli_run ("pinwheel compare ezyroller --methods rk4" ONCE "--t-end 2 --step-ladder 0.01:1e-8 --limit 0.1 -o @/l");
   assert_int_equal (status, 0);
@@ -402,8 +234,7 @@ static void test_limit (void **state) {
 }
 
 /* A failure keeps its row, its reason and the time reached; the others go on. */
-static void test_failure (void **state) {
-  (void)state;
+TEST (failure) {
   cli_good ("pinwheel compare ezyroller --methods erk8+projection" ONCE "--t-end 1 --rtol-ladder 1e-14:1e-13 -o @/f");
   assert_string_equal (compare_cell ("f/compare.csv", 0, STATUS), "ok");
   assert_string_equal (compare_cell ("f/compare.csv", 1, STATUS), "refused");
@@ -415,8 +246,7 @@ static void test_failure (void **state) {
 }
 
 /* Interrupted in the middle: rows done stay. */
-static void test_interrupt (void **state) {
-  (void)state;
+TEST (interrupt) {
   int status = cli_run (
       "\"${PINWHEEL:-build/pinwheel}\" compare ezyroller --methods rk4" ONCE
       "--t-end 2 --step-ladder 0.1:1e-8 --limit 100 -o @/i &\n"
@@ -429,8 +259,7 @@ static void test_interrupt (void **state) {
 }
 
 /* Concurrent methods give the same rows in the same order, but for the times. */
-static void test_jobs (void **state) {
-  (void)state;
+TEST (jobs) {
   cli_good ("for j in 1 2 5; do\n"
             "  pinwheel compare pendulum --methods galpha+ggl,rk4,erk5,bdf,ida+none " SHORT
             " --jobs $j -o @/j$j || exit 1\n"
@@ -442,8 +271,7 @@ static void test_jobs (void **state) {
 }
 
 /* Threads whose runs are timed never share a processor; on a machine with one core there is one of them. */
-static void test_cores (void **state) {
-  (void)state;
+TEST (cores) {
   cli_good (
       "\"${PINWHEEL:-build/pinwheel}\" compare ezyroller --specialise never --methods rk4,rk4+none,rk4+baumgarte" ONCE
       "--step-ladder 1e-8 --jobs 3 --limit 60 >@/cores.txt 2>&1 &\n"
@@ -459,8 +287,7 @@ static void test_cores (void **state) {
   free (line);
 }
 
-static void test_bad (void **state) {
-  (void)state;
+TEST (bad) {
   const cli_wrong bad[] = {
     { "ezyrolle", "there is no model \"ezyrolle\"; did you mean \"ezyroller\"?" },
     { "ezyroller --methods rk5", "there is no integrator \"rk5\"; did you mean \"erk5\"?" },
@@ -506,37 +333,9 @@ static void test_bad (void **state) {
 }
 
 /* The table of a run. */
-static int compare_setup (void **state) {
-  if (cli_setup (state) != 0) return -1;
+static int compare_setup (void) {
+  if (cli_setup () != 0) return -1;
   return cli_run ("pinwheel run ezyroller --method rk4+projection --step 0.025 --t-end 2 --every 0.1 -o @/known.csv");
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_rows),
-    cmocka_unit_test (test_orders),
-    cmocka_unit_test (test_no_order),
-    cmocka_unit_test (test_uncertain_order),
-    cmocka_unit_test (test_repeats),
-    cmocka_unit_test (test_row_is_run),
-    cmocka_unit_test (test_reference),
-    cmocka_unit_test (test_own_reference),
-    cmocka_unit_test (test_jump),
-    cmocka_unit_test (test_multiplier_scale),
-    cmocka_unit_test (test_all),
-    cmocka_unit_test (test_limit),
-    cmocka_unit_test (test_failure),
-    cmocka_unit_test (test_interrupt),
-    cmocka_unit_test (test_jobs),
-    cmocka_unit_test (test_cores),
-    cmocka_unit_test (test_bad),
-    cmocka_unit_test (test_alias),
-    cmocka_unit_test (test_conclusion),
-    cmocka_unit_test (test_conclusion_bounds),
-    cmocka_unit_test (test_conclusion_uncertain),
-    cmocka_unit_test (test_conclusion_failures),
-    cmocka_unit_test (test_no_conclusion),
-    cmocka_unit_test (test_presets),
-  };
-  return cmocka_run_group_tests (tests, compare_setup, cli_teardown);
-}
+const check_fixture fixture = { compare_setup, cli_teardown };

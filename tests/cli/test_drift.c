@@ -48,8 +48,7 @@ static double drift_number (const char *file, const char *method, int column) {
 
 /* A conservative pendulum's accelerations alone: velocities drift linearly, positions quadratically; projected they
  * stay at round-off, and with feedback within bounds. */
-static void test_growth (void **state) {
-  (void)state;
+TEST (growth) {
   cli_good ("pinwheel drift pendulum --t-end 40 --step 0.005 --methods rk4+none,rk4+baumgarte,rk4+projection "
             "--only-methods -o @/growth");
   const char *f = "growth/drift.csv";
@@ -65,8 +64,7 @@ static void test_growth (void **state) {
 }
 
 /* The worst of all steps is what a run reports of itself. */
-static void test_row_is_run (void **state) {
-  (void)state;
+TEST (row_is_run) {
   static const char *const method[] = { "rk4+baumgarte", "erk8+none", "ida+ggl" };
   for (int m = 0; m < 3; m++) {
     char command[500];
@@ -88,8 +86,7 @@ static void test_row_is_run (void **state) {
 }
 
 /* Every stabilisation of an integrator, each once; by default those of three. */
-static void test_all_of_one (void **state) {
-  (void)state;
+TEST (all_of_one) {
   cli_good ("pinwheel drift pendulum --t-end 0.1 --methods rk4+none,rk4+all --only-methods -o @/one >@/out1; "
             "tail -n +2 @/one/drift.csv | cut -d, -f2");
   assert_string_equal (cli_out, "rk4+none\nrk4+baumgarte\nrk4+projection\nrk4+nullspace\n");
@@ -99,8 +96,7 @@ static void test_all_of_one (void **state) {
 }
 
 /* What the options do: seldom projections leave more, and a grid of alpha and beta has all its rows. */
-static void test_options (void **state) {
-  (void)state;
+TEST (options) {
   cli_good (
       "pinwheel drift pendulum --t-end 2 --step 0.01 --methods rk4+projection --vary alpha=0,5 --vary "
       "beta=log:1:100:3 --vary every=1,4,16 -o @/options && tail -n +2 @/options/drift.csv | cut -d, -f1 | uniq -c "
@@ -125,8 +121,7 @@ static void test_options (void **state) {
 }
 
 /* Each method of the curves against time has its points, the last one at the end. */
-static void test_times (void **state) {
-  (void)state;
+TEST (times) {
   cli_good (
       "pinwheel drift pendulum --t-end 2 --step 0.01 --methods rk4+none,ida+ggl --only-methods -o @/times >@/out1; "
       "grep -c '^rk4+none,' @/times/drift-time.csv; grep '^ida+ggl,' @/times/drift-time.csv | tail -1 | cut -d, -f2");
@@ -134,8 +129,7 @@ static void test_times (void **state) {
 }
 
 /* A run that fails is a row with its reason; the others go on. */
-static void test_failure (void **state) {
-  (void)state;
+TEST (failure) {
   cli_good (
       "pinwheel drift ezyroller --t-end 2 --step 0.02 --methods rk4+none --vary alpha=10,1000 --vary beta=10 --vary "
       "every=1 -o @/f");
@@ -147,8 +141,7 @@ static void test_failure (void **state) {
 }
 
 /* Interrupted in the middle: rows done stay. */
-static void test_interrupt (void **state) {
-  (void)state;
+TEST (interrupt) {
   int status =
       cli_run ("\"${PINWHEEL:-build/pinwheel}\" drift ezyroller --t-end 4 --step 1e-3 --vary every=1,2 -o @/i &\n"
                "p=$!; while kill -0 $! 2>/dev/null && ! grep -q '^methods,rk4' @/i/drift.csv.part 2>/dev/null; do "
@@ -161,15 +154,13 @@ static void test_interrupt (void **state) {
 }
 
 /* No figure against alpha if it is 0, which a logarithmic axis does not show. */
-static void test_alpha_zero (void **state) {
-  (void)state;
+TEST (alpha_zero) {
   cli_good ("pinwheel drift pendulum --t-end 0.1 --step 0.01 --methods rk4 --vary alpha=0 --vary beta=1 --vary every=1 "
             "-o @/zero && test ! -e @/zero/drift-baumgarte.gp");
 }
 
 /* Rows that have been written are kept, and named. */
-static void test_kept (void **state) {
-  (void)state;
+TEST (kept) {
   assert_int_equal (cli_run ("(ulimit -f 2; pinwheel drift pendulum --t-end 1 --step 0.01 -o @/full)"), 1);
   assert_non_null (strstr (cli_err, "pinwheel: the runs so far are kept in "));
   assert_non_null (cli_file ("full/drift.csv.part"));
@@ -177,8 +168,7 @@ static void test_kept (void **state) {
   assert_non_null (strstr (cli_err, "time/drift-time.csv.part\n"));
 }
 
-static void test_bad (void **state) {
-  (void)state;
+TEST (bad) {
   const cli_wrong bad[] = {
     { "ezyrolle", "there is no model \"ezyrolle\"; did you mean \"ezyroller\"?" },
     { "ezyroller --methods rk4+nome", "integrator rk4 has no stabilisation \"nome\"; did you mean \"none\"?" },
@@ -200,8 +190,7 @@ static void test_bad (void **state) {
 }
 
 /* Concurrent runs, the longest of which begins first, appear in their order with the same numbers. */
-static void test_jobs (void **state) {
-  (void)state;
+TEST (jobs) {
   cli_good (
       "pinwheel drift pendulum --t-end 2 --methods ida+ggl,rk4+projection,erk5+none,bdf+projection --only-methods "
       "--jobs 1 -o @/jobs1");
@@ -214,12 +203,4 @@ static void test_jobs (void **state) {
   cli_bad ("pinwheel drift pendulum --jobs 0", 2, "--jobs 0: expected a whole number >= 1");
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_growth),    cmocka_unit_test (test_row_is_run), cmocka_unit_test (test_all_of_one),
-    cmocka_unit_test (test_options),   cmocka_unit_test (test_times),      cmocka_unit_test (test_failure),
-    cmocka_unit_test (test_interrupt), cmocka_unit_test (test_bad),        cmocka_unit_test (test_jobs),
-    cmocka_unit_test (test_kept),      cmocka_unit_test (test_alpha_zero),
-  };
-  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
-}
+const check_fixture fixture = { cli_setup, cli_teardown };

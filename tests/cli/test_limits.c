@@ -14,8 +14,7 @@ static const char *const limits_adaptive[] = { "erk5+projection", "erk8+projecti
 /* ---- Attempted steps ---- */
 
 /* The run ends after that many attempted steps, with a message; SUNDIALS finishes the step it is in. */
-static void test_max_steps (void **state) {
-  (void)state;
+TEST (max_steps) {
   for (const char *const *method = limits_adaptive; *method; method++) {
     pw_error error = { 0 };
     pw_system *s = scene_system (&scene_ezyroller, NULL);
@@ -31,9 +30,8 @@ static void test_max_steps (void **state) {
   }
 }
 
-static void test_max_steps_of_fixed_steps (void **state) {
+TEST (max_steps_of_fixed_steps) {
   static const char *const method[] = { "rk4+projection", "erk5+projection:steps=fixed", "galpha", "leapfrog" };
-  (void)state;
   for (int i = 0; i < 4; i++) {
     pw_system *s = scene_system (&scene_ezyroller, NULL);
     pw_run *r = runs_open (s, method[i], &(pw_settings){ .step = 0.01, .max_steps = 10 });
@@ -44,8 +42,7 @@ static void test_max_steps_of_fixed_steps (void **state) {
   }
 }
 
-static void test_bad_max_steps (void **state) {
-  (void)state;
+TEST (bad_max_steps) {
   pw_error error = { 0 };
   pw_system *s = scene_system (&scene_ezyroller, NULL);
   assert_null (pw_run_open (s, "erk5", &(pw_settings){ .max_steps = -1 }, &error));
@@ -62,9 +59,8 @@ static int limits_stop (void *context) {
 
 /* Wherever a run is stopped, it goes on when it is advanced again, and nothing but the last digits of a method that has
  * to start anew, or of steps that were tried with another size, shows it. */
-static void test_stop (void **state) {
+TEST (stop) {
   static const char *const one_step[] = { "rk4+projection", "galpha", "leapfrog", "erk8+projection", NULL };
-  (void)state;
   for (int k = 0; k < 2; k++)
     for (const char *const *method = k ? limits_adaptive : one_step; *method; method++)
       for (int stop = 1; stop < 400; stop = 2 * stop + 1) {
@@ -99,9 +95,8 @@ static int limits_asked (void *context) {
 }
 
 /* A sample inside a step is refused, the state reached is there. */
-static void test_stop_samples (void **state) {
+TEST (stop_samples) {
   char name[40];
-  (void)state;
   for (int i = 0; runs_method (i, name); i++) {
     int asked = 0;
     pw_sample sample;
@@ -126,8 +121,7 @@ static int limits_inside (void *context) {
   return ++*(int *)context > 1;
 }
 
-static void test_stop_inside (void **state) {
-  (void)state;
+TEST (stop_inside) {
   for (const char *const *method = limits_adaptive + 2; *method; method++) {
     int calls = 0;
     pw_error error = { 0 };
@@ -142,30 +136,23 @@ static void test_stop_inside (void **state) {
 
 /* ---- Growth ---- */
 
+static const pw_parameter limits_list[] = { { .name = "torque" }, { .name = NULL } };
+
 /* A rotor on a pin with a constant torque; without it, as fast as it gets, it only turns. */
-static void limits_rotor (pw_model *m, const void *parameters) {
-  const double *torque = parameters;
-  pw_add_body (m, &(pw_body){ .name = "rotor", .mass = 1, .inertia = 1, .rate = { 0, 0, *torque != 0 ? 0 : 5000 } });
+SCENE_WITH (limits_rotor, limits_list, double) {
+  pw_add_body (m, &(pw_body){ .name = "rotor", .mass = 1, .inertia = 1, .rate = { 0, 0, *p != 0 ? 0 : 5000 } });
   pw_add_pin (m, &(pw_pin){ .name = "P", .body = { "rotor", "ground" } });
-  pw_add_torque (m, &(pw_torque){ .name = "T", .body = { "rotor", "ground" }, .value = { .constant = *torque } });
+  pw_add_torque (m, &(pw_torque){ .name = "T", .body = { "rotor", "ground" }, .value = { .constant = *p } });
 }
 
-static const pw_parameter limits_list[] = { { .name = "torque" }, { .name = NULL } };
-static const pw_plugin_table limits_table = { .abi = PW_ABI,
-                                              .size = sizeof (pw_plugin_table),
-                                              .parameters = limits_list,
-                                              .parameters_size = sizeof (double),
-                                              .build = limits_rotor };
-
 /* T is 1 s: after t seconds the speed is t times its scale, and it grows with t. */
-static void test_growth (void **state) {
+TEST (growth) {
   static const char *const method[] = { "rk4+projection", "erk8+projection", "bdf+projection", NULL };
-  (void)state;
   for (const char *const *k = method; *k; k++)
     for (int spins = 0; spins < 2; spins++) {
       int which;
       double power;
-      pw_system *s = scene_system (&limits_table, "torque", spins ? 0. : 1., NULL);
+      pw_system *s = scene_system (&limits_rotor_table, "torque", spins ? 0. : 1., NULL);
       pw_run *r = runs_open (s, *k, &(pw_settings){ .step = 0.1, .span = 1 });
       runs_to (r, 900);
       assert_true (pw_run_growth (r, &which, &power) == 0);
@@ -181,8 +168,8 @@ static void test_growth (void **state) {
 }
 
 /* A torque that changes sign: the speed, (1 - cos w t) / w, was as large at half of the time as it is again. */
-static void limits_swung (pw_model *m, const void *parameters) {
-  const double omega = *(const double *)parameters;
+SCENE_WITH (limits_swung, limits_list, double) {
+  const double omega = *p;
   pw_add_body (m, &(pw_body){ .name = "rotor", .mass = 1, .inertia = 1 });
   pw_add_pin (m, &(pw_pin){ .name = "P", .body = { "rotor", "ground" } });
   pw_add_torque (
@@ -192,17 +179,11 @@ static void limits_swung (pw_model *m, const void *parameters) {
 }
 
 /* Growth is that since a mark at 8192 s or so, not that of the last step. */
-static void test_no_growth (void **state) {
-  static const pw_plugin_table table = { .abi = PW_ABI,
-                                         .size = sizeof (pw_plugin_table),
-                                         .parameters = limits_list,
-                                         .parameters_size = sizeof (double),
-                                         .build = limits_swung };
-  (void)state;
+TEST (no_growth) {
   int which;
   const double omega = 3 * PW_PI / 8192, t = (6 * PW_PI + 2.2) / omega;
   double power;
-  pw_system *s = scene_system (&table, "torque", omega, NULL);
+  pw_system *s = scene_system (&limits_swung_table, "torque", omega, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1, .span = 1 });
   check_close ("speed", runs_to (r, t).v[2], (1 - cos (2.2)) / omega, 1e-6 / omega, "1e-6: (w h)^4, with room");
   assert_true (pw_run_growth (r, &which, &power) == 0 && power < 0);
@@ -211,10 +192,9 @@ static void test_no_growth (void **state) {
 }
 
 /* At 4.5e13 rad an angle is known to 0.01 rad. */
-static void test_beyond_numbers (void **state) {
-  (void)state;
+TEST (beyond_numbers) {
   pw_error error = { 0 };
-  pw_system *s = scene_system (&limits_table, "torque", 0., NULL);
+  pw_system *s = scene_system (&limits_rotor_table, "torque", 0., NULL);
   pw_run *r = runs_open (s, "erk5+projection", &(pw_settings){ .span = 1 });
   assert_int_equal (pw_run_advance_to (r, 1e12, 1e12, &error), PW_METHOD);
   assert_non_null (strstr (error.text, "s: the motion has grown beyond what numbers resolve: rotor.phi = "));
@@ -222,15 +202,4 @@ static void test_beyond_numbers (void **state) {
                pw_run_time (r) < 5 * 4.6e13 / 5000); /* a step grows fivefold at most */
   pw_run_close (r);
   pw_system_free (s);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_max_steps),     cmocka_unit_test (test_max_steps_of_fixed_steps),
-    cmocka_unit_test (test_bad_max_steps), cmocka_unit_test (test_stop),
-    cmocka_unit_test (test_stop_samples),  cmocka_unit_test (test_stop_inside),
-    cmocka_unit_test (test_growth),        cmocka_unit_test (test_no_growth),
-    cmocka_unit_test (test_beyond_numbers)
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -14,9 +14,8 @@ static int plots_has (const char *name) {
 /* Draws all figures of a model; gnuplot has nothing to report. */
 static void plots_draw (const char *model) {
   static const char *const figures[] = { "paths", "velocities", "angular", "energy", "mechanism" };
-  char command[200], name[80];
-  snprintf (command, sizeof command, "pinwheel run %s --plots @/drawn", model);
-  cli_good (command);
+  char name[80];
+  cli_good (check_text ("pinwheel run %s --plots @/drawn", model));
   assert_null (strstr (cli_err, ".gp"));
   for (size_t i = 0; i < sizeof figures / sizeof *figures; i++) {
     snprintf (name, sizeof name, "drawn/%s.svg", figures[i]);
@@ -32,16 +31,16 @@ static void plots_draw (const char *model) {
 }
 
 /* After Ctrl-C data and scripts are written; the figures of an earlier run are removed. */
-static void test_interrupted (void **state) {
-  (void)state;
+TEST (interrupted) {
   const char *program = getenv ("PINWHEEL");
-  char command[1000], expected[400];
+  char expected[400];
   cli_run ("mkdir @/stopped; touch @/stopped/paths.svg");
-  snprintf (command, sizeof command,
-            "timeout --preserve-status -s INT 1 '%s' run ezyroller --t-end 300 --step 1e-5 --specialise never --plots "
-            "@/stopped",
-            program ? program : "build/pinwheel");
-  assert_int_equal (cli_run (command), 130);
+  assert_int_equal (
+      cli_run (check_text (
+          "timeout --preserve-status -s INT 1 '%s' run ezyroller --t-end 300 --step 1e-5 --specialise never --plots "
+          "@/stopped",
+          program ? program : "build/pinwheel")),
+      130);
   cli_expand ("pinwheel: the run was interrupted, so no figures are drawn; data and scripts are in @/stopped: gnuplot "
               "FILE.gp draws them there\n",
               expected, sizeof expected);
@@ -50,21 +49,17 @@ static void test_interrupted (void **state) {
   assert_non_null (cli_file ("stopped/paths.gp"));
 }
 
-static void test_drawn (void **state) {
-  (void)state;
+TEST (drawn) {
   plots_draw ("ezyroller --t-end 40"); /* goes far: a picture of the beginning too */
 }
 
 /* The data and scripts of a model without gnuplot. */
 static void plots_write (const char *model) {
-  char command[300];
-  snprintf (command, sizeof command, "PATH=/none pinwheel run %s --plots @/written >/dev/null", model);
-  assert_int_equal (cli_run (command), 0);
+  assert_int_equal (cli_run (check_text ("PATH=/none pinwheel run %s --plots @/written >/dev/null", model)), 0);
   assert_true (plots_has ("written/mechanism.gp") && plots_has ("written/energy.gp"));
 }
 
-static void test_written (void **state) {
-  (void)state;
+TEST (written) {
   plots_write ("pendulum --t-end 3");                 /* without wheels */
   plots_write ("wheeled-snake --set n=16 --t-end 1"); /* coloured by number */
   plots_write ("chain --set n=80 --t-end 0.05");
@@ -73,8 +68,7 @@ static void test_written (void **state) {
 }
 
 /* Figures that need a layout of their own. */
-static void test_layouts (void **state) {
-  (void)state;
+TEST (layouts) {
   cli_write ("sled.yaml", "pinwheel: 1\nabout: 'it has {braces}, a_b & 100 % ~ \\'\nbodies:\n  - {name: sled, mass: 1, "
                           "inertia: 1, rate: {vx: 20}}\n"
                           "  - {name: \"a-dog-whose-name-is-as-long-as-the-longest-may-be-\", mass: 1, "
@@ -91,8 +85,7 @@ static void test_layouts (void **state) {
 }
 
 /* A plate is its convex outline, with a line to what is attached inside; what lies on a line is one. */
-static void test_outline (void **state) {
-  (void)state;
+TEST (outline) {
   cli_write ("plate.yaml", "pinwheel: 1\nbodies:\n  - {name: plate, mass: 1, inertia: 1, rate: {vx: 1}}\n"
                            "  - {name: bar, mass: 1, inertia: 1, start: {x: 9}}\nelements:\n"
                            "  - {marker: a, body: plate, at: [1, 1]}\n  - {marker: b, body: plate, at: [-1, -1]}\n"
@@ -110,8 +103,7 @@ static void test_outline (void **state) {
 }
 
 /* What gnuplot says when it fails is passed on, and summaries say that the command has failed. */
-static void test_gnuplot_fails (void **state) {
-  (void)state;
+TEST (gnuplot_fails) {
   cli_good ("mkdir @/bin && printf '#!/bin/sh\\necho no such colour >&2; exit 3\\n' >@/bin/gnuplot && chmod +x "
             "@/bin/gnuplot");
   cli_run ("PATH=@/bin pinwheel run pendulum -t 0.1 --plots @/fails >@/log");
@@ -133,8 +125,7 @@ static void test_gnuplot_fails (void **state) {
   assert_non_null (cli_file ("fit.csv"));
 }
 
-static void test_data (void **state) {
-  (void)state;
+TEST (data) {
   assert_int_equal (cli_run ("PATH=/none pinwheel run ezyroller --t-end 20 --plots @/data >/dev/null"), 0);
   assert_non_null (strstr (cli_err, "gnuplot was not found, so no figures are drawn; data and scripts are in"));
   assert_true (plots_has ("data/motion.dat") && plots_has ("data/wheels.dat") && plots_has ("data/energy.dat"));
@@ -142,8 +133,7 @@ static void test_data (void **state) {
   assert_null (cli_file ("data/paths.svg"));
 }
 
-static void test_ground (void **state) {
-  (void)state;
+TEST (ground) {
   assert_int_equal (cli_run ("PATH=/none pinwheel run andrews-squeezer --plots @/squeezer >/dev/null"), 0);
   assert_true (plots_has ("squeezer/ground.dat"));
   assert_null (cli_file ("squeezer/wheels.dat"));
@@ -151,13 +141,13 @@ static void test_ground (void **state) {
 
 /* The lines of symbols in a model's last snapshot. */
 static const char *plots_symbols (const char *elements) {
-  char text[1200];
-  snprintf (text, sizeof text,
-            "pinwheel: 1\nbodies:\n  - {name: a, mass: 1, inertia: 1, rate: {omega: 1}}\n"
-            "  - {name: b, mass: 1, inertia: 1, start: {x: 0.6}}\n  - {name: c, mass: 1, inertia: 1, start: {y: -1}, "
-            "rate: {vx: 2}}\nelements:\n%s",
-            elements);
-  cli_write ("symbols.yaml", text);
+  cli_write (
+      "symbols.yaml",
+      check_text (
+          "pinwheel: 1\nbodies:\n  - {name: a, mass: 1, inertia: 1, rate: {omega: 1}}\n"
+          "  - {name: b, mass: 1, inertia: 1, start: {x: 0.6}}\n  - {name: c, mass: 1, inertia: 1, start: {y: -1}, "
+          "rate: {vx: 2}}\nelements:\n%s",
+          elements));
   assert_int_equal (cli_run ("PATH=/none pinwheel run @/symbols.yaml -t 1 --plots @/symbols >/dev/null 2>&1"), 0);
   const char *data = strstr (cli_file ("symbols/mechanism.dat"), "# symbols");
   assert_non_null (data);
@@ -165,8 +155,7 @@ static const char *plots_symbols (const char *elements) {
 }
 
 /* Pitch circles, a rail as long as the travel, a damper only where there is damping. */
-static void test_symbols (void **state) {
-  (void)state;
+TEST (symbols) {
   const char *gear = "  - {pin: A, body: [a, ground], at: [[0, 0], [0, 0]]}\n"
                      "  - {pin: B, body: [b, ground], at: [[0, 0], [0.6, 0]]}\n"
                      "  - {gear: g, body: [a, b, ground], ratio: -0.5}\n";
@@ -191,8 +180,7 @@ static void test_symbols (void **state) {
   assert_true (found && x0 < 0 && x0 > -0.5 && x1 > 2 && x1 < 2.5);
 }
 
-static void test_style (void **state) {
-  (void)state;
+TEST (style) {
   assert_int_equal (
       cli_run ("PATH=/none pinwheel run ezyroller -t 1 --plots @/style --width 8.5cm --colour time >/dev/null"), 0);
   assert_non_null (strstr (cli_file ("style/paths.gp"), "\nwidth = 240.94\n"));
@@ -206,8 +194,7 @@ static void test_style (void **state) {
 
 /* In a narrow figure the legend of eleven methods, whose last one is galpha+ggl, ends above the frame of the first
  * panel. */
-static void test_legend (void **state) {
-  (void)state;
+TEST (legend) {
   static const char *const width[] = { "85mm", "120mm", "170mm" };
   char command[200];
   for (int i = 0; i < 3; i++) {
@@ -229,20 +216,11 @@ static void test_legend (void **state) {
   }
 }
 
-static void test_refusals (void **state) {
-  (void)state;
+TEST (refusals) {
   cli_write ("file", "in the way");
   cli_bad ("pinwheel run ezyroller --t-end 1 --plots @/file >/dev/null", 1,
            "cannot write into @/file: Not a directory");
   cli_bad ("pinwheel run ezyroller --t-end 1 --plots ''", 2, "\"\" cannot be the name of a folder");
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_drawn),   cmocka_unit_test (test_interrupted),   cmocka_unit_test (test_written),
-    cmocka_unit_test (test_data),    cmocka_unit_test (test_ground),        cmocka_unit_test (test_layouts),
-    cmocka_unit_test (test_outline), cmocka_unit_test (test_gnuplot_fails), cmocka_unit_test (test_refusals),
-    cmocka_unit_test (test_symbols), cmocka_unit_test (test_style),         cmocka_unit_test (test_legend),
-  };
-  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
-}
+const check_fixture fixture = { cli_setup, cli_teardown };

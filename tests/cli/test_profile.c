@@ -33,8 +33,7 @@ static void profile_has (const char *name, int elements, int rows, int unknowns)
   for (int i = 3; i < n; i++) assert_true (value[i] >= 0);
 }
 
-static void test_tables (void **state) {
-  (void)state;
+TEST (tables) {
   cli_good ("pinwheel run ezyroller --t-end 0.5 --profile");
   profile_has ("(bodies)", 2, 0, 6);
   profile_has ("pin", 1, 2, 2);
@@ -56,8 +55,7 @@ static void test_tables (void **state) {
 }
 
 /* An implicit method's steps are not made of evaluations of the accelerations. */
-static void test_implicit (void **state) {
-  (void)state;
+TEST (implicit) {
   double value[4];
   cli_good ("pinwheel run ezyroller --t-end 0.5 --method ida+ggl --profile");
   assert_int_equal (profile_row ("solution", value, 4), 2);
@@ -67,8 +65,7 @@ static void test_implicit (void **state) {
 #define PROFILE_OTHER "pinwheel run ezyroller -t 0.5 -m rk4+projection:metric=identity --energy --every 0.1 -o -"
 
 /* The table of a run is the same to the bit, and alone on standard output. */
-static void test_unnoticed (void **state) {
-  (void)state;
+TEST (unnoticed) {
   static char table[sizeof cli_out];
   cli_good (PROFILE_OTHER);
   memcpy (table, cli_out, sizeof table);
@@ -77,11 +74,4 @@ static void test_unnoticed (void **state) {
   assert_non_null (strstr (cli_err, "together"));
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_tables),
-    cmocka_unit_test (test_implicit),
-    cmocka_unit_test (test_unnoticed),
-  };
-  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
-}
+const check_fixture fixture = { cli_setup, cli_teardown };

@@ -10,8 +10,7 @@ static void reports_shows (const char *text) {
 }
 
 /* The wheels' spin angles and the energies, after 0.5 s of given rates. */
-static void test_roller (void **state) {
-  (void)state;
+TEST (roller) {
   assert_int_equal (cli_run ("pinwheel run differential-drive --t-end 0.5 --energy"), 0);
   reports_shows ("\n  left.spin             2.5  rad  left.spin_rate               5  rad/s\n");
   reports_shows ("\n  right.spin           3.75  rad  right.spin_rate            7.5  rad/s\n");
@@ -23,8 +22,7 @@ static void test_roller (void **state) {
 }
 
 /* Reactions have a reference of their own. */
-static void test_reactions (void **state) {
-  (void)state;
+TEST (reactions) {
   assert_int_equal (cli_run ("pinwheel run pendulum --t-end 0.5 -o @/truth.csv >@/log && "
                              "pinwheel run pendulum --t-end 0.5 --step 2e-3 --reference @/truth.csv"),
                     0);
@@ -33,8 +31,7 @@ static void test_reactions (void **state) {
 }
 
 /* The angle is not known at the end, but at other times. */
-static void test_unknown_end (void **state) {
-  (void)state;
+TEST (unknown_end) {
   assert_int_equal (
       cli_run ("pinwheel run pendulum --t-end 0.5 --every 0.1 -o @/ends.csv >@/log && "
                "awk -F, -v OFS=, 'NR > 1 && $1 == 0.5 { $4 = \"nan\" } 1' @/ends.csv >@/unknown.csv && "
@@ -46,8 +43,7 @@ static void test_unknown_end (void **state) {
   assert_true (cli_number (json, "truth", "largest", "angle", NULL) > 0);
 }
 
-static void test_signals (void **state) {
-  (void)state;
+TEST (signals) {
   cli_good ("pinwheel show tests/models/signals.yaml");
   reports_shows ("heading {ramp: {from: 0.1, to: -0.2, start: 0.333333, duration: 0.7}} rad\n");
   reports_shows ("value {table: {points: 4 from 0 to 3.14159 s}} m/s\n");
@@ -57,8 +53,7 @@ static void test_signals (void **state) {
 }
 
 /* A free body whose turning is driven by its own rate, 2 1/s: it grows, and no step of RK4 is too large for that. */
-static void test_unbound (void **state) {
-  (void)state;
+TEST (unbound) {
   cli_write ("free.yaml", "pinwheel: 1\nabout: \"says \\\"so\\\", \\\\ and a\\ttab\"\nbodies:\n"
                           "  - {name: a, mass: 1, inertia: 1}\nelements:\n"
                           "  - {torque: T, body: [a, ground], value: 2*a.omega}\n");
@@ -75,15 +70,11 @@ static void test_unbound (void **state) {
 }
 
 /* Texts that are null, true or a number without their quotes. */
-static void test_literals (void **state) {
+TEST (literals) {
   static const char *const name[] = { "null", "true", "1e3" };
-  (void)state;
   for (int i = 0; i < 3; i++) {
-    char text[200];
-    snprintf (text, sizeof text,
-              "cp models/pendulum.yaml @/%s.yaml && pinwheel run @/%s.yaml -t 0.01 --json @/it.json >@/log", name[i],
-              name[i]);
-    cli_good (text);
+    cli_good (check_text ("cp models/pendulum.yaml @/%s.yaml && pinwheel run @/%s.yaml -t 0.01 --json @/it.json >@/log",
+                          name[i], name[i]));
     assert_true (cli_says (cli_file ("it.json"), "model", name[i]));
   }
 }
@@ -110,8 +101,7 @@ static void reports_write_gap (void) {
 }
 
 /* Every domain of a parameter has a text. */
-static void test_domains (void **state) {
-  (void)state;
+TEST (domains) {
   cli_write ("domains.c",
              "#include \"pinwheel.h\"\n"
              "typedef struct { double r, n, p, c, f; } all;\n"
@@ -132,8 +122,7 @@ static void test_domains (void **state) {
 }
 
 /* A run that ends before its first step has nothing to draw, and leaves nothing. */
-static void test_nothing (void **state) {
-  (void)state;
+TEST (nothing) {
   reports_write_gap ();
   assert_int_equal (cli_run ("pinwheel run @/gap.c --plots @/none --animate @/none.html"), 4);
   assert_non_null (strstr (cli_err, ": the run is too short for figures: none are drawn in "));
@@ -142,8 +131,7 @@ static void test_nothing (void **state) {
 }
 
 /* If several things fail, each is reported; the failure of the run determines the exit status. */
-static void test_failures (void **state) {
-  (void)state;
+TEST (failures) {
   reports_write_gap ();
   assert_int_equal (cli_run ("pinwheel run @/gap.c --json /dev/full"), 4);
   assert_non_null (strstr (cli_err, "pinwheel: cannot write /dev/full: No space left on device\n"));
@@ -155,23 +143,18 @@ static void test_failures (void **state) {
 }
 
 /* A table of a sweep that cannot be put in order: all its rows are kept, and the next start has only to sort them. */
-static void test_sorted (void **state) {
-  (void)state;
+TEST (sorted) {
   const char *sweep = "pinwheel sweep pendulum -t 0.1 --vary m=1,2 -o @/sorted.csv >@/log";
-  char text[200];
-  snprintf (text, sizeof text, "mkdir @/sorted.csv.sorted; %s", sweep);
-  assert_int_equal (cli_run (text), 1);
+  assert_int_equal (cli_run (check_text ("mkdir @/sorted.csv.sorted; %s", sweep)), 1);
   assert_non_null (strstr (cli_err, "so the same command only has to sort them\n"));
   assert_null (cli_file ("sorted.csv"));
   assert_non_null (cli_file ("sorted.csv.part"));
-  snprintf (text, sizeof text, "rmdir @/sorted.csv.sorted; %s; wc -l <@/sorted.csv", sweep);
-  assert_int_equal (cli_run (text), 0);
+  assert_int_equal (cli_run (check_text ("rmdir @/sorted.csv.sorted; %s; wc -l <@/sorted.csv", sweep)), 0);
   assert_string_equal (cli_out, "3\n");
 }
 
 /* Figures of a run that was resumed are those of one that was not. */
-static void test_figures_resumed (void **state) {
-  (void)state;
+TEST (figures_resumed) {
   assert_int_equal (cli_run ("PATH=/none pinwheel run ezyroller -t 1 --plots @/whole --checkpoint @/whole.ck\n"
                              "PATH=/none pinwheel run ezyroller -t 1 --plots @/parts --checkpoint @/parts.ck\n"
                              "PATH=/none pinwheel run ezyroller -t 1 --plots @/parts --resume @/parts.ck\n"
@@ -181,8 +164,7 @@ static void test_figures_resumed (void **state) {
 }
 
 /* The error of reactions is relative also if their unit is "": one of 981, and a reference that is 1 % larger. */
-static void test_reaction_without_unit (void **state) {
-  (void)state;
+TEST (reaction_without_unit) {
   cli_write ("hold.c",
              "#include \"pinwheel.h\"\n"
              "typedef struct { const char *name, *body; } hold;\n"
@@ -212,10 +194,9 @@ static void test_reaction_without_unit (void **state) {
 }
 
 /* More rows that say the same than are listed. */
-static void test_many_redundant (void **state) {
+TEST (many_redundant) {
   char text[2000] = "pinwheel: 1\nbodies:\n  - {name: a, mass: 1, inertia: 1}\nelements:\n";
   size_t n = strlen (text);
-  (void)state;
   for (int i = 0; i < 12; i++)
     n += (size_t)snprintf (text + n, sizeof text - n, "  - {wheel: w%d, body: a, at: [0, %d]}\n", i, i);
   snprintf (text + n, sizeof text - n,
@@ -228,8 +209,7 @@ static void test_many_redundant (void **state) {
 }
 
 /* What contradicts itself has no start, and check knows nothing further. */
-static void test_contradiction (void **state) {
-  (void)state;
+TEST (contradiction) {
   cli_write ("two.yaml", "pinwheel: 1\nbodies:\n  - {name: a, mass: 1, inertia: 1}\nelements:\n"
                          "  - {pin: P, body: [a, ground], at: [[0, 0], [0, 0]]}\n"
                          "  - {pin: Q, body: [a, ground], at: [[0, 0], [1, 0]]}\n");
@@ -240,8 +220,7 @@ static void test_contradiction (void **state) {
 }
 
 /* A program alone, without models or headers around it. */
-static void test_alone (void **state) {
-  (void)state;
+TEST (alone) {
   cli_good ("mkdir @/bin && cp \"${PINWHEEL:-build/pinwheel}\" ${BUILD:-build}/libpinwheel*.so.* @/bin");
   cli_good ("PINWHEEL_MODELS= @/bin/pinwheel list");
   reports_shows ("none found; folders named in the environment variable PINWHEEL_MODELS are searched\n");
@@ -252,8 +231,7 @@ static void test_alone (void **state) {
 }
 
 /* A table of a sweep has the same columns in every row. */
-static void test_columns (void **state) {
-  (void)state;
+TEST (columns) {
   cli_write ("some.c",
              "#include \"pinwheel.h\"\n"
              "typedef struct { double size; } some;\n"
@@ -272,32 +250,10 @@ static void test_columns (void **state) {
 }
 
 /* Ladders that are none. */
-static void test_ladder (void **state) {
-  (void)state;
+TEST (ladder) {
   cli_bad (
       "pinwheel compare pendulum --methods rk4 --step-ladder 0.0000000000000000000000000000000000000000000000001:1", 2,
       "--step-ladder 0.0000000000000000000000000000000000000000000000001:1: expected FROM:TO");
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_roller),
-    cmocka_unit_test (test_reactions),
-    cmocka_unit_test (test_unknown_end),
-    cmocka_unit_test (test_signals),
-    cmocka_unit_test (test_unbound),
-    cmocka_unit_test (test_literals),
-    cmocka_unit_test (test_nothing),
-    cmocka_unit_test (test_failures),
-    cmocka_unit_test (test_sorted),
-    cmocka_unit_test (test_figures_resumed),
-    cmocka_unit_test (test_domains),
-    cmocka_unit_test (test_ladder),
-    cmocka_unit_test (test_many_redundant),
-    cmocka_unit_test (test_contradiction),
-    cmocka_unit_test (test_alone),
-    cmocka_unit_test (test_columns),
-    cmocka_unit_test (test_reaction_without_unit),
-  };
-  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
-}
+const check_fixture fixture = { cli_setup, cli_teardown };

@@ -30,16 +30,14 @@ static void resume_killed (const char *method) {
             "cmp @/whole @/killed && test ! -e @/killed.csv.part");
 }
 
-static void test_killed (void **state) {
-  (void)state;
+TEST (killed) {
   resume_killed ("rk4+projection");
   resume_killed ("erk8+projection --rtol 1e-12");
   resume_killed ("ida+ggl");
 }
 
 /* Saving disturbs no step of a one-step method; the summary counts the restarts of a multistep one. */
-static void test_restarts (void **state) {
-  (void)state;
+TEST (restarts) {
   cli_good ("pinwheel " RESUME_RUN "-m rk4 -o @/a.csv --json @/a.json --checkpoint @/a.ck");
   assert_true (cli_number (cli_file ("a.json"), "restarts", NULL) == 0);
   assert_true (cli_number (cli_file ("a.json"), "steps", NULL) == 30000);
@@ -49,8 +47,7 @@ static void test_restarts (void **state) {
 }
 
 /* Stopped by a signal: what there is to go on from, and that it does. */
-static void test_interrupted (void **state) {
-  (void)state;
+TEST (interrupted) {
   cli_run ("rm -f @/a.*; " RESUME_PROGRAM RESUME_RUN "-m rk4 --step 1e-5 -o @/a.csv --checkpoint @/a.ck & "
            "while kill -0 $! 2>/dev/null && [ ! -e @/a.ck ]; do sleep 0.02; done; kill -TERM $!; wait $!; echo $?");
   assert_string_equal (cli_out, "130\n");
@@ -59,16 +56,14 @@ static void test_interrupted (void **state) {
 }
 
 /* An interval far below the round-off of time: a checkpoint after every step. */
-static void test_short_interval (void **state) {
-  (void)state;
+TEST (short_interval) {
   cli_good ("timeout -s KILL 20 " RESUME_PROGRAM "run ezyroller -t 0.02 --checkpoint-every 1e-20 --checkpoint @/s.ck");
 }
 
 /* With a row for every step, too, none is there twice; a run that had ended already, but for its checkpoint, goes
  * on. */
-static void test_every_step (void **state) {
+TEST (every_step) {
   static const char *const left[] = { "cp @/one.csv @/two.csv.part", "cp @/one.csv @/two.csv", NULL };
-  (void)state;
   cli_good ("pinwheel run ezyroller -t 2 --checkpoint-every 0.5 --checkpoint @/one.ck -o @/one.csv");
   for (const char *const *c = left; *c; c++) {
     char command[400];
@@ -84,8 +79,7 @@ static void test_every_step (void **state) {
 }
 
 /* A state given twice has its last value. */
-static void test_start_twice (void **state) {
-  (void)state;
+TEST (start_twice) {
 #define RESUME_TWICE "pinwheel run ezyroller -t 2 -o @/t.csv --start frame.vx=1 --start frame.vx=0.1 "
   cli_shell (RESUME_TWICE "--checkpoint @/t.ck; mv @/t.csv @/t.csv.part; " RESUME_TWICE "--resume @/t.ck");
   cli_bad ("mv @/t.csv @/t.csv.part; " RESUME_TWICE "--start frame.vx=2 --resume @/t.ck", 2,
@@ -103,15 +97,12 @@ static void resume_prepare (void) {
 }
 
 static void resume_bad (const char *change, const char *option, const char *message) {
-  char command[1500];
   resume_prepare ();
-  snprintf (command, sizeof command, "%s; pinwheel " RESUME_SHORT "%s --resume @/b.ck", change, option);
-  cli_bad (command, 2, message);
+  cli_bad (check_text ("%s; pinwheel " RESUME_SHORT "%s --resume @/b.ck", change, option), 2, message);
   cli_good ("test -s @/b.csv.part");
 }
 
-static void test_other_run (void **state) {
-  (void)state;
+TEST (other_run) {
 #define OTHER "the checkpoint @/b.ck belongs to another run: "
   resume_bad (":", "--set a=0.6", OTHER "parameter a is 0.5 there and 0.59999999999999998 here");
   resume_bad (":", "--step 2e-3", OTHER "step is 0.001 there and 0.002 here");
@@ -126,8 +117,7 @@ static void test_other_run (void **state) {
   assert_non_null (strstr (cli_err, "b.ck belongs to another run: model is ezyroller, contents "));
 }
 
-static void test_other_file (void **state) {
-  (void)state;
+TEST (other_file) {
   resume_bad ("rm @/b.ck", "", "cannot read the checkpoint @/b.ck: No such file or directory");
   resume_bad ("echo hello >@/b.ck", "", "@/b.ck is not a checkpoint of Pinwheel");
   resume_bad (": >@/b.ck", "", "@/b.ck is not a checkpoint of Pinwheel");
@@ -145,21 +135,17 @@ static void test_other_file (void **state) {
 }
 
 /* A run that cannot be resumed leaves the summary of the one before it. */
-static void test_summary (void **state) {
-  (void)state;
+TEST (summary) {
   resume_bad ("echo old >@/b.json; echo hello >@/b.ck", "--json @/b.json", "@/b.ck is not a checkpoint of Pinwheel");
   assert_string_equal (cli_file ("b.json"), "old\n");
   cli_good ("test ! -e @/b.json.part");
 }
 
 /* Cut anywhere, or with any one bit changed, it is refused. */
-static void test_damaged (void **state) {
+TEST (damaged) {
   static char text[20000], other[20000];
-  char path[300];
-  (void)state;
   resume_prepare ();
-  snprintf (path, sizeof path, "%s/good.ck", cli_folder);
-  FILE *f = fopen (path, "rb");
+  FILE *f = fopen (cli_path ("good.ck"), "rb");
   assert_non_null (f);
   size_t size = fread (text, 1, sizeof text, f);
   fclose (f);
@@ -167,11 +153,7 @@ static void test_damaged (void **state) {
     size_t at = size * (size_t)i / 40, length = i % 2 ? at : size;
     memcpy (other, text, size);
     other[at] = (char)(other[at] ^ (1 << i % 8));
-    snprintf (path, sizeof path, "%s/b.ck", cli_folder);
-    f = fopen (path, "wb");
-    assert_non_null (f);
-    fwrite (other, 1, length, f);
-    assert_int_equal (fclose (f), 0);
+    cli_write_bytes ("b.ck", other, length);
     int status = cli_run ("pinwheel " RESUME_SHORT "--resume @/b.ck");
     if (status != 2) print_error ("byte %zu, %zu bytes: status %d, %s", at, length, status, cli_err);
     assert_int_equal (status, 2);
@@ -179,8 +161,7 @@ static void test_damaged (void **state) {
   }
 }
 
-static void test_options (void **state) {
-  (void)state;
+TEST (options) {
   cli_bad ("pinwheel run ezyroller --checkpoint-every 1", 2,
            "--checkpoint-every 1: --checkpoint FILE is needed to save to");
   cli_bad ("pinwheel run ezyroller --checkpoint @/c.ck --checkpoint-every -1", 2,
@@ -194,12 +175,4 @@ static void test_options (void **state) {
   cli_bad ("pinwheel run ezyroller --checkpoint @/none/c.ck", 1, "cannot write @/none/c.ck: No such file or directory");
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_killed),         cmocka_unit_test (test_restarts),    cmocka_unit_test (test_interrupted),
-    cmocka_unit_test (test_other_run),      cmocka_unit_test (test_other_file),  cmocka_unit_test (test_damaged),
-    cmocka_unit_test (test_options),        cmocka_unit_test (test_summary),     cmocka_unit_test (test_every_step),
-    cmocka_unit_test (test_short_interval), cmocka_unit_test (test_start_twice),
-  };
-  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
-}
+const check_fixture fixture = { cli_setup, cli_teardown };

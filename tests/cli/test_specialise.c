@@ -25,8 +25,7 @@ static void specialise_says (const char *engine) {
 /* ---- The cache ---- */
 
 /* Compiled once, then loaded; nothing but the object remains, and it is private. */
-static void test_cached (void **state) {
-  (void)state;
+TEST (cached) {
   cli_good (FRESH RUN
             "--json @/1.json >@/1\n" RUN "--json @/2.json >@/2\n" CALLS
             "stat -c %a @/c/pinwheel; ls @/c/pinwheel | sed 's/.*[.]//'; ls @/tmp; grep -v cpu_s @/1.json >@/a\n"
@@ -37,15 +36,14 @@ static void test_cached (void **state) {
 }
 
 /* A compiler that has changed makes a new object; it is found in the current folder if PATH has an empty entry. */
-static void test_changed_compiler (void **state) {
-  (void)state;
+TEST (changed_compiler) {
   cli_good (FRESH "mv @/cc @/counting; export CC=counting PATH=:$PATH p=$(realpath ${PINWHEEL:-build/pinwheel}); cd @\n"
                   "pinwheel () { $p $*; }\n" RUN ">/dev/null; echo >>counting\n" RUN ">/dev/null; " CALLS);
   assert_string_equal (cli_out, "2\n");
 }
 
 /* An object that is not what was written is replaced; the run has its code all the same. */
-static void test_damaged (void **state) {
+TEST (damaged) {
   static const char *const damage[] = {
     "s=$(wc -c <$f); head -c $((s / 2)) $f >@/x; cat @/x >$f",
     "printf X | dd of=$f bs=1 seek=5000 conv=notrunc 2>/dev/null",
@@ -53,12 +51,9 @@ static void test_damaged (void **state) {
     "echo 'int x;' >$f",
     "s=$(wc -c <$f); head -c 1000000 /dev/zero | head -c $s >$f",
   };
-  (void)state;
   cli_good (FRESH RUN ">/dev/null");
   for (size_t i = 0; i < sizeof damage / sizeof *damage; i++) {
-    char command[900];
-    snprintf (command, sizeof command, CACHED "f=$(echo @/c/pinwheel/*.so); %s\n" RUN, damage[i]);
-    cli_shell (command);
+    cli_shell (check_text (CACHED "f=$(echo @/c/pinwheel/*.so); %s\n" RUN, damage[i]));
     specialise_says ("code specialised for this scene");
     assert_non_null (strstr (cli_err, ".so is replaced: it is damaged\n"));
     assert_ptr_equal (strchr (cli_err, '\n'), cli_err + strlen (cli_err) - 1);
@@ -67,8 +62,7 @@ static void test_damaged (void **state) {
 }
 
 /* Objects under names of others are never used. */
-static void test_foreign_object (void **state) {
-  (void)state;
+TEST (foreign_object) {
   cli_good (FRESH RUN ">/dev/null; f=$(echo @/c/pinwheel/*.so); cp $f @/one\n"
                       "pinwheel run snakeboard -t 0.1 --specialise always >/dev/null\n"
                       "for g in @/c/pinwheel/*.so; do [ $g = $f ] || cp $g $f; done; cmp -s $f @/one && exit 9\n" RUN
@@ -77,7 +71,7 @@ static void test_foreign_object (void **state) {
 }
 
 /* A cache to which others can write, or that is no folder, is left alone; without one the code is made apart. */
-static void test_unusable (void **state) {
+TEST (unusable) {
   static const struct {
     const char *make, *notice;
   } cache[] = {
@@ -89,7 +83,6 @@ static void test_unusable (void **state) {
     { "mkdir -p @/c/pinwheel; chown 12345 @/c/pinwheel", "@/c/pinwheel is not used: it belongs to another user" },
     { "export XDG_CACHE_HOME=/proc/none", "/proc/none is not used: No such file or directory" }
   };
-  (void)state;
   for (size_t i = 0; i < sizeof cache / sizeof *cache; i++) {
     char command[900], notice[300], expected[600];
     if (strstr (cache[i].make, "chown") && geteuid () != 0) continue;
@@ -109,16 +102,14 @@ static void test_unusable (void **state) {
 }
 
 /* The folder may go at any time, even while the compiler runs. */
-static void test_deleted (void **state) {
-  (void)state;
+TEST (deleted) {
   cli_good (FRESH "printf '#!/bin/sh\\nrm -rf @/c/pinwheel\\nexec cc $*\\n' >@/cc\n" RUN
                   "| grep -c specialised; ls @/tmp; ls @/c");
   assert_string_equal (cli_out, "1\n");
 }
 
 /* Processes that need the same code wait for the first one. */
-static void test_concurrent (void **state) {
-  (void)state;
+TEST (concurrent) {
   cli_good (FRESH
             "printf '#!/bin/sh\\necho call >>@/calls\\nsleep 0.3\\nexec cc $*\\n' >@/cc\n"
             "for i in 1 2 3 4 5; do " RUN "-o @/$i.csv --json @/$i & done; wait\n"
@@ -128,8 +119,7 @@ static void test_concurrent (void **state) {
 }
 
 /* A killed compilation neither blocks nor damages the next one, though its compiler may still run. */
-static void test_killed (void **state) {
-  (void)state;
+TEST (killed) {
   cli_good (
       FRESH
       "printf '#!/bin/sh\\necho call >>@/calls\\n[ -e @/go ] || { : >@/on; sleep 0.6; }\\nexec cc $*\\n' >@/cc\n"
@@ -141,8 +131,7 @@ static void test_killed (void **state) {
 }
 
 /* The oldest files go. */
-static void test_size (void **state) {
-  (void)state;
+TEST (size) {
   cli_good (FRESH "mkdir -p -m 700 @/c @/c/pinwheel; for i in 1 2 3; do truncate -s 30M @/c/pinwheel/$i.so\n"
                   "touch -d \"$((4 - i)) days ago\" @/c/pinwheel/$i.so; done\n" RUN
                   ">/dev/null; cd @/c/pinwheel; ls ?.so; ls | wc -l");
@@ -151,8 +140,7 @@ static void test_size (void **state) {
 
 /* ---- Without a compiler ---- */
 
-static void test_no_compiler (void **state) {
-  (void)state;
+TEST (no_compiler) {
   cli_good (FRESH "pinwheel run chaplygin-sleigh -t 0.1 --specialise never -o @/never.csv >/dev/null");
   cli_shell (FRESH "export CC=/nonexistent\n" RUN "-o @/none.csv --json @/none.json; cmp @/never.csv @/none.csv");
   assert_string_equal (
@@ -163,15 +151,12 @@ static void test_no_compiler (void **state) {
 }
 
 /* What does not compile is kept, with the messages; the run goes on. */
-static void test_bad_compiler (void **state) {
+TEST (bad_compiler) {
   static const char *const bad[] = { "echo message >&2; exit 1", "kill -9 $$" };
-  (void)state;
   for (int i = 0; i < 2; i++) {
-    char command[900];
-    snprintf (command, sizeof command,
-              FRESH "printf '#!/bin/sh\\n%s\\n' >@/cc\n" RUN "&& head -c 3 @/c/pinwheel/*.c && cat @/c/pinwheel/*.log",
-              bad[i]);
-    cli_shell (command);
+    cli_shell (check_text (FRESH "printf '#!/bin/sh\\n%s\\n' >@/cc\n" RUN
+                                 "&& head -c 3 @/c/pinwheel/*.c && cat @/c/pinwheel/*.log",
+                           bad[i]));
     specialise_says ("general engine: the generated code does not compile\n");
     specialise_says (i == 0 ? "/* message\n" : "/* ");
     assert_non_null (strstr (cli_err, "pinwheel: general engine: "));
@@ -184,7 +169,7 @@ static void test_bad_compiler (void **state) {
 }
 
 /* Neither does a compiler that writes something else, or nothing, stop a run; and its object is not kept. */
-static void test_strange_compiler (void **state) {
+TEST (strange_compiler) {
   static const struct {
     const char *does, *notice;
   } strange[] = {
@@ -193,12 +178,9 @@ static void test_strange_compiler (void **state) {
     { "while [ \"$1\" != -o ]; do shift; done; echo \"int pw_specialised_scene[9];\" | cc -shared -xc - -o $2",
       "it belongs to another scene or version\n" }
   };
-  (void)state;
   for (int i = 0; i < 3; i++) {
-    char command[900];
-    snprintf (command, sizeof command, FRESH "cat >@/cc <<'X'\n#!/bin/sh\n%s\nX\n" RUN "&& ls @/c/pinwheel @/tmp",
-              strange[i].does);
-    cli_shell (command);
+    cli_shell (
+        check_text (FRESH "cat >@/cc <<'X'\n#!/bin/sh\n%s\nX\n" RUN "&& ls @/c/pinwheel @/tmp", strange[i].does));
     specialise_says ("general engine: the compiled code cannot be loaded\n");
     assert_null (strstr (cli_out, ".so\n"));
     assert_non_null (strstr (cli_err, strange[i].notice));
@@ -207,8 +189,7 @@ static void test_strange_compiler (void **state) {
 
 /* ---- When code is used ---- */
 
-static void test_when (void **state) {
-  (void)state;
+TEST (when) {
   for (int cached = 0; cached < 2; cached++) { /* the same with the object in the cache */
     cli_good (cached ? CACHED "rm @/calls" : FRESH);
     cli_good (
@@ -227,8 +208,7 @@ static void test_when (void **state) {
 }
 
 /* Scenes without code run in the general engine: `always` says so, `auto` does not. */
-static void test_not_possible (void **state) {
-  (void)state;
+TEST (not_possible) {
   cli_good (
       FRESH
       "pinwheel run chain --set n=40 -t 0.1 --step 1e-7 --limit 0.05 >/dev/null 2>&1; pinwheel run chain --set n=40 -t "
@@ -244,8 +224,7 @@ static void test_not_possible (void **state) {
 }
 
 /* A study uses one engine, and says which. */
-static void test_studies (void **state) {
-  (void)state;
+TEST (studies) {
   cli_good (
       FRESH
       "pinwheel compare chaplygin-sleigh -m rk4+projection --step-ladder 0.1 -t 1 --repeats 1 --specialise always "
@@ -260,8 +239,7 @@ static void test_studies (void **state) {
 /* ---- Sweeps ---- */
 
 /* The structure depends on n; rows are the same for any number of workers, in parts, and without a cache. */
-static void test_sweep (void **state) {
-  (void)state;
+TEST (sweep) {
   cli_good (
       FRESH
       "s='pinwheel sweep n-trailer --vary n=1,2,3 --vary L=0.5,0.6 -t 0.5 --specialise always'\n"
@@ -275,8 +253,7 @@ static void test_sweep (void **state) {
 }
 
 /* A sweep that was killed, with its cache deleted meanwhile, ends with the same bytes. */
-static void test_sweep_killed (void **state) {
-  (void)state;
+TEST (sweep_killed) {
   cli_good (FRESH "s='sweep n-trailer --vary n=1,2 --vary L=lin:0.5:0.6:40 -t 2 --specialise always -j 2'\n"
                   "pinwheel $s -o @/whole.csv || exit 1\n"
                   "${PINWHEEL:-build/pinwheel} $s -o @/k.csv >/dev/null 2>&1 &\n"
@@ -287,8 +264,7 @@ static void test_sweep_killed (void **state) {
 }
 
 /* Rows of different engines are not mixed. */
-static void test_sweep_engine (void **state) {
-  (void)state;
+TEST (sweep_engine) {
   cli_good (FRESH
             "s='pinwheel sweep n-trailer --vary L=0.5,0.6 -t 0.5'; $s --part 1/2 -o @/p1.csv --specialise always\n"
             "$s --part 2/2 -o @/p2.csv --specialise never; pinwheel sweep --merge @/p1.csv @/p2.csv -o @/m.csv "
@@ -338,7 +314,7 @@ static void specialise_agree (const char *model, const char *method, double boun
 
 /* Every model of the gallery, a short time, in which round-off does not grow to the bound.  Steps of adaptive methods
  * amplify it up to the errors they allow, those of multistep methods to about 1000 tolerances. */
-static void test_gallery (void **state) {
+TEST (gallery) {
   static const struct {
     const char *name;
     double bound;
@@ -353,7 +329,6 @@ static void test_gallery (void **state) {
                  { "galpha", 1e-10 },
                  { "leapfrog", 1e-10 } };
   static char list[20000];
-  (void)state;
   cli_good ("pinwheel list models | awk '/^  [a-z]/ { print $1 }'");
   snprintf (list, sizeof list, "%.19999s", cli_out);
   assert_true (strlen (list) > 100);
@@ -365,12 +340,11 @@ static void test_gallery (void **state) {
 
 /* Names in the text end no comment and are no code; those of bodies and elements have no such characters to begin
  * with. */
-static void test_names (void **state) {
+TEST (names) {
   static const char *const name[] = { "*/ int x; /*", "\\n#include <y>",    "x\\",
                                       "?\?/",         "gr\xC3\xBC\xC3\x9F", "a\" \"%s%n" };
   pw_error error = { 0 };
   pw_file *f = pw_file_open ("pendulum", &error);
-  (void)state;
   for (size_t i = 0; i < sizeof name / sizeof *name; i++) {
     pw_model *m = pw_model_new (name[i], pw_file_table (f), &error);
     check_ok (m ? pw_model_build (m, &error) : error.status, &error);
@@ -396,8 +370,7 @@ static void test_names (void **state) {
 }
 
 /* The text is that of the model with its parameters. */
-static void test_show (void **state) {
-  (void)state;
+TEST (show) {
   cli_good ("pinwheel show n-trailer --set n=3 --c >@/3.c; pinwheel show n-trailer --c >@/2.c\n"
             "grep -c 'body 3: trailer3 ' @/3.c; grep -c 'body 3' @/2.c; cc -std=c11 -Wall -Wno-unused -Werror -O0 "
             "-I${BUILD:-build}/include -c @/3.c -o @/3.o");
@@ -406,19 +379,4 @@ static void test_show (void **state) {
            "model chain: 80 constraint equations: specialised code has at most 60");
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_cached),       cmocka_unit_test (test_changed_compiler),
-    cmocka_unit_test (test_damaged),      cmocka_unit_test (test_foreign_object),
-    cmocka_unit_test (test_unusable),     cmocka_unit_test (test_deleted),
-    cmocka_unit_test (test_concurrent),   cmocka_unit_test (test_killed),
-    cmocka_unit_test (test_size),         cmocka_unit_test (test_no_compiler),
-    cmocka_unit_test (test_bad_compiler), cmocka_unit_test (test_strange_compiler),
-    cmocka_unit_test (test_when),         cmocka_unit_test (test_not_possible),
-    cmocka_unit_test (test_studies),      cmocka_unit_test (test_sweep),
-    cmocka_unit_test (test_sweep_killed), cmocka_unit_test (test_sweep_engine),
-    cmocka_unit_test (test_gallery),      cmocka_unit_test (test_names),
-    cmocka_unit_test (test_show),
-  };
-  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
-}
+const check_fixture fixture = { cli_setup, cli_teardown };

@@ -10,8 +10,7 @@
 
 /* ---- The grid and its rows ---- */
 
-static void test_order (void **state) {
-  (void)state;
+TEST (order) {
   cli_good ("pinwheel sweep ezyroller " GRID " -o @/order.csv && cut -d, -f1-4 @/order.csv | sed -n '1,5p;13p'");
   assert_string_equal (cli_out, "omega [rad/s],M0 [N m],status,t [s]\n"
                                 "1,0.050000000000000003,ok,0.050000000000000003\n"
@@ -25,8 +24,7 @@ static void test_order (void **state) {
 
 /* The fourth value of lin:0:1:11 is 0.3, ends are exact, and decades of a logarithmic range are; large numbers do not
  * overflow. */
-static void test_ranges (void **state) {
-  (void)state;
+TEST (ranges) {
   cli_good (
       "pinwheel sweep ezyroller --vary M0=lin:0:1:11 --t-end 0.001 -o @/lin.csv && sed -n 5p @/lin.csv | cut -c1-24");
   assert_string_equal (cli_out, "0.29999999999999999,ok,0\n");
@@ -49,19 +47,16 @@ static void test_ranges (void **state) {
 }
 
 /* A row is what the run says, digit by digit. */
-static void test_row_is_run (void **state) {
-  (void)state;
+TEST (row_is_run) {
   static const char *const method[] = { "rk4+projection --step 2e-3", "ida+ggl --rtol 1e-8" };
   for (int i = 0; i < 2; i++) {
-    char command[900];
-    snprintf (command, sizeof command,
-              "o='--method %s --t-end 1.5 --set M0=0.2 --start frame.vx=0.3'\n"
-              "pinwheel sweep ezyroller --vary omega=2,3 --vary frame.omega=0.1,0.4 $o -o @/row.csv || exit 1\n"
-              "pinwheel run ezyroller --set omega=3 --start frame.omega=0.1 $o --every 1.5 -o @/run.csv 2>/dev/null\n"
-              "sed -n '1p;4p' @/row.csv | cut -d, -f4-16 >@/a\n sed -n '1p;$p' @/run.csv | cut -d, -f1-13 >@/b\n"
-              "cmp @/a @/b && pinwheel run ezyroller --set omega=3 --start frame.omega=0.1 $o --json - 2>/dev/null",
-              method[i]);
-    cli_shell (command);
+    cli_shell (check_text (
+        "o='--method %s --t-end 1.5 --set M0=0.2 --start frame.vx=0.3'\n"
+        "pinwheel sweep ezyroller --vary omega=2,3 --vary frame.omega=0.1,0.4 $o -o @/row.csv || exit 1\n"
+        "pinwheel run ezyroller --set omega=3 --start frame.omega=0.1 $o --every 1.5 -o @/run.csv 2>/dev/null\n"
+        "sed -n '1p;4p' @/row.csv | cut -d, -f4-16 >@/a\n sed -n '1p;$p' @/run.csv | cut -d, -f1-13 >@/b\n"
+        "cmp @/a @/b && pinwheel run ezyroller --set omega=3 --start frame.omega=0.1 $o --json - 2>/dev/null",
+        method[i]));
     const char *row = cli_file ("row.csv");
     for (int line = 0; line < 3; line++) row = strchr (row, '\n') + 1;
     for (int comma = 0; comma < 17; comma++) row = strchr (row, ',') + 1;
@@ -76,16 +71,14 @@ static void test_row_is_run (void **state) {
 }
 
 /* Start values have a column of their own name, apart from the final state's. */
-static void test_start_values (void **state) {
-  (void)state;
+TEST (start_values) {
   cli_shell ("pinwheel sweep ezyroller --vary frame.vx=0,1 --t-end 0.01 -o @/start.csv && head -1 @/start.csv | cut "
              "-d, -f1-5");
   assert_string_equal (cli_out, "start.frame.vx [m/s],status,t [s],frame.x [m],frame.y [m]\n");
 }
 
 /* Varied and given initial values that the constraints change are counted, with the largest change. */
-static void test_changed_values (void **state) {
-  (void)state;
+TEST (changed_values) {
   assert_int_equal (
       cli_run ("pinwheel sweep ezyroller --vary frame.vy=0,1,2 --start frame.omega=0 --t-end 0.01 -o @/v.csv"), 0);
   assert_string_equal (cli_err, "pinwheel: in 2 of 3 runs the constraints changed given initial values, at worst "
@@ -94,8 +87,7 @@ static void test_changed_values (void **state) {
 }
 
 /* Bodies may come and go with a count; where there is none there is no number. */
-static void test_counts (void **state) {
-  (void)state;
+TEST (counts) {
   cli_shell ("pinwheel sweep tests/scenes/chain.c --vary links=2,1,3 --t-end 0.01 -o @/count.csv\n"
              "head -1 @/count.csv | tr , '\\n' | grep -c link; cut -d, -f1,2,15,16,21 @/count.csv");
   const char *expected = "19\nlinks,status,link2.omega [rad/s],link3.x [m],link3.omega [rad/s]\n2,ok,";
@@ -103,15 +95,13 @@ static void test_counts (void **state) {
   assert_non_null (strstr (cli_out, ",nan,nan\n1,ok,nan,nan,nan\n3,ok,"));
 }
 
-static void test_cpu (void **state) {
-  (void)state;
+TEST (cpu) {
   cli_shell ("pinwheel sweep ezyroller " GRID " --cpu -o @/cpu.csv && head -1 @/cpu.csv | grep -o 'rhs,.*'");
   assert_string_equal (cli_out, "rhs,cpu [s],reason\n");
 }
 
 /* Why runs that are measured or limited one by one have no lanes, nor those of a scene that cannot run by itself. */
-static void test_no_lanes (void **state) {
-  (void)state;
+TEST (no_lanes) {
   assert_int_equal (cli_run ("pinwheel sweep ezyroller " GRID " --lanes 4 --cpu -o @/cpu.csv"), 0);
   assert_string_equal (cli_err, "pinwheel: one run after the other: --cpu measures each run\n");
   assert_int_equal (cli_run ("pinwheel sweep ezyroller " GRID " --lanes 4 --limit 60 -o @/cpu.csv"), 0);
@@ -130,8 +120,7 @@ static void test_no_lanes (void **state) {
 
 /* A model that counts how often it is built: once for the columns, then once for each of two lengths, whichever
  * quantity varies fastest.  One worker, so that the second length is not compiled while the first is still in use. */
-static void test_shared (void **state) {
-  (void)state;
+TEST (shared) {
   cli_write ("counted.c",
              "#include <stdio.h>\n#include <stdlib.h>\n#include \"pinwheel.h\"\n"
              "static const pw_parameter p[] = { { \"l\", 0, 1, \"m\", \"length\", PW_POSITIVE }, { 0 } };\n"
@@ -150,8 +139,7 @@ static void test_shared (void **state) {
 
 /* ---- Runs that fail ---- */
 
-static void test_failures (void **state) {
-  (void)state;
+TEST (failures) {
   assert_int_equal (cli_run ("pinwheel sweep tests/scenes/chain.c --vary pull=-1,2,-3 --t-end 0.01 -o @/fail.csv"), 0);
   assert_string_equal (cli_err,
                        "pinwheel: 2 of 3 runs failed, the first of them: model chain: the spring \"pulls\", -1 N/m "
@@ -162,8 +150,7 @@ static void test_failures (void **state) {
                                 "-1,input,nan\n2,ok,0.01\n-3,input,nan\n");
 }
 
-static void test_all_fail (void **state) {
-  (void)state;
+TEST (all_fail) {
   cli_bad ("pinwheel sweep ezyroller --vary omega=1,2 --set c=0 --set d=0 --t-end 0.01 -o @/all.csv", 2,
            "all 2 runs failed, the first one: model ezyroller: steer.phi has no inertia, and no constraint determines "
            "how it "
@@ -178,8 +165,7 @@ static void test_all_fail (void **state) {
 }
 
 /* A run that fails on the way says how far it came. */
-static void test_fails_late (void **state) {
-  (void)state;
+TEST (fails_late) {
   assert_int_equal (
       cli_run ("pinwheel sweep ezyroller --vary M0=0.1,1e300 --method rk4+none --t-end 0.05 -o @/late.csv"), 0);
   assert_int_equal (strncmp (cli_err, "pinwheel: 1 of 2 runs failed, the first of them: ", 49), 0);
@@ -190,8 +176,7 @@ static void test_fails_late (void **state) {
 
 /* ---- Bad input: said before anything is computed ---- */
 
-static void test_bad_input (void **state) {
-  (void)state;
+TEST (bad_input) {
   static const cli_wrong bad[] = {
     { "", "nothing is varied: add --vary NAME=lin:FIRST:LAST:COUNT, log:..., or V1,V2,..." },
     { "--vary omga=1,2", "model ezyroller has no parameter \"omga\"; did you mean \"omega\"?" },
@@ -237,13 +222,4 @@ static void test_bad_input (void **state) {
   assert_string_equal (cli_out, "0\n");
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_order),        cmocka_unit_test (test_ranges),     cmocka_unit_test (test_row_is_run),
-    cmocka_unit_test (test_start_values), cmocka_unit_test (test_counts),     cmocka_unit_test (test_cpu),
-    cmocka_unit_test (test_no_lanes),     cmocka_unit_test (test_shared),     cmocka_unit_test (test_failures),
-    cmocka_unit_test (test_all_fail),     cmocka_unit_test (test_fails_late), cmocka_unit_test (test_changed_values),
-    cmocka_unit_test (test_bad_input),
-  };
-  return cmocka_run_group_tests_name ("sweeps", tests, cli_setup, cli_teardown);
-}
+const check_fixture fixture = { cli_setup, cli_teardown };

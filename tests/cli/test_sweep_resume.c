@@ -9,8 +9,7 @@
 
 /* ---- The same table whatever happens ---- */
 
-static void test_jobs (void **state) {
-  (void)state;
+TEST (jobs) {
   cli_shell ("for m in rk4+projection ida+ggl ida+baumgarte; do for j in 1 2 3 7; do\n"
              "  pinwheel sweep ezyroller " GRID " -m $m -j $j -o @/jobs.csv && cksum <@/jobs.csv || exit 1\n"
              "done | sort -u | wc -l; done");
@@ -18,8 +17,7 @@ static void test_jobs (void **state) {
 }
 
 /* A journal cut after any byte, as a kill may leave it: the part is a complete journal with another name. */
-static void test_cut_journal (void **state) {
-  (void)state;
+TEST (cut_journal) {
   cli_shell ("s='pinwheel sweep ezyroller " GRID " --part 1/2 -o @/cut.csv'; $s || exit 1\n"
              "cp @/cut.csv @/whole; size=$(wc -c <@/whole); n=0\n"
              "while [ $n -le $size ]; do\n"
@@ -30,8 +28,7 @@ static void test_cut_journal (void **state) {
 }
 
 /* Rows in another order, a row twice, a damaged one, rows of another part, a forgotten half-sorted table. */
-static void test_odd_journal (void **state) {
-  (void)state;
+TEST (odd_journal) {
   cli_shell ("s='pinwheel sweep ezyroller " GRID " --part 2/2 -o @/odd.csv'; $s || exit 1\n"
              "cp @/odd.csv @/whole; head=$(grep -n '^end$' @/whole | cut -d: -f1)\n"
              "front () { head -$head @/whole; }; rows () { tail -n +$((head + 1)) @/whole; }\n"
@@ -48,34 +45,27 @@ static void test_odd_journal (void **state) {
 }
 
 /* A signal, and kills at odd moments, until it is through. */
-static void test_kills (void **state) {
-  (void)state;
+TEST (kills) {
   const char *sweep = "p=\"${PINWHEEL:-build/pinwheel}\"\n"
                       "s='sweep ezyroller --vary omega=lin:1:4:10 --vary M0=0.05,0.1,0.2,0.3 --t-end 4'\n";
-  char command[1500];
-  snprintf (command, sizeof command,
-            "%s\"$p\" $s -j 1 -o @/whole.csv || exit 1\n"
-            "\"$p\" $s -o @/kill.csv &\n"
-            "while kill -0 $! && ! grep -q '^[0-9]' @/kill.csv.part; do sleep 0.01; done 2>/dev/null; "
-            "kill -TERM $!; wait $!; "
-            "echo $?; ls @/kill.csv*",
-            sweep);
-  cli_shell (command);
+  cli_shell (check_text ("%s\"$p\" $s -j 1 -o @/whole.csv || exit 1\n"
+                         "\"$p\" $s -o @/kill.csv &\n"
+                         "while kill -0 $! && ! grep -q '^[0-9]' @/kill.csv.part; do sleep 0.01; done 2>/dev/null; "
+                         "kill -TERM $!; wait $!; "
+                         "echo $?; ls @/kill.csv*",
+                         sweep));
   char expected[200];
   cli_expand ("130\n@/kill.csv.part\n", expected, sizeof expected);
   assert_string_equal (cli_out, expected);
   assert_non_null (strstr (cli_err, "; the same command continues from there\n"));
-  snprintf (command, sizeof command,
-            "%si=3; while [ $i -lt 60 ]; do i=$((i + 1))\n"
-            "\"$p\" $s -o @/kill.csv 2>/dev/null & sleep $(printf 0.%%02d $i)\n"
-            "kill -KILL $! 2>/dev/null; wait $! 2>/dev/null && break\n"
-            "done; \"$p\" $s -o @/kill.csv; cmp @/kill.csv @/whole.csv && [ ! -e @/kill.csv.part ]",
-            sweep);
-  cli_shell (command);
+  cli_shell (check_text ("%si=3; while [ $i -lt 60 ]; do i=$((i + 1))\n"
+                         "\"$p\" $s -o @/kill.csv 2>/dev/null & sleep $(printf 0.%%02d $i)\n"
+                         "kill -KILL $! 2>/dev/null; wait $! 2>/dev/null && break\n"
+                         "done; \"$p\" $s -o @/kill.csv; cmp @/kill.csv @/whole.csv && [ ! -e @/kill.csv.part ]",
+                         sweep));
 }
 
-static void test_journal_of_another (void **state) {
-  (void)state;
+TEST (journal_of_another) {
   cli_shell ("pinwheel sweep ezyroller " GRID " --part 1/2 -o @/other.csv && mv @/other.csv @/other.csv.part");
   const char *last = "; finish that one with its own command, or remove the file";
   char text[600];
@@ -98,8 +88,7 @@ static void test_journal_of_another (void **state) {
   assert_string_equal (cli_file ("mine.csv.part"), "t [s],x [m]\n0,1\n");
 }
 
-static void test_lock (void **state) {
-  (void)state;
+TEST (lock) {
   cli_shell (
       "\"${PINWHEEL:-build/pinwheel}\" sweep ezyroller --vary omega=lin:1:4:400 --t-end 50 -o @/lock.csv & first=$!\n"
       "while kill -0 $! 2>/dev/null && [ ! -s @/lock.csv.part ]; do sleep 0.02; done\n"
@@ -112,8 +101,7 @@ static void test_lock (void **state) {
 
 /* ---- Parts ---- */
 
-static void test_parts (void **state) {
-  (void)state;
+TEST (parts) {
   cli_shell ("pinwheel sweep ezyroller " GRID " -o @/one.csv || exit 1\n"
              "for n in 1 4 5 12; do rm -f @/part*; i=1; while [ $i -le $n ]; do\n"
              "  pinwheel sweep ezyroller " GRID " --part $i/$n -o @/part$i.csv || exit 1; i=$((i + 1)); done\n"
@@ -122,8 +110,7 @@ static void test_parts (void **state) {
              "done");
 }
 
-static void test_bad_parts (void **state) {
-  (void)state;
+TEST (bad_parts) {
   cli_shell ("for i in 1 2 3; do pinwheel sweep ezyroller " GRID " --part $i/3 -o @/p$i.csv || exit 1; done\n"
              "pinwheel sweep ezyroller " GRID " --step 2e-3 --part 2/3 -o @/q2.csv\n"
              "pinwheel sweep ezyroller " GRID
@@ -158,8 +145,7 @@ static void test_bad_parts (void **state) {
 }
 
 /* A table in a file is as much of the model as the model's own file. */
-static void test_changed_table (void **state) {
-  (void)state;
+TEST (changed_table) {
   cli_write ("table.yaml", "pinwheel: 1\nparameters: [{name: I, value: 1, domain: positive}]\n"
                            "bodies: [{name: a, mass: 1, inertia: I}]\n"
                            "elements: [{torque: T, body: [a, ground], value: {table: {file: table.csv}}}]\n");
@@ -173,11 +159,4 @@ static void test_changed_table (void **state) {
              "pinwheel sweep --merge @/t1.csv @/t3.csv -o @/t.csv");
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_jobs),  cmocka_unit_test (test_cut_journal),        cmocka_unit_test (test_odd_journal),
-    cmocka_unit_test (test_kills), cmocka_unit_test (test_journal_of_another), cmocka_unit_test (test_lock),
-    cmocka_unit_test (test_parts), cmocka_unit_test (test_bad_parts),          cmocka_unit_test (test_changed_table),
-  };
-  return cmocka_run_group_tests_name ("sweeps resumed", tests, cli_setup, cli_teardown);
-}
+const check_fixture fixture = { cli_setup, cli_teardown };

@@ -1,4 +1,4 @@
-/* On a terminal: the progress bar of a long run; Ctrl-C once, and repeatedly. */
+/* On a terminal: the progress bar of a long run; Ctrl-C once, and repeatedly; names with control characters. */
 #define _XOPEN_SOURCE 700
 #include <fcntl.h>
 #include <signal.h>
@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/ioctl.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 #include "check.h"
@@ -13,8 +14,10 @@
 
 enum { TERMINAL_COLUMNS = 60 };
 
-/* Starts a run whose standard error is the far end of a new terminal; returns the near end. */
-static int terminal_open (const char *model, const char *t_end, pid_t *child) {
+/* Starts a command whose standard output or error is the far end of a new terminal; returns the near end.  NULL instead
+ * of `option`: no option. */
+static int terminal_open (int output, const char *command, const char *model, const char *option, const char *value,
+                          pid_t *child) {
   const char *program = getenv ("PINWHEEL");
   int near = posix_openpt (O_RDWR | O_NOCTTY);
   if (near < 0 || grantpt (near) != 0 || unlockpt (near) != 0) return -1;
@@ -24,11 +27,9 @@ static int terminal_open (const char *model, const char *t_end, pid_t *child) {
   if (ioctl (near, TIOCSWINSZ, &size) != 0) return -1;
   *child = fork ();
   if (*child == 0) {
-    dup2 (nothing, STDIN_FILENO);
-    dup2 (nothing, STDOUT_FILENO);
-    dup2 (far, STDERR_FILENO);
+    for (int i = 0; i < 3; i++) dup2 (i == output ? far : nothing, i);
     close (near);
-    execl (program, program, "run", model, "--t-end", t_end, (char *)NULL);
+    execl (program, program, command, model, option, value, (char *)NULL);
     _exit (127);
   }
   close (far);
@@ -53,7 +54,7 @@ static void terminal_bar (const char *model, const char *title, const char *t_en
   char text[20000] = "";
   size_t n = 0;
   pid_t child = -1;
-  int status = 0, near = terminal_open (model, t_end, &child);
+  int status = 0, near = terminal_open (STDERR_FILENO, "run", model, "--t-end", t_end, &child);
   if (near < 0) skip ();
   assert_true (child > 0);
   assert_true (terminal_read (near, " to go\033[K", text, sizeof text, &n));
@@ -71,21 +72,17 @@ static void terminal_bar (const char *model, const char *title, const char *t_en
   assert_true (wiped && message && message > wiped);
 }
 
-static void test_bar (void **state) {
-  (void)state;
-  char path[300];
+TEST (bar) {
   terminal_bar ("ezyroller", "\rezyroller [", "3e4", " of 3e+04 s  ");  /* most of a minute */
   terminal_bar ("ezyroller", "\rezyroller [", "1e7", " of 1e+07 s  ");  /* hours */
   terminal_bar ("ezyroller", "\rezyroller [", "1e12", " of 1e+12 s  "); /* nobody knows */
   /* the 16 bytes that are shown would end within the umlaut */
   cli_write ("fifteen-lettersü.yaml", "pinwheel: 1\nabout: free\nbodies:\n  - {name: b, mass: 1, inertia: 1}\n");
-  cli_expand ("@/fifteen-lettersü.yaml", path, sizeof path);
-  terminal_bar (path, "\rfifteen-letters [", "1e7", " of 1e+07 s  ");
+  terminal_bar (cli_path ("fifteen-lettersü.yaml"), "\rfifteen-letters [", "1e7", " of 1e+07 s  ");
 }
 
 /* A model that never answers: the first two Ctrl-C ask it to stop, the third ends the program. */
-static void test_insist (void **state) {
-  (void)state;
+TEST (insist) {
   cli_write ("hang.c", "#include <stdio.h>\n#include <unistd.h>\n#include \"pinwheel.h\"\n"
                        "static int wait (void *c, double t, const double *x, double *u, double *g) {\n"
                        "  (void)c, (void)t, (void)x, (void)g;\n"
@@ -106,10 +103,25 @@ static void test_insist (void **state) {
   assert_string_equal (cli_out, "143\n");
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_bar),
-    cmocka_unit_test (test_insist),
-  };
-  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
+/* What a command prints at a terminal has none of the control characters of a name. */
+static void terminal_escapes (const char *command, const char *path, const char *expected) {
+  char text[10000] = "";
+  size_t n = 0;
+  pid_t child = -1;
+  int near = terminal_open (STDOUT_FILENO, command, path, NULL, NULL, &child);
+  if (near < 0) skip ();
+  terminal_read (near, NULL, text, sizeof text, &n);
+  close (near);
+  waitpid (child, NULL, 0);
+  assert_null (strchr (text, '\033'));
+  assert_non_null (strstr (text, expected));
 }
+
+TEST (names) {
+  assert_int_equal (mkdir (cli_path ("odd\033[31m"), 0700), 0);
+  const char *path = cli_path ("odd\033[31m/x.yaml");
+  terminal_escapes ("new", path, "/odd\\x1b[31m/x.yaml is written");
+  terminal_escapes ("show", path, "/odd\\x1b[31m/x.yaml\r\n");
+}
+
+const check_fixture fixture = { cli_setup, cli_teardown };

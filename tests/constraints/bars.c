@@ -40,4 +40,4 @@ static void bars_build (pw_model *m, const void *parameter) {
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -p->g } });
 }
 
-const pw_plugin_table bars_table = TRIAL_TABLE_WITH (bars_build, bars_list, sizeof (bars));
+const pw_plugin_table bars_table = SCENE_TABLE_WITH (bars_build, bars_list, sizeof (bars));

@@ -12,7 +12,7 @@ enum { REDUNDANT_COORDS = 20 };
     (void)parameter;                                      \
     build;                                                \
   }                                                       \
-  static const pw_plugin_table name##_table = TRIAL_TABLE (name)
+  static const pw_plugin_table name##_table = SCENE_TABLE (name)
 
 /* Runs a scene to t, with a fixed step or with rtol, and stores the final values of the states with these names, which
  * end with NULL. */

@@ -29,17 +29,11 @@ static long rows_memory (long rows, const char *method) {
   return used.ru_maxrss;
 }
 
-static void test_constant (void **state) {
-  (void)state;
+TEST (constant) {
   static const char *const method[] = { "rk4+projection", "ida+ggl" };
   for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
     long few = rows_memory (10000, method[i]), many = rows_memory (1000000, method[i]);
     print_message ("%s: 10,000 rows in %ld kB, 1,000,000 in %ld kB\n", method[i], few, many);
     assert_true (many < few + 1024); /* 1 MB: variations of the allocator */
   }
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_constant) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -18,10 +18,9 @@ static const pw_parameter locked_cart_list[] = {
   { .name = NULL },
 };
 
-static void locked_build_cart (pw_model *m, const void *parameter) {
+SCENE_WITH (locked_build_cart, locked_cart_list, locked_cart) {
   static const char *const name[] = { "front", "left", "right", "rear" };
   static const double at[][3] = { { 0.5, 0, 0.3 }, { 0, 0.4, -0.2 }, { 0, -0.4, 0.1 }, { -0.5, 0.1, 0.7 } };
-  const locked_cart *p = parameter;
   pw_add_body (
       m, &(pw_body){ .name = "cart", .mass = 3, .inertia = 0.2, .start = { 1, 2, 0.3 }, .rate = { p->speed, 0, 0 } });
   for (int i = 0; i < (int)p->wheels; i++)
@@ -29,11 +28,8 @@ static void locked_build_cart (pw_model *m, const void *parameter) {
   pw_add_torque (m, &(pw_torque){ .name = "push", .body = { "cart", "ground" }, .value = { .constant = p->torque } });
 }
 
-static const pw_plugin_table locked_cart_table =
-    TRIAL_TABLE_WITH (locked_build_cart, locked_cart_list, sizeof (locked_cart));
-
 /* The cart stays at rest under a torque. */
-static void test_locked (void **state) {
+TEST (locked) {
   static const char *const method[] = {
     "rk4+none",       "rk4+baumgarte", "rk4+projection", "rk4+projection:metric=identity",
     "ida+none",       "ida+baumgarte", "ida+ggl",        "ida+index2",
@@ -41,10 +37,9 @@ static void test_locked (void **state) {
     "bdf+projection", "rk4+nullspace", "galpha+index3",  "galpha+ggl",
     "leapfrog",       "radau+ggl",     "radau+index2",   "radau+index3"
   };
-  (void)state;
   for (int wheels = 3; wheels <= 4; wheels++)
     for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
-      pw_system *s = scene_system (&locked_cart_table, "wheels", (double)wheels, NULL);
+      pw_system *s = scene_system (&locked_build_cart_table, "wheels", (double)wheels, NULL);
       pw_run *r = runs_open (s, method[i], &(pw_settings){ .step = 1e-2, .rtol = 1e-8, .span = 2 });
       assert_int_equal (pw_run_redundant (r), wheels - 3);
       pw_sample x = runs_to (r, 2);
@@ -57,11 +52,10 @@ static void test_locked (void **state) {
     }
 }
 
-static void test_locked_with_velocity (void **state) {
-  (void)state;
+TEST (locked_with_velocity) {
   for (int wheels = 3; wheels <= 4; wheels++) {
     pw_error error = { 0 };
-    pw_system *s = scene_system (&locked_cart_table, "wheels", (double)wheels, "speed", 1.5, NULL);
+    pw_system *s = scene_system (&locked_build_cart_table, "wheels", (double)wheels, "speed", 1.5, NULL);
     assert_null (pw_run_open (s, "rk4+projection", NULL, &error));
     check_error (&error, PW_INITIAL,
                  wheels == 3
@@ -74,8 +68,7 @@ static void test_locked_with_velocity (void **state) {
 }
 
 /* A body specified at rest, whose wheel has a given spin rate: both rows belong to one element. */
-static void locked_spin (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (locked_spin) {
   pw_add_body (m, &(pw_body){ .name = "cart",
                               .mass = 1,
                               .inertia = 1,
@@ -83,11 +76,9 @@ static void locked_spin (pw_model *m, const void *parameters) {
   pw_add_rolling_wheel (m, &(pw_rolling_wheel){ .name = "wheel", .body = "cart", .radius = 1, .rate = 1 });
 }
 
-static void test_spinning_wheel_locked (void **state) {
-  static const pw_plugin_table table = TRIAL_TABLE (locked_spin);
-  (void)state;
+TEST (spinning_wheel_locked) {
   pw_error error = { 0 };
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (&locked_spin_table, NULL);
   assert_null (pw_run_open (s, "rk4", NULL, &error));
   check_error (
       &error, PW_INITIAL,
@@ -96,16 +87,13 @@ static void test_spinning_wheel_locked (void **state) {
 }
 
 /* Most of the velocity is lateral: accepted, although the constraint removes all but a hundredth of it. */
-static void locked_build_skidding (pw_model *m, const void *parameter) {
-  (void)parameter;
+SCENE (locked_build_skidding) {
   pw_add_body (m, &(pw_body){ .name = "skate", .mass = 1, .inertia = 1, .rate = { 0.01, 1, 0 } });
   pw_add_wheel (m, &(pw_wheel){ .name = "edge", .body = "skate" });
 }
 
-static void test_skidding (void **state) {
-  static const pw_plugin_table table = TRIAL_TABLE (locked_build_skidding);
-  (void)state;
-  pw_system *s = scene_system (&table, NULL);
+TEST (skidding) {
+  pw_system *s = scene_system (&locked_build_skidding_table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", NULL);
   pw_sample x = runs_to (r, 1);
   check_close ("longitudinal", x.v[0], 0.01, 16 * CHECK_EPS, "the part that the wheel allows");
@@ -122,8 +110,7 @@ static int locked_steer (void *context, double t, const double *x, double value[
   return 0;
 }
 
-static void locked_build_steered (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (locked_build_steered) {
   pw_add_body (m, &(pw_body){ .name = "cart", .mass = 3, .inertia = 0.2, .rate = { 1, 0, 0 } });
   pw_add_body (m,
                &(pw_body){ .name = "fork", .mass = 0.2, .inertia = 0.01, .start = { 0.5, 0, 0 }, .rate = { 1, 0, 0 } });
@@ -138,17 +125,15 @@ static void locked_build_steered (pw_model *m, const void *parameters) {
 }
 
 /* Wheels that lock during the motion stop the run with the name of a wheel. */
-static void test_locks_in_motion (void **state) {
-  static const pw_plugin_table table = TRIAL_TABLE (locked_build_steered);
+TEST (locks_in_motion) {
   static const char *const method[] = { "rk4+projection", "rk4+baumgarte",  "rk4+none",      "ida+baumgarte",
                                         "ida+ggl",        "rk4+nullspace",  "galpha+index3", "galpha+ggl",
                                         "adams+none",     "ida+si1",        "ida+index2",    "adams+baumgarte",
                                         "bdf+baumgarte",  "bdf+projection", "leapfrog",      "radau+ggl",
                                         "radau+index2",   "radau+index3" };
-  (void)state;
   for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
     pw_error error = { 0 };
-    pw_system *s = scene_system (&table, NULL);
+    pw_system *s = scene_system (&locked_build_steered_table, NULL);
     pw_run *r = pw_run_open (s, method[i], &(pw_settings){ .step = 1e-3, .rtol = 1e-8, .span = 1 }, &error);
     int status = r ? pw_run_advance_to (r, 1, 1, &error) : error.status;
     print_message ("%s: %s\n", method[i], error.text);
@@ -165,8 +150,7 @@ static void test_locks_in_motion (void **state) {
 /* ---- Contradictory constraints ---- */
 
 /* Two bodies at pivots 10 m apart, with a weld between their ends, 1 m from the pivots. */
-static void locked_build_gap (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (locked_build_gap) {
   pw_add_body (m, &(pw_body){ .name = "left", .mass = 1, .inertia = 0.1, .start = { 0.5, 0, 0 } });
   pw_add_body (m, &(pw_body){ .name = "right", .mass = 1, .inertia = 0.1, .start = { 9.5, 0, 0 } });
   pw_add_pin (m, &(pw_pin){ .name = "A", .body = { "left", "ground" }, .at = { { -0.5, 0 }, { 0, 0 } } });
@@ -174,12 +158,10 @@ static void locked_build_gap (pw_model *m, const void *parameters) {
   pw_add_weld (m, &(pw_weld){ .name = "joint", .body = { "left", "right" }, .at = { { 0.5, 0 }, { -0.5, 0 } } });
 }
 
-static void test_open_weld (void **state) {
-  static const pw_plugin_table table = TRIAL_TABLE (locked_build_gap);
-  (void)state;
+TEST (open_weld) {
   pw_error error = { 0 };
   double open = 0;
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (&locked_build_gap_table, NULL);
   assert_null (pw_run_open (s, "rk4+projection", NULL, &error));
   print_message ("%s\n", error.text);
   assert_int_equal (error.status, PW_INITIAL);
@@ -199,8 +181,7 @@ static const pw_parameter locked_offset_list[] = {
 };
 
 /* Two drives prescribe different angles of one body. */
-static void locked_build_drives (pw_model *m, const void *parameter) {
-  const locked_offset *p = parameter;
+SCENE_WITH (locked_build_drives, locked_offset_list, locked_offset) {
   pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 0.1 });
   pw_add_pin (m, &(pw_pin){ .name = "hub", .body = { "disc", "ground" } });
   pw_add_drive (m, &(pw_drive){ .name = "one", .body = { "disc", "ground" }, .what = PW_DRIVE_ANGLE });
@@ -209,24 +190,20 @@ static void locked_build_drives (pw_model *m, const void *parameter) {
   pw_add_drive (m, &(pw_drive){ .name = "two", .body = { "disc", "ground" }, .what = PW_DRIVE_ANGLE, .value = other });
 }
 
-static const pw_plugin_table locked_drives_table =
-    TRIAL_TABLE_WITH (locked_build_drives, locked_offset_list, sizeof (locked_offset));
-
-static void test_contradictory_drives (void **state) {
+TEST (contradictory_drives) {
   static const char *const method[] = { "rk4+projection", "rk4+baumgarte",   "ida+ggl",    "ida+baumgarte",
                                         "rk4+nullspace",  "galpha+index3",   "galpha+ggl", "ida+si1",
                                         "bdf+projection", "adams+baumgarte", "leapfrog" };
-  (void)state;
   for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
     pw_error error = { 0 };
-    pw_system *s = scene_system (&locked_drives_table, "offset", 0.1, NULL);
+    pw_system *s = scene_system (&locked_build_drives_table, "offset", 0.1, NULL);
     assert_null (pw_run_open (s, method[i], NULL, &error));
     print_message ("%s\n", error.text);
     assert_int_equal (error.status, PW_INITIAL);
     assert_non_null (strstr (error.text, "drive "));
     pw_system_free (s);
     error = (pw_error){ 0 };
-    s = scene_system (&locked_drives_table, NULL);
+    s = scene_system (&locked_build_drives_table, NULL);
     pw_run *r = pw_run_open (s, method[i], &(pw_settings){ .step = 1e-3, .rtol = 1e-6, .span = 1 }, &error);
     int status = r ? pw_run_advance_to (r, 1, 1, &error) : error.status;
     print_message ("%s\n", error.text);
@@ -235,15 +212,4 @@ static void test_contradictory_drives (void **state) {
     if (r) pw_run_close (r);
     pw_system_free (s);
   }
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_locked),
-                                      cmocka_unit_test (test_locked_with_velocity),
-                                      cmocka_unit_test (test_skidding),
-                                      cmocka_unit_test (test_spinning_wheel_locked),
-                                      cmocka_unit_test (test_locks_in_motion),
-                                      cmocka_unit_test (test_open_weld),
-                                      cmocka_unit_test (test_contradictory_drives) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

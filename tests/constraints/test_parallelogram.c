@@ -37,8 +37,7 @@ static void parallelogram_digits (pw_system *s, pw_run *r, double bound, const c
   check_close ("balance", x.balance, 0, 1e2 * bound, reason);
 }
 
-static void test_digits (void **state) {
-  (void)state;
+TEST (digits) {
   parallelogram_every_method (parallelogram_digits, 1e-7, "1e3 rtol");
 }
 
@@ -57,15 +56,13 @@ static void parallelogram_shares (pw_system *s, pw_run *r, double bound, const c
   check_close ("Newton's law of the coupler, x", -(share[0] + share[1] + share[2]), 2 * x.a[0], 1e2 * bound, reason);
 }
 
-static void test_shares (void **state) {
-  (void)state;
+TEST (shares) {
   parallelogram_every_method (parallelogram_shares, 1e-6, "1e4 rtol");
 }
 
 /* ---- Messages: all elements that a redundant row depends on are named; a short buffer truncates the text ---- */
 
-static void test_partners (void **state) {
-  (void)state;
+TEST (partners) {
   char text[500];
   pw_system *s = scene_named ("redundant-parallelogram", NULL, 0);
   pw_run *r = runs_open (s, "ida+ggl", NULL);
@@ -75,10 +72,4 @@ static void test_partners (void **state) {
   pw_run_redundancy (r, 0, text, 10);
   assert_int_equal (strlen (text), 9);
   runs_close (r, s);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_digits), cmocka_unit_test (test_shares),
-                                      cmocka_unit_test (test_partners) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

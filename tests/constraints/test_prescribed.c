@@ -13,8 +13,7 @@
 
 /* ---- Given values are kept ---- */
 
-static void test_given_values_kept (void **state) {
-  (void)state;
+TEST (given_values_kept) {
   static const char *const name[] = { "frame.phi", "steer.phi", "frame.vx", NULL };
   static const double value[] = { 0.3, 2, 1.5 };
   pw_system *s;
@@ -31,8 +30,7 @@ static void test_given_values_kept (void **state) {
 }
 
 /* All states of the frame are given; they satisfy the row of wheel A, which has no other coordinates. */
-static void test_given_body_kept (void **state) {
-  (void)state;
+TEST (given_body_kept) {
   static const char *const name[] = { "frame.x",  "frame.y",     "frame.phi", "frame.vx",
                                       "frame.vy", "frame.omega", "steer.phi", NULL };
   static const double value[] = { 1, 2, 0, 1, 0.1, 0.2, PW_PI / 2 };
@@ -66,12 +64,11 @@ static void start_chain (pw_model *m, const void *parameters) {
 
 /* Given values are kept if they satisfy a constraint without other coordinates, in scenes of any size: all coordinates
  * of a body pinned to the ground, both angles of a gear. */
-static void test_given_satisfied_rows (void **state) {
+TEST (given_satisfied_rows) {
   static const char *const name[] = { "link0.x", "link0.y", "link0.phi", "link2.phi" };
   static const double value[] = { 0.5, 0, 0, 0 };
   static const pw_parameter list[] = { { .name = "links", .value = 3 }, { .name = NULL } };
-  static const pw_plugin_table table = TRIAL_TABLE_WITH (start_chain, list, sizeof (double));
-  (void)state;
+  static const pw_plugin_table table = SCENE_TABLE_WITH (start_chain, list, sizeof (double));
   for (int links = 3; links <= 16; links++) {
     pw_error error = { 0 };
     pw_model *m = scene_model (&table, "links", (double)links, NULL);
@@ -106,12 +103,11 @@ static void start_arms (pw_model *m, const void *parameters) {
   }
 }
 
-static void test_given_centre_kept (void **state) {
+TEST (given_centre_kept) {
   static const char *const name[] = { "disc0.x", "disc0.y", "disc0.vx", "disc0.vy" };
   static const double value[] = { 0.6, 0.8, -0.8, 0.6 };
   static const pw_parameter list[] = { { .name = "arms", .value = 1 }, { .name = NULL } };
-  static const pw_plugin_table table = TRIAL_TABLE_WITH (start_arms, list, sizeof (double));
-  (void)state;
+  static const pw_plugin_table table = SCENE_TABLE_WITH (start_arms, list, sizeof (double));
   for (int arms = 1; arms <= 40; arms += 13) {
     pw_error error = { 0 };
     pw_model *m = scene_model (&table, "arms", (double)arms, NULL);
@@ -128,8 +124,7 @@ static void test_given_centre_kept (void **state) {
 }
 
 /* A given angle of the massless steering assembly does not change the frame. */
-static void test_massive_body_kept (void **state) {
-  (void)state;
+TEST (massive_body_kept) {
   static const char *const name[] = { "steer.phi", NULL };
   static const double value[] = { 2 };
   pw_system *s;
@@ -143,8 +138,7 @@ static void test_massive_body_kept (void **state) {
 }
 
 /* The angle of a wheel is specified, and velocities that violate its constraint: the velocities change. */
-static void start_slipping (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (start_slipping) {
   pw_add_body (m, &(pw_body){ .name = "frame", .mass = 1, .inertia = 0.1, .rate = { 1, 0.3, 0.2 } });
   pw_add_body (m, &(pw_body){ .name = "steer", .start = { 0, 0, 2 } });
   pw_add_pin (m, &(pw_pin){ .name = "B", .body = { "frame", "steer" }, .at = { { 0.5, 0 }, { -0.125, 0 } } });
@@ -152,10 +146,8 @@ static void start_slipping (pw_model *m, const void *parameters) {
   pw_add_wheel (m, &(pw_wheel){ .name = "C", .body = "steer" });
 }
 
-static void test_velocities_change (void **state) {
-  static const pw_plugin_table table = TRIAL_TABLE (start_slipping);
-  (void)state;
-  pw_system *s = scene_system (&table, NULL);
+TEST (velocities_change) {
+  pw_system *s = scene_system (&start_slipping_table, NULL);
   pw_run *r = runs_open (s, "rk4", NULL);
   const pw_initial_report *start = pw_run_initial (r);
   const double frame[3] = { 0 };
@@ -165,8 +157,7 @@ static void test_velocities_change (void **state) {
 }
 
 /* If given positions are released, given velocities are kept. */
-static void test_velocities_kept (void **state) {
-  (void)state;
+TEST (velocities_kept) {
   static const char *const name[] = { "frame.x", "steer.x", "steer.vy", NULL };
   static const double value[] = { 0, 5.375, 5 };
   pw_system *s;
@@ -178,8 +169,7 @@ static void test_velocities_kept (void **state) {
 }
 
 /* Given values that contradict each other are all released. */
-static void test_released (void **state) {
-  (void)state;
+TEST (released) {
   static const char *const name[] = { "frame.x", "frame.y", "frame.phi", "steer.x", NULL };
   static const double value[] = { 0, 0, 0, 3 };
   pw_system *s;
@@ -202,12 +192,11 @@ static void start_massive (pw_model *m, const void *parameters) {
   pw_add_wheel (m, &(pw_wheel){ .name = "A", .body = "frame", .at = { -0.5, 0 } });
 }
 
-static void test_least_change (void **state) {
-  (void)state;
+TEST (least_change) {
   static const pw_parameter list[] = { { .name = "vx" },
                                        { .name = "omega", .offset = sizeof (double) },
                                        { .name = NULL } };
-  static const pw_plugin_table table = TRIAL_TABLE_WITH (start_massive, list, 2 * sizeof (double));
+  static const pw_plugin_table table = SCENE_TABLE_WITH (start_massive, list, 2 * sizeof (double));
   double v[6][6], change[6][6];
   pw_system *s = NULL;
   for (int i = 0; i < 6; i++) {
@@ -232,8 +221,7 @@ static void test_least_change (void **state) {
 
 /* ---- A constraint with a signal ---- */
 
-static void start_driven (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (start_driven) {
   pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 1 });
   pw_add (m, &toy_kind_drive,
           &(toy_drive){ .name = "motor",
@@ -241,10 +229,8 @@ static void start_driven (pw_model *m, const void *parameters) {
                         .angle = { PW_HARMONIC, .harmonic = { .amplitude = 0.5, .omega = 2, .phase = 1 } } });
 }
 
-static void test_driven_constraint (void **state) {
-  (void)state;
-  static const pw_plugin_table table = TRIAL_TABLE (start_driven);
-  pw_system *s = scene_system (&table, NULL);
+TEST (driven_constraint) {
+  pw_system *s = scene_system (&start_driven_table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .t = 3, .span = 1 });
   const pw_initial_report *start = pw_run_initial (r);
   check_close ("angle", start->q[2], 0.5 * cos (7), 4 * CHECK_EPS, "4 eps: round-off");
@@ -256,16 +242,14 @@ static void test_driven_constraint (void **state) {
 
 /* ---- Inconsistent initial conditions ---- */
 
-static void start_too_far (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (start_too_far) {
   pw_add_body (m, &(pw_body){ .name = "rod", .mass = 1, .inertia = 1, .start = { 1.5, 0, 0 } });
   pw_add_pin (m, &(pw_pin){ .name = "left", .body = { "rod", "ground" }, .at = { { -0.5, 0 }, { 0, 0 } } });
   pw_add_pin (m, &(pw_pin){ .name = "right", .body = { "rod", "ground" }, .at = { { 0.5, 0 }, { 3, 0 } } });
 }
 
 /* Two drives turn one disc at different speeds. */
-static void start_contradictory (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (start_contradictory) {
   start_driven (m, NULL);
   m->body[0].start[2] = 0.5 * cos (1);
   pw_add (m, &toy_kind_drive,
@@ -275,8 +259,7 @@ static void start_contradictory (pw_model *m, const void *parameters) {
 }
 
 /* Speeds contradict each other; that of another body has a larger residual, but a smaller scaled one. */
-static void start_speeds (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (start_speeds) {
   pw_add_body (m, &(pw_body){ .name = "fast", .mass = 1, .inertia = 1, .rate = { 1e4 } });
   pw_add_body (m, &(pw_body){ .name = "slow", .mass = 1, .inertia = 1 });
   pw_add_speed (m, &(pw_speed){ .name = "other", .body = "fast", .value.constant = 10050 });
@@ -284,35 +267,21 @@ static void start_speeds (pw_model *m, const void *parameters) {
   pw_add_speed (m, &(pw_speed){ .name = "two", .body = "slow", .value.constant = 2 });
 }
 
-static void start_expect_error (void (*build) (pw_model *, const void *), const char *text) {
-  const pw_plugin_table table = TRIAL_TABLE (build);
+static void start_expect_error (const pw_plugin_table *table, const char *text) {
   pw_error error = { 0 };
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (table, NULL);
   assert_null (pw_run_open (s, "rk4", NULL, &error));
   check_error (&error, PW_INITIAL, text);
   pw_system_free (s);
 }
 
-static void test_inconsistent (void **state) {
-  (void)state;
-  start_expect_error (start_too_far,
+TEST (inconsistent) {
+  start_expect_error (&start_too_far_table,
                       "model scene: the initial state cannot be made consistent: pin left is open by 1 m; if it "
                       "can close, begin nearer to where it does");
   start_expect_error (
-      start_contradictory,
+      &start_contradictory_table,
       "model scene: the initial state cannot be made consistent: drive other is violated by 1.26221 rad/s");
-  start_expect_error (start_speeds,
+  start_expect_error (&start_speeds_table,
                       "model scene: the initial state cannot be made consistent: speed two is violated by 2 m/s");
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_given_values_kept),    cmocka_unit_test (test_given_body_kept),
-    cmocka_unit_test (test_given_satisfied_rows), cmocka_unit_test (test_released),
-    cmocka_unit_test (test_given_centre_kept),    cmocka_unit_test (test_massive_body_kept),
-    cmocka_unit_test (test_velocities_change),    cmocka_unit_test (test_velocities_kept),
-    cmocka_unit_test (test_least_change),         cmocka_unit_test (test_driven_constraint),
-    cmocka_unit_test (test_inconsistent),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -43,15 +43,13 @@ static void project_try (const char *model, const char *parameter, double value,
   runs_close (r, s);
 }
 
-static void test_consistent (void **state) {
-  (void)state;
+TEST (consistent) {
   project_try ("ezyroller", NULL, 0, "rk4+projection", 0);
   project_try ("ezyroller", "m2", 0.1, "rk4+projection", 0);
   project_try ("n-trailer", NULL, 0, "rk4+projection", 0);
 }
 
-static void test_perturbed (void **state) {
-  (void)state;
+TEST (perturbed) {
   project_try ("ezyroller", NULL, 0, "rk4+projection", 1e-3);
   project_try ("ezyroller", "m2", 0.1, "rk4+projection", 1e-3);
   project_try ("ezyroller", NULL, 0, "rk4+projection:metric=identity", 1e-3);
@@ -80,16 +78,14 @@ static double project_length (const char *method) {
 }
 
 /* The correction is shortest in the identity metric. */
-static void test_metric (void **state) {
-  (void)state;
+TEST (metric) {
   double identity = project_length ("rk4+projection:metric=identity"), mass = project_length ("rk4+projection");
   print_message ("corrections %.6g and %.6g\n", identity, mass);
   check_below ("correction", identity, 0.999 * mass, "the mass matrix has entries from 0.1 to 1");
 }
 
 /* A residual that is NaN is the largest, in any row. */
-static void test_nan_residual (void **state) {
-  (void)state;
+TEST (nan_residual) {
   double size[PROJECT_MOST];
   pw_system *s = scene_named ("n-four-bar", NULL, 0);
   assert_in_range (s->holonomic, 3, PROJECT_MOST);
@@ -106,8 +102,7 @@ static void test_nan_residual (void **state) {
 }
 
 /* A contradictory row of one projection is not reported as the cause of a failure of the next one. */
-static void test_not_contradictory (void **state) {
-  (void)state;
+TEST (not_contradictory) {
   pw_system *s = scene_named ("redundant-parallelogram", NULL, 0);
   pw_run *r = runs_open (s, "rk4+projection", NULL);
   pw_error error = { 0 };
@@ -119,11 +114,4 @@ static void test_not_contradictory (void **state) {
   assert_int_equal (p.contradictory_row, -1);
   pw_projector_close (&p);
   runs_close (r, s);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_consistent), cmocka_unit_test (test_perturbed),
-                                      cmocka_unit_test (test_metric), cmocka_unit_test (test_nan_residual),
-                                      cmocka_unit_test (test_not_contradictory) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

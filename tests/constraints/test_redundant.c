@@ -14,8 +14,7 @@
 
 /* The third crank is connected to the coupler in x only; the others determine y.  The rows are independent unless the
  * cranks are horizontal. */
-static void redundant_slotted (pw_model *m, const void *parameter) {
-  (void)parameter;
+SCENE (redundant_slotted) {
   double c = cos (-PW_PI / 4), s = sin (-PW_PI / 4);
   pw_add_body (m, &(pw_body){ .name = "coupler", .mass = 2, .inertia = 2. / 3, .start = { 1 + c, s, 0 } });
   for (int i = 0; i < 3; i++) {
@@ -32,22 +31,18 @@ static void redundant_slotted (pw_model *m, const void *parameter) {
   pw_add_gravity (m, &(pw_gravity){ .name = "gravity", .acceleration = { 0, -9.81 } });
 }
 
-static const pw_plugin_table redundant_slotted_table = TRIAL_TABLE (redundant_slotted);
-
 static const char *const redundant_cranks[] = { "coupler.x",    "coupler.y",    "coupler.phi",
                                                 "crank1.phi",   "crank2.phi",   "crank3.phi",
                                                 "crank1.omega", "crank3.omega", NULL };
 
-static void test_parallelogram_twins (void **state) {
-  (void)state;
+TEST (parallelogram_twins) {
   redundant_twins (&redundant_parallelogram, &redundant_slotted_table, 1, 1e-3, redundant_cranks);
 }
 
 /* The initial angle of one crank differs from the others: where constraints are violated, all rows are independent. */
-static void test_parallelogram_start (void **state) {
+TEST (parallelogram_start) {
   static const char *const crank[] = { "crank1.phi", "crank2.phi", "crank3.phi" };
   static const double off[] = { 1e-5, 1e-3, 0.1, 0.4, 0.6, 1.0 };
-  (void)state;
   for (int i = 0; i < 3; i++)
     for (int k = 0; k < 6; k++) {
       pw_error error = { 0 };
@@ -89,8 +84,7 @@ REDUNDANT_SCENE (redundant_three, redundant_tricycle (m, 2));
 REDUNDANT_SCENE (redundant_two, redundant_tricycle (m, 1));
 
 /* Two equal drives turn a crank against its weight: each has half of the reaction and half of the work. */
-static void redundant_drives (pw_model *m, const void *parameter) {
-  (void)parameter;
+SCENE (redundant_drives) {
   const pw_signal turn = { PW_SMOOTH_STEP, .ramp = { .to = 1, .duration = 1 } };
   pw_add_body (m, &(pw_body){ .name = "crank", .mass = 1, .inertia = 0.1, .start = { 1 } });
   pw_add_pin (m, &(pw_pin){ .name = "axle", .body = { "crank", "ground" }, .at = { { -1, 0 }, { 0, 0 } } });
@@ -99,12 +93,9 @@ static void redundant_drives (pw_model *m, const void *parameter) {
   pw_add_gravity (m, &(pw_gravity){ .name = "gravity", .acceleration = { 0, -10 } });
 }
 
-static const pw_plugin_table redundant_drives_table = TRIAL_TABLE (redundant_drives);
-
-static void test_drives (void **state) {
+TEST (drives) {
   static const char *const method[] = { "rk4+projection", "erk8+projection", "ida+ggl", "bdf+projection",
                                         "galpha+ggl" };
-  (void)state;
   for (int i = 0; i < 5; i++) {
     pw_system *s = scene_system (&redundant_drives_table, NULL);
     pw_run *r = runs_open (s, method[i], &(pw_settings){ .rtol = 1e-8, .step = 1e-3, .span = 1, .ledger = 1 });
@@ -116,8 +107,7 @@ static void test_drives (void **state) {
   }
 }
 
-static void test_axle (void **state) {
-  (void)state;
+TEST (axle) {
   static const char *const name[] = { "frame.x",     "frame.y", "frame.phi", "fork.phi",   "frame.vx", "frame.vy",
                                       "frame.omega", "fork.vx", "fork.vy",   "fork.omega", NULL };
   redundant_twins (&redundant_three_table, &redundant_two_table, 3, 1e-3, name);
@@ -125,8 +115,7 @@ static void test_axle (void **state) {
 }
 
 /* Two wheels on one axle have half of the reaction of a single one each. */
-static void test_axle_forces (void **state) {
-  (void)state;
+TEST (axle_forces) {
   pw_system *s = scene_system (&redundant_three_table, NULL), *twin = scene_system (&redundant_two_table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", NULL), *one = runs_open (twin, "rk4+projection", NULL);
   for (int i = 1; i <= 4; i++) {
@@ -168,8 +157,7 @@ static void redundant_frame (pw_model *m, int pins) {
 REDUNDANT_SCENE (redundant_bolted, redundant_frame (m, 2));
 REDUNDANT_SCENE (redundant_welded, redundant_frame (m, 0));
 
-static void test_frame (void **state) {
-  (void)state;
+TEST (frame) {
   static const char *const name[] = {
     "left.phi", "right.phi", "right.x", "right.y", "left.omega", "right.omega", NULL
   };
@@ -180,19 +168,15 @@ static void test_frame (void **state) {
 /* ---- Messages ---- */
 
 /* A plate of 1 nm, held by pins at two corners and an angle. */
-static void redundant_plate (pw_model *m, const void *parameter) {
+SCENE (redundant_plate) {
   const double size = 1e-9;
-  (void)parameter;
   pw_add_body (m, &(pw_body){ .name = "plate", .mass = 1, .inertia = size * size });
   pw_add_pin (m, &(pw_pin){ .name = "A", .body = { "plate", "ground" } });
   pw_add_drive (m, &(pw_drive){ .name = "D", .body = { "plate", "ground" }, .what = PW_DRIVE_ANGLE });
   pw_add_pin (m, &(pw_pin){ .name = "B", .body = { "plate", "ground" }, .at = { { size, 0 }, { size, 0 } } });
 }
 
-static const pw_plugin_table redundant_plate_table = TRIAL_TABLE (redundant_plate);
-
-static void test_names (void **state) {
-  (void)state;
+TEST (names) {
   static const char *const corner[] = { "pins A and B: the same x constraint",
                                         "pin B (B.Fy) follows from pin A, drive D", NULL };
   static const char *const axle[] = { "wheels rear_left and rear_right: the same lateral constraint", NULL };
@@ -206,8 +190,7 @@ static void test_names (void **state) {
 
 /* A disc on a rod and a drive cannot move.  The wheel's row has a larger angle to the drive's row than the rod's row
  * has, but holonomic rows are selected first. */
-static void redundant_fixed_disc (pw_model *m, const void *parameter) {
-  (void)parameter;
+SCENE (redundant_fixed_disc) {
   pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 1, .start = { 1, 1, 0 }, .rate = { 0, 0, 1 } });
   pw_add_drive (
       m, &(pw_drive){ .name = "across", .body = { "disc", "ground" }, .what = PW_DRIVE_X, .value = { .constant = 1 } });
@@ -216,38 +199,31 @@ static void redundant_fixed_disc (pw_model *m, const void *parameter) {
 }
 
 /* The cosine between the wheel's row and that of the drive along it is 1/200. */
-static void redundant_oblique_drive (pw_model *m, const void *parameter) {
-  (void)parameter;
+SCENE (redundant_oblique_drive) {
   pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 1 });
   pw_add_drive (m, &(pw_drive){ .name = "ahead", .body = { "disc", "ground" }, .what = PW_DRIVE_X });
   pw_add_drive (m, &(pw_drive){ .name = "aside", .body = { "disc", "ground" }, .what = PW_DRIVE_Y });
   pw_add_wheel (m, &(pw_wheel){ .name = "edge", .body = "disc", .heading = 0.005 });
 }
 
-static void test_kept (void **state) {
-  (void)state;
-  static const pw_plugin_table fixed = TRIAL_TABLE (redundant_fixed_disc),
-                               oblique = TRIAL_TABLE (redundant_oblique_drive);
+TEST (kept) {
   static const char *const of_fixed[] = { "wheel edge (edge.N) follows from drive across, rod rod", NULL };
   static const char *const of_oblique[] = { "wheel edge (edge.N) follows from drive ahead, drive aside", NULL };
-  redundant_expect_reports (&fixed, of_fixed);
-  redundant_expect_reports (&oblique, of_oblique);
+  redundant_expect_reports (&redundant_fixed_disc_table, of_fixed);
+  redundant_expect_reports (&redundant_oblique_drive_table, of_oblique);
 }
 
 /* A body with a weld at its centre and a pin at the distance d.  The pin has the part p of the weight W that minimises
  * p^2 + (W - p)^2 + (d p / L)^2, moments in units of force times the scene's length. */
-static void redundant_hung (pw_model *m, const void *parameter) {
-  (void)parameter;
+SCENE (redundant_hung) {
   pw_add_body (m, &(pw_body){ .name = "sign", .mass = 3, .inertia = 2 });
   pw_add_weld (m, &(pw_weld){ .name = "weld", .body = { "sign", "ground" } });
   pw_add_pin (m, &(pw_pin){ .name = "pin", .body = { "sign", "ground" }, .at = { { 4, 0 }, { 4, 0 } } });
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -10 } });
 }
 
-static void test_moments (void **state) {
-  (void)state;
-  static const pw_plugin_table hung = TRIAL_TABLE (redundant_hung);
-  pw_system *s = scene_system (&hung, NULL);
+TEST (moments) {
+  pw_system *s = scene_system (&redundant_hung_table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", NULL);
   pw_sample x = runs_to (r, 0);
   double L = pw_run_scale (r)->length, W = 30, d = 4, p = W / (2 + d * d / (L * L));
@@ -259,9 +235,8 @@ static void test_moments (void **state) {
 }
 
 /* Two bodies with two common pins: the redundant equation is the one along the line between them. */
-static void redundant_two_pins (pw_model *m, const void *parameter) {
+SCENE (redundant_two_pins) {
   static const char *const name[] = { "one", "two" };
-  (void)parameter;
   for (int i = 0; i < 2; i++)
     pw_add_body (m, &(pw_body){ .name = name[i], .mass = 1, .inertia = 0.1, .rate = { 0, 0, 1 } });
   for (int i = 0; i < 2; i++)
@@ -269,12 +244,10 @@ static void redundant_two_pins (pw_model *m, const void *parameter) {
 }
 
 /* After a restart with this line turned by 90 degrees other equations are redundant. */
-static void test_restart (void **state) {
-  static const pw_plugin_table pins = TRIAL_TABLE (redundant_two_pins);
+TEST (restart) {
   static const double turned[] = { 0, 0, PW_PI / 2, 0, 0, PW_PI / 2 };
-  (void)state;
   char method[40];
-  pw_system *s = scene_system (&pins, NULL);
+  pw_system *s = scene_system (&redundant_two_pins_table, NULL);
   for (int i = 0; runs_method (i, method); i++) {
     pw_error error = { 0 };
     pw_run *r = runs_open (s, method, &(pw_settings){ .step = 0.01, .rtol = 1e-6 });
@@ -285,18 +258,4 @@ static void test_restart (void **state) {
     pw_run_close (r);
   }
   pw_system_free (s);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_parallelogram_twins),
-                                      cmocka_unit_test (test_parallelogram_start),
-                                      cmocka_unit_test (test_drives),
-                                      cmocka_unit_test (test_axle),
-                                      cmocka_unit_test (test_axle_forces),
-                                      cmocka_unit_test (test_frame),
-                                      cmocka_unit_test (test_names),
-                                      cmocka_unit_test (test_kept),
-                                      cmocka_unit_test (test_moments),
-                                      cmocka_unit_test (test_restart) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -30,8 +30,7 @@ static void redundant_tow (pw_model *m, int bolts) {
 REDUNDANT_SCENE (redundant_bolted, redundant_tow (m, 2));
 REDUNDANT_SCENE (redundant_welded, redundant_tow (m, 0));
 
-static void test_bracket (void **state) {
-  (void)state;
+TEST (bracket) {
   static const char *const name[] = { "hull.x", "hull.phi", "load.x", "load.y", "bracket.phi", "hull.omega", NULL };
   double a[REDUNDANT_COORDS], b[REDUNDANT_COORDS];
   redundant_twins (&redundant_bolted_table, &redundant_welded_table, 1, 2e-4, name); /* past one reselection of rows */
@@ -55,8 +54,7 @@ static void redundant_caster (pw_model *m) {
 REDUNDANT_SCENE (redundant_bolted_on_caster, redundant_tow (m, 2); redundant_caster (m));
 REDUNDANT_SCENE (redundant_welded_on_caster, redundant_tow (m, 0); redundant_caster (m));
 
-static void test_caster (void **state) {
-  (void)state;
+TEST (caster) {
   static const char *const name[] = { "hull.x", "hull.phi", "load.x", "load.y", "bracket.phi", "fork.phi", NULL };
   static const char *const method[] = { "erk8+projection", "erk5+projection", "erk8+baumgarte", "ida+ggl", NULL };
   double a[REDUNDANT_COORDS], b[REDUNDANT_COORDS], exact[REDUNDANT_COORDS];
@@ -70,8 +68,7 @@ static void test_caster (void **state) {
 }
 
 /* Pins at points that do not coincide have four independent rows; three of them are selected, and the wheel's row. */
-static void test_drifting_bolts (void **state) {
-  (void)state;
+TEST (drifting_bolts) {
   static const char *const name[] = { "hull.x", "hull.y", "hull.phi", "load.x", "load.y", "fork.phi", NULL };
   double a[REDUNDANT_COORDS], b[REDUNDANT_COORDS];
   redundant_end (&redundant_bolted_on_caster_table, "rk4+none", 0, 3, name, a, 0.004);
@@ -106,17 +103,10 @@ static void redundant_casters (pw_model *m, int wheels) {
 REDUNDANT_SCENE (redundant_four_wheels, redundant_casters (m, 2));
 REDUNDANT_SCENE (redundant_two_wheels, redundant_casters (m, 1));
 
-static void test_casters (void **state) {
-  (void)state;
+TEST (casters) {
   static const char *const name[] = { "cart.x", "cart.y", "cart.phi", "fork1.phi", "fork2.phi", "cart.omega", NULL };
   static const char *const wheels[] = { "wheels left1 and right1: the same lateral constraint",
                                         "wheels left2 and right2: the same lateral constraint", NULL };
   redundant_expect_reports (&redundant_four_wheels_table, wheels);
   redundant_twins (&redundant_four_wheels_table, &redundant_two_wheels_table, 1, 1e-3, name);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_bracket), cmocka_unit_test (test_caster),
-                                      cmocka_unit_test (test_drifting_bolts), cmocka_unit_test (test_casters) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -11,8 +11,7 @@
 /* ---- Passing singular configurations ---- */
 
 /* Two four-bar linkages; all cranks pass the horizontal ten times in 10 s. */
-static void test_four_bar (void **state) {
-  (void)state;
+TEST (four_bar) {
   pw_system *s = scene_named ("n-four-bar", NULL, 0);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 10, .ledger = 1 });
   int passes = 0;
@@ -43,12 +42,11 @@ static void test_four_bar (void **state) {
 }
 
 /* A step that would end at a singular configuration is replaced by a longer one, for all step sizes. */
-static void test_steps_ending_there (void **state) {
+TEST (steps_ending_there) {
   static const struct {
     double cranks, step, t;
     int parts; /* number of samples */
   } steps[] = { { 2, 7.75e-4, 10, 10 }, { 2, 7.842e-4, 10, 1 }, { 5, 1e-4, 1, 10 }, { 40, 3.1e-4, 1.5, 10 } };
-  (void)state;
   for (size_t i = 0; i < sizeof steps / sizeof *steps; i++) {
     double t = steps[i].t, most = 0, before = NAN;
     pw_system *s = scene_named ("n-four-bar", "N", steps[i].cranks);
@@ -65,7 +63,7 @@ static void test_steps_ending_there (void **state) {
 }
 
 /* The same by implicit methods: these steps end at a singular configuration at 1.2, 2.7, 3.2, 5.1 or 6.5 s. */
-static void test_implicit_steps_ending_there (void **state) {
+TEST (implicit_steps_ending_there) {
   static const struct {
     const char *method;
     double step;
@@ -73,7 +71,6 @@ static void test_implicit_steps_ending_there (void **state) {
                 { "galpha+index3", 7.62e-4 }, { "galpha+index3", 7.66333333333e-4 },
                 { "leapfrog", 7.7e-4 },       { "leapfrog", 7.71e-4 } };
   double four = atan2 (0.9445185381786009622, 0.3284581115408153787);
-  (void)state;
   for (size_t i = 0; i < sizeof steps / sizeof *steps; i++) {
     pw_system *s = scene_named ("n-four-bar", NULL, 0);
     pw_run *r = runs_open (s, steps[i].method, &(pw_settings){ .step = steps[i].step, .span = 10 });
@@ -84,10 +81,9 @@ static void test_implicit_steps_ending_there (void **state) {
   }
 }
 
-static void test_slider_crank (void **state) {
+TEST (slider_crank) {
   static const char *const method[] = { "rk4+projection", "rk4+projection:metric=identity", "rk4+none", "rk4+baumgarte",
                                         "rk4+nullspace" };
-  (void)state;
   for (int i = 0; i < 5; i++) {
     pw_system *s = scene_named ("slider-crank", NULL, 0);
     pw_run *r = runs_open (s, method[i], &(pw_settings){ .step = 1e-3, .span = 1, .ledger = 1 });
@@ -121,7 +117,7 @@ static void singular_passes_or_stops (const char *model, const char *method, dou
 }
 
 /* Without the watchdog's criteria for drift, all of these end on another branch with status ok. */
-static void test_turned (void **state) {
+TEST (turned) {
   static const struct {
     const char *method;
     double cranks, rtol;
@@ -131,14 +127,12 @@ static void test_turned (void **state) {
     { "ida+index2", 1, 1e-4 },    { "erk8+none", 1, 1e-5 },  { "erk8+none", 2, 3e-5 }, { "erk5+none", 1, 3e-4 },
   };
   int reported = 0, count = sizeof turns / sizeof *turns;
-  (void)state;
   for (int i = 0; i < count; i++) reported += turns_try (turns[i].method, turns[i].rtol, "n-four-bar", turns[i].cranks);
   assert_true (2 * reported > count);
 }
 
-static void test_ida (void **state) {
+TEST (ida) {
   static const double rtol[] = { 1e-6, 1e-8 };
-  (void)state;
   for (int i = 0; i < 2; i++) {
     double four = atan2 (0.9445185381786009622, 0.3284581115408153787);
     singular_passes_or_stops ("n-four-bar", "ida+ggl", rtol[i], "crank0.phi", 10, four, 2 * PW_PI);
@@ -147,8 +141,7 @@ static void test_ida (void **state) {
 }
 
 /* A four-bar linkage that is initially flat has two branches. */
-static void singular_flat (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (singular_flat) {
   pw_add_body (m,
                &(pw_body){ .name = "left", .mass = 1, .inertia = 0.1, .start = { 0.5, 0, 0 }, .rate = { 0, 0.5, 1 } });
   pw_add_body (m, &(pw_body){ .name = "rod", .mass = 1, .inertia = 0.1, .start = { 1.5, 0, 0 }, .rate = { 0, 1, 0 } });
@@ -160,13 +153,11 @@ static void singular_flat (pw_model *m, const void *parameters) {
   pw_add_pin (m, &(pw_pin){ .name = "D", .body = { "right", "ground" }, .at = { { -0.5, 0 }, { 1, 0 } } });
 }
 
-static void test_flat_start (void **state) {
-  static const pw_plugin_table table = TRIAL_TABLE (singular_flat);
-  (void)state;
+TEST (flat_start) {
   static const char *const method[] = { "rk4+projection", "ida+ggl" };
   for (int i = 0; i < 2; i++) {
     pw_error error = { 0 };
-    pw_system *s = scene_system (&table, NULL);
+    pw_system *s = scene_system (&singular_flat_table, NULL);
     assert_null (pw_run_open (s, method[i], NULL, &error));
     check_error (&error, PW_INITIAL,
                  "model scene: the initial configuration is singular: 7 constraint equations are independent there, 8 "
@@ -188,8 +179,7 @@ static const pw_parameter singular_angle_list[] = {
 };
 
 /* A parallelogram of bars of 1 m. */
-static void singular_rhombus (pw_model *m, const void *parameter) {
-  const singular_angle *p = parameter;
+SCENE_WITH (singular_rhombus, singular_angle_list, singular_angle) {
   double c = cos (p->angle), n = sin (p->angle);
   pw_add_body (m, &(pw_body){ .name = "left", .mass = 1, .inertia = 0.1, .start = { 0.5 * c, 0.5 * n, p->angle } });
   pw_add_body (m, &(pw_body){ .name = "rod", .mass = 1, .inertia = 0.1, .start = { 0.5 + c, n, 0 } });
@@ -202,16 +192,13 @@ static void singular_rhombus (pw_model *m, const void *parameter) {
 }
 
 /* A restart in a singular configuration is refused with the name of a pin; the run continues from its former state. */
-static void test_restart_there (void **state) {
-  static const pw_plugin_table table =
-      TRIAL_TABLE_WITH (singular_rhombus, singular_angle_list, sizeof (singular_angle));
+TEST (restart_there) {
   static const double flat[9] = { 0.5, 0, 0, 1.5, 0, 0, 1.5, 0, 0 }, rest[9] = { 0 };
   static const char *const method[] = { "rk4+projection", "galpha+ggl", "bdf+projection" };
-  (void)state;
   for (int i = 0; i < 3; i++) {
     pw_error error = { 0 };
     char pin = 0;
-    pw_system *s = scene_system (&table, NULL);
+    pw_system *s = scene_system (&singular_rhombus_table, NULL);
     pw_run *r = runs_open (s, method[i], NULL);
     double start[9];
     memcpy (start, pw_run_initial (r)->q, sizeof start);
@@ -228,10 +215,9 @@ static void test_restart_there (void **state) {
 
 /* After a restart, the reference level of accelerations is that of the new state: a linkage accelerated just before a
  * singular configuration passes it like one that arrives at the same speed. */
-static void test_accelerated_by_restart (void **state) {
+TEST (accelerated_by_restart) {
   static const char *const method[] = { "rk4", "leapfrog", "galpha+index3" };
   const double slow = 1.4908, fast = 40, end = 1.5; /* 0.08 rad before it: a step of 2 ms at 40 rad/s */
-  (void)state;
   for (int i = 0; i < 3; i++) {
     pw_error error = { 0 };
     double v[15];
@@ -248,8 +234,7 @@ static void test_accelerated_by_restart (void **state) {
 }
 
 /* A norm is NaN if any entry is NaN. */
-static void test_nan (void **state) {
-  (void)state;
+TEST (nan) {
   pw_system *s = scene_named ("n-four-bar", NULL, 0);
   pw_run *r = runs_open (s, "rk4", NULL);
   for (int j = 0; j < s->coords; j++) {
@@ -270,18 +255,4 @@ static void test_nan (void **state) {
     pw_evaluate_J (r->w);
   }
   runs_close (r, s);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_four_bar),
-                                      cmocka_unit_test (test_implicit_steps_ending_there),
-                                      cmocka_unit_test (test_slider_crank),
-                                      cmocka_unit_test (test_ida),
-                                      cmocka_unit_test (test_flat_start),
-                                      cmocka_unit_test (test_restart_there),
-                                      cmocka_unit_test (test_steps_ending_there),
-                                      cmocka_unit_test (test_turned),
-                                      cmocka_unit_test (test_accelerated_by_restart),
-                                      cmocka_unit_test (test_nan) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

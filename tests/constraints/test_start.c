@@ -13,12 +13,11 @@
 /* ---- Initial values of the settings ---- */
 
 /* Initial values of the settings replace those of the system for this run, with the same result as in the model. */
-static void test_settings (void **state) {
+TEST (settings) {
   static const char *const name[] = { "frame.omega", "steer.phi", NULL };
   static const double value[] = { 0.3, 0.2 };
   pw_system *own, *shared;
   pw_error error = { 0 };
-  (void)state;
   pw_run *expected = start_open (&own, name, value), *plain = start_open (&shared, NULL, NULL);
   pw_initial_value initial[2];
   for (int i = 0; i < 2; i++)
@@ -38,12 +37,11 @@ static void test_settings (void **state) {
   runs_close (expected, own);
 }
 
-static void test_bad_settings (void **state) {
+TEST (bad_settings) {
   static const pw_initial_value bad[] = { { -1, 0 }, { 12, 0 }, { 0, NAN }, { 0, 1e200 } };
   static const char *const expected[] = { "state -1 = 0: expected a state from 0 to 11", "state 12 = 0: expected",
                                           "state 0 = nan: expected",
                                           "values too extreme: frame.x is initially 1e+200" };
-  (void)state;
   pw_system *s = scene_compile (scene_model (&scene_ezyroller, NULL));
   for (int i = 0; i < 4; i++) {
     pw_error error = { 0 };
@@ -56,8 +54,7 @@ static void test_bad_settings (void **state) {
 
 /* ---- Consistent and nearly consistent values ---- */
 
-static void test_consistent_unchanged (void **state) {
-  (void)state;
+TEST (consistent_unchanged) {
   pw_system *s;
   pw_run *r = start_open (&s, NULL, NULL);
   const pw_initial_report *start = pw_run_initial (r);
@@ -68,10 +65,9 @@ static void test_consistent_unchanged (void **state) {
 }
 
 /* All deviations above round-off are corrected and reported. */
-static void test_small_deviation (void **state) {
+TEST (small_deviation) {
   static const char *const name[] = { "steer.x", "frame.vy", NULL };
   static const double value[] = { 0.375 + 1e-10, 1e-10 };
-  (void)state;
   for (int i = 0; i < 2; i++) {
     pw_system *s;
     const char *const one[] = { name[i], NULL };
@@ -82,10 +78,9 @@ static void test_small_deviation (void **state) {
 }
 
 /* Deviations of round-off are corrected without a report. */
-static void test_round_off (void **state) {
+TEST (round_off) {
   static const char *const name[] = { "steer.x", NULL };
   static const double value[] = { 0.375 + 12 * CHECK_EPS };
-  (void)state;
   pw_system *s;
   pw_run *r = start_open (&s, name, value);
   const pw_initial_report *start = pw_run_initial (r);
@@ -96,8 +91,7 @@ static void test_round_off (void **state) {
 }
 
 /* A restart does not change a state reached by a run. */
-static void test_reached_state_unchanged (void **state) {
-  (void)state;
+TEST (reached_state_unchanged) {
   for (double t = 0.25; t <= 2; t += 0.25) {
     double q[6], v[6];
     pw_error error = { 0 };
@@ -117,25 +111,24 @@ static void test_reached_state_unchanged (void **state) {
 
 /* ---- Specified values are kept ---- */
 
+typedef struct {
+  double phi, x, omega, vy, specified;
+} start_given;
+
+static const pw_parameter start_rod_list[] = { { PW_AT (start_given, phi) },       { PW_AT (start_given, x) },
+                                               { PW_AT (start_given, omega) },     { PW_AT (start_given, vy) },
+                                               { PW_AT (start_given, specified) }, { .name = NULL } };
+
 /* A rod on a pin with one or two specified states. */
-static void start_rod (pw_model *m, const void *parameters) {
-  const double *p = parameters;
+SCENE_WITH (start_rod, start_rod_list, start_given) {
   pw_add_body (m, &(pw_body){ .name = "rod",
                               .mass = 1,
                               .inertia = 1. / 12,
-                              .start = { p[1], 0, p[0] },
-                              .rate = { 0, p[3], p[2] },
-                              .specified = (unsigned)p[4] });
+                              .start = { p->x, 0, p->phi },
+                              .rate = { 0, p->vy, p->omega },
+                              .specified = (unsigned)p->specified });
   pw_add_pin (m, &(pw_pin){ .name = "O", .body = { "ground", "rod" }, .at = { { 0 }, { -0.5, 0 } } });
 }
-
-static const pw_parameter start_rod_list[] = { { .name = "phi" },
-                                               { .name = "x", .offset = 8 },
-                                               { .name = "omega", .offset = 16 },
-                                               { .name = "vy", .offset = 24 },
-                                               { .name = "specified", .offset = 32 },
-                                               { .name = NULL } };
-static const pw_plugin_table start_rod_table = TRIAL_TABLE_WITH (start_rod, start_rod_list, 40);
 
 static const pw_initial_report *start_of_rod (pw_system **s, pw_run **r, double phi, double x, double omega, double vy,
                                               double specified) {
@@ -147,10 +140,9 @@ static const pw_initial_report *start_of_rod (pw_system **s, pw_run **r, double 
 }
 
 /* A specified angle and angular velocity are unchanged; omitted values follow. */
-static void test_specified (void **state) {
+TEST (specified) {
   pw_system *s;
   pw_run *r;
-  (void)state;
   const pw_initial_report *start = start_of_rod (&s, &r, PW_PI / 6, 0, 2, 0, 0);
   assert_true (start->q[2] == PW_PI / 6 && start->v[2] == 2 && start->moved == 4 && start->changed == 0);
   check_close ("x", start->q[0], 0.5 * cos (PW_PI / 6), START_ROUND_OFF, START_REASON);
@@ -161,10 +153,9 @@ static void test_specified (void **state) {
 
 /* A specified 0, and x instead of the angle: the angle follows from x = 0.5 cos phi, omega from vy = 0.5 omega cos
  * phi. */
-static void test_specified_zero (void **state) {
+TEST (specified_zero) {
   pw_system *s;
   pw_run *r;
-  (void)state;
   const pw_initial_report *start = start_of_rod (&s, &r, 1.5, 0, 0, 0, PW_SPECIFIES_X);
   assert_true (start->q[0] == 0 && start->changed == 0);
   check_close ("phi", start->q[2], PW_PI / 2, START_ROUND_OFF, START_REASON);
@@ -177,10 +168,9 @@ static void test_specified_zero (void **state) {
 
 /* Specified positions that contradict the pin change as little as possible and are reported; specified velocities
  * are kept. */
-static void test_overspecified (void **state) {
+TEST (overspecified) {
   pw_system *s;
   pw_run *r;
-  (void)state;
   const pw_initial_report *start = start_of_rod (&s, &r, PW_PI / 6, 0.5, 2, 0, 0);
   assert_true (start->released == 0 && start->changed == 2 && start->v[2] == 2);
   assert_true (start->q[2] > 0.1 && start->q[2] < PW_PI / 6 && start->q[0] < 0.5);
@@ -188,9 +178,8 @@ static void test_overspecified (void **state) {
 }
 
 /* Given values take precedence over specified ones. */
-static void test_given_before_specified (void **state) {
+TEST (given_before_specified) {
   pw_error error = { 0 };
-  (void)state;
   pw_model *m = scene_model (&start_rod_table, "phi", PW_PI / 6, NULL);
   check_ok (pw_model_set_initial (m, "rod.y", 0.4, &error), &error);
   pw_system *s = scene_compile (m);
@@ -202,8 +191,8 @@ static void test_given_before_specified (void **state) {
 }
 
 /* A body on two wheels, or in two slots, one behind the other, pinned to an arm without given values. */
-static void start_axles (pw_model *m, const void *parameters) {
-  const int slots = ((const double *)parameters)[4] != 0;
+SCENE_WITH (start_axles, start_rod_list, start_given) {
+  const int slots = p->specified != 0;
   pw_add_body (m, &(pw_body){ .name = "car", .mass = 1, .inertia = 1 });
   pw_add_body (m, &(pw_body){ .name = "arm", .mass = 1, .inertia = 1 });
   for (int i = 0; i < 2; i++) {
@@ -218,13 +207,11 @@ static void start_axles (pw_model *m, const void *parameters) {
 
 /* Given values that satisfy the constraints are kept, though they leave two equations for one unknown: with y, or vy,
  * only the angle, or omega, of the car is left. */
-static void test_given_consistent (void **state) {
-  static const pw_plugin_table table = TRIAL_TABLE_WITH (start_axles, start_rod_list, 40);
+TEST (given_consistent) {
   static const char *const name[2][3] = { { "car.vx", "car.vy", "car.omega" }, { "car.x", "car.y", "car.phi" } };
-  (void)state;
   for (int slots = 0; slots < 2; slots++)
     for (int given = 1; given < 8; given++) {
-      pw_model *m = scene_model (&table, "specified", (double)slots, NULL);
+      pw_model *m = scene_model (&start_axles_table, "specified", (double)slots, NULL);
       for (int j = 0; j < 3; j++)
         if (given >> j & 1) check_ok (pw_model_set_initial (m, name[slots][j], j == 0 ? 10 : 0, NULL), NULL);
       pw_system *s = scene_compile (m);
@@ -236,19 +223,4 @@ static void test_given_consistent (void **state) {
       check_close ("x of the arm", state_of[3], given & 1 ? 10 : 0, 10 * START_ROUND_OFF, START_REASON);
       runs_close (r, s);
     }
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_settings),
-                                      cmocka_unit_test (test_bad_settings),
-                                      cmocka_unit_test (test_consistent_unchanged),
-                                      cmocka_unit_test (test_small_deviation),
-                                      cmocka_unit_test (test_round_off),
-                                      cmocka_unit_test (test_reached_state_unchanged),
-                                      cmocka_unit_test (test_specified),
-                                      cmocka_unit_test (test_specified_zero),
-                                      cmocka_unit_test (test_overspecified),
-                                      cmocka_unit_test (test_given_before_specified),
-                                      cmocka_unit_test (test_given_consistent) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -69,9 +69,8 @@ static void watchdog_measure (int i, double factor, double *t, long *rejected) {
   runs_close (r, s);
 }
 
-static void test_limits (void **state) {
+TEST (limits) {
   int bad = 0;
-  (void)state;
   for (size_t i = 0; i < sizeof watchdog_limit / sizeof *watchdog_limit; i++) {
     double t[2];
     long rejected[2];
@@ -84,8 +83,7 @@ static void test_limits (void **state) {
 }
 
 /* A step that has failed fails again. */
-static void test_again (void **state) {
-  (void)state;
+TEST (again) {
   pw_error first = { 0 }, second = { 0 };
   pw_system *s = scene_named ("n-four-bar", NULL, 0);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 4 });
@@ -109,8 +107,7 @@ static void watchdog_bend (pw_run *r, double angle) {
 }
 
 /* The state reached is examined, not that at which the run's matrix was factorised last. */
-static void test_near_state (void **state) {
-  (void)state;
+TEST (near_state) {
   static const char *const method[] = { "rk4+projection", "erk5+projection" };
   for (int i = 0; i < 2; i++) {
     pw_system *s = scene_system (&bars_table, NULL);
@@ -124,8 +121,7 @@ static void test_near_state (void **state) {
 }
 
 /* A tree of joints has no singular configuration: the sine is 1, without a row. */
-static void test_tree (void **state) {
-  (void)state;
+TEST (tree) {
   int row = 7;
   pw_system *s = scene_named ("pendulum", NULL, 0);
   pw_run *r = runs_open (s, "rk4+projection", NULL);
@@ -163,8 +159,7 @@ static double watchdog_projected (pw_run *r, double angle) {
   return most;
 }
 
-static void test_evaluations (void **state) {
-  (void)state;
+TEST (evaluations) {
   pw_system *s = scene_system (&bars_table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", NULL);
   const double angle = 1e-4;
@@ -182,8 +177,7 @@ static void test_evaluations (void **state) {
   runs_close (r, s);
 }
 
-static void test_jump (void **state) {
-  (void)state;
+TEST (jump) {
   pw_system *s = scene_named ("chaplygin-sleigh", NULL, 0);
   pw_run *r = runs_open (s, "rk4+projection", NULL);
   pw_error error = { 0 };
@@ -199,8 +193,7 @@ static void test_jump (void **state) {
 }
 
 /* A redundant row whose residual is the largest does not contradict the others if theirs are of the same size. */
-static void test_drift (void **state) {
-  (void)state;
+TEST (drift) {
   pw_error error = { 0 };
   char row[120];
   pw_system *s = scene_named ("redundant-parallelogram", NULL, 0);
@@ -217,8 +210,7 @@ static void test_drift (void **state) {
   runs_close (r, s);
 }
 
-static void test_masses (void **state) {
-  (void)state;
+TEST (masses) {
   pw_error error = { 0 };
   pw_system *s = scene_named ("n-four-bar", "m", 0.7 * pw_watchdog_limits.extreme);
   pw_run *r = runs_open (s, "rk4+projection", NULL);
@@ -237,23 +229,13 @@ static void watchdog_build_disc (pw_model *m, const void *parameter) {
                                   .value = { .constant = *(const double *)parameter } });
 }
 
-static void test_acceleration_norm (void **state) {
+TEST (acceleration_norm) {
   static const pw_parameter list[] = { { .name = "torque", .value = 1 }, { .name = NULL } };
-  static const pw_plugin_table table = TRIAL_TABLE_WITH (watchdog_build_disc, list, sizeof (double));
-  (void)state;
+  static const pw_plugin_table table = SCENE_TABLE_WITH (watchdog_build_disc, list, sizeof (double));
   for (int k = 0; k <= 6; k += 2) {
     pw_system *s = scene_system (&table, "torque", pow (10, k), NULL);
     pw_run *r = runs_open (s, "rk4+projection", NULL);
     check_close ("acceleration norm", pw_run_acceleration_norm (r), 1, 16 * CHECK_EPS, "round-off");
     runs_close (r, s);
   }
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_limits), cmocka_unit_test (test_evaluations),
-                                      cmocka_unit_test (test_jump),   cmocka_unit_test (test_acceleration_norm),
-                                      cmocka_unit_test (test_masses), cmocka_unit_test (test_near_state),
-                                      cmocka_unit_test (test_tree),   cmocka_unit_test (test_drift),
-                                      cmocka_unit_test (test_again) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -25,8 +25,7 @@ static const pw_parameter watchdog_cart_list[] = {
   { .name = NULL },
 };
 
-static void watchdog_build_cart (pw_model *m, const void *parameter) {
-  const watchdog_cart *p = parameter;
+SCENE_WITH (watchdog_build_cart, watchdog_cart_list, watchdog_cart) {
   double cart = p->cart * p->scale;
   pw_add_body (m, &(pw_body){ .name = "cart", .mass = cart, .inertia = cart });
   pw_add_body (m, &(pw_body){ .name = "bob", .mass = p->scale, .start = { cos (p->phi), sin (p->phi), p->phi } });
@@ -34,9 +33,6 @@ static void watchdog_build_cart (pw_model *m, const void *parameter) {
   pw_add_pin (m, &(pw_pin){ .name = "hinge", .body = { "bob", "cart" }, .at = { { -1, 0 }, { 0, 0 } } });
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 } });
 }
-
-static const pw_plugin_table watchdog_cart_table =
-    TRIAL_TABLE_WITH (watchdog_build_cart, watchdog_cart_list, sizeof (watchdog_cart));
 
 /* ---- Regular scenes with very different masses ---- */
 
@@ -66,18 +62,17 @@ static double watchdog_angle (double cart, double t) {
 }
 
 static void watchdog_try_cart (const char *method, double cart, double scale, double exact, double bound) {
-  pw_system *s = scene_system (&watchdog_cart_table, "cart", cart, "scale", scale, NULL);
+  pw_system *s = scene_system (&watchdog_build_cart_table, "cart", cart, "scale", scale, NULL);
   pw_run *r = runs_open (s, method, &(pw_settings){ .rtol = 1e-9, .span = 10 });
   pw_sample x = runs_to (r, 10);
   check_close (method, trial_state (s, &x, "cart.x"), (1 - cos (exact)) / (1 + cart), bound, "1e4 rtol");
   runs_close (r, s);
 }
 
-static void test_nearly_massless_cart (void **state) {
+TEST (nearly_massless_cart) {
   static const char *const method[] = { "erk5+projection", "erk8+projection", "erk8+nullspace", "ida+ggl",
                                         "bdf+projection" };
   static const double cart[] = { 1e-6, 1e-3 };
-  (void)state;
   check_close ("quadrature", (double)watchdog_time (1e-6L / (1 + 1e-6L), 1.57079632679489661923L), 0.45152453568165885,
                1e-12, "QUADPACK");
   for (size_t k = 0; k < sizeof cart / sizeof *cart; k++) {
@@ -89,8 +84,7 @@ static void test_nearly_massless_cart (void **state) {
 }
 
 /* The sine is a property of J: it depends neither on masses nor on the initial configuration. */
-static void test_sine (void **state) {
-  (void)state;
+TEST (sine) {
   double sine[3];
   static const double mass[] = { 1, 1e-8, 1e8 };
   for (int i = 0; i < 3; i++) {
@@ -134,10 +128,9 @@ static const struct {
 enum { WATCHDOG_RUNS = sizeof watchdog_runs / sizeof *watchdog_runs };
 
 /* The rod of a slider-crank, if longer than the crank, points backwards only on the wrong branch. */
-static void test_close_branches_slider_crank (void **state) {
+TEST (close_branches_slider_crank) {
   static const double l2[] = { 1.00000001, 1.000003, 1.00001, 1.0001 };
   int reported = 0, finished = 0;
-  (void)state;
   for (size_t k = 0; k < sizeof l2 / sizeof *l2; k++)
     for (int i = 0; i < WATCHDOG_RUNS; i++) {
       pw_error error = { 0 };
@@ -154,7 +147,7 @@ static void test_close_branches_slider_crank (void **state) {
 }
 
 /* Each run agrees with one of high accuracy, or stops. */
-static void test_close_branches_four_bar (void **state) {
+TEST (close_branches_four_bar) {
   static const struct {
     double a, b, c, d, g;
   } bars[] = { { 1, 1.00001, 1, 1, 0 },
@@ -163,7 +156,6 @@ static void test_close_branches_four_bar (void **state) {
                { 1, 1, 2.0001, 2, 0 },
                { 2, 1, 2.00001, 1, 9.81 } };
   int reported = 0;
-  (void)state;
   for (size_t k = 0; k < sizeof bars / sizeof *bars; k++) {
     pw_error none = { 0 };
     double exact[3];
@@ -184,9 +176,8 @@ static void test_close_branches_four_bar (void **state) {
 }
 
 /* Nothing is reported where branches cross, or where they are far apart. */
-static void test_no_change_point (void **state) {
+TEST (no_change_point) {
   static const struct { double a, b, c, d; } bars[] = { { 1, 1, 1, 1 }, { 1, 2, 1, 2 }, { 1, 2.5, 2, 2 } };
-  (void)state;
   for (size_t k = 0; k < sizeof bars / sizeof *bars; k++) {
     pw_system *s = scene_system (&bars_table, "a", bars[k].a, "b", bars[k].b, "c", bars[k].c, "d", bars[k].d, NULL);
     for (int i = 0; i < WATCHDOG_RUNS - 2; i++) {
@@ -215,8 +206,7 @@ static void watchdog_bars_at (double phi, int crossed, double *q) {
 }
 
 /* Branches cross twice within a step: the motion must stay on its branch at the second crossing, too. */
-static void test_two_crossings (void **state) {
-  (void)state;
+TEST (two_crossings) {
   for (int crossed = 0; crossed < 2; crossed++) {
     pw_error error = { 0 };
     pw_system *s = scene_system (&bars_table, "b", watchdog_bar, "d", watchdog_bar, NULL);
@@ -253,8 +243,7 @@ static void watchdog_build_disc (pw_model *m, const void *parameters) {
   pw_add_torque (m, &torque);
 }
 
-static void test_fast_disc (void **state) {
-  (void)state;
+TEST (fast_disc) {
   pw_plugin_table table = bars_table;
   table.build = watchdog_build_disc;
   pw_error error = { 0 };
@@ -286,8 +275,7 @@ static void watchdog_build_failing (pw_model *m, const void *parameters) {
 }
 
 /* A later error does not mention this failure. */
-static void test_failing_signal (void **state) {
-  (void)state;
+TEST (failing_signal) {
   pw_error error = { 0 };
   pw_plugin_table table = bars_table;
   watchdog_valid = 0.2;
@@ -326,9 +314,8 @@ static void watchdog_expect (const char *model, const char *parameter, double va
   pw_system_free (s);
 }
 
-static void test_messages (void **state) {
+TEST (messages) {
   static const char *const drifting[] = { "ida+none", "adams+none", "bdf+none", "erk5+none", "adams+baumgarte" };
-  (void)state;
   for (size_t i = 0; i < sizeof drifting / sizeof *drifting; i++)
     for (double rtol = 1e-3; rtol > 5e-6; rtol /= 10)
       watchdog_expect ("pendulum", NULL, 0, drifting[i], rtol, 100, rtol > 5e-4 && i < 4 ? "constraint drift" : NULL);
@@ -348,7 +335,7 @@ static void watchdog_build_small (pw_model *m, const void *parameter) {
 /* The bounds in the message are in the units of the value, which is outside them. */
 static void watchdog_try_inertia (double inertia) {
   static const pw_parameter list[] = { { .name = "inertia", .value = 1 }, { .name = NULL } };
-  static const pw_plugin_table table = TRIAL_TABLE_WITH (watchdog_build_small, list, sizeof (double));
+  static const pw_plugin_table table = SCENE_TABLE_WITH (watchdog_build_small, list, sizeof (double));
   double value, low, high;
   pw_error error = { 0 };
   pw_system *s = scene_system (&table, "inertia", inertia, NULL);
@@ -360,11 +347,10 @@ static void watchdog_try_inertia (double inertia) {
   pw_system_free (s);
 }
 
-static void test_extreme (void **state) {
+TEST (extreme) {
   static const double mass[] = { 1e200, 1e-200 };
   pw_error error = { 0 }, beyond = { 0 };
-  (void)state;
-  pw_system *far = scene_system (&watchdog_cart_table, "phi", 1e308, NULL);
+  pw_system *far = scene_system (&watchdog_build_cart_table, "phi", 1e308, NULL);
   assert_null (pw_run_open (far, "bdf", NULL, &beyond));
   check_error (&beyond, PW_INPUT,
                "model scene: values too extreme: bob.phi is initially 1e+308: expected a magnitude below 1e+100");
@@ -379,24 +365,10 @@ static void test_extreme (void **state) {
     assert_non_null (strstr (refused.text, "values too extreme: the mass or inertia that goes with crank0.x is"));
     pw_system_free (s);
   }
-  pw_system *s = scene_system (&watchdog_cart_table, "cart", 1e-15, "phi", -PW_PI / 2, NULL);
+  pw_system *s = scene_system (&watchdog_build_cart_table, "cart", 1e-15, "phi", -PW_PI / 2, NULL);
   pw_run *r = pw_run_open (s, "rk4+projection", NULL, &error);
   if (r) pw_run_advance_to (r, 1, 1, &error);
   assert_int_equal (error.status, PW_METHOD);
   assert_non_null (strstr (error.text, "values too extreme: masses and inertias differ"));
   runs_close (r, s);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_nearly_massless_cart),
-                                      cmocka_unit_test (test_sine),
-                                      cmocka_unit_test (test_close_branches_slider_crank),
-                                      cmocka_unit_test (test_close_branches_four_bar),
-                                      cmocka_unit_test (test_no_change_point),
-                                      cmocka_unit_test (test_two_crossings),
-                                      cmocka_unit_test (test_fast_disc),
-                                      cmocka_unit_test (test_failing_signal),
-                                      cmocka_unit_test (test_messages),
-                                      cmocka_unit_test (test_extreme) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -26,8 +26,7 @@ static const pw_parameter description_list[] = {
   { .name = NULL },
 };
 
-static void description_build (pw_model *m, const void *parameters) {
-  const description_parameters *p = parameters;
+SCENE_WITH (description, description_list, description_parameters) {
   if (p->links > 5) pw_model_refuse (m, "links = %g: at most %d", p->links, 5);
   pw_add_body (
       m,
@@ -35,11 +34,7 @@ static void description_build (pw_model *m, const void *parameters) {
   pw_add_body (m, &(pw_body){ .name = "steer", .mass = 1, .inertia = 1 });
 }
 
-static const pw_plugin_table description_table =
-    TRIAL_TABLE_WITH (description_build, description_list, sizeof (description_parameters));
-
-static void test_parameters (void **state) {
-  (void)state;
+TEST (parameters) {
   pw_system *s = scene_system (&description_table, NULL);
   assert_true (s->q0[0] == 2 && s->mass[0] == 3); /* the defaults */
   pw_system_free (s);
@@ -57,8 +52,7 @@ static void description_not_set (const char *name, double value, const char *tex
   pw_model_free (m);
 }
 
-static void test_bad_parameters (void **state) {
-  (void)state;
+TEST (bad_parameters) {
   description_not_set ("lenght", 1, "model cart has no parameter \"lenght\"; did you mean \"length\"?");
   description_not_set ("length", NAN, "model cart: parameter length = nan: expected a finite number");
   description_not_set ("length", INFINITY, "model cart: parameter length = inf: expected a finite number");
@@ -67,9 +61,8 @@ static void test_bad_parameters (void **state) {
   description_not_set ("links", 1.5, "model cart: parameter links = 1.5: expected a whole number >= 1");
 }
 
-static void test_no_parameters (void **state) {
-  (void)state;
-  pw_plugin_table table = TRIAL_TABLE (description_build);
+TEST (no_parameters) {
+  pw_plugin_table table = SCENE_TABLE (description);
   pw_error error = { 0 };
   pw_model *m = pw_model_new ("cart", &table, &error);
   assert_int_equal (pw_model_set (m, "length", 1, &error), PW_INPUT);
@@ -77,8 +70,7 @@ static void test_no_parameters (void **state) {
   pw_model_free (m);
 }
 
-static void test_refused (void **state) {
-  (void)state;
+TEST (refused) {
   pw_error error = { 0 };
   pw_model *m = pw_model_new ("cart", &description_table, &error);
   check_ok (pw_model_set (m, "links", 7, &error), &error);
@@ -87,18 +79,17 @@ static void test_refused (void **state) {
   pw_model_free (m);
 }
 
-static void test_bad_tables (void **state) {
-  (void)state;
+TEST (bad_tables) {
   pw_error error = { 0 };
   pw_plugin_table table = description_table;
-  char text[200];
   table.abi = PW_ABI + 6;
   assert_null (pw_model_new ("cart", &table, &error));
-  snprintf (text, sizeof text,
-            "model cart was compiled for another Pinwheel (ABI %d, this one has %d; table of %zu bytes, here %zu): "
-            "recompile it",
-            PW_ABI + 6, PW_ABI, sizeof table, sizeof table);
-  check_error (&error, PW_INPUT, text);
+  check_error (
+      &error, PW_INPUT,
+      check_text (
+          "model cart was compiled for another Pinwheel (ABI %d, this one has %d; table of %zu bytes, here %zu): "
+          "recompile it",
+          PW_ABI + 6, PW_ABI, sizeof table, sizeof table));
   table = description_table;
   table.build = NULL;
   error.status = PW_OK;
@@ -106,8 +97,7 @@ static void test_bad_tables (void **state) {
   check_error (&error, PW_INPUT, "model cart has no build function: PW_MODEL (...) at its end must set .build");
 }
 
-static void test_order_of_calls (void **state) {
-  (void)state;
+TEST (order_of_calls) {
   pw_error error = { 0 };
   pw_model *m = pw_model_new ("cart", &description_table, &error);
   assert_null (pw_system_compile (m, &error));
@@ -123,8 +113,7 @@ static void test_order_of_calls (void **state) {
 }
 
 /* NULL, the result of a failed call, is an error of every function that takes it. */
-static void test_missing (void **state) {
-  (void)state;
+TEST (missing) {
   pw_error e[] = { { 0 }, { 0 }, { 0 }, { 0 }, { 0 }, { 0 } };
   assert_int_equal (pw_model_set (NULL, "length", 1, &e[0]), PW_INPUT);
   assert_int_equal (pw_model_build (NULL, &e[1]), PW_INPUT);
@@ -138,8 +127,7 @@ static void test_missing (void **state) {
   check_error (&e[5], PW_INPUT, "a model file is missing");
 }
 
-static void test_missing_system (void **state) {
-  (void)state;
+TEST (missing_system) {
   pw_error e[6] = { { 0 } };
   double q[3] = { 0 };
   pw_equations equations;
@@ -159,26 +147,21 @@ static void test_missing_system (void **state) {
   pw_model_free (m);
 }
 
-static void description_add_no_body (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (description_add_no_body) {
   pw_add_body (m, NULL);
 }
 
-static void description_add_no_pin (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (description_add_no_pin) {
   pw_add_pin (m, NULL);
 }
 
-static void test_missing_definitions (void **state) {
-  (void)state;
-  static void (*const build[]) (pw_model * m, const void *parameters) = { description_add_no_body,
-                                                                          description_add_no_pin };
+TEST (missing_definitions) {
+  static const pw_plugin_table *const table[] = { &description_add_no_body_table, &description_add_no_pin_table };
   static const char *const text[] = { "model cart: pw_add_body without a body",
                                       "model cart: pw_add of element type pin without a definition" };
   for (int i = 0; i < 2; i++) {
-    pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = build[i] };
     pw_error error = { 0 };
-    pw_model *m = pw_model_new ("cart", &table, &error);
+    pw_model *m = pw_model_new ("cart", table[i], &error);
     assert_int_equal (pw_model_build (m, &error), PW_INPUT);
     check_error (&error, PW_INPUT, text[i]);
     pw_model_free (m);
@@ -195,8 +178,7 @@ static void description_no_signal (const char *element, const char *field, const
   pw_model_free (m);
 }
 
-static void test_bad_set_signal (void **state) {
-  (void)state;
+TEST (bad_set_signal) {
   description_no_signal ("ridder", "value", "model ezyroller has no element \"ridder\"; did you mean \"rider\"?");
   description_no_signal ("rider", "values",
                          "model ezyroller: torque rider has no signal \"values\"; did you mean \"value\"?");
@@ -218,8 +200,7 @@ static const pw_kind description_kind = {
   .name = "pair", .definition = sizeof (description_pair), .fields = description_fields, .bodies = 1, .signals = 2
 };
 
-static void test_set_one_of_two (void **state) {
-  (void)state;
+TEST (set_one_of_two) {
   pw_error error = { 0 };
   pw_model *m = scene_model (&scene_ezyroller, NULL);
   pw_add (m, &description_kind, &(description_pair){ "pair", "frame", { { .constant = 1 }, { .constant = 2 } } });
@@ -234,8 +215,7 @@ static void test_set_one_of_two (void **state) {
   pw_model_free (m);
 }
 
-static void test_initial (void **state) {
-  (void)state;
+TEST (initial) {
   pw_error error = { 0 };
   pw_model *m = scene_model (&scene_ezyroller, NULL);
   check_ok (pw_model_set_initial (m, "frame.phi", 0.5, &error), &error);
@@ -248,8 +228,7 @@ static void test_initial (void **state) {
   pw_system_free (s);
 }
 
-static void test_bad_initial (void **state) {
-  (void)state;
+TEST (bad_initial) {
   pw_error error = { 0 };
   pw_model *m = scene_model (&scene_ezyroller, NULL);
   assert_int_equal (pw_model_set_initial (m, "frame.phi", NAN, &error), PW_INPUT);
@@ -261,8 +240,7 @@ static void test_bad_initial (void **state) {
 
 /* ---- Names and sizes in the compiled system ---- */
 
-static void test_query (void **state) {
-  (void)state;
+TEST (query) {
   pw_system *s = scene_system (&scene_ezyroller, NULL);
   char text[100];
   assert_int_equal (pw_system_bodies (s), 2);
@@ -298,8 +276,7 @@ static void description_no_state (const pw_system *s, const char *name, const ch
   check_error (&error, PW_INPUT, text);
 }
 
-static void test_bad_query (void **state) {
-  (void)state;
+TEST (bad_query) {
   pw_system *s = scene_system (&scene_ezyroller, NULL);
   description_no_state (s, "steer.omga", "model ezyroller has no state \"steer.omga\"; did you mean \"steer.omega\"?");
   description_no_state (s, "ster.phi", "model ezyroller has no state \"ster.phi\"; did you mean \"steer.phi\"?");
@@ -308,8 +285,7 @@ static void test_bad_query (void **state) {
 }
 
 /* Names of internal coordinates and losses of elements. */
-static void test_internal_coordinates (void **state) {
-  (void)state;
+TEST (internal_coordinates) {
   pw_model *m = scene_model (&description_table, NULL);
   pw_add (m, &toy_kind_roller,
           &(toy_roller){ .name = "left", .body = "frame", .at = { 0, 1 }, .radius = 0.1, .inertia = 0.2 });
@@ -342,8 +318,7 @@ static int description_spin (void *context, double t, const double *x, double va
 }
 
 /* The description may be changed after it has been handed over: the model keeps copies. */
-static void test_copies (void **state) {
-  (void)state;
+TEST (copies) {
   char body[] = "cart", name[] = "W", read[] = "cart.omega";
   const char *reads[] = { read, NULL };
   pw_model *m = scene_model (&description_table, NULL);
@@ -365,8 +340,7 @@ static void test_copies (void **state) {
 }
 
 /* Reactions are found by their names. */
-static void test_find_reaction (void **state) {
-  (void)state;
+TEST (find_reaction) {
   pw_system *s = scene_system (&scene_ezyroller, NULL);
   char name[40];
   for (int row = 0; row < pw_system_rows (s); row++)
@@ -378,19 +352,4 @@ static void test_find_reaction (void **state) {
   assert_int_equal (pw_system_find_reaction (s, NULL, &error), PW_INPUT);
   check_error (&error, PW_INPUT, "model ezyroller: the name of a reaction is missing");
   pw_system_free (s);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_parameters),          cmocka_unit_test (test_bad_parameters),
-    cmocka_unit_test (test_no_parameters),       cmocka_unit_test (test_refused),
-    cmocka_unit_test (test_bad_tables),          cmocka_unit_test (test_order_of_calls),
-    cmocka_unit_test (test_bad_set_signal),      cmocka_unit_test (test_initial),
-    cmocka_unit_test (test_bad_initial),         cmocka_unit_test (test_query),
-    cmocka_unit_test (test_bad_query),           cmocka_unit_test (test_internal_coordinates),
-    cmocka_unit_test (test_find_reaction),       cmocka_unit_test (test_copies),
-    cmocka_unit_test (test_missing_system),      cmocka_unit_test (test_missing),
-    cmocka_unit_test (test_missing_definitions), cmocka_unit_test (test_set_one_of_two),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

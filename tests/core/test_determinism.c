@@ -41,16 +41,14 @@ enum {
 
 static pw_file *same_file[SAME_SCENES];
 
-static int same_setup (void **state) {
-  (void)state;
+static int same_setup (void) {
   pw_error error = { 0 };
   for (int i = 0; i < SAME_SCENES; i++)
     if ((same_file[i] = pw_file_open (same_scenes[i].scene, &error)) == NULL) check_ok (error.status, &error);
   return 0;
 }
 
-static int same_teardown (void **state) {
-  (void)state;
+static int same_teardown (void) {
   for (int i = 0; i < SAME_SCENES; i++) pw_file_close (same_file[i]);
   return 0;
 }
@@ -121,16 +119,14 @@ static void same_expect (int run, uint64_t hash, const char *what) {
 /* ---- Tests ---- */
 
 /* All hashes differ: they distinguish the runs. */
-static void test_hashes (void **state) {
-  (void)state;
+TEST (hashes) {
   const uint64_t *hash = same_reference ();
   for (int i = 0; i < SAME_RUNS; i++)
     for (int k = 0; k < i; k++) assert_true (hash[i] != hash[k]);
 }
 
 /* In reverse order, with memory that is not zero. */
-static void test_again (void **state) {
-  (void)state;
+TEST (again) {
   for (int i = SAME_RUNS - 1; i >= 0; i--) {
     pw_error error = { 0 };
     void *used[20];
@@ -142,8 +138,7 @@ static void test_again (void **state) {
 }
 
 /* A run does not depend on earlier ones of the same system. */
-static void test_used_system (void **state) {
-  (void)state;
+TEST (used_system) {
   for (int scene = 0; scene < SAME_SCENES; scene++) {
     pw_error error = { 0 };
     pw_system *s = same_system (scene, &error);
@@ -190,16 +185,14 @@ static void same_threads (const pw_system *const *shared, const char *what) {
   }
 }
 
-static void test_threads (void **state) {
-  (void)state;
+TEST (threads) {
   same_threads (NULL, "in a thread");
 }
 
 /* All threads run all methods at once on one compiled system of each scene, which no run modifies. */
-static void test_shared_system (void **state) {
+TEST (shared_system) {
   pw_system *s[SAME_SCENES];
   const pw_system *shared[SAME_SCENES];
-  (void)state;
   for (int i = 0; i < SAME_SCENES; i++) {
     pw_error error = { 0 };
     shared[i] = s[i] = same_system (i, &error);
@@ -209,9 +202,4 @@ static void test_shared_system (void **state) {
   for (int i = 0; i < SAME_SCENES; i++) pw_system_free (s[i]);
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_hashes), cmocka_unit_test (test_again),
-                                      cmocka_unit_test (test_used_system), cmocka_unit_test (test_threads),
-                                      cmocka_unit_test (test_shared_system) };
-  return cmocka_run_group_tests_name ("determinism", tests, same_setup, same_teardown);
-}
+const check_fixture fixture = { same_setup, same_teardown };

@@ -35,12 +35,11 @@ static int embed_torque (void *context, double t, const double *x, double value[
   return 0;
 }
 
-static void test_embed (void **state) {
+TEST (embed) {
   static const char *const reads[] = { "frame.omega", "steer.omega", NULL };
   const pw_signal torque = { PW_FUNCTION, .function = { .eval = embed_torque, .reads = reads } };
   pw_error error = { 0 };
-  char command[300], printed[300], expected[300];
-  (void)state;
+  char command[300], printed[300];
   snprintf (command, sizeof command, "'%s/docs/embed'", embed_build ());
   assert_int_equal (embed_run (command, printed, sizeof printed), 0);
   pw_model *m = scene_model (&scene_ezyroller, "a", 0.6, NULL);
@@ -48,14 +47,12 @@ static void test_embed (void **state) {
   pw_system *s = scene_compile (m);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3 });
   pw_sample now = runs_to (r, 10);
-  snprintf (expected, sizeof expected, "frame at t = %g s: x = %.6f m, y = %.6f m, phi = %.6f rad\n", now.t, now.q[0],
-            now.q[1], now.q[2]);
-  assert_string_equal (printed, expected);
+  assert_string_equal (printed, check_text ("frame at t = %g s: x = %.6f m, y = %.6f m, phi = %.6f rad\n", now.t,
+                                            now.q[0], now.q[1], now.q[2]));
   runs_close (r, s);
 }
 
-static void test_layers (void **state) {
-  (void)state;
+TEST (layers) {
 #if defined(__SANITIZE_ADDRESS__)
   skip (); /* the libraries also need that of the sanitizer */
 #else
@@ -70,10 +67,9 @@ static void test_layers (void **state) {
 }
 
 /* What a failed call returned is refused by the next one. */
-static void test_null (void **state) {
+TEST (null) {
   pw_error e[6] = { { 0 } };
   pw_page page;
-  (void)state;
   pw_system *s = scene_compile (scene_model (&scene_ezyroller, "a", 0.6, NULL));
   assert_null (pw_csv_open (NULL, 0, NULL, &e[0]));
   check_error (&e[0], PW_INPUT, "a system is missing");
@@ -100,8 +96,7 @@ static void test_null (void **state) {
 
 /* A compiler that writes no object is reported, and tolerated without a place for the report.  Changes the environment:
  * the last test. */
-static void test_no_object (void **state) {
-  (void)state;
+TEST (no_object) {
   pw_error error = { 0 };
   pw_system *s = scene_compile (scene_model (&scene_ezyroller, "a", 0.6, NULL));
   char *text = pw_system_source (s, NULL, NULL);
@@ -113,10 +108,4 @@ static void test_no_object (void **state) {
   check_error (&error, PW_RESOURCE, "the compiler has written no object");
   free (text);
   pw_system_free (s);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_embed), cmocka_unit_test (test_null),
-                                      cmocka_unit_test (test_layers), cmocka_unit_test (test_no_object) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

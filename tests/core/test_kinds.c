@@ -27,20 +27,16 @@ static void kinds_pass (const pw_kind *const *kinds) {
     assert_true (report.checks >= (pw_kind_acts (*kinds) ? 5 : 4));
     for (int i = 0; i < report.checks; i++) {
       const pw_selftest_check *c = &report.check[i];
-      char what[100];
-      snprintf (what, sizeof what, "%s %s", (*kinds)->name, c->name);
-      check_below (what, c->error, c->bound, c->reason);
+      check_below (check_text ("%s %s", (*kinds)->name, c->name), c->error, c->bound, c->reason);
     }
   }
 }
 
-static void test_built_in (void **state) {
-  (void)state;
+TEST (built_in) {
   kinds_pass (pw_kinds);
 }
 
-static void test_plug_in (void **state) {
-  (void)state;
+TEST (plug_in) {
   kinds_pass (toy_kinds);
 }
 
@@ -109,8 +105,7 @@ static void kinds_break (const pw_kind *kind) {
   }
 }
 
-static void test_broken (void **state) {
-  (void)state;
+TEST (broken) {
   for (const pw_kind *const *k = pw_kinds; *k; k++) kinds_break (*k);
   for (const pw_kind *const *k = toy_kinds; *k; k++) kinds_break (*k);
 }
@@ -135,9 +130,8 @@ static void kinds_long (const pw_batch *b, double *out) {
   out[b->count * 2 * b->cols] = 0;
 }
 
-static void test_sizes (void **state) {
+TEST (sizes) {
   static pw_batch_function *const wrong[] = { kinds_first_only, kinds_short, kinds_long };
-  (void)state;
   kinds_original = pw_kind_pin.J;
   for (int i = 0; i < 3; i++) {
     pw_kind broken = pw_kind_pin;
@@ -147,9 +141,8 @@ static void test_sizes (void **state) {
 }
 
 /* A missing saturation, and one a thousand times too wide. */
-static void test_saturation (void **state) {
+TEST (saturation) {
   int kinds = 0;
-  (void)state;
   for (const pw_kind *const *k = pw_kinds; *k; k++) {
     if ((*k)->saturation == NULL) continue;
     pw_kind broken = **k;
@@ -185,8 +178,7 @@ static const pw_quantity kinds_long_name[] = { { "x", "N", NULL, "" }, { KINDS_5
 static const pw_quantity kinds_line[] = { { "x", "N\n", NULL, "" }, { KINDS_50, "N", NULL, "" } };
 static const pw_field kinds_latin1[] = { { .name = "m\xF6", .offset = 8, .type = PW_NUMBER }, { .name = NULL } };
 
-static void test_faults (void **state) {
-  (void)state;
+TEST (faults) {
 #define KINDS_FAULT(member, value, text) \
   do {                                   \
     pw_kind broken = pw_kind_pin;        \
@@ -229,8 +221,7 @@ static void test_faults (void **state) {
 /* ---- Further checks ---- */
 
 /* J v of a wheel is the lateral velocity of its contact point, by differences of `contact`. */
-static void test_wheel_contact (void **state) {
-  (void)state;
+TEST (wheel_contact) {
   for (uint64_t seed = 1; seed <= 20; seed++) {
     pw_error error = { 0 };
     pw_random random = { seed };
@@ -272,20 +263,11 @@ static int kinds_refuse (const void *definition, const pw_body *const *bodies, v
   return pw_fail (error, PW_INPUT, "nothing suits me");
 }
 
-static void test_refused (void **state) {
-  (void)state;
+TEST (refused) {
   pw_kind broken = pw_kind_pin;
   broken.prepare = kinds_refuse;
   pw_selftest_report report = { 0 };
   pw_error error = { 0 };
   assert_int_equal (pw_selftest (&broken, 1, &report, &error), PW_INPUT);
   check_error (&error, PW_INPUT, "model pin: pin e0: nothing suits me");
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_built_in),      cmocka_unit_test (test_plug_in),
-                                      cmocka_unit_test (test_broken),        cmocka_unit_test (test_sizes),
-                                      cmocka_unit_test (test_faults),        cmocka_unit_test (test_saturation),
-                                      cmocka_unit_test (test_wheel_contact), cmocka_unit_test (test_refused) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

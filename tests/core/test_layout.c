@@ -165,7 +165,7 @@ static unsigned long long layout_of (const pw_kind *k) {
 }
 
 /* Enter a new element type here, too; PW_ABI stays. */
-static void test_definitions (void **state) {
+TEST (definitions) {
   static const struct {
     const char *kind;
     unsigned long long layout;
@@ -183,7 +183,6 @@ static void test_definitions (void **state) {
     { "force", 0xbc29b0bbfe5b6a71 },         { "torque", 0xc52ae040b1e51021 },
     { "motor", 0x4b2d8f0773cca89 },          { "marker", 0xa45ad3f1c6e75b4a },
   };
-  (void)state;
   int bad = 0;
   for (const pw_kind *const *k = pw_kinds; *k; k++) {
     size_t i = 0;
@@ -198,15 +197,9 @@ static void test_definitions (void **state) {
 
 #else
 
-static void test_definitions (void **state) {
-  (void)state;
+TEST (definitions) {
   print_message ("no layout is known for ABI %d on this machine\n", PW_ABI);
   skip ();
 }
 
 #endif
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_definitions) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
-}

@@ -35,24 +35,18 @@ static void locale_write (const char *model, const char *name) {
   runs_close (r, s);
 }
 
-static void test_comma (void **state) {
-  (void)state;
+TEST (comma) {
   static const char *const model[] = { "tests/models/arm.yaml", "tests/models/ezyroller.yaml", "models/chain.c" };
   if (cli_run ("localedef -i de_DE -f UTF-8 @/de_DE.UTF-8") != 0) skip ();
   for (size_t i = 0; i < sizeof model / sizeof *model; i++) {
-    char text[100];
     locale_write (model[i], "plain");
     setenv ("LOCPATH", cli_folder, 1);
     if (setlocale (LC_ALL, "de_DE.UTF-8") == NULL) skip ();
-    snprintf (text, sizeof text, "%.1f", 0.5);
-    assert_string_equal (text, "0,5"); /* the locale has a decimal comma */
+    assert_string_equal (check_text ("%.1f", 0.5), "0,5"); /* the locale has a decimal comma */
     locale_write (model[i], "comma");
     setlocale (LC_ALL, "C");
     cli_good ("cmp @/plain.csv @/comma.csv && cmp @/plain.json @/comma.json && test -s @/plain.csv");
   }
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_comma) };
-  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
-}
+const check_fixture fixture = { cli_setup, cli_teardown };

@@ -8,22 +8,19 @@
 #include "toys.h"
 #include "trial.h"
 
-static void messages_build (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (messages_build) {
   pw_add_body (m, &(pw_body){ .name = "frame", .mass = 1, .inertia = 1 });
   pw_add_body (m, &(pw_body){ .name = "steer", .mass = 1, .inertia = 1 });
 }
 
-static const pw_plugin_table messages_table = TRIAL_TABLE (messages_build);
-
 /* ---- Invalid bodies and elements ---- */
 
 /* Executes statements that make the valid model m invalid, and expects "model scene" with this text. */
-#define BAD(text, ...)                                 \
-  do {                                                 \
-    pw_model *m = scene_model (&messages_table, NULL); \
-    __VA_ARGS__;                                       \
-    scene_refused (m, "model scene" text);             \
+#define BAD(text, ...)                                       \
+  do {                                                       \
+    pw_model *m = scene_model (&messages_build_table, NULL); \
+    __VA_ARGS__;                                             \
+    scene_refused (m, "model scene" text);                   \
   } while (0)
 #define BODY(...) pw_add_body (m, &(pw_body){ __VA_ARGS__ })
 #define PIN(...) pw_add_pin (m, &(pw_pin){ __VA_ARGS__ })
@@ -32,8 +29,7 @@ static const pw_plugin_table messages_table = TRIAL_TABLE (messages_build);
 
 #define MESSAGES_50 "a-name-of-fifty-bytes-that-is-longer-than-it-shoul"
 
-static void test_bad_names (void **state) {
-  (void)state;
+TEST (bad_names) {
   BAD (": a body without a name", BODY (.mass = 1));
   BAD (": a body without a name", BODY (.name = ""));
   BAD (": a pin without a name", PIN (.body = { "frame", "steer" }));
@@ -51,8 +47,7 @@ static void test_bad_names (void **state) {
   BAD (": two elements are named \"A\"", WHEEL (.name = "A", .body = "frame"); WHEEL (.name = "A", .body = "steer"));
 }
 
-static void test_bad_bodies (void **state) {
-  (void)state;
+TEST (bad_bodies) {
   BAD (": body x: mass = -1: expected a number >= 0", BODY (.name = "x", .mass = -1));
   BAD (": body x: mass = nan: expected a finite number", BODY (.name = "x", .mass = NAN));
   BAD (": body x: inertia = -0.5: expected a number >= 0", BODY (.name = "x", .inertia = -0.5));
@@ -64,8 +59,7 @@ static void test_bad_bodies (void **state) {
   BAD (": body x: rate omega = nan: expected a finite number", BODY (.name = "x", .rate = { 0, 0, NAN }));
 }
 
-static void test_bad_references (void **state) {
-  (void)state;
+TEST (bad_references) {
   BAD (": pin B: there is no body \"ster\"; did you mean \"steer\"?", PIN (.name = "B", .body = { "frame", "ster" }));
   BAD (": pin B: there is no body \"Ground\"; did you mean \"ground\"?",
        PIN (.name = "B", .body = { "frame", "Ground" }));
@@ -79,8 +73,7 @@ static void test_bad_references (void **state) {
   BAD (": wheel A: expected a body other than the ground, which does not move", WHEEL (.name = "A", .body = "ground"));
 }
 
-static void test_bad_numbers (void **state) {
-  (void)state;
+TEST (bad_numbers) {
   BAD (": pin B: at = nan: expected a finite number",
        PIN (.name = "B", .body = { "frame", "steer" }, .at = { { 0, 0 }, { 0, NAN } }));
   BAD (": wheel A: heading = inf: expected a finite number", WHEEL (.name = "A", .body = "frame", .heading = INFINITY));
@@ -90,8 +83,7 @@ static void test_bad_numbers (void **state) {
        pw_add (m, &toy_kind_spring, &(toy_spring){ .name = "k", .body = { "frame", "steer" }, .length = 2 }));
 }
 
-static void test_bad_signals (void **state) {
-  (void)state;
+TEST (bad_signals) {
   BAD (": torque T: value: nan: expected a finite number", TORQUE (.name = "T", .value = { .constant = NAN }));
   BAD (": torque T: value: omega = inf: expected a finite number",
        TORQUE (.name = "T", .value = { PW_HARMONIC, .harmonic = { .amplitude = 1, .omega = INFINITY } }));
@@ -114,8 +106,7 @@ static const char *const messages_reads[] = { "stear.phi", NULL };
     PW_FUNCTION, .function = {.eval = messages_eval, .reads = messages_reads } \
   }
 
-static void test_bad_readers (void **state) {
-  (void)state;
+TEST (bad_readers) {
   BAD (": element T reads a state: model scene has no state \"stear.phi\"; did you mean \"steer.phi\"?",
        TORQUE (.name = "T", .value = READER));
   BAD (": drive D: angle: a constraint's signal may depend on time only",
@@ -140,16 +131,14 @@ static const pw_kind messages_kind = {
   .name = "chooser", .definition = sizeof (messages_chooser), .fields = messages_fields, .bodies = 1
 };
 
-static void test_bad_choices (void **state) {
-  (void)state;
+TEST (bad_choices) {
   BAD (": chooser c: mode = 2: expected 0 to 1", pw_add (m, &messages_kind, &(messages_chooser){ "c", "frame", 2 }));
   BAD (": chooser c: mode = -1: expected 0 to 1", pw_add (m, &messages_kind, &(messages_chooser){ "c", "frame", -1 }));
 }
 
 /* ---- Invalid element types and models ---- */
 
-static void test_bad_kinds (void **state) {
-  (void)state;
+TEST (bad_kinds) {
   pw_kind kind = messages_kind;
   kind.rows = 1; /* but .level is PW_FORCE */
   BAD (": element type chooser: rows and level are inconsistent",
@@ -163,11 +152,10 @@ static void test_bad_kinds (void **state) {
 }
 
 /* Gravity acts on each body: the scene has 6000 x 6000 elements. */
-static void test_too_large (void **state) {
+TEST (too_large) {
   enum { COUNT = 6000 };
   static char name[COUNT][2][8];
-  (void)state;
-  pw_model *m = scene_model (&messages_table, NULL);
+  pw_model *m = scene_model (&messages_build_table, NULL);
   for (int i = 0; i < COUNT; i++) {
     snprintf (name[i][0], sizeof name[i][0], "b%d", i);
     snprintf (name[i][1], sizeof name[i][1], "g%d", i);
@@ -185,8 +173,7 @@ static int messages_prepare (const void *definition, const pw_body *const *bodie
   return PW_OK;
 }
 
-static void test_bad_prepare (void **state) {
-  (void)state;
+TEST (bad_prepare) {
   pw_kind kind = messages_kind;
   kind.prepare = messages_prepare;
   kind.element = sizeof (messages_chooser) - 8;
@@ -204,7 +191,7 @@ static int messages_flywheel (const void *definition, const pw_body *const *bodi
   return PW_OK;
 }
 
-static void test_bad_internal (void **state) {
+TEST (bad_internal) {
   static const pw_quantity angle[] = { { "turn", "rad", "turn_rate", NULL } };
   static const pw_quantity length[] = { { "travel", "m", "speed", NULL } };
   static const char *const mode[] = { "zero", "one", "two", NULL };
@@ -218,7 +205,6 @@ static void test_bad_internal (void **state) {
                    .internal = 1,
                    .coordinate = angle,
                    .prepare = messages_flywheel };
-  (void)state;
   BAD (": flywheel f: inertia of turn = -3: expected a number >= 0",
        pw_add (m, &kind, &(messages_chooser){ "f", "frame", 1 }));
   BAD (": flywheel f: inertia of turn = nan: expected a finite number",
@@ -228,7 +214,7 @@ static void test_bad_internal (void **state) {
        pw_add (m, &kind, &(messages_chooser){ "f", "frame", 0 }));
   kind.coordinate = angle;
   pw_error error = { 0 };
-  pw_model *m = scene_model (&messages_table, NULL);
+  pw_model *m = scene_model (&messages_build_table, NULL);
   pw_add (m, &kind, &(messages_chooser){ "f", "frame", 0 });
   assert_null (pw_system_compile (m, &error));
   check_error (&error, PW_RESOURCE, "model scene: flywheel f: prepare refuses it");
@@ -236,9 +222,8 @@ static void test_bad_internal (void **state) {
 }
 
 /* A missing name is an error. */
-static void test_missing_names (void **state) {
-  (void)state;
-  pw_model *m = scene_model (&messages_table, NULL);
+TEST (missing_names) {
+  pw_model *m = scene_model (&messages_build_table, NULL);
   const pw_signal nothing = { 0 };
   pw_error error = { 0 };
   assert_int_equal (pw_model_set (m, NULL, 1, &error), PW_INPUT);
@@ -260,10 +245,9 @@ static void test_missing_names (void **state) {
 static const pw_parameter messages_outside[] = { { "a", 8, 1, "m", "a length", PW_REAL }, { .name = NULL } };
 static const pw_parameter messages_domain[] = { { "a", 0, 1, "m", "a length", (pw_domain)77 }, { .name = NULL } };
 
-static void test_bad_parameters (void **state) {
-  (void)state;
+TEST (bad_parameters) {
   pw_error error = { 0 };
-  pw_plugin_table table = messages_table;
+  pw_plugin_table table = messages_build_table;
   table.parameters = messages_outside;
   table.parameters_size = 8;
   assert_null (pw_model_new ("scene", &table, &error));
@@ -290,19 +274,7 @@ static void messages_empty (pw_model *m, const void *parameters) {
   (void)m, (void)parameters;
 }
 
-static void test_no_body (void **state) {
-  (void)state;
-  pw_plugin_table table = TRIAL_TABLE (messages_empty);
+TEST (no_body) {
+  pw_plugin_table table = SCENE_TABLE (messages_empty);
   scene_refused (scene_model (&table, NULL), "model scene has no body");
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_bad_names),      cmocka_unit_test (test_bad_bodies),
-                                      cmocka_unit_test (test_bad_references), cmocka_unit_test (test_bad_numbers),
-                                      cmocka_unit_test (test_bad_signals),    cmocka_unit_test (test_bad_readers),
-                                      cmocka_unit_test (test_bad_choices),    cmocka_unit_test (test_bad_kinds),
-                                      cmocka_unit_test (test_no_body),        cmocka_unit_test (test_too_large),
-                                      cmocka_unit_test (test_bad_prepare),    cmocka_unit_test (test_bad_internal),
-                                      cmocka_unit_test (test_missing_names),  cmocka_unit_test (test_bad_parameters) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

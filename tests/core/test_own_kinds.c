@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 #include "check.h"
+#include "gallery.h"
 #include "cli.h"
 #include "pinwheel-files.h"
 #include "scene.h"
@@ -15,26 +16,9 @@
 /* Eccentricity and semi-minor axis of the ellipse; the semi-major axis is 1 m, the attraction 1 N m^2 / r^2. */
 static const double own_e = 0.6, own_b = 0.8;
 
-/* A system of models/elliptic-wire.c, whose file must stay open; factor: of the speed of a planet. */
-typedef struct {
-  pw_file *file;
-  pw_system *s;
-} own;
-
-static own own_open (double factor) {
-  pw_error error = { 0 };
-  own x = { .file = pw_file_open ("elliptic-wire", &error) };
-  check_ok (x.file ? PW_OK : error.status, &error);
-  pw_model *m = pw_file_model (x.file, &error);
-  check_ok (m ? pw_model_set (m, "factor", factor, &error) : error.status, &error);
-  check_ok (pw_model_build (m, &error), &error);
-  x.s = scene_compile (m);
-  return x;
-}
-
-static void own_close (own *x) {
-  pw_system_free (x->s);
-  pw_file_close (x->file);
+/* models/elliptic-wire.c; factor: of the speed of a planet. */
+static gallery_scene own_open (double factor) {
+  return gallery_load ("elliptic-wire", "factor", factor, NULL);
 }
 
 /* ---- The reference ---- */
@@ -48,57 +32,54 @@ static void own_planet (double t, double p[2]) {
 }
 
 /* With the speed of a planet the bead moves like one, without a force on the wire. */
-static void test_planet (void **state) {
-  (void)state;
-  own x = own_open (1);
-  pw_run *r = runs_open (x.s, "rk4+projection", &(pw_settings){ .step = 1e-3, .ledger = 1 });
+TEST (planet) {
+  gallery_scene x = own_open (1);
+  pw_run *r = runs_open (x.system, "rk4+projection", &(pw_settings){ .step = 1e-3, .ledger = 1 });
   for (int t = 1; t <= 10; t++) {
     double p[2];
     pw_sample now = runs_to (r, t);
     own_planet (t, p);
-    check_close ("x", trial_state (x.s, &now, "bead.x"), p[0], 5e-9,
+    check_close ("x", trial_state (x.system, &now, "bead.x"), p[0], 5e-9,
                  "t (h w)^4 at h = 1 ms and w = 5/s, at perihelion");
-    check_close ("y", trial_state (x.s, &now, "bead.y"), p[1], 5e-9,
+    check_close ("y", trial_state (x.system, &now, "bead.y"), p[1], 5e-9,
                  "t (h w)^4 at h = 1 ms and w = 5/s, at perihelion");
-    check_close ("N", trial_reaction (x.s, &now, "orbit.N"), 0, 5e-9, "(h w)^4 times the attraction");
+    check_close ("N", trial_reaction (x.system, &now, "orbit.N"), 0, 5e-9, "(h w)^4 times the attraction");
     check_close ("balance", now.balance, 0, 5e-9, "(h w)^4");
   }
   pw_run_close (r);
-  own_close (&x);
+  gallery_close (&x);
 }
 
 /* A faster bead presses on the wire with m (v^2 - v_p^2) / rho, v_p the speed of a planet; v^2 - v_p^2 is constant, and
  * (1.2^2 - 1) 2^2 at perihelion. */
-static void test_faster (void **state) {
-  (void)state;
-  own x = own_open (1.2);
-  pw_run *r = runs_open (x.s, "rk4+projection", &(pw_settings){ .step = 1e-3 });
+TEST (faster) {
+  gallery_scene x = own_open (1.2);
+  pw_run *r = runs_open (x.system, "rk4+projection", &(pw_settings){ .step = 1e-3 });
   for (int t = 1; t <= 10; t++) {
     pw_sample now = runs_to (r, t);
-    double X = trial_state (x.s, &now, "bead.x") + own_e, Y = trial_state (x.s, &now, "bead.y");
+    double X = trial_state (x.system, &now, "bead.x") + own_e, Y = trial_state (x.system, &now, "bead.y");
     double s = hypot (X, Y / (own_b * own_b)), rho = own_b * own_b * s * s * s;
-    check_close ("force", -s * trial_reaction (x.s, &now, "orbit.N"), (1.2 * 1.2 - 1) * 4 / rho, 1e-7,
+    check_close ("force", -s * trial_reaction (x.system, &now, "orbit.N"), (1.2 * 1.2 - 1) * 4 / rho, 1e-7,
                  "t (h w)^4 times the force at perihelion");
   }
   pw_run_close (r);
-  own_close (&x);
+  gallery_close (&x);
 }
 
 /* ---- Every method ---- */
 
-static void test_methods (void **state) {
-  (void)state;
+TEST (methods) {
   double p[2];
   own_planet (2, p);
   char method[40];
   for (int i = 0; runs_method (i, method); i++) {
-    own x = own_open (1);
-    pw_run *r = runs_open (x.s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-8, .span = 2 });
+    gallery_scene x = own_open (1);
+    pw_run *r = runs_open (x.system, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-8, .span = 2 });
     pw_sample now = runs_to (r, 2);
-    double off = hypot (trial_state (x.s, &now, "bead.x") - p[0], trial_state (x.s, &now, "bead.y") - p[1]);
+    double off = hypot (trial_state (x.system, &now, "bead.x") - p[0], trial_state (x.system, &now, "bead.y") - p[1]);
     check_below (method, off, 1e-4, "(h w)^2 for the methods of lowest order, 1e4 rtol for the others");
     pw_run_close (r);
-    own_close (&x);
+    gallery_close (&x);
   }
 }
 
@@ -176,20 +157,16 @@ static const pw_kind guide_kind = {
   .force_q = guide_force_q,
 };
 
-static void guide_build (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (guide_build) {
   pw_add_body (m, &(pw_body){ .name = "bead", .mass = 1, .inertia = 1, .start = { 0.1, 0.2, 0 } });
   pw_add (m, &guide_kind, &(guide){ .name = "line", .body = "bead" });
 }
 
-static const pw_plugin_table guide_table = TRIAL_TABLE (guide_build);
-
 /* Methods with Newton's iteration have its complete matrix: few steps are rejected. */
-static void test_guide (void **state) {
-  (void)state;
+TEST (guide) {
   char method[40];
   for (int i = 0; runs_method (i, method); i++) {
-    pw_system *s = scene_system (&guide_table, NULL);
+    pw_system *s = scene_system (&guide_build_table, NULL);
     pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-8, .span = 2 });
     pw_sample now = runs_to (r, 2);
     const pw_statistics *n = pw_run_statistics (r);
@@ -200,17 +177,14 @@ static void test_guide (void **state) {
 }
 
 /* A slot along the same line. */
-static void slotted_build (pw_model *m, const void *parameters) {
-  guide_build (m, parameters);
+SCENE (slotted_build) {
+  guide_build (m, parameter);
   pw_add_slot (m, &(pw_slot){ .name = "slot", .body = { "bead", "ground" }, .heading = atan2 (2, 1) });
 }
 
-static const pw_plugin_table slotted_table = TRIAL_TABLE (slotted_build);
-
 /* A guide connects its body to the ground: together with another such element it can be redundant. */
-static void test_redundant_guide (void **state) {
-  (void)state;
-  pw_system *s = scene_system (&slotted_table, NULL);
+TEST (redundant_guide) {
+  pw_system *s = scene_system (&slotted_build_table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 2 });
   assert_int_equal (pw_run_redundant (r), 1);
   pw_sample now = runs_to (r, 2);
@@ -221,13 +195,11 @@ static void test_redundant_guide (void **state) {
 /* ---- The program ---- */
 
 /* One notice, by every method. */
-static void test_notice (void **state) {
+TEST (notice) {
   static const char *const method[] = { "rk4+projection", "erk8+projection", "ida+ggl" };
-  (void)state;
   for (int i = 0; i < 3; i++) {
-    char line[200];
-    snprintf (line, sizeof line, "pinwheel run elliptic-wire --t-end 0.5 -m %s --json @/wire.json", method[i]);
-    assert_int_equal (cli_run (line), 0);
+    assert_int_equal (
+        cli_run (check_text ("pinwheel run elliptic-wire --t-end 0.5 -m %s --json @/wire.json", method[i])), 0);
     assert_string_equal (cli_err, OWN_NOTICE);
     assert_non_null (strstr (cli_file ("wire.json"), "\"force_q of element type attraction\""));
   }
@@ -235,8 +207,7 @@ static void test_notice (void **state) {
   assert_non_null (strstr (cli_file ("none.json"), "\"differences\": []"));
 }
 
-static void test_show (void **state) {
-  (void)state;
+TEST (show) {
   cli_good ("pinwheel show elliptic-wire");
   assert_non_null (strstr (cli_out, "attraction sun: body [bead, ground]; strength 1 N m^2"));
   assert_non_null (strstr (cli_out, "Derivatives by differences"));
@@ -252,8 +223,7 @@ static void test_show (void **state) {
 }
 
 /* A force that is an expression of states has exact derivatives. */
-static void test_expression (void **state) {
-  (void)state;
+TEST (expression) {
   cli_write ("follow.yaml", "pinwheel: 1\nbodies:\n  - {name: arm, mass: 1, inertia: 1}\nelements:\n"
                             "  - {torque: T, body: [arm, ground], value: -3*arm.phi}\n"
                             "  - {torque: U, body: [arm, ground], value: sin(t)}\n");
@@ -264,12 +234,11 @@ static void test_expression (void **state) {
 
 /* ---- The self-test ---- */
 
-static void test_selftest (void **state) {
-  (void)state;
-  own x = own_open (1);
-  assert_int_equal (x.s->batches, 2);
+TEST (selftest) {
+  gallery_scene x = own_open (1);
+  assert_int_equal (x.system->batches, 2);
   for (int i = 0; i < 2; i++) {
-    const pw_kind *kind = x.s->batch[i].kind;
+    const pw_kind *kind = x.system->batch[i].kind;
     pw_selftest_report report = { 0 };
     pw_error error = { 0 };
     for (unsigned seed = 1; seed <= 100; seed++) check_ok (pw_selftest (kind, seed, &report, &error), &error);
@@ -277,17 +246,10 @@ static void test_selftest (void **state) {
     for (int c = 0; c < report.checks; c++)
       check_below (report.check[c].name, report.check[c].error, report.check[c].bound, report.check[c].reason);
   }
-  own_close (&x);
+  gallery_close (&x);
   cli_good ("pinwheel check elliptic-wire");
   assert_non_null (strstr (cli_out, "wire (1 element)"));
   assert_non_null (strstr (cli_out, "attraction (1 element)"));
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_planet),  cmocka_unit_test (test_faster),
-                                      cmocka_unit_test (test_methods), cmocka_unit_test (test_notice),
-                                      cmocka_unit_test (test_show),    cmocka_unit_test (test_expression),
-                                      cmocka_unit_test (test_guide),   cmocka_unit_test (test_redundant_guide),
-                                      cmocka_unit_test (test_selftest) };
-  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
-}
+const check_fixture fixture = { cli_setup, cli_teardown };

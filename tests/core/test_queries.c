@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "check.h"
-#include "pinwheel-files.h"
+#include "gallery.h"
 #include "pinwheel-solvers.h"
 #include "runs.h"
 #include "scene.h"
@@ -14,23 +14,19 @@ static const char *const queries_scene[] = { "tests/scenes/zoo.c", "ezyroller", 
 enum { SCENES = sizeof queries_scene / sizeof *queries_scene };
 
 typedef struct {
-  pw_file *file;
-  pw_model *model;
-  pw_system *s;
+  gallery_scene scene;
+  pw_system *s; /* of the scene */
   pw_workspace *w;
   pw_run *r;
   pw_sample x;
 } queries;
 
 static queries queries_open (const char *model) {
-  pw_error error = { 0 };
-  queries k = { .file = pw_file_open (model, &error) };
-  k.model = pw_file_model (k.file, &error);
-  check_ok (pw_model_build (k.model, &error), &error);
-  k.s = pw_system_compile (k.model, &error);
+  queries k = { .scene = gallery_load (model, NULL) };
+  k.s = k.scene.system;
   k.r = runs_open (k.s, "rk4+projection", &(pw_settings){ .step = 1e-3 });
   k.x = runs_to (k.r, 0.01);
-  k.w = pw_workspace_new (k.s, &error);
+  k.w = pw_workspace_new (k.s, NULL);
   assert_non_null (k.w);
   return k;
 }
@@ -38,15 +34,12 @@ static queries queries_open (const char *model) {
 static void queries_close (queries *k) {
   pw_run_close (k->r);
   pw_workspace_free (k->w);
-  pw_system_free (k->s);
-  pw_model_free (k->model);
-  pw_file_close (k->file);
+  gallery_close (&k->scene);
 }
 
 /* M a = sum of the forces of all elements, for each body (Newton, Euler): reactions and applied forces, independently
  * of the solver's sums. */
-static void test_forces (void **state) {
-  (void)state;
+TEST (forces) {
   for (int i = 0; i < SCENES; i++) {
     queries k = queries_open (queries_scene[i]);
     int bodies = pw_system_bodies (k.s);
@@ -70,8 +63,7 @@ static void test_forces (void **state) {
 }
 
 /* M a + J^T lambda = f and J a = gamma at a sample; J v = eta and g = 0 after projection. */
-static void test_equations (void **state) {
-  (void)state;
+TEST (equations) {
   for (int i = 0; i < SCENES; i++) {
     queries k = queries_open (queries_scene[i]);
     pw_equations e;
@@ -100,12 +92,11 @@ static void test_equations (void **state) {
 }
 
 /* Elements are those of the model, in the order of their rows; a reaction's name begins with its element's. */
-static void test_elements (void **state) {
-  (void)state;
+TEST (elements) {
   for (int i = 0; i < SCENES; i++) {
     queries k = queries_open (queries_scene[i]);
     int rows = 0, contacts = 0, described, found = 0, bodies;
-    const pw_element *e = pw_model_elements (k.model, &described);
+    const pw_element *e = pw_model_elements (k.scene.model, &described);
     char name[200];
     for (int n = 0; n < pw_system_elements (k.s); n++) {
       pw_element_info info = pw_system_element (k.s, n);
@@ -126,7 +117,7 @@ static void test_elements (void **state) {
     assert_int_equal (found, described);
     assert_int_equal (rows, pw_system_rows (k.s));
     assert_int_equal (contacts, pw_system_contacts (k.s));
-    const pw_body *b = pw_model_bodies (k.model, &bodies);
+    const pw_body *b = pw_model_bodies (k.scene.model, &bodies);
     assert_int_equal (bodies, pw_system_bodies (k.s));
     for (int j = 0; j < bodies; j++) {
       assert_string_equal (b[j].name, pw_system_body_name (k.s, j));
@@ -138,9 +129,8 @@ static void test_elements (void **state) {
 }
 
 /* Contact points are displaced with their bodies and keep their headings. */
-static void test_contacts (void **state) {
+TEST (contacts) {
   static const double at[2] = { 0.3, -0.2 };
-  (void)state;
   pw_error error = { 0 };
   queries k = queries_open ("ezyroller");
   double out[4][3], *q = malloc ((size_t)pw_system_coordinates (k.s) * sizeof *q);
@@ -156,10 +146,4 @@ static void test_contacts (void **state) {
   }
   free (q);
   queries_close (&k);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_forces), cmocka_unit_test (test_equations),
-                                      cmocka_unit_test (test_elements), cmocka_unit_test (test_contacts) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

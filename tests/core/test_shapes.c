@@ -79,7 +79,7 @@ static void shapes_breaks (const pw_signal *s, int count, int smooth) {
   if (s->pulse.period == 0 || s->type != PW_PULSE) assert_true (isinf (pw_signal_breakpoint (s, PW_JUMPS, t)));
 }
 
-static void test_forms (void **state) {
+TEST (forms) {
   static const struct {
     const pw_signal *s;
     int breaks, smooth;
@@ -88,7 +88,6 @@ static void test_forms (void **state) {
     { &shapes_pulses, 30, -1 }, { &shapes_for_ever, 1, -1 }, { &shapes_linear, SHAPES_POINTS, 0 },
     { &shapes_free, 2, 0 },     { &shapes_rest, 2, 1 },
   };
-  (void)state;
   for (size_t i = 0; i < sizeof shape / sizeof *shape; i++) {
     shapes_derivatives (shape[i].s);
     shapes_breaks (shape[i].s, shape[i].breaks, shape[i].smooth);
@@ -102,8 +101,7 @@ static void shapes_is (const pw_signal *s, double t, double value) {
   check_close ("value", u[0], value, 8 * DBL_EPSILON, "round-off");
 }
 
-static void test_values (void **state) {
-  (void)state;
+TEST (values) {
   shapes_is (&shapes_ramp, -9, 0.3);
   shapes_is (&shapes_ramp, 0.7 + 1.9 / 4, 0.3 - 1.5 / 4);
   shapes_is (&shapes_ramp, 1e9, -1.2);
@@ -126,11 +124,10 @@ static void test_values (void **state) {
 }
 
 /* A pulse begins and ends exactly at its breakpoints, however the quotient of times is rounded. */
-static void test_many_pulses (void **state) {
+TEST (many_pulses) {
   pw_signal s = { PW_PULSE, .pulse = { .height = 1, .start = 0.1, .width = 0.05, .period = 0.1 } };
   pw_source source = { .signal = s };
   double t = 0, u[3];
-  (void)state;
   for (int i = 0; i < 20000; i++) {
     t = pw_signal_breakpoint (&s, PW_JUMPS, t);
     shapes_at (&source, t, u);
@@ -144,8 +141,7 @@ static void test_many_pulses (void **state) {
 /* ---- Splines ---- */
 
 /* Points between the ends of a cubic table, where its second derivative has kinks, are no breakpoints for PW_JUMPS. */
-static void test_knots (void **state) {
-  (void)state;
+TEST (knots) {
   for (int i = 0; i < SHAPES_POINTS - 1; i++) {
     assert_true (pw_signal_breakpoint (&shapes_rest, PW_JUMPS_AND_KINKS, shapes_t[i]) == shapes_t[i + 1]);
     assert_true (pw_signal_breakpoint (&shapes_rest, PW_JUMPS, shapes_t[i]) == shapes_t[SHAPES_POINTS - 1]);
@@ -155,10 +151,9 @@ static void test_knots (void **state) {
 }
 
 /* A spline with free ends through points of a cubic polynomial is that polynomial. */
-static void test_cubic (void **state) {
+TEST (cubic) {
   double y[SHAPES_POINTS], u[3];
   pw_signal s = shapes_free;
-  (void)state;
   for (int n = 4; n <= SHAPES_POINTS; n++) {
     for (int i = 0; i < n; i++) y[i] = 1 + shapes_t[i] * (-2 + shapes_t[i] * (0.5 + 0.3 * shapes_t[i]));
     s.table.value = y;
@@ -173,12 +168,11 @@ static void test_cubic (void **state) {
 }
 
 /* With ends at rest, two points give 3 x^2 - 2 x^3; rates at the ends are 0. */
-static void test_rest (void **state) {
+TEST (rest) {
   static const double t[] = { 1, 3 }, y[] = { 2, 7 };
   pw_signal s = { PW_TABLE, .table = { t, y, 2, PW_CUBIC, PW_ENDS_REST, 0, 0 } };
   pw_source source = shapes_source (&s);
   double u[3];
-  (void)state;
   for (double x = 0; x < 1; x += 0.1) {
     shapes_at (&source, 1 + 2 * x, u);
     check_close ("value", u[0], 2 + 5 * x * x * (3 - 2 * x), 1e-14, "round-off");
@@ -194,9 +188,8 @@ static void test_rest (void **state) {
 
 /* A car: steered by a ramp, its speed a table; a trailer turned by a motor with pulses, a disc turned by a smooth step,
  * a boom by a cubic table. */
-static void shapes_car (pw_model *m, const void *parameters) {
+SCENE (shapes_car) {
   static const double t[] = { 0.15, 0.8, 1.3 }, y[] = { 1, 1.6, 1.2 };
-  (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "car", .mass = 3, .inertia = 0.4, .rate = { 1 } });
   pw_add_body (m, &(pw_body){ .name = "trailer", .mass = 1, .inertia = 0.1, .start = { -1.2 }, .rate = { 1 } });
   pw_add_body (m, &(pw_body){ .name = "disc", .mass = 0.2, .inertia = 0.05 });
@@ -227,10 +220,8 @@ static void shapes_car (pw_model *m, const void *parameters) {
                                 .value = { PW_TABLE, .table = { t, y, 3, PW_CUBIC, PW_ENDS_REST, 0, 0 } } });
 }
 
-static void test_methods (void **state) {
-  static const pw_plugin_table car = TRIAL_TABLE (shapes_car);
-  (void)state;
-  trial (&car, 2);
+TEST (methods) {
+  trial (&shapes_car_table, 2);
 }
 
 /* The signal of a torque, of a velocity constraint, of a position constraint. */
@@ -251,8 +242,7 @@ static void shapes_refused (int level, pw_signal value, const char *text) {
   "model ezyroller: drive X: value: " what " has kinks, and a prescribed position must not: use a smooth-step, " \
   "a cubic table with ends at rest, a harmonic"
 
-static void test_refused (void **state) {
-  (void)state;
+TEST (refused) {
   shapes_refused (SHAPES_POSITION, shapes_ramp, SHAPES_KINKS ("a ramp"));
   shapes_refused (SHAPES_POSITION, shapes_linear, SHAPES_KINKS ("a linear table"));
   shapes_refused (SHAPES_POSITION, shapes_free, SHAPES_KINKS ("a cubic table with free ends"));
@@ -269,9 +259,8 @@ static pw_signal shapes_points (const double *t, const double *y, int count, int
   return (pw_signal){ PW_TABLE, .table = { t, y, count, interpolation, 0, 0, 0 } };
 }
 
-static void test_faults (void **state) {
+TEST (faults) {
   static const double t[] = { 0, 1, 1, 2 }, y[] = { 0, 1, NAN, 2 };
-  (void)state;
 #define FAULT "model ezyroller: torque X: value: "
   shapes_refused (SHAPES_FORCE, shapes_points (t, t, 4, PW_LINEAR),
                   FAULT "point 3 is at t = 1 s, after one at 1 s: expected increasing times");
@@ -296,13 +285,4 @@ static void test_faults (void **state) {
                   FAULT "width = -1: expected a number >= 0");
   shapes_refused (SHAPES_FORCE, (pw_signal){ PW_PULSE, .pulse = { .height = 1, .width = 2, .period = 2 } },
                   FAULT "a pulse every 2 s: expected a width > 0 and < 2 s, found 2 s");
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_forms),   cmocka_unit_test (test_values),  cmocka_unit_test (test_many_pulses),
-    cmocka_unit_test (test_knots),   cmocka_unit_test (test_cubic),   cmocka_unit_test (test_rest),
-    cmocka_unit_test (test_methods), cmocka_unit_test (test_refused), cmocka_unit_test (test_faults),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

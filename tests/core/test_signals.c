@@ -8,8 +8,7 @@
 #include "toys.h"
 #include "trial.h"
 
-static void test_constant (void **state) {
-  (void)state;
+TEST (constant) {
   double u[3];
   pw_source source = { .signal = { .constant = 2.5 }, .u = u };
   assert_int_equal (pw_signal_eval (&source, 7), 0);
@@ -17,8 +16,7 @@ static void test_constant (void **state) {
   assert_true (isinf (pw_signal_breakpoint (&source.signal, PW_JUMPS, 0)));
 }
 
-static void test_harmonic (void **state) {
-  (void)state;
+TEST (harmonic) {
   double A = 1.7, w = 2.3, p = 0.4, c = -0.6, t = 1.1, u[3], only[3];
   pw_source source = { .signal = { PW_HARMONIC, .harmonic = { .amplitude = A, .omega = w, .phase = p, .offset = c } },
                        .u = u };
@@ -72,8 +70,7 @@ static pw_system *signals_scene (const pw_signal *torque) {
   return scene_compile (m);
 }
 
-static void test_reads (void **state) {
-  (void)state;
+TEST (reads) {
   static const char *const reads[] = { "steer.phi", "frame.vx", NULL };
   signals_context c = { .breakpoint = 3 };
   pw_signal torque = {
@@ -113,9 +110,8 @@ static int signals_of_angle (void *context, double t, const double *x, double va
 }
 
 /* New velocities do not evaluate signals that read none, or held ones. */
-static void test_velocities (void **state) {
+TEST (velocities) {
   static const char *const reads[][2] = { { "steer.phi", NULL }, { "steer.omega", NULL } };
-  (void)state;
   for (int velocity = 0; velocity < 2; velocity++) {
     signals_context c = { 0 };
     pw_signal torque = { PW_FUNCTION,
@@ -136,8 +132,7 @@ static void test_velocities (void **state) {
 }
 
 /* A signal of time alone is evaluated once for stages at the same time; a held one is not evaluated. */
-static void test_sharing_and_hold (void **state) {
-  (void)state;
+TEST (sharing_and_hold) {
   signals_context c = { 0 };
   pw_signal torque = { PW_FUNCTION, .function = { .eval = signals_of_time, .context = &c } };
   pw_system *s = signals_scene (&torque);
@@ -165,8 +160,7 @@ static void test_sharing_and_hold (void **state) {
 }
 
 /* Jumps are found up to the round-off of sums of steps, also at the time 0; ramps of forces do not jump. */
-static void test_jumps (void **state) {
-  (void)state;
+TEST (jumps) {
   for (double start = -2; start <= 2; start += 2) {
     pw_signal torque = { PW_PULSE, .pulse = { .height = 1, .start = start } };
     pw_system *s = signals_scene (&torque);
@@ -184,8 +178,7 @@ static void test_jumps (void **state) {
 
 static signals_context signals_driven;
 
-static void signals_build (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (signals_build) {
   pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 1 });
   pw_add (
       m, &toy_kind_drive,
@@ -194,11 +187,9 @@ static void signals_build (pw_model *m, const void *parameters) {
                     .angle = { PW_FUNCTION, .function = { .eval = signals_of_time, .context = &signals_driven } } });
 }
 
-static void test_drive (void **state) {
-  (void)state;
-  static const pw_plugin_table table = TRIAL_TABLE (signals_build);
+TEST (drive) {
   signals_driven = (signals_context){ 0 };
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (&signals_build_table, NULL);
   pw_workspace *w = pw_workspace_new (s, NULL);
   double q[3] = { 0, 0, 10 }, v[3] = { 0 }, y;
   pw_update_kinematics (w, 3, q, v);
@@ -214,13 +205,4 @@ static void test_drive (void **state) {
   assert_true (y == 10 - 16);
   pw_workspace_free (w);
   pw_system_free (s);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_constant),   cmocka_unit_test (test_harmonic),         cmocka_unit_test (test_reads),
-    cmocka_unit_test (test_velocities), cmocka_unit_test (test_sharing_and_hold), cmocka_unit_test (test_drive),
-    cmocka_unit_test (test_jumps),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

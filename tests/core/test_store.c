@@ -7,8 +7,7 @@
 #include "check.h"
 #include "util.h"
 
-static void test_names (void **state) {
-  (void)state;
+TEST (names) {
   enum { COUNT = 1000 };
   static char text[COUNT][16];
   pw_names names;
@@ -30,8 +29,7 @@ static void test_names (void **state) {
   assert_null (names.slot);
 }
 
-static void test_names_empty (void **state) {
-  (void)state;
+TEST (names_empty) {
   pw_names names;
   assert_int_equal (pw_names_open (&names, 0), PW_OK);
   assert_int_equal (pw_names_find (&names, "x"), -1);
@@ -39,8 +37,7 @@ static void test_names_empty (void **state) {
 }
 
 /* Pieces are zeroed, aligned and disjoint, whether they fit into a chunk or are larger than one. */
-static void test_arena (void **state) {
-  (void)state;
+TEST (arena) {
   static const size_t size[] = { 1, 7, 16, 100, 70000, 3, 65536, 65537, 0, 5 };
   enum { PIECES = sizeof size / sizeof *size };
   pw_arena arena = { NULL };
@@ -65,8 +62,7 @@ static void test_arena (void **state) {
 }
 
 /* The same calls, made twice, give the size and then the addresses. */
-static void test_layout (void **state) {
-  (void)state;
+TEST (layout) {
   _Alignas(max_align_t) char room[256];
   pw_layout size = { NULL, 0 }, place = { room, 0 };
   assert_null (pw_layout_alloc (&size, 3, 5));
@@ -79,8 +75,7 @@ static void test_layout (void **state) {
 }
 
 /* Two passes, also for an array without elements. */
-static void test_layout_pass (void **state) {
-  (void)state;
+TEST (layout_pass) {
   for (size_t count = 0; count < 3; count++) {
     double *a = NULL;
     char *memory = NULL;
@@ -102,8 +97,7 @@ static const char *store_nearest (const char *sought, const char *const *candida
   return strcpy (best, n.best);
 }
 
-static void test_nearest (void **state) {
-  (void)state;
+TEST (nearest) {
   static const char *const names[] = { "frame", "steer", "ground", NULL }, *const none[] = { NULL };
   assert_string_equal (store_nearest ("fraem", names), "frame");    /* two changes */
   assert_string_equal (store_nearest ("ster", names), "steer");     /* one left out */
@@ -122,8 +116,7 @@ static void store_hint (const char *sought, const char *const *candidates, const
 }
 
 /* If no name is near, all valid names are given, if they are few. */
-static void test_nearest_text (void **state) {
-  (void)state;
+TEST (nearest_text) {
   static const char *const names[] = { "frame", "steer", "ground", NULL };
   static const char *const many[] = { "tractor",      "locomotive", "dining-car",
                                       "sleeping-car", "couchette",  "luggage-van",
@@ -142,8 +135,7 @@ static void test_nearest_text (void **state) {
 }
 
 /* A candidate that is too long for the table of distances is never near. */
-static void test_nearest_long (void **state) {
-  (void)state;
+TEST (nearest_long) {
   char longer[300];
   memset (longer, 'x', sizeof longer - 1);
   longer[sizeof longer - 1] = 0;
@@ -154,8 +146,7 @@ static void test_nearest_long (void **state) {
 
 /* ---- Errors and domains ---- */
 
-static void test_first_error_stays (void **state) {
-  (void)state;
+TEST (first_error_stays) {
   pw_error error = { 0 };
   assert_int_equal (pw_fail (&error, PW_INPUT, "first %d", 1), PW_INPUT);
   assert_int_equal (pw_fail (&error, PW_RESOURCE, "second"), PW_RESOURCE);
@@ -163,8 +154,7 @@ static void test_first_error_stays (void **state) {
   assert_int_equal (pw_fail (NULL, PW_INITIAL, "nobody listens"), PW_INITIAL);
 }
 
-static void test_long_error (void **state) {
-  (void)state;
+TEST (long_error) {
   char longer[1000];
   memset (longer, 'x', sizeof longer - 1);
   longer[sizeof longer - 1] = 0;
@@ -173,8 +163,7 @@ static void test_long_error (void **state) {
   assert_int_equal (strlen (error.text), sizeof error.text - 1);
 }
 
-static void test_domains (void **state) {
-  (void)state;
+TEST (domains) {
   static const struct {
     pw_domain domain;
     double value;
@@ -198,14 +187,4 @@ static void test_domains (void **state) {
   };
   for (size_t i = 0; i < sizeof tries / sizeof *tries; i++)
     assert_string_equal (pw_domain_check (tries[i].domain, tries[i].value), tries[i].expected);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_names),        cmocka_unit_test (test_names_empty),
-                                      cmocka_unit_test (test_arena),        cmocka_unit_test (test_layout),
-                                      cmocka_unit_test (test_layout_pass),  cmocka_unit_test (test_nearest),
-                                      cmocka_unit_test (test_nearest_text), cmocka_unit_test (test_nearest_long),
-                                      cmocka_unit_test (test_long_error),   cmocka_unit_test (test_first_error_stays),
-                                      cmocka_unit_test (test_domains) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

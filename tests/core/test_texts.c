@@ -9,7 +9,7 @@
 #include "util.h"
 
 /* Characters of one to four bytes, and sequences that are overlong, too high, surrogates or truncated. */
-static void test_characters (void **state) {
+TEST (characters) {
   static const struct {
     const char *text;
     int size;
@@ -29,13 +29,11 @@ static void test_characters (void **state) {
     { "\xF4\x90\x80\x80", 0 }, /* beyond U+10FFFF */
     { "\xFF", 0 },
   };
-  (void)state;
   for (size_t i = 0; i < sizeof each / sizeof *each; i++) assert_int_equal (pw_utf8_size (each[i].text), each[i].size);
 }
 
-static void test_controls (void **state) {
+TEST (controls) {
   char text[] = "a\033[31m\n\tb\377\177\302\233\303\266";
-  (void)state;
   assert_int_equal (pw_is_text ("a line\n\tand another: \303\266"), 1);
   assert_int_equal (pw_is_text (text), 0);
   pw_text_sanitise (text);
@@ -44,21 +42,17 @@ static void test_controls (void **state) {
 }
 
 /* Messages quote external texts. */
-static void test_message (void **state) {
+TEST (message) {
   pw_error error = { 0 };
-  (void)state;
   pw_fail (&error, PW_INPUT, "there is no \"%s\"", "\033]0;title\007\xff");
   check_error (&error, PW_INPUT, "there is no \"?]0;title??\"");
 }
 
 /* JSON: control characters are escaped, invalid bytes replaced. */
-static void test_summary (void **state) {
+TEST (summary) {
   pw_error error = { 0 };
   pw_summary summary = { .model = "a\033\xff\"\\\n", .method = "1", .status = "ok", .reason = "\xC3" };
-  char path[300];
-  (void)state;
-  cli_expand ("@/a.json", path, sizeof path);
-  pw_output *o = pw_output_open (path, &error);
+  pw_output *o = pw_output_open (cli_path ("a.json"), &error);
   check_ok (pw_json_write (&summary, NULL, NULL, 0, NULL, o, &error), &error);
   check_ok (pw_output_finish (o, &error), &error);
   const char *text = cli_file ("a.json");
@@ -69,31 +63,28 @@ static void test_summary (void **state) {
 
 /* A model in C with this `about`, unit of its parameter and name of its body is rejected with the message. */
 static void texts_model (const char *about, const char *unit, const char *body, const char *message) {
-  char text[700];
-  snprintf (text, sizeof text,
-            "#include <pinwheel.h>\n"
-            "typedef struct { double a; } P;\n"
-            "static const pw_parameter p[] = { { PW_AT (P, a), .unit = \"%s\" }, { .name = NULL } };\n"
-            "static void build (pw_model *m, const void *p) {\n"
-            "  (void)p;\n"
-            "  pw_add_body (m, &(pw_body){ .name = \"%s\", .mass = 1, .inertia = 1 });\n"
-            "}\n"
-            "PW_MODEL (.about = \"%s\", .parameters = p, .parameters_size = sizeof (P), .build = build);\n",
-            unit, body, about);
-  cli_write ("own.c", text);
+  cli_write (
+      "own.c",
+      check_text ("#include <pinwheel.h>\n"
+                  "typedef struct { double a; } P;\n"
+                  "static const pw_parameter p[] = { { PW_AT (P, a), .unit = \"%s\" }, { .name = NULL } };\n"
+                  "static void build (pw_model *m, const void *p) {\n"
+                  "  (void)p;\n"
+                  "  pw_add_body (m, &(pw_body){ .name = \"%s\", .mass = 1, .inertia = 1 });\n"
+                  "}\n"
+                  "PW_MODEL (.about = \"%s\", .parameters = p, .parameters_size = sizeof (P), .build = build);\n",
+                  unit, body, about));
   cli_bad ("pinwheel show @/own.c", 2, message);
 }
 
-static void test_model (void **state) {
-  (void)state;
+TEST (model) {
   texts_model ("\\033[31m", "m", "a", "@/own.c: .about is not text: expected UTF-8 without control characters");
   texts_model ("good", "\\377", "a",
                "@/own.c: name, unit or meaning of parameter a is not text: expected UTF-8 without control characters");
   texts_model ("good", "m", "a\\033[31m", "model own: body \"a?[31m\": a name consists of letters, digits, _ and -");
 }
 
-static void test_file_name (void **state) {
-  (void)state;
+TEST (file_name) {
   cli_good ("cp tests/models/arm.yaml \"$(printf '@/a\\033[31m.yaml')\"");
   cli_bad ("pinwheel show \"$(printf '@/a\\033[31m.yaml')\"", 2,
            "@/a?[31m.yaml: the name of a model file is UTF-8 without control characters");
@@ -101,9 +92,4 @@ static void test_file_name (void **state) {
   assert_string_equal (cli_out, "0\n");
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_characters), cmocka_unit_test (test_controls),
-                                      cmocka_unit_test (test_message),    cmocka_unit_test (test_summary),
-                                      cmocka_unit_test (test_model),      cmocka_unit_test (test_file_name) };
-  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
-}
+const check_fixture fixture = { cli_setup, cli_teardown };

@@ -15,9 +15,7 @@
 /* ---- Files ---- */
 
 static size_t faults_slurp (const char *folder, const char *name, char *text, size_t room) {
-  char path[600];
-  snprintf (path, sizeof path, "%s/%s", folder, name);
-  FILE *f = fopen (path, "rb");
+  FILE *f = fopen (check_text ("%s/%s", folder, name), "rb");
   if (f == NULL) return room; /* as no file has it */
   size_t size = fread (text, 1, room - 1, f);
   text[size] = 0;
@@ -38,7 +36,6 @@ static int faults_lines (const char *text) {
 
 static int faults_whole (const char *o, const char *whole, const char *name) {
   static char text[1 << 20], same[1 << 20];
-  char path[600];
   pw_checkpoint c;
   size_t size = faults_slurp (o, name, text, sizeof text);
   if (faults_ends (name, ".part")) return 1;
@@ -50,18 +47,14 @@ static int faults_whole (const char *o, const char *whole, const char *name) {
   if (!faults_ends (name, ".ck"))
     return faults_slurp (whole, name, same, sizeof same) > 0 && faults_lines (text) == faults_lines (same) &&
            text[size - 1] == '\n';
-  snprintf (path, sizeof path, "%s/%s", o, name);
-  int status = pw_checkpoint_read (path, &c, &(pw_error){ 0 });
+  int status = pw_checkpoint_read (check_text ("%s/%s", o, name), &c, &(pw_error){ 0 });
   pw_checkpoint_free (&c);
   return status == PW_OK;
 }
 
 const char *faults_broken (void) {
   static char name[300];
-  char o[300], whole[300];
-  const char *broken = NULL;
-  snprintf (o, sizeof o, "%s/o", cli_folder);
-  snprintf (whole, sizeof whole, "%s/whole", cli_folder);
+  const char *broken = NULL, *o = cli_path ("o"), *whole = cli_path ("whole");
   DIR *d = opendir (o);
   for (const struct dirent *e; d && (e = readdir (d)) != NULL;) {
     if (*e->d_name == '.' || broken) continue;
@@ -86,9 +79,8 @@ static void faults_empty (const char *folder) {
 
 void faults_prepare (void) {
   static char text[1 << 20];
-  char o[300], start[300], path[600];
-  snprintf (o, sizeof o, "%s/o", cli_folder);
-  snprintf (start, sizeof start, "%s/start", cli_folder);
+  char path[600];
+  const char *o = cli_path ("o"), *start = cli_path ("start");
   faults_empty (o);
   DIR *d = opendir (start);
   for (const struct dirent *e; d && (e = readdir (d)) != NULL;) {
@@ -113,9 +105,7 @@ static const pw_command *faults_command (const char *name) {
 
 /* Sends what goes to a descriptor into a file of the folder; returns another one for where it went before. */
 static int faults_redirect (int fd, const char *name) {
-  char path[300];
-  snprintf (path, sizeof path, "%s/%s", cli_folder, name);
-  int before = dup (fd), file = creat (path, 0666);
+  int before = dup (fd), file = creat (cli_path (name), 0666);
   dup2 (file, fd);
   close (file);
   return before;
@@ -144,9 +134,7 @@ int faults_run (const char *command) {
 }
 
 void faults_begin (const char *start, const char *command) {
-  char text[1500];
-  snprintf (text, sizeof text, "rm -rf @/o @/start; mkdir -p @/o @/start; %s; rm -rf @/whole", start);
-  cli_good (text);
+  cli_good (check_text ("rm -rf @/o @/start; mkdir -p @/o @/start; %s; rm -rf @/whole", start));
   faults_prepare ();
   int status = faults_run (command);
   if (status != 0) print_error ("%s: %s", command, cli_file ("log"));
@@ -154,19 +142,16 @@ void faults_begin (const char *start, const char *command) {
   cli_good ("cp -r @/o @/whole");
 }
 
-int faults_setup (void **state) {
+int faults_setup (void) {
   static const char gnuplot[] = "#!/bin/sh\n",
                     compiler[] = "#!/bin/sh\nwhile [ \"$1\" != -o ]; do shift; done\n/bin/cp \"$MODEL\" \"$2\"\n";
-  char text[400];
   const char *build = getenv ("BUILD");
-  if (cli_setup (state) != 0) return -1;
+  if (cli_setup () != 0) return -1;
   cli_write ("gnuplot", gnuplot);
   cli_write ("cc", compiler);
   cli_run ("chmod +x @/gnuplot @/cc");
-  cli_expand ("@/cc", text, sizeof text);
-  setenv ("CC", text, 1);
-  snprintf (text, sizeof text, "%s/models/ezyroller.so", build ? build : "build");
-  setenv ("MODEL", text, 1);
+  setenv ("CC", cli_path ("cc"), 1);
+  setenv ("MODEL", check_text ("%s/models/ezyroller.so", build ? build : "build"), 1);
   const char *path = getenv ("PATH");
   size_t size = strlen (cli_folder) + strlen (path ? path : "") + 2;
   char *longer = malloc (size);

@@ -7,7 +7,7 @@
 
 /* A setup: the folder, and programs that the commands ask for, at no cost: gnuplot draws nothing, the compiler has
  * compiled the EzyRoller.  Its teardown is cli_teardown. */
-int faults_setup (void **state);
+int faults_setup (void);
 
 /* Fills @/start by a shell command, and @/whole by the command itself, which has to succeed. */
 void faults_begin (const char *start, const char *command);

@@ -170,32 +170,27 @@ static int alloc_text (const char *path, pw_error *error) {
 
 /* ---- Tests ---- */
 
-static void test_compile (void **state) {
-  (void)state;
+TEST (compile) {
   alloc_each (alloc_compile, "model and compile");
 }
 
-static void test_runs (void **state) {
-  (void)state;
+TEST (runs) {
   char name[40];
   for (int i = 0; runs_method (i, name); i++) alloc_each (alloc_run, name);
   alloc_each (alloc_run, "rk4+projection:metric=identity");
 }
 
-static void test_selftest (void **state) {
-  (void)state;
+TEST (selftest) {
   alloc_each (alloc_selftest, "self-test");
   alloc_each (alloc_check, "check");
 }
 
-static void test_verify (void **state) {
-  (void)state;
+TEST (verify) {
   alloc_each (alloc_verify, "verifier");
 }
 
 /* A table as text and as an archive. */
-static void test_files (void **state) {
-  (void)state;
+TEST (files) {
   char path[] = "/tmp/pinwheel-alloc-XXXXXX", file[sizeof path + 10], part[sizeof path + 20];
   int fd = mkstemp (path);
   assert_true (fd >= 0);
@@ -209,15 +204,13 @@ static void test_files (void **state) {
   }
 }
 
-static void test_texts (void **state) {
-  (void)state;
+TEST (texts) {
   alloc_each (alloc_text, "tests/models/ezyroller.yaml");
   alloc_each (alloc_text, "tests/models/arm.yaml");
 }
 
 /* A method allocates when it is opened, and not in a step. */
-static void test_steps (void **state) {
-  (void)state;
+TEST (steps) {
   pw_error error = { 0 };
   char name[40];
   for (int i = 0; runs_method (i, name); i++) {
@@ -231,13 +224,4 @@ static void test_steps (void **state) {
     pw_run_close (r);
     pw_system_free (s);
   }
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_compile), cmocka_unit_test (test_runs),  cmocka_unit_test (test_selftest),
-    cmocka_unit_test (test_verify),  cmocka_unit_test (test_files), cmocka_unit_test (test_texts),
-    cmocka_unit_test (test_steps),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

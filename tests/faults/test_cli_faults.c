@@ -19,9 +19,7 @@ static int faults_bad; /* calls after whose failure something was not as it shou
 static int faults_pair; /* 1: the command writes a table and a summary */
 
 static int faults_exists (const char *name) {
-  char path[300];
-  cli_expand (name, path, sizeof path);
-  return access (path, F_OK) == 0;
+  return access (cli_path (name), F_OK) == 0;
 }
 
 /* The command once more with one call failing; 1 if it came so far. */
@@ -38,7 +36,7 @@ static int faults_try (const char *command, long *count, long *fail, long n) {
   *fail = 0;
   const char *said = cli_file ("log"), *broken = faults_broken ();
   int good = !reached ? status == 0 : (status == 1 || (call.reading && status == 2)) && strstr (said, "pinwheel: ");
-  if (faults_exists ("@/o/a.csv") != faults_exists ("@/o/a.json") && faults_pair) broken = "one of a.csv and a.json";
+  if (faults_exists ("o/a.csv") != faults_exists ("o/a.json") && faults_pair) broken = "one of a.csv and a.json";
   if (good && reached && fail == &alloc.fail) good = strstr (said, "out of memory") || strstr (said, strerror (ENOMEM));
   int fd = dup (0);
   close (fd);
@@ -75,8 +73,7 @@ static void faults_from (const char *start, const char *command) {
 
 /* ---- Tests ---- */
 
-static void test_run (void **state) {
-  (void)state;
+TEST (run) {
   faults_most = 200;
   faults_from (":", "run ezyroller --t-end 0.02 -o @/o/a.csv --json @/o/a.json");
   mode_t before = umask (027); /* the file that is replaced has another mode than a new one */
@@ -87,21 +84,18 @@ static void test_run (void **state) {
 
 #define FAULTS_RUN "run ezyroller --t-end 0.01 --step 0.001 --checkpoint-every 0.005 -o @/o/a.csv "
 
-static void test_checkpoint (void **state) {
-  (void)state;
+TEST (checkpoint) {
   faults_most = 200;
   faults_from (":", FAULTS_RUN "--checkpoint @/o/a.ck");
   faults_from ("cp @/whole/a.csv @/start/a.csv.part && cp @/whole/a.ck @/start", FAULTS_RUN "--resume @/o/a.ck");
 }
 
-static void test_plots (void **state) {
-  (void)state;
+TEST (plots) {
   faults_most = 30;
   faults_from (":", "run pendulum --t-end 0.01 --plots @/o --animate @/o/a.html");
 }
 
-static void test_sweep (void **state) {
-  (void)state;
+TEST (sweep) {
   faults_most = 200;
 #define FAULTS_SWEEP "sweep ezyroller --vary a=0.5,0.6 --t-end 0.01 --step 0.01 --jobs 1 -o @/o/a.csv"
   faults_from (":", FAULTS_SWEEP);
@@ -110,15 +104,13 @@ static void test_sweep (void **state) {
   faults_from ("cp @/whole/a.csv @/second.csv", "sweep --merge @/first.csv @/second.csv -o @/o/a.csv");
 }
 
-static void test_drift (void **state) {
-  (void)state;
+TEST (drift) {
   faults_most = 30;
   faults_from (":", "drift ezyroller --t-end 0.1 --methods rk4+none --only-methods -o @/o");
   faults_from (":", "steady n-trailer --starts 0 -o @/o");
 }
 
-static void test_reading (void **state) {
-  (void)state;
+TEST (reading) {
   faults_most = 100;
   cli_good ("pinwheel new @/own.c >@/new.txt");
   faults_from (":", "new @/o/mine.yaml");
@@ -132,9 +124,8 @@ static void test_reading (void **state) {
 }
 
 /* The file that was opened is another process's complete one by the time it is locked: it is left alone. */
-static void test_race (void **state) {
+TEST (race) {
   char part[300], away[300];
-  (void)state;
   faults_begin (":", "run ezyroller --t-end 0.02 -o @/o/a.csv");
   faults_prepare ();
   cli_expand ("@/o/a.csv.part", part, sizeof part);
@@ -145,11 +136,4 @@ static void test_race (void **state) {
   cli_good ("cmp @/o/a.csv @/whole/a.csv && [ ! -s @/o/b.csv ]");
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_run),   cmocka_unit_test (test_checkpoint), cmocka_unit_test (test_plots),
-    cmocka_unit_test (test_sweep), cmocka_unit_test (test_drift),      cmocka_unit_test (test_reading),
-    cmocka_unit_test (test_race),
-  };
-  return cmocka_run_group_tests (tests, faults_setup, cli_teardown);
-}
+const check_fixture fixture = { faults_setup, cli_teardown };

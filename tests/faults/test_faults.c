@@ -179,8 +179,7 @@ static void fault_each (pw_system *s, const char *method) {
   fault.fail = 0;
 }
 
-static void test_faults (void **state) {
-  (void)state;
+TEST (faults) {
   pw_system *s = scene_system (&scene_ezyroller, NULL);
   char name[40];
   for (int i = 0; runs_method (i, name); i++) fault_each (s, name);
@@ -188,15 +187,9 @@ static void test_faults (void **state) {
 }
 
 /* A scene large enough for its rows to be ordered. */
-static void test_ordering (void **state) {
-  (void)state;
+TEST (ordering) {
   pw_system *s = scene_system (&faults_chain, "n", 20.0, NULL);
   fault_each (s, "rk4+projection");
   assert_true (fault.name && strcmp (fault.name, "amd_order") == 0);
   pw_system_free (s);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_faults), cmocka_unit_test (test_ordering) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -49,8 +49,7 @@ static void machine_check_whole (const char *writer) {
 }
 
 /* As on a disk that is full: no file may grow beyond so many blocks of 512 bytes. */
-static void test_full (void **state) {
-  (void)state;
+TEST (full) {
   for (int i = 0; i < MACHINE_WRITERS; i++) {
     machine_whole (machine_writers[i]);
     int failed = 0;
@@ -70,8 +69,7 @@ static void test_full (void **state) {
 }
 
 /* /dev/full takes nothing; a folder that cannot be written; a folder in the place of a file. */
-static void test_unwritable (void **state) {
-  (void)state;
+TEST (unwritable) {
   const char *folder = getuid () == 0 ? "@/file" : "@/closed"; /* root may write everywhere but below a file */
   const char *const option[] = { "run ezyroller -o %s/x.csv",
                                  "run ezyroller --json %s/x.json",
@@ -102,14 +100,11 @@ static void test_unwritable (void **state) {
 }
 
 /* A reader that has seen enough: nothing is said, the status is that of a process ended by SIGPIPE. */
-static void test_closed_pipe (void **state) {
-  (void)state;
+TEST (closed_pipe) {
   const char *const command[] = { "run ezyroller -o -", "run ezyroller --json -", "run ezyroller", "list",
                                   "show chain",         "show --yaml pendulum",   "list methods" };
   for (size_t i = 0; i < sizeof command / sizeof *command; i++) {
-    char text[300];
-    snprintf (text, sizeof text, "{ sleep 0.05; pinwheel %s; echo $? >@/status; } | true", command[i]);
-    cli_good (text);
+    cli_good (check_text ("{ sleep 0.05; pinwheel %s; echo $? >@/status; } | true", command[i]));
     if (strcmp (cli_file ("status"), "141\n") != 0) print_error ("%s: %s", command[i], cli_file ("status"));
     assert_string_equal (cli_file ("status"), "141\n");
   }
@@ -120,8 +115,7 @@ static void test_closed_pipe (void **state) {
 }
 
 /* Ctrl-C after any time: files under their own names are whole, and the status is 130 unless all was done. */
-static void test_interrupted (void **state) {
-  (void)state;
+TEST (interrupted) {
   for (int i = 0; i + 1 < MACHINE_WRITERS; i++) {
     machine_whole (machine_writers[i]);
     for (int after = 1; after < 100; after = 3 * after + 2) {
@@ -142,15 +136,13 @@ static void test_interrupted (void **state) {
 
 /* ---- Programs that are missing or fail ---- */
 
-static void test_no_compiler (void **state) {
-  (void)state;
+TEST (no_compiler) {
   cli_good ("pinwheel new @/own.c >@/log");
   assert_int_equal (cli_run ("unset CC; PATH=/none pinwheel run @/own.c"), 2);
   assert_non_null (strstr (cli_err, "cannot run the C compiler \"cc\" that the model file "));
 }
 
-static void test_gnuplot (void **state) {
-  (void)state;
+TEST (gnuplot) {
   const struct {
     const char *program, *message;
     int status;
@@ -161,13 +153,12 @@ static void test_gnuplot (void **state) {
     { "echo >@/bin/gnuplot; chmod a-x @/bin/gnuplot", "cannot run gnuplot: ", 1 },
   };
   for (size_t i = 0; i < sizeof each / sizeof *each; i++) {
-    char text[900], message[300];
-    snprintf (text, sizeof text,
-              "rm -rf @/bin @/p; mkdir -p @/bin @/p; echo old >@/p/paths.svg; touch @/bin/gnuplot; chmod +x "
-              "@/bin/gnuplot\n%s\n"
-              "PATH=@/bin pinwheel run ezyroller --t-end 1 --plots @/p >@/log",
-              each[i].program);
-    int status = cli_run (text);
+    char message[300];
+    int status = cli_run (
+        check_text ("rm -rf @/bin @/p; mkdir -p @/bin @/p; echo old >@/p/paths.svg; touch @/bin/gnuplot; chmod +x "
+                    "@/bin/gnuplot\n%s\n"
+                    "PATH=@/bin pinwheel run ezyroller --t-end 1 --plots @/p >@/log",
+                    each[i].program));
     cli_expand (each[i].message, message, sizeof message);
     if (strstr (cli_err, message) == NULL) print_error ("%s: %s", each[i].program, cli_err);
     assert_non_null (strstr (cli_err, message));
@@ -179,8 +170,7 @@ static void test_gnuplot (void **state) {
 
 /* ---- Names ---- */
 
-static void test_names (void **state) {
-  (void)state;
+TEST (names) {
   cli_good (
       "mkdir -p '@/ein Ordner/größer & \"so\"'; cp tests/models/arm.yaml '@/ein Ordner/größer & \"so\"/der Arm.yaml'");
   cli_run (
@@ -196,11 +186,4 @@ static void test_names (void **state) {
   assert_string_equal (cli_out, "5\n");
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_full),        cmocka_unit_test (test_unwritable),  cmocka_unit_test (test_closed_pipe),
-    cmocka_unit_test (test_interrupted), cmocka_unit_test (test_no_compiler), cmocka_unit_test (test_gnuplot),
-    cmocka_unit_test (test_names),
-  };
-  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
-}
+const check_fixture fixture = { cli_setup, cli_teardown };

@@ -201,8 +201,7 @@ static void memory_each (int exact, const char *command) {
 
 /* ---- Tests ---- */
 
-static void test_reading (void **state) {
-  (void)state;
+TEST (reading) {
   memory_each (1, "list kinds");
   memory_each (1, "show tests/models/arm.yaml");
   memory_each (1, "show --yaml pendulum");
@@ -216,16 +215,14 @@ static void test_reading (void **state) {
   memory_each (1, "new @/o/mine.yaml");
 }
 
-static void test_run (void **state) {
-  (void)state;
+TEST (run) {
   memory_each (1, "run ezyroller --t-end 0.02 -o @/o/a.csv --json @/o/a.json");
   memory_each (1, "run tests/models/signals.yaml --t-end 0.02 -o @/o/a.csv --json @/o/a.json");
   memory_each (1, "run ezyroller --method ida+ggl --t-end 0.02 --energy -o @/o/a.csv");
   memory_each (1, "run ezyroller --method bdf+projection --t-end 0.02 --energy -o @/o/a.csv");
 }
 
-static void test_studies (void **state) {
-  (void)state;
+TEST (studies) {
   memory_each (0, "sweep ezyroller --vary a=0.5,0.6 --t-end 0.01 --step 0.01 --jobs 1 -o @/o/a.csv");
   memory_each (0, "drift ezyroller --t-end 0.1 --methods rk4+none --only-methods -o @/o");
   memory_each (0, "steady n-trailer --starts 0 -o @/o");
@@ -234,8 +231,7 @@ static void test_studies (void **state) {
 }
 
 /* One job: threads would allocate in any order. */
-static void test_searches (void **state) {
-  (void)state;
+TEST (searches) {
   cli_write ("d.csv", "t,bob.x,bob.y\n0,0.5,-0.8\n0.01,0.5,-0.79\n0.02,0.49,-0.8\n");
   memory_each (1, "fit pendulum --data @/d.csv --columns bob.x,bob.y --free l=0.5:2 --jobs 1 "
                   "-o @/o/a.csv --json @/o/a.json");
@@ -246,7 +242,7 @@ static void test_searches (void **state) {
                   "--jobs 1 -o @/o/a.yaml");
 }
 
-static int memory_setup (void **state) {
+static int memory_setup (void) {
 #ifndef MEMORY_OF_OTHERS
   void *frame[4];
   backtrace (frame, 4); /* it loads what it needs */
@@ -254,15 +250,7 @@ static int memory_setup (void **state) {
   memory = mmap (NULL, sizeof *memory, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   if (memory == MAP_FAILED) return -1;
 #endif
-  return faults_setup (state);
+  return faults_setup ();
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_reading),
-    cmocka_unit_test (test_run),
-    cmocka_unit_test (test_studies),
-    cmocka_unit_test (test_searches),
-  };
-  return cmocka_run_group_tests (tests, memory_setup, cli_teardown);
-}
+const check_fixture fixture = { memory_setup, cli_teardown };

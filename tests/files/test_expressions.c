@@ -1,55 +1,36 @@
 /* Signals given by expressions: they agree with built-in signals, steps end where they jump, derivatives are exact. */
-#define _GNU_SOURCE /* mkstemps */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 #include "check.h"
+#include "cli.h"
+#include "gallery.h"
 #include "model.h"
-#include "pinwheel-files.h"
 #include "runs.h"
 
-static char path[] = "/tmp/pinwheel-expression-XXXXXX.yaml";
-
-typedef struct {
-  pw_file *file;
-  pw_model *model;
-  pw_system *system;
-} scene;
-
 /* A model whose elements are given by a format and a value in it. */
-static scene scene_of (const char *elements, const char *value) {
-  pw_error error = { 0 };
-  FILE *f = fopen (path, "w");
-  assert_non_null (f);
-  fputs ("pinwheel: 1\nparameters: [{name: A, value: 0.3}, {name: w, value: 2}, {name: T, value: 1.5}]\n"
-         "bodies: [{name: a, mass: 1, inertia: 0.1}, {name: b, mass: 2, inertia: 0.3, rate: {vx: 1}}]\nelements:\n",
-         f);
-  for (const char *p = elements; *p; p++) *p == '@' ? fputs (value, f) : fputc (*p, f);
-  assert_int_equal (fclose (f), 0);
-  scene x = { .file = pw_file_open (path, &error) };
-  check_ok (x.file ? PW_OK : error.status, &error);
-  x.model = pw_file_model (x.file, &error);
-  check_ok (pw_model_build (x.model, &error), &error);
-  x.system = pw_system_compile (x.model, &error);
-  check_ok (x.system ? PW_OK : error.status, &error);
-  return x;
+static gallery_scene scene_of (const char *elements, const char *value) {
+  char text[2000];
+  int n = snprintf (text, sizeof text, "%s",
+                    "pinwheel: 1\nparameters: [{name: A, value: 0.3}, {name: w, value: 2}, {name: T, value: 1.5}]\n"
+                    "bodies: [{name: a, mass: 1, inertia: 0.1}, {name: b, mass: 2, inertia: 0.3, rate: {vx: 1}}]\n"
+                    "elements:\n");
+  for (const char *p = elements; *p; p++)
+    n += *p == '@' ? snprintf (text + n, sizeof text - (size_t)n, "%s", value)
+                   : snprintf (text + n, sizeof text - (size_t)n, "%c", *p);
+  assert_true (n < (int)sizeof text);
+  cli_write ("m.yaml", text);
+  return gallery_load (cli_path ("m.yaml"), NULL);
 }
 
-static void scene_close (scene *x) {
-  pw_system_free (x->system);
-  pw_model_free (x->model);
-  pw_file_close (x->file);
-}
-
-static const pw_signal *scene_signal (const scene *x) {
+static const pw_signal *scene_signal (const gallery_scene *x) {
   return pw_field_at (x->model->element[0].kind, x->model->element[0].definition, PW_SIGNAL, 0);
 }
 
 /* 100 N for 0.01 s give 1 kg a speed of 1 m/s, however long the steps and however the times are written: a
  * constant force is integrated without an error of the method. */
-static void test_push (void **state) {
+TEST (push) {
   static const char *const value[] = { "t > 7.0003 && t < 7.0103 ? 100 : 0",
                                        "100*(7.0003 < t && 7.0103 >= t)",
                                        "2*t - 1 > 13.0006 && 3*t < 21.0309 ? 100 : 0",
@@ -61,19 +42,18 @@ static void test_push (void **state) {
                                        "t^2 > 7.0003^2 && exp(t) < exp(7.0103) ? 100 : 0" };
   char method[40];
   double q[6], v[6];
-  (void)state;
   for (size_t i = 0; i < sizeof value / sizeof *value; i++) {
-    scene x = scene_of ("  - {force: F, body: a, fx: \"@\"}\n", value[i]);
+    gallery_scene x = scene_of ("  - {force: F, body: a, fx: \"@\"}\n", value[i]);
     for (int k = 0; runs_method (k, method); k++) {
       runs_state (x.system, method, &(pw_settings){ .step = 0.25, .rtol = 1e-6 }, 10, q, v, NULL);
       check_close (method, v[0], 1, 1e-11, "100 N, two times with round-off, restarts");
     }
-    scene_close (&x);
+    gallery_close (&x);
   }
 }
 
 /* An expression in place of a built-in signal: the same motion but for round-off. */
-static void test_built_in (void **state) {
+TEST (built_in) {
   static const char drive[] = "  - {drive: D, body: [a, ground], what: angle, value: @}\n"
                               "  - {pin: P, body: [a, b], at: [[0.5, 0], [-0.5, 0]]}\n";
   static const char steered[] = "  - {steered-wheel: W, body: b, at: [0.4, 0.1], heading: @}\n"
@@ -94,14 +74,13 @@ static void test_built_in (void **state) {
     { speed, "{ramp: {from: 1, to: 2, start: 0.4, duration: T}}", "\"1 + max(0, min(1, (t - 0.4)/T))\"" },
   };
   static const char *const method[] = { "rk4+projection", "erk8+projection", "ida+ggl", "bdf+projection", "galpha" };
-  (void)state;
   for (size_t i = 0; i < sizeof pair / sizeof *pair; i++)
     for (size_t m = 0; m < sizeof method / sizeof *method; m++) {
       double q[2][6], v[2][6];
       for (int k = 0; k < 2; k++) {
-        scene x = scene_of (pair[i].elements, k ? pair[i].expression : pair[i].form);
+        gallery_scene x = scene_of (pair[i].elements, k ? pair[i].expression : pair[i].form);
         runs_state (x.system, method[m], &(pw_settings){ .step = 0.05, .rtol = 1e-7 }, 3, q[k], v[k], NULL);
-        scene_close (&x);
+        gallery_close (&x);
       }
       for (int j = 0; j < 6; j++) {
         check_close (pair[i].expression, q[1][j], q[0][j], 1e-11, "round-off, which adaptive steps carry on");
@@ -111,14 +90,13 @@ static void test_built_in (void **state) {
 }
 
 /* The gradient by states is that of the formula. */
-static void test_gradient (void **state) {
-  scene x = scene_of ("  - {torque: T, body: [b, ground], value: \"@\"}\n",
-                      "t*sin(b.phi)*exp(-b.omega^2) + abs(a.x)*(b.omega > 0 ? 2 : 3)");
+TEST (gradient) {
+  gallery_scene x = scene_of ("  - {torque: T, body: [b, ground], value: \"@\"}\n",
+                              "t*sin(b.phi)*exp(-b.omega^2) + abs(a.x)*(b.omega > 0 ? 2 : 3)");
   const pw_signal *s = scene_signal (&x);
   void *own = s->function.open (s->function.context);
   double t = 1.3, phi = 0.4, omega = 0.7, ax = -2, value[3], gradient[3];
   const double states[] = { phi, omega, ax };
-  (void)state;
   assert_string_equal (s->function.reads[0], "b.phi");
   assert_int_equal (s->function.eval (own, t, states, value, gradient), 0);
   double e = exp (-omega * omega);
@@ -128,32 +106,31 @@ static void test_gradient (void **state) {
   check_close ("by x", gradient[2], -2, 0, "exact");
   assert_string_equal (s->function.text->jump, "b.omega > 0");
   s->function.close (own);
-  scene_close (&x);
+  gallery_close (&x);
 }
 
 /* At a jump in time it is that just after it, as the value is. */
-static void test_gradient_after (void **state) {
-  scene x = scene_of ("  - {torque: T, body: [b, ground], value: \"@\"}\n", "t <= 1 ? b.phi : 2*b.phi + a.x*floor(-t)");
+TEST (gradient_after) {
+  gallery_scene x =
+      scene_of ("  - {torque: T, body: [b, ground], value: \"@\"}\n", "t <= 1 ? b.phi : 2*b.phi + a.x*floor(-t)");
   const pw_signal *s = scene_signal (&x);
   void *own = s->function.open (s->function.context);
   double value[3], gradient[2];
-  (void)state;
   assert_int_equal (s->function.eval (own, 1, (double[]){ 3, 5 }, value, gradient), 0);
   assert_true (value[0] == 6 - 10 && gradient[0] == 2 && gradient[1] == -2);
   assert_int_equal (s->function.eval (own, 0.5, (double[]){ 3, 5 }, value, gradient), 0);
   assert_true (value[0] == 3 && gradient[0] == 1 && gradient[1] == 0);
   s->function.close (own);
-  scene_close (&x);
+  gallery_close (&x);
 }
 
 /* A derivative without a value stops the run with its reason; one that is given in its place does not. */
-static void test_no_derivative (void **state) {
+TEST (no_derivative) {
   static const char *const value[] = { "sqrt(t^4)", "{expression: sqrt(t^4), rate: 2*t, acceleration: 2}",
                                        "{expression: sqrt(t^4), rate: 2*t}" };
-  (void)state;
   for (int i = 0; i < 3; i++) {
     pw_error error = { 0 };
-    scene x = scene_of ("  - {drive: D, body: [a, ground], what: angle, value: @}\n", value[i]);
+    gallery_scene x = scene_of ("  - {drive: D, body: [a, ground], what: angle, value: @}\n", value[i]);
     pw_run *r = pw_run_open (x.system, "rk4+projection", &(pw_settings){ .step = 0.1 }, &error);
     if (i == 0)
       check_error (&error, PW_METHOD,
@@ -161,30 +138,28 @@ static void test_no_derivative (void **state) {
     else
       check_close ("angle", runs_to (r, 2).q[2], 4, 1e-13, "round-off");
     pw_run_close (r);
-    scene_close (&x);
+    gallery_close (&x);
   }
 }
 
 /* Constraints take what is continuous where it breaks, however fast it changes; what is not is refused
  * (tests/bad-models). */
-static void test_continuous (void **state) {
+TEST (continuous) {
   static const char *const value[] = { "t < 1 ? t^3 : 3*t - 2",        "abs(sin(3*t))^3",           "max(0, t - 1)^2",
                                        "sin(1e9*t) + max(0, t - 1)^2", "1e8*max(0, t - 1)^3 + 1e8", "t > 5 || 1" };
-  (void)state;
   for (size_t i = 0; i < sizeof value / sizeof *value; i++) {
-    scene x = scene_of ("  - {drive: D, body: [a, ground], what: angle, value: \"@\"}\n", value[i]);
-    scene_close (&x);
+    gallery_scene x = scene_of ("  - {drive: D, body: [a, ground], what: angle, value: \"@\"}\n", value[i]);
+    gallery_close (&x);
   }
 }
 
 /* No name of a formula is the time: at a jump its value is that of the jump, whichever name comes first. */
-static void test_formula (void **state) {
+TEST (formula) {
   static const struct {
     const char *text;
     double value;
   } formula[] = { { "ceil(a)", 2 }, { "ceil(b)", 2 }, { "a <= 2", 1 }, { "a == b", 1 }, { "sign(a - b)", 0 } };
   const char *const names[] = { "a", "b", NULL };
-  (void)state;
   for (size_t i = 0; i < sizeof formula / sizeof *formula; i++) {
     pw_error error = { 0 };
     pw_formula *f = pw_formula_open (formula[i].text, names, &error);
@@ -194,21 +169,4 @@ static void test_formula (void **state) {
   }
 }
 
-static int setup (void **state) {
-  (void)state;
-  int file = mkstemps (path, 5);
-  return file < 0 ? -1 : close (file);
-}
-
-static int teardown (void **state) {
-  (void)state;
-  return remove (path);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_push),       cmocka_unit_test (test_built_in),
-                                      cmocka_unit_test (test_gradient),   cmocka_unit_test (test_gradient_after),
-                                      cmocka_unit_test (test_continuous), cmocka_unit_test (test_no_derivative),
-                                      cmocka_unit_test (test_formula) };
-  return cmocka_run_group_tests (tests, setup, teardown);
-}
+const check_fixture fixture = { cli_setup, cli_teardown };

@@ -1,12 +1,12 @@
 /* Text models that are wrong: each file in tests/bad-models/ begins with a comment that says what it is told,
  * "# LINE:COLUMN: TEXT"; a caret below its own line points to the column.  Run from the top folder. */
-#define _GNU_SOURCE /* mkstemps */
 #include <dirent.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 #include "check.h"
+#include "cli.h"
 #include "pinwheel-files.h"
 
 #define BAD_FOLDER "tests/bad-models"
@@ -56,11 +56,10 @@ static int bad_file (const char *path) {
   return 0;
 }
 
-static void test_bad_models (void **state) {
+TEST (bad_models) {
   int files = 0, failed = 0;
   struct dirent *entry;
   DIR *d = opendir (BAD_FOLDER);
-  (void)state;
   assert_non_null (d);
   while ((entry = readdir (d)) != NULL) {
     char path[300];
@@ -76,49 +75,27 @@ static void test_bad_models (void **state) {
 
 /* ---- Damage ---- */
 
-static char bad_path[] = "/tmp/pinwheel-bad-XXXXXX.yaml";
-
-static int bad_setup (void **state) {
-  (void)state;
-  int file = mkstemps (bad_path, 5);
-  return file < 0 ? -1 : close (file);
-}
-
-static int bad_teardown (void **state) {
-  (void)state;
-  return remove (bad_path);
-}
-
-static void bad_write (const char *text, size_t size) {
-  FILE *f = fopen (bad_path, "wb");
-  assert_non_null (f);
-  assert_int_equal (fwrite (text, 1, size, f), size);
-  assert_int_equal (fclose (f), 0);
-}
-
 /* Columns of the first line do not count a byte order mark. */
-static void test_byte_order_mark (void **state) {
+TEST (byte_order_mark) {
   static const char *const bad[] = { "about: a: b\n", "pinwheel: 2\n", "pinwheel: 1, x: [\n", "{pinwheel: 1, x: 3}\n",
                                      "%YAML 1.2\n---\npinwheel: 1\n" };
-  (void)state;
   for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
     char text[100];
-    bad_write (bad[i], strlen (bad[i]));
-    pw_error without = bad_open (bad_path);
+    cli_write_bytes ("m.yaml", bad[i], strlen (bad[i]));
+    pw_error without = bad_open (cli_path ("m.yaml"));
     snprintf (text, sizeof text, "\xEF\xBB\xBF%s", bad[i]);
-    bad_write (text, strlen (text));
-    pw_error with = bad_open (bad_path);
+    cli_write_bytes ("m.yaml", text, strlen (text));
+    pw_error with = bad_open (cli_path ("m.yaml"));
     assert_int_equal (without.status, PW_INPUT);
     assert_string_equal (with.text, without.text);
   }
 }
 
 /* A good model with one byte changed, or cut off somewhere, is read or refused with a text, never more. */
-static void test_damage (void **state) {
+TEST (damage) {
   static const char byte[] = "{}[],:#&*!|>'\"%@ \n-t.=(1\xC3";
   static char text[4000], copy[4000];
   FILE *f = fopen ("tests/models/ezyroller.yaml", "rb");
-  (void)state;
   assert_non_null (f);
   size_t size = fread (text, 1, sizeof text, f);
   fclose (f);
@@ -127,30 +104,24 @@ static void test_damage (void **state) {
     size_t at = (i * 7919) % size;
     memcpy (copy, text, size);
     if (i % 6) copy[at] = byte[i % (sizeof byte - 1)];
-    bad_write (copy, i % 6 ? size : at);
-    pw_error error = bad_open (bad_path);
+    cli_write_bytes ("m.yaml", copy, i % 6 ? size : at);
+    pw_error error = bad_open (cli_path ("m.yaml"));
     assert_true (error.status == PW_OK || (error.status == PW_INPUT && error.text[0]));
   }
 }
 
-static void test_size (void **state) {
-  char expected[200];
-  (void)state;
-  bad_write ("pinwheel: 1\n", 12);
-  assert_int_equal (truncate (bad_path, (64L << 20) + 1), 0);
-  pw_error error = bad_open (bad_path);
-  snprintf (expected, sizeof expected,
-            "%s: the file has more than 64 MB, the limit for a model unless --max-file raises it", bad_path);
-  check_error (&error, PW_INPUT, expected);
+TEST (size) {
+  cli_write_bytes ("m.yaml", "pinwheel: 1\n", 12);
+  assert_int_equal (truncate (cli_path ("m.yaml"), (64L << 20) + 1), 0);
+  pw_error error = bad_open (cli_path ("m.yaml"));
+  check_error (&error, PW_INPUT,
+               check_text ("%s: the file has more than 64 MB, the limit for a model unless --max-file raises it",
+                           cli_path ("m.yaml")));
   error = (pw_error){ 0 };
-  assert_null (pw_file_open_limited (bad_path, 1 << 19, &error));
-  snprintf (expected, sizeof expected,
-            "%s: the file has more than 0.5 MB, the limit for a model unless --max-file raises it", bad_path);
-  check_error (&error, PW_INPUT, expected);
+  assert_null (pw_file_open_limited (cli_path ("m.yaml"), 1 << 19, &error));
+  check_error (&error, PW_INPUT,
+               check_text ("%s: the file has more than 0.5 MB, the limit for a model unless --max-file raises it",
+                           cli_path ("m.yaml")));
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_bad_models), cmocka_unit_test (test_byte_order_mark),
-                                      cmocka_unit_test (test_damage), cmocka_unit_test (test_size) };
-  return cmocka_run_group_tests (tests, bad_setup, bad_teardown);
-}
+const check_fixture fixture = { cli_setup, cli_teardown };

@@ -6,8 +6,7 @@
 
 #define TEXT "tests/models/ezyroller.yaml"
 
-static void test_same_tables (void **state) {
-  (void)state;
+TEST (same_tables) {
   cli_good ("pinwheel run ezyroller -t 10 --energy -o @/c.csv >/dev/null && pinwheel run " TEXT
             " -t 10 --energy -o @/text.csv >/dev/null && cmp @/c.csv @/text.csv");
   assert_int_equal (cli_run ("pinwheel run ezyroller -t 5 -m ida+ggl --set a=0.4 --start frame.vx=1 -o @/c.csv && "
@@ -17,8 +16,7 @@ static void test_same_tables (void **state) {
 }
 
 /* Each row builds the model anew, in threads. */
-static void test_same_sweeps (void **state) {
-  (void)state;
+TEST (same_sweeps) {
   cli_good (
       "pinwheel sweep ezyroller -t 1 --vary a=lin:0.3:0.7:9 --jobs 2 -o @/c.csv >/dev/null 2>&1 && pinwheel sweep " TEXT
       " -t 1 --vary a=lin:0.3:0.7:9 --jobs 2 -o @/text.csv >/dev/null 2>&1 && cmp @/c.csv @/text.csv");
@@ -26,8 +24,7 @@ static void test_same_sweeps (void **state) {
 
 /* Every model on the search path: as text, and its run compared; what text cannot say is
  * refused by name. */
-static void test_round_trip (void **state) {
-  (void)state;
+TEST (round_trip) {
   cli_good ("pinwheel list models >/dev/null");
   assert_int_equal (
       cli_run (
@@ -49,8 +46,7 @@ static void test_round_trip (void **state) {
 }
 
 /* Every signal, tables from a file among them, by a fixed and an adaptive method. */
-static void test_round_trip_signals (void **state) {
-  (void)state;
+TEST (round_trip_signals) {
   cli_good (
       "pinwheel show tests/models/signals.yaml --yaml >@/signals.yaml && ! grep file: @/signals.yaml && "
       "for m in rk4+projection ida+ggl; do pinwheel run tests/models/signals.yaml -m $m -o @/once.csv >/dev/null 2>&1 "
@@ -81,8 +77,7 @@ static const char cli_expressions[] =
     "  - {drive: D, body: [b, ground], what: angle, value: {expression: A*t^2, rate: 2*A*t}}\n"
     "  - {torque: U, body: [a, ground], value: -A*sign(a.omega - 1)}\n";
 
-static void test_expressions (void **state) {
-  (void)state;
+TEST (expressions) {
   cli_write ("e.yaml", cli_expressions);
   cli_good ("pinwheel show @/e.yaml");
   assert_non_null (
@@ -98,8 +93,7 @@ static void test_expressions (void **state) {
   assert_non_null (strstr (cli_err, "torque U: value: \"sign(a.omega - 1)\" may jump as states change"));
 }
 
-static void test_no_text (void **state) {
-  (void)state;
+TEST (no_text) {
   cli_write ("f.c", cli_function);
   cli_bad ("pinwheel show @/f.c --yaml", 2,
            "model f cannot be written as text: the signal \"value\" of torque T is a function");
@@ -109,8 +103,7 @@ static void test_no_text (void **state) {
   assert_non_null (strstr (cli_out, "torque T: body [a, ground]; value f (t) N m"));
 }
 
-static void test_max_file (void **state) {
-  (void)state;
+TEST (max_file) {
   cli_good ("{ cat " TEXT "; yes '# nothing' | head -c 300000; } >@/long.yaml");
   cli_bad ("pinwheel show @/long.yaml --max-file 0.25", 2,
            "@/long.yaml: the file has more than 0.25 MB, the limit for a model unless --max-file raises it");
@@ -119,8 +112,7 @@ static void test_max_file (void **state) {
   cli_bad ("pinwheel sweep @/long.yaml --max-file x --vary a=1,2 -o @/x.csv", 2, "--max-file: \"x\" is not a number");
 }
 
-static void test_names (void **state) {
-  (void)state;
+TEST (names) {
   cli_good ("mkdir @/models && cp " TEXT " @/models/roller.yaml && "
             "PINWHEEL_MODELS=@/models pinwheel run roller -t 0.1 >/dev/null");
   assert_int_equal (cli_run ("cp ${BUILD:-build}/models/ezyroller.so @/models/roller.so && "
@@ -132,9 +124,8 @@ static void test_names (void **state) {
 }
 
 /* Nothing but Pinwheel's own message is printed, as compilers do. */
-static void test_message (void **state) {
+TEST (message) {
   char expected[500];
-  (void)state;
   cli_write ("bad.yaml", "pinwheel: 1\nbodies:\n  - {name: a, mass: 1/(k - k)}\n");
   assert_int_equal (cli_run ("pinwheel run @/bad.yaml"), 2);
   cli_expand ("@/bad.yaml:3:24: error: body a: mass: there is no \"k\"\n"
@@ -153,8 +144,7 @@ static void test_message (void **state) {
 }
 
 /* `new` writes the same model both ways. */
-static void test_new (void **state) {
-  (void)state;
+TEST (new) {
   cli_good ("pinwheel new @/mine.yaml");
   cli_good ("pinwheel new @/mine.c");
   cli_bad ("pinwheel new @/mine.yaml", 2, "@/mine.yaml exists already and was not changed");
@@ -163,21 +153,10 @@ static void test_new (void **state) {
 }
 
 /* Rows between rates that are all held are no way to begin: what is held is let go, the scene starts and runs. */
-static void test_held (void **state) {
-  (void)state;
+TEST (held) {
   assert_int_equal (cli_run ("pinwheel run tests/scenes/held-welds.yaml -t 0.5 --json @/held.json"), 0);
   const char *json = cli_file ("held.json");
   assert_true (cli_says (json, "status", "ok"));
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_same_tables), cmocka_unit_test (test_same_sweeps),
-    cmocka_unit_test (test_round_trip),  cmocka_unit_test (test_round_trip_signals),
-    cmocka_unit_test (test_no_text),     cmocka_unit_test (test_expressions),
-    cmocka_unit_test (test_max_file),    cmocka_unit_test (test_names),
-    cmocka_unit_test (test_message),     cmocka_unit_test (test_new),
-    cmocka_unit_test (test_held),
-  };
-  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
-}
+const check_fixture fixture = { cli_setup, cli_teardown };

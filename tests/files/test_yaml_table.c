@@ -5,35 +5,18 @@
 #include <sys/stat.h>
 #include <unistd.h>
 #include "check.h"
+#include "cli.h"
 #include "model.h"
 #include "pinwheel-files.h"
-
-static char table_folder[] = "/tmp/pinwheel-table-XXXXXX", table_path[200];
-
-/* A path in the folder. */
-static const char *table_in (const char *name) {
-  snprintf (table_path, sizeof table_path, "%s/%s", table_folder, name);
-  return table_path;
-}
-
-static void table_write (const char *name, const char *text, size_t size) {
-  FILE *f = fopen (table_in (name), "wb");
-  assert_non_null (f);
-  assert_int_equal (fwrite (text, 1, size, f), size);
-  assert_int_equal (fclose (f), 0);
-}
 
 /* Builds a model in the subfolder "model" whose torque is this table; the signal goes to *signal, its first points to
  * `point`. */
 static pw_error table_build (const char *table, pw_signal *signal, double point[2][3]) {
-  char text[400];
   pw_error error = { 0 };
-  snprintf (text, sizeof text,
-            "pinwheel: 1\nbodies: [{name: a, mass: 1, inertia: 1}]\n"
-            "elements: [{torque: T, body: [a, ground], value: {table: %s}}]\n",
-            table);
-  table_write ("model/m.yaml", text, strlen (text));
-  pw_file *f = pw_file_open (table_in ("model/m.yaml"), &error);
+  cli_write ("model/m.yaml", check_text ("pinwheel: 1\nbodies: [{name: a, mass: 1, inertia: 1}]\n"
+                                         "elements: [{torque: T, body: [a, ground], value: {table: %s}}]\n",
+                                         table));
+  pw_file *f = pw_file_open (cli_path ("model/m.yaml"), &error);
   pw_model *m = f ? pw_file_model (f, &error) : NULL;
   if (m && pw_model_build (m, &error) == PW_OK) {
     *signal = ((const pw_torque *)m->element[0].definition)->value;
@@ -50,7 +33,7 @@ static pw_error table_build (const char *table, pw_signal *signal, double point[
 static void table_good (const char *csv, const char *table) {
   pw_signal s = { 0 };
   double point[2][3];
-  table_write ("model/data.csv", csv, strlen (csv));
+  cli_write ("model/data.csv", csv);
   pw_error error = table_build (table, &s, point);
   check_ok (error.status, &error);
   assert_true (s.type == PW_TABLE && s.table.count == 3);
@@ -58,8 +41,7 @@ static void table_good (const char *csv, const char *table) {
   assert_true (point[1][0] == 1 && point[1][1] == -2 && point[1][2] == 0.3);
 }
 
-static void test_forms (void **state) {
-  (void)state;
+TEST (forms) {
   table_good ("", "{points: [[0, 1], [1/2, -2], [2, 0.3]]}");
   table_good ("0,1\n0.5,-2\n2,3e-1\n", "{file: data.csv}");
   table_good ("0,1\n0.5,-2\n2,3e-1", "{file: ./data.csv, columns: [1, 2]}");
@@ -84,10 +66,9 @@ static void table_bad (const char *table, const char *text) {
 }
 
 /* A header's unit converts its column, however it is written. */
-static void test_units (void **state) {
+TEST (units) {
   static const char *const unit[] = { "[N mm]", "[mN m]", "[N*mm]", "[kN um]", "[g m^2/s^2]", "[Nmm]", "(N mm)" };
   char csv[200];
-  (void)state;
   for (size_t i = 0; i < sizeof unit / sizeof *unit; i++) {
     snprintf (csv, sizeof csv, "t [ms],u %s\n0,1000\n500,-2000\n2000,300\n", unit[i]);
     table_good (csv, "{file: data.csv}");
@@ -100,10 +81,9 @@ static void test_units (void **state) {
 }
 
 /* What is not known, or measures something else, is refused with column and unit. */
-static void test_bad_units (void **state) {
+TEST (bad_units) {
   static const char csv[] = "t [s],u [dyn cm],w [deg],f [N],z [N m/],h [%]\n0,1,2,3,4,5\n1,2,3,4,5,6\n";
-  (void)state;
-  table_write ("model/u.csv", csv, strlen (csv));
+  cli_write ("model/u.csv", csv);
   table_bad ("{file: u.csv}", "u.csv:1: column \"u [dyn cm]\": the unit \"dyn cm\" is not known; expected N m");
   table_bad ("{file: u.csv, columns: [t, w]}", "column \"w [deg]\": the unit \"deg\" does not measure what N m does");
   table_bad ("{file: u.csv, columns: [t, f]}", "column \"f [N]\": the unit \"N\" does not measure what N m does");
@@ -113,42 +93,37 @@ static void test_bad_units (void **state) {
 }
 
 /* What overflows as it is converted is refused. */
-static void test_too_large (void **state) {
+TEST (too_large) {
   static const char csv[] = "t [h],u [kN km]\n0,1\n1,-1e303\n1e305,2\n";
-  (void)state;
-  table_write ("model/large.csv", csv, sizeof csv - 1);
+  cli_write ("model/large.csv", csv);
   table_bad ("{file: large.csv}", "large.csv:3: column 2: \"-1e303\" is too large in SI units");
-  table_write ("model/large.csv", "t [h],u\n0,1\n1e305,2\n", 20);
+  cli_write ("model/large.csv", "t [h],u\n0,1\n1e305,2\n");
   table_bad ("{file: large.csv}", "large.csv:3: column 1: \"1e305\" is too large in SI units");
 }
 
 /* Cells are not cut: neither a number before its exponent nor a name before its unit. */
-static void test_long_cells (void **state) {
+TEST (long_cells) {
   char csv[3000];
-  (void)state;
   snprintf (csv, sizeof csv, "t,%0150d [N mm]\n0,1.%0150de3\n0.5,-2e3\n2,300\n", 0, 0);
   csv[2] = 'M'; /* a name */
   table_good (csv, "{file: data.csv}");
   snprintf (csv, sizeof csv, "0,1\n0.5,-2\n2,3.%01500de-1\n", 0);
-  table_write ("model/data.csv", csv, strlen (csv));
+  cli_write ("model/data.csv", csv);
   table_bad ("{file: data.csv}", "data.csv:3: column 2: expected a finite number, found \"3.000");
   snprintf (csv, sizeof csv, "t,M%01500d [N mm]\n0,1\n0.5,-2\n2,3\n", 0);
-  table_write ("model/data.csv", csv, strlen (csv));
+  cli_write ("model/data.csv", csv);
   table_bad ("{file: data.csv}", "data.csv:1: the name of column 2 is too long");
 }
 
 /* The unit a signal has: of a drive, that of what it drives. */
 static void table_unit (const char *element, const char *header, double expected, const char *text) {
-  char yaml[500], csv[100];
   pw_error error = { 0 };
-  snprintf (csv, sizeof csv, "t,u [%s]\n0,0\n1,90\n", header);
-  table_write ("model/data.csv", csv, strlen (csv));
-  snprintf (yaml, sizeof yaml,
-            "pinwheel: 1\nbodies: [{name: a, mass: 1, inertia: 1}]\n"
-            "elements: [{%s: {table: {file: data.csv, interpolation: cubic, ends: rest}}}]\n",
-            element);
-  table_write ("model/m.yaml", yaml, strlen (yaml));
-  pw_file *f = pw_file_open (table_in ("model/m.yaml"), &error);
+  cli_write ("model/data.csv", check_text ("t,u [%s]\n0,0\n1,90\n", header));
+  cli_write ("model/m.yaml",
+             check_text ("pinwheel: 1\nbodies: [{name: a, mass: 1, inertia: 1}]\n"
+                         "elements: [{%s: {table: {file: data.csv, interpolation: cubic, ends: rest}}}]\n",
+                         element));
+  pw_file *f = pw_file_open (cli_path ("model/m.yaml"), &error);
   pw_model *m = f ? pw_file_model (f, &error) : NULL;
   assert_non_null (m);
   int status = pw_model_build (m, &error);
@@ -164,12 +139,11 @@ static void table_unit (const char *element, const char *header, double expected
   pw_file_close (f);
 }
 
-static void test_unit_of_signal (void **state) {
+TEST (unit_of_signal) {
   static const char angle[] = "drive: D, body: [a, ground], at: [[0, 0], [0, 0]], what: angle, value",
                     x[] = "drive: D, body: [a, ground], at: [[0, 0], [0, 0]], what: x, value",
                     speed[] = "speed: V, body: a, at: [0, 0], value",
                     pfaffian[] = "pfaffian: P, body: [a, ground], a: [1, 0, 0], b: [0, 0, 0], value";
-  (void)state;
   table_unit (angle, "deg", PW_PI / 2, NULL);
   table_unit (angle, "\xC2\xB0", PW_PI / 2, NULL);
   table_unit (angle, "rev", 180 * PW_PI, NULL);
@@ -185,7 +159,7 @@ static void test_unit_of_signal (void **state) {
 }
 
 /* 90 of each unit, in SI units. */
-static void test_unit_factors (void **state) {
+TEST (unit_factors) {
   static const struct {
     const char *unit;
     double si;
@@ -233,17 +207,15 @@ static void test_unit_factors (void **state) {
     { "cm^2", 9e-3 },
     { "1/ms", 9e4 },
   };
-  (void)state;
   for (size_t i = 0; i < sizeof units / sizeof *units; i++)
     table_unit ("pfaffian: P, body: [a, ground], a: [1, 0, 0], b: [0, 0, 0], value", units[i].unit, units[i].si, NULL);
 }
 
 /* offset + scale value, at the compiled signal; the points stay as they are. */
-static void test_scale (void **state) {
+TEST (scale) {
   pw_signal s = { 0 };
   double point[2][3];
-  (void)state;
-  table_write ("model/data.csv", "0,1\n2,3\n", 8);
+  cli_write ("model/data.csv", "0,1\n2,3\n");
   pw_error error = table_build ("{file: data.csv, scale: 2*deg, offset: -1}", &s, point);
   check_ok (error.status, &error);
   assert_true (s.table.scale == 2 * (PW_PI / 180) && s.table.offset == -1 && point[1][1] == 3);
@@ -251,54 +223,51 @@ static void test_scale (void **state) {
   table_bad ("{points: [[0, 1], [1, 1e300]], scale: 1e300}", "point 2: offset + scale * 1e+300 is not finite");
 }
 
-static void test_contents (void **state) {
-  (void)state;
-  table_write ("model/nul.csv", "0,1\n1,\0002\n", 9);
+TEST (contents) {
+  cli_write_bytes ("model/nul.csv", "0,1\n1,\0002\n", 9);
   table_bad ("{file: nul.csv}", "value: nul.csv: a table is text, and this has a byte 0\n");
-  table_write ("model/twice.csv", "t,u,u [m]\n0,1,2\n1,2,3\n", 22);
+  cli_write ("model/twice.csv", "t,u,u [m]\n0,1,2\n1,2,3\n");
   table_bad ("{file: twice.csv, columns: [t, u]}", "value: twice.csv:1: columns 2 and 3 are both named \"u\"\n");
-  table_write ("model/comma.csv", "t;u\n0;1,5\n", 10);
+  cli_write ("model/comma.csv", "t;u\n0;1,5\n");
   table_bad ("{file: comma.csv}", "value: comma.csv:2: column 2: expected a finite number, found \"1,5\"");
 }
 
 /* Nothing outside the model's folder is read, however it is named. */
-static void test_places (void **state) {
+TEST (places) {
   char outside[200];
-  (void)state;
-  table_write ("data.csv", "0,1\n1,2\n", 8);
-  snprintf (outside, sizeof outside, "{file: %s/data.csv}", table_folder);
+  cli_write ("data.csv", "0,1\n1,2\n");
+  snprintf (outside, sizeof outside, "{file: %s/data.csv}", cli_folder);
 #define OWN "a table must be in the model's folder: its path is relative and has no \"..\""
 #define LINK "it is a link that leads out of the model's folder"
   table_bad (outside, OWN);
   table_bad ("{file: ../data.csv}", OWN);
   table_bad ("{file: sub/../../data.csv}", OWN);
   table_bad ("{file: ..}", OWN);
-  assert_int_equal (symlink ("../data.csv", table_in ("model/link.csv")), 0);
+  assert_int_equal (symlink ("../data.csv", cli_path ("model/link.csv")), 0);
   table_bad ("{file: link.csv}", LINK);
-  assert_int_equal (symlink ("..", table_in ("model/up")), 0);
+  assert_int_equal (symlink ("..", cli_path ("model/up")), 0);
   table_bad ("{file: up/data.csv}", LINK);
-  assert_int_equal (mkdir (table_in ("model-b"), 0700), 0); /* its name begins like that of the model's folder */
-  table_write ("model-b/data.csv", "0,1\n1,2\n", 8);
-  assert_int_equal (symlink ("../model-b/data.csv", table_in ("model/b.csv")), 0);
+  assert_int_equal (mkdir (cli_path ("model-b"), 0700), 0); /* its name begins like that of the model's folder */
+  cli_write ("model-b/data.csv", "0,1\n1,2\n");
+  assert_int_equal (symlink ("../model-b/data.csv", cli_path ("model/b.csv")), 0);
   table_bad ("{file: b.csv}", LINK);
-  assert_int_equal (mkfifo (table_in ("model/pipe.csv"), 0600), 0);
+  assert_int_equal (mkfifo (cli_path ("model/pipe.csv"), 0600), 0);
   table_bad ("{file: pipe.csv}", "it is a FIFO or pipe, not a regular file");
   table_bad ("{file: sub}", "it is a directory, not a regular file");
   table_bad ("{file: none.csv}", "cannot read \"none.csv\": No such file or directory");
-  assert_int_equal (symlink ("data.csv", table_in ("model/good.csv")), 0);
-  assert_int_equal (symlink ("../data.csv", table_in ("model/sub/good.csv")), 0);
+  assert_int_equal (symlink ("data.csv", cli_path ("model/good.csv")), 0);
+  assert_int_equal (symlink ("../data.csv", cli_path ("model/sub/good.csv")), 0);
   table_good ("0,1\n0.5,-2\n2,3e-1\n", "{file: good.csv}");
   table_good ("0,1\n0.5,-2\n2,3e-1\n", "{file: sub/good.csv}");
   table_good ("0,1\n0.5,-2\n2,3e-1\n", "{file: sub/..data.csv}");
 }
 
-static void test_limits (void **state) {
+TEST (limits) {
   char message[200];
-  (void)state;
-  table_write ("model/large.csv", "0,1\n", 4);
-  assert_int_equal (truncate (table_in ("model/large.csv"), (64L << 20) + 1), 0);
+  cli_write ("model/large.csv", "0,1\n");
+  assert_int_equal (truncate (cli_path ("model/large.csv"), (64L << 20) + 1), 0);
   table_bad ("{file: large.csv}", "large.csv: the file has more than 64 MB, the limit for a table");
-  FILE *f = fopen (table_in ("model/long.csv"), "w");
+  FILE *f = fopen (cli_path ("model/long.csv"), "w");
   assert_non_null (f);
   for (int i = 0; i < 1000001; i++) fputs ("1\n", f);
   assert_int_equal (fflush (f), 0);
@@ -310,17 +279,16 @@ static void test_limits (void **state) {
 }
 
 /* A page has a table once, although two signals read it, and takes no definition for a table. */
-static void test_page (void **state) {
+TEST (page) {
   static const char text[] =
       "pinwheel: 1\nlet: {file: 3}\nbodies: [{name: a, mass: file, inertia: 1}]\n"
       "elements: [{force: F, body: a, fx: {table: {file: t.csv}}, fy: {table: {file: t.csv}}}]\n";
   pw_error error = { 0 };
   pw_page page;
   int tables = 0;
-  (void)state;
-  table_write ("model/m.yaml", text, strlen (text));
-  table_write ("model/t.csv", "0,1\n1,2\n", 8);
-  pw_file *f = pw_file_open (table_in ("model/m.yaml"), &error);
+  cli_write ("model/m.yaml", text);
+  cli_write ("model/t.csv", "0,1\n1,2\n");
+  pw_file *f = pw_file_open (cli_path ("model/m.yaml"), &error);
   check_ok (f ? PW_OK : error.status, &error);
   int status = pw_page_open (&page, f, &error);
   for (int i = 0; i < page.files; i++) tables += strcmp (page.file[i].name, "t.csv") == 0;
@@ -331,34 +299,18 @@ static void test_page (void **state) {
   assert_int_equal (tables, 1);
   const char named[] = "pinwheel: 1\nbodies: [{name: a, mass: 1, inertia: 1}]\n"
                        "elements: [{force: F, body: a, fx: {table: {file: tree}}}]\n";
-  table_write ("model/m.yaml", named, strlen (named));
-  table_write ("model/tree", "0,1\n1,2\n", 8);
-  f = pw_file_open (table_in ("model/m.yaml"), &error);
+  cli_write ("model/m.yaml", named);
+  cli_write ("model/tree", "0,1\n1,2\n");
+  f = pw_file_open (cli_path ("model/m.yaml"), &error);
   assert_int_equal (pw_page_open (&page, f, &error), PW_INPUT);
   assert_string_equal (error.text, "table tree: a page has a part of this name; rename the file, to tree.csv");
   pw_page_close (&page);
   pw_file_close (f);
 }
 
-static int table_setup (void **state) {
-  (void)state;
-  if (mkdtemp (table_folder) == NULL || mkdir (table_in ("model"), 0700) != 0) return -1;
-  return mkdir (table_in ("model/sub"), 0700) == 0 ? symlink ("../data.csv", table_in ("model/sub/..data.csv")) : -1;
+static int table_setup (void) {
+  if (cli_setup () != 0 || mkdir (cli_path ("model"), 0700) != 0) return -1;
+  return mkdir (cli_path ("model/sub"), 0700) == 0 ? symlink ("../data.csv", cli_path ("model/sub/..data.csv")) : -1;
 }
 
-static int table_teardown (void **state) {
-  char command[100];
-  (void)state;
-  snprintf (command, sizeof command, "rm -r %s", table_folder);
-  return system (command);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_forms),        cmocka_unit_test (test_units),
-                                      cmocka_unit_test (test_bad_units),    cmocka_unit_test (test_too_large),
-                                      cmocka_unit_test (test_long_cells),   cmocka_unit_test (test_unit_of_signal),
-                                      cmocka_unit_test (test_unit_factors), cmocka_unit_test (test_scale),
-                                      cmocka_unit_test (test_contents),     cmocka_unit_test (test_places),
-                                      cmocka_unit_test (test_limits),       cmocka_unit_test (test_page) };
-  return cmocka_run_group_tests (tests, table_setup, table_teardown);
-}
+const check_fixture fixture = { table_setup, cli_teardown };

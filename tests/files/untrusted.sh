@@ -9,13 +9,9 @@ mkdir "$work/in" && cd "$work/in" || exit 1
 # refused NAME TEXT: standard input is a model after its first line; it is refused with the text in the message.
 refused () {
   { echo 'pinwheel: 1'; cat; } >model.yaml
-  (ulimit -v 2000000; exec timeout 100 "$pinwheel" show ./model.yaml) >out 2>err
-  status=$?
-  if [ $status = 2 ] && grep -q "$2" err; then echo "ok $1"; else
-    echo "not ok $1"
-    echo "# status $status: $(head -c 300 err)"
-    bad=1
-  fi
+  (ulimit -v 2000000; exec timeout 100 "$pinwheel" show ./model.yaml) >out 2>"$work/log"
+  [ $? = 2 ] && grep -q "$2" "$work/log"
+  report "$1" $?
 }
 
 # many COUNT FORMAT: a line for each number
@@ -69,7 +65,7 @@ signal '"a.phi = 1"' | refused 'an assignment' 'would assign'
 cc -shared -fPIC -o ezyroller.so evil.c 2>/dev/null && cp ezyroller.so libpinwheel.so && cp ezyroller.so libpinwheel.so.0
 printf 'pinwheel: 1\n%s\n' "$body" >mine.yaml
 cp mine.yaml ezyroller.yaml
-"$pinwheel" show ezyroller >out 2>err && grep -q steer out && ! "$pinwheel" show mine >out 2>err &&
-  "$pinwheel" show ./mine.yaml >out 2>err && ! "$pinwheel" list | grep -q mine && [ ! -e ran ]
-if [ $? = 0 ]; then echo 'ok nothing is taken from the current directory'; else echo 'not ok nothing is taken from the current directory'; bad=1; fi
-exit $bad
+"$pinwheel" show ezyroller >out 2>"$work/log" && grep -q steer out && ! "$pinwheel" show mine >out 2>"$work/log" &&
+  "$pinwheel" show ./mine.yaml >out 2>"$work/log" && ! "$pinwheel" list | grep -q mine && [ ! -e ran ]
+report 'nothing is taken from the current directory' $?
+[ ! -e "$work/failed" ]

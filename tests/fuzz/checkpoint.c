@@ -8,6 +8,7 @@
 #include "fuzz.h"
 #include "pinwheel-files.h"
 #include "pinwheel-solvers.h"
+#include "util.h"
 
 static const char *const checkpoint_methods[] = { "rk4+projection", "erk8+projection", "ida+ggl",
                                                   "bdf+projection", "radau+ggl",       "galpha+ggl",
@@ -81,12 +82,6 @@ static const uint8_t *checkpoint_valid (int method, size_t *size) {
   return data[method];
 }
 
-/* FNV-1a. */
-static unsigned long long checkpoint_sum (const uint8_t *data, size_t size, unsigned long long sum) {
-  for (size_t i = 0; i < size; i++) sum = (sum ^ data[i]) * 1099511628211u;
-  return sum;
-}
-
 /* One edit of ten bytes: a place, and what is put there: a number, or a special one. */
 static void checkpoint_edit (uint8_t *state, size_t size, const uint8_t *edit) {
   static const double special[] = { 0, -1, 1e300, -1e300, 1e-320, 0.0199, 1e9 };
@@ -112,8 +107,8 @@ static void checkpoint_forge (const uint8_t *edit, size_t count, int method) {
   size_t states = (size_t)(copy + size - state);
   for (size_t i = 0; i < count; i++) checkpoint_edit (state, states, edit + 10 * i);
   char text[17];
-  unsigned long long whole = checkpoint_sum (copy, (size_t)(line - copy), 14695981039346656037u);
-  snprintf (text, sizeof text, "%016llx", checkpoint_sum (state, states, whole));
+  unsigned long long whole = pw_check_sum (PW_CHECK, copy, (size_t)(line - copy));
+  snprintf (text, sizeof text, "%016llx", pw_check_sum (whole, state, states));
   memcpy (sum, text, 16);
   FILE *f = fopen (checkpoint_path, "wb");
   if (f == NULL || fwrite (copy, 1, size, f) != size || fclose (f) != 0) exit (1);

@@ -16,8 +16,7 @@
 
 static const struct { double M, m, I, l, g, A, w, th; } drive_p = { 3, 0.8, 0.02, 0.4, 9.81, 0.15, 5, 0.3 };
 
-static void drive_shaken (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (drive_shaken) {
   pw_add_body (m, &(pw_body){ .name = "cart", .mass = drive_p.M, .inertia = 1, .start = { drive_p.A } });
   pw_add_body (m, &(pw_body){ .name = "bob",
                               .mass = drive_p.m,
@@ -33,8 +32,6 @@ static void drive_shaken (pw_model *m, const void *parameters) {
   pw_add_drive (m, &(pw_drive){ .name = "guide", .body = { "cart", "ground" }, .what = PW_DRIVE_ANGLE });
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -drive_p.g } });
 }
-
-static const pw_plugin_table drive_shaken_table = TRIAL_TABLE (drive_shaken);
 
 /* th'' */
 static long double drive_swing (long double t, long double th) {
@@ -78,8 +75,7 @@ static void drive_shake (const char *method, double bound, const char *reason) {
   runs_close (r, s);
 }
 
-static void test_shaken (void **state) {
-  (void)state;
+TEST (shaken) {
   drive_shake ("rk4+projection", 1e-9, "(h w)^4 at h = 1e-3 and w = 5/s");
   drive_shake ("rk4+baumgarte", 1e-9, "(h w)^4 at h = 1e-3 and w = 5/s");
   drive_shake ("ida+ggl", 1e-6, "1e4 rtol");
@@ -93,8 +89,7 @@ static void test_shaken (void **state) {
 
 static const struct { double I, m, i, r, A, s, w; } drive_b = { 0.6, 0.5, 0.03, 0.7, 0.3, 4, 2 };
 
-static void drive_bead (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (drive_bead) {
   pw_add_body (m, &(pw_body){ .name = "rod", .mass = 1, .inertia = drive_b.I, .rate = { 0, 0, drive_b.w } });
   pw_add_body (m, &(pw_body){ .name = "bead",
                               .mass = drive_b.m,
@@ -115,10 +110,7 @@ static void drive_bead (pw_model *m, const void *parameters) {
       &(pw_drive){ .name = "turn", .body = { "bead", "rod" }, .what = PW_DRIVE_ANGLE, .value = { .constant = 0.5 } });
 }
 
-static const pw_plugin_table drive_bead_table = TRIAL_TABLE (drive_bead);
-
-static void test_bead (void **state) {
-  (void)state;
+TEST (bead) {
   pw_system *s = scene_system (&drive_bead_table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .ledger = 1 });
   check_below ("start", pw_run_initial (r)->velocity, 16 * CHECK_EPS, "given consistently");
@@ -147,8 +139,7 @@ static void test_bead (void **state) {
 
 /* ---- A flywheel driven relative to a free platform: the sum of their angular momenta is 0 ---- */
 
-static void drive_flywheel (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (drive_flywheel) {
   pw_add_body (m, &(pw_body){ .name = "flywheel", .mass = 1, .inertia = 0.2, .start = { 0.3 } });
   pw_add_body (m, &(pw_body){ .name = "platform", .mass = 4, .inertia = 0.6, .start = { 0.3 } });
   pw_add_pin (m, &(pw_pin){ .name = "axle", .body = { "flywheel", "platform" } });
@@ -158,10 +149,8 @@ static void drive_flywheel (pw_model *m, const void *parameters) {
                                 .value = DRIVE_HARMONIC (-3, 2, 0, 3) });
 }
 
-static void test_flywheel (void **state) {
-  (void)state;
-  static const pw_plugin_table table = TRIAL_TABLE (drive_flywheel);
-  pw_system *s = scene_system (&table, NULL);
+TEST (flywheel) {
+  pw_system *s = scene_system (&drive_flywheel_table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .ledger = 1 });
   pw_sample x = runs_to (r, 1.3);
   double angle = 3 - 3 * cos (2.6), bound = 1e-11;
@@ -181,8 +170,7 @@ static void test_flywheel (void **state) {
 /* ---- Initial states, invalid signals ---- */
 
 /* A run that begins at t = 0.7 s has the drive's position and velocity at that time. */
-static void test_start (void **state) {
-  (void)state;
+TEST (start) {
   pw_system *s = scene_system (&drive_shaken_table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .t = 0.7 });
   pw_sample x = runs_to (r, 0.7);
@@ -198,9 +186,8 @@ static int drive_follow (void *context, double t, const double *x, double value[
   return 0;
 }
 
-static void test_refused (void **state) {
+TEST (refused) {
   static const char *const reads[] = { "bob.phi", NULL };
-  (void)state;
   pw_error error = { 0 };
   pw_signal follow = { PW_FUNCTION, .function = { .eval = drive_follow, .reads = reads } };
   pw_model *m = scene_model (&drive_shaken_table, NULL);
@@ -208,15 +195,7 @@ static void test_refused (void **state) {
   scene_refused (m, "model scene: drive shaker: value: a constraint's signal may depend on time only");
 }
 
-static void test_methods (void **state) {
-  (void)state;
+TEST (methods) {
   trial (&drive_shaken_table, 2);
   trial (&drive_bead_table, 2);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_shaken),   cmocka_unit_test (test_bead),
-                                      cmocka_unit_test (test_flywheel), cmocka_unit_test (test_start),
-                                      cmocka_unit_test (test_refused),  cmocka_unit_test (test_methods) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -51,8 +51,7 @@ static pw_signal driven_torque (int i) {
 }
 
 /* The order is 4, although jumps and kinks do not lie at multiples of the step. */
-static void test_order (void **state) {
-  (void)state;
+TEST (order) {
   for (int i = 0; i < DRIVEN_TORQUES; i++) {
     double exact[6], error[3];
     pw_signal torque = driven_torque (i);
@@ -65,8 +64,7 @@ static void test_order (void **state) {
 }
 
 /* With inputs=held the torque is constant over a step. */
-static void test_held (void **state) {
-  (void)state;
+TEST (held) {
   for (int i = 0; i < DRIVEN_TORQUES; i++) {
     double exact[6];
     pw_signal torque = driven_torque (i);
@@ -80,9 +78,8 @@ static void test_held (void **state) {
   }
 }
 
-static void test_tolerances (void **state) {
+TEST (tolerances) {
   static const char *const method[] = { "erk5+projection", "erk8+projection", "ida+ggl", "ida+baumgarte", "radau+ggl" };
-  (void)state;
   for (int i = 0; i < DRIVEN_TORQUES; i++) {
     double exact[6];
     pw_signal torque = driven_torque (i);
@@ -95,19 +92,15 @@ static void test_tolerances (void **state) {
   }
 }
 
-static void driven_disc (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (driven_disc) {
   pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 2 });
   pw_add_torque (m, &(pw_torque){ .name = "push", .body = { "disc", "ground" } });
 }
 
-static const pw_plugin_table driven_disc_table = TRIAL_TABLE (driven_disc);
-
 /* A pulse is not stepped over, however short it is and however large the steps before it are. */
-static void test_short_pulse (void **state) {
+TEST (short_pulse) {
   static const char *const method[] = { "erk5", "erk8", "rk4", "ida" };
   pw_signal force = { PW_PULSE, .pulse = { .height = 1000, .start = 70. / 3, .width = 1e-3 } };
-  (void)state;
   for (int i = 0; i < 4; i++) {
     double q[3], v[3];
     pw_error error = { 0 };
@@ -121,11 +114,10 @@ static void test_short_pulse (void **state) {
 }
 
 /* The model copies the points of a table. */
-static void test_copies (void **state) {
+TEST (copies) {
   double t[] = { 0, 1, 2, 3 }, y[] = { 0, 0.1, 0.2, 0.1 }, q[2][6], v[6];
   pw_signal torque = { PW_TABLE, .table = { t, y, 4, PW_CUBIC, 0, 0, 0 } };
   pw_error error = { 0 };
-  (void)state;
   driven_run (&torque, "rk4", &(pw_settings){ .step = 0.01 }, q[0], NULL);
   pw_model *m = scene_model (&scene_ezyroller, NULL);
   check_ok (pw_model_set_signal (m, "rider", "value", &torque, &error), &error);
@@ -138,10 +130,9 @@ static void test_copies (void **state) {
 }
 
 /* A crank driven through the points of a cubic table, at which its acceleration has kinks. */
-static void driven_crank (pw_model *m, const void *parameters) {
+SCENE (driven_crank) {
   enum { POINTS = 41 };
   double t[POINTS], angle[POINTS];
-  (void)parameters;
   for (int i = 0; i < POINTS; i++) {
     double x = 2 * PW_PI * i / (POINTS - 1);
     t[i] = 0.1 * i;
@@ -164,12 +155,10 @@ static void driven_crank (pw_model *m, const void *parameters) {
 
 /* Methods of order > 2 end their steps at the kinks: few steps are rejected, and the error is below rtol = 1e-10.
  * Without that, a hundred would be rejected, and the error would be 2e-9. */
-static void test_knots (void **state) {
-  static const pw_plugin_table table = TRIAL_TABLE (driven_crank);
+TEST (knots) {
   double exact[6], q[6], v[6];
   pw_statistics cost;
-  (void)state;
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (&driven_crank_table, NULL);
   runs_state (s, "erk8+projection", &(pw_settings){ .rtol = 1e-13, .span = 4 }, 4, exact, v, NULL);
   runs_state (s, "erk8+projection", &(pw_settings){ .rtol = 1e-10, .span = 4 }, 4, q, v, &cost);
   assert_true (cost.rejected < 5 && cost.steps >= 40);
@@ -179,11 +168,4 @@ static void test_knots (void **state) {
   runs_state (s, "bdf+projection", &(pw_settings){ .rtol = 1e-6, .span = 4 }, 4, q, v, &cost);
   assert_true (cost.steps < 700); /* about 350; 900 if the method restarted at each point */
   pw_system_free (s);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_order),      cmocka_unit_test (test_held),
-                                      cmocka_unit_test (test_tolerances), cmocka_unit_test (test_short_pulse),
-                                      cmocka_unit_test (test_copies),     cmocka_unit_test (test_knots) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

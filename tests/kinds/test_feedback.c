@@ -29,10 +29,9 @@ static const pw_parameter feedback_list[] = { { PW_AT (feedback_parameters, sign
 
 /* Two rods: the hinge of the first one is damped, and air resists the motion of the second one.  The described initial
  * velocities are inconsistent. */
-static void feedback_build (pw_model *m, const void *parameters) {
+SCENE_WITH (feedback_build, feedback_list, feedback_parameters) {
   static const char *const omega[] = { "a.omega", NULL }, *const vx[] = { "b.vx", NULL },
                            *const vy[] = { "b.vy", NULL };
-  const feedback_parameters *p = parameters;
   pw_add_body (m, &(pw_body){ .name = "a", .mass = 1, .inertia = 1. / 12, .start = { 0.5 }, .rate = { 0, 0, 1 } });
   pw_add_body (m, &(pw_body){ .name = "b", .mass = 1, .inertia = 1. / 12, .start = { 1.5 } });
   pw_add_pin (m, &(pw_pin){ .name = "A", .body = { "a", "ground" }, .at = { { -0.5 } } });
@@ -47,14 +46,11 @@ static void feedback_build (pw_model *m, const void *parameters) {
   }
 }
 
-static const pw_plugin_table feedback_table =
-    TRIAL_TABLE_WITH (feedback_build, feedback_list, sizeof (feedback_parameters));
-
 /* q and a at 1 s and, from state[12] on, 0.3 steps earlier. */
 static void feedback_run (const char *method, double signals, double step, double state[24]) {
   pw_error error = { 0 };
   pw_sample x;
-  pw_system *s = scene_system (&feedback_table, "signals", signals, NULL);
+  pw_system *s = scene_system (&feedback_build_table, "signals", signals, NULL);
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = step, .rtol = 1e-8, .span = 1 });
   runs_to (r, 1);
   for (int i = 0; i < 2; i++, state += 12) {
@@ -65,9 +61,8 @@ static void feedback_run (const char *method, double signals, double step, doubl
   runs_close (r, s);
 }
 
-static void test_methods (void **state) {
+TEST (methods) {
   char name[40];
-  (void)state;
   for (int i = 0; runs_method (i, name); i++) {
     int adaptive = runs_method (i, name)->adaptive;
     double with[24], without[24], step = adaptive ? 1e-6 : 0.01; /* adaptive: less than the last step of any method */
@@ -80,17 +75,11 @@ static void test_methods (void **state) {
 }
 
 /* leapfrog would be of order 1 if signals at the end of a step were evaluated with the velocities of its middle. */
-static void test_order (void **state) {
+TEST (order) {
   double exact[24], coarse[24], fine[24];
-  (void)state;
   feedback_run ("erk8+projection", 0, 1e-6, exact);
   feedback_run ("leapfrog+rattle", 1, 0.01, coarse);
   feedback_run ("leapfrog+rattle", 1, 0.005, fine);
   double order = log2 (fabs (coarse[2] - exact[2]) / fabs (fine[2] - exact[2]));
   check_close ("order of leapfrog", order, 2, 0.1, "over one halving");
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_methods), cmocka_unit_test (test_order) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

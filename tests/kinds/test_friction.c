@@ -33,10 +33,7 @@ static const pw_parameter friction_list[] = {
   { .name = NULL },
 };
 
-#define FRICTION_TABLE(build) TRIAL_TABLE_WITH (build, friction_list, sizeof (friction_parameters))
-
-static void friction_discs (pw_model *m, const void *parameters) {
-  const friction_parameters *p = parameters;
+SCENE_WITH (friction_discs, friction_list, friction_parameters) {
   pw_add_body (m, &(pw_body){ .name = "a", .mass = 1, .inertia = friction_d.I[0], .rate = { 0, 0, friction_d.w } });
   pw_add_body (m, &(pw_body){ .name = "b", .mass = 1, .inertia = friction_d.I[1] });
   pw_add_pin (m, &(pw_pin){ .name = "O", .body = { "a", "b" } });
@@ -44,8 +41,6 @@ static void friction_discs (pw_model *m, const void *parameters) {
       m, &(pw_friction){
              .name = "rub", .body = { "b", "a" }, .viscous = p->viscous, .limit = p->limit, .speed = p->speed });
 }
-
-static const pw_plugin_table friction_discs_table = FRICTION_TABLE (friction_discs);
 
 static void friction_rub (const char *method, double viscous, double limit, double bound, const char *reason) {
   pw_system *s = scene_system (&friction_discs_table, "viscous", viscous, "limit", limit, NULL);
@@ -64,8 +59,7 @@ static void friction_rub (const char *method, double viscous, double limit, doub
   runs_close (r, s);
 }
 
-static void test_discs (void **state) {
-  (void)state;
+TEST (discs) {
   friction_rub ("rk4+projection", 0.4, 0, 1e-10, "(h k)^4 at h = 1e-3 and k = 2/s");
   friction_rub ("rk4+projection", 0, 0.3, 1e-10, "(h k)^4 at h = 1e-3 and k = 3/s");
   friction_rub ("ida+ggl", 0, 0.3, 1e-6, "1e4 rtol");
@@ -75,8 +69,7 @@ static void test_discs (void **state) {
 
 static const struct { double m[2], v, psi, w0; } friction_b = { { 0.7, 2.1 }, 1.8, 0.4, 0.3 };
 
-static void friction_beam (pw_model *m, const void *parameters) {
-  const friction_parameters *p = parameters;
+SCENE_WITH (friction_beam, friction_list, friction_parameters) {
   double c = cos (friction_b.psi), s = sin (friction_b.psi);
   pw_add_body (m, &(pw_body){ .name = "block",
                               .mass = friction_b.m[0],
@@ -95,8 +88,7 @@ static void friction_beam (pw_model *m, const void *parameters) {
 
 /* The line passes through both centres of mass: nothing turns, the relative velocity is that of the reduced mass. */
 static void friction_slide (const char *method, double viscous, double limit, double bound, const char *reason) {
-  static const pw_plugin_table table = FRICTION_TABLE (friction_beam);
-  pw_system *s = scene_system (&table, "viscous", viscous, "limit", limit, "speed", friction_b.w0, NULL);
+  pw_system *s = scene_system (&friction_beam_table, "viscous", viscous, "limit", limit, "speed", friction_b.w0, NULL);
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-10, .span = 2, .ledger = 1 });
   double M = friction_b.m[0] * friction_b.m[1] / (friction_b.m[0] + friction_b.m[1]);
   for (int i = 1; i <= 4; i++) {
@@ -111,15 +103,13 @@ static void friction_slide (const char *method, double viscous, double limit, do
   runs_close (r, s);
 }
 
-static void test_slide (void **state) {
-  (void)state;
+TEST (slide) {
   friction_slide ("rk4+projection", 0.5, 0, 1e-10, "(h k)^4 at h = 1e-3 and k = 1/s");
   friction_slide ("rk4+projection", 0, 0.6, 1e-10, "(h k)^4 at h = 1e-3 and k = 4/s");
   friction_slide ("ida+ggl", 0, 0.6, 1e-6, "1e4 rtol");
 }
 
-static void test_refused (void **state) {
-  (void)state;
+TEST (refused) {
   scene_refused (scene_model (&friction_discs_table, "limit", 0.2, "speed", 0.0, NULL),
                  "model scene: friction rub: speed = 0: expected > 0, since below it the limit is smoothed");
 }
@@ -128,8 +118,7 @@ static void test_refused (void **state) {
 
 static const struct { double m, I, v, w, turning, turning_quadratic; } friction_a = { 1.4, 0.2, 3, -5, 0.1, 0.05 };
 
-static void friction_flight (pw_model *m, const void *parameters) {
-  const friction_parameters *p = parameters;
+SCENE_WITH (friction_flight, friction_list, friction_parameters) {
   pw_add_body (m, &(pw_body){ .name = "ball",
                               .mass = friction_a.m,
                               .inertia = friction_a.I,
@@ -141,8 +130,6 @@ static void friction_flight (pw_model *m, const void *parameters) {
                               .turning = friction_a.turning,
                               .turning_quadratic = friction_a.turning_quadratic });
 }
-
-static const pw_plugin_table friction_flight_table = FRICTION_TABLE (friction_flight);
 
 static void friction_fly (const char *method, double linear, double quadratic, double bound, const char *reason) {
   pw_system *s = scene_system (&friction_flight_table, "linear", linear, "quadratic", quadratic, NULL);
@@ -164,8 +151,7 @@ static void friction_fly (const char *method, double linear, double quadratic, d
   runs_close (r, s);
 }
 
-static void test_flight (void **state) {
-  (void)state;
+TEST (flight) {
   friction_fly ("rk4", 0, 0.4, 1e-10, "(h k)^4 at h = 1e-3 and k = 2/s");
   friction_fly ("rk4", 0.5, 0, 1e-10, "(h k)^4 at h = 1e-3 and k = 2/s");
   friction_fly ("rk4", 0.3, 0.4, 1e-10, "(h k)^4 at h = 1e-3 and k = 2/s");
@@ -176,9 +162,8 @@ static void test_flight (void **state) {
 
 static const struct { double m, v, psi, L, v0; } friction_c = { 2, 1.5, 0.7, 1.2, 0.4 };
 
-static void friction_cart (pw_model *m, const void *parameters) {
+SCENE (friction_cart) {
   double c = cos (friction_c.psi), s = sin (friction_c.psi);
-  (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "cart",
                               .mass = friction_c.m,
                               .inertia = 0.2,
@@ -194,8 +179,7 @@ static void friction_cart (pw_model *m, const void *parameters) {
 }
 
 static void friction_coast (const char *method, double bound, const char *reason) {
-  static const pw_plugin_table table = TRIAL_TABLE (friction_cart);
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (&friction_cart_table, NULL);
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-10, .span = 3, .ledger = 1 });
   for (int i = 1; i <= 4; i++) {
     double t = i, v = friction_coulomb (friction_c.v, t, friction_c.m, friction_c.L, friction_c.v0);
@@ -208,16 +192,14 @@ static void friction_coast (const char *method, double bound, const char *reason
   runs_close (r, s);
 }
 
-static void test_coast (void **state) {
-  (void)state;
+TEST (coast) {
   friction_coast ("rk4+projection", 1e-10, "(h k)^4 at h = 1e-3 and k = 1.5/s");
   friction_coast ("ida+ggl", 1e-6, "1e4 rtol");
 }
 
 /* ---- By all methods: a car and a trailer that are slowed down by all of these elements ---- */
 
-static void friction_car (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (friction_car) {
   pw_add_body (m, &(pw_body){ .name = "car", .mass = 3, .inertia = 0.4, .rate = { 2, 0.2, 0.5 } });
   pw_add_body (m, &(pw_body){ .name = "trailer", .mass = 1, .inertia = 0.1, .start = { -1 }, .rate = { 2 } });
   pw_add_pin (m, &(pw_pin){ .name = "H", .body = { "car", "trailer" }, .at = { { -0.5, 0 }, { 0.5, 0 } } });
@@ -245,15 +227,6 @@ static void friction_car (pw_model *m, const void *parameters) {
       m, &(pw_rolling_resistance){ .name = "F", .body = "car", .at = { 0.4, -0.2 }, .limit = 0.5, .speed = 0.3 });
 }
 
-static void test_methods (void **state) {
-  static const pw_plugin_table car = TRIAL_TABLE (friction_car);
-  (void)state;
-  trial (&car, 2);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_discs),   cmocka_unit_test (test_slide),
-                                      cmocka_unit_test (test_refused), cmocka_unit_test (test_flight),
-                                      cmocka_unit_test (test_coast),   cmocka_unit_test (test_methods) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
+TEST (methods) {
+  trial (&friction_car_table, 2);
 }

@@ -22,8 +22,7 @@ static const pw_parameter gear_list[] = {
 static const double gear_I[2] = { 0.2, 1.1 }, gear_T = 0.7;
 
 /* Two bodies pinned to the ground, the first one driven by a torque.  The second one is a gear or the carrier. */
-static void gear_build (pw_model *m, const void *parameters) {
-  const gear_parameters *p = parameters;
+SCENE_WITH (gear_build, gear_list, gear_parameters) {
   pw_add_body (m, &(pw_body){ .name = "in", .mass = 1, .inertia = gear_I[0], .start = { 0, 0, 0.4 } });
   pw_add_body (m, &(pw_body){ .name = "out", .mass = 1, .inertia = gear_I[1], .start = { 2, 0, -0.3 } });
   pw_add_pin (m, &(pw_pin){ .name = "O", .body = { "in", "ground" } });
@@ -36,11 +35,9 @@ static void gear_build (pw_model *m, const void *parameters) {
   pw_add_torque (m, &(pw_torque){ .name = "T", .body = { "in", "ground" }, .value = GEAR_CONSTANT (gear_T) });
 }
 
-static const pw_plugin_table gear_table = TRIAL_TABLE_WITH (gear_build, gear_list, sizeof (gear_parameters));
-
 /* phi_in' = i phi_out':  (I_in + I_out / i^2) phi_in'' = T;  with a fixed ring phi_in' = (1 - i) phi_out' (Willis). */
 static void gear_turn (double ratio, double held) {
-  pw_system *s = scene_system (&gear_table, "ratio", ratio, "held", held, NULL);
+  pw_system *s = scene_system (&gear_build_table, "ratio", ratio, "held", held, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-2, .ledger = 1 });
   const double bound = 1e5 * CHECK_EPS;
   const char *reason = "RK4 is exact for parabolas: round-off of 200 steps";
@@ -56,8 +53,7 @@ static void gear_turn (double ratio, double held) {
   runs_close (r, s);
 }
 
-static void test_turn (void **state) {
-  (void)state;
+TEST (turn) {
   gear_turn (-3, 0);
   gear_turn (2.5, 0);
   gear_turn (-3, 1);
@@ -65,9 +61,8 @@ static void test_turn (void **state) {
 }
 
 /* The initial angles do not have the given offset: both are changed to satisfy the constraint. */
-static void test_offset (void **state) {
-  (void)state;
-  pw_system *s = scene_system (&gear_table, "from", (double)PW_GEAR_OFFSET, "offset", 0.25, NULL);
+TEST (offset) {
+  pw_system *s = scene_system (&gear_build_table, "from", (double)PW_GEAR_OFFSET, "offset", 0.25, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-2 });
   const double *q = pw_run_initial (r)->q;
   check_close ("offset", q[2] + 3 * q[5], 0.25, 100 * CHECK_EPS, "the constraint");
@@ -76,27 +71,23 @@ static void test_offset (void **state) {
   runs_close (r, s);
 }
 
-static void gear_twice (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (gear_twice) {
   pw_add_body (m, &(pw_body){ .name = "a", .mass = 1, .inertia = 1 });
   pw_add_body (m, &(pw_body){ .name = "b", .mass = 1, .inertia = 1 });
   pw_add_gear (m, &(pw_gear){ .name = "gear", .body = { "a", "b", "a" }, .ratio = 2 });
 }
 
-static void test_refused (void **state) {
-  static const pw_plugin_table twice = TRIAL_TABLE (gear_twice);
-  (void)state;
-  scene_refused (scene_model (&gear_table, "ratio", 0.0, NULL),
+TEST (refused) {
+  scene_refused (scene_model (&gear_build_table, "ratio", 0.0, NULL),
                  "model scene: gear gear: ratio = 0: expected another number, positive or negative");
-  scene_refused (scene_model (&twice, NULL),
+  scene_refused (scene_model (&gear_twice_table, NULL),
                  "model scene: gear gear: two of its bodies are \"a\": expected different ones");
 }
 
 /* ---- By all methods: a sun, a planet on a carrier, a ring, all of which can turn ---- */
 
-static void gear_planetary (pw_model *m, const void *parameters) {
+SCENE (gear_planetary) {
   const double sun = 0.3, planet = 0.2, ring = sun + 2 * planet, arm = sun + planet;
-  (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "sun", .mass = 1, .inertia = 0.1 });
   pw_add_body (m, &(pw_body){ .name = "ring", .mass = 2, .inertia = 0.6, .rate = { 0, 0, 0.5 } });
   pw_add_body (m, &(pw_body){ .name = "carrier", .mass = 0.5, .inertia = 0.05 });
@@ -110,14 +101,6 @@ static void gear_planetary (pw_model *m, const void *parameters) {
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 } });
 }
 
-static void test_methods (void **state) {
-  static const pw_plugin_table planetary = TRIAL_TABLE (gear_planetary);
-  (void)state;
-  trial (&planetary, 1.5);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_turn), cmocka_unit_test (test_offset),
-                                      cmocka_unit_test (test_refused), cmocka_unit_test (test_methods) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
+TEST (methods) {
+  trial (&gear_planetary_table, 1.5);
 }

@@ -7,8 +7,7 @@
 
 /* ---- Free fall ---- */
 
-static void gravity_fall (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (gravity_fall) {
   pw_add_body (m, &(pw_body){ .name = "stone", .mass = 3, .inertia = 0.1, .start = { 1, 2 }, .rate = { 4, 5, 6 } });
   pw_add_body (m, &(pw_body){ .name = "wing", .start = { 1.5, 2 } });
   pw_add_weld (m, &(pw_weld){ .name = "W", .body = { "stone", "wing" }, .at = { { 0.5, 0 }, { 0, 0 } } });
@@ -16,10 +15,8 @@ static void gravity_fall (pw_model *m, const void *parameters) {
 }
 
 /* The centre of mass moves on a parabola, which rk4 integrates exactly; the wing is massless. */
-static void test_fall (void **state) {
-  (void)state;
-  static const pw_plugin_table table = TRIAL_TABLE (gravity_fall);
-  pw_system *s = scene_system (&table, NULL);
+TEST (fall) {
+  pw_system *s = scene_system (&gravity_fall_table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 0.01, .ledger = 1 });
   pw_sample x = runs_to (r, 2);
   double bound = 200 * 8 * CHECK_EPS, size = 20;
@@ -35,16 +32,14 @@ static void test_fall (void **state) {
 
 /* ---- Knife edge on an incline: x = k sin^2 wt, y = k (wt - sin (2wt) / 2), k = g sin alpha / 2w^2 ---- */
 
-static void gravity_incline (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (gravity_incline) {
   pw_add_body (m, &(pw_body){ .name = "skate", .mass = 2, .inertia = 0.3, .rate = { 0, 0, 1 } });
   pw_add_wheel (m, &(pw_wheel){ .name = "edge", .body = "skate" });
   pw_add_gravity (m, &(pw_gravity){ .name = "slope", .acceleration = { 9.81 * 0.5, 0 } });
 }
 
 static void gravity_skate (const char *method, double bound, const char *reason) {
-  static const pw_plugin_table table = TRIAL_TABLE (gravity_incline);
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (&gravity_incline_table, NULL);
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-10, .span = 10, .ledger = 1 });
   for (int t = 1; t <= 10; t++) {
     pw_sample x = runs_to (r, t);
@@ -60,8 +55,7 @@ static void gravity_skate (const char *method, double bound, const char *reason)
   runs_close (r, s);
 }
 
-static void test_incline (void **state) {
-  (void)state;
+TEST (incline) {
   gravity_skate ("rk4+projection", 1e-10, "100 h^4 at h = 1e-3");
   gravity_skate ("ida+ggl", 1e-6, "1e4 rtol");
   gravity_skate ("ida+baumgarte", 1e-6, "1e4 rtol");
@@ -69,17 +63,13 @@ static void test_incline (void **state) {
 
 /* ---- A pendulum of a point mass on a massless rod, from the horizontal (IFToMM A01) ---- */
 
-static void gravity_pendulum (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (gravity_pendulum) {
   pw_add_body (m, &(pw_body){ .name = "bob", .mass = 1, .start = { 1, 0, 0 } });
   pw_add_pin (m, &(pw_pin){ .name = "O", .body = { "bob", "ground" }, .at = { { -1, 0 }, { 0, 0 } } });
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 } });
 }
 
-static const pw_plugin_table gravity_pendulum_table = TRIAL_TABLE (gravity_pendulum);
-
-static void test_pendulum (void **state) {
-  (void)state;
+TEST (pendulum) {
   pw_system *s = scene_system (&gravity_pendulum_table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .ledger = 1 });
   pw_sample x = runs_to (r, 10);
@@ -143,19 +133,15 @@ static const pw_kind gravity_kind_drag = {
   .loss = gravity_drag_loss,
 };
 
-static void gravity_rain (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (gravity_rain) {
   pw_add_body (m, &(pw_body){ .name = "drop", .mass = 0.5, .inertia = 1, .rate = { 2, 3 } });
   pw_add_body (m, &(pw_body){ .name = "hail", .mass = 2, .inertia = 1 });
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 } });
   pw_add (m, &gravity_kind_drag, &(gravity_drag){ .name = "air", .c = 0.8 });
 }
 
-static const pw_plugin_table gravity_rain_table = TRIAL_TABLE (gravity_rain);
-
 /* Each body has its own terminal velocity, v = m g / c (exp (-c t / m) - 1) from rest, and its own ledger entry. */
-static void test_each_body (void **state) {
-  (void)state;
+TEST (each_body) {
   static const double mass[] = { 0.5, 2 }, up[] = { 3, 0 };
   static const char *const entry[] = { "air.drop.loss", "air.hail.loss" };
   pw_system *s = scene_system (&gravity_rain_table, NULL);
@@ -173,15 +159,7 @@ static void test_each_body (void **state) {
   runs_close (r, s);
 }
 
-static void test_methods (void **state) {
-  (void)state;
+TEST (methods) {
   trial (&gravity_pendulum_table, 3);
   trial (&gravity_rain_table, 1);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_fall), cmocka_unit_test (test_incline),
-                                      cmocka_unit_test (test_pendulum), cmocka_unit_test (test_each_body),
-                                      cmocka_unit_test (test_methods) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -17,9 +17,8 @@
 #define MARKER_TIP "  - {marker: tip, body: arm, at: [40, -3]}\n"
 
 /* Tolerances and residuals refer to the length of the scene, which a distant marker does not change. */
-static void test_without_effect (void **state) {
+TEST (without_effect) {
   char *bare;
-  (void)state;
   cli_write ("arm.yaml", MARKER_ARM);
   cli_good ("pinwheel run @/arm.yaml --t-end 2 --method erk5+projection --energy -o @/bare.csv");
   bare = strdup (cli_file ("bare.csv"));
@@ -33,9 +32,8 @@ static void test_without_effect (void **state) {
 }
 
 /* P = r + R(phi) s */
-static void test_place (void **state) {
+TEST (place) {
   double t, x, y, phi, vx, vy, omega, px, py;
-  (void)state;
   cli_write ("arm.yaml", MARKER_ARM MARKER_TIP);
   cli_good ("pinwheel run @/arm.yaml --t-end 1 -o @/marked.csv && tail -1 @/marked.csv >@/last");
   const char *row = cli_file ("last");
@@ -48,8 +46,7 @@ static void test_place (void **state) {
 #define MARKER_WHEELS "# wheels, before: x [m], y [m], t [s], number of the body\n"
 
 /* Figures show its path, and, other than for wheels, no heading. */
-static void test_figures (void **state) {
-  (void)state;
+TEST (figures) {
   cli_write ("arm.yaml", MARKER_ARM MARKER_TIP);
   assert_int_equal (cli_run ("pinwheel run @/arm.yaml -t 1 --plots @/plots --animate @/arm.html"), 0);
   assert_non_null (strstr (cli_file ("plots/paths.svg"), "paths of the markers<"));
@@ -64,8 +61,4 @@ static void test_figures (void **state) {
   assert_non_null (strstr (cli_file ("arm.html"), "{\"name\": \"T\", \"body\": 0, \"rolls\": true}"));
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_without_effect), cmocka_unit_test (test_place),
-                                      cmocka_unit_test (test_figures) };
-  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
-}
+const check_fixture fixture = { cli_setup, cli_teardown };

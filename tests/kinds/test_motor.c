@@ -23,8 +23,8 @@ static const pw_parameter motor_list[] = {
   { .name = NULL },
 };
 
-static void motor_oscillator (pw_model *m, const void *parameters) {
-  int driven = ((const motor_parameters *)parameters)->driven > 0;
+SCENE_WITH (motor_oscillator, motor_list, motor_parameters) {
+  int driven = p->driven > 0;
   pw_add_body (m, &(pw_body){ .name = "a",
                               .mass = 1,
                               .inertia = motor_o.I[0],
@@ -43,9 +43,6 @@ static void motor_oscillator (pw_model *m, const void *parameters) {
         &(pw_rotational_spring){
             .name = "M", .body = { "a", "b" }, .stiffness = motor_o.k, .damping = motor_o.c, .angle = motor_o.beta });
 }
-
-static const pw_plugin_table motor_oscillator_table =
-    TRIAL_TABLE_WITH (motor_oscillator, motor_list, sizeof (motor_parameters));
 
 static void motor_swing (const char *method, double driven, double bound, const char *reason) {
   pw_system *s = scene_system (&motor_oscillator_table, "driven", driven, NULL);
@@ -72,8 +69,7 @@ static void motor_swing (const char *method, double driven, double bound, const 
   runs_close (r, s);
 }
 
-static void test_oscillator (void **state) {
-  (void)state;
+TEST (oscillator) {
   for (int driven = 0; driven < 2; driven++) {
     motor_swing ("rk4", driven, 1e-9, "(h w)^4 at h = 1e-3 and w = 4/s");
     motor_swing ("ida", driven, 1e-6, "1e4 rtol");
@@ -84,15 +80,12 @@ static void test_oscillator (void **state) {
  *
  *   I w' = L tanh (c (u - w) / L):  sinh (c (u - w) / L) decays as exp (-c t / I);  the work is I w^2 / 2 */
 
-static void motor_start (pw_model *m, const void *parameters) {
-  const motor_parameters *p = parameters;
+SCENE_WITH (motor_start, motor_list, motor_parameters) {
   pw_add_body (m, &(pw_body){ .name = "rotor", .mass = 1, .inertia = 0.4 });
   pw_add_motor (
       m, &(pw_motor){
              .name = "M", .body = { "rotor", "ground" }, .damping = 2, .limit = p->limit, .rate = MOTOR_CONSTANT (3) });
 }
-
-static const pw_plugin_table motor_start_table = TRIAL_TABLE_WITH (motor_start, motor_list, sizeof (motor_parameters));
 
 static void motor_run_up (const char *method, double limit, double bound, const char *reason) {
   pw_system *s = scene_system (&motor_start_table, "limit", limit, NULL);
@@ -109,8 +102,7 @@ static void motor_run_up (const char *method, double limit, double bound, const 
   runs_close (r, s);
 }
 
-static void test_limit (void **state) {
-  (void)state;
+TEST (limit) {
   motor_run_up ("rk4", 0, 1e-9, "(h k)^4 at h = 1e-3 and k = 5/s");
   motor_run_up ("rk4", 1.5, 1e-9, "(h k)^4 at h = 1e-3 and k = 5/s");
   motor_run_up ("ida", 1.5, 1e-6, "1e4 rtol");
@@ -123,16 +115,14 @@ static void test_limit (void **state) {
 
 static const struct { double m, I, w, F; } motor_f = { 1.2, 0.3, 1.7, 0.9 };
 
-static void motor_thrust (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (motor_thrust) {
   pw_add_body (m, &(pw_body){ .name = "ship", .mass = motor_f.m, .inertia = motor_f.I, .rate = { 0, 0, motor_f.w } });
   pw_add_force (
       m, &(pw_force){
              .name = "F", .body = "ship", .at = { -0.5, 0 }, .axes = PW_AXES_BODY, .fx = MOTOR_CONSTANT (motor_f.F) });
 }
 
-static void motor_push (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (motor_push) {
   pw_add_body (m, &(pw_body){ .name = "ship", .mass = motor_f.m, .inertia = motor_f.I, .rate = { 0, 0, motor_f.w } });
   pw_add_force (m, &(pw_force){ .name = "F",
                                 .body = "ship",
@@ -142,10 +132,9 @@ static void motor_push (pw_model *m, const void *parameters) {
 }
 
 static void motor_fly (const char *method, double bound, const char *reason) {
-  static const pw_plugin_table thrust = TRIAL_TABLE (motor_thrust), push = TRIAL_TABLE (motor_push);
   const double t = 2, w = motor_f.w, a = motor_f.F / motor_f.m;
   const pw_settings settings = { .step = 1e-3, .rtol = 1e-10, .span = t, .ledger = 1 };
-  pw_system *s = scene_system (&thrust, NULL);
+  pw_system *s = scene_system (&motor_thrust_table, NULL);
   pw_run *r = runs_open (s, method, &settings);
   pw_sample x = runs_to (r, t);
   check_close ("vx", x.v[0], a * sin (w * t) / w, bound, reason);
@@ -155,7 +144,7 @@ static void motor_fly (const char *method, double bound, const char *reason) {
   check_close ("y", x.q[1], a * (t - sin (w * t) / w) / w, bound, reason);
   check_close ("work", x.work, motor_f.m * a * a * (1 - cos (w * t)) / (w * w), bound, reason);
   runs_close (r, s);
-  s = scene_system (&push, NULL);
+  s = scene_system (&motor_push_table, NULL);
   r = runs_open (s, method, &settings);
   x = runs_to (r, t);
   double c = cos (x.q[2]), sn = sin (x.q[2]), X = x.q[0] - 0.5 * c - 0.2 * sn + 0.5,
@@ -168,16 +157,14 @@ static void motor_fly (const char *method, double bound, const char *reason) {
   runs_close (r, s);
 }
 
-static void test_force (void **state) {
-  (void)state;
+TEST (force) {
   motor_fly ("rk4", 1e-10, "(h w)^4 at h = 1e-3 and w = 2/s");
   motor_fly ("ida", 1e-6, "1e4 rtol");
 }
 
 /* ---- By all methods: an arm of two links with a motor, a spring and forces; signals that read states ---- */
 
-static void motor_arm (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (motor_arm) {
   pw_add_body (m, &(pw_body){ .name = "upper", .mass = 1, .inertia = 0.08, .start = { 0.5 } });
   pw_add_body (m, &(pw_body){ .name = "lower", .mass = 0.6, .inertia = 0.04, .start = { 1.4 } });
   pw_add_pin (m, &(pw_pin){ .name = "A", .body = { "upper", "ground" }, .at = { { -0.5, 0 }, { 0, 0 } } });
@@ -211,10 +198,9 @@ static int motor_follow (void *context, double t, const double *x, double value[
 }
 
 /* A motor whose targets are twice the angle and the rate of another body, and a force that depends on that rate. */
-static void motor_leader (pw_model *m, const void *parameters) {
+SCENE (motor_leader) {
   static const char *const angle[] = { "leader.phi", NULL }, *const rate[] = { "leader.omega", NULL };
   static double twice = 2, brake = -0.3;
-  (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "leader", .mass = 1, .inertia = 0.5, .rate = { 0, 0, 1 } });
   pw_add_body (m, &(pw_body){ .name = "follower", .mass = 1, .inertia = 0.1, .start = { 1 }, .rate = { 0.5 } });
   pw_add_pin (m, &(pw_pin){ .name = "P", .body = { "leader", "ground" } });
@@ -236,15 +222,7 @@ static void motor_leader (pw_model *m, const void *parameters) {
   pw_add_rotational_spring (m, &(pw_rotational_spring){ .name = "k", .body = { "leader", "ground" }, .stiffness = 2 });
 }
 
-static void test_methods (void **state) {
-  static const pw_plugin_table arm = TRIAL_TABLE (motor_arm), leader = TRIAL_TABLE (motor_leader);
-  (void)state;
-  trial (&arm, 1.5);
-  trial (&leader, 1.5);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_oscillator), cmocka_unit_test (test_limit),
-                                      cmocka_unit_test (test_force), cmocka_unit_test (test_methods) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
+TEST (methods) {
+  trial (&motor_arm_table, 1.5);
+  trial (&motor_leader_table, 1.5);
 }

@@ -12,8 +12,7 @@ static double planimeter_phi (void) {
 }
 
 /* k = 0.6: each round turns the rod by 2 pi (1 - sqrt (1 - k^2)) = 2 pi 0.2; after five of them it is back. */
-static void test_comes_back (void **state) {
-  (void)state;
+TEST (comes_back) {
   cli_good ("pinwheel run hatchet-planimeter --json -");
   check_close ("phi", planimeter_phi (), 6.28318530717958648, 100 * H4, "100 h^4");
   check_close ("x", cli_number (cli_out, "bodies", "rod", "x", NULL), 0.025, 100 * H4, "100 h^4");
@@ -24,8 +23,7 @@ static void test_comes_back (void **state) {
 }
 
 /* k = 0.28, sqrt (1 - k^2) = 0.96: the turn per round is nearly the area of a small circle in units of L^2, pi k^2. */
-static void test_area (void **state) {
-  (void)state;
+TEST (area) {
   cli_good ("pinwheel run hatchet-planimeter --set r=0.07 --t-end 50 --json -");
   double turn = planimeter_phi () / 25, area = 3.14159265358979324 * 0.28 * 0.28;
   check_close ("turn", turn, 2 * 3.14159265358979324 * 0.04, 100 * H4, "100 h^4");
@@ -34,8 +32,7 @@ static void test_area (void **state) {
 }
 
 /* With r > L the knife edge follows the point on a circle of radius sqrt (r^2 - L^2). */
-static void test_long_radius (void **state) {
-  (void)state;
+TEST (long_radius) {
   cli_good ("pinwheel run hatchet-planimeter --set r=0.65 --json - -o @/drawn.csv");
   check_close ("omega", cli_number (cli_out, "bodies", "rod", "omega", NULL), 3.14159265358979324, 100 * H4, "100 h^4");
   cli_good (
@@ -47,26 +44,19 @@ static void test_long_radius (void **state) {
 }
 
 /* The motion is prescribed and does not depend on the mass; without mass the reactions are 0. */
-static void test_without_mass (void **state) {
-  (void)state;
+TEST (without_mass) {
   enum { FIXED = 3 }; /* methods with fixed steps, which come first */
   static const char *const method[] = { "rk4+projection", "galpha+ggl", "leapfrog",      "erk8+nullspace",
                                         "adams+none",     "ida+none",   "ida+baumgarte", "ida+index2",
                                         "ida+ggl",        "ida+si1",    "radau+ggl",     "bdf+projection" };
   for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
     int fixed = i < FIXED;
-    char command[200];
-    snprintf (command, sizeof command, "pinwheel run hatchet-planimeter --set m=0 --t-end 2 --method %s --%s --json -",
-              method[i], fixed ? "step=1e-3" : "rtol=1e-8");
-    cli_good (command);
+    cli_good (check_text ("pinwheel run hatchet-planimeter --set m=0 --t-end 2 --method %s --%s --json -", method[i],
+                          fixed ? "step=1e-3" : "rtol=1e-8"));
     check_close (method[i], cli_number (cli_out, "truth", "largest", "angle", NULL), 0, fixed ? 100 * 1e-6 : 1e4 * 1e-8,
                  "100 h^2, or 1e4 rtol");
     check_close (method[i], cli_number (cli_out, "reactions", "hatchet.N", NULL), 0, 1e-15, "no mass, no force");
   }
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_comes_back), cmocka_unit_test (test_area),
-                                      cmocka_unit_test (test_long_radius), cmocka_unit_test (test_without_mass) };
-  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
-}
+const check_fixture fixture = { cli_setup, cli_teardown };

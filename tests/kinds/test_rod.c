@@ -8,9 +8,8 @@
 
 static const struct { double m[2], L, w, vx; } rod_d = { { 1.5, 0.5 }, 0.8, 3, 0.4 };
 
-static void rod_dumbbell (pw_model *m, const void *parameters) {
+SCENE (rod_dumbbell) {
   double r0 = rod_d.L * rod_d.m[1] / (rod_d.m[0] + rod_d.m[1]), r1 = rod_d.L - r0;
-  (void)parameters;
   pw_add_body (
       m, &(pw_body){
              .name = "a", .mass = rod_d.m[0], .inertia = 0.1, .start = { r0 }, .rate = { rod_d.vx, r0 * rod_d.w, 1 } });
@@ -22,8 +21,7 @@ static void rod_dumbbell (pw_model *m, const void *parameters) {
 }
 
 static void rod_whirl (const char *method, double bound, const char *reason) {
-  static const pw_plugin_table table = TRIAL_TABLE (rod_dumbbell);
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (&rod_dumbbell_table, NULL);
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-10, .span = 2, .ledger = 1 });
   double r0 = rod_d.L * rod_d.m[1] / (rod_d.m[0] + rod_d.m[1]), pull = rod_d.m[0] * r0 * rod_d.w * rod_d.w;
   check_below ("start", pw_run_initial (r)->velocity, 16 * CHECK_EPS, "given consistently");
@@ -39,8 +37,7 @@ static void rod_whirl (const char *method, double bound, const char *reason) {
   runs_close (r, s);
 }
 
-static void test_whirl (void **state) {
-  (void)state;
+TEST (whirl) {
   rod_whirl ("rk4+projection", 1e-10, "(h w)^4 at h = 1e-3 and w = 3/s");
   rod_whirl ("ida+ggl", 1e-6, "1e4 rtol");
 }
@@ -56,8 +53,8 @@ static const pw_parameter rod_list[] = {
   { .name = NULL },
 };
 
-static void rod_fourbar (pw_model *m, const void *parameters) {
-  int link = ((const rod_parameters *)parameters)->link > 0;
+SCENE_WITH (rod_fourbar, rod_list, rod_parameters) {
+  int link = p->link > 0;
   const double L = hypot (0.9, 0.3); /* from (0.1, 0.6) to (1, 0.9) */
   pw_add_body (m, &(pw_body){ .name = "crank", .mass = 1, .inertia = 0.05, .start = { 0, 0.3 }, .rate = { 0, 0, 1 } });
   pw_add_body (m, &(pw_body){ .name = "rocker", .mass = 2, .inertia = 0.2, .start = { 1.1, 0.4 } });
@@ -75,10 +72,7 @@ static void rod_fourbar (pw_model *m, const void *parameters) {
   pw_add_pin (m, &(pw_pin){ .name = "B", .body = { "rocker", "link" }, .at = { { -0.1, 0.5 }, { L, 0 } } });
 }
 
-static const pw_plugin_table rod_fourbar_table = TRIAL_TABLE_WITH (rod_fourbar, rod_list, sizeof (rod_parameters));
-
-static void test_link (void **state) {
-  (void)state;
+TEST (link) {
   const char *reason = "(h w)^4 at h = 1e-3 and w = 10/s: two projections";
   pw_system *s = scene_system (&rod_fourbar_table, NULL), *p = scene_system (&rod_fourbar_table, "link", 1.0, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3 }),
@@ -99,8 +93,7 @@ static void test_link (void **state) {
 
 /* ---- By all methods: a chain of bodies on rods with ends off the centres of mass ---- */
 
-static void rod_chain (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (rod_chain) {
   pw_add_body (m, &(pw_body){ .name = "a", .mass = 1, .inertia = 0.1, .start = { 1 }, .rate = { 0, 0.5, 1 } });
   pw_add_body (m, &(pw_body){ .name = "b", .mass = 2, .inertia = 0.2, .start = { 2, 0.2, 0.3 } });
   pw_add_rod (m, &(pw_rod){ .name = "1",
@@ -111,14 +104,6 @@ static void rod_chain (pw_model *m, const void *parameters) {
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -4 } });
 }
 
-static void test_methods (void **state) {
-  static const pw_plugin_table chain = TRIAL_TABLE (rod_chain);
-  (void)state;
-  trial (&chain, 1.5);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_whirl), cmocka_unit_test (test_link),
-                                      cmocka_unit_test (test_methods) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
+TEST (methods) {
+  trial (&rod_chain_table, 1.5);
 }

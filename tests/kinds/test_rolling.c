@@ -19,8 +19,7 @@ static const pw_parameter rolling_list[] = {
 
 static const struct { double m, r, u, w, heading; } rolling_u = { 2, 0.15, 0.4, 0.9, 0.6 };
 
-static void rolling_unicycle (pw_model *m, const void *parameters) {
-  const rolling_parameters *p = parameters;
+SCENE_WITH (rolling_unicycle, rolling_list, rolling_parameters) {
   pw_add_body (m, &(pw_body){ .name = "body", .mass = rolling_u.m, .inertia = 0.1, .rate = { 0, 0, rolling_u.w } });
   pw_add_rolling_wheel (m, &(pw_rolling_wheel){ .name = "wheel",
                                                 .body = "body",
@@ -30,9 +29,6 @@ static void rolling_unicycle (pw_model *m, const void *parameters) {
                                                 .start = 0.5,
                                                 .torque = { .constant = rolling_u.u } });
 }
-
-static const pw_plugin_table rolling_unicycle_table =
-    TRIAL_TABLE_WITH (rolling_unicycle, rolling_list, sizeof (rolling_parameters));
 
 static void rolling_turn (const char *method, double inertia, double bound, const char *reason) {
   const double t = 3, w = rolling_u.w, r = rolling_u.r;
@@ -54,9 +50,8 @@ static void rolling_turn (const char *method, double inertia, double bound, cons
   runs_close (run, system);
 }
 
-static void test_unicycle (void **state) {
+TEST (unicycle) {
   static const double inertia[] = { 0.03, 0 };
-  (void)state;
   for (int i = 0; i < 2; i++) {
     rolling_turn ("rk4+projection", inertia[i], 1e-11, "10 h^4 at h = 1e-3");
     rolling_turn ("rk4+baumgarte", inertia[i], 1e-11, "10 h^4 at h = 1e-3");
@@ -91,21 +86,16 @@ static void rolling_two (pw_model *m, int hub) {
   pw_add_rolling_wheel (m, &wheel);
 }
 
-static void rolling_robot (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (rolling_robot) {
   rolling_two (m, 0);
 }
 
-static void rolling_hub (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (rolling_hub) {
   rolling_two (m, 1);
   pw_add_body (m, &(pw_body){ .name = "hub", .start = { 0, -rolling_r.c } });
   pw_add_drive (m, &(pw_drive){ .name = "slot", .body = { "hub", "robot" }, .what = PW_DRIVE_X });
   pw_add_drive (m, &(pw_drive){ .name = "key", .body = { "hub", "robot" }, .what = PW_DRIVE_ANGLE });
 }
-
-static const pw_plugin_table rolling_robot_table = TRIAL_TABLE (rolling_robot);
-static const pw_plugin_table rolling_hub_table = TRIAL_TABLE (rolling_hub);
 
 /* shares: the parts of the lateral force that the left and the right wheel have. */
 static void rolling_circle (const pw_plugin_table *table, const double shares[2], const char *method, double bound,
@@ -140,9 +130,8 @@ static void rolling_every_method (const pw_plugin_table *table, const double sha
       rolling_circle (table, shares, method, 100 * pow (1e-3, m->order), "100 h^order at h = 1e-3");
 }
 
-static void test_robot (void **state) {
+TEST (robot) {
   static const double halves[] = { 0.5, 0.5 };
-  (void)state;
   char text[200];
   rolling_every_method (&rolling_robot_table, halves);
   pw_system *s = scene_system (&rolling_robot_table, NULL);
@@ -153,9 +142,8 @@ static void test_robot (void **state) {
   runs_close (r, s);
 }
 
-static void test_hub (void **state) {
+TEST (hub) {
   static const double all[] = { 1, 0 };
-  (void)state;
   rolling_every_method (&rolling_hub_table, all);
 }
 
@@ -183,16 +171,14 @@ static void rolling_speed (const char *method, double bound, const char *reason)
   runs_close (run, s);
 }
 
-static void test_motor (void **state) {
-  (void)state;
+TEST (motor) {
   rolling_speed ("rk4+projection", 1e-11, "(h k / J)^4 at h = 1e-3");
   rolling_speed ("ida+ggl", 1e-6, "1e4 rtol");
 }
 
 /* ---- Initial states ---- */
 
-static void rolling_coast (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (rolling_coast) {
   pw_add_body (m, &(pw_body){ .name = "body",
                               .mass = 1,
                               .inertia = 0.1,
@@ -204,10 +190,8 @@ static void rolling_coast (pw_model *m, const void *parameters) {
 }
 
 /* A wheel without a given spin rate takes that with which it rolls; the velocity of the body does not change. */
-static void test_start (void **state) {
-  (void)state;
-  static const pw_plugin_table table = TRIAL_TABLE (rolling_coast);
-  pw_system *s = scene_system (&table, NULL);
+TEST (start) {
+  pw_system *s = scene_system (&rolling_coast_table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", NULL);
   assert_int_equal (pw_run_initial (r)->moved, 0);
   check_close ("spin rate", pw_run_initial (r)->v[3], 2 / 0.2, 64 * CHECK_EPS, "speed of the contact point / radius");
@@ -215,8 +199,7 @@ static void test_start (void **state) {
 }
 
 /* A spin rate set by pw_model_set_initial is kept; the velocity of the body changes. */
-static void test_given (void **state) {
-  (void)state;
+TEST (given) {
   pw_error error = { 0 };
   pw_model *m = scene_model (&rolling_unicycle_table, NULL);
   check_ok (pw_model_set_initial (m, "wheel.spin_rate", 4, &error), &error);
@@ -230,8 +213,7 @@ static void test_given (void **state) {
 
 /* ---- By all methods: a planar bicycle with a driven rear wheel and a free fork with trail ---- */
 
-static void rolling_bicycle (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (rolling_bicycle) {
   pw_add_body (m, &(pw_body){ .name = "frame", .mass = 8, .inertia = 1.2, .rate = { 1, 0, 0 } });
   pw_add_body (m,
                &(pw_body){ .name = "fork", .mass = 1, .inertia = 0.02, .start = { 0.57, 0.03, 0.3 }, .rate = { 1 } });
@@ -247,17 +229,7 @@ static void rolling_bicycle (pw_model *m, const void *parameters) {
       m, &(pw_rolling_wheel){ .name = "front", .body = "fork", .at = { -0.05, 0 }, .heading = 0.1, .radius = 0.25 });
 }
 
-static void test_methods (void **state) {
-  (void)state;
-  static const pw_plugin_table bicycle = TRIAL_TABLE (rolling_bicycle);
-  trial (&bicycle, 2);
+TEST (methods) {
+  trial (&rolling_bicycle_table, 2);
   trial (&rolling_hub_table, 2);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_unicycle), cmocka_unit_test (test_robot),
-                                      cmocka_unit_test (test_hub),      cmocka_unit_test (test_motor),
-                                      cmocka_unit_test (test_start),    cmocka_unit_test (test_given),
-                                      cmocka_unit_test (test_methods) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

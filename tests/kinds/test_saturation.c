@@ -17,14 +17,11 @@ static const pw_parameter saturation_list[] = {
   { .name = NULL },
 };
 
-#define SATURATION_TABLE(build) TRIAL_TABLE_WITH (build, saturation_list, sizeof (saturation))
-
 static void saturation_body (pw_model *m, double vx, double omega) {
   pw_add_body (m, &(pw_body){ .name = "b", .mass = 1, .inertia = 1, .rate = { vx, 0, omega } });
 }
 
-static void saturation_block (pw_model *m, const void *parameters) {
-  const saturation *p = parameters;
+SCENE_WITH (saturation_block, saturation_list, saturation) {
   saturation_body (m, p->v, 0);
   pw_add_slider (m, &(pw_slider){ .name = "s", .body = { "b", "ground" } });
   pw_add_sliding_friction (
@@ -32,8 +29,7 @@ static void saturation_block (pw_model *m, const void *parameters) {
 }
 
 /* A block on a table that moves at 10 m/s. */
-static void saturation_table (pw_model *m, const void *parameters) {
-  const saturation *p = parameters;
+SCENE_WITH (saturation_table, saturation_list, saturation) {
   saturation_body (m, 10 + p->v, 0);
   pw_add_body (m, &(pw_body){ .name = "table", .mass = 1e9, .inertia = 1, .rate = { 10 } });
   pw_add_slider (m, &(pw_slider){ .name = "r", .body = { "table", "ground" } });
@@ -42,22 +38,19 @@ static void saturation_table (pw_model *m, const void *parameters) {
       m, &(pw_sliding_friction){ .name = "f", .body = { "b", "table" }, .limit = 1, .speed = p->speed });
 }
 
-static void saturation_disc (pw_model *m, const void *parameters) {
-  const saturation *p = parameters;
+SCENE_WITH (saturation_disc, saturation_list, saturation) {
   saturation_body (m, 0, p->v);
   pw_add_pin (m, &(pw_pin){ .name = "p", .body = { "b", "ground" } });
   pw_add_friction (m, &(pw_friction){ .name = "f", .body = { "b", "ground" }, .limit = 1, .speed = p->speed });
 }
 
-static void saturation_motor (pw_model *m, const void *parameters) {
-  const saturation *p = parameters;
+SCENE_WITH (saturation_motor, saturation_list, saturation) {
   saturation_body (m, 0, p->v);
   pw_add_pin (m, &(pw_pin){ .name = "p", .body = { "b", "ground" } });
   pw_add_motor (m, &(pw_motor){ .name = "f", .body = { "b", "ground" }, .damping = 1 / p->speed, .limit = 1 });
 }
 
-static void saturation_wheel (pw_model *m, const void *parameters) {
-  const saturation *p = parameters;
+SCENE_WITH (saturation_wheel, saturation_list, saturation) {
   saturation_body (m, p->v, 0);
   pw_add_wheel (m, &(pw_wheel){ .name = "w", .body = "b", .at = { 0.3, 0 } });
   pw_add_rolling_resistance (
@@ -65,8 +58,7 @@ static void saturation_wheel (pw_model *m, const void *parameters) {
 }
 
 /* A body that skids laterally. */
-static void saturation_tyre (pw_model *m, const void *parameters) {
-  const saturation *p = parameters;
+SCENE_WITH (saturation_tyre, saturation_list, saturation) {
   saturation_body (m, p->v, 0);
   pw_add_slider (m, &(pw_slider){ .name = "s", .body = { "b", "ground" } });
   pw_add_tyre (m, &(pw_tyre){ .name = "f",
@@ -80,13 +72,13 @@ static void saturation_tyre (pw_model *m, const void *parameters) {
 
 static const struct {
   const char *name;
-  pw_plugin_table table;
+  const pw_plugin_table *table;
   int state;     /* the coordinate whose velocity decreases */
   double moving; /* its final velocity */
 } saturation_scenes[] = {
-  { "block", SATURATION_TABLE (saturation_block), 0, 0 }, { "table", SATURATION_TABLE (saturation_table), 0, 10 },
-  { "disc", SATURATION_TABLE (saturation_disc), 2, 0 },   { "motor", SATURATION_TABLE (saturation_motor), 2, 0 },
-  { "wheel", SATURATION_TABLE (saturation_wheel), 0, 0 }, { "tyre", SATURATION_TABLE (saturation_tyre), 0, 0 },
+  { "block", &saturation_block_table, 0, 0 }, { "table", &saturation_table_table, 0, 10 },
+  { "disc", &saturation_disc_table, 2, 0 },   { "motor", &saturation_motor_table, 2, 0 },
+  { "wheel", &saturation_wheel_table, 0, 0 }, { "tyre", &saturation_tyre_table, 0, 0 },
 };
 enum { SATURATION_SCENES = sizeof saturation_scenes / sizeof *saturation_scenes };
 
@@ -97,7 +89,7 @@ static void saturation_stops (int scene, const char *method, double rtol, double
   pw_sample x;
   double moving = saturation_scenes[scene].moving;
   int j = saturation_scenes[scene].state, steps = 0;
-  pw_system *s = scene_system (&saturation_scenes[scene].table, "speed", speed, "v", v, NULL);
+  pw_system *s = scene_system (saturation_scenes[scene].table, "speed", speed, "v", v, NULL);
   pw_run *r = runs_open (s, method, &(pw_settings){ .rtol = rtol, .atol = atol, .span = 4 });
   snprintf (what, sizeof what, "%s, %s, rtol %g, atol %g, speed %g, v = %g", saturation_scenes[scene].name, method,
             rtol, atol, speed, v);
@@ -116,19 +108,17 @@ static const char *const saturation_methods[] = { "bdf+none",   "bdf+projection"
 enum { SATURATION_METHODS = sizeof saturation_methods / sizeof *saturation_methods };
 
 /* Without bounds of the tolerances, bdf+projection ends at wrong positions, without an error. */
-static void test_block (void **state) {
+TEST (block) {
   static const double setting[][2] = { { 1e-6, 1e-8 }, { 1e-6, 1e-7 }, { 1e-4, 1e-8 },
                                        { 1e-4, 1e-7 }, { 1e-2, 1e-8 }, { 1e-8, 1e-10 } };
-  (void)state;
   for (int m = 0; m < SATURATION_METHODS; m++)
     for (size_t k = 0; k < sizeof setting / sizeof *setting; k++)
       for (int i = 0; i < 12; i++)
         saturation_stops (0, saturation_methods[m], setting[k][0], 0, setting[k][1], 0.2 + 0.15 * i);
 }
 
-static void test_kinds (void **state) {
+TEST (kinds) {
   static const double setting[][2] = { { 1e-6, 1e-9 }, { 1e-5, 1e-7 }, { 1e-3, 1e-8 } };
-  (void)state;
   for (int scene = 1; scene < SATURATION_SCENES; scene++)
     for (int m = 0; m < SATURATION_METHODS; m++)
       for (size_t k = 0; k < sizeof setting / sizeof *setting; k++)
@@ -137,14 +127,13 @@ static void test_kinds (void **state) {
 }
 
 /* Explicit methods oscillate about rest, with an amplitude that the tolerance permits. */
-static void test_explicit (void **state) {
+TEST (explicit) {
   static const char *const methods[] = { "erk5+none", "erk5+projection", "erk8+projection" };
-  (void)state;
   for (int m = 0; m < 3; m++)
     for (int k = 2; k <= 3; k++)
       for (int i = 0; i < 12; i++) {
         double rtol = pow (10, -k), v = 0.2 + 0.15 * i, q[3], w[3];
-        pw_system *s = scene_system (&saturation_scenes[0].table, "speed", 1e-8, "v", v, NULL);
+        pw_system *s = scene_system (saturation_scenes[0].table, "speed", 1e-8, "v", v, NULL);
         runs_state (s, methods[m], &(pw_settings){ .rtol = rtol, .span = 4 }, 4, q, w, NULL);
         check_close (methods[m], q[0], v * v / 2, 4 * pow (rtol, 0.75), "4 s at rtol^(3/4)");
         check_close (methods[m], w[0], 0, 4 * pow (rtol, 0.75),
@@ -154,14 +143,13 @@ static void test_explicit (void **state) {
 }
 
 /* The same with an absolute tolerance above the velocity scale, which pw_run_saturation returns. */
-static void test_atol (void **state) {
-  (void)state;
+TEST (atol) {
   for (int m = 0; m < SATURATION_METHODS; m++)
     for (int i = 0; i < 4; i++) saturation_stops (0, saturation_methods[m], 1e-4, 1e-3, 1e-8, 0.25 + 0.45 * i);
   for (int scene = 0; scene < SATURATION_SCENES; scene++) {
     char element[100];
     double least;
-    pw_system *s = scene_system (&saturation_scenes[scene].table, "speed", 1e-8, NULL);
+    pw_system *s = scene_system (saturation_scenes[scene].table, "speed", 1e-8, NULL);
     pw_run *r = runs_open (s, "bdf+projection", NULL);
     int j = pw_run_saturation (r, &least, element, sizeof element);
     assert_true (j == pw_system_coordinates (s) + saturation_scenes[scene].state);
@@ -179,30 +167,21 @@ static int saturation_power (void *context, double t, const double *x, double va
   return 0;
 }
 
-static void saturation_driven (pw_model *m, const void *parameters) {
+SCENE_WITH (saturation_driven, saturation_list, saturation) {
   static const char *const reads[] = { "b.vx", NULL };
-  saturation_block (m, parameters);
+  saturation_block (m, p);
   pw_add_force (m, &(pw_force){ .name = "p",
                                 .body = "b",
                                 .fx = { PW_FUNCTION, .function = { .eval = saturation_power, .reads = reads } } });
 }
 
 /* pw_run_saturation finds the velocity scale although a signal has no value at rest. */
-static void test_no_rest (void **state) {
-  const pw_plugin_table table = SATURATION_TABLE (saturation_driven);
+TEST (no_rest) {
   char element[100];
   double least;
-  pw_system *s = scene_system (&table, "speed", 1e-3, NULL);
+  pw_system *s = scene_system (&saturation_driven_table, "speed", 1e-3, NULL);
   pw_run *r = runs_open (s, "erk5+projection", NULL);
-  (void)state;
   assert_int_equal (pw_run_saturation (r, &least, element, sizeof element), pw_system_coordinates (s));
   check_close ("driven block", least, 1e-3, 1e-3 * 8 * CHECK_EPS, "round-off");
   runs_close (r, s);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_block), cmocka_unit_test (test_kinds),
-                                      cmocka_unit_test (test_explicit), cmocka_unit_test (test_atol),
-                                      cmocka_unit_test (test_no_rest) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

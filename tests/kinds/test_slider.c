@@ -14,10 +14,9 @@ static const struct {
   double m, g, alpha, beta, v, at[2], foot[2];
 } slider_i = { 1.7, 9.81, 0.4, 0.9, 3, { 0.2, -0.3 }, { 1, 2 } };
 
-static void slider_incline (pw_model *m, const void *parameters) {
+SCENE (slider_incline) {
   double c = cos (slider_i.beta), s = sin (slider_i.beta), X = c * slider_i.at[0] - s * slider_i.at[1],
          Y = s * slider_i.at[0] + c * slider_i.at[1];
-  (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "block",
                               .mass = slider_i.m,
                               .inertia = 0.3,
@@ -31,10 +30,8 @@ static void slider_incline (pw_model *m, const void *parameters) {
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -slider_i.g } });
 }
 
-static void test_incline (void **state) {
-  static const pw_plugin_table table = TRIAL_TABLE (slider_incline);
-  (void)state;
-  pw_system *s = scene_system (&table, NULL);
+TEST (incline) {
+  pw_system *s = scene_system (&slider_incline_table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-2, .ledger = 1 });
   const double t = 2, c = cos (slider_i.beta), si = sin (slider_i.beta), ca = cos (slider_i.alpha),
                sa = sin (slider_i.alpha), bound = 1e4 * CHECK_EPS;
@@ -58,8 +55,7 @@ static void test_incline (void **state) {
 
 static const struct { double I, m, r, w, c; } slider_y = { 0.4, 1.5, 0.5, 3, 0.3 };
 
-static void slider_yoke (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (slider_yoke) {
   pw_add_body (m, &(pw_body){ .name = "crank", .mass = 1, .inertia = slider_y.I, .rate = { 0, 0, slider_y.w } });
   pw_add_body (
       m, &(pw_body){ .name = "yoke", .mass = slider_y.m, .inertia = 0.2, .start = { slider_y.r - slider_y.c, 0.1 } });
@@ -72,8 +68,7 @@ static void slider_yoke (pw_model *m, const void *parameters) {
 }
 
 static void slider_turn (const char *method, double bound, const char *reason) {
-  static const pw_plugin_table table = TRIAL_TABLE (slider_yoke);
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (&slider_yoke_table, NULL);
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-10, .span = 2, .ledger = 1 });
   double mr = slider_y.m * slider_y.r;
   for (int i = 1; i <= 8; i++) {
@@ -88,8 +83,7 @@ static void slider_turn (const char *method, double bound, const char *reason) {
   runs_close (r, s);
 }
 
-static void test_yoke (void **state) {
-  (void)state;
+TEST (yoke) {
   slider_turn ("rk4+projection", 1e-10, "(h w)^4 at h = 1e-3 and w = 3/s");
   slider_turn ("ida+ggl", 1e-7, "1e3 rtol");
 }
@@ -105,8 +99,8 @@ static const pw_parameter slider_list[] = {
   { .name = NULL },
 };
 
-static void slider_bead (pw_model *m, const void *parameters) {
-  int by = (int)((const slider_parameters *)parameters)->by;
+SCENE_WITH (slider_bead, slider_list, slider_parameters) {
+  int by = (int)p->by;
   pw_add_body (m, &(pw_body){ .name = "arm", .mass = 2, .inertia = 0.5, .start = { 0.3 }, .rate = { 0, 0.6, 2 } });
   pw_add_body (
       m,
@@ -136,9 +130,6 @@ static void slider_bead (pw_model *m, const void *parameters) {
     pw_add_drive (m, &(pw_drive){ .name = "aside", .body = { "bead", "arm" }, .at = SLIDER_AT, .what = PW_DRIVE_Y });
 }
 
-static const pw_plugin_table slider_bead_table =
-    TRIAL_TABLE_WITH (slider_bead, slider_list, sizeof (slider_parameters));
-
 static void slider_state (double by, const char *force, const char *moment, double out[14]) {
   pw_system *s = scene_system (&slider_bead_table, "by", by, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3 });
@@ -149,9 +140,8 @@ static void slider_state (double by, const char *force, const char *moment, doub
   runs_close (r, s);
 }
 
-static void test_drives (void **state) {
+TEST (drives) {
   double a[14], b[14];
-  (void)state;
   slider_state (0, "S.N", "S.M", a);
   slider_state (1, "aside.F", "turn.F", b);
   for (int i = 0; i < 14; i++) check_close ("slider", a[i], b[i], 1e6 * CHECK_EPS, "round-off of 2000 steps");
@@ -162,8 +152,7 @@ static void test_drives (void **state) {
 
 /* ---- By all methods: oblique lines on moving bodies ---- */
 
-static void slider_train (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (slider_train) {
   pw_add_body (m, &(pw_body){ .name = "base", .mass = 3, .inertia = 0.5, .rate = { 0.3, 0, 0.8 } });
   pw_add_body (m, &(pw_body){ .name = "ram", .mass = 1, .inertia = 0.1, .start = { 0.6, 0.4, 0.3 }, .rate = { 1, 1 } });
   pw_add_body (m, &(pw_body){ .name = "cam", .mass = 0.5, .inertia = 0.05, .start = { 1.2, 0.6, -0.5 } });
@@ -181,15 +170,7 @@ static void slider_train (pw_model *m, const void *parameters) {
              .name = "l", .body = { "cam", "ram" }, .at = { { 0, 0 }, { 0, 1 } }, .stiffness = 6, .damping = 0.1 });
 }
 
-static void test_methods (void **state) {
-  static const pw_plugin_table train = TRIAL_TABLE (slider_train), yoke = TRIAL_TABLE (slider_yoke);
-  (void)state;
-  trial (&train, 2);
-  trial (&yoke, 2);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_incline), cmocka_unit_test (test_yoke),
-                                      cmocka_unit_test (test_drives), cmocka_unit_test (test_methods) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
+TEST (methods) {
+  trial (&slider_train_table, 2);
+  trial (&slider_yoke_table, 2);
 }

@@ -24,8 +24,8 @@ static const pw_parameter speed_list[] = {
   { .name = NULL },
 };
 
-static void speed_sled (pw_model *m, const void *parameters) {
-  int pfaffian = ((const speed_parameters *)parameters)->pfaffian > 0;
+SCENE_WITH (speed_sled, speed_list, speed_parameters) {
+  int pfaffian = p->pfaffian > 0;
   double c = cos (speed_s.psi), s = sin (speed_s.psi), u = speed_s.o + speed_s.A;
   const pw_signal signal = SPEED_HARMONIC (speed_s.A, speed_s.s, speed_s.o);
   pw_add_body (m, &(pw_body){ .name = "sled",
@@ -42,8 +42,6 @@ static void speed_sled (pw_model *m, const void *parameters) {
   pw_add_speed (m, &(pw_speed){ .name = "push", .body = "sled", .heading = speed_s.psi, .value = signal });
   pw_add_wheel (m, &(pw_wheel){ .name = "edge", .body = "sled", .heading = speed_s.psi });
 }
-
-static const pw_plugin_table speed_sled_table = TRIAL_TABLE_WITH (speed_sled, speed_list, sizeof (speed_parameters));
 
 /* The position at t: the integral of u e(w t). */
 static void speed_position (double t, double out[2]) {
@@ -73,8 +71,7 @@ static void speed_follow (const char *method, double pfaffian, double bound, con
   runs_close (r, s);
 }
 
-static void test_sled (void **state) {
-  (void)state;
+TEST (sled) {
   for (int pfaffian = 0; pfaffian < 2; pfaffian++) {
     speed_follow ("rk4+projection", pfaffian, 1e-10, "(h w)^4 at h = 1e-3 and w = 2/s");
     speed_follow ("ida+ggl", pfaffian, 1e-6, "1e4 rtol");
@@ -85,8 +82,7 @@ static void test_sled (void **state) {
 
 static const struct { double m[2], I[2], A, s, ratio; } speed_p = { { 1, 3 }, { 0.2, 0.7 }, 0.6, 1.5, -2.5 };
 
-static void speed_pair (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (speed_pair) {
   pw_add_body (m, &(pw_body){ .name = "a", .mass = speed_p.m[0], .inertia = speed_p.I[0], .rate = { speed_p.A } });
   pw_add_body (m, &(pw_body){ .name = "b", .mass = speed_p.m[1], .inertia = speed_p.I[1], .start = { 1, 2, 0.3 } });
   pw_add_pfaffian (m, &(pw_pfaffian){ .name = "push",
@@ -98,12 +94,10 @@ static void speed_pair (pw_model *m, const void *parameters) {
   pw_add_torque (m, &(pw_torque){ .name = "T", .body = { "b", "ground" }, .value = { PW_CONSTANT, .constant = 0.5 } });
 }
 
-static void test_pair (void **state) {
-  static const pw_plugin_table pair = TRIAL_TABLE (speed_pair);
+TEST (pair) {
   const double t = 2, i = speed_p.ratio, bound = 1e-11;
   const char *reason = "(h w)^4 at h = 1e-3 and w = 1.5/s";
-  (void)state;
-  pw_system *s = scene_system (&pair, NULL);
+  pw_system *s = scene_system (&speed_pair_table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .ledger = 1 });
   pw_sample x = runs_to (r, t);
   double a = 0.5 / (speed_p.I[1] + i * i * speed_p.I[0]);
@@ -117,23 +111,19 @@ static void test_pair (void **state) {
   runs_close (r, s);
 }
 
-static void speed_nothing (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (speed_nothing) {
   pw_add_body (m, &(pw_body){ .name = "a", .mass = 1, .inertia = 1 });
   pw_add_pfaffian (m, &(pw_pfaffian){ .name = "none", .body = { "a", "ground" } });
 }
 
-static void test_refused (void **state) {
-  static const pw_plugin_table nothing = TRIAL_TABLE (speed_nothing);
-  (void)state;
-  scene_refused (scene_model (&nothing, NULL),
+TEST (refused) {
+  scene_refused (scene_model (&speed_nothing_table, NULL),
                  "model scene: pfaffian none: a and b are all zero: expected at least one other number");
 }
 
 /* ---- By all methods: points off the centres of mass, rotating bodies, variable signals ---- */
 
-static void speed_tow (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (speed_tow) {
   pw_add_body (m, &(pw_body){ .name = "tug", .mass = 2, .inertia = 0.3, .rate = { 1, 0, 0.4 } });
   pw_add_body (m, &(pw_body){ .name = "raft", .mass = 1, .inertia = 0.2, .start = { -1, 0.2 }, .rate = { 1 } });
   pw_add_speed (
@@ -153,14 +143,6 @@ static void speed_tow (pw_model *m, const void *parameters) {
                                   .length = 0.4 });
 }
 
-static void test_methods (void **state) {
-  static const pw_plugin_table tow = TRIAL_TABLE (speed_tow);
-  (void)state;
-  trial (&tow, 1.5);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_sled), cmocka_unit_test (test_pair),
-                                      cmocka_unit_test (test_refused), cmocka_unit_test (test_methods) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
+TEST (methods) {
+  trial (&speed_tow_table, 1.5);
 }

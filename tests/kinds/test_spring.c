@@ -9,8 +9,7 @@
 
 static const struct { double m, k, c, l0, l, v; } spring_o = { 1.5, 60, 2.4, 0.8, 1.1, 0.5 };
 
-static void spring_oscillator (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (spring_oscillator) {
   double c = cos (0.7), s = sin (0.7); /* along a slanted line through (1, 2) */
   pw_add_body (m, &(pw_body){ .name = "block",
                               .mass = spring_o.m,
@@ -24,8 +23,6 @@ static void spring_oscillator (pw_model *m, const void *parameters) {
                                   .damping = spring_o.c,
                                   .length = spring_o.l0 });
 }
-
-static const pw_plugin_table spring_oscillator_table = TRIAL_TABLE (spring_oscillator);
 
 static void spring_swing (const char *method, double bound, const char *reason) {
   double d = spring_o.c / (2 * spring_o.m), w = sqrt (spring_o.k / spring_o.m - d * d);
@@ -43,8 +40,7 @@ static void spring_swing (const char *method, double bound, const char *reason) 
   runs_close (r, s);
 }
 
-static void test_oscillator (void **state) {
-  (void)state;
+TEST (oscillator) {
   spring_swing ("rk4+projection", 1e-10, "(h w)^4 / 10 at h = 1e-3 and w = 6/s");
   spring_swing ("ida", 1e-6, "1e4 rtol");
 }
@@ -53,9 +49,11 @@ static void test_oscillator (void **state) {
 
 static const struct { double x[2], v[2]; } spring_start[] = { { { 1, 0 }, { 0, 0.5 } }, { { 0, 0 }, { 0.6, 0.8 } } };
 
-static void spring_ellipse (pw_model *m, const void *parameters) {
-  const double *which = parameters;
-  int i = (int)*which;
+static const pw_parameter spring_which[] = { { .name = "which", .value = 0, .domain = PW_NONNEGATIVE },
+                                             { .name = NULL } };
+
+SCENE_WITH (spring_ellipse, spring_which, double) {
+  int i = (int)*p;
   pw_add_body (m, &(pw_body){ .name = "bead",
                               .mass = 2,
                               .inertia = 1,
@@ -64,15 +62,10 @@ static void spring_ellipse (pw_model *m, const void *parameters) {
   pw_add_spring (m, &(pw_spring){ .name = "S", .body = { "bead", "ground" }, .stiffness = 18 });
 }
 
-static const pw_parameter spring_which[] = { { .name = "which", .value = 0, .domain = PW_NONNEGATIVE },
-                                             { .name = NULL } };
-
-static void test_ellipse (void **state) {
-  (void)state;
-  static const pw_plugin_table table = TRIAL_TABLE_WITH (spring_ellipse, spring_which, sizeof (double));
+TEST (ellipse) {
   const double w = 3, t = 4;
   for (int i = 0; i < 2; i++) {
-    pw_system *s = scene_system (&table, "which", (double)i, NULL);
+    pw_system *s = scene_system (&spring_ellipse_table, "which", (double)i, NULL);
     pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .ledger = 1 });
     pw_sample x = runs_to (r, t);
     for (int j = 0; j < 2; j++)
@@ -85,8 +78,7 @@ static void test_ellipse (void **state) {
 
 /* ---- Coincident ends, without a direction: the force is 0, its derivatives are finite ---- */
 
-static void spring_meeting (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (spring_meeting) {
   pw_add_body (m, &(pw_body){ .name = "a", .mass = 1, .inertia = 1, .rate = { 1, 2, 3 } });
   pw_add_body (m, &(pw_body){ .name = "b", .mass = 1, .inertia = 1, .start = { 1, 0, 0 } });
   for (int i = 0; i < 2; i++)
@@ -98,10 +90,8 @@ static void spring_meeting (pw_model *m, const void *parameters) {
                                     .length = i ? 0.3 : 0 });
 }
 
-static void test_meeting (void **state) {
-  (void)state;
-  static const pw_plugin_table table = TRIAL_TABLE (spring_meeting);
-  pw_system *s = scene_system (&table, NULL);
+TEST (meeting) {
+  pw_system *s = scene_system (&spring_meeting_table, NULL);
   pw_workspace *w = pw_workspace_new (s, NULL);
   double out[72];
   assert_int_equal (pw_update_kinematics (w, 0, s->q0, s->v0), PW_OK);
@@ -124,16 +114,13 @@ static void test_meeting (void **state) {
 
 /* ---- Free length 0, lengths so small that their inverse overflows: derivatives are bounded ---- */
 
-static void spring_settling (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (spring_settling) {
   pw_add_body (m, &(pw_body){ .name = "bead", .mass = 1, .inertia = 1, .start = { 3e-308, 4e-308 } });
   pw_add_spring (m, &(pw_spring){ .name = "S", .body = { "bead", "ground" }, .stiffness = 5, .damping = 2 });
 }
 
-static void test_settling (void **state) {
-  (void)state;
-  static const pw_plugin_table table = TRIAL_TABLE (spring_settling);
-  pw_system *s = scene_system (&table, NULL);
+TEST (settling) {
+  pw_system *s = scene_system (&spring_settling_table, NULL);
   pw_workspace *w = pw_workspace_new (s, NULL);
   double out[36];
   for (double size = 1; size > 1e-17; size /= 10) {
@@ -151,9 +138,8 @@ static void test_settling (void **state) {
 
 /* ---- By all methods: three bodies connected by springs, one of them to the ground ---- */
 
-static void spring_web (pw_model *m, const void *parameters) {
+SCENE (spring_web) {
   static const char *const body[] = { "a", "b", "c", "a" };
-  (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "a", .mass = 1, .inertia = 0.1, .rate = { 0.3, -0.2, 1 } });
   pw_add_body (m, &(pw_body){ .name = "b", .mass = 2, .inertia = 0.2, .start = { 1.5, 0.2, 0.4 } });
   pw_add_body (m, &(pw_body){ .name = "c", .mass = 0.5, .inertia = 0.02, .start = { 0.7, 1.3, -0.8 } });
@@ -171,15 +157,6 @@ static void spring_web (pw_model *m, const void *parameters) {
           .name = "hook", .body = { "ground", "b" }, .at = { { 3, 3 }, { 0, 0.1 } }, .stiffness = 4, .damping = 0.2 });
 }
 
-static void test_methods (void **state) {
-  (void)state;
-  static const pw_plugin_table web = TRIAL_TABLE (spring_web);
-  trial (&web, 2);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_oscillator), cmocka_unit_test (test_ellipse),
-                                      cmocka_unit_test (test_meeting), cmocka_unit_test (test_settling),
-                                      cmocka_unit_test (test_methods) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
+TEST (methods) {
+  trial (&spring_web_table, 2);
 }

@@ -19,8 +19,7 @@ static double steered_angle (double t) {
   return steered_c.o + steered_c.A * cos (steered_c.w * t);
 }
 
-static void steered_car (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (steered_car) {
   pw_add_body (m, &(pw_body){ .name = "car",
                               .mass = steered_c.m,
                               .inertia = steered_c.I,
@@ -57,11 +56,10 @@ static void steered_path (double t_end, double out[3]) {
 }
 
 static void steered_drive (const char *method, double bound, const char *reason) {
-  static const pw_plugin_table table = TRIAL_TABLE (steered_car);
   const double t = 4;
   double path[3];
   steered_path (t, path);
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (&steered_car_table, NULL);
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-10, .span = t, .ledger = 1 });
   check_below ("start", pw_run_initial (r)->velocity, 16 * CHECK_EPS, "given consistently");
   pw_sample x = runs_to (r, t);
@@ -72,8 +70,7 @@ static void steered_drive (const char *method, double bound, const char *reason)
   runs_close (r, s);
 }
 
-static void test_car (void **state) {
-  (void)state;
+TEST (car) {
   steered_drive ("rk4+projection", 1e-10, "(h w)^4 at h = 1e-3 and w = 2/s, over 4 s");
   steered_drive ("rk4+baumgarte", 1e-10, "(h w)^4 at h = 1e-3 and w = 2/s, over 4 s");
   steered_drive ("ida+ggl", 1e-6, "1e4 rtol");
@@ -91,8 +88,8 @@ static const pw_parameter steered_list[] = {
   { .name = NULL },
 };
 
-static void steered_truck (pw_model *m, const void *parameters) {
-  int by = (int)((const steered_parameters *)parameters)->by;
+SCENE_WITH (steered_truck, steered_list, steered_parameters) {
+  int by = (int)p->by;
   const double at[2] = { 0.6, 0.15 };
   pw_add_body (m, &(pw_body){ .name = "truck", .mass = 2, .inertia = 0.3, .rate = { 1 } });
   pw_add_wheel (m, &(pw_wheel){ .name = "rear", .body = "truck", .at = { -0.5, 0.1 }, .heading = 0.1 });
@@ -117,9 +114,6 @@ static void steered_truck (pw_model *m, const void *parameters) {
   pw_add_wheel (m, &(pw_wheel){ .name = "front", .body = "fork" });
 }
 
-static const pw_plugin_table steered_truck_table =
-    TRIAL_TABLE_WITH (steered_truck, steered_list, sizeof (steered_parameters));
-
 static void steered_compare (double one, double other, double bound, const char *reason) {
   pw_system *s = scene_system (&steered_truck_table, "by", one, NULL),
             *p = scene_system (&steered_truck_table, "by", other, NULL);
@@ -140,23 +134,14 @@ static void steered_compare (double one, double other, double bound, const char 
   pw_system_free (s), pw_system_free (p);
 }
 
-static void test_fork (void **state) {
-  (void)state;
+TEST (fork) {
   steered_compare (0, 1, 1e-9, "(h w)^4 at h = 1e-3 and w = 2/s: two projections");
   steered_compare (2, 3, 1e5 * CHECK_EPS, "round-off of 2000 steps");
 }
 
 /* ---- By all methods ---- */
 
-static void test_methods (void **state) {
-  static const pw_plugin_table car = TRIAL_TABLE (steered_car);
-  (void)state;
+TEST (methods) {
   trial (&steered_truck_table, 2);
-  trial (&car, 2);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_car), cmocka_unit_test (test_fork),
-                                      cmocka_unit_test (test_methods) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
+  trial (&steered_car_table, 2);
 }

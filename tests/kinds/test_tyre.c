@@ -21,8 +21,7 @@ static const pw_parameter tyre_list[] = {
   { .name = NULL },
 };
 
-static void tyre_slide (pw_model *m, const void *parameters) {
-  const tyre_parameters *p = parameters;
+SCENE_WITH (tyre_slide, tyre_list, tyre_parameters) {
   double c = cos (0.8), s = sin (0.8); /* of the heading; the block slides to the left of it */
   pw_add_body (m,
                &(pw_body){ .name = "block", .mass = tyre_s.m, .inertia = 1, .rate = { -tyre_s.v * s, tyre_s.v * c } });
@@ -34,8 +33,6 @@ static void tyre_slide (pw_model *m, const void *parameters) {
                               .load = p->load,
                               .friction = p->friction });
 }
-
-static const pw_plugin_table tyre_slide_table = TRIAL_TABLE_WITH (tyre_slide, tyre_list, sizeof (tyre_parameters));
 
 static void tyre_stop (const char *method, double load, double bound, const char *reason) {
   pw_system *s = scene_system (&tyre_slide_table, "load", load, "friction", load > 0 ? 0.4 : 0, NULL);
@@ -51,8 +48,7 @@ static void tyre_stop (const char *method, double load, double bound, const char
   runs_close (r, s);
 }
 
-static void test_slide (void **state) {
-  (void)state;
+TEST (slide) {
   tyre_stop ("rk4", 0, 1e-10, "(h k)^4 at h = 1e-3 and k = 3/s");
   tyre_stop ("rk4", 5, 1e-10, "(h k)^4 at h = 1e-3 and k = 3/s");
   tyre_stop ("ida", 0, 1e-7, "1e3 rtol");
@@ -78,8 +74,7 @@ static void tyre_wheel (pw_model *m, const char *name, const char *body, double 
 }
 
 /* A vehicle of two segments, moved by a torque at its hinge. */
-static void tyre_vehicle (pw_model *m, const void *parameters) {
-  const tyre_vehicle_parameters *p = parameters;
+SCENE_WITH (tyre_vehicle, tyre_vehicle_list, tyre_vehicle_parameters) {
   pw_add_body (m, &(pw_body){ .name = "frame", .mass = 1, .inertia = 0.1, .rate = { 0.5 } });
   pw_add_body (m, &(pw_body){ .name = "steer", .mass = 0.2, .inertia = 0.01, .start = { 0.6 }, .rate = { 0.5 } });
   pw_add_pin (m, &(pw_pin){ .name = "B", .body = { "frame", "steer" }, .at = { { 0.5, 0 }, { -0.1, 0 } } });
@@ -90,12 +85,8 @@ static void tyre_vehicle (pw_model *m, const void *parameters) {
                                   .value = { PW_HARMONIC, .harmonic = { .amplitude = 0.1, .omega = 3 } } });
 }
 
-static const pw_plugin_table tyre_vehicle_table =
-    TRIAL_TABLE_WITH (tyre_vehicle, tyre_vehicle_list, sizeof (tyre_vehicle_parameters));
-
-static void test_limit (void **state) {
+TEST (limit) {
   enum { STEPS = 5 }; /* stiffnesses, from 100 N over two decades */
-  (void)state;
   double wheel[6], rate[6], q[6], v[6], distance[STEPS], stiffness = 100;
   pw_settings settings = { .rtol = 1e-10, .span = 2 };
   pw_system *s = scene_system (&tyre_vehicle_table, NULL);
@@ -116,8 +107,7 @@ static void test_limit (void **state) {
 
 /* ---- Load and friction: both are given, or neither ---- */
 
-static void test_refused (void **state) {
-  (void)state;
+TEST (refused) {
   scene_refused (scene_model (&tyre_slide_table, "load", 5.0, NULL),
                  "model scene: tyre T: friction = 0: expected > 0, since a load limits the force to friction x load");
   scene_refused (scene_model (&tyre_slide_table, "friction", 0.4, NULL),
@@ -126,8 +116,7 @@ static void test_refused (void **state) {
 
 /* ---- By all methods: a car and a trailer on tyres, with and without a load, off their axes, oblique ---- */
 
-static void tyre_car (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (tyre_car) {
   pw_add_body (m, &(pw_body){ .name = "car", .mass = 10, .inertia = 1.5, .rate = { 3, 0.4, 0.3 } });
   pw_add_tyre (m, &(pw_tyre){ .name = "front",
                               .body = "car",
@@ -149,14 +138,6 @@ static void tyre_car (pw_model *m, const void *parameters) {
                               .friction = 0.5 });
 }
 
-static void test_methods (void **state) {
-  (void)state;
-  static const pw_plugin_table car = TRIAL_TABLE (tyre_car);
-  trial (&car, 2);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_slide), cmocka_unit_test (test_limit),
-                                      cmocka_unit_test (test_refused), cmocka_unit_test (test_methods) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
+TEST (methods) {
+  trial (&tyre_car_table, 2);
 }

@@ -21,8 +21,7 @@ static void weld_equip (pw_model *m, const char *body, double x, double y) {
   pw_add_gravity (m, &(pw_gravity){ .name = "slope", .acceleration = { 0.4, -0.9 } });
 }
 
-static void weld_two (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (weld_two) {
   pw_add_body (m, &(pw_body){ .name = "rear", .mass = weld_mass[0], .inertia = weld_inertia[0] });
   pw_add_body (m, &(pw_body){ .name = "front",
                               .mass = weld_mass[1],
@@ -37,8 +36,7 @@ static void weld_two (pw_model *m, const void *parameters) {
 }
 
 /* share: the front part's share of the mass, by which the centre of mass of the sleigh is moved towards it. */
-static void weld_one (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (weld_one) {
   double mass = weld_mass[0] + weld_mass[1], share = weld_mass[1] / mass;
   double x = share * weld_apart[0], y = share * weld_apart[1];
   double steiner = weld_mass[0] * share *
@@ -49,8 +47,6 @@ static void weld_one (pw_model *m, const void *parameters) {
                               .start = { x, y } });
   weld_equip (m, "sleigh", -x, -y);
 }
-
-static const pw_plugin_table weld_two_table = TRIAL_TABLE (weld_two), weld_one_table = TRIAL_TABLE (weld_one);
 
 static void weld_compare (const char *method, double bound, const char *reason) {
   const pw_settings settings = { .step = 1e-3, .rtol = 1e-10, .span = 3, .ledger = 1 };
@@ -70,8 +66,7 @@ static void weld_compare (const char *method, double bound, const char *reason) 
   pw_system_free (one), pw_system_free (two);
 }
 
-static void test_one_body (void **state) {
-  (void)state;
+TEST (one_body) {
   weld_compare ("rk4+projection", 1e-12, "the same steps: round-off of 3000");
   weld_compare ("ida+ggl", 1e-6, "1e4 rtol");
   weld_compare ("ida+baumgarte", 1e-6, "1e4 rtol");
@@ -89,12 +84,11 @@ static double weld_point_y (int i) {
   return 0.23 * cos (2. * i);
 }
 
-static void weld_string (pw_model *m, const void *parameters) {
+SCENE (weld_string) {
   static const char *const name[WELD_POINTS] = { "p0", "p1", "p2", "p3", "p4",  "p5",
                                                  "p6", "p7", "p8", "p9", "p10", "p11" };
   static const char *const joint[WELD_POINTS] = { "w0", "w1", "w2", "w3", "w4",  "w5",
                                                   "w6", "w7", "w8", "w9", "w10", "w11" };
-  (void)parameters;
   for (int i = 0; i < WELD_POINTS; i++) {
     const double x = weld_point_x (i), y = weld_point_y (i);
     pw_add_body (m, &(pw_body){ .name = name[i], .mass = 1, .start = { x, y } });
@@ -108,9 +102,8 @@ static void weld_string (pw_model *m, const void *parameters) {
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 } });
 }
 
-static void weld_pendulum (pw_model *m, const void *parameters) {
+SCENE (weld_pendulum) {
   double x = 0, y = 0, inertia = 0;
-  (void)parameters;
   for (int i = 0; i < WELD_POINTS; i++) x += weld_point_x (i) / WELD_POINTS, y += weld_point_y (i) / WELD_POINTS;
   for (int i = 0; i < WELD_POINTS; i++)
     inertia += (weld_point_x (i) - x) * (weld_point_x (i) - x) + (weld_point_y (i) - y) * (weld_point_y (i) - y);
@@ -119,12 +112,10 @@ static void weld_pendulum (pw_model *m, const void *parameters) {
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 } });
 }
 
-static void test_points (void **state) {
-  static const pw_plugin_table points = TRIAL_TABLE (weld_string), one = TRIAL_TABLE (weld_pendulum);
+TEST (points) {
   static const char *const method[] = { "rk4+projection", "rk4+nullspace", "leapfrog", "galpha+ggl" };
-  (void)state;
   for (int i = 0; i < 4; i++) {
-    pw_system *s = scene_system (&points, NULL), *t = scene_system (&one, NULL);
+    pw_system *s = scene_system (&weld_string_table, NULL), *t = scene_system (&weld_pendulum_table, NULL);
     pw_run *r = runs_open (s, method[i], &(pw_settings){ .step = 2e-3, .span = 1 });
     pw_run *twin = runs_open (t, method[i], &(pw_settings){ .step = 2e-3, .span = 1 });
     pw_sample x = runs_to (r, 1), y = runs_to (twin, 1);
@@ -138,18 +129,15 @@ static void test_points (void **state) {
 
 /* ---- A beam held by a wall ---- */
 
-static void weld_beam (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (weld_beam) {
   pw_add_body (m, &(pw_body){ .name = "beam", .mass = 4, .inertia = 1, .start = { 1, 5, 0 } });
   pw_add_weld (m, &(pw_weld){ .name = "wall", .body = { "beam", "ground" }, .at = { { -1.5, 0 }, { 0, 5 } } });
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 2, -9.81 } });
 }
 
 /* The described position is half a metre too far to the left; the initial state satisfies the weld. */
-static void test_beam (void **state) {
-  (void)state;
-  static const pw_plugin_table table = TRIAL_TABLE (weld_beam);
-  pw_system *s = scene_system (&table, NULL);
+TEST (beam) {
+  pw_system *s = scene_system (&weld_beam_table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 0.01 });
   assert_int_equal (pw_run_initial (r)->moved, 1);
   pw_sample x = runs_to (r, 1);
@@ -162,13 +150,6 @@ static void test_beam (void **state) {
   runs_close (r, s);
 }
 
-static void test_methods (void **state) {
-  (void)state;
+TEST (methods) {
   trial (&weld_two_table, 3);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_one_body), cmocka_unit_test (test_points),
-                                      cmocka_unit_test (test_beam), cmocka_unit_test (test_methods) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -25,22 +25,21 @@ static double adaptive_error (const char *method, pw_settings settings, pw_stati
 static void adaptive_order (const char *integrator, int order, const double step[3], double band, const char *reason) {
   static const char *const rest[] = { "none", "projection", "projection:metric=identity" };
   for (int k = 0; k < 3; k++) {
-    char method[80], what[160];
+    char method[80];
     double error[3];
     snprintf (method, sizeof method, "%s+%s:steps=fixed", integrator, rest[k]);
     for (int i = 0; i < 3; i++) error[i] = adaptive_error (method, (pw_settings){ .step = step[i] }, NULL);
     check_below ("round-off in the last error", 10 / step[2] * CHECK_EPS, error[2],
                  "one eps of each of 10 s / h steps");
     for (int i = 0; i < 2; i++) {
-      snprintf (what, sizeof what, "slope of %s from h = %g to %g", method, step[i], step[i + 1]);
-      check_close (what, log2 (error[i] / error[i + 1]), order, band, reason);
+      check_close (check_text ("slope of %s from h = %g to %g", method, step[i], step[i + 1]),
+                   log2 (error[i] / error[i + 1]), order, band, reason);
     }
   }
 }
 
-static void test_orders (void **state) {
+TEST (orders) {
   static const double step5[] = { 0.04, 0.02, 0.01 }, step8[] = { 0.2, 0.1, 0.05 };
-  (void)state;
   adaptive_order ("erk5", 5, step5, 0.3, "order 5, and the next power of h");
   adaptive_order ("erk8", 8, step8, 0.75, "order 8, and the next power of h: steps are large, or round-off shows");
 }
@@ -51,8 +50,7 @@ static const char *const adaptive_methods[] = { "erk5+none", "erk5+projection", 
                                                 "erk8+none", "erk8+projection", "erk8+projection:metric=identity" };
 enum { ADAPT_METHODS = sizeof adaptive_methods / sizeof *adaptive_methods };
 
-static void test_tolerances (void **state) {
-  (void)state;
+TEST (tolerances) {
   for (int i = 0; i < ADAPT_METHODS; i++) {
     double error[13];
     long steps = 0;
@@ -78,8 +76,7 @@ static void test_tolerances (void **state) {
 }
 
 /* The work grows with rtol^(-1/order): erk8 becomes cheaper relative to erk5 at tight tolerances. */
-static void test_work (void **state) {
-  (void)state;
+TEST (work) {
   const double rtol[] = { 1e-6, 1e-9, 1e-12 };
   double before = 1;
   for (int i = 0; i < 3; i++) {
@@ -103,8 +100,13 @@ typedef struct {
   double swing; /* [rad/s] */
 } adaptive_edge;
 
-static void adaptive_build_edge (pw_model *m, const void *parameters) {
-  const double k = ADAPTIVE_DAMPING, w = ADAPTIVE_DRIVE, swing = ((const adaptive_edge *)parameters)->swing;
+static const pw_parameter adaptive_edge_list[] = {
+  { PW_AT (adaptive_edge, swing), 20, "rad/s", "of the spring", PW_POSITIVE },
+  { .name = NULL },
+};
+
+SCENE_WITH (adaptive_build_edge, adaptive_edge_list, adaptive_edge) {
+  const double k = ADAPTIVE_DAMPING, w = ADAPTIVE_DRIVE, swing = p->swing;
   pw_add_body (m, &(pw_body){ .name = "led", .mass = 1, .inertia = 1, .rate = { k * k / (k * k + w * w) } });
   pw_add_body (m, &(pw_body){ .name = "swung", .mass = 1, .inertia = 1, .start = { 1 } });
   pw_add_drag (m, &(pw_drag){ .name = "oil", .body = "led", .linear = k });
@@ -114,22 +116,11 @@ static void adaptive_build_edge (pw_model *m, const void *parameters) {
   pw_add_spring (m, &(pw_spring){ .name = "spring", .body = { "swung", "ground" }, .stiffness = swing * swing });
 }
 
-static const pw_parameter adaptive_edge_list[] = {
-  { PW_AT (adaptive_edge, swing), 20, "rad/s", "of the spring", PW_POSITIVE },
-  { .name = NULL },
-};
-
-static void test_edge (void **state) {
-  (void)state;
-  static const pw_plugin_table table = { .abi = PW_ABI,
-                                         .size = sizeof table,
-                                         .parameters = adaptive_edge_list,
-                                         .parameters_size = sizeof (adaptive_edge),
-                                         .build = adaptive_build_edge };
+TEST (edge) {
   const double k = ADAPTIVE_DAMPING, w = ADAPTIVE_DRIVE, t_end = 5;
   for (double swing = 10; swing < 25; swing += 1) {
     pw_error error = { 0 };
-    pw_system *s = scene_system (&table, "swing", swing, NULL);
+    pw_system *s = scene_system (&adaptive_build_edge_table, "swing", swing, NULL);
     pw_run *r = runs_open (s, "erk8+none", &(pw_settings){ .rtol = 1e-10, .span = t_end });
     double worst = 0;
     while (pw_run_time (r) < t_end) {
@@ -187,22 +178,13 @@ static void adaptive_pushed (pw_model *m, int (*eval) (void *, double, const dou
   pw_add_force (m, &(pw_force){ .name = "push", .body = "puck", .fx = { PW_FUNCTION, .function = { .eval = eval } } });
 }
 
-static void adaptive_by_power (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (adaptive_by_power) {
   adaptive_pushed (m, adaptive_power);
 }
 
-static void adaptive_by_bump (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (adaptive_by_bump) {
   adaptive_pushed (m, adaptive_bump);
 }
-
-static const pw_plugin_table adaptive_power_table = { .abi = PW_ABI,
-                                                      .size = sizeof (pw_plugin_table),
-                                                      .build = adaptive_by_power };
-static const pw_plugin_table adaptive_bump_table = { .abi = PW_ABI,
-                                                     .size = sizeof (pw_plugin_table),
-                                                     .build = adaptive_by_bump };
 
 static double adaptive_step (pw_run *r, double t_end) {
   pw_error error = { 0 };
@@ -228,12 +210,11 @@ static double adaptive_estimate (double t, double h, const pw_sample *x, const p
 
 /* h_new / h = 0.9 err^-(1/5 - 3/4 0.04) err_before^0.04, unless the error of the work is larger than that of the state
  * (Hairer, Norsett & Wanner 1993, section II.4). */
-static void test_norm (void **state) {
-  (void)state;
+TEST (norm) {
   const double rtol = 1e-8, round_off = 1e-6;
   double before = 0, predicted = 0;
   int equal = 0;
-  pw_system *s = scene_system (&adaptive_power_table, NULL);
+  pw_system *s = scene_system (&adaptive_by_power_table, NULL);
   pw_run *r = runs_open (s, "erk5+none", &(pw_settings){ .rtol = rtol, .span = 1 });
   for (int n = 0; n < 40; n++) {
     double t = pw_run_time (r);
@@ -255,11 +236,10 @@ static void test_norm (void **state) {
 
 /* A narrow bump causes rejected steps, after which a step may be far smaller than needed: the next one is not
  * longer. */
-static void test_after_rejection (void **state) {
-  (void)state;
+TEST (after_rejection) {
   int found = 0;
   for (adaptive_height = 1e-3; adaptive_height < 1e6; adaptive_height *= 3) {
-    pw_system *s = scene_system (&adaptive_bump_table, NULL);
+    pw_system *s = scene_system (&adaptive_by_bump_table, NULL);
     pw_run *r = runs_open (s, "erk5+none", &(pw_settings){ .rtol = 1e-8, .span = 2 });
     for (double last = INFINITY; pw_run_time (r) < 1.5;) {
       long rejected = pw_run_statistics (r)->rejected;
@@ -276,8 +256,7 @@ static void test_after_rejection (void **state) {
 }
 
 /* A step shortened at the requested time does not shorten later steps. */
-static void test_after_cut (void **state) {
-  (void)state;
+TEST (after_cut) {
   pw_system *s = scene_system (&scene_ezyroller, NULL);
   pw_run *r = runs_open (s, "erk5+projection", &(pw_settings){ .rtol = 1e-8, .span = 10 });
   double h = 0;
@@ -295,8 +274,7 @@ static void test_after_cut (void **state) {
  * the size of the projection limits steps, at rtol^(3/4).  With an estimate of order h^5, h is proportional to
  * rtol^(3/20). */
 
-static void adaptive_turned (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (adaptive_turned) {
   pw_add_body (m, &(pw_body){ .name = "arm", .start = { 1 } });
   pw_add_pin (m, &(pw_pin){ .name = "O", .body = { "ground", "arm" }, .at = { { 0, 0 }, { -1, 0 } } });
   pw_add_drive (m, &(pw_drive){ .name = "motor",
@@ -304,10 +282,6 @@ static void adaptive_turned (pw_model *m, const void *parameters) {
                                 .what = PW_DRIVE_ANGLE,
                                 .value = { PW_HARMONIC, .harmonic = { .amplitude = 5, .omega = 0.5, .offset = -5 } } });
 }
-
-static const pw_plugin_table adaptive_turned_table = { .abi = PW_ABI,
-                                                       .size = sizeof (pw_plugin_table),
-                                                       .build = adaptive_turned };
 
 static double adaptive_steps (const char *method, double rtol, double t_end) {
   double q[3], v[3];
@@ -318,8 +292,7 @@ static double adaptive_steps (const char *method, double rtol, double t_end) {
   return (double)cost.steps;
 }
 
-static void test_prescribed (void **state) {
-  (void)state;
+TEST (prescribed) {
   double few = adaptive_steps ("erk5+projection", 1e-4, 50), many = adaptive_steps ("erk5+projection", 1e-10, 50);
   check_close ("growth of steps", log10 (many / few) / 6, 0.15, 0.02, "rtol^(3/20); rtol^(1/10) without the root");
   check_below ("steps of bdf+projection", 300, adaptive_steps ("bdf+projection", 1e-4, 50),
@@ -349,21 +322,14 @@ static void adaptive_rotor (pw_model *m, pw_signal torque) {
   pw_add_torque (m, &(pw_torque){ .name = "motor", .body = { "rotor", "ground" }, .value = torque });
 }
 
-static void adaptive_exploding (pw_model *m, const void *parameters) {
+SCENE (adaptive_exploding) {
   static const char *const reads[] = { "rotor.omega", NULL };
-  (void)parameters;
   adaptive_rotor (m, (pw_signal){ PW_FUNCTION, .function = { .eval = adaptive_square, .reads = reads } });
 }
 
-static void adaptive_ending (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (adaptive_ending) {
   adaptive_rotor (m, (pw_signal){ PW_FUNCTION, .function = { .eval = adaptive_failing } });
 }
-
-static const pw_plugin_table adaptive_tables[] = {
-  { .abi = PW_ABI, .size = sizeof (pw_plugin_table), .build = adaptive_exploding },
-  { .abi = PW_ABI, .size = sizeof (pw_plugin_table), .build = adaptive_ending },
-};
 
 /* The run fails with the time reached, at most `last`; the state there can be sampled. */
 static void adaptive_stops (const char *method, const pw_plugin_table *table, double last, const char *cause) {
@@ -384,18 +350,17 @@ static void adaptive_stops (const char *method, const pw_plugin_table *table, do
   pw_system_free (s);
 }
 
-static void test_stops (void **state) {
-  (void)state;
+TEST (stops) {
   for (int i = 0; i < ADAPT_METHODS; i++) {
-    adaptive_stops (adaptive_methods[i], &adaptive_tables[0], 1 + 100 * 1e-8, "the tolerances require a step below ");
-    adaptive_stops (adaptive_methods[i], &adaptive_tables[1], 0.7, "a signal failed");
+    adaptive_stops (adaptive_methods[i], &adaptive_exploding_table, 1 + 100 * 1e-8,
+                    "the tolerances require a step below ");
+    adaptive_stops (adaptive_methods[i], &adaptive_ending_table, 0.7, "a signal failed");
   }
 }
 
 /* Tolerances that accept everything: the run ends at t_end, or with an error. */
-static void test_useless_tolerances (void **state) {
+TEST (useless_tolerances) {
   static const double atol[] = { 0, 1e6 };
-  (void)state;
   for (int i = 0; i < ADAPT_METHODS; i++)
     for (int k = 0; k < 2; k++) {
       pw_error error = { 0 };
@@ -407,20 +372,4 @@ static void test_useless_tolerances (void **state) {
       pw_run_close (r);
       pw_system_free (s);
     }
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_orders),
-    cmocka_unit_test (test_tolerances),
-    cmocka_unit_test (test_work),
-    cmocka_unit_test (test_norm),
-    cmocka_unit_test (test_after_rejection),
-    cmocka_unit_test (test_after_cut),
-    cmocka_unit_test (test_prescribed),
-    cmocka_unit_test (test_edge),
-    cmocka_unit_test (test_stops),
-    cmocka_unit_test (test_useless_tolerances),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -13,8 +13,7 @@
 
 /* A cart on a rolling wheel with an internal coordinate, with a damped spring to the ground, an arm driven by a
  * motor, and a free pendulum at its end. */
-static void agree_cart (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (agree_cart) {
   pw_add_body (m, &(pw_body){ .name = "cart", .mass = 2, .inertia = 0.3, .rate = { 0.5, 0, 0.4 } });
   pw_add_body (m, &(pw_body){ .name = "arm", .mass = 0.5, .inertia = 0.05, .start = { 0.8, 0, 0.3 } });
   pw_add_body (m, &(pw_body){ .name = "bob", .mass = 0.3, .inertia = 0.01, .start = { 1.3, 0.1, -0.4 } });
@@ -44,15 +43,13 @@ static int agree_steering (void *context, double t, const double *x, double valu
   return 0;
 }
 
-static const pw_plugin_table agree_table = { .abi = PW_ABI, .size = sizeof agree_table, .build = agree_cart };
-
 enum { AGREE_MASSLESS, AGREE_MASSIVE, AGREE_STATE_TORQUE, AGREE_CART, AGREE_SCENES };
 static const char *const agree_names[] = { "massless", "massive", "state-dependent torque", "cart" };
 
 static pw_system *agree_scene (int scene) {
   static const char *const reads[] = { "frame.phi", "steer.phi", "frame.omega", "steer.omega", NULL };
   pw_error error = { 0 };
-  if (scene == AGREE_CART) return scene_system (&agree_table, NULL);
+  if (scene == AGREE_CART) return scene_system (&agree_cart_table, NULL);
   if (scene == AGREE_MASSLESS) return scene_system (&scene_ezyroller, NULL);
   pw_model *m = scene_model (&scene_ezyroller, "m2", 0.1, "I2", 0.01, NULL);
   pw_signal torque = { PW_FUNCTION, .function = { .eval = agree_steering, .reads = reads } };
@@ -92,8 +89,7 @@ static const struct {
                       { "bdf+projection", 1e3 },
                       { "bdf+projection:metric=identity:every=3", 1e3 } };
 
-static void test_integrators (void **state) {
-  (void)state;
+TEST (integrators) {
   const double rtol = 1e-9;
   for (int scene = 0; scene < AGREE_SCENES; scene++) {
     double q[AGREE_MOST], v[AGREE_MOST], Q[AGREE_MOST], V[AGREE_MOST];
@@ -104,10 +100,10 @@ static void test_integrators (void **state) {
       double bound = agree_methods[i].factor > 0 ? agree_methods[i].factor * rtol : agree_order_4 (1e-3);
       const char *reason = agree_methods[i].factor > 0 ? "1e3 rtol" : agree_reason;
       for (int j = 0; j < pw_system_coordinates (s); j++) {
-        char what[100], name[60];
-        snprintf (what, sizeof what, "%s, %s, %s", agree_names[scene], agree_methods[i].name,
-                  pw_system_state_name (s, j, name, sizeof name));
-        check_close (what, Q[j], q[j], bound, reason);
+        char name[60];
+        check_close (check_text ("%s, %s, %s", agree_names[scene], agree_methods[i].name,
+                                 pw_system_state_name (s, j, name, sizeof name)),
+                     Q[j], q[j], bound, reason);
       }
     }
     pw_system_free (s);
@@ -117,12 +113,11 @@ static void test_integrators (void **state) {
 /* ---- The ledger ---- */
 
 /* The energy balances, and the ledger does not change the run. */
-static void test_ledger (void **state) {
+TEST (ledger) {
   static const char *const method[] = { "rk4+projection", "rk4+none",      "rk4+baumgarte",  "ida+ggl",
                                         "ida+baumgarte",  "ida+index2",    "ida+si1",        "adams+baumgarte",
                                         "bdf+none",       "bdf+baumgarte", "bdf+projection", "radau+ggl",
                                         "radau+index2",   "radau+index3" };
-  (void)state;
   for (int scene = 0; scene < AGREE_SCENES; scene++)
     for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
       pw_system *s = agree_scene (scene);
@@ -155,10 +150,9 @@ static void test_ledger (void **state) {
 /* ---- Sampling ---- */
 
 /* Samples at any time do not change the run, and satisfy the constraints as accurately as its steps. */
-static void test_sampling (void **state) {
+TEST (sampling) {
   static const char *const method[] = { "rk4+projection", "bdf+projection", "ida+ggl",    "radau+ggl",    "ida+si1",
                                         "rk4+none",       "ida+baumgarte",  "adams+none", "bdf+baumgarte" };
-  (void)state;
   for (int scene = 0; scene < AGREE_SCENES; scene++)
     for (int i = 0; i < 9; i++) {
       pw_system *s = agree_scene (scene);
@@ -191,9 +185,8 @@ static void test_sampling (void **state) {
 }
 
 /* Samples inside steps are as accurate as the ends of steps. */
-static void test_dense (void **state) {
+TEST (dense) {
   static const char *const method[] = { "rk4+projection", "ida+ggl", "radau+ggl" };
-  (void)state;
   for (int scene = 0; scene < AGREE_SCENES; scene++)
     for (int i = 0; i < 3; i++) {
       pw_system *s = agree_scene (scene);
@@ -239,7 +232,6 @@ static void agree_verify (int scene, const agree_bound *bound) {
     pw_sample now = runs_to (r, 0.1 * k);
     pw_verification v;
     assert_int_equal (pw_verify (s, pw_run_scale (r), now.t, now.q, now.v, now.a, now.lambda, &v), PW_OK);
-    char what[120];
     const struct {
       const char *name;
       const pw_worst_residual *verdict;
@@ -249,9 +241,9 @@ static void agree_verify (int scene, const agree_bound *bound) {
                  { "J a", &v.acceleration, bound->acceleration },
                  { "M a", &v.force, bound->force } };
     for (int i = 0; i < 4; i++) {
-      snprintf (what, sizeof what, "%s %s, %s at %s, t = %g", agree_names[scene], bound->method, each[i].name,
-                each[i].verdict->name, now.t);
-      check_below (what, each[i].verdict->scaled, each[i].bound, bound->reason);
+      check_below (check_text ("%s %s, %s at %s, t = %g", agree_names[scene], bound->method, each[i].name,
+                               each[i].verdict->name, now.t),
+                   each[i].verdict->scaled, each[i].bound, bound->reason);
       assert_true (each[i].verdict->name[0] != 0);
     }
     check_close ("the run's own position residual", now.position, v.position.scaled, 8 * CHECK_EPS + 0.5 * now.position,
@@ -261,7 +253,7 @@ static void agree_verify (int scene, const agree_bound *bound) {
   pw_system_free (s);
 }
 
-static void test_verifier (void **state) {
+TEST (verifier) {
   static const agree_bound bounds[] = {
     { "rk4+projection", 16 * CHECK_EPS, 16 * CHECK_EPS, 64 * CHECK_EPS, 64 * CHECK_EPS,
       "round-off of the projection and of one solve" },
@@ -269,14 +261,12 @@ static void test_verifier (void **state) {
     { "radau+ggl", 1e-8, 1e-8, 64 * CHECK_EPS, 64 * CHECK_EPS, "10 rtol; round-off of one solve" },
     { "ida+ggl", 1e-8, 1e-8, 1e-4, 1e-4, "10 rtol; accelerations are one derivative up: 1e5 rtol" },
   };
-  (void)state;
   for (int scene = 0; scene < AGREE_SCENES; scene++)
     for (int i = 0; i < 4; i++) agree_verify (scene, &bounds[i]);
 }
 
 /* The verifier detects an error of 1e-6 in any number. */
-static void test_verifier_detects_errors (void **state) {
-  (void)state;
+TEST (verifier_detects_errors) {
   pw_system *s = agree_scene (AGREE_CART);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 1 });
   pw_sample now = runs_to (r, 0.5);
@@ -308,8 +298,7 @@ static void test_verifier_detects_errors (void **state) {
 /* ---- Units ---- */
 
 /* The EzyRoller in units of 1/1024 m and 1/8 kg: all numbers differ only in the exponent. */
-static void test_units (void **state) {
-  (void)state;
+TEST (units) {
   const double L = 1024, m = 8, I = L * L * m;
   static const char *const method[] = { "rk4+projection", "rk4+none",  "rk4+baumgarte", "ida+ggl",
                                         "ida+baumgarte",  "radau+ggl", "radau+index3" };
@@ -340,9 +329,8 @@ static void test_units (void **state) {
 /* The same with moments among the multipliers: two welded bodies, one a point mass, swing, in units of 1/1024 m. */
 static double agree_length;
 
-static void agree_swing (pw_model *m, const void *parameters) {
+SCENE (agree_swing) {
   const double L = agree_length;
-  (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "arm", .mass = 1, .inertia = 0.1 * L * L, .start = { 0.5 * L } });
   pw_add_body (m, &(pw_body){ .name = "tip", .mass = 0.5, .start = { L, 0.2 * L } });
   pw_add_pin (m, &(pw_pin){ .name = "pin", .body = { "arm", "ground" }, .at = { { -0.5 * L } } });
@@ -350,18 +338,16 @@ static void agree_swing (pw_model *m, const void *parameters) {
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 * L } });
 }
 
-static void test_units_of_moments (void **state) {
-  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = agree_swing };
+TEST (units_of_moments) {
   static const char *const method[] = { "ida+si1", "ida+ggl", "ida+baumgarte", "radau+ggl" };
-  (void)state;
   for (int i = 0; i < 4; i++) {
     pw_settings settings = { .rtol = 1e-8, .span = 1 };
     double q[6], v[6], Q[6], V[6];
     pw_statistics cost, Cost;
     agree_length = 1;
-    pw_system *s = scene_system (&table, NULL);
+    pw_system *s = scene_system (&agree_swing_table, NULL);
     agree_length = 1024;
-    pw_system *S = scene_system (&table, NULL);
+    pw_system *S = scene_system (&agree_swing_table, NULL);
     runs_state (s, method[i], &settings, 1, q, v, &cost);
     runs_state (S, method[i], &settings, 1, Q, V, &Cost);
     check_close ("angle", Q[2], q[2], 1e-4, "1e4 rtol");
@@ -369,14 +355,4 @@ static void test_units_of_moments (void **state) {
     pw_system_free (s);
     pw_system_free (S);
   }
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_integrators), cmocka_unit_test (test_ledger),
-    cmocka_unit_test (test_sampling),    cmocka_unit_test (test_dense),
-    cmocka_unit_test (test_verifier),    cmocka_unit_test (test_verifier_detects_errors),
-    cmocka_unit_test (test_units),       cmocka_unit_test (test_units_of_moments),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -50,9 +50,8 @@ static void arkode_run (pw_run *r, double h, double t_end, double *y_end) {
   SUNContext_Free (&context);
 }
 
-static void test_same_steps (void **state) {
+TEST (same_steps) {
   static const double step[] = { 0.125, 0.0625, 0.015625 };
-  (void)state;
   for (int massive = 0; massive < 2; massive++)
     for (int i = 0; i < 3; i++) {
       double q[6], v[6], y[12];
@@ -69,9 +68,4 @@ static void test_same_steps (void **state) {
       pw_run_close (r);
       pw_system_free (s);
     }
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_same_steps) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -16,13 +16,11 @@ static double ezy_torque (double t) {
 
 /* The four states of the table, and the position of the other body, which follows from them. */
 static void ezy_compare (const pw_sample *s, const double *line, double bound, const char *reason) {
-  char what[60];
   const double *x = line + 1;
   double steer[2] = { x[0] + 0.5 * cos (x[2]) + 0.125 * cos (x[3]), x[1] + 0.5 * sin (x[2]) + 0.125 * sin (x[3]) };
   const double reference[6] = { x[0], x[1], x[2], steer[0], steer[1], x[3] };
   for (int j = 0; j < 6; j++) {
-    snprintf (what, sizeof what, "coordinate %d at t = %g s", j, line[0]);
-    check_close (what, s->q[j], reference[j], bound, reason);
+    check_close (check_text ("coordinate %d at t = %g s", j, line[0]), s->q[j], reference[j], bound, reason);
   }
 }
 
@@ -54,46 +52,39 @@ static void ezy_digits (const char *method, const pw_settings *settings, const e
   pw_system_free (s);
 }
 
-static void test_rk4_projection (void **state) {
-  (void)state;
+TEST (rk4_projection) {
   ezy_digits ("rk4+projection", &(pw_settings){ .step = 1e-3, .span = 10, .ledger = 1 },
               &(ezy_bounds){ 1e-11, 1e-12, 60 * CHECK_EPS, 60 * CHECK_EPS,
                              "(h omega)^4 / 10 at h = 1e-3; residuals: 10 eps of terms of 6 m" });
 }
 
-static void test_rk4_identity (void **state) {
-  (void)state;
+TEST (rk4_identity) {
   ezy_digits ("rk4+projection:metric=identity", &(pw_settings){ .step = 1e-3, .span = 10, .ledger = 1 },
               &(ezy_bounds){ 1e-10, 1e-11, 60 * CHECK_EPS, 60 * CHECK_EPS,
                              "(h omega)^4 at h = 1e-3; residuals: 10 eps of terms of 6 m" });
 }
 
-static void test_rk4_none (void **state) {
-  (void)state;
+TEST (rk4_none) {
   ezy_digits ("rk4+none", &(pw_settings){ .step = 1e-3, .span = 10, .ledger = 1 },
               &(ezy_bounds){ 1e-10, 1e-10, 1e-10, 1e-10, "(h omega)^4 at h = 1e-3, drift as well" });
 }
 
-static void test_rk4_baumgarte (void **state) {
-  (void)state;
+TEST (rk4_baumgarte) {
   ezy_digits ("rk4+baumgarte", &(pw_settings){ .step = 1e-3, .span = 10, .ledger = 1 },
               &(ezy_bounds){ 1e-10, 1e-10, 1e-10, 1e-10, "(h omega)^4 at h = 1e-3, drift as well" });
 }
 
-static void test_ida_ggl (void **state) {
-  (void)state;
+TEST (ida_ggl) {
   ezy_digits ("ida+ggl", &(pw_settings){ .rtol = 1e-10, .atol = 1e-10, .span = 10, .ledger = 1 },
               &(ezy_bounds){ 1e-6, 1e-6, 1e-10, 1e-9, "1e4 rtol; |g| <= rtol, |J v| <= 10 rtol" });
 }
 
-static void test_ida_baumgarte (void **state) {
-  (void)state;
+TEST (ida_baumgarte) {
   ezy_digits ("ida+baumgarte", &(pw_settings){ .rtol = 1e-10, .atol = 1e-10, .span = 10, .ledger = 1 },
               &(ezy_bounds){ 1e-6, 1e-6, 1e-8, 1e-8, "1e4 rtol; residuals: 100 rtol" });
 }
 
-static void test_ida_none (void **state) {
-  (void)state;
+TEST (ida_none) {
   ezy_digits ("ida+none", &(pw_settings){ .rtol = 1e-10, .atol = 1e-10, .span = 10, .ledger = 1 },
               &(ezy_bounds){ 1e-6, 1e-6, 1e-6, 1e-6, "1e4 rtol, drift as well" });
 }
@@ -113,8 +104,7 @@ static void ezy_multiplier (const char *method, double bound, const char *reason
   pw_system_free (s);
 }
 
-static void test_multiplier (void **state) {
-  (void)state;
+TEST (multiplier) {
   ezy_multiplier ("rk4+projection", 16 * CHECK_EPS, "round-off of one solve with forces of 1 N");
   ezy_multiplier ("ida+ggl", 1e-7, "10 rtol: multipliers are outside the error test");
   ezy_multiplier ("ida+baumgarte", 1e-7, "10 rtol: multipliers are outside the error test");
@@ -143,8 +133,7 @@ static void ezy_straight (const char *method, double bound, const char *reason) 
   pw_system_free (s);
 }
 
-static void test_straight (void **state) {
-  (void)state;
+TEST (straight) {
   ezy_straight ("rk4+projection", 1e-11, "h^4 (u/(c+d))^5 / 120 at h = 1e-3 is 9e-12");
   ezy_straight ("rk4+none", 2e-11, "twice h^4 (u/(c+d))^5 / 120 at h = 1e-3");
   ezy_straight ("ida+ggl", 1e-6, "1e4 rtol");
@@ -184,8 +173,7 @@ static void ezy_reduced_step (long double t, long double h, ezy_reduced y) {
     for (int j = 0; j < 6; j++) y[j] += h * weight[i] * k[i][j];
 }
 
-static void test_reduced (void **state) {
-  (void)state;
+TEST (reduced) {
   enum { STEPS = 20000 };
   const double t_end = 7;
   ezy_reduced y = { -(long double)ezy_other.a, 0, 0, PW_PI, 0, 0 };
@@ -214,8 +202,7 @@ static void test_reduced (void **state) {
 }
 
 /* The opposite torque mirrors the motion about the x axis. */
-static void test_mirror (void **state) {
-  (void)state;
+TEST (mirror) {
   double q[6], v[6], Q[6], V[6];
   pw_system *s = scene_system (&scene_ezyroller, NULL), *S = scene_system (&scene_ezyroller, "M0", -0.1, NULL);
   runs_state (s, "rk4+projection", &(pw_settings){ .step = 1e-2 }, 3, q, v, NULL);
@@ -226,14 +213,4 @@ static void test_mirror (void **state) {
   check_close ("mirror", Q[5] - PW_PI, -(q[5] - PW_PI), bound, "round-off over 300 steps");
   pw_system_free (s);
   pw_system_free (S);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_rk4_projection), cmocka_unit_test (test_rk4_identity), cmocka_unit_test (test_rk4_none),
-    cmocka_unit_test (test_rk4_baumgarte),  cmocka_unit_test (test_ida_ggl),      cmocka_unit_test (test_ida_baumgarte),
-    cmocka_unit_test (test_ida_none),       cmocka_unit_test (test_multiplier),   cmocka_unit_test (test_straight),
-    cmocka_unit_test (test_reduced),        cmocka_unit_test (test_mirror),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

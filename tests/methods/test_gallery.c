@@ -12,8 +12,7 @@
 
 /* ---- Closed forms ---- */
 
-static void test_chaplygin_sleigh (void **state) {
-  (void)state;
+TEST (chaplygin_sleigh) {
   pw_system *s = gallery_open ("chaplygin-sleigh", NULL);
   pw_run *r = gallery_run (s, 1e-3, 20);
   const double k2 = 0.5 + 0.25 * 0.25, A = sqrt (0.16 + k2 * 0.64), rate = 0.25 * A / k2, c = atanh (-0.4 / A);
@@ -35,8 +34,7 @@ static void test_chaplygin_sleigh (void **state) {
   runs_close (r, s);
 }
 
-static void test_knife_edge_incline (void **state) {
-  (void)state;
+TEST (knife_edge_incline) {
   pw_system *s = gallery_open ("knife-edge-incline", NULL);
   pw_run *r = gallery_run (s, 1e-3, 10);
   pw_sample x = runs_to (r, 10);
@@ -46,8 +44,7 @@ static void test_knife_edge_incline (void **state) {
   runs_close (r, s);
 }
 
-static void test_pendulum (void **state) {
-  (void)state;
+TEST (pendulum) {
   pw_system *s = gallery_open ("pendulum", NULL);
   pw_run *r = gallery_run (s, 1e-3, 10);
   pw_sample x = runs_to (r, 10);
@@ -84,29 +81,25 @@ static void gallery_turn (int n, double longer, double ratio) {
   runs_close (r, s);
 }
 
-static void test_n_trailer (void **state) {
-  (void)state;
+TEST (n_trailer) {
   gallery_turn (2, 0.2, 0.25);
   gallery_turn (8, 0, 0.9);
 }
 
 /* ---- Energy ---- */
 
-static void test_chain (void **state) {
-  (void)state;
+TEST (chain) {
   for (double n = 1; n <= 20; n *= 4)
     gallery_energy (gallery_open ("chain", "n", n, NULL), 2e-4, 1, n * 1e4 * H4, GALLERY_CONSERVATIVE);
 }
 
-static void test_snakeboard (void **state) {
-  (void)state;
+TEST (snakeboard) {
   gallery_energy (gallery_open ("snakeboard", NULL), 1e-3, 10, 100 * H4, GALLERY_DRIVEN);
   gallery_energy (gallery_open ("snakeboard", "swing", 0., "steer", 0., "trim", 0.4, "u0", 1.5, NULL), 1e-3, 10,
                   100 * H4, GALLERY_CONSERVATIVE);
 }
 
-static void test_roller_racer (void **state) {
-  (void)state;
+TEST (roller_racer) {
   gallery_energy (gallery_open ("roller-racer", NULL), 1e-3, 5, 1e6 * H4, GALLERY_DRIVEN);
   gallery_energy (gallery_open ("roller-racer", "stiffness", 0., "damping", 0., "u0", 1., NULL), 1e-3, 5, 1e3 * H4,
                   GALLERY_CONSERVATIVE);
@@ -114,10 +107,9 @@ static void test_roller_racer (void **state) {
 
 /* ---- Mechanisms ---- */
 
-static void test_andrews_squeezer (void **state) {
+TEST (andrews_squeezer) {
   static const char *const name[] = { "K1.phi", "K3.phi", "K5.phi", "K7.phi" };
   static const double digits[] = { 15.8107711951537, 0.0408222401196458, 0.524409965879954, 1.04808074104194 };
-  (void)state;
   pw_system *s = gallery_open ("andrews-squeezer", NULL);
   pw_run *r = gallery_run (s, 2e-6, 0.03);
   pw_sample x = runs_to (r, 0.03);
@@ -131,8 +123,7 @@ static void test_andrews_squeezer (void **state) {
   runs_close (r, s);
 }
 
-static void test_peaucellier (void **state) {
-  (void)state;
+TEST (peaucellier) {
   pw_system *s = gallery_open ("peaucellier", NULL);
   pw_run *r = gallery_run (s, 1e-3, 2);
   double low = 0, high = 0, P[2];
@@ -149,8 +140,7 @@ static void test_peaucellier (void **state) {
 }
 
 /* The loops stay closed, and after one revolution the leg is back at its initial position. */
-static void test_theo_jansen (void **state) {
-  (void)state;
+TEST (theo_jansen) {
   pw_system *s = gallery_open ("theo-jansen", NULL);
   pw_run *r = gallery_run (s, 1e-3, 2);
   pw_sample x = runs_to (r, 0);
@@ -192,25 +182,7 @@ static int gallery_default (void *context, const char *model, const char *path) 
   return 0;
 }
 
-static void test_defaults (void **state) {
+TEST (defaults) {
   pw_error error = { 0 };
-  (void)state;
   check_ok (pw_file_list (gallery_default, NULL, &error), &error);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_chaplygin_sleigh),
-    cmocka_unit_test (test_knife_edge_incline),
-    cmocka_unit_test (test_pendulum),
-    cmocka_unit_test (test_n_trailer),
-    cmocka_unit_test (test_chain),
-    cmocka_unit_test (test_snakeboard),
-    cmocka_unit_test (test_roller_racer),
-    cmocka_unit_test (test_andrews_squeezer),
-    cmocka_unit_test (test_peaucellier),
-    cmocka_unit_test (test_theo_jansen),
-    cmocka_unit_test (test_defaults),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -22,9 +22,8 @@ static const struct {
 };
 enum { GALPHA_SCENES = sizeof galpha_scene / sizeof *galpha_scene };
 
-static void test_order (void **state) {
+TEST (order) {
   static const char *const method[] = { "galpha+index3", "galpha+ggl", "galpha+index3:rho=0", "galpha+ggl:rho=0.5" };
-  (void)state;
   for (int i = 0; i < GALPHA_SCENES; i++)
     for (int k = 0; k < 4; k++)
       ladder_expect (galpha_scene[i].model, method[k], galpha_scene[i].h, galpha_scene[i].t, 2, 0.2,
@@ -33,9 +32,8 @@ static void test_order (void **state) {
 }
 
 /* After three steps, before the effect of the initial values has decayed. */
-static void test_start (void **state) {
+TEST (start) {
   static const char *const model[] = { "n-trailer", "n-four-bar", "arm", "snakeboard", "redundant-parallelogram" };
-  (void)state;
   for (int i = 0; i < 10; i++) {
     const char *method = i % 2 ? "galpha+ggl" : "galpha+index3";
     double h = 0.004, coarse = ladder_run (model[i / 2], method, h, 3 * h).lambda;
@@ -45,8 +43,7 @@ static void test_start (void **state) {
 }
 
 /* The last step is shortened; the order is unchanged. */
-static void test_cut (void **state) {
-  (void)state;
+TEST (cut) {
   for (int i = 0; i < 2; i++)
     for (int k = 0; k < 2; k++) {
       const char *method = i ? "galpha+ggl" : "galpha+index3", *model = k ? "n-four-bar" : "arm";
@@ -60,8 +57,7 @@ static void test_cut (void **state) {
 
 /* ---- Residuals, small steps, large steps ---- */
 
-static void test_residuals (void **state) {
-  (void)state;
+TEST (residuals) {
   for (int i = 0; i < GALPHA_SCENES; i++) {
     double h = galpha_scene[i].h, t = 20 * h;
     pw_statistics coarse = ladder_run (galpha_scene[i].model, "galpha+index3", h, t).cost;
@@ -80,9 +76,8 @@ static void test_residuals (void **state) {
 
 /* Small steps impair neither the iteration nor the multipliers, except for the round-off eps L of positions in
  * index 3, an acceleration of eps L / (beta h^2). */
-static void test_small_steps (void **state) {
+TEST (small_steps) {
   static const char *const model[] = { "ezyroller", "n-four-bar", "arm", "n-trailer" };
-  (void)state;
   for (int i = 0; i < 4; i++)
     for (int k = 3; k <= 5; k++) {
       double h = pow (10, -k);
@@ -109,9 +104,8 @@ static double galpha_condition (const char *model, const char *method, double h)
   return condition;
 }
 
-static void test_condition (void **state) {
+TEST (condition) {
   static const char *const model[] = { "ezyroller", "n-four-bar", "arm" };
-  (void)state;
   for (int i = 0; i < 6; i++) {
     const char *method = i % 2 ? "galpha+ggl" : "galpha+index3";
     double coarse = galpha_condition (model[i / 2], method, 1e-3), fine = galpha_condition (model[i / 2], method, 1e-6);
@@ -129,8 +123,7 @@ static void galpha_stops (const char *model, const char *method, double step, co
   pw_system_free (s);
 }
 
-static void test_large_steps (void **state) {
-  (void)state;
+TEST (large_steps) {
   galpha_stops ("ezyroller", "galpha+index3", 3,
                 "t = 0 s: the iteration does not converge; the step of 3 s may be too large");
   galpha_stops ("ezyroller", "galpha+ggl", 3, "the step of 3 s may be too large");
@@ -141,9 +134,8 @@ static void test_large_steps (void **state) {
 
 /* Samples inside steps are as accurate as the ends of steps and satisfy the constraints; the energy balances, and
  * sampling changes nothing. */
-static void test_samples (void **state) {
+TEST (samples) {
   static const char *const method[] = { "galpha+index3", "galpha+ggl", "leapfrog" };
-  (void)state;
   for (int i = 0; i < 3; i++) {
     double off[2] = { 0 }, force[2] = { 0 }, balance[2] = { 0 }, q[2][6];
     for (int k = 0; k < 2; k++) {
@@ -206,9 +198,8 @@ static void galpha_switched_run (const char *method, pw_settings settings, doubl
   pw_system_free (s);
 }
 
-static void test_breakpoint (void **state) {
+TEST (breakpoint) {
   static const char *const method[] = { "galpha+index3", "galpha+ggl", "leapfrog" };
-  (void)state;
   double x[12], l[4];
   galpha_switched_run ("erk8+projection", (pw_settings){ .rtol = 1e-12, .span = 1 }, 0.5, x, l);
   for (int i = 0; i < 3; i++) {
@@ -225,8 +216,7 @@ static void test_breakpoint (void **state) {
 }
 
 /* A pendulum whose torque jumps: the multipliers have order 2 from the first step after the jump on. */
-static void galpha_pushed (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (galpha_pushed) {
   pw_add_body (m, &(pw_body){ .name = "arm", .mass = 1, .inertia = 0.5, .start = { 0.5 } });
   pw_add_pin (m, &(pw_pin){ .name = "pivot", .body = { "arm", "ground" }, .at = { { -0.5, 0 }, { 0, 0 } } });
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 } });
@@ -235,10 +225,8 @@ static void galpha_pushed (pw_model *m, const void *parameters) {
                                   .value = { PW_PULSE, .pulse = { .height = 3, .start = 1. / 3 } } });
 }
 
-static void test_restart (void **state) {
-  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof (pw_plugin_table), .build = galpha_pushed };
-  (void)state;
-  pw_system *s = scene_system (&table, NULL);
+TEST (restart) {
+  pw_system *s = scene_system (&galpha_pushed_table, NULL);
   for (int i = 0; i < 2; i++) {
     const char *method = i ? "galpha+ggl" : "galpha+index3";
     double off[2] = { 0 };
@@ -257,19 +245,16 @@ static void test_restart (void **state) {
 
 /* ---- Damping ---- */
 
-static void galpha_stiff (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (galpha_stiff) {
   pw_add_body (m, &(pw_body){ .name = "rotor", .mass = 1, .inertia = 1, .start = { 0, 0, 0.01 } });
   pw_add_rotational_spring (m, &(pw_rotational_spring){ .name = "k", .body = { "rotor", "ground" }, .stiffness = 1e8 });
 }
 
 /* A vibration of 1e4 rad/s at a step of 0.01 s is reduced to about rho by each step; with rho = 1 it is not damped.
  * */
-static void test_damping (void **state) {
-  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof (pw_plugin_table), .build = galpha_stiff };
+TEST (damping) {
   static const double rho[] = { 0.2, 0.6, 1 };
-  (void)state;
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (&galpha_stiff_table, NULL);
   for (int i = 0; i < 3; i++) {
     char method[40];
     snprintf (method, sizeof method, "galpha:rho=%g", rho[i]);
@@ -288,21 +273,18 @@ static void test_damping (void **state) {
 
 /* ---- A vibration of 1000 times the frequency that the step resolves ---- */
 
-static void galpha_fast (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (galpha_fast) {
   pw_add_body (m, &(pw_body){ .name = "arm", .mass = 1, .inertia = 1, .start = { 0, 0, 1e-3 } });
   pw_add_rotational_spring (m, &(pw_rotational_spring){ .name = "k", .body = { "arm", "ground" }, .stiffness = 1e10 });
 }
 
 /* It never exceeds its initial size, and in the end each step reduces it to rho. */
-static void test_no_overshoot (void **state) {
+TEST (no_overshoot) {
   static const char *const method[] = { "galpha+ggl:rho=0.3", "galpha+ggl:rho=0.5", "galpha+index3:rho=0.8",
                                         "galpha+ggl:rho=1" };
   static const double rho[] = { 0.3, 0.5, 0.8, 1 };
-  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = galpha_fast };
-  (void)state;
   for (int i = 0; i < 4; i++) {
-    pw_system *s = scene_system (&table, NULL);
+    pw_system *s = scene_system (&galpha_fast_table, NULL);
     pw_run *r = runs_open (s, method[i], &(pw_settings){ .step = 0.01, .span = 1 });
     double before = 0, most = 0;
     for (int k = 1; k <= 60; k++) {
@@ -339,13 +321,10 @@ static void failing_build (pw_model *m, const void *parameters) {
 }
 
 /* The next step, of another size, does not begin with what the failed one has computed. */
-static void test_failing (void **state) {
+TEST (failing) {
   static const pw_parameter none[] = { { .name = NULL } };
-  static const pw_plugin_table table = {
-    .abi = PW_ABI, .size = sizeof (pw_plugin_table), .parameters = none, .build = failing_build
-  };
+  static const pw_plugin_table table = SCENE_TABLE_WITH (failing_build, none, 0);
   double phi[2];
-  (void)state;
   for (int fails = 0; fails < 2; fails++) {
     pw_error error = { 0 };
     pw_system *s = scene_system (&table, NULL);
@@ -359,15 +338,4 @@ static void test_failing (void **state) {
     pw_system_free (s);
   }
   check_close ("angle", phi[1], phi[0], 1e-6, "h^3: that of a new initialisation");
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_failing),     cmocka_unit_test (test_order),     cmocka_unit_test (test_start),
-    cmocka_unit_test (test_cut),         cmocka_unit_test (test_residuals), cmocka_unit_test (test_small_steps),
-    cmocka_unit_test (test_large_steps), cmocka_unit_test (test_condition), cmocka_unit_test (test_samples),
-    cmocka_unit_test (test_breakpoint),  cmocka_unit_test (test_restart),   cmocka_unit_test (test_no_overshoot),
-    cmocka_unit_test (test_damping),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

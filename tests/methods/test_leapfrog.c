@@ -19,16 +19,14 @@ static const struct {
                        { "car-tyres", 0.002, 1 } };
 enum { LEAPFROG_SCENES = sizeof leapfrog_scene / sizeof *leapfrog_scene };
 
-static void test_order (void **state) {
-  (void)state;
+TEST (order) {
   for (int i = 0; i < LEAPFROG_SCENES; i++)
     ladder_expect (leapfrog_scene[i].model, "leapfrog", leapfrog_scene[i].h, leapfrog_scene[i].t, 2, 0.25,
                    LADDER_LAMBDA);
   ladder_expect ("tractor", "leapfrog", 0.01, 1, 2, 0.25, LADDER_Q); /* prescribed motion */
 }
 
-static void test_residuals (void **state) {
-  (void)state;
+TEST (residuals) {
   for (int i = 0; i < LEAPFROG_SCENES; i++) {
     double h = leapfrog_scene[i].h;
     pw_statistics cost = ladder_run (leapfrog_scene[i].model, "leapfrog", h, 20 * h).cost;
@@ -42,8 +40,7 @@ static void test_residuals (void **state) {
 
 /* A board on two skewed knife edges held by springs, with a sprung rider: three nonholonomic rows, five pins, light
  * trucks, conservative. */
-static void leapfrog_board (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (leapfrog_board) {
   pw_add_body (m, &(pw_body){ .name = "board", .mass = 6, .inertia = 0.1, .rate = { 1, 0, 0 } });
   pw_add_body (m, &(pw_body){ .name = "rotor", .inertia = 0.2, .start = { 0, 0, 0.7 }, .rate = { 1, 0, 0 } });
   pw_add_body (
@@ -64,8 +61,7 @@ static void leapfrog_board (pw_model *m, const void *parameters) {
 }
 
 /* An EzyRoller steered by a spring; its steering assembly is massless. */
-static void leapfrog_roller (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (leapfrog_roller) {
   pw_add_body (m, &(pw_body){ .name = "frame", .mass = 10, .inertia = 2, .rate = { 1, 0, 0 } });
   pw_add_body (m, &(pw_body){ .name = "steer", .start = { 0.6, 0, 0.1 }, .rate = { 1, 0, 0 } });
   pw_add_pin (m, &(pw_pin){ .name = "B", .body = { "frame", "steer" }, .at = { { 0.5, 0 }, { -0.1, 0 } } });
@@ -73,9 +69,6 @@ static void leapfrog_roller (pw_model *m, const void *parameters) {
   pw_add_wheel (m, &(pw_wheel){ .name = "C", .body = "steer", .at = { -0.2, 0 } });
   pw_add_rotational_spring (m, &(pw_rotational_spring){ .name = "k", .body = { "steer", "frame" }, .stiffness = 1 });
 }
-
-static const pw_plugin_table leapfrog_board_table = TRIAL_TABLE (leapfrog_board),
-                             leapfrog_roller_table = TRIAL_TABLE (leapfrog_roller);
 
 static pw_system *leapfrog_open (const char *model) {
   if (strcmp (model, "board") == 0) return scene_system (&leapfrog_board_table, NULL);
@@ -121,8 +114,7 @@ static const struct {
 };
 enum { LEAPFROG_CONSERVATIVE = sizeof leapfrog_conservative / sizeof *leapfrog_conservative };
 
-static void test_way_back (void **state) {
-  (void)state;
+TEST (way_back) {
   for (int i = 0; i < LEAPFROG_CONSERVATIVE; i++) {
     const char *model = leapfrog_conservative[i].model;
     double h = leapfrog_conservative[i].h, n = leapfrog_conservative[i].steps;
@@ -152,8 +144,7 @@ static double leapfrog_drift_of (const char *model, const char *method, double h
   return fabs (mean[3] - mean[0]) / most;
 }
 
-static void test_energy (void **state) {
-  (void)state;
+TEST (energy) {
   for (int i = 0; i < LEAPFROG_CONSERVATIVE; i++) {
     const char *model = leapfrog_conservative[i].model;
     double h = leapfrog_conservative[i].h, transient = i == 4 ? 0.1 : 0.05;
@@ -169,9 +160,8 @@ static void test_energy (void **state) {
 /* ---- Step sizes and settings ---- */
 
 /* The last step is shortened; the order is unchanged. */
-static void test_last_step (void **state) {
+TEST (last_step) {
   static const char *const model[] = { "arm", "n-four-bar", "ezyroller" };
-  (void)state;
   for (int k = 0; k < 3; k++) {
     double h = 0.004, t = 0.3 + h / 12;
     ladder_error coarse = ladder_run (model[k], "leapfrog", h, t), fine = ladder_run (model[k], "leapfrog", h / 4, t);
@@ -181,8 +171,7 @@ static void test_last_step (void **state) {
   }
 }
 
-static void leapfrog_damped (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (leapfrog_damped) {
   pw_add_body (m, &(pw_body){ .name = "rotor", .mass = 1, .inertia = 1, .rate = { 0, 0, 1 } });
   pw_add_rotational_spring (m, &(pw_rotational_spring){ .name = "c", .body = { "rotor", "ground" }, .damping = 1000 });
 }
@@ -196,12 +185,10 @@ static void leapfrog_stops (pw_system *s, double step, const char *cause) {
   pw_system_free (s);
 }
 
-static void test_large_steps (void **state) {
-  static const pw_plugin_table damped = TRIAL_TABLE (leapfrog_damped);
-  (void)state;
+TEST (large_steps) {
   leapfrog_stops (ladder_open ("ezyroller"), 3, "the step of 3 s may be too large");
   leapfrog_stops (ladder_open ("pendulum"), 1, "the step of 1 s may be too large");
-  leapfrog_stops (scene_system (&damped, NULL), 0.01,
+  leapfrog_stops (scene_system (&leapfrog_damped_table, NULL), 0.01,
                   "t = 0 s: the iteration does not converge; the step of 0.01 s may be too large");
 }
 
@@ -237,24 +224,13 @@ static const pw_kind leapfrog_edge_kind = {
   .force_q = leapfrog_edge_force_q,
 };
 
-static void leapfrog_beyond_edge (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (leapfrog_beyond_edge) {
   pw_add_body (m, &(pw_body){ .name = "puck", .mass = 1, .inertia = 1, .rate = { 1, 0, 0 } });
   pw_add (m, &leapfrog_edge_kind, &(leapfrog_edge){ .name = "edge", .body = "puck" });
 }
 
 /* The step that meets it is refused, although the corrections of y and phi are 0. */
-static void test_undefined_force (void **state) {
-  static const pw_plugin_table undefined = TRIAL_TABLE (leapfrog_beyond_edge);
-  (void)state;
-  leapfrog_stops (scene_system (&undefined, NULL), 0.01, "t = 0.04 s: the iteration does not converge");
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_order),           cmocka_unit_test (test_residuals), cmocka_unit_test (test_way_back),
-    cmocka_unit_test (test_energy),          cmocka_unit_test (test_last_step), cmocka_unit_test (test_large_steps),
-    cmocka_unit_test (test_undefined_force),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
+TEST (undefined_force) {
+  leapfrog_stops (scene_system (&leapfrog_beyond_edge_table, NULL), 0.01,
+                  "t = 0.04 s: the iteration does not converge");
 }

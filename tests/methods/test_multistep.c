@@ -25,19 +25,17 @@ static ladder_error multi_error (int scene, const char *method, double rtol) {
 }
 
 /* Errors are proportional to the tolerance, with all constraint types. */
-static void test_tolerances (void **state) {
-  (void)state;
+TEST (tolerances) {
   for (int i = 0; i < SCENES; i++)
     for (int m = 0; m < METHODS; m++) {
       ladder_error e[2];
       for (int k = 0; k < 2; k++) {
         double rtol = k ? 1e-10 : 1e-6;
-        char what[100];
         e[k] = multi_error (i, multi_methods[m], rtol);
-        snprintf (what, sizeof what, "%s, %s, rtol %g: positions", multi_scenes[i].model, multi_methods[m], rtol);
-        check_below (what, e[k].q, 3e3 * rtol, "3000 rtol: errors of some hundred steps, and their growth");
-        snprintf (what, sizeof what, "%s, %s, rtol %g: velocities", multi_scenes[i].model, multi_methods[m], rtol);
-        check_below (what, e[k].v, 3e3 * rtol, "3000 rtol");
+        check_below (check_text ("%s, %s, rtol %g: positions", multi_scenes[i].model, multi_methods[m], rtol), e[k].q,
+                     3e3 * rtol, "3000 rtol: errors of some hundred steps, and their growth");
+        check_below (check_text ("%s, %s, rtol %g: velocities", multi_scenes[i].model, multi_methods[m], rtol), e[k].v,
+                     3e3 * rtol, "3000 rtol");
       }
       check_below (multi_methods[m], e[1].q, e[0].q / 100, "four decades of tolerance give two of error at the least");
     }
@@ -45,8 +43,7 @@ static void test_tolerances (void **state) {
 
 /* Steps grow as rtol^(-1/(order + 1)): those of Adams, of orders to 12, more slowly than those of BDF, of orders to
  * 5. */
-static void test_orders (void **state) {
-  (void)state;
+TEST (orders) {
   static const struct {
     const char *method;
     double slowest, fastest; /* orders with equal growth */
@@ -63,8 +60,7 @@ static void test_orders (void **state) {
 
 /* Constraints enforced by each form: velocities by index2, positions too by ggl and si1, to the tolerance;
  * projection to round-off. */
-static void test_residuals (void **state) {
-  (void)state;
+TEST (residuals) {
   const double rtol = 1e-8;
   for (int i = 0; i < SCENES; i++) {
     const char *model = multi_scenes[i].model;
@@ -80,8 +76,7 @@ static void test_residuals (void **state) {
 }
 
 /* The multipliers of si1 are derivatives of unknowns, and as accurate as multipliers that are unknowns. */
-static void test_multipliers (void **state) {
-  (void)state;
+TEST (multipliers) {
   double ratio = 0;
   int count = 0;
   for (int i = 0; i < SCENES - 1; i++) /* not the tractor's, whose motion is prescribed */
@@ -113,10 +108,9 @@ static pw_statistics multi_cost (pw_system *s, const char *method, double t, dou
 }
 
 /* Explicit methods must resolve modes that have decayed; implicit ones step over them, with the same result. */
-static void test_stiff (void **state) {
+TEST (stiff) {
   static const char *const method[] = { "ida+ggl",      "ida+si1",  "ida+index2",    "radau+ggl",     "radau+index2",
                                         "radau+index3", "bdf+none", "bdf+baumgarte", "bdf+projection" };
-  (void)state;
   double exact[20], q[20];
   pw_system *s = multi_steering ();
   pw_statistics by_hand = multi_cost (s, "erk8+projection", 2, exact);
@@ -129,8 +123,7 @@ static void test_stiff (void **state) {
 }
 
 /* Several steps use the same matrix; functional iteration has none. */
-static void test_cost (void **state) {
-  (void)state;
+TEST (cost) {
   pw_statistics bdf = multi_error (0, "bdf+projection", 1e-8).cost, adams = multi_error (0, "adams+none", 1e-8).cost;
   check_below ("matrices", (double)bdf.jacobians, 0.1 * (double)bdf.steps, "one in ten steps");
   check_below ("evaluations a step", (double)bdf.rhs, 2.5 * (double)bdf.steps,
@@ -144,8 +137,7 @@ static void test_cost (void **state) {
 /* A step over a jump of a prescribed third derivative leaves the constraints before it is projected, and the
  * accelerations at its end are those of the displaced state.  An estimate that ignores displacements leaves errors of
  * up to 850 rtol here. */
-static void test_lifted (void **state) {
-  (void)state;
+TEST (lifted) {
   for (int i = 0; i < 10; i++) {
     double q[2][3], v[2][3];
     pw_system *s = scene_named ("tests/scenes/lifted.yaml", "kink", 0.26 + 0.01 * i);
@@ -161,8 +153,7 @@ static void test_lifted (void **state) {
 
 /* ---- Options ---- */
 
-static void test_options (void **state) {
-  (void)state;
+TEST (options) {
   double all = multi_error (1, "bdf+projection", 1e-8).cost.position;
   double some = multi_error (1, "bdf+projection:every=7", 1e-8).cost.position;
   check_below ("position residual, every step", all, 32 * CHECK_EPS, "round-off");
@@ -176,9 +167,8 @@ static void test_options (void **state) {
 }
 
 /* Samples inside a step, some of them near singular configurations, change nothing in the run. */
-static void test_sampled (void **state) {
+TEST (sampled) {
   static const char *const method[] = { "adams", "bdf", "bdf+projection" };
-  (void)state;
   for (int i = 0; i < 3; i++) {
     pw_error error = { 0 };
     pw_sample x;
@@ -194,13 +184,4 @@ static void test_sampled (void **state) {
     pw_run_close (r);
     pw_system_free (s);
   }
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_tolerances),  cmocka_unit_test (test_orders),  cmocka_unit_test (test_residuals),
-    cmocka_unit_test (test_multipliers), cmocka_unit_test (test_stiff),   cmocka_unit_test (test_cost),
-    cmocka_unit_test (test_lifted),      cmocka_unit_test (test_options), cmocka_unit_test (test_sampled),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -23,16 +23,14 @@ static void order_expect (const char *method, const double *step, double ratio, 
   double error[3];
   for (int i = 0; i < 3; i++) error[i] = order_error (method, step[i]);
   for (int i = 0; i < 2; i++) {
-    char what[100];
-    snprintf (what, sizeof what, "%s, error at h = %g over error at h = %g", method, step[i], step[i + 1]);
-    check_close (what, error[i] / error[i + 1], ratio, margin, reason);
+    check_close (check_text ("%s, error at h = %g over error at h = %g", method, step[i], step[i + 1]),
+                 error[i] / error[i + 1], ratio, margin, reason);
   }
 }
 
 static const double order_steps[] = { 0.02, 0.01, 0.005 };
 
-static void test_order_4 (void **state) {
-  (void)state;
+TEST (order_4) {
   order_expect ("rk4+none", order_steps, 16, 1, "order 4: 2^4, and the next power of h");
   order_expect ("rk4+projection", order_steps, 16, 1, "order 4: 2^4, and the next power of h");
   order_expect ("rk4+projection:metric=identity", order_steps, 16, 1.5, "order 4: 2^4, and the next power of h");
@@ -41,9 +39,8 @@ static void test_order_4 (void **state) {
 }
 
 /* Torques held over the step make any method first order. */
-static void test_held (void **state) {
+TEST (held) {
   static const double step[] = { 0.002, 0.001, 0.0005 };
-  (void)state;
   order_expect ("rk4+projection:inputs=held", step, 2, 0.1, "order 1: 2, and the next power of h");
   order_expect ("rk4+none:inputs=held", step, 2, 0.1, "order 1: 2, and the next power of h");
 }
@@ -83,8 +80,7 @@ static double order_switched_error (const char *method, double step) {
 
 /* A step ends where a signal jumps and uses its value before; the next one begins with the value after the jump:
  * the order stays 4, errors follow the tolerances. */
-static void test_switched (void **state) {
-  (void)state;
+TEST (switched) {
   double coarse = order_switched_error ("rk4+projection", 0.04), fine = order_switched_error ("rk4+projection", 0.02);
   check_below ("error at h = 0.02", fine, coarse / 8, "order 4 has 1/16; with the value after the jump it has 1/2");
   check_below ("error at h = 0.02", fine, 1e-5, "h^4 (torque / inertia)^2, about 8e-7");
@@ -98,13 +94,4 @@ static void test_switched (void **state) {
     for (int j = 0; j < 6; j++) check_close (ida[i], q[0][j], q[1][j], 1e3 * 1e-8, "1e3 rtol");
     check_below ("steps", (double)cost.steps, 400, "not many more than without a switch");
   }
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_order_4),
-    cmocka_unit_test (test_held),
-    cmocka_unit_test (test_switched),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -52,8 +52,7 @@ static pw_system *own_system (const pw_signal *torque) {
 }
 
 /* Projection keeps residuals at round-off; feedback reduces them. */
-static void test_stabilisations (void **state) {
-  (void)state;
+TEST (stabilisations) {
   static const char *const method[] = { "euler", "euler+baumgarte:alpha=50:beta=50", "euler+projection" };
   double off[3];
   for (int i = 0; i < 3; i++) {
@@ -71,8 +70,7 @@ static void test_stabilisations (void **state) {
 }
 
 /* Steps end at a discontinuity and at t_end; steps after it are multiples of the given size. */
-static void test_breakpoint (void **state) {
-  (void)state;
+TEST (breakpoint) {
   const pw_signal pulse = { PW_PULSE, .pulse = { .height = 0.1, .start = 0.0104, .width = 0.02 } };
   pw_system *s = own_system (&pulse);
   pw_run *r = runs_open (s, "euler+projection", &own_settings);
@@ -93,8 +91,7 @@ static void test_breakpoint (void **state) {
 }
 
 /* A sample inside a step satisfies the constraints, and lies between the ends like a cubic. */
-static void test_sample (void **state) {
-  (void)state;
+TEST (sample) {
   pw_system *s = own_system (NULL);
   pw_run *r = runs_open (s, "euler+projection", &own_settings);
   runs_to (r, 0.5);
@@ -112,8 +109,7 @@ static void test_sample (void **state) {
 }
 
 /* A run resumed from a checkpoint continues bit-identically. */
-static void test_checkpoint (void **state) {
-  (void)state;
+TEST (checkpoint) {
   pw_archive a = { 0 };
   pw_error error = { 0 };
   double q[2][12];
@@ -136,8 +132,7 @@ static void test_checkpoint (void **state) {
 }
 
 /* Only while a step is near a singular configuration is there no checkpoint. */
-static void test_after_singular (void **state) {
-  (void)state;
+TEST (after_singular) {
   pw_error error = { 0 };
   pw_archive a = { 0 };
   pw_system *s = own_system (NULL);
@@ -151,8 +146,7 @@ static void test_after_singular (void **state) {
   pw_system_free (s);
 }
 
-static void test_errors (void **state) {
-  (void)state;
+TEST (errors) {
   pw_system *s = own_system (NULL);
   pw_error error = { 0 };
   assert_null (pw_run_open (s, "eulr", &own_settings, &error));
@@ -164,11 +158,4 @@ static void test_errors (void **state) {
   assert_null (pw_run_open (s, "euler", NULL, &error));
   assert_int_equal (error.status, PW_INPUT);
   pw_system_free (s);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_stabilisations), cmocka_unit_test (test_breakpoint),
-                                      cmocka_unit_test (test_sample),         cmocka_unit_test (test_checkpoint),
-                                      cmocka_unit_test (test_errors),         cmocka_unit_test (test_after_singular) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

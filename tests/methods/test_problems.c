@@ -90,8 +90,7 @@ static void problem_run (const problem *p, pw_system *s, int method) {
   pw_run_close (r);
 }
 
-static void test_problems (void **state) {
-  (void)state;
+TEST (problems) {
   for (const problem *p = problems; p < problems + sizeof problems / sizeof *problems; p++) {
     pw_error error = { 0 };
     pw_file *f = pw_file_open (p->model, &error);
@@ -104,9 +103,4 @@ static void test_problems (void **state) {
     pw_system_free (s);
     pw_file_close (f);
   }
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_problems) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -3,8 +3,8 @@
 #include <stdio.h>
 #include <string.h>
 #include "check.h"
+#include "gallery.h"
 #include "ladder.h"
-#include "pinwheel-files.h"
 #include "scene.h"
 #include "system.h"
 #include "trial.h"
@@ -28,8 +28,7 @@ enum { RADAU_SCENES = sizeof radau_scene / sizeof *radau_scene };
 
 /* Order 5 of positions and velocities in index 2 (Hairer, Lubich & Roche 1989: 2 s - 1 with s = 3 stages); multipliers
  * are computed from these. */
-static void test_order (void **state) {
-  (void)state;
+TEST (order) {
   for (int i = 0; i < RADAU_SCENES; i++) {
     ladder_expect (radau_scene[i].model, "radau+ggl:steps=fixed", radau_scene[i].h, radau_scene[i].t, 5, 0.5,
                    radau_scene[i].depth);
@@ -40,8 +39,7 @@ static void test_order (void **state) {
 
 /* Index 3: positions 2 s - 1 = 5, velocities s = 3, and so the multipliers computed from both; without holonomic
  * constraints it is index 2. */
-static void test_order_index3 (void **state) {
-  (void)state;
+TEST (order_index3) {
   for (int i = 0; i < RADAU_SCENES; i++) {
     const char *model = radau_scene[i].model, *method = "radau+index3:steps=fixed";
     int second = strcmp (model, "tractor") == 0 || strcmp (model, "chaplygin-sleigh") == 0;
@@ -61,9 +59,8 @@ static void test_order_index3 (void **state) {
 
 /* With step-size control: small steps after a turn correct positions that Newton's iteration has left within its
  * tolerance, by velocities of that size over the step. */
-static void test_small_steps_index3 (void **state) {
+TEST (small_steps_index3) {
   double q[2][3 * 8], v[3 * 8];
-  (void)state;
   pw_system *s = ladder_open ("n-four-bar");
   int n = pw_system_coordinates (s);
   assert_true (n <= 3 * 8);
@@ -74,8 +71,7 @@ static void test_small_steps_index3 (void **state) {
 }
 
 /* Constraints enforced by each form. */
-static void test_residuals (void **state) {
-  (void)state;
+TEST (residuals) {
   for (int i = 0; i < RADAU_SCENES; i++) {
     const char *model = radau_scene[i].model;
     double h = radau_scene[i].h / 4, t = radau_scene[i].t;
@@ -92,11 +88,10 @@ static void test_residuals (void **state) {
 
 static const char *const radau_forms[] = { "radau+ggl", "radau+index2", "radau+index3" };
 
-static void test_digits (void **state) {
+TEST (digits) {
   static const char *const name[] = { "K1.phi", "K3.phi", "K5.phi", "K7.phi" };
   static const double digits[] = { 15.8107711951537, 0.0408222401196458, 0.524409965879954, 1.04808074104194 };
   double table[4 * 6], q[6], v[6];
-  (void)state;
   assert_int_equal (runs_reference ("tests/reference/ezyroller.txt", 4, 6, table), 4);
   const double *x = table + 3 * 6;
   for (int i = 0; i < 3; i++) {
@@ -116,9 +111,8 @@ static void test_digits (void **state) {
 }
 
 /* Errors are proportional to the tolerance, and matrices are factorised no more often than they change. */
-static void test_tolerances (void **state) {
+TEST (tolerances) {
   static const char *const model[] = { "ezyroller", "pendulum", "arm", "snakeboard" };
-  (void)state;
   for (int i = 0; i < 4; i++)
     for (int k = 0; k < 3; k++)
       for (int digits = 4; digits <= 10; digits += 3) {
@@ -137,9 +131,8 @@ static void test_tolerances (void **state) {
 
 /* The controller predicts the error of a step from the two before it (Gustafsson 1994): few steps are rejected where
  * the motion repeats. */
-static void test_step_sizes (void **state) {
+TEST (step_sizes) {
   static const char *const model[] = { "pendulum", "wheeled-snake" };
-  (void)state;
   for (int i = 0; i < 2; i++) {
     pw_statistics n = ladder_solve (model[i], "radau+ggl", &(pw_settings){ .rtol = 1e-4, .span = 5 }, 5).cost;
     check_below (model[i], (double)n.rejected, (double)n.steps / 10, "one step in ten");
@@ -170,8 +163,7 @@ static void radau_switched_run (const char *method, pw_settings settings, double
 }
 
 /* Steps end where the torque jumps; the order is unchanged after it. */
-static void test_switched (void **state) {
-  (void)state;
+TEST (switched) {
   double exact[12], x[12], off[2] = { 0 };
   radau_switched_run ("erk8+projection", (pw_settings){ .rtol = 1e-13, .span = 1 }, exact);
   for (int k = 0; k < 2; k++) {
@@ -184,17 +176,14 @@ static void test_switched (void **state) {
 
 /* ---- Stiff scenes ---- */
 
-static void radau_stiff (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (radau_stiff) {
   pw_add_body (m, &(pw_body){ .name = "rotor", .mass = 1, .inertia = 1, .start = { 0, 0, 0.01 } });
   pw_add_rotational_spring (m, &(pw_rotational_spring){ .name = "k", .body = { "rotor", "ground" }, .stiffness = 1e8 });
 }
 
 /* A vibration of 1e4 rad/s at a step of 0.01 s: y = 100, of which a step leaves |R (i y)| -> 3 / y. */
-static void test_damping (void **state) {
-  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = radau_stiff };
-  (void)state;
-  pw_system *s = scene_system (&table, NULL);
+TEST (damping) {
+  pw_system *s = scene_system (&radau_stiff_table, NULL);
   pw_run *r = runs_open (s, "radau:steps=fixed", &(pw_settings){ .step = 0.01, .span = 1 });
   double phi = runs_to (r, 0.04).q[2];
   check_below ("angle after four steps", fabs (phi), 0.01 * pow (6. / 100, 4), "twice 3 / y in each step");
@@ -203,18 +192,15 @@ static void test_damping (void **state) {
 }
 
 /* Samples stay between the values at the ends of steps that do not resolve a decay of 1e8 /s. */
-static void radau_brake (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (radau_brake) {
   pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 1, .rate = { 0, 0, 1 } });
   pw_add_friction (m, &(pw_friction){ .name = "f", .body = { "disc", "ground" }, .viscous = 1e8 });
 }
 
-static void test_unresolved_samples (void **state) {
-  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = radau_brake };
+TEST (unresolved_samples) {
   static const char *const method[] = { "radau", "radau:steps=fixed" };
-  (void)state;
   for (int i = 0; i < 2; i++) {
-    pw_system *s = scene_system (&table, NULL);
+    pw_system *s = scene_system (&radau_brake_table, NULL);
     pw_run *r = runs_open (s, method[i], &(pw_settings){ .step = 0.01, .span = 1 });
     for (int k = 1; k <= 200; k++) {
       pw_error error = { 0 };
@@ -232,23 +218,15 @@ static void test_unresolved_samples (void **state) {
 /* A block pulled by slightly more than dry friction, smoothed over 1e-8 m/s, begins to slide at the right time:
  * while it rests, corrections are small because of an inaccurate matrix, not of a small residual. */
 static double radau_pulled (double pull, double rtol) {
-  pw_error error = { 0 };
-  pw_file *f = pw_file_open ("benchmarks/hard/models/sliding-block.yaml", &error);
-  pw_model *m = pw_file_model (f, &error);
-  pw_model_set (m, "v0", 0, &error);
-  pw_model_set (m, "pull", pull, &error);
-  check_ok (pw_model_build (m, &error), &error);
-  pw_system *s = scene_compile (m);
-  pw_file_close (f);
+  pw_system *s = gallery_open ("benchmarks/hard/models/sliding-block.yaml", "v0", 0., "pull", pull, NULL);
   double q[3], v[3];
   runs_state (s, "radau", &(pw_settings){ .rtol = rtol, .span = 6 }, 6, q, v, NULL);
   pw_system_free (s);
   return q[0];
 }
 
-static void test_pulled (void **state) {
+TEST (pulled) {
   static const double pull[] = { 1.001, 1.1, 1.3 };
-  (void)state;
   for (int i = 0; i < 3; i++) {
     double exact = radau_pulled (pull[i], 1e-9);
     for (int digits = 5; digits <= 7; digits++)
@@ -282,9 +260,8 @@ static void radau_sampled (const char *method, double h, double *q, double *v, d
 }
 
 /* Samples inside steps are as accurate as ends of steps; work is integrated with an error of order h^4. */
-static void test_samples (void **state) {
+TEST (samples) {
   static const char *const method[] = { "radau+ggl:steps=fixed", "radau+index2:steps=fixed" };
-  (void)state;
   for (int i = 0; i < 2; i++) {
     double q[2], v[2], lambda[2], balance[2];
     for (int k = 0; k < 2; k++) radau_sampled (method[i], k ? 0.0125 : 0.05, &q[k], &v[k], &lambda[k], &balance[k]);
@@ -297,8 +274,7 @@ static void test_samples (void **state) {
 
 /* ---- Large steps ---- */
 
-static void test_large_steps (void **state) {
-  (void)state;
+TEST (large_steps) {
   pw_error error = { 0 };
   pw_system *s = ladder_open ("pendulum");
   pw_run *r = runs_open (s, "radau:steps=fixed", &(pw_settings){ .step = 3, .span = 100 });
@@ -306,23 +282,4 @@ static void test_large_steps (void **state) {
   check_error (&error, PW_METHOD, "t = 0 s: the iteration does not converge; the step of 3 s may be too large");
   pw_run_close (r);
   pw_system_free (s);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_order),
-    cmocka_unit_test (test_order_index3),
-    cmocka_unit_test (test_small_steps_index3),
-    cmocka_unit_test (test_residuals),
-    cmocka_unit_test (test_digits),
-    cmocka_unit_test (test_tolerances),
-    cmocka_unit_test (test_step_sizes),
-    cmocka_unit_test (test_switched),
-    cmocka_unit_test (test_damping),
-    cmocka_unit_test (test_unresolved_samples),
-    cmocka_unit_test (test_pulled),
-    cmocka_unit_test (test_samples),
-    cmocka_unit_test (test_large_steps),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

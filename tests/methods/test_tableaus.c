@@ -46,13 +46,11 @@ static double tableaus_row (const pw_tableau *b, int i, int k, double *size) {
 
 static void tableaus_check (const char *name, const char *what, int l, int k, double value, double reference,
                             double size) {
-  char text[100];
-  snprintf (text, sizeof text, "%s: %s, l = %d, k = %d", name, what, l, k);
-  check_close (text, value, reference, 4 * CHECK_EPS * (size + fabs (reference)), "4 eps of each term");
+  check_close (check_text ("%s: %s, l = %d, k = %d", name, what, l, k), value, reference,
+               4 * CHECK_EPS * (size + fabs (reference)), "4 eps of each term");
 }
 
-static void test_rows (void **state) {
-  (void)state;
+TEST (rows) {
   for (int n = 0; n < TABLEAUS; n++)
     for (int i = 0; i < tableaus[n].b->stages; i++) {
       double size, sum = tableaus_row (tableaus[n].b, i, 0, &size);
@@ -60,8 +58,7 @@ static void test_rows (void **state) {
     }
 }
 
-static void test_quadrature (void **state) {
-  (void)state;
+TEST (quadrature) {
   for (int n = 0; n < TABLEAUS; n++) {
     const pw_tableau *b = tableaus[n].b;
     for (int k = 0; k < tableaus[n].method->order; k++) {
@@ -76,8 +73,7 @@ static void test_quadrature (void **state) {
   }
 }
 
-static void test_two_levels (void **state) {
-  (void)state;
+TEST (two_levels) {
   for (int n = 0; n < TABLEAUS; n++) {
     const pw_tableau *b = tableaus[n].b;
     int order = tableaus[n].method->order;
@@ -110,8 +106,7 @@ static void tableaus_estimate (const char *name, const pw_tableau *b, const doub
   }
 }
 
-static void test_estimates (void **state) {
-  (void)state;
+TEST (estimates) {
   for (int n = 0; n < TABLEAUS; n++) {
     const pw_tableau *b = tableaus[n].b;
     assert_true ((b->e != NULL) == (tableaus[n].order_e > 0) && (b->e3 != NULL) == (tableaus[n].order_e3 > 0));
@@ -121,14 +116,4 @@ static void test_estimates (void **state) {
   assert_int_equal (tableaus_rk4.order, 4);
   assert_int_equal (tableaus_erk5.order, 5);
   assert_int_equal (tableaus_erk8.order, 8);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_rows),
-    cmocka_unit_test (test_quadrature),
-    cmocka_unit_test (test_two_levels),
-    cmocka_unit_test (test_estimates),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -6,8 +6,7 @@
 #include "system.h"
 #include "trial.h"
 
-static void test_wheeled_snake (void **state) {
-  (void)state;
+TEST (wheeled_snake) {
   for (double n = 3; n <= 12; n += 3)
     gallery_energy (gallery_open ("wheeled-snake", "n", n, NULL), 5e-4, 4, 1e6 * H4, GALLERY_DRIVEN);
 }
@@ -24,8 +23,7 @@ static void gallery_circle (const pw_system *s, const pw_sample *x, const char *
   check_close ("centre, y", P[1] + R * cos (phi), R, bound, reason);
 }
 
-static void test_car (void **state) {
-  (void)state;
+TEST (car) {
   pw_system *s = gallery_open ("car", NULL);
   pw_run *r = gallery_run (s, 1e-3, 10);
   assert_int_equal (pw_run_redundant (r), 2);
@@ -39,8 +37,7 @@ static void test_car (void **state) {
 }
 
 /* Steered while driving: the four wheels are consistent at all times, and the car turns at u T / L. */
-static void test_ackermann_car (void **state) {
-  (void)state;
+TEST (ackermann_car) {
   const double L = 2.6, k = tan (PW_PI * 25 / 180), w = 0.2 * PW_PI;
   pw_system *s = gallery_open ("ackermann-car", NULL);
   pw_run *r = gallery_run (s, 1e-3, 20);
@@ -62,8 +59,7 @@ static void test_ackermann_car (void **state) {
 }
 
 /* The headings of both front wheels, from the model's expressions: cot (outer) - cot (inner) = track / L. */
-static void test_ackermann_angles (void **state) {
-  (void)state;
+TEST (ackermann_angles) {
   pw_system *s = gallery_open ("ackermann-car", NULL);
   pw_workspace *w = pw_workspace_new (s, NULL);
   const pw_element_batch *k = w->batch;
@@ -80,9 +76,8 @@ static void test_ackermann_angles (void **state) {
 }
 
 /* In a steady turn each axle moves on a circle given by Pythagoras, without forces in the hitches. */
-static void test_car_two_trailers (void **state) {
+TEST (car_two_trailers) {
   static const char *const body[] = { "car", "trailer1", "trailer2" };
-  (void)state;
   pw_system *s = gallery_open ("car-two-trailers", "w", 0., NULL);
   pw_run *r = gallery_run (s, 1e-3, 100);
   pw_sample x = runs_to (r, 100);
@@ -111,8 +106,7 @@ static double gallery_tyres (double stiffness) {
   return radius;
 }
 
-static void test_car_tyres (void **state) {
-  (void)state;
+TEST (car_tyres) {
   const double R = 2.6 / tan (0.3);
   double off[4], stiffness = 4e4;
   for (int i = 0; i < 4; i++, stiffness *= 2) off[i] = gallery_tyres (stiffness) - R;
@@ -120,8 +114,7 @@ static void test_car_tyres (void **state) {
   check_close ("extrapolated", 2 * off[3] - off[2], 0, fabs (off[3]) / 20, "the remainder is of second order");
 }
 
-static void test_differential_drive (void **state) {
-  (void)state;
+TEST (differential_drive) {
   pw_system *s = gallery_open ("differential-drive", NULL);
   pw_run *r = gallery_run (s, 1e-3, 10);
   assert_int_equal (pw_run_redundant (r), 1);
@@ -135,14 +128,4 @@ static void test_differential_drive (void **state) {
   check_close ("right wheel", trial_state (s, &x, "right.spin"), 10 * 0.6 / 0.08, 100 * H4, "100 h^4");
   check_close ("balance", x.balance, 0, 100 * H4, "100 h^4");
   runs_close (r, s);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_wheeled_snake),      cmocka_unit_test (test_car),
-    cmocka_unit_test (test_ackermann_car),      cmocka_unit_test (test_ackermann_angles),
-    cmocka_unit_test (test_car_two_trailers),   cmocka_unit_test (test_car_tyres),
-    cmocka_unit_test (test_differential_drive),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -24,16 +24,14 @@ enum { SAVED_SCENES = sizeof saved_scenes / sizeof *saved_scenes, SAVED_MOMENTS 
 
 static pw_file *saved_file[SAVED_SCENES];
 
-static int saved_setup (void **state) {
-  (void)state;
+static int saved_setup (void) {
   pw_error error = { 0 };
   for (int i = 0; i < SAVED_SCENES; i++)
     if ((saved_file[i] = pw_file_open (saved_scenes[i].scene, &error)) == NULL) check_ok (error.status, &error);
   return 0;
 }
 
-static int saved_teardown (void **state) {
-  (void)state;
+static int saved_teardown (void) {
   for (int i = 0; i < SAVED_SCENES; i++) pw_file_close (saved_file[i]);
   return 0;
 }
@@ -145,15 +143,13 @@ static void saved_compare (int scene, const char *method) {
   pw_system_free (s);
 }
 
-static void test_same (void **state) {
-  (void)state;
+TEST (same) {
   char name[40];
   for (int scene = 0; scene < SAVED_SCENES; scene++)
     for (int i = 0; runs_method (i, name); i++) saved_compare (scene, name);
 }
 
-static void test_options (void **state) {
-  (void)state;
+TEST (options) {
   static const char *const method[] = { "rk4+projection:every=3", "rk4+projection:metric=identity",
                                         "rk4:inputs=held",        "erk5:steps=fixed",
                                         "erk8+baumgarte:alpha=3", "rk4+nullspace",
@@ -162,8 +158,7 @@ static void test_options (void **state) {
 }
 
 /* After a checkpoint, the energy added by a change of velocities is still known. */
-static void test_kicked (void **state) {
-  (void)state;
+TEST (kicked) {
   pw_error error = { 0 };
   pw_archive archive = { .at = NULL };
   double v[6];
@@ -185,8 +180,7 @@ static void test_kicked (void **state) {
 }
 
 /* Invalid counts anywhere in the saved state are refused, or have no effect. */
-static void test_counts (void **state) {
-  (void)state;
+TEST (counts) {
   static const char *const method[] = { "rk4+projection", "leapfrog", "ida+ggl" };
   for (size_t m = 0; m < sizeof method / sizeof *method; m++) {
     pw_error error = { 0 };
@@ -215,8 +209,7 @@ static void test_counts (void **state) {
 }
 
 /* Archives of other runs, and truncated ones, are refused. */
-static void test_other (void **state) {
-  (void)state;
+TEST (other) {
   pw_error error = { 0 };
   pw_archive archive = { .at = NULL };
   pw_system *s = saved_system (0), *other = saved_system (2);
@@ -243,10 +236,9 @@ static void test_other (void **state) {
 }
 
 /* The ledger includes work done before the run was saved: the energy balances to the accuracy of each method. */
-static void test_ledger (void **state) {
+TEST (ledger) {
   static const char *const method[] = { "rk4+projection", "erk8+projection", "adams",
                                         "bdf+projection", "ida+ggl",         "galpha" };
-  (void)state;
   for (int i = 0; i < 6; i++) {
     pw_error error = { 0 };
     pw_archive a = { .at = NULL };
@@ -264,8 +256,7 @@ static void test_ledger (void **state) {
 }
 
 /* Times may be negative. */
-static void test_negative (void **state) {
-  (void)state;
+TEST (negative) {
   char name[40];
   pw_system *s = saved_system (0);
   int n = pw_system_coordinates (s);
@@ -300,9 +291,8 @@ static int saved_torque (void *context, double t, const double *x, double value[
   return 0;
 }
 
-static void saved_build (pw_model *m, const void *parameters) {
+SCENE (saved_build) {
   static const char *const reads[] = { "arm.omega", NULL };
-  (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "arm", .mass = 1, .inertia = 0.5, .start = { 0.5 } });
   pw_add_pin (m, &(pw_pin){ .name = "pivot", .body = { "arm", "ground" }, .at = { { -0.5, 0 }, { 0, 0 } } });
   pw_add_torque (m, &(pw_torque){ .name = "M",
@@ -336,12 +326,10 @@ static void saved_fail (pw_system *s, const char *method, double phi) {
   assert_true (reopened > 0);
 }
 
-static void test_failing (void **state) {
-  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof (pw_plugin_table), .build = saved_build };
-  (void)state;
+TEST (failing) {
   char name[40];
   double q[3], v[3];
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (&saved_build_table, NULL);
   saved_failing = 0;
   runs_state (s, "erk8+projection", &(pw_settings){ .rtol = 1e-10 }, 1, q, v, NULL);
   for (int i = 0; runs_method (i, name); i++) saved_fail (s, name, q[2]);
@@ -358,12 +346,9 @@ static void undetermined_build (pw_model *m, const void *parameters) {
 }
 
 /* Matrices cannot be planned again there. */
-static void test_undetermined (void **state) {
+TEST (undetermined) {
   static const pw_parameter none[] = { { .name = NULL } };
-  static const pw_plugin_table table = {
-    .abi = PW_ABI, .size = sizeof (pw_plugin_table), .parameters = none, .build = undetermined_build
-  };
-  (void)state;
+  static const pw_plugin_table table = SCENE_TABLE_WITH (undetermined_build, none, 0);
   pw_error error = { 0 };
   pw_archive a = { 0 };
   pw_system *s = scene_system (&table, NULL);
@@ -379,11 +364,4 @@ static void test_undetermined (void **state) {
   pw_system_free (s);
 }
 
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_same),     cmocka_unit_test (test_options), cmocka_unit_test (test_other),
-    cmocka_unit_test (test_kicked),   cmocka_unit_test (test_counts),  cmocka_unit_test (test_ledger),
-    cmocka_unit_test (test_negative), cmocka_unit_test (test_failing), cmocka_unit_test (test_undetermined),
-  };
-  return cmocka_run_group_tests (tests, saved_setup, saved_teardown);
-}
+const check_fixture fixture = { saved_setup, saved_teardown };

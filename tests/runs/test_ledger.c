@@ -21,8 +21,7 @@ static double ledger_step (double t, double *rate) {
 
 /* ---- Scenes, their work and losses until t, and the energy they exchange ---- */
 
-static void ledger_turned (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (ledger_turned) {
   pw_add_body (m, &(pw_body){ .name = "b", .mass = 1, .inertia = 1, .rate = { 1 } });
   pw_add_drive (m, &(pw_drive){ .name = "d", .body = { "b", "ground" }, .what = PW_DRIVE_ANGLE, .value = LEDGER_STEP });
 }
@@ -33,8 +32,7 @@ static void ledger_turned_exact (double t, double *work, double *loss) {
   *work = rate * rate / 2, *loss = 0;
 }
 
-static void ledger_lifted (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (ledger_lifted) {
   pw_add_body (m, &(pw_body){ .name = "b", .mass = 2, .inertia = 1, .rate = { 1 } });
   pw_add_drive (m, &(pw_drive){ .name = "d", .body = { "b", "ground" }, .what = PW_DRIVE_Y, .value = LEDGER_STEP });
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 } });
@@ -45,8 +43,7 @@ static void ledger_lifted_exact (double t, double *work, double *loss) {
   *work = rate * rate + 2 * 9.81 * y, *loss = 0;
 }
 
-static void ledger_shaken (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (ledger_shaken) {
   pw_add_body (m, &(pw_body){ .name = "b", .mass = 2, .inertia = 1, .rate = { 0, 1 } });
   pw_add_drive (m, &(pw_drive){ .name = "d",
                                 .body = { "b", "ground" },
@@ -59,8 +56,7 @@ static void ledger_shaken_exact (double t, double *work, double *loss) {
 }
 
 /* All work is dissipated at once: the energy is always 0. */
-static void ledger_massless (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (ledger_massless) {
   pw_add_body (m, &(pw_body){ .name = "b" });
   pw_add_pin (m, &(pw_pin){ .name = "P", .body = { "b", "ground" }, .at = { { -1 } } });
   pw_add_drive (m, &(pw_drive){ .name = "d", .body = { "b", "ground" }, .what = PW_DRIVE_ANGLE, .value = LEDGER_STEP });
@@ -74,8 +70,7 @@ static void ledger_massless_exact (double t, double *work, double *loss) {
 }
 
 /* A constant speed against drag, which also slows the transverse motion. */
-static void ledger_towed (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (ledger_towed) {
   pw_add_body (m, &(pw_body){ .name = "b", .mass = 1, .inertia = 1, .rate = { 2, 1 } });
   pw_add_speed (m, &(pw_speed){ .name = "s", .body = "b", .value = { .constant = 2 } });
   pw_add_drag (m, &(pw_drag){ .name = "f", .body = "b", .linear = 3 });
@@ -93,9 +88,8 @@ static int ledger_limited (void *context, double t, const double *x, double valu
   return 0;
 }
 
-static void ledger_driven (pw_model *m, const void *parameters) {
+SCENE (ledger_driven) {
   static const char *const reads[] = { "b.omega", NULL };
-  (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "b", .mass = 1, .inertia = 1 });
   pw_add_torque (m, &(pw_torque){ .name = "T",
                                   .body = { "b", "ground" },
@@ -108,18 +102,12 @@ static void ledger_driven_exact (double t, double *work, double *loss) {
   *work = 2 * one - square, *loss = square;
 }
 
-#define LEDGER_SCENE(what, moved)                                                \
-  {                                                                              \
-    .name = #what, .reference = ledger_##what##_exact, .size = moved, .table = { \
-      .abi = PW_ABI,                                                             \
-      .size = sizeof (pw_plugin_table),                                          \
-      .build = ledger_##what                                                     \
-    }                                                                            \
-  }
+#define LEDGER_SCENE(what, moved) \
+  { .name = #what, .table = &ledger_##what##_table, .reference = ledger_##what##_exact, .size = moved }
 
 static const struct {
   const char *name;
-  pw_plugin_table table;
+  const pw_plugin_table *table;
   void (*reference) (double t, double *work, double *loss);
   double size; /* energy exchanged [J] */
 } ledger_scene[] = { LEDGER_SCENE (turned, 2),   LEDGER_SCENE (lifted, 25), LEDGER_SCENE (shaken, 3),
@@ -127,19 +115,18 @@ static const struct {
 enum { LEDGER_SCENES = sizeof ledger_scene / sizeof *ledger_scene };
 
 static void ledger_compare (int scene, const char *method, const pw_sample *x, double bound, const char *reason) {
-  char what[100];
   double work, loss;
   ledger_scene[scene].reference (x->t, &work, &loss);
-  snprintf (what, sizeof what, "%s, %s, work at %g s", ledger_scene[scene].name, method, x->t);
-  check_close (what, x->work, work, bound, reason);
-  snprintf (what, sizeof what, "%s, %s, loss at %g s", ledger_scene[scene].name, method, x->t);
-  check_close (what, x->loss, loss, bound, reason);
+  check_close (check_text ("%s, %s, work at %g s", ledger_scene[scene].name, method, x->t), x->work, work, bound,
+               reason);
+  check_close (check_text ("%s, %s, loss at %g s", ledger_scene[scene].name, method, x->t), x->loss, loss, bound,
+               reason);
 }
 
 /* At 0.8 s the power of `turned` is as large as at 0.3 s. */
 static void ledger_run (int scene, const char *method, const pw_settings *settings, double bound, const char *reason) {
   static const double t[] = { 0.2, 0.55, 0.8, 1, 1.7 };
-  pw_system *s = scene_system (&ledger_scene[scene].table, NULL);
+  pw_system *s = scene_system (ledger_scene[scene].table, NULL);
   for (int i = 0; i < 2; i++) {
     pw_error error = { 0 };
     pw_run *r = runs_open (s, method, settings);
@@ -156,9 +143,8 @@ static void ledger_run (int scene, const char *method, const pw_settings *settin
   pw_system_free (s);
 }
 
-static void test_closed_forms (void **state) {
+TEST (closed_forms) {
   char name[40];
-  (void)state;
   for (int scene = 0; scene < LEDGER_SCENES; scene++)
     for (int i = 0; runs_method (i, name); i++) {
       double size = ledger_scene[scene].size;
@@ -176,14 +162,13 @@ static void test_closed_forms (void **state) {
 }
 
 /* Work, losses and energy defect of a run are bit-identical with and without the option `ledger`. */
-static void test_always_kept (void **state) {
+TEST (always_kept) {
   char name[40];
-  (void)state;
   for (int scene = 0; scene < LEDGER_SCENES; scene++)
     for (int i = 0; runs_method (i, name); i++) {
       double kept[2][9];
       for (int asked = 0; asked < 2; asked++) {
-        pw_system *s = scene_system (&ledger_scene[scene].table, NULL);
+        pw_system *s = scene_system (ledger_scene[scene].table, NULL);
         pw_run *r = runs_open (s, name, &(pw_settings){ .step = 1e-2, .span = 2, .ledger = asked });
         pw_sample x = runs_to (r, 1);
         memcpy (kept[asked], (const double[]){ x.work, x.loss, pw_run_energy_defect (r, &x) }, 3 * sizeof (double));
@@ -200,9 +185,8 @@ static void test_always_kept (void **state) {
 /* ---- The energy defect ---- */
 
 /* The defect is relative to the energy exchanged, not to 1200 J of losses. */
-static void test_exchanged (void **state) {
-  (void)state;
-  pw_system *s = scene_system (&ledger_scene[4].table, NULL);
+TEST (exchanged) {
+  pw_system *s = scene_system (ledger_scene[4].table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 0.1, .span = 100 });
   pw_sample x = runs_to (r, 100);
   assert_true (x.loss > 1000);
@@ -213,8 +197,7 @@ static void test_exchanged (void **state) {
 }
 
 /* A position prescribed by a constant does no work and has no account. */
-static void test_constant_drive (void **state) {
-  (void)state;
+TEST (constant_drive) {
   pw_system *s = scene_named ("slider-crank", "l2", 1);
   assert_int_equal (pw_system_ledger_entries (s), 0);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 1 });
@@ -235,19 +218,10 @@ static void ledger_advise (const char *model, const char *method, double rtol, d
 }
 
 /* The advice recommends a smaller tolerance only where it helps. */
-static void test_advice (void **state) {
-  (void)state;
+TEST (advice) {
   ledger_advise ("n-four-bar", "rk4+projection", 0, 0.1, "a smaller step");
   ledger_advise ("n-four-bar", "erk5+projection", 1e-3, 0.02, "a smaller tolerance");
   ledger_advise ("n-four-bar", "erk5+projection", 1e-9, 0.5, "more than the tolerance explains");
   ledger_advise ("n-four-bar", "erk8+projection", 1e-13, 0.5, "cannot be much smaller");
   ledger_advise ("pendulum", "adams+none", 1e-2, 0.02, "the constraints have drifted");
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_closed_forms),   cmocka_unit_test (test_always_kept), cmocka_unit_test (test_exchanged),
-    cmocka_unit_test (test_constant_drive), cmocka_unit_test (test_advice),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -6,10 +6,9 @@
 #include "scene.h"
 
 /* A restart from the state reached changes nothing; from another state, the run continues there. */
-static void test_onwards (void **state) {
+TEST (onwards) {
   static const char *const method[] = { "rk4+projection", "rk4+baumgarte",   "ida+ggl",       "ida+baumgarte",
                                         "ida+si1",        "adams+baumgarte", "bdf+baumgarte", "bdf+projection" };
-  (void)state;
   for (int i = 0; i < 8; i++) {
     pw_error error = { 0 };
     double q[6], v[6];
@@ -38,8 +37,7 @@ static void test_onwards (void **state) {
 }
 
 /* Changed velocities change the power: the first step after a restart must use the new one. */
-static void test_slower (void **state) {
-  (void)state;
+TEST (slower) {
   pw_error error = { 0 };
   double v[6];
   pw_system *s = scene_system (&scene_ezyroller, NULL);
@@ -55,8 +53,7 @@ static void test_slower (void **state) {
 }
 
 /* A run whose constraints were lost continues from a state that satisfies them. */
-static void test_lost (void **state) {
-  (void)state;
+TEST (lost) {
   pw_error error = { 0 };
   pw_sample x;
   pw_system *s = scene_named ("pendulum", NULL, 0);
@@ -74,8 +71,7 @@ static void test_lost (void **state) {
 }
 
 /* A refused restart leaves the run unchanged, to the bit. */
-static void test_refused (void **state) {
-  (void)state;
+TEST (refused) {
   pw_system *s = scene_system (&scene_ezyroller, NULL), *same = scene_system (&scene_ezyroller, NULL);
   pw_settings settings = { .step = 1e-3, .span = 2, .ledger = 1 };
   pw_run *r = runs_open (s, "rk4+projection", &settings), *left = runs_open (same, "rk4+projection", &settings);
@@ -111,8 +107,7 @@ static int restart_or_fail (pw_run *r, pw_error *error) {
 }
 
 /* One that the method refuses does so, too. */
-static void test_refused_by_method (void **state) {
-  (void)state;
+TEST (refused_by_method) {
   for (int i = 0; strcmp ((restart_built_in = pw_methods[i])->name, "rk4") != 0;) i++;
   pw_method refusing = *restart_built_in;
   refusing.name = "refusing", refusing.restart = restart_or_fail;
@@ -144,8 +139,7 @@ static void test_refused_by_method (void **state) {
 
 /* Energy added by the caller is not an error of the method: the balance contains only the latter, before and after.
  * */
-static void test_kick (void **state) {
-  (void)state;
+TEST (kick) {
   pw_error error = { 0 };
   double v[6];
   pw_system *s = scene_system (&scene_ezyroller, NULL);
@@ -162,8 +156,7 @@ static void test_kick (void **state) {
 }
 
 /* The same where only the total energy is known. */
-static void test_kick_unkept (void **state) {
-  (void)state;
+TEST (kick_unkept) {
   pw_error error = { 0 };
   double v[30];
   pw_system *s = scene_named ("n-four-bar", "N", 2);
@@ -207,24 +200,13 @@ static double restart_controlled (const char *method, double step) {
 }
 
 /* After a restart, the method uses the new value of a function: its order is unchanged. */
-static void test_controlled (void **state) {
+TEST (controlled) {
   static const char *const method[] = { "rk4+projection", "galpha+ggl", "leapfrog" };
   static const double order[] = { 4, 2, 2 };
-  (void)state;
   double reference = restart_controlled ("erk8+projection", 0);
   for (int i = 0; i < 3; i++) {
     double coarse = restart_controlled (method[i], 0.02) - reference,
            fine = restart_controlled (method[i], 0.01) - reference;
     check_close (method[i], log2 (coarse / fine), order[i], 0.3, "order over one halving");
   }
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_onwards),     cmocka_unit_test (test_slower),
-    cmocka_unit_test (test_refused),     cmocka_unit_test (test_kick),
-    cmocka_unit_test (test_kick_unkept), cmocka_unit_test (test_controlled),
-    cmocka_unit_test (test_lost),        cmocka_unit_test (test_refused_by_method),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -31,9 +31,8 @@ static pw_system *runs_fused (runs_fuse *fuse) {
 }
 
 /* A failing signal stops the run; the error contains the time reached, at which the run can still be sampled. */
-static void test_signal_fails (void **state) {
+TEST (signal_fails) {
   static const char *const method[] = { "rk4+projection", "rk4+none", "ida+ggl", "ida+baumgarte" };
-  (void)state;
   for (int i = 0; i < 4; i++) {
     runs_fuse fuse = { 0.5 };
     pw_error error = { 0 };
@@ -55,8 +54,7 @@ static void test_signal_fails (void **state) {
   }
 }
 
-static void test_signal_fails_at_once (void **state) {
-  (void)state;
+TEST (signal_fails_at_once) {
   runs_fuse fuse = { -1 };
   pw_error error = { 0 };
   pw_system *s = runs_fused (&fuse);
@@ -66,8 +64,7 @@ static void test_signal_fails_at_once (void **state) {
 }
 
 /* A spring too stiff for the step size. */
-static void runs_stiff (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (runs_stiff) {
   pw_add_body (m, &(pw_body){ .name = "a", .mass = 1, .inertia = 1, .start = { 2, 0, 0 } });
   pw_add_body (m, &(pw_body){ .name = "b", .mass = 1, .inertia = 1, .start = { 2, 0, 0 } });
   pw_add_pin (m, &(pw_pin){ .name = "P", .body = { "a", "b" } });
@@ -76,11 +73,9 @@ static void runs_stiff (pw_model *m, const void *parameters) {
               .name = "k", .body = { "a", "ground" }, .at = { { 0.1, 0.2 }, { 0 } }, .stiffness = 1e9, .length = 1 });
 }
 
-static void test_too_large_a_step (void **state) {
-  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = runs_stiff };
-  (void)state;
+TEST (too_large_a_step) {
   pw_error error = { 0 };
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (&runs_stiff_table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 0.1 });
   assert_int_equal (pw_run_advance_to (r, 100, 100, &error), PW_METHOD);
   assert_non_null (strstr (error.text, "s: the step of 0.1 s is too large: the "));
@@ -91,32 +86,30 @@ static void test_too_large_a_step (void **state) {
 
 /* ---- An undetermined body ---- */
 
-static void runs_loose (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (runs_loose) {
   pw_add_body (m, &(pw_body){ .name = "loose" });
 }
 
-static void runs_hanging (pw_model *m, const void *parameters) {
-  runs_loose (m, parameters);
+SCENE (runs_hanging) {
+  runs_loose (m, parameter);
   pw_add_pin (m, &(pw_pin){ .name = "P", .body = { "loose", "ground" } });
 }
 
 /* Of a pinned body only the angle is not determined. */
-static void test_massless (void **state) {
+TEST (massless) {
   static const struct {
-    pw_plugin_table table;
+    const pw_plugin_table *table;
     const char *reports;
   } scene[] = {
-    { { .abi = PW_ABI, .size = sizeof scene->table, .build = runs_loose },
+    { &runs_loose_table,
       "model scene: loose.x has no mass, and no constraint determines how it moves; give it mass, or constrain it" },
-    { { .abi = PW_ABI, .size = sizeof scene->table, .build = runs_hanging },
+    { &runs_hanging_table,
       "model scene: loose.phi has no inertia, and no constraint determines how it moves; give it inertia, or constrain "
       "it" },
   };
-  (void)state;
   for (size_t k = 0; k < sizeof scene / sizeof *scene; k++) {
     pw_error error = { 0 };
-    pw_system *s = scene_system (&scene[k].table, NULL);
+    pw_system *s = scene_system (scene[k].table, NULL);
     assert_null (pw_run_open (s, "rk4", NULL, &error));
     check_error (&error, PW_INPUT, scene[k].reports);
     pw_system_free (s);
@@ -134,14 +127,11 @@ static void runs_free (pw_model *m, const void *parameters) {
 }
 
 /* A constant torque turns a disc that is free, pinned at its centre, or on a wheel there: phi = (T/I) t^2 / 2. */
-static void test_few_rows (void **state) {
+TEST (few_rows) {
   static const pw_parameter list[] = { { .name = "pin" },
                                        { .name = "wheel", .offset = sizeof (double) },
                                        { .name = NULL } };
-  static const pw_plugin_table table = {
-    .abi = PW_ABI, .size = sizeof table, .parameters = list, .parameters_size = 2 * sizeof (double), .build = runs_free
-  };
-  (void)state;
+  static const pw_plugin_table table = SCENE_TABLE_WITH (runs_free, list, 2 * sizeof (double));
   for (int with = 0; with < 3; with++) {
     pw_system *s = scene_system (&table, "pin", with & 1 ? 1.0 : 0.0, "wheel", with & 2 ? 1.0 : 0.0, NULL);
     const pw_method *m;
@@ -162,18 +152,15 @@ static void test_few_rows (void **state) {
 
 /* ---- Redundant constraints ---- */
 
-static void runs_twice (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (runs_twice) {
   pw_add_body (m, &(pw_body){ .name = "disc", .mass = 2, .inertia = 0.5 });
   pw_add_pin (m, &(pw_pin){ .name = "P", .body = { "disc", "ground" } });
   pw_add_pin (m, &(pw_pin){ .name = "Q", .body = { "ground", "disc" } });
 }
 
-static void test_twice (void **state) {
-  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = runs_twice };
-  (void)state;
+TEST (twice) {
   char text[200];
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (&runs_twice_table, NULL);
   pw_run *r = runs_open (s, "rk4", NULL);
   assert_int_equal (pw_run_redundant (r), 2);
   assert_string_equal (pw_run_redundancy (r, 0, text, sizeof text), "pins P and Q: the same x constraint");
@@ -185,13 +172,12 @@ static void test_twice (void **state) {
 /* ---- Runs that share a system ---- */
 
 /* Runs advanced alternately on one system have the same results as alone. */
-static void test_shared (void **state) {
+TEST (shared) {
   static const char *const method[] = { "rk4+projection", "ida+ggl", "bdf+projection", "galpha+ggl",
                                         "rk4:inputs=held" };
   enum { METHODS = sizeof method / sizeof *method };
   double alone[METHODS][2][6];
   pw_run *r[METHODS];
-  (void)state;
   pw_system *s = scene_system (&scene_ezyroller, NULL);
   for (int i = 0; i < METHODS; i++) {
     r[i] = runs_open (s, method[i], &(pw_settings){ .step = 1e-2, .span = 1 + i });
@@ -213,8 +199,7 @@ static void test_shared (void **state) {
   pw_system_free (s);
 }
 
-static void test_missing (void **state) {
-  (void)state;
+TEST (missing) {
   pw_error e[] = { { 0 }, { 0 }, { 0 }, { 0 }, { 0 }, { 0 } };
   pw_sample sample;
   assert_null (pw_run_open (NULL, "rk4", NULL, &e[0]));
@@ -238,9 +223,8 @@ static void test_missing (void **state) {
 
 /* ---- Sampling ---- */
 
-static void test_outside (void **state) {
+TEST (outside) {
   static const char *const method[] = { "rk4+projection", "ida+ggl" };
-  (void)state;
   for (int i = 0; i < 2; i++) {
     pw_error error = { 0 };
     pw_sample sample;
@@ -257,9 +241,8 @@ static void test_outside (void **state) {
 }
 
 /* A run does not pass t_end; t_end can be increased. */
-static void test_t_end (void **state) {
+TEST (t_end) {
   static const char *const method[] = { "rk4+projection", "ida+ggl" };
-  (void)state;
   for (int i = 0; i < 2; i++) {
     pw_error error = { 0 };
     pw_system *s = scene_system (&scene_ezyroller, NULL);
@@ -292,10 +275,9 @@ static pw_system *runs_wild_system (double *from) {
 }
 
 /* Every method stops before it; none takes ever smaller steps without end. */
-static void test_wild (void **state) {
+TEST (wild) {
   static const char *const method[] = { "rk4+projection", "erk5+projection", "erk8",       "adams",   "bdf+projection",
                                         "ida+ggl",        "ida+baumgarte",   "galpha+ggl", "leapfrog" };
-  (void)state;
   double from = 0.5;
   for (int i = 0; i < 9; i++) {
     pw_error error = { 0 };
@@ -309,55 +291,30 @@ static void test_wild (void **state) {
 }
 
 /* A force that is initially infinite. */
-static void runs_strong (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (runs_strong) {
   pw_add_body (m, &(pw_body){ .name = "a", .mass = 1, .inertia = 1, .start = { 100, 0, 0 } });
   pw_add_spring (m, &(pw_spring){ .name = "k", .body = { "a", "ground" }, .stiffness = 1e308 });
 }
 
 /* A mass too small for a force. */
-static void runs_weak (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (runs_weak) {
   pw_add_body (m, &(pw_body){ .name = "a", .mass = 1, .inertia = 1 });
   pw_add_body (m, &(pw_body){ .name = "b", .mass = 1, .inertia = 1e-309 });
   pw_add_torque (m, &(pw_torque){ .name = "T", .body = { "b", "ground" }, .value = { .constant = 1 } });
 }
 
-static void test_weak_start (void **state) {
-  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = runs_weak };
-  (void)state;
+TEST (weak_start) {
   pw_error error = { 0 };
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (&runs_weak_table, NULL);
   assert_null (pw_run_open (s, "rk4", NULL, &error));
   check_error (&error, PW_METHOD, "t = 0 s: the acceleration of b.phi is not finite");
   pw_system_free (s);
 }
 
-static void test_wild_start (void **state) {
-  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = runs_strong };
-  (void)state;
+TEST (wild_start) {
   pw_error error = { 0 };
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (&runs_strong_table, NULL);
   assert_null (pw_run_open (s, "erk8+projection", NULL, &error));
   check_error (&error, PW_METHOD, "t = 0 s: force of spring k is not finite");
   pw_system_free (s);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_signal_fails),
-    cmocka_unit_test (test_wild),
-    cmocka_unit_test (test_wild_start),
-    cmocka_unit_test (test_weak_start),
-    cmocka_unit_test (test_signal_fails_at_once),
-    cmocka_unit_test (test_too_large_a_step),
-    cmocka_unit_test (test_massless),
-    cmocka_unit_test (test_few_rows),
-    cmocka_unit_test (test_outside),
-    cmocka_unit_test (test_t_end),
-    cmocka_unit_test (test_twice),
-    cmocka_unit_test (test_shared),
-    cmocka_unit_test (test_missing),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -47,8 +47,7 @@ static void samples_state (const char *method, double rtol, int look, double *q,
   pw_system_free (S);
 }
 
-static void test_samples (void **state) {
-  (void)state;
+TEST (samples) {
   for (int i = 0; i < SAMPLES_METHODS; i++)
     for (int k = 5; k <= 10; k++) {
       double q[2][6], v[2][6], ledger[2][4];
@@ -63,9 +62,8 @@ static void test_samples (void **state) {
 }
 
 /* A sample is bit-identical to the end of a run that ends at its time: both make that last step. */
-static void test_bits (void **state) {
+TEST (bits) {
   static const char *const method[] = { "erk5+none", "erk5+projection" };
-  (void)state;
   for (int i = 0; i < 2; i++) {
     pw_error error = { 0 };
     pw_settings settings = { .rtol = 1e-9, .span = 2 };
@@ -110,8 +108,7 @@ static pw_system *samples_switched_scene (void) {
 }
 
 /* A step ends where the torque jumps, and the jump causes no rejections. */
-static void test_breakpoint (void **state) {
-  (void)state;
+TEST (breakpoint) {
   const double rtol = 1e-8;
   for (int i = 0; i < SAMPLES_METHODS; i++) {
     pw_error error = { 0 };
@@ -141,10 +138,9 @@ static void test_breakpoint (void **state) {
 }
 
 /* A step that ends at the jump can be sampled. */
-static void test_across (void **state) {
+TEST (across) {
   static const char *const method[] = { "erk5+none",       "erk5+projection", "erk8+none",
                                         "erk8+projection", "rk4+projection",  "ida+ggl" };
-  (void)state;
   for (int i = 0; i < 6; i++) {
     pw_error error = { 0 };
     pw_sample now;
@@ -171,8 +167,7 @@ static void test_across (void **state) {
 }
 
 /* An end within round-off of the time reached counts as reached and does not change the next step. */
-static void test_short_end (void **state) {
-  (void)state;
+TEST (short_end) {
   for (int i = 0; i < SAMPLES_METHODS; i++) {
     pw_error error = { 0 };
     pw_system *s = scene_system (&scene_ezyroller, NULL);
@@ -190,23 +185,14 @@ static void test_short_end (void **state) {
 }
 
 /* A recording ends at the last of its times, even if that is reached before t_end. */
-static void test_record (void **state) {
+TEST (record) {
   double times[] = { 0, 0.5 }, row[100];
   long recorded;
   pw_error error = { 0 };
-  (void)state;
   pw_system *s = scene_system (&scene_ezyroller, "m2", 0.1, "I2", 0.01, NULL);
   pw_run *r = runs_open (s, "erk8+projection", &(pw_settings){ .span = 1 });
   assert_true (pw_run_record_width (r) <= 100);
   check_ok (pw_run_record (r, 1, times, 1, 9, row, &recorded, &error), &error);
   assert_true (recorded == 1 && row[0] == 0 && pw_run_time (r) == 0);
   runs_close (r, s);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_samples), cmocka_unit_test (test_bits),      cmocka_unit_test (test_breakpoint),
-    cmocka_unit_test (test_across),  cmocka_unit_test (test_short_end), cmocka_unit_test (test_record),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

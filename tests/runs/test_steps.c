@@ -27,20 +27,17 @@ static const char *steps_method (int i, char name[STEPS_NAME]) {
 /* A pendulum, initially hanging, with a given torque. */
 static pw_signal steps_torque[2];
 
-static void steps_build (pw_model *m, const void *parameters) {
+SCENE (steps_build) {
   static const char *const name[] = { "T", "U" };
-  (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "bob", .mass = 1, .inertia = 0.1, .start = { 0, -1, 0 } });
   pw_add_pin (m, &(pw_pin){ .name = "P", .body = { "ground", "bob" }, .at = { { 0, 0 }, { 0, 1 } } });
   for (int i = 0; i < 2; i++)
     pw_add_torque (m, &(pw_torque){ .name = name[i], .body = { "bob", "ground" }, .value = steps_torque[i] });
 }
 
-static const pw_plugin_table steps_table = TRIAL_TABLE (steps_build);
-
 static pw_system *steps_open (pw_signal one, pw_signal two) {
   steps_torque[0] = one, steps_torque[1] = two;
-  return scene_system (&steps_table, NULL);
+  return scene_system (&steps_build_table, NULL);
 }
 
 static const pw_signal steps_swing = { PW_HARMONIC, .harmonic = { .amplitude = 1, .omega = 30 } };
@@ -64,9 +61,8 @@ static void steps_run (pw_system *s, const char *method, int looks, double q[3],
 }
 
 /* Samples do not change a run, however many there are. */
-static void test_looks (void **state) {
+TEST (looks) {
   char name[STEPS_NAME];
-  (void)state;
   pw_system *s = steps_open (steps_swing, (pw_signal){ 0 });
   for (int i = 0; steps_method (i, name); i++) {
     double q[3], v[3], q_seen[3], v_seen[3];
@@ -80,8 +76,7 @@ static void test_looks (void **state) {
 
 /* Inside a step, held signals have the values of its beginning, also if a later time has been sampled: the angle of
  * the step is T t^2 / (2 I), T at its beginning. */
-static void test_held_signal_sampled (void **state) {
-  (void)state;
+TEST (held_signal_sampled) {
   pw_error error = { 0 };
   pw_sample sample;
   pw_system *s = steps_open (steps_swing, (pw_signal){ 0 });
@@ -97,9 +92,8 @@ static void test_held_signal_sampled (void **state) {
 }
 
 /* The beginning of a step can be sampled. */
-static void test_beginning (void **state) {
+TEST (beginning) {
   char name[STEPS_NAME];
-  (void)state;
   pw_system *s = steps_open (steps_swing, (pw_signal){ 0 });
   for (int i = 0; steps_method (i, name); i++) {
     pw_error error = { 0 };
@@ -118,9 +112,8 @@ static void test_beginning (void **state) {
 /* ---- Ends of runs ---- */
 
 /* A run without an end takes the same steps as one with a distant end. */
-static void test_endless (void **state) {
+TEST (endless) {
   char name[STEPS_NAME];
-  (void)state;
   pw_system *s = steps_open (steps_swing, (pw_signal){ 0 });
   for (int i = 0; steps_method (i, name); i++) {
     double t[2];
@@ -137,9 +130,8 @@ static void test_endless (void **state) {
 }
 
 /* Two pulses begin at times that differ in the last digit; the run ends one digit later, or further on. */
-static void test_adjacent_breakpoints (void **state) {
+TEST (adjacent_breakpoints) {
   char name[STEPS_NAME];
-  (void)state;
   const double one = 0.3, two = 0.1 + 0.2;
   assert_true (two > one);
   pw_system *s = steps_open ((pw_signal){ PW_PULSE, .pulse = { .height = 1, .start = one } },
@@ -156,9 +148,8 @@ static void test_adjacent_breakpoints (void **state) {
 
 /* One pulse ends and another one begins, in motion: both times are meant to be the same but differ in the last
  * digit. */
-static void test_adjacent_in_motion (void **state) {
+TEST (adjacent_in_motion) {
   char name[STEPS_NAME];
-  (void)state;
   pw_system *s = steps_open ((pw_signal){ PW_PULSE, .pulse = { .height = 10, .start = 0.1, .width = 0.2 } },
                              (pw_signal){ PW_PULSE, .pulse = { .height = -10, .start = 0.3, .width = 0.5 } });
   for (int i = 0; steps_method (i, name); i++) {
@@ -179,10 +170,9 @@ static int steps_breaks (void *context, double t, const double *x, double value[
 }
 
 /* A function value that is not finite stops the run, or refuses a sample, with the name of the element. */
-static void test_not_a_number (void **state) {
+TEST (not_a_number) {
   char name[STEPS_NAME];
   double until = 0.25;
-  (void)state;
   pw_system *s = steps_open ((pw_signal){ PW_FUNCTION, .function = { .eval = steps_breaks, .context = &until } },
                              (pw_signal){ 0 });
   for (int i = 0; steps_method (i, name); i++) {
@@ -232,10 +222,9 @@ static double steps_bad_breakpoint (void *context, double t) {
 }
 
 /* A function must return a breakpoint after the given time; otherwise the run would not advance. */
-static void test_breakpoints_told (void **state) {
+TEST (breakpoints_told) {
   static const double returned[] = { 0.125, 0, -INFINITY, NAN };
   steps_breakpoint wrong;
-  (void)state;
   pw_system *s = steps_open (
       (pw_signal){ PW_FUNCTION,
                    .function = { .eval = steps_still, .breakpoint = steps_bad_breakpoint, .context = &wrong } },
@@ -261,8 +250,7 @@ static void test_breakpoints_told (void **state) {
 }
 
 /* Fixed steps as short as a run accepts at a large time make progress. */
-static void test_short_steps (void **state) {
-  (void)state;
+TEST (short_steps) {
   const double t = 1e6, step = 2e-9;
   pw_error error = { 0 };
   pw_system *s = scene_named ("pendulum", NULL, 0);
@@ -271,19 +259,4 @@ static void test_short_steps (void **state) {
   assert_int_equal (pw_run_statistics (r)->steps, 1500);
   pw_run_close (r);
   pw_system_free (s);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_looks),
-    cmocka_unit_test (test_held_signal_sampled),
-    cmocka_unit_test (test_beginning),
-    cmocka_unit_test (test_endless),
-    cmocka_unit_test (test_adjacent_breakpoints),
-    cmocka_unit_test (test_adjacent_in_motion),
-    cmocka_unit_test (test_not_a_number),
-    cmocka_unit_test (test_breakpoints_told),
-    cmocka_unit_test (test_short_steps),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

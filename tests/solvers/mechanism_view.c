@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 #include "mechanism.h"
+#include "scene.h"
 
 static int view_ground (const char *body) {
   return strcmp (body, "ground") == 0;
@@ -112,8 +113,7 @@ void mechanism_transform (const mechanism_view *w, pw_body *b) {
 static const mechanism *view_of; /* arguments of view_build */
 static const mechanism_view *view_from;
 
-static void view_build (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (view_build) {
   for (int i = 0; i < view_of->bodies; i++) {
     pw_body b = view_of->body[view_from->backwards ? view_of->bodies - 1 - i : i];
     mechanism_transform (view_from, &b);
@@ -127,9 +127,8 @@ static void view_build (pw_model *m, const void *parameters) {
 }
 
 pw_system *mechanism_compile (const mechanism *x, const mechanism_view *view, pw_error *error) {
-  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof (pw_plugin_table), .build = view_build };
   view_of = x, view_from = view;
-  pw_model *m = pw_model_new ("mechanism", &table, error);
+  pw_model *m = pw_model_new ("mechanism", &view_build_table, error);
   pw_system *s = m && pw_model_build (m, error) == PW_OK ? pw_system_compile (m, error) : NULL;
   pw_model_free (m);
   return s;

@@ -98,10 +98,9 @@ static int try_mechanism (unsigned seed, const pw_system *s) {
   return code ? failed : -1;
 }
 
-static void test_random (void **state) {
+TEST (random) {
   static const mechanism_view unchanged = { .mirror = 0 };
   int tried = 0, failed = 0;
-  (void)state;
   for (unsigned seed = 1; seed <= SCENES; seed++) {
     mechanism m;
     pw_error error = { 0 };
@@ -114,9 +113,4 @@ static void test_random (void **state) {
   }
   assert_true (tried == 0 || tried == SCENES); /* 0: a compiler that does not vectorise loops over runs */
   print_message ("%d of %d mechanisms in lanes, %d runs failed\n", tried, SCENES, failed);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_random) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

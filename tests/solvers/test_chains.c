@@ -82,8 +82,13 @@ static void chains_add_element (pw_model *m, int variant, int n) {
   for (int i = 0; i < n / 2; i++) chains_pin (m, "twig", i, bar, 0.5, 0);
 }
 
-static void chains_build (pw_model *m, const void *parameters) {
-  const chains_parameters *p = parameters;
+static const pw_parameter chains_list[] = {
+  { PW_AT (chains_parameters, variant), .domain = PW_NONNEGATIVE, .about = "number of the scene" },
+  { PW_AT (chains_parameters, bars), .value = 14, .domain = PW_COUNT, .about = "number of bars" },
+  { .name = NULL },
+};
+
+SCENE_WITH (chains_build, chains_list, chains_parameters) {
   const int variant = (int)p->variant, n = (int)p->bars;
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 } });
   for (int i = 0; i < n; i++)
@@ -95,24 +100,12 @@ static void chains_build (pw_model *m, const void *parameters) {
   chains_add_element (m, variant, n);
 }
 
-static const pw_parameter chains_list[] = {
-  { PW_AT (chains_parameters, variant), .domain = PW_NONNEGATIVE, .about = "number of the scene" },
-  { PW_AT (chains_parameters, bars), .value = 14, .domain = PW_COUNT, .about = "number of bars" },
-  { .name = NULL },
-};
-
-static const pw_plugin_table chains_table = { .abi = PW_ABI,
-                                              .size = sizeof (pw_plugin_table),
-                                              .parameters = chains_list,
-                                              .parameters_size = sizeof (chains_parameters),
-                                              .build = chains_build };
-
 /* ---- Tests ---- */
 
 /* Verifies a short run; returns final states of some bars, and the force in a pin. */
 static void chains_run (int variant, int bars, double end[8]) {
   static const char *const name[] = { "bar0.phi", "bar6.x", "bar6.omega", "bar7.phi", "bar13.x", "bar13.vy" };
-  pw_system *s = scene_system (&chains_table, "variant", (double)variant, "bars", (double)bars, NULL);
+  pw_system *s = scene_system (&chains_build_table, "variant", (double)variant, "bars", (double)bars, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 0.01, .span = 0.2 });
   pw_sample x = runs_to (r, 0.2);
   trial_verify (s, r, &x, 1e4 * CHECK_EPS, "round-off of a projected state");
@@ -123,9 +116,8 @@ static void chains_run (int variant, int bars, double end[8]) {
   pw_system_free (s);
 }
 
-static void test_same (void **state) {
+TEST (same) {
   double first[8], other[8];
-  (void)state;
   for (size_t k = 0; k < sizeof chains_bars / sizeof *chains_bars; k++) {
     chains_run (CHAINS_PLAIN, chains_bars[k], first);
     assert_true (fabs (first[5]) > 0.1); /* it moves */
@@ -137,17 +129,8 @@ static void test_same (void **state) {
   }
 }
 
-static void test_others (void **state) {
+TEST (others) {
   double end[8];
-  (void)state;
   for (size_t k = 0; k < sizeof chains_bars / sizeof *chains_bars; k++)
     for (int variant = CHAINS_OTHERS; variant < CHAINS_ALL; variant++) chains_run (variant, chains_bars[k], end);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_same),
-    cmocka_unit_test (test_others),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -21,8 +21,7 @@ static pw_saddle *condense_open (pw_workspace *w, const double *weight) {
 /* ---- Prescribed coordinates ---- */
 
 /* A disc whose centre is at the end of a massless arm. */
-static void condense_arm (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (condense_arm) {
   pw_add_body (m, &(pw_body){ .name = "disc", .mass = 2, .inertia = 0.5, .start = { 0.6, 0.8, 0 } });
   pw_add_body (m, &(pw_body){ .name = "arm", .start = { 0.3, 0.4, 0.3 } });
   double x = 0.5 * cos (atan2 (0.8, 0.6) - 0.3), y = 0.5 * sin (atan2 (0.8, 0.6) - 0.3);
@@ -30,14 +29,9 @@ static void condense_arm (pw_model *m, const void *parameters) {
   pw_add_pin (m, &(pw_pin){ .name = "O", .body = { "arm", "ground" }, .at = { { -x, -y } } });
 }
 
-static const pw_plugin_table condense_arm_table = { .abi = PW_ABI,
-                                                    .size = sizeof (pw_plugin_table),
-                                                    .build = condense_arm };
-
 /* The equation that remains after the elimination of the arm contains the position of the disc only, not its angle.
  * It has no multiplier, also after the arm has turned so far that another equation remains. */
-static void test_prescribed_centre (void **state) {
-  (void)state;
+TEST (prescribed_centre) {
   pw_system *s = scene_system (&condense_arm_table, NULL);
   pw_workspace *w = pw_workspace_new (s, NULL);
   const double weight[] = { INFINITY, INFINITY, 0.5, 0, 0, 0 }, gamma[4] = { 0 }, f[9] = { 0, 0, 3, 5, 7, 2 };
@@ -78,8 +72,7 @@ static const pw_parameter platform_list[] = {
 
 /* A platform with legs.  In the coordinates of a leg that stands on the ground its two pins are dependent; the second
  * one is therefore eliminated after the platform. */
-static void platform_build (pw_model *m, const void *parameters) {
-  const platform *p = parameters;
+SCENE_WITH (platform_build, platform_list, platform) {
   char leg[20], pin[20];
   for (int i = -1; i <= PLATFORM_LEGS; i++) {
     snprintf (leg, sizeof leg, "leg%d", i);
@@ -101,12 +94,6 @@ static void platform_build (pw_model *m, const void *parameters) {
   }
 }
 
-static const pw_plugin_table platform_table = { .abi = PW_ABI,
-                                                .size = sizeof (pw_plugin_table),
-                                                .parameters = platform_list,
-                                                .parameters_size = sizeof (platform),
-                                                .build = platform_build };
-
 typedef struct {
   double a[PLATFORM_COORDS + 3], lambda[PLATFORM_ROWS], sine;
   int status, row;
@@ -115,7 +102,7 @@ typedef struct {
 /* The accelerations of the legs come first. */
 static solution platform_solve (double mass, int last, int feet) {
   solution x = { .row = -1 };
-  pw_system *s = scene_system (&platform_table, "mass", mass, "last", (double)last, "feet", (double)feet, NULL);
+  pw_system *s = scene_system (&platform_build_table, "mass", mass, "last", (double)last, "feet", (double)feet, NULL);
   pw_workspace *w = pw_workspace_new (s, NULL);
   double f[PLATFORM_COORDS + 3] = { 0 }, gamma[PLATFORM_ROWS], a[PLATFORM_COORDS + 3];
   const int first = last ? 0 : 3, coords = PLATFORM_COORDS;
@@ -141,8 +128,7 @@ static void platform_compare (const char *what, const double *a, const double *b
 }
 
 /* Accelerations, multipliers, the smallest pivot and the verdict do not depend on the order of the bodies. */
-static void test_order_of_bodies (void **state) {
-  (void)state;
+TEST (order_of_bodies) {
   for (double mass = 1e-3; mass < 2e3; mass *= 10)
     for (int feet = 1; feet <= 4; feet++) {
       const solution x = platform_solve (mass, 0, feet), y = platform_solve (mass, 1, feet);
@@ -157,8 +143,7 @@ static void test_order_of_bodies (void **state) {
 }
 
 /* A platform with free arms, on a leg of two links that is bent. */
-static void bent_leg_build (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (bent_leg_build) {
   pw_add_body (m, &(pw_body){ .name = "thigh", .mass = 0.2, .inertia = 0.01, .start = { 0, 0, 0.5 } });
   pw_add_body (m, &(pw_body){ .name = "shank", .mass = 0.2, .inertia = 0.01 });
   pw_add_body (m, &(pw_body){ .name = "platform", .mass = 1, .inertia = 0.3 });
@@ -174,14 +159,9 @@ static void bent_leg_build (pw_model *m, const void *parameters) {
   }
 }
 
-static const pw_plugin_table bent_leg_table = { .abi = PW_ABI,
-                                                .size = sizeof (pw_plugin_table),
-                                                .build = bent_leg_build };
-
 /* A stretched leg is singular for a platform at rest, not for one that moves. */
-static void test_stretched_leg (void **state) {
-  (void)state;
-  pw_system *s = scene_system (&bent_leg_table, NULL);
+TEST (stretched_leg) {
+  pw_system *s = scene_system (&bent_leg_build_table, NULL);
   pw_workspace *w = pw_workspace_new (s, NULL);
   double *q = calloc ((size_t)s->coords, sizeof *q);
   int row;
@@ -195,10 +175,4 @@ static void test_stretched_leg (void **state) {
   pw_saddle_close (k);
   pw_workspace_free (w);
   pw_system_free (s);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_prescribed_centre),
-                                      cmocka_unit_test (test_order_of_bodies), cmocka_unit_test (test_stretched_leg) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -93,7 +93,7 @@ static int has_lanes (void) {
   return has;
 }
 
-static void test_models (void **state) {
+TEST (models) {
   static const struct {
     const char *model, *method;
     double step;
@@ -112,7 +112,6 @@ static void test_models (void **state) {
     { "wheeled-snake", "rk4+projection", 1e-3 },
     { "chain", "rk4+projection", 1e-3 },
   };
-  (void)state;
   if (!has_lanes ()) skip ();
   for (size_t i = 0; i < sizeof all / sizeof *all; i++)
     for (int lanes = 2; lanes <= 8; lanes *= 4) {
@@ -126,8 +125,7 @@ static void test_models (void **state) {
 }
 
 /* A run that waits for the others has the configurations of its own state, and so its potential energy. */
-static void test_waiting (void **state) {
-  (void)state;
+TEST (waiting) {
   if (!has_lanes ()) skip ();
   several x;
   several_open (&x, scene_named ("slider-crank", NULL, 0), 4, 4, "rk4+projection", 1e-3);
@@ -151,8 +149,7 @@ static void test_waiting (void **state) {
 }
 
 /* A few runs leave lanes empty; one run is faster alone. */
-static void test_empty_lanes (void **state) {
-  (void)state;
+TEST (empty_lanes) {
   if (!has_lanes ()) skip ();
   for (int n = 1; n <= 4; n++) {
     several x;
@@ -163,17 +160,10 @@ static void test_empty_lanes (void **state) {
   }
 }
 
-static void test_excluded (void **state) {
+TEST (excluded) {
   pw_system *plain = scene_named ("ezyroller", NULL, 0), *own = scene_named ("elliptic-wire", NULL, 0);
-  (void)state;
   assert_true (pw_system_has_lanes (plain));
   assert_false (pw_system_has_lanes (own));
   pw_system_free (plain);
   pw_system_free (own);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_models), cmocka_unit_test (test_waiting),
-                                      cmocka_unit_test (test_empty_lanes), cmocka_unit_test (test_excluded) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

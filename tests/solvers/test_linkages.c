@@ -34,9 +34,14 @@ static void linkage_pin (pw_model *m, const double (*at)[3], int number, int a, 
   pw_add_pin (m, &pin);
 }
 
+static const pw_parameter linkage_list[] = {
+  { PW_AT (linkage, seed), .domain = PW_NONNEGATIVE, .about = "number of the linkage" },
+  { .name = NULL },
+};
+
 /* Most bars are pinned to the end of the previous one, so that there are chains. */
-static void linkage_build (pw_model *m, const void *parameters) {
-  unsigned random = (unsigned)((const linkage *)parameters)->seed * 2654435761U;
+SCENE_WITH (linkage_build, linkage_list, linkage) {
+  unsigned random = (unsigned)p->seed * 2654435761U;
   double at[LINKAGE_MOST][3] = { { 0 } };
   int n = 6 + (int)((LINKAGE_MOST - 6) * fabs (saddle_number (&random))), loops = n / 5;
   for (int i = 0; i < n; i++) {
@@ -60,8 +65,8 @@ static void linkage_build (pw_model *m, const void *parameters) {
 }
 
 /* Bars with mass, connected by massless links: one with a wheel, one as a rod, or two in series. */
-static void linkage_build_massless (pw_model *m, const void *parameters) {
-  unsigned random = (unsigned)((const linkage *)parameters)->seed * 2654435761U;
+SCENE_WITH (linkage_build_massless, linkage_list, linkage) {
+  unsigned random = (unsigned)p->seed * 2654435761U;
   double at[LINKAGE_MOST][3] = { { 0 } };
   const double (*there)[3] = (const double (*)[3])at;
   int massive = 2 + (int)(2 * fabs (saddle_number (&random))), links = 1 + (int)(5 * fabs (saddle_number (&random)));
@@ -73,7 +78,7 @@ static void linkage_build_massless (pw_model *m, const void *parameters) {
            mass = i < massive ? 1 + i : 0;
     int a = (int)(massive * fabs (saddle_number (&random))), b = (int)(massive * fabs (saddle_number (&random)));
     int what = i < massive ? -1 : (int)(3 * fabs (saddle_number (&random))), body = i < massive ? i : next++;
-    char name[12], wheel[12];
+    char name[12];
     for (int n = body; n <= body + (what == 2); n++) {
       snprintf (name, sizeof name, "b%d", n);
       pw_add_body (
@@ -81,8 +86,9 @@ static void linkage_build_massless (pw_model *m, const void *parameters) {
           &(pw_body){ .name = name, .mass = mass, .inertia = 0.1 * mass, .start = { at[n][0], at[n][1], at[n][2] } });
     }
     if (what >= 0) linkage_pin (m, there, pins++, body, a, x, y);
-    snprintf (wheel, sizeof wheel, "w%d", body);
-    if (what == 0) pw_add_wheel (m, &(pw_wheel){ .name = wheel, .body = name, .at = { 0.3, 0.1 * y }, .heading = x });
+    if (what == 0)
+      pw_add_wheel (
+          m, &(pw_wheel){ .name = check_text ("w%d", body), .body = name, .at = { 0.3, 0.1 * y }, .heading = x });
     if (what == 1) linkage_pin (m, there, pins++, body, b, 1 - 0.7 * y, 1.3 * x * y);
     if (what == 2) {
       linkage_pin (m, there, pins++, body, next, x + y, x - y);
@@ -90,23 +96,6 @@ static void linkage_build_massless (pw_model *m, const void *parameters) {
     }
   }
 }
-
-static const pw_parameter linkage_list[] = {
-  { PW_AT (linkage, seed), .domain = PW_NONNEGATIVE, .about = "number of the linkage" },
-  { .name = NULL },
-};
-
-static const pw_plugin_table linkage_table = { .abi = PW_ABI,
-                                               .size = sizeof (pw_plugin_table),
-                                               .parameters = linkage_list,
-                                               .parameters_size = sizeof (linkage),
-                                               .build = linkage_build };
-
-static const pw_plugin_table linkage_massless_table = { .abi = PW_ABI,
-                                                        .size = sizeof (pw_plugin_table),
-                                                        .parameters = linkage_list,
-                                                        .parameters_size = sizeof (linkage),
-                                                        .build = linkage_build_massless };
 
 static void linkage_each (const char *what, const pw_plugin_table *table, int seeds, int all) {
   for (int seed = 1; seed <= seeds; seed++) {
@@ -116,15 +105,7 @@ static void linkage_each (const char *what, const pw_plugin_table *table, int se
   }
 }
 
-static void test_linkages (void **state) {
-  (void)state;
-  linkage_each ("a linkage", &linkage_table, 200, 1);
-  linkage_each ("a linkage with massless links", &linkage_massless_table, 300, 0);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_linkages),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
+TEST (linkages) {
+  linkage_each ("a linkage", &linkage_build_table, 200, 1);
+  linkage_each ("a linkage with massless links", &linkage_build_massless_table, 300, 0);
 }

@@ -17,12 +17,6 @@ static const pw_parameter massless_list[] = {
   { .name = NULL },
 };
 
-#define MASSLESS_TABLE(f)                                                         \
-  {                                                                               \
-    .abi = PW_ABI, .size = sizeof (pw_plugin_table), .parameters = massless_list, \
-    .parameters_size = sizeof (massless), .build = f                              \
-  }
-
 static const char *const massless_methods[] = { "rk4+projection",
                                                 "rk4+nullspace",
                                                 "erk5+projection",
@@ -45,8 +39,7 @@ static void massless_other (pw_model *m, const massless *p) {
 }
 
 /* A disc on a massless arm turns at 1 rad/s. */
-static void massless_disc (pw_model *m, const void *parameters) {
-  const massless *p = parameters;
+SCENE_WITH (massless_disc, massless_list, massless) {
   double L = p->length;
   pw_add_body (m, &(pw_body){ .name = "disc", .inertia = p->mass * L * L, .start = { L, 0, 0 }, .rate = { 0, L, 1 } });
   pw_add_pin (m, &(pw_pin){ .name = "O", .body = { "disc", "ground" }, .at = { { -L, 0 }, { 0, 0 } } });
@@ -54,18 +47,16 @@ static void massless_disc (pw_model *m, const void *parameters) {
 }
 
 static double massless_turned (const char *method, double length, double mass, double other) {
-  static const pw_plugin_table table = MASSLESS_TABLE (massless_disc);
   double q[6], v[6];
-  pw_system *s = scene_system (&table, "length", length, "mass", mass, "other", other, NULL);
+  pw_system *s = scene_system (&massless_disc_table, "length", length, "mass", mass, "other", other, NULL);
   runs_state (s, method, &(pw_settings){ .rtol = 1e-6, .step = 1e-3, .span = 1 }, 1, q, v, NULL);
   pw_system_free (s);
   return fmax (fabs (q[2] - 1), fmax (hypot (q[0] / length - cos (1), q[1] / length - sin (1)), fabs (v[2] - 1)));
 }
 
-static void test_disc (void **state) {
+TEST (disc) {
   static const double units[][3] = { { 1, 1, 0 },      { 1, 1, 1 },   { 1, 1, 1e6 },   { 1e-3, 1, 0 },   { 1e3, 1, 0 },
                                      { 1, 1e-6, 1e3 }, { 1, 1e6, 0 }, { 1e3, 1e6, 1 }, { 1e-3, 1e-6, 0 } };
-  (void)state;
   for (size_t i = 0; i < sizeof massless_methods / sizeof *massless_methods; i++)
     for (size_t k = 0; k < sizeof units / sizeof *units; k++)
       check_below (massless_methods[i], massless_turned (massless_methods[i], units[k][0], units[k][1], units[k][2]),
@@ -73,16 +64,14 @@ static void test_disc (void **state) {
 }
 
 /* With the mass metric there is no error, since only the angle changes, linearly. */
-static void test_exact (void **state) {
-  (void)state;
+TEST (exact) {
   check_below ("bdf+projection", massless_turned ("bdf+projection", 1, 1, 0), 16 * CHECK_EPS, "round-off");
   check_below ("bdf+projection:every=3", massless_turned ("bdf+projection:every=3", 1, 1, 0), 16 * CHECK_EPS,
                "round-off");
 }
 
 /* Bars with inertia and with mass only, a massless coupler between bars with both, and a massless wheel carrier. */
-static void massless_chain (pw_model *m, const void *parameters) {
-  const massless *p = parameters;
+SCENE_WITH (massless_chain, massless_list, massless) {
   double L = p->length, M = p->mass;
   pw_add_body (m, &(pw_body){ .name = "a", .inertia = M * L * L, .start = { L, 0, 0 }, .rate = { 0, L, 1 } });
   pw_add_body (m, &(pw_body){ .name = "b", .start = { 2.5 * L, 0, 0 } });
@@ -97,8 +86,7 @@ static void massless_chain (pw_model *m, const void *parameters) {
   massless_other (m, p);
 }
 
-static void massless_car (pw_model *m, const void *parameters) {
-  const massless *p = parameters;
+SCENE_WITH (massless_car, massless_list, massless) {
   double L = p->length, M = p->mass;
   pw_add_body (m, &(pw_body){ .name = "frame", .inertia = M * L * L, .rate = { L, 0, 0.3 } });
   pw_add_body (
@@ -134,22 +122,11 @@ static void massless_agree (const pw_plugin_table *table, const char *method) {
   }
 }
 
-static void test_agree (void **state) {
-  static const pw_plugin_table chain = MASSLESS_TABLE (massless_chain), car = MASSLESS_TABLE (massless_car);
+TEST (agree) {
   static const char *const methods[] = { "bdf+projection", "bdf+projection:every=3", "erk5+projection",
                                          "erk8+nullspace", "ida+ggl" };
-  (void)state;
   for (size_t i = 0; i < sizeof methods / sizeof *methods; i++) {
-    massless_agree (&chain, methods[i]);
-    massless_agree (&car, methods[i]);
+    massless_agree (&massless_chain_table, methods[i]);
+    massless_agree (&massless_car_table, methods[i]);
   }
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_disc),
-    cmocka_unit_test (test_exact),
-    cmocka_unit_test (test_agree),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

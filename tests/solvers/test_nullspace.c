@@ -11,8 +11,7 @@
 
 #define DRIFT "nullspace:positions=drift"
 
-static void test_order (void **state) {
-  (void)state;
+TEST (order) {
   static const struct {
     const char *model;
     double h, t;
@@ -30,8 +29,7 @@ static void test_order (void **state) {
 
 /* Velocities satisfy every row to round-off at any step size; positions are projected, or drift with the order of
  * the method. */
-static void test_residuals (void **state) {
-  (void)state;
+TEST (residuals) {
   static const char *const model[] = {
     "ezyroller", "n-trailer", "pendulum", "arm", "tractor", "redundant-parallelogram", "andrews-squeezer"
   };
@@ -49,9 +47,8 @@ static void test_residuals (void **state) {
   assert_true (fine > 1e3 * CHECK_EPS);
 }
 
-static void test_tolerances (void **state) {
+TEST (tolerances) {
   static const char *const method[] = { "erk5+nullspace", "erk8+nullspace", "erk5+" DRIFT, "erk8+" DRIFT };
-  (void)state;
   for (size_t i = 0; i < sizeof method / sizeof *method; i++)
     for (int k = 5; k <= 11; k += 3) {
       double rtol = pow (10, -k), q[2][6], v[2][6];
@@ -65,8 +62,7 @@ static void test_tolerances (void **state) {
 
 /* The energy balances, including the work of drives and the energy added by projections; the ledger does not change
  * the run. */
-static void test_ledger (void **state) {
-  (void)state;
+TEST (ledger) {
   double q[2][6], v[2][6];
   for (int ledger = 0; ledger < 2; ledger++) {
     pw_system *s = ladder_open ("arm");
@@ -85,9 +81,8 @@ static void test_ledger (void **state) {
 
 /* ---- Refused scenes ---- */
 
-static void nullspace_chain (pw_model *m, const void *parameters) {
+SCENE (nullspace_chain) {
   static char body[200][8], pin[200][8];
-  (void)parameters;
   for (int i = 0; i < 129; i++) {
     snprintf (body[i], sizeof body[i], "b%d", i);
     snprintf (pin[i], sizeof pin[i], "p%d", i);
@@ -98,11 +93,9 @@ static void nullspace_chain (pw_model *m, const void *parameters) {
   }
 }
 
-static void test_refused (void **state) {
-  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof (pw_plugin_table), .build = nullspace_chain };
-  (void)state;
+TEST (refused) {
   pw_error error = { 0 };
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (&nullspace_chain_table, NULL);
   assert_null (pw_run_open (s, "erk5+nullspace", NULL, &error));
   check_error (
       &error, PW_INPUT,
@@ -112,8 +105,7 @@ static void test_refused (void **state) {
 }
 
 /* A step over which the null space turns too far fails with a message. */
-static void test_large_step (void **state) {
-  (void)state;
+TEST (large_step) {
   pw_error error = { 0 };
   pw_system *s = ladder_open ("pendulum");
   pw_run *r = runs_open (s, "rk4+nullspace", &(pw_settings){ .step = 3, .span = 100 });
@@ -155,20 +147,16 @@ static void nullspace_cart (pw_model *m, int parts) {
   pw_add_pin (m, &(pw_pin){ .name = "bolt2", .body = { "rest", "bracket" }, .at = { { 0.1, -0.2 }, { 0.1, -0.2 } } });
 }
 
-static void nullspace_whole (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (nullspace_whole) {
   nullspace_cart (m, 0);
 }
 
-static void nullspace_parts (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (nullspace_parts) {
   nullspace_cart (m, 1);
 }
 
-static void test_parts (void **state) {
-  static const pw_plugin_table whole = TRIAL_TABLE (nullspace_whole), parts = TRIAL_TABLE (nullspace_parts);
-  (void)state;
-  pw_system *s = scene_system (&whole, NULL), *twin = scene_system (&parts, NULL);
+TEST (parts) {
+  pw_system *s = scene_system (&nullspace_whole_table, NULL), *twin = scene_system (&nullspace_parts_table, NULL);
   double q[12], v[12], Q[12], V[12];
   runs_state (s, "rk4+nullspace", &(pw_settings){ .step = 0.01, .span = 1 }, 1, q, v, NULL);
   runs_state (twin, "rk4+nullspace", &(pw_settings){ .step = 0.01, .span = 1 }, 1, Q, V, NULL);
@@ -177,13 +165,4 @@ static void test_parts (void **state) {
     check_close ("velocities", V[j], v[j], 1e-10, "round-off of 100 steps, magnified by small weights");
   }
   pw_system_free (s), pw_system_free (twin);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_order),      cmocka_unit_test (test_parts),  cmocka_unit_test (test_residuals),
-    cmocka_unit_test (test_tolerances), cmocka_unit_test (test_ledger), cmocka_unit_test (test_refused),
-    cmocka_unit_test (test_large_step),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -15,7 +15,7 @@
 #include "saddle_scene.h"
 #include "scene.h"
 
-static void test_models (void **state) {
+TEST (models) {
   static const struct {
     const char *model, *parameter;
     double value;
@@ -26,7 +26,6 @@ static void test_models (void **state) {
     { "ezyroller", NULL, 0 },    { "ezyroller", "m2", 0.1 },        { "car", NULL, 0 },
     { "snakeboard", NULL, 0 },   { "differential-drive", NULL, 0 }, { "redundant-parallelogram", NULL, 0 }
   };
-  (void)state;
   for (size_t i = 0; i < sizeof scene / sizeof *scene; i++) {
     double e = saddle_scene (scene_named (scene[i].model, scene[i].parameter, scene[i].value), 0.02, 1);
     assert_true (e >= 0);
@@ -39,9 +38,8 @@ static void test_models (void **state) {
 enum { SADDLE_LINKS = 26, SADDLE_COORDS = 3 * SADDLE_LINKS };
 
 /* A chain with rods instead of pins. */
-static void saddle_rods (pw_model *m, const void *parameters) {
+SCENE (saddle_rods) {
   char name[20], rod[20], before[20] = "ground";
-  (void)parameters;
   for (int i = 0; i < SADDLE_LINKS; i++) {
     snprintf (name, sizeof name, "body%d", i);
     snprintf (rod, sizeof rod, "rod%d", i);
@@ -50,10 +48,6 @@ static void saddle_rods (pw_model *m, const void *parameters) {
     memcpy (before, name, sizeof before);
   }
 }
-
-static const pw_plugin_table saddle_rods_table = { .abi = PW_ABI,
-                                                   .size = sizeof (pw_plugin_table),
-                                                   .build = saddle_rods };
 
 /* The saddle-point system of a scene in a configuration without aligned bodies; `held` coordinates are prescribed,
  * beginning with those of a body. */
@@ -73,8 +67,7 @@ static pw_saddle *saddle_turned (pw_workspace *w, int body, int held) {
 }
 
 /* Pins between two prescribed bodies, or one and the ground, are inactive; all others are satisfied. */
-static void test_prescribed_bodies (void **state) {
-  (void)state;
+TEST (prescribed_bodies) {
   for (int body = 0; body + 1 < SADDLE_LINKS;
        body += body > 0 ? 1 : 2) { /* one link between a prescribed body and the ground could not move */
     double a[SADDLE_COORDS + 3], lambda[2 * SADDLE_LINKS], Ja[2 * SADDLE_LINKS], gamma[2 * SADDLE_LINKS];
@@ -98,8 +91,7 @@ static void test_prescribed_bodies (void **state) {
 }
 
 /* A row without entries is singular at every place in the order: 0/0 is not a pivot. */
-static void test_empty_row (void **state) {
-  (void)state;
+TEST (empty_row) {
   for (int rod = 0; rod < SADDLE_LINKS; rod++) {
     pw_system *s = scene_system (&saddle_rods_table, NULL);
     pw_workspace *w = pw_workspace_new (s, NULL);
@@ -152,28 +144,21 @@ static void bolted_build (pw_model *m, const bolted *p, int pairs) {
   }
 }
 
-static void bolted_pair (pw_model *m, const void *parameters) {
-  bolted_build (m, parameters, 1);
+SCENE_WITH (bolted_pair, bolted_list, bolted) {
+  bolted_build (m, p, 1);
 }
 
-static void bolted_many (pw_model *m, const void *parameters) {
-  bolted_build (m, parameters, SADDLE_LINKS);
+SCENE_WITH (bolted_many, bolted_list, bolted) {
+  bolted_build (m, p, SADDLE_LINKS);
 }
-
-#define BOLTED_TABLE(f)                                                                                             \
-  {                                                                                                                 \
-    .abi = PW_ABI, .size = sizeof (pw_plugin_table), .parameters = bolted_list, .parameters_size = sizeof (bolted), \
-    .build = f                                                                                                      \
-  }
 
 /* Round-off of a dependent row is not accepted as a pivot at any angle, with and without massless coordinates. */
-static void test_dependent_rows (void **state) {
-  static const pw_plugin_table table[] = { BOLTED_TABLE (bolted_pair), BOLTED_TABLE (bolted_many) };
-  (void)state;
+TEST (dependent_rows) {
+  static const pw_plugin_table *const table[] = { &bolted_pair_table, &bolted_many_table };
   for (int i = 0; i < 60; i++)
     for (int which = 0; which < 4; which++) {
       pw_error error = { 0 };
-      pw_system *s = scene_system (&table[which / 2], "angle", 0.1 * i, "mass", (double)(which % 2), NULL);
+      pw_system *s = scene_system (table[which / 2], "angle", 0.1 * i, "mass", (double)(which % 2), NULL);
       pw_workspace *w = pw_workspace_new (s, NULL);
       assert_int_equal (pw_update_kinematics (w, 0, s->q0, s->v0), PW_OK);
       pw_evaluate_J (w);
@@ -199,12 +184,12 @@ static void pairs_build (pw_model *m, double angle, int pairs) {
   }
 }
 
-static void pairs_one (pw_model *m, const void *parameters) {
-  pairs_build (m, ((const bolted *)parameters)->angle, 1);
+SCENE_WITH (pairs_one, bolted_list, bolted) {
+  pairs_build (m, p->angle, 1);
 }
 
-static void pairs_many (pw_model *m, const void *parameters) {
-  pairs_build (m, ((const bolted *)parameters)->angle, SADDLE_LINKS);
+SCENE_WITH (pairs_many, bolted_list, bolted) {
+  pairs_build (m, p->angle, SADDLE_LINKS);
 }
 
 static double pairs_sine (const pw_plugin_table *table, double angle) {
@@ -225,20 +210,18 @@ static double pairs_sine (const pw_plugin_table *table, double angle) {
 }
 
 /* The sine between the rows of a pin does not depend on how many other pins there are. */
-static void test_sine (void **state) {
-  static const pw_plugin_table one = BOLTED_TABLE (pairs_one), many = BOLTED_TABLE (pairs_many);
-  (void)state;
+TEST (sine) {
   for (int i = 0; i < 16; i++) {
-    double sine = pairs_sine (&one, 0.1 * i);
+    double sine = pairs_sine (&pairs_one_table, 0.1 * i);
     assert_true (sine > 0.1 && sine < 1);
-    check_close ("sine", pairs_sine (&many, 0.1 * i), sine, 1e3 * CHECK_EPS, "round-off, over a sine above 0.1");
+    check_close ("sine", pairs_sine (&pairs_many_table, 0.1 * i), sine, 1e3 * CHECK_EPS,
+                 "round-off, over a sine above 0.1");
   }
 }
 
-static void test_random (void **state) {
+TEST (random) {
   int tried = 0;
   double worst = 0;
-  (void)state;
   for (unsigned seed = 1; seed <= 200; seed++) {
     mechanism x;
     pw_error error = { 0 };
@@ -255,8 +238,7 @@ static void test_random (void **state) {
 }
 
 /* Norms are NaN if any entry is NaN. */
-static void test_not_a_number (void **state) {
-  (void)state;
+TEST (not_a_number) {
   pw_error error = { 0 };
   pw_system *s = scene_named ("theo-jansen", NULL, 0);
   pw_run *r = pw_run_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 1 }, &error);
@@ -275,14 +257,4 @@ static void test_not_a_number (void **state) {
   assert_true (isfinite (pw_run_acceleration_norm (r)) && isfinite (pw_rk_distance (r)));
   pw_run_close (r);
   pw_system_free (s);
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_models),       cmocka_unit_test (test_prescribed_bodies),
-    cmocka_unit_test (test_empty_row),    cmocka_unit_test (test_dependent_rows),
-    cmocka_unit_test (test_sine),         cmocka_unit_test (test_random),
-    cmocka_unit_test (test_not_a_number),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -70,7 +70,7 @@ static long both_specialised (const both *x) {
 
 /* Every model without element types of its own (test_specialise has these): 100 steps of 1e-4 s, nearly all of them by
  * specialised code. */
-static void test_gallery (void **state) {
+TEST (gallery) {
   static const char *const model[] = { "ackermann-car",
                                        "andrews-squeezer",
                                        "car",
@@ -93,7 +93,6 @@ static void test_gallery (void **state) {
                                        "theo-jansen",
                                        "wheeled-snake" };
   static const char *const method[] = { "rk4+projection", "rk4+baumgarte", "erk5:steps=fixed" };
-  (void)state;
   for (size_t i = 0; i < sizeof model / sizeof *model; i++)
     for (size_t k = 0; k < sizeof method / sizeof *method; k++) {
       both x;
@@ -107,7 +106,7 @@ static void test_gallery (void **state) {
 
 /* Steps of adaptive methods so long that a singular configuration may be within one, though none is: specialised code
  * evaluates them. */
-static void test_long_steps (void **state) {
+TEST (long_steps) {
   static const struct {
     const char *model, *method;
     double t;
@@ -116,7 +115,6 @@ static void test_long_steps (void **state) {
               { "snakeboard", "erk8+projection", 5 },
               { "snakeboard", "bdf+projection", 5 },
               { "n-trailer", "adams+none", 10 } };
-  (void)state;
   for (size_t i = 0; i < sizeof run / sizeof *run; i++) {
     both x;
     both_open (&x, scene_named (run[i].model, NULL, 0), run[i].method,
@@ -130,9 +128,8 @@ static void test_long_steps (void **state) {
 }
 
 /* Adaptive methods pass singular configurations with either engine. */
-static void test_adaptive_singular (void **state) {
+TEST (adaptive_singular) {
   both x;
-  (void)state;
   both_open (&x, scene_named ("n-four-bar", NULL, 0), "erk8+projection", &(pw_settings){ .rtol = 1e-9, .span = 10 });
   pw_sample a = runs_to (x.general, 10), b = runs_to (x.special, 10);
   const double x0 = 0.3284581115408153787, y0 = 0.9445185381786009622;
@@ -143,9 +140,8 @@ static void test_adaptive_singular (void **state) {
 }
 
 /* Residuals and counts that a projection reports are those of the general engine. */
-static void test_report (void **state) {
+TEST (report) {
   both x;
-  (void)state;
   both_open (&x, scene_named ("snakeboard", NULL, 0), "rk4+projection", NULL);
   both_run (&x, 0.05);
   const pw_statistics *a = pw_run_statistics (x.general), *b = pw_run_statistics (x.special);
@@ -205,7 +201,7 @@ static void refuse_steps (pw_scene *s, pw_scene_steps *x) {
 
 /* Several steps at once, and the stages of a step at once, have the bits of single evaluations, between steps too, at
  * breakpoints, and where guards leave some of them to the general engine. */
-static void test_stages (void **state) {
+TEST (stages) {
   static const struct {
     const char *model, *method; /* NULL: pulsed */
     double step, span;
@@ -223,7 +219,6 @@ static void test_stages (void **state) {
     { "hatchet-planimeter", "erk5+nullspace", 0, 1 },
     { "redundant-parallelogram", "erk5", 0, 1 },
   };
-  (void)state;
   for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
     both x;
     pw_settings set = { .step = all[i].step, .span = all[i].span };
@@ -239,9 +234,8 @@ static void test_stages (void **state) {
 }
 
 /* Angles beyond the range of the own sine are evaluated by the general engine: the same bits. */
-static void test_angles (void **state) {
+TEST (angles) {
   both x;
-  (void)state;
   pw_system *s = scene_named ("chaplygin-sleigh", NULL, 0);
   const pw_initial_value far = { pw_system_find_state (s, "sleigh.phi", NULL), 2e6 };
   assert_true (far.state >= 0);
@@ -253,9 +247,8 @@ static void test_angles (void **state) {
 }
 
 /* Passing singular configurations, the guards leave some evaluations to the general engine, and the result is right. */
-static void test_singular (void **state) {
+TEST (singular) {
   both x;
-  (void)state;
   both_open (&x, scene_named ("n-four-bar", "N", 2), "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 10 });
   pw_sample b = runs_to (x.special, 3);
   const pw_statistics *count = pw_run_statistics (x.special);
@@ -268,11 +261,10 @@ static void test_singular (void **state) {
 
 /* At a singular configuration, a crank and a rod of equal lengths above the slider, evaluation and projection
  * refuse. */
-static void test_guard (void **state) {
+TEST (guard) {
   const double up = PW_PI / 2;
   double q[12] = { 0, 0.5, up, 0, 0.5, -up, 0, 0, 0 }, v[12] = { 0 }, a[12], lambda[12];
   both x;
-  (void)state;
   both_open (&x, scene_named ("slider-crank", NULL, 0), "rk4+projection", NULL);
   const pw_specialised *code = pw_scene_code_table (x.code);
   pw_workspace *w = x.special->w;
@@ -284,10 +276,9 @@ static void test_guard (void **state) {
 }
 
 /* Code without an equation that the run enforces is not used. */
-static void test_independent (void **state) {
+TEST (independent) {
   pw_error error = { 0 };
   unsigned char independent[40];
-  (void)state;
   pw_system *s = scene_named ("snakeboard", NULL, 0);
   memset (independent, 1, sizeof independent);
   independent[pw_system_rows (s) - 1] = 0;
@@ -344,19 +335,16 @@ static const pw_kind wall_kind = {
   .force_q = PW_BY_DIFFERENCES,
 };
 
-static void wall_build (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (wall_build) {
   pw_add_body (m, &(pw_body){ .name = "ball", .mass = 1, .inertia = 1, .rate = { 2 } });
   pw_add (m, &wall_kind, &(wall){ .name = "end", .body = "ball" });
 }
 
 /* A scene without any element type of the library, whose force is 0 at the initial state and at all random ones. */
-static void test_plug_in (void **state) {
-  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = wall_build };
+TEST (plug_in) {
   const double w = sqrt (WALL_STIFFNESS), t = 6;
   both x;
-  (void)state;
-  both_open (&x, scene_system (&table, NULL), "rk4+none", &(pw_settings){ .step = 1e-3, .span = t });
+  both_open (&x, scene_system (&wall_build_table, NULL), "rk4+none", &(pw_settings){ .step = 1e-3, .span = t });
   both_run (&x, t);
   check_close ("x", runs_to (x.special, t).q[0], WALL_AT - 2 * (t - WALL_AT / 2 - PW_PI / w), 1e-6,
                "second order where the force begins");
@@ -367,9 +355,8 @@ static void test_plug_in (void **state) {
 /* ---- Codes of other scenes ---- */
 
 /* A code with all equations does not suit a run with redundant ones, nor one for another scene at all. */
-static void test_another (void **state) {
+TEST (another) {
   pw_error error = { 0 };
-  (void)state;
   pw_system *s = scene_named ("redundant-parallelogram", NULL, 0), *other = scene_named ("pendulum", NULL, 0);
   char *text = pw_system_source (s, NULL, &error);
   pw_scene_code *code = text ? pw_scene_code_open (text, s, &error) : NULL;
@@ -388,9 +375,8 @@ static void test_another (void **state) {
 }
 
 /* Scenes without a fixed order of elimination are refused with the reason. */
-static void test_refused (void **state) {
+TEST (refused) {
   pw_error error = { 0 };
-  (void)state;
   pw_system *s = scene_named ("chain", "n", 40);
   assert_null (pw_system_source (s, NULL, &error));
   check_error (&error, PW_INPUT, "model chain: 80 constraint equations: specialised code has at most 60");
@@ -410,14 +396,13 @@ static void test_refused (void **state) {
 }
 
 /* They take a sixteenth of the calls, and leave the watchdog where single steps do. */
-static void test_several_steps (void **state) {
+TEST (several_steps) {
   static const char *const model[] = { "ezyroller",    "snakeboard",       "n-trailer",
                                        "theo-jansen",  "car-tyres",        "slider-crank",
                                        "roller-racer", "andrews-squeezer", "car-two-trailers" };
   static const char *const method[] = { "rk4+projection", "rk4+none", "erk5+projection:steps=fixed",
                                         "erk8:steps=fixed" };
   const double h = 1e-4, t = 310.5 * h;
-  (void)state;
   for (size_t i = 0; i < sizeof model / sizeof *model; i++)
     for (size_t k = 0; k < sizeof method / sizeof *method; k++) {
       both x;
@@ -439,17 +424,4 @@ static void test_several_steps (void **state) {
       pw_run_close (one);
       both_close (&x);
     }
-}
-
-int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_gallery),     cmocka_unit_test (test_several_steps),
-    cmocka_unit_test (test_long_steps),  cmocka_unit_test (test_adaptive_singular),
-    cmocka_unit_test (test_report),      cmocka_unit_test (test_angles),
-    cmocka_unit_test (test_singular),    cmocka_unit_test (test_another),
-    cmocka_unit_test (test_refused),     cmocka_unit_test (test_guard),
-    cmocka_unit_test (test_independent), cmocka_unit_test (test_stages),
-    cmocka_unit_test (test_plug_in),
-  };
-  return cmocka_run_group_tests (tests, NULL, NULL);
 }

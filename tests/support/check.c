@@ -1,8 +1,44 @@
-/* Comparisons of numbers, arrays and errors, for all tests; see check.h. */
+/* Running tests, and comparisons of numbers, arrays and errors; see check.h. */
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "check.h"
+
+const check_fixture fixture __attribute__ ((weak)) = { NULL, NULL };
+
+static struct CMUnitTest check_tests[64];
+static size_t check_count;
+
+void check_add (const char *name, CMUnitTestFunction test) {
+  if (check_count == sizeof check_tests / sizeof *check_tests) abort ();
+  check_tests[check_count++] = (struct CMUnitTest){ .name = name, .test_func = test };
+}
+
+static int check_setup (void **state) {
+  (void)state;
+  return fixture.setup ? fixture.setup () : 0;
+}
+
+static int check_teardown (void **state) {
+  (void)state;
+  return fixture.teardown ? fixture.teardown () : 0;
+}
+
+int check_run (void) {
+  return _cmocka_run_group_tests ("tests", check_tests, check_count, check_setup, check_teardown);
+}
+
+const char *check_text (const char *format, ...) {
+  static char text[8][4000];
+  static int next;
+  va_list list;
+  next = (next + 1) % 8;
+  va_start (list, format);
+  vsnprintf (text[next], sizeof text[next], format, list);
+  va_end (list);
+  return text[next];
+}
 
 static double check_scale (void) {
   const char *text = getenv ("PW_TOL_SCALE");

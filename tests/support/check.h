@@ -1,4 +1,4 @@
-/* Checks for all tests: a number is compared with a reference, within a bound that has a reason.
+/* Tests, and their checks: a number is compared with a reference, within a bound that has a reason.
  *
  * With PW_TOL_SCALE in the environment every bound is multiplied by it; 0 prints all of them and fails none. */
 #ifndef CHECK_H
@@ -12,6 +12,28 @@
 #include "pinwheel.h"
 
 #define CHECK_EPS 2.220446049250313e-16
+
+/* TEST (pendulum) { ... } defines a test, which the program prints as test_pendulum.  A program runs the tests of its
+ * file in the order of their definitions. */
+#define TEST(name)                                                    \
+  static void test_##name (void **check_state);                       \
+  __attribute__ ((constructor)) static void check_add_##name (void) { \
+    check_add ("test_" #name, test_##name);                           \
+  }                                                                   \
+  static void test_##name (void **check_state __attribute__ ((unused)))
+
+/* What a program does before its first test and after its last one: a file of tests can define `fixture`. */
+typedef struct {
+  int (*setup) (void), (*teardown) (void); /* not 0: failure */
+} check_fixture;
+extern const check_fixture fixture;
+
+/* Adds a test; runs all of them and returns the number of failures. */
+void check_add (const char *name, CMUnitTestFunction test);
+int check_run (void);
+
+/* A text as by printf, until the eighth call after this one. */
+const char *check_text (const char *format, ...) __attribute__ ((format (printf, 1, 2)));
 
 /* |value - reference| <= bound */
 #define check_close(what, value, reference, bound, reason) \

@@ -20,11 +20,17 @@ static int cli_read_all (const char *path, char *text, size_t size) {
   return 1;
 }
 
+const char *cli_path (const char *name) {
+  static char path[2][4200];
+  static int next;
+  next = !next;
+  snprintf (path[next], sizeof path[next], "%s/%s", cli_folder, name);
+  return path[next];
+}
+
 const char *cli_file (const char *name) {
   static char text[200000];
-  char path[300];
-  snprintf (path, sizeof path, "%s/%s", cli_folder, name);
-  return cli_read_all (path, text, sizeof text) ? text : NULL;
+  return cli_read_all (cli_path (name), text, sizeof text) ? text : NULL;
 }
 
 void cli_expand (const char *from, char *to, size_t size) {
@@ -38,16 +44,14 @@ void cli_expand (const char *from, char *to, size_t size) {
 }
 
 int cli_run (const char *command) {
-  char expanded[2000], script[3000], path[300];
+  char expanded[2000], script[3000];
   const char *program = getenv ("PINWHEEL");
   cli_expand (command, expanded, sizeof expanded);
   snprintf (script, sizeof script, "pinwheel () { '%s' \"$@\"; }\n{ %s\n} >%s/out 2>%s/err </dev/null",
             program ? program : "build/pinwheel", expanded, cli_folder, cli_folder);
   int status = system (script);
-  snprintf (path, sizeof path, "%s/out", cli_folder);
-  assert_true (cli_read_all (path, cli_out, sizeof cli_out));
-  snprintf (path, sizeof path, "%s/err", cli_folder);
-  assert_true (cli_read_all (path, cli_err, sizeof cli_err));
+  assert_true (cli_read_all (cli_path ("out"), cli_out, sizeof cli_out));
+  assert_true (cli_read_all (cli_path ("err"), cli_err, sizeof cli_err));
   return WIFEXITED (status) ? WEXITSTATUS (status) : -1;
 }
 
@@ -76,20 +80,20 @@ void cli_bad (const char *command, int status, const char *message) {
 
 void cli_bad_each (const char *command, const cli_wrong *each, size_t count) {
   for (size_t i = 0; i < count; i++) {
-    char text[400];
-    snprintf (text, sizeof text, "pinwheel %s %s", command, each[i].arguments);
-    cli_bad (text, 2, each[i].message);
+    cli_bad (check_text ("pinwheel %s %s", command, each[i].arguments), 2, each[i].message);
     assert_string_equal (cli_out, "");
   }
 }
 
-void cli_write (const char *name, const char *text) {
-  char path[300];
-  snprintf (path, sizeof path, "%s/%s", cli_folder, name);
-  FILE *f = fopen (path, "w");
+void cli_write_bytes (const char *name, const void *bytes, size_t size) {
+  FILE *f = fopen (cli_path (name), "wb");
   assert_non_null (f);
-  fputs (text, f);
+  assert_int_equal (fwrite (bytes, 1, size, f), size);
   assert_int_equal (fclose (f), 0);
+}
+
+void cli_write (const char *name, const char *text) {
+  cli_write_bytes (name, text, strlen (text));
 }
 
 /* ---- Reading summaries ---- */
@@ -121,14 +125,12 @@ int cli_says (const char *json, const char *key, const char *value) {
   return json && strncmp (json, quoted, (size_t)length) == 0;
 }
 
-int cli_setup (void **state) {
-  (void)state;
+int cli_setup (void) {
   return mkdtemp (cli_folder) && setenv ("XDG_CACHE_HOME", cli_folder, 1) == 0 ? 0 : -1;
 }
 
-int cli_teardown (void **state) {
+int cli_teardown (void) {
   char command[200];
-  (void)state;
   snprintf (command, sizeof command, "rm -rf '%s'", cli_folder);
   return system (command);
 }

@@ -10,8 +10,8 @@ extern char cli_folder[];                    /* temporary folder for the files o
 extern char cli_out[200000], cli_err[20000]; /* standard output and error of the last command */
 
 /* Makes and removes the folder. */
-int cli_setup (void **state);
-int cli_teardown (void **state);
+int cli_setup (void);
+int cli_teardown (void);
 
 /* Runs a shell command in which `pinwheel` is the program and @ the folder; returns its exit status. */
 int cli_run (const char *command);
@@ -34,8 +34,12 @@ void cli_bad_each (const char *command, const cli_wrong *each, size_t count);
 /* Replaces every @ by the folder. */
 void cli_expand (const char *from, char *to, size_t size);
 
-/* Writes a file in the folder. */
+/* The path of a file in the folder, until the second call after this one, or the next command. */
+const char *cli_path (const char *name);
+
+/* Writes a file in the folder: a text; any bytes. */
 void cli_write (const char *name, const char *text);
+void cli_write_bytes (const char *name, const void *bytes, size_t size);
 
 /* The text of a file in the folder, until the next call; NULL if there is none. */
 const char *cli_file (const char *name);

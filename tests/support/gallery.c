@@ -4,26 +4,46 @@
 #include <stdio.h>
 #include "check.h"
 #include "gallery.h"
-#include "pinwheel-files.h"
 #include "runs.h"
-#include "scene.h"
 #include "system.h"
 #include "trial.h"
 
-pw_system *gallery_open (const char *model, ...) {
+static gallery_scene gallery_build (const char *model, va_list sets) {
   pw_error error = { 0 };
-  pw_file *f = pw_file_open (model, &error);
-  check_ok (f ? PW_OK : error.status, &error);
-  pw_model *m = pw_file_model (f, &error);
-  check_ok (m ? PW_OK : error.status, &error);
-  va_list list;
-  va_start (list, model);
-  for (const char *name; (name = va_arg (list, const char *)) != NULL;)
-    check_ok (pw_model_set (m, name, va_arg (list, double), &error), &error);
-  va_end (list);
-  check_ok (pw_model_build (m, &error), &error);
-  pw_system *s = scene_compile (m);
-  pw_file_close (f);
+  gallery_scene x = { .file = pw_file_open (model, &error) };
+  check_ok (x.file ? PW_OK : error.status, &error);
+  x.model = pw_file_model (x.file, &error);
+  check_ok (x.model ? PW_OK : error.status, &error);
+  for (const char *name; (name = va_arg (sets, const char *)) != NULL;)
+    check_ok (pw_model_set (x.model, name, va_arg (sets, double), &error), &error);
+  check_ok (pw_model_build (x.model, &error), &error);
+  x.system = pw_system_compile (x.model, &error);
+  check_ok (x.system ? PW_OK : error.status, &error);
+  return x;
+}
+
+gallery_scene gallery_load (const char *model, ...) {
+  va_list sets;
+  va_start (sets, model);
+  gallery_scene x = gallery_build (model, sets);
+  va_end (sets);
+  return x;
+}
+
+void gallery_close (gallery_scene *x) {
+  pw_system_free (x->system);
+  pw_model_free (x->model);
+  pw_file_close (x->file);
+}
+
+pw_system *gallery_open (const char *model, ...) {
+  va_list sets;
+  va_start (sets, model);
+  gallery_scene x = gallery_build (model, sets);
+  va_end (sets);
+  pw_system *s = x.system;
+  x.system = NULL;
+  gallery_close (&x);
   return s;
 }
 

@@ -2,12 +2,22 @@
 #ifndef GALLERY_H
 #define GALLERY_H
 
+#include "pinwheel-files.h"
 #include "pinwheel-solvers.h"
 
 #define H4 1e-12 /* h^4, for methods of order 4, at h = 1 ms */
 
 /* The system of a model by name or path, with parameters set: gallery_open ("chain", "n", 3., NULL). */
 pw_system *gallery_open (const char *model, ...);
+
+/* The same, together with its model and the file, which contains the code of its own element types and signals. */
+typedef struct {
+  pw_file *file;
+  pw_model *model;
+  pw_system *system;
+} gallery_scene;
+gallery_scene gallery_load (const char *model, ...);
+void gallery_close (gallery_scene *x);
 
 /* Opens a run of rk4+projection with an energy ledger, to end at t. */
 pw_run *gallery_run (pw_system *s, double step, double t);

@@ -8,8 +8,7 @@
 #include "system.h"
 #include "trial.h"
 
-static void ladder_arm (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (ladder_arm) {
   double x = cos (0.5), y = sin (0.5);
   pw_add_body (m, &(pw_body){ .name = "upper", .mass = 2, .inertia = 0.2, .start = { 0.5 * x, 0.5 * y, 0.5 } });
   pw_add_body (m, &(pw_body){ .name = "lower", .mass = 1, .inertia = 0.1, .start = { 0.5 + x, y, 0 } });
@@ -23,8 +22,7 @@ static void ladder_arm (pw_model *m, const void *parameters) {
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 } });
 }
 
-static void ladder_tractor (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (ladder_tractor) {
   pw_add_body (m, &(pw_body){ .name = "body", .mass = 3, .inertia = 0.5 });
   pw_add_wheel (m, &(pw_wheel){ .name = "rear", .body = "body", .at = { -0.4, 0 } });
   pw_add_steered_wheel (
@@ -38,9 +36,8 @@ static void ladder_tractor (pw_model *m, const void *parameters) {
 }
 
 pw_system *ladder_open (const char *model) {
-  static const pw_plugin_table arm = TRIAL_TABLE (ladder_arm), tractor = TRIAL_TABLE (ladder_tractor);
-  if (strcmp (model, "arm") == 0) return scene_system (&arm, NULL);
-  if (strcmp (model, "tractor") == 0) return scene_system (&tractor, NULL);
+  if (strcmp (model, "arm") == 0) return scene_system (&ladder_arm_table, NULL);
+  if (strcmp (model, "tractor") == 0) return scene_system (&ladder_tractor_table, NULL);
   return scene_named (model, NULL, 0);
 }
 
@@ -71,9 +68,8 @@ ladder_error ladder_solve (const char *model, const char *method, const pw_setti
 
 static void ladder_check (const char *model, const char *method, const char *quantity, double coarse, double fine,
                           double h, int order, double band) {
-  char what[160];
-  snprintf (what, sizeof what, "%s, %s: order of %s at h = %g", model, method, quantity, h);
-  check_close (what, log2 (coarse / fine), order, band, "the order, and the next power of h");
+  check_close (check_text ("%s, %s: order of %s at h = %g", model, method, quantity, h), log2 (coarse / fine), order,
+               band, "the order, and the next power of h");
 }
 
 void ladder_expect (const char *model, const char *method, double h, double t, int order, double band,

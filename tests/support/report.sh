@@ -4,7 +4,7 @@
 #   $work               a temporary folder, removed when the script ends
 #   report NAME STATUS  prints the result of a test that ended with this status, with the end of $work/log if it failed
 #   random LOW HIGH     sets $random to a pseudorandom number in this range; it begins with $seed (SEED, or the process id)
-#   exit $bad           at the end of a script: 0 if no test failed
+#   exit $bad           at the end of a script: 0 if no test failed; [ ! -e "$work/failed" ] if tests are reported in pipelines
 
 pinwheel=${PINWHEEL:-build/pinwheel}
 case $pinwheel in /*) ;; *) pinwheel=$PWD/$pinwheel ;; esac
@@ -22,6 +22,7 @@ report () {
     echo "not ok $1"
     [ ! -f "$work/log" ] || tail -n 20 "$work/log"
     bad=1
+    : >"$work/failed"
   fi
 }
 

@@ -4,6 +4,26 @@
 
 #include "pinwheel.h"
 
+/* The table of a model, whose bodies and elements the function `build` adds: without parameters; with a list of
+ * parameters that are members of a structure of `bytes` bytes. */
+#define SCENE_TABLE(build) SCENE_TABLE_WITH (build, NULL, 0)
+#define SCENE_TABLE_WITH(build_, list, bytes) \
+  { .abi = PW_ABI, .size = sizeof (pw_plugin_table), .parameters = list, .parameters_size = bytes, .build = build_ }
+
+/* SCENE (fall) { ... } defines a function that adds bodies and elements to the model m, and its table, fall_table;
+ * SCENE_WITH also has a list of parameters, the members of the structure p of this type. */
+#define SCENE(name)                                               \
+  static void name (pw_model *m, const void *);                   \
+  static const pw_plugin_table name##_table = SCENE_TABLE (name); \
+  static void name (pw_model *m, const void *parameter __attribute__ ((unused)))
+#define SCENE_WITH(name, list, type)                                                        \
+  static void name##_with (pw_model *m, const type *p);                                     \
+  static void name (pw_model *m, const void *parameter) {                                   \
+    name##_with (m, parameter);                                                             \
+  }                                                                                         \
+  static const pw_plugin_table name##_table = SCENE_TABLE_WITH (name, list, sizeof (type)); \
+  static void name##_with (pw_model *m, const type *p __attribute__ ((unused)))
+
 /* The table of models/ezyroller.c. */
 extern const pw_plugin_table scene_ezyroller;
 

@@ -47,10 +47,10 @@ void trial_verify (const pw_system *s, const pw_run *r, const pw_sample *x, doub
 
 static void trial_compare (const pw_system *s, const char *method, const pw_sample *x, const double *reference,
                            double bound, const char *reason) {
-  char what[120], name[60];
+  char name[60];
   for (int i = 0; i < 2 * s->coords; i++) {
-    snprintf (what, sizeof what, "%s %s", method, pw_system_state_name (s, i, name, sizeof name));
-    check_close (what, i < s->coords ? x->q[i] : x->v[i - s->coords], reference[i], bound, reason);
+    check_close (check_text ("%s %s", method, pw_system_state_name (s, i, name, sizeof name)),
+                 i < s->coords ? x->q[i] : x->v[i - s->coords], reference[i], bound, reason);
   }
 }
 
@@ -58,15 +58,14 @@ static void trial_compare (const pw_system *s, const char *method, const pw_samp
 static void trial_implicit (pw_system *s, const char *method, double factor, double t_end, const double *reference,
                             trial_size size) {
   const double rtol = 1e-9;
-  char what[80];
   pw_run *r = runs_open (s, method, &(pw_settings){ .rtol = rtol, .span = t_end, .ledger = 1 });
   pw_sample x = runs_to (r, t_end);
   const pw_statistics *cost = pw_run_statistics (r);
   trial_compare (s, method, &x, reference, factor * rtol * size.state, "the sum of the errors of the steps");
-  snprintf (what, sizeof what, "%s: balance", method);
-  check_below (what, fabs (x.balance), factor * rtol * size.energy, "the sum of the errors of the steps");
-  snprintf (what, sizeof what, "%s: rejected of %ld steps", method, cost->steps);
-  check_below (what, (double)cost->rejected, 10 + 0.1 * (double)cost->steps, "an exact Newton matrix");
+  check_below (check_text ("%s: balance", method), fabs (x.balance), factor * rtol * size.energy,
+               "the sum of the errors of the steps");
+  check_below (check_text ("%s: rejected of %ld steps", method, cost->steps), (double)cost->rejected,
+               10 + 0.1 * (double)cost->steps, "an exact Newton matrix");
   pw_run_close (r);
 }
 
