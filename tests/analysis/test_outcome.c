@@ -122,6 +122,18 @@ static void test_fast (void **state) {
                "divided until two formulas agree to 1e-3, which makes one of them accurate to 3e-11 of a part");
 }
 
+static void test_units (void **state) {
+  static const char *const text[] = { "t", "integral:t", "integral:wheel.phi", "integral:residual.position", "mean:t" };
+  static const char *const unit[] = { "s", "s^2", "rad s", "s", "s" };
+  char buffer[40];
+  pw_outcomes x;
+  pw_error error = { 0 };
+  (void)state;
+  check_ok (pw_outcomes_open (&x, s, "--of", text, 5, &error), &error);
+  for (int i = 0; i < 5; i++) assert_string_equal (pw_outcome_unit (&x, i, buffer, sizeof buffer), unit[i]);
+  pw_outcomes_close (&x);
+}
+
 static void test_gradient (void **state) {
   (void)state;
   const char *text = "integral:wheel.phi * 2 + max:wheel.phi";
@@ -163,7 +175,8 @@ static void test_bad (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = { cmocka_unit_test (test_functionals), cmocka_unit_test (test_jump),
-                                      cmocka_unit_test (test_gradient),    cmocka_unit_test (test_bad),
-                                      cmocka_unit_test (test_small_jump),  cmocka_unit_test (test_fast) };
+                                      cmocka_unit_test (test_units),       cmocka_unit_test (test_gradient),
+                                      cmocka_unit_test (test_bad),         cmocka_unit_test (test_small_jump),
+                                      cmocka_unit_test (test_fast) };
   return cmocka_run_group_tests (tests, outcome_setup, outcome_teardown);
 }

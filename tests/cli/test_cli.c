@@ -66,6 +66,9 @@ static void test_degrees (void **state) {
   snprintf (text, sizeof text, model, "2*pi", "-90*deg", "pi/4");
   cli_write ("skate.yaml", text);
   cli_good ("pinwheel run @/skate.yaml --t-end 0.01");
+  cli_good ("pinwheel run @/skate.yaml --t-end 0.01 --start skate.phi=-6");
+  assert_int_equal (cli_run ("pinwheel run @/skate.yaml --t-end 0.01 --start skate.phi=400"), 0);
+  assert_non_null (strstr (cli_err, "pinwheel: body skate: initial phi = 400 rad is more than a turn and ends at "));
   snprintf (text, sizeof text, model, "30", "-90", "45");
   cli_write ("skate.yaml", text);
   assert_int_equal (cli_run ("pinwheel check @/skate.yaml"), 0);

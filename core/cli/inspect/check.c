@@ -171,7 +171,7 @@ static int check_model (pw_check *check, pw_error *error) {
   int status = PW_OK;
   check->rk4_limit = check->doubling_time = INFINITY;
   check->fastest = -1;
-  pw_report_model (check->model.model);
+  pw_report_model (&check->model);
   check_open_run (check);
   if (check->run) {
     check_given_values (check);

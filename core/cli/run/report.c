@@ -85,11 +85,12 @@ static void report_field (const pw_element *element, const pw_field *field) {
   for (int i = 0; signal && i < pw_field_count (field); i++) report_jump (element, field->name, signal + i);
 }
 
-void pw_report_model (const pw_model *model) {
-  int bodies, elements;
-  const pw_body *body = pw_model_bodies (model, &bodies);
-  const pw_element *element = pw_model_elements (model, &elements);
-  for (int i = 0; i < bodies; i++) report_angle ("body", body[i].name, "initial phi", body[i].start[2]);
+void pw_report_model (const pw_cli_model *m) {
+  int elements;
+  const pw_system *s = m->system;
+  const pw_element *element = pw_model_elements (m->model, &elements);
+  for (int i = 0; i < pw_system_bodies (s); i++)
+    report_angle ("body", pw_system_body_name (s, i), "initial phi", pw_system_initial_q (s)[3 * i + 2]);
   for (int i = 0; i < elements; i++)
     for (const pw_field *field = element[i].kind->fields; field->name; field++) report_field (&element[i], field);
 }
