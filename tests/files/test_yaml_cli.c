@@ -109,6 +109,26 @@ static void test_no_text (void **state) {
   assert_non_null (strstr (cli_out, "torque T: body [a, ground]; value f (t) N m"));
 }
 
+/* A text model specifies what it contains; a model in C may contain values that it does not specify. */
+static void test_unspecified (void **state) {
+  (void)state;
+  cli_write ("guess.c", "#include \"pinwheel.h\"\n"
+                        "static void build (pw_model *m, const void *p) {\n"
+                        "  (void)p;\n"
+                        "  pw_add_body (m, &(pw_body){ .name = \"a\", .mass = 1, .start = { 1, 2 }, .rate = { 3 },\n"
+                        "                              .specified = PW_SPECIFIES_Y | PW_SPECIFIES_OMEGA });\n"
+                        "  pw_add_body (m, &(pw_body){ .name = \"b\", .mass = 1, .start = { 1, -0.0 } });\n"
+                        "  pw_add_body (m, &(pw_body){ .name = \"c\", .mass = 1, .start = { 1 } });\n"
+                        "}\n"
+                        "PW_MODEL (.build = build);\n");
+  cli_good ("pinwheel show @/guess.c --yaml");
+  assert_non_null (strstr (cli_out, "  - {name: a, mass: 1, start: {x: 1, y: 2}, rate: {vx: 3, omega: 0}}"
+                                    "  # the model does not specify x, vx\n"));
+  assert_non_null (strstr (cli_out, "start: {x: 1, y: -0}}  # the model does not specify y\n"));
+  assert_non_null (strstr (cli_out, "  - {name: c, mass: 1, start: {x: 1}}\n"));
+  cli_good ("pinwheel show @/guess.c --yaml >@/guess.yaml && pinwheel show @/guess.yaml");
+}
+
 static void test_max_file (void **state) {
   (void)state;
   cli_good ("{ cat " TEXT "; yes '# nothing' | head -c 300000; } >@/long.yaml");
@@ -174,10 +194,10 @@ int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_same_tables), cmocka_unit_test (test_same_sweeps),
     cmocka_unit_test (test_round_trip),  cmocka_unit_test (test_round_trip_signals),
-    cmocka_unit_test (test_no_text),     cmocka_unit_test (test_expressions),
-    cmocka_unit_test (test_max_file),    cmocka_unit_test (test_names),
-    cmocka_unit_test (test_message),     cmocka_unit_test (test_new),
-    cmocka_unit_test (test_held),
+    cmocka_unit_test (test_unspecified), cmocka_unit_test (test_no_text),
+    cmocka_unit_test (test_expressions), cmocka_unit_test (test_max_file),
+    cmocka_unit_test (test_names),       cmocka_unit_test (test_message),
+    cmocka_unit_test (test_new),         cmocka_unit_test (test_held),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

@@ -130,14 +130,26 @@ static void yaml_triple (const char *key, const char *const name[3], const doubl
   if (written) putchar ('}');
 }
 
+/* A comment on values that are written but not specified by the model: a text model specifies what it contains. */
+static void yaml_unspecified (const pw_body *b, const char *const name[6]) {
+  const char *separator = "  # the model does not specify ";
+  for (int i = 0; i < 6; i++) {
+    double value = i < 3 ? b->start[i] : b->rate[i - 3];
+    if (yaml_is_zero (value) || (b->specified ? b->specified >> i & 1 : value != 0)) continue;
+    printf ("%s%s", separator, name[i]), separator = ", ";
+  }
+}
+
 static void yaml_body (const pw_body *b) {
-  static const char *const start[] = { "x", "y", "phi" }, *const rate[] = { "vx", "vy", "omega" };
+  static const char *const state[] = { "x", "y", "phi", "vx", "vy", "omega" };
   printf ("  - {name: "), yaml_name (b->name);
   if (!yaml_is_zero (b->mass)) printf (", mass: "), yaml_number (b->mass, YAML_DIGITS);
   if (!yaml_is_zero (b->inertia)) printf (", inertia: "), yaml_number (b->inertia, YAML_DIGITS);
-  yaml_triple ("start", start, b->start, b->specified);
-  yaml_triple ("rate", rate, b->rate, b->specified >> 3);
-  puts ("}");
+  yaml_triple ("start", state, b->start, b->specified);
+  yaml_triple ("rate", state + 3, b->rate, b->specified >> 3);
+  putchar ('}');
+  yaml_unspecified (b, state);
+  putchar ('\n');
 }
 
 static void yaml_element (const pw_element *e) {
