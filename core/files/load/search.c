@@ -24,39 +24,34 @@ static int search_no_memory (pw_error *error) {
 /* What folders are relative to: the folder of the running program, that of this library. */
 typedef enum { SEARCH_PROGRAM, SEARCH_LIBRARY, SEARCH_ANCHORS } search_anchor;
 
-/* Stores the folder of the running program or of this library, malloced; NULL if unknown. */
-static int search_anchor_folder (search_anchor anchor, char **folder, pw_error *error) {
-  char path[PATH_MAX];
-  *folder = NULL;
-  if (anchor == SEARCH_PROGRAM) {
-    ssize_t n = readlink ("/proc/self/exe", path, sizeof path - 1);
-    if (n <= 0) return PW_OK;
-    path[n] = 0;
-  } else {
-    static const char here = 0; /* an address inside this library */
-    Dl_info info;
-    if (dladdr (&here, &info) == 0 || info.dli_fname == NULL) return PW_OK;
-    if (realpath (info.dli_fname, path) == NULL) return errno == ENOMEM ? search_no_memory (error) : PW_OK;
+enum { SEARCH_PATH = PATH_MAX + 40 };
+typedef char search_anchors[SEARCH_ANCHORS][PATH_MAX];
+
+/* Stores these folders; "" if one is unknown. */
+static int search_find_anchors (search_anchors anchor, pw_error *error) {
+  static const char here = 0; /* an address inside this library */
+  Dl_info info;
+  ssize_t n = readlink ("/proc/self/exe", anchor[SEARCH_PROGRAM], PATH_MAX - 1);
+  anchor[SEARCH_PROGRAM][n > 0 ? n : 0] = 0;
+  const char *library = dladdr (&here, &info) ? info.dli_fname : NULL;
+  if (library && (library = realpath (library, anchor[SEARCH_LIBRARY])) == NULL && errno == ENOMEM)
+    return search_no_memory (error);
+  if (library == NULL) *anchor[SEARCH_LIBRARY] = 0;
+  for (int i = 0; i < SEARCH_ANCHORS; i++) {
+    char *slash = strrchr (anchor[i], '/');
+    if (slash) *slash = 0;
   }
-  char *slash = strrchr (path, '/');
-  if (slash == NULL) return PW_OK;
-  *slash = 0;
-  *folder = strdup (path);
-  return *folder ? PW_OK : search_no_memory (error);
+  return PW_OK;
 }
 
 /* Folders relative to each anchor. */
 typedef const char *const search_folders[SEARCH_ANCHORS][3];
 enum { SEARCH_FOLDERS = 3 * SEARCH_ANCHORS };
 
-/* Stores the i-th of these folders, which need not exist, malloced; NULL if its anchor is unknown. */
-static int search_place (search_folders where, int i, char **folder, pw_error *error) {
-  char *anchor;
-  int status = search_anchor_folder ((search_anchor)(i / 3), &anchor, error);
-  *folder = anchor ? pw_path_join (anchor, where[i / 3][i % 3], "") : NULL;
-  if (anchor && *folder == NULL) status = search_no_memory (error);
-  free (anchor);
-  return status;
+/* Stores the i-th of these folders, which need not exist; 0 if its anchor is unknown. */
+static int search_place (search_anchors anchor, search_folders where, int i, char folder[SEARCH_PATH]) {
+  snprintf (folder, SEARCH_PATH, "%s/%s", anchor[i / 3], where[i / 3][i % 3]);
+  return *anchor[i / 3] != 0;
 }
 
 /* ---- Model files ---- */
@@ -149,14 +144,13 @@ static int search_order (const void *a, const void *b) {
 int pw_search_open (pw_search *s, pw_error *error) {
   static const search_folders where = { { "models", "../models", "../lib/pinwheel/models" },
                                         { "models", "../models", "pinwheel/models" } };
+  search_anchors anchor;
+  char folder[SEARCH_PATH];
   *s = (pw_search){ .count = 0 };
   int status = search_environment (s, error);
-  for (int i = 0; i < SEARCH_FOLDERS && status == PW_OK; i++) {
-    char *folder;
-    status = search_place (where, i, &folder, error);
-    if (folder) status = search_folder (s, folder, error);
-    free (folder);
-  }
+  if (status == PW_OK) status = search_find_anchors (anchor, error);
+  for (int i = 0; i < SEARCH_FOLDERS && status == PW_OK; i++)
+    if (search_place (anchor, where, i, folder)) status = search_folder (s, folder, error);
   if (s->count > 1) qsort (s->found, (size_t)s->count, sizeof *s->found, search_order);
   return status;
 }
@@ -170,14 +164,14 @@ void pw_search_close (pw_search *s) {
 
 /* Stores the path of the first of the files of this name that can be read, malloced; NULL if there is none. */
 static int search_find (search_folders where, const char *file, char **path, pw_error *error) {
-  int status = PW_OK;
+  search_anchors anchor;
+  char folder[SEARCH_PATH];
+  int status = search_find_anchors (anchor, error);
   *path = NULL;
   for (int i = 0; i < SEARCH_FOLDERS && *path == NULL && status == PW_OK; i++) {
-    char *folder;
-    status = search_place (where, i, &folder, error);
-    if (folder && (*path = pw_path_join (folder, file, "")) == NULL) status = search_no_memory (error);
+    if (!search_place (anchor, where, i, folder)) continue;
+    if ((*path = pw_path_join (folder, file, "")) == NULL) status = search_no_memory (error);
     if (*path && access (*path, R_OK) != 0) free (*path), *path = NULL;
-    free (folder);
   }
   return status;
 }

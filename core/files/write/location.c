@@ -67,8 +67,8 @@ static int location_follow (pw_location *p) {
   ssize_t n = readlink (p->path, target, sizeof target - 1);
   if (n < 0) return errno;
   target[n] = 0;
-  char *folder = *target == '/' ? NULL : pw_folder_of (p->path);
-  char *path = folder ? pw_path_join (folder, target, "") : strdup (target);
+  char *folder = pw_folder_of (p->path);
+  char *path = *target == '/' ? strdup (target) : folder ? pw_path_join (folder, target, "") : NULL;
   free (folder);
   free (p->path);
   p->path = path;
