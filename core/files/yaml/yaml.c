@@ -155,8 +155,9 @@ static int yaml_head (pw_yaml *y, const pw_reader *r) {
 pw_yaml *pw_yaml_open (const char *path, const char *shown, size_t max_bytes, pw_error *error) {
   const char *slash = strrchr (path, '/');
   pw_yaml *y = calloc (1, sizeof *y);
-  if (y) y->path = strdup (shown);
-  if (y) y->folder = slash ? strndup (path, (size_t)(slash - path)) : strdup ("."); /* "" for "/model.yaml" */
+  if (y) y->path = pw_arena_copy (&y->arena, shown);
+  if (y) y->folder = pw_arena_copy (&y->arena, slash ? path : ".");
+  if (y && y->folder && slash) y->folder[slash - path] = 0; /* "" for "/model.yaml" */
   if (y == NULL || y->path == NULL || y->folder == NULL) {
     pw_fail (error, PW_RESOURCE, "out of memory");
     pw_yaml_close (y);
@@ -175,8 +176,6 @@ void pw_yaml_close (pw_yaml *y) {
   if (y == NULL) return;
   pw_arena_free (&y->arena);
   free (y->source);
-  free (y->path);
-  free (y->folder);
   free (y);
 }
 
@@ -191,9 +190,8 @@ static int yaml_each_table (const pw_yaml *y, const pw_node *node, int (*each) (
   for (const pw_node *n = node->type == PW_YAML_SCALAR ? NULL : node->first; n && !stop; n = n->next) {
     const pw_node *value = node->type == PW_YAML_MAP ? n->next : NULL;
     if (value && n->type == PW_YAML_SCALAR && strcmp (n->text, "file") == 0 && value->type == PW_YAML_SCALAR) {
-      char *path = pw_path_join (y->folder, value->text, "");
-      stop = path ? each (context, path) : PW_RESOURCE;
-      free (path);
+      char path[PW_PATH];
+      stop = each (context, pw_path (path, "%s/%s", y->folder, value->text));
     }
     if (!stop) stop = yaml_each_table (y, n, each, context);
   }

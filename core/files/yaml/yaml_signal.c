@@ -40,26 +40,16 @@ static int table_leaves_folder (const char *name) {
   return 0;
 }
 
-/* The real path of the file if it is below the folder; malloced. */
-static char *table_path_in_folder (const char *folder, const char *name, const char **reason) {
-  char *joined = pw_path_join (folder, name, ""), *path = joined ? realpath (joined, NULL) : NULL;
-  size_t n = strlen (folder); /* 0 for the root */
-  *reason = joined == NULL ? "out of memory" : strerror (errno);
-  free (joined);
-  if (path == NULL || (strncmp (path, folder, n) == 0 && (path[n] == '/' || path[n] == 0))) return path;
-  *reason = "it is a link that leads out of the model's folder";
-  free (path);
-  return NULL;
-}
-
 /* A model may only read files in its folder. */
 static FILE *table_open (const pw_yaml *y, const char *name, const char **reason) {
+  char joined[PW_PATH], path[PW_PATH];
+  size_t n = strlen (y->folder); /* 0 for the root */
   *reason = "a table must be in the model's folder: its path is relative and has no \"..\"";
   if (*name == '/' || table_leaves_folder (name)) return NULL;
-  char *path = table_path_in_folder (y->folder, name, reason);
-  FILE *f = path ? pw_open_input (path, reason) : NULL;
-  free (path);
-  return f;
+  if (realpath (pw_path (joined, "%s/%s", y->folder, name), path) == NULL) return *reason = strerror (errno), NULL;
+  *reason = "it is a link that leads out of the model's folder";
+  int is_inside = strncmp (path, y->folder, n) == 0 && (path[n] == '/' || path[n] == 0);
+  return is_inside ? pw_open_input (path, reason) : NULL;
 }
 
 /* The unit of the current field.  If it is "m or rad", the choice before it decides: rad for an angle. */
