@@ -265,6 +265,9 @@ int pw_cli_check_csv (const char *path, pw_error *error);
 
 /* ---- Messages ---- */
 
+/* The text of a number with so many digits (pw_format); it lives as long as the block around it. */
+#define PW_DIGITS(value, digits) pw_format ((char[32]){ 0 }, value, digits)
+
 /* Prints to a stream; pw_cli_say: to standard error.  On a terminal control characters are escaped. */
 void pw_cli_print (FILE *f, const char *format, ...) PW_PRINTF (2, 3);
 #define pw_cli_say(...) pw_cli_print (stderr, __VA_ARGS__)

@@ -84,14 +84,14 @@ void pw_cli_state_change (const pw_system *system, const pw_initial_report *init
 double pw_cli_largest_change (const pw_run *r, const pw_system *s, char text[PW_CHANGE_TEXT]) {
   const pw_initial_report *initial = pw_run_initial (r);
   double largest = 0, given, consistent;
-  char name[PW_STATE_NAME], given_text[32], consistent_text[32];
+  char name[PW_STATE_NAME];
   for (int i = 0; i < 2 * pw_system_coordinates (s); i++) {
     if (!pw_initial_given (initial, i) || !pw_initial_moved (s, initial, i)) continue;
     pw_cli_state_change (s, initial, i, name, &given, &consistent);
     if (!(fabs (consistent - given) > largest)) continue;
     largest = fabs (consistent - given);
-    snprintf (text, PW_CHANGE_TEXT, "%s from %s to %s %s", name, pw_format (given_text, given, 10),
-              pw_format (consistent_text, consistent, 10), pw_system_state_unit (s, i));
+    snprintf (text, PW_CHANGE_TEXT, "%s from %s to %s %s", name, PW_DIGITS (given, 10), PW_DIGITS (consistent, 10),
+              pw_system_state_unit (s, i));
   }
   return largest;
 }

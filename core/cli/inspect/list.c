@@ -106,11 +106,10 @@ static int list_models (const char **name, pw_error *error) {
 /* ---- Methods ---- */
 
 static void list_option (const pw_option *o) {
-  char text[32];
   printf ("    :%s=", o->name);
   for (int i = 0; o->choices && o->choices[i]; i++) printf ("%s%s", i ? "|" : "", o->choices[i]);
   if (o->choices == NULL) printf ("NUMBER%s%s", o->unit && *o->unit ? " " : "", o->unit ? o->unit : "");
-  printf ("  (default %s", o->choices ? o->choices[(int)o->value] : pw_format (text, o->value, 6));
+  printf ("  (default %s", o->choices ? o->choices[(int)o->value] : PW_DIGITS (o->value, 6));
   if (o->with) printf ("; with %s", o->with);
   printf (")\n        %s\n", o->about);
 }

@@ -51,14 +51,13 @@ static void show_parameters (const pw_model *m) {
   for (pw_table t = { 0 }; pw_table_pass (&t);)
     for (const pw_parameter *p = parameters; p->name; p++) {
       double value = pw_model_parameter (m, p);
-      char text[32], original[60] = "";
+      char original[60] = "";
       pw_cell (&t, -1, p->name);
       pw_cell_number (&t, 1, value, SHOW_DIGITS);
       pw_cell (&t, -1, p->unit ? p->unit : "");
       pw_cell (&t, -1, pw_domain_text (p->domain));
       pw_cell (&t, -1, p->about ? p->about : "");
-      if (value != p->value)
-        snprintf (original, sizeof original, "default %s", pw_format (text, p->value, SHOW_DIGITS));
+      if (value != p->value) snprintf (original, sizeof original, "default %s", PW_DIGITS (p->value, SHOW_DIGITS));
       if (*original) pw_cell (&t, -1, original);
       pw_row_end (&t);
     }
@@ -66,10 +65,9 @@ static void show_parameters (const pw_model *m) {
 
 static void show_defaults (const pw_plugin_table *table) {
   pw_run_defaults defaults = pw_cli_defaults (table);
-  char t_end[32], step[32], rtol[32];
-  printf ("\nRuns by default for %s s with %s, --step %s", pw_format (t_end, defaults.t_end, SHOW_DIGITS),
-          defaults.method, pw_format (step, defaults.step, SHOW_DIGITS));
-  if (defaults.rtol != 0) printf (", --rtol %s", pw_format (rtol, defaults.rtol, SHOW_DIGITS));
+  printf ("\nRuns by default for %s s with %s, --step %s", PW_DIGITS (defaults.t_end, SHOW_DIGITS), defaults.method,
+          PW_DIGITS (defaults.step, SHOW_DIGITS));
+  if (defaults.rtol != 0) printf (", --rtol %s", PW_DIGITS (defaults.rtol, SHOW_DIGITS));
   putchar ('\n');
 }
 
@@ -181,8 +179,7 @@ static void matrices_panel (const pw_system *s, const pw_equations *equations, i
 
 static void matrices_print (const pw_cli_model *m, const pw_equations *equations, const pw_sample *sample) {
   const pw_system *s = m->system;
-  char t[32];
-  printf ("%s at t = %s s\n", pw_file_name (m->file), pw_format (t, sample->t, MATRICES_DIGITS));
+  printf ("%s at t = %s s\n", pw_file_name (m->file), PW_DIGITS (sample->t, MATRICES_DIGITS));
   matrices_coordinates (s, equations, sample);
   if (equations->rows == 0) puts ("\nThe model has no constraints: no J, no gamma");
   if (equations->rows > 0) matrices_constraints (s, equations, sample);

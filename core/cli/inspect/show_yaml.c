@@ -8,8 +8,7 @@
 enum { YAML_DIGITS = 17 };
 
 static void yaml_number (double value, int digits) {
-  char text[32];
-  fputs (pw_format (text, value, digits), stdout);
+  fputs (PW_DIGITS (value, digits), stdout);
 }
 
 /* 1 for the default, 0; -0 is not the default. */
@@ -35,8 +34,7 @@ static void yaml_text (const char *text) {
 
 /* "[1, 2]" */
 static void yaml_pair (const double value[2], int digits) {
-  char first[32], second[32];
-  printf ("[%s, %s]", pw_format (first, value[0], digits), pw_format (second, value[1], digits));
+  printf ("[%s, %s]", PW_DIGITS (value[0], digits), PW_DIGITS (value[1], digits));
 }
 
 /* {expression: "t^2", rate: "2*t"}, or f (t, a.phi) for a function of a C model */
@@ -54,9 +52,8 @@ static void yaml_function (const pw_signal *s) {
 static void yaml_points (const pw_signal *s, int digits) {
   const double *t = s->table.t;
   int count = s->table.count;
-  char from[32], to[32];
   if (digits < YAML_DIGITS) {
-    printf ("%d from %s to %s s", count, pw_format (from, t[0], digits), pw_format (to, t[count - 1], digits));
+    printf ("%d from %s to %s s", count, PW_DIGITS (t[0], digits), PW_DIGITS (t[count - 1], digits));
     return;
   }
   for (int i = 0; i < count; i++) {
