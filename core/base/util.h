@@ -48,6 +48,10 @@ int pw_control (const char *text);
 int pw_is_text (const char *text);
 /* Replaces control characters and invalid bytes by question marks. */
 void pw_text_sanitise (char *text);
+/* Prints into a buffer, which is returned; what does not fit is cut off. */
+char *pw_print (char *buffer, size_t size, const char *format, ...) PW_PRINTF (3, 4);
+/* The same into a buffer of its own, which lives as long as the block around it. */
+#define PW_PRINTED(size, ...) pw_print ((char[size]){ 0 }, size, __VA_ARGS__)
 
 /* ---- Streams into memory (stream.c) ---- */
 

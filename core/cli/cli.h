@@ -265,7 +265,7 @@ int pw_cli_check_csv (const char *path, pw_error *error);
 
 /* ---- Messages ---- */
 
-/* The text of a number with so many digits (pw_format); it lives as long as the block around it. */
+/* A number as text (pw_format), in a buffer that lives as long as the block around it. */
 #define PW_DIGITS(value, digits) pw_format ((char[32]){ 0 }, value, digits)
 
 /* Prints to a stream; pw_cli_say: to standard error.  On a terminal control characters are escaped. */

@@ -3,6 +3,7 @@
 #include <stdarg.h>
 #include <string.h>
 #include "check_report.h"
+#include "util.h"
 
 enum { REPORT_LISTED = 8, REPORT_EIGENVALUES = 60 }; /* items of a list; lines of eigenvalues: in the text, at most */
 
@@ -117,10 +118,8 @@ static void report_mass (pw_json *j, const pw_check *check) {
   for (int b = 0; b < pw_system_bodies (s); b++) {
     int which = (M[3 * b] == 0) + 2 * (M[3 * b + 2] == 0);
     const char *name = pw_system_body_name (s, b);
-    char line[300];
     if (which == 0) continue;
-    snprintf (line, sizeof line, "%s has %s", name, lack[which]);
-    report_item (j, &listed, name, line);
+    report_item (j, &listed, name, PW_PRINTED (300, "%s has %s", name, lack[which]));
   }
   report_end_list (j, listed);
   report_text (j, "saddle-point matrix", "%s%s", saddle_point ? saddle_point : "not known",
@@ -132,7 +131,7 @@ static void report_mass (pw_json *j, const pw_check *check) {
 /* ---- Initial conditions ---- */
 
 static void report_change (pw_json *j, const pw_check *check, int i, int *listed) {
-  char name[PW_STATE_NAME], line[500];
+  char name[PW_STATE_NAME];
   double from, to;
   pw_cli_state_change (check->model.system, pw_run_initial (check->run), i, name, &from, &to);
   pw_json_open (j, NULL, '{');
@@ -140,9 +139,10 @@ static void report_change (pw_json *j, const pw_check *check, int i, int *listed
   pw_json_number (j, "from", from);
   pw_json_number (j, "to", to);
   pw_json_close (j, '}');
-  snprintf (line, sizeof line, "%-20s from %s to %s, by %s %s", name, PW_DIGITS (from, 10), PW_DIGITS (to, 10),
-            PW_DIGITS (to - from, 3), pw_system_state_unit (check->model.system, i));
-  report_item (j, listed, NULL, line);
+  const char *unit = pw_system_state_unit (check->model.system, i);
+  report_item (j, listed, NULL,
+               PW_PRINTED (500, "%-20s from %s to %s, by %s %s", name, PW_DIGITS (from, 10), PW_DIGITS (to, 10),
+                           PW_DIGITS (to - from, 3), unit));
 }
 
 static void report_initial (pw_json *j, const pw_check *check) {
@@ -193,15 +193,14 @@ static void report_failures (pw_json *j, const pw_selftest_report *report, const
 }
 
 static void report_kind (pw_json *j, const pw_checked_kind *k) {
-  char name[100];
   report_line (j);
   pw_json_open (j, NULL, '{');
   pw_json_text (j, "kind", k->kind->name);
   pw_json_number (j, "elements", k->count);
   pw_json_number (j, "checks", k->random.checks + k->in_model.checks);
   pw_json_open (j, "failed", '[');
-  snprintf (name, sizeof name, "%s (%d element%s)", k->kind->name, k->count, k->count == 1 ? "" : "s");
-  report_text (j, name, "%s: %d checks in random scenes, %d in this model",
+  report_text (j, PW_PRINTED (100, "%s (%d element%s)", k->kind->name, k->count, k->count == 1 ? "" : "s"),
+               "%s: %d checks in random scenes, %d in this model",
                k->random.failed + k->in_model.failed ? "FAILED" : "good", k->random.checks, k->in_model.checks);
   if (*k->untested) report_print (j, "    not tested in random scenes: %s\n", k->untested);
   report_failures (j, &k->random, "random scenes");

@@ -67,14 +67,12 @@ static int page_has_method (const pw_method *m, int stabilisation) {
 }
 
 static void page_methods_json (pw_json *j) {
-  char name[100];
   pw_json_open (j, "methods", '[');
   for (const pw_method *const *m = pw_methods; *m; m++)
     for (int i = 0; (*m)->stabilisations[i].name; i++) {
       if (!page_has_method (*m, i)) continue;
-      snprintf (name, sizeof name, "%s+%s", (*m)->name, (*m)->stabilisations[i].name);
       pw_json_open (j, NULL, '{');
-      pw_json_text (j, "name", name);
+      pw_json_text (j, "name", PW_PRINTED (100, "%s+%s", (*m)->name, (*m)->stabilisations[i].name));
       pw_json_flag (j, "adaptive", (*m)->adaptive);
       pw_json_close (j, '}');
     }

@@ -86,9 +86,9 @@ static int model_find_path (pw_file *f, const char *path, pw_error *error) {
 /* Reports an unknown name; suggests a path if the current directory has such a file, else the nearest name. */
 static int model_unknown (const pw_search *s, const char *name, pw_error *error) {
   struct stat info;
-  char here[200], unread[300] = ""; /* a file in the current directory; folders that cannot be searched */
+  char unread[300] = ""; /* folders that cannot be searched */
   for (int i = 0; i < MODEL_ENDINGS; i++) {
-    snprintf (here, sizeof here, "%s%s", name, model_endings[i]);
+    const char *here = PW_PRINTED (200, "%s%s", name, model_endings[i]);
     if (stat (here, &info) == 0)
       return pw_fail (error, PW_INPUT, "there is no model \"%s\" on the search path; to use the file here, write ./%s",
                       name, here);

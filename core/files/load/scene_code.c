@@ -39,9 +39,9 @@ typedef struct {
 static int code_find_program (const char *word, struct stat *info) {
   if (strchr (word, '/')) return stat (word, info) == 0;
   for (const char *entry = getenv ("PATH"), *end; entry; entry = *end ? end + 1 : NULL) {
-    char path[1000];
+    char path[PW_PATH];
     end = entry + strcspn (entry, ":");
-    snprintf (path, sizeof path, "%.*s%s%s", (int)(end - entry), entry, end > entry ? "/" : "", word);
+    pw_path (path, "%.*s%s%s", (int)(end - entry), entry, end > entry ? "/" : "", word);
     if (stat (path, info) == 0 && S_ISREG (info->st_mode) && access (path, X_OK) == 0) return 1;
   }
   return 0;
@@ -55,14 +55,13 @@ static void code_add (code_job *x, const char *text) {
 
 /* Adds the words of the compiler; of programs among them ("ccache gcc") also size, date and inode. */
 static int code_add_compiler (code_job *x) {
-  char text[200], *copy = strdup (pw_compiler ()), *rest = NULL;
+  char *copy = strdup (pw_compiler ()), *rest = NULL;
   for (char *w = copy ? strtok_r (copy, " \t", &rest) : NULL; w; w = strtok_r (NULL, " \t", &rest)) {
     struct stat info;
     code_add (x, w);
     if (!code_find_program (w, &info)) continue;
-    snprintf (text, sizeof text, "%lld %lld %ld %llu", (long long)info.st_size, (long long)info.st_mtim.tv_sec,
-              (long)info.st_mtim.tv_nsec, (unsigned long long)info.st_ino);
-    code_add (x, text);
+    code_add (x, PW_PRINTED (200, "%lld %lld %ld %llu", (long long)info.st_size, (long long)info.st_mtim.tv_sec,
+                             (long)info.st_mtim.tv_nsec, (unsigned long long)info.st_ino));
   }
   free (copy);
   return copy && strlen (x->identity) < sizeof x->identity - 50 ? PW_OK : PW_RESOURCE; /* room for the checksum */

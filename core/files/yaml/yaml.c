@@ -73,14 +73,13 @@ static int yaml_default (const pw_reader *r, const pw_node *node, const char *la
 static int yaml_parameter (const pw_reader *r, const pw_node *node, pw_names *names, pw_parameter *p) {
   static const char *const key[] = { "name", "value", "unit", "about", "domain", "min", NULL };
   const pw_node *v[sizeof key / sizeof *key];
-  char label[100];
   if (pw_yaml_keys (r, node, key, "a parameter", v) != PW_OK) return r->error->status;
   const pw_node *name = v[0], *value = v[1], *unit = v[2], *about = v[3], *domain = v[4], *min = v[5];
   if (name == NULL) return pw_yaml_fail (r, node->at, "a parameter needs a name");
   if (yaml_new_name (r, name, "parameter", names) != PW_OK) return r->error->status;
   p->name = name->text;
   p->unit = p->about = "";
-  snprintf (label, sizeof label, "parameter %s", p->name);
+  const char *label = PW_PRINTED (100, "parameter %s", p->name);
   if (value == NULL) return pw_yaml_fail (r, node->at, "%s needs a value, its default", label);
   yaml_domain (r, domain, min, &p->domain);
   yaml_unit (r, unit, value, &p->unit);
