@@ -39,14 +39,12 @@ static void check_given_values (pw_check *check) {
   const pw_system *s = check->model.system;
   const pw_initial_report *initial = pw_run_initial (check->run);
   for (int i = 0; i < 2 * pw_system_coordinates (s); i++) {
-    char name[PW_STATE_NAME];
-    double from, to;
     if (!pw_initial_moved (s, initial, i) || !pw_initial_specified (initial, i)) continue;
-    pw_cli_state_change (s, initial, i, name, &from, &to);
-    if (fabs (to) < 1e-12 * fabs (from)) to = 0; /* round-off */
+    pw_state_change c = pw_cli_state_change (s, initial, i);
+    if (fabs (c.consistent) < 1e-12 * fabs (c.given)) c.consistent = 0; /* round-off */
     check_add (&check->finding, "%s %s = %s %s, but the constraints require %s %s",
-               pw_initial_given (initial, i) ? "--start gives" : "the model specifies", name, PW_DIGITS (from, 10),
-               pw_system_state_unit (s, i), PW_DIGITS (to, 10), pw_system_state_unit (s, i));
+               pw_initial_given (initial, i) ? "--start gives" : "the model specifies", c.name, PW_DIGITS (c.given, 10),
+               c.unit, PW_DIGITS (c.consistent, 10), c.unit);
   }
 }
 
@@ -58,14 +56,12 @@ static int check_reference (pw_check *check, pw_error *error) {
   if (reference == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   int status = pw_system_reference (check->model.model, check->model.system, 0, reference, reference + n, error);
   for (int i = 0; i < 2 * n && status == PW_OK; i++) {
-    char name[PW_STATE_NAME];
-    double from, to;
     if (isnan (reference[i])) continue;
     check->reference_states++;
-    pw_cli_state_change (check->model.system, pw_run_initial (check->run), i, name, &from, &to);
-    if (!(fabs (reference[i] - to) <= 1e-9 * (1 + fabs (to))))
-      check_add (&check->problem, "the model's reference solution does not hold initially: %s is %s, not %s", name,
-                 PW_DIGITS (to, 9), PW_DIGITS (reference[i], 9));
+    const pw_state_change c = pw_cli_state_change (check->model.system, pw_run_initial (check->run), i);
+    if (!(fabs (reference[i] - c.consistent) <= 1e-9 * (1 + fabs (c.consistent))))
+      check_add (&check->problem, "the model's reference solution does not hold initially: %s is %s, not %s", c.name,
+                 PW_DIGITS (c.consistent, 9), PW_DIGITS (reference[i], 9));
   }
   free (reference);
   return status;

@@ -131,18 +131,15 @@ static void report_mass (pw_json *j, const pw_check *check) {
 /* ---- Initial conditions ---- */
 
 static void report_change (pw_json *j, const pw_check *check, int i, int *listed) {
-  char name[PW_STATE_NAME];
-  double from, to;
-  pw_cli_state_change (check->model.system, pw_run_initial (check->run), i, name, &from, &to);
+  const pw_state_change c = pw_cli_state_change (check->model.system, pw_run_initial (check->run), i);
   pw_json_open (j, NULL, '{');
-  pw_json_text (j, "state", name);
-  pw_json_number (j, "from", from);
-  pw_json_number (j, "to", to);
+  pw_json_text (j, "state", c.name);
+  pw_json_number (j, "from", c.given);
+  pw_json_number (j, "to", c.consistent);
   pw_json_close (j, '}');
-  const char *unit = pw_system_state_unit (check->model.system, i);
   report_item (j, listed, NULL,
-               PW_PRINTED (500, "%-20s from %s to %s, by %s %s", name, PW_DIGITS (from, 10), PW_DIGITS (to, 10),
-                           PW_DIGITS (to - from, 3), unit));
+               PW_PRINTED (500, "%-20s from %s to %s, by %s %s", c.name, PW_DIGITS (c.given, 10),
+                           PW_DIGITS (c.consistent, 10), PW_DIGITS (c.consistent - c.given, 3), c.unit));
 }
 
 static void report_initial (pw_json *j, const pw_check *check) {

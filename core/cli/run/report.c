@@ -107,12 +107,9 @@ static void report_initial (const pw_system *system, const pw_initial_report *in
               moved == 1 ? "was" : "were",
               initial->released ? ", including given ones, which cannot all be satisfied" : "", changed);
   for (int state = 0; state < 2 * n && listed < REPORT_MESSAGES; state++) {
-    double given, consistent;
-    char name[PW_STATE_NAME], given_text[32], consistent_text[32];
     if (!pw_initial_moved (system, initial, state)) continue;
-    pw_cli_state_change (system, initial, state, name, &given, &consistent);
-    pw_cli_say ("  %s from %s to %s %s%s\n", name, pw_format (given_text, given, 10),
-                pw_format (consistent_text, consistent, 10), pw_system_state_unit (system, state),
+    const pw_state_change c = pw_cli_state_change (system, initial, state);
+    pw_cli_say ("  %s from %s to %s %s%s\n", c.name, PW_DIGITS (c.given, 10), PW_DIGITS (c.consistent, 10), c.unit,
                 initial->changed && pw_initial_specified (initial, state) ? " (specified)" : "");
     listed++;
   }
