@@ -38,10 +38,10 @@ static void list_default (const pw_field *f, char *text, size_t size) {
 
 static void list_fields (pw_table *t, const pw_field *fields) {
   for (const pw_field *f = fields; f->name; f++) {
-    char type[60], value[80], times[16] = "";
-    if (pw_field_count (f) > 1) snprintf (times, sizeof times, "%d x ", f->count);
-    snprintf (type, sizeof type, "%s%s%s%s%s", times, list_types[f->type].name, f->unit ? " [" : "",
-              f->unit ? f->unit : "", f->unit ? "]" : "");
+    char value[80];
+    const char *times = pw_field_count (f) > 1 ? PW_PRINTED (16, "%d x ", f->count) : "",
+               *unit = f->unit ? PW_PRINTED (40, " [%s]", f->unit) : "",
+               *type = PW_PRINTED (60, "%s%s%s", times, list_types[f->type].name, unit);
     list_default (f, value, sizeof value);
     list_row (t, f->name, type, value, f->about ? f->about : "");
   }
