@@ -67,9 +67,8 @@ static void csv_number (pw_csv *c, double value) {
 /* ---- Lines ---- */
 
 static void csv_state (pw_csv *c, const pw_sample *x, int state) {
-  char name[300];
   int n = pw_system_coordinates (c->system);
-  CSV_CELL (c, pw_system_state_name (c->system, state, name, sizeof name), pw_system_state_unit (c->system, state),
+  CSV_CELL (c, PW_NAME (pw_system_state_name, c->system, state), pw_system_state_unit (c->system, state),
             state < n ? x->q[state] : x->v[state - n]);
 }
 
@@ -92,18 +91,16 @@ static void csv_contacts (pw_csv *c) {
 }
 
 static void csv_reactions (pw_csv *c, const pw_sample *x) {
-  char name[300];
   for (int i = 0; i < pw_system_rows (c->system); i++)
-    CSV_CELL (c, pw_system_reaction_name (c->system, i, name, sizeof name), pw_system_reaction_unit (c->system, i),
+    CSV_CELL (c, PW_NAME (pw_system_reaction_name, c->system, i), pw_system_reaction_unit (c->system, i),
               0 - x->lambda[i]); /* avoids -0 */
 }
 
 static void csv_ledger (pw_csv *c, const pw_sample *x) {
-  char name[300];
   CSV_CELL (c, "kinetic", "J", x->kinetic);
   CSV_CELL (c, "potential", "J", x->potential);
   for (int i = 0; i < pw_system_ledger_entries (c->system); i++)
-    CSV_CELL (c, pw_system_ledger_name (c->system, i, name, sizeof name), "J", x->ledger ? x->ledger[i] : NAN);
+    CSV_CELL (c, PW_NAME (pw_system_ledger_name, c->system, i), "J", x->ledger ? x->ledger[i] : NAN);
   CSV_CELL (c, "projection", "J", x->projection);
   CSV_CELL (c, "balance", "J", x->balance);
 }
