@@ -1,4 +1,6 @@
 /* Checks of external texts: UTF-8 without control characters, which could move a terminal's cursor. */
+#include <stdarg.h>
+#include <stdio.h>
 #include <string.h>
 #include "util.h"
 
@@ -37,4 +39,12 @@ void pw_text_sanitise (char *text) {
     if (n == 0) n = 1;
     if (replace) memset (text, '?', (size_t)n);
   }
+}
+
+char *pw_print (char *buffer, size_t size, const char *format, ...) {
+  va_list arguments;
+  va_start (arguments, format);
+  vsnprintf (buffer, size, format, arguments);
+  va_end (arguments);
+  return buffer;
 }

@@ -5,22 +5,23 @@
 #include <string.h>
 #include "util.h"
 
-/* Edit distance (Levenshtein 1966), keeping one row of the table; the length of b if b is too long for the row. */
+/* Edit distance, in which exchanging neighbours is one change (Damerau 1964, optimal string alignment), keeping three
+ * rows of the table; for a candidate longer than a row, its length. */
 static size_t nearest_distance (const char *a, const char *b) {
-  size_t row[64], n = strlen (b);
-  if (n >= sizeof row / sizeof *row) return n;
-  for (size_t j = 0; j <= n; j++) row[j] = j;
-  for (size_t i = 0; a[i]; i++) {
-    size_t diagonal = row[0];
-    row[0] = i + 1;
+  size_t row[3][64], n = strlen (b), i = 0;
+  if (n >= sizeof *row / sizeof **row) return n;
+  for (size_t j = 0; j <= n; j++) row[0][j] = j;
+  for (; a[i]; i++) {
+    size_t *next = row[(i + 1) % 3], *last = row[i % 3], *before = row[(i + 2) % 3];
+    next[0] = i + 1;
     for (size_t j = 0; j < n; j++) {
-      size_t substitute = diagonal + (a[i] != b[j]);
-      diagonal = row[j + 1];
-      size_t least = (row[j] < diagonal ? row[j] : diagonal) + 1;
-      row[j + 1] = substitute < least ? substitute : least;
+      size_t least = (next[j] < last[j + 1] ? next[j] : last[j + 1]) + 1, substitute = last[j] + (a[i] != b[j]);
+      int exchanged = i > 0 && j > 0 && a[i] == b[j - 1] && a[i - 1] == b[j];
+      if (substitute < least) least = substitute;
+      next[j + 1] = exchanged && before[j - 1] + 1 < least ? before[j - 1] + 1 : least;
     }
   }
-  return row[n];
+  return row[i % 3][n];
 }
 
 /* Two names are near if less than half of the longer one has to change, or exactly half where that is at most two

@@ -65,6 +65,12 @@ int pw_control (const char *text);
 int pw_is_text (const char *text);
 /* Replaces invalid bytes, and control characters other than line ends and tabs, by question marks. */
 void pw_text_sanitise (char *text);
+/* Prints into a buffer, which is returned; what does not fit is cut off. */
+char *pw_print (char *buffer, size_t size, const char *format, ...) PW_PRINTF (3, 4);
+/* The same into a buffer of its own, which lives as long as the block around it. */
+#define PW_PRINTED(size, ...) pw_print ((char[size]){ 0 }, size, __VA_ARGS__)
+/* The result of pw_system_state_name, or a function like it, in such a buffer. */
+#define PW_NAME(function, s, i) function (s, i, (char[300]){ 0 }, 300)
 
 /* ---- Streams into memory (stream.c) ---- */
 

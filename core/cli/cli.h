@@ -191,9 +191,13 @@ int pw_cli_apply (pw_model *m, const char *option, const char **list,
 const pw_parameter *pw_cli_parameter (const pw_model *m, const char *name);
 
 enum { PW_STATE_NAME = 300, PW_CHANGE_TEXT = 400 };
-/* The name of a state, and its values before and after the consistent initialisation. */
-void pw_cli_state_change (const pw_system *system, const pw_initial_report *initial, int state,
-                          char name[PW_STATE_NAME], double *given, double *consistent);
+/* A state, and its values before and after the consistent initialisation. */
+typedef struct {
+  char name[PW_STATE_NAME];
+  const char *unit;
+  double given, consistent;
+} pw_state_change;
+pw_state_change pw_cli_state_change (const pw_system *system, const pw_initial_report *initial, int state);
 /* The largest such change [SI units] of the values given by the user, and a text such as "frame.vy from 1 to 1.2 m/s";
  * 0, without a text, if all are as given. */
 double pw_cli_largest_change (const pw_run *r, const pw_system *s, char text[PW_CHANGE_TEXT]);
@@ -264,6 +268,9 @@ void pw_files_close (pw_files *files);
 int pw_cli_check_csv (const char *path, pw_error *error);
 
 /* ---- Messages ---- */
+
+/* A number as text (pw_format), in a buffer that lives as long as the block around it. */
+#define PW_DIGITS(value, digits) pw_format ((char[32]){ 0 }, value, digits)
 
 /* Prints to a stream; pw_cli_say: to standard error.  On a terminal control characters are escaped. */
 void pw_cli_print (FILE *f, const char *format, ...) PW_PRINTF (2, 3);

@@ -73,25 +73,25 @@ void pw_cli_close_model (pw_cli_model *m) {
   *m = (pw_cli_model){ .file = NULL };
 }
 
-void pw_cli_state_change (const pw_system *system, const pw_initial_report *initial, int state,
-                          char name[PW_STATE_NAME], double *given, double *consistent) {
+pw_state_change pw_cli_state_change (const pw_system *system, const pw_initial_report *initial, int state) {
   int n = pw_system_coordinates (system);
-  *given = state < n ? initial->q_given[state] : initial->v_given[state - n];
-  *consistent = state < n ? initial->q[state] : initial->v[state - n];
-  pw_system_state_name (system, state, name, PW_STATE_NAME);
+  pw_state_change change = { .unit = pw_system_state_unit (system, state),
+                             .given = state < n ? initial->q_given[state] : initial->v_given[state - n],
+                             .consistent = state < n ? initial->q[state] : initial->v[state - n] };
+  pw_system_state_name (system, state, change.name, sizeof change.name);
+  return change;
 }
 
 double pw_cli_largest_change (const pw_run *r, const pw_system *s, char text[PW_CHANGE_TEXT]) {
   const pw_initial_report *initial = pw_run_initial (r);
-  double largest = 0, given, consistent;
-  char name[PW_STATE_NAME], given_text[32], consistent_text[32];
+  double largest = 0;
   for (int i = 0; i < 2 * pw_system_coordinates (s); i++) {
     if (!pw_initial_given (initial, i) || !pw_initial_moved (s, initial, i)) continue;
-    pw_cli_state_change (s, initial, i, name, &given, &consistent);
-    if (!(fabs (consistent - given) > largest)) continue;
-    largest = fabs (consistent - given);
-    snprintf (text, PW_CHANGE_TEXT, "%s from %s to %s %s", name, pw_format (given_text, given, 10),
-              pw_format (consistent_text, consistent, 10), pw_system_state_unit (s, i));
+    const pw_state_change c = pw_cli_state_change (s, initial, i);
+    if (!(fabs (c.consistent - c.given) > largest)) continue;
+    largest = fabs (c.consistent - c.given);
+    pw_print (text, PW_CHANGE_TEXT, "%s from %s to %s %s", c.name, PW_DIGITS (c.given, 10),
+              PW_DIGITS (c.consistent, 10), c.unit);
   }
   return largest;
 }

@@ -84,16 +84,12 @@ static void command_help (const pw_command *command) {
 /* ---- Reading ---- */
 
 static int command_unknown (const pw_command *command, const pw_cli_line *line, const char *option, pw_error *error) {
-  char sought[100], hint[140];
   const char *name = option + strspn (option, "-");
-  snprintf (sought, sizeof sought, "%.*s", (int)strcspn (name, "="), name);
-  pw_nearest near = { .sought = sought };
+  pw_nearest near = { .sought = PW_PRINTED (100, "%.*s", (int)strcspn (name, "="), name) };
   for (const struct poptOption *o = line->table; o->longName; o++)
     if (o->descrip) pw_nearest_try (&near, o->longName);
-  if (near.near)
-    snprintf (hint, sizeof hint, "did you mean \"--%s\"?", near.best);
-  else
-    snprintf (hint, sizeof hint, "see pinwheel %s --help", command->name);
+  const char *hint = near.near ? PW_PRINTED (140, "did you mean \"--%s\"?", near.best)
+                               : PW_PRINTED (140, "see pinwheel %s --help", command->name);
   return pw_fail (error, PW_INPUT, "%s has no option \"%.*s\"; %s", command->name, (int)strcspn (option, "="), option,
                   hint);
 }

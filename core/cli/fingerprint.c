@@ -24,7 +24,7 @@ void pw_fingerprint_number (pw_text *t, const char *key, const char *name, doubl
 }
 
 int pw_fingerprint_file (pw_text *t, const char *key, const char *name, const char *path, pw_error *error) {
-  char text[200], block[4096];
+  char block[4096];
   uint64_t sum = PW_CHECK;
   const char *reason;
   FILE *f = pw_open_input (path, &reason);
@@ -33,19 +33,17 @@ int pw_fingerprint_file (pw_text *t, const char *key, const char *name, const ch
   int code = ferror (f) ? errno : 0;
   fclose (f);
   if (code) return pw_fail (error, PW_RESOURCE, "cannot read %s: %s", path, strerror (code));
-  snprintf (text, sizeof text, "%.150s, contents %016llx", name, (unsigned long long)sum);
-  pw_fingerprint_line (t, key, NULL, text);
+  pw_fingerprint_line (t, key, NULL, PW_PRINTED (200, "%.150s, contents %016llx", name, (unsigned long long)sum));
   return PW_OK;
 }
 
 int pw_fingerprint_run (pw_text *t, const char *magic, const pw_file *file, uint64_t table_sum, const char *method,
                         const pw_settings *settings, pw_error *error) {
-  char text[200];
   pw_text_add (t, magic);
   pw_fingerprint_line (t, "version", NULL, PW_VERSION);
   int status = pw_fingerprint_file (t, "model", pw_file_name (file), pw_file_path (file), error);
-  snprintf (text, sizeof text, "contents %016llx", (unsigned long long)table_sum);
-  if (table_sum) pw_fingerprint_line (t, "tables", NULL, text);
+  if (table_sum)
+    pw_fingerprint_line (t, "tables", NULL, PW_PRINTED (40, "contents %016llx", (unsigned long long)table_sum));
   pw_fingerprint_line (t, "method", NULL, method);
   pw_fingerprint_number (t, "t-end", NULL, settings->span);
   pw_fingerprint_number (t, "step", NULL, settings->step);
@@ -71,13 +69,11 @@ uint64_t pw_fingerprint_tables (uint64_t sum, const pw_model *m) {
 
 void pw_fingerprint_initial (pw_text *t, const char **starts) {
   for (; starts && *starts; starts++) {
-    char name[200];
     size_t n = strcspn (*starts, "=");
     const char **later = starts + 1;
     while (*later && strncmp (*later, *starts, n + 1) != 0) later++;
     if (*later) continue;
-    snprintf (name, sizeof name, "%.*s", (int)n, *starts);
-    pw_fingerprint_line (t, "start", name, *starts + n + 1);
+    pw_fingerprint_line (t, "start", PW_PRINTED (200, "%.*s", (int)n, *starts), *starts + n + 1);
   }
 }
 

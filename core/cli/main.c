@@ -46,7 +46,7 @@ static int main_unknown (const char *word) {
     pw_fail (&error, PW_INPUT, "\"%s\" is not a command; to run a model write pinwheel run %s", word, word);
   else
     pw_fail (&error, PW_INPUT, "there is no %s \"%s\"%s", word[0] == '-' ? "option" : "command", word,
-             pw_nearest_text (&near));
+             near.near ? pw_nearest_text (&near) : "; see pinwheel --help");
   return pw_cli_report_error (&error);
 }
 

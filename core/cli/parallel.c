@@ -9,6 +9,7 @@
 #include <string.h>
 #include <unistd.h>
 #include "parallel.h"
+#include "util.h"
 
 enum { PARALLEL_JOBS = 10000 }; /* at most; more threads than any machine runs at once */
 
@@ -107,10 +108,8 @@ int pw_parallel (int jobs, int count, pw_task *task, void *context, pw_error *er
 
 /* The first processor on the same physical core; the processor itself if that is unknown. */
 static int parallel_first_sibling (int processor) {
-  char name[80];
   int first = processor;
-  snprintf (name, sizeof name, "/sys/devices/system/cpu/cpu%d/topology/thread_siblings_list", processor);
-  FILE *f = fopen (name, "r");
+  FILE *f = fopen (PW_PRINTED (80, "/sys/devices/system/cpu/cpu%d/topology/thread_siblings_list", processor), "r");
   if (f == NULL) return processor;
   if (fscanf (f, "%d", &first) != 1 || first < 0 || first >= CPU_SETSIZE) first = processor;
   fclose (f);

@@ -51,8 +51,7 @@ int pw_limit_over (void *context) {
 }
 
 int pw_limit_status (const pw_limit *limit, double t, pw_error *error) {
-  char seconds[32], reached[32];
   if (pw_stop) return PW_RETRY;
   return pw_fail (error, PW_METHOD, "t = %s s: the limit of %s s of processor time is reached (--limit)",
-                  pw_format (reached, t, 6), pw_format (seconds, limit->seconds, 6));
+                  PW_DIGITS (t, 6), PW_DIGITS (limit->seconds, 6));
 }

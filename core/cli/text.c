@@ -5,6 +5,7 @@
 #include <string.h>
 #include "cli.h"
 #include "text.h"
+#include "util.h"
 
 void pw_text_clear (pw_text *t) {
   t->length = 0;
@@ -18,15 +19,9 @@ void pw_text_free (pw_text *t) {
 }
 
 void pw_text_add_bytes (pw_text *t, const char *bytes, size_t count) {
-  if (t->length + count + 1 > t->room) {
-    size_t room = 2 * (t->length + count + 1) + 500; /* doubled, so that few additions move the text */
-    char *more = realloc (t->chars, room);
-    if (more == NULL) {
-      t->failed = 1;
-      return;
-    }
-    t->chars = more;
-    t->room = room;
+  if (pw_grow (&t->chars, t->length + count, &t->room, 1) != PW_OK) {
+    t->failed = 1;
+    return;
   }
   memcpy (t->chars + t->length, bytes, count);
   t->length += count;
@@ -43,8 +38,7 @@ void pw_text_cell (pw_text *t, const char *text) {
 }
 
 void pw_text_number (pw_text *t, double value) {
-  char number[32];
-  pw_text_cell (t, isfinite (value) ? pw_format (number, value, 17) : "nan");
+  pw_text_cell (t, isfinite (value) ? PW_DIGITS (value, 17) : "nan");
 }
 
 void pw_text_name (pw_text *t, const char *name, const char *unit) {

@@ -2,9 +2,17 @@
 #ifndef PW_FILES_H
 #define PW_FILES_H
 
+#include <limits.h>
 #include <sys/stat.h>
 #include "pinwheel-files.h"
 #include "util.h"
+
+/* ---- Paths (path.c) ---- */
+
+/* The size of a buffer for a path: a path that is cut to it is still too long for the system, which refuses it. */
+enum { PW_PATH = PATH_MAX + 1 };
+/* Prints a path into the buffer, which is returned. */
+char *pw_path (char path[PW_PATH], const char *format, ...) PW_PRINTF (2, 3);
 
 /* ---- Search path for models (search.c) ---- */
 
@@ -27,10 +35,10 @@ typedef struct {
 int pw_search_open (pw_search *s, pw_error *error);
 void pw_search_close (pw_search *s);
 
-/* Find the pinwheel.h of this library, a file of the engine of interactive pages; *path: malloced, or NULL if there is
- * none.  PW_OK or PW_RESOURCE. */
-int pw_search_header (char **path, pw_error *error);
-int pw_search_page_file (const char *file, char **path, pw_error *error);
+/* Find the pinwheel.h of this library, a file of the engine of interactive pages; the path is "" if there is none.
+ * PW_OK or PW_RESOURCE. */
+int pw_search_header (char path[PW_PATH], pw_error *error);
+int pw_search_page_file (const char *file, char path[PW_PATH], pw_error *error);
 
 /* Whether a name has an ending such as ".so", after at least one character. */
 int pw_ends_with (const char *name, const char *ending);
@@ -56,14 +64,14 @@ const char *const *pw_scene_options (int lanes);
 /* The command of the C compiler: CC in the environment, else "cc". */
 const char *pw_compiler (void);
 
-/* A new folder in TMPDIR that only the user can use, malloced; NULL and PW_RESOURCE. */
-char *pw_temporary_folder (pw_error *error);
+/* Makes a new folder in TMPDIR that only the user can use.  PW_OK or PW_RESOURCE. */
+int pw_temporary_folder (char folder[PW_PATH], pw_error *error);
 
 /* ---- The cache (cache.c) ---- */
 
-/* Creates the cache's folder if it does not exist, and returns its path, malloced; NULL if there is none, with a
- * notice in the buffer (otherwise unchanged) if one exists but others could have written to it, or it is unusable. */
-char *pw_cache_folder (char *notice, size_t size);
+/* Stores the path of the cache's folder, which is created if it does not exist; 0 if there is none, with a notice in
+ * the buffer (otherwise unchanged) if one exists but others could have written to it, or it is unusable. */
+int pw_cache_folder (char path[PW_PATH], char *notice, size_t size);
 /* Deletes the least recently used files until the rest is within the limit; each use must set st_mtime. */
 void pw_cache_trim (const char *folder);
 
@@ -104,9 +112,6 @@ extern const pw_unit_name pw_unit_names[]; /* ends with a NULL name */
 
 /* ---- Paths (path.c), reading (read.c) ---- */
 
-/* folder + "/" + name + ending, malloced; NULL if out of memory. */
-char *pw_path_join (const char *folder, const char *name, const char *ending);
-
 /* As pw_read_rest, of the regular file at a path.  If it cannot be opened, the error is "FAILURE PATH: REASON". */
 int pw_read_file (const char *failure, const char *path, size_t max_bytes, const char *limit, char **text, size_t *size,
                   pw_error *error);
@@ -121,18 +126,18 @@ int pw_read_rest (FILE *f, size_t max_bytes, const char *path, const char *limit
 /* Why a file is refused: "it is a directory, not a regular file". */
 const char *pw_not_regular (mode_t mode);
 
-/* The folder of the file at a path, malloced; NULL if out of memory. */
-char *pw_folder_of (const char *path);
+/* Stores the folder of the file at a path in the buffer, which is returned. */
+char *pw_folder_of (char folder[PW_PATH], const char *path);
 
 /* The location of an existing or future file, links followed. */
 typedef struct {
-  char *path;     /* of the file itself, or naming the descriptor; malloced */
-  int descriptor; /* descriptor of this process that the path names ("-", /dev/stdout, /dev/fd/3), or -1 */
-  int exists;     /* 1: `info` is known */
+  char path[PW_PATH]; /* of the file itself, or naming the descriptor */
+  int descriptor;     /* descriptor of this process that the path names ("-", /dev/stdout, /dev/fd/3), or -1 */
+  int exists;         /* 1: `info` is known */
   struct stat info;
 } pw_location;
 
-/* 0 or an errno value; free the path in every case. */
+/* 0 or an errno value. */
 int pw_locate (pw_location *p, const char *path);
 
 /* ---- Locks (lock.c) ---- */

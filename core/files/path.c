@@ -1,12 +1,12 @@
-/* Paths. */
+/* Paths in buffers. */
+#include <stdarg.h>
 #include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include "files.h"
 
-char *pw_path_join (const char *folder, const char *name, const char *ending) {
-  size_t size = strlen (folder) + strlen (name) + strlen (ending) + 2;
-  char *path = malloc (size);
-  if (path) snprintf (path, size, "%s/%s%s", folder, name, ending);
+char *pw_path (char path[PW_PATH], const char *format, ...) {
+  va_list arguments;
+  va_start (arguments, format);
+  vsnprintf (path, PW_PATH, format, arguments);
+  va_end (arguments);
   return path;
 }

@@ -111,6 +111,17 @@ TEST (fast) {
                "divided until two formulas agree to 1e-3, which makes one of them accurate to 3e-11 of a part");
 }
 
+TEST (units) {
+  static const char *const text[] = { "t", "integral:t", "integral:wheel.phi", "integral:residual.position", "mean:t" };
+  static const char *const unit[] = { "s", "s^2", "rad s", "s", "s" };
+  char buffer[40];
+  pw_outcomes x;
+  pw_error error = { 0 };
+  check_ok (pw_outcomes_open (&x, s, "--of", text, 5, &error), &error);
+  for (int i = 0; i < 5; i++) assert_string_equal (pw_outcome_unit (&x, i, buffer, sizeof buffer), unit[i]);
+  pw_outcomes_close (&x);
+}
+
 TEST (gradient) {
   const char *text = "integral:wheel.phi * 2 + max:wheel.phi";
   pw_outcomes x;

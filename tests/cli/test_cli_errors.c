@@ -11,6 +11,8 @@
 TEST (bad_lines) {
   static const cli_wrong bad[] = {
     { "shew", "there is no command \"shew\"; did you mean \"show\"?" },
+    { "rnu", "there is no command \"rnu\"; did you mean \"run\"?" },
+    { "xyzzy", "there is no command \"xyzzy\"; see pinwheel --help" },
     { "--verbose", "there is no option \"--verbose\"; did you mean \"--version\"?" },
     { "./car.yaml", "\"./car.yaml\" is not a command; to run a model write pinwheel run ./car.yaml" },
     { "run", "missing argument; usage: pinwheel run MODEL [OPTION...]" },

@@ -13,6 +13,7 @@
 #include "scene.h"
 #include "pinwheel-selftest.h"
 #include "toys.h"
+#include "yaml.h"
 
 /* ---- Scenarios ---- */
 
@@ -156,6 +157,12 @@ static int alloc_files (const char *path, pw_error *error) {
   return status;
 }
 
+/* A link in the current folder to a file in another one. */
+static int alloc_link (const char *link, pw_error *error) {
+  return pw_check_paths ((const pw_use[]){ { "-o", link, PW_WRITES, NULL }, { "--json", "other", PW_WRITES, NULL } }, 2,
+                         error);
+}
+
 static int alloc_text (const char *path, pw_error *error) {
   pw_file *f = pw_file_open (path, error);
   pw_model *m = f ? pw_file_model (f, error) : NULL;
@@ -165,6 +172,16 @@ static int alloc_text (const char *path, pw_error *error) {
   pw_system_free (s);
   pw_model_free (m);
   pw_file_close (f);
+  return status;
+}
+
+static pw_stream alloc_stored; /* a tree as bytes */
+
+static int alloc_tree (const char *path, pw_error *error) {
+  pw_yaml y = { .path = (char[]){ "model.yaml" } };
+  (void)path;
+  int status = pw_yaml_load_tree (&y, alloc_stored.text, alloc_stored.size, error);
+  pw_arena_free (&y.arena);
   return status;
 }
 
@@ -204,9 +221,34 @@ TEST (files) {
   }
 }
 
+TEST (links) {
+  char link[] = "pinwheel-alloc-link";
+  unlink (link);
+  assert_int_equal (symlink ("build/absent.csv", link), 0);
+  alloc_each (alloc_link, link);
+  unlink (link);
+}
+
 TEST (texts) {
   alloc_each (alloc_text, "tests/models/ezyroller.yaml");
   alloc_each (alloc_text, "tests/models/arm.yaml");
+}
+
+TEST (tree) {
+  static const char path[] = "tests/models/arm.yaml";
+  pw_error error = { 0 };
+  pw_yaml *y = pw_yaml_open (path, path, PW_FILE_DEFAULT_BYTES, &error);
+  assert_non_null (y);
+  FILE *f = pw_stream_open (&alloc_stored);
+  pw_yaml_write_tree (y, f);
+  assert_int_equal (pw_stream_close (f, &alloc_stored), PW_OK);
+  pw_yaml_close (y);
+  alloc.live = 0;
+  alloc_each (alloc_tree, path);
+  alloc_stored.size--;
+  assert_int_equal (alloc_tree (path, &error), PW_INPUT);
+  assert_string_equal (error.text, "model.yaml: the stored tree is incomplete");
+  free (alloc_stored.text);
 }
 
 /* A method allocates when it is opened, and not in a step. */

@@ -103,6 +103,25 @@ TEST (no_text) {
   assert_non_null (strstr (cli_out, "torque T: body [a, ground]; value f (t) N m"));
 }
 
+/* A text model specifies what it contains; a model in C may contain values that it does not specify. */
+TEST (unspecified) {
+  cli_write ("guess.c", "#include \"pinwheel.h\"\n"
+                        "static void build (pw_model *m, const void *p) {\n"
+                        "  (void)p;\n"
+                        "  pw_add_body (m, &(pw_body){ .name = \"a\", .mass = 1, .start = { 1, 2 }, .rate = { 3 },\n"
+                        "                              .specified = PW_SPECIFIES_Y | PW_SPECIFIES_OMEGA });\n"
+                        "  pw_add_body (m, &(pw_body){ .name = \"b\", .mass = 1, .start = { 1, -0.0 } });\n"
+                        "  pw_add_body (m, &(pw_body){ .name = \"c\", .mass = 1, .start = { 1 } });\n"
+                        "}\n"
+                        "PW_MODEL (.build = build);\n");
+  cli_good ("pinwheel show @/guess.c --yaml");
+  assert_non_null (strstr (cli_out, "  - {name: a, mass: 1, start: {x: 1, y: 2}, rate: {vx: 3, omega: 0}}"
+                                    "  # the model does not specify x, vx\n"));
+  assert_non_null (strstr (cli_out, "start: {x: 1, y: -0}}  # the model does not specify y\n"));
+  assert_non_null (strstr (cli_out, "  - {name: c, mass: 1, start: {x: 1}}\n"));
+  cli_good ("pinwheel show @/guess.c --yaml >@/guess.yaml && pinwheel show @/guess.yaml");
+}
+
 TEST (max_file) {
   cli_good ("{ cat " TEXT "; yes '# nothing' | head -c 300000; } >@/long.yaml");
   cli_bad ("pinwheel show @/long.yaml --max-file 0.25", 2,

@@ -166,7 +166,7 @@ static int linearise_command (void *options, pw_error *error) {
   if (status == PW_OK) status = pw_cli_open (&cmd->m, &cmd->line, error);
   if (status == PW_OK) status = linearise_select (cmd, error);
   if (status == PW_OK) status = linearise_open_files (cmd, error);
-  if (status == PW_OK) pw_report_model (cmd->m.model);
+  if (status == PW_OK) pw_report_model (&cmd->m);
   if (status == PW_OK) status = linearise_compute (cmd, error);
   if (status == PW_OK) pw_linearise_print (cmd);
   if (status == PW_OK) status = linearise_write (cmd, error);

@@ -239,6 +239,7 @@ const char *pw_outcome_unit (const pw_outcomes *set, int outcome, char *buffer, 
   const pw_outcome *o = set->outcome + outcome;
   const pw_functional *f = set->functional + o->term[0];
   const char *unit = o->formula ? "" : pw_column_unit (set->system, f->column);
-  snprintf (buffer, size, "%s%s", unit, o->formula || f->type != PW_INTEGRAL ? "" : *unit ? " s" : "s");
+  int is_integral = !o->formula && f->type == PW_INTEGRAL, of_time = strcmp (unit, "s") == 0;
+  snprintf (buffer, size, "%s%s", unit, !is_integral ? "" : of_time ? "^2" : *unit ? " s" : "s");
   return buffer;
 }

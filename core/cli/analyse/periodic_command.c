@@ -158,7 +158,7 @@ static int periodic_command (void *options, pw_error *error) {
   int status = pw_cli_open (&cmd->m, &cmd->line, error);
   if (status == PW_OK) status = periodic_read_options (cmd, error);
   if (status == PW_OK) status = pw_figure_results (&cmd->line, &cmd->m, cmd->folder, "periodic", &cmd->files, error);
-  if (status == PW_OK) pw_report_model (cmd->m.model);
+  if (status == PW_OK) pw_report_model (&cmd->m);
   if (status == PW_OK) status = periodic_compute (cmd, error);
   if (status == PW_OK && cmd->points) pw_periodic_print (cmd);
   if (status == PW_OK && cmd->points && cmd->folder) status = pw_periodic_write (cmd, error);

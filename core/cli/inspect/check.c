@@ -39,15 +39,12 @@ static void check_given_values (pw_check *check) {
   const pw_system *s = check->model.system;
   const pw_initial_report *initial = pw_run_initial (check->run);
   for (int i = 0; i < 2 * pw_system_coordinates (s); i++) {
-    char name[PW_STATE_NAME], from_text[32], to_text[32];
-    double from, to;
     if (!pw_initial_moved (s, initial, i) || !pw_initial_specified (initial, i)) continue;
-    pw_cli_state_change (s, initial, i, name, &from, &to);
-    if (fabs (to) < 1e-12 * fabs (from)) to = 0; /* round-off */
+    pw_state_change c = pw_cli_state_change (s, initial, i);
+    if (fabs (c.consistent) < 1e-12 * fabs (c.given)) c.consistent = 0; /* round-off */
     check_add (&check->finding, "%s %s = %s %s, but the constraints require %s %s",
-               pw_initial_given (initial, i) ? "--start gives" : "the model specifies", name,
-               pw_format (from_text, from, 10), pw_system_state_unit (s, i), pw_format (to_text, to, 10),
-               pw_system_state_unit (s, i));
+               pw_initial_given (initial, i) ? "--start gives" : "the model specifies", c.name, PW_DIGITS (c.given, 10),
+               c.unit, PW_DIGITS (c.consistent, 10), c.unit);
   }
 }
 
@@ -59,14 +56,12 @@ static int check_reference (pw_check *check, pw_error *error) {
   if (reference == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   int status = pw_system_reference (check->model.model, check->model.system, 0, reference, reference + n, error);
   for (int i = 0; i < 2 * n && status == PW_OK; i++) {
-    char name[PW_STATE_NAME], from_text[32], to_text[32];
-    double from, to;
     if (isnan (reference[i])) continue;
     check->reference_states++;
-    pw_cli_state_change (check->model.system, pw_run_initial (check->run), i, name, &from, &to);
-    if (!(fabs (reference[i] - to) <= 1e-9 * (1 + fabs (to))))
-      check_add (&check->problem, "the model's reference solution does not hold initially: %s is %s, not %s", name,
-                 pw_format (from_text, to, 9), pw_format (to_text, reference[i], 9));
+    const pw_state_change c = pw_cli_state_change (check->model.system, pw_run_initial (check->run), i);
+    if (!(fabs (reference[i] - c.consistent) <= 1e-9 * (1 + fabs (c.consistent))))
+      check_add (&check->problem, "the model's reference solution does not hold initially: %s is %s, not %s", c.name,
+                 PW_DIGITS (c.consistent, 9), PW_DIGITS (reference[i], 9));
   }
   free (reference);
   return status;
@@ -144,7 +139,6 @@ static void check_fastest (pw_check *check) {
 }
 
 static int check_linear (pw_check *check, pw_error *error) {
-  char step[32], limit[32], time[32];
   pw_error own = { 0 };
   int status = pw_run_linearise (check->run, CHECK_COORDINATES, &check->linear, &own);
   if (status == PW_METHOD || status == PW_INPUT) {
@@ -156,12 +150,12 @@ static int check_linear (pw_check *check, pw_error *error) {
   check_fastest (check);
   if (check->uses_rk4 && check->step > check->rk4_limit)
     check_add (&check->problem, "the model's step of %s s is too large for rk4, which is stable up to %s s",
-               pw_format (step, check->step, 6), pw_format (limit, check->rk4_limit, 3));
+               PW_DIGITS (check->step, 6), PW_DIGITS (check->rk4_limit, 3));
   const pw_linear *linear = &check->linear;
   if (linear->steady != PW_STEADY || linear->unknowns == 0 || !(linear->re[0] > 0)) return PW_OK;
   check->doubling_time = log (2) / linear->re[0];
   check_add (&check->finding, "the motion is unstable: a perturbation doubles in %s s",
-             pw_format (time, check->doubling_time, CHECK_DIGITS));
+             PW_DIGITS (check->doubling_time, CHECK_DIGITS));
   return PW_OK;
 }
 
@@ -171,7 +165,7 @@ static int check_model (pw_check *check, pw_error *error) {
   int status = PW_OK;
   check->rk4_limit = check->doubling_time = INFINITY;
   check->fastest = -1;
-  pw_report_model (check->model.model);
+  pw_report_model (&check->model);
   check_open_run (check);
   if (check->run) {
     check_given_values (check);

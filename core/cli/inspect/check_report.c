@@ -3,6 +3,7 @@
 #include <stdarg.h>
 #include <string.h>
 #include "check_report.h"
+#include "util.h"
 
 enum { REPORT_LISTED = 8, REPORT_EIGENVALUES = 60 }; /* items of a list; lines of eigenvalues: in the text, at most */
 
@@ -61,15 +62,14 @@ static void report_end_list (pw_json *j, int listed) {
 static void report_singular_value (pw_json *j, const pw_check *check) {
   const pw_linear *linear = &check->linear;
   double length = check->run ? pw_run_scale (check->run)->length : NAN;
-  char value[32], unit[32];
   const char *label = linear->rank > 0 ? "smallest singular value of J" : NULL;
   if (isnan (linear->least))
     report_entry (j, "least_singular_value", NAN, label, "not computed: %d coordinates, the limit is %d",
                   linear->coordinates, CHECK_COORDINATES);
   else
     report_entry (j, "least_singular_value", check->run ? linear->least : NAN, label,
-                  "%s, rows scaled to length 1, angles multiplied by L = %s m",
-                  pw_format (value, linear->least, CHECK_DIGITS), pw_format (unit, length, CHECK_DIGITS));
+                  "%s, rows scaled to length 1, angles multiplied by L = %s m", PW_DIGITS (linear->least, CHECK_DIGITS),
+                  PW_DIGITS (length, CHECK_DIGITS));
   pw_json_number (j, "length_scale", length);
 }
 
@@ -118,10 +118,8 @@ static void report_mass (pw_json *j, const pw_check *check) {
   for (int b = 0; b < pw_system_bodies (s); b++) {
     int which = (M[3 * b] == 0) + 2 * (M[3 * b + 2] == 0);
     const char *name = pw_system_body_name (s, b);
-    char line[300];
     if (which == 0) continue;
-    snprintf (line, sizeof line, "%s has %s", name, lack[which]);
-    report_item (j, &listed, name, line);
+    report_item (j, &listed, name, PW_PRINTED (300, "%s has %s", name, lack[which]));
   }
   report_end_list (j, listed);
   report_text (j, "saddle-point matrix", "%s%s", saddle_point ? saddle_point : "not known",
@@ -133,17 +131,15 @@ static void report_mass (pw_json *j, const pw_check *check) {
 /* ---- Initial conditions ---- */
 
 static void report_change (pw_json *j, const pw_check *check, int i, int *listed) {
-  char name[PW_STATE_NAME], line[500], a[32], b[32], c[32];
-  double from, to;
-  pw_cli_state_change (check->model.system, pw_run_initial (check->run), i, name, &from, &to);
+  const pw_state_change c = pw_cli_state_change (check->model.system, pw_run_initial (check->run), i);
   pw_json_open (j, NULL, '{');
-  pw_json_text (j, "state", name);
-  pw_json_number (j, "from", from);
-  pw_json_number (j, "to", to);
+  pw_json_text (j, "state", c.name);
+  pw_json_number (j, "from", c.given);
+  pw_json_number (j, "to", c.consistent);
   pw_json_close (j, '}');
-  snprintf (line, sizeof line, "%-20s from %s to %s, by %s %s", name, pw_format (a, from, 10), pw_format (b, to, 10),
-            pw_format (c, to - from, 3), pw_system_state_unit (check->model.system, i));
-  report_item (j, listed, NULL, line);
+  report_item (j, listed, NULL,
+               PW_PRINTED (500, "%-20s from %s to %s, by %s %s", c.name, PW_DIGITS (c.given, 10),
+                           PW_DIGITS (c.consistent, 10), PW_DIGITS (c.consistent - c.given, 3), c.unit));
 }
 
 static void report_initial (pw_json *j, const pw_check *check) {
@@ -178,11 +174,10 @@ static void report_initial (pw_json *j, const pw_check *check) {
 
 /* The checks that failed, in `scenes`: "random scenes" or "this model". */
 static void report_failures (pw_json *j, const pw_selftest_report *report, const char *scenes) {
-  char error[32], bound[32];
   for (const pw_selftest_check *c = report->check; c < report->check + report->checks; c++) {
     if (!c->failed) continue;
     report_print (j, "    in %s: %s does not hold: off by %s, the bound is %s\n      %s\n", scenes, c->about,
-                  pw_format (error, c->error, 2), pw_format (bound, c->bound, 2), c->where);
+                  PW_DIGITS (c->error, 2), PW_DIGITS (c->bound, 2), c->where);
     pw_json_open (j, NULL, '{');
     pw_json_text (j, "check", c->name);
     pw_json_text (j, "in", scenes);
@@ -195,15 +190,14 @@ static void report_failures (pw_json *j, const pw_selftest_report *report, const
 }
 
 static void report_kind (pw_json *j, const pw_checked_kind *k) {
-  char name[100];
   report_line (j);
   pw_json_open (j, NULL, '{');
   pw_json_text (j, "kind", k->kind->name);
   pw_json_number (j, "elements", k->count);
   pw_json_number (j, "checks", k->random.checks + k->in_model.checks);
   pw_json_open (j, "failed", '[');
-  snprintf (name, sizeof name, "%s (%d element%s)", k->kind->name, k->count, k->count == 1 ? "" : "s");
-  report_text (j, name, "%s: %d checks in random scenes, %d in this model",
+  report_text (j, PW_PRINTED (100, "%s (%d element%s)", k->kind->name, k->count, k->count == 1 ? "" : "s"),
+               "%s: %d checks in random scenes, %d in this model",
                k->random.failed + k->in_model.failed ? "FAILED" : "good", k->random.checks, k->in_model.checks);
   if (*k->untested) report_print (j, "    not tested in random scenes: %s\n", k->untested);
   report_failures (j, &k->random, "random scenes");
@@ -216,9 +210,8 @@ static void report_kind (pw_json *j, const pw_checked_kind *k) {
 
 /* An eigenvalue, or a conjugate pair. */
 static char *report_eigenvalue (const pw_linear *linear, int i, char buffer[100]) {
-  char re[32], im[32];
-  snprintf (buffer, 100, linear->im[i] != 0 ? "%s +- %s i 1/s" : "%s 1/s", pw_format (re, linear->re[i], CHECK_DIGITS),
-            pw_format (im, fabs (linear->im[i]), CHECK_DIGITS));
+  snprintf (buffer, 100, linear->im[i] != 0 ? "%s +- %s i 1/s" : "%s 1/s", PW_DIGITS (linear->re[i], CHECK_DIGITS),
+            PW_DIGITS (fabs (linear->im[i]), CHECK_DIGITS));
   return buffer;
 }
 
@@ -249,23 +242,20 @@ static void report_eigenvalues (const pw_linear *linear) {
 
 static void report_motion (pw_json *j, const pw_linear *linear) {
   static const char *const steady[] = { "steady", "accelerated", "changing" };
-  char acceleration[32], rate[32];
   pw_json_text (j, "motion", steady[linear->steady]);
   report_entry (j, "acceleration", linear->acceleration, linear->steady == PW_ACCELERATED ? "motion" : NULL,
-                "not steady: accelerations of %s m/s^2 in the co-moving frame",
-                pw_format (acceleration, linear->acceleration, 3));
+                "not steady: accelerations of %s m/s^2 in the co-moving frame", PW_DIGITS (linear->acceleration, 3));
   if (linear->steady == PW_CHANGING)
     report_text (j, "motion", "not steady: the equations change with time or along the motion");
   if (linear->steady != PW_STEADY) report_text (j, "", "the eigenvalues are not stability exponents");
   report_entry (j, "turn_rate", linear->twist[2], linear->twist[2] != 0 ? "co-moving frame" : NULL, "turns at %s rad/s",
-                pw_format (rate, linear->twist[2], CHECK_DIGITS));
+                PW_DIGITS (linear->twist[2], CHECK_DIGITS));
   pw_json_number (j, "symmetries", linear->symmetries);
 }
 
 static void report_stability (pw_json *j, const pw_check *check) {
   const pw_linear *linear = &check->linear;
   double rightmost = -INFINITY; /* real part [1/s] */
-  char time[32];
   for (int i = 0; i < linear->unknowns; i++)
     if (!linear->rigid[i]) rightmost = fmax (rightmost, linear->re[i]);
   const char *label = linear->steady == PW_STEADY && isfinite (rightmost) ? "stability" : NULL;
@@ -274,7 +264,7 @@ static void report_stability (pw_json *j, const pw_check *check) {
   else
     report_text (j, label, "%s in %s s",
                  rightmost > 0 ? "unstable, doubles" : "stable, the slowest perturbation halves",
-                 pw_format (time, log (2) / fabs (rightmost), CHECK_DIGITS));
+                 PW_DIGITS (log (2) / fabs (rightmost), CHECK_DIGITS));
   pw_json_number (j, "doubling_time", check->doubling_time);
 }
 
@@ -284,21 +274,21 @@ static void report_fastest (pw_json *j, const pw_check *check) {
   double re = found ? linear->re[check->fastest] : 0, im = found ? fabs (linear->im[check->fastest]) : 0,
          size = hypot (re, im);
   double damping = !found ? NAN : re != 0 ? -re / size : 0;
-  char text[100], first[32], second[32];
+  char text[100];
   if (found) report_text (j, "fastest eigenvalue", "%s", report_eigenvalue (linear, check->fastest, text));
   report_entry (j, "frequency_hz", im / (2 * PW_PI), im != 0 ? "its frequency" : NULL,
-                "%s Hz, undamped it would be %s Hz", pw_format (first, im / (2 * PW_PI), CHECK_DIGITS),
-                pw_format (second, size / (2 * PW_PI), CHECK_DIGITS));
+                "%s Hz, undamped it would be %s Hz", PW_DIGITS (im / (2 * PW_PI), CHECK_DIGITS),
+                PW_DIGITS (size / (2 * PW_PI), CHECK_DIGITS));
   report_entry (j, "damping", damping, im != 0 ? "its damping" : NULL, "%s of critical",
-                pw_format (first, damping, CHECK_DIGITS));
+                PW_DIGITS (damping, CHECK_DIGITS));
   if (found && im == 0)
     report_text (j, re < 0 ? "it decays by a factor of e in" : "it grows by a factor of e in", "%s s",
-                 pw_format (first, 1 / size, CHECK_DIGITS));
+                 PW_DIGITS (1 / size, CHECK_DIGITS));
   if (found && isinf (check->rk4_limit))
     report_text (j, "RK4 is stable", "with any step: no mode decays or oscillates");
   else if (found)
-    report_text (j, "RK4 is stable up to a step of", "%s s; the model's step is %s s",
-                 pw_format (first, check->rk4_limit, 3), pw_format (second, check->step, 6));
+    report_text (j, "RK4 is stable up to a step of", "%s s; the model's step is %s s", PW_DIGITS (check->rk4_limit, 3),
+                 PW_DIGITS (check->step, 6));
   pw_json_number (j, "rk4_step", check->rk4_limit);
 }
 

@@ -38,10 +38,10 @@ static void list_default (const pw_field *f, char *text, size_t size) {
 
 static void list_fields (pw_table *t, const pw_field *fields) {
   for (const pw_field *f = fields; f->name; f++) {
-    char type[60], value[80], times[16] = "";
-    if (pw_field_count (f) > 1) snprintf (times, sizeof times, "%d x ", f->count);
-    snprintf (type, sizeof type, "%s%s%s%s%s", times, list_types[f->type].name, f->unit ? " [" : "",
-              f->unit ? f->unit : "", f->unit ? "]" : "");
+    char value[80];
+    const char *times = pw_field_count (f) > 1 ? PW_PRINTED (16, "%d x ", f->count) : "",
+               *unit = f->unit ? PW_PRINTED (40, " [%s]", f->unit) : "",
+               *type = PW_PRINTED (60, "%s%s%s", times, list_types[f->type].name, unit);
     list_default (f, value, sizeof value);
     list_row (t, f->name, type, value, f->about ? f->about : "");
   }
@@ -106,11 +106,10 @@ static int list_models (const char **name, pw_error *error) {
 /* ---- Methods ---- */
 
 static void list_option (const pw_option *o) {
-  char text[32];
   printf ("    :%s=", o->name);
   for (int i = 0; o->choices && o->choices[i]; i++) printf ("%s%s", i ? "|" : "", o->choices[i]);
   if (o->choices == NULL) printf ("NUMBER%s%s", o->unit && *o->unit ? " " : "", o->unit ? o->unit : "");
-  printf ("  (default %s", o->choices ? o->choices[(int)o->value] : pw_format (text, o->value, 6));
+  printf ("  (default %s", o->choices ? o->choices[(int)o->value] : PW_DIGITS (o->value, 6));
   if (o->with) printf ("; with %s", o->with);
   printf (")\n        %s\n", o->about);
 }

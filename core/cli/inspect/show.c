@@ -38,10 +38,9 @@ static void show_element (const pw_element *e) {
 
 /* Derivative blocks that element types do not provide. */
 static void show_differences (const pw_system *s) {
-  char text[300];
   int count = pw_system_differences (s);
   if (count) puts ("\nDerivatives by differences, for implicit methods and linearisation");
-  for (int i = 0; i < count; i++) printf ("  %s\n", pw_system_difference_name (s, i, text, sizeof text));
+  for (int i = 0; i < count; i++) printf ("  %s\n", PW_NAME (pw_system_difference_name, s, i));
 }
 
 static void show_parameters (const pw_model *m) {
@@ -51,14 +50,13 @@ static void show_parameters (const pw_model *m) {
   for (pw_table t = { 0 }; pw_table_pass (&t);)
     for (const pw_parameter *p = parameters; p->name; p++) {
       double value = pw_model_parameter (m, p);
-      char text[32], original[60] = "";
+      char original[60] = "";
       pw_cell (&t, -1, p->name);
       pw_cell_number (&t, 1, value, SHOW_DIGITS);
       pw_cell (&t, -1, p->unit ? p->unit : "");
       pw_cell (&t, -1, pw_domain_text (p->domain));
       pw_cell (&t, -1, p->about ? p->about : "");
-      if (value != p->value)
-        snprintf (original, sizeof original, "default %s", pw_format (text, p->value, SHOW_DIGITS));
+      if (value != p->value) snprintf (original, sizeof original, "default %s", PW_DIGITS (p->value, SHOW_DIGITS));
       if (*original) pw_cell (&t, -1, original);
       pw_row_end (&t);
     }
@@ -66,10 +64,9 @@ static void show_parameters (const pw_model *m) {
 
 static void show_defaults (const pw_plugin_table *table) {
   pw_run_defaults defaults = pw_cli_defaults (table);
-  char t_end[32], step[32], rtol[32];
-  printf ("\nRuns by default for %s s with %s, --step %s", pw_format (t_end, defaults.t_end, SHOW_DIGITS),
-          defaults.method, pw_format (step, defaults.step, SHOW_DIGITS));
-  if (defaults.rtol != 0) printf (", --rtol %s", pw_format (rtol, defaults.rtol, SHOW_DIGITS));
+  printf ("\nRuns by default for %s s with %s, --step %s", PW_DIGITS (defaults.t_end, SHOW_DIGITS), defaults.method,
+          PW_DIGITS (defaults.step, SHOW_DIGITS));
+  if (defaults.rtol != 0) printf (", --rtol %s", PW_DIGITS (defaults.rtol, SHOW_DIGITS));
   putchar ('\n');
 }
 
@@ -84,13 +81,11 @@ static void show_sizes (const pw_system *s) {
 static void show_reference (const pw_cli_model *m) {
   enum { LISTED = 12 }; /* states, at most */
   int n = pw_system_coordinates (m->system), known = 0;
-  char name[300];
   double *x = pw_system_has_reference (m->model) ? malloc (2 * (size_t)n * sizeof *x) : NULL;
   if (x && pw_system_reference (m->model, m->system, 0, x, x + n, NULL) == PW_OK)
     for (int i = 0; i < 2 * n; i++)
       if (!isnan (x[i]) && ++known <= LISTED)
-        printf ("%s%s",
-                known > 1 ? ", " : "\nReference solution: ", pw_system_state_name (m->system, i, name, sizeof name));
+        printf ("%s%s", known > 1 ? ", " : "\nReference solution: ", PW_NAME (pw_system_state_name, m->system, i));
   if (known > LISTED) printf (", and %d more", known - LISTED);
   if (known) putchar ('\n');
   free (x);
@@ -128,29 +123,25 @@ static void matrices_row (pw_table *t, const char *name, const char *unit, const
 
 static void matrices_coordinates (const pw_system *s, const pw_equations *equations, const pw_sample *sample) {
   static const char *const head[] = { "", "M", "f", "q", "v", "a", NULL };
-  char name[300];
   puts ("\nM (diagonal), forces and state by coordinate; SI units");
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     pw_head (&t, -22, 13, head);
     for (int j = 0; j < equations->coordinates; j++) {
       const double value[] = { equations->mass[j], equations->force[j], sample->q[j], sample->v[j], sample->a[j] };
-      pw_system_state_name (s, j, name, sizeof name);
-      matrices_row (&t, name, pw_system_state_unit (s, j), value, 5);
+      matrices_row (&t, PW_NAME (pw_system_state_name, s, j), pw_system_state_unit (s, j), value, 5);
     }
   }
 }
 
 static void matrices_constraints (const pw_system *s, const pw_equations *equations, const pw_sample *sample) {
   static const char *const head[] = { "", "gamma", "eta", "g", "lambda", NULL };
-  char name[300];
   puts ("\ngamma, eta, g and lambda by constraint equation, named after its reaction, which is -lambda");
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     pw_head (&t, -22, 13, head);
     for (int i = 0; i < equations->rows; i++) {
       const double g = i < equations->holonomic ? equations->g[i] : NAN,
                    value[] = { equations->gamma[i], equations->eta[i], g, sample->lambda[i] };
-      pw_system_reaction_name (s, i, name, sizeof name);
-      matrices_row (&t, name, pw_system_reaction_unit (s, i), value, 4);
+      matrices_row (&t, PW_NAME (pw_system_reaction_name, s, i), pw_system_reaction_unit (s, i), value, 4);
     }
   }
 }
@@ -158,11 +149,10 @@ static void matrices_constraints (const pw_system *s, const pw_equations *equati
 /* Columns of J from `first` on; in a large scene only the rows that are not zero there.  Entries are sorted by rows. */
 static void matrices_panel (const pw_system *s, const pw_equations *equations, int first) {
   int left = equations->coordinates - first, columns = left < MATRICES_PANEL ? left : MATRICES_PANEL;
-  char name[300];
   putchar ('\n');
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     pw_cell (&t, -22, "J");
-    for (int c = 0; c < columns; c++) pw_cell (&t, 13, pw_system_state_name (s, first + c, name, sizeof name));
+    for (int c = 0; c < columns; c++) pw_cell (&t, 13, PW_NAME (pw_system_state_name, s, first + c));
     pw_row_end (&t);
     for (int i = 0, entry = 0; i < equations->rows; i++) {
       double row[MATRICES_PANEL] = { 0 };
@@ -174,15 +164,14 @@ static void matrices_panel (const pw_system *s, const pw_equations *equations, i
         shown |= row[c] != 0;
       }
       if (!shown) continue;
-      matrices_row (&t, pw_system_reaction_name (s, i, name, sizeof name), "", row, columns);
+      matrices_row (&t, PW_NAME (pw_system_reaction_name, s, i), "", row, columns);
     }
   }
 }
 
 static void matrices_print (const pw_cli_model *m, const pw_equations *equations, const pw_sample *sample) {
   const pw_system *s = m->system;
-  char t[32];
-  printf ("%s at t = %s s\n", pw_file_name (m->file), pw_format (t, sample->t, MATRICES_DIGITS));
+  printf ("%s at t = %s s\n", pw_file_name (m->file), PW_DIGITS (sample->t, MATRICES_DIGITS));
   matrices_coordinates (s, equations, sample);
   if (equations->rows == 0) puts ("\nThe model has no constraints: no J, no gamma");
   if (equations->rows > 0) matrices_constraints (s, equations, sample);

@@ -7,10 +7,8 @@
 
 enum { YAML_DIGITS = 17 };
 
-static void yaml_number (double value, int digits) {
-  char text[32];
-  fputs (pw_format (text, value, digits), stdout);
-}
+/* A number with all of its digits. */
+#define YAML_NUMBER(value) PW_DIGITS (value, YAML_DIGITS)
 
 /* 1 for the default, 0; -0 is not the default. */
 static int yaml_is_zero (double value) {
@@ -33,12 +31,6 @@ static void yaml_text (const char *text) {
 
 /* ---- Values ---- */
 
-/* "[1, 2]" */
-static void yaml_pair (const double value[2], int digits) {
-  char first[32], second[32];
-  printf ("[%s, %s]", pw_format (first, value[0], digits), pw_format (second, value[1], digits));
-}
-
 /* {expression: "t^2", rate: "2*t"}, or f (t, a.phi) for a function of a C model */
 static void yaml_function (const pw_signal *s) {
   static const char *const key[] = { "{expression: ", ", rate: ", ", acceleration: " };
@@ -54,15 +46,12 @@ static void yaml_function (const pw_signal *s) {
 static void yaml_points (const pw_signal *s, int digits) {
   const double *t = s->table.t;
   int count = s->table.count;
-  char from[32], to[32];
   if (digits < YAML_DIGITS) {
-    printf ("%d from %s to %s s", count, pw_format (from, t[0], digits), pw_format (to, t[count - 1], digits));
+    printf ("%d from %s to %s s", count, PW_DIGITS (t[0], digits), PW_DIGITS (t[count - 1], digits));
     return;
   }
-  for (int i = 0; i < count; i++) {
-    fputs (i ? ", " : "[", stdout);
-    yaml_pair ((const double[]){ t[i], s->table.value[i] }, digits);
-  }
+  for (int i = 0; i < count; i++)
+    printf ("%s[%s, %s]", i ? ", " : "[", YAML_NUMBER (t[i]), YAML_NUMBER (s->table.value[i]));
   putchar (']');
 }
 
@@ -84,7 +73,7 @@ static void yaml_signal (const pw_signal *s, int digits) {
     return;
   }
   if (form == NULL) {
-    yaml_number (s->constant, digits);
+    fputs (PW_DIGITS (s->constant, digits), stdout);
     return;
   }
   printf ("{%s: {", form->name);
@@ -99,8 +88,10 @@ static void yaml_signal (const pw_signal *s, int digits) {
 }
 
 static void yaml_value (const pw_field *f, const void *at, int digits) {
-  if (f->type == PW_NUMBER) yaml_number (*(const double *)at, digits);
-  if (f->type == PW_POINT || f->type == PW_VECTOR) yaml_pair (at, digits);
+  const double *number = at;
+  if (f->type == PW_NUMBER) fputs (PW_DIGITS (*number, digits), stdout);
+  if (f->type == PW_POINT || f->type == PW_VECTOR)
+    printf ("[%s, %s]", PW_DIGITS (number[0], digits), PW_DIGITS (number[1], digits));
   if (f->type == PW_BODY) yaml_name (*(const char *const *)at);
   if (f->type == PW_SIGNAL) yaml_signal (at, digits);
   if (f->type == PW_CHOICE) fputs (f->choices[*(const int *)at], stdout);
@@ -124,20 +115,31 @@ static void yaml_triple (const char *key, const char *const name[3], const doubl
   for (int i = 0; i < 3; i++) {
     if (yaml_is_zero (value[i]) && !(specified >> i & 1)) continue;
     if (written++ == 0) printf (", %s: {", key);
-    printf ("%s%s: ", written > 1 ? ", " : "", name[i]);
-    yaml_number (value[i], YAML_DIGITS);
+    printf ("%s%s: %s", written > 1 ? ", " : "", name[i], YAML_NUMBER (value[i]));
   }
   if (written) putchar ('}');
 }
 
+/* A comment on values that are written but not specified by the model: a text model specifies what it contains. */
+static void yaml_unspecified (const pw_body *b, const char *const name[6]) {
+  const char *separator = "  # the model does not specify ";
+  for (int i = 0; i < 6; i++) {
+    double value = i < 3 ? b->start[i] : b->rate[i - 3];
+    if (yaml_is_zero (value) || (b->specified ? b->specified >> i & 1 : value != 0)) continue;
+    printf ("%s%s", separator, name[i]), separator = ", ";
+  }
+}
+
 static void yaml_body (const pw_body *b) {
-  static const char *const start[] = { "x", "y", "phi" }, *const rate[] = { "vx", "vy", "omega" };
+  static const char *const state[] = { "x", "y", "phi", "vx", "vy", "omega" };
   printf ("  - {name: "), yaml_name (b->name);
-  if (!yaml_is_zero (b->mass)) printf (", mass: "), yaml_number (b->mass, YAML_DIGITS);
-  if (!yaml_is_zero (b->inertia)) printf (", inertia: "), yaml_number (b->inertia, YAML_DIGITS);
-  yaml_triple ("start", start, b->start, b->specified);
-  yaml_triple ("rate", rate, b->rate, b->specified >> 3);
-  puts ("}");
+  if (!yaml_is_zero (b->mass)) printf (", mass: %s", YAML_NUMBER (b->mass));
+  if (!yaml_is_zero (b->inertia)) printf (", inertia: %s", YAML_NUMBER (b->inertia));
+  yaml_triple ("start", state, b->start, b->specified);
+  yaml_triple ("rate", state + 3, b->rate, b->specified >> 3);
+  putchar ('}');
+  yaml_unspecified (b, state);
+  putchar ('\n');
 }
 
 static void yaml_element (const pw_element *e) {
@@ -188,7 +190,7 @@ static void yaml_run (const pw_run_defaults *run) {
   const double value[] = { run->t_end, run->step, run->rtol };
   const char *separator = "run: {";
   for (int i = 0; i < 3; i++)
-    if (value[i] != 0) printf ("%s%s: ", separator, key[i]), yaml_number (value[i], YAML_DIGITS), separator = ", ";
+    if (value[i] != 0) printf ("%s%s: %s", separator, key[i], YAML_NUMBER (value[i])), separator = ", ";
   if (run->method) printf ("%smethod: ", separator), yaml_text (run->method), separator = ", ";
   if (*separator == ',') puts ("}");
 }
@@ -197,7 +199,7 @@ static void yaml_run (const pw_run_defaults *run) {
 static void yaml_names (const pw_reference_text *reference) {
   if (reference->names) puts ("let:");
   for (int i = 0; i < reference->names; i++)
-    printf ("  %s: ", reference->name[i]), yaml_number (reference->value[i], YAML_DIGITS), putchar ('\n');
+    printf ("  %s: %s\n", reference->name[i], YAML_NUMBER (reference->value[i]));
 }
 
 static void yaml_reference (const pw_model *m) {

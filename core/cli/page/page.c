@@ -43,12 +43,11 @@ static void page_file_json (pw_json *j, const pw_page_file *file, char *base64) 
 /* Writes the consistent initial state, but values of --start as given, with a mark. */
 static void page_states_json (const page *cmd, pw_json *j) {
   const pw_initial_report *initial = pw_run_initial (cmd->run);
-  char name[300];
   int n = pw_system_coordinates (cmd->compiled.system);
   pw_json_open (j, "states", '[');
   for (int i = 0; i < 2 * n; i++) {
     pw_json_open (j, NULL, '{');
-    pw_json_text (j, "name", pw_system_state_name (cmd->compiled.system, i, name, sizeof name));
+    pw_json_text (j, "name", PW_NAME (pw_system_state_name, cmd->compiled.system, i));
     pw_json_text (j, "unit", pw_system_state_unit (cmd->compiled.system, i));
     int given = pw_initial_given (initial, i);
     const double *q = given ? initial->q_given : initial->q, *v = given ? initial->v_given : initial->v;
@@ -67,14 +66,12 @@ static int page_has_method (const pw_method *m, int stabilisation) {
 }
 
 static void page_methods_json (pw_json *j) {
-  char name[100];
   pw_json_open (j, "methods", '[');
   for (const pw_method *const *m = pw_methods; *m; m++)
     for (int i = 0; (*m)->stabilisations[i].name; i++) {
       if (!page_has_method (*m, i)) continue;
-      snprintf (name, sizeof name, "%s+%s", (*m)->name, (*m)->stabilisations[i].name);
       pw_json_open (j, NULL, '{');
-      pw_json_text (j, "name", name);
+      pw_json_text (j, "name", PW_PRINTED (100, "%s+%s", (*m)->name, (*m)->stabilisations[i].name));
       pw_json_flag (j, "adaptive", (*m)->adaptive);
       pw_json_close (j, '}');
     }

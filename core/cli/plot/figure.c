@@ -8,6 +8,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 #include "figure.h"
+#include "util.h"
 
 const char *const pw_figure_endings[] = { ".dat", ".gp", ".svg", ".png", ".pdf", NULL };
 
@@ -37,9 +38,7 @@ int pw_figures_of (pw_figures *f, const pw_cli_line *line, const pw_cli_model *m
 /* ---- The folder ---- */
 
 pw_output *pw_figure_open (const char *folder, const char *name, pw_error *error) {
-  char path[FIGURE_PATH + 40];
-  snprintf (path, sizeof path, "%s/%s", folder, name);
-  return pw_output_open (path, error);
+  return pw_output_open (PW_PRINTED (FIGURE_PATH + 40, "%s/%s", folder, name), error);
 }
 
 pw_output *pw_figure_data (const pw_figures *f, const char *name, pw_error *error) {
@@ -63,12 +62,9 @@ int pw_figure_results (const pw_cli_line *line, const pw_cli_model *model, const
 int pw_figure_tables (const char *folder, const char *name, int lines, const void *context,
                       int (*csv) (const void *context, FILE *f, pw_error *error),
                       void (*json) (const void *context, pw_json *j), pw_error *error) {
-  char path[60];
   pw_output *file[2] = { NULL };
-  for (int i = 0; i < 2; i++) {
-    snprintf (path, sizeof path, "%s.%s", name, i ? "json" : "csv");
-    file[i] = i == 0 || file[0] ? pw_figure_open (folder, path, error) : NULL;
-  }
+  file[0] = pw_figure_open (folder, PW_PRINTED (60, "%s.csv", name), error);
+  if (file[0]) file[1] = pw_figure_open (folder, PW_PRINTED (60, "%s.json", name), error);
   int status = file[1] ? csv (context, pw_output_stream (file[0]), error) : PW_RESOURCE;
   if (status == PW_OK) {
     json (context, &(pw_json){ .f = pw_output_stream (file[1]), .lines = lines });
@@ -90,9 +86,7 @@ static const struct {
 };
 
 pw_output *pw_figure_begin (const pw_figures *f, const char *name, pw_error *error) {
-  char script[40];
-  snprintf (script, sizeof script, "%s.gp", name);
-  pw_output *o = pw_figure_open (f->folder, script, error);
+  pw_output *o = pw_figure_open (f->folder, PW_PRINTED (40, "%s.gp", name), error);
   if (o == NULL) return NULL;
   FILE *out = pw_output_stream (o);
   fprintf (out,
@@ -124,14 +118,11 @@ void pw_figure_quoted (FILE *f, const char *text, const char *quote) {
 }
 
 void pw_figure_element (FILE *f, const char *variable, int i, const char *value) {
-  char element[60];
-  snprintf (element, sizeof element, "%s[%d]", variable, i);
-  pw_figure_text (f, element, value);
+  pw_figure_text (f, PW_PRINTED (60, "%s[%d]", variable, i), value);
 }
 
 void pw_figure_label (FILE *f, const char *variable, int i, const char *name, const char *unit) {
-  char label[300];
-  snprintf (label, sizeof label, *unit ? "%s [%s]" : "%s", name, unit);
+  const char *label = *unit ? PW_PRINTED (300, "%s [%s]", name, unit) : name;
   i ? pw_figure_element (f, variable, i, label) : pw_figure_text (f, variable, label);
 }
 
@@ -162,12 +153,9 @@ static int gnuplot_start (const char *folder, char *const *argv, pid_t *child) {
 
 /* Removes the pictures of an earlier run, and incomplete ones. */
 static void gnuplot_remove_pictures (const char *folder, const char *const *names) {
-  char path[2 * FIGURE_PATH];
   for (int i = 0; i < FIGURE_SCRIPTS && names[i]; i++)
-    for (const char *const *ending = pw_figure_endings + 2; *ending; ending++) {
-      snprintf (path, sizeof path, "%s/%s%s", folder, names[i], *ending);
-      remove (path);
-    }
+    for (const char *const *ending = pw_figure_endings + 2; *ending; ending++)
+      remove (PW_PRINTED (2 * FIGURE_PATH, "%s/%s%s", folder, names[i], *ending));
 }
 
 int pw_figure_undrawn (const char *folder, const char *const *names, const char *why) {
@@ -204,10 +192,8 @@ int pw_figure_write (const pw_cli_line *line, const pw_cli_model *model, const c
                      const void *context, int (*data) (const void *context, FILE *f, pw_error *error),
                      void (*variables) (const void *context, FILE *f), pw_error *error) {
   pw_figures figures;
-  char file[40];
-  snprintf (file, sizeof file, "%s.dat", name);
   if (pw_figures_of (&figures, line, model, folder, error) != PW_OK) return error->status;
-  pw_output *o = pw_figure_data (&figures, file, error);
+  pw_output *o = pw_figure_data (&figures, PW_PRINTED (40, "%s.dat", name), error);
   if (o == NULL) return error->status;
   int status = data (context, pw_output_stream (o), error);
   if (status != PW_OK) return pw_output_discard (o), status;

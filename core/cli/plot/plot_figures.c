@@ -16,8 +16,7 @@ enum {
 
 /* Numbers separated by spaces, then an end. */
 static void data_row (FILE *f, const double *value, int count, const char *end) {
-  char text[32];
-  for (int i = 0; i < count; i++) fprintf (f, "%s%s", i ? " " : "", pw_format (text, value[i], 10));
+  for (int i = 0; i < count; i++) fprintf (f, "%s%s", i ? " " : "", PW_DIGITS (value[i], 10));
   fputs (end, f);
 }
 
@@ -248,7 +247,6 @@ static int figures_write (const pw_plots *plots, const char *name, int closeup, 
 int pw_plots_finish (pw_plots *plots, int draw, pw_error *error) {
   static const char *const names[] = { "paths", "velocities", "angular", "energy", "mechanism", NULL };
   const char *folder = plots->figures.folder;
-  char t[32], end[32];
   if (folder == NULL) return PW_OK;
   if (plots->samples < 2) {
     pw_cli_say ("pinwheel: the run is too short for figures: none are drawn in %s\n", folder);
@@ -256,7 +254,7 @@ int pw_plots_finish (pw_plots *plots, int draw, pw_error *error) {
   }
   if (plots->samples < plots->planned)
     snprintf (plots->figures.incomplete, sizeof plots->figures.incomplete, ", incomplete: up to t = %s s of %s s",
-              pw_format (t, pw_plot_sample (plots, plots->samples - 1)[PLOT_T], 4), pw_format (end, plots->t_end, 4));
+              PW_DIGITS (pw_plot_sample (plots, plots->samples - 1)[PLOT_T], 4), PW_DIGITS (plots->t_end, 4));
   int closeup = data_closeup (plots), status = data_write (plots, closeup, error);
   for (const char *const *name = names; status == PW_OK && *name; name++)
     status = figures_write (plots, *name, closeup, error);

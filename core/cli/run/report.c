@@ -85,11 +85,12 @@ static void report_field (const pw_element *element, const pw_field *field) {
   for (int i = 0; signal && i < pw_field_count (field); i++) report_jump (element, field->name, signal + i);
 }
 
-void pw_report_model (const pw_model *model) {
-  int bodies, elements;
-  const pw_body *body = pw_model_bodies (model, &bodies);
-  const pw_element *element = pw_model_elements (model, &elements);
-  for (int i = 0; i < bodies; i++) report_angle ("body", body[i].name, "initial phi", body[i].start[2]);
+void pw_report_model (const pw_cli_model *m) {
+  int elements;
+  const pw_system *s = m->system;
+  const pw_element *element = pw_model_elements (m->model, &elements);
+  for (int i = 0; i < pw_system_bodies (s); i++)
+    report_angle ("body", pw_system_body_name (s, i), "initial phi", pw_system_initial_q (s)[3 * i + 2]);
   for (int i = 0; i < elements; i++)
     for (const pw_field *field = element[i].kind->fields; field->name; field++) report_field (&element[i], field);
 }
@@ -106,12 +107,9 @@ static void report_initial (const pw_system *system, const pw_initial_report *in
               moved == 1 ? "was" : "were",
               initial->released ? ", including given ones, which cannot all be satisfied" : "", changed);
   for (int state = 0; state < 2 * n && listed < REPORT_MESSAGES; state++) {
-    double given, consistent;
-    char name[PW_STATE_NAME], given_text[32], consistent_text[32];
     if (!pw_initial_moved (system, initial, state)) continue;
-    pw_cli_state_change (system, initial, state, name, &given, &consistent);
-    pw_cli_say ("  %s from %s to %s %s%s\n", name, pw_format (given_text, given, 10),
-                pw_format (consistent_text, consistent, 10), pw_system_state_unit (system, state),
+    const pw_state_change c = pw_cli_state_change (system, initial, state);
+    pw_cli_say ("  %s from %s to %s %s%s\n", c.name, PW_DIGITS (c.given, 10), PW_DIGITS (c.consistent, 10), c.unit,
                 initial->changed && pw_initial_specified (initial, state) ? " (specified)" : "");
     listed++;
   }

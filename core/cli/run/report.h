@@ -7,7 +7,7 @@
 /* ---- Warnings on standard error ---- */
 
 /* Initial phi and headings of more than a turn, which are probably degrees; expressions that may jump with states. */
-void pw_report_model (const pw_model *model);
+void pw_report_model (const pw_cli_model *m);
 
 /* Options without effect, long fixed steps, an absolute tolerance within which a force saturates. */
 void pw_report_settings (pw_run *run, const pw_system *system, const char *method, const pw_cli_line *line,

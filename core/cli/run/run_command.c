@@ -138,7 +138,7 @@ static int run_open (pw_run_cli *command, pw_error *error) {
   command->run = pw_run_open (system, command->method, &command->settings, error);
   if (command->run == NULL) return error->status;
   command->redundant = pw_report_redundancies (command->run);
-  pw_report_model (command->compiled.model);
+  pw_report_model (&command->compiled);
   pw_report_settings (command->run, system, command->method, &command->line, &command->settings);
   pw_report_initialisation (command->run, system, command->redundant);
   pw_output *table = command->output[PW_RUN_TABLE];

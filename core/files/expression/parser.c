@@ -174,12 +174,12 @@ static parser_part parser_unexpected (parser *p, char open, size_t at) {
 
 /* Reports that no operand begins here. */
 static parser_part parser_missing (parser *p) {
-  char last[PW_EXPRESSION_NAME];
   if (p->status != PW_OK) return (parser_part){ 0 };
-  snprintf (last, sizeof last, "%.*s", (int)(p->previous_end - p->previous), p->text + p->previous);
   if (p->type == 0 && p->previous_end == 0) return parser_fail (p, 0, "an expression is missing");
   if (p->type == 0 || (p->type == ')' && p->previous_end))
-    return parser_fail (p, p->previous, "something is missing after \"%s\"", last);
+    return parser_fail (
+        p, p->previous, "something is missing after \"%s\"",
+        PW_PRINTED (PW_EXPRESSION_NAME, "%.*s", (int)(p->previous_end - p->previous), p->text + p->previous));
   return parser_fail (p, p->at, "this does not belong here");
 }
 
@@ -257,12 +257,11 @@ static parser_part parser_number (parser *p) {
 }
 
 static parser_part parser_operand (parser *p) {
-  char name[PW_EXPRESSION_NAME];
   if (p->status != PW_OK) return (parser_part){ 0 };
   if (p->type == '0') return parser_number (p);
   if (p->type == '(') return parser_group (p);
   if (p->type != 'n') return parser_missing (p);
-  snprintf (name, sizeof name, "%.*s", (int)p->size, p->text + p->at);
+  const char *name = PW_PRINTED (PW_EXPRESSION_NAME, "%.*s", (int)p->size, p->text + p->at);
   int index = pw_expression_find_function (name);
   if (index < 0) return parser_name (p, name);
   if (parser_is_call (p)) return parser_call (p, index);

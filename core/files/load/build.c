@@ -81,16 +81,16 @@ static void build_add (char **word, int *count, const char *const *more) {
 }
 
 static int build_object (const build_command *command, const char *source, const char *object, pw_error *error) {
-  char *header, *include = NULL, *compiler = strdup (command->compiler), *rest = NULL;
+  char header[PW_PATH], include[PW_PATH], *compiler = strdup (command->compiler), *rest = NULL;
   char *word[BUILD_COMPILER + BUILD_OTHERS] = { NULL };
-  int words = 0, status = pw_search_header (&header, error);
-  if (header) include = pw_folder_of (header);
-  if (status == PW_OK && header == NULL)
+  int words = 0, status = pw_search_header (header, error);
+  pw_folder_of (include, header);
+  if (status == PW_OK && *header == 0)
     status = pw_fail (error, PW_INPUT,
                       "cannot compile %s: pinwheel.h is neither in \"include\" next to the program nor in "
                       "\"../include/pinwheel\"",
                       source);
-  if (status == PW_OK && (include == NULL || compiler == NULL)) status = pw_fail (error, PW_RESOURCE, "out of memory");
+  if (status == PW_OK && compiler == NULL) status = pw_fail (error, PW_RESOURCE, "out of memory");
   if (status == PW_OK) {
     char *w = strtok_r (compiler, " \t", &rest);
     for (; w && words < BUILD_COMPILER; w = strtok_r (NULL, " \t", &rest)) word[words++] = w;
@@ -101,19 +101,14 @@ static int build_object (const build_command *command, const char *source, const
                : build_run (command, word, source, error);
   }
   free (compiler);
-  free (include);
-  free (header);
   return status;
 }
 
-char *pw_temporary_folder (pw_error *error) {
+int pw_temporary_folder (char folder[PW_PATH], pw_error *error) {
   const char *tmp = getenv ("TMPDIR");
   if (tmp == NULL || *tmp == 0) tmp = "/tmp";
-  char *folder = pw_path_join (tmp, "pinwheel-XXXXXX", "");
-  if (folder && mkdtemp (folder)) return folder; /* mkdtemp gives mode 0700 */
-  pw_fail (error, PW_RESOURCE, "cannot make a temporary folder in %s: %s", tmp, strerror (errno));
-  free (folder);
-  return NULL;
+  if (mkdtemp (pw_path (folder, "%s/pinwheel-XXXXXX", tmp))) return PW_OK; /* mkdtemp gives mode 0700 */
+  return pw_fail (error, PW_RESOURCE, "cannot make a temporary folder in %s: %s", tmp, strerror (errno));
 }
 
 int pw_processor_lanes (void) {
@@ -175,15 +170,14 @@ int pw_compile_file (const char *path, const char *engine, pw_object_user *use, 
                             .last = { engine ? engine : "-lm", engine ? "-Wl,--no-whole-archive" : NULL },
                             .for_page = engine != NULL };
   build_defer (&command.signals);
-  char *folder = pw_temporary_folder (error), *object = folder ? pw_path_join (folder, "model.so", "") : NULL;
-  int status = folder ? PW_OK : PW_RESOURCE;
-  if (folder && object == NULL) status = pw_fail (error, PW_RESOURCE, "out of memory");
-  if (status == PW_OK) status = build_object (&command, path, object, error);
-  if (status == PW_OK) status = use (context, object, error);
-  if (object) unlink (object);
-  if (folder) rmdir (folder);
-  free (object);
-  free (folder);
+  char folder[PW_PATH], object[PW_PATH];
+  int status = pw_temporary_folder (folder, error);
+  if (status == PW_OK) {
+    status = build_object (&command, path, pw_path (object, "%s/model.so", folder), error);
+    if (status == PW_OK) status = use (context, object, error);
+    unlink (object);
+    rmdir (folder);
+  }
   pthread_sigmask (SIG_SETMASK, &command.signals, NULL);
   return status;
 }

@@ -11,11 +11,11 @@
 
 enum { CACHE_MAX_BYTES = 64 << 20 };
 
-/* $XDG_CACHE_HOME or $HOME/.cache, malloced; NULL if neither is an absolute path. */
-static char *cache_parent (void) {
+/* $XDG_CACHE_HOME or $HOME/.cache in the buffer, which is returned; NULL if neither is an absolute path. */
+static char *cache_parent (char parent[PW_PATH]) {
   const char *cache = getenv ("XDG_CACHE_HOME"), *home = getenv ("HOME");
-  if (cache && *cache == '/') return strdup (cache);
-  return home && *home == '/' ? pw_path_join (home, ".cache", "") : NULL;
+  if (cache && *cache == '/') return pw_path (parent, "%s", cache);
+  return home && *home == '/' ? pw_path (parent, "%s/.cache", home) : NULL;
 }
 
 /* Makes a folder and those above it. */
@@ -41,48 +41,39 @@ static const char *cache_defect (const char *path, cache_role role) {
   return role == CACHE_FOLDER && access (path, R_OK | W_OK | X_OK) != 0 ? strerror (errno) : NULL;
 }
 
-char *pw_cache_folder (char *notice, size_t size) {
-  char *parent = cache_parent (), *path = parent ? pw_path_join (parent, "pinwheel", "") : NULL;
-  const char *faulty = parent, *defect = NULL;
-  if (path) {
-    cache_make (path);
-    defect = cache_defect (parent, CACHE_PARENT);
-    if (defect == NULL) defect = cache_defect (faulty = path, CACHE_FOLDER);
-    if (defect) snprintf (notice, size, "the cache %s is not used: %s", faulty, defect);
-    if (defect) free (path), path = NULL;
-  }
-  free (parent);
-  return path;
+int pw_cache_folder (char path[PW_PATH], char *notice, size_t size) {
+  char parent[PW_PATH];
+  if (cache_parent (parent) == NULL) return 0;
+  cache_make (pw_path (path, "%s/pinwheel", parent));
+  const char *faulty = parent, *defect = cache_defect (parent, CACHE_PARENT);
+  if (defect == NULL) defect = cache_defect (faulty = path, CACHE_FOLDER);
+  if (defect) snprintf (notice, size, "the cache %s is not used: %s", faulty, defect);
+  return defect == NULL;
 }
 
-/* The size of all files [bytes]; *oldest: the path of the least recently used one, malloced, or NULL. */
-static long long cache_size (const char *folder, char **oldest) {
+/* The size of all files [bytes]; oldest: the path of the least recently used one, or "". */
+static long long cache_size (const char *folder, char oldest[PW_PATH]) {
   long long size = 0;
   struct timespec used = { 0 };
   struct dirent *e;
   DIR *dir = opendir (folder);
-  *oldest = NULL;
+  *oldest = 0;
   while (dir && (e = readdir (dir)) != NULL) {
     struct stat info;
-    char *path = e->d_name[0] == '.' ? NULL : pw_path_join (folder, e->d_name, "");
-    if (path && lstat (path, &info) == 0 && S_ISREG (info.st_mode)) {
-      const struct timespec *t = &info.st_mtim;
-      size += info.st_size;
-      if (*oldest == NULL || t->tv_sec < used.tv_sec || (t->tv_sec == used.tv_sec && t->tv_nsec < used.tv_nsec)) {
-        free (*oldest);
-        *oldest = path;
-        path = NULL;
-        used = *t;
-      }
-    }
-    free (path);
+    char path[PW_PATH];
+    pw_path (path, "%s/%s", folder, e->d_name);
+    if (e->d_name[0] == '.' || lstat (path, &info) != 0 || !S_ISREG (info.st_mode)) continue;
+    const struct timespec *t = &info.st_mtim;
+    size += info.st_size;
+    if (*oldest && (t->tv_sec > used.tv_sec || (t->tv_sec == used.tv_sec && t->tv_nsec >= used.tv_nsec))) continue;
+    strcpy (oldest, path);
+    used = *t;
   }
   if (dir) closedir (dir);
   return size;
 }
 
 void pw_cache_trim (const char *folder) {
-  char *oldest;
-  while (cache_size (folder, &oldest) > CACHE_MAX_BYTES && (unlink (oldest) == 0 || errno == ENOENT)) free (oldest);
-  free (oldest);
+  char oldest[PW_PATH];
+  while (cache_size (folder, oldest) > CACHE_MAX_BYTES && (unlink (oldest) == 0 || errno == ENOENT)) continue;
 }

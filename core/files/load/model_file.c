@@ -7,10 +7,10 @@
 #include "files.h"
 
 struct pw_file {
-  char *name, *path; /* the name without its ending; the path with links resolved */
-  void *handle;      /* of dlopen; NULL for a text model */
-  pw_yaml *yaml;     /* the text model; NULL for a plug-in */
-  size_t max_bytes;  /* limit for a text model */
+  char name[PW_PATH], path[PW_PATH]; /* the name without its ending; the path with links resolved */
+  void *handle;                      /* of dlopen; NULL for a text model */
+  pw_yaml *yaml;                     /* the text model; NULL for a plug-in */
+  size_t max_bytes;                  /* limit for a text model */
   const pw_plugin_table *table;
 };
 
@@ -64,9 +64,7 @@ static int model_open_path (pw_file *f, const char *shown, pw_error *error) {
   if (ending == MODEL_ENDINGS) return pw_fail (error, PW_INPUT, "%s: a model file ends in .c, .so or .yaml", f->path);
   if (!pw_is_text (base))
     return pw_fail (error, PW_INPUT, "%s: the name of a model file is UTF-8 without control characters", f->path);
-  f->name = strdup (base);
-  if (f->name == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  f->name[strlen (base) - strlen (model_endings[ending])] = 0;
+  pw_path (f->name, "%.*s", (int)(strlen (base) - strlen (model_endings[ending])), base);
   if (ending == MODEL_YAML) {
     f->yaml = pw_yaml_open (f->path, shown, f->max_bytes, error);
     if (f->yaml) f->table = pw_yaml_table (f->yaml);
@@ -77,8 +75,7 @@ static int model_open_path (pw_file *f, const char *shown, pw_error *error) {
 
 static int model_find_path (pw_file *f, const char *path, pw_error *error) {
   struct stat info;
-  f->path = realpath (path, NULL);
-  if (f->path == NULL)
+  if (realpath (path, f->path) == NULL)
     return pw_fail (error, errno == ENOMEM ? PW_RESOURCE : PW_INPUT, "cannot open the model file %s: %s", path,
                     strerror (errno));
   if (stat (f->path, &info) == 0 && !S_ISREG (info.st_mode))
@@ -89,9 +86,9 @@ static int model_find_path (pw_file *f, const char *path, pw_error *error) {
 /* Reports an unknown name; suggests a path if the current directory has such a file, else the nearest name. */
 static int model_unknown (const pw_search *s, const char *name, pw_error *error) {
   struct stat info;
-  char here[200], unread[300] = ""; /* a file in the current directory; folders that cannot be searched */
+  char unread[300] = ""; /* folders that cannot be searched */
   for (int i = 0; i < MODEL_ENDINGS; i++) {
-    snprintf (here, sizeof here, "%s%s", name, model_endings[i]);
+    const char *here = PW_PRINTED (200, "%s%s", name, model_endings[i]);
     if (stat (here, &info) == 0)
       return pw_fail (error, PW_INPUT, "there is no model \"%s\" on the search path; to use the file here, write ./%s",
                       name, here);
@@ -117,8 +114,8 @@ static int model_find_name (pw_file *f, const char *name, pw_error *error) {
   else if (status == PW_OK && first + 1 < s.count && strcmp (found[1].name, name) == 0)
     status = pw_fail (error, PW_INPUT, "several files match \"%s\", such as %s and %s; name the model by its path",
                       name, found[0].path, found[1].path);
-  else if (status == PW_OK && (f->path = strdup (found->path)) == NULL)
-    status = pw_fail (error, PW_RESOURCE, "out of memory");
+  else if (status == PW_OK)
+    pw_path (f->path, "%s", found->path);
   pw_search_close (&s);
   return status;
 }
@@ -142,8 +139,8 @@ static pw_file *model_find (const char *model, const char **shown, pw_error *err
 
 char *pw_file_find (const char *model, pw_error *error) {
   pw_file *f = model_find (model, &(const char *){ NULL }, error);
-  char *path = f ? f->path : NULL;
-  if (f) f->path = NULL;
+  char *path = f ? strdup (f->path) : NULL;
+  if (f && path == NULL) pw_fail (error, PW_RESOURCE, "out of memory");
   pw_file_close (f);
   return path;
 }
@@ -167,8 +164,6 @@ void pw_file_close (pw_file *f) {
   if (f == NULL) return;
   if (f->handle) dlclose (f->handle);
   pw_yaml_close (f->yaml);
-  free (f->name);
-  free (f->path);
   free (f);
 }
 

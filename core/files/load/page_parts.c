@@ -34,15 +34,14 @@ static int page_use_engine (void *context, const char *object, pw_error *error) 
 
 /* Text models share one engine; `source`, a model in C or NULL, is compiled into an engine of its own. */
 static int page_engine (pw_page *p, const char *source, pw_error *error) {
-  char *path;
-  int status = pw_search_page_file (source ? "pinwheel-page.objects" : "pinwheel.wasm", &path, error);
-  if (status == PW_OK && path == NULL)
+  char path[PW_PATH];
+  int status = pw_search_page_file (source ? "pinwheel-page.objects" : "pinwheel.wasm", path, error);
+  if (status == PW_OK && *path == 0)
     status = pw_fail (error, PW_INPUT,
                       "this Pinwheel was built without the engine of interactive pages: install %s and build it again",
                       PW_PAGE_TOOLS);
   if (status == PW_OK)
     status = source ? pw_compile_file (source, path, page_use_engine, p, error) : page_read (p, "engine", path, error);
-  free (path);
   return status;
 }
 

@@ -18,7 +18,7 @@ struct pw_scene_code {
   void *handle;
   const pw_specialised *table;
   const pw_specialised_lanes *lanes_table;
-  char notice[600];
+  char notice[PW_PATH + 600];
 };
 
 /* The object to load. */
@@ -28,8 +28,9 @@ typedef struct {
   int lanes;           /* 0: for single runs */
   char identity[2000]; /* what else determines the object: version, compiler, options, checksum of pinwheel.h */
   char key[17];        /* checksum of text and identity, in hexadecimal */
-  char *folder, *source, *log, *part, *object; /* paths: KEY.c, KEY.log, the object while written, KEY.so */
-  pw_scene_code *code;                         /* the result */
+  /* paths: KEY.c, KEY.log, the object while written, KEY.so */
+  char folder[PW_PATH], source[PW_PATH], log[PW_PATH], part[PW_PATH], object[PW_PATH];
+  pw_scene_code *code; /* the result */
 } code_job;
 
 /* ---- Identity ---- */
@@ -38,9 +39,9 @@ typedef struct {
 static int code_find_program (const char *word, struct stat *info) {
   if (strchr (word, '/')) return stat (word, info) == 0;
   for (const char *entry = getenv ("PATH"), *end; entry; entry = *end ? end + 1 : NULL) {
-    char path[1000];
+    char path[PW_PATH];
     end = entry + strcspn (entry, ":");
-    snprintf (path, sizeof path, "%.*s%s%s", (int)(end - entry), entry, end > entry ? "/" : "", word);
+    pw_path (path, "%.*s%s%s", (int)(end - entry), entry, end > entry ? "/" : "", word);
     if (stat (path, info) == 0 && S_ISREG (info->st_mode) && access (path, X_OK) == 0) return 1;
   }
   return 0;
@@ -54,14 +55,13 @@ static void code_add (code_job *x, const char *text) {
 
 /* Adds the words of the compiler; of programs among them ("ccache gcc") also size, date and inode. */
 static int code_add_compiler (code_job *x) {
-  char text[200], *copy = strdup (pw_compiler ()), *rest = NULL;
+  char *copy = strdup (pw_compiler ()), *rest = NULL;
   for (char *w = copy ? strtok_r (copy, " \t", &rest) : NULL; w; w = strtok_r (NULL, " \t", &rest)) {
     struct stat info;
     code_add (x, w);
     if (!code_find_program (w, &info)) continue;
-    snprintf (text, sizeof text, "%lld %lld %ld %llu", (long long)info.st_size, (long long)info.st_mtim.tv_sec,
-              (long)info.st_mtim.tv_nsec, (unsigned long long)info.st_ino);
-    code_add (x, text);
+    code_add (x, PW_PRINTED (200, "%lld %lld %ld %llu", (long long)info.st_size, (long long)info.st_mtim.tv_sec,
+                             (long)info.st_mtim.tv_nsec, (unsigned long long)info.st_ino));
   }
   free (copy);
   return copy && strlen (x->identity) < sizeof x->identity - 50 ? PW_OK : PW_RESOURCE; /* room for the checksum */
@@ -74,34 +74,27 @@ static int code_read (const char *path, char **text, size_t *size, pw_error *err
 }
 
 static int code_identify (code_job *x, pw_error *error) {
-  char *header, *text = NULL, sum[40] = "";
+  char header[PW_PATH], *text = NULL, sum[40] = "";
   size_t size;
   code_add (x, "pinwheel " PW_VERSION);
   for (const char *const *o = pw_scene_options (x->lanes); *o; o++) code_add (x, *o);
   if (code_add_compiler (x) != PW_OK) return pw_fail (error, PW_RESOURCE, "out of memory, or CC is too long");
-  int status = pw_search_header (&header, error);
-  if (header && code_read (header, &text, &size, NULL) == PW_OK)
+  int status = pw_search_header (header, error);
+  if (*header && code_read (header, &text, &size, NULL) == PW_OK)
     snprintf (sum, sizeof sum, "%016llx", pw_check_sum (PW_CHECK, text, size));
   code_add (x, sum);
   snprintf (x->key, sizeof x->key, "%016llx",
             pw_check_sum (pw_check_sum (PW_CHECK, x->text, strlen (x->text)), x->identity, strlen (x->identity)));
-  free (header);
   free (text);
   return status;
 }
 
-static int code_paths (code_job *x, pw_error *error) {
-  char **const path[] = { &x->source, &x->log, &x->part, &x->object }, part[40];
-  const char *const ending[] = { ".c", ".log", part, ".so" };
-  /* Named by process: the compiler of a killed one may still run. */
-  snprintf (part, sizeof part, ".%ld.part", (long)getpid ());
-  int status = PW_OK;
-  for (int i = 0; i < 4; i++) {
-    free (*path[i]);
-    *path[i] = pw_path_join (x->folder, x->key, ending[i]);
-    if (*path[i] == NULL) status = pw_fail (error, PW_RESOURCE, "out of memory");
-  }
-  return status;
+/* The object while written is named by process: the compiler of a killed one may still run. */
+static void code_paths (code_job *x) {
+  pw_path (x->source, "%s/%s.c", x->folder, x->key);
+  pw_path (x->log, "%s/%s.log", x->folder, x->key);
+  pw_path (x->part, "%s/%s.%ld.part", x->folder, x->key, (long)getpid ());
+  pw_path (x->object, "%s/%s.so", x->folder, x->key);
 }
 
 /* ---- Loading ---- */
@@ -215,9 +208,8 @@ static int code_compile_cached (code_job *x, pw_error *error) {
 }
 
 static int code_compile_temporary (code_job *x, pw_error *error) {
-  free (x->folder);
-  x->folder = pw_temporary_folder (error);
-  if (x->folder == NULL || code_paths (x, error) != PW_OK) return PW_RESOURCE;
+  if (pw_temporary_folder (x->folder, error) != PW_OK) return PW_RESOURCE;
+  code_paths (x);
   FILE *source = code_lock (x);
   int status =
       source ? code_compile (x, source, error) : pw_fail (error, PW_RESOURCE, "cannot write into %s", x->folder);
@@ -229,10 +221,9 @@ static int code_compile_temporary (code_job *x, pw_error *error) {
 
 static int code_open (code_job *x, pw_error *error) {
   int status = code_identify (x, error);
-  x->folder = pw_cache_folder (x->code->notice, sizeof x->code->notice);
-  if (status == PW_OK && x->folder) {
-    status = code_paths (x, error);
-    if (status == PW_OK) status = code_load_cached (x);
+  if (pw_cache_folder (x->folder, x->code->notice, sizeof x->code->notice) && status == PW_OK) {
+    code_paths (x);
+    status = code_load_cached (x);
     if (status == PW_RETRY) status = code_compile_cached (x, error);
     if (status != PW_RETRY) return status;
   }
@@ -243,8 +234,6 @@ pw_scene_code *pw_scene_lanes_open (const char *text, const pw_system *s, int la
   if (pw_require (text, "specialised code", error) != PW_OK || pw_require (s, "a system", error) != PW_OK) return NULL;
   code_job x = { .system = s, .text = text, .lanes = lanes, .code = calloc (1, sizeof *x.code) };
   int status = x.code ? code_open (&x, error) : pw_fail (error, PW_RESOURCE, "out of memory");
-  char *const path[] = { x.folder, x.source, x.log, x.part, x.object };
-  for (int i = 0; i < 5; i++) free (path[i]);
   if (status == PW_OK) return x.code;
   free (x.code);
   return NULL;

@@ -24,39 +24,33 @@ static int search_no_memory (pw_error *error) {
 /* What folders are relative to: the folder of the running program, that of this library. */
 typedef enum { SEARCH_PROGRAM, SEARCH_LIBRARY, SEARCH_ANCHORS } search_anchor;
 
-/* Stores the folder of the running program or of this library, malloced; NULL if unknown. */
-static int search_anchor_folder (search_anchor anchor, char **folder, pw_error *error) {
-  char path[PATH_MAX];
-  *folder = NULL;
-  if (anchor == SEARCH_PROGRAM) {
-    ssize_t n = readlink ("/proc/self/exe", path, sizeof path - 1);
-    if (n <= 0) return PW_OK;
-    path[n] = 0;
-  } else {
-    static const char here = 0; /* an address inside this library */
-    Dl_info info;
-    if (dladdr (&here, &info) == 0 || info.dli_fname == NULL) return PW_OK;
-    if (realpath (info.dli_fname, path) == NULL) return errno == ENOMEM ? search_no_memory (error) : PW_OK;
+typedef char search_anchors[SEARCH_ANCHORS][PW_PATH];
+
+/* Stores these folders; "" if one is unknown. */
+static int search_find_anchors (search_anchors anchor, pw_error *error) {
+  static const char here = 0; /* an address inside this library */
+  Dl_info info;
+  ssize_t n = readlink ("/proc/self/exe", anchor[SEARCH_PROGRAM], PATH_MAX - 1);
+  anchor[SEARCH_PROGRAM][n > 0 ? n : 0] = 0;
+  const char *library = dladdr (&here, &info) ? info.dli_fname : NULL;
+  if (library && (library = realpath (library, anchor[SEARCH_LIBRARY])) == NULL && errno == ENOMEM)
+    return search_no_memory (error);
+  if (library == NULL) *anchor[SEARCH_LIBRARY] = 0;
+  for (int i = 0; i < SEARCH_ANCHORS; i++) {
+    char *slash = strrchr (anchor[i], '/');
+    if (slash) *slash = 0;
   }
-  char *slash = strrchr (path, '/');
-  if (slash == NULL) return PW_OK;
-  *slash = 0;
-  *folder = strdup (path);
-  return *folder ? PW_OK : search_no_memory (error);
+  return PW_OK;
 }
 
 /* Folders relative to each anchor. */
 typedef const char *const search_folders[SEARCH_ANCHORS][3];
 enum { SEARCH_FOLDERS = 3 * SEARCH_ANCHORS };
 
-/* Stores the i-th of these folders, which need not exist, malloced; NULL if its anchor is unknown. */
-static int search_place (search_folders where, int i, char **folder, pw_error *error) {
-  char *anchor;
-  int status = search_anchor_folder ((search_anchor)(i / 3), &anchor, error);
-  *folder = anchor ? pw_path_join (anchor, where[i / 3][i % 3], "") : NULL;
-  if (anchor && *folder == NULL) status = search_no_memory (error);
-  free (anchor);
-  return status;
+/* Stores the i-th of these folders, which need not exist; 0 if its anchor is unknown. */
+static int search_place (search_anchors anchor, search_folders where, int i, char folder[PW_PATH]) {
+  pw_path (folder, "%s/%s", anchor[i / 3], where[i / 3][i % 3]);
+  return *anchor[i / 3] != 0;
 }
 
 /* ---- Model files ---- */
@@ -80,16 +74,12 @@ static int search_add_file (pw_search *s, const char *name, size_t length, const
 static int search_entry (pw_search *s, const char *folder, const char *entry, pw_error *error) {
   const char *ending = pw_ends_with (entry, ".so") ? ".so" : pw_ends_with (entry, ".yaml") ? ".yaml" : NULL;
   if (ending == NULL || entry[0] == '.' || !pw_is_text (entry)) return PW_OK;
-  char *path = pw_path_join (folder, entry, "");
-  if (path == NULL) return search_no_memory (error);
-  char *real = realpath (path, NULL);
+  char path[PW_PATH], real[PW_PATH];
   struct stat info;
-  int status = real || errno != ENOMEM ? PW_OK : search_no_memory (error);
-  if (real && stat (real, &info) == 0 && S_ISREG (info.st_mode))
-    status = search_add_file (s, entry, strlen (entry) - strlen (ending), real, error);
-  free (real);
-  free (path);
-  return status;
+  if (realpath (pw_path (path, "%s/%s", folder, entry), real) == NULL)
+    return errno == ENOMEM ? search_no_memory (error) : PW_OK;
+  if (stat (real, &info) != 0 || !S_ISREG (info.st_mode)) return PW_OK;
+  return search_add_file (s, entry, strlen (entry) - strlen (ending), real, error);
 }
 
 /* Adds a folder to s->folders if there is room; 0 if it is there already, so that it is searched once. */
@@ -103,12 +93,11 @@ static int search_add_folder (pw_search *s, const char *real) {
 
 /* Adds the models in a folder; skips missing and inaccessible folders, as shells do with PATH. */
 static int search_folder (pw_search *s, const char *folder, pw_error *error) {
-  char *real = realpath (folder, NULL);
-  if (real == NULL && errno == ENOMEM) return search_no_memory (error);
-  int is_new = real && search_add_folder (s, real);
-  free (real);
-  DIR *dir = is_new ? opendir (folder) : NULL;
-  if (is_new && dir == NULL && (errno == ENOMEM || errno == EMFILE || errno == ENFILE))
+  char real[PW_PATH];
+  if (realpath (folder, real) == NULL) return errno == ENOMEM ? search_no_memory (error) : PW_OK;
+  if (!search_add_folder (s, real)) return PW_OK;
+  DIR *dir = opendir (folder);
+  if (dir == NULL && (errno == ENOMEM || errno == EMFILE || errno == ENFILE))
     return pw_fail (error, PW_RESOURCE, "cannot look into the folder %s: %s", folder, strerror (errno));
   if (dir == NULL) return PW_OK;
   int status = PW_OK;
@@ -120,10 +109,9 @@ static int search_folder (pw_search *s, const char *folder, pw_error *error) {
 
 /* Whether a folder can be searched; if not, adds it to s->unread with the reason. */
 static int search_is_readable (pw_search *s, const char *folder) {
-  char inside[PATH_MAX];
+  char inside[PW_PATH];
   size_t used = strlen (s->unread);
-  snprintf (inside, sizeof inside, "%s/.", folder);
-  if (access (inside, R_OK | X_OK) == 0) return 1;
+  if (access (pw_path (inside, "%s/.", folder), R_OK | X_OK) == 0) return 1;
   snprintf (s->unread + used, sizeof s->unread - used, "%s%.80s (%s)", used ? ", " : "", folder, strerror (errno));
   return 0;
 }
@@ -149,14 +137,13 @@ static int search_order (const void *a, const void *b) {
 int pw_search_open (pw_search *s, pw_error *error) {
   static const search_folders where = { { "models", "../models", "../lib/pinwheel/models" },
                                         { "models", "../models", "pinwheel/models" } };
+  search_anchors anchor;
+  char folder[PW_PATH];
   *s = (pw_search){ .count = 0 };
   int status = search_environment (s, error);
-  for (int i = 0; i < SEARCH_FOLDERS && status == PW_OK; i++) {
-    char *folder;
-    status = search_place (where, i, &folder, error);
-    if (folder) status = search_folder (s, folder, error);
-    free (folder);
-  }
+  if (status == PW_OK) status = search_find_anchors (anchor, error);
+  for (int i = 0; i < SEARCH_FOLDERS && status == PW_OK; i++)
+    if (search_place (anchor, where, i, folder)) status = search_folder (s, folder, error);
   if (s->count > 1) qsort (s->found, (size_t)s->count, sizeof *s->found, search_order);
   return status;
 }
@@ -168,27 +155,25 @@ void pw_search_close (pw_search *s) {
 
 /* ---- Other files ---- */
 
-/* Stores the path of the first of the files of this name that can be read, malloced; NULL if there is none. */
-static int search_find (search_folders where, const char *file, char **path, pw_error *error) {
-  int status = PW_OK;
-  *path = NULL;
-  for (int i = 0; i < SEARCH_FOLDERS && *path == NULL && status == PW_OK; i++) {
-    char *folder;
-    status = search_place (where, i, &folder, error);
-    if (folder && (*path = pw_path_join (folder, file, "")) == NULL) status = search_no_memory (error);
-    if (*path && access (*path, R_OK) != 0) free (*path), *path = NULL;
-    free (folder);
-  }
+/* Stores the path of the first of the files of this name that can be read; "" if there is none. */
+static int search_find (search_folders where, const char *file, char path[PW_PATH], pw_error *error) {
+  search_anchors anchor;
+  char folder[PW_PATH];
+  int status = search_find_anchors (anchor, error);
+  for (int i = 0; i < SEARCH_FOLDERS && status == PW_OK; i++)
+    if (search_place (anchor, where, i, folder) && access (pw_path (path, "%s/%s", folder, file), R_OK) == 0)
+      return PW_OK;
+  *path = 0;
   return status;
 }
 
-int pw_search_header (char **path, pw_error *error) {
+int pw_search_header (char path[PW_PATH], pw_error *error) {
   static const search_folders where = { { "include", "../include", "../include/pinwheel" },
                                         { "include", "../include", "../include/pinwheel" } };
   return search_find (where, "pinwheel.h", path, error);
 }
 
-int pw_search_page_file (const char *file, char **path, pw_error *error) {
+int pw_search_page_file (const char *file, char path[PW_PATH], pw_error *error) {
   static const search_folders where = { { "page", "../page", "../lib/pinwheel/page" },
                                         { "page", "../page", "pinwheel/page" } };
   return search_find (where, file, path, error);

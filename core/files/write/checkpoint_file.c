@@ -11,9 +11,8 @@ static unsigned long long checkpoint_sum (const char *head, size_t head_size, co
 }
 
 int pw_checkpoint_put (pw_output *o, const char *head, const pw_archive *state, pw_error *error) {
-  char line[100];
-  snprintf (line, sizeof line, "state = %zu bytes, check sum %016llx\n", state->used,
-            checkpoint_sum (head, strlen (head), state->at, state->used));
+  const char *line = PW_PRINTED (100, "state = %zu bytes, check sum %016llx\n", state->used,
+                                 checkpoint_sum (head, strlen (head), state->at, state->used));
   int status = pw_output_text (o, head, strlen (head), error);
   if (status == PW_OK) status = pw_output_text (o, line, strlen (line), error);
   if (status == PW_OK) status = pw_output_text (o, (const char *)state->at, state->used, error);

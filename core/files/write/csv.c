@@ -61,22 +61,15 @@ static void csv_number (pw_csv *c, double value) {
   c->cells++;
 }
 
-static void csv_cell (pw_csv *c, const char *name, const char *unit, double value) {
-  if (c->content == CSV_NAMES)
-    csv_name (c, name, unit);
-  else
-    csv_number (c, value);
-}
+/* Writes the name of the next column or its value, and evaluates only that. */
+#define CSV_CELL(c, name, unit, value) ((c)->content == CSV_NAMES ? csv_name (c, name, unit) : csv_number (c, value))
 
 /* ---- Lines ---- */
 
 static void csv_state (pw_csv *c, const pw_sample *x, int state) {
-  char name[300];
   int n = pw_system_coordinates (c->system);
-  if (c->content == CSV_NAMES)
-    csv_name (c, pw_system_state_name (c->system, state, name, sizeof name), pw_system_state_unit (c->system, state));
-  else
-    csv_number (c, state < n ? x->q[state] : x->v[state - n]);
+  CSV_CELL (c, PW_NAME (pw_system_state_name, c->system, state), pw_system_state_unit (c->system, state),
+            state < n ? x->q[state] : x->v[state - n]);
 }
 
 static void csv_states (pw_csv *c, const pw_sample *x) {
@@ -90,47 +83,38 @@ static void csv_states (pw_csv *c, const pw_sample *x) {
 }
 
 static void csv_contacts (pw_csv *c) {
-  char name[300] = "";
   for (int e = 0; c->workspace && e < pw_system_elements (c->system); e++) {
     const pw_element_info x = pw_system_element (c->system, e);
-    for (int i = 0; x.contact >= 0 && i < 2; i++) {
-      if (c->content == CSV_NAMES) snprintf (name, sizeof name, "%s.%c", x.name, "xy"[i]);
-      csv_cell (c, name, "m", c->contact[x.contact][i]);
-    }
+    for (int i = 0; x.contact >= 0 && i < 2; i++)
+      CSV_CELL (c, PW_PRINTED (300, "%s.%c", x.name, "xy"[i]), "m", c->contact[x.contact][i]);
   }
 }
 
 static void csv_reactions (pw_csv *c, const pw_sample *x) {
-  char name[300];
   for (int i = 0; i < pw_system_rows (c->system); i++)
-    if (c->content == CSV_NAMES)
-      csv_name (c, pw_system_reaction_name (c->system, i, name, sizeof name), pw_system_reaction_unit (c->system, i));
-    else
-      csv_number (c, 0 - x->lambda[i]); /* avoids -0 */
+    CSV_CELL (c, PW_NAME (pw_system_reaction_name, c->system, i), pw_system_reaction_unit (c->system, i),
+              0 - x->lambda[i]); /* avoids -0 */
 }
 
 static void csv_ledger (pw_csv *c, const pw_sample *x) {
-  char name[300] = "";
-  csv_cell (c, "kinetic", "J", x->kinetic);
-  csv_cell (c, "potential", "J", x->potential);
-  for (int i = 0; i < pw_system_ledger_entries (c->system); i++) {
-    if (c->content == CSV_NAMES) pw_system_ledger_name (c->system, i, name, sizeof name);
-    csv_cell (c, name, "J", x->ledger ? x->ledger[i] : NAN);
-  }
-  csv_cell (c, "projection", "J", x->projection);
-  csv_cell (c, "balance", "J", x->balance);
+  CSV_CELL (c, "kinetic", "J", x->kinetic);
+  CSV_CELL (c, "potential", "J", x->potential);
+  for (int i = 0; i < pw_system_ledger_entries (c->system); i++)
+    CSV_CELL (c, PW_NAME (pw_system_ledger_name, c->system, i), "J", x->ledger ? x->ledger[i] : NAN);
+  CSV_CELL (c, "projection", "J", x->projection);
+  CSV_CELL (c, "balance", "J", x->balance);
 }
 
 static int csv_line (pw_csv *c, csv_content content, const pw_sample *x, pw_error *error) {
   errno = 0; /* for pw_output_check */
   c->content = content;
   c->cells = 0;
-  csv_cell (c, "t", "s", x->t);
+  CSV_CELL (c, "t", "s", x->t);
   csv_states (c, x);
   csv_contacts (c);
   csv_reactions (c, x);
-  csv_cell (c, "residual.position", NULL, x->position);
-  csv_cell (c, "residual.velocity", NULL, x->velocity);
+  CSV_CELL (c, "residual.position", NULL, x->position);
+  CSV_CELL (c, "residual.velocity", NULL, x->velocity);
   if (c->ledger) csv_ledger (c, x);
   c->columns = (size_t)c->cells;
   if (c->failed) return pw_fail (error, PW_RESOURCE, "out of memory while writing a table");

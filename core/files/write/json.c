@@ -85,12 +85,12 @@ static void json_bodies (pw_json *j, const pw_system *s, const pw_sample *x) {
 
 /* Internal coordinates "ELEMENT.NAME" and their velocities, one object per element. */
 static void json_elements (pw_json *j, const pw_system *s, const pw_sample *x) {
-  char name[300], element[300] = "";
+  char element[300] = "";
   int n = pw_system_coordinates (s), first = 3 * pw_system_bodies (s);
   if (n == first) return;
   pw_json_open (j, "elements", '{');
   for (int i = first; i < n; i++) {
-    char *dot = strrchr (pw_system_state_name (s, i, name, sizeof name), '.');
+    char *name = PW_NAME (pw_system_state_name, s, i), *dot = strrchr (name, '.');
     *dot = 0;
     if (strcmp (element, name) != 0) {
       if (*element) pw_json_close (j, '}');
@@ -98,17 +98,16 @@ static void json_elements (pw_json *j, const pw_system *s, const pw_sample *x) {
       pw_json_open (j, element, '{');
     }
     pw_json_number (j, dot + 1, x->q[i]);
-    pw_json_number (j, strrchr (pw_system_state_name (s, n + i, name, sizeof name), '.') + 1, x->v[i]);
+    pw_json_number (j, strrchr (PW_NAME (pw_system_state_name, s, n + i), '.') + 1, x->v[i]);
   }
   pw_json_close (j, '}');
   pw_json_close (j, '}');
 }
 
 static void json_reactions (pw_json *j, const pw_system *s, const pw_sample *x) {
-  char name[300];
   pw_json_open (j, "reactions", '{');
   for (int i = 0; i < pw_system_rows (s); i++)
-    pw_json_number (j, pw_system_reaction_name (s, i, name, sizeof name), 0 - x->lambda[i]);
+    pw_json_number (j, PW_NAME (pw_system_reaction_name, s, i), 0 - x->lambda[i]);
   pw_json_close (j, '}');
 }
 
@@ -141,13 +140,12 @@ static void json_sample (pw_json *j, const pw_system *s, const pw_sample *x, int
 /* ---- The run ---- */
 
 static void json_lists (pw_json *j, const char *const *redundant, const pw_system *s) {
-  char name[300];
   pw_json_open (j, "redundant", '[');
   for (; redundant && *redundant; redundant++) pw_json_text (j, NULL, *redundant);
   pw_json_close (j, ']');
   pw_json_open (j, "differences", '[');
   for (int i = 0, n = s ? pw_system_differences (s) : 0; i < n; i++)
-    pw_json_text (j, NULL, pw_system_difference_name (s, i, name, sizeof name));
+    pw_json_text (j, NULL, PW_NAME (pw_system_difference_name, s, i));
   pw_json_close (j, ']');
 }
 

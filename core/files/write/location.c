@@ -38,10 +38,9 @@ static const char *location_base (const char *path) {
   return slash ? slash + 1 : path;
 }
 
-char *pw_folder_of (const char *path) {
-  size_t n = (size_t)(location_base (path) - path);
-  if (n == 0) return strdup (".");
-  return strndup (path, n > 1 ? n - 1 : 1);
+char *pw_folder_of (char folder[PW_PATH], const char *path) {
+  int n = (int)(location_base (path) - path);
+  return pw_path (folder, "%.*s", n > 1 ? n - 1 : 1, n ? path : ".");
 }
 
 static int location_same (const struct stat *a, const struct stat *b) {
@@ -51,33 +50,29 @@ static int location_same (const struct stat *a, const struct stat *b) {
 /* The descriptor of this process that a path in /dev/fd or /proc/self/fd means, or -1. */
 static int location_descriptor (const char *path) {
   const char *base = location_base (path);
+  char folder[PW_PATH];
   struct stat here, descriptors;
   size_t digits = strspn (base, "0123456789");
   if (digits == 0 || digits > 9 || base[digits]) return -1;
-  char *folder = pw_folder_of (path);
-  int found =
-      folder && stat (folder, &here) == 0 && stat ("/dev/fd", &descriptors) == 0 && location_same (&here, &descriptors);
-  free (folder);
+  int found = stat (pw_folder_of (folder, path), &here) == 0 && stat ("/dev/fd", &descriptors) == 0 &&
+              location_same (&here, &descriptors);
   return found ? atoi (base) : -1;
 }
 
 /* Replaces the path of a link by its target.  0 or an errno value. */
 static int location_follow (pw_location *p) {
-  char target[4096];
+  char target[PW_PATH], folder[PW_PATH];
   ssize_t n = readlink (p->path, target, sizeof target - 1);
   if (n < 0) return errno;
   target[n] = 0;
-  char *folder = *target == '/' ? NULL : pw_folder_of (p->path);
-  char *path = folder ? pw_path_join (folder, target, "") : strdup (target);
-  free (folder);
-  free (p->path);
-  p->path = path;
-  return path ? 0 : ENOMEM;
+  pw_folder_of (folder, p->path);
+  *target == '/' ? strcpy (p->path, target) : pw_path (p->path, "%s/%s", folder, target);
+  return 0;
 }
 
 int pw_locate (pw_location *p, const char *path) {
-  *p = (pw_location){ .path = strdup (path), .descriptor = strcmp (path, "-") == 0 ? STDOUT_FILENO : -1 };
-  if (p->path == NULL) return ENOMEM;
+  *p = (pw_location){ .descriptor = strcmp (path, "-") == 0 ? STDOUT_FILENO : -1 };
+  pw_path (p->path, "%s", path);
   for (int links = 0, code; links < LOCATION_LINKS; links++) {
     if (p->descriptor < 0) p->descriptor = location_descriptor (p->path);
     p->exists = (p->descriptor >= 0 ? fstat (p->descriptor, &p->info) : lstat (p->path, &p->info)) == 0;
@@ -97,15 +92,12 @@ typedef struct {
   int known;          /* 1: `folder` was found */
 } location_use;
 
-/* Ignores files that cannot be located, since opening them reports it.  PW_RESOURCE if out of memory. */
-static int location_use_find (location_use *u, const pw_use *use) {
-  *u = (location_use){ .use = use };
-  int code = use->path ? pw_locate (&u->location, use->path) : ENOENT;
-  if (code) return code == ENOMEM ? PW_RESOURCE : PW_OK;
-  char *folder = pw_folder_of (u->location.path);
-  u->known = folder && stat (folder, &u->folder) == 0;
-  free (folder);
-  return folder ? PW_OK : PW_RESOURCE;
+/* Ignores files that cannot be located, since opening them reports it. */
+static void location_use_find (location_use *u, const pw_use *use) {
+  char folder[PW_PATH];
+  u->use = use;
+  if (use->path == NULL || pw_locate (&u->location, use->path) != 0) return;
+  u->known = stat (pw_folder_of (folder, u->location.path), &u->folder) == 0;
 }
 
 /* Whether a name is `before` (NULL: any name) followed by one of the endings. */
@@ -149,13 +141,11 @@ static int location_fail (const pw_use *a, const pw_use *b, pw_error *error) {
 
 int pw_check_paths (const pw_use *use, int count, pw_error *error) {
   location_use *u = calloc ((size_t)count, sizeof *u);
-  int status = u ? PW_OK : PW_RESOURCE;
-  for (int i = 0; i < count && status == PW_OK; i++) status = location_use_find (u + i, use + i);
-  if (status != PW_OK) pw_fail (error, status, "out of memory");
+  int status = u ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+  for (int i = 0; i < count && u; i++) location_use_find (u + i, use + i);
   for (int i = 0; i < count && status == PW_OK; i++)
     for (int k = 0; k < count && status == PW_OK; k++)
       if (i != k && location_conflicts (u + i, u + k)) status = location_fail (u[i].use, u[k].use, error);
-  for (int i = 0; u && i < count; i++) free (u[i].location.path);
   free (u);
   return status;
 }

@@ -10,25 +10,22 @@
 #include "files.h"
 
 struct pw_output {
-  FILE *stream;  /* NULL: closed, but not renamed yet */
-  char *path;    /* as the user knows it */
-  char *real;    /* of the file itself, links followed */
-  char *part;    /* its temporary name; NULL: written directly */
-  char *old;     /* second name of the file that it replaces, while several are renamed */
-  int file;      /* keeps the temporary file locked; -1: written directly */
-  int folder;    /* that contains it; -1: written directly, or the folder is not readable */
-  int code;      /* errno of the first failed write; -1: unknown; 0: none has failed */
-  int continued; /* 1: opened by pw_output_continue */
-  int discard;   /* 1: the temporary file is removed if finishing fails */
+  FILE *stream;       /* NULL: closed, but not renamed yet */
+  char path[PW_PATH]; /* as the user knows it */
+  char real[PW_PATH]; /* of the file itself, links followed */
+  char part[PW_PATH]; /* its temporary name; "": written directly */
+  char old[PW_PATH];  /* second name of the file that it replaces, while several are renamed */
+  int file;           /* keeps the temporary file locked; -1: written directly */
+  int folder;         /* that contains it; -1: written directly, or the folder is not readable */
+  int code;           /* errno of the first failed write; -1: unknown; 0: none has failed */
+  int continued;      /* 1: opened by pw_output_continue */
+  int discard;        /* 1: the temporary file is removed if finishing fails */
 };
 
 static void output_free (pw_output *o) {
   if (o == NULL) return;
   if (o->file >= 0) close (o->file);
   if (o->folder >= 0) close (o->folder);
-  free (o->path);
-  free (o->real);
-  free (o->part);
   free (o);
 }
 
@@ -47,7 +44,7 @@ static int output_fail (const pw_output *o, int code, pw_error *error) {
 
 /* The same, and names the temporary file, if that remains. */
 static int output_fail_with_part (const pw_output *o, int code, pw_error *error) {
-  if (o->part == NULL || o->discard) return output_fail (o, code, error);
+  if (*o->part == 0 || o->discard) return output_fail (o, code, error);
   return pw_fail (error, PW_RESOURCE, "cannot write %.200s: %s; what was written is in %.200s", output_shown (o),
                   output_reason (code), o->part);
 }
@@ -94,12 +91,9 @@ static int output_stream (pw_output *o) {
 }
 
 static int output_open_part (pw_output *o, pw_lock_mode lock_mode) {
-  char *folder = pw_folder_of (o->real);
-  if (folder == NULL) return ENOMEM;
-  o->folder = open (folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  int code = o->folder < 0 && errno != EACCES ? errno : 0; /* a folder that cannot be listed may still be writable */
-  free (folder);
-  if (code) return code;
+  char folder[PW_PATH];
+  o->folder = open (pw_folder_of (folder, o->real), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (o->folder < 0 && errno != EACCES) return errno; /* a folder that cannot be listed may still be writable */
   o->file = pw_lock_file (o->part, lock_mode);
   return o->file < 0 ? errno : 0;
 }
@@ -116,21 +110,19 @@ static int output_locate (const char *path, pw_location *p, int *direct) {
 char *pw_output_path (const char *path, pw_error *error) {
   pw_location p;
   int direct, code = output_locate (path, &p, &direct);
-  if (code == 0 && !direct) return p.path;
-  pw_fail (error, PW_RESOURCE, "cannot write %s: %s", path, code ? strerror (code) : pw_not_regular (p.info.st_mode));
-  free (p.path);
-  return NULL;
+  char *copy = code || direct ? NULL : strdup (p.path);
+  const char *why = code ? strerror (code) : direct ? pw_not_regular (p.info.st_mode) : "out of memory";
+  if (copy == NULL) pw_fail (error, PW_RESOURCE, "cannot write %s: %s", path, why);
+  return copy;
 }
 
-/* Finds the location `p`, and o->part and o->old, in one allocation, unless the file is written directly. */
+/* Finds the location `p`, and the other names of the file unless it is written directly. */
 static int output_name (pw_output *o, pw_location *p, const char *ending) {
   int direct, code = output_locate (o->path, p, &direct);
-  o->real = p->path;
   if (code || direct) return code;
-  size_t size = strlen (o->real) + strlen (ending) + 1;
-  if ((o->part = malloc (2 * size + strlen (".old"))) == NULL) return ENOMEM;
-  snprintf (o->part, size, "%s%s", o->real, ending);
-  o->old = strcat (strcpy (o->part + size, o->part), ".old");
+  pw_path (o->real, "%s", p->path);
+  pw_path (o->part, "%s%s", o->real, ending);
+  pw_path (o->old, "%s.old", o->part);
   return 0;
 }
 
@@ -138,7 +130,7 @@ static int output_open_file (pw_output *o, const char *ending) {
   pw_location p;
   int code = output_name (o, &p, ending);
   if (code) return code;
-  if (o->part == NULL) return output_open_direct (o, &p);
+  if (*o->part == 0) return output_open_direct (o, &p);
   code = output_open_part (o, PW_LOCK_NEW);
   if (code == 0 && p.exists) code = output_inherit (o->file, &p.info);
   if (code == 0) code = output_stream (o);
@@ -147,14 +139,14 @@ static int output_open_file (pw_output *o, const char *ending) {
 }
 
 static pw_output *output_new (const char *path, pw_error *error) {
-  pw_output *o = calloc (1, sizeof *o);
-  if (o) o->file = o->folder = -1;
-  if (o) o->path = strdup (path);
-  if (o && o->path && *path) return o;
-  int empty = o && o->path;
-  pw_fail (error, empty ? PW_INPUT : PW_RESOURCE, empty ? "the name of a file to write is empty" : "out of memory");
-  output_free (o);
-  return NULL;
+  pw_output *o = *path ? calloc (1, sizeof *o) : NULL;
+  if (o == NULL) {
+    pw_fail (error, *path ? PW_RESOURCE : PW_INPUT, *path ? "out of memory" : "the name of a file to write is empty");
+    return NULL;
+  }
+  o->file = o->folder = -1;
+  pw_path (o->path, "%s", path);
+  return o;
 }
 
 pw_output *pw_output_open_as (const char *path, const char *ending, pw_error *error) {
@@ -178,7 +170,7 @@ FILE *pw_output_stream (pw_output *o) {
 }
 
 int pw_output_is_file (const pw_output *o) {
-  return o->part != NULL;
+  return *o->part != 0;
 }
 
 int pw_output_check (pw_output *o, pw_error *error) {
@@ -228,15 +220,15 @@ static void output_truncate (pw_output *o) {
 char *pw_output_abandon (pw_output *o, char *buffer, size_t size) {
   if (o->stream) output_close (o, fflush (o->stream));
   buffer[0] = 0;
-  if (o->part && !pw_output_named (o, ".npz")) output_truncate (o); /* archives are complete, and have no lines */
-  if (o->part) snprintf (buffer, size, "%s", o->part);
+  if (*o->part && !pw_output_named (o, ".npz")) output_truncate (o); /* archives are complete, and have no lines */
+  if (*o->part) snprintf (buffer, size, "%s", o->part);
   output_free (o);
   return *buffer ? buffer : NULL;
 }
 
 void pw_output_discard (pw_output *o) {
   output_close (o, 0);
-  if (o->part) unlink (o->part);
+  if (*o->part) unlink (o->part);
   output_free (o);
 }
 
@@ -250,15 +242,15 @@ static int output_sync_folder (const pw_output *o, pw_error *error) {
 /* Renames all files or none.  Until the last one is renamed, replaced files keep a second name, a hard link. */
 static int output_rename_all (pw_output *const *o, int count, pw_error *error) {
   int last = count - 1, renamed = 0, status = PW_OK;
-  while (last > 0 && (o[last] == NULL || o[last]->part == NULL)) last--;
+  while (last > 0 && (o[last] == NULL || *o[last]->part == 0)) last--;
   for (int i = 0; i <= last && status == PW_OK; i++) {
-    if (o[i] == NULL || o[i]->part == NULL) continue;
+    if (o[i] == NULL || *o[i]->part == 0) continue;
     if (i < last) unlink (o[i]->old), (void)!link (o[i]->real, o[i]->old);
     if (rename (o[i]->part, o[i]->real) != 0) status = output_fail_with_part (o[i], errno, error);
     renamed = i;
   }
   for (int i = 0; i < last; i++) {
-    if (o[i] == NULL || o[i]->part == NULL) continue;
+    if (o[i] == NULL || *o[i]->part == 0) continue;
     if (status != PW_OK && i < renamed) (void)rename (o[i]->real, o[i]->part), (void)rename (o[i]->old, o[i]->real);
     unlink (o[i]->old);
   }
@@ -315,7 +307,7 @@ int pw_output_continued (const pw_output *o) {
 }
 
 int pw_output_mark (pw_output *o, pw_mark *mark, pw_error *error) {
-  if (o->part == NULL)
+  if (*o->part == 0)
     return pw_fail (error, PW_INPUT, "%s cannot be continued: it is not a regular file",
                     o->stream == stdout ? "standard output" : o->path);
   int code = output_sync (o);
@@ -343,7 +335,7 @@ static int output_reopen (pw_output *o, const pw_mark *mark, pw_error *error) {
   pw_location p;
   int code = output_name (o, &p, ".part");
   if (code) return output_fail (o, code, error);
-  if (o->part == NULL) return pw_fail (error, PW_INPUT, "cannot continue %s: it is not a regular file", o->path);
+  if (*o->part == 0) return pw_fail (error, PW_INPUT, "cannot continue %s: it is not a regular file", o->path);
   code = output_open_part (o, PW_LOCK_EXISTING);
   int absent = code == ENOENT;
   if (absent) code = output_restore_part (o, mark);

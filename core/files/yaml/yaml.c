@@ -73,14 +73,13 @@ static int yaml_default (const pw_reader *r, const pw_node *node, const char *la
 static int yaml_parameter (const pw_reader *r, const pw_node *node, pw_names *names, pw_parameter *p) {
   static const char *const key[] = { "name", "value", "unit", "about", "domain", "min", NULL };
   const pw_node *v[sizeof key / sizeof *key];
-  char label[100];
   if (pw_yaml_keys (r, node, key, "a parameter", v) != PW_OK) return r->error->status;
   const pw_node *name = v[0], *value = v[1], *unit = v[2], *about = v[3], *domain = v[4], *min = v[5];
   if (name == NULL) return pw_yaml_fail (r, node->at, "a parameter needs a name");
   if (yaml_new_name (r, name, "parameter", names) != PW_OK) return r->error->status;
   p->name = name->text;
   p->unit = p->about = "";
-  snprintf (label, sizeof label, "parameter %s", p->name);
+  const char *label = PW_PRINTED (100, "parameter %s", p->name);
   if (value == NULL) return pw_yaml_fail (r, node->at, "%s needs a value, its default", label);
   yaml_domain (r, domain, min, &p->domain);
   yaml_unit (r, unit, value, &p->unit);
@@ -155,8 +154,9 @@ static int yaml_head (pw_yaml *y, const pw_reader *r) {
 pw_yaml *pw_yaml_open (const char *path, const char *shown, size_t max_bytes, pw_error *error) {
   const char *slash = strrchr (path, '/');
   pw_yaml *y = calloc (1, sizeof *y);
-  if (y) y->path = strdup (shown);
-  if (y) y->folder = slash ? strndup (path, (size_t)(slash - path)) : strdup ("."); /* "" for "/model.yaml" */
+  if (y) y->path = pw_arena_copy (&y->arena, shown);
+  if (y) y->folder = pw_arena_copy (&y->arena, slash ? path : ".");
+  if (y && y->folder && slash) y->folder[slash - path] = 0; /* "" for "/model.yaml" */
   if (y == NULL || y->path == NULL || y->folder == NULL) {
     pw_fail (error, PW_RESOURCE, "out of memory");
     pw_yaml_close (y);
@@ -175,8 +175,6 @@ void pw_yaml_close (pw_yaml *y) {
   if (y == NULL) return;
   pw_arena_free (&y->arena);
   free (y->source);
-  free (y->path);
-  free (y->folder);
   free (y);
 }
 
@@ -191,9 +189,8 @@ static int yaml_each_table (const pw_yaml *y, const pw_node *node, int (*each) (
   for (const pw_node *n = node->type == PW_YAML_SCALAR ? NULL : node->first; n && !stop; n = n->next) {
     const pw_node *value = node->type == PW_YAML_MAP ? n->next : NULL;
     if (value && n->type == PW_YAML_SCALAR && strcmp (n->text, "file") == 0 && value->type == PW_YAML_SCALAR) {
-      char *path = pw_path_join (y->folder, value->text, "");
-      stop = path ? each (context, path) : PW_RESOURCE;
-      free (path);
+      char path[PW_PATH];
+      stop = each (context, pw_path (path, "%s/%s", y->folder, value->text));
     }
     if (!stop) stop = yaml_each_table (y, n, each, context);
   }

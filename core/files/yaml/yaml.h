@@ -85,7 +85,7 @@ int pw_yaml_line (const pw_yaml *y, size_t at);
 
 int pw_yaml_read_tree (pw_yaml *y, pw_error *error);
 
-/* Loads what pw_yaml_write_tree wrote (yaml_stored.c).  PW_INPUT if it is incomplete or memory is exhausted. */
+/* Loads what pw_yaml_write_tree wrote (yaml_stored.c).  PW_INPUT if it is incomplete; PW_RESOURCE. */
 int pw_yaml_load_tree (pw_yaml *y, const char *bytes, size_t size, pw_error *error);
 
 /* ---- Reading the tree (yaml_read.c) ---- */

@@ -29,12 +29,10 @@ static int build_fail (const pw_reader *r, const pw_node *node, const pw_error *
 static void build_triple (const pw_reader *r, const pw_node *node, const char *label, const char *const key[4],
                           double value[3], unsigned *specified, int first_bit) {
   const pw_node *v[4];
-  char name[200];
   pw_yaml_keys (r, node, key, label, v);
   for (int i = 0; i < 3; i++) {
     if (v[i] == NULL) continue;
-    snprintf (name, sizeof name, "%s: %s", label, key[i]);
-    pw_yaml_number (r, v[i], name, PW_REAL, &value[i]);
+    pw_yaml_number (r, v[i], PW_PRINTED (200, "%s: %s", label, key[i]), PW_REAL, &value[i]);
     *specified |= 1u << (first_bit + i);
   }
 }
@@ -45,17 +43,16 @@ static int build_body (pw_reader *r, const pw_node *node) {
   const pw_node *v[sizeof key / sizeof *key];
   pw_body body = { .specified = PW_SPECIFIES_NOTHING };
   pw_error cause = { 0 };
-  char label[160];
   if (pw_yaml_keys (r, node, key, "a body", v) != PW_OK) return r->error->status;
   const pw_node *name = v[0];
   if (name == NULL) return pw_yaml_fail (r, node->at, "a body needs a name");
   if (build_name (r, name, "body", &body.name) != PW_OK) return r->error->status;
   for (int i = 0; i < 2; i++) {
-    snprintf (label, sizeof label, "body %.60s: %s", body.name, key[1 + i]);
+    const char *label = PW_PRINTED (160, "body %.60s: %s", body.name, key[1 + i]);
     pw_yaml_number (r, v[1 + i], label, PW_NONNEGATIVE, i ? &body.inertia : &body.mass);
   }
   for (int i = 0; i < 2; i++) {
-    snprintf (label, sizeof label, "%s of body %.60s", key[3 + i], body.name);
+    const char *label = PW_PRINTED (160, "%s of body %.60s", key[3 + i], body.name);
     build_triple (r, v[3 + i], label, state[i], i ? body.rate : body.start, &body.specified, 3 * i);
   }
   if (r->error->status != PW_OK) return r->error->status;
@@ -101,9 +98,8 @@ static int build_field (pw_reader *r, const pw_kind *kind, const pw_field *f, co
                                         [PW_BODY] = "bodies",
                                         [PW_SIGNAL] = "signals",
                                         [PW_CHOICE] = "choices" };
-  char label[200];
+  const char *label = PW_PRINTED (200, "%s %.60s: %s", kind->name, element, f->name);
   int count = pw_field_count (f);
-  snprintf (label, sizeof label, "%s %.60s: %s", kind->name, element, f->name);
   if (count == 1) return build_value (r, kind, f, node, label, at);
   if (pw_yaml_list_of (r, node, label, count, plural[f->type]) != PW_OK) return r->error->status;
   for (const pw_node *n = node->first; n; n = n->next, at += pw_field_bytes (f->type))
@@ -154,12 +150,11 @@ static const pw_kind *build_kind (const pw_reader *r, const pw_node *node) {
 static int build_fields (pw_reader *r, const pw_kind *kind, const pw_node *node, const char *name) {
   const char *key[PW_YAML_MAX_KEYS + 1];
   const pw_node *v[PW_YAML_MAX_KEYS + 1];
-  char label[100];
   int n = 0;
   for (const pw_field *f = kind->fields; f->name && n < PW_YAML_MAX_KEYS; f++) key[n++] = f->name;
   key[n] = NULL;
-  snprintf (label, sizeof label, "a %s", kind->name);
-  if (pw_yaml_keys_from (r, node->first->next->next, key, label, v) != PW_OK) return r->error->status;
+  if (pw_yaml_keys_from (r, node->first->next->next, key, PW_PRINTED (100, "a %s", kind->name), v) != PW_OK)
+    return r->error->status;
   for (int i = 0; i < n && r->error->status == PW_OK; i++) {
     const pw_field *f = r->field = &kind->fields[i];
     if (v[i])
@@ -189,12 +184,11 @@ static int build_element (pw_reader *r, const pw_node *node) {
 /* Defines the parameters, then the numbers of `let`, which may depend on parameters and preceding numbers. */
 static int build_let (pw_reader *r, const double *parameter) {
   const pw_yaml *y = r->y;
-  char label[100];
   double value;
   for (int i = 0; i < y->parameters; i++) pw_scope_add (r->scope, y->parameter[i].name, parameter[i]);
   for (const pw_node *n = y->let ? y->let->first : NULL; n; n = n->next->next) {
-    snprintf (label, sizeof label, "let %s", n->text);
-    if (pw_yaml_number (r, n->next, label, PW_REAL, &value) != PW_OK) return r->error->status;
+    if (pw_yaml_number (r, n->next, PW_PRINTED (100, "let %s", n->text), PW_REAL, &value) != PW_OK)
+      return r->error->status;
     pw_scope_add (r->scope, n->text, value);
   }
   return PW_OK;

@@ -94,9 +94,8 @@ static int state_of_element (const reading *e, const char *owner, const char *pa
 /* Checks that a name with a dot, at an offset of the expression, names a state. */
 static int state_check (const reading *e, const char *name, size_t at) {
   static const char *const part[] = { "x", "y", "phi", "vx", "vy", "omega" };
-  char owner[100];
   size_t n = strcspn (name, ".");
-  snprintf (owner, sizeof owner, "%.*s", (int)n, name);
+  const char *owner = PW_PRINTED (100, "%.*s", (int)n, name);
   if (pw_names_find (&e->r->bodies, owner) < 0) return state_of_element (e, owner, name + n + 1, at);
   for (int i = 0; i < 6; i++)
     if (strcmp (part[i], name + n + 1) == 0) return PW_OK;
@@ -287,15 +286,13 @@ static int reference_entry (pw_reader *r, const pw_node *n, pw_names *seen) {
   static const char *const time[] = { "t", NULL };
   pw_reference_text *t = r->reference;
   const pw_expression **x = t->context;
-  char label[100];
   const char *name;
   if (pw_yaml_text (r, n, "truth", &name) != PW_OK) return r->error->status;
   if (strchr (name, '.') == NULL)
     return pw_yaml_fail (r, n->at, "truth: expected a state such as BODY.phi, found \"%.60s\"", name);
   if (state_check (&(reading){ .r = r, .node = n, .label = "truth" }, n->text, 0) != PW_OK) return r->error->status;
   if (pw_names_add (seen, n->text, 0) >= 0) return pw_yaml_fail (r, n->at, "truth: a second \"%s\"", n->text);
-  snprintf (label, sizeof label, "truth of %.60s", n->text);
-  const reading value = { .r = r, .node = n->next, .label = label };
+  const reading value = { .r = r, .node = n->next, .label = PW_PRINTED (100, "truth of %.60s", n->text) };
   t->state[t->states] = n->text;
   int status = reading_expression (&value, time, &t->text[t->states], &x[t->states]);
   t->states += status == PW_OK;

@@ -15,7 +15,6 @@
 /* ---- Points of tables, in the model ---- */
 
 static int table_list (pw_reader *r, const char *label, const pw_node *list, pw_signal *s) {
-  char text[240];
   if (pw_yaml_list (r, list, label) != PW_OK) return r->error->status;
   size_t bytes = (size_t)list->count * sizeof (double);
   double *t = pw_arena_alloc (r->arena, bytes), *value = pw_arena_alloc (r->arena, bytes);
@@ -24,7 +23,7 @@ static int table_list (pw_reader *r, const char *label, const pw_node *list, pw_
   s->table.value = value;
   for (const pw_node *n = list->first; n; n = n->next) {
     double point[2] = { 0 };
-    snprintf (text, sizeof text, "%s: point %d", label, s->table.count + 1);
+    const char *text = PW_PRINTED (240, "%s: point %d", label, s->table.count + 1);
     if (pw_yaml_pair (r, n, text, "numbers, [time, value]", point) != PW_OK) return r->error->status;
     t[s->table.count] = point[0];
     value[s->table.count++] = point[1];
@@ -40,26 +39,16 @@ static int table_leaves_folder (const char *name) {
   return 0;
 }
 
-/* The real path of the file if it is below the folder; malloced. */
-static char *table_path_in_folder (const char *folder, const char *name, const char **reason) {
-  char *joined = pw_path_join (folder, name, ""), *path = joined ? realpath (joined, NULL) : NULL;
-  size_t n = strlen (folder); /* 0 for the root */
-  *reason = joined == NULL ? "out of memory" : strerror (errno);
-  free (joined);
-  if (path == NULL || (strncmp (path, folder, n) == 0 && (path[n] == '/' || path[n] == 0))) return path;
-  *reason = "it is a link that leads out of the model's folder";
-  free (path);
-  return NULL;
-}
-
 /* A model may only read files in its folder. */
 static FILE *table_open (const pw_yaml *y, const char *name, const char **reason) {
+  char joined[PW_PATH], path[PW_PATH];
+  size_t n = strlen (y->folder); /* 0 for the root */
   *reason = "a table must be in the model's folder: its path is relative and has no \"..\"";
   if (*name == '/' || table_leaves_folder (name)) return NULL;
-  char *path = table_path_in_folder (y->folder, name, reason);
-  FILE *f = path ? pw_open_input (path, reason) : NULL;
-  free (path);
-  return f;
+  if (realpath (pw_path (joined, "%s/%s", y->folder, name), path) == NULL) return *reason = strerror (errno), NULL;
+  *reason = "it is a link that leads out of the model's folder";
+  int is_inside = strncmp (path, y->folder, n) == 0 && (path[n] == '/' || path[n] == 0);
+  return is_inside ? pw_open_input (path, reason) : NULL;
 }
 
 /* The unit of the current field.  If it is "m or rad", the choice before it decides: rad for an angle. */
@@ -73,9 +62,8 @@ static const char *table_unit (const pw_reader *r) {
 
 static int table_file (pw_reader *r, const char *label, const pw_node *node, const pw_node *columns, pw_signal *s) {
   const char *name, *reason, *column[2] = { "1", "2" }, *const unit[2] = { "s", table_unit (r) };
+  const char *text = PW_PRINTED (240, "%s: columns", label);
   pw_error cause = { 0 };
-  char text[240];
-  snprintf (text, sizeof text, "%s: columns", label);
   if (pw_yaml_list_of (r, columns, text, 2, "columns, [time, value]") != PW_OK) return r->error->status;
   pw_yaml_text (r, columns ? columns->first : NULL, text, &column[0]);
   pw_yaml_text (r, columns ? columns->first->next : NULL, text, &column[1]);
@@ -114,11 +102,10 @@ static int table_points (pw_reader *r, const char *label, const pw_node *node, c
 /* Reads the fields of a form, except a table's points. */
 static int signal_fields (pw_reader *r, const pw_signal_form *form, const char *label, const pw_node *node,
                           const pw_node *const *v, pw_signal *signal) {
-  char text[240];
   for (int i = 0; form->fields[i].name; i++) {
     const pw_field *f = &form->fields[i];
     void *at = (char *)signal + f->offset;
-    snprintf (text, sizeof text, "%s: %s", label, f->name);
+    const char *text = PW_PRINTED (240, "%s: %s", label, f->name);
     if (v[i] == NULL && f->required) pw_yaml_fail (r, node->at, "%s is missing", text);
     if (f->type == PW_NUMBER) pw_yaml_number (r, v[i], text, f->domain, at);
     if (f->type == PW_CHOICE) pw_yaml_choice (r, v[i], text, f->choices, at);
@@ -143,15 +130,14 @@ static int signal_check (pw_reader *r, const pw_kind *kind, const char *label, c
 static int signal_read_form (pw_reader *r, const pw_kind *kind, const pw_signal_form *form, const char *label,
                              const pw_node *node, pw_signal *signal) {
   const char *key[PW_YAML_MAX_KEYS];
-  char about[100];
   const pw_node *v[PW_YAML_MAX_KEYS];
   int fields = 0, n, is_table = form->type == PW_TABLE;
   *signal = (pw_signal){ .type = form->type };
   for (const pw_field *f = form->fields; f->name; f++) key[fields++] = f->name;
   for (n = fields; is_table && n < fields + 3; n++) key[n] = table_keys[n - fields];
   key[n] = NULL;
-  snprintf (about, sizeof about, "a %s", form->name);
-  if (pw_yaml_keys (r, node, key, about, v) != PW_OK || signal_fields (r, form, label, node, v, signal) != PW_OK ||
+  if (pw_yaml_keys (r, node, key, PW_PRINTED (100, "a %s", form->name), v) != PW_OK ||
+      signal_fields (r, form, label, node, v, signal) != PW_OK ||
       (is_table && table_points (r, label, node, v + fields, signal) != PW_OK))
     return r->error->status;
   return signal_check (r, kind, label, node, is_table ? v[fields] : NULL, signal);

@@ -29,18 +29,25 @@ void pw_yaml_write_tree (const pw_yaml *y, FILE *f) {
 typedef struct {
   pw_yaml *y;
   const char *at, *end;
+  int status; /* of the load; what is incomplete is PW_INPUT */
 } stored_bytes;
+
+static void *stored_alloc (stored_bytes *x, size_t size) {
+  void *p = pw_arena_alloc (&x->y->arena, size);
+  if (p == NULL) x->status = PW_RESOURCE;
+  return p;
+}
 
 static pw_node *stored_read (stored_bytes *x, int depth) {
   stored_head h;
   if ((size_t)(x->end - x->at) < sizeof h || depth > STORED_DEPTH) return NULL;
   memcpy (&h, x->at, sizeof h);
   x->at += sizeof h;
-  pw_node *n = pw_arena_alloc (&x->y->arena, sizeof *n), **to;
+  pw_node *n = stored_alloc (x, sizeof *n), **to;
   if (n == NULL || h.count > (size_t)(x->end - x->at)) return NULL;
   *n = (pw_node){ .at = h.at, .count = (int)h.count, .type = h.type, .quoted = h.quoted };
   if (h.type == PW_YAML_SCALAR) {
-    char *text = pw_arena_alloc (&x->y->arena, (size_t)h.count + 1);
+    char *text = stored_alloc (x, (size_t)h.count + 1);
     if (text == NULL) return NULL;
     memcpy (text, x->at, h.count);
     n->text = text;
@@ -55,7 +62,9 @@ static pw_node *stored_read (stored_bytes *x, int depth) {
 }
 
 int pw_yaml_load_tree (pw_yaml *y, const char *bytes, size_t size, pw_error *error) {
-  stored_bytes x = { y, bytes, bytes + size };
+  stored_bytes x = { y, bytes, bytes + size, PW_INPUT };
   y->root = stored_read (&x, 0);
-  return y->root ? PW_OK : pw_fail (error, PW_INPUT, "%s: the stored tree is incomplete", y->path);
+  return y->root ? PW_OK
+                 : pw_fail (error, x.status, "%s: %s", y->path,
+                            x.status == PW_INPUT ? "the stored tree is incomplete" : "out of memory");
 }

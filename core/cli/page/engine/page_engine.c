@@ -50,7 +50,7 @@ int pw_open_input_status (void) {
 }
 
 char *realpath (const char *path, char *resolved) {
-  return resolved ? strcpy (resolved, path) : strdup (path);
+  return strcpy (resolved, path);
 }
 
 int pw_yaml_read_tree (pw_yaml *y, pw_error *error) {
