@@ -38,7 +38,7 @@ struct pw_run {
   double reselect_below;       /* independence below which other active rows are tried */
   const struct pw_specialised *specialised; /* compiled code of the scene in use, or NULL */
   struct pw_scene *scene;                   /* its data; NULL: none, or a constant pivot is too small */
-  pw_thresholds limits;                     /* thresholds of the watchdog */
+  pw_thresholds thresholds;                 /* thresholds of the watchdog */
   pw_watchdog watchdog;                     /* the sine, which measures the distance from a singular configuration */
   double refused_sine;                      /* sine below which an evaluation is refused */
   int near_singular;                        /* 1 after an evaluation near a singular configuration */
@@ -78,6 +78,7 @@ struct pw_run {
                                         * in which it is valid; only if the system `saturates` */
   int matrix_outdated;                 /* 1: a state reached since is outside that range */
   double *q_given, *v_given;           /* coords + 3: the values last given (opening, restart), not yet consistent */
+  double *given_before;                /* 2 (coords + 3): those before a restart, which may be refused */
   unsigned char *origin;               /* 2 coords: of initial values, as in pw_system */
   pw_initial_report initial;
   pw_statistics statistics;
@@ -343,8 +344,8 @@ int pw_projector_open_by_options (pw_projector *p, pw_run *r, pw_error *error);
 void pw_projector_close (pw_projector *p);
 
 /* Gauss-Newton iteration on g(q) = 0 to round-off, minimal changes in the metric.  Leaves kinematics and J evaluated at
- * (t, q, v).  PW_RETRY if it does not converge, or if a redundant equation contradicts the others; PW_METHOD if a
- * signal failed. */
+ * (t, q, v) and, if no row is redundant, the residuals of positions in r->residuals.  PW_RETRY if it does not converge
+ * (contradictory_row: -1), or if a redundant equation contradicts the others; PW_METHOD if a signal failed. */
 int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const double *v);
 
 /* A linear solve for J v = eta at the current configuration, near a singular one two; updates the velocity kinematics.

@@ -122,7 +122,7 @@ double pw_variation_better_step (const pw_variation *x, int i);
 
 void pw_variation_close (pw_variation *x);
 
-/* ---- Steady motions (steady.c) ---- */
+/* ---- Steady motions (steady*.c) ---- */
 
 /* Finds by name a quantity that can be held: a state, numbered as in pw_system_find_state; after these, of each body,
  * the velocity of its centre of mass along its x axis (BODY.speed), the turning radius speed / omega (BODY.radius),
@@ -137,7 +137,7 @@ typedef struct {
   const pw_initial_value *hold; /* what is held, numbered as in pw_system_find_held */
   int holds;
   double t;           /* time at which signals are evaluated [s] */
-  double span;        /* as in pw_settings, but > 0: signals must be constant in it */
+  double span;        /* as in pw_settings, default 1 s: signals must be constant in it */
   double first, last; /* range of the parameter */
   int vary;           /* the parameter is the value of hold[vary]; -1: it is that of `compile`, if any */
   /* Compiles the system for a value of the parameter.  The search frees it.  NULL and the error: there is no
@@ -198,7 +198,7 @@ int pw_steady_suggest (pw_steady *x, pw_initial_value *hold, int most);
 int pw_steady_follow (pw_steady *x, const double *q, const double *v, double parameter, int direction, pw_error *error);
 int pw_steady_next (pw_steady *x, pw_steady_motion *out, pw_error *error);
 
-/* ---- Periodic motions (periodic.c) ---- */
+/* ---- Periodic motions (periodic*.c) ---- */
 
 /* The period of all signals of which it is known, harmonic ones and repeated pulses [s]; 0: there are none; NaN: they
  * have none in common. */

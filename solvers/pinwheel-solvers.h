@@ -157,8 +157,8 @@ int pw_run_redundant (const pw_run *r);
 char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size);
 
 /* The smallest velocity scale [m/s] or [rad/s] of a saturating force, at the configuration reached and at rest:
- * returns the velocity (numbered as in pw_system_find_state), or -1 if no force saturates, and the element,
- * "friction hinge".  adams, bdf, ida and radau keep their tolerances below it, whatever the settings. */
+ * returns the velocity (numbered as in pw_system_find_state) and the element, "friction hinge"; or -1 if no change of a
+ * velocity saturates a force.  adams, bdf, ida and radau keep their tolerances below it, whatever the settings. */
 int pw_run_saturation (pw_run *r, double *least, char *element, size_t size);
 
 /* These belong to the run.  After pw_run_restart, pw_run_initial reports on the state given there. */

@@ -47,7 +47,7 @@ typedef struct {
   double stalled;                 /* consecutive steps that do not advance */
 } pw_thresholds;
 
-extern const pw_thresholds pw_watchdog_limits;
+extern const pw_thresholds pw_watchdog_thresholds;
 
 /* The sine along a run, at the states reached. */
 typedef struct {
@@ -61,7 +61,7 @@ typedef struct {
   double sine_slope;          /* fastest recent change of the sine per unit of motion */
   int dependent_row;          /* the row that is most nearly dependent */
   int singular_ahead;         /* 1: a singular configuration may be within the next step */
-  int crossed;                /* 1: a point where branches cross was, or may have been, passed recently */
+  int may_have_crossed;       /* 1: the motion may recently have passed a point where branches cross */
   double step_length;         /* of the last step, in the units of `moved` */
   double previous_t;          /* at the state last checked, the beginning of the step to be checked: the time, */
   double *previous_q;         /* the coordinates, */

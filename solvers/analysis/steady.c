@@ -59,11 +59,12 @@ static double steady_last_breakpoint (pw_workspace *w, double t, double span) {
 static int steady_constant (pw_steady *x, pw_error *error) {
   pw_run *r = x->system[PW_HERE].run;
   char name[200], text[32];
-  int changed, later, status = pw_signals_change (r, x->settings.t, 0, x->settings.span, &changed, error);
+  const double span = r->settings.span; /* with its default */
+  int changed, later, status = pw_signals_change (r, x->settings.t, 0, span, &changed, error);
   if (status != PW_OK || changed < 0) return status;
   pw_system_signal_name (x->s, changed, name, sizeof name);
-  double last = steady_last_breakpoint (r->w, x->settings.t, x->settings.span);
-  status = pw_signals_change (r, last, 0, x->settings.span, &later, error);
+  double last = steady_last_breakpoint (r->w, x->settings.t, span);
+  status = pw_signals_change (r, last, 0, span, &later, error);
   if (status != PW_OK) return status;
   snprintf (text, sizeof text, "%.9g", last);
   if (strtod (text, NULL) < last) snprintf (text, sizeof text, "%.9g", last * (1 + 1e-8));

@@ -22,7 +22,11 @@
 enum { CHANGE_STRIDES = 1000, CHANGE_EVALUATIONS = 1000, CHANGE_ATTEMPTS = 8 };
 static const double CHANGE_LONGER = 1.7;
 
-typedef enum { CHANGE_SAME_BRANCH, CHANGE_OTHER_BRANCH, CHANGE_UNKNOWN } change_verdict;
+typedef enum {
+  CHANGE_SAME_BRANCH,
+  CHANGE_OTHER_BRANCH,
+  CHANGE_UNKNOWN /* the walk ended before the end of the step; branches may cross there */
+} change_verdict;
 
 typedef struct {
   pw_run *r;
@@ -68,7 +72,7 @@ static int change_project (change_walk *walk, double t, double *q, double *sine)
  * that it is left in about the same direction. */
 static void change_watch_crossing (change_walk *walk, double sine) {
   const pw_system *s = walk->r->s;
-  const int in_crossing = sine < walk->r->limits.crossing;
+  const int in_crossing = sine < walk->r->thresholds.crossing;
   size_t bytes = (size_t)s->coords * sizeof (double);
   if (!walk->in_crossing && in_crossing) {
     memcpy (walk->entry, walk->q, bytes);
@@ -76,8 +80,8 @@ static void change_watch_crossing (change_walk *walk, double sine) {
   } else if (walk->in_crossing && !in_crossing) {
     const double *from = walk->entry, *to = from + s->coords;
     double along = change_dot (s, to, from, walk->next, walk->q);
-    walk->turned |=
-        !(along > walk->r->limits.straight * change_distance (s, to, from) * change_distance (s, walk->next, walk->q));
+    walk->turned |= !(along > walk->r->thresholds.straight * change_distance (s, to, from) *
+                                  change_distance (s, walk->next, walk->q));
   }
   walk->in_crossing = in_crossing;
 }
@@ -92,7 +96,7 @@ static int change_stride (change_walk *walk, double part) {
     if (change_project (walk, t, walk->next, &sine) != PW_OK) continue;
     double length = change_distance (s, walk->next, walk->q);
     change_watch_crossing (walk, sine);
-    walk->sine_slope = fmax (walk->sine_slope, fabs (sine - walk->sine) / fmax (length, walk->r->limits.floor));
+    walk->sine_slope = fmax (walk->sine_slope, fabs (sine - walk->sine) / fmax (length, walk->r->thresholds.floor));
     walk->next = walk->q, walk->q = swap;
     walk->t = t, walk->sine = sine;
     return PW_OK;
@@ -102,7 +106,7 @@ static int change_stride (change_walk *walk, double part) {
 
 /* Length of the next stride: a part of the distance at which the sine could vanish. */
 static double change_length (const change_walk *walk) {
-  const pw_thresholds *limit = &walk->r->limits;
+  const pw_thresholds *limit = &walk->r->thresholds;
   return fmax (fmin (limit->stride * walk->sine / walk->sine_slope, limit->stride), limit->floor);
 }
 
@@ -121,11 +125,11 @@ static change_verdict change_follow (change_walk *walk) {
     return CHANGE_UNKNOWN;
   for (int i = 0; i < CHANGE_STRIDES; i++) {
     double distance = change_distance (r->s, walk->q, walk->target);
-    if (distance <= r->limits.floor) return walk->turned ? CHANGE_OTHER_BRANCH : CHANGE_SAME_BRANCH;
+    if (distance <= r->thresholds.floor) return walk->turned ? CHANGE_OTHER_BRANCH : CHANGE_SAME_BRANCH;
     double part = fmin (1, change_length (walk) / distance);
     if (change_stride (walk, part) != PW_OK) return CHANGE_UNKNOWN;
-    if (change_distance (r->s, walk->q, walk->target) <= distance * (1 - r->limits.progress * part)) continue;
-    if (walk->least_sine > r->limits.low * watch->largest_sine) return CHANGE_UNKNOWN;
+    if (change_distance (r->s, walk->q, walk->target) <= distance * (1 - r->thresholds.progress * part)) continue;
+    if (walk->least_sine > r->thresholds.low * watch->largest_sine) return CHANGE_UNKNOWN;
     return CHANGE_OTHER_BRANCH;
   }
   return CHANGE_UNKNOWN;
@@ -167,11 +171,11 @@ static double change_sine_at (pw_run *r, double t, const double *q) {
  * scratch. */
 static int change_low_between (pw_run *r, double length) {
   const pw_watchdog *watch = &r->watchdog;
-  int parts = (int)fmin (length / r->limits.stride, CHANGE_EVALUATIONS) + 1;
+  int parts = (int)fmin (length / r->thresholds.stride, CHANGE_EVALUATIONS) + 1;
   for (int i = 1; i < parts; i++) {
     double part = (double)i / parts, t = watch->previous_t + part * (r->t - watch->previous_t);
     for (int j = 0; j < r->s->coords; j++) r->q_at[j] = watch->previous_q[j] + part * (r->q[j] - watch->previous_q[j]);
-    if (change_sine_at (r, t, r->q_at) < r->limits.low * watch->largest_sine) return 1;
+    if (change_sine_at (r, t, r->q_at) < r->thresholds.low * watch->largest_sine) return 1;
   }
   return 0;
 }
@@ -179,10 +183,10 @@ static int change_low_between (pw_run *r, double length) {
 /* 1 if the sine may have a minimum within the step that is low enough to matter.  With K the largest change of the sine
  * per unit of motion, no sine in the step is below (previous_sine + sine - K length) / 2. */
 static int change_may_be_low (pw_run *r, double previous_sine, double sine, double length) {
-  double low = r->limits.low * fmin (previous_sine, sine);
-  double K = r->limits.lipschitz * r->watchdog.largest_sine;
+  double low = r->thresholds.low * fmin (previous_sine, sine);
+  double K = r->thresholds.lipschitz * r->watchdog.largest_sine;
   if (previous_sine + sine - K * length > 2 * low) return 0;
-  return length <= r->limits.stride || change_low_between (r, length);
+  return length <= r->thresholds.stride || change_low_between (r, length);
 }
 
 /* row: the most nearly dependent one, or -1; apart: distance of the branches, estimated as the sine over its change per
@@ -200,9 +204,10 @@ int pw_change_point_resolve (pw_run *r, double last_sine, pw_error *error) {
   pw_watchdog *watch = &r->watchdog;
   if (isnan (last_sine) || watch->step_length == 0) return PW_OK;
   watch->sine_slope = fmax (watch->sine_slope, fabs (watch->checked_sine - last_sine) / watch->step_length);
-  if (!watch->loops || !r->fixed_steps || watch->crossed || watch->dependent_row >= r->s->holonomic) return PW_OK;
+  if (!watch->loops || !r->fixed_steps || watch->may_have_crossed || watch->dependent_row >= r->s->holonomic)
+    return PW_OK;
   const int is_minimum = last_sine < watch->sine_before_checked && last_sine < watch->checked_sine;
-  if (!is_minimum || watch->step_length * watch->sine_slope <= r->limits.resolved * last_sine) return PW_OK;
+  if (!is_minimum || watch->step_length * watch->sine_slope <= r->thresholds.resolved * last_sine) return PW_OK;
   return change_fail (r, watch->dependent_row, last_sine / watch->sine_slope, "the step does not resolve it",
                       watch->step_length, error);
 }
@@ -210,10 +215,10 @@ int pw_change_point_resolve (pw_run *r, double last_sine, pw_error *error) {
 static int change_report (pw_run *r, const change_walk *walk, change_verdict verdict, double sine, double length,
                           pw_error *error) {
   pw_watchdog *watch = &r->watchdog;
-  double low = r->limits.unresolved * fmin (watch->previous_sine, sine);
-  watch->crossed |= verdict == CHANGE_UNKNOWN || walk->least_sine <= r->limits.crossing;
+  double low = r->thresholds.unresolved * fmin (watch->previous_sine, sine);
+  watch->may_have_crossed |= verdict == CHANGE_UNKNOWN || walk->least_sine <= r->thresholds.crossing;
   const char *finding = verdict == CHANGE_OTHER_BRANCH ? "the motion has left its branch" : NULL;
-  if (verdict == CHANGE_SAME_BRANCH && !watch->crossed && walk->least_sine < low)
+  if (verdict == CHANGE_SAME_BRANCH && !watch->may_have_crossed && walk->least_sine < low)
     finding = "the step does not resolve it";
   return finding ? change_fail (r, walk->least_row, walk->least_sine / walk->sine_slope, finding, length, error)
                  : PW_OK;

@@ -55,7 +55,7 @@ void pw_run_accelerate_updated (pw_run *r, const double *v, double *a, double *l
   const double *f = dynamics_right_side (r, v, r->scratch, lambda);
   r->statistics.rhs++;
   pw_saddle_solve (r->saddle, f, lambda, a, lambda);
-  if (pw_saddle_sine_below (r->saddle, r->limits.refine)) dynamics_refine (r, v, a, lambda);
+  if (pw_saddle_sine_below (r->saddle, r->thresholds.refine)) dynamics_refine (r, v, a, lambda);
 }
 
 /* Factorises and solves, with gamma in the array of lambda; *near = 1 near a singular configuration, where the status
@@ -68,7 +68,7 @@ static inline int dynamics_solve (pw_run *r, const double *v, double *a, double 
   if (status == PW_OK) pw_saddle_solve (r->saddle, f, lambda, a, lambda);
   *near = pw_watchdog_near (r);
   if (*near && r->watchdog.evaluated_sine <= r->refused_sine) return PW_RETRY;
-  if (status == PW_OK && pw_saddle_sine_below (r->saddle, r->limits.refine)) dynamics_refine (r, v, a, lambda);
+  if (status == PW_OK && pw_saddle_sine_below (r->saddle, r->thresholds.refine)) dynamics_refine (r, v, a, lambda);
   return status;
 }
 

@@ -15,7 +15,7 @@ enum { INDEPENDENT_NEARBY = 3 };
 static const double INDEPENDENT_MOTION = 0.03;
 
 static int independent_rank (const pw_run *r, pw_row_basis *b) {
-  return pw_row_basis_select (b, r->w, r->limits.independent, NULL, r->s->rows, r->s->rows);
+  return pw_row_basis_select (b, r->w, r->thresholds.independent, NULL, r->s->rows, r->s->rows);
 }
 
 /* The n-th direction that the constraints allow, of largest component 1 in units of the scene: along the velocities v
@@ -82,19 +82,20 @@ static int independent_store (pw_run *r, const unsigned char *active, size_t red
 /* Selects the rows at the state reached, whose rank must be the largest one nearby. */
 static int independent_search (pw_run *r, pw_row_basis *b, pw_error *error) {
   const pw_system *s = r->s;
-  int status = pw_evaluate_J_at (r->w, r->t, r->q, r->v), rank = independent_rank (r, b), largest = rank;
-  for (int n = 0; n < INDEPENDENT_NEARBY && status == PW_OK; n++) {
+  if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
+  int rank = independent_rank (r, b), largest = rank;
+  for (int n = 0; n < INDEPENDENT_NEARBY; n++) {
     int nearby = independent_rank_nearby (r, b, n);
     if (nearby > largest) largest = nearby;
   }
-  if (status == PW_OK) r->w->failed = NULL;
+  r->w->failed = NULL;
   if (largest > rank)
     return pw_fail (
         error, PW_INITIAL,
         "model %s: the initial configuration is singular: %d constraint equations are independent there, %d nearby; "
         "begin slightly off it",
         s->model, rank, largest);
-  if (rank == s->rows || status != PW_OK) return status;
+  if (rank == s->rows) return PW_OK;
   (void)pw_evaluate_J_at (r->w, r->t, r->q, r->v);
   independent_rank (r, b);
   return independent_store (r, b->active, (size_t)(s->rows - rank)) == PW_OK ? PW_OK : pw_fail_memory (s, error);
@@ -116,7 +117,7 @@ int pw_rank_reselect (pw_run *r) {
   int holonomic = 0, rank = s->rows - r->redundant;
   if (pw_row_basis_open (&b, s) != PW_OK) return PW_RESOURCE;
   for (int i = 0; i < s->holonomic; i++) holonomic += r->active[i];
-  int found = pw_row_basis_select (&b, r->w, r->limits.independent, NULL, holonomic, rank);
+  int found = pw_row_basis_select (&b, r->w, r->thresholds.independent, NULL, holonomic, rank);
   int changes = found == rank && memcmp (b.active, r->active, (size_t)s->rows) != 0;
   if (changes) independent_activate (r, b.active);
   pw_row_basis_close (&b);

@@ -57,7 +57,7 @@ void pw_projector_close (pw_projector *p) {
 /* PW_RETRY if a redundant equation is violated where the others hold: it contradicts them.  g, size: residuals and the
  * sizes of their terms. */
 static int project_check_redundant (pw_projector *p, const pw_run *r, const double *g, const double *size) {
-  double largest = r->limits.redundant_residual;
+  double largest = r->thresholds.redundant_residual;
   if (p->active == NULL || p->ignores_inactive) return PW_OK;
   for (int i = 0; i < r->s->holonomic; i++) {
     double residual = p->active[i] ? 0 : fabs (g[i]) / size[i];
@@ -115,7 +115,7 @@ int pw_project_velocities (pw_projector *p, pw_run *r, double *v) {
   r->statistics.factorisations++;
   if (pw_saddle_factor (p->velocity) != PW_OK) return PW_RETRY;
   project_correct_velocities (p, r, v);
-  if (pw_saddle_sine_below (p->velocity, r->limits.refine)) project_correct_velocities (p, r, v);
+  if (pw_saddle_sine_below (p->velocity, r->thresholds.refine)) project_correct_velocities (p, r, v);
   return pw_update_velocities (r->w, v);
 }
 

@@ -9,7 +9,7 @@
 /* s: the sine; d: the scaled constraint residual; eps: the machine precision.  Where branches cross, the constraints
  * are x y = 0 in suitable coordinates, and s = |(x, y)|; with a residual d, x y = d: each branch turns, most sharply
  * where s^2 = 2 d. */
-const pw_thresholds pw_watchdog_limits = {
+const pw_thresholds pw_watchdog_thresholds = {
   /* A motion with residuals of 1 % is wrong; without stabilisation some drift is expected. */
   .lost = 1e-2,
   .lost_unstabilised = 0.1,
@@ -156,9 +156,9 @@ double pw_watchdog_sine (pw_run *r, int *row) {
 int pw_watchdog_near (pw_run *r) {
   pw_watchdog *watch = &r->watchdog;
   if (!watch->singular_ahead || watch->saddle == NULL) return 0;
-  if (!r->fixed_steps && !pw_saddle_sine_below (r->saddle, r->limits.refine)) return 0;
+  if (!r->fixed_steps && !pw_saddle_sine_below (r->saddle, r->thresholds.refine)) return 0;
   watch->evaluated_sine = pw_watchdog_sine (r, NULL);
-  return watch->evaluated_sine < r->limits.near * watch->largest_sine;
+  return watch->evaluated_sine < r->thresholds.near * watch->largest_sine;
 }
 
 int pw_fail_singular (pw_run *r, double t, pw_error *error) {
@@ -166,14 +166,14 @@ int pw_fail_singular (pw_run *r, double t, pw_error *error) {
   int row = -1;
   double sine = pw_watchdog_sine (r, &row);
   /* largest_sine is 0 while the run is being opened */
-  if (sine > r->limits.rank_refused && sine > r->limits.near * r->watchdog.largest_sine)
+  if (sine > r->thresholds.rank_refused && sine > r->thresholds.near * r->watchdog.largest_sine)
     return pw_fail (
         error, PW_METHOD,
         "t = %.6g s: values too extreme: masses and inertias differ by so much that the equations of motion "
         "cannot be solved; the configuration is not singular",
         t);
   if (row >= 0) pw_system_row_name (r->s, row, element, sizeof element);
-  if (sine <= r->limits.rank_lost)
+  if (sine <= r->thresholds.rank_lost)
     return pw_fail (error, PW_METHOD, "t = %.6g s: singular configuration: %s depends on other constraints", t,
                     element);
   return pw_fail (
@@ -192,7 +192,7 @@ int pw_watchdog_near_state (pw_run *r) {
 
 int pw_watchdog_check_values (const pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
-  const double extreme = r->limits.extreme;
+  const double extreme = r->thresholds.extreme;
   char name[120];
   for (int i = 0; i < 2 * s->coords; i++) {
     double value = i < s->coords ? r->q[i] : r->v[i - s->coords];

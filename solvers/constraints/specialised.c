@@ -41,7 +41,7 @@ int pw_specialised_open (pw_run *r, pw_error *error) {
     return pw_fail (error, PW_INPUT, "model %s: the specialised code belongs to another scene", r->s->model);
   if (specialised_allocate (r, code->constants) != PW_OK) return pw_fail_memory (r->s, error);
   r->scene->length = r->w->scale.length, r->scene->speed = r->scene->length / r->w->scale.time;
-  r->scene->redundant_residual = r->limits.redundant_residual;
+  r->scene->redundant_residual = r->thresholds.redundant_residual;
   r->scene->alpha = r->alpha, r->scene->beta = r->beta;
   if (code->prepare (r->scene) != 0) r->scene = NULL;
   pw_specialised_select (r);

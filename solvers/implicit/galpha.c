@@ -134,7 +134,7 @@ static int galpha_correct (pw_run *r, double h, double *correction, double *roun
 }
 
 /* Computes the new state at t1 = t + h with its accelerations and multipliers; kinematics and J are left there.
- * PW_RETRY if the iteration does not converge; PW_INPUT if its matrix is singular; PW_METHOD if a signal failed;
+ * PW_RETRY if the iteration does not converge; PW_SINGULAR if its matrix is; PW_METHOD if a signal failed;
  * PW_RESOURCE.
  *
  * The matrix is evaluated at the prediction, and again while convergence is slow.  The remaining error in multipliers,

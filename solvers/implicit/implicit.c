@@ -65,12 +65,12 @@ int pw_implicit_fail (pw_run *r, int status, double h, pw_error *error) {
   if (status == PW_METHOD) return pw_fail_signal (r->t, error);
   if (status == PW_RESOURCE) return pw_fail (error, PW_RESOURCE, "t = %.6g s: out of memory in KLU", r->t);
   if (r->near_singular || pw_watchdog_near_state (r)) return pw_fail_singular (r, r->t, error);
-  const char *reason = status == PW_INPUT ? "the Newton matrix is singular"
-                       : status == PW_OK  ? "the error test fails"
-                                          : "the iteration does not converge";
+  const char *reason = status == PW_SINGULAR ? "the Newton matrix is singular"
+                       : status == PW_OK     ? "the error test fails"
+                                             : "the iteration does not converge";
   if (r->fixed_steps)
     return pw_fail (error, PW_METHOD, "t = %.6g s: %s; the step of %.6g s may be too large", r->t, reason, h);
-  if (status == PW_INPUT) return pw_fail (error, PW_METHOD, "t = %.6g s: %s", r->t, reason);
+  if (status == PW_SINGULAR) return pw_fail (error, PW_METHOD, "t = %.6g s: %s", r->t, reason);
   return pw_fail (error, PW_METHOD, "t = %.6g s: %s however small the step (rtol %.3g)", r->t, reason,
                   r->settings.rtol);
 }
@@ -83,8 +83,9 @@ static int implicit_step_around (pw_run *r, pw_implicit_step *step, double h, do
   int status = step (r, h, *t1);
   for (size_t i = 0; i < sizeof longer / sizeof *longer; i++) {
     double later = r->t + longer[i] * h;
-    if ((status != PW_RETRY && status != PW_INPUT) || !(later <= stop)) break;
+    if ((status != PW_RETRY && status != PW_SINGULAR) || !(later <= stop)) break;
     if (!r->near_singular && !pw_watchdog_near_state (r)) break;
+    if (pw_run_stop_requested (r)) return PW_STOPPED;
     r->statistics.rejected++;
     status = step (r, later - r->t, later);
     if (status == PW_OK) *t1 = later;
@@ -101,7 +102,7 @@ int pw_implicit_advance (pw_run *r, double t_end, pw_implicit_step *step, void (
   int status = whole ? implicit_step_around (r, step, h, fmin (t_end, r->breakpoint), &t1) : step (r, h, t1);
   if (t1 > end) h = t1 - r->t, whole = 0;
   x->h = status == PW_OK ? h : 0;
-  if (status != PW_OK) return pw_implicit_fail (r, status, h, error);
+  if (status != PW_OK) return status == PW_STOPPED ? status : pw_implicit_fail (r, status, h, error);
   pw_store_start (&x->last.start, r);
   memcpy (r->q, x->q1, n);
   memcpy (r->v, x->v1, n);

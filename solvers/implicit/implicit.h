@@ -38,7 +38,7 @@ void pw_implicit_scale (const pw_dae *x, double c, double e, double *row_factor,
 
 /* A step from the state reached to the new state q1, v1 at t1 = t + h; kinematics and J are left there.  PW_RETRY if
  * the iteration does not converge, or a singular configuration prevents the solution for velocities or accelerations;
- * PW_INPUT if the Newton matrix is singular; PW_METHOD if a signal failed; PW_RESOURCE. */
+ * PW_SINGULAR if the Newton matrix is; PW_METHOD if a signal failed; PW_RESOURCE. */
 typedef int pw_implicit_step (pw_run *r, double h, double t1);
 
 /* Advances by one step: makes q1, v1 the state reached, and calls `accept`, which sets its accelerations and

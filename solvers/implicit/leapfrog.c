@@ -113,7 +113,7 @@ static int drift_open_matrix (pw_run *r) {
   const int size = r->s->coords + x->rows;
   pw_scatter_begin_record (&x->scatter);
   drift_put_momentum (r);
-  drift_put_middle (r, 1);
+  drift_put_middle (r, 1); /* any step size but 0: only the pattern counts */
   drift_put_end (r);
   if (pw_scatter_lay_out (&x->scatter, size) != PW_OK) return PW_RESOURCE;
   return pw_implicit_open_matrix (&d->common, size);
@@ -183,12 +183,12 @@ static int drift_solve (pw_run *r, double h, double t1) {
   for (int j = 0; j < r->s->coords; j++) d->u[j] = r->v[j] + 0.5 * h * r->a[j];
   drift_positions (r, h);
   pw_convergence convergence = r->s->rows == 0 ? PW_CONVERGED : PW_ITERATE;
-  for (int i = 0; convergence == PW_ITERATE; i++) {
+  for (int i = 0; i < DRIFT_MOST && convergence == PW_ITERATE; i++) {
     int refactor = i == 0 || (i > 1 && p.rate > 0.02), status = refactor ? drift_factor (r, h, t1) : PW_OK;
     if (status == PW_OK) status = drift_residual (r, h, t1);
     if (status == PW_OK) status = drift_correct (r, h, &p);
     if (status != PW_OK) return status;
-    convergence = i < DRIFT_MOST ? leapfrog_test (&p) : PW_DIVERGED;
+    convergence = leapfrog_test (&p);
   }
   return convergence == PW_CONVERGED ? PW_OK : PW_RETRY;
 }
@@ -231,13 +231,13 @@ static int kick_solve (pw_run *r, double h, double t1) {
   if (status != PW_OK) return status;
   memcpy (d->common.v1, d->u, (size_t)r->s->coords * sizeof *d->common.v1);
   memset (d->f, 0, (size_t)r->s->coords * sizeof *d->f);
-  for (pw_convergence convergence = PW_ITERATE; convergence != PW_CONVERGED;) {
+  pw_convergence convergence = PW_ITERATE;
+  for (int i = 0; i < KICK_MOST && convergence == PW_ITERATE; i++) {
     status = kick_correct (r, h, &p);
     if (status != PW_OK) return status;
-    convergence = p.done < KICK_MOST ? leapfrog_test (&p) : PW_DIVERGED;
-    if (convergence == PW_DIVERGED) return PW_RETRY;
+    convergence = leapfrog_test (&p);
   }
-  return pw_update_velocities (r->w, d->common.v1);
+  return convergence == PW_CONVERGED ? pw_update_velocities (r->w, d->common.v1) : PW_RETRY;
 }
 
 /* ---- Opening ---- */

@@ -230,7 +230,7 @@ static int radau_advance (pw_run *r, double t_end, pw_error *error) {
     if (status == PW_OK && err < 1) status = radau_accept_adaptive (r, h, t1, err, rejected, shortened);
     if (status == PW_OK && err < 1) return PW_OK;
     int signal_fails = status == PW_METHOD && h < RADAU_SIGNAL_STEP * r->w->scale.time;
-    if (status == PW_RESOURCE || status == PW_INPUT || signal_fails) return pw_implicit_fail (r, status, h, error);
+    if (status == PW_RESOURCE || status == PW_SINGULAR || signal_fails) return pw_implicit_fail (r, status, h, error);
     r->statistics.rejected++;
     d->renew_F_y = !d->F_y_at_state;
     if (status == PW_OK && rejected > 0) radau_project_start (r);

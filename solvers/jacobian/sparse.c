@@ -26,17 +26,17 @@ void pw_sparse_close (pw_sparse *x) {
 static int sparse_refactor (pw_sparse *x, double *value) {
   if (x->factors == NULL) return 0;
   if (!SPARSE_KLU (x, refactor, x->colptr, x->rowind, value, x->symbolic, x->factors, &x->common)) return 0;
-  return SPARSE_KLU (x, rcond, x->symbolic, x->factors, &x->common) && x->common.rcond > x->least_rcond;
+  return SPARSE_KLU (x, rcond, x->symbolic, x->factors, &x->common) && x->common.rcond > x->least_pivot_ratio;
 }
 
 int pw_sparse_factor (pw_sparse *x, double *value) {
   if (sparse_refactor (x, value)) return PW_OK;
   pw_sparse_forget_pivots (x);
   x->factors = SPARSE_KLU (x, factor, x->colptr, x->rowind, value, x->symbolic, &x->common);
-  if (x->factors == NULL) return x->common.status == KLU_OUT_OF_MEMORY ? PW_RESOURCE : PW_INPUT;
+  if (x->factors == NULL) return x->common.status == KLU_OUT_OF_MEMORY ? PW_RESOURCE : PW_SINGULAR;
   if (!SPARSE_KLU (x, rcond, x->symbolic, x->factors, &x->common)) return PW_RESOURCE;
-  x->least_rcond = 0.01 * x->common.rcond; /* two digits may be lost */
-  return x->common.rcond > 0 ? PW_OK : PW_INPUT;
+  x->least_pivot_ratio = 0.01 * x->common.rcond; /* two digits may be lost */
+  return x->common.rcond > 0 ? PW_OK : PW_SINGULAR;
 }
 
 int pw_sparse_solve (pw_sparse *x, double *right) {

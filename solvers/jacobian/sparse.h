@@ -6,6 +6,9 @@
 #include <stdint.h>
 #include <klu.h>
 
+/* A status besides those of pinwheel.h: the matrix is singular; with another step size it may not be. */
+enum { PW_SINGULAR = 3 };
+
 /* Complex numbers are pairs of doubles. */
 typedef enum { PW_SPARSE_REAL, PW_SPARSE_COMPLEX } pw_sparse_numbers;
 
@@ -15,14 +18,14 @@ typedef struct {
   klu_l_symbolic *symbolic;
   klu_l_numeric *factors;   /* NULL: none, or forgotten */
   int64_t *colptr, *rowind; /* the pattern, the caller's */
-  double least_rcond;       /* ratio of the least to the largest pivot (KLU) below which pivots are selected again */
+  double least_pivot_ratio; /* ratio of the least to the largest pivot (KLU) below which pivots are selected again */
 } pw_sparse;
 
 /* n columns in compressed form.  PW_OK or PW_RESOURCE. */
 int pw_sparse_open (pw_sparse *x, pw_sparse_numbers numbers, int n, int64_t *colptr, int64_t *rowind);
 void pw_sparse_close (pw_sparse *x);
 
-/* value: the nonzeros in the order of rowind.  PW_OK, PW_INPUT if the matrix is singular, PW_RESOURCE. */
+/* value: the nonzeros in the order of rowind.  PW_OK, PW_SINGULAR, PW_RESOURCE. */
 int pw_sparse_factor (pw_sparse *x, double *value);
 
 /* The next factorisation selects its pivots again. */

@@ -23,7 +23,7 @@ typedef struct {
 typedef struct {
   chain_lane first, second;
   ptrdiff_t J_stride, j_stride, unknown_stride; /* from body to body in the first lane; in the second one times
-                                                 * 1 or -1, the argument `sign` of functions */
+                                                 * 1 or -1, the argument `direction` of functions */
   ptrdiff_t row_stride;                         /* from row to row of J */
 } chain_sweep;
 
@@ -57,13 +57,13 @@ PW_INLINE void chain_advance (chain_lane *x, const chain_sweep *s, ptrdiff_t bod
   x->j += bodies * s->j_stride, x->unknown += bodies * s->unknown_stride;
 }
 
-/* sign: 1, both lanes begin at the first pin; -1, the second lane begins at the last pin. */
-static chain_sweep chain_begin (const pw_block_ldl *l, const pw_chain *c, int sign) {
+/* direction: 1, both lanes begin at the first pin; -1, the second lane begins at the last pin. */
+static chain_sweep chain_begin (const pw_block_ldl *l, const pw_chain *c, int direction) {
   chain_sweep s = {
     .J_stride = c->J_stride, .j_stride = c->j_stride, .unknown_stride = c->unknown_stride, .row_stride = c->row_stride
   };
   s.first = s.second = (chain_lane){ c->J_first, c->J_second, l->chain_factor + c->first_factor, c->j, c->unknown };
-  if (sign > 0) return s;
+  if (direction > 0) return s;
   chain_advance (&s.second, &s, c->bodies - 1);
   const double *J = s.second.J_eliminated;
   s.second.J_eliminated = s.second.J_next, s.second.J_next = J;
@@ -72,9 +72,9 @@ static chain_sweep chain_begin (const pw_block_ldl *l, const pw_chain *c, int si
 }
 
 /* Moves both lanes on by some bodies. */
-PW_INLINE void chain_move (chain_sweep *s, ptrdiff_t bodies, int sign) {
+PW_INLINE void chain_move (chain_sweep *s, ptrdiff_t bodies, int direction) {
   chain_advance (&s->first, s, bodies);
-  chain_advance (&s->second, s, sign * bodies);
+  chain_advance (&s->second, s, direction * bodies);
 }
 
 /* Entry i of two arrays, one for each lane. */
@@ -152,7 +152,7 @@ PW_INLINE void chain_pivot (chain_lanes *D, pw_block_ldl *l, const chain_sweep *
 
 /* Eliminates the pins.  D: their diagonal blocks without the contributions of the bodies of s, which are added; then
  * those of the next pins, without the contributions of the next bodies. */
-PW_INLINE void chain_eliminate (pw_block_ldl *l, chain_sweep *s, int sign, chain_lanes *D) {
+PW_INLINE void chain_eliminate (pw_block_ldl *l, chain_sweep *s, int direction, chain_lanes *D) {
   const chain_body p = chain_read (l, s);
   const chain_square K = chain_coupling (p);
   const chain_lanes ax = p.i * p.a.x, ay = p.i * p.a.y, xx = p.m + ax * p.a.x, yy = p.m + ay * p.a.y;
@@ -166,7 +166,7 @@ PW_INLINE void chain_eliminate (pw_block_ldl *l, chain_sweep *s, int sign, chain
   D[0] = D[3] - (x.x * K.xx + x.y * K.xy);
   D[1] = bx * p.b.y - (y.x * K.xx + y.y * K.xy);
   D[2] = D[4] - (y.x * K.yx + y.y * K.yy);
-  chain_move (s, 1, sign);
+  chain_move (s, 1, direction);
 }
 
 /* Without includes_last, eliminates all pins but the last, one by one.  With includes_last, eliminates pairs of pins
@@ -198,12 +198,12 @@ void pw_chain_factor (pw_block_ldl *l, const pw_chain *c) {
 
 /* Subtracts J W^-1 f from y of both pins of the body, then K D^-1 y_c from y_(c+1).  at: y of the pins that are
  * eliminated.  Returns y of the next ones. */
-PW_INLINE chain_pair chain_forward (const pw_block_ldl *l, chain_sweep *s, int sign, const double *f, double *y,
+PW_INLINE chain_pair chain_forward (const pw_block_ldl *l, chain_sweep *s, int direction, const double *f, double *y,
                                     chain_pair at) {
   const chain_body p = chain_read (l, s);
   const chain_lanes mass = p.m * p.a.sign * p.b.sign;
   const double *first = y + s->first.unknown + s->unknown_stride,
-               *second = y + s->second.unknown + sign * s->unknown_stride;
+               *second = y + s->second.unknown + direction * s->unknown_stride;
   chain_pair next = { chain_load (first, second, 0), chain_load (first, second, 1) };
   if (f) {
     const chain_vector force = chain_forces (s, f);
@@ -216,7 +216,7 @@ PW_INLINE chain_pair chain_forward (const pw_block_ldl *l, chain_sweep *s, int s
   const chain_lanes turn = p.i * (p.a.x * z.x + p.a.y * z.y);
   next.x -= mass * z.x + turn * p.b.x;
   next.y -= mass * z.y + turn * p.b.y;
-  chain_move (s, 1, sign);
+  chain_move (s, 1, direction);
   return next;
 }
 
@@ -238,9 +238,9 @@ void pw_chain_forward (const pw_block_ldl *l, const pw_chain *c, const double *f
 
 /* Goes back to the pins before; returns their lambda, from that of the next ones, `next`, and stores it in y; also
  * stores the accelerations of the bodies between them. */
-PW_INLINE chain_pair chain_backward (const pw_block_ldl *l, chain_sweep *s, int sign, const double *f, double *y,
+PW_INLINE chain_pair chain_backward (const pw_block_ldl *l, chain_sweep *s, int direction, const double *f, double *y,
                                      double *acceleration, chain_pair next) {
-  chain_move (s, -1, sign);
+  chain_move (s, -1, direction);
   const chain_body p = chain_read (l, s);
   const chain_square K = chain_coupling (p);
   const chain_pair own = chain_unknowns (s, y);

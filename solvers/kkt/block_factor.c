@@ -22,7 +22,7 @@ PW_INLINE void block_couple (int kb, int ka, int width, double *K, const block_r
 
 /* Adds the products of a contribution of ka rows with itself and with those after it; coupling: indices in `value` of
  * the latter. */
-PW_INLINE void block_contribute (int ka, int width, const pw_block_ldl *l, const pw_body_block *p,
+PW_INLINE void block_contribute (int ka, int width, const pw_block_ldl *l, const pw_group_block *p,
                                  const pw_contribution *a, const int *coupling) {
   const double *A = a->J, *w = l->inverse_weight + p->j;
   double *D = l->value + a->diagonal;
@@ -38,7 +38,7 @@ PW_INLINE void block_contribute (int ka, int width, const pw_block_ldl *l, const
 
 /* Adds an uncondensed body: -W_k, and its columns of J.  The original diagonal entries of the equations eliminated
  * after the body grow as if it were condensed. */
-static void block_uncondensed (const pw_block_ldl *l, const pw_body_block *p) {
+static void block_uncondensed (const pw_block_ldl *l, const pw_group_block *p) {
   const pw_contribution *own = l->contribution + p[1].first_contribution - 2;
   const double *w = l->inverse_weight + p->j;
   const int *coupling = l->coupling + p->first_coupling;
@@ -59,7 +59,7 @@ static void block_uncondensed (const pw_block_ldl *l, const pw_body_block *p) {
 
 static void block_assemble (const pw_block_ldl *l) {
   memset (l->value, 0, (size_t)l->values * sizeof *l->value);
-  for (const pw_body_block *p = l->body, *last = p + l->bodies; p < last; p++) {
+  for (const pw_group_block *p = l->group, *last = p + l->groups; p < last; p++) {
     const int *coupling = l->coupling + p->first_coupling;
     const pw_contribution *a = l->contribution + p->first_contribution,
                           *end = l->contribution + p[1].first_contribution;
@@ -129,7 +129,7 @@ PW_INLINE void block_eliminate_row (int ki, const pw_block_ldl *l, const pw_bloc
 
 /* Eliminates a column of kj unknowns; returns the next column's targets. */
 PW_INLINE const int *block_eliminate (int kj, pw_block_ldl *l, const pw_block_column *c, const int *target) {
-  double *D = l->value + c->first_value, *B = D + pw_block_diagonal (kj), *A = l->value + c[1].first_value;
+  double *D = l->value + c->first_value, *B = D + pw_block_diagonal_values (kj), *A = l->value + c[1].first_value;
   block_pivot (kj, D, l, c->unknown);
   for (int p = c[1].first_below - 1; p >= c->first_below; target += p-- - c->first_below) {
     int ki = l->column[l->below[p]].size;

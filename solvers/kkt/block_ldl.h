@@ -2,9 +2,9 @@
  * of 1 or 2 unknowns, ordered and laid out once, assembled body by body and factorised column by column (Duff, Erisman
  * & Reid 2017, Direct Methods for Sparse Matrices, chapters 5, 10 and 12).  K: the blocks of S before elimination.
  *
- * A node is a constraint equation, or two with the same columns.  Its contribution to a body, or to an internal
- * coordinate, is its part of J in those columns.  A body block lists the contributions to a body; any two of them
- * couple their nodes.
+ * A node is a constraint equation, or two with the same columns.  Its contribution to a group, a body or an
+ * internal coordinate, is its part of J in the group's columns.  A group block lists the contributions to a group; any
+ * two of them couple their nodes.
  *
  * Many nodes meeting at one body would make S dense.  Such a body k is not condensed: its accelerations a_k are
  * unknowns, too,
@@ -48,7 +48,7 @@ typedef struct {
   unsigned char in_chain; /* 1: of a pin inside a chain: it has no values */
 } pw_block_column;
 
-/* The contribution of a node to a body. */
+/* The contribution of a node to a group. */
 typedef struct {
   const double *J; /* its entry in the first row and column; NULL: a node of -a_k */
   int unknown;     /* index in y of the node's first unknown */
@@ -63,7 +63,7 @@ typedef struct {
   int first_coupling;        /* index of the first one: for each contribution a, for each b after it */
   unsigned char width;       /* columns: 3, or 1 of an internal coordinate */
   unsigned char uncondensed; /* 1: its last two contributions are the nodes of -a_k; couplings are with these only */
-} pw_body_block;
+} pw_group_block;
 
 /* Pointers and indices are those of the first body and its pins; the others follow at equal strides. */
 typedef struct {
@@ -87,15 +87,15 @@ typedef struct {
   double *value;                /* K, then its factors */
   int values;                   /* length of `value` */
   const double *inverse_weight; /* diagonal of W^-1, owned by the saddle */
-  pw_body_block *body;          /* bodies + 1: the last one ends the ranges */
+  pw_group_block *group;        /* groups + 1: the last one ends the ranges */
   pw_contribution *contribution;
   int *coupling;        /* index in `value` of the block of nodes a and b */
   pw_chain *chain;      /* chains + 1, by ascending columns, the last one a sentinel; their bodies have no block */
   double *chain_factor; /* factors of D in the chains' columns */
-  int bodies;
+  int groups;
   double least_pivot;     /* smallest pivot of the last factorisation over its diagonal entry before elimination */
   int least_unknown;      /* index in y of its unknown; -1: there is none */
-  char *pattern, *memory; /* allocations of the arrays of columns, and of bodies and chains */
+  char *pattern, *memory; /* allocations of the arrays of columns, and of groups and chains */
 } pw_block_ldl;
 
 /* ---- Planning (block_order.c) ---- */
@@ -123,7 +123,7 @@ int pw_block_lay_out (pw_block_ldl *l);
 int pw_block_find (const pw_block_ldl *l, int a, int b);
 
 /* Number of values of a diagonal block: its lower triangle, and its diagonal before elimination. */
-static inline int pw_block_diagonal (int size) {
+static inline int pw_block_diagonal_values (int size) {
   return size * (size + 3) / 2;
 }
 

@@ -114,7 +114,7 @@ int pw_block_find (const pw_block_ldl *l, int a, int b) {
   const int row = l->column_of_node[a], column = l->column_of_node[b];
   if (row < column) return pw_block_find (l, b, a);
   const pw_block_column *c = &l->column[column];
-  int at = c->first_value + pw_block_diagonal (c->size);
+  int at = c->first_value + pw_block_diagonal_values (c->size);
   for (int i = c->first_below; l->below[i] != row; i++) at += c->size * l->column[l->below[i]].size;
   return at;
 }
@@ -126,7 +126,7 @@ static int order_place_columns (pw_block_ldl *l) {
     pw_block_column *c = &l->column[j];
     c->first_value = (int)at;
     if (c->in_chain) continue;
-    at += (size_t)pw_block_diagonal (c->size);
+    at += (size_t)pw_block_diagonal_values (c->size);
     for (int i = c->first_below; i < c[1].first_below; i++) at += (size_t)(c->size * l->column[l->below[i]].size);
     if (at > INT_MAX) return PW_RESOURCE;
   }
@@ -143,7 +143,7 @@ static void order_place_targets (pw_block_ldl *l) {
     const int *below = l->below + c->first_below;
     for (int q = 0; q < n; q++) {
       const pw_block_column *d = &l->column[below[q]];
-      int at = d->first_value + pw_block_diagonal (d->size), i = d->first_below;
+      int at = d->first_value + pw_block_diagonal_values (d->size), i = d->first_below;
       for (int p = q + 1; p < n; p++, i++) {
         for (; l->below[i] != below[p]; i++) at += d->size * l->column[l->below[i]].size;
         /* rows p descending, each with p entries: those of rows n - 1 .. p + 1 come first */

@@ -25,9 +25,9 @@ static inline double block_product (int width, block_row a, const double *b) {
 }
 
 /* Updates l->least_pivot, dividing the pivot by its original diagonal entry only if that makes it smaller; NaN counts
- * as smaller.  The entry is negative only for uncondensed bodies, which do not count. */
+ * as the smallest.  The entry is negative only for uncondensed bodies, which do not count. */
 static inline void block_track_pivot (pw_block_ldl *l, double pivot, double original, int unknown) {
-  if (pivot > l->least_pivot * original || original < 0) return;
+  if (pivot > l->least_pivot * original || original < 0 || isnan (l->least_pivot)) return;
   l->least_pivot = pivot / original;
   l->least_unknown = unknown;
 }

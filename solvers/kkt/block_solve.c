@@ -25,7 +25,7 @@ PW_INLINE block_row block_scatter (int size, int width, const double *y, const d
 }
 
 /* y -= J W^-1 f for a body. */
-PW_INLINE void block_right_of (int width, const pw_block_ldl *l, const pw_body_block *p, const double *f, double *y) {
+PW_INLINE void block_right_of (int width, const pw_block_ldl *l, const pw_group_block *p, const double *f, double *y) {
   const block_row z = block_weigh (width, f + p->j, l->inverse_weight + p->j);
   for (const pw_contribution *a = l->contribution + p->first_contribution;
        a < l->contribution + p[1].first_contribution; a++)
@@ -33,7 +33,7 @@ PW_INLINE void block_right_of (int width, const pw_block_ldl *l, const pw_body_b
 }
 
 /* a = W^-1 (f - J^T y) for a body. */
-PW_INLINE void block_accelerate (int width, const pw_block_ldl *l, const pw_body_block *p, const double *f,
+PW_INLINE void block_accelerate (int width, const pw_block_ldl *l, const pw_group_block *p, const double *f,
                                  const double *y, double *a) {
   const double *w = l->inverse_weight + p->j;
   block_row z = { 0 };
@@ -54,7 +54,7 @@ PW_INLINE void block_forward (int ki, double *to, const double *L, const double 
 }
 
 PW_INLINE void block_forward_column (int kj, const pw_block_ldl *l, const pw_block_column *c, double *y) {
-  const double *L = l->value + c->first_value + pw_block_diagonal (kj);
+  const double *L = l->value + c->first_value + pw_block_diagonal_values (kj);
   for (int p = c->first_below; p < c[1].first_below; p++) {
     const pw_block_column *row = l->column + l->below[p];
     BLOCK_SIZE (row->size, block_forward, y + row->unknown, L, y + c->unknown, kj);
@@ -69,7 +69,7 @@ PW_INLINE void block_backward (int ki, double *sum, const double *L, const doubl
 }
 
 PW_INLINE void block_backward_column (int kj, const pw_block_ldl *l, const pw_block_column *c, double *y) {
-  const double *D = l->value + c->first_value, *L = D + pw_block_diagonal (kj);
+  const double *D = l->value + c->first_value, *L = D + pw_block_diagonal_values (kj);
   double *to = y + c->unknown;
   block_pair own = block_divide (kj, D, to[0], kj == 2 ? to[1] : 0);
   double sum[2] = { -own.x, -own.y };
@@ -85,7 +85,7 @@ PW_INLINE void block_backward_column (int kj, const pw_block_ldl *l, const pw_bl
 /* ---- All bodies and columns ---- */
 
 static void block_right (const pw_block_ldl *l, const double *f, double *y) {
-  for (const pw_body_block *p = l->body, *last = p + l->bodies; p < last; p++)
+  for (const pw_group_block *p = l->group, *last = p + l->groups; p < last; p++)
     if (p->uncondensed)
       for (int n = 0; n < 3; n++) y[l->contribution[p[1].first_contribution - 2].unknown + n] -= f[p->j + n];
     else
@@ -93,7 +93,7 @@ static void block_right (const pw_block_ldl *l, const double *f, double *y) {
 }
 
 static void block_accelerations (const pw_block_ldl *l, const double *f, const double *y, double *a) {
-  for (const pw_body_block *p = l->body, *last = p + l->bodies; p < last; p++)
+  for (const pw_group_block *p = l->group, *last = p + l->groups; p < last; p++)
     if (p->uncondensed)
       for (int n = 0; n < 3; n++) a[p->j + n] = -y[l->contribution[p[1].first_contribution - 2].unknown + n];
     else

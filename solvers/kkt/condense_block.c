@@ -38,17 +38,17 @@ static void condense_sort_columns (const pw_plan *plan, const int *column_of_nod
   }
 }
 
-/* ---- Body blocks ---- */
+/* ---- Groups ---- */
 
 /* Fills the block p of group g; *contributions, *couplings: numbers of those filled so far. */
-static void condense_body (const pw_plan *plan, pw_block_ldl *l, int g, pw_body_block *p, int *contributions,
-                           int *couplings) {
+static void condense_group (const pw_plan *plan, pw_block_ldl *l, int g, pw_group_block *p, int *contributions,
+                            int *couplings) {
   int j = pw_group_first (plan->saddle->s, g), body = plan->uncondensed[g];
-  *p = (pw_body_block){ .j = j,
-                        .first_contribution = *contributions,
-                        .first_coupling = *couplings,
-                        .width = (unsigned char)pw_group_width (plan->saddle->s, j),
-                        .uncondensed = body >= 0 };
+  *p = (pw_group_block){ .j = j,
+                         .first_contribution = *contributions,
+                         .first_coupling = *couplings,
+                         .width = (unsigned char)pw_group_width (plan->saddle->s, j),
+                         .uncondensed = body >= 0 };
   for (int x = plan->start[g]; x < plan->start[g + 1]; x++) {
     const pw_plan_contribution *a = &plan->contribution[plan->list[x]];
     const pw_plan_node *n = &plan->node[a->node];
@@ -74,13 +74,13 @@ static int condense_has_block (const pw_plan *plan, int g) {
   return has_weight && !plan->is_linked[g];
 }
 
-/* Allocates and fills the body blocks. */
+/* Allocates and fills the groups' blocks, and the chains. */
 static int condense_fill (const pw_plan *plan, pw_block_ldl *l) {
-  int contributions = 0, couplings = 0, body = 0, uncondensed = plan->saddle->extra / 3;
+  int contributions = 0, couplings = 0, filled = 0, uncondensed = plan->saddle->extra / 3;
   l->inverse_weight = plan->saddle->inverse_weight;
-  for (int g = 0; g < plan->groups; g++) l->bodies += condense_has_block (plan, g);
+  for (int g = 0; g < plan->groups; g++) l->groups += condense_has_block (plan, g);
   for (pw_layout lay = { 0 }; pw_layout_pass (&lay, &l->memory);) {
-    l->body = pw_layout_alloc (&lay, (size_t)l->bodies + 1, sizeof *l->body);
+    l->group = pw_layout_alloc (&lay, (size_t)l->groups + 1, sizeof *l->group);
     l->contribution = pw_layout_alloc (&lay, (size_t)(plan->contributions - 2 * plan->linked + 2 * uncondensed),
                                        sizeof *l->contribution);
     l->coupling = pw_layout_alloc (&lay, (size_t)(plan->pairs - plan->linked), sizeof *l->coupling);
@@ -93,8 +93,8 @@ static int condense_fill (const pw_plan *plan, pw_block_ldl *l) {
   for (int last = 0; last < 2; last++) /* uncondensed bodies last: they add to diagonals that the others store */
     for (int g = 0; g < plan->groups; g++)
       if (condense_has_block (plan, g) && (plan->uncondensed[g] >= 0) == last)
-        condense_body (plan, l, g, &l->body[body++], &contributions, &couplings);
-  l->body[body] = (pw_body_block){ .first_contribution = contributions, .first_coupling = couplings };
+        condense_group (plan, l, g, &l->group[filled++], &contributions, &couplings);
+  l->group[filled] = (pw_group_block){ .first_contribution = contributions, .first_coupling = couplings };
   return PW_OK;
 }
 

@@ -78,7 +78,7 @@ static double adapt_whole (pw_run *r, const pw_rk_row *e) {
 static double adapt_remaining (pw_run *r, double whole, int projected) {
   pw_method_data *d = r->data;
   if (!projected && !d->uses_nullspace) return whole;
-  if (projected || d->projects_positions) pw_project_error (r, r->saddle, r->q_at, r->s->holonomic);
+  if (projected || d->nullspace_projects) pw_project_error (r, r->saddle, r->q_at, r->s->holonomic);
   pw_project_error (r, r->saddle, r->v_at, r->s->rows);
   return adapt_mean_square (r, r->q_at, r->v_at) + sqrt (r->settings.rtol) * whole;
 }

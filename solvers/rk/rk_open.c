@@ -1,4 +1,4 @@
-/* Explicit Runge-Kutta methods: options, opening and closing, choice between fixed steps (rk_divide.c) and step-size
+/* Explicit Runge-Kutta methods: options, opening and closing, choice between fixed steps (rk_fixed.c) and step-size
  * control (rk_adapt.c). */
 #include <stdlib.h>
 #include <string.h>
@@ -80,10 +80,10 @@ int pw_rk_open (pw_run *r, const pw_tableau *tableau, pw_error *error) {
   d->holds_signals = pw_run_option (r, "inputs") != 0;
   d->projects = pw_stabilised_by (r, PW_PROJECTION);
   d->uses_nullspace = pw_stabilised_by (r, PW_NULLSPACE);
-  d->projects_positions = d->uses_nullspace && pw_run_option (r, "positions") == 0;
+  d->nullspace_projects = d->uses_nullspace && pw_run_option (r, "positions") == 0;
   d->every = (int)pw_run_option (r, "every");
   if (rk_allocate (d, r->s) != PW_OK) return pw_fail_memory (r->s, error);
-  int status = d->projects || d->projects_positions ? pw_projector_open_by_options (&d->projector, r, error) : PW_OK;
+  int status = d->projects || d->nullspace_projects ? pw_projector_open_by_options (&d->projector, r, error) : PW_OK;
   if (status == PW_OK && d->uses_nullspace) status = pw_nullspace_open (&d->nullspace, r, error);
   return status == PW_OK ? pw_rk_restart (r, error) : status;
 }

@@ -117,7 +117,7 @@ int pw_rk_step (pw_run *r, double h, double t1, int project, double *added_energ
   if (status != PW_OK) return status;
   if (project) return pw_project_state (&d->projector, r, t1, d->q, d->v, d->a, d->lambda, added_energy);
   if (!d->uses_nullspace) return pw_run_accelerate (r, t1, d->q, d->v, d->a, d->lambda);
-  status = pw_nullspace_finalise (&d->nullspace, d->projects_positions ? &d->projector : NULL, r, t1, d->q, d->v,
+  status = pw_nullspace_finalise (&d->nullspace, d->nullspace_projects ? &d->projector : NULL, r, t1, d->q, d->v,
                                   added_energy);
   return status == PW_OK ? pw_nullspace_accelerate (r, d->v, d->a, d->lambda) : status;
 }
@@ -145,7 +145,7 @@ double pw_rk_distance (const pw_run *r) {
 
 int pw_rk_fail (pw_run *r, int status, double t, double h, int divided, pw_error *error) {
   int finite = pw_is_finite_state (r, r->data->q, r->data->v) && pw_is_finite_state (r, r->q, r->v);
-  int has_projector = r->data->projects || r->data->projects_positions;
+  int has_projector = r->data->projects || r->data->nullspace_projects;
   int contradictory = has_projector && finite ? r->data->projector.contradictory_row : -1;
   char element[120];
   if (status < 0) return pw_fail_signal (t, error);

@@ -1,5 +1,5 @@
 /* Private to the explicit Runge-Kutta methods: stages and steps (rk_step.c), step-size control (rk_adapt.c), fixed
- * steps and samples (rk_divide.c), null-space velocities (nullspace.c). */
+ * steps and samples (rk_fixed.c), null-space velocities (nullspace.c). */
 #ifndef PW_RK_STEP_H
 #define PW_RK_STEP_H
 
@@ -28,7 +28,7 @@ struct pw_method_data {
   pw_rk_row estimate[3];       /* those of e, e3, e6 */
   int projects, every;         /* 1: coordinate projection; steps from one projection to the next */
   int uses_nullspace;          /* 1: stabilisation nullspace */
-  int projects_positions;      /* 1: with positions projected after each step */
+  int nullspace_projects;      /* 1: with positions projected after each step */
   int holds_signals;           /* 1: signals of forces are constant over a step */
   pw_projector projector;
   pw_nullspace nullspace;

@@ -38,7 +38,7 @@ static int several_count (const pw_run *r, double t, double t_end) {
 
 /* The watchdog's data in the form that specialised code uses. */
 static pw_scene_watch several_watchdog (const pw_run *r) {
-  const pw_thresholds *limit = &r->limits;
+  const pw_thresholds *limit = &r->thresholds;
   const pw_watchdog *watch = &r->watchdog;
   const double T = r->w->scale.time, L = r->s->scale.length, largest = watch->largest_sine;
   pw_scene_watch x = { .sine = INFINITY, .moved = watch->moved, .reference = r->reference_level };
@@ -68,7 +68,7 @@ static void several_record (pw_run *r, const pw_scene_steps *x) {
   pw_specialised_count (r, (long)x->stages * x->done, x->iterations);
   if (watch->saddle == NULL) return; /* else: what watchdog_follow stores where the sine need not be computed */
   watch->step_length = x->watch.step, watch->moved = x->watch.moved, watch->singular_ahead = 0;
-  watch->sine_before_checked = NAN, watch->sine_slope = 0, watch->crossed = 0;
+  watch->sine_before_checked = NAN, watch->sine_slope = 0, watch->may_have_crossed = 0;
   watch->previous_t = r->t, watch->previous_sine = NAN;
   memcpy (watch->previous_q, r->q, (size_t)r->s->coords * sizeof *watch->previous_q);
 }

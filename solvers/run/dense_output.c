@@ -54,6 +54,7 @@ static int dense_interpolate (void *dense_output, pw_run *r, double t) {
   for (int i = 0; i < s->rows; i++) r->lambda_at[i] = (1 - x) * lambda0[i] + x * r->lambda[i];
   for (int i = 0; i < s->entries; i++)
     r->ledger_at[i] = start->ledger[i] + h * x * (start->rate[i] + 0.5 * x * (r->rate[i] - start->rate[i]));
+  r->projected_at = (1 - x) * start->projected + x * r->projected;
   if (b->projection == PW_DENSE_UNPROJECTED) return pw_evaluate_J_at (r->w, t, r->q_at, r->v_at);
   int status = pw_project_positions (&b->projector, r, t, r->q_at, r->v_at);
   if (status != PW_OK || b->projection == PW_DENSE_POSITIONS) return status;
@@ -77,9 +78,9 @@ int pw_sample_last_step (pw_run *r, double t0, double t, pw_interpolate *interpo
     return PW_OK;
   }
   const pw_statistics statistics = r->statistics;
+  r->projected_at = r->projected;
   int status = interpolate (method, r, t);
   r->statistics = statistics;
-  r->projected_at = r->projected;
   if (status == PW_OK) return PW_OK;
   if (status == PW_METHOD) return pw_fail_signal (t, error);
   if (r->near_singular) return pw_fail_singular (r, t, error);

@@ -132,9 +132,9 @@ int pw_parse_options (const char *text, const pw_method *const *own, const pw_me
   }
   while (*text == ':') {
     text++;
-    if (methods_part (part, &text, ":", "an option", whole, error) != PW_OK ||
-        methods_option (*method, *stabilisation, part, values, &given, error) != PW_OK)
-      return PW_INPUT;
+    int status = methods_part (part, &text, ":", "an option", whole, error);
+    if (status == PW_OK) status = methods_option (*method, *stabilisation, part, values, &given, error);
+    if (status != PW_OK) return status;
   }
   if (*text)
     return pw_fail (error, PW_INPUT, "method \"%.80s\": expected INTEGRATOR+STABILISATION:OPTION=VALUE", whole);

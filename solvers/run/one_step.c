@@ -1,4 +1,4 @@
-/* The functions of pinwheel-method.h for one-step methods of users; pw_run_option: tolerances.c; pw_run_accelerate:
+/* The functions of pinwheel-method.h for one-step methods of users; pw_run_option: options.c; pw_run_accelerate:
  * dynamics.c. */
 #include <math.h>
 #include <stdlib.h>
@@ -74,12 +74,11 @@ double pw_step_size (pw_run *r, double t_end) {
 }
 
 /* Projects the new state if the method does, and evaluates its accelerations. */
-static int step_evaluate (pw_run *r, double t, double *q, double *v) {
+static int step_evaluate (pw_run *r, double t, double *q, double *v, double *added_energy) {
   struct pw_method_data *d = r->data;
   if (!pw_is_finite_state (r, q, v)) return PW_RETRY;
   if (!d->projects) return pw_run_accelerate (r, t, q, v, d->a, d->lambda);
-  double *added_energy = r->settings.ledger ? &r->projected : NULL;
-  return pw_project_state (&d->last.projector, r, t, q, v, d->a, d->lambda, added_energy);
+  return pw_project_state (&d->last.projector, r, t, q, v, d->a, d->lambda, r->settings.ledger ? added_energy : NULL);
 }
 
 static int step_fail (pw_run *r, int status, double h, pw_error *error) {
@@ -94,11 +93,12 @@ int pw_step_accept (pw_run *r, int status, double h, double *q, double *v, pw_er
   struct pw_method_data *d = r->data;
   size_t n = (size_t)r->s->coords * sizeof *q;
   int requested = fabs (r->t + h - d->end) <= 1e-9 * h; /* 0: the caller chose another size */
-  double t1 = requested ? d->end : r->t + h;
-  if (status == PW_OK) status = step_evaluate (r, t1, q, v);
+  double t1 = requested ? d->end : r->t + h, added_energy = 0;
+  if (status == PW_OK) status = step_evaluate (r, t1, q, v, &added_energy);
   if (status != PW_OK) return step_fail (r, status, h, error);
   pw_store_start (&d->last.start, r);
   r->t = t1;
+  r->projected += added_energy;
   memcpy (r->q, q, n);
   memcpy (r->v, v, n);
   memcpy (r->a, d->a, n);

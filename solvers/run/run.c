@@ -20,9 +20,10 @@ int pw_run_annotate_error (const pw_run *r, int status, pw_error *error) {
 }
 
 int pw_run_open_saddle (pw_run *r, pw_error *error) {
+  pw_error cause = { 0 };
   pw_saddle_close (r->saddle);
-  r->saddle = pw_saddle_open (r->w, r->s->mass, r->s->rows, r->active, error);
-  if (r->saddle == NULL) return error ? error->status : PW_RESOURCE;
+  r->saddle = pw_saddle_open (r->w, r->s->mass, r->s->rows, r->active, &cause);
+  if (r->saddle == NULL) return pw_fail (error, cause.status, "%s", cause.text);
   pw_specialised_select (r);
   return pw_watchdog_open (r, error);
 }
@@ -40,7 +41,7 @@ void pw_run_set_references (pw_run *r) {
   pw_watchdog_begin (r);
   if (r->redundant == 0) return;
   r->independence = pw_rank_independence (r);
-  r->reselect_below = fmin (r->limits.reselect_ratio * r->independence, r->limits.reselect_below);
+  r->reselect_below = fmin (r->thresholds.reselect_ratio * r->independence, r->thresholds.reselect_below);
 }
 
 int pw_run_look_ahead (pw_run *r, pw_error *error) {
@@ -139,7 +140,7 @@ static int run_check_progress (pw_run *r, double before, pw_error *error) {
   double least = 64 * DBL_EPSILON * fabs (r->t);
   if (r->fixed_steps) least = fmin (least, r->settings.step / 2);
   r->stalled = r->t - before > least ? 0 : r->stalled + 1;
-  if (r->stalled < r->limits.stalled) return PW_OK;
+  if (r->stalled < r->thresholds.stalled) return PW_OK;
   return pw_fail (error, PW_METHOD,
                   "t = %.6g s: no step succeeds, however small: the next state cannot be evaluated, or not to within "
                   "the tolerances",
@@ -221,20 +222,21 @@ int pw_run_sample (pw_run *r, double t, pw_sample *sample, pw_error *error) {
 static int run_check_given (const pw_run *r, const double *x, int first, pw_error *error) {
   char name[120];
   for (int j = 0, n = r->s->coords; x && j < n; j++)
-    if (!(fabs (x[j]) < r->limits.extreme))
+    if (!(fabs (x[j]) < r->thresholds.extreme))
       return pw_fail (error, PW_INPUT, "model %s: restart with %s = %g: expected a magnitude below %g", r->s->model,
-                      pw_system_state_name (r->s, first + j, name, sizeof name), x[j], r->limits.extreme);
+                      pw_system_state_name (r->s, first + j, name, sizeof name), x[j], r->thresholds.extreme);
   return PW_OK;
 }
 
-/* Makes (q, v) the state reached and moves the previous one to the sample arrays.  q and v may be in these; NULL:
- * unchanged. */
+/* Makes (q, v) the state reached; moves the previous one to the sample arrays and the values given before to
+ * r->given_before.  q and v may be in the sample arrays; NULL: unchanged. */
 static void run_exchange (pw_run *r, const double *q, const double *v) {
   size_t n = (size_t)r->s->coords, bytes = n * sizeof *q;
   double *given = r->scratch;
   memcpy (given, q ? q : r->q, bytes);
   memcpy (given + n, v ? v : r->v, bytes);
   memcpy (r->q_at, r->q, pw_state_length (r->s) * sizeof *q);
+  memcpy (r->given_before, r->q_given, 2 * (n + 3) * sizeof *q);
   memcpy (r->q, given, bytes);
   memcpy (r->v, given + n, bytes);
 }
@@ -275,10 +277,12 @@ int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error
   if (run_has_no_method (r, error)) return PW_RESOURCE;
   if (run_check_given (r, q, 0, error) != PW_OK || run_check_given (r, v, r->s->coords, error) != PW_OK)
     return PW_INPUT;
+  r->w->failed = NULL;
   int status = run_energy (r, &before, error);
   if (status == PW_OK) status = pw_run_look_ahead (r, error);
-  if (status != PW_OK) return status;
+  if (status != PW_OK) return pw_run_annotate_error (r, status, error);
   const double reselect_below = r->reselect_below;
+  const pw_initial_report initial = r->initial;
   r->w->t_signal = NAN;
   run_exchange (r, q, v);
   status = run_continue_at (r, &after, error);
@@ -290,8 +294,10 @@ int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error
     r->energy0 += after - before;
     return PW_OK;
   }
+  pw_run_annotate_error (r, status, error);
   memcpy (r->q, r->q_at, pw_state_length (r->s) * sizeof *r->q);
-  r->reselect_below = reselect_below;
+  memcpy (r->q_given, r->given_before, 2 * ((size_t)r->s->coords + 3) * sizeof *r->q);
+  r->reselect_below = reselect_below, r->initial = initial;
   if (run_select_rows (r, NULL) == PW_OK) pw_run_evaluate (r, NULL);
   return status;
 }

@@ -49,8 +49,8 @@ static int run_allocate (pw_run *r) {
                              { &r->q_at, state },
                              { &r->ledger_at, entries },
                              { &r->scratch, scratch },
-                             { &r->q_given, n },
-                             { &r->v_given, n },
+                             { &r->q_given, 2 * n },
+                             { &r->given_before, 2 * n },
                              { &r->saturation, 2 * n },
                              { &r->matrix_state, states },
                              { &r->matrix_range, states },
@@ -59,6 +59,7 @@ static int run_allocate (pw_run *r) {
   r->origin = malloc (2 * n);
   if (r->memory == NULL || r->origin == NULL) return PW_RESOURCE;
   r->v = r->q + n, r->a = r->v + n, r->lambda = r->a + n;
+  r->v_given = r->q_given + n;
   r->v_at = r->q_at + n, r->a_at = r->v_at + n, r->lambda_at = r->a_at + n;
   for (size_t j = 0; j < 2 * n; j++) r->saturation[j] = INFINITY;
   for (size_t j = 0; j < states; j++) r->matrix_range[j] = INFINITY;
@@ -101,7 +102,7 @@ static int run_first_evaluation (pw_run *r, pw_error *error) {
   if (status != PW_OK) return status;
   double sine = pw_watchdog_sine (r, NULL);
   int large = (double)r->s->rows * r->s->coords > PW_RANK_MAX_ENTRIES;
-  if (sine < (large ? r->limits.rank_refused : r->limits.rank_suspect)) {
+  if (sine < (large ? r->thresholds.rank_refused : r->thresholds.rank_suspect)) {
     if (large) return pw_fail_singular (r, r->t, error);
     status = pw_rank_open (r, error);
     if (status == PW_OK && r->redundant) status = pw_run_open_saddle (r, error);
@@ -147,14 +148,15 @@ int pw_run_check_derivatives (pw_run *r, const char *user, const char *needs, pw
 static int run_open (pw_run *r, const char *method, const pw_settings *settings, pw_error *error) {
   const pw_settings none = { 0 };
   if (settings == NULL) settings = &none;
-  r->limits = pw_watchdog_limits;
-  r->refused_sine = r->limits.rank_lost;
+  r->thresholds = pw_watchdog_thresholds;
+  r->refused_sine = r->thresholds.rank_lost;
   if (run_allocate (r) != PW_OK) return pw_fail_memory (r->s, error);
-  if (run_initial_values (r, settings, error) != PW_OK ||
-      pw_parse_options (method, settings->methods, &r->method, &r->stabilisation, r->option, error) != PW_OK)
-    return PW_INPUT;
+  int status = run_initial_values (r, settings, error);
+  if (status == PW_OK)
+    status = pw_parse_options (method, settings->methods, &r->method, &r->stabilisation, r->option, error);
+  if (status != PW_OK) return status;
   r->fixed_steps = !pw_method_adaptive (r->method, method);
-  int status = run_settings (&r->settings, settings, r->fixed_steps, error);
+  status = run_settings (&r->settings, settings, r->fixed_steps, error);
   if (status != PW_OK) return status;
   r->t = r->settings.t;
   pw_hold_signals (r->w, 0);

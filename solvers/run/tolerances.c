@@ -58,9 +58,3 @@ int pw_run_saturation (pw_run *r, double *least, char *element, size_t size) {
   (void)pw_update_kinematics (r->w, r->t, r->q, r->v);
   return state;
 }
-
-double pw_run_option (const pw_run *r, const char *name) {
-  int i = 0;
-  while (r->method->options[i].name && strcmp (r->method->options[i].name, name) != 0) i++;
-  return r->method->options[i].name ? r->option[i] : 0;
-}

@@ -94,7 +94,7 @@ static int multistep_complete (pw_method_data *d, double t, int project, double 
   r->refused_sine = 0;
   int status = project ? multistep_project (d, t, q, v) : PW_OK;
   if (status == PW_OK) status = pw_run_accelerate (r, t, q, v, a, lambda);
-  r->refused_sine = r->limits.rank_lost;
+  r->refused_sine = r->thresholds.rank_lost;
   r->statistics = statistics;
   r->near_singular = near_singular;
   return status;
@@ -214,7 +214,7 @@ static void multistep_evaluate (pw_method_data *d) {
   r->refused_sine = 0;
   d->evaluated = pw_run_accelerate_evaluated (r, r->v, r->a, r->lambda) == PW_OK;
   if (!d->evaluated) memcpy (r->lambda, d->lambda, (size_t)r->s->rows * sizeof *r->lambda);
-  r->refused_sine = r->limits.rank_lost;
+  r->refused_sine = r->thresholds.rank_lost;
   r->statistics = statistics;
 }
 

@@ -81,6 +81,29 @@ TEST (implicit_steps_ending_there) {
   }
 }
 
+/* Stops at the second call. */
+static int singular_stop (void *calls) {
+  return ++*(int *)calls == 2;
+}
+
+/* Before each further attempt at such a step a stop is possible; the step is then made by the next call. */
+TEST (stopped_attempts) {
+  static const char *const method[] = { "galpha+index3", "leapfrog" };
+  static const double step[] = { 7.66333333333e-4, 7.7e-4 };
+  for (int i = 0; i < 2; i++) {
+    int calls = 0, status = PW_OK;
+    pw_error error = { 0 };
+    pw_system *s = scene_named ("n-four-bar", NULL, 0);
+    pw_run *r = runs_open (
+        s, method[i], &(pw_settings){ .step = step[i], .span = 10, .stop = singular_stop, .stop_context = &calls });
+    for (; status == PW_OK && pw_run_time (r) < 10; calls = 0) status = pw_run_advance (r, 10, &error);
+    assert_int_equal (status, PW_STOPPED);
+    calls = 2;
+    check_ok (pw_run_advance (r, 10, &error), &error);
+    runs_close (r, s);
+  }
+}
+
 TEST (slider_crank) {
   static const char *const method[] = { "rk4+projection", "rk4+projection:metric=identity", "rk4+none", "rk4+baumgarte",
                                         "rk4+nullspace" };

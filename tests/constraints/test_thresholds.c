@@ -61,7 +61,7 @@ static void watchdog_measure (int i, double factor, double *t, long *rejected) {
                          &(pw_settings){ .rtol = watchdog_limit[i].tolerance,
                                          .step = watchdog_limit[i].tolerance,
                                          .span = watchdog_limit[i].t });
-  *(double *)(void *)((char *)&r->limits + watchdog_limit[i].at) *= factor;
+  *(double *)(void *)((char *)&r->thresholds + watchdog_limit[i].at) *= factor;
   pw_run_advance_to (r, watchdog_limit[i].t, watchdog_limit[i].t, &error);
   *t = pw_run_time (r);
   *rejected = pw_run_statistics (r)->rejected;
@@ -87,7 +87,7 @@ TEST (again) {
   pw_error first = { 0 }, second = { 0 };
   pw_system *s = scene_named ("n-four-bar", NULL, 0);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 4 });
-  r->limits.agree *= 1e-6;
+  r->thresholds.agree *= 1e-6;
   assert_int_equal (pw_run_advance_to (r, 4, 4, &first), PW_METHOD);
   assert_int_equal (pw_run_advance (r, 4, &second), PW_METHOD);
   check_error (&second, PW_METHOD, first.text);
@@ -165,7 +165,7 @@ TEST (evaluations) {
   const double angle = 1e-4;
   double refined = watchdog_residual (r, angle), sine = r->watchdog.evaluated_sine,
          projected = watchdog_projected (r, angle);
-  r->limits.refine = 0;
+  r->thresholds.refine = 0;
   check_below ("projected", projected, 0.1 * watchdog_projected (r, angle), "eps / s instead of eps / s^2");
   check_below ("refined", refined, 0.1 * watchdog_residual (r, angle), "eps / s instead of eps / s^2");
   r->refused_sine = 2 * sine;
@@ -173,7 +173,7 @@ TEST (evaluations) {
   assert_int_equal (pw_run_accelerate (r, 0, r->q, r->v, r->a, r->lambda), PW_RETRY);
   r->refused_sine = 0.5 * sine;
   assert_int_equal (pw_run_accelerate (r, 0, r->q, r->v, r->a, r->lambda), PW_OK);
-  assert_true (r->limits.rank_lost == pw_watchdog_limits.rank_lost);
+  assert_true (r->thresholds.rank_lost == pw_watchdog_thresholds.rank_lost);
   runs_close (r, s);
 }
 
@@ -182,10 +182,11 @@ TEST (jump) {
   pw_run *r = runs_open (s, "rk4+projection", NULL);
   pw_error error = { 0 };
   r->near_singular = 1;
-  r->a[0] = 1.5 * r->limits.jump_growth * r->reference_level * s->scale.length / (r->w->scale.time * r->w->scale.time);
+  r->a[0] =
+      1.5 * r->thresholds.jump_growth * r->reference_level * s->scale.length / (r->w->scale.time * r->w->scale.time);
   assert_int_equal (pw_run_watchdog (r, &error), PW_METHOD);
   assert_non_null (strstr (error.text, "lost at a singular configuration: the accelerations are 150 times"));
-  r->limits.jump_growth *= 2;
+  r->thresholds.jump_growth *= 2;
   error = (pw_error){ 0 };
   r->near_singular = 1;
   check_ok (pw_run_watchdog (r, &error), &error);
@@ -212,10 +213,10 @@ TEST (drift) {
 
 TEST (masses) {
   pw_error error = { 0 };
-  pw_system *s = scene_named ("n-four-bar", "m", 0.7 * pw_watchdog_limits.extreme);
+  pw_system *s = scene_named ("n-four-bar", "m", 0.7 * pw_watchdog_thresholds.extreme);
   pw_run *r = runs_open (s, "rk4+projection", NULL);
   assert_int_equal (pw_watchdog_check_values (r, &error), PW_OK);
-  r->limits.extreme /= 2;
+  r->thresholds.extreme /= 2;
   assert_int_equal (pw_watchdog_check_values (r, &error), PW_INPUT);
   runs_close (r, s);
 }

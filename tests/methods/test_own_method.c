@@ -108,6 +108,24 @@ TEST (sample) {
   pw_system_free (s);
 }
 
+/* Samples inside a step contain a part of the energy that its projection adds: at its beginning, none. */
+TEST (sample_projection) {
+  pw_error error = { 0 };
+  pw_sample x;
+  pw_system *s = scene_named ("pendulum", NULL, 0);
+  pw_run *r = runs_open (s, "euler+projection", &(pw_settings){ .step = 1e-2, .ledger = 1, .methods = own_methods });
+  const pw_sample before = runs_to (r, 0.5);
+  check_ok (pw_run_advance (r, 1, &error), &error);
+  const pw_sample after = runs_to (r, pw_run_time (r));
+  assert_true (fabs (after.projection - before.projection) > 1e-6);
+  check_ok (pw_run_sample (r, 0.5, &x, &error), &error);
+  check_close ("at the beginning", x.projection, before.projection, 0, "the end of the last step");
+  check_close ("balance there", x.balance, before.balance, 1e-12, "round-off of a projection");
+  check_ok (pw_run_sample (r, 0.505, &x, &error), &error);
+  check_close ("halfway", x.projection, (before.projection + after.projection) / 2, 1e-12, "linear, with round-off");
+  runs_close (r, s);
+}
+
 /* A run resumed from a checkpoint continues bit-identically. */
 TEST (checkpoint) {
   pw_archive a = { 0 };

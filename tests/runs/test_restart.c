@@ -117,11 +117,13 @@ TEST (refused_by_method) {
   pw_run *r = runs_open (s, "refusing+projection", &settings), *left = runs_open (s, "rk4+projection", &settings);
   pw_sample now = runs_to (r, 1), before = runs_to (left, 1);
   pw_error error = { 0 };
-  double v[6];
+  double v[6], given[6];
+  memcpy (given, pw_run_initial (r)->v_given, sizeof given);
   for (int j = 0; j < 6; j++) v[j] = 3 * now.v[j];
   restart_fails = 1;
   assert_int_equal (pw_run_restart (r, NULL, v, &error), PW_METHOD);
   check_error (&error, PW_METHOD, "no restart");
+  check_bits ("the report", pw_run_initial (r)->v_given, given, 6);
   error = (pw_error){ 0 };
   assert_int_equal (pw_run_advance (r, 2, &error), PW_METHOD);
   check_error (&error, PW_METHOD, "no restart");
@@ -197,6 +199,21 @@ static double restart_controlled (const char *method, double step) {
   pw_run_close (r);
   pw_system_free (s);
   return phi;
+}
+
+/* A restart for which a signal fails names the signal. */
+TEST (signal_fails) {
+  pw_error error = { 0 };
+  double u = 0;
+  pw_signal torque = { PW_FUNCTION, .function = { .eval = restart_held, .context = &u } };
+  pw_model *m = scene_model (&scene_ezyroller, NULL);
+  check_ok (pw_model_set_signal (m, "rider", "value", &torque, &error), &error);
+  pw_system *s = scene_compile (m);
+  pw_run *r = runs_open (s, "rk4+projection", NULL);
+  u = NAN;
+  assert_int_equal (pw_run_restart (r, NULL, NULL, &error), PW_METHOD);
+  check_error (&error, PW_METHOD, "t = 0 s: a signal failed: torque rider: value is not a finite number");
+  runs_close (r, s);
 }
 
 /* After a restart, the method uses the new value of a function: its order is unchanged. */

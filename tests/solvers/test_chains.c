@@ -3,6 +3,8 @@
 #include <math.h>
 #include <stdio.h>
 #include "check.h"
+#include "condense.h"
+#include "method.h"
 #include "runs.h"
 #include "scene.h"
 #include "trial.h"
@@ -133,4 +135,19 @@ TEST (others) {
   double end[8];
   for (size_t k = 0; k < sizeof chains_bars / sizeof *chains_bars; k++)
     for (int variant = CHAINS_OTHERS; variant < CHAINS_ALL; variant++) chains_run (variant, chains_bars[k], end);
+}
+
+/* In an elimination from both ends, a pivot that is not a number stays the smallest: that of the first pin. */
+TEST (not_a_number) {
+  pw_system *s = scene_system (&chains_build_table, "variant", 0., "bars", 14., NULL);
+  pw_run *r = runs_open (s, "rk4+projection", NULL);
+  const pw_chain *chain = r->saddle->block->chain;
+  int row;
+  assert_true (chain->includes_last);
+  assert_int_equal (pw_evaluate_J_at (r->w, 0, r->q, r->v), PW_OK);
+  ((double *)(uintptr_t)chain->J_first)[2] = NAN;
+  assert_int_equal (pw_saddle_factor (r->saddle), PW_RETRY);
+  assert_true (pw_saddle_sine (r->saddle, &row) == 0);
+  assert_int_equal (row, chain->unknown);
+  runs_close (r, s);
 }

@@ -211,6 +211,7 @@ static int steady_branches_from (pw_steady_command *cmd, double parameter, int d
   if (status < 0 && status != PW_RESOURCE && cmd->branches > 0) {
     pw_cli_say ("pinwheel: no branches sought from the other end: %s\n", error->text);
     *error = (pw_error){ 0 };
+    while (cmd->points > before) free (cmd->point[--cmd->points].state);
     return PW_OK;
   }
   pw_steady_point *start = malloc (((size_t)found + 1) * sizeof *start);

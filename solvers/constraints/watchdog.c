@@ -37,7 +37,7 @@ static void watchdog_record_sine (pw_run *r, double sine) {
 static int watchdog_reaches (const pw_run *r, double sine, double length) {
   const pw_watchdog *watch = &r->watchdog;
   return watch->saddle &&
-         !(watch->checked_sine - r->limits.lipschitz * watch->largest_sine * (watch->moved + length) > sine);
+         !(watch->checked_sine - r->thresholds.lipschitz * watch->largest_sine * (watch->moved + length) > sine);
 }
 
 /* The typical sine: the largest at a few irregular configurations, which need not satisfy the constraints. */
@@ -63,7 +63,7 @@ void pw_watchdog_begin (pw_run *r) {
   watch->previous_sine = watch->checked_sine;
   watch->step_length = watch->sine_slope = 0;
   watch->sine_before_checked = NAN;
-  watch->crossed = 0;
+  watch->may_have_crossed = 0;
   watch->singular_ahead = 1;
   memcpy (watch->previous_q, r->q, (size_t)r->s->coords * sizeof *watch->previous_q);
 }
@@ -76,7 +76,7 @@ static int watchdog_follow (pw_run *r, pw_error *error) {
   if (watch->saddle == NULL) return PW_OK;
   watch->step_length = watchdog_step_length (r);
   watch->moved += watch->step_length;
-  double near = r->limits.near * watch->largest_sine, ahead = r->limits.step_growth * watch->step_length;
+  double near = r->thresholds.near * watch->largest_sine, ahead = r->thresholds.step_growth * watch->step_length;
   int may_be_near = watchdog_reaches (r, near, ahead);
   if (may_be_near) {
     double last = watch->moved == watch->step_length ? watch->checked_sine : NAN;
@@ -85,7 +85,7 @@ static int watchdog_follow (pw_run *r, pw_error *error) {
     if (status == PW_OK) status = pw_change_point_resolve (r, last, error);
     watch->sine_before_checked = last;
   } else
-    watch->sine_before_checked = NAN, watch->sine_slope = 0, watch->crossed = 0;
+    watch->sine_before_checked = NAN, watch->sine_slope = 0, watch->may_have_crossed = 0;
   if (may_be_near && watch->checked_sine < near) r->near_singular = 1;
   watch->singular_ahead = may_be_near && watchdog_reaches (r, near, ahead);
   watch->previous_t = r->t;
@@ -123,10 +123,10 @@ static int watchdog_exceeds (double position, double velocity, double limit) {
 static int watchdog_contradicts (pw_run *r) {
   pw_residuals all, enforced;
   pw_evaluate_residuals (r->w, NULL, &all);
-  if (!watchdog_exceeds (all.position, all.velocity, r->limits.redundant_residual)) return 0;
+  if (!watchdog_exceeds (all.position, all.velocity, r->thresholds.redundant_residual)) return 0;
   pw_evaluate_residuals (r->w, r->active, &enforced);
   double explained =
-      r->limits.redundant_residual + r->limits.redundant_ratio * fmax (enforced.position, enforced.velocity);
+      r->thresholds.redundant_residual + r->thresholds.redundant_ratio * fmax (enforced.position, enforced.velocity);
   return watchdog_exceeds (all.position, all.velocity, explained);
 }
 
@@ -142,15 +142,15 @@ static double watchdog_residual (const pw_run *r) {
  * turn, which a method follows however small its steps. */
 static int watchdog_unresolved (pw_run *r, double residual, double ratio) {
   int row;
-  double bound = fmin (sqrt (residual / ratio), r->limits.regular * r->watchdog.largest_sine);
-  return bound > r->limits.rank_lost && watchdog_reaches (r, bound, 0) && pw_watchdog_sine (r, &row) < bound &&
+  double bound = fmin (sqrt (residual / ratio), r->thresholds.regular * r->watchdog.largest_sine);
+  return bound > r->thresholds.rank_lost && watchdog_reaches (r, bound, 0) && pw_watchdog_sine (r, &row) < bound &&
          row < r->s->holonomic;
 }
 
 /* Fails where residuals may decide the branch and accelerations have grown, or residuals are large: the turn is then a
  * corner whose radius grows with the residual, so that its accelerations need not grow. */
 static int watchdog_check_turn (pw_run *r, double norm, pw_error *error) {
-  const pw_thresholds *limit = &r->limits;
+  const pw_thresholds *limit = &r->thresholds;
   double residual = watchdog_residual (r), before = fmax (r->previous_norm, limit->turn_reference);
   if (!(norm <= limit->turn_growth * before) && watchdog_unresolved (r, residual, limit->drift_turn))
     return pw_fail (error, PW_METHOD,
@@ -173,11 +173,11 @@ static int watchdog_check_jump (pw_run *r, pw_error *error) {
   double norm = pw_run_acceleration_norm (r);
   if (r->near_singular) pw_watchdog_sine (r, &row);
   int may_jump = r->near_singular && (row < 0 || row >= r->s->holonomic || !isfinite (norm));
-  if (may_jump && !(norm <= r->limits.jump_growth * r->reference_level))
+  if (may_jump && !(norm <= r->thresholds.jump_growth * r->reference_level))
     return pw_fail (error, PW_METHOD,
                     "t = %.6g s: lost at a singular configuration: the accelerations are %.3g times those before", r->t,
                     norm / r->reference_level);
-  if (r->near_singular || watchdog_unresolved (r, watchdog_residual (r), r->limits.drift_near))
+  if (r->near_singular || watchdog_unresolved (r, watchdog_residual (r), r->thresholds.drift_near))
     return watchdog_check_turn (r, norm, error);
   r->reference_level = pw_larger (norm, r->reference_level);
   r->previous_norm = norm;
@@ -186,7 +186,7 @@ static int watchdog_check_jump (pw_run *r, pw_error *error) {
 
 int pw_run_watchdog (pw_run *r, pw_error *error) {
   pw_record_residuals (r);
-  double lost = pw_stabilised_by (r, PW_UNSTABILISED) ? r->limits.lost_unstabilised : r->limits.lost;
+  double lost = pw_stabilised_by (r, PW_UNSTABILISED) ? r->thresholds.lost_unstabilised : r->thresholds.lost;
   int contradicts = r->redundant && watchdog_contradicts (r);
   if (contradicts || watchdog_exceeds (r->residuals.position, r->residuals.velocity, lost))
     return watchdog_fail_lost (r, contradicts, error);

@@ -11,7 +11,7 @@
 
 /* A step to t from the state `from`, which temporarily replaces the state reached: computes the new state, and its
  * ledger in r->ledger_at; with_energy: 1 to compute r->projected_at, too. */
-static int divide_step (pw_run *r, const pw_step_start *from, double t, int project, int with_energy) {
+static int fixed_step_from (pw_run *r, const pw_step_start *from, double t, int project, int with_energy) {
   const double h = t - from->t, t_reached = r->t;
   double *const q = r->q, *const v = r->v, *const a = r->a, *const rate = r->rate;
   double added_energy = 0;
@@ -25,37 +25,37 @@ static int divide_step (pw_run *r, const pw_step_start *from, double t, int proj
 }
 
 /* The same in two parts, with the energy, the first one up to the time `between`. */
-static int divide_two_parts (pw_run *r, const pw_step_start *from, double between, double t, int project) {
+static int fixed_two_parts (pw_run *r, const pw_step_start *from, double between, double t, int project) {
   pw_method_data *d = r->data;
-  int status = divide_step (r, from, between, project, 1);
+  int status = fixed_step_from (r, from, between, project, 1);
   if (status != PW_OK) return status;
   d->second.t = between, d->second.projected = r->projected_at;
   memcpy (d->second.q, d->q, pw_state_length (r->s) * sizeof *d->q);
   memcpy (d->second.ledger, r->ledger_at, (size_t)r->s->entries * sizeof (double));
   pw_ledger_rates (r, d->lambda, d->second.rate);
-  return divide_step (r, &d->second, t, project, 1);
+  return fixed_step_from (r, &d->second, t, project, 1);
 }
 
 /* Divides the step to t1 at several times after `earliest`, until two successive results differ by at most `best`;
  * *between: the time of division with the least difference.  PW_RETRY if that exceeds `acceptable`; PW_STOPPED or
  * PW_METHOD.  status: of the undivided step, whose result is in d->q.  In a step from the state reached, energy added
  * by projections is an error, too. */
-static int divide (pw_run *r, const pw_step_start *from, int status, double t1, int project, double earliest,
-                   double *between) {
+static int fixed_divide (pw_run *r, const pw_step_start *from, int status, double t1, int project, double earliest,
+                         double *between) {
   /* fractions of the step; irregular, since configurations may recur */
   static const double part[] = { 0.382, 0.681, 0.209, 0.847, 0.127, 0.541, 0.943, 0.302, 0.764, 0.891 };
   const pw_method_data *d = r->data;
   const size_t bytes = pw_state_length (r->s) * sizeof *d->q;
   double least = INFINITY, energy = fmax (r->scene_energy, r->exchanged);
   int has_result = status == PW_OK, is_step = from->q == r->q; /* otherwise it is a sample */
-  const double best = is_step ? r->limits.agree_best : r->limits.sample_best;
-  const double acceptable = is_step ? r->limits.agree : r->limits.sample;
+  const double best = is_step ? r->thresholds.agree_best : r->thresholds.sample_best;
+  const double acceptable = is_step ? r->thresholds.agree : r->thresholds.sample;
   if (has_result) memcpy (r->q_at, d->q, bytes);
   for (size_t i = 0; i < sizeof part / sizeof *part && least > best; i++) {
     double t = from->t + part[i] * (t1 - from->t);
     if (t <= earliest) continue;
     if (is_step && pw_run_stop_requested (r)) return PW_STOPPED;
-    status = divide_two_parts (r, from, t, t1, project);
+    status = fixed_two_parts (r, from, t, t1, project);
     r->statistics.rejected++;
     if (status < 0) return status;
     if (status != PW_OK) continue;
@@ -82,10 +82,10 @@ int pw_rk_at (pw_run *r, double t, pw_error *error) {
   double between;
   r->near_singular = 0;
   r->refused_sine = 0; /* a sample is divided, not refused, near a singular configuration */
-  int status = divide_step (r, from, t, d->projects, r->settings.ledger), divided = r->near_singular && status >= 0;
+  int status = fixed_step_from (r, from, t, d->projects, r->settings.ledger), divided = r->near_singular && status >= 0;
   if (divided) {
-    status = divide (r, from, status, t, d->projects, from->t, &between);
-    if (status == PW_OK) status = divide_two_parts (r, from, between, t, d->projects);
+    status = fixed_divide (r, from, status, t, d->projects, from->t, &between);
+    if (status == PW_OK) status = fixed_two_parts (r, from, between, t, d->projects);
   }
   memcpy (r->q_at, d->q, pw_state_length (r->s) * sizeof *d->q);
   r->statistics = statistics, r->refused_sine = refused_sine, r->near_singular = near_singular;
@@ -104,11 +104,11 @@ static int fixed_step_around (pw_run *r, int status, int ends_singular, double t
   static const double beyond[] = { 0.62, 2.62, 7.62 }; /* in step sizes; irregular, since configurations may recur */
   const pw_step_start from = { .t = r->t, .projected = r->projected, .q = r->q, .ledger = r->ledger, .rate = r->rate };
   double added_energy = 0;
-  if (!ends_singular) status = divide (r, &from, status, t1, project, r->t, t);
+  if (!ends_singular) status = fixed_divide (r, &from, status, t1, project, r->t, t);
   if (ends_singular && status == PW_OK) status = PW_RETRY;
   for (size_t i = 0; i < sizeof beyond / sizeof *beyond && status == PW_RETRY && t1 < stop; i++)
-    status = divide (r, &from, status, fmin (t1 + beyond[i] * r->settings.step, stop), project, t1, t);
-  if (ends_singular && status == PW_RETRY) status = divide (r, &from, status, t1, project, r->t, t);
+    status = fixed_divide (r, &from, status, fmin (t1 + beyond[i] * r->settings.step, stop), project, t1, t);
+  if (ends_singular && status == PW_RETRY) status = fixed_divide (r, &from, status, t1, project, r->t, t);
   if (status == PW_OK) status = pw_rk_step (r, *t - r->t, *t, project, &added_energy);
   if (status == PW_OK) pw_rk_accept (r, *t - r->t, *t, r->settings.ledger ? added_energy : 0);
   return status;
@@ -122,7 +122,7 @@ int pw_rk_advance_fixed (pw_run *r, double t_end, pw_error *error) {
   double h = whole && !was_off_grid ? r->settings.step : t1 - r->t;
   int status = pw_rk_step (r, h, t1, project, r->settings.ledger ? &added_energy : NULL);
   int ends_singular =
-      r->near_singular && r->watchdog.evaluated_sine < r->limits.ends_singular * r->watchdog.checked_sine;
+      r->near_singular && r->watchdog.evaluated_sine < r->thresholds.ends_singular * r->watchdog.checked_sine;
   d->off_grid = r->near_singular && !was_off_grid;
   double stop = whole ? fmin (t_end, r->breakpoint) : t1, t = t1;
   if (d->off_grid) status = fixed_step_around (r, status, ends_singular, t1, stop, project, &t);
