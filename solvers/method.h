@@ -38,7 +38,7 @@ struct pw_run {
   double reselect_below;       /* independence below which other active rows are tried */
   const struct pw_specialised *specialised; /* compiled code of the scene in use, or NULL */
   struct pw_scene *scene;                   /* its data; NULL: none, or a constant pivot is too small */
-  pw_thresholds thresholds;                 /* thresholds of the watchdog */
+  pw_thresholds thresholds;                 /* of the watchdog */
   pw_watchdog watchdog;                     /* the sine, which measures the distance from a singular configuration */
   double refused_sine;                      /* sine below which an evaluation is refused */
   int near_singular;                        /* 1 after an evaluation near a singular configuration */
@@ -344,7 +344,7 @@ int pw_projector_open_by_options (pw_projector *p, pw_run *r, pw_error *error);
 void pw_projector_close (pw_projector *p);
 
 /* Gauss-Newton iteration on g(q) = 0 to round-off, minimal changes in the metric.  Leaves kinematics and J evaluated at
- * (t, q, v) and, if no row is redundant, the residuals of positions in r->residuals.  PW_RETRY if it does not converge
+ * (t, q, v) and, if all rows are enforced, the residuals of positions in r->residuals.  PW_RETRY if it does not converge
  * (contradictory_row: -1), or if a redundant equation contradicts the others; PW_METHOD if a signal failed. */
 int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const double *v);
 

@@ -6,7 +6,7 @@
 
 PW_BEGIN
 
-/* ---- Mobility and linearisation at the state reached (linear.c) ---- */
+/* ---- Mobility and linearisation at the state reached (linear*.c) ---- */
 
 /* Whether eigenvalues of the linearisation are growth rates of perturbations: only if the linearised equations are
  * constant along the motion, in a frame that moves with it. */
@@ -55,7 +55,7 @@ void pw_linear_free (pw_linear *l);
  * re > 0 counts as 0.  INFINITY if im = 0 and re >= 0. */
 double pw_rk4_limit (double re, double im);
 
-/* ---- Derivatives of a run (variation.c) ---- */
+/* ---- Derivatives of a run (variation*.c) ---- */
 
 /* What the motion is differentiated with respect to: a number p that changes the system, the initial state, or both.
  *
@@ -104,9 +104,9 @@ int pw_variation_sample (pw_variation *x, int i, pw_sample *derivative, pw_sampl
  * breakpoint, or of one at the time reached. */
 double pw_variation_breakpoint (const pw_variation *x, int i, double *slope);
 
-/* Advances the run to time t, but not beyond its next breakpoint nor by more than 256 states, and returns the time just
- * after the first jump of its accelerations with the state after the time reached, or INFINITY.  NAN and the error if
- * that fails. */
+/* Where pw_system_may_jump, advances the run to time t, but not beyond its next breakpoint nor farther than 256 states
+ * ahead, and returns the time just after the first jump of its accelerations with the state after the time reached, or
+ * INFINITY.  NAN and the error if that fails. */
 double pw_variation_next_jump (pw_variation *x, double t, double t_end, pw_error *error);
 /* The derivative along direction i of the time of the last jump or breakpoint passed. */
 double pw_variation_jump_slope (const pw_variation *x, int i);

@@ -25,7 +25,7 @@ static const double CHANGE_LONGER = 1.7;
 typedef enum {
   CHANGE_SAME_BRANCH,
   CHANGE_OTHER_BRANCH,
-  CHANGE_UNKNOWN /* the walk ended before the end of the step; branches may cross there */
+  CHANGE_UNKNOWN /* the walk did not reach the end of the step, perhaps since branches cross */
 } change_verdict;
 
 typedef struct {
