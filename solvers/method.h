@@ -344,8 +344,8 @@ int pw_projector_open_by_options (pw_projector *p, pw_run *r, pw_error *error);
 void pw_projector_close (pw_projector *p);
 
 /* Gauss-Newton iteration on g(q) = 0 to round-off, minimal changes in the metric.  Leaves kinematics and J evaluated at
- * (t, q, v) and, if all rows are enforced, the residuals of positions in r->residuals.  PW_RETRY if it does not converge
- * (contradictory_row: -1), or if a redundant equation contradicts the others; PW_METHOD if a signal failed. */
+ * (t, q, v) and, if all rows are enforced, the residuals of positions in r->residuals.  PW_RETRY if it does not
+ * converge (contradictory_row: -1), or if a redundant equation contradicts the others; PW_METHOD if a signal failed. */
 int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const double *v);
 
 /* A linear solve for J v = eta at the current configuration, near a singular one two; updates the velocity kinematics.

@@ -53,8 +53,8 @@ int pw_radau_open_matrices (pw_run *r);
 /* The relative tolerance of the error estimate, 0.05 rtol^(2/3); see radau.c. */
 double pw_radau_rtol (const pw_run *r);
 
-/* Solves for the stages of the step to t1 = t + h.  PW_RETRY if Newton's iteration does not converge, PW_SINGULAR if its
- * matrix is, PW_METHOD if a signal failed, PW_RESOURCE. */
+/* Solves for the stages of the step to t1 = t + h.  PW_RETRY if Newton's iteration does not converge, PW_SINGULAR if
+ * its matrix is, PW_METHOD if a signal failed, PW_RESOURCE. */
 int pw_radau_solve (pw_run *r, double h, double t1);
 
 /* y + the weighted sum of entry i of Z at the stages. */

@@ -1,6 +1,6 @@
 /* Dense output: positions and velocities by cubic Hermite interpolation, of order 4, projected onto the constraints as
- * pw_dense_projection says; accelerations, multipliers, the ledger's rates and the energy added by projections by linear
- * interpolation, with errors of order h^2. */
+ * pw_dense_projection says; accelerations, multipliers, the ledger's rates and the energy added by projections by
+ * linear interpolation, with errors of order h^2. */
 #include <stdlib.h>
 #include <string.h>
 #include "dense_output.h"
