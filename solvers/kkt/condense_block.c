@@ -1,4 +1,4 @@
-/* Plans the block L D L^T: the pattern of S and the body blocks; see condense.h and block_ldl.h. */
+/* Plans the block L D L^T: the pattern of S and the group blocks; see condense.h and block_ldl.h. */
 #include <limits.h>
 #include <string.h>
 #include "condense.h"
