@@ -93,6 +93,21 @@ static int has_lanes (void) {
   return has;
 }
 
+/* Numbers of runs for which there is no code. */
+static void test_numbers (void **state) {
+  static const int lanes[] = { -1, 1, 3, PW_LANES_MOST + 1, 2 * PW_LANES_MOST };
+  pw_system *s = scene_named ("chaplygin-sleigh", NULL, 0);
+  char *text = pw_system_source (s, NULL, NULL);
+  (void)state;
+  for (size_t i = 0; i < sizeof lanes / sizeof *lanes; i++) {
+    pw_error error = { 0 };
+    assert_null (pw_scene_lanes_open (text, s, lanes[i], &error));
+    assert_int_equal (error.status, PW_INPUT);
+  }
+  pw_system_free (s);
+  free (text);
+}
+
 static void test_models (void **state) {
   static const struct {
     const char *model, *method;
@@ -173,7 +188,8 @@ static void test_excluded (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_models), cmocka_unit_test (test_waiting),
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_numbers),
+    cmocka_unit_test (test_models), cmocka_unit_test (test_waiting),
                                       cmocka_unit_test (test_empty_lanes), cmocka_unit_test (test_excluded) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

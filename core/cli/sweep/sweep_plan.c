@@ -145,22 +145,6 @@ static int plan_find_columns (pw_plan *plan, pw_error *error) {
   return pw_fail (error, scan.first_error.status, "%s", scan.first_error.text);
 }
 
-static void plan_heading (pw_plan *plan) {
-  char name[300];
-  pw_text *heading = &plan->heading;
-  for (const pw_axis *axis = plan->grid.axis; axis < plan->grid.axis + plan->grid.axes; axis++) {
-    snprintf (name, sizeof name, "%s%s", axis->parameter ? "" : "start.", axis->name);
-    pw_text_name (heading, name, axis->unit);
-  }
-  pw_text_cell (heading, "status");
-  pw_text_name (heading, "t", "s");
-  for (int i = 0; i < plan->columns; i++) pw_text_name (heading, plan->column[i].name, plan->column[i].unit);
-  pw_text_name (heading, "kinetic", "J");
-  pw_text_add (heading, ",residual.position,residual.velocity,steps,rhs");
-  if (plan->with_cpu) pw_text_name (heading, "cpu", "s");
-  pw_text_cell (heading, "reason");
-}
-
 /* ---- The fingerprint ---- */
 
 /* The values of parameters that are not varied: the model's or those of --set. */
@@ -220,7 +204,7 @@ int pw_plan_open (pw_plan *plan, const char **ranges, pw_error *error) {
   for (int i = 0; i < plan->grid.axes && status == PW_OK; i++)
     status = plan_match_axis (plan, plan->grid.axis + i, model, error);
   if (status == PW_OK) status = plan_find_columns (plan, error);
-  if (status == PW_OK) plan_heading (plan);
+  if (status == PW_OK) pw_sweep_heading (plan, &plan->heading);
   if (status == PW_OK) status = plan_fingerprint (plan, model, error);
   pw_model_free (model);
   return status;

@@ -50,4 +50,7 @@ void pw_plan_close (pw_plan *plan);
  * threads at once. */
 int pw_plan_compile (const pw_plan *plan, long row, pw_cli_model *compiled, pw_error *error);
 
+/* Appends the table's first line, without its end (sweep_rows.c). */
+void pw_sweep_heading (const pw_plan *plan, pw_text *heading);
+
 #endif
