@@ -188,8 +188,8 @@ static void test_excluded (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_numbers),
-    cmocka_unit_test (test_models), cmocka_unit_test (test_waiting),
-                                      cmocka_unit_test (test_empty_lanes), cmocka_unit_test (test_excluded) };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_numbers), cmocka_unit_test (test_models),
+                                      cmocka_unit_test (test_waiting), cmocka_unit_test (test_empty_lanes),
+                                      cmocka_unit_test (test_excluded) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

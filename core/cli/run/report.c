@@ -247,17 +247,16 @@ pw_summary pw_run_summary (pw_run_cli *command, const pw_sample *last, const pw_
                            char reason[PW_RUN_REASON]) {
   const pw_file *file = command->compiled.file;
   const pw_run *run = command->run;
-  pw_summary summary = {
-    .model = file ? pw_file_name (file) : command->line.argument[0],
-    .method = command->method,
-    .status = pw_cli_status_word (error->status),
-    .reason = error->text,
-    .cpu = command->cpu,
-    .energy_defect = last ? pw_run_energy_defect (run, last) : NAN,
-    .redundant = command->redundant,
-    .general = run ? report_general_reason (command) : NULL,
-    .reference = run ? pw_comparison_errors (&command->comparison, command->compiled.system) : NULL
-  };
+  pw_summary summary = { .model = file ? pw_file_name (file) : command->line.argument[0],
+                         .method = command->method,
+                         .status = pw_cli_status_word (error->status),
+                         .reason = error->text,
+                         .cpu = command->cpu,
+                         .energy_defect = last ? pw_run_energy_defect (run, last) : NAN,
+                         .redundant = command->redundant,
+                         .general = run ? report_general_reason (command) : NULL,
+                         .reference =
+                             run ? pw_comparison_errors (&command->comparison, command->compiled.system) : NULL };
   if (error->status == PW_OK && pw_stop) {
     char t[32];
     snprintf (reason, PW_RUN_REASON, "interrupted at t = %s s", pw_format (t, pw_run_time (run), 6));

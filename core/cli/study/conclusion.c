@@ -53,8 +53,8 @@ static double conclusion_error (const pw_reference *reference, const double *err
 /* ---- Costs ---- */
 
 /* The least processor time of a method for the required relative error, interpolated between neighbouring runs on
- * logarithmic scales.  It is an upper bound if no run before it was less accurate, if the run just before it has no error
- * (it failed), or if it is interpolated to an error that is only known to be below the uncertainty. */
+ * logarithmic scales.  It is an upper bound if no run before it was less accurate, if the run just before it failed, so
+ * that its error is unknown, or if it is interpolated to an error that is only known to be below the uncertainty. */
 static conclusion_cost conclusion_least_cost (const pw_conclusion *conclusion, int method, double required) {
   conclusion_cost least = { NAN, 0 };
   double error_before = NAN;
@@ -153,7 +153,7 @@ static void conclusion_print_table (const pw_conclusion *conclusion) {
     }
   }
   puts (any_upper_bound
-            ? "\n<: at most: no run has fewer digits, the one before failed, or the reference cannot tell the digits of the next"
+            ? "\n<: at most: no run has fewer digits, or it is unknown how many the one before or the next one has"
             : "");
   if (any_uncertain) puts ("uncertain: the reference is not accurate enough to distinguish methods");
 }

@@ -59,13 +59,14 @@ static int sweep_read_part (pw_sweep *sweep, pw_error *error) {
 }
 
 #define SWEEP_LANES "1, 2, 4 or 8" /* the powers of 2 up to PW_LANES_MOST */
-_Static_assert (PW_LANES_MOST == 8, "SWEEP_LANES, and numbers of one digit");
+_Static_assert(PW_LANES_MOST == 8, "SWEEP_LANES, and numbers of one digit");
 
 static int sweep_read_lanes (pw_sweep *sweep, pw_error *error) {
   const char *text = sweep->lanes_text;
   int lanes = sweep->plan.lanes = text ? *text - '0' : 0;
-  if (text == NULL || (1 <= lanes && lanes <= PW_LANES_MOST && (lanes & (lanes - 1)) == 0 && text[1] == 0)) return PW_OK;
-  return pw_fail (error, PW_INPUT, "--lanes %.60s: expected " SWEEP_LANES, text);
+  if (text && (lanes < 1 || lanes > PW_LANES_MOST || (lanes & (lanes - 1)) != 0 || text[1]))
+    return pw_fail (error, PW_INPUT, "--lanes %.60s: expected " SWEEP_LANES, text);
+  return PW_OK;
 }
 
 static int sweep_read_settings (pw_sweep *sweep, pw_error *error) {

@@ -189,45 +189,6 @@ static int row_ended (const sweep_row *row, const pw_plan *plan) {
   return row->status != PW_OK || !(pw_run_time (row->run) < plan->t_end);
 }
 
-/* ---- Columns ---- */
-
-/* A cell of a row or, if that is NULL, of the heading. */
-static void row_cell (const sweep_row *row, pw_text *text, const char *name, const char *unit, double value) {
-  row ? pw_text_number (text, value) : pw_text_name (text, name, unit);
-}
-
-/* Appends the cells of a row, with NaN where there is no last sample or no run; the heading if the row is NULL. */
-static void row_cells (const sweep_row *row, const pw_plan *plan, const pw_sample *last, pw_text *text) {
-  const pw_run *run = row ? row->run : NULL;
-  const pw_statistics *statistics = run ? pw_run_statistics (run) : NULL;
-  const int n = last ? pw_system_coordinates (row->system->model.system) : 0;
-  char name[300];
-  for (int i = 0; i < plan->grid.axes; i++) {
-    const pw_axis *axis = &plan->grid.axis[i];
-    snprintf (name, sizeof name, "%s%s", axis->parameter ? "" : "start.", axis->name);
-    row_cell (row, text, name, axis->unit, row ? pw_grid_value (&plan->grid, i, row->number) : 0);
-  }
-  pw_text_cell (text, row ? pw_cli_status_word (row->status) : "status");
-  row_cell (row, text, "t", "s", run ? pw_run_time (run) : NAN);
-  for (int i = 0; i < plan->columns; i++) {
-    int state = last ? row->system->state[i] : -1;
-    row_cell (row, text, plan->column[i].name, plan->column[i].unit,
-              state < 0 ? NAN : state < n ? last->q[state] : last->v[state - n]);
-  }
-  row_cell (row, text, "kinetic", "J", last ? last->kinetic : NAN);
-  row_cell (row, text, "residual.position", NULL, run ? statistics->position : NAN);
-  row_cell (row, text, "residual.velocity", NULL, run ? statistics->velocity : NAN);
-  row_cell (row, text, "steps", NULL, run ? (double)statistics->steps : NAN);
-  row_cell (row, text, "rhs", NULL, run ? (double)statistics->rhs : NAN);
-  if (plan->with_cpu)
-    row_cell (row, text, "cpu", "s", run ? pw_seconds (CLOCK_THREAD_CPUTIME_ID) - row->limit.start : 0);
-  row ? pw_text_quoted (text, row->error.text) : pw_text_cell (text, "reason");
-}
-
-void pw_sweep_heading (const pw_plan *plan, pw_text *heading) {
-  row_cells (NULL, plan, NULL, heading);
-}
-
 /* Closes the run and appends the cells of its row, without the end of the line, even if the run failed; returns its
  * status.  No cells are written if this is PW_RETRY, after a request to stop, or PW_RESOURCE. */
 static int row_close (sweep_row *row, const pw_plan *plan, pw_text *text) {
@@ -238,7 +199,12 @@ static int row_close (sweep_row *row, const pw_plan *plan, pw_text *text) {
   if (row->status == PW_OK && last == NULL) row->status = sample_error.status, row->error = sample_error;
   /* PW_RETRY, from a method, without a request to stop */
   if (row->status > 0 && pw_stop == 0) row->status = pw_fail (&row->error, PW_METHOD, "the method gave up");
-  if (row->status != PW_RETRY && row->status != PW_RESOURCE) row_cells (row, plan, last, text);
+  if (row->status != PW_RETRY && row->status != PW_RESOURCE) {
+    pw_plan_row shown = { row->number, row->status, row->error.text, row->run, .last = last };
+    if (plan->with_cpu && row->run) shown.cpu = pw_seconds (CLOCK_THREAD_CPUTIME_ID) - row->limit.start;
+    if (last) shown.coordinates = pw_system_coordinates (row->system->model.system), shown.state = row->system->state;
+    pw_plan_cells (plan, &shown, text);
+  }
   pw_run_close (row->run);
   if (!text->failed) return row->status;
   row->error = (pw_error){ 0 };
