@@ -786,7 +786,9 @@ char *pw_system_source (const pw_system *s, const unsigned char *independent, pw
 typedef struct pw_specialised pw_specialised;
 int pw_specialised_fits (const pw_specialised *code, const pw_system *s);
 
-/* The same text compiled with PW_LANES defined as the number of runs that it advances at once (pw_runs_advance). */
+/* The same text compiled with PW_LANES defined as the number of runs that it advances at once (pw_runs_advance): 2, 4
+ * or PW_LANES_MOST. */
+enum { PW_LANES_MOST = 8 };
 typedef struct pw_specialised_lanes pw_specialised_lanes;
 int pw_specialised_lanes_fit (const pw_specialised_lanes *code, const pw_system *s);
 int pw_specialised_lanes_count (const pw_specialised_lanes *code);

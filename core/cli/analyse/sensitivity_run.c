@@ -234,7 +234,7 @@ static int sensitivity_jump (pw_sensitivity *sens, double t0, double t, int at_s
 typedef enum { NO_JUMP, JUMP_AT_BREAKPOINT, JUMP_AT_STATE } sensitivity_jump_type;
 
 /* The end of the next interval from t towards `to`, in which derivatives are smooth; the type of the jump at its end is
- * stored.  NAN and the error if the search for the next jump fails. */
+ * stored.  NAN as pw_variation_next_jump. */
 static double sensitivity_next (pw_sensitivity *sens, double t, double to, sensitivity_jump_type *jump,
                                 pw_error *error) {
   double slope, breakpoint = pw_variation_breakpoint (sens->variation, 0, &slope);
@@ -255,7 +255,7 @@ static int sensitivity_advance (pw_sensitivity *sens, double t, double to, pw_pr
   int status = PW_OK;
   while (t < to && status == PW_OK) {
     double next = sensitivity_next (sens, t, to, &jump, error);
-    if (isnan (next)) return error->status;
+    if (isnan (next)) return error->status != PW_OK ? error->status : PW_STOPPED;
     double end = jump ? next - fmin (aside, next - t) : next;
     status = sensitivity_interval (sens, t, end, error);
     if (jump == JUMP_AT_BREAKPOINT) sens->last_breakpoint = next, next = fmin (next + aside, sens->unknowns.t_end);

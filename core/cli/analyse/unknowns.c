@@ -106,6 +106,32 @@ int pw_unknowns_read (pw_unknowns *u, const char **list, pw_error *error) {
   return status;
 }
 
+/* ---- Unknowns of --by ---- */
+
+static int unknown_of_run (pw_unknown *u, const pw_cli_model *m, const pw_run *r, const char *name, pw_error *error) {
+  int n = pw_system_coordinates (m->system), status = pw_unknown_find (u, m, name, error);
+  if (status == PW_OK && u->state >= 0)
+    u->value = u->state < n ? pw_run_initial (r)->q[u->state] : pw_run_initial (r)->v[u->state - n];
+  if (status != PW_OK || u->parameter == NULL || u->parameter->domain != PW_COUNT) return status;
+  return pw_fail (error, PW_INPUT, "%s is a count (%g): derivatives need a number that varies continuously", name,
+                  u->value);
+}
+
+int pw_unknowns_differentiated (pw_unknowns *u, const char **list, pw_error *error) {
+  while (list[u->count]) u->count++;
+  u->list = calloc ((size_t)u->count, sizeof *u->list);
+  if (u->list == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  pw_run *r = pw_run_open (u->m->system, u->method, &u->settings, error);
+  int status = r ? PW_OK : error->status;
+  for (int i = 0; i < u->count && status == PW_OK; i++) {
+    status = unknown_of_run (&u->list[i], u->m, r, list[i], error);
+    for (int k = 0; k < i && status == PW_OK; k++)
+      if (strcmp (list[k], list[i]) == 0) status = pw_fail (error, PW_INPUT, "--by %s is given twice", list[i]);
+  }
+  pw_run_close (r);
+  return status;
+}
+
 /* ---- Runs ---- */
 
 int pw_unknowns_system (pw_cli_model *m, const pw_unknowns *u, const double *x, pw_error *error) {

@@ -94,7 +94,8 @@ static int solve_run (fit_solver *solver, const gsl_vector *u) {
   if (status == PW_OK && !isfinite (solve_sum (fit, solver->values)))
     status = pw_fail (&own, PW_METHOD, "the sum of the squares of the residuals is not finite");
   solver->known = status == PW_OK;
-  solve_fail (solver, fit->runs++ == 0, &own, status);
+  fit->runs++;
+  solve_fail (solver, fit->runs == 1, &own, status);
   return status;
 }
 

@@ -66,4 +66,12 @@ int pw_checkpoints_resume (pw_run_cli *command, pw_error *error);
 int pw_checkpoints_save (pw_run_cli *command, pw_error *error);
 void pw_checkpoints_close (pw_checkpoints *checkpoints);
 
+/* ---- The summary (report.c) ---- */
+
+enum { PW_RUN_REASON = 80 };
+/* The summary of a run that ended with this error, if any; last: the last sample, or NULL; `reason` receives the text
+ * of an interruption. */
+pw_summary pw_run_summary (pw_run_cli *command, const pw_sample *last, const pw_error *error,
+                           char reason[PW_RUN_REASON]);
+
 #endif

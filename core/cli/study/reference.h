@@ -40,7 +40,7 @@ int pw_reference_write (const pw_reference *reference, const char *folder, const
 
 /* ---- The conclusion of a comparison (conclusion.c) ---- */
 
-/* Prints the processor time of each method for 3, 6 and 9 digits that agree with a known reference, and failures.
+/* Prints the processor time of each method for numbers of digits that agree with a known reference, and failures.
  * error_column: index of the largest error of lengths in the values of a row; that of angles follows. */
 void pw_conclusion_print (const pw_study *study, const pw_reference *reference, int error_column);
 

@@ -30,7 +30,7 @@ void pw_journal_close (pw_journal *journal);
 
 /* ---- Rows (sweep_rows.c) ---- */
 
-/* Computes the missing rows in `jobs` threads, until all are there or a signal requests a stop.  PW_RESOURCE. */
+/* Computes the missing rows in `jobs` threads, until all are there or pw_stop is set.  PW_RESOURCE. */
 int pw_sweep_rows (const pw_plan *plan, pw_journal *journal, int jobs, pw_error *error);
 
 /* ---- The table ---- */
