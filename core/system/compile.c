@@ -206,7 +206,8 @@ static int compile_element (const compilation *job, const pw_element_batch *k, c
   }
   if (kind->prepare == NULL) return PW_OK;
   pw_internal internal[PW_MAX_INTERNAL] = { { 0 } };
-  if (compile_prepare (job, from, bodies, internal, a->element + (size_t)e * kind->element) != PW_OK) return PW_INPUT;
+  int status = compile_prepare (job, from, bodies, internal, a->element + (size_t)e * kind->element);
+  if (status != PW_OK) return status;
   for (int n = 0, j = k->internal + e * kind->internal; n < kind->internal; n++, j++) {
     const char *expected = pw_domain_check (PW_NONNEGATIVE, internal[n].mass);
     if (*expected)
@@ -233,7 +234,8 @@ static int compile_batch (const compilation *job, int i, const batch_arrays *a) 
     for (int b = k->kind->each_body ? 0 : -1; b < (k->kind->each_body ? job->s->bodies : 0); b++) {
       if (b >= 0 && !(job->m->body[b].mass > 0)) continue;
       a->name[e] = name;
-      if (compile_element (job, k, a, e++, from, b) != PW_OK) return PW_INPUT;
+      int status = compile_element (job, k, a, e++, from, b);
+      if (status != PW_OK) return status;
     }
   }
   return PW_OK;
@@ -258,7 +260,8 @@ static int compile_batches (const compilation *job) {
     row += count * kind->rows;
     internal += count * kind->internal;
     source += count * kind->signals;
-    if (compile_batch (job, i, &a) != PW_OK) return PW_INPUT;
+    int status = compile_batch (job, i, &a);
+    if (status != PW_OK) return status;
   }
   return PW_OK;
 }
@@ -277,8 +280,7 @@ static int compile_initial (const compilation *job) {
   return PW_OK;
 }
 
-/* The largest distance of an element's point, markers excepted, from the origin of its body; if 0, the radius of
- * gyration of the first body where it is not 0, or 1 m. */
+/* The length scale (pw_scale). */
 static double compile_length (const compilation *job) {
   const pw_model *m = job->m;
   double L = 0;

@@ -12,7 +12,7 @@ static int signals_table (pw_system *s, pw_source *source, pw_error *error) {
   for (size_t i = 0; i < n; i++) value[i] = pw_table_value (&source->signal, (int)i);
   table->t = t;
   table->value = value;
-  table->scale = table->offset = 0;
+  table->scale = 1, table->offset = 0;
   source->spline = value + n;
   pw_table_spline (&source->signal, source->spline);
   return PW_OK;
@@ -54,8 +54,8 @@ static int signals_element (pw_system *s, const pw_element_batch *k, int e, cons
   pw_source *source = k->source + e * k->kind->signals;
   for (int u = 0; u < k->kind->signals; u++, source++) {
     source->of_force = pw_kind_signals_force (k->kind);
-    if (signals_source (s, source, pw_field_at (k->kind, definition, PW_SIGNAL, u), k->name[e], error) != PW_OK)
-      return PW_INPUT;
+    int status = signals_source (s, source, pw_field_at (k->kind, definition, PW_SIGNAL, u), k->name[e], error);
+    if (status != PW_OK) return status;
   }
   return PW_OK;
 }
@@ -67,8 +67,10 @@ int pw_compile_signals (pw_system *s, const pw_model *m, const int *batch_of, pw
     const pw_element *from = &m->element[n];
     const pw_element_batch *k = &s->batch[batch_of[n]];
     int *e = &next[batch_of[n]];
-    for (; *e < k->b.count && strcmp (k->name[*e], pw_element_name (from)) == 0; ++*e)
-      if (signals_element (s, k, *e, from->definition, error) != PW_OK) return PW_INPUT;
+    for (; *e < k->b.count && strcmp (k->name[*e], pw_element_name (from)) == 0; ++*e) {
+      int status = signals_element (s, k, *e, from->definition, error);
+      if (status != PW_OK) return status;
+    }
   }
   return PW_OK;
 }
