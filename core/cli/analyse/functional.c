@@ -9,8 +9,8 @@
  * halved, at most 4 times, until the interpolatory formula of nodes 1, 3 and 5 agrees to 1e-3 of the largest value.
  * For cos (w t) in a part of length h Gauss' formula has the relative error 4e-10 (w h / 2)^10, the other one 3e-3
  * (w h / 2)^4: agreement to 1e-3 makes the integral accurate to 3e-11.  Extrema: the largest or least value at the
- * nodes and ends, refined by Brent's method between its neighbours.  Values jump at breakpoints, where steps end: a step
- * before a jump is always sampled at the nodes. */
+ * nodes and ends, refined by Brent's method between its neighbours.  Values jump at breakpoints, where steps end: a
+ * step before a jump is always sampled at the nodes. */
 #include <gsl/gsl_errno.h>
 #include <gsl/gsl_min.h>
 #include <math.h>
