@@ -61,7 +61,7 @@ static int linearise_has_shape (const pw_linear *l, int i) {
   return !l->rigid[i] && (l->re[i] != 0 || l->im[i] != 0);
 }
 
-/* 1 if mode i is shown: it has a shape, and is the first of a conjugate pair. */
+/* 1 if mode i is shown: it has a shape, and is real or the first of a conjugate pair. */
 static int linearise_is_shown (const pw_linear *l, int i) {
   return linearise_has_shape (l, i) && l->im[i] >= 0;
 }

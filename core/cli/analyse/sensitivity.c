@@ -13,7 +13,7 @@ enum {
   SENSITIVITY_DIGITS = 9,   /* of numbers in the text */
   SENSITIVITY_UNIT = 64,    /* longest unit, its end included */
   SENSITIVITY_NAME = 10000, /* likewise the name of a column of the table; longer names are cut off */
-  SENSITIVITY_ROWS = 1000,  /* of the table, unless --every is given */
+  SENSITIVITY_ROWS = 1000,  /* of the table after the first, unless --every is given */
   SENSITIVITY_REPEATED = 5  /* computations with better steps of the differences, at most */
 };
 
@@ -320,7 +320,7 @@ static int sensitivity_compute (pw_sensitivity *sens, pw_error *error) {
     status = sensitivity_repeat (sens, &progress, error);
     if (status == PW_OK || status == PW_RESOURCE || status == PW_RETRY) continue;
     for (int p = 0; p < sens->unknowns.count; p++) sens->unknowns.list[p].step = sens->unknowns.list[p].last_step;
-    *error = (pw_error){ 0 }; /* the model refused a longer step */
+    *error = (pw_error){ 0 }; /* such as that of a model that refuses the value of a neighbour */
     status = sensitivity_repeat (sens, &progress, error);
     break;
   }

@@ -175,9 +175,9 @@ void pw_unknowns_report (const pw_unknowns *u, const double *x) {
 
 /* ---- Directions ---- */
 
-/* PW_UNKNOWN_STEP times the typical size of the unknown: |value|, but at least 0.1 rad for angles, the unit of the
- * scene for states, 1e-3 of the scale in searches; for a parameter that is 0 its default value, or 1 if that is 0,
- * too. */
+/* u->step if that is not 0, else PW_UNKNOWN_STEP times the typical size of the unknown: |value|, but at least 0.1 rad
+ * for angles, the unit of the scene for states, 1e-3 of the scale in searches; for a parameter that is 0 its default
+ * value, or 1 if that is 0, too. */
 static double unknown_step (const pw_unknown *u, double value, const pw_run *r) {
   if (u->step > 0) return u->step;
   double size = fabs (value), length = pw_run_scale (r)->length, time = pw_run_scale (r)->time;

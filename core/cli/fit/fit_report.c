@@ -234,7 +234,7 @@ static void report_json_matrix (const pw_fit *fit, pw_json *j, const char *key,
   pw_json_close (j, ']');
 }
 
-/* Writes where each search ended. */
+/* Writes pw_fit.minima. */
 static void report_json_minima (const pw_fit *fit, pw_json *j) {
   int n = fit->unknowns.count;
   pw_json_open (j, "searches", '[');

@@ -16,7 +16,7 @@ typedef struct {
   double uncertainty[MOTION_ERRORS]; /* 0 where nothing is compared */
   double size[MOTION_UNITS];         /* largest coordinate or velocity */
   char name[300];                    /* "erk8+projection, rtol 3e-14", "the exact solution of the model" or a path */
-  int partners;                      /* number of other computed solutions; their errors relative to this one */
+  int partners;                      /* number of other computed solutions, with their distances from this one */
   struct {
     char name[100];
     double error[MOTION_ERRORS];
