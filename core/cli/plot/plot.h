@@ -23,7 +23,7 @@ int pw_plots_style (pw_plots *plots, const char *width, const char *colour, pw_e
 
 /* The time of the next sample [s]; INFINITY after the last one. */
 double pw_plots_next (const pw_plots *plots);
-/* Stores the sample at the time pw_plots_next, of a run with pw_settings.ledger. */
+/* Stores a sample, if there is room; its energies are complete only with pw_settings.ledger. */
 void pw_plots_add (pw_plots *plots, const pw_sample *sample);
 /* Saves or loads the samples stored so far. */
 void pw_plots_serialise (pw_plots *plots, pw_archive *archive);
