@@ -15,12 +15,12 @@
 /* Exit statuses after SIGINT or SIGTERM, and after SIGPIPE: 128 + SIGINT and 128 + SIGPIPE, as shells report them. */
 enum { PW_INTERRUPTED = 130, PW_CLOSED_PIPE = 141 };
 
-/* ---- Requests to stop, by a signal or a limit of processor time; commands check them between steps (stop.c) ---- */
+/* ---- Requests to stop, by a signal or a limit of processor time, checked between steps or more often (stop.c) ---- */
 
 extern volatile sig_atomic_t pw_stop; /* not 0: commands stop; each SIGINT or SIGTERM adds 1, a failed thread sets 1 */
 
-/* Counts these signals from now on.  The first requests a stop after the current step.  The third ends the program, in
- * case that step never ends; the second does not, since some senders signal both a process and its group. */
+/* Counts these signals from now on.  The first requests a stop at the next check.  The third ends the program, in case
+ * that check never comes; the second does not, since some senders signal both a process and its group. */
 void pw_stop_catch (void);
 /* Lets signals end the program again. */
 void pw_stop_release (void);

@@ -1,4 +1,4 @@
-/* Requests to stop, by a signal or a limit of processor time; commands check them between steps. */
+/* Requests to stop, by a signal or a limit of processor time, checked between steps or more often. */
 #define _DEFAULT_SOURCE /* CLOCK_MONOTONIC_COARSE */
 #include <math.h>
 #include <time.h>

@@ -6,7 +6,7 @@
 enum {
   FIGURES_NAMED = 12,     /* curves with a name each, at most */
   FIGURES_COLOURS = 8,    /* of bodies */
-  FIGURES_SNAPSHOTS = 60, /* at most */
+  FIGURES_SNAPSHOTS = 60, /* at most, before their stride is rounded down */
   FIGURES_FEWEST = 8,     /* snapshots, at least */
   FIGURES_CLOSEUP = 12    /* samples of a close-up, at least */
 };
