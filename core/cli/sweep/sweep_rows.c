@@ -223,7 +223,7 @@ static void rows_store (sweep_rows *sweep, const sweep_row *row, int status, con
   if (sweep->error->status != PW_OK && pw_stop == 0) pw_stop = 1;
 }
 
-/* The next missing row of the part; -1 if there is none. */
+/* The next missing row of the part; -1 if there is none, or after a request to stop. */
 static long rows_next (sweep_rows *sweep) {
   const pw_plan *plan = sweep->plan;
   while (pw_stop == 0 && sweep->next < plan->grid.rows) {
