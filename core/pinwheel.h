@@ -41,7 +41,7 @@
 PW_BEGIN
 
 #define PW_VERSION "0.1.0"
-#define PW_ABI 1 /* after release 0.1.0, raised when plug-ins compiled against an older header could be misread */
+#define PW_ABI 1 /* stays 1 until 0.1.0 is released; later raised when plug-ins of an older header could be misread */
 #define PW_PI 3.14159265358979323846
 
 /* ---- Status and errors ---- */
@@ -267,7 +267,7 @@ typedef struct {
 typedef struct {
   const char *name, *body[2]; /* the two bodies, or "ground" for one of them */
   double at[2][2];            /* the common point in each body's frame [m]; on the ground: in the world */
-  double angle;               /* of body 2 relative to body 1: phi2 - phi1 [rad] */
+  double angle;               /* phi2 - phi1 [rad]; of sliders, drives, motors, rotational springs: phi1 - phi2 */
 } pw_weld;
 
 /* Slider: a point of body 1 stays on a line of body 2, and body 1 does not rotate relative to body 2.  Two holonomic
@@ -276,7 +276,7 @@ typedef struct {
   const char *name, *body[2]; /* what slides, and what it slides on; "ground" for one of them */
   double at[2][2]; /* the point, and a point of the line, in each body's frame [m]; on the ground: in the world */
   double heading;  /* direction of the line in body 2's frame [rad] */
-  double angle;    /* of body 1 relative to body 2: phi1 - phi2 [rad] */
+  double angle;    /* phi1 - phi2 [rad]; of a weld: phi2 - phi1 */
 } pw_slider;
 
 /* Slot: a point of body 1 stays on a line of body 2.  One holonomic constraint equation. */
@@ -314,7 +314,7 @@ typedef struct {
   const char *name, *body[2]; /* the driven body, the reference body; "ground" for one of them */
   double at[2][2];            /* a point in each body's frame [m]; on the ground: in the world */
   int what;        /* PW_DRIVE_X, PW_DRIVE_Y: from point 2 to point 1 in body 2's frame; PW_DRIVE_ANGLE: phi1 - phi2 */
-  pw_signal value; /* with its first and second time derivative [m] or [rad] */
+  pw_signal value; /* [m] or [rad]; with its first and second time derivative */
 } pw_drive;
 
 /* Wheel: a knife edge; the contact point does not move across the heading.  One nonholonomic constraint equation. */
@@ -341,7 +341,7 @@ typedef struct {
 typedef struct {
   const char *name, *body;
   double at[2];      /* contact point in the body's frame [m] */
-  pw_signal heading; /* rolling direction in the body's frame, with its first time derivative [rad] */
+  pw_signal heading; /* rolling direction in the body's frame [rad]; with its first time derivative */
 } pw_steered_wheel;
 
 /* Speed: a point's speed along a direction of its body follows a signal.  One nonholonomic constraint equation. */
@@ -349,10 +349,10 @@ typedef struct {
   const char *name, *body;
   double at[2];    /* the point in the body's frame [m] */
   double heading;  /* the direction in the body's frame [rad] */
-  pw_signal value; /* with its first time derivative [m/s] */
+  pw_signal value; /* [m/s]; with its first time derivative */
 } pw_speed;
 
-/* Pfaffian: a linear relation between the velocities of two bodies, both in the frame of body 1:
+/* Pfaffian: a linear relation between the velocities of two bodies, both along the axes of body 1:
  * a . (vx1, vy1, omega1) + b . (vx2, vy2, omega2) = value.  One nonholonomic constraint equation. */
 typedef struct {
   const char *name, *body[2]; /* the two bodies, or "ground" for one of them */
@@ -391,7 +391,7 @@ typedef struct {
 typedef struct {
   const char *name, *body[2]; /* the two bodies, or "ground" for one of them */
   double stiffness, damping;  /* [N m/rad], [N m s/rad], >= 0 */
-  double angle;               /* free angle, of body 1 relative to body 2: phi1 - phi2 [rad] */
+  double angle;               /* free value of phi1 - phi2 [rad] */
 } pw_rotational_spring;
 
 /* Friction: a viscous and a Coulomb torque that oppose the rotation of body 1 relative to body 2, as in a pin. */
@@ -553,8 +553,9 @@ typedef enum {
   PW_NONHOLONOMIC /* S (q, t) v = eta (t, q) */
 } pw_level;
 
-/* An element type: one const table.  A NULL function is zero (the self-test verifies this).  Sizes are per element; at
- * most 4 bodies, 4 internal coordinates, 6 constraint equations, 4 signals. */
+/* An element type: one const table.  A NULL function is zero (the self-test verifies this); J of constraint equations
+ * and g of holonomic ones are required.  Sizes are per element; at most 4 bodies, 4 internal coordinates, 6 constraint
+ * equations, 4 signals. */
 struct pw_kind {
   const char *name;       /* "pin" */
   const char *about;      /* one line */
@@ -645,8 +646,8 @@ int pw_model_set (pw_model *m, const char *parameter, double value, pw_error *er
  * for a second call.  Values are checked by pw_system_compile. */
 int pw_model_build (pw_model *m, pw_error *error);
 
-/* Replaces a signal of a built model; pw_system_compile checks it.  field: "value", or "value[1]" if it has several
- * signals.  PW_INPUT for an unknown element or field. */
+/* Replaces a signal of a built model; pw_system_compile checks it.  field: "value", or "value[1]" if the field has
+ * several.  PW_INPUT for an unknown element or field. */
 int pw_model_set_signal (pw_model *m, const char *element, const char *field, const pw_signal *signal, pw_error *error);
 
 /* Prescribes the initial value of a state, "frame.vx" or "wheel.spin", which the consistent initial state keeps if
@@ -786,7 +787,9 @@ char *pw_system_source (const pw_system *s, const unsigned char *independent, pw
 typedef struct pw_specialised pw_specialised;
 int pw_specialised_fits (const pw_specialised *code, const pw_system *s);
 
-/* The same text compiled with PW_LANES defined as the number of runs that it advances at once (pw_runs_advance). */
+/* The same text compiled with PW_LANES defined as the number of runs that it advances at once (pw_runs_advance): 2, 4
+ * or PW_LANES_MOST. */
+enum { PW_LANES_MOST = 8 };
 typedef struct pw_specialised_lanes pw_specialised_lanes;
 int pw_specialised_lanes_fit (const pw_specialised_lanes *code, const pw_system *s);
 int pw_specialised_lanes_count (const pw_specialised_lanes *code);

@@ -47,8 +47,8 @@ typedef struct {
 /* Scales of a system in its initial state.  "Units of the scene", in which thresholds and scaled numbers are given, are
  * L for lengths, 1 rad for angles, T for times. */
 typedef struct {
-  double length; /* L [m]: largest distance of an attachment from its body's centre of mass, else a radius of gyration
-                  * other than 0, else 1 */
+  double length; /* L [m]: largest distance of an element's point, markers excepted, from its body's centre of mass; if
+                  * 0, the first radius of gyration of a body other than 0, or 1 */
   double time; /* T: 1 / max (1 / span, largest velocity, square root of the largest acceleration), in units of L [s] */
 } pw_scale;
 
@@ -59,7 +59,7 @@ typedef struct {
   long rhs;            /* evaluations of the accelerations, or of the residual */
   long jacobians;      /* evaluations of an iteration matrix */
   long factorisations; /* of any matrix */
-  long restarts;       /* of a multistep method, at checkpoints */
+  long restarts;       /* at checkpoints, of methods without pw_method.serialise */
   long specialised;    /* of the evaluations, by specialised code */
   double position;     /* worst scaled residual of g = 0 */
   double velocity;     /* worst scaled residual of J v = eta */
@@ -80,7 +80,7 @@ typedef struct {
   const double *ledger; /* pw_system_ledger_entries: work or loss of each entry [J]; NULL without pw_settings.ledger */
   double work;          /* supplied since the initial time, by torques, forces, motors, drives, ... [J] */
   double loss;          /* dissipated since the initial time [J] */
-  double projection;    /* energy added by projections after steps [J]; 0 without pw_settings.ledger */
+  double projection;    /* energy added by projections after steps [J]; 0 without pw_settings.ledger, and with bdf */
   double balance;       /* change of (kinetic + potential) - work + loss - projection [J] */
 } pw_sample;
 

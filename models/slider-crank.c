@@ -26,11 +26,12 @@ static const pw_parameter parameters[] = {
 static void build (pw_model *m, const void *parameter) {
   const slider_crank *p = parameter;
   double c = cos (p->theta), s = sin (p->theta), w = p->omega;
-  if (p->l1 * fabs (s) > p->l2) {
-    pw_model_refuse (m, "l2 = %g: the rod does not reach the slider's axis at theta = %g", p->l2, p->theta);
+  double beta = -asin (p->l1 * s / p->l2), rate = -p->l1 * c * w / (p->l2 * cos (beta));
+  if (!(fabs (rate) <= 1e6 * fabs (w))) { /* NaN if it does not reach */
+    pw_model_refuse (m, "l2 = %g: the rod does not reach the slider's axis at theta = %g, or is perpendicular to it",
+                     p->l2, p->theta);
     return;
   }
-  double beta = -asin (p->l1 * s / p->l2), rate = -p->l1 * c * w / (p->l2 * cos (beta));
   double x = p->l1 * c + p->l2 * cos (beta), v = -p->l1 * s * w - p->l2 * sin (beta) * rate;
   pw_add_body (m, &(pw_body){ .name = "crank",
                               .mass = p->m1,

@@ -106,7 +106,7 @@ double pw_variation_breakpoint (const pw_variation *x, int i, double *slope);
 
 /* Where pw_system_may_jump, advances the run to time t, but not beyond its next breakpoint nor farther than 256 states
  * ahead, and returns the time just after the first jump of its accelerations with the state after the time reached, or
- * INFINITY.  NAN and the error if that fails. */
+ * INFINITY.  NAN and the error if that fails; NAN without an error if the run was stopped (PW_STOPPED). */
 double pw_variation_next_jump (pw_variation *x, double t, double t_end, pw_error *error);
 /* The derivative along direction i of the time of the last jump or breakpoint passed. */
 double pw_variation_jump_slope (const pw_variation *x, int i);

@@ -107,7 +107,7 @@ void *pw_layout_alloc (pw_layout *l, size_t count, size_t size) {
 
 int pw_layout_pass (pw_layout *l, char **memory) {
   if (l->base) return 0;
-  if (l->used == 0) { /* used == 0: no pass has begun; the first one starts at 1 */
+  if (l->used == 0) { /* no pass has begun; the first one counts from 1 */
     *memory = NULL;
     l->used = 1;
     return 1;

@@ -135,7 +135,7 @@ typedef struct {
   double **at;
   size_t count;
 } pw_array;
-/* Lays out arrays in one zeroed allocation and returns it; NULL if out of memory. */
+/* Lays out arrays in one zeroed allocation and returns it; if out of memory, NULL, and so are all pointers. */
 char *pw_alloc_arrays (const pw_array *array, size_t arrays);
 
 /* PW_OK if `bytes` could be allocated now, else PW_RESOURCE.  For libraries that crash if an allocation fails. */

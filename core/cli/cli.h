@@ -15,12 +15,13 @@
 /* Exit statuses after SIGINT or SIGTERM, and after SIGPIPE: 128 + SIGINT and 128 + SIGPIPE, as shells report them. */
 enum { PW_INTERRUPTED = 130, PW_CLOSED_PIPE = 141 };
 
-/* ---- Requests to stop, by a signal or a limit of processor time; commands check them between steps (stop.c) ---- */
+/* ---- Requests to stop; commands check them between steps or more often (stop.c) ---- */
 
-extern volatile sig_atomic_t pw_stop; /* not 0: commands stop; each SIGINT or SIGTERM adds 1 */
+/* Not 0: all runs stop.  Each SIGINT or SIGTERM adds 1; after an error that ends a command, its threads set it to 1. */
+extern volatile sig_atomic_t pw_stop;
 
-/* Counts these signals from now on.  The first requests a stop after the current step.  The third ends the program, in
- * case that step never ends; the second does not, since some senders signal both a process and its group. */
+/* Counts these signals from now on.  The first requests a stop at the next check.  The third ends the program, in case
+ * that check never comes; the second does not, since some senders signal both a process and its group. */
 void pw_stop_catch (void);
 /* Lets signals end the program again. */
 void pw_stop_release (void);
@@ -33,12 +34,12 @@ typedef struct {
   double last_check; /* the coarse clock when the limit was last found not exceeded [s] */
 } pw_limit;
 
-/* Starts the clock; call it when the run begins. */
+/* Starts the clock; call it in the thread of the run when the run begins. */
 void pw_limit_start (pw_limit *limit);
-/* 1 once the limit is exceeded or a signal has requested a stop.  For pw_settings.stop; the context is the pw_limit. */
+/* 1 once the limit is exceeded or pw_stop is set.  For pw_settings.stop; the context is the pw_limit. */
 int pw_limit_over (void *context);
-/* The status of a command whose run returned PW_STOPPED at time t: PW_RETRY, without an error, after a signal; else
- * PW_METHOD with an error that names the limit. */
+/* Why a run returned PW_STOPPED at time t: PW_RETRY, without an error, if pw_stop is set (after a signal the command
+ * returns PW_INTERRUPTED); else PW_METHOD with an error that names the limit. */
 int pw_limit_status (const pw_limit *limit, double t, pw_error *error);
 
 /* ---- Commands ---- */

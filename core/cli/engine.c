@@ -33,7 +33,8 @@ char *pw_cli_source (const pw_system *s, pw_error *error) {
   return text;
 }
 
-/* Loads or compiles code for the system; without it, reports why the general engine is used. */
+/* Loads or compiles code for the system; without it, stores the reason, which is printed if code was generated, or for
+ * PW_SPECIALISE_ALWAYS. */
 static void engine_open_code (pw_cli_engine *e, const pw_system *s, pw_specialise when) {
   pw_error own = { 0 };
   char *text = pw_cli_source (s, &own);

@@ -1,5 +1,5 @@
-/* Fingerprints of checkpoints and journals of sweeps: a first line that names the format (`magic`), lines "KEY =
- * VALUE" with everything that determines the results of a run or a sweep, and a line "end". */
+/* Fingerprints of checkpoints and journals of sweeps: a first line that names the format (`magic`, with its "\n"),
+ * lines "KEY = VALUE" with everything that determines the results of a run or a sweep, and a line "end". */
 #ifndef PW_FINGERPRINT_H
 #define PW_FINGERPRINT_H
 

@@ -1,13 +1,14 @@
-/* Requests to stop, by a signal or a limit of processor time; commands check them between steps. */
+/* Requests to stop: pw_stop, set by signals or after an error in a thread, and limits of processor time. */
 #define _DEFAULT_SOURCE /* CLOCK_MONOTONIC_COARSE */
 #include <math.h>
 #include <time.h>
 #include "cli.h"
 
 volatile sig_atomic_t pw_stop;
+enum { STOP_NOW = 3 }; /* pw_stop when a signal ends the program, see pw_stop_catch */
 
 static void stop_on_signal (int number) {
-  if (++pw_stop < 3) return; /* see pw_stop_catch */
+  if (++pw_stop < STOP_NOW) return;
   signal (number, SIG_DFL);
   raise (number);
 }

@@ -58,7 +58,7 @@ int pw_compile_file (const char *path, const char *engine, pw_object_user *use, 
  * compiler or pinwheel.h; PW_METHOD if it does not compile; PW_RESOURCE. */
 int pw_compile_scene (const char *path, const char *object, const char *log, int lanes, pw_error *error);
 /* The compiler's options for generated code, ending with NULL: vector instructions of this processor, no fused
- * multiply-add, so that results have the same bits. */
+ * multiply-add, so that results have the same bits.  NULL: no code advances this number of runs. */
 const char *const *pw_scene_options (int lanes);
 
 /* The command of the C compiler: CC in the environment, else "cc". */

@@ -276,7 +276,8 @@ typedef struct {
 void pw_json_open (pw_json *j, const char *key, char bracket); /* '{' or '[' */
 void pw_json_close (pw_json *j, char bracket);
 void pw_json_number (pw_json *j, const char *key, double value);
-void pw_json_text (pw_json *j, const char *key, const char *text); /* NULL: null */
+void pw_json_numbers (pw_json *j, const char *key, const double *value, int count); /* a list */
+void pw_json_text (pw_json *j, const char *key, const char *text);                  /* NULL: null */
 void pw_json_flag (pw_json *j, const char *key, int value);
 
 /* ---- Summaries ---- */

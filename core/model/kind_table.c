@@ -35,7 +35,7 @@ const void *pw_field_at (const pw_kind *kind, const void *definition, pw_field_t
   return NULL;
 }
 
-char *pw_signal_field_name (const pw_field *f, int i, char *buffer, size_t size) {
+char *pw_field_value_name (const pw_field *f, int i, char *buffer, size_t size) {
   if (pw_field_count (f) > 1)
     snprintf (buffer, size, "%s[%d]", f->name, i);
   else

@@ -215,7 +215,7 @@ static pw_signal *model_find_signal (const pw_element *e, const char *name, pw_n
   char known[80];
   for (const pw_field *f = e->kind->fields; f->name; f++)
     for (int i = 0; f->type == PW_SIGNAL && i < pw_field_count (f); i++) {
-      pw_nearest_try (near, pw_signal_field_name (f, i, known, sizeof known));
+      pw_nearest_try (near, pw_field_value_name (f, i, known, sizeof known));
       if (strcmp (known, name) == 0) return (pw_signal *)(void *)((char *)e->definition + f->offset) + i;
     }
   return NULL;

@@ -51,8 +51,8 @@ const char *pw_kind_check (const pw_kind *kind, char *buffer, size_t size);
 /* 1 for the library's own element types, 0 for those of plug-ins. */
 int pw_kind_is_built_in (const pw_kind *kind);
 
-/* The name of signal i of a field, "torque", or "u[1]" if the field has several; writes it to the buffer. */
-char *pw_signal_field_name (const pw_field *f, int i, char *buffer, size_t size);
+/* The name of value i of a field, "torque", or "u[1]" if the field has several; writes it to the buffer. */
+char *pw_field_value_name (const pw_field *f, int i, char *buffer, size_t size);
 
 /* As pw_field_at, for a definition that will be modified. */
 static inline void *pw_field_mutable (const pw_kind *kind, void *definition, pw_field_type type, int index) {

@@ -72,15 +72,6 @@ int pw_model_check_body (const pw_model *m, const pw_body *b, pw_error *error) {
   return PW_OK;
 }
 
-static int check_signal (const pw_model *m, const pw_element *e, const pw_field *f, const pw_signal *s,
-                         pw_error *error) {
-  char fault[300];
-  int point;
-  if (*pw_signal_check (s, e->kind, &point, fault, sizeof fault) == 0) return PW_OK;
-  return pw_fail (error, PW_INPUT, "model %s: %s %s: %s: %s", m->name, e->kind->name, pw_element_name (e), f->name,
-                  fault);
-}
-
 static int check_body_name (const pw_model *m, const pw_element *e, const char *body, const pw_names *names,
                             pw_error *error) {
   const char *kind = e->kind->name, *name = pw_element_name (e);
@@ -96,35 +87,40 @@ static int check_body_name (const pw_model *m, const pw_element *e, const char *
                   pw_nearest_text (&near));
 }
 
-static int check_number (const pw_model *m, const pw_element *e, const pw_field *f, double value, pw_error *error) {
-  const char *expected = pw_domain_check (f->type == PW_NUMBER ? f->domain : PW_REAL, value);
-  if (*expected == 0) return PW_OK;
-  return pw_fail (error, PW_INPUT, "model %s: %s %s: %s = %g: expected %s", m->name, e->kind->name, pw_element_name (e),
-                  f->name, value, expected);
+/* ---- Values: the fault is written to `text`, or nothing ---- */
+
+static void check_numbers (const pw_field *f, const double *value, char *text, size_t size) {
+  for (int k = 0; k < (f->type == PW_NUMBER ? 1 : 2) && !*text; k++) {
+    const char *expected = pw_domain_check (f->type == PW_NUMBER ? f->domain : PW_REAL, value[k]);
+    if (*expected) snprintf (text, size, " = %g: expected %s", value[k], expected);
+  }
 }
 
-static int check_choice (const pw_model *m, const pw_element *e, const pw_field *f, int value, pw_error *error) {
+static void check_choice (const pw_field *f, int value, char *text, size_t size) {
   int choices = 0;
   while (f->choices[choices]) choices++;
-  if (value >= 0 && value < choices) return PW_OK;
-  return pw_fail (error, PW_INPUT, "model %s: %s %s: %s = %d: expected 0 to %d", m->name, e->kind->name,
-                  pw_element_name (e), f->name, value, choices - 1);
+  if (value < 0 || value >= choices) snprintf (text, size, " = %d: expected 0 to %d", value, choices - 1);
 }
 
 static int check_field (const pw_model *m, const pw_element *e, const pw_field *f, const pw_names *names,
                         pw_error *error) {
+  char name[80], fault[300];
+  int point;
   for (int i = 0; i < pw_field_count (f); i++) {
     const void *at = (const char *)e->definition + f->offset + (size_t)i * pw_field_bytes (f->type);
-    int status = PW_OK, numbers = f->type == PW_NUMBER ? 1 : f->type == PW_POINT || f->type == PW_VECTOR ? 2 : 0;
-    for (int k = 0; k < numbers && status == PW_OK; k++)
-      status = check_number (m, e, f, ((const double *)at)[k], error);
-    if (f->type == PW_BODY) status = check_body_name (m, e, *(const char *const *)at, names, error);
-    if (f->type == PW_SIGNAL) status = check_signal (m, e, f, at, error);
-    if (f->type == PW_CHOICE) status = check_choice (m, e, f, *(const int *)at, error);
-    if (status != PW_OK) return status;
+    *fault = 0;
+    if (f->type == PW_BODY && check_body_name (m, e, *(const char *const *)at, names, error) != PW_OK) return PW_INPUT;
+    if (f->type == PW_NUMBER || f->type == PW_POINT || f->type == PW_VECTOR) check_numbers (f, at, fault, sizeof fault);
+    if (f->type == PW_SIGNAL) pw_signal_check (at, e->kind, &point, fault, sizeof fault);
+    if (f->type == PW_CHOICE) check_choice (f, *(const int *)at, fault, sizeof fault);
+    if (*fault)
+      return pw_fail (error, PW_INPUT, "model %s: %s %s: %s%s%s", m->name, e->kind->name, pw_element_name (e),
+                      pw_field_value_name (f, i, name, sizeof name), f->type == PW_SIGNAL ? ": " : "", fault);
   }
   return PW_OK;
 }
+
+/* ---- Elements and models ---- */
 
 /* names NULL: whether the bodies exist is not checked. */
 static int check_element (const pw_model *m, const pw_element *e, const pw_names *names, pw_error *error) {

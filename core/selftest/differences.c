@@ -5,7 +5,7 @@
 #include "random_scene.h"
 
 static const char *const differences_name[PW_BLOCKS] = {
-  [PW_JW_Q] = "jw_q",       [PW_JTL_Q] = "jtl_q",     [PW_ETA_Q] = "eta_q",     [PW_GAMMA_Q] = "gamma_q",
+  [PW_JW_Q] = "jw_q",       [PW_JTL_Q] = "jw_q",      [PW_ETA_Q] = "eta_q",     [PW_GAMMA_Q] = "gamma_q",
   [PW_GAMMA_V] = "gamma_v", [PW_FORCE_Q] = "force_q", [PW_FORCE_V] = "force_v",
 };
 

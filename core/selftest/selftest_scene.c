@@ -144,7 +144,7 @@ static void scene_all (scene_test *test) {
 
 /* ---- The motion ---- */
 
-static void scene_randomise (pw_probe *probe, const double *q, const double *v, pw_random *r) {
+static int scene_randomise (pw_probe *probe, const double *q, const double *v, pw_random *r, pw_error *error) {
   double T = probe->workspace->scale.time, *w = probe->v_now; /* w of jw_q; not used before the update */
   for (int j = 0; j < probe->s->coords; j++) {
     double unit = pw_unit (probe->s, j);
@@ -161,9 +161,13 @@ static void scene_randomise (pw_probe *probe, const double *q, const double *v, 
   /* no signal has a breakpoint between the times used, which are later than one that is too near for differences */
   double next = pw_next_breakpoint (probe->workspace, 0, probe->t);
   if (next - probe->t < 1e-6 * fabs (probe->t)) probe->t = next, next = pw_next_breakpoint (probe->workspace, 0, next);
-  probe->failed = isnan (next);
+  char signal[160];
+  if (isnan (next))
+    return pw_fail (error, PW_METHOD, "t = %.6g s: %s: its breakpoint function returned a time that is not later",
+                    probe->t, pw_failed_signal (probe->workspace, signal, sizeof signal));
   probe->tau = fmin (T, next - probe->t) / 2;
   probe->t += probe->tau;
+  return PW_OK;
 }
 
 static int scene_open (scene_test *test, pw_error *error) {
@@ -180,10 +184,8 @@ static int scene_open (scene_test *test, pw_error *error) {
   return test->memory ? PW_OK : pw_fail_memory (test->probe.s, error);
 }
 
-/* Reports the signal and discards the checks, which mean nothing after its failure. */
-static int scene_fail_signal (scene_test *test, pw_error *error) {
+static int scene_fail_signal (const scene_test *test, pw_error *error) {
   char signal[160];
-  *test->probe.report = (pw_selftest_report){ 0 };
   return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed: %s is not a finite number, or its function failed",
                   test->probe.t, pw_failed_signal (test->probe.workspace, signal, sizeof signal));
 }
@@ -199,11 +201,12 @@ int pw_selftest_scene (const pw_system *s, double T, const pw_kind *kind, double
   const pw_element_batch *end = w->batch + s->batches;
   while (probe->batch < end && probe->batch->kind != kind) probe->batch++;
   int used = probe->batch < end && probe->batch->b.count > 0, status = used ? scene_open (&test, error) : PW_OK;
+  if (used && status == PW_OK) status = scene_randomise (probe, q, v, &random, error);
   if (used && status == PW_OK) {
-    scene_randomise (probe, q, v, &random);
     scene_all (&test);
     if (probe->failed) status = scene_fail_signal (&test, error);
   }
+  if (status != PW_OK) *report = (pw_selftest_report){ 0 }; /* checks with a failed signal mean nothing */
   free (test.memory);
   free (probe->memory);
   pw_workspace_free (w);

@@ -77,8 +77,8 @@ static void verify_forces (verified_scene *scene, const pw_element_batch *k) {
 
 /* ---- Worst residuals ---- */
 
-/* Sets the size of every equation to the largest force in the scene, but at least the largest mass times L / T^2; those
- * of moments are L times as large. */
+/* Replaces the sum in the size of every equation by the largest of these sums, but at least the largest mass times
+ * L / T^2; of moments: L times as much. */
 static void verify_force_sizes (verified_scene *scene) {
   const pw_system *s = scene->s;
   double L = scene->workspace->scale.length, T = scene->workspace->scale.time, largest = 0;

@@ -29,6 +29,9 @@ typedef enum {
 /* The first such time after t, or INFINITY; of a function signal, what its breakpoint function returns. */
 double pw_signal_breakpoint (const pw_signal *s, pw_breakpoints which, double t);
 
+/* 1 if the value may jump: that of a pulse; that of a function, of which this is not known. */
+int pw_signal_may_jump (const pw_signal *s);
+
 /* ---- Tables (table.c) ---- */
 
 /* The signal at point i of a table. */

@@ -105,17 +105,27 @@ static void form_check_points (const pw_signal *s, int *point, char *text, size_
 
 /* The form of a signal that jumps or has kinks, for messages; NULL if it has neither or is a function. */
 static const char *form_with_kinks (const pw_signal *s) {
-  if (s->type == PW_PULSE) return "a pulse";
-  if (s->type == PW_RAMP) return "a ramp";
-  if (s->type != PW_TABLE) return NULL;
-  if (s->table.interpolation == PW_LINEAR) return "a linear table";
-  return s->table.ends == PW_ENDS_FREE ? "a cubic table with free ends" : NULL;
+  switch (s->type) {
+  case PW_PULSE:
+    return "a pulse";
+  case PW_RAMP:
+    return "a ramp";
+  case PW_TABLE:
+    if (s->table.interpolation == PW_LINEAR) return "a linear table";
+    return s->table.ends == PW_ENDS_FREE ? "a cubic table with free ends" : NULL;
+  case PW_CONSTANT:
+  case PW_HARMONIC:
+  case PW_SMOOTH_STEP:
+  case PW_FUNCTION:
+    break;
+  }
+  return NULL;
 }
 
 /* Kinks of prescribed positions and jumps of prescribed velocities would require infinite forces. */
 static void form_check_continuity (const pw_signal *s, const pw_kind *kind, char *text, size_t size) {
   const char *form = form_with_kinks (s);
-  int jumps = s->type == PW_PULSE;
+  int jumps = pw_signal_may_jump (s);
   if (form == NULL || pw_kind_signals_force (kind)) return;
   if (kind->level == PW_HOLONOMIC)
     snprintf (text, size,

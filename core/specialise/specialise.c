@@ -14,13 +14,13 @@ typedef struct {
 } source_text;
 #include "source_texts.inc" /* written by the build: source_texts, which ends with a NULL name */
 
-enum { SPECIALISE_TEXTS = 64 }; /* more than there are in source_texts */
+enum { SPECIALISE_TEXTS = sizeof source_texts / sizeof *source_texts };
 
 /* Writes the text of a source file, unless it is marked in `done`, after the texts of the headers that it includes. */
 static void specialise_text (FILE *out, const char *name, unsigned char done[SPECIALISE_TEXTS]) {
   char header[80], hint[PW_HINT];
   const int i = pw_find_name (source_texts, sizeof *source_texts, name, hint);
-  if (i < 0 || i >= SPECIALISE_TEXTS || done[i]) return;
+  if (i < 0 || done[i]) return;
   done[i] = 1;
   for (const char *const *line = source_texts[i].line; *line; line++)
     if (sscanf (*line, "#include \"%79[a-z_0-9.]\"", header) == 1) specialise_text (out, header, done);
@@ -166,7 +166,8 @@ int pw_specialised_lanes_count (const pw_specialised_lanes *code) {
 }
 
 void *pw_specialised_lanes_memory (const pw_specialised_lanes *code) {
-  return aligned_alloc (64, (code->size + 63) / 64 * 64);
+  enum { ALIGN = 64 }; /* bytes: of the largest vector registers, those of AVX-512 */
+  return aligned_alloc (ALIGN, (code->size + ALIGN - 1) / ALIGN * ALIGN);
 }
 
 char *pw_system_source (const pw_system *s, const unsigned char *independent, pw_error *error) {

@@ -206,7 +206,8 @@ static int compile_element (const compilation *job, const pw_element_batch *k, c
   }
   if (kind->prepare == NULL) return PW_OK;
   pw_internal internal[PW_MAX_INTERNAL] = { { 0 } };
-  if (compile_prepare (job, from, bodies, internal, a->element + (size_t)e * kind->element) != PW_OK) return PW_INPUT;
+  int status = compile_prepare (job, from, bodies, internal, a->element + (size_t)e * kind->element);
+  if (status != PW_OK) return status;
   for (int n = 0, j = k->internal + e * kind->internal; n < kind->internal; n++, j++) {
     const char *expected = pw_domain_check (PW_NONNEGATIVE, internal[n].mass);
     if (*expected)
@@ -224,8 +225,8 @@ static int compile_element (const compilation *job, const pw_element_batch *k, c
 /* Stores the elements of batch i, those of an each_body type once for every body with mass. */
 static int compile_batch (const compilation *job, int i, const batch_arrays *a) {
   const pw_element_batch *k = &job->s->batch[i];
-  int e = 0;
-  for (int n = 0; n < job->m->elements; n++) {
+  int e = 0, status = PW_OK;
+  for (int n = 0; n < job->m->elements && status == PW_OK; n++) {
     if (job->batch_of[n] != i) continue;
     const pw_element *from = &job->m->element[n];
     const char *name = compile_text (job, pw_element_name (from));
@@ -233,17 +234,17 @@ static int compile_batch (const compilation *job, int i, const batch_arrays *a) 
     for (int b = k->kind->each_body ? 0 : -1; b < (k->kind->each_body ? job->s->bodies : 0); b++) {
       if (b >= 0 && !(job->m->body[b].mass > 0)) continue;
       a->name[e] = name;
-      if (compile_element (job, k, a, e++, from, b) != PW_OK) return PW_INPUT;
+      if ((status = compile_element (job, k, a, e++, from, b)) != PW_OK) break;
     }
   }
-  return PW_OK;
+  return status;
 }
 
 static int compile_batches (const compilation *job) {
   pw_system *s = job->s;
-  int row = 0, internal = 3 * s->bodies;
+  int row = 0, internal = 3 * s->bodies, status = PW_OK;
   pw_source *source = s->source;
-  for (int i = 0; i < s->batches; i++) {
+  for (int i = 0; i < s->batches && status == PW_OK; i++) {
     pw_element_batch *k = &s->batch[i];
     const pw_kind *kind = k->kind;
     int count = k->b.count;
@@ -258,9 +259,9 @@ static int compile_batches (const compilation *job) {
     row += count * kind->rows;
     internal += count * kind->internal;
     source += count * kind->signals;
-    if (compile_batch (job, i, &a) != PW_OK) return PW_INPUT;
+    status = compile_batch (job, i, &a);
   }
-  return PW_OK;
+  return status;
 }
 
 /* ---- Initial values, scales ---- */
@@ -277,8 +278,7 @@ static int compile_initial (const compilation *job) {
   return PW_OK;
 }
 
-/* The largest distance of an element's point, markers excepted, from the origin of its body; if 0, the radius of
- * gyration of the first body where it is not 0, or 1 m. */
+/* The length scale (pw_scale). */
 static double compile_length (const compilation *job) {
   const pw_model *m = job->m;
   double L = 0;

@@ -12,7 +12,7 @@ static int signals_table (pw_system *s, pw_source *source, pw_error *error) {
   for (size_t i = 0; i < n; i++) value[i] = pw_table_value (&source->signal, (int)i);
   table->t = t;
   table->value = value;
-  table->scale = table->offset = 0;
+  table->scale = 1, table->offset = 0;
   source->spline = value + n;
   pw_table_spline (&source->signal, source->spline);
   return PW_OK;
@@ -52,23 +52,24 @@ static int signals_source (pw_system *s, pw_source *source, const pw_signal *sig
 /* Compiles the signals of element e of a batch. */
 static int signals_element (pw_system *s, const pw_element_batch *k, int e, const void *definition, pw_error *error) {
   pw_source *source = k->source + e * k->kind->signals;
-  for (int u = 0; u < k->kind->signals; u++, source++) {
+  int status = PW_OK;
+  for (int u = 0; u < k->kind->signals && status == PW_OK; u++, source++) {
     source->of_force = pw_kind_signals_force (k->kind);
-    if (signals_source (s, source, pw_field_at (k->kind, definition, PW_SIGNAL, u), k->name[e], error) != PW_OK)
-      return PW_INPUT;
+    status = signals_source (s, source, pw_field_at (k->kind, definition, PW_SIGNAL, u), k->name[e], error);
   }
-  return PW_OK;
+  return status;
 }
 
 int pw_compile_signals (pw_system *s, const pw_model *m, const int *batch_of, pw_error *error) {
   int *next = pw_arena_alloc (&s->arena, (size_t)s->batches * sizeof *next); /* next element of each batch */
   if (next == NULL) return pw_fail_memory (s, error);
-  for (int n = 0; n < m->elements; n++) {
+  int status = PW_OK;
+  for (int n = 0; n < m->elements && status == PW_OK; n++) {
     const pw_element *from = &m->element[n];
     const pw_element_batch *k = &s->batch[batch_of[n]];
     int *e = &next[batch_of[n]];
-    for (; *e < k->b.count && strcmp (k->name[*e], pw_element_name (from)) == 0; ++*e)
-      if (signals_element (s, k, *e, from->definition, error) != PW_OK) return PW_INPUT;
+    for (; *e < k->b.count && strcmp (k->name[*e], pw_element_name (from)) == 0 && status == PW_OK; ++*e)
+      status = signals_element (s, k, *e, from->definition, error);
   }
-  return PW_OK;
+  return status;
 }

@@ -33,7 +33,7 @@ int pw_system_jumps (const pw_system *s, double t) {
   const double near = 8 * DBL_EPSILON * fmax (fabs (t), 1); /* round-off of sums of steps, which also end near 0 */
   /* the other signals of forces are continuous, and their derivatives are not used */
   for (const pw_source *source = s->source, *end = source + s->sources; source < end; source++)
-    if (!source->of_force || source->signal.type == PW_PULSE || source->signal.type == PW_FUNCTION)
+    if (!source->of_force || pw_signal_may_jump (&source->signal))
       if (pw_signal_breakpoint (&source->signal, PW_JUMPS, t - near) <= t + near) return 1;
   return 0;
 }
@@ -172,7 +172,7 @@ char *pw_system_signal_name (const pw_system *s, int signal, char *buffer, size_
   const pw_field *f;
   char field[80];
   const pw_element_batch *k = query_signal (s, signal, &e, &f, &n);
-  snprintf (buffer, size, "%s.%s", k->name[e], pw_signal_field_name (f, n, field, sizeof field));
+  snprintf (buffer, size, "%s.%s", k->name[e], pw_field_value_name (f, n, field, sizeof field));
   return buffer;
 }
 
@@ -199,7 +199,7 @@ char *pw_failed_signal (const pw_workspace *w, char *buffer, size_t size) {
   const pw_field *f;
   char field[80];
   const pw_element_batch *k = query_signal (w->s, (int)(w->failed - w->source), &e, &f, &n);
-  snprintf (buffer, size, "%s %s: %s", k->kind->name, k->name[e], pw_signal_field_name (f, n, field, sizeof field));
+  snprintf (buffer, size, "%s %s: %s", k->kind->name, k->name[e], pw_field_value_name (f, n, field, sizeof field));
   return buffer;
 }
 

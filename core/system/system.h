@@ -1,8 +1,8 @@
 /* The compiled system and the workspace of a run, for core/ and solvers/, not for models.
  *
  * Names: system s, workspace w; body b, batch k, element e of a batch, local column c of an element, global coordinate
- * j, constraint equation (row) i.  Arrays that elements add to have three additional entries after the coordinates:
- * those of the ground, which are never read. */
+ * j, constraint equation (row) i.  Arrays that elements add to have three additional entries after the coordinates,
+ * those of the ground: they need not be set before, and their values mean nothing. */
 #ifndef PW_SYSTEM_H
 #define PW_SYSTEM_H
 
@@ -20,8 +20,8 @@ typedef struct {
   const int *column; /* count x bodies: first coordinate of each body; s->coords for the ground */
   const char **name; /* count */
   double *J;         /* count x rows x cols */
-  double *block; /* count x cols, at least count: scratch for forces, energies, powers; count x 2 cols for saturation */
-  double *u;     /* count x signals x 3, as b.u */
+  double *block;     /* count x cols: scratch for forces, energies, powers; count x 2 cols for saturation */
+  double *u;         /* count x signals x 3, as b.u */
   pw_source *source; /* count x signals, part of the array of all sources */
 } pw_element_batch;
 

@@ -17,8 +17,7 @@ static void workspace_batch (pw_layout *layout, const pw_workspace *w, int i, do
   const pw_kind *kind = from->kind;
   size_t n = (size_t)from->b.count, cols = (size_t)from->b.cols;
   int used = kind->force || kind->energy || kind->power || kind->loss;
-  size_t each = cols ? (kind->saturation ? 2 : 1) * cols : 1; /* without columns: an energy or a power */
-  double *block = pw_layout_alloc (layout, used ? n * each : 0, sizeof *block);
+  double *block = pw_layout_alloc (layout, used ? (kind->saturation ? 2 : 1) * n * cols : 0, sizeof *block);
   if (layout->base == NULL) return;
   pw_element_batch *k = &w->batch[i];
   *k = *from;

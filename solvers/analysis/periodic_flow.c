@@ -24,11 +24,21 @@ static const double flow_min_rtol[] = { [PW_FLOW] = 0, [PW_FLOW_DERIVATIVES] = 1
 
 /* ---- The period of signals ---- */
 
-/* The period of a signal [s]; 0: none. */
+/* The period of a signal [s]; 0: none, or not known. */
 static double signal_period (const pw_signal *s) {
-  if (s->type == PW_HARMONIC && s->harmonic.amplitude != 0 && s->harmonic.omega != 0)
-    return 2 * PW_PI / fabs (s->harmonic.omega);
-  return s->type == PW_PULSE && s->pulse.period > 0 && s->pulse.height != 0 ? s->pulse.period : 0;
+  switch (s->type) {
+  case PW_HARMONIC:
+    return s->harmonic.amplitude != 0 && s->harmonic.omega != 0 ? 2 * PW_PI / fabs (s->harmonic.omega) : 0;
+  case PW_PULSE:
+    return s->pulse.height != 0 ? s->pulse.period : 0;
+  case PW_CONSTANT:
+  case PW_FUNCTION:
+  case PW_RAMP:
+  case PW_SMOOTH_STEP:
+  case PW_TABLE:
+    break;
+  }
+  return 0;
 }
 
 /* The least common multiple of two periods, where 0 stands for none; NaN if it is not found. */

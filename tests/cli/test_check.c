@@ -305,6 +305,8 @@ TEST (breakpoint) {
     if (report.check[i].failed) fail_msg ("%s: %s", report.check[i].name, report.check[i].where);
   check_breakpoint = NAN;
   assert_int_equal (pw_selftest_scene (s, 1, &pw_kind_drive, 1, q, v, 1, &report, &error), PW_METHOD);
+  check_error (&error, PW_METHOD, "t = 1 s: drive D: value: its breakpoint function returned a time that is not later");
+  assert_int_equal (report.checks, 0);
   pw_system_free (s);
 }
 

@@ -59,6 +59,11 @@ TEST (bad_lines) {
     { "run ezyroller --start m1=1", "--start m1=1: m1 is a parameter, expected a state; use --set" },
     { "run ezyroller --set m1=-1", "model ezyroller: parameter m1 = -1: expected a number > 0" },
     { "run ezyroller --set m1=nan", "model ezyroller: parameter m1 = nan: expected a finite number" },
+    { "run slider-crank --set l1=2 --set theta=0.5235987755982988",
+      "model slider-crank: l2 = 1: the rod does not reach the slider's axis at theta = 0.523599, or is perpendicular "
+      "to it" },
+    { "run slider-crank --set l1=2 --set theta=1",
+      "model slider-crank: l2 = 1: the rod does not reach the slider's axis at theta = 1, or is perpendicular to it" },
     { "run ezyroller --set m1", "--set m1: expected NAME=VALUE" },
     { "run ezyroller --set m1=", "--set m1=: \"\" is not a number" },
     { "run ezyroller --set =1", "--set =1: expected NAME=VALUE" },

@@ -77,6 +77,27 @@ TEST (bounds) {
   assert_string_equal (compare_word ("rk4+projection", 2), "1.0");
   assert_non_null (strstr (cli_out, "\n<: at most"));
   assert_non_null (strstr (cli_out, "\nstopped by the limit of 0.05 s: rk4+projection from "));
+  /* the run with steps of 0.05 s fails: how many digits it would have is unknown */
+  cli_write ("fails.c", "#include <math.h>\n#include \"pinwheel.h\"\nstatic _Thread_local double before;\n"
+                        "static int force (void *c, double t, const double *x, double *u, double *g) {\n"
+                        "  double stage = t - before;\n"
+                        "  (void)c, (void)x, (void)g;\n"
+                        "  before = t, u[0] = u[1] = u[2] = 0;\n"
+                        "  return fabs (stage - 0.025) < 1e-9;\n"
+                        "}\n"
+                        "static void build (pw_model *m, const void *p) {\n"
+                        "  (void)p;\n"
+                        "  pw_add_body (m, &(pw_body){ .name = \"a\", .mass = 1, .inertia = 1,\n"
+                        "    .start = { 1, 0, 0 } });\n"
+                        "  pw_add_spring (m, &(pw_spring){ .name = \"s\", .stiffness = 1,\n"
+                        "    .body = { \"a\", \"ground\" } });\n"
+                        "  pw_add_force (m, &(pw_force){ .name = \"F\", .body = \"a\",\n"
+                        "    .fx = { PW_FUNCTION, .function = { .eval = force } } });\n"
+                        "}\n"
+                        "PW_MODEL (.about = \"fails\", .build = build);\n");
+  cli_good ("pinwheel compare @/fails.c --methods rk4+none --t-end 2 --step-ladder 0.1:0.025 --repeats 1");
+  assert_non_null (strstr (cli_out, "\nrk4+none: 1 of 3 runs fail, first at step 0.05: "));
+  assert_string_equal (compare_word ("rk4+none", 1), "<1.0");
 }
 
 /* A chaotic motion is not known to 9 digits: the conclusion does not compare methods there. */

@@ -74,8 +74,10 @@ TEST (bad_references) {
 }
 
 TEST (bad_numbers) {
-  BAD (": pin B: at = nan: expected a finite number",
+  BAD (": pin B: at[1] = nan: expected a finite number",
        PIN (.name = "B", .body = { "frame", "steer" }, .at = { { 0, 0 }, { 0, NAN } }));
+  BAD (": pfaffian p: a[2] = inf: expected a finite number",
+       pw_add_pfaffian (m, &(pw_pfaffian){ .name = "p", .body = { "frame", "steer" }, .a = { 1, 0, INFINITY } }));
   BAD (": wheel A: heading = inf: expected a finite number", WHEEL (.name = "A", .body = "frame", .heading = INFINITY));
   BAD (": roller A: radius = 0: expected a number > 0",
        pw_add (m, &toy_kind_roller, &(toy_roller){ .name = "A", .body = "frame" }));

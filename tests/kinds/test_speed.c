@@ -108,6 +108,8 @@ TEST (pair) {
   check_close ("first angle", x.q[2], i * a * t * t / 2, bound, reason);
   check_close ("mesh", trial_reaction (s, &x, "mesh.F"), speed_p.I[0] * i * a, bound, reason);
   check_close ("balance", x.balance, 0, 10 * bound, reason);
+  assert_string_equal (pw_system_reaction_unit (s, pw_system_find_reaction (s, "push.F", NULL)), "N");
+  assert_string_equal (pw_system_reaction_unit (s, pw_system_find_reaction (s, "mesh.F", NULL)), "N m");
   runs_close (r, s);
 }
 

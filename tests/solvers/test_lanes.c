@@ -93,6 +93,20 @@ static int has_lanes (void) {
   return has;
 }
 
+/* Numbers of runs for which there is no code. */
+TEST (numbers) {
+  static const int lanes[] = { -1, 1, 3, PW_LANES_MOST + 1, 2 * PW_LANES_MOST };
+  pw_system *s = scene_named ("chaplygin-sleigh", NULL, 0);
+  char *text = pw_system_source (s, NULL, NULL);
+  for (size_t i = 0; i < sizeof lanes / sizeof *lanes; i++) {
+    pw_error error = { 0 };
+    assert_null (pw_scene_lanes_open (text, s, lanes[i], &error));
+    assert_int_equal (error.status, PW_INPUT);
+  }
+  pw_system_free (s);
+  free (text);
+}
+
 TEST (models) {
   static const struct {
     const char *model, *method;

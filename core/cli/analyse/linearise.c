@@ -1,4 +1,5 @@
-/* The command `linearise`: the linearised equations of motion x' = A x + B u, y = C x + D u at a time of a run. */
+/* The command `linearise`: the linearised equations of motion x' = A x + B u, y = C x + D u at a time of a run or a
+ * steady motion. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

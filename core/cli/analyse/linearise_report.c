@@ -61,7 +61,7 @@ static int linearise_has_shape (const pw_linear *l, int i) {
   return !l->rigid[i] && (l->re[i] != 0 || l->im[i] != 0);
 }
 
-/* 1 if mode i is shown: it has a shape, and is the first of a conjugate pair. */
+/* 1 if mode i is shown: it has a shape, and is real or the first of a conjugate pair. */
 static int linearise_is_shown (const pw_linear *l, int i) {
   return linearise_has_shape (l, i) && l->im[i] >= 0;
 }
@@ -186,7 +186,7 @@ static void linearise_mode_json (const pw_linearise_command *cmd, pw_json *j, in
   pw_json_flag (j, "rigid", l->rigid[i]);
   pw_json_open (j, "shape", '{');
   for (int k = 0; linearise_has_shape (l, i) && k < 2 * l->coordinates; k++)
-    pw_numbers_json (j, pw_system_state_name (cmd->m.system, k, name, sizeof name), linearise_shape (l, i, k), 2);
+    pw_json_numbers (j, pw_system_state_name (cmd->m.system, k, name, sizeof name), linearise_shape (l, i, k), 2);
   pw_json_close (j, '}');
   pw_json_close (j, '}');
 }
@@ -218,7 +218,7 @@ void pw_linearise_json (const pw_linearise_command *cmd, pw_json *j) {
   pw_json_number (j, "positions", l->positions);
   pw_json_number (j, "velocities", l->velocities);
   pw_json_number (j, "symmetries", l->symmetries);
-  pw_numbers_json (j, "twist", l->twist, 3);
+  pw_json_numbers (j, "twist", l->twist, 3);
   linearise_names_json (cmd, j, "inputs", cmd->input, cmd->inputs, pw_system_signal_name, pw_system_signal_unit);
   linearise_names_json (cmd, j, "outputs", cmd->output, cmd->outputs, pw_system_state_name, pw_system_state_unit);
   linearise_blocks (cmd, block);

@@ -110,7 +110,7 @@ static const char *outcome_variable (char name[OUTCOME_VARIABLE], int i) {
   return name;
 }
 
-/* Adds the functional `name`, [TYPE:]NAME, to an output, unless it is there, and returns the name of its variable.
+/* Adds the functional `name`, [TYPE:]NAME, to an output, unless it is there, and writes the name of its variable.
  * next: the character after it in the text of the output, for the message about an unknown TYPE. */
 static int outcome_add_term (pw_outcomes *set, pw_outcome *o, const char *origin, const char *name, char next,
                              char variable[OUTCOME_VARIABLE], pw_error *error) {

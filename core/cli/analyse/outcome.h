@@ -45,7 +45,7 @@ double pw_column_value (const pw_system *s, pw_column c, const pw_sample *sample
 
 typedef enum { PW_FINAL, PW_MAX, PW_MIN, PW_MEAN, PW_INTEGRAL, PW_RMS } pw_functional_type;
 
-enum { PW_FUNCTIONAL_TIMES = 9 }; /* at which a step of the run is sampled, at most */
+enum { PW_FUNCTIONAL_TIMES = 9 }; /* at which a step of the run is sampled before refinements (functional.c) */
 /* Columns may jump at the ends of a step: it is sampled also at this distance from them, relative to its size. */
 #define PW_FUNCTIONAL_INSET 1e-6
 
@@ -68,7 +68,7 @@ static inline double pw_gauss_time (double t0, double t1, int node) {
 typedef struct {
   pw_functional_type type;
   pw_column column;
-  double value;                       /* of the part of the run that is done */
+  double value;                       /* set by pw_outcomes_run; final ones also by pw_sensitivity_compute */
   double t;                           /* time of the extremum so far [s] */
   double step;                        /* size of the step of the run that contains the extremum [s] */
   double values[PW_FUNCTIONAL_TIMES]; /* private: the column at times of the current step; [0] at its beginning */

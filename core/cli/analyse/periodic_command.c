@@ -10,7 +10,8 @@
 enum { PERIODIC_PERIODS = 100000 }; /* of the signals in one period of the motion, at most */
 
 /* Periods of the run that precedes each attempt, in which the motion approaches a stable periodic one. */
-static const int periodic_settling[PW_PERIODIC_ATTEMPTS] = { 0, 10, 100 };
+static const int periodic_settling[] = { 0, 10, 100 };
+_Static_assert(sizeof periodic_settling / sizeof *periodic_settling == PW_PERIODIC_ATTEMPTS, "one for each attempt");
 
 /* ---- Options ---- */
 

@@ -13,7 +13,7 @@ enum {
   SENSITIVITY_DIGITS = 9,   /* of numbers in the text */
   SENSITIVITY_UNIT = 64,    /* longest unit, its end included */
   SENSITIVITY_NAME = 10000, /* likewise the name of a column of the table; longer names are cut off */
-  SENSITIVITY_ROWS = 1000,  /* of the table, unless --every is given */
+  SENSITIVITY_ROWS = 1000,  /* of the table after the first, unless --every is given */
   SENSITIVITY_REPEATED = 5  /* computations with better steps of the differences, at most */
 };
 
@@ -236,37 +236,6 @@ static int sensitivity_write (const sensitivity *cmd, pw_error *error) {
 
 /* ---- The command ---- */
 
-/* Finds an unknown; its value is that of the parameter, or of the state in the consistent initial state of run r. */
-static int sensitivity_find_unknown (const pw_sensitivity *sens, pw_unknown *u, const pw_run *r, const char *name,
-                                     pw_error *error) {
-  int n = pw_system_coordinates (sens->unknowns.m->system), status = pw_unknown_find (u, sens->unknowns.m, name, error);
-  if (status == PW_OK && u->state >= 0)
-    u->value = u->state < n ? pw_run_initial (r)->q[u->state] : pw_run_initial (r)->v[u->state - n];
-  if (status != PW_OK || u->parameter == NULL || u->parameter->domain != PW_COUNT) return status;
-  return pw_fail (error, PW_INPUT, "%s is a count (%g): derivatives need a number that varies continuously", name,
-                  u->value);
-}
-
-/* Finds the unknowns, and their values in a run opened for this. */
-static int sensitivity_find_unknowns (sensitivity *cmd, pw_error *error) {
-  pw_unknowns *u = &cmd->sens.unknowns;
-  if (cmd->by == NULL) return pw_fail (error, PW_INPUT, "--by is missing: expected a parameter or an initial value");
-  if (cmd->sens.of == NULL) return pw_fail (error, PW_INPUT, "--of is missing: expected an output, such as frame.x");
-  while (cmd->by[u->count]) u->count++;
-  u->list = calloc ((size_t)u->count, sizeof *u->list);
-  if (u->list == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  pw_run *r = pw_run_open (cmd->m.system, u->method, &u->settings, error);
-  int status = r ? PW_OK : error->status;
-  for (int i = 0; i < u->count && status == PW_OK; i++) {
-    status = sensitivity_find_unknown (&cmd->sens, &u->list[i], r, cmd->by[i], error);
-    for (int k = 0; k < i && status == PW_OK; k++)
-      if (strcmp (cmd->by[k], cmd->by[i]) == 0)
-        status = pw_fail (error, PW_INPUT, "--by %s is given twice", cmd->by[i]);
-  }
-  pw_run_close (r);
-  return status;
-}
-
 static int sensitivity_open (sensitivity *cmd, pw_error *error) {
   pw_sensitivity *sens = &cmd->sens;
   int status = pw_cli_open (&cmd->m, &cmd->line, error);
@@ -277,7 +246,10 @@ static int sensitivity_open (sensitivity *cmd, pw_error *error) {
   if (cmd->folder) sens->row_interval = sens->unknowns.t_end / SENSITIVITY_ROWS;
   status = pw_cli_requires ("--every", cmd->every, "-o DIR", cmd->folder != NULL, error);
   if (status == PW_OK) status = pw_cli_number ("--every", cmd->every, PW_POSITIVE, &sens->row_interval, error);
-  return status == PW_OK ? sensitivity_find_unknowns (cmd, error) : status;
+  if (status != PW_OK) return status;
+  if (cmd->by == NULL) return pw_fail (error, PW_INPUT, "--by is missing: expected a parameter or an initial value");
+  if (sens->of == NULL) return pw_fail (error, PW_INPUT, "--of is missing: expected an output, such as frame.x");
+  return pw_unknowns_differentiated (&sens->unknowns, cmd->by, error);
 }
 
 /* Sets better steps of the differences for parameters; 1 if there are any. */
@@ -348,7 +320,7 @@ static int sensitivity_compute (pw_sensitivity *sens, pw_error *error) {
     status = sensitivity_repeat (sens, &progress, error);
     if (status == PW_OK || status == PW_RESOURCE || status == PW_RETRY) continue;
     for (int p = 0; p < sens->unknowns.count; p++) sens->unknowns.list[p].step = sens->unknowns.list[p].last_step;
-    *error = (pw_error){ 0 }; /* the model refused a longer step */
+    *error = (pw_error){ 0 }; /* such as that of a model that refuses the value of a neighbour */
     status = sensitivity_repeat (sens, &progress, error);
     break;
   }

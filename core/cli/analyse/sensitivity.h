@@ -11,14 +11,14 @@
 typedef struct {
   const char **of; /* the texts of the outputs, ended by NULL */
   pw_unknowns unknowns;
-  double row_interval; /* between rows of the table [s]; 0: a few rows */
+  double row_interval; /* between rows of the table [s]; 0: 20 intervals */
   int no_error;        /* 1: neither errors nor a check that the constraints leave the unknowns free */
   /* results */
   pw_outcomes outcomes;                /* of the run */
   double *run_slope, *run_slope_error; /* F x P: derivatives of the functionals, and their errors; NaN: none exists */
   int rows, columns;                   /* of the table: t, then each output that is in it, with its derivatives */
   double *row;                         /* rows x columns */
-  double *loose;                       /* outputs x P: derivatives with larger tolerances; NULL: not computed */
+  double *loose;                       /* outputs x P: derivatives with larger tolerances, NaN: failed; or NULL */
   int stopped;                         /* 1: stopped before t_end, by Ctrl-C or the limit */
   pw_limit limit;                      /* of all runs of one computation together */
   pw_unknown_run base;                 /* the run, at the given values of the unknowns */
@@ -46,7 +46,7 @@ int pw_sensitivity_start (pw_sensitivity *sens, const double *values, pw_error *
 /* Advances the run to a time, and sets value, slope and slope_error there.  Returns as pw_variation_advance. */
 int pw_sensitivity_at (pw_sensitivity *sens, double t, pw_error *error);
 /* Starts the run, advances it to the end, and computes all results except `loose`.  PW_OK with `stopped` if it is
- * stopped while it computes derivatives; the status of the run if before. */
+ * stopped while it computes derivatives; the status of pw_outcomes_run if before. */
 int pw_sensitivity_compute (pw_sensitivity *sens, const double *values, pw_progress *progress, pw_error *error);
 void pw_sensitivity_close (pw_sensitivity *sens); /* but not its unknowns */
 /* 1 if an output is in the table: it is a function of columns at one time, without extrema and integrals. */

@@ -150,7 +150,8 @@ static void sensitivity_drop_extrema (pw_sensitivity *sens, double t, const doub
   }
 }
 
-/* Adds a row to the table: the time, then each output in it, with its derivatives. */
+/* Sets the values of final columns, and adds a row to the table: the time, then each output in it, with its
+ * derivatives. */
 static int sensitivity_add_row (pw_sensitivity *sens, double t, pw_error *error) {
   if (pw_grow (&sens->row, (size_t)sens->rows, &sens->room, (size_t)sens->columns * sizeof *sens->row) != PW_OK)
     return pw_fail (error, PW_RESOURCE, "out of memory");
@@ -234,7 +235,7 @@ static int sensitivity_jump (pw_sensitivity *sens, double t0, double t, int at_s
 typedef enum { NO_JUMP, JUMP_AT_BREAKPOINT, JUMP_AT_STATE } sensitivity_jump_type;
 
 /* The end of the next interval from t towards `to`, in which derivatives are smooth; the type of the jump at its end is
- * stored.  NAN and the error if the search for the next jump fails. */
+ * stored; NO_JUMP without extrema and integrals, to which alone jumps matter.  NAN as pw_variation_next_jump. */
 static double sensitivity_next (pw_sensitivity *sens, double t, double to, sensitivity_jump_type *jump,
                                 pw_error *error) {
   double slope, breakpoint = pw_variation_breakpoint (sens->variation, 0, &slope);
@@ -249,13 +250,13 @@ static double sensitivity_next (pw_sensitivity *sens, double t, double to, sensi
 
 /* Advances from t to `to`: in intervals without jumps, and across jumps from just before to just after them. */
 static int sensitivity_advance (pw_sensitivity *sens, double t, double to, pw_progress *progress, pw_error *error) {
-  /* time before and after a jump at which the columns are evaluated [s] */
+  /* from a jump to the evaluations of columns before it and, at a breakpoint, after it [s] */
   const double aside = 1e-9 * fmin (sens->row_interval, sens->unknowns.t_end / SENSITIVITY_PARTS);
   sensitivity_jump_type jump;
   int status = PW_OK;
   while (t < to && status == PW_OK) {
     double next = sensitivity_next (sens, t, to, &jump, error);
-    if (isnan (next)) return error->status;
+    if (isnan (next)) return error->status != PW_OK ? error->status : PW_STOPPED;
     double end = jump ? next - fmin (aside, next - t) : next;
     status = sensitivity_interval (sens, t, end, error);
     if (jump == JUMP_AT_BREAKPOINT) sens->last_breakpoint = next, next = fmin (next + aside, sens->unknowns.t_end);

@@ -54,12 +54,6 @@ void pw_states_json (const pw_system *s, const double *q, const double *v, const
   pw_json_close (j, '}');
 }
 
-void pw_numbers_json (pw_json *j, const char *key, const double *value, int count) {
-  pw_json_open (j, key, '[');
-  for (int i = 0; i < count; i++) pw_json_number (j, NULL, value[i]);
-  pw_json_close (j, ']');
-}
-
 void pw_states_header (const pw_system *s, pw_text *t) {
   char name[300];
   for (int i = 0; i < 2 * pw_system_coordinates (s); i++)

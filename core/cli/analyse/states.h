@@ -30,8 +30,6 @@ static inline double pw_rounded (double value, double smallest) {
 void pw_states_print (const pw_system *s, const double *q, const double *v, int digits, double smallest);
 /* Writes an object with the names and values of all states. */
 void pw_states_json (const pw_system *s, const double *q, const double *v, const char *key, pw_json *j);
-/* Writes a list of numbers. */
-void pw_numbers_json (pw_json *j, const char *key, const double *value, int count);
 
 /* Add cells of a table: the names of the states; of `most` complex numbers, re1, im1, re2, ...; and these numbers, nan
  * beyond `count`. */

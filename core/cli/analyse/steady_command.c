@@ -99,7 +99,8 @@ static int steady_is_stopped (pw_steady_command *cmd) {
 
 /* ---- The search ---- */
 
-/* Adds a solution unless it is known; of solutions in families of the same dimension and stability only one. */
+/* Adds a solution unless it is known or not steady; only one of those in families of the same dimension and
+ * stability. */
 static int steady_found (pw_steady_command *cmd, const pw_steady_motion *m, int attempt, pw_error *error) {
   if (m->linear->steady == PW_CHANGING) return cmd->changing++, PW_OK;
   for (int i = 0; i < cmd->points; i++) {
@@ -239,8 +240,8 @@ static double steady_model_value (const pw_steady_command *cmd) {
                                pw_system_initial_v (s));
 }
 
-/* The motion nearest to the initial state: at the initial value of the held quantity that varies, or for a parameter of
- * the model where the range begins; at a value within the range if the family is smaller there. */
+/* The motion nearest to the initial state: at the initial value of the held quantity that varies, if that is finite,
+ * else where the range begins, as for a parameter; at a value within the range if the family is smaller there. */
 static int steady_nearest_motion (pw_steady_command *cmd, pw_steady_motion *m, pw_error *error) {
   const double first = cmd->settings.first, held = cmd->settings.vary < 0 ? NAN : steady_model_value (cmd),
                begin = isfinite (held) ? held : first, within = pw_value_within (first, cmd->settings.last);

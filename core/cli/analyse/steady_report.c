@@ -142,7 +142,7 @@ static void steady_point_json (const pw_steady_command *cmd, const pw_steady_poi
   pw_json_number (j, "residual", p->motion.residual);
   if (!cmd->vary_text) pw_json_number (j, "family", p->motion.family);
   pw_json_number (j, "growing", p->motion.unstable);
-  pw_numbers_json (j, "twist", p->linear.twist, 3);
+  pw_json_numbers (j, "twist", p->linear.twist, 3);
   pw_states_json (s, p->motion.q, p->motion.v, "state", j);
   steady_eigenvalues_json (&p->linear, j);
   pw_json_close (j, '}');

@@ -31,7 +31,7 @@ typedef struct {
   pw_steady_point *point; /* points: the motions, or those of each branch in turn */
   int points;
   size_t room;                   /* points allocated */
-  char (*end)[PW_STEADY_REASON]; /* branches: why each ended; "" at the end of the range */
+  char (*end)[PW_STEADY_REASON]; /* branches: why each ended; "" at the end of the range, or if stopped */
   int branches;
   double residual[2]; /* the least of attempts that failed: from the initial state, from random ones */
   int changing;       /* solutions that are not steady, as the equations change with time or along the motion */

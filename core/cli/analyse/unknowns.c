@@ -106,6 +106,32 @@ int pw_unknowns_read (pw_unknowns *u, const char **list, pw_error *error) {
   return status;
 }
 
+/* ---- Unknowns of --by ---- */
+
+static int unknown_of_run (pw_unknown *u, const pw_cli_model *m, const pw_run *r, const char *name, pw_error *error) {
+  int n = pw_system_coordinates (m->system), status = pw_unknown_find (u, m, name, error);
+  if (status == PW_OK && u->state >= 0)
+    u->value = u->state < n ? pw_run_initial (r)->q[u->state] : pw_run_initial (r)->v[u->state - n];
+  if (status != PW_OK || u->parameter == NULL || u->parameter->domain != PW_COUNT) return status;
+  return pw_fail (error, PW_INPUT, "%s is a count (%g): derivatives need a number that varies continuously", name,
+                  u->value);
+}
+
+int pw_unknowns_differentiated (pw_unknowns *u, const char **list, pw_error *error) {
+  while (list[u->count]) u->count++;
+  u->list = calloc ((size_t)u->count, sizeof *u->list);
+  if (u->list == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  pw_run *r = pw_run_open (u->m->system, u->method, &u->settings, error);
+  int status = r ? PW_OK : error->status;
+  for (int i = 0; i < u->count && status == PW_OK; i++) {
+    status = unknown_of_run (&u->list[i], u->m, r, list[i], error);
+    for (int k = 0; k < i && status == PW_OK; k++)
+      if (strcmp (list[k], list[i]) == 0) status = pw_fail (error, PW_INPUT, "--by %s is given twice", list[i]);
+  }
+  pw_run_close (r);
+  return status;
+}
+
 /* ---- Runs ---- */
 
 int pw_unknowns_system (pw_cli_model *m, const pw_unknowns *u, const double *x, pw_error *error) {
@@ -149,9 +175,9 @@ void pw_unknowns_report (const pw_unknowns *u, const double *x) {
 
 /* ---- Directions ---- */
 
-/* PW_UNKNOWN_STEP times the typical size of the unknown: |value|, but at least 0.1 rad for angles, the unit of the
- * scene for states, 1e-3 of the scale in searches; for a parameter that is 0 its default value, or 1 if that is 0,
- * too. */
+/* u->step if that is not 0, else PW_UNKNOWN_STEP times the typical size of the unknown: |value|, but at least 0.1 rad
+ * for angles, the unit of the scene for states, 1e-3 of the scale in searches; for a parameter that is 0 its default
+ * value, or 1 if that is 0, too. */
 static double unknown_step (const pw_unknown *u, double value, const pw_run *r) {
   if (u->step > 0) return u->step;
   double size = fabs (value), length = pw_run_scale (r)->length, time = pw_run_scale (r)->time;

@@ -47,6 +47,10 @@ void pw_unknowns_close (pw_unknowns *u);
 /* Reads unknowns from a list of "NAME" or "NAME=LOW:HIGH" of --free, ended by NULL.  PW_INPUT for a name that the model
  * does not have, a parameter that is a count, and bounds outside its domain or without its value between them. */
 int pw_unknowns_read (pw_unknowns *u, const char **list, pw_error *error);
+/* Finds the unknowns of a list of names of --by, ended by NULL; values of initial states are those of the consistent
+ * initial state.  PW_INPUT for a name that the model does not have, that is given twice or that is a count; else as
+ * pw_run_open. */
+int pw_unknowns_differentiated (pw_unknowns *u, const char **list, pw_error *error);
 /* Chooses the engine for this estimated number of runs. */
 void pw_unknowns_engine (pw_unknowns *u, double runs);
 

@@ -150,7 +150,7 @@ static int fit_options (pw_fit *fit, pw_error *error) {
   return status == PW_OK ? pw_parallel_jobs (fit->jobs_text, &fit->jobs, error) : status;
 }
 
-/* Reads the data and the unknowns; runs end at the last datum. */
+/* Reads the data and the unknowns; runs end at the time of the last row. */
 static int fit_open_data (pw_fit *fit, pw_error *error) {
   int status = fit_read_data (fit, error);
   if (status == PW_OK) status = pw_unknowns_open (&fit->unknowns, &fit->line, &fit->model, error);

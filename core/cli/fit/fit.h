@@ -27,7 +27,7 @@ typedef struct {
   int weighted;                            /* 1: standard deviations are given */
   int residuals;                           /* number of data that are not NaN */
   /* results */
-  double *minima;         /* starts x (1 + unknowns): sum of squares, INFINITY without a result, then the values */
+  double *minima;         /* starts x (1 + unknowns): sum of squares, values; without a result INFINITY, the start */
   double *estimate;       /* unknowns */
   double *fitted;         /* columns x rows: values of the model at the estimate */
   double *standard_error; /* unknowns; INFINITY: not determined by the data, NaN: not known */
@@ -42,7 +42,7 @@ typedef struct {
   int by_differences; /* 1: derivatives are differences of runs, since the variational equations could not be used */
   int converged, iterations;
   int interrupted; /* 1: by Ctrl-C; the estimate is the best so far, its standard errors are NaN */
-  long runs;
+  long runs;       /* without those of the variational equations */
   pw_progress progress;
 } pw_fit;
 

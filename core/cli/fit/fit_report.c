@@ -4,7 +4,6 @@
 #include <math.h>
 #include "figure.h"
 #include "print_table.h"
-#include "states.h"
 #include "text.h"
 
 enum {
@@ -235,7 +234,7 @@ static void report_json_matrix (const pw_fit *fit, pw_json *j, const char *key,
   pw_json_close (j, ']');
 }
 
-/* Writes where each search ended. */
+/* Writes pw_fit.minima. */
 static void report_json_minima (const pw_fit *fit, pw_json *j) {
   int n = fit->unknowns.count;
   pw_json_open (j, "searches", '[');
@@ -243,7 +242,7 @@ static void report_json_minima (const pw_fit *fit, pw_json *j) {
     j->line = 1;
     pw_json_open (j, NULL, '{');
     pw_json_number (j, "chi2", *minimum);
-    pw_numbers_json (j, "values", minimum + 1, n);
+    pw_json_numbers (j, "values", minimum + 1, n);
     pw_json_close (j, '}');
   }
   pw_json_close (j, ']');

@@ -36,7 +36,7 @@ typedef struct {
   pw_error *error;
   double worst; /* largest norm of the residuals of the runs of this search that succeeded */
   double least; /* sum of squares at the best minimum so far, fit->estimate; INFINITY: no search has reached one yet */
-  int previous; /* iterations of earlier searches */
+  int previous; /* iterations of earlier searches that ended without an error */
 } fit_solver;
 
 /* ---- Bounds: an unknown with an upper bound has a lower one, too ---- */
@@ -94,7 +94,8 @@ static int solve_run (fit_solver *solver, const gsl_vector *u) {
   if (status == PW_OK && !isfinite (solve_sum (fit, solver->values)))
     status = pw_fail (&own, PW_METHOD, "the sum of the squares of the residuals is not finite");
   solver->known = status == PW_OK;
-  solve_fail (solver, fit->runs++ == 0, &own, status);
+  fit->runs++;
+  solve_fail (solver, fit->runs == 1, &own, status);
   return status;
 }
 
@@ -145,7 +146,7 @@ static void solve_store (fit_solver *solver, double chi2) {
   memcpy (fit->fitted, solver->values, (size_t)fit->columns * (size_t)fit->rows * sizeof *fit->fitted);
 }
 
-/* `moved`: 1 if the last run was made at the position reached; it is the result if Ctrl-C ends the first search. */
+/* `moved`: 1 if the last run was made at the position reached; it is the result if Ctrl-C comes before any minimum. */
 static void solve_progress (fit_solver *solver, int iteration, int moved, const gsl_multifit_nlinear_workspace *w) {
   double norm = gsl_blas_dnrm2 (gsl_multifit_nlinear_residual (w));
   if (iteration == 0 && solver->previous == 0) solver->fit->initial_chi2 = norm * norm;

@@ -1,5 +1,5 @@
-/* Local searches of `pinwheel optimise`, by NLopt; refinements use derivatives of differentiable outputs.  NLopt varies
- * scaled unknowns (search_unknown). */
+/* Local searches of `pinwheel optimise`, by NLopt; refinements of SEARCH_SLOPES or more unknowns use derivatives of
+ * differentiable outputs.  NLopt varies scaled unknowns (search_unknown). */
 #define _POSIX_C_SOURCE 200809L
 #include <math.h>
 #include <nlopt.h>
@@ -242,7 +242,7 @@ static int search_open (local_search *local, double first, double last) {
   done &= nlopt_add_inequality_mconstraint (o, constraints, search_constraints, local, local->allowed) > 0;
   done &= nlopt_set_xtol_abs1 (o, last) > 0;
   done &= nlopt_set_initial_step1 (o, first) > 0;
-  nlopt_set_maxeval (o, 200 + 100 * n); /* runs, at most */
+  nlopt_set_maxeval (o, 200 + 100 * n); /* of each nlopt_optimize */
   return done ? PW_OK : PW_RESOURCE;
 }
 

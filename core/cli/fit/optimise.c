@@ -1,6 +1,6 @@
 /* pinwheel optimise: parameters and initial values for which an output is largest or smallest.
  *
- * Local searches begin at several starts: the model's values, and Sobol points between the bounds.  Each search is a
+ * Local searches begin at several starts: the model's values, and Sobol points (pw_unknowns_starts).  Each search is a
  * task of its own, so that results do not depend on the number of threads.  The best results are then refined. */
 #define _POSIX_C_SOURCE 200809L
 #include "optimise.h"

@@ -12,7 +12,7 @@ typedef struct {
   double *from, *to;    /* unknowns: where it begins; its result, the best run that satisfies the constraints */
   double *output;       /* outputs: of that run */
   int feasible;         /* 1: there is such a run */
-  int converged;        /* 0: the search ended at its limit of runs, or NLopt failed */
+  int converged;        /* 1: NLopt ended the search by its tolerances or at round-off */
   long runs, failed;    /* number of runs; of those that failed */
   long derivatives;     /* number of points at which derivatives were computed */
   double *trials;       /* runs x (unknowns + outputs): all runs; outputs of failed ones are NaN */
@@ -50,7 +50,7 @@ typedef struct {
 
 #define PW_SEARCH_FINE 1e-7 /* last steps of refinements, relative to the scales of the unknowns */
 
-/* 1 if the outputs of a run satisfy the constraints, up to violations of 1e-6 relative to their bounds. */
+/* 1 if the outputs of a run satisfy the constraints, up to a pw_search_violation of 1e-6. */
 int pw_search_feasible (const pw_optimise *problem, const double *output);
 /* The largest violation of a constraint by the outputs of a run, relative to its bound if that is not 0; <= 0: there is
  * none.  *constraint: the index of that output; not set without constraints. */

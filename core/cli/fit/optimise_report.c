@@ -5,7 +5,6 @@
 #include <string.h>
 #include "figure.h"
 #include "print_table.h"
-#include "states.h"
 
 #define REPORT_SAME 0.01       /* largest distance of results of the same optimum, in scales of the unknowns */
 #define REPORT_ROUND_OFF 1e-14 /* largest relative difference of equal outputs */
@@ -145,8 +144,8 @@ static void report_json_search (const pw_optimise *problem, pw_json *j, const pw
   pw_json_number (j, "value", search->feasible ? search->output[0] : NAN);
   pw_json_number (j, "runs", (double)search->runs);
   pw_json_number (j, "failed", (double)search->failed);
-  pw_numbers_json (j, "from", search->from, problem->unknowns.count);
-  pw_numbers_json (j, "to", search->to, search->feasible ? problem->unknowns.count : 0);
+  pw_json_numbers (j, "from", search->from, problem->unknowns.count);
+  pw_json_numbers (j, "to", search->to, search->feasible ? problem->unknowns.count : 0);
   pw_json_close (j, '}');
 }
 

@@ -125,7 +125,7 @@ static int check_kinds (pw_check *check, pw_error *error) {
 
 /* ---- Linearisation ---- */
 
-/* The fastest eigenvalue, and the largest step of RK4 that is stable for all of them. */
+/* The fastest eigenvalue, and the largest step of RK4 that is stable for all; both without rigid displacements. */
 static void check_fastest (pw_check *check) {
   const pw_linear *linear = &check->linear;
   double most = 0;

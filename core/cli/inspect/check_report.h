@@ -42,7 +42,7 @@ typedef struct {
   int uses_rk4;         /* 1: the model's method is rk4 */
   double rk4_limit;     /* the largest stable step of RK4 [s]; INFINITY: all are stable */
   int fastest;          /* the eigenvalue of largest modulus except rigid displacements; -1: none, or all 0 */
-  double doubling_time; /* of the fastest growing perturbation of a steady motion [s]; INFINITY: none grows */
+  double doubling_time; /* of the fastest growing perturbation [s]; INFINITY: none grows, or the motion is not steady */
   pw_check_list problem, finding;
 } pw_check;
 

@@ -9,7 +9,7 @@
 
 /* Integrators in the engine, which has neither SUNDIALS nor LAPACK, and so no null-space method. */
 static const char *const page_integrators[] = { "rk4", "erk5", "erk8", NULL };
-#define PAGE_METHOD "erk8+projection" /* in place of a method of the model that the engine does not have */
+#define PAGE_METHOD "erk8+projection" /* in place of a method of the model that has options or that the engine lacks */
 
 typedef struct {
   pw_cli_line line;

@@ -247,8 +247,8 @@ function difference (a, b) {
   return most;
 }
 
-/* Runs with the settings of the panel and shows the result; 300 ms later, unless another run has followed, estimates its
- * error. */
+/* Runs with the settings of the panel and shows the result; 300 ms later, if the run was complete and no other one has
+ * followed, estimates its error. */
 let estimateTimer = 0;
 function simulate () {
   let result;

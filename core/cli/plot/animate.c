@@ -9,17 +9,11 @@ static const char *const page_lines[] = {
   NULL
 };
 
-static void page_numbers (pw_json *j, const char *key, const double *number, int count) {
-  pw_json_open (j, key, '[');
-  for (int i = 0; i < count; i++) pw_json_number (j, NULL, number[i]);
-  pw_json_close (j, ']');
-}
-
 /* Points of the ground or of a body; if a shape is given, only those that are not corners of it. */
 static void page_points (pw_json *j, const char *key, const double *at, int count, const pw_plot_body *shape) {
   pw_json_open (j, key, '[');
   for (int k = 0; k < count; k++)
-    if (shape == NULL || pw_plot_inside (shape, k)) page_numbers (j, NULL, at + 2 * k, 2);
+    if (shape == NULL || pw_plot_inside (shape, k)) pw_json_numbers (j, NULL, at + 2 * k, 2);
   pw_json_close (j, ']');
 }
 
@@ -61,7 +55,7 @@ static void page_strokes (pw_json *j, const pw_plots *plots, const pw_plot_link 
   for (const pw_plot_stroke *s = stroke; s < stroke + strokes; s++) {
     pw_json_open (j, NULL, '[');
     pw_json_number (j, NULL, s->closed + 2 * s->upright);
-    for (int k = 0; k < s->vertices; k++) page_numbers (j, NULL, s->vertex[k], 4);
+    for (int k = 0; k < s->vertices; k++) pw_json_numbers (j, NULL, s->vertex[k], 4);
     pw_json_close (j, ']');
   }
   pw_json_close (j, ']');
@@ -77,7 +71,7 @@ static void page_links (pw_json *j, const pw_plots *plots) {
     for (int n = 0; n < link->ends; n++) {
       pw_json_open (j, NULL, '{');
       pw_json_number (j, "body", link->end[n].body);
-      page_numbers (j, "at", link->end[n].at, 2);
+      pw_json_numbers (j, "at", link->end[n].at, 2);
       pw_json_close (j, '}');
     }
     pw_json_close (j, ']');

@@ -23,14 +23,14 @@ int pw_plots_style (pw_plots *plots, const char *width, const char *colour, pw_e
 
 /* The time of the next sample [s]; INFINITY after the last one. */
 double pw_plots_next (const pw_plots *plots);
-/* Stores a sample of a run with pw_settings.ledger. */
+/* Stores a sample, if there is room; its energies are complete only with pw_settings.ledger. */
 void pw_plots_add (pw_plots *plots, const pw_sample *sample);
 /* Saves or loads the samples stored so far. */
 void pw_plots_serialise (pw_plots *plots, pw_archive *archive);
 
 /* Writes data and scripts into the folder and, if `draw`, runs gnuplot; after an interrupt (`draw` 0), or if gnuplot is
- * not installed, a notice says how to draw the figures.  Without a folder it does nothing.  PW_RESOURCE if a file
- * cannot be written or gnuplot fails. */
+ * not installed, a notice says how to draw the figures.  Without a folder it does nothing, with fewer than two samples
+ * it only prints a notice.  PW_RESOURCE if a file cannot be written or gnuplot fails. */
 int pw_plots_finish (pw_plots *plots, int draw, pw_error *error);
 
 /* PW_INPUT unless the path of an animation, the value of an option, ends in .html. */
@@ -110,7 +110,7 @@ typedef struct {
  * of symbols, e the direction of the symbol (plot_symbols.c) and n is e turned to the left by 90 degrees. */
 typedef struct {
   int vertices;
-  int closed;  /* 1: the last vertex is the first one */
+  int closed;  /* 1: the last vertex is the first one, and the area inside hides what is below */
   int upright; /* 1: e is the x axis, and d = 0 if the first body is the ground */
   double vertex[PLOT_VERTICES][4];
 } pw_plot_stroke;

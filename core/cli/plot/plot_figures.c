@@ -6,7 +6,7 @@
 enum {
   FIGURES_NAMED = 12,     /* curves with a name each, at most */
   FIGURES_COLOURS = 8,    /* of bodies */
-  FIGURES_SNAPSHOTS = 60, /* at most */
+  FIGURES_SNAPSHOTS = 60, /* at most, before their stride is rounded down */
   FIGURES_FEWEST = 8,     /* snapshots, at least */
   FIGURES_CLOSEUP = 12    /* samples of a close-up, at least */
 };
@@ -69,7 +69,7 @@ static int data_table (const pw_plots *plots, const char *name, const char *head
   return pw_output_finish (o, error);
 }
 
-/* ---- The mechanism: lines of "x y t body", blank lines between polygons; bodies from 1, 0: an element ---- */
+/* ---- The mechanism: lines "x y t body", blank ones between polygons; body: from 1; 0: element; -1: not drawn ---- */
 
 static void data_vertex (FILE *f, const double *at, double t, int body, const char *end) {
   data_row (f, (const double[]){ at[0], at[1], t, body + 1 }, 4, end);
@@ -112,7 +112,7 @@ static void data_wheels (FILE *f, const pw_plots *plots, int i) {
   }
 }
 
-/* Bodies of sample i that are points: without attachment points or without inertia. */
+/* Bodies of sample i that are points: without attachment points, or with mass but no inertia. */
 static void data_centres (FILE *f, const pw_plots *plots, int i) {
   for (int b = 0; b < plots->bodies.drawn; b++)
     if (plots->shape[b].attachments == 0 || plots->shape[b].is_point)

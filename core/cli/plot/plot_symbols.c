@@ -136,7 +136,7 @@ static void symbol_travel (const pw_plots *plots, const pw_plot_link *link, int 
   *low -= SYMBOL_OVERHANG, *high += SYMBOL_OVERHANG;
 }
 
-/* Hatching below the line from x0 to x1 at height y relative to p2; returns the number of strokes. */
+/* Hatching below the line from x0 to x1 at height y relative to p1 + d; returns the number of strokes. */
 static int symbol_hatch (double x0, double x1, double y, int upright, pw_plot_stroke *stroke) {
   int strokes = (int)fmin (PLOT_HATCHES, ceil ((x1 - x0) / SYMBOL_HATCH));
   for (int k = 0; k < strokes; k++) {

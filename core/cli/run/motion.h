@@ -42,10 +42,10 @@ void pw_motion_distance (const pw_system *system, const pw_motion *reference, co
 /* The unit of a state: MOTION_LENGTH to MOTION_RATE. */
 int pw_motion_unit (const pw_system *system, int state);
 
-/* Opens a reference, to be closed in every case.  If `path` is NULL, it is the model's own reference solution up to
- * *t_end; else the table at `path`, with columns as `pinwheel run -o` writes them: at most MOTION_SAMPLES of its rows
- * after t = 0 and up to *t_end, which if 0 becomes the time of the last row.  Errors: PW_INPUT with the line,
- * PW_RESOURCE. */
+/* Opens a reference in *motion, zero-initialised, to be closed in every case.  If `path` is NULL, it is the model's own
+ * reference solution up to *t_end; else the table at `path`, with columns as `pinwheel run -o` writes them: at most
+ * MOTION_SAMPLES of its rows after t = 0 and up to *t_end, which if 0 becomes the time of the last row.  Errors:
+ * PW_INPUT with the line, PW_RESOURCE. */
 int pw_motion_open_reference (pw_motion *motion, const pw_cli_model *compiled, const char *path, double *t_end,
                               pw_error *error);
 

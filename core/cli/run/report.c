@@ -4,6 +4,7 @@
 #include <string.h>
 #include "print_table.h"
 #include "report.h"
+#include "run_command.h"
 
 enum {
   REPORT_MESSAGES = 8, /* messages of one kind, or changed states, that are printed at most */
@@ -231,6 +232,36 @@ static void report_errors (const pw_reference_error *errors) {
     for (int i = 0; i < 4; i++) report_error (&table, name[i], errors->end[i], errors->most[i], unit[i]);
     report_error (&table, "reactions", NAN, errors->reactions, "of the largest");
   }
+}
+
+/* Why the general engine was used; "": it was not. */
+static const char *report_general_reason (const pw_run_cli *command) {
+  if (command->engine.code == NULL) return command->engine.reason;
+  if (pw_run_statistics (command->run)->specialised) return "";
+  return "the method, its options or redundant drives do not permit specialised code";
+}
+
+pw_summary pw_run_summary (pw_run_cli *command, const pw_sample *last, const pw_error *error,
+                           char reason[PW_RUN_REASON]) {
+  const pw_file *file = command->compiled.file;
+  const pw_run *run = command->run;
+  pw_summary summary = { .model = file ? pw_file_name (file) : command->line.argument[0],
+                         .method = command->method,
+                         .status = pw_cli_status_word (error->status),
+                         .reason = error->text,
+                         .cpu = command->cpu,
+                         .energy_defect = last ? pw_run_energy_defect (run, last) : NAN,
+                         .redundant = command->redundant,
+                         .general = run ? report_general_reason (command) : NULL,
+                         .reference =
+                             run ? pw_comparison_errors (&command->comparison, command->compiled.system) : NULL };
+  if (error->status == PW_OK && pw_stop) {
+    char t[32];
+    snprintf (reason, PW_RUN_REASON, "interrupted at t = %s s", pw_format (t, pw_run_time (run), 6));
+    summary.status = "interrupted";
+    summary.reason = reason;
+  }
+  return summary;
 }
 
 void pw_report_warnings (const pw_run *run, const pw_system *system, double defect) {

@@ -110,13 +110,6 @@ static int run_choose_engine (pw_run_cli *command, pw_error *error) {
   return PW_OK;
 }
 
-/* Why the general engine was used; "": it was not. */
-static const char *run_general_reason (const pw_run_cli *command) {
-  if (command->engine.code == NULL) return command->engine.reason;
-  if (pw_run_statistics (command->run)->specialised) return "";
-  return "the method, its options or redundant drives do not permit specialised code";
-}
-
 static int run_open (pw_run_cli *command, pw_error *error) {
   int status = run_open_outputs (command, error);
   if (status == PW_OK) status = run_open_model (command, error);
@@ -291,25 +284,6 @@ static void run_name_files (pw_run_cli *command, pw_error *error) {
   run_add_error (error, &finish_error);
 }
 
-/* The summary of a run that ended with this error, if any; `reason` receives the text of an interruption. */
-static pw_summary run_summary (const pw_run_cli *command, const pw_error *error, char *reason, size_t size) {
-  const pw_file *file = command->compiled.file;
-  pw_summary summary = { .model = file ? pw_file_name (file) : command->line.argument[0],
-                         .method = command->method,
-                         .status = pw_cli_status_word (error->status),
-                         .reason = error->text,
-                         .cpu = command->cpu,
-                         .energy_defect = NAN,
-                         .redundant = command->redundant };
-  if (error->status == PW_OK && pw_stop) {
-    char t[32];
-    snprintf (reason, size, "interrupted at t = %s s", pw_format (t, pw_run_time (command->run), 6));
-    summary.status = "interrupted";
-    summary.reason = reason;
-  }
-  return summary;
-}
-
 /* Completes figures and animation; after an interrupt gnuplot is not run. */
 static void run_finish_figures (pw_run_cli *command, const char *reason, pw_error *error) {
   pw_error draw_error = { 0 };
@@ -327,16 +301,13 @@ static int run_finish (pw_run_cli *command, pw_error *error) {
   const pw_system *system = command->compiled.system;
   pw_run *run = command->run;
   static const char *const output_name[PW_RUN_OUTPUTS] = { "the table so far", "the page", "the summary" };
-  char reason[80] = "", t[32];
+  char reason[PW_RUN_REASON] = "", t[32];
   int interrupted = error->status == PW_OK && pw_stop;
   int prints_file = run_is_stdout (command->table_path) || run_is_stdout (command->summary_path);
   pw_sample sample, *last = NULL;
   if (run && pw_run_sample (run, pw_run_time (run), &sample, NULL) == PW_OK) last = &sample;
   run_close_table (command, error->status == PW_OK && !interrupted, error);
-  pw_summary summary = run_summary (command, error, reason, sizeof reason);
-  if (run) summary.general = run_general_reason (command);
-  if (run) summary.reference = pw_comparison_errors (&command->comparison, system);
-  if (last) summary.energy_defect = pw_run_energy_defect (run, last);
+  pw_summary summary = pw_run_summary (command, last, error, reason);
   if (last && command->table_path == NULL && command->summary_path == NULL)
     pw_report_end (&summary, system, last, command->with_energies, pw_run_statistics (run));
   if (error->status == PW_OK) pw_report_warnings (run, system, summary.energy_defect);

@@ -60,10 +60,18 @@ int pw_checkpoints_open (pw_run_cli *command, pw_specialise *specialise, pw_erro
 /* Before anything is written: locks the checkpoint file, verifies that a resumed checkpoint belongs to this run and
  * opens its table; without --resume, refuses a table that could not be continued. */
 int pw_checkpoints_prepare (pw_run_cli *command, pw_error *error);
-/* After everything is open: loads the state of the checkpoint that is resumed, if any. */
+/* After everything is open: loads the state of the checkpoint that is resumed, if any; schedules the next one. */
 int pw_checkpoints_resume (pw_run_cli *command, pw_error *error);
 /* Saves a checkpoint that is due; near a singular configuration it is postponed. */
 int pw_checkpoints_save (pw_run_cli *command, pw_error *error);
 void pw_checkpoints_close (pw_checkpoints *checkpoints);
+
+/* ---- The summary (report.c) ---- */
+
+enum { PW_RUN_REASON = 80 };
+/* The summary of a run that ended with this error, if any; last: the last sample, or NULL; `reason` receives the text
+ * of an interruption. */
+pw_summary pw_run_summary (pw_run_cli *command, const pw_sample *last, const pw_error *error,
+                           char reason[PW_RUN_REASON]);
 
 #endif

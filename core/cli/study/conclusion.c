@@ -1,5 +1,6 @@
-/* Prints the conclusion of a comparison: the processor time of each method for 3, 6 and 9 correct digits, interpolated
- * on its work-precision curve and relative to the cheapest method; then the runs that failed or were stopped. */
+/* Prints the conclusion of a comparison: the processor time of each method for the numbers of correct digits in
+ * conclusion_required, interpolated on its work-precision curve and relative to the cheapest method; then the runs that
+ * failed or were stopped. */
 #include <math.h>
 #include <string.h>
 #include "reference.h"
@@ -52,8 +53,8 @@ static double conclusion_error (const pw_reference *reference, const double *err
 /* ---- Costs ---- */
 
 /* The least processor time of a method for the required relative error, interpolated between neighbouring runs on
- * logarithmic scales.  It is an upper bound if no run before it was less accurate, or if it is interpolated to an error
- * that is only known to be below the uncertainty. */
+ * logarithmic scales.  It is an upper bound if no run before it was less accurate, if the run just before it failed, so
+ * that its error is unknown, or if it is interpolated to an error that is only known to be below the uncertainty. */
 static conclusion_cost conclusion_least_cost (const pw_conclusion *conclusion, int method, double required) {
   conclusion_cost least = { NAN, 0 };
   double error_before = NAN;
@@ -63,7 +64,7 @@ static conclusion_cost conclusion_least_cost (const pw_conclusion *conclusion, i
     if (row->curve != method) continue;
     double error =
         row->state == ROW_DONE ? conclusion_error (conclusion->reference, row->value + conclusion->error_column) : NAN;
-    conclusion_cost candidate = { error <= required ? row->cpu : NAN, !less_accurate_before };
+    conclusion_cost candidate = { error <= required ? row->cpu : NAN, !less_accurate_before || isnan (error_before) };
     if (error <= required && error_before > required) {
       double cpu =
           row[-1].cpu * pow (row->cpu / row[-1].cpu, log (required / error_before) / log (error / error_before));
@@ -97,7 +98,10 @@ static void conclusion_print_heading (const pw_conclusion *conclusion) {
   const pw_reference *reference = conclusion->reference;
   const char *between = "";
   char text[32];
-  printf ("Processor time for 3, 6 and 9 correct digits, relative to the cheapest method.\n"
+  printf ("Processor time for ");
+  for (int k = 0; k < CONCLUSION_COLUMNS; k++)
+    printf ("%s%d", k == 0 ? "" : k + 1 < CONCLUSION_COLUMNS ? ", " : " and ", conclusion_required[k].digits);
+  printf (" correct digits, relative to the cheapest method.\n"
           "Digits: the largest error of a coordinate at %d times up to %s s, relative to\n",
           reference->motion.samples, pw_format (text, conclusion->study->t_end, 6));
   for (int i = MOTION_LENGTH; i <= MOTION_ANGLE; i++)
@@ -149,7 +153,7 @@ static void conclusion_print_table (const pw_conclusion *conclusion) {
     }
   }
   puts (any_upper_bound
-            ? "\n<: at most: no run has fewer digits, or the reference cannot tell how many the next one has"
+            ? "\n<: at most: no run has fewer digits, or it is unknown how many the one before or the next one has"
             : "");
   if (any_uncertain) puts ("uncertain: the reference is not accurate enough to distinguish methods");
 }

@@ -16,7 +16,7 @@ typedef struct {
   double uncertainty[MOTION_ERRORS]; /* 0 where nothing is compared */
   double size[MOTION_UNITS];         /* largest coordinate or velocity */
   char name[300];                    /* "erk8+projection, rtol 3e-14", "the exact solution of the model" or a path */
-  int partners;                      /* number of other computed solutions; their errors relative to this one */
+  int partners;                      /* number of other computed solutions, with their distances from this one */
   struct {
     char name[100];
     double error[MOTION_ERRORS];
@@ -40,7 +40,7 @@ int pw_reference_write (const pw_reference *reference, const char *folder, const
 
 /* ---- The conclusion of a comparison (conclusion.c) ---- */
 
-/* Prints the processor time of each method for 3, 6 and 9 digits that agree with a known reference, and failures.
+/* Prints the processor time of each method for numbers of digits that agree with a known reference, and failures.
  * error_column: index of the largest error of lengths in the values of a row; that of angles follows. */
 void pw_conclusion_print (const pw_study *study, const pw_reference *reference, int error_column);
 

@@ -58,11 +58,14 @@ static int sweep_read_part (pw_sweep *sweep, pw_error *error) {
                   sweep->part_text);
 }
 
+#define SWEEP_LANES "1, 2, 4 or 8" /* the powers of 2 up to PW_LANES_MOST */
+_Static_assert(PW_LANES_MOST == 8, "SWEEP_LANES, and numbers of one digit");
+
 static int sweep_read_lanes (pw_sweep *sweep, pw_error *error) {
   const char *text = sweep->lanes_text;
-  if (text && (strspn (text, "1248") != 1 || text[1]))
-    return pw_fail (error, PW_INPUT, "--lanes %.60s: expected 1, 2, 4 or 8", text);
-  sweep->plan.lanes = text ? *text - '0' : 0;
+  int lanes = sweep->plan.lanes = text ? *text - '0' : 0;
+  if (text && (lanes < 1 || lanes > PW_LANES_MOST || (lanes & (lanes - 1)) != 0 || text[1]))
+    return pw_fail (error, PW_INPUT, "--lanes %.60s: expected " SWEEP_LANES, text);
   return PW_OK;
 }
 
@@ -170,7 +173,7 @@ static const struct poptOption sweep_options[] = {
   PW_TEXT_OPTION (pw_sweep, path, "output", 'o', "FILE.csv", "Write the table to this file"),
   PW_TEXT_OPTION (pw_sweep, jobs_text, "jobs", 'j', "N", "Number of threads (default: one per processor)"),
   PW_TEXT_OPTION (pw_sweep, lanes_text, "lanes", 0, "N",
-                  "Runs that a thread advances at once, 1, 2, 4 or 8, with steps of fixed size and specialised code "
+                  "Runs that a thread advances at once, " SWEEP_LANES ", with steps of fixed size and specialised code "
                   "(default: as many as are worthwhile)"),
   PW_TEXT_OPTION (pw_sweep, part_text, "part", 0, "I/N",
                   "Compute every N-th row, from the I-th on, for a later --merge"),

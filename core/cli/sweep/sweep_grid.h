@@ -16,7 +16,7 @@ typedef struct {
   double *value;                 /* of PW_AXIS_LIST */
   long count;                    /* number of values */
   long stride;                   /* number of rows from one value to the next */
-  const pw_parameter *parameter; /* NULL: the initial value of a state */
+  const pw_parameter *parameter; /* NULL: the initial value of a state; set by pw_plan_open, like the unit */
   const char *unit;
 } pw_axis;
 

@@ -11,7 +11,7 @@ typedef struct {
   char *table_path; /* links followed */
   char *path;       /* of the journal: that of the table and ".part" */
   int descriptor;   /* of the journal, locked; -1: not open */
-  int created;      /* 1: by this process */
+  int created;      /* 1: this process has written the fingerprint */
   off_t *offset;    /* in the journal, of the line of row r of the part: offset[r / parts]; 0: missing */
   long rows, done;  /* numbers of these rows; of those in the journal */
   off_t size;       /* bytes of the journal's complete lines */
@@ -30,7 +30,7 @@ void pw_journal_close (pw_journal *journal);
 
 /* ---- Rows (sweep_rows.c) ---- */
 
-/* Computes the missing rows in `jobs` threads, until all are there or a signal requests a stop.  PW_RESOURCE. */
+/* Computes the missing rows in `jobs` threads, until all are there or pw_stop is set.  PW_RESOURCE. */
 int pw_sweep_rows (const pw_plan *plan, pw_journal *journal, int jobs, pw_error *error);
 
 /* ---- The table ---- */

@@ -145,20 +145,39 @@ static int plan_find_columns (pw_plan *plan, pw_error *error) {
   return pw_fail (error, scan.first_error.status, "%s", scan.first_error.text);
 }
 
-static void plan_heading (pw_plan *plan) {
+/* ---- Cells ---- */
+
+/* A cell of a row or, if that is NULL, of the heading. */
+static void plan_cell (const pw_plan_row *row, pw_text *text, const char *name, const char *unit, double value) {
+  row ? pw_text_number (text, value) : pw_text_name (text, name, unit);
+}
+
+void pw_plan_cells (const pw_plan *plan, const pw_plan_row *row, pw_text *text) {
+  const pw_run *run = row ? row->run : NULL;
+  const pw_sample *last = row ? row->last : NULL;
+  const pw_statistics *statistics = run ? pw_run_statistics (run) : NULL;
   char name[300];
-  pw_text *heading = &plan->heading;
-  for (const pw_axis *axis = plan->grid.axis; axis < plan->grid.axis + plan->grid.axes; axis++) {
+  for (int i = 0; i < plan->grid.axes; i++) {
+    const pw_axis *axis = &plan->grid.axis[i];
     snprintf (name, sizeof name, "%s%s", axis->parameter ? "" : "start.", axis->name);
-    pw_text_name (heading, name, axis->unit);
+    plan_cell (row, text, name, axis->unit, row ? pw_grid_value (&plan->grid, i, row->number) : 0);
   }
-  pw_text_cell (heading, "status");
-  pw_text_name (heading, "t", "s");
-  for (int i = 0; i < plan->columns; i++) pw_text_name (heading, plan->column[i].name, plan->column[i].unit);
-  pw_text_name (heading, "kinetic", "J");
-  pw_text_add (heading, ",residual.position,residual.velocity,steps,rhs");
-  if (plan->with_cpu) pw_text_name (heading, "cpu", "s");
-  pw_text_cell (heading, "reason");
+  pw_text_cell (text, row ? pw_cli_status_word (row->status) : "status");
+  plan_cell (row, text, "t", "s", run ? pw_run_time (run) : NAN);
+  for (int i = 0; i < plan->columns; i++) {
+    int state = last ? row->state[i] : -1, n = last ? row->coordinates : 0;
+    plan_cell (row, text, plan->column[i].name, plan->column[i].unit,
+               state < 0   ? NAN
+               : state < n ? last->q[state]
+                           : last->v[state - n]);
+  }
+  plan_cell (row, text, "kinetic", "J", last ? last->kinetic : NAN);
+  plan_cell (row, text, "residual.position", NULL, run ? statistics->position : NAN);
+  plan_cell (row, text, "residual.velocity", NULL, run ? statistics->velocity : NAN);
+  plan_cell (row, text, "steps", NULL, run ? (double)statistics->steps : NAN);
+  plan_cell (row, text, "rhs", NULL, run ? (double)statistics->rhs : NAN);
+  if (plan->with_cpu) plan_cell (row, text, "cpu", "s", row ? row->cpu : 0);
+  row ? pw_text_quoted (text, row->reason) : pw_text_cell (text, "reason");
 }
 
 /* ---- The fingerprint ---- */
@@ -220,7 +239,7 @@ int pw_plan_open (pw_plan *plan, const char **ranges, pw_error *error) {
   for (int i = 0; i < plan->grid.axes && status == PW_OK; i++)
     status = plan_match_axis (plan, plan->grid.axis + i, model, error);
   if (status == PW_OK) status = plan_find_columns (plan, error);
-  if (status == PW_OK) plan_heading (plan);
+  if (status == PW_OK) pw_plan_cells (plan, NULL, &plan->heading);
   if (status == PW_OK) status = plan_fingerprint (plan, model, error);
   pw_model_free (model);
   return status;

@@ -50,4 +50,20 @@ void pw_plan_close (pw_plan *plan);
  * threads at once. */
 int pw_plan_compile (const pw_plan *plan, long row, pw_cli_model *compiled, pw_error *error);
 
+/* What a row of the table shows. */
+typedef struct {
+  long number; /* in the grid */
+  int status;
+  const char *reason;    /* "" without an error */
+  const pw_run *run;     /* NULL: it could not be opened */
+  const pw_sample *last; /* NULL: there is none */
+  int coordinates;       /* of its system */
+  const int *state;      /* index of the state in each column; -1: the system does not have it; unused without `last` */
+  double cpu;            /* [s] */
+} pw_plan_row;
+
+/* Appends the cells of a row, nan where there is no run or no sample; if the row is NULL, the heading.  No end of the
+ * line is added. */
+void pw_plan_cells (const pw_plan *plan, const pw_plan_row *row, pw_text *text);
+
 #endif

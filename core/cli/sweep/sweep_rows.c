@@ -9,8 +9,6 @@
 #include "parallel.h"
 #include "sweep_journal.h"
 
-enum { ROWS_LANES = 8 }; /* runs that a thread advances at once, at most: the largest --lanes */
-
 /* A compiled system, shared by rows with the same parameters. */
 typedef struct {
   long parameters;            /* pw_grid_parameter_index of these rows */
@@ -73,8 +71,7 @@ static const pw_specialised *rows_compile (sweep_rows *sweep, char *text, const 
   }
   if ((entry = malloc (sizeof *entry)) == NULL) {
     free (text);
-    pw_fail (error, PW_RESOURCE, "out of memory");
-    return NULL;
+    return pw_fail (error, PW_RESOURCE, "out of memory"), NULL;
   }
   *entry = (row_code){ .text = text, .next = sweep->codes };
   sweep->codes = entry;
@@ -102,7 +99,7 @@ static void rows_specialise (sweep_rows *sweep, row_system *system) {
   system->code = rows_compile (sweep, text, system->model.system, &code_error);
   pthread_mutex_unlock (&sweep->lock);
   if (code_error.status != PW_OK && pw_stop == 0) pw_cli_say ("pinwheel: general engine: %s\n", code_error.text);
-  if (system->code == NULL && pw_stop) system->error.status = PW_RETRY; /* Ctrl-C has stopped the compiler too */
+  if (system->code == NULL && pw_stop) system->error.status = PW_RETRY; /* Ctrl-C ends the compiler, too */
 }
 
 /* ---- Compiled systems ---- */
@@ -192,26 +189,6 @@ static int row_ended (const sweep_row *row, const pw_plan *plan) {
   return row->status != PW_OK || !(pw_run_time (row->run) < plan->t_end);
 }
 
-/* Appends the cells of a row, as in the heading of the plan: NaN where there is no last sample or no run. */
-static void row_cells (const sweep_row *row, const pw_plan *plan, const pw_sample *last, pw_text *text) {
-  const pw_statistics *statistics = row->run ? pw_run_statistics (row->run) : NULL;
-  int n = last ? pw_system_coordinates (row->system->model.system) : 0;
-  for (int i = 0; i < plan->grid.axes; i++) pw_text_number (text, pw_grid_value (&plan->grid, i, row->number));
-  pw_text_cell (text, pw_cli_status_word (row->status));
-  pw_text_number (text, row->run ? pw_run_time (row->run) : NAN);
-  for (int i = 0; i < plan->columns; i++) {
-    int state = last ? row->system->state[i] : -1;
-    pw_text_number (text, state < 0 ? NAN : state < n ? last->q[state] : last->v[state - n]);
-  }
-  pw_text_number (text, last ? last->kinetic : NAN);
-  pw_text_number (text, statistics ? statistics->position : NAN);
-  pw_text_number (text, statistics ? statistics->velocity : NAN);
-  pw_text_number (text, statistics ? (double)statistics->steps : NAN);
-  pw_text_number (text, statistics ? (double)statistics->rhs : NAN);
-  if (plan->with_cpu) pw_text_number (text, row->run ? pw_seconds (CLOCK_THREAD_CPUTIME_ID) - row->limit.start : 0);
-  pw_text_quoted (text, row->error.text);
-}
-
 /* Closes the run and appends the cells of its row, without the end of the line, even if the run failed; returns its
  * status.  No cells are written if this is PW_RETRY, after a request to stop, or PW_RESOURCE. */
 static int row_close (sweep_row *row, const pw_plan *plan, pw_text *text) {
@@ -222,7 +199,12 @@ static int row_close (sweep_row *row, const pw_plan *plan, pw_text *text) {
   if (row->status == PW_OK && last == NULL) row->status = sample_error.status, row->error = sample_error;
   /* PW_RETRY, from a method, without a request to stop */
   if (row->status > 0 && pw_stop == 0) row->status = pw_fail (&row->error, PW_METHOD, "the method gave up");
-  if (row->status != PW_RETRY && row->status != PW_RESOURCE) row_cells (row, plan, last, text);
+  if (row->status != PW_RETRY && row->status != PW_RESOURCE) {
+    pw_plan_row shown = { row->number, row->status, row->error.text, row->run, .last = last };
+    if (plan->with_cpu && row->run) shown.cpu = pw_seconds (CLOCK_THREAD_CPUTIME_ID) - row->limit.start;
+    if (last) shown.coordinates = pw_system_coordinates (row->system->model.system), shown.state = row->system->state;
+    pw_plan_cells (plan, &shown, text);
+  }
   pw_run_close (row->run);
   if (!text->failed) return row->status;
   row->error = (pw_error){ 0 };
@@ -241,7 +223,7 @@ static void rows_store (sweep_rows *sweep, const sweep_row *row, int status, con
   if (sweep->error->status != PW_OK && pw_stop == 0) pw_stop = 1;
 }
 
-/* The next missing row of the part; -1 if there is none. */
+/* The next missing row of the part; -1 if there is none, or after a request to stop. */
 static long rows_next (sweep_rows *sweep) {
   const pw_plan *plan = sweep->plan;
   while (pw_stop == 0 && sweep->next < plan->grid.rows) {
@@ -269,7 +251,7 @@ typedef struct {
   const pw_specialised_lanes *lanes_code; /* NULL: none */
   void *lanes_memory;
   int width; /* number of rows: at most that of lanes; 1 without lanes_code */
-  sweep_row row[ROWS_LANES];
+  sweep_row row[PW_LANES_MOST];
   pw_text text; /* cells of a row */
 } sweep_worker;
 
@@ -307,10 +289,10 @@ static void worker_end (sweep_worker *worker, sweep_row *row) {
  * other. */
 static void worker_advance (sweep_worker *worker) {
   const pw_plan *plan = worker->sweep->plan;
-  sweep_row *running[ROWS_LANES];
-  pw_run *run[ROWS_LANES];
-  int status[ROWS_LANES], n = 0, same_code = 1, ended = 0;
-  pw_error error[ROWS_LANES];
+  sweep_row *running[PW_LANES_MOST];
+  pw_run *run[PW_LANES_MOST];
+  int status[PW_LANES_MOST], n = 0, same_code = 1, ended = 0;
+  pw_error error[PW_LANES_MOST];
   for (sweep_row *row = worker->row; row < worker->row + worker->width; row++) {
     if (row->system == NULL) continue;
     if (row_ended (row, plan)) return; /* it could not be opened, and is stored first */

@@ -139,9 +139,10 @@ const char *const *pw_scene_options (int lanes) {
     { 8, 4, { BUILD_LANES, "-DPW_LANES=8", "-mavx2" } },
     { 8, 1, { BUILD_LANES, "-DPW_LANES=8" } },
   };
-  int i = 0, processor = pw_processor_lanes ();
-  while (known[i].lanes < lanes || known[i].processor > processor) i++;
-  return known[i].option;
+  int processor = pw_processor_lanes ();
+  for (size_t i = 0; i < sizeof known / sizeof *known; i++)
+    if (known[i].lanes == lanes && known[i].processor <= processor) return known[i].option;
+  return NULL;
 }
 
 /* Blocks SIGINT (Ctrl-C reaches the compiler, too), SIGTERM and SIGHUP; the mask `before` restores them. */

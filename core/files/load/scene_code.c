@@ -232,6 +232,8 @@ static int code_open (code_job *x, pw_error *error) {
 
 pw_scene_code *pw_scene_lanes_open (const char *text, const pw_system *s, int lanes, pw_error *error) {
   if (pw_require (text, "specialised code", error) != PW_OK || pw_require (s, "a system", error) != PW_OK) return NULL;
+  if (pw_scene_options (lanes) == NULL)
+    return pw_fail (error, PW_INPUT, "%d runs at once: expected 2, 4 or %d", lanes, PW_LANES_MOST), NULL;
   code_job x = { .system = s, .text = text, .lanes = lanes, .code = calloc (1, sizeof *x.code) };
   int status = x.code ? code_open (&x, error) : pw_fail (error, PW_RESOURCE, "out of memory");
   if (status == PW_OK) return x.code;

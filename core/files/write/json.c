@@ -66,6 +66,12 @@ void pw_json_number (pw_json *j, const char *key, double value) {
   fputs (isfinite (value) ? pw_format (text, value, j->digits ? j->digits : 17) : "null", j->f);
 }
 
+void pw_json_numbers (pw_json *j, const char *key, const double *value, int count) {
+  pw_json_open (j, key, '[');
+  for (int i = 0; i < count; i++) pw_json_number (j, NULL, value[i]);
+  pw_json_close (j, ']');
+}
+
 void pw_json_flag (pw_json *j, const char *key, int value) {
   if (json_item (j, key)) fputs (value ? "true" : "false", j->f);
 }

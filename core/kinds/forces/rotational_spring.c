@@ -1,4 +1,4 @@
-/* rotational-spring: a spring and a parallel damper between the angles of two bodies.
+/* rotational-spring: a spring and a parallel damper between the angles of two bodies; beta: free value of phi1 - phi2.
  *
  *   T = k (phi1 - phi2 - beta) + c (omega1 - omega2)
  *   f = (0, 0, -T | 0, 0, T)
@@ -56,7 +56,7 @@ static const pw_field twist_fields[] = {
   { PW_AT (pw_rotational_spring, damping), PW_NUMBER, .unit = "N m s/rad", .domain = PW_NONNEGATIVE,
     .about = "torque per angular velocity" },
   { PW_AT (pw_rotational_spring, angle), PW_NUMBER, .unit = "rad",
-    .about = "free angle, of the first body relative to the second" },
+    .about = "free value of phi1 - phi2, the angle of the first body relative to the second" },
   { .name = NULL },
 };
 

@@ -60,7 +60,7 @@ static inline void spring_product (const spring_state *s, double K[2][2], double
 
 /* -D^T K D and terms of the rotating arms: d^2d/dphi1^2 = -(X1, Y1), d^2d/dphi2^2 = (X2, Y2), dd'/dphi1 =
  * -omega1 (X1, Y1), dd'/dphi2 = omega2 (X2, Y2).
- * K = dF/dd = (k (1 - l0/l) + c l'/l) (I - e e^T) + k e e^T + (c/l) e (d' - l' e)^T */
+ * K = dF/dd = (k (1 - l0/l) + c l'/l) (I - e e^T) + k e e^T + (c/l) e (d' - l' e)^T; if the ends meet, K = k I */
 PER_ELEMENT (spring_force_q, spring, 36) {
   const double k = now.element->stiffness, c = now.element->damping, l0 = now.element->free_length;
   const double *S1 = now.ends.S1, *S2 = now.ends.S2, omega1 = now.ends.body1->omega, omega2 = now.ends.body2->omega;

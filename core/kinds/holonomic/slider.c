@@ -1,4 +1,5 @@
-/* slider: a prismatic joint; a point of body 1 stays on a line of body 2 at a constant relative angle.
+/* slider: a prismatic joint; a point of body 1 stays on a line of body 2 at a constant relative angle
+ * beta = phi1 - phi2.
  *
  *   g     = ( n . (r1 + R(phi1) s1 - r2 - R(phi2) s2),  phi1 - phi2 - beta ) = 0      (2 holonomic equations)
  *   gamma = ( as in line.h,  0 )                         n: normal of the line, to the left of its heading
@@ -45,7 +46,8 @@ static const pw_field slider_fields[] = {
   { PW_AT (pw_slider, body), PW_BODY, .count = 2, .required = 1,
     .about = "the sliding body and the body with the line; one may be ground" },
   LINE_FIELDS (pw_slider),
-  { PW_AT (pw_slider, angle), PW_NUMBER, .unit = "rad", .about = "of the first body relative to the second" },
+  { PW_AT (pw_slider, angle), PW_NUMBER, .unit = "rad",
+    .about = "phi1 - phi2, of the first body relative to the second" },
   { .name = NULL },
 };
 

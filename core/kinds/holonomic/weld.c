@@ -1,4 +1,5 @@
-/* weld: body 2 is fixed to body 1 at a point and at the relative angle beta.
+/* weld: body 2 is fixed to body 1 at a point and at the relative angle beta = phi2 - phi1; in
+ * other element types relative angles are phi1 - phi2.
  *
  *   g     = ( d,  phi1 - phi2 + beta ) = 0,  d = r1 + R(phi1) s1 - r2 - R(phi2) s2     (3 holonomic equations)
  *   gamma = ( as in points.h,  0 )
@@ -61,7 +62,8 @@ static const pw_field weld_fields[] = {
   { PW_AT (pw_weld, body), PW_BODY, .count = 2, .required = 1, .about = "the two bodies; one may be ground" },
   { PW_AT (pw_weld, at), PW_POINT, .count = 2, .unit = "m", .required = 1,
     .about = "the common point in each body's frame" },
-  { PW_AT (pw_weld, angle), PW_NUMBER, .unit = "rad", .about = "of the second body relative to the first" },
+  { PW_AT (pw_weld, angle), PW_NUMBER, .unit = "rad",
+    .about = "phi2 - phi1, of the second body relative to the first" },
   { .name = NULL },
 };
 

@@ -5,8 +5,9 @@
  *   gamma = u' - omega1 (p(A).r1' + p(B).r2')           so that S v' = gamma; p(A) = A turned by +90 degrees
  *
  * (Neimark & Fufaev 1972, Dynamics of Nonholonomic Systems, chapter I.)
- * The reaction F = -lambda, [N] if A and B have no unit, acts on body 1 as the force F A and the moment F a3, on body 2
- * as F B and F b3.  The two forces need not balance: their sum is an external force.  The power is F u. */
+ * The reaction F = -lambda acts on body 1 as the force F A and the moment F a3, on body 2 as F B and F b3: [N] if A and
+ * B have no unit; [N m] if A = B = 0 and a3, b3 have no unit.  The two forces need not balance: their sum is an
+ * external force.  The power is F u. */
 #include <string.h>
 #include "batch.h"
 
@@ -77,6 +78,12 @@ static const pw_field pfaffian_fields[] = {
   { .name = NULL },
 };
 
+static const char *pfaffian_unit (const void *element, int row) {
+  const pfaffian *e = element;
+  (void)row;
+  return e->a[0] == 0 && e->a[1] == 0 && e->b[0] == 0 && e->b[1] == 0 ? "N m" : "N";
+}
+
 const pw_kind pw_kind_pfaffian = {
   .name = "pfaffian",
   .about = "a linear relation, given by its coefficients, between the velocities of one or two bodies",
@@ -85,7 +92,8 @@ const pw_kind pw_kind_pfaffian = {
   .rows = 1,
   .signals = 1,
   .level = PW_NONHOLONOMIC,
-  REACTION ("F", "N", "F a and F b are force and moment on the two bodies, in the frame of the first"),
+  REACTION ("F", "N or N m", "F a and F b are force and moment on the two bodies, in the frame of the first"),
+  .reaction_unit = pfaffian_unit,
   .eta = batch_eta_of_signal,
   CONSTRAINT (pfaffian),
 };

@@ -171,7 +171,7 @@ class Model:
     parameters, units : dict
         Values and units of all parameters.
     defaults : dict
-        Method, t_end, step, rtol of the model.
+        Method, t_end, step, rtol of the model; rtol None: the library's default.
     """
 
     def __init__(self, model, *, start: dict | None = None, signals: dict[str, Callable] | None = None, **parameters):
@@ -185,7 +185,7 @@ class Model:
         table = lib.files.pw_file_table(pointer).contents
         self.name, self.about = lib.text(lib.files.pw_file_name(pointer)), lib.text(table.about)
         self.defaults: dict[str, Any] = {"method": lib.text(table.run__method) or "rk4+projection", "t_end": table.run__t_end or 10.0,
-                         "step": table.run__step or 1e-3, "rtol": table.run__rtol or 1e-6}
+                         "step": table.run__step or 1e-3, "rtol": table.run__rtol or None}
         listed = list(lib.listed(lib.pw_parameter, table.parameters))
         self.parameters = {p.name.decode(): p.value for p in listed}
         self.units = {p.name.decode(): lib.text(p.unit) for p in listed}
@@ -332,7 +332,7 @@ class Model:
     def _setting(self, name, value):
         """A setting by its name in C, as a number; the model's default for None, 0 if it has none."""
         if value is None:
-            return self.defaults.get("t_end" if name == "span" else name, 0)
+            return self.defaults.get("t_end" if name == "span" else name) or 0
         value = lib.number(value, "t_end" if name == "span" else name, above=0)
         if name == "max_steps" and (value != int(value) or value > 2**53):
             raise lib.InputError(f"max_steps = {value:g}: expected a whole number from 1 to 2^53")

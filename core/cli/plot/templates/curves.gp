@@ -1,7 +1,7 @@
 
 # ---- Curves of bodies or wheels, a block of the file `data` each; more than 12 are coloured by number ----
 # Above: t_end [s], data, what ('body' or 'wheel'), curves (their number), label[i] unless there are more than 12,
-# numbers (of all bodies or wheels), number_column of the data.
+# numbers (of all bodies or wheels), number_column of the data, markers (a list of the blocks, from 0, of markers).
 
 numbered = curves > 12
 label_length = 0

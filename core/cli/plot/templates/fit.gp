@@ -1,8 +1,8 @@
 # include look.gp
 
 # ---- Data and model of each column, below them the residuals ----
-# Above: panels (number of columns), label[i], weighted (1: the data have standard deviations).  A block of fit.dat for
-# each column: t [s], data, standard deviation, model.
+# Above: panels (number of columns shown), label[i], weighted (1: the data have standard deviations).  A block of
+# fit.dat for each column: t [s], data, standard deviation, model.
 
 title = 'data and fitted model'
 left = 58.0 # for the digits of residuals

@@ -1,6 +1,6 @@
 
 # ---- Panels with equal axes: the whole run and, if the mechanism goes far, its beginning ----
-# Above: t_end of the run, t_detail (end of the beginning that panel 2 shows; 0: no panel 2) [s].
+# Above: t_end (of the samples), t_detail (end of the beginning that panel 2 shows; 0: no panel 2) [s].
 # Panel i shows x0[i] to x1[i] and y0[i] to y1[i] [m], at px0[i] to px1[i] and py0[i] to py1[i] of the page [pt].
 
 if (name eq 'mechanism' && by_time) { bottom = bottom + 40 } # room for a colour bar

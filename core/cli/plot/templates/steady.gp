@@ -2,7 +2,8 @@
 
 # ---- Steady motions: eigenvalues over the parameter, stable parts solid, unstable ones dashed; root locus ----
 # Above: label_of_x, first and last (range of the parameter), re_min to re_max and im_min to im_max (of eigenvalues).
-# Blocks of the data: stable parts, unstable parts, events (1: fold, larger: change of stability), eigenvalues.
+# Blocks of the data: stable and unstable parts (parameter, real part [1/s], frequency [Hz]), events (parameter; 1:
+# fold, larger: change of stability), eigenvalues (parameter, real and imaginary part [1/s]).
 
 data = name.'.dat'
 title = 'eigenvalues of steady motions'
