@@ -774,7 +774,8 @@ double pw_system_length (const pw_system *s);
 const double *pw_system_initial_q (const pw_system *s);
 const double *pw_system_initial_v (const pw_system *s);
 
-/* 1 if multipliers may jump at time t: the signal of a force, or that of a constraint or its derivatives, jumps. */
+/* 1 if multipliers may be discontinuous at time t: a force's signal may jump, or a constraint's signal or its first or
+ * second derivative. */
 int pw_system_jumps (const pw_system *s, double t);
 
 /* Specialised code: C code for this system alone, which evaluates and projects it faster than the library
@@ -798,7 +799,8 @@ void *pw_specialised_lanes_memory (const pw_specialised_lanes *code);
 /* 1 if the code can be compiled for several runs at once: all element types are built-in, signals depend on time alone,
  * and there are not too many constraint equations or elements.  The runs must not have redundant equations. */
 int pw_system_has_lanes (const pw_system *s);
-/* 1 if accelerations may jump at some states: an element type is from a plug-in, or a signal depends on states. */
+/* 1 if accelerations may be discontinuous at some states, where no step ends: an element type is from a plug-in, or a
+ * signal depends on states. */
 int pw_system_may_jump (const pw_system *s);
 
 /* ---- Elements of a system, in the order of its constraint equations ---- */

@@ -36,9 +36,7 @@ shot () {
 
 # ---- Gallery ----
 
-for model in ackermann-car andrews-squeezer car car-two-trailers car-tyres chain chaplygin-sleigh differential-drive elliptic-wire \
-  hatchet-planimeter knife-edge-incline n-four-bar n-trailer peaucellier pendulum redundant-parallelogram roller-racer slider-crank \
-  snakeboard theo-jansen wheeled-snake; do
+for model in $("$pinwheel" list models | awk '/^  [a-z]/ && $1 != "ezyroller" { print $1 }'); do
   draw gallery-$model mechanism run $model --plots
 done
 

@@ -36,7 +36,9 @@ typedef enum {
   PW_NULLSPACE,
   PW_INDEX2,
   PW_GGL,
-  PW_SI1
+  PW_SI1,
+  PW_INDEX3,
+  PW_RATTLE
 } pw_stabilisation_kind;
 
 typedef struct {

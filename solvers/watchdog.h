@@ -12,7 +12,7 @@
 
 struct pw_run;
 
-/* The thresholds, of which a run has a copy; values and derivations are in singular.c.  Residuals are scaled; lengths
+/* The thresholds, of which a run has a copy; values and derivations are in thresholds.c.  Residuals are scaled; lengths
  * and motions are in units of L and rad.  A relative sine is the sine over the largest one of the run. */
 typedef struct {
   double lost, lost_unstabilised; /* residuals above which constraints count as lost */

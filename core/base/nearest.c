@@ -28,7 +28,7 @@ static size_t nearest_distance (const char *a, const char *b) {
  * characters, or if one begins or ends with the other. */
 static int nearest_is_near (const char *a, size_t n, const char *b, size_t m, size_t distance) {
   size_t longer = n > m ? n : m, shorter = n + m - longer;
-  return 2 * distance < longer + (distance <= 2) ||
+  return 2 * distance < longer || (2 * distance == longer && distance <= 2) ||
          (shorter > 0 && (memcmp (a, b, shorter) == 0 || memcmp (a + n - shorter, b + m - shorter, shorter) == 0));
 }
 

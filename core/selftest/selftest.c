@@ -158,13 +158,14 @@ static void selftest_blocks (pw_probe *probe) {
   selftest_block (probe, PW_FORCE_V, PW_CHECK_force_v, size_force);
 }
 
-/* Makes a check at velocities multiplied by a factor; dv, which no check here moves along, saves the velocities. */
+/* Makes a check at velocities multiplied by a factor. */
 static void selftest_at_speed (pw_probe *probe, double factor, void (*check) (pw_probe *probe)) {
-  memcpy (probe->dv, probe->v, (size_t)probe->s->coords * sizeof *probe->v);
+  double v[PW_SCENE_COORDS];
+  memcpy (v, probe->v, (size_t)probe->s->coords * sizeof *v);
   for (int j = 0; j < probe->s->coords; j++) probe->v[j] *= factor;
   pw_probe_update (probe, PW_PROBE_TIME, 0);
   check (probe);
-  memcpy (probe->v, probe->dv, (size_t)probe->s->coords * sizeof *probe->v);
+  memcpy (probe->v, v, (size_t)probe->s->coords * sizeof *v);
 }
 
 /* Near rest, squares of velocities underflow to 0 and their inverses are infinite; results must still be finite. */
@@ -278,11 +279,12 @@ static void selftest_power_of (pw_probe *probe, int e) {
 }
 
 static void selftest_power (pw_probe *probe) {
+  double v[PW_SCENE_COORDS];
   if (!probe->kind->force && !probe->kind->energy && !probe->kind->power && !probe->kind->loss) return;
   for (int e = 0; e < probe->elements; e++) {
-    memcpy (probe->dv, probe->v, (size_t)probe->s->coords * sizeof *probe->v);
+    memcpy (v, probe->v, (size_t)probe->s->coords * sizeof *v);
     if (probe->rows == 0 || selftest_satisfy (probe, e)) selftest_power_of (probe, e);
-    memcpy (probe->v, probe->dv, (size_t)probe->s->coords * sizeof *probe->v);
+    memcpy (probe->v, v, (size_t)probe->s->coords * sizeof *v);
   }
 }
 

@@ -44,7 +44,7 @@ static int sparsity_scene (const pw_system *s, pw_random *random, int *known, pw
   double q[PW_SCENE_COORDS], v[PW_SCENE_COORDS], first[PW_SCENE_BATCH][PW_MAX_ROWS * PW_MAX_COLS];
   pw_workspace *w = pw_workspace_new (s, NULL);
   if (w == NULL) return PW_RESOURCE;
-  pw_element_batch *k = w->batch;
+  pw_element_batch *k = w->batch; /* the only one */
   for (int state = 0; state < SPARSITY_STATES; state++) {
     for (int j = 0; j < s->coords; j++) {
       q[j] = s->q0[j] + pw_random_between (random, -2, 2);

@@ -145,7 +145,8 @@ void pw_add_JT (const pw_workspace *w, const double *lambda, double *out) {
   }
 }
 
-/* The largest absolute and scaled residual so far, and the constraint equation of the latter.  NaN is the largest. */
+/* The largest absolute and scaled residual so far, and the constraint equation of the latter.  NaN is the largest,
+ * hence the negated comparisons. */
 typedef struct {
   double largest, scaled;
   int row;

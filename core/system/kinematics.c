@@ -87,8 +87,8 @@ void pw_hold_signals (pw_workspace *w, int hold) {
 double pw_next_breakpoint (pw_workspace *w, int kinks, double t) {
   double next = INFINITY;
   for (const pw_source *source = w->source, *end = source + w->s->sources; source < end; source++) {
-    double breakpoint =
-        pw_signal_breakpoint (&source->signal, kinks && !source->of_force ? PW_JUMPS_AND_KINKS : PW_JUMPS, t);
+    double breakpoint = pw_signal_breakpoint (
+        &source->signal, kinks && !source->of_force ? PW_DISCONTINUITIES_AND_KINKS : PW_DISCONTINUITIES, t);
     if (breakpoint < next) next = breakpoint;
     if (breakpoint > t) continue;
     w->failed = source;

@@ -33,8 +33,8 @@ int pw_system_jumps (const pw_system *s, double t) {
   const double near = 8 * DBL_EPSILON * fmax (fabs (t), 1); /* round-off of sums of steps, which also end near 0 */
   /* the other signals of forces are continuous, and their derivatives are not used */
   for (const pw_source *source = s->source, *end = source + s->sources; source < end; source++)
-    if (!source->of_force || pw_signal_may_jump (&source->signal))
-      if (pw_signal_breakpoint (&source->signal, PW_JUMPS, t - near) <= t + near) return 1;
+    if (!source->of_force || pw_signal_value_may_jump (&source->signal))
+      if (pw_signal_breakpoint (&source->signal, PW_DISCONTINUITIES, t - near) <= t + near) return 1;
   return 0;
 }
 

@@ -125,7 +125,7 @@ void pw_hold_signals (pw_workspace *w, int hold);
 
 void pw_evaluate_J (pw_workspace *w);                    /* fills J of every batch */
 void pw_evaluate_g (pw_workspace *w, double *g);         /* holonomic */
-void pw_evaluate_g_size (pw_workspace *w, double *size); /* holonomic; at least the length scale, also of angles */
+void pw_evaluate_g_size (pw_workspace *w, double *size); /* holonomic, in units of g; at least L, for angles L rad */
 void pw_evaluate_eta (pw_workspace *w, double *eta);
 void pw_evaluate_gamma (pw_workspace *w, double *gamma);
 void pw_evaluate_force (pw_workspace *w, double *f);    /* constant forces included */
@@ -168,8 +168,9 @@ void pw_evaluate_velocity_residual (pw_workspace *w, const unsigned char *enforc
 void pw_worst_position (const pw_system *s, const double *g, const double *size, const unsigned char *enforced,
                         pw_residuals *r);
 
-/* The first time after t at which a step must end because of a signal, or INFINITY: PW_JUMPS of all signals; kinks: 1:
- * PW_JUMPS_AND_KINKS of those of constraints.  NaN if the breakpoint function of a signal returned no time > t. */
+/* The first time after t at which a step must end because of a signal, or INFINITY: PW_DISCONTINUITIES of all signals;
+ * kinks: 1: PW_DISCONTINUITIES_AND_KINKS of those of constraints.  NaN if the breakpoint function of a signal returned
+ * no time > t. */
 double pw_next_breakpoint (pw_workspace *w, int kinks, double t);
 
 /* 1 if a force, J or gamma is not finite at the current state; writes "force of spring S" to the buffer. */
@@ -199,7 +200,8 @@ int pw_block_missing (const pw_workspace *w, const pw_element_batch *k, int e, p
 
 /* Searches for such a block near the state q, v at time t, in a few elements of each type that is not built-in
  * (built-in ones pass the self-test).  Returns 1 and writes its name ("force_q of element type magnet") to the buffer;
- * 0 if there is none; PW_RESOURCE.  Update the kinematics afterwards. */
+ * 0 if there is none; PW_RESOURCE.  Update the kinematics afterwards: until then the batches point to internal
+ * coordinates in released memory. */
 int pw_find_missing_block (pw_workspace *w, double t, const double *q, const double *v, char *buffer, size_t size);
 
 /* A block of element e by central differences, whatever the type provides, but 0 in columns of the ground. */

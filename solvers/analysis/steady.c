@@ -31,8 +31,9 @@ static int steady_arrays (pw_steady *x) {
     { &x->combined, rates },
     { &x->u, unknowns + 1 },
     { &x->F, equations + n * rates + (1 + PW_STEADY_WORK) * unknowns }, /* see pw_steady_nearest */
-    { &x->q0, n },
-    { &x->v0, n },
+    { &x->scratch[0], n },
+    { &x->scratch[1], n },
+    { &x->scratch[2], n },
     { &x->dq, n },
     { &x->dv, n },
     { &x->null_space, (unknowns + 1) * (unknowns + 1) },

@@ -38,9 +38,10 @@ struct pw_steady {
   pw_initial_value *solution; /* 2 n: the last solution, where runs are opened */
   int solved;                 /* 1: there is one */
 
-  double *q, *v, *rates, *u;                /* unknowns u, their state q, v, and its rates of displacement [1/s] */
-  double *F, *q0, *v0, *dq, *dv, *combined; /* scratch */
-  double *null_space;                       /* unknowns x unknowns: directions of a family; scratch */
+  double *q, *v, *rates, *u;      /* unknowns u, their state q, v, and its rates of displacement [1/s] */
+  double *F, *dq, *dv, *combined; /* scratch: residuals, a variation, rates */
+  double *scratch[3];             /* n each */
+  double *null_space;             /* unknowns x unknowns: directions of a family; scratch */
   pw_branch branch;
   pw_linear linear; /* of the state q, v */
   pw_error why;     /* the last reason why a system could not be evaluated */

@@ -16,9 +16,10 @@ static double start_random (uint64_t *state) {
 
 /* Makes the positions x->q consistent, if possible. */
 static int start_assemble (pw_steady *x, pw_projector *p) {
-  memcpy (x->dq, x->q, (size_t)x->n * sizeof *x->q);
-  int status = pw_project_positions (p, x->system[PW_HERE].run, x->settings.t, x->dq, x->v);
-  if (status == PW_OK) memcpy (x->q, x->dq, (size_t)x->n * sizeof *x->q);
+  double *q = x->scratch[0];
+  memcpy (q, x->q, (size_t)x->n * sizeof *q);
+  int status = pw_project_positions (p, x->system[PW_HERE].run, x->settings.t, q, x->v);
+  if (status == PW_OK) memcpy (x->q, q, (size_t)x->n * sizeof *q);
   return status;
 }
 
@@ -38,7 +39,7 @@ static double start_accelerate (pw_steady *x, double *a) {
 /* Moves positions along the accelerations, at constant rates: towards a minimum of the potential, if forces have one.
  * Steps become longer while the direction of the accelerations changes by less than 90 degrees, otherwise shorter. */
 static void start_relax (pw_steady *x, pw_projector *p) {
-  double *a = x->q0, *before = x->v0, most = start_accelerate (x, a), step = START_FAR / most;
+  double *a = x->scratch[1], *before = x->scratch[2], most = start_accelerate (x, a), step = START_FAR / most;
   for (int i = 0; i < START_STEPS && most > 0 && isfinite (step); i++) {
     double dot = 0;
     for (int j = 0; j < x->n; j++) x->q[j] += fmin (step, START_FAR / most) * a[j];
@@ -54,15 +55,16 @@ int pw_steady_start (pw_steady *x, int attempt, double *u, pw_error *error) {
   int status = pw_steady_nearest (x, x->start, x->start + x->n, u, error);
   uint64_t state = (uint64_t)attempt * 0xd1342543de82ef95;
   double wide = attempt % 2 ? 1 : 0.2; /* of lengths L, angles pi, rates 2 / T */
+  const int relaxed = attempt == 1 || attempt % 4 == 2, consistent = relaxed || attempt % 4 == 3;
   pw_projector p;
   for (int j = 0; attempt > 1 && j < pw_steady_unknowns (x); j++)
     u[j] += wide * start_random (&state) * (j >= x->n ? 2 : pw_is_angle (x->s, j) ? PW_PI : 1);
-  if (status != PW_OK || (attempt != 1 && attempt % 4 < 2)) return status;
+  if (status != PW_OK || !consistent) return status;
   pw_steady_state (x, u);
   if (pw_evaluate_J_at (x->system[PW_HERE].run->w, x->settings.t, x->q, x->v) != PW_OK) return PW_OK; /* as it is */
   if (pw_projector_open (&p, x->system[PW_HERE].run, x->s->metric, x->s->metric, &x->why) != PW_OK)
     return pw_fail_memory (x->s, error);
-  if (start_assemble (x, &p) == PW_OK && attempt % 4 < 3) start_relax (x, &p);
+  if (start_assemble (x, &p) == PW_OK && relaxed) start_relax (x, &p);
   pw_projector_close (&p);
   for (int j = 0; j < x->n; j++) u[j] = x->q[j] / pw_unit (x->s, j);
   return PW_OK;

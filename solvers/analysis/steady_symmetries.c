@@ -272,7 +272,7 @@ void pw_steady_move_to_start (const pw_steady *x, double *q, double *v) {
 
 double pw_steady_distance (pw_steady *x, const double *q1, const double *v1, const double *q2, const double *v2) {
   size_t bytes = (size_t)x->n * sizeof *q1;
-  double *a = x->q0, *va = x->v0, *b = x->dq, *vb = x->dv, most = 0;
+  double *a = x->scratch[0], *va = x->scratch[1], *b = x->dq, *vb = x->dv, most = 0;
   memcpy (a, q1, bytes), memcpy (va, v1, bytes), memcpy (b, q2, bytes), memcpy (vb, v2, bytes);
   pw_steady_canonical (x, a, va);
   pw_steady_canonical (x, b, vb);

@@ -138,7 +138,7 @@ static double watchdog_residual (const pw_run *r) {
 }
 
 /* 1 if a constraint residual d may decide which branch is followed: if the sine s is below its regular value, and s^2
- * below d / ratio.  Drifted constraints, x y = d in place of x y = 0 (singular.c), connect branches that cross by a
+ * below d / ratio.  Drifted constraints, x y = d in place of x y = 0 (thresholds.c), connect branches that cross by a
  * turn, which a method follows however small its steps. */
 static int watchdog_unresolved (pw_run *r, double residual, double ratio) {
   int row;

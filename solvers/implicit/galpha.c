@@ -294,8 +294,7 @@ static int galpha_advance (pw_run *r, double t_end, pw_error *error) {
 }
 
 static const pw_stabilisation galpha_stabilisations[] = {
-  { "index3", "positions enforced, and the velocities of nonholonomic constraints (Arnold & Brüls 2007)",
-    PW_STABILISED_OTHERWISE },
+  { "index3", "positions enforced, and the velocities of nonholonomic constraints (Arnold & Brüls 2007)", PW_INDEX3 },
   { "ggl", "stabilised index 2: positions and velocities both enforced (Gear, Gupta & Leimkuhler 1985)", PW_GGL },
   { .name = NULL },
 };

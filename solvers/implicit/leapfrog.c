@@ -274,8 +274,7 @@ static int leapfrog_advance (pw_run *r, double t_end, pw_error *error) {
 }
 
 static const pw_stabilisation leapfrog_stabilisations[] = {
-  { "rattle", "positions and velocities both enforced by the step's own multipliers (Andersen 1983)",
-    PW_STABILISED_OTHERWISE },
+  { "rattle", "positions and velocities both enforced by the step's own multipliers (Andersen 1983)", PW_RATTLE },
   { .name = NULL },
 };
 

@@ -315,7 +315,7 @@ static const pw_stabilisation radau_stabilisations[] = {
   { "ggl", "stabilised index 2: positions and velocities both enforced (Gear, Gupta & Leimkuhler 1985)", PW_GGL },
   { "index2", "velocities enforced, positions drift", PW_INDEX2 },
   { "index3", "positions enforced, and the velocities of nonholonomic constraints (Hairer, Lubich & Roche 1989)",
-    PW_STABILISED_OTHERWISE },
+    PW_INDEX3 },
   { .name = NULL },
 };
 

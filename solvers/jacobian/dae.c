@@ -8,7 +8,7 @@ int pw_dae_open (pw_dae *x, pw_run *r) {
   size_t n = (size_t)s->coords, m = (size_t)s->rows;
   const pw_stabilisation_kind kind = r->method->stabilisations[r->stabilisation].kind;
   *x = (pw_dae){ .integrates_multipliers = kind == PW_SI1, .n = s->coords };
-  x->enforces_positions = kind == PW_GGL || kind == PW_SI1 || kind == PW_STABILISED_OTHERWISE; /* index3 or rattle */
+  x->enforces_positions = kind == PW_GGL || kind == PW_SI1 || kind == PW_INDEX3 || kind == PW_RATTLE;
   x->enforces_velocities = kind == PW_GGL || kind == PW_SI1 || kind == PW_INDEX2;
   const pw_array array[] = { { &x->reaction, n + 3 }, { &x->force, n + 3 }, { &x->residual, m }, { &x->scratch, m } };
   x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);

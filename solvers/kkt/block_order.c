@@ -21,18 +21,20 @@ typedef struct {
   int *first, *list; /* neighbours of node n, with repetition: list[first[n]] to list[first[n + 1] - 1] */
   int *parent;       /* of each column in the elimination tree, or -1 */
   int *visited;      /* the last row whose paths in this tree have visited the column */
+  int *next;         /* of each node or column: its number of entries, then where the next one is listed */
   order_variant minimum_degree, natural;
   char *memory;
 } order_search;
 
 static int order_open (order_search *x) {
-  size_t n = (size_t)x->nodes + 2;
+  size_t n = (size_t)x->nodes + 1;
   order_variant *const variant[] = { &x->minimum_degree, &x->natural };
   for (pw_layout l = { 0 }; pw_layout_pass (&l, &x->memory);) {
     x->first = pw_layout_alloc (&l, n, sizeof *x->first);
     x->list = pw_layout_alloc (&l, (size_t)(2 * x->pairs), sizeof *x->list);
     x->parent = pw_layout_alloc (&l, n, sizeof *x->parent);
     x->visited = pw_layout_alloc (&l, n, sizeof *x->visited);
+    x->next = pw_layout_alloc (&l, n, sizeof *x->next);
     for (int i = 0; i < 2; i++) {
       variant[i]->node = pw_layout_alloc (&l, n, sizeof (int));
       variant[i]->column = pw_layout_alloc (&l, n, sizeof (int));
@@ -42,26 +44,32 @@ static int order_open (order_search *x) {
   return x->memory ? PW_OK : PW_RESOURCE;
 }
 
+/* Gives each list as many entries as x->next has counted: first[c] and x->next[c] become its beginning. */
+static void order_begin_lists (order_search *x, int *first) {
+  first[0] = 0;
+  for (int c = 0; c < x->nodes; c++) {
+    first[c + 1] = first[c] + x->next[c];
+    x->next[c] = first[c];
+  }
+}
+
 /* Lists the neighbours of each node in the graph of the nodes of at most this rank. */
 static void order_list_neighbours (order_search *x, int rank) {
-  memset (x->first, 0, ((size_t)x->nodes + 2) * sizeof *x->first);
-  for (int pass = 0; pass < 2; pass++) { /* counts node c in first[c + 2], then fills through first[c + 1] */
+  memset (x->next, 0, (size_t)x->nodes * sizeof *x->next);
+  for (int listing = 0; listing < 2; listing++) { /* counts, then lists */
     for (long i = 0; i < 2 * x->pairs; i++) {
       int c = x->pair[i], r = x->pair[i ^ 1];
       if (c == r || x->node[c].rank > rank || x->node[r].rank > rank) continue;
-      if (pass == 0)
-        x->first[c + 2]++;
-      else
-        x->list[x->first[c + 1]++] = r;
+      if (listing) x->list[x->next[c]] = r;
+      x->next[c]++;
     }
-    for (int c = 0; pass == 0 && c < x->nodes; c++) x->first[c + 2] += x->first[c + 1];
+    if (!listing) order_begin_lists (x, x->first);
   }
 }
 
 /* Passes through the rows of L.  Row i has entries in the columns on the paths to i in the elimination tree that begin
- * at the columns in which row i of the matrix has entries (Davis 2005, Algorithm 849: LDL).  The first pass counts them
- * in first[column + 2]; the second one, where v->below is allocated, lists them.  PW_RETRY if there are more than
- * `most`. */
+ * at the columns in which row i of the matrix has entries (Davis 2005, Algorithm 849: LDL).  Counts them in
+ * x->next of each column or, where v->below is allocated, lists them.  PW_RETRY if there are more than `most`. */
 static int order_pass (const order_search *x, int most, const order_variant *v) {
   long count = 0;
   for (int i = 0; i < x->nodes; i++) x->visited[i] = x->parent[i] = -1;
@@ -73,10 +81,8 @@ static int order_pass (const order_search *x, int most, const order_variant *v) 
         if (x->parent[j] < 0) x->parent[j] = i;
         x->visited[j] = i;
         count++;
-        if (v->below)
-          v->below[v->first[j + 1]++] = i;
-        else
-          v->first[j + 2]++;
+        if (v->below) v->below[x->next[j]] = i;
+        x->next[j]++;
       }
   }
   return count <= most ? PW_OK : PW_RETRY;
@@ -84,15 +90,16 @@ static int order_pass (const order_search *x, int most, const order_variant *v) 
 
 /* Sorts the nodes of an order by rank and lists the rows of each column, fill-in included.  PW_OK, PW_RESOURCE, or
  * PW_RETRY if there are more than `most`. */
-static int order_fill (const order_search *x, int most, order_variant *v) {
+static int order_fill (order_search *x, int most, order_variant *v) {
   int at = 0;
   for (int rank = 0; rank < PW_BLOCK_RANKS; rank++)
     for (int j = 0; j < x->nodes; j++)
       if (x->node[v->node[j]].rank == rank) v->column[v->node[j]] = at++;
   for (int n = 0; n < x->nodes; n++) v->node[v->column[n]] = n;
+  memset (x->next, 0, (size_t)x->nodes * sizeof *x->next);
   if (order_pass (x, most, v) != PW_OK) return PW_RETRY;
-  for (int j = 0; j < x->nodes; j++) v->first[j + 2] += v->first[j + 1];
-  v->below = malloc (((size_t)v->first[x->nodes + 1] + 1) * sizeof *v->below);
+  order_begin_lists (x, v->first);
+  v->below = malloc (((size_t)v->first[x->nodes] + 1) * sizeof *v->below);
   return v->below ? order_pass (x, most, v) : PW_RESOURCE;
 }
 

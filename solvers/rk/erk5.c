@@ -17,4 +17,4 @@ const pw_tableau pw_erk5_tableau = {
 };
 
 PW_RK_METHOD (erk5, pw_erk5_tableau, .about = "explicit Runge-Kutta of order 5(4), adaptive (Dormand & Prince 1980)",
-              .adaptive = 1, .order = 5, .options = pw_rk_options);
+              .adaptive = 1, .order = 5, .options = pw_rk_adaptive_options);

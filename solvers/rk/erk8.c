@@ -69,4 +69,4 @@ static const pw_tableau erk8_tableau = {
 PW_RK_METHOD (
     erk8, erk8_tableau,
     .about = "explicit Runge-Kutta of order 8(5,3), adaptive (Dormand & Prince; Hairer, Norsett & Wanner 1993)",
-    .adaptive = 1, .order = 8, .options = pw_rk_options);
+    .adaptive = 1, .order = 8, .options = pw_rk_adaptive_options);

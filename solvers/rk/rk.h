@@ -27,7 +27,7 @@ int pw_rk_restart (pw_run *r, pw_error *error);
 void pw_rk_close (pw_run *r);
 void pw_rk_serialise (pw_run *r, pw_archive *a);
 extern const pw_stabilisation pw_rk_stabilisations[];
-extern const pw_option pw_rk_options[]; /* the first one, `steps`, is only for adaptive methods */
+extern const pw_option pw_rk_adaptive_options[], pw_rk_fixed_options[]; /* of methods with and without an estimate */
 
 /* Defines pw_method_NAME with this tableau; the remaining arguments initialise the members that methods do not
  * share. */

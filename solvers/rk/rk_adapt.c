@@ -43,7 +43,8 @@ static void adapt_estimate (const pw_rk_row *e, double *const *slope, int n, dou
   for (int j = 0; j < e->count; j++) pw_add_scaled (out, slope[e->stage[j]], e->weight[j], n);
 }
 
-/* Reciprocal tolerances of positions and velocities for the step from the state reached to the new state. */
+/* Reciprocal tolerances for the step from the state reached to the new state: for each coordinate those of its position
+ * and its velocity. */
 static void adapt_weigh (const pw_run *r) {
   const pw_method_data *d = r->data;
   double *w = d->weight, rtol = r->settings.rtol;
@@ -83,14 +84,13 @@ static double adapt_remaining (pw_run *r, double whole, int projected) {
   return adapt_mean_square (r, r->q_at, r->v_at) + sqrt (r->settings.rtol) * whole;
 }
 
-/* The two errors of which the larger one counts (see the top of this file); e3, e5, e6 are the squares of those
- * there. */
-static double adapt_combine (double e5, double e3) {
-  return e5 == 0 ? 0 : e5 / sqrt (e5 + 0.01 * e3);
+/* The two errors of which the larger one counts (see the top of this file), from the squares of e3, e5, e6. */
+static double adapt_combine (double square5, double square3) {
+  return square5 == 0 ? 0 : square5 / sqrt (square5 + 0.01 * square3);
 }
 
-static double adapt_guard (double e6, double e5) {
-  return e6 == 0 ? 0 : e6 * sqrt (e6) / (e6 + e5);
+static double adapt_guard (double square6, double square5) {
+  return square6 == 0 ? 0 : square6 * sqrt (square6) / (square6 + square5);
 }
 
 /* The error of the new state, divided by h. */
@@ -99,12 +99,12 @@ static double adapt_state (pw_run *r, int projected) {
   const pw_tableau *tableau = d->tableau;
   d->stage_v[tableau->stages] = d->v, d->stage_a[tableau->stages] = d->a;
   adapt_weigh (r);
-  double e5 = adapt_remaining (r, adapt_whole (r, &d->estimate[0]), projected);
-  if (tableau->e3 == NULL) return sqrt (e5);
-  double e3 = adapt_remaining (r, adapt_whole (r, &d->estimate[1]), projected), err = adapt_combine (e5, e3);
-  double e6 = adapt_whole (r, &d->estimate[2]);
-  if (adapt_guard (e6, e5) > err) /* otherwise the projection of e6, which mostly reduces it, is not needed */
-    err = fmax (err, adapt_guard (adapt_remaining (r, e6, projected), e5));
+  double square5 = adapt_remaining (r, adapt_whole (r, &d->estimate[0]), projected);
+  if (tableau->e3 == NULL) return sqrt (square5);
+  double square3 = adapt_remaining (r, adapt_whole (r, &d->estimate[1]), projected);
+  double square6 = adapt_whole (r, &d->estimate[2]), err = adapt_combine (square5, square3);
+  if (adapt_guard (square6, square5) > err) /* otherwise the projection of e6, which mostly reduces it, is not needed */
+    err = fmax (err, adapt_guard (adapt_remaining (r, square6, projected), square5));
   return err;
 }
 
@@ -112,13 +112,14 @@ static double adapt_state (pw_run *r, int projected) {
 static double adapt_ledger (pw_run *r, double h) {
   pw_method_data *d = r->data;
   const pw_tableau *tableau = d->tableau;
-  double e[3] = { 0 }, tolerance = pw_ledger_tolerance (r, h); /* e: squares of e5, e3, e6 */
+  double square[3] = { 0 }, tolerance = pw_ledger_tolerance (r, h); /* square: of e5, e3, e6 */
   pw_ledger_rates (r, d->lambda, d->stage_rate[tableau->stages]);
   for (int k = 0; k < (tableau->e3 ? 3 : 1); k++) {
     adapt_estimate (&d->estimate[k], d->stage_rate, r->s->entries, r->ledger_at);
-    for (int i = 0; i < r->s->entries; i++) e[k] += r->ledger_at[i] * r->ledger_at[i] / (tolerance * tolerance);
+    for (int i = 0; i < r->s->entries; i++) square[k] += r->ledger_at[i] * r->ledger_at[i] / (tolerance * tolerance);
   }
-  double err = tableau->e3 ? fmax (adapt_combine (e[0], e[1]), adapt_guard (e[2], e[0])) : sqrt (e[0]);
+  double err =
+      tableau->e3 ? fmax (adapt_combine (square[0], square[1]), adapt_guard (square[2], square[0])) : sqrt (square[0]);
   return isfinite (err) ? err : 0;
 }
 

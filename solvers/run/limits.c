@@ -31,6 +31,7 @@ static double limits_speed (const pw_run *r, int *state) {
 
 double pw_run_growth (const pw_run *r, int *state, double *power) {
   double now = limits_speed (r, state), span = r->t - r->settings.t;
+  /* the last record may be of this moment, the one before is at half its time or less */
   *power = r->earlier_record.time > 0 && r->earlier_record.speed > 0
                ? log (now / r->earlier_record.speed) / log (span / r->earlier_record.time)
                : 0;

@@ -1,5 +1,4 @@
-/* Every element type passes the self-test, which detects each fault made in its functions or its table.  A sweep is one
- * of the functions of type pw_batch_function. */
+/* Every element type passes the self-test, which detects each fault made in its functions or its table. */
 #include <float.h>
 #include <math.h>
 #include <stdint.h>
@@ -44,23 +43,23 @@ TEST (plug_in) {
 
 static const struct {
   const char *name;
-  size_t sweep;
-} kinds_sweeps[] = {
-#define KINDS_SWEEP(s) \
+  size_t offset; /* in pw_kind */
+} kinds_functions[] = {
+#define KINDS_FUNCTION(s) \
   { #s, offsetof(pw_kind, s) }
-  KINDS_SWEEP (g),       KINDS_SWEEP (g_size),  KINDS_SWEEP (eta),     KINDS_SWEEP (J),
-  KINDS_SWEEP (gamma),   KINDS_SWEEP (force),   KINDS_SWEEP (force_u), KINDS_SWEEP (jw_q),
-  KINDS_SWEEP (eta_q),   KINDS_SWEEP (gamma_q), KINDS_SWEEP (gamma_v), KINDS_SWEEP (force_q),
-  KINDS_SWEEP (force_v), KINDS_SWEEP (energy),  KINDS_SWEEP (power),   KINDS_SWEEP (loss),
-#undef KINDS_SWEEP
+  KINDS_FUNCTION (g),       KINDS_FUNCTION (g_size),  KINDS_FUNCTION (eta),     KINDS_FUNCTION (J),
+  KINDS_FUNCTION (gamma),   KINDS_FUNCTION (force),   KINDS_FUNCTION (force_u), KINDS_FUNCTION (jw_q),
+  KINDS_FUNCTION (eta_q),   KINDS_FUNCTION (gamma_q), KINDS_FUNCTION (gamma_v), KINDS_FUNCTION (force_q),
+  KINDS_FUNCTION (force_v), KINDS_FUNCTION (energy),  KINDS_FUNCTION (power),   KINDS_FUNCTION (loss),
+#undef KINDS_FUNCTION
 };
-enum { KINDS_SWEEPS = sizeof kinds_sweeps / sizeof *kinds_sweeps };
+enum { KINDS_FUNCTIONS = sizeof kinds_functions / sizeof *kinds_functions };
 
 static pw_batch_function **kinds_member (pw_kind *kind, size_t offset) {
   return (pw_batch_function **)(void *)((char *)kind + offset);
 }
 
-/* The sweep that a faulty one replaces; the factor of kinds_multiplied. */
+/* The function that a faulty one replaces; the factor of kinds_multiplied. */
 static pw_batch_function *kinds_original;
 static double kinds_factor;
 
@@ -78,30 +77,30 @@ static void kinds_wide (const pw_batch *b, double *out) {
   for (int i = 0; i < b->count * 2 * b->cols; i++) out[i] *= 1000;
 }
 
-static void kinds_expect_caught (const pw_kind *kind, const char *sweep, const char *how) {
+static void kinds_expect_caught (const pw_kind *kind, const char *function, const char *how) {
   pw_selftest_report report;
   kinds_run (kind, KINDS_FEW, &report);
   if (report.failed > 0) return;
-  print_error ("the self-test did not notice: %s of %s %s\n", sweep, kind->name, how);
+  print_error ("the self-test did not notice: %s of %s %s\n", function, kind->name, how);
   fail ();
 }
 
-/* Each sweep in turn: missing, with the wrong sign, with a relative error of 1e-5. */
+/* Each function in turn: missing, with the wrong sign, with a relative error of 1e-5. */
 static void kinds_break (const pw_kind *kind) {
-  for (int i = 0; i < KINDS_SWEEPS; i++) {
+  for (int i = 0; i < KINDS_FUNCTIONS; i++) {
     pw_kind broken = *kind;
-    pw_batch_function **member = kinds_member (&broken, kinds_sweeps[i].sweep);
+    pw_batch_function **member = kinds_member (&broken, kinds_functions[i].offset);
     kinds_original = *member;
     if (kinds_original == NULL) continue;
     *member = NULL;
-    kinds_expect_caught (&broken, kinds_sweeps[i].name, "missing");
+    kinds_expect_caught (&broken, kinds_functions[i].name, "missing");
     if (kinds_original == pw_by_differences) continue;
     *member = kinds_multiplied;
     kinds_factor = -1;
-    kinds_expect_caught (&broken, kinds_sweeps[i].name, "with the wrong sign");
-    if (strcmp (kinds_sweeps[i].name, "g_size") == 0) continue; /* an upper bound */
+    kinds_expect_caught (&broken, kinds_functions[i].name, "with the wrong sign");
+    if (strcmp (kinds_functions[i].name, "g_size") == 0) continue; /* an upper bound */
     kinds_factor = 1 + 1e-5;
-    kinds_expect_caught (&broken, kinds_sweeps[i].name, "off by 1e-5");
+    kinds_expect_caught (&broken, kinds_functions[i].name, "off by 1e-5");
   }
 }
 

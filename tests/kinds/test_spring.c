@@ -126,9 +126,9 @@ TEST (settling) {
   for (double size = 1; size > 1e-17; size /= 10) {
     const double q[3] = { 3e-308 * size, 4e-308 * size, 0 }, v[3] = { -1e-308 * size, 0, 0 };
     assert_int_equal (pw_update_kinematics (w, 0, q, v), PW_OK);
-    pw_batch_function *const sweep[] = { pw_kind_spring.force_q, pw_kind_spring.force_v };
+    pw_batch_function *const derivative[] = { pw_kind_spring.force_q, pw_kind_spring.force_v };
     for (int i = 0; i < 2; i++) {
-      sweep[i](&w->batch[0].b, out);
+      derivative[i](&w->batch[0].b, out);
       for (int j = 0; j < 36; j++) check_below ("derivative", fabs (out[j]), 20, "stiffness and damping are 5 and 2");
     }
   }

@@ -199,7 +199,7 @@ static int data_write (const pw_plots *plots, int closeup, pw_error *error) {
     status = data_table (plots, "ground.dat", "points of the ground: x [m], y [m]", *plots->ground, 2, 2,
                          plots->grounds, error);
   if (status == PW_OK) status = data_mechanism (plots, "mechanism.dat", plots->samples, error);
-  if (status == PW_OK && closeup > 0) status = data_mechanism (plots, "mechanism-start.dat", closeup, error);
+  if (status == PW_OK && closeup > 0) status = data_mechanism (plots, "mechanism-closeup.dat", closeup, error);
   return status;
 }
 
@@ -236,7 +236,7 @@ static int figures_write (const pw_plots *plots, const char *name, int closeup, 
   pw_output *o = pw_figure_begin (&plots->figures, name, error);
   if (o == NULL) return PW_RESOURCE;
   FILE *f = pw_output_stream (o);
-  fprintf (f, "t_end = %.9g\nt_detail = %.9g\n", pw_plot_sample (plots, plots->samples - 1)[PLOT_T],
+  fprintf (f, "t_end = %.9g\nt_closeup = %.9g\n", pw_plot_sample (plots, plots->samples - 1)[PLOT_T],
            closeup > 0 ? pw_plot_sample (plots, closeup - 1)[PLOT_T] : 0);
   figures_curves (f, plots, paths && plots->wheels.drawn ? &plots->wheels : &plots->bodies);
   fprintf (f, "ground = %d\nby_time = %d\n", plots->grounds > 0, plots->by_time);

@@ -60,7 +60,7 @@ static void reference_raise_uncertainty (const pw_system *system, pw_reference *
   double *uncertainty = reference->uncertainty;
   int has_multipliers = reference_sizes (system, &reference->motion, reference->size);
   for (int i = 0; i < MOTION_ERRORS; i++) {
-    double size = i < MOTION_MULTIPLIERS ? reference->size[i % MOTION_UNITS] : has_multipliers;
+    double size = i < MOTION_MULTIPLIERS ? reference->size[i % MOTION_UNITS] : has_multipliers ? 1 : 0;
     if (i < MOTION_LARGEST)
       uncertainty[i] = uncertainty[i + MOTION_LARGEST]; /* agreement at the end may be accidental */
     uncertainty[i] = fmax (uncertainty[i], REFERENCE_ROUND_OFF * DBL_EPSILON * size);

@@ -1,11 +1,12 @@
 /* Journals and parts of a sweep, and the table made of them.
  *
  * A journal has rows in the order of completion, each appended by one write.  If the program is killed, the fingerprint
- * and complete lines remain, and perhaps an incomplete line, which the next start removes.  A lock excludes other
- * processes; it ends with the process.  The table is written under another name in the order of the grid and renamed,
- * then the journal is removed: if the program is killed in between, the same command finds the journal complete and
- * writes the same bytes again.  The file of a part, which is written like a table, has the fingerprint and the lines of
- * its journal in the order of the grid.
+ * and complete lines remain, and perhaps an incomplete line.  The next start removes the first line that is incomplete
+ * or damaged, and all after it, whose rows are computed again.  A lock excludes other processes; it ends with the
+ * process.  The table is written under another name in the order of the grid and renamed, then the journal is removed:
+ * if the program is killed in between, the same command finds the journal complete and writes the same bytes again.
+ * The file of a part, which is written like a table, has the fingerprint and the lines of its journal in the order of
+ * the grid.
  *
  *     pinwheel sweep 1              the fingerprint: lines "KEY = VALUE"
  *     ...
@@ -152,8 +153,8 @@ static int journal_begin (pw_journal *journal, const pw_plan *plan, pw_error *er
   if (status != PW_OK) return status;
   if (file_size > journal->size && ftruncate (journal->descriptor, journal->size) != 0)
     return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", journal->path, strerror (errno));
-  journal->created = journal->size == 0;
-  return journal->created ? journal_write (journal, plan->fingerprint.chars, plan->fingerprint.length, error) : PW_OK;
+  journal->begun = journal->size == 0;
+  return journal->begun ? journal_write (journal, plan->fingerprint.chars, plan->fingerprint.length, error) : PW_OK;
 }
 
 int pw_journal_open (pw_journal *journal, const pw_plan *plan, const char *path, pw_error *error) {
@@ -181,7 +182,7 @@ int pw_journal_add (pw_journal *journal, const pw_plan *plan, long row, int stat
 }
 
 void pw_journal_close (pw_journal *journal) {
-  if (journal->created && journal->done == 0 && journal->descriptor >= 0) unlink (journal->path);
+  if (journal->begun && journal->done == 0 && journal->descriptor >= 0) unlink (journal->path);
   if (journal->descriptor >= 0) close (journal->descriptor);
   pw_text_free (&journal->line);
   free (journal->offset);

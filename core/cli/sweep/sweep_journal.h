@@ -11,7 +11,7 @@ typedef struct {
   char *table_path; /* links followed */
   char *path;       /* of the journal: that of the table and ".part" */
   int descriptor;   /* of the journal, locked; -1: not open */
-  int created;      /* 1: this process has written the fingerprint */
+  int begun;        /* 1: this process has written the fingerprint, in a new file or where it was incomplete */
   off_t *offset;    /* in the journal, of the line of row r of the part: offset[r / parts]; 0: missing */
   long rows, done;  /* numbers of these rows; of those in the journal */
   off_t size;       /* bytes of the journal's complete lines */
@@ -25,7 +25,7 @@ int pw_journal_open (pw_journal *journal, const pw_plan *plan, const char *path,
 /* Appends a row of the grid: the exit status of its run, 0 to 4, and its line of the table, `text`, without a newline.
  * One thread at a time.  PW_RESOURCE: the journal is unchanged. */
 int pw_journal_add (pw_journal *journal, const pw_plan *plan, long row, int status, const char *text, pw_error *error);
-/* Closes the journal; removes it if it was created here and has no rows. */
+/* Closes the journal; removes it if it was begun here and has no rows. */
 void pw_journal_close (pw_journal *journal);
 
 /* ---- Rows (sweep_rows.c) ---- */

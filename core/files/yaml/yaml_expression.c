@@ -11,7 +11,7 @@ enum { MAX_SIGNAL_STATES = 16, MAX_CHECKED_BREAKPOINTS = 100 };
 /* A signal defined by expressions. */
 typedef struct {
   const pw_expression *expression[3];      /* value, rate, acceleration; NULL: not given, differentiated instead */
-  int derivatives;                         /* required time derivatives: 0 (of a force), 1, 2 */
+  int derivatives;                         /* required time derivatives; of a force: 0, nonholonomic: 1, holonomic: 2 */
   int states;                              /* number of states in it */
   const char *name[MAX_SIGNAL_STATES + 2]; /* "t", then states, "BODY.phi"; not for evaluation */
   pw_signal_text text;

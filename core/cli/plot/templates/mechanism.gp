@@ -4,7 +4,7 @@
 # ---- Snapshots of the motion: earlier ones fainter, the last one with symbols; paths of the markers ----
 # Above: bodies (number of those with a name), body[i], by_time (1: colours show the time), markers (a list of blocks of
 # wheels.dat, from 0), areas (a list of the colours of bodies with an area), ground (1: ground.dat exists), t_end and
-# t_detail as for plane.gp.
+# t_closeup as for plane.gp.
 # Blocks of the data file: 0 to 3 bodies, wheels, point masses, rods before the end; 4 to 7 the same at the end; 8 and 9
 # open and closed strokes of symbols.  Columns: x, y, t, number of the body.
 
@@ -28,8 +28,8 @@ area(c) = sprintf(", %s index 4 using ($4 > 0 && (int($4) - 1) %% 8 == %d ? $1 :
 symbols(k, look) = sprintf(", %s index %d using 1:2 with %s notitle", file, k, look)
 array images[2] = ['', '']
 do for [i = 1:panels] {
-  file = i == 1 ? "'mechanism.dat'" : "'mechanism-start.dat'"
-  span = i == 1 ? 't_end' : 't_detail'
+  file = i == 1 ? "'mechanism.dat'" : "'mechanism-closeup.dat'"
+  span = i == 1 ? 't_end' : 't_closeup'
   images[i] = before(0, 'lines lw 0.7 dt 1').before(3, 'lines lw 0.5 dt 1').before(1, 'lines lw 1.6 dt 1'). \
     before(2, 'points pt 7 ps 0.5')
   do for [k in markers] {
@@ -51,7 +51,7 @@ do for [form in forms] {
   do for [i = 1:panels] {
     if (i == 1 && strlen(names)) { eval key(legend_top, per_row) } else { unset key }
     eval place(i)
-    set cbrange [0:i == 1 ? t_end : t_detail]
+    set cbrange [0:i == 1 ? t_end : t_closeup]
     if (by_time) { eval sprintf('set colorbox horizontal user origin graph 0,screen %.6f size graph 1,screen %.6f', \
                                 1 - (py1[i] + 38)/height, 6.0/height) }
     eval 'plot '.(i == 1 && strlen(names) ? names[3:*].images[i] : images[i][3:*])

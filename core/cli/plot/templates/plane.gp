@@ -1,6 +1,6 @@
 
-# ---- Panels with equal axes: the whole run and, if the mechanism goes far, its beginning ----
-# Above: t_end (of the samples), t_detail (end of the beginning that panel 2 shows; 0: no panel 2) [s].
+# ---- Panels with equal axes: the whole run and, if the mechanism goes far, a close-up of its beginning ----
+# Above: t_end (of the samples), t_closeup (end of the close-up in panel 2; 0: no panel 2) [s].
 # Panel i shows x0[i] to x1[i] and y0[i] to y1[i] [m], at px0[i] to px1[i] and py0[i] to py1[i] of the page [pt].
 
 if (name eq 'mechanism' && by_time) { bottom = bottom + 40 } # room for a colour bar
@@ -10,7 +10,7 @@ if (name eq 'mechanism') {
   items = by_time ? 0 : bodies
   do for [i = 1:items] { label_length = max(label_length, strlen(short(body[i]))) }
 }
-panels = t_detail > 0 ? 2 : 1
+panels = t_closeup > 0 ? 2 : 1
 array px0[2]
 array px1[2]
 array py0[2]
@@ -23,11 +23,11 @@ array y1[2] = [-1e300, -1e300]
 extend_axis(i, z, file, k) = sprintf('stats %s using %s nooutput; ', file, k). \
   sprintf('%s0[%d] = min(%s0[%d], STATS_min); %s1[%d] = max(%s1[%d], STATS_max); ', z, i, z, i, z, i, z, i)
 extend(i, file, x, y) = extend_axis(i, 'x', file, x).extend_axis(i, 'y', file, y)
-# Column k, for panel 2 at times up to t_detail.
-during(i, k) = i == 1 ? sprintf('%d', k) : sprintf('($1 <= 1.000001*t_detail ? $%d : NaN)', k)
+# Column k, for panel 2 at times up to t_closeup.
+during(i, k) = i == 1 ? sprintf('%d', k) : sprintf('($1 <= 1.000001*t_closeup ? $%d : NaN)', k)
 do for [i = 1:panels] {
   if (name eq 'mechanism') {
-    eval extend(i, i == 1 ? "'mechanism.dat'" : "'mechanism-start.dat'", '1', '2')
+    eval extend(i, i == 1 ? "'mechanism.dat'" : "'mechanism-closeup.dat'", '1', '2')
     if (ground) { eval extend(i, "'ground.dat'", '1', '2') }
     do for [k in markers] { eval extend(i, sprintf("'wheels.dat' index %s", k), during(i, 2), during(i, 3)) }
   } else { eval extend(i, 'data', during(i, 2), during(i, 3)) }
@@ -95,4 +95,4 @@ do for [i = 1:panels] {
 axes = "set xlabel 'x [m]'; set ylabel 'y [m]'; unset xzeroaxis"
 place(i) = panel(px0[i], px1[i], py0[i], py1[i]). \
   sprintf('; set xrange [%.9g:%.9g]; set yrange [%.9g:%.9g]', x0[i], x1[i], y0[i], y1[i]). \
-  (panels == 1 ? '' : i == 1 ? "; set title 'whole run'" : sprintf("; set title 'the first %.3g s'", t_detail))
+  (panels == 1 ? '' : i == 1 ? "; set title 'whole run'" : sprintf("; set title 'the first %.3g s'", t_closeup))
