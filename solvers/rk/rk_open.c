@@ -19,23 +19,20 @@ const pw_stabilisation pw_rk_stabilisations[] = {
   { .name = NULL },
 };
 
-#define RK_OPTIONS                                                                                     \
-  { .name = "inputs",                                                                                  \
-    .choices = rk_inputs,                                                                              \
-    .about = "signals of forces at stage times, or held from the step's start (first order)" },        \
-      PW_BAUMGARTE_OPTIONS, PW_PROJECTION_OPTIONS,                                                     \
-      { .name = "positions",                                                                           \
-        .with = "nullspace",                                                                           \
-        .choices = rk_positions,                                                                       \
-        .about = "positions projected after each step, or left to drift at the order of the method" }, \
-  {                                                                                                    \
-    .name = NULL                                                                                       \
+#define RK_OPTIONS                                                                              \
+  { .name = "inputs",                                                                           \
+    .choices = rk_inputs,                                                                       \
+    .about = "signals of forces at stage times, or held from the step's start (first order)" }, \
+      PW_BAUMGARTE_OPTIONS, PW_PROJECTION_OPTIONS, {                                            \
+    .name = "positions", .with = "nullspace", .choices = rk_positions,                          \
+    .about = "positions projected after each step, or left to drift at the order of the method" \
   }
 
-const pw_option pw_rk_fixed_options[] = { RK_OPTIONS };
+const pw_option pw_rk_fixed_options[] = { RK_OPTIONS, { .name = NULL } };
 const pw_option pw_rk_adaptive_options[] = {
   { .name = "steps", .choices = rk_steps, .about = "steps that follow the tolerances, or of the given size" },
   RK_OPTIONS,
+  { .name = NULL },
 };
 
 static pw_rk_row rk_nonzero_weights (const double *weight, int stages) {
