@@ -59,7 +59,7 @@ static inline double pw_value_within (double first, double last) {
 
 /* Bytes of the UTF-8 character at the beginning of a text; 0 if invalid. */
 int pw_utf8_size (const char *text);
-/* Code of the control character at the beginning of a text; 0 if there is none, or a line end or tab. */
+/* Code of the control character at the beginning of a text; 0 if there is none, or a line end (\n only) or tab. */
 int pw_control (const char *text);
 /* 1 if a text is UTF-8 without control characters other than line ends and tabs. */
 int pw_is_text (const char *text);
@@ -78,7 +78,7 @@ typedef struct {
   char *text;        /* zero-terminated; up to date after fflush */
   size_t size, room; /* bytes of the text; allocated */
 } pw_stream;
-FILE *pw_stream_open (pw_stream *t); /* NULL if out of memory */
+FILE *pw_stream_open (pw_stream *t); /* NULL if out of memory; close it even then */
 /* Closes f.  PW_RESOURCE, and t->text is NULL, if f is NULL or any part of the text is missing.  Free t->text. */
 int pw_stream_close (FILE *f, pw_stream *t);
 

@@ -11,13 +11,13 @@ typedef struct {
   const int *state; /* their indices: coordinate j, or coordinates + j for a velocity */
   double *x;        /* 2 reads: values of these states, then the gradient */
   double *spline;   /* of a table: see pw_table_spline */
-  double *u;        /* 3: receives value, first and second time derivative */
+  double *u;        /* 3: receives value, first and second time derivative; x, u: NULL except in a workspace */
   int of_force;     /* 1: belongs to a force, which needs no derivatives */
 } pw_source;
 
 /* Stores value, first and second time derivative at time t in source->u; of a force's signal the derivatives are
- * meaningless.  source->x: the states that a function reads.  Returns non-zero, which stops the run, if the user's
- * function returns it or computes values that are not finite. */
+ * meaningless.  source->x: the states that a function reads.  Returns non-zero if the user's function does so or
+ * computes values that are not finite. */
 int pw_signal_eval (const pw_source *source, double t);
 
 /* Times at which a step must end. */

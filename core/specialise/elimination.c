@@ -121,7 +121,8 @@ static void elimination_pivot (pw_elimination *ldl, pw_emitter *emitter, int p, 
         elimination_update (ldl, emitter, i, j, FACTOR (i, p), AT (j, p));
 }
 
-/* Eliminates a massless coordinate c and an equation r with the pivot [ 0 d ; d 0 ]. */
+/* Eliminates a massless coordinate c and an equation r with the pivot [ 0 d ; d 0 ].  FACTOR (k, c) = K_kc / d is the
+ * entry of L in column r. */
 static void elimination_pair (pw_elimination *ldl, pw_emitter *emitter, int c, int r) {
   elimination_comment (ldl, emitter, c, r);
   elimination_place (ldl, c, r);

@@ -16,7 +16,8 @@ typedef struct {
 
 enum { SPECIALISE_TEXTS = sizeof source_texts / sizeof *source_texts };
 
-/* Writes the text of a source file, unless it is marked in `done`, after the texts of the headers that it includes. */
+/* Writes the text of a source file, unless it is marked in `done` or not in source_texts (pinwheel.h), after the texts
+ * of the headers that it includes. */
 static void specialise_text (FILE *out, const char *name, unsigned char done[SPECIALISE_TEXTS]) {
   char header[80], hint[PW_HINT];
   const int i = pw_find_name (source_texts, sizeof *source_texts, name, hint);

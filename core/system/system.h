@@ -118,7 +118,8 @@ int pw_update_signals (pw_workspace *w, double t, const double *q, const double 
 /* Points the batches to the internal coordinates in q, v; q NULL: only to their velocities. */
 void pw_point_to_internal (pw_workspace *w, const double *q, const double *v);
 
-/* 1: the signals of forces keep their values from now on; 0: they follow time and states again. */
+/* 1: the signals of forces keep their values from now on; 0: they follow time and states again.  Call
+ * pw_update_kinematics before pw_update_velocities then. */
 void pw_hold_signals (pw_workspace *w, int hold);
 
 /* ---- Evaluations; arrays over constraint equations have `rows` entries, f has `coords` + 3 ---- */
