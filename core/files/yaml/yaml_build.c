@@ -4,7 +4,7 @@
 #include <string.h>
 #include "yaml.h"
 
-/* Reads the name of a body or element, which no other one has. */
+/* Reads the name of a body or element, which must be unique. */
 static int build_name (pw_reader *r, const pw_node *node, const char *label, const char **name) {
   if (pw_yaml_text (r, node, label, name) != PW_OK) return r->error->status;
   int before = pw_names_add (&r->names, *name, (int)node->at); /* a file has less than INT_MAX bytes */

@@ -52,7 +52,7 @@ static FILE *table_open (const pw_yaml *y, const char *name, const char **reason
   return is_inside ? pw_open_input (path, reason) : NULL;
 }
 
-/* The unit of the current field.  Only a drive has "m or rad": its choice, a field before, decides. */
+/* The unit of the current field.  Only a drive has "m or rad"; the choice before this field decides. */
 static const char *table_unit (const pw_reader *r) {
   if (r->field->unit == NULL || strcmp (r->field->unit, "m or rad") != 0) return r->field->unit;
   const pw_field *choice = r->field;
