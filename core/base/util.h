@@ -63,6 +63,8 @@ int pw_utf8_size (const char *text);
 int pw_control (const char *text);
 /* 1 if a text is UTF-8 without control characters other than line ends and tabs. */
 int pw_is_text (const char *text);
+/* 1 if a text is one line of UTF-8 without control characters, as names and units are. */
+int pw_is_line (const char *text);
 /* Replaces invalid bytes, and control characters other than line ends and tabs, by question marks. */
 void pw_text_sanitise (char *text);
 /* Prints into a buffer, which is returned; what does not fit is cut off. */

@@ -73,7 +73,7 @@ static int search_add_file (pw_search *s, const char *name, size_t length, const
 
 static int search_entry (pw_search *s, const char *folder, const char *entry, pw_error *error) {
   const char *ending = pw_ends_with (entry, ".so") ? ".so" : pw_ends_with (entry, ".yaml") ? ".yaml" : NULL;
-  if (ending == NULL || entry[0] == '.' || !pw_is_text (entry)) return PW_OK;
+  if (ending == NULL || entry[0] == '.' || !pw_is_line (entry)) return PW_OK;
   char path[PW_PATH], real[PW_PATH];
   struct stat info;
   if (realpath (pw_path (path, "%s/%s", folder, entry), real) == NULL)

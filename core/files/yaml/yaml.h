@@ -137,7 +137,7 @@ int pw_yaml_signal (pw_reader *r, const pw_kind *kind, const char *label, const 
 /* Reads the reference solution, after bodies and elements (yaml_expression.c). */
 int pw_yaml_reference (pw_reader *r);
 
-/* The build function (yaml_build.c). */
+/* The build function; the parameters are an array of numbers in the order of y->parameter (yaml_build.c). */
 void pw_yaml_build (pw_model *m, const void *parameters);
 
 #endif
