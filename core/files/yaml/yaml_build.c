@@ -109,11 +109,18 @@ static int build_field (pw_reader *r, const pw_kind *kind, const pw_field *f, co
 
 /* ---- Elements ---- */
 
-/* Whether a synonym, a word in the parentheses of a description, begins with this prefix of at least 3 bytes. */
-static int build_has_synonym (const char *about, const char *prefix) {
-  const char *word = strchr (about, '(');
-  while (word && strlen (prefix) >= 3 && (word = strstr (word + 1, prefix)) != NULL)
-    if (strchr (" (", word[-1])) return 1;
+/* Whether a word of a text begins with this prefix of at least 3 bytes. */
+static int build_has_word (const char *text, const char *prefix) {
+  for (const char *at = text; strlen (prefix) >= 3 && (at = strstr (at, prefix)) != NULL; at++)
+    if (at == text || strchr (" (", at[-1])) return 1;
+  return 0;
+}
+
+/* 1 if an element type has a field of this name. */
+static int build_is_field (const char *name) {
+  for (const pw_kind *const *k = pw_kinds; *k; k++)
+    for (const pw_field *f = (*k)->fields; f->name; f++)
+      if (strcmp (f->name, name) == 0) return 1;
   return 0;
 }
 
@@ -139,9 +146,9 @@ static const pw_kind *build_kind (const pw_reader *r, const pw_node *node) {
   }
   const char *kind = build_later_type (first);
   if (kind) return pw_yaml_fail (r, first->at, "an element begins with its type: write {%s: NAME, ...}", kind), NULL;
-  /* the description of pin has "(revolute joint, hinge)" */
-  for (const pw_kind *const *k = pw_kinds; *k && !near.near; k++)
-    if (build_has_synonym ((*k)->about, first->text))
+  /* Words of descriptions suggest a type: "hinge" pin, "damper" spring; but a field of any type, as "angle", does not. */
+  for (const pw_kind *const *k = pw_kinds; *k && !near.near && !build_is_field (first->text); k++)
+    if (build_has_word ((*k)->about, first->text))
       snprintf (near.best, sizeof near.best, "%s", (*k)->name), near.near = 1;
   pw_yaml_fail (r, first->at, "an element begins with its type, and there is no type \"%.60s\"%s", first->text,
                 near.near ? pw_nearest_text (&near) : ": see pinwheel list kinds");
