@@ -26,7 +26,7 @@ struct pw_run {
   int fixed_steps;             /* 1: fixed step size */
   pw_saddle *saddle;           /* matrix of M and all active rows: for accelerations, impulses */
   const unsigned char *active; /* rows: 0 for redundant ones; NULL: none is redundant */
-  int redundant;               /* number of redundant rows; the following only if there are any */
+  int redundant;               /* number of redundant rows; what follows, to reselect_below, only if there are any */
   int redundant_drive;         /* 1: one of them has an eta, so that work depends on its multiplier */
   int *redundant_row;          /* redundant: their indices */
   unsigned char *active_array; /* rows: what `active` points to */
@@ -50,7 +50,8 @@ struct pw_run {
   int stalled;            /* consecutive steps that did not advance */
   pw_residuals residuals; /* of the state reached; NaN: not computed */
 
-  /* The state reached.  Of adams and bdf, a and lambda may be those of the last iterate until `at` is called. */
+  /* The state reached, where `advance` leaves kinematics and J evaluated.  Of adams and bdf, a and lambda may be those
+   * of the last iterate until `at` is called. */
   double t;
   double *q, *v, *a; /* coords + 3 each */
   double *lambda;    /* rows; contiguous with q, v, a: pw_state_length numbers */
@@ -58,7 +59,7 @@ struct pw_run {
   double *rate;      /* entries: powers at t */
   double projected;  /* energy added by projections up to t; only with settings.ledger; 0 in bdf */
 
-  /* The state requested from pw_run_sample. */
+  /* The state requested from pw_run_sample; `at` stores it and leaves kinematics and J evaluated there. */
   double *q_at, *v_at, *a_at, *lambda_at, *ledger_at; /* same layout */
   double projected_at;
 
@@ -166,7 +167,7 @@ static inline int pw_stabilised_by (const pw_run *r, pw_stabilisation_kind kind)
 extern const char *const pw_metrics[];
 
 /* Initial step size for methods that begin with order 1: the error h^2 / T^2 is a quarter of the tolerance; states that
- * saturating forces depend on change by at most their tolerance, unless that takes less than 1e-9 T. */
+ * saturating forces depend on change by at most r->saturation, unless that takes less than 1e-9 T. */
 double pw_first_step (const pw_run *r);
 
 /* Step size of an adaptive method below which steps vanish in the round-off of the time. */
@@ -183,10 +184,12 @@ int pw_run_annotate_error (const pw_run *r, int status, pw_error *error);
  * it".  PW_METHOD if a signal fails; PW_RESOURCE. */
 int pw_run_check_derivatives (pw_run *r, const char *user, const char *needs, pw_error *error);
 
-/* Replaces the saddle, and the watchdog's, by one for the active rows; a saddle that cannot be opened is NULL. */
+/* Replaces the saddle, and the watchdog's, by one for the active rows, where J is evaluated; a saddle that cannot be
+ * opened is NULL. */
 int pw_run_open_saddle (pw_run *r, pw_error *error);
 
-/* Evaluates accelerations, multipliers and the ledger's powers at the state reached; errors contain the reason. */
+/* Evaluates accelerations, multipliers and the ledger's powers at the state reached, and calls pw_bound_tolerances.
+ * PW_METHOD with the reason. */
 int pw_run_evaluate (pw_run *r, pw_error *error);
 
 /* Restarts the watchdog at the state reached, which must be regular, and makes the independence of its active rows the
@@ -245,8 +248,8 @@ static inline double pw_larger_or_nan (double x, double y) {
 
 /* Norm of the accelerations at the state reached, in units of L / T^2 (watchdog.c). */
 double pw_run_acceleration_norm (const pw_run *r);
-/* Checks the state reached.  PW_METHOD if constraints are lost or contradict each other, or if the motion has jumped to
- * another branch; PW_RESOURCE. */
+/* Checks the state reached, where kinematics and J must be up to date.  PW_METHOD if constraints are lost or contradict
+ * each other, if the motion has jumped to another branch, or does not resolve a change point; PW_RESOURCE. */
 int pw_run_watchdog (pw_run *r, pw_error *error);
 
 /* ---- Limits (limits.c) ---- */
@@ -328,7 +331,7 @@ typedef struct {
   pw_saddle *position;         /* of the metric of positions and the holonomic rows; or the run's saddle */
   int owns_position;           /* 1: position is not the run's saddle */
   pw_saddle *velocity;         /* of the metric of velocities and all rows */
-  int owns_velocity;           /* 1: velocity is not the run's saddle, since its metric is not the mass matrix */
+  int owns_velocity;           /* 1: velocity is not the run's saddle, since its metric was given */
   int iterations;              /* of the last projection of positions */
   const unsigned char *active; /* rows that are enforced; NULL: all */
   int ignores_inactive;        /* 1: the residuals of the other rows are not checked */
@@ -377,10 +380,10 @@ int pw_specialised_project (const pw_projector *p, pw_run *r, double t, double *
 /* The stages of a step, if specialised code can evaluate all of them: 1; 0 if not.  Kinematics and J are not
  * updated. */
 int pw_specialised_stages (pw_run *r, const struct pw_scene_step *x);
-/* Residuals of the state reached, unless they are known or the general engine has to evaluate them. */
+/* Both residuals of the state reached, unless one is known or the general engine has to evaluate them. */
 void pw_specialised_residuals (pw_run *r);
 
-/* 1 if specialised code can do the run's next evaluation. */
+/* 1 if specialised code may be called for the run's next evaluation; it can still refuse the state. */
 int pw_specialised_suits (const pw_run *r);
 /* Adds to the statistics: evaluations, and iterations of projections, of specialised code. */
 void pw_specialised_count (pw_run *r, long evaluations, long iterations);
