@@ -32,7 +32,7 @@ struct pw_run {
   unsigned char *active_array; /* rows: what `active` points to */
   double *coefficient;         /* redundant x rows: each redundant row as a combination of active rows */
   double *normal;              /* redundant x (redundant + 1): normal equations in redundancy.c, right side last */
-  double *row_force;           /* coords + 3: right-hand side for the coefficients of a redundant row */
+  double *row_force;           /* coords + 3: right-hand side for the coefficients of a redundant row; 0 between uses */
   double *least_norm;          /* rows: least-norm multipliers for the ledger */
   double independence;         /* of the active rows at the state reached (rank.h) */
   double reselect_below;       /* independence below which other active rows are tried */
@@ -41,7 +41,7 @@ struct pw_run {
   pw_thresholds thresholds;                 /* of the watchdog */
   pw_watchdog watchdog;                     /* the sine, which measures the distance from a singular configuration */
   double refused_sine;                      /* sine below which an evaluation is refused */
-  int near_singular;                        /* 1 after an evaluation near a singular configuration */
+  int near_singular;                        /* 1 after an evaluation near a singular configuration in the last step */
   double reference_level; /* largest acceleration norm away from singular configurations, in units of L / T^2; >= 1 */
   double previous_norm;   /* acceleration norm of the last such state */
   int uses_derivatives;   /* 1: the method uses the derivatives of the equations (tangent.h) */
@@ -310,7 +310,7 @@ int pw_run_accelerate_evaluated (pw_run *r, const double *v, double *a, double *
 void pw_sample_reached (pw_run *r);
 
 /* Reports why the J last evaluated is unusable at time t: rank lost or nearly lost, or values too extreme
- * (singular.c). */
+ * (singular.c).  PW_METHOD. */
 int pw_fail_singular (pw_run *r, double t, pw_error *error);
 
 /* Completes r->residuals at the state just evaluated, some of which a projection may have computed, and updates the

@@ -35,7 +35,7 @@ struct pw_steady {
     pw_run *run;    /* NULL: not open */
     pw_linearisation linearisation;
   } system[PW_PLACES];
-  pw_initial_value *solution; /* 2 n: the last solution, where runs are opened */
+  pw_initial_value *solution; /* 2 n: the last solution, where runs are opened; or that configuration at rest */
   int solved;                 /* 1: there is one */
 
   double *q, *v, *rates, *u;                /* unknowns u, their state q, v, and its rates of displacement [1/s] */
@@ -111,8 +111,8 @@ double pw_steady_parameter (const pw_steady *x, const double *u);
 
 enum { PW_STEADY_MAX_COORDINATES = 400 }; /* since the cost is cubic */
 
-/* Opens x->system[place] for a value of the parameter, unless it is open.  A status, with x->why if it fails; PW_RETRY:
- * none at this value (x->why has the status of the error). */
+/* Opens x->system[place] for a value of the parameter, unless it is open for it.  A status, with x->why if it fails;
+ * PW_RETRY: none at this value (x->why has the status of the error). */
 int pw_steady_open_system (pw_steady *x, pw_place place, double value);
 void pw_steady_close_system (pw_steady *x, pw_place place);
 /* PW_INPUT and the reason unless both systems have as many bodies, coordinates and constraint equations. */
