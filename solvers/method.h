@@ -44,11 +44,11 @@ struct pw_run {
   int near_singular;                        /* 1 after an evaluation near a singular configuration in the last step */
   double reference_level; /* largest acceleration norm away from singular configurations, in units of L / T^2; >= 1 */
   double previous_norm;   /* acceleration norm of the last such state */
-  int uses_derivatives;   /* 1: the method uses the derivatives of the equations (tangent.h) */
+  int uses_derivatives;   /* 1: the method uses the derivatives of the equations (tangent.h); only for opening */
   double alpha, beta;     /* Baumgarte's [1/s], used by pw_run_accelerate; 0: none */
   double breakpoint;      /* next discontinuity of a signal, or INFINITY; t if it has just been reached */
   int stalled;            /* consecutive steps that did not advance */
-  pw_residuals residuals; /* of the state reached; NaN: not computed */
+  pw_residuals residuals; /* of the state reached, until a sample is projected; NaN: not computed */
 
   /* The state reached, where `advance` leaves kinematics and J evaluated.  Of adams and bdf, a and lambda may be those
    * of the last iterate until `at` is called. */
@@ -59,7 +59,7 @@ struct pw_run {
   double *rate;      /* entries: powers at t */
   double projected;  /* energy added by projections up to t; only with settings.ledger; 0 in bdf */
 
-  /* The state requested from pw_run_sample; `at` stores it and leaves kinematics and J evaluated there. */
+  /* The state requested from pw_run_sample, where `at` leaves kinematics and J evaluated; otherwise scratch. */
   double *q_at, *v_at, *a_at, *lambda_at, *ledger_at; /* same layout */
   double projected_at;
 
