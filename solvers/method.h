@@ -184,16 +184,16 @@ int pw_run_annotate_error (const pw_run *r, int status, pw_error *error);
  * it".  PW_METHOD if a signal fails; PW_RESOURCE. */
 int pw_run_check_derivatives (pw_run *r, const char *user, const char *needs, pw_error *error);
 
-/* Replaces the saddle, and the watchdog's, by one for the active rows, where J is evaluated; a saddle that cannot be
- * opened is NULL. */
+/* Replaces the saddle, and the watchdog's, by one for the active rows with the J last evaluated; a saddle that cannot
+ * be opened is NULL. */
 int pw_run_open_saddle (pw_run *r, pw_error *error);
 
 /* Evaluates accelerations, multipliers and the ledger's powers at the state reached, and calls pw_bound_tolerances.
- * PW_METHOD with the reason. */
+ * PW_METHOD with the reason if that fails. */
 int pw_run_evaluate (pw_run *r, pw_error *error);
 
-/* Restarts the watchdog at the state reached, which must be regular, and makes the independence of its active rows the
- * reference for later states. */
+/* After pw_run_evaluate at a regular state: restarts the watchdog there, and makes the independence of the active rows
+ * the reference for later states. */
 void pw_run_set_references (pw_run *r);
 
 /* pw_next_breakpoint of the run's system; with kinks for methods of order > 2: lower orders do not suffer from a kink

@@ -138,7 +138,7 @@ typedef struct {
   int holds;
   double t;           /* time at which signals are evaluated [s] */
   double span;        /* as in pw_settings, default 1 s: signals must be constant in it */
-  double first, last; /* range of the parameter; they differ if a branch is followed */
+  double first, last; /* range of the parameter; to follow a branch they must differ */
   int vary;           /* the parameter is the value of hold[vary]; -1: it is that of `compile`, if any */
   /* Compiles the system for a value of the parameter.  The search frees it.  NULL and the error: there is no
    * system for this value.  May be NULL. */
