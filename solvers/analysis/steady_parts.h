@@ -38,12 +38,12 @@ struct pw_steady {
   pw_initial_value *solution; /* 2 n: the last solution, where runs are opened; or that configuration at rest */
   int solved;                 /* 1: there is one */
 
-  double *q, *v, *rates, *u;                /* unknowns u, their state q, v, and its rates of displacement [1/s] */
+  double *q, *v, *rates, *u;                /* state, rates of displacement [1/s] at the last evaluation; unknowns */
   double *F, *q0, *v0, *dq, *dv, *combined; /* scratch */
   double *null_space;                       /* unknowns x unknowns: directions of a family; scratch */
   pw_branch branch;
-  pw_linear linear; /* of the state q, v */
-  pw_error why;     /* the last reason why a system could not be evaluated */
+  pw_linear linear; /* of the last motion */
+  pw_error why;     /* the last reason why a system could not be evaluated, or why a branch ended */
 
   int unstable, neutral; /* eigenvalues at the point reached: growing, with real part 0 */
   int sought;            /* index of the eigenvalue whose change of sign is located */
