@@ -13,7 +13,7 @@ enum {
 static const double STEADY_EXACT = 1e-9, /* largest residual of a solution, in units of the scene */
     STEADY_SLOW = 1e-4,    /* rates that may be round-off at a double root: more than the root of STEADY_EXACT */
     SUGGEST_CHANGE = 1e-8, /* a quantity is worth holding if the square of its change along the family, without the */
-    SUGGEST_LEFT = 1e-6;   /* part that is held already, is larger than this, and than this times the whole square */
+    SUGGEST_LEFT = 1e-6;   /* part that is held already, exceeds SUGGEST_CHANGE, and SUGGEST_LEFT x the whole square */
 
 /* ---- Opening ---- */
 

@@ -113,7 +113,7 @@ static int run_has_no_method (const pw_run *r, pw_error *error) {
  * reopened.  This is done only before the next step or in a restart, since until then the last step may be sampled. */
 static int run_reselect (pw_run *r, pw_error *error) {
   if (r->redundant == 0 || r->independence >= r->reselect_below) return PW_OK;
-  r->reselect_below = r->independence / 2;
+  r->reselect_below = r->independence / 2; /* if no other set is better, the next search is at half the independence */
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   int other = pw_rank_reselect (r);
   if (other < 0) return pw_fail_memory (r->s, error);

@@ -96,7 +96,7 @@ static double run_time_scale (const pw_run *r) {
 }
 
 /* Opens the saddle at the consistent initial state and evaluates the accelerations there; if some rows are nearly
- * dependent, an independent set is selected first, unless the scene is too large for that. */
+ * dependent, an independent set is selected first.  A scene too large for that fails below the sine rank_refused. */
 static int run_first_evaluation (pw_run *r, pw_error *error) {
   int status = pw_run_open_saddle (r, error);
   if (status != PW_OK) return status;
