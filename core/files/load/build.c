@@ -50,13 +50,14 @@ static int build_spawn (const build_command *command, char *const *word, pid_t *
   return code;
 }
 
-/* Runs the words of a command line, which compiles a source. */
-static int build_run (const build_command *command, char *const *word, const char *source, pw_error *error) {
-  pid_t child;
+/* Runs the words of a command line, which compiles a source to an object that does not exist yet. */
+static int build_run (const build_command *command, char *const *word, const char *source, const char *object,
+                      pw_error *error) {
+  pid_t child, ended = 0;
   int outcome = 0, code = build_spawn (command, word, &child);
-  while (code == 0 && waitpid (child, &outcome, 0) < 0 && errno != ECHILD) /* ECHILD: SIGCHLD is ignored */
-    if (errno != EINTR) code = errno;
+  while (code == 0 && (ended = waitpid (child, &outcome, 0)) < 0 && errno == EINTR) continue;
   int status = WIFEXITED (outcome) ? WEXITSTATUS (outcome) : -1;
+  if (ended < 0) status = access (object, F_OK) != 0; /* SIGCHLD is ignored: there is no exit status */
   if (code != 0 && code != ENOENT && code != EACCES)
     return pw_fail (error, PW_RESOURCE, "cannot run the C compiler \"%s\": %s", word[0], strerror (code));
   if (code != 0 || status == 127)
@@ -98,7 +99,7 @@ static int build_object (const build_command *command, const char *source, const
     build_add (word, &words, (const char *const[]){ "-I", include, "-o", object, source, NULL });
     build_add (word, &words, command->last);
     status = w ? pw_fail (error, PW_INPUT, "the C compiler's command in CC has more than %d words", BUILD_COMPILER)
-               : build_run (command, word, source, error);
+               : build_run (command, word, source, object, error);
   }
   free (compiler);
   return status;
