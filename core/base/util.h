@@ -13,6 +13,12 @@ static inline int pw_require (const void *object, const char *type, pw_error *er
   return object ? PW_OK : pw_fail (error, PW_INPUT, "%s is missing", type);
 }
 
+/* ---- Members of pw_statistics, as checkpoints and JSON contain them ---- */
+
+#define PW_STATISTICS_COUNTS(X) \
+  X (steps) X (rejected) X (rhs) X (jacobians) X (factorisations) X (restarts) X (specialised)
+#define PW_STATISTICS_RESIDUALS(X) X (position) X (velocity) X (g) X (jv)
+
 /* ---- Nearest names, domains of numbers (nearest.c) ---- */
 
 enum { PW_HINT = 140 }; /* "; did you mean \"...\"?" with the longest name */

@@ -83,13 +83,14 @@ TEST (units) {
 
 /* What is not known, or measures something else, is refused with column and unit. */
 TEST (bad_units) {
-  static const char csv[] = "t [s],u [dyn cm],w [deg],f [N],z [N m/],h [%]\n0,1,2,3,4,5\n1,2,3,4,5,6\n";
+  static const char csv[] = "t [s],u [dyn cm],w [deg],f [N],z [N m/],h [%],d [·]\n0,1,2,3,4,5,6\n1,2,3,4,5,6,7\n";
   cli_write ("model/u.csv", csv);
   table_bad ("{file: u.csv}", "u.csv:1: column \"u [dyn cm]\": the unit \"dyn cm\" is not known; expected N m");
   table_bad ("{file: u.csv, columns: [t, w]}", "column \"w [deg]\": the unit \"deg\" does not measure what N m does");
   table_bad ("{file: u.csv, columns: [t, f]}", "column \"f [N]\": the unit \"N\" does not measure what N m does");
   table_bad ("{file: u.csv, columns: [t, z]}", "the unit \"N m/\" is not known");
   table_bad ("{file: u.csv, columns: [t, h]}", "the unit \"%\" is not known");
+  table_bad ("{file: u.csv, columns: [t, d]}", "the unit \"·\" is not known");
   table_bad ("{file: u.csv, columns: [f, z]}", "column \"f [N]\": the unit \"N\" does not measure what s does");
 }
 

@@ -48,17 +48,19 @@ static int build_spawn (const build_command *command, char *const *word, int log
   return code;
 }
 
-/* Runs a compiler's command line; `source`, the file that it compiles, is for messages. */
-static int build_run (const build_command *command, char *const *word, const char *source, pw_error *error) {
-  pid_t child;
+/* Runs a compiler's command line; `source` and `object` are the file that it compiles and the one that it makes, which
+ * does not exist yet. */
+static int build_run (const build_command *command, char *const *word, const char *source, const char *object,
+                      pw_error *error) {
+  pid_t child, ended = 0;
   int log =
       command->log ? open (command->log, O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, 0600) : STDERR_FILENO;
   if (log < 0) return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", command->log, strerror (errno));
   int outcome = 0, code = build_spawn (command, word, log, &child);
   if (command->log) close (log);
-  while (code == 0 && waitpid (child, &outcome, 0) < 0 && errno != ECHILD) /* ECHILD: SIGCHLD is ignored */
-    if (errno != EINTR) code = errno;
+  while (code == 0 && (ended = waitpid (child, &outcome, 0)) < 0 && errno == EINTR) continue;
   int exit_code = WEXITSTATUS (outcome);
+  if (ended < 0) exit_code = access (object, F_OK) != 0; /* SIGCHLD is ignored: there is no exit status */
   if (code != 0 && code != ENOENT && code != EACCES)
     return pw_fail (error, PW_RESOURCE, "cannot run the C compiler \"%s\": %s", word[0], strerror (code));
   if (code == 0 && WIFSIGNALED (outcome)) /* Ctrl-C, or too little memory */
@@ -105,7 +107,7 @@ static int build_object (const build_command *command, const char *source, const
     build_add (word, &words, command->last);
     status =
         w ? pw_fail (error, PW_INPUT, "the C compiler's command in CC has more than %d words", BUILD_COMPILER_WORDS)
-          : build_run (command, word, source, error);
+          : build_run (command, word, source, object, error);
   }
   free (compiler);
   return status;
