@@ -33,7 +33,7 @@ static int steady_read_vary (pw_steady_command *cmd, pw_error *error) {
 }
 
 static int steady_read_options (pw_steady_command *cmd, pw_error *error) {
-  double starts;
+  double starts = 0;
   int status = pw_cli_number ("--at", cmd->at_text, PW_NONNEGATIVE, &cmd->settings.t, error);
   cmd->limit.seconds = INFINITY;
   cmd->settings.span = pw_cli_defaults (pw_file_table (cmd->m.file)).t_end;
