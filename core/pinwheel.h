@@ -740,6 +740,8 @@ int pw_system_find_body (const pw_system *s, const char *name);
  * PW_INPUT and the error, with the nearest name, for an unknown state. */
 int pw_system_find_state (const pw_system *s, const char *name, pw_error *error);
 
+enum { PW_NAME_BYTES = 160 }; /* size of buffers in which every name of a system fits */
+
 /* Name and unit of a state ("frame.vx", "m/s").  The name is written to the buffer, which is returned. */
 char *pw_system_state_name (const pw_system *s, int state, char *buffer, size_t size);
 const char *pw_system_state_unit (const pw_system *s, int state);

@@ -36,9 +36,7 @@ shot () {
 
 # ---- Gallery ----
 
-for model in ackermann-car andrews-squeezer car car-two-trailers car-tyres chain chaplygin-sleigh differential-drive elliptic-wire \
-  hatchet-planimeter knife-edge-incline n-four-bar n-trailer peaucellier pendulum redundant-parallelogram roller-racer slider-crank \
-  snakeboard theo-jansen wheeled-snake; do
+for model in $(find models -name '*.c' -o -name '*.yaml' | sed 's,.*/,,; s/\..*//' | sort | grep -vx ezyroller); do
   draw gallery-$model mechanism run $model --plots
 done
 

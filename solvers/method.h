@@ -40,7 +40,7 @@ struct pw_run {
   struct pw_scene *scene;                   /* its data; NULL: none, or a constant pivot is too small */
   pw_thresholds thresholds;                 /* of the watchdog */
   pw_watchdog watchdog;                     /* the sine, which measures the distance from a singular configuration */
-  double refused_sine;                      /* sine below which an evaluation is refused */
+  double refused_sine;                      /* largest sine at which an evaluation is refused */
   int near_singular;                        /* 1 after an evaluation near a singular configuration in the last step */
   double reference_level; /* largest acceleration norm away from singular configurations, in units of L / T^2; >= 1 */
   double previous_norm;   /* acceleration norm of the last such state */
@@ -74,9 +74,9 @@ struct pw_run {
   double power;               /* the largest sum of the absolute values of the ledger's rates so far [W] */
   double scene_energy;        /* kinetic energy [J] of moving by L and 1 rad in the span; if massless: see ledger.c */
   double *scratch;            /* 2 (coords + 3) + 3 rows, for projections and evaluations */
-  double *saturation;         /* 2 coords: upper bounds of tolerances; INFINITY: unbounded */
+  double *tolerance_bound;    /* 2 coords, from pw_kind.saturation; INFINITY: unbounded */
   double *matrix_state, *matrix_range; /* 2 coords: state at which the Newton matrix was evaluated, range around it
-                                        * in which it is valid; only if the system `saturates` */
+                                        * in which it is valid (pw_kind.saturation); only if the system `saturates` */
   int matrix_outdated;                 /* 1: a state reached since is outside that range */
   double *q_given, *v_given;           /* coords + 3: the values last given (opening, restart), not yet consistent */
   double *given_before;                /* 2 (coords + 3): those before a restart, which may be refused */
@@ -98,7 +98,7 @@ static inline double pw_atol (const pw_run *r, int state) {
   double atol = r->settings.rtol * pw_unit (r->s, state < n ? state : state - n);
   return state < n ? atol : atol / r->w->scale.time;
 }
-/* Updates r->saturation, the bounds of tolerances due to saturating forces, and r->matrix_outdated at the state
+/* Updates r->tolerance_bound, the bounds of tolerances due to saturating forces, and r->matrix_outdated at the state
  * reached, whose kinematics must be up to date (tolerances.c). */
 void pw_bound_tolerances (pw_run *r);
 /* Change of a state (numbered as in pw_system_find_state) from the state reached over which a saturating force changes
@@ -109,7 +109,7 @@ void pw_matrix_evaluated (pw_run *r, const double *q, const double *v);
 /* Tolerance of a state at a given value, for iterative methods.  It is bounded by the range in which a force saturates;
  * otherwise an iteration could converge to any value of the force. */
 static inline double pw_tolerance (const pw_run *r, int state, double value) {
-  return fmin (r->settings.rtol * fabs (value) + pw_atol (r, state), r->saturation[state]);
+  return fmin (r->settings.rtol * fabs (value) + pw_atol (r, state), r->tolerance_bound[state]);
 }
 
 /* ---- Fixed steps, which end at multiples of the step size after a time `base` ---- */

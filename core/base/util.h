@@ -41,6 +41,7 @@ const char *pw_nearest_text (pw_nearest *n);
 /* The index of a name in a table whose entries, of `entry_size` bytes, begin with a name and whose last name is NULL;
  * -1, with the hint of pw_nearest_text, if the name is not there.  A table that is NULL has no entries. */
 int pw_find_name (const void *table, size_t entry_size, const char *name, char hint[PW_HINT]);
+extern const char *const pw_domain_names[]; /* "real", ..., NULL; as text models and pages write them */
 /* "", ">= 0", "> 0", "1, 2, ...", "0 to 1" */
 const char *pw_domain_text (pw_domain domain);
 /* "" if a value lies in the domain, else the expected one ("a number >= 0"). */
@@ -78,7 +79,7 @@ char *pw_print (char *buffer, size_t size, const char *format, ...) PW_PRINTF (3
 /* The same into a buffer of its own, which lives as long as the block around it. */
 #define PW_PRINTED(size, ...) pw_print ((char[size]){ 0 }, size, __VA_ARGS__)
 /* The result of pw_system_state_name, or a function like it, in such a buffer. */
-#define PW_NAME(function, s, i) function (s, i, (char[300]){ 0 }, 300)
+#define PW_NAME(function, s, i) function (s, i, (char[PW_NAME_BYTES]){ 0 }, PW_NAME_BYTES)
 
 /* ---- Streams into memory (stream.c) ---- */
 

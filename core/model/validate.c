@@ -106,7 +106,7 @@ static void check_choice (const pw_field *f, int value, char *text, size_t size)
 
 static int check_field (const pw_model *m, const pw_element *e, const pw_field *f, const pw_names *names,
                         pw_error *error) {
-  char name[80], fault[300];
+  char name[PW_NAME_BYTES], fault[300];
   int point; /* the faulty point of a table; not used here */
   for (int i = 0; i < pw_field_count (f); i++) {
     const void *at = (const char *)e->definition + f->offset + (size_t)i * pw_field_bytes (f->type);

@@ -119,7 +119,7 @@ int pw_signal_eval (const pw_source *source, double t) {
   return 0;
 }
 
-int pw_signal_may_jump (const pw_signal *s) {
+int pw_signal_value_may_jump (const pw_signal *s) {
   switch (s->type) {
   case PW_PULSE:
   case PW_FUNCTION:

@@ -20,17 +20,17 @@ typedef struct {
  * computes values that are not finite. */
 int pw_signal_eval (const pw_source *source, double t);
 
-/* Times at which a step must end. */
+/* Times at which a step must end: the signal or a derivative up to this order jumps. */
 typedef enum {
-  PW_JUMPS,          /* jumps of the signal or of its first or second derivative; start and end of a smooth-step */
-  PW_JUMPS_AND_KINKS /* also kinks of the second derivative: the points of a cubic table */
+  PW_BREAKS_2, /* second; and at the start and end of a smooth-step */
+  PW_BREAKS_3  /* third: also at the points of a cubic table */
 } pw_breakpoints;
 
 /* The first such time after t, or INFINITY; of a function signal, what its breakpoint function returns. */
 double pw_signal_breakpoint (const pw_signal *s, pw_breakpoints which, double t);
 
 /* 1 if the value may jump: that of a pulse; that of a function, of which this is not known. */
-int pw_signal_may_jump (const pw_signal *s);
+int pw_signal_value_may_jump (const pw_signal *s);
 
 /* ---- Tables (table.c) ---- */
 

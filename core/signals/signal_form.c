@@ -125,7 +125,7 @@ static const char *form_with_kinks (const pw_signal *s) {
 /* Kinks of prescribed positions and jumps of prescribed velocities would require infinite forces. */
 static void form_check_continuity (const pw_signal *s, const pw_kind *kind, char *text, size_t size) {
   const char *form = form_with_kinks (s);
-  int jumps = pw_signal_may_jump (s);
+  int jumps = pw_signal_value_may_jump (s);
   if (form == NULL || pw_kind_signals_force (kind)) return;
   if (kind->level == PW_HOLONOMIC)
     snprintf (text, size,

@@ -33,7 +33,7 @@ static int elimination_degree (const pw_elimination *ldl, int p) {
 
 /* Writes a comment with the names of unknown p and its partner, which may be -1. */
 static void elimination_comment (const pw_elimination *ldl, pw_emitter *emitter, int p, int partner) {
-  char name[120];
+  char name[PW_NAME_BYTES];
   for (int k = 0, i = p; k < 1 + (partner >= 0); k++, i = partner) {
     fputs (k ? " by " : "  /* ", emitter->code);
     pw_emit_name (emitter->code, i < ldl->coordinates

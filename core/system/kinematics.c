@@ -88,7 +88,7 @@ double pw_next_breakpoint (pw_workspace *w, int kinks, double t) {
   double next = INFINITY;
   for (const pw_source *source = w->source, *end = source + w->s->sources; source < end; source++) {
     double breakpoint =
-        pw_signal_breakpoint (&source->signal, kinks && !source->of_force ? PW_JUMPS_AND_KINKS : PW_JUMPS, t);
+        pw_signal_breakpoint (&source->signal, kinks && !source->of_force ? PW_BREAKS_3 : PW_BREAKS_2, t);
     if (breakpoint < next) next = breakpoint;
     if (breakpoint > t) continue;
     w->failed = source;

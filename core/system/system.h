@@ -158,7 +158,7 @@ static inline int pw_global (const pw_element_batch *k, int e, int c) {
 typedef struct {
   double position, velocity;      /* scaled */
   double g, jv;                   /* absolute */
-  int row_position, row_velocity; /* equations with the worst scaled residuals, or -1 */
+  int row_position, row_velocity; /* equations with the worst scaled residuals; -1: none, or all are 0 */
 } pw_residuals;
 /* At the kinematics and J of the workspace; only equations with enforced[i] != 0, unless enforced is NULL. */
 void pw_evaluate_residuals (pw_workspace *w, const unsigned char *enforced, pw_residuals *r);
@@ -169,8 +169,8 @@ void pw_evaluate_velocity_residual (pw_workspace *w, const unsigned char *enforc
 void pw_worst_position (const pw_system *s, const double *g, const double *size, const unsigned char *enforced,
                         pw_residuals *r);
 
-/* The first time after t at which a step must end because of a signal, or INFINITY: PW_JUMPS of all signals; kinks: 1:
- * PW_JUMPS_AND_KINKS of those of constraints.  NaN if the breakpoint function of a signal returned no time > t. */
+/* The first time after t at which a step must end because of a signal, or INFINITY: PW_BREAKS_2 of all signals;
+ * kinks: 1: PW_BREAKS_3 of those of constraints.  NaN if the breakpoint function of a signal returned no time > t. */
 double pw_next_breakpoint (pw_workspace *w, int kinks, double t);
 
 /* 1 if a force, J or gamma is not finite at the current state; writes "force of spring S" to the buffer. */

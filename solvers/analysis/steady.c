@@ -58,7 +58,7 @@ static double steady_last_breakpoint (pw_workspace *w, double t, double span) {
  * after the last breakpoint, the time of this breakpoint, rounded up. */
 static int steady_constant (pw_steady *x, pw_error *error) {
   pw_run *r = x->system[PW_HERE].run;
-  char name[200], text[32];
+  char name[PW_NAME_BYTES], text[32];
   const double span = r->settings.span; /* with its default */
   int changed, later, status = pw_signals_change (r, x->settings.t, 0, span, &changed, error);
   if (status != PW_OK || changed < 0) return status;

@@ -112,7 +112,7 @@ double pw_steady_parameter (const pw_steady *x, const double *u);
 enum { PW_STEADY_MAX_COORDINATES = 400 }; /* since the cost is cubic */
 
 /* Opens x->system[place] for a value of the parameter, unless it is open for it.  A status, with x->why if it fails;
- * PW_RETRY: none at this value (x->why has the status of the error). */
+ * PW_INPUT: its sizes differ; PW_RETRY: none at this value (x->why has the status of the error). */
 int pw_steady_open_system (pw_steady *x, pw_place place, double value);
 void pw_steady_close_system (pw_steady *x, pw_place place);
 /* PW_INPUT and the reason unless both systems have as many bodies, coordinates and constraint equations. */

@@ -57,4 +57,10 @@ for page in README.md docs/*.md; do
     [ $bad = 0 ] || : >"$work/bad" # $bad itself is lost with this subshell
   done
 done
-[ ! -e "$work/bad" ]
+
+models=$(find models -name '*.c' -o -name '*.yaml' | sed 's,.*/,,; s/\..*//' | sort)
+[ "$models" = "$(sed -n 's/^### //p' docs/gallery.md | sort)" ]
+report "docs/gallery.md: every model" $?
+tr '\n' ' ' <docs/changelog.md | grep -q "gallery of $(echo "$models" | wc -l) models"
+report "docs/changelog.md: the number of models" $?
+[ $bad = 0 ] && [ ! -e "$work/bad" ]

@@ -1,7 +1,8 @@
 /* The search path for models: the folders of PINWHEEL_MODELS, then those of the running program and of this library.
  *
  * Folders next to the program, or one level up (tests), serve the build tree; ../lib and ../include serve an
- * installation; the folder of the library serves programs installed elsewhere. */
+ * installation; the folder of the library serves programs installed elsewhere.  The order of the folders decides only
+ * about headers and pages, of which the first is taken: a name that two models have is refused (model_file.c). */
 #define _GNU_SOURCE /* dladdr */
 #include <dirent.h>
 #include <dlfcn.h>

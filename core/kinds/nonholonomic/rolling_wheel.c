@@ -89,7 +89,7 @@ static const pw_field rolling_fields[] = {
     .about = "moment of inertia about the axle; the wheel's mass belongs to the body" },
   { PW_AT (pw_rolling_wheel, start), PW_NUMBER, .unit = "rad", .about = "initial spin angle" },
   { PW_AT (pw_rolling_wheel, rate), PW_NUMBER, .unit = "rad/s",
-    .about = "initial spin velocity; 0: from rolling at the body's initial velocity" },
+    .about = "initial spin velocity; 0, even if written: from rolling at the body's initial velocity" },
   { PW_AT (pw_rolling_wheel, torque), PW_SIGNAL, .unit = "N m",
     .about = "torque on the wheel about its axle; positive: drives along the heading" },
   { .name = NULL },
