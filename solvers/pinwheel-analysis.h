@@ -213,7 +213,7 @@ typedef struct {
   double period;      /* [s]; 0: that of the signals at each value of the parameter; with `free` the first guess */
   int periods;        /* of the signals in one of the motion, if `period` is 0; default 1 */
   int free;           /* 1: the period is sought; signals must not change with time */
-  double first, last; /* range of the parameter */
+  double first, last; /* as in pw_steady_settings */
   pw_system *(*compile) (void *context, double value, pw_error *error); /* as in pw_steady_settings */
   void *context;
   int points; /* in the range, at least; default 20 */
