@@ -146,7 +146,7 @@ static const pw_kind *build_kind (const pw_reader *r, const pw_node *node) {
   }
   const char *kind = build_later_type (first);
   if (kind) return pw_yaml_fail (r, first->at, "an element begins with its type: write {%s: NAME, ...}", kind), NULL;
-  /* Words of descriptions suggest a type: "hinge" pin, "damper" spring; but a field of any type, as "angle", does not. */
+  /* Words of descriptions suggest a type: "hinge" pin, "damper" spring; names of fields, as "angle", do not. */
   for (const pw_kind *const *k = pw_kinds; *k && !near.near && !build_is_field (first->text); k++)
     if (build_has_word ((*k)->about, first->text))
       snprintf (near.best, sizeof near.best, "%s", (*k)->name), near.near = 1;
