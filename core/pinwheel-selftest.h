@@ -27,7 +27,7 @@ typedef struct {
 
 /* Tests an element type, built-in or from a plug-in, using only its table, in a random scene and state generated
  * from the seed.  Start with a zero-initialised report; further calls with other seeds keep the worst result of each
- * check.  Failed checks are only in the report: the status is PW_OK.  Errors: PW_INPUT if the type rejects 50
+ * check.  Failed checks are only in the report: the status is PW_OK.  Errors: PW_INPUT if the type rejects 200
  * random definitions that its field table permits, PW_RESOURCE. */
 int pw_selftest (const pw_kind *kind, unsigned seed, pw_selftest_report *report, pw_error *error);
 
@@ -44,7 +44,7 @@ typedef struct {
   double scaled;   /* worst residual over its size: the sum of the absolute values of its terms, plus L/T or L/T^2; of
                     * positions g_size, at least L; of forces the largest, or mass x L/T^2, of all; inf: not finite */
   double absolute; /* largest residual, in the units of its equation; inf: not finite */
-  char name[80];   /* the equation with the worst scaled residual: "B.Fx", "frame.vx" */
+  char name[PW_NAME_BYTES]; /* the equation with the worst scaled residual: "B.Fx", "frame.vx" */
 } pw_worst_residual;
 
 typedef struct {

@@ -334,7 +334,7 @@ typedef struct {
   double radius;      /* [m], > 0 */
   double inertia;     /* about its axle [kg m^2], >= 0; its mass belongs to the body */
   double start, rate; /* initial spin angle [rad] and velocity [rad/s]; rate 0: from rolling at the body's velocity */
-  pw_signal torque;   /* on the wheel about its axle [N m]; its reaction is out of the plane */
+  pw_signal torque;   /* on the wheel about its axle [N m]; its reaction has a horizontal axis */
 } pw_rolling_wheel;
 
 /* Steered wheel: a wheel whose heading in the body follows a signal.  One nonholonomic constraint equation. */
@@ -597,7 +597,8 @@ struct pw_kind {
    * that reverses the force or changes it by its own magnitude.  Entries are INFINITY before the call. */
   pw_batch_function *saturation;
   /* Strokes in figures (core/cli/plot/plot_symbols.c); NULL: none.  Vertex "a x y": at a from the first body's point
-   * (0) to the last body's (1), plus x along and y to the left of the heading, in units of symbols; "o ...": circle. */
+   * (0) to the last body's (1), plus x along and y to the left of the heading, in units of symbols.  "o a x y r": a
+   * circle of radius r. */
   const char *symbol;
 };
 
@@ -738,6 +739,8 @@ int pw_system_find_body (const pw_system *s, const char *name);
 /* Index of a state by name: i for coordinate q[i], n + i for velocity v[i], where n is the number of coordinates.
  * PW_INPUT and the error, with the nearest name, for an unknown state. */
 int pw_system_find_state (const pw_system *s, const char *name, pw_error *error);
+
+enum { PW_NAME_BYTES = 160 }; /* size of buffers in which every name of a system fits */
 
 /* Name and unit of a state ("frame.vx", "m/s").  The name is written to the buffer, which is returned. */
 char *pw_system_state_name (const pw_system *s, int state, char *buffer, size_t size);

@@ -52,7 +52,8 @@ typedef struct {
   double time; /* T: 1 / max (1 / span, largest velocity, square root of the largest acceleration), in units of L [s] */
 } pw_scale;
 
-/* Cost of a run, and its worst constraint residuals at accepted steps; docs/theory.md defines scaled residuals. */
+/* Cost of a run, and its worst constraint residuals at accepted steps; docs/theory.md defines scaled residuals.
+ * PW_STATISTICS_COUNTS and PW_STATISTICS_RESIDUALS (util.h) list the members. */
 typedef struct {
   long steps;          /* accepted */
   long rejected;       /* repeated with another step size */

@@ -36,7 +36,7 @@ shot () {
 
 # ---- Gallery ----
 
-for model in $("$pinwheel" list models | awk '/^  [a-z]/ && $1 != "ezyroller" { print $1 }'); do
+for model in $(find models -name '*.c' -o -name '*.yaml' | sed 's,.*/,,; s/\..*//' | sort | grep -vx ezyroller); do
   draw gallery-$model mechanism run $model --plots
 done
 

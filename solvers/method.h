@@ -26,13 +26,13 @@ struct pw_run {
   int fixed_steps;             /* 1: fixed step size */
   pw_saddle *saddle;           /* matrix of M and all active rows: for accelerations, impulses */
   const unsigned char *active; /* rows: 0 for redundant ones; NULL: none is redundant */
-  int redundant;               /* number of redundant rows; the following only if there are any */
+  int redundant;               /* number of redundant rows; what follows, to reselect_below, only if there are any */
   int redundant_drive;         /* 1: one of them has an eta, so that work depends on its multiplier */
   int *redundant_row;          /* redundant: their indices */
   unsigned char *active_array; /* rows: what `active` points to */
   double *coefficient;         /* redundant x rows: each redundant row as a combination of active rows */
   double *normal;              /* redundant x (redundant + 1): normal equations in redundancy.c, right side last */
-  double *row_force;           /* coords + 3: right-hand side for the coefficients of a redundant row */
+  double *row_force;           /* coords + 3: right-hand side for the coefficients of a redundant row; 0 between uses */
   double *least_norm;          /* rows: least-norm multipliers for the ledger */
   double independence;         /* of the active rows at the state reached (rank.h) */
   double reselect_below;       /* independence below which other active rows are tried */
@@ -40,17 +40,18 @@ struct pw_run {
   struct pw_scene *scene;                   /* its data; NULL: none, or a constant pivot is too small */
   pw_thresholds thresholds;                 /* of the watchdog */
   pw_watchdog watchdog;                     /* the sine, which measures the distance from a singular configuration */
-  double refused_sine;                      /* sine below which an evaluation is refused */
-  int near_singular;                        /* 1 after an evaluation near a singular configuration */
+  double refused_sine;                      /* largest sine at which an evaluation is refused */
+  int near_singular;                        /* 1 after an evaluation near a singular configuration in the last step */
   double reference_level; /* largest acceleration norm away from singular configurations, in units of L / T^2; >= 1 */
   double previous_norm;   /* acceleration norm of the last such state */
-  int uses_derivatives;   /* 1: the method uses the derivatives of the equations (tangent.h) */
+  int uses_derivatives;   /* 1: the method uses the derivatives of the equations (tangent.h); only for opening */
   double alpha, beta;     /* Baumgarte's [1/s], used by pw_run_accelerate; 0: none */
   double breakpoint;      /* next discontinuity of a signal, or INFINITY; t if it has just been reached */
   int stalled;            /* consecutive steps that did not advance */
-  pw_residuals residuals; /* of the state reached; NaN: not computed */
+  pw_residuals residuals; /* of the state reached, until a sample is projected; NaN: not computed */
 
-  /* The state reached.  Of adams and bdf, a and lambda may be those of the last iterate until `at` is called. */
+  /* The state reached, where `advance` leaves kinematics and J evaluated.  Of adams and bdf, a and lambda may be those
+   * of the last iterate until `at` is called. */
   double t;
   double *q, *v, *a; /* coords + 3 each */
   double *lambda;    /* rows; contiguous with q, v, a: pw_state_length numbers */
@@ -58,7 +59,7 @@ struct pw_run {
   double *rate;      /* entries: powers at t */
   double projected;  /* energy added by projections up to t; only with settings.ledger; 0 in bdf */
 
-  /* The state requested from pw_run_sample. */
+  /* The state requested from pw_run_sample, where `at` leaves kinematics and J evaluated; otherwise scratch. */
   double *q_at, *v_at, *a_at, *lambda_at, *ledger_at; /* same layout */
   double projected_at;
 
@@ -73,9 +74,9 @@ struct pw_run {
   double power;               /* the largest sum of the absolute values of the ledger's rates so far [W] */
   double scene_energy;        /* kinetic energy [J] of moving by L and 1 rad in the span; if massless: see ledger.c */
   double *scratch;            /* 2 (coords + 3) + 3 rows, for projections and evaluations */
-  double *saturation;         /* 2 coords: upper bounds of tolerances; INFINITY: unbounded */
+  double *tolerance_bound;    /* 2 coords, from pw_kind.saturation; INFINITY: unbounded */
   double *matrix_state, *matrix_range; /* 2 coords: state at which the Newton matrix was evaluated, range around it
-                                        * in which it is valid; only if the system `saturates` */
+                                        * in which it is valid (pw_kind.saturation); only if the system `saturates` */
   int matrix_outdated;                 /* 1: a state reached since is outside that range */
   double *q_given, *v_given;           /* coords + 3: the values last given (opening, restart), not yet consistent */
   double *given_before;                /* 2 (coords + 3): those before a restart, which may be refused */
@@ -97,7 +98,7 @@ static inline double pw_atol (const pw_run *r, int state) {
   double atol = r->settings.rtol * pw_unit (r->s, state < n ? state : state - n);
   return state < n ? atol : atol / r->w->scale.time;
 }
-/* Updates r->saturation, the bounds of tolerances due to saturating forces, and r->matrix_outdated at the state
+/* Updates r->tolerance_bound, the bounds of tolerances due to saturating forces, and r->matrix_outdated at the state
  * reached, whose kinematics must be up to date (tolerances.c). */
 void pw_bound_tolerances (pw_run *r);
 /* Change of a state (numbered as in pw_system_find_state) from the state reached over which a saturating force changes
@@ -108,7 +109,7 @@ void pw_matrix_evaluated (pw_run *r, const double *q, const double *v);
 /* Tolerance of a state at a given value, for iterative methods.  It is bounded by the range in which a force saturates;
  * otherwise an iteration could converge to any value of the force. */
 static inline double pw_tolerance (const pw_run *r, int state, double value) {
-  return fmin (r->settings.rtol * fabs (value) + pw_atol (r, state), r->saturation[state]);
+  return fmin (r->settings.rtol * fabs (value) + pw_atol (r, state), r->tolerance_bound[state]);
 }
 
 /* ---- Fixed steps, which end at multiples of the step size after a time `base` ---- */
@@ -166,7 +167,7 @@ static inline int pw_stabilised_by (const pw_run *r, pw_stabilisation_kind kind)
 extern const char *const pw_metrics[];
 
 /* Initial step size for methods that begin with order 1: the error h^2 / T^2 is a quarter of the tolerance; states that
- * saturating forces depend on change by at most their tolerance, unless that takes less than 1e-9 T. */
+ * saturating forces depend on change by at most r->saturation, unless that takes less than 1e-9 T. */
 double pw_first_step (const pw_run *r);
 
 /* Step size of an adaptive method below which steps vanish in the round-off of the time. */
@@ -183,14 +184,16 @@ int pw_run_annotate_error (const pw_run *r, int status, pw_error *error);
  * it".  PW_METHOD if a signal fails; PW_RESOURCE. */
 int pw_run_check_derivatives (pw_run *r, const char *user, const char *needs, pw_error *error);
 
-/* Replaces the saddle, and the watchdog's, by one for the active rows; a saddle that cannot be opened is NULL. */
+/* Replaces the saddle, and the watchdog's, by one for the active rows with the J last evaluated; a saddle that cannot
+ * be opened is NULL. */
 int pw_run_open_saddle (pw_run *r, pw_error *error);
 
-/* Evaluates accelerations, multipliers and the ledger's powers at the state reached; errors contain the reason. */
+/* Evaluates accelerations, multipliers and the ledger's powers at the state reached, and calls pw_bound_tolerances.
+ * PW_METHOD with the reason if that fails. */
 int pw_run_evaluate (pw_run *r, pw_error *error);
 
-/* Restarts the watchdog at the state reached, which must be regular, and makes the independence of its active rows the
- * reference for later states. */
+/* After pw_run_evaluate at a regular state: restarts the watchdog there, and makes the independence of the active rows
+ * the reference for later states. */
 void pw_run_set_references (pw_run *r);
 
 /* pw_next_breakpoint of the run's system; with kinks for methods of order > 2: lower orders do not suffer from a kink
@@ -245,8 +248,8 @@ static inline double pw_larger_or_nan (double x, double y) {
 
 /* Norm of the accelerations at the state reached, in units of L / T^2 (watchdog.c). */
 double pw_run_acceleration_norm (const pw_run *r);
-/* Checks the state reached.  PW_METHOD if constraints are lost or contradict each other, or if the motion has jumped to
- * another branch; PW_RESOURCE. */
+/* Checks the state reached, where kinematics and J must be up to date.  PW_METHOD if constraints are lost or contradict
+ * each other, if the motion has jumped to another branch, or does not resolve a change point; PW_RESOURCE. */
 int pw_run_watchdog (pw_run *r, pw_error *error);
 
 /* ---- Limits (limits.c) ---- */
@@ -307,7 +310,7 @@ int pw_run_accelerate_evaluated (pw_run *r, const double *v, double *a, double *
 void pw_sample_reached (pw_run *r);
 
 /* Reports why the J last evaluated is unusable at time t: rank lost or nearly lost, or values too extreme
- * (singular.c). */
+ * (singular.c).  PW_METHOD. */
 int pw_fail_singular (pw_run *r, double t, pw_error *error);
 
 /* Completes r->residuals at the state just evaluated, some of which a projection may have computed, and updates the
@@ -328,7 +331,7 @@ typedef struct {
   pw_saddle *position;         /* of the metric of positions and the holonomic rows; or the run's saddle */
   int owns_position;           /* 1: position is not the run's saddle */
   pw_saddle *velocity;         /* of the metric of velocities and all rows */
-  int owns_velocity;           /* 1: velocity is not the run's saddle, since its metric is not the mass matrix */
+  int owns_velocity;           /* 1: velocity is not the run's saddle, since its metric was given */
   int iterations;              /* of the last projection of positions */
   const unsigned char *active; /* rows that are enforced; NULL: all */
   int ignores_inactive;        /* 1: the residuals of the other rows are not checked */
@@ -377,10 +380,10 @@ int pw_specialised_project (const pw_projector *p, pw_run *r, double t, double *
 /* The stages of a step, if specialised code can evaluate all of them: 1; 0 if not.  Kinematics and J are not
  * updated. */
 int pw_specialised_stages (pw_run *r, const struct pw_scene_step *x);
-/* Residuals of the state reached, unless they are known or the general engine has to evaluate them. */
+/* Both residuals of the state reached, unless one is known or the general engine has to evaluate them. */
 void pw_specialised_residuals (pw_run *r);
 
-/* 1 if specialised code can do the run's next evaluation. */
+/* 1 if specialised code may be called for the run's next evaluation; it can still refuse the state. */
 int pw_specialised_suits (const pw_run *r);
 /* Adds to the statistics: evaluations, and iterations of projections, of specialised code. */
 void pw_specialised_count (pw_run *r, long evaluations, long iterations);

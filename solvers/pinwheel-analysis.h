@@ -138,7 +138,7 @@ typedef struct {
   int holds;
   double t;           /* time at which signals are evaluated [s] */
   double span;        /* as in pw_settings, default 1 s: signals must be constant in it */
-  double first, last; /* range of the parameter */
+  double first, last; /* range of the parameter; to follow a branch they must differ */
   int vary;           /* the parameter is the value of hold[vary]; -1: it is that of `compile`, if any */
   /* Compiles the system for a value of the parameter.  The search frees it.  NULL and the error: there is no
    * system for this value.  May be NULL. */
@@ -172,7 +172,7 @@ typedef struct {
 typedef struct pw_steady pw_steady;
 
 /* Opens a search, which the system must outlive.  NULL and the error as pw_run_open; PW_INPUT with the first signal
- * that changes with time within the span. */
+ * that changes with time within the span; also if the system has more than 400 coordinates. */
 pw_steady *pw_steady_open (const pw_system *s, const pw_steady_settings *settings, pw_error *error);
 void pw_steady_close (pw_steady *x);
 
@@ -211,9 +211,9 @@ typedef struct {
   void *stop_context;
   double t;           /* initial time [s] */
   double period;      /* [s]; 0: that of the signals at each value of the parameter; with `free` the first guess */
-  int periods;        /* of the signals; default 1 */
+  int periods;        /* of the signals in one of the motion, if `period` is 0; default 1 */
   int free;           /* 1: the period is sought; signals must not change with time */
-  double first, last; /* range of the parameter */
+  double first, last; /* as in pw_steady_settings */
   pw_system *(*compile) (void *context, double value, pw_error *error); /* as in pw_steady_settings */
   void *context;
   int points; /* in the range, at least; default 20 */
@@ -248,7 +248,8 @@ typedef struct {
 typedef struct pw_periodic pw_periodic;
 
 /* Opens a search, which the system must outlive.  NULL and the error as pw_run_open; PW_INPUT with the first signal
- * that does not have the period, or with a free period changes with time. */
+ * that does not have the period, or with a free period changes with time; also if the system has more than 100
+ * coordinates, or the method has fixed steps. */
 pw_periodic *pw_periodic_open (const pw_system *s, const pw_periodic_settings *settings, pw_error *error);
 void pw_periodic_close (pw_periodic *x);
 

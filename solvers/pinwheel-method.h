@@ -1,8 +1,8 @@
 /* Integration methods of your own, compiled against the installed headers (docs/method.c is an example).
  *
  * A method is a const pw_method table (pinwheel-solvers.h).  A program passes its tables in pw_settings.methods;
- * their names then work in pw_run_open like those of built-in methods, with stabilisations and options.  The run
- * makes the initial state consistent, evaluates it, calls `open`, then `advance` for each step, which must not pass
+ * their names, other than those of built-in methods, then work in pw_run_open, with stabilisations and options.  The
+ * run makes the initial state consistent, evaluates it, calls `open`, then `advance` for each step, which must not pass
  * t_end or the next discontinuity and ends with pw_step_accept.  It monitors constraints and energy, and evaluates the
  * state again before it calls `restart` after a discontinuity.
  *
@@ -62,8 +62,8 @@ double pw_step_size (pw_run *r, double t_end);
 
 /* Ends `advance`.  `status` is that of the stages; if it is PW_OK, (q, v) at t + h becomes the state reached:
  * projected onto the constraints if the stabilisation is PW_PROJECTION (in the metric of M), with accelerations and
- * multipliers.  Work and losses are integrated by the trapezoidal rule.  q and v must not be the arrays of
- * pw_run_state.  Errors: PW_METHOD, with the reason. */
+ * multipliers.  Work and losses are integrated by the trapezoidal rule.  q and v, projected in place, must not be the
+ * arrays of pw_run_state.  Errors: PW_METHOD, with the reason. */
 int pw_step_accept (pw_run *r, int status, double h, double *q, double *v, pw_error *error);
 
 /* The other functions of the table.  Samples inside a step: q and v by cubic Hermite interpolation, of order 4,

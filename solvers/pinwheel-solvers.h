@@ -59,7 +59,7 @@ struct pw_method {
   int (*advance) (pw_run *r, double t_end, pw_error *error); /* one step, at most to t_end or a discontinuity */
   int (*at) (pw_run *r, double t, pw_error *error); /* the state in the last step that pw_run_sample requests */
   int (*restart) (pw_run *r, pw_error *error);      /* continues at the state reached, after a discontinuity */
-  void (*close) (pw_run *r);                        /* frees the data */
+  void (*close) (pw_run *r);                        /* frees the data, also what a failed `open` has left */
   /* Saves or loads what steps after a checkpoint need beyond the state: step size, counts.  NULL: the method restarts
    * at checkpoints. */
   void (*serialise) (pw_run *r, pw_archive *a);
@@ -68,11 +68,11 @@ struct pw_method {
 /* All integrators, ended by NULL. */
 extern const pw_method *const pw_methods[];
 
-/* Makes the initial state consistent and opens a method.  The system must outlive the run, which only reads it: any
- * number of runs, in any threads, may share it.  Errors: PW_INPUT for an unknown or invalid method, option or
- * setting, with the nearest valid name, and if the method uses a derivative that an element type omits though it is
- * not zero; PW_INITIAL if the initial state cannot be made consistent; PW_METHOD if it cannot be evaluated;
- * PW_RESOURCE. */
+/* Makes the initial state consistent and opens a method; settings NULL: defaults.  The system must outlive the run,
+ * which only reads it: any number of runs, in any threads, may share it.  Errors: PW_INPUT for an unknown or invalid
+ * method, option or setting, with the nearest valid name, and if the method uses a derivative that an element type
+ * omits though it is not zero; PW_INITIAL if the initial state cannot be made consistent; PW_METHOD if it cannot be
+ * evaluated; PW_RESOURCE. */
 pw_run *pw_run_open (const pw_system *s, const char *method, const pw_settings *settings, pw_error *error);
 
 /* Checks name and options of a built-in method without a system; returns integrator and index of the stabilisation. */
@@ -87,10 +87,10 @@ int pw_method_adaptive (const pw_method *integrator, const char *method);
 enum { PW_SPECIALISE_STEPS = 1000000 };
 double pw_method_steps (const char *method, const pw_settings *s, double step, double t_end);
 
-/* Makes one accepted step that does not pass t_end.  If t_end or a discontinuity equals the time reached up to
- * round-off, only the time is set to it.  PW_STOPPED, without an error, if settings.stop requested it: the run stays
- * where it was, and the next call continues.  Errors: PW_INPUT if t_end is not a number; PW_METHOD with the time
- * reached and the reason, such as max_steps; PW_RESOURCE. */
+/* Makes one accepted step that does not pass t_end; none if t_end is not after the time reached.  If t_end or a
+ * discontinuity equals the time reached up to round-off, only the time is set to it.  PW_STOPPED, without an error, if
+ * settings.stop requested it: the run stays where it was, and the next call continues.  Errors: PW_INPUT if t_end is
+ * not a number; PW_METHOD with the time reached and the reason, such as max_steps; PW_RESOURCE. */
 int pw_run_advance (pw_run *r, double t_end, pw_error *error);
 
 /* The same, or with specialised code several steps of a fixed size: they end where single ones would, and none is made

@@ -32,6 +32,10 @@ int pw_is_text (const char *text) {
   return 1;
 }
 
+int pw_is_line (const char *text) {
+  return pw_is_text (text) && text[strcspn (text, "\n\t")] == 0;
+}
+
 void pw_text_sanitise (char *text) {
   for (int n; *text; text += n) {
     n = pw_utf8_size (text);

@@ -11,7 +11,7 @@
 
 enum { PW_ELLIPTIC_STEPS = 12 }; /* a and b agree to round-off after them for any m < 1, even -1e300 */
 
-/* Stores the mean in *a, and c' / a' and c' / m of each step.  Returns the number of steps, at least 1. */
+/* m < 1.  Stores the mean in *a, and c' / a' and c' / m of each step.  Returns the number of steps, at least 1. */
 static inline int pw_elliptic_mean (double m, double *a, double c_by_a[PW_ELLIPTIC_STEPS],
                                     double c_by_m[PW_ELLIPTIC_STEPS]) {
   double b = sqrt (1 - m), c = 0;

@@ -78,8 +78,15 @@ int pw_find_name (const void *table, size_t entry_size, const char *name, char h
   return -1;
 }
 
+const char *const pw_domain_names[] = {
+  [PW_REAL] = "real",   [PW_NONNEGATIVE] = "nonnegative", [PW_POSITIVE] = "positive",
+  [PW_COUNT] = "count", [PW_FRACTION] = "fraction",       NULL
+};
+
 const char *pw_domain_text (pw_domain domain) {
-  static const char *const text[] = { "", ">= 0", "> 0", "1, 2, ...", "0 to 1" };
+  static const char *const text[] = {
+    [PW_REAL] = "", [PW_NONNEGATIVE] = ">= 0", [PW_POSITIVE] = "> 0", [PW_COUNT] = "1, 2, ...", [PW_FRACTION] = "0 to 1"
+  };
   return text[domain];
 }
 

@@ -13,6 +13,12 @@ static inline int pw_require (const void *object, const char *type, pw_error *er
   return object ? PW_OK : pw_fail (error, PW_INPUT, "%s is missing", type);
 }
 
+/* ---- Members of pw_statistics, as checkpoints and JSON contain them ---- */
+
+#define PW_STATISTICS_COUNTS(X) \
+  X (steps) X (rejected) X (rhs) X (jacobians) X (factorisations) X (restarts) X (specialised)
+#define PW_STATISTICS_RESIDUALS(X) X (position) X (velocity) X (g) X (jv)
+
 /* ---- Nearest names, domains of numbers (nearest.c) ---- */
 
 enum { PW_HINT = 140 }; /* "; did you mean \"...\"?" with the longest name */
@@ -35,6 +41,7 @@ const char *pw_nearest_text (pw_nearest *n);
 /* The index of a name in a table whose entries, of `entry_size` bytes, begin with a name and whose last name is NULL;
  * -1, with the hint of pw_nearest_text, if the name is not there.  A table that is NULL has no entries. */
 int pw_find_name (const void *table, size_t entry_size, const char *name, char hint[PW_HINT]);
+extern const char *const pw_domain_names[]; /* "real", ..., NULL; as text models and pages write them */
 /* "", ">= 0", "> 0", "1, 2, ...", "0 to 1" */
 const char *pw_domain_text (pw_domain domain);
 /* "" if a value lies in the domain, else the expected one ("a number >= 0"). */
@@ -59,10 +66,12 @@ static inline double pw_value_within (double first, double last) {
 
 /* Bytes of the UTF-8 character at the beginning of a text; 0 if invalid. */
 int pw_utf8_size (const char *text);
-/* Code of the control character at the beginning of a text; 0 if there is none, or a line end or tab. */
+/* Code of the control character at the beginning of a text; 0 if there is none, or a line end (\n only) or tab. */
 int pw_control (const char *text);
 /* 1 if a text is UTF-8 without control characters other than line ends and tabs. */
 int pw_is_text (const char *text);
+/* 1 if a text is one line of UTF-8 without control characters, as names and units are. */
+int pw_is_line (const char *text);
 /* Replaces invalid bytes, and control characters other than line ends and tabs, by question marks. */
 void pw_text_sanitise (char *text);
 /* Prints into a buffer, which is returned; what does not fit is cut off. */
@@ -70,7 +79,7 @@ char *pw_print (char *buffer, size_t size, const char *format, ...) PW_PRINTF (3
 /* The same into a buffer of its own, which lives as long as the block around it. */
 #define PW_PRINTED(size, ...) pw_print ((char[size]){ 0 }, size, __VA_ARGS__)
 /* The result of pw_system_state_name, or a function like it, in such a buffer. */
-#define PW_NAME(function, s, i) function (s, i, (char[300]){ 0 }, 300)
+#define PW_NAME(function, s, i) function (s, i, (char[PW_NAME_BYTES]){ 0 }, PW_NAME_BYTES)
 
 /* ---- Streams into memory (stream.c) ---- */
 
@@ -78,7 +87,7 @@ typedef struct {
   char *text;        /* zero-terminated; up to date after fflush */
   size_t size, room; /* bytes of the text; allocated */
 } pw_stream;
-FILE *pw_stream_open (pw_stream *t); /* NULL if out of memory */
+FILE *pw_stream_open (pw_stream *t); /* NULL if out of memory; close it even then */
 /* Closes f.  PW_RESOURCE, and t->text is NULL, if f is NULL or any part of the text is missing.  Free t->text. */
 int pw_stream_close (FILE *f, pw_stream *t);
 

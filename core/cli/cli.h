@@ -191,10 +191,10 @@ int pw_cli_apply (pw_model *m, const char *option, const char **list,
 /* The parameter of a model of this name; NULL: there is none. */
 const pw_parameter *pw_cli_parameter (const pw_model *m, const char *name);
 
-enum { PW_STATE_NAME = 300, PW_CHANGE_TEXT = 400 };
+enum { PW_CHANGE_TEXT = 400 };
 /* A state, and its values before and after the consistent initialisation. */
 typedef struct {
-  char name[PW_STATE_NAME];
+  char name[PW_NAME_BYTES];
   const char *unit;
   double given, consistent;
 } pw_state_change;

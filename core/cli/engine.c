@@ -22,7 +22,7 @@ static void engine_keep_reason (pw_cli_engine *e, const pw_system *s, int has_te
   if (has_text)
     reason = error->status == PW_INPUT    ? "no C compiler"
              : error->status == PW_METHOD ? "the generated code does not compile"
-                                          : "the compiled code cannot be loaded";
+                                          : "the generated code cannot be compiled or loaded";
   snprintf (e->reason, sizeof e->reason, "%.190s", reason);
 }
 

@@ -71,6 +71,7 @@ int main (int argc, char **argv) {
   /* A closed pipe or a file size limit makes writes fail, which is handled like other errors. */
   signal (SIGPIPE, SIG_IGN);
   signal (SIGXFSZ, SIG_IGN);
+  signal (SIGCHLD, SIG_DFL);    /* if it is ignored, the exit status of gnuplot is not known */
   unsetenv ("POSIXLY_CORRECT"); /* with this variable popt does not accept options after the model */
   int status = main_dispatch (argc, (const char **)(void *)argv);
   pw_error error = { 0 };

@@ -258,7 +258,7 @@ int pw_npz_end (pw_npz *z, pw_error *error);
  * written when the table is closed; it cannot continue a file (PW_INPUT).  PW_RESOURCE; PW_METHOD if a signal fails. */
 typedef struct pw_csv pw_csv;
 pw_csv *pw_csv_open (const pw_system *s, int ledger, pw_output *o, pw_error *error);
-int pw_csv_write (pw_csv *c, const pw_system *s, const pw_sample *sample, pw_error *error);
+int pw_csv_write (pw_csv *c, const pw_system *s /* not used */, const pw_sample *sample, pw_error *error);
 int pw_csv_close (pw_csv *c, pw_error *error); /* the output stays open; c may be NULL */
 
 /* ---- JSON ---- */

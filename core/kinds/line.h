@@ -1,11 +1,12 @@
-/* A point of body 1 on a line of body 2: the equation shared by slot, slider, drive and sliding-friction.
+/* A point of body 1 on a line of body 2: the equation of slot and slider.  In a drive g equals the signal; to
+ * sliding-friction g is the position along n.
  *
  *   g     = n . D - c = 0,  D = r1 + R(phi1) s1 - r2,  c = n . R(phi2) s2           (1 holonomic equation)
  *   G     = [ n  t.a | -n  -t.D ]             t: along the line, n: t turned by +90 degrees, a = R(phi1) s1
  *   gamma = -v.H v = 2 omega2 t.(r1' - r2') + omega1 (omega1 - 2 omega2) n.a + omega2^2 n.D      so that G v' = gamma
  *
- * With dn/dphi2 = -t and dt/dphi2 = n, the entries of H = d2g/dq2 are -t and t over (r1, phi2) and (r2, phi2), -n.a
- * over (phi1, phi1), n.a over (phi1, phi2) and -n.D over (phi2, phi2).
+ * By dn/dphi2 = -t and dt/dphi2 = n, the non-zero blocks of the symmetric H = d2g/dq2 are H(r1, phi2) = -t,
+ * H(r2, phi2) = t, H(phi1, phi1) = -n.a, H(phi1, phi2) = n.a and H(phi2, phi2) = -n.D.
  * (Haug 1989, Computer Aided Kinematics and Dynamics of Mechanical Systems, section 3.3.) */
 #ifndef PW_LINE_H
 #define PW_LINE_H
@@ -25,7 +26,7 @@ typedef struct {
 typedef struct {
   const line *constants;
   const pw_configuration *body1, *body2;
-  const double *w, *u;           /* the vector w of jw_q, else NULL; the signal of a drive, with two time derivatives */
+  const double *w;               /* the vector w of jw_q, else NULL */
   double n[2], t[2], a[2], D[2]; /* in world axes */
   double na, nD, ta, tD;         /* n.a, n.D, t.a, t.D */
 } line_state;
@@ -36,10 +37,10 @@ static inline line line_make (const double at[2][2], double heading) {
   return out;
 }
 
-/* A line of element e of a batch of elements with two bodies and at most one signal. */
+/* A line of element e of a batch of elements with two bodies. */
 static inline line_state line_of (const line *constants, const pw_batch *batch, int e) {
   const pw_configuration *body1 = batch_body (batch, 2 * e), *body2 = batch_body (batch, 2 * e + 1);
-  line_state now = { constants, body1, body2, .w = batch_w (batch, e), .u = batch->u + 3 * e };
+  line_state now = { constants, body1, body2, .w = batch_w (batch, e) };
   to_world (body2, constants->n, now.n);
   to_world (body1, constants->s1, now.a);
   now.t[0] = now.n[1], now.t[1] = -now.n[0];
@@ -82,7 +83,7 @@ static inline void line_multiply_H (const line_state *now, double factor, const 
   out[5] = factor * (now->na * w[2] - now->nD * w[5] - now->t[0] * (w[0] - w[3]) - now->t[1] * (w[1] - w[4]));
 }
 
-/* out = factor H, 6 x 6 */
+/* out = factor H, 6 x 6: entry (i, j) is out[6 i + j]; coordinates x1, y1, phi1, x2, y2, phi2 */
 static inline void line_scaled_H (const line_state *now, double factor, double *out) {
   memset (out, 0, 36 * sizeof *out);
   out[5] = out[30] = -factor * now->t[0], out[11] = out[31] = -factor * now->t[1];
@@ -113,12 +114,13 @@ PER_ELEMENT (line_gamma_v, line, 6) {
 }
 
 /* Fields of a definition: the arguments of line_make. */
-#define LINE_FIELDS(type)                                                                                         \
-  { PW_AT (type, at), PW_POINT,      .count = 2,                                                                  \
-    .unit = "m",      .required = 1, .about = "the point, and a point of the line, in each body's frame" },       \
-  {                                                                                                               \
-    PW_AT (type, heading), PW_NUMBER, .unit = "rad",                                                              \
-                                      .about = "direction of the line in the second body's frame; 0: along its x" \
+#define LINE_FIELDS(type)                                                                                              \
+  { PW_AT (type, at), PW_POINT,                                                                                        \
+    .count = 2,       .unit = "m",                                                                                     \
+    .required = 1,    .about = "the point in the first body's frame, and a point of the line in the second's" },       \
+  {                                                                                                                    \
+    PW_AT (type, heading), PW_NUMBER, .unit = "rad",                                                                   \
+                                      .about = "direction of the line in the second body's frame; 0: along its x axis" \
   }
 
 #endif

@@ -46,9 +46,9 @@ char *pw_field_value_name (const pw_field *f, int i, char *buffer, size_t size) 
 _Static_assert(PW_NAME_MAX == 50, "as in FAULT_TEXT");
 #define FAULT_TEXT ": expected at most 50 bytes of UTF-8 without control characters"
 
-/* 1 if a name or unit is too long or not one line of text: it would spoil tables and files. */
+/* 1 if a name or unit is too long or not one line: it would spoil tables and files. */
 static int is_bad_text (const char *text) {
-  return strlen (text) > PW_NAME_MAX || !pw_is_text (text) || strpbrk (text, "\n\t");
+  return strlen (text) > PW_NAME_MAX || !pw_is_line (text);
 }
 
 /* The fault of one field, or "". */

@@ -37,8 +37,8 @@ struct pw_model {
   pw_error error;       /* the first error */
 };
 
-/* The longest name [bytes]: "KIND ELEMENT" and "ELEMENT.REACTION" fit in a buffer of 120. */
-enum { PW_NAME_MAX = 50 };
+enum { PW_NAME_MAX = 50 }; /* bytes of the longest name of a body, element, field, ... */
+_Static_assert(PW_NAME_BYTES >= 3 * PW_NAME_MAX + 10, "room for \"KIND ELEMENT: FIELD[3]\"");
 
 /* Checks every body and element: names, numbers, signals, and whether the table has the bodies of elements: numbers
  * below m->bodies. */

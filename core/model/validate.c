@@ -1,13 +1,13 @@
-/* Checks the table of a plug-in; before a model is compiled, its bodies, and its elements by their types' fields. */
+/* Checks the table of a plug-in, and the bodies and elements of a model, before these are used. */
 #include <ctype.h>
 #include <string.h>
 #include "model.h"
 #include "signal.h"
 
-/* Texts must pass pw_is_text, since they are printed and written to JSON. */
+/* Names and units are one line, since tables have them in their heads; a description may have several lines. */
 static int check_parameter (const pw_plugin_table *t, const pw_parameter *p, const char *what, pw_error *error) {
   const char *expected = pw_domain_check (p->domain, p->value);
-  if (!pw_is_text (p->name) || (p->unit && !pw_is_text (p->unit)) || (p->about && !pw_is_text (p->about)))
+  if (!pw_is_line (p->name) || (p->unit && !pw_is_line (p->unit)) || (p->about && !pw_is_text (p->about)))
     return pw_fail (error, PW_INPUT,
                     "%s: name, unit or meaning of parameter %s is not text: expected UTF-8 without control characters",
                     what, p->name);
@@ -46,10 +46,11 @@ static int check_name (const pw_model *m, const char *type, const char *name, pw
   if (strcmp (name, "ground") == 0)
     return pw_fail (error, PW_INPUT, "model %s: %s \"ground\": this name is reserved for the ground", m->name, type);
   int valid = pw_is_text (name);
-  for (const char *c = name; *c; c++) valid &= isalnum ((unsigned char)*c) || *c == '_' || *c == '-' || *c & 0x80;
+  for (const unsigned char *c = (const unsigned char *)name; *c; c++)
+    valid &= isalnum (*c) || *c == '_' || *c == '-' || *c >= 0x80; /* the latter: any character beyond ASCII */
   if (valid) return PW_OK;
-  return pw_fail (error, PW_INPUT, "model %s: %s \"%s\": a name consists of letters, digits, _ and -", m->name, type,
-                  name);
+  return pw_fail (error, PW_INPUT, "model %s: %s \"%s\": expected letters, digits, _, - and characters beyond ASCII",
+                  m->name, type, name);
 }
 
 int pw_model_check_body (const pw_model *m, const pw_body *b, pw_error *error) {
@@ -72,6 +73,7 @@ int pw_model_check_body (const pw_model *m, const pw_body *b, pw_error *error) {
   return PW_OK;
 }
 
+/* names: of all bodies of the model, or NULL while it is built: then any name passes. */
 static int check_body_name (const pw_model *m, const pw_element *e, const char *body, const pw_names *names,
                             pw_error *error) {
   const char *kind = e->kind->name, *name = pw_element_name (e);
@@ -87,7 +89,7 @@ static int check_body_name (const pw_model *m, const pw_element *e, const char *
                   pw_nearest_text (&near));
 }
 
-/* ---- Values: the fault is written to `text`, or nothing ---- */
+/* ---- Values: these functions write what is wrong, if anything, to `text` ---- */
 
 static void check_numbers (const pw_field *f, const double *value, char *text, size_t size) {
   for (int k = 0; k < (f->type == PW_NUMBER ? 1 : 2) && !*text; k++) {
@@ -104,8 +106,8 @@ static void check_choice (const pw_field *f, int value, char *text, size_t size)
 
 static int check_field (const pw_model *m, const pw_element *e, const pw_field *f, const pw_names *names,
                         pw_error *error) {
-  char name[80], fault[300];
-  int point;
+  char name[PW_NAME_BYTES], fault[300];
+  int point; /* the faulty point of a table; not used here */
   for (int i = 0; i < pw_field_count (f); i++) {
     const void *at = (const char *)e->definition + f->offset + (size_t)i * pw_field_bytes (f->type);
     *fault = 0;
@@ -122,7 +124,6 @@ static int check_field (const pw_model *m, const pw_element *e, const pw_field *
 
 /* ---- Elements and models ---- */
 
-/* names NULL: whether the bodies exist is not checked. */
 static int check_element (const pw_model *m, const pw_element *e, const pw_names *names, pw_error *error) {
   if (check_name (m, e->kind->name, pw_element_name (e), error) != PW_OK) return PW_INPUT;
   for (const pw_field *f = e->kind->fields; f->name; f++)

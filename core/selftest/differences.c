@@ -9,7 +9,8 @@ static const char *const differences_name[PW_BLOCKS] = {
   [PW_GAMMA_V] = "gamma_v", [PW_FORCE_Q] = "force_q", [PW_FORCE_V] = "force_v",
 };
 
-/* The batch and type of block i of those by differences, or NULL; PW_JTL_Q is not counted: a type gives it by jw_q. */
+/* The batch of the i-th block that is computed by differences, and which *block of it, a pw_block; NULL if there are
+ * fewer.  PW_JTL_Q is not counted: a type gives it by jw_q. */
 static const pw_element_batch *differences_find (const pw_system *s, int i, int *block) {
   for (const pw_element_batch *k = s->batch; k < s->batch + s->batches; k++)
     for (*block = 0; *block < PW_BLOCKS; ++*block)
@@ -34,7 +35,7 @@ char *pw_system_difference_name (const pw_system *s, int i, char *buffer, size_t
 
 /* ---- Missing blocks ---- */
 
-/* Tests the first, the last and a middle element of the batch. */
+/* Tests each block of the first, the last and a middle element of the batch: 1 if one is missing, with its name. */
 static int differences_test (const pw_workspace *w, pw_element_batch *k, char *buffer, size_t size) {
   const int element[] = { 0, k->b.count - 1, k->b.count / 2 };
   for (int block = 0; block < PW_BLOCKS; block++)
@@ -67,6 +68,7 @@ int pw_find_missing_block (pw_workspace *w, double t, const double *q, const dou
   int not_built_in = 0, found = 0;
   for (pw_element_batch *k = w->batch; k < w->batch + s->batches; k++) not_built_in += !pw_kind_is_built_in (k->kind);
   if (not_built_in == 0) return 0;
+  /* near the given state, at which blocks may vanish by chance or by symmetry */
   double *state = malloc ((2 * (size_t)s->coords + 1) * sizeof *state);
   if (state == NULL) return PW_RESOURCE;
   for (int i = 0; i < 2 * s->coords; i++) {

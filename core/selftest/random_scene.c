@@ -96,7 +96,7 @@ static pw_system *scene_try (const pw_kind *kind, pw_random *random, pw_error *e
 }
 
 pw_system *pw_random_scene (const pw_kind *kind, pw_random *random, pw_error *error) {
-  for (int i = 0; i < 50; i++) { /* the type may reject inconsistent numbers */
+  for (int i = 0; i < 200; i++) { /* the type may reject inconsistent numbers */
     *error = (pw_error){ 0 };
     pw_system *s = scene_try (kind, random, error);
     if (s || error->status != PW_INPUT) return s;

@@ -18,7 +18,7 @@ typedef struct {
   int width; /* largest number of values per element in any comparison; arrays have elements x width entries */
   double *plus, *minus, *derivative; /* a function after steps forwards and backwards; its derivative by differences */
   double *value, *terms;             /* what is compared with it; the sum of the absolute values of its terms */
-  double *size;                      /* of g: g_size; of other functions: 0 */
+  double *size;                      /* in the check of J: g_size; in other checks: 0 */
   double *error, *expected;          /* the least error of all steps; the derivative by differences of that step */
   double *block;                     /* elements x width x width */
   char *memory;

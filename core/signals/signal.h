@@ -11,25 +11,25 @@ typedef struct {
   const int *state; /* their indices: coordinate j, or coordinates + j for a velocity */
   double *x;        /* 2 reads: values of these states, then the gradient */
   double *spline;   /* of a table: see pw_table_spline */
-  double *u;        /* 3: receives value, first and second time derivative */
+  double *u;        /* 3: receives value, first and second time derivative; x, u: NULL except in a workspace */
   int of_force;     /* 1: belongs to a force, which needs no derivatives */
 } pw_source;
 
 /* Stores value, first and second time derivative at time t in source->u; of a force's signal the derivatives are
- * meaningless.  source->x: the states that a function reads.  Returns non-zero, which stops the run, if the user's
- * function returns it or computes values that are not finite. */
+ * meaningless.  source->x: the states that a function reads.  Returns non-zero if the user's function does so or
+ * computes values that are not finite. */
 int pw_signal_eval (const pw_source *source, double t);
 
-/* Times at which a step must end. */
+/* Times at which a step must end: the signal or a derivative up to this order jumps. */
 typedef enum {
-  PW_DISCONTINUITIES,          /* of the signal, its first or second derivative; start and end of a smooth-step */
-  PW_DISCONTINUITIES_AND_KINKS /* also kinks of the second derivative: the points of a cubic table */
+  PW_BREAKS_2, /* second; and at the start and end of a smooth-step */
+  PW_BREAKS_3  /* third: also at the points of a cubic table */
 } pw_breakpoints;
 
 /* The first such time after t, or INFINITY; of a function signal, what its breakpoint function returns. */
 double pw_signal_breakpoint (const pw_signal *s, pw_breakpoints which, double t);
 
-/* 1 if the value, not only a derivative, may jump: of a pulse, and of a function, of which this is not known. */
+/* 1 if the value may jump: that of a pulse; that of a function, of which this is not known. */
 int pw_signal_value_may_jump (const pw_signal *s);
 
 /* ---- Tables (table.c) ---- */

@@ -93,5 +93,5 @@ double pw_table_breakpoint (const pw_signal *s, pw_breakpoints which, double t) 
   int n = s->table.count, next = table_passed (s, t);
   if (next == n) return INFINITY;
   int in_spline = s->table.interpolation == PW_CUBIC && next > 0;
-  return s->table.t[in_spline && which == PW_DISCONTINUITIES ? n - 1 : next];
+  return s->table.t[in_spline && which == PW_BREAKS_2 ? n - 1 : next];
 }

@@ -33,7 +33,7 @@ static int elimination_degree (const pw_elimination *ldl, int p) {
 
 /* Writes a comment with the names of unknown p and its partner, which may be -1. */
 static void elimination_comment (const pw_elimination *ldl, pw_emitter *emitter, int p, int partner) {
-  char name[120];
+  char name[PW_NAME_BYTES];
   for (int k = 0, i = p; k < 1 + (partner >= 0); k++, i = partner) {
     fputs (k ? " by " : "  /* ", emitter->code);
     pw_emit_name (emitter->code, i < ldl->coordinates
@@ -121,7 +121,8 @@ static void elimination_pivot (pw_elimination *ldl, pw_emitter *emitter, int p, 
         elimination_update (ldl, emitter, i, j, FACTOR (i, p), AT (j, p));
 }
 
-/* Eliminates a massless coordinate c and an equation r with the pivot [ 0 d ; d 0 ]. */
+/* Eliminates a massless coordinate c and an equation r with the pivot [ 0 d ; d 0 ].  FACTOR (k, c) = K_kc / d is the
+ * entry of L in column r. */
 static void elimination_pair (pw_elimination *ldl, pw_emitter *emitter, int c, int r) {
   elimination_comment (ldl, emitter, c, r);
   elimination_place (ldl, c, r);

@@ -78,5 +78,7 @@ int pw_sparsity_find (const pw_kind *kind, pw_sparsity *out) {
     memset (out, PW_ENTRY_VARIABLE, offsetof (pw_sparsity, length));
     memset (out->length, 0, sizeof out->length);
   }
+  if (kind->force && memchr (out->force, PW_ENTRY_VARIABLE, sizeof out->force) == NULL)
+    memset (out->force, PW_ENTRY_VARIABLE, sizeof out->force);
   return status;
 }

@@ -15,7 +15,8 @@ typedef struct {
 } pw_sparsity;
 
 /* All entries of a plug-in's type count as variable: the force of a wall, for example, is 0 at most states.  So do
- * those of a type that rejects random definitions.  PW_OK or PW_RESOURCE. */
+ * those of a type that rejects random definitions, and those of a force that is 0 at all these states.  PW_OK or
+ * PW_RESOURCE. */
 int pw_sparsity_find (const pw_kind *kind, pw_sparsity *out);
 
 #endif

@@ -16,7 +16,8 @@ typedef struct {
 
 enum { SPECIALISE_TEXTS = sizeof source_texts / sizeof *source_texts };
 
-/* Writes the text of a source file, unless it is marked in `done`, after the texts of the headers that it includes. */
+/* Writes the text of a source file, unless it is marked in `done` or not in source_texts (pinwheel.h), after the texts
+ * of the headers that it includes. */
 static void specialise_text (FILE *out, const char *name, unsigned char done[SPECIALISE_TEXTS]) {
   char header[80], hint[PW_HINT];
   const int i = pw_find_name (source_texts, sizeof *source_texts, name, hint);
@@ -73,7 +74,7 @@ static void specialise_constants (const pw_generator *gen) {
   pw_specialise_list (gen->out, "HOLONOMIC", s->holonomic);
   pw_specialise_list (gen->out, "INTERNAL", s->coords - 3 * s->bodies);
   specialise_coordinates (gen->out, s->coords);
-  char name[120];
+  char name[PW_NAME_BYTES];
   for (int b = 0; b < s->bodies; b++) specialise_comment (gen->out, "body", b, s->body_name[b]);
   for (int i = 0; i < s->rows; i++)
     specialise_comment (gen->out, "equation", i, pw_system_reaction_name (s, i, name, sizeof name));

@@ -48,7 +48,8 @@ void pw_specialise_signals (const pw_generator *gen);
 /* #define EACH_name(X) X (0) X (1) ...: a loop without a counter, so that arrays stay in registers. */
 void pw_specialise_list (FILE *out, const char *name, int n);
 
-/* Writes the tables of the data that code for several runs copies from each. */
+/* Writes the tables of the data that code for several runs copies from each; after pw_specialise_algebra, which counts
+ * the constants. */
 void pw_specialise_data (const pw_generator *gen);
 
 /* Writes products with J, factorisations and solutions; fills gen->prepare.  Returns as pw_elimination_open. */

@@ -1,7 +1,7 @@
 /* Compiles a model: names become indices, the elements of each type become one batch.
  *
- * All arrays of the system but that of the batches are in its arena.  Data needed only during compilation are in
- * `scratch`. */
+ * All arrays of the system but that of the batches are in its arena; `scratch` has data needed only during
+ * compilation. */
 #include <limits.h>
 #include <math.h>
 #include <stdlib.h>
@@ -353,7 +353,7 @@ pw_system *pw_system_compile (const pw_model *m, pw_error *error) {
   int status = PW_OK;
   if (!m->built)
     status = pw_fail (error, PW_INPUT, "model %s: pw_system_compile before pw_model_build", m->name);
-  else if (m->error.status != PW_OK) /* from something added after pw_model_build */
+  else if (m->error.status != PW_OK) /* from pw_model_build, or from something added after it */
     status = pw_fail (error, m->error.status, "%s", m->error.text);
   else
     status = job.s ? compile_all (&job) : compile_no_memory (&job);

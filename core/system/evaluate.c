@@ -100,7 +100,7 @@ double pw_kinetic (const pw_system *s, const double *v) {
   return sum / 2;
 }
 
-/* out = J x for a batch; `bodies` and `internal` are constants after inlining. */
+/* out = J x for a batch; for frequent types `bodies` and `internal` are constants after inlining. */
 PW_INLINE void evaluate_multiply_J (const pw_system *s, const pw_element_batch *k, const double *x, double *out,
                                     int bodies, int internal) {
   static const double ground[3] = { 0, 0, 0 };

@@ -12,7 +12,7 @@ void pw_point_to_internal (pw_workspace *w, const double *q, const double *v) {
   }
 }
 
-/* Two bodies at a time; the last of an odd number, and all from the first angle beyond the limit on, one by one. */
+/* Two bodies at a time; singly the last of an odd number, and all from a pair with an angle beyond the limit on. */
 static inline void kinematics_configurations (pw_workspace *w, const double *q, const double *v) {
   if (w->s->coords > 3 * w->s->bodies) pw_point_to_internal (w, q, v);
   pw_configuration *p = w->configuration, *end = p + w->s->bodies;
@@ -87,8 +87,8 @@ void pw_hold_signals (pw_workspace *w, int hold) {
 double pw_next_breakpoint (pw_workspace *w, int kinks, double t) {
   double next = INFINITY;
   for (const pw_source *source = w->source, *end = source + w->s->sources; source < end; source++) {
-    double breakpoint = pw_signal_breakpoint (
-        &source->signal, kinks && !source->of_force ? PW_DISCONTINUITIES_AND_KINKS : PW_DISCONTINUITIES, t);
+    double breakpoint =
+        pw_signal_breakpoint (&source->signal, kinks && !source->of_force ? PW_BREAKS_3 : PW_BREAKS_2, t);
     if (breakpoint < next) next = breakpoint;
     if (breakpoint > t) continue;
     w->failed = source;

@@ -57,7 +57,7 @@ void pw_evaluate_ledger (pw_workspace *w, const double *lambda, double *rate) {
       rate[i] = k->block[entry->element];
       continue;
     }
-    rate[i] = 0; /* the constraint force -J^T lambda does the work -lambda . J v = -lambda . eta */
+    rate[i] = 0; /* the constraint force -J^T lambda has the power -lambda . J v = -lambda . eta */
     for (int r = 0, n = k->kind->rows; r < n; r++)
       rate[i] -= k->b.lambda[entry->element * n + r] * eta[entry->element * n + r];
   }

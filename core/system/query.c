@@ -34,7 +34,7 @@ int pw_system_jumps (const pw_system *s, double t) {
   /* the other signals of forces are continuous, and their derivatives are not used */
   for (const pw_source *source = s->source, *end = source + s->sources; source < end; source++)
     if (!source->of_force || pw_signal_value_may_jump (&source->signal))
-      if (pw_signal_breakpoint (&source->signal, PW_DISCONTINUITIES, t - near) <= t + near) return 1;
+      if (pw_signal_breakpoint (&source->signal, PW_BREAKS_2, t - near) <= t + near) return 1;
   return 0;
 }
 
@@ -100,7 +100,7 @@ typedef char *query_name (const pw_system *s, int i, char *buffer, size_t size);
  * else the nearest name.  what: "state", ... */
 static int query_find (const pw_system *s, const char *what, int (*count_of) (const pw_system *s), query_name *name_of,
                        pw_nearest *near, pw_error *error) {
-  char text[120];
+  char text[PW_NAME_BYTES];
   if (pw_require (s, "a system", error) != PW_OK) return PW_INPUT;
   if (near->sought == NULL) return pw_fail (error, PW_INPUT, "model %s: the name of a %s is missing", s->model, what);
   int count = count_of (s), search = *near->best == 0;

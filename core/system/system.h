@@ -118,7 +118,8 @@ int pw_update_signals (pw_workspace *w, double t, const double *q, const double 
 /* Points the batches to the internal coordinates in q, v; q NULL: only to their velocities. */
 void pw_point_to_internal (pw_workspace *w, const double *q, const double *v);
 
-/* 1: the signals of forces keep their values from now on; 0: they follow time and states again. */
+/* 1: the signals of forces keep their values from now on; 0: they follow time and states again.  Call
+ * pw_update_kinematics before pw_update_velocities then. */
 void pw_hold_signals (pw_workspace *w, int hold);
 
 /* ---- Evaluations; arrays over constraint equations have `rows` entries, f has `coords` + 3 ---- */
@@ -157,7 +158,7 @@ static inline int pw_global (const pw_element_batch *k, int e, int c) {
 typedef struct {
   double position, velocity;      /* scaled */
   double g, jv;                   /* absolute */
-  int row_position, row_velocity; /* equations with the worst scaled residuals, or -1 */
+  int row_position, row_velocity; /* equations with the worst scaled residuals; -1: none, or all are 0 */
 } pw_residuals;
 /* At the kinematics and J of the workspace; only equations with enforced[i] != 0, unless enforced is NULL. */
 void pw_evaluate_residuals (pw_workspace *w, const unsigned char *enforced, pw_residuals *r);
@@ -168,9 +169,8 @@ void pw_evaluate_velocity_residual (pw_workspace *w, const unsigned char *enforc
 void pw_worst_position (const pw_system *s, const double *g, const double *size, const unsigned char *enforced,
                         pw_residuals *r);
 
-/* The first time after t at which a step must end because of a signal, or INFINITY: PW_DISCONTINUITIES of all signals;
- * kinks: 1: PW_DISCONTINUITIES_AND_KINKS of those of constraints.  NaN if the breakpoint function of a signal returned
- * no time > t. */
+/* The first time after t at which a step must end because of a signal, or INFINITY: PW_BREAKS_2 of all signals;
+ * kinks: 1: PW_BREAKS_3 of those of constraints.  NaN if the breakpoint function of a signal returned no time > t. */
 double pw_next_breakpoint (pw_workspace *w, int kinks, double t);
 
 /* 1 if a force, J or gamma is not finite at the current state; writes "force of spring S" to the buffer. */

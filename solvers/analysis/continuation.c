@@ -106,8 +106,8 @@ static int branch_parabolic (const pw_branch *b, const pw_branch_point *from, co
   return slope * end >= 0 || fabs (change - (slope + end) / 2) <= error;
 }
 
-/* Whether two points are on one smooth branch: the chord between them has the direction of the sum of their
- * tangents. */
+/* Whether two points are on one smooth branch: their tangents differ little, the chord between them has the direction
+ * of the sum of these, and branch_parabolic holds. */
 static int branch_smooth (const pw_branch *b, const pw_branch_point *from, const pw_branch_point *to) {
   double chord = branch_distance (b, to->u, from->u), dot = 0, off = 0;
   for (int j = 0; j <= b->problem.unknowns; j++) dot += from->tangent[j] * to->tangent[j];
@@ -193,7 +193,7 @@ static int branch_between (pw_branch *b, const pw_branch_point *from, const pw_b
 
 /* The Illinois variant of regula falsi (Dowell & Jarratt 1971), every fourth step a bisection.  The bracket s[0], s[1]
  * consists of fractions of the cubic between b->side[0] and b->side[1].  Points to which Newton's method converges
- * become ends of this cubic; `scale` is its length, relative to the step. */
+ * become ends of this cubic if the branch is smooth there; `scale` is its length, relative to the step. */
 int pw_branch_locate (pw_branch *b, pw_branch_test *test, void *context, pw_error *error) {
   pw_branch_point *point = &b->found;
   double s[2] = { 0, 1 }, f[2], middle, value, scale = 1;

@@ -29,7 +29,7 @@ typedef struct {
 typedef struct {
   double *u, *tangent; /* unknowns + 1 each; the tangent has unit length */
   double residual;     /* largest |F_i| */
-  int interpolated;    /* 1: on the cubic through two points, since Newton's method did not converge */
+  int interpolated;    /* 1: on the cubic through two points: Newton's method did not converge nearby */
 } pw_branch_point;
 
 /* What a point is; users number their own events from PW_BRANCH_OTHER. */
@@ -60,7 +60,7 @@ typedef struct {
   int iterations;  /* of the last solution */
   double residual; /* largest |F_i| there, or where the iteration stopped; INFINITY: it could not begin */
   int folded;      /* 1: p has an extremum between the last two points */
-  /* Points of the last step not yet returned, in order; those before the last one are events. */
+  /* Points of the last step, in order; those before the last one are events.  `returned` of them have been returned. */
   pw_branch_event queue[PW_BRANCH_QUEUE];
   int queued, returned;
   /* private; F, J and pivot serve callers as scratch, too */
@@ -91,7 +91,7 @@ int pw_branch_solve (pw_branch *b, double *u, pw_error *error);
  * at a fold. */
 int pw_branch_start (pw_branch *b, const double *u, double direction, pw_error *error);
 
-/* Moves to the next point.  The step length adapts to the curvature of the branch.  PW_RETRY if no step of length
+/* Moves to the next point.  The step length adapts to the curvature of the branch.  PW_RETRY if no step down to
  * min_step converges to a point nearby on a smooth branch.  Branches that bifurcate from it are not followed. */
 int pw_branch_step (pw_branch *b, pw_error *error);
 

@@ -7,11 +7,11 @@
 enum {
   NEWTON_MOST = 60,     /* iterations of a solution */
   NEWTON_HALVINGS = 10, /* of a correction */
-  NEWTON_SLOW = 4       /* an iteration that reduces |F| by less has reached round-off, below the tolerance */
+  NEWTON_SLOW = 4       /* an iteration that divides |F| by less has reached round-off, below the tolerance */
 };
 static const double NEWTON_DAMPING = 0.1; /* factor of |F| in the square of the damping */
 
-/* The largest |F_i|; NaN if one is not finite. */
+/* The largest |F_i|; NaN if one is NaN. */
 static double newton_residual (const pw_branch *b) {
   double most = 0;
   for (int i = 0; i < b->problem.equations; i++)

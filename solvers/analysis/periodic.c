@@ -209,6 +209,8 @@ int pw_periodic_solve (pw_periodic *x, int settle, double parameter, pw_periodic
 
 int pw_periodic_follow (pw_periodic *x, int direction, pw_error *error) {
   if (pw_require (x, "a search", error) != PW_OK) return PW_INPUT;
+  if (x->settings.first == x->settings.last)
+    return pw_fail (error, PW_INPUT, "first = last = %.9g: expected a range", x->settings.first);
   pw_branch *b = &x->branch;
   b->max_change = 1.0 / x->settings.points, b->step = b->max_change / 4, b->min_step = PERIODIC_MIN_STEP;
   b->event_accuracy = PERIODIC_EVENT, b->max_points = PERIODIC_MAX_POINTS * x->settings.points;

@@ -61,7 +61,7 @@ double pw_system_period (const pw_system *s) {
  * Verifies that signals repeat after it; with a free period, that they are constant during the time that is set. */
 static int flow_signals (pw_periodic *x, pw_place place, pw_run *r) {
   double signals = pw_system_period (r->s), period = x->settings.free ? FLOW_TIMES * x->T : x->settings.period;
-  char name[200];
+  char name[PW_NAME_BYTES];
   int changed, status;
   if (period <= 0) period = signals == 0 ? x->last_period : x->settings.periods * signals;
   if (!(period > 0))

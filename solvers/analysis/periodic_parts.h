@@ -33,7 +33,7 @@ struct pw_periodic {
   double *monodromy;   /* size x size, by columns: the monodromy matrix; then scratch */
   double *re, *im;     /* size: its eigenvalues, the multipliers */
   double *work, *beside; /* scratch: rates; unknowns and residuals beside a point */
-  pw_error why;          /* the last reason why a motion could not be computed */
+  pw_error why;          /* the last reason why a motion could not be computed, or why a branch ended */
   int unstable;          /* multipliers outside the unit circle at the last point; -1: not known */
   int sought;            /* index of the multiplier whose crossing of the unit circle is located */
   int on_circle;         /* 1: this multiplier moves on the unit circle until it leaves it */

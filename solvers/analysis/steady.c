@@ -13,7 +13,7 @@ enum {
 static const double STEADY_EXACT = 1e-9, /* largest residual of a solution, in units of the scene */
     STEADY_SLOW = 1e-4,    /* rates that may be round-off at a double root: more than the root of STEADY_EXACT */
     SUGGEST_CHANGE = 1e-8, /* a quantity is worth holding if the square of its change along the family, without the */
-    SUGGEST_LEFT = 1e-6;   /* part that is held already, is larger than this, and than this times the whole square */
+    SUGGEST_LEFT = 1e-6;   /* part that is held already, exceeds SUGGEST_CHANGE, and SUGGEST_LEFT x the whole square */
 
 /* ---- Opening ---- */
 
@@ -59,7 +59,7 @@ static double steady_last_breakpoint (pw_workspace *w, double t, double span) {
  * after the last breakpoint, the time of this breakpoint, rounded up. */
 static int steady_constant (pw_steady *x, pw_error *error) {
   pw_run *r = x->system[PW_HERE].run;
-  char name[200], text[32];
+  char name[PW_NAME_BYTES], text[32];
   const double span = r->settings.span; /* with its default */
   int changed, later, status = pw_signals_change (r, x->settings.t, 0, span, &changed, error);
   if (status != PW_OK || changed < 0) return status;

@@ -15,6 +15,7 @@ int pw_steady_follow (pw_steady *x, const double *q, const double *v, double par
   if (pw_require (x, "a search", error) != PW_OK) return PW_INPUT;
   int unknowns = pw_steady_unknowns (x);
   double range = x->settings.last - x->settings.first;
+  if (range == 0) return pw_fail (error, PW_INPUT, "first = last = %.9g: expected a range", x->settings.first);
   pw_steady_motion motion;
   x->free_symmetries = 0;
   int status = pw_steady_nearest (x, q, v, x->u, error);

@@ -118,7 +118,7 @@ static void steady_columns (pw_steady *x, double *dF) {
   pw_linearisation *l = &x->system[PW_HERE].linearisation;
   int n = x->n, equations = pw_steady_equations (x);
   for (int c = 0; c < pw_steady_unknowns (x); c++, dF += equations) {
-    const double *symmetry = x->symmetry + (c - n) * pw_steady_rate_count (x->s);
+    const double *symmetry = x->symmetry + (c < n ? 0 : c - n) * pw_steady_rate_count (x->s); /* only for c >= n */
     memset (l->dx, 0, 2 * (size_t)n * sizeof *l->dx);
     if (c < n) {
       l->dx[c] = pw_unit (x->s, c);

@@ -35,16 +35,16 @@ struct pw_steady {
     pw_run *run;    /* NULL: not open */
     pw_linearisation linearisation;
   } system[PW_PLACES];
-  pw_initial_value *solution; /* 2 n: the last solution, where runs are opened */
+  pw_initial_value *solution; /* 2 n: the last solution, where runs are opened; or that configuration at rest */
   int solved;                 /* 1: there is one */
 
-  double *q, *v, *rates, *u;      /* unknowns u, their state q, v, and its rates of displacement [1/s] */
+  double *q, *v, *rates, *u;      /* state, rates of displacement [1/s] at the last evaluation; unknowns */
   double *F, *dq, *dv, *combined; /* scratch: residuals, a variation, rates */
   double *scratch[3];             /* n each */
   double *null_space;             /* unknowns x unknowns: directions of a family; scratch */
   pw_branch branch;
-  pw_linear linear; /* of the state q, v */
-  pw_error why;     /* the last reason why a system could not be evaluated */
+  pw_linear linear; /* of the last motion */
+  pw_error why;     /* the last reason why a system could not be evaluated, or why a branch ended */
 
   int unstable, neutral; /* eigenvalues at the point reached: growing, with real part 0 */
   int sought;            /* index of the eigenvalue whose change of sign is located */
@@ -69,7 +69,7 @@ static inline int pw_steady_angle_rate (const pw_system *s, int j) {
 void pw_steady_combine (const pw_steady *x, const double *coefficient, double unit, double *rates);
 /* The velocities that rates cause at a configuration. */
 void pw_steady_velocities (const pw_steady *x, const double *rates, const double *q, double *v);
-/* out: orthonormal rows of length n that span the null space of M (rows x n, by columns, destroyed; rows >= n).
+/* out: orthonormal rows of length n that span the null space of M (rows x n, by columns, destroyed; rows >= n > 0).
  * Singular values up to the tolerance, or up to round-off, count as 0.  Returns the number of rows, or a status < 0. */
 int pw_null_space (int rows, int n, double *M, double tolerance, double *out);
 /* A state at most `distance` units of the scene from the run's, perhaps off the constraints: an irregular one for each
@@ -112,8 +112,8 @@ double pw_steady_parameter (const pw_steady *x, const double *u);
 
 enum { PW_STEADY_MAX_COORDINATES = 400 }; /* since the cost is cubic */
 
-/* Opens x->system[place] for a value of the parameter, unless it is open.  A status, with x->why if it fails; PW_RETRY:
- * none at this value (x->why has the status of the error). */
+/* Opens x->system[place] for a value of the parameter, unless it is open for it.  A status, with x->why if it fails;
+ * PW_INPUT: its sizes differ; PW_RETRY: none at this value (x->why has the status of the error). */
 int pw_steady_open_system (pw_steady *x, pw_place place, double value);
 void pw_steady_close_system (pw_steady *x, pw_place place);
 /* PW_INPUT and the reason unless both systems have as many bodies, coordinates and constraint equations. */

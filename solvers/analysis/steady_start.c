@@ -53,8 +53,8 @@ static void start_relax (pw_steady *x, pw_projector *p) {
 
 int pw_steady_start (pw_steady *x, int attempt, double *u, pw_error *error) {
   int status = pw_steady_nearest (x, x->start, x->start + x->n, u, error);
-  uint64_t state = (uint64_t)attempt * 0xd1342543de82ef95;
-  double wide = attempt % 2 ? 1 : 0.2; /* of lengths L, angles pi, rates 2 / T */
+  uint64_t state = (uint64_t)attempt * 0xd1342543de82ef95; /* of the random numbers; far apart between attempts */
+  double wide = attempt % 2 ? 1 : 0.2;                     /* of lengths L, angles pi, rates 2 / T */
   const int relaxed = attempt == 1 || attempt % 4 == 2, consistent = relaxed || attempt % 4 == 3;
   pw_projector p;
   for (int j = 0; attempt > 1 && j < pw_steady_unknowns (x); j++)

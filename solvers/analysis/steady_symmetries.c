@@ -56,8 +56,8 @@ static double symmetry_largest_change (pw_steady *x) {
   return most;
 }
 
-/* Reduced row echelon form of `rows` independent rows of n rates.  Pivots are chosen from the last column on, so that
- * angles of single bodies stand alone in their rows. */
+/* Reduced row echelon form of `rows` rows of n rates; rows that depend on others become 0 and are last.  Pivots are
+ * chosen from the last column on, so that angles of single bodies stand alone in their rows. */
 static void symmetry_reduce (int rows, int n, double *row) {
   for (int i = 0, c = n - 1; i < rows && c >= 0; c--) {
     int best = i;

@@ -39,8 +39,8 @@ int pw_steady_open_system (pw_steady *x, pw_place place, double value) {
   x->why = (pw_error){ 0 };
   x->system[place].value = value;
   if (x->settings.compile) s = x->system[place].own = x->settings.compile (x->settings.context, value, &x->why);
-  if (s && pw_steady_same_sizes (x->s, s, &x->why) != PW_OK) return PW_INPUT;
-  int status = s ? steady_open_run (x, place, s) : x->why.status;
+  int refused = s && pw_steady_same_sizes (x->s, s, &x->why) != PW_OK;
+  int status = s && !refused ? steady_open_run (x, place, s) : x->why.status;
   if (status != PW_OK) pw_steady_close_system (x, place);
-  return status == PW_OK || status == PW_RESOURCE ? status : PW_RETRY;
+  return status == PW_OK || status == PW_RESOURCE || refused ? status : PW_RETRY;
 }

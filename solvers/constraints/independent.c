@@ -110,7 +110,7 @@ int pw_rank_open (pw_run *r, pw_error *error) {
   return status;
 }
 
-/* The rank stays the same, since drift makes dependent equations independent. */
+/* The numbers of holonomic and of all rows are prescribed, since drift makes dependent equations appear independent. */
 int pw_rank_reselect (pw_run *r) {
   const pw_system *s = r->s;
   pw_row_basis b;

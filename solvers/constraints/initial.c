@@ -175,7 +175,7 @@ static int initial_attempt (pw_run *r, const unsigned char *prescribed, int redu
 }
 
 static int initial_fail (pw_run *r, const initial_failure *failure, pw_error *error) {
-  char element[120];
+  char element[PW_NAME_BYTES];
   if (failure->row < 0)
     return pw_fail (error, PW_INITIAL, "model %s: the initial state cannot be made consistent", r->s->model);
   pw_system_row_name (r->s, failure->row, element, sizeof element);
@@ -252,7 +252,7 @@ static int initial_attempt_reduced (pw_run *r, const unsigned char *prescribed, 
 static int initial_locked (pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
   double given = 0, left = 0;
-  char element[120], previous[120] = "", elements[300] = "";
+  char element[PW_NAME_BYTES], previous[PW_NAME_BYTES] = "", elements[300] = "";
   for (int j = 0; j < s->coords; j++) {
     given += s->metric[j] * r->v_given[j] * r->v_given[j];
     left += s->metric[j] * r->v[j] * r->v[j];

@@ -124,7 +124,7 @@ static const char *redundancy_direction (const char *one, const char *two) {
 
 /* Describes two rows that are multiples of each other: "wheels left and right: the same lateral constraint". */
 static void redundancy_describe_pair (const pw_system *s, int one, int two, char *buffer, size_t size) {
-  char a[120], b[120], reaction_a[120], reaction_b[120];
+  char a[PW_NAME_BYTES], b[PW_NAME_BYTES], reaction_a[PW_NAME_BYTES], reaction_b[PW_NAME_BYTES];
   pw_system_row_name (s, one, a, sizeof a);
   pw_system_row_name (s, two, b, sizeof b);
   pw_system_reaction_name (s, one, reaction_a, sizeof reaction_a);
@@ -144,7 +144,7 @@ char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size) {
   const double round_off = 1e-8; /* of a coefficient between rows of length 1: eps / s^2 at a sine s of 1.5e-4 */
   const pw_system *s = r->s;
   int row = r->redundant_row[i], partners = 0, last = -1, elements = 0;
-  char element[120], own[120], before[120] = "", reaction[120];
+  char element[PW_NAME_BYTES], own[PW_NAME_BYTES], before[PW_NAME_BYTES] = "", reaction[PW_NAME_BYTES];
   pw_system_row_name (s, row, own, sizeof own);
   snprintf (buffer, size, "%s (%s)", own, pw_system_reaction_name (s, row, reaction, sizeof reaction));
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return buffer;

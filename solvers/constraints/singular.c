@@ -65,7 +65,7 @@ int pw_watchdog_near (pw_run *r) {
 }
 
 int pw_fail_singular (pw_run *r, double t, pw_error *error) {
-  char element[120] = "a constraint";
+  char element[PW_NAME_BYTES] = "a constraint";
   int row = -1;
   double sine = pw_watchdog_sine (r, &row);
   /* largest_sine is 0 while the run is being opened */
@@ -96,7 +96,7 @@ int pw_watchdog_near_state (pw_run *r) {
 int pw_watchdog_check_values (const pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
   const double extreme = r->thresholds.extreme;
-  char name[120];
+  char name[PW_NAME_BYTES];
   for (int i = 0; i < 2 * s->coords; i++) {
     double value = i < s->coords ? r->q[i] : r->v[i - s->coords];
     if (!(fabs (value) < extreme))

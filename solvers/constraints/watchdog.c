@@ -98,7 +98,7 @@ static int watchdog_follow (pw_run *r, pw_error *error) {
 
 static int watchdog_fail_lost (pw_run *r, int contradicts, pw_error *error) {
   pw_residuals now;
-  char element[120] = "a constraint", cause[60] = "constraint drift";
+  char element[PW_NAME_BYTES] = "a constraint", cause[60] = "constraint drift";
   pw_evaluate_residuals (r->w, NULL, &now);
   int in_position = isnan (now.position) || now.position > now.velocity;
   int row = in_position ? now.row_position : now.row_velocity;

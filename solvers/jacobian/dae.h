@@ -19,8 +19,8 @@
 
 typedef struct {
   pw_tangent tangent;
-  int enforces_velocities;     /* 1: index2, ggl, si1 */
-  int enforces_positions;      /* 1: index3, rattle, ggl, si1; both are 0 for none and baumgarte */
+  int enforces_velocities;     /* 1: J v = eta of holonomic equations (index3: of the others only): index2, ggl, si1 */
+  int enforces_positions;      /* 1: index3, rattle (leapfrog), ggl, si1; both are 0 for none and baumgarte */
   int integrates_multipliers;  /* 1: si1 */
   int n, rows, mu_count, size; /* numbers of coordinates, independent equations, multipliers mu, unknowns */
   double *reaction, *force;    /* coords + 3: J^T lambda or G^T mu; applied forces */

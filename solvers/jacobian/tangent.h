@@ -23,7 +23,7 @@ typedef struct {
   char *memory;
 } pw_tangent;
 
-int pw_tangent_open (pw_tangent *x, pw_run *r); /* PW_OK or PW_RESOURCE */
+int pw_tangent_open (pw_tangent *x, pw_run *r); /* PW_OK or PW_RESOURCE; close it in every case */
 void pw_tangent_close (pw_tangent *x);
 
 /* ---- From values of the active equations to those of all, and back ---- */

@@ -24,8 +24,8 @@
  *   L = K D_c^-1,   D_(c+1) = K_(c+1)(c+1) - L K^T,   y_(c+1) -= L y_c
  *   backwards:   y_c = -D_c^-1 (y_c + K^T y_(c+1)),   K^T y = s s' m y + i (b . y) a
  *
- * where D and y are passed from pin to pin, and only the factors of D are stored.  If a chain has two bodies or more
- * and its last pin's column has no rows below the diagonal, the elimination proceeds from both ends to the middle. */
+ * where D and y are passed from pin to pin; of the matrix, only the factors of D are stored.  If a chain has two bodies
+ * or more and its last pin's column has no rows below the diagonal, both ends are eliminated towards the middle. */
 #ifndef PW_BLOCK_LDL_H
 #define PW_BLOCK_LDL_H
 

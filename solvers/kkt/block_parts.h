@@ -36,7 +36,7 @@ typedef struct {
   double x, y;
 } block_pair;
 
-/* (x, y) divided by a diagonal block of k unknowns, factorised by block_pivot: D = 1 / d_1, l_21, 1 / d_2. */
+/* (x, y) divided by a diagonal block of k unknowns with the factors 1 / d_1, l_21, 1 / d_2 of block_factor.c in D. */
 static inline block_pair block_divide (int k, const double *D, double x, double y) {
   if (k == 1) return (block_pair){ .x = x * D[0] };
   double z = (y - D[1] * x) * D[2];

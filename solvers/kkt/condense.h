@@ -21,7 +21,7 @@ struct pw_saddle {
   int extra;              /* unknowns besides the multipliers of rows: 3 for each uncondensed body */
   double *y;              /* s->rows + extra: right-hand side and solution; NULL without extra unknowns */
   pw_block_ldl *block;
-  int *inactive; /* rows whose multiplier is 0 */
+  int *inactive; /* rows outside massless components whose multiplier is 0 */
   int inactive_count;
   double pivot;  /* smallest when last factorised: of `block`, the squared sine of the angle between a row and those
                   * before it; of `massless`, see pw_massless_factor */

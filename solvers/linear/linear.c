@@ -100,7 +100,7 @@ static int linear_jump (pw_linearisation *x) {
 /* Computes all but the counts.  Leaves the workspace at the current state. */
 static int linear_compute (pw_linearisation *x, pw_linear *l, pw_error *error) {
   pw_run *r = x->r;
-  char name[120];
+  char name[PW_NAME_BYTES];
   int status = pw_linear_evaluate (x, r->t, r->q, r->v);
   if (status != PW_OK)
     return status > 0 ? pw_fail_singular (r, r->t, error)

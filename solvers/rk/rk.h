@@ -4,7 +4,7 @@
 
 #include "method.h"
 
-enum { PW_RK_STAGES = 16 }; /* the most, including the new state */
+enum { PW_RK_STAGES = 16 }; /* more than the most stages: the new state counts as one */
 
 /* The coefficients of a method, named as by Hairer, Norsett & Wanner 1993. */
 typedef struct {

@@ -186,7 +186,7 @@ int pw_rk_advance_adaptive (pw_run *r, double t_end, pw_error *error) {
   int status = PW_OK, project = pw_rk_projects_next (r);
   for (;;) {
     double t1 = r->t + d->h, added_energy = 0, err;
-    int shortened = t1 > stop - 0.01 * d->h; /* no tiny step remains */
+    int shortened = t1 > stop - 0.01 * d->h; /* or lengthened by up to 1 %, so that no tiny step remains */
     if (shortened) t1 = stop;
     double h = t1 - r->t;
     if (!shortened && !(h > pw_least_step (r))) {

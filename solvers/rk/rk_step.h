@@ -38,7 +38,7 @@ struct pw_method_data {
   double *stage_v[PW_RK_STAGES], *stage_a[PW_RK_STAGES], *stage_rate[PW_RK_STAGES];
   double *q, *v, *a, *lambda; /* the new state, laid out as in pw_run; before: q, lambda of a stage */
   double h, last_error;       /* adaptive: size of the next step, error of the last one */
-  double *weight;             /* adaptive: reciprocal tolerances of each position and its velocity */
+  double *weight;             /* adaptive: reciprocal tolerances: [2 j] of q_j, [2 j + 1] of v_j */
   pw_step_start last, second; /* of the last step, for samples inside it; of the second part of a divided step */
   char *memory;
 };

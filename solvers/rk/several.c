@@ -119,7 +119,7 @@ int pw_run_advance_towards (pw_run *r, double t, double t_end, pw_error *error) 
 
 /* ---- Several runs ---- */
 
-/* Runs whose next steps can be taken together: those with the step size and method of the first. */
+/* Runs whose next steps can be taken together: those with the step size, method and stabilisation of the first. */
 typedef struct {
   pw_run *const *run;
   int used, index[PW_LANES_MOST];      /* number of lanes with a run; index in `run` of each lane's run */

@@ -34,8 +34,8 @@ void pw_dense_output_integrate_ledger (pw_dense_output *b, pw_run *r);
 /* Reports that t is outside the last step, which begins at t0 (NaN: unknown).  PW_INPUT. */
 int pw_fail_outside (const pw_run *r, double t0, double t, pw_error *error);
 
-/* Computes the state at t inside the last step, in the run's sample arrays, with kinematics and J evaluated.  Returns
- * as pw_project_positions. */
+/* Computes the state at t inside the last step, in the run's sample arrays (r->projected_at has been set to
+ * r->projected), with kinematics and J evaluated.  Returns as pw_project_positions. */
 typedef int pw_interpolate (void *method, pw_run *r, double t);
 
 /* A method's `at`: the state at t in the sample arrays; inside the last step, which begins at t0, by `interpolate`,

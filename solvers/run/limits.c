@@ -50,7 +50,7 @@ static int limits_record_speed (pw_run *r) {
 
 static int limits_fail_steps (const pw_run *r, pw_error *error) {
   const pw_statistics *now = &r->statistics;
-  char name[120], grows[240] = "";
+  char name[PW_NAME_BYTES], grows[240] = "";
   int state;
   double power, growth = pw_run_growth (r, &state, &power);
   if (growth > 0)
@@ -71,7 +71,7 @@ int pw_run_check_limits (pw_run *r, pw_error *error) {
 
 int pw_run_check_resolution (pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
-  char name[120];
+  char name[PW_NAME_BYTES];
   if (!limits_record_speed (r) && r->statistics.steps % PW_CHECK_INTERVAL != 0) return PW_OK;
   for (int j = 0; j < s->coords; j++) {
     double round_off = fabs (r->q[j]) * DBL_EPSILON;

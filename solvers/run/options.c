@@ -1,4 +1,4 @@
-/* The options of a run's method.  methods.c, which reads them, refers to all methods, so it cannot serve them. */
+/* The options of a run's method, for the methods themselves; methods.c, which reads options, depends on all methods. */
 #include <string.h>
 #include "method.h"
 

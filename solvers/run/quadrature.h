@@ -28,7 +28,7 @@ typedef struct {
 int pw_quadrature_open (pw_quadrature *x, pw_run *r, pw_rates_at *rates);
 void pw_quadrature_close (pw_quadrature *x);
 
-/* Restarts at the state reached; kinematics, the ledger and its rates must be up to date. */
+/* Restarts at the state reached; kinematics and r->rate must be up to date. */
 void pw_quadrature_restart (pw_quadrature *x, pw_run *r);
 
 /* Integrates the ledger over the step, of this order, to the state reached, where kinematics, J and r->rate must be up

@@ -113,7 +113,7 @@ static int run_has_no_method (const pw_run *r, pw_error *error) {
  * reopened.  This is done only before the next step or in a restart, since until then the last step may be sampled. */
 static int run_reselect (pw_run *r, pw_error *error) {
   if (r->redundant == 0 || r->independence >= r->reselect_below) return PW_OK;
-  r->reselect_below = r->independence / 2;
+  r->reselect_below = r->independence / 2; /* if no other set is better, the next search is at half the independence */
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   int other = pw_rank_reselect (r);
   if (other < 0) return pw_fail_memory (r->s, error);
@@ -220,7 +220,7 @@ int pw_run_sample (pw_run *r, double t, pw_sample *sample, pw_error *error) {
 
 /* Checks given positions or velocities x, whose states begin at `first`; NULL: none are given. */
 static int run_check_given (const pw_run *r, const double *x, int first, pw_error *error) {
-  char name[120];
+  char name[PW_NAME_BYTES];
   for (int j = 0, n = r->s->coords; x && j < n; j++)
     if (!(fabs (x[j]) < r->thresholds.extreme))
       return pw_fail (error, PW_INPUT, "model %s: restart with %s = %g: expected a magnitude below %g", r->s->model,

@@ -21,12 +21,20 @@ static int checkpoint_sizes (pw_run *r, pw_archive *a) {
   return same;
 }
 
+#define CHECKPOINT_LONG(name) long name;
+#define CHECKPOINT_DOUBLE(name) double name;
+typedef struct {
+  PW_STATISTICS_COUNTS (CHECKPOINT_LONG)
+  PW_STATISTICS_RESIDUALS (CHECKPOINT_DOUBLE)
+} checkpoint_members;
+_Static_assert(sizeof (checkpoint_members) == sizeof (pw_statistics),
+               "enter each member of pw_statistics in util.h, PW_STATISTICS_..., and its count in docs/manual.md");
+
 static void checkpoint_statistics (pw_statistics *s, pw_archive *a) {
-  long *const count[] = { &s->steps,          &s->rejected, &s->rhs,        &s->jacobians,
-                          &s->factorisations, &s->restarts, &s->specialised };
-  double *const worst[] = { &s->position, &s->velocity, &s->g, &s->jv };
-  for (size_t i = 0; i < sizeof count / sizeof *count; i++) pw_archive_count (a, count[i]);
-  for (size_t i = 0; i < sizeof worst / sizeof *worst; i++) pw_archive_bytes (a, worst[i], sizeof (double));
+#define CHECKPOINT_COUNT(name) pw_archive_count (a, &s->name);
+#define CHECKPOINT_RESIDUAL(name) pw_archive_bytes (a, &s->name, sizeof s->name);
+  PW_STATISTICS_COUNTS (CHECKPOINT_COUNT)
+  PW_STATISTICS_RESIDUALS (CHECKPOINT_RESIDUAL)
 }
 
 static void checkpoint_state (pw_run *r, pw_archive *a) {

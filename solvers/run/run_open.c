@@ -51,7 +51,7 @@ static int run_allocate (pw_run *r) {
                              { &r->scratch, scratch },
                              { &r->q_given, 2 * n },
                              { &r->given_before, 2 * n },
-                             { &r->saturation, 2 * n },
+                             { &r->tolerance_bound, 2 * n },
                              { &r->matrix_state, states },
                              { &r->matrix_range, states },
                              { &r->watchdog.previous_q, n } };
@@ -61,7 +61,7 @@ static int run_allocate (pw_run *r) {
   r->v = r->q + n, r->a = r->v + n, r->lambda = r->a + n;
   r->v_given = r->q_given + n;
   r->v_at = r->q_at + n, r->a_at = r->v_at + n, r->lambda_at = r->a_at + n;
-  for (size_t j = 0; j < 2 * n; j++) r->saturation[j] = INFINITY;
+  for (size_t j = 0; j < 2 * n; j++) r->tolerance_bound[j] = INFINITY;
   for (size_t j = 0; j < states; j++) r->matrix_range[j] = INFINITY;
   return PW_OK;
 }
@@ -96,7 +96,7 @@ static double run_time_scale (const pw_run *r) {
 }
 
 /* Opens the saddle at the consistent initial state and evaluates the accelerations there; if some rows are nearly
- * dependent, an independent set is selected first, unless the scene is too large for that. */
+ * dependent, an independent set is selected first.  A scene too large for that fails below the sine rank_refused. */
 static int run_first_evaluation (pw_run *r, pw_error *error) {
   int status = pw_run_open_saddle (r, error);
   if (status != PW_OK) return status;
@@ -116,7 +116,7 @@ static int run_first_evaluation (pw_run *r, pw_error *error) {
 /* Initial accelerations that are not finite come from an element or a signal, which is reported, or from a mass that
  * is too small for its force. */
 static int run_check_finite (pw_run *r, pw_error *error) {
-  char element[200];
+  char element[PW_NAME_BYTES];
   double sum = 0;
   int infinite = -1; /* the first such acceleration */
   for (int j = 0; j < r->s->coords; j++) {

@@ -16,16 +16,16 @@
 void pw_bound_tolerances (pw_run *r) {
   int coords = r->s->coords, n = 2 * coords;
   if (!r->s->saturates) return;
-  pw_evaluate_saturation (r->w, r->saturation);
+  pw_evaluate_saturation (r->w, r->tolerance_bound);
   for (int j = 0; j < n; j++) {
     double y = j < coords ? r->q[j] : r->v[j - coords];
     r->matrix_outdated |= fabs (y - r->matrix_state[j]) > r->matrix_range[j];
-    r->saturation[j] *= TOLERANCES_PART / sqrt (n);
+    r->tolerance_bound[j] *= TOLERANCES_PART / sqrt (n);
   }
 }
 
 double pw_saturation_range (const pw_run *r, int state) {
-  return r->saturation[state] * sqrt (2 * r->s->coords) / TOLERANCES_PART;
+  return r->tolerance_bound[state] * sqrt (2 * r->s->coords) / TOLERANCES_PART;
 }
 
 void pw_matrix_evaluated (pw_run *r, const double *q, const double *v) {
@@ -40,8 +40,8 @@ void pw_matrix_evaluated (pw_run *r, const double *q, const double *v) {
 double pw_first_step (const pw_run *r) {
   double T = r->w->scale.time, h = 0.5 * T * sqrt (r->settings.rtol);
   for (int j = 0, n = r->s->coords; j < n; j++) {
-    if (r->v[j] != 0) h = fmin (h, fmax (r->saturation[j] / fabs (r->v[j]), 1e-9 * T));
-    if (r->a[j] != 0) h = fmin (h, fmax (r->saturation[n + j] / fabs (r->a[j]), 1e-9 * T));
+    if (r->v[j] != 0) h = fmin (h, fmax (r->tolerance_bound[j] / fabs (r->v[j]), 1e-9 * T));
+    if (r->a[j] != 0) h = fmin (h, fmax (r->tolerance_bound[n + j] / fabs (r->a[j]), 1e-9 * T));
   }
   return h;
 }

@@ -194,7 +194,7 @@ static void multistep_count (pw_method_data *d) {
 
 static int multistep_fail (pw_method_data *d, int flag, pw_error *error) {
   pw_run *r = d->sun.run;
-  char element[120];
+  char element[PW_NAME_BYTES];
   int singular = flag == CV_FIRST_RHSFUNC_ERR || flag == CV_REPTD_RHSFUNC_ERR || flag == CV_UNREC_RHSFUNC_ERR;
   if (!r->stopped) multistep_count (d);
   if (!r->stopped && flag == CV_REPTD_PROJFUNC_ERR && d->projector.contradictory_row >= 0)

@@ -177,7 +177,7 @@ static int variation_record (pw_variation *x, double t0, pw_error *error) {
 
 /* The smallest change of a velocity over which a force reverses, at most 1, in units of the scene. */
 static double variation_reversal (pw_run *r) {
-  char element[80];
+  char element[PW_NAME_BYTES];
   double least;
   int state = pw_run_saturation (r, &least, element, sizeof element); /* a velocity */
   return state < 0 ? 1 : fmin (1, least * r->w->scale.time / pw_unit (r->s, state - r->s->coords));

@@ -1,32 +1,36 @@
 /* Jumps of the accelerations at a surface in the space of states, such as vx = 0 of a force sign (vx).
  *
- * Where the motion crosses the surface s (y, t, p) = 0, y = (q, v), and y' jumps from y'- to y'+, derivatives jump by
+ * Let dy be the derivative of y = (q, v) by a parameter p at constant time.  If the motion meets a surface
+ * s (y, t, p) = 0 at a time t_s, where y' jumps from y'- to y'+, dy jumps, too, as at breakpoints
+ * (variation_breakpoint.c; Aizerman & Gantmakher 1958; Leine & Nijmeijer 2004):
  *
  *     dy+ = dy- + (y'- - y'+) dt_s/dp
  *
- * as at breakpoints (variation_breakpoint.c), with the time t_s at which the motion meets the surface (Aizerman &
- * Gantmakher 1958; Leine & Nijmeijer 2004).  Neither the surface nor its gradient is known.  Bisection finds t_s of the
- * run, and of motions nearby, y + step dy + (t - t_s) y'-, with the equations of the run or of its neighbours: the
- * accelerations are nearer to those of one side or of the other. */
+ * Neither the surface nor its gradient is known.  Bisection finds t_s of the run, and of motions nearby,
+ * y + step dy + (t - t_s) y'-, by the equations of the run or of a neighbour: a state is on the side, before or after
+ * the jump, to whose accelerations its own are nearer. */
 #include <math.h>
 #include <string.h>
 #include "variation_parts.h"
 
 enum { JUMP_MANY = 8 }; /* jumps in one step of a run: more are chatter */
 
-/* The interval of time at which bisection ends, in units of the scene. */
-static const double JUMP_ZERO = 1e-20;
+/* Bisection ends at this interval of time, in units of the scene. */
+static const double JUMP_SHORTEST = 1e-20;
 
 /* Accelerations jump if they change over the last interval of the bisection by more than JUMP_PART of their largest
  * change over an interval before, and by more than JUMP_LEAST in units of the scene. */
 static const double JUMP_PART = 0.25, JUMP_LEAST = 1e-6;
 
+/* Accelerations that differ from those before a jump by less than this part of the jump belong to that side. */
+static const double JUMP_BEFORE = 0.25;
+
 /* An interval is searched if accelerations at its middle differ from the mean of those at its ends by more than this
  * part of their change. */
 static const double JUMP_BEND = 0.1;
 
-/* The first and the largest interval of time in which a motion nearby is searched for the surface, in units of the
- * scene; JUMP_NEAR is also the time after which the run must have left it. */
+/* Times in units of the scene: motions nearby are searched for the surface within JUMP_NEAR of t_s, then ten times as
+ * far, up to JUMP_FAR.  The run must be on one side JUMP_NEAR before t_s, on the other JUMP_NEAR after. */
 static const double JUMP_NEAR = 1e-9, JUMP_FAR = 1e-2;
 
 /* Largest difference of accelerations, in units of the scene. */
@@ -38,7 +42,7 @@ static double jump_distance (const pw_variation *x, const double *a, const doubl
 
 /* ---- Jumps of the run ---- */
 
-/* The state and the accelerations between recorded ones. */
+/* The state between recorded ones, interpolated, and its accelerations by the equations; 3 n + 3. */
 static int jump_state (pw_variation *x, double t, double *state, pw_error *error) {
   int n = x->n;
   pw_variation_state (x, t, state);
@@ -66,7 +70,7 @@ static int jump_bisect (pw_variation *x, double *t0, double *t1, double *left, d
                         pw_error *error) {
   double *middle = x->scratch, largest = jump_distance (x, left + 2 * x->n, right + 2 * x->n), t;
   size_t bytes = 3 * (size_t)x->n * sizeof *left;
-  while (*t1 - *t0 > JUMP_ZERO * x->r->w->scale.time && (t = *t0 + (*t1 - *t0) / 2) > *t0 && t < *t1) {
+  while (*t1 - *t0 > JUMP_SHORTEST * x->r->w->scale.time && (t = *t0 + (*t1 - *t0) / 2) > *t0 && t < *t1) {
     int status = jump_state (x, t, middle, error);
     if (status != PW_OK) return status;
     double before = jump_distance (x, left + 2 * x->n, middle + 2 * x->n),
@@ -80,14 +84,15 @@ static int jump_bisect (pw_variation *x, double *t0, double *t1, double *left, d
   return PW_OK;
 }
 
-/* *suspected: 1 if accelerations between points i and i + 1 may jump: they are not linear in time.  state: 3 n */
+/* *suspected: 1 if accelerations between points i and i + 1 are not linear in time.  state: scratch, 3 n + 3 */
 static int jump_suspected (pw_variation *x, int i, double *state, int *suspected, pw_error *error) {
   const double *left = x->point[i].x + 2 * x->n, *right = x->point[i + 1].x + 2 * x->n;
   double t = x->point[i].t + (x->point[i + 1].t - x->point[i].t) / 2, *a = state + 2 * x->n;
   int status = jump_state (x, t, state, error);
   double most = fmax (jump_distance (x, left, a), jump_distance (x, a, right));
-  for (int j = 0; j < x->n; j++) a[j] -= left[j] / 2, state[j] = right[j] / 2; /* the distance from the mean */
-  *suspected = jump_distance (x, a, state) > fmax (JUMP_LEAST, JUMP_BEND * most);
+  double *mean = state;
+  for (int j = 0; j < x->n; j++) mean[j] = left[j] / 2 + right[j] / 2;
+  *suspected = jump_distance (x, a, mean) > fmax (JUMP_LEAST, JUMP_BEND * most);
   return status;
 }
 
@@ -104,7 +109,7 @@ static int jump_extend (pw_variation *x, int i, double t0, double t1, const doub
 
 /* *found: 1 if a jump between points i and i + 1 has been found and recorded, with the states on both sides. */
 static int jump_find (pw_variation *x, int i, int *found, pw_error *error) {
-  double t0 = x->point[i].t, t1 = x->point[i + 1].t, *left = x->values, *right = left + 3 * x->n;
+  double t0 = x->point[i].t, t1 = x->point[i + 1].t, *left = x->values, *right = left + 3 * x->n + 3;
   int status = jump_suspected (x, i, left, found, error);
   if (status != PW_OK || !*found) return status;
   *found = 0;
@@ -112,12 +117,13 @@ static int jump_find (pw_variation *x, int i, int *found, pw_error *error) {
   if (status == PW_OK) status = jump_state (x, t1, right, error);
   if (status == PW_OK) status = jump_bisect (x, &t0, &t1, left, right, found, error);
   if (status != PW_OK || !*found || jump_extend (x, i, t0, t1, left, right)) return status;
-  if (t0 > x->point[i].t)
-    status = jump_insert (x, i++, t0, left, error);
+  int before = t0 > x->point[i].t ? i + 1 : i; /* the point just before the jump */
+  if (before > i)
+    status = jump_insert (x, i, t0, left, error);
   else
     memcpy (x->point[i].x + 2 * x->n, left + 2 * x->n, (size_t)x->n * sizeof *left);
-  x->point[i].jumps = 1;
-  return status == PW_OK && t1 < x->point[i + 1].t ? jump_insert (x, i, t1, right, error) : status;
+  x->point[before].jumps = 1;
+  return status == PW_OK && t1 < x->point[before + 1].t ? jump_insert (x, before, t1, right, error) : status;
 }
 
 int pw_variation_find_jumps (pw_variation *x, int first, pw_error *error) {
@@ -143,7 +149,7 @@ double pw_variation_recorded_jump (const pw_variation *x) {
   return INFINITY;
 }
 
-/* ---- Derivatives of their times ---- */
+/* ---- Derivatives of the times of jumps ---- */
 
 static int jump_fail (double t, pw_error *error) {
   return pw_fail (error, PW_METHOD,
@@ -152,21 +158,21 @@ static int jump_fail (double t, pw_error *error) {
                   t);
 }
 
-/* A motion near that of the run, y + step dy + (t - t_s) y'-. */
+/* A motion y + step dy + (t - t_s) y'- near that of the run, or, with step 0, the run itself. */
 typedef struct {
   pw_variation *x;
-  pw_run *r;                    /* its equations: those of the run or of a neighbouring one */
+  pw_run *r;                    /* whose equations it has: the run or a neighbouring one */
   double t, t_after;            /* t_s, and the recorded time after it */
   const double *before, *after; /* q, v, a of the run at t_s, on both sides */
-  const double *dy;
-  double step;
-} jump_neighbour;
+  const double *dy;             /* 2 n: for q, v */
+  double step;                  /* step dy has the units of q, v */
+} jump_motion;
 
 /* The run at the recorded jump at time t. */
-static jump_neighbour jump_of (pw_variation *x, double t) {
+static jump_motion jump_of (pw_variation *x, double t) {
   const pw_variation_point *p = x->point;
   while (!(p->jumps && p->t == t)) p++;
-  return (jump_neighbour){ .x = x, .r = x->r, .t = t, .t_after = p[1].t, .before = p[0].x, .after = p[1].x };
+  return (jump_motion){ .x = x, .r = x->r, .t = t, .t_after = p[1].t, .before = p[0].x, .after = p[1].x };
 }
 
 /* n + 3: where jump_side leaves the accelerations. */
@@ -176,7 +182,7 @@ static double *jump_scratch_a (const pw_variation *x) {
 
 /* *after: 1 if the accelerations of the motion at time t_s + delay are nearer to those after the jump than to those
  * before it.  A status. */
-static int jump_side (const jump_neighbour *k, double delay, int *after) {
+static int jump_side (const jump_motion *k, double delay, int *after) {
   pw_variation *x = k->x;
   int n = x->n;
   double *q = x->scratch, *v = q + n + 3, *a = jump_scratch_a (x), *lambda = a + n + 3;
@@ -193,34 +199,34 @@ static int jump_side (const jump_neighbour *k, double delay, int *after) {
 }
 
 /* The time at which the motion meets the surface, minus t_s, to 12 digits; NaN: never, or it cannot be evaluated. */
-static double jump_time (const jump_neighbour *k) {
+static double jump_time (const jump_motion *k) {
   double T = k->x->r->w->scale.time, lo, hi, middle;
-  int before = 1, after = 0, side;
-  for (double near = JUMP_NEAR; (before || !after) && near <= JUMP_FAR; near *= 10) {
+  int lo_is_after = 1, hi_is_after = 0, is_after;
+  for (double near = JUMP_NEAR; (lo_is_after || !hi_is_after) && near <= JUMP_FAR; near *= 10) {
     lo = -near * T, hi = near * T;
-    if (jump_side (k, lo, &before) != PW_OK || jump_side (k, hi, &after) != PW_OK) return NAN;
+    if (jump_side (k, lo, &lo_is_after) != PW_OK || jump_side (k, hi, &hi_is_after) != PW_OK) return NAN;
   }
-  if (before || !after) return NAN;
+  if (lo_is_after || !hi_is_after) return NAN;
   while ((middle = lo + (hi - lo) / 2) > lo && middle < hi) {
-    if (jump_side (k, middle, &side) != PW_OK) return NAN;
-    *(side ? &hi : &lo) = middle;
-    if (hi - lo < fmax (1e-12 * fabs (middle), JUMP_ZERO * T)) break;
+    if (jump_side (k, middle, &is_after) != PW_OK) return NAN;
+    *(is_after ? &hi : &lo) = middle;
+    if (hi - lo < fmax (1e-12 * fabs (middle), JUMP_SHORTEST * T)) break;
   }
-  return fabs (middle) > 2 * JUMP_ZERO * T ? middle : 0;
+  return fabs (middle) > 2 * JUMP_SHORTEST * T ? middle : 0;
 }
 
 /* The directional derivative of t_s along the change of state c->Y. */
-static double jump_along (const pw_variation_column *c, jump_neighbour k) {
+static double jump_along (const pw_variation_column *c, jump_motion k) {
   double step = pw_variation_step_along (c);
   k.dy = c->Y;
   k.step = step;
-  double later = jump_time (&k);
+  double forward = jump_time (&k);
   k.step = -step;
-  return (later - jump_time (&k)) / (2 * step);
+  return (forward - jump_time (&k)) / (2 * step);
 }
 
-/* The derivative of t_s, or its error, the sum of those due to the state's error and to the differences' one. */
-static double jump_slope (const pw_variation_column *c, jump_neighbour k) {
+/* The derivative of t_s or, of column 1, its error: due to that of the state's derivative and that of differences. */
+static double jump_slope (const pw_variation_column *c, jump_motion k) {
   const pw_direction *d = &c->direction->given;
   int index = pw_variation_column_index (c);
   double slope = d->initial || index == 1 ? jump_along (c, k) : 0;
@@ -234,29 +240,30 @@ static double jump_slope (const pw_variation_column *c, jump_neighbour k) {
   return slope;
 }
 
-/* 1 if the motion leaves the surface after the jump, instead of sliding along it: with the velocities and accelerations
- * after it (dy adds their difference to those before, times step), it is on that side a short time later. */
-static int jump_leaves (jump_neighbour k) {
-  int n = k.x->n, side;
+/* 1 if the motion leaves the surface after the jump, instead of sliding along it: with the accelerations after the jump
+ * (step dy replaces those before, which jump_side uses) the motion is on that side a short time later. */
+static int jump_leaves (jump_motion k) {
+  int n = k.x->n, is_after;
   double *dy = k.x->output;
   for (int j = 0; j < n; j++) dy[j] = 0, dy[n + j] = k.after[2 * n + j] - k.before[2 * n + j];
   k.dy = dy, k.step = JUMP_NEAR * k.x->r->w->scale.time;
-  return jump_side (&k, k.step, &side) == PW_OK && side;
+  return jump_side (&k, k.step, &is_after) == PW_OK && is_after;
 }
 
 /* 1 if the motion has not started at the jump: at an earlier state, accelerations are those before the jump. */
-static int jump_arrives (jump_neighbour k) {
-  int n = k.x->n, side;
+static int jump_arrives (jump_motion k) {
+  int n = k.x->n, is_after;
   double delay = -JUMP_NEAR * k.x->r->w->scale.time, *a = jump_scratch_a (k.x);
   k.dy = k.before; /* without effect: step is 0 */
-  return jump_side (&k, delay, &side) == PW_OK &&
-         jump_distance (k.x, a, k.before + 2 * n) < JUMP_PART * jump_distance (k.x, k.before + 2 * n, k.after + 2 * n);
+  return jump_side (&k, delay, &is_after) == PW_OK &&
+         jump_distance (k.x, a, k.before + 2 * n) <
+             JUMP_BEFORE * jump_distance (k.x, k.before + 2 * n, k.after + 2 * n);
 }
 
-/* The largest difference between t_s and the times at which motions nearby meet the surface: those of the neighbouring
- * runs from the state of the run, and with the ledger those of the run from states displaced along each column, at
- * which powers are differentiated. */
-static double jump_width (pw_variation *x, jump_neighbour k) {
+/* The largest difference between t_s and the times at which motions nearby meet the surface: by the neighbours'
+ * equations from the state of the run; with the ledger, also by the run's equations from the states, displaced along
+ * each column, between which powers are differentiated. */
+static double jump_width (pw_variation *x, jump_motion k) {
   double most = 0;
   PW_EACH_COLUMN (c, x)
   for (int sign = -1; sign <= 1 && x->ledger; sign += 2) {
@@ -272,7 +279,7 @@ static double jump_width (pw_variation *x, jump_neighbour k) {
   return most;
 }
 
-/* Holds the state at t_side + delay, linearly from that at t_side, on one side of the jump. */
+/* Stores the state at t_side + delay, extrapolated linearly from `state`, that at t_side on one side of the jump. */
 static void jump_hold (pw_variation_hold *h, const double *state, double t_side, double delay, int n) {
   for (int j = 0; j < 2 * n; j++) h->state[j] = state[j] + delay * state[n + j];
   h->t = t_side + delay;
@@ -282,7 +289,7 @@ static void jump_hold (pw_variation_hold *h, const double *state, double t_side,
 int pw_variation_approach_jump (pw_variation *x, pw_error *error) {
   double t = pw_variation_recorded_jump (x);
   if (isinf (t) || t == x->hold[0].to) return PW_OK;
-  jump_neighbour k = jump_of (x, t);
+  jump_motion k = jump_of (x, t);
   double width = 2 * jump_width (x, k);
   if (!isfinite (width)) return jump_fail (t, error);
   jump_hold (&x->hold[0], k.before, t, -width, x->n);
@@ -295,11 +302,11 @@ int pw_variation_approach_jump (pw_variation *x, pw_error *error) {
 }
 
 int pw_variation_pass_jump (pw_variation *x, pw_error *error) {
-  jump_neighbour k = jump_of (x, x->t);
+  jump_motion k = jump_of (x, x->t);
   int time_varies = 0, smooth = jump_leaves (k);
   PW_EACH_COLUMN (c, x) {
     c->slope = jump_slope (c, k);
-    smooth &= isfinite (c->slope);
+    smooth &= isfinite (c->slope) != 0;
     time_varies |= c->slope != 0;
   }
   /* a motion may start at the jump if t_s does not depend on the parameters */

@@ -16,9 +16,10 @@ static const double STEP_MOTION = 1e-8;
  * errors of velocities. */
 static const double STEP_ROUND = 1e-14;
 
-/* Errors of derivatives with respect to a parameter p are relative to at least STEP_LEAST_DERIVATIVE / |p|, in units of
- * the scene, with |p| estimated as the step of its differences over STEP_OF_PARAMETER; of work and losses, to at least
- * STEP_LEAST_ENERGY times the energy exchanged, or scene_energy, times what the errors of the state are relative to. */
+/* Errors of derivatives of the state by a parameter p are relative to the largest of these, or to STEP_LEAST_DERIVATIVE
+ * / |p| in units of the scene if that is larger; the step of the differences is about STEP_OF_PARAMETER |p|.  Errors of
+ * derivatives of work and losses are relative to the largest of these, or to STEP_LEAST_ENERGY times the energy (the
+ * larger of `exchanged` and `scene_energy` of the run) times what those of the state are relative to. */
 static const double STEP_LEAST_DERIVATIVE = 0.1, STEP_OF_PARAMETER = 1e-5, STEP_LEAST_ENERGY = 1e-3;
 
 /* The least step is this multiple of the scale of time T, or pw_least_step if that is larger. */
@@ -27,9 +28,9 @@ static const double STEP_SMALLEST = 1e-12;
 /* Sine between constraint equations below which the round-off of accelerations prevents steps. */
 static const double STEP_SINGULAR = 0.01;
 
-/* A step of size h is fast if h times the rate at which the fastest component decays exceeds STEP_FAST; x->stiff
- * grows by 1 after such a step, and falls by 1, not below 0, after another.  At STEP_STIFF the motion is stiff.  This
- * product is about 0.2 at a tolerance of 1e-9, 3.3 at the limit of stability (Hairer & Wanner 1996, section IV.2). */
+/* Let z be the size of a step times the rate at which the fastest component of the derivatives decays.  x->stiff grows
+ * by 1 after a step with z > STEP_FAST and falls by 1, not below 0, after any other; at STEP_STIFF the motion is stiff.
+ * z is about 0.2 where a tolerance of 1e-9 limits the step, 3.3 where stability does (Hairer & Wanner 1996, IV.2). */
 enum { STEP_STIFF = 100 };
 static const double STEP_FAST = 1;
 
@@ -54,46 +55,35 @@ static double step_motion_error (const pw_variation *x) {
   return step_largest_velocity (x, x->motion_error) / fmax (1, x->speed);
 }
 
-/* Error of the run's change of velocities over a step, in units of the scene: with adaptive steps, interpolation gives
- * each of two velocities to a tenth of rtol (pw_variation_refine). */
-static double step_noise (const pw_variation *x) {
+/* The run's error: that of the change of its velocities over a step, in units of the scene.  With adaptive steps,
+ * interpolation gives each of two velocities to a tenth of rtol (pw_variation_refine). */
+static double step_run_error (const pw_variation *x) {
   double most = 1;
   if (!x->r->fixed_steps) return 2 * 0.1 * x->r->settings.rtol * fmax (1, x->speed);
   for (int j = 0; j < x->n; j++) most = fmax (most, fabs (x->q[j]) / pw_unit (x->r->s, j));
   return STEP_ROUND * most * x->r->w->scale.time / fmin (x->r->settings.step, x->r->w->scale.time);
 }
 
-/* The permitted step_motion_error: STEP_MOTION, or the run's own error multiplied by x->reversal if that is larger: in
- * motions with forces that reverse fast, smaller errors matter. */
+/* The permitted step_motion_error: STEP_MOTION, or the run's error times x->reversal if that is larger; x->reversal is
+ * small in motions with forces that reverse fast, where smaller errors matter. */
 static double step_motion_tolerance (const pw_variation *x) {
-  return fmax (STEP_MOTION, step_noise (x) * x->reversal / fmax (1, x->speed));
+  return fmax (STEP_MOTION, step_run_error (x) * x->reversal / fmax (1, x->speed));
 }
 
-/* Changes of velocities below this part of the largest, or this multiple of the run's tolerance, count as that large:
- * the error of a body in free flight, which does not accelerate, is no large part of its motion. */
+/* The defect is relative to at least STEP_CHANGE, or STEP_CHANGE_RTOL rtol, times the largest velocity: the round-off
+ * of a body in free flight, whose velocity does not change, is no defect. */
 static const double STEP_CHANGE = 1e-6, STEP_CHANGE_RTOL = 1000;
 
 /* The difference between the change of the run's velocities and the integral of its accelerations over a step, relative
  * to h times the largest acceleration, at most 1: large where the run does not resolve the motion.  The error of the
- * formula (x->motion_error), and step_noise multiplied by x->reversal, are subtracted. */
+ * formula (x->motion_error), and the run's error times x->reversal, are subtracted. */
 static double step_defect (const pw_variation *x, double h) {
   int stages = x->implicit ? 1 + PW_VARIATION_STAGES : PW_VARIATION_RATES - 1;
   double most = fmax (STEP_CHANGE, x->r->fixed_steps ? 0 : STEP_CHANGE_RTOL * x->r->settings.rtol) * fmax (1, x->speed);
   for (int k = 0; k < stages; k++) most = fmax (most, h * step_largest_velocity (x, x->a[k]));
-  double defect = step_largest_velocity (x, x->motion_defect) - step_noise (x) * x->reversal -
+  double defect = step_largest_velocity (x, x->motion_defect) - step_run_error (x) * x->reversal -
                   step_largest_velocity (x, x->motion_error);
   return defect > 0 ? fmin (1, defect / most) : 0;
-}
-
-/* Adds to the errors of derivatives the part of their change that the run does not resolve. */
-static void step_add_defect (pw_variation *x, double h) {
-  double defect = step_defect (x, h);
-  for (pw_direction_copy *d = x->direction; d < x->direction + x->count; d++) {
-    const pw_variation_column *derivative = &d->column[0];
-    double *error = d->column[1].trial;
-    for (int j = 0; j < x->size && d->columns > 1; j++)
-      error[j] += copysign (defect * (derivative->trial[j] - derivative->Y[j]), error[j]);
-  }
 }
 
 /* What the errors of a derivative are relative to. */
@@ -118,14 +108,22 @@ static double step_error (const pw_variation *x) {
   return most;
 }
 
-/* Adds the errors of the step to the errors of derivatives: entries from `first` to `end` - 1. */
-static void step_add_errors (pw_variation *x, int first, int end) {
-  for (pw_direction_copy *d = x->direction; d < x->direction + x->count; d++)
-    for (int j = first; j < end && d->columns > 1; j++) d->column[1].trial[j] += d->local_error[j];
+/* Adds to entries `first` to `end` - 1 of the errors of derivatives those of the step, and the part of the derivatives'
+ * change that the run does not resolve. */
+static void step_add_errors (pw_variation *x, double h, int first, int end) {
+  double defect = step_defect (x, h);
+  for (pw_direction_copy *d = x->direction; d < x->direction + x->count; d++) {
+    const pw_variation_column *derivative = &d->column[0];
+    double *error = d->column[1].trial;
+    for (int j = first; j < end && d->columns > 1; j++) {
+      error[j] += d->local_error[j];
+      error[j] += copysign (defect * (derivative->trial[j] - derivative->Y[j]), error[j]);
+    }
+  }
 }
 
-/* Scales an estimate of order h^4 from the magnitude r = `relative` to (10 r)^(3/2), of order h^6 as the error of the
- * step.  RADAU5 bounds it by the tolerance tol in the form r <= 0.1 tol^(2/3). */
+/* Scales an estimate of order h^4 and magnitude r = `relative` to (10 r)^(3/2), of order h^6 like the error of the
+ * step, if that is smaller.  It meets a tolerance tol if r <= 0.1 tol^(2/3), which is the test of RADAU5. */
 static void step_scale_error (double *error, double relative, int n) {
   double factor = fmin (1, sqrt (1000 * relative));
   for (int j = 0; j < n && relative > 0; j++) error[j] *= factor;
@@ -140,8 +138,9 @@ static void step_implicit_errors (pw_variation *x) {
   step_scale_error (x->motion_error, step_motion_error (x), x->n);
 }
 
-/* Computes the stages, the new derivatives into `trial`, their time derivatives and errors.  The errors of the step
- * follow from the time derivatives of column 0 and are added to column 1 before its own are evaluated. */
+/* Computes the stages, the new derivatives into `trial`, their time derivatives and errors.  The errors of dq and dv
+ * follow from the time derivatives of column 0 and are added to column 1 before the time derivatives there are
+ * evaluated.  Those of work and losses follow from all of these, and no time derivative depends on them. */
 static int step_stages (pw_variation *x, double h, double t1, pw_error *error) {
   int last = PW_VARIATION_RATES - 1;
   pw_variation_state (x, x->t, x->scratch);
@@ -156,12 +155,11 @@ static int step_stages (pw_variation *x, double h, double t1, pw_error *error) {
     step_implicit_errors (x);
   else
     pw_variation_explicit_errors (x, h, 0, 2 * x->n);
-  step_add_errors (x, 0, 2 * x->n);
+  step_add_errors (x, h, 0, 2 * x->n);
   pw_variation_accelerate (x, 1, last);
   if (pw_variation_ledger_rates (x, last) != PW_OK) return pw_fail_signal (x->at, error);
   if (x->implicit == NULL) pw_variation_explicit_errors (x, h, 2 * x->n, x->size);
-  step_add_errors (x, 2 * x->n, x->size);
-  step_add_defect (x, h);
+  step_add_errors (x, h, 2 * x->n, x->size);
   return PW_OK;
 }
 
@@ -189,15 +187,16 @@ int pw_variation_restart (pw_variation *x, pw_error *error) {
   return status;
 }
 
-/* The size of the next step relative to one with the error `off`.  It depends on the error of the last accepted step,
- * too (at least 1e-4 of the tolerance: the first step has none), which damps oscillations of the step at the limit of
- * stability (Hairer & Wanner 1996, section IV.2: exponents 1 / order - 0.75 b and b, b = 0.04). */
+/* The size of the next step divided by that of one with the error `off`.  The error of the last accepted step, counted
+ * as at least 1e-4 of the tolerance since the first step has none before, damps oscillations of the step size at the
+ * limit of stability (Hairer & Wanner 1996, section IV.2: exponents 1 / order - 0.75 b and b, b = 0.04). */
 static double step_factor (const pw_variation *x, double off, double tolerance) {
   double factor = 0.9 * pow (off / tolerance, -0.17) * pow (fmax (x->last_error, 1e-4 * tolerance) / tolerance, 0.04);
   return fmin (5, fmax (0.2, factor));
 }
 
-/* The size of the step after one of size h with the error `off`: by `tolerance`; up to loose_size, by STEP_LOOSE. */
+/* The size of the step after one of size h with the error `off`: the larger of those for `tolerance`, and for
+ * STEP_LOOSE but at most loose_size. */
 static double step_next_size (const pw_variation *x, double h, double off, double tolerance, double loose_size) {
   if (!isfinite (off)) return h / 10;
   return fmax (h * step_factor (x, off, tolerance), fmin (h * step_factor (x, off, STEP_LOOSE), loose_size));

@@ -81,6 +81,7 @@ TEST (npz) {
   assert_memory_equal (head + 30 + 5 + 22, "f8', 'fortran_order': False, 'shape': (2, 2), }", 46);
   check_close ("trace", A[0] + A[3], -2.4 / 1.5, 1e-14, "round-off");
   check_close ("determinant", A[0] * A[3] - A[1] * A[2], 60 / 1.5, 1e-13, "round-off");
+  cli_good ("grep -a -q \"'shape': (2,), }\" @/block.npz"); /* eigenvalues */
   cli_shell ("! command -v python3 >@/log || python3 -m zipfile -t @/block.npz >@/log");
   assert_null (strstr (cli_file ("log"), "corrupt"));
 }

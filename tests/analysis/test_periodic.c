@@ -340,7 +340,11 @@ TEST (refused) {
   check_error (&error, PW_INPUT,
                "model snakeboard: signal swing.value changes with time, so that the period is not free");
   error = (pw_error){ 0 };
-  pw_periodic_close (periodic_open (s, &(pw_periodic_settings){ .period = 4 }));
+  pw_periodic *x = periodic_open (s, &(pw_periodic_settings){ .period = 4 });
+  assert_int_equal (pw_periodic_follow (x, 1, &error), PW_INPUT);
+  check_error (&error, PW_INPUT, "first = last = 0: expected a range");
+  error = (pw_error){ 0 };
+  pw_periodic_close (x);
   pw_system_free (s);
   s = mathieu_at (NULL, 1, NULL);
   check_close ("period", pw_system_period (s), 0, 0, "a function has none that is known");

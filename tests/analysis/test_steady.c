@@ -201,6 +201,31 @@ TEST (refused) {
   steady_close (&t);
 }
 
+/* A constant value; what it stores as derivatives is meaningless for a force. */
+static int constant_value (void *context, double t, const double *x, double *value, double *gradient) {
+  (void)context, (void)x, (void)gradient;
+  value[0] = 1, value[1] = t, value[2] = t;
+  return 0;
+}
+
+SCENE (pushed) {
+  pw_add_body (m, &(pw_body){ .name = "a", .mass = 1, .inertia = 1 });
+  pw_add_spring (m, &(pw_spring){ .name = "s", .body = { "a", "ground" }, .stiffness = 1 });
+  pw_add_torque (
+      m,
+      &(pw_torque){ .name = "T", .body = { "a", "ground" }, .value = { PW_FUNCTION, .function = { constant_value } } });
+}
+
+TEST (constant) {
+  pw_error error = { 0 };
+  const double zero[3] = { 0 };
+  steady t = { .s = scene_system (&pushed_table, NULL), .set.vary = -1 };
+  steady_open (&t);
+  assert_int_equal (pw_steady_follow (t.x, zero, zero, 0, 1, &error), PW_INPUT);
+  check_error (&error, PW_INPUT, "first = last = 0: expected a range");
+  steady_close (&t);
+}
+
 static pw_system *trailers_at (void *context, double n, pw_error *error) {
   (void)context;
   if (n != floor (n)) return pw_fail (error, PW_INPUT, "%g trailers", n), NULL;

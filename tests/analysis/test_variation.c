@@ -11,6 +11,7 @@
 #include "runs.h"
 #include "scene.h"
 #include "trial.h"
+#include "variation_parts.h"
 
 /* A model with one parameter changed: a run, its neighbours, the direction. */
 typedef struct {
@@ -162,6 +163,28 @@ TEST (stiff) {
     pw_variation_close (d);
     variation_free (&v);
   }
+}
+
+/* A run that does not resolve the motion: its error is part of the derivative's, whose next step begins with the time
+ * derivative of both. */
+TEST (unresolved) {
+  const block b = { .name = "k", .k = 8, .c = 1, .m = 2, .x0 = 0.3, .start = 99, .width = 1 };
+  variation_case v = variation_open (block_make, &b, 8, 8e-5, "rk4", &(pw_settings){ .span = 3, .step = 0.3 });
+  pw_error error = { 0 };
+  pw_variation *x = pw_variation_open (v.r, &v.d, 1, 1, &error);
+  check_ok (error.status, &error);
+  for (int i = 1; i <= 10; i++) {
+    check_ok (pw_variation_advance (x, 0.3 * i, 3, &error), &error);
+    const pw_variation_column *c = &x->direction->column[1];
+    const double *first = c->K[0], *again = c->K[PW_VARIATION_RATES - 1];
+    PW_EACH_COLUMN (each, x) memcpy (each->trial, each->Y, (size_t)x->size * sizeof *each->Y);
+    check_ok (pw_variation_evaluate_at (x, x->t, &error), &error);
+    check_ok (pw_variation_time_derivatives (x, PW_VARIATION_RATES - 1, &error), &error);
+    for (int j = 0; j < 2 * x->n; j++)
+      check_close ("rate", first[j], again[j], 1e-12 * (1e-3 + fabs (again[j])), "the same evaluation");
+  }
+  pw_variation_close (x);
+  variation_free (&v);
 }
 
 /* Differences with a step that changes nothing, or little: their errors contain the result, and a few better steps

@@ -132,6 +132,8 @@ TEST (broken_kind) {
   check_shows ("  well (1 element)                   FAILED");
   check_shows ("in random scenes: force_q = d force/dq does not hold");
   check_shows ("in this model: force_q = d force/dq does not hold");
+  check_shows ("not computed: the linearisation fails, see the findings");
+  assert_null (strstr (cli_out, "the limit is"));
   check_shows ("\n1 problem\n");
   assert_non_null (strstr (cli_err, "pinwheel: element type well fails its self-test: force_q = d force/dq"));
   assert_int_equal (cli_run ("pinwheel check @/broken.c --json -"), 2);

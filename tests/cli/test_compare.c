@@ -313,6 +313,7 @@ TEST (bad) {
     { "ezyroller --reference @/back.csv", "--reference @/back.csv: line 3: times must be finite and increase" },
     { "ezyroller --reference @/inf.csv", "--reference @/inf.csv: line 3: times must be finite and increase" },
     { "ezyroller --reference @/far.csv", "--reference @/far.csv: line 3: \"-inf\" is not finite" },
+    { "ezyroller --reference @/nan.csv", "--reference @/nan.csv: every value is nan" },
     { "ezyroller --reference @/comma.csv", "--reference @/comma.csv: line 2 has more cells than the first line" },
     { "ezyroller --reference @/short.csv --t-end 2",
       "--reference @/short.csv: no row at the final time, t = 2 s; the last one before it is at 1 s" },
@@ -325,7 +326,8 @@ TEST (bad) {
   cli_write ("back.csv", "t,frame.x\n1,0\n0.5,0\n");
   cli_write ("inf.csv", "t,frame.x\n1,0\ninf,0\n");
   cli_write ("far.csv", "\xEF\xBB\xBFt,frame.x\n1,nan\n2,-inf\n"); /* with a byte order mark */
-  cli_write ("comma.csv", "t,frame.x\n1,0,3,14\n");                /* decimal commas */
+  cli_write ("nan.csv", "t,frame.x,frame.y\n1,nan,nan\n2,nan,nan\n");
+  cli_write ("comma.csv", "t,frame.x\n1,0,3,14\n"); /* decimal commas */
   cli_write ("short.csv", "t,frame.x\n1,0\n");
   cli_bad_each ("compare", bad, sizeof bad / sizeof *bad);
   cli_write ("file", "");

@@ -178,6 +178,9 @@ TEST (symbols) {
     found = sscanf (data, "%lf %lf 1 0\n%lf %lf 1 0\n", &x0, &y0, &x1, &y1) == 4 && y0 == -1 && y1 == -1;
   }
   assert_true (found && x0 < 0 && x0 > -0.5 && x1 > 2 && x1 < 2.5);
+  length[0] = strlen (plots_symbols ("  - {slot: s, body: [c, ground], at: [[0, 0], [0, -1]]}\n"));
+  length[1] = strlen (plots_symbols ("  - {slot: s, body: [ground, c], at: [[0, -1], [0, 0]]}\n"));
+  assert_true (2 * length[1] < length[0]); /* a rail that moves has no hatching */
 }
 
 TEST (style) {

@@ -227,7 +227,7 @@ TEST (alone) {
   assert_int_equal (cli_run ("PINWHEEL_MODELS= @/bin/pinwheel run pendulum"), 2);
   assert_non_null (strstr (cli_err, "pinwheel: there is no model \"pendulum\", nor any other in the folders of "));
   assert_int_equal (cli_run ("pinwheel new @/own.c >@/log && @/bin/pinwheel run @/own.c"), 2);
-  assert_non_null (strstr (cli_err, ": pinwheel.h is neither in \"include\" next to the program nor in "));
+  assert_non_null (strstr (cli_err, ": pinwheel.h is not in \"include\", \"../include\" or "));
 }
 
 /* A table of a sweep has the same columns in every row. */

@@ -152,20 +152,25 @@ TEST (no_compiler) {
 
 /* What does not compile is kept, with the messages; the run goes on. */
 TEST (bad_compiler) {
-  static const char *const bad[] = { "echo message >&2; exit 1", "kill -9 $$" };
-  for (int i = 0; i < 2; i++) {
-    cli_shell (check_text (FRESH "printf '#!/bin/sh\\n%s\\n' >@/cc\n" RUN
-                                 "&& head -c 3 @/c/pinwheel/*.c && cat @/c/pinwheel/*.log",
-                           bad[i]));
-    specialise_says ("general engine: the generated code does not compile\n");
-    specialise_says (i == 0 ? "/* message\n" : "/* ");
-    assert_non_null (strstr (cli_err, "pinwheel: general engine: "));
-    assert_non_null (strstr (cli_err, ".c does not compile; the messages of "));
-    assert_ptr_equal (strchr (cli_err, '\n'), cli_err + strlen (cli_err) - 1);
-  }
+  cli_shell (FRESH "printf '#!/bin/sh\\necho message >&2; exit 1\\n' >@/cc\n" RUN
+                   "&& head -c 3 @/c/pinwheel/*.c && cat @/c/pinwheel/*.log");
+  specialise_says ("general engine: the generated code does not compile\n");
+  specialise_says ("/* message\n");
+  assert_non_null (strstr (cli_err, "pinwheel: general engine: "));
+  assert_non_null (strstr (cli_err, ".c does not compile; the messages of "));
+  assert_ptr_equal (strchr (cli_err, '\n'), cli_err + strlen (cli_err) - 1);
   cli_shell (CACHED "export CC=cc\n" RUN "; rm -rf @/c; unset HOME XDG_CACHE_HOME; export CC=false\n" RUN
                     "; ls @/tmp/*/*.c | wc -l");
   specialise_says ("general engine: the generated code does not compile\n1\n");
+}
+
+/* A compiler that is killed says nothing about the code, which is not kept. */
+TEST (killed_compiler) {
+  cli_shell (FRESH "printf '#!/bin/sh\\nkill -9 $$\\n' >@/cc\n" RUN "&& ls @/c/pinwheel @/tmp");
+  specialise_says ("general engine: the generated code cannot be compiled or loaded\n");
+  assert_null (strstr (cli_out, ".c\n"));
+  assert_non_null (strstr (cli_err, "/cc\" was ended by a signal: Killed\n"));
+  cli_bad ("CC=@/cc pinwheel show models/ezyroller.c", 1, "the C compiler \"@/cc\" was ended by a signal: Killed");
 }
 
 /* Neither does a compiler that writes something else, or nothing, stop a run; and its object is not kept. */
@@ -181,7 +186,7 @@ TEST (strange_compiler) {
   for (int i = 0; i < 3; i++) {
     cli_shell (
         check_text (FRESH "cat >@/cc <<'X'\n#!/bin/sh\n%s\nX\n" RUN "&& ls @/c/pinwheel @/tmp", strange[i].does));
-    specialise_says ("general engine: the compiled code cannot be loaded\n");
+    specialise_says ("general engine: the generated code cannot be compiled or loaded\n");
     assert_null (strstr (cli_out, ".so\n"));
     assert_non_null (strstr (cli_err, strange[i].notice));
   }

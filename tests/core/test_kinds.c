@@ -8,7 +8,9 @@
 #include "check.h"
 #include "model.h"
 #include "probe.h"
+#include "random_scene.h"
 #include "pinwheel-selftest.h"
+#include "scene.h"
 #include "toys.h"
 
 enum { KINDS_SEEDS = 100, KINDS_FEW = 3 }; /* random scenes for a good element type, for a faulty one */
@@ -37,6 +39,22 @@ TEST (built_in) {
 
 TEST (plug_in) {
   kinds_pass (toy_kinds);
+}
+
+/* Specialised code copies elements as doubles.  A small integer, or two of them, would be a subnormal number. */
+TEST (doubles) {
+  for (const pw_kind *const *kind = pw_kinds; *kind; kind++)
+    for (unsigned seed = 1; seed <= KINDS_FEW; seed++) {
+      pw_error error = { 0 };
+      pw_random random = { .state = seed };
+      pw_system *s = pw_random_scene (*kind, &random, &error);
+      check_ok (error.status, &error);
+      const double *number = s->batch->b.element;
+      size_t numbers = (size_t)s->batch->b.count * (*kind)->element / sizeof *number;
+      assert_int_equal ((*kind)->element % sizeof *number, 0);
+      for (size_t i = 0; i < numbers; i++) assert_int_not_equal (fpclassify (number[i]), FP_SUBNORMAL);
+      pw_system_free (s);
+    }
 }
 
 /* ---- Faulty element types ---- */
@@ -176,6 +194,25 @@ static const pw_field kinds_domain[] = { { .name = "mode", .offset = 8, .domain 
 static const pw_quantity kinds_long_name[] = { { "x", "N", NULL, "" }, { KINDS_50 "x", "N", NULL, "" } };
 static const pw_quantity kinds_line[] = { { "x", "N\n", NULL, "" }, { KINDS_50, "N", NULL, "" } };
 static const pw_field kinds_latin1[] = { { .name = "m\xF6", .offset = 8, .type = PW_NUMBER }, { .name = NULL } };
+
+static pw_kind kinds_rod;
+
+SCENE (kinds_longest) {
+  kinds_rod = pw_kind_rod;
+  kinds_rod.reaction = kinds_line + 1;
+  pw_add_body (m, &(pw_body){ .name = "b", .mass = 1, .inertia = 1, .start = { 2 } });
+  pw_add (m, &kinds_rod, &(pw_rod){ .name = KINDS_50, .body = { "b", "ground" }, .length = 1 });
+}
+
+/* The verifier names the equation of the longest names in full. */
+TEST (longest_name) {
+  const double zero[8] = { 0 }, q[8] = { 2 };
+  pw_verification result;
+  pw_system *s = scene_system (&kinds_longest_table, NULL);
+  assert_int_equal (pw_verify (s, &(pw_scale){ 1, 1 }, 0, q, zero, zero, zero, &result), PW_OK);
+  assert_string_equal (result.position.name, KINDS_50 "." KINDS_50);
+  pw_system_free (s);
+}
 
 TEST (faults) {
 #define KINDS_FAULT(member, value, text) \

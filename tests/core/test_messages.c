@@ -35,10 +35,10 @@ TEST (bad_names) {
   BAD (": a pin without a name", PIN (.body = { "frame", "steer" }));
   BAD (": body \"ground\": this name is reserved for the ground", BODY (.name = "ground"));
   BAD (": wheel \"ground\": this name is reserved for the ground", WHEEL (.name = "ground", .body = "frame"));
-  BAD (": body \"rear axle\": a name consists of letters, digits, _ and -", BODY (.name = "rear axle"));
-  BAD (": body \"a.b\": a name consists of letters, digits, _ and -", BODY (.name = "a.b"));
-  BAD (": body \"a?\": a name consists of letters, digits, _ and -", BODY (.name = "a\xFF"));
-  BAD (": body \"a??\": a name consists of letters, digits, _ and -", BODY (.name = "a\xC2\x9B"));
+  BAD (": body \"rear axle\": expected letters, digits, _, - and characters beyond ASCII", BODY (.name = "rear axle"));
+  BAD (": body \"a.b\": expected letters, digits, _, - and characters beyond ASCII", BODY (.name = "a.b"));
+  BAD (": body \"a?\": expected letters, digits, _, - and characters beyond ASCII", BODY (.name = "a\xFF"));
+  BAD (": body \"a??\": expected letters, digits, _, - and characters beyond ASCII", BODY (.name = "a\xC2\x9B"));
   BAD (": body \"" MESSAGES_50 "...\": a name has at most 50 bytes, this one 51", BODY (.name = MESSAGES_50 "x"));
   BAD (": wheel \"" MESSAGES_50 "...\": a name has at most 50 bytes, this one 150",
        WHEEL (.name = MESSAGES_50 MESSAGES_50 MESSAGES_50, .body = "frame"));

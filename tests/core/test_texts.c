@@ -81,13 +81,21 @@ TEST (model) {
   texts_model ("\\033[31m", "m", "a", "@/own.c: .about is not text: expected UTF-8 without control characters");
   texts_model ("good", "\\377", "a",
                "@/own.c: name, unit or meaning of parameter a is not text: expected UTF-8 without control characters");
-  texts_model ("good", "m", "a\\033[31m", "model own: body \"a?[31m\": a name consists of letters, digits, _ and -");
+  texts_model ("good", "m\\nm", "a",
+               "@/own.c: name, unit or meaning of parameter a is not text: expected UTF-8 without control characters");
+  texts_model ("good", "m", "a\\033[31m",
+               "model own: body \"a?[31m\": expected letters, digits, _, - and characters beyond ASCII");
 }
 
 TEST (file_name) {
   cli_good ("cp tests/models/arm.yaml \"$(printf '@/a\\033[31m.yaml')\"");
   cli_bad ("pinwheel show \"$(printf '@/a\\033[31m.yaml')\"", 2,
            "@/a?[31m.yaml: the name of a model file is UTF-8 without control characters");
+  cli_good ("cp tests/models/arm.yaml \"$(printf '@/a\\nb.yaml')\"");
+  cli_bad ("pinwheel show \"$(printf '@/a\\nb.yaml')\"", 2,
+           "@/a\nb.yaml: the name of a model file is UTF-8 without control characters");
+  cli_good ("PINWHEEL_MODELS=@ pinwheel list models | grep -c '^b' || true");
+  assert_string_equal (cli_out, "0\n");
   cli_good ("PINWHEEL_MODELS=@ pinwheel list models | tr -d '\\n' | LC_ALL=C tr -d ' -~' | wc -c");
   assert_string_equal (cli_out, "0\n");
 }

@@ -1,11 +1,13 @@
 /* Failures of the system: files that cannot be written or extended, closed pipes, Ctrl-C at any moment, programs
  * that are missing, names with blanks and umlauts.  What is left is whole, or carries another name. */
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 #include "check.h"
 #include "cli.h"
+#include "pinwheel-files.h"
 
 #define MACHINE "\"${PINWHEEL:-build/pinwheel}\" "
 
@@ -140,6 +142,22 @@ TEST (no_compiler) {
   cli_good ("pinwheel new @/own.c >@/log");
   assert_int_equal (cli_run ("unset CC; PATH=/none pinwheel run @/own.c"), 2);
   assert_non_null (strstr (cli_err, "cannot run the C compiler \"cc\" that the model file "));
+}
+
+/* A parent that ignores SIGCHLD leaves no exit status of the children. */
+TEST (ignored_children) {
+  cli_good ("mkdir -p @/fine; printf '#!/bin/sh\n' >@/fine/gnuplot; chmod +x @/fine/gnuplot; echo 'int x = ;' >@/x.c");
+  cli_good ("PATH=@/fine:$PATH env --ignore-signal=CHLD \"${PINWHEEL:-build/pinwheel}\" run ezyroller -t 1 --plots @/p "
+            ">@/log");
+  assert_int_equal (cli_run ("env --ignore-signal=CHLD \"${PINWHEEL:-build/pinwheel}\" run @/x.c"), 2);
+  assert_non_null (strstr (cli_err, "x.c does not compile"));
+  pw_error error = { 0 };
+  signal (SIGCHLD, SIG_IGN);
+  pw_file *file = pw_file_open (cli_path ("x.c"), &error);
+  signal (SIGCHLD, SIG_DFL);
+  assert_null (file);
+  assert_int_equal (error.status, PW_INPUT);
+  assert_non_null (strstr (error.text, "x.c does not compile"));
 }
 
 TEST (gnuplot) {

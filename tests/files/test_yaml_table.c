@@ -2,6 +2,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include "check.h"
@@ -82,13 +83,14 @@ TEST (units) {
 
 /* What is not known, or measures something else, is refused with column and unit. */
 TEST (bad_units) {
-  static const char csv[] = "t [s],u [dyn cm],w [deg],f [N],z [N m/],h [%]\n0,1,2,3,4,5\n1,2,3,4,5,6\n";
+  static const char csv[] = "t [s],u [dyn cm],w [deg],f [N],z [N m/],h [%],d [·]\n0,1,2,3,4,5,6\n1,2,3,4,5,6,7\n";
   cli_write ("model/u.csv", csv);
   table_bad ("{file: u.csv}", "u.csv:1: column \"u [dyn cm]\": the unit \"dyn cm\" is not known; expected N m");
   table_bad ("{file: u.csv, columns: [t, w]}", "column \"w [deg]\": the unit \"deg\" does not measure what N m does");
   table_bad ("{file: u.csv, columns: [t, f]}", "column \"f [N]\": the unit \"N\" does not measure what N m does");
   table_bad ("{file: u.csv, columns: [t, z]}", "the unit \"N m/\" is not known");
   table_bad ("{file: u.csv, columns: [t, h]}", "the unit \"%\" is not known");
+  table_bad ("{file: u.csv, columns: [t, d]}", "the unit \"·\" is not known");
   table_bad ("{file: u.csv, columns: [f, z]}", "column \"f [N]\": the unit \"N\" does not measure what s does");
 }
 
@@ -221,6 +223,25 @@ TEST (scale) {
   assert_true (s.table.scale == 2 * (PW_PI / 180) && s.table.offset == -1 && point[1][1] == 3);
   table_bad ("{points: [[0, 1], [1, 2]], scale: 0}", "scale: 0 is not permitted");
   table_bad ("{points: [[0, 1], [1, 1e300]], scale: 1e300}", "point 2: offset + scale * 1e+300 is not finite");
+}
+
+/* Too few descriptors are not the model's fault. */
+TEST (descriptors) {
+  pw_error error = { 0 };
+  struct rlimit old;
+  cli_write ("model/data.csv", "0,1\n1,2\n");
+  cli_write ("model/m.yaml", "pinwheel: 1\nbodies: [{name: a, mass: 1, inertia: 1}]\n"
+                             "elements: [{torque: T, body: [a, ground], value: {table: {file: data.csv}}}]\n");
+  pw_file *f = pw_file_open (cli_path ("model/m.yaml"), &error);
+  pw_model *m = pw_file_model (f, &error);
+  assert_int_equal (getrlimit (RLIMIT_NOFILE, &old), 0);
+  assert_int_equal (setrlimit (RLIMIT_NOFILE, &(struct rlimit){ 0, old.rlim_max }), 0);
+  int status = pw_model_build (m, &error);
+  assert_int_equal (setrlimit (RLIMIT_NOFILE, &old), 0);
+  assert_int_equal (status, PW_RESOURCE);
+  assert_non_null (strstr (error.text, "m.yaml: cannot read data.csv: Too many open files"));
+  pw_model_free (m);
+  pw_file_close (f);
 }
 
 TEST (contents) {

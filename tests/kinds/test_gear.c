@@ -80,6 +80,8 @@ SCENE (gear_twice) {
 TEST (refused) {
   scene_refused (scene_model (&gear_build_table, "ratio", 0.0, NULL),
                  "model scene: gear gear: ratio = 0: expected another number, positive or negative");
+  scene_refused (scene_model (&gear_build_table, "offset", 0.25, NULL),
+                 "model scene: gear gear: offset = 0.25: has no effect without from: offset");
   scene_refused (scene_model (&gear_twice_table, NULL),
                  "model scene: gear gear: two of its bodies are \"a\": expected different ones");
 }

@@ -124,6 +124,8 @@ def headers(tmp_path):
 
 def test_the_binding_follows_the_headers(headers):
     assert differences(headers) == []
+    domain = parsed(headers)["enumerators"]
+    assert [domain[name] for name in lib.DOMAINS] == [*range(domain["PW_FRACTION"] + 1)]
 
 
 @pytest.mark.parametrize("file, old, new, named", [

@@ -17,6 +17,21 @@
   try {
     await until("the first run", () => root.simulated === "yes");
     await until("its error", () => root.estimated !== undefined);
+    const run = engine.run, ends = [], end = settings.end; /* ends: final times of the runs */
+    const count = function (s, limit) { ends.push(s.end); return run.call(engine, s, limit); };
+    engine.run = count;
+    simulate();
+    settings.end = end / 2;
+    await until("the run of reference", () => ends.length === 2);
+    settings.end = end;
+    if (ends[1] !== end) throw new Error("the reference has other settings than the run: " + ends);
+    simulate();
+    engine.run = () => { throw new Error("as wanted"); };
+    simulate();
+    engine.run = count;
+    await new Promise(done => setTimeout(done, 500));
+    if (ends.length !== 3) throw new Error("the error of a run is estimated after another one has failed");
+    engine.run = run;
     await change("#page-method", "erk5+projection", "change");
     await change("#page-accuracy", "-9", "input");
     await change('#parameters input[type=number][data-name="' + wanted.name + '"]', wanted.value, "change");

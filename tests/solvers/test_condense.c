@@ -61,17 +61,19 @@ enum { PLATFORM_LEGS = 10, PLATFORM_COORDS = 3 * PLATFORM_LEGS + 3, PLATFORM_ROW
 
 typedef struct {
   double mass, last, feet; /* of the platform; 1: it is declared after its legs; legs that stand on the ground */
+  double slots;            /* 1: the platform slides on these, in slots */
 } platform;
 
 static const pw_parameter platform_list[] = {
   { PW_AT (platform, mass), 1, "kg", "of the platform", PW_POSITIVE },
   { PW_AT (platform, last), .about = "1: the platform is the last body" },
   { PW_AT (platform, feet), 2, .about = "legs that stand on the ground" },
+  { PW_AT (platform, slots), .about = "1: the platform has slots for these" },
   { .name = NULL },
 };
 
 /* A platform with legs.  In the coordinates of a leg that stands on the ground its two pins are dependent; the second
- * one is therefore eliminated after the platform. */
+ * one is therefore eliminated after the platform; if it is a slot, with fewer equations than the foot, that. */
 SCENE_WITH (platform_build, platform_list, platform) {
   char leg[20], pin[20];
   for (int i = -1; i <= PLATFORM_LEGS; i++) {
@@ -90,7 +92,12 @@ SCENE_WITH (platform_build, platform_list, platform) {
       pw_add_pin (m,
                   &(pw_pin){ .name = pin, .body = { leg, "ground" }, .at = { { 0.1 - s, -c }, { 0.3 * i + 0.1, 0 } } });
     snprintf (pin, sizeof pin, "pin%d", i);
-    pw_add_pin (m, &(pw_pin){ .name = pin, .body = { leg, "platform" }, .at = { { s, c }, { 0.3 * i, 0 } } });
+    if (i < p->feet && p->slots != 0)
+      pw_add_slot (
+          m,
+          &(pw_slot){ .name = pin, .body = { leg, "platform" }, .at = { { s, c }, { 0.3 * i, 0 } }, .heading = 1 + i });
+    else
+      pw_add_pin (m, &(pw_pin){ .name = pin, .body = { leg, "platform" }, .at = { { s, c }, { 0.3 * i, 0 } } });
   }
 }
 
@@ -100,13 +107,14 @@ typedef struct {
 } solution;
 
 /* The accelerations of the legs come first. */
-static solution platform_solve (double mass, int last, int feet) {
+static solution platform_solve (double mass, int last, int feet, int slots) {
   solution x = { .row = -1 };
-  pw_system *s = scene_system (&platform_build_table, "mass", mass, "last", (double)last, "feet", (double)feet, NULL);
+  pw_system *s = scene_system (&platform_build_table, "mass", mass, "last", (double)last, "feet", (double)feet, "slots",
+                               (double)slots, NULL);
   pw_workspace *w = pw_workspace_new (s, NULL);
   double f[PLATFORM_COORDS + 3] = { 0 }, gamma[PLATFORM_ROWS], a[PLATFORM_COORDS + 3];
   const int first = last ? 0 : 3, coords = PLATFORM_COORDS;
-  assert_true (s->coords == coords && s->rows == 2 * (PLATFORM_LEGS + feet));
+  assert_true (s->coords == coords && s->rows == 2 * (PLATFORM_LEGS + feet) - slots * feet);
   pw_saddle *k = condense_open (w, s->mass);
   for (int j = 0; j < coords; j++) f[(j + first) % coords] = cos (j);
   for (int i = 0; i < s->rows; i++) gamma[i] = sin (3 * i);
@@ -128,18 +136,26 @@ static void platform_compare (const char *what, const double *a, const double *b
 }
 
 /* Accelerations, multipliers, the smallest pivot and the verdict do not depend on the order of the bodies. */
-TEST (order_of_bodies) {
+static void platform_check (int slots) {
   for (double mass = 1e-3; mass < 2e3; mass *= 10)
     for (int feet = 1; feet <= 4; feet++) {
-      const solution x = platform_solve (mass, 0, feet), y = platform_solve (mass, 1, feet);
-      assert_int_equal (x.status, feet < 4 ? PW_OK : PW_RETRY); /* three legs hold the platform */
+      const solution x = platform_solve (mass, 0, feet, slots), y = platform_solve (mass, 1, feet, slots);
+      assert_int_equal (x.status, feet < 4 || slots ? PW_OK : PW_RETRY); /* three pinned legs hold the platform */
       assert_int_equal (y.status, x.status);
       if (x.status != PW_OK) continue;
       platform_compare ("acceleration", x.a, y.a, PLATFORM_COORDS);
-      platform_compare ("multiplier", x.lambda, y.lambda, 2 * (PLATFORM_LEGS + feet));
+      platform_compare ("multiplier", x.lambda, y.lambda, 2 * (PLATFORM_LEGS + feet) - slots * feet);
       check_close ("sine", x.sine / y.sine, 1, 1e4 * CHECK_EPS, "round-off, over the square of a sine above 0.01");
       assert_int_equal (x.row, y.row);
     }
+}
+
+TEST (order_of_bodies) {
+  platform_check (0);
+}
+
+TEST (order_with_slots) {
+  platform_check (1);
 }
 
 /* A platform with free arms, on a leg of two links that is bent. */

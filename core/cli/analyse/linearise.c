@@ -28,7 +28,7 @@ static int linearise_find_all (const pw_system *s, const char **name, int *list,
  * are refused: their first and second time derivatives would be inputs as well. */
 static int linearise_select (pw_linearise_command *cmd, pw_error *error) {
   const pw_system *s = cmd->m.system;
-  char name[200];
+  char name[PW_NAME_BYTES];
   int states = 2 * pw_system_coordinates (s), signals = pw_system_signals (s);
   cmd->input = malloc (((size_t)signals + 1) * sizeof *cmd->input);
   cmd->output = malloc (((size_t)states + 1) * sizeof *cmd->output);

@@ -88,7 +88,7 @@ static void linearise_print_component (pw_table *t, const pw_linear *l, int mode
 static void linearise_print_mode (const pw_linearise_command *cmd, int mode) {
   const pw_system *s = cmd->m.system;
   int bodies = pw_system_bodies (s), internal = pw_system_coordinates (s) - 3 * bodies;
-  char name[300];
+  char name[PW_NAME_BYTES];
   printf ("\nMode %d\n", mode + 1);
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     static const char *const head[] = { "", "x [m]", "y [m]", "phi [rad]", NULL };
@@ -174,7 +174,7 @@ static void linearise_block_json (const pw_linearise_command *cmd, pw_json *j, c
 
 static void linearise_mode_json (const pw_linearise_command *cmd, pw_json *j, int i) {
   const pw_linear *l = &cmd->linear;
-  char name[300];
+  char name[PW_NAME_BYTES];
   j->line = 1;
   pw_json_open (j, NULL, '{');
   pw_json_number (j, "re", l->re[i]);
@@ -195,7 +195,7 @@ static void linearise_mode_json (const pw_linearise_command *cmd, pw_json *j, in
 static void linearise_names_json (const pw_linearise_command *cmd, pw_json *j, const char *key, const int *list,
                                   int count, char *(*name_of) (const pw_system *s, int i, char *buffer, size_t size),
                                   const char *(*unit_of) (const pw_system *s, int i)) {
-  char name[300];
+  char name[PW_NAME_BYTES];
   j->line = 1;
   pw_json_open (j, key, '[');
   for (int i = 0; i < count; i++) {
@@ -234,7 +234,7 @@ int pw_linearise_csv (const pw_linearise_command *cmd, FILE *f, pw_error *error)
   const pw_system *s = cmd->m.system;
   int n = cmd->linear.unknowns, rows = n + cmd->outputs, columns = n + cmd->inputs;
   pw_text t = { .chars = NULL };
-  char name[300];
+  char name[PW_NAME_BYTES];
   pw_text_cell (&t, "row");
   for (int c = 0; c < n; c++) snprintf (name, sizeof name, "x%d", c + 1), pw_text_name (&t, name, "m");
   for (int c = 0; c < cmd->inputs; c++)
@@ -268,7 +268,7 @@ int pw_linearise_npz (const pw_linearise_command *cmd, FILE *f, pw_error *error)
     pw_npz_add (&z, b->name, b->rows, b->columns, REAL, value);
   }
   for (int i = 0; i < n; i++) value[2 * i] = l->re[i], value[2 * i + 1] = l->im[i];
-  pw_npz_add (&z, "eigenvalues", n, 1, COMPLEX, value);
+  pw_npz_add (&z, "eigenvalues", n, 0, COMPLEX, value);
   free (value);
   return pw_npz_end (&z, error);
 }

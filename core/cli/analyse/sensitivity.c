@@ -318,7 +318,7 @@ static int sensitivity_compute (pw_sensitivity *sens, pw_error *error) {
   int status = pw_sensitivity_compute (sens, NULL, &progress, error);
   for (int i = 0; i < SENSITIVITY_REPEATED && status == PW_OK && sensitivity_improve_steps (sens); i++) {
     status = sensitivity_repeat (sens, &progress, error);
-    if (status == PW_OK || status == PW_RESOURCE || status == PW_RETRY) continue;
+    if (status == PW_OK || status == PW_RESOURCE || pw_limit_over (&sens->limit)) continue; /* or after Ctrl-C */
     for (int p = 0; p < sens->unknowns.count; p++) sens->unknowns.list[p].step = sens->unknowns.list[p].last_step;
     *error = (pw_error){ 0 }; /* such as that of a model that refuses the value of a neighbour */
     status = sensitivity_repeat (sens, &progress, error);

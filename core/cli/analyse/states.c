@@ -47,7 +47,7 @@ void pw_states_print (const pw_system *s, const double *q, const double *v, int 
 
 void pw_states_json (const pw_system *s, const double *q, const double *v, const char *key, pw_json *j) {
   int n = pw_system_coordinates (s);
-  char name[300];
+  char name[PW_NAME_BYTES];
   pw_json_open (j, key, '{');
   for (int i = 0; i < 2 * n; i++)
     pw_json_number (j, pw_system_state_name (s, i, name, sizeof name), i < n ? q[i] : v[i - n]);
@@ -55,7 +55,7 @@ void pw_states_json (const pw_system *s, const double *q, const double *v, const
 }
 
 void pw_states_header (const pw_system *s, pw_text *t) {
-  char name[300];
+  char name[PW_NAME_BYTES];
   for (int i = 0; i < 2 * pw_system_coordinates (s); i++)
     pw_text_name (t, pw_system_state_name (s, i, name, sizeof name), pw_system_state_unit (s, i));
 }

@@ -7,7 +7,7 @@
 #include "report.h"
 #include "util.h"
 
-enum { STEADY_STARTS = 30 }; /* default of --starts */
+#define STEADY_STARTS "30" /* default of --starts */
 
 /* Directions of pw_steady_follow: towards the first or the last value of the range. */
 enum { TO_FIRST = -1, TO_LAST = 1 };
@@ -33,13 +33,14 @@ static int steady_read_vary (pw_steady_command *cmd, pw_error *error) {
 }
 
 static int steady_read_options (pw_steady_command *cmd, pw_error *error) {
-  double starts = STEADY_STARTS;
+  double starts = 0;
   int status = pw_cli_number ("--at", cmd->at_text, PW_NONNEGATIVE, &cmd->settings.t, error);
   cmd->limit.seconds = INFINITY;
   cmd->settings.span = pw_cli_defaults (pw_file_table (cmd->m.file)).t_end;
   cmd->settings.vary = -1; /* none of the values held */
   cmd->settings.hold = cmd->hold;
   if (status == PW_OK) status = pw_cli_number ("--limit", cmd->line.limit, PW_POSITIVE, &cmd->limit.seconds, error);
+  if (cmd->starts_text == NULL) cmd->starts_text = STEADY_STARTS;
   if (status == PW_OK) status = pw_cli_number ("--starts", cmd->starts_text, PW_REAL, &starts, error);
   if (status == PW_OK && !(starts >= 0 && starts <= 1e9 && starts == floor (starts)))
     status = pw_fail (error, PW_INPUT, "--starts %s: expected a whole number >= 0", cmd->starts_text);
@@ -78,7 +79,7 @@ static int steady_unadvised (const pw_steady_command *cmd, int status, pw_error 
 /* Stores the options --hold which, besides those given, select the motion last found within its family. */
 static int steady_advise (pw_steady_command *cmd, pw_steady_point *p, pw_error *error) {
   pw_initial_value hold[PW_HOLDS];
-  char name[300];
+  char name[PW_NAME_BYTES];
   size_t used = 0;
   int count = p->motion.family > 0 ? pw_steady_suggest (cmd->search, hold, PW_HOLDS) : 0;
   for (int i = 0; i < count && used < sizeof p->advice; i++)
@@ -257,7 +258,7 @@ static int steady_nearest_motion (pw_steady_command *cmd, pw_steady_motion *m, p
 static int steady_hold_more (pw_steady_command *cmd, pw_error *error) {
   const pw_system *s = cmd->m.system;
   pw_steady_motion m;
-  char name[300];
+  char name[PW_NAME_BYTES];
   int status = steady_nearest_motion (cmd, &m, error);
   if (status == PW_RETRY || (status == PW_OK && m.family == 0)) return PW_OK;
   if (status != PW_OK) return status;
@@ -323,7 +324,7 @@ static const struct poptOption steady_options_table[] = {
   PW_TEXT_OPTION (pw_steady_command, vary_text, "vary", 0, "NAME=FIRST:LAST",
                   "Follow branches over a parameter of the model, or of a held value such as BODY.speed"),
   PW_TEXT_OPTION (pw_steady_command, starts_text, "starts", 0, "N",
-                  "Begin at the initial state and at N random ones (default 30)"),
+                  "Begin at the initial state and at N random ones (default " STEADY_STARTS ")"),
   PW_TEXT_OPTION (pw_steady_command, at_text, "at", 0, "T", "Evaluate signals at time T [s] (default 0)"),
   PW_TEXT_OPTION (pw_steady_command, folder, "output", 'o', "DIR",
                   "Write steady.csv, steady.json and, with --vary, figures into a folder"),

@@ -41,7 +41,7 @@ static void steady_cells_rightmost (pw_table *t, const pw_steady_point *p) {
 static void steady_print_motions (const pw_steady_command *cmd) {
   const pw_system *s = cmd->m.system;
   const int n = pw_system_coordinates (s), held[] = { 2 * n, n + 2 }; /* (pw_system_find_held) speed, omega of body 0 */
-  char name[300];
+  char name[PW_NAME_BYTES];
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     pw_cell (&t, 6, "motion");
     for (int k = 0; k < 2; k++)
@@ -150,7 +150,7 @@ static void steady_point_json (const pw_steady_command *cmd, const pw_steady_poi
 
 static void steady_json (const void *context, pw_json *j) {
   const pw_steady_command *cmd = context;
-  char name[300];
+  char name[PW_NAME_BYTES];
   pw_json_open (j, NULL, '{');
   pw_json_number (j, "schema", 1);
   pw_json_text (j, "model", pw_file_name (cmd->m.file));

@@ -38,7 +38,7 @@ typedef struct {
   double *column_length;   /* unknowns: before scaling; 0: the unknown has no effect */
   int rank;                /* singular values that differ from 0 */
   double chi2;             /* sum of squares of the residuals (model - data) / sigma */
-  double initial_chi2;
+  double initial_chi2;     /* where the first search begins */
   int by_differences; /* 1: derivatives are differences of runs, since the variational equations could not be used */
   int converged, iterations;
   int interrupted; /* 1: by Ctrl-C; the estimate is the best so far, its standard errors are NaN */

@@ -36,7 +36,7 @@ typedef struct {
   pw_error *error;
   double worst; /* largest norm of the residuals of the runs of this search that succeeded */
   double least; /* sum of squares at the best minimum so far, fit->estimate; INFINITY: no search has reached one yet */
-  int previous; /* iterations of earlier searches that ended without an error */
+  int previous; /* iterations of earlier searches */
 } fit_solver;
 
 /* ---- Bounds: an unknown with an upper bound has a lower one, too ---- */
@@ -149,7 +149,7 @@ static void solve_store (fit_solver *solver, double chi2) {
 /* `moved`: 1 if the last run was made at the position reached; it is the result if Ctrl-C comes before any minimum. */
 static void solve_progress (fit_solver *solver, int iteration, int moved, const gsl_multifit_nlinear_workspace *w) {
   double norm = gsl_blas_dnrm2 (gsl_multifit_nlinear_residual (w));
-  if (iteration == 0 && solver->previous == 0) solver->fit->initial_chi2 = norm * norm;
+  if (isnan (solver->fit->initial_chi2)) solver->fit->initial_chi2 = norm * norm;
   solver->fit->iterations = solver->previous + iteration;
   if (!isfinite (solver->least) && moved) solve_store (solver, norm * norm);
   snprintf (solver->fit->progress.note, sizeof solver->fit->progress.note, "residual %.6g", norm);
@@ -193,10 +193,12 @@ static void solve_minimum (fit_solver *solver, gsl_multifit_nlinear_workspace *w
   for (size_t i = 0; i < n; i++) solver->u[i] = solve_start (fit->unknowns.list + i, minimum[1 + i]);
   *minimum = INFINITY;
   solver->worst = 0;
-  int status = solve_run (solver, u) == PW_OK ? solve_iterate (solver, u, &f, w) : GSL_EBADFUNC;
-  if (solver->status != PW_OK || (status != GSL_SUCCESS && status != GSL_ENOPROG)) return;
-  gsl_vector_memcpy (u, gsl_multifit_nlinear_position (w));
+  if (solve_run (solver, u) != PW_OK) return;
+  int status = solve_iterate (solver, u, &f, w);
+  if (solver->status != PW_OK) return;
   fit->iterations = solver->previous += (int)gsl_multifit_nlinear_niter (w);
+  if (status != GSL_SUCCESS && status != GSL_ENOPROG) return;
+  gsl_vector_memcpy (u, gsl_multifit_nlinear_position (w));
   if (solve_run (solver, u) == PW_OK) solve_keep (solver, minimum);
 }
 
@@ -318,6 +320,7 @@ static int solve_open (fit_solver *solver) {
 
 int pw_fit_solve (pw_fit *fit, pw_error *error) {
   fit_solver solver = { .fit = fit, .error = error };
+  fit->initial_chi2 = NAN;
   solver.status = solve_open (&solver);
   if (solver.status == PW_OK) solve_minima (&solver);
   if (solver.status == PW_OK) solve_errors (&solver);

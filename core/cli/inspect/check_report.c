@@ -59,13 +59,19 @@ static void report_end_list (pw_json *j, int listed) {
 
 /* ---- Mobility and mass ---- */
 
+/* Why results of the linearisation are missing. */
+static const char *report_why_not_computed (const pw_linear *linear) {
+  static char text[80];
+  snprintf (text, sizeof text, "%d coordinates, the limit is %d", linear->coordinates, CHECK_COORDINATES);
+  return linear->coordinates > CHECK_COORDINATES ? text : "the linearisation fails, see the findings";
+}
+
 static void report_singular_value (pw_json *j, const pw_check *check) {
   const pw_linear *linear = &check->linear;
   double length = check->run ? pw_run_scale (check->run)->length : NAN;
   const char *label = linear->rank > 0 ? "smallest singular value of J" : NULL;
   if (isnan (linear->least))
-    report_entry (j, "least_singular_value", NAN, label, "not computed: %d coordinates, the limit is %d",
-                  linear->coordinates, CHECK_COORDINATES);
+    report_entry (j, "least_singular_value", NAN, label, "not computed: %s", report_why_not_computed (linear));
   else
     report_entry (j, "least_singular_value", check->run ? linear->least : NAN, label,
                   "%s, rows scaled to length 1, angles multiplied by L = %s m", PW_DIGITS (linear->least, CHECK_DIGITS),
@@ -298,10 +304,10 @@ static void report_linear (pw_json *j, const pw_check *check) {
   if (check->run == NULL || (j && linear->A == NULL)) return;
   report_section (j, "linearisation", '{', "Linearised at the initial state");
   report_entry (j, "unknowns", linear->unknowns, "unknowns", "%d", linear->unknowns);
-  if (linear->A == NULL && linear->coordinates > CHECK_COORDINATES)
-    report_text (j, "eigenvalues", "not computed: %d coordinates, the limit is %d", linear->coordinates,
-                 CHECK_COORDINATES);
-  if (linear->A == NULL) return;
+  if (linear->A == NULL) {
+    report_text (j, "eigenvalues", "not computed: %s", report_why_not_computed (linear));
+    return;
+  }
   report_motion (j, linear);
   /* eigenvalues of rigid displacements are not 0 in a frame that turns */
   if (j == NULL && check->fastest < 0 && linear->twist[2] == 0)

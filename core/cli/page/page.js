@@ -125,11 +125,11 @@ const pageSettings = () => ({ method: page.method, accuracy: null, end: page.t_e
 function accuracy (s) {
   return s.accuracy ?? (byName(s.method).adaptive ? page.rtol : page.step);
 }
-/* Settings for the engine.  Initial values are used only if the numbers of bodies are those with which the page begins:
- * indices of states depend on them. */
+/* A copy of the settings for the engine.  Initial values are used only if the numbers of bodies are those with which the
+ * page begins: indices of states depend on them. */
 function engineSettings (s) {
   const otherCounts = page.parameters.some((p, i) => p.domain === "count" && s.parameters[i] !== p.value);
-  return { ...s, initial: otherCounts ? [] : [...s.initial], step: accuracy(s), rtol: accuracy(s) };
+  return { ...s, parameters: [...s.parameters], initial: otherCounts ? [] : [...s.initial], step: accuracy(s), rtol: accuracy(s) };
 }
 
 /* Adds a label with a slider and a field for a number; `change` is called with a new number. */
@@ -251,10 +251,12 @@ function difference (a, b) {
  * followed, estimates its error. */
 let estimateTimer = 0;
 function simulate () {
+  const used = engineSettings(settings);
   let result;
+  clearTimeout(estimateTimer);
   document.documentElement.dataset.simulated = "";
   try {
-    result = engine.run(engineSettings(settings), usualRun);
+    result = engine.run(used, usualRun);
   } catch (error) {
     engine.restart();
     $("reason").textContent = error.message + (run ? ". The run before it is still shown." : "");
@@ -267,17 +269,16 @@ function simulate () {
   showValues();
   history.replaceState(null, "", "#" + link());
   document.documentElement.dataset.simulated = "yes";
-  clearTimeout(estimateTimer);
-  if (!result.reason) estimateTimer = setTimeout(() => estimate(result), 300);
+  if (!result.reason) estimateTimer = setTimeout(() => estimate(result, used), 300);
 }
 
-/* Estimates the error of a result by a reference: erk8+projection with a tolerance of 1e-13. */
-function estimate (result) {
+/* Estimates the error of the result of these settings by a reference: erk8+projection with a tolerance of 1e-13. */
+function estimate (result, used) {
   try {
-    const reference = engine.run({ ...engineSettings(settings), method: "erk8+projection", rtol: 1e-13 }, longRun);
+    const reference = engine.run({ ...used, method: "erk8+projection", rtol: 1e-13 }, longRun);
     if (reference.reason) return;
     const error = difference(result, reference);
-    result.ms = Math.max(engine.time(engineSettings(settings)), 0.01); /* logarithmic axes have no 0 */
+    result.ms = Math.max(engine.time(used), 0.01); /* logarithmic axes have no 0 */
     runs.push({ method: result.method, ms: result.ms, error: Math.max(error, 1e-16) });
     showCost(result, error);
     document.documentElement.dataset.estimated = error;

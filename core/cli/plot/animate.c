@@ -108,14 +108,13 @@ static void page_samples (pw_json *j, const pw_plots *plots, const char *key, in
 }
 
 void pw_animation_parameters (pw_json *j, const pw_model *model) {
-  static const char *const domain[] = { "real", "nonnegative", "positive", "count", "fraction" };
   pw_json_open (j, "parameters", '[');
   for (const pw_parameter *p = pw_model_table (model)->parameters; p && p->name; p++) {
     pw_json_open (j, NULL, '{');
     pw_json_text (j, "name", p->name);
     pw_json_text (j, "unit", p->unit);
     pw_json_text (j, "about", p->about);
-    pw_json_text (j, "domain", domain[p->domain]);
+    pw_json_text (j, "domain", pw_domain_names[p->domain]);
     pw_json_number (j, "value", pw_model_parameter (model, p));
     pw_json_close (j, '}');
   }

@@ -83,7 +83,7 @@ typedef struct {
  * without corners if they are collinear. */
 typedef struct {
   int attachments, corners;
-  int is_point; /* 1: it has mass but no inertia */
+  int is_point_mass; /* 1: it has mass but no inertia */
   double attachment[PLOT_ATTACHMENTS][2];
   double corner[PLOT_ATTACHMENTS + 1][2];
 } pw_plot_body;

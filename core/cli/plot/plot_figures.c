@@ -115,7 +115,7 @@ static void data_wheels (FILE *f, const pw_plots *plots, int i) {
 /* Bodies of sample i that are points: without attachment points, or with mass but no inertia. */
 static void data_centres (FILE *f, const pw_plots *plots, int i) {
   for (int b = 0; b < plots->bodies.drawn; b++)
-    if (plots->shape[b].attachments == 0 || plots->shape[b].is_point)
+    if (plots->shape[b].attachments == 0 || plots->shape[b].is_point_mass)
       data_vertex (f, pw_plot_track (plots, i, &plots->bodies, b), pw_plot_sample (plots, i)[PLOT_T], b, "\n");
 }
 

@@ -147,7 +147,7 @@ void pw_plot_find_shapes (pw_plots *plots) {
   }
   for (int b = 0; b < plots->bodies.drawn; b++) {
     const double *M = mass + 3 * plots->bodies.system_index[b];
-    plots->shape[b].is_point = M[0] > 0 && M[2] == 0;
+    plots->shape[b].is_point_mass = M[0] > 0 && M[2] == 0;
     shapes_outline (&plots->shape[b]);
   }
 }

@@ -146,13 +146,15 @@ static int symbol_hatch (double x0, double x1, double y, int upright, pw_plot_st
   return strokes;
 }
 
-/* The hatching of a rail on the ground, or the support of a joint on the ground; returns the number of strokes. */
+/* The hatching of a rail on the ground; else the support of a joint, or of p1 on a rail, on the ground.  Returns the
+ * number of strokes. */
 static int symbol_ground (double low, double high, const pw_plot_link *link, pw_plot_stroke *stroke) {
   static const pw_plot_stroke support = {
     6, 0, 1, { { 1, 1.1, -1.5 }, { 1, .8, -1.5 }, { 1, 0, 0 }, { 1, -.8, -1.5 }, { 1, -1.1, -1.5 }, { 1, 1.1, -1.5 } }
   };
   const double groove = -.4; /* y of the lower edge of a slot, "1 -inf -.4" in its symbol; a rail has y = 0 */
-  if (link->rail) return symbol_hatch (low, high, strstr (link->kind->symbol, "1 -inf -") ? groove : 0, 0, stroke);
+  if (link->rail && link->end[link->ends - 1].body < 0)
+    return symbol_hatch (low, high, strstr (link->kind->symbol, "1 -inf -") ? groove : 0, 0, stroke);
   *stroke = support;
   return 1 + symbol_hatch (-1.1, 1.1, -1.5, 1, stroke + 1);
 }

@@ -39,7 +39,7 @@ const pw_reference_error *pw_comparison_errors (pw_comparison *comparison, const
   pw_reference_error *errors = &comparison->errors;
   if (motion->taken == 0) return NULL;
   motion->samples = comparison->reference.samples = motion->taken; /* the run may have ended early */
-  pw_motion_distance (system, &comparison->reference, motion, error);
+  pw_motion_errors (system, &comparison->reference, motion, error);
   errors->samples = motion->taken;
   errors->t = motion->t[motion->taken - 1];
   memcpy (errors->end, error + MOTION_END, sizeof errors->end);

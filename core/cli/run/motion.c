@@ -59,8 +59,8 @@ static void motion_include (double *error, int *compared, double difference) {
   *compared = 1;
 }
 
-void pw_motion_distance (const pw_system *system, const pw_motion *reference, const pw_motion *motion,
-                         double error[MOTION_ERRORS]) {
+void pw_motion_errors (const pw_system *system, const pw_motion *reference, const pw_motion *motion,
+                       double error[MOTION_ERRORS]) {
   int states = 2 * pw_system_coordinates (system), last = motion->samples - 1;
   int compared[MOTION_ERRORS] = { 0 }, jumps[MOTION_SAMPLES];
   const char *unit = NULL; /* of the multiplier before: neighbours mostly have the same */

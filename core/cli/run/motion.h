@@ -37,8 +37,8 @@ double pw_motion_next_time (const pw_motion *motion);
 /* Stores the next sample. */
 void pw_motion_add (pw_motion *motion, const pw_system *system, const pw_sample *sample);
 /* The errors of a motion relative to a reference at the same times. */
-void pw_motion_distance (const pw_system *system, const pw_motion *reference, const pw_motion *motion,
-                         double error[MOTION_ERRORS]);
+void pw_motion_errors (const pw_system *system, const pw_motion *reference, const pw_motion *motion,
+                       double error[MOTION_ERRORS]);
 /* The unit of a state: MOTION_LENGTH to MOTION_RATE. */
 int pw_motion_unit (const pw_system *system, int state);
 

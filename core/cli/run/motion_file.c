@@ -23,6 +23,7 @@ typedef struct {
   double time_unit; /* of the first column [s] */
   file_column *column;
   int columns, states; /* columns after the first; those of them that are states of the model */
+  int known;           /* 1: a value is not nan */
   pw_names indices;    /* in a sample, of the names of states and reactions */
   pw_arena arena;      /* of line, column and names */
 } file_reader;
@@ -78,7 +79,7 @@ static int file_number (const file_reader *reader, const char *cell, double *val
 
 /* Lists the names of states and reactions in the order of a sample. */
 static int file_list_names (file_reader *reader, const pw_system *system) {
-  char name[300];
+  char name[PW_NAME_BYTES];
   int states = 2 * pw_system_coordinates (system), rows = pw_system_rows (system);
   if (pw_names_open (&reader->indices, (size_t)(states + rows)) != PW_OK) return PW_RESOURCE;
   for (int i = 0; i < states + rows; i++) {
@@ -114,7 +115,7 @@ static int file_find_column (file_reader *reader, int i, const pw_system *system
 }
 
 static int file_read_columns (file_reader *reader, const pw_system *system, pw_error *error) {
-  char example[300], text[260];
+  char example[PW_NAME_BYTES], text[260];
   int status = file_next_line (reader, error);
   if (status == PW_RETRY) return pw_fail (error, PW_INPUT, "--reference %s: the file is empty", reader->path);
   if (status != PW_OK) return status;
@@ -169,17 +170,20 @@ static int file_count_rows (file_reader *reader, double *t_end, int *rows, pw_er
                   pw_format (end, *t_end, 9));
 }
 
-/* Reads the cells after the time into a sample of `width` numbers; NaN where there is no column. */
+/* Reads the cells after the time into a sample of `width` numbers; NaN, unknown, where there is no column
+ * or a cell is nan. */
 static int file_read_sample (file_reader *reader, char *rest, double *sample, int width, pw_error *error) {
   for (int i = 0; i < width; i++) sample[i] = NAN;
   for (const file_column *column = reader->column; column < reader->column + reader->columns; column++) {
     const char *cell = file_cell (&rest);
     double value;
     if (column->index < 0) continue;
-    if (file_number (reader, cell, &value, error) != PW_OK || isinf (value))
+    if (file_number (reader, cell, &value, error) != PW_OK) return error->status;
+    if (isinf (value))
       return pw_fail (error, PW_INPUT, "--reference %s: line %ld: \"%.60s\" is not finite", reader->path,
                       reader->line_number, cell);
     sample[column->index] = column->factor * value;
+    reader->known |= !isnan (value);
   }
   if (*rest == 0) return PW_OK;
   return pw_fail (error, PW_INPUT, "--reference %s: line %ld has more cells than the first line", reader->path,
@@ -199,7 +203,7 @@ static int file_read_samples (file_reader *reader, int rows, double t_end, pw_mo
     status = file_read_sample (reader, rest, pw_motion_at (motion, k++), motion->width, error);
     if (status != PW_OK) return status;
   }
-  return PW_OK;
+  return reader->known ? PW_OK : pw_fail (error, PW_INPUT, "--reference %s: every value is nan", reader->path);
 }
 
 /* Reads the file twice: rows are selected once their number is known. */

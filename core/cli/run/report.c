@@ -36,7 +36,7 @@ static void report_step (const pw_run *run, double step) {
 
 /* An absolute tolerance within which a force saturates. */
 static void report_atol (pw_run *run, const pw_system *system, double atol) {
-  char atol_text[32], saturation_text[32], element[PW_STATE_NAME];
+  char atol_text[32], saturation_text[32], element[PW_NAME_BYTES];
   double saturation;
   int state = atol > 0 ? pw_run_saturation (run, &saturation, element, sizeof element) : -1;
   if (state >= 0 && atol > saturation)
@@ -119,7 +119,7 @@ static void report_initial (const pw_system *system, const pw_initial_report *in
 
 void pw_report_initialisation (const pw_run *run, const pw_system *system, const char *const *redundant) {
   int differences = pw_system_differences (system), count = 0;
-  char name[PW_STATE_NAME];
+  char name[PW_NAME_BYTES];
   for (int i = 0; i < differences && i < REPORT_MESSAGES; i++)
     pw_cli_say ("pinwheel: derivatives by differences: %s\n", pw_system_difference_name (system, i, name, sizeof name));
   report_more (stderr, differences - REPORT_MESSAGES, "");
@@ -170,7 +170,7 @@ static void report_bodies (const pw_system *system, const pw_sample *last) {
 static void report_internal (const pw_system *system, const pw_sample *last) {
   int first = 3 * pw_system_bodies (system), n = pw_system_coordinates (system);
   int end = n - first > REPORT_ROWS ? first + REPORT_ROWS : n;
-  char name[PW_STATE_NAME];
+  char name[PW_NAME_BYTES];
   for (pw_table table = { 0 }; pw_table_pass (&table);)
     for (int j = first; j < end; j++) {
       for (int state = j; state < 2 * n; state += n)
@@ -184,7 +184,7 @@ static void report_internal (const pw_system *system, const pw_sample *last) {
 /* Reactions are -lambda; 0 - lambda is never -0. */
 static void report_reactions (const pw_system *system, const pw_sample *last) {
   int rows = pw_system_rows (system), shown = rows < REPORT_ROWS ? rows : REPORT_ROWS;
-  char name[PW_STATE_NAME];
+  char name[PW_NAME_BYTES];
   if (rows > 0) printf ("\n  reaction\n");
   for (pw_table table = { 0 }; pw_table_pass (&table);)
     for (int i = 0; i < shown; i++) {
@@ -267,7 +267,7 @@ pw_summary pw_run_summary (pw_run_cli *command, const pw_sample *last, const pw_
 void pw_report_warnings (const pw_run *run, const pw_system *system, double defect) {
   int state;
   double power, growth = pw_run_growth (run, &state, &power);
-  char name[PW_STATE_NAME], times[32], grows[32], percent[32];
+  char name[PW_NAME_BYTES], times[32], grows[32], percent[32];
   if (defect > REPORT_DEFECT)
     pw_cli_say ("pinwheel: the energy does not balance: %s %% of it is unaccounted for; %s\n",
                 pw_format (percent, 100 * defect, 2), pw_run_energy_advice (run, defect));

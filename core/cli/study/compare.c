@@ -165,7 +165,7 @@ static void compare_set_errors (const pw_compare *compare, const pw_motion *moti
   const pw_reference *reference = &compare->reference;
   double *error = &row->value[COLUMN_ERROR];
   if (!reference->known) return;
-  pw_motion_distance (compare->study.compiled.system, &reference->motion, motion, error);
+  pw_motion_errors (compare->study.compiled.system, &reference->motion, motion, error);
   for (int i = 0; i < MOTION_ERRORS; i++) {
     if (reference->uncertainty[i] == 0) error[i] = NAN;
     if (!(error[i] <= reference->uncertainty[i])) continue;

@@ -103,7 +103,7 @@ static int reference_run (void *context, int i, pw_error *error) {
 static double reference_distance (const pw_system *system, const pw_motion *a, const pw_motion *b) {
   double error[MOTION_ERRORS], size[MOTION_UNITS], largest = 0;
   reference_sizes (system, a, size);
-  pw_motion_distance (system, a, b, error);
+  pw_motion_errors (system, a, b, error);
   for (int i = 0; i < MOTION_UNITS; i++) {
     double relative = error[MOTION_LARGEST + i] / (size[i] > 0 ? size[i] : 1);
     if (!isnan (largest) && !(relative <= largest)) largest = relative;
@@ -141,7 +141,7 @@ static void reference_add_partner (pw_reference *reference, const pw_system *sys
                                    const reference_candidate *partner) {
   int i = reference->partners++;
   reference_name (partner, reference->partner[i].name, sizeof reference->partner[i].name);
-  pw_motion_distance (system, &best->motion, &partner->motion, reference->partner[i].error);
+  pw_motion_errors (system, &best->motion, &partner->motion, reference->partner[i].error);
 }
 
 /* Selects the reference: the first of the two candidates that agree best.  The second is its first partner. */

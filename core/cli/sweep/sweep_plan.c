@@ -77,7 +77,7 @@ static int plan_reserve_column (pw_plan *plan) {
 
 /* Adds the new states of a system, and the units of varied initial values. */
 static int plan_add_columns (pw_plan *plan, const pw_system *system, pw_error *error) {
-  char name[300];
+  char name[PW_NAME_BYTES];
   for (int i = 0; i < 2 * pw_system_coordinates (system); i++) {
     int state = plan_table_state (system, i);
     pw_system_state_name (system, state, name, sizeof name);

@@ -106,7 +106,7 @@ static void rows_specialise (sweep_rows *sweep, row_system *system) {
 
 /* Compiles the system of a row, and finds the states of the table in it. */
 static int system_open (row_system *system, const pw_plan *plan, long row, pw_error *error) {
-  char name[300];
+  char name[PW_NAME_BYTES];
   if (pw_plan_compile (plan, row, &system->model, error) != PW_OK) return error->status;
   system->state = malloc ((size_t)plan->columns * sizeof *system->state);
   if (system->state == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");

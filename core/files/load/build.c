@@ -16,8 +16,8 @@ typedef struct {
   const char *const *options; /* ends with NULL, as does `last` */
   const char *last[3];        /* options and files after the name of the source */
   int for_page;               /* 1: compiles to WebAssembly */
-  const char *log;            /* path of the file that gets the messages; NULL: standard error */
-  sigset_t signals;           /* blocked before build_defer, and so in the compiler */
+  const char *log;            /* generated code: the file that gets its messages; NULL: a model file */
+  sigset_t mask;              /* signals blocked before build_defer, and in the compiler */
 } build_command;
 
 const char *pw_compiler (void) {
@@ -25,8 +25,8 @@ const char *pw_compiler (void) {
   return cc && cc[strspn (cc, " \t")] ? cc : "cc";
 }
 
-/* Starts the compiler, its messages on standard error or in a log, SIGPIPE not ignored.  0 or an errno value. */
-static int build_spawn (const build_command *command, char *const *word, pid_t *child) {
+/* Starts the compiler, its messages into the file `log`, SIGPIPE not ignored.  0 or an errno value. */
+static int build_spawn (const build_command *command, char *const *word, int log, pid_t *child) {
   posix_spawn_file_actions_t files;
   posix_spawnattr_t attributes;
   sigset_t pipe;
@@ -36,11 +36,9 @@ static int build_spawn (const build_command *command, char *const *word, pid_t *
   if (code) return code;
   code = posix_spawnattr_init (&attributes);
   if (code == 0) {
-    if (command->log)
-      code = posix_spawn_file_actions_addopen (&files, STDERR_FILENO, command->log,
-                                               O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW, 0600);
+    code = posix_spawn_file_actions_adddup2 (&files, log, STDERR_FILENO);
     if (code == 0) code = posix_spawn_file_actions_adddup2 (&files, STDERR_FILENO, STDOUT_FILENO);
-    posix_spawnattr_setsigmask (&attributes, &command->signals);
+    posix_spawnattr_setsigmask (&attributes, &command->mask);
     posix_spawnattr_setsigdefault (&attributes, &pipe);
     posix_spawnattr_setflags (&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
     if (code == 0) code = posix_spawnp (child, word[0], &files, &attributes, word, environ);
@@ -50,55 +48,66 @@ static int build_spawn (const build_command *command, char *const *word, pid_t *
   return code;
 }
 
-/* Runs the words of a command line, which compiles a source. */
-static int build_run (const build_command *command, char *const *word, const char *source, pw_error *error) {
-  pid_t child;
-  int outcome = 0, code = build_spawn (command, word, &child);
-  while (code == 0 && waitpid (child, &outcome, 0) < 0 && errno != ECHILD) /* ECHILD: SIGCHLD is ignored */
-    if (errno != EINTR) code = errno;
-  int status = WIFEXITED (outcome) ? WEXITSTATUS (outcome) : -1;
+/* Runs a compiler's command line; `source` and `object` are the file that it compiles and the one that it makes, which
+ * does not exist yet. */
+static int build_run (const build_command *command, char *const *word, const char *source, const char *object,
+                      pw_error *error) {
+  pid_t child, ended = 0;
+  int log =
+      command->log ? open (command->log, O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, 0600) : STDERR_FILENO;
+  if (log < 0) return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", command->log, strerror (errno));
+  int outcome = 0, code = build_spawn (command, word, log, &child);
+  if (command->log) close (log);
+  while (code == 0 && (ended = waitpid (child, &outcome, 0)) < 0 && errno == EINTR) continue;
+  int exit_code = WEXITSTATUS (outcome);
+  if (ended < 0) exit_code = access (object, F_OK) != 0; /* SIGCHLD is ignored: there is no exit status */
   if (code != 0 && code != ENOENT && code != EACCES)
     return pw_fail (error, PW_RESOURCE, "cannot run the C compiler \"%s\": %s", word[0], strerror (code));
-  if (code != 0 || status == 127)
+  if (code == 0 && WIFSIGNALED (outcome)) /* Ctrl-C, or too little memory */
+    return pw_fail (error, PW_RESOURCE, "the C compiler \"%s\" was ended by a signal: %s", word[0],
+                    strsignal (WTERMSIG (outcome)));
+  if (code != 0 || exit_code == 127)
     return pw_fail (error, PW_INPUT, "cannot run the C compiler \"%s\" that %s%s needs (%s): install %s", word[0],
                     command->log ? "specialised code" : "the model file ", command->log ? "" : source,
                     code ? strerror (code) : "not found",
                     command->for_page ? PW_PAGE_TOOLS : "one, or name another in the environment variable CC");
-  if (status != 0 && command->log)
+  if (exit_code != 0 && command->log)
     return pw_fail (error, PW_METHOD, "%s does not compile; the messages of %s are in %s", source, word[0],
                     command->log);
-  if (status != 0)
+  if (exit_code != 0)
     return pw_fail (error, PW_INPUT, "the model file %s does not compile; the messages of %s are above", source,
                     word[0]);
   return PW_OK;
 }
 
-enum { BUILD_COMPILER = 24, BUILD_OTHERS = 24 }; /* most words of the compiler's command; of options and files */
+/* Largest numbers of words: of CC; of options and files. */
+enum { BUILD_COMPILER_WORDS = 24, BUILD_OTHER_WORDS = 24 };
 
-/* Adds words to a command line, which execv does not modify. */
+/* Adds words to a command line.  Copying their addresses drops `const`: posix_spawnp does not modify the words. */
 static void build_add (char **word, int *count, const char *const *more) {
   for (; *more; more++) memcpy (&word[(*count)++], more, sizeof *more);
 }
 
 static int build_object (const build_command *command, const char *source, const char *object, pw_error *error) {
   char header[PW_PATH], include[PW_PATH], *compiler = strdup (command->compiler), *rest = NULL;
-  char *word[BUILD_COMPILER + BUILD_OTHERS] = { NULL };
+  char *word[BUILD_COMPILER_WORDS + BUILD_OTHER_WORDS] = { NULL };
   int words = 0, status = pw_search_header (header, error);
   pw_folder_of (include, header);
   if (status == PW_OK && *header == 0)
     status = pw_fail (error, PW_INPUT,
-                      "cannot compile %s: pinwheel.h is neither in \"include\" next to the program nor in "
-                      "\"../include/pinwheel\"",
+                      "cannot compile %s: pinwheel.h is not in \"include\", \"../include\" or \"../include/pinwheel\", "
+                      "seen from the folder of the program or of its library",
                       source);
   if (status == PW_OK && compiler == NULL) status = pw_fail (error, PW_RESOURCE, "out of memory");
   if (status == PW_OK) {
     char *w = strtok_r (compiler, " \t", &rest);
-    for (; w && words < BUILD_COMPILER; w = strtok_r (NULL, " \t", &rest)) word[words++] = w;
+    for (; w && words < BUILD_COMPILER_WORDS; w = strtok_r (NULL, " \t", &rest)) word[words++] = w;
     build_add (word, &words, command->options);
     build_add (word, &words, (const char *const[]){ "-I", include, "-o", object, source, NULL });
     build_add (word, &words, command->last);
-    status = w ? pw_fail (error, PW_INPUT, "the C compiler's command in CC has more than %d words", BUILD_COMPILER)
-               : build_run (command, word, source, error);
+    status =
+        w ? pw_fail (error, PW_INPUT, "the C compiler's command in CC has more than %d words", BUILD_COMPILER_WORDS)
+          : build_run (command, word, source, object, error);
   }
   free (compiler);
   return status;
@@ -112,7 +121,7 @@ int pw_temporary_folder (char folder[PW_PATH], pw_error *error) {
 }
 
 int pw_processor_lanes (void) {
-#if defined __x86_64__ && !defined __clang_analyzer__
+#if defined __x86_64__
   if (__builtin_cpu_supports ("avx512f") && __builtin_cpu_supports ("avx512dq") && __builtin_cpu_supports ("avx512vl"))
     return 8;
   if (__builtin_cpu_supports ("avx2")) return 4;
@@ -120,7 +129,7 @@ int pw_processor_lanes (void) {
   return 1;
 }
 
-/* gcc 12.2 fuses operations when it vectorises straight code, see the Makefile. */
+/* Without -fno-tree-slp-vectorize, gcc 12.2 would use fused multiply-add (see STRICT in the Makefile). */
 #define BUILD_SCENE "-std=c11", "-ffp-contract=off", "-fPIC", "-shared", "-fno-tree-slp-vectorize"
 #define BUILD_LANES BUILD_SCENE, "-O3", "-fno-math-errno", "-fno-trapping-math", "-fopenmp-simd"
 
@@ -131,7 +140,7 @@ const char *const *pw_scene_options (int lanes) {
   } known[] = {
     { 0, 4, { BUILD_SCENE, "-O2", "-mavx2" } },
     { 0, 1, { BUILD_SCENE, "-O2" } },
-    { 2, 4, { BUILD_LANES, "-DPW_LANES=2", "-mavx" } },
+    { 2, 4, { BUILD_LANES, "-DPW_LANES=2", "-mavx" } }, /* not -mavx2: functions of libm on 2 numbers (batch.h) */
     { 2, 1, { BUILD_LANES, "-DPW_LANES=2" } },
     { 4, 4, { BUILD_LANES, "-DPW_LANES=4", "-mavx2" } },
     { 4, 1, { BUILD_LANES, "-DPW_LANES=4" } },
@@ -145,14 +154,15 @@ const char *const *pw_scene_options (int lanes) {
   return NULL;
 }
 
-/* Blocks SIGINT (Ctrl-C reaches the compiler, too), SIGTERM and SIGHUP; the mask `before` restores them. */
-static void build_defer (sigset_t *before) {
+/* Blocks SIGINT (Ctrl-C reaches the compiler, too), SIGTERM and SIGHUP until the caller, having deleted temporary
+ * files, restores the mask that is stored. */
+static void build_defer (sigset_t *mask) {
   sigset_t stop;
   sigemptyset (&stop);
   sigaddset (&stop, SIGINT);
   sigaddset (&stop, SIGTERM);
   sigaddset (&stop, SIGHUP);
-  pthread_sigmask (SIG_BLOCK, &stop, before);
+  pthread_sigmask (SIG_BLOCK, &stop, mask);
 }
 
 int pw_compile_file (const char *path, const char *engine, pw_object_user *use, void *context, pw_error *error) {
@@ -170,16 +180,16 @@ int pw_compile_file (const char *path, const char *engine, pw_object_user *use, 
                             .options = engine ? page : plugin,
                             .last = { engine ? engine : "-lm", engine ? "-Wl,--no-whole-archive" : NULL },
                             .for_page = engine != NULL };
-  build_defer (&command.signals);
+  build_defer (&command.mask);
   char folder[PW_PATH], object[PW_PATH];
   int status = pw_temporary_folder (folder, error);
   if (status == PW_OK) {
-    status = build_object (&command, path, pw_path (object, "%s/model.so", folder), error);
+    status = build_object (&command, path, pw_path (object, "%s/object", folder), error);
     if (status == PW_OK) status = use (context, object, error);
     unlink (object);
     rmdir (folder);
   }
-  pthread_sigmask (SIG_SETMASK, &command.signals, NULL);
+  pthread_sigmask (SIG_SETMASK, &command.mask, NULL);
   return status;
 }
 
@@ -187,8 +197,8 @@ int pw_compile_scene (const char *path, const char *object, const char *log, int
   build_command command = {
     .compiler = pw_compiler (), .options = pw_scene_options (lanes), .last = { "-lm" }, .log = log
   };
-  build_defer (&command.signals);
+  build_defer (&command.mask);
   int status = build_object (&command, path, object, error);
-  pthread_sigmask (SIG_SETMASK, &command.signals, NULL);
+  pthread_sigmask (SIG_SETMASK, &command.mask, NULL);
   return status;
 }

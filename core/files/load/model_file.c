@@ -62,7 +62,7 @@ static int model_open_path (pw_file *f, const char *shown, pw_error *error) {
     return pw_fail (error, PW_INPUT,
                     "%s: a model is compiled as C, not as C++: write it in C, in a file that ends in .c", f->path);
   if (ending == MODEL_ENDINGS) return pw_fail (error, PW_INPUT, "%s: a model file ends in .c, .so or .yaml", f->path);
-  if (!pw_is_text (base))
+  if (!pw_is_line (base))
     return pw_fail (error, PW_INPUT, "%s: the name of a model file is UTF-8 without control characters", f->path);
   pw_path (f->name, "%.*s", (int)(strlen (base) - strlen (model_endings[ending])), base);
   if (ending == MODEL_YAML) {
@@ -86,22 +86,22 @@ static int model_find_path (pw_file *f, const char *path, pw_error *error) {
 /* Reports an unknown name; suggests a path if the current directory has such a file, else the nearest name. */
 static int model_unknown (const pw_search *s, const char *name, pw_error *error) {
   struct stat info;
-  char unread[300] = ""; /* folders that cannot be searched */
+  char remark[300] = ""; /* on folders that cannot be searched */
   for (int i = 0; i < MODEL_ENDINGS; i++) {
     const char *here = PW_PRINTED (200, "%s%s", name, model_endings[i]);
     if (stat (here, &info) == 0)
       return pw_fail (error, PW_INPUT, "there is no model \"%s\" on the search path; to use the file here, write ./%s",
                       name, here);
   }
-  if (*s->unread) snprintf (unread, sizeof unread, "; PINWHEEL_MODELS has %s", s->unread);
+  if (*s->unread) snprintf (remark, sizeof remark, "; PINWHEEL_MODELS has %s", s->unread);
   if (s->count == 0)
     return pw_fail (error, PW_INPUT, "there is no model \"%s\", nor any other in %s%s", name,
-                    *s->folders ? s->folders : "the folders of PINWHEEL_MODELS or next to the program", unread);
+                    *s->folders ? s->folders : "the folders of PINWHEEL_MODELS or next to the program", remark);
   pw_nearest near = { .sought = name };
   for (int i = 0; i < s->count; i++) pw_nearest_try (&near, s->found[i].name);
   const char *hint = pw_nearest_text (&near);
-  if (*unread == 0) return pw_fail (error, PW_INPUT, "there is no model \"%s\"%s", name, hint);
-  return pw_fail (error, PW_INPUT, "there is no model \"%s\" in %s%s%s", name, s->folders, unread, hint);
+  if (*remark == 0) return pw_fail (error, PW_INPUT, "there is no model \"%s\"%s", name, hint);
+  return pw_fail (error, PW_INPUT, "there is no model \"%s\" in %s%s%s", name, s->folders, remark, hint);
 }
 
 static int model_find_name (pw_file *f, const char *name, pw_error *error) {
@@ -120,7 +120,7 @@ static int model_find_name (pw_file *f, const char *name, pw_error *error) {
   return status;
 }
 
-/* Finds a model's file, which is not opened; *shown: its path as given, or found for a name. */
+/* Finds a model's file, which is not opened.  *shown becomes its path for messages: as given, or as found by name. */
 static pw_file *model_find (const char *model, const char **shown, pw_error *error) {
   int given = model && *model;
   pw_file *f = given ? calloc (1, sizeof *f) : NULL;

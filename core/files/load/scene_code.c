@@ -186,7 +186,7 @@ static FILE *code_lock (const code_job *x) {
   while ((file = pw_lock_file (x->source, PW_LOCK_NEW)) < 0 && errno == EWOULDBLOCK && waits++ < CODE_MAX_WAITS)
     nanosleep (&pause, NULL);
   FILE *f = file >= 0 ? fdopen (file, "wb") : NULL;
-  if (f == NULL && file >= 0) close (file);
+  if (f == NULL && file >= 0) unlink (x->source), close (file);
   return f;
 }
 

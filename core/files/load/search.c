@@ -1,7 +1,8 @@
 /* The search path for models: the folders of PINWHEEL_MODELS, then those of the running program and of this library.
  *
  * Folders next to the program, or one level up (tests), serve the build tree; ../lib and ../include serve an
- * installation; the folder of the library serves programs installed elsewhere. */
+ * installation; the folder of the library serves programs installed elsewhere.  The order of the folders decides only
+ * about headers and pages, of which the first is taken: a name that two models have is refused (model_file.c). */
 #define _GNU_SOURCE /* dladdr */
 #include <dirent.h>
 #include <dlfcn.h>
@@ -73,7 +74,7 @@ static int search_add_file (pw_search *s, const char *name, size_t length, const
 
 static int search_entry (pw_search *s, const char *folder, const char *entry, pw_error *error) {
   const char *ending = pw_ends_with (entry, ".so") ? ".so" : pw_ends_with (entry, ".yaml") ? ".yaml" : NULL;
-  if (ending == NULL || entry[0] == '.' || !pw_is_text (entry)) return PW_OK;
+  if (ending == NULL || entry[0] == '.' || !pw_is_line (entry)) return PW_OK;
   char path[PW_PATH], real[PW_PATH];
   struct stat info;
   if (realpath (pw_path (path, "%s/%s", folder, entry), real) == NULL)

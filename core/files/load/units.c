@@ -104,7 +104,7 @@ static const char *units_power (const char *p, int *power) {
 static int units_read (const char *text, units_value *u) {
   static const char ends[] = " */^0123456789-\xC2"; /* of a name; the last begins a raised digit or a middle dot */
   static const char dot[] = "\xC2\xB7";
-  int divide = 0;
+  int divide = 0, names = 0;
   *u = (units_value){ .factor = 1 };
   for (const char *p = text; *p;) {
     int power;
@@ -114,7 +114,7 @@ static int units_read (const char *text, units_value *u) {
     if (n > 0) {
       const char *after = units_power (p + n, &power);
       if (power == 0 || units_multiply (p, n, divide ? -power : power, u) != PW_OK) return PW_INPUT;
-      divide = 0;
+      divide = 0, names++;
       p = after;
     }
     size_t separators = strspn (p, " *");
@@ -126,7 +126,7 @@ static int units_read (const char *text, units_value *u) {
     p += strspn (p, " ");
     if (separators == 0 && *p) return PW_INPUT;
   }
-  return divide || *text == 0 ? PW_INPUT : PW_OK;
+  return divide || names == 0 ? PW_INPUT : PW_OK;
 }
 
 int pw_unit_factor (const char *unit, const char *wanted, double *factor) {

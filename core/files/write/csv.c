@@ -156,7 +156,7 @@ pw_csv *pw_csv_open (const pw_system *s, int ledger, pw_output *o, pw_error *err
 
 int pw_csv_write (pw_csv *c, const pw_system *s, const pw_sample *sample, pw_error *error) {
   int status = pw_require (c, "a table", error);
-  (void)s; /* that of pw_csv_open */
+  (void)s; /* the table has that of pw_csv_open */
   if (status == PW_OK && c->workspace)
     status = pw_workspace_contact_points (c->workspace, sample->t, sample->q, sample->v, c->contact, error);
   return status == PW_OK ? csv_line (c, CSV_VALUES, sample, error) : status;

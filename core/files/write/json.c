@@ -172,14 +172,17 @@ static void json_reference (pw_json *j, const pw_reference_error *e) {
 }
 
 static void json_statistics (pw_json *j, const pw_statistics *n, double cpu) {
-  static const char *const residuals[] = { "position", "velocity" }, *const names[] = {
-    "steps", "rejected", "rhs", "jacobians", "factorisations", "restarts", "specialised", "cpu_s"
-  };
+  static const char *const residuals[] = { "position", "velocity" };
   json_numbers (j, "residual", residuals, n ? (const double[]){ n->position, n->velocity } : NULL, 2);
-  const pw_statistics x = n ? *n : (pw_statistics){ 0 };
-  const double value[] = { (double)x.steps,          (double)x.rejected, (double)x.rhs,         (double)x.jacobians,
-                           (double)x.factorisations, (double)x.restarts, (double)x.specialised, cpu };
-  json_numbers (j, "statistics", names, n ? value : NULL, 8);
+  if (n == NULL) {
+    pw_json_text (j, "statistics", NULL);
+    return;
+  }
+  pw_json_open (j, "statistics", '{');
+#define JSON_COUNT(name) pw_json_number (j, #name, (double)n->name);
+  PW_STATISTICS_COUNTS (JSON_COUNT)
+  pw_json_number (j, "cpu_s", cpu);
+  pw_json_close (j, '}');
 }
 
 enum { JSON_ALL_LEVELS = 99 };

@@ -1,4 +1,5 @@
-/* Opens files for reading; follows links, also to files that do not exist; finds different names of one file. */
+/* Opens files for reading; follows links, also to files that do not exist; finds conflicts between the files that a
+ * command reads and writes, under any name. */
 #include <errno.h>
 #include <fcntl.h>
 #include <stdlib.h>
@@ -7,11 +8,12 @@
 #include "files.h"
 
 FILE *pw_open_input (const char *path, const char **why) {
-  struct stat info = { .st_mode = S_IFREG };
+  struct stat info;
   int file = open (path, O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC); /* does not block on a FIFO */
-  FILE *f = file >= 0 && fstat (file, &info) == 0 && S_ISREG (info.st_mode) ? fdopen (file, "rb") : NULL;
+  int known = file >= 0 && fstat (file, &info) == 0, other = known && !S_ISREG (info.st_mode);
+  FILE *f = known && !other ? fdopen (file, "rb") : NULL;
   if (f) return f;
-  int code = S_ISREG (info.st_mode) ? errno : 0;
+  int code = other ? 0 : errno;
   *why = code ? strerror (code) : pw_not_regular (info.st_mode);
   if (file >= 0) close (file);
   errno = code; /* for pw_open_input_status */
@@ -100,15 +102,13 @@ static void location_use_find (location_use *u, const pw_use *use) {
   u->known = stat (pw_folder_of (folder, u->location.path), &u->folder) == 0;
 }
 
-/* Whether a name is `before` (NULL: any name) followed by one of the endings. */
-static int location_ends (const char *name, const char *before, const char *const *ending) {
-  size_t size = strlen (name);
+/* The length of the first `size` bytes of a name without one of the endings; `size` if they have none of these. */
+static size_t location_without (const char *name, size_t size, const char *const *ending) {
   for (; *ending; ending++) {
-    size_t ending_size = strlen (*ending), rest = size - ending_size;
-    if (size < ending_size || strcmp (name + rest, *ending) != 0) continue;
-    if (before == NULL || (strlen (before) == rest && memcmp (name, before, rest) == 0)) return 1;
+    size_t bytes = strlen (*ending);
+    if (bytes <= size && memcmp (name + size - bytes, *ending, bytes) == 0) return size - bytes;
   }
-  return 0;
+  return size;
 }
 
 static int location_is_null_device (const struct stat *info) {
@@ -116,20 +116,22 @@ static int location_is_null_device (const struct stat *info) {
   return S_ISCHR (info->st_mode) && stat ("/dev/null", &null) == 0 && null.st_rdev == info->st_rdev;
 }
 
-/* Whether writing `a` affects `b`: the same file, a temporary file, or a file written into a folder. */
+/* Whether writing `a` affects `b`: the same file, a file written into a folder, or a temporary file of either. */
 static int location_conflicts (const location_use *a, const location_use *b) {
   /* Endings of temporary files: of outputs, of sorted tables, of checkpoints. */
   static const char *const temporary[] = { ".part", ".part.old", ".sorted", ".next", NULL };
   const struct stat *info = &a->location.info;
   if (a->use->how == PW_READS || !a->known || !b->known) return 0;
-  const char *name = location_base (b->location.path);
+  const char *name = location_base (b->location.path), *own = location_base (a->location.path);
+  size_t size = strlen (name), final = location_without (name, size, temporary);
   if (a->use->how == PW_WRITES_INTO)
-    return a->location.exists && location_same (info, &b->folder) && location_ends (name, NULL, a->use->names);
+    return a->location.exists && location_same (info, &b->folder) &&
+           (location_without (name, size, a->use->names) < size ||
+            location_without (name, final, a->use->names) < final);
   if (a->location.exists && b->location.exists && location_same (info, &b->location.info))
     return !location_is_null_device (info);
   if (a->location.descriptor >= 0 || b->location.descriptor >= 0 || !location_same (&a->folder, &b->folder)) return 0;
-  return strcmp (name, location_base (a->location.path)) == 0 ||
-         location_ends (name, location_base (a->location.path), temporary);
+  return strcmp (name, own) == 0 || (strlen (own) == final && memcmp (name, own, final) == 0);
 }
 
 static int location_fail (const pw_use *a, const pw_use *b, pw_error *error) {

@@ -239,19 +239,28 @@ static int output_sync_folder (const pw_output *o, pw_error *error) {
                   strerror (errno));
 }
 
-/* Renames all files or none.  Until the last one is renamed, replaced files keep a second name, a hard link. */
+/* Keeps the file that will be replaced under its second name, a hard link; without hard links, under that name only.
+ * 0, also if there is none, or -1. */
+static int output_keep_old (const pw_output *o) {
+  struct stat info;
+  unlink (o->old);
+  if (link (o->real, o->old) == 0 || stat (o->real, &info) != 0 || !S_ISREG (info.st_mode)) return 0;
+  return rename (o->real, o->old);
+}
+
+/* Renames all files or none: replaced files are kept until the last one is renamed. */
 static int output_rename_all (pw_output *const *o, int count, pw_error *error) {
-  int last = count - 1, renamed = 0, status = PW_OK;
+  int last = count - 1, failed = count, status = PW_OK; /* failed: the file that cannot be renamed */
   while (last > 0 && (o[last] == NULL || *o[last]->part == 0)) last--;
   for (int i = 0; i <= last && status == PW_OK; i++) {
     if (o[i] == NULL || *o[i]->part == 0) continue;
-    if (i < last) unlink (o[i]->old), (void)!link (o[i]->real, o[i]->old);
-    if (rename (o[i]->part, o[i]->real) != 0) status = output_fail_with_part (o[i], errno, error);
-    renamed = i;
+    if ((i == last || output_keep_old (o[i]) == 0) && rename (o[i]->part, o[i]->real) == 0) continue;
+    status = output_fail_with_part (o[failed = i], errno, error);
   }
   for (int i = 0; i < last; i++) {
     if (o[i] == NULL || *o[i]->part == 0) continue;
-    if (status != PW_OK && i < renamed) (void)rename (o[i]->real, o[i]->part), (void)rename (o[i]->old, o[i]->real);
+    if (status != PW_OK && i < failed) (void)rename (o[i]->real, o[i]->part);
+    if (status != PW_OK && i <= failed) (void)rename (o[i]->old, o[i]->real);
     unlink (o[i]->old);
   }
   return status;

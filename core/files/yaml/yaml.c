@@ -25,11 +25,10 @@ static int yaml_new_name (const pw_reader *r, const pw_node *node, const char *l
 
 /* `domain: positive`, or `min: 0`. */
 static int yaml_domain (const pw_reader *r, const pw_node *domain, const pw_node *min, pw_domain *d) {
-  static const char *const name[] = { "real", "nonnegative", "positive", "count", NULL };
   int chosen = min ? PW_NONNEGATIVE : PW_REAL;
   if (min && (min->type != PW_YAML_SCALAR || strcmp (min->text, "0") != 0 || domain))
     return pw_yaml_fail (r, min->at, "min: only 0 can be written, without a domain; \"domain: positive\" means > 0");
-  int status = pw_yaml_choice (r, domain, "domain", name, &chosen);
+  int status = pw_yaml_choice (r, domain, "domain", pw_domain_names, &chosen);
   *d = (pw_domain)chosen;
   return status;
 }

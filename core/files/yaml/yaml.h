@@ -66,6 +66,7 @@ typedef struct {
 
 /* Limits of one model, about 1 GB each, so that a small file cannot use all memory: entries of each list, such as
  * bodies, elements, parameters; points of all tables; operations of all expressions. */
+enum { PW_YAML_DEPTH = 30 }; /* most lists and maps inside each other */
 enum { PW_YAML_MAX_ITEMS = 1000000, PW_YAML_MAX_POINTS = 20000000, PW_YAML_MAX_OPERATIONS = 30000000 };
 
 /* ---- The text (yaml_source.c) ---- */
@@ -137,7 +138,7 @@ int pw_yaml_signal (pw_reader *r, const pw_kind *kind, const char *label, const 
 /* Reads the reference solution, after bodies and elements (yaml_expression.c). */
 int pw_yaml_reference (pw_reader *r);
 
-/* The build function (yaml_build.c). */
+/* The build function; the parameters are an array of numbers in the order of y->parameter (yaml_build.c). */
 void pw_yaml_build (pw_model *m, const void *parameters);
 
 #endif

@@ -4,7 +4,7 @@
 #include <string.h>
 #include "yaml.h"
 
-/* A name, which no body or element has yet. */
+/* Reads the name of a body or element, which must be unique. */
 static int build_name (pw_reader *r, const pw_node *node, const char *label, const char **name) {
   if (pw_yaml_text (r, node, label, name) != PW_OK) return r->error->status;
   int before = pw_names_add (&r->names, *name, (int)node->at); /* a file has less than INT_MAX bytes */
@@ -25,7 +25,7 @@ static int build_fail (const pw_reader *r, const pw_node *node, const pw_error *
 
 /* ---- Bodies ---- */
 
-/* Initial coordinates or velocities; a bit of *specified for each that is given, from `first_bit`. */
+/* Reads three initial coordinates or velocities; sets bit first_bit + i of *specified if value i is given. */
 static void build_triple (const pw_reader *r, const pw_node *node, const char *label, const char *const key[4],
                           double value[3], unsigned *specified, int first_bit) {
   const pw_node *v[4];
@@ -73,25 +73,25 @@ static int build_body_name (const pw_reader *r, const pw_node *node, const char 
 }
 
 static int build_value (pw_reader *r, const pw_kind *kind, const pw_field *f, const pw_node *node, const char *label,
-                        void *at) {
+                        void *to) {
   switch (f->type) {
   case PW_NUMBER:
-    return pw_yaml_number (r, node, label, f->domain, at);
+    return pw_yaml_number (r, node, label, f->domain, to);
   case PW_POINT:
   case PW_VECTOR:
-    return pw_yaml_pair (r, node, label, "numbers, [x, y]", at);
+    return pw_yaml_pair (r, node, label, "numbers, [x, y]", to);
   case PW_BODY:
-    return build_body_name (r, node, label, at);
+    return build_body_name (r, node, label, to);
   case PW_SIGNAL:
-    return pw_yaml_signal (r, kind, label, node, at);
+    return pw_yaml_signal (r, kind, label, node, to);
   case PW_CHOICE:
-    return pw_yaml_choice (r, node, label, f->choices, at);
+    return pw_yaml_choice (r, node, label, f->choices, to);
   }
   return pw_yaml_fail (r, node->at, "%s cannot be given in a text model", label);
 }
 
 static int build_field (pw_reader *r, const pw_kind *kind, const pw_field *f, const pw_node *node, const char *element,
-                        char *at) {
+                        char *to) {
   static const char *const plural[] = { [PW_NUMBER] = "numbers",
                                         [PW_POINT] = "points, each [x, y],",
                                         [PW_VECTOR] = "vectors, each [x, y],",
@@ -100,10 +100,10 @@ static int build_field (pw_reader *r, const pw_kind *kind, const pw_field *f, co
                                         [PW_CHOICE] = "choices" };
   const char *label = PW_PRINTED (200, "%s %.60s: %s", kind->name, element, f->name);
   int count = pw_field_count (f);
-  if (count == 1) return build_value (r, kind, f, node, label, at);
+  if (count == 1) return build_value (r, kind, f, node, label, to);
   if (pw_yaml_list_of (r, node, label, count, plural[f->type]) != PW_OK) return r->error->status;
-  for (const pw_node *n = node->first; n; n = n->next, at += pw_field_bytes (f->type))
-    build_value (r, kind, f, n, label, at);
+  for (const pw_node *n = node->first; n; n = n->next, to += pw_field_bytes (f->type))
+    build_value (r, kind, f, n, label, to);
   return r->error->status;
 }
 
@@ -113,6 +113,14 @@ static int build_field (pw_reader *r, const pw_kind *kind, const pw_field *f, co
 static int build_has_word (const char *text, const char *prefix) {
   for (const char *at = text; strlen (prefix) >= 3 && (at = strstr (at, prefix)) != NULL; at++)
     if (at == text || strchr (" (", at[-1])) return 1;
+  return 0;
+}
+
+/* 1 if an element type has a field of this name. */
+static int build_is_field (const char *name) {
+  for (const pw_kind *const *k = pw_kinds; *k; k++)
+    for (const pw_field *f = (*k)->fields; f->name; f++)
+      if (strcmp (f->name, name) == 0) return 1;
   return 0;
 }
 
@@ -138,8 +146,8 @@ static const pw_kind *build_kind (const pw_reader *r, const pw_node *node) {
   }
   const char *kind = build_later_type (first);
   if (kind) return pw_yaml_fail (r, first->at, "an element begins with its type: write {%s: NAME, ...}", kind), NULL;
-  /* "revolute" and "hinge" are words of the description of a type. */
-  for (const pw_kind *const *k = pw_kinds; *k && !near.near; k++)
+  /* Words of descriptions suggest a type: "hinge" pin, "damper" spring; names of fields, as "angle", do not. */
+  for (const pw_kind *const *k = pw_kinds; *k && !near.near && !build_is_field (first->text); k++)
     if (build_has_word ((*k)->about, first->text))
       snprintf (near.best, sizeof near.best, "%s", (*k)->name), near.near = 1;
   pw_yaml_fail (r, first->at, "an element begins with its type, and there is no type \"%.60s\"%s", first->text,

@@ -1,5 +1,5 @@
 /* Expressions of time, and of states, in text models: signals, and the reference solution.  A signal becomes a function
- * signal, of which each compiled system has a copy (time_open), since it may outlive the model. */
+ * signal, of which each compiled system has a copy (signal_open), since it may outlive the model. */
 #include <math.h>
 #include <stdarg.h>
 #include <stdlib.h>
@@ -15,13 +15,13 @@ typedef struct {
   int states;                              /* number of states in it */
   const char *name[MAX_SIGNAL_STATES + 2]; /* "t", then states, "BODY.phi"; not for evaluation */
   pw_signal_text text;
-} time_function;
+} signal_function;
 
 typedef struct {
   pw_reader *r;
   const pw_node *node;
-  const char *label; /* "torque T: value", for messages */
-  time_function *f;  /* the signal it belongs to, or NULL */
+  const char *label;  /* "torque T: value", for messages */
+  signal_function *f; /* the signal it belongs to, or NULL */
 } reading;
 
 /* Reports an error at an offset of the expression. */
@@ -105,7 +105,7 @@ static int state_check (const reading *e, const char *name, size_t at) {
 /* ---- Evaluation of signals ---- */
 
 /* Value and derivatives u; what is not given is computed from the last one given before; u[2] is 0 unless required. */
-static void time_derivatives (const time_function *f, const double *variable, double u[3]) {
+static void signal_derivatives (const signal_function *f, const double *variable, double u[3]) {
   pw_expression_derivatives (f->expression[0], variable, PW_EXPRESSION_TIME, u);
   for (int i = 1; i <= f->derivatives; i++) {
     double given[3];
@@ -117,12 +117,12 @@ static void time_derivatives (const time_function *f, const double *variable, do
   if (f->derivatives < 2) u[2] = 0;
 }
 
-static int time_eval (void *context, double t, const double *state, double value[3], double *gradient) {
-  const time_function *f = context;
+static int signal_eval (void *context, double t, const double *state, double value[3], double *gradient) {
+  const signal_function *f = context;
   double variable[MAX_SIGNAL_STATES + 1] = { t }, derivatives[3];
   if (f->states) memcpy (variable + 1, state, (size_t)f->states * sizeof *state);
   if (f->derivatives)
-    time_derivatives (f, variable, value);
+    signal_derivatives (f, variable, value);
   else
     value[0] = pw_expression_value (f->expression[0], variable);
   for (int i = 0; gradient && i < f->states; i++) {
@@ -135,19 +135,19 @@ static int time_eval (void *context, double t, const double *state, double value
   return isfinite (value[0]) && (f->derivatives == 0 || (isfinite (value[1]) && isfinite (value[2]))) ? 0 : -1;
 }
 
-static double time_breakpoint (void *context, double t) {
-  const time_function *f = context;
+static double signal_breakpoint (void *context, double t) {
+  const signal_function *f = context;
   double first = INFINITY;
   for (int i = 0; i < 3; i++)
     if (f->expression[i]) first = fmin (first, pw_expression_breakpoint (f->expression[i], t));
   return first;
 }
 
-static void *time_open (void *context) {
-  const time_function *f = context;
+static void *signal_open (void *context) {
+  const signal_function *f = context;
   size_t size = sizeof *f;
   for (int i = 0; i < 3; i++) size += f->expression[i] ? pw_expression_size (f->expression[i]) : 0;
-  time_function *copy = malloc (size);
+  signal_function *copy = malloc (size);
   if (copy == NULL) return NULL;
   *copy = *f;
   char *at = (char *)(copy + 1);
@@ -163,15 +163,15 @@ static void *time_open (void *context) {
 /* ---- Reading of signals ---- */
 
 /* Stores the names that expressions may use, and their values, for `show`. */
-static void time_store_names (const pw_reader *r) {
+static void signal_store_names (const pw_reader *r) {
   r->reference->names = r->scope->names;
   r->reference->name = r->scope->name;
   r->reference->value = r->scope->value;
 }
 
 /* Adds a state, unless it is known already. */
-static int time_add_state (const reading *e, const char *name, size_t at) {
-  time_function *f = e->f;
+static int signal_add_state (const reading *e, const char *name, size_t at) {
+  signal_function *f = e->f;
   for (int i = 1; i <= f->states; i++)
     if (strcmp (f->name[i], name) == 0) return PW_OK;
   if (f->derivatives)
@@ -182,13 +182,13 @@ static int time_add_state (const reading *e, const char *name, size_t at) {
   return f->name[++f->states] ? PW_OK : pw_yaml_no_memory (e->r);
 }
 
-static int time_read_expression (reading *e, int i) {
+static int signal_read_expression (reading *e, int i) {
   pw_reader *r = e->r;
-  time_function *f = e->f;
+  signal_function *f = e->f;
   const char *source = e->node->type == PW_YAML_SCALAR ? e->node->text : "";
   char name[PW_EXPRESSION_NAME];
   for (const char *rest = source, *p; (p = pw_expression_next_name (&rest, name)) != NULL;)
-    if (strchr (name, '.') && time_add_state (e, name, (size_t)(p - source)) != PW_OK) return r->error->status;
+    if (strchr (name, '.') && signal_add_state (e, name, (size_t)(p - source)) != PW_OK) return r->error->status;
   if (reading_expression (e, f->name, &f->text.part[i], &f->expression[i]) != PW_OK) return r->error->status;
   const pw_expression *expression = f->expression[i];
   if (expression->jump == NULL || f->text.jump) return PW_OK;
@@ -198,7 +198,7 @@ static int time_read_expression (reading *e, int i) {
 }
 
 /* Compares derivative i, 1 or 2, which is given, with that computed from the last one given before, at some times. */
-static int time_check_derivative (const reading *e, int i, const char *name) {
+static int signal_check_derivative (const reading *e, int i, const char *name) {
   static const double time[] = { 0.3, 1.7, 4.1 }; /* [s], arbitrary */
   int last = e->f->expression[i - 1] ? i - 1 : 0, n = i - last;
   double given[3], exact[3][3], size = 0;
@@ -216,11 +216,11 @@ static int time_check_derivative (const reading *e, int i, const char *name) {
 }
 
 /* The largest magnitude of derivative i at t +- 2^-1, 2^-2, ... 2^-20 s and t + 1 s. */
-static double time_magnitude (const time_function *f, double t, int i) {
+static double signal_magnitude (const signal_function *f, double t, int i) {
   double size = 0;
   for (int k = -20; k <= 20; k++) {
     double at = t + (k < 0 ? -1 : 1) * ldexp (1, -abs (k)), u[3];
-    time_derivatives (f, &at, u);
+    signal_derivatives (f, &at, u);
     if (isfinite (u[i])) size = fmax (size, fabs (u[i]));
   }
   return size;
@@ -228,18 +228,18 @@ static double time_magnitude (const time_function *f, double t, int i) {
 
 /* Refuses signals that a constraint cannot follow: a jump of the value or, for positions, of its derivative, at one of
  * the first breakpoints after t = 0, beyond round-off and the change between adjacent times. */
-static int time_check_continuity (const reading *e) {
+static int signal_check_continuity (const reading *e) {
   static const char *const name[] = { "its value", "its rate" };
   double t = 0, before[3], after[3];
   for (int k = 0; k < MAX_CHECKED_BREAKPOINTS; k++) {
-    t = time_breakpoint (e->f, t);
+    t = signal_breakpoint (e->f, t);
     if (t == INFINITY) return PW_OK;
-    time_derivatives (e->f, &(double){ nextafter (t, -INFINITY) }, before);
-    time_derivatives (e->f, &t, after);
+    signal_derivatives (e->f, &(double){ nextafter (t, -INFINITY) }, before);
+    signal_derivatives (e->f, &t, after);
     double between = t - nextafter (t, -INFINITY);
     for (int i = 0; i < e->f->derivatives; i++)
       if (fabs (after[i] - before[i]) >
-          1e-9 * time_magnitude (e->f, t, i) + 2 * between * (fabs (after[i + 1]) + fabs (before[i + 1])))
+          1e-9 * signal_magnitude (e->f, t, i) + 2 * between * (fabs (after[i + 1]) + fabs (before[i + 1])))
         return pw_yaml_fail (e->r, e->node->at, "%s: %s jumps from %.6g to %.6g at t = %.9g s, and that of %s must not",
                              e->label, name[i], before[i], after[i], t,
                              e->f->derivatives > 1 ? "a prescribed position" : "a velocity constraint");
@@ -247,30 +247,30 @@ static int time_check_continuity (const reading *e) {
   return PW_OK;
 }
 
-static int time_read_all (reading *e, const pw_node *const node[3]) {
+static int signal_read_all (reading *e, const pw_node *const node[3]) {
   static const char *const key[] = { "expression", "rate", "acceleration" };
   for (int i = 0; i < 3; i++) {
     if ((e->node = node[i]) == NULL) continue;
-    if (time_read_expression (e, i) != PW_OK) return e->r->error->status;
-    if (i > 0 && !e->f->states && time_check_derivative (e, i, key[i]) != PW_OK) return e->r->error->status;
+    if (signal_read_expression (e, i) != PW_OK) return e->r->error->status;
+    if (i > 0 && !e->f->states && signal_check_derivative (e, i, key[i]) != PW_OK) return e->r->error->status;
   }
   e->node = node[0];
-  return e->f->derivatives ? time_check_continuity (e) : PW_OK;
+  return e->f->derivatives ? signal_check_continuity (e) : PW_OK;
 }
 
 int pw_yaml_time_signal (pw_reader *r, const pw_kind *kind, const char *label, const pw_node *const v[3],
                          pw_signal *signal) {
-  time_function *f = pw_arena_alloc (r->arena, sizeof *f);
+  signal_function *f = pw_arena_alloc (r->arena, sizeof *f);
   if (f == NULL) return pw_yaml_no_memory (r);
   f->name[0] = "t";
   f->derivatives = pw_kind_signals_force (kind) ? 0 : kind->level == PW_HOLONOMIC ? 2 : 1;
-  *signal = (pw_signal){ PW_FUNCTION, .function = { .eval = time_eval, .context = f, .text = &f->text } };
-  signal->function.open = time_open;
+  *signal = (pw_signal){ PW_FUNCTION, .function = { .eval = signal_eval, .context = f, .text = &f->text } };
+  signal->function.open = signal_open;
   signal->function.close = free;
-  time_store_names (r);
-  if (time_read_all (&(reading){ .r = r, .label = label, .f = f }, v) != PW_OK) return r->error->status;
+  signal_store_names (r);
+  if (signal_read_all (&(reading){ .r = r, .label = label, .f = f }, v) != PW_OK) return r->error->status;
   for (int i = 0; i < 3; i++)
-    if (f->expression[i] && f->expression[i]->breaks) signal->function.breakpoint = time_breakpoint;
+    if (f->expression[i] && f->expression[i]->breaks) signal->function.breakpoint = signal_breakpoint;
   if (f->states) signal->function.reads = f->name + 1;
   return PW_OK;
 }
@@ -304,7 +304,7 @@ int pw_yaml_reference (pw_reader *r) {
   pw_reference_text *t = r->reference;
   pw_names seen = { .size = 0 };
   if (map == NULL) return r->error->status;
-  time_store_names (r);
+  signal_store_names (r);
   if (map->type != PW_YAML_MAP)
     return pw_yaml_fail (r, map->at, "truth: expected a map {STATE: EXPRESSION, ...}, found %s", pw_yaml_found (map));
   t->state = pw_arena_alloc (r->arena, ((size_t)map->count + 1) * sizeof *t->state);

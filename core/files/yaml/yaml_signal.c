@@ -2,9 +2,10 @@
  *
  *   3, "2 * M0"                                    a constant
  *   {constant: 3}                                  the same
- *   {harmonic: {amplitude, omega, phase, offset}}  and the other forms made of numbers (signal_form.c)
+ *   {harmonic: {amplitude: 3, omega: 2}}           and ramp, smooth-step, pulse: their fields are in signal_form.c
+ *   {table: {points: [[0, 1], [2, 3]]}}            or {file: M.csv, columns: [t, M]}, by default columns 1 and 2
  *   "M0 * cos (omega * t)"                         an expression of the time t; in forces also of states: BODY.phi
- *   {expression: .., rate: .., acceleration: ..}   the same; constraints may give its time derivatives
+ *   {expression: .., rate: .., acceleration: ..}   the same; in constraints, its time derivatives may be given
  */
 #define _XOPEN_SOURCE 700 /* realpath */
 #include <errno.h>
@@ -33,7 +34,7 @@ static int table_list (pw_reader *r, const char *label, const pw_node *list, pw_
 
 /* ---- Points of tables: two columns of a file in the model's folder ---- */
 
-static int table_leaves_folder (const char *name) {
+static int table_has_parent (const char *name) {
   for (const char *part = name; part; part = strchr (part, '/'), part = part ? part + 1 : NULL)
     if (strncmp (part, "..", 2) == 0 && (part[2] == '/' || part[2] == 0)) return 1;
   return 0;
@@ -44,14 +45,14 @@ static FILE *table_open (const pw_yaml *y, const char *name, const char **reason
   char joined[PW_PATH], path[PW_PATH];
   size_t n = strlen (y->folder); /* 0 for the root */
   *reason = "a table must be in the model's folder: its path is relative and has no \"..\"";
-  if (*name == '/' || table_leaves_folder (name)) return NULL;
+  if (*name == '/' || table_has_parent (name)) return NULL;
   if (realpath (pw_path (joined, "%s/%s", y->folder, name), path) == NULL) return *reason = strerror (errno), NULL;
   *reason = "it is a link that leads out of the model's folder";
   int is_inside = strncmp (path, y->folder, n) == 0 && (path[n] == '/' || path[n] == 0);
   return is_inside ? pw_open_input (path, reason) : NULL;
 }
 
-/* The unit of the current field.  If it is "m or rad", the choice before it decides: rad for an angle. */
+/* The unit of the current field.  Only a drive has "m or rad"; the choice before this field decides. */
 static const char *table_unit (const pw_reader *r) {
   if (r->field->unit == NULL || strcmp (r->field->unit, "m or rad") != 0) return r->field->unit;
   const pw_field *choice = r->field;
@@ -70,7 +71,8 @@ static int table_file (pw_reader *r, const char *label, const pw_node *node, con
   if (pw_yaml_text (r, node, label, &name) != PW_OK) return r->error->status;
   errno = 0;
   FILE *f = table_open (r->y, name, &reason);
-  if (f == NULL && errno == ENOMEM) return pw_yaml_no_memory (r);
+  if (f == NULL && pw_open_input_status () == PW_RESOURCE)
+    return pw_fail (r->error, PW_RESOURCE, "%s: cannot read %s: %s", r->y->path, name, reason);
   if (f == NULL) return pw_yaml_fail (r, node->at, "%s: cannot read \"%.60s\": %s", label, name, reason);
   double *t = pw_columns_from_stream (f, name, column, unit, 2, PW_GAPS_REFUSED, &s->table.count, &cause);
   fclose (f);
@@ -99,18 +101,19 @@ static int table_points (pw_reader *r, const char *label, const pw_node *node, c
 
 /* ---- Forms made of numbers ---- */
 
-/* Reads the fields of a form, except a table's points. */
+/* Reads the fields of a form, except a table's points; value: of each, or NULL. */
 static int signal_fields (pw_reader *r, const pw_signal_form *form, const char *label, const pw_node *node,
-                          const pw_node *const *v, pw_signal *signal) {
+                          const pw_node *const *value, pw_signal *signal) {
   for (int i = 0; form->fields[i].name; i++) {
     const pw_field *f = &form->fields[i];
     void *at = (char *)signal + f->offset;
     const char *text = PW_PRINTED (240, "%s: %s", label, f->name);
-    if (v[i] == NULL && f->required) pw_yaml_fail (r, node->at, "%s is missing", text);
-    if (f->type == PW_NUMBER) pw_yaml_number (r, v[i], text, f->domain, at);
-    if (f->type == PW_CHOICE) pw_yaml_choice (r, v[i], text, f->choices, at);
-    if (v[i] && form->type == PW_TABLE && strcmp (f->name, "scale") == 0 && signal->table.scale == 0)
-      pw_yaml_fail (r, v[i]->at, "%s: 0 is not permitted", text);
+    if (value[i] == NULL && f->required) pw_yaml_fail (r, node->at, "%s is missing", text);
+    if (f->type == PW_NUMBER) pw_yaml_number (r, value[i], text, f->domain, at);
+    if (f->type == PW_CHOICE) pw_yaml_choice (r, value[i], text, f->choices, at);
+    /* in the structure 0 means an omitted scale, 1 */
+    if (value[i] && form->type == PW_TABLE && strcmp (f->name, "scale") == 0 && signal->table.scale == 0)
+      pw_yaml_fail (r, value[i]->at, "%s: 0 is not permitted", text);
   }
   return r->error->status;
 }
@@ -119,10 +122,10 @@ static int signal_fields (pw_reader *r, const pw_signal_form *form, const char *
 static int signal_check (pw_reader *r, const pw_kind *kind, const char *label, const pw_node *node,
                          const pw_node *points, const pw_signal *signal) {
   char fault[300];
-  int point;
+  int point, i = 0;
   if (*pw_signal_check (signal, kind, &point, fault, sizeof fault) == 0) return PW_OK;
-  for (const pw_node *n = points ? points->first : NULL; n && point >= 0; n = n->next)
-    if (point-- == 0) node = n;
+  for (const pw_node *n = points ? points->first : NULL; n; n = n->next, i++)
+    if (i == point) node = n;
   return pw_yaml_fail (r, node->at, "%s: %s", label, fault);
 }
 
@@ -158,13 +161,13 @@ static int signal_map (pw_reader *r, const pw_kind *kind, const char *label, con
   const char *key[PW_YAML_MAX_KEYS] = { "constant", "expression", "rate", "acceleration" };
   const pw_node *v[PW_YAML_MAX_KEYS];
   char list[100];
-  int n = SIGNAL_FORMS, given = 0, form = -1;
+  int n = SIGNAL_FORMS, given = 0, form_key = SIGNAL_FORMS;
   for (const pw_signal_form *f = pw_signal_forms; f->name; f++) key[n++] = f->name;
   key[n] = NULL;
   if (pw_yaml_keys (r, node, key, "a signal", v) != PW_OK) return r->error->status;
   for (int i = 0; i < n; i++) {
     given += v[i] != NULL && i != SIGNAL_RATE && i != SIGNAL_ACCELERATION;
-    if (v[i] && i >= SIGNAL_FORMS) form = i;
+    if (v[i] && i >= SIGNAL_FORMS) form_key = i;
   }
   if (given != 1)
     return pw_yaml_fail (r, node->at, "%s: expected one of %s; found %s", label, signal_list (key, list, sizeof list),
@@ -173,7 +176,7 @@ static int signal_map (pw_reader *r, const pw_kind *kind, const char *label, con
     return pw_yaml_fail (r, node->at, "%s: a rate or acceleration belongs to an expression", label);
   if (v[SIGNAL_CONSTANT]) return pw_yaml_number (r, v[SIGNAL_CONSTANT], label, PW_REAL, &signal->constant);
   if (v[SIGNAL_EXPRESSION]) return pw_yaml_time_signal (r, kind, label, v + SIGNAL_EXPRESSION, signal);
-  return signal_read_form (r, kind, &pw_signal_forms[form - SIGNAL_FORMS], label, v[form], signal);
+  return signal_read_form (r, kind, &pw_signal_forms[form_key - SIGNAL_FORMS], label, v[form_key], signal);
 }
 
 int pw_yaml_signal (pw_reader *r, const pw_kind *kind, const char *label, const pw_node *node, pw_signal *signal) {

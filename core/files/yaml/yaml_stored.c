@@ -3,8 +3,6 @@
 #include <string.h>
 #include "yaml.h"
 
-enum { STORED_DEPTH = 40 }; /* more than a tree of yaml_tree.c has */
-
 typedef struct {
   unsigned char type, quoted, unused[2]; /* no padding, which would be written uninitialised */
   unsigned at, count;
@@ -40,7 +38,7 @@ static void *stored_alloc (stored_bytes *x, size_t size) {
 
 static pw_node *stored_read (stored_bytes *x, int depth) {
   stored_head h;
-  if ((size_t)(x->end - x->at) < sizeof h || depth > STORED_DEPTH) return NULL;
+  if ((size_t)(x->end - x->at) < sizeof h || depth > PW_YAML_DEPTH) return NULL;
   memcpy (&h, x->at, sizeof h);
   x->at += sizeof h;
   pw_node *n = stored_alloc (x, sizeof *n), **to;

@@ -5,16 +5,16 @@
 #include <string.h>
 #include "yaml.h"
 
-enum { TREE_DEPTH = 30, TREE_PIECE = 4096 }; /* nested lists and maps; bytes given to the parser at once */
+enum { TREE_PIECE = 4096 }; /* bytes given to the parser at once */
 
 typedef struct {
   pw_reader r;
   pw_yaml *y; /* r.y; receives the nodes */
   struct fy_parser *parser;
   struct fy_diag *diag;
-  struct fy_token_iter *pieces; /* iterates over the pieces of a scalar */
-  pw_node *open[TREE_DEPTH];    /* open lists and maps */
-  pw_node **tail[TREE_DEPTH];   /* where the next node of each goes */
+  struct fy_token_iter *pieces;  /* iterates over the pieces of a scalar */
+  pw_node *open[PW_YAML_DEPTH];  /* open lists and maps */
+  pw_node **tail[PW_YAML_DEPTH]; /* where the next node of each goes */
   int depth;
   int documents;
   /* what the parser reads ahead of its events */
@@ -106,7 +106,7 @@ static int tree_scalar (tree *x, struct fy_event *e) {
 
 static int tree_begin (tree *x, struct fy_event *e, pw_yaml_type type) {
   unsigned at = tree_event_offset (x, e);
-  if (x->depth == TREE_DEPTH) return pw_yaml_fail (&x->r, at, "nested too deeply");
+  if (x->depth == PW_YAML_DEPTH) return pw_yaml_fail (&x->r, at, "nested too deeply");
   pw_node *n = tree_add (x, type, at);
   if (n == NULL) return PW_RESOURCE;
   x->open[x->depth] = n;

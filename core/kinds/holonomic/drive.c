@@ -11,6 +11,16 @@
  * The drive acts on body 1 with -lambda: along e at its point, or as a moment; on body 2 with the opposite. */
 #include "line.h"
 
+/* A drive in the current state. */
+typedef struct {
+  line_state line;
+  const double *u; /* the signal, with two time derivatives */
+} drive_state;
+
+static inline drive_state drive_at (const pw_batch *batch, int e) {
+  return (drive_state){ line_at (batch, e), batch->u + 3 * e };
+}
+
 PREPARE (drive_prepare, pw_drive, line) {
   *element = (line){ .s1 = { definition->at[0][0], definition->at[0][1] },
                      .prescribes_angle = definition->what == PW_DRIVE_ANGLE };
@@ -20,14 +30,14 @@ PREPARE (drive_prepare, pw_drive, line) {
   return PW_OK;
 }
 
-PER_ELEMENT (drive_g, line, 1) {
-  line_g_one (now, out);
-  *out = *out + now.constants->prescribes_angle * (now.body1->phi - now.body2->phi) - now.u[0];
+PER_ELEMENT (drive_g, drive, 1) {
+  line_g_one (now.line, out);
+  *out = *out + now.line.constants->prescribes_angle * (now.line.body1->phi - now.line.body2->phi) - now.u[0];
 }
 
-PER_ELEMENT (drive_g_size, line, 1) {
-  line_g_size_one (now, out);
-  *out += now.constants->prescribes_angle * (fabs (now.body1->phi) + fabs (now.body2->phi));
+PER_ELEMENT (drive_g_size, drive, 1) {
+  line_g_size_one (now.line, out);
+  *out += now.line.constants->prescribes_angle * (fabs (now.line.body1->phi) + fabs (now.line.body2->phi));
   *out += fabs (now.u[0]);
 }
 
@@ -40,8 +50,8 @@ PER_ELEMENT (drive_J, line, 6) {
   out[2] += now.constants->prescribes_angle, out[5] -= now.constants->prescribes_angle;
 }
 
-PER_ELEMENT (drive_gamma, line, 1) {
-  line_gamma_one (now, out);
+PER_ELEMENT (drive_gamma, drive, 1) {
+  line_gamma_one (now.line, out);
   *out += now.u[2];
 }
 

@@ -20,6 +20,8 @@ PREPARE (gear_prepare, pw_gear, gear) {
   *element = (gear){ definition->ratio, definition->from == PW_GEAR_START ? initial : definition->offset };
   if (definition->ratio == 0)
     return pw_fail (error, PW_INPUT, "ratio = 0: expected another number, positive or negative");
+  if (definition->offset != 0 && definition->from == PW_GEAR_START)
+    return pw_fail (error, PW_INPUT, "offset = %g: has no effect without from: offset", definition->offset);
   return PW_OK;
 }
 
@@ -58,7 +60,7 @@ static const pw_field gear_fields[] = {
   { PW_AT (pw_gear, from), PW_CHOICE, .choices = gear_from,
     .about = "whether the offset follows from the initial angles or is given" },
   { PW_AT (pw_gear, offset), PW_NUMBER, .unit = "rad",
-    .about = "angle of the first minus ratio times that of the second, relative to the carrier" },
+    .about = "with from: offset; angle of the first minus ratio times that of the second, relative to the carrier" },
   { .name = NULL },
 };
 

@@ -48,7 +48,7 @@ PER_ELEMENT (rod_g, rod, 1) {
   *out = (rod_dot (now.ends.d, now.ends.d) - now.L * now.L) / (2 * now.L);
 }
 
-/* dg = d^T dd / L, and the round-off of d is proportional to its size. */
+/* A change dd of d changes g by d^T dd / L; dd is proportional to the size of d, and L / 2 is the second term of g. */
 PER_ELEMENT (rod_g_size, rod, 1) {
   double size[2];
   points_g_size_one (now.ends, size);
@@ -60,9 +60,9 @@ PER_ELEMENT (rod_J, rod, 6) {
 }
 
 PER_ELEMENT (rod_gamma, rod, 1) {
-  double centripetal = now.omega1 * now.omega1 * rod_dot (now.ends.d, now.ends.S1) -
-                       now.omega2 * now.omega2 * rod_dot (now.ends.d, now.ends.S2);
-  *out = (centripetal - rod_dot (now.ends.rate, now.ends.rate)) / now.L;
+  double d_c = now.omega1 * now.omega1 * rod_dot (now.ends.d, now.ends.S1) -
+               now.omega2 * now.omega2 * rod_dot (now.ends.d, now.ends.S2); /* d.c, see rod_gamma_q */
+  *out = (d_c - rod_dot (now.ends.rate, now.ends.rate)) / now.L;
 }
 
 /* ((D w)^T D + d^T (D w)_q) / L; the columns of (D w)_q: -(X1, Y1) w[2] for phi1, (X2, Y2) w[5] for phi2. */
@@ -78,9 +78,9 @@ PER_ELEMENT (rod_jw_q, rod, 6) {
  * those of D times omega1^2, omega2^2; of d'_q -omega1 (X1, Y1), omega2 (X2, Y2). */
 PER_ELEMENT (rod_gamma_q, rod, 6) {
   const double square1 = now.omega1 * now.omega1, square2 = now.omega2 * now.omega2, *d = now.ends.d;
-  double centripetal[2];
-  points_gamma_one (now.ends, centripetal);
-  rod_multiply_D (&now, centripetal, out);
+  double c[2];
+  points_gamma_one (now.ends, c);
+  rod_multiply_D (&now, c, out);
   out[2] +=
       (square1 * (d[0] * now.D[2] + d[1] * now.D[8]) + 2 * now.omega1 * rod_dot (now.ends.rate, now.ends.S1)) / now.L;
   out[5] +=

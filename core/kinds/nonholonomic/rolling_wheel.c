@@ -6,8 +6,8 @@
  *   gamma = ( omega (c vx + s vy),  omega (s vx - c vy) )         so that S v' = gamma; both rows as in contact.h
  *   f     = u on chi, power = u chi'                              u: torque about the axle
  *
- * The forces -lambda(1) along n and -lambda(2) along e act on the body at P.  The axle is horizontal, so the reaction
- * to u and the gyroscopic moments of the wheel act out of the plane. */
+ * The forces -lambda(1) along n and -lambda(2) along e act on the body at P.  The reaction to u and the gyroscopic
+ * moments of the wheel are moments about horizontal axes, which do not enter the equations of planar motion. */
 #include "contact.h"
 
 typedef struct {
@@ -55,7 +55,7 @@ PER_ELEMENT (rolling_gamma, rolling, 2) {
   contact_gamma_one (now.along, out + 1);
 }
 
-/* Defines rolling_jw_q, ...: the derivatives with respect to the spin angle are 0. */
+/* Defines rolling_jw_q, ...: the derivatives with respect to the spin angle or spin velocity are 0. */
 #define ROLLING_DERIVATIVE(member)               \
   PER_ELEMENT (rolling_##member, rolling, 8) {   \
     contact_##member##_one (now.across, out);    \
@@ -89,7 +89,7 @@ static const pw_field rolling_fields[] = {
     .about = "moment of inertia about the axle; the wheel's mass belongs to the body" },
   { PW_AT (pw_rolling_wheel, start), PW_NUMBER, .unit = "rad", .about = "initial spin angle" },
   { PW_AT (pw_rolling_wheel, rate), PW_NUMBER, .unit = "rad/s",
-    .about = "initial spin velocity; 0: from rolling at the body's initial velocity" },
+    .about = "initial spin velocity; 0, even if written: from rolling at the body's initial velocity" },
   { PW_AT (pw_rolling_wheel, torque), PW_SIGNAL, .unit = "N m",
     .about = "torque on the wheel about its axle; positive: drives along the heading" },
   { .name = NULL },

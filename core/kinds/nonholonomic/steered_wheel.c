@@ -1,11 +1,13 @@
 /* steered-wheel: a knife edge whose heading in the body is a signal u of time.
  *
  *   n . v_P = 0,  n = (-sin, cos)(phi + u)                        (1 nonholonomic equation)
- *   S     = [ -sin(theta)  cos(theta)  l ]      theta = phi + u;  l, m: arm of P along the heading, to its left
- *   gamma = (omega + u') (cos(theta) vx + sin(theta) vy) - u' m omega    so that S v' = gamma, with l' = u' m
+ *   S     = [ -sin(theta)  cos(theta)  l ]      theta = phi + u;  l, h: arm of P along the heading, to its left
+ *   gamma = -(omega + u') s_phi - u' h omega    so that S v' = gamma, with l' = u' h
+ *   s_phi = d(S v)/dphi = -(cos(theta) vx + sin(theta) vy)
  *
- * S is that of contact.h for the direction n.  The lateral force on the body, along n, is N = -lambda.  It acts at P,
- * about which the wheel is steered, so steering needs no moment and does no work. */
+ * S, s_phi and jw_q are those of contact.h for the direction n at the present u; gamma and its derivatives are not,
+ * since n turns in the body.  The lateral force on the body, along n, is N = -lambda.  It acts at P, about which the
+ * wheel is steered, so steering needs no moment and does no work. */
 #include "contact.h"
 
 typedef struct {
@@ -15,7 +17,7 @@ typedef struct {
 /* A wheel in the current state. */
 typedef struct {
   contact_state contact;
-  double aside;                       /* arm of P to the left of the heading, m above [m] */
+  double h;                           /* arm of P to the left of the heading [m] */
   double steering_rate, heading_rate; /* u', omega + u' */
 } steered_state;
 
@@ -37,7 +39,7 @@ PER_ELEMENT (steered_J, steered, 3) {
 }
 
 PER_ELEMENT (steered_gamma, steered, 1) {
-  *out = -now.heading_rate * contact_speed_phi (&now.contact) - now.steering_rate * now.aside * now.contact.body->omega;
+  *out = -now.heading_rate * contact_speed_phi (&now.contact) - now.steering_rate * now.h * now.contact.body->omega;
 }
 
 PER_ELEMENT (steered_jw_q, steered, 3) {
@@ -51,7 +53,7 @@ PER_ELEMENT (steered_gamma_q, steered, 3) {
 
 PER_ELEMENT (steered_gamma_v, steered, 3) {
   out[0] = now.heading_rate * now.contact.dy, out[1] = -now.heading_rate * now.contact.dx;
-  out[2] = -contact_speed_phi (&now.contact) - now.steering_rate * now.aside;
+  out[2] = -contact_speed_phi (&now.contact) - now.steering_rate * now.h;
 }
 
 PER_ELEMENT (steered_contact, steered, 3) {

@@ -15,7 +15,8 @@ VERSION = "0.1.0"
 PW_OK, PW_RETRY, PW_STOPPED, PW_RESOURCE, PW_INPUT, PW_INITIAL, PW_METHOD = 0, 1, 2, -1, -2, -3, -4
 PW_FUNCTION, PW_STEADY, PW_SPECIALISE_STEPS = 2, 0, 1000000
 PW_NUMBER, PW_POINT, PW_VECTOR, PW_BODY, PW_SIGNAL, PW_CHOICE = range(6)
-DOMAINS = ("", ">= 0", "> 0", "1, 2, 3, ...", "from 0 to 1")  # by pw_domain
+DOMAINS = {"PW_REAL": "", "PW_NONNEGATIVE": ">= 0", "PW_POSITIVE": "> 0", "PW_COUNT": "1, 2, 3, ...",
+           "PW_FRACTION": "from 0 to 1"}  # in the order of pw_domain
 
 
 class Error(Exception):

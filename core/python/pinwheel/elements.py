@@ -69,7 +69,8 @@ def _parameter(field):
     if field.count > 1:
         shape, default = f"list of {field.count} {shape}", [default] * field.count
     properties = [shape, "required" if field.required else f"default {default!r}"]
-    lines = [f"{name} : {', '.join(properties)}", "    " + " ".join(filter(None, [about, unit, lib.DOMAINS[field.domain]]))]
+    domain = [*lib.DOMAINS.values()][field.domain]
+    lines = [f"{name} : {', '.join(properties)}", "    " + " ".join(filter(None, [about, unit, domain]))]
     if field.required:
         default = inspect.Parameter.empty
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default), lines
