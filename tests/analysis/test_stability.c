@@ -33,6 +33,13 @@ static void stability_has (const pw_linear *l, double re, double im, double boun
   check_below ("conjugate", other, bound, reason);
 }
 
+/* |w| from the eigenvalues +-i w of translations of the whole in a frame that turns at the rate w. */
+static double stability_turn (const pw_linear *l) {
+  double squares = 0;
+  for (int i = 0; i < l->unknowns; i++) squares += l->rigid[i] * l->im[i] * l->im[i];
+  return sqrt (squares / 2);
+}
+
 static int stability_zeros (const pw_linear *l) {
   int zeros = 0;
   for (int i = 0; i < l->unknowns; i++) zeros += l->re[i] == 0 && l->im[i] == 0 && !l->rigid[i];
@@ -118,6 +125,7 @@ TEST (trailers) {
       assert_int_equal (l.steady, PW_STEADY);
       assert_int_equal (l.symmetries, 3);
       check_close ("rate of turn", l.twist[2], w, 1e-12 * fabs (w), "round-off");
+      check_close ("translations", stability_turn (&l), fabs (w), 1e-12 * fabs (w), "round-off");
       for (int i = 0; i < 3; i++) {
         if (w != 0) R = sqrt (R * R - L[i] * L[i]);
         stability_has (&l, w != 0 ? -w * R / L[i] : -u / L[i], 0, 1e-9 * fabs (u),

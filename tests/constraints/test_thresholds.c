@@ -110,10 +110,13 @@ static void watchdog_bend (pw_run *r, double angle) {
 TEST (near_state) {
   static const char *const method[] = { "rk4+projection", "erk5+projection" };
   for (int i = 0; i < 2; i++) {
+    pw_error error = { 0 };
     pw_system *s = scene_system (&bars_table, NULL);
     pw_run *r = runs_open (s, method[i], NULL);
     watchdog_bend (r, 1e-4);
     assert_int_equal (pw_watchdog_near_state (r), 1);
+    pw_fail_singular (r, 0, &error);
+    assert_non_null (strstr (error.text, "near a singular configuration: pin "));
     watchdog_bend (r, 1);
     assert_int_equal (pw_watchdog_near_state (r), 0);
     runs_close (r, s);
