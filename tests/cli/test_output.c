@@ -298,6 +298,7 @@ TEST (types) {
     { "run ezyroller -t 1 --reference @/r/pipe --checkpoint @/r/c", "cannot read @/r/pipe" OUTPUT_PIPE },
     { "run ezyroller -t 1 --reference /dev/zero", "--reference /dev/zero: cannot be read" OUTPUT_ZERO },
     { "run ezyroller -t 1 --reference @/r/D", "--reference @/r/D: cannot be read" OUTPUT_FOLDER },
+    { "run ezyroller --reference /proc/self/mem", "--reference /proc/self/mem: cannot be read: Input/output error" },
     { "run ezyroller -t 1 --resume @/r/pipe", "cannot read the checkpoint @/r/pipe" OUTPUT_PIPE },
     { "sweep --merge @/r/pipe -o @/r/m.csv", "cannot open the part @/r/pipe" OUTPUT_PIPE },
     { "sweep --merge /dev/zero -o @/r/m.csv", "cannot open the part /dev/zero" OUTPUT_ZERO },
@@ -333,10 +334,13 @@ TEST (bounded) {
            "--reference @/zero.csv: cannot be read: a table is text, and this has a byte 0");
   cli_bad ("pinwheel run ezyroller --reference @/zero2.csv", 2,
            "--reference @/zero2.csv: cannot be read: a table is text, and this has a byte 0");
-  cli_bad ("ulimit -v 2000000; pinwheel sweep pendulum -t 0.1 --vary l=lin:1:2:9999 --jobs 9999 -o @/many.csv "
-           "2>@/err9; s=$?; "
-           "sed 's/only [0-9]*/only N/; s/jobs [0-9]*/jobs N/; s/N: .*;/N;/' @/err9 >&2; exit $s",
-           1, "cannot start 9999 runs at a time, only N; try --jobs N");
+  static const char *const many[] = { "sweep pendulum --vary l=lin:1:2:9999 -o @/many.csv",
+                                      "optimise pendulum --minimise pivot.Fx --free l=1:2 --starts 9999" };
+  for (int i = 0; i < 2; i++)
+    cli_bad (check_text ("ulimit -v 2000000; pinwheel %s -t 0.1 --jobs 9999 2>@/err9; s=$?; "
+                         "sed 's/only [0-9]*/only N/; s/jobs [0-9]*/jobs N/; s/N: .*;/N;/' @/err9 >&2; exit $s",
+                         many[i]),
+             1, "cannot start 9999 runs at a time, only N; try --jobs N");
   cli_good ("{ echo 'pinwheel: 1'; yes '# größer' | head -n 20000; echo 'odd: 1'; } >@/far.yaml");
   assert_int_equal (cli_run ("pinwheel show @/far.yaml"), 2); /* libfyaml counts offsets modulo 65536 */
   assert_non_null (strstr (cli_err, "far.yaml:20002:1: error: a model has no \"odd\""));
