@@ -1,5 +1,4 @@
-/* The command `linearise`: the linearised equations of motion x' = A x + B u, y = C x + D u at a time of a run, or at a
- * steady motion. */
+/* The command `linearise`: x' = A x + B u, y = C x + D u, linearised at a time of a run or at a steady motion. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
