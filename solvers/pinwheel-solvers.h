@@ -189,8 +189,8 @@ typedef struct {
 typedef struct {
   int kinds;
   pw_profile_kind *kind;
-  double configurations; /* kinematics of the bodies, and signals that depend on states */
-  double kinematics;     /* the same with all signals */
+  double configurations; /* of the bodies */
+  double kinematics;     /* the configurations and all signals */
   double equations;      /* J, gamma, f */
   double stabilisation;  /* Baumgarte's terms */
   double factorisation, solution;

@@ -66,7 +66,7 @@ int pw_rank_open (struct pw_run *r, pw_error *error);
 int pw_rank_reselect (struct pw_run *r);
 
 /* Conditioning of the active equations: 1 over their largest coefficient in a sum of the redundant ones with irregular
- * weights (rows of length 1); 0 if NaN.  Redundant equations have about the residuals of the active ones over this.
+ * weights (rows of norm 1); 0 if NaN.  Redundant equations have about the residuals of the active ones over this.
  * J must be evaluated and the run's saddle factorised at the configuration. */
 double pw_rank_independence (struct pw_run *r);
 

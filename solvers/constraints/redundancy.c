@@ -29,8 +29,8 @@ double pw_rank_multiplier_unit (const pw_workspace *w, int row) {
   return w->scale.length;
 }
 
-/* The length of a row as a derivative with respect to lengths (pw_length_factor). */
-static double redundancy_length (const pw_workspace *w, int row) {
+/* The norm of a row as a derivative with respect to lengths (pw_length_factor). */
+static double redundancy_norm (const pw_workspace *w, int row) {
   int e;
   const double *J;
   double square = 0;
@@ -64,18 +64,18 @@ static void redundancy_coefficients (pw_run *r, int i) {
   redundancy_solve (r, r->coefficient + i * r->s->rows);
 }
 
-/* A sum of the redundant equations with irregular weights, so that terms do not cancel, needs one solution only. */
+/* One solution, for a sum of all redundant rows; their weights are irregular so that terms do not cancel. */
 double pw_rank_independence (pw_run *r) {
-  double *c = r->coefficient, most = 0;
+  double *c = r->coefficient /* overwritten: each user computes it first */, most = 0;
   for (int i = 0; i < r->redundant; i++) {
     int row = r->redundant_row[i];
-    double x = pw_irregular (0, row + 1), length = redundancy_length (r->w, row);
+    double x = pw_irregular (0, row + 1), norm = redundancy_norm (r->w, row);
     double weight = (x + copysign (1, x)) / 2; /* of modulus 1/2 to 1 */
-    if (length > 0) redundancy_add_row (r->w, row, weight / length, r->row_force);
+    if (norm > 0) redundancy_add_row (r->w, row, weight / norm, r->row_force);
   }
   redundancy_solve (r, c);
   for (int row = 0; row < r->s->rows; row++)
-    if (r->active[row]) most = pw_larger_or_nan (most, fabs (c[row]) * redundancy_length (r->w, row));
+    if (r->active[row]) most = pw_larger_or_nan (most, fabs (c[row]) * redundancy_norm (r->w, row));
   return isnan (most) ? 0 : 1 / most;
 }
 
@@ -141,7 +141,7 @@ static void redundancy_describe_pair (const pw_system *s, int one, int two, char
 
 char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size) {
   enum { MAX_ELEMENTS = 6 };
-  const double round_off = 1e-8; /* of a coefficient between rows of length 1: eps / s^2 at a sine s of 1.5e-4 */
+  const double round_off = 1e-8; /* of c between rows of norm 1: eps / sine^2, if active rows have sines above 1.5e-4 */
   const pw_system *s = r->s;
   int row = r->redundant_row[i], partners = 0, last = -1, elements = 0;
   char element[PW_NAME_BYTES], own[PW_NAME_BYTES], before[PW_NAME_BYTES] = "", reaction[PW_NAME_BYTES];
@@ -150,9 +150,9 @@ char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size) {
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return buffer;
   if (pw_saddle_factor (r->saddle) != PW_OK) return buffer;
   redundancy_coefficients (r, i);
-  const double *c = r->coefficient + i * s->rows, least = round_off * redundancy_length (r->w, row);
+  const double *c = r->coefficient + i * s->rows, least = round_off * redundancy_norm (r->w, row);
   for (int a = 0; a < s->rows; a++) {
-    if (fabs (c[a]) * redundancy_length (r->w, a) <= least) continue;
+    if (fabs (c[a]) * redundancy_norm (r->w, a) <= least) continue;
     partners++, last = a;
     pw_system_row_name (s, a, element, sizeof element);
     if (elements > MAX_ELEMENTS || strcmp (element, own) == 0 || strcmp (element, before) == 0) continue;
@@ -161,6 +161,7 @@ char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size) {
     if (elements++ < MAX_ELEMENTS) redundancy_append (buffer, size, element);
   }
   if (partners == 0) redundancy_append (buffer, size, " has no effect in this configuration");
+  if (partners > 1 && elements == 0) redundancy_append (buffer, size, " follows from its other equations");
   if (partners == 1) redundancy_describe_pair (s, last, row, buffer, size);
   return buffer;
 }

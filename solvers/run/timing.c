@@ -67,8 +67,10 @@ static void profile_do (profile *p, profile_part part, double t) {
   size_t bytes = (size_t)r->s->coords * sizeof (double);
   switch (part) {
   case PROFILE_CONFIGURATIONS:
+    pw_update_configurations (w, r->q, r->v);
+    break;
   case PROFILE_KINEMATICS:
-    pw_update_kinematics (w, part == PROFILE_KINEMATICS ? t : p->t, r->q, r->v);
+    pw_update_kinematics (w, t, r->q, r->v);
     break;
   case PROFILE_EQUATIONS:
     pw_evaluate_J (w);

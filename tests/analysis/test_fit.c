@@ -323,7 +323,7 @@ TEST (starts) {
   const char *json = cli_file ("fit.json");
   check_close ("k", fit_value (json, "k", "value"), fit_k, 1e-5, "rk4 with steps of 0.02 s, and 9 digits of the data");
   check_below ("chi2", cli_number (json, "chi2", NULL), 1e-9, "the same");
-  const char *said = strstr (cli_out, " of 12 searches end at this minimum; the next one is ");
+  const char *said = strstr (cli_out, " of 12 searches end at this estimate; the best other end is ");
   assert_non_null (said);
   assert_non_null (strstr (said, "--set k="));
 }

@@ -301,11 +301,22 @@ TEST (linearise) {
   steady_shows ("     7            -5 ");
   cli_good ("pinwheel linearise pendulum --steady");
   steady_shows ("     1             0           3.1321 ");
-  cli_bad (
-      "pinwheel linearise theo-jansen --steady -o @/none", 4,
-      "theo-jansen: no steady motion near the initial state: the residual ends at 1, in units of the scene; `pinwheel "
-      "steady` also begins at random states");
+  cli_bad ("pinwheel linearise theo-jansen --steady -o @/none", 4,
+           "theo-jansen: no steady motion is reached from the initial state: the last residual is 1, in units of the "
+           "scene; `pinwheel "
+           "steady` also begins at random states");
   assert_null (cli_file ("none.json"));
+}
+
+/* Search and linearisation need constant signals for the same time, t_end after --at. */
+TEST (linearise_later) {
+  cli_write ("later.yaml", "pinwheel: 1\nrun: {t_end: 1}\nbodies: [{name: block, mass: 1, inertia: 1}]\nelements:\n"
+                           "  - {slider: rail, body: [block, ground], at: [[0, 0], [0, 0]], heading: 0}\n"
+                           "  - {drag: D, body: block, linear: 0.5, turning: 0.1}\n"
+                           "  - {force: F, body: block, fx: {pulse: {height: 1, start: 7, width: 0.5}}}\n");
+  cli_good ("pinwheel linearise @/later.yaml --steady --at 5");
+  steady_shows ("The motion is steady\n");
+  assert_int_equal (cli_run ("pinwheel linearise @/later.yaml --steady --at 6.5"), 2);
 }
 
 TEST (limit) {

@@ -54,6 +54,14 @@ TEST (tables) {
   assert_int_equal (profile_row ("projection", value, 4), -1);
 }
 
+/* Times of the two engines are told apart. */
+TEST (engines) {
+  cli_good ("pinwheel run ezyroller --t-end 0.5 --profile");
+  assert_null (strstr (cli_out, "specialised code"));
+  cli_good ("export XDG_CACHE_HOME=@/cache; pinwheel run ezyroller --t-end 0.5 --specialise always --profile");
+  assert_non_null (strstr (cli_out, "`together` is by specialised code"));
+}
+
 /* An implicit method's steps are not made of evaluations of the accelerations. */
 TEST (implicit) {
   double value[4];

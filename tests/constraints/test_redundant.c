@@ -1,6 +1,7 @@
 /* Redundant constraint equations: the motion is that of the scene without them, reactions have the least norm, and
  * messages name the elements. */
 #include <math.h>
+#include <string.h>
 #include "check.h"
 #include "redundant.h"
 #include "scene.h"
@@ -184,6 +185,44 @@ TEST (names) {
   redundant_expect_reports (&redundant_three_table, axle);
   redundant_expect_reports (&redundant_two_table, none);
   redundant_expect_reports (&redundant_plate_table, corner);
+}
+
+/* An element type whose third row is the sum of the other two. */
+typedef struct {
+  const char *name, *body;
+} redundant_stop;
+
+static void redundant_stop_J (const pw_batch *b, double *out) {
+  static const double J[9] = { 1, 0, 0, 0, 1, 0, 1, 1, 0 };
+  for (int e = 0; e < b->count; e++, out += 9) memcpy (out, J, sizeof J);
+}
+
+static const pw_field redundant_stop_fields[] = {
+  { PW_AT (redundant_stop, body), PW_BODY, .required = 1, .about = "the body" }, { .name = NULL }
+};
+
+static const pw_quantity redundant_stop_reaction[] = { { "Fx", "N", NULL, "force along x" },
+                                                       { "Fy", "N", NULL, "force along y" },
+                                                       { "F", "N", NULL, "force along both" } };
+
+static const pw_kind redundant_kind_stop = { .name = "stop",
+                                             .about = "a body that only turns",
+                                             .definition = sizeof (redundant_stop),
+                                             .fields = redundant_stop_fields,
+                                             .bodies = 1,
+                                             .rows = 3,
+                                             .level = PW_NONHOLONOMIC,
+                                             .reaction = redundant_stop_reaction,
+                                             .J = redundant_stop_J };
+
+SCENE (redundant_stopped) {
+  pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 1, .rate = { 0, 0, 1 } });
+  pw_add (m, &redundant_kind_stop, &(redundant_stop){ .name = "S", .body = "disc" });
+}
+
+TEST (same_element) {
+  static const char *const own[] = { "stop S (S.F) follows from its other equations", NULL };
+  redundant_expect_reports (&redundant_stopped_table, own);
 }
 
 /* ---- Selection of independent rows ---- */

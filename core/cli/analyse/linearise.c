@@ -1,5 +1,4 @@
-/* The command `linearise`: the linearised equations of motion x' = A x + B u, y = C x + D u at a time of a run or a
- * steady motion. */
+/* The command `linearise`: x' = A x + B u, y = C x + D u, linearised at a time of a run or at a steady motion. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -65,22 +64,22 @@ static int linearise_advance (pw_linearise_command *cmd, pw_error *error) {
   return status == PW_STOPPED ? pw_limit_status (&cmd->limit, pw_run_time (cmd->r), error) : status;
 }
 
-/* Finds the steady motion nearest to the initial state, with the quantities of --hold held. */
+/* Newton's method from the initial state, then from one to which forces lead; the quantities of --hold are held. */
 static int linearise_solve_steady (pw_linearise_command *cmd, pw_steady *steady, pw_error *error) {
   int n = pw_system_coordinates (cmd->m.system);
-  pw_steady_motion m;
+  pw_steady_motion motion;
   int status = steady ? PW_RETRY : error->status;
   for (int attempt = 0; status == PW_RETRY && attempt < PW_STEADY_NOT_RANDOM; attempt++)
-    status = pw_steady_solve (steady, attempt, 0 /* no parameter */, &m, error);
+    status = pw_steady_solve (steady, attempt, 0 /* no parameter */, &motion, error);
   if (status == PW_RETRY)
     return pw_fail (error, PW_METHOD,
-                    "%s: no steady motion near the initial state: the residual ends at %.2g, in units of the scene; "
-                    "`pinwheel steady` also begins at random states",
-                    pw_file_name (cmd->m.file), m.residual);
+                    "%s: no steady motion is reached from the initial state: the last residual is %.2g, in units of "
+                    "the scene; `pinwheel steady` also begins at random states",
+                    pw_file_name (cmd->m.file), motion.residual);
   if (status != PW_OK) return status;
   cmd->initial = malloc (2 * (size_t)n * sizeof *cmd->initial);
   if (cmd->initial == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  for (int i = 0; i < 2 * n; i++) cmd->initial[i] = (pw_initial_value){ i, i < n ? m.q[i] : m.v[i - n] };
+  for (int i = 0; i < 2 * n; i++) cmd->initial[i] = (pw_initial_value){ i, i < n ? motion.q[i] : motion.v[i - n] };
   return PW_OK;
 }
 
@@ -100,10 +99,10 @@ static int linearise_run (pw_linearise_command *cmd, pw_error *error) {
   pw_settings settings;
   double t_end;
   if (pw_cli_settings (&cmd->line, &d, &t_end, &settings, &cmd->limit, error) != PW_OK) return error->status;
-  settings.span = fmax (t_end, cmd->t);
+  settings.span = cmd->steady ? t_end /* after --at: signals are constant in it */ : fmax (t_end, cmd->t);
   pw_limit_start (&cmd->limit);
   if (cmd->steady) {
-    if (linearise_find_steady (cmd, t_end, error) != PW_OK) return error->status;
+    if (linearise_find_steady (cmd, settings.span, error) != PW_OK) return error->status;
     settings.t = cmd->t;
     settings.initial = cmd->initial;
     settings.initials = 2 * pw_system_coordinates (cmd->m.system);
@@ -187,7 +186,7 @@ static const struct poptOption linearise_options[] = {
   PW_TEXT_OPTION (pw_linearise_command, t_text, "at", 0, "T",
                   "At time T [s] of a run with the model's default method (default 0)"),
   PW_FLAG_OPTION (pw_linearise_command, steady, "steady",
-                  "At the steady motion nearest to the initial state; --at is the time of its signals"),
+                  "At the steady motion that is reached from the initial state; signals are those of --at"),
   PW_HOLD_OPTION (pw_linearise_command, hold_texts),
   PW_LIST_OPTION (pw_linearise_command, input_names, "input", 0, "SIGNAL",
                   "Input u: the signal of a force, ELEMENT or ELEMENT.FIELD; repeatable (default all)"),
@@ -205,9 +204,9 @@ const pw_command pw_cli_linearise = {
   .name = "linearise",
   .synopsis = "MODEL [OPTION...]",
   .summary = "linearise a model: matrices, eigenvalues and mode shapes",
-  .help = "Linearise the equations of motion in minimal coordinates on the constraints, in a frame that moves with the "
-          "motion: x' = A x + B u, y = C x + D u. Prints eigenvalues with frequency, damping and time to double or "
-          "halve, and mode shapes.",
+  .help = "Linearise the equations of motion in minimal coordinates, which satisfy the constraints, in a frame that "
+          "moves with the motion: x' = A x + B u, y = C x + D u. Prints eigenvalues with frequency, damping and time "
+          "to double or halve, and mode shapes.",
   .options_size = sizeof (pw_linearise_command),
   .function = linearise_command,
   .options = linearise_options,

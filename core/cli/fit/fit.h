@@ -27,7 +27,7 @@ typedef struct {
   int weighted;                            /* 1: standard deviations are given */
   int residuals;                           /* number of data that are not NaN */
   /* results */
-  double *minima;         /* starts x (1 + unknowns): sum of squares, values; without a result INFINITY, the start */
+  double *ends;           /* starts x (1 + unknowns): sum of squares, values; without a result INFINITY, the start */
   double *estimate;       /* unknowns */
   double *fitted;         /* columns x rows: values of the model at the estimate */
   double *standard_error; /* unknowns; INFINITY: not determined by the data, NaN: not known */

@@ -142,24 +142,24 @@ static void report_undetermined (const pw_fit *fit) {
   }
 }
 
-/* 1 if a search ended at the best minimum, up to round-off and the tolerances of searches. */
-static int report_is_best (const pw_fit *fit, const double *minimum) {
-  return *minimum <= fit->chi2 + 1e-6 * fit->chi2 + 1e-12 * fit->initial_chi2;
+/* 1 if a search ended at the estimate, up to round-off and the tolerances of searches. */
+static int report_is_best (const pw_fit *fit, const double *end) {
+  return *end <= fit->chi2 + 1e-6 * fit->chi2 + 1e-12 * fit->initial_chi2;
 }
 
-/* Prints how many searches ended at the best minimum, and the next best one. */
-static void report_minima (const pw_fit *fit) {
+/* Prints how many searches ended at the estimate, and the best other end, where that search need not have converged. */
+static void report_ends (const pw_fit *fit) {
   char options[PW_UNKNOWNS_OPTIONS];
   const double *next = NULL;
   int equal = 0;
   for (int i = 0; i < fit->starts; i++) {
-    const double *minimum = fit->minima + i * (1 + fit->unknowns.count);
-    equal += report_is_best (fit, minimum);
-    if (!report_is_best (fit, minimum) && isfinite (*minimum) && (next == NULL || *minimum < *next)) next = minimum;
+    const double *end = fit->ends + i * (1 + fit->unknowns.count);
+    equal += report_is_best (fit, end);
+    if (!report_is_best (fit, end) && isfinite (*end) && (next == NULL || *end < *next)) next = end;
   }
-  if (fit->starts > 1) printf ("%d of %d searches end at this minimum", equal, fit->starts);
+  if (fit->starts > 1) printf ("%d of %d searches end at this estimate", equal, fit->starts);
   if (next && pw_unknowns_options (&fit->unknowns, next + 1, options))
-    printf ("; the next one is %.6g at %s", *next, options);
+    printf ("; the best other end is %.6g at %s", *next, options);
   if (fit->starts > 1) putchar ('\n');
 }
 
@@ -178,7 +178,7 @@ void pw_fit_print (const pw_fit *fit) {
   report_undetermined (fit);
   printf ("\n%ld runs, %d iterations, derivatives by %s\n", fit->runs, fit->iterations,
           fit->by_differences ? "differences of runs" : "the variational equations");
-  report_minima (fit);
+  report_ends (fit);
   if (pw_unknowns_options (&fit->unknowns, fit->estimate, options)) printf ("\n%s\n", options);
 }
 
@@ -234,15 +234,15 @@ static void report_json_matrix (const pw_fit *fit, pw_json *j, const char *key,
   pw_json_close (j, ']');
 }
 
-/* Writes pw_fit.minima. */
-static void report_json_minima (const pw_fit *fit, pw_json *j) {
+/* Writes pw_fit.ends. */
+static void report_json_ends (const pw_fit *fit, pw_json *j) {
   int n = fit->unknowns.count;
   pw_json_open (j, "searches", '[');
-  for (const double *minimum = fit->minima; minimum < fit->minima + fit->starts * (1 + n); minimum += 1 + n) {
+  for (const double *end = fit->ends; end < fit->ends + fit->starts * (1 + n); end += 1 + n) {
     j->line = 1;
     pw_json_open (j, NULL, '{');
-    pw_json_number (j, "chi2", *minimum);
-    pw_json_numbers (j, "values", minimum + 1, n);
+    pw_json_number (j, "chi2", *end);
+    pw_json_numbers (j, "values", end + 1, n);
     pw_json_close (j, '}');
   }
   pw_json_close (j, ']');
@@ -273,7 +273,7 @@ void pw_fit_json (const pw_fit *fit, const char *status, FILE *f) {
   report_json_columns (fit, j);
   report_json_matrix (fit, j, "covariance", report_covariance);
   report_json_matrix (fit, j, "correlation", report_correlation);
-  report_json_minima (fit, j);
+  report_json_ends (fit, j);
   pw_json_close (j, '}');
 }
 

@@ -27,15 +27,15 @@ enum { SOLVE_ITERATIONS = 100 /* of a search, at most */ };
 
 typedef struct {
   pw_fit *fit;
-  double *u;        /* unknowns: where a search begins and ends */
-  double *unknowns; /* unknowns: their values in the last run */
-  double *values;   /* columns x rows: of the model, in the last run */
-  double *jacobian; /* unknowns x (columns x rows) */
-  int known;        /* 1: the last run succeeded */
-  int status;       /* PW_OK, or else the fit ends, with `error` */
+  double *u;          /* unknowns: where a search begins and ends */
+  double *last_value; /* unknowns: in the last run */
+  double *values;     /* columns x rows: of the model, in the last run */
+  double *jacobian;   /* unknowns x (columns x rows) */
+  int known;          /* 1: the last run succeeded */
+  int status;         /* PW_OK, or else the fit ends, with `error` */
   pw_error *error;
   double worst; /* largest norm of the residuals of the runs of this search that succeeded */
-  double least; /* sum of squares at the best minimum so far, fit->estimate; INFINITY: no search has reached one yet */
+  double least; /* sum of squares at the best end of a search, fit->estimate; INFINITY: none is completed yet */
   int previous; /* iterations of earlier searches */
 } fit_solver;
 
@@ -64,7 +64,7 @@ static double solve_start (const pw_unknown *unknown, double value) {
 
 /* ---- Residuals ---- */
 
-/* Ends the fit after a failure of memory, after Ctrl-C, or if `essential`: no search can do without what failed. */
+/* Ends the fit if memory is short, after Ctrl-C, or if what failed is `essential`: no search can do without it. */
 static void solve_fail (fit_solver *solver, int essential, const pw_error *error, int status) {
   if (status == PW_OK || !(essential || status == PW_RETRY || status == PW_RESOURCE)) return;
   solver->status = status;
@@ -79,18 +79,18 @@ static double solve_sum (const pw_fit *fit, const double *values) {
   return sum;
 }
 
-/* Makes the run at u the last one, unless it already is.  A failure of the very first run ends the fit.  A status. */
+/* Runs the model at u, unless the last run was there.  If the first run of the fit fails, the fit ends.  A status. */
 static int solve_run (fit_solver *solver, const gsl_vector *u) {
   pw_fit *fit = solver->fit;
   int same = solver->known;
   pw_error own = { 0 };
   for (int i = 0; i < fit->unknowns.count; i++) {
     double value = solve_value (fit->unknowns.list + i, gsl_vector_get (u, (size_t)i));
-    same &= value == solver->unknowns[i];
-    solver->unknowns[i] = value;
+    same &= value == solver->last_value[i];
+    solver->last_value[i] = value;
   }
   if (same) return PW_OK;
-  int status = pw_fit_run (fit, solver->unknowns, solver->values, &own);
+  int status = pw_fit_run (fit, solver->last_value, solver->values, &own);
   if (status == PW_OK && !isfinite (solve_sum (fit, solver->values)))
     status = pw_fail (&own, PW_METHOD, "the sum of the squares of the residuals is not finite");
   solver->known = status == PW_OK;
@@ -115,15 +115,15 @@ static int solve_residuals (const gsl_vector *u, void *context, gsl_vector *f) {
 }
 
 /* Derivatives of the residuals with respect to u at u; or if u is NULL, with respect to the unknowns at the estimate.
- * Without derivatives a search ends; the fit ends if no search has reached a minimum. */
+ * Without derivatives a search ends; the fit ends if no search is completed. */
 static int solve_derivatives (const gsl_vector *u, void *context, gsl_matrix *J) {
   fit_solver *solver = context;
   pw_fit *fit = solver->fit;
   int cells = fit->columns * fit->rows;
   pw_error own = { 0 };
   if (u && solve_run (solver, u) != PW_OK) return GSL_EBADFUNC;
-  const double *unknowns = u ? solver->unknowns : fit->estimate, *values = u ? solver->values : fit->fitted;
-  int status = pw_fit_jacobian (fit, unknowns, values, solver->jacobian, &own);
+  const double *value = u ? solver->last_value : fit->estimate, *values = u ? solver->values : fit->fitted;
+  int status = pw_fit_jacobian (fit, value, values, solver->jacobian, &own);
   solve_fail (solver, u == NULL || !isfinite (solver->least), &own, status);
   if (status != PW_OK) return GSL_EBADFUNC;
   for (int j = 0; j < fit->unknowns.count; j++) {
@@ -142,11 +142,11 @@ static int solve_derivatives (const gsl_vector *u, void *context, gsl_matrix *J)
 static void solve_store (fit_solver *solver, double chi2) {
   pw_fit *fit = solver->fit;
   fit->chi2 = chi2;
-  memcpy (fit->estimate, solver->unknowns, (size_t)fit->unknowns.count * sizeof *fit->estimate);
+  memcpy (fit->estimate, solver->last_value, (size_t)fit->unknowns.count * sizeof *fit->estimate);
   memcpy (fit->fitted, solver->values, (size_t)fit->columns * (size_t)fit->rows * sizeof *fit->fitted);
 }
 
-/* `moved`: 1 if the last run was made at the position reached; it is the result if Ctrl-C comes before any minimum. */
+/* `moved`: 1 if the last run is the position reached, the result if Ctrl-C comes before a search is completed. */
 static void solve_progress (fit_solver *solver, int iteration, int moved, const gsl_multifit_nlinear_workspace *w) {
   double norm = gsl_blas_dnrm2 (gsl_multifit_nlinear_residual (w));
   if (isnan (solver->fit->initial_chi2)) solver->fit->initial_chi2 = norm * norm;
@@ -156,9 +156,9 @@ static void solve_progress (fit_solver *solver, int iteration, int moved, const 
   pw_progress_at (&solver->fit->progress, solver->fit->iterations);
 }
 
-/* Iterates from u, the last run.  Unlike gsl_multifit_nlinear_driver, it ends when derivatives cannot be evaluated:
- * GSL_EBADFUNC.  GSL_ENOPROG: many steps in a row were rejected; only in the first iteration is this the end, since
- * otherwise the next one begins with a new damping parameter. */
+/* Iterates from u, where the last run was made.  Unlike gsl_multifit_nlinear_driver, it ends when derivatives cannot be
+ * evaluated (GSL_EBADFUNC).  An iteration that rejects many steps (GSL_ENOPROG) ends the search only if it is the
+ * first: the next one begins with a new damping parameter. */
 static int solve_iterate (fit_solver *solver, gsl_vector *u, gsl_multifit_nlinear_fdf *f,
                           gsl_multifit_nlinear_workspace *w) {
   int info, status = gsl_multifit_nlinear_init (u, f, w), more = status == GSL_SUCCESS;
@@ -172,17 +172,17 @@ static int solve_iterate (fit_solver *solver, gsl_vector *u, gsl_multifit_nlinea
   return status;
 }
 
-/* Stores the sum of squares and the unknowns at the minimum that a search has reached; the best one is the result. */
-static void solve_keep (fit_solver *solver, double *minimum) {
-  *minimum = solve_sum (solver->fit, solver->values);
-  memcpy (minimum + 1, solver->unknowns, (size_t)solver->fit->unknowns.count * sizeof *solver->unknowns);
-  if (!(*minimum < solver->least)) return;
-  solver->least = *minimum;
-  solve_store (solver, *minimum);
+/* Stores where a search has ended, perhaps without converging: sum of squares, values.  The best end is the result. */
+static void solve_keep (fit_solver *solver, double *end) {
+  *end = solve_sum (solver->fit, solver->values);
+  memcpy (end + 1, solver->last_value, (size_t)solver->fit->unknowns.count * sizeof *solver->last_value);
+  if (!(*end < solver->least)) return;
+  solver->least = *end;
+  solve_store (solver, *end);
 }
 
-/* A search from the unknowns in `minimum`, which its result replaces; *minimum is INFINITY without a result. */
-static void solve_minimum (fit_solver *solver, gsl_multifit_nlinear_workspace *w, double *minimum) {
+/* A search from the values in end + 1, which its result replaces, see fit->ends; *end is INFINITY without a result. */
+static void solve_search (fit_solver *solver, gsl_multifit_nlinear_workspace *w, double *end) {
   pw_fit *fit = solver->fit;
   size_t n = (size_t)fit->unknowns.count;
   gsl_multifit_nlinear_fdf f = {
@@ -190,8 +190,8 @@ static void solve_minimum (fit_solver *solver, gsl_multifit_nlinear_workspace *w
   };
   gsl_vector_view view = gsl_vector_view_array (solver->u, n);
   gsl_vector *u = &view.vector;
-  for (size_t i = 0; i < n; i++) solver->u[i] = solve_start (fit->unknowns.list + i, minimum[1 + i]);
-  *minimum = INFINITY;
+  for (size_t i = 0; i < n; i++) solver->u[i] = solve_start (fit->unknowns.list + i, end[1 + i]);
+  *end = INFINITY;
   solver->worst = 0;
   if (solve_run (solver, u) != PW_OK) return;
   int status = solve_iterate (solver, u, &f, w);
@@ -199,31 +199,31 @@ static void solve_minimum (fit_solver *solver, gsl_multifit_nlinear_workspace *w
   fit->iterations = solver->previous += (int)gsl_multifit_nlinear_niter (w);
   if (status != GSL_SUCCESS && status != GSL_ENOPROG) return;
   gsl_vector_memcpy (u, gsl_multifit_nlinear_position (w));
-  if (solve_run (solver, u) == PW_OK) solve_keep (solver, minimum);
+  if (solve_run (solver, u) == PW_OK) solve_keep (solver, end);
 }
 
 /* Searches from all starts. */
-static void solve_minima (fit_solver *solver) {
+static void solve_searches (fit_solver *solver) {
   pw_fit *fit = solver->fit;
   size_t n = (size_t)fit->unknowns.count, starts = (size_t)fit->starts;
   const gsl_multifit_nlinear_parameters parameters = gsl_multifit_nlinear_default_parameters ();
   gsl_multifit_nlinear_workspace *w =
       gsl_multifit_nlinear_alloc (gsl_multifit_nlinear_trust, &parameters, (size_t)fit->residuals, n);
   double *start = pw_unknowns_starts (&fit->unknowns, fit->starts, 1);
-  fit->minima = pw_arena_alloc (&fit->arena, starts * (1 + n) * sizeof *fit->minima);
-  if (w == NULL || start == NULL || fit->minima == NULL)
+  fit->ends = pw_arena_alloc (&fit->arena, starts * (1 + n) * sizeof *fit->ends);
+  if (w == NULL || start == NULL || fit->ends == NULL)
     solver->status = pw_fail (solver->error, PW_RESOURCE, "out of memory");
   solver->least = INFINITY;
   for (size_t i = 0; i < starts && solver->status == PW_OK; i++) {
-    fit->minima[i * (1 + n)] = INFINITY;
-    memcpy (fit->minima + i * (1 + n) + 1, start + i * n, n * sizeof *start);
+    fit->ends[i * (1 + n)] = INFINITY;
+    memcpy (fit->ends + i * (1 + n) + 1, start + i * n, n * sizeof *start);
   }
-  for (size_t i = 0; i < starts && solver->status == PW_OK; i++) solve_minimum (solver, w, fit->minima + i * (1 + n));
+  for (size_t i = 0; i < starts && solver->status == PW_OK; i++) solve_search (solver, w, fit->ends + i * (1 + n));
   free (start);
   if (w) gsl_multifit_nlinear_free (w);
   if (solver->status == PW_OK && !isfinite (solver->least))
-    solver->status =
-        pw_fail (solver->error, PW_METHOD, "no search reached a minimum; begin nearer to it, by --set or --start");
+    solver->status = pw_fail (solver->error, PW_METHOD,
+                              "no search could be completed; begin nearer to a minimum, by --set or --start");
 }
 
 /* ---- Errors of the estimates ---- */
@@ -308,10 +308,10 @@ static void solve_errors (fit_solver *solver) {
 static int solve_open (fit_solver *solver) {
   pw_fit *fit = solver->fit;
   size_t n = (size_t)fit->unknowns.count, cells = (size_t)fit->columns * (size_t)fit->rows;
-  solver->unknowns = pw_arena_alloc (&fit->arena, (2 * n + (1 + n) * cells) * sizeof *solver->unknowns);
+  solver->last_value = pw_arena_alloc (&fit->arena, (2 * n + (1 + n) * cells) * sizeof *solver->last_value);
   fit->estimate = pw_arena_alloc (&fit->arena, (4 * n + 2 * n * n + cells) * sizeof *fit->estimate);
-  if (solver->unknowns == NULL || fit->estimate == NULL) return pw_fail (solver->error, PW_RESOURCE, "out of memory");
-  solver->u = solver->unknowns + n, solver->values = solver->u + n, solver->jacobian = solver->values + cells;
+  if (solver->last_value == NULL || fit->estimate == NULL) return pw_fail (solver->error, PW_RESOURCE, "out of memory");
+  solver->u = solver->last_value + n, solver->values = solver->u + n, solver->jacobian = solver->values + cells;
   fit->standard_error = fit->estimate + n, fit->singular_value = fit->standard_error + n,
   fit->column_length = fit->singular_value + n, fit->covariance = fit->column_length + n;
   fit->singular_vector = fit->covariance + n * n, fit->fitted = fit->singular_vector + n * n;
@@ -322,7 +322,7 @@ int pw_fit_solve (pw_fit *fit, pw_error *error) {
   fit_solver solver = { .fit = fit, .error = error };
   fit->initial_chi2 = NAN;
   solver.status = solve_open (&solver);
-  if (solver.status == PW_OK) solve_minima (&solver);
+  if (solver.status == PW_OK) solve_searches (&solver);
   if (solver.status == PW_OK) solve_errors (&solver);
   return solver.status;
 }

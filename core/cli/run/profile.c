@@ -14,7 +14,7 @@ static void profile_share (pw_table *table, double part, double whole) {
   pw_cell (table, 8, whole > 0 ? text : "");
 }
 
-/* The name of an element type, or of the bodies, and its counts. */
+/* The name of an element type, or of the bodies, and its counts; unknowns: accelerations and multipliers. */
 static void profile_counts (pw_table *table, const char *name, int elements, int rows, int unknowns) {
   pw_cell (table, -14, name);
   const int count[] = { elements, rows, unknowns };
@@ -85,17 +85,19 @@ static void profile_stages (const pw_profile *profile, FILE *f) {
 static void profile_print (const pw_system *system, const pw_run *run, const pw_profile *profile, double cpu, FILE *f) {
   char t[32], evaluations[32], iterations[32];
   double steps = (double)pw_run_statistics (run)->steps;
-  fprintf (f, "\n  what an evaluation of the accelerations costs at t = %s s [ns]\n\n",
+  fprintf (f, "\n  what an evaluation of the accelerations costs [ns] at t = %s s\n\n",
            pw_format (t, pw_run_time (run), 8));
   profile_kinds (profile, pw_system_bodies (system), f);
   profile_stages (profile, f);
+  if (pw_run_statistics (run)->specialised > 0)
+    fprintf (f, "\n  `together` is by specialised code, all other times are of the general engine\n");
   if (steps == 0) return;
   pw_format (evaluations, (double)pw_run_statistics (run)->rhs / steps, 3);
   pw_format (iterations, profile->iterations, 2);
-  fprintf (f, "\n  a step of the run took %.0f ns, %s evaluations%s", 1e9 * cpu / steps, evaluations,
-           profile->evaluations > 0 ? "" : " of residuals, and matrices of the method's own");
+  fprintf (f, "\n  a step of the run took %.0f ns; evaluations%s: %s", 1e9 * cpu / steps,
+           profile->evaluations > 0 ? "" : " of residuals, matrices not counted", evaluations);
   if (profile->projections > 0)
-    fprintf (f, " (that after a projection is part of it), %s iterations to project", iterations);
+    fprintf (f, " (with those after projections); iterations of a projection: %s", iterations);
   fprintf (f, "\n");
 }
 

@@ -2,18 +2,19 @@
  *
  * An interval of time is excluded if interval arithmetic proves that no comparison or other discontinuous operation
  * changes in it, not even because an operand becomes NaN at the end of a function's domain.
- * Otherwise it is bisected, the earlier half first, down to a least relative width, at first 2^-36 (Moore, Kearfott &
+ * Otherwise it is bisected, the earlier half first, down to a least width, at first 2^-36 |t| (Moore, Kearfott &
  * Cloud 2009, Introduction to Interval Analysis, chapter 8).  If an operation differs between the ends of such an
  * interval, bisection finds the two adjacent floating-point numbers between which it changes: steps must end there.
  * Changes that cancel within the least width are ignored.  So are those of noisy operations, which change too often
- * for steps to end there.  While two compared numbers stay equal, the least width grows. */
+ * for steps to end there.  The least width doubles where many intervals of that width could not be excluded although
+ * nothing changes in them, as while two compared numbers stay equal. */
 #include <math.h>
 #include "expression_parts.h"
 #include "pinwheel.h"
 
 #define LATEST 1e18                  /* breakpoints after it are not found [s] */
 #define FIRST_WIDTH 1e-9             /* of the first interval, relative to 1 s + |t|; each next one is twice as wide */
-#define LEAST_WIDTH 0x1p-36          /* of bisected intervals, at first, relative to |t| */
+#define LEAST_WIDTH 0x1p-36          /* of bisected intervals, at first, relative to |t| + least_width s */
 #define GREATEST_LEAST_WIDTH 0x1p-10 /* to which it grows */
 #define SMALLEST_INTERVAL 1e-18      /* [s]: not bisected either, for t near 0 */
 enum { NOISE_CHANGES = 8 };          /* more changes in an interval of the least width and just after it are noise */
@@ -25,9 +26,9 @@ typedef struct {
   const pw_expression *expression;
   double from;                              /* time at which the search begins */
   int remaining;                            /* intervals that may still be tested */
-  int equal;                                /* intervals of the least width without a change so far */
-  int max_equal;                            /* number of these after which the least width doubles */
-  double least_width;                       /* relative to |t| */
+  int undecided;                            /* intervals of the least width, not excluded, without a change so far */
+  int undecided_to_double;                  /* number of these after which the least width doubles */
+  double least_width;                       /* relative to |t| + least_width s, so that it grows near t = 0, too */
   double noise_end;                         /* time until which noisy operations are ignored; INFINITY without any */
   unsigned char noisy[PW_EXPRESSION_CODES]; /* 1: this operation is noisy */
 } search;
@@ -88,7 +89,7 @@ static double search_first (search *s, double a, double b) {
   if (!pw_expression_range (s->expression, s->noisy, a, b).breaks) return INFINITY;
   if (b - a <= s->least_width * (fmax (fabs (a), fabs (b)) + s->least_width) + SMALLEST_INTERVAL) {
     if (search_differ (s, a, b)) return search_mark_noisy (s, a, b) ? search_first (s, a, b) : search_bisect (s, a, b);
-    if (++s->equal % s->max_equal == 0) s->least_width = fmin (2 * s->least_width, GREATEST_LEAST_WIDTH);
+    if (++s->undecided % s->undecided_to_double == 0) s->least_width = fmin (2 * s->least_width, GREATEST_LEAST_WIDTH);
     return INFINITY;
   }
   double middle = a + (b - a) / 2, first = search_first (s, a, middle);
@@ -98,12 +99,11 @@ static double search_first (search *s, double a, double b) {
 double pw_expression_breakpoint (const pw_expression *expression, double t) {
   search s = { .expression = expression, .from = t, .least_width = LEAST_WIDTH, .noise_end = INFINITY };
   s.remaining = 400 + 4000000 / (100 + expression->codes); /* so that the time of a search has a bound */
-  s.max_equal = 1 + s.remaining / 120; /* 26 doublings to the greatest least width before the limit */
+  s.undecided_to_double = 1 + s.remaining / 120;           /* 26 doublings, 2^-36 to 2^-10, before the limit */
   double a = t, found = INFINITY;
   if (!expression->breaks) return INFINITY;
   for (double width = FIRST_WIDTH * (1 + fabs (t)); a < LATEST && found == INFINITY; width *= 2) {
-    int without_noise = s.noise_end == INFINITY;
-    if (a >= s.noise_end || (without_noise && !pw_expression_range (expression, s.noisy, a, LATEST).breaks)) break;
+    if (a >= s.noise_end || !pw_expression_range (expression, s.noisy, a, LATEST).breaks) break;
     found = search_first (&s, a, a + width);
     a += width;
   }
