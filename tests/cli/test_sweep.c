@@ -113,7 +113,7 @@ TEST (no_lanes) {
   assert_int_equal (cli_run ("pinwheel sweep @/locked.yaml --vary b.vx=0,0 --t-end 0.1 --lanes 4 --specialise always "
                              "-o @/locked.csv"),
                     0);
-  assert_string_equal (cli_err, "pinwheel: one run after the other: the model's own initial state is refused\n");
+  assert_string_equal (cli_err, "pinwheel: one run after the other: the scene's initial state is refused\n");
 }
 
 /* ---- Compiled systems ---- */
@@ -135,6 +135,17 @@ TEST (shared) {
              "exit 1\n"
              "done");
   assert_string_equal (cli_out, "3\n3\n");
+}
+
+/* A misspelt state is reported once a model has been compiled, which has all states but for counts. */
+TEST (misspelt_state) {
+  assert_int_equal (
+      cli_run ("rm -f @/counted; export COUNTED=@/counted; pinwheel sweep @/counted.c --t-end 0.01 --vary "
+               "l=1:2:50 --vary b.omgea=0,1 -o @/wrong.csv; s=$?; wc -l <@/counted; exit $s"),
+      2);
+  print_error ("%s", cli_err);
+  assert_non_null (strstr (cli_err, "did you mean \"b.omega\"?"));
+  assert_string_equal (cli_out, "1\n");
 }
 
 /* ---- Runs that fail ---- */
