@@ -40,7 +40,8 @@ static int nearest_equal (const char *a, const char *b) {
 
 static void nearest_append (pw_nearest *n, const char *candidate) {
   size_t used = strlen (n->all), more = strlen (candidate);
-  n->overflow |= used + more + 3 > sizeof n->all;
+  if (n->overflow || strstr (PW_PRINTED (96, ", %s,", n->all), PW_PRINTED (96, ", %s,", candidate))) return;
+  n->overflow = used + more + 3 > sizeof n->all;
   if (n->overflow) return;
   if (used) memcpy (n->all + used, ", ", 2), used += 2;
   memcpy (n->all + used, candidate, more + 1);

@@ -23,8 +23,8 @@ static inline int pw_require (const void *object, const char *type, pw_error *er
 
 enum { PW_HINT = 140 }; /* "; did you mean \"...\"?" with the longest name */
 
-/* Collects valid names, and the one nearest to an unknown name: least distance over the length of the longer name.
- * Start with { .sought = name }. */
+/* Collects valid names, each once, and the one nearest to an unknown name: least distance over the length of the
+ * longer name.  Start with { .sought = name }. */
 typedef struct {
   const char *sought;
   char best[120];          /* "" before the first candidate */

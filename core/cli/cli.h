@@ -219,7 +219,7 @@ typedef struct {
 } pw_cli_engine;
 
 /* Reads the value of --specialise; NULL, if it is not given, means "auto". */
-int pw_cli_specialise (const char *text, pw_specialise *when, pw_error *error);
+int pw_cli_read_specialise (const char *text, pw_specialise *when, pw_error *error);
 
 /* The C text of the code specialised for a system, without the constraint equations that are redundant at the initial
  * state, if that can be made consistent.  NULL and the error if there can be none.  Free it. */

@@ -1,4 +1,4 @@
-/* The model of a command line: opened with its --set and --start, and its parameters and initial values. */
+/* The model of a command line: opens it with --set and --start; its parameters, changed initial values and defaults. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -24,8 +24,9 @@ int pw_cli_assignment (const char *option, const char *text, const char *form, c
   if (equals == NULL || equals == text || equals - text >= PW_ASSIGNED_NAME)
     return pw_fail (error, PW_INPUT, "%s %s: expected %s", option, text, form);
   snprintf (name, PW_ASSIGNED_NAME, "%.*s", (int)(equals - text), text);
-  if (pw_read_expression (equals + 1, value) == PW_OK) return PW_OK;
-  return pw_fail (error, PW_INPUT, "%s %s: \"%s\" is not a number", option, text, equals + 1);
+  int status = pw_read_expression (equals + 1, value);
+  if (status == PW_RESOURCE) return pw_fail (error, status, "out of memory");
+  return status == PW_OK ? status : pw_fail (error, status, "%s %s: \"%s\" is not a number", option, text, equals + 1);
 }
 
 int pw_cli_apply (pw_model *m, const char *option, const char **list,

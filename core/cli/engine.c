@@ -4,7 +4,7 @@
 #include "cli.h"
 #include "util.h"
 
-int pw_cli_specialise (const char *text, pw_specialise *when, pw_error *error) {
+int pw_cli_read_specialise (const char *text, pw_specialise *when, pw_error *error) {
   static const char *const name[] = { "auto", "always", "never", NULL };
   char hint[PW_HINT];
   int i = text ? pw_find_name (name, sizeof *name, text, hint) : PW_SPECIALISE_AUTO;
@@ -13,28 +13,28 @@ int pw_cli_specialise (const char *text, pw_specialise *when, pw_error *error) {
   return PW_OK;
 }
 
-/* Stores in a few words why the general engine is used: the error without the model's name or, if code was generated
- * (`has_text`), the meaning of its status. */
+/* Stores in a few words why the general engine is used: the error without the model's name or, if the C text was
+ * generated (`has_text`), the meaning of its status. */
 static void engine_keep_reason (pw_cli_engine *e, const pw_system *s, int has_text, const pw_error *error) {
   char model[300];
   size_t n = (size_t)snprintf (model, sizeof model, "model %s: ", pw_system_name (s));
   const char *reason = error->text + (strncmp (error->text, model, n) == 0 ? n : 0);
   if (has_text)
-    reason = error->status == PW_INPUT    ? "no C compiler"
+    reason = error->status == PW_INPUT    ? "no C compiler or no pinwheel.h"
              : error->status == PW_METHOD ? "the generated code does not compile"
                                           : "the generated code cannot be compiled or loaded";
   snprintf (e->reason, sizeof e->reason, "%.190s", reason);
 }
 
 char *pw_cli_source (const pw_system *s, pw_error *error) {
-  pw_run *r = pw_run_open (s, "rk4+none", NULL, NULL);
+  pw_run *r = pw_run_open (s, "rk4+none", NULL, NULL); /* makes no step: any method will do */
   char *text = r ? pw_run_source (r, error) : pw_system_source (s, NULL, error);
   pw_run_close (r);
   return text;
 }
 
-/* Loads or compiles code for the system; without it, stores the reason, which is printed if code was generated, or for
- * PW_SPECIALISE_ALWAYS. */
+/* Loads or compiles code for the system.  If there is none, stores the reason; prints the error if it is one of a
+ * generated C text, or with PW_SPECIALISE_ALWAYS. */
 static void engine_open_code (pw_cli_engine *e, const pw_system *s, pw_specialise when) {
   pw_error own = { 0 };
   char *text = pw_cli_source (s, &own);
@@ -52,7 +52,7 @@ void pw_cli_engine_open (pw_cli_engine *e, const pw_system *s, pw_specialise whe
   if (when == PW_SPECIALISE_NEVER)
     strcpy (e->reason, "--specialise never");
   else if (when == PW_SPECIALISE_AUTO && !(steps >= PW_SPECIALISE_STEPS))
-    strcpy (e->reason, "short run"); /* even if the cache has the code: the same command has the same result */
+    strcpy (e->reason, "short run"); /* even if the cache has the code: results of the engines differ by round-off */
   else
     engine_open_code (e, s, when);
 }
@@ -62,7 +62,7 @@ static const char *engine_lanes_obstacle (const pw_cli_engine *e, const pw_syste
                                           const pw_run *r) {
   if (e->code == NULL) return "the general engine is in use, see --specialise";
   if (pw_cli_adaptive (method) != 0) return "the method controls its step size";
-  if (r == NULL) return "the model's own initial state is refused";
+  if (r == NULL) return "the scene's initial state is refused";
   if (pw_run_redundant (r) > 0) return "the scene has redundant constraint equations";
   return pw_system_has_lanes (s) ? NULL : "the scene has element types of its own, or signals that depend on the state";
 }
@@ -73,11 +73,11 @@ pw_scene_code *pw_cli_engine_lanes (const pw_cli_engine *e, const pw_system *s, 
   pw_error own = { 0 };
   if (lanes == 0 && steps >= PW_LANES_STEPS) lanes = pw_processor_lanes ();
   if (lanes <= 1) return NULL;
-  pw_run *r = pw_run_open (s, "rk4+none", NULL, NULL);
+  pw_run *r = pw_run_open (s, "rk4+none", NULL, NULL); /* makes no step: any method will do */
   const char *reason = engine_lanes_obstacle (e, s, method, r);
   char *text = reason ? NULL : pw_run_source (r, &own);
   pw_scene_code *code = text ? pw_scene_lanes_open (text, s, lanes, &own) : NULL;
-  const int failed = reason == NULL && code == NULL;
+  const int failed = reason == NULL && code == NULL; /* also by Ctrl-C, which ends the compiler, too */
   if (failed) reason = own.text;
   if (code && pw_scene_code_lanes (code) == NULL) {
     pw_scene_code_close (code);

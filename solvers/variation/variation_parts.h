@@ -1,5 +1,5 @@
-/* Derivatives of a run in progress; for variation*.c only.  Equations in variation.c.  Comments of arrays begin with
- * their lengths: n coordinates, m constraint equations, `entries` of the ledger. */
+/* Derivatives of a run with respect to p, a parameter or initial value, while it proceeds; for variation*.c only.  The
+ * equations are in variation.c.  Comments of arrays begin with their lengths; n, m, entries, size: see pw_variation. */
 #ifndef PW_VARIATION_H
 #define PW_VARIATION_H
 
@@ -8,21 +8,23 @@
 enum {
   PW_VARIATION_NEIGHBOURS = 4, /* neighbouring runs of a direction */
   PW_VARIATION_STAGES = 3,     /* of an implicit step */
-  PW_VARIATION_RATES = 7,      /* stages of an explicit step, and the time derivative at its end */
-  PW_VARIATION_POINTS = 256,   /* recorded states of the run at which it waits for the derivatives */
+  PW_VARIATION_RATES = 7,      /* 6 stages of an explicit step, and its end */
+  PW_VARIATION_POINTS = 256,   /* number of recorded states at which the run waits for the derivatives */
   PW_VARIATION_DENSE = 100     /* most coordinates for implicit steps, which need dense matrices */
 };
 
 /* The derivative along a direction, or its error. */
 typedef struct {
   const struct pw_direction_copy *direction;
-  double *Y;                     /* size: dq, dv, d ledger, the latter only with `ledger` */
-  double *K[PW_VARIATION_RATES]; /* size: F = Y' at stages and end; implicit steps: F, F_i, Y_i (Y_3, then F at end) */
-  double *lambda;                /* m: d lambda at the state last evaluated */
-  double *trial;                 /* size: Y at a stage, or at the end of a step */
-  double slope;                  /* derivative of the time of the breakpoint or jump passed last */
-  double largest;                /* norm of Y so far, in units of the scene */
-  double energy;                 /* largest derivative of work and losses so far */
+  double *Y; /* size: derivatives of q, v and, with `ledger`, of work and losses */
+  /* size: F, the time derivative of Y: K[0] at the beginning of a step, K[6] at its end, others at its stages.  Within
+   * an implicit step K[1..3] are F_i, K[4..6] the stages Y_i themselves. */
+  double *K[PW_VARIATION_RATES];
+  double *lambda; /* m: d lambda at the state last evaluated */
+  double *trial;  /* size: Y at a stage, or at the end of a step */
+  double slope;   /* derivative of the time of the last breakpoint or jump, set before pw_variation_jump */
+  double largest; /* norm of Y up to now, in units of the scene */
+  double energy;  /* largest derivative of work and losses up to now */
 } pw_variation_column;
 
 /* Sums of magnitudes, in units of the scene: of differences, of their errors, and of the round-off in the errors. */
@@ -33,12 +35,12 @@ typedef struct {
 typedef struct pw_direction_copy {
   pw_direction given;
   int columns;                                /* 2, or 1 with `no_error` */
-  pw_variation_column column[2];              /* the derivative, its error */
+  pw_variation_column column[2];              /* [0]: the derivative, [1]: its error */
   double breakpoint[PW_VARIATION_NEIGHBOURS]; /* the next one of each neighbour */
   double first, last;                         /* times between which no neighbour has a breakpoint */
-  /* of each column, n + 3 m: d/dp of f - M a - J^T lambda, gamma - J a, g, J v - eta */
+  /* of each column, n + 3 m: effects of p, d/dp of f - M a - J^T lambda, gamma - J a, g, J v - eta at a fixed state */
   double *effect[2];
-  double *terms;                     /* n + 3 m: magnitudes of the terms of which these are differences */
+  double *terms;                     /* n + 3 m: magnitudes of the terms whose differences the effects are */
   pw_difference_sums start, effects; /* of the initial state; of the effects at all evaluations */
   double *local_error;               /* size: error of the derivative in the last step */
   int signals;                       /* 1: some signals may differ in the neighbours */
@@ -49,12 +51,12 @@ typedef struct pw_direction_copy {
 
 /* A state of the run. */
 typedef struct {
-  double t, *x; /* 3 n + 3: q, v, a, and room for the ground's entries of a */
-  int jumps;    /* 1: accelerations jump between this state and the next one, at the same time up to round-off */
+  double t, *x; /* 3 n + 3: q, v, a, the ground's entries of a, which are unused */
+  int jumps;    /* 1: accelerations jump between this state and the next one, whose times are equal up to round-off */
 } pw_variation_point;
 
-/* Times [from, to] on one side of a jump at which motions nearby may be on the other side.  Neighbours are evaluated at
- * the held time t and state instead; the interval is so short that their effects change by round-off. */
+/* Times [from, to] on one side of a jump at which neighbouring runs may be on the other side.  There, neighbours are
+ * evaluated at the held time t and state; the interval is so short that this changes effects of p by round-off only. */
 typedef struct {
   double from, to;
   double t, *state; /* 2 n: q, v */
@@ -62,7 +64,7 @@ typedef struct {
 
 struct pw_variation {
   pw_run *r;
-  int n, m, entries, size, count;         /* size: of Y; count: number of directions */
+  int n, m, entries, size, count;         /* coordinates, constraint equations, of the ledger, of Y, directions */
   int ledger;                             /* 1: with derivatives of work and losses */
   pw_direction_copy *direction;           /* count */
   pw_linearisation linear;                /* at the state last evaluated */
@@ -70,21 +72,21 @@ struct pw_variation {
   double at;                              /* time of the state last evaluated */
   double h;                               /* size of the next step [s] */
   double last_error;                      /* relative error of the last accepted step */
-  int stiff;                              /* steps whose size stability limited, minus others; >= 0 */
+  int stiff;                              /* number of steps that stability has limited, less that of others; >= 0 */
   struct pw_variation_implicit *implicit; /* implicit steps; NULL: explicit ones */
   double *q, *v;                          /* n + 3: the state last evaluated */
   double *a[PW_VARIATION_RATES];          /* n: accelerations of the run at the stages */
-  /* n, of the last step: error with which its formula integrates accelerations; this integral less the change of v */
+  /* n, of the last step: error of its integral of the run's accelerations; that integral less the run's change of v */
   double *motion_error, *motion_defect;
-  double speed;              /* largest velocity of the run so far, in units of the scene */
+  double speed;              /* largest velocity of the run up to now, in units of the scene */
   double reversal;           /* change of a velocity over which a force reverses, at most 1, in units of the scene */
-  double *scratch, *output;  /* k = 3 n + 4 m + entries + 9 each; `output`: of pw_variation_outputs */
-  double *values;            /* 2 k: scratch */
+  double *scratch, *output;  /* k = 3 n + 4 m + entries + 9 each: overwritten, as `values`, by steps and jumps; */
+  double *values;            /* 2 k; `scratch` also by evaluate_at, `values` by outputs, `output` by samples */
   int elements;              /* number of elements */
-  double *element_energy;    /* 2 elements: potential energies at the state evaluated, and at another one */
+  double *element_energy;    /* 2 x elements: potential energies at the state evaluated, then at another one */
   double *sample[2];         /* 3 n + m + entries: of the last sample; its error */
   int may_jump;              /* 1: accelerations may jump with the state */
-  double begun;              /* the beginning of the run's last step */
+  double begun;              /* time at which the run's last step has begun */
   int points, room;          /* recorded states, allocated ones */
   pw_variation_point *point; /* room: the last state of the run up to t, and all later ones */
   double passed;             /* the last breakpoint that the derivatives have passed */
@@ -92,6 +94,7 @@ struct pw_variation {
   char *memory;
 };
 
+/* For each column c of each direction d; declares both. */
 #define PW_EACH_COLUMN(c, x)                                                        \
   for (pw_direction_copy *d = (x)->direction; d < (x)->direction + (x)->count; d++) \
     for (pw_variation_column *c = d->column; c < d->column + d->columns; c++)
@@ -105,24 +108,24 @@ typedef struct {
 
 /* ---- variation_path.c ---- */
 
-/* Appends the state of the run at time t, in its last step.  A status. */
+/* Appends the state of the run at time t, which lies in the run's last step.  A status. */
 int pw_variation_append (pw_variation *x, double t, pw_error *error);
-/* Inserts states between points i and i + 1, both in the last step of a run that adapts its steps, until interpolation
- * is as good as a tenth of its tolerance.  A status. */
+/* Inserts states between points i and i + 1, both in the run's last step, until the error of interpolation is at most a
+ * tenth of the run's tolerance; none if its steps are fixed.  A status. */
 int pw_variation_refine (pw_variation *x, int i, pw_error *error);
 /* Adds a last point, whose state the caller stores.  PW_OK or PW_RESOURCE. */
 int pw_variation_add_point (pw_variation *x, pw_error *error);
-/* Accelerations (a: n + 3) by the run's equations at a state; at a breakpoint, those before it.  A status. */
+/* Accelerations (a: n + 3) by the run's equations at a state; at a breakpoint, as just before it.  A status. */
 int pw_variation_accelerations (pw_variation *x, double t, const double *q, const double *v, double *a,
                                 pw_error *error);
-/* Discards the states that precede the last one up to x->t. */
+/* Discards the points before the last one at or before x->t. */
 void pw_variation_discard_points (pw_variation *x);
 /* The state (q, v) of the run at a time, by Hermite interpolation between recorded ones; 2 n numbers. */
 void pw_variation_state (const pw_variation *x, double t, double *out);
 
 /* ---- variation_effect.c ---- */
 
-/* Evaluates the linearised equations, and the effects of parameters, at (t, x->q, x->v).  A status. */
+/* Evaluates the linearised equations and the effects of p at (t, x->q, x->v): "the state evaluated".  A status. */
 int pw_variation_evaluate (pw_variation *x, double t, pw_error *error);
 /* The same at the state of the run at time t. */
 int pw_variation_evaluate_at (pw_variation *x, double t, pw_error *error);
@@ -136,8 +139,8 @@ void pw_variation_project (pw_variation *x, pw_variation_column *c);
  * breakpoints differ slightly from the run's; near a jump, at the held time and state. */
 pw_variation_place pw_variation_place_of (const pw_variation *x, const pw_direction_copy *d);
 
-/* Smaller effects of p count as this large: 1 or, for p > 1, 1/p, in units of the scene per unit of p; a step of the
- * differences is about 1e-5 p. */
+/* The least reference for relative errors of effects of p: 1 or, for p > 1, 1/p, in units of the scene per unit of p; a
+ * step of the differences is about 1e-5 p. */
 double pw_variation_least_effect (const pw_direction_copy *d);
 
 /* ---- variation_outputs.c ---- */
@@ -191,7 +194,7 @@ int pw_variation_look_ahead (pw_variation *x, pw_direction_copy *d, double next,
 /* Passes the breakpoint at which run and derivatives have arrived.  A status. */
 int pw_variation_pass_breakpoint (pw_variation *x, pw_error *error);
 /* Passes a jump of the accelerations, from those at the state evaluated to those at `state` (q, v) and time t:
- * evaluates the latter and continues there, with the derivative `slope` of the time of the jump.  A status. */
+ * evaluates the latter and continues there.  The caller has set the `slope` of every column.  A status. */
 int pw_variation_jump (pw_variation *x, double t, const double *state, pw_error *error);
 
 /* ---- variation_jump.c ---- */

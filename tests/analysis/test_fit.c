@@ -346,6 +346,17 @@ TEST (engine) {
   assert_non_null (strstr (cli_file ("engine.txt"), "general engine: "));
 }
 
+/* ... and for the searches from all starts: one of 50 runs of 1000 steps is short, 20 of them are not. */
+TEST (engine_starts) {
+  cli_shell ("pinwheel run pendulum --t-end 1 --every 0.5 -o @/short.csv");
+  cli_shell (
+      "export CC=/nonexistent XDG_CACHE_HOME=@/none\n"
+      "fit='pinwheel fit pendulum --data @/short.csv --columns bob.phi --free l=0.9:1.2 --method rk4 --step 1e-3'\n"
+      "$fit 2>@/one.txt; $fit --starts 20 2>@/starts.txt");
+  assert_null (strstr (cli_file ("one.txt"), "general engine: "));
+  assert_non_null (strstr (cli_file ("starts.txt"), "general engine: "));
+}
+
 /* After Ctrl-C the values reached are written, without their errors. */
 TEST (interrupt) {
   const char *program = getenv ("PINWHEEL");

@@ -315,7 +315,7 @@ TEST (list) {
                                        "  spin  rad  spin_rate  ",
                                        "- {drive: NAME, body: [BODY, BODY], what: x, value: SIGNAL}",
                                        "required: x | y | angle",
-                                       "a number, an expression of t, or see" };
+                                       "a number, an expression of t, or a form of" };
   for (size_t i = 0; i < sizeof items / sizeof *items; i++) assert_non_null (strstr (cli_out, items[i]));
 }
 

@@ -292,6 +292,9 @@ TEST (bad) {
     { "ezyroller --methods rk5", "there is no integrator \"rk5\"; did you mean \"erk5\"?" },
     { "ezyroller --methods all,ida+gll", "integrator ida has no stabilisation \"gll\"; did you mean \"ggl\"?" },
     { "ezyroller --methods all+gll", "--methods all+gll: no integrator has this stabilisation; did you mean \"ggl\"?" },
+    { "ezyroller --methods all+foo",
+      "--methods all+foo: no integrator has this stabilisation; "
+      "valid are none, baumgarte, projection, nullspace, index2, ggl, si1, index3, rattle" },
     { "ezyroller --methods rk5+all", "there is no integrator \"rk5\"; did you mean \"erk5\"?" },
     { "ezyroller --methods rk4,", "--methods \"rk4,\": a name is missing" },
     { "ezyroller --limt 3", "compare has no option \"--limt\"; did you mean \"--limit\"?" },

@@ -153,6 +153,17 @@ TEST (interrupt) {
   assert_string_equal (drift_cell ("i/drift.csv.part", "rk4+none", STATUS), "ok");
 }
 
+/* Rows after the one that an interruption has stopped are below the heading of their group. */
+TEST (interrupt_gap) {
+  int status = cli_run ("\"${PINWHEEL:-build/pinwheel}\" drift ezyroller --t-end 2000 --step 0.1 --rtol 1e-12 --jobs 2 "
+                        "--methods ida+ggl,rk4+projection --only-methods &\n"
+                        "sleep 1; kill -TERM $!; wait $!");
+  const char *row = strstr (cli_out, "\nrk4+projection ");
+  if (status != 130 || row == NULL) return; /* it was slower than the signal: nothing to see */
+  assert_non_null (strstr (cli_out, "\nmethods "));
+  assert_true (strstr (cli_out, "\nmethods ") < row);
+}
+
 /* No figure against alpha if it is 0, which a logarithmic axis does not show. */
 TEST (alpha_zero) {
   cli_good ("pinwheel drift pendulum --t-end 0.1 --step 0.01 --methods rk4 --vary alpha=0 --vary beta=1 --vary every=1 "

@@ -244,8 +244,8 @@ TEST (columns) {
              "PW_MODEL (.about = \"some\", .parameters = list, .parameters_size = sizeof (some), .build = build);\n");
   assert_int_equal (cli_run ("pinwheel sweep @/some.c -t 0.1 --vary size=1,2 -o @/some.csv"), 0);
   assert_non_null (strstr (cli_err,
-                           "pinwheel: 1 of 2 runs failed, the first of them: big.x has no column: the number of bodies "
-                           "may only depend on parameters that are counts"));
+                           "pinwheel: 1 of 2 runs failed, the first of them: big.x has no column: not in the first or "
+                           "last row, nor in the first with one count changed"));
   assert_non_null (strstr (cli_file ("some.csv"), "\n2,input,"));
 }
 

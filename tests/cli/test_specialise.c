@@ -147,7 +147,19 @@ TEST (no_compiler) {
       cli_err, "pinwheel: general engine: cannot run the C compiler \"/nonexistent\" that specialised code "
                "needs (No such file or directory): install one, or name another in the environment variable CC\n");
   assert_true (cli_says (cli_file ("none.json"), "engine", "general"));
-  assert_true (cli_says (cli_file ("none.json"), "engine_reason", "no C compiler"));
+  assert_true (cli_says (cli_file ("none.json"), "engine_reason", "no C compiler or no pinwheel.h"));
+}
+
+/* A program without its headers, in which a text model runs. */
+TEST (no_header) {
+  cli_write ("one.yaml",
+             "pinwheel: 1\nbodies: [{name: a, mass: 1, inertia: 1}]\nelements: [{force: F, body: a, fx: 1}]\n");
+  assert_int_equal (
+      cli_run (FRESH "mkdir @/bin && cp \"${PINWHEEL:-build/pinwheel}\" ${BUILD:-build}/libpinwheel*.so.* @/bin\n"
+                     "@/bin/pinwheel run @/one.yaml -t 0.1 --specialise always --json @/bare.json"),
+      0);
+  assert_non_null (strstr (cli_err, "pinwheel.h is not in "));
+  assert_true (cli_says (cli_file ("bare.json"), "engine_reason", "no C compiler or no pinwheel.h"));
 }
 
 /* What does not compile is kept, with the messages; the run goes on. */

@@ -113,28 +113,42 @@ TEST (no_lanes) {
   assert_int_equal (cli_run ("pinwheel sweep @/locked.yaml --vary b.vx=0,0 --t-end 0.1 --lanes 4 --specialise always "
                              "-o @/locked.csv"),
                     0);
-  assert_string_equal (cli_err, "pinwheel: one run after the other: the model's own initial state is refused\n");
+  assert_string_equal (cli_err, "pinwheel: one run after the other: the scene's initial state is refused\n");
 }
 
 /* ---- Compiled systems ---- */
 
-/* A model that counts how often it is built: once for the columns, then once for each of two lengths, whichever
+/* A model that counts how often it is built. */
+static const char sweep_counted[] =
+    "#include <stdio.h>\n#include <stdlib.h>\n#include \"pinwheel.h\"\n"
+    "static const pw_parameter p[] = { { \"l\", 0, 1, \"m\", \"length\", PW_POSITIVE }, { 0 } };\n"
+    "static void build (pw_model *m, const void *l) {\n"
+    "  FILE *f = fopen (getenv (\"COUNTED\"), \"a\");\n"
+    "  fputs (\"x\\n\", f), fclose (f);\n"
+    "  pw_add_body (m, &(pw_body){ .name = \"b\", .mass = 1, .inertia = *(const double *)l });\n}\n"
+    "PW_MODEL (.about = \"\", .parameters = p, .parameters_size = sizeof (double), .build = build);\n";
+
+/* Once for the columns, then once for each of two lengths, whichever
  * quantity varies fastest.  One worker, so that the second length is not compiled while the first is still in use. */
 TEST (shared) {
-  cli_write ("counted.c",
-             "#include <stdio.h>\n#include <stdlib.h>\n#include \"pinwheel.h\"\n"
-             "static const pw_parameter p[] = { { \"l\", 0, 1, \"m\", \"length\", PW_POSITIVE }, { 0 } };\n"
-             "static void build (pw_model *m, const void *l) {\n"
-             "  FILE *f = fopen (getenv (\"COUNTED\"), \"a\");\n"
-             "  fputs (\"x\\n\", f), fclose (f);\n"
-             "  pw_add_body (m, &(pw_body){ .name = \"b\", .mass = 1, .inertia = *(const double *)l });\n}\n"
-             "PW_MODEL (.about = \"\", .parameters = p, .parameters_size = sizeof (double), .build = build);\n");
+  cli_write ("counted.c", sweep_counted);
   cli_shell ("export COUNTED=@/counted; s='pinwheel sweep @/counted.c --t-end 0.01'\n"
              "for v in '--vary l=1,2 --vary b.omega=0,1,2' '--vary b.omega=0,1,2 --vary l=1,2'; do rm -f @/counted\n"
              "$s $v -j 1 -o @/one.csv && wc -l <@/counted && $s $v -j 3 -o @/three.csv && cmp @/one.csv @/three.csv || "
              "exit 1\n"
              "done");
   assert_string_equal (cli_out, "3\n3\n");
+}
+
+/* A misspelt state is reported once a model has been compiled, which has all states but for counts. */
+TEST (misspelt_state) {
+  cli_write ("counted.c", sweep_counted);
+  assert_int_equal (
+      cli_run ("rm -f @/counted; export COUNTED=@/counted; pinwheel sweep @/counted.c --t-end 0.01 --vary "
+               "l=lin:1:2:50 --vary b.omgea=0,1 -o @/wrong.csv; s=$?; wc -l <@/counted; exit $s"),
+      2);
+  assert_non_null (strstr (cli_err, "did you mean \"b.omega\"?"));
+  assert_string_equal (cli_out, "1\n");
 }
 
 /* ---- Runs that fail ---- */

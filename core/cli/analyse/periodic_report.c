@@ -9,14 +9,16 @@
 #include "text.h"
 
 enum {
-  PERIODIC_SHOWN = 12,    /* in the text: multipliers, at most; points of a branch that are not events, about */
+  PERIODIC_MOST = 12,     /* multipliers in the text, at most */
+  PERIODIC_POINTS = 12,   /* of a branch that are not events, in the text, about */
   PERIODIC_BODIES = 20,   /* in the figure, at most */
   PERIODIC_SAMPLES = 400, /* of one motion, in its figure */
   PERIODIC_CURVES = 3     /* over the parameter, see periodic_curve */
 };
-#define PERIODIC_SMALL 1e-9 /* displacements, rotations, speeds and states below it are printed and drawn as 0 */
+/* [SI units]  Smaller displacements, rotations, speeds and states are printed as 0, displacements also drawn as 0. */
+#define PERIODIC_SMALL 1e-9
 
-/* By pw_periodic_event, without PW_PERIODIC_END, which is not stored. */
+/* The names of pw_periodic_event; PW_PERIODIC_END has none: it is not stored. */
 static const char *const periodic_events[] = { "point", "fold", "branch point", "period doubling", "Neimark-Sacker" };
 
 /* ---- Quantities ---- */
@@ -46,11 +48,11 @@ static void periodic_print_multipliers (const pw_periodic_orbit *o, int symmetri
   int nontrivial = o->multipliers - o->trivial, shown = 0, shift = o->trivial > symmetries;
   printf ("  Floquet multipliers          ");
   for (int i = 0; i < nontrivial; i++) {
-    if (o->im[i] < 0 || shown++ >= PERIODIC_SHOWN) continue;
+    if (o->im[i] < 0 || shown++ >= PERIODIC_MOST) continue;
     if (shown > 1) printf ("\n                               ");
     printf (o->im[i] > 0 ? "%.6g +- %.6g i, modulus %.6g" : "%.6g", o->re[i], o->im[i], hypot (o->re[i], o->im[i]));
   }
-  puts (nontrivial == 0 ? "none" : shown > PERIODIC_SHOWN ? " ..." : "");
+  puts (nontrivial == 0 ? "none" : shown > PERIODIC_MOST ? " ..." : "");
   printf ("  trivial multipliers          %d%s%s\n", o->trivial, symmetries ? ", of symmetries" : "",
           !shift       ? ""
           : symmetries ? " and a shift in time"
@@ -87,7 +89,7 @@ static void periodic_print_motion (const pw_periodic_command *cmd, const pw_peri
   pw_states_print (cmd->m.system, o->q, o->v, 8, PERIODIC_SMALL);
 }
 
-/* Prints a row for each event and about PERIODIC_SHOWN other points. */
+/* Prints a row for each event and about PERIODIC_POINTS other points. */
 static void periodic_print_branch (const pw_periodic_command *cmd) {
   static const char *const head[] = { "period [s]", "displacement [m]",   "rotation [rad]",
                                       "growing",    "largest multiplier", NULL };
@@ -101,7 +103,7 @@ static void periodic_print_branch (const pw_periodic_command *cmd) {
     pw_head (&t, 12, 12, head);
     for (int i = 0; i < cmd->points; i++) {
       const pw_periodic_orbit *o = &cmd->point[i].orbit;
-      int stride = cmd->points / PERIODIC_SHOWN + 1;
+      int stride = cmd->points / PERIODIC_POINTS + 1;
       const periodic_displacement d = periodic_displace (o);
       if (o->event == PW_PERIODIC_POINT && i % stride && i + 1 < cmd->points) continue;
       pw_cell (&t, -15,
@@ -183,12 +185,12 @@ static void periodic_json (const void *context, pw_json *j) {
 static int periodic_csv (const void *context, FILE *f, pw_error *error) {
   const pw_periodic_command *cmd = context;
   const pw_system *s = cmd->m.system;
-  int states = 2 * pw_system_coordinates (s), most = cmd->point->orbit.multipliers;
+  int states = 2 * pw_system_coordinates (s), multipliers = cmd->point->orbit.multipliers; /* of every point */
   pw_text t = { .chars = NULL };
   pw_text_name (&t, cmd->vary_text ? cmd->vary.name : "parameter", cmd->vary.unit);
   pw_text_cell (&t, "event,period [s],displacement [m],rotation [rad],growing,residual");
   pw_states_header (s, &t);
-  pw_complex_header (&t, most, "");
+  pw_complex_header (&t, multipliers, "");
   int status = pw_text_line (&t, f, cmd->folder, error);
   for (const pw_periodic_point *p = cmd->point; status == PW_OK && p < cmd->point + cmd->points; p++) {
     const pw_periodic_orbit *o = &p->orbit;
@@ -198,7 +200,7 @@ static int periodic_csv (const void *context, FILE *f, pw_error *error) {
     const double number[] = { o->period, d.total, o->rotation, o->unstable, o->residual };
     for (int k = 0; k < 5; k++) pw_text_number (&t, number[k]);
     for (int i = 0; i < states; i++) pw_text_number (&t, p->state[i]);
-    pw_complex_cells (&t, o->re, o->im, o->multipliers, most);
+    pw_complex_cells (&t, o->re, o->im, o->multipliers, multipliers);
     status = pw_text_line (&t, f, cmd->folder, error);
   }
   return status;
@@ -237,8 +239,8 @@ static double periodic_curve (const pw_periodic_orbit *o, int k) {
   return k == 0 ? periodic_round (d.total) : k == 1 ? periodic_largest (o) : o->period;
 }
 
-/* Writes the parts of the branch without growing perturbations (stable or neutral), or those with, each followed by a
- * blank line.  A point belongs to the part that begins at it and to the one that ends there; after an event, the
+/* Writes the parts of the branch whose motions have no growing perturbations (`stable`: 1), or have some (0), each part
+ * followed by a blank line.  A point where one part ends and the next begins belongs to both.  From an event on, the
  * stability is that of the next point. */
 static void periodic_write_parts (const pw_periodic_command *cmd, FILE *f, int stable) {
   int inside = 0; /* 1: the last point began or continued a part */

@@ -240,8 +240,8 @@ static int sensitivity_open (sensitivity *cmd, pw_error *error) {
   pw_sensitivity *sens = &cmd->sens;
   int status = pw_cli_open (&cmd->m, &cmd->line, error);
   if (status == PW_OK) status = pw_unknowns_open (&sens->unknowns, &cmd->line, &cmd->m, error);
+  if (status == PW_OK) status = pw_unknowns_engine (&sens->unknowns, 1, 1, error);
   if (status != PW_OK) return status;
-  pw_unknowns_engine (&sens->unknowns, 1);
   sens->unknowns.settings.specialised = pw_scene_code_table (sens->unknowns.engine.code);
   if (cmd->folder) sens->row_interval = sens->unknowns.t_end / SENSITIVITY_ROWS;
   status = pw_cli_requires ("--every", cmd->every, "-o DIR", cmd->folder != NULL, error);

@@ -35,7 +35,7 @@ int pw_unknowns_open (pw_unknowns *u, const pw_cli_line *line, const pw_cli_mode
   *u = (pw_unknowns){ .line = line, .m = m, .method = line->method ? line->method : d.method };
   int status = pw_method_parse (u->method, &method, &stabilisation, error);
   if (status == PW_OK) status = pw_cli_settings (line, &d, &u->t_end, &u->settings, &limit, error);
-  if (status == PW_OK) status = pw_cli_specialise (line->specialise, &u->when, error);
+  if (status == PW_OK) status = pw_cli_read_specialise (line->specialise, &u->when, error);
   if (status != PW_OK) return status;
   u->settings.stop = NULL;
   if (u->settings.rtol == 0) u->settings.rtol = PW_RTOL; /* from which errors are estimated */
@@ -44,10 +44,14 @@ int pw_unknowns_open (pw_unknowns *u, const pw_cli_line *line, const pw_cli_mode
   return PW_OK;
 }
 
-void pw_unknowns_engine (pw_unknowns *u, double runs) {
+int pw_unknowns_engine (pw_unknowns *u, double runs, int starts, pw_error *error) {
   pw_run_defaults d = pw_cli_defaults (pw_file_table (u->m->file));
+  if (starts > 1 && u->count > PW_UNKNOWNS_SOBOL_MOST)
+    return pw_fail (error, PW_INPUT, "at most %d unknowns with more than one start; give --starts 1",
+                    PW_UNKNOWNS_SOBOL_MOST);
   pw_cli_engine_open (&u->engine, u->m->system, u->when,
-                      runs * pw_method_steps (u->method, &u->settings, d.step, u->t_end));
+                      runs * starts * pw_method_steps (u->method, &u->settings, d.step, u->t_end));
+  return PW_OK;
 }
 
 void pw_unknowns_close (pw_unknowns *u) {

@@ -51,8 +51,9 @@ int pw_unknowns_read (pw_unknowns *u, const char **list, pw_error *error);
  * initial state.  PW_INPUT for a name that the model does not have, that is given twice or that is a count; else as
  * pw_run_open. */
 int pw_unknowns_differentiated (pw_unknowns *u, const char **list, pw_error *error);
-/* Chooses the engine for this estimated number of runs. */
-void pw_unknowns_engine (pw_unknowns *u, double runs);
+/* Chooses the engine for searches from `starts` points, of about `runs` runs each.  PW_INPUT if there are too many
+ * unknowns for more than one start. */
+int pw_unknowns_engine (pw_unknowns *u, double runs, int starts, pw_error *error);
 
 /* The model with these values of the unknowns, compiled.  PW_INPUT if it refuses them; PW_RESOURCE.  Close it by
  * pw_cli_close_model in every case.  May be called by several threads at once. */

@@ -6,7 +6,7 @@
 #include "unknowns.h"
 
 typedef struct {
-  const char *name, *unit;       /* pw_vary_read sets the unit of a parameter alone */
+  const char *name, *unit;       /* "" without --vary; pw_vary_read sets the unit of a parameter alone */
   const pw_parameter *parameter; /* of the model; NULL: there is none of this name */
   double first, last;
   /* private */

@@ -39,7 +39,7 @@ static int data_read_columns (pw_fit *fit, pw_error *error) {
 }
 
 /* Reads "COLUMN=VALUE" or "COLUMN=NAME" of --sigma. */
-static int data_read_sigma (const pw_fit *fit, const char *text, fit_sigma *sigma, pw_error *error) {
+static int data_read_sigma (const pw_fit *fit, const char *text, fit_sigma *given, pw_error *error) {
   const int length = (int)strcspn (text, "="); /* of the column's name */
   const char *value = text + length + 1;
   int i = 0;
@@ -47,18 +47,18 @@ static int data_read_sigma (const pw_fit *fit, const char *text, fit_sigma *sigm
   while (i < fit->columns && (strncmp (fit->column_name[i], text, (size_t)length) != 0 || fit->column_name[i][length]))
     i++;
   if (i == fit->columns) return pw_fail (error, PW_INPUT, "--sigma %.*s: it is not among --columns", length, text);
-  if (sigma[i].text) return pw_fail (error, PW_INPUT, "--sigma %.*s is given twice", length, text);
-  sigma[i] = (fit_sigma){ value, NAN };
-  if (pw_read_expression (value, &sigma[i].number) == PW_OK && !(sigma[i].number > 0 && isfinite (sigma[i].number)))
+  if (given[i].text) return pw_fail (error, PW_INPUT, "--sigma %.*s is given twice", length, text);
+  given[i] = (fit_sigma){ value, NAN };
+  if (pw_read_expression (value, &given[i].number) == PW_OK && !(given[i].number > 0 && isfinite (given[i].number)))
     return pw_fail (error, PW_INPUT, "--sigma %s: expected a finite number > 0", text);
   return PW_OK;
 }
 
 /* Checks that standard deviations are given for all columns or, if all have the same unit, for none. */
-static int data_check_sigma (pw_fit *fit, const fit_sigma *sigma, pw_error *error) {
-  for (int i = 0; i < fit->columns; i++) fit->weighted |= sigma[i].text != NULL;
+static int data_check_sigma (pw_fit *fit, const fit_sigma *given, pw_error *error) {
+  for (int i = 0; i < fit->columns; i++) fit->weighted |= given[i].text != NULL;
   for (int i = 0; i < fit->columns; i++) {
-    if (fit->weighted && sigma[i].text == NULL)
+    if (fit->weighted && given[i].text == NULL)
       return pw_fail (error, PW_INPUT, "--sigma is given for other columns, but not for %s", fit->column_name[i]);
     if (!fit->weighted && strcmp (fit->column_unit[i], fit->column_unit[0]) != 0)
       return pw_fail (error, PW_INPUT,
@@ -69,29 +69,31 @@ static int data_check_sigma (pw_fit *fit, const fit_sigma *sigma, pw_error *erro
 }
 
 /* Reads times, data, and columns of standard deviations. */
-static int data_read_table (pw_fit *fit, const fit_sigma *sigma, pw_error *error) {
+static int data_read_table (pw_fit *fit, const fit_sigma *given, pw_error *error) {
   const size_t most = 1 + 2 * (size_t)fit->columns;
-  const char **column = pw_arena_alloc (&fit->arena, 2 * most * sizeof *column), **unit = column + most;
+  const char **column = pw_arena_alloc (&fit->arena, 2 * most * sizeof *column);
   int count = 1;
   if (column == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  const char **unit = column + most;
   column[0] = "t", unit[0] = "s";
   for (int i = 0; i < fit->columns; i++) column[count] = fit->column_name[i], unit[count++] = fit->column_unit[i];
   for (int i = 0; i < fit->columns; i++)
-    if (isnan (sigma[i].number)) column[count] = sigma[i].text, unit[count++] = fit->column_unit[i];
+    if (isnan (given[i].number)) column[count] = given[i].text, unit[count++] = fit->column_unit[i];
   fit->table = pw_read_columns (fit->data_path, column, unit, count, &fit->rows, error);
   return fit->table ? PW_OK : error->status;
 }
 
 /* Reads the data, and sets the standard deviation of each datum. */
-static int data_read (pw_fit *fit, const fit_sigma *sigma, pw_error *error) {
-  if (data_read_table (fit, sigma, error) != PW_OK) return error->status;
+static int data_read (pw_fit *fit, const fit_sigma *given, pw_error *error) {
+  if (data_read_table (fit, given, error) != PW_OK) return error->status;
+  if (fit->rows == 0) return pw_fail (error, PW_INPUT, "--data %s: no rows", fit->data_path);
   size_t rows = (size_t)fit->rows, cells = (size_t)fit->columns * rows;
   fit->t = fit->table, fit->data = fit->table + rows;
-  fit->sigma = pw_arena_alloc (&fit->arena, (cells + 1) * sizeof *fit->sigma);
+  fit->sigma = pw_arena_alloc (&fit->arena, cells * sizeof *fit->sigma);
   if (fit->sigma == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   const double *next = fit->data + cells;
   for (int i = 0; i < fit->columns; i++) {
-    const double *column = isnan (sigma[i].number) ? next : NULL, all = sigma[i].text ? sigma[i].number : 1;
+    const double *column = isnan (given[i].number) ? next : NULL, all = given[i].text ? given[i].number : 1;
     for (size_t k = 0; k < rows; k++) fit->sigma[(size_t)i * rows + k] = column ? column[k] : all;
     if (column) next += rows;
   }
@@ -100,7 +102,6 @@ static int data_read (pw_fit *fit, const fit_sigma *sigma, pw_error *error) {
 
 /* Counts the data, each of which needs a positive standard deviation. */
 static int data_check (pw_fit *fit, pw_error *error) {
-  if (fit->rows == 0) return pw_fail (error, PW_INPUT, "--data %s: no rows", fit->data_path);
   if (fit->t[0] < 0)
     return pw_fail (error, PW_INPUT, "--data %s: time %g s is before the start of the run", fit->data_path, fit->t[0]);
   for (int i = 0; i < fit->columns * fit->rows; i++) {
@@ -116,18 +117,18 @@ static int data_check (pw_fit *fit, pw_error *error) {
 
 static int fit_read_data (pw_fit *fit, pw_error *error) {
   if (data_read_columns (fit, error) != PW_OK) return error->status;
-  fit_sigma *sigma = pw_arena_alloc (&fit->arena, (size_t)fit->columns * sizeof *sigma);
-  int status = sigma ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+  fit_sigma *given = pw_arena_alloc (&fit->arena, (size_t)fit->columns * sizeof *given);
+  int status = given ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
   for (const char **text = fit->sigma_texts; status == PW_OK && text && *text; text++)
-    status = data_read_sigma (fit, *text, sigma, error);
-  if (status == PW_OK) status = data_check_sigma (fit, sigma, error);
-  if (status == PW_OK) status = data_read (fit, sigma, error);
+    status = data_read_sigma (fit, *text, given, error);
+  if (status == PW_OK) status = data_check_sigma (fit, given, error);
+  if (status == PW_OK) status = data_read (fit, given, error);
   return status == PW_OK ? data_check (fit, error) : status;
 }
 
 /* ---- The command ---- */
 
-#define FIT_RUNS 50.       /* usual number of runs, to choose the engine */
+#define FIT_RUNS 50.       /* usual number of runs of a search, to choose the engine */
 #define FIT_ITERATIONS 20. /* usual number of iterations of a search, to show progress */
 
 enum { FIT_TABLE = 2, FIT_SUMMARY }; /* indices in the list of files of fit_open */
@@ -159,12 +160,8 @@ static int fit_open_data (pw_fit *fit, pw_error *error) {
   if (fit->residuals < fit->unknowns.count)
     return pw_fail (error, PW_INPUT, "--data %s has fewer data (%d) than there are unknowns (%d)", fit->data_path,
                     fit->residuals, fit->unknowns.count);
-  if (fit->starts > 1 && fit->unknowns.count > PW_UNKNOWNS_SOBOL_MOST)
-    return pw_fail (error, PW_INPUT, "at most %d unknowns with more than one start; give --starts 1",
-                    PW_UNKNOWNS_SOBOL_MOST);
   fit->unknowns.t_end = fit->unknowns.settings.span = fit->t[fit->rows - 1];
-  pw_unknowns_engine (&fit->unknowns, FIT_RUNS);
-  return PW_OK;
+  return pw_unknowns_engine (&fit->unknowns, FIT_RUNS, fit->starts, error);
 }
 
 static int fit_open (pw_fit *fit, pw_error *error) {
@@ -186,7 +183,7 @@ static void fit_interrupt (pw_fit *fit) {
   int n = fit->unknowns.count;
   for (int i = 0; i < n; i++) fit->standard_error[i] = NAN;
   for (int i = 0; i < n * n; i++) fit->covariance[i] = NAN;
-  fit->rank = n;
+  fit->rank = n; /* no combination of unknowns is reported as not determined */
   fit->interrupted = 1;
 }
 
@@ -241,10 +238,10 @@ static int fit_command (void *options, pw_error *error) {
 static const struct poptOption fit_options_table[] = {
   PW_OPTION_GROUP ("Fit"),
   PW_TEXT_OPTION (pw_fit, data_path, "data", 0, "FILE.csv",
-                  "Measured data: a table with the columns t and those of `run`, in any order; empty cells are gaps"),
+                  "Measured data: a table with t and columns named as those of `run`; empty cells are gaps"),
   PW_TEXT_OPTION (pw_fit, columns_text, "columns", 0, "NAME,...", "Columns of the data to compare with the model"),
   PW_LIST_OPTION (pw_fit, free, "free", 0, "NAME[=LOW:HIGH]",
-                  "Determine a parameter or an initial value, such as frame.vx, perhaps between bounds; repeatable"),
+                  "Determine a parameter or initial value, such as frame.vx, within bounds if given; repeatable"),
   PW_LIST_OPTION (pw_fit, sigma_texts, "sigma", 0, "COLUMN=VALUE",
                   "Standard deviation of a column, a number or the name of a column of the data; repeatable"),
   PW_TEXT_OPTION (pw_fit, confidence_text, "confidence", 0, "P", "Probability of confidence intervals (default 0.95)"),

@@ -162,10 +162,7 @@ static int optimise_open (pw_optimise *problem, pw_error *error) {
   if (status == PW_OK) status = optimise_open_outputs (problem, 1, problem->outputs - 1, "--subject-to", error);
   if (status == PW_OK) status = pw_unknowns_open (&problem->unknowns, &problem->line, &problem->model, error);
   if (status == PW_OK) status = pw_unknowns_read (&problem->unknowns, problem->free, error);
-  if (status == PW_OK) pw_unknowns_engine (&problem->unknowns, OPTIMISE_RUNS * problem->starts);
-  if (status == PW_OK && problem->starts > 1 && problem->unknowns.count > PW_UNKNOWNS_SOBOL_MOST)
-    status = pw_fail (error, PW_INPUT, "at most %d unknowns with more than one start; give --starts 1",
-                      PW_UNKNOWNS_SOBOL_MOST);
+  if (status == PW_OK) status = pw_unknowns_engine (&problem->unknowns, OPTIMISE_RUNS, problem->starts, error);
   if (status == PW_OK)
     status = pw_files_open (&problem->files, &problem->line, &problem->model, use, sizeof use / sizeof *use, error);
   return status == PW_OK ? optimise_open_searches (problem, error) : status;

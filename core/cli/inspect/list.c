@@ -8,7 +8,7 @@
 /* Characters of a line whose last column is wrapped; of a line of names; of the heading before the names. */
 enum { LIST_WIDTH = 110, LIST_NAMES = 100, LIST_HEADING = 14 };
 
-/* Of each type of field: its name, default, and value in an example. */
+/* Of each type of field: its name, default (a choice has its first alternative), and value in an example. */
 static const struct {
   const char *name, *zero, *example;
 } list_types[] = { [PW_NUMBER] = { "number", "0", "NUMBER" },      [PW_POINT] = { "point", "[0, 0]", "[X, Y]" },
@@ -22,7 +22,7 @@ static void list_row (pw_table *t, const char *name, const char *type, const cha
   pw_cell (t, -1, type);
   pw_cell (t, 0, value);
   if (pw_cell (t, 0, "")) pw_cli_print_wrapped (about, t->indent, LIST_WIDTH);
-  t->column = t->pad = 0;
+  t->column = t->pad = 0; /* in place of pw_row_end: the wrapped text ends with a newline */
 }
 
 /* "required" or the default; the domain of a number; the alternatives of a choice. */
@@ -32,7 +32,8 @@ static void list_default (const pw_field *f, char *text, size_t size) {
             f->required || f->type == PW_BODY ? "required" : list_types[f->type].zero, domain);
   for (int i = 0; f->type == PW_CHOICE && f->choices[i]; i++) {
     size_t used = strlen (text);
-    snprintf (text + used, size - used, "%s%s", i ? " | " : f->required ? ": " : "", f->choices[i]);
+    const char *mark = i || f->required ? "" : " (default)";
+    snprintf (text + used, size - used, "%s%s%s", i ? " | " : f->required ? ": " : "", f->choices[i], mark);
   }
 }
 
@@ -49,9 +50,9 @@ static void list_fields (pw_table *t, const pw_field *fields) {
 
 /* ---- Descriptions of methods and element types by name ---- */
 
-/* Describes the entries of these names, all of them for the name "all".  The first member of an entry is its name;
- * entries and names end with NULL.  `sort`: "element type". */
-static int list_named (const char *sort, const void *const *entries, void (*describe) (const void *entry),
+/* Describes the entry of each name, or all entries for the name "all".  The first member of an entry is its name;
+ * entries and names end with NULL.  `noun`: what an entry is, such as "element type". */
+static int list_named (const char *noun, const void *const *entries, void (*describe) (const void *entry),
                        const char **name, pw_error *error) {
   for (int shown = 0; *name; name++) {
     int all = strcmp (*name, "all") == 0, found = all;
@@ -64,7 +65,7 @@ static int list_named (const char *sort, const void *const *entries, void (*desc
       describe (*entry);
       found = 1;
     }
-    if (!found) return pw_fail (error, PW_INPUT, "there is no %s \"%s\"%s", sort, *name, pw_nearest_text (&near));
+    if (!found) return pw_fail (error, PW_INPUT, "there is no %s \"%s\"%s", noun, *name, pw_nearest_text (&near));
   }
   return PW_OK;
 }
@@ -168,7 +169,7 @@ static void list_kind (const void *entry) {
   puts ("    fields");
   for (pw_table t = { 0 }; pw_table_pass (&t);) list_fields (&t, k->fields);
   if (k->signals)
-    printf ("    a signal: a number, an expression of t%s, or see `pinwheel list signals`\n",
+    printf ("    a signal: a number, an expression of t%s, or a form of `pinwheel list signals`\n",
             pw_kind_signals_force (k) ? " and of states such as BODY.phi" : "");
   list_quantities ("reactions", k->reaction, k->rows);
   list_quantities ("internal coordinates, and their velocities", k->coordinate, k->internal);
@@ -197,13 +198,13 @@ static int list_kinds (const char **name, pw_error *error) {
 
 /* ---- Signals ---- */
 
-/* The fields of a form of signals; a table has further ones in a text model. */
+/* The fields of a form of signals, and those that the form `table` has in text models alone. */
 static void list_signal (pw_table *t, const pw_signal_form *s) {
   list_fields (t, s->fields);
   if (s->type != PW_TABLE) return;
-  list_row (t, "points", "list", "", "[[TIME, VALUE], ...]; in a text model, or");
-  list_row (t, "file", "text", "", "a CSV file in the model's folder, and");
-  list_row (t, "columns", "2 x text", "[1, 2]", "its columns of times and values, names or numbers");
+  list_row (t, "points", "list", "", "[[TIME, VALUE], ...]; only in a text model");
+  list_row (t, "file", "text", "", "CSV file in the model's folder, in place of `points`; only in a text model");
+  list_row (t, "columns", "2 x text", "[1, 2]", "names or numbers of the columns of times and values in this file");
 }
 
 static int list_signals (const char **name, pw_error *error) {
@@ -218,7 +219,7 @@ static int list_signals (const char **name, pw_error *error) {
 
 /* ---- Without arguments: the names, on one screen ---- */
 
-/* Prints a name; *column is the end of the line so far, without the newline before it, which printf counts. */
+/* Prints a name.  *column: length of the line so far; printf counts the newline before it, too, hence - 1. */
 static void list_name (int *column, const char *name) {
   if (*column + 1 + (int)strlen (name) > LIST_NAMES) *column = printf ("\n%*s", LIST_HEADING, "") - 1;
   *column += printf (" %s", name);

@@ -123,7 +123,7 @@ static void matrices_row (pw_table *t, const char *name, const char *unit, const
 
 static void matrices_coordinates (const pw_system *s, const pw_equations *equations, const pw_sample *sample) {
   static const char *const head[] = { "", "M", "f", "q", "v", "a", NULL };
-  puts ("\nM (diagonal), forces and state by coordinate; SI units");
+  puts ("\nM (diagonal), forces and state by coordinate [its unit]; all numbers in SI units");
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     pw_head (&t, -22, 13, head);
     for (int j = 0; j < equations->coordinates; j++) {
@@ -135,7 +135,7 @@ static void matrices_coordinates (const pw_system *s, const pw_equations *equati
 
 static void matrices_constraints (const pw_system *s, const pw_equations *equations, const pw_sample *sample) {
   static const char *const head[] = { "", "gamma", "eta", "g", "lambda", NULL };
-  puts ("\ngamma, eta, g and lambda by constraint equation, named after its reaction, which is -lambda");
+  puts ("\ngamma, eta, g and lambda by constraint equation, named after its reaction -lambda [its unit]");
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     pw_head (&t, -22, 13, head);
     for (int i = 0; i < equations->rows; i++) {
@@ -201,7 +201,7 @@ static int show_matrices (const pw_cli_model *m, double t, pw_error *error) {
 
 typedef struct {
   pw_cli_line line;
-  int matrices, yaml, code; /* 1: what is shown in place of the usual */
+  int matrices, yaml, code; /* 1: shown in place of the description of the model */
   const char *at;           /* time at which matrices are shown, as text */
 } show_line;
 

@@ -98,7 +98,7 @@ static int run_read_settings (pw_run_cli *command, pw_error *error) {
 static int run_choose_engine (pw_run_cli *command, pw_error *error) {
   pw_run_defaults defaults = pw_cli_defaults (pw_file_table (command->compiled.file));
   pw_specialise when;
-  int status = pw_cli_specialise (command->line.specialise, &when, error);
+  int status = pw_cli_read_specialise (command->line.specialise, &when, error);
   if (status == PW_OK) status = pw_checkpoints_open (command, &when, error);
   if (status != PW_OK) return status;
   /* the stages of --profile are those of the general engine */

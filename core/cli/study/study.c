@@ -1,11 +1,11 @@
-/* What compare and drift have in common: the option --methods, runs, the sequence of a command. */
+/* The common part of compare and drift: reads --methods, performs the runs, opens and finishes the output. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "study.h"
 
-/* Clocks are read after a batch of steps: its processor time [s] below which the next batch has more steps, and above
- * which it has fewer. */
+/* The thread's clock is read after a batch of calls of pw_run_advance_towards.  If the batch has taken less processor
+ * time than STUDY_SHORT, the next one is twice as long; if more than STUDY_LONG, half as long [s]. */
 #define STUDY_SHORT 0.005
 #define STUDY_LONG 0.02
 enum { STUDY_FIRST_BATCH = 8, STUDY_LONGEST_BATCH = 65536 }; /* calls of pw_run_advance_towards */
@@ -27,14 +27,14 @@ static int methods_add (pw_study *study, const char *name, pw_error *error) {
 
 /* Adds the methods of "all", "INTEGRATOR+all", "all+STABILISATION", or a method. */
 static int methods_add_pattern (pw_study *study, char *pattern, pw_error *error) {
-  char name[STUDY_NAME], *plus = pattern + strcspn (pattern, "+:");
+  char name[STUDY_NAME], *tail = pattern + strcspn (pattern, "+:");
   int any_integrator = strncmp (pattern, "all+", 4) == 0 || strcmp (pattern, "all") == 0;
-  const char *stabilisation = any_integrator && *plus && strcmp (plus, "+all") != 0 ? plus + 1 : NULL; /* NULL: all */
+  const char *stabilisation = any_integrator && *tail && strcmp (tail, "+all") != 0 ? tail + 1 : NULL; /* NULL: all */
   const pw_method *integrator = NULL;                                                                  /* NULL: all */
   pw_nearest near = { .sought = stabilisation };
   int index, status = PW_OK, found = 0;
-  if (!any_integrator && strcmp (plus, "+all") != 0) return methods_add (study, pattern, error);
-  *plus = 0;
+  if (!any_integrator && strcmp (tail, "+all") != 0) return methods_add (study, pattern, error);
+  *tail = 0;
   if (!any_integrator) status = pw_method_parse (pattern, &integrator, &index, error);
   for (int i = 0; pw_methods[i]; i++)
     for (const pw_stabilisation *s = pw_methods[i]->stabilisations; status == PW_OK && s->name; s++) {
@@ -95,8 +95,8 @@ void pw_study_progress (pw_study *study, pw_row *row, double part) {
 }
 
 /* Advances a run to the end. */
-static int study_steps (pw_study *study, pw_row *row, pw_run *run, const pw_limit *limit, pw_visitor *visitor,
-                        pw_error *error) {
+static int study_advance (pw_study *study, pw_row *row, pw_run *run, const pw_limit *limit, pw_visitor *visitor,
+                          pw_error *error) {
   int status = PW_OK;
   long batch = STUDY_FIRST_BATCH;
   while (status == PW_OK && pw_run_time (run) < study->t_end) {
@@ -131,7 +131,7 @@ int pw_study_run (pw_study *study, pw_row *row, const pw_settings *settings, pw_
   run_settings.specialised = pw_scene_code_table (study->engine.code);
   pw_run *run = pw_run_open (study->compiled.system, row->method, &run_settings, error);
   if (run == NULL) return error->status;
-  int status = study_steps (study, row, run, &limit, visitor, error);
+  int status = study_advance (study, row, run, &limit, visitor, error);
   row->t = pw_run_time (run);
   row->statistics = *pw_run_statistics (run);
   row->runs += status == PW_OK;
@@ -175,7 +175,7 @@ static int study_open_folder (pw_study *study, pw_error *error) {
 }
 
 /* Estimated number of steps of all runs. */
-static double study_steps_of_all (const pw_study *study) {
+static double study_estimated_steps (const pw_study *study) {
   pw_run_defaults defaults = pw_cli_defaults (pw_file_table (study->compiled.file));
   double steps = 0;
   for (const pw_row *row = study->row; row < study->row + study->rows; row++) {
@@ -194,10 +194,10 @@ static int study_open (pw_study *study, pw_error *error) {
   int status = pw_cli_open (&study->compiled, &study->line, error);
   if (status == PW_OK) status = pw_parallel_jobs (study->jobs_text, &study->jobs, error);
   if (status == PW_OK) status = study->type->plan (study, error);
-  if (status == PW_OK) status = pw_cli_specialise (study->line.specialise, &when, error);
+  if (status == PW_OK) status = pw_cli_read_specialise (study->line.specialise, &when, error);
   if (status != PW_OK) return status;
-  /* one engine for all runs, since their times are compared */
-  pw_cli_engine_open (&study->engine, study->compiled.system, when, study_steps_of_all (study));
+  /* one engine for all runs, since `compare` compares their processor times */
+  pw_cli_engine_open (&study->engine, study->compiled.system, when, study_estimated_steps (study));
   return study_open_folder (study, error);
 }
 
@@ -228,9 +228,8 @@ static int study_measure_method (void *context, int curve, pw_error *error) {
 /* Writes the measured rows after one that an interruption has stopped.  PW_RETRY, or the status of a failure. */
 static int study_write_kept (pw_study *study, pw_error *error) {
   for (const pw_row *row = study->row + study->written; row < study->row + study->rows; row++) {
-    if (!row->measured) continue;
-    if (pw_study_write_row (study, row, error) != PW_OK) return error->status;
-    study->written++;
+    if (row->measured && pw_study_write_row (study, row, error) != PW_OK) return error->status;
+    study->written += row->measured;
   }
   return PW_RETRY;
 }
@@ -240,7 +239,7 @@ static int study_perform (pw_study *study, pw_error *error) {
   int status = study->type->begin (study, error);
   if (status == PW_OK)
     printf ("all runs use %s%s\n\n",
-            study->engine.code ? "code specialised for this scene where the method can" : "the general engine: ",
+            study->engine.code ? "code specialised for this scene, if their method can use it" : "the general engine: ",
             study->engine.code ? "" : study->engine.reason);
   pw_study_begin_progress (study, pw_file_name (study->compiled.file), study->type->row_noun, study->rows);
   if (status == PW_OK)

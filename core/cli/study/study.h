@@ -110,6 +110,7 @@ struct pw_study {
   int quiet;      /* 1: rows are not printed */
   pw_row *row;
   int rows, written; /* all; those written to the table */
+  int headed;        /* 1 + the group of the heading printed last; 0: none */
   pthread_mutex_t mutex;
   pw_progress progress;
   double progress_sum;                     /* of all rows */

@@ -48,14 +48,15 @@ static int table_width (const pw_study *study) {
   return (int)width;
 }
 
-static void table_heading (const pw_study *study, int group) {
+static void table_heading (pw_study *study, int group) {
   const pw_study_column *column = study->type->column;
   int width = table_width (study);
-  printf ("%s%-*s%s\n%-*s", group ? "\n" : "", width, study->type->group[group], study->type->heading_above, width,
-          "method");
+  printf ("%s%-*s%s\n%-*s", study->headed ? "\n" : "", width, study->type->group[group], study->type->heading_above,
+          width, "method");
   for (int i = 0; i < study->type->columns; i++)
     if (column[i].head) printf ("%*s", column[i].width, column[i].head);
   putchar ('\n');
+  study->headed = group + 1;
 }
 
 /* Prints a value, "-" if it is unknown, "<1e-9" if it is an upper bound. */
@@ -89,7 +90,7 @@ static void table_print (const pw_study *study, const pw_row *row) {
 }
 
 int pw_study_write_row (pw_study *study, const pw_row *row, pw_error *error) {
-  if (!study->quiet && (row == study->row || row->group != row[-1].group)) table_heading (study, row->group);
+  if (!study->quiet && study->headed != row->group + 1) table_heading (study, row->group);
   if (!study->quiet) table_print (study, row);
   return study->csv ? table_write_csv (study, row, error) : PW_OK;
 }

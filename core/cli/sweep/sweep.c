@@ -76,7 +76,7 @@ static int sweep_read_settings (pw_sweep *sweep, pw_error *error) {
   plan->method = sweep->line.method ? sweep->line.method : defaults.method;
   int status = pw_cli_settings (&sweep->line, &defaults, &plan->t_end, &plan->settings, &plan->limit, error);
   if (status == PW_OK) pw_cli_report_unused (plan->method, &sweep->line);
-  if (status == PW_OK) status = pw_cli_specialise (sweep->line.specialise, &plan->specialise, error);
+  if (status == PW_OK) status = pw_cli_read_specialise (sweep->line.specialise, &plan->specialise, error);
   if (status == PW_OK) status = sweep_read_lanes (sweep, error);
   if (status == PW_OK) status = pw_parallel_jobs (sweep->jobs_text, &sweep->jobs, error);
   return status == PW_OK ? sweep_read_part (sweep, error) : status;

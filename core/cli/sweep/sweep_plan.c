@@ -1,5 +1,4 @@
-/* Makes the plan of a sweep: matches the varied quantities to the model, and finds the columns of the table and the
- * fingerprint. */
+/* Makes the plan of a sweep: finds the parameters that are varied, the columns of the table and the fingerprint. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,7 +9,7 @@ enum { PLAN_TRIES = 1000 }; /* failures to build a model after which no other va
 
 /* ---- Models ---- */
 
-/* Builds the model of a row, with --set and --start. */
+/* Builds the model of a row: --set, varied parameters, --start.  Varied initial values are set when its run begins. */
 static int plan_build (const pw_plan *plan, long row, pw_model *model, pw_error *error) {
   int status = pw_cli_apply (model, "--set", plan->line->sets, pw_model_set, error);
   for (int i = 0; i < plan->grid.axes && status == PW_OK; i++)
@@ -41,7 +40,7 @@ static int plan_has_name (const char **list, const char *name) {
 }
 
 /* Finds the parameter of an axis, in whose domain all values must lie.  Other names with a dot are those of states,
- * which exist only in a compiled model.  pw_model_set reports wrong names and values. */
+ * which exist only in a compiled model. */
 static int plan_match_axis (const pw_plan *plan, pw_axis *axis, pw_model *model, pw_error *error) {
   const pw_parameter *parameter = axis->parameter = pw_cli_parameter (model, axis->name);
   if (parameter) axis->unit = parameter->unit;
@@ -50,7 +49,7 @@ static int plan_match_axis (const pw_plan *plan, pw_axis *axis, pw_model *model,
   if (parameter == NULL && strchr (axis->name, '.')) return PW_OK;
   for (long i = 0; i < axis->count; i++)
     if (parameter == NULL || *pw_domain_check (parameter->domain, pw_axis_value (axis, i)))
-      return pw_model_set (model, axis->name, pw_axis_value (axis, i), error);
+      return pw_model_set (model, axis->name, pw_axis_value (axis, i), error); /* fails with the reason */
   return PW_OK;
 }
 
@@ -96,12 +95,13 @@ static int plan_add_columns (pw_plan *plan, const pw_system *system, pw_error *e
 /* Models built to find the columns. */
 typedef struct {
   int built;            /* 1: at least one */
-  int failed;           /* number of those that could not be built */
-  pw_error first_error; /* why the first of them could not */
+  int complete;         /* 1: at least one has all states that are varied */
+  int failed;           /* number of the others */
+  pw_error first_error; /* why the first of these failed */
 } plan_scan;
 
-/* Chooses the code that evaluates the equations, of one run and of several at once.  The choice depends on the whole
- * sweep, not on the part: results of different codes differ by round-off. */
+/* Chooses what evaluates the equations, of one run and of several at once: the same in all parts of a sweep, since
+ * results of different codes differ by round-off. */
 static void plan_open_engines (pw_plan *plan, const pw_system *system) {
   pw_run_defaults defaults = pw_cli_defaults (pw_file_table (plan->file));
   double steps = (double)plan->grid.rows * pw_method_steps (plan->method, &plan->settings, defaults.step, plan->t_end);
@@ -120,10 +120,11 @@ static int plan_scan_row (pw_plan *plan, long row, plan_scan *scan, pw_error *er
   int status = pw_plan_compile (plan, row, &compiled, &row_error);
   if (status == PW_OK) plan->tables_sum = pw_fingerprint_tables (plan->tables_sum, compiled.model);
   if (status == PW_OK) status = plan_add_columns (plan, compiled.system, &row_error);
-  if (status == PW_OK && !scan->built) plan_open_engines (plan, compiled.system);
+  if (status == PW_OK && !scan->complete) plan_open_engines (plan, compiled.system);
+  scan->built |= compiled.system != NULL;
   pw_cli_close_model (&compiled);
   if (status == PW_RESOURCE) return pw_fail (error, status, "%s", row_error.text);
-  scan->built |= status == PW_OK;
+  scan->complete |= status == PW_OK;
   if (status != PW_OK && scan->failed++ == 0) scan->first_error = row_error;
   return PW_OK;
 }
@@ -133,15 +134,15 @@ static int plan_scan_row (pw_plan *plan, long row, plan_scan *scan, pw_error *er
  * way until a model can be built; without integers the last row is not tried. */
 static int plan_find_columns (pw_plan *plan, pw_error *error) {
   plan_scan scan = { .built = 0 };
-  int any_count = 0, status = plan_scan_row (plan, 0, &scan, error);
+  int any_integer = 0, status = plan_scan_row (plan, 0, &scan, error);
   for (const pw_axis *axis = plan->grid.axis; axis < plan->grid.axis + plan->grid.axes; axis++) {
-    int is_count = axis->parameter && axis->parameter->domain == PW_COUNT;
-    any_count += is_count;
-    for (long i = 1; i < axis->count && status == PW_OK && (is_count || !scan.built) && scan.failed < PLAN_TRIES; i++)
+    int integer = axis->parameter && axis->parameter->domain == PW_COUNT;
+    any_integer |= integer;
+    for (long i = 1; i < axis->count && (integer || !scan.built) && scan.failed < PLAN_TRIES && status == PW_OK; i++)
       status = plan_scan_row (plan, i * axis->stride, &scan, error);
   }
-  if (status == PW_OK && any_count) status = plan_scan_row (plan, plan->grid.rows - 1, &scan, error);
-  if (status != PW_OK || scan.built) return status;
+  if (status == PW_OK && any_integer) status = plan_scan_row (plan, plan->grid.rows - 1, &scan, error);
+  if (status != PW_OK || scan.complete) return status;
   return pw_fail (error, scan.first_error.status, "%s", scan.first_error.text);
 }
 
@@ -195,7 +196,7 @@ static void plan_fingerprint_parameters (pw_plan *plan, const pw_model *model) {
 static void plan_fingerprint_grid (pw_plan *plan) {
   pw_text *text = &plan->fingerprint;
   pw_fingerprint_initial (text, plan->line->starts);
-  pw_text order = { .chars = NULL };
+  pw_text order = { .chars = NULL }; /* of the axes, which determines the order of the rows */
   for (int i = 0; i < plan->grid.axes; i++) {
     pw_fingerprint_line (text, "vary", plan->grid.axis[i].name, plan->grid.axis[i].range);
     pw_text_cell (&order, plan->grid.axis[i].name);

@@ -115,7 +115,7 @@ static int system_open (row_system *system, const pw_plan *plan, long row, pw_er
     int column = pw_names_find (&plan->column_of, pw_system_state_name (system->model.system, i, name, sizeof name));
     if (column < 0)
       return pw_fail (error, PW_INPUT,
-                      "%s has no column: the number of bodies may only depend on parameters that are counts", name);
+                      "%s has no column: not in the first or last row, nor in the first with one count changed", name);
     system->state[column] = i;
   }
   return PW_OK;

@@ -5,8 +5,8 @@
  *   f' = f_x x' + f_y y',   f'' = f_xx x'^2 + 2 f_xy x' y' + f_yy y'^2 + f_x x'' + f_y y''
  *
  * where f_x is the partial derivative with respect to operand x, and the prime the derivative with respect to the
- * chosen variable (Griewank & Walther 2008, Evaluating Derivatives, chapter 13).  They decide comparisons of equal
- * numbers, so that an expression has the value just after a jump, that is for a slightly larger variable. */
+ * chosen variable (Griewank & Walther 2008, Evaluating Derivatives, chapter 13).  The derivatives decide comparisons
+ * of equal numbers, so that an expression has the value just after a jump, that is for a slightly larger variable. */
 #include <math.h>
 #include "expression_parts.h"
 #include "pinwheel.h"
@@ -78,7 +78,7 @@ double pw_expression_apply (const pw_expression_code *c, double left, double rig
   return value_of (c, left, right, &(int){ 0 });
 }
 
-/* `last` is the last value; the stack has those before it. */
+/* `last` is the top of the stack; the values below it are in stack[1], stack[2], ...; stack[0] is unused. */
 double pw_expression_run (const pw_expression_code *code, int codes, const double *variable, int *may_jump) {
   double stack[PW_EXPRESSION_STACK + 1], *top = stack, last = 0;
   for (const pw_expression_code *c = code, *end = code + codes; c < end; c++)
@@ -99,7 +99,7 @@ double pw_expression_run (const pw_expression_code *code, int codes, const doubl
 
 typedef struct {
   double v, d, dd; /* value, first and second derivative with respect to the variable */
-  int varies;      /* 1: depends on the variable */
+  int varies;      /* 1: depends on the variable; 0: constant, or constant but for jumps, as floor (t) */
 } jet;
 
 /* The chain rule; f: the value.  Constant operands contribute 0, even where a partial derivative is infinite. */
@@ -127,10 +127,10 @@ static pw_order jet_order (const jet *x, const jet *y) {
 
 /* floor, ceil, round of x just after; `direction`: sign of the change of x. */
 static double jet_step (int op, double x, int direction) {
-  double low = floor (x);
-  if (op == PW_OP_FLOOR) return x == low && direction < 0 ? low - 1 : low;
-  if (op == PW_OP_CEIL) return x == low ? low + (direction > 0) : ceil (x);
-  return x - low == 0.5 && direction != 0 ? low + (direction > 0) : round (x);
+  int may_jump = 0;
+  double y = value_step (op, x, &may_jump);
+  if (!may_jump || direction == 0) return y;
+  return op == PW_OP_FLOOR ? y - (direction < 0) : (op == PW_OP_CEIL ? y : floor (x)) + (direction > 0);
 }
 
 /* abs, sign, floor, ceil, round. */
@@ -190,12 +190,12 @@ static jet jet_function (const pw_expression_code *c, const jet *x, const jet *y
   return jet_chain (value, &s, x, y);
 }
 
-/* Jumps where y, the first argument, changes sign at x <= 0, and where x does while y is 0.  At the origin p =
- * (x, y) = 0 the angle just after is that of p' or, if this is 0, of p''; its derivatives are unknown: NaN. */
+/* Jumps where y, the first argument, changes sign while x <= 0, and where x changes sign while y is 0.  At the origin
+ * p = (x, y) = 0 the angle just after is that of p' or, if this is 0, of p''; its derivatives are unknown: NaN. */
 static jet jet_atan2 (const pw_expression_code *c, const jet *y, const jet *x, double *discrete) {
   jet r = jet_function (c, y, x);
   int sign = jet_sign (y);
-  *discrete = x->v <= 0 ? (sign < 0) + 2 * (sign == 0) : 0;
+  *discrete = x->v <= 0 && sign <= 0 ? sign - 1 : 0; /* 0: x > 0 or y > 0, without a jump between them */
   double b = y->v, a = x->v;
   if (b == 0 && a == 0) b = y->d, a = x->d;
   if (b == 0 && a == 0) b = y->dd, a = x->dd;
@@ -242,8 +242,8 @@ static jet jet_binary (const pw_expression_code *c, const jet *x, const jet *y, 
   pw_order order = jet_order (x, y);
   *discrete = order;
   if (c->op == PW_OP_MIN || c->op == PW_OP_MAX) {
-    pw_order of_result = c->op == PW_OP_MIN ? PW_ORDER_LESS : PW_ORDER_GREATER;
-    int first = order == PW_ORDER_UNORDERED ? !isnan (x->v) : order == of_result;
+    pw_order order_of_first = c->op == PW_OP_MIN ? PW_ORDER_LESS : PW_ORDER_GREATER;
+    int first = order == PW_ORDER_UNORDERED ? !isnan (x->v) : order == order_of_first;
     return first ? *x : *y;
   }
   *discrete = pw_expression_compare (c->op, order);
@@ -255,7 +255,7 @@ void pw_expression_run_jet (const pw_expression *expression, const double *varia
   jet stack[PW_EXPRESSION_STACK], *top = stack;
   for (const pw_expression_code *c = expression->code, *end = c + expression->codes; c < end; c++) {
     int operands = pw_expression_operands (c->op);
-    double branch = 0; /* see `discrete` in expression_parts.h */
+    double side = 0; /* see `discrete` in expression_parts.h */
     top -= operands;
     if (operands == 0)
       *top = c->op == PW_OP_CONSTANT ? (jet){ .v = c->value }
@@ -265,8 +265,8 @@ void pw_expression_run_jet (const pw_expression *expression, const double *varia
     else if (!top[0].varies && !top[operands - 1].varies)
       *top = (jet){ .v = pw_expression_apply (c, top[0].v, top[operands - 1].v) };
     else
-      *top = operands == 1 ? jet_unary (c, top, &branch) : jet_binary (c, top, top + 1, &branch);
-    if (discrete) discrete[c - expression->code] = branch;
+      *top = operands == 1 ? jet_unary (c, top, &side) : jet_binary (c, top, top + 1, &side);
+    if (discrete) discrete[c - expression->code] = side;
     top++;
   }
   u[0] = top[-1].v, u[1] = top[-1].d, u[2] = top[-1].dd;
