@@ -217,11 +217,10 @@ static int change_report (pw_run *r, const change_walk *walk, change_verdict ver
   pw_watchdog *watch = &r->watchdog;
   double low = r->thresholds.unresolved * fmin (watch->previous_sine, sine);
   watch->may_have_crossed |= verdict == CHANGE_UNKNOWN || walk->least_sine <= r->thresholds.crossing;
-  const char *finding = verdict == CHANGE_OTHER_BRANCH ? "the motion has left its branch" : NULL;
+  const char *found = verdict == CHANGE_OTHER_BRANCH ? "the motion has left its branch" : NULL;
   if (verdict == CHANGE_SAME_BRANCH && !watch->may_have_crossed && walk->least_sine < low)
-    finding = "the step does not resolve it";
-  return finding ? change_fail (r, walk->least_row, walk->least_sine / walk->sine_slope, finding, length, error)
-                 : PW_OK;
+    found = "the step does not resolve it";
+  return found ? change_fail (r, walk->least_row, walk->least_sine / walk->sine_slope, found, length, error) : PW_OK;
 }
 
 int pw_change_point_check (pw_run *r, double sine, pw_error *error) {

@@ -88,7 +88,6 @@ static void linearise_print_component (pw_table *t, const pw_linear *l, int mode
 static void linearise_print_mode (const pw_linearise_command *cmd, int mode) {
   const pw_system *s = cmd->m.system;
   int bodies = pw_system_bodies (s), internal = pw_system_coordinates (s) - 3 * bodies;
-  char name[PW_NAME_BYTES];
   printf ("\nMode %d\n", mode + 1);
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     static const char *const head[] = { "", "x [m]", "y [m]", "phi [rad]", NULL };
@@ -99,7 +98,7 @@ static void linearise_print_mode (const pw_linearise_command *cmd, int mode) {
       pw_row_end (&t);
     }
     for (int j = 3 * bodies; j < 3 * bodies + internal && j < 3 * bodies + LINEARISE_ROWS; j++) {
-      pw_cell_unit (&t, -12, pw_system_state_name (s, j, name, sizeof name), pw_system_state_unit (s, j));
+      pw_cell_unit (&t, -12, PW_NAME (pw_system_state_name, s, j), pw_system_state_unit (s, j));
       linearise_print_component (&t, &cmd->linear, mode, j);
       pw_row_end (&t);
     }
@@ -174,7 +173,6 @@ static void linearise_block_json (const pw_linearise_command *cmd, pw_json *j, c
 
 static void linearise_mode_json (const pw_linearise_command *cmd, pw_json *j, int i) {
   const pw_linear *l = &cmd->linear;
-  char name[PW_NAME_BYTES];
   j->line = 1;
   pw_json_open (j, NULL, '{');
   pw_json_number (j, "re", l->re[i]);
@@ -186,7 +184,7 @@ static void linearise_mode_json (const pw_linearise_command *cmd, pw_json *j, in
   pw_json_flag (j, "rigid", l->rigid[i]);
   pw_json_open (j, "shape", '{');
   for (int k = 0; linearise_has_shape (l, i) && k < 2 * l->coordinates; k++)
-    pw_json_numbers (j, pw_system_state_name (cmd->m.system, k, name, sizeof name), linearise_shape (l, i, k), 2);
+    pw_json_numbers (j, PW_NAME (pw_system_state_name, cmd->m.system, k), linearise_shape (l, i, k), 2);
   pw_json_close (j, '}');
   pw_json_close (j, '}');
 }
@@ -195,12 +193,11 @@ static void linearise_mode_json (const pw_linearise_command *cmd, pw_json *j, in
 static void linearise_names_json (const pw_linearise_command *cmd, pw_json *j, const char *key, const int *list,
                                   int count, char *(*name_of) (const pw_system *s, int i, char *buffer, size_t size),
                                   const char *(*unit_of) (const pw_system *s, int i)) {
-  char name[PW_NAME_BYTES];
   j->line = 1;
   pw_json_open (j, key, '[');
   for (int i = 0; i < count; i++) {
     pw_json_open (j, NULL, '{');
-    pw_json_text (j, "name", name_of (cmd->m.system, list[i], name, sizeof name));
+    pw_json_text (j, "name", PW_NAME (name_of, cmd->m.system, list[i]));
     pw_json_text (j, "unit", unit_of (cmd->m.system, list[i]));
     pw_json_close (j, '}');
   }

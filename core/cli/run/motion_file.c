@@ -4,7 +4,6 @@
 #include <math.h>
 #include <string.h>
 #include "motion.h"
-#include "util.h"
 
 #define FILE_SAME 1e-9 /* relative to the final time: smaller differences of times are ignored */
 
@@ -115,7 +114,7 @@ static int file_find_column (file_reader *reader, int i, const pw_system *system
 }
 
 static int file_read_columns (file_reader *reader, const pw_system *system, pw_error *error) {
-  char example[PW_NAME_BYTES], text[260];
+  char text[260];
   int status = file_next_line (reader, error);
   if (status == PW_RETRY) return pw_fail (error, PW_INPUT, "--reference %s: the file is empty", reader->path);
   if (status != PW_OK) return status;
@@ -134,7 +133,7 @@ static int file_read_columns (file_reader *reader, const pw_system *system, pw_e
     if (file_find_column (reader, i, system, file_cell (&rest), error) != PW_OK) return error->status;
   if (reader->states) return PW_OK;
   return pw_fail (error, PW_INPUT, "--reference %s: no column is a state of this model, such as \"%s\"", reader->path,
-                  pw_system_state_name (system, 0, example, sizeof example));
+                  PW_NAME (pw_system_state_name, system, 0));
 }
 
 /* ---- Rows ---- */
@@ -152,7 +151,7 @@ static int file_read_time (file_reader *reader, char **rest, double *t, pw_error
 /* Counts the rows after 0 and up to *t_end, which becomes the time of the last row if it is 0. */
 static int file_count_rows (file_reader *reader, double *t_end, int *rows, pw_error *error) {
   double t, last = 0, before = -INFINITY;
-  char *rest, end[32];
+  char *rest;
   int status;
   for (*rows = 0; (status = file_read_time (reader, &rest, &t, error)) == PW_OK;) {
     if (!(t > before) || isinf (t))
@@ -167,7 +166,7 @@ static int file_count_rows (file_reader *reader, double *t_end, int *rows, pw_er
   if (*t_end == 0) *t_end = last;
   if (*rows > 0) return PW_OK;
   return pw_fail (error, PW_INPUT, "--reference %s: no row between 0 and the final time, t = %s s", reader->path,
-                  pw_format (end, *t_end, 9));
+                  PW_DIGITS (*t_end, 9));
 }
 
 /* Reads the cells after the time into a sample of `width` numbers; NaN, unknown, where there is no column

@@ -113,9 +113,8 @@ static int compare_read_ladder (const char *option, const char *text, compare_la
 
 /* Level i of a ladder, or 0 after its end; steps are halved, tolerances divided by ten and rounded to 12 digits. */
 static double compare_level (compare_ladder ladder, int adaptive, int i) {
-  char text[32];
   double level = ldexp (ladder.from, -i);
-  if (adaptive) pw_read_number (pw_format (text, ladder.from / pow (10, i), 12), &level);
+  if (adaptive) pw_read_number (PW_DIGITS (ladder.from / pow (10, i), 12), &level);
   return level >= ladder.to * (1 - 1e-9) ? level : 0;
 }
 
@@ -246,9 +245,9 @@ static int compare_measure_errors (pw_compare *compare, pw_row *row, pw_error *e
 static int compare_measure (pw_study *study, pw_row *row, pw_error *error) {
   pw_compare *compare = (pw_compare *)study;
   pw_error run_error = { 0 };
-  char limit[32], text[60] = "";
+  char text[60] = "";
   double predicted = compare_predicted_time (row);
-  pw_format (limit, study->cpu_limit, 4);
+  const char *limit = PW_DIGITS (study->cpu_limit, 4);
   if (predicted > study->cpu_limit) {
     row->state = ROW_SKIPPED;
     if (isfinite (predicted)) snprintf (text, sizeof text, ", about %.2g s", predicted);
@@ -307,9 +306,8 @@ static int compare_figures (pw_study *study, pw_error *error) {
                                     "lengths [m] and angles [rad]",
                                     POINT_COORDINATES, error);
   for (int unit = 0; status == PW_OK && unit < 2; unit++) {
-    char variables[100];
-    snprintf (variables, sizeof variables, "uncertainty = %.9g\nsize_of_motion = %.9g\n",
-              reference->uncertainty[MOTION_LARGEST + unit], reference->size[unit]);
+    const char *variables = PW_PRINTED (100, "uncertainty = %.9g\nsize_of_motion = %.9g\n",
+                                        reference->uncertainty[MOTION_LARGEST + unit], reference->size[unit]);
     if (pw_study_positive (study, COMPARE_GROUP, POINT_LENGTH + unit))
       status = pw_study_write_script (study, COMPARE_GROUP, name[unit], "work-precision", variables, error);
   }
