@@ -56,9 +56,8 @@ static int command_keep (const pw_command *command, pw_cli_line *line, int i, pw
 
 static void command_option_help (const struct poptOption *o) {
   enum { COLUMN = 28 };
-  char letter[8] = "   ";
+  const char *letter = o->shortName ? PW_PRINTED (8, "-%c,", o->shortName) : "   ";
   int is_list = (o->argInfo & POPT_ARG_MASK) == POPT_ARG_ARGV;
-  if (o->shortName) snprintf (letter, sizeof letter, "-%c,", o->shortName);
   const char *left = PW_PRINTED (80, "  %s --%s%s%s", letter, o->longName, o->argDescrip ? is_list ? " " : "=" : "",
                                  o->argDescrip ? o->argDescrip : "");
   if (strlen (left) > COLUMN - 2)

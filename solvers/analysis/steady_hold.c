@@ -13,9 +13,8 @@ static const struct {
 
 static int hold_unknown (const pw_system *s, const char *name, pw_error *error) {
   pw_nearest near = { .sought = name };
-  char known[300];
   for (int i = 0; i < 2 * s->coords + PW_HOLD_OF_BODY * s->bodies; i++)
-    pw_nearest_try (&near, pw_system_held_name (s, i, known, sizeof known));
+    pw_nearest_try (&near, PW_NAME (pw_system_held_name, s, i));
   return pw_fail (error, PW_INPUT, "model %s has no state \"%s\"%s", s->model, name, pw_nearest_text (&near));
 }
 

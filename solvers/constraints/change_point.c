@@ -192,8 +192,7 @@ static int change_may_be_low (pw_run *r, double previous_sine, double sine, doub
 /* row: the most nearly dependent one, or -1; apart: distance of the branches, estimated as the sine over its change per
  * unit of motion; length: of the step. */
 static int change_fail (pw_run *r, int row, double apart, const char *finding, double length, pw_error *error) {
-  char element[PW_NAME_BYTES] = "the constraints";
-  if (row >= 0) pw_system_row_name (r->s, row, element, sizeof element);
+  const char *element = row >= 0 ? PW_NAME (pw_system_row_name, r->s, row) : "the constraints";
   return pw_fail (error, PW_METHOD,
                   "t = %.6g s: change point at %s: %s; branches come within %.2g of each other, the step is "
                   "%.2g long (scaled); use a smaller %s",

@@ -124,8 +124,7 @@ static const char *redundancy_direction (const char *one, const char *two) {
 
 /* Describes two rows that are multiples of each other: "wheels left and right: the same lateral constraint". */
 static void redundancy_describe_pair (const pw_system *s, int one, int two, char *buffer, size_t size) {
-  const char *a = PW_NAME (pw_system_row_name, s, one);
-  const char *b = PW_NAME (pw_system_row_name, s, two);
+  const char *a = PW_NAME (pw_system_row_name, s, one), *b = PW_NAME (pw_system_row_name, s, two);
   const char *reaction_a = PW_NAME (pw_system_reaction_name, s, one);
   const char *reaction_b = PW_NAME (pw_system_reaction_name, s, two);
   const char *direction = redundancy_direction (reaction_a, reaction_b);

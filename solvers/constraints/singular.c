@@ -65,7 +65,6 @@ int pw_watchdog_near (pw_run *r) {
 }
 
 int pw_fail_singular (pw_run *r, double t, pw_error *error) {
-  char name[PW_NAME_BYTES] = "a constraint";
   int row = -1;
   double sine = pw_watchdog_sine (r, &row);
   /* largest_sine is 0 while the run is being opened */
@@ -75,7 +74,7 @@ int pw_fail_singular (pw_run *r, double t, pw_error *error) {
         "t = %.6g s: values too extreme: masses and inertias differ by so much that the equations of motion "
         "cannot be solved; the configuration is not singular",
         t);
-  if (row >= 0) pw_system_row_name (r->s, row, name, sizeof name);
+  const char *name = row >= 0 ? PW_NAME (pw_system_row_name, r->s, row) : "a constraint";
   if (sine <= r->thresholds.rank_lost)
     return pw_fail (error, PW_METHOD, "t = %.6g s: singular configuration: %s depends on other constraints", t, name);
   return pw_fail (

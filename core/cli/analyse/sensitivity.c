@@ -164,10 +164,9 @@ static int sensitivity_csv (const void *context, FILE *f, pw_error *error) {
   for (int o = 0; o < sens->outcomes.outcomes; o++) {
     if (!pw_sensitivity_in_table (sens, o)) continue;
     sensitivity_cell (&t, sens->of[o], pw_outcome_unit (&sens->outcomes, o, unit, sizeof unit));
-    for (int p = 0; p < sens->unknowns.count; p++) {
-      const char *name = PW_PRINTED (SENSITIVITY_NAME, "d(%s)/d(%s)", sens->of[o], sens->unknowns.list[p].name);
-      sensitivity_cell (&t, name, sensitivity_unit (sens, o, p, unit));
-    }
+    for (int p = 0; p < sens->unknowns.count; p++)
+      sensitivity_cell (&t, PW_PRINTED (SENSITIVITY_NAME, "d(%s)/d(%s)", sens->of[o], sens->unknowns.list[p].name),
+                        sensitivity_unit (sens, o, p, unit));
   }
   int status = pw_text_line (&t, f, cmd->folder, error);
   for (int i = 0; i < sens->rows && status == PW_OK; i++) {

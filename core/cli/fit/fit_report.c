@@ -57,9 +57,8 @@ static double report_rms (const pw_fit *fit, int column, int *count) {
 /* ---- Text ---- */
 
 static void report_unknowns (const pw_fit *fit) {
-  char from[80];
+  const char *from = PW_PRINTED (80, "%g %% confidence:  from", 100 * fit->confidence);
   const char *const head[] = { "free", "initially", "estimate", "standard error", from, "to", NULL };
-  snprintf (from, sizeof from, "%g %% confidence:  from", 100 * fit->confidence);
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     pw_head (&t, -12, 12, head);
     for (int i = 0; i < fit->unknowns.count; i++) {

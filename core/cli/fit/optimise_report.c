@@ -88,17 +88,13 @@ static void report_outputs (const pw_optimise *problem) {
   putchar ('\n');
   for (pw_table t = { 0 }; pw_table_pass (&t);)
     for (int i = 0; i < problem->outputs; i++) {
-      char text[120];
-      snprintf (text, sizeof text,
-                i == 0                 ? (problem->maximise ? "largest" : "smallest")
-                : problem->sign[i] > 0 ? "at most %s"
-                                       : "at least %s",
-                PW_DIGITS (problem->bound[i], REPORT_DIGITS));
+      const char *bound = PW_DIGITS (problem->bound[i], REPORT_DIGITS);
       pw_cell_unit (&t, -12, problem->output[i], problem->unit[i]);
       pw_cell_number (&t, 12, output[i], REPORT_DIGITS);
-      pw_cell (&t, -1, text);
-      if (i == 0) snprintf (text, sizeof text, "(initially %s)", PW_DIGITS (report_initial (problem), REPORT_DIGITS));
-      if (i == 0) pw_cell (&t, -1, text);
+      if (i > 0) pw_cell (&t, -1, PW_PRINTED (60, "at %s %s", problem->sign[i] > 0 ? "most" : "least", bound));
+      if (i == 0) pw_cell (&t, -1, problem->maximise ? "largest" : "smallest");
+      if (i == 0)
+        pw_cell (&t, -1, PW_PRINTED (60, "(initially %s)", PW_DIGITS (report_initial (problem), REPORT_DIGITS)));
       pw_row_end (&t);
     }
 }

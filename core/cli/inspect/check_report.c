@@ -236,8 +236,7 @@ static void report_eigenvalues (const pw_linear *linear) {
     }
     same = report_equal (linear, i);
     int multiplicity = linear->im[i] != 0 ? same / 2 : same;
-    char times[30] = "";
-    if (multiplicity > 1) snprintf (times, sizeof times, ", %d times", multiplicity);
+    const char *times = multiplicity > 1 ? PW_PRINTED (30, ", %d times", multiplicity) : "";
     report_text (NULL, i == 0 ? "eigenvalues, rightmost first" : "", "%s%s%s", report_eigenvalue (linear, i, text),
                  times, linear->rigid[i] ? ": rigid displacement" : "");
   }
@@ -313,12 +312,8 @@ static void report_linear (pw_json *j, const pw_check *check) {
   report_stability (j, check);
   report_fastest (j, check);
   report_section (j, "eigenvalues", '[', NULL);
-  for (int i = 0; i < linear->unknowns; i++) {
-    pw_json_open (j, NULL, '[');
-    pw_json_number (j, NULL, linear->re[i]);
-    pw_json_number (j, NULL, linear->im[i]);
-    pw_json_close (j, ']');
-  }
+  for (int i = 0; i < linear->unknowns; i++)
+    pw_json_numbers (j, NULL, (const double[]){ linear->re[i], linear->im[i] }, 2);
   pw_json_close (j, ']');
   pw_json_close (j, '}');
 }

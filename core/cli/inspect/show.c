@@ -49,14 +49,12 @@ static void show_parameters (const pw_model *m) {
   for (pw_table t = { 0 }; pw_table_pass (&t);)
     for (const pw_parameter *p = parameters; p->name; p++) {
       double value = pw_model_parameter (m, p);
-      char original[60] = "";
       pw_cell (&t, -1, p->name);
       pw_cell_number (&t, 1, value, SHOW_DIGITS);
       pw_cell (&t, -1, p->unit ? p->unit : "");
       pw_cell (&t, -1, pw_domain_text (p->domain));
       pw_cell (&t, -1, p->about ? p->about : "");
-      if (value != p->value) snprintf (original, sizeof original, "default %s", PW_DIGITS (p->value, SHOW_DIGITS));
-      if (*original) pw_cell (&t, -1, original);
+      if (value != p->value) pw_cell (&t, -1, PW_PRINTED (60, "default %s", PW_DIGITS (p->value, SHOW_DIGITS)));
       pw_row_end (&t);
     }
 }

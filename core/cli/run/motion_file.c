@@ -78,14 +78,11 @@ static int file_number (const file_reader *reader, const char *cell, double *val
 
 /* Lists the names of states and reactions in the order of a sample. */
 static int file_list_names (file_reader *reader, const pw_system *system) {
-  char name[PW_NAME_BYTES];
   int states = 2 * pw_system_coordinates (system), rows = pw_system_rows (system);
   if (pw_names_open (&reader->indices, (size_t)(states + rows)) != PW_OK) return PW_RESOURCE;
   for (int i = 0; i < states + rows; i++) {
-    if (i < states)
-      pw_system_state_name (system, i, name, sizeof name);
-    else
-      pw_system_reaction_name (system, i - states, name, sizeof name);
+    const char *name =
+        i < states ? PW_NAME (pw_system_state_name, system, i) : PW_NAME (pw_system_reaction_name, system, i - states);
     const char *copy = pw_arena_copy (&reader->arena, name);
     if (copy == NULL) return PW_RESOURCE;
     pw_names_add (&reader->indices, copy, i);

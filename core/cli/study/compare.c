@@ -245,12 +245,11 @@ static int compare_measure_errors (pw_compare *compare, pw_row *row, pw_error *e
 static int compare_measure (pw_study *study, pw_row *row, pw_error *error) {
   pw_compare *compare = (pw_compare *)study;
   pw_error run_error = { 0 };
-  char text[60] = "";
   double predicted = compare_predicted_time (row);
   const char *limit = PW_DIGITS (study->cpu_limit, 4);
   if (predicted > study->cpu_limit) {
     row->state = ROW_SKIPPED;
-    if (isfinite (predicted)) snprintf (text, sizeof text, ", about %.2g s", predicted);
+    const char *text = isfinite (predicted) ? PW_PRINTED (60, ", about %.2g s", predicted) : "";
     snprintf (row->reason, sizeof row->reason, "too slow%s; the limit is %s s", text, limit);
     return PW_OK;
   }
@@ -259,7 +258,7 @@ static int compare_measure (pw_study *study, pw_row *row, pw_error *error) {
   if (status == PW_OK) status = compare_measure_times (compare, row, &run_error);
   if (row->state == ROW_STOPPED)
     snprintf (row->reason, sizeof row->reason, "too slow: the limit of %s s was reached at t = %s s", limit,
-              pw_format (text, row->t, 4));
+              PW_DIGITS (row->t, 4));
   status = pw_study_record_run (study, row, status, &run_error, error);
   row->value[COLUMN_ORDER] = compare_order (compare, row);
   if (row->state != ROW_REFUSED) {

@@ -184,9 +184,8 @@ static void conclusion_print_failures (const pw_study *study, int method) {
 
 /* One line for all methods with runs that the limit has stopped or prevented. */
 static void conclusion_print_limited (const pw_study *study) {
-  char beginning[80];
+  const char *beginning = PW_PRINTED (80, "stopped by the limit of %s s: ", PW_DIGITS (study->cpu_limit, 4));
   const char *before = beginning;
-  snprintf (beginning, sizeof beginning, "stopped by the limit of %s s: ", PW_DIGITS (study->cpu_limit, 4));
   for (int i = 0; i < study->methods; i++) {
     const pw_row *first;
     if (conclusion_count_runs (study, i, RUNS_LIMITED, &first) == 0) continue;
