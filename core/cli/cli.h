@@ -11,6 +11,7 @@
 #include "pinwheel-files.h"
 #include "pinwheel-solvers.h"
 #include "progress.h"
+#include "util.h"
 
 /* Exit statuses after SIGINT or SIGTERM, and after SIGPIPE: 128 + SIGINT and 128 + SIGPIPE, as shells report them. */
 enum { PW_INTERRUPTED = 130, PW_CLOSED_PIPE = 141 };

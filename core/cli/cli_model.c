@@ -4,7 +4,6 @@
 #include <string.h>
 #include <unistd.h>
 #include "cli.h"
-#include "util.h"
 
 /* Refuses a parameter in --start, and a state in --set: names of states have a dot, those of parameters have none. */
 static int model_check_name (const pw_model *m, const char *option, const char *text, const char *name,

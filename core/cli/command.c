@@ -6,7 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include "cli.h"
-#include "util.h"
 
 enum {
   COMMAND_HELP = 1000, /* number of --help, which poptGetNextOpt returns; those of other options are 1, 2, ... */
@@ -57,11 +56,10 @@ static int command_keep (const pw_command *command, pw_cli_line *line, int i, pw
 
 static void command_option_help (const struct poptOption *o) {
   enum { COLUMN = 28 };
-  char left[80], letter[8] = "   ";
+  const char *letter = o->shortName ? PW_PRINTED (8, "-%c,", o->shortName) : "   ";
   int is_list = (o->argInfo & POPT_ARG_MASK) == POPT_ARG_ARGV;
-  if (o->shortName) snprintf (letter, sizeof letter, "-%c,", o->shortName);
-  snprintf (left, sizeof left, "  %s --%s%s%s", letter, o->longName, o->argDescrip ? is_list ? " " : "=" : "",
-            o->argDescrip ? o->argDescrip : "");
+  const char *left = PW_PRINTED (80, "  %s --%s%s%s", letter, o->longName, o->argDescrip ? is_list ? " " : "=" : "",
+                                 o->argDescrip ? o->argDescrip : "");
   if (strlen (left) > COLUMN - 2)
     printf ("%s\n%*s", left, COLUMN, "");
   else

@@ -2,7 +2,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include "cli.h"
-#include "util.h"
 
 int pw_cli_read_specialise (const char *text, pw_specialise *when, pw_error *error) {
   static const char *const name[] = { "auto", "always", "never", NULL };

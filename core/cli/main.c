@@ -7,7 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include "cli.h"
-#include "util.h"
 
 #define MAIN_ENTRY(name) &pw_cli_##name,
 static const pw_command *const main_commands[] = { PW_COMMANDS (MAIN_ENTRY) NULL };

@@ -9,7 +9,6 @@
 #include <string.h>
 #include <unistd.h>
 #include "parallel.h"
-#include "util.h"
 
 enum { PARALLEL_JOBS = 10000 }; /* at most; more threads than any machine runs at once */
 

@@ -5,7 +5,6 @@
 #include <string.h>
 #include <unistd.h>
 #include "cli.h"
-#include "util.h"
 
 /* Writes control characters and invalid bytes as \xNN. */
 static void say_escaped (FILE *f, const char *text) {

@@ -16,12 +16,11 @@ static void stop_on_signal (int number) {
 /* Sets the handler of SIGINT and SIGTERM; a signal that the program was started to ignore, by nohup or in a script's
  * background, stays ignored.  SA_RESTART: a write that waits for the reader of a pipe goes on. */
 static void stop_set (void (*handler) (int)) {
-  static const int numbers[] = { SIGINT, SIGTERM };
+  static const int caught[] = { SIGINT, SIGTERM };
   struct sigaction action = { .sa_handler = handler, .sa_flags = SA_RESTART }, before;
   sigemptyset (&action.sa_mask);
   for (int i = 0; i < 2; i++)
-    if (sigaction (numbers[i], NULL, &before) == 0 && before.sa_handler != SIG_IGN)
-      sigaction (numbers[i], &action, NULL);
+    if (sigaction (caught[i], NULL, &before) == 0 && before.sa_handler != SIG_IGN) sigaction (caught[i], &action, NULL);
 }
 
 void pw_stop_catch (void) {

@@ -5,7 +5,6 @@
 #include <string.h>
 #include "cli.h"
 #include "text.h"
-#include "util.h"
 
 void pw_text_clear (pw_text *t) {
   t->length = 0;

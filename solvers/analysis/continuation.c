@@ -85,14 +85,13 @@ static double branch_distance (const pw_branch *b, const double *x, const double
 }
 
 /* Corrects to->u on the plane perpendicular to a tangent, or if that is NULL at constant p; then sets to->tangent.
- * PW_RETRY if the correction is longer than max_distance. */
-static int branch_correct (pw_branch *b, const double *tangent, double max_distance, pw_branch_point *to,
-                           pw_error *error) {
+ * PW_RETRY if the correction is longer than `farthest`. */
+static int branch_correct (pw_branch *b, const double *tangent, double farthest, pw_branch_point *to, pw_error *error) {
   memcpy (b->condition, tangent ? tangent : b->reached.tangent, b->bytes);
   memcpy (b->predicted, to->u, b->bytes);
   int status = pw_branch_iterate (b, to->u, tangent ? b->condition : NULL, 0, error);
   if (status != PW_OK) return status;
-  if (branch_distance (b, to->u, b->predicted) > max_distance) return PW_RETRY;
+  if (branch_distance (b, to->u, b->predicted) > farthest) return PW_RETRY;
   to->residual = b->residual, to->interpolated = 0;
   return pw_branch_tangent (b, to->u, b->condition, to->tangent, error);
 }

@@ -61,7 +61,6 @@ double pw_system_period (const pw_system *s) {
  * Verifies that signals repeat after it; with a free period, that they are constant during the time that is set. */
 static int flow_signals (pw_periodic *x, pw_place place, pw_run *r) {
   double signals = pw_system_period (r->s), period = x->settings.free ? FLOW_TIMES * x->T : x->settings.period;
-  char name[PW_NAME_BYTES];
   int changed, status;
   if (period <= 0) period = signals == 0 ? x->last_period : x->settings.periods * signals;
   if (!(period > 0))
@@ -73,7 +72,7 @@ static int flow_signals (pw_periodic *x, pw_place place, pw_run *r) {
                             : pw_signals_change (r, x->settings.t, period, FLOW_PERIODS * period, &changed, &x->why);
   if (status != PW_OK) return status;
   if (changed < 0) return x->system[place].period = period, PW_OK;
-  pw_system_signal_name (r->s, changed, name, sizeof name);
+  const char *name = PW_NAME (pw_system_signal_name, r->s, changed);
   if (x->settings.free)
     return pw_fail (&x->why, PW_INPUT, "model %s: signal %s changes with time, so that the period is not free",
                     x->s->model, name);

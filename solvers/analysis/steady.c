@@ -59,11 +59,11 @@ static double steady_last_breakpoint (pw_workspace *w, double t, double span) {
  * after the last breakpoint, the time of this breakpoint, rounded up. */
 static int steady_constant (pw_steady *x, pw_error *error) {
   pw_run *r = x->system[PW_HERE].run;
-  char name[PW_NAME_BYTES], text[32];
+  char text[32];
   const double span = r->settings.span; /* with its default */
   int changed, later, status = pw_signals_change (r, x->settings.t, 0, span, &changed, error);
   if (status != PW_OK || changed < 0) return status;
-  pw_system_signal_name (x->s, changed, name, sizeof name);
+  const char *name = PW_NAME (pw_system_signal_name, x->s, changed);
   double last = steady_last_breakpoint (r->w, x->settings.t, span);
   status = pw_signals_change (r, last, 0, span, &later, error);
   if (status != PW_OK) return status;

@@ -46,19 +46,18 @@ int pw_steady_same_motion (void *steady, const double *u, const double *other) {
 }
 
 int pw_steady_nearest (pw_steady *x, const double *q, const double *v, double *u, pw_error *error) {
-  int n = x->n, symmetries = x->symmetries, rank;
-  double *S = x->F, *right = S + n * symmetries, *work = right + n + symmetries;
-  memset (x->branch.pivot, 0, (size_t)symmetries * sizeof *x->branch.pivot);
+  int n = x->n, columns = x->symmetries, rank;
+  double *S = x->F, *right = S + n * columns, *work = right + n + columns;
+  memset (x->branch.pivot, 0, (size_t)columns * sizeof *x->branch.pivot);
   for (int j = 0; j < n; j++) u[j] = q[j] / pw_unit (x->s, j), right[j] = v[j] / pw_unit (x->s, j) * x->T;
-  for (int k = 0; k < symmetries; k++) {
+  for (int k = 0; k < columns; k++) {
     pw_steady_velocities (x, x->symmetry + k * pw_steady_rate_count (x->s), q, S + k * n);
     for (int j = 0; j < n; j++) S[k * n + j] /= pw_unit (x->s, j);
   }
-  if (symmetries &&
-      LAPACKE_dgelsy_work (LAPACK_COL_MAJOR, n, symmetries, 1, S, n, right, n > symmetries ? n : symmetries,
-                           x->branch.pivot, PW_STEADY_RANK, &rank, work, PW_STEADY_WORK * (n + symmetries)))
+  if (columns && LAPACKE_dgelsy_work (LAPACK_COL_MAJOR, n, columns, 1, S, n, right, n > columns ? n : columns,
+                                      x->branch.pivot, PW_STEADY_RANK, &rank, work, PW_STEADY_WORK * (n + columns)))
     return pw_fail (error, PW_METHOD, "the symmetries cannot be separated");
-  memcpy (u + n, right, (size_t)symmetries * sizeof *u);
+  memcpy (u + n, right, (size_t)columns * sizeof *u);
   return PW_OK;
 }
 

@@ -13,20 +13,17 @@ static const struct {
 
 static int hold_unknown (const pw_system *s, const char *name, pw_error *error) {
   pw_nearest near = { .sought = name };
-  char known[300];
   for (int i = 0; i < 2 * s->coords + PW_HOLD_OF_BODY * s->bodies; i++)
-    pw_nearest_try (&near, pw_system_held_name (s, i, known, sizeof known));
+    pw_nearest_try (&near, PW_NAME (pw_system_held_name, s, i));
   return pw_fail (error, PW_INPUT, "model %s has no state \"%s\"%s", s->model, name, pw_nearest_text (&near));
 }
 
 int pw_system_find_held (const pw_system *s, const char *name, pw_error *error) {
   const char *dot = strrchr (name, '.');
-  char body[300];
   pw_error none = { 0 };
   for (int k = 0; dot && k < PW_HOLD_OF_BODY; k++) {
     if (strcmp (dot + 1, hold_of_body[k].name) != 0) continue;
-    snprintf (body, sizeof body, "%.*s", (int)(dot - name), name);
-    int b = pw_system_find_body (s, body);
+    int b = pw_system_find_body (s, PW_PRINTED (300, "%.*s", (int)(dot - name), name));
     if (b >= 0) return 2 * s->coords + b * PW_HOLD_OF_BODY + k;
   }
   int state = pw_system_find_state (s, name, &none);

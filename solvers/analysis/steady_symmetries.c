@@ -124,23 +124,22 @@ static int symmetry_evaluate (pw_steady *x, double distance, int number) {
  * about the centre of a pinned disc less one of the disc's angle.  Returns their number, or a status < 0.  x->q is in
  * general position. */
 static int symmetry_remove_idle (pw_steady *x, int rates) {
-  int n = x->n + 3, symmetries = x->symmetries; /* at least as many rows as columns */
-  double *F = calloc ((size_t)(n + symmetries + rates) * (size_t)symmetries + 1, sizeof *F);
-  double *c = F + n * symmetries, *idle_rates = c + symmetries * symmetries; /* combinations, and their rates */
+  int n = x->n + 3, count = x->symmetries; /* at least as many rows as columns */
+  double *F = calloc ((size_t)(n + count + rates) * (size_t)count + 1, sizeof *F);
+  double *c = F + n * count, *idle_rates = c + count * count; /* combinations, and their rates */
   if (F == NULL) return PW_RESOURCE;
-  for (int k = 0; k < symmetries; k++) {
+  for (int k = 0; k < count; k++) {
     pw_steady_velocities (x, x->symmetry + k * rates, x->q, F + k * n);
     for (int j = 0; j < x->n; j++) F[k * n + j] /= pw_unit (x->s, j);
   }
-  int idle = symmetries ? pw_null_space (n, symmetries, F, PW_STEADY_RANK, c) : 0;
-  for (int i = 0; i < idle * symmetries; i++)
-    for (int j = 0; j < rates; j++)
-      idle_rates[i / symmetries * rates + j] += c[i] * x->symmetry[i % symmetries * rates + j];
+  int idle = count ? pw_null_space (n, count, F, PW_STEADY_RANK, c) : 0;
+  for (int i = 0; i < idle * count; i++)
+    for (int j = 0; j < rates; j++) idle_rates[i / count * rates + j] += c[i] * x->symmetry[i % count * rates + j];
   symmetry_reduce (idle, rates, idle_rates);
   for (int i = 0; i < idle; i++) {
     int last = rates - 1; /* the pivot */
     while (last > 0 && idle_rates[i * rates + last] == 0) last--;
-    for (int k = 0; k < symmetries; k++) {
+    for (int k = 0; k < count; k++) {
       double factor = x->symmetry[k * rates + last];
       for (int j = 0; j < rates; j++) x->symmetry[k * rates + j] -= factor * idle_rates[i * rates + j];
     }
@@ -238,26 +237,25 @@ static double symmetry_angle (const pw_steady *x, const double centre[2], const 
 void pw_steady_canonical (const pw_steady *x, double *q, double *v) {
   int rates = pw_steady_rate_count (x->s);
   for (int k = 0; k < x->symmetries; k++) {
-    const double *symmetry = x->symmetry + k * rates;
+    const double *rate = x->symmetry + k * rates;
     int c = rates - 1;
-    while (c >= PW_RATE_ANGLES && symmetry[c] == 0) c--;
-    if (c >= PW_RATE_ANGLES && !symmetry_of_whole (symmetry)) {
-      double by = -q[symmetry_coordinate (x, c)] / symmetry[c];
+    while (c >= PW_RATE_ANGLES && rate[c] == 0) c--;
+    if (c >= PW_RATE_ANGLES && !symmetry_of_whole (rate)) {
+      double by = -q[symmetry_coordinate (x, c)] / rate[c];
       for (int j = 0; j < x->n; j++)
-        if (pw_is_angle (x->s, j)) q[j] += by * symmetry[pw_steady_angle_rate (x->s, j)];
+        if (pw_is_angle (x->s, j)) q[j] += by * rate[pw_steady_angle_rate (x->s, j)];
     }
-    if (symmetry[PW_RATE_TURN] == 0) continue;
-    double centre[2] = { x->origin[0] - x->L * symmetry[PW_RATE_Y] / symmetry[PW_RATE_TURN],
-                         x->origin[1] + x->L * symmetry[PW_RATE_X] / symmetry[PW_RATE_TURN] };
+    if (rate[PW_RATE_TURN] == 0) continue;
+    double centre[2] = { x->origin[0] - x->L * rate[PW_RATE_Y] / rate[PW_RATE_TURN],
+                         x->origin[1] + x->L * rate[PW_RATE_X] / rate[PW_RATE_TURN] };
     symmetry_rotate (x, -symmetry_angle (x, centre, q), centre, q, v);
   }
   for (int k = 0; k < x->symmetries; k++) {
-    const double *symmetry = x->symmetry + k * rates;
-    double square = symmetry[PW_RATE_X] * symmetry[PW_RATE_X] + symmetry[PW_RATE_Y] * symmetry[PW_RATE_Y];
-    if (symmetry[PW_RATE_TURN] != 0 || !(square > 0)) continue;
-    double by = (symmetry[PW_RATE_X] * q[0] + symmetry[PW_RATE_Y] * q[1]) / square;
-    for (int j = 0; j < 3 * x->s->bodies; j += 3)
-      q[j] -= by * symmetry[PW_RATE_X], q[j + 1] -= by * symmetry[PW_RATE_Y];
+    const double *rate = x->symmetry + k * rates;
+    double square = rate[PW_RATE_X] * rate[PW_RATE_X] + rate[PW_RATE_Y] * rate[PW_RATE_Y];
+    if (rate[PW_RATE_TURN] != 0 || !(square > 0)) continue;
+    double by = (rate[PW_RATE_X] * q[0] + rate[PW_RATE_Y] * q[1]) / square;
+    for (int j = 0; j < 3 * x->s->bodies; j += 3) q[j] -= by * rate[PW_RATE_X], q[j + 1] -= by * rate[PW_RATE_Y];
   }
 }
 

@@ -192,8 +192,7 @@ static int change_may_be_low (pw_run *r, double previous_sine, double sine, doub
 /* row: the most nearly dependent one, or -1; apart: distance of the branches, estimated as the sine over its change per
  * unit of motion; length: of the step. */
 static int change_fail (pw_run *r, int row, double apart, const char *finding, double length, pw_error *error) {
-  char element[PW_NAME_BYTES] = "the constraints";
-  if (row >= 0) pw_system_row_name (r->s, row, element, sizeof element);
+  const char *element = row >= 0 ? PW_NAME (pw_system_row_name, r->s, row) : "the constraints";
   return pw_fail (error, PW_METHOD,
                   "t = %.6g s: change point at %s: %s; branches come within %.2g of each other, the step is "
                   "%.2g long (scaled); use a smaller %s",
@@ -217,11 +216,10 @@ static int change_report (pw_run *r, const change_walk *walk, change_verdict ver
   pw_watchdog *watch = &r->watchdog;
   double low = r->thresholds.unresolved * fmin (watch->previous_sine, sine);
   watch->may_have_crossed |= verdict == CHANGE_UNKNOWN || walk->least_sine <= r->thresholds.crossing;
-  const char *finding = verdict == CHANGE_OTHER_BRANCH ? "the motion has left its branch" : NULL;
+  const char *found = verdict == CHANGE_OTHER_BRANCH ? "the motion has left its branch" : NULL;
   if (verdict == CHANGE_SAME_BRANCH && !watch->may_have_crossed && walk->least_sine < low)
-    finding = "the step does not resolve it";
-  return finding ? change_fail (r, walk->least_row, walk->least_sine / walk->sine_slope, finding, length, error)
-                 : PW_OK;
+    found = "the step does not resolve it";
+  return found ? change_fail (r, walk->least_row, walk->least_sine / walk->sine_slope, found, length, error) : PW_OK;
 }
 
 int pw_change_point_check (pw_run *r, double sine, pw_error *error) {

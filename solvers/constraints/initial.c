@@ -175,10 +175,9 @@ static int initial_attempt (pw_run *r, const unsigned char *prescribed, int redu
 }
 
 static int initial_fail (pw_run *r, const initial_failure *failure, pw_error *error) {
-  char element[PW_NAME_BYTES];
   if (failure->row < 0)
     return pw_fail (error, PW_INITIAL, "model %s: the initial state cannot be made consistent", r->s->model);
-  pw_system_row_name (r->s, failure->row, element, sizeof element);
+  const char *element = PW_NAME (pw_system_row_name, r->s, failure->row);
   const char *unit = strcmp (pw_system_reaction_unit (r->s, failure->row), "N m") == 0 ? "rad" : "m";
   const int is_open = failure->level == INITIAL_POSITIONS;
   return pw_fail (error, PW_INITIAL, "model %s: the initial state cannot be made consistent: %s is %s by %.6g %s%s",

@@ -124,11 +124,9 @@ static const char *redundancy_direction (const char *one, const char *two) {
 
 /* Describes two rows that are multiples of each other: "wheels left and right: the same lateral constraint". */
 static void redundancy_describe_pair (const pw_system *s, int one, int two, char *buffer, size_t size) {
-  char a[PW_NAME_BYTES], b[PW_NAME_BYTES], reaction_a[PW_NAME_BYTES], reaction_b[PW_NAME_BYTES];
-  pw_system_row_name (s, one, a, sizeof a);
-  pw_system_row_name (s, two, b, sizeof b);
-  pw_system_reaction_name (s, one, reaction_a, sizeof reaction_a);
-  pw_system_reaction_name (s, two, reaction_b, sizeof reaction_b);
+  const char *a = PW_NAME (pw_system_row_name, s, one), *b = PW_NAME (pw_system_row_name, s, two);
+  const char *reaction_a = PW_NAME (pw_system_reaction_name, s, one);
+  const char *reaction_b = PW_NAME (pw_system_reaction_name, s, two);
   const char *direction = redundancy_direction (reaction_a, reaction_b);
   size_t kind = strcspn (a, " "); /* length of the element's type, with which its name begins */
   if (strcmp (a, b) == 0)
@@ -144,9 +142,9 @@ char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size) {
   const double round_off = 1e-8; /* of c between rows of norm 1: eps / sine^2, if active rows have sines above 1.5e-4 */
   const pw_system *s = r->s;
   int row = r->redundant_row[i], partners = 0, last = -1, elements = 0;
-  char element[PW_NAME_BYTES], own[PW_NAME_BYTES], before[PW_NAME_BYTES] = "", reaction[PW_NAME_BYTES];
-  pw_system_row_name (s, row, own, sizeof own);
-  snprintf (buffer, size, "%s (%s)", own, pw_system_reaction_name (s, row, reaction, sizeof reaction));
+  char before[PW_NAME_BYTES] = "";
+  const char *own = PW_NAME (pw_system_row_name, s, row);
+  snprintf (buffer, size, "%s (%s)", own, PW_NAME (pw_system_reaction_name, s, row));
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return buffer;
   if (pw_saddle_factor (r->saddle) != PW_OK) return buffer;
   redundancy_coefficients (r, i);
@@ -154,7 +152,7 @@ char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size) {
   for (int a = 0; a < s->rows; a++) {
     if (fabs (c[a]) * redundancy_norm (r->w, a) <= least) continue;
     partners++, last = a;
-    pw_system_row_name (s, a, element, sizeof element);
+    const char *element = PW_NAME (pw_system_row_name, s, a);
     if (elements > MAX_ELEMENTS || strcmp (element, own) == 0 || strcmp (element, before) == 0) continue;
     strcpy (before, element);
     redundancy_append (buffer, size, elements == MAX_ELEMENTS ? " and others" : elements > 0 ? ", " : " follows from ");

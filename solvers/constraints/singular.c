@@ -65,7 +65,6 @@ int pw_watchdog_near (pw_run *r) {
 }
 
 int pw_fail_singular (pw_run *r, double t, pw_error *error) {
-  char element[PW_NAME_BYTES] = "a constraint";
   int row = -1;
   double sine = pw_watchdog_sine (r, &row);
   /* largest_sine is 0 while the run is being opened */
@@ -75,15 +74,14 @@ int pw_fail_singular (pw_run *r, double t, pw_error *error) {
         "t = %.6g s: values too extreme: masses and inertias differ by so much that the equations of motion "
         "cannot be solved; the configuration is not singular",
         t);
-  if (row >= 0) pw_system_row_name (r->s, row, element, sizeof element);
+  const char *name = row >= 0 ? PW_NAME (pw_system_row_name, r->s, row) : "a constraint";
   if (sine <= r->thresholds.rank_lost)
-    return pw_fail (error, PW_METHOD, "t = %.6g s: singular configuration: %s depends on other constraints", t,
-                    element);
+    return pw_fail (error, PW_METHOD, "t = %.6g s: singular configuration: %s depends on other constraints", t, name);
   return pw_fail (
       error, PW_METHOD,
       "t = %.6g s: near a singular configuration: %s nearly depends on other constraints (sine %.2g); the next "
       "step cannot be computed",
-      t, element, sine);
+      t, name, sine);
 }
 
 int pw_watchdog_near_state (pw_run *r) {
@@ -96,13 +94,12 @@ int pw_watchdog_near_state (pw_run *r) {
 int pw_watchdog_check_values (const pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
   const double extreme = r->thresholds.extreme;
-  char name[PW_NAME_BYTES];
   for (int i = 0; i < 2 * s->coords; i++) {
     double value = i < s->coords ? r->q[i] : r->v[i - s->coords];
     if (!(fabs (value) < extreme))
       return pw_fail (error, PW_INPUT,
                       "model %s: values too extreme: %s is initially %g: expected a magnitude below %g", s->model,
-                      pw_system_state_name (s, i, name, sizeof name), value, extreme);
+                      PW_NAME (pw_system_state_name, s, i), value, extreme);
   }
   for (int j = 0; s->rows > 0 && j < s->coords; j++) {
     double unit = pw_length_factor (s, j) * pw_length_factor (s, j), mass = s->mass[j] / unit;
@@ -110,7 +107,7 @@ int pw_watchdog_check_values (const pw_run *r, pw_error *error) {
       return pw_fail (
           error, PW_INPUT,
           "model %s: values too extreme: the mass or inertia that goes with %s is %g: expected 0, or %g to %g",
-          s->model, pw_system_state_name (s, j, name, sizeof name), s->mass[j], unit / extreme, unit * extreme);
+          s->model, PW_NAME (pw_system_state_name, s, j), s->mass[j], unit / extreme, unit * extreme);
   }
   return PW_OK;
 }

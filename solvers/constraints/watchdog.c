@@ -98,12 +98,11 @@ static int watchdog_follow (pw_run *r, pw_error *error) {
 
 static int watchdog_fail_lost (pw_run *r, int contradicts, pw_error *error) {
   pw_residuals now;
-  char element[PW_NAME_BYTES] = "a constraint", cause[60] = "constraint drift";
+  char cause[60] = "constraint drift";
   pw_evaluate_residuals (r->w, NULL, &now);
   int in_position = isnan (now.position) || now.position > now.velocity;
   int row = in_position ? now.row_position : now.row_velocity;
-  if (row >= 0) pw_system_row_name (r->s, row, element, sizeof element);
-  const char *advice = "";
+  const char *element = row >= 0 ? PW_NAME (pw_system_row_name, r->s, row) : "a constraint", *advice = "";
   if (contradicts)
     snprintf (cause, sizeof cause, "constraints contradict each other");
   else if (pw_stabilised_by (r, PW_UNSTABILISED))

@@ -52,11 +52,10 @@ static inline void leapfrog_measure (leapfrog_progress *p, double correction, do
 /* Converged: to round-off; or all further corrections together would be below a quarter of it; or corrections stall at
  * what small masses or lengths make of the round-off of the largest coordinate, `magnified`. */
 static pw_convergence leapfrog_test (leapfrog_progress *p) {
-  const double round_off = 2 * DBL_EPSILON, magnified = 1e4 * DBL_EPSILON;
+  const double rounding = 2 * DBL_EPSILON, magnified = 1e4 * DBL_EPSILON;
   p->rate = p->done > 0 ? p->size / p->before : 1;
   if (!isfinite (p->size)) return PW_DIVERGED;
-  if (p->size <= round_off || (p->rate < 1 && p->size * p->rate / (1 - p->rate) <= 0.25 * round_off))
-    return PW_CONVERGED;
+  if (p->size <= rounding || (p->rate < 1 && p->size * p->rate / (1 - p->rate) <= 0.25 * rounding)) return PW_CONVERGED;
   if (p->rate > 0.5 && p->size <= magnified * p->largest) return PW_CONVERGED;
   if (p->done > 3 && p->rate > 2) return PW_DIVERGED;
   p->before = p->size;

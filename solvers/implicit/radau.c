@@ -75,11 +75,9 @@ static int radau_allocate (pw_run *r) {
     { &d->last.a, n },    { &d->rate, entries }, { &d->now.ledger, entries }, { &d->last.ledger, entries }
   };
   for (int k = 0; k < STAGES; k++) {
-    const pw_array of_stage[OF_STAGE] = {
-      { &d->now.Z[k], n },  { &d->now.ledger_change[k], entries },  { &d->W[k], n },
-      { &d->last.Z[k], n }, { &d->last.ledger_change[k], entries }, { &d->F[k], n }
-    };
-    memcpy (array + SINGLE + OF_STAGE * k, of_stage, sizeof of_stage);
+    const pw_array stage[OF_STAGE] = { { &d->now.Z[k], n },  { &d->now.ledger_change[k], entries },  { &d->W[k], n },
+                                       { &d->last.Z[k], n }, { &d->last.ledger_change[k], entries }, { &d->F[k], n } };
+    memcpy (array + SINGLE + OF_STAGE * k, stage, sizeof stage);
   }
   array[ALL - 1] = (pw_array){ &d->complex_x, 2 * n };
   d->memory = pw_alloc_arrays (array, ALL);

@@ -11,13 +11,12 @@
 
 /* ---- Assembly ---- */
 
-/* K += B R^T, kb x ka, with B = J_b, whose rows are row_stride apart, and R = J_a W^-1. */
-PW_INLINE void block_couple (int kb, int ka, int width, double *K, const block_row *R, const double *B,
-                             int row_stride) {
+/* K += B R^T, kb x ka, with B = J_b, whose rows are `stride` apart, and R = J_a W^-1. */
+PW_INLINE void block_couple (int kb, int ka, int width, double *K, const block_row *R, const double *B, int stride) {
   K[0] += block_product (width, R[0], B);
   if (ka == 2) K[1] += block_product (width, R[1], B);
-  if (kb == 2) K[ka] += block_product (width, R[0], B + row_stride);
-  if (ka == 2 && kb == 2) K[3] += block_product (width, R[1], B + row_stride);
+  if (kb == 2) K[ka] += block_product (width, R[0], B + stride);
+  if (ka == 2 && kb == 2) K[3] += block_product (width, R[1], B + stride);
 }
 
 /* Adds the products of a contribution of ka rows with itself and with those after it; coupling: indices in `value` of

@@ -125,11 +125,10 @@ static int massless_lay_out (pw_massless *m, const massless_plan *p) {
 /* ---- Opening ---- */
 
 static int massless_undetermined (const pw_system *s, int j, pw_error *error) {
-  char name[PW_NAME_BYTES];
   const char *lacking = pw_is_angle (s, j) ? "inertia" : "mass";
   return pw_fail (error, PW_INPUT,
                   "model %s: %s has no %s, and no constraint determines how it moves; give it %s, or constrain it",
-                  s->model, pw_system_state_name (s, j, name, sizeof name), lacking, lacking);
+                  s->model, PW_NAME (pw_system_state_name, s, j), lacking, lacking);
 }
 
 /* Marks the massless columns and matches them; reports a column that no row determines. */

@@ -100,7 +100,6 @@ static int linear_jump (pw_linearisation *x) {
 /* Computes all but the counts.  Leaves the workspace at the current state. */
 static int linear_compute (pw_linearisation *x, pw_linear *l, pw_error *error) {
   pw_run *r = x->r;
-  char name[PW_NAME_BYTES];
   int status = pw_linear_evaluate (x, r->t, r->q, r->v);
   if (status != PW_OK)
     return status > 0 ? pw_fail_singular (r, r->t, error)
@@ -112,7 +111,7 @@ static int linear_compute (pw_linearisation *x, pw_linear *l, pw_error *error) {
   if (jump >= 0)
     return pw_fail (error, PW_METHOD,
                     "t = %.6g s: accelerations jump with %s at this state, or fail beside it: it has no linearisation",
-                    r->t, pw_system_state_name (r->s, jump, name, sizeof name));
+                    r->t, PW_NAME (pw_system_state_name, r->s, jump));
   pw_linear_choose_frame (x);
   if (linear_results (x, l) != PW_OK) return PW_RESOURCE;
   for (int c = 0; c < x->size; c++) linear_column_of_A (x, c);

@@ -97,18 +97,17 @@ int pw_rk_at (pw_run *r, double t, pw_error *error) {
  * and accepts that part; *t: its end.
  *
  * Accelerations at the end of a step, with which the next one begins, have the error of the state over the sine.  So if
- * the step ends at the singular configuration (ends_singular: 1), longer ones, up to `stop`, are tried first, whose
+ * the step ends at the singular configuration (singular: 1), longer ones, up to `stop`, are tried first, whose
  * first part ends after t1; otherwise they are tried if no division of the step to t1 is accurate. */
-static int fixed_step_around (pw_run *r, int status, int ends_singular, double t1, double stop, int project,
-                              double *t) {
+static int fixed_step_around (pw_run *r, int status, int singular, double t1, double stop, int project, double *t) {
   static const double beyond[] = { 0.62, 2.62, 7.62 }; /* in step sizes; irregular, since configurations may recur */
   const pw_step_start from = { .t = r->t, .projected = r->projected, .q = r->q, .ledger = r->ledger, .rate = r->rate };
   double added_energy = 0;
-  if (!ends_singular) status = fixed_divide (r, &from, status, t1, project, r->t, t);
-  if (ends_singular && status == PW_OK) status = PW_RETRY;
+  if (!singular) status = fixed_divide (r, &from, status, t1, project, r->t, t);
+  if (singular && status == PW_OK) status = PW_RETRY;
   for (size_t i = 0; i < sizeof beyond / sizeof *beyond && status == PW_RETRY && t1 < stop; i++)
     status = fixed_divide (r, &from, status, fmin (t1 + beyond[i] * r->settings.step, stop), project, t1, t);
-  if (ends_singular && status == PW_RETRY) status = fixed_divide (r, &from, status, t1, project, r->t, t);
+  if (singular && status == PW_RETRY) status = fixed_divide (r, &from, status, t1, project, r->t, t);
   if (status == PW_OK) status = pw_rk_step (r, *t - r->t, *t, project, &added_energy);
   if (status == PW_OK) pw_rk_accept (r, *t - r->t, *t, r->settings.ledger ? added_energy : 0);
   return status;

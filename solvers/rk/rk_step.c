@@ -147,11 +147,10 @@ int pw_rk_fail (pw_run *r, int status, double t, double h, int divided, pw_error
   int finite = pw_is_finite_state (r, r->data->q, r->data->v) && pw_is_finite_state (r, r->q, r->v);
   int has_projector = r->data->projects || r->data->nullspace_projects;
   int contradictory = has_projector && finite ? r->data->projector.contradictory_row : -1;
-  char element[PW_NAME_BYTES];
   if (status < 0) return pw_fail_signal (t, error);
   if (contradictory >= 0)
     return pw_fail (error, PW_METHOD, "t = %.6g s: %s contradicts the other constraints", t,
-                    pw_system_row_name (r->s, contradictory, element, sizeof element));
+                    PW_NAME (pw_system_row_name, r->s, contradictory));
   if (finite && pw_watchdog_near_state (r)) return pw_fail_singular (r, t, error);
   if (!finite && h < 1e-12 * fabs (t)) /* some 4000 eps */
     return pw_fail (error, PW_METHOD, "t = %.6g s: the next state is not finite, however small the step", t);

@@ -50,13 +50,13 @@ static int limits_record_speed (pw_run *r) {
 
 static int limits_fail_steps (const pw_run *r, pw_error *error) {
   const pw_statistics *now = &r->statistics;
-  char name[PW_NAME_BYTES], grows[240] = "";
+  char grows[240] = "";
   int state;
   double power, growth = pw_run_growth (r, &state, &power);
   if (growth > 0)
     snprintf (grows, sizeof grows,
               "; the motion grows without bound: %s = %.3g %s, %.2g times the scene's own speed, as t^%.1f",
-              pw_system_state_name (r->s, state, name, sizeof name), r->v[state - r->s->coords],
+              PW_NAME (pw_system_state_name, r->s, state), r->v[state - r->s->coords],
               pw_system_state_unit (r->s, state), growth, power);
   return pw_fail (error, PW_METHOD,
                   "t = %.6g s: the limit max-steps is reached: %ld attempted steps, %ld of them rejected%s", r->t,
@@ -71,7 +71,6 @@ int pw_run_check_limits (pw_run *r, pw_error *error) {
 
 int pw_run_check_resolution (pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
-  char name[PW_NAME_BYTES];
   if (!limits_record_speed (r) && r->statistics.steps % PW_CHECK_INTERVAL != 0) return PW_OK;
   for (int j = 0; j < s->coords; j++) {
     double round_off = fabs (r->q[j]) * DBL_EPSILON;
@@ -80,10 +79,9 @@ int pw_run_check_resolution (pw_run *r, pw_error *error) {
       return pw_fail (error, PW_METHOD,
                       "t = %.6g s: the step of %.6g s is too large: the state grows beyond all bounds", r->t,
                       r->settings.step);
-    pw_system_state_name (s, j, name, sizeof name);
     return pw_fail (error, PW_METHOD,
                     "t = %.6g s: the motion has grown beyond what numbers resolve: %s = %.3g %s, known to %.2g only",
-                    r->t, name, r->q[j], pw_system_state_unit (s, j), round_off);
+                    r->t, PW_NAME (pw_system_state_name, s, j), r->q[j], pw_system_state_unit (s, j), round_off);
   }
   return PW_OK;
 }

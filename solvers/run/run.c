@@ -220,11 +220,10 @@ int pw_run_sample (pw_run *r, double t, pw_sample *sample, pw_error *error) {
 
 /* Checks given positions or velocities x, whose states begin at `first`; NULL: none are given. */
 static int run_check_given (const pw_run *r, const double *x, int first, pw_error *error) {
-  char name[PW_NAME_BYTES];
   for (int j = 0, n = r->s->coords; x && j < n; j++)
     if (!(fabs (x[j]) < r->thresholds.extreme))
       return pw_fail (error, PW_INPUT, "model %s: restart with %s = %g: expected a magnitude below %g", r->s->model,
-                      pw_system_state_name (r->s, first + j, name, sizeof name), x[j], r->thresholds.extreme);
+                      PW_NAME (pw_system_state_name, r->s, first + j), x[j], r->thresholds.extreme);
   return PW_OK;
 }
 

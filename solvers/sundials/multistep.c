@@ -194,12 +194,11 @@ static void multistep_count (pw_method_data *d) {
 
 static int multistep_fail (pw_method_data *d, int flag, pw_error *error) {
   pw_run *r = d->sun.run;
-  char element[PW_NAME_BYTES];
   int singular = flag == CV_FIRST_RHSFUNC_ERR || flag == CV_REPTD_RHSFUNC_ERR || flag == CV_UNREC_RHSFUNC_ERR;
   if (!r->stopped) multistep_count (d);
   if (!r->stopped && flag == CV_REPTD_PROJFUNC_ERR && d->projector.contradictory_row >= 0)
     return pw_fail (error, PW_METHOD, "t = %.6g s: %s contradicts the other constraints", r->t,
-                    pw_system_row_name (r->s, d->projector.contradictory_row, element, sizeof element));
+                    PW_NAME (pw_system_row_name, r->s, d->projector.contradictory_row));
   if (flag == CV_PROJFUNC_FAIL) flag = CV_RHSFUNC_FAIL; /* a signal failed */
   return pw_sun_fail (&d->sun, flag, singular,
                       flag == CV_REPTD_PROJFUNC_ERR ? "the projection does not converge however small the step" : NULL,

@@ -128,11 +128,10 @@ static void variation_add_round_off (const pw_variation *x, pw_direction_copy *d
   double *error = d->column[1].trial;
   for (int j = 0; j < 2 * x->n; j++) {
     int i = j % x->n;
-    double per_unit = (j < x->n ? 1 : r->w->scale.time) / pw_unit (r->s, i), value = j < x->n ? near->q[i] : near->v[i],
+    double weight = (j < x->n ? 1 : r->w->scale.time) / pw_unit (r->s, i), value = j < x->n ? near->q[i] : near->v[i],
            round = value != (j < x->n ? r->q[i] : r->v[i]) ? relative * fabs (value) : 0;
     error[j] += copysign (round, error[j]);
-    d->start.all += per_unit * fabs (Y[j]), d->start.error += per_unit * fabs (error[j]),
-        d->start.round += per_unit * round;
+    d->start.all += weight * fabs (Y[j]), d->start.error += weight * fabs (error[j]), d->start.round += weight * round;
   }
   d->start.all = fmax (d->start.all, pw_variation_least_effect (d));
 }

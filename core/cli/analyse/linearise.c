@@ -27,7 +27,6 @@ static int linearise_find_all (const pw_system *s, const char **name, int *list,
  * are refused: their first and second time derivatives would be inputs as well. */
 static int linearise_select (pw_linearise_command *cmd, pw_error *error) {
   const pw_system *s = cmd->m.system;
-  char name[PW_NAME_BYTES];
   int states = 2 * pw_system_coordinates (s), signals = pw_system_signals (s);
   cmd->input = malloc (((size_t)signals + 1) * sizeof *cmd->input);
   cmd->output = malloc (((size_t)states + 1) * sizeof *cmd->output);
@@ -44,7 +43,7 @@ static int linearise_select (pw_linearise_command *cmd, pw_error *error) {
     if (!pw_system_signal_forced (s, cmd->input[i]))
       status =
           pw_fail (error, PW_INPUT, "--input %s is the signal of a constraint; only signals of forces can be inputs",
-                   pw_system_signal_name (s, cmd->input[i], name, sizeof name));
+                   PW_NAME (pw_system_signal_name, s, cmd->input[i]));
   return status;
 }
 

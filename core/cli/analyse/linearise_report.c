@@ -74,21 +74,16 @@ static const double *linearise_shape (const pw_linear *l, int i, int state) {
 /* Prints a component of a mode shape: a real number, or amplitude and phase of a complex one, this to 0.1 degrees. */
 static void linearise_print_component (pw_table *t, const pw_linear *l, int mode, int coordinate) {
   const double *c = linearise_shape (l, mode, coordinate);
-  char text[80];
-  double amplitude = hypot (c[0], c[1]);
-  if (amplitude < LINEARISE_SMALL)
-    snprintf (text, sizeof text, "0");
-  else if (l->im[mode] == 0)
-    snprintf (text, sizeof text, "%.5g", c[0]);
-  else
-    snprintf (text, sizeof text, "%.5g at %.5g deg", amplitude, round (1800 / PW_PI * atan2 (c[1], c[0])) / 10 + 0);
-  pw_cell (t, 12, text);
+  double amplitude = hypot (c[0], c[1]), degrees = round (1800 / PW_PI * atan2 (c[1], c[0])) / 10 + 0;
+  pw_cell (t, 12,
+           amplitude < LINEARISE_SMALL ? "0"
+           : l->im[mode] == 0          ? PW_PRINTED (80, "%.5g", c[0])
+                                       : PW_PRINTED (80, "%.5g at %.5g deg", amplitude, degrees));
 }
 
 static void linearise_print_mode (const pw_linearise_command *cmd, int mode) {
   const pw_system *s = cmd->m.system;
   int bodies = pw_system_bodies (s), internal = pw_system_coordinates (s) - 3 * bodies;
-  char name[PW_NAME_BYTES];
   printf ("\nMode %d\n", mode + 1);
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     static const char *const head[] = { "", "x [m]", "y [m]", "phi [rad]", NULL };
@@ -99,7 +94,7 @@ static void linearise_print_mode (const pw_linearise_command *cmd, int mode) {
       pw_row_end (&t);
     }
     for (int j = 3 * bodies; j < 3 * bodies + internal && j < 3 * bodies + LINEARISE_ROWS; j++) {
-      pw_cell_unit (&t, -12, pw_system_state_name (s, j, name, sizeof name), pw_system_state_unit (s, j));
+      pw_cell_unit (&t, -12, PW_NAME (pw_system_state_name, s, j), pw_system_state_unit (s, j));
       linearise_print_component (&t, &cmd->linear, mode, j);
       pw_row_end (&t);
     }
@@ -174,7 +169,6 @@ static void linearise_block_json (const pw_linearise_command *cmd, pw_json *j, c
 
 static void linearise_mode_json (const pw_linearise_command *cmd, pw_json *j, int i) {
   const pw_linear *l = &cmd->linear;
-  char name[PW_NAME_BYTES];
   j->line = 1;
   pw_json_open (j, NULL, '{');
   pw_json_number (j, "re", l->re[i]);
@@ -186,7 +180,7 @@ static void linearise_mode_json (const pw_linearise_command *cmd, pw_json *j, in
   pw_json_flag (j, "rigid", l->rigid[i]);
   pw_json_open (j, "shape", '{');
   for (int k = 0; linearise_has_shape (l, i) && k < 2 * l->coordinates; k++)
-    pw_json_numbers (j, pw_system_state_name (cmd->m.system, k, name, sizeof name), linearise_shape (l, i, k), 2);
+    pw_json_numbers (j, PW_NAME (pw_system_state_name, cmd->m.system, k), linearise_shape (l, i, k), 2);
   pw_json_close (j, '}');
   pw_json_close (j, '}');
 }
@@ -195,12 +189,11 @@ static void linearise_mode_json (const pw_linearise_command *cmd, pw_json *j, in
 static void linearise_names_json (const pw_linearise_command *cmd, pw_json *j, const char *key, const int *list,
                                   int count, char *(*name_of) (const pw_system *s, int i, char *buffer, size_t size),
                                   const char *(*unit_of) (const pw_system *s, int i)) {
-  char name[PW_NAME_BYTES];
   j->line = 1;
   pw_json_open (j, key, '[');
   for (int i = 0; i < count; i++) {
     pw_json_open (j, NULL, '{');
-    pw_json_text (j, "name", name_of (cmd->m.system, list[i], name, sizeof name));
+    pw_json_text (j, "name", PW_NAME (name_of, cmd->m.system, list[i]));
     pw_json_text (j, "unit", unit_of (cmd->m.system, list[i]));
     pw_json_close (j, '}');
   }
@@ -234,19 +227,17 @@ int pw_linearise_csv (const pw_linearise_command *cmd, FILE *f, pw_error *error)
   const pw_system *s = cmd->m.system;
   int n = cmd->linear.unknowns, rows = n + cmd->outputs, columns = n + cmd->inputs;
   pw_text t = { .chars = NULL };
-  char name[PW_NAME_BYTES];
   pw_text_cell (&t, "row");
-  for (int c = 0; c < n; c++) snprintf (name, sizeof name, "x%d", c + 1), pw_text_name (&t, name, "m");
+  for (int c = 0; c < n; c++) pw_text_name (&t, PW_PRINTED (40, "x%d", c + 1), "m");
   for (int c = 0; c < cmd->inputs; c++)
-    pw_text_name (&t, pw_system_signal_name (s, cmd->input[c], name, sizeof name),
-                  pw_system_signal_unit (s, cmd->input[c]));
+    pw_text_name (&t, PW_NAME (pw_system_signal_name, s, cmd->input[c]), pw_system_signal_unit (s, cmd->input[c]));
   int status = pw_text_line (&t, f, cmd->name, error);
   for (int i = 0; status == PW_OK && i < rows; i++) {
     if (i < n)
-      snprintf (name, sizeof name, "x%d'", i + 1);
+      pw_text_name (&t, PW_PRINTED (40, "x%d'", i + 1), "m/s");
     else
-      pw_system_state_name (s, cmd->output[i - n], name, sizeof name);
-    pw_text_name (&t, name, i < n ? "m/s" : pw_system_state_unit (s, cmd->output[i - n]));
+      pw_text_name (&t, PW_NAME (pw_system_state_name, s, cmd->output[i - n]),
+                    pw_system_state_unit (s, cmd->output[i - n]));
     for (int c = 0; c < columns; c++) pw_text_number (&t, linearise_entry (cmd, i, c));
     status = pw_text_line (&t, f, cmd->name, error);
   }

@@ -190,8 +190,8 @@ static int outcome_read_formula (pw_outcomes *set, pw_outcome *o, const char *or
 
 /* Reads an output.  A single column, which may have any name, is no formula. */
 static int outcome_read (pw_outcomes *set, pw_outcome *o, const char *option, pw_error *error) {
-  char origin[300], variable[OUTCOME_VARIABLE];
-  snprintf (origin, sizeof origin, "%s %.200s", option, o->text);
+  char variable[OUTCOME_VARIABLE];
+  const char *origin = PW_PRINTED (300, "%s %.200s", option, o->text);
   if (*o->text == 0) return pw_fail (error, PW_INPUT, "%s is empty: expected a column, such as frame.x", option);
   pw_error own = { 0 };
   int status = outcome_add_term (set, o, origin, o->text, 0, variable, &own);

@@ -5,7 +5,6 @@
 #include "figure.h"
 #include "periodic_report.h"
 #include "report.h"
-#include "util.h"
 
 enum { PERIODIC_PERIODS = 100000 }; /* of the signals in one period of the motion, at most */
 
@@ -31,13 +30,12 @@ static int periodic_read_period (pw_periodic_command *cmd, pw_error *error) {
     status = pw_fail (error, PW_INPUT, "--periods %s: expected at most %d", cmd->periods_text, PERIODIC_PERIODS);
   if (status != PW_OK) return status;
   cmd->settings.periods = (int)periods;
-  double common_period = pw_system_period (cmd->m.system);
-  if (cmd->period_text || cmd->vary_text || common_period > 0) return PW_OK;
+  double period = pw_system_period (cmd->m.system);
+  if (cmd->period_text || cmd->vary_text || period > 0) return PW_OK;
   return pw_fail (error, PW_INPUT, "%s: %s", pw_file_name (cmd->m.file),
-                  isnan (common_period)
-                      ? "the periods of its signals have no common multiple: give --period T"
-                      : "no signal has a known period (those of expressions and tables are not known): "
-                        "give --period T, or --period free if no signal changes with time");
+                  isnan (period) ? "the periods of its signals have no common multiple: give --period T"
+                                 : "no signal has a known period (those of expressions and tables are not known): "
+                                   "give --period T, or --period free if no signal changes with time");
 }
 
 static int periodic_read_options (pw_periodic_command *cmd, pw_error *error) {

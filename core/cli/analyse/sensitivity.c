@@ -58,7 +58,7 @@ static sensitivity_result sensitivity_of (const pw_sensitivity *sens, int output
 }
 
 static void sensitivity_print (const pw_sensitivity *sens) {
-  char value[32], unit[SENSITIVITY_UNIT], digits[32];
+  char unit[SENSITIVITY_UNIT];
   static const struct {
     int width;
     const char *name;
@@ -68,8 +68,8 @@ static void sensitivity_print (const pw_sensitivity *sens) {
           pw_run_time (sens->base.run));
   for (int o = 0; o < sens->outcomes.outcomes && !sens->stopped; o++) {
     pw_outcome_unit (&sens->outcomes, o, unit, sizeof unit);
-    pw_cli_print (stdout, "\n%s = %s %s\n", sens->of[o],
-                  pw_format (value, pw_outcome_value (&sens->outcomes, o, NULL), 12), unit);
+    pw_cli_print (stdout, "\n%s = %s %s\n", sens->of[o], PW_DIGITS (pw_outcome_value (&sens->outcomes, o, NULL), 12),
+                  unit);
     for (pw_table table = { 0 }; pw_table_pass (&table);) {
       for (int k = 0; k < 6; k++) pw_cell (&table, head[k].width, head[k].name);
       pw_row_end (&table);
@@ -78,8 +78,7 @@ static void sensitivity_print (const pw_sensitivity *sens) {
         const pw_unknown *u = &sens->unknowns.list[p];
         pw_cell_unit (&table, -14, u->name, u->unit);
         pw_cell_number (&table, 12, u->value, SENSITIVITY_DIGITS);
-        pw_cell (&table, 12,
-                 isnan (result.derivative) ? "none" : pw_format (digits, result.derivative, SENSITIVITY_DIGITS));
+        pw_cell (&table, 12, isnan (result.derivative) ? "none" : PW_DIGITS (result.derivative, SENSITIVITY_DIGITS));
         pw_cell (&table, -8, sensitivity_unit (sens, o, p, unit));
         pw_cell_number (&table, 12, result.error, 2);
         pw_cell_number (&table, 12, result.elasticity, 5);
@@ -159,16 +158,15 @@ static void sensitivity_cell (pw_text *t, const char *name, const char *unit) {
 static int sensitivity_csv (const void *context, FILE *f, pw_error *error) {
   const sensitivity *cmd = context;
   const pw_sensitivity *sens = &cmd->sens;
-  char unit[SENSITIVITY_UNIT], name[SENSITIVITY_NAME];
+  char unit[SENSITIVITY_UNIT];
   pw_text t = { 0 };
   pw_text_cell (&t, "t [s]");
   for (int o = 0; o < sens->outcomes.outcomes; o++) {
     if (!pw_sensitivity_in_table (sens, o)) continue;
     sensitivity_cell (&t, sens->of[o], pw_outcome_unit (&sens->outcomes, o, unit, sizeof unit));
-    for (int p = 0; p < sens->unknowns.count; p++) {
-      snprintf (name, sizeof name, "d(%s)/d(%s)", sens->of[o], sens->unknowns.list[p].name);
-      sensitivity_cell (&t, name, sensitivity_unit (sens, o, p, unit));
-    }
+    for (int p = 0; p < sens->unknowns.count; p++)
+      sensitivity_cell (&t, PW_PRINTED (SENSITIVITY_NAME, "d(%s)/d(%s)", sens->of[o], sens->unknowns.list[p].name),
+                        sensitivity_unit (sens, o, p, unit));
   }
   int status = pw_text_line (&t, f, cmd->folder, error);
   for (int i = 0; i < sens->rows && status == PW_OK; i++) {

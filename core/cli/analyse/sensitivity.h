@@ -6,7 +6,6 @@
 #include "outcome.h"
 #include "progress.h"
 #include "unknowns.h"
-#include "util.h"
 
 typedef struct {
   const char **of; /* the texts of the outputs, ended by NULL */

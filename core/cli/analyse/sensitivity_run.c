@@ -9,7 +9,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include "sensitivity.h"
-#include "util.h"
 
 enum {
   SENSITIVITY_PARTS = 20, /* of the run, between rows of the table, if row_interval is not given */

@@ -28,7 +28,7 @@ int pw_hold_read (const pw_system *s, const char **texts, pw_initial_value *hold
   return status;
 }
 
-void pw_states_print (const pw_system *s, const double *q, const double *v, int digits, double smallest) {
+void pw_states_print (const pw_system *s, const double *q, const double *v, int digits, double least) {
   static const char *const head[] = {
     "", "x [m]", "y [m]", "phi [rad]", "vx [m/s]", "vy [m/s]", "omega [rad/s]", NULL
   };
@@ -37,8 +37,7 @@ void pw_states_print (const pw_system *s, const double *q, const double *v, int 
     pw_head (&t, -12, 12, head);
     for (int b = 0; b < bodies && b < STATES_BODIES; b++) {
       pw_cell (&t, -12, pw_system_body_name (s, b));
-      for (int k = 0; k < 6; k++)
-        pw_cell_number (&t, 12, pw_rounded ((k < 3 ? q : v)[3 * b + k % 3], smallest), digits);
+      for (int k = 0; k < 6; k++) pw_cell_number (&t, 12, pw_rounded ((k < 3 ? q : v)[3 * b + k % 3], least), digits);
       pw_row_end (&t);
     }
   }
@@ -47,17 +46,14 @@ void pw_states_print (const pw_system *s, const double *q, const double *v, int 
 
 void pw_states_json (const pw_system *s, const double *q, const double *v, const char *key, pw_json *j) {
   int n = pw_system_coordinates (s);
-  char name[PW_NAME_BYTES];
   pw_json_open (j, key, '{');
-  for (int i = 0; i < 2 * n; i++)
-    pw_json_number (j, pw_system_state_name (s, i, name, sizeof name), i < n ? q[i] : v[i - n]);
+  for (int i = 0; i < 2 * n; i++) pw_json_number (j, PW_NAME (pw_system_state_name, s, i), i < n ? q[i] : v[i - n]);
   pw_json_close (j, '}');
 }
 
 void pw_states_header (const pw_system *s, pw_text *t) {
-  char name[PW_NAME_BYTES];
   for (int i = 0; i < 2 * pw_system_coordinates (s); i++)
-    pw_text_name (t, pw_system_state_name (s, i, name, sizeof name), pw_system_state_unit (s, i));
+    pw_text_name (t, PW_NAME (pw_system_state_name, s, i), pw_system_state_unit (s, i));
 }
 
 void pw_complex_header (pw_text *t, int most, const char *unit) {

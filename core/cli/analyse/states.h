@@ -22,12 +22,12 @@ int pw_hold_add (const pw_system *s, const char *option, const char *text, const
 /* Adds the quantity of each --hold "STATE=VALUE"; `texts` ends with NULL, or is NULL. */
 int pw_hold_read (const pw_system *s, const char **texts, pw_initial_value *hold, int *holds, pw_error *error);
 
-/* The value, or 0 if its modulus is below `smallest`. */
-static inline double pw_rounded (double value, double smallest) {
-  return fabs (value) < smallest ? 0 : value;
+/* The value, or 0 if its modulus is below `least`. */
+static inline double pw_rounded (double value, double least) {
+  return fabs (value) < least ? 0 : value;
 }
-/* Prints x, y, phi and their rates of the bodies, at most 20, with 0 for numbers below `smallest`. */
-void pw_states_print (const pw_system *s, const double *q, const double *v, int digits, double smallest);
+/* Prints x, y, phi and their rates of the bodies, at most 20, with 0 for numbers below `least`. */
+void pw_states_print (const pw_system *s, const double *q, const double *v, int digits, double least);
 /* Writes an object with the names and values of all states. */
 void pw_states_json (const pw_system *s, const double *q, const double *v, const char *key, pw_json *j);
 

@@ -5,7 +5,6 @@
 #include <string.h>
 #include "figure.h"
 #include "report.h"
-#include "util.h"
 
 #define STEADY_STARTS "30" /* default of --starts */
 
@@ -79,12 +78,11 @@ static int steady_unadvised (const pw_steady_command *cmd, int status, pw_error 
 /* Stores the options --hold which, besides those given, select the motion last found within its family. */
 static int steady_advise (pw_steady_command *cmd, pw_steady_point *p, pw_error *error) {
   pw_initial_value hold[PW_HOLDS];
-  char name[PW_NAME_BYTES];
   size_t used = 0;
   int count = p->motion.family > 0 ? pw_steady_suggest (cmd->search, hold, PW_HOLDS) : 0;
   for (int i = 0; i < count && used < sizeof p->advice; i++)
     used += (size_t)snprintf (p->advice + used, sizeof p->advice - used, " --hold %s=%.9g",
-                              pw_system_held_name (cmd->m.system, hold[i].state, name, sizeof name), hold[i].value);
+                              PW_NAME (pw_system_held_name, cmd->m.system, hold[i].state), hold[i].value);
   if (used >= sizeof p->advice) *p->advice = 0;
   return count < 0 ? steady_unadvised (cmd, count, error) : PW_OK;
 }
@@ -138,7 +136,7 @@ static int steady_search (pw_steady_command *cmd, double parameter, pw_error *er
 }
 
 static int steady_fail (pw_steady_command *cmd, pw_error *error) {
-  char initial[60], random[100] = "", reason[300] = "";
+  char random[100] = "", reason[300] = "";
   if (cmd->changing)
     return pw_fail (error, PW_INPUT,
                     "%s: the equations change with time or along the motion: there is no steady motion",
@@ -148,7 +146,7 @@ static int steady_fail (pw_steady_command *cmd, pw_error *error) {
         error, PW_METHOD,
         "%s: all steady motions found are members of families, in which no branch begins; hold more (--hold)",
         pw_file_name (cmd->m.file));
-  snprintf (initial, sizeof initial, "from the initial state the residual ends at %.2g", cmd->residual[0]);
+  const char *initial = PW_PRINTED (60, "from the initial state the residual ends at %.2g", cmd->residual[0]);
   if (cmd->random_attempts)
     snprintf (random, sizeof random, ", from %d random ones at %.2g at best", cmd->random_attempts, cmd->residual[1]);
   if (*pw_steady_reason (cmd->search)) snprintf (reason, sizeof reason, "; %s", pw_steady_reason (cmd->search));
@@ -258,7 +256,6 @@ static int steady_nearest_motion (pw_steady_command *cmd, pw_steady_motion *m, p
 static int steady_hold_more (pw_steady_command *cmd, pw_error *error) {
   const pw_system *s = cmd->m.system;
   pw_steady_motion m;
-  char name[PW_NAME_BYTES];
   int status = steady_nearest_motion (cmd, &m, error);
   if (status == PW_RETRY || (status == PW_OK && m.family == 0)) return PW_OK;
   if (status != PW_OK) return status;
@@ -266,7 +263,7 @@ static int steady_hold_more (pw_steady_command *cmd, pw_error *error) {
   if (more < 0) return steady_unadvised (cmd, more, error);
   for (int i = cmd->settings.holds; i < cmd->settings.holds + more; i++)
     pw_cli_say ("pinwheel: holding %s=%.9g, as in the motion nearest to the initial state\n",
-                pw_system_held_name (s, cmd->hold[i].state, name, sizeof name), cmd->hold[i].value);
+                PW_NAME (pw_system_held_name, s, cmd->hold[i].state), cmd->hold[i].value);
   cmd->settings.holds += more;
   pw_steady_close (cmd->search);
   cmd->search = pw_steady_open (cmd->m.system, &cmd->settings, error);

@@ -41,11 +41,10 @@ static void steady_cells_rightmost (pw_table *t, const pw_steady_point *p) {
 static void steady_print_motions (const pw_steady_command *cmd) {
   const pw_system *s = cmd->m.system;
   const int n = pw_system_coordinates (s), held[] = { 2 * n, n + 2 }; /* (pw_system_find_held) speed, omega of body 0 */
-  char name[PW_NAME_BYTES];
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     pw_cell (&t, 6, "motion");
     for (int k = 0; k < 2; k++)
-      pw_cell_unit (&t, 12, pw_system_held_name (s, held[k], name, sizeof name), pw_system_held_unit (s, held[k]));
+      pw_cell_unit (&t, 12, PW_NAME (pw_system_held_name, s, held[k]), pw_system_held_unit (s, held[k]));
     pw_head (&t, 7, 7, (const char *[]){ "family", "growing", "rightmost [1/s]", "frequency [Hz]", "residual", NULL });
     for (int i = 0; i < cmd->points && i < STEADY_SHOWN; i++) {
       const pw_steady_point *p = cmd->point + i;
@@ -150,7 +149,6 @@ static void steady_point_json (const pw_steady_command *cmd, const pw_steady_poi
 
 static void steady_json (const void *context, pw_json *j) {
   const pw_steady_command *cmd = context;
-  char name[PW_NAME_BYTES];
   pw_json_open (j, NULL, '{');
   pw_json_number (j, "schema", 1);
   pw_json_text (j, "model", pw_file_name (cmd->m.file));
@@ -159,8 +157,7 @@ static void steady_json (const void *context, pw_json *j) {
   pw_json_open (j, "held", '{');
   for (int i = 0; i < cmd->settings.holds; i++)
     if (i != cmd->settings.vary)
-      pw_json_number (j, pw_system_held_name (cmd->m.system, cmd->hold[i].state, name, sizeof name),
-                      cmd->hold[i].value);
+      pw_json_number (j, PW_NAME (pw_system_held_name, cmd->m.system, cmd->hold[i].state), cmd->hold[i].value);
   pw_json_close (j, '}');
   pw_json_number (j, "symmetries", pw_steady_symmetries (cmd->search));
   pw_json_number (j, "attempts", PW_STEADY_NOT_RANDOM + cmd->random_attempts);

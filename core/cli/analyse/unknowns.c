@@ -5,7 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include "unknowns.h"
-#include "util.h"
 
 int pw_unknown_find (pw_unknown *u, const pw_cli_model *m, const char *name, pw_error *error) {
   *u = (pw_unknown){ .parameter = pw_cli_parameter (m->model, name), .state = -1 };

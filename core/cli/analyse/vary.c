@@ -1,7 +1,6 @@
 /* The option --vary of `steady` and `periodic`. */
 #include "vary.h"
 #include <string.h>
-#include "util.h"
 
 /* Refuses a parameter that is a count or also given by --set, and a range outside its domain. */
 static int vary_check (const pw_vary *v, const char *text, pw_error *error) {

@@ -4,7 +4,6 @@
 #define PW_FIT_H
 
 #include "sensitivity.h"
-#include "util.h"
 
 typedef struct {
   pw_cli_line line;

@@ -57,9 +57,8 @@ static double report_rms (const pw_fit *fit, int column, int *count) {
 /* ---- Text ---- */
 
 static void report_unknowns (const pw_fit *fit) {
-  char from[80];
+  const char *from = PW_PRINTED (80, "%g %% confidence:  from", 100 * fit->confidence);
   const char *const head[] = { "free", "initially", "estimate", "standard error", from, "to", NULL };
-  snprintf (from, sizeof from, "%g %% confidence:  from", 100 * fit->confidence);
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     pw_head (&t, -12, 12, head);
     for (int i = 0; i < fit->unknowns.count; i++) {
@@ -165,15 +164,14 @@ static void report_ends (const pw_fit *fit) {
 
 void pw_fit_print (const pw_fit *fit) {
   char options[PW_UNKNOWNS_OPTIONS];
-  int freedom = pw_fit_degrees_of_freedom (fit);
+  int dof = pw_fit_degrees_of_freedom (fit);
   report_unknowns (fit);
   report_columns (fit);
   if (fit->weighted)
     printf ("\nchi^2 %.6g with %d degrees of freedom (initially %.6g); it is larger with probability %.2g\n", fit->chi2,
-            freedom, fit->initial_chi2, freedom > 0 ? gsl_cdf_chisq_Q (fit->chi2, freedom) : 1);
+            dof, fit->initial_chi2, dof > 0 ? gsl_cdf_chisq_Q (fit->chi2, dof) : 1);
   else
-    printf ("\nsum of squares %.6g with %d degrees of freedom (initially %.6g)\n", fit->chi2, freedom,
-            fit->initial_chi2);
+    printf ("\nsum of squares %.6g with %d degrees of freedom (initially %.6g)\n", fit->chi2, dof, fit->initial_chi2);
   report_correlations (fit);
   report_undetermined (fit);
   printf ("\n%ld runs, %d iterations, derivatives by %s\n", fit->runs, fit->iterations,
@@ -280,13 +278,10 @@ void pw_fit_json (const pw_fit *fit, const char *status, FILE *f) {
 int pw_fit_table (const pw_fit *fit, FILE *f, pw_error *error) {
   static const char *const part[] = { "", ".model", ".residual", ".sigma" };
   pw_text t = { .chars = NULL };
-  char name[300];
   pw_text_name (&t, "t", "s");
   for (int i = 0; i < fit->columns; i++)
-    for (int k = 0; k < 4; k++) {
-      snprintf (name, sizeof name, "%s%s", fit->column_name[i], part[k]);
-      pw_text_name (&t, name, fit->column_unit[i]);
-    }
+    for (int k = 0; k < 4; k++)
+      pw_text_name (&t, PW_PRINTED (300, "%s%s", fit->column_name[i], part[k]), fit->column_unit[i]);
   int status = pw_text_line (&t, f, fit->table_path, error);
   for (int row = 0; row < fit->rows && status == PW_OK; row++) {
     pw_text_number (&t, fit->t[row]);
@@ -305,14 +300,13 @@ int pw_fit_table (const pw_fit *fit, FILE *f, pw_error *error) {
 
 static int report_data (const void *context, FILE *f, pw_error *error) {
   const pw_fit *fit = context;
-  char number[32];
   (void)error;
   fputs ("# t [s], data, standard deviation, model; a block per column\n", f);
   for (int i = 0; i < fit->columns; i++) {
     for (int k = 0; k < fit->rows; k++) {
       int c = i * fit->rows + k;
       const double value[] = { fit->t[k], fit->data[c], fit->weighted ? fit->sigma[c] : 0, fit->fitted[c] };
-      for (int v = 0; v < 4; v++) fprintf (f, "%s%s", v ? " " : "", pw_format (number, value[v], 12));
+      for (int v = 0; v < 4; v++) fprintf (f, "%s%s", v ? " " : "", PW_DIGITS (value[v], 12));
       fputc ('\n', f);
     }
     fputs ("\n\n", f);

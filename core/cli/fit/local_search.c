@@ -51,7 +51,6 @@ static int search_run (const local_search *local, pw_error *error) {
   const pw_unknowns *unknowns = &problem->unknowns;
   pw_outcomes outcomes = { .system = NULL };
   pw_unknown_run run;
-  char number[32];
   int status = pw_unknown_run_prepare (&run, unknowns, local->unknown, error);
   if (status == PW_OK)
     status = pw_outcomes_open (&outcomes, run.m.system, "output", problem->output, problem->outputs, error);
@@ -60,7 +59,7 @@ static int search_run (const local_search *local, pw_error *error) {
   for (int i = 0; status == PW_OK && i < problem->outputs; i++) {
     local->output[i] = pw_outcome_value (&outcomes, i, NULL);
     if (!isfinite (local->output[i]))
-      status = pw_fail (error, PW_METHOD, "%s is %s", problem->output[i], pw_format (number, local->output[i], 9));
+      status = pw_fail (error, PW_METHOD, "%s is %s", problem->output[i], PW_DIGITS (local->output[i], 9));
   }
   pw_outcomes_close (&outcomes);
   pw_unknown_run_close (&run);
@@ -185,20 +184,20 @@ static void search_evaluate (local_search *local, const double *scaled, int slop
   nlopt_force_stop (local->optimiser);
 }
 
-/* Stores the derivatives of factor x output i, 0 if they are unknown, unless `gradient` is NULL. */
-static void search_gradient (const local_search *local, int i, double factor, double *gradient) {
+/* Stores the derivatives of factor x output i, 0 if they are unknown, unless `grad` is NULL. */
+static void search_gradient (const local_search *local, int i, double factor, double *grad) {
   int unknowns = local->problem->unknowns.count;
-  for (int j = 0; gradient && j < unknowns; j++)
-    gradient[j] = local->failed || local->slopes_failed ? 0 : factor * local->slope[i * unknowns + j];
+  for (int j = 0; grad && j < unknowns; j++)
+    grad[j] = local->failed || local->slopes_failed ? 0 : factor * local->slope[i * unknowns + j];
 }
 
 /* The function that NLopt minimises: sign x objective, for a failed run more than in all others. */
-static double search_objective (unsigned unknowns, const double *scaled, double *gradient, void *context) {
+static double search_objective (unsigned unknowns, const double *scaled, double *grad, void *context) {
   local_search *local = context;
   double sign = local->problem->sign[0], most = local->most;
   (void)unknowns;
-  search_evaluate (local, scaled, gradient != NULL);
-  search_gradient (local, 0, sign, gradient);
+  search_evaluate (local, scaled, grad != NULL);
+  search_gradient (local, 0, sign, grad);
   if (!local->failed) return sign * local->output[0];
   double beyond = fmax (most - local->least, 0.1 * fabs (most));
   return isfinite (most) ? most + (beyond > 0 ? beyond : 1) : 0;
@@ -206,13 +205,12 @@ static double search_objective (unsigned unknowns, const double *scaled, double 
 
 /* The constraints of NLopt: their violations, which are 1 for a run that failed. */
 static void search_constraints (unsigned count, double *violation, unsigned unknowns, const double *scaled,
-                                double *gradient, void *context) {
+                                double *grad, void *context) {
   local_search *local = context;
-  search_evaluate (local, scaled, gradient != NULL);
+  search_evaluate (local, scaled, grad != NULL);
   for (int i = 1; i <= (int)count; i++) {
     violation[i - 1] = local->failed ? 1 : search_violation (local->problem, i, local->output);
-    search_gradient (local, i, search_factor (local->problem, i),
-                     gradient ? gradient + (unsigned)(i - 1) * unknowns : NULL);
+    search_gradient (local, i, search_factor (local->problem, i), grad ? grad + (unsigned)(i - 1) * unknowns : NULL);
   }
 }
 

@@ -86,15 +86,14 @@ static int optimise_search (pw_optimise *problem, pw_error *error) {
 /* Adds the constraint "OUTPUT<=VALUE" or "OUTPUT>=VALUE".  text: a copy of `given`, of which OUTPUT is kept. */
 static int optimise_constraint (pw_optimise *problem, char *text, const char *given, pw_error *error) {
   const int i = problem->outputs;
-  char *relation = NULL;
+  char *symbol = NULL;
   for (char *c = text; *c; c++)
-    if ((*c == '<' || *c == '>') && c[1] == '=') relation = c;
-  if (relation == NULL || pw_read_expression (relation + 2, &problem->bound[i]) != PW_OK ||
-      !isfinite (problem->bound[i]))
+    if ((*c == '<' || *c == '>') && c[1] == '=') symbol = c;
+  if (symbol == NULL || pw_read_expression (symbol + 2, &problem->bound[i]) != PW_OK || !isfinite (problem->bound[i]))
     return pw_fail (error, PW_INPUT, "--subject-to %.200s: expected OUTPUT<=VALUE or OUTPUT>=VALUE", given);
-  problem->sign[i] = *relation == '<' ? 1 : -1;
-  *relation = 0;
-  while (relation > text && relation[-1] == ' ') *--relation = 0;
+  problem->sign[i] = *symbol == '<' ? 1 : -1;
+  *symbol = 0;
+  while (symbol > text && symbol[-1] == ' ') *--symbol = 0;
   problem->output[problem->outputs++] = text;
   return PW_OK;
 }
@@ -121,13 +120,11 @@ static int optimise_read_outputs (pw_optimise *problem, pw_error *error) {
 
 /* Checks the outputs of an option, from number `first` on, and stores their units.  Extrema are not differentiable. */
 static int optimise_open_outputs (pw_optimise *problem, int first, int count, const char *option, pw_error *error) {
-  pw_outcomes outcomes;
-  int status = pw_outcomes_open (&outcomes, problem->model.system, option, problem->output + first, count, error);
-  for (int i = 0; i < outcomes.outcomes; i++)
-    pw_outcome_unit (&outcomes, i, problem->unit[first + i], sizeof *problem->unit);
-  for (int i = 0; i < outcomes.functionals; i++)
-    problem->differentiable &= !pw_is_extremum (outcomes.functional[i].type);
-  pw_outcomes_close (&outcomes);
+  pw_outcomes set;
+  int status = pw_outcomes_open (&set, problem->model.system, option, problem->output + first, count, error);
+  for (int i = 0; i < set.outcomes; i++) pw_outcome_unit (&set, i, problem->unit[first + i], sizeof *problem->unit);
+  for (int i = 0; i < set.functionals; i++) problem->differentiable &= !pw_is_extremum (set.functional[i].type);
+  pw_outcomes_close (&set);
   return status;
 }
 
@@ -186,7 +183,7 @@ static const double *optimise_nearest (const pw_optimise *problem, int *constrai
 
 /* The error if no run satisfies the constraints: that of the first run if every run failed. */
 static int optimise_infeasible (const pw_optimise *problem, pw_error *error) {
-  char value[32], bound[32], unit[90] = "";
+  char unit[90] = "";
   int i = 0;
   if (problem->failed == problem->runs && problem->first_error)
     return pw_fail (error, problem->first_error->status, "none of %ld runs succeeded, the first one: %s", problem->runs,
@@ -195,8 +192,8 @@ static int optimise_infeasible (const pw_optimise *problem, pw_error *error) {
   if (*problem->unit[i]) snprintf (unit, sizeof unit, " %s", problem->unit[i]);
   return pw_fail (error, PW_METHOD,
                   "no run from %d starts satisfies --subject-to; in the nearest one %s is %s%s and must be at %s %s%s",
-                  problem->starts, problem->output[i], pw_format (value, output[i], 9), unit,
-                  problem->sign[i] > 0 ? "most" : "least", pw_format (bound, problem->bound[i], 9), unit);
+                  problem->starts, problem->output[i], PW_DIGITS (output[i], 9), unit,
+                  problem->sign[i] > 0 ? "most" : "least", PW_DIGITS (problem->bound[i], 9), unit);
 }
 
 /* PW_METHOD if the search with the best result did not converge, or ended at a very large value of an unknown without
@@ -220,10 +217,9 @@ static int optimise_converged (const pw_optimise *problem, pw_error *error) {
 static int optimise_finish (pw_optimise *problem, pw_error *error) {
   FILE *result = pw_files_stream (&problem->files, OPTIMISE_RESULT),
        *summary = pw_files_stream (&problem->files, OPTIMISE_SUMMARY);
-  int interrupted = pw_stop != 0;
-  if (problem->best == NULL && interrupted)
-    pw_cli_say ("pinwheel: interrupted before any run satisfied the constraints\n");
-  if (problem->best == NULL) return interrupted ? PW_INTERRUPTED : optimise_infeasible (problem, error);
+  int stopped = pw_stop != 0;
+  if (problem->best == NULL && stopped) pw_cli_say ("pinwheel: interrupted before any run satisfied the constraints\n");
+  if (problem->best == NULL) return stopped ? PW_INTERRUPTED : optimise_infeasible (problem, error);
   pw_error unconverged = { 0 }, drawing = { 0 };
   int converged = optimise_converged (problem, &unconverged) == PW_OK;
   pw_optimise_print (problem);
@@ -231,11 +227,11 @@ static int optimise_finish (pw_optimise *problem, pw_error *error) {
   if (result) pw_optimise_yaml (problem, result);
   if (problem->plots_path) pw_optimise_draw (problem, &drawing);
   const char *word = drawing.status ? pw_cli_status_word (drawing.status) : converged ? "ok" : "method";
-  if (summary) pw_optimise_json (problem, interrupted ? "interrupted" : word, summary);
+  if (summary) pw_optimise_json (problem, stopped ? "interrupted" : word, summary);
   int status = pw_files_finish (&problem->files, error);
   if (status == PW_OK && drawing.status) status = pw_fail (error, drawing.status, "%s", drawing.text);
-  if (interrupted) pw_cli_say ("pinwheel: interrupted; this is the best result so far\n");
-  if (status == PW_OK && interrupted) return PW_INTERRUPTED;
+  if (stopped) pw_cli_say ("pinwheel: interrupted; this is the best result so far\n");
+  if (status == PW_OK && stopped) return PW_INTERRUPTED;
   return status == PW_OK && !converged ? pw_fail (error, unconverged.status, "%s", unconverged.text) : status;
 }
 

@@ -5,7 +5,6 @@
 
 #include <pthread.h>
 #include "sensitivity.h"
-#include "util.h"
 
 /* A local search and its runs. */
 typedef struct {

@@ -88,18 +88,13 @@ static void report_outputs (const pw_optimise *problem) {
   putchar ('\n');
   for (pw_table t = { 0 }; pw_table_pass (&t);)
     for (int i = 0; i < problem->outputs; i++) {
-      char text[120], number[32];
-      snprintf (text, sizeof text,
-                i == 0                 ? (problem->maximise ? "largest" : "smallest")
-                : problem->sign[i] > 0 ? "at most %s"
-                                       : "at least %s",
-                pw_format (number, problem->bound[i], REPORT_DIGITS));
+      const char *bound = PW_DIGITS (problem->bound[i], REPORT_DIGITS);
       pw_cell_unit (&t, -12, problem->output[i], problem->unit[i]);
       pw_cell_number (&t, 12, output[i], REPORT_DIGITS);
-      pw_cell (&t, -1, text);
+      if (i > 0) pw_cell (&t, -1, PW_PRINTED (60, "at %s %s", problem->sign[i] > 0 ? "most" : "least", bound));
+      if (i == 0) pw_cell (&t, -1, problem->maximise ? "largest" : "smallest");
       if (i == 0)
-        snprintf (text, sizeof text, "(initially %s)", pw_format (number, report_initial (problem), REPORT_DIGITS));
-      if (i == 0) pw_cell (&t, -1, text);
+        pw_cell (&t, -1, PW_PRINTED (60, "(initially %s)", PW_DIGITS (report_initial (problem), REPORT_DIGITS)));
       pw_row_end (&t);
     }
 }
@@ -246,7 +241,6 @@ void pw_optimise_yaml (const pw_optimise *problem, FILE *f) {
 static int report_data (const void *context, FILE *f, pw_error *error) {
   const pw_optimise *problem = context;
   int n = problem->unknowns.count, width = n + problem->outputs;
-  char number[32];
   (void)error;
   fputs ("# start", f);
   for (int i = 0; i < n; i++) fprintf (f, ", %s [%s]", problem->unknowns.list[i].name, problem->unknowns.list[i].unit);
@@ -255,7 +249,7 @@ static int report_data (const void *context, FILE *f, pw_error *error) {
     for (long k = 0; k < problem->search[i].runs; k++) {
       fprintf (f, "%d", i + 1);
       const double *row = problem->search[i].trials + k * width;
-      for (int c = 0; c <= n; c++) fprintf (f, " %s", pw_format (number, row[c], 12));
+      for (int c = 0; c <= n; c++) fprintf (f, " %s", PW_DIGITS (row[c], 12));
       fprintf (f, " %d\n", !isnan (row[n]) && pw_search_feasible (problem, row + n));
     }
   return PW_OK;

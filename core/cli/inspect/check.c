@@ -6,7 +6,6 @@
 #include <string.h>
 #include "check_report.h"
 #include "report.h"
-#include "util.h"
 
 enum { CHECK_SEEDS = 5 /* random scenes of each element type */ };
 

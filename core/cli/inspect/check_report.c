@@ -3,7 +3,6 @@
 #include <stdarg.h>
 #include <string.h>
 #include "check_report.h"
-#include "util.h"
 
 enum { REPORT_LISTED = 8, REPORT_EIGENVALUES = 60 }; /* items of a list; lines of eigenvalues: in the text, at most */
 
@@ -82,11 +81,10 @@ static void report_singular_value (pw_json *j, const pw_check *check) {
 static void report_mobility (pw_json *j, const pw_check *check) {
   const pw_system *s = check->model.system;
   const pw_linear *linear = &check->linear;
-  int coordinates = pw_system_coordinates (s), rows = pw_system_rows (s), holonomic = pw_system_holonomic (s),
-      listed = 0;
+  int coords = pw_system_coordinates (s), rows = pw_system_rows (s), holonomic = pw_system_holonomic (s), listed = 0;
   report_section (j, "mobility", '{', "Mobility");
   pw_json_number (j, "bodies", pw_system_bodies (s));
-  report_entry (j, "coordinates", coordinates, "coordinates", "%d", coordinates);
+  report_entry (j, "coordinates", coords, "coordinates", "%d", coords);
   report_entry (j, "rows", rows, "constraint equations", "%d (%d on positions, %d on velocities)", rows, holonomic,
                 rows - holonomic);
   pw_json_number (j, "holonomic_rows", holonomic);
@@ -111,10 +109,10 @@ static void report_mass (pw_json *j, const pw_check *check) {
   static const char *const lack[] = { NULL, "no mass", "no inertia", "neither mass nor inertia" };
   /* the error of solvers/kkt/massless_open.c; after other errors it is not known if the matrix is singular */
   int is_singular = strstr (check->run_error.text, "no constraint determines how it moves") != NULL;
-  const char *saddle_point = is_singular                         ? "singular"
-                             : check->run == NULL                ? NULL
-                             : pw_run_redundant (check->run) > 0 ? "regular without the redundant constraint equations"
-                                                                 : "regular";
+  const char *condition = is_singular                         ? "singular"
+                          : check->run == NULL                ? NULL
+                          : pw_run_redundant (check->run) > 0 ? "regular without the redundant constraint equations"
+                                                              : "regular";
   const pw_system *s = check->model.system;
   const double *M = pw_system_mass (s);
   int lacking = 0, listed = 0;
@@ -128,10 +126,9 @@ static void report_mass (pw_json *j, const pw_check *check) {
     report_item (j, &listed, name, PW_PRINTED (300, "%s has %s", name, lack[which]));
   }
   report_end_list (j, listed);
-  report_text (j, "saddle-point matrix", "%s%s", saddle_point ? saddle_point : "not known",
-               is_singular ? "; see below" : "");
+  report_text (j, "saddle-point matrix", "%s%s", condition ? condition : "not known", is_singular ? "; see below" : "");
   report_line (j);
-  pw_json_text (j, "saddle_point", saddle_point);
+  pw_json_text (j, "saddle_point", condition);
 }
 
 /* ---- Initial conditions ---- */
@@ -239,8 +236,7 @@ static void report_eigenvalues (const pw_linear *linear) {
     }
     same = report_equal (linear, i);
     int multiplicity = linear->im[i] != 0 ? same / 2 : same;
-    char times[30] = "";
-    if (multiplicity > 1) snprintf (times, sizeof times, ", %d times", multiplicity);
+    const char *times = multiplicity > 1 ? PW_PRINTED (30, ", %d times", multiplicity) : "";
     report_text (NULL, i == 0 ? "eigenvalues, rightmost first" : "", "%s%s%s", report_eigenvalue (linear, i, text),
                  times, linear->rigid[i] ? ": rigid displacement" : "");
   }
@@ -279,14 +275,13 @@ static void report_fastest (pw_json *j, const pw_check *check) {
   int found = check->fastest >= 0;
   double re = found ? linear->re[check->fastest] : 0, im = found ? fabs (linear->im[check->fastest]) : 0,
          size = hypot (re, im);
-  double damping = !found ? NAN : re != 0 ? -re / size : 0;
+  double ratio = !found ? NAN : re != 0 ? -re / size : 0;
   char text[100];
   if (found) report_text (j, "fastest eigenvalue", "%s", report_eigenvalue (linear, check->fastest, text));
   report_entry (j, "frequency_hz", im / (2 * PW_PI), im != 0 ? "its frequency" : NULL,
                 "%s Hz, undamped it would be %s Hz", PW_DIGITS (im / (2 * PW_PI), CHECK_DIGITS),
                 PW_DIGITS (size / (2 * PW_PI), CHECK_DIGITS));
-  report_entry (j, "damping", damping, im != 0 ? "its damping" : NULL, "%s of critical",
-                PW_DIGITS (damping, CHECK_DIGITS));
+  report_entry (j, "damping", ratio, im != 0 ? "its damping" : NULL, "%s of critical", PW_DIGITS (ratio, CHECK_DIGITS));
   if (found && im == 0)
     report_text (j, re < 0 ? "it decays by a factor of e in" : "it grows by a factor of e in", "%s s",
                  PW_DIGITS (1 / size, CHECK_DIGITS));
@@ -317,12 +312,8 @@ static void report_linear (pw_json *j, const pw_check *check) {
   report_stability (j, check);
   report_fastest (j, check);
   report_section (j, "eigenvalues", '[', NULL);
-  for (int i = 0; i < linear->unknowns; i++) {
-    pw_json_open (j, NULL, '[');
-    pw_json_number (j, NULL, linear->re[i]);
-    pw_json_number (j, NULL, linear->im[i]);
-    pw_json_close (j, ']');
-  }
+  for (int i = 0; i < linear->unknowns; i++)
+    pw_json_numbers (j, NULL, (const double[]){ linear->re[i], linear->im[i] }, 2);
   pw_json_close (j, ']');
   pw_json_close (j, '}');
 }

@@ -3,7 +3,6 @@
 #include <string.h>
 #include "cli.h"
 #include "print_table.h"
-#include "util.h"
 
 /* Characters of a line whose last column is wrapped; of a line of names; of the heading before the names. */
 enum { LIST_WIDTH = 110, LIST_NAMES = 100, LIST_HEADING = 14 };

@@ -5,7 +5,6 @@
 #include <string.h>
 #include "print_table.h"
 #include "show.h"
-#include "util.h"
 
 enum { SHOW_DIGITS = 6 };
 
@@ -50,14 +49,12 @@ static void show_parameters (const pw_model *m) {
   for (pw_table t = { 0 }; pw_table_pass (&t);)
     for (const pw_parameter *p = parameters; p->name; p++) {
       double value = pw_model_parameter (m, p);
-      char original[60] = "";
       pw_cell (&t, -1, p->name);
       pw_cell_number (&t, 1, value, SHOW_DIGITS);
       pw_cell (&t, -1, p->unit ? p->unit : "");
       pw_cell (&t, -1, pw_domain_text (p->domain));
       pw_cell (&t, -1, p->about ? p->about : "");
-      if (value != p->value) snprintf (original, sizeof original, "default %s", PW_DIGITS (p->value, SHOW_DIGITS));
-      if (*original) pw_cell (&t, -1, original);
+      if (value != p->value) pw_cell (&t, -1, PW_PRINTED (60, "default %s", PW_DIGITS (p->value, SHOW_DIGITS)));
       pw_row_end (&t);
     }
 }
@@ -121,46 +118,45 @@ static void matrices_row (pw_table *t, const char *name, const char *unit, const
   pw_row_end (t);
 }
 
-static void matrices_coordinates (const pw_system *s, const pw_equations *equations, const pw_sample *sample) {
+static void matrices_coordinates (const pw_system *s, const pw_equations *eq, const pw_sample *sample) {
   static const char *const head[] = { "", "M", "f", "q", "v", "a", NULL };
   puts ("\nM (diagonal), forces and state by coordinate [its unit]; all numbers in SI units");
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     pw_head (&t, -22, 13, head);
-    for (int j = 0; j < equations->coordinates; j++) {
-      const double value[] = { equations->mass[j], equations->force[j], sample->q[j], sample->v[j], sample->a[j] };
+    for (int j = 0; j < eq->coordinates; j++) {
+      const double value[] = { eq->mass[j], eq->force[j], sample->q[j], sample->v[j], sample->a[j] };
       matrices_row (&t, PW_NAME (pw_system_state_name, s, j), pw_system_state_unit (s, j), value, 5);
     }
   }
 }
 
-static void matrices_constraints (const pw_system *s, const pw_equations *equations, const pw_sample *sample) {
+static void matrices_constraints (const pw_system *s, const pw_equations *eq, const pw_sample *sample) {
   static const char *const head[] = { "", "gamma", "eta", "g", "lambda", NULL };
   puts ("\ngamma, eta, g and lambda by constraint equation, named after its reaction -lambda [its unit]");
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     pw_head (&t, -22, 13, head);
-    for (int i = 0; i < equations->rows; i++) {
-      const double g = i < equations->holonomic ? equations->g[i] : NAN,
-                   value[] = { equations->gamma[i], equations->eta[i], g, sample->lambda[i] };
+    for (int i = 0; i < eq->rows; i++) {
+      const double g = i < eq->holonomic ? eq->g[i] : NAN, value[] = { eq->gamma[i], eq->eta[i], g, sample->lambda[i] };
       matrices_row (&t, PW_NAME (pw_system_reaction_name, s, i), pw_system_reaction_unit (s, i), value, 4);
     }
   }
 }
 
 /* Columns of J from `first` on; in a large scene only the rows that are not zero there.  Entries are sorted by rows. */
-static void matrices_panel (const pw_system *s, const pw_equations *equations, int first) {
-  int left = equations->coordinates - first, columns = left < MATRICES_PANEL ? left : MATRICES_PANEL;
+static void matrices_panel (const pw_system *s, const pw_equations *eq, int first) {
+  int left = eq->coordinates - first, columns = left < MATRICES_PANEL ? left : MATRICES_PANEL;
   putchar ('\n');
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     pw_cell (&t, -22, "J");
     for (int c = 0; c < columns; c++) pw_cell (&t, 13, PW_NAME (pw_system_state_name, s, first + c));
     pw_row_end (&t);
-    for (int i = 0, entry = 0; i < equations->rows; i++) {
+    for (int i = 0, entry = 0; i < eq->rows; i++) {
       double row[MATRICES_PANEL] = { 0 };
-      int shown = equations->coordinates <= 2 * MATRICES_PANEL;
-      for (; entry < equations->entries && equations->row[entry] == i; entry++) {
-        int c = equations->column[entry] - first;
+      int shown = eq->coordinates <= 2 * MATRICES_PANEL;
+      for (; entry < eq->entries && eq->row[entry] == i; entry++) {
+        int c = eq->column[entry] - first;
         if (c < 0 || c >= columns) continue;
-        row[c] = equations->value[entry] + 0; /* not -0 */
+        row[c] = eq->value[entry] + 0; /* not -0 */
         shown |= row[c] != 0;
       }
       if (!shown) continue;
@@ -169,16 +165,15 @@ static void matrices_panel (const pw_system *s, const pw_equations *equations, i
   }
 }
 
-static void matrices_print (const pw_cli_model *m, const pw_equations *equations, const pw_sample *sample) {
+static void matrices_print (const pw_cli_model *m, const pw_equations *eq, const pw_sample *sample) {
   const pw_system *s = m->system;
   printf ("%s at t = %s s\n", pw_file_name (m->file), PW_DIGITS (sample->t, MATRICES_DIGITS));
-  matrices_coordinates (s, equations, sample);
-  if (equations->rows == 0) puts ("\nThe model has no constraints: no J, no gamma");
-  if (equations->rows > 0) matrices_constraints (s, equations, sample);
-  if (equations->rows > 0 && equations->coordinates > 2 * MATRICES_PANEL)
+  matrices_coordinates (s, eq, sample);
+  if (eq->rows == 0) puts ("\nThe model has no constraints: no J, no gamma");
+  if (eq->rows > 0) matrices_constraints (s, eq, sample);
+  if (eq->rows > 0 && eq->coordinates > 2 * MATRICES_PANEL)
     puts ("\nRows of J that are zero in the columns shown are left out");
-  for (int j = 0; equations->rows > 0 && j < equations->coordinates; j += MATRICES_PANEL)
-    matrices_panel (s, equations, j);
+  for (int j = 0; eq->rows > 0 && j < eq->coordinates; j += MATRICES_PANEL) matrices_panel (s, eq, j);
 }
 
 static int show_matrices (const pw_cli_model *m, double t, pw_error *error) {
@@ -187,12 +182,12 @@ static int show_matrices (const pw_cli_model *m, double t, pw_error *error) {
   pw_run *run = pw_run_open (m->system, defaults.method, &settings, error);
   if (run == NULL) return error->status;
   pw_sample sample;
-  pw_equations equations = { .rows = 0 };
+  pw_equations eq = { .rows = 0 };
   int status = t > 0 ? pw_run_advance_to (run, t, t, error) : PW_OK;
   if (status == PW_OK) status = pw_run_sample (run, t, &sample, error);
-  if (status == PW_OK) status = pw_system_equations (m->system, sample.t, sample.q, sample.v, &equations, error);
-  if (status == PW_OK) matrices_print (m, &equations, &sample);
-  pw_equations_free (&equations);
+  if (status == PW_OK) status = pw_system_equations (m->system, sample.t, sample.q, sample.v, &eq, error);
+  if (status == PW_OK) matrices_print (m, &eq, &sample);
+  pw_equations_free (&eq);
   pw_run_close (run);
   return status;
 }

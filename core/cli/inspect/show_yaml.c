@@ -196,19 +196,17 @@ static void yaml_run (const pw_run_defaults *run) {
 }
 
 /* Expressions contain names, whose values are written under `let`. */
-static void yaml_names (const pw_reference_text *reference) {
-  if (reference->names) puts ("let:");
-  for (int i = 0; i < reference->names; i++)
-    printf ("  %s: %s\n", reference->name[i], YAML_NUMBER (reference->value[i]));
+static void yaml_names (const pw_reference_text *ref) {
+  if (ref->names) puts ("let:");
+  for (int i = 0; i < ref->names; i++) printf ("  %s: %s\n", ref->name[i], YAML_NUMBER (ref->value[i]));
 }
 
 static void yaml_reference (const pw_model *m) {
-  const pw_reference_text *reference = pw_model_reference (m);
+  const pw_reference_text *ref = pw_model_reference (m);
   if (pw_model_table (m)->reference)
     puts ("# The reference solution of the model is a function in C, which cannot be written as text.");
-  if (reference->states) puts ("truth:");
-  for (int i = 0; i < reference->states; i++)
-    printf ("  %s: ", reference->state[i]), yaml_text (reference->text[i]), putchar ('\n');
+  if (ref->states) puts ("truth:");
+  for (int i = 0; i < ref->states; i++) printf ("  %s: ", ref->state[i]), yaml_text (ref->text[i]), putchar ('\n');
 }
 
 int pw_show_yaml (const pw_cli_model *opened, pw_error *error) {

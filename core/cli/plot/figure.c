@@ -8,7 +8,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 #include "figure.h"
-#include "util.h"
 
 const char *const pw_figure_endings[] = { ".dat", ".gp", ".svg", ".png", ".pdf", NULL };
 

@@ -8,7 +8,6 @@
 
 #include <math.h>
 #include "figure.h"
-#include "util.h"
 
 typedef struct pw_plots pw_plots;
 

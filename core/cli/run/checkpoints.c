@@ -42,7 +42,6 @@ int pw_checkpoints_open (pw_run_cli *command, pw_specialise *specialise, pw_erro
 /* Everything that determines the results. */
 static int checkpoints_fingerprint (pw_run_cli *command, pw_error *error) {
   const unsigned short order = 1;
-  char numbers[60];
   pw_text *text = &command->checkpoints.fingerprint;
   const pw_model *model = command->compiled.model;
   if (pw_fingerprint_run (text, PW_CHECKPOINT_MAGIC, command->compiled.file, pw_fingerprint_tables (0, model),
@@ -62,8 +61,8 @@ static int checkpoints_fingerprint (pw_run_cli *command, pw_error *error) {
   else if (pw_fingerprint_file (text, "reference", command->reference_path, command->reference_path, error) != PW_OK)
     return error->status;
   pw_fingerprint_number (text, checkpoints_interval_key, NULL, command->checkpoints.interval);
-  snprintf (numbers, sizeof numbers, "%s endian, %zu bytes", *(const unsigned char *)&order ? "little" : "big",
-            sizeof (long));
+  const char *numbers =
+      PW_PRINTED (60, "%s endian, %zu bytes", *(const unsigned char *)&order ? "little" : "big", sizeof (long));
   pw_fingerprint_line (text, "numbers", NULL, numbers);
   pw_text_add (text, "end\n");
   return text->failed ? pw_fail (error, PW_RESOURCE, "out of memory") : PW_OK;
@@ -141,7 +140,6 @@ static int checkpoints_plausible (const pw_run_cli *command) {
 
 int pw_checkpoints_resume (pw_run_cli *command, pw_error *error) {
   pw_checkpoints *checkpoints = &command->checkpoints;
-  char t[32];
   if (checkpoints->resume_path) {
     checkpoints_serialise (command, &checkpoints->resumed.state);
     if (pw_run_load (command->run, &checkpoints->resumed.state, error) != PW_OK) return error->status;
@@ -151,7 +149,7 @@ int pw_checkpoints_resume (pw_run_cli *command, pw_error *error) {
                       "are impossible",
                       checkpoints->resume_path);
     command->loaded = 1;
-    pw_cli_say ("pinwheel: resumed at t = %s s\n", pw_format (t, pw_run_time (command->run), 6));
+    pw_cli_say ("pinwheel: resumed at t = %s s\n", PW_DIGITS (pw_run_time (command->run), 6));
   }
   checkpoints_schedule (checkpoints, pw_run_time (command->run));
   return PW_OK;

@@ -4,7 +4,6 @@
 #include <math.h>
 #include <string.h>
 #include "motion.h"
-#include "util.h"
 
 #define FILE_SAME 1e-9 /* relative to the final time: smaller differences of times are ignored */
 
@@ -79,14 +78,11 @@ static int file_number (const file_reader *reader, const char *cell, double *val
 
 /* Lists the names of states and reactions in the order of a sample. */
 static int file_list_names (file_reader *reader, const pw_system *system) {
-  char name[PW_NAME_BYTES];
   int states = 2 * pw_system_coordinates (system), rows = pw_system_rows (system);
   if (pw_names_open (&reader->indices, (size_t)(states + rows)) != PW_OK) return PW_RESOURCE;
   for (int i = 0; i < states + rows; i++) {
-    if (i < states)
-      pw_system_state_name (system, i, name, sizeof name);
-    else
-      pw_system_reaction_name (system, i - states, name, sizeof name);
+    const char *name =
+        i < states ? PW_NAME (pw_system_state_name, system, i) : PW_NAME (pw_system_reaction_name, system, i - states);
     const char *copy = pw_arena_copy (&reader->arena, name);
     if (copy == NULL) return PW_RESOURCE;
     pw_names_add (&reader->indices, copy, i);
@@ -115,7 +111,7 @@ static int file_find_column (file_reader *reader, int i, const pw_system *system
 }
 
 static int file_read_columns (file_reader *reader, const pw_system *system, pw_error *error) {
-  char example[PW_NAME_BYTES], text[260];
+  char text[260];
   int status = file_next_line (reader, error);
   if (status == PW_RETRY) return pw_fail (error, PW_INPUT, "--reference %s: the file is empty", reader->path);
   if (status != PW_OK) return status;
@@ -134,7 +130,7 @@ static int file_read_columns (file_reader *reader, const pw_system *system, pw_e
     if (file_find_column (reader, i, system, file_cell (&rest), error) != PW_OK) return error->status;
   if (reader->states) return PW_OK;
   return pw_fail (error, PW_INPUT, "--reference %s: no column is a state of this model, such as \"%s\"", reader->path,
-                  pw_system_state_name (system, 0, example, sizeof example));
+                  PW_NAME (pw_system_state_name, system, 0));
 }
 
 /* ---- Rows ---- */
@@ -152,7 +148,7 @@ static int file_read_time (file_reader *reader, char **rest, double *t, pw_error
 /* Counts the rows after 0 and up to *t_end, which becomes the time of the last row if it is 0. */
 static int file_count_rows (file_reader *reader, double *t_end, int *rows, pw_error *error) {
   double t, last = 0, before = -INFINITY;
-  char *rest, end[32];
+  char *rest;
   int status;
   for (*rows = 0; (status = file_read_time (reader, &rest, &t, error)) == PW_OK;) {
     if (!(t > before) || isinf (t))
@@ -167,7 +163,7 @@ static int file_count_rows (file_reader *reader, double *t_end, int *rows, pw_er
   if (*t_end == 0) *t_end = last;
   if (*rows > 0) return PW_OK;
   return pw_fail (error, PW_INPUT, "--reference %s: no row between 0 and the final time, t = %s s", reader->path,
-                  pw_format (end, *t_end, 9));
+                  PW_DIGITS (*t_end, 9));
 }
 
 /* Reads the cells after the time into a sample of `width` numbers; NaN, unknown, where there is no column

@@ -1,7 +1,7 @@
 /* Prints tables: a first pass over the rows measures the columns, a second one prints. */
 #include <math.h>
 #include <stdlib.h>
-#include "pinwheel-files.h"
+#include "cli.h"
 #include "print_table.h"
 
 int pw_table_pass (pw_table *table) {
@@ -29,14 +29,11 @@ int pw_cell (pw_table *table, int width, const char *text) {
 }
 
 int pw_cell_number (pw_table *table, int width, double value, int digits) {
-  char text[32];
-  return pw_cell (table, width, isnan (value) ? "" : pw_format (text, value, digits));
+  return pw_cell (table, width, isnan (value) ? "" : PW_DIGITS (value, digits));
 }
 
 int pw_cell_unit (pw_table *table, int width, const char *name, const char *unit) {
-  char text[350];
-  snprintf (text, sizeof text, *unit ? "%s [%s]" : "%s", name, unit);
-  return pw_cell (table, width, text);
+  return pw_cell (table, width, PW_PRINTED (350, *unit ? "%s [%s]" : "%s", name, unit));
 }
 
 void pw_row_end (pw_table *table) {

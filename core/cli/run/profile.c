@@ -9,9 +9,7 @@ static void profile_cell (pw_table *table, double ns) {
 }
 
 static void profile_share (pw_table *table, double part, double whole) {
-  char text[40];
-  snprintf (text, sizeof text, "%.0f %%", 100 * part / whole);
-  pw_cell (table, 8, whole > 0 ? text : "");
+  pw_cell (table, 8, whole > 0 ? PW_PRINTED (40, "%.0f %%", 100 * part / whole) : "");
 }
 
 /* The name of an element type, or of the bodies, and its counts; unknowns: accelerations and multipliers. */
@@ -83,17 +81,16 @@ static void profile_stages (const pw_profile *profile, FILE *f) {
 }
 
 static void profile_print (const pw_system *system, const pw_run *run, const pw_profile *profile, double cpu, FILE *f) {
-  char t[32], evaluations[32], iterations[32];
   double steps = (double)pw_run_statistics (run)->steps;
   fprintf (f, "\n  what an evaluation of the accelerations costs [ns] at t = %s s\n\n",
-           pw_format (t, pw_run_time (run), 8));
+           PW_DIGITS (pw_run_time (run), 8));
   profile_kinds (profile, pw_system_bodies (system), f);
   profile_stages (profile, f);
   if (pw_run_statistics (run)->specialised > 0)
     fprintf (f, "\n  `together` is by specialised code, all other times are of the general engine\n");
   if (steps == 0) return;
-  pw_format (evaluations, (double)pw_run_statistics (run)->rhs / steps, 3);
-  pw_format (iterations, profile->iterations, 2);
+  const char *evaluations = PW_DIGITS ((double)pw_run_statistics (run)->rhs / steps, 3);
+  const char *iterations = PW_DIGITS (profile->iterations, 2);
   fprintf (f, "\n  a step of the run took %.0f ns; evaluations%s: %s", 1e9 * cpu / steps,
            profile->evaluations > 0 ? "" : " of residuals, matrices not counted", evaluations);
   if (profile->projections > 0)

@@ -25,25 +25,23 @@ static void report_more (FILE *f, int more, const char *hint) {
 
 /* A fixed step longer than the time in which the initial motion changes. */
 static void report_step (const pw_run *run, double step) {
-  char step_text[32], time_text[32];
   double time_scale = pw_run_scale (run)->time;
   if (step > time_scale)
     pw_cli_say (
         "pinwheel: a step of %s s is long for a motion that changes within %s s, and nothing controls its error: "
         "compare with shorter ones\n",
-        pw_format (step_text, step, 3), pw_format (time_text, time_scale, 2));
+        PW_DIGITS (step, 3), PW_DIGITS (time_scale, 2));
 }
 
 /* An absolute tolerance within which a force saturates. */
 static void report_atol (pw_run *run, const pw_system *system, double atol) {
-  char atol_text[32], saturation_text[32], element[PW_NAME_BYTES];
+  char element[PW_NAME_BYTES];
   double saturation;
   int state = atol > 0 ? pw_run_saturation (run, &saturation, element, sizeof element) : -1;
   if (state >= 0 && atol > saturation)
     pw_cli_say ("pinwheel: --atol %s is above %s %s, within which the force of %s reverses: methods with Newton's "
                 "iteration reduce the tolerance of the states that the force depends on, others may be wrong\n",
-                pw_format (atol_text, atol, 3), pw_format (saturation_text, saturation, 3),
-                pw_system_state_unit (system, state), element);
+                PW_DIGITS (atol, 3), PW_DIGITS (saturation, 3), pw_system_state_unit (system, state), element);
 }
 
 void pw_report_settings (pw_run *run, const pw_system *system, const char *method, const pw_cli_line *line,
@@ -59,13 +57,10 @@ void pw_report_settings (pw_run *run, const pw_system *system, const char *metho
 
 /* Angles of more than a turn: most likely they are degrees. */
 static void report_angle (const char *kind, const char *name, const char *field, double angle) {
-  char value[32], degrees[32];
   if (!(fabs (angle) > 2 * PW_PI)) return;
-  pw_format (value, angle, 6);
-  pw_format (degrees, fmod (angle * 180 / PW_PI, 360), 4);
   pw_cli_say ("pinwheel: %s %s: %s = %s rad is more than a turn and ends at %s degrees; if degrees are meant, write "
               "\"*deg\" after the number\n",
-              kind, name, field, value, degrees);
+              kind, name, field, PW_DIGITS (angle, 6), PW_DIGITS (fmod (angle * 180 / PW_PI, 360), 4));
 }
 
 /* Expressions that may jump when states change; steps do not end at such jumps. */
@@ -119,9 +114,8 @@ static void report_initial (const pw_system *system, const pw_initial_report *in
 
 void pw_report_initialisation (const pw_run *run, const pw_system *system, const char *const *redundant) {
   int differences = pw_system_differences (system), count = 0;
-  char name[PW_NAME_BYTES];
   for (int i = 0; i < differences && i < REPORT_MESSAGES; i++)
-    pw_cli_say ("pinwheel: derivatives by differences: %s\n", pw_system_difference_name (system, i, name, sizeof name));
+    pw_cli_say ("pinwheel: derivatives by differences: %s\n", PW_NAME (pw_system_difference_name, system, i));
   report_more (stderr, differences - REPORT_MESSAGES, "");
   report_initial (system, pw_run_initial (run));
   for (; redundant && redundant[count]; count++)
@@ -170,12 +164,11 @@ static void report_bodies (const pw_system *system, const pw_sample *last) {
 static void report_internal (const pw_system *system, const pw_sample *last) {
   int first = 3 * pw_system_bodies (system), n = pw_system_coordinates (system);
   int end = n - first > REPORT_ROWS ? first + REPORT_ROWS : n;
-  char name[PW_NAME_BYTES];
   for (pw_table table = { 0 }; pw_table_pass (&table);)
     for (int j = first; j < end; j++) {
       for (int state = j; state < 2 * n; state += n)
-        report_value (&table, -1, pw_system_state_name (system, state, name, sizeof name),
-                      state < n ? last->q[j] : last->v[j], pw_system_state_unit (system, state));
+        report_value (&table, -1, PW_NAME (pw_system_state_name, system, state), state < n ? last->q[j] : last->v[j],
+                      pw_system_state_unit (system, state));
       pw_row_end (&table);
     }
   report_more (stdout, n - end, "");
@@ -184,11 +177,10 @@ static void report_internal (const pw_system *system, const pw_sample *last) {
 /* Reactions are -lambda; 0 - lambda is never -0. */
 static void report_reactions (const pw_system *system, const pw_sample *last) {
   int rows = pw_system_rows (system), shown = rows < REPORT_ROWS ? rows : REPORT_ROWS;
-  char name[PW_NAME_BYTES];
   if (rows > 0) printf ("\n  reaction\n");
   for (pw_table table = { 0 }; pw_table_pass (&table);)
     for (int i = 0; i < shown; i++) {
-      report_value (&table, -8, pw_system_reaction_name (system, i, name, sizeof name), 0 - last->lambda[i],
+      report_value (&table, -8, PW_NAME (pw_system_reaction_name, system, i), 0 - last->lambda[i],
                     pw_system_reaction_unit (system, i));
       pw_row_end (&table);
     }
@@ -222,9 +214,8 @@ static void report_error (pw_table *table, const char *name, double end, double 
 static void report_errors (const pw_reference_error *errors) {
   static const char *const name[] = { "length", "angle", "speed", "rate" };
   static const char *const unit[] = { "m", "rad", "m/s", "rad/s" };
-  char time[32], at[40];
   if (errors == NULL) return;
-  snprintf (at, sizeof at, "at %s s", pw_format (time, errors->t, 6));
+  const char *at = PW_PRINTED (40, "at %s s", PW_DIGITS (errors->t, 6));
   pw_cli_print (stdout, "\n  error against the reference solution of %s, at %d time%s\n", errors->source,
                 errors->samples, errors->samples == 1 ? "" : "s");
   for (pw_table table = { 0 }; pw_table_pass (&table);) {
@@ -256,8 +247,7 @@ pw_summary pw_run_summary (pw_run_cli *command, const pw_sample *last, const pw_
                          .reference =
                              run ? pw_comparison_errors (&command->comparison, command->compiled.system) : NULL };
   if (error->status == PW_OK && pw_stop) {
-    char t[32];
-    snprintf (reason, PW_RUN_REASON, "interrupted at t = %s s", pw_format (t, pw_run_time (run), 6));
+    snprintf (reason, PW_RUN_REASON, "interrupted at t = %s s", PW_DIGITS (pw_run_time (run), 6));
     summary.status = "interrupted";
     summary.reason = reason;
   }
@@ -267,37 +257,33 @@ pw_summary pw_run_summary (pw_run_cli *command, const pw_sample *last, const pw_
 void pw_report_warnings (const pw_run *run, const pw_system *system, double defect) {
   int state;
   double power, growth = pw_run_growth (run, &state, &power);
-  char name[PW_NAME_BYTES], times[32], grows[32], percent[32];
   if (defect > REPORT_DEFECT)
     pw_cli_say ("pinwheel: the energy does not balance: %s %% of it is unaccounted for; %s\n",
-                pw_format (percent, 100 * defect, 2), pw_run_energy_advice (run, defect));
+                PW_DIGITS (100 * defect, 2), pw_run_energy_advice (run, defect));
   if (growth != 0)
     pw_cli_say (
         "pinwheel: the motion grows without bound: %s has become %s times the scene's own speed and grows as t^%s; "
         "nothing opposes what drives it\n",
-        pw_system_state_name (system, state, name, sizeof name), pw_format (times, growth, 2),
-        pw_format (grows, power, 2));
+        PW_NAME (pw_system_state_name, system, state), PW_DIGITS (growth, 2), PW_DIGITS (power, 2));
 }
 
 void pw_report_end (const pw_summary *summary, const pw_system *system, const pw_sample *last, int energy,
-                    const pw_statistics *statistics) {
-  char t[32], position[32], velocity[32], cpu[32];
-  printf ("%s, %s, at t = %s s\n\n", summary->model, summary->method, pw_format (t, last->t, 8));
+                    const pw_statistics *stats) {
+  printf ("%s, %s, at t = %s s\n\n", summary->model, summary->method, PW_DIGITS (last->t, 8));
   report_bodies (system, last);
   report_internal (system, last);
   report_reactions (system, last);
   if (energy) report_energy (last);
   report_errors (summary->reference);
-  printf ("\n  worst scaled residuals: position %s, velocity %s\n", pw_format (position, statistics->position, 2),
-          pw_format (velocity, statistics->velocity, 2));
+  printf ("\n  worst scaled residuals: position %s, velocity %s\n", PW_DIGITS (stats->position, 2),
+          PW_DIGITS (stats->velocity, 2));
   printf (
       "  %ld steps, %ld rejected, %ld right-hand sides, %ld Jacobians, %ld factorisations, %s s of processor time\n",
-      statistics->steps, statistics->rejected, statistics->rhs, statistics->jacobians, statistics->factorisations,
-      pw_format (cpu, summary->cpu, 3));
+      stats->steps, stats->rejected, stats->rhs, stats->jacobians, stats->factorisations, PW_DIGITS (summary->cpu, 3));
   if (*summary->general)
     pw_cli_print (stdout, "  general engine: %s\n", summary->general);
   else
-    printf ("  code specialised for this scene: %ld evaluations\n", statistics->specialised);
-  if (statistics->restarts > 0) printf ("  restarted at %ld checkpoints\n", statistics->restarts);
+    printf ("  code specialised for this scene: %ld evaluations\n", stats->specialised);
+  if (stats->restarts > 0) printf ("  restarted at %ld checkpoints\n", stats->restarts);
   if (*summary->reason) printf ("  ended early: %s\n", summary->reason);
 }

@@ -301,7 +301,7 @@ static int run_finish (pw_run_cli *command, pw_error *error) {
   const pw_system *system = command->compiled.system;
   pw_run *run = command->run;
   static const char *const output_name[PW_RUN_OUTPUTS] = { "the table so far", "the page", "the summary" };
-  char reason[PW_RUN_REASON] = "", t[32];
+  char reason[PW_RUN_REASON] = "";
   int interrupted = error->status == PW_OK && pw_stop;
   int prints_file = run_is_stdout (command->table_path) || run_is_stdout (command->summary_path);
   pw_sample sample, *last = NULL;
@@ -324,7 +324,7 @@ static int run_finish (pw_run_cli *command, pw_error *error) {
     if (*command->kept_path[i]) pw_cli_say ("pinwheel: %s is kept in %s\n", output_name[i], command->kept_path[i]);
   if (command->checkpoints.saved_time > 0 && (interrupted || command->limited || status == -PW_RESOURCE))
     pw_cli_say ("pinwheel: --resume %s continues from t = %s s\n", command->checkpoints.path,
-                pw_format (t, command->checkpoints.saved_time, 6));
+                PW_DIGITS (command->checkpoints.saved_time, 6));
   return interrupted && status == 0 ? PW_INTERRUPTED : status;
 }
 

@@ -113,9 +113,8 @@ static int compare_read_ladder (const char *option, const char *text, compare_la
 
 /* Level i of a ladder, or 0 after its end; steps are halved, tolerances divided by ten and rounded to 12 digits. */
 static double compare_level (compare_ladder ladder, int adaptive, int i) {
-  char text[32];
   double level = ldexp (ladder.from, -i);
-  if (adaptive) pw_read_number (pw_format (text, ladder.from / pow (10, i), 12), &level);
+  if (adaptive) pw_read_number (PW_DIGITS (ladder.from / pow (10, i), 12), &level);
   return level >= ladder.to * (1 - 1e-9) ? level : 0;
 }
 
@@ -246,12 +245,11 @@ static int compare_measure_errors (pw_compare *compare, pw_row *row, pw_error *e
 static int compare_measure (pw_study *study, pw_row *row, pw_error *error) {
   pw_compare *compare = (pw_compare *)study;
   pw_error run_error = { 0 };
-  char limit[32], text[60] = "";
   double predicted = compare_predicted_time (row);
-  pw_format (limit, study->cpu_limit, 4);
+  const char *limit = PW_DIGITS (study->cpu_limit, 4);
   if (predicted > study->cpu_limit) {
     row->state = ROW_SKIPPED;
-    if (isfinite (predicted)) snprintf (text, sizeof text, ", about %.2g s", predicted);
+    const char *text = isfinite (predicted) ? PW_PRINTED (60, ", about %.2g s", predicted) : "";
     snprintf (row->reason, sizeof row->reason, "too slow%s; the limit is %s s", text, limit);
     return PW_OK;
   }
@@ -260,7 +258,7 @@ static int compare_measure (pw_study *study, pw_row *row, pw_error *error) {
   if (status == PW_OK) status = compare_measure_times (compare, row, &run_error);
   if (row->state == ROW_STOPPED)
     snprintf (row->reason, sizeof row->reason, "too slow: the limit of %s s was reached at t = %s s", limit,
-              pw_format (text, row->t, 4));
+              PW_DIGITS (row->t, 4));
   status = pw_study_record_run (study, row, status, &run_error, error);
   row->value[COLUMN_ORDER] = compare_order (compare, row);
   if (row->state != ROW_REFUSED) {
@@ -307,9 +305,8 @@ static int compare_figures (pw_study *study, pw_error *error) {
                                     "lengths [m] and angles [rad]",
                                     POINT_COORDINATES, error);
   for (int unit = 0; status == PW_OK && unit < 2; unit++) {
-    char variables[100];
-    snprintf (variables, sizeof variables, "uncertainty = %.9g\nsize_of_motion = %.9g\n",
-              reference->uncertainty[MOTION_LARGEST + unit], reference->size[unit]);
+    const char *variables = PW_PRINTED (100, "uncertainty = %.9g\nsize_of_motion = %.9g\n",
+                                        reference->uncertainty[MOTION_LARGEST + unit], reference->size[unit]);
     if (pw_study_positive (study, COMPARE_GROUP, POINT_LENGTH + unit))
       status = pw_study_write_script (study, COMPARE_GROUP, name[unit], "work-precision", variables, error);
   }

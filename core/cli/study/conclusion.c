@@ -57,22 +57,21 @@ static double conclusion_error (const pw_reference *reference, const double *err
  * that its error is unknown, or if it is interpolated to an error that is only known to be below the uncertainty. */
 static conclusion_cost conclusion_least_cost (const pw_conclusion *conclusion, int method, double required) {
   conclusion_cost least = { NAN, 0 };
-  double error_before = NAN;
+  double previous = NAN;
   int less_accurate_before = 0;
   const pw_study *study = conclusion->study;
   for (const pw_row *row = study->row; row < study->row + study->rows; row++) {
     if (row->curve != method) continue;
     double error =
         row->state == ROW_DONE ? conclusion_error (conclusion->reference, row->value + conclusion->error_column) : NAN;
-    conclusion_cost candidate = { error <= required ? row->cpu : NAN, !less_accurate_before || isnan (error_before) };
-    if (error <= required && error_before > required) {
-      double cpu =
-          row[-1].cpu * pow (row->cpu / row[-1].cpu, log (required / error_before) / log (error / error_before));
+    conclusion_cost candidate = { error <= required ? row->cpu : NAN, !less_accurate_before || isnan (previous) };
+    if (error <= required && previous > required) {
+      double cpu = row[-1].cpu * pow (row->cpu / row[-1].cpu, log (required / previous) / log (error / previous));
       candidate = (conclusion_cost){ fmin (cpu, row->cpu), error <= conclusion->uncertainty };
     }
     if (candidate.cpu > 0 && !(least.cpu <= candidate.cpu)) least = candidate;
     less_accurate_before |= error > required;
-    error_before = error;
+    previous = error;
   }
   return least;
 }
@@ -97,16 +96,15 @@ static void conclusion_print_heading (const pw_conclusion *conclusion) {
   static const char *const unit[] = { "m", "rad" }, *const name[] = { "lengths", "angles" };
   const pw_reference *reference = conclusion->reference;
   const char *between = "";
-  char text[32];
   printf ("Processor time for ");
   for (int k = 0; k < CONCLUSION_COLUMNS; k++)
     printf ("%s%d", k == 0 ? "" : k + 1 < CONCLUSION_COLUMNS ? ", " : " and ", conclusion_required[k].digits);
   printf (" correct digits, relative to the cheapest method.\n"
           "Digits: the largest error of a coordinate at %d times up to %s s, relative to\n",
-          reference->motion.samples, pw_format (text, conclusion->study->t_end, 6));
+          reference->motion.samples, PW_DIGITS (conclusion->study->t_end, 6));
   for (int i = MOTION_LENGTH; i <= MOTION_ANGLE; i++)
     if (reference->uncertainty[MOTION_LARGEST + i] > 0) {
-      printf ("%s%s %s (%s)", between, pw_format (text, conclusion_scale (reference, i), 3), unit[i], name[i]);
+      printf ("%s%s %s (%s)", between, PW_DIGITS (conclusion_scale (reference, i), 3), unit[i], name[i]);
       between = ", ";
     }
   printf (". The reference has %.1f digits%s.\n\n", -log10 (conclusion->uncertainty),
@@ -115,10 +113,8 @@ static void conclusion_print_heading (const pw_conclusion *conclusion) {
 
 /* "1.5 ms", "<0.2 ms", "-" */
 static char *conclusion_format_time (char text[40], conclusion_cost c) {
-  char number[32];
   int ms = c.cpu < 1;
-  snprintf (text, 40, "%s%s %s", c.is_upper_bound ? "<" : "", pw_format (number, ms ? 1e3 * c.cpu : c.cpu, 2),
-            ms ? "ms" : "s");
+  snprintf (text, 40, "%s%s %s", c.is_upper_bound ? "<" : "", PW_DIGITS (ms ? 1e3 * c.cpu : c.cpu, 2), ms ? "ms" : "s");
   return isnan (c.cpu) ? strcpy (text, "-") : text;
 }
 
@@ -134,7 +130,7 @@ static char *conclusion_format_ratio (char text[40], const pw_conclusion *conclu
 /* The cheapest methods, their times, then a line for each method. */
 static void conclusion_print_table (const pw_conclusion *conclusion) {
   char text[40];
-  int any_upper_bound = 0, any_uncertain = 0;
+  int bounds = 0, any_uncertain = 0;
   printf ("%-*s", conclusion->width, "");
   for (int k = 0; k < CONCLUSION_COLUMNS; k++)
     printf ("  %*d digits", conclusion->width - 7, conclusion_required[k].digits);
@@ -148,13 +144,12 @@ static void conclusion_print_table (const pw_conclusion *conclusion) {
     printf ("\n%-*s", conclusion->width, conclusion->study->method[i]);
     for (int k = 0; k < CONCLUSION_COLUMNS; k++) {
       printf ("  %*s", conclusion->width, conclusion_format_ratio (text, conclusion, i, k));
-      any_upper_bound |= *text == '<';
+      bounds |= *text == '<';
       any_uncertain |= *text == 'u';
     }
   }
-  puts (any_upper_bound
-            ? "\n<: at most: no run has fewer digits, or it is unknown how many the one before or the next one has"
-            : "");
+  puts (bounds ? "\n<: at most: no run has fewer digits, or it is unknown how many the one before or the next one has"
+               : "");
   if (any_uncertain) puts ("uncertain: the reference is not accurate enough to distinguish methods");
 }
 
@@ -177,7 +172,6 @@ static int conclusion_count_runs (const pw_study *study, int method, int states,
 }
 
 static void conclusion_print_failures (const pw_study *study, int method) {
-  char text[32];
   const pw_row *first, *any;
   int failures = conclusion_count_runs (study, method, RUNS_FAILED, &first);
   if (first == NULL) return;
@@ -185,18 +179,17 @@ static void conclusion_print_failures (const pw_study *study, int method) {
   pw_cli_print (stdout, "%s: %d of %d runs %s, first at %s %s: %.*s%s\n", first->method, failures,
                 conclusion_count_runs (study, method, RUNS_ALL, &any),
                 first->state == ROW_FAILED ? "fail" : "are refused", first->adaptive ? "rtol" : "step",
-                pw_format (text, first->level, 4), CONCLUSION_REASON, first->reason, cut ? "..." : "");
+                PW_DIGITS (first->level, 4), CONCLUSION_REASON, first->reason, cut ? "..." : "");
 }
 
 /* One line for all methods with runs that the limit has stopped or prevented. */
 static void conclusion_print_limited (const pw_study *study) {
-  char text[32], beginning[80];
+  const char *beginning = PW_PRINTED (80, "stopped by the limit of %s s: ", PW_DIGITS (study->cpu_limit, 4));
   const char *before = beginning;
-  snprintf (beginning, sizeof beginning, "stopped by the limit of %s s: ", pw_format (text, study->cpu_limit, 4));
   for (int i = 0; i < study->methods; i++) {
     const pw_row *first;
     if (conclusion_count_runs (study, i, RUNS_LIMITED, &first) == 0) continue;
-    printf ("%s%s from %s", before, first->method, pw_format (text, first->level, 4));
+    printf ("%s%s from %s", before, first->method, PW_DIGITS (first->level, 4));
     before = ", ";
   }
   if (before != beginning) putchar ('\n');

@@ -67,8 +67,8 @@ static const pw_study_column drift_columns[] = {
 
 /* Reads "OPTION=RANGE". */
 static int drift_read_values (pw_drift *drift, const char *text, pw_error *error) {
-  char name[60], hint[PW_HINT];
-  snprintf (name, sizeof name, "%.*s", (int)strcspn (text, "="), text);
+  char hint[PW_HINT];
+  const char *name = PW_PRINTED (60, "%.*s", (int)strcspn (text, "="), text);
   int option = pw_find_name (drift_option, sizeof *drift_option, name, hint);
   if (option < 0) return pw_fail (error, PW_INPUT, "--vary %.100s: alpha, beta and every can be varied%s", text, hint);
   pw_axis *axis = &drift->axis[option];
@@ -109,14 +109,13 @@ static int drift_add (pw_drift *drift, int group, int curve, const char *method,
 static int drift_plan_baumgarte (pw_drift *drift, pw_error *error) {
   const char *integrator = drift_integrator (&drift->study, "alpha");
   const pw_axis *alphas = &drift->axis[DRIFT_ALPHA], *betas = &drift->axis[DRIFT_BETA];
-  char a[32], b[32], method[STUDY_NAME], label[60];
   int status = PW_OK;
   for (long j = 0; j < betas->count; j++)
     for (long i = 0; i < alphas->count && status == PW_OK; i++) {
       double alpha = pw_axis_value (alphas, i), beta = pw_axis_value (betas, j);
-      snprintf (label, sizeof label, "beta = %s /s", pw_format (b, beta, 6));
-      snprintf (method, sizeof method, "%s+baumgarte:alpha=%s:beta=%s", integrator, pw_format (a, alpha, 9),
-                pw_format (b, beta, 9));
+      const char *label = PW_PRINTED (60, "beta = %s /s", PW_DIGITS (beta, 6));
+      const char *method = PW_PRINTED (STUDY_NAME, "%s+baumgarte:alpha=%s:beta=%s", integrator, PW_DIGITS (alpha, 9),
+                                       PW_DIGITS (beta, 9));
       status = drift_add (drift, DRIFT_BAUMGARTE, (int)j, method, label, COLUMN_ALPHA, alpha, error);
     }
   return status;
@@ -126,12 +125,11 @@ static int drift_plan_baumgarte (pw_drift *drift, pw_error *error) {
 static int drift_plan_projection (pw_drift *drift, pw_error *error) {
   static const char *const metric[] = { "metric=mass", "metric=identity" };
   const char *integrator = drift_integrator (&drift->study, "every");
-  char method[STUDY_NAME];
   int status = PW_OK;
   for (int j = 0; j < 2; j++)
     for (long i = 0; i < drift->axis[DRIFT_EVERY].count && status == PW_OK; i++) {
       double every = pw_axis_value (&drift->axis[DRIFT_EVERY], i);
-      snprintf (method, sizeof method, "%s+projection:%s:every=%.0f", integrator, metric[j], every);
+      const char *method = PW_PRINTED (STUDY_NAME, "%s+projection:%s:every=%.0f", integrator, metric[j], every);
       status = drift_add (drift, DRIFT_PROJECTION, j, method, metric[j], COLUMN_EVERY, every, error);
     }
   return status;
@@ -228,12 +226,11 @@ static int drift_measure (pw_study *study, pw_row *row, pw_error *error) {
 /* ---- The command ---- */
 
 static int drift_begin (pw_study *study, pw_error *error) {
-  char t[32], h[32], rtol[32];
   (void)error;
   printf (
       "%s, %s s, steps of %s s or rtol %s: the largest value of all steps and of the last %g %%, and its growth\n\n",
-      pw_file_name (study->compiled.file), pw_format (t, study->t_end, 6), pw_format (h, study->settings.step, 6),
-      pw_format (rtol, study->settings.rtol, 6), 100.0 / DRIFT_PARTS);
+      pw_file_name (study->compiled.file), PW_DIGITS (study->t_end, 6), PW_DIGITS (study->settings.step, 6),
+      PW_DIGITS (study->settings.rtol, 6), 100.0 / DRIFT_PARTS);
   return PW_OK;
 }
 
@@ -260,13 +257,13 @@ static int drift_figures (pw_study *study, pw_error *error) {
   static const char *const axis[] = { "t [s]", "alpha [1/s]", "steps per projection (every)" };
   int status = drift_write_times (study, error);
   for (int group = 0; status == PW_OK && group < DRIFT_GROUPS; group++) {
-    char variables[40] = "quantities = '", heading[160];
+    char variables[40] = "quantities = '";
     for (int i = 1; i <= DRIFT_QUANTITIES; i++)
       if (pw_study_positive (study, group, i)) sprintf (strchr (variables, 0), "%d ", i);
     if (variables[strlen (variables) - 1] == '\'' || !pw_study_positive (study, group, 0)) continue;
     strcat (variables, "'\n");
-    snprintf (heading, sizeof heading, "%s, largest scaled residuals of position and velocity, energy defect [J]",
-              axis[group]);
+    const char *heading =
+        PW_PRINTED (160, "%s, largest scaled residuals of position and velocity, energy defect [J]", axis[group]);
     status = pw_study_write_data (study, group, name[group], heading, 1 + DRIFT_QUANTITIES, error);
     if (status == PW_OK) status = pw_study_write_script (study, group, name[group], "drift", variables, error);
   }

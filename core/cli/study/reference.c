@@ -112,9 +112,8 @@ static double reference_distance (const pw_system *system, const pw_motion *a, c
 }
 
 static void reference_name (const reference_candidate *candidate, char *text, size_t size) {
-  char level[32];
   snprintf (text, size, "%s, %s %s%s", candidate->row.method, candidate->row.adaptive ? "rtol" : "step",
-            pw_format (level, candidate->row.level, 4), candidate->row.adaptive ? "" : " s");
+            PW_DIGITS (candidate->row.level, 4), candidate->row.adaptive ? "" : " s");
 }
 
 /* 1 if two methods have the same integrator. */
@@ -145,18 +144,17 @@ static void reference_add_partner (pw_reference *reference, const pw_system *sys
 }
 
 /* Selects the reference: the first of the two candidates that agree best.  The second is its first partner. */
-static void reference_choose (pw_reference *reference, const pw_system *system, reference_candidate *candidates) {
+static void reference_choose (pw_reference *reference, const pw_system *system, reference_candidate *list) {
   int best = -1, second = -1;
-  if (!reference_pair (system, candidates, &best, &second)) return;
+  if (!reference_pair (system, list, &best, &second)) return;
   reference->known = 1;
-  reference_name (&candidates[best], reference->name, sizeof reference->name);
-  reference_add_partner (reference, system, &candidates[best], &candidates[second]);
+  reference_name (&list[best], reference->name, sizeof reference->name);
+  reference_add_partner (reference, system, &list[best], &list[second]);
   memcpy (reference->uncertainty, reference->partner[0].error, sizeof reference->uncertainty);
   for (int i = 0; i < REFERENCE_CANDIDATES; i++)
-    if (i != best && i != second && candidates[i].finished)
-      reference_add_partner (reference, system, &candidates[best], &candidates[i]);
-  reference->motion = candidates[best].motion;
-  candidates[best].motion = (pw_motion){ .samples = 0 };
+    if (i != best && i != second && list[i].finished) reference_add_partner (reference, system, &list[best], &list[i]);
+  reference->motion = list[best].motion;
+  list[best].motion = (pw_motion){ .samples = 0 };
   reference_raise_uncertainty (system, reference);
 }
 
@@ -179,7 +177,6 @@ static int reference_compute (pw_reference *reference, pw_study *study, double s
 
 int pw_reference_find (pw_reference *reference, pw_study *study, double step, pw_error *error) {
   const char *path = study->reference_path;
-  char end[32], reached[32];
   double t_end = path && study->line.t_end == NULL ? 0 : study->t_end; /* 0: that of the table */
   /* the model's solution holds only for its own initial values */
   if (path == NULL && (study->line.starts || !pw_system_has_reference (study->compiled.model)))
@@ -190,7 +187,7 @@ int pw_reference_find (pw_reference *reference, pw_study *study, double step, pw
   if (last < t_end)
     return pw_fail (error, PW_INPUT,
                     "--reference %s: no row at the final time, t = %s s; the last one before it is at %s s", path,
-                    pw_format (end, t_end, 9), pw_format (reached, last, 9));
+                    PW_DIGITS (t_end, 9), PW_DIGITS (last, 9));
   snprintf (reference->name, sizeof reference->name, "%s", path ? path : "the exact solution of the model");
   study->t_end = t_end;
   reference->known = 1;

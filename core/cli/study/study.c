@@ -27,7 +27,7 @@ static int methods_add (pw_study *study, const char *name, pw_error *error) {
 
 /* Adds the methods of "all", "INTEGRATOR+all", "all+STABILISATION", or a method. */
 static int methods_add_pattern (pw_study *study, char *pattern, pw_error *error) {
-  char name[STUDY_NAME], *tail = pattern + strcspn (pattern, "+:");
+  char *tail = pattern + strcspn (pattern, "+:");
   int any_integrator = strncmp (pattern, "all+", 4) == 0 || strcmp (pattern, "all") == 0;
   const char *stabilisation = any_integrator && *tail && strcmp (tail, "+all") != 0 ? tail + 1 : NULL; /* NULL: all */
   const pw_method *integrator = NULL;                                                                  /* NULL: all */
@@ -41,8 +41,7 @@ static int methods_add_pattern (pw_study *study, char *pattern, pw_error *error)
       if (integrator && integrator != pw_methods[i]) continue;
       if (stabilisation) pw_nearest_try (&near, s->name);
       if (stabilisation && strcmp (stabilisation, s->name) != 0) continue;
-      snprintf (name, sizeof name, "%s+%s", pw_methods[i]->name, s->name);
-      status = methods_add (study, name, error);
+      status = methods_add (study, PW_PRINTED (STUDY_NAME, "%s+%s", pw_methods[i]->name, s->name), error);
       found = 1;
     }
   if (status != PW_OK || found) return status;
@@ -146,9 +145,8 @@ int pw_study_parallel (pw_study *study, int count, pw_task *task, void *context,
 }
 
 int pw_study_record_run (const pw_study *study, pw_row *row, int status, const pw_error *run_error, pw_error *error) {
-  const pw_statistics *statistics = &row->statistics;
-  const long count[] = { statistics->steps, statistics->rejected, statistics->rhs, statistics->jacobians,
-                         statistics->factorisations };
+  const pw_statistics *stats = &row->statistics;
+  const long count[] = { stats->steps, stats->rejected, stats->rhs, stats->jacobians, stats->factorisations };
   for (int i = 0; i < 5; i++) row->value[study->type->first_count_column + i] = (double)count[i];
   row->value[study->type->time_column] = row->t;
   if (status == PW_OK || row->state == ROW_STOPPED) return PW_OK;

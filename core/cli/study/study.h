@@ -8,7 +8,6 @@
 #include "figure.h"
 #include "parallel.h"
 #include "text.h"
-#include "util.h"
 
 enum {
   STUDY_NAME = 200,     /* longest name of a method with its options, end included */

@@ -72,7 +72,6 @@ static void table_number (const pw_row *row, const pw_study_column *column, int 
 /* Prints a row: columns after the status only if its runs have reached the end, else the reason. */
 static void table_print (const pw_study *study, const pw_row *row) {
   const pw_study_column *column = study->type->column;
-  char t[32];
   int shown = 1;
   printf ("%-*s", table_width (study), row->method);
   for (int i = 0; shown && i < study->type->columns; i++) {
@@ -82,7 +81,7 @@ static void table_print (const pw_study *study, const pw_row *row) {
   if (row->state != ROW_DONE) {
     printf ("  %s", pw_study_status (row));
     if (row->state == ROW_FAILED && strncmp (row->reason, "t = ", 4) != 0)
-      printf (" at t = %s s", pw_format (t, row->t, 4));
+      printf (" at t = %s s", PW_DIGITS (row->t, 4));
     printf (": %s", row->reason);
   }
   putchar ('\n');
@@ -117,9 +116,7 @@ int pw_study_positive (const pw_study *study, int group, int coordinate) {
 
 int pw_study_write_data (const pw_study *study, int group, const char *name, const char *heading, int count,
                          pw_error *error) {
-  char file[40], text[32];
-  snprintf (file, sizeof file, "%s.dat", name);
-  pw_output *output = pw_figure_open (study->folder, file, error);
+  pw_output *output = pw_figure_open (study->folder, PW_PRINTED (40, "%s.dat", name), error);
   if (output == NULL) return PW_RESOURCE;
   FILE *f = pw_output_stream (output);
   const pw_row *row = study->row;
@@ -128,7 +125,7 @@ int pw_study_write_data (const pw_study *study, int group, const char *name, con
   for (int k = -1, curve = -1; (point = table_next_point (study, group, &row, &k)) != NULL; curve = row->curve) {
     if (row->curve != curve) fprintf (f, "%s# %s\n", curve < 0 ? "" : "\n\n", row->label);
     for (int i = 0; i < count; i++) /* only positive numbers have logarithms */
-      fprintf (f, "%s%s", i ? " " : "", point[i] > 0 ? pw_format (text, point[i], 9) : "NaN");
+      fprintf (f, "%s%s", i ? " " : "", point[i] > 0 ? PW_DIGITS (point[i], 9) : "NaN");
     fputc ('\n', f);
   }
   return pw_output_finish (output, error);

@@ -28,7 +28,6 @@ static size_t axis_value_length (const char *list) {
 
 /* "V1,V2,..." */
 static int axis_read_list (pw_axis *axis, pw_arena *arena, pw_error *error) {
-  char why[140];
   axis->count = 1;
   for (const char *c = axis->range; *(c += axis_value_length (c)); c++) axis->count++;
   axis->value = pw_arena_alloc (arena, (size_t)axis->count * sizeof *axis->value);
@@ -36,7 +35,7 @@ static int axis_read_list (pw_axis *axis, pw_arena *arena, pw_error *error) {
   char *c = axis->range;
   for (long i = 0; i < axis->count; i++) {
     size_t n = axis_value_length (c);
-    snprintf (why, sizeof why, "\"%.*s\" is not a finite number", n < 100 ? (int)n : 100, c);
+    const char *why = PW_PRINTED (140, "\"%.*s\" is not a finite number", n < 100 ? (int)n : 100, c);
     if (axis_read_number (c, n, axis->value + i) != PW_OK) return axis_fail (axis, why, error);
     c += n + 1;
   }
@@ -46,8 +45,8 @@ static int axis_read_list (pw_axis *axis, pw_arena *arena, pw_error *error) {
 /* "lin:FIRST:LAST:COUNT" or "log:FIRST:LAST:COUNT" */
 static int axis_read_range (pw_axis *axis, pw_error *error) {
   double number[3];
-  char why[80], *c = strchr (axis->range, ':') + 1;
-  snprintf (why, sizeof why, "expected %.3s:FIRST:LAST:COUNT, three numbers", axis->range);
+  char *c = strchr (axis->range, ':') + 1;
+  const char *why = PW_PRINTED (80, "expected %.3s:FIRST:LAST:COUNT, three numbers", axis->range);
   for (int i = 0; i < 3; i++) {
     size_t n = strcspn (c, ":");
     if (axis_read_number (c, n, number + i) != PW_OK || (c[n] == ':') != (i < 2)) return axis_fail (axis, why, error);
@@ -85,14 +84,13 @@ int pw_axis_read (pw_axis *axis, const char *text, pw_arena *arena, pw_error *er
  * fourth value of lin:0:1:11 is 0.3. */
 double pw_axis_value (const pw_axis *axis, long i) {
   if (axis->type == PW_AXIS_LIST) return axis->value[i];
-  double intervals = (double)(axis->count - 1), k = (double)i;
+  double last = (double)(axis->count - 1), k = (double)i;
   if (i == 0 || axis->first == axis->last) return axis->first;
   if (i == axis->count - 1) return axis->last;
-  if (axis->type == PW_AXIS_LOG)
-    return pow (10, (log10 (axis->first) * (intervals - k) + log10 (axis->last) * k) / intervals);
-  double value = (axis->first * (intervals - k) + axis->last * k) / intervals;
+  if (axis->type == PW_AXIS_LOG) return pow (10, (log10 (axis->first) * (last - k) + log10 (axis->last) * k) / last);
+  double value = (axis->first * (last - k) + axis->last * k) / last;
   if (isfinite (value)) return value;
-  return axis->first / intervals * (intervals - k) + axis->last / intervals * k; /* the products were too large */
+  return axis->first / last * (last - k) + axis->last / last * k; /* the products were too large */
 }
 
 /* ---- The grid ---- */

@@ -48,11 +48,9 @@ static uint32_t journal_line_checksum (long row, int status, const char *text, s
 }
 
 static void journal_line_format (pw_text *line, long row, int status, const char *text) {
-  char front[60];
   size_t size = strlen (text);
-  snprintf (front, sizeof front, "%ld %d %08lx ", row, status,
-            (unsigned long)journal_line_checksum (row, status, text, size));
-  pw_text_add (line, front);
+  pw_text_add (line, PW_PRINTED (60, "%ld %d %08lx ", row, status,
+                                 (unsigned long)journal_line_checksum (row, status, text, size)));
   pw_text_add_bytes (line, text, size);
   pw_text_add (line, "\n");
 }
@@ -239,18 +237,17 @@ static int table_write (const pw_journal *journal, const pw_plan *plan, const jo
 
 int pw_sweep_finish (pw_journal *journal, const pw_plan *plan, pw_tally *tally, pw_error *error) {
   journal_map map;
-  pw_error table_error = { 0 };
+  pw_error failure = { 0 };
   *tally = (pw_tally){ .rows = 0 };
   if (journal_map_open (&map, journal->descriptor) != PW_OK)
     return pw_fail (error, PW_RESOURCE, "cannot read %s: %s", journal->path, strerror (errno));
-  pw_output *output = pw_output_open_as (journal->table_path, ".sorted", &table_error);
-  if (output) table_write (journal, plan, &map, pw_output_stream (output), tally, &table_error);
-  if (output) table_close (output, &table_error);
+  pw_output *output = pw_output_open_as (journal->table_path, ".sorted", &failure);
+  if (output) table_write (journal, plan, &map, pw_output_stream (output), tally, &failure);
+  if (output) table_close (output, &failure);
   journal_map_close (&map);
-  if (table_error.status != PW_OK)
-    return pw_fail (error, table_error.status,
-                    "%.300s; all rows are in %.150s, so the same command only has to sort them", table_error.text,
-                    journal->path);
+  if (failure.status != PW_OK)
+    return pw_fail (error, failure.status, "%.300s; all rows are in %.150s, so the same command only has to sort them",
+                    failure.text, journal->path);
   if (unlink (journal->path) == 0) return PW_OK;
   return pw_fail (error, PW_RESOURCE, "%s is complete, but %s cannot be removed: %s", journal->table_path,
                   journal->path, strerror (errno));
@@ -268,7 +265,7 @@ typedef struct {
 /* Opens a part and finds its number and first row. */
 static int table_open_part (table_part *part, const char *path, pw_error *error) {
   const char *reason;
-  char fraction[40] = "";
+  char text[40] = "";
   size_t size;
   FILE *f = pw_open_input (path, &reason);
   part->path = path;
@@ -278,9 +275,8 @@ static int table_open_part (table_part *part, const char *path, pw_error *error)
   if (status != PW_OK) return pw_fail (error, PW_RESOURCE, "cannot read the part %s: %s", path, strerror (why));
   part->first_row = part->next_row = pw_fingerprint_end (PW_SWEEP_MAGIC, part->map.begin, part->map.end);
   const char *value = part->first_row ? pw_fingerprint_value (part->map.begin, part->first_row, "part", &size) : NULL;
-  if (value)
-    snprintf (fraction, sizeof fraction, "%.*s", (int)(size < 39 ? size : 39), value); /* sscanf needs its end */
-  if (sscanf (fraction, "%9d/%9d", &part->number, &part->parts) != 2 || part->parts < 1 || part->number < 1 ||
+  if (value) snprintf (text, sizeof text, "%.*s", (int)(size < 39 ? size : 39), value); /* sscanf needs its end */
+  if (sscanf (text, "%9d/%9d", &part->number, &part->parts) != 2 || part->parts < 1 || part->number < 1 ||
       part->number > part->parts)
     return pw_fail (error, PW_INPUT, "%s is not a part of a sweep: parts are written by --part I/N", path);
   return PW_OK;

@@ -76,10 +76,9 @@ static int plan_reserve_column (pw_plan *plan) {
 
 /* Adds the new states of a system, and the units of varied initial values. */
 static int plan_add_columns (pw_plan *plan, const pw_system *system, pw_error *error) {
-  char name[PW_NAME_BYTES];
   for (int i = 0; i < 2 * pw_system_coordinates (system); i++) {
     int state = plan_table_state (system, i);
-    pw_system_state_name (system, state, name, sizeof name);
+    const char *name = PW_NAME (pw_system_state_name, system, state);
     if (plan->column_room && pw_names_find (&plan->column_of, name) >= 0) continue;
     const char *copy = pw_arena_copy (&plan->arena, name);
     if (copy == NULL || plan_reserve_column (plan) != PW_OK) return pw_fail (error, PW_RESOURCE, "out of memory");
@@ -106,12 +105,11 @@ static void plan_open_engines (pw_plan *plan, const pw_system *system) {
   pw_run_defaults defaults = pw_cli_defaults (pw_file_table (plan->file));
   double steps = (double)plan->grid.rows * pw_method_steps (plan->method, &plan->settings, defaults.step, plan->t_end);
   pw_cli_engine_open (&plan->engine, system, plan->specialise, steps);
-  const char *no_lanes = plan->with_cpu                   ? "--cpu measures each run"
-                         : isfinite (plan->limit.seconds) ? "--limit stops each run by itself"
-                                                          : NULL;
-  if (no_lanes == NULL)
-    plan->lanes_code = pw_cli_engine_lanes (&plan->engine, system, plan->method, plan->lanes, steps);
-  if (no_lanes && plan->lanes > 1) pw_cli_say ("pinwheel: one run after the other: %s\n", no_lanes);
+  const char *reason = plan->with_cpu                   ? "--cpu measures each run"
+                       : isfinite (plan->limit.seconds) ? "--limit stops each run by itself"
+                                                        : NULL;
+  if (reason == NULL) plan->lanes_code = pw_cli_engine_lanes (&plan->engine, system, plan->method, plan->lanes, steps);
+  if (reason && plan->lanes > 1) pw_cli_say ("pinwheel: one run after the other: %s\n", reason);
 }
 
 static int plan_scan_row (pw_plan *plan, long row, plan_scan *scan, pw_error *error) {
@@ -157,10 +155,9 @@ void pw_plan_cells (const pw_plan *plan, const pw_plan_row *row, pw_text *text) 
   const pw_run *run = row ? row->run : NULL;
   const pw_sample *last = row ? row->last : NULL;
   const pw_statistics *statistics = run ? pw_run_statistics (run) : NULL;
-  char name[300];
   for (int i = 0; i < plan->grid.axes; i++) {
     const pw_axis *axis = &plan->grid.axis[i];
-    snprintf (name, sizeof name, "%s%s", axis->parameter ? "" : "start.", axis->name);
+    const char *name = PW_PRINTED (300, "%s%s", axis->parameter ? "" : "start.", axis->name);
     plan_cell (row, text, name, axis->unit, row ? pw_grid_value (&plan->grid, i, row->number) : 0);
   }
   pw_text_cell (text, row ? pw_cli_status_word (row->status) : "status");
@@ -208,7 +205,6 @@ static void plan_fingerprint_grid (pw_plan *plan) {
 
 static int plan_fingerprint (pw_plan *plan, const pw_model *model, pw_error *error) {
   pw_text *text = &plan->fingerprint;
-  char part_text[60];
   if (pw_fingerprint_run (text, PW_SWEEP_MAGIC, plan->file, plan->tables_sum, plan->method, &plan->settings, error) !=
       PW_OK)
     return error->status;
@@ -220,8 +216,7 @@ static int plan_fingerprint (pw_plan *plan, const pw_model *model, pw_error *err
   plan_fingerprint_grid (plan);
   pw_fingerprint_number (text, "rows", NULL, (double)plan->grid.rows);
   pw_fingerprint_line (text, "columns", NULL, plan->heading.chars ? plan->heading.chars : "");
-  snprintf (part_text, sizeof part_text, "%d/%d", plan->part, plan->parts);
-  pw_fingerprint_line (text, "part", NULL, part_text);
+  pw_fingerprint_line (text, "part", NULL, PW_PRINTED (60, "%d/%d", plan->part, plan->parts));
   pw_text_add (text, "end\n");
   if (text->failed || plan->heading.failed) return pw_fail (error, PW_RESOURCE, "out of memory");
   return PW_OK;

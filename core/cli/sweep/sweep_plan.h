@@ -9,7 +9,6 @@
 #include "cli.h"
 #include "sweep_grid.h"
 #include "text.h"
-#include "util.h"
 
 #define PW_SWEEP_MAGIC "pinwheel sweep 1\n" /* the first line of a fingerprint */
 

@@ -345,12 +345,10 @@ static void rows_close (sweep_rows *sweep) {
 }
 
 int pw_sweep_rows (const pw_plan *plan, pw_journal *journal, int jobs, pw_error *error) {
-  const long missing = journal->rows - journal->done;
-  sweep_rows sweep = { .plan = plan,
-                       .journal = journal,
-                       .missing_at_start = missing,
-                       .jobs = jobs < missing ? jobs : (int)missing,
-                       .error = error };
+  const long left = journal->rows - journal->done;
+  sweep_rows sweep = {
+    .plan = plan, .journal = journal, .missing_at_start = left, .jobs = jobs < left ? jobs : (int)left, .error = error
+  };
   pthread_mutex_init (&sweep.lock, NULL);
   pthread_cond_init (&sweep.compiled, NULL);
   pw_stop_catch ();

@@ -72,8 +72,7 @@ static int search_mark_noisy (search *s, double a, double b) {
   int marked = 0;
   search_evaluate (s, a, value[0]);
   for (int k = 1; k <= 2 * NOISE_SAMPLES; k++) {
-    double fraction = (double)k / NOISE_SAMPLES,
-           t = fraction <= 1 ? a + (b - a) * fraction : b + after * (fraction - 1);
+    double part = (double)k / NOISE_SAMPLES, t = part <= 1 ? a + (b - a) * part : b + after * (part - 1);
     search_evaluate (s, t, value[k % 2]);
     for (int i = 0; i < s->expression->codes; i++)
       if (search_changed (value[0][i], value[1][i]) && ++changes[i] > NOISE_CHANGES && !s->noisy[i])

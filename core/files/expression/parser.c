@@ -200,14 +200,13 @@ static int parser_is_call (const parser *p) {
 
 static parser_part parser_name (parser *p, const char *name) {
   const pw_expression_named_constant *constant = pw_expression_find_constant (name);
-  int variable_index = 0, named = p->scope ? pw_names_find (&p->scope->index, name) : -1;
-  while (p->variable && p->variable[variable_index] && strcmp (p->variable[variable_index], name) != 0)
-    variable_index++;
-  int variable = p->variable && p->variable[variable_index];
-  if (!variable && named < 0 && constant == NULL) return parser_unknown (p, name);
+  int variable = 0, named = p->scope ? pw_names_find (&p->scope->index, name) : -1;
+  while (p->variable && p->variable[variable] && strcmp (p->variable[variable], name) != 0) variable++;
+  int is_variable = p->variable && p->variable[variable];
+  if (!is_variable && named < 0 && constant == NULL) return parser_unknown (p, name);
   if (parser_is_call (p))
     return parser_fail (p, p->at, "\"%s\" is a number, not a function; a product is written with *", name);
-  if (variable) return parser_leaf (p, PW_OP_VARIABLE, variable_index, 0);
+  if (is_variable) return parser_leaf (p, PW_OP_VARIABLE, variable, 0);
   return parser_leaf (p, PW_OP_CONSTANT, 0, named >= 0 ? p->scope->value[named] : constant->value);
 }
 

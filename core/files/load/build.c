@@ -26,7 +26,7 @@ const char *pw_compiler (void) {
 }
 
 /* Starts the compiler, its messages into the file `log`, SIGPIPE not ignored.  0 or an errno value. */
-static int build_spawn (const build_command *command, char *const *word, int log, pid_t *child) {
+static int build_spawn (const build_command *cmd, char *const *word, int log, pid_t *child) {
   posix_spawn_file_actions_t files;
   posix_spawnattr_t attributes;
   sigset_t pipe;
@@ -38,7 +38,7 @@ static int build_spawn (const build_command *command, char *const *word, int log
   if (code == 0) {
     code = posix_spawn_file_actions_adddup2 (&files, log, STDERR_FILENO);
     if (code == 0) code = posix_spawn_file_actions_adddup2 (&files, STDERR_FILENO, STDOUT_FILENO);
-    posix_spawnattr_setsigmask (&attributes, &command->mask);
+    posix_spawnattr_setsigmask (&attributes, &cmd->mask);
     posix_spawnattr_setsigdefault (&attributes, &pipe);
     posix_spawnattr_setflags (&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
     if (code == 0) code = posix_spawnp (child, word[0], &files, &attributes, word, environ);
@@ -50,14 +50,13 @@ static int build_spawn (const build_command *command, char *const *word, int log
 
 /* Runs a compiler's command line; `source` and `object` are the file that it compiles and the one that it makes, which
  * does not exist yet. */
-static int build_run (const build_command *command, char *const *word, const char *source, const char *object,
+static int build_run (const build_command *cmd, char *const *word, const char *source, const char *object,
                       pw_error *error) {
   pid_t child, ended = 0;
-  int log =
-      command->log ? open (command->log, O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, 0600) : STDERR_FILENO;
-  if (log < 0) return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", command->log, strerror (errno));
-  int outcome = 0, code = build_spawn (command, word, log, &child);
-  if (command->log) close (log);
+  int log = cmd->log ? open (cmd->log, O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, 0600) : STDERR_FILENO;
+  if (log < 0) return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", cmd->log, strerror (errno));
+  int outcome = 0, code = build_spawn (cmd, word, log, &child);
+  if (cmd->log) close (log);
   while (code == 0 && (ended = waitpid (child, &outcome, 0)) < 0 && errno == EINTR) continue;
   int exit_code = WEXITSTATUS (outcome);
   if (ended < 0) exit_code = access (object, F_OK) != 0; /* SIGCHLD is ignored: there is no exit status */
@@ -68,12 +67,11 @@ static int build_run (const build_command *command, char *const *word, const cha
                     strsignal (WTERMSIG (outcome)));
   if (code != 0 || exit_code == 127)
     return pw_fail (error, PW_INPUT, "cannot run the C compiler \"%s\" that %s%s needs (%s): install %s", word[0],
-                    command->log ? "specialised code" : "the model file ", command->log ? "" : source,
+                    cmd->log ? "specialised code" : "the model file ", cmd->log ? "" : source,
                     code ? strerror (code) : "not found",
-                    command->for_page ? PW_PAGE_TOOLS : "one, or name another in the environment variable CC");
-  if (exit_code != 0 && command->log)
-    return pw_fail (error, PW_METHOD, "%s does not compile; the messages of %s are in %s", source, word[0],
-                    command->log);
+                    cmd->for_page ? PW_PAGE_TOOLS : "one, or name another in the environment variable CC");
+  if (exit_code != 0 && cmd->log)
+    return pw_fail (error, PW_METHOD, "%s does not compile; the messages of %s are in %s", source, word[0], cmd->log);
   if (exit_code != 0)
     return pw_fail (error, PW_INPUT, "the model file %s does not compile; the messages of %s are above", source,
                     word[0]);
@@ -88,8 +86,8 @@ static void build_add (char **word, int *count, const char *const *more) {
   for (; *more; more++) memcpy (&word[(*count)++], more, sizeof *more);
 }
 
-static int build_object (const build_command *command, const char *source, const char *object, pw_error *error) {
-  char header[PW_PATH], include[PW_PATH], *compiler = strdup (command->compiler), *rest = NULL;
+static int build_object (const build_command *cmd, const char *source, const char *object, pw_error *error) {
+  char header[PW_PATH], include[PW_PATH], *compiler = strdup (cmd->compiler), *rest = NULL;
   char *word[BUILD_COMPILER_WORDS + BUILD_OTHER_WORDS] = { NULL };
   int words = 0, status = pw_search_header (header, error);
   pw_folder_of (include, header);
@@ -102,12 +100,12 @@ static int build_object (const build_command *command, const char *source, const
   if (status == PW_OK) {
     char *w = strtok_r (compiler, " \t", &rest);
     for (; w && words < BUILD_COMPILER_WORDS; w = strtok_r (NULL, " \t", &rest)) word[words++] = w;
-    build_add (word, &words, command->options);
+    build_add (word, &words, cmd->options);
     build_add (word, &words, (const char *const[]){ "-I", include, "-o", object, source, NULL });
-    build_add (word, &words, command->last);
+    build_add (word, &words, cmd->last);
     status =
         w ? pw_fail (error, PW_INPUT, "the C compiler's command in CC has more than %d words", BUILD_COMPILER_WORDS)
-          : build_run (command, word, source, object, error);
+          : build_run (cmd, word, source, object, error);
   }
   free (compiler);
   return status;
@@ -176,29 +174,29 @@ int pw_compile_file (const char *path, const char *engine, pw_object_user *use, 
     "-Wl,--gc-sections,--allow-undefined,--strip-all,-z,stack-size=1048576,--whole-archive",
     NULL
   };
-  build_command command = { .compiler = engine ? "clang" : pw_compiler (),
-                            .options = engine ? page : plugin,
-                            .last = { engine ? engine : "-lm", engine ? "-Wl,--no-whole-archive" : NULL },
-                            .for_page = engine != NULL };
-  build_defer (&command.mask);
+  build_command cmd = { .compiler = engine ? "clang" : pw_compiler (),
+                        .options = engine ? page : plugin,
+                        .last = { engine ? engine : "-lm", engine ? "-Wl,--no-whole-archive" : NULL },
+                        .for_page = engine != NULL };
+  build_defer (&cmd.mask);
   char folder[PW_PATH], object[PW_PATH];
   int status = pw_temporary_folder (folder, error);
   if (status == PW_OK) {
-    status = build_object (&command, path, pw_path (object, "%s/object", folder), error);
+    status = build_object (&cmd, path, pw_path (object, "%s/object", folder), error);
     if (status == PW_OK) status = use (context, object, error);
     unlink (object);
     rmdir (folder);
   }
-  pthread_sigmask (SIG_SETMASK, &command.mask, NULL);
+  pthread_sigmask (SIG_SETMASK, &cmd.mask, NULL);
   return status;
 }
 
 int pw_compile_scene (const char *path, const char *object, const char *log, int lanes, pw_error *error) {
-  build_command command = {
+  build_command cmd = {
     .compiler = pw_compiler (), .options = pw_scene_options (lanes), .last = { "-lm" }, .log = log
   };
-  build_defer (&command.mask);
-  int status = build_object (&command, path, object, error);
-  pthread_sigmask (SIG_SETMASK, &command.mask, NULL);
+  build_defer (&cmd.mask);
+  int status = build_object (&cmd, path, object, error);
+  pthread_sigmask (SIG_SETMASK, &cmd.mask, NULL);
   return status;
 }

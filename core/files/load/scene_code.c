@@ -102,15 +102,14 @@ static void code_paths (code_job *x) {
 /* Checks a cached object.  PW_RETRY: missing, or of another text or identity; PW_INPUT: damaged; PW_RESOURCE. */
 static int code_check (const code_job *x, pw_error *error) {
   char *bytes;
-  size_t size = 0, text_size = strlen (x->text), identity_size = strlen (x->identity);
+  size_t size = 0, text_size = strlen (x->text), id_size = strlen (x->identity);
   unsigned long long check = 0;
   int status = code_read (x->object, &bytes, &size, error);
   if (status == PW_OK && size >= sizeof check) memcpy (&check, bytes + (size -= sizeof check), sizeof check);
   if (status == PW_OK && pw_check_sum (PW_CHECK, bytes, size) != check)
     status = pw_fail (error, PW_INPUT, "it is damaged");
-  if (status == PW_OK &&
-      (size < text_size + identity_size || memcmp (bytes + size - identity_size, x->identity, identity_size) != 0 ||
-       memcmp (bytes + size - identity_size - text_size, x->text, text_size) != 0))
+  if (status == PW_OK && (size < text_size + id_size || memcmp (bytes + size - id_size, x->identity, id_size) != 0 ||
+                          memcmp (bytes + size - id_size - text_size, x->text, text_size) != 0))
     status = PW_RETRY;
   free (bytes);
   return status;
