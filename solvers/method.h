@@ -323,7 +323,7 @@ static inline void pw_forget_residuals (pw_run *r) {
 /* ---- Projection ---- */
 
 /* Scaled residuals: the round-off of the few terms of a row, to which an iteration converges; the largest that is
- * accepted where it stalls. */
+ * accepted where it stalls, for angles up to 1 rad (project.c). */
 #define PW_RESIDUAL_CONVERGED (4 * DBL_EPSILON)
 #define PW_RESIDUAL_ACCEPTED (64 * DBL_EPSILON)
 

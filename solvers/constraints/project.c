@@ -68,6 +68,14 @@ static int project_check_redundant (pw_projector *p, const pw_run *r, const doub
   return PW_RETRY;
 }
 
+/* The largest angle of a body, at least 1 rad: where no body with mass can take up the residual of a joint, its scaled
+ * residual cannot be smaller than the round-off of that angle. */
+static double project_largest_angle (const pw_system *s, const double *q) {
+  double largest = 1;
+  for (int b = 0; b < s->bodies; b++) largest = fmax (largest, fabs (q[3 * b + 2]));
+  return largest;
+}
+
 int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const double *v) {
   const double small = 1e-6;     /* below this residual, a correction hardly changes the sizes of the terms */
   const int max_iterations = 30; /* quadratic convergence needs some 5; a bad start needs more */
@@ -84,7 +92,8 @@ int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const
     pw_worst_position (s, g, size, p->active, &now);
     p->worst_row = now.row_position;
     int stalled = now.position > previous / 4; /* at round-off, since convergence is quadratic */
-    if (now.position <= PW_RESIDUAL_CONVERGED || (stalled && now.position <= PW_RESIDUAL_ACCEPTED)) break;
+    if (now.position <= PW_RESIDUAL_CONVERGED) break;
+    if (stalled && now.position <= PW_RESIDUAL_ACCEPTED * project_largest_angle (s, q)) break;
     if (p->iterations >= max_iterations || !isfinite (now.position)) return PW_RETRY;
     previous = now.position;
     pw_evaluate_J (r->w);
