@@ -48,7 +48,7 @@ typedef struct {
  * L for lengths, 1 rad for angles, T for times. */
 typedef struct {
   double length; /* L [m]: largest distance of an element's point, markers excepted, from its body's centre of mass; if
-                  * 0, the first radius of gyration of a body other than 0, or 1 */
+                  * that is 0, the first nonzero radius of gyration of a body with mass; else 1 */
   double time; /* T: 1 / max (1 / span, largest velocity, square root of the largest acceleration), in units of L [s] */
 } pw_scale;
 

@@ -162,8 +162,9 @@ int pw_cli_requires (const char *option, const char *value, const char *required
 int pw_cli_number (const char *option, const char *text, pw_domain domain, double *value, pw_error *error) {
   if (text == NULL) return PW_OK;
   double number;
-  if (pw_read_expression (text, &number) != PW_OK)
-    return pw_fail (error, PW_INPUT, "%s: \"%s\" is not a number", option, text);
+  int status = pw_read_expression (text, &number);
+  if (status == PW_RESOURCE) return pw_fail (error, status, "out of memory");
+  if (status != PW_OK) return pw_fail (error, status, "%s: \"%s\" is not a number", option, text);
   const char *expected = pw_domain_check (domain, number);
   if (*expected) return pw_fail (error, PW_INPUT, "%s %s: expected %s", option, text, expected);
   *value = number;

@@ -167,8 +167,9 @@ static int study_open_folder (pw_study *study, pw_error *error) {
                    { "--reference", study->reference_path, PW_READS, NULL },
                    { "-o", study->folder, PW_WRITES_INTO, names } };
   if (study->folder == NULL) return pw_cli_requires ("--width", study->line.width, "-o DIR", 0, error);
-  if (pw_figures_of (&study->figures, &study->line, &study->compiled, study->folder, error) != PW_OK) return PW_INPUT;
-  int status = pw_files_open (&study->files, &study->line, &study->compiled, use, sizeof use / sizeof *use, error);
+  int status = pw_figures_of (&study->figures, &study->line, &study->compiled, study->folder, error);
+  if (status == PW_OK)
+    status = pw_files_open (&study->files, &study->line, &study->compiled, use, sizeof use / sizeof *use, error);
   return status == PW_OK ? pw_study_open_table (study, error) : status;
 }
 

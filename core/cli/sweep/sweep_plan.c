@@ -146,7 +146,7 @@ static int plan_find_columns (pw_plan *plan, pw_error *error) {
 
 /* ---- Cells ---- */
 
-/* A cell of a row or, if that is NULL, of the heading. */
+/* A cell of a row or, if that is NULL, of the heading, which alone uses name and unit. */
 static void plan_cell (const pw_plan_row *row, pw_text *text, const char *name, const char *unit, double value) {
   row ? pw_text_number (text, value) : pw_text_name (text, name, unit);
 }
@@ -157,7 +157,7 @@ void pw_plan_cells (const pw_plan *plan, const pw_plan_row *row, pw_text *text) 
   const pw_statistics *statistics = run ? pw_run_statistics (run) : NULL;
   for (int i = 0; i < plan->grid.axes; i++) {
     const pw_axis *axis = &plan->grid.axis[i];
-    const char *name = PW_PRINTED (300, "%s%s", axis->parameter ? "" : "start.", axis->name);
+    const char *name = row ? NULL : PW_PRINTED (300, "%s%s", axis->parameter ? "" : "start.", axis->name);
     plan_cell (row, text, name, axis->unit, row ? pw_grid_value (&plan->grid, i, row->number) : 0);
   }
   pw_text_cell (text, row ? pw_cli_status_word (row->status) : "status");

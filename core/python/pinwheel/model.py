@@ -427,7 +427,7 @@ class Model:
                       np.array(linear.twist))
 
 
-@functools.wraps(studies.sweep)
+@functools.wraps(studies.sweep, assigned=["__doc__"])  # with its own module, by which it is pickled
 def sweep(model, *arguments, **settings):
     return studies.sweep(model if isinstance(model, Model) else Model(model), *arguments, **settings)
 
