@@ -167,7 +167,7 @@ static inline int pw_stabilised_by (const pw_run *r, pw_stabilisation_kind kind)
 extern const char *const pw_metrics[];
 
 /* Initial step size for methods that begin with order 1: the error h^2 / T^2 is a quarter of the tolerance; states that
- * saturating forces depend on change by at most r->saturation, unless that takes less than 1e-9 T. */
+ * saturating forces depend on change by at most r->tolerance_bound, unless that takes less than 1e-9 T. */
 double pw_first_step (const pw_run *r);
 
 /* Step size of an adaptive method below which steps vanish in the round-off of the time. */
@@ -323,9 +323,12 @@ static inline void pw_forget_residuals (pw_run *r) {
 /* ---- Projection ---- */
 
 /* Scaled residuals: the round-off of the few terms of a row, to which an iteration converges; the largest that is
- * accepted where it stalls, for angles up to 1 rad (project.c). */
+ * accepted where it stalls, times the largest angle before the iteration. */
 #define PW_RESIDUAL_CONVERGED (4 * DBL_EPSILON)
 #define PW_RESIDUAL_ACCEPTED (64 * DBL_EPSILON)
+/* The largest angle of a body, at least 1 rad: where no body with mass can take up the residual of a joint, its scaled
+ * residual cannot be smaller than the round-off of that angle. */
+double pw_largest_angle (const pw_system *s, const double *q);
 
 typedef struct {
   pw_saddle *position;         /* of the metric of positions and the holonomic rows; or the run's saddle */

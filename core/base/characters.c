@@ -1,4 +1,5 @@
-/* Checks of external texts: UTF-8 without control characters, which could move a terminal's cursor. */
+/* Checks of external texts: UTF-8 without control characters, which could move a terminal's cursor; printing into
+ * buffers. */
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>

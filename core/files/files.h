@@ -55,7 +55,7 @@ int pw_compile_file (const char *path, const char *engine, pw_object_user *use, 
 #define PW_PAGE_TOOLS "clang, lld, wasi-libc and libclang-rt-14-dev-wasm32 (make deps TOOLS=page)"
 
 /* Compiles generated code with all messages in a log, for `lanes` runs at once; 0: for single runs.  PW_INPUT without
- * compiler or pinwheel.h; PW_METHOD if it does not compile; PW_RESOURCE. */
+ * compiler or pinwheel.h; PW_METHOD if it does not compile; PW_STOPPED if a signal ended the compiler; PW_RESOURCE. */
 int pw_compile_scene (const char *path, const char *object, const char *log, int lanes, pw_error *error);
 /* The compiler's options for generated code, ending with NULL: vector instructions of this processor, no fused
  * multiply-add, so that results have the same bits.  NULL: no code advances this number of runs. */
@@ -110,7 +110,7 @@ typedef struct {
 
 extern const pw_unit_name pw_unit_names[]; /* ends with a NULL name */
 
-/* ---- Paths (path.c), reading (read.c) ---- */
+/* ---- Reading (read.c) ---- */
 
 /* As pw_read_rest, of the regular file at a path.  If it cannot be opened, the error is "FAILURE PATH: REASON". */
 int pw_read_file (const char *failure, const char *path, size_t max_bytes, const char *limit, char **text, size_t *size,

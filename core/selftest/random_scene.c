@@ -41,7 +41,8 @@ static int scene_choice (pw_random *r, const pw_field *f) {
 
 /* One value of a field.  Points are near the centre of mass, so that points of distant bodies do not coincide. */
 static void scene_value (pw_random *r, const pw_field *f, void *at) {
-  if (f->type == PW_NUMBER) *(double *)at = scene_number (r, f->domain);
+  int is_default = f->type == PW_NUMBER && f->domain == PW_REAL && !f->required && pw_random_between (r, 0, 1) < 0.2;
+  if (f->type == PW_NUMBER) *(double *)at = is_default ? 0 : scene_number (r, f->domain);
   if (f->type == PW_SIGNAL) *(pw_signal *)at = scene_signal (r);
   if (f->type == PW_CHOICE) *(int *)at = scene_choice (r, f);
   for (int i = 0; i < 2 && f->type == PW_POINT; i++) ((double *)at)[i] = pw_random_between (r, -0.6, 0.6);

@@ -161,7 +161,7 @@ static int scene_randomise (pw_probe *probe, const double *q, const double *v, p
   /* no signal has a breakpoint between the times used, which are later than one that is too near for differences */
   double next = pw_next_breakpoint (probe->workspace, 0, probe->t);
   if (next - probe->t < 1e-6 * fabs (probe->t)) probe->t = next, next = pw_next_breakpoint (probe->workspace, 0, next);
-  char signal[160];
+  char signal[PW_NAME_BYTES];
   if (isnan (next))
     return pw_fail (error, PW_METHOD, "t = %.6g s: %s: its breakpoint function returned a time that is not later",
                     probe->t, pw_failed_signal (probe->workspace, signal, sizeof signal));
@@ -185,7 +185,7 @@ static int scene_open (scene_test *test, pw_error *error) {
 }
 
 static int scene_fail_signal (const scene_test *test, pw_error *error) {
-  char signal[160];
+  char signal[PW_NAME_BYTES];
   return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed: %s is not a finite number, or its function failed",
                   test->probe.t, pw_failed_signal (test->probe.workspace, signal, sizeof signal));
 }

@@ -68,9 +68,7 @@ static int project_check_redundant (pw_projector *p, const pw_run *r, const doub
   return PW_RETRY;
 }
 
-/* The largest angle of a body, at least 1 rad: where no body with mass can take up the residual of a joint, its scaled
- * residual cannot be smaller than the round-off of that angle. */
-static double project_largest_angle (const pw_system *s, const double *q) {
+double pw_largest_angle (const pw_system *s, const double *q) {
   double largest = 1;
   for (int b = 0; b < s->bodies; b++) largest = fmax (largest, fabs (q[3 * b + 2]));
   return largest;
@@ -83,6 +81,7 @@ int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const
   pw_residuals now = { 0 };
   double *g = r->scratch, *size = g + s->rows, *mu = size + s->rows, *dq = mu + s->rows;
   double previous = INFINITY; /* the residual before the last correction */
+  double accepted = PW_RESIDUAL_ACCEPTED;
   p->contradictory_row = -1;
   for (p->iterations = 0;; p->iterations++) {
     int status = pw_update_kinematics (r->w, t, q, v);
@@ -93,8 +92,9 @@ int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const
     p->worst_row = now.row_position;
     int stalled = now.position > previous / 4; /* at round-off, since convergence is quadratic */
     if (now.position <= PW_RESIDUAL_CONVERGED) break;
-    if (stalled && now.position <= PW_RESIDUAL_ACCEPTED * project_largest_angle (s, q)) break;
+    if (stalled && now.position <= accepted) break;
     if (p->iterations >= max_iterations || !isfinite (now.position)) return PW_RETRY;
+    if (p->iterations == 0) accepted *= pw_largest_angle (s, q); /* not later: corrections may diverge */
     previous = now.position;
     pw_evaluate_J (r->w);
     r->statistics.factorisations++;

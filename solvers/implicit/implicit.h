@@ -42,7 +42,7 @@ void pw_implicit_scale (const pw_dae *x, double c, double e, double *row_factor,
 typedef int pw_implicit_step (pw_run *r, double h, double t1);
 
 /* Advances by one step: makes q1, v1 the state reached, and calls `accept`, which sets its accelerations and
- * multipliers, before r->t changes. */
+ * multipliers, before r->t changes.  PW_STOPPED between attempts near a singular configuration, if requested. */
 int pw_implicit_advance (pw_run *r, double t_end, pw_implicit_step *step, void (*accept) (pw_run *r), pw_error *error);
 
 /* Reports a failed step of size h from the state reached, also of radau; status: what the step returned, PW_OK if its

@@ -9,11 +9,13 @@
 #include "util.h"
 
 int pw_run_annotate_error (const pw_run *r, int status, pw_error *error) {
-  char signal[160];
+  char signal[PW_NAME_BYTES];
   if (status == PW_OK || error == NULL || *pw_failed_signal (r->w, signal, sizeof signal) == 0) return status;
   if (strstr (error->text, signal)) return status;
   size_t n = strlen (error->text);
-  const char *link = strstr (error->text, "a signal failed") ? ":" : "; in the attempted step,";
+  const char *link = strstr (error->text, "a signal failed") ? ":"
+                     : status == PW_INITIAL                  ? "; in an attempt,"
+                                                             : "; in the attempted step,";
   const char *derivative = r->w->failed->of_force ? "" : ", or a derivative of it,"; /* no time derivatives of those */
   snprintf (error->text + n, sizeof error->text - n, "%s %s%s is not a finite number", link, signal, derivative);
   return status;
@@ -45,7 +47,7 @@ void pw_run_set_references (pw_run *r) {
 }
 
 int pw_run_look_ahead (pw_run *r, pw_error *error) {
-  char signal[160];
+  char signal[PW_NAME_BYTES];
   double next = pw_run_next_breakpoint (r, r->t);
   if (!isnan (next)) {
     r->breakpoint = next;
@@ -119,6 +121,7 @@ static int run_reselect (pw_run *r, pw_error *error) {
   if (other < 0) return pw_fail_memory (r->s, error);
   if (other == 0) return PW_OK;
   int status = pw_run_renew (r, error);
+  if (status == PW_OK) status = pw_run_evaluate (r, error); /* a method's `open` may have evaluated another state */
   if (status == PW_OK) pw_run_set_references (r);
   return status;
 }
@@ -297,7 +300,8 @@ int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error
   memcpy (r->q, r->q_at, pw_state_length (r->s) * sizeof *r->q);
   memcpy (r->q_given, r->given_before, 2 * ((size_t)r->s->coords + 3) * sizeof *r->q);
   r->reselect_below = reselect_below, r->initial = initial;
-  if (run_select_rows (r, NULL) == PW_OK) pw_run_evaluate (r, NULL);
+  if (run_select_rows (r, NULL) == PW_OK && pw_run_evaluate (r, NULL) == PW_OK && r->redundant) pw_watchdog_begin (r);
+  r->interrupted |= r->redundant > 0; /* run_select_rows may have opened the method at the refused state */
   return status;
 }
 

@@ -109,9 +109,8 @@ static double step_error (const pw_variation *x) {
 }
 
 /* Adds to entries `first` to `end` - 1 of the errors of derivatives those of the step, and the part of the derivatives'
- * change that the run does not resolve. */
-static void step_add_errors (pw_variation *x, double h, int first, int end) {
-  double defect = step_defect (x, h);
+ * change that the run does not resolve, step_defect. */
+static void step_add_errors (pw_variation *x, double defect, int first, int end) {
   for (pw_direction_copy *d = x->direction; d < x->direction + x->count; d++) {
     const pw_variation_column *derivative = &d->column[0];
     double *error = d->column[1].trial;
@@ -155,11 +154,12 @@ static int step_stages (pw_variation *x, double h, double t1, pw_error *error) {
     step_implicit_errors (x);
   else
     pw_variation_explicit_errors (x, h, 0, 2 * x->n);
-  step_add_errors (x, h, 0, 2 * x->n);
+  const double defect = step_defect (x, h);
+  step_add_errors (x, defect, 0, 2 * x->n);
   pw_variation_accelerate (x, 1, last);
   if (pw_variation_ledger_rates (x, last) != PW_OK) return pw_fail_signal (x->at, error);
   if (x->implicit == NULL) pw_variation_explicit_errors (x, h, 2 * x->n, x->size);
-  step_add_errors (x, h, 2 * x->n, x->size);
+  step_add_errors (x, defect, 2 * x->n, x->size);
   return PW_OK;
 }
 

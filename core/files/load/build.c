@@ -63,8 +63,8 @@ static int build_run (const build_command *cmd, char *const *word, const char *s
   if (code != 0 && code != ENOENT && code != EACCES)
     return pw_fail (error, PW_RESOURCE, "cannot run the C compiler \"%s\": %s", word[0], strerror (code));
   if (code == 0 && WIFSIGNALED (outcome)) /* Ctrl-C, or too little memory */
-    return pw_fail (error, PW_RESOURCE, "the C compiler \"%s\" was ended by a signal: %s", word[0],
-                    strsignal (WTERMSIG (outcome)));
+    return pw_fail (error, cmd->log ? PW_STOPPED : PW_RESOURCE, "the C compiler \"%s\" was ended by a signal: %s",
+                    word[0], strsignal (WTERMSIG (outcome)));
   if (code != 0 || exit_code == 127)
     return pw_fail (error, PW_INPUT, "cannot run the C compiler \"%s\" that %s%s needs (%s): install %s", word[0],
                     cmd->log ? "specialised code" : "the model file ", cmd->log ? "" : source,
@@ -152,8 +152,8 @@ const char *const *pw_scene_options (int lanes) {
   return NULL;
 }
 
-/* Blocks SIGINT (Ctrl-C reaches the compiler, too), SIGTERM and SIGHUP until the caller, having deleted temporary
- * files, restores the mask that is stored. */
+/* Blocks SIGINT (Ctrl-C reaches the compiler, too), SIGTERM and SIGHUP until the caller restores the mask that
+ * is stored: pw_compile_file after deleting its temporary files, pw_compile_scene, whose caller deletes them, before. */
 static void build_defer (sigset_t *mask) {
   sigset_t stop;
   sigemptyset (&stop);

@@ -189,8 +189,8 @@ static FILE *code_lock (const code_job *x) {
   return f;
 }
 
-/* Compiles into the cache.  PW_METHOD if the text does not compile, else PW_RETRY: the cache may be the cause, as it is
- * if KEY.c was deleted meanwhile. */
+/* Compiles into the cache.  PW_METHOD if the text does not compile, PW_STOPPED if a signal ended the compiler, else
+ * PW_RETRY: the cache may be the cause, as it is if KEY.c was deleted meanwhile. */
 static int code_compile_cached (code_job *x, pw_error *error) {
   pw_error cause = { 0 };
   FILE *source = code_lock (x);
@@ -202,7 +202,8 @@ static int code_compile_cached (code_job *x, pw_error *error) {
     unlink (x->source);
   fclose (source);
   if (status == PW_OK) pw_cache_trim (x->folder);
-  if (status == PW_METHOD && access (x->source, F_OK) == 0) return pw_fail (error, status, "%s", cause.text);
+  if (status == PW_STOPPED || (status == PW_METHOD && access (x->source, F_OK) == 0))
+    return pw_fail (error, status, "%s", cause.text);
   return status == PW_OK ? PW_OK : PW_RETRY;
 }
 

@@ -39,7 +39,7 @@ static int search_find_anchors (search_anchors anchor, pw_error *error) {
   if (library == NULL) *anchor[SEARCH_LIBRARY] = 0;
   for (int i = 0; i < SEARCH_ANCHORS; i++) {
     char *slash = strrchr (anchor[i], '/');
-    if (slash) *slash = 0;
+    if (slash) slash[slash == anchor[i]] = 0; /* "/" of the root */
   }
   return PW_OK;
 }

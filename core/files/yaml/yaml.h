@@ -64,9 +64,9 @@ typedef struct {
   double operations;     /* of all expressions so far */
 } pw_reader;
 
+enum { PW_YAML_DEPTH = 30 }; /* most lists and maps inside each other */
 /* Limits of one model, about 1 GB each, so that a small file cannot use all memory: entries of each list, such as
  * bodies, elements, parameters; points of all tables; operations of all expressions. */
-enum { PW_YAML_DEPTH = 30 }; /* most lists and maps inside each other */
 enum { PW_YAML_MAX_ITEMS = 1000000, PW_YAML_MAX_POINTS = 20000000, PW_YAML_MAX_OPERATIONS = 30000000 };
 
 /* ---- The text (yaml_source.c) ---- */
