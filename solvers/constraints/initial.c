@@ -128,7 +128,8 @@ static int initial_project_reduced (pw_projector *p, pw_run *r, initial_level le
     status = initial_project (&reduced, r, level, &unused);
     pw_projector_close (&reduced);
     pw_evaluate_residuals (r->w, NULL, &now);
-    if (status == PW_OK && !(now.position <= PW_RESIDUAL_ACCEPTED * pw_largest_angle (s, r->q_given))) status = PW_RETRY;
+    if (status == PW_OK && !(now.position <= PW_RESIDUAL_ACCEPTED * pw_largest_angle (s, r->q_given)))
+      status = PW_RETRY;
   }
   free (start);
   return status;

@@ -152,8 +152,8 @@ const char *const *pw_scene_options (int lanes) {
   return NULL;
 }
 
-/* Blocks SIGINT (Ctrl-C reaches the compiler, too), SIGTERM and SIGHUP until the caller restores the mask that
- * is stored: pw_compile_file after deleting its temporary files, pw_compile_scene, whose caller deletes them, before. */
+/* Blocks SIGINT (Ctrl-C reaches the compiler, too), SIGTERM and SIGHUP until the caller restores the mask that is
+ * stored: pw_compile_file after deleting its temporary files, pw_compile_scene before its caller deletes them. */
 static void build_defer (sigset_t *mask) {
   sigset_t stop;
   sigemptyset (&stop);
