@@ -139,11 +139,10 @@ static const pw_kind *build_kind (const pw_reader *r, const pw_node *node) {
   const pw_node *first = node->type == PW_YAML_MAP ? node->first : NULL;
   if (first == NULL || first->type != PW_YAML_SCALAR)
     return pw_yaml_fail (r, node->at, "expected an element {TYPE: NAME, ...}, found %s", pw_yaml_found (node)), NULL;
-  pw_nearest near = { .sought = first->text };
-  for (const pw_kind *const *k = pw_kinds; *k; k++) {
+  for (const pw_kind *const *k = pw_kinds; *k; k++)
     if (strcmp ((*k)->name, first->text) == 0) return *k;
-    pw_nearest_try (&near, (*k)->name);
-  }
+  pw_nearest near = { .sought = first->text };
+  for (const pw_kind *const *k = pw_kinds; *k; k++) pw_nearest_try (&near, (*k)->name);
   const char *kind = build_later_type (first);
   if (kind) return pw_yaml_fail (r, first->at, "an element begins with its type: write {%s: NAME, ...}", kind), NULL;
   /* Words of descriptions suggest a type: "hinge" pin, "damper" spring; names of fields, as "angle", do not. */

@@ -24,15 +24,15 @@ static int read_key (const pw_reader *r, const pw_node *node, const char *const 
                      const pw_node **value) {
   if (node->type != PW_YAML_SCALAR)
     return pw_yaml_fail (r, node->at, "expected a key of %s, found %s", owner, pw_yaml_found (node));
-  pw_nearest near = { .sought = node->text };
   for (int i = 0; key[i]; i++) {
-    pw_nearest_try (&near, key[i]);
     if (strcmp (key[i], node->text) != 0) continue;
     if (value[i]) return pw_yaml_fail (r, node->at, "\"%s\" appears twice", key[i]);
     value[i] = node->next;
     int empty = node->next->type == PW_YAML_SCALAR && !node->next->quoted && *node->next->text == 0;
     return empty ? pw_yaml_fail (r, node->at, "\"%s\" has no value", key[i]) : PW_OK;
   }
+  pw_nearest near = { .sought = node->text };
+  for (int i = 0; key[i]; i++) pw_nearest_try (&near, key[i]);
   const char *hint = read_key_hint (node->text, key);
   return pw_yaml_fail (r, node->at, "%s has no \"%.60s\"%s", owner, node->text, *hint ? hint : pw_nearest_text (&near));
 }
