@@ -159,7 +159,8 @@ TEST (interrupt_gap) {
                         "--methods ida+ggl,rk4+projection --only-methods &\n"
                         "sleep 1; kill -TERM $!; wait $!");
   const char *row = strstr (cli_out, "\nrk4+projection ");
-  if (status != 130 || row == NULL) return; /* it was slower than the signal: nothing to see */
+  assert_true (status == 0 || status == 130);
+  if (status == 0 || row == NULL) return; /* all runs, or none of rk4, ended before the signal: nothing to see */
   assert_non_null (strstr (cli_out, "\nmethods "));
   assert_true (strstr (cli_out, "\nmethods ") < row);
 }

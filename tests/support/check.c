@@ -35,8 +35,9 @@ const char *check_text (const char *format, ...) {
   va_list list;
   next = (next + 1) % 8;
   va_start (list, format);
-  vsnprintf (text[next], sizeof text[next], format, list);
+  int length = vsnprintf (text[next], sizeof text[next], format, list);
   va_end (list);
+  assert_true (length >= 0 && (size_t)length < sizeof text[next]);
   return text[next];
 }
 

@@ -14,6 +14,7 @@ static gallery_scene gallery_build (const char *model, va_list sets) {
   check_ok (x.file ? PW_OK : error.status, &error);
   x.model = pw_file_model (x.file, &error);
   check_ok (x.model ? PW_OK : error.status, &error);
+  check_ok (x.model ? PW_OK : error.status, &error);
   for (const char *name; (name = va_arg (sets, const char *)) != NULL;)
     check_ok (pw_model_set (x.model, name, va_arg (sets, double), &error), &error);
   check_ok (pw_model_build (x.model, &error), &error);
