@@ -75,7 +75,7 @@ typedef struct pw_scene_code pw_scene_code;
  * (pw_specialised_fits), and so may processes at the same time.
  *
  * NULL and PW_INPUT without compiler or pinwheel.h; PW_METHOD if the text does not compile, with the path at which it
- * is kept; PW_RESOURCE. */
+ * is kept; PW_STOPPED if a signal ended the compiler; PW_RESOURCE. */
 pw_scene_code *pw_scene_code_open (const char *text, const pw_system *s, pw_error *error);
 /* The same for 2, 4 or 8 runs at once (pw_runs_advance), if pw_system_has_lanes. */
 pw_scene_code *pw_scene_lanes_open (const char *text, const pw_system *s, int lanes, pw_error *error);

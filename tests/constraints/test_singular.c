@@ -98,8 +98,11 @@ TEST (stopped_attempts) {
         s, method[i], &(pw_settings){ .step = step[i], .span = 10, .stop = singular_stop, .stop_context = &calls });
     for (; status == PW_OK && pw_run_time (r) < 10; calls = 0) status = pw_run_advance (r, 10, &error);
     assert_int_equal (status, PW_STOPPED);
+    const double stopped = pw_run_time (r);
     calls = 2;
+    error = (pw_error){ 0 };
     check_ok (pw_run_advance (r, 10, &error), &error);
+    assert_true (pw_run_time (r) > stopped);
     runs_close (r, s);
   }
 }

@@ -106,7 +106,7 @@ static int restart_or_fail (pw_run *r, pw_error *error) {
   return restart_fails ? pw_fail (error, PW_METHOD, "no restart") : restart_built_in->restart (r, error);
 }
 
-/* One that the method refuses does so, too. */
+/* A restart that the method refuses leaves the run as it was; each later step tries it again first. */
 TEST (refused_by_method) {
   for (int i = 0; strcmp ((restart_built_in = pw_methods[i])->name, "rk4") != 0;) i++;
   pw_method refusing = *restart_built_in;

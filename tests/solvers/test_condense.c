@@ -73,7 +73,7 @@ static const pw_parameter platform_list[] = {
 };
 
 /* A platform with legs.  In the coordinates of a leg that stands on the ground its two pins are dependent; the second
- * one is therefore eliminated after the platform; if it is a slot, with fewer equations than the foot, that. */
+ * one is therefore eliminated after the platform, or a slot in its place, which has fewer equations than the foot. */
 SCENE_WITH (platform_build, platform_list, platform) {
   char leg[20], pin[20];
   for (int i = -1; i <= PLATFORM_LEGS; i++) {

@@ -138,7 +138,7 @@ TEST (models) {
     }
 }
 
-/* A run that waits for the others has the configurations of its own state, and so its potential energy. */
+/* A run that waits for the others has the configurations of its own state, from which the potential energy follows. */
 TEST (waiting) {
   if (!has_lanes ()) skip ();
   several x;

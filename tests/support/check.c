@@ -26,6 +26,7 @@ static int check_teardown (void **state) {
 }
 
 int check_run (void) {
+  if (check_count == 0) return 1; /* a program without tests would pass */
   return _cmocka_run_group_tests ("tests", check_tests, check_count, check_setup, check_teardown);
 }
 

@@ -225,13 +225,16 @@ static int optimise_finish (pw_optimise *problem, pw_error *error) {
   pw_optimise_print (problem);
   pw_unknowns_report (&problem->unknowns, problem->best->to);
   if (result) pw_optimise_yaml (problem, result);
+  const int signals = pw_stop;
   pw_stop_catch (); /* Ctrl-C ends gnuplot, but the files are still written */
   if (problem->plots_path) pw_optimise_draw (problem, &drawing);
   pw_stop_release ();
   const char *word = drawing.status ? pw_cli_status_word (drawing.status) : converged ? "ok" : "method";
   if (summary) pw_optimise_json (problem, stopped ? "interrupted" : word, summary);
   int status = pw_files_finish (&problem->files, error);
-  if (status != PW_OK && drawing.status) pw_cli_say ("pinwheel: %s\n", drawing.text);
+  const int undrawn = drawing.status && pw_stop > signals; /* by a signal while gnuplot was running */
+  if (drawing.status && (status != PW_OK || undrawn)) pw_cli_say ("pinwheel: %s\n", drawing.text);
+  if (status == PW_OK && undrawn) return PW_INTERRUPTED;
   if (status == PW_OK && drawing.status) status = pw_fail (error, drawing.status, "%s", drawing.text);
   if (stopped) pw_cli_say ("pinwheel: interrupted; this is the best result so far\n");
   if (status == PW_OK && stopped) return PW_INTERRUPTED;
