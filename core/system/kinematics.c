@@ -13,8 +13,7 @@ void pw_point_to_internal (pw_workspace *w, const double *q, const double *v) {
 }
 
 /* Two bodies at a time; singly the last of an odd number, and all from a pair with an angle beyond the limit on. */
-__attribute__ ((always_inline)) inline void pw_update_configurations (pw_workspace *w, const double *q,
-                                                                      const double *v) {
+PW_INLINE void kinematics_configurations (pw_workspace *w, const double *q, const double *v) {
   if (w->s->coords > 3 * w->s->bodies) pw_point_to_internal (w, q, v);
   pw_configuration *p = w->configuration, *end = p + w->s->bodies;
   _Static_assert(PW_SINE_LANES == 2, "bodies are evaluated in pairs");
@@ -30,6 +29,10 @@ __attribute__ ((always_inline)) inline void pw_update_configurations (pw_workspa
     pw_sin_cos (q[2], &s, &c);
     *p = (pw_configuration){ q[0], q[1], q[2], c, s, v[0], v[1], v[2] };
   }
+}
+
+void pw_update_configurations (pw_workspace *w, const double *q, const double *v) {
+  kinematics_configurations (w, q, v);
 }
 
 /* Copies the states that a function reads; q NULL: only velocities.  Returns the number of states copied. */
@@ -68,7 +71,7 @@ int pw_update_signals (pw_workspace *w, double t, const double *q, const double 
 }
 
 int pw_update_kinematics (pw_workspace *w, double t, const double *q, const double *v) {
-  pw_update_configurations (w, q, v);
+  kinematics_configurations (w, q, v);
   return t == w->t_signal && w->s->state_dependent == 0 ? PW_OK : pw_update_signals (w, t, q, v);
 }
 

@@ -81,7 +81,7 @@ int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const
   pw_residuals now = { 0 };
   double *g = r->scratch, *size = g + s->rows, *mu = size + s->rows, *dq = mu + s->rows;
   double previous = INFINITY; /* the residual before the last correction */
-  double accepted = PW_RESIDUAL_ACCEPTED;
+  double accepted = PW_RESIDUAL_ACCEPTED, at_large_angles = 0;
   p->contradictory_row = -1;
   for (p->iterations = 0;; p->iterations++) {
     int status = pw_update_kinematics (r->w, t, q, v);
@@ -94,7 +94,8 @@ int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const
     if (now.position <= PW_RESIDUAL_CONVERGED) break;
     if (stalled && now.position <= accepted) break;
     if (p->iterations >= max_iterations || !isfinite (now.position)) return PW_RETRY;
-    if (p->iterations == 0) accepted *= pw_largest_angle (s, q); /* not later: corrections may diverge */
+    if (p->iterations == 0) at_large_angles = accepted * pw_largest_angle (s, q); /* not later: it may diverge */
+    if (stalled) accepted = at_large_angles; /* if the next correction stalls, too */
     previous = now.position;
     pw_evaluate_J (r->w);
     r->statistics.factorisations++;
