@@ -211,9 +211,9 @@ static int constant_value (void *context, double t, const double *x, double *val
 SCENE (pushed) {
   pw_add_body (m, &(pw_body){ .name = "a", .mass = 1, .inertia = 1 });
   pw_add_spring (m, &(pw_spring){ .name = "s", .body = { "a", "ground" }, .stiffness = 1 });
-  pw_add_torque (
-      m,
-      &(pw_torque){ .name = "T", .body = { "a", "ground" }, .value = { PW_FUNCTION, .function = { constant_value } } });
+  pw_add_torque (m, &(pw_torque){ .name = "T",
+                                  .body = { "a", "ground" },
+                                  .value = { PW_FUNCTION, .function = { .eval = constant_value } } });
 }
 
 TEST (constant) {
