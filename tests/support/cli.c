@@ -1,4 +1,5 @@
 /* Runs the program in a temporary folder and reads its output, for the tests; see cli.h. */
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -116,6 +117,14 @@ double cli_number (const char *json, ...) {
   }
   va_end (keys);
   return strtod (json, NULL);
+}
+
+int cli_sensitivity (const char *key, double *value) {
+  int count = 0;
+  for (const char *at = cli_file ("sens/sensitivity.json"); (at = cli_value (at, key)) != NULL; count++)
+    if (count < CLI_MOST) value[count] = strncmp (at, "null", 4) == 0 ? NAN : strtod (at, NULL);
+  assert_in_range (count, 0, CLI_MOST);
+  return count;
 }
 
 int cli_says (const char *json, const char *key, const char *value) {

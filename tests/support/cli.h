@@ -47,6 +47,11 @@ const char *cli_file (const char *name);
 /* The number under the keys of a summary, in order: cli_number (json, "bodies", "frame", "x", NULL). */
 double cli_number (const char *json, ...);
 
+enum { CLI_MOST = 40 };
+
+/* Numbers under a key of sens/sensitivity.json, in order, at most CLI_MOST; NaN for null.  Returns how many there are. */
+int cli_sensitivity (const char *key, double *value);
+
 /* 1 if the summary has this text under the key. */
 int cli_says (const char *json, const char *key, const char *value);
 
