@@ -49,7 +49,7 @@ double cli_number (const char *json, ...);
 
 enum { CLI_MOST = 40 };
 
-/* Numbers under a key of sens/sensitivity.json, in order, at most CLI_MOST; NaN for null.  Returns how many there are. */
+/* Numbers under a key of sens/sensitivity.json, in order, at most CLI_MOST; NaN for null.  Returns their number. */
 int cli_sensitivity (const char *key, double *value);
 
 /* 1 if the summary has this text under the key. */
