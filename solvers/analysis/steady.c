@@ -114,6 +114,16 @@ static int steady_symmetries (pw_steady *x, signal_rule signals, pw_error *error
   return status == PW_OK ? PW_OK : pw_fail (error, x->why.status, "%s", x->why.text);
 }
 
+static int steady_open_branch (pw_steady *x, pw_error *error) {
+  const pw_branch_problem problem = { .unknowns = pw_steady_unknowns (x),
+                                      .equations = pw_steady_equations (x),
+                                      .tolerance = STEADY_EXACT,
+                                      .evaluate = pw_steady_evaluate,
+                                      .same = pw_steady_same_motion,
+                                      .context = x };
+  return pw_branch_open (&x->branch, &problem, error);
+}
+
 static pw_steady *steady_open (const pw_system *s, const pw_steady_settings *settings, signal_rule signals,
                                pw_error *error) {
   pw_steady *x = calloc (1, sizeof *x);
@@ -128,13 +138,7 @@ static pw_steady *steady_open (const pw_system *s, const pw_steady_settings *set
   if (status == PW_OK && steady_arrays (x) != PW_OK) status = pw_fail_memory (s, error);
   if (status == PW_OK) status = steady_begin (x, error);
   if (status == PW_OK) status = steady_symmetries (x, signals, error);
-  const pw_branch_problem problem = { .unknowns = pw_steady_unknowns (x),
-                                      .equations = pw_steady_equations (x),
-                                      .tolerance = STEADY_EXACT,
-                                      .evaluate = pw_steady_evaluate,
-                                      .same = pw_steady_same_motion,
-                                      .context = x };
-  if (status == PW_OK) status = pw_branch_open (&x->branch, &problem, error);
+  if (status == PW_OK) status = steady_open_branch (x, error);
   if (status == PW_OK) return x;
   pw_steady_close (x);
   return NULL;
@@ -219,12 +223,10 @@ static int steady_rest (pw_steady *x) {
   return 0;
 }
 
-int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_motion *out, pw_error *error) {
-  *out = (pw_steady_motion){ .parameter = parameter, .residual = INFINITY };
-  if (pw_require (x, "a search", error) != PW_OK) return PW_INPUT;
-  double range = x->settings.last - x->settings.first;
+/* Newton's method from the state of an attempt. */
+static int steady_converge (pw_steady *x, int attempt, double parameter, pw_steady_motion *out, pw_error *error) {
+  const double range = x->settings.last - x->settings.first;
   x->free_symmetries = 0;
-  if (pw_steady_open_system (x, PW_HERE, parameter) != PW_OK) return pw_fail (error, x->why.status, "%s", x->why.text);
   int status = pw_steady_start (x, attempt, x->u, error);
   if (status != PW_OK) return status;
   x->u[pw_steady_unknowns (x)] = range != 0 ? (parameter - x->settings.first) / range : 0;
@@ -233,8 +235,30 @@ int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_moti
   out->residual = x->branch.residual;
   if (status == PW_OK && steady_rest (x)) out->iterations = x->branch.iterations, out->residual = x->branch.residual;
   pw_steady_state (x, x->u);
-  out->q = x->q, out->v = x->v;
-  if (status != PW_OK) return status;
+  return status;
+}
+
+/* Removes symmetries that the solution reached does not have: then PW_RETRY. */
+static int steady_lose_symmetries (pw_steady *x, pw_error *error) {
+  const int symmetries = x->symmetries, status = pw_steady_keep_symmetries (x);
+  if (status == PW_RESOURCE) return pw_fail_memory (x->s, error);
+  if (status != PW_OK || x->symmetries == symmetries) return PW_OK;
+  pw_branch_close (&x->branch);
+  return steady_open_branch (x, error) == PW_OK ? PW_RETRY : error->status;
+}
+
+int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_motion *out, pw_error *error) {
+  *out = (pw_steady_motion){ .parameter = parameter, .residual = INFINITY };
+  if (pw_require (x, "a search", error) != PW_OK) return PW_INPUT;
+  if (pw_steady_open_system (x, PW_HERE, parameter) != PW_OK) return pw_fail (error, x->why.status, "%s", x->why.text);
+  int status, known;
+  do {
+    status = steady_converge (x, attempt, parameter, out, error);
+    out->q = x->q, out->v = x->v;
+    if (status != PW_OK) return status;
+    known = steady_lose_symmetries (x, error);
+  } while (known == PW_RETRY);
+  if (known != PW_OK) return known;
   out->family = steady_family (x);
   if (out->family == PW_RESOURCE) return pw_fail_memory (x->s, error);
   if (out->family < 0) return pw_fail (error, PW_METHOD, "the family of the steady motion cannot be determined");

@@ -77,6 +77,9 @@ int pw_null_space (int rows, int n, double *M, double tolerance, double *out);
 void pw_irregular_state (const pw_run *r, double distance, int number, double *q, double *v);
 /* Finds the symmetries of the system.  A status; PW_RETRY and PW_METHOD: the equations are singular. */
 int pw_steady_find_symmetries (pw_steady *x);
+/* Removes the symmetries under which the equations at x->q, x->v are not invariant; then x->symmetries decreases, and
+ * unknowns lose their meaning.  A status. */
+int pw_steady_keep_symmetries (pw_steady *x);
 /* Finds the symmetries that leave what is held unchanged, at the state x->q, x->v.  A status. */
 int pw_steady_find_free_symmetries (pw_steady *x);
 /* The largest difference of two states up to symmetries and whole turns, in units of the scene; of numbers above 1 in

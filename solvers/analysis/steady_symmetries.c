@@ -1,6 +1,7 @@
 /* Symmetries of a system: displacements under which its equations are invariant.  Besides displacements of the whole
  * these are changes of angles on which nothing depends, such as that of a wheel that rolls.  They span the null space
- * of the derivatives of the equations along all displacements, at states in general position. */
+ * of the derivatives of the equations along all displacements, at states in general position, near the initial one and
+ * far away, since forces may be constant over a region only; and at each solution (pw_steady_keep_symmetries). */
 #include <lapacke.h>
 #include <math.h>
 #include <stdlib.h>
@@ -8,9 +9,12 @@
 #include "rank.h"
 #include "steady_parts.h"
 
-enum { SYMMETRY_STATES = 2 }; /* more than one, since a body alone has more displacements than equations */
-static const double SYMMETRY_DISTANCE = 0.02,    /* of these states from the initial one, in units of the scene */
-    SYMMETRY_ROUND_OFF = 1e-12,                  /* of singular values, relative to the largest one */
+enum {
+  SYMMETRY_NEAR = 2,  /* states; more than one, since a body alone has more displacements than equations */
+  SYMMETRY_STATES = 8 /* the others are displaced as a whole, if they can be, by L, 3 L, 9 L, ... */
+};
+static const double SYMMETRY_DISTANCE = 0.02, /* of a state from the initial or displaced one, in units of the scene */
+    SYMMETRY_ROUND_OFF = 1e-12,               /* of singular values, relative to the largest one */
     SYMMETRY_PIVOT = 1e-6, SYMMETRY_ZERO = 1e-7, /* rates below these cannot be pivots; count as 0 */
     SYMMETRY_SAME = 1e-4; /* of equal states: a double root moves by the root of the residual, 3e-5, with a margin */
 
@@ -31,15 +35,13 @@ void pw_steady_velocities (const pw_steady *x, const double *rates, const double
   for (int j = bodies; j < x->n; j++) v[j] = rates[pw_steady_angle_rate (x->s, j)];
 }
 
-/* The change of the equations by rate of displacement c, in units of the scene. */
-static void symmetry_violation (pw_steady *x, int c, double *rates, double *out) {
+/* What displacements of these rates change in the equations at x->q, x->v, in units of the scene. */
+static void symmetry_violation (pw_steady *x, const double *rates, double *out) {
   pw_linearisation *l = &x->system[PW_HERE].linearisation;
-  memset (rates, 0, (size_t)pw_steady_rate_count (x->s) * sizeof *rates);
-  rates[c] = 1;
   memset (l->dx, 0, 2 * (size_t)x->n * sizeof *l->dx);
   pw_steady_velocities (x, rates, x->q, l->dx);
-  if (c == PW_RATE_TURN) pw_linear_turn (l, 1, x->v, l->dx + x->n);
-  pw_linear_asymmetry (l, c == PW_RATE_TURN, out);
+  pw_linear_turn (l, rates[PW_RATE_TURN], x->v, l->dx + x->n);
+  pw_linear_asymmetry (l, rates[PW_RATE_TURN], out);
 }
 
 /* The largest change of an acceleration by a single coordinate, in units of the scene. */
@@ -105,12 +107,30 @@ void pw_irregular_state (const pw_run *r, double distance, int number, double *q
   }
 }
 
-/* Evaluates derivatives at state `number` near the initial one, in general position, but on the constraints: off them
- * residuals rotate with the whole. */
-static int symmetry_evaluate (pw_steady *x, double distance, int number) {
+/* Rotates positions and velocities by an angle about a point, which may be in q. */
+static void symmetry_rotate (const pw_steady *x, double angle, const double *about, double *q, double *v) {
+  double c = pw_cos (angle), s = pw_sin (angle), centre[2] = { about[0], about[1] };
+  for (int j = 0; j < 3 * x->s->bodies; j += 3) {
+    double dx = q[j] - centre[0], dy = q[j + 1] - centre[1], vx = v[j], vy = v[j + 1];
+    q[j] = centre[0] + c * dx - s * dy, q[j + 1] = centre[1] + s * dx + c * dy, q[j + 2] += angle;
+    v[j] = c * vx - s * vy, v[j + 1] = s * vx + c * vy;
+  }
+}
+
+/* Displaces the whole at x->q, x->v irregularly, by up to pi and `distance` along x and y. */
+static void symmetry_displace (pw_steady *x, double distance, int number) {
+  symmetry_rotate (x, PW_PI * pw_irregular (0.9 + number, 1), x->origin, x->q, x->v);
+  for (int j = 0; j < 3 * x->s->bodies; j += 3)
+    for (int i = 0; i < 2; i++) x->q[j + i] += distance * pw_irregular (0.9 + number, 2 + i);
+}
+
+/* Evaluates derivatives at state `number` in general position, but on the constraints: off them residuals rotate with
+ * the whole.  near: greatest distance of a state from the initial one, or from that after a displacement. */
+static int symmetry_evaluate (pw_steady *x, double near, int number) {
   pw_run *r = x->system[PW_HERE].run;
   pw_projector p;
-  pw_irregular_state (r, distance, number, x->q, x->v);
+  pw_irregular_state (r, near, number, x->q, x->v);
+  if (number >= SYMMETRY_NEAR) symmetry_displace (x, x->L * pow (3, number - SYMMETRY_NEAR), number);
   if (pw_projector_open (&p, r, x->s->metric, x->s->metric, &x->why) != PW_OK) return PW_RESOURCE;
   int status = pw_project_positions (&p, r, x->settings.t, x->q, x->v);
   if (status == PW_OK) status = pw_project_velocities (&p, r, x->v);
@@ -118,6 +138,25 @@ static int symmetry_evaluate (pw_steady *x, double distance, int number) {
   if (status == PW_OK) status = pw_linear_evaluate (&x->system[PW_HERE].linearisation, x->settings.t, x->q, x->v);
   if (status == PW_OK) pw_rank_rows (r->w, x->system[PW_HERE].linearisation.R, x->system[PW_HERE].linearisation.norm);
   return status;
+}
+
+/* Number of residuals and accelerations by which an asymmetry is measured. */
+static int symmetry_length (const pw_steady *x) {
+  const pw_linearisation *l = &x->system[PW_HERE].linearisation;
+  return l->holonomic + l->rank + x->n + 3; /* the last three are 0, so that there are at least as many as rates */
+}
+
+/* Stores the asymmetries of `count` displacements at x->q, x->v as columns of M, from one column to the next `rows`
+ * later, relative to 1 + 1e-4 x the largest derivative of an acceleration, whose round-off they contain.  0 if one is
+ * not finite. */
+static int symmetry_columns (pw_steady *x, int count, const double *displacement, int rows, double *M) {
+  const double scale = 1 / (1 + 1e-4 * symmetry_largest_change (x));
+  int finite = 1, length = symmetry_length (x) - 3;
+  for (int c = 0; c < count; c++, M += rows) {
+    symmetry_violation (x, displacement + c * pw_steady_rate_count (x->s), M);
+    for (int i = 0; i < length; i++) finite &= isfinite (M[i] *= scale);
+  }
+  return finite;
 }
 
 /* Reduces the symmetries so that combinations of them that displace nothing vanish, such as a rotation of the whole
@@ -175,31 +214,61 @@ static void symmetry_find_cyclic (pw_steady *x) {
   }
 }
 
-int pw_steady_find_symmetries (pw_steady *x) {
-  pw_linearisation *l = &x->system[PW_HERE].linearisation;
-  int rates = pw_steady_rate_count (x->s); /* n + 3 at most */
-  int length = l->holonomic + l->rank + x->n + 3, rows = SYMMETRY_STATES * length;
-  int status = PW_OK;
-  double *M = calloc ((size_t)rows * (size_t)rates + (size_t)rates, sizeof *M), size = 0;
-  if (M == NULL) return PW_RESOURCE;
-  for (int k = 0; k < SYMMETRY_STATES && status == PW_OK; k++) {
-    status = symmetry_evaluate (x, SYMMETRY_DISTANCE, k);
-    if (status == PW_RETRY) status = symmetry_evaluate (x, SYMMETRY_DISTANCE / 100, k);
-    for (int c = 0; c < rates && status == PW_OK; c++)
-      symmetry_violation (x, c, M + rows * rates, M + c * rows + k * length);
-    if (status == PW_OK) size = fmax (size, symmetry_largest_change (x));
-  }
-  double tolerance = PW_LINEAR_SYMMETRIC * (1 + 1e-4 * size); /* round-off of larger derivatives is larger */
-  if (status == PW_OK) x->symmetries = x->s->bodies ? pw_null_space (rows, rates, M, tolerance, x->symmetry) : 0;
-  free (M);
-  if (status != PW_OK || x->symmetries < 0) return status != PW_OK ? status : x->symmetries;
-  int idle = symmetry_remove_idle (x, rates);
-  if (idle < 0) return idle;
+/* Makes x->symmetry a basis whose rows are as sparse as possible. */
+static void symmetry_simplify (pw_steady *x, int idle) {
+  int rates = pw_steady_rate_count (x->s);
   symmetry_reduce (x->symmetries, rates, x->symmetry);
   x->symmetries -= idle;
   symmetry_keep_one_turn (x, rates);
   symmetry_find_cyclic (x);
+}
+
+/* Adds the asymmetries at state `number` of all displacements, the rows of `unit`. */
+static int symmetry_add_state (pw_steady *x, int number, const double *unit, int rows, double *M) {
+  int rates = pw_steady_rate_count (x->s), status = symmetry_evaluate (x, SYMMETRY_DISTANCE, number);
+  M += number * symmetry_length (x);
+  if (status == PW_RETRY) status = symmetry_evaluate (x, SYMMETRY_DISTANCE / 100, number);
+  const int finite = status == PW_OK && symmetry_columns (x, rates, unit, rows, M);
+  if (number < SYMMETRY_NEAR || status == PW_RESOURCE) return status;
+  for (int c = 0; c < rates && !finite; c++) memset (M + c * rows, 0, (size_t)symmetry_length (x) * sizeof *M);
+  return PW_OK; /* the whole may be joined to the ground, or forces undefined far away */
+}
+
+int pw_steady_find_symmetries (pw_steady *x) {
+  int rates = pw_steady_rate_count (x->s), rows = SYMMETRY_STATES * symmetry_length (x), status = PW_OK;
+  double *M = calloc ((size_t)(rows + rates) * (size_t)rates, sizeof *M), *unit = M + rows * rates;
+  if (M == NULL) return PW_RESOURCE;
+  for (int c = 0; c < rates; c++) unit[c * rates + c] = 1;
+  for (int k = SYMMETRY_STATES; k-- > 0 && status == PW_OK;) status = symmetry_add_state (x, k, unit, rows, M);
+  if (status == PW_OK)
+    x->symmetries = x->s->bodies ? pw_null_space (rows, rates, M, PW_LINEAR_SYMMETRIC, x->symmetry) : 0;
+  free (M);
+  if (status != PW_OK || x->symmetries < 0) return status != PW_OK ? status : x->symmetries;
+  int idle = symmetry_remove_idle (x, rates); /* at state 0, evaluated last */
+  if (idle < 0) return idle;
+  symmetry_simplify (x, idle);
   return PW_OK;
+}
+
+int pw_steady_keep_symmetries (pw_steady *x) {
+  int rates = pw_steady_rate_count (x->s), count = x->symmetries, rows = symmetry_length (x);
+  int status = pw_linear_evaluate (&x->system[PW_HERE].linearisation, x->settings.t, x->q, x->v);
+  if (status != PW_OK || count == 0) return status;
+  double *M = calloc ((size_t)(rows + count + rates) * (size_t)count, sizeof *M), *c = M + rows * count,
+         *kept = c + count * count;
+  if (M == NULL) return PW_RESOURCE;
+  int left = symmetry_columns (x, count, x->symmetry, rows, M) ? pw_null_space (rows, count, M, PW_LINEAR_SYMMETRIC, c)
+                                                               : count;
+  for (int i = 0; left < count && i < left * count; i++)
+    for (int j = 0; j < rates; j++) kept[i / count * rates + j] += c[i] * x->symmetry[i % count * rates + j];
+  if (left >= 0 && left < count) {
+    memcpy (x->symmetry, kept, (size_t)(left * rates) * sizeof *kept);
+    memset (x->cyclic, 0, (size_t)x->n);
+    x->symmetries = left;
+    symmetry_simplify (x, 0);
+  }
+  free (M);
+  return left < 0 ? left : PW_OK;
 }
 
 int pw_steady_find_free_symmetries (pw_steady *x) {
@@ -223,16 +292,6 @@ int pw_steady_find_free_symmetries (pw_steady *x) {
 /* Whether a symmetry displaces the whole. */
 static int symmetry_of_whole (const double *symmetry) {
   return symmetry[PW_RATE_X] != 0 || symmetry[PW_RATE_Y] != 0 || symmetry[PW_RATE_TURN] != 0;
-}
-
-/* Rotates positions and velocities by an angle about a point, which may be in q. */
-static void symmetry_rotate (const pw_steady *x, double angle, const double *about, double *q, double *v) {
-  double c = pw_cos (angle), s = pw_sin (angle), centre[2] = { about[0], about[1] };
-  for (int j = 0; j < 3 * x->s->bodies; j += 3) {
-    double dx = q[j] - centre[0], dy = q[j + 1] - centre[1], vx = v[j], vy = v[j + 1];
-    q[j] = centre[0] + c * dx - s * dy, q[j + 1] = centre[1] + s * dx + c * dy, q[j + 2] += angle;
-    v[j] = c * vx - s * vy, v[j + 1] = s * vx + c * vy;
-  }
 }
 
 /* The angle by which a state is turned along a symmetry: that of the first body which only this symmetry turns; if

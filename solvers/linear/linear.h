@@ -109,8 +109,8 @@ int pw_linear_shapes (pw_linearisation *x, int k, pw_linear *l);
 /* Chooses a frame with small accelerations of the evaluated state; one that rotates only if it halves them. */
 void pw_linear_choose_frame (pw_linearisation *x);
 /* What the variation dx changes, in units of the scene, 0 for a symmetry: `holonomic` + `rank` residuals, then n
- * accelerations; turns: 1 if dx is a rotation of the whole by 1 rad, with which accelerations rotate. */
-void pw_linear_asymmetry (pw_linearisation *x, int turns, double *out);
+ * accelerations; turn: by what angle dx rotates the whole, with which accelerations rotate [rad]. */
+void pw_linear_asymmetry (pw_linearisation *x, double turn, double *out);
 /* Number of rigid displacements of the whole (x, y, phi) under which the equations are invariant to first order; stores
  * their directions in `symmetry`.  Needs A, for the tolerance. */
 int pw_linear_symmetries (pw_linearisation *x);

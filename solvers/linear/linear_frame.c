@@ -115,10 +115,10 @@ static double *linear_violation (pw_linearisation *x, double *out) {
   return out;
 }
 
-void pw_linear_asymmetry (pw_linearisation *x, int turns, double *out) {
+void pw_linear_asymmetry (pw_linearisation *x, double turn, double *out) {
   pw_linear_vary (x);
   out = linear_violation (x, out);
-  if (turns) pw_linear_turn (x, -1, x->a, x->da);
+  pw_linear_turn (x, -turn, x->a, x->da);
   for (int j = 0; j < x->n; j++) out[j] = x->da[j] * pw_length_factor (x->r->s, j) / linear_unit (x);
 }
 
@@ -183,12 +183,13 @@ static int linear_agree (const pw_linearisation *x, const double *a, const doubl
   return off <= LINEAR_STEADY * most;
 }
 
-/* Whether the equations and their linearisation are the same after a time, except for the rotation. */
-static int linear_same (pw_linearisation *x, double time) {
+/* Whether the equations and their linearisation are the same after a time, except for the rotation; signals are those
+ * after this time within the span. */
+static int linear_same (pw_linearisation *x, double time, double span) {
   double angle = x->frame.twist[2] * time, *q = x->later, *v = q + x->n, *expected = x->scratch;
   pw_residuals now;
   linear_later (x, time, q, v);
-  if (pw_linear_evaluate (x, x->r->t + time, q, v) != PW_OK) return 0;
+  if (pw_linear_evaluate (x, x->r->t + fmin (time, span), q, v) != PW_OK) return 0;
   pw_evaluate_residuals (x->r->w, x->r->active, &now);
   if (!(now.position <= LINEAR_STEADY && now.velocity <= LINEAR_STEADY)) return 0;
   pw_linear_rotate (x, angle, x->probe_a, expected);
@@ -217,15 +218,20 @@ static void linear_set_probe (pw_linearisation *x) {
   memcpy (x->probe_a, x->a, (size_t)x->n * sizeof *x->a);
 }
 
-/* Times at irregular fractions of the span and of T, so that a periodic change is not sampled at its period. */
+/* Times at irregular fractions of the span and of T, so that a periodic change is not sampled at its period; if a turn
+ * of the frame takes longer than the span, also at fractions of it that are at most 0.15 apart. */
 pw_steadiness pw_linear_steady (pw_linearisation *x) {
-  static const double fraction[] = { 0.0123, 0.31, 0.77, 1 };
+  static const double fraction[] = { 0.0123, 0.31, 0.77, 1 }, most_spans = 1000;
   pw_run *r = x->r;
-  double span = r->settings.span > 0 ? r->settings.span : r->w->scale.time;
+  const double span = r->settings.span > 0 ? r->settings.span : r->w->scale.time;
+  const double turn = fmin (2 * PW_PI / fabs (x->frame.twist[2]), most_spans * span);
   if (!(x->frame.residual <= LINEAR_STEADY)) return PW_ACCELERATED;
   if (!(pw_next_breakpoint (r->w, 0, r->t) > r->t + span)) return PW_CHANGING;
   linear_set_probe (x);
-  int same = linear_same (x, 0.137 * fmin (r->w->scale.time, span));
-  for (size_t i = 0; same && i < sizeof fraction / sizeof *fraction; i++) same = linear_same (x, fraction[i] * span);
+  int same = linear_same (x, 0.137 * fmin (r->w->scale.time, span), span);
+  for (size_t i = 0; same && i < sizeof fraction / sizeof *fraction; i++)
+    same = linear_same (x, fraction[i] * span, span);
+  for (int i = 1; same && x->frame.twist[2] != 0 && turn > span && i <= 8; i++)
+    same = linear_same (x, fmod (0.618034 * i, 1) * turn, span); /* golden ratio: equidistributed */
   return pw_linear_evaluate (x, r->t, r->q, r->v) == PW_OK && same ? PW_STEADY : PW_CHANGING;
 }

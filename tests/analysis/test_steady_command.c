@@ -369,6 +369,34 @@ TEST (bad) {
   cli_bad ("pinwheel linearise n-trailer --hold tractor.speed=1", 2, "--hold needs --steady");
 }
 
+/* Forces that do not change near the initial state, but elsewhere: a torque that saturates, a kerb, three lanes. */
+TEST (flat_forces) {
+  static const char head[] = "pinwheel: 1\nbodies: [{name: c, mass: 1, inertia: 1, rate: {vx: 1}}]\nelements:\n"
+                             "  - {force: push, body: c, axes: body, fx: 1}\n"
+                             "  - {drag: air, body: c, linear: 1, turning: 2}\n";
+  cli_write ("helm.yaml", check_text ("%s  - {wheel: w, body: c, at: [0, 0]}\n"
+                                      "  - {motor: helm, body: [c, ground], stiffness: 4, limit: 1, angle: 3}\n",
+                                      head));
+  cli_good ("pinwheel steady @/helm.yaml");
+  steady_shows ("helm: 1 steady motion up to 2 symmetries");
+  steady_shows ("             3     -0.989992       0.14112              0\n");
+  cli_write ("kerb.yaml", check_text ("%s  - {force: kerb, body: c, fy: '0.3 - 20*max(0, c.y - 1)'}\n", head));
+  cli_good ("pinwheel linearise @/kerb.yaml --steady --hold c.phi=0");
+  steady_shows ("The motion is steady\n");
+  steady_shows ("          -0.5           4.4441          0.7073");
+  cli_write ("lanes.yaml",
+             check_text ("%s  - {force: lane, body: c, fy: '-2*tanh((c.y + 8)*((c.y + 8)^2 - 9)/5)'}\n", head));
+  cli_good ("pinwheel steady @/lanes.yaml --hold c.phi=0");
+  steady_shows ("lanes: 1 steady motion up to 1 symmetry");
+  cli_write ("circle.yaml",
+             "pinwheel: 1\nrun: {t_end: 0.5}\n"
+             "bodies: [{name: c, mass: 1, inertia: 1, start: {y: 1}, rate: {vx: -1, omega: 1}}]\nelements:\n"
+             "  - {spring: s, body: [c, ground], at: [[0, 0], [0, 0]], stiffness: 1}\n"
+             "  - {force: f, body: c, fy: 'max(0, -0.9 - c.y)'}\n");
+  cli_good ("pinwheel linearise @/circle.yaml");
+  steady_shows ("Not steady: the equations change with time or along the motion");
+}
+
 /* Where the range begins there may be more symmetries: without stiffness or slope a body can be anywhere or have any
  * direction.  Branches have the symmetries within the range, and begin at its other end, or within it. */
 TEST (more_symmetries) {
@@ -398,8 +426,9 @@ TEST (more_symmetries) {
                           "bodies: [{name: bob, mass: 1, inertia: 1, start: {x: 0.3}, rate: {vx: 0.1}}]\nelements:\n"
                           "  - {spring: s, body: [bob, ground], at: [[0, 0], [-2, 0]], stiffness: 'k > 0.9 ? 1 : 0', "
                           "length: 2}\n");
-  cli_shell ("pinwheel steady @/step.yaml --hold bob.speed=0.1 --vary k=1:0 --starts 0"); /* more where it begins */
-  steady_shows ("Branch 1 ends: the equations change along the motion\n");
+  cli_shell ("pinwheel steady @/step.yaml --hold bob.speed=0.1 --vary k=1:0"); /* fewer where it begins */
+  steady_shows ("step: 1 branch of steady motions up to 1 symmetry, k from 1 to 0\n");
+  steady_shows ("       1  ends              0.900010099 ");
   assert_int_equal (cli_run ("pinwheel steady chaplygin-sleigh --vary a=0:0.2"), 0);
   steady_shows ("       1  begins                      0.2        1 ");
   cli_shell ("pinwheel steady knife-edge-incline --set w=0 --start skate.phi=1.5 --vary alpha=0:pi");

@@ -67,14 +67,17 @@ static int linearise_advance (pw_linearise_command *cmd, pw_error *error) {
 static int linearise_solve_steady (pw_linearise_command *cmd, pw_steady *steady, pw_error *error) {
   int n = pw_system_coordinates (cmd->m.system);
   pw_steady_motion motion;
-  int status = steady ? PW_RETRY : error->status;
-  for (int attempt = 0; status == PW_RETRY && attempt < PW_STEADY_NOT_RANDOM; attempt++)
+  int status = steady ? PW_RETRY : error->status, changes = 0;
+  for (int attempt = 0; status == PW_RETRY && attempt < PW_STEADY_NOT_RANDOM; attempt++) {
     status = pw_steady_solve (steady, attempt, 0 /* no parameter */, &motion, error);
+    if (status == PW_OK && motion.linear->steady == PW_CHANGING) status = PW_RETRY, changes = 1;
+  }
   if (status == PW_RETRY)
     return pw_fail (error, PW_METHOD,
                     "%s: no steady motion is reached from the initial state: the last residual is %.2g, in units of "
-                    "the scene; `pinwheel steady` also begins at random states",
-                    pw_file_name (cmd->m.file), motion.residual);
+                    "the scene%s; `pinwheel steady` also begins at random states",
+                    pw_file_name (cmd->m.file), motion.residual,
+                    changes ? ", but the equations change with time or along the motion" : "");
   if (status != PW_OK) return status;
   cmd->initial = malloc (2 * (size_t)n * sizeof *cmd->initial);
   if (cmd->initial == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");

@@ -87,6 +87,12 @@ static int steady_advise (pw_steady_command *cmd, pw_steady_point *p, pw_error *
   return count < 0 ? steady_unadvised (cmd, count, error) : PW_OK;
 }
 
+/* Removes all points but the first `kept`. */
+static void steady_forget (pw_steady_command *cmd, int kept) {
+  if (!cmd->vary_text) cmd->branches -= cmd->points - kept;
+  while (cmd->points > kept) free (cmd->point[--cmd->points].state);
+}
+
 static int steady_same (const pw_steady_command *cmd, const pw_steady_motion *a, const pw_steady_motion *b) {
   return fabs (a->parameter - b->parameter) <= 1e-9 * fabs (cmd->settings.last - cmd->settings.first) &&
          pw_steady_same (cmd->search, a->q, a->v, b->q, b->v);
@@ -117,18 +123,20 @@ static int steady_found (pw_steady_command *cmd, const pw_steady_motion *m, int 
 static int steady_search (pw_steady_command *cmd, double parameter, pw_error *error) {
   pw_progress progress;
   pw_steady_motion m;
-  int status = PW_OK;
-  const int attempts = PW_STEADY_NOT_RANDOM + cmd->random_attempts;
+  int status = PW_OK, symmetries = pw_steady_symmetries (cmd->search);
+  const int attempts = PW_STEADY_NOT_RANDOM + cmd->random_attempts, before = cmd->points;
   pw_progress_start (&progress, pw_file_name (cmd->m.file), "starts", 0, attempts);
   for (int k = 0; status == PW_OK && k < attempts && !steady_is_stopped (cmd); k++) {
     status = pw_steady_solve (cmd->search, k, parameter, &m, error);
-    if (status == PW_OK) status = steady_found (cmd, &m, k, error);
+    const int lost = symmetries - pw_steady_symmetries (cmd->search);
+    if (status == PW_OK && lost == 0) status = steady_found (cmd, &m, k, error);
     if (status == PW_RETRY || (status == PW_METHOD && k > 0)) {
       double *least = &cmd->residual[k >= PW_STEADY_NOT_RANDOM];
       *least = fmin (*least, m.residual);
       *error = (pw_error){ 0 };
       status = PW_OK;
     }
+    if (lost > 0) symmetries -= lost, steady_forget (cmd, before), k = -1; /* those found may differ by what is lost */
     pw_progress_at (&progress, k + 1);
   }
   pw_progress_end (&progress);
@@ -137,10 +145,6 @@ static int steady_search (pw_steady_command *cmd, double parameter, pw_error *er
 
 static int steady_fail (pw_steady_command *cmd, pw_error *error) {
   char random[100] = "", reason[300] = "";
-  if (cmd->changing)
-    return pw_fail (error, PW_INPUT,
-                    "%s: the equations change with time or along the motion: there is no steady motion",
-                    pw_file_name (cmd->m.file));
   if (cmd->families)
     return pw_fail (
         error, PW_METHOD,
@@ -149,7 +153,11 @@ static int steady_fail (pw_steady_command *cmd, pw_error *error) {
   const char *initial = PW_PRINTED (60, "from the initial state the residual ends at %.2g", cmd->residual[0]);
   if (cmd->random_attempts)
     snprintf (random, sizeof random, ", from %d random ones at %.2g at best", cmd->random_attempts, cmd->residual[1]);
-  if (*pw_steady_reason (cmd->search)) snprintf (reason, sizeof reason, "; %s", pw_steady_reason (cmd->search));
+  if (cmd->changing)
+    snprintf (reason, sizeof reason,
+              "; %d solutions are not steady, as the equations change with time or along the motion", cmd->changing);
+  else if (*pw_steady_reason (cmd->search))
+    snprintf (reason, sizeof reason, "; %s", pw_steady_reason (cmd->search));
   return pw_fail (error, PW_METHOD,
                   "%s: no steady motion found: %s%s, in units of the scene (L, L/T, L/T^2)%s; change what is held, or "
                   "begin nearer to one (--start)",
@@ -211,7 +219,7 @@ static int steady_branches_from (pw_steady_command *cmd, double parameter, int d
   if (status < 0 && status != PW_RESOURCE && cmd->branches > 0) {
     pw_cli_say ("pinwheel: no branches sought from the other end: %s\n", error->text);
     *error = (pw_error){ 0 };
-    while (cmd->points > before) free (cmd->point[--cmd->points].state);
+    steady_forget (cmd, before);
     return PW_OK;
   }
   pw_steady_point *start = malloc (((size_t)found + 1) * sizeof *start);
@@ -307,7 +315,7 @@ static int steady_command (void *options, pw_error *error) {
   if (status == PW_OK && cmd->points) pw_steady_print (cmd);
   if (status == PW_OK && cmd->points && cmd->folder) status = pw_steady_write (cmd, error);
   pw_files_close (&cmd->files);
-  for (int i = 0; i < cmd->points; i++) free (cmd->point[i].state);
+  steady_forget (cmd, 0);
   free (cmd->point);
   free (cmd->end);
   pw_steady_close (cmd->search);
