@@ -1,7 +1,8 @@
 /* Checkpoints of `pinwheel run`: their contents, when they are due, and how a run continues from one.
  *
- * A checkpoint is saved after the step that reaches a multiple of the interval, once that step's rows have been written.
- * The table is flushed to the disk first, so that a resumed run finds at least the rows that the checkpoint counts. */
+ * A checkpoint is saved after the step that reaches a multiple of the interval, once that step's rows have been
+ * written.  The table is flushed to the disk first, so that a resumed run finds at least the rows that the checkpoint
+ * counts. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -42,8 +42,8 @@ int pw_motion_unit (const pw_system *system, int state) {
   return (is_velocity ? MOTION_SPEED : MOTION_LENGTH) + angle;
 }
 
-/* The largest |multiplier| in the first samples of the constraint equations whose reaction has the same unit as that of this row, since
- * forces and moments cannot be compared with each other; 1 N or N m if all are zero or unknown. */
+/* The largest |multiplier|, in the first samples, of the constraint equations whose reaction has the same unit as that
+ * of this row, since forces and moments cannot be compared with each other; 1 N or N m if all are zero or unknown. */
 static double motion_largest_multiplier (const pw_system *system, const pw_motion *reference, int samples, int row) {
   double largest = 0;
   for (int j = 0; j < pw_system_rows (system); j++)

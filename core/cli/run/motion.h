@@ -10,9 +10,9 @@ enum { MOTION_SAMPLES = 100 }; /* of a motion, at most */
 enum { MOTION_LENGTH, MOTION_ANGLE, MOTION_SPEED, MOTION_RATE, MOTION_UNITS };
 
 /* Indices of the errors of a motion, NaN if not known.  MOTION_END + unit: the largest error of any state of that unit
- * at the last sample; MOTION_LARGEST + unit: over all samples.  MOTION_MULTIPLIERS: the largest error of any multiplier,
- * over all samples but those at whose times a signal makes multipliers jump, relative to the largest multiplier of the
- * same unit in all samples of the reference. */
+ * at the last sample; MOTION_LARGEST + unit: over all samples.  MOTION_MULTIPLIERS: the largest error of any
+ * multiplier, over all samples but those at whose times a signal makes multipliers jump, relative to the largest
+ * multiplier of the same unit in the same samples of the reference, jumps included. */
 enum { MOTION_END, MOTION_LARGEST = MOTION_UNITS, MOTION_MULTIPLIERS = 2 * MOTION_UNITS, MOTION_ERRORS };
 
 typedef struct {
