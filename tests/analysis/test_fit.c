@@ -334,8 +334,9 @@ TEST (changed_values) {
   assert_int_equal (cli_run ("pinwheel fit ezyroller --data @/e.csv --columns frame.y --free M0 --start frame.vy=0 "
                              "--start frame.omega=7"),
                     0);
-  assert_non_null (strstr (cli_err, "pinwheel: the constraints changed given initial values of this result, at worst "
-                                    "frame.omega from 7 to 2 rad/s\n"));
+  assert_non_null (strstr (
+      cli_err, "pinwheel: given initial values of this result were changed to satisfy the constraints, at worst "
+               "frame.omega from 7 to 2 rad/s\n"));
 }
 
 /* The engine is chosen for runs to the last datum, not to the final time of the model. */
