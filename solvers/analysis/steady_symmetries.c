@@ -148,6 +148,16 @@ static int symmetry_remove_idle (pw_steady *x, int rates) {
   return idle;
 }
 
+/* Leaves only one symmetry that turns the whole, the last of them: the other rows keep their pivots. */
+static void symmetry_keep_one_turn (pw_steady *x, int rates) {
+  const double *turn = NULL;
+  for (int k = x->symmetries - 1; k >= 0; k--) {
+    double *rate = x->symmetry + k * rates, factor = turn ? rate[PW_RATE_TURN] / turn[PW_RATE_TURN] : 0;
+    if (turn == NULL && rate[PW_RATE_TURN] != 0) turn = rate;
+    for (int c = 0; c < rates && factor != 0; c++) rate[c] = c == PW_RATE_TURN ? 0 : rate[c] - factor * turn[c];
+  }
+}
+
 /* The coordinate that rate c >= PW_RATE_ANGLES changes: the inverse of pw_steady_angle_rate. */
 static int symmetry_coordinate (const pw_steady *x, int c) {
   int k = c - PW_RATE_ANGLES;
@@ -187,6 +197,7 @@ int pw_steady_find_symmetries (pw_steady *x) {
   if (idle < 0) return idle;
   symmetry_reduce (x->symmetries, rates, x->symmetry);
   x->symmetries -= idle;
+  symmetry_keep_one_turn (x, rates);
   symmetry_find_cyclic (x);
   return PW_OK;
 }
@@ -214,7 +225,7 @@ static int symmetry_of_whole (const double *symmetry) {
   return symmetry[PW_RATE_X] != 0 || symmetry[PW_RATE_Y] != 0 || symmetry[PW_RATE_TURN] != 0;
 }
 
-/* Rotates positions and velocities by an angle about a point. */
+/* Rotates positions and velocities by an angle about a point, which may be in q. */
 static void symmetry_rotate (const pw_steady *x, double angle, const double *about, double *q, double *v) {
   double c = pw_cos (angle), s = pw_sin (angle), centre[2] = { about[0], about[1] };
   for (int j = 0; j < 3 * x->s->bodies; j += 3) {
@@ -224,39 +235,55 @@ static void symmetry_rotate (const pw_steady *x, double angle, const double *abo
   }
 }
 
-/* The angle of the whole: that of the first body on whose angle something depends; if there is none, of the line from
- * the centre to the last body. */
-static double symmetry_angle (const pw_steady *x, const double centre[2], const double *q) {
-  int last = 3 * (x->s->bodies - 1);
-  for (int b = 0; b < x->s->bodies; b++)
-    if (!x->cyclic[3 * b + 2]) return q[3 * b + 2];
+/* The angle by which a state is turned along a symmetry: that of the first body which only this symmetry turns; if
+ * there is none, of the line to the last body from the centre, or from the first body if the whole can be translated. */
+static double symmetry_angle (const pw_steady *x, const double *turn, const double *centre, const double *q) {
+  int rates = pw_steady_rate_count (x->s), last = 3 * (x->s->bodies - 1);
+  for (int b = 0; b < x->s->bodies; b++) {
+    double factor = 1 + turn[PW_RATE_ANGLES + b] / turn[PW_RATE_TURN];
+    int others = 0;
+    for (const double *rate = x->symmetry; rate < x->symmetry + x->symmetries * rates; rate += rates) {
+      others += rate != turn && rate[PW_RATE_ANGLES + b] != 0;
+      if (rate != turn && symmetry_of_whole (rate)) centre = q;
+    }
+    if (others == 0 && fabs (factor) > SYMMETRY_PIVOT) return q[3 * b + 2] / factor;
+  }
   return atan2 (q[last + 1] - centre[1], q[last] - centre[0]);
 }
 
-/* Changes of single angles first: rotations of the whole change all angles of bodies, translations none. */
+/* The time by which a state is ahead along a symmetry that does not turn the whole: that of the angle that is its
+ * pivot, else of the position of the first body. */
+static double symmetry_time (const pw_steady *x, const double *rate, const double *q) {
+  int c = pw_steady_rate_count (x->s) - 1;
+  while (c >= PW_RATE_ANGLES && rate[c] == 0) c--;
+  if (c >= PW_RATE_ANGLES) return q[symmetry_coordinate (x, c)] / rate[c];
+  double square = rate[PW_RATE_X] * rate[PW_RATE_X] + rate[PW_RATE_Y] * rate[PW_RATE_Y];
+  return square > 0 ? (rate[PW_RATE_X] * q[0] + rate[PW_RATE_Y] * q[1]) / (x->L * square) : 0;
+}
+
+/* Displaces a state back along a symmetry. */
+static void symmetry_go_back (const pw_steady *x, const double *rate, double *q, double *v) {
+  double turn = rate[PW_RATE_TURN], time;
+  if (turn != 0) {
+    double centre[2] = { x->origin[0] - x->L * rate[PW_RATE_Y] / turn, x->origin[1] + x->L * rate[PW_RATE_X] / turn };
+    time = symmetry_angle (x, rate, centre, q) / turn;
+    symmetry_rotate (x, -turn * time, centre, q, v);
+  } else {
+    time = symmetry_time (x, rate, q);
+    for (int j = 0; j < 3 * x->s->bodies; j += 3)
+      q[j] -= time * x->L * rate[PW_RATE_X], q[j + 1] -= time * x->L * rate[PW_RATE_Y];
+  }
+  for (int j = 0; j < x->n; j++)
+    if (pw_is_angle (x->s, j)) q[j] -= time * rate[pw_steady_angle_rate (x->s, j)];
+}
+
+/* The whole is turned first, since this changes what the other symmetries change; these commute, and the pivot of each
+ * is changed by it alone. */
 void pw_steady_canonical (const pw_steady *x, double *q, double *v) {
   int rates = pw_steady_rate_count (x->s);
-  for (int k = 0; k < x->symmetries; k++) {
-    const double *rate = x->symmetry + k * rates;
-    int c = rates - 1;
-    while (c >= PW_RATE_ANGLES && rate[c] == 0) c--;
-    if (c >= PW_RATE_ANGLES && !symmetry_of_whole (rate)) {
-      double by = -q[symmetry_coordinate (x, c)] / rate[c];
-      for (int j = 0; j < x->n; j++)
-        if (pw_is_angle (x->s, j)) q[j] += by * rate[pw_steady_angle_rate (x->s, j)];
-    }
-    if (rate[PW_RATE_TURN] == 0) continue;
-    double centre[2] = { x->origin[0] - x->L * rate[PW_RATE_Y] / rate[PW_RATE_TURN],
-                         x->origin[1] + x->L * rate[PW_RATE_X] / rate[PW_RATE_TURN] };
-    symmetry_rotate (x, -symmetry_angle (x, centre, q), centre, q, v);
-  }
-  for (int k = 0; k < x->symmetries; k++) {
-    const double *rate = x->symmetry + k * rates;
-    double square = rate[PW_RATE_X] * rate[PW_RATE_X] + rate[PW_RATE_Y] * rate[PW_RATE_Y];
-    if (rate[PW_RATE_TURN] != 0 || !(square > 0)) continue;
-    double by = (rate[PW_RATE_X] * q[0] + rate[PW_RATE_Y] * q[1]) / square;
-    for (int j = 0; j < 3 * x->s->bodies; j += 3) q[j] -= by * rate[PW_RATE_X], q[j + 1] -= by * rate[PW_RATE_Y];
-  }
+  for (int turns = 1; turns >= 0; turns--)
+    for (int k = 0; k < x->symmetries; k++)
+      if ((x->symmetry[k * rates + PW_RATE_TURN] != 0) == turns) symmetry_go_back (x, x->symmetry + k * rates, q, v);
 }
 
 void pw_steady_move_to_start (const pw_steady *x, double *q, double *v) {

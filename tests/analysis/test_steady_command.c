@@ -421,6 +421,31 @@ TEST (hopf_in_a_turn) {
   steady_shows ("        0                0       0.0795775\n");
 }
 
+/* A symmetry may turn the whole and keep, or turn by another angle, single bodies: an arm beside a disc on a torsion
+ * spring, or beside two geared discs, on one axis.  Symmetries may change the angle of the first body alone: gears. */
+TEST (one_axis) {
+  static const char *const scene[][3] = {
+    { "  - {rotational-spring: S, body: [disc, ground], stiffness: 5}\n", "arm.omega=1", "1 symmetry" },
+    { "  - {pin: P, body: [other, ground], at: [[0, 0], [0, 0]]}\n"
+      "  - {gear: G, body: [disc, other, ground], ratio: -2}\n",
+      "arm.omega=1 --hold disc.omega=1", "2 symmetries" },
+    { "  - {pin: P, body: [other, arm], at: [[0, 0], [-1, 1]]}\n  - {gear: G, body: [other, disc, arm], ratio: -2}\n",
+      "arm.omega=1 --hold disc.omega=0", "2 symmetries" },
+  };
+  for (size_t i = 0; i < sizeof scene / sizeof *scene; i++) {
+    char line[300];
+    cli_write ("axis.yaml", check_text ("pinwheel: 1\nbodies:\n  - {name: disc, mass: 1, inertia: 1}\n%s"
+                                        "  - {name: arm, mass: 1, inertia: 1, start: {x: 1}}\nelements:\n"
+                                        "  - {pin: C, body: [disc, ground], at: [[0, 0], [0, 0]]}\n"
+                                        "  - {pin: A, body: [arm, ground], at: [[-1, 0], [0, 0]]}\n%s",
+                                        i ? "  - {name: other, mass: 1, inertia: 1}\n" : "", scene[i][0]));
+    snprintf (line, sizeof line, "pinwheel steady @/axis.yaml --starts 5 --hold %s", scene[i][1]);
+    cli_good (line);
+    snprintf (line, sizeof line, "axis: 1 steady motion up to %s,", scene[i][2]);
+    steady_shows (line);
+  }
+}
+
 /* A parameter of a model in C need not have a unit. */
 TEST (without_unit) {
   cli_write ("unitless.c", "#include \"pinwheel.h\"\ntypedef struct { double v; } numbers;\n"
