@@ -37,8 +37,8 @@ static double selftest_derivative (pw_probe *probe, pw_probe_function *f, pw_pro
   return selftest_largest (n, plus);
 }
 
-/* Compares elements x rows x cols entries with a reference, except columns of the ground, for which it has none, relative
- * to the larger of 1 + size and the largest reference; size: the largest value of the function differenced. */
+/* Compares elements x rows x cols entries, except columns of the ground, for which there is no reference, relative to
+ * the larger of 1 + size and the largest reference; size: the largest value of the function differenced. */
 static void selftest_compare (pw_probe *probe, pw_check check, int rows, int cols, double size, const double *value,
                               const double *reference) {
   int n = probe->elements * rows * cols, at = 0;

@@ -237,7 +237,7 @@ static void symmetry_rotate (const pw_steady *x, double angle, const double *abo
 }
 
 /* The angle by which a state is turned along a symmetry: that of the first body which only this symmetry turns; if
- * there is none, of the line to the last body from the centre, or from the first body if the whole can be translated. */
+ * there is none, of the line to the last body from the centre, or from the first body if translation is a symmetry. */
 static double symmetry_angle (const pw_steady *x, const double *turn, const double *centre, const double *q) {
   int rates = pw_steady_rate_count (x->s), last = 3 * (x->s->bodies - 1);
   for (int b = 0; b < x->s->bodies; b++) {

@@ -1,8 +1,8 @@
 /* Checkpoints: the state of a run as bytes.
  *
- * What a method or a factorisation has built up, such as pivot choices and earlier values of a multistep formula, is not
- * saved: the saved run and the loaded one both rebuild it from the state reached, and so continue alike.  A method's
- * `serialise` adds what it cannot rebuild: step size, counts. */
+ * What a method or a factorisation has built up, such as pivot choices and earlier values of a multistep formula, is
+ * not saved: the saved run and the loaded one both rebuild it from the state reached, and so continue alike.  A
+ * method's `serialise` adds what it cannot rebuild: step size, counts. */
 #include <math.h>
 #include "method.h"
 #include "rank.h"
