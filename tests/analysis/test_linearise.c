@@ -84,6 +84,8 @@ TEST (npz) {
   cli_good ("grep -a -q \"'shape': (2,), }\" @/block.npz"); /* eigenvalues */
   cli_shell ("! command -v python3 >@/log || python3 -m zipfile -t @/block.npz >@/log");
   assert_null (strstr (cli_file ("log"), "corrupt"));
+  cli_good ("pinwheel linearise pendulum -o @/pendulum"); /* without inputs */
+  cli_good ("grep -a -q \"'shape': (2, 0), }\" @/pendulum.npz");
 }
 
 /* The eigenvalues are those of `check`; a steady motion has them at every time; the inverted pendulum grows. */
