@@ -28,6 +28,14 @@ TEST (text) {
                1e-12, "1e4 eps");
 }
 
+/* An entry of A overflows. */
+TEST (infinite) {
+  cli_write ("stiff.yaml", "pinwheel: 1\nbodies: [{name: b, mass: 1e-10, inertia: 1}]\n"
+                           "elements: [{force: f, body: b, fx: -1e300*b.x}]\n");
+  cli_good ("pinwheel check @/stiff.yaml");
+  stability_shows ("  eigenvalues                        not computed: the linearisation fails, see the findings\n");
+}
+
 /* Initial conditions whose given angle cannot be kept, and others whose omitted values follow. */
 TEST (finding) {
   static const char *const body =
