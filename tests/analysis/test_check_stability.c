@@ -19,6 +19,8 @@ TEST (text) {
   stability_shows ("rightmost first       0 +- 1 i 1/s: rigid displacement\n");
   stability_shows (" -2.3344 1/s\n");
   stability_shows ("\nNo problems found\n");
+  cli_good ("pinwheel check peaucellier");
+  stability_shows ("  eigenvalues                        none\n");
   cli_good ("pinwheel check pendulum");
   stability_shows ("not steady: accelerations of 9.81 m/s^2 in the co-moving frame\n");
   stability_shows ("the eigenvalues are not stability exponents\n");
