@@ -219,7 +219,7 @@ static int sensitivity_interval (pw_sensitivity *sens, double t0, double t1, pw_
  * integral. */
 static int sensitivity_jump (pw_sensitivity *sens, double t0, double t, int at_state, pw_error *error) {
   const size_t F = (size_t)sens->outcomes.functionals, P = (size_t)sens->unknowns.count;
-  double *slope = sens->before + F; /* before the jump */
+  double *slope = sens->before + F;                                           /* before the jump */
   const double split = at_state ? t0 : nextafter (sens->last_breakpoint, t0); /* extrema up to it are before the jump */
   sensitivity_keep_extrema (sens, t0, split, 1);
   memcpy (sens->before, sens->value, F * sizeof *sens->before);

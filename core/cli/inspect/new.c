@@ -47,8 +47,8 @@ static int new_command (void *options, pw_error *error) {
     return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", path, strerror (failed));
   }
   const char *quote = path[strspn (path, NEW_LETTERS "./")] ? "'" : "";
-  pw_cli_print (stdout, "%s is written; now:  pinwheel run %s%s%s%s\n", path, quote, strchr (path, '/') ? "" : "./", path,
-                quote);
+  pw_cli_print (stdout, "%s is written; now:  pinwheel run %s%s%s%s\n", path, quote, strchr (path, '/') ? "" : "./",
+                path, quote);
   return PW_OK;
 }
 
