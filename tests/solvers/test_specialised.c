@@ -233,6 +233,23 @@ TEST (angles) {
   both_close (&x);
 }
 
+SCENE (two_torques) {
+  const pw_signal fast = { PW_HARMONIC, .harmonic = { .amplitude = 1, .omega = 50 } },
+                  far = { PW_HARMONIC, .harmonic = { .omega = 1, .phase = 1e6 - 0.057 } };
+  pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 1 });
+  pw_add_torque (m, &(pw_torque){ .name = "fast", .body = { "disc", "ground" }, .value = fast });
+  pw_add_torque (m, &(pw_torque){ .name = "far", .body = { "disc", "ground" }, .value = far });
+}
+
+/* At the end of the step from 0.05 s the argument of the second torque is beyond that range, of the first it is not. */
+TEST (arguments) {
+  both x;
+  both_open (&x, scene_system (&two_torques_table, NULL), "rk4", &(pw_settings){ .step = 0.01, .span = 1 });
+  both_run (&x, 0.1);
+  assert_true (both_specialised (&x) > 0);
+  both_close (&x);
+}
+
 /* Passing singular configurations, the guards leave some evaluations to the general engine, and the result is right. */
 TEST (singular) {
   both x;
