@@ -783,7 +783,7 @@ int pw_system_jumps (const pw_system *s, double t);
 
 /* Specialised code: C code for this system alone, which evaluates and projects it faster than the library
  * (pw_settings.specialised).  independent: for each constraint equation, 0 if it is redundant (pw_run_source); NULL:
- * none is.  NULL and the error if there is none, as for too many constraint equations or elements.  Free the text. */
+ * none is.  NULL and the error if there is none, as for too large a system.  Free the text. */
 char *pw_system_source (const pw_system *s, const unsigned char *independent, pw_error *error);
 
 /* 1 if compiled code has this library's interface to such code and is of a system with the same structure: parameters
@@ -800,7 +800,7 @@ int pw_specialised_lanes_count (const pw_specialised_lanes *code);
 /* Memory for the runs of one thread; NULL if out of memory.  Free it. */
 void *pw_specialised_lanes_memory (const pw_specialised_lanes *code);
 /* 1 if the code can be compiled for several runs at once: all element types are built-in, signals depend on time alone,
- * and there are not too many constraint equations or elements.  The runs must not have redundant equations. */
+ * and the system is not too large.  The runs must not have redundant equations. */
 int pw_system_has_lanes (const pw_system *s);
 /* 1 if accelerations may be discontinuous at some states, where no step ends: an element type is from a plug-in, or a
  * signal depends on states. */

@@ -252,6 +252,9 @@ TEST (faults) {
   KINDS_FAULT (g, NULL, "holonomic constraint equations without g");
   KINDS_FAULT (level, PW_NONHOLONOMIC, "g, but no holonomic constraint equations");
 #undef KINDS_FAULT
+  pw_kind broken = pw_kind_torque;
+  broken.force_u = NULL;
+  kinds_expect_fault (&broken, "signals, but no constraint equations and no force_u");
 }
 
 /* ---- Further checks ---- */

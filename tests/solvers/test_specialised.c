@@ -395,6 +395,14 @@ TEST (refused) {
   assert_null (pw_system_source (s, NULL, &error));
   check_error (&error, PW_INPUT, "model ezyroller: 125 elements: specialised code has at most 120");
   pw_system_free (s);
+  m = scene_model (&scene_ezyroller, NULL);
+  for (int i = 0; i < 199; i++)
+    pw_add_body (m, &(pw_body){ .name = PW_PRINTED (8, "b%d", i), .mass = 1, .inertia = 1 });
+  s = scene_compile (m);
+  error = (pw_error){ 0 };
+  assert_null (pw_system_source (s, NULL, &error));
+  check_error (&error, PW_INPUT, "model ezyroller: 201 bodies: specialised code has at most 200");
+  pw_system_free (s);
   assert_null (pw_system_source (NULL, NULL, &(pw_error){ 0 }));
   assert_null (pw_run_source (NULL, &(pw_error){ 0 }));
 }
