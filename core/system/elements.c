@@ -28,7 +28,7 @@ pw_element_info pw_system_element (const pw_system *s, int element) {
 
 static int elements_update (pw_workspace *w, double t, const double *q, const double *v, pw_error *error) {
   if (pw_update_kinematics (w, t, q, v) == PW_OK) return PW_OK;
-  return pw_fail (error, PW_METHOD, "at t = %g s a signal of the model reports an error", t);
+  return pw_fail_evaluation (w, t, error);
 }
 
 /* ---- Contact points ---- */

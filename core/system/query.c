@@ -203,6 +203,11 @@ char *pw_failed_signal (const pw_workspace *w, char *buffer, size_t size) {
   return buffer;
 }
 
+int pw_fail_evaluation (const pw_workspace *w, double t, pw_error *error) {
+  return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed: %s is not a finite number, or its function failed", t,
+                  pw_failed_signal (w, (char[PW_NAME_BYTES]){ 0 }, PW_NAME_BYTES));
+}
+
 int pw_system_may_jump (const pw_system *s) {
   for (int i = 0; i < s->batches; i++)
     if (!pw_kind_is_built_in (s->batch[i].kind)) return 1;
