@@ -59,7 +59,7 @@ typedef enum {
 } pw_status;
 
 /* An error, owned by the caller and zero-initialised.  It keeps the first failure.  NULL in place of a file, model,
- * system or run is an error too, so that the result of a failed call may be passed to the next call. */
+ * system, workspace or run is an error too, so that the result of a failed call may be passed to the next call. */
 typedef struct {
   int status; /* a pw_status; 0: no error yet */
   /* One line without a full stop: found value, expected value, nearest valid name.  Text models: preceded by

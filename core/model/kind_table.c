@@ -88,7 +88,8 @@ static const char *fault_functions (const pw_kind *kind) {
     if (exact[i] == PW_BY_DIFFERENCES) return "PW_BY_DIFFERENCES is permitted only for second-order blocks";
   if (kind->constant && (kind->force == NULL || kind->signals > 0))
     return "declared constant, but it has no force, or has signals";
-  if (kind->signals > 0 && kind->rows == 0 && kind->force_u == NULL) return "signals, but no constraint equations and no force_u";
+  if (kind->signals > 0 && kind->rows == 0 && kind->force && kind->force_u == NULL)
+    return "a force with signals, but no force_u";
   if (kind->rows > 0 && kind->J == NULL) return "constraint equations without J";
   if (kind->level == PW_HOLONOMIC && kind->g == NULL) return "holonomic constraint equations without g";
   if (kind->level != PW_HOLONOMIC && kind->g) return "g, but no holonomic constraint equations";

@@ -254,7 +254,7 @@ TEST (faults) {
 #undef KINDS_FAULT
   pw_kind broken = pw_kind_torque;
   broken.force_u = NULL;
-  kinds_expect_fault (&broken, "signals, but no constraint equations and no force_u");
+  kinds_expect_fault (&broken, "a force with signals, but no force_u");
 }
 
 /* ---- Further checks ---- */
