@@ -566,7 +566,7 @@ struct pw_kind {
   int internal;           /* internal coordinates */
   int rows;               /* constraint equations */
   int signals;    /* in the order of the fields; they belong to its force if force_u is set, else to its constraints */
-  int each_body;  /* 1: names no body; acts on every body with mass */
+  int each_body;  /* 1: names no body; acts on every body with mass, which its reactions etc. name: "air.frame.N" */
   int constant;   /* 1: its force is constant and evaluated once, when the system is compiled */
   pw_level level; /* of its constraint equations */
   const pw_quantity *reaction;                                 /* rows: meaning of each -lambda */
@@ -830,6 +830,8 @@ void pw_workspace_free (pw_workspace *w);
 
 /* Number of elements with a contact point; contact point on the ground (x, y) [m] and heading [rad] of each. */
 int pw_system_contacts (const pw_system *s);
+/* Name of x (i = 0) or y (1) of the first contact point, "W.x", of the next one (2, 3), ..., as pw_system_state_name. */
+char *pw_system_contact_name (const pw_system *s, int i, char *buffer, size_t size);
 int pw_workspace_contact_points (pw_workspace *w, double t, const double *q, const double *v, double (*out)[3],
                                  pw_error *error);
 

@@ -39,6 +39,13 @@ int pw_system_contacts (const pw_system *s) {
   return count;
 }
 
+char *pw_system_contact_name (const pw_system *s, int i, char *buffer, size_t size) {
+  const pw_element_batch *k = s->batch;
+  int contact = i / 2;
+  for (; k->kind->contact == NULL || contact >= k->b.count; k++) contact -= k->kind->contact ? k->b.count : 0;
+  return pw_member_name (s, k, contact, i % 2 ? "y" : "x", buffer, size);
+}
+
 int pw_workspace_contact_points (pw_workspace *w, double t, const double *q, const double *v, double (*out)[3],
                                  pw_error *error) {
   int status = elements_update (w, t, q, v, error);
