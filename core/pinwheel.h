@@ -830,7 +830,7 @@ void pw_workspace_free (pw_workspace *w);
 
 /* Number of elements with a contact point; contact point on the ground (x, y) [m] and heading [rad] of each. */
 int pw_system_contacts (const pw_system *s);
-/* Name of x (i = 0) or y (1) of the first contact point, "W.x", of the next one (2, 3), ..., as pw_system_state_name. */
+/* Name of x (i = 0) or y (1) of the first contact point, "W.x", of the next (2, 3) etc., as pw_system_state_name. */
 char *pw_system_contact_name (const pw_system *s, int i, char *buffer, size_t size);
 int pw_workspace_contact_points (pw_workspace *w, double t, const double *q, const double *v, double (*out)[3],
                                  pw_error *error);
