@@ -221,7 +221,7 @@ int pw_periodic_multipliers (pw_periodic *x, const double *u, int *trivial) {
     equations_coordinates (x, x->change, x->monodromy + c * size);
   }
   LAPACKE_dgeqrf_work (LAPACK_COL_MAJOR, size, k, S, size, tau, work, lwork);
-  if (x->settings.free && k > x->symmetries && fabs (S[(k - 1) * size + k - 1]) * x->T < EQUATIONS_STEADY) {
+  if (x->settings.free && k > x->symmetries && fabs (S[(k - 1) * size + k - 1]) * x->T < EQUATIONS_STEADY * x->L) {
     pw_fail (&x->why, PW_METHOD, "Newton's method leads to a steady motion or an equilibrium");
     return PW_RETRY;
   }
