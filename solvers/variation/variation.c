@@ -267,6 +267,7 @@ int pw_variation_advance (pw_variation *x, double t, double t_end, pw_error *err
   if (isnan (t)) return pw_fail (error, PW_INPUT, "t = nan: expected a time");
   pw_run *r = x->r;
   int status = PW_OK;
+  r->stopped = 0;
   while (status == PW_OK && x->t < fmin (t, t_end)) {
     if (x->t == pw_variation_recorded_jump (x))
       status = pw_variation_pass_jump (x, error);
