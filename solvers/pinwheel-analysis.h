@@ -262,7 +262,8 @@ const char *pw_periodic_reason (const pw_periodic *x);
 /* Number of symmetries, as pw_steady_symmetries. */
 int pw_periodic_symmetries (const pw_periodic *x);
 
-/* Follows the branch of the motion last found towards the end of the range (direction 1) or its beginning (-1).
+/* Follows the branch of the motion that pw_periodic_solve has found last, PW_INPUT if it has failed, towards the end of
+ * the range (direction 1) or its beginning (-1).
  * pw_periodic_next returns its points, the first one included, and events in between, then PW_PERIODIC_END (perhaps
  * with pw_periodic_reason). */
 int pw_periodic_follow (pw_periodic *x, int direction, pw_error *error);
