@@ -31,7 +31,7 @@ typedef struct {
   unsigned char *rigid; /* unknowns: 1 for rigid displacements of the whole, under which the equations are invariant */
   int symmetries;       /* number of symmetry directions among x, y, phi */
   pw_steadiness steady;
-  double twist[3];     /* velocity of the frame [m/s, m/s, rad/s] */
+  double twist[3];     /* velocity of the frame's origin, at a body or the mean of all; of its rotation [m/s, rad/s] */
   double acceleration; /* the largest in that frame; angles multiplied by the length scale [m/s^2] */
   /* Of pw_run_linear_modes, otherwise NULL; axes are those of the frame, which are the world's at this moment. */
   double *B;     /* unknowns x signals, by rows: x' = A x + B u, u added to the signals of forces [m/s per unit of the

@@ -216,6 +216,7 @@ int pw_periodic_multipliers (pw_periodic *x, const double *u, int *trivial) {
   double *S = x->monodromy + size * size, *tau = S + size * size, *work = tau + size;
   int k = *trivial = equations_shifts (x, S);
   pw_steady_combine (x->steady, u + 2 * n, 1, x->work);
+  if (size == 0) return PW_OK;
   for (int c = 0; c < size; c++) {
     equations_rotate (x, -x->work[PW_RATE_TURN], x->Phi + 2 * n * c, x->change);
     equations_coordinates (x, x->change, x->monodromy + c * size);
