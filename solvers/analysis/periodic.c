@@ -214,7 +214,8 @@ int pw_periodic_follow (pw_periodic *x, int direction, pw_error *error) {
   if (pw_require (x, "a search", error) != PW_OK) return PW_INPUT;
   if (x->settings.first == x->settings.last)
     return pw_fail (error, PW_INPUT, "first = last = %.9g: expected a range", x->settings.first);
-  if (!(x->begin_period > 0)) return pw_fail (error, PW_INPUT, "no motion has been found from which to follow a branch");
+  if (!(x->begin_period > 0))
+    return pw_fail (error, PW_INPUT, "no motion has been found from which to follow a branch");
   x->last_period = x->begin_period, x->steps = 0;
   pw_branch *b = &x->branch;
   b->max_change = 1.0 / x->settings.points, b->step = b->max_change / 4, b->min_step = PERIODIC_MIN_STEP;

@@ -122,12 +122,13 @@ typedef struct {
   double a, q, p, c, x, mass; /* mass: of a disc with the inertia 1: 1 / L^2 */
 } oscillator;
 
-static const pw_parameter oscillator_parameters[] = {
-  { PW_AT (oscillator, a), 1, "", "", PW_REAL }, { PW_AT (oscillator, q), 0, "", "", PW_REAL },
-  { PW_AT (oscillator, p), 0, "", "", PW_REAL }, { PW_AT (oscillator, c), 0, "", "", PW_REAL },
-  { PW_AT (oscillator, x), 0, "", "", PW_REAL }, { PW_AT (oscillator, mass), 1, "", "", PW_REAL },
-  { .name = NULL }
-};
+static const pw_parameter oscillator_parameters[] = { { PW_AT (oscillator, a), 1, "", "", PW_REAL },
+                                                      { PW_AT (oscillator, q), 0, "", "", PW_REAL },
+                                                      { PW_AT (oscillator, p), 0, "", "", PW_REAL },
+                                                      { PW_AT (oscillator, c), 0, "", "", PW_REAL },
+                                                      { PW_AT (oscillator, x), 0, "", "", PW_REAL },
+                                                      { PW_AT (oscillator, mass), 1, "", "", PW_REAL },
+                                                      { .name = NULL } };
 
 static int oscillator_torque (void *context, double t, const double *x, double value[3], double *gradient) {
   const oscillator *o = context;
