@@ -285,7 +285,7 @@ int pw_branch_next (pw_branch *b, pw_branch_find_events *find_events, pw_error *
   if (b->returned == b->queued && !b->ended) {
     b->queued = b->returned = 0;
     int status = branch_advance (b, find_events, why, error);
-    if (status == PW_RETRY) return b->ended = 1, PW_OK;
+    if (status == PW_RETRY) return b->ended = 1, b->queued = 0, PW_OK;
     if (status != PW_OK) return status;
   }
   if (b->returned < b->queued)

@@ -270,6 +270,29 @@ TEST (outwards) {
   pw_branch_close (&b);
 }
 
+static int failing_events (void *context, pw_error *error) {
+  (void)context, (void)error;
+  return PW_RETRY;
+}
+
+/* Where events cannot be sought, the branch ends, for good: the fold of this step does not follow. */
+TEST (events_fail) {
+  const pw_branch_problem problem = { .unknowns = 1, .equations = 1, .tolerance = 1e-12, .evaluate = parabola };
+  double u[2] = { -0.05, 0.05 * 0.05 / 2 };
+  pw_error error = { 0 }, why = { 0 };
+  const pw_branch_event *next;
+  pw_branch b;
+  continuation_open (&b, &problem);
+  b.step = 0.07, b.event_accuracy = 1e-9, b.max_points = 10;
+  check_ok (pw_branch_start (&b, u, -1, &error), &error);
+  for (int i = 0; i < 3; i++) {
+    check_ok (pw_branch_next (&b, failing_events, &why, &next, &error), &error);
+    assert_true ((next != NULL) == (i == 0));
+  }
+  assert_true (b.folded && *why.text);
+  pw_branch_close (&b);
+}
+
 /* p = 0.5 + 0.3 sin x + climb (x - pi), and the same with other angles x. */
 static int wave (void *context, const double *u, double *F, double *dF, pw_error *error) {
   double climb = *(double *)context;
