@@ -269,8 +269,9 @@ static int branch_advance (pw_branch *b, pw_branch_find_events *find_events, pw_
     status = pw_branch_locate (b, branch_slope_of_p, b, error);
     if (status == PW_OK) pw_branch_queue (b, PW_BRANCH_FOLD, 0);
   }
+  if (status == PW_RETRY) pw_fail (why, PW_METHOD, "Newton's method fails at the smallest step");
   if (status == PW_OK) status = find_events (b->problem.context, error);
-  if (status == PW_RETRY && !*why->text) pw_fail (why, PW_METHOD, "Newton's method fails at the smallest step");
+  if (status == PW_RETRY) pw_fail (why, PW_METHOD, "the next point cannot be evaluated");
   if (status != PW_OK) return status;
   *why = (pw_error){ 0 }; /* it may be that of longer steps that were refused */
   branch_insert (b, &b->reached, PW_BRANCH_POINT, 1, 0);
