@@ -43,10 +43,12 @@ static const double radau_derivative_at_end[STAGES] = { 5.53197264742180826186, 
 
 /* ---- Opening ---- */
 
-/* At the sine s, solutions magnify round-off by 1/s^2.  r->saddle must be factorised at the state reached. */
+/* Round-off of the largest coordinate may affect others; at the sine s, solutions magnify it by 1/s^2.  r->saddle must be
+ * factorised at the state reached. */
 static void radau_measure_noise (pw_run *r) {
-  double sine = pw_saddle_sine (r->saddle, NULL);
-  r->data->noise = fmin (64 / (sine * sine), 1e7);
+  double sine = pw_saddle_sine (r->saddle, NULL), largest = 1;
+  for (int j = 0; j < r->s->coords; j++) largest = fmax (largest, fabs (r->q[j]) / pw_unit (r->s, j));
+  r->data->noise = fmin (64 / (sine * sine), 1e7) * largest;
 }
 
 static int radau_restart (pw_run *r, pw_error *error) {
