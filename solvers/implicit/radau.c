@@ -43,8 +43,8 @@ static const double radau_derivative_at_end[STAGES] = { 5.53197264742180826186, 
 
 /* ---- Opening ---- */
 
-/* Round-off of the largest coordinate may affect others; at the sine s, solutions magnify it by 1/s^2.  r->saddle must be
- * factorised at the state reached. */
+/* Round-off of the largest coordinate may affect others; at the sine s, solutions magnify it by 1/s^2.  r->saddle must
+ * be factorised at the state reached. */
 static void radau_measure_noise (pw_run *r) {
   double sine = pw_saddle_sine (r->saddle, NULL), largest = 1;
   for (int j = 0; j < r->s->coords; j++) largest = fmax (largest, fabs (r->q[j]) / pw_unit (r->s, j));
