@@ -61,6 +61,7 @@ static int radau_restart (pw_run *r, pw_error *error) {
   d->remaining = 1;
   d->renew_F_y = 1;
   d->F_y_at_state = 0;
+  d->near_singular = r->near_singular;
   radau_measure_noise (r);
   d->h = pw_first_step (r);
   if (d->h >= 0.5 * time_scale * sqrt (r->settings.rtol)) /* saturating forces do not limit it */
