@@ -78,7 +78,7 @@ static void plot_choose (pw_plots *plots) {
 /* Locks the folder; an error before the run if it cannot be written. */
 static int plot_try_folder (pw_plots *plots, pw_error *error) {
   plots->lock = pw_cli_lock_folder (plots->figures.folder, error);
-  pw_output *probe = plots->lock < 0 ? NULL : pw_figure_data (&plots->figures, "motion.dat", error);
+  pw_output *probe = plots->lock < 0 ? NULL : pw_figure_open_data (&plots->figures, "motion.dat", error);
   if (probe) pw_output_discard (probe);
   return probe ? PW_OK : error->status;
 }
