@@ -352,7 +352,7 @@ pw_range pw_expression_range (const pw_expression *expression, const unsigned ch
     else if (c->op == PW_OP_CONSTANT)
       *top = range_constant (c->value);
     else
-      *top = c->index == PW_EXPRESSION_TIME ? range_between (lo, hi)
+      *top = c->index == PW_EXPRESSION_TIME ? range_between (lo, nextafter (hi, INFINITY)) /* also just after hi */
                                             : (pw_range){ .lo = -DBL_MAX, .hi = DBL_MAX, .of_states = 1 };
     if (noisy[c - expression->code]) top->breaks &= operands_break;
     top++;
