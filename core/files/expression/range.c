@@ -238,8 +238,8 @@ static pw_range range_logical (int op, const pw_range *x, const pw_range *y) {
   return r;
 }
 
-/* The minimum of NaN and a number is the number.  Where either operand can be the smaller one there may be a kink, and a
- * minimum that is constant in the interval may fall just after it. */
+/* The minimum of NaN and a number is the number.  Where either operand can be the smaller one there may be a kink, and
+ * a minimum that is constant in the interval may fall just after it. */
 static pw_range range_min (const pw_range *x, const pw_range *y) {
   if (y->lo > y->hi || (x->hi < y->lo && !x->nan)) return *x;
   if (x->lo > x->hi || (y->hi < x->lo && !y->nan)) return *y;
