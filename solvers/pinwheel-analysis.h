@@ -31,7 +31,7 @@ typedef struct {
   unsigned char *rigid; /* unknowns: 1 for rigid displacements of the whole, under which the equations are invariant */
   int symmetries;       /* number of symmetry directions among x, y, phi */
   pw_steadiness steady;
-  double twist[3];     /* velocity of the frame [m/s, m/s, rad/s] */
+  double twist[3];     /* velocity of the frame's origin, at a body or the mean of all; of its rotation [m/s, rad/s] */
   double acceleration; /* the largest in that frame; angles multiplied by the length scale [m/s^2] */
   /* Of pw_run_linear_modes, otherwise NULL; axes are those of the frame, which are the world's at this moment. */
   double *B;     /* unknowns x signals, by rows: x' = A x + B u, u added to the signals of forces [m/s per unit of the
@@ -94,14 +94,15 @@ pw_variation *pw_variation_open (pw_run *r, const pw_direction *d, int count, in
  * pw_run_advance; also PW_METHOD where the motion is not differentiable. */
 int pw_variation_advance (pw_variation *x, double t, double t_end, pw_error *error);
 
-/* The derivative along direction i of the sample at the time reached by pw_variation_advance: each number in it is that
- * of the sample differentiated at constant time (residuals, projection, balance: 0; without `ledger`, work, loss and
- * ledger: NaN).  error_of, unless NULL, receives an estimate of its error due to differences and to integration,
- * without that due to the error of the run (0 with `no_error`).  Arrays are valid until the next call. */
+/* The derivative along direction i of the sample at the time reached by pw_variation_advance (at a breakpoint, after
+ * it): each number in it is that of the sample differentiated at constant time (residuals, projection, balance: 0;
+ * without `ledger`, work, loss and ledger: NaN).  error_of, unless NULL, receives an estimate of its error due to
+ * differences and to integration, without that due to the error of the run (0 with `no_error`).  Arrays are valid until
+ * the next call. */
 int pw_variation_sample (pw_variation *x, int i, pw_sample *derivative, pw_sample *error_of, pw_error *error);
 
 /* The first breakpoint of the run after the time reached, or INFINITY; *slope: the derivative along direction i of that
- * breakpoint, or of one at the time reached. */
+ * breakpoint, or of one at the time reached until pw_variation_sample passes it. */
 double pw_variation_breakpoint (const pw_variation *x, int i, double *slope);
 
 /* Where pw_system_may_jump, advances the run to time t, but not beyond its next breakpoint nor farther than 256 states
@@ -262,7 +263,8 @@ const char *pw_periodic_reason (const pw_periodic *x);
 /* Number of symmetries, as pw_steady_symmetries. */
 int pw_periodic_symmetries (const pw_periodic *x);
 
-/* Follows the branch of the motion last found towards the end of the range (direction 1) or its beginning (-1).
+/* Follows the branch of the motion that pw_periodic_solve has found last, PW_INPUT if it has failed, towards the end of
+ * the range (direction 1) or its beginning (-1).
  * pw_periodic_next returns its points, the first one included, and events in between, then PW_PERIODIC_END (perhaps
  * with pw_periodic_reason). */
 int pw_periodic_follow (pw_periodic *x, int direction, pw_error *error);

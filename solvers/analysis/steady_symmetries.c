@@ -15,7 +15,8 @@ enum {
 };
 static const double SYMMETRY_DISTANCE = 0.02, /* of a state from the initial or displaced one, in units of the scene */
     SYMMETRY_ROUND_OFF = 1e-12,               /* of singular values, relative to the largest one */
-    SYMMETRY_PIVOT = 1e-6, SYMMETRY_ZERO = 1e-7, /* rates below these cannot be pivots; count as 0 */
+    SYMMETRY_PIVOT = 1e-6,                    /* least rate that can be a pivot */
+    SYMMETRY_ZERO = 1e-7,                     /* rates below it count as 0 */
     SYMMETRY_SAME = 1e-4; /* of equal states: a double root moves by the root of the residual, 3e-5, with a margin */
 
 void pw_steady_combine (const pw_steady *x, const double *coefficient, double unit, double *rates) {
@@ -26,13 +27,13 @@ void pw_steady_combine (const pw_steady *x, const double *coefficient, double un
 }
 
 void pw_steady_velocities (const pw_steady *x, const double *rates, const double *q, double *v) {
-  int bodies = 3 * x->s->bodies;
-  for (int j = 0; j < bodies; j += 3) {
+  int internal = 3 * x->s->bodies; /* the first internal coordinate */
+  for (int j = 0; j < internal; j += 3) {
     v[j] = x->L * rates[PW_RATE_X] - rates[PW_RATE_TURN] * (q[j + 1] - x->origin[1]);
     v[j + 1] = x->L * rates[PW_RATE_Y] + rates[PW_RATE_TURN] * (q[j] - x->origin[0]);
     v[j + 2] = rates[PW_RATE_TURN] + rates[pw_steady_angle_rate (x->s, j)];
   }
-  for (int j = bodies; j < x->n; j++) v[j] = rates[pw_steady_angle_rate (x->s, j)];
+  for (int j = internal; j < x->n; j++) v[j] = rates[pw_steady_angle_rate (x->s, j)];
 }
 
 /* What displacements of these rates change in the equations at x->q, x->v, in units of the scene. */
@@ -84,19 +85,19 @@ static void symmetry_reduce (int rows, int n, double *row) {
 
 int pw_null_space (int rows, int n, double *M, double tolerance, double *out) {
   double *work = malloc (((size_t)n * (size_t)n + 8 * (size_t)(rows + n)) * sizeof *work), *sigma = work,
-         *V = sigma + n;
-  int left = 0;
+         *VT = sigma + n;
+  int count = 0;
   if (work == NULL) return PW_RESOURCE;
-  if (LAPACKE_dgesvd_work (LAPACK_COL_MAJOR, 'N', 'A', rows, n, M, rows, sigma, NULL, 1, V, n, V + n * n,
+  if (LAPACKE_dgesvd_work (LAPACK_COL_MAJOR, 'N', 'A', rows, n, M, rows, sigma, NULL, 1, VT, n, VT + n * n,
                            8 * (rows + n) - n))
-    left = PW_METHOD;
+    count = PW_METHOD;
   tolerance = fmax (tolerance, SYMMETRY_ROUND_OFF * sigma[0]);
-  while (left >= 0 && left < n && sigma[n - 1 - left] <= tolerance) {
-    for (int j = 0; j < n; j++) out[left * n + j] = V[j * n + n - 1 - left];
-    left++;
+  while (count >= 0 && count < n && sigma[n - 1 - count] <= tolerance) {
+    for (int j = 0; j < n; j++) out[count * n + j] = VT[j * n + n - 1 - count];
+    count++;
   }
   free (work);
-  return left;
+  return count;
 }
 
 void pw_irregular_state (const pw_run *r, double distance, int number, double *q, double *v) {
@@ -159,9 +160,9 @@ static int symmetry_columns (pw_steady *x, int count, const double *displacement
   return finite;
 }
 
-/* Reduces the symmetries so that combinations of them that displace nothing vanish, such as a rotation of the whole
- * about the centre of a pinned disc less one of the disc's angle.  Returns their number, or a status < 0.  x->q is in
- * general position. */
+/* Subtracts from the symmetries the combinations of them that displace nothing, such as a rotation of a pinned disc as
+ * the whole less that of its angle alone.  Returns the number of these combinations, by which the caller reduces
+ * x->symmetries, or a status < 0.  x->q is in general position. */
 static int symmetry_remove_idle (pw_steady *x, int rates) {
   int n = x->n + 3, count = x->symmetries; /* at least as many rows as columns */
   double *F = calloc ((size_t)(n + count + rates) * (size_t)count + 1, sizeof *F);
@@ -203,24 +204,12 @@ static int symmetry_coordinate (const pw_steady *x, int c) {
   return k < x->s->bodies ? 3 * k + 2 : 2 * x->s->bodies + k;
 }
 
-/* Finds the angles whose change is a symmetry by itself. */
-static void symmetry_find_cyclic (pw_steady *x) {
-  int rates = pw_steady_rate_count (x->s);
-  for (int k = 0; k < x->symmetries; k++) {
-    int last = 0, count = 0;
-    for (int c = 0; c < rates; c++)
-      if (x->symmetry[k * rates + c] != 0) last = c, count++;
-    if (count == 1 && last >= PW_RATE_ANGLES) x->cyclic[symmetry_coordinate (x, last)] = 1;
-  }
-}
-
 /* Makes x->symmetry a basis whose rows are as sparse as possible. */
 static void symmetry_simplify (pw_steady *x, int idle) {
   int rates = pw_steady_rate_count (x->s);
   symmetry_reduce (x->symmetries, rates, x->symmetry);
   x->symmetries -= idle;
   symmetry_keep_one_turn (x, rates);
-  symmetry_find_cyclic (x);
 }
 
 /* Adds the asymmetries at state `number` of all displacements, the rows of `unit`. */
@@ -263,7 +252,6 @@ int pw_steady_keep_symmetries (pw_steady *x) {
     for (int j = 0; j < rates; j++) kept[i / count * rates + j] += c[i] * x->symmetry[i % count * rates + j];
   if (left >= 0 && left < count) {
     memcpy (x->symmetry, kept, (size_t)(left * rates) * sizeof *kept);
-    memset (x->cyclic, 0, (size_t)x->n);
     x->symmetries = left;
     symmetry_simplify (x, 0);
   }
@@ -364,7 +352,7 @@ double pw_steady_distance (pw_steady *x, const double *q1, const double *v1, con
   for (int j = 0; j < x->n; j++) {
     double unit = pw_unit (x->s, j), off = (a[j] - b[j]) / unit, size = fmax (1, fabs (b[j] / unit));
     if (j < 3 * x->s->bodies && j % 3 == 2) off = remainder (off, 2 * PW_PI), size = 1;
-    if (!x->cyclic[j]) most = pw_larger_or_nan (most, fabs (off) / size);
+    most = pw_larger_or_nan (most, fabs (off) / size);
     off = (va[j] - vb[j]) / unit * x->T;
     most = pw_larger_or_nan (most, fabs (off) / fmax (1, fabs (vb[j] / unit * x->T)));
   }

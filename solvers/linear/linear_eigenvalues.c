@@ -69,12 +69,12 @@ static int eigen_certain (const pw_linearisation *x, int n, double *B, double *r
   double *perturbed = B + cells, *re2 = perturbed + cells, *im2 = re2 + n, *shift = im2 + n, *work = shift + n;
   double most = 1 / x->r->w->scale.time; /* so that rows of zeros are perturbed, too */
   memcpy (perturbed, B, (size_t)cells * sizeof *B);
+  if (eigen_values (n, B, re, im, x->modes ? x->left_vectors : NULL, work) != PW_OK) return PW_RETRY;
+  if (x->modes) memcpy (x->left_vectors + cells, im, (size_t)n * sizeof *im);
   eigen_perturb (n, most, perturbed);
   if (n) LAPACKE_dgebal_work (LAPACK_COL_MAJOR, 'S', n, perturbed, n, &unused, &also_unused, work);
   for (int i = 0; i < cells; i++) most = fmax (most, fabs (perturbed[i]));
   eigen_perturb (n, most, perturbed);
-  if (eigen_values (n, B, re, im, x->modes ? x->left_vectors : NULL, work) != PW_OK) return PW_RETRY;
-  if (x->modes) memcpy (x->left_vectors + cells, im, (size_t)n * sizeof *im);
   if (eigen_values (n, perturbed, re2, im2, NULL, work) != PW_OK) return PW_RETRY;
   eigen_shift (n, re, im, re2, im2, EIGEN_ROUND_OFF * most, shift);
   eigen_clean (n, re, im, shift);
@@ -137,7 +137,7 @@ int pw_linear_eigenvalues (pw_linearisation *x, pw_linear *l, pw_error *error) {
   for (int i = k; k > 0 && i < n; i++)
     memmove (B + (size_t)(i - k) * (size_t)(n - k), B + (size_t)i * (size_t)n + k, (size_t)(n - k) * sizeof *B);
   memset (l->rigid, 1, (size_t)k);
-  if (k >= 2) l->im[0] = fabs (l->twist[2]), l->im[1] = -l->im[0]; /* both translations, in a rotating frame */
+  if (k >= 2) l->im[0] = fabs (l->twist[2]), l->im[1] = 0 - l->im[0]; /* translations; 0 - 0 is not -0 */
   int status = eigen_certain (x, n - k, B, l->re + k, l->im + k);
   free (B);
   if (status == PW_OK && x->modes) status = pw_linear_shapes (x, k, l);
@@ -163,7 +163,7 @@ static int rk4_stable (double re, double im, double h) {
 
 double pw_rk4_limit (double re, double im) {
   double size = hypot (fmin (re, 0), im), low = 0, high = 0;
-  if (!(size > 0)) return INFINITY;
+  if (!(size > DBL_MIN)) return INFINITY; /* or a number that overflows */
   while (rk4_stable (re, im, high) && high * size < 4) low = high, high += 0.01 / size;
   for (int i = 0; i < 50; i++) {
     double middle = (low + high) / 2;

@@ -231,6 +231,22 @@ TEST (extremum) {
   }
 }
 
+/* A reaction h + 5 t for 0.2 s <= t < 0.5 s, else 5 t: at a breakpoint, where the run ends; largest just before one. */
+TEST (beside_breakpoint) {
+  double slope[2];
+  cli_write ("held.yaml", "pinwheel: 1\nparameters: [{name: h, value: 3}]\n"
+                          "bodies: [{name: rod, mass: 1, inertia: 0.1, start: {x: 1}}]\nelements:\n"
+                          "  - {pin: A, body: [ground, rod], at: [[0, 0], [-1, 0]]}\n"
+                          "  - {force: F, body: rod, fx: 5*t}\n"
+                          "  - {force: P, body: rod, fx: {pulse: {height: h, start: 0.2, width: 0.3}}}\n");
+  for (int i = 0; i < 2; i++) {
+    cli_good (i ? "pinwheel sensitivity @/held.yaml --of max:A.Fx --by h -t 0.55 -o @/sens"
+                : "pinwheel sensitivity @/held.yaml --of A.Fx --by h -t 0.2 -o @/sens");
+    assert_int_equal (cli_sensitivity ("derivative", slope + i), 1);
+    check_close ("slope", slope[i], 1, 1e-9, "round-off of differences");
+  }
+}
+
 /* ---- Files ---- */
 
 TEST (files) {

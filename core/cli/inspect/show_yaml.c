@@ -179,7 +179,7 @@ static int yaml_check (const pw_model *m, pw_error *error) {
                           f->name, kind, name);
     }
   }
-  if (pw_model_initial (m))
+  if (pw_model_initials (m))
     return pw_fail (error, PW_INPUT,
                     "--yaml: initial values of --start have no place in a text model; give them to run");
   return PW_OK;
@@ -204,7 +204,7 @@ static void yaml_names (const pw_reference_text *ref) {
 }
 
 static void yaml_reference (const pw_model *m) {
-  const pw_reference_text *ref = pw_model_reference (m);
+  const pw_reference_text *ref = pw_model_reference_text (m);
   if (pw_model_table (m)->reference)
     puts ("# The reference solution of the model is a function in C, which cannot be written as text.");
   if (ref->states) puts ("truth:");
@@ -221,7 +221,7 @@ int pw_show_yaml (const pw_cli_model *opened, pw_error *error) {
   const pw_element *e = pw_model_elements (m, &elements);
   if (table->about && *table->about) printf ("about: "), yaml_text (table->about), putchar ('\n');
   yaml_run (&table->run);
-  yaml_names (pw_model_reference (m));
+  yaml_names (pw_model_reference_text (m));
   if (bodies) puts ("bodies:");
   for (int i = 0; i < bodies; i++) yaml_body (&b[i]);
   if (elements) puts ("elements:");

@@ -5,7 +5,7 @@
 int pw_comparison_open (pw_comparison *comparison, const pw_cli_model *compiled, const char *path, int started,
                         double t_end, pw_error *error) {
   *comparison = (pw_comparison){ .errors = { .source = path ? path : "the model" } };
-  if (path == NULL && !pw_system_has_reference (compiled->model)) return PW_OK;
+  if (path == NULL && !pw_model_has_reference (compiled->model)) return PW_OK;
   if (path == NULL && started) {
     pw_cli_say (
         "pinwheel: the model's reference solution holds for its own initial values: with --start errors are not "

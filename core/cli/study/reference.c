@@ -179,7 +179,7 @@ int pw_reference_find (pw_reference *reference, pw_study *study, double step, pw
   const char *path = study->reference_path;
   double t_end = path && study->line.t_end == NULL ? 0 : study->t_end; /* 0: that of the table */
   /* the model's solution holds only for its own initial values */
-  if (path == NULL && (study->line.starts || !pw_system_has_reference (study->compiled.model)))
+  if (path == NULL && (study->line.starts || !pw_model_has_reference (study->compiled.model)))
     return reference_compute (reference, study, step, error);
   int status = pw_motion_open_reference (&reference->motion, &study->compiled, path, &t_end, error);
   if (status != PW_OK) return status;

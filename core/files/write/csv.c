@@ -35,7 +35,7 @@ static void csv_array (pw_csv *c, const char *name) {
   double *column = malloc ((rows + 1) * sizeof *column);
   c->failed |= column == NULL;
   for (size_t row = 0; column && row < rows; row++) column[row] = c->value[row * c->columns + (size_t)c->cells];
-  if (column) pw_npz_add (&c->npz, name, (long)rows, 0, 1, column);
+  if (column) pw_npz_add (&c->npz, name, (long)rows, -1, 1, column);
   free (column);
 }
 
@@ -83,11 +83,8 @@ static void csv_states (pw_csv *c, const pw_sample *x) {
 }
 
 static void csv_contacts (pw_csv *c) {
-  for (int e = 0; c->workspace && e < pw_system_elements (c->system); e++) {
-    const pw_element_info x = pw_system_element (c->system, e);
-    for (int i = 0; x.contact >= 0 && i < 2; i++)
-      CSV_CELL (c, PW_PRINTED (300, "%s.%c", x.name, "xy"[i]), "m", c->contact[x.contact][i]);
-  }
+  for (int i = 0; c->workspace && i < 2 * pw_system_contacts (c->system); i++)
+    CSV_CELL (c, PW_NAME (pw_system_contact_name, c->system, i), "m", c->contact[i / 2][i % 2]);
 }
 
 static void csv_reactions (pw_csv *c, const pw_sample *x) {
