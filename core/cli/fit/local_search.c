@@ -10,6 +10,8 @@
 #define SEARCH_FIRST 0.1    /* first steps from a start, in scaled unknowns */
 #define SEARCH_ROUGH 1e-3   /* last steps from a start, first steps of refinements */
 #define SEARCH_ALLOWED 1e-6 /* permitted violation of a constraint, relative to its bound if that is not 0 */
+#define SEARCH_PROBE 0.1    /* change of an unknown to find out whether it has an effect, in scales */
+#define SEARCH_SAME 1e-6    /* largest change of an output without an effect, relative to its value */
 #define SEARCH_GAIN 1e-9    /* least improvement of the objective for a restart, relative to its value */
 
 enum {
@@ -321,4 +323,32 @@ int pw_search_fine (void *context, int i, pw_error *error) {
   pw_optimise *problem = context;
   int slopes = problem->differentiable && problem->unknowns.count >= SEARCH_SLOPES;
   return search_task (problem, problem->starts + i, slopes, SEARCH_ROUGH, PW_SEARCH_FINE, error);
+}
+
+/* 1 if outputs differ from those of the best result, or the run fails. */
+static int search_differs (const local_search *local) {
+  const pw_optimise *problem = local->problem;
+  int differ = search_run (local, &(pw_error){ 0 }) != PW_OK;
+  for (int i = 0; i < problem->outputs && !differ; i++) {
+    const double best = problem->best->output[i];
+    differ = !(fabs (local->output[i] - best) <= SEARCH_SAME * fabs (best));
+  }
+  return differ;
+}
+
+int pw_search_effect (void *context, int i, pw_error *error) {
+  pw_optimise *problem = context;
+  const pw_unknown *unknown = problem->unknowns.list + i;
+  size_t n = (size_t)problem->unknowns.count;
+  double *memory = calloc (n + (size_t)problem->outputs, sizeof *memory), value = problem->best->to[i];
+  if (memory == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  local_search local = { .problem = problem, .unknown = memory, .output = memory + n };
+  memcpy (local.unknown, problem->best->to, n * sizeof *memory);
+  problem->without_effect[i] = 1;
+  for (int side = -1; side <= 1 && problem->without_effect[i]; side += 2) {
+    local.unknown[i] = search_unknown (unknown, search_scaled (unknown, value) + side * SEARCH_PROBE);
+    if (local.unknown[i] != value) problem->without_effect[i] = !search_differs (&local);
+  }
+  free (memory);
+  return PW_OK;
 }
