@@ -297,8 +297,8 @@ static int search_from (local_search *local, int slopes, double first, double la
   return status;
 }
 
-/* Search i of the problem, repeated without derivatives if they fail.  Where COBYLA would be used, a refinement at first
- * ignores the constraints, as COBYLA is slow in curved valleys; it continues with them once they matter. */
+/* Search i of the problem, repeated without derivatives if they fail.  A refinement without derivatives first ignores
+ * the constraints, as COBYLA is slow in curved valleys; it is repeated with them once they matter. */
 static int search_task (pw_optimise *problem, int i, int slopes, double first, double last, pw_error *error) {
   local_search local = { .problem = problem, .search = problem->search + i, .least = INFINITY, .most = -INFINITY };
   if (pw_stop) return PW_OK;

@@ -30,8 +30,8 @@ static int report_is_constant (const pw_optimise *problem) {
   return memchr (problem->without_effect, 0, (size_t)problem->unknowns.count) == NULL;
 }
 
-/* The bound at which the best value of unknown i is: -1 the lower one, 1 the upper one, 0 neither, or no effect; that of
- * an incomplete search must be exactly there. */
+/* The bound at which the best value of unknown i is: -1 the lower one, 1 the upper one, 0 neither, or no effect.  The
+ * value of an incomplete search must be exactly there. */
 static int report_bound (const pw_optimise *problem, int i) {
   const pw_unknown *unknown = problem->unknowns.list + i;
   if (problem->without_effect[i]) return 0;
