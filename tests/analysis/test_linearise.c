@@ -143,6 +143,8 @@ TEST (bad) {
     { "chain --set n=200", "chain has 600 coordinates; linearise takes at most 400" },
   };
   cli_bad_each ("linearise", each, sizeof each / sizeof *each);
+  cli_good ("pinwheel linearise snakeboard -o @/board >/dev/null");
+  assert_null (strstr (cli_file ("board.json"), "\"im\": -0,"));
   cli_bad ("pinwheel linearise pendulum --at 1 --limit 1e-9", 4,
            "t = 0 s: the limit of 1e-09 s of processor time is reached (--limit)");
   cli_bad ("pinwheel show pendulum --at 1 --limit 1e-9", 4,
