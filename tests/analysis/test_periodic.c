@@ -373,7 +373,10 @@ TEST (refused) {
   pw_system *s = gallery_open ("snakeboard", NULL);
   check_close ("period", pw_system_period (s), 2, 1e-14, "2 pi / omega");
   assert_null (pw_periodic_open (s, &(pw_periodic_settings){ .period = 1.9 }, &error));
-  check_error (&error, PW_INPUT, "model snakeboard: signal swing.value does not repeat after 1.9 s");
+  check_error (
+      &error, PW_INPUT,
+      "model snakeboard: signal swing.value does not repeat after 1.9 s; without a given period that of harmonic "
+      "signals and pulses is used");
   error = (pw_error){ 0 };
   assert_null (pw_periodic_open (s, &(pw_periodic_settings){ .free = 1 }, &error));
   check_error (&error, PW_INPUT,

@@ -207,7 +207,8 @@ TEST (without_modes) {
                               "  - {speed: engine, body: car, at: [-0.4, 0], value: 1}\n");
   cli_good ("pinwheel steady @/tricycle.yaml --vary steer=-0.5:0.5 -o @/tricycle");
   assert_string_equal (cli_err, "");
-  assert_non_null (cli_file ("tricycle/steady.svg"));
+  const char *svg = cli_file ("tricycle/steady.svg");
+  assert_true (svg && strstr (svg, "unstable") && !strstr (svg, "stability changes") && !strstr (svg, "fold"));
 }
 
 /* Signals that stop changing: from then on there are steady motions. */
