@@ -2,6 +2,7 @@
 #define _DEFAULT_SOURCE /* CLOCK_MONOTONIC_COARSE */
 #include <math.h>
 #include <time.h>
+#include <unistd.h>
 #include "cli.h"
 
 volatile sig_atomic_t pw_stop;
@@ -11,6 +12,14 @@ static void stop_on_signal (int number) {
   if (++pw_stop < STOP_NOW) return;
   signal (number, SIG_DFL);
   raise (number);
+}
+
+/* Outside of the loops that check pw_stop, as during a compilation. */
+static void stop_at_once (int number) {
+  static const char text[] = "pinwheel: interrupted\n";
+  ssize_t written = write (STDERR_FILENO, text, sizeof text - 1);
+  (void)number, (void)written;
+  _exit (PW_INTERRUPTED);
 }
 
 /* Sets the handler of SIGINT and SIGTERM; a signal that the program was started to ignore, by nohup or in a script's
@@ -28,7 +37,7 @@ void pw_stop_catch (void) {
 }
 
 void pw_stop_release (void) {
-  stop_set (SIG_DFL);
+  stop_set (stop_at_once);
 }
 
 /* ---- Limits ---- */

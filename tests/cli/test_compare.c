@@ -58,6 +58,12 @@ TEST (orders) {
   }
 }
 
+/* Steps that follow a tolerance are nowhere in an asymptotic range; with these, orders of 8 would agree. */
+TEST (no_adaptive_order) {
+  cli_good ("pinwheel compare pendulum --methods erk5+projection --rtol-ladder 1e-3:1e-6 --repeats 1 -o @/adaptive");
+  for (int row = 0; row < 4; row++) assert_string_equal (compare_cell ("adaptive/compare.csv", row, ORDER), "nan");
+}
+
 /* Outside the asymptotic range, here next to the reference's uncertainty, levels disagree and no order is given. */
 TEST (no_order) {
   cli_good ("pinwheel compare ezyroller --methods erk5+projection:steps=fixed --t-end 2 --step-ladder 0.05:0.0125 "
@@ -230,6 +236,25 @@ TEST (limit) {
   assert_string_equal (compare_cell ("stop/compare.csv", 0, STATUS), "stopped");
   assert_non_null (
       strstr (compare_cell ("stop/compare.csv", 0, REASON), "too slow: the limit of 0.125 s was reached at"));
+}
+
+/* The limit bounds the runs of the reference, too. */
+TEST (limited_reference) {
+  assert_int_equal (cli_run ("pinwheel compare ezyroller --methods rk4 --t-end 1e4 --repeats 1 --step-ladder 0.1 "
+                             "--limit 0.01 --specialise never"),
+                    4);
+  assert_non_null (strstr (cli_out, "no two methods reach the end within --limit, so errors are unknown"));
+}
+
+/* Initial values changed by the constraints are reported, as by `run`. */
+TEST (changed) {
+  static const char *const command[] = { "compare", "drift --only-methods",
+                                         "sensitivity --of sleigh.x --by sleigh.phi -m rk4", "linearise" };
+  for (int i = 0; i < 4; i++) {
+    cli_shell (check_text ("pinwheel %s chaplygin-sleigh --start sleigh.omega=0.5 %s", command[i],
+                           i < 2 ? "-t 0.1 --methods rk4" : ""));
+    assert_non_null (strstr (cli_err, "\n  sleigh.vy from 0.2 to 0.125 m/s (specified)\n"));
+  }
 }
 
 /* A failure keeps its row, its reason and the time reached; the others go on. */

@@ -4,7 +4,6 @@
 #include <string.h>
 #include "reference.h"
 
-#define REFERENCE_CPU_LIMIT 10 /* smallest limit of the processor time of a candidate [s] */
 #define REFERENCE_LOOSEST 1e-9 /* the largest tolerance, after failures with smaller ones */
 #define REFERENCE_STEPS 1e5    /* the fewest steps of fixed size at first, */
 #define REFERENCE_FEWEST 1000  /* and after failures with more steps */
@@ -165,13 +164,13 @@ static int reference_compute (pw_reference *reference, pw_study *study, double s
     { study, .row = { .method = "ida+ggl", .adaptive = 1, .level = 1e-13 } },
     { study, .row = { .method = "ida+baumgarte", .adaptive = 1, .level = 1e-13 } },
   };
-  double limit = study->cpu_limit;
-  study->cpu_limit = fmax (limit, REFERENCE_CPU_LIMIT);
   pw_study_begin_progress (study, "reference", "methods", REFERENCE_CANDIDATES);
   int status = pw_study_parallel (study, REFERENCE_CANDIDATES, reference_run, candidates, error);
-  study->cpu_limit = limit;
   if (status == PW_OK) reference_choose (reference, study->compiled.system, candidates);
-  for (int i = 0; i < REFERENCE_CANDIDATES; i++) pw_motion_close (&candidates[i].motion);
+  for (int i = 0; i < REFERENCE_CANDIDATES; i++) {
+    reference->limited |= candidates[i].row.state == ROW_STOPPED;
+    pw_motion_close (&candidates[i].motion);
+  }
   return status;
 }
 
@@ -200,7 +199,8 @@ int pw_reference_find (pw_reference *reference, pw_study *study, double step, pw
 
 void pw_reference_print (const pw_reference *reference, int partners) {
   if (!reference->known) {
-    puts ("no two methods reach the end, so errors are unknown; --reference FILE.csv provides a reference\n");
+    printf ("no two methods reach the end%s, so errors are unknown; --reference FILE.csv provides a reference\n\n",
+            reference->limited ? " within --limit" : "");
     return;
   }
   pw_cli_print (stdout, "errors are measured against %s%s\n", reference->name,
