@@ -185,7 +185,7 @@ static double compare_pair_order (const pw_compare *compare, const pw_row *row) 
   return known ? log2 (coarser->value[COLUMN_ERROR + error_index] / error[error_index]) : NAN;
 }
 
-/* The observed order of convergence: only with fixed steps, and in the asymptotic range, where the last two orders agree
+/* The observed order of convergence: only of fixed steps and in the asymptotic range, where the last two orders agree
  * and errors are well above the uncertainty of the reference; else NaN. */
 static double compare_order (const pw_compare *compare, const pw_row *row) {
   if (row->adaptive || row->coarser_levels < 2) return NAN;
