@@ -41,7 +41,7 @@
 PW_BEGIN
 
 #define PW_VERSION "0.1.0"
-#define PW_ABI 1 /* stays 1 until 0.1.0 is released; later raised when plug-ins of an older header could be misread */
+#define PW_ABI 1 /* 1 until 0.1.0 is released; then raised if plug-ins built with an older header could be misread */
 #define PW_PI 3.14159265358979323846
 
 /* ---- Status and errors ---- */
@@ -81,7 +81,7 @@ enum { PW_ENDS_FREE, PW_ENDS_REST };
 /* The source text of a function signal in a text model. */
 typedef struct {
   const char *part[3]; /* expressions of value, rate, acceleration; NULL: not given */
-  const char *jump; /* an operation in them that jumps as states change, where no step ends: "sign (a.vx)"; or NULL */
+  const char *jump; /* an operation in them that may jump within a step, as it reads states: "sign (a.vx)"; or NULL */
 } pw_signal_text;
 
 /* A signal computed by the caller.  `eval` stores the value in value[0] and, for a signal of a constraint, its time
@@ -170,7 +170,7 @@ typedef struct {
   unsigned specified;   /* PW_SPECIFIES_X | ...: which initial values are specified; 0: those that are not 0 */
 } pw_body;
 
-/* Initial values that a body specifies: to satisfy the constraints they change less readily than the others. */
+/* Initial values that a body specifies: the constraints are satisfied by changing the others rather than these. */
 enum {
   PW_SPECIFIES_X = 1,
   PW_SPECIFIES_Y = 2,
@@ -242,7 +242,7 @@ int pw_add_body (pw_model *m, const pw_body *body);
 int pw_add (pw_model *m, const pw_kind *kind, const void *definition);
 
 /* For build functions: rejects the parameters with a message ("links: at most 1000").  Returns PW_INPUT. */
-int pw_model_refuse (pw_model *m, const char *format, ...);
+int pw_model_refuse (pw_model *m, const char *format, ...) PW_PRINTF (2, 3);
 
 /* Jacobi's amplitude am (u | m) and the complete elliptic integral K (m), m = k^2 <= 1 (NaN above): sn = sin (am).
  * A pendulum released at rest at an angle A from its lowest point is at the angle 2 asin (k sn (K - w t)), where
@@ -592,13 +592,13 @@ struct pw_kind {
   pw_batch_function *energy;                    /* 1: potential energy [J] */
   pw_batch_function *power;                     /* 1: power supplied to the system [W]; NULL: -lambda . eta */
   pw_batch_function *loss;                      /* 1: dissipated power [W], >= 0 */
-  pw_batch_function *contact;                   /* 3: contact point on the ground [m] and heading [rad], for output */
+  pw_batch_function *contact; /* 3: contact point, or point of a marker [m], and heading [rad]; for output */
   /* 2 cols, for forces that saturate, such as friction: the smallest change of each coordinate, then of each velocity,
    * that reverses the force or changes it by its own magnitude.  Entries are INFINITY before the call. */
   pw_batch_function *saturation;
-  /* Strokes in figures (core/cli/plot/plot_symbols.c); NULL: none.  Vertex "a x y": at a from the first body's point
-   * (0) to the last body's (1), plus x along and y to the left of the heading, in units of symbols.  "o a x y r": a
-   * circle of radius r. */
+  /* Strokes in figures, separated by ";" (core/cli/plot/plot_symbols.c); NULL: none.  Vertex "a x y": at the fraction a
+   * of the way from the first body's point to the last body's, plus x along and y to the left of the heading, in units
+   * of symbols.  "o a x y r": a circle of radius r.  "g1", "g2": the pitch circles of two gears. */
   const char *symbol;
 };
 
@@ -671,7 +671,7 @@ const pw_element *pw_model_elements (const pw_model *m, int *count);
 static inline const char *pw_element_name (const pw_element *e) {
   return *(const char *const *)e->definition;
 }
-int pw_model_initial (const pw_model *m); /* number of values set by pw_model_set_initial */
+int pw_model_initials (const pw_model *m); /* number of values set by pw_model_set_initial */
 
 /* Reference solution of a text model: expressions of time for some states; names used in them and in signals. */
 typedef struct {
@@ -683,7 +683,7 @@ typedef struct {
   double (*eval) (void *context, int i, double t); /* value of expression i at time t */
   void *context;
 } pw_reference_text;
-const pw_reference_text *pw_model_reference (const pw_model *m);               /* all zero if there is none */
+const pw_reference_text *pw_model_reference_text (const pw_model *m);          /* all zero if there is none */
 void pw_model_set_reference (pw_model *m, const pw_reference_text *reference); /* must outlive the model */
 
 /* ---- For build functions that read models from other sources ---- */
@@ -724,7 +724,7 @@ void pw_system_free (pw_system *s);
 /* Whether a built model has a reference solution (see pw_plugin_table), and its values at time t.  q and v:
  * pw_system_coordinates entries each; unknown ones are NaN.  Valid for the described initial conditions, not for
  * values of pw_model_set_initial.  Errors: PW_INPUT for a state the system does not have. */
-int pw_system_has_reference (const pw_model *m);
+int pw_model_has_reference (const pw_model *m);
 int pw_system_reference (const pw_model *m, const pw_system *s, double t, double *q, double *v, pw_error *error);
 
 /* Numbers of bodies; coordinates (entries of q and of v); constraint equations; holonomic ones, which come first. */
@@ -754,11 +754,12 @@ const char *pw_system_reaction_unit (const pw_system *s, int row);
  * error, with the nearest name, if there is none. */
 int pw_system_find_reaction (const pw_system *s, const char *name, pw_error *error);
 
-/* The number of signals; name and unit of one ("rider.value", "N m"), as pw_system_state_name; 1 if it is a force's. */
+/* The number of signals; name and unit of one ("rider.value", "N m"), as pw_system_state_name; 1 if it belongs to a
+ * force. */
 int pw_system_signals (const pw_system *s);
 char *pw_system_signal_name (const pw_system *s, int signal, char *buffer, size_t size);
 const char *pw_system_signal_unit (const pw_system *s, int signal);
-int pw_system_signal_forced (const pw_system *s, int signal);
+int pw_system_signal_of_force (const pw_system *s, int signal);
 
 /* The signal of this name; the name of an element suffices if the element has one signal.  PW_INPUT and the error, with
  * the nearest name, if there is none. */
@@ -783,7 +784,8 @@ int pw_system_jumps (const pw_system *s, double t);
 
 /* Specialised code: C code for this system alone, which evaluates and projects it faster than the library
  * (pw_settings.specialised).  independent: for each constraint equation, 0 if it is redundant (pw_run_source); NULL:
- * none is.  NULL and the error if there is none, as for too many constraint equations or elements.  Free the text. */
+ * none is redundant.  Free the text.  NULL and the error if a system cannot have such code, for example with too many
+ * constraint equations or elements. */
 char *pw_system_source (const pw_system *s, const unsigned char *independent, pw_error *error);
 
 /* 1 if compiled code has this library's interface to such code and is of a system with the same structure: parameters
@@ -802,7 +804,7 @@ void *pw_specialised_lanes_memory (const pw_specialised_lanes *code);
 /* 1 if the code can be compiled for several runs at once: all element types are built-in, signals depend on time alone,
  * and there are not too many constraint equations or elements.  The runs must not have redundant equations. */
 int pw_system_has_lanes (const pw_system *s);
-/* 1 if accelerations may be discontinuous at some states, where no step ends: an element type is from a plug-in, or a
+/* 1 if accelerations may be discontinuous within a step, at some states: an element type is from a plug-in, or a
  * signal depends on states. */
 int pw_system_may_jump (const pw_system *s);
 
@@ -815,7 +817,7 @@ typedef struct {
   const int *body;     /* kind->bodies indices; the ground's index is the number of bodies */
   int row;             /* its first constraint equation, of kind->rows */
   int coordinate;      /* its first internal coordinate, of kind->internal */
-  int contact;         /* index of its contact point; -1: no contact point */
+  int contact;         /* index of its contact point or marker; -1: it has none */
   int force;           /* index in `out` of pw_workspace_forces of its first number */
 } pw_element_info;
 int pw_system_elements (const pw_system *s);
@@ -828,7 +830,8 @@ void pw_workspace_free (pw_workspace *w);
 
 /* The functions below evaluate a state.  Errors: PW_METHOD if a signal fails, PW_RESOURCE. */
 
-/* Number of elements with a contact point; contact point on the ground (x, y) [m] and heading [rad] of each. */
+/* Number of elements with a place on the ground, which is the contact point of a wheel or tyre, or the point of a
+ * marker; place (x, y) [m] and heading [rad] of each. */
 int pw_system_contacts (const pw_system *s);
 int pw_workspace_contact_points (pw_workspace *w, double t, const double *q, const double *v, double (*out)[3],
                                  pw_error *error);

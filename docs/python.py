@@ -5,12 +5,12 @@ import numpy as np
 import pinwheel as pw
 
 model, coordinates = pw.Model("ezyroller"), ["frame.x", "frame.y", "frame.phi", "steer.phi"]
-exact = model.run("rk4+projection", step=2e-4, every=1)
+reference = model.run("erk8+projection", rtol=3e-14, every=1)
 
 def measure(method, **settings):
     start = time.process_time()
     run = model.run(method, every=1, energy=True, **settings)
-    error = [max(abs(run[name][t] - exact[name][t]) for name in coordinates) for t in (10, 100)]
+    error = [max(abs(run[name][t] - reference[name][t]) for name in coordinates) for t in (10, 100)]
     return run.statistics, error, abs(run["balance"]).max(), time.process_time() - start
 
 print("method            steps     rhs  error 10 s  100 s     |g| [m]  |Jv| [m/s]  gap [J]  CPU [s]")

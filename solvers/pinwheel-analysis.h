@@ -94,14 +94,15 @@ pw_variation *pw_variation_open (pw_run *r, const pw_direction *d, int count, in
  * pw_run_advance; also PW_METHOD where the motion is not differentiable. */
 int pw_variation_advance (pw_variation *x, double t, double t_end, pw_error *error);
 
-/* The derivative along direction i of the sample at the time reached by pw_variation_advance: each number in it is that
- * of the sample differentiated at constant time (residuals, projection, balance: 0; without `ledger`, work, loss and
- * ledger: NaN).  error_of, unless NULL, receives an estimate of its error due to differences and to integration,
- * without that due to the error of the run (0 with `no_error`).  Arrays are valid until the next call. */
+/* The derivative along direction i of the sample at the time reached by pw_variation_advance (at a breakpoint, after
+ * it): each number in it is that of the sample differentiated at constant time (residuals, projection, balance: 0;
+ * without `ledger`, work, loss and ledger: NaN).  error_of, unless NULL, receives an estimate of its error due to
+ * differences and to integration, without that due to the error of the run (0 with `no_error`).  Arrays are valid until
+ * the next call. */
 int pw_variation_sample (pw_variation *x, int i, pw_sample *derivative, pw_sample *error_of, pw_error *error);
 
 /* The first breakpoint of the run after the time reached, or INFINITY; *slope: the derivative along direction i of that
- * breakpoint, or of one at the time reached. */
+ * breakpoint, or of one at the time reached until pw_variation_sample passes it. */
 double pw_variation_breakpoint (const pw_variation *x, int i, double *slope);
 
 /* Where pw_system_may_jump, advances the run to time t, but not beyond its next breakpoint nor farther than 256 states

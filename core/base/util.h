@@ -57,7 +57,7 @@ static inline uint64_t pw_random_bits (uint64_t *state) {
   return z ^ (z >> 31);
 }
 
-/* A value of a parameter within a range, at which no parameter is likely to vanish. */
+/* A value within a range, at which no parameter is likely to vanish. */
 static inline double pw_value_within (double first, double last) {
   return first + 0.382 * (last - first);
 }
@@ -66,7 +66,8 @@ static inline double pw_value_within (double first, double last) {
 
 /* Bytes of the UTF-8 character at the beginning of a text; 0 if invalid. */
 int pw_utf8_size (const char *text);
-/* Code of the control character at the beginning of a text; 0 if there is none, or a line end (\n only) or tab. */
+/* Code of the control character at the beginning of a text; 0 if there is none, or if it is a
+ * line end (\n only) or a tab. */
 int pw_control (const char *text);
 /* 1 if a text is UTF-8 without control characters other than line ends and tabs. */
 int pw_is_text (const char *text);
@@ -111,7 +112,8 @@ void pw_names_close (pw_names *n);
 int pw_names_add (pw_names *n, const char *name, int value);
 int pw_names_find (const pw_names *n, const char *name); /* -1 if absent */
 
-/* Makes room for more than `count` entries of `size` bytes; array: address of a pointer to *room of them or NULL. */
+/* Makes room for more than `count` entries of `size` bytes in an array that has room for *room.  `array` is the address
+ * of the pointer to it, which is NULL at first.  PW_OK or PW_RESOURCE. */
 int pw_grow (void *array, size_t count, size_t *room, size_t size);
 
 /* The root of member i of a union-find structure, in which a root is its own parent; halves the path. */

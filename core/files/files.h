@@ -26,16 +26,17 @@ typedef struct {
   pw_arena arena;
   pw_found *found;
   int count;
-  size_t room;       /* entries of `found` allocated */
-  char folders[400]; /* the folders searched, "/first:/second", as many as fit; also for messages */
-  char unread[160];  /* folders of PINWHEEL_MODELS that cannot be searched: "/nowhere (No such file or directory)" */
+  size_t room;                  /* entries of `found` allocated */
+  struct pw_searched *searched; /* the folders searched, links resolved */
+  char folders[400];            /* the same for messages, "/first:/second", as many as fit */
+  char unread[160]; /* folders of PINWHEEL_MODELS that cannot be searched: "/nowhere (No such file or directory)" */
 } pw_search;
 
 /* Searches every folder of the search path.  Close in every case.  PW_OK or PW_RESOURCE. */
 int pw_search_open (pw_search *s, pw_error *error);
 void pw_search_close (pw_search *s);
 
-/* Find the pinwheel.h of this library, a file of the engine of interactive pages; the path is "" if there is none.
+/* Find the pinwheel.h of this library; a file of the engine of interactive pages.  The path is "" if there is none.
  * PW_OK or PW_RESOURCE. */
 int pw_search_header (char path[PW_PATH], pw_error *error);
 int pw_search_page_file (const char *file, char path[PW_PATH], pw_error *error);
@@ -109,6 +110,8 @@ typedef struct {
 } pw_unit_name;
 
 extern const pw_unit_name pw_unit_names[]; /* ends with a NULL name */
+/* Stores the power at p, after a name: "^2", "²", "2"; 1 if there is none, 0 if it is refused.  Returns its end. */
+const char *pw_unit_power (const char *p, int *power);
 
 /* ---- Reading (read.c) ---- */
 

@@ -244,7 +244,7 @@ typedef struct {
   unsigned long at;  /* bytes written */
 } pw_npz;
 
-/* Adds an array of rows x columns numbers, row by row, or a vector if columns = 0; each number is 1 double, or 2 if it
+/* Adds an array of rows x columns numbers, row by row, or a vector if columns < 0; each number is 1 double, or 2 if it
  * is complex (parts).  The name has at most 300 bytes. */
 void pw_npz_add (pw_npz *z, const char *name, long rows, long columns, int parts, const double *value);
 /* Completes the archive and frees its memory, in every case.  PW_RESOURCE; errors of the stream are the caller's. */

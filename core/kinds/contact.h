@@ -1,4 +1,4 @@
-/* The velocity of a point P of a body, the contact point of a wheel, along a direction d fixed in the body: velocity
+/* The velocity of a point P of a body (for a wheel: its contact point) along a direction d fixed in the body; velocity
  * constraints prescribe it, forces oppose it.
  *
  *   d . v_P = S v,  d = R(phi) (a, b),  v = (vx, vy, omega)

@@ -5,7 +5,7 @@
  *
  * (Andersson, Soderberg & Bjorklund 2007, Tribology International 40, 580-587, for the smoothing by tanh.)
  * The limit L (friction coefficient times normal load) is constant, since forces cannot depend on multipliers.  The
- * regularised law cannot stick: under a load M < L it creeps, for c = 0 at v0 atanh (M / L). */
+ * regularised law cannot stick: under an applied force or torque P < L it creeps, for c = 0 at v0 atanh (P / L). */
 #ifndef PW_COULOMB_H
 #define PW_COULOMB_H
 
@@ -18,8 +18,10 @@ typedef struct {
 
 static inline int coulomb_make (double viscous, double limit, double speed, coulomb *law, pw_error *error) {
   *law = (coulomb){ viscous, limit, limit > 0 ? 1 / speed : 0 };
-  if (limit > 0 && !(speed > 0))
-    return pw_fail (error, PW_INPUT, "speed = %g: expected > 0, since below it the limit is smoothed", speed);
+  if (limit > 0 && !(speed > 0 && isfinite (limit * law->inverse)))
+    return pw_fail (error, PW_INPUT,
+                    "speed = %g: expected > 0, and limit / speed finite, since the limit is smoothed below this speed",
+                    speed);
   return PW_OK;
 }
 

@@ -168,7 +168,7 @@ int pw_add (pw_model *m, const pw_kind *kind, const void *definition) {
   }
 MEMBER (const char *, pw_model_name, name)
 MEMBER (const pw_plugin_table *, pw_model_table, table)
-MEMBER (int, pw_model_initial, initials)
+MEMBER (int, pw_model_initials, initials)
 
 double pw_model_parameter (const pw_model *m, const pw_parameter *p) {
   double value;
@@ -186,7 +186,7 @@ const pw_element *pw_model_elements (const pw_model *m, int *count) {
   return m->element;
 }
 
-const pw_reference_text *pw_model_reference (const pw_model *m) {
+const pw_reference_text *pw_model_reference_text (const pw_model *m) {
   static const pw_reference_text nothing;
   return m->reference ? m->reference : &nothing;
 }
@@ -262,8 +262,8 @@ int pw_model_set_initial (pw_model *m, const char *state, double value, pw_error
 
 /* ---- Reference solution: a function in C, or expressions of a text model ---- */
 
-int pw_system_has_reference (const pw_model *m) {
-  return m->table->reference != NULL || pw_model_reference (m)->states > 0;
+int pw_model_has_reference (const pw_model *m) {
+  return m->table->reference != NULL || pw_model_reference_text (m)->states > 0;
 }
 
 int pw_system_reference (const pw_model *m, const pw_system *s, double t, double *q, double *v, pw_error *error) {
@@ -271,7 +271,7 @@ int pw_system_reference (const pw_model *m, const pw_system *s, double t, double
   int n = pw_system_coordinates (s);
   for (int j = 0; j < n; j++) q[j] = v[j] = NAN;
   if (m->table->reference) m->table->reference (m->parameters, t, q, v);
-  const pw_reference_text *text = pw_model_reference (m);
+  const pw_reference_text *text = pw_model_reference_text (m);
   for (int i = 0; i < text->states; i++) {
     int state = pw_system_find_state (s, text->state[i], error);
     if (state < 0) return state;

@@ -4,7 +4,7 @@
 
 #include "pinwheel.h"
 
-#define PW_SCENE_ABI 5
+#define PW_SCENE_ABI 6
 enum { PW_STAGES_MOST = 16 }; /* most stages of a Runge-Kutta method */
 /* Least pivot of a constraint equation in the elimination of J M^-1 J^T, relative to its diagonal entry there: the
  * squared sine of the angle between its row of J and those eliminated before, in the metric of M^-1.  Its root is
@@ -53,23 +53,28 @@ typedef struct pw_scene_step {
   double *lambda;              /* scratch: multipliers of a stage */
 } pw_scene_step;
 
-/* The watchdog (watchdog.h) in specialised code: limits, beyond which the general engine makes a step, and what it
- * records.  The motion of a step is the largest change of a body's coordinate, in units of the scene; `sine` is that of
- * the smallest angle between a row of J and those before it. */
+/* The watchdog (watchdog.h) in specialised code.  The motion of a step is the largest change of a body's coordinate, in
+ * units of the scene; `sine` is that of the smallest angle between a row of J and those before it.  All members are of
+ * the type double, since specialised code copies them as an array. */
 typedef struct {
-  double lost;              /* largest scaled residual */
-  double sine, moved;       /* the sine when last computed; motion since */
+  /* Set by the run: limits, beyond which the general engine makes a step, and factors. */
+  double lost;              /* limit of scaled residuals */
+  double sine;              /* when last computed */
   double reach;             /* largest change of the sine per unit of motion */
   double near_sine, growth; /* the sine must exceed near_sine even after a next step of `growth` times the motion */
-  /* A residual d may decide which branch is followed where the sine is below min (sqrt (d / drift), regular), if that
-   * exceeds `rank`.  Below no_branch it cannot. */
-  double drift, regular, rank, no_branch;
-  double length;                    /* L [m] */
-  double per_length, per_angle;     /* convert accelerations [m/s^2], [rad/s^2] to units of the scene */
+  /* A residual d may decide which branch is followed where the sine is below min (sqrt (d / drift), regular).  That
+   * matters only if this minimum exceeds rank_lost; residuals d < no_branch need not be tested. */
+  double drift, regular, rank_lost, no_branch;
+  double length;                /* L [m] */
+  double per_length, per_angle; /* convert accelerations [m/s^2], [rad/s^2] to units of the scene */
+  /* Set by the run, then updated by specialised code. */
+  double moved;           /* motion since the sine was computed */
+  double norm, reference; /* accelerations in units of the scene: of the state reached; largest so far */
+  /* Recorded by specialised code. */
   double step;                      /* motion of the last step */
-  double norm, reference;           /* accelerations in units of the scene: of the state reached; largest so far */
   double position, g, velocity, jv; /* largest residuals of the steps, as in pw_scene */
 } pw_scene_watch;
+_Static_assert(sizeof (pw_scene_watch) == 20 * sizeof (double), "the 20 members are of the type double");
 
 /* Consecutive steps of size h of a Runge-Kutta method, with watchdog and ledger.  The arrays belong to the run. */
 typedef struct pw_scene_steps {
@@ -101,8 +106,8 @@ typedef struct pw_specialised {
   unsigned long shape;              /* hash of the system's structure */
   const unsigned char *independent; /* rows: 0 for redundant equations, which have the multiplier 0 */
   int (*prepare) (pw_scene *s);     /* 1: a constant pivot is too small */
-  /* Accelerations and multipliers at a state; configurations c of the bodies, then of the ground, which the caller
-   * sets; entries of J. */
+  /* Stores accelerations and multipliers at a state; configurations of the bodies in c, which end with that of the
+   * ground, set by the caller; entries of J. */
   int (*evaluate) (pw_scene *s, double t, const double *q, const double *v, double *a, double *lambda,
                    pw_configuration *c, double *J);
   /* Projects a state onto the constraints in the metric of M, then evaluates it. */

@@ -163,7 +163,7 @@ static const pw_element_batch *query_signal (const pw_system *s, int signal, int
   return k;
 }
 
-int pw_system_signal_forced (const pw_system *s, int signal) {
+int pw_system_signal_of_force (const pw_system *s, int signal) {
   return s->source[signal].of_force;
 }
 

@@ -15,7 +15,8 @@ enum {
 };
 static const double SYMMETRY_DISTANCE = 0.02, /* of a state from the initial or displaced one, in units of the scene */
     SYMMETRY_ROUND_OFF = 1e-12,               /* of singular values, relative to the largest one */
-    SYMMETRY_PIVOT = 1e-6, SYMMETRY_ZERO = 1e-7, /* rates below these cannot be pivots; count as 0 */
+    SYMMETRY_PIVOT = 1e-6,                    /* least rate that can be a pivot */
+    SYMMETRY_ZERO = 1e-7,                     /* rates below it count as 0 */
     SYMMETRY_SAME = 1e-4; /* of equal states: a double root moves by the root of the residual, 3e-5, with a margin */
 
 void pw_steady_combine (const pw_steady *x, const double *coefficient, double unit, double *rates) {
@@ -26,13 +27,13 @@ void pw_steady_combine (const pw_steady *x, const double *coefficient, double un
 }
 
 void pw_steady_velocities (const pw_steady *x, const double *rates, const double *q, double *v) {
-  int bodies = 3 * x->s->bodies;
-  for (int j = 0; j < bodies; j += 3) {
+  int internal = 3 * x->s->bodies; /* the first internal coordinate */
+  for (int j = 0; j < internal; j += 3) {
     v[j] = x->L * rates[PW_RATE_X] - rates[PW_RATE_TURN] * (q[j + 1] - x->origin[1]);
     v[j + 1] = x->L * rates[PW_RATE_Y] + rates[PW_RATE_TURN] * (q[j] - x->origin[0]);
     v[j + 2] = rates[PW_RATE_TURN] + rates[pw_steady_angle_rate (x->s, j)];
   }
-  for (int j = bodies; j < x->n; j++) v[j] = rates[pw_steady_angle_rate (x->s, j)];
+  for (int j = internal; j < x->n; j++) v[j] = rates[pw_steady_angle_rate (x->s, j)];
 }
 
 /* What displacements of these rates change in the equations at x->q, x->v, in units of the scene. */
@@ -84,19 +85,19 @@ static void symmetry_reduce (int rows, int n, double *row) {
 
 int pw_null_space (int rows, int n, double *M, double tolerance, double *out) {
   double *work = malloc (((size_t)n * (size_t)n + 8 * (size_t)(rows + n)) * sizeof *work), *sigma = work,
-         *V = sigma + n;
-  int left = 0;
+         *VT = sigma + n;
+  int count = 0;
   if (work == NULL) return PW_RESOURCE;
-  if (LAPACKE_dgesvd_work (LAPACK_COL_MAJOR, 'N', 'A', rows, n, M, rows, sigma, NULL, 1, V, n, V + n * n,
+  if (LAPACKE_dgesvd_work (LAPACK_COL_MAJOR, 'N', 'A', rows, n, M, rows, sigma, NULL, 1, VT, n, VT + n * n,
                            8 * (rows + n) - n))
-    left = PW_METHOD;
+    count = PW_METHOD;
   tolerance = fmax (tolerance, SYMMETRY_ROUND_OFF * sigma[0]);
-  while (left >= 0 && left < n && sigma[n - 1 - left] <= tolerance) {
-    for (int j = 0; j < n; j++) out[left * n + j] = V[j * n + n - 1 - left];
-    left++;
+  while (count >= 0 && count < n && sigma[n - 1 - count] <= tolerance) {
+    for (int j = 0; j < n; j++) out[count * n + j] = VT[j * n + n - 1 - count];
+    count++;
   }
   free (work);
-  return left;
+  return count;
 }
 
 void pw_irregular_state (const pw_run *r, double distance, int number, double *q, double *v) {
@@ -159,9 +160,9 @@ static int symmetry_columns (pw_steady *x, int count, const double *displacement
   return finite;
 }
 
-/* Reduces the symmetries so that combinations of them that displace nothing vanish, such as a rotation of the whole
- * about the centre of a pinned disc less one of the disc's angle.  Returns their number, or a status < 0.  x->q is in
- * general position. */
+/* Subtracts from the symmetries the combinations of them that displace nothing, such as a rotation of a pinned disc as
+ * the whole less that of its angle alone.  Returns the number of these combinations, by which the caller reduces
+ * x->symmetries, or a status < 0.  x->q is in general position. */
 static int symmetry_remove_idle (pw_steady *x, int rates) {
   int n = x->n + 3, count = x->symmetries; /* at least as many rows as columns */
   double *F = calloc ((size_t)(n + count + rates) * (size_t)count + 1, sizeof *F);
@@ -295,7 +296,8 @@ static int symmetry_of_whole (const double *symmetry) {
 }
 
 /* The angle by which a state is turned along a symmetry: that of the first body which only this symmetry turns; if
- * there is none, of the line to the last body from the centre, or from the first body if the whole can be translated. */
+ * there is none, of the line to the last body from the centre, or from the first body if the whole can be
+ * translated. */
 static double symmetry_angle (const pw_steady *x, const double *turn, const double *centre, const double *q) {
   int rates = pw_steady_rate_count (x->s), last = 3 * (x->s->bodies - 1);
   for (int b = 0; b < x->s->bodies; b++) {

@@ -240,8 +240,8 @@ static pw_convergence radau_test (pw_run *r, int done, double size, double befor
   return PW_DIVERGED;
 }
 
-/* In index3 corrections of velocities stop shrinking at the round-off of positions over h, and steps follow the errors of
- * velocities, which have a lower order: one more correction makes positions 10 to 100 times more accurate. */
+/* In index3 corrections of velocities stop shrinking at the round-off of positions over h, and steps follow the errors
+ * of velocities, which have a lower order: one more correction makes positions 10 to 100 times more accurate. */
 static int radau_iterate (pw_run *r, double h, double t1) {
   pw_method_data *d = r->data;
   double size = 0, before, round_offs;

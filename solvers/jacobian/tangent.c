@@ -41,18 +41,18 @@ void pw_tangent_close (pw_tangent *x) {
 
 /* Values of all equations from those of the first `count` active ones: `active` itself if these are all, else `all`,
  * whose other entries stay 0. */
-static const double *tangent_expand (const pw_tangent *x, const double *active, int count, double *all) {
+static const double *tangent_expand_into (const pw_tangent *x, const double *active, int count, double *all) {
   if (count == x->run->s->rows) return active;
   for (int i = 0; i < count; i++) all[x->row[i]] = active[i];
   return all;
 }
 
 const double *pw_tangent_expand_lambda (const pw_tangent *x, const double *active) {
-  return tangent_expand (x, active, x->rows, x->lambda);
+  return tangent_expand_into (x, active, x->rows, x->lambda);
 }
 
 const double *pw_tangent_expand_mu (const pw_tangent *x, const double *active, int count) {
-  return count > 0 ? tangent_expand (x, active, count, x->mu) : NULL;
+  return count > 0 ? tangent_expand_into (x, active, count, x->mu) : NULL;
 }
 
 void pw_tangent_expand (const pw_tangent *x, const double *active, double *all) {
@@ -60,8 +60,9 @@ void pw_tangent_expand (const pw_tangent *x, const double *active, double *all) 
 }
 
 void pw_tangent_multiply_JT (const pw_tangent *x, const double *active, int count, double *out) {
-  memset (out, 0, (size_t)x->run->s->coords * sizeof *out);
-  if (count > 0) pw_add_JT (x->run->w, tangent_expand (x, active, count, count == x->rows ? x->lambda : x->mu), out);
+  memset (out, 0, ((size_t)x->run->s->coords + 3) * sizeof *out);
+  if (count > 0)
+    pw_add_JT (x->run->w, tangent_expand_into (x, active, count, count == x->rows ? x->lambda : x->mu), out);
 }
 
 void pw_tangent_compress (const pw_tangent *x, const double *all, int count, double *active) {
@@ -75,9 +76,9 @@ void pw_tangent_add_equations (pw_tangent *x, pw_block block, int row, int col, 
   pw_newton_add_block (&x->newton, x->run->w, &x->scatter, block, &put);
 }
 
-void pw_tangent_add_J (pw_tangent *x, int rows, int row, int col, double holonomic, double nonholonomic) {
+void pw_tangent_add_J (pw_tangent *x, int count, int row, int col, double holonomic, double nonholonomic) {
   pw_newton_add_J (x->run->w, &x->scatter,
-                   &(pw_placement){ row, col, rows, holonomic, nonholonomic, .row_index = x->row_index });
+                   &(pw_placement){ row, col, count, holonomic, nonholonomic, .row_index = x->row_index });
 }
 
 /* (J^T lambda)_q - f_q; -f_v; M; J^T: the derivatives with respect to q, v, a, lambda */

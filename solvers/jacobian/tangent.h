@@ -1,10 +1,11 @@
-/* Derivatives of the equations of motion with the active constraint equations, shared by the Newton matrices of
+/* Derivatives of the equations of motion and of the active constraint equations, shared by the Newton matrices of
  * implicit methods:
  *
  *   momentum        M a + J^T lambda - f
  *   accelerations   J a - gamma + 2 alpha (J v - eta) + beta^2 g   (nonholonomic: + alpha (J v - eta))
  *
- * with Baumgarte's alpha and beta. */
+ * with Baumgarte's alpha and beta; G: the rows of J of the holonomic equations.  Some methods have further multipliers
+ * mu, of the first of the active equations (dae.h). */
 #ifndef PW_TANGENT_H
 #define PW_TANGENT_H
 
@@ -45,8 +46,8 @@ void pw_tangent_compress (const pw_tangent *x, const double *all, int count, dou
  * and `nonholonomic`; w: the vector of the block (J w)_q. */
 void pw_tangent_add_equations (pw_tangent *x, pw_block block, int row, int col, const double *w, double holonomic,
                                double nonholonomic);
-/* Adds J of the first `rows` of all equations in the same way. */
-void pw_tangent_add_J (pw_tangent *x, int rows, int row, int col, double holonomic, double nonholonomic);
+/* Adds in the same way the rows of J of those among the first `count` of all equations that are active. */
+void pw_tangent_add_J (pw_tangent *x, int count, int row, int col, double holonomic, double nonholonomic);
 
 /* Where the parts of the equations are in the matrix, and factors of derivatives. */
 typedef struct {

@@ -138,6 +138,7 @@ static int linear_run (pw_run *r, int most, pw_linear_extent extent, pw_linear *
     status = pw_run_check_derivatives (r, "the linearisation", "needs", error);
   if (status == PW_OK && extent > PW_LINEAR_COUNTS) status = linear_compute (&x, l, error);
   pw_linear_close (&x);
+  if (status != PW_OK) pw_linear_free (l); /* eigenvalues that fail leave A */
   r->statistics = before;
   r->near_singular = near_singular;
   return status == PW_RESOURCE ? pw_fail_memory (r->s, error) : status;

@@ -69,12 +69,12 @@ static int eigen_certain (const pw_linearisation *x, int n, double *B, double *r
   double *perturbed = B + cells, *re2 = perturbed + cells, *im2 = re2 + n, *shift = im2 + n, *work = shift + n;
   double most = 1 / x->r->w->scale.time; /* so that rows of zeros are perturbed, too */
   memcpy (perturbed, B, (size_t)cells * sizeof *B);
+  if (eigen_values (n, B, re, im, x->modes ? x->left_vectors : NULL, work) != PW_OK) return PW_RETRY;
+  if (x->modes) memcpy (x->left_vectors + cells, im, (size_t)n * sizeof *im);
   eigen_perturb (n, most, perturbed);
   if (n) LAPACKE_dgebal_work (LAPACK_COL_MAJOR, 'S', n, perturbed, n, &unused, &also_unused, work);
   for (int i = 0; i < cells; i++) most = fmax (most, fabs (perturbed[i]));
   eigen_perturb (n, most, perturbed);
-  if (eigen_values (n, B, re, im, x->modes ? x->left_vectors : NULL, work) != PW_OK) return PW_RETRY;
-  if (x->modes) memcpy (x->left_vectors + cells, im, (size_t)n * sizeof *im);
   if (eigen_values (n, perturbed, re2, im2, NULL, work) != PW_OK) return PW_RETRY;
   eigen_shift (n, re, im, re2, im2, EIGEN_ROUND_OFF * most, shift);
   eigen_clean (n, re, im, shift);

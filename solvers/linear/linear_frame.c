@@ -51,9 +51,10 @@ static pw_linear_frame linear_frame_at (const pw_linearisation *x, int b, double
 }
 
 /* The frame that rotates with the positions of all bodies: at their mean, with its velocity and the angular velocity
- * that fits theirs best. */
+ * that fits theirs best.  If all are at one point, the one that rotates with its velocity, w = v x a / v^2, if the
+ * motion is steady in it. */
 static pw_linear_frame linear_fit (const pw_linearisation *x) {
-  const double *q = x->r->q, *v = x->r->v;
+  const double *q = x->r->q, *v = x->r->v, *a = x->a;
   int bodies = x->r->s->bodies;
   double moment = 0, square = 0;
   pw_linear_frame f = { .residual = INFINITY };
@@ -64,9 +65,11 @@ static pw_linear_frame linear_fit (const pw_linearisation *x) {
     moment += dx * (v[j + 1] - f.twist[1]) - dy * (v[j] - f.twist[0]);
     square += dx * dx + dy * dy;
   }
-  if (!(square > 0)) return f;
+  const int at_one_point = !(square > 0);
+  if (at_one_point) moment = v[0] * a[1] - v[1] * a[0], square = v[0] * v[0] + v[1] * v[1];
   f.twist[2] = moment / square;
   linear_set_residual (x, &f);
+  if (at_one_point && !(f.residual <= LINEAR_STEADY)) f.residual = INFINITY;
   return f;
 }
 

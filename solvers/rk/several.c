@@ -45,7 +45,7 @@ static pw_scene_watch several_watchdog (const pw_run *r) {
   x.lost = pw_stabilised_by (r, PW_UNSTABILISED) ? limit->lost_unstabilised : limit->lost;
   if (watch->saddle) /* else a tree of holonomic joints, never singular */
     x.sine = watch->checked_sine, x.reach = limit->lipschitz * largest, x.near_sine = limit->near * largest;
-  x.growth = limit->step_growth, x.rank = limit->rank_lost, x.regular = limit->regular * largest;
+  x.growth = limit->step_growth, x.rank_lost = limit->rank_lost, x.regular = limit->regular * largest;
   x.drift = limit->drift_near;
   x.no_branch = 0.5 * limit->drift_near * limit->rank_lost * limit->rank_lost; /* 0.5: a margin for round-off */
   x.length = L, x.per_length = T * T / L, x.per_angle = T * T;

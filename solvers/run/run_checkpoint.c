@@ -1,8 +1,8 @@
 /* Checkpoints: the state of a run as bytes.
  *
- * Data that depend on the history of a run, such as pivot choices and earlier values of a multistep formula, are not
- * saved: the saved run and the loaded one both rebuild them from the state reached, and so continue alike.  A
- * method's `serialise` adds the rest: step size, counts. */
+ * What a method or a factorisation has built up, such as pivot choices and earlier values of a multistep formula, is
+ * not saved: the saved run and the loaded one both rebuild it from the state reached, and so continue alike.  A
+ * method's `serialise` adds what it cannot rebuild: step size, counts. */
 #include <math.h>
 #include "method.h"
 #include "rank.h"
@@ -28,7 +28,7 @@ typedef struct {
   PW_STATISTICS_RESIDUALS (CHECKPOINT_DOUBLE)
 } checkpoint_members;
 _Static_assert(sizeof (checkpoint_members) == sizeof (pw_statistics),
-               "enter each member of pw_statistics in util.h, PW_STATISTICS_..., and its count in docs/manual.md");
+               "enter each member of pw_statistics in util.h, PW_STATISTICS_..., and a count also in docs/manual.md");
 
 static void checkpoint_statistics (pw_statistics *s, pw_archive *a) {
 #define CHECKPOINT_COUNT(name) pw_archive_count (a, &s->name);
@@ -53,14 +53,14 @@ static void checkpoint_state (pw_run *r, pw_archive *a) {
   pw_rank_serialise (r, a);
 }
 
-/* Continues from the state in the run, after saving or loading; `a` is loading, at the method's own data, if any. */
+/* Continues from the run's state, which was just saved or loaded, and loads the method's own data, if any, from a. */
 static int checkpoint_continue (pw_run *r, pw_archive *a, pw_error *error) {
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   r->near_singular = 0;
   if (r->method->serialise == NULL) r->statistics.restarts++;
   int status = pw_run_renew (r, error);
   if (status == PW_OK && r->method->serialise) r->method->serialise (r, a);
-  if (status == PW_OK && a->failed) return pw_fail (error, PW_INPUT, "the saved state is not of this run");
+  if (status == PW_OK && a->failed) return pw_fail (error, PW_INPUT, "the saved state does not belong to this run");
   return status;
 }
 
@@ -84,7 +84,7 @@ int pw_run_load (pw_run *r, pw_archive *a, pw_error *error) {
   if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
   int same_sizes = checkpoint_sizes (r, a);
   if (same_sizes) checkpoint_state (r, a);
-  if (!same_sizes || a->failed) return pw_fail (error, PW_INPUT, "the saved state is not of this run");
+  if (!same_sizes || a->failed) return pw_fail (error, PW_INPUT, "the saved state does not belong to this run");
   if (!isfinite (r->t) || r->t < r->settings.t || !pw_is_finite_state (r, r->q, r->v)) /* not written by a run */
     return pw_fail (
         error, PW_INPUT,

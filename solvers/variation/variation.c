@@ -262,6 +262,11 @@ static double variation_run_time (const pw_variation *x, double t, double t_end)
   return fmin (fmin (t, x->t + x->h) + ahead, t_end);
 }
 
+/* 1 if the time reached is a breakpoint that the derivatives have not passed. */
+static int variation_before_breakpoint (const pw_variation *x) {
+  return x->t == x->r->breakpoint && x->passed < x->t;
+}
+
 int pw_variation_advance (pw_variation *x, double t, double t_end, pw_error *error) {
   if (pw_require (x, "derivatives", error) != PW_OK) return PW_INPUT;
   if (isnan (t)) return pw_fail (error, PW_INPUT, "t = nan: expected a time");
@@ -270,7 +275,7 @@ int pw_variation_advance (pw_variation *x, double t, double t_end, pw_error *err
   while (status == PW_OK && x->t < fmin (t, t_end)) {
     if (x->t == pw_variation_recorded_jump (x))
       status = pw_variation_pass_jump (x, error);
-    else if (x->t == r->breakpoint && x->passed < x->t)
+    else if (variation_before_breakpoint (x))
       status = pw_variation_pass_breakpoint (x, error);
     else {
       status = variation_advance_run (x, variation_run_time (x, t, t_end), t_end, error);
@@ -321,7 +326,10 @@ static int variation_column_sample (pw_variation *x, const pw_direction_copy *d,
 
 int pw_variation_sample (pw_variation *x, int i, pw_sample *derivative, pw_sample *error_of, pw_error *error) {
   if (pw_require (x, "derivatives", error) != PW_OK) return PW_INPUT;
-  int status = variation_column_sample (x, &x->direction[i], 0, derivative);
+  /* the run's samples at a breakpoint are those after it */
+  int status = variation_before_breakpoint (x) ? pw_variation_pass_breakpoint (x, error) : PW_OK;
+  if (status != PW_OK) return pw_run_annotate_error (x->r, status, error);
+  status = variation_column_sample (x, &x->direction[i], 0, derivative);
   if (status == PW_OK && error_of) status = variation_column_sample (x, &x->direction[i], 1, error_of);
   (void)pw_evaluate_J_at (x->r->w, x->at, x->q, x->v);
   return pw_run_annotate_error (x->r, status == PW_OK ? PW_OK : pw_fail_signal (x->t, error), error);

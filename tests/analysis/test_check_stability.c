@@ -19,6 +19,8 @@ TEST (text) {
   stability_shows ("rightmost first       0 +- 1 i 1/s: rigid displacement\n");
   stability_shows (" -2.3344 1/s\n");
   stability_shows ("\nNo problems found\n");
+  cli_good ("pinwheel check peaucellier");
+  stability_shows ("  eigenvalues                        none\n");
   cli_good ("pinwheel check pendulum");
   stability_shows ("not steady: accelerations of 9.81 m/s^2 in the co-moving frame\n");
   stability_shows ("the eigenvalues are not stability exponents\n");
@@ -26,6 +28,14 @@ TEST (text) {
   stability_shows ("\"motion\": \"steady\"");
   check_close ("doubling", cli_number (cli_out, "linearisation", "doubling_time", NULL), log (2) / sqrt (9.81 / 3),
                1e-12, "1e4 eps");
+}
+
+/* An entry of A overflows. */
+TEST (infinite) {
+  cli_write ("stiff.yaml", "pinwheel: 1\nbodies: [{name: b, mass: 1e-10, inertia: 1}]\n"
+                           "elements: [{force: f, body: b, fx: -1e300*b.x}]\n");
+  cli_good ("pinwheel check @/stiff.yaml");
+  stability_shows ("  eigenvalues                        not computed: the linearisation fails, see the findings\n");
 }
 
 /* Initial conditions whose given angle cannot be kept, and others whose omitted values follow. */

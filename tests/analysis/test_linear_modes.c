@@ -274,7 +274,7 @@ TEST (constraint_signal) {
   int pull = pw_system_find_signal (x.s, "pull", &error),
       torque = pw_system_find_signal (x.s, "actuator.value", &error);
   assert_true (pull >= 0 && torque >= 0 && pw_system_signals (x.s) == 2);
-  assert_true (pw_system_signal_forced (x.s, torque) && !pw_system_signal_forced (x.s, pull));
+  assert_true (pw_system_signal_of_force (x.s, torque) && !pw_system_signal_of_force (x.s, pull));
   for (int i = 0; i < x.l.unknowns; i++) assert_true (isnan (x.l.B[2 * i + pull]) && isfinite (x.l.B[2 * i + torque]));
   assert_string_equal (pw_system_signal_unit (x.s, torque), "N m");
   assert_int_equal (pw_system_find_signal (x.s, "actuator.valve", &error), PW_INPUT);

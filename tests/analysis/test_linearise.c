@@ -84,6 +84,8 @@ TEST (npz) {
   cli_good ("grep -a -q \"'shape': (2,), }\" @/block.npz"); /* eigenvalues */
   cli_shell ("! command -v python3 >@/log || python3 -m zipfile -t @/block.npz >@/log");
   assert_null (strstr (cli_file ("log"), "corrupt"));
+  cli_good ("pinwheel linearise pendulum -o @/pendulum"); /* without inputs */
+  cli_good ("grep -a -q \"'shape': (2, 0), }\" @/pendulum.npz");
 }
 
 /* The eigenvalues are those of `check`; a steady motion has them at every time; the inverted pendulum grows. */
@@ -114,6 +116,14 @@ TEST (whirl) {
   cli_good ("pinwheel linearise @/whirl.yaml");
   assert_non_null (strstr (cli_out, "The motion is steady"));
   assert_non_null (strstr (cli_out, "     1             0           4.6637         0.74225"));
+  /* one mass, W^2 = 0.6/s^2, which turns at another rate: (3 W^2 + k/m)^(1/2) */
+  cli_write ("orbit.yaml",
+             "pinwheel: 1\nbodies:\n"
+             "  - {name: a, mass: 1, inertia: 0.1, start: {x: 1}, rate: {vy: sqrt(0.6), omega: 0.3}}\n"
+             "elements:\n  - {spring: S, body: [ground, a], at: [[0, 0], [0, 0]], stiffness: 3, length: 0.8}\n");
+  cli_good ("pinwheel linearise @/orbit.yaml");
+  linearise_shows ("The frame turns at 0.7746 rad/s\nThe motion is steady\n");
+  linearise_shows ("     1             0           2.1909         0.34869");
 }
 
 TEST (bad) {

@@ -283,8 +283,9 @@ TEST (changed_values) {
       cli_run ("pinwheel optimise ezyroller --t-end 0.1 --maximise frame.x --free frame.vx=0:1 --starts 1 "
                "--start frame.vy=0 --start frame.omega=7"),
       0);
-  assert_string_equal (cli_err, "pinwheel: the constraints changed given initial values of this result, at worst "
-                                "frame.omega from 7 to 2 rad/s\n");
+  assert_string_equal (
+      cli_err, "pinwheel: given initial values of this result were changed to satisfy the constraints, at worst "
+               "frame.omega from 7 to 2 rad/s\n");
 }
 
 const check_fixture fixture = { optimise_setup, cli_teardown };

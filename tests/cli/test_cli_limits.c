@@ -77,6 +77,17 @@ TEST (resume) {
   }
 }
 
+/* A resumed run that ends before its first checkpoint names the one from which it began, whatever it saves to. */
+TEST (resume_again) {
+  static const char *const saved[] = { "--checkpoint @/c.ck --checkpoint-every 20", "--resume @/c.ck",
+                                       "--resume @/c.ck --checkpoint @/d.ck" };
+  for (int i = 0; i < 3; i++) {
+    assert_int_equal (
+        cli_run (check_text ("pinwheel run ezyroller -m erk8+projection --t-end 100 --max-steps 120 %s", saved[i])), 4);
+    assert_non_null (strstr (cli_err, "c.ck continues from t = 40.08"));
+  }
+}
+
 TEST (bad) {
   static const cli_wrong wrong[] = {
     { "ezyroller --limit 0", "--limit 0: expected a number > 0" },

@@ -62,6 +62,13 @@ TEST (uses) {
   cli_good ("pinwheel run ezyroller -t 0.01 -o /dev/null --json /dev/null"); /* it takes everything */
 }
 
+/* The value "file" of an element is no table. */
+TEST (named_file) {
+  cli_write ("named.yaml", "pinwheel: 1\nbodies: [{name: bob, mass: 1, inertia: 1}]\n"
+                           "elements: [{pin: file, body: [bob, ground], at: [[0, 0], [0, 0]]}]\n");
+  cli_good ("p=$(realpath ${PINWHEEL:-build/pinwheel}); cd @; \"$p\" run ./named.yaml -t 0.1 -o body");
+}
+
 /* ---- Links ---- */
 
 TEST (links) {

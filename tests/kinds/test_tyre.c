@@ -105,13 +105,19 @@ TEST (limit) {
                "1/C, and the next power of 1/C");
 }
 
-/* ---- Load and friction: both are given, or neither ---- */
+/* ---- Load and friction: both are given, or neither; the square of the speed does not underflow ---- */
 
 TEST (refused) {
   scene_refused (scene_model (&tyre_slide_table, "load", 5.0, NULL),
                  "model scene: tyre T: friction = 0: expected > 0, since a load limits the force to friction x load");
   scene_refused (scene_model (&tyre_slide_table, "friction", 0.4, NULL),
                  "model scene: tyre T: load = 0: expected > 0, since friction limits the force to friction x load");
+  double element[100];
+  pw_error error = { 0 };
+  pw_tyre tyre = { .name = "T", .body = "a", .stiffness = 1, .speed = 1e-170 };
+  assert_true (pw_kind_tyre.element <= sizeof element);
+  assert_int_equal (pw_kind_tyre.prepare (&tyre, NULL, element, NULL, &error), PW_INPUT);
+  assert_string_equal (error.text, "speed = 1e-170: expected >= 1.5e-154, so that its square does not underflow");
 }
 
 /* ---- By all methods: a car and a trailer on tyres, with and without a load, off their axes, oblique ---- */

@@ -58,6 +58,19 @@ TEST (rk4_projection) {
                              "(h omega)^4 / 10 at h = 1e-3; residuals: 10 eps of terms of 6 m" });
 }
 
+/* The longest run of the README's table. */
+TEST (hundred_seconds) {
+  double table[(EZY_LINES + 1) * EZY_COLUMNS];
+  const double *line = table + EZY_LINES * EZY_COLUMNS;
+  assert_int_equal (runs_reference ("tests/reference/ezyroller.txt", EZY_LINES + 1, EZY_COLUMNS, table), EZY_LINES + 1);
+  pw_system *s = scene_system (&scene_ezyroller, NULL);
+  pw_run *r = runs_open (s, "erk8+projection", &(pw_settings){ .rtol = 3e-14, .span = 100 });
+  pw_sample end = runs_to (r, line[0]);
+  ezy_compare (&end, line, 2e-11, "rtol 3e-14, 90 m from the start");
+  pw_run_close (r);
+  pw_system_free (s);
+}
+
 TEST (rk4_identity) {
   ezy_digits ("rk4+projection:metric=identity", &(pw_settings){ .step = 1e-3, .span = 10, .ledger = 1 },
               &(ezy_bounds){ 1e-10, 1e-11, 60 * CHECK_EPS, 60 * CHECK_EPS,

@@ -193,7 +193,7 @@ def test_changed_initial_values_are_reported():
     assert model.run(t_end=0.01).changed == {}
     r = model.run(t_end=0.01, start={"frame.vy": 1})
     assert r.changed["frame.omega"] == (0, pytest.approx(2, rel=1e-12)) and len(r.changed) == 3
-    with pytest.warns(UserWarning, match="model ezyroller: .*changed given initial values: frame.vy from 1 to .*, frame.omega from 0"):
+    with pytest.warns(UserWarning, match="model ezyroller: given initial values were changed to satisfy the constraints: frame.vy from 1 to .*, frame.omega from 0"):
         model.run(t_end=0.01, start={"frame.vy": 1, "frame.omega": 0})
 
 

@@ -222,7 +222,7 @@ TEST (other) {
     error = (pw_error){ 0 };
     r = saved_open (s, 0, "erk8+projection");
     assert_int_equal (pw_run_load (r, &from, &error), PW_INPUT);
-    assert_string_equal (error.text, "the saved state is not of this run");
+    assert_string_equal (error.text, "the saved state does not belong to this run");
     pw_run_close (r);
   }
   pw_archive from = { .at = archive.at, .size = archive.used, .loading = 1 };

@@ -32,7 +32,7 @@ static int linearise_select (pw_linearise_command *cmd, pw_error *error) {
   cmd->output = malloc (((size_t)states + 1) * sizeof *cmd->output);
   if (cmd->input == NULL || cmd->output == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   for (int i = 0; cmd->input_names == NULL && i < signals; i++)
-    if (pw_system_signal_forced (s, i)) cmd->input[cmd->inputs++] = i;
+    if (pw_system_signal_of_force (s, i)) cmd->input[cmd->inputs++] = i;
   for (int i = 0; cmd->output_names == NULL && i < states; i++) cmd->output[cmd->outputs++] = i;
   int status = PW_OK;
   if (cmd->input_names)
@@ -40,7 +40,7 @@ static int linearise_select (pw_linearise_command *cmd, pw_error *error) {
   if (status == PW_OK && cmd->output_names)
     status = linearise_find_all (s, cmd->output_names, cmd->output, &cmd->outputs, pw_system_find_state, error);
   for (int i = 0; i < cmd->inputs && status == PW_OK; i++)
-    if (!pw_system_signal_forced (s, cmd->input[i]))
+    if (!pw_system_signal_of_force (s, cmd->input[i]))
       status =
           pw_fail (error, PW_INPUT, "--input %s is the signal of a constraint; only signals of forces can be inputs",
                    PW_NAME (pw_system_signal_name, s, cmd->input[i]));

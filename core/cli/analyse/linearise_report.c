@@ -259,7 +259,7 @@ int pw_linearise_npz (const pw_linearise_command *cmd, FILE *f, pw_error *error)
     pw_npz_add (&z, b->name, b->rows, b->columns, REAL, value);
   }
   for (int i = 0; i < n; i++) value[2 * i] = l->re[i], value[2 * i + 1] = l->im[i];
-  pw_npz_add (&z, "eigenvalues", n, 0, COMPLEX, value);
+  pw_npz_add (&z, "eigenvalues", n, -1 /* a vector */, COMPLEX, value);
   free (value);
   return pw_npz_end (&z, error);
 }

@@ -156,7 +156,8 @@ static int periodic_command (void *options, pw_error *error) {
   pw_periodic_command *cmd = options;
   int status = pw_cli_open (&cmd->m, &cmd->line, error);
   if (status == PW_OK) status = periodic_read_options (cmd, error);
-  if (status == PW_OK) status = pw_figure_results (&cmd->line, &cmd->m, cmd->folder, "periodic", &cmd->files, error);
+  if (status == PW_OK)
+    status = pw_figure_lock_folder (&cmd->line, &cmd->m, cmd->folder, "periodic", &cmd->files, error);
   if (status == PW_OK) pw_report_model (&cmd->m);
   if (status == PW_OK) status = periodic_compute (cmd, error);
   if (status == PW_OK && cmd->points) pw_periodic_print (cmd);

@@ -312,7 +312,7 @@ static void periodic_variables (const void *context, FILE *f) {
 }
 
 int pw_periodic_write (const pw_periodic_command *cmd, pw_error *error) {
-  int status = pw_figure_tables (cmd->folder, "periodic", 1, cmd, periodic_csv, periodic_json, error);
+  int status = pw_figure_write_tables (cmd->folder, "periodic", 1, cmd, periodic_csv, periodic_json, error);
   if (status != PW_OK) return status;
   return pw_figure_write (&cmd->line, &cmd->m, cmd->folder, "periodic", cmd, periodic_data, periodic_variables, error);
 }

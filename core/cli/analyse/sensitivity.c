@@ -226,7 +226,7 @@ static void sensitivity_variables (const void *context, FILE *f) {
 }
 
 static int sensitivity_write (const sensitivity *cmd, pw_error *error) {
-  int status = pw_figure_tables (cmd->folder, "sensitivity", 5, cmd, sensitivity_csv, sensitivity_json, error);
+  int status = pw_figure_write_tables (cmd->folder, "sensitivity", 5, cmd, sensitivity_csv, sensitivity_json, error);
   if (status != PW_OK || cmd->sens.columns < 2 || cmd->sens.rows < 2) return status;
   return pw_figure_write (&cmd->line, &cmd->m, cmd->folder, "sensitivity", cmd, sensitivity_data, sensitivity_variables,
                           error);
@@ -339,7 +339,8 @@ static int sensitivity_command (void *options, pw_error *error) {
   sensitivity *cmd = options;
   pw_sensitivity *sens = &cmd->sens;
   int status = sensitivity_open (cmd, error);
-  if (status == PW_OK) status = pw_figure_results (&cmd->line, &cmd->m, cmd->folder, "sensitivity", &cmd->files, error);
+  if (status == PW_OK)
+    status = pw_figure_lock_folder (&cmd->line, &cmd->m, cmd->folder, "sensitivity", &cmd->files, error);
   if (status == PW_OK) pw_report_model (&cmd->m), pw_report_initial_state (&cmd->m);
   const double start = pw_seconds (CLOCK_PROCESS_CPUTIME_ID);
   if (status == PW_OK) status = sensitivity_compute (sens, error);

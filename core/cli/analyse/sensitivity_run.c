@@ -138,6 +138,14 @@ static void sensitivity_keep_extremum (pw_sensitivity *sens, int i, int at_next)
     if (sensitivity_jump_slope (sens, p, !at_next) != 0) sens->run_slope[i * sens->unknowns.count + p] = NAN;
 }
 
+/* The same for all extrema in (t0, t1]. */
+static void sensitivity_keep_extrema (pw_sensitivity *sens, double t0, double t1, int at_next) {
+  for (int i = 0; i < sens->outcomes.functionals; i++) {
+    const pw_functional *f = &sens->outcomes.functional[i];
+    if (pw_is_extremum (f->type) && f->t > t0 && f->t <= t1) sensitivity_keep_extremum (sens, i, at_next);
+  }
+}
+
 /* Drops derivatives of extrema that do not exist: those in the step of the run in which accelerations jump at a
  * state, reached at t, if the derivative of the column jumps there; before: derivatives before the jump. */
 static void sensitivity_drop_extrema (pw_sensitivity *sens, double t, const double *before) {
@@ -208,24 +216,25 @@ static int sensitivity_interval (pw_sensitivity *sens, double t0, double t1, pw_
 
 /* Advances from t0 to t, from just before to just after a breakpoint, or a jump at a state, at a time tb that depends
  * on the unknown p.  Where a column jumps from x- to x+, this adds (x- - x+) dtb/dp to the derivative of its
- * integral.  A breakpoint at the end of the run is reached, but not passed. */
+ * integral. */
 static int sensitivity_jump (pw_sensitivity *sens, double t0, double t, int at_state, pw_error *error) {
-  int passed = at_state || t > sens->last_breakpoint;
   const size_t F = (size_t)sens->outcomes.functionals, P = (size_t)sens->unknowns.count;
-  double *slope = sens->before + F; /* before the jump */
+  double *slope = sens->before + F;                                           /* before the jump */
+  const double split = at_state ? t0 : nextafter (sens->last_breakpoint, t0); /* extrema up to it are before the jump */
+  sensitivity_keep_extrema (sens, t0, split, 1);
   memcpy (sens->before, sens->value, F * sizeof *sens->before);
   memcpy (slope, sens->slope, F * P * sizeof *slope);
   int status = pw_sensitivity_at (sens, t, error);
   if (status == PW_OK && at_state) sensitivity_drop_extrema (sens, t, slope);
+  if (status == PW_OK) sensitivity_keep_extrema (sens, split, t, 0);
   for (int i = 0; i < sens->outcomes.functionals && status == PW_OK; i++) {
     const pw_functional *f = &sens->outcomes.functional[i];
     double jump = sens->before[i] - sens->value[i];
-    if (pw_is_extremum (f->type) && f->t > t0 && f->t <= t) sensitivity_keep_extremum (sens, i, !passed);
     if (!pw_is_integral (f->type) || jump == 0) continue;
     if (f->type != PW_INTEGRAL) jump /= sens->unknowns.t_end;
     if (f->type == PW_RMS) jump *= (sens->before[i] + sens->value[i]) / (2 * f->value);
     for (int p = 0; p < sens->unknowns.count; p++)
-      sens->run_slope[i * sens->unknowns.count + p] += jump * sensitivity_jump_slope (sens, p, passed);
+      sens->run_slope[i * sens->unknowns.count + p] += jump * pw_variation_jump_slope (sens->variation, p);
   }
   return status;
 }

@@ -309,7 +309,7 @@ static int steady_command (void *options, pw_error *error) {
   pw_steady_command *cmd = options;
   int status = pw_cli_open (&cmd->m, &cmd->line, error);
   if (status == PW_OK) status = steady_read_options (cmd, error);
-  if (status == PW_OK) status = pw_figure_results (&cmd->line, &cmd->m, cmd->folder, "steady", &cmd->files, error);
+  if (status == PW_OK) status = pw_figure_lock_folder (&cmd->line, &cmd->m, cmd->folder, "steady", &cmd->files, error);
   if (status == PW_OK) pw_report_model (&cmd->m);
   if (status == PW_OK) status = steady_compute (cmd, error);
   if (status == PW_OK && cmd->points) pw_steady_print (cmd);

@@ -285,7 +285,7 @@ static void steady_variables (const void *context, FILE *f) {
 }
 
 int pw_steady_write (const pw_steady_command *cmd, pw_error *error) {
-  int status = pw_figure_tables (cmd->folder, "steady", 1, cmd, steady_csv, steady_json, error);
+  int status = pw_figure_write_tables (cmd->folder, "steady", 1, cmd, steady_csv, steady_json, error);
   if (status != PW_OK || !cmd->vary_text) return status;
   return pw_figure_write (&cmd->line, &cmd->m, cmd->folder, "steady", cmd, steady_data, steady_variables, error);
 }

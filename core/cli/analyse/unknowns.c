@@ -37,7 +37,8 @@ int pw_unknowns_open (pw_unknowns *u, const pw_cli_line *line, const pw_cli_mode
   if (status == PW_OK) status = pw_cli_read_specialise (line->specialise, &u->when, error);
   if (status != PW_OK) return status;
   u->settings.stop = NULL;
-  if (u->settings.rtol == 0) u->settings.rtol = PW_RTOL; /* from which errors are estimated */
+  if (u->settings.rtol == 0)
+    u->settings.rtol = PW_RTOL; /* sensitivity.c estimates errors by runs with a multiple of it */
   u->limit = limit.seconds;
   pw_cli_report_unused (u->method, line);
   return PW_OK;
@@ -172,7 +173,8 @@ void pw_unknowns_report (const pw_unknowns *u, const double *x) {
   if (pw_unknown_run_prepare (&r, u, x, &(pw_error){ 0 }) == PW_OK)
     r.run = pw_run_open (r.m.system, u->method, &r.settings, NULL);
   if (r.run && pw_cli_largest_change (r.run, r.m.system, text) > 0)
-    pw_cli_say ("pinwheel: the constraints changed given initial values of this result, at worst %s\n", text);
+    pw_cli_say ("pinwheel: given initial values of this result were changed to satisfy the constraints, at worst %s\n",
+                text);
   pw_unknown_run_close (&r);
 }
 

@@ -49,7 +49,7 @@ typedef struct {
 #define PW_FIT_MARGIN 1e-3
 
 /* An unknown belongs to a combination that the data do not determine, a singular vector, if its component is larger. */
-#define PW_FIT_COMPONENT 0.1
+#define PW_FIT_COMPONENT 0.01
 
 /* Runs the model with these values of the unknowns; out: columns x rows.  A status; PW_RETRY after Ctrl-C. */
 int pw_fit_run (const pw_fit *fit, const double *unknowns, double *out, pw_error *error);

@@ -50,7 +50,7 @@ static void check_given_values (pw_check *check) {
 /* The model's reference solution must hold initially, up to round-off, unless the user gives initial values. */
 static int check_reference (pw_check *check, pw_error *error) {
   int n = pw_system_coordinates (check->model.system);
-  if (check->line.starts || !pw_system_has_reference (check->model.model)) return PW_OK;
+  if (check->line.starts || !pw_model_has_reference (check->model.model)) return PW_OK;
   double *reference = malloc (2 * (size_t)n * sizeof *reference);
   if (reference == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   int status = pw_system_reference (check->model.model, check->model.system, 0, reference, reference + n, error);

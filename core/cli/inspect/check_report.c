@@ -306,7 +306,7 @@ static void report_linear (pw_json *j, const pw_check *check) {
   report_motion (j, linear);
   /* eigenvalues of rigid displacements are not 0 in a frame that turns */
   if (j == NULL && check->fastest < 0 && linear->twist[2] == 0)
-    report_text (j, "eigenvalues", "all 0: nothing vibrates, grows or decays");
+    report_text (j, "eigenvalues", linear->unknowns ? "all 0: nothing vibrates, grows or decays" : "none");
   else if (j == NULL)
     report_eigenvalues (linear);
   report_stability (j, check);

@@ -8,11 +8,13 @@
  * new_model_yaml. */
 #include "new.inc"
 
+#define NEW_LETTERS "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-"
+
 /* "folder/my_car.c" gives "my_car" and ".c".  PW_INPUT for a name that is too long, that a shell would not read as one
  * word, or a program as an option. */
 static int new_name (const char *path, char *name, size_t size, const char **ending, pw_error *error) {
   const char *slash = strrchr (path, '/'), *base = slash ? slash + 1 : path;
-  size_t length = strspn (base, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-");
+  size_t length = strspn (base, NEW_LETTERS);
   *ending = base + length;
   if (length == 0 || length >= size || base[0] == '-' ||
       (strcmp (*ending, ".c") != 0 && strcmp (*ending, ".yaml") != 0))
@@ -44,7 +46,9 @@ static int new_command (void *options, pw_error *error) {
     remove (path);
     return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", path, strerror (failed));
   }
-  pw_cli_print (stdout, "%s is written; now:  pinwheel run %s%s\n", path, strchr (path, '/') ? "" : "./", path);
+  const char *quote = path[strspn (path, NEW_LETTERS "./")] ? "'" : "";
+  pw_cli_print (stdout, "%s is written; now:  pinwheel run %s%s%s%s\n", path, quote, strchr (path, '/') ? "" : "./",
+                path, quote);
   return PW_OK;
 }
 

@@ -78,7 +78,7 @@ static void show_sizes (const pw_system *s) {
 static void show_reference (const pw_cli_model *m) {
   enum { LISTED = 12 }; /* states, at most */
   int n = pw_system_coordinates (m->system), known = 0;
-  double *x = pw_system_has_reference (m->model) ? malloc (2 * (size_t)n * sizeof *x) : NULL;
+  double *x = pw_model_has_reference (m->model) ? malloc (2 * (size_t)n * sizeof *x) : NULL;
   if (x && pw_system_reference (m->model, m->system, 0, x, x + n, NULL) == PW_OK)
     for (int i = 0; i < 2 * n; i++)
       if (!isnan (x[i]) && ++known <= LISTED)

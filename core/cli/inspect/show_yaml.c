@@ -15,7 +15,8 @@ static int yaml_is_zero (double value) {
   return value == 0 && !signbit (value);
 }
 
-/* Names are made of letters, digits, _ and -; one that begins with - could be read as an entry of a list. */
+/* Names are made of letters, digits, _, - and characters beyond ASCII; one that begins with - could be read as an entry
+ * of a list. */
 static void yaml_name (const char *name) {
   printf (*name == '-' ? "\"%s\"" : "%s", name);
 }
@@ -42,7 +43,7 @@ static void yaml_function (const pw_signal *s) {
   if (text == NULL) putchar (')');
 }
 
-/* The points of a table; with few digits only their number. */
+/* The points of a table; with fewer digits than YAML_DIGITS only their number and their first and last times. */
 static void yaml_points (const pw_signal *s, int digits) {
   const double *t = s->table.t;
   int count = s->table.count;
@@ -120,12 +121,13 @@ static void yaml_triple (const char *key, const char *const name[3], const doubl
   if (written) putchar ('}');
 }
 
-/* A comment on values that are written but not specified by the model: a text model specifies what it contains. */
+/* A comment on values that are written although the model does not specify them: reading the text will specify them. */
 static void yaml_unspecified (const pw_body *b, const char *const name[6]) {
   const char *separator = "  # the model does not specify ";
   for (int i = 0; i < 6; i++) {
     double value = i < 3 ? b->start[i] : b->rate[i - 3];
-    if (yaml_is_zero (value) || (b->specified ? b->specified >> i & 1 : value != 0)) continue;
+    unsigned specified = b->specified ? b->specified >> i & 1 : value != 0; /* so -0 is written, but not specified */
+    if (yaml_is_zero (value) || specified) continue;
     printf ("%s%s", separator, name[i]), separator = ", ";
   }
 }
@@ -177,7 +179,7 @@ static int yaml_check (const pw_model *m, pw_error *error) {
                           f->name, kind, name);
     }
   }
-  if (pw_model_initial (m))
+  if (pw_model_initials (m))
     return pw_fail (error, PW_INPUT,
                     "--yaml: initial values of --start have no place in a text model; give them to run");
   return PW_OK;
@@ -202,7 +204,7 @@ static void yaml_names (const pw_reference_text *ref) {
 }
 
 static void yaml_reference (const pw_model *m) {
-  const pw_reference_text *ref = pw_model_reference (m);
+  const pw_reference_text *ref = pw_model_reference_text (m);
   if (pw_model_table (m)->reference)
     puts ("# The reference solution of the model is a function in C, which cannot be written as text.");
   if (ref->states) puts ("truth:");
@@ -219,7 +221,7 @@ int pw_show_yaml (const pw_cli_model *opened, pw_error *error) {
   const pw_element *e = pw_model_elements (m, &elements);
   if (table->about && *table->about) printf ("about: "), yaml_text (table->about), putchar ('\n');
   yaml_run (&table->run);
-  yaml_names (pw_model_reference (m));
+  yaml_names (pw_model_reference_text (m));
   if (bodies) puts ("bodies:");
   for (int i = 0; i < bodies; i++) yaml_body (&b[i]);
   if (elements) puts ("elements:");

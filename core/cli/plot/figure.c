@@ -36,18 +36,18 @@ int pw_figures_of (pw_figures *f, const pw_cli_line *line, const pw_cli_model *m
 
 /* ---- The folder ---- */
 
-pw_output *pw_figure_open (const char *folder, const char *name, pw_error *error) {
+pw_output *pw_figure_open_file (const char *folder, const char *name, pw_error *error) {
   return pw_output_open (PW_PRINTED (FIGURE_PATH + 40, "%s/%s", folder, name), error);
 }
 
-pw_output *pw_figure_data (const pw_figures *f, const char *name, pw_error *error) {
-  pw_output *o = pw_figure_open (f->folder, name, error);
+pw_output *pw_figure_open_data (const pw_figures *f, const char *name, pw_error *error) {
+  pw_output *o = pw_figure_open_file (f->folder, name, error);
   if (o && *f->incomplete) fprintf (pw_output_stream (o), "# %s\n", f->incomplete + 2);
   return o;
 }
 
-int pw_figure_results (const pw_cli_line *line, const pw_cli_model *model, const char *folder, const char *name,
-                       pw_files *files, pw_error *error) {
+int pw_figure_lock_folder (const pw_cli_line *line, const pw_cli_model *model, const char *folder, const char *name,
+                           pw_files *files, pw_error *error) {
   static const char *const ending[] = { ".csv", ".json", ".dat", ".gp", ".svg", ".png", ".pdf" };
   enum { ENDINGS = sizeof ending / sizeof *ending };
   char text[ENDINGS][40];
@@ -58,12 +58,12 @@ int pw_figure_results (const pw_cli_line *line, const pw_cli_model *model, const
   return pw_files_open (files, line, model, use, 2, error);
 }
 
-int pw_figure_tables (const char *folder, const char *name, int lines, const void *context,
-                      int (*csv) (const void *context, FILE *f, pw_error *error),
-                      void (*json) (const void *context, pw_json *j), pw_error *error) {
+int pw_figure_write_tables (const char *folder, const char *name, int lines, const void *context,
+                            int (*csv) (const void *context, FILE *f, pw_error *error),
+                            void (*json) (const void *context, pw_json *j), pw_error *error) {
   pw_output *file[2] = { NULL };
-  file[0] = pw_figure_open (folder, PW_PRINTED (60, "%s.csv", name), error);
-  if (file[0]) file[1] = pw_figure_open (folder, PW_PRINTED (60, "%s.json", name), error);
+  file[0] = pw_figure_open_file (folder, PW_PRINTED (60, "%s.csv", name), error);
+  if (file[0]) file[1] = pw_figure_open_file (folder, PW_PRINTED (60, "%s.json", name), error);
   int status = file[1] ? csv (context, pw_output_stream (file[0]), error) : PW_RESOURCE;
   if (status == PW_OK) {
     json (context, &(pw_json){ .f = pw_output_stream (file[1]), .lines = lines });
@@ -85,7 +85,7 @@ static const struct {
 };
 
 pw_output *pw_figure_begin (const pw_figures *f, const char *name, pw_error *error) {
-  pw_output *o = pw_figure_open (f->folder, PW_PRINTED (40, "%s.gp", name), error);
+  pw_output *o = pw_figure_open_file (f->folder, PW_PRINTED (40, "%s.gp", name), error);
   if (o == NULL) return NULL;
   FILE *out = pw_output_stream (o);
   fprintf (out,
@@ -137,7 +137,7 @@ int pw_figure_end (pw_output *o, const char *template_name, pw_error *error) {
 extern char **environ;
 
 /* Starts gnuplot in a folder, without input, with its output on standard error, in a locale with all characters of the
- * scripts; the program itself sets no locale.  Returns an errno value. */
+ * scripts; LC_ALL has no effect on this program, which never calls setlocale.  Returns 0 or an errno value. */
 static int gnuplot_start (const char *folder, char *const *argv, pid_t *child) {
   posix_spawn_file_actions_t actions;
   int failed = setenv ("LC_ALL", "C.UTF-8", 1) == 0 ? posix_spawn_file_actions_init (&actions) : ENOMEM;
@@ -167,7 +167,7 @@ int pw_figure_undrawn (const char *folder, const char *const *names, const char 
 int pw_figure_draw (const char *folder, const char *const *names, pw_error *error) {
   char script[FIGURE_SCRIPTS][40], *argv[2 + FIGURE_SCRIPTS + 1] = { "gnuplot", "-d" /* no settings of the user */ };
   pid_t child;
-  int status;
+  int wait_status;
   for (int i = 0; i < FIGURE_SCRIPTS && names[i]; i++) {
     snprintf (script[i], sizeof script[i], "%s.gp", names[i]);
     argv[2 + i] = script[i];
@@ -177,14 +177,14 @@ int pw_figure_draw (const char *folder, const char *const *names, pw_error *erro
   int failed = gnuplot_start (folder, argv, &child);
   if (failed == ENOENT) return pw_figure_undrawn (folder, names, "gnuplot was not found");
   if (failed) return pw_fail (error, PW_RESOURCE, "cannot run gnuplot: %s", strerror (failed));
-  while (waitpid (child, &status, 0) < 0)
+  while (waitpid (child, &wait_status, 0) < 0)
     if (errno != EINTR) return pw_fail (error, PW_RESOURCE, "cannot wait for gnuplot: %s", strerror (errno));
-  if (WIFEXITED (status) && WEXITSTATUS (status) == 0) return PW_OK;
+  if (WIFEXITED (wait_status) && WEXITSTATUS (wait_status) == 0) return PW_OK;
   gnuplot_remove_pictures (folder, names);
-  int ended = WIFSIGNALED (status);
+  int signalled = WIFSIGNALED (wait_status);
   return pw_fail (error, PW_RESOURCE, "gnuplot %s %d; its message is above, data and scripts are in %s",
-                  ended ? "was ended by signal" : "failed with exit status",
-                  ended ? WTERMSIG (status) : WEXITSTATUS (status), folder);
+                  signalled ? "was ended by signal" : "failed with exit status",
+                  signalled ? WTERMSIG (wait_status) : WEXITSTATUS (wait_status), folder);
 }
 
 int pw_figure_write (const pw_cli_line *line, const pw_cli_model *model, const char *folder, const char *name,
@@ -192,7 +192,7 @@ int pw_figure_write (const pw_cli_line *line, const pw_cli_model *model, const c
                      void (*variables) (const void *context, FILE *f), pw_error *error) {
   pw_figures figures;
   if (pw_figures_of (&figures, line, model, folder, error) != PW_OK) return error->status;
-  pw_output *o = pw_figure_data (&figures, PW_PRINTED (40, "%s.dat", name), error);
+  pw_output *o = pw_figure_open_data (&figures, PW_PRINTED (40, "%s.dat", name), error);
   if (o == NULL) return error->status;
   int status = data (context, pw_output_stream (o), error);
   if (status != PW_OK) return pw_output_discard (o), status;

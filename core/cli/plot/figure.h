@@ -32,17 +32,17 @@ int pw_figures_of (pw_figures *f, const pw_cli_line *line, const pw_cli_model *m
                    pw_error *error);
 
 /* Opens a file of a folder; a data file, with a comment if the run is incomplete.  NULL and PW_RESOURCE. */
-pw_output *pw_figure_open (const char *folder, const char *name, pw_error *error);
-pw_output *pw_figure_data (const pw_figures *f, const char *name, pw_error *error);
+pw_output *pw_figure_open_file (const char *folder, const char *name, pw_error *error);
+pw_output *pw_figure_open_data (const pw_figures *f, const char *name, pw_error *error);
 
 /* Locks the folder of the option -o, in which NAME.csv, NAME.json and the figure NAME will be written, for `files`,
  * which the caller closes.  Without a folder (NULL) it only refuses --width.  A status. */
-int pw_figure_results (const pw_cli_line *line, const pw_cli_model *model, const char *folder, const char *name,
-                       pw_files *files, pw_error *error);
+int pw_figure_lock_folder (const pw_cli_line *line, const pw_cli_model *model, const char *folder, const char *name,
+                           pw_files *files, pw_error *error);
 /* Writes NAME.csv and NAME.json, with this value of pw_json.lines, into the folder.  A status. */
-int pw_figure_tables (const char *folder, const char *name, int lines, const void *context,
-                      int (*csv) (const void *context, FILE *f, pw_error *error),
-                      void (*json) (const void *context, pw_json *j), pw_error *error);
+int pw_figure_write_tables (const char *folder, const char *name, int lines, const void *context,
+                            int (*csv) (const void *context, FILE *f, pw_error *error),
+                            void (*json) (const void *context, pw_json *j), pw_error *error);
 
 /* Opens the script NAME.gp; write the variables of its template to it, then end it.  NULL and PW_RESOURCE if it cannot
  * be written. */

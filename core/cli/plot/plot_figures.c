@@ -44,7 +44,7 @@ static int data_closeup (const pw_plots *plots) {
 
 /* One block per curve: time, the numbers of the body or wheel, its number among all of them, from 1. */
 static int data_tracks (const pw_plots *plots, const pw_tracks *tracks, pw_error *error) {
-  pw_output *o = tracks->curves ? pw_figure_data (&plots->figures, tracks->file, error) : NULL;
+  pw_output *o = tracks->curves ? pw_figure_open_data (&plots->figures, tracks->file, error) : NULL;
   if (o == NULL) return tracks->curves ? PW_RESOURCE : PW_OK;
   FILE *out = pw_output_stream (o);
   for (int c = 0; c < tracks->curves; c++) {
@@ -62,7 +62,7 @@ static int data_tracks (const pw_plots *plots, const pw_tracks *tracks, pw_error
 /* A file of `rows` rows of `width` numbers, of which the first `count` are written; no file without rows. */
 static int data_table (const pw_plots *plots, const char *name, const char *heading, const double *row, int width,
                        int count, int rows, pw_error *error) {
-  pw_output *o = rows ? pw_figure_data (&plots->figures, name, error) : NULL;
+  pw_output *o = rows ? pw_figure_open_data (&plots->figures, name, error) : NULL;
   if (o == NULL) return rows ? PW_RESOURCE : PW_OK;
   fprintf (pw_output_stream (o), "# %s\n", heading);
   for (int i = 0; i < rows; i++, row += width) data_row (pw_output_stream (o), row, count, "\n");
@@ -171,7 +171,7 @@ static int data_mechanism (const pw_plots *plots, const char *name, int n, pw_er
     { "bodies", data_bodies }, { "wheels", data_wheels }, { "point masses", data_centres }, { "rods", data_rods }
   };
   static const char first[] = "nan nan nan nan\n\n";
-  pw_output *o = pw_figure_data (&plots->figures, name, error);
+  pw_output *o = pw_figure_open_data (&plots->figures, name, error);
   if (o == NULL) return PW_RESOURCE;
   FILE *f = pw_output_stream (o);
   int stride = data_stride (plots, n);

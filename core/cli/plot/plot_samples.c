@@ -77,7 +77,7 @@ static void plot_choose (pw_plots *plots) {
 /* Locks the folder; an error before the run if it cannot be written. */
 static int plot_try_folder (pw_plots *plots, pw_error *error) {
   if (pw_folder_open (&plots->folder, plots->figures.folder, error) != PW_OK) return error->status;
-  pw_output *probe = pw_figure_data (&plots->figures, "motion.dat", error);
+  pw_output *probe = pw_figure_open_data (&plots->figures, "motion.dat", error);
   if (probe) pw_output_discard (probe);
   return probe ? PW_OK : error->status;
 }

@@ -1,7 +1,8 @@
 /* Checkpoints of `pinwheel run`: their contents, when they are due, and how a run continues from one.
  *
- * A checkpoint is saved after the step that reaches a multiple of the interval, when the step's rows are written.  The
- * table is written to the disk first, so that a resumed run finds at least the rows that the checkpoint counts. */
+ * A checkpoint is saved after the step that reaches a multiple of the interval, once that step's rows have been
+ * written.  The table is flushed to the disk first, so that a resumed run finds at least the rows that the checkpoint
+ * counts. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -145,10 +146,11 @@ int pw_checkpoints_resume (pw_run_cli *command, pw_error *error) {
     if (pw_run_load (command->run, &checkpoints->resumed.state, error) != PW_OK) return error->status;
     if (!checkpoints_plausible (command))
       return pw_fail (error, PW_INPUT,
-                      "the checkpoint %s is not that of a run: time, number of rows or processor time "
-                      "are impossible",
+                      "the checkpoint %s is not that of a run: its time, number of rows or processor time "
+                      "is impossible",
                       checkpoints->resume_path);
     command->loaded = 1;
+    checkpoints->last_path = checkpoints->resume_path, checkpoints->last_time = pw_run_time (command->run);
     pw_cli_say ("pinwheel: resumed at t = %s s\n", PW_DIGITS (pw_run_time (command->run), 6));
   }
   checkpoints_schedule (checkpoints, pw_run_time (command->run));
@@ -165,7 +167,7 @@ int pw_checkpoints_save (pw_run_cli *command, pw_error *error) {
   pw_archive_clear (&checkpoints->state);
   if (table) pw_archive_bytes (&checkpoints->state, &mark, sizeof mark);
   checkpoints_serialise (command, &checkpoints->state);
-  int status = pw_run_save (command->run, &checkpoints->state, error); /* reopens the method of this run, too */
+  int status = pw_run_save (command->run, &checkpoints->state, error); /* reopens the method, as resuming does */
   if (status > 0) return PW_OK; /* near a singular configuration: still due, so the next batch tries again */
   if (status != PW_OK) return status;
   checkpoints_schedule (checkpoints, t);
@@ -173,6 +175,6 @@ int pw_checkpoints_save (pw_run_cli *command, pw_error *error) {
   pw_output *output = pw_output_open_as (checkpoints->path, ".next", error);
   status =
       output ? pw_checkpoint_put (output, checkpoints->fingerprint.chars, &checkpoints->state, error) : error->status;
-  if (status == PW_OK) checkpoints->saved_time = t;
+  if (status == PW_OK) checkpoints->last_path = checkpoints->path, checkpoints->last_time = t;
   return status;
 }

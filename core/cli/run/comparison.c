@@ -5,7 +5,7 @@
 int pw_comparison_open (pw_comparison *comparison, const pw_cli_model *compiled, const char *path, int started,
                         double t_end, pw_error *error) {
   *comparison = (pw_comparison){ .errors = { .source = path ? path : "the model" } };
-  if (path == NULL && !pw_system_has_reference (compiled->model)) return PW_OK;
+  if (path == NULL && !pw_model_has_reference (compiled->model)) return PW_OK;
   if (path == NULL && started) {
     pw_cli_say (
         "pinwheel: the model's reference solution holds for its own initial values: with --start errors are not "
@@ -25,9 +25,9 @@ void pw_comparison_close (pw_comparison *comparison) {
 void pw_comparison_serialise (pw_comparison *comparison, pw_archive *archive) {
   pw_motion *motion = &comparison->motion;
   int taken = motion->taken;
-  if (motion->samples == 0) return;
+  if (motion->times == 0) return;
   pw_archive_bytes (archive, &taken, sizeof taken);
-  if (taken < 0 || taken > motion->samples) archive->failed = 1;
+  if (taken < 0 || taken > motion->times) archive->failed = 1;
   if (archive->failed) return;
   motion->taken = taken;
   pw_archive_bytes (archive, motion->value, (size_t)taken * (size_t)motion->width * sizeof *motion->value);
@@ -38,7 +38,6 @@ const pw_reference_error *pw_comparison_errors (pw_comparison *comparison, const
   pw_motion *motion = &comparison->motion;
   pw_reference_error *errors = &comparison->errors;
   if (motion->taken == 0) return NULL;
-  motion->samples = comparison->reference.samples = motion->taken; /* the run may have ended early */
   pw_motion_errors (system, &comparison->reference, motion, error);
   errors->samples = motion->taken;
   errors->t = motion->t[motion->taken - 1];

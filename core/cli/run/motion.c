@@ -4,28 +4,28 @@
 #include <string.h>
 #include "motion.h"
 
-int pw_motion_open (pw_motion *motion, const pw_system *system, int samples, double t_end, pw_error *error) {
+int pw_motion_open (pw_motion *motion, const pw_system *system, int times, double t_end, pw_error *error) {
   int width = 2 * pw_system_coordinates (system) + pw_system_rows (system);
-  *motion = (pw_motion){ .t = calloc ((size_t)samples * (size_t)(1 + width), sizeof *motion->t) };
+  *motion = (pw_motion){ .t = calloc ((size_t)times * (size_t)(1 + width), sizeof *motion->t) };
   if (motion->t == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  motion->samples = samples, motion->width = width, motion->value = motion->t + samples;
-  for (int k = 0; k < samples; k++) motion->t[k] = k + 1 < samples ? t_end * (k + 1) / samples : t_end;
+  motion->times = times, motion->width = width, motion->value = motion->t + times;
+  for (int k = 0; k < times; k++) motion->t[k] = k + 1 < times ? t_end * (k + 1) / times : t_end;
   return PW_OK;
 }
 
-int pw_motion_open_at (pw_motion *motion, const pw_system *system, const pw_motion *times, pw_error *error) {
-  int status = pw_motion_open (motion, system, times->samples, 0, error);
-  if (status == PW_OK) memcpy (motion->t, times->t, (size_t)motion->samples * sizeof *motion->t);
+int pw_motion_open_at (pw_motion *motion, const pw_system *system, const pw_motion *other, pw_error *error) {
+  int status = pw_motion_open (motion, system, other->times, 0, error);
+  if (status == PW_OK) memcpy (motion->t, other->t, (size_t)motion->times * sizeof *motion->t);
   return status;
 }
 
 void pw_motion_close (pw_motion *motion) {
   free (motion->t);
-  *motion = (pw_motion){ .samples = 0 };
+  *motion = (pw_motion){ .times = 0 };
 }
 
 double pw_motion_next_time (const pw_motion *motion) {
-  return motion->taken < motion->samples ? motion->t[motion->taken] : INFINITY;
+  return motion->taken < motion->times ? motion->t[motion->taken] : INFINITY;
 }
 
 void pw_motion_add (pw_motion *motion, const pw_system *system, const pw_sample *sample) {
@@ -42,13 +42,13 @@ int pw_motion_unit (const pw_system *system, int state) {
   return (is_velocity ? MOTION_SPEED : MOTION_LENGTH) + angle;
 }
 
-/* The largest |multiplier| of the constraint equations whose reaction has the same unit as that of this row, since
- * forces and moments cannot be compared with each other; 1 N or N m if all are zero or unknown. */
-static double motion_largest_multiplier (const pw_system *system, const pw_motion *reference, int row) {
+/* The largest |multiplier|, in the first samples, of the constraint equations whose reaction has the same unit as that
+ * of this row, since forces and moments cannot be compared with each other; 1 N or N m if all are zero or unknown. */
+static double motion_largest_multiplier (const pw_system *system, const pw_motion *reference, int samples, int row) {
   double largest = 0;
   for (int j = 0; j < pw_system_rows (system); j++)
     if (strcmp (pw_system_reaction_unit (system, row), pw_system_reaction_unit (system, j)) == 0)
-      for (int k = 0; k < reference->samples; k++)
+      for (int k = 0; k < samples; k++)
         largest = fmax (largest, fabs (pw_motion_at (reference, k)[2 * pw_system_coordinates (system) + j]));
   return largest > 0 ? largest : 1;
 }
@@ -61,7 +61,7 @@ static void motion_include (double *error, int *compared, double difference) {
 
 void pw_motion_errors (const pw_system *system, const pw_motion *reference, const pw_motion *motion,
                        double error[MOTION_ERRORS]) {
-  int states = 2 * pw_system_coordinates (system), last = motion->samples - 1;
+  int states = 2 * pw_system_coordinates (system), last = motion->taken - 1;
   int compared[MOTION_ERRORS] = { 0 }, jumps[MOTION_SAMPLES];
   const char *unit = NULL; /* of the multiplier before: neighbours mostly have the same */
   double scale = 1;
@@ -72,7 +72,7 @@ void pw_motion_errors (const pw_system *system, const pw_motion *reference, cons
     int largest = is_state ? MOTION_LARGEST + state_unit : MOTION_MULTIPLIERS;
     if (!is_state && (unit == NULL || strcmp (unit, pw_system_reaction_unit (system, j - states)) != 0)) {
       unit = pw_system_reaction_unit (system, j - states);
-      scale = motion_largest_multiplier (system, reference, j - states);
+      scale = motion_largest_multiplier (system, reference, motion->taken, j - states);
     }
     for (int k = 0; k <= last; k++) {
       double expected = pw_motion_at (reference, k)[j];

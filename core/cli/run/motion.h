@@ -9,17 +9,18 @@ enum { MOTION_SAMPLES = 100 }; /* of a motion, at most */
 /* Units of states: m, rad, m/s, rad/s. */
 enum { MOTION_LENGTH, MOTION_ANGLE, MOTION_SPEED, MOTION_RATE, MOTION_UNITS };
 
-/* Indices of the errors of a motion, NaN if not known.  MOTION_END + unit: the largest of the states of a unit at the
- * end; MOTION_LARGEST + unit: the same over all samples.  MOTION_MULTIPLIERS: the largest of the multipliers over all
- * samples, relative to the largest multiplier of the same unit, except at times at which a signal makes them jump. */
+/* Indices of the errors of a motion, NaN if not known.  MOTION_END + unit: the largest error of any state of that unit
+ * at the last sample; MOTION_LARGEST + unit: over all samples.  MOTION_MULTIPLIERS: the largest error of any
+ * multiplier, over all samples but those at whose times a signal makes multipliers jump, relative to the largest
+ * multiplier of the same unit in the same samples of the reference, jumps included. */
 enum { MOTION_END, MOTION_LARGEST = MOTION_UNITS, MOTION_MULTIPLIERS = 2 * MOTION_UNITS, MOTION_ERRORS };
 
 typedef struct {
-  int samples;   /* number of times */
+  int times;     /* of samples */
   int width;     /* numbers of a sample: coordinates, velocities, multipliers */
-  int taken;     /* samples stored so far */
-  double *t;     /* [s], samples; owns the memory of `value` */
-  double *value; /* samples x width; NaN: not known */
+  int taken;     /* samples stored so far, at the first of the times */
+  double *t;     /* [s], times; owns the memory of `value` */
+  double *value; /* times x width; NaN: not known */
 } pw_motion;
 
 /* The numbers of sample k. */
@@ -27,41 +28,41 @@ static inline double *pw_motion_at (const pw_motion *motion, int k) {
   return motion->value + (size_t)k * (size_t)motion->width;
 }
 
-/* Opens a motion of 1 to MOTION_SAMPLES samples at the times t_end / samples, ..., t_end.  Errors: PW_RESOURCE. */
-int pw_motion_open (pw_motion *motion, const pw_system *system, int samples, double t_end, pw_error *error);
+/* Opens a motion of 1 to MOTION_SAMPLES times, t_end / times, ..., t_end, without samples.  Errors: PW_RESOURCE. */
+int pw_motion_open (pw_motion *motion, const pw_system *system, int times, double t_end, pw_error *error);
 /* The same at the times of another motion. */
-int pw_motion_open_at (pw_motion *motion, const pw_system *system, const pw_motion *times, pw_error *error);
+int pw_motion_open_at (pw_motion *motion, const pw_system *system, const pw_motion *other, pw_error *error);
 void pw_motion_close (pw_motion *motion);
 /* The time of the next sample; INFINITY if there is none. */
 double pw_motion_next_time (const pw_motion *motion);
 /* Stores the next sample. */
 void pw_motion_add (pw_motion *motion, const pw_system *system, const pw_sample *sample);
-/* The errors of a motion relative to a reference at the same times. */
+/* The errors of the samples taken of a motion, relative to those of a reference at the same times. */
 void pw_motion_errors (const pw_system *system, const pw_motion *reference, const pw_motion *motion,
                        double error[MOTION_ERRORS]);
 /* The unit of a state: MOTION_LENGTH to MOTION_RATE. */
 int pw_motion_unit (const pw_system *system, int state);
 
-/* Opens a reference in *motion, zero-initialised, to be closed in every case.  If `path` is NULL, it is the model's own
- * reference solution up to *t_end; else the table at `path`, with columns as `pinwheel run -o` writes them: at most
- * MOTION_SAMPLES of its rows after t = 0 and up to *t_end, which if 0 becomes the time of the last row.  Errors:
- * PW_INPUT with the line, PW_RESOURCE. */
+/* Opens a reference with all of its samples in *motion, zero-initialised, to be closed in every case.  If `path` is
+ * NULL, it is the model's own reference solution up to *t_end; else the table at `path`, with columns as `pinwheel run
+ * -o` writes them: at most MOTION_SAMPLES of its rows after t = 0 and up to *t_end; if *t_end is 0, it becomes the time
+ * of the last row.  Errors: PW_INPUT with the line, PW_RESOURCE. */
 int pw_motion_open_reference (pw_motion *motion, const pw_cli_model *compiled, const char *path, double *t_end,
                               pw_error *error);
 
 /* ---- A run compared with a reference ---- */
 
 typedef struct {
-  pw_motion reference, motion; /* at the same times; `motion` is that of the run; without a reference, no samples */
+  pw_motion reference, motion; /* at the same times; `motion` is that of the run; without a reference, no times */
   pw_reference_error errors;
 } pw_comparison;
 
 /* Opens the reference of a run up to t_end: the table at `path` or, if that is NULL, the model's reference solution
- * unless the run has other initial values (`started`).  Close it in every case.  Errors: PW_INPUT, PW_RESOURCE. */
+ * unless --start changes the initial values (`started`).  Close it in every case.  Errors: PW_INPUT, PW_RESOURCE. */
 int pw_comparison_open (pw_comparison *comparison, const pw_cli_model *compiled, const char *path, int started,
                         double t_end, pw_error *error);
 void pw_comparison_close (pw_comparison *comparison);
-/* Saves or loads the samples of a checkpoint. */
+/* Saves the samples taken in a checkpoint, or loads them from one. */
 void pw_comparison_serialise (pw_comparison *comparison, pw_archive *a);
 /* The errors of the samples taken, after the run; NULL if there are none. */
 const pw_reference_error *pw_comparison_errors (pw_comparison *comparison, const pw_system *system);

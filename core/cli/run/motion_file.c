@@ -186,18 +186,20 @@ static int file_read_sample (file_reader *reader, char *rest, double *sample, in
                   reader->line_number);
 }
 
-/* Selects as many of the rows as there are samples, evenly spaced and including the last one; times within round-off of
- * the end are set to it. */
+/* Selects as many of the rows as the motion has times, evenly spaced and including the last one; times within round-off
+ * of the end are set to it. */
 static int file_read_samples (file_reader *reader, int rows, double t_end, pw_motion *motion, pw_error *error) {
   char *rest;
   double t;
-  for (int row = 0, k = 0; k < motion->samples;) {
+  for (int row = 0; motion->taken < motion->times;) {
+    int k = motion->taken;
     int status = file_read_time (reader, &rest, &t, error);
     if (status != PW_OK) return status;
-    if (t <= 0 || ++row < (int)((long long)rows * (k + 1) / motion->samples)) continue;
+    if (t <= 0 || ++row < (int)((long long)rows * (k + 1) / motion->times)) continue;
     motion->t[k] = fabs (t - t_end) <= FILE_SAME * t_end ? t_end : t;
-    status = file_read_sample (reader, rest, pw_motion_at (motion, k++), motion->width, error);
+    status = file_read_sample (reader, rest, pw_motion_at (motion, k), motion->width, error);
     if (status != PW_OK) return status;
+    motion->taken++;
   }
   return reader->known ? PW_OK : pw_fail (error, PW_INPUT, "--reference %s: every value is nan", reader->path);
 }
@@ -221,10 +223,10 @@ static int file_read (file_reader *reader, pw_motion *motion, const pw_system *s
 static int motion_of_model (pw_motion *motion, const pw_cli_model *compiled, double t_end, pw_error *error) {
   const pw_system *system = compiled->system;
   int n = pw_system_coordinates (system), status = pw_motion_open (motion, system, MOTION_SAMPLES, t_end, error);
-  for (int k = 0; k < motion->samples && status == PW_OK; k++) {
-    double *state = pw_motion_at (motion, k);
+  for (; motion->taken < motion->times && status == PW_OK; motion->taken++) {
+    double *state = pw_motion_at (motion, motion->taken);
     for (int j = 2 * n; j < motion->width; j++) state[j] = NAN;
-    status = pw_system_reference (compiled->model, system, motion->t[k], state, state + n, error);
+    status = pw_system_reference (compiled->model, system, motion->t[motion->taken], state, state + n, error);
   }
   return status;
 }

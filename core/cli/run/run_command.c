@@ -322,9 +322,9 @@ static int run_finish (pw_run_cli *command, pw_error *error) {
   error->status = PW_OK;
   for (int i = 0; i < PW_RUN_OUTPUTS; i++)
     if (*command->kept_path[i]) pw_cli_say ("pinwheel: %s is kept in %s\n", output_name[i], command->kept_path[i]);
-  if (command->checkpoints.saved_time > 0 && (interrupted || command->limited || status == -PW_RESOURCE))
-    pw_cli_say ("pinwheel: --resume %s continues from t = %s s\n", command->checkpoints.path,
-                PW_DIGITS (command->checkpoints.saved_time, 6));
+  if (command->checkpoints.last_path && (interrupted || command->limited || status == -PW_RESOURCE))
+    pw_cli_say ("pinwheel: --resume %s continues from t = %s s\n", command->checkpoints.last_path,
+                PW_DIGITS (command->checkpoints.last_time, 6));
   return interrupted && status == 0 ? PW_INTERRUPTED : status;
 }
 

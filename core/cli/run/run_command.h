@@ -12,7 +12,8 @@ typedef struct {
   /* as understood */
   double interval;       /* simulated time between two checkpoints [s]; 0: there are none */
   double next_time;      /* of the next checkpoint [s]; INFINITY: never */
-  double saved_time;     /* of the last one that was saved [s]; 0: none */
+  const char *last_path; /* of the last one, resumed or saved; NULL: none */
+  double last_time;      /* its time [s] */
   pw_text fingerprint;   /* of this run: the head of its checkpoints */
   pw_archive state;      /* of the next checkpoint */
   pw_checkpoint resumed; /* the checkpoint from which the run continues */

@@ -101,7 +101,7 @@ static void conclusion_print_heading (const pw_conclusion *conclusion) {
     printf ("%s%d", k == 0 ? "" : k + 1 < CONCLUSION_COLUMNS ? ", " : " and ", conclusion_required[k].digits);
   printf (" correct digits, relative to the cheapest method.\n"
           "Digits: the largest error of a coordinate at %d times up to %s s, relative to\n",
-          reference->motion.samples, PW_DIGITS (conclusion->study->t_end, 6));
+          reference->motion.taken, PW_DIGITS (conclusion->study->t_end, 6));
   for (int i = MOTION_LENGTH; i <= MOTION_ANGLE; i++)
     if (reference->uncertainty[MOTION_LARGEST + i] > 0) {
       printf ("%s%s %s (%s)", between, PW_DIGITS (conclusion_scale (reference, i), 3), unit[i], name[i]);

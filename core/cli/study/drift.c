@@ -236,7 +236,7 @@ static int drift_begin (pw_study *study, pw_error *error) {
 
 /* DIR/drift-time.csv: the largest values in each part of the runs of methods. */
 static int drift_write_times (const pw_study *study, pw_error *error) {
-  pw_output *output = pw_figure_open (study->folder, "drift-time.csv", error);
+  pw_output *output = pw_figure_open_file (study->folder, "drift-time.csv", error);
   if (output == NULL) return error->status;
   pw_text line = { .chars = NULL };
   pw_text_cell (&line, "method,t [s],position,velocity,balance [J]");

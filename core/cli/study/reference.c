@@ -43,7 +43,7 @@ int pw_motion_run (pw_study *study, pw_row *row, pw_motion *motion, pw_error *er
 static int reference_sizes (const pw_system *system, const pw_motion *motion, double size[MOTION_UNITS]) {
   int states = 2 * pw_system_coordinates (system), has_multipliers = 0;
   for (int i = 0; i < MOTION_UNITS; i++) size[i] = 0;
-  for (int k = 0; k < motion->samples; k++)
+  for (int k = 0; k < motion->taken; k++)
     for (int j = 0; j < motion->width; j++) {
       double value = fabs (pw_motion_at (motion, k)[j]);
       if (j >= states)
@@ -153,7 +153,7 @@ static void reference_choose (pw_reference *reference, const pw_system *system, 
   for (int i = 0; i < REFERENCE_CANDIDATES; i++)
     if (i != best && i != second && list[i].finished) reference_add_partner (reference, system, &list[best], &list[i]);
   reference->motion = list[best].motion;
-  list[best].motion = (pw_motion){ .samples = 0 };
+  list[best].motion = (pw_motion){ .times = 0 };
   reference_raise_uncertainty (system, reference);
 }
 
@@ -178,11 +178,11 @@ int pw_reference_find (pw_reference *reference, pw_study *study, double step, pw
   const char *path = study->reference_path;
   double t_end = path && study->line.t_end == NULL ? 0 : study->t_end; /* 0: that of the table */
   /* the model's solution holds only for its own initial values */
-  if (path == NULL && (study->line.starts || !pw_system_has_reference (study->compiled.model)))
+  if (path == NULL && (study->line.starts || !pw_model_has_reference (study->compiled.model)))
     return reference_compute (reference, study, step, error);
   int status = pw_motion_open_reference (&reference->motion, &study->compiled, path, &t_end, error);
   if (status != PW_OK) return status;
-  double last = reference->motion.t[reference->motion.samples - 1];
+  double last = reference->motion.t[reference->motion.times - 1];
   if (last < t_end)
     return pw_fail (error, PW_INPUT,
                     "--reference %s: no row at the final time, t = %s s; the last one before it is at %s s", path,
@@ -215,7 +215,7 @@ void pw_reference_print (const pw_reference *reference, int partners) {
 
 int pw_reference_write (const pw_reference *reference, const char *folder, const pw_study_column *error_columns,
                         pw_error *error) {
-  pw_output *output = pw_figure_open (folder, "truth.csv", error);
+  pw_output *output = pw_figure_open_file (folder, "truth.csv", error);
   if (output == NULL) return error->status;
   FILE *f = pw_output_stream (output);
   pw_text line = { .chars = NULL };

@@ -18,7 +18,7 @@ const char *pw_study_status (const pw_row *row) {
 int pw_study_open_table (pw_study *study, pw_error *error) {
   const pw_study_column *column = study->type->column;
   pw_text line = { .chars = NULL };
-  study->csv = pw_figure_open (study->folder, study->type->table_names[0], error);
+  study->csv = pw_figure_open_file (study->folder, study->type->table_names[0], error);
   if (study->csv == NULL) return error->status;
   for (int i = 0; i < study->type->columns; i++)
     if (column[i].name) pw_text_name (&line, column[i].name, column[i].unit);
@@ -116,7 +116,7 @@ int pw_study_positive (const pw_study *study, int group, int coordinate) {
 
 int pw_study_write_data (const pw_study *study, int group, const char *name, const char *heading, int count,
                          pw_error *error) {
-  pw_output *output = pw_figure_open (study->folder, PW_PRINTED (40, "%s.dat", name), error);
+  pw_output *output = pw_figure_open_file (study->folder, PW_PRINTED (40, "%s.dat", name), error);
   if (output == NULL) return PW_RESOURCE;
   FILE *f = pw_output_stream (output);
   const pw_row *row = study->row;

@@ -357,8 +357,9 @@ int pw_sweep_rows (const pw_plan *plan, pw_journal *journal, int jobs, pw_error 
   pw_progress_end (&sweep.progress);
   pw_stop_release (); /* the rest can be interrupted and repeated */
   if (error->status == PW_OK && sweep.changed_runs)
-    pw_cli_say ("pinwheel: in %ld of %ld runs the constraints changed given initial values, at worst %s\n",
-                sweep.changed_runs, sweep.opened_runs, sweep.largest_change_text);
+    pw_cli_say (
+        "pinwheel: in %ld of %ld runs given initial values were changed to satisfy the constraints, at worst %s\n",
+        sweep.changed_runs, sweep.opened_runs, sweep.largest_change_text);
   rows_close (&sweep);
   return error->status;
 }

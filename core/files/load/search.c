@@ -3,11 +3,12 @@
  * Folders next to the program, or one level up (tests), serve the build tree; ../lib and ../include serve an
  * installation; the folder of the library serves programs installed elsewhere.  The order of the folders decides only
  * about headers and pages, of which the first is taken: a name that two models have is refused (model_file.c). */
-#define _GNU_SOURCE /* dladdr */
+#define _GNU_SOURCE /* dladdr1 */
 #include <dirent.h>
 #include <dlfcn.h>
 #include <errno.h>
 #include <limits.h>
+#include <link.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -23,17 +24,19 @@ static int search_no_memory (pw_error *error) {
 }
 
 /* What folders are relative to: the folder of the running program, that of this library. */
-typedef enum { SEARCH_PROGRAM, SEARCH_LIBRARY, SEARCH_ANCHORS } search_anchor;
+enum { SEARCH_PROGRAM, SEARCH_LIBRARY, SEARCH_ANCHORS };
 
-typedef char search_anchors[SEARCH_ANCHORS][PW_PATH];
+typedef char search_anchor_paths[SEARCH_ANCHORS][PW_PATH];
 
 /* Stores these folders; "" if one is unknown. */
-static int search_find_anchors (search_anchors anchor, pw_error *error) {
+static int search_find_anchors (search_anchor_paths anchor, pw_error *error) {
   static const char here = 0; /* an address inside this library */
   Dl_info info;
+  struct link_map *object = NULL;
   ssize_t n = readlink ("/proc/self/exe", anchor[SEARCH_PROGRAM], PATH_MAX - 1);
   anchor[SEARCH_PROGRAM][n > 0 ? n : 0] = 0;
-  const char *library = dladdr (&here, &info) ? info.dli_fname : NULL;
+  /* l_name is "" if the program contains the library */
+  const char *library = dladdr1 (&here, &info, (void **)&object, RTLD_DL_LINKMAP) ? object->l_name : NULL;
   if (library && (library = realpath (library, anchor[SEARCH_LIBRARY])) == NULL && errno == ENOMEM)
     return search_no_memory (error);
   if (library == NULL) *anchor[SEARCH_LIBRARY] = 0;
@@ -49,7 +52,7 @@ typedef const char *const search_folders[SEARCH_ANCHORS][3];
 enum { SEARCH_FOLDERS = 3 * SEARCH_ANCHORS };
 
 /* Stores the i-th of these folders, which need not exist; 0 if its anchor is unknown. */
-static int search_place (search_anchors anchor, search_folders where, int i, char folder[PW_PATH]) {
+static int search_place (search_anchor_paths anchor, search_folders where, int i, char folder[PW_PATH]) {
   pw_path (folder, "%s/%s", anchor[i / 3], where[i / 3][i % 3]);
   return *anchor[i / 3] != 0;
 }
@@ -83,20 +86,30 @@ static int search_entry (pw_search *s, const char *folder, const char *entry, pw
   return search_add_file (s, entry, strlen (entry) - strlen (ending), real, error);
 }
 
-/* Adds a folder to s->folders if there is room; 0 if it is there already, so that it is searched once. */
-static int search_add_folder (pw_search *s, const char *real) {
+/* A folder that has been searched, so that it is not searched again; the list begins with the last one. */
+struct pw_searched {
+  struct pw_searched *before;
+  char path[];
+};
+
+static int search_add_folder (pw_search *s, const char *real, pw_error *error) {
   size_t n = strlen (real), used = strlen (s->folders);
-  for (const char *p = s->folders; *p; p += strcspn (p, ":"), p += *p == ':')
-    if (strcspn (p, ":") == n && strncmp (p, real, n) == 0) return 0;
+  struct pw_searched *folder = pw_arena_alloc (&s->arena, sizeof *folder + n + 1);
+  if (folder == NULL) return search_no_memory (error);
+  folder->before = s->searched;
+  memcpy (folder->path, real, n);
+  s->searched = folder;
   if (used + n + 2 <= sizeof s->folders) sprintf (s->folders + used, "%s%s", used ? ":" : "", real);
-  return 1;
+  return PW_OK;
 }
 
 /* Adds the models in a folder; skips missing and inaccessible folders, as shells do with PATH. */
 static int search_folder (pw_search *s, const char *folder, pw_error *error) {
   char real[PW_PATH];
   if (realpath (folder, real) == NULL) return errno == ENOMEM ? search_no_memory (error) : PW_OK;
-  if (!search_add_folder (s, real)) return PW_OK;
+  for (const struct pw_searched *other = s->searched; other; other = other->before)
+    if (strcmp (other->path, real) == 0) return PW_OK;
+  if (search_add_folder (s, real, error) != PW_OK) return PW_RESOURCE;
   DIR *dir = opendir (folder);
   if (dir == NULL && (errno == ENOMEM || errno == EMFILE || errno == ENFILE))
     return pw_fail (error, PW_RESOURCE, "cannot look into the folder %s: %s", folder, strerror (errno));
@@ -138,7 +151,7 @@ static int search_order (const void *a, const void *b) {
 int pw_search_open (pw_search *s, pw_error *error) {
   static const search_folders where = { { "models", "../models", "../lib/pinwheel/models" },
                                         { "models", "../models", "pinwheel/models" } };
-  search_anchors anchor;
+  search_anchor_paths anchor;
   char folder[PW_PATH];
   *s = (pw_search){ .count = 0 };
   int status = search_environment (s, error);
@@ -158,7 +171,7 @@ void pw_search_close (pw_search *s) {
 
 /* Stores the path of the first of the files of this name that can be read; "" if there is none. */
 static int search_find (search_folders where, const char *file, char path[PW_PATH], pw_error *error) {
-  search_anchors anchor;
+  search_anchor_paths anchor;
   char folder[PW_PATH];
   int status = search_find_anchors (anchor, error);
   for (int i = 0; i < SEARCH_FOLDERS && status == PW_OK; i++)

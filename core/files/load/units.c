@@ -86,8 +86,7 @@ static int units_multiply (const char *name, size_t n, int power, units_value *u
   return PW_OK;
 }
 
-/* Stores the power at p, after a name: "^2", "²", "2"; 1 if there is none, 0 if it is refused.  Returns its end. */
-static const char *units_power (const char *p, int *power) {
+const char *pw_unit_power (const char *p, int *power) {
   static const char square[] = "\xC2\xB2", cube[] = "\xC2\xB3";
   char *end;
   *power = strncmp (p, square, 2) == 0 ? 2 : strncmp (p, cube, 2) == 0 ? 3 : 1;
@@ -112,7 +111,7 @@ static int units_read (const char *text, units_value *u) {
     size_t n = symbol + strcspn (p + symbol, ends);
     if (n == 0 && *p == '1' && !isdigit ((unsigned char)p[1])) n = 1; /* as in 1/s; other numbers are no units */
     if (n > 0) {
-      const char *after = units_power (p + n, &power);
+      const char *after = pw_unit_power (p + n, &power);
       if (power == 0 || units_multiply (p, n, divide ? -power : power, u) != PW_OK) return PW_INPUT;
       divide = 0, names++;
       p = after;

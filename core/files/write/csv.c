@@ -35,7 +35,7 @@ static void csv_array (pw_csv *c, const char *name) {
   double *column = malloc ((rows + 1) * sizeof *column);
   c->failed |= column == NULL;
   for (size_t row = 0; column && row < rows; row++) column[row] = c->value[row * c->columns + (size_t)c->cells];
-  if (column) pw_npz_add (&c->npz, name, (long)rows, 0, 1, column);
+  if (column) pw_npz_add (&c->npz, name, (long)rows, -1, 1, column);
   free (column);
 }
 

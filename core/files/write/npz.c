@@ -55,11 +55,11 @@ static void npz_describe (pw_npz *z, const struct pw_npz_entry *e) {
 
 void pw_npz_add (pw_npz *z, const char *name, long rows, long columns, int parts, const double *value) {
   char head[NPZ_HEAD + 1] = "\x93NUMPY\x01";
-  size_t size = (size_t)rows * (size_t)(columns ? columns : 1) * (size_t)parts * sizeof *value;
+  size_t size = (size_t)rows * (size_t)(columns < 0 ? 1 : columns) * (size_t)parts * sizeof *value;
   z->failed |= pw_grow (&z->entry, (size_t)z->count, &z->room, sizeof *z->entry) != PW_OK;
   if (z->failed) return;
   struct pw_npz_entry *e = z->entry + z->count++;
-  const char *shape = columns ? PW_PRINTED (60, "%ld, %ld", rows, columns) : PW_PRINTED (60, "%ld,", rows);
+  const char *shape = columns < 0 ? PW_PRINTED (60, "%ld,", rows) : PW_PRINTED (60, "%ld, %ld", rows, columns);
   head[8] = NPZ_HEAD - 10; /* bytes of the header after its length, in two bytes */
   sprintf (head + 10, "{'descr': '%c%s', 'fortran_order': False, 'shape': (%s), }",
            *(const char *)&(int){ 1 } ? '<' : '>', parts == 2 ? "c16" : "f8", shape);

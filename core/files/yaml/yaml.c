@@ -6,7 +6,7 @@
 #include <string.h>
 #include "yaml.h"
 
-#define YAML_MAX_AHEAD 1e6 /* pw_yaml.max_ahead for the default limit of bytes; libfyaml takes 350 bytes for each */
+#define YAML_MAX_AHEAD 1e6 /* pw_yaml.max_ahead for the default limit of bytes: each indicator takes 350 bytes */
 
 /* ---- Parameters ---- */
 
@@ -40,19 +40,32 @@ static const char *yaml_find_word (const char *text, const char *name) {
   return NULL;
 }
 
-/* Reads the unit of a parameter and refuses a known one that is no SI unit: 40 with the unit deg would mean 40 rad. */
+/* Refuses a unit that contains this name of another unit than an SI unit, and says how to convert the value. */
+static int yaml_refuse_unit (const pw_reader *r, const pw_node *node, const pw_node *value, const pw_unit_name *other,
+                             const char *unit, const char *name) {
+  static const char why[] = "unit: numbers are in SI units, angles in radians, and no unit converts a value";
+  const char *before = name, *after = name + strlen (other->name);
+  int power, number = value->type == PW_YAML_SCALAR && strlen (value->text) <= 30 &&
+                      pw_expression_number (value->text, &(double){ 0 });
+  if (strlen (unit) > 60 || pw_unit_factor (unit, NULL, &(double){ 0 }) != PW_OK) /* not understood as a whole */
+    return pw_yaml_fail (r, node->at, "%s; convert it by the factor %s of %s, with the unit %s", why, other->factor,
+                         other->name, other->si);
+  pw_unit_power (after, &power);
+  while (before > unit && before[-1] == ' ') before--;
+  int divides = before > unit && before[-1] == '/', product = strpbrk (other->si, " /") && (divides || power != 1);
+  return pw_yaml_fail (r, node->at, "%s; write \"value: %s%c%s%s, unit: %.*s%s%s%s%s\"", why,
+                       number ? value->text : "(..)", divides ? '/' : '*', other->factor,
+                       power == 1 ? "" : PW_PRINTED (20, "^%d", power), (int)(name - unit), unit, product ? "(" : "",
+                       other->si, product ? ")" : "", after);
+}
+
+/* Reads the unit of a parameter; refuses a known one that is not an SI unit: 40 with the unit deg would mean 40 rad. */
 static int yaml_unit (const pw_reader *r, const pw_node *node, const pw_node *value, const char **unit) {
   if (node == NULL || pw_yaml_text (r, node, "unit", unit) != PW_OK) return r->error->status;
-  int number = value->type == PW_YAML_SCALAR && pw_expression_number (value->text, &(double){ 0 });
   for (const pw_unit_name *other = pw_unit_names; other->name; other++) {
-    const char *at = strcmp (other->factor, "1") ? yaml_find_word (*unit, other->name) : NULL;
-    if (at == NULL) continue;
-    const char *after = at + strlen (other->name);
-    return pw_yaml_fail (r, node->at,
-                         "unit: numbers are in SI units, angles in radians, and no unit converts a value; write "
-                         "\"value: %.30s%c%s%.2s, unit: %.*s%s%.30s\"",
-                         number ? value->text : "(..)", at > *unit && at[-1] == '/' ? '/' : '*', other->factor,
-                         *after == '^' ? after : "", (int)(at - *unit), *unit, other->si, after);
+    if (strcmp (other->factor, "1") == 0 || (strchr (other->name, '/') && strcmp (other->name, *unit) != 0)) continue;
+    const char *name = yaml_find_word (*unit, other->name);
+    if (name) return yaml_refuse_unit (r, node, value, other, *unit, name);
   }
   return PW_OK;
 }
@@ -89,13 +102,13 @@ static int yaml_parameter (const pw_reader *r, const pw_node *node, pw_names *na
 static int yaml_parameters (pw_yaml *y, const pw_reader *r, const pw_node *list, pw_names *names) {
   if (pw_yaml_list (r, list, "parameters") != PW_OK) return r->error->status;
   int count = list ? list->count : 0;
-  pw_parameter *p = y->parameter = pw_arena_alloc (&y->arena, ((size_t)count + 1) * sizeof *p);
+  pw_parameter *p = pw_arena_alloc (&y->arena, ((size_t)count + 1) * sizeof *p);
   if (p == NULL) return pw_yaml_no_memory (r);
+  y->table.parameters = p;
   for (const pw_node *n = list ? list->first : NULL; n; n = n->next, p++) {
     if (yaml_parameter (r, n, names, p) != PW_OK) return r->error->status;
-    p->offset = (size_t)y->parameters++ * sizeof (double);
+    p->offset = (size_t)y->parameter_count++ * sizeof (double);
   }
-  y->table.parameters = y->parameter;
   y->table.parameters_size = (size_t)count * sizeof (double);
   return PW_OK;
 }
@@ -136,6 +149,7 @@ static int yaml_head (pw_yaml *y, const pw_reader *r) {
   pw_yaml_text (r, v[1], "about", &y->table.about);
   yaml_run (y, r, v[2]);
   const pw_node *parameters = v[3];
+  /* the key of the reference solution is "truth" */
   y->let = v[4], y->bodies = v[5], y->elements = v[6], y->reference = v[7];
   for (int i = 3; key[i]; i++) /* from "parameters" on: lists and maps */
     if (v[i] && v[i]->count > PW_YAML_MAX_ITEMS)
@@ -186,12 +200,13 @@ static int yaml_each_table (const pw_yaml *y, const pw_node *node, int (*each) (
                             void *context) {
   int stop = 0;
   for (const pw_node *n = node->type == PW_YAML_SCALAR ? NULL : node->first; n && !stop; n = n->next) {
-    const pw_node *value = node->type == PW_YAML_MAP ? n->next : NULL;
-    if (value && n->type == PW_YAML_SCALAR && strcmp (n->text, "file") == 0 && value->type == PW_YAML_SCALAR) {
+    const pw_node *key = node->type == PW_YAML_MAP ? n : NULL;
+    if (key) n = key->next; /* its value */
+    if (key && key->type == PW_YAML_SCALAR && strcmp (key->text, "file") == 0 && n->type == PW_YAML_SCALAR) {
       char path[PW_PATH];
-      stop = each (context, pw_path (path, "%s/%s", y->folder, value->text));
-    }
-    if (!stop) stop = yaml_each_table (y, n, each, context);
+      stop = each (context, pw_path (path, "%s/%s", y->folder, n->text));
+    } else
+      stop = yaml_each_table (y, n, each, context);
   }
   return stop;
 }

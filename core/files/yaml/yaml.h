@@ -42,8 +42,7 @@ struct pw_yaml {
   pw_arena arena;   /* nodes and texts */
   const pw_node *root;
   const pw_node *bodies, *elements, *let, *reference; /* or NULL */
-  pw_parameter *parameter;                            /* ends with a NULL name */
-  int parameters;
+  int parameter_count;                                /* of table.parameters */
 };
 
 /* What functions share while a file is read or a model is built from it. */

@@ -192,7 +192,7 @@ static int build_element (pw_reader *r, const pw_node *node) {
 static int build_let (pw_reader *r, const double *parameter) {
   const pw_yaml *y = r->y;
   double value;
-  for (int i = 0; i < y->parameters; i++) pw_scope_add (r->scope, y->parameter[i].name, parameter[i]);
+  for (int i = 0; i < y->parameter_count; i++) pw_scope_add (r->scope, y->table.parameters[i].name, parameter[i]);
   for (const pw_node *n = y->let ? y->let->first : NULL; n; n = n->next->next) {
     if (pw_yaml_number (r, n->next, PW_PRINTED (100, "let %s", n->text), PW_REAL, &value) != PW_OK)
       return r->error->status;
@@ -228,7 +228,7 @@ static int build_open (pw_reader *r) {
   r->reference = pw_arena_alloc (r->arena, sizeof *r->reference);
   pw_model_set_reference (r->model, r->reference);
   r->definition = malloc (largest);
-  if (r->reference && r->definition && pw_scope_open (r->scope, y->parameters + (int)lets, r->arena) == PW_OK &&
+  if (r->reference && r->definition && pw_scope_open (r->scope, y->parameter_count + (int)lets, r->arena) == PW_OK &&
       pw_names_open (&r->bodies, bodies) == PW_OK && pw_names_open (&r->names, all) == PW_OK)
     return PW_OK;
   return pw_yaml_no_memory (r);

@@ -9,6 +9,7 @@
  *
  * (Pacejka 2012, Tire and Vehicle Dynamics, chapter 1, for slip and cornering stiffness; the regularising v0 keeps the
  * slip smooth at rest.)  As C grows, v_n of the linear law, -F R / C, vanishes: the tyre approaches a knife edge. */
+#include <float.h>
 #include <string.h>
 #include "contact.h"
 
@@ -46,6 +47,9 @@ PREPARE (tyre_prepare, pw_tyre, tyre) {
   *element =
       (tyre){ contact_along (definition->at, definition->heading), contact_across (definition->at, definition->heading),
               definition->stiffness, definition->speed, definition->friction * definition->load };
+  if (element->speed * element->speed < DBL_MIN)
+    return pw_fail (error, PW_INPUT, "speed = %g: expected >= 1.5e-154, so that its square does not underflow",
+                    element->speed);
   if ((definition->load > 0) == (definition->friction > 0)) return PW_OK;
   return pw_fail (error, PW_INPUT, "%s = 0: expected > 0, since %s limits the force to friction x load",
                   definition->load > 0 ? "friction" : "load", definition->load > 0 ? "a load" : "friction");

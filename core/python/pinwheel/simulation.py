@@ -147,7 +147,7 @@ class Simulation:
             if core.pw_initial_given(report, i):
                 given.append(f"{name} from {changed[name][0]:.10g} to {changed[name][1]:.10g} {lib.text(core.pw_system_state_unit(s, i))}")
         if given:
-            warnings.warn(f"model {self.model.name}: the constraints changed given initial values: {', '.join(given)}", stacklevel=4)
+            warnings.warn(f"model {self.model.name}: given initial values were changed to satisfy the constraints: {', '.join(given)}", stacklevel=4)
         return changed
 
     def __enter__(self) -> Simulation:

@@ -1,4 +1,4 @@
-/* The two library functions that explicit methods call, for scenes of the size of a page: AMD's fill-reducing order and
+/* The two library functions that explicit methods call, for scenes small enough to run in a web page: AMD's fill-reducing order and
  * LAPACK's solution by a Cholesky factorisation. */
 #include <amd.h>
 #include <lapacke.h>
