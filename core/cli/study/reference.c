@@ -57,14 +57,16 @@ static int reference_sizes (const pw_system *system, const pw_motion *motion, do
 /* Raises the uncertainties to round-off; that of multipliers is relative. */
 static void reference_raise_uncertainty (const pw_system *system, pw_reference *reference) {
   double *uncertainty = reference->uncertainty;
-  int has_multipliers = reference_sizes (system, &reference->motion, reference->size);
+  int has_multipliers =
+      reference_sizes (system, &reference->motion, reference->size) &&
+      uncertainty[MOTION_MULTIPLIERS] < 1; /* else never compared, or as uncertain as they are large */
   for (int i = 0; i < MOTION_ERRORS; i++) {
     double size = i < MOTION_MULTIPLIERS ? reference->size[i % MOTION_UNITS] : has_multipliers ? 1 : 0;
     if (i < MOTION_LARGEST)
       uncertainty[i] = uncertainty[i + MOTION_LARGEST]; /* agreement at the end may be accidental */
     uncertainty[i] = fmax (uncertainty[i], REFERENCE_ROUND_OFF * DBL_EPSILON * size);
   }
-  if (uncertainty[MOTION_MULTIPLIERS] >= 1) uncertainty[MOTION_MULTIPLIERS] = 0; /* as large as they are: unknown */
+  if (!has_multipliers) uncertainty[MOTION_MULTIPLIERS] = 0;
 }
 
 /* ---- Candidates ---- */
