@@ -56,6 +56,11 @@ TEST (without_multipliers) {
   cli_good ("pinwheel periodic @/tricycle.yaml --vary steer=0.1:0.3 -o @/path");
   assert_string_equal (cli_err, "");
   assert_non_null (cli_file ("path/periodic.svg"));
+  cli_write ("fixed.yaml", "pinwheel: 1\nbodies: [{name: a, mass: 1, inertia: 1}]\nelements:\n"
+                           "  - {weld: W, body: [a, ground], at: [[0, 0], [0, 0]]}\n");
+  cli_good ("pinwheel periodic @/fixed.yaml --period 1");
+  assert_string_equal (cli_err, "");
+  assert_int_equal (strncmp (cli_out, "fixed: a periodic motion\n", 25), 0); /* no message of LAPACK */
 }
 
 /* Twice the period: the multipliers are squared. */
