@@ -1,6 +1,7 @@
 /* Requests to stop: pw_stop, set by signals or after an error in a thread, and limits of processor time. */
 #define _DEFAULT_SOURCE /* CLOCK_MONOTONIC_COARSE */
 #include <math.h>
+#include <pthread.h>
 #include <time.h>
 #include <unistd.h>
 #include "cli.h"
@@ -14,11 +15,18 @@ static void stop_on_signal (int number) {
   raise (number);
 }
 
-/* Outside of the loops that check pw_stop, as during a compilation. */
+static pthread_t stop_thread; /* of the command */
+
+/* Outside of the loops that check pw_stop.  The command's thread blocks signals until it has removed temporary files;
+ * then another one, as of a BLAS library, receives them. */
 static void stop_at_once (int number) {
   static const char text[] = "pinwheel: interrupted\n";
+  if (!pthread_equal (pthread_self (), stop_thread)) {
+    pthread_kill (stop_thread, number);
+    return;
+  }
   ssize_t written = write (STDERR_FILENO, text, sizeof text - 1);
-  (void)number, (void)written;
+  (void)written;
   _exit (PW_INTERRUPTED);
 }
 
@@ -37,6 +45,7 @@ void pw_stop_catch (void) {
 }
 
 void pw_stop_release (void) {
+  stop_thread = pthread_self ();
   stop_set (stop_at_once);
 }
 
