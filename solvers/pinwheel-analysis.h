@@ -184,7 +184,8 @@ void pw_steady_close (pw_steady *x);
 int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_motion *out, pw_error *error);
 /* Why the system could last not be evaluated during the search, or why a branch ended within the range; or "". */
 const char *pw_steady_reason (const pw_steady *x);
-/* Number of symmetries: displacements of the whole, and angles on which nothing depends. */
+/* Number of symmetries: displacements of the whole, and angles on which nothing depends.  It decreases when
+ * pw_steady_solve reaches a solution without some of them; solutions found before may then count as different. */
 int pw_steady_symmetries (const pw_steady *x);
 /* Whether two states differ by symmetries only. */
 int pw_steady_same (pw_steady *x, const double *q1, const double *v1, const double *q2, const double *v2);
