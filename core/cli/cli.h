@@ -24,7 +24,7 @@ extern volatile sig_atomic_t pw_stop;
 /* Counts these signals from now on.  The first requests a stop at the next check.  The third ends the program, in case
  * that check never comes; the second does not, since some senders signal both a process and its group. */
 void pw_stop_catch (void);
-/* Lets signals end the program again. */
+/* From now on a signal ends the program, with a message and PW_INTERRUPTED; commands begin so. */
 void pw_stop_release (void);
 
 /* A limit of the processor time of a run, measured by the clock of its thread. */
@@ -248,14 +248,23 @@ pw_scene_code *pw_cli_engine_lanes (const pw_cli_engine *e, const pw_system *s, 
  * for the model of the command line and, if its file is open (`file` is not NULL), for the tables that it reads. */
 int pw_cli_check_uses (const pw_cli_line *line, const pw_file *file, pw_use *use, int count, pw_error *error);
 
-/* Makes a folder and those above it, and locks it until the returned descriptor is closed; -1 if that fails. */
-int pw_cli_lock_folder (const char *folder, pw_error *error);
+/* A folder that a command writes into; zero-initialised, none. */
+typedef struct {
+  const char *path;
+  size_t made;      /* length of the part of the path that is the outermost folder made; 0: none was */
+  int locked, lock; /* 1: the folder is locked; the descriptor of the lock */
+} pw_folder;
 
-/* The files that a command writes, and the lock of the folder that it writes into; zero-initialised. */
+/* Makes a folder and those above it, and locks it.  The path must outlive it; close it in every case. */
+int pw_folder_open (pw_folder *folder, const char *path, pw_error *error);
+/* Unlocks a folder; removes what was made, as far as it is empty. */
+void pw_folder_close (pw_folder *folder);
+
+/* The files that a command writes, and the folder that it writes into; zero-initialised. */
 enum { PW_FILES = 6 };
 typedef struct {
   pw_output *output[PW_FILES]; /* NULL: not requested */
-  int locked, lock;            /* 1: a folder is locked; the descriptor of the lock */
+  pw_folder folder;
 } pw_files;
 
 /* Checks a list of at most PW_FILES uses (pw_cli_check_uses), then opens each file that is written, use[i] as
@@ -265,7 +274,7 @@ int pw_files_open (pw_files *files, const pw_cli_line *line, const pw_cli_model 
 FILE *pw_files_stream (const pw_files *files, int i); /* NULL: not requested */
 /* Completes all of them (pw_output_finish_all). */
 int pw_files_finish (pw_files *files, pw_error *error);
-/* Unlocks the folder, and removes files that have not been completed. */
+/* Removes files that have not been completed, and closes the folder. */
 void pw_files_close (pw_files *files);
 
 /* PW_INPUT if the path of -o (NULL: none) ends in .npz: NumPy archives cannot contain the texts of some tables. */

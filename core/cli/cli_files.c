@@ -45,24 +45,40 @@ int pw_cli_check_csv (const char *path, pw_error *error) {
 
 /* ---- Folders ---- */
 
-static int files_make_folder (const char *folder, pw_error *error) {
+static int folder_make (pw_folder *folder, pw_error *error) {
   char path[FILES_FOLDER + 1];
-  size_t n = strlen (folder);
-  if (n == 0 || n > FILES_FOLDER) return pw_fail (error, PW_INPUT, "\"%s\" cannot be the name of a folder", folder);
-  memcpy (path, folder, n + 1);
+  size_t n = strlen (folder->path);
+  if (n == 0 || n > FILES_FOLDER)
+    return pw_fail (error, PW_INPUT, "\"%s\" cannot be the name of a folder", folder->path);
+  memcpy (path, folder->path, n + 1);
   for (size_t i = 1; i <= n; i++) {
     if (path[i] != '/' && path[i] != 0) continue;
     char end = path[i];
     path[i] = 0;
-    if (mkdir (path, 0777) != 0 && errno != EEXIST)
+    if (mkdir (path, 0777) == 0)
+      folder->made = folder->made ? folder->made : i;
+    else if (errno != EEXIST)
       return pw_fail (error, PW_RESOURCE, "cannot make the folder %s: %s", path, strerror (errno));
     path[i] = end;
   }
   return PW_OK;
 }
 
-int pw_cli_lock_folder (const char *folder, pw_error *error) {
-  return files_make_folder (folder, error) == PW_OK ? pw_lock_folder (folder, error) : -1;
+int pw_folder_open (pw_folder *folder, const char *path, pw_error *error) {
+  *folder = (pw_folder){ .path = path };
+  if (folder_make (folder, error) == PW_OK) folder->lock = pw_lock_folder (path, error);
+  folder->locked = error->status == PW_OK;
+  return error->status;
+}
+
+void pw_folder_close (pw_folder *folder) {
+  char path[FILES_FOLDER + 1];
+  for (size_t n = folder->made ? strlen (strcpy (path, folder->path)) : 0; n && n >= folder->made; n--) {
+    if (path[n] != '/' && path[n] != 0) continue;
+    path[n] = 0;
+    if (rmdir (path) != 0 && errno != ENOENT) break; /* it has files; ENOENT: "a/" and "a" are the same folder */
+  }
+  if (folder->locked) close (folder->lock);
 }
 
 /* ---- The files that a command writes ---- */
@@ -75,8 +91,7 @@ int pw_files_open (pw_files *files, const pw_cli_line *line, const pw_cli_model 
     if (use[i].how == PW_WRITES)
       status = (files->output[i] = pw_output_open (use[i].path, error)) ? PW_OK : error->status;
     else
-      status = (files->lock = pw_cli_lock_folder (use[i].path, error)) >= 0 ? PW_OK : error->status;
-    files->locked |= use[i].how == PW_WRITES_INTO && status == PW_OK;
+      status = pw_folder_open (&files->folder, use[i].path, error);
   }
   return status;
 }
@@ -94,5 +109,5 @@ int pw_files_finish (pw_files *files, pw_error *error) {
 void pw_files_close (pw_files *files) {
   for (int i = 0; i < PW_FILES; i++)
     if (files->output[i]) pw_output_discard (files->output[i]);
-  if (files->locked) close (files->lock);
+  pw_folder_close (&files->folder);
 }

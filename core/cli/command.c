@@ -143,6 +143,7 @@ static void command_close (pw_cli_line *line) {
 
 int pw_cli_main (const pw_command *command, int argc, const char **argv) {
   gsl_set_error_handler_off (); /* the default handler ends the program */
+  pw_stop_release ();
   pw_error error = { 0 };
   int exit_status = 0; /* that of errors follows from `error` */
   pw_cli_line *line = calloc (1, command->options_size);

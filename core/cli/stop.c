@@ -1,7 +1,9 @@
 /* Requests to stop: pw_stop, set by signals or after an error in a thread, and limits of processor time. */
 #define _DEFAULT_SOURCE /* CLOCK_MONOTONIC_COARSE */
 #include <math.h>
+#include <pthread.h>
 #include <time.h>
+#include <unistd.h>
 #include "cli.h"
 
 volatile sig_atomic_t pw_stop;
@@ -11,6 +13,21 @@ static void stop_on_signal (int number) {
   if (++pw_stop < STOP_NOW) return;
   signal (number, SIG_DFL);
   raise (number);
+}
+
+static pthread_t stop_thread; /* of the command */
+
+/* Outside of the loops that check pw_stop.  The command's thread blocks signals until it has removed temporary files;
+ * then another one, as of a BLAS library, receives them. */
+static void stop_at_once (int number) {
+  static const char text[] = "pinwheel: interrupted\n";
+  if (!pthread_equal (pthread_self (), stop_thread)) {
+    pthread_kill (stop_thread, number);
+    return;
+  }
+  ssize_t written = write (STDERR_FILENO, text, sizeof text - 1);
+  (void)written;
+  _exit (PW_INTERRUPTED);
 }
 
 /* Sets the handler of SIGINT and SIGTERM; a signal that the program was started to ignore, by nohup or in a script's
@@ -28,7 +45,8 @@ void pw_stop_catch (void) {
 }
 
 void pw_stop_release (void) {
-  stop_set (SIG_DFL);
+  stop_thread = pthread_self ();
+  stop_set (stop_at_once);
 }
 
 /* ---- Limits ---- */

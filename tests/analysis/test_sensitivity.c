@@ -84,7 +84,7 @@ static void sensitivity_values (const char *name, double value, double *out) {
   snprintf (command, sizeof command, "pinwheel sensitivity ezyroller -t 3%s--by b --%s=%.17g -o @/sens",
             sensitivity_outputs, name, value);
   double all[CLI_MOST];
-  cli_good (command);
+  cli_shell (command); /* initial values changed by the constraints are reported */
   assert_int_equal (cli_sensitivity ("value", all), 26);
   for (int i = 0; i < 13; i++) out[i] = all[2 * i]; /* each output's, then that of b */
 }

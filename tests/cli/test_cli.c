@@ -257,6 +257,8 @@ TEST (last_row) {
   const char *csv = cli_columns ("-t 0.3 --every 0.1");
   assert_int_equal (cli_lines (csv), 5);
   assert_true (cli_cell (csv, 3, "t [s]") == 0.3);
+  csv = cli_columns ("-t 0.1 --every 1e12"); /* from t = 0 on, however small the run is against the interval */
+  assert_true (cli_lines (csv) == 2 && cli_cell (csv, 0, "t [s]") == 0);
   csv = cli_columns ("-t 0.4 --every 0.1");
   assert_true (cli_cell (csv, 3, "t [s]") == 3 * 0.1);
 }

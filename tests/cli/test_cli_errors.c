@@ -134,6 +134,18 @@ TEST (unwritable) {
   cli_bad ("pinwheel new @/no/mine.c", 1, "cannot write @/no/mine.c: No such file or directory");
 }
 
+/* A command that is refused leaves no folder behind, but those that were there. */
+TEST (no_folder) {
+  cli_good ("mkdir @/kept");
+  assert_int_equal (cli_run ("pinwheel steady ezyroller -o @/kept/new/inner/"), 2);
+  assert_int_equal (cli_run ("pinwheel run ezyroller --plots @/kept/plots -m rk4:step=1"), 2);
+  assert_int_equal (cli_run ("pinwheel compare ezyroller --reference @/none.csv -o @/kept/study"), 2);
+  cli_good ("ls @/kept");
+  assert_string_equal (cli_out, "");
+  assert_int_equal (cli_run ("pinwheel steady ezyroller -o @/kept"), 2);
+  cli_good ("rmdir @/kept");
+}
+
 TEST (full_disk) {
   if (access ("/dev/full", W_OK) != 0) skip ();
   cli_bad ("pinwheel run ezyroller --t-end 10 -o /dev/full", 1, "cannot write /dev/full: No space left on device");
@@ -339,7 +351,7 @@ TEST (compiled) {
   cli_write ("interrupting", "#!/bin/sh\nkill -TERM $PPID\nsleep 0.2\nexec cc \"$@\"\n");
   cli_run ("chmod +x @/interrupting; (TMPDIR=@/tmp CC=@/interrupting "
            "\"${PINWHEEL:-build/pinwheel}\" run models/ezyroller.c -t 0.1); echo $?; sleep 0.4; ls @/tmp");
-  assert_string_equal (cli_out, "143\n");
+  assert_string_equal (cli_out, "130\n");
 }
 
 const check_fixture fixture = { cli_setup, cli_teardown };

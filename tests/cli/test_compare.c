@@ -58,6 +58,12 @@ TEST (orders) {
   }
 }
 
+/* Steps that follow a tolerance are nowhere in an asymptotic range; with these, orders of 8 would agree. */
+TEST (no_adaptive_order) {
+  cli_good ("pinwheel compare pendulum --methods erk5+projection --rtol-ladder 1e-3:1e-6 --repeats 1 -o @/adaptive");
+  for (int row = 0; row < 4; row++) assert_string_equal (compare_cell ("adaptive/compare.csv", row, ORDER), "nan");
+}
+
 /* Outside the asymptotic range, here next to the reference's uncertainty, levels disagree and no order is given. */
 TEST (no_order) {
   cli_good ("pinwheel compare ezyroller --methods erk5+projection:steps=fixed --t-end 2 --step-ladder 0.05:0.0125 "
@@ -144,6 +150,12 @@ TEST (jump) {
     double error = compare_number ("jump/compare.csv", i, MULTIPLIER);
     assert_true (error > 0 && error < 1e-3); /* the jump is 1 */
   }
+  cli_write ("jumps.yaml", "pinwheel: 1\nbodies: [{name: b, mass: 1, inertia: 1}]\nelements:\n"
+                           "  - {pin: p, body: [b, ground], at: [[-1, 0], [-1, 0]]}\n"
+                           "  - {torque: T, body: [b, ground], value: \"sign(sin(2*pi*t))\"}\n");
+  cli_good ("pinwheel compare @/jumps.yaml -t 100 --methods rk4 --step-ladder 0.1 --repeats 1 -o @/jumps >@/table && "
+            "sed -n 's/.*uncertainty.*,//p' @/jumps/truth.csv");
+  assert_string_equal (cli_out, "0\n"); /* every sample is at a jump: multipliers are not compared */
 }
 
 /* Eight methods by default; every integrator with one stabilisation. */
@@ -232,6 +244,25 @@ TEST (limit) {
       strstr (compare_cell ("stop/compare.csv", 0, REASON), "too slow: the limit of 0.125 s was reached at"));
 }
 
+/* The limit bounds the runs of the reference, too. */
+TEST (limited_reference) {
+  assert_int_equal (cli_run ("pinwheel compare ezyroller --methods rk4 --t-end 1e4 --repeats 1 --step-ladder 0.1 "
+                             "--limit 0.01 --specialise never"),
+                    4);
+  assert_non_null (strstr (cli_out, "no two methods reach the end within --limit, so errors are unknown"));
+}
+
+/* Initial values changed by the constraints are reported, as by `run`. */
+TEST (changed) {
+  static const char *const command[] = { "compare", "drift --only-methods",
+                                         "sensitivity --of sleigh.x --by sleigh.phi -m rk4", "linearise" };
+  for (int i = 0; i < 4; i++) {
+    cli_shell (check_text ("pinwheel %s chaplygin-sleigh --start sleigh.omega=0.5 %s", command[i],
+                           i < 2 ? "-t 0.1 --methods rk4" : ""));
+    assert_non_null (strstr (cli_err, "\n  sleigh.vy from 0.2 to 0.125 m/s (specified)\n"));
+  }
+}
+
 /* A failure keeps its row, its reason and the time reached; the others go on. */
 TEST (failure) {
   cli_good ("pinwheel compare ezyroller --methods erk8+projection" ONCE "--t-end 1 --rtol-ladder 1e-14:1e-13 -o @/f");
@@ -271,12 +302,11 @@ TEST (jobs) {
 
 /* Threads whose runs are timed never share a processor; on a machine with one core there is one of them. */
 TEST (cores) {
-  cli_good (
-      "\"${PINWHEEL:-build/pinwheel}\" compare ezyroller --specialise never --methods rk4,rk4+none,rk4+baumgarte" ONCE
-      "--step-ladder 1e-8 --jobs 3 --limit 60 >@/cores.txt 2>&1 &\n"
-      "lscpu -p=CORE,SOCKET | grep -v '#' | sort -u | wc -l >@/physical\n"
-      "sleep 0.5; cat /proc/$!/task/*/status | sed -n 's/^Cpus_allowed_list:.//p' >@/lists; kill $!; wait $!\n"
-      "test -s @/lists");
+  cli_good ("OPENBLAS_NUM_THREADS=1 \"${PINWHEEL:-build/pinwheel}\" compare ezyroller --specialise never --methods "
+            "rk4,rk4+none,rk4+baumgarte" ONCE "--step-ladder 1e-8 --jobs 3 --limit 60 >@/cores.txt 2>&1 &\n"
+            "lscpu -p=CORE,SOCKET | grep -v '#' | sort -u | wc -l >@/physical\n"
+            "sleep 0.5; cat /proc/$!/task/*/status | sed -n 's/^Cpus_allowed_list:.//p' >@/lists; kill $!; wait $!\n"
+            "test -s @/lists");
   char *line = strdup (cli_file ("lists"));
   long threads = 0, physical = strtol (cli_file ("physical"), NULL, 10);
   cli_good ("tr ',' '\\n' <@/lists | sort | uniq -d | wc -l");

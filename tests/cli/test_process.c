@@ -18,6 +18,16 @@ TEST (ignored) {
   assert_string_equal (cli_out, "137\n");
 }
 
+/* A signal before the first step, here during a compilation, is reported, too. */
+TEST (compiling) {
+  cli_good ("printf '#!/bin/sh\\n: >@/begun\\nexec sleep 2\\n' >@/cc; chmod +x @/cc");
+  int status = cli_run (
+      "CC=@/cc XDG_CACHE_HOME=@/cache \"${PINWHEEL:-build/pinwheel}\" drift ezyroller --specialise always & p=$!\n"
+      "while kill -0 $p 2>/dev/null && [ ! -e @/begun ]; do sleep 0.01; done; kill -TERM $p; wait $p");
+  assert_int_equal (status, 130);
+  assert_string_equal (cli_err, "pinwheel: interrupted\n");
+}
+
 /* A test program that takes too long ends its children, says its name and fails (limit.c). */
 TEST (limit) {
   assert_int_not_equal (cli_run (check_text ("LIMIT=1 %s @/child", program_invocation_name)), 0);

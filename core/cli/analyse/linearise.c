@@ -111,8 +111,10 @@ static int linearise_run (pw_linearise_command *cmd, pw_error *error) {
   }
   cmd->r = pw_run_open (cmd->m.system, d.method, &settings, error);
   if (cmd->r == NULL) return error->status;
-  if (cmd->t == 0 || cmd->steady) return PW_OK;
-  int status = linearise_advance (cmd, error);
+  if (cmd->steady) return PW_OK;
+  int status = pw_report_initial_state (&cmd->m, error);
+  if (cmd->t == 0 || status != PW_OK) return status;
+  status = linearise_advance (cmd, error);
   return status == PW_OK ? pw_run_restart (cmd->r, NULL, NULL, error) : status;
 }
 

@@ -117,7 +117,7 @@ typedef struct {
 struct pw_plots {
   pw_figures figures; /* their folder is NULL without figures */
   int by_time;        /* 1: colours show the time, 0: the bodies */
-  int lock;           /* of the folder; -1: none */
+  pw_folder folder;   /* none without figures */
   const pw_model *model;
   const pw_system *system;
   pw_workspace *workspace; /* for contact points and forces */

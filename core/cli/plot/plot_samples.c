@@ -3,7 +3,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 const char *pw_plot_name (const pw_plots *plots, const pw_tracks *tracks, int k) {
   return tracks == &plots->bodies ? pw_system_body_name (plots->system, tracks->system_index[k])
@@ -77,8 +76,8 @@ static void plot_choose (pw_plots *plots) {
 
 /* Locks the folder; an error before the run if it cannot be written. */
 static int plot_try_folder (pw_plots *plots, pw_error *error) {
-  plots->lock = pw_cli_lock_folder (plots->figures.folder, error);
-  pw_output *probe = plots->lock < 0 ? NULL : pw_figure_open_data (&plots->figures, "motion.dat", error);
+  if (pw_folder_open (&plots->folder, plots->figures.folder, error) != PW_OK) return error->status;
+  pw_output *probe = pw_figure_open_data (&plots->figures, "motion.dat", error);
   if (probe) pw_output_discard (probe);
   return probe ? PW_OK : error->status;
 }
@@ -89,7 +88,6 @@ pw_plots *pw_plots_open (const char *folder, int forces, const pw_model *model, 
   if (plots == NULL) return pw_fail (error, PW_RESOURCE, "plots: out of memory"), NULL;
   *plots = (pw_plots){
     .figures = { .folder = folder, .model = pw_system_name (system), .about = pw_model_table (model)->about },
-    .lock = -1,
     .model = model,
     .system = system,
     .t_end = t_end,
@@ -115,7 +113,7 @@ int pw_plots_style (pw_plots *plots, const char *width, const char *colour, pw_e
 
 void pw_plots_close (pw_plots *plots) {
   if (plots == NULL) return;
-  if (plots->lock >= 0) close (plots->lock);
+  if (plots->figures.folder) pw_folder_close (&plots->folder);
   pw_workspace_free (plots->workspace);
   pw_arena_free (&plots->arena);
   free (plots);

@@ -112,6 +112,14 @@ static void report_initial (const pw_system *system, const pw_initial_report *in
   report_more (stderr, moved - listed, "");
 }
 
+int pw_report_initial_state (const pw_cli_model *m, pw_error *error) {
+  pw_error own = { 0 };
+  pw_run *run = pw_run_open (m->system, "rk4+none", NULL, &own); /* makes no step: any method will do */
+  if (run) report_initial (m->system, pw_run_initial (run));
+  pw_run_close (run);
+  return own.status == PW_RESOURCE ? pw_fail (error, own.status, "%s", own.text) : PW_OK;
+}
+
 void pw_report_initialisation (const pw_run *run, const pw_system *system, const char *const *redundant) {
   int differences = pw_system_differences (system), count = 0;
   for (int i = 0; i < differences && i < REPORT_MESSAGES; i++)

@@ -149,7 +149,7 @@ static double run_next_row_time (const pw_run_cli *command) {
   if (command->row_interval == 0) return 0;
   double t = (double)command->rows * command->row_interval;
   double round_off = fmax (1e-9 * command->row_interval, 4 * DBL_EPSILON * command->t_end);
-  return fabs (t - command->t_end) <= round_off ? command->t_end : t;
+  return t > 0 && fabs (t - command->t_end) <= round_off ? command->t_end : t;
 }
 
 /* Writes rows and stores samples up to the time reached. */

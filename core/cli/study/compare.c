@@ -9,7 +9,6 @@
 enum { COMPARE_REPEATS = 99 }; /* the largest value of --repeats */
 #define COMPARE_FEW 3          /* timed runs of a row, at least, unless --repeats is less or they exceed the limit */
 #define COMPARE_ENOUGH 0.5     /* total processor time [s] of a row after which no further run is timed */
-#define COMPARE_REFINEMENT 1.2 /* smallest ratio of numbers of steps from which an order is computed */
 #define COMPARE_CLEAR 10   /* error over uncertainty of the reference, so that orders are accurate to log2 1.1 = 0.14 */
 #define COMPARE_AGREE 0.1  /* largest relative difference of the last two orders in the asymptotic range */
 #define COMPARE_DECADE 1.6 /* factor of the cost if a tolerance is divided by ten, of a method of order 5: 10^(1/5) */
@@ -142,7 +141,6 @@ static int compare_plan (pw_study *study, pw_error *error) {
   pw_compare *compare = (pw_compare *)study;
   compare_ladder ladders[2] = { { 0.1, 1e-4 }, { 1e-3, 1e-12 } }; /* steps, tolerances */
   study->t_end = pw_cli_defaults (pw_file_table (study->compiled.file)).t_end;
-  study->limit.seconds = INFINITY; /* the clock is read between batches of steps only: timed runs are not slowed down */
   study->cpu_limit = 10;
   compare->repeats = 9;
   int status = pw_cli_number ("--t-end", study->line.t_end, PW_POSITIVE, &study->t_end, error);
@@ -153,6 +151,7 @@ static int compare_plan (pw_study *study, pw_error *error) {
   if (status == PW_OK) status = pw_study_read_methods (study, compare_default_methods, error);
   if (status == PW_OK) status = compare_read_ladder ("--step-ladder", compare->step_text, &ladders[0], error);
   if (status == PW_OK) status = compare_read_ladder ("--rtol-ladder", compare->rtol_text, &ladders[1], error);
+  study->limit.seconds = study->cpu_limit;
   compare->finest_step = ladders[0].to;
   return status == PW_OK ? compare_plan_rows (study, ladders, error) : status;
 }
@@ -174,27 +173,23 @@ static void compare_set_errors (const pw_compare *compare, const pw_motion *moti
   }
 }
 
-/* The order p of a row and the coarser one before it, from error ~ steps^-p: log (coarser error / error) over
- * log (steps / coarser steps), with the largest error of lengths or, if that is unknown, of angles.  NaN if an error is
- * unknown, if that of the row is less than COMPARE_CLEAR times the uncertainty, or if the steps are nearly equal. */
+/* The order p of a row and the coarser one before it, with twice the step h, from error ~ h^p, with the largest error
+ * of lengths or, if that is unknown, of angles.  NaN if an error is unknown, or if that of the row is less than
+ * COMPARE_CLEAR times the uncertainty. */
 static double compare_pair_order (const pw_compare *compare, const pw_row *row) {
   const pw_row *coarser = row - 1;
   const double *error = &row->value[COLUMN_ERROR];
   int error_index = isnan (error[MOTION_LARGEST]) ? MOTION_LARGEST + MOTION_ANGLE : MOTION_LARGEST;
   int known = coarser->state == ROW_DONE && row->state == ROW_DONE &&
               error[error_index] > COMPARE_CLEAR * compare->reference.uncertainty[error_index];
-  double refinement =
-      row->adaptive ? (double)row->statistics.steps / (double)coarser->statistics.steps : coarser->level / row->level;
-  return known && refinement > COMPARE_REFINEMENT
-             ? log (coarser->value[COLUMN_ERROR + error_index] / error[error_index]) / log (refinement)
-             : NAN;
+  return known ? log2 (coarser->value[COLUMN_ERROR + error_index] / error[error_index]) : NAN;
 }
 
-/* The observed order of convergence: only in the asymptotic range, where the last two orders agree and errors are well
- * above the uncertainty of the reference; else NaN. */
+/* The observed order of convergence: only of fixed steps and in the asymptotic range, where the last two orders agree
+ * and errors are well above the uncertainty of the reference; else NaN. */
 static double compare_order (const pw_compare *compare, const pw_row *row) {
-  double order = row->coarser_levels >= 2 ? compare_pair_order (compare, row) : NAN,
-         coarser_order = row->coarser_levels >= 2 ? compare_pair_order (compare, row - 1) : NAN;
+  if (row->adaptive || row->coarser_levels < 2) return NAN;
+  double order = compare_pair_order (compare, row), coarser_order = compare_pair_order (compare, row - 1);
   return order > 0 && fabs (order - coarser_order) <= COMPARE_AGREE * order ? order : NAN;
 }
 

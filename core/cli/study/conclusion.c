@@ -107,7 +107,8 @@ static void conclusion_print_heading (const pw_conclusion *conclusion) {
       printf ("%s%s %s (%s)", between, PW_DIGITS (conclusion_scale (reference, i), 3), unit[i], name[i]);
       between = ", ";
     }
-  printf (". The reference has %.1f digits%s.\n\n", -log10 (conclusion->uncertainty),
+  const double digits = -log10 (conclusion->uncertainty);
+  printf (". The reference has %s digits%s.\n\n", digits >= 0.05 ? PW_PRINTED (40, "%.1f", digits) : "no correct",
           conclusion->study->reference_path ? " if its table is exact" : "");
 }
 

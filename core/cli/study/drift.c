@@ -203,8 +203,8 @@ static int drift_visit (pw_visitor *visitor, pw_run *run, pw_error *error) {
 }
 
 /* The growth p of a quantity that is proportional to t^p, from its largest values in the first half and in the whole
- * run; 0 if the largest is in the first half, NaN if there is only round-off.  The point of a row with a value of an
- * option has the largest value as ordinate. */
+ * run; 0 if the largest is in the first half, NaN for a residual that is round-off.  The point of a row with a value of
+ * an option has the largest value as ordinate. */
 static void drift_finish (pw_row *row, int quantity, double first_half) {
   double *value = &row->value[COLUMN_QUANTITY + DRIFT_VALUES * quantity], largest = value[DRIFT_LARGEST];
   int known = quantity == DRIFT_BALANCE || largest > DRIFT_ROUND_OFF;

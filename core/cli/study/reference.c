@@ -4,7 +4,6 @@
 #include <string.h>
 #include "reference.h"
 
-#define REFERENCE_CPU_LIMIT 10 /* smallest limit of the processor time of a candidate [s] */
 #define REFERENCE_LOOSEST 1e-9 /* the largest tolerance, after failures with smaller ones */
 #define REFERENCE_STEPS 1e5    /* the fewest steps of fixed size at first, */
 #define REFERENCE_FEWEST 1000  /* and after failures with more steps */
@@ -58,14 +57,16 @@ static int reference_sizes (const pw_system *system, const pw_motion *motion, do
 /* Raises the uncertainties to round-off; that of multipliers is relative. */
 static void reference_raise_uncertainty (const pw_system *system, pw_reference *reference) {
   double *uncertainty = reference->uncertainty;
-  int has_multipliers = reference_sizes (system, &reference->motion, reference->size);
+  int has_multipliers =
+      reference_sizes (system, &reference->motion, reference->size) &&
+      uncertainty[MOTION_MULTIPLIERS] < 1; /* else never compared, or as uncertain as they are large */
   for (int i = 0; i < MOTION_ERRORS; i++) {
     double size = i < MOTION_MULTIPLIERS ? reference->size[i % MOTION_UNITS] : has_multipliers ? 1 : 0;
     if (i < MOTION_LARGEST)
       uncertainty[i] = uncertainty[i + MOTION_LARGEST]; /* agreement at the end may be accidental */
     uncertainty[i] = fmax (uncertainty[i], REFERENCE_ROUND_OFF * DBL_EPSILON * size);
   }
-  if (uncertainty[MOTION_MULTIPLIERS] >= 1) uncertainty[MOTION_MULTIPLIERS] = 0; /* as large as they are: unknown */
+  if (!has_multipliers) uncertainty[MOTION_MULTIPLIERS] = 0;
 }
 
 /* ---- Candidates ---- */
@@ -165,13 +166,13 @@ static int reference_compute (pw_reference *reference, pw_study *study, double s
     { study, .row = { .method = "ida+ggl", .adaptive = 1, .level = 1e-13 } },
     { study, .row = { .method = "ida+baumgarte", .adaptive = 1, .level = 1e-13 } },
   };
-  double limit = study->cpu_limit;
-  study->cpu_limit = fmax (limit, REFERENCE_CPU_LIMIT);
   pw_study_begin_progress (study, "reference", "methods", REFERENCE_CANDIDATES);
   int status = pw_study_parallel (study, REFERENCE_CANDIDATES, reference_run, candidates, error);
-  study->cpu_limit = limit;
   if (status == PW_OK) reference_choose (reference, study->compiled.system, candidates);
-  for (int i = 0; i < REFERENCE_CANDIDATES; i++) pw_motion_close (&candidates[i].motion);
+  for (int i = 0; i < REFERENCE_CANDIDATES; i++) {
+    reference->limited |= candidates[i].row.state == ROW_STOPPED;
+    pw_motion_close (&candidates[i].motion);
+  }
   return status;
 }
 
@@ -200,7 +201,8 @@ int pw_reference_find (pw_reference *reference, pw_study *study, double step, pw
 
 void pw_reference_print (const pw_reference *reference, int partners) {
   if (!reference->known) {
-    puts ("no two methods reach the end, so errors are unknown; --reference FILE.csv provides a reference\n");
+    printf ("no two methods reach the end%s, so errors are unknown; --reference FILE.csv provides a reference\n\n",
+            reference->limited ? " within --limit" : "");
     return;
   }
   pw_cli_print (stdout, "errors are measured against %s%s\n", reference->name,

@@ -13,6 +13,7 @@ typedef struct {
   pw_motion motion;
   int known;                         /* 0: there is no reference */
   int from_table;                    /* 1: it is the table of --reference */
+  int limited;                       /* 1: the limit of processor time has stopped a method that would compute it */
   double uncertainty[MOTION_ERRORS]; /* 0 where nothing is compared */
   double size[MOTION_UNITS];         /* largest coordinate or velocity */
   char name[300];                    /* "erk8+projection, rtol 3e-14", "the exact solution of the model" or a path */

@@ -2,6 +2,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "report.h"
 #include "study.h"
 
 /* The thread's clock is read after a batch of calls of pw_run_advance_towards.  If the batch has taken less processor
@@ -111,8 +112,9 @@ static int study_advance (pw_study *study, pw_row *row, pw_run *run, const pw_li
     if (used < STUDY_SHORT && n == batch && batch < STUDY_LONGEST_BATCH) batch *= 2;
     if (used > STUDY_LONG && batch > 1) batch /= 2;
     pw_study_progress (study, row, study->run_share * (row->runs + pw_run_time (run) / study->t_end));
-    if (status == PW_STOPPED) return pw_limit_status (limit, pw_run_time (run), error);
-    if (status == PW_OK && row->cpu > study->cpu_limit && pw_run_time (run) < study->t_end) {
+    int stopped = status == PW_STOPPED;
+    if (stopped && (pw_stop || isinf (study->cpu_limit))) return pw_limit_status (limit, pw_run_time (run), error);
+    if (stopped || (status == PW_OK && row->cpu > study->cpu_limit && pw_run_time (run) < study->t_end)) {
       row->state = ROW_STOPPED;
       return PW_RETRY;
     }
@@ -123,6 +125,7 @@ static int study_advance (pw_study *study, pw_row *row, pw_run *run, const pw_li
 int pw_study_run (pw_study *study, pw_row *row, const pw_settings *settings, pw_visitor *visitor, pw_error *error) {
   pw_settings run_settings = *settings;
   pw_limit limit = study->limit;
+  if (visitor == NULL) limit.seconds = INFINITY; /* timed: not slowed down by readings of the clock in every step */
   row->cpu = 0;
   pw_limit_start (&limit);
   run_settings.stop = pw_limit_over;
@@ -194,6 +197,7 @@ static int study_open (pw_study *study, pw_error *error) {
   if (status == PW_OK) status = pw_parallel_jobs (study->jobs_text, &study->jobs, error);
   if (status == PW_OK) status = study->type->plan (study, error);
   if (status == PW_OK) status = pw_cli_read_specialise (study->line.specialise, &when, error);
+  if (status == PW_OK) status = pw_report_initial_state (&study->compiled, error);
   if (status != PW_OK) return status;
   /* one engine for all runs, since `compare` compares their processor times */
   pw_cli_engine_open (&study->engine, study->compiled.system, when, study_estimated_steps (study));

@@ -99,8 +99,8 @@ struct pw_study {
   int methods;
   int jobs; /* number of concurrent runs */
   pw_settings settings;
-  pw_limit limit;   /* of a run, checked in every step: the run fails */
-  double cpu_limit; /* of the processor time of a run, checked between batches of steps: ROW_STOPPED [s] */
+  pw_limit limit;   /* of a run with a visitor, checked in every step */
+  double cpu_limit; /* of every run, checked between batches of steps [s]: ROW_STOPPED; INFINITY: the run fails */
   double t_end;     /* [s] */
   pw_figures figures;
   pw_arena arena; /* of the points of rows, and of what a command keeps there */
