@@ -200,7 +200,8 @@ int pw_periodic_solve (pw_periodic *x, int settle, double parameter, pw_periodic
   if (status != PW_OK) return status;
   periodic_set_unknowns (x, parameter);
   x->steps = 0;
-  status = pw_branch_solve (&x->branch, x->u, error);
+  status = pw_periodic_guess_displacement (x, x->u, error);
+  if (status == PW_OK) status = pw_branch_solve (&x->branch, x->u, error);
   if (status == PW_OK) status = periodic_orbit (x, x->u, out, error);
   if (status == PW_OK) x->begin_period = out->period;
   out->residual = x->branch.residual;

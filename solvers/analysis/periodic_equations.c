@@ -77,6 +77,45 @@ static void equations_rotate (const pw_periodic *x, double w, const double *in, 
   pw_linear_rotate (&x->steady->system[PW_HERE].linearisation, w, in + x->n, out + x->n);
 }
 
+/* The angle by which a symmetry that turns the whole does so in the last flow: by the first body whose angle only this
+ * symmetry changes, or 0. */
+static double equations_turn (const pw_periodic *x) {
+  int rates = pw_steady_rate_count (x->s);
+  for (int b = 0; b < x->s->bodies; b++) {
+    int others = 0;
+    for (int k = 0; k < x->symmetries; k++) others += x->steady->symmetry[k * rates + PW_RATE_ANGLES + b] != 0;
+    if (others == 0) return x->y1[3 * b + 2] - x->y0[3 * b + 2];
+  }
+  return 0;
+}
+
+int pw_periodic_guess_displacement (pw_periodic *x, double *u, pw_error *error) {
+  enum { CORRECTIONS = 3 }; /* the rotation is known; for a given one translations are linear */
+  int states = 2 * x->n, count = x->symmetries, rates = pw_steady_rate_count (x->s), rank;
+  size_t rows = 2 * (size_t)states, work_size = rows + (size_t)(PW_PERIODIC_WORK * (states + count));
+  int status = pw_periodic_flow (x, u, PW_FLOW, PW_HERE, error);
+  if (status != PW_OK || count == 0) return status;
+  double *F = calloc (rows + rows * (size_t)count + work_size, sizeof *F), *M = F + rows,
+         *work = M + rows * (size_t)count;
+  if (F == NULL) return pw_fail_memory (x->s, error);
+  for (int k = 0; k < count; k++) {
+    double turn = x->steady->symmetry[k * rates + PW_RATE_TURN];
+    if (turn != 0) u[states + k] = equations_turn (x) / turn;
+  }
+  for (int i = 0; i < CORRECTIONS; i++) {
+    equations_residual (x, u, F);
+    memset (M, 0, rows * (size_t)count * sizeof *M);
+    memset (x->branch.pivot, 0, (size_t)count * sizeof *x->branch.pivot);
+    equations_by_displacement (x, u, (int)rows, M);
+    if (LAPACKE_dgelsy_work (LAPACK_COL_MAJOR, states, count, 1, M, (int)rows, F, (int)rows, x->branch.pivot,
+                             PW_STEADY_RANK, &rank, work, (int)work_size))
+      break;
+    for (int k = 0; k < count; k++) u[states + k] -= F[k];
+  }
+  free (F);
+  return PW_OK;
+}
+
 /* Adds the derivatives with respect to y. */
 static void equations_by_state (pw_periodic *x, const double *u, int rows, double *dF) {
   int states = 2 * x->n, size = x->size;

@@ -74,6 +74,8 @@ int pw_periodic_settle (pw_periodic *x, double value, int periods);
 /* ---- periodic_equations.c ---- */
 
 enum { PW_PERIODIC_WORK = 34 }; /* numbers of work space of LAPACK per minimal coordinate */
+/* Sets the displacement in u to the one that agrees best with a flow of one period from the state of u.  A status. */
+int pw_periodic_guess_displacement (pw_periodic *x, double *u, pw_error *error);
 /* pw_branch_problem.evaluate. */
 int pw_periodic_evaluate (void *periodic, const double *u, double *F, double *dF, pw_error *error);
 /* Fills x->re, x->im with the multipliers of u, after a flow with derivatives: those that are not trivial, the largest

@@ -122,6 +122,13 @@ TEST (turns) {
   assert_non_null (strstr (cli_err, "bodies make whole turns in a period, on whose number forces depend"));
 }
 
+/* A stable gait that turns the vehicle by 3.84 rad in each period, as a run of 100 periods does, too. */
+TEST (turning_gait) {
+  cli_good ("pinwheel periodic tests/scenes/turning-gait.yaml");
+  periodic_shows ("  rotation per period          3.84049 rad\n");
+  periodic_shows ("     2.8869602\n");
+}
+
 /* The branch through both folds, and one row of the table for each point. */
 TEST (branch) {
   int rows = 0, folds = 0;
