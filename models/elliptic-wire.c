@@ -87,7 +87,7 @@ static const pw_field wire_fields[] = {
   { .name = NULL },
 };
 
-static const pw_quantity wire_reaction[] = { { "N", "N", NULL,
+static const pw_quantity wire_reaction[] = { { "multiplier", "N", NULL,
                                                "times (X/a, Y a/b^2): the force on the body, outwards" } };
 
 /* Parameters of a wire: centre, a, 1/a and a/b^2. */

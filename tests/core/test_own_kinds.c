@@ -43,7 +43,7 @@ TEST (planet) {
                  "t (h w)^4 at h = 1 ms and w = 5/s, at perihelion");
     check_close ("y", trial_state (x.system, &now, "bead.y"), p[1], 5e-9,
                  "t (h w)^4 at h = 1 ms and w = 5/s, at perihelion");
-    check_close ("N", trial_reaction (x.system, &now, "orbit.N"), 0, 5e-9, "(h w)^4 times the attraction");
+    check_close ("N", trial_reaction (x.system, &now, "orbit.multiplier"), 0, 5e-9, "(h w)^4 times the attraction");
     check_close ("balance", now.balance, 0, 5e-9, "(h w)^4");
   }
   pw_run_close (r);
@@ -59,7 +59,7 @@ TEST (faster) {
     pw_sample now = runs_to (r, t);
     double X = trial_state (x.system, &now, "bead.x") + own_e, Y = trial_state (x.system, &now, "bead.y");
     double s = hypot (X, Y / (own_b * own_b)), rho = own_b * own_b * s * s * s;
-    check_close ("force", -s * trial_reaction (x.system, &now, "orbit.N"), (1.2 * 1.2 - 1) * 4 / rho, 1e-7,
+    check_close ("force", -s * trial_reaction (x.system, &now, "orbit.multiplier"), (1.2 * 1.2 - 1) * 4 / rho, 1e-7,
                  "t (h w)^4 times the force at perihelion");
   }
   pw_run_close (r);
@@ -213,7 +213,7 @@ TEST (show) {
   assert_non_null (strstr (cli_out, "Derivatives by differences"));
   assert_non_null (strstr (cli_out, "  force_q of element type attraction\n"));
   cli_good ("pinwheel show elliptic-wire --matrices");
-  assert_non_null (strstr (cli_out, "orbit.N [N]"));
+  assert_non_null (strstr (cli_out, "orbit.multiplier [N]"));
   cli_bad ("pinwheel show elliptic-wire --yaml", 2,
            "model elliptic-wire cannot be written as text: attraction sun has an element type of the model's own");
   cli_bad ("pinwheel run elliptic-wire --set e=1", 2,

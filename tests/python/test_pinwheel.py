@@ -46,14 +46,19 @@ def test_every_model_of_the_gallery_opens():
     (lambda: pw.Model("ezyroller", start={"m1": 1}), pw.InputError, "start: m1 is a parameter of model ezyroller, expected a state"),
     (lambda: pw.Model("ezyroller", **{"frame.vx": 1}), pw.InputError, "'frame.vx': expected a parameter; initial values of states"),
     (lambda: pw.Model("snakeboard").run(step=1e-300), pw.InputError, "setting step = 1e-300: expected at least"),
-    (lambda: pw.Model("pendulum", m=-1).run(), pw.InputError, "m = -1"),
+    (lambda: pw.Model("pendulum", m=-1), pw.InputError, "m = -1"),
+    (lambda: pw.Model("snakeboard", swing=math.nan), pw.InputError, "swing = nan"),
+    (lambda: pw.Model("snakeboard", start={"board.vxx": 1}), pw.InputError, 'did you mean "board.vx"?'),
+    (lambda: pw.Model("ezyroller", signals={"ridr": math.cos}), pw.InputError, 'did you mean "rider"?'),
+    (lambda: pw.sweep("snakeboard", {"swng": [1]}), pw.InputError, "did you mean 'swing'?"),
+    (lambda: pw.sweep("snakeboard", {"board.vxx": [1]}), pw.InputError, 'did you mean "board.vx"?'),
     (lambda: pw.Model("snakeboard").run("rk9"), pw.InputError, "rk9"),
     (lambda: pw.Model("snakeboard").run(start={"bord.x": 1}), pw.InputError, 'did you mean "board.x"?'),
     (lambda: pw.Model("snakeboard").run(times=np.zeros((2, 2))), pw.InputError, "found shape (2, 2)"),
     (lambda: pw.Model("snakeboard").run(times=[1, 0.5]), pw.InputError, "increasing times"),
     (lambda: pw.Model("snakeboard").run(every=-1), pw.InputError, "every = -1"),
     (lambda: pw.Model("ezyroller", a=0, b=0, c=0, d=0).run(), pw.Error, "ezyroller"),
-    (lambda: pw.describe(bodies=[{"name": "a", "mas": 1}]).run(), pw.InputError, "mas"),
+    (lambda: pw.describe(bodies=[{"name": "a", "mas": 1}]), pw.InputError, 'yaml:3:19: error: a body has no "mas"'),
     (lambda: pw.command("check", "snakebord"), pw.InputError, "snakebord"),
 ])
 def test_refusals_have_the_text_of_the_library(make, kind, text):
@@ -81,6 +86,34 @@ def test_functions_as_signals():
     r = pw.describe(bodies=bodies, elements=[element]).run("erk8", t_end=3, rtol=1e-12)
     assert r["disc.omega"][-1] == pytest.approx(math.sin(3) / 2, abs=1e-11)
     assert r["disc.phi"][-1] == pytest.approx((1 - math.cos(3)) / 2, abs=1e-11)
+
+
+def swinging(rate, acceleration, w=math.pi):
+    """The snakeboard with a swing of 0.7 rad, whose derivatives have these factors."""
+    return pw.Model("snakeboard", signals={"swing": lambda t: (
+        0.7 * math.cos(w * t), -0.7 * rate * w * math.sin(w * t), -0.7 * acceleration * w * w * math.cos(w * t))})
+
+
+@pytest.mark.parametrize("w", [0.01, 1, 100, 1e5])
+def test_derivatives_of_functions_are_checked(w):
+    swinging(1, 1, w)
+    with pytest.raises(pw.InputError, match="signal swing: the rate at t = 0.3137 s is .*, but the derivative is"):
+        swinging(-1, 1, w)
+    with pytest.raises(pw.InputError, match="signal swing: the acceleration at t = 0.3137 s is .*, but the derivative is"):
+        swinging(1, 1.1, w)
+
+
+def test_functions_that_interpolate_pass_the_check_of_derivatives():
+    t = np.arange(0, 6, 0.02)
+    tables = np.cos(3 * t), -3 * np.sin(3 * t), -9 * np.cos(3 * t)
+    model = pw.Model("snakeboard", signals={"swing": lambda now: tuple(np.interp(now, t, x) for x in tables)})
+    assert "swing" in model.signals
+
+
+def test_functions_of_forces_are_not_called_before_the_run():
+    calls = []
+    pw.Model("ezyroller", signals={"rider": lambda t: calls.append(t) or 0.0})
+    assert calls == []
 
 
 def test_a_failing_function_stops_the_run(capfd):
@@ -193,8 +226,14 @@ def test_changed_initial_values_are_reported():
     assert model.run(t_end=0.01).changed == {}
     r = model.run(t_end=0.01, start={"frame.vy": 1})
     assert r.changed["frame.omega"] == (0, pytest.approx(2, rel=1e-12)) and len(r.changed) == 3
-    with pytest.warns(UserWarning, match="model ezyroller: given initial values were changed to satisfy the constraints: frame.vy from 1 to .*, frame.omega from 0"):
+    with pytest.warns(UserWarning, match="model ezyroller: initial values were changed to satisfy the constraints: frame.vy from 1 to .*, frame.omega from 0"):
         model.run(t_end=0.01, start={"frame.vy": 1, "frame.omega": 0})
+    sleigh = pw.describe(bodies=[pw.Body("sleigh", mass=1, inertia=0.5, rate={"vx": 1, "vy": 0.1, "omega": 0.8})],
+                         elements=[pw.Wheel("edge", body="sleigh", at=[-0.25, 0])])
+    with pytest.warns(UserWarning, match="vy from 0.1 to 0.18.* m/s .specified by the model., sleigh.omega from 0.8 to 0.75"):
+        sleigh.run(t_end=0.01)
+    with pytest.warns(UserWarning, match="constraints: sleigh.omega from 0.8 to 0 rad/s .specified by the model.$"):
+        sleigh.run(t_end=0.01, start={"sleigh.vy": 0, "sleigh.vx": 1})
 
 
 def test_controller():
@@ -279,6 +318,12 @@ def test_sweep_has_the_values_of_the_program(tmp_path):
     data = pw.sweep("snakeboard", {"swing": [0.3, 0.6], "board.vx": [0, 0.1, 0.2]}, t_end=1, method="rk4+projection", step=1e-3)
     for name in ("board.x", "board.phi", "rotor.omega"):
         assert np.array_equal(np.asarray(data[name]).ravel(), expected[name]), name
+
+
+def test_a_sweep_of_which_all_runs_fail_has_its_columns():
+    data = pw.sweep("snakeboard", {"swing": [0.1, 0.2]}, method="erk8", max_steps=3, t_end=1, energy=True)
+    good = pw.sweep("snakeboard", {"swing": [0.1, 0.2]}, method="erk8", t_end=1, energy=True)
+    assert set(data) == set(good) and np.isnan(np.asarray(data["board.x"])).all() and all(np.asarray(data["failed"]))
 
 
 def table_of_sweep(path):

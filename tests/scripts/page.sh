@@ -127,7 +127,7 @@ grep -q '"method": "erk8+projection"' "$work/table.html"
 report 'a default method of a model that pages do not have is replaced' $?
 
 "$pinwheel" page ezyroller -o "$work/x.html" 2>"$work/log"
-[ $? = 2 ] && grep -q 'name its source' "$work/log"
+[ $? = 2 ] && grep -q 'name its source, a .c file; .* installed in share/doc/pinwheel/examples' "$work/log"
 report 'a compiled model without its source is refused' $?
 "$pinwheel" page snakeboard --method ida+ggl -o "$work/x.html" 2>"$work/log"
 [ $? = 2 ] && grep -q 'pages have rk4, erk5 and erk8' "$work/log" && [ ! -e "$work/x.html" ]

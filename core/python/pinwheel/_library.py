@@ -14,6 +14,7 @@ import pathlib
 VERSION = "0.1.0"
 PW_OK, PW_RETRY, PW_STOPPED, PW_RESOURCE, PW_INPUT, PW_INITIAL, PW_METHOD = 0, 1, 2, -1, -2, -3, -4
 PW_FUNCTION, PW_STEADY, PW_SPECIALISE_STEPS = 2, 0, 1000000
+PW_FORCE, PW_HOLONOMIC, PW_NONHOLONOMIC = range(3)
 PW_NUMBER, PW_POINT, PW_VECTOR, PW_BODY, PW_SIGNAL, PW_CHOICE = range(6)
 DOMAINS = {"PW_REAL": "", "PW_NONNEGATIVE": ">= 0", "PW_POSITIVE": "> 0", "PW_COUNT": "1, 2, 3, ...",
            "PW_FRACTION": "from 0 to 1"}  # in the order of pw_domain
@@ -158,7 +159,9 @@ pw_field = _structure(
     choices=c.POINTER(c.c_char_p), about=c.c_char_p)
 pw_quantity = _structure("pw_quantity", name=c.c_char_p, unit=c.c_char_p, about=c.c_char_p)
 pw_kind = _structure(
-    "pw_kind", name=c.c_char_p, about=c.c_char_p, fields=c.c_void_p, rows=c.c_int, reaction=c.c_void_p)
+    "pw_kind", name=c.c_char_p, about=c.c_char_p, fields=c.c_void_p, rows=c.c_int, reaction=c.c_void_p, level=c.c_int,
+    force_u=c.c_void_p)
+pw_element = _structure("pw_element", kind=c.POINTER(pw_kind), definition=c.POINTER(c.c_char_p))
 pw_plugin_table = _structure(
     "pw_plugin_table", about=c.c_char_p, parameters=c.c_void_p, run__t_end=c.c_double, run__step=c.c_double,
     run__rtol=c.c_double, run__method=c.c_char_p)
@@ -205,8 +208,10 @@ _declare(core, _i, ("pw_run_advance_to", _p, _d, _d, _e), ("pw_run_restart", _p,
          ("pw_run_record_width", _p), ("pw_run_linear_modes", _p, _i, c.POINTER(pw_linear), _e),
          ("pw_run_record", _p, _d, _p, c.c_long, c.c_long, _p, c.POINTER(c.c_long), _e))
 _declare(core, _d, ("pw_run_time", _p))
+_declare(core, c.POINTER(pw_element), ("pw_model_elements", _p, c.POINTER(_i)))
 _declare(core, c.POINTER(pw_initial_report), ("pw_run_initial", _p))
-_declare(core, _i, ("pw_initial_moved", _p, c.POINTER(pw_initial_report), _i), ("pw_initial_given", c.POINTER(pw_initial_report), _i))
+_declare(core, _i, ("pw_initial_moved", _p, c.POINTER(pw_initial_report), _i), ("pw_initial_given", c.POINTER(pw_initial_report), _i),
+         ("pw_initial_specified", c.POINTER(pw_initial_report), _i))
 _declare(core, c.POINTER(pw_statistics), ("pw_run_statistics", _p))
 
 

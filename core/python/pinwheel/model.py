@@ -156,14 +156,16 @@ class Model:
         Initial values of states [m, rad, m/s, rad/s], such as ``{"frame.vx": 1}``.
     signals : dict, optional
         Functions of the time [s] that replace signals: ``{"rider": lambda t: 0.1 * math.cos(t)}``; of a constraint they
-        return the value, its rate and its acceleration.  The name is that of the element, or ELEMENT.FIELD.
+        return the value, its rate and its acceleration, which are compared at a few times, to 1 %.  The name is that of
+        the element, or ELEMENT.FIELD.
     **parameters : float or str
         Values of the model's parameters, in the units of :attr:`units`, or expressions such as ``"30*deg"``.
 
     Raises
     ------
     InputError
-        For an unknown name, parameter or state, with the nearest valid name.
+        For an unknown name, parameter, state or signal, with the nearest valid name; for a value that the model refuses;
+        and for a function, of a constraint, whose rate or acceleration is not the derivative of its value.
 
     Attributes
     ----------
@@ -173,6 +175,8 @@ class Model:
     defaults : dict
         Method, t_end, step, rtol of the model; rtol None: the library's default.
     """
+
+    _warns_of = staticmethod(lib.core.pw_initial_specified)  # whether a run warns of a changed initial value
 
     def __init__(self, model, *, start: dict | None = None, signals: dict[str, Callable] | None = None, **parameters):
         self._origin = model if isinstance(model, _Described) else str(model)  # keeps the file of a described model
@@ -200,6 +204,7 @@ class Model:
                 raise lib.InputError(f"model {self.name} has no parameter {name!r}{_nearest(name, self.parameters)}")
             self.parameters[name] = self._given[name] = lib.number(value, name)
         self._compiled = None
+        self._compile()  # refuses what is wrong
 
     def __repr__(self):
         changed = "".join(f", {name}={value:g}" for name, value in self._given.items())
@@ -235,7 +240,7 @@ class Model:
 
     # ---- Compiling ----
 
-    def _compile(self, inputs=()):
+    def _compile(self, inputs=None):
         """The compiled system, and the cells (C doubles) that its inputs read, by name."""
         if not inputs and self._compiled:
             return self._compiled
@@ -252,7 +257,8 @@ class Model:
         lib.check(error)
         for name, function in self.signals.items():
             self._set_signal(model, name, _callback(function, raised), None, keep)
-        cells = {name: c.c_double(value) for name, value in lib.numbers(inputs, "inputs").items()}
+            _check_derivatives(name, function, _derivatives(model.pointer, name.partition(".")[0]))
+        cells = {name: c.c_double(value) for name, value in lib.numbers(inputs or {}, "inputs").items()}
         reads_cell = c.cast(lib.core.pw_input_signal, c.c_void_p).value
         for name, cell in cells.items():
             self._set_signal(model, name, reads_cell, c.addressof(cell), keep)
@@ -443,6 +449,37 @@ def _functions(signals):
     return dict(signals)
 
 
+def _derivatives(model, element):
+    """The number of derivatives of its signals that an element of a built model needs."""
+    count = c.c_int()
+    elements = lib.core.pw_model_elements(model, c.byref(count))
+    kind = next(e.kind.contents for e in elements[:count.value] if e.definition[0] == element.encode())
+    return 0 if kind.force_u else {lib.PW_HOLONOMIC: 2, lib.PW_NONHOLONOMIC: 1}.get(kind.level, 0)
+
+
+def _check_derivatives(name, function, count):
+    """Refuses a function of a constraint if one of its first `count` derivatives is not the derivative of the last one.
+
+    It is compared with central differences of many widths, one of which must agree within 1 %: the function may interpolate.
+    """
+    for i in range(1, count + 1):
+        found, size = [], 0.0
+        for t in (0.3137, 1.7321, 4.1231):  # [s], arbitrary, hardly a point of a table
+            try:
+                given, value = function(t)[i], function(t)[i - 1]
+                slopes = [(function(t + h)[i - 1] - function(t - h)[i - 1]) / (2 * h) for h in 0.5 ** np.arange(4, 24)]
+                slope = min(slopes, key=lambda x: abs(x - given))
+                if math.isfinite(given + slope):
+                    found.append((t, given, slope))
+                    size = max(size, abs(given) + abs(slope) + 1e-6 * abs(value))
+            except Exception:  # noqa: BLE001: it ends the run, if that gets there
+                continue
+        for t, given, slope in found:
+            if abs(given - slope) > 0.01 * size:
+                what = ("rate", "acceleration")[i - 1]
+                raise lib.InputError(f"signal {name}: the {what} at t = {t} s is {given:.6g}, but the derivative is {slope:.4g}")
+
+
 def _callback(function, raised):
     """A function of the time as the library calls it; an exception stops the run and is kept in `raised`, by thread."""
 
@@ -493,7 +530,7 @@ def describe(name: str = "model", *, about: str = "", bodies=(), elements=(), pa
     Raises
     ------
     InputError
-        With the line of the text model that is wrong.
+        With the line of the text model that is wrong, or as :class:`Model` does.
 
     Examples
     --------

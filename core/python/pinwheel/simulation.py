@@ -97,6 +97,25 @@ def specialised(when: str, steps: float) -> bool:
     return when == "always" or (when == "auto" and steps >= lib.PW_SPECIALISE_STEPS)
 
 
+def columns(s, ledger) -> tuple[dict, dict]:
+    """Of a compiled system: units of all columns by name, in their order; names of columns by group, as in :class:`Result`."""
+    n, core = lib.core.pw_system_coordinates(s), lib.core
+    units, groups = dict(_FIRST_COLUMNS), {}
+    groups["states"] = [lib.name_of(core.pw_system_state_name, s, i) for i in range(2 * n)]
+    for i, name in enumerate(groups["states"]):
+        units[name] = lib.text(core.pw_system_state_unit(s, i))
+    for i, name in enumerate(groups["states"][n:]):
+        unit = units[name]
+        units[name + "'"] = unit[:-1] + "s^2" if unit.endswith("/s") else unit + "/s"
+    groups["reactions"] = [lib.name_of(core.pw_system_reaction_name, s, i) for i in range(core.pw_system_rows(s))]
+    for i, name in enumerate(groups["reactions"]):
+        units[name] = lib.text(core.pw_system_reaction_unit(s, i))
+    entries = core.pw_system_ledger_entries(s) if ledger else 0
+    groups["ledger"] = [lib.name_of(core.pw_system_ledger_name, s, i) for i in range(entries)]
+    units.update(dict.fromkeys(groups["ledger"], "J"))
+    return units, groups
+
+
 class Simulation:
     """An open run of a model, advanced by its caller: for controllers, or to look at every step.
 
@@ -110,7 +129,7 @@ class Simulation:
         Inputs that may be set between steps, by name; after a change the method restarts from the state reached.
     changed : dict of tuple
         Initial values that the constraints have changed: (described, consistent) by name of the state; a warning names
-        those that the user has given.
+        those that the user gives or, except in sweeps, the model specifies.
 
     Examples
     --------
@@ -136,18 +155,21 @@ class Simulation:
         self._restart = True
 
     def _initial(self):
-        """The attribute `changed`; warns of changed values that the user has given."""
-        s, core, report, changed, given = self._system.pointer, lib.core, lib.core.pw_run_initial(self._run), {}, []
+        """The attribute `changed`; warns of it."""
+        s, core, report, changed, texts = self._system.pointer, lib.core, lib.core.pw_run_initial(self._run), {}, []
         n, x = core.pw_system_coordinates(s), report.contents
         for i in range(2 * n):
             if not core.pw_initial_moved(s, report, i):
                 continue
             name = lib.name_of(core.pw_system_state_name, s, i)
             changed[name] = (x.q_given[i], x.q[i]) if i < n else (x.v_given[i - n], x.v[i - n])
-            if core.pw_initial_given(report, i):
-                given.append(f"{name} from {changed[name][0]:.10g} to {changed[name][1]:.10g} {lib.text(core.pw_system_state_unit(s, i))}")
-        if given:
-            warnings.warn(f"model {self.model.name}: given initial values were changed to satisfy the constraints: {', '.join(given)}", stacklevel=4)
+            if self.model._warns_of(report, i):
+                texts.append(f"{name} from {changed[name][0]:.10g} to {changed[name][1]:.10g} {lib.text(core.pw_system_state_unit(s, i))}"
+                             + ("" if core.pw_initial_given(report, i) else " (specified by the model)"))
+        if texts[8:]:
+            texts[8:] = [f"and {len(texts) - 8} more"]
+        if texts:
+            warnings.warn(f"model {self.model.name}: initial values were changed to satisfy the constraints: {', '.join(texts)}", stacklevel=4)
         return changed
 
     def __enter__(self) -> Simulation:
@@ -199,22 +221,7 @@ class Simulation:
                                                         "position", "velocity", "g", "jv")}
 
     def _columns(self):
-        """Units of all columns by name, in their order; names of columns by group, as in :class:`Result`."""
-        s, n, core = self._system.pointer, lib.core.pw_system_coordinates(self._system.pointer), lib.core
-        units, groups = dict(_FIRST_COLUMNS), {}
-        groups["states"] = [lib.name_of(core.pw_system_state_name, s, i) for i in range(2 * n)]
-        for i, name in enumerate(groups["states"]):
-            units[name] = lib.text(core.pw_system_state_unit(s, i))
-        for i, name in enumerate(groups["states"][n:]):
-            unit = units[name]
-            units[name + "'"] = unit[:-1] + "s^2" if unit.endswith("/s") else unit + "/s"
-        groups["reactions"] = [lib.name_of(core.pw_system_reaction_name, s, i) for i in range(core.pw_system_rows(s))]
-        for i, name in enumerate(groups["reactions"]):
-            units[name] = lib.text(core.pw_system_reaction_unit(s, i))
-        entries = core.pw_system_ledger_entries(s) if self._settings.ledger else 0
-        groups["ledger"] = [lib.name_of(core.pw_system_ledger_name, s, i) for i in range(entries)]
-        units.update(dict.fromkeys(groups["ledger"], "J"))
-        return units, groups
+        return columns(self._system.pointer, self._settings.ledger)
 
     # ---- Steps of the caller ----
 

@@ -17,24 +17,26 @@ import numpy as np
 from . import _library as lib
 from . import _program
 from ._progress import watched
-from .simulation import specialised
+from .simulation import columns, specialised
 
 # ---- Sweeps ----
 
 def _final(model, parameters, start, method, t_end, settings, cancelled=None):
-    """The last sample of one run, its units, and why it failed, or "".
+    """The last sample of one run, {} if it failed; the units of its columns; why it failed, or "".
 
     Executors call it in threads or other processes; cancelled: a function that says whether to stop.
     """
     varied = model.replace(start=start, **parameters)
+    varied._warns_of = lib.core.pw_initial_given  # as the program does
     end = varied.defaults["t_end"] if t_end is None else t_end
+    units, _ = columns(varied._compile()[0].pointer, settings.get("energy"))
     try:
         with varied.open(method, t_end=end or None, **settings) as simulation:
             simulation._cancelled = cancelled or simulation._cancelled
             simulation.advance(end)
-            return simulation.sample(), simulation._columns()[0], ""
+            return simulation.sample(), units, ""
     except (lib.InitialError, lib.MethodError) as failure:
-        return {}, {}, str(failure)
+        return {}, units, str(failure)
 
 
 def _points(vary):
@@ -96,8 +98,9 @@ def sweep(model, vary: dict, *, method: str | None = None, t_end: float | None =
     if not hasattr(pool, "submit"):
         raise lib.InputError(f"executor: expected a concurrent.futures.Executor, found {executor!r:.60}")
     try:
-        pending = [pool.submit(_final, model, {n: x for n, x in p.items() if n in model.parameters},
-                               {n: x for n, x in p.items() if n not in model.parameters}, method, t_end, settings, *watch)
+        starts = {n for n in names if n not in model.parameters and "." in n}
+        pending = [pool.submit(_final, model, {n: x for n, x in p.items() if n not in starts},
+                               {n: x for n, x in p.items() if n in starts}, method, t_end, settings, *watch)
                    for p in points]
         with watched(progress) as report:
             rows = [(future.result(), report((i + 1) / len(pending)))[0] for i, future in enumerate(pending)]
@@ -111,15 +114,15 @@ def sweep(model, vary: dict, *, method: str | None = None, t_end: float | None =
 def _table(values, rows, units):
     """The result of a sweep.  values: those varied, by name; rows: results of _final; units: those of parameters."""
     shape = [len(v) for v in values.values()]
-    columns = next((of for row, of, _ in rows if row), {})
-    table = {name: np.array([row.get(name, np.nan) for row, _, _ in rows]).reshape(shape) for name in columns}
+    names = next((of for row, of, _ in rows if row), rows[0][1])
+    table = {name: np.array([row.get(name, np.nan) for row, _, _ in rows]).reshape(shape) for name in names}
     table["failed"] = np.array([why for _, _, why in rows], dtype=object).reshape(shape)
     try:
         import xarray
     except ImportError:
         return {**table, **values}
     data = xarray.Dataset({name: (list(values), column) for name, column in table.items() if name not in values}, coords=values)
-    for name, unit in {**columns, **units}.items():
+    for name, unit in {**names, **units}.items():
         if name in data.variables:
             data[name].attrs["units"] = unit
     return data
