@@ -47,8 +47,9 @@ struct pw_run {
   int uses_derivatives;   /* 1: the method uses the derivatives of the equations (tangent.h); only for opening */
   double alpha, beta;     /* Baumgarte's [1/s], used by pw_run_accelerate; 0: none */
   double breakpoint;      /* next discontinuity of a signal, or INFINITY; t if it has just been reached */
-  int stalled;            /* consecutive steps that did not advance */
-  pw_residuals residuals; /* of the state reached, until a sample is projected; NaN: not computed */
+  double moved_from, moved_to; /* ends of the last change of t without a step; between them the state is the same */
+  int stalled;                 /* consecutive steps that did not advance */
+  pw_residuals residuals;      /* of the state reached, until a sample is projected; NaN: not computed */
 
   /* The state reached, where `advance` leaves kinematics and J evaluated.  Of adams and bdf, a and lambda may be those
    * of the last iterate until `at` is called. */
