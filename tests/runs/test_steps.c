@@ -165,6 +165,22 @@ TEST (adjacent_in_motion) {
   pw_system_free (s);
 }
 
+/* No tiny step remains before the end, since round-off would dominate its multipliers. */
+TEST (tiny_remainder) {
+  static const char *const method[] = { "rk4+projection", "leapfrog", "galpha", "galpha+ggl", "radau:steps=fixed" };
+  pw_system *s = scene_named ("pendulum", NULL, 0);
+  for (int i = 0; i < 5; i++) {
+    pw_run *r = runs_open (s, method[i], &(pw_settings){ .step = 0.01 });
+    const double before = runs_to (r, 0.1).lambda[0];
+    pw_run_close (r);
+    r = runs_open (s, method[i], &(pw_settings){ .step = 0.01 });
+    check_close (method[i], runs_to (r, 0.1 + 1e-10).lambda[0], before, 1e-2, "h^2: galpha starts anew");
+    assert_int_equal (pw_run_statistics (r)->steps, 10);
+    pw_run_close (r);
+  }
+  pw_system_free (s);
+}
+
 /* ---- User functions ---- */
 
 static int steps_breaks (void *context, double t, const double *x, double value[3], double *gradient) {
