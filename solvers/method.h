@@ -120,9 +120,9 @@ typedef struct {
   long count; /* steps since then */
 } pw_step_counter;
 
-/* End of the next step of size h: the next multiple of h, or t_end or a breakpoint if one of them is earlier, or later by
- * at most PW_STEP_LONGER h, so that no tiny step remains, in which round-off dominates multipliers; *whole: 1 if it is
- * the multiple.  Times within 1e-9 h of each other differ by round-off only. */
+/* End of the next step of size h: the next multiple of h; or t_end or a breakpoint, if it is earlier, or later by up to
+ * PW_STEP_LONGER h, so that no tiny step remains, in which round-off dominates multipliers; *whole: 1 if it is the
+ * multiple.  Times within 1e-9 h of each other differ by round-off only. */
 #define PW_STEP_LONGER 0.01
 static inline double pw_step_end (const pw_run *r, const pw_step_counter *c, double t_end, int *whole) {
   double h = r->settings.step, t1 = c->base + (double)(c->count + 1) * h, stop = fmin (t_end, r->breakpoint);
