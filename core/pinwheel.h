@@ -59,7 +59,7 @@ typedef enum {
 } pw_status;
 
 /* An error, owned by the caller and zero-initialised.  It keeps the first failure.  NULL in place of a file, model,
- * system or run is an error too, so that the result of a failed call may be passed to the next call. */
+ * system, workspace or run is an error too, so that the result of a failed call may be passed to the next call. */
 typedef struct {
   int status; /* a pw_status; 0: no error yet */
   /* One line without a full stop: found value, expected value, nearest valid name.  Text models: preceded by
@@ -566,7 +566,7 @@ struct pw_kind {
   int internal;           /* internal coordinates */
   int rows;               /* constraint equations */
   int signals;    /* in the order of the fields; they belong to its force if force_u is set, else to its constraints */
-  int each_body;  /* 1: names no body; acts on every body with mass */
+  int each_body;  /* 1: names no body; acts on every body with mass, which its reactions etc. name: "air.frame.N" */
   int constant;   /* 1: its force is constant and evaluated once, when the system is compiled */
   pw_level level; /* of its constraint equations */
   const pw_quantity *reaction;                                 /* rows: meaning of each -lambda */
@@ -784,8 +784,8 @@ int pw_system_jumps (const pw_system *s, double t);
 
 /* Specialised code: C code for this system alone, which evaluates and projects it faster than the library
  * (pw_settings.specialised).  independent: for each constraint equation, 0 if it is redundant (pw_run_source); NULL:
- * none is redundant.  Free the text.  NULL and the error if a system cannot have such code, for example with too many
- * constraint equations or elements. */
+ * none is redundant.  Free the text.  NULL and the error if a system cannot have such code, for example if it is too
+ * large. */
 char *pw_system_source (const pw_system *s, const unsigned char *independent, pw_error *error);
 
 /* 1 if compiled code has this library's interface to such code and is of a system with the same structure: parameters
@@ -802,7 +802,7 @@ int pw_specialised_lanes_count (const pw_specialised_lanes *code);
 /* Memory for the runs of one thread; NULL if out of memory.  Free it. */
 void *pw_specialised_lanes_memory (const pw_specialised_lanes *code);
 /* 1 if the code can be compiled for several runs at once: all element types are built-in, signals depend on time alone,
- * and there are not too many constraint equations or elements.  The runs must not have redundant equations. */
+ * and the system is not too large.  The runs must not have redundant equations. */
 int pw_system_has_lanes (const pw_system *s);
 /* 1 if accelerations may be discontinuous within a step, at some states: an element type is from a plug-in, or a
  * signal depends on states. */
@@ -833,6 +833,8 @@ void pw_workspace_free (pw_workspace *w);
 /* Number of elements with a place on the ground, which is the contact point of a wheel or tyre, or the point of a
  * marker; place (x, y) [m] and heading [rad] of each. */
 int pw_system_contacts (const pw_system *s);
+/* Name of x (i = 0) or y (1) of the first contact point, "W.x", of the next (2, 3) etc., as pw_system_state_name. */
+char *pw_system_contact_name (const pw_system *s, int i, char *buffer, size_t size);
 int pw_workspace_contact_points (pw_workspace *w, double t, const double *q, const double *v, double (*out)[3],
                                  pw_error *error);
 

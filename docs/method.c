@@ -1,7 +1,7 @@
 /* An integration method of your own: that of Kutta of order 3; measures its order on a pendulum with a known motion.
  * From the source tree, after `make`:
  *     cc -std=c11 -Ibuild/include docs/method.c -o method -Lbuild -lpinwheel-files -lpinwheel -Wl,-rpath,$PWD/build -lm
- * with an installed Pinwheel as docs/embed.c. */
+ * with an installed Pinwheel as docs/embed.c.  For `pinwheel compare` compile a method into Pinwheel (adding.md). */
 #include <math.h>
 #include <stdio.h>
 #include "pinwheel-files.h"

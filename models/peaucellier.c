@@ -61,8 +61,8 @@ static joints joints_at (const inversor *p, double angle) {
 static void build (pw_model *m, const void *parameter) {
   const inversor *p = parameter;
   /* least_OB: smallest distance of B from O; arm, side: half lengths */
-  double least_OB = 2 * p->a * cos (fmin (fabs (p->swing), PW_PI) / 2), arm = p->L / 2, side = p->s / 2;
-  if (least_OB <= fabs (p->L - p->s)) {
+  double least_OB = 2 * p->a * cos (p->swing / 2), arm = p->L / 2, side = p->s / 2;
+  if (fabs (p->swing) >= PW_PI || least_OB <= fabs (p->L - p->s)) {
     pw_model_refuse (m, "swing = %g: arms and rhombus do not reach the crank there", p->swing);
     return;
   }

@@ -31,7 +31,7 @@ typedef struct {
   unsigned char *rigid; /* unknowns: 1 for rigid displacements of the whole, under which the equations are invariant */
   int symmetries;       /* number of symmetry directions among x, y, phi */
   pw_steadiness steady;
-  double twist[3];     /* velocity of the frame [m/s, m/s, rad/s] */
+  double twist[3];     /* velocity of the frame's origin, at a body or the mean of all; of its rotation [m/s, rad/s] */
   double acceleration; /* the largest in that frame; angles multiplied by the length scale [m/s^2] */
   /* Of pw_run_linear_modes, otherwise NULL; axes are those of the frame, which are the world's at this moment. */
   double *B;     /* unknowns x signals, by rows: x' = A x + B u, u added to the signals of forces [m/s per unit of the
@@ -184,7 +184,8 @@ void pw_steady_close (pw_steady *x);
 int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_motion *out, pw_error *error);
 /* Why the system could last not be evaluated during the search, or why a branch ended within the range; or "". */
 const char *pw_steady_reason (const pw_steady *x);
-/* Number of symmetries: displacements of the whole, and angles on which nothing depends. */
+/* Number of symmetries: displacements of the whole, and angles on which nothing depends.  It decreases when
+ * pw_steady_solve reaches a solution without some of them; solutions found before may then count as different. */
 int pw_steady_symmetries (const pw_steady *x);
 /* Whether two states differ by symmetries only. */
 int pw_steady_same (pw_steady *x, const double *q1, const double *v1, const double *q2, const double *v2);
@@ -263,7 +264,8 @@ const char *pw_periodic_reason (const pw_periodic *x);
 /* Number of symmetries, as pw_steady_symmetries. */
 int pw_periodic_symmetries (const pw_periodic *x);
 
-/* Follows the branch of the motion last found towards the end of the range (direction 1) or its beginning (-1).
+/* Follows the branch of the motion that pw_periodic_solve has found last, PW_INPUT if it has failed, towards the end of
+ * the range (direction 1) or its beginning (-1).
  * pw_periodic_next returns its points, the first one included, and events in between, then PW_PERIODIC_END (perhaps
  * with pw_periodic_reason). */
 int pw_periodic_follow (pw_periodic *x, int direction, pw_error *error);

@@ -118,6 +118,8 @@ PW_COMMANDS (PW_COMMAND)
       PW_TEXT_OPTION (pw_cli_line, limit, "limit", 0, "SECONDS",                                    \
                       "Stop a run after this much processor time (default unlimited)"),             \
       PW_ENGINE_OPTION
+#define PW_LIMIT_OPTION \
+  PW_TEXT_OPTION (pw_cli_line, limit, "limit", 0, "SECONDS", "Stop after this much processor time (default unlimited)")
 #define PW_ENGINE_OPTION                                                                                    \
   PW_TEXT_OPTION (                                                                                          \
       pw_cli_line, specialise, "specialise", 0, "WHEN",                                                     \
@@ -274,6 +276,9 @@ int pw_cli_check_csv (const char *path, pw_error *error);
 /* A number as text (pw_format), in a buffer that lives as long as the block around it. */
 #define PW_DIGITS(value, digits) pw_format ((char[32]){ 0 }, value, digits)
 
+/* "1 run", "2 runs", likewise. */
+#define PW_COUNTED(count, noun) PW_PRINTED (60, "%ld %s%s", (long)(count), noun, (count) == 1 ? "" : "s")
+
 /* Prints to a stream; pw_cli_say: to standard error.  On a terminal control characters are escaped. */
 void pw_cli_print (FILE *f, const char *format, ...) PW_PRINTF (2, 3);
 #define pw_cli_say(...) pw_cli_print (stderr, __VA_ARGS__)
@@ -282,7 +287,8 @@ void pw_cli_print (FILE *f, const char *format, ...) PW_PRINTF (2, 3);
  * begin. */
 void pw_cli_print_wrapped (const char *text, int indent, int width);
 
-/* The word for a status PW_OK to PW_METHOD in tables and summaries: "ok", "machine", "input", "start" or "method". */
+/* The word for a status in tables and summaries: "ok", "machine", "input", "start" or "method" for PW_OK to PW_METHOD,
+ * "interrupted" for PW_INTERRUPTED. */
 const char *pw_cli_status_word (int status);
 
 /* Prints an error, if there is one, as "pinwheel: TEXT" on standard error, without "pinwheel:" if TEXT begins with a

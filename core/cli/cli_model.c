@@ -51,6 +51,7 @@ pw_file *pw_cli_file (const pw_cli_line *line, pw_error *error) {
   const double largest = PW_FILE_MAX_BYTES >> 20; /* [MB] */
   double size = PW_FILE_DEFAULT_BYTES >> 20;
   if (pw_cli_number ("--max-file", line->max_file, PW_POSITIVE, &size, error) != PW_OK) return NULL;
+  if (size < 1e-3) return pw_fail (error, PW_INPUT, "--max-file %s: expected at least 0.001 MB", line->max_file), NULL;
   if (size <= largest) return pw_file_open_limited (line->argument[0], (size_t)(size * (1 << 20)), error);
   pw_fail (error, PW_INPUT, "--max-file %s: expected at most %g MB", line->max_file, largest);
   return NULL;

@@ -48,7 +48,7 @@ static int say_pipe_closed (void) {
 
 const char *pw_cli_status_word (int status) {
   static const char *const word[] = { "ok", "machine", "input", "start", "method" };
-  return word[-status];
+  return status == PW_INTERRUPTED ? "interrupted" : word[-status];
 }
 
 int pw_cli_report_error (const pw_error *error) {

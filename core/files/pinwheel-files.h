@@ -41,7 +41,7 @@ const char *pw_file_path (const pw_file *f);
 char *pw_file_find (const char *model, pw_error *error);
 
 /* Calls `each` with the path of each table of a text model, once for each signal that reads it, until it returns
- * non-zero; returns that, 0, or PW_RESOURCE. */
+ * non-zero; returns that, or 0. */
 int pw_file_tables (const pw_file *f, int (*each) (void *context, const char *path), void *context);
 
 /* Calls `each` with the name and path of every model on the search path, sorted by name, until it returns non-zero.

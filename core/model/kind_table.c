@@ -88,6 +88,8 @@ static const char *fault_functions (const pw_kind *kind) {
     if (exact[i] == PW_BY_DIFFERENCES) return "PW_BY_DIFFERENCES is permitted only for second-order blocks";
   if (kind->constant && (kind->force == NULL || kind->signals > 0))
     return "declared constant, but it has no force, or has signals";
+  if (kind->signals > 0 && kind->rows == 0 && kind->force && kind->force_u == NULL)
+    return "a force with signals, but no force_u";
   if (kind->rows > 0 && kind->J == NULL) return "constraint equations without J";
   if (kind->level == PW_HOLONOMIC && kind->g == NULL) return "holonomic constraint equations without g";
   if (kind->level != PW_HOLONOMIC && kind->g) return "g, but no holonomic constraint equations";
@@ -95,10 +97,13 @@ static const char *fault_functions (const pw_kind *kind) {
 }
 
 static const char *fault_names (const pw_kind *kind) {
+  const char *name[PW_MAX_ROWS + 2 * PW_MAX_INTERNAL];
+  int names = 0;
   for (int i = 0; i < kind->rows; i++) {
     const pw_quantity *q = kind->reaction ? &kind->reaction[i] : NULL;
     if (!q || !q->name || !q->unit) return "constraint equations without names of their reactions";
     if (is_bad_text (q->name) || is_bad_text (q->unit)) return "name or unit of a reaction" FAULT_TEXT;
+    name[names++] = q->name;
   }
   for (int i = 0; i < kind->internal; i++) {
     const pw_quantity *q = kind->coordinate ? &kind->coordinate[i] : NULL;
@@ -106,7 +111,11 @@ static const char *fault_names (const pw_kind *kind) {
     if (is_bad_text (q->name) || is_bad_text (q->rate) || is_bad_text (q->unit))
       return "name or unit of an internal coordinate" FAULT_TEXT;
     if (strcmp (q->unit, "rad") != 0) return "an internal coordinate whose unit is not rad";
+    name[names++] = q->name, name[names++] = q->rate;
   }
+  for (int i = 0; i < names; i++)
+    for (int n = 0; n < i; n++)
+      if (strcmp (name[i], name[n]) == 0) return "two reactions or internal coordinates of the same name";
   return "";
 }
 

@@ -184,12 +184,6 @@ static int scene_open (scene_test *test, pw_error *error) {
   return test->memory ? PW_OK : pw_fail_memory (test->probe.s, error);
 }
 
-static int scene_fail_signal (const scene_test *test, pw_error *error) {
-  char signal[PW_NAME_BYTES];
-  return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed: %s is not a finite number, or its function failed",
-                  test->probe.t, pw_failed_signal (test->probe.workspace, signal, sizeof signal));
-}
-
 int pw_selftest_scene (const pw_system *s, double T, const pw_kind *kind, double t, const double *q, const double *v,
                        unsigned seed, pw_selftest_report *report, pw_error *error) {
   pw_random random = { seed };
@@ -204,7 +198,7 @@ int pw_selftest_scene (const pw_system *s, double T, const pw_kind *kind, double
   if (used && status == PW_OK) status = scene_randomise (probe, q, v, &random, error);
   if (used && status == PW_OK) {
     scene_all (&test);
-    if (probe->failed) status = scene_fail_signal (&test, error);
+    if (probe->failed) status = pw_fail_evaluation (w, probe->t, error);
   }
   if (status != PW_OK) *report = (pw_selftest_report){ 0 }; /* checks with a failed signal mean nothing */
   free (test.memory);

@@ -126,6 +126,7 @@ static void verify_all (verified_scene *scene, const double *v, const double *a,
 
 int pw_verify (const pw_system *s, const pw_scale *scale, double t, const double *q, const double *v, const double *a,
                const double *lambda, pw_verification *result) {
+  if (s == NULL) return PW_INPUT;
   size_t rows = (size_t)s->rows, coords = (size_t)s->coords;
   verified_scene scene = { .s = s };
   const pw_array array[] = {

@@ -178,13 +178,16 @@ void pw_specialise_signals (const pw_generator *gen) {
 /* ---- Lanes ---- */
 
 int pw_specialise_check_limits (const pw_system *s, pw_error *error) {
-  const int elements = pw_system_elements (s);
-  if (s->rows > SPECIALISE_ROWS)
-    return pw_fail (error, PW_INPUT, "model %s: %d constraint equations: specialised code has at most %d", s->model,
-                    s->rows, SPECIALISE_ROWS);
-  if (elements > SPECIALISE_ELEMENTS)
-    return pw_fail (error, PW_INPUT, "model %s: %d elements: specialised code has at most %d", s->model, elements,
-                    SPECIALISE_ELEMENTS);
+  const struct {
+    int count, most;
+    const char *what;
+  } limit[] = { { s->rows, SPECIALISE_ROWS, "constraint equations" },
+                { pw_system_elements (s), SPECIALISE_ELEMENTS, "elements" },
+                { s->bodies, SPECIALISE_BODIES, "bodies" } };
+  for (size_t i = 0; i < sizeof limit / sizeof *limit; i++)
+    if (limit[i].count > limit[i].most)
+      return pw_fail (error, PW_INPUT, "model %s: %d %s: specialised code has at most %d", s->model, limit[i].count,
+                      limit[i].what, limit[i].most);
   return PW_OK;
 }
 

@@ -10,6 +10,7 @@
 enum {
   SPECIALISE_ROWS = 60,      /* most constraint equations: code without loops becomes too long */
   SPECIALISE_ELEMENTS = 120, /* most elements: compilation takes about 0.1 s for each */
+  SPECIALISE_BODIES = 200,   /* most bodies: the elimination has a dense matrix */
   SPECIALISE_INLINE = 8      /* up to this number of rows all functions are inlined: common parts are computed once */
 };
 
@@ -24,7 +25,7 @@ typedef struct {
   pw_emitter emitter;
 } pw_generator;
 
-/* PW_INPUT if a system has too many constraint equations or elements for specialised code. */
+/* PW_INPUT if a system has too many constraint equations, elements or bodies for specialised code. */
 int pw_specialise_check_limits (const pw_system *s, pw_error *error);
 /* "rolling_wheel", in the buffer, which is returned. */
 char *pw_specialise_identifier (const pw_kind *kind, char *buffer, size_t size);

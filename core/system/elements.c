@@ -27,8 +27,8 @@ pw_element_info pw_system_element (const pw_system *s, int element) {
 }
 
 static int elements_update (pw_workspace *w, double t, const double *q, const double *v, pw_error *error) {
-  if (pw_update_kinematics (w, t, q, v) == PW_OK) return PW_OK;
-  return pw_fail (error, PW_METHOD, "at t = %g s a signal of the model reports an error", t);
+  if (pw_require (w, "a workspace", error) != PW_OK) return PW_INPUT;
+  return pw_update_kinematics (w, t, q, v) == PW_OK ? PW_OK : pw_fail_evaluation (w, t, error);
 }
 
 /* ---- Contact points ---- */
@@ -39,15 +39,23 @@ int pw_system_contacts (const pw_system *s) {
   return count;
 }
 
+char *pw_system_contact_name (const pw_system *s, int i, char *buffer, size_t size) {
+  const pw_element_batch *k = s->batch;
+  int contact = i / 2;
+  for (; k->kind->contact == NULL || contact >= k->b.count; k++) contact -= k->kind->contact ? k->b.count : 0;
+  return pw_member_name (s, k, contact, i % 2 ? "y" : "x", buffer, size);
+}
+
 int pw_workspace_contact_points (pw_workspace *w, double t, const double *q, const double *v, double (*out)[3],
                                  pw_error *error) {
   int status = elements_update (w, t, q, v, error);
-  for (const pw_element_batch *k = w->batch; status == PW_OK && k < w->batch + w->s->batches; k++) {
+  if (status != PW_OK) return status;
+  for (const pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++) {
     if (k->kind->contact == NULL) continue;
     k->kind->contact (&k->b, out[0]);
     out += k->b.count;
   }
-  return status;
+  return PW_OK;
 }
 
 /* ---- Forces ---- */
@@ -77,7 +85,8 @@ int pw_system_force_size (const pw_system *s) {
 
 int pw_workspace_forces (pw_workspace *w, double t, const double *q, const double *v, const double *lambda, double *out,
                          pw_error *error) {
-  if (elements_update (w, t, q, v, error) != PW_OK) return PW_METHOD;
+  int status = elements_update (w, t, q, v, error);
+  if (status != PW_OK) return status;
   memset (out, 0, (size_t)pw_system_force_size (w->s) * sizeof *out);
   pw_evaluate_J (w);
   for (const pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++) {

@@ -28,13 +28,8 @@ int pw_ledger_list (const pw_system *s, pw_entry *entry) {
 
 char *pw_system_ledger_name (const pw_system *s, int entry, char *buffer, size_t size) {
   const pw_entry *listed = &s->entry[entry];
-  const pw_element_batch *k = &s->batch[listed->batch];
-  const char *what = listed->type == PW_WORK ? "work" : "loss";
-  if (k->kind->each_body)
-    snprintf (buffer, size, "%s.%s.%s", k->name[listed->element], s->body_name[k->b.body[listed->element]], what);
-  else
-    snprintf (buffer, size, "%s.%s", k->name[listed->element], what);
-  return buffer;
+  return pw_member_name (s, &s->batch[listed->batch], listed->element, listed->type == PW_WORK ? "work" : "loss",
+                         buffer, size);
 }
 
 void pw_evaluate_ledger (pw_workspace *w, const double *lambda, double *rate) {

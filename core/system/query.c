@@ -59,6 +59,13 @@ static const pw_element_batch *query_find_element (const pw_system *s, size_t me
   }
 }
 
+char *pw_member_name (const pw_system *s, const pw_element_batch *k, int e, const char *what, char *buffer,
+                      size_t size) {
+  const char *body = k->kind->each_body ? s->body_name[k->b.body[e]] : "";
+  snprintf (buffer, size, "%s%s%s.%s", k->name[e], *body ? "." : "", body, what);
+  return buffer;
+}
+
 char *pw_system_state_name (const pw_system *s, int state, char *buffer, size_t size) {
   int velocity = state >= s->coords, j = velocity ? state - s->coords : state, e, n;
   if (j < 3 * s->bodies) {
@@ -66,8 +73,8 @@ char *pw_system_state_name (const pw_system *s, int state, char *buffer, size_t 
     return buffer;
   }
   const pw_element_batch *k = query_find_element (s, offsetof (pw_kind, internal), j - 3 * s->bodies, &e, &n);
-  snprintf (buffer, size, "%s.%s", k->name[e], velocity ? k->kind->coordinate[n].rate : k->kind->coordinate[n].name);
-  return buffer;
+  const pw_quantity *x = &k->kind->coordinate[n];
+  return pw_member_name (s, k, e, velocity ? x->rate : x->name, buffer, size);
 }
 
 const char *pw_system_state_unit (const pw_system *s, int state) {
@@ -130,8 +137,7 @@ int pw_system_row_element (const pw_system *s, int row) {
 char *pw_system_reaction_name (const pw_system *s, int row, char *buffer, size_t size) {
   int e, n;
   const pw_element_batch *k = query_find_element (s, offsetof (pw_kind, rows), row, &e, &n);
-  snprintf (buffer, size, "%s.%s", k->name[e], k->kind->reaction[n].name);
-  return buffer;
+  return pw_member_name (s, k, e, k->kind->reaction[n].name, buffer, size);
 }
 
 const char *pw_system_reaction_unit (const pw_system *s, int row) {
@@ -172,8 +178,7 @@ char *pw_system_signal_name (const pw_system *s, int signal, char *buffer, size_
   const pw_field *f;
   char field[80];
   const pw_element_batch *k = query_signal (s, signal, &e, &f, &n);
-  snprintf (buffer, size, "%s.%s", k->name[e], pw_field_value_name (f, n, field, sizeof field));
-  return buffer;
+  return pw_member_name (s, k, e, pw_field_value_name (f, n, field, sizeof field), buffer, size);
 }
 
 const char *pw_system_signal_unit (const pw_system *s, int signal) {
@@ -186,7 +191,7 @@ const char *pw_system_signal_unit (const pw_system *s, int signal) {
 int pw_system_find_signal (const pw_system *s, const char *name, pw_error *error) {
   for (int i = 0; s && name && i < s->batches; i++) {
     const pw_element_batch *k = &s->batch[i];
-    for (int e = 0; k->kind->signals == 1 && e < k->b.count; e++)
+    for (int e = 0; k->kind->signals == 1 && !k->kind->each_body && e < k->b.count; e++)
       if (strcmp (k->name[e], name) == 0) return (int)(k->source - s->source) + e;
   }
   return query_find (s, "signal", pw_system_signals, pw_system_signal_name, &(pw_nearest){ .sought = name }, error);
@@ -201,6 +206,11 @@ char *pw_failed_signal (const pw_workspace *w, char *buffer, size_t size) {
   const pw_element_batch *k = query_signal (w->s, (int)(w->failed - w->source), &e, &f, &n);
   snprintf (buffer, size, "%s %s: %s", k->kind->name, k->name[e], pw_field_value_name (f, n, field, sizeof field));
   return buffer;
+}
+
+int pw_fail_evaluation (const pw_workspace *w, double t, pw_error *error) {
+  return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed: %s is not a finite number, or its function failed", t,
+                  pw_failed_signal (w, (char[PW_NAME_BYTES]){ 0 }, PW_NAME_BYTES));
 }
 
 int pw_system_may_jump (const pw_system *s) {

@@ -88,8 +88,13 @@ void pw_close_signals (const pw_source *source, int count);
  * that does not say which values are specified.  0: none of these. */
 enum { PW_GIVEN = 1, PW_SPECIFIED = 2, PW_ZERO_POSITION = 4 };
 
+/* Writes "ELEMENT.what", or "ELEMENT.BODY.what" if its type acts on every body, to the buffer, which is returned. */
+char *pw_member_name (const pw_system *s, const pw_element_batch *k, int e, const char *what, char *buffer,
+                      size_t size);
+
 /* Writes the last signal that failed, "torque T: value", or "", to the buffer and returns it. */
 char *pw_failed_signal (const pw_workspace *w, char *buffer, size_t size);
+int pw_fail_evaluation (const pw_workspace *w, double t, pw_error *error); /* reports it; returns PW_METHOD */
 
 /* 1 for an angle, 0 for a length; internal coordinates are angles. */
 static inline int pw_is_angle (const pw_system *s, int j) {

@@ -68,11 +68,12 @@ int pw_branch_start (pw_branch *b, const double *u, double direction, pw_error *
   size_t n = (size_t)b->problem.unknowns + 1;
   memset (b->condition, 0, b->bytes);
   b->condition[n - 1] = direction > 0 ? 1 : -1;
-  b->folded = b->steps = b->ended = b->queued = b->returned = 0;
-  b->reached.residual = b->residual, b->reached.interpolated = 0;
+  b->folded = b->steps = b->queued = b->returned = 0;
   memmove (b->reached.u, u, b->bytes);
   int status = pw_branch_tangent (b, b->reached.u, b->condition, b->reached.tangent, error);
   if (status != PW_OK) return status;
+  b->reached.residual = b->residual, b->reached.interpolated = 0;
+  b->ended = b->reached.tangent[n - 1] > 0 ? u[n - 1] >= 1 : u[n - 1] <= 0;
   branch_copy (b, &b->reached, &b->first);
   branch_insert (b, &b->reached, PW_BRANCH_POINT, 0, 0);
   return PW_OK;
@@ -268,24 +269,29 @@ static int branch_advance (pw_branch *b, pw_branch_find_events *find_events, pw_
     status = pw_branch_locate (b, branch_slope_of_p, b, error);
     if (status == PW_OK) pw_branch_queue (b, PW_BRANCH_FOLD, 0);
   }
+  if (status == PW_RETRY) pw_fail (why, PW_METHOD, "Newton's method fails at the smallest step");
   if (status == PW_OK) status = find_events (b->problem.context, error);
-  if (status == PW_RETRY && !*why->text) pw_fail (why, PW_METHOD, "Newton's method fails at the smallest step");
+  if (status == PW_RETRY) pw_fail (why, PW_METHOD, "the next point cannot be evaluated");
   if (status != PW_OK) return status;
   *why = (pw_error){ 0 }; /* it may be that of longer steps that were refused */
   branch_insert (b, &b->reached, PW_BRANCH_POINT, 1, 0);
-  if (branch_closed (b)) b->ended = 1, pw_fail (why, PW_METHOD, "it has returned to its first point");
+  if (branch_closed (b)) b->ended = 1;
   return PW_OK;
 }
 
 int pw_branch_next (pw_branch *b, pw_branch_find_events *find_events, pw_error *why, const pw_branch_event **next,
                     pw_error *error) {
   *next = NULL;
+  if (b->steps == 0) *why = (pw_error){ 0 };
   if (b->returned == b->queued && !b->ended) {
     b->queued = b->returned = 0;
     int status = branch_advance (b, find_events, why, error);
-    if (status == PW_RETRY) return b->ended = 1, PW_OK;
+    if (status == PW_RETRY) return b->ended = 1, b->queued = 0, PW_OK;
     if (status != PW_OK) return status;
   }
-  if (b->returned < b->queued) *next = &b->queue[b->returned++];
+  if (b->returned < b->queued)
+    *next = &b->queue[b->returned++];
+  else if (b->steps > 0 && branch_closed (b))
+    pw_fail (why, PW_METHOD, "it has returned to its first point"); /* unless an error has ended it before */
   return PW_OK;
 }

@@ -87,7 +87,7 @@ void pw_branch_close (pw_branch *b);
  * PW_RETRY if it does not converge: u is where it stopped. */
 int pw_branch_solve (pw_branch *b, double *u, pw_error *error);
 
-/* Starts a branch at a solution, the last of pw_branch_solve: p increases along the tangent if direction > 0.  PW_RETRY
+/* Starts a branch at a solution: p increases along the tangent if direction > 0.  PW_RETRY
  * at a fold. */
 int pw_branch_start (pw_branch *b, const double *u, double direction, pw_error *error);
 

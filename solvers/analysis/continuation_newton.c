@@ -119,6 +119,7 @@ int pw_branch_tangent (pw_branch *b, const double *u, const double *c, double *t
   double dot = 0;
   int status = newton_evaluate (b, u, 1, error);
   if (status != PW_OK) return status;
+  b->residual = newton_residual (b);
   memset (b->F, 0, (size_t)b->problem.equations * sizeof *b->F);
   status = newton_least_squares (b, b->F, c, 1, 0);
   if (status != PW_OK) return status;

@@ -193,13 +193,16 @@ static void periodic_set_unknowns (pw_periodic *x, double parameter) {
 int pw_periodic_solve (pw_periodic *x, int settle, double parameter, pw_periodic_orbit *out, pw_error *error) {
   *out = (pw_periodic_orbit){ .residual = INFINITY };
   if (pw_require (x, "a search", error) != PW_OK) return PW_INPUT;
+  x->begin_period = 0;
   if (x->settings.free) x->last_period = x->settings.period > 0 ? x->settings.period : 2 * PW_PI * x->T;
   int status = pw_periodic_settle (x, parameter, settle);
   if (status < 0) return pw_fail (error, status, "%s", x->why.text);
   if (status != PW_OK) return status;
   periodic_set_unknowns (x, parameter);
+  x->steps = 0;
   status = pw_branch_solve (&x->branch, x->u, error);
   if (status == PW_OK) status = periodic_orbit (x, x->u, out, error);
+  if (status == PW_OK) x->begin_period = out->period;
   out->residual = x->branch.residual;
   out->iterations = x->branch.iterations;
   return status;
@@ -211,6 +214,9 @@ int pw_periodic_follow (pw_periodic *x, int direction, pw_error *error) {
   if (pw_require (x, "a search", error) != PW_OK) return PW_INPUT;
   if (x->settings.first == x->settings.last)
     return pw_fail (error, PW_INPUT, "first = last = %.9g: expected a range", x->settings.first);
+  if (!(x->begin_period > 0))
+    return pw_fail (error, PW_INPUT, "no motion has been found from which to follow a branch");
+  x->last_period = x->begin_period, x->steps = 0;
   pw_branch *b = &x->branch;
   b->max_change = 1.0 / x->settings.points, b->step = b->max_change / 4, b->min_step = PERIODIC_MIN_STEP;
   b->event_accuracy = PERIODIC_EVENT, b->max_points = PERIODIC_MAX_POINTS * x->settings.points;

@@ -216,12 +216,13 @@ int pw_periodic_multipliers (pw_periodic *x, const double *u, int *trivial) {
   double *S = x->monodromy + size * size, *tau = S + size * size, *work = tau + size;
   int k = *trivial = equations_shifts (x, S);
   pw_steady_combine (x->steady, u + 2 * n, 1, x->work);
+  if (size == 0) return PW_OK;
   for (int c = 0; c < size; c++) {
     equations_rotate (x, -x->work[PW_RATE_TURN], x->Phi + 2 * n * c, x->change);
     equations_coordinates (x, x->change, x->monodromy + c * size);
   }
   LAPACKE_dgeqrf_work (LAPACK_COL_MAJOR, size, k, S, size, tau, work, lwork);
-  if (x->settings.free && k > x->symmetries && fabs (S[(k - 1) * size + k - 1]) * x->T < EQUATIONS_STEADY) {
+  if (x->settings.free && k > x->symmetries && fabs (S[(k - 1) * size + k - 1]) * x->T < EQUATIONS_STEADY * x->L) {
     pw_fail (&x->why, PW_METHOD, "Newton's method leads to a steady motion or an equilibrium");
     return PW_RETRY;
   }

@@ -76,7 +76,8 @@ static int flow_signals (pw_periodic *x, pw_place place, pw_run *r) {
   if (x->settings.free)
     return pw_fail (&x->why, PW_INPUT, "model %s: signal %s changes with time, so that the period is not free",
                     x->s->model, name);
-  return pw_fail (&x->why, PW_INPUT, "model %s: signal %s does not repeat after %.12g s", x->s->model, name, period);
+  return pw_fail (&x->why, PW_INPUT, "model %s: signal %s does not repeat after %.12g s%s", x->s->model, name, period,
+                  x->settings.period > 0 ? "; without a given period that of harmonic signals and pulses is used" : "");
 }
 
 /* ---- Runs ---- */

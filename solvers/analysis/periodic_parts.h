@@ -21,8 +21,9 @@ struct pw_periodic {
     double period;  /* verified; free: during which signals are constant [s]; 0: not yet */
   } system[PW_PLACES];
   pw_branch branch;
-  double *u;          /* scaled: 2 n of the state, displacement along symmetries in a period, free period; parameter */
-  double last_period; /* the period of the last motion, or a guess of a free one [s] */
+  double *u;           /* scaled: 2 n of the state, displacement along symmetries in a period, free period; parameter */
+  double last_period;  /* the period of the last motion, or a guess of a free one [s] */
+  double begin_period; /* the period of the motion that pw_periodic_solve has found, at x->u [s]; 0: none */
   /* Of the last flow: state at its beginning and end, with accelerations there. */
   double *y0, *y1, *a0, *a1; /* 2 n, 2 n, n, n */
   double *state, *change;    /* 2 n: a state that a run begins with, a change of a state; scratch */

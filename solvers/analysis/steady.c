@@ -39,10 +39,9 @@ static int steady_arrays (pw_steady *x) {
     { &x->null_space, (unknowns + 1) * (unknowns + 1) },
   };
   x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
-  x->cyclic = pw_arena_alloc (&x->arena, n);
   x->solution = pw_arena_alloc (&x->arena, 2 * n * sizeof *x->solution);
   x->hold = pw_arena_alloc (&x->arena, holds * sizeof *x->hold);
-  if (!x->memory || !x->cyclic || !x->solution || !x->hold) return PW_RESOURCE;
+  if (!x->memory || !x->solution || !x->hold) return PW_RESOURCE;
   if (holds) memcpy (x->hold, x->settings.hold, holds * sizeof *x->hold);
   for (int j = 0; j < 2 * x->n; j++) x->solution[j].state = j;
   return PW_OK;
@@ -324,7 +323,6 @@ int pw_steady_suggest (pw_steady *x, pw_initial_value *hold, int most) {
     int placed = try.state < 3 * x->s->bodies; /* 1: a position or an angle of a body */
     int relative = turns && placed && try.state % 3 == 2;
     if (turns && placed && !relative) continue;
-    if (try.state < x->n && x->cyclic[try.state]) continue;
     if (!suggest_helps (x, &try, relative, family, basis, held)) continue;
     if (relative && !anchored && count < most)
       hold[count++] = (pw_initial_value){ .state = 2, .value = x->q[2] }, anchored = 1;

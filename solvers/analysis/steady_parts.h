@@ -17,10 +17,9 @@ struct pw_steady {
   pw_steady_settings settings;
   pw_initial_value *hold; /* those of the settings, with the value that varies */
   int n, m, holonomic;
-  double L, T;           /* scales at the initial state [m, s] */
-  double *start;         /* 2 n: initial state */
-  unsigned char *cyclic; /* n: 1 for angles on which nothing depends */
-  double *norm;          /* m: lengths of the rows of J near the initial state, by which residuals are divided */
+  double L, T;   /* scales at the initial state [m, s] */
+  double *start; /* 2 n: initial state */
+  double *norm;  /* m: lengths of the rows of J near the initial state, by which residuals are divided */
 
   /* Displacements are given by their rates: pw_steady_rate_count. */
   int symmetries;

@@ -204,24 +204,12 @@ static int symmetry_coordinate (const pw_steady *x, int c) {
   return k < x->s->bodies ? 3 * k + 2 : 2 * x->s->bodies + k;
 }
 
-/* Finds the angles whose change is a symmetry by itself. */
-static void symmetry_find_cyclic (pw_steady *x) {
-  int rates = pw_steady_rate_count (x->s);
-  for (int k = 0; k < x->symmetries; k++) {
-    int last = 0, count = 0;
-    for (int c = 0; c < rates; c++)
-      if (x->symmetry[k * rates + c] != 0) last = c, count++;
-    if (count == 1 && last >= PW_RATE_ANGLES) x->cyclic[symmetry_coordinate (x, last)] = 1;
-  }
-}
-
 /* Makes x->symmetry a basis whose rows are as sparse as possible. */
 static void symmetry_simplify (pw_steady *x, int idle) {
   int rates = pw_steady_rate_count (x->s);
   symmetry_reduce (x->symmetries, rates, x->symmetry);
   x->symmetries -= idle;
   symmetry_keep_one_turn (x, rates);
-  symmetry_find_cyclic (x);
 }
 
 /* Adds the asymmetries at state `number` of all displacements, the rows of `unit`. */
@@ -264,7 +252,6 @@ int pw_steady_keep_symmetries (pw_steady *x) {
     for (int j = 0; j < rates; j++) kept[i / count * rates + j] += c[i] * x->symmetry[i % count * rates + j];
   if (left >= 0 && left < count) {
     memcpy (x->symmetry, kept, (size_t)(left * rates) * sizeof *kept);
-    memset (x->cyclic, 0, (size_t)x->n);
     x->symmetries = left;
     symmetry_simplify (x, 0);
   }
@@ -365,7 +352,7 @@ double pw_steady_distance (pw_steady *x, const double *q1, const double *v1, con
   for (int j = 0; j < x->n; j++) {
     double unit = pw_unit (x->s, j), off = (a[j] - b[j]) / unit, size = fmax (1, fabs (b[j] / unit));
     if (j < 3 * x->s->bodies && j % 3 == 2) off = remainder (off, 2 * PW_PI), size = 1;
-    if (!x->cyclic[j]) most = pw_larger_or_nan (most, fabs (off) / size);
+    most = pw_larger_or_nan (most, fabs (off) / size);
     off = (va[j] - vb[j]) / unit * x->T;
     most = pw_larger_or_nan (most, fabs (off) / fmax (1, fabs (vb[j] / unit * x->T)));
   }

@@ -248,21 +248,27 @@ static int initial_attempt_reduced (pw_run *r, const unsigned char *prescribed, 
   return status;
 }
 
-/* Fails if less than 1e-10 of the given velocities is left, in the norm of the metric: the wheels allow no motion. */
+/* Fails if less than 1e-10 of the given velocities is left, in the norm of the metric, and nonholonomic equations are
+ * among those that they violate. */
 static int initial_locked (pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
-  double given = 0, left = 0;
+  double given = 0, left = 0, speed = 0, *Jv = r->scratch, *eta = Jv + s->rows;
   char element[PW_NAME_BYTES], previous[PW_NAME_BYTES] = "", elements[300] = "";
   for (int j = 0; j < s->coords; j++) {
     given += s->metric[j] * r->v_given[j] * r->v_given[j];
     left += s->metric[j] * r->v[j] * r->v[j];
+    speed = fmax (speed, fabs (r->v_given[j]) * pw_length_factor (s, j));
   }
   if (s->rows == s->holonomic || given == 0 || left > 1e-20 * given) return PW_OK;
+  pw_mul_J (r->w, r->v_given, Jv);
+  pw_evaluate_eta (r->w, eta);
   for (int i = s->holonomic; i < s->rows && strlen (elements) < 150; i++) {
     size_t length = strlen (elements);
+    if (fabs (Jv[i] - eta[i]) <= 1e-10 * speed) continue;
     if (strcmp (pw_system_row_name (s, i, element, sizeof element), previous) != 0)
       snprintf (elements + length, sizeof elements - length, "%s%s", length ? ", " : "", strcpy (previous, element));
   }
+  if (*elements == 0) return PW_OK;
   return pw_fail (error, PW_INITIAL,
                   "model %s: the given velocities would have to be removed entirely: %s allow no such motion", s->model,
                   elements);

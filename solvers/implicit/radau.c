@@ -43,6 +43,14 @@ static const double radau_derivative_at_end[STAGES] = { 5.53197264742180826186, 
 
 /* ---- Opening ---- */
 
+/* Round-off of the largest coordinate may affect others; at the sine s, solutions magnify it by 1/s^2.  r->saddle must
+ * be factorised at the state reached. */
+static void radau_measure_noise (pw_run *r) {
+  double sine = pw_saddle_sine (r->saddle, NULL), largest = 1;
+  for (int j = 0; j < r->s->coords; j++) largest = fmax (largest, fabs (r->q[j]) / pw_unit (r->s, j));
+  r->data->noise = fmin (64 / (sine * sine), 1e7) * largest;
+}
+
 static int radau_restart (pw_run *r, pw_error *error) {
   pw_method_data *d = r->data;
   double time_scale = r->w->scale.time;
@@ -53,6 +61,8 @@ static int radau_restart (pw_run *r, pw_error *error) {
   d->remaining = 1;
   d->renew_F_y = 1;
   d->F_y_at_state = 0;
+  d->near_singular = r->near_singular;
+  radau_measure_noise (r);
   d->h = pw_first_step (r);
   if (d->h >= 0.5 * time_scale * sqrt (r->settings.rtol)) /* saturating forces do not limit it */
     d->h = fmax (d->h, 0.1 * time_scale * sqrt (sqrt (pw_radau_rtol (r))));
@@ -119,6 +129,7 @@ static void radau_evaluate_reached (pw_run *r, double h) {
   double *lambda = d->now.y + 2 * d->dae.n;
   int status = pw_saddle_factor (r->saddle);
   d->near_singular = r->near_singular = status != PW_OK || pw_watchdog_near (r);
+  radau_measure_noise (r);
   if (status == PW_OK) {
     pw_run_accelerate_updated (r, r->v, r->a, r->lambda);
   } else {
@@ -209,9 +220,12 @@ static int radau_accept_adaptive (pw_run *r, double h, double t1, double error, 
  * by velocities of that size over h: no step, however small, has a smaller error, unless the state is projected. */
 static void radau_project_start (pw_run *r) {
   pw_method_data *d = r->data;
-  double *q = d->now.y, *v = q + d->dae.n;
-  if (d->dae.enforces_velocities || pw_project_positions (&d->projector, r, r->t, q, v) != PW_OK) return;
-  (void)pw_project_velocities (&d->projector, r, v);
+  double *q = d->Y, *v = q + d->dae.n;
+  if (d->dae.enforces_velocities) return;
+  memcpy (q, d->now.y, (size_t)(2 * d->dae.n) * sizeof *q);
+  int status = pw_project_positions (&d->projector, r, r->t, q, v);
+  if (status == PW_OK) status = pw_project_velocities (&d->projector, r, v);
+  if (status == PW_OK) memcpy (d->now.y, q, (size_t)(2 * d->dae.n) * sizeof *q);
   pw_forget_residuals (r);
 }
 

@@ -240,7 +240,9 @@ static pw_convergence radau_test (pw_run *r, int done, double size, double befor
   return PW_DIVERGED;
 }
 
-/* In index3 corrections of velocities stop shrinking at the round-off of positions over h, and steps follow the errors
+/* With F_y at the state reached, corrections up to `noise` that do not shrink are accepted.
+ *
+ * In index3 corrections of velocities stop shrinking at the round-off of positions over h, and steps follow the errors
  * of velocities, which have a lower order: one more correction makes positions 10 to 100 times more accurate. */
 static int radau_iterate (pw_run *r, double h, double t1) {
   pw_method_data *d = r->data;
@@ -253,7 +255,7 @@ static int radau_iterate (pw_run *r, double h, double t1) {
     pw_convergence convergence = radau_test (r, done, size, before, round_offs);
     d->iterations = done + 1;
     if (convergence == PW_ITERATE) continue;
-    if (convergence != PW_CONVERGED) return PW_RETRY;
+    if (convergence == PW_DIVERGED && !(d->F_y_at_state && round_offs <= d->noise)) return PW_RETRY;
     return d->dae.enforces_velocities ? PW_OK : radau_correct (r, h, t1, &size, &round_offs);
   }
 }

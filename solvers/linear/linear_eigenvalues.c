@@ -137,7 +137,7 @@ int pw_linear_eigenvalues (pw_linearisation *x, pw_linear *l, pw_error *error) {
   for (int i = k; k > 0 && i < n; i++)
     memmove (B + (size_t)(i - k) * (size_t)(n - k), B + (size_t)i * (size_t)n + k, (size_t)(n - k) * sizeof *B);
   memset (l->rigid, 1, (size_t)k);
-  if (k >= 2) l->im[0] = fabs (l->twist[2]), l->im[1] = -l->im[0]; /* both translations, in a rotating frame */
+  if (k >= 2) l->im[0] = fabs (l->twist[2]), l->im[1] = 0 - l->im[0]; /* translations; 0 - 0 is not -0 */
   int status = eigen_certain (x, n - k, B, l->re + k, l->im + k);
   free (B);
   if (status == PW_OK && x->modes) status = pw_linear_shapes (x, k, l);
@@ -163,7 +163,7 @@ static int rk4_stable (double re, double im, double h) {
 
 double pw_rk4_limit (double re, double im) {
   double size = hypot (fmin (re, 0), im), low = 0, high = 0;
-  if (!(size > 0)) return INFINITY;
+  if (!(size > DBL_MIN)) return INFINITY; /* or a number that overflows */
   while (rk4_stable (re, im, high) && high * size < 4) low = high, high += 0.01 / size;
   for (int i = 0; i < 50; i++) {
     double middle = (low + high) / 2;

@@ -161,17 +161,18 @@ static int variation_start (pw_variation *x, pw_direction_copy *d, const pw_dire
 
 /* Records the states of the run in its last step, from time t0; at first, its initial state.  A step across a jump is
  * not refined: samples in it, each computed by a Runge-Kutta step of its own, are not continuous in time and might seem
- * to cross the jump several times. */
+ * to cross the jump several times.  If it fails, or the run is stopped, the step remains to be recorded. */
 static int variation_record (pw_variation *x, double t0, pw_error *error) {
   int last = x->points - 1, points;
   x->begun = t0;
   int status = pw_variation_append (x, last < 0 ? t0 : x->r->t, error);
-  if (status != PW_OK || last < 0) return status;
   points = x->points;
-  status = pw_variation_find_jumps (x, last, error);
-  if (status != PW_OK || x->points > points || x->point[last].jumps) return status;
-  status = pw_variation_refine (x, last, error);
-  return status == PW_OK && x->points > points ? pw_variation_find_jumps (x, last, error) : status;
+  if (status == PW_OK && last >= 0) status = pw_variation_find_jumps (x, last, error);
+  int smooth = status == PW_OK && last >= 0 && x->points == points && !x->point[last].jumps;
+  if (smooth) status = pw_variation_refine (x, last, error);
+  if (smooth && status == PW_OK && x->points > points) status = pw_variation_find_jumps (x, last, error);
+  if (status != PW_OK) x->points = last + 1;
+  return status;
 }
 
 /* The smallest change of a velocity over which a force reverses, at most 1, in units of the scene. */
@@ -247,7 +248,7 @@ double pw_variation_step_size (const pw_variation *x) {
 /* Advances the run until its states reach time `to`, a breakpoint, or are too many. */
 static int variation_advance_run (pw_variation *x, double to, double t_end, pw_error *error) {
   pw_run *r = x->r;
-  int status = PW_OK;
+  int status = x->point[x->points - 1].t < r->t ? variation_record (x, x->begun, error) : PW_OK;
   while (status == PW_OK && r->t < to && x->points < PW_VARIATION_POINTS && (r->t < r->breakpoint || r->t == x->t)) {
     double t0 = r->t;
     status = pw_run_advance (r, t_end, error);
@@ -272,6 +273,7 @@ int pw_variation_advance (pw_variation *x, double t, double t_end, pw_error *err
   if (isnan (t)) return pw_fail (error, PW_INPUT, "t = nan: expected a time");
   pw_run *r = x->r;
   int status = PW_OK;
+  r->stopped = 0;
   while (status == PW_OK && x->t < fmin (t, t_end)) {
     if (x->t == pw_variation_recorded_jump (x))
       status = pw_variation_pass_jump (x, error);

@@ -253,6 +253,47 @@ TEST (range) {
   }
 }
 
+/* A branch that leads out of the range ends at its first point, without a reason. */
+TEST (outwards) {
+  const pw_branch_problem problem = { .unknowns = 1, .equations = 1, .tolerance = 1e-12, .evaluate = parabola };
+  double u[2] = { sqrt (2), 1 };
+  pw_error error = { 0 }, why = { .status = PW_METHOD, .text = "of another branch" };
+  const pw_branch_event *next;
+  pw_branch b;
+  continuation_open (&b, &problem);
+  check_ok (pw_branch_start (&b, u, 1, &error), &error);
+  for (int i = 0; i < 2; i++) {
+    check_ok (pw_branch_next (&b, no_events, &why, &next, &error), &error);
+    assert_true ((next != NULL) == (i == 0));
+  }
+  assert_string_equal (why.text, "");
+  pw_branch_close (&b);
+}
+
+static int failing_events (void *context, pw_error *error) {
+  (void)context, (void)error;
+  return PW_RETRY;
+}
+
+/* Where events cannot be sought, the branch ends, for good: the fold of this step does not follow. */
+TEST (events_fail) {
+  const pw_branch_problem problem = { .unknowns = 1, .equations = 1, .tolerance = 1e-12, .evaluate = parabola };
+  double u[2] = { -0.05, 0.05 * 0.05 / 2 };
+  pw_error error = { 0 }, why = { 0 };
+  const pw_branch_event *next;
+  pw_branch b;
+  continuation_open (&b, &problem);
+  b.step = 0.07, b.event_accuracy = 1e-9, b.max_points = 10;
+  check_ok (pw_branch_start (&b, u, -1, &error), &error);
+  for (int i = 0; i < 3; i++) {
+    check_ok (pw_branch_next (&b, failing_events, &why, &next, &error), &error);
+    assert_true ((next != NULL) == (i == 0));
+  }
+  assert_true (b.folded);
+  assert_string_equal (why.text, "the next point cannot be evaluated");
+  pw_branch_close (&b);
+}
+
 /* p = 0.5 + 0.3 sin x + climb (x - pi), and the same with other angles x. */
 static int wave (void *context, const double *u, double *F, double *dF, pw_error *error) {
   double climb = *(double *)context;
@@ -286,7 +327,8 @@ TEST (turns) {
     continuation_open (&b, &problem);
     b.max_change = b.step = 0.1, b.event_accuracy = 1e-9, b.max_points = 1000;
     check_ok (pw_branch_start (&b, u, 0.3 * cos (x) + climb, &error), &error);
-    while (pw_branch_next (&b, no_events, &why, &next, &error) == PW_OK && next) folds += next->event == PW_BRANCH_FOLD;
+    while (pw_branch_next (&b, no_events, &why, &next, &error) == PW_OK && next)
+      folds += next->event == PW_BRANCH_FOLD, why = (pw_error){ 0 }; /* as evaluations of the point do */
     assert_string_equal (why.text, climb > 0 ? "" : "it has returned to its first point");
     if (climb > 0) {
       assert_true (folds > 5);

@@ -137,10 +137,18 @@ TEST (bad) {
       "--input x.value is the signal of a constraint; only signals of forces can be inputs" },
     { "ezyroller --at -1", "--at -1: expected a number >= 0" },
     { "ezyroller --at soon", "--at: \"soon\" is not a number" },
+    { "pendulum -o ''", "-o : expected a NAME, for NAME.json, NAME.csv and NAME.npz" },
+    { "pendulum -o ./", "-o ./: expected a NAME, for NAME.json, NAME.csv and NAME.npz" },
     { "peaucellier -o @/none", "peaucellier has no degrees of freedom: there is nothing to linearise" },
     { "chain --set n=200", "chain has 600 coordinates; linearise takes at most 400" },
   };
   cli_bad_each ("linearise", each, sizeof each / sizeof *each);
+  cli_good ("pinwheel linearise snakeboard -o @/board >/dev/null");
+  assert_null (strstr (cli_file ("board.json"), "\"im\": -0,"));
+  cli_bad ("pinwheel linearise pendulum --at 1 --limit 1e-9", 4,
+           "t = 0 s: the limit of 1e-09 s of processor time is reached (--limit)");
+  cli_bad ("pinwheel show pendulum --at 1 --limit 1e-9", 4,
+           "t = 0 s: the limit of 1e-09 s of processor time is reached (--limit)");
   assert_null (cli_file ("none.json"));
   assert_null (cli_file ("none.csv"));
   assert_null (cli_file ("none.json.part"));

@@ -270,11 +270,39 @@ TEST (equal_refinement) {
 /* A pendulum at rest without gravity. */
 TEST (no_effect) {
   cli_shell ("pinwheel optimise pendulum --maximise bob.y --free I=0:1 --set g=0 -t 0.1 --starts 2");
-  assert_string_equal (cli_err, "pinwheel: bob.y is the same in all runs: no free value has an effect on it\n");
+  assert_string_equal (cli_err, "pinwheel: no free value has an effect on bob.y\n");
   cli_shell ("pinwheel optimise @/point.yaml --minimise p.x --free b=-3:3 --free a=-1:3 --json @/o.json");
   if (!strstr (cli_out, " 3  without effect\n") || !strstr (cli_out, " 3  at its lower bound\n"))
     fail_msg ("one without effect, one at its bound:\n%s", cli_out);
   assert_non_null (strstr (cli_file ("o.json"), "\"bound\": null"));
+}
+
+/* Where p.x is 0 it does not matter in which direction the point goes; the searches end at different b. */
+TEST (no_effect_there) {
+  cli_shell ("pinwheel optimise @/point.yaml --minimise '(p.x*(1 + p.y))^2 + 1' --free a=-3:3 --free b=-0.5:3");
+  if (!strstr (cli_out, " 3  without effect\n") || !strstr (cli_out, ", 10 of which end at this optimum"))
+    fail_msg ("b has no effect at a = 0:\n%s", cli_out);
+}
+
+/* Every run but the first fails. */
+TEST (one_run) {
+  assert_int_equal (cli_run ("pinwheel optimise @/point.yaml --maximise 'p.x + 0*sqrt(-1 - p.x)' --free a=-1:1e308 -o "
+                             "@/o.yaml --starts 2"),
+                    4);
+  assert_non_null (strstr (cli_out, " largest so far "));
+  assert_non_null (strstr (cli_err, "all other runs of the search failed"));
+  assert_null (strstr (cli_err, "no free value"));
+  assert_non_null (strstr (cli_file ("o.yaml"), "\n# not an optimum: the search did not converge\n"));
+}
+
+/* A constraint that is not reached, in a curved valley. */
+TEST (inactive_constraint) {
+  cli_shell (
+      "pinwheel optimise @/point.yaml --minimise '100*(p.y - p.x^2)^2 + (1 - p.x)^2 + 100*(p.phi - p.y^2)^2 + (1 - "
+      "p.y)^2' --free a=-3:3 --free b=-3:3 --free p.omega=-3:3 --subject-to 'max:p.x<=5' --json @/o.json");
+  const char *json = cli_file ("o.json");
+  check_close ("a", optimise_value (json, "a"), 1, 1e-5, "last steps of 1e-7");
+  check_close ("p.omega", optimise_value (json, "p.omega"), 1, 1e-4, "p.omega = b^2 = a^4");
 }
 
 /* Given initial values that the best run does not have. */

@@ -119,14 +119,16 @@ TEST (folds) {
 /* ---- An oscillator: x'' = -(a - 2 q cos 2 t) x + (p - c x^2) x' ---- */
 
 typedef struct {
-  double a, q, p, c, x;
+  double a, q, p, c, x, mass; /* mass: of a disc with the inertia 1: 1 / L^2 */
 } oscillator;
 
-static const pw_parameter oscillator_parameters[] = {
-  { PW_AT (oscillator, a), 1, "", "", PW_REAL }, { PW_AT (oscillator, q), 0, "", "", PW_REAL },
-  { PW_AT (oscillator, p), 0, "", "", PW_REAL }, { PW_AT (oscillator, c), 0, "", "", PW_REAL },
-  { PW_AT (oscillator, x), 0, "", "", PW_REAL }, { .name = NULL }
-};
+static const pw_parameter oscillator_parameters[] = { { PW_AT (oscillator, a), 1, "", "", PW_REAL },
+                                                      { PW_AT (oscillator, q), 0, "", "", PW_REAL },
+                                                      { PW_AT (oscillator, p), 0, "", "", PW_REAL },
+                                                      { PW_AT (oscillator, c), 0, "", "", PW_REAL },
+                                                      { PW_AT (oscillator, x), 0, "", "", PW_REAL },
+                                                      { PW_AT (oscillator, mass), 1, "", "", PW_REAL },
+                                                      { .name = NULL } };
 
 static int oscillator_torque (void *context, double t, const double *x, double value[3], double *gradient) {
   const oscillator *o = context;
@@ -144,7 +146,7 @@ SCENE_WITH (oscillator_build, oscillator_parameters, oscillator) {
   oscillator *o = &kept[next++ % 16];
   *o = *p;
   const pw_signal torque = { PW_FUNCTION, .function = { .eval = oscillator_torque, .context = o, .reads = reads } };
-  pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 1, .start = { 0, 0, o->x } });
+  pw_add_body (m, &(pw_body){ .name = "disc", .mass = p->mass, .inertia = 1, .start = { 0, 0, o->x } });
   pw_add_pin (m, &(pw_pin){ .name = "axle", .body = { "disc", "ground" } });
   pw_add_torque (m, &(pw_torque){ .name = "torque", .body = { "disc", "ground" }, .value = torque });
 }
@@ -253,6 +255,43 @@ TEST (van_der_pol) {
   pw_system_free (s);
 }
 
+/* The same motion in a scene of 10 micrometres. */
+TEST (small) {
+  pw_system *s = scene_system (&oscillator_build_table, "p", 1., "c", 1., "x", 2., "mass", 1e10, NULL);
+  pw_periodic *x = periodic_open (s, &(pw_periodic_settings){ .free = 1, .period = 6 });
+  check_close ("period", periodic_solve (x, 10, 0).period, 6.66328686, 1e-8, "the digits given");
+  pw_periodic_close (x);
+  pw_system_free (s);
+}
+
+static pw_system *van_der_pol_at (void *context, double p, pw_error *error) {
+  (void)context, (void)error;
+  return scene_system (&oscillator_build_table, "p", p, "c", p, "x", 2., NULL);
+}
+
+/* Motions with 70 steps do not limit those of others; a second branch begins where the first one did, whose period has
+ * grown to five times. */
+TEST (again) {
+  pw_error error = { 0 };
+  pw_periodic_orbit o;
+  pw_system *s = van_der_pol_at (NULL, 1, NULL);
+  pw_periodic_settings set = { .free = 1, .compile = van_der_pol_at, .first = 0.1, .last = 20, .points = 5 };
+  pw_periodic *x = periodic_open (s, &set);
+  assert_int_equal (pw_periodic_follow (x, 1, &error), PW_INPUT);
+  check_error (&error, PW_INPUT, "no motion has been found from which to follow a branch");
+  periodic_solve (x, 1, 0.1);
+  pw_periodic_solve (x, 1, 60, &o, &(pw_error){ 0 });
+  assert_true (isfinite (o.residual));
+  double begin = periodic_solve (x, 1, 1).period;
+  assert_true (periodic_follow (x).last == 20 && x->last_period > 4 * begin);
+  error = (pw_error){ 0 };
+  check_ok (pw_periodic_follow (x, -1, &error), &error);
+  check_ok (pw_periodic_next (x, &o, &error), &error);
+  check_close ("period", o.period, begin, 1e-13, "that of the first branch");
+  pw_periodic_close (x);
+  pw_system_free (s);
+}
+
 /* ---- A gait: the EzyRoller in air, with a constant torque that makes it turn ---- */
 
 static pw_system *gait_open (double bias, double omega) {
@@ -334,7 +373,10 @@ TEST (refused) {
   pw_system *s = gallery_open ("snakeboard", NULL);
   check_close ("period", pw_system_period (s), 2, 1e-14, "2 pi / omega");
   assert_null (pw_periodic_open (s, &(pw_periodic_settings){ .period = 1.9 }, &error));
-  check_error (&error, PW_INPUT, "model snakeboard: signal swing.value does not repeat after 1.9 s");
+  check_error (
+      &error, PW_INPUT,
+      "model snakeboard: signal swing.value does not repeat after 1.9 s; without a given period that of harmonic "
+      "signals and pulses is used");
   error = (pw_error){ 0 };
   assert_null (pw_periodic_open (s, &(pw_periodic_settings){ .free = 1 }, &error));
   check_error (&error, PW_INPUT,

@@ -56,6 +56,11 @@ TEST (without_multipliers) {
   cli_good ("pinwheel periodic @/tricycle.yaml --vary steer=0.1:0.3 -o @/path");
   assert_string_equal (cli_err, "");
   assert_non_null (cli_file ("path/periodic.svg"));
+  cli_write ("fixed.yaml", "pinwheel: 1\nbodies: [{name: a, mass: 1, inertia: 1}]\nelements:\n"
+                           "  - {weld: W, body: [a, ground], at: [[0, 0], [0, 0]]}\n");
+  cli_good ("pinwheel periodic @/fixed.yaml --period 1");
+  assert_string_equal (cli_err, "");
+  assert_int_equal (strncmp (cli_out, "fixed: a periodic motion\n", 25), 0); /* no message of LAPACK */
 }
 
 /* Twice the period: the multipliers are squared. */
@@ -274,7 +279,9 @@ TEST (limit) {
 
 TEST (bad) {
   static const cli_wrong each[] = {
-    { "snakeboard --period 1.9", "model snakeboard: signal swing.value does not repeat after 1.9 s" },
+    { "snakeboard --period 1.9", "model snakeboard: signal swing.value does not repeat after 1.9 s; without a given "
+                                 "period that of harmonic signals and pulses is used" },
+    { "snakeboard --period 1e-308", "--period: expected at least 1e-100 s" },
     { "snakeboard --period free",
       "model snakeboard: signal swing.value changes with time, so that the period is not free" },
     { "snakeboard --period fast", "--period: \"fast\" is not a number" },
@@ -302,7 +309,8 @@ TEST (bad) {
   cli_bad ("pinwheel periodic @/oscillator.yaml --vary n=1:3", 2,
            "--vary n=1:3: n counts something and cannot vary continuously; use `pinwheel sweep`");
   cli_bad ("pinwheel periodic @/oscillator.yaml --period 2.5*pi --vary w=0.8:1", 2,
-           "model oscillator: signal drive.value does not repeat after 7.85398163397 s");
+           "model oscillator: signal drive.value does not repeat after 7.85398163397 s; without a given period that of "
+           "harmonic signals and pulses is used");
 }
 
 /* Without losses the snakeboard is faster after each period; a pendulum at rest stays there. */
@@ -327,13 +335,16 @@ TEST (vanishing) {
   cli_write ("grow.yaml", "pinwheel: 1\nbodies: [{name: m, mass: 1, inertia: 1, rate: {vx: 1}}]\nelements:\n"
                           "  - {force: f, body: m, fx: '-(1 + 0.5*cos (1.7*t))*m.x'}\n");
   cli_bad ("pinwheel periodic @/grow.yaml --period pi", 2,
-           "model grow: signal f.fx does not repeat after 3.14159265359 s");
+           "model grow: signal f.fx does not repeat after 3.14159265359 s; without a given period that of harmonic "
+           "signals and pulses is used");
   cli_bad ("pinwheel periodic @/grow.yaml --period free", 2,
            "model grow: signal f.fx changes with time, so that the period is not free");
   cli_write ("short.yaml", "pinwheel: 1\nbodies: [{name: m, mass: 1, inertia: 1}]\nelements:\n"
                            "  - {force: f, body: m, fx: {harmonic: {amplitude: 1, omega: 2*pi}}}\n"
                            "  - {force: g, body: m, fx: {pulse: {height: 1, start: 1.501, width: 0.002}}}\n");
-  cli_bad ("pinwheel periodic @/short.yaml --period 1", 2, "model short: signal g.fx does not repeat after 1 s");
+  cli_bad ("pinwheel periodic @/short.yaml --period 1", 2,
+           "model short: signal g.fx does not repeat after 1 s; without a given period that of harmonic signals and "
+           "pulses is used");
 }
 
 const check_fixture fixture = { cli_setup, cli_teardown };

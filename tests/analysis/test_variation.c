@@ -124,6 +124,34 @@ TEST (oscillator) {
   }
 }
 
+static int stopped_every (void *context) {
+  int *calls = context;
+  return ++*calls % 37 == 0;
+}
+
+/* Derivatives of a run that is stopped again and again; steps of stiff motions are implicit. */
+TEST (stopped) {
+  for (int stiff = 0; stiff < 2; stiff++) {
+    double end[2];
+    for (int stops = 0; stops < 2; stops++) {
+      pw_error error = { 0 };
+      pw_sample x;
+      int calls = 0, status;
+      block b = { .name = "k", .k = stiff ? 4e4 : 8, .c = stiff ? 4e4 : 0, .m = 2, .x0 = 0.3, .start = 99, .width = 1 };
+      pw_settings set = { .rtol = 1e-8, .stop = stops ? stopped_every : NULL, .stop_context = &calls };
+      variation_case c = variation_open (block_make, &b, b.k, 1e-5 * b.k, "radau", &set);
+      pw_variation *v = pw_variation_open (c.r, &c.d, 1, 0, &error);
+      while ((status = pw_variation_advance (v, 1, 1, &error)) == PW_STOPPED && calls < 1e6) {}
+      check_ok (status, &error);
+      check_ok (pw_variation_sample (v, 0, &x, NULL, &error), &error);
+      end[stops] = x.q[0];
+      pw_variation_close (v);
+      variation_free (&c);
+    }
+    check_close ("dx/dk", end[1], end[0], 0, "stops change nothing");
+  }
+}
+
 /* Overdamped: x = x0 (r2 exp (-r1 t) - r1 exp (-r2 t)) / (r2 - r1), r1 r2 = k / m, r1 + r2 = c / m; and the loss. */
 static void stiff_closed (double k, double c, double t, double out[3]) {
   double m = 2, x0 = 0.3, r1 = c / (2 * m) + sqrt (c * c / (4 * m * m) - k / m), r2 = k / m / r1;

@@ -93,6 +93,8 @@ TEST (links) {
   cli_good ("pinwheel run ezyroller -t 0.01 -o @/k/far.csv; pinwheel run ezyroller -t 0.01 -o @/k/none.csv; cd @/k; "
             "[ -L far.csv ] && [ -L none.csv ] && wc -l <sub/there.csv && wc -l <sub/absent.csv");
   assert_string_equal (cli_out, "12\n12\n");
+  cli_good ("ln -s round @/k/round");
+  cli_bad ("pinwheel run ezyroller -t 1 -o @/k/round", 1, "cannot write @/k/round: Too many levels of symbolic links");
 }
 
 /* ---- One process ---- */

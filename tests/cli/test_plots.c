@@ -125,6 +125,23 @@ TEST (gnuplot_fails) {
   assert_non_null (cli_file ("fit.csv"));
 }
 
+/* Ctrl-C, which ends gnuplot, too: the other files are completed. */
+TEST (gnuplot_interrupted) {
+  static const char *const commands[] = {
+    "optimise pendulum --minimise bob.y --free I=0:1 -t 0.1 --starts 1 --json @/stop/o.json --plots @/stop",
+    "fit pendulum --data @/stop/data.csv --columns bob.phi --free g --plots @/stop --json @/stop/o.json",
+    "run pendulum -t 0.1 --plots @/stop --json @/stop/o.json", "sensitivity pendulum --of bob.x --by g -t 0.1 -o @/stop"
+  };
+  cli_good ("mkdir -p @/stop/bin && printf '#!/bin/sh\\nkill -INT $PPID; exit 1\\n' >@/stop/bin/gnuplot && chmod +x "
+            "@/stop/bin/gnuplot && pinwheel run pendulum -t 1 --every 0.1 -o @/stop/data.csv");
+  for (size_t i = 0; i < sizeof commands / sizeof *commands; i++) {
+    assert_int_equal (cli_run (check_text ("PATH=@/stop/bin pinwheel %s", commands[i])), 130);
+    assert_non_null (strstr (cli_err, "pinwheel: gnuplot was interrupted, so no figures are drawn; data and scripts"));
+    if (i < 3) assert_true (cli_says (cli_file ("stop/o.json"), "status", "interrupted"));
+    cli_good ("rm -f @/stop/o.json");
+  }
+}
+
 TEST (data) {
   assert_int_equal (cli_run ("PATH=/none pinwheel run ezyroller --t-end 20 --plots @/data >/dev/null"), 0);
   assert_non_null (strstr (cli_err, "gnuplot was not found, so no figures are drawn; data and scripts are in"));

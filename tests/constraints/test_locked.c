@@ -86,6 +86,19 @@ TEST (spinning_wheel_locked) {
   pw_system_free (s);
 }
 
+/* A weld removes the given velocity; the wheel allows it. */
+SCENE (locked_build_post) {
+  pw_add_body (m, &(pw_body){ .name = "post", .mass = 1, .inertia = 1, .rate = { 1, 0, 0 } });
+  pw_add_body (m, &(pw_body){ .name = "sledge", .mass = 1, .inertia = 1 });
+  pw_add_weld (m, &(pw_weld){ .name = "base", .body = { "post", "ground" } });
+  pw_add_wheel (m, &(pw_wheel){ .name = "skate", .body = "sledge" });
+}
+
+TEST (wheel_not_to_blame) {
+  pw_system *s = scene_system (&locked_build_post_table, NULL);
+  runs_close (runs_open (s, "rk4", NULL), s);
+}
+
 /* Most of the velocity is lateral: accepted, although the constraint removes all but a hundredth of it. */
 SCENE (locked_build_skidding) {
   pw_add_body (m, &(pw_body){ .name = "skate", .mass = 1, .inertia = 1, .rate = { 0.01, 1, 0 } });

@@ -145,6 +145,15 @@ TEST (missing_system) {
   check_error (&e[0], PW_INPUT, "a system is missing");
   pw_equations_free (&equations);
   pw_model_free (m);
+  assert_int_equal (pw_verify (NULL, &(pw_scale){ 1, 1 }, 0, q, q, q, q, &(pw_verification){ 0 }), PW_INPUT);
+}
+
+TEST (missing_workspace) {
+  pw_error e[2] = { { 0 } };
+  double q[3] = { 0 }, out[3];
+  assert_int_equal (pw_workspace_contact_points (NULL, 0, q, q, &out, &e[0]), PW_INPUT);
+  assert_int_equal (pw_workspace_forces (NULL, 0, q, q, q, out, &e[1]), PW_INPUT);
+  for (int i = 0; i < 2; i++) check_error (&e[i], PW_INPUT, "a workspace is missing");
 }
 
 SCENE (description_add_no_body) {

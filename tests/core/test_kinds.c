@@ -193,6 +193,7 @@ static const pw_field kinds_domain[] = { { .name = "mode", .offset = 8, .domain 
 #define KINDS_TEXT ": expected at most 50 bytes of UTF-8 without control characters"
 static const pw_quantity kinds_long_name[] = { { "x", "N", NULL, "" }, { KINDS_50 "x", "N", NULL, "" } };
 static const pw_quantity kinds_line[] = { { "x", "N\n", NULL, "" }, { KINDS_50, "N", NULL, "" } };
+static const pw_quantity kinds_twice[] = { { "N", "N", NULL, "" }, { "N", "N", NULL, "" } };
 static const pw_field kinds_latin1[] = { { .name = "m\xF6", .offset = 8, .type = PW_NUMBER }, { .name = NULL } };
 
 static pw_kind kinds_rod;
@@ -226,6 +227,7 @@ TEST (faults) {
   KINDS_FAULT (name, "a\nb", "its name" KINDS_TEXT);
   KINDS_FAULT (reaction, kinds_long_name, "name or unit of a reaction" KINDS_TEXT);
   KINDS_FAULT (reaction, kinds_line, "name or unit of a reaction" KINDS_TEXT);
+  KINDS_FAULT (reaction, kinds_twice, "two reactions or internal coordinates of the same name");
   KINDS_FAULT (fields, kinds_latin1, "field m\xF6: name or unit" KINDS_TEXT);
   KINDS_FAULT (definition, 0, "the definition has no room for its name");
   KINDS_FAULT (bodies, 5, "at most 4 bodies, 4 internal coordinates, 6 constraint equations and 4 signals");
@@ -252,6 +254,9 @@ TEST (faults) {
   KINDS_FAULT (g, NULL, "holonomic constraint equations without g");
   KINDS_FAULT (level, PW_NONHOLONOMIC, "g, but no holonomic constraint equations");
 #undef KINDS_FAULT
+  pw_kind broken = pw_kind_torque;
+  broken.force_u = NULL;
+  kinds_expect_fault (&broken, "a force with signals, but no force_u");
 }
 
 /* ---- Further checks ---- */

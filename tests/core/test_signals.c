@@ -97,6 +97,10 @@ TEST (reads) {
   assert_true (pw_next_breakpoint (w, 0, 0) == 3 && isinf (pw_next_breakpoint (w, 0, 3)));
   c.fails = 1;
   assert_int_equal (pw_update_kinematics (w, 2.5, q, v), PW_METHOD);
+  pw_error error = { 0 };
+  assert_int_equal (pw_workspace_contact_points (w, 2.5, q, v, NULL, &error), PW_METHOD);
+  check_error (&error, PW_METHOD,
+               "t = 2.5 s: a signal failed: torque rider: value is not a finite number, or its function failed");
   pw_workspace_free (w);
   pw_system_free (s);
 }

@@ -223,6 +223,8 @@ TEST (digits) {
 TEST (peaucellier) {
   cli_bad ("pinwheel run peaucellier --set swing=-12.5", 2,
            "model peaucellier: swing = -12.5: arms and rhombus do not reach the crank there");
+  cli_bad ("pinwheel run peaucellier --set L=0.5 --set swing=3.5", 2,
+           "model peaucellier: swing = 3.5: arms and rhombus do not reach the crank there");
   cli_bad ("pinwheel run peaucellier --set a=0.8 --set swing=0.1", 2,
            "model peaucellier: a = 0.8: arms and rhombus do not reach the crank at the angle 0");
 }

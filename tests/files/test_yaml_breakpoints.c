@@ -30,6 +30,7 @@ TEST (breakpoints) {
     { "exp(t) < 3 ? 1 : 2", 1.0986122886681098, 0 },
     { "min(t, 1)", 1, 0 },
     { "max(1, t, 3)", 3, 0 },
+    { "max(t, 1) > 1", 1, 0 }, /* 1 > 1 is false, but true just after */
     { "sign(t - 3)", 3, 0 },
     { "t == 4", 0, 0 }, /* not for any time */
     { "sin(t) > 0.5 && t < 1", 0.5235987755982989, 1 },
@@ -57,6 +58,7 @@ TEST (breakpoints) {
     { "sqrt(t - 2) == sqrt(t - 2)", 2, -1 },
     { "exp(elliptic_K(t/4)) > -1", 4, 0 },
     { "sin(jacobi_am(t, t/2)) < 2", 2, 0 },
+    { "sin(jacobi_am(t, sqrt(3 - t))) < 2", 2, 3 },
     { "jacobi_am(t/2, -t) > 1", 1.6950459364929928, 0 },
     { "(2 - t)^2.5 > -1", 2, 0 },
     { "acos(t)^0 > t - 4", 5, 0 },

@@ -127,6 +127,7 @@ TEST (max_file) {
   cli_bad ("pinwheel show @/long.yaml --max-file 0.25", 2,
            "@/long.yaml: the file has more than 0.25 MB, the limit for a model unless --max-file raises it");
   cli_good ("pinwheel show @/long.yaml --max-file 0.5 >/dev/null");
+  cli_bad ("pinwheel show @/long.yaml --max-file 1e-308", 2, "--max-file 1e-308: expected at least 0.001 MB");
   cli_bad ("pinwheel run @/long.yaml --max-file 1e4", 2, "--max-file 1e4: expected at most 2000 MB");
   cli_bad ("pinwheel sweep @/long.yaml --max-file x --vary a=1,2 -o @/x.csv", 2, "--max-file: \"x\" is not a number");
 }

@@ -84,6 +84,7 @@ TEST (troubles) {
     { "(a)(a)", 3, "an operator such as * is missing before \"(\"" },
     { "a**2", 1, "a power is written with ^" },
     { "\"a\"", 0, "\"\"\" does not belong in an expression" },
+    { "2 \xc3\xb7 a", 2, "a non-ASCII character does not belong in an expression" },
     { "a & 1", 2, "\"&\" does not belong in an expression" },
     { "a &&", 2, "something is missing after \"&&\"" },
     { "2*(a + )", 5, "something is missing after \"+\"" },

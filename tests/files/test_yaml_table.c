@@ -152,6 +152,8 @@ TEST (unit_of_signal) {
   table_unit (angle, "mm", 0, "the unit \"mm\" does not measure what rad does");
   table_unit (x, "mm", 0.09, NULL);
   table_unit (x, "deg", 0, "the unit \"deg\" does not measure what m does");
+  table_unit (x, "\xC2\xB5m", 9e-5, NULL);
+  table_unit (x, "\xCE\xBCm", 9e-5, NULL);
   table_unit (speed, "km/h", 25, NULL);
   table_unit (pfaffian, "cm", 0.9, NULL); /* any: its coefficients may have units */
   table_unit (speed, "rpm", 0, "does not measure what m/s does");

@@ -159,6 +159,24 @@ TEST (each_body) {
   runs_close (r, s);
 }
 
+static pw_kind gravity_kind_skid;
+
+SCENE (gravity_skid) {
+  for (int i = 0; i < 2; i++) pw_add_body (m, &(pw_body){ .name = i ? "hail" : "drop", .mass = 1, .inertia = 1 });
+  pw_add (m, &gravity_kind_skid, &(gravity_drag){ .name = "air", .c = 1 });
+}
+
+/* Reactions and contact points of such a type have names of their own too. */
+TEST (names) {
+  gravity_kind_skid = gravity_kind_drag;
+  gravity_kind_skid.rows = 1, gravity_kind_skid.level = PW_NONHOLONOMIC, gravity_kind_skid.J = pw_kind_wheel.J;
+  gravity_kind_skid.reaction = pw_kind_wheel.reaction, gravity_kind_skid.contact = pw_kind_wheel.contact;
+  pw_system *s = scene_system (&gravity_skid_table, NULL);
+  assert_int_equal (pw_system_find_reaction (s, "air.hail.N", NULL), 1);
+  assert_string_equal (PW_NAME (pw_system_contact_name, s, 3), "air.hail.y");
+  pw_system_free (s);
+}
+
 TEST (methods) {
   trial (&gravity_pendulum_table, 3);
   trial (&gravity_rain_table, 1);

@@ -70,6 +70,32 @@ TEST (small_steps_index3) {
   pw_system_free (s);
 }
 
+/* Near a singular configuration Newton's iteration ends in round-off that exceeds the tolerance of its corrections. */
+TEST (magnified_round_off) {
+  double q[2][3 * 8], v[3 * 8];
+  pw_system *s = ladder_open ("n-four-bar");
+  runs_state (s, "erk8+projection", &(pw_settings){ .rtol = 1e-12, .span = 1 }, 1, q[0], v, NULL);
+  runs_state (s, "radau", &(pw_settings){ .rtol = 1e-11, .span = 1 }, 1, q[1], v, NULL);
+  for (int j = 0; j < pw_system_coordinates (s); j++) check_close ("n-four-bar", q[1][j], q[0][j], 1e-8, "1e3 rtol");
+  pw_system_free (s);
+}
+
+/* Of a distance of 1e4 L, which the small coordinates of a pendulum there contain, too. */
+SCENE (radau_build_distant) {
+  pw_add_body (m, &(pw_body){ .name = "rod", .mass = 1, .inertia = 0.1, .start = { 1e4, 0, 0 }, .rate = { 0, 3, 3 } });
+  pw_add_pin (m, &(pw_pin){ .name = "pivot", .body = { "rod", "ground" }, .at = { { -1, 0 }, { 1e4 - 1, 0 } } });
+}
+
+TEST (distant) {
+  static const char *const method[] = { "radau:steps=fixed", "radau+index3:steps=fixed" };
+  for (int i = 0; i < 2; i++) {
+    pw_system *s = scene_system (&radau_build_distant_table, NULL);
+    pw_run *r = runs_open (s, method[i], &(pw_settings){ .step = 1e-2, .span = 1 });
+    check_close (method[i], runs_to (r, 1).q[2], 3, 1e-9, "the angle has a round-off of 1e4 eps");
+    runs_close (r, s);
+  }
+}
+
 /* Velocities have the round-off of positions over h, 3e-13 m/s, which must not add up in 3200 steps. */
 TEST (round_off_index3) {
   check_below ("roller-racer", ladder_run ("roller-racer", "radau+index3:steps=fixed", 6.25e-4, 2).q, 3e-11,

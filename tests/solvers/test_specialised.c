@@ -233,6 +233,23 @@ TEST (angles) {
   both_close (&x);
 }
 
+SCENE (two_torques) {
+  const pw_signal fast = { PW_HARMONIC, .harmonic = { .amplitude = 1, .omega = 50 } },
+                  far = { PW_HARMONIC, .harmonic = { .omega = 1, .phase = 1e6 - 0.057 } };
+  pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 1 });
+  pw_add_torque (m, &(pw_torque){ .name = "fast", .body = { "disc", "ground" }, .value = fast });
+  pw_add_torque (m, &(pw_torque){ .name = "far", .body = { "disc", "ground" }, .value = far });
+}
+
+/* At the end of the step from 0.05 s the argument of the second torque is beyond that range, of the first it is not. */
+TEST (arguments) {
+  both x;
+  both_open (&x, scene_system (&two_torques_table, NULL), "rk4", &(pw_settings){ .step = 0.01, .span = 1 });
+  both_run (&x, 0.1);
+  assert_true (both_specialised (&x) > 0);
+  both_close (&x);
+}
+
 /* Passing singular configurations, the guards leave some evaluations to the general engine, and the result is right. */
 TEST (singular) {
   both x;
@@ -377,6 +394,14 @@ TEST (refused) {
   error = (pw_error){ 0 };
   assert_null (pw_system_source (s, NULL, &error));
   check_error (&error, PW_INPUT, "model ezyroller: 125 elements: specialised code has at most 120");
+  pw_system_free (s);
+  m = scene_model (&scene_ezyroller, NULL);
+  for (int i = 0; i < 199; i++)
+    pw_add_body (m, &(pw_body){ .name = PW_PRINTED (8, "b%d", i), .mass = 1, .inertia = 1 });
+  s = scene_compile (m);
+  error = (pw_error){ 0 };
+  assert_null (pw_system_source (s, NULL, &error));
+  check_error (&error, PW_INPUT, "model ezyroller: 201 bodies: specialised code has at most 200");
   pw_system_free (s);
   assert_null (pw_system_source (NULL, NULL, &(pw_error){ 0 }));
   assert_null (pw_run_source (NULL, &(pw_error){ 0 }));

@@ -140,6 +140,9 @@ static int linearise_open_files (pw_linearise_command *cmd, pw_error *error) {
   char path[LINEARISE_PAGE][4096];
   pw_use use[LINEARISE_FILES] = { PW_CLI_MODEL_USE, [LINEARISE_PAGE] = { "--animate", cmd->page_path, PW_WRITES,
                                                                          NULL } };
+  const char *slash = cmd->name ? strrchr (cmd->name, '/') : NULL, *last = slash ? slash + 1 : cmd->name;
+  if (last && (*last == 0 || strcmp (last, ".") == 0 || strcmp (last, "..") == 0))
+    return pw_fail (error, PW_INPUT, "-o %s: expected a NAME, for NAME.json, NAME.csv and NAME.npz", cmd->name);
   for (int i = LINEARISE_JSON; i < LINEARISE_PAGE && cmd->name; i++) {
     if (snprintf (path[i], sizeof path[i], "%s.%s", cmd->name, ending[i]) >= (int)sizeof path[i])
       return pw_fail (error, PW_INPUT, "-o: the name is too long");
@@ -198,6 +201,7 @@ static const struct poptOption linearise_options[] = {
                   "Write NAME.json (everything), NAME.csv (the matrix [A B; C D]) and NAME.npz for NumPy"),
   PW_TEXT_OPTION (pw_linearise_command, page_path, "animate", 0, "FILE.html",
                   "Write a page in which the modes are animated"),
+  PW_LIMIT_OPTION,
   PW_MODEL_OPTIONS,
   POPT_TABLEEND
 };

@@ -32,20 +32,12 @@ static int outcome_count_columns (const pw_system *s, pw_column_type type) {
   return type == PW_COLUMN_LEDGER ? pw_system_ledger_entries (s) : 1;
 }
 
-/* Name of the element with contact point number `contact`. */
-static const char *outcome_contact_element (const pw_system *s, int contact) {
-  int e = 0;
-  while (pw_system_element (s, e).contact != contact) e++;
-  return pw_system_element (s, e).name;
-}
-
 static const char *outcome_name (const pw_system *s, pw_column c, char *buffer, size_t size) {
   if (c.type == PW_COLUMN_STATE) return pw_system_state_name (s, c.index, buffer, size);
   if (c.type == PW_COLUMN_REACTION) return pw_system_reaction_name (s, c.index, buffer, size);
   if (c.type == PW_COLUMN_LEDGER) return pw_system_ledger_name (s, c.index, buffer, size);
-  if (c.type != PW_COLUMN_CONTACT) return outcome_scalars[c.type].name;
-  snprintf (buffer, size, "%s.%c", outcome_contact_element (s, c.index / 2), "xy"[c.index % 2]);
-  return buffer;
+  if (c.type == PW_COLUMN_CONTACT) return pw_system_contact_name (s, c.index, buffer, size);
+  return outcome_scalars[c.type].name;
 }
 
 const char *pw_column_unit (const pw_system *s, pw_column c) {

@@ -7,6 +7,7 @@
 #include "report.h"
 
 enum { PERIODIC_PERIODS = 100000 }; /* of the signals in one period of the motion, at most */
+#define PERIODIC_LEAST 1e-100       /* shortest period that is sought [s] */
 
 /* Periods of the run that precedes each attempt, in which the motion approaches a stable periodic one. */
 static const int periodic_settling[] = { 0, 10, 100 };
@@ -26,6 +27,9 @@ static int periodic_read_period (pw_periodic_command *cmd, pw_error *error) {
   if (status == PW_OK) status = pw_cli_number ("--periods", cmd->periods_text, PW_COUNT, &periods, error);
   if (status == PW_OK && !cmd->settings.free)
     status = pw_cli_number ("--period", cmd->period_text, PW_POSITIVE, &cmd->settings.period, error);
+  if (status == PW_OK && cmd->settings.period > 0 && cmd->settings.period < PERIODIC_LEAST)
+    status = pw_fail (error, PW_INPUT, "%s: expected at least %g s", cmd->guess_text ? "--guess" : "--period",
+                      PERIODIC_LEAST);
   if (status == PW_OK && periods > PERIODIC_PERIODS)
     status = pw_fail (error, PW_INPUT, "--periods %s: expected at most %d", cmd->periods_text, PERIODIC_PERIODS);
   if (status != PW_OK) return status;
@@ -184,7 +188,7 @@ static const struct poptOption periodic_options_table[] = {
   PW_WIDTH_OPTION,
   PW_TEXT_OPTION (pw_cli_line, method, "method", 'm', "METHOD", "Adaptive integrator (default erk8+projection)"),
   PW_TEXT_OPTION (pw_cli_line, rtol, "rtol", 0, "R", "Relative tolerance (default 1e-12)"),
-  PW_TEXT_OPTION (pw_cli_line, limit, "limit", 0, "SECONDS", "Stop after this much processor time (default unlimited)"),
+  PW_LIMIT_OPTION,
   PW_MODEL_OPTIONS,
   POPT_TABLEEND
 };

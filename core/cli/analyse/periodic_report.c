@@ -84,7 +84,7 @@ static void periodic_print_motion (const pw_periodic_command *cmd, const pw_peri
   printf ("  mean speed                   %.6g m/s\n", periodic_round (d.total / o->period));
   periodic_print_multipliers (o, pw_periodic_symmetries (cmd->search));
   printf ("  stability                    %s\n", periodic_stability (o, text, sizeof text));
-  printf ("  residual                     %.1e after %d iterations\n", o->residual, o->iterations);
+  printf ("  residual                     %.1e after %s\n", o->residual, PW_COUNTED (o->iterations, "iteration"));
   puts ("\nInitial state");
   pw_states_print (cmd->m.system, o->q, o->v, 8, PERIODIC_SMALL);
 }
@@ -94,9 +94,9 @@ static void periodic_print_branch (const pw_periodic_command *cmd) {
   static const char *const head[] = { "period [s]", "displacement [m]",   "rotation [rad]",
                                       "growing",    "largest multiplier", NULL };
   char text[40];
-  printf ("%s: a branch of periodic motions%s, %s from %.9g to %.9g, %d points\n\n", pw_file_name (cmd->m.file),
+  printf ("%s: a branch of periodic motions%s, %s from %.9g to %.9g, %s\n\n", pw_file_name (cmd->m.file),
           pw_states_symmetries (pw_periodic_symmetries (cmd->search), text), cmd->vary.name, cmd->settings.first,
-          cmd->settings.last, cmd->points);
+          cmd->settings.last, PW_COUNTED (cmd->points, "point"));
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     pw_cell (&t, -15, "event");
     pw_cell_unit (&t, 12, cmd->vary.name, cmd->vary.unit);
@@ -110,6 +110,7 @@ static void periodic_print_branch (const pw_periodic_command *cmd) {
                o->event != PW_PERIODIC_POINT ? periodic_events[o->event]
                : i == 0                      ? "begins"
                : i + 1 < cmd->points         ? ""
+               : cmd->stopped                ? "stopped"
                                              : "ends");
       pw_cell_number (&t, 12, o->parameter, 9);
       pw_cell_number (&t, 12, o->period, 7);

@@ -334,7 +334,7 @@ static const struct poptOption steady_options_table[] = {
   PW_TEXT_OPTION (pw_steady_command, folder, "output", 'o', "DIR",
                   "Write steady.csv, steady.json and, with --vary, figures into a folder"),
   PW_WIDTH_OPTION,
-  PW_TEXT_OPTION (pw_cli_line, limit, "limit", 0, "SECONDS", "Stop after this much processor time (default unlimited)"),
+  PW_LIMIT_OPTION,
   PW_MODEL_OPTIONS,
   POPT_TABLEEND
 };

@@ -75,16 +75,17 @@ static void steady_print_branches (const pw_steady_command *cmd) {
       if (!first && !last && (p->motion.event == PW_STEADY_POINT || ++events > STEADY_EVENTS)) continue;
       pw_cell_number (&t, 6, p->branch, 6);
       pw_cell (&t, -15,
-               first                                ? "begins"
-               : p->motion.event != PW_STEADY_POINT ? steady_events[p->motion.event]
-                                                    : "ends");
+               first                                               ? "begins"
+               : p->motion.event != PW_STEADY_POINT                ? steady_events[p->motion.event]
+               : cmd->stopped && p + 1 == cmd->point + cmd->points ? "stopped"
+                                                                   : "ends");
       pw_cell_number (&t, 12, p->motion.parameter, 9);
       pw_cell_number (&t, 7, p->motion.unstable, 6);
       steady_cells_rightmost (&t, p);
       pw_row_end (&t);
     }
   }
-  if (events > STEADY_EVENTS) printf ("and %d more events, see -o DIR\n", events - STEADY_EVENTS);
+  if (events > STEADY_EVENTS) printf ("and %s, see -o DIR\n", PW_COUNTED (events - STEADY_EVENTS, "more event"));
   for (int i = 0; i < cmd->branches; i++)
     if (*cmd->end[i]) printf ("Branch %d ends: %s\n", i + 1, cmd->end[i]);
 }
@@ -280,6 +281,10 @@ static void steady_variables (const void *context, FILE *f) {
   if (low[0] > high[0]) low[0] = -1, high[0] = 1, low[1] = high[1] = 0; /* no eigenvalues */
   fprintf (f, "re_min = %.10g\nre_max = %.10g\nim_min = %.10g\nim_max = %.10g\n", low[0], high[0], low[1], high[1]);
   pw_figure_label (f, "label_of_x", 0, cmd->vary.name, cmd->vary.unit);
+  int folds = 0, changes = 0;
+  for (const pw_steady_point *p = cmd->point; p < cmd->point + cmd->points; p++)
+    folds += p->motion.event == PW_STEADY_FOLD, changes += p->motion.event > PW_STEADY_FOLD;
+  fprintf (f, "folds = %d\nchanges = %d\n", folds, changes);
   fprintf (f, "first = %.10g\nlast = %.10g\n", fmin (cmd->settings.first, cmd->settings.last),
            fmax (cmd->settings.first, cmd->settings.last));
 }

@@ -207,24 +207,17 @@ static int fit_finish (pw_fit *fit, pw_error *error) {
   pw_error drawing = { 0 };
   pw_fit_print (fit);
   pw_unknowns_report (&fit->unknowns, fit->estimate);
-  const int signals = pw_stop;
-  pw_stop_catch (); /* Ctrl-C ends gnuplot, but the files are still written */
-  if (fit->plots_path) pw_fit_draw (fit, &drawing);
-  pw_stop_release ();
-  const char *word = drawing.status ? pw_cli_status_word (drawing.status) : fit->converged ? "ok" : "method";
+  const int drawn = fit->plots_path ? pw_fit_draw (fit, &drawing) : PW_OK;
+  const char *word = pw_cli_status_word (drawn != PW_OK || fit->converged ? drawn : PW_METHOD);
   int status = table ? pw_fit_table (fit, table, error) : PW_OK;
   if (summary) pw_fit_json (fit, fit->interrupted ? "interrupted" : word, summary);
   if (status == PW_OK) status = pw_files_finish (&fit->files, error);
-  const int undrawn = drawing.status && pw_stop > signals; /* by a signal while gnuplot was running */
-  if (drawing.status && (status != PW_OK || undrawn)) pw_cli_say ("pinwheel: %s\n", drawing.text);
-  if (status == PW_OK && undrawn) return PW_INTERRUPTED;
-  if (status == PW_OK && drawing.status) status = pw_fail (error, drawing.status, "%s", drawing.text);
+  status = pw_figure_status (drawn, &drawing, status, error);
   if (fit->interrupted) pw_cli_say ("pinwheel: interrupted; these are the values so far, without their errors\n");
   if (status == PW_OK && fit->interrupted) return PW_INTERRUPTED;
   if (status == PW_OK && !fit->converged)
-    status =
-        pw_fail (error, PW_METHOD, "no minimum was found in %d iterations; begin nearer to it, by --set or --start",
-                 fit->iterations);
+    status = pw_fail (error, PW_METHOD, "no minimum was found in %s; begin nearer to it, by --set or --start",
+                      PW_COUNTED (fit->iterations, "iteration"));
   return status;
 }
 

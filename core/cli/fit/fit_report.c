@@ -168,13 +168,14 @@ void pw_fit_print (const pw_fit *fit) {
   report_unknowns (fit);
   report_columns (fit);
   if (fit->weighted)
-    printf ("\nchi^2 %.6g with %d degrees of freedom (initially %.6g); it is larger with probability %.2g\n", fit->chi2,
-            dof, fit->initial_chi2, dof > 0 ? gsl_cdf_chisq_Q (fit->chi2, dof) : 1);
+    printf ("\nchi^2 %.6g with %s of freedom (initially %.6g); it is larger with probability %.2g\n", fit->chi2,
+            PW_COUNTED (dof, "degree"), fit->initial_chi2, dof > 0 ? gsl_cdf_chisq_Q (fit->chi2, dof) : 1);
   else
-    printf ("\nsum of squares %.6g with %d degrees of freedom (initially %.6g)\n", fit->chi2, dof, fit->initial_chi2);
+    printf ("\nsum of squares %.6g with %s of freedom (initially %.6g)\n", fit->chi2, PW_COUNTED (dof, "degree"),
+            fit->initial_chi2);
   report_correlations (fit);
   report_undetermined (fit);
-  printf ("\n%ld runs, %d iterations, derivatives by %s\n", fit->runs, fit->iterations,
+  printf ("\n%s, %s, derivatives by %s\n", PW_COUNTED (fit->runs, "run"), PW_COUNTED (fit->iterations, "iteration"),
           fit->by_differences ? "differences of runs" : "the variational equations");
   report_ends (fit);
   if (pw_unknowns_options (&fit->unknowns, fit->estimate, options)) printf ("\n%s\n", options);

@@ -10,6 +10,8 @@
 #define SEARCH_FIRST 0.1    /* first steps from a start, in scaled unknowns */
 #define SEARCH_ROUGH 1e-3   /* last steps from a start, first steps of refinements */
 #define SEARCH_ALLOWED 1e-6 /* permitted violation of a constraint, relative to its bound if that is not 0 */
+#define SEARCH_PROBE 0.1    /* change of an unknown to find out whether it has an effect, in scales */
+#define SEARCH_SAME 1e-6    /* largest change of an output without an effect, relative to its value */
 #define SEARCH_GAIN 1e-9    /* least improvement of the objective for a restart, relative to its value */
 
 enum {
@@ -26,6 +28,8 @@ typedef struct {
   double *scaled, *unknown, *output; /* of the last run; the unknowns scaled and not */
   double *allowed;                   /* outputs: violation that NLopt permits */
   double *slope;      /* outputs x unknowns: derivatives with respect to scaled unknowns; NULL: none are used */
+  int constrained;    /* 1: NLopt knows the constraints */
+  int crossed;        /* 1: it does not, and a run that violates one is better than those that satisfy them */
   int evaluated;      /* 1: there was a run */
   int tried_slopes;   /* 1: the last run was tried with derivatives */
   int failed;         /* 1: the last run failed */
@@ -130,8 +134,12 @@ static void search_keep (local_search *local) {
   const double objective = problem->sign[0] * local->output[0];
   local->least = fmin (local->least, objective);
   local->most = fmax (local->most, objective);
-  if (!pw_search_feasible (problem, local->output)) return;
   if (search->feasible && !(objective < problem->sign[0] * search->output[0])) return;
+  if (!pw_search_feasible (problem, local->output)) {
+    local->crossed = !local->constrained;
+    if (local->crossed) nlopt_force_stop (local->optimiser);
+    return;
+  }
   search->feasible = 1;
   memcpy (search->to, local->unknown, (size_t)problem->unknowns.count * sizeof *search->to);
   memcpy (search->output, local->output, (size_t)problem->outputs * sizeof *search->output);
@@ -220,7 +228,7 @@ static void search_constraints (unsigned count, double *violation, unsigned unkn
  * single unknown, as SBPLX does. */
 static nlopt_algorithm search_algorithm (const local_search *local) {
   if (local->slope) return NLOPT_LD_SLSQP;
-  if (local->problem->outputs > 1) return NLOPT_LN_COBYLA;
+  if (local->constrained) return NLOPT_LN_COBYLA;
   return local->problem->unknowns.count == 1 ? NLOPT_LN_SBPLX : NLOPT_LN_BOBYQA;
 }
 
@@ -236,7 +244,7 @@ static int search_open (local_search *local, double first, double last) {
     if (isfinite (unknown->low)) done &= nlopt_set_lower_bound (o, i, search_scaled (unknown, unknown->low)) > 0;
     if (isfinite (unknown->high)) done &= nlopt_set_upper_bound (o, i, search_scaled (unknown, unknown->high)) > 0;
   }
-  unsigned constraints = (unsigned)local->problem->outputs - 1;
+  unsigned constraints = local->constrained ? (unsigned)local->problem->outputs - 1 : 0;
   done &= nlopt_add_inequality_mconstraint (o, constraints, search_constraints, local, local->allowed) > 0;
   done &= nlopt_set_xtol_abs1 (o, last) > 0;
   done &= nlopt_set_initial_step1 (o, first) > 0;
@@ -253,7 +261,7 @@ static void search_point (const pw_unknowns *unknowns, const double *value, doub
 static int search_minimise (local_search *local, double *scaled) {
   pw_search *search = local->search;
   for (int left = local->slope ? 1 + SEARCH_RESTARTS : 1;
-       left > 0 && !local->failed && !local->slopes_failed && !pw_stop; left--) {
+       left > 0 && !local->failed && !local->slopes_failed && !local->crossed && !pw_stop; left--) {
     double before = search->feasible ? search->output[0] : NAN, objective;
     nlopt_result result = nlopt_optimize (local->optimiser, scaled, &objective);
     if (result == NLOPT_OUT_OF_MEMORY) return PW_RESOURCE;
@@ -264,7 +272,7 @@ static int search_minimise (local_search *local, double *scaled) {
   return PW_OK;
 }
 
-/* Searches from the beginning of the search, by derivatives if `slopes`. */
+/* Searches from the best run so far, or else from the beginning of the search, by derivatives if `slopes`. */
 static int search_from (local_search *local, int slopes, double first, double last) {
   const pw_unknowns *unknowns = &local->problem->unknowns;
   size_t n = (size_t)unknowns->count, outputs = (size_t)local->problem->outputs;
@@ -275,10 +283,10 @@ static int search_from (local_search *local, int slopes, double first, double la
     local->scaled = begin + n, local->unknown = local->scaled + n, local->output = local->unknown + n;
     local->allowed = local->output + outputs;
     local->slope = slopes ? local->allowed + outputs : NULL;
-    local->evaluated = local->slopes_failed = 0;
+    local->evaluated = local->slopes_failed = local->crossed = 0;
     for (size_t i = 0; i < outputs; i++)
       local->allowed[i] = SEARCH_ALLOWED / 10; /* so that NLopt's result is feasible */
-    search_point (unknowns, local->search->from, begin);
+    search_point (unknowns, local->search->feasible ? local->search->to : local->search->from, begin);
     status = search_open (local, first, last);
     if (status == PW_OK) search_evaluate (local, begin, slopes);
     if (status == PW_OK) status = search_minimise (local, begin);
@@ -289,12 +297,17 @@ static int search_from (local_search *local, int slopes, double first, double la
   return status;
 }
 
-/* Search i of the problem, repeated without derivatives if they fail. */
+/* Search i of the problem, repeated without derivatives if they fail.  A refinement without derivatives first ignores
+ * the constraints, as COBYLA is slow in curved valleys; it is repeated with them once they matter. */
 static int search_task (pw_optimise *problem, int i, int slopes, double first, double last, pw_error *error) {
   local_search local = { .problem = problem, .search = problem->search + i, .least = INFINITY, .most = -INFINITY };
   if (pw_stop) return PW_OK;
+  local.constrained = problem->outputs > 1 && (slopes || i < problem->starts);
   int status = search_from (&local, slopes, first, last);
-  if (status == PW_OK && local.slopes_failed) status = search_from (&local, 0, first, last);
+  if (status == PW_OK && (local.slopes_failed || local.crossed)) {
+    local.constrained = problem->outputs > 1;
+    status = search_from (&local, 0, first, last);
+  }
   pthread_mutex_lock (&problem->lock);
   pw_progress_at (&problem->progress, ++problem->searches_done);
   pthread_mutex_unlock (&problem->lock);
@@ -310,4 +323,32 @@ int pw_search_fine (void *context, int i, pw_error *error) {
   pw_optimise *problem = context;
   int slopes = problem->differentiable && problem->unknowns.count >= SEARCH_SLOPES;
   return search_task (problem, problem->starts + i, slopes, SEARCH_ROUGH, PW_SEARCH_FINE, error);
+}
+
+/* 1 if outputs differ from those of the best result, or the run fails. */
+static int search_differs (const local_search *local) {
+  const pw_optimise *problem = local->problem;
+  int differ = search_run (local, &(pw_error){ 0 }) != PW_OK;
+  for (int i = 0; i < problem->outputs && !differ; i++) {
+    const double best = problem->best->output[i];
+    differ = !(fabs (local->output[i] - best) <= SEARCH_SAME * fabs (best));
+  }
+  return differ;
+}
+
+int pw_search_effect (void *context, int i, pw_error *error) {
+  pw_optimise *problem = context;
+  const pw_unknown *unknown = problem->unknowns.list + i;
+  size_t n = (size_t)problem->unknowns.count;
+  double *memory = calloc (n + (size_t)problem->outputs, sizeof *memory), value = problem->best->to[i];
+  if (memory == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  local_search local = { .problem = problem, .unknown = memory, .output = memory + n };
+  memcpy (local.unknown, problem->best->to, n * sizeof *memory);
+  problem->without_effect[i] = 1;
+  for (int side = -1; side <= 1 && problem->without_effect[i]; side += 2) {
+    local.unknown[i] = search_unknown (unknown, search_scaled (unknown, value) + side * SEARCH_PROBE);
+    if (local.unknown[i] != value) problem->without_effect[i] = !search_differs (&local);
+  }
+  free (memory);
+  return PW_OK;
 }

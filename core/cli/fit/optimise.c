@@ -23,7 +23,10 @@ static int optimise_open_searches (pw_optimise *problem, pw_error *error) {
   double *start = pw_unknowns_starts (&problem->unknowns, problem->starts, problem->seed),
          *memory = pw_arena_alloc (&problem->arena, all * width * sizeof *memory);
   problem->search = pw_arena_alloc (&problem->arena, all * sizeof *problem->search);
-  int status = start && memory && problem->search ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+  problem->without_effect = pw_arena_alloc (&problem->arena, n);
+  int status = start && memory && problem->search && problem->without_effect
+                   ? PW_OK
+                   : pw_fail (error, PW_RESOURCE, "out of memory");
   for (size_t i = 0; status == PW_OK && i < all; i++) {
     pw_search *search = problem->search + i;
     search->from = memory + i * width, search->to = search->from + n, search->output = search->to + n;
@@ -62,6 +65,27 @@ static int optimise_refine (pw_optimise *problem, pw_error *error) {
   return pw_parallel (problem->jobs, problem->refinements, pw_search_fine, problem, error);
 }
 
+/* PW_METHOD if the search with the best result did not converge, or made only one run that did not fail, or ended at a
+ * very large value of an unknown without bounds. */
+static int optimise_converged (const pw_optimise *problem, pw_error *error) {
+  const pw_search *search = problem->best;
+  const pw_unknown *farthest = NULL;
+  double distance = 0; /* in units of its scale */
+  for (int i = 0; i < problem->unknowns.count; i++) {
+    const pw_unknown *unknown = problem->unknowns.list + i;
+    if (unknown->has_bounds || !(fabs (search->to[i]) >= distance * unknown->scale)) continue;
+    farthest = unknown, distance = fabs (search->to[i]) / unknown->scale;
+  }
+  int found = search->converged && distance < OPTIMISE_DIVERGED;
+  if (found && search->failed > 0 && search->runs - search->failed == 1)
+    return pw_fail (error, PW_METHOD, "all other runs of the search failed: %s", search->first_error.text);
+  if (found) return PW_OK;
+  if (farthest == NULL) return pw_fail (error, PW_METHOD, "the search did not converge");
+  return pw_fail (error, PW_METHOD,
+                  "the search %s; perhaps there is no optimum unless bounds are given, as in --free %s=LOW:HIGH",
+                  search->converged ? "diverged" : "did not converge", farthest->name);
+}
+
 static int optimise_search (pw_optimise *problem, pw_error *error) {
   pw_stop_catch ();
   pthread_mutex_init (&problem->lock, NULL);
@@ -70,9 +94,11 @@ static int optimise_search (pw_optimise *problem, pw_error *error) {
   int status = pw_parallel (problem->jobs, problem->starts, pw_search_rough, problem, error);
   if (status == PW_OK) status = optimise_refine (problem, error);
   pw_progress_end (&problem->progress);
+  problem->best = optimise_best (problem, problem->starts + problem->refinements, NULL);
+  if (status == PW_OK && problem->best && !pw_stop && optimise_converged (problem, &(pw_error){ 0 }) == PW_OK)
+    status = pw_parallel (problem->jobs, problem->unknowns.count, pw_search_effect, problem, error);
   pthread_mutex_destroy (&problem->lock);
   pw_stop_release ();
-  problem->best = optimise_best (problem, problem->starts + problem->refinements, NULL);
   for (int i = 0; i < problem->starts + problem->refinements; i++) {
     const pw_search *search = problem->search + i;
     problem->runs += search->runs, problem->failed += search->failed, problem->derivatives += search->derivatives;
@@ -186,32 +212,14 @@ static int optimise_infeasible (const pw_optimise *problem, pw_error *error) {
   char unit[90] = "";
   int i = 0;
   if (problem->failed == problem->runs && problem->first_error)
-    return pw_fail (error, problem->first_error->status, "none of %ld runs succeeded, the first one: %s", problem->runs,
-                    problem->first_error->text);
+    return pw_fail (error, problem->first_error->status, "none of %s succeeded, the first one: %s",
+                    PW_COUNTED (problem->runs, "run"), problem->first_error->text);
   const double *output = optimise_nearest (problem, &i);
   if (*problem->unit[i]) snprintf (unit, sizeof unit, " %s", problem->unit[i]);
   return pw_fail (error, PW_METHOD,
-                  "no run from %d starts satisfies --subject-to; in the nearest one %s is %s%s and must be at %s %s%s",
-                  problem->starts, problem->output[i], PW_DIGITS (output[i], 9), unit,
+                  "no run from %s satisfies --subject-to; in the nearest one %s is %s%s and must be at %s %s%s",
+                  PW_COUNTED (problem->starts, "start"), problem->output[i], PW_DIGITS (output[i], 9), unit,
                   problem->sign[i] > 0 ? "most" : "least", PW_DIGITS (problem->bound[i], 9), unit);
-}
-
-/* PW_METHOD if the search with the best result did not converge, or ended at a very large value of an unknown without
- * bounds. */
-static int optimise_converged (const pw_optimise *problem, pw_error *error) {
-  const pw_search *search = problem->best;
-  const pw_unknown *farthest = NULL;
-  double distance = 0; /* in units of its scale */
-  for (int i = 0; i < problem->unknowns.count; i++) {
-    const pw_unknown *unknown = problem->unknowns.list + i;
-    if (unknown->has_bounds || !(fabs (search->to[i]) >= distance * unknown->scale)) continue;
-    farthest = unknown, distance = fabs (search->to[i]) / unknown->scale;
-  }
-  if (search->converged && distance < OPTIMISE_DIVERGED) return PW_OK;
-  if (farthest == NULL) return pw_fail (error, PW_METHOD, "the search did not converge");
-  return pw_fail (error, PW_METHOD,
-                  "the search %s; perhaps there is no optimum unless bounds are given, as in --free %s=LOW:HIGH",
-                  search->converged ? "diverged" : "did not converge", farthest->name);
 }
 
 static int optimise_finish (pw_optimise *problem, pw_error *error) {
@@ -222,20 +230,14 @@ static int optimise_finish (pw_optimise *problem, pw_error *error) {
   if (problem->best == NULL) return stopped ? PW_INTERRUPTED : optimise_infeasible (problem, error);
   pw_error unconverged = { 0 }, drawing = { 0 };
   int converged = optimise_converged (problem, &unconverged) == PW_OK;
+  problem->incomplete = stopped ? "the search was interrupted" : converged ? NULL : "the search did not converge";
   pw_optimise_print (problem);
   pw_unknowns_report (&problem->unknowns, problem->best->to);
   if (result) pw_optimise_yaml (problem, result);
-  const int signals = pw_stop;
-  pw_stop_catch (); /* Ctrl-C ends gnuplot, but the files are still written */
-  if (problem->plots_path) pw_optimise_draw (problem, &drawing);
-  pw_stop_release ();
-  const char *word = drawing.status ? pw_cli_status_word (drawing.status) : converged ? "ok" : "method";
+  const int drawn = problem->plots_path ? pw_optimise_draw (problem, &drawing) : PW_OK;
+  const char *word = pw_cli_status_word (drawn != PW_OK || converged ? drawn : PW_METHOD);
   if (summary) pw_optimise_json (problem, stopped ? "interrupted" : word, summary);
-  int status = pw_files_finish (&problem->files, error);
-  const int undrawn = drawing.status && pw_stop > signals; /* by a signal while gnuplot was running */
-  if (drawing.status && (status != PW_OK || undrawn)) pw_cli_say ("pinwheel: %s\n", drawing.text);
-  if (status == PW_OK && undrawn) return PW_INTERRUPTED;
-  if (status == PW_OK && drawing.status) status = pw_fail (error, drawing.status, "%s", drawing.text);
+  int status = pw_figure_status (drawn, &drawing, pw_files_finish (&problem->files, error), error);
   if (stopped) pw_cli_say ("pinwheel: interrupted; this is the best result so far\n");
   if (status == PW_OK && stopped) return PW_INTERRUPTED;
   return status == PW_OK && !converged ? pw_fail (error, unconverged.status, "%s", unconverged.text) : status;

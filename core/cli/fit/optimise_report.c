@@ -6,8 +6,7 @@
 #include "figure.h"
 #include "print_table.h"
 
-#define REPORT_SAME 0.01       /* largest distance of results of the same optimum, in scales of the unknowns */
-#define REPORT_ROUND_OFF 1e-14 /* largest relative difference of equal outputs */
+#define REPORT_SAME 0.01 /* largest distance of results of the same optimum, in scales of the unknowns */
 
 enum {
   REPORT_DIGITS = 9,
@@ -17,7 +16,7 @@ enum {
 int pw_optimise_same (const pw_optimise *problem, const pw_search *a, const pw_search *b) {
   int same = a->feasible && b->feasible;
   for (int j = 0; same && j < problem->unknowns.count; j++)
-    same = fabs (a->to[j] - b->to[j]) <= REPORT_SAME * problem->unknowns.list[j].scale;
+    same = problem->without_effect[j] || fabs (a->to[j] - b->to[j]) <= REPORT_SAME * problem->unknowns.list[j].scale;
   return same;
 }
 
@@ -26,40 +25,17 @@ static double report_initial (const pw_optimise *problem) {
   return problem->search[0].runs > 0 ? problem->search[0].trials[problem->unknowns.count] : NAN;
 }
 
-/* 1 if the objective is the same in all runs that did not fail. */
+/* 1 if no unknown has an effect. */
 static int report_is_constant (const pw_optimise *problem) {
-  double least = INFINITY, most = -INFINITY;
-  int columns = problem->unknowns.count + problem->outputs;
-  for (int i = 0; i < problem->starts + problem->refinements; i++)
-    for (long k = 0; k < problem->search[i].runs; k++) {
-      double objective = problem->search[i].trials[k * columns + problem->unknowns.count];
-      least = fmin (least, objective), most = fmax (most, objective);
-    }
-  return most - least <= REPORT_ROUND_OFF * fabs (most);
+  return memchr (problem->without_effect, 0, (size_t)problem->unknowns.count) == NULL;
 }
 
-/* 1 if unknown i has no effect: there are runs that differ from the first run of their search in unknown i alone, and
- * their outputs are the same. */
-static int report_has_no_effect (const pw_optimise *problem, int i) {
-  int n = problem->unknowns.count, columns = n + problem->outputs, pairs = 0;
-  const pw_search *search = problem->search, *end = search + problem->starts + problem->refinements;
-  for (; search < end; search++)
-    for (long k = 1; k < search->runs; k++) {
-      const double *a = search->trials, *b = a + k * columns;
-      int others = a[i] == b[i];
-      for (int j = 0; j < n; j++) others |= j != i && a[j] != b[j];
-      for (int j = n; j < columns && !others; j++)
-        if (!(fabs (a[j] - b[j]) <= REPORT_ROUND_OFF * fabs (a[j]))) return 0;
-      pairs += !others;
-    }
-  return pairs > 0;
-}
-
-/* The bound at which the best value of unknown i is: -1 the lower one, 1 the upper one, 0 neither, or no effect. */
+/* The bound at which the best value of unknown i is: -1 the lower one, 1 the upper one, 0 neither, or no effect.  The
+ * value of an incomplete search must be exactly there. */
 static int report_bound (const pw_optimise *problem, int i) {
   const pw_unknown *unknown = problem->unknowns.list + i;
-  if (report_has_no_effect (problem, i)) return 0;
-  double near = 10 * PW_SEARCH_FINE * unknown->scale, value = problem->best->to[i];
+  if (problem->without_effect[i]) return 0;
+  double near = problem->incomplete ? 0 : 10 * PW_SEARCH_FINE * unknown->scale, value = problem->best->to[i];
   return value - unknown->low <= near ? -1 : unknown->high - value <= near;
 }
 
@@ -75,7 +51,7 @@ static void report_unknowns (const pw_optimise *problem) {
       pw_cell_number (&t, 12, isfinite (u->low) ? u->low : NAN, REPORT_DIGITS);
       pw_cell_number (&t, 12, isfinite (u->high) ? u->high : NAN, REPORT_DIGITS);
       pw_cell (&t, -1,
-               report_has_no_effect (problem, i)
+               problem->without_effect[i]
                    ? "without effect"
                    : (const char *[]){ "at its lower bound", "", "at its upper bound" }[1 + report_bound (problem, i)]);
       pw_row_end (&t);
@@ -92,7 +68,10 @@ static void report_outputs (const pw_optimise *problem) {
       pw_cell_unit (&t, -12, problem->output[i], problem->unit[i]);
       pw_cell_number (&t, 12, output[i], REPORT_DIGITS);
       if (i > 0) pw_cell (&t, -1, PW_PRINTED (60, "at %s %s", problem->sign[i] > 0 ? "most" : "least", bound));
-      if (i == 0) pw_cell (&t, -1, problem->maximise ? "largest" : "smallest");
+      if (i == 0)
+        pw_cell (
+            &t, -1,
+            PW_PRINTED (60, "%s%s", problem->maximise ? "largest" : "smallest", problem->incomplete ? " so far" : ""));
       if (i == 0)
         pw_cell (&t, -1, PW_PRINTED (60, "(initially %s)", PW_DIGITS (report_initial (problem), REPORT_DIGITS)));
       pw_row_end (&t);
@@ -105,15 +84,19 @@ void pw_optimise_print (const pw_optimise *problem) {
   for (int i = 0; i < problem->starts; i++) same += pw_optimise_same (problem, problem->search + i, problem->best);
   report_unknowns (problem);
   report_outputs (problem);
-  printf ("\n%ld runs from %d starts, %d of which end at this optimum\n", problem->runs, problem->starts, same);
+  printf ("\n%s from %s, %d of which %s\n", PW_COUNTED (problem->runs, "run"), PW_COUNTED (problem->starts, "start"),
+          same,
+          problem->incomplete ? "end here"
+          : same == 1         ? "ends at this optimum"
+                              : "end at this optimum");
   if (problem->derivatives)
-    printf ("with derivatives at %ld points of the searches that continue (SLSQP), without in the others\n",
-            problem->derivatives);
+    printf ("with derivatives at %s of the searches that continue (SLSQP), without in the others\n",
+            PW_COUNTED (problem->derivatives, "point"));
   if (problem->first_error)
-    pw_cli_print (stdout, "%ld runs failed and count as infeasible, the first of them: %s\n", problem->failed,
+    pw_cli_print (stdout, "%s failed and %s as infeasible, the first of them: %s\n",
+                  PW_COUNTED (problem->failed, "run"), problem->failed == 1 ? "counts" : "count",
                   problem->first_error->text);
-  if (report_is_constant (problem))
-    pw_cli_say ("pinwheel: %s is the same in all runs: no free value has an effect on it\n", problem->output[0]);
+  if (report_is_constant (problem)) pw_cli_say ("pinwheel: no free value has an effect on %s\n", problem->output[0]);
   if (pw_unknowns_options (&problem->unknowns, problem->best->to, options)) printf ("\n%s\n", options);
 }
 
@@ -223,6 +206,7 @@ void pw_optimise_yaml (const pw_optimise *problem, FILE *f) {
   const pw_search *best = problem->best;
   if (pw_unknowns_options (&problem->unknowns, best->to, values) && strpbrk (problem->line.argument[0], "\r\n") == NULL)
     report_command (problem, values, f);
+  if (problem->incomplete) fprintf (f, "# not an optimum: %s\n", problem->incomplete);
   report_yaml_text (f, "model", pw_file_name (problem->model.file));
   report_yaml_text (f, problem->maximise ? "maximise" : "minimise", problem->output[0]);
   fprintf (f, "value: %.17g\n", best->output[0]);

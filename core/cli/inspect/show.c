@@ -176,14 +176,19 @@ static void matrices_print (const pw_cli_model *m, const pw_equations *eq, const
   for (int j = 0; eq->rows > 0 && j < eq->coordinates; j += MATRICES_PANEL) matrices_panel (s, eq, j);
 }
 
-static int show_matrices (const pw_cli_model *m, double t, pw_error *error) {
+static int show_matrices (const pw_cli_line *line, const pw_cli_model *m, double t, pw_error *error) {
   pw_run_defaults defaults = pw_cli_defaults (pw_file_table (m->file));
-  pw_settings settings = { .span = t > 0 ? t : defaults.t_end, .step = defaults.step, .rtol = defaults.rtol };
+  pw_settings settings;
+  pw_limit limit;
+  if (t > 0) defaults.t_end = t;
+  if (pw_cli_settings (line, &defaults, &(double){ 0 }, &settings, &limit, error) != PW_OK) return error->status;
+  pw_limit_start (&limit);
   pw_run *run = pw_run_open (m->system, defaults.method, &settings, error);
   if (run == NULL) return error->status;
   pw_sample sample;
   pw_equations eq = { .rows = 0 };
   int status = t > 0 ? pw_run_advance_to (run, t, t, error) : PW_OK;
+  if (status == PW_STOPPED) status = pw_limit_status (&limit, pw_run_time (run), error);
   if (status == PW_OK) status = pw_run_sample (run, t, &sample, error);
   if (status == PW_OK) status = pw_system_equations (m->system, sample.t, sample.q, sample.v, &eq, error);
   if (status == PW_OK) matrices_print (m, &eq, &sample);
@@ -220,7 +225,7 @@ static int show_command (void *options, pw_error *error) {
   else if (status == PW_OK && given->yaml)
     status = pw_show_yaml (&m, error);
   else if (status == PW_OK && matrices)
-    status = show_matrices (&m, t, error);
+    status = show_matrices (&given->line, &m, t, error);
   else if (status == PW_OK)
     show_model (&m);
   pw_cli_close_model (&m);
@@ -232,6 +237,7 @@ static const struct poptOption show_options[] = {
   PW_FLAG_OPTION (show_line, matrices, "matrices", "Show M, J and gamma at the initial state instead"),
   PW_TEXT_OPTION (show_line, at, "at", 0, "T",
                   "Show M, J and gamma at time T [s] of a run with the model's default method"),
+  PW_LIMIT_OPTION,
   PW_FLAG_OPTION (show_line, code, "c", "Write the C code of the specialised scene, as --specialise compiles it"),
   PW_FLAG_OPTION (show_line, yaml, "yaml", "Write the model as a text model with the same trajectory"),
   PW_MODEL_OPTIONS,

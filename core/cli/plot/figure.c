@@ -150,6 +150,15 @@ static int gnuplot_start (const char *folder, char *const *argv, pid_t *child) {
   return failed;
 }
 
+/* Runs gnuplot, likewise.  Returns 0 or an errno value. */
+static int gnuplot_run (const char *folder, char *const *argv, int *wait_status) {
+  pid_t child;
+  int failed = gnuplot_start (folder, argv, &child);
+  while (!failed && waitpid (child, wait_status, 0) < 0)
+    if (errno != EINTR) failed = errno;
+  return failed;
+}
+
 /* Removes the pictures of an earlier run, and incomplete ones. */
 static void gnuplot_remove_pictures (const char *folder, const char *const *names) {
   for (int i = 0; i < FIGURE_SCRIPTS && names[i]; i++)
@@ -166,25 +175,32 @@ int pw_figure_undrawn (const char *folder, const char *const *names, const char 
 
 int pw_figure_draw (const char *folder, const char *const *names, pw_error *error) {
   char script[FIGURE_SCRIPTS][40], *argv[2 + FIGURE_SCRIPTS + 1] = { "gnuplot", "-d" /* no settings of the user */ };
-  pid_t child;
-  int wait_status;
+  int wait_status, signals = pw_stop;
   for (int i = 0; i < FIGURE_SCRIPTS && names[i]; i++) {
     snprintf (script[i], sizeof script[i], "%s.gp", names[i]);
     argv[2 + i] = script[i];
   }
   fflush (stderr);
   gnuplot_remove_pictures (folder, names);
-  int failed = gnuplot_start (folder, argv, &child);
+  pw_stop_catch (); /* Ctrl-C ends gnuplot, but the command still completes its files */
+  int failed = gnuplot_run (folder, argv, &wait_status);
+  pw_stop_release ();
   if (failed == ENOENT) return pw_figure_undrawn (folder, names, "gnuplot was not found");
   if (failed) return pw_fail (error, PW_RESOURCE, "cannot run gnuplot: %s", strerror (failed));
-  while (waitpid (child, &wait_status, 0) < 0)
-    if (errno != EINTR) return pw_fail (error, PW_RESOURCE, "cannot wait for gnuplot: %s", strerror (errno));
   if (WIFEXITED (wait_status) && WEXITSTATUS (wait_status) == 0) return PW_OK;
+  if (pw_stop > signals) return pw_figure_undrawn (folder, names, "gnuplot was interrupted"), PW_INTERRUPTED;
   gnuplot_remove_pictures (folder, names);
   int signalled = WIFSIGNALED (wait_status);
   return pw_fail (error, PW_RESOURCE, "gnuplot %s %d; its message is above, data and scripts are in %s",
                   signalled ? "was ended by signal" : "failed with exit status",
                   signalled ? WTERMSIG (wait_status) : WEXITSTATUS (wait_status), folder);
+}
+
+int pw_figure_status (int drawn, const pw_error *drawing, int status, pw_error *error) {
+  if (status != PW_OK && drawing->status != PW_OK) pw_cli_say ("pinwheel: %s\n", drawing->text);
+  if (status != PW_OK) return status;
+  *error = *drawing;
+  return drawn;
 }
 
 int pw_figure_write (const pw_cli_line *line, const pw_cli_model *model, const char *folder, const char *name,

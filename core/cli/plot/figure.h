@@ -63,9 +63,11 @@ int pw_figure_write (const pw_cli_line *line, const pw_cli_model *model, const c
                      void (*variables) (const void *context, FILE *f), pw_error *error);
 
 /* Runs gnuplot on NAME.gp for each of at most FIGURE_SCRIPTS names, a list ended by NULL; a missing gnuplot is reported
- * on standard error.  PW_RESOURCE if gnuplot fails. */
+ * on standard error.  PW_RESOURCE if gnuplot fails; PW_INTERRUPTED, reported, if a signal ends it. */
 int pw_figure_draw (const char *folder, const char *const *names, pw_error *error);
 /* Removes the pictures of an earlier run and reports why none are drawn.  Returns PW_OK. */
 int pw_figure_undrawn (const char *folder, const char *const *names, const char *why);
+/* The status of a command that has drawn, with this status and error, and then completed its files, with `status`. */
+int pw_figure_status (int drawn, const pw_error *drawing, int status, pw_error *error);
 
 #endif

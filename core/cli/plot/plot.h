@@ -29,7 +29,7 @@ void pw_plots_serialise (pw_plots *plots, pw_archive *archive);
 
 /* Writes data and scripts into the folder and, if `draw`, runs gnuplot; after an interrupt (`draw` 0), or if gnuplot is
  * not installed, a notice says how to draw the figures.  Without a folder it does nothing, with fewer than two samples
- * it only prints a notice.  PW_RESOURCE if a file cannot be written or gnuplot fails. */
+ * it only prints a notice.  PW_RESOURCE if a file cannot be written or gnuplot fails; PW_INTERRUPTED. */
 int pw_plots_finish (pw_plots *plots, int draw, pw_error *error);
 
 /* PW_INPUT unless the path of an animation, the value of an option, ends in .html. */

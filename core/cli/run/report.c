@@ -277,13 +277,13 @@ void pw_report_end (const pw_summary *summary, const pw_system *system, const pw
   report_errors (summary->reference);
   printf ("\n  worst scaled residuals: position %s, velocity %s\n", PW_DIGITS (stats->position, 2),
           PW_DIGITS (stats->velocity, 2));
-  printf (
-      "  %ld steps, %ld rejected, %ld right-hand sides, %ld Jacobians, %ld factorisations, %s s of processor time\n",
-      stats->steps, stats->rejected, stats->rhs, stats->jacobians, stats->factorisations, PW_DIGITS (summary->cpu, 3));
+  printf ("  %s, %ld rejected, %s, %s, %s, %s s of processor time\n", PW_COUNTED (stats->steps, "step"),
+          stats->rejected, PW_COUNTED (stats->rhs, "right-hand side"), PW_COUNTED (stats->jacobians, "Jacobian"),
+          PW_COUNTED (stats->factorisations, "factorisation"), PW_DIGITS (summary->cpu, 3));
   if (*summary->general)
     pw_cli_print (stdout, "  general engine: %s\n", summary->general);
   else
     printf ("  code specialised for this scene: %ld evaluations\n", stats->specialised);
-  if (stats->restarts > 0) printf ("  restarted at %ld checkpoints\n", stats->restarts);
+  if (stats->restarts > 0) printf ("  restarted at %s\n", PW_COUNTED (stats->restarts, "checkpoint"));
   if (*summary->reason) printf ("  ended early: %s\n", summary->reason);
 }

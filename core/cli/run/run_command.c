@@ -284,15 +284,16 @@ static void run_name_files (pw_run_cli *command, pw_error *error) {
   run_add_error (error, &finish_error);
 }
 
-/* Completes figures and animation; after an interrupt gnuplot is not run. */
-static void run_finish_figures (pw_run_cli *command, const char *reason, pw_error *error) {
+/* Completes figures and animation; after an interrupt gnuplot is not run.  1 if a signal has ended it. */
+static int run_finish_figures (pw_run_cli *command, const char *reason, pw_error *error) {
   pw_error draw_error = { 0 };
-  int drawn = 0;
-  if (command->plots && command->run) pw_plots_finish (command->plots, !pw_stop, &draw_error);
+  int status = PW_OK, animated = 0;
+  if (command->plots && command->run) status = pw_plots_finish (command->plots, !pw_stop, &draw_error);
   if (command->plots && command->run && command->output[PW_RUN_PAGE])
-    drawn = pw_animate (command->plots, command->page_path, command->output[PW_RUN_PAGE], command->method, reason);
-  if (!drawn) run_discard (command, PW_RUN_PAGE);
+    animated = pw_animate (command->plots, command->page_path, command->output[PW_RUN_PAGE], command->method, reason);
+  if (!animated) run_discard (command, PW_RUN_PAGE);
   run_add_error (error, &draw_error);
+  return status == PW_INTERRUPTED;
 }
 
 /* Everything after the last step, however that came about: table, summary, figures, messages.  Returns an exit
@@ -311,8 +312,9 @@ static int run_finish (pw_run_cli *command, pw_error *error) {
   if (last && command->table_path == NULL && command->summary_path == NULL)
     pw_report_end (&summary, system, last, command->with_energies, pw_run_statistics (run));
   if (error->status == PW_OK) pw_report_warnings (run, system, summary.energy_defect);
-  run_finish_figures (command, summary.reason, error);
+  int undrawn = run_finish_figures (command, summary.reason, error);
   if (!interrupted) summary.status = pw_cli_status_word (error->status); /* summary.reason is the text of the error */
+  if (undrawn && error->status == PW_OK) summary.status = "interrupted", summary.reason = "gnuplot was interrupted";
   run_write_json (command, &summary, last, error);
   run_name_files (command, error);
   if (command->profile && last && error->status == PW_OK && !interrupted)
@@ -325,7 +327,7 @@ static int run_finish (pw_run_cli *command, pw_error *error) {
   if (command->checkpoints.last_path && (interrupted || command->limited || status == -PW_RESOURCE))
     pw_cli_say ("pinwheel: --resume %s continues from t = %s s\n", command->checkpoints.last_path,
                 PW_DIGITS (command->checkpoints.last_time, 6));
-  return interrupted && status == 0 ? PW_INTERRUPTED : status;
+  return (interrupted || undrawn) && status == 0 ? PW_INTERRUPTED : status;
 }
 
 static void run_close (pw_run_cli *command) {

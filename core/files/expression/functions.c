@@ -121,7 +121,7 @@ static pw_partials partials_jacobi_am (double u, double m, double phi) {
   double sc_m = ((c * c - s * s) * am_m - s * c * dn_m / dn) / dn;
   double F_m = (N_m - sc_m) / (2 * m1) + F / m1;
   pw_partials r = { dn, am_m, -m * s * c, dn_m, -(dn_m * F + dn * F_m) };
-  if (fabs (m) >= 1e-5) return r;
+  if (!(fabs (m) < 1e-5)) return r; /* also if m is NaN */
   const double h = 1e-4; /* the error of N_m, a difference, would be 1e-15 / m; that of this difference is 1e-9 */
   r.yy = (partials_jacobi_am (u, m + h, pw_jacobi_am (u, m + h)).y -
           partials_jacobi_am (u, m - h, pw_jacobi_am (u, m - h)).y) /

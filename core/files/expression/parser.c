@@ -89,8 +89,8 @@ static void parser_next (parser *p) {
   if (p->symbol == NULL && *word == '=')
     parser_fail (p, p->at, "\"=\" would assign; equality is written ==");
   else if (p->symbol == NULL)
-    parser_fail (p, p->at, "\"%s\" does not belong in an expression",
-                 *word & 0x80 ? "a non-ASCII character" : (char[2]){ *word, 0 });
+    parser_fail (p, p->at, "%s does not belong in an expression",
+                 *word & 0x80 ? "a non-ASCII character" : (char[]){ '"', *word, '"', 0 });
   else if (word[0] == '*' && word[1] == '*')
     parser_fail (p, p->at, "a power is written with ^");
   else

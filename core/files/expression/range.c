@@ -238,12 +238,14 @@ static pw_range range_logical (int op, const pw_range *x, const pw_range *y) {
   return r;
 }
 
-/* The minimum of NaN and a number is the number.  Where either operand can be the smaller one there may be a kink. */
+/* The minimum of NaN and a number is the number.  Where either operand can be the smaller one there may be a kink, and
+ * a minimum that is constant in the interval may fall just after it. */
 static pw_range range_min (const pw_range *x, const pw_range *y) {
   if (y->lo > y->hi || (x->hi < y->lo && !x->nan)) return *x;
   if (x->lo > x->hi || (y->hi < x->lo && !y->nan)) return *y;
   pw_range r = range_hull (x, y);
   if (!r.nan) r.hi = fmin (x->hi, y->hi);
+  if (r.lo == r.hi && (x->lo < x->hi || y->lo < y->hi)) r.lo = range_rounded (r.lo, r.lo).lo;
   r.breaks |= !r.of_states;
   r.nan = x->nan & y->nan;
   return r;

@@ -83,11 +83,8 @@ static void csv_states (pw_csv *c, const pw_sample *x) {
 }
 
 static void csv_contacts (pw_csv *c) {
-  for (int e = 0; c->workspace && e < pw_system_elements (c->system); e++) {
-    const pw_element_info x = pw_system_element (c->system, e);
-    for (int i = 0; x.contact >= 0 && i < 2; i++)
-      CSV_CELL (c, PW_PRINTED (300, "%s.%c", x.name, "xy"[i]), "m", c->contact[x.contact][i]);
-  }
+  for (int i = 0; c->workspace && i < 2 * pw_system_contacts (c->system); i++)
+    CSV_CELL (c, PW_NAME (pw_system_contact_name, c->system, i), "m", c->contact[i / 2][i % 2]);
 }
 
 static void csv_reactions (pw_csv *c, const pw_sample *x) {

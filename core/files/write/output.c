@@ -34,19 +34,19 @@ static const char *output_shown (const pw_output *o) {
 }
 
 /* The reason for messages; code: an errno value, or -1 if it is unknown. */
-static const char *output_reason (int code) {
-  return code > 0 ? pw_lock_reason (code) : "a write failed";
+static const char *output_reason (const pw_output *o, int code) {
+  return code <= 0 ? "a write failed" : *o->part ? pw_lock_reason (code) : strerror (code);
 }
 
 static int output_fail (const pw_output *o, int code, pw_error *error) {
-  return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", output_shown (o), output_reason (code));
+  return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", output_shown (o), output_reason (o, code));
 }
 
 /* The same, and names the temporary file, if that remains. */
 static int output_fail_with_part (const pw_output *o, int code, pw_error *error) {
   if (*o->part == 0 || o->discard) return output_fail (o, code, error);
   return pw_fail (error, PW_RESOURCE, "cannot write %.200s: %s; what was written is in %.200s", output_shown (o),
-                  output_reason (code), o->part);
+                  output_reason (o, code), o->part);
 }
 
 /* ---- Opening ---- */

@@ -15,7 +15,7 @@ static const char *read_key_hint (const char *text, const char *const *key) {
     if (strncmp (text, key[i], n) == 0 && text[n] == ':') return "; a space goes after the colon";
     if (strncmp (text, key[i], n) == 0 && text[n] == ' ') return "; a colon goes after the key";
   }
-  if (strspn (text, "0123456789") == strlen (text)) return "; decimals are written with a point";
+  if (*text && strspn (text, "0123456789") == strlen (text)) return "; decimals are written with a point";
   if (strpbrk (text, "()*/^")) return "; an expression with commas goes between double quotes";
   return "";
 }

@@ -1,7 +1,7 @@
 # include look.gp
 
 # ---- Steady motions: eigenvalues over the parameter, stable parts solid, unstable ones dashed; root locus ----
-# Above: label_of_x, first and last (range of the parameter), re_min to re_max and im_min to im_max (of eigenvalues).
+# Above: label_of_x, first and last (range of the parameter), folds and changes (numbers of events), re_min to re_max and im_min to im_max (of eigenvalues).
 # Blocks of the data: stable and unstable parts (parameter, real part [1/s], frequency [Hz]), events (parameter; 1:
 # fold, larger: change of stability), eigenvalues (parameter, real and imaginary part [1/s]).
 
@@ -29,9 +29,9 @@ do for [form in forms] {
   plot data index 0 using 1:2 with lines lw 1.1 dt 1 lc rgb '#004488' title 'stable', \
        data index 1 using 1:2 with lines lw 1.1 dt (8,5) lc rgb '#cc6677' title 'unstable', \
        data index 2 using 1:($2 > 1 ? bar_low : NaN):(0):(bar_length) \
-         with vectors nohead dt (2,4) lw 0.7 lc rgb '#000000' title 'stability changes', \
+         with vectors nohead dt (2,4) lw 0.7 lc rgb '#000000' title (changes ? 'stability changes' : ''), \
        data index 2 using 1:($2 == 1 ? bar_low : NaN):(0):(bar_length) \
-         with vectors nohead dt (10,4,2,4) lw 0.7 lc rgb '#c49a00' title 'fold'
+         with vectors nohead dt (10,4,2,4) lw 0.7 lc rgb '#c49a00' title (folds ? 'fold' : '')
   set format x
   set xlabel label_of_x noenhanced
   set ylabel 'frequency [Hz]'
