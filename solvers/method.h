@@ -47,8 +47,9 @@ struct pw_run {
   int uses_derivatives;   /* 1: the method uses the derivatives of the equations (tangent.h); only for opening */
   double alpha, beta;     /* Baumgarte's [1/s], used by pw_run_accelerate; 0: none */
   double breakpoint;      /* next discontinuity of a signal, or INFINITY; t if it has just been reached */
-  int stalled;            /* consecutive steps that did not advance */
-  pw_residuals residuals; /* of the state reached, until a sample is projected; NaN: not computed */
+  double moved_from, moved_to; /* ends of the last change of t without a step; between them the state is the same */
+  int stalled;                 /* consecutive steps that did not advance */
+  pw_residuals residuals;      /* of the state reached, until a sample is projected; NaN: not computed */
 
   /* The state reached, where `advance` leaves kinematics and J evaluated.  Of adams and bdf, a and lambda may be those
    * of the last iterate until `at` is called. */
@@ -119,12 +120,15 @@ typedef struct {
   long count; /* steps since then */
 } pw_step_counter;
 
-/* End of the next step of size h: the next multiple of h, or t_end or a breakpoint if one of them is earlier; *whole: 1
- * if it is the multiple.  Times within 1e-9 h of each other differ by round-off only. */
+/* End of the next step of size h: the next multiple of h; or t_end or a breakpoint, if it is earlier, or later by up to
+ * PW_STEP_LONGER h, so that no tiny step remains, in which round-off dominates multipliers; *whole: 1 if it is the
+ * multiple.  Times within 1e-9 h of each other differ by round-off only. */
+#define PW_STEP_LONGER 0.01
 static inline double pw_step_end (const pw_run *r, const pw_step_counter *c, double t_end, int *whole) {
   double h = r->settings.step, t1 = c->base + (double)(c->count + 1) * h, stop = fmin (t_end, r->breakpoint);
-  *whole = t1 < stop + 1e-9 * h;
-  return t1 > stop - 1e-9 * h ? stop : t1;
+  int is_before = t1 <= stop - PW_STEP_LONGER * h;
+  *whole = is_before || fabs (t1 - stop) < 1e-9 * h;
+  return is_before ? t1 : stop;
 }
 /* Counts a step to t1; after one that is not whole, steps are counted from t1. */
 static inline void pw_count_step (pw_step_counter *c, int whole, double t1) {

@@ -57,7 +57,8 @@ int pw_step_open (pw_run *r, int arrays, pw_error *error);
  * larger. */
 double *pw_step_array (pw_run *r, int i);
 
-/* The size of the next step: settings->step, or less if it would pass t_end or a discontinuity. */
+/* The size of the next step: settings->step; less if it would pass t_end or a discontinuity, or up to 1 % more to end
+ * there. */
 double pw_step_size (pw_run *r, double t_end);
 
 /* Ends `advance`.  `status` is that of the stages; if it is PW_OK, (q, v) at t + h becomes the state reached:

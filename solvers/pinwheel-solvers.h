@@ -112,10 +112,10 @@ int pw_run_advance_to (pw_run *r, double t, double t_end, pw_error *error);
 /* The time reached. */
 double pw_run_time (const pw_run *r);
 
-/* The state at a time inside the last accepted step, its end included.  PW_STOPPED as pw_run_advance, but never at
- * the end: the state reached is available however a run has stopped; after a stop, other times may not be.  Errors:
- * PW_INPUT if t lies outside the step; PW_METHOD if a signal fails there, or no state satisfies the constraints;
- * PW_RESOURCE. */
+/* The state at a time inside the last accepted step, its end included; at a discontinuity accelerations and multipliers
+ * are those before or after it, depending on the method.  PW_STOPPED as pw_run_advance, but never at the end: the state
+ * reached is available however a run has stopped; after a stop, other times may not be.  Errors: PW_INPUT if t lies
+ * outside the step; PW_METHOD if a signal fails there, or no state satisfies the constraints; PW_RESOURCE. */
 int pw_run_sample (pw_run *r, double t, pw_sample *sample, pw_error *error);
 
 /* Energy defect of a sample, including energy added by projections, relative to the energy that the run has

@@ -25,7 +25,8 @@ static int several_possible (const pw_run *r) {
  * (limits.c).  Each must be twice as long as a step that counts as stalled (run.c). */
 static int several_count (const pw_run *r, double t, double t_end) {
   const pw_method_data *d = r->data;
-  const double h = r->settings.step, stop = fmin (t_end, r->breakpoint) - 1e-9 * h, shortest = 128 * DBL_EPSILON;
+  const double h = r->settings.step, stop = fmin (t_end, r->breakpoint) - PW_STEP_LONGER * h,
+               shortest = 128 * DBL_EPSILON;
   int most = PW_CHECK_INTERVAL - (int)(r->statistics.steps % PW_CHECK_INTERVAL), n = 0;
   double reached = r->t;
   while (n < most && reached < t && reached < t_end && reached - r->settings.t < 2 * r->speed_record.time) {

@@ -73,10 +73,11 @@ double pw_step_size (pw_run *r, double t_end) {
   return d->end - r->t;
 }
 
-/* Projects the new state if the method does, and evaluates its accelerations. */
+/* Projects the new state if the method does, and evaluates its accelerations; at a discontinuity, those before it. */
 static int step_evaluate (pw_run *r, double t, double *q, double *v, double *added_energy) {
   struct pw_method_data *d = r->data;
   if (!pw_is_finite_state (r, q, v)) return PW_RETRY;
+  t = pw_before_breakpoint (r, t);
   if (!d->projects) return pw_run_accelerate (r, t, q, v, d->a, d->lambda);
   return pw_project_state (&d->last.projector, r, t, q, v, d->a, d->lambda, r->settings.ledger ? added_energy : NULL);
 }

@@ -168,7 +168,8 @@ int pw_run_advance (pw_run *r, double t_end, pw_error *error) {
   if (status == PW_OK) status = run_reselect (r, error);
   const double stop = fmin (t_end, r->breakpoint);
   if (status == PW_OK && run_is_at (r, stop)) {
-    r->t = stop;
+    if (r->t != r->moved_to) r->moved_from = r->t;
+    r->moved_to = r->t = stop;
     return run_check_progress (r, before, error);
   }
   r->near_singular = 0;
@@ -206,8 +207,9 @@ int pw_run_sample (pw_run *r, double t, pw_sample *sample, pw_error *error) {
   r->stopped = 0;
   if (t < r->t && pw_run_stop_requested (r)) return PW_STOPPED;
   const pw_source *failed = r->w->failed;
+  const int is_reached = r->t == r->moved_to && t >= r->moved_from && t < r->t;
   r->w->failed = NULL;
-  int status = pw_run_annotate_error (r, r->method->at (r, t, error), error);
+  int status = pw_run_annotate_error (r, r->method->at (r, is_reached ? r->t : t, error), error);
   r->w->failed = failed;
   if (status != PW_OK) return status;
   *sample = (pw_sample){ .t = t, .q = r->q_at, .v = r->v_at, .a = r->a_at, .lambda = r->lambda_at };
@@ -280,6 +282,7 @@ int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error
   if (run_check_given (r, q, 0, error) != PW_OK || run_check_given (r, v, r->s->coords, error) != PW_OK)
     return PW_INPUT;
   r->w->failed = NULL;
+  r->interrupted |= r->t >= r->breakpoint; /* and remains so if the restart is refused */
   int status = run_energy (r, &before, error);
   if (status == PW_OK) status = pw_run_look_ahead (r, error);
   if (status != PW_OK) return pw_run_annotate_error (r, status, error);

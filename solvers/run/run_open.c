@@ -32,7 +32,7 @@ static int run_settings (pw_settings *to, const pw_settings *from, int fixed_ste
   if (to->step == 0) to->step = 1e-3;
   if (to->rtol == 0) to->rtol = PW_RTOL;
   if (to->max_steps == 0) to->max_steps = PW_MAX_STEPS;
-  if (to->span == 0) to->span = fixed_steps ? 1000 * to->step : 1;
+  if (to->span == 0) to->span = fixed_steps ? fmin (1000 * to->step, DBL_MAX) : 1;
   double least_step = (fabs (to->t) + to->span) / RUN_MOST_STEPS;
   if (!fixed_steps || to->step >= least_step) return PW_OK;
   return pw_fail (error, PW_INPUT, "setting step = %g: expected at least %g for a run to t = %g", to->step, least_step,

@@ -269,7 +269,7 @@ static int variation_before_breakpoint (const pw_variation *x) {
 }
 
 int pw_variation_advance (pw_variation *x, double t, double t_end, pw_error *error) {
-  if (pw_require (x, "derivatives", error) != PW_OK) return PW_INPUT;
+  if (pw_require (x, "a variation", error) != PW_OK) return PW_INPUT;
   if (isnan (t)) return pw_fail (error, PW_INPUT, "t = nan: expected a time");
   pw_run *r = x->r;
   int status = PW_OK;
@@ -292,7 +292,7 @@ int pw_variation_advance (pw_variation *x, double t, double t_end, pw_error *err
 }
 
 double pw_variation_next_jump (pw_variation *x, double t, double t_end, pw_error *error) {
-  if (pw_require (x, "derivatives", error) != PW_OK) return NAN;
+  if (pw_require (x, "a variation", error) != PW_OK) return NAN;
   int status = x->may_jump ? variation_advance_run (x, t, t_end, error) : PW_OK;
   double jump = pw_variation_recorded_jump (x);
   for (int i = 0; i + 1 < x->points && status == PW_OK; i++)
@@ -327,7 +327,7 @@ static int variation_column_sample (pw_variation *x, const pw_direction_copy *d,
 }
 
 int pw_variation_sample (pw_variation *x, int i, pw_sample *derivative, pw_sample *error_of, pw_error *error) {
-  if (pw_require (x, "derivatives", error) != PW_OK) return PW_INPUT;
+  if (pw_require (x, "a variation", error) != PW_OK) return PW_INPUT;
   /* the run's samples at a breakpoint are those after it */
   int status = variation_before_breakpoint (x) ? pw_variation_pass_breakpoint (x, error) : PW_OK;
   if (status != PW_OK) return pw_run_annotate_error (x->r, status, error);

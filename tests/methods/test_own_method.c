@@ -69,19 +69,24 @@ TEST (stabilisations) {
   assert_true (off[0] > 1e-6);
 }
 
-/* Steps end at a discontinuity and at t_end; steps after it are multiples of the given size. */
+/* Steps end at a discontinuity, with the accelerations before it, and at t_end; steps after it are multiples of the
+ * given size. */
 TEST (breakpoint) {
   const pw_signal pulse = { PW_PULSE, .pulse = { .height = 0.1, .start = 0.0104, .width = 0.02 } };
   pw_system *s = own_system (&pulse);
   pw_run *r = runs_open (s, "euler+projection", &own_settings);
   pw_error error = { 0 };
   int met = 0;
+  pw_sample x;
   check_ok (pw_run_advance (r, 0.0005, &error), &error);
   check_ok (pw_run_advance (r, 0.02, &error), &error);
   check_close ("a step after a shortened one", pw_run_time (r), 0.0015, 1e-15, "a rounding");
   while (pw_run_time (r) < 0.02) {
     check_ok (pw_run_advance (r, 0.02, &error), &error);
-    if (pw_run_time (r) == 0.0104) met = 1;
+    if (pw_run_time (r) != 0.0104) continue;
+    met = 1;
+    check_ok (pw_run_sample (r, 0.0102, &x, &error), &error);
+    check_close ("before the pulse", x.v[2], 0, 1e-12, "at rest");
   }
   assert_true (met);
   check_close ("the end", pw_run_time (r), 0.02, 0, "the last step ends there");

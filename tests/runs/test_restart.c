@@ -98,6 +98,43 @@ TEST (refused) {
   pw_system_free (s), pw_system_free (same);
 }
 
+/* A torque that jumps at 0.5 s.  *context: 1: evaluations fail once it has been asked for its next jump, which makes it
+ * 2. */
+static int restart_jump (void *context, double t, const double *x, double value[3], double *gradient) {
+  (void)x, (void)gradient;
+  value[0] = t < 0.5 ? 0 : 0.1;
+  return *(int *)context == 2;
+}
+
+static double restart_next_jump (void *context, double t) {
+  if (*(int *)context) *(int *)context = 2;
+  return t < 0.5 ? 0.5 : INFINITY;
+}
+
+/* A restart that is refused where the torque jumps: the next step still restarts the method there. */
+TEST (refused_at_jump) {
+  static const char *const method[] = { "galpha", "leapfrog", "erk8+projection", "ida+ggl", "bdf+projection" };
+  const pw_settings settings = { .step = 1e-2 };
+  pw_error error = { 0 };
+  int fails = 0;
+  pw_signal jump = { PW_FUNCTION,
+                     .function = { .eval = restart_jump, .context = &fails, .breakpoint = restart_next_jump } };
+  pw_model *m = scene_model (&scene_ezyroller, NULL);
+  check_ok (pw_model_set_signal (m, "rider", "value", &jump, &error), &error);
+  pw_system *s = scene_compile (m);
+  for (int i = 0; i < 5; i++) {
+    pw_run *r = runs_open (s, method[i], &settings), *left = runs_open (s, method[i], &settings);
+    runs_to (r, 0.5), runs_to (left, 0.5);
+    fails = 1;
+    assert_int_equal (pw_run_restart (r, NULL, NULL, NULL), PW_METHOD);
+    fails = 0;
+    check_close (method[i], runs_to (r, 1).q[2], runs_to (left, 1).q[2], 1e-12, "round-off");
+    assert_int_equal (pw_run_statistics (r)->steps, pw_run_statistics (left)->steps);
+    pw_run_close (r), pw_run_close (left);
+  }
+  pw_system_free (s);
+}
+
 static const pw_method *restart_built_in;
 static int restart_fails, restart_calls;
 

@@ -200,7 +200,7 @@ TEST (shared) {
 }
 
 TEST (missing) {
-  pw_error e[] = { { 0 }, { 0 }, { 0 }, { 0 }, { 0 }, { 0 } };
+  pw_error e[] = { { 0 }, { 0 }, { 0 }, { 0 }, { 0 }, { 0 }, { 0 } };
   pw_sample sample;
   assert_null (pw_run_open (NULL, "rk4", NULL, &e[0]));
   check_error (&e[0], PW_INPUT, "a system is missing");
@@ -218,6 +218,9 @@ TEST (missing) {
   assert_int_equal (pw_run_sample (r, 0, NULL, &e[5]), PW_INPUT);
   check_error (&e[5], PW_INPUT, "a sample is missing");
   pw_run_close (r);
+  pw_run_close (runs_open (s, "rk4", &(pw_settings){ .step = 1e308 })); /* 1000 of these, the default span, overflow */
+  assert_int_equal (pw_system_find_held (NULL, "frame.x", &e[6]), PW_INPUT);
+  check_error (&e[6], PW_INPUT, "a system is missing");
   pw_system_free (s);
 }
 

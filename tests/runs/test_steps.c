@@ -147,14 +147,35 @@ TEST (adjacent_breakpoints) {
 }
 
 /* One pulse ends and another one begins, in motion: both times are meant to be the same but differ in the last
- * digit. */
+ * digit.  Samples at such times are of the same state. */
 TEST (adjacent_in_motion) {
   char name[STEPS_NAME];
+  pw_error error = { 0 };
+  pw_sample x;
   pw_system *s = steps_open ((pw_signal){ PW_PULSE, .pulse = { .height = 10, .start = 0.1, .width = 0.2 } },
                              (pw_signal){ PW_PULSE, .pulse = { .height = -10, .start = 0.3, .width = 0.5 } });
   for (int i = 0; steps_method (i, name); i++) {
     pw_run *r = runs_open (s, name, &(pw_settings){ .step = 0.01, .rtol = 1e-6 });
+    const double end = runs_to (r, nextafter (0.1 + 0.2, 1)).q[2];
+    check_ok (pw_run_sample (r, 0.1 + 0.2, &x, &error), &error);
+    check_close (name, x.q[2], end, 1e-15, "round-off");
     check_close (name, runs_to (r, 1).q[2], 10 / 1.1 * (0.02 + 0.1 - 0.125 - 0.06), 1e-3, "1000 rtol; galpha: h^2");
+    pw_run_close (r);
+  }
+  pw_system_free (s);
+}
+
+/* No tiny step remains before the end, since round-off would dominate its multipliers. */
+TEST (tiny_remainder) {
+  static const char *const method[] = { "rk4+projection", "leapfrog", "galpha", "galpha+ggl", "radau:steps=fixed" };
+  pw_system *s = scene_named ("pendulum", NULL, 0);
+  for (int i = 0; i < 5; i++) {
+    pw_run *r = runs_open (s, method[i], &(pw_settings){ .step = 0.01 });
+    const double before = runs_to (r, 0.1).lambda[0];
+    pw_run_close (r);
+    r = runs_open (s, method[i], &(pw_settings){ .step = 0.01 });
+    check_close (method[i], runs_to (r, 0.1 + 1e-10).lambda[0], before, 1e-2, "h^2: galpha starts anew");
+    assert_int_equal (pw_run_statistics (r)->steps, 10);
     pw_run_close (r);
   }
   pw_system_free (s);

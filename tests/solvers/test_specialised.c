@@ -432,6 +432,10 @@ TEST (several_steps) {
       check_bits ("motion since the last sine", &one->watchdog.moved, &many->watchdog.moved, 1);
       check_bits ("accelerations so far", &one->reference_level, &many->reference_level, 1);
       check_bits ("energy so far", &one->exchanged, &many->exchanged, 1);
+      const double end = pw_run_time (one) + 40.005 * h; /* the last step is longer */
+      while (pw_run_time (one) < end) check_ok (pw_run_advance (one, end, NULL), NULL);
+      check_ok (pw_run_advance_to (many, end, end, NULL), NULL);
+      assert_int_equal (pw_run_statistics (one)->steps, pw_run_statistics (many)->steps);
       assert_int_equal (pw_run_advance_towards (many, 1, NAN, &(pw_error){ 0 }), PW_INPUT);
       pw_run_close (one);
       both_close (&x);
