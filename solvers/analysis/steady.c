@@ -10,8 +10,11 @@ enum {
   STEADY_POINTS = 50,       /* of a branch, by default */
   STEADY_BREAKPOINTS = 1000 /* that are followed to find the last one */
 };
-static const double STEADY_EXACT = 1e-9, /* largest residual of a solution, in units of the scene */
-    STEADY_SLOW = 1e-4,    /* rates that may be round-off at a double root: more than the root of STEADY_EXACT */
+static const double
+    STEADY_EXACT = 1e-9, /* largest residual of a solution, in units of the scene */
+    STEADY_SLOW = 1e-4,  /* rates that may be round-off at a double root: more than the root of STEADY_EXACT */
+    STEADY_CRAWL = 1e-2, /* the same at a root of higher order, where residuals exceed STEADY_REGULAR */
+    STEADY_REGULAR = 1e-13,
     SUGGEST_CHANGE = 1e-8, /* a quantity is worth holding if the square of its change along the family, without the */
     SUGGEST_LEFT = 1e-6;   /* part that is held already, exceeds SUGGEST_CHANGE, and SUGGEST_LEFT x the whole square */
 
@@ -208,13 +211,13 @@ static int steady_family (pw_steady *x) {
   return pw_null_space (equations, unknowns, x->branch.J, PW_STEADY_RANK, x->null_space);
 }
 
-/* Replaces rates below the accuracy of a double root by rest, if that is a solution, too: then 1. */
+/* Replaces rates below the accuracy of a multiple root by rest, if that is a solution, too: then 1. */
 static int steady_rest (pw_steady *x) {
   size_t bytes = ((size_t)pw_steady_unknowns (x) + 1) * sizeof *x->u;
   pw_error none = { 0 };
   double most = 0;
   for (int k = x->n; k < pw_steady_unknowns (x); k++) most = fmax (most, fabs (x->u[k]));
-  if (most == 0 || most > STEADY_SLOW) return 0;
+  if (most == 0 || most > (x->branch.residual > STEADY_REGULAR ? STEADY_CRAWL : STEADY_SLOW)) return 0;
   memcpy (x->null_space, x->u, bytes);
   memset (x->u + x->n, 0, (size_t)x->symmetries * sizeof *x->u);
   if (pw_branch_solve (&x->branch, x->u, &none) == PW_OK) return 1;
@@ -232,7 +235,8 @@ static int steady_converge (pw_steady *x, int attempt, double parameter, pw_stea
   status = pw_branch_solve (&x->branch, x->u, error);
   out->iterations = x->branch.iterations;
   out->residual = x->branch.residual;
-  if (status == PW_OK && steady_rest (x)) out->iterations = x->branch.iterations, out->residual = x->branch.residual;
+  if ((status == PW_OK || status == PW_RETRY) && steady_rest (x))
+    status = PW_OK, out->iterations = x->branch.iterations, out->residual = x->branch.residual;
   pw_steady_state (x, x->u);
   return status;
 }
