@@ -89,7 +89,9 @@ TEST (resume) {
 }
 
 TEST (compare) {
-  cli_write ("block.yaml", check_text ("%s  block.y: 0\n  block.phi: 0\n  block.vy: 0\n", truth_text));
+  cli_write ("block.yaml", check_text ("%s  block.y: 0\n  block.phi: 0\n"
+                                       "  block.vx: -a*(w + d^2/w)*exp(-d*t)*sin(w*t)\n",
+                                       truth_text));
   cli_good ("pinwheel compare @/block.yaml --methods rk4,erk5 --repeats 1 --step-ladder 0.1:0.02 --rtol-ladder "
             "1e-4:1e-5 -o @/whole");
   truth_shows ("errors are measured against the exact solution of the model\n");
