@@ -63,6 +63,7 @@ TEST (degrees) {
   cli_good ("pinwheel run @/skate.yaml --t-end 0.01 --start skate.phi=-6");
   assert_int_equal (cli_run ("pinwheel run @/skate.yaml --t-end 0.01 --start skate.phi=400"), 0);
   assert_non_null (strstr (cli_err, "pinwheel: body skate: initial phi = 400 rad is more than a turn and ends at "));
+  cli_good ("pinwheel run @/skate.yaml --t-end 0.01 --start skate.phi=373.883"); /* the end of a long run */
   cli_write ("skate.yaml", check_text (model, "30", "-90", "45"));
   assert_int_equal (cli_run ("pinwheel check @/skate.yaml"), 0);
   assert_non_null (strstr (cli_err, "pinwheel: body skate: initial phi = 30 rad is more than a turn"));

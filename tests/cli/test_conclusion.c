@@ -128,6 +128,7 @@ TEST (none) {
   cli_write ("speed.csv", "t,frame.vx\n1,0\n2,0\n");
   cli_good ("pinwheel compare ezyroller --methods rk4 --reference @/speed.csv --repeats 1 --step-ladder 0.1");
   assert_null (strstr (cli_out, "cheapest"));
+  assert_non_null (strstr (cli_out, "\n  it contains none of 6 coordinates\n"));
   assert_non_null (strstr (cli_out, "\nrk4          0.1 "));
 }
 

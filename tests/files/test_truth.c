@@ -89,11 +89,45 @@ TEST (resume) {
 }
 
 TEST (compare) {
-  cli_write ("block.yaml", truth_text);
-  cli_good ("pinwheel compare @/block.yaml --methods rk4,erk5 --step-ladder 0.1:0.02 --rtol-ladder 1e-4:1e-5");
+  cli_write ("block.yaml", check_text ("%s  block.y: 0\n  block.phi: 0\n"
+                                       "  block.vx: -a*(w + d^2/w)*exp(-d*t)*sin(w*t)\n",
+                                       truth_text));
+  cli_good ("pinwheel compare @/block.yaml --methods rk4,erk5 --repeats 1 --step-ladder 0.1:0.02 --rtol-ladder "
+            "1e-4:1e-5 -o @/whole");
   truth_shows ("errors are measured against the exact solution of the model\n");
+  assert_null (strstr (cli_out, "contains"));
+  cli_good ("tail -n +2 @/whole/compare.csv | cut -d, -f8,12 | sort -u");
+  assert_string_equal (cli_out, "nan,nan\n"); /* speeds: only one of the three velocities is given */
   cli_good ("pinwheel compare @/block.yaml --methods rk4 --step-ladder 0.1:0.05 --start block.x=1.2 --t-end 1");
   assert_null (strstr (cli_out, "the exact solution of the model"));
+}
+
+/* A part of the coordinates is not the motion: `compare` computes a reference if it is the model that gives a part, and
+ * names the part if it is a table; `run` names it. */
+TEST (partial) {
+#define PARTIAL " --methods rk4+projection --repeats 1 --step-ladder 0.1:0.05"
+  cli_good ("pinwheel compare car-two-trailers -t 2 -o @/part" PARTIAL);
+  truth_shows ("the model's own reference solution contains only car.phi of 9 coordinates: a computed one is used\n"
+               "errors are measured against erk8+projection, rtol 3e-14\n");
+  truth_shows (" m (lengths), ");
+  cli_good ("tail -n +2 @/part/compare.csv | cut -d, -f6-14"); /* the errors */
+  assert_null (strstr (cli_out, "nan"));
+  cli_good ("pinwheel compare hatchet-planimeter --set r=0.4 -t 2" PARTIAL);
+  truth_shows ("the model's own reference solution contains none of 3 coordinates: a computed one is used\n");
+  truth_shows ("cheapest ");
+  /* the angle is known up to 0.5 s only */
+  cli_write ("block.yaml", check_text ("%s  block.y: 0\n  block.phi: 0*sqrt(0.5 - t)\n", truth_text));
+  cli_good ("pinwheel compare @/block.yaml -t 1" PARTIAL);
+  truth_shows ("solution contains only block.x, block.y of 3 coordinates: a computed one is used\n");
+  cli_write ("few.csv", "t,K1.x,K1.y,K1.phi,K2.x,K2.y\n0.01,0,0,0,0,nan\n0.02,0,0,0,nan,nan\n");
+  cli_good ("pinwheel compare andrews-squeezer --reference @/few.csv" PARTIAL);
+  truth_shows ("few.csv, as if it were exact\n"
+               "  it contains only K1.x, K1.y, K1.phi and 1 more of 21 coordinates\n");
+  cli_good ("pinwheel run car-two-trailers -t 1");
+  truth_shows ("\n  the reference solution contains only car.phi of 9 coordinates\n");
+  cli_good ("pinwheel run hatchet-planimeter --set r=0.4 -t 1");
+  truth_shows ("\n  errors are unknown: the reference solution of the model contains no value at the times compared\n");
+  assert_null (strstr (cli_out, "error against"));
 }
 
 TEST (round_trip) {

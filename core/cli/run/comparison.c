@@ -14,6 +14,7 @@ int pw_comparison_open (pw_comparison *comparison, const pw_cli_model *compiled,
   }
   int status = pw_motion_open_reference (&comparison->reference, compiled, path, &t_end, error);
   if (status != PW_OK) return status;
+  pw_motion_gaps (compiled->system, &comparison->reference, 1, comparison->gaps);
   return pw_motion_open_at (&comparison->motion, compiled->system, &comparison->reference, error);
 }
 

@@ -36,6 +36,27 @@ void pw_motion_add (pw_motion *motion, const pw_system *system, const pw_sample 
   if (rows) memcpy (values + 2 * n, sample->lambda, rows * sizeof *values);
 }
 
+int pw_motion_known (const pw_motion *motion, int j) {
+  int known = 0;
+  for (int k = 0; k < motion->taken; k++) known += !isnan (pw_motion_at (motion, k)[j]);
+  return known;
+}
+
+void pw_motion_gaps (const pw_system *system, const pw_motion *reference, int least, char text[MOTION_GAPS]) {
+  enum { LISTED = 3 }; /* coordinates, at most */
+  char names[MOTION_GAPS - 80] = "", more[30] = "";
+  int n = pw_system_coordinates (system), known = 0;
+  for (int j = 0; j < n; j++) {
+    size_t used = strlen (names);
+    if (pw_motion_known (reference, j) >= least && ++known <= LISTED)
+      snprintf (names + used, sizeof names - used, "%s%s", known > 1 ? ", " : "only ",
+                PW_NAME (pw_system_state_name, system, j));
+  }
+  if (known > LISTED) snprintf (more, sizeof more, " and %d more", known - LISTED);
+  snprintf (text, MOTION_GAPS, "%s%s of %d coordinates", known ? names : "none", more, n);
+  if (known == n) *text = 0;
+}
+
 int pw_motion_unit (const pw_system *system, int state) {
   int is_velocity = state >= pw_system_coordinates (system);
   int angle = strncmp (pw_system_state_unit (system, state), "rad", 3) == 0;

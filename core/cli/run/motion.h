@@ -4,7 +4,10 @@
 
 #include "cli.h"
 
-enum { MOTION_SAMPLES = 100 }; /* of a motion, at most */
+enum {
+  MOTION_SAMPLES = 100, /* of a motion, at most */
+  MOTION_GAPS = 600     /* bytes of the text of pw_motion_gaps */
+};
 
 /* Units of states: m, rad, m/s, rad/s. */
 enum { MOTION_LENGTH, MOTION_ANGLE, MOTION_SPEED, MOTION_RATE, MOTION_UNITS };
@@ -40,6 +43,11 @@ void pw_motion_add (pw_motion *motion, const pw_system *system, const pw_sample 
 /* The errors of the samples taken of a motion, relative to those of a reference at the same times. */
 void pw_motion_errors (const pw_system *system, const pw_motion *reference, const pw_motion *motion,
                        double error[MOTION_ERRORS]);
+/* The number of samples in which number j of a motion is known. */
+int pw_motion_known (const pw_motion *motion, int j);
+/* Which coordinates a reference contains, if not all, in at least `least` samples: "only car.phi of 9 coordinates",
+ * "none of 9 coordinates"; "": all. */
+void pw_motion_gaps (const pw_system *system, const pw_motion *reference, int least, char text[MOTION_GAPS]);
 /* The unit of a state: MOTION_LENGTH to MOTION_RATE. */
 int pw_motion_unit (const pw_system *system, int state);
 
@@ -55,6 +63,7 @@ int pw_motion_open_reference (pw_motion *motion, const pw_cli_model *compiled, c
 typedef struct {
   pw_motion reference, motion; /* at the same times; `motion` is that of the run; without a reference, no times */
   pw_reference_error errors;
+  char gaps[MOTION_GAPS]; /* pw_motion_gaps of the reference in any sample */
 } pw_comparison;
 
 /* Opens the reference of a run up to t_end: the table at `path` or, if that is NULL, the model's reference solution

@@ -55,9 +55,9 @@ void pw_report_settings (pw_run *run, const pw_system *system, const char *metho
 
 /* ---- The model ---- */
 
-/* Angles of more than a turn: most likely they are degrees. */
+/* Angles of more than a turn that are multiples of 0.5: most likely they are degrees, not those of a long run. */
 static void report_angle (const char *kind, const char *name, const char *field, double angle) {
-  if (!(fabs (angle) > 2 * PW_PI)) return;
+  if (!(fabs (angle) > 2 * PW_PI) || fmod (angle, 0.5) != 0) return;
   pw_cli_say ("pinwheel: %s %s: %s = %s rad is more than a turn and ends at %s degrees; if degrees are meant, write "
               "\"*deg\" after the number\n",
               kind, name, field, PW_DIGITS (angle, 6), PW_DIGITS (fmod (angle * 180 / PW_PI, 360), 4));
@@ -219,10 +219,19 @@ static void report_error (pw_table *table, const char *name, double end, double 
   pw_row_end (table);
 }
 
-static void report_errors (const pw_reference_error *errors) {
+/* The errors of a run, NULL without a reference, and what this does not contain (pw_motion_gaps). */
+static void report_errors (const pw_reference_error *errors, const char *gaps) {
   static const char *const name[] = { "length", "angle", "speed", "rate" };
   static const char *const unit[] = { "m", "rad", "m/s", "rad/s" };
   if (errors == NULL) return;
+  int known = !isnan (errors->reactions);
+  for (int i = 0; i < 4; i++) known |= !isnan (errors->most[i]);
+  if (!known) {
+    pw_cli_print (stdout,
+                  "\n  errors are unknown: the reference solution of %s contains no value at the times compared\n",
+                  errors->source);
+    return;
+  }
   const char *at = PW_PRINTED (40, "at %s s", PW_DIGITS (errors->t, 6));
   pw_cli_print (stdout, "\n  error against the reference solution of %s, at %d time%s\n", errors->source,
                 errors->samples, errors->samples == 1 ? "" : "s");
@@ -231,6 +240,7 @@ static void report_errors (const pw_reference_error *errors) {
     for (int i = 0; i < 4; i++) report_error (&table, name[i], errors->end[i], errors->most[i], unit[i]);
     report_error (&table, "reactions", NAN, errors->reactions, "of the largest");
   }
+  if (*gaps) pw_cli_print (stdout, "  the reference solution contains %s\n", gaps);
 }
 
 /* Why the general engine was used; "": it was not. */
@@ -275,14 +285,15 @@ void pw_report_warnings (const pw_run *run, const pw_system *system, double defe
         PW_NAME (pw_system_state_name, system, state), PW_DIGITS (growth, 2), PW_DIGITS (power, 2));
 }
 
-void pw_report_end (const pw_summary *summary, const pw_system *system, const pw_sample *last, int energy,
-                    const pw_statistics *stats) {
+void pw_report_end (const pw_run_cli *command, const pw_summary *summary, const pw_sample *last) {
+  const pw_system *system = command->compiled.system;
+  const pw_statistics *stats = pw_run_statistics (command->run);
   printf ("%s, %s, at t = %s s\n\n", summary->model, summary->method, PW_DIGITS (last->t, 8));
   report_bodies (system, last);
   report_internal (system, last);
   report_reactions (system, last);
-  if (energy) report_energy (last);
-  report_errors (summary->reference);
+  if (command->with_energies) report_energy (last);
+  report_errors (summary->reference, command->comparison.gaps);
   printf ("\n  worst scaled residuals: position %s, velocity %s\n", PW_DIGITS (stats->position, 2),
           PW_DIGITS (stats->velocity, 2));
   printf ("  %s, %ld rejected, %s, %s, %s, %s s of processor time\n", PW_COUNTED (stats->steps, "step"),

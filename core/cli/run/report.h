@@ -6,7 +6,7 @@
 
 /* ---- Warnings on standard error ---- */
 
-/* Initial phi and headings of more than a turn, which are probably degrees; expressions that may jump with states. */
+/* Initial phi and headings that are probably degrees; expressions that may jump with states. */
 void pw_report_model (const pw_cli_model *m);
 
 /* Options without effect, long fixed steps, an absolute tolerance within which a force saturates. */
@@ -28,10 +28,6 @@ void pw_report_warnings (const pw_run *run, const pw_system *system, double defe
 /* Descriptions of the redundant constraint equations, ended by NULL; release them with one free.  NULL if there are
  * none or memory is exhausted. */
 const char **pw_report_redundancies (pw_run *run);
-
-/* Prints the last state, reactions, energies if `energy` is not 0, errors, residuals and cost. */
-void pw_report_end (const pw_summary *summary, const pw_system *system, const pw_sample *last, int energy,
-                    const pw_statistics *statistics);
 
 /* ---- The tables of --profile (profile.c) ---- */
 

@@ -309,8 +309,7 @@ static int run_finish (pw_run_cli *command, pw_error *error) {
   if (run && pw_run_sample (run, pw_run_time (run), &sample, NULL) == PW_OK) last = &sample;
   run_close_table (command, error->status == PW_OK && !interrupted, error);
   pw_summary summary = pw_run_summary (command, last, error, reason);
-  if (last && command->table_path == NULL && command->summary_path == NULL)
-    pw_report_end (&summary, system, last, command->with_energies, pw_run_statistics (run));
+  if (last && command->table_path == NULL && command->summary_path == NULL) pw_report_end (command, &summary, last);
   if (error->status == PW_OK) pw_report_warnings (run, system, summary.energy_defect);
   int undrawn = run_finish_figures (command, summary.reason, error);
   if (!interrupted) summary.status = pw_cli_status_word (error->status); /* summary.reason is the text of the error */

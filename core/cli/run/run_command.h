@@ -67,12 +67,14 @@ int pw_checkpoints_resume (pw_run_cli *command, pw_error *error);
 int pw_checkpoints_save (pw_run_cli *command, pw_error *error);
 void pw_checkpoints_close (pw_checkpoints *checkpoints);
 
-/* ---- The summary (report.c) ---- */
+/* ---- The summary and the report (report.c) ---- */
 
 enum { PW_RUN_REASON = 80 };
 /* The summary of a run that ended with this error, if any; last: the last sample, or NULL; `reason` receives the text
  * of an interruption. */
 pw_summary pw_run_summary (pw_run_cli *command, const pw_sample *last, const pw_error *error,
                            char reason[PW_RUN_REASON]);
+/* Prints the last state, reactions, energies if they are asked for, errors, residuals and cost. */
+void pw_report_end (const pw_run_cli *command, const pw_summary *summary, const pw_sample *last);
 
 #endif

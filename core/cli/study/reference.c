@@ -176,6 +176,14 @@ static int reference_compute (pw_reference *reference, pw_study *study, double s
   return status;
 }
 
+/* Makes all velocities unknown if any is, so that no error is that of a part of them. */
+static void reference_complete_velocities (const pw_system *system, pw_motion *motion) {
+  int n = pw_system_coordinates (system), complete = 1;
+  for (int j = n; j < 2 * n; j++) complete &= pw_motion_known (motion, j) == motion->times;
+  for (int k = 0; !complete && k < motion->times; k++)
+    for (int j = n; j < 2 * n; j++) pw_motion_at (motion, k)[j] = NAN;
+}
+
 int pw_reference_find (pw_reference *reference, pw_study *study, double step, pw_error *error) {
   const char *path = study->reference_path;
   double t_end = path && study->line.t_end == NULL ? 0 : study->t_end; /* 0: that of the table */
@@ -184,6 +192,12 @@ int pw_reference_find (pw_reference *reference, pw_study *study, double step, pw
     return reference_compute (reference, study, step, error);
   int status = pw_motion_open_reference (&reference->motion, &study->compiled, path, &t_end, error);
   if (status != PW_OK) return status;
+  pw_motion_gaps (study->compiled.system, &reference->motion, path ? 1 : reference->motion.times, reference->gaps);
+  if (path == NULL && *reference->gaps) {
+    pw_motion_close (&reference->motion);
+    return reference_compute (reference, study, step, error);
+  }
+  if (path == NULL) reference_complete_velocities (study->compiled.system, &reference->motion);
   double last = reference->motion.t[reference->motion.times - 1];
   if (last < t_end)
     return pw_fail (error, PW_INPUT,
@@ -200,6 +214,9 @@ int pw_reference_find (pw_reference *reference, pw_study *study, double step, pw
 /* ---- Output ---- */
 
 void pw_reference_print (const pw_reference *reference, int partners) {
+  const char *gaps = reference->gaps;
+  if (*gaps && !reference->from_table)
+    pw_cli_print (stdout, "the model's own reference solution contains %s: a computed one is used\n", gaps);
   if (!reference->known) {
     printf ("no two methods reach the end%s, so errors are unknown; --reference FILE.csv provides a reference\n\n",
             reference->limited ? " within --limit" : "");
@@ -207,6 +224,7 @@ void pw_reference_print (const pw_reference *reference, int partners) {
   }
   pw_cli_print (stdout, "errors are measured against %s%s\n", reference->name,
                 reference->from_table ? ", as if it were exact" : "");
+  if (*gaps && reference->from_table) pw_cli_print (stdout, "  it contains %s\n", gaps);
   for (int i = 0; i < partners && i < reference->partners; i++)
     printf ("  %s agrees with it to %.1e m, %.1e rad%s\n", reference->partner[i].name,
             reference->partner[i].error[MOTION_LARGEST + MOTION_LENGTH],

@@ -1,5 +1,6 @@
 /* The reference solution of a comparison: a table, the exact solution of the model, or else a motion computed with a
- * tight tolerance.  Several methods compute one; of the two that agree best, the first is the reference, and their
+ * tight tolerance.  The solution of the model is used if it contains all coordinates, its velocities if it contains
+ * all of them.  Several methods compute one; of the two that agree best, the first is the reference, and their
  * distance is its uncertainty. */
 #ifndef PW_REFERENCE_H
 #define PW_REFERENCE_H
@@ -16,8 +17,9 @@ typedef struct {
   int limited;                       /* 1: the limit of processor time has stopped a method that would compute it */
   double uncertainty[MOTION_ERRORS]; /* 0 where nothing is compared */
   double size[MOTION_UNITS];         /* largest coordinate or velocity */
-  char name[300];                    /* "erk8+projection, rtol 3e-14", "the exact solution of the model" or a path */
-  int partners;                      /* number of other computed solutions, with their distances from this one */
+  char gaps[MOTION_GAPS]; /* pw_motion_gaps of the table or, if a computed reference replaces it, of the model's own */
+  char name[300];         /* "erk8+projection, rtol 3e-14", "the exact solution of the model" or a path */
+  int partners;           /* number of other computed solutions, with their distances from this one */
   struct {
     char name[100];
     double error[MOTION_ERRORS];
