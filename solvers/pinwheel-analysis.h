@@ -196,7 +196,9 @@ int pw_steady_suggest (pw_steady *x, pw_initial_value *hold, int most);
 /* Follows the branch of a solution, initially towards the end of the range (direction 1) or its beginning (-1).
  * pw_steady_next returns its points, the first one included, and events in between, then PW_STEADY_END: at an end of
  * the range or the start of a closed branch, where Newton's method fails at the smallest step, or after 100 times
- * `points` points (pw_steady_reason). */
+ * `points` points (pw_steady_reason).  It returns PW_STEADY_END also before and after a branch, and after
+ * pw_steady_follow has failed: with the errors of pw_steady_solve, with PW_INPUT if first = last, or with PW_METHOD if
+ * Newton's method does not converge from this state, or the branch has a fold there. */
 int pw_steady_follow (pw_steady *x, const double *q, const double *v, double parameter, int direction, pw_error *error);
 int pw_steady_next (pw_steady *x, pw_steady_motion *out, pw_error *error);
 
@@ -264,10 +266,11 @@ const char *pw_periodic_reason (const pw_periodic *x);
 /* Number of symmetries, as pw_steady_symmetries. */
 int pw_periodic_symmetries (const pw_periodic *x);
 
-/* Follows the branch of the motion that pw_periodic_solve has found last, PW_INPUT if it has failed, towards the end of
- * the range (direction 1) or its beginning (-1).
+/* Follows the branch of the motion that pw_periodic_solve has found last towards the end of the range (direction 1) or
+ * its beginning (-1).  Errors: PW_INPUT if pw_periodic_solve has failed, or first = last; PW_METHOD at a fold;
+ * PW_RESOURCE.
  * pw_periodic_next returns its points, the first one included, and events in between, then PW_PERIODIC_END (perhaps
- * with pw_periodic_reason). */
+ * with pw_periodic_reason); so also before and after a branch, and after pw_periodic_follow has failed. */
 int pw_periodic_follow (pw_periodic *x, int direction, pw_error *error);
 int pw_periodic_next (pw_periodic *x, pw_periodic_orbit *out, pw_error *error);
 

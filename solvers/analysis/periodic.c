@@ -212,6 +212,7 @@ int pw_periodic_solve (pw_periodic *x, int settle, double parameter, pw_periodic
 
 int pw_periodic_follow (pw_periodic *x, int direction, pw_error *error) {
   if (pw_require (x, "a search", error) != PW_OK) return PW_INPUT;
+  pw_branch_end (&x->branch);
   if (x->settings.first == x->settings.last)
     return pw_fail (error, PW_INPUT, "first = last = %.9g: expected a range", x->settings.first);
   if (!(x->begin_period > 0))

@@ -279,6 +279,8 @@ TEST (again) {
   pw_periodic *x = periodic_open (s, &set);
   assert_int_equal (pw_periodic_follow (x, 1, &error), PW_INPUT);
   check_error (&error, PW_INPUT, "no motion has been found from which to follow a branch");
+  assert_int_equal (pw_periodic_next (x, &o, &(pw_error){ 0 }), PW_OK);
+  assert_int_equal (o.event, PW_PERIODIC_END);
   periodic_solve (x, 1, 0.1);
   pw_periodic_solve (x, 1, 60, &o, &(pw_error){ 0 });
   assert_true (isfinite (o.residual));
@@ -288,6 +290,10 @@ TEST (again) {
   check_ok (pw_periodic_follow (x, -1, &error), &error);
   check_ok (pw_periodic_next (x, &o, &error), &error);
   check_close ("period", o.period, begin, 1e-13, "that of the first branch");
+  x->begin_period = 0; /* as after a search without result */
+  assert_int_equal (pw_periodic_follow (x, -1, &(pw_error){ 0 }), PW_INPUT);
+  check_ok (pw_periodic_next (x, &o, &error), &error);
+  assert_int_equal (o.event, PW_PERIODIC_END);
   pw_periodic_close (x);
   pw_system_free (s);
 }
