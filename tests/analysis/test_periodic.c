@@ -444,6 +444,36 @@ TEST (wild) {
   pw_system_free (s);
 }
 
+/* Settings and arguments out of range are named. */
+TEST (settings) {
+  static const struct {
+    pw_periodic_settings set;
+    const char *text;
+  } wrong[] = {
+    { { .rtol = -1 }, "setting rtol = -1: expected a number > 0" },
+    { { .period = -1 }, "setting period = -1: expected a number > 0" },
+    { { .period = NAN }, "setting period = nan: expected a number > 0" },
+    { { .periods = -1 }, "setting periods = -1: expected a number > 0" },
+    { { .points = -2 }, "setting points = -2: expected a number > 0" },
+    { { .last = INFINITY }, "settings first = 0, last = inf: expected finite numbers" },
+  };
+  pw_system *s = gallery_open ("snakeboard", NULL);
+  for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
+    pw_error error = { 0 };
+    assert_null (pw_periodic_open (s, &wrong[i].set, &error));
+    check_error (&error, PW_INPUT, wrong[i].text);
+  }
+  pw_error e[2] = { { 0 } };
+  pw_periodic_orbit o;
+  pw_periodic *x = periodic_open (s, &(pw_periodic_settings){ .period = 4 });
+  assert_int_equal (pw_periodic_solve (x, -1, 0, &o, &e[0]), PW_INPUT);
+  check_error (&e[0], PW_INPUT, "settle = -1: expected a number >= 0");
+  assert_int_equal (pw_periodic_follow (x, 0, &e[1]), PW_INPUT);
+  check_error (&e[1], PW_INPUT, "direction = 0: expected 1 or -1");
+  pw_periodic_close (x);
+  pw_system_free (s);
+}
+
 /* A search that could not be opened is refused. */
 TEST (missing) {
   pw_error e[5] = { { 0 } };
