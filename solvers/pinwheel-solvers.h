@@ -147,8 +147,10 @@ void pw_run_close (pw_run *r);
 int pw_run_save (pw_run *r, pw_archive *a, pw_error *error);
 
 /* Loads a saved state into a run opened with the same system, method and settings that has not advanced; it continues
- * bit for bit as the run that was saved.  After an error it can only be closed: PW_INPUT if the archive does not match;
- * PW_METHOD; PW_RESOURCE. */
+ * bit for bit as the run that was saved.  Bytes after the state are left to the caller: a->used < a->size.  After an
+ * error the run can only be closed: PW_INPUT if it has advanced, the archive is truncated, or method, options, settings
+ * (without limits and code), masses, names, signals, initial state or accelerations there differ; PW_METHOD; PW_RESOURCE.  That
+ * systems do not differ otherwise, such as by a damper that is at rest initially, is for the caller to ensure. */
 int pw_run_load (pw_run *r, pw_archive *a, pw_error *error);
 
 /* ---- Properties of a run ---- */
