@@ -75,7 +75,8 @@ extern const pw_method *const pw_methods[];
  * evaluated; PW_RESOURCE. */
 pw_run *pw_run_open (const pw_system *s, const char *method, const pw_settings *settings, pw_error *error);
 
-/* Checks name and options of a built-in method without a system; returns integrator and index of the stabilisation. */
+/* Checks name and options of a built-in method without a system; returns integrator and index of the stabilisation, each
+ * unless the pointer is NULL. */
 int pw_method_parse (const char *method, const pw_method **integrator, int *stabilisation, pw_error *error);
 
 /* 1 if a method controls its step size; 0 if steps are fixed, by the integrator or by the option steps=fixed.
@@ -155,8 +156,8 @@ int pw_run_load (pw_run *r, pw_archive *a, pw_error *error);
 
 /* ---- Properties of a run ---- */
 
-/* The number of redundant constraint equations, and a description of those that the i-th one follows from, in the
- * buffer, which is returned.  With redundant equations reactions are not unique: samples have the least-norm ones. */
+/* The number of redundant constraint equations, and a description of those that the i-th one (from 0) follows from, or
+ * "" if there is none, in the buffer, which is returned.  With redundant equations reactions are not unique: samples have the least-norm ones. */
 int pw_run_redundant (const pw_run *r);
 char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size);
 

@@ -337,5 +337,6 @@ TEST (missing) {
   assert_int_equal (pw_variation_advance (NULL, 1, 1, &error), PW_INPUT);
   assert_int_equal (pw_variation_sample (NULL, 0, &sample, NULL, &error), PW_INPUT);
   assert_int_equal (pw_system_find_state (NULL, "x", &error), PW_INPUT);
+  assert_int_equal (pw_system_find_held (NULL, "a.x", &error), PW_INPUT);
   check_error (&error, PW_INPUT, "a system is missing");
 }

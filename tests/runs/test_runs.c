@@ -217,6 +217,9 @@ TEST (missing) {
   pw_run *r = runs_open (s, "rk4", NULL);
   assert_int_equal (pw_run_sample (r, 0, NULL, &e[5]), PW_INPUT);
   check_error (&e[5], PW_INPUT, "a sample is missing");
+  char text[40] = "x";
+  assert_string_equal (pw_run_redundancy (r, pw_run_redundant (r), text, sizeof text), "");
+  assert_int_equal (pw_method_parse ("rk4", NULL, NULL, NULL), PW_OK);
   pw_run_close (r);
   pw_system_free (s);
 }
