@@ -141,8 +141,8 @@ typedef struct {
   double span;        /* as in pw_settings, default 1 s: signals must be constant in it */
   double first, last; /* range of the parameter; to follow a branch they must differ */
   int vary;           /* the parameter is the value of hold[vary]; -1: it is that of `compile`, if any */
-  /* Compiles the system for a value of the parameter.  The search frees it.  NULL and the error: there is no
-   * system for this value.  May be NULL. */
+  /* Compiles the system for a value of the parameter.  The search frees it.  NULL or an error: there is no system
+   * for this value.  May be NULL. */
   pw_system *(*compile) (void *context, double value, pw_error *error);
   void *context;
   int points; /* in the range, at least; default 50 */
@@ -154,7 +154,7 @@ typedef enum {
   PW_STEADY_FOLD,        /* the parameter has an extremum */
   PW_STEADY_REAL,        /* a real eigenvalue changes its sign */
   PW_STEADY_OSCILLATION, /* a conjugate pair crosses the imaginary axis (Hopf) */
-  PW_STEADY_END          /* the branch cannot be followed further */
+  PW_STEADY_END          /* the branch cannot be followed further; all else is 0 or NULL */
 } pw_steady_event;
 
 /* A steady motion: velocities are those of a rigid displacement of the whole and of angles on which nothing depends,
@@ -211,7 +211,7 @@ double pw_system_period (const pw_system *s);
 typedef struct {
   const char *method;          /* default "erk8+projection" */
   double rtol;                 /* default 1e-12 */
-  int (*stop) (void *context); /* as in pw_settings, but a stop counts as PW_RETRY; or NULL */
+  int (*stop) (void *context); /* as in pw_settings, but a stop counts as PW_RETRY, reason "stopped"; or NULL */
   void *stop_context;
   double t;           /* initial time [s] */
   double period;      /* [s]; 0: that of the signals at each value of the parameter; with `free` the first guess */
@@ -229,7 +229,8 @@ typedef enum {
   PW_PERIODIC_REAL,  /* a multiplier passes 1 elsewhere: branches cross */
   PW_PERIODIC_FLIP,  /* a multiplier passes -1: period doubling */
   PW_PERIODIC_TORUS, /* a conjugate pair crosses the unit circle (Neimark-Sacker) */
-  PW_PERIODIC_END    /* the end of the range or of a closed branch; or pw_periodic_reason says why no points follow */
+  /* The end of the range or of a closed branch; or pw_periodic_reason says why no points follow.  All else is 0. */
+  PW_PERIODIC_END
 } pw_periodic_event;
 
 /* A relative periodic motion: after one period the state is the initial one up to symmetries of the system

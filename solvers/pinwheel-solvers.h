@@ -90,7 +90,8 @@ double pw_method_steps (const char *method, const pw_settings *s, double step, d
 
 /* Makes one accepted step that does not pass t_end; none if t_end is not after the time reached.  If t_end or a
  * discontinuity equals the time reached up to round-off, only the time is set to it.  PW_STOPPED, without an error, if
- * settings.stop requested it: the run stays where it was, and the next call continues.  Errors: PW_INPUT if t_end is
+ * settings.stop requested it: the run stays where it was, and the next call continues; adams, bdf and ida then restart
+ * their formulas, so that results change within the tolerances, and with many stops beyond.  Errors: PW_INPUT if t_end is
  * not a number; PW_METHOD with the time reached and the reason, such as max_steps; PW_RESOURCE. */
 int pw_run_advance (pw_run *r, double t_end, pw_error *error);
 

@@ -115,6 +115,9 @@ double pw_steady_parameter (const pw_steady *x, const double *u);
 
 enum { PW_STEADY_MAX_COORDINATES = 400 }; /* since the cost is cubic */
 
+/* The system of pw_steady_settings.compile; NULL and the reason if this returns none or records an error. */
+pw_system *pw_compile_at (pw_system *(*compile) (void *context, double value, pw_error *error), void *context,
+                          double value, pw_error *why);
 /* Opens x->system[place] for a value of the parameter, unless it is open for it.  A status, with x->why if it fails;
  * PW_INPUT: its sizes differ; PW_RETRY: none at this value (x->why has the status of the error). */
 int pw_steady_open_system (pw_steady *x, pw_place place, double value);

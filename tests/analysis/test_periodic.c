@@ -444,6 +444,35 @@ TEST (wild) {
   pw_system_free (s);
 }
 
+static pw_system *mathieu_with_error (void *context, double a, pw_error *error) {
+  pw_fail (error, PW_INPUT, "a = %g is refused", a);
+  return mathieu_at (context, a, error);
+}
+
+static int stop_at_once (void *context) {
+  (void)context;
+  return 1;
+}
+
+/* An error that `compile` records counts, whatever it returns; a stop is the reason of PW_RETRY. */
+TEST (compile_and_stop) {
+  pw_error error = { 0 };
+  pw_periodic_orbit o;
+  pw_system *s = mathieu_at (NULL, 1, NULL);
+  const pw_periodic_settings wrong = { .period = PW_PI, .compile = mathieu_with_error, .first = 1, .last = 2 };
+  assert_null (pw_periodic_open (s, &wrong, &error));
+  check_error (&error, PW_INPUT, "a = 1 is refused");
+  assert_null (
+      pw_steady_open (s, &(pw_steady_settings){ .compile = mathieu_with_error, .vary = -1 }, &(pw_error){ 0 }));
+  pw_periodic *x = periodic_open (s, &(pw_periodic_settings){ .period = PW_PI, .stop = stop_at_once });
+  for (int settle = 0; settle < 2; settle++) {
+    assert_int_equal (pw_periodic_solve (x, settle, 0, &o, &error), PW_RETRY);
+    assert_string_equal (pw_periodic_reason (x), "stopped");
+  }
+  pw_periodic_close (x);
+  pw_system_free (s);
+}
+
 /* Settings and arguments out of range are named. */
 TEST (settings) {
   static const struct {
