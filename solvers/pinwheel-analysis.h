@@ -84,9 +84,9 @@ typedef struct pw_variation pw_variation;
 
 /* Begins at the state reached; with neighbours, the run must not have advanced.  It must outlive the derivatives, and
  * only pw_variation_advance and _next_jump may advance it from now on.  ledger: 1: with derivatives of work and losses,
- * at about twice the cost.  Errors: PW_INPUT if it has, a system differs in its bodies or elements, the run has the option
- * inputs=held, or an element type leaves out a derivative that is not zero; PW_METHOD if the state or a breakpoint is
- * not differentiable; PW_RESOURCE. */
+ * at about twice the cost.  Errors: PW_INPUT if the run has advanced (with neighbours), a system differs in its bodies
+ * or elements, the run has the option inputs=held, or an element type leaves out a derivative that is not zero;
+ * PW_METHOD if the state or a breakpoint is not differentiable; PW_RESOURCE. */
 pw_variation *pw_variation_open (pw_run *r, const pw_direction *d, int count, int ledger, pw_error *error);
 
 /* Advances the run and the derivatives to time t <= t_end, which is then in the last step of the run; but where
