@@ -58,8 +58,10 @@ typedef enum {
   PW_METHOD = -4    /* the method failed during the run */
 } pw_status;
 
-/* An error, owned by the caller and zero-initialised.  It keeps the first failure.  NULL in place of a file, model,
- * system, workspace or run is an error too, so that the result of a failed call may be passed to the next call. */
+/* An error, owned by the caller and zero-initialised.  It keeps the first failure.  For functions with an argument
+ * `error`, NULL in place of a file, model, system, workspace, run or search is an error too, so that the result of a
+ * failed call may be passed to the next one; so it may to functions that free or close it.  Functions that only return
+ * a property do not check it. */
 typedef struct {
   int status; /* a pw_status; 0: no error yet */
   /* One line without a full stop: found value, expected value, nearest valid name.  Text models: preceded by

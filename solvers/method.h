@@ -83,6 +83,7 @@ struct pw_run {
   double *given_before;                /* 2 (coords + 3): those before a restart, which may be refused */
   unsigned char *origin;               /* 2 coords: of initial values, as in pw_system */
   pw_initial_report initial;
+  unsigned long long identity; /* pw_run_identity */
   pw_statistics statistics;
   pw_method_data *data; /* private to the integrator */
   char *memory;         /* of the state, samples and scratch */
@@ -211,6 +212,10 @@ int pw_run_look_ahead (pw_run *r, pw_error *error);
 
 /* Makes the norm of the accelerations at the state reached the reference level for later ones. */
 void pw_run_set_reference_level (pw_run *r);
+
+/* A check sum, at the initial state, of what a saved state must share with the run that loads it: method, options,
+ * settings, masses, names, signals, initial state and accelerations. */
+unsigned long long pw_run_identity (const pw_run *r);
 
 /* Opens the saddle and the method anew at the state reached, where J is evaluated. */
 int pw_run_renew (pw_run *r, pw_error *error);

@@ -84,9 +84,9 @@ typedef struct pw_variation pw_variation;
 
 /* Begins at the state reached; with neighbours, the run must not have advanced.  It must outlive the derivatives, and
  * only pw_variation_advance and _next_jump may advance it from now on.  ledger: 1: with derivatives of work and losses,
- * at about twice the cost.  Errors: PW_INPUT if a system differs in its bodies or elements, the run has the option
- * inputs=held, or an element type leaves out a derivative that is not zero; PW_METHOD if the state or a breakpoint is
- * not differentiable; PW_RESOURCE. */
+ * at about twice the cost.  Errors: PW_INPUT if the run has advanced (with neighbours), a system differs in its bodies
+ * or elements, the run has the option inputs=held, or an element type leaves out a derivative that is not zero;
+ * PW_METHOD if the state or a breakpoint is not differentiable; PW_RESOURCE. */
 pw_variation *pw_variation_open (pw_run *r, const pw_direction *d, int count, int ledger, pw_error *error);
 
 /* Advances the run and the derivatives to time t <= t_end, which is then in the last step of the run; but where
@@ -141,8 +141,8 @@ typedef struct {
   double span;        /* as in pw_settings, default 1 s: signals must be constant in it */
   double first, last; /* range of the parameter; to follow a branch they must differ */
   int vary;           /* the parameter is the value of hold[vary]; -1: it is that of `compile`, if any */
-  /* Compiles the system for a value of the parameter.  The search frees it.  NULL and the error: there is no
-   * system for this value.  May be NULL. */
+  /* Compiles the system for a value of the parameter.  The search frees it.  NULL or an error: there is no system
+   * for this value.  May be NULL. */
   pw_system *(*compile) (void *context, double value, pw_error *error);
   void *context;
   int points; /* in the range, at least; default 50 */
@@ -154,7 +154,7 @@ typedef enum {
   PW_STEADY_FOLD,        /* the parameter has an extremum */
   PW_STEADY_REAL,        /* a real eigenvalue changes its sign */
   PW_STEADY_OSCILLATION, /* a conjugate pair crosses the imaginary axis (Hopf) */
-  PW_STEADY_END          /* the branch cannot be followed further */
+  PW_STEADY_END          /* the branch cannot be followed further; all else is 0 or NULL */
 } pw_steady_event;
 
 /* A steady motion: velocities are those of a rigid displacement of the whole and of angles on which nothing depends,
@@ -196,7 +196,9 @@ int pw_steady_suggest (pw_steady *x, pw_initial_value *hold, int most);
 /* Follows the branch of a solution, initially towards the end of the range (direction 1) or its beginning (-1).
  * pw_steady_next returns its points, the first one included, and events in between, then PW_STEADY_END: at an end of
  * the range or the start of a closed branch, where Newton's method fails at the smallest step, or after 100 times
- * `points` points (pw_steady_reason). */
+ * `points` points (pw_steady_reason).  It returns PW_STEADY_END also before and after a branch, and after
+ * pw_steady_follow has failed: with the errors of pw_steady_solve, with PW_INPUT if first = last, or with PW_METHOD if
+ * Newton's method does not converge from this state, or the branch has a fold there. */
 int pw_steady_follow (pw_steady *x, const double *q, const double *v, double parameter, int direction, pw_error *error);
 int pw_steady_next (pw_steady *x, pw_steady_motion *out, pw_error *error);
 
@@ -209,7 +211,7 @@ double pw_system_period (const pw_system *s);
 typedef struct {
   const char *method;          /* default "erk8+projection" */
   double rtol;                 /* default 1e-12 */
-  int (*stop) (void *context); /* as in pw_settings, but a stop counts as PW_RETRY; or NULL */
+  int (*stop) (void *context); /* as in pw_settings, but a stop counts as PW_RETRY, reason "stopped"; or NULL */
   void *stop_context;
   double t;           /* initial time [s] */
   double period;      /* [s]; 0: that of the signals at each value of the parameter; with `free` the first guess */
@@ -227,7 +229,8 @@ typedef enum {
   PW_PERIODIC_REAL,  /* a multiplier passes 1 elsewhere: branches cross */
   PW_PERIODIC_FLIP,  /* a multiplier passes -1: period doubling */
   PW_PERIODIC_TORUS, /* a conjugate pair crosses the unit circle (Neimark-Sacker) */
-  PW_PERIODIC_END    /* the end of the range or of a closed branch; or pw_periodic_reason says why no points follow */
+  /* The end of the range or of a closed branch; or pw_periodic_reason says why no points follow.  All else is 0. */
+  PW_PERIODIC_END
 } pw_periodic_event;
 
 /* A relative periodic motion: after one period the state is the initial one up to symmetries of the system
@@ -264,10 +267,11 @@ const char *pw_periodic_reason (const pw_periodic *x);
 /* Number of symmetries, as pw_steady_symmetries. */
 int pw_periodic_symmetries (const pw_periodic *x);
 
-/* Follows the branch of the motion that pw_periodic_solve has found last, PW_INPUT if it has failed, towards the end of
- * the range (direction 1) or its beginning (-1).
+/* Follows the branch of the motion that pw_periodic_solve has found last towards the end of the range (direction 1) or
+ * its beginning (-1).  Errors: PW_INPUT if pw_periodic_solve has failed, or first = last; PW_METHOD at a fold;
+ * PW_RESOURCE.
  * pw_periodic_next returns its points, the first one included, and events in between, then PW_PERIODIC_END (perhaps
- * with pw_periodic_reason). */
+ * with pw_periodic_reason); so also before and after a branch, and after pw_periodic_follow has failed. */
 int pw_periodic_follow (pw_periodic *x, int direction, pw_error *error);
 int pw_periodic_next (pw_periodic *x, pw_periodic_orbit *out, pw_error *error);
 

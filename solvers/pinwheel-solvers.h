@@ -75,7 +75,8 @@ extern const pw_method *const pw_methods[];
  * evaluated; PW_RESOURCE. */
 pw_run *pw_run_open (const pw_system *s, const char *method, const pw_settings *settings, pw_error *error);
 
-/* Checks name and options of a built-in method without a system; returns integrator and index of the stabilisation. */
+/* Checks name and options of a built-in method without a system; returns integrator and index of the stabilisation,
+ * each unless its pointer is NULL. */
 int pw_method_parse (const char *method, const pw_method **integrator, int *stabilisation, pw_error *error);
 
 /* 1 if a method controls its step size; 0 if steps are fixed, by the integrator or by the option steps=fixed.
@@ -89,8 +90,10 @@ double pw_method_steps (const char *method, const pw_settings *s, double step, d
 
 /* Makes one accepted step that does not pass t_end; none if t_end is not after the time reached.  If t_end or a
  * discontinuity equals the time reached up to round-off, only the time is set to it.  PW_STOPPED, without an error, if
- * settings.stop requested it: the run stays where it was, and the next call continues.  Errors: PW_INPUT if t_end is
- * not a number; PW_METHOD with the time reached and the reason, such as max_steps; PW_RESOURCE. */
+ * settings.stop requested it: the run stays where it was, and the next call continues; adams, bdf and ida then restart
+ * their formulas, so that results depend on the stops: by about the tolerance after one, by far more if most steps are
+ * stopped.  Errors: PW_INPUT if t_end is not a number; PW_METHOD with the time reached and the reason, such as
+ * max_steps; PW_RESOURCE. */
 int pw_run_advance (pw_run *r, double t_end, pw_error *error);
 
 /* The same, or with specialised code several steps of a fixed size: they end where single ones would, and none is made
@@ -147,14 +150,17 @@ void pw_run_close (pw_run *r);
 int pw_run_save (pw_run *r, pw_archive *a, pw_error *error);
 
 /* Loads a saved state into a run opened with the same system, method and settings that has not advanced; it continues
- * bit for bit as the run that was saved.  After an error it can only be closed: PW_INPUT if the archive does not match;
- * PW_METHOD; PW_RESOURCE. */
+ * bit for bit as the run that was saved.  Bytes after the state are left to the caller: a->used < a->size.  After an
+ * error the run can only be closed: PW_INPUT if it has advanced, the archive is truncated, or method, options, settings
+ * (without limits and code), masses, names, signals, initial state or accelerations there differ; PW_METHOD;
+ * PW_RESOURCE.  The caller ensures that systems do not differ otherwise, as by a damper that is at rest initially. */
 int pw_run_load (pw_run *r, pw_archive *a, pw_error *error);
 
 /* ---- Properties of a run ---- */
 
-/* The number of redundant constraint equations, and a description of those that the i-th one follows from, in the
- * buffer, which is returned.  With redundant equations reactions are not unique: samples have the least-norm ones. */
+/* The number of redundant constraint equations, and a description of those that the i-th one (from 0) follows from, or
+ * "" if there is none, in the buffer, which is returned.  With redundant equations reactions are not unique: samples
+ * have the least-norm ones. */
 int pw_run_redundant (const pw_run *r);
 char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size);
 

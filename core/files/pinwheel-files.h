@@ -207,14 +207,14 @@ pw_output *pw_output_continue (const char *path, const pw_mark *mark, pw_error *
 
 /* ---- Checkpoints ----
  *
- *     pinwheel checkpoint 1      lines "KEY = VALUE": the run it belongs to
+ *     pinwheel checkpoint 2      lines "KEY = VALUE": the run it belongs to
  *     ...
  *     end
  *     state = 812 bytes, check sum 0123456789abcdef
  *
  * and the state, bytes as in memory. */
 
-#define PW_CHECKPOINT_MAGIC "pinwheel checkpoint 1\n"
+#define PW_CHECKPOINT_MAGIC "pinwheel checkpoint 2\n"
 
 /* Writes a checkpoint and completes the file, which is released in every case; an existing one is replaced only then.
  * The head begins with PW_CHECKPOINT_MAGIC and ends with "end\n".  Errors: PW_RESOURCE. */

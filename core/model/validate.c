@@ -23,6 +23,7 @@ static int check_parameter (const pw_plugin_table *t, const pw_parameter *p, con
 }
 
 int pw_plugin_check (const pw_plugin_table *t, const char *what, pw_error *error) {
+  if (pw_require (t, "the table of a model", error) != PW_OK) return PW_INPUT;
   if (t->abi != PW_ABI || t->size != sizeof *t)
     return pw_fail (error, PW_INPUT,
                     "%s was compiled for another Pinwheel (ABI %u, this one has %u; table of %zu bytes, here %zu): "

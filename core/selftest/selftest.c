@@ -320,6 +320,8 @@ static void selftest_all (pw_probe *probe) {
 
 int pw_selftest (const pw_kind *kind, unsigned seed, pw_selftest_report *report, pw_error *error) {
   char buffer[200];
+  if (pw_require (kind, "an element type", error) != PW_OK || pw_require (report, "a report", error) != PW_OK)
+    return PW_INPUT;
   const char *fault = pw_kind_check (kind, buffer, sizeof buffer);
   pw_probe_record (report, PW_CHECK_table, *fault != 0, 0, "exact", fault);
   if (*fault) return PW_OK;

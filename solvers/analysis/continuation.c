@@ -18,9 +18,9 @@ static const double BRANCH_STEEP = 1e-3, /* smallest slope of p along a branch t
 
 int pw_branch_open (pw_branch *b, const pw_branch_problem *problem, pw_error *error) {
   size_t n = (size_t)problem->unknowns + 1, m = (size_t)problem->equations + n, large = n > m ? n : m;
-  *b = (pw_branch){ .problem = *problem,
-                    .bytes = n * sizeof (double),
-                    .work_size = (int)(42 * large + 200) }; /* dgelsy needs 35 large + 32, with blocks of 32 */
+  *b = (pw_branch){
+    .problem = *problem, .bytes = n * sizeof (double), .ended = 1, .work_size = (int)(42 * large + 200)
+  }; /* dgelsy needs 35 large + 32, with blocks of 32 */
   if (!(b->problem.rank_tolerance > 0)) b->problem.rank_tolerance = 1e-9;
   pw_branch_point *const point[] = {
     &b->reached, &b->previous, &b->found, &b->first, &b->next, &b->side[0], &b->side[1]
@@ -64,11 +64,16 @@ static void branch_insert (pw_branch *b, const pw_branch_point *point, int event
   branch_copy (b, point, &b->queue[i].point);
 }
 
+void pw_branch_end (pw_branch *b) {
+  b->folded = b->steps = b->queued = b->returned = 0;
+  b->ended = 1;
+}
+
 int pw_branch_start (pw_branch *b, const double *u, double direction, pw_error *error) {
   size_t n = (size_t)b->problem.unknowns + 1;
   memset (b->condition, 0, b->bytes);
   b->condition[n - 1] = direction > 0 ? 1 : -1;
-  b->folded = b->steps = b->queued = b->returned = 0;
+  pw_branch_end (b);
   memmove (b->reached.u, u, b->bytes);
   int status = pw_branch_tangent (b, b->reached.u, b->condition, b->reached.tangent, error);
   if (status != PW_OK) return status;

@@ -87,8 +87,10 @@ void pw_branch_close (pw_branch *b);
  * PW_RETRY if it does not converge: u is where it stopped. */
 int pw_branch_solve (pw_branch *b, double *u, pw_error *error);
 
-/* Starts a branch at a solution: p increases along the tangent if direction > 0.  PW_RETRY
- * at a fold. */
+/* Ends the branch, if any: no points follow until pw_branch_start has succeeded. */
+void pw_branch_end (pw_branch *b);
+
+/* Starts a branch at a solution: p increases along the tangent if direction > 0.  PW_RETRY at a fold. */
 int pw_branch_start (pw_branch *b, const double *u, double direction, pw_error *error);
 
 /* Moves to the next point.  The step length adapts to the curvature of the branch.  PW_RETRY if no step down to

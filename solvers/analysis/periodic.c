@@ -69,6 +69,15 @@ static int periodic_signal_period (pw_periodic *x, double *period) {
   return PW_OK;
 }
 
+static int periodic_check_settings (const pw_periodic_settings *set, pw_error *error) {
+  if (!isfinite (set->rtol) || set->rtol < 0) /* 0 selects the default, here and below */
+    return pw_fail (error, PW_INPUT, "setting rtol = %g: expected a number > 0", set->rtol);
+  if (!isfinite (set->period) || set->period < 0)
+    return pw_fail (error, PW_INPUT, "setting period = %g: expected a number > 0", set->period);
+  if (set->periods < 0) return pw_fail (error, PW_INPUT, "setting periods = %d: expected a number > 0", set->periods);
+  return pw_check_search (set->first, set->last, set->points, error);
+}
+
 static int periodic_open (pw_periodic *x, pw_error *error) {
   const pw_system *s = x->s;
   const pw_method *integrator;
@@ -82,10 +91,10 @@ static int periodic_open (pw_periodic *x, pw_error *error) {
     return pw_fail (error, PW_INPUT, "model %s has %d coordinates; periodic motions are sought with at most %d",
                     s->model, x->n, PERIODIC_MAX_COORDINATES);
   double period = x->settings.period;
-  if (period <= 0 && !x->settings.free && periodic_signal_period (x, &period) != PW_OK)
+  if (period == 0 && !x->settings.free && periodic_signal_period (x, &period) != PW_OK)
     return pw_fail (error, x->why.status, "%s", x->why.text);
   /* At a time at which no signal is likely to vanish: then the system would have more symmetries. */
-  const pw_steady_settings settings = { .t = x->settings.t + 0.317 * fmax (period, 0),
+  const pw_steady_settings settings = { .t = x->settings.t + 0.317 * period,
                                         .span = period > 0 ? period : 1,
                                         .first = x->settings.first,
                                         .last = x->settings.last,
@@ -115,13 +124,14 @@ pw_periodic *pw_periodic_open (const pw_system *s, const pw_periodic_settings *s
   pw_error ignored = { 0 };
   if (error == NULL) error = &ignored;
   if (pw_require (s, "a system", error) != PW_OK || pw_require (settings, "settings", error) != PW_OK) return NULL;
+  if (periodic_check_settings (settings, error) != PW_OK) return NULL;
   pw_periodic *x = calloc (1, sizeof *x);
   if (x == NULL) return pw_fail_memory (s, error), NULL;
   x->s = s, x->settings = *settings, x->n = s->coords;
   if (x->settings.method == NULL) x->settings.method = "erk8+projection";
-  if (x->settings.rtol <= 0) x->settings.rtol = 1e-12;
-  if (x->settings.points <= 0) x->settings.points = PERIODIC_POINTS;
-  if (x->settings.periods <= 0) x->settings.periods = 1;
+  if (x->settings.rtol == 0) x->settings.rtol = 1e-12;
+  if (x->settings.points == 0) x->settings.points = PERIODIC_POINTS;
+  if (x->settings.periods == 0) x->settings.periods = 1;
   if (periodic_open (x, error) == PW_OK) return x;
   pw_periodic_close (x);
   return NULL;
@@ -193,6 +203,8 @@ static void periodic_set_unknowns (pw_periodic *x, double parameter) {
 int pw_periodic_solve (pw_periodic *x, int settle, double parameter, pw_periodic_orbit *out, pw_error *error) {
   *out = (pw_periodic_orbit){ .residual = INFINITY };
   if (pw_require (x, "a search", error) != PW_OK) return PW_INPUT;
+  if (settle < 0) return pw_fail (error, PW_INPUT, "settle = %d: expected a number >= 0", settle);
+  if (pw_check_parameter (parameter, error) != PW_OK) return PW_INPUT;
   x->begin_period = 0;
   if (x->settings.free) x->last_period = x->settings.period > 0 ? x->settings.period : 2 * PW_PI * x->T;
   int status = pw_periodic_settle (x, parameter, settle);
@@ -213,6 +225,8 @@ int pw_periodic_solve (pw_periodic *x, int settle, double parameter, pw_periodic
 
 int pw_periodic_follow (pw_periodic *x, int direction, pw_error *error) {
   if (pw_require (x, "a search", error) != PW_OK) return PW_INPUT;
+  pw_branch_end (&x->branch);
+  if (pw_check_direction (direction, error) != PW_OK) return PW_INPUT;
   if (x->settings.first == x->settings.last)
     return pw_fail (error, PW_INPUT, "first = last = %.9g: expected a range", x->settings.first);
   if (!(x->begin_period > 0))

@@ -87,7 +87,7 @@ const pw_system *pw_periodic_system (pw_periodic *x, pw_place place, double valu
   if (x->system[place].own == NULL || x->system[place].value != value) {
     pw_system_free (x->system[place].own);
     x->system[place].value = value, x->system[place].period = 0;
-    x->system[place].own = x->settings.compile (x->settings.context, value, &x->why);
+    x->system[place].own = pw_compile_at (x->settings.compile, x->settings.context, value, &x->why);
   }
   const pw_system *s = x->system[place].own;
   return s && pw_steady_same_sizes (x->s, s, &x->why) == PW_OK ? s : NULL;
@@ -212,6 +212,7 @@ int pw_periodic_flow (pw_periodic *x, const double *u, pw_flow_accuracy accuracy
   int status = r ? flow_run (x, r, x->settings.free ? period : x->system[place].period, accuracy) : x->why.status;
   pw_run_close (r);
   if (status == PW_OK) return PW_OK;
+  if (status == PW_STOPPED) pw_fail (&x->why, PW_METHOD, "stopped");
   int refused = x->settings.compile && x->system[place].own == NULL; /* the model refused the value of the parameter */
   if (status == PW_RESOURCE) pw_fail_memory (x->s, &x->why);
   if (status == PW_RESOURCE || (status == PW_INPUT && r == NULL && !refused))
@@ -274,5 +275,6 @@ int pw_periodic_settle (pw_periodic *x, double value, int periods) {
     flow_state (x, &sample, x->state), pw_steady_move_to_start (x->steady, x->state, x->state + x->n);
   if (status == PW_OK && x->settings.free && x->settings.period <= 0) status = flow_return (x, r);
   pw_run_close (r);
+  if (status == PW_STOPPED) pw_fail (&x->why, PW_METHOD, "stopped");
   return status == PW_OK || status == PW_RESOURCE ? status : PW_RETRY;
 }

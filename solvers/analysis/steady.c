@@ -20,6 +20,13 @@ static const double
 
 /* ---- Opening ---- */
 
+int pw_check_search (double first, double last, int points, pw_error *error) {
+  if (!isfinite (first) || !isfinite (last))
+    return pw_fail (error, PW_INPUT, "settings first = %g, last = %g: expected finite numbers", first, last);
+  if (points < 0) return pw_fail (error, PW_INPUT, "setting points = %d: expected a number > 0", points);
+  return PW_OK;
+}
+
 static int steady_arrays (pw_steady *x) {
   size_t n = (size_t)x->n, m = (size_t)x->m, rates = (size_t)pw_steady_rate_count (x->s), unknowns = n + rates;
   size_t holds = (size_t)x->settings.holds, equations = (size_t)x->holonomic + m + n + holds + rates;
@@ -132,7 +139,7 @@ static pw_steady *steady_open (const pw_system *s, const pw_steady_settings *set
   if (x == NULL) return pw_fail_memory (s, error), NULL;
   x->s = s, x->settings = *settings;
   x->n = s->coords, x->m = s->rows, x->holonomic = s->holonomic;
-  if (x->settings.points <= 0) x->settings.points = STEADY_POINTS;
+  if (x->settings.points == 0) x->settings.points = STEADY_POINTS;
   int status = PW_OK;
   if (x->n > PW_STEADY_MAX_COORDINATES)
     status = pw_fail (error, PW_INPUT, "model %s has %d coordinates; steady motions are sought with at most %d",
@@ -146,8 +153,23 @@ static pw_steady *steady_open (const pw_system *s, const pw_steady_settings *set
   return NULL;
 }
 
+static int steady_check_settings (const pw_system *s, const pw_steady_settings *set, pw_error *error) {
+  const int most = 2 * s->coords + PW_HOLD_OF_BODY * s->bodies - 1;
+  if (pw_check_search (set->first, set->last, set->points, error) != PW_OK) return PW_INPUT;
+  if (set->holds < 0 || (set->holds > 0 && set->hold == NULL))
+    return pw_fail (error, PW_INPUT, "setting holds = %d: expected the number of entries of `hold`", set->holds);
+  for (const pw_initial_value *x = set->hold, *end = x + set->holds; x < end; x++)
+    if (x->state < 0 || x->state > most || !isfinite (x->value))
+      return pw_fail (error, PW_INPUT, "setting hold: quantity %d = %g: expected one from 0 to %d and a finite value",
+                      x->state, x->value, most);
+  if (set->vary >= -1 && set->vary < set->holds) return PW_OK;
+  return pw_fail (error, PW_INPUT, "setting vary = %d: expected -1 or an index of `hold`, below holds = %d", set->vary,
+                  set->holds);
+}
+
 pw_steady *pw_steady_open (const pw_system *s, const pw_steady_settings *settings, pw_error *error) {
   if (pw_require (s, "a system", error) != PW_OK || pw_require (settings, "settings", error) != PW_OK) return NULL;
+  if (steady_check_settings (s, settings, error) != PW_OK) return NULL;
   return steady_open (s, settings, SIGNALS_CONSTANT, error);
 }
 
@@ -253,6 +275,8 @@ static int steady_lose_symmetries (pw_steady *x, pw_error *error) {
 int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_motion *out, pw_error *error) {
   *out = (pw_steady_motion){ .parameter = parameter, .residual = INFINITY };
   if (pw_require (x, "a search", error) != PW_OK) return PW_INPUT;
+  if (attempt < 0) return pw_fail (error, PW_INPUT, "attempt = %d: expected a number >= 0", attempt);
+  if (pw_check_parameter (parameter, error) != PW_OK) return PW_INPUT;
   if (pw_steady_open_system (x, PW_HERE, parameter) != PW_OK) return pw_fail (error, x->why.status, "%s", x->why.text);
   int status, known;
   do {

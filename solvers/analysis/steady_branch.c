@@ -13,6 +13,9 @@ int pw_steady_follow (pw_steady *x, const double *q, const double *v, double par
   pw_error ignored = { 0 };
   if (error == NULL) error = &ignored;
   if (pw_require (x, "a search", error) != PW_OK) return PW_INPUT;
+  pw_branch_end (&x->branch);
+  if (pw_require (q, "q", error) != PW_OK || pw_require (v, "v", error) != PW_OK) return PW_INPUT;
+  if (pw_check_direction (direction, error) != PW_OK || pw_check_parameter (parameter, error) != PW_OK) return PW_INPUT;
   int unknowns = pw_steady_unknowns (x);
   double range = x->settings.last - x->settings.first;
   if (range == 0) return pw_fail (error, PW_INPUT, "first = last = %.9g: expected a range", x->settings.first);

@@ -19,7 +19,7 @@ static int hold_unknown (const pw_system *s, const char *name, pw_error *error) 
 }
 
 int pw_system_find_held (const pw_system *s, const char *name, pw_error *error) {
-  if (s == NULL || name == NULL) return pw_system_find_state (s, name, error);
+  if (pw_require (s, "a system", error) != PW_OK || pw_require (name, "a name", error) != PW_OK) return PW_INPUT;
   const char *dot = strrchr (name, '.');
   pw_error none = { 0 };
   for (int k = 0; dot && k < PW_HOLD_OF_BODY; k++) {

@@ -6,6 +6,7 @@
 #ifndef PW_STEADY_H
 #define PW_STEADY_H
 
+#include <math.h>
 #include "continuation.h"
 #include "linear.h"
 
@@ -114,6 +115,9 @@ double pw_steady_parameter (const pw_steady *x, const double *u);
 
 enum { PW_STEADY_MAX_COORDINATES = 400 }; /* since the cost is cubic */
 
+/* The system of pw_steady_settings.compile; NULL and the reason if this returns none or records an error. */
+pw_system *pw_compile_at (pw_system *(*compile) (void *context, double value, pw_error *error), void *context,
+                          double value, pw_error *why);
 /* Opens x->system[place] for a value of the parameter, unless it is open for it.  A status, with x->why if it fails;
  * PW_INPUT: its sizes differ; PW_RETRY: none at this value (x->why has the status of the error). */
 int pw_steady_open_system (pw_steady *x, pw_place place, double value);
@@ -146,6 +150,18 @@ int pw_steady_start (pw_steady *x, int attempt, double *u, pw_error *error);
 int pw_signals_change (pw_run *r, double t, double period, double span, int *changed, pw_error *error);
 
 /* ---- steady.c ---- */
+
+/* PW_INPUT, with the name, unless these settings of a search for steady or periodic motions are valid. */
+int pw_check_search (double first, double last, int points, pw_error *error);
+/* The same for arguments. */
+static inline int pw_check_parameter (double parameter, pw_error *error) {
+  if (isfinite (parameter)) return PW_OK;
+  return pw_fail (error, PW_INPUT, "parameter = %g: expected a finite number", parameter);
+}
+static inline int pw_check_direction (int direction, pw_error *error) {
+  if (direction == 1 || direction == -1) return PW_OK;
+  return pw_fail (error, PW_INPUT, "direction = %d: expected 1 or -1", direction);
+}
 
 /* As pw_steady_open, for searches that need only scales and symmetries: signals may change. */
 pw_steady *pw_steady_open_symmetries (const pw_system *s, const pw_steady_settings *settings, pw_error *error);

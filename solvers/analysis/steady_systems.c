@@ -32,13 +32,24 @@ static int steady_open_run (pw_steady *x, pw_place place, const pw_system *s) {
   return status == PW_OK ? PW_OK : pw_fail_memory (s, &x->why);
 }
 
+pw_system *pw_compile_at (pw_system *(*compile) (void *context, double value, pw_error *error), void *context,
+                          double value, pw_error *why) {
+  *why = (pw_error){ 0 };
+  pw_system *s = compile (context, value, why);
+  if (s && why->status == PW_OK) return s;
+  pw_fail (why, PW_INPUT, "there is no system at %.9g", value);
+  pw_system_free (s);
+  return NULL;
+}
+
 int pw_steady_open_system (pw_steady *x, pw_place place, double value) {
   const pw_system *s = x->s;
   if (x->system[place].run && (x->settings.compile == NULL || x->system[place].value == value)) return PW_OK;
   pw_steady_close_system (x, place);
   x->why = (pw_error){ 0 };
   x->system[place].value = value;
-  if (x->settings.compile) s = x->system[place].own = x->settings.compile (x->settings.context, value, &x->why);
+  if (x->settings.compile)
+    s = x->system[place].own = pw_compile_at (x->settings.compile, x->settings.context, value, &x->why);
   int refused = s && pw_steady_same_sizes (x->s, s, &x->why) != PW_OK;
   int status = s && !refused ? steady_open_run (x, place, s) : x->why.status;
   if (status != PW_OK) pw_steady_close_system (x, place);

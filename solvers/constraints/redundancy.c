@@ -141,6 +141,7 @@ char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size) {
   enum { MAX_ELEMENTS = 6 };
   const double round_off = 1e-8; /* of c between rows of norm 1: eps / sine^2, if active rows have sines above 1.5e-4 */
   const pw_system *s = r->s;
+  if (i < 0 || i >= r->redundant) return snprintf (buffer, size, "%s", ""), buffer;
   int row = r->redundant_row[i], partners = 0, last = -1, elements = 0;
   char before[PW_NAME_BYTES] = "";
   const char *own = PW_NAME (pw_system_row_name, s, row);

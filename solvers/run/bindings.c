@@ -1,4 +1,5 @@
 /* For programs in other languages: samples in rows of an array, signals whose value they set, layouts of structures. */
+#include <math.h>
 #include <string.h>
 #include "method.h"
 #include "pinwheel-analysis.h"
@@ -34,6 +35,9 @@ int pw_run_record (pw_run *r, double t_end, const double *times, long count, lon
   int status = PW_OK;
   *recorded = 0;
   if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
+  for (long i = 0; times && i < count; i++)
+    if (isnan (times[i])) return pw_fail (error, PW_INPUT, "times[%ld] = nan: expected a time", i);
+  if (isnan (t_end)) return pw_fail (error, PW_INPUT, "t_end = nan: expected a time");
   for (long calls = 0; status == PW_OK && *recorded < count; calls++) {
     while (times && status == PW_OK && *recorded < count && times[*recorded] <= r->t)
       status = record_sample (r, times[*recorded], rows, recorded, error);

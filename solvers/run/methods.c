@@ -143,7 +143,9 @@ int pw_parse_options (const char *text, const pw_method *const *own, const pw_me
 
 int pw_method_parse (const char *text, const pw_method **method, int *stabilisation, pw_error *error) {
   double values[PW_MAX_OPTIONS];
-  return pw_parse_options (text, NULL, method, stabilisation, values, error);
+  const pw_method *found;
+  int index;
+  return pw_parse_options (text, NULL, method ? method : &found, stabilisation ? stabilisation : &index, values, error);
 }
 
 #define METHODS_STEP_RATIO 20. /* typical ratio of an adaptive step at rtol 1e-6 to the model's fixed step */

@@ -38,6 +38,7 @@ int pw_step_restart (pw_run *r, pw_error *error) {
 }
 
 int pw_step_open (pw_run *r, int arrays, pw_error *error) {
+  if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
   struct pw_method_data *d = r->data = calloc (1, sizeof *d);
   size_t n = (size_t)r->s->coords + 3, rows = (size_t)r->s->rows;
   if (d == NULL) return pw_fail_memory (r->s, error);

@@ -17,7 +17,10 @@ int pw_run_annotate_error (const pw_run *r, int status, pw_error *error) {
                      : status == PW_INITIAL                  ? "; in an attempt,"
                                                              : "; in the attempted step,";
   const char *derivative = r->w->failed->of_force ? "" : ", or a derivative of it,"; /* no time derivatives of those */
-  snprintf (error->text + n, sizeof error->text - n, "%s %s%s is not a finite number", link, signal, derivative);
+  const pw_signal *failed = &r->w->failed->signal;
+  const char *failure = failed->type == PW_FUNCTION && failed->function.text == NULL ? ", or its function failed" : "";
+  snprintf (error->text + n, sizeof error->text - n, "%s %s%s is not a finite number%s", link, signal, derivative,
+            failure);
   return status;
 }
 

@@ -174,6 +174,7 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   status = pw_run_look_ahead (r, error);
   if (status != PW_OK) return status;
   if (pw_stabilised_by (r, PW_BAUMGARTE)) r->alpha = pw_run_option (r, "alpha"), r->beta = pw_run_option (r, "beta");
+  r->identity = pw_run_identity (r);
   status = pw_specialised_open (r, error);
   if (status == PW_OK) status = r->method->open (r, error);
   if (status != PW_OK || !r->uses_derivatives) return status;

@@ -79,6 +79,9 @@ static int variation_open_arrays (pw_variation *x) {
 static int variation_check_neighbours (const pw_variation *x, const pw_direction *d, int i, pw_error *error) {
   const pw_system *s = x->r->s;
   if (d->initial) return PW_OK;
+  if (x->r->statistics.steps > 0 || x->r->t != x->r->settings.t)
+    return pw_fail (error, PW_INPUT, "direction %d: neighbours need a run that has not advanced; it is at t = %g s",
+                    i + 1, x->r->t);
   for (int k = 0; k < PW_VARIATION_NEIGHBOURS; k++) {
     const pw_system *other = d->neighbour[k] ? d->neighbour[k]->s : NULL;
     if (other == NULL || d->step == 0 || !isfinite (d->step))
@@ -328,6 +331,7 @@ static int variation_column_sample (pw_variation *x, const pw_direction_copy *d,
 
 int pw_variation_sample (pw_variation *x, int i, pw_sample *derivative, pw_sample *error_of, pw_error *error) {
   if (pw_require (x, "a variation", error) != PW_OK) return PW_INPUT;
+  if (i < 0 || i >= x->count) return pw_fail (error, PW_INPUT, "direction i = %d: expected 0 to %d", i, x->count - 1);
   /* the run's samples at a breakpoint are those after it */
   int status = variation_before_breakpoint (x) ? pw_variation_pass_breakpoint (x, error) : PW_OK;
   if (status != PW_OK) return pw_run_annotate_error (x->r, status, error);

@@ -373,12 +373,11 @@ TEST (engine_starts) {
 TEST (interrupt) {
   const char *program = getenv ("PINWHEEL");
   fit_write (0);
-  assert_int_equal (
-      cli_run (check_text (
-          "timeout --preserve-status -s INT 1 '%s' fit @/wheel.yaml --data @/data.csv --columns w.phi --free k=1:100 "
-          "--set k=60 --starts 100000 --json @/stop.json -o @/stop.csv",
-          program ? program : "build/pinwheel")),
-      130);
+  assert_int_equal (cli_run (check_text ("CC=/nonexistent timeout --preserve-status -s INT 2 '%s' fit @/wheel.yaml "
+                                         "--data @/data.csv --columns w.phi --free k=1:100 "
+                                         "--set k=60 --starts 100000 --json @/stop.json -o @/stop.csv",
+                                         program ? program : "build/pinwheel")),
+                    130);
   assert_non_null (strstr (cli_err, "interrupted; these are the values so far, without their errors"));
   assert_true (cli_says (cli_file ("stop.json"), "status", "interrupted"));
   assert_non_null (strstr (cli_file ("stop.json"), "\"standard_error\": null"));

@@ -279,6 +279,8 @@ TEST (again) {
   pw_periodic *x = periodic_open (s, &set);
   assert_int_equal (pw_periodic_follow (x, 1, &error), PW_INPUT);
   check_error (&error, PW_INPUT, "no motion has been found from which to follow a branch");
+  assert_int_equal (pw_periodic_next (x, &o, &(pw_error){ 0 }), PW_OK);
+  assert_int_equal (o.event, PW_PERIODIC_END);
   periodic_solve (x, 1, 0.1);
   pw_periodic_solve (x, 1, 60, &o, &(pw_error){ 0 });
   assert_true (isfinite (o.residual));
@@ -288,6 +290,10 @@ TEST (again) {
   check_ok (pw_periodic_follow (x, -1, &error), &error);
   check_ok (pw_periodic_next (x, &o, &error), &error);
   check_close ("period", o.period, begin, 1e-13, "that of the first branch");
+  x->begin_period = 0; /* as after a search without result */
+  assert_int_equal (pw_periodic_follow (x, -1, &(pw_error){ 0 }), PW_INPUT);
+  check_ok (pw_periodic_next (x, &o, &error), &error);
+  assert_int_equal (o.event, PW_PERIODIC_END);
   pw_periodic_close (x);
   pw_system_free (s);
 }
@@ -437,6 +443,65 @@ TEST (wild) {
   pw_periodic *x = periodic_open (s, &(pw_periodic_settings){ .period = 4 });
   assert_true (pw_periodic_unknowns (x) < 40);
   assert_int_equal (pw_periodic_flow (x, u, PW_FLOW, PW_HERE, &error), PW_RETRY);
+  pw_periodic_close (x);
+  pw_system_free (s);
+}
+
+static pw_system *mathieu_with_error (void *context, double a, pw_error *error) {
+  pw_fail (error, PW_INPUT, "a = %g is refused", a);
+  return mathieu_at (context, a, error);
+}
+
+static int stop_at_once (void *context) {
+  (void)context;
+  return 1;
+}
+
+/* An error that `compile` records counts, whatever it returns; a stop is the reason of PW_RETRY. */
+TEST (compile_and_stop) {
+  pw_error error = { 0 };
+  pw_periodic_orbit o;
+  pw_system *s = mathieu_at (NULL, 1, NULL);
+  const pw_periodic_settings wrong = { .period = PW_PI, .compile = mathieu_with_error, .first = 1, .last = 2 };
+  assert_null (pw_periodic_open (s, &wrong, &error));
+  check_error (&error, PW_INPUT, "a = 1 is refused");
+  assert_null (
+      pw_steady_open (s, &(pw_steady_settings){ .compile = mathieu_with_error, .vary = -1 }, &(pw_error){ 0 }));
+  pw_periodic *x = periodic_open (s, &(pw_periodic_settings){ .period = PW_PI, .stop = stop_at_once });
+  for (int settle = 0; settle < 2; settle++) {
+    assert_int_equal (pw_periodic_solve (x, settle, 0, &o, &error), PW_RETRY);
+    assert_string_equal (pw_periodic_reason (x), "stopped");
+  }
+  pw_periodic_close (x);
+  pw_system_free (s);
+}
+
+/* Settings and arguments out of range are named. */
+TEST (settings) {
+  static const struct {
+    pw_periodic_settings set;
+    const char *text;
+  } wrong[] = {
+    { { .rtol = -1 }, "setting rtol = -1: expected a number > 0" },
+    { { .period = -1 }, "setting period = -1: expected a number > 0" },
+    { { .period = NAN }, "setting period = nan: expected a number > 0" },
+    { { .periods = -1 }, "setting periods = -1: expected a number > 0" },
+    { { .points = -2 }, "setting points = -2: expected a number > 0" },
+    { { .last = INFINITY }, "settings first = 0, last = inf: expected finite numbers" },
+  };
+  pw_system *s = gallery_open ("snakeboard", NULL);
+  for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
+    pw_error error = { 0 };
+    assert_null (pw_periodic_open (s, &wrong[i].set, &error));
+    check_error (&error, PW_INPUT, wrong[i].text);
+  }
+  pw_error e[2] = { { 0 } };
+  pw_periodic_orbit o;
+  pw_periodic *x = periodic_open (s, &(pw_periodic_settings){ .period = 4 });
+  assert_int_equal (pw_periodic_solve (x, -1, 0, &o, &e[0]), PW_INPUT);
+  check_error (&e[0], PW_INPUT, "settle = -1: expected a number >= 0");
+  assert_int_equal (pw_periodic_follow (x, 0, &e[1]), PW_INPUT);
+  check_error (&e[1], PW_INPUT, "direction = 0: expected 1 or -1");
   pw_periodic_close (x);
   pw_system_free (s);
 }

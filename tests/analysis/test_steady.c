@@ -281,6 +281,45 @@ TEST (concentric) {
   }
 }
 
+/* Settings and arguments out of range are named. */
+TEST (settings) {
+  static const pw_initial_value beyond = { 9, 0 }, below = { -5, 0 }, undefined = { 0, NAN }, fixed = { 2, 0 };
+  static const struct {
+    pw_steady_settings set;
+    const char *text;
+  } wrong[] = {
+    { { .hold = &beyond, .holds = 1 }, "setting hold: quantity 9 = 0: expected one from 0 to 8 and a finite value" },
+    { { .hold = &below, .holds = 1 }, "setting hold: quantity -5 = 0: expected one from 0 to 8 and a finite value" },
+    { { .hold = &undefined, .holds = 1 }, "setting hold: quantity 0 = nan: expected one from 0 to 8 and a finite" },
+    { { .holds = 1 }, "setting holds = 1: expected the number of entries of `hold`" },
+    { { .vary = 0 }, "setting vary = 0: expected -1 or an index of `hold`, below holds = 0" },
+    { { .hold = &fixed, .holds = 1, .vary = 7 },
+      "setting vary = 7: expected -1 or an index of `hold`, below holds = 1" },
+    { { .vary = -1, .points = -3 }, "setting points = -3: expected a number > 0" },
+    { { .vary = -1, .first = NAN }, "settings first = nan, last = 0: expected finite numbers" },
+  };
+  steady t = { .s = scene_system (&pushed_table, NULL), .set = { .vary = -1, .last = 1 } };
+  for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
+    pw_error error = { 0 };
+    assert_null (pw_steady_open (t.s, &wrong[i].set, &error));
+    assert_int_equal (error.status, PW_INPUT);
+    assert_non_null (strstr (error.text, wrong[i].text));
+  }
+  steady_open (&t);
+  pw_steady_motion m;
+  pw_error e[4] = { { 0 } };
+  assert_int_equal (pw_steady_solve (t.x, -1, 0, &m, &e[0]), PW_INPUT);
+  check_error (&e[0], PW_INPUT, "attempt = -1: expected a number >= 0");
+  assert_int_equal (pw_steady_solve (t.x, 0, NAN, &m, &e[1]), PW_INPUT);
+  check_error (&e[1], PW_INPUT, "parameter = nan: expected a finite number");
+  const double zero[3] = { 0 };
+  assert_int_equal (pw_steady_follow (t.x, zero, zero, 0, 0, &e[2]), PW_INPUT);
+  check_error (&e[2], PW_INPUT, "direction = 0: expected 1 or -1");
+  assert_int_equal (pw_steady_follow (t.x, zero, zero, INFINITY, 1, &e[3]), PW_INPUT);
+  check_error (&e[3], PW_INPUT, "parameter = inf: expected a finite number");
+  steady_close (&t);
+}
+
 /* The result NULL of a failed call is refused by the next, and the first error stays. */
 TEST (missing) {
   pw_error error = { 0 };
@@ -298,5 +337,6 @@ TEST (missing) {
   assert_int_equal (pw_variation_advance (NULL, 1, 1, &error), PW_INPUT);
   assert_int_equal (pw_variation_sample (NULL, 0, &sample, NULL, &error), PW_INPUT);
   assert_int_equal (pw_system_find_state (NULL, "x", &error), PW_INPUT);
+  assert_int_equal (pw_system_find_held (NULL, "a.x", &error), PW_INPUT);
   check_error (&error, PW_INPUT, "a system is missing");
 }

@@ -65,6 +65,30 @@ TEST (pitchfork) {
   steady_close (&t);
 }
 
+/* Without a branch there are no points: before the first one, and after one that could not be followed. */
+TEST (no_branch) {
+  double beta = 0, q[6], v[6];
+  pw_error error = { 0 };
+  steady t = whirl_open (&beta);
+  pw_steady_motion m;
+  check_ok (pw_steady_next (t.x, &m, &error), &error);
+  assert_int_equal (m.event, PW_STEADY_END);
+  m = steady_solve (&t, 0, 0.5);
+  memcpy (q, m.q, sizeof q), memcpy (v, m.v, sizeof v);
+  for (int missing = 0; missing < 2; missing++) {
+    error = (pw_error){ 0 };
+    check_ok (pw_steady_follow (t.x, q, v, 0.5, 1, &error), &error);
+    check_ok (pw_steady_next (t.x, &m, &error), &error);
+    assert_int_equal (m.event, PW_STEADY_POINT);
+    const double other[6] = { NAN };
+    assert_true (pw_steady_follow (t.x, missing ? NULL : other, v, 0.5, 1, &error) < 0);
+    assert_int_equal (pw_steady_next (t.x, &m, &(pw_error){ 0 }), PW_OK);
+    assert_int_equal (m.event, PW_STEADY_END);
+  }
+  check_error (&error, PW_INPUT, "q is missing");
+  steady_close (&t);
+}
+
 /* A second rod, with a stiffer spring. */
 static void twins_build (pw_model *m, const void *parameters) {
   whirl_build (m, parameters);

@@ -450,7 +450,17 @@ TEST (refusals) {
   pw_variation *x = pw_variation_open (c.r, &c.d, 1, 0, &error);
   assert_int_equal (pw_variation_advance (x, NAN, 0.1, &error), PW_INPUT);
   check_error (&error, PW_INPUT, "t = nan: expected a time");
+  for (int i = -1; i < 2; i += 2) {
+    pw_sample sample;
+    error = (pw_error){ 0 };
+    assert_int_equal (pw_variation_sample (x, i, &sample, NULL, &error), PW_INPUT);
+    assert_non_null (strstr (error.text, ": expected 0 to 0"));
+  }
   pw_variation_close (x);
+  assert_int_equal (pw_run_advance_to (c.r, 0.5, 0.5, NULL), PW_OK);
+  error = (pw_error){ 0 };
+  assert_null (pw_variation_open (c.r, &c.d, 1, 0, &error));
+  check_error (&error, PW_INPUT, "direction 1: neighbours need a run that has not advanced; it is at t = 0.5 s");
   variation_free (&c);
 }
 

@@ -124,9 +124,9 @@ TEST (other_file) {
   resume_bad ("rm @/b.ck; mkdir @/b.ck", "",
               "cannot read the checkpoint @/b.ck: it is a directory, not a regular file");
   cli_good ("rmdir @/b.ck");
-  resume_bad ("sed 1s/1/7/ @/good.ck >@/b.ck", "", "@/b.ck is a checkpoint of format 7; this Pinwheel reads format 1");
+  resume_bad ("sed 1s/2/7/ @/good.ck >@/b.ck", "", "@/b.ck is a checkpoint of format 7; this Pinwheel reads format 2");
   resume_bad ("sed '1s/$/\r/' @/good.ck >@/b.ck", "", "the checkpoint @/b.ck is truncated or damaged");
-  resume_bad ("printf 'pinwheel checkpoint 1' >@/b.ck", "", "the checkpoint @/b.ck is truncated or damaged");
+  resume_bad ("printf 'pinwheel checkpoint 2' >@/b.ck", "", "the checkpoint @/b.ck is truncated or damaged");
   resume_bad ("printf x >>@/b.ck", "", "the checkpoint @/b.ck is damaged: its checksum is wrong");
   resume_bad ("rm @/b.csv.part; echo >@/b.csv.part", "",
               "cannot continue @/b.csv: @/b.csv.part is not the table that the checkpoint belongs to");

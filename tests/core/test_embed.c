@@ -9,6 +9,7 @@
 #include <sys/wait.h>
 #include "check.h"
 #include "pinwheel-files.h"
+#include "pinwheel-selftest.h"
 #include "runs.h"
 #include "scene.h"
 
@@ -108,4 +109,28 @@ TEST (no_object) {
   check_error (&error, PW_RESOURCE, "the compiler has written no object");
   free (text);
   pw_system_free (s);
+}
+
+/* Each function with an error reports what is missing. */
+TEST (missing) {
+  static const char *const expected[] = {
+    "a function for each model is missing", "the name of a file to write is missing",
+    "the name of a checkpoint is missing",  "an expression is missing",
+    "the list of names is missing",         "an element type is missing",
+    "the table of a model is missing",      "the name of a table is missing"
+  };
+  enum { MISSING = sizeof expected / sizeof *expected };
+  pw_error e[MISSING] = { { 0 } };
+  pw_checkpoint c;
+  pw_selftest_report report = { 0 };
+  int rows;
+  assert_int_equal (pw_file_list (NULL, NULL, &e[0]), PW_INPUT);
+  assert_null (pw_output_open (NULL, &e[1]));
+  assert_int_equal (pw_checkpoint_read (NULL, &c, &e[2]), PW_INPUT);
+  assert_null (pw_formula_open (NULL, NULL, &e[3]));
+  assert_null (pw_formula_open ("1", NULL, &e[4]));
+  assert_int_equal (pw_selftest (NULL, 1, &report, &e[5]), PW_INPUT);
+  assert_int_equal (pw_plugin_check (NULL, "it", &e[6]), PW_INPUT);
+  assert_null (pw_read_columns (NULL, NULL, NULL, 0, &rows, &e[7]));
+  for (int i = 0; i < MISSING; i++) check_error (&e[i], PW_INPUT, expected[i]);
 }

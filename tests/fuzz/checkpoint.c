@@ -7,7 +7,7 @@
 #include "cli.h"
 #include "fuzz.h"
 #include "pinwheel-files.h"
-#include "pinwheel-solvers.h"
+#include "method.h"
 #include "util.h"
 
 static const char *const checkpoint_methods[] = { "rk4+projection", "erk8+projection", "ida+ggl",
@@ -15,18 +15,22 @@ static const char *const checkpoint_methods[] = { "rk4+projection", "erk8+projec
                                                   "adams",          "rk4+baumgarte",   "erk5+nullspace" };
 enum { CHECKPOINT_METHODS = sizeof checkpoint_methods / sizeof *checkpoint_methods };
 
-/* The bytes as a state, whatever they are. */
+/* The bytes as a state after the identity of the run, whatever they are. */
 static void checkpoint_load (const uint8_t *data, size_t size, const char *method) {
   pw_error error = { 0 };
   pw_settings settings = { .step = 1e-3, .rtol = 1e-6, .span = 1, .ledger = 1 };
   pw_run *r = pw_run_open (fuzz_pendulum (), method, &settings, &error);
-  pw_archive a = { .at = (unsigned char *)(size_t)data, .size = size, .loading = 1 };
   if (r == NULL) abort ();
+  pw_archive saved = { .at = NULL };
+  pw_archive_bytes (&saved, &(unsigned long long){ r->identity }, sizeof r->identity);
+  pw_archive_bytes (&saved, (uint8_t *)(size_t)data, size);
+  pw_archive a = { .at = saved.at, .size = saved.used, .loading = 1 };
   if (pw_run_load (r, &a, &error) == PW_OK) {
     double t = pw_run_time (r);
     for (int i = 0; i < 2 && error.status == PW_OK && t < 1e6; i++) pw_run_advance (r, t + 1e-3, &error);
   } else if (error.status >= 0)
     abort ();
+  pw_archive_free (&saved);
   pw_run_close (r);
 }
 

@@ -235,6 +235,49 @@ TEST (other) {
   pw_system_free (other);
 }
 
+static int saved_load (const pw_archive *saved, pw_run *r, const char *text) {
+  pw_error error = { 0 };
+  pw_archive from = { .at = saved->at, .size = saved->used, .loading = 1 };
+  int status = pw_run_load (r, &from, &error);
+  if (status != PW_OK) check_error (&error, PW_INPUT, text);
+  pw_run_close (r);
+  return status;
+}
+
+/* Method, options, settings and system must be those of the saved run, and the run must not have advanced. */
+TEST (identity) {
+  static const char other[] = "the saved state does not belong to this run";
+  static const char *const method[] = { "rk4+baumgarte", "rk4+none", "rk4+projection:every=2",
+                                        "erk5",          "erk8",     "erk5:steps=fixed",
+                                        "radau",         "bdf",      "ida",
+                                        "adams",         "galpha",   "leapfrog" };
+  enum { METHODS = sizeof method / sizeof *method };
+  const pw_settings own = { .step = 1e-3, .rtol = 1e-6 };
+  const pw_settings changed[] = { { .step = 2e-3, .rtol = 1e-6 },
+                                  { .step = 1e-3, .rtol = 1e-7 },
+                                  { .step = 1e-3, .rtol = 1e-6, .span = 3 },
+                                  { .step = 1e-3, .rtol = 1e-6, .ledger = 1 } };
+  pw_system *s = saved_system (0), *faster = saved_system (1);
+  for (int i = 0; i < METHODS; i++) {
+    pw_error error = { 0 };
+    pw_archive a = { .at = NULL };
+    pw_run *r = runs_open (s, method[i], &own);
+    check_ok (pw_run_advance_to (r, 0.1, 1, &error), &error);
+    check_ok (pw_run_save (r, &a, &error), &error);
+    for (int k = 0; k < METHODS; k++)
+      assert_int_equal (saved_load (&a, runs_open (s, method[k], &own), other), k == i ? PW_OK : PW_INPUT);
+    for (size_t k = 0; k < sizeof changed / sizeof *changed; k++)
+      assert_int_equal (saved_load (&a, runs_open (s, method[i], &changed[k]), other), PW_INPUT);
+    assert_int_equal (saved_load (&a, runs_open (faster, method[i], &own), other), PW_INPUT);
+    char text[120];
+    snprintf (text, sizeof text, "the run has advanced to t = %g s: a saved state needs a new one", pw_run_time (r));
+    assert_int_equal (saved_load (&a, r, text), PW_INPUT);
+    pw_archive_free (&a);
+  }
+  pw_system_free (s);
+  pw_system_free (faster);
+}
+
 /* The ledger includes work done before the run was saved: the energy balances to the accuracy of each method. */
 TEST (ledger) {
   static const char *const method[] = { "rk4+projection", "erk8+projection", "adams",

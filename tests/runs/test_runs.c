@@ -59,7 +59,8 @@ TEST (signal_fails_at_once) {
   pw_error error = { 0 };
   pw_system *s = runs_fused (&fuse);
   assert_null (pw_run_open (s, "rk4", NULL, &error));
-  check_error (&error, PW_METHOD, "t = 0 s: a signal failed: torque rider: value is not a finite number");
+  check_error (&error, PW_METHOD,
+               "t = 0 s: a signal failed: torque rider: value is not a finite number, or its function failed");
   pw_system_free (s);
 }
 
@@ -217,6 +218,9 @@ TEST (missing) {
   pw_run *r = runs_open (s, "rk4", NULL);
   assert_int_equal (pw_run_sample (r, 0, NULL, &e[5]), PW_INPUT);
   check_error (&e[5], PW_INPUT, "a sample is missing");
+  char text[40] = "x";
+  assert_string_equal (pw_run_redundancy (r, pw_run_redundant (r), text, sizeof text), "");
+  assert_int_equal (pw_method_parse ("rk4", NULL, NULL, NULL), PW_OK);
   pw_run_close (r);
   pw_run_close (runs_open (s, "rk4", &(pw_settings){ .step = 1e308 })); /* 1000 of these, the default span, overflow */
   assert_int_equal (pw_system_find_held (NULL, "frame.x", &e[6]), PW_INPUT);

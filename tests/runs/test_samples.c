@@ -194,5 +194,11 @@ TEST (record) {
   assert_true (pw_run_record_width (r) <= 100);
   check_ok (pw_run_record (r, 1, times, 1, 9, row, &recorded, &error), &error);
   assert_true (recorded == 1 && row[0] == 0 && pw_run_time (r) == 0);
+  times[1] = NAN;
+  assert_int_equal (pw_run_record (r, 1, times, 2, 9, row, &recorded, &error), PW_INPUT);
+  check_error (&error, PW_INPUT, "times[1] = nan: expected a time");
+  assert_int_equal (pw_run_record (r, NAN, NULL, 1, 9, row, &recorded, NULL), PW_INPUT);
+  assert_int_equal (recorded, 0);
+  error = (pw_error){ 0 };
   runs_close (r, s);
 }

@@ -11,6 +11,8 @@ struct pw_formula {
 pw_formula *pw_formula_open (const char *text, const char *const *names, pw_error *error) {
   pw_expression_error why;
   int status = PW_RESOURCE, count = 0;
+  if (pw_require (text, "an expression", error) != PW_OK || pw_require (names, "the list of names", error) != PW_OK)
+    return NULL;
   while (names[count]) count++;
   if (count > PW_FORMULA_NAMES) {
     pw_fail (error, PW_INPUT, "more than %d names", PW_FORMULA_NAMES);

@@ -216,6 +216,7 @@ double *pw_columns_from_stream (FILE *f, const char *shown, const char *const *c
 double *pw_read_columns (const char *path, const char *const *column, const char *const *unit, int width, int *rows,
                          pw_error *error) {
   const char *why;
+  if (pw_require (path, "the name of a table", error) != PW_OK) return NULL;
   FILE *f = pw_open_input (path, &why);
   if (f == NULL) {
     pw_fail (error, pw_open_input_status (), "%s: cannot be read: %s", path, why);

@@ -195,6 +195,7 @@ int pw_file_tables (const pw_file *f, int (*each) (void *context, const char *pa
 
 int pw_file_list (int (*each) (void *context, const char *name, const char *path), void *context, pw_error *error) {
   pw_search s;
+  if (each == NULL) return pw_fail (error, PW_INPUT, "a function for each model is missing");
   int status = pw_search_open (&s, error);
   for (int i = 0; status == PW_OK && i < s.count; i++)
     if (each (context, s.found[i].name, s.found[i].path) != 0) break;

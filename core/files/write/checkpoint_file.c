@@ -67,6 +67,7 @@ static int checkpoint_parse (const char *path, pw_checkpoint *c, size_t size, pw
 int pw_checkpoint_read (const char *path, pw_checkpoint *c, pw_error *error) {
   size_t size = 0;
   *c = (pw_checkpoint){ .text = NULL };
+  if (pw_require (path, "the name of a checkpoint", error) != PW_OK) return PW_INPUT;
   int status = pw_read_file ("cannot read the checkpoint", path, CHECKPOINT_MAX_BYTES, "the limit for a checkpoint",
                              &c->text, &size, error);
   if (status == PW_OK) status = checkpoint_version (path, c->text, error);

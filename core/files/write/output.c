@@ -139,6 +139,7 @@ static int output_open_file (pw_output *o, const char *ending) {
 }
 
 static pw_output *output_new (const char *path, pw_error *error) {
+  if (pw_require (path, "the name of a file to write", error) != PW_OK) return NULL;
   pw_output *o = *path ? calloc (1, sizeof *o) : NULL;
   if (o == NULL) {
     pw_fail (error, *path ? PW_RESOURCE : PW_INPUT, *path ? "out of memory" : "the name of a file to write is empty");
