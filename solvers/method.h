@@ -214,7 +214,7 @@ int pw_run_look_ahead (pw_run *r, pw_error *error);
 void pw_run_set_reference_level (pw_run *r);
 
 /* A check sum, at the initial state, of what a saved state must share with the run that loads it: method, options,
- * settings, masses, names, signals, initial state and accelerations. */
+ * settings, masses, names, numbers of signals, initial state and accelerations. */
 unsigned long long pw_run_identity (const pw_run *r);
 
 /* Opens the saddle and the method anew at the state reached, where J is evaluated. */

@@ -197,8 +197,9 @@ int pw_steady_suggest (pw_steady *x, pw_initial_value *hold, int most);
  * pw_steady_next returns its points, the first one included, and events in between, then PW_STEADY_END: at an end of
  * the range or the start of a closed branch, where Newton's method fails at the smallest step, or after 100 times
  * `points` points (pw_steady_reason).  It returns PW_STEADY_END also before and after a branch, and after
- * pw_steady_follow has failed: with the errors of pw_steady_solve, with PW_INPUT if first = last, or with PW_METHOD if
- * Newton's method does not converge from this state, or the branch has a fold there. */
+ * pw_steady_follow has failed.  Errors of pw_steady_follow: those of pw_steady_solve; PW_INPUT also if first = last, q
+ * or v is NULL, or the direction is another; PW_METHOD if Newton's method does not converge from this state, or the
+ * branch has a fold there. */
 int pw_steady_follow (pw_steady *x, const double *q, const double *v, double parameter, int direction, pw_error *error);
 int pw_steady_next (pw_steady *x, pw_steady_motion *out, pw_error *error);
 
@@ -268,8 +269,8 @@ const char *pw_periodic_reason (const pw_periodic *x);
 int pw_periodic_symmetries (const pw_periodic *x);
 
 /* Follows the branch of the motion that pw_periodic_solve has found last towards the end of the range (direction 1) or
- * its beginning (-1).  Errors: PW_INPUT if pw_periodic_solve has failed, or first = last; PW_METHOD at a fold;
- * PW_RESOURCE.
+ * its beginning (-1).  Errors: PW_INPUT if pw_periodic_solve has failed, first = last, or the direction is another;
+ * PW_METHOD at a fold; PW_RESOURCE.
  * pw_periodic_next returns its points, the first one included, and events in between, then PW_PERIODIC_END (perhaps
  * with pw_periodic_reason); so also before and after a branch, and after pw_periodic_follow has failed. */
 int pw_periodic_follow (pw_periodic *x, int direction, pw_error *error);

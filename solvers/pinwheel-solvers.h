@@ -152,8 +152,9 @@ int pw_run_save (pw_run *r, pw_archive *a, pw_error *error);
 /* Loads a saved state into a run opened with the same system, method and settings that has not advanced; it continues
  * bit for bit as the run that was saved.  Bytes after the state are left to the caller: a->used < a->size.  After an
  * error the run can only be closed: PW_INPUT if it has advanced, the archive is truncated, or method, options, settings
- * (without limits and code), masses, names, signals, initial state or accelerations there differ; PW_METHOD;
- * PW_RESOURCE.  The caller ensures that systems do not differ otherwise, as by a damper that is at rest initially. */
+ * (without limits and code), masses, names, numbers of signals, initial state or accelerations there differ; PW_METHOD;
+ * PW_RESOURCE.  The caller ensures that systems do not differ otherwise: by a damper that is at rest initially, or a
+ * function. */
 int pw_run_load (pw_run *r, pw_archive *a, pw_error *error);
 
 /* ---- Properties of a run ---- */

@@ -203,9 +203,9 @@ static void periodic_set_unknowns (pw_periodic *x, double parameter) {
 int pw_periodic_solve (pw_periodic *x, int settle, double parameter, pw_periodic_orbit *out, pw_error *error) {
   *out = (pw_periodic_orbit){ .residual = INFINITY };
   if (pw_require (x, "a search", error) != PW_OK) return PW_INPUT;
+  x->begin_period = 0;
   if (settle < 0) return pw_fail (error, PW_INPUT, "settle = %d: expected a number >= 0", settle);
   if (pw_check_parameter (parameter, error) != PW_OK) return PW_INPUT;
-  x->begin_period = 0;
   if (x->settings.free) x->last_period = x->settings.period > 0 ? x->settings.period : 2 * PW_PI * x->T;
   int status = pw_periodic_settle (x, parameter, settle);
   if (status < 0) return pw_fail (error, status, "%s", x->why.text);
@@ -213,7 +213,8 @@ int pw_periodic_solve (pw_periodic *x, int settle, double parameter, pw_periodic
   periodic_set_unknowns (x, parameter);
   x->steps = 0;
   status = pw_periodic_guess_displacement (x, x->u, error);
-  if (status == PW_OK) status = pw_branch_solve (&x->branch, x->u, error);
+  if (status != PW_OK) return status;
+  status = pw_branch_solve (&x->branch, x->u, error);
   if (status == PW_OK) status = periodic_orbit (x, x->u, out, error);
   if (status == PW_OK) x->begin_period = out->period;
   out->residual = x->branch.residual;

@@ -77,8 +77,8 @@ static void equations_rotate (const pw_periodic *x, double w, const double *in, 
   pw_linear_rotate (&x->steady->system[PW_HERE].linearisation, w, in + x->n, out + x->n);
 }
 
-/* The angle by which a symmetry that turns the whole does so in the last flow: by the first body whose angle only this
- * symmetry changes, or 0. */
+/* The angle by which the whole turns in the last flow: that of the first body whose angle no symmetry changes except by
+ * turning the whole, or 0. */
 static double equations_turn (const pw_periodic *x) {
   int rates = pw_steady_rate_count (x->s);
   for (int b = 0; b < x->s->bodies; b++) {
@@ -93,7 +93,7 @@ int pw_periodic_guess_displacement (pw_periodic *x, double *u, pw_error *error) 
   enum { CORRECTIONS = 3 }; /* the rotation is known; for a given one translations are linear */
   int states = 2 * x->n, count = x->symmetries, rates = pw_steady_rate_count (x->s), rank;
   size_t rows = 2 * (size_t)states, work_size = rows + (size_t)(PW_PERIODIC_WORK * (states + count));
-  int status = pw_periodic_flow (x, u, PW_FLOW, PW_HERE, error);
+  int status = count ? pw_periodic_flow (x, u, PW_FLOW, PW_HERE, error) : PW_OK;
   if (status != PW_OK || count == 0) return status;
   double *F = calloc (rows + rows * (size_t)count + work_size, sizeof *F), *M = F + rows,
          *work = M + rows * (size_t)count;

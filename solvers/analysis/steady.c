@@ -268,8 +268,10 @@ static int steady_lose_symmetries (pw_steady *x, pw_error *error) {
   const int symmetries = x->symmetries, status = pw_steady_keep_symmetries (x);
   if (status == PW_RESOURCE) return pw_fail_memory (x->s, error);
   if (status != PW_OK || x->symmetries == symmetries) return PW_OK;
-  pw_branch_close (&x->branch);
-  return steady_open_branch (x, error) == PW_OK ? PW_RETRY : error->status;
+  pw_branch before = x->branch;
+  if (steady_open_branch (x, error) != PW_OK) return PW_RESOURCE;
+  pw_branch_close (&before);
+  return PW_RETRY;
 }
 
 int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_motion *out, pw_error *error) {

@@ -153,7 +153,7 @@ int pw_signals_change (pw_run *r, double t, double period, double span, int *cha
 
 /* PW_INPUT, with the name, unless these settings of a search for steady or periodic motions are valid. */
 int pw_check_search (double first, double last, int points, pw_error *error);
-/* The same for arguments. */
+/* PW_INPUT unless the parameter is finite; unless the direction is 1 or -1. */
 static inline int pw_check_parameter (double parameter, pw_error *error) {
   if (isfinite (parameter)) return PW_OK;
   return pw_fail (error, PW_INPUT, "parameter = %g: expected a finite number", parameter);

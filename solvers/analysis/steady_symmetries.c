@@ -11,7 +11,7 @@
 
 enum {
   SYMMETRY_NEAR = 2,  /* states; more than one, since a body alone has more displacements than equations */
-  SYMMETRY_STATES = 8 /* the others are displaced as a whole, if they can be, by L, 3 L, 9 L, ... */
+  SYMMETRY_STATES = 8 /* the others are turned, and displaced by up to L, 3 L, 9 L, ..., if the whole can be */
 };
 static const double SYMMETRY_DISTANCE = 0.02, /* of a state from the initial or displaced one, in units of the scene */
     SYMMETRY_ROUND_OFF = 1e-12,               /* of singular values, relative to the largest one */
@@ -194,7 +194,10 @@ static void symmetry_keep_one_turn (pw_steady *x, int rates) {
   for (int k = x->symmetries - 1; k >= 0; k--) {
     double *rate = x->symmetry + k * rates, factor = turn ? rate[PW_RATE_TURN] / turn[PW_RATE_TURN] : 0;
     if (turn == NULL && rate[PW_RATE_TURN] != 0) turn = rate;
-    for (int c = 0; c < rates && factor != 0; c++) rate[c] = c == PW_RATE_TURN ? 0 : rate[c] - factor * turn[c];
+    for (int c = 0; c < rates && factor != 0; c++) {
+      rate[c] -= factor * turn[c];
+      if (c == PW_RATE_TURN || fabs (rate[c]) < SYMMETRY_ZERO) rate[c] = 0;
+    }
   }
 }
 
@@ -282,11 +285,12 @@ static int symmetry_of_whole (const double *symmetry) {
   return symmetry[PW_RATE_X] != 0 || symmetry[PW_RATE_Y] != 0 || symmetry[PW_RATE_TURN] != 0;
 }
 
-/* The angle by which a state is turned along a symmetry: that of the first body which only this symmetry turns; if
- * there is none, of the line to the last body from the centre, or from the first body if the whole can be
- * translated. */
+/* The angle by which a state is turned along a symmetry: that of the first body which only this symmetry turns, if
+ * possible one that turns as the whole, so that whole turns do not matter; if there is none, of the line to the last
+ * body from the centre, or from the first body if the whole can be translated. */
 static double symmetry_angle (const pw_steady *x, const double *turn, const double *centre, const double *q) {
   int rates = pw_steady_rate_count (x->s), last = 3 * (x->s->bodies - 1);
+  double angle = NAN;
   for (int b = 0; b < x->s->bodies; b++) {
     double factor = 1 + turn[PW_RATE_ANGLES + b] / turn[PW_RATE_TURN];
     int others = 0;
@@ -294,9 +298,10 @@ static double symmetry_angle (const pw_steady *x, const double *turn, const doub
       others += rate != turn && rate[PW_RATE_ANGLES + b] != 0;
       if (rate != turn && symmetry_of_whole (rate)) centre = q;
     }
-    if (others == 0 && fabs (factor) > SYMMETRY_PIVOT) return q[3 * b + 2] / factor;
+    if (others == 0 && factor == 1) return q[3 * b + 2];
+    if (others == 0 && fabs (factor) > SYMMETRY_PIVOT && isnan (angle)) angle = q[3 * b + 2] / factor;
   }
-  return atan2 (q[last + 1] - centre[1], q[last] - centre[0]);
+  return isfinite (angle) ? angle : atan2 (q[last + 1] - centre[1], q[last] - centre[0]);
 }
 
 /* The time by which a state is ahead along a symmetry that does not turn the whole: that of the angle that is its

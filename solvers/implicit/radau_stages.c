@@ -240,7 +240,7 @@ static pw_convergence radau_test (pw_run *r, int done, double size, double befor
   return PW_DIVERGED;
 }
 
-/* With F_y at the state reached, corrections up to `noise` that do not shrink are accepted.
+/* With F_y at the state reached, corrections up to `noise` are accepted even if they grow.
  *
  * In index3 corrections of velocities stop shrinking at the round-off of positions over h, and steps follow the errors
  * of velocities, which have a lower order: one more correction makes positions 10 to 100 times more accurate. */
@@ -256,7 +256,10 @@ static int radau_iterate (pw_run *r, double h, double t1) {
     d->iterations = done + 1;
     if (convergence == PW_ITERATE) continue;
     if (convergence == PW_DIVERGED && !(d->F_y_at_state && round_offs <= d->noise)) return PW_RETRY;
-    return d->dae.enforces_velocities ? PW_OK : radau_correct (r, h, t1, &size, &round_offs);
+    if (d->dae.enforces_velocities || d->dae.tangent.holonomic == 0) return PW_OK;
+    status = radau_correct (r, h, t1, &size, &round_offs);
+    d->iterations++;
+    return status == PW_OK && !isfinite (size) ? PW_RETRY : status;
   }
 }
 

@@ -40,10 +40,10 @@ struct pw_method_data {
   radau_step now, last;                            /* the step being made; the last one */
   double *a_end;                                   /* coords: accelerations at the end of the last step */
   int near_singular;                               /* 1: the state reached is near a singular configuration */
-  double noise;                                    /* there: largest noise in corrections, in units of round_off */
-  pw_step_counter counter;                         /* of fixed steps */
-  double h;                                        /* adaptive: size of the next step */
-  double previous_h, previous_error;               /* adaptive: size and error of the last step; 0: there is none */
+  double noise;                      /* at the state reached: of corrections that do not shrink, in round_off */
+  pw_step_counter counter;           /* of fixed steps */
+  double h;                          /* adaptive: size of the next step */
+  double previous_h, previous_error; /* adaptive: size and error of the last step; 0: there is none */
   pw_projector projector;
   char *memory;
 };

@@ -18,6 +18,11 @@
  * chosen. */
 static const double LINEAR_STEADY = 1e-6, LINEAR_EXACT = 1e-13;
 
+enum {
+  LINEAR_IN_TURN = 8,      /* states compared in a turn of the frame */
+  LINEAR_MOST_SPANS = 1000 /* the part of a turn that is sampled, in spans */
+};
+
 /* The unit of accelerations, L / T^2. */
 static double linear_unit (const pw_linearisation *x) {
   const pw_scale *scale = &x->r->w->scale;
@@ -186,13 +191,13 @@ static int linear_agree (const pw_linearisation *x, const double *a, const doubl
   return off <= LINEAR_STEADY * most;
 }
 
-/* Whether the equations and their linearisation are the same after a time, except for the rotation; signals are those
- * after this time within the span. */
-static int linear_same (pw_linearisation *x, double time, double span) {
+/* Whether the equations and their linearisation are the same after a time, except for the rotation, with the signals
+ * after `later`. */
+static int linear_same (pw_linearisation *x, double time, double later) {
   double angle = x->frame.twist[2] * time, *q = x->later, *v = q + x->n, *expected = x->scratch;
   pw_residuals now;
   linear_later (x, time, q, v);
-  if (pw_linear_evaluate (x, x->r->t + fmin (time, span), q, v) != PW_OK) return 0;
+  if (pw_linear_evaluate (x, x->r->t + later, q, v) != PW_OK) return 0;
   pw_evaluate_residuals (x->r->w, x->r->active, &now);
   if (!(now.position <= LINEAR_STEADY && now.velocity <= LINEAR_STEADY)) return 0;
   pw_linear_rotate (x, angle, x->probe_a, expected);
@@ -221,20 +226,30 @@ static void linear_set_probe (pw_linearisation *x) {
   memcpy (x->probe_a, x->a, (size_t)x->n * sizeof *x->a);
 }
 
-/* Times at irregular fractions of the span and of T, so that a periodic change is not sampled at its period; if a turn
- * of the frame takes longer than the span, also at fractions of it that are at most 0.15 apart. */
+/* Whether the equations are the same within a turn of the frame that takes longer than the span, or within
+ * LINEAR_MOST_SPANS, if no signal changes within the span. */
+static int linear_same_in_turn (pw_linearisation *x, double span) {
+  const double turn = fmin (2 * PW_PI / fabs (x->frame.twist[2]), LINEAR_MOST_SPANS * span);
+  int same = 1;
+  if (x->frame.twist[2] == 0 || turn <= span) return 1;
+  if (!linear_same (x, 0, 0.31 * span) || !linear_same (x, 0, span)) return 1;
+  for (int i = 1; same && i <= LINEAR_IN_TURN; i++)
+    same = linear_same (x, fmod (0.618034 * i, 1) * turn, 0); /* golden ratio: equidistributed */
+  return same;
+}
+
+/* Times at irregular fractions of the span and of T, so that a periodic change is not sampled at its period. */
 pw_steadiness pw_linear_steady (pw_linearisation *x) {
-  static const double fraction[] = { 0.0123, 0.31, 0.77, 1 }, most_spans = 1000;
+  static const double fraction[] = { 0.0123, 0.31, 0.77, 1 };
   pw_run *r = x->r;
   const double span = r->settings.span > 0 ? r->settings.span : r->w->scale.time;
-  const double turn = fmin (2 * PW_PI / fabs (x->frame.twist[2]), most_spans * span);
+  const double soon = 0.137 * fmin (r->w->scale.time, span);
   if (!(x->frame.residual <= LINEAR_STEADY)) return PW_ACCELERATED;
   if (!(pw_next_breakpoint (r->w, 0, r->t) > r->t + span)) return PW_CHANGING;
   linear_set_probe (x);
-  int same = linear_same (x, 0.137 * fmin (r->w->scale.time, span), span);
+  int same = linear_same (x, soon, soon);
   for (size_t i = 0; same && i < sizeof fraction / sizeof *fraction; i++)
-    same = linear_same (x, fraction[i] * span, span);
-  for (int i = 1; same && x->frame.twist[2] != 0 && turn > span && i <= 8; i++)
-    same = linear_same (x, fmod (0.618034 * i, 1) * turn, span); /* golden ratio: equidistributed */
+    same = linear_same (x, fraction[i] * span, fraction[i] * span);
+  same = same && linear_same_in_turn (x, span);
   return pw_linear_evaluate (x, r->t, r->q, r->v) == PW_OK && same ? PW_STEADY : PW_CHANGING;
 }

@@ -295,6 +295,7 @@ int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error
   run_exchange (r, q, v);
   status = run_continue_at (r, &after, error);
   if (status == PW_OK) {
+    r->moved_from = r->t;
     pw_run_count_moved (r);
     pw_watchdog_begin (r);
     if (!r->near_singular)

@@ -166,7 +166,7 @@ static int variation_start (pw_variation *x, pw_direction_copy *d, const pw_dire
  * not refined: samples in it, each computed by a Runge-Kutta step of its own, are not continuous in time and might seem
  * to cross the jump several times.  If it fails, or the run is stopped, the step remains to be recorded. */
 static int variation_record (pw_variation *x, double t0, pw_error *error) {
-  int last = x->points - 1, points;
+  int last = x->points - 1, points, jumps = last < 0 ? 0 : x->point[last].jumps;
   x->begun = t0;
   int status = pw_variation_append (x, last < 0 ? t0 : x->r->t, error);
   points = x->points;
@@ -175,6 +175,7 @@ static int variation_record (pw_variation *x, double t0, pw_error *error) {
   if (smooth) status = pw_variation_refine (x, last, error);
   if (smooth && status == PW_OK && x->points > points) status = pw_variation_find_jumps (x, last, error);
   if (status != PW_OK) x->points = last + 1;
+  if (status != PW_OK && last >= 0) x->point[last].jumps = jumps;
   return status;
 }
 
@@ -253,7 +254,7 @@ static int variation_advance_run (pw_variation *x, double to, double t_end, pw_e
   pw_run *r = x->r;
   int status = x->point[x->points - 1].t < r->t ? variation_record (x, x->begun, error) : PW_OK;
   while (status == PW_OK && r->t < to && x->points < PW_VARIATION_POINTS && (r->t < r->breakpoint || r->t == x->t)) {
-    double t0 = r->t;
+    double t0 = x->begun = r->t;
     status = pw_run_advance (r, t_end, error);
     if (status == PW_OK && r->t > t0) status = variation_record (x, t0, error);
   }

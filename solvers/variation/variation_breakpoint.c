@@ -102,7 +102,7 @@ int pw_variation_pass_breakpoint (pw_variation *x, pw_error *error) {
     status =
         pw_fail (error, PW_METHOD, "t = %.6g s: prescribed velocities jump: the motion is not differentiable", x->t);
   if (status == PW_OK) memcpy (x->point[0].x + 2 * x->n, x->linear.a, (size_t)x->n * sizeof (double));
-  x->passed = x->t;
+  if (status == PW_OK) x->passed = x->t;
   return status;
 }
 

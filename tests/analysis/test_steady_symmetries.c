@@ -84,6 +84,15 @@ TEST (flat_forces) {
              "  - {force: f, body: c, fy: 'max(0, -0.9 - c.y)'}\n");
   cli_good ("pinwheel linearise @/circle.yaml");
   steady_shows ("Not steady: the equations change with time or along the motion");
+  /* a drive that turns steadily: less than a turn in the span */
+  cli_write ("turn.yaml",
+             "pinwheel: 1\nrun: {t_end: 1}\nbodies:\n  - {name: c, mass: 1, inertia: 1, rate: {omega: 1}}\n"
+             "  - {name: d, mass: 1, inertia: 1, start: {x: 1}, rate: {vy: 1, omega: 1}}\nelements:\n"
+             "  - {pin: p, body: [c, ground], at: [[0, 0], [0, 0]]}\n"
+             "  - {pin: q, body: [c, d], at: [[0.5, 0], [-0.5, 0]]}\n"
+             "  - {drive: w, body: [c, ground], what: angle, value: 1*t}\n");
+  cli_good ("pinwheel linearise @/turn.yaml");
+  assert_null (strstr (cli_out, "Not steady"));
 }
 
 /* Where the range begins there may be more symmetries: without stiffness or slope a body can be anywhere or have any
