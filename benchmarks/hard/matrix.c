@@ -58,7 +58,7 @@ static void matrix_page_head (const hard_matrix *m, FILE *out) {
   if (count[HARD_WRONG] + count[HARD_CRASH])
     fprintf (out, "| **W C** | **wrong, crash** | never allowed | %d |\n", count[HARD_WRONG] + count[HARD_CRASH]);
   fputs ("\nThe measures are:\n\n"
-         "- *error* at the end of the states that the reference solution contains, relative to them or, if larger, to "
+         "- *error*: of the states that the reference solution contains, at the end, relative to it or, if larger, to "
          "their\n"
          "  [scale](theory.md#residuals-and-scales),\n"
          "- *balance*: the largest [energy defect](theory.md#energy-ledger), relative to the largest kinetic energy,\n"

@@ -58,7 +58,7 @@ TEST (orders) {
   }
 }
 
-/* Steps that follow a tolerance are nowhere in an asymptotic range; with these, orders of 8 would agree. */
+/* Steps that follow a tolerance are nowhere in an asymptotic range; here two orders of 8 agree. */
 TEST (no_adaptive_order) {
   cli_good ("pinwheel compare pendulum --methods erk5+projection --rtol-ladder 1e-3:1e-6 --repeats 1 -o @/adaptive");
   for (int row = 0; row < 4; row++) assert_string_equal (compare_cell ("adaptive/compare.csv", row, ORDER), "nan");

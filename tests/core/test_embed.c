@@ -111,7 +111,7 @@ TEST (no_object) {
   pw_system_free (s);
 }
 
-/* Each function with an error reports what is missing. */
+/* Functions with an error report what is missing. */
 TEST (missing) {
   static const char *const expected[] = {
     "a function for each model is missing", "the name of a file to write is missing",
