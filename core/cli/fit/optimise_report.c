@@ -25,9 +25,9 @@ static double report_initial (const pw_optimise *problem) {
   return problem->search[0].runs > 0 ? problem->search[0].trials[problem->unknowns.count] : NAN;
 }
 
-/* 1 if no unknown has an effect. */
+/* 1 if no unknown has an effect on the objective. */
 static int report_is_constant (const pw_optimise *problem) {
-  return memchr (problem->without_effect, 0, (size_t)problem->unknowns.count) == NULL;
+  return memchr (problem->objective_same, 0, (size_t)problem->unknowns.count) == NULL;
 }
 
 /* The bound at which the best value of unknown i is: -1 the lower one, 1 the upper one, 0 neither, or no effect.  The
@@ -206,7 +206,8 @@ void pw_optimise_yaml (const pw_optimise *problem, FILE *f) {
   const pw_search *best = problem->best;
   if (pw_unknowns_options (&problem->unknowns, best->to, values) && strpbrk (problem->line.argument[0], "\r\n") == NULL)
     report_command (problem, values, f);
-  if (problem->incomplete) fprintf (f, "# not an optimum: %s\n", problem->incomplete);
+  if (problem->incomplete)
+    fprintf (f, "# perhaps not an optimum: %.*s\n", (int)strcspn (problem->incomplete, "\r\n"), problem->incomplete);
   report_yaml_text (f, "model", pw_file_name (problem->model.file));
   report_yaml_text (f, problem->maximise ? "maximise" : "minimise", problem->output[0]);
   fprintf (f, "value: %.17g\n", best->output[0]);
