@@ -273,6 +273,11 @@ TEST (no_effect) {
   assert_string_equal (cli_err, "pinwheel: no free value has an effect on bob.y\n");
   cli_shell ("pinwheel optimise @/point.yaml --minimise 'p.x*0' --free a=-1:1 --subject-to 'p.x<=0.5'");
   assert_string_equal (cli_err, "pinwheel: no free value has an effect on p.x*0\n");
+  assert_int_equal (
+      cli_run ("pinwheel optimise @/point.yaml --minimise p.x --free a=-1:1 --subject-to 'p.x>=9' --plots "
+               "@/made/a/../b"),
+      4);
+  assert_int_equal (cli_run ("ls @/made"), 2);
   cli_shell ("pinwheel optimise @/point.yaml --maximise '100 + 0.01*(1 - (p.x - 0.37)^2)' --free a=-1:1");
   assert_null (strstr (cli_out, "without effect"));
   cli_shell ("pinwheel optimise @/point.yaml --minimise '1e4 + 0.05*p.x' --free a=-1:1");

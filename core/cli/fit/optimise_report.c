@@ -169,12 +169,6 @@ void pw_optimise_json (const pw_optimise *problem, const char *status, FILE *f) 
 
 /* ---- YAML ---- */
 
-/* A word of a shell command. */
-static void report_word (FILE *f, const char *word) {
-  fputc (' ', f);
-  pw_figure_quoted (f, word, "'\\''");
-}
-
 /* Writes the command that runs the result, as a comment: the given options that affect runs, then the values found. */
 static void report_command (const pw_optimise *problem, const char *values, FILE *f) {
   const pw_cli_line *line = &problem->line;
@@ -186,12 +180,12 @@ static void report_command (const pw_optimise *problem, const char *values, FILE
     { "--rtol", line->rtol },           { "--atol", line->atol },
     { "--max-steps", line->max_steps }, { "--specialise", problem->unknowns.engine.code ? "always" : line->specialise }
   };
-  fputs ("# pinwheel run", f);
-  report_word (f, line->argument[0]);
-  for (const char **set = line->sets; set && *set; set++) fputs (" --set", f), report_word (f, *set);
-  for (const char **start = line->starts; start && *start; start++) fputs (" --start", f), report_word (f, *start);
+  fputs ("# pinwheel run ", f);
+  pw_figure_word (f, line->argument[0]);
+  for (const char **set = line->sets; set && *set; set++) fputs (" --set ", f), pw_figure_word (f, *set);
+  for (const char **start = line->starts; start && *start; start++) fputs (" --start ", f), pw_figure_word (f, *start);
   for (size_t i = 0; i < sizeof given / sizeof *given; i++)
-    if (given[i].value) fprintf (f, " %s", given[i].option), report_word (f, given[i].value);
+    if (given[i].value) fprintf (f, " %s ", given[i].option), pw_figure_word (f, given[i].value);
   fprintf (f, " %s\n", values);
 }
 

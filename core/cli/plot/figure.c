@@ -116,6 +116,10 @@ void pw_figure_quoted (FILE *f, const char *text, const char *quote) {
   fputc ('\'', f);
 }
 
+void pw_figure_word (FILE *f, const char *word) {
+  pw_figure_quoted (f, word, "'\\''");
+}
+
 void pw_figure_element (FILE *f, const char *variable, int i, const char *value) {
   pw_figure_text (f, PW_PRINTED (60, "%s[%d]", variable, i), value);
 }
@@ -182,12 +186,16 @@ int pw_figure_draw (const char *folder, const char *const *names, pw_error *erro
   }
   fflush (stderr);
   gnuplot_remove_pictures (folder, names);
-  pw_stop_catch (); /* Ctrl-C ends gnuplot, but the command still completes its files */
+  pw_stop_catch (); /* Ctrl-C ends gnuplot, a signal to this program alone does not; the command still completes its files */
   int failed = gnuplot_run (folder, argv, &wait_status);
   pw_stop_release ();
   if (failed == ENOENT) return pw_figure_undrawn (folder, names, "gnuplot was not found");
   if (failed) return pw_fail (error, PW_RESOURCE, "cannot run gnuplot: %s", strerror (failed));
-  if (WIFEXITED (wait_status) && WEXITSTATUS (wait_status) == 0) return PW_OK;
+  if (WIFEXITED (wait_status) && WEXITSTATUS (wait_status) == 0) {
+    if (pw_stop == signals) return PW_OK;
+    pw_cli_say ("pinwheel: interrupted; the figures are complete\n");
+    return PW_INTERRUPTED;
+  }
   if (pw_stop > signals) return pw_figure_undrawn (folder, names, "gnuplot was interrupted"), PW_INTERRUPTED;
   gnuplot_remove_pictures (folder, names);
   int signalled = WIFSIGNALED (wait_status);
