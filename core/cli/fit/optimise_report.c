@@ -181,17 +181,17 @@ static void report_command (const pw_optimise *problem, const char *values, FILE
     { "--max-steps", line->max_steps }, { "--specialise", problem->unknowns.engine.code ? "always" : line->specialise }
   };
   fputs ("# pinwheel run ", f);
-  pw_figure_word (f, line->argument[0]);
-  for (const char **set = line->sets; set && *set; set++) fputs (" --set ", f), pw_figure_word (f, *set);
-  for (const char **start = line->starts; start && *start; start++) fputs (" --start ", f), pw_figure_word (f, *start);
+  pw_cli_word (f, line->argument[0]);
+  for (const char **set = line->sets; set && *set; set++) fputs (" --set ", f), pw_cli_word (f, *set);
+  for (const char **start = line->starts; start && *start; start++) fputs (" --start ", f), pw_cli_word (f, *start);
   for (size_t i = 0; i < sizeof given / sizeof *given; i++)
-    if (given[i].value) fprintf (f, " %s ", given[i].option), pw_figure_word (f, given[i].value);
+    if (given[i].value) fprintf (f, " %s ", given[i].option), pw_cli_word (f, given[i].value);
   fprintf (f, " %s\n", values);
 }
 
 static void report_yaml_text (FILE *f, const char *key, const char *text) {
   fprintf (f, "%s: ", key);
-  pw_figure_quoted (f, text, "''");
+  pw_cli_quoted (f, text, "''");
   fputc ('\n', f);
 }
 

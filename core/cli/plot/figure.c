@@ -102,22 +102,8 @@ pw_output *pw_figure_begin (const pw_figures *f, const char *name, pw_error *err
 
 void pw_figure_text (FILE *f, const char *variable, const char *value) {
   fprintf (f, "%s = ", variable);
-  pw_figure_quoted (f, value, "''");
+  pw_cli_quoted (f, value, "''");
   fputc ('\n', f);
-}
-
-void pw_figure_quoted (FILE *f, const char *text, const char *quote) {
-  fputc ('\'', f);
-  for (; *text; text++)
-    if (*text == '\'')
-      fputs (quote, f);
-    else
-      fputc ((unsigned char)*text < ' ' ? ' ' : *text, f);
-  fputc ('\'', f);
-}
-
-void pw_figure_word (FILE *f, const char *word) {
-  pw_figure_quoted (f, word, "'\\''");
 }
 
 void pw_figure_element (FILE *f, const char *variable, int i, const char *value) {
