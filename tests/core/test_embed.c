@@ -123,7 +123,7 @@ TEST (missing) {
                                           "the name of a table is missing",
                                           "a model is missing",
                                           "a model is missing",
-                                          "a system is missing" };
+                                          "a summary is missing" };
   enum { MISSING = sizeof expected / sizeof *expected };
   pw_error e[MISSING] = { { 0 } };
   pw_checkpoint c;
