@@ -292,6 +292,11 @@ int pw_cli_check_csv (const char *path, pw_error *error);
 void pw_cli_print (FILE *f, const char *format, ...) PW_PRINTF (2, 3);
 #define pw_cli_say(...) pw_cli_print (stderr, __VA_ARGS__)
 
+/* Writes a text in single quotes, on one line.  A quote in it becomes `quote`: "''" for gnuplot and YAML. */
+void pw_cli_quoted (FILE *f, const char *text, const char *quote);
+/* Writes a word of a shell command, in quotes. */
+void pw_cli_word (FILE *f, const char *word);
+
 /* Prints text broken into lines of `width` characters.  The first line continues at column `indent`, where the others
  * begin. */
 void pw_cli_print_wrapped (const char *text, int indent, int width);

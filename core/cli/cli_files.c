@@ -76,7 +76,9 @@ void pw_folder_close (pw_folder *folder) {
   for (size_t n = folder->made ? strlen (strcpy (path, folder->path)) : 0; n && n >= folder->made; n--) {
     if (path[n] != '/' && path[n] != 0) continue;
     path[n] = 0;
-    if (rmdir (path) != 0 && errno != ENOENT) break; /* it has files; ENOENT: "a/" and "a" are the same folder */
+    const char *slash = strrchr (path, '/'), *last = slash ? slash + 1 : path;
+    if (*last == 0 || strcmp (last, ".") == 0 || strcmp (last, "..") == 0) continue; /* no folder of its own */
+    if (rmdir (path) != 0 && errno != ENOENT) break; /* it has files; ENOENT: "a/../a" and "a" are the same folder */
   }
   if (folder->locked) close (folder->lock);
 }

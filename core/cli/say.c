@@ -28,6 +28,20 @@ void pw_cli_print (FILE *f, const char *format, ...) {
     fputs (text, f);
 }
 
+void pw_cli_quoted (FILE *f, const char *text, const char *quote) {
+  fputc ('\'', f);
+  for (; *text; text++)
+    if (*text == '\'')
+      fputs (quote, f);
+    else
+      fputc ((unsigned char)*text < ' ' ? ' ' : *text, f);
+  fputc ('\'', f);
+}
+
+void pw_cli_word (FILE *f, const char *word) {
+  pw_cli_quoted (f, word, "'\\''");
+}
+
 void pw_cli_print_wrapped (const char *text, int indent, int width) {
   int longest = width - indent > 40 ? width - indent : 40; /* of a line */
   while ((int)strlen (text) > longest) {

@@ -55,6 +55,7 @@ static int check_name (const pw_model *m, const char *type, const char *name, pw
 }
 
 int pw_model_check_body (const pw_model *m, const pw_body *b, pw_error *error) {
+  if (pw_require (m, "a model", error) != PW_OK || pw_require (b, "a body", error) != PW_OK) return PW_INPUT;
   if (check_name (m, "body", b->name, error) != PW_OK) return PW_INPUT;
   const struct {
     const char *name;
@@ -143,6 +144,7 @@ static int check_element (const pw_model *m, const pw_element *e, const pw_names
 }
 
 int pw_model_check_element (const pw_model *m, const pw_element *e, pw_error *error) {
+  if (pw_require (m, "a model", error) != PW_OK || pw_require (e, "an element", error) != PW_OK) return PW_INPUT;
   return check_element (m, e, NULL, error);
 }
 

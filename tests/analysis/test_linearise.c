@@ -147,6 +147,8 @@ TEST (bad) {
   assert_null (strstr (cli_file ("board.json"), "\"im\": -0,"));
   cli_bad ("pinwheel linearise pendulum --at 1 --limit 1e-9", 4,
            "t = 0 s: the limit of 1e-09 s of processor time is reached (--limit)");
+  cli_bad ("pinwheel linearise pendulum --limit 1", 2, "--limit 1: only with --at or --steady");
+  cli_bad ("pinwheel show pendulum --limit 1", 2, "--limit 1: only with --at");
   cli_bad ("pinwheel show pendulum --at 1 --limit 1e-9", 4,
            "t = 0 s: the limit of 1e-09 s of processor time is reached (--limit)");
   assert_null (cli_file ("none.json"));

@@ -351,10 +351,10 @@ TEST (bad) {
     { "chain --set n=200", "model chain has 600 coordinates; steady motions are sought with at most 400" },
   };
   cli_bad_each ("steady", each, sizeof each / sizeof *each);
-  cli_bad (
-      "pinwheel steady theo-jansen --starts 3", 4,
-      "theo-jansen: no steady motion found: from the initial state the residual ends at 1, from 3 random ones at 1 at "
-      "best, in units of the scene (L, L/T, L/T^2); change what is held, or begin nearer to one (--start)");
+  cli_bad ("pinwheel steady theo-jansen --starts 3", 4,
+           "theo-jansen: no steady motion found: from the initial state the residual ends at 1, from 3 random states "
+           "at 1 at "
+           "best, in units of the scene (L, L/T, L/T^2); change what is held, or begin nearer to one (--start)");
   cli_bad ("pinwheel steady slider-crank --set theta=pi/2", 3,
            "model slider-crank: the initial configuration is singular: 7 constraint equations are independent there, 8 "
            "nearby; begin slightly off it");

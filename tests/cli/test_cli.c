@@ -389,7 +389,9 @@ TEST (new) {
   cli_good ("pinwheel run @/mine.c --t-end 1 --json -");
   assert_true (cli_says (cli_out, "status", "ok") && cli_says (cli_out, "model", "mine"));
   cli_bad ("pinwheel new @/mine.c", 2, "@/mine.c exists already and was not changed");
-  cli_good ("mkdir '@/my models' && pinwheel new '@/my models/car.c'");
+  cli_good ("mkdir '@/my models' \"@/it's\" && pinwheel new \"@/it's/car.c\"");
+  assert_non_null (strstr (cli_out, "/it'\\''s/car.c'\n"));
+  cli_good ("pinwheel new '@/my models/car.c'");
   assert_non_null (strstr (cli_out, "/my models/car.c'\n"));
 }
 

@@ -140,6 +140,11 @@ TEST (gnuplot_interrupted) {
     if (i < 3) assert_true (cli_says (cli_file ("stop/o.json"), "status", "interrupted"));
     cli_good ("rm -f @/stop/o.json");
   }
+  /* the program alone receives the signal */
+  cli_good ("printf '#!/bin/sh\nkill -TERM $PPID\n' >@/stop/bin/gnuplot");
+  assert_int_equal (cli_run ("PATH=@/stop/bin pinwheel run pendulum -t 0.1 --plots @/stop --json @/stop/o.json"), 130);
+  assert_string_equal (cli_err, "pinwheel: interrupted; the figures are complete\n");
+  assert_true (cli_says (cli_file ("stop/o.json"), "status", "interrupted"));
 }
 
 TEST (data) {

@@ -113,12 +113,17 @@ TEST (no_object) {
 
 /* Functions with an error report what is missing. */
 TEST (missing) {
-  static const char *const expected[] = {
-    "a function for each model is missing", "the name of a file to write is missing",
-    "the name of a checkpoint is missing",  "an expression is missing",
-    "the list of names is missing",         "an element type is missing",
-    "the table of a model is missing",      "the name of a table is missing"
-  };
+  static const char *const expected[] = { "a function for each model is missing",
+                                          "the name of a file to write is missing",
+                                          "the name of a checkpoint is missing",
+                                          "an expression is missing",
+                                          "the list of names is missing",
+                                          "an element type is missing",
+                                          "the table of a model is missing",
+                                          "the name of a table is missing",
+                                          "a model is missing",
+                                          "a model is missing",
+                                          "a summary is missing" };
   enum { MISSING = sizeof expected / sizeof *expected };
   pw_error e[MISSING] = { { 0 } };
   pw_checkpoint c;
@@ -132,5 +137,8 @@ TEST (missing) {
   assert_int_equal (pw_selftest (NULL, 1, &report, &e[5]), PW_INPUT);
   assert_int_equal (pw_plugin_check (NULL, "it", &e[6]), PW_INPUT);
   assert_null (pw_read_columns (NULL, NULL, NULL, 0, &rows, &e[7]));
+  assert_int_equal (pw_model_check_body (NULL, NULL, &e[8]), PW_INPUT);
+  assert_int_equal (pw_model_check_element (NULL, NULL, &e[9]), PW_INPUT);
+  assert_int_equal (pw_json_write (NULL, NULL, NULL, 0, NULL, NULL, &e[10]), PW_INPUT);
   for (int i = 0; i < MISSING; i++) check_error (&e[i], PW_INPUT, expected[i]);
 }

@@ -107,18 +107,20 @@ TEST (compare) {
 TEST (partial) {
 #define PARTIAL " --methods rk4+projection --repeats 1 --step-ladder 0.1:0.05"
   cli_good ("pinwheel compare car-two-trailers -t 2 -o @/part" PARTIAL);
-  truth_shows ("the model's own reference solution contains only car.phi of 9 coordinates: a computed one is used\n"
-               "errors are measured against erk8+projection, rtol 3e-14\n");
+  truth_shows (
+      "the model's own reference solution contains at all times only car.phi of 9 coordinates: a computed one is used\n"
+      "errors are measured against erk8+projection, rtol 3e-14\n");
   truth_shows (" m (lengths), ");
   cli_good ("tail -n +2 @/part/compare.csv | cut -d, -f6-14"); /* the errors */
   assert_null (strstr (cli_out, "nan"));
   cli_good ("pinwheel compare hatchet-planimeter --set r=0.4 -t 2" PARTIAL);
-  truth_shows ("the model's own reference solution contains none of 3 coordinates: a computed one is used\n");
+  truth_shows (
+      "the model's own reference solution contains at all times none of 3 coordinates: a computed one is used\n");
   truth_shows ("cheapest ");
   /* the angle is known up to 0.5 s only */
   cli_write ("block.yaml", check_text ("%s  block.y: 0\n  block.phi: 0*sqrt(0.5 - t)\n", truth_text));
   cli_good ("pinwheel compare @/block.yaml -t 1" PARTIAL);
-  truth_shows ("solution contains only block.x, block.y of 3 coordinates: a computed one is used\n");
+  truth_shows ("solution contains at all times only block.x, block.y of 3 coordinates: a computed one is used\n");
   cli_write ("few.csv", "t,K1.x,K1.y,K1.phi,K2.x,K2.y\n0.01,0,0,0,0,nan\n0.02,0,0,0,nan,nan\n");
   cli_good ("pinwheel compare andrews-squeezer --reference @/few.csv" PARTIAL);
   truth_shows ("few.csv, as if it were exact\n"

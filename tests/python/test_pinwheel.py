@@ -106,8 +106,13 @@ def test_derivatives_of_functions_are_checked(w):
 def test_functions_that_interpolate_pass_the_check_of_derivatives():
     t = np.arange(0, 6, 0.02)
     tables = np.cos(3 * t), -3 * np.sin(3 * t), -9 * np.cos(3 * t)
-    model = pw.Model("snakeboard", signals={"swing": lambda now: tuple(np.interp(now, t, x) for x in tables)})
+    calls = []
+    model = pw.Model("snakeboard", signals={"swing": lambda now: calls.append(now) or tuple(np.interp(now, t, x) for x in tables)})
     assert "swing" in model.signals
+    assert 0 < max(calls) < model.defaults["t_end"]
+    calls.clear()
+    model.replace(start={"front.x": 1})
+    assert len(calls) < 20  # derivatives are not checked again
 
 
 def test_functions_of_forces_are_not_called_before_the_run():

@@ -68,16 +68,19 @@ static int linearise_solve_steady (pw_linearise_command *cmd, pw_steady *steady,
   int n = pw_system_coordinates (cmd->m.system);
   pw_steady_motion motion;
   int status = steady ? PW_RETRY : error->status, changes = 0;
-  for (int attempt = 0; status == PW_RETRY && attempt < PW_STEADY_NOT_RANDOM; attempt++) {
+  for (int attempt = 0; status == PW_RETRY && attempt < PW_STEADY_NOT_RANDOM && !pw_limit_over (&cmd->limit);
+       attempt++) {
     status = pw_steady_solve (steady, attempt, 0 /* no parameter */, &motion, error);
     if (status == PW_OK && motion.linear->steady == PW_CHANGING) status = PW_RETRY, changes = 1;
   }
+  if (status == PW_RETRY && pw_limit_over (&cmd->limit)) return pw_limit_status (&cmd->limit, cmd->t, error);
   if (status == PW_RETRY)
-    return pw_fail (error, PW_METHOD,
-                    "%s: no steady motion is reached from the initial state: the last residual is %.2g, in units of "
-                    "the scene%s; `pinwheel steady` also begins at random states",
-                    pw_file_name (cmd->m.file), motion.residual,
-                    changes ? ", but the equations change with time or along the motion" : "");
+    return pw_fail (
+        error, PW_METHOD,
+        "%s: no steady motion is reached from the initial state: %s; `pinwheel steady` also begins at random states",
+        pw_file_name (cmd->m.file),
+        changes ? "the solutions found are not steady, as the equations change with time or along the motion"
+                : PW_PRINTED (70, "the last residual is %.2g, in units of the scene", motion.residual));
   if (status != PW_OK) return status;
   cmd->initial = malloc (2 * (size_t)n * sizeof *cmd->initial);
   if (cmd->initial == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
@@ -170,6 +173,8 @@ static int linearise_command (void *options, pw_error *error) {
   pw_linearise_command *cmd = options;
   int status = pw_cli_number ("--at", cmd->t_text, PW_NONNEGATIVE, &cmd->t, error);
   if (status == PW_OK && cmd->hold_texts && !cmd->steady) status = pw_fail (error, PW_INPUT, "--hold needs --steady");
+  if (status == PW_OK)
+    status = pw_cli_requires ("--limit", cmd->line.limit, "--at or --steady", cmd->t_text || cmd->steady, error);
   if (status == PW_OK) status = pw_cli_open (&cmd->m, &cmd->line, error);
   if (status == PW_OK) status = linearise_select (cmd, error);
   if (status == PW_OK) status = linearise_open_files (cmd, error);

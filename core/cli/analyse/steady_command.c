@@ -124,19 +124,24 @@ static int steady_search (pw_steady_command *cmd, double parameter, pw_error *er
   pw_progress progress;
   pw_steady_motion m;
   int status = PW_OK, symmetries = pw_steady_symmetries (cmd->search);
-  const int attempts = PW_STEADY_NOT_RANDOM + cmd->random_attempts, before = cmd->points;
+  const int attempts = PW_STEADY_NOT_RANDOM + cmd->random_attempts, before = cmd->points, changing = cmd->changing;
+  const double residual[2] = { cmd->residual[0], cmd->residual[1] };
   pw_progress_start (&progress, pw_file_name (cmd->m.file), "starts", 0, attempts);
   for (int k = 0; status == PW_OK && k < attempts && !steady_is_stopped (cmd); k++) {
     status = pw_steady_solve (cmd->search, k, parameter, &m, error);
     const int lost = symmetries - pw_steady_symmetries (cmd->search);
     if (status == PW_OK && lost == 0) status = steady_found (cmd, &m, k, error);
+    double *least = &cmd->residual[k >= PW_STEADY_NOT_RANDOM];
+    *least = fmin (*least, m.residual);
     if (status == PW_RETRY || (status == PW_METHOD && k > 0)) {
-      double *least = &cmd->residual[k >= PW_STEADY_NOT_RANDOM];
-      *least = fmin (*least, m.residual);
       *error = (pw_error){ 0 };
       status = PW_OK;
     }
-    if (lost > 0) symmetries -= lost, steady_forget (cmd, before), k = -1; /* those found may differ by what is lost */
+    if (lost > 0) { /* those found may differ by what is lost */
+      symmetries -= lost, steady_forget (cmd, before), k = -1;
+      cmd->changing = changing;
+      memcpy (cmd->residual, residual, sizeof residual);
+    }
     pw_progress_at (&progress, k + 1);
   }
   pw_progress_end (&progress);
@@ -152,10 +157,11 @@ static int steady_fail (pw_steady_command *cmd, pw_error *error) {
         pw_file_name (cmd->m.file));
   const char *initial = PW_PRINTED (60, "from the initial state the residual ends at %.2g", cmd->residual[0]);
   if (cmd->random_attempts)
-    snprintf (random, sizeof random, ", from %d random ones at %.2g at best", cmd->random_attempts, cmd->residual[1]);
+    snprintf (random, sizeof random, ", from %s at %.2g at best", PW_COUNTED (cmd->random_attempts, "random state"),
+              cmd->residual[1]);
   if (cmd->changing)
-    snprintf (reason, sizeof reason,
-              "; %d solutions are not steady, as the equations change with time or along the motion", cmd->changing);
+    snprintf (reason, sizeof reason, "; %s %s not steady, as the equations change with time or along the motion",
+              PW_COUNTED (cmd->changing, "solution"), cmd->changing == 1 ? "is" : "are");
   else if (*pw_steady_reason (cmd->search))
     snprintf (reason, sizeof reason, "; %s", pw_steady_reason (cmd->search));
   return pw_fail (error, PW_METHOD,

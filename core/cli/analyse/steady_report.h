@@ -33,7 +33,7 @@ typedef struct {
   size_t room;                   /* points allocated */
   char (*end)[PW_STEADY_REASON]; /* branches: why each ended; "" at the end of the range, or if stopped */
   int branches;
-  double residual[2]; /* the least of attempts that failed: from the initial state, from random ones */
+  double residual[2]; /* the least of the attempts: from the initial state, from random ones */
   int changing;       /* solutions that are not steady, as the equations change with time or along the motion */
   int families;       /* solutions of which no branch begins, since they are members of families */
   int stopped;        /* 1: by Ctrl-C or --limit */

@@ -11,7 +11,8 @@
 #define SEARCH_ROUGH 1e-3   /* last steps from a start, first steps of refinements */
 #define SEARCH_ALLOWED 1e-6 /* permitted violation of a constraint, relative to its bound if that is not 0 */
 #define SEARCH_PROBE 0.1    /* change of an unknown to find out whether it has an effect, in scales */
-#define SEARCH_SAME 1e-6    /* largest change of an output without an effect, relative to its value */
+#define SEARCH_SAME 1e-6    /* largest change of an output without an effect, relative to its value and to its range */
+#define SEARCH_ROUND 1e-12  /* round-off of an output, relative to its value */
 #define SEARCH_GAIN 1e-9    /* least improvement of the objective for a restart, relative to its value */
 
 enum {
@@ -325,15 +326,16 @@ int pw_search_fine (void *context, int i, pw_error *error) {
   return search_task (problem, problem->starts + i, slopes, SEARCH_ROUGH, PW_SEARCH_FINE, error);
 }
 
-/* 1 if outputs differ from those of the best result, or the run fails. */
-static int search_differs (const local_search *local) {
-  const pw_optimise *problem = local->problem;
-  int differ = search_run (local, &(pw_error){ 0 }) != PW_OK;
-  for (int i = 0; i < problem->outputs && !differ; i++) {
-    const double best = problem->best->output[i];
-    differ = !(fabs (local->output[i] - best) <= SEARCH_SAME * fabs (best));
-  }
-  return differ;
+/* The largest change of output i without an effect: small compared with its value and with its range over all runs, a
+ * large constant in it hides no effect; but not less than the errors of the runs. */
+static double search_noise (const pw_optimise *problem, int i, double rtol) {
+  const int n = problem->unknowns.count, width = n + problem->outputs;
+  double least = INFINITY, most = -INFINITY, size = fabs (problem->best->output[i]);
+  for (const pw_search *s = problem->search; s < problem->search + problem->starts + problem->refinements; s++)
+    for (const double *row = s->trials; row && row < s->trials + s->runs * width; row += width)
+      least = fmin (least, row[n + i]), most = fmax (most, row[n + i]);
+  double tolerance = pw_cli_adaptive (problem->unknowns.method) == 1 ? 4 * (rtol > 0 ? rtol : PW_RTOL) : 0;
+  return fmax (fmax (SEARCH_ROUND, tolerance) * size, SEARCH_SAME * fmin (size, most - least));
 }
 
 int pw_search_effect (void *context, int i, pw_error *error) {
@@ -344,10 +346,17 @@ int pw_search_effect (void *context, int i, pw_error *error) {
   if (memory == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   local_search local = { .problem = problem, .unknown = memory, .output = memory + n };
   memcpy (local.unknown, problem->best->to, n * sizeof *memory);
-  problem->without_effect[i] = 1;
-  for (int side = -1; side <= 1 && problem->without_effect[i]; side += 2) {
+  problem->without_effect[i] = problem->objective_same[i] = 1;
+  for (int side = -1; side <= 1 && problem->objective_same[i]; side += 2) {
     local.unknown[i] = search_unknown (unknown, search_scaled (unknown, value) + side * SEARCH_PROBE);
-    if (local.unknown[i] != value) problem->without_effect[i] = !search_differs (&local);
+    if (local.unknown[i] == value) continue;
+    const int failed = search_run (&local, &(pw_error){ 0 }) != PW_OK;
+    for (int k = 0; k < problem->outputs; k++) {
+      const double change = fabs (local.output[k] - problem->best->output[k]);
+      if (!failed && change <= search_noise (problem, k, problem->unknowns.settings.rtol)) continue;
+      problem->without_effect[i] = 0;
+      if (k == 0) problem->objective_same[i] = 0;
+    }
   }
   free (memory);
   return PW_OK;

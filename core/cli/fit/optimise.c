@@ -23,10 +23,11 @@ static int optimise_open_searches (pw_optimise *problem, pw_error *error) {
   double *start = pw_unknowns_starts (&problem->unknowns, problem->starts, problem->seed),
          *memory = pw_arena_alloc (&problem->arena, all * width * sizeof *memory);
   problem->search = pw_arena_alloc (&problem->arena, all * sizeof *problem->search);
-  problem->without_effect = pw_arena_alloc (&problem->arena, n);
+  problem->without_effect = pw_arena_alloc (&problem->arena, 2 * n);
   int status = start && memory && problem->search && problem->without_effect
                    ? PW_OK
                    : pw_fail (error, PW_RESOURCE, "out of memory");
+  if (status == PW_OK) problem->objective_same = problem->without_effect + n;
   for (size_t i = 0; status == PW_OK && i < all; i++) {
     pw_search *search = problem->search + i;
     search->from = memory + i * width, search->to = search->from + n, search->output = search->to + n;
@@ -230,7 +231,7 @@ static int optimise_finish (pw_optimise *problem, pw_error *error) {
   if (problem->best == NULL) return stopped ? PW_INTERRUPTED : optimise_infeasible (problem, error);
   pw_error unconverged = { 0 }, drawing = { 0 };
   int converged = optimise_converged (problem, &unconverged) == PW_OK;
-  problem->incomplete = stopped ? "the search was interrupted" : converged ? NULL : "the search did not converge";
+  problem->incomplete = stopped ? "the search was interrupted" : converged ? NULL : unconverged.text;
   pw_optimise_print (problem);
   pw_unknowns_report (&problem->unknowns, problem->best->to);
   if (result) pw_optimise_yaml (problem, result);

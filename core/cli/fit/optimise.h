@@ -38,6 +38,7 @@ typedef struct {
   pw_search *search;              /* starts, then refinements */
   const pw_search *best;          /* that with the best result; NULL: none has one */
   unsigned char *without_effect;  /* unknowns: 1: changes of it alone do not change the outputs of the optimum */
+  unsigned char *objective_same;  /* unknowns: 1: they do not change the objective of the optimum */
   const char *incomplete;         /* why the best result may not be an optimum; NULL: it is one */
   long runs, failed, derivatives; /* of all searches */
   const pw_error *first_error;    /* of the first failed run; NULL: there is none */
@@ -60,7 +61,7 @@ double pw_search_violation (const pw_optimise *problem, const double *output, in
 /* Tasks of pw_parallel: the search from start i; refinement i.  The context is the pw_optimise. */
 int pw_search_rough (void *context, int i, pw_error *error);
 int pw_search_fine (void *context, int i, pw_error *error);
-/* Sets without_effect[i], by two runs; their failure is an effect. */
+/* Sets without_effect[i] and objective_same[i], by two runs; their failure is an effect. */
 int pw_search_effect (void *context, int i, pw_error *error);
 
 /* ---- Results (optimise_report.c) ---- */

@@ -25,9 +25,9 @@ static double report_initial (const pw_optimise *problem) {
   return problem->search[0].runs > 0 ? problem->search[0].trials[problem->unknowns.count] : NAN;
 }
 
-/* 1 if no unknown has an effect. */
+/* 1 if no unknown has an effect on the objective. */
 static int report_is_constant (const pw_optimise *problem) {
-  return memchr (problem->without_effect, 0, (size_t)problem->unknowns.count) == NULL;
+  return memchr (problem->objective_same, 0, (size_t)problem->unknowns.count) == NULL;
 }
 
 /* The bound at which the best value of unknown i is: -1 the lower one, 1 the upper one, 0 neither, or no effect.  The
@@ -169,12 +169,6 @@ void pw_optimise_json (const pw_optimise *problem, const char *status, FILE *f) 
 
 /* ---- YAML ---- */
 
-/* A word of a shell command. */
-static void report_word (FILE *f, const char *word) {
-  fputc (' ', f);
-  pw_figure_quoted (f, word, "'\\''");
-}
-
 /* Writes the command that runs the result, as a comment: the given options that affect runs, then the values found. */
 static void report_command (const pw_optimise *problem, const char *values, FILE *f) {
   const pw_cli_line *line = &problem->line;
@@ -186,18 +180,18 @@ static void report_command (const pw_optimise *problem, const char *values, FILE
     { "--rtol", line->rtol },           { "--atol", line->atol },
     { "--max-steps", line->max_steps }, { "--specialise", problem->unknowns.engine.code ? "always" : line->specialise }
   };
-  fputs ("# pinwheel run", f);
-  report_word (f, line->argument[0]);
-  for (const char **set = line->sets; set && *set; set++) fputs (" --set", f), report_word (f, *set);
-  for (const char **start = line->starts; start && *start; start++) fputs (" --start", f), report_word (f, *start);
+  fputs ("# pinwheel run ", f);
+  pw_cli_word (f, line->argument[0]);
+  for (const char **set = line->sets; set && *set; set++) fputs (" --set ", f), pw_cli_word (f, *set);
+  for (const char **start = line->starts; start && *start; start++) fputs (" --start ", f), pw_cli_word (f, *start);
   for (size_t i = 0; i < sizeof given / sizeof *given; i++)
-    if (given[i].value) fprintf (f, " %s", given[i].option), report_word (f, given[i].value);
+    if (given[i].value) fprintf (f, " %s ", given[i].option), pw_cli_word (f, given[i].value);
   fprintf (f, " %s\n", values);
 }
 
 static void report_yaml_text (FILE *f, const char *key, const char *text) {
   fprintf (f, "%s: ", key);
-  pw_figure_quoted (f, text, "''");
+  pw_cli_quoted (f, text, "''");
   fputc ('\n', f);
 }
 
@@ -206,7 +200,8 @@ void pw_optimise_yaml (const pw_optimise *problem, FILE *f) {
   const pw_search *best = problem->best;
   if (pw_unknowns_options (&problem->unknowns, best->to, values) && strpbrk (problem->line.argument[0], "\r\n") == NULL)
     report_command (problem, values, f);
-  if (problem->incomplete) fprintf (f, "# not an optimum: %s\n", problem->incomplete);
+  if (problem->incomplete)
+    fprintf (f, "# perhaps not an optimum: %.*s\n", (int)strcspn (problem->incomplete, "\r\n"), problem->incomplete);
   report_yaml_text (f, "model", pw_file_name (problem->model.file));
   report_yaml_text (f, problem->maximise ? "maximise" : "minimise", problem->output[0]);
   fprintf (f, "value: %.17g\n", best->output[0]);

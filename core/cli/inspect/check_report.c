@@ -169,8 +169,8 @@ static void report_initial (pw_json *j, const pw_check *check) {
   report_end_list (j, listed);
   pw_json_close (j, '}');
   if (check->reference_states)
-    report_print (j, "  compared with the reference solution of the model in %d state%s\n", check->reference_states,
-                  check->reference_states == 1 ? "" : "s");
+    report_print (j, "  compared with the reference solution of the model in %s\n",
+                  PW_COUNTED (check->reference_states, "state"));
 }
 
 /* ---- Element types ---- */
@@ -199,7 +199,7 @@ static void report_kind (pw_json *j, const pw_checked_kind *k) {
   pw_json_number (j, "elements", k->count);
   pw_json_number (j, "checks", k->random.checks + k->in_model.checks);
   pw_json_open (j, "failed", '[');
-  report_text (j, PW_PRINTED (100, "%s (%d element%s)", k->kind->name, k->count, k->count == 1 ? "" : "s"),
+  report_text (j, PW_PRINTED (100, "%s (%s)", k->kind->name, PW_COUNTED (k->count, "element")),
                "%s: %d checks in random scenes, %d in this model",
                k->random.failed + k->in_model.failed ? "FAILED" : "good", k->random.checks, k->in_model.checks);
   if (*k->untested) report_print (j, "    not tested in random scenes: %s\n", k->untested);

@@ -162,7 +162,7 @@ static void list_kind (const void *entry) {
   static const char *const level[] = { "force", "constraint on positions", "constraint on velocities" };
   const pw_kind *k = entry;
   printf ("%s: %s\n    %s", k->name, k->about, pw_kind_acts (k) ? level[k->level] : "without effect");
-  if (k->rows) printf (", %d constraint equation%s per element", k->rows, k->rows == 1 ? "" : "s");
+  if (k->rows) printf (", %s per element", PW_COUNTED (k->rows, "constraint equation"));
   puts (k->each_body ? ", acts on every body that has mass" : "");
   list_example (k);
   puts ("    fields");

@@ -46,9 +46,13 @@ static int new_command (void *options, pw_error *error) {
     remove (path);
     return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", path, strerror (failed));
   }
-  const char *quote = path[strspn (path, NEW_LETTERS "./")] ? "'" : "";
-  pw_cli_print (stdout, "%s is written; now:  pinwheel run %s%s%s%s\n", path, quote, strchr (path, '/') ? "" : "./",
-                path, quote);
+  pw_cli_print (stdout, "%s is written; now:  pinwheel run ", path);
+  if (strchr (path, '/') == NULL) fputs ("./", stdout);
+  if (path[strspn (path, NEW_LETTERS "./")])
+    pw_cli_word (stdout, path);
+  else
+    fputs (path, stdout);
+  putchar ('\n');
   return PW_OK;
 }
 

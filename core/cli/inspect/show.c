@@ -219,6 +219,7 @@ static int show_command (void *options, pw_error *error) {
   int matrices = given->matrices || given->at, status = pw_cli_number ("--at", given->at, PW_NONNEGATIVE, &t, error);
   if (status == PW_OK && matrices + given->yaml + given->code > 1)
     status = pw_fail (error, PW_INPUT, "expected one of --%s, --yaml and --c", given->at ? "at T" : "matrices");
+  if (status == PW_OK) status = pw_cli_requires ("--limit", given->line.limit, "--at", given->at != NULL, error);
   if (status == PW_OK) status = pw_cli_open (&m, &given->line, error);
   if (status == PW_OK && given->code)
     status = show_code (&m, error);

@@ -102,18 +102,8 @@ pw_output *pw_figure_begin (const pw_figures *f, const char *name, pw_error *err
 
 void pw_figure_text (FILE *f, const char *variable, const char *value) {
   fprintf (f, "%s = ", variable);
-  pw_figure_quoted (f, value, "''");
+  pw_cli_quoted (f, value, "''");
   fputc ('\n', f);
-}
-
-void pw_figure_quoted (FILE *f, const char *text, const char *quote) {
-  fputc ('\'', f);
-  for (; *text; text++)
-    if (*text == '\'')
-      fputs (quote, f);
-    else
-      fputc ((unsigned char)*text < ' ' ? ' ' : *text, f);
-  fputc ('\'', f);
 }
 
 void pw_figure_element (FILE *f, const char *variable, int i, const char *value) {
@@ -182,12 +172,16 @@ int pw_figure_draw (const char *folder, const char *const *names, pw_error *erro
   }
   fflush (stderr);
   gnuplot_remove_pictures (folder, names);
-  pw_stop_catch (); /* Ctrl-C ends gnuplot, but the command still completes its files */
+  pw_stop_catch (); /* Ctrl-C ends gnuplot, a signal to this program alone does not; the command still completes its files */
   int failed = gnuplot_run (folder, argv, &wait_status);
   pw_stop_release ();
   if (failed == ENOENT) return pw_figure_undrawn (folder, names, "gnuplot was not found");
   if (failed) return pw_fail (error, PW_RESOURCE, "cannot run gnuplot: %s", strerror (failed));
-  if (WIFEXITED (wait_status) && WEXITSTATUS (wait_status) == 0) return PW_OK;
+  if (WIFEXITED (wait_status) && WEXITSTATUS (wait_status) == 0) {
+    if (pw_stop == signals) return PW_OK;
+    pw_cli_say ("pinwheel: interrupted; the figures are complete\n");
+    return PW_INTERRUPTED;
+  }
   if (pw_stop > signals) return pw_figure_undrawn (folder, names, "gnuplot was interrupted"), PW_INTERRUPTED;
   gnuplot_remove_pictures (folder, names);
   int signalled = WIFSIGNALED (wait_status);

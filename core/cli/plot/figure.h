@@ -54,8 +54,6 @@ int pw_figure_end (pw_output *o, const char *template_name, pw_error *error);
 void pw_figure_text (FILE *f, const char *variable, const char *value);
 void pw_figure_element (FILE *f, const char *variable, int i, const char *value);
 void pw_figure_label (FILE *f, const char *variable, int i, const char *name, const char *unit);
-/* Writes a text in single quotes, on one line.  A quote in it becomes `quote`: "''" for gnuplot and YAML. */
-void pw_figure_quoted (FILE *f, const char *text, const char *quote);
 /* Writes and draws the figure of a command that has one, NAME: `data` writes NAME.dat, `variables` those of the
  * template of this name.  A status. */
 int pw_figure_write (const pw_cli_line *line, const pw_cli_model *model, const char *folder, const char *name,

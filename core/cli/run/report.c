@@ -233,8 +233,8 @@ static void report_errors (const pw_reference_error *errors, const char *gaps) {
     return;
   }
   const char *at = PW_PRINTED (40, "at %s s", PW_DIGITS (errors->t, 6));
-  pw_cli_print (stdout, "\n  error against the reference solution of %s, at %d time%s\n", errors->source,
-                errors->samples, errors->samples == 1 ? "" : "s");
+  pw_cli_print (stdout, "\n  error against the reference solution of %s, at %s\n", errors->source,
+                PW_COUNTED (errors->samples, "time"));
   for (pw_table table = { 0 }; pw_table_pass (&table);) {
     pw_head (&table, -10, REPORT_WIDTH, (const char *const[]){ "", at, "largest", NULL });
     for (int i = 0; i < 4; i++) report_error (&table, name[i], errors->end[i], errors->most[i], unit[i]);

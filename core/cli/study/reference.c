@@ -216,7 +216,8 @@ int pw_reference_find (pw_reference *reference, pw_study *study, double step, pw
 void pw_reference_print (const pw_reference *reference, int partners) {
   const char *gaps = reference->gaps;
   if (*gaps && !reference->from_table)
-    pw_cli_print (stdout, "the model's own reference solution contains %s: a computed one is used\n", gaps);
+    pw_cli_print (stdout, "the model's own reference solution contains at all times %s: a computed one is used\n",
+                  gaps);
   if (!reference->known) {
     printf ("no two methods reach the end%s, so errors are unknown; --reference FILE.csv provides a reference\n\n",
             reference->limited ? " within --limit" : "");

@@ -189,7 +189,7 @@ enum { JSON_ALL_LEVELS = 99 };
 
 int pw_json_write (const pw_summary *summary, const pw_system *s, const pw_sample *sample, int ledger,
                    const pw_statistics *statistics, pw_output *o, pw_error *error) {
-  if (pw_require (o, "an output", error) != PW_OK) return PW_INPUT;
+  if (pw_require (summary, "a summary", error) != PW_OK || pw_require (o, "an output", error) != PW_OK) return PW_INPUT;
   pw_json j = { .f = pw_output_stream (o), .lines = JSON_ALL_LEVELS };
   errno = 0;
   pw_json_open (&j, NULL, '{');

@@ -7,6 +7,9 @@
 #include "yaml.h"
 
 #define YAML_MAX_AHEAD 1e6 /* pw_yaml.max_ahead for the default limit of bytes: each indicator takes 350 bytes */
+enum {
+  YAML_UNIT = 400
+}; /* bytes of a unit of up to 60 characters with SI units in place of others, its end included */
 
 /* ---- Parameters ---- */
 
@@ -40,34 +43,59 @@ static const char *yaml_find_word (const char *text, const char *name) {
   return NULL;
 }
 
+/* The first unit other than an SI unit in a text, and its place; NULL: there is none. */
+static const pw_unit_name *yaml_other_unit (const char *unit, const char **name) {
+  for (const pw_unit_name *other = pw_unit_names; other->name; other++) {
+    if (strcmp (other->factor, "1") == 0 || (strchr (other->name, '/') && strcmp (other->name, unit) != 0)) continue;
+    if ((*name = yaml_find_word (unit, other->name)) != NULL) return other;
+  }
+  return NULL;
+}
+
+/* Replaces a name in the unit by SI units.  *divides: 1 if the unit is divided by it; *power: its power. */
+static void yaml_replace_unit (char unit[YAML_UNIT], const pw_unit_name *other, const char *name, int *divides,
+                               int *power) {
+  char text[YAML_UNIT];
+  const char *before = name, *after = name + strlen (other->name);
+  pw_unit_power (after, power);
+  while (before > unit && before[-1] == ' ') before--;
+  *divides = before > unit && before[-1] == '/';
+  const int product = strpbrk (other->si, " /") && (*divides || *power != 1);
+  snprintf (text, sizeof text, "%.*s%s%s%s%s", (int)(name - unit), unit, product ? "(" : "", other->si,
+            product ? ")" : "", after);
+  memcpy (unit, text, sizeof text);
+}
+
 /* Refuses a unit that contains this name of another unit than an SI unit, and says how to convert the value. */
 static int yaml_refuse_unit (const pw_reader *r, const pw_node *node, const pw_node *value, const pw_unit_name *other,
                              const char *unit, const char *name) {
   static const char why[] = "unit: numbers are in SI units, angles in radians, and no unit converts a value";
-  const char *before = name, *after = name + strlen (other->name);
-  int power, number = value->type == PW_YAML_SCALAR && strlen (value->text) <= 30 &&
-                      pw_expression_number (value->text, &(double){ 0 });
-  if (strlen (unit) > 60 || pw_unit_factor (unit, NULL, &(double){ 0 }) != PW_OK) /* not understood as a whole */
-    return pw_yaml_fail (r, node->at, "%s; convert it by the factor %s of %s, with the unit %s", why, other->factor,
-                         other->name, other->si);
-  pw_unit_power (after, &power);
-  while (before > unit && before[-1] == ' ') before--;
-  int divides = before > unit && before[-1] == '/', product = strpbrk (other->si, " /") && (divides || power != 1);
-  return pw_yaml_fail (r, node->at, "%s; write \"value: %s%c%s%s, unit: %.*s%s%s%s%s\"", why,
-                       number ? value->text : "(..)", divides ? '/' : '*', other->factor,
-                       power == 1 ? "" : PW_PRINTED (20, "^%d", power), (int)(name - unit), unit, product ? "(" : "",
-                       other->si, product ? ")" : "", after);
+  char si[YAML_UNIT];
+  double factor;
+  int divides, power,
+      number = value->type == PW_YAML_SCALAR && strlen (value->text) <= 30 &&
+               pw_expression_number (value->text, &(double){ 0 });
+  if (strlen (unit) > 60 || pw_unit_factor (unit, NULL, &factor) != PW_OK) { /* not understood as a whole */
+    pw_unit_factor (other->name, other->si, &factor);
+    return pw_yaml_fail (r, node->at, "%s; convert it with 1 %s = %.15g %s, and write %s instead", why, other->name,
+                         factor, other->si, other->si);
+  }
+  snprintf (si, sizeof si, "%s", unit);
+  yaml_replace_unit (si, other, si + (name - unit), &divides, &power);
+  const char *given = number ? value->text : "(..)", *next;
+  if (yaml_other_unit (si, &next) == NULL)
+    return pw_yaml_fail (r, node->at, "%s; write \"value: %s%c%s%s, unit: %s\"", why, given, divides ? '/' : '*',
+                         other->factor, power == 1 ? "" : PW_PRINTED (20, "^%d", power), si);
+  while ((other = yaml_other_unit (si, &next)) != NULL) yaml_replace_unit (si, other, next, &divides, &power);
+  return pw_yaml_fail (r, node->at, "%s; write \"value: %s*%.15g, unit: %s\"", why, given, factor, si);
 }
 
 /* Reads the unit of a parameter; refuses a known one that is not an SI unit: 40 with the unit deg would mean 40 rad. */
 static int yaml_unit (const pw_reader *r, const pw_node *node, const pw_node *value, const char **unit) {
+  const char *name;
   if (node == NULL || pw_yaml_text (r, node, "unit", unit) != PW_OK) return r->error->status;
-  for (const pw_unit_name *other = pw_unit_names; other->name; other++) {
-    if (strcmp (other->factor, "1") == 0 || (strchr (other->name, '/') && strcmp (other->name, *unit) != 0)) continue;
-    const char *name = yaml_find_word (*unit, other->name);
-    if (name) return yaml_refuse_unit (r, node, value, other, *unit, name);
-  }
-  return PW_OK;
+  const pw_unit_name *other = yaml_other_unit (*unit, &name);
+  return other ? yaml_refuse_unit (r, node, value, other, *unit, name) : PW_OK;
 }
 
 /* A default must not depend on other parameters: --set would have to change it, too. */

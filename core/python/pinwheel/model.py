@@ -257,7 +257,9 @@ class Model:
         lib.check(error)
         for name, function in self.signals.items():
             self._set_signal(model, name, _callback(function, raised), None, keep)
-            _check_derivatives(name, function, _derivatives(model.pointer, name.partition(".")[0]))
+            if self.signals.checked.get(name) is not function:
+                _check_derivatives(name, function, _derivatives(model.pointer, name.partition(".")[0]), self.defaults["t_end"])
+                self.signals.checked[name] = function
         cells = {name: c.c_double(value) for name, value in lib.numbers(inputs or {}, "inputs").items()}
         reads_cell = c.cast(lib.core.pw_input_signal, c.c_void_p).value
         for name, cell in cells.items():
@@ -438,15 +440,23 @@ def sweep(model, *arguments, **settings):
     return studies.sweep(model if isinstance(model, Model) else Model(model), *arguments, **settings)
 
 
+class _Signals(dict):
+    """Functions by name, and those whose derivatives have been checked."""
+
+    def __init__(self, signals):
+        super().__init__(signals)
+        self.checked = dict(getattr(signals, "checked", {}))
+
+
 def _functions(signals):
-    """A dict of functions by name, checked."""
+    """Functions by name."""
     if not hasattr(signals, "items"):
         raise lib.InputError(f"signals: expected a dict of functions by name, found {signals!r:.60}")
     for name, function in signals.items():
         lib.encode(name, "signals")
         if not callable(function):
             raise lib.InputError(f"signal {name}: expected a function of the time, found {function!r:.60}")
-    return dict(signals)
+    return _Signals(signals)
 
 
 def _derivatives(model, element):
@@ -457,17 +467,19 @@ def _derivatives(model, element):
     return 0 if kind.force_u else {lib.PW_HOLONOMIC: 2, lib.PW_NONHOLONOMIC: 1}.get(kind.level, 0)
 
 
-def _check_derivatives(name, function, count):
-    """Refuses a function of a constraint if one of its first `count` derivatives is not the derivative of the last one.
+def _check_derivatives(name, function, count, t_end):
+    """Refuses a function of a constraint if one of its first `count` derivatives is not the derivative of the one before it.
 
-    It is compared with central differences of many widths, one of which must agree within 1 %: the function may interpolate.
+    It is compared at a few times before t_end with central differences of many widths, one of which must agree within 1 %:
+    the function may interpolate.
     """
+    widths = min(1, t_end / 10) * 0.5 ** np.arange(4, 24)  # [s]
     for i in range(1, count + 1):
         found, size = [], 0.0
-        for t in (0.3137, 1.7321, 4.1231):  # [s], arbitrary, hardly a point of a table
+        for t in (0.03137 * t_end, 0.17321 * t_end, 0.41231 * t_end):  # arbitrary, hardly a point of a table
             try:
                 given, value = function(t)[i], function(t)[i - 1]
-                slopes = [(function(t + h)[i - 1] - function(t - h)[i - 1]) / (2 * h) for h in 0.5 ** np.arange(4, 24)]
+                slopes = [(function(t + h)[i - 1] - function(t - h)[i - 1]) / (2 * h) for h in widths]
                 slope = min(slopes, key=lambda x: abs(x - given))
                 if math.isfinite(given + slope):
                     found.append((t, given, slope))
@@ -477,7 +489,7 @@ def _check_derivatives(name, function, count):
         for t, given, slope in found:
             if abs(given - slope) > 0.01 * size:
                 what = ("rate", "acceleration")[i - 1]
-                raise lib.InputError(f"signal {name}: the {what} at t = {t} s is {given:.6g}, but the derivative is {slope:.4g}")
+                raise lib.InputError(f"signal {name}: the {what} at t = {t:.5g} s is {given:.6g}, but the derivative is {slope:.4g}")
 
 
 def _callback(function, raised):

@@ -1,5 +1,5 @@
-/* The two library functions that explicit methods call, for scenes small enough to run in a web page: AMD's fill-reducing order and
- * LAPACK's solution by a Cholesky factorisation. */
+/* The two library functions that explicit methods call, for scenes small enough to run in a web page: AMD's
+ * fill-reducing order and LAPACK's solution by a Cholesky factorisation. */
 #include <amd.h>
 #include <lapacke.h>
 #include <math.h>
