@@ -280,7 +280,7 @@ TEST (no_effect) {
   assert_int_equal (cli_run ("ls @/made"), 2);
   cli_shell ("pinwheel optimise @/point.yaml --maximise '100 + 0.01*(1 - (p.x - 0.37)^2)' --free a=-1:1");
   assert_null (strstr (cli_out, "without effect"));
-  cli_shell ("pinwheel optimise @/point.yaml --minimise '1e4 + 0.05*p.x' --free a=-1:1");
+  cli_shell ("pinwheel optimise @/point.yaml --minimise '1e4 + 0.05*p.x' --free a=-1:1 -m erk8+none");
   assert_non_null (strstr (cli_out, "at its lower bound"));
   cli_shell ("pinwheel optimise @/point.yaml --minimise p.x --free b=-3:3 --free a=-1:3 --json @/o.json");
   if (!strstr (cli_out, " 3  without effect\n") || !strstr (cli_out, " 3  at its lower bound\n"))

@@ -326,16 +326,17 @@ int pw_search_fine (void *context, int i, pw_error *error) {
   return search_task (problem, problem->starts + i, slopes, SEARCH_ROUGH, PW_SEARCH_FINE, error);
 }
 
-/* The largest change of output i without an effect: small compared with its value and with its range over all runs, a
- * large constant in it hides no effect; but not less than the errors of the runs. */
-static double search_noise (const pw_optimise *problem, int i, double rtol) {
+/* The largest change of output i without an effect: small compared with its value and with its range over all runs, so
+ * that a large constant in it hides no effect; but not below round-off. */
+static double search_noise (const pw_optimise *problem, int i) {
   const int n = problem->unknowns.count, width = n + problem->outputs;
   double least = INFINITY, most = -INFINITY, size = fabs (problem->best->output[i]);
   for (const pw_search *s = problem->search; s < problem->search + problem->starts + problem->refinements; s++)
-    for (const double *row = s->trials; row && row < s->trials + s->runs * width; row += width)
-      least = fmin (least, row[n + i]), most = fmax (most, row[n + i]);
-  double tolerance = pw_cli_adaptive (problem->unknowns.method) == 1 ? 4 * (rtol > 0 ? rtol : PW_RTOL) : 0;
-  return fmax (fmax (SEARCH_ROUND, tolerance) * size, SEARCH_SAME * fmin (size, most - least));
+    for (long k = 0; k < s->runs; k++) {
+      const double value = s->trials[k * width + n + i];
+      least = fmin (least, value), most = fmax (most, value);
+    }
+  return fmax (SEARCH_ROUND * size, SEARCH_SAME * fmin (size, most - least));
 }
 
 int pw_search_effect (void *context, int i, pw_error *error) {
@@ -353,7 +354,7 @@ int pw_search_effect (void *context, int i, pw_error *error) {
     const int failed = search_run (&local, &(pw_error){ 0 }) != PW_OK;
     for (int k = 0; k < problem->outputs; k++) {
       const double change = fabs (local.output[k] - problem->best->output[k]);
-      if (!failed && change <= search_noise (problem, k, problem->unknowns.settings.rtol)) continue;
+      if (!failed && change <= search_noise (problem, k)) continue;
       problem->without_effect[i] = 0;
       if (k == 0) problem->objective_same[i] = 0;
     }

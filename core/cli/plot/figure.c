@@ -172,7 +172,7 @@ int pw_figure_draw (const char *folder, const char *const *names, pw_error *erro
   }
   fflush (stderr);
   gnuplot_remove_pictures (folder, names);
-  pw_stop_catch (); /* Ctrl-C ends gnuplot, a signal to this program alone does not; the command still completes its files */
+  pw_stop_catch (); /* Ctrl-C ends gnuplot, too; the command still completes its files */
   int failed = gnuplot_run (folder, argv, &wait_status);
   pw_stop_release ();
   if (failed == ENOENT) return pw_figure_undrawn (folder, names, "gnuplot was not found");
