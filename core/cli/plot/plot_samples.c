@@ -113,7 +113,7 @@ int pw_plots_style (pw_plots *plots, const char *width, const char *colour, pw_e
 
 void pw_plots_close (pw_plots *plots) {
   if (plots == NULL) return;
-  pw_folder_close (&plots->folder);
+  if (plots->figures.folder) pw_folder_close (&plots->folder); /* pages have no folders */
   pw_workspace_free (plots->workspace);
   pw_arena_free (&plots->arena);
   free (plots);
