@@ -6,15 +6,11 @@
 #include "check.h"
 #include "cli.h"
 
-static void steady_shows (const char *text) {
-  if (strstr (cli_out, text) == NULL) fail_msg ("\"%s\" is not in\n%s", text, cli_out);
-}
-
 /* A turn of the n-trailer, and what to hold to select it. */
 TEST (motion) {
   cli_good ("pinwheel steady n-trailer --starts 0 -o @/turn");
-  steady_shows ("n-trailer: 1 steady motion up to 3 symmetries, from the initial state and 0 random ones\n");
-  steady_shows (
+  cli_shows ("n-trailer: 1 steady motion up to 3 symmetries, from the initial state and 0 random ones\n");
+  cli_shows (
       "Motion 1 is one of a family of dimension 2; to select one: --hold tractor.speed=2 --hold tractor.omega=1\n");
   const char *json = cli_file ("turn/steady.json");
   assert_true (cli_says (json, "model", "n-trailer"));
@@ -23,7 +19,7 @@ TEST (motion) {
   check_close ("omega", cli_number (json, "motions", "state", "trailer2.omega", NULL), 1, 1e-12, "Newton to round-off");
   assert_null (cli_file ("turn/steady.dat"));
   cli_good ("pinwheel steady n-trailer --starts 0 --hold tractor.speed=2*1.5 --hold tractor.curvature=1/4");
-  steady_shows ("     1                    3                   0.75        0        0");
+  cli_shows ("     1                    3                   0.75        0        0");
   assert_null (strstr (cli_out, "to select one"));
 }
 
@@ -37,7 +33,7 @@ TEST (long_advice) {
                           "  - {name: a_body_with_a_rather_long_name_%d, mass: 1, inertia: 1, start: {x: %d}}\n", i, i);
   cli_write ("free.yaml", text);
   cli_good ("pinwheel steady @/free.yaml --starts 0");
-  steady_shows (" --hold a_body_with_a_rather_long_name_5.omega=0\n");
+  cli_shows (" --hold a_body_with_a_rather_long_name_5.omega=0\n");
 }
 
 /* Number `column` (from 0) of a line of a table. */
@@ -50,8 +46,8 @@ static double table_number (const char *line, int column) {
 TEST (branch) {
   int rows = 0, events = 0;
   cli_good ("pinwheel steady car-tyres --set steer=0 --set a=1.4 --set b=1.2 --vary u=20:60 --starts 2 -o @/car");
-  steady_shows ("car-tyres: 1 branch of steady motions up to 3 symmetries, u from 20 to 60\n");
-  steady_shows ("       1  zero eigenvalue    51.9999995        0                0                \n");
+  cli_shows ("car-tyres: 1 branch of steady motions up to 3 symmetries, u from 20 to 60\n");
+  cli_shows ("       1  zero eigenvalue    51.9999995        0                0                \n");
   const char *csv = cli_file ("car/steady.csv");
   assert_int_equal (strncmp (csv, "branch,event,u [m/s],growing,residual,car.x [m],", 48), 0);
   for (const char *line = strchr (csv, '\n') + 1; *line; line = strchr (line, '\n') + 1, rows++) {
@@ -108,7 +104,7 @@ TEST (closed_branch) {
                             "  - {slider: rail, body: [b, ground], at: [[0, 0], [0, 0]]}\n"
                             "  - {force: f, body: b, at: [0, 0], fx: {expression: \"b.x^2 + p^2 - 1 - 0.5*b.vx\"}}\n");
   cli_good ("pinwheel steady @/circle.yaml --vary p=-2:2 --starts 0 -o @/circle");
-  steady_shows ("circle: 1 branch of steady motions, p from -2 to 2\n");
+  cli_shows ("circle: 1 branch of steady motions, p from -2 to 2\n");
   for (const char *line = strchr (cli_file ("circle/steady.csv"), '\n') + 1; *line; line = strchr (line, '\n') + 1) {
     double p = table_number (line, 2), x = table_number (line, 5);
     check_close ("x^2 + p^2", x * x + p * p, 1, 1e-9, "Newton's tolerance");
@@ -145,9 +141,9 @@ TEST (turned_branch) {
                             "  - {pin: hitch, body: [tractor, trailer], at: [[0, 0], [1, 0]]}\n"
                             "  - {wheel: axle, body: trailer, at: [0, 0]}\n");
   cli_good ("pinwheel steady @/turned.yaml --vary steer=-0.7:0.8 -o @/turns");
-  steady_shows ("turned: 1 branch of ");
-  steady_shows ("       1  fold              0.463647609        0 ");
-  steady_shows ("       1  fold             -0.463647609        0 ");
+  cli_shows ("turned: 1 branch of ");
+  cli_shows ("       1  fold              0.463647609        0 ");
+  cli_shows ("       1  fold             -0.463647609        0 ");
   assert_int_equal (steady_lines ("1,fold,"), 2);
   cli_write ("arm.yaml", "pinwheel: 1\nparameters: [{name: T, value: 0}, {name: k, value: 0, domain: nonnegative}]\n"
                          "bodies: [{name: arm, mass: 1, inertia: 0.1, start: {phi: -pi/2}}]\nelements:\n"
@@ -156,12 +152,12 @@ TEST (turned_branch) {
                          "  - {torque: M, body: [arm, ground], value: T}\n"
                          "  - {rotational-spring: s, body: [arm, ground], stiffness: k, damping: 0.2}\n");
   cli_good ("pinwheel steady @/arm.yaml --vary T=-2:2 -o @/turns");
-  steady_shows ("arm: 1 branch of ");
-  steady_shows ("       1  fold                        1        0 ");
+  cli_shows ("arm: 1 branch of ");
+  cli_shows ("       1  fold                        1        0 ");
   assert_int_equal (steady_lines ("1,fold,"), 2);
   cli_good ("pinwheel steady @/arm.yaml --set k=0.02 --vary T=-3:3 --starts 0");
-  steady_shows ("       1  ends                         3 ");
-  steady_shows ("       2  ends                        -3 ");
+  cli_shows ("       1  ends                         3 ");
+  cli_shows ("       2  ends                        -3 ");
 }
 
 /* Where the speed is 0, any angle of the trailer is an equilibrium, and no velocities are left: there the eigenvalue
@@ -195,7 +191,7 @@ TEST (standstill) {
     assert_int_equal (events, 1);
   }
   cli_good ("pinwheel steady @/trailer.yaml --vary u=-3:0 --starts 0");
-  steady_shows ("       1  ends                        0 ");
+  cli_shows ("       1  ends                        0 ");
 }
 
 /* Without modes but rigid displacements there is a figure, too, and no message of gnuplot. */
@@ -224,7 +220,7 @@ TEST (ramp) {
            "model ramp: signal front.heading changes with time, but after 2.33333336 s no signal does: give --at "
            "2.33333336");
   cli_good ("pinwheel steady @/ramp.yaml --at 2.33333336 --starts 0");
-  steady_shows ("     1          1.96413           0.442387 ");
+  cli_shows ("     1          1.96413           0.442387 ");
 }
 
 /* The ends of branches are those of the range to the last bit; the motion is found once, whatever angle it is found
@@ -244,13 +240,13 @@ TEST (ends) {
                             "  - {pin: O, body: [ground, rod], at: [[0, 0], [0, 0]]}\n"
                             "  - {rotational-spring: s, body: [rod, ground], stiffness: 3, damping: c_d}\n");
   cli_good ("pinwheel steady @/damped.yaml --vary c_d=1:0 --starts 0 -o @/ends");
-  steady_shows ("damped: 1 branch of steady motions");
+  cli_shows ("damped: 1 branch of steady motions");
   assert_non_null (strstr (cli_file ("ends/steady.svg"), ">c_d<")); /* plain text, without a subscript */
   line = strchr (cli_file ("ends/steady.csv"), '\n') + 1;
   for (const char *next; *(next = strchr (line, '\n') + 1);) line = next;
   assert_true (table_number (line, 2) == 0);
   cli_good ("pinwheel steady pendulum --starts 60");
-  steady_shows ("pendulum: 2 steady motions, ");
+  cli_shows ("pendulum: 2 steady motions, ");
 }
 
 /* At rest the resistance and its derivative are 0: the velocity is exactly 0 as well. */
@@ -259,25 +255,25 @@ TEST (rest) {
                           "  - {slider: rail, body: [b, ground], at: [[0, 0], [0, 0]]}\n"
                           "  - {drag: air, body: b, quadratic: 1}\n");
   cli_good ("pinwheel steady @/rest.yaml --starts 5 -o @/rest");
-  steady_shows ("rest: 1 steady motion up to 1 symmetry, ");
+  cli_shows ("rest: 1 steady motion up to 1 symmetry, ");
   check_close ("speed", cli_number (cli_file ("rest/steady.json"), "motions", "state", "b.vx", NULL), 0, 0, "exact");
   /* there residuals grow with the third power of velocities, so that Newton's method ends before it reaches rest */
   cli_write ("axles.yaml", "pinwheel: 1\nbodies: [{name: b, mass: 2, inertia: 0.4, rate: {vx: 0.2, omega: 0.3}}]\n"
                            "elements:\n  - {wheel: w, body: b, at: [-0.5, -0.2]}\n"
                            "  - {tyre: f, body: b, at: [0.2, 0.3], heading: 0.3, stiffness: 8, speed: 0.5}\n");
   cli_good ("pinwheel steady @/axles.yaml");
-  steady_shows ("axles: 1 steady motion up to 3 symmetries");
-  steady_shows ("       1              0                0        1        0 ");
+  cli_shows ("axles: 1 steady motion up to 3 symmetries");
+  cli_shows ("       1              0                0        1        0 ");
 }
 
 /* Straight ahead the hinges decay at u / L; the motion of the model is a turn. */
 TEST (linearise) {
   cli_good ("pinwheel linearise n-trailer --steady --hold tractor.speed=3 --hold tractor.omega=0");
-  steady_shows ("n-trailer, steady motion at t = 0 s: 7 minimal coordinates");
-  steady_shows ("     6         -3.75 ");
-  steady_shows ("     7            -5 ");
+  cli_shows ("n-trailer, steady motion at t = 0 s: 7 minimal coordinates");
+  cli_shows ("     6         -3.75 ");
+  cli_shows ("     7            -5 ");
   cli_good ("pinwheel linearise pendulum --steady");
-  steady_shows ("     1             0           3.1321 ");
+  cli_shows ("     1             0           3.1321 ");
   cli_bad ("pinwheel linearise theo-jansen --steady -o @/none", 4,
            "theo-jansen: no steady motion is reached from the initial state: the last residual is 1, in units of the "
            "scene; `pinwheel "
@@ -292,7 +288,7 @@ TEST (linearise_later) {
                            "  - {drag: D, body: block, linear: 0.5, turning: 0.1}\n"
                            "  - {force: F, body: block, fx: {pulse: {height: 1, start: 7, width: 0.5}}}\n");
   cli_good ("pinwheel linearise @/later.yaml --steady --at 5");
-  steady_shows ("The motion is steady\n");
+  cli_shows ("The motion is steady\n");
   assert_int_equal (cli_run ("pinwheel linearise @/later.yaml --steady --at 6.5"), 2);
 }
 
@@ -312,7 +308,7 @@ TEST (hopf_in_a_turn) {
                           "  - {torque: s, body: [arm, car], "
                           "value: \"-0.25*(arm.phi - car.phi) - (p - 0.1)*(arm.omega - car.omega)\"}\n");
   cli_good ("pinwheel steady @/turn.yaml --vary p=-0.2:0.3 --starts 0");
-  steady_shows ("        0                0       0.0795775\n");
+  cli_shows ("        0                0       0.0795775\n");
 }
 
 /* A parameter of a model in C need not have a unit. */
@@ -329,7 +325,7 @@ TEST (without_unit) {
   cli_shell ("pinwheel steady @/unitless.c --vary v=1:2 --starts 0 -o @/unitless");
   assert_int_equal (strncmp (cli_file ("unitless/steady.csv"), "branch,event,v,growing,", 23), 0);
   cli_good ("pinwheel sensitivity @/unitless.c --of a.x --by v -t 1");
-  steady_shows ("  v                          1             1  m ");
+  cli_shows ("  v                          1             1  m ");
 }
 
 TEST (bad) {

@@ -6,10 +6,6 @@
 #include "check.h"
 #include "cli.h"
 
-static void steady_shows (const char *text) {
-  if (strstr (cli_out, text) == NULL) fail_msg ("\"%s\" is not in\n%s", text, cli_out);
-}
-
 /* A disc that spins freely on a car, listed first or last: its angle makes no other motion. */
 TEST (spin) {
   static const char *const body[] = { "  - {name: disc, mass: 1, inertia: 0.1, rate: {vx: 1, omega: 2}}\n",
@@ -22,7 +18,7 @@ TEST (spin) {
                            "  - {pin: P, body: [disc, car], at: [[0, 0], [0.2, 0]]}\n",
                            body[k], body[1 - k]));
     cli_good ("pinwheel steady @/spin.yaml --hold disc.omega=2 --starts 10");
-    steady_shows ("spin: 1 steady motion up to 4 symmetries, ");
+    cli_shows ("spin: 1 steady motion up to 4 symmetries, ");
   }
 }
 
@@ -38,7 +34,7 @@ TEST (many_symmetries) {
                    i);
   cli_write ("many.yaml", text);
   cli_good ("pinwheel steady @/many.yaml --starts 0");
-  steady_shows ("many: 1 steady motion up to 70 symmetries, ");
+  cli_shows ("many: 1 steady motion up to 70 symmetries, ");
 }
 
 /* One body on two springs, the truss of von Mises: it has fewer equations than a plane has displacements, and no
@@ -67,23 +63,23 @@ TEST (flat_forces) {
                                       "  - {motor: helm, body: [c, ground], stiffness: 4, limit: 1, angle: 3}\n",
                                       head));
   cli_good ("pinwheel steady @/helm.yaml");
-  steady_shows ("helm: 1 steady motion up to 2 symmetries");
-  steady_shows ("             3     -0.989992       0.14112              0\n");
+  cli_shows ("helm: 1 steady motion up to 2 symmetries");
+  cli_shows ("             3     -0.989992       0.14112              0\n");
   cli_write ("kerb.yaml", check_text ("%s  - {force: kerb, body: c, fy: '0.3 - 20*max(0, c.y - 1)'}\n", head));
   cli_good ("pinwheel linearise @/kerb.yaml --steady --hold c.phi=0");
-  steady_shows ("The motion is steady\n");
-  steady_shows ("          -0.5           4.4441          0.7073");
+  cli_shows ("The motion is steady\n");
+  cli_shows ("          -0.5           4.4441          0.7073");
   cli_write ("lanes.yaml",
              check_text ("%s  - {force: lane, body: c, fy: '-2*tanh((c.y + 8)*((c.y + 8)^2 - 9)/5)'}\n", head));
   cli_good ("pinwheel steady @/lanes.yaml --hold c.phi=0");
-  steady_shows ("lanes: 1 steady motion up to 1 symmetry");
+  cli_shows ("lanes: 1 steady motion up to 1 symmetry");
   cli_write ("circle.yaml",
              "pinwheel: 1\nrun: {t_end: 0.5}\n"
              "bodies: [{name: c, mass: 1, inertia: 1, start: {y: 1}, rate: {vx: -1, omega: 1}}]\nelements:\n"
              "  - {spring: s, body: [c, ground], at: [[0, 0], [0, 0]], stiffness: 1}\n"
              "  - {force: f, body: c, fy: 'max(0, -0.9 - c.y)'}\n");
   cli_good ("pinwheel linearise @/circle.yaml");
-  steady_shows ("Not steady: the equations change with time or along the motion");
+  cli_shows ("Not steady: the equations change with time or along the motion");
   /* a drive that turns steadily: less than a turn in the span */
   cli_write ("turn.yaml",
              "pinwheel: 1\nrun: {t_end: 1}\nbodies:\n  - {name: c, mass: 1, inertia: 1, rate: {omega: 1}}\n"
@@ -102,8 +98,8 @@ TEST (more_symmetries) {
                           "bodies: [{name: bob, mass: 1, inertia: 1, start: {x: 0.3}, rate: {vx: 0.1}}]\nelements:\n"
                           "  - {spring: s, body: [bob, ground], at: [[0, 0], [-2, 0]], stiffness: k, length: 2}\n");
   cli_shell ("pinwheel steady @/held.yaml --hold bob.speed=0 --hold bob.omega=0 --vary k=0:1 --starts 5");
-  steady_shows ("held: 1 branch of steady motions up to 2 symmetries, k from 0 to 1\n");
-  steady_shows ("       1  begins                      1        0                0        0.159155\n");
+  cli_shows ("held: 1 branch of steady motions up to 2 symmetries, k from 0 to 1\n");
+  cli_shows ("       1  begins                      1        0                0        0.159155\n");
   assert_int_equal (cli_run ("pinwheel steady @/held.yaml --hold bob.speed=0.1 --vary k=1:0.5 -o @/circle"), 0);
   const char *json = cli_file ("circle/steady.json");
   double number[4];
@@ -117,20 +113,20 @@ TEST (more_symmetries) {
   assert_string_equal (cli_err, "pinwheel: holding skate.speed=0, as in the motion nearest to the initial state\n"
                                 "pinwheel: alpha=0: no branch begins at a steady motion that is one of a family of "
                                 "dimension 1\n");
-  steady_shows ("knife-edge-incline: 2 branches of steady motions up to 2 symmetries, alpha from 0 to 0.3\n");
-  steady_shows ("       1  begins                    0.3        0                                 \n");
-  steady_shows ("       2  ends                        0        0                                 \n");
+  cli_shows ("knife-edge-incline: 2 branches of steady motions up to 2 symmetries, alpha from 0 to 0.3\n");
+  cli_shows ("       1  begins                    0.3        0                                 \n");
+  cli_shows ("       2  ends                        0        0                                 \n");
   cli_write ("step.yaml", "pinwheel: 1\nparameters: [{name: k, value: 0}]\n"
                           "bodies: [{name: bob, mass: 1, inertia: 1, start: {x: 0.3}, rate: {vx: 0.1}}]\nelements:\n"
                           "  - {spring: s, body: [bob, ground], at: [[0, 0], [-2, 0]], stiffness: 'k > 0.9 ? 1 : 0', "
                           "length: 2}\n");
   cli_shell ("pinwheel steady @/step.yaml --hold bob.speed=0.1 --vary k=1:0"); /* fewer where it begins */
-  steady_shows ("step: 1 branch of steady motions up to 1 symmetry, k from 1 to 0\n");
-  steady_shows ("       1  ends              0.900010099 ");
+  cli_shows ("step: 1 branch of steady motions up to 1 symmetry, k from 1 to 0\n");
+  cli_shows ("       1  ends              0.900010099 ");
   assert_int_equal (cli_run ("pinwheel steady chaplygin-sleigh --vary a=0:0.2"), 0);
-  steady_shows ("       1  begins                      0.2        1 ");
+  cli_shows ("       1  begins                      0.2        1 ");
   cli_shell ("pinwheel steady knife-edge-incline --set w=0 --start skate.phi=1.5 --vary alpha=0:pi");
-  steady_shows ("knife-edge-incline: 4 branches of steady motions up to 2 symmetries, alpha from 0 to 3.14159265\n");
+  cli_shows ("knife-edge-incline: 4 branches of steady motions up to 2 symmetries, alpha from 0 to 3.14159265\n");
 }
 
 /* A symmetry may turn the whole and keep, or turn by another angle, single bodies: an arm beside a disc on a torsion
@@ -154,7 +150,7 @@ TEST (one_axis) {
     snprintf (line, sizeof line, "pinwheel steady @/axis.yaml --starts 5 --hold %s", scene[i][1]);
     cli_good (line);
     snprintf (line, sizeof line, "axis: 1 steady motion up to %s,", scene[i][2]);
-    steady_shows (line);
+    cli_shows (line);
   }
 }
 

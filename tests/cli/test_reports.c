@@ -5,17 +5,13 @@
 #include "check.h"
 #include "cli.h"
 
-static void reports_shows (const char *text) {
-  if (strstr (cli_out, text) == NULL) fail_msg ("\"%s\" is not in\n%s", text, cli_out);
-}
-
 /* The wheels' spin angles and the energies, after 0.5 s of given rates. */
 TEST (roller) {
   assert_int_equal (cli_run ("pinwheel run differential-drive --t-end 0.5 --energy"), 0);
-  reports_shows ("\n  left.spin             2.5  rad  left.spin_rate               5  rad/s\n");
-  reports_shows ("\n  right.spin           3.75  rad  right.spin_rate            7.5  rad/s\n");
-  reports_shows ("\n  energy\n  kinetic ");
-  reports_shows ("\n  dissipated               0  J\n");
+  cli_shows ("\n  left.spin             2.5  rad  left.spin_rate               5  rad/s\n");
+  cli_shows ("\n  right.spin           3.75  rad  right.spin_rate            7.5  rad/s\n");
+  cli_shows ("\n  energy\n  kinetic ");
+  cli_shows ("\n  dissipated               0  J\n");
   assert_int_equal (cli_run ("pinwheel run differential-drive --t-end 0.5 --json @/roller.json"), 0);
   check_close ("spin", cli_number (cli_file ("roller.json"), "elements", "right", "spin", NULL), 3.75, 1e-12,
                "4096 eps");
@@ -26,8 +22,8 @@ TEST (reactions) {
   assert_int_equal (cli_run ("pinwheel run pendulum --t-end 0.5 -o @/truth.csv >@/log && "
                              "pinwheel run pendulum --t-end 0.5 --step 2e-3 --reference @/truth.csv"),
                     0);
-  reports_shows ("\n  reactions ");
-  reports_shows (" of the largest\n");
+  cli_shows ("\n  reactions ");
+  cli_shows (" of the largest\n");
 }
 
 /* The angle is not known at the end, but at other times. */
@@ -45,11 +41,11 @@ TEST (unknown_end) {
 
 TEST (signals) {
   cli_good ("pinwheel show tests/models/signals.yaml");
-  reports_shows ("heading {ramp: {from: 0.1, to: -0.2, start: 0.333333, duration: 0.7}} rad\n");
-  reports_shows ("value {table: {points: 4 from 0 to 3.14159 s}} m/s\n");
-  reports_shows ("value {pulse: {height: 0.142857, start: 0.1, width: 0.2, period: 0.7, offset: -0.01}} N m\n");
-  reports_shows ("fx {harmonic: {amplitude: 0.2, omega: 3, phase: 0.1}} N; fy 0.1 N\n");
-  reports_shows ("rate {smooth-step: {from: 0.3, to: 0, duration: 2}} rad/s\n");
+  cli_shows ("heading {ramp: {from: 0.1, to: -0.2, start: 0.333333, duration: 0.7}} rad\n");
+  cli_shows ("value {table: {points: 4 from 0 to 3.14159 s}} m/s\n");
+  cli_shows ("value {pulse: {height: 0.142857, start: 0.1, width: 0.2, period: 0.7, offset: -0.01}} N m\n");
+  cli_shows ("fx {harmonic: {amplitude: 0.2, omega: 3, phase: 0.1}} N; fy 0.1 N\n");
+  cli_shows ("rate {smooth-step: {from: 0.3, to: 0, duration: 2}} rad/s\n");
 }
 
 /* A free body whose turning is driven by its own rate, 2 1/s: it grows, and no step of RK4 is too large for that. */
@@ -58,15 +54,15 @@ TEST (unbound) {
                           "  - {name: a, mass: 1, inertia: 1}\nelements:\n"
                           "  - {torque: T, body: [a, ground], value: 2*a.omega}\n");
   cli_good ("pinwheel show @/free.yaml --matrices");
-  reports_shows ("\nThe model has no constraints: no J, no gamma\n");
+  cli_shows ("\nThe model has no constraints: no J, no gamma\n");
   cli_good ("pinwheel check @/free.yaml");
-  reports_shows ("  fastest eigenvalue                 2 1/s\n");
-  reports_shows ("  it grows by a factor of e in       0.5 s\n");
-  reports_shows ("  RK4 is stable                      with any step: no mode decays or oscillates\n");
+  cli_shows ("  fastest eigenvalue                 2 1/s\n");
+  cli_shows ("  it grows by a factor of e in       0.5 s\n");
+  cli_shows ("  RK4 is stable                      with any step: no mode decays or oscillates\n");
   cli_good ("sed '/elements/,$d' @/free.yaml >@/alone.yaml && pinwheel show @/alone.yaml --yaml");
-  reports_shows ("about: \"says \\\"so\\\", \\\\ and a\\x09tab\"\n");
+  cli_shows ("about: \"says \\\"so\\\", \\\\ and a\\x09tab\"\n");
   cli_good ("pinwheel show @/alone.yaml --yaml >@/again.yaml && pinwheel show @/again.yaml");
-  reports_shows ("again: says \"so\", \\ and a\ttab\n");
+  cli_shows ("again: says \"so\", \\ and a\ttab\n");
 }
 
 /* Texts that are null, true or a number without their quotes. */
@@ -114,11 +110,11 @@ TEST (domains) {
              "  (void)p;\n  pw_add_body (m, &(pw_body){ .name = \"a\", .mass = 1, .inertia = 1 });\n}\n"
              "PW_MODEL (.about = \"domains\", .parameters = list, .parameters_size = sizeof (all), .build = build);\n");
   cli_good ("pinwheel show @/domains.c");
-  reports_shows ("  r  1  m             any\n");
-  reports_shows ("  n  1  m  >= 0       not below 0\n");
-  reports_shows ("  p  1  m  > 0        above 0\n");
-  reports_shows ("  c  1     1, 2, ...  number\n");
-  reports_shows ("  f  1     0 to 1     part\n");
+  cli_shows ("  r  1  m             any\n");
+  cli_shows ("  n  1  m  >= 0       not below 0\n");
+  cli_shows ("  p  1  m  > 0        above 0\n");
+  cli_shows ("  c  1     1, 2, ...  number\n");
+  cli_shows ("  f  1     0 to 1     part\n");
 }
 
 /* A run that ends before its first step has nothing to draw, and leaves nothing. */
@@ -214,16 +210,16 @@ TEST (contradiction) {
                          "  - {pin: P, body: [a, ground], at: [[0, 0], [0, 0]]}\n"
                          "  - {pin: Q, body: [a, ground], at: [[0, 0], [1, 0]]}\n");
   assert_int_equal (cli_run ("pinwheel check @/two.yaml --json -"), 3);
-  reports_shows ("\"saddle_point\": null");
-  reports_shows ("\"start\": null");
-  reports_shows ("\"linearisation\": null");
+  cli_shows ("\"saddle_point\": null");
+  cli_shows ("\"start\": null");
+  cli_shows ("\"linearisation\": null");
 }
 
 /* A program alone, without models or headers around it. */
 TEST (alone) {
   cli_good ("mkdir @/bin && cp \"${PINWHEEL:-build/pinwheel}\" ${BUILD:-build}/libpinwheel*.so.* @/bin");
   cli_good ("PINWHEEL_MODELS= @/bin/pinwheel list");
-  reports_shows ("none found; folders named in the environment variable PINWHEEL_MODELS are searched\n");
+  cli_shows ("none found; folders named in the environment variable PINWHEEL_MODELS are searched\n");
   assert_int_equal (cli_run ("PINWHEEL_MODELS= @/bin/pinwheel run pendulum"), 2);
   assert_non_null (strstr (cli_err, "pinwheel: there is no model \"pendulum\", nor any other in the folders of "));
   assert_int_equal (cli_run ("pinwheel new @/own.c >@/log && @/bin/pinwheel run @/own.c"), 2);

@@ -44,10 +44,6 @@ static double truth_error (const char *when, const char *what) {
   return cli_number (cli_out, "truth", when, what, NULL);
 }
 
-static void truth_shows (const char *text) {
-  if (strstr (cli_out, text) == NULL) fail_msg ("\"%s\" is not in\n%s", text, cli_out);
-}
-
 /* Order 4: ten times smaller steps, ten thousand times smaller errors; parameters are followed. */
 TEST (text) {
   double coarse;
@@ -62,10 +58,10 @@ TEST (text) {
   cli_good ("pinwheel run @/block.yaml --set a=0.5 --set k=45 --step 0.001 --json -");
   check_close ("order", log10 (coarse / truth_error ("largest", "length")), 4, 0.1, "order 4 in h");
   cli_good ("pinwheel run @/block.yaml");
-  truth_shows ("error against the reference solution of the model, at 100 times\n");
-  truth_shows ("  length ");
+  cli_shows ("error against the reference solution of the model, at 100 times\n");
+  cli_shows ("  length ");
   cli_good ("pinwheel show @/block.yaml");
-  truth_shows ("\nReference solution: block.x\n");
+  cli_shows ("\nReference solution: block.x\n");
 }
 
 /* Errors do not change the run: table and end are the same to the bit. */
@@ -75,7 +71,7 @@ TEST (does_no_harm) {
             "pinwheel run @/block.yaml --step 0.007 -o @/a.csv && pinwheel run @/plain.yaml --step 0.007 -o @/b.csv && "
             "cmp @/a.csv @/b.csv");
   cli_good ("pinwheel run @/plain.yaml --json -");
-  truth_shows ("\"truth\": null");
+  cli_shows ("\"truth\": null");
 }
 
 /* A resumed run knows the samples before its checkpoint. */
@@ -94,7 +90,7 @@ TEST (compare) {
                                        truth_text));
   cli_good ("pinwheel compare @/block.yaml --methods rk4,erk5 --repeats 1 --step-ladder 0.1:0.02 --rtol-ladder "
             "1e-4:1e-5 -o @/whole");
-  truth_shows ("errors are measured against the exact solution of the model\n");
+  cli_shows ("errors are measured against the exact solution of the model\n");
   assert_null (strstr (cli_out, "contains"));
   cli_good ("tail -n +2 @/whole/compare.csv | cut -d, -f8,12 | sort -u");
   assert_string_equal (cli_out, "nan,nan\n"); /* speeds: only one of the three velocities is given */
@@ -107,28 +103,28 @@ TEST (compare) {
 TEST (partial) {
 #define PARTIAL " --methods rk4+projection --repeats 1 --step-ladder 0.1:0.05"
   cli_good ("pinwheel compare car-two-trailers -t 2 -o @/part" PARTIAL);
-  truth_shows (
+  cli_shows (
       "the model's own reference solution contains at all times only car.phi of 9 coordinates: a computed one is used\n"
       "errors are measured against erk8+projection, rtol 3e-14\n");
-  truth_shows (" m (lengths), ");
+  cli_shows (" m (lengths), ");
   cli_good ("tail -n +2 @/part/compare.csv | cut -d, -f6-14"); /* the errors */
   assert_null (strstr (cli_out, "nan"));
   cli_good ("pinwheel compare hatchet-planimeter --set r=0.4 -t 2" PARTIAL);
-  truth_shows (
+  cli_shows (
       "the model's own reference solution contains at all times none of 3 coordinates: a computed one is used\n");
-  truth_shows ("cheapest ");
+  cli_shows ("cheapest ");
   /* the angle is known up to 0.5 s only */
   cli_write ("block.yaml", check_text ("%s  block.y: 0\n  block.phi: 0*sqrt(0.5 - t)\n", truth_text));
   cli_good ("pinwheel compare @/block.yaml -t 1" PARTIAL);
-  truth_shows ("solution contains at all times only block.x, block.y of 3 coordinates: a computed one is used\n");
+  cli_shows ("solution contains at all times only block.x, block.y of 3 coordinates: a computed one is used\n");
   cli_write ("few.csv", "t,K1.x,K1.y,K1.phi,K2.x,K2.y\n0.01,0,0,0,0,nan\n0.02,0,0,0,nan,nan\n");
   cli_good ("pinwheel compare andrews-squeezer --reference @/few.csv" PARTIAL);
-  truth_shows ("few.csv, as if it were exact\n"
-               "  it contains only K1.x, K1.y, K1.phi and 1 more of 21 coordinates\n");
+  cli_shows ("few.csv, as if it were exact\n"
+             "  it contains only K1.x, K1.y, K1.phi and 1 more of 21 coordinates\n");
   cli_good ("pinwheel run car-two-trailers -t 1");
-  truth_shows ("\n  the reference solution contains only car.phi of 9 coordinates\n");
+  cli_shows ("\n  the reference solution contains only car.phi of 9 coordinates\n");
   cli_good ("pinwheel run hatchet-planimeter --set r=0.4 -t 1");
-  truth_shows ("\n  errors are unknown: the reference solution of the model contains no value at the times compared\n");
+  cli_shows ("\n  errors are unknown: the reference solution of the model contains no value at the times compared\n");
   assert_null (strstr (cli_out, "error against"));
 }
 
@@ -140,7 +136,7 @@ TEST (round_trip) {
             "grep -q largest @/a && cmp @/a @/b");
   truth_write_c ("0");
   cli_good ("pinwheel show @/particles.c --yaml");
-  truth_shows ("# The reference solution of the model is a function in C, which cannot be written as text.\n");
+  cli_shows ("# The reference solution of the model is a function in C, which cannot be written as text.\n");
 }
 
 TEST (function) {
@@ -148,9 +144,9 @@ TEST (function) {
   cli_good ("pinwheel run @/particles.c --set u=3 --json - && pinwheel show @/particles.c");
   check_below ("length", truth_error ("largest", "length"), 1e-14, "round-off");
   check_below ("angle", truth_error ("largest", "angle"), 1e-14, "round-off");
-  truth_shows ("Reference solution: one.x, one.phi, two.x, one.vx\n");
+  cli_shows ("Reference solution: one.x, one.phi, two.x, one.vx\n");
   cli_good ("pinwheel check @/particles.c");
-  truth_shows ("  compared with the reference solution of the model in 4 states\n");
+  cli_shows ("  compared with the reference solution of the model in 4 states\n");
   truth_write_c ("0.25");
   cli_good ("pinwheel run @/particles.c --json -");
   check_close ("a wrong truth", truth_error ("end", "length"), 0.25, 1e-12, "round-off");
@@ -161,7 +157,7 @@ TEST (function) {
 TEST (started_elsewhere) {
   truth_write_c ("0");
   assert_int_equal (cli_run ("pinwheel run @/particles.c --start one.x=5 --json -"), 0);
-  truth_shows ("\"truth\": null");
+  cli_shows ("\"truth\": null");
   assert_non_null (strstr (cli_err, "with --start errors are not computed"));
 }
 
@@ -177,7 +173,7 @@ TEST (table) {
   check_close ("end", truth_error ("end", "length"), 0, 1e-14, "round-off");
   check_close ("angle", truth_error ("largest", "angle"), 0, 0, "exact");
   cli_good ("pinwheel run @/particles.c --reference @/table.csv");
-  truth_shows ("table.csv, at 3 times\n");
+  cli_shows ("table.csv, at 3 times\n");
   cli_write ("units.csv", "t [ms],one.x [mm],two.phi[deg]\n250,500,0\n500,1125,0\n750,1500,0\n");
   cli_good ("pinwheel run @/particles.c --reference @/units.csv --json -");
   check_close ("last", cli_number (cli_out, "truth", "t", NULL), 0.75, 0, "exact");
@@ -270,8 +266,8 @@ TEST (not_compared) {
   cli_write ("speed.csv", "t,frame.vx\n1,0\n2,0\n");
   cli_good ("pinwheel run ezyroller -t 2 --reference @/speed.csv --json -");
   assert_true (truth_error ("end", "speed") > 0.1);
-  truth_shows ("\"end\": {\n      \"length\": null,\n      \"angle\": null,\n");
-  truth_shows ("\"largest\": {\n      \"length\": null,\n      \"angle\": null,\n");
+  cli_shows ("\"end\": {\n      \"length\": null,\n      \"angle\": null,\n");
+  cli_shows ("\"largest\": {\n      \"length\": null,\n      \"angle\": null,\n");
 }
 
 const check_fixture fixture = { cli_setup, cli_teardown };

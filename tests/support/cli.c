@@ -97,6 +97,10 @@ void cli_write (const char *name, const char *text) {
   cli_write_bytes (name, text, strlen (text));
 }
 
+void cli_shows (const char *text) {
+  if (strstr (cli_out, text) == NULL) fail_msg ("\"%s\" is not in\n%s", text, cli_out);
+}
+
 /* ---- Reading summaries ---- */
 
 /* The value of the first such key; NULL if there is none. */

@@ -44,6 +44,9 @@ void cli_write_bytes (const char *name, const void *bytes, size_t size);
 /* The text of a file in the folder, until the next call; NULL if there is none. */
 const char *cli_file (const char *name);
 
+/* Fails unless the last command has printed this text. */
+void cli_shows (const char *text);
+
 /* The number under the keys of a summary, in order: cli_number (json, "bodies", "frame", "x", NULL). */
 double cli_number (const char *json, ...);
 
