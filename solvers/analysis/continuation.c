@@ -18,9 +18,8 @@ static const double BRANCH_STEEP = 1e-3, /* smallest slope of p along a branch t
 
 int pw_branch_open (pw_branch *b, const pw_branch_problem *problem, pw_error *error) {
   size_t n = (size_t)problem->unknowns + 1, m = (size_t)problem->equations + n, large = n > m ? n : m;
-  *b = (pw_branch){
-    .problem = *problem, .bytes = n * sizeof (double), .ended = 1, .work_size = (int)(42 * large + 200)
-  }; /* dgelsy needs 35 large + 32, with blocks of 32 */
+  *b = (pw_branch){ .problem = *problem, .bytes = n * sizeof (double), .ended = 1 };
+  b->work_size = (int)(42 * large + 200); /* dgelsy needs 35 large + 32, with blocks of 32 */
   if (!(b->problem.rank_tolerance > 0)) b->problem.rank_tolerance = 1e-9;
   pw_branch_point *const point[] = {
     &b->reached, &b->previous, &b->found, &b->first, &b->next, &b->side[0], &b->side[1]

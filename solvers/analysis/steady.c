@@ -10,13 +10,12 @@ enum {
   STEADY_POINTS = 50,       /* of a branch, by default */
   STEADY_BREAKPOINTS = 1000 /* that are followed to find the last one */
 };
-static const double
-    STEADY_EXACT = 1e-9, /* largest residual of a solution, in units of the scene */
-    STEADY_SLOW = 1e-4,  /* rates that may be round-off at a double root: more than the root of STEADY_EXACT */
-    STEADY_CRAWL = 1e-2, /* the same at a root of higher order, where residuals exceed STEADY_REGULAR */
-    STEADY_REGULAR = 1e-13,
-    SUGGEST_CHANGE = 1e-8, /* a quantity is worth holding if the square of its change along the family, without the */
-    SUGGEST_LEFT = 1e-6;   /* part that is held already, exceeds SUGGEST_CHANGE, and SUGGEST_LEFT x the whole square */
+static const double STEADY_EXACT = 1e-9, /* largest residual of a solution, in units of the scene */
+    STEADY_SLOW = 1e-4,     /* rates that may be round-off at a double root: more than the root of STEADY_EXACT */
+    STEADY_CRAWL = 1e-2,    /* the same at a root of higher order */
+    STEADY_REGULAR = 1e-13, /* Newton's method ends at smaller residuals unless the root is of higher order */
+    SUGGEST_CHANGE = 1e-8,  /* a quantity is worth holding if the square of its change along the family, without the */
+    SUGGEST_LEFT = 1e-6;    /* part that is held already, exceeds SUGGEST_CHANGE, and SUGGEST_LEFT x the whole square */
 
 /* ---- Opening ---- */
 
@@ -269,9 +268,11 @@ static int steady_lose_symmetries (pw_steady *x, pw_error *error) {
   if (status == PW_RESOURCE) return pw_fail_memory (x->s, error);
   if (status != PW_OK || x->symmetries == symmetries) return PW_OK;
   pw_branch before = x->branch;
-  if (steady_open_branch (x, error) != PW_OK) return PW_RESOURCE;
-  pw_branch_close (&before);
-  return PW_RETRY;
+  const int opened = steady_open_branch (x, error);
+  pw_branch_close (opened == PW_OK ? &before : &x->branch);
+  if (opened == PW_OK) return PW_RETRY;
+  x->branch = before;
+  return opened;
 }
 
 int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_motion *out, pw_error *error) {
