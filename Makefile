@@ -341,7 +341,7 @@ test: all $(TESTS) $(PROGRAMS)
 	@$(RUN_TESTS) $(TESTS)
 
 test-all: everything
-	@$(RUN_TESTS) $(TESTS) $(SLOWS) $(SHELLS)
+	@$(RUN_TESTS) $(SHELLS) $(SLOWS) $(TESTS)
 
 demo: all $(BUILD)/benchmarks/demo
 	@$(BUILD)/benchmarks/demo
