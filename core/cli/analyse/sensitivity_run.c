@@ -176,42 +176,31 @@ static int sensitivity_add_row (pw_sensitivity *sens, double t, pw_error *error)
 
 /* ---- Along the run ---- */
 
-typedef struct pw_sensitivity_point {
-  double t;      /* [s] */
-  double weight; /* of a node [s] */
-  int extremum;  /* the functional whose extremum is at t; -1: t is a node of the integrals */
-} sensitivity_point;
-
-static int sensitivity_compare_times (const void *a, const void *b) {
-  double first = ((const sensitivity_point *)a)->t, second = ((const sensitivity_point *)b)->t;
-  return (first > second) - (first < second);
-}
-
-/* Lists the times of nodes and extrema in (t0, t1] in order; returns their number. */
-static int sensitivity_points (pw_sensitivity *sens, double t0, double t1) {
-  sensitivity_point *list = sens->point;
-  int count = 0, integrals = 0;
-  for (int i = 0; i < sens->outcomes.functionals; i++) {
-    const pw_functional *f = &sens->outcomes.functional[i];
-    integrals |= pw_is_integral (f->type);
-    if (pw_is_extremum (f->type) && f->t > t0 && f->t <= t1) list[count++] = (sensitivity_point){ f->t, 0, i };
-  }
-  for (int k = 0; k < PW_GAUSS_NODES && integrals; k++)
-    list[count++] = (sensitivity_point){ pw_gauss_time (t0, t1, k), pw_gauss_w[k] * (t1 - t0) / 2, -1 };
-  qsort (list, (size_t)count, sizeof *list, sensitivity_compare_times);
-  return count;
-}
-
-/* Advances from t0, where the columns have been evaluated, to t1. */
-static int sensitivity_interval (pw_sensitivity *sens, double t0, double t1, pw_error *error) {
-  const sensitivity_point *list = sens->point;
-  int count = sensitivity_points (sens, t0, t1), status = PW_OK;
-  for (int i = 0; i < count && status == PW_OK; i++) {
-    status = pw_sensitivity_at (sens, list[i].t, error);
-    if (status == PW_OK && list[i].extremum < 0) sensitivity_add_node (sens, list[i].weight);
-    if (status == PW_OK && list[i].extremum >= 0) sensitivity_keep_extremum (sens, list[i].extremum, 0);
+/* Advances from t0, where the columns have been evaluated, to t1, with Gauss' formula for the integrals. */
+static int sensitivity_integrate (pw_sensitivity *sens, double t0, double t1, pw_error *error) {
+  int status = PW_OK, integrals = 0;
+  for (int i = 0; i < sens->outcomes.functionals; i++) integrals |= pw_is_integral (sens->outcomes.functional[i].type);
+  for (int k = 0; k < PW_GAUSS_NODES && integrals && status == PW_OK; k++) {
+    status = pw_sensitivity_at (sens, pw_gauss_time (t0, t1, k), error);
+    if (status == PW_OK) sensitivity_add_node (sens, pw_gauss_w[k] * (t1 - t0) / 2);
   }
   return status == PW_OK ? pw_sensitivity_at (sens, t1, error) : status;
+}
+
+/* The same, in parts that end at extrema. */
+static int sensitivity_interval (pw_sensitivity *sens, double t0, double t1, pw_error *error) {
+  int status;
+  do {
+    double end = t1;
+    for (int i = 0; i < sens->outcomes.functionals; i++) {
+      const pw_functional *f = &sens->outcomes.functional[i];
+      if (pw_is_extremum (f->type) && f->t > t0) end = fmin (end, f->t);
+    }
+    status = sensitivity_integrate (sens, t0, end, error);
+    if (status == PW_OK) sensitivity_keep_extrema (sens, t0, end, 0);
+    t0 = end;
+  } while (status == PW_OK && t0 < t1);
+  return status;
 }
 
 /* Advances from t0 to t, from just before to just after a breakpoint, or a jump at a state, at a time tb that depends
@@ -301,9 +290,6 @@ static int sensitivity_advance_to_end (pw_sensitivity *sens, pw_progress *progre
 static int sensitivity_prepare (pw_sensitivity *sens, const double *values, pw_error *error) {
   size_t P = (size_t)sens->unknowns.count;
   if (sens->row_interval == 0) sens->row_interval = sens->unknowns.t_end / SENSITIVITY_PARTS;
-  sens->limit.seconds = sens->unknowns.limit;
-  sens->unknowns.settings.stop = pw_limit_over;
-  sens->unknowns.settings.stop_context = &sens->limit;
   sens->unknown_value = pw_arena_alloc (&sens->arena, P * sizeof *sens->unknown_value);
   sens->neighbours = pw_arena_alloc (&sens->arena, 4 * P * sizeof *sens->neighbours);
   sens->direction = pw_arena_alloc (&sens->arena, P * sizeof *sens->direction);
@@ -326,8 +312,7 @@ static int sensitivity_arrays (pw_sensitivity *sens, pw_error *error) {
   for (int o = 0; o < sens->outcomes.outcomes; o++)
     if (pw_sensitivity_in_table (sens, o)) sens->columns += 1 + sens->unknowns.count;
   sens->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
-  sens->point = pw_arena_alloc (&sens->arena, (F + PW_GAUSS_NODES) * sizeof *sens->point);
-  return sens->memory && sens->point ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+  return sens->memory ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
 }
 
 /* Refuses initial values that the constraints determine: then making the state of a neighbour consistent changes them
@@ -353,16 +338,15 @@ static int sensitivity_check_independence (const pw_sensitivity *sens, pw_error 
 /* Opens the run, with the ledger if outputs need it; the one of which samples are taken where base.run is ahead of the
  * derivatives (pw_variation_advance); and the neighbours. */
 static int sensitivity_open_runs (pw_sensitivity *sens, pw_error *error) {
-  const pw_settings *settings = &sens->unknowns.settings;
   int count = 0;
   while (sens->of[count]) count++;
-  int status = pw_unknowns_system (&sens->base.m, &sens->unknowns, sens->unknown_value, error);
+  int status = pw_unknown_run_prepare (&sens->base, &sens->unknowns, sens->unknown_value, error);
   if (status == PW_OK) status = pw_outcomes_open (&sens->outcomes, sens->base.m.system, "--of", sens->of, count, error);
   if (status != PW_OK) return status;
-  sens->unknowns.settings.ledger = sens->outcomes.ledger;
-  sens->base.run = pw_run_open (sens->base.m.system, sens->unknowns.method, settings, error);
+  sens->base.settings.ledger = sens->outcomes.ledger;
+  sens->base.run = pw_run_open (sens->base.m.system, sens->unknowns.method, &sens->base.settings, error);
   if (sens->base.run && pw_system_may_jump (sens->base.m.system))
-    sens->sampled = pw_run_open (sens->base.m.system, sens->unknowns.method, settings, error);
+    sens->sampled = pw_run_open (sens->base.m.system, sens->unknowns.method, &sens->base.settings, error);
   if (error->status != PW_OK) return error->status;
   status = pw_unknowns_directions (sens->direction, &sens->unknowns, sens->unknown_value, &sens->base, sens->neighbours,
                                    error);
@@ -374,7 +358,6 @@ int pw_sensitivity_start (pw_sensitivity *sens, const double *values, pw_error *
   int status = sensitivity_prepare (sens, values, error);
   if (status == PW_OK) status = sensitivity_open_runs (sens, error);
   if (status == PW_OK) status = sensitivity_arrays (sens, error);
-  pw_limit_start (&sens->limit);
   if (status != PW_OK) return status;
   sens->variation =
       pw_variation_open (sens->base.run, sens->direction, sens->unknowns.count, sens->outcomes.ledger, error);
@@ -386,7 +369,7 @@ int pw_sensitivity_compute (pw_sensitivity *sens, const double *values, pw_progr
   /* Another run determines the values of extrema and integrals, and the times of extrema. */
   if (status == PW_OK && sens->outcomes.along_run)
     status =
-        pw_outcomes_run (&sens->outcomes, sens->unknowns.method, &sens->unknowns.settings, sens->unknowns.t_end, error);
+        pw_outcomes_run (&sens->outcomes, sens->unknowns.method, &sens->base.settings, sens->unknowns.t_end, error);
   if (status != PW_OK) return status;
   status = sensitivity_advance_to_end (sens, progress, error);
   sens->stopped = status == PW_STOPPED;

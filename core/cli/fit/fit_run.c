@@ -132,7 +132,7 @@ static int jacobian_by_variation (const pw_fit *fit, const double *unknowns, dou
   pw_sensitivity s = { .of = fit->column_name, .unknowns = fit->unknowns, .no_error = 1 };
   int status = pw_sensitivity_start (&s, unknowns, error);
   for (int row = 0; row < fit->rows && status == PW_OK; row++) status = jacobian_row (&s, fit, row, jacobian, error);
-  if (status == PW_STOPPED) status = pw_limit_status (&s.limit, pw_run_time (s.base.run), error);
+  if (status == PW_STOPPED) status = pw_limit_status (&s.base.limit, pw_run_time (s.base.run), error);
   pw_sensitivity_close (&s);
   return status;
 }

@@ -78,7 +78,7 @@ static int search_differentiate (local_search *local, pw_error *error) {
   pw_progress silent = { 0 };
   pw_sensitivity s = { .of = problem->output, .unknowns = *unknowns, .no_error = 1 };
   int status = pw_sensitivity_compute (&s, local->unknown, &silent, error);
-  if (status == PW_OK && s.stopped) status = pw_limit_status (&s.limit, pw_run_time (s.base.run), error);
+  if (status == PW_OK && s.stopped) status = pw_limit_status (&s.base.limit, pw_run_time (s.base.run), error);
   for (int i = 0; i < problem->outputs && status == PW_OK; i++) {
     local->output[i] = pw_outcome_value (&s.outcomes, i, NULL);
     for (int j = 0; j < unknowns->count && status == PW_OK; j++) {
