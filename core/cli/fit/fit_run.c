@@ -19,7 +19,9 @@ static int fit_sample (const pw_fit *fit, pw_outcomes *outcomes, pw_run *run, do
   for (int k = 0; k < fit->rows && status == PW_OK; k++) {
     status = pw_run_advance_to (run, fit->t[k], fit->unknowns.t_end, error);
     if (status == PW_OK) status = pw_run_sample (run, fit->t[k], &sample, error);
-    if (status == PW_OK) status = pw_outcomes_read (outcomes, &sample, out + k, fit->rows, error);
+    if (status == PW_OK) status = pw_outcomes_read (outcomes, &sample, 0, error);
+    for (int i = 0; i < fit->columns && status == PW_OK; i++)
+      out[i * fit->rows + k] = outcomes->functional[outcomes->outcome[i].term[0]].values[0];
   }
   return status;
 }
