@@ -102,8 +102,8 @@ int pw_outcomes_open (pw_outcomes *set, const pw_system *s, const char *option, 
                       pw_error *error);
 void pw_outcomes_close (pw_outcomes *set);
 
-/* Stores the columns in a sample as values[at] of their functionals.  pw_outcomes_run overwrites them: by those at times
- * of the current step, [0] at its beginning, and at another one, [PW_FUNCTIONAL_TIMES]. */
+/* Stores the columns in a sample as values[at] of their functionals.  pw_outcomes_run overwrites these: by the columns
+ * at times of the current step, [0] at its beginning, and at another one, [PW_FUNCTIONAL_TIMES]. */
 int pw_outcomes_read (pw_outcomes *set, const pw_sample *s, int at, pw_error *error);
 /* Evaluates the functionals along a run to t_end; settings.stop_context is a pw_limit.  A status: that of
  * pw_limit_status if the run is stopped. */
