@@ -315,6 +315,10 @@ static int solve_open (fit_solver *solver) {
   fit->standard_error = fit->estimate + n, fit->singular_value = fit->standard_error + n,
   fit->column_length = fit->singular_value + n, fit->covariance = fit->column_length + n;
   fit->singular_vector = fit->covariance + n * n, fit->fitted = fit->singular_vector + n * n;
+  /* the errors are not known until solve_covariance; nor are combinations of unknowns that are not determined */
+  for (size_t i = 0; i < n; i++) fit->standard_error[i] = NAN;
+  for (size_t i = 0; i < n * n; i++) fit->covariance[i] = NAN;
+  fit->rank = fit->unknowns.count;
   return PW_OK;
 }
 
