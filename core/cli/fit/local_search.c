@@ -50,21 +50,21 @@ static double search_scaled (const pw_unknown *unknown, double value) {
   return (value - (unknown->has_bounds ? unknown->low : 0)) / unknown->scale;
 }
 
-/* Runs the model with local->unknown and stores the outputs; a run with outputs that are not finite fails. */
-static int search_run (const local_search *local, pw_error *error) {
-  const pw_optimise *problem = local->problem;
+/* Runs the model with these values of the unknowns and stores the outputs; a run with outputs that are not finite
+ * fails. */
+static int search_run (const pw_optimise *problem, const double *unknown, double *output, pw_error *error) {
   const pw_unknowns *unknowns = &problem->unknowns;
   pw_outcomes outcomes = { .system = NULL };
   pw_unknown_run run;
-  int status = pw_unknown_run_prepare (&run, unknowns, local->unknown, error);
+  int status = pw_unknown_run_prepare (&run, unknowns, unknown, error);
   if (status == PW_OK)
     status = pw_outcomes_open (&outcomes, run.m.system, "output", problem->output, problem->outputs, error);
   run.settings.ledger = outcomes.ledger;
   if (status == PW_OK) status = pw_outcomes_run (&outcomes, unknowns->method, &run.settings, unknowns->t_end, error);
   for (int i = 0; status == PW_OK && i < problem->outputs; i++) {
-    local->output[i] = pw_outcome_value (&outcomes, i, NULL);
-    if (!isfinite (local->output[i]))
-      status = pw_fail (error, PW_METHOD, "%s is %s", problem->output[i], PW_DIGITS (local->output[i], 9));
+    output[i] = pw_outcome_value (&outcomes, i, NULL);
+    if (!isfinite (output[i]))
+      status = pw_fail (error, PW_METHOD, "%s is %s", problem->output[i], PW_DIGITS (output[i], 9));
   }
   pw_outcomes_close (&outcomes);
   pw_unknown_run_close (&run);
@@ -162,7 +162,7 @@ static int search_try (local_search *local, int slopes, pw_error *error) {
     if (status == PW_RETRY || status == PW_RESOURCE) *error = own;
     if (status == PW_OK || status == PW_RETRY || status == PW_RESOURCE) return status;
   }
-  status = search_run (local, error);
+  status = search_run (local->problem, local->unknown, local->output, error);
   local->slopes_failed = slopes && status == PW_OK;
   if (local->slopes_failed) nlopt_force_stop (local->optimiser);
   return status;
@@ -343,22 +343,22 @@ int pw_search_effect (void *context, int i, pw_error *error) {
   pw_optimise *problem = context;
   const pw_unknown *unknown = problem->unknowns.list + i;
   size_t n = (size_t)problem->unknowns.count;
-  double *memory = calloc (n + (size_t)problem->outputs, sizeof *memory), value = problem->best->to[i];
-  if (memory == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  local_search local = { .problem = problem, .unknown = memory, .output = memory + n };
-  memcpy (local.unknown, problem->best->to, n * sizeof *memory);
+  double *unknowns = calloc (n + (size_t)problem->outputs, sizeof *unknowns), value = problem->best->to[i];
+  if (unknowns == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  double *output = unknowns + n;
+  memcpy (unknowns, problem->best->to, n * sizeof *unknowns);
   problem->without_effect[i] = problem->objective_same[i] = 1;
   for (int side = -1; side <= 1 && problem->objective_same[i]; side += 2) {
-    local.unknown[i] = search_unknown (unknown, search_scaled (unknown, value) + side * SEARCH_PROBE);
-    if (local.unknown[i] == value) continue;
-    const int failed = search_run (&local, &(pw_error){ 0 }) != PW_OK;
+    unknowns[i] = search_unknown (unknown, search_scaled (unknown, value) + side * SEARCH_PROBE);
+    if (unknowns[i] == value) continue;
+    const int failed = search_run (problem, unknowns, output, &(pw_error){ 0 }) != PW_OK;
     for (int k = 0; k < problem->outputs; k++) {
-      const double change = fabs (local.output[k] - problem->best->output[k]);
+      const double change = fabs (output[k] - problem->best->output[k]);
       if (!failed && change <= search_noise (problem, k)) continue;
       problem->without_effect[i] = 0;
       if (k == 0) problem->objective_same[i] = 0;
     }
   }
-  free (memory);
+  free (unknowns);
   return PW_OK;
 }
