@@ -59,11 +59,6 @@ static sensitivity_result sensitivity_of (const pw_sensitivity *sens, int output
 
 static void sensitivity_print (const pw_sensitivity *sens) {
   char unit[SENSITIVITY_UNIT];
-  static const struct {
-    int width;
-    const char *name;
-  } head[] = { { -14, "by" },  { 12, "value" }, { 12, "derivative" },
-               { -8, "unit" }, { 12, "error" }, { 12, "elasticity" } };
   printf ("%s by %s to t = %.9g s\n", pw_file_name (sens->unknowns.m->file), sens->unknowns.method,
           pw_run_time (sens->base.run));
   for (int o = 0; o < sens->outcomes.outcomes && !sens->stopped; o++) {
@@ -71,8 +66,11 @@ static void sensitivity_print (const pw_sensitivity *sens) {
     pw_cli_print (stdout, "\n%s = %s %s\n", sens->of[o], PW_DIGITS (pw_outcome_value (&sens->outcomes, o, NULL), 12),
                   unit);
     for (pw_table table = { 0 }; pw_table_pass (&table);) {
-      for (int k = 0; k < 6; k++) pw_cell (&table, head[k].width, head[k].name);
-      pw_row_end (&table);
+      pw_cell (&table, -14, "by");
+      pw_cell (&table, 12, "value");
+      pw_cell (&table, 12, "derivative");
+      pw_cell (&table, -8, "unit");
+      pw_head (&table, 12, 12, (const char *[]){ "error", "elasticity", NULL });
       for (int p = 0; p < sens->unknowns.count; p++) {
         const sensitivity_result result = sensitivity_of (sens, o, p);
         const pw_unknown *u = &sens->unknowns.list[p];
