@@ -159,15 +159,12 @@ static void functional_extremum (functional_step *step, pw_functional *f, const 
 
 /* ---- Along the run ---- */
 
-static int functional_begin (pw_outcomes *set, pw_run *r, pw_error *error) {
-  functional_step step = { set, r, pw_run_time (r), pw_run_time (r), PW_OK, error };
-  set->t0 = set->t = step.t0;
-  functional_sample (&step, set->t, 0);
-  for (pw_functional *f = set->functional; f < set->functional + set->functionals; f++) {
+static void functional_begin (functional_step *step) {
+  functional_sample (step, step->t1, 0);
+  for (pw_functional *f = step->set->functional; f < step->set->functional + step->set->functionals; f++) {
     f->value = pw_is_integral (f->type) ? 0 : f->values[0];
-    f->t = set->t;
+    f->t = step->t1;
   }
-  return step.status;
 }
 
 /* Times in a step: its beginning, just after it, the nodes of Gauss' formula, just before the end, the end. */
@@ -197,50 +194,47 @@ static void functional_simpson (const functional_step *step, pw_functional *f) {
   }
 }
 
-static int functional_advance (pw_outcomes *set, pw_run *r, pw_error *error) {
-  functional_step step = { set, r, set->t, pw_run_time (r), PW_OK, error };
+static void functional_advance (functional_step *step) {
   double t[PW_FUNCTIONAL_TIMES];
-  int nodes = pw_system_jumps (set->system, step.t1);
-  pw_functional *const end = set->functional + set->functionals;
-  set->t = step.t1;
-  if (!set->along_run) return PW_OK;
-  functional_times (&step, t);
-  functional_sample (&step, t[FUNCTIONAL_MIDDLE], FUNCTIONAL_MIDDLE);
-  functional_sample (&step, step.t1, FUNCTIONAL_END);
-  for (const pw_functional *f = set->functional; f < end; f++) nodes |= functional_needs_nodes (f);
+  int nodes = pw_system_jumps (step->set->system, step->t1);
+  pw_functional *const begin = step->set->functional, *const end = begin + step->set->functionals;
+  functional_times (step, t);
+  functional_sample (step, t[FUNCTIONAL_MIDDLE], FUNCTIONAL_MIDDLE);
+  functional_sample (step, step->t1, FUNCTIONAL_END);
+  for (const pw_functional *f = begin; f < end; f++) nodes |= functional_needs_nodes (f);
   for (int i = 1; nodes && i < FUNCTIONAL_END; i++)
-    if (i != FUNCTIONAL_MIDDLE) functional_sample (&step, t[i], i);
-  for (pw_functional *f = set->functional; f < end && step.status == PW_OK; f++) {
-    if (pw_is_integral (f->type) && nodes) functional_integrate (&step, f, step.t0, step.t1, f->values + 2, 0);
-    if (pw_is_integral (f->type) && !nodes) functional_simpson (&step, f);
-    if (pw_is_extremum (f->type) && nodes) functional_extremum (&step, f, t, f->values);
-    if (pw_is_extremum (f->type) && !nodes) functional_update_extremum (&step, f, step.t1, f->values[FUNCTIONAL_END]);
+    if (i != FUNCTIONAL_MIDDLE) functional_sample (step, t[i], i);
+  for (pw_functional *f = begin; f < end && step->status == PW_OK; f++) {
+    if (pw_is_integral (f->type) && nodes) functional_integrate (step, f, step->t0, step->t1, f->values + 2, 0);
+    if (pw_is_integral (f->type) && !nodes) functional_simpson (step, f);
+    if (pw_is_extremum (f->type) && nodes) functional_extremum (step, f, t, f->values);
+    if (pw_is_extremum (f->type) && !nodes) functional_update_extremum (step, f, step->t1, f->values[FUNCTIONAL_END]);
     f->values[0] = f->values[FUNCTIONAL_END];
   }
-  return step.status;
 }
 
-static int functional_end (pw_outcomes *set, pw_run *r, pw_error *error) {
-  functional_step step = { set, r, set->t, pw_run_time (r), PW_OK, error };
-  const double span = set->t - set->t0;
-  for (pw_functional *f = set->functional; f < set->functional + set->functionals && step.status == PW_OK; f++) {
+/* span: the duration of the run [s]. */
+static void functional_end (functional_step *step, double span) {
+  for (pw_functional *f = step->set->functional; f < step->set->functional + step->set->functionals; f++) {
     if (f->type == PW_MEAN) f->value /= span;
     if (f->type == PW_RMS) f->value = sqrt (f->value / span);
-    if (f->type == PW_FINAL) f->value = functional_at (&step, f, step.t1);
+    if (f->type == PW_FINAL) f->value = functional_at (step, f, step->t1);
   }
-  return step.status;
 }
 
 int pw_outcomes_run (pw_outcomes *set, const char *method, const pw_settings *settings, double t_end, pw_error *error) {
   pw_run *r = pw_run_open (set->system, method, settings, error);
   if (r == NULL) return error->status;
-  int status = functional_begin (set, r, error);
-  while (status == PW_OK && pw_run_time (r) < t_end) {
-    status = pw_run_advance (r, t_end, error);
-    if (status == PW_OK) status = functional_advance (set, r, error);
+  const double begin = pw_run_time (r);
+  functional_step step = { set, r, begin, begin, PW_OK, error };
+  functional_begin (&step);
+  while (step.status == PW_OK && step.t1 < t_end) {
+    step.status = pw_run_advance (r, t_end, error);
+    step.t0 = step.t1, step.t1 = pw_run_time (r);
+    if (step.status == PW_OK && set->along_run) functional_advance (&step);
   }
-  if (status == PW_OK) status = functional_end (set, r, error);
-  if (status == PW_STOPPED) status = pw_limit_status (settings->stop_context, pw_run_time (r), error);
+  functional_end (&step, step.t1 - begin);
+  if (step.status == PW_STOPPED) step.status = pw_limit_status (settings->stop_context, step.t1, error);
   pw_run_close (r);
-  return status;
+  return step.status;
 }

@@ -91,7 +91,6 @@ typedef struct {
   int ledger;    /* 1: runs need pw_settings.ledger */
   int along_run; /* 1: there are extrema or integrals, for which every step of the run is sampled */
   /* private */
-  double t0, t;            /* the beginning of the run, the time reached [s] */
   pw_workspace *workspace; /* for contact points */
   double (*contact)[3];
 } pw_outcomes;
