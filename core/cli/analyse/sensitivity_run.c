@@ -351,6 +351,7 @@ int pw_sensitivity_start (pw_sensitivity *sens, const double *values, pw_error *
   int status = sensitivity_prepare (sens, values, error);
   if (status == PW_OK) status = sensitivity_open_runs (sens, error);
   if (status == PW_OK) status = sensitivity_arrays (sens, error);
+  pw_limit_start (&sens->base.limit); /* without the time to open the neighbours */
   if (status != PW_OK) return status;
   sens->variation =
       pw_variation_open (sens->base.run, sens->direction, sens->unknowns.count, sens->outcomes.ledger, error);
