@@ -26,6 +26,7 @@
 enum {
   FUNCTIONAL_MIDDLE = 4,                    /* index of the time in the middle of a step, see functional_times */
   FUNCTIONAL_END = PW_FUNCTIONAL_TIMES - 1, /* and at its end */
+  FUNCTIONAL_OTHER = PW_FUNCTIONAL_TIMES,   /* index of any other time */
   FUNCTIONAL_DIVISIONS = 4,                 /* of a step into halves, at most */
   FUNCTIONAL_ITERATIONS = 60                /* of Brent's method, at most; golden sections alone would need 39 */
 };
@@ -48,29 +49,29 @@ typedef struct {
 
 /* ---- Values ---- */
 
-/* Evaluates the contact points at a sample, if a functional needs them. */
-static int functional_find_contacts (pw_outcomes *set, const pw_sample *s, pw_error *error) {
-  int contacts = 0;
+int pw_outcomes_read (pw_outcomes *set, const pw_sample *s, int at, pw_error *error) {
+  int contacts = 0, status = PW_OK;
   for (int i = 0; i < set->functionals; i++) contacts |= set->functional[i].column.type == PW_COLUMN_CONTACT;
-  return contacts ? pw_workspace_contact_points (set->workspace, s->t, s->q, s->v, set->contact, error) : PW_OK;
+  if (contacts) status = pw_workspace_contact_points (set->workspace, s->t, s->q, s->v, set->contact, error);
+  for (pw_functional *f = set->functional; f < set->functional + set->functionals && status == PW_OK; f++) {
+    const pw_column c = f->column;
+    f->values[at] =
+        c.type == PW_COLUMN_CONTACT ? set->contact[c.index / 2][c.index % 2] : pw_column_value (set->system, c, s);
+  }
+  return status;
 }
 
-static double functional_read (const pw_outcomes *set, const pw_functional *f, const pw_sample *s) {
-  if (f->column.type == PW_COLUMN_CONTACT) return set->contact[f->column.index / 2][f->column.index % 2];
-  return pw_column_value (set->system, f->column, s);
-}
-
-/* Samples the run at time t in the step.  Returns 0, with step->status set, if that or an earlier sample failed. */
-static int functional_sample (functional_step *step, double t, pw_sample *s) {
-  if (step->status == PW_OK) step->status = pw_run_sample (step->run, t, s, step->error);
-  if (step->status == PW_OK) step->status = functional_find_contacts (step->set, s, step->error);
-  return step->status == PW_OK;
+/* Stores the columns at t, a time in the step, as values[at], unless that or an earlier sample fails. */
+static void functional_sample (functional_step *step, double t, int at) {
+  pw_sample s;
+  if (step->status == PW_OK) step->status = pw_run_sample (step->run, t, &s, step->error);
+  if (step->status == PW_OK) step->status = pw_outcomes_read (step->set, &s, at, step->error);
 }
 
 /* The column of a functional at time t in the step; NaN if that fails. */
 static double functional_at (functional_step *step, const pw_functional *f, double t) {
-  pw_sample s;
-  return functional_sample (step, t, &s) ? functional_read (step->set, f, &s) : NAN;
+  functional_sample (step, t, FUNCTIONAL_OTHER);
+  return step->status == PW_OK ? f->values[FUNCTIONAL_OTHER] : NAN;
 }
 
 /* ---- Integrals ---- */
@@ -158,17 +159,12 @@ static void functional_extremum (functional_step *step, pw_functional *f, const 
 
 /* ---- Along the run ---- */
 
-static int functional_begin (pw_outcomes *set, pw_run *r, pw_error *error) {
-  pw_sample s;
-  set->t0 = set->t = pw_run_time (r);
-  int status = pw_run_sample (r, set->t, &s, error);
-  if (status == PW_OK) status = functional_find_contacts (set, &s, error);
-  for (pw_functional *f = set->functional; f < set->functional + set->functionals && status == PW_OK; f++) {
-    f->values[0] = functional_read (set, f, &s);
+static void functional_begin (functional_step *step) {
+  functional_sample (step, step->t1, 0);
+  for (pw_functional *f = step->set->functional; f < step->set->functional + step->set->functionals; f++) {
     f->value = pw_is_integral (f->type) ? 0 : f->values[0];
-    f->t = set->t;
+    f->t = step->t1;
   }
-  return status;
 }
 
 /* Times in a step: its beginning, just after it, the nodes of Gauss' formula, just before the end, the end. */
@@ -177,14 +173,6 @@ static void functional_times (const functional_step *step, double t[PW_FUNCTIONA
   t[0] = step->t0, t[1] = step->t0 + PW_FUNCTIONAL_INSET * h;
   for (int i = 0; i < PW_GAUSS_NODES; i++) t[2 + i] = pw_gauss_time (step->t0, step->t1, i);
   t[FUNCTIONAL_END - 1] = step->t1 - PW_FUNCTIONAL_INSET * h, t[FUNCTIONAL_END] = step->t1;
-}
-
-/* Stores the columns of all functionals at t, time number i of the step. */
-static void functional_sample_columns (functional_step *step, double t, int i) {
-  pw_sample s;
-  if (!functional_sample (step, t, &s)) return;
-  for (pw_functional *f = step->set->functional; f < step->set->functional + step->set->functionals; f++)
-    f->values[i] = functional_read (step->set, f, &s);
 }
 
 /* 1 if the values at the ends and in the middle do not suffice: the column of an integral bends too much; or that of an
@@ -206,57 +194,47 @@ static void functional_simpson (const functional_step *step, pw_functional *f) {
   }
 }
 
-static int functional_advance (pw_outcomes *set, pw_run *r, pw_error *error) {
-  functional_step step = { set, r, set->t, pw_run_time (r), PW_OK, error };
+static void functional_advance (functional_step *step) {
   double t[PW_FUNCTIONAL_TIMES];
-  int nodes = pw_system_jumps (set->system, step.t1);
-  pw_functional *const end = set->functional + set->functionals;
-  set->t = step.t1;
-  if (!set->along_run) return PW_OK;
-  functional_times (&step, t);
-  functional_sample_columns (&step, t[FUNCTIONAL_MIDDLE], FUNCTIONAL_MIDDLE);
-  functional_sample_columns (&step, step.t1, FUNCTIONAL_END);
-  for (const pw_functional *f = set->functional; f < end; f++) nodes |= functional_needs_nodes (f);
+  int nodes = pw_system_jumps (step->set->system, step->t1);
+  pw_functional *const begin = step->set->functional, *const end = begin + step->set->functionals;
+  functional_times (step, t);
+  functional_sample (step, t[FUNCTIONAL_MIDDLE], FUNCTIONAL_MIDDLE);
+  functional_sample (step, step->t1, FUNCTIONAL_END);
+  for (const pw_functional *f = begin; f < end; f++) nodes |= functional_needs_nodes (f);
   for (int i = 1; nodes && i < FUNCTIONAL_END; i++)
-    if (i != FUNCTIONAL_MIDDLE) functional_sample_columns (&step, t[i], i);
-  for (pw_functional *f = set->functional; f < end && step.status == PW_OK; f++) {
-    if (pw_is_integral (f->type) && nodes) functional_integrate (&step, f, step.t0, step.t1, f->values + 2, 0);
-    if (pw_is_integral (f->type) && !nodes) functional_simpson (&step, f);
-    if (pw_is_extremum (f->type) && nodes) functional_extremum (&step, f, t, f->values);
-    if (pw_is_extremum (f->type) && !nodes) functional_update_extremum (&step, f, step.t1, f->values[FUNCTIONAL_END]);
+    if (i != FUNCTIONAL_MIDDLE) functional_sample (step, t[i], i);
+  for (pw_functional *f = begin; f < end && step->status == PW_OK; f++) {
+    if (pw_is_integral (f->type) && nodes) functional_integrate (step, f, step->t0, step->t1, f->values + 2, 0);
+    if (pw_is_integral (f->type) && !nodes) functional_simpson (step, f);
+    if (pw_is_extremum (f->type) && nodes) functional_extremum (step, f, t, f->values);
+    if (pw_is_extremum (f->type) && !nodes) functional_update_extremum (step, f, step->t1, f->values[FUNCTIONAL_END]);
     f->values[0] = f->values[FUNCTIONAL_END];
   }
-  return step.status;
 }
 
-static int functional_end (pw_outcomes *set, pw_run *r, pw_error *error) {
-  functional_step step = { set, r, set->t, pw_run_time (r), PW_OK, error };
-  const double span = set->t - set->t0;
-  for (pw_functional *f = set->functional; f < set->functional + set->functionals && step.status == PW_OK; f++) {
+/* span: the duration of the run [s]. */
+static void functional_end (functional_step *step, double span) {
+  for (pw_functional *f = step->set->functional; f < step->set->functional + step->set->functionals; f++) {
     if (f->type == PW_MEAN) f->value /= span;
     if (f->type == PW_RMS) f->value = sqrt (f->value / span);
-    if (f->type == PW_FINAL) f->value = functional_at (&step, f, step.t1);
+    if (f->type == PW_FINAL) f->value = functional_at (step, f, step->t1);
   }
-  return step.status;
-}
-
-int pw_outcomes_read (pw_outcomes *set, const pw_sample *s, double *value, int stride, pw_error *error) {
-  int status = functional_find_contacts (set, s, error);
-  for (int i = 0; status == PW_OK && i < set->functionals; i++)
-    value[i * stride] = functional_read (set, set->functional + i, s);
-  return status;
 }
 
 int pw_outcomes_run (pw_outcomes *set, const char *method, const pw_settings *settings, double t_end, pw_error *error) {
   pw_run *r = pw_run_open (set->system, method, settings, error);
   if (r == NULL) return error->status;
-  int status = functional_begin (set, r, error);
-  while (status == PW_OK && pw_run_time (r) < t_end) {
-    status = pw_run_advance (r, t_end, error);
-    if (status == PW_OK) status = functional_advance (set, r, error);
+  const double begin = pw_run_time (r);
+  functional_step step = { set, r, begin, begin, PW_OK, error };
+  functional_begin (&step);
+  while (step.status == PW_OK && step.t1 < t_end) {
+    step.status = pw_run_advance (r, t_end, error);
+    step.t0 = step.t1, step.t1 = pw_run_time (r);
+    if (step.status == PW_OK && set->along_run) functional_advance (&step);
   }
-  if (status == PW_OK) status = functional_end (set, r, error);
-  if (status == PW_STOPPED) status = pw_limit_status (settings->stop_context, pw_run_time (r), error);
+  functional_end (&step, step.t1 - begin);
+  if (step.status == PW_STOPPED) step.status = pw_limit_status (settings->stop_context, step.t1, error);
   pw_run_close (r);
-  return status;
+  return step.status;
 }

@@ -137,24 +137,22 @@ static int linearise_compute (pw_linearise_command *cmd, pw_error *error) {
 /* ---- Files ---- */
 
 /* Indices in the list of files of linearise_open_files; 0 is the model. */
-enum { LINEARISE_JSON = 1, LINEARISE_CSV, LINEARISE_NPZ, LINEARISE_PAGE, LINEARISE_FILES };
+enum { LINEARISE_JSON = 1, LINEARISE_CSV, LINEARISE_NPZ, LINEARISE_PAGE };
 
 /* Opens NAME.json, .csv, .npz, and the page, before anything is computed. */
 static int linearise_open_files (pw_linearise_command *cmd, pw_error *error) {
-  static const char *const ending[] = { [LINEARISE_JSON] = "json", "csv", "npz" };
-  char path[LINEARISE_PAGE][4096];
-  pw_use use[LINEARISE_FILES] = { PW_CLI_MODEL_USE, [LINEARISE_PAGE] = { "--animate", cmd->page_path, PW_WRITES,
-                                                                         NULL } };
-  const char *slash = cmd->name ? strrchr (cmd->name, '/') : NULL, *last = slash ? slash + 1 : cmd->name;
+  enum { PATH = 4096 };
+  const char *name = cmd->name, *slash = name ? strrchr (name, '/') : NULL, *last = slash ? slash + 1 : name;
   if (last && (*last == 0 || strcmp (last, ".") == 0 || strcmp (last, "..") == 0))
-    return pw_fail (error, PW_INPUT, "-o %s: expected a NAME, for NAME.json, NAME.csv and NAME.npz", cmd->name);
-  for (int i = LINEARISE_JSON; i < LINEARISE_PAGE && cmd->name; i++) {
-    if (snprintf (path[i], sizeof path[i], "%s.%s", cmd->name, ending[i]) >= (int)sizeof path[i])
-      return pw_fail (error, PW_INPUT, "-o: the name is too long");
-    use[i] = (pw_use){ "-o", path[i], PW_WRITES, NULL };
-  }
+    return pw_fail (error, PW_INPUT, "-o %s: expected a NAME, for NAME.json, NAME.csv and NAME.npz", name);
+  if (name && strlen (name) + sizeof ".json" > PATH) return pw_fail (error, PW_INPUT, "-o: the name is too long");
   if (cmd->page_path && pw_animation_check ("--animate", cmd->page_path, error) != PW_OK) return error->status;
-  return pw_files_open (&cmd->files, &cmd->line, &cmd->m, use, LINEARISE_FILES, error);
+  pw_use use[] = { PW_CLI_MODEL_USE,
+                   { "-o", name ? PW_PRINTED (PATH, "%s.json", name) : NULL, PW_WRITES, NULL },
+                   { "-o", name ? PW_PRINTED (PATH, "%s.csv", name) : NULL, PW_WRITES, NULL },
+                   { "-o", name ? PW_PRINTED (PATH, "%s.npz", name) : NULL, PW_WRITES, NULL },
+                   { "--animate", cmd->page_path, PW_WRITES, NULL } };
+  return pw_files_open (&cmd->files, &cmd->line, &cmd->m, use, sizeof use / sizeof *use, error);
 }
 
 static int linearise_write (pw_linearise_command *cmd, pw_error *error) {

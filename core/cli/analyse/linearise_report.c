@@ -156,7 +156,6 @@ static void linearise_blocks (const pw_linearise_command *cmd, linearise_block b
 }
 
 static void linearise_block_json (const pw_linearise_command *cmd, pw_json *j, const linearise_block *b) {
-  j->line = 1;
   pw_json_open (j, b->name, '[');
   for (int i = 0; i < b->rows; i++) {
     j->line = 1;
@@ -189,7 +188,6 @@ static void linearise_mode_json (const pw_linearise_command *cmd, pw_json *j, in
 static void linearise_names_json (const pw_linearise_command *cmd, pw_json *j, const char *key, const int *list,
                                   int count, char *(*name_of) (const pw_system *s, int i, char *buffer, size_t size),
                                   const char *(*unit_of) (const pw_system *s, int i)) {
-  j->line = 1;
   pw_json_open (j, key, '[');
   for (int i = 0; i < count; i++) {
     pw_json_open (j, NULL, '{');
@@ -216,7 +214,6 @@ void pw_linearise_json (const pw_linearise_command *cmd, pw_json *j) {
   linearise_names_json (cmd, j, "outputs", cmd->output, cmd->outputs, pw_system_state_name, pw_system_state_unit);
   linearise_blocks (cmd, block);
   for (int i = 0; i < 4; i++) linearise_block_json (cmd, j, &block[i]);
-  j->line = 1;
   pw_json_open (j, "eigenvalues", '[');
   for (int i = 0; i < l->unknowns; i++) linearise_mode_json (cmd, j, i);
   pw_json_close (j, ']');

@@ -148,10 +148,10 @@ static size_t outcome_term_length (const pw_system *s, const char *text) {
   return prefix + longest;
 }
 
-/* Length of what the formula contains unchanged: a function or constant, a number, or another character. */
+/* Length of what the formula contains unchanged: a function or constant, a number up to the sign of
+ * its exponent, or another character. */
 static size_t outcome_copied_length (const char *text) {
-  size_t n = strspn (text, OUTCOME_LETTERS "0123456789."), sign = text[n] == '+' || text[n] == '-';
-  if (n > 1 && strchr ("0123456789.", *text) && strchr ("eE", text[n - 1]) && sign) n += 1; /* of an exponent: 1e-3 */
+  size_t n = strspn (text, OUTCOME_LETTERS "0123456789.");
   return n ? n : 1;
 }
 

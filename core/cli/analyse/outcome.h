@@ -68,10 +68,10 @@ static inline double pw_gauss_time (double t0, double t1, int node) {
 typedef struct {
   pw_functional_type type;
   pw_column column;
-  double value;                       /* set by pw_outcomes_run; final ones also by pw_sensitivity_compute */
-  double t;                           /* time of the extremum so far [s] */
-  double step;                        /* size of the step of the run that contains the extremum [s] */
-  double values[PW_FUNCTIONAL_TIMES]; /* private: the column at times of the current step; [0] at its beginning */
+  double value;                           /* set by pw_outcomes_run; final ones also by pw_sensitivity_compute */
+  double t;                               /* time of the extremum so far [s] */
+  double step;                            /* size of the step of the run that contains the extremum [s] */
+  double values[PW_FUNCTIONAL_TIMES + 1]; /* of the column: set by pw_outcomes_read */
 } pw_functional;
 
 /* One output. */
@@ -91,7 +91,6 @@ typedef struct {
   int ledger;    /* 1: runs need pw_settings.ledger */
   int along_run; /* 1: there are extrema or integrals, for which every step of the run is sampled */
   /* private */
-  double t0, t;            /* the beginning of the run, the time reached [s] */
   pw_workspace *workspace; /* for contact points */
   double (*contact)[3];
 } pw_outcomes;
@@ -102,8 +101,9 @@ int pw_outcomes_open (pw_outcomes *set, const pw_system *s, const char *option, 
                       pw_error *error);
 void pw_outcomes_close (pw_outcomes *set);
 
-/* Stores the column of functional i in a sample as value[i x stride]. */
-int pw_outcomes_read (pw_outcomes *set, const pw_sample *s, double *value, int stride, pw_error *error);
+/* Stores the columns in a sample as values[at] of their functionals.  pw_outcomes_run overwrites these: by the columns
+ * at times of the current step, [0] at its beginning, and at another one, [PW_FUNCTIONAL_TIMES]. */
+int pw_outcomes_read (pw_outcomes *set, const pw_sample *s, int at, pw_error *error);
 /* Evaluates the functionals along a run to t_end; settings.stop_context is a pw_limit.  A status: that of
  * pw_limit_status if the run is stopped. */
 int pw_outcomes_run (pw_outcomes *set, const char *method, const pw_settings *settings, double t_end, pw_error *error);

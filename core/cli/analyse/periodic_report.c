@@ -174,7 +174,6 @@ static void periodic_json (const void *context, pw_json *j) {
   pw_json_text (j, "method", cmd->settings.method);
   pw_json_number (j, "symmetries", pw_periodic_symmetries (cmd->search));
   pw_json_flag (j, "complete", !cmd->stopped);
-  j->line = 1;
   pw_json_open (j, "motions", '[');
   for (int i = 0; i < cmd->points; i++) periodic_point_json (cmd, &cmd->point[i].orbit, j);
   pw_json_close (j, ']');

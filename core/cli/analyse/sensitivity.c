@@ -59,11 +59,6 @@ static sensitivity_result sensitivity_of (const pw_sensitivity *sens, int output
 
 static void sensitivity_print (const pw_sensitivity *sens) {
   char unit[SENSITIVITY_UNIT];
-  static const struct {
-    int width;
-    const char *name;
-  } head[] = { { -14, "by" },  { 12, "value" }, { 12, "derivative" },
-               { -8, "unit" }, { 12, "error" }, { 12, "elasticity" } };
   printf ("%s by %s to t = %.9g s\n", pw_file_name (sens->unknowns.m->file), sens->unknowns.method,
           pw_run_time (sens->base.run));
   for (int o = 0; o < sens->outcomes.outcomes && !sens->stopped; o++) {
@@ -71,8 +66,11 @@ static void sensitivity_print (const pw_sensitivity *sens) {
     pw_cli_print (stdout, "\n%s = %s %s\n", sens->of[o], PW_DIGITS (pw_outcome_value (&sens->outcomes, o, NULL), 12),
                   unit);
     for (pw_table table = { 0 }; pw_table_pass (&table);) {
-      for (int k = 0; k < 6; k++) pw_cell (&table, head[k].width, head[k].name);
-      pw_row_end (&table);
+      pw_cell (&table, -14, "by");
+      pw_cell (&table, 12, "value");
+      pw_cell (&table, 12, "derivative");
+      pw_cell (&table, -8, "unit");
+      pw_head (&table, 12, 12, (const char *[]){ "error", "elasticity", NULL });
       for (int p = 0; p < sens->unknowns.count; p++) {
         const sensitivity_result result = sensitivity_of (sens, o, p);
         const pw_unknown *u = &sens->unknowns.list[p];
@@ -240,7 +238,6 @@ static int sensitivity_open (sensitivity *cmd, pw_error *error) {
   if (status == PW_OK) status = pw_unknowns_open (&sens->unknowns, &cmd->line, &cmd->m, error);
   if (status == PW_OK) status = pw_unknowns_engine (&sens->unknowns, 1, 1, error);
   if (status != PW_OK) return status;
-  sens->unknowns.settings.specialised = pw_scene_code_table (sens->unknowns.engine.code);
   if (cmd->folder) sens->row_interval = sens->unknowns.t_end / SENSITIVITY_ROWS;
   status = pw_cli_requires ("--every", cmd->every, "-o DIR", cmd->folder != NULL, error);
   if (status == PW_OK) status = pw_cli_number ("--every", cmd->every, PW_POSITIVE, &sens->row_interval, error);
@@ -290,7 +287,8 @@ static int sensitivity_loosen (pw_sensitivity *sens, pw_progress *progress, pw_e
   sens->loose = pw_arena_alloc (&sens->arena, (size_t)(outputs * unknowns) * sizeof *sens->loose);
   if (sens->loose == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   int status = pw_sensitivity_compute (&other, NULL, progress, error);
-  if (status == PW_OK && other.stopped) status = pw_limit_status (&other.limit, pw_run_time (other.base.run), error);
+  if (status == PW_OK && other.stopped)
+    status = pw_limit_status (&other.base.limit, pw_run_time (other.base.run), error);
   for (int i = 0; i < outputs * unknowns; i++)
     sens->loose[i] =
         status == PW_OK ? pw_sensitivity_derivative (&other, i / unknowns, i % unknowns, other.run_slope) : NAN;
@@ -316,7 +314,7 @@ static int sensitivity_compute (pw_sensitivity *sens, pw_error *error) {
   int status = pw_sensitivity_compute (sens, NULL, &progress, error);
   for (int i = 0; i < SENSITIVITY_REPEATED && status == PW_OK && sensitivity_improve_steps (sens); i++) {
     status = sensitivity_repeat (sens, &progress, error);
-    if (status == PW_OK || status == PW_RESOURCE || pw_limit_over (&sens->limit)) continue; /* or after Ctrl-C */
+    if (status == PW_OK || status == PW_RESOURCE || pw_limit_over (&sens->base.limit)) continue; /* or after Ctrl-C */
     for (int p = 0; p < sens->unknowns.count; p++) sens->unknowns.list[p].step = sens->unknowns.list[p].last_step;
     *error = (pw_error){ 0 }; /* such as that of a model that refuses the value of a neighbour */
     status = sensitivity_repeat (sens, &progress, error);
@@ -350,7 +348,8 @@ static int sensitivity_command (void *options, pw_error *error) {
   if (status == PW_OK) status = sensitivity_check (sens, error);
   if (status == PW_OK) sensitivity_print (sens), sensitivity_warn (sens);
   if (status == PW_OK && cmd->folder) status = sensitivity_write (cmd, error);
-  if (status == PW_OK && sens->stopped) status = pw_limit_status (&sens->limit, pw_run_time (sens->base.run), error);
+  if (status == PW_OK && sens->stopped)
+    status = pw_limit_status (&sens->base.limit, pw_run_time (sens->base.run), error);
   if (status == PW_OK && without_errors) status = PW_RETRY;
   pw_files_close (&cmd->files);
   pw_sensitivity_close (sens);

@@ -19,30 +19,29 @@ typedef struct {
   double *row;                         /* rows x columns */
   double *loose;                       /* outputs x P: derivatives with larger tolerances, NaN: failed; or NULL */
   int stopped;                         /* 1: stopped before t_end, by Ctrl-C or the limit */
-  pw_limit limit;                      /* of all runs of one computation together */
-  pw_unknown_run base;                 /* the run, at the given values of the unknowns */
+  pw_unknown_run base;                 /* the run, at the given values of the unknowns; its limit is that of all runs */
   pw_direction *direction;             /* P */
-  /* at the time last evaluated: */
-  double *value;               /* 2 F: columns of the functionals; then scratch, the gradient of an output */
+  /* at the time last evaluated, where the columns of the functionals are their values[0]: */
   double *slope, *slope_error; /* F x P: derivatives of the columns, and their errors */
   /* private */
+  double *gradient;           /* F: scratch, of an output */
   double *unknown_value;      /* P: the given values */
   pw_unknown_run *neighbours; /* 4 P: those of each direction */
   pw_variation *variation;
-  pw_run *sampled;                    /* the run of which samples are taken; NULL: base.run */
-  double last_breakpoint;             /* that has been reached [s] */
-  double *before;                     /* F + F P: values and derivatives before a jump */
-  double *q;                          /* coordinates: scratch */
-  struct pw_sensitivity_point *point; /* F + PW_GAUSS_NODES: the times of the current interval */
-  char *memory;                       /* of value, slope, run_slope, their errors, before and q */
-  pw_arena arena;                     /* of loose, direction, unknown_value, neighbours and point */
-  size_t room;                        /* rows allocated */
+  pw_run *sampled;        /* the run of which samples are taken; NULL: base.run */
+  double last_breakpoint; /* that has been reached [s] */
+  double *before;         /* F + F P: values and derivatives before a jump */
+  double *q;              /* coordinates: scratch */
+  char *memory;           /* of gradient, slope, run_slope, their errors, before and q */
+  pw_arena arena;         /* of loose, direction, unknown_value and neighbours */
+  size_t room;            /* rows allocated */
 } pw_sensitivity;
 
 /* Begins the run with its derivatives at these values of the unknowns; NULL: their own.  Set the members up to
  * `no_error` before, the others to zero.  Close it in every case. */
 int pw_sensitivity_start (pw_sensitivity *sens, const double *values, pw_error *error);
-/* Advances the run to a time, and sets value, slope and slope_error there.  Returns as pw_variation_advance. */
+/* Advances the run to a time, and sets slope, slope_error and the functionals' values[0] there.  Returns as
+ * pw_variation_advance. */
 int pw_sensitivity_at (pw_sensitivity *sens, double t, pw_error *error);
 /* Starts the run, advances it to the end, and computes all results except `loose`.  PW_OK with `stopped` if it is
  * stopped while it computes derivatives; the status of pw_outcomes_run if before. */

@@ -25,9 +25,10 @@ int pw_sensitivity_in_table (const pw_sensitivity *sens, int output) {
 
 double pw_sensitivity_derivative (const pw_sensitivity *sens, int output, int unknown, const double *slope) {
   const pw_outcome *o = &sens->outcomes.outcome[output];
-  double *gradient = sens->value + sens->outcomes.functionals, sum = 0;
-  pw_outcome_value (&sens->outcomes, output, gradient);
-  for (int i = 0; i < o->terms; i++) sum += gradient[o->term[i]] * slope[o->term[i] * sens->unknowns.count + unknown];
+  double sum = 0;
+  pw_outcome_value (&sens->outcomes, output, sens->gradient);
+  for (int i = 0; i < o->terms; i++)
+    sum += sens->gradient[o->term[i]] * slope[o->term[i] * sens->unknowns.count + unknown];
   return sum;
 }
 
@@ -74,7 +75,7 @@ int pw_sensitivity_at (pw_sensitivity *sens, double t, pw_error *error) {
   int status = pw_variation_advance (sens->variation, t, sens->unknowns.t_end, error);
   if (status == PW_OK && sens->sampled) status = pw_run_advance_to (sens->sampled, t, sens->unknowns.t_end, error);
   if (status == PW_OK) status = pw_run_sample (sens->sampled ? sens->sampled : sens->base.run, t, &s, error);
-  if (status == PW_OK) status = pw_outcomes_read (&sens->outcomes, &s, sens->value, 1, error);
+  if (status == PW_OK) status = pw_outcomes_read (&sens->outcomes, &s, 0, error);
   for (int p = 0; p < P && status == PW_OK; p++) {
     status = pw_variation_sample (sens->variation, p, &derivative, &slope_error, error);
     for (int i = 0; i < sens->outcomes.functionals && status == PW_OK; i++) {
@@ -101,7 +102,7 @@ static void sensitivity_add_node (pw_sensitivity *sens, double weight) {
     const pw_functional *f = &sens->outcomes.functional[i];
     double factor = f->type == PW_INTEGRAL ? weight : weight / sens->unknowns.t_end;
     if (!pw_is_integral (f->type)) continue;
-    if (f->type == PW_RMS) factor *= f->value > 0 ? sens->value[i] / f->value : 0;
+    if (f->type == PW_RMS) factor *= f->value > 0 ? f->values[0] / f->value : 0;
     for (int p = i * sens->unknowns.count; p < (i + 1) * sens->unknowns.count; p++) {
       sens->run_slope[p] += factor * sens->slope[p];
       sens->run_slope_error[p] += factor * sens->slope_error[p];
@@ -125,24 +126,18 @@ static void sensitivity_keep (pw_sensitivity *sens, int i) {
       sens->run_slope[at] = sens->slope[at], sens->run_slope_error[at] = sens->slope_error[at];
 }
 
-/* The same for an extremum, whose derivatives do not exist if it is at a breakpoint whose time depends on the unknown.
- * at_next: 1: it is known to be at the next breakpoint. */
-static void sensitivity_keep_extremum (pw_sensitivity *sens, int i, int at_next) {
-  const pw_functional *f = &sens->outcomes.functional[i];
-  const double near = 2 * PW_FUNCTIONAL_INSET * f->step; /* extrema are sought beside the ends of a step */
-  double slope, next = pw_variation_breakpoint (sens->variation, 0, &slope);
-  int at_last = f->t - sens->last_breakpoint <= near;
-  at_next |= next - f->t <= near;
-  sensitivity_keep (sens, i);
-  for (int p = 0; p < sens->unknowns.count && (at_next || at_last); p++)
-    if (sensitivity_jump_slope (sens, p, !at_next) != 0) sens->run_slope[i * sens->unknowns.count + p] = NAN;
-}
-
-/* The same for all extrema in (t0, t1]. */
+/* The same for all extrema in (t0, t1]; the derivatives of one do not exist if it is at a breakpoint whose time depends
+ * on the unknown.  at_next: 1: they are known to be at the next breakpoint. */
 static void sensitivity_keep_extrema (pw_sensitivity *sens, double t0, double t1, int at_next) {
+  double slope, next = pw_variation_breakpoint (sens->variation, 0, &slope);
   for (int i = 0; i < sens->outcomes.functionals; i++) {
     const pw_functional *f = &sens->outcomes.functional[i];
-    if (pw_is_extremum (f->type) && f->t > t0 && f->t <= t1) sensitivity_keep_extremum (sens, i, at_next);
+    const double near = 2 * PW_FUNCTIONAL_INSET * f->step; /* extrema are sought beside the ends of a step */
+    const int before = at_next || next - f->t <= near, after = f->t - sens->last_breakpoint <= near;
+    if (!pw_is_extremum (f->type) || f->t <= t0 || f->t > t1) continue;
+    sensitivity_keep (sens, i);
+    for (int p = 0; p < sens->unknowns.count && (before || after); p++)
+      if (sensitivity_jump_slope (sens, p, !before) != 0) sens->run_slope[i * sens->unknowns.count + p] = NAN;
   }
 }
 
@@ -164,8 +159,8 @@ static int sensitivity_add_row (pw_sensitivity *sens, double t, pw_error *error)
     return pw_fail (error, PW_RESOURCE, "out of memory");
   double *out = sens->row + (size_t)sens->rows++ * (size_t)sens->columns;
   *out++ = t;
-  for (int i = 0; i < sens->outcomes.functionals; i++)
-    if (sens->outcomes.functional[i].type == PW_FINAL) sens->outcomes.functional[i].value = sens->value[i];
+  for (pw_functional *f = sens->outcomes.functional; f < sens->outcomes.functional + sens->outcomes.functionals; f++)
+    if (f->type == PW_FINAL) f->value = f->values[0];
   for (int o = 0; o < sens->outcomes.outcomes; o++) {
     if (!pw_sensitivity_in_table (sens, o)) continue;
     *out++ = pw_outcome_value (&sens->outcomes, o, NULL);
@@ -176,42 +171,31 @@ static int sensitivity_add_row (pw_sensitivity *sens, double t, pw_error *error)
 
 /* ---- Along the run ---- */
 
-typedef struct pw_sensitivity_point {
-  double t;      /* [s] */
-  double weight; /* of a node [s] */
-  int extremum;  /* the functional whose extremum is at t; -1: t is a node of the integrals */
-} sensitivity_point;
-
-static int sensitivity_compare_times (const void *a, const void *b) {
-  double first = ((const sensitivity_point *)a)->t, second = ((const sensitivity_point *)b)->t;
-  return (first > second) - (first < second);
-}
-
-/* Lists the times of nodes and extrema in (t0, t1] in order; returns their number. */
-static int sensitivity_points (pw_sensitivity *sens, double t0, double t1) {
-  sensitivity_point *list = sens->point;
-  int count = 0, integrals = 0;
-  for (int i = 0; i < sens->outcomes.functionals; i++) {
-    const pw_functional *f = &sens->outcomes.functional[i];
-    integrals |= pw_is_integral (f->type);
-    if (pw_is_extremum (f->type) && f->t > t0 && f->t <= t1) list[count++] = (sensitivity_point){ f->t, 0, i };
-  }
-  for (int k = 0; k < PW_GAUSS_NODES && integrals; k++)
-    list[count++] = (sensitivity_point){ pw_gauss_time (t0, t1, k), pw_gauss_w[k] * (t1 - t0) / 2, -1 };
-  qsort (list, (size_t)count, sizeof *list, sensitivity_compare_times);
-  return count;
-}
-
-/* Advances from t0, where the columns have been evaluated, to t1. */
-static int sensitivity_interval (pw_sensitivity *sens, double t0, double t1, pw_error *error) {
-  const sensitivity_point *list = sens->point;
-  int count = sensitivity_points (sens, t0, t1), status = PW_OK;
-  for (int i = 0; i < count && status == PW_OK; i++) {
-    status = pw_sensitivity_at (sens, list[i].t, error);
-    if (status == PW_OK && list[i].extremum < 0) sensitivity_add_node (sens, list[i].weight);
-    if (status == PW_OK && list[i].extremum >= 0) sensitivity_keep_extremum (sens, list[i].extremum, 0);
+/* Advances from t0, where the columns have been evaluated, to t1, with Gauss' formula for the integrals. */
+static int sensitivity_integrate (pw_sensitivity *sens, double t0, double t1, pw_error *error) {
+  int status = PW_OK, integrals = 0;
+  for (int i = 0; i < sens->outcomes.functionals; i++) integrals |= pw_is_integral (sens->outcomes.functional[i].type);
+  for (int k = 0; k < PW_GAUSS_NODES && integrals && status == PW_OK; k++) {
+    status = pw_sensitivity_at (sens, pw_gauss_time (t0, t1, k), error);
+    if (status == PW_OK) sensitivity_add_node (sens, pw_gauss_w[k] * (t1 - t0) / 2);
   }
   return status == PW_OK ? pw_sensitivity_at (sens, t1, error) : status;
+}
+
+/* The same, in parts that end at extrema. */
+static int sensitivity_interval (pw_sensitivity *sens, double t0, double t1, pw_error *error) {
+  int status;
+  do {
+    double end = t1;
+    for (int i = 0; i < sens->outcomes.functionals; i++) {
+      const pw_functional *f = &sens->outcomes.functional[i];
+      if (pw_is_extremum (f->type) && f->t > t0) end = fmin (end, f->t);
+    }
+    status = sensitivity_integrate (sens, t0, end, error);
+    if (status == PW_OK) sensitivity_keep_extrema (sens, t0, end, 0);
+    t0 = end;
+  } while (status == PW_OK && t0 < t1);
+  return status;
 }
 
 /* Advances from t0 to t, from just before to just after a breakpoint, or a jump at a state, at a time tb that depends
@@ -222,17 +206,17 @@ static int sensitivity_jump (pw_sensitivity *sens, double t0, double t, int at_s
   double *slope = sens->before + F;                                           /* before the jump */
   const double split = at_state ? t0 : nextafter (sens->last_breakpoint, t0); /* extrema up to it are before the jump */
   sensitivity_keep_extrema (sens, t0, split, 1);
-  memcpy (sens->before, sens->value, F * sizeof *sens->before);
+  for (size_t i = 0; i < F; i++) sens->before[i] = sens->outcomes.functional[i].values[0];
   memcpy (slope, sens->slope, F * P * sizeof *slope);
   int status = pw_sensitivity_at (sens, t, error);
   if (status == PW_OK && at_state) sensitivity_drop_extrema (sens, t, slope);
   if (status == PW_OK) sensitivity_keep_extrema (sens, split, t, 0);
   for (int i = 0; i < sens->outcomes.functionals && status == PW_OK; i++) {
     const pw_functional *f = &sens->outcomes.functional[i];
-    double jump = sens->before[i] - sens->value[i];
+    double jump = sens->before[i] - f->values[0];
     if (!pw_is_integral (f->type) || jump == 0) continue;
     if (f->type != PW_INTEGRAL) jump /= sens->unknowns.t_end;
-    if (f->type == PW_RMS) jump *= (sens->before[i] + sens->value[i]) / (2 * f->value);
+    if (f->type == PW_RMS) jump *= (sens->before[i] + f->values[0]) / (2 * f->value);
     for (int p = 0; p < sens->unknowns.count; p++)
       sens->run_slope[i * sens->unknowns.count + p] += jump * pw_variation_jump_slope (sens->variation, p);
   }
@@ -281,9 +265,7 @@ static int sensitivity_advance_to_end (pw_sensitivity *sens, pw_progress *progre
   sens->last_breakpoint = -INFINITY;
   int status = pw_sensitivity_at (sens, 0, error);
   if (status == PW_OK) status = sensitivity_add_row (sens, 0, error);
-  /* The derivatives of extrema at t = 0; later ones replace them. */
-  for (int i = 0; i < sens->outcomes.functionals && status == PW_OK; i++)
-    if (pw_is_extremum (sens->outcomes.functional[i].type)) sensitivity_keep (sens, i);
+  if (status == PW_OK) sensitivity_keep_extrema (sens, -INFINITY, 0, 0);
   for (long k = 1; t < t_end && status == PW_OK; k++, t = to) {
     to = (double)k * sens->row_interval;
     if (to >= t_end * (1 - 1e-12)) to = t_end; /* no row beside the last one due to round-off */
@@ -301,9 +283,6 @@ static int sensitivity_advance_to_end (pw_sensitivity *sens, pw_progress *progre
 static int sensitivity_prepare (pw_sensitivity *sens, const double *values, pw_error *error) {
   size_t P = (size_t)sens->unknowns.count;
   if (sens->row_interval == 0) sens->row_interval = sens->unknowns.t_end / SENSITIVITY_PARTS;
-  sens->limit.seconds = sens->unknowns.limit;
-  sens->unknowns.settings.stop = pw_limit_over;
-  sens->unknowns.settings.stop_context = &sens->limit;
   sens->unknown_value = pw_arena_alloc (&sens->arena, P * sizeof *sens->unknown_value);
   sens->neighbours = pw_arena_alloc (&sens->arena, 4 * P * sizeof *sens->neighbours);
   sens->direction = pw_arena_alloc (&sens->arena, P * sizeof *sens->direction);
@@ -315,7 +294,7 @@ static int sensitivity_prepare (pw_sensitivity *sens, const double *values, pw_e
 
 static int sensitivity_arrays (pw_sensitivity *sens, pw_error *error) {
   const size_t F = (size_t)sens->outcomes.functionals, P = (size_t)sens->unknowns.count;
-  const pw_array array[] = { { &sens->value, 2 * F },
+  const pw_array array[] = { { &sens->gradient, F },
                              { &sens->slope, F * P },
                              { &sens->slope_error, F * P },
                              { &sens->run_slope, F * P },
@@ -326,8 +305,7 @@ static int sensitivity_arrays (pw_sensitivity *sens, pw_error *error) {
   for (int o = 0; o < sens->outcomes.outcomes; o++)
     if (pw_sensitivity_in_table (sens, o)) sens->columns += 1 + sens->unknowns.count;
   sens->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
-  sens->point = pw_arena_alloc (&sens->arena, (F + PW_GAUSS_NODES) * sizeof *sens->point);
-  return sens->memory && sens->point ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+  return sens->memory ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
 }
 
 /* Refuses initial values that the constraints determine: then making the state of a neighbour consistent changes them
@@ -353,16 +331,15 @@ static int sensitivity_check_independence (const pw_sensitivity *sens, pw_error 
 /* Opens the run, with the ledger if outputs need it; the one of which samples are taken where base.run is ahead of the
  * derivatives (pw_variation_advance); and the neighbours. */
 static int sensitivity_open_runs (pw_sensitivity *sens, pw_error *error) {
-  const pw_settings *settings = &sens->unknowns.settings;
   int count = 0;
   while (sens->of[count]) count++;
-  int status = pw_unknowns_system (&sens->base.m, &sens->unknowns, sens->unknown_value, error);
+  int status = pw_unknown_run_prepare (&sens->base, &sens->unknowns, sens->unknown_value, error);
   if (status == PW_OK) status = pw_outcomes_open (&sens->outcomes, sens->base.m.system, "--of", sens->of, count, error);
   if (status != PW_OK) return status;
-  sens->unknowns.settings.ledger = sens->outcomes.ledger;
-  sens->base.run = pw_run_open (sens->base.m.system, sens->unknowns.method, settings, error);
+  sens->base.settings.ledger = sens->outcomes.ledger;
+  sens->base.run = pw_run_open (sens->base.m.system, sens->unknowns.method, &sens->base.settings, error);
   if (sens->base.run && pw_system_may_jump (sens->base.m.system))
-    sens->sampled = pw_run_open (sens->base.m.system, sens->unknowns.method, settings, error);
+    sens->sampled = pw_run_open (sens->base.m.system, sens->unknowns.method, &sens->base.settings, error);
   if (error->status != PW_OK) return error->status;
   status = pw_unknowns_directions (sens->direction, &sens->unknowns, sens->unknown_value, &sens->base, sens->neighbours,
                                    error);
@@ -374,7 +351,7 @@ int pw_sensitivity_start (pw_sensitivity *sens, const double *values, pw_error *
   int status = sensitivity_prepare (sens, values, error);
   if (status == PW_OK) status = sensitivity_open_runs (sens, error);
   if (status == PW_OK) status = sensitivity_arrays (sens, error);
-  pw_limit_start (&sens->limit);
+  pw_limit_start (&sens->base.limit); /* without the time to open the neighbours */
   if (status != PW_OK) return status;
   sens->variation =
       pw_variation_open (sens->base.run, sens->direction, sens->unknowns.count, sens->outcomes.ledger, error);
@@ -386,7 +363,7 @@ int pw_sensitivity_compute (pw_sensitivity *sens, const double *values, pw_progr
   /* Another run determines the values of extrema and integrals, and the times of extrema. */
   if (status == PW_OK && sens->outcomes.along_run)
     status =
-        pw_outcomes_run (&sens->outcomes, sens->unknowns.method, &sens->unknowns.settings, sens->unknowns.t_end, error);
+        pw_outcomes_run (&sens->outcomes, sens->unknowns.method, &sens->base.settings, sens->unknowns.t_end, error);
   if (status != PW_OK) return status;
   status = sensitivity_advance_to_end (sens, progress, error);
   sens->stopped = status == PW_STOPPED;

@@ -166,7 +166,6 @@ static void steady_json (const void *context, pw_json *j) {
   pw_json_open (j, "ends", '[');
   for (int i = 0; cmd->vary_text && i < cmd->branches; i++) pw_json_text (j, NULL, cmd->end[i]);
   pw_json_close (j, ']');
-  j->line = 1;
   pw_json_open (j, "motions", '[');
   for (int i = 0; i < cmd->points; i++) steady_point_json (cmd, cmd->point + i, j);
   pw_json_close (j, ']');

@@ -211,7 +211,7 @@ static int unknown_same_size (const pw_system *a, const pw_system *b) {
 static int unknown_direction (pw_direction *d, const pw_unknowns *u, int i, double *x, const pw_unknown_run *run,
                               pw_unknown_run *neighbours, pw_error *error) {
   const double value = x[i];
-  pw_settings general = u->settings;
+  pw_settings general = run->settings;
   general.specialised = NULL;
   int status = PW_OK;
   *d = (pw_direction){ .step = unknown_step (&u->list[i], value, run->run) };

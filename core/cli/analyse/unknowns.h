@@ -34,7 +34,7 @@ typedef struct {
   pw_unknown *list;
   int count;
   const char *method;
-  pw_settings settings; /* without stop, initial and specialised, which callers may set */
+  pw_settings settings; /* without those that differ between runs (pw_unknown_run) */
   double t_end;         /* [s] */
   double limit;         /* of the processor time of each run [s] */
   pw_specialise when;   /* of --specialise */

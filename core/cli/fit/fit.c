@@ -178,26 +178,15 @@ static int fit_open (pw_fit *fit, pw_error *error) {
                          : status;
 }
 
-/* After Ctrl-C the errors of the estimate are not known. */
-static void fit_interrupt (pw_fit *fit) {
-  int n = fit->unknowns.count;
-  for (int i = 0; i < n; i++) fit->standard_error[i] = NAN;
-  for (int i = 0; i < n * n; i++) fit->covariance[i] = NAN;
-  fit->rank = n; /* no combination of unknowns is reported as not determined */
-  fit->interrupted = 1;
-}
-
 static int fit_search (pw_fit *fit, pw_error *error) {
   pw_stop_catch ();
   pw_progress_start (&fit->progress, pw_file_name (fit->model.file), "iterations", 0, FIT_ITERATIONS * fit->starts);
   int status = pw_fit_solve (fit, error);
   pw_progress_end (&fit->progress);
   pw_stop_release ();
-  if (status != PW_RETRY) return status;
-  if (fit->iterations > 0) {
-    fit_interrupt (fit);
-    return PW_OK;
-  }
+  fit->interrupted = status == PW_RETRY;
+  if (!fit->interrupted) return status;
+  if (fit->iterations > 0) return PW_OK;
   pw_cli_say ("pinwheel: interrupted before the first iteration was done\n");
   return PW_INTERRUPTED;
 }

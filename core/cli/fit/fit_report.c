@@ -185,7 +185,6 @@ void pw_fit_print (const pw_fit *fit) {
 
 static void report_json_unknown (const pw_fit *fit, pw_json *j, int i) {
   const pw_unknown *u = fit->unknowns.list + i;
-  j->line = 1;
   pw_json_open (j, NULL, '{');
   pw_json_text (j, "name", u->name);
   pw_json_text (j, "unit", u->unit);
@@ -203,12 +202,10 @@ static void report_json_unknown (const pw_fit *fit, pw_json *j, int i) {
 }
 
 static void report_json_columns (const pw_fit *fit, pw_json *j) {
-  j->line = 1;
   pw_json_open (j, "columns", '[');
   for (int i = 0; i < fit->columns; i++) {
     int count;
     double rms = report_rms (fit, i, &count);
-    j->line = 1;
     pw_json_open (j, NULL, '{');
     pw_json_text (j, "name", fit->column_name[i]);
     pw_json_text (j, "unit", fit->column_unit[i]);
@@ -225,7 +222,6 @@ static void report_json_matrix (const pw_fit *fit, pw_json *j, const char *key,
   int n = fit->unknowns.count;
   pw_json_open (j, key, '[');
   for (int i = 0; i < n; i++) {
-    j->line = 1;
     pw_json_open (j, NULL, '[');
     for (int k = 0; k < n; k++) pw_json_number (j, NULL, entry (fit, i, k));
     pw_json_close (j, ']');
@@ -238,7 +234,6 @@ static void report_json_ends (const pw_fit *fit, pw_json *j) {
   int n = fit->unknowns.count;
   pw_json_open (j, "searches", '[');
   for (const double *end = fit->ends; end < fit->ends + fit->starts * (1 + n); end += 1 + n) {
-    j->line = 1;
     pw_json_open (j, NULL, '{');
     pw_json_number (j, "chi2", *end);
     pw_json_numbers (j, "values", end + 1, n);

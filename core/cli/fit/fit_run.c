@@ -19,7 +19,9 @@ static int fit_sample (const pw_fit *fit, pw_outcomes *outcomes, pw_run *run, do
   for (int k = 0; k < fit->rows && status == PW_OK; k++) {
     status = pw_run_advance_to (run, fit->t[k], fit->unknowns.t_end, error);
     if (status == PW_OK) status = pw_run_sample (run, fit->t[k], &sample, error);
-    if (status == PW_OK) status = pw_outcomes_read (outcomes, &sample, out + k, fit->rows, error);
+    if (status == PW_OK) status = pw_outcomes_read (outcomes, &sample, 0, error);
+    for (int i = 0; i < fit->columns && status == PW_OK; i++)
+      out[i * fit->rows + k] = outcomes->functional[outcomes->outcome[i].term[0]].values[0];
   }
   return status;
 }
@@ -52,64 +54,42 @@ double pw_fit_derivative_error (const pw_fit *fit) {
   return fit->by_differences ? pow (noise, 2. / 3) : fmax (noise, JACOBIAN_ERROR);
 }
 
-/* Runs on both sides of each unknown: task 2 j is the run below unknown j, task 2 j + 1 that above it. */
+/* The arguments of pw_fit_jacobian. */
 typedef struct {
   const pw_fit *fit;
-  double *unknowns, *values, *step; /* of each task: unknowns, values of the model, signed step */
-  pw_error *error;                  /* of each task */
+  const double *unknowns, *values;
+  double *jacobian;
 } jacobian_differences;
 
-/* The step h, relative to the value or, if that is larger, to a hundredth of the scale, is the cube root of the noise:
- * the truncation error of central differences, of order h^2, and noise / h are both noise^(2/3). */
-static int jacobian_side (void *context, int task, pw_error *error) {
-  jacobian_differences *d = context;
-  const pw_fit *fit = d->fit;
-  const pw_unknown *unknown = fit->unknowns.list + task / 2;
-  double *unknowns = d->unknowns + task * fit->unknowns.count, *value = unknowns + task / 2, middle = *value;
-  double size = fmax (fabs (middle), 1e-2 * unknown->scale) * cbrt (jacobian_noise (fit));
-  *value = fmin (fmax (middle + (task % 2 ? size : -size), unknown->low), unknown->high);
-  d->step[task] = *value - middle;
-  (void)error;
-  double *values = d->values + (size_t)task * (size_t)fit->columns * (size_t)fit->rows;
-  d->error[task].status = pw_fit_run (fit, unknowns, values, d->error + task);
-  return PW_OK; /* see jacobian_column */
-}
-
 /* Derivatives with respect to unknown j by central differences; by one-sided ones if the run on one side failed and no
- * bound leaves less than a tenth of the step on the other side.  middle: the values of the model between both sides. */
-static int jacobian_column (const jacobian_differences *d, int j, const double *middle, double *out, pw_error *error) {
-  size_t cells = (size_t)d->fit->columns * (size_t)d->fit->rows;
-  const double *side[2];
-  double step[2];
+ * bound leaves less than a tenth of the step on the other side.  The step h, relative to the value or, if that is
+ * larger, to a hundredth of the scale, is the cube root of the noise: the truncation error of central differences, of
+ * order h^2, and noise / h are both noise^(2/3). */
+static int jacobian_column (void *context, int j, pw_error *error) {
+  const jacobian_differences *d = context;
+  const pw_unknown *unknown = d->fit->unknowns.list + j;
+  const size_t n = (size_t)d->fit->unknowns.count, cells = (size_t)d->fit->columns * (size_t)d->fit->rows;
+  const double middle = d->unknowns[j],
+               size = fmax (fabs (middle), 1e-2 * unknown->scale) * cbrt (jacobian_noise (d->fit));
+  double *x = malloc ((n + cells) * sizeof *x), *out = d->jacobian + (size_t)j * cells, step[2];
+  if (x == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  const double *side[2] = { out, x + n };
+  pw_error own[2] = { 0 };
+  memcpy (x, d->unknowns, n * sizeof *x);
   for (int k = 0; k < 2; k++) {
-    const pw_error *own = d->error + 2 * j + k, *other = d->error + 2 * j + !k;
-    int failed = own->status != PW_OK, pinched = fabs (d->step[2 * j + !k]) < fabs (d->step[2 * j + k]) / 10;
-    if (failed && (own->status == PW_RETRY || own->status == PW_RESOURCE || other->status != PW_OK || pinched))
-      return *error = *own, error->status;
-    side[k] = failed ? middle : d->values + (size_t)(2 * j + k) * cells;
-    step[k] = failed ? 0 : d->step[2 * j + k];
+    x[j] = fmin (fmax (middle + (k ? size : -size), unknown->low), unknown->high);
+    step[k] = x[j] - middle;
+    own[k].status = pw_fit_run (d->fit, x, k ? x + n : out, &own[k]);
+  }
+  for (int k = 0; k < 2 && error->status == PW_OK; k++) {
+    int status = own[k].status, pinched = fabs (step[!k]) < fabs (step[k]) / 10;
+    if (status == PW_OK) continue;
+    if (status == PW_RETRY || status == PW_RESOURCE || own[!k].status != PW_OK || pinched) *error = own[k];
+    side[k] = d->values, step[k] = 0;
   }
   for (size_t i = 0; i < cells; i++) out[i] = (side[1][i] - side[0][i]) / (step[1] - step[0]);
-  return PW_OK;
-}
-
-static int jacobian_by_differences (pw_fit *fit, const double *unknowns, const double *values, double *jacobian,
-                                    pw_error *error) {
-  size_t n = (size_t)fit->unknowns.count, cells = (size_t)fit->columns * (size_t)fit->rows;
-  jacobian_differences d = { .fit = fit, .unknowns = malloc (2 * n * (n + cells + 1) * sizeof *d.unknowns) };
-  d.error = calloc (2 * n, sizeof *d.error);
-  int status = d.unknowns && d.error ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
-  if (status == PW_OK) {
-    d.values = d.unknowns + 2 * n * n, d.step = d.values + 2 * n * cells;
-    for (size_t task = 0; task < 2 * n; task++) memcpy (d.unknowns + task * n, unknowns, n * sizeof *unknowns);
-    status = pw_parallel (fit->jobs, (int)(2 * n), jacobian_side, &d, error);
-    fit->runs += 2 * (long)n;
-  }
-  for (int j = 0; j < fit->unknowns.count && status == PW_OK; j++)
-    status = jacobian_column (&d, j, values, jacobian + (size_t)j * cells, error);
-  free (d.unknowns);
-  free (d.error);
-  return status;
+  free (x);
+  return error->status;
 }
 
 /* ---- Variational equations ---- */
@@ -132,7 +112,7 @@ static int jacobian_by_variation (const pw_fit *fit, const double *unknowns, dou
   pw_sensitivity s = { .of = fit->column_name, .unknowns = fit->unknowns, .no_error = 1 };
   int status = pw_sensitivity_start (&s, unknowns, error);
   for (int row = 0; row < fit->rows && status == PW_OK; row++) status = jacobian_row (&s, fit, row, jacobian, error);
-  if (status == PW_STOPPED) status = pw_limit_status (&s.limit, pw_run_time (s.base.run), error);
+  if (status == PW_STOPPED) status = pw_limit_status (&s.base.limit, pw_run_time (s.base.run), error);
   pw_sensitivity_close (&s);
   return status;
 }
@@ -143,5 +123,7 @@ int pw_fit_jacobian (pw_fit *fit, const double *unknowns, const double *values, 
   if (status == PW_RESOURCE) *error = own;
   if (status == PW_OK || status == PW_RETRY || status == PW_RESOURCE) return status;
   fit->by_differences = 1;
-  return jacobian_by_differences (fit, unknowns, values, jacobian, error);
+  fit->runs += 2 * (long)fit->unknowns.count;
+  return pw_parallel (fit->jobs, fit->unknowns.count, jacobian_column,
+                      &(jacobian_differences){ fit, unknowns, values, jacobian }, error);
 }

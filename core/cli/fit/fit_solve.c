@@ -36,7 +36,6 @@ typedef struct {
   pw_error *error;
   double worst; /* largest norm of the residuals of the runs of this search that succeeded */
   double least; /* sum of squares at the best end of a search, fit->estimate; INFINITY: none is completed yet */
-  int previous; /* iterations of earlier searches */
 } fit_solver;
 
 /* ---- Bounds: an unknown with an upper bound has a lower one, too ---- */
@@ -147,10 +146,9 @@ static void solve_store (fit_solver *solver, double chi2) {
 }
 
 /* `moved`: 1 if the last run is the position reached, the result if Ctrl-C comes before a search is completed. */
-static void solve_progress (fit_solver *solver, int iteration, int moved, const gsl_multifit_nlinear_workspace *w) {
+static void solve_progress (fit_solver *solver, int moved, const gsl_multifit_nlinear_workspace *w) {
   double norm = gsl_blas_dnrm2 (gsl_multifit_nlinear_residual (w));
   if (isnan (solver->fit->initial_chi2)) solver->fit->initial_chi2 = norm * norm;
-  solver->fit->iterations = solver->previous + iteration;
   if (!isfinite (solver->least) && moved) solve_store (solver, norm * norm);
   snprintf (solver->fit->progress.note, sizeof solver->fit->progress.note, "residual %.6g", norm);
   pw_progress_at (&solver->fit->progress, solver->fit->iterations);
@@ -162,11 +160,13 @@ static void solve_progress (fit_solver *solver, int iteration, int moved, const 
 static int solve_iterate (fit_solver *solver, gsl_vector *u, gsl_multifit_nlinear_fdf *f,
                           gsl_multifit_nlinear_workspace *w) {
   int info, status = gsl_multifit_nlinear_init (u, f, w), more = status == GSL_SUCCESS;
-  if (more) solve_progress (solver, 0, 1, w);
+  if (more) solve_progress (solver, 1, w);
   for (int i = 1; i <= SOLVE_ITERATIONS && more; i++) {
     status = gsl_multifit_nlinear_iterate (w);
+    if (solver->status != PW_OK) break;
+    solver->fit->iterations++;
     if (status != GSL_SUCCESS && (status != GSL_ENOPROG || i == 1)) break;
-    solve_progress (solver, i, status == GSL_SUCCESS, w);
+    solve_progress (solver, status == GSL_SUCCESS, w);
     more = gsl_multifit_nlinear_test (SOLVE_TOLERANCE, SOLVE_TOLERANCE, 0, &info, w) == GSL_CONTINUE;
   }
   return status;
@@ -196,7 +196,6 @@ static void solve_search (fit_solver *solver, gsl_multifit_nlinear_workspace *w,
   if (solve_run (solver, u) != PW_OK) return;
   int status = solve_iterate (solver, u, &f, w);
   if (solver->status != PW_OK) return;
-  fit->iterations = solver->previous += (int)gsl_multifit_nlinear_niter (w);
   if (status != GSL_SUCCESS && status != GSL_ENOPROG) return;
   gsl_vector_memcpy (u, gsl_multifit_nlinear_position (w));
   if (solve_run (solver, u) == PW_OK) solve_keep (solver, end);
@@ -315,6 +314,10 @@ static int solve_open (fit_solver *solver) {
   fit->standard_error = fit->estimate + n, fit->singular_value = fit->standard_error + n,
   fit->column_length = fit->singular_value + n, fit->covariance = fit->column_length + n;
   fit->singular_vector = fit->covariance + n * n, fit->fitted = fit->singular_vector + n * n;
+  /* the errors are not known until solve_covariance; nor are combinations of unknowns that are not determined */
+  for (size_t i = 0; i < n; i++) fit->standard_error[i] = NAN;
+  for (size_t i = 0; i < n * n; i++) fit->covariance[i] = NAN;
+  fit->rank = fit->unknowns.count;
   return PW_OK;
 }
 

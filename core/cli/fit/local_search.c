@@ -28,15 +28,15 @@ typedef struct {
   nlopt_opt optimiser;
   double *scaled, *unknown, *output; /* of the last run; the unknowns scaled and not */
   double *allowed;                   /* outputs: violation that NLopt permits */
-  double *slope;      /* outputs x unknowns: derivatives with respect to scaled unknowns; NULL: none are used */
-  int constrained;    /* 1: NLopt knows the constraints */
-  int crossed;        /* 1: it does not, and a run that violates one is better than those that satisfy them */
-  int evaluated;      /* 1: there was a run */
-  int tried_slopes;   /* 1: the last run was tried with derivatives */
-  int failed;         /* 1: the last run failed */
-  int slopes_failed;  /* 1: derivatives could not be computed, though the run succeeded */
+  double *slope;   /* outputs x unknowns: derivatives with respect to scaled unknowns; NULL: none are used */
+  int constrained; /* 1: NLopt knows the constraints */
+  int known;       /* 1: there is a last run; 2: it was tried with derivatives */
+  int failed;      /* 1: the last run failed */
+  /* 1: the search ends, and is repeated with constraints and without derivatives: these could not be computed, though
+   * the run succeeded; or NLopt does not know the constraints, and a run that violates one is the best */
+  int repeat;
   double least, most; /* extrema of sign x objective in the runs that succeeded */
-  pw_error fatal;     /* of a run that ended all searches, out of memory */
+  pw_error *error;    /* of a run that ends all searches, out of memory */
 } local_search;
 
 /* The value of an unknown.  If the user gives bounds, `scaled` runs from 0 to 1 between them; otherwise it is the value
@@ -50,21 +50,21 @@ static double search_scaled (const pw_unknown *unknown, double value) {
   return (value - (unknown->has_bounds ? unknown->low : 0)) / unknown->scale;
 }
 
-/* Runs the model with local->unknown and stores the outputs; a run with outputs that are not finite fails. */
-static int search_run (const local_search *local, pw_error *error) {
-  const pw_optimise *problem = local->problem;
+/* Runs the model with these values of the unknowns and stores the outputs; a run with outputs that are not finite
+ * fails. */
+static int search_run (const pw_optimise *problem, const double *unknown, double *output, pw_error *error) {
   const pw_unknowns *unknowns = &problem->unknowns;
   pw_outcomes outcomes = { .system = NULL };
   pw_unknown_run run;
-  int status = pw_unknown_run_prepare (&run, unknowns, local->unknown, error);
+  int status = pw_unknown_run_prepare (&run, unknowns, unknown, error);
   if (status == PW_OK)
     status = pw_outcomes_open (&outcomes, run.m.system, "output", problem->output, problem->outputs, error);
   run.settings.ledger = outcomes.ledger;
   if (status == PW_OK) status = pw_outcomes_run (&outcomes, unknowns->method, &run.settings, unknowns->t_end, error);
   for (int i = 0; status == PW_OK && i < problem->outputs; i++) {
-    local->output[i] = pw_outcome_value (&outcomes, i, NULL);
-    if (!isfinite (local->output[i]))
-      status = pw_fail (error, PW_METHOD, "%s is %s", problem->output[i], PW_DIGITS (local->output[i], 9));
+    output[i] = pw_outcome_value (&outcomes, i, NULL);
+    if (!isfinite (output[i]))
+      status = pw_fail (error, PW_METHOD, "%s is %s", problem->output[i], PW_DIGITS (output[i], 9));
   }
   pw_outcomes_close (&outcomes);
   pw_unknown_run_close (&run);
@@ -78,7 +78,7 @@ static int search_differentiate (local_search *local, pw_error *error) {
   pw_progress silent = { 0 };
   pw_sensitivity s = { .of = problem->output, .unknowns = *unknowns, .no_error = 1 };
   int status = pw_sensitivity_compute (&s, local->unknown, &silent, error);
-  if (status == PW_OK && s.stopped) status = pw_limit_status (&s.limit, pw_run_time (s.base.run), error);
+  if (status == PW_OK && s.stopped) status = pw_limit_status (&s.base.limit, pw_run_time (s.base.run), error);
   for (int i = 0; i < problem->outputs && status == PW_OK; i++) {
     local->output[i] = pw_outcome_value (&s.outcomes, i, NULL);
     for (int j = 0; j < unknowns->count && status == PW_OK; j++) {
@@ -137,8 +137,7 @@ static void search_keep (local_search *local) {
   local->most = fmax (local->most, objective);
   if (search->feasible && !(objective < problem->sign[0] * search->output[0])) return;
   if (!pw_search_feasible (problem, local->output)) {
-    local->crossed = !local->constrained;
-    if (local->crossed) nlopt_force_stop (local->optimiser);
+    local->repeat |= !local->constrained;
     return;
   }
   search->feasible = 1;
@@ -156,15 +155,10 @@ static void search_keep (local_search *local) {
 /* Makes a run, with derivatives if `slopes`.  If only the derivatives fail, the search ends. */
 static int search_try (local_search *local, int slopes, pw_error *error) {
   pw_error own = { 0 };
-  int status = PW_OK;
-  if (slopes) {
-    status = search_differentiate (local, &own);
-    if (status == PW_RETRY || status == PW_RESOURCE) *error = own;
-    if (status == PW_OK || status == PW_RETRY || status == PW_RESOURCE) return status;
-  }
-  status = search_run (local, error);
-  local->slopes_failed = slopes && status == PW_OK;
-  if (local->slopes_failed) nlopt_force_stop (local->optimiser);
+  int status = slopes ? search_differentiate (local, &own) : PW_METHOD;
+  if (status == PW_OK || status == PW_RETRY || status == PW_RESOURCE) return *error = own, status;
+  status = search_run (local->problem, local->unknown, local->output, error);
+  local->repeat |= slopes && status == PW_OK;
   return status;
 }
 
@@ -173,7 +167,7 @@ static void search_evaluate (local_search *local, const double *scaled, int slop
   const pw_unknowns *unknowns = &local->problem->unknowns;
   const size_t size = (size_t)unknowns->count * sizeof *scaled;
   pw_error error = { 0 };
-  if (local->evaluated && local->tried_slopes >= slopes && memcmp (local->scaled, scaled, size) == 0) return;
+  if (local->known > slopes && memcmp (local->scaled, scaled, size) == 0) return;
   memcpy (local->scaled, scaled, size);
   for (int i = 0; i < unknowns->count; i++) local->unknown[i] = search_unknown (unknowns->list + i, scaled[i]);
   int status = search_try (local, slopes, &error);
@@ -181,23 +175,23 @@ static void search_evaluate (local_search *local, const double *scaled, int slop
     nlopt_force_stop (local->optimiser);
     return;
   }
-  local->evaluated = 1;
-  local->tried_slopes = slopes;
+  local->known = 1 + slopes;
   local->failed = status != PW_OK;
   if (local->failed && local->search->failed++ == 0) local->search->first_error = error;
   if (search_store (local) != PW_OK) status = pw_fail (&error, PW_RESOURCE, "out of memory");
   if (!local->failed) search_keep (local);
-  if (status != PW_RESOURCE) return;
-  local->fatal = error;
-  pw_stop = pw_stop ? pw_stop : 1; /* ends the other searches, too */
-  nlopt_force_stop (local->optimiser);
+  if (status == PW_RESOURCE) {
+    *local->error = error;
+    pw_stop = pw_stop ? pw_stop : 1; /* ends the other searches, too */
+  }
+  if (status == PW_RESOURCE || local->repeat) nlopt_force_stop (local->optimiser);
 }
 
 /* Stores the derivatives of factor x output i, 0 if they are unknown, unless `grad` is NULL. */
 static void search_gradient (const local_search *local, int i, double factor, double *grad) {
   int unknowns = local->problem->unknowns.count;
   for (int j = 0; grad && j < unknowns; j++)
-    grad[j] = local->failed || local->slopes_failed ? 0 : factor * local->slope[i * unknowns + j];
+    grad[j] = local->failed || local->repeat ? 0 : factor * local->slope[i * unknowns + j];
 }
 
 /* The function that NLopt minimises: sign x objective, for a failed run more than in all others. */
@@ -261,8 +255,8 @@ static void search_point (const pw_unknowns *unknowns, const double *value, doub
  * restarted at the best run as long as that improves. */
 static int search_minimise (local_search *local, double *scaled) {
   pw_search *search = local->search;
-  for (int left = local->slope ? 1 + SEARCH_RESTARTS : 1;
-       left > 0 && !local->failed && !local->slopes_failed && !local->crossed && !pw_stop; left--) {
+  for (int left = local->slope ? 1 + SEARCH_RESTARTS : 1; left > 0 && !local->failed && !local->repeat && !pw_stop;
+       left--) {
     double before = search->feasible ? search->output[0] : NAN, objective;
     nlopt_result result = nlopt_optimize (local->optimiser, scaled, &objective);
     if (result == NLOPT_OUT_OF_MEMORY) return PW_RESOURCE;
@@ -284,7 +278,7 @@ static int search_from (local_search *local, int slopes, double first, double la
     local->scaled = begin + n, local->unknown = local->scaled + n, local->output = local->unknown + n;
     local->allowed = local->output + outputs;
     local->slope = slopes ? local->allowed + outputs : NULL;
-    local->evaluated = local->slopes_failed = local->crossed = 0;
+    local->known = local->repeat = 0;
     for (size_t i = 0; i < outputs; i++)
       local->allowed[i] = SEARCH_ALLOWED / 10; /* so that NLopt's result is feasible */
     search_point (unknowns, local->search->feasible ? local->search->to : local->search->from, begin);
@@ -301,18 +295,19 @@ static int search_from (local_search *local, int slopes, double first, double la
 /* Search i of the problem, repeated without derivatives if they fail.  A refinement without derivatives first ignores
  * the constraints, as COBYLA is slow in curved valleys; it is repeated with them once they matter. */
 static int search_task (pw_optimise *problem, int i, int slopes, double first, double last, pw_error *error) {
-  local_search local = { .problem = problem, .search = problem->search + i, .least = INFINITY, .most = -INFINITY };
+  local_search local = {
+    .problem = problem, .search = problem->search + i, .least = INFINITY, .most = -INFINITY, .error = error
+  };
   if (pw_stop) return PW_OK;
   local.constrained = problem->outputs > 1 && (slopes || i < problem->starts);
   int status = search_from (&local, slopes, first, last);
-  if (status == PW_OK && (local.slopes_failed || local.crossed)) {
+  if (status == PW_OK && local.repeat) {
     local.constrained = problem->outputs > 1;
     status = search_from (&local, 0, first, last);
   }
   pthread_mutex_lock (&problem->lock);
   pw_progress_at (&problem->progress, ++problem->searches_done);
   pthread_mutex_unlock (&problem->lock);
-  if (local.fatal.status != PW_OK) *error = local.fatal;
   return status == PW_OK ? error->status : pw_fail (error, status, "out of memory");
 }
 
@@ -343,22 +338,22 @@ int pw_search_effect (void *context, int i, pw_error *error) {
   pw_optimise *problem = context;
   const pw_unknown *unknown = problem->unknowns.list + i;
   size_t n = (size_t)problem->unknowns.count;
-  double *memory = calloc (n + (size_t)problem->outputs, sizeof *memory), value = problem->best->to[i];
-  if (memory == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  local_search local = { .problem = problem, .unknown = memory, .output = memory + n };
-  memcpy (local.unknown, problem->best->to, n * sizeof *memory);
+  double *unknowns = calloc (n + (size_t)problem->outputs, sizeof *unknowns), value = problem->best->to[i];
+  if (unknowns == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  double *output = unknowns + n;
+  memcpy (unknowns, problem->best->to, n * sizeof *unknowns);
   problem->without_effect[i] = problem->objective_same[i] = 1;
   for (int side = -1; side <= 1 && problem->objective_same[i]; side += 2) {
-    local.unknown[i] = search_unknown (unknown, search_scaled (unknown, value) + side * SEARCH_PROBE);
-    if (local.unknown[i] == value) continue;
-    const int failed = search_run (&local, &(pw_error){ 0 }) != PW_OK;
+    unknowns[i] = search_unknown (unknown, search_scaled (unknown, value) + side * SEARCH_PROBE);
+    if (unknowns[i] == value) continue;
+    const int failed = search_run (problem, unknowns, output, &(pw_error){ 0 }) != PW_OK;
     for (int k = 0; k < problem->outputs; k++) {
-      const double change = fabs (local.output[k] - problem->best->output[k]);
+      const double change = fabs (output[k] - problem->best->output[k]);
       if (!failed && change <= search_noise (problem, k)) continue;
       problem->without_effect[i] = 0;
       if (k == 0) problem->objective_same[i] = 0;
     }
   }
-  free (memory);
+  free (unknowns);
   return PW_OK;
 }

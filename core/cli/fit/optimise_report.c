@@ -104,7 +104,6 @@ void pw_optimise_print (const pw_optimise *problem) {
 
 static void report_json_unknown (const pw_optimise *problem, pw_json *j, int i) {
   const pw_unknown *u = problem->unknowns.list + i;
-  j->line = 1;
   pw_json_open (j, NULL, '{');
   pw_json_text (j, "name", u->name);
   pw_json_text (j, "unit", u->unit);
@@ -117,7 +116,6 @@ static void report_json_unknown (const pw_optimise *problem, pw_json *j, int i) 
 }
 
 static void report_json_search (const pw_optimise *problem, pw_json *j, const pw_search *search) {
-  j->line = 1;
   pw_json_open (j, NULL, '{');
   pw_json_number (j, "value", search->feasible ? search->output[0] : NAN);
   pw_json_number (j, "runs", (double)search->runs);
@@ -128,7 +126,6 @@ static void report_json_search (const pw_optimise *problem, pw_json *j, const pw
 }
 
 static void report_json_constraint (const pw_optimise *problem, pw_json *j, int i) {
-  j->line = 1;
   pw_json_open (j, NULL, '{');
   pw_json_text (j, "output", problem->output[i]);
   pw_json_text (j, "type", problem->sign[i] > 0 ? "<=" : ">=");
