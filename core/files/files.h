@@ -158,8 +158,6 @@ const char *pw_lock_reason (int code); /* of an errno value, for messages */
 
 /* ---- Outputs (output.c) ---- */
 
-/* Writes; PW_RESOURCE with the reason if this or an earlier write fails. */
-int pw_output_text (pw_output *o, const char *text, size_t size, pw_error *error);
 /* PW_RESOURCE if a write to its stream has failed; set errno to 0 before writing, for the reason. */
 int pw_output_check (pw_output *o, pw_error *error);
 

@@ -180,12 +180,6 @@ int pw_output_check (pw_output *o, pw_error *error) {
   return output_fail (o, o->code, error);
 }
 
-int pw_output_text (pw_output *o, const char *text, size_t size, pw_error *error) {
-  errno = 0;
-  if (size > 0) fwrite (text, 1, size, o->stream);
-  return pw_output_check (o, error);
-}
-
 /* ---- Closing ---- */
 
 /* Flushes the stream and writes a regular file to the disk.  0, an errno value, or -1 for an unknown reason. */
