@@ -1,7 +1,6 @@
 /* Expressions of time, and of states, in text models: signals, and the reference solution.  A signal becomes a function
  * signal, of which each compiled system has a copy (signal_open), since it may outlive the model. */
 #include <math.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 #include "yaml.h"
@@ -25,14 +24,8 @@ typedef struct {
 } reading;
 
 /* Reports an error at an offset of the expression. */
-PW_PRINTF (3, 4) static int reading_fail (const reading *e, size_t at, const char *format, ...) {
-  char text[300];
-  va_list arguments;
-  va_start (arguments, format);
-  vsnprintf (text, sizeof text, format, arguments);
-  va_end (arguments);
-  return pw_yaml_fail (e->r, pw_yaml_offset (e->r->y, e->node, at), "%s: %s", e->label, text);
-}
+#define reading_fail(e, at, ...) \
+  pw_yaml_fail ((e)->r, pw_yaml_offset ((e)->r->y, (e)->node, at), "%s: %s", (e)->label, PW_PRINTED (300, __VA_ARGS__))
 
 /* Reads the expression; `variable`: names, which end with NULL. */
 static int reading_expression (const reading *e, const char *const *variable, const char **text,
