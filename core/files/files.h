@@ -84,7 +84,6 @@ typedef struct pw_yaml pw_yaml;
 pw_yaml *pw_yaml_open (const char *path, const char *shown, size_t max_bytes, pw_error *error);
 void pw_yaml_close (pw_yaml *y);
 const pw_plugin_table *pw_yaml_table (const pw_yaml *y);
-const char *pw_yaml_text_of (const pw_yaml *y, size_t *size);
 /* Writes the tree as bytes, for programs without libfyaml (yaml_stored.c). */
 void pw_yaml_write_tree (const pw_yaml *y, FILE *f);
 /* As pw_file_tables. */

@@ -31,14 +31,12 @@ typedef struct {
 /* The offset of a mark, computed from its line and its column (in characters): the offsets of libfyaml 0.7.12 are wrong
  * if the input is read in pieces.  Starts from the last mark: marks are nearly in order. */
 static unsigned tree_offset_of (tree *x, const struct fy_mark *mark) {
-  static const char bom[] = "\xEF\xBB\xBF"; /* byte order mark, not counted as a column */
   const char *source = x->y->source, *end = source + x->y->size, *p = source + x->offset;
   if (x->line != mark->line) {
     for (; x->line < mark->line && p < end; p++) x->line += *p == '\n';
     for (; p > source && (x->line > mark->line || p[-1] != '\n'); p--) x->line -= p[-1] == '\n';
     x->column = 0;
   }
-  if (p == source && strncmp (p, bom, 3) == 0) p += 3;
   for (; x->column < mark->column && p < end && *p != '\n'; x->column++) p += pw_utf8_size (p);
   for (; x->column > mark->column && p > source; x->column--)
     for (p--; p > source && (*p & 0xC0) == 0x80;) p--;
