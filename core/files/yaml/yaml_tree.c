@@ -17,11 +17,9 @@ typedef struct {
   pw_node **tail[PW_YAML_DEPTH]; /* where the next node of each goes */
   int depth;
   int documents;
-  /* what the parser reads ahead of its events */
-  size_t processed;  /* bytes of the source up to the last event */
   size_t fed;        /* bytes given to the parser */
-  double indicators; /* [ ] { } , : between the two */
-  double opened;     /* opening minus closing brackets there */
+  double indicators; /* [ ] { } , : given since the last event */
+  double opened;     /* opening minus closing brackets among them */
   /* the last position converted */
   int line, column; /* from 0 */
   size_t offset;
@@ -135,25 +133,21 @@ static int tree_refuse_anchor (tree *x, struct fy_event *e) {
  * indicators without an event, or too many open brackets. */
 enum { TREE_NESTED = 10000 };
 
-/* Adds (sign 1) or subtracts (-1) the indicators between two offsets. */
-static void tree_count (tree *x, size_t from, size_t to, int sign) {
-  for (const char *p = x->y->source + from; p < x->y->source + to; p++) {
-    int opens = *p == '[' || *p == '{', closes = *p == ']' || *p == '}';
-    x->opened += sign * (opens - closes);
-    x->indicators += sign * (opens || closes || *p == ',' || *p == ':');
-  }
-}
-
 static ssize_t tree_feed (void *user, void *to, size_t count) {
   tree *x = user;
+  const char *piece = x->y->source + x->fed;
   size_t rest = x->y->size - x->fed, n = count < rest ? count : rest;
   if (n > TREE_PIECE) n = TREE_PIECE;
-  memcpy (to, x->y->source + x->fed, n);
-  tree_count (x, x->fed, x->fed + n, 1);
+  memcpy (to, piece, n);
   x->fed += n;
-  if (x->opened > TREE_NESTED) pw_yaml_fail (&x->r, x->processed, "nested too deeply");
+  for (const char *p = piece; p < piece + n; p++) {
+    int opens = *p == '[' || *p == '{', closes = *p == ']' || *p == '}';
+    x->opened += opens - closes;
+    x->indicators += opens || closes || *p == ',' || *p == ':';
+  }
+  if (x->opened > TREE_NESTED) pw_yaml_fail (&x->r, x->at, "nested too deeply");
   if (x->indicators > x->y->max_ahead)
-    pw_yaml_fail (&x->r, x->processed,
+    pw_yaml_fail (&x->r, x->at,
                   "a list or map in brackets with more than %g commas, colons and brackets, which takes much memory: "
                   "write its entries on separate lines, after \"- \" or \"key: \"",
                   x->y->max_ahead);
@@ -162,9 +156,7 @@ static ssize_t tree_feed (void *user, void *to, size_t count) {
 
 static void tree_event (tree *x, struct fy_event *e) {
   if (tree_refuse_anchor (x, e) != PW_OK) return;
-  size_t at = tree_event_offset (x, e);
-  if (at > x->fed) at = x->fed;
-  if (at > x->processed) tree_count (x, x->processed, at, -1), x->processed = at;
+  x->indicators = x->opened = 0;
   if (e->type == FYET_DOCUMENT_START && x->documents++ > 0)
     pw_yaml_fail (&x->r, tree_event_offset (x, e), "a second document; a file contains one model");
   if (e->type == FYET_SCALAR) tree_scalar (x, e);
