@@ -26,10 +26,9 @@ typedef struct {
   pw_arena arena;
   pw_found *found;
   int count;
-  size_t room;                  /* entries of `found` allocated */
-  struct pw_searched *searched; /* the folders searched, links resolved */
-  char folders[400];            /* the same for messages, "/first:/second", as many as fit */
-  char unread[160]; /* folders of PINWHEEL_MODELS that cannot be searched: "/nowhere (No such file or directory)" */
+  size_t room;       /* entries of `found` allocated */
+  char folders[400]; /* the folders searched, links resolved, for messages: "/first:/second", as many as fit */
+  char unread[160];  /* folders of PINWHEEL_MODELS that cannot be searched: "/nowhere (No such file or directory)" */
 } pw_search;
 
 /* Searches every folder of the search path.  Close in every case.  PW_OK or PW_RESOURCE. */
