@@ -187,7 +187,6 @@ static parser_part parser_unknown (parser *p, const char *name) {
   pw_nearest near = { .sought = name };
   for (const char *const *v = p->variable; v && *v; v++) pw_nearest_try (&near, *v);
   for (int i = 0; p->scope && i < p->scope->names; i++) pw_nearest_try (&near, p->scope->name[i]);
-  for (const pw_expression_named_constant *c = pw_expression_constants; c->name; c++) pw_nearest_try (&near, c->name);
   for (const pw_expression_function *f = pw_expression_functions; f->name; f++) pw_nearest_try (&near, f->name);
   if (strcmp (name, "T") == 0) pw_nearest_try (&near, "t"); /* the time, defined in some expressions only */
   return parser_fail (p, p->at, "there is no \"%s\"%s", name, pw_nearest_text (&near));
@@ -198,8 +197,8 @@ static int parser_is_call (const parser *p) {
   return after[strspn (after, " \t\r\n")] == '(';
 }
 
-static parser_part parser_name (parser *p, const char *name) {
-  const pw_expression_named_constant *constant = pw_expression_find_constant (name);
+/* constant: the constant of this name, or NULL; other names have precedence. */
+static parser_part parser_name (parser *p, const char *name, const pw_expression_function *constant) {
   int variable = 0, named = p->scope ? pw_names_find (&p->scope->index, name) : -1;
   while (p->variable && p->variable[variable] && strcmp (p->variable[variable], name) != 0) variable++;
   int is_variable = p->variable && p->variable[variable];
@@ -262,7 +261,8 @@ static parser_part parser_operand (parser *p) {
   if (p->type != 'n') return parser_missing (p);
   const char *name = PW_PRINTED (PW_EXPRESSION_NAME, "%.*s", (int)p->size, p->text + p->at);
   int index = pw_expression_find_function (name);
-  if (index < 0) return parser_name (p, name);
+  const pw_expression_function *f = index < 0 ? NULL : &pw_expression_functions[index];
+  if (f == NULL || f->op == PW_OP_CONSTANT) return parser_name (p, name, f);
   if (parser_is_call (p)) return parser_call (p, index);
   return parser_fail (p, p->at, "\"%s\" is a function: write its argument in parentheses", name);
 }
