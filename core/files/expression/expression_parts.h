@@ -30,15 +30,13 @@ typedef enum {
   PW_OP_GREATER_EQUAL,
   PW_OP_EQUAL,
   PW_OP_UNEQUAL,
-  PW_OP_AND, /* operands are 1 or 0 */
-  PW_OP_OR,
   PW_OP_MOD,
   PW_OP_MIN,
   PW_OP_MAX,
   PW_OP_ATAN2,
   PW_OP_HYPOT,
   PW_OP_FUNCTION_OF_TWO, /* a smooth function of two arguments */
-  PW_OP_SELECT           /* condition is 1 or 0 */
+  PW_OP_SELECT           /* condition ? x : y; the condition is 1 or 0.  a && b is a ? b : 0, a || b is a ? 1 : b */
 } pw_expression_op;
 
 static inline int pw_expression_operands (int op) {

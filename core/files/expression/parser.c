@@ -28,10 +28,11 @@ typedef struct {
 
 /* An operator that begins with another one comes before it; precedence 1 binds least. */
 static const parser_operator parser_operators[] = {
-  { "||", PW_OP_OR, 1 },    { "&&", PW_OP_AND, 2 },     { "<=", PW_OP_LESS_EQUAL, 3 }, { ">=", PW_OP_GREATER_EQUAL, 3 },
-  { "==", PW_OP_EQUAL, 3 }, { "!=", PW_OP_UNEQUAL, 3 }, { "<", PW_OP_LESS, 3 },        { ">", PW_OP_GREATER, 3 },
-  { "+", PW_OP_ADD, 4 },    { "-", PW_OP_SUBTRACT, 4 }, { "*", PW_OP_MULTIPLY, 5 },    { "/", PW_OP_DIVIDE, 5 },
-  { "^", PW_OP_POWER, 6 },  { .name = NULL },
+  { "||", PW_OP_SELECT, 1 },        { "&&", PW_OP_SELECT, 2 },  { "<=", PW_OP_LESS_EQUAL, 3 },
+  { ">=", PW_OP_GREATER_EQUAL, 3 }, { "==", PW_OP_EQUAL, 3 },   { "!=", PW_OP_UNEQUAL, 3 },
+  { "<", PW_OP_LESS, 3 },           { ">", PW_OP_GREATER, 3 },  { "+", PW_OP_ADD, 4 },
+  { "-", PW_OP_SUBTRACT, 4 },       { "*", PW_OP_MULTIPLY, 5 }, { "/", PW_OP_DIVIDE, 5 },
+  { "^", PW_OP_POWER, 6 },          { .name = NULL },
 };
 
 typedef struct {
@@ -126,7 +127,7 @@ static parser_part parser_leaf (parser *p, int op, int index, double value) {
 static parser_part parser_operation (parser *p, parser_part part, int depends, int op, int index) {
   int may_jump = 0;
   part.depends |= depends;
-  part.condition = op >= PW_OP_LESS && op <= PW_OP_OR;
+  part.condition = op >= PW_OP_LESS && op <= PW_OP_UNEQUAL;
   parser_push (p, op, index, 0);
   if (p->status != PW_OK) return part;
   if (part.depends == 0) {
@@ -287,12 +288,15 @@ static parser_part parser_binary (parser *p, int precedence) {
   parser_part part = parser_unary (p);
   while (p->status == PW_OK && p->symbol && p->symbol->precedence >= precedence) {
     const parser_operator *o = p->symbol;
-    int logical = o->op == PW_OP_AND || o->op == PW_OP_OR;
+    int logical = o->op == PW_OP_SELECT;
     if (logical) part = parser_condition (p, part);
+    if (logical && *o->name == '|') parser_push (p, PW_OP_CONSTANT, 0, 1);
     parser_next (p);
     parser_part right = parser_binary (p, o->precedence + 1);
     if (logical) right = parser_condition (p, right);
+    if (logical && *o->name == '&') parser_push (p, PW_OP_CONSTANT, 0, 0);
     part = parser_operation (p, part, right.depends, o->op, 0);
+    part.condition |= logical;
   }
   return part;
 }
