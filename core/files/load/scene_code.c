@@ -1,8 +1,8 @@
 /* Specialised code: loads the compiled object from the cache, or compiles it.
  *
  * A file KEY.so in the cache is the object, then its source and a checksum; it is loaded if these are as expected.
- * KEY.c is locked while it is compiled, and deleted afterwards; if it does not compile, it is kept, with the messages in
- * KEY.log. */
+ * KEY.c is locked while it is compiled, and deleted afterwards; if it does not compile, it is kept, with the messages
+ * in KEY.log. */
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -159,9 +159,9 @@ static int code_complete (const code_job *x, pw_error *error) {
 }
 
 /* Compiles KEY.c, which this process has locked. */
-static int code_compile (code_job *x, FILE *c_file, pw_error *error) {
+static int code_compile (code_job *x, int file, pw_error *error) {
   int status = PW_OK;
-  if (fputs (x->source.text, c_file) < 0 || fflush (c_file) != 0)
+  if (dprintf (file, "%s", x->source.text) < 0)
     status = pw_fail (error, PW_RESOURCE, "cannot write %s: %s", x->c_file, strerror (errno));
   if (status == PW_OK) status = pw_compile_scene (x->c_file, x->part, x->log, x->lanes, error);
   int keep = status == PW_METHOD;
@@ -172,31 +172,29 @@ static int code_compile (code_job *x, FILE *c_file, pw_error *error) {
   return status;
 }
 
-/* Creates and locks KEY.c, waiting while another process compiles it.  NULL after a minute, or if that fails. */
-static FILE *code_lock (const code_job *x) {
+/* Creates and locks KEY.c, waiting while another process compiles it.  -1 after a minute, or if that fails. */
+static int code_lock (const code_job *x) {
   const struct timespec pause = { .tv_nsec = 20000000 };
   int file, waits = 0;
   while ((file = pw_lock_file (x->c_file, PW_LOCK_NEW)) < 0 && errno == EWOULDBLOCK && waits++ < CODE_MAX_WAITS)
     nanosleep (&pause, NULL);
-  FILE *f = file >= 0 ? fdopen (file, "wb") : NULL;
-  if (f == NULL && file >= 0) unlink (x->c_file), close (file);
-  return f;
+  return file;
 }
 
 /* Compiles in the folder, unless another process has done so meanwhile. */
 static int code_make (code_job *x, pw_error *error) {
-  FILE *c_file = code_lock (x);
-  if (c_file == NULL) return pw_fail (error, PW_RESOURCE, "cannot write into %s", x->folder);
+  int file = code_lock (x);
+  if (file < 0) return pw_fail (error, PW_RESOURCE, "cannot write into %s", x->folder);
   int status = code_load_cached (x);
   if (status == PW_OK)
     unlink (x->c_file);
   else
-    status = code_compile (x, c_file, error);
-  fclose (c_file);
+    status = code_compile (x, file, error);
+  close (file);
   return status;
 }
 
-/* Where the cache may be the cause of a failure, as it is if KEY.c was deleted meanwhile, a temporary folder is used. */
+/* Uses a temporary folder after failures that the cache may have caused, as by the deletion of KEY.c. */
 static int code_open (code_job *x, pw_error *error) {
   pw_error cause = { 0 };
   if (pw_cache_folder (x->folder, x->code->notice, sizeof x->code->notice)) {
