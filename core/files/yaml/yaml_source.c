@@ -34,15 +34,6 @@ static void source_window (const pw_yaml *y, size_t at, const char **begin, cons
   while (*to > caret && (**to & 0xC0) == 0x80) --*to;
 }
 
-/* Shows invalid bytes as ?, control characters as blanks. */
-static void source_clean (char *text) {
-  for (int n; *text; text += n) {
-    n = pw_utf8_size (text);
-    if (n == 0 || (unsigned char)*text < ' ') *text = n ? ' ' : '?';
-    if (n == 0) n = 1;
-  }
-}
-
 int pw_yaml_fail (const pw_reader *r, size_t at, const char *format, ...) {
   const pw_yaml *y = r->y;
   char text[220], shown[SOURCE_SHOWN + 4];
@@ -54,7 +45,8 @@ int pw_yaml_fail (const pw_reader *r, size_t at, const char *format, ...) {
   if (at > y->size) at = y->size;
   source_window (y, at, &begin, &from, &to);
   snprintf (shown, sizeof shown, "%s%.*s", from > begin ? "..." : "", (int)(to - from), from);
-  source_clean (shown);
+  pw_text_sanitise (shown);
+  for (char *tab = shown; (tab = strchr (tab, '\t')) != NULL;) *tab = ' '; /* one column, as in the line of the caret */
   size_t n = strlen (y->path);
   return pw_fail (r->error, PW_INPUT, "%s%s:%d:%d: error: %s\n  %s\n  %*s^", n > 100 ? "..." : "",
                   n > 100 ? y->path + n - 97 : y->path, pw_yaml_line (y, at),

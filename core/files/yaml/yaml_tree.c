@@ -16,7 +16,6 @@ typedef struct {
   pw_node *open[PW_YAML_DEPTH];  /* open lists and maps */
   pw_node **tail[PW_YAML_DEPTH]; /* where the next node of each goes */
   int depth;
-  int documents;
   size_t fed;        /* bytes given to the parser */
   double indicators; /* [ ] { } , : given since the last event */
   double opened;     /* opening minus closing brackets among them */
@@ -157,7 +156,7 @@ static ssize_t tree_feed (void *user, void *to, size_t count) {
 static void tree_event (tree *x, struct fy_event *e) {
   if (tree_refuse_anchor (x, e) != PW_OK) return;
   x->indicators = x->opened = 0;
-  if (e->type == FYET_DOCUMENT_START && x->documents++ > 0)
+  if (e->type == FYET_DOCUMENT_START && x->y->root)
     pw_yaml_fail (&x->r, tree_event_offset (x, e), "a second document; a file contains one model");
   if (e->type == FYET_SCALAR) tree_scalar (x, e);
   if (e->type == FYET_SEQUENCE_START) tree_begin (x, e, PW_YAML_LIST);
