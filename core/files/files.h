@@ -26,10 +26,9 @@ typedef struct {
   pw_arena arena;
   pw_found *found;
   int count;
-  size_t room;                  /* entries of `found` allocated */
-  struct pw_searched *searched; /* the folders searched, links resolved */
-  char folders[400];            /* the same for messages, "/first:/second", as many as fit */
-  char unread[160]; /* folders of PINWHEEL_MODELS that cannot be searched: "/nowhere (No such file or directory)" */
+  size_t room;       /* entries of `found` allocated */
+  char folders[400]; /* the folders searched, links resolved, for messages: "/first:/second", as many as fit */
+  char unread[160];  /* folders of PINWHEEL_MODELS that cannot be searched: "/nowhere (No such file or directory)" */
 } pw_search;
 
 /* Searches every folder of the search path.  Close in every case.  PW_OK or PW_RESOURCE. */
@@ -84,7 +83,6 @@ typedef struct pw_yaml pw_yaml;
 pw_yaml *pw_yaml_open (const char *path, const char *shown, size_t max_bytes, pw_error *error);
 void pw_yaml_close (pw_yaml *y);
 const pw_plugin_table *pw_yaml_table (const pw_yaml *y);
-const char *pw_yaml_text_of (const pw_yaml *y, size_t *size);
 /* Writes the tree as bytes, for programs without libfyaml (yaml_stored.c). */
 void pw_yaml_write_tree (const pw_yaml *y, FILE *f);
 /* As pw_file_tables. */
@@ -158,8 +156,6 @@ const char *pw_lock_reason (int code); /* of an errno value, for messages */
 
 /* ---- Outputs (output.c) ---- */
 
-/* Writes; PW_RESOURCE with the reason if this or an earlier write fails. */
-int pw_output_text (pw_output *o, const char *text, size_t size, pw_error *error);
 /* PW_RESOURCE if a write to its stream has failed; set errno to 0 before writing, for the reason. */
 int pw_output_check (pw_output *o, pw_error *error);
 

@@ -49,10 +49,6 @@ static inline double value_of (const pw_expression_code *c, double left, double 
   case PW_OP_POWER:
     if (left == 0 && right < 0) *may_jump = 1;
     return pw_expression_power (left, right);
-  case PW_OP_AND:
-    return left != 0 && right != 0;
-  case PW_OP_OR:
-    return left != 0 || right != 0;
   case PW_OP_MIN:
     return fmin (left, right);
   case PW_OP_MAX:
@@ -212,7 +208,6 @@ static jet jet_hypot (const pw_expression_code *c, const jet *x, const jet *y, d
   return (jet){ 0, d, d > 0 ? (x->d * x->dd + y->d * y->dd) / d : hypot (x->dd, y->dd), 1 };
 }
 
-/* All but && and ||, whose operands never vary: they are 1 or 0. */
 static jet jet_binary (const pw_expression_code *c, const jet *x, const jet *y, double *discrete) {
   /* At a pole, the denominator or base 0 has the sign of its value just after. */
   jet after = c->op == PW_OP_DIVIDE ? *y : *x;

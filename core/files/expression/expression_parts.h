@@ -30,15 +30,13 @@ typedef enum {
   PW_OP_GREATER_EQUAL,
   PW_OP_EQUAL,
   PW_OP_UNEQUAL,
-  PW_OP_AND, /* operands are 1 or 0 */
-  PW_OP_OR,
   PW_OP_MOD,
   PW_OP_MIN,
   PW_OP_MAX,
   PW_OP_ATAN2,
   PW_OP_HYPOT,
   PW_OP_FUNCTION_OF_TWO, /* a smooth function of two arguments */
-  PW_OP_SELECT           /* condition is 1 or 0 */
+  PW_OP_SELECT           /* condition ? x : y; the condition is 1 or 0.  a && b is a ? b : 0, a || b is a ? 1 : b */
 } pw_expression_op;
 
 static inline int pw_expression_operands (int op) {
@@ -80,28 +78,20 @@ typedef enum { PW_INCREASING, PW_DECREASING, PW_NOT_MONOTONIC } pw_trend;
 
 typedef struct {
   const char *name;
-  short op;          /* PW_OP_FUNCTION_OF_ONE, PW_OP_FUNCTION_OF_TWO, or an operation of its own */
+  short op;          /* PW_OP_FUNCTION_OF_ONE, PW_OP_FUNCTION_OF_TWO, or an operation of its own; PW_OP_CONSTANT */
   short least, most; /* arguments; most = 0: any number */
   double (*of_one) (double);
   double (*of_two) (double, double);
   pw_partials (*partials) (double x, double y, double f); /* f: the value at (x, y) */
   pw_trend trend;
   double from, to; /* domain of a function of one argument, NaN outside */
+  double value;    /* of a constant, without arguments */
 } pw_expression_function;
 
-typedef struct {
-  const char *name;
-  double value;
-} pw_expression_named_constant;
+extern const pw_expression_function pw_expression_functions[]; /* ends with a NULL name */
 
-/* Both end with a NULL name. */
-extern const pw_expression_function pw_expression_functions[];
-extern const pw_expression_named_constant pw_expression_constants[];
-
-/* The index of a function, or -1. */
+/* The index of a function or constant, or -1. */
 int pw_expression_find_function (const char *name);
-/* A constant, or NULL (words.c). */
-const pw_expression_named_constant *pw_expression_find_constant (const char *name);
 
 /* The length of the name at p, which may contain dots (frame.phi), or of the number: digits, perhaps with a decimal
  * point and an exponent; 0 if there is none (words.c). */

@@ -133,16 +133,19 @@ static pw_partials partials_jacobi_am (double u, double m, double phi) {
 
 /* The entries are pw_expression_function. */
 #define FUNCTION_OF_ONE(name, f, trend, from, to) \
-  { #name, PW_OP_FUNCTION_OF_ONE, 1, 1, f, NULL, partials_##name, trend, from, to }
+  { #name, PW_OP_FUNCTION_OF_ONE, 1, 1, f, NULL, partials_##name, trend, from, to, 0 }
 #define FUNCTION_OF_TWO(name, op, f) \
-  { #name, op, 2, 2, NULL, f, partials_##name, PW_NOT_MONOTONIC, 0, 0 }
+  { #name, op, 2, 2, NULL, f, partials_##name, PW_NOT_MONOTONIC, 0, 0, 0 }
 #define FUNCTION_WITHOUT_PARTIALS(name, op, least, most) \
-  { #name, op, least, most, NULL, NULL, NULL, PW_NOT_MONOTONIC, 0, 0 }
+  { #name, op, least, most, NULL, NULL, NULL, PW_NOT_MONOTONIC, 0, 0, 0 }
 
 const pw_expression_function pw_expression_functions[] = {
+  { .name = "pi", .op = PW_OP_CONSTANT, .value = PW_PI },
+  { .name = "e", .op = PW_OP_CONSTANT, .value = 2.71828182845904523536 },
+  { .name = "deg", .op = PW_OP_CONSTANT, .value = PW_PI / 180 },
   FUNCTION_OF_ONE (sin, pw_sin, PW_NOT_MONOTONIC, -DBL_MAX, DBL_MAX),
   FUNCTION_OF_ONE (cos, pw_cos, PW_NOT_MONOTONIC, -DBL_MAX, DBL_MAX),
-  { "tan", PW_OP_TAN, 1, 1, tan, NULL, partials_tan, PW_NOT_MONOTONIC, -DBL_MAX, DBL_MAX },
+  { "tan", PW_OP_TAN, 1, 1, tan, NULL, partials_tan, PW_NOT_MONOTONIC, -DBL_MAX, DBL_MAX, 0 },
   FUNCTION_OF_ONE (asin, asin, PW_INCREASING, -1, 1),
   FUNCTION_OF_ONE (acos, acos, PW_DECREASING, -1, 1),
   FUNCTION_OF_ONE (atan, atan, PW_INCREASING, -INFINITY, INFINITY),
@@ -166,10 +169,6 @@ const pw_expression_function pw_expression_functions[] = {
   FUNCTION_WITHOUT_PARTIALS (min, PW_OP_MIN, 1, 0),
   FUNCTION_WITHOUT_PARTIALS (max, PW_OP_MAX, 1, 0),
   { .name = NULL },
-};
-
-const pw_expression_named_constant pw_expression_constants[] = {
-  { "pi", PW_PI }, { "e", 2.71828182845904523536 }, { "deg", PW_PI / 180 }, { .name = NULL }
 };
 
 int pw_expression_find_function (const char *name) {

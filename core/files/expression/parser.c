@@ -28,10 +28,11 @@ typedef struct {
 
 /* An operator that begins with another one comes before it; precedence 1 binds least. */
 static const parser_operator parser_operators[] = {
-  { "||", PW_OP_OR, 1 },    { "&&", PW_OP_AND, 2 },     { "<=", PW_OP_LESS_EQUAL, 3 }, { ">=", PW_OP_GREATER_EQUAL, 3 },
-  { "==", PW_OP_EQUAL, 3 }, { "!=", PW_OP_UNEQUAL, 3 }, { "<", PW_OP_LESS, 3 },        { ">", PW_OP_GREATER, 3 },
-  { "+", PW_OP_ADD, 4 },    { "-", PW_OP_SUBTRACT, 4 }, { "*", PW_OP_MULTIPLY, 5 },    { "/", PW_OP_DIVIDE, 5 },
-  { "^", PW_OP_POWER, 6 },  { .name = NULL },
+  { "||", PW_OP_SELECT, 1 },        { "&&", PW_OP_SELECT, 2 },  { "<=", PW_OP_LESS_EQUAL, 3 },
+  { ">=", PW_OP_GREATER_EQUAL, 3 }, { "==", PW_OP_EQUAL, 3 },   { "!=", PW_OP_UNEQUAL, 3 },
+  { "<", PW_OP_LESS, 3 },           { ">", PW_OP_GREATER, 3 },  { "+", PW_OP_ADD, 4 },
+  { "-", PW_OP_SUBTRACT, 4 },       { "*", PW_OP_MULTIPLY, 5 }, { "/", PW_OP_DIVIDE, 5 },
+  { "^", PW_OP_POWER, 6 },          { .name = NULL },
 };
 
 typedef struct {
@@ -126,7 +127,7 @@ static parser_part parser_leaf (parser *p, int op, int index, double value) {
 static parser_part parser_operation (parser *p, parser_part part, int depends, int op, int index) {
   int may_jump = 0;
   part.depends |= depends;
-  part.condition = op >= PW_OP_LESS && op <= PW_OP_OR;
+  part.condition = op >= PW_OP_LESS && op <= PW_OP_UNEQUAL;
   parser_push (p, op, index, 0);
   if (p->status != PW_OK) return part;
   if (part.depends == 0) {
@@ -187,7 +188,6 @@ static parser_part parser_unknown (parser *p, const char *name) {
   pw_nearest near = { .sought = name };
   for (const char *const *v = p->variable; v && *v; v++) pw_nearest_try (&near, *v);
   for (int i = 0; p->scope && i < p->scope->names; i++) pw_nearest_try (&near, p->scope->name[i]);
-  for (const pw_expression_named_constant *c = pw_expression_constants; c->name; c++) pw_nearest_try (&near, c->name);
   for (const pw_expression_function *f = pw_expression_functions; f->name; f++) pw_nearest_try (&near, f->name);
   if (strcmp (name, "T") == 0) pw_nearest_try (&near, "t"); /* the time, defined in some expressions only */
   return parser_fail (p, p->at, "there is no \"%s\"%s", name, pw_nearest_text (&near));
@@ -198,8 +198,8 @@ static int parser_is_call (const parser *p) {
   return after[strspn (after, " \t\r\n")] == '(';
 }
 
-static parser_part parser_name (parser *p, const char *name) {
-  const pw_expression_named_constant *constant = pw_expression_find_constant (name);
+/* constant: the constant of this name, or NULL; other names have precedence. */
+static parser_part parser_name (parser *p, const char *name, const pw_expression_function *constant) {
   int variable = 0, named = p->scope ? pw_names_find (&p->scope->index, name) : -1;
   while (p->variable && p->variable[variable] && strcmp (p->variable[variable], name) != 0) variable++;
   int is_variable = p->variable && p->variable[variable];
@@ -262,7 +262,8 @@ static parser_part parser_operand (parser *p) {
   if (p->type != 'n') return parser_missing (p);
   const char *name = PW_PRINTED (PW_EXPRESSION_NAME, "%.*s", (int)p->size, p->text + p->at);
   int index = pw_expression_find_function (name);
-  if (index < 0) return parser_name (p, name);
+  const pw_expression_function *f = index < 0 ? NULL : &pw_expression_functions[index];
+  if (f == NULL || f->op == PW_OP_CONSTANT) return parser_name (p, name, f);
   if (parser_is_call (p)) return parser_call (p, index);
   return parser_fail (p, p->at, "\"%s\" is a function: write its argument in parentheses", name);
 }
@@ -287,12 +288,15 @@ static parser_part parser_binary (parser *p, int precedence) {
   parser_part part = parser_unary (p);
   while (p->status == PW_OK && p->symbol && p->symbol->precedence >= precedence) {
     const parser_operator *o = p->symbol;
-    int logical = o->op == PW_OP_AND || o->op == PW_OP_OR;
+    int logical = o->op == PW_OP_SELECT;
     if (logical) part = parser_condition (p, part);
+    if (logical && *o->name == '|') parser_push (p, PW_OP_CONSTANT, 0, 1);
     parser_next (p);
     parser_part right = parser_binary (p, o->precedence + 1);
     if (logical) right = parser_condition (p, right);
+    if (logical && *o->name == '&') parser_push (p, PW_OP_CONSTANT, 0, 0);
     part = parser_operation (p, part, right.depends, o->op, 0);
+    part.condition |= logical;
   }
   return part;
 }

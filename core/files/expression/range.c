@@ -225,19 +225,6 @@ static pw_range range_hull (const pw_range *x, const pw_range *y) {
                      .nan = x->nan | y->nan };
 }
 
-/* An operand that decides the result hides breaks of the other one. */
-static pw_range range_logical (int op, const pw_range *x, const pw_range *y) {
-  double decisive = op == PW_OP_OR; /* 1 decides ||, 0 decides && */
-  if (x->lo == decisive && x->hi == decisive) return *x;
-  if (y->lo == decisive && y->hi == decisive) return *y;
-  pw_range r = range_hull (x, y);
-  if (op == PW_OP_OR)
-    r.lo = fmax (x->lo, y->lo);
-  else
-    r.hi = fmin (x->hi, y->hi);
-  return r;
-}
-
 /* The minimum of NaN and a number is the number.  Where either operand can be the smaller one there may be a kink, and
  * a minimum that is constant in the interval may fall just after it. */
 static pw_range range_min (const pw_range *x, const pw_range *y) {
@@ -267,6 +254,7 @@ static pw_range range_select (const pw_range *condition, const pw_range *x, cons
   if (condition->lo > 0) return *x;
   if (condition->hi < 1) return *y;
   pw_range r = range_hull (x, y);
+  if (range_is (&r, r.lo)) return r; /* the condition does not matter */
   r.breaks |= condition->breaks;
   r.of_states |= condition->of_states;
   return r;
@@ -274,7 +262,7 @@ static pw_range range_select (const pw_range *condition, const pw_range *x, cons
 
 /* ---- Operations ---- */
 
-/* Operations of one or two operands but && || min max; only sign and comparisons consider NaN (range_result). */
+/* Operations of one or two operands but min and max; only sign and comparisons consider NaN (range_result). */
 static pw_range range_operation (const pw_expression_code *c, const pw_range *x) {
   const pw_range *y = x + 1;
   switch (c->op) {
@@ -331,7 +319,6 @@ static pw_range range_result (const pw_expression_code *c, const pw_range *x, in
 /* Ignores breaks whose time depends on states.  Where an operation that jumps, and is constant between jumps (unlike
  * mod and atan2), has one value, breaks of its operands do not matter. */
 static pw_range range_apply (const pw_expression_code *c, const pw_range *x, int operands) {
-  if (c->op == PW_OP_AND || c->op == PW_OP_OR) return range_logical (c->op, x, x + 1);
   if (c->op == PW_OP_MIN || c->op == PW_OP_MAX) return (c->op == PW_OP_MIN ? range_min : range_max) (x, x + 1);
   if (c->op == PW_OP_SELECT) return range_select (x, x + 1, x + 2);
   pw_range r = range_result (c, x, operands);

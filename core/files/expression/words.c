@@ -25,14 +25,8 @@ int pw_expression_number (const char *text, double *value) {
   return n && text[sign + n] == 0 && pw_read_number (text, value) == PW_OK;
 }
 
-const pw_expression_named_constant *pw_expression_find_constant (const char *name) {
-  const pw_expression_named_constant *c = pw_expression_constants;
-  while (c->name && strcmp (c->name, name) != 0) c++;
-  return c->name ? c : NULL;
-}
-
 int pw_expression_is_reserved (const char *text) {
-  return pw_expression_find_constant (text) || pw_expression_find_function (text) >= 0;
+  return pw_expression_find_function (text) >= 0;
 }
 
 int pw_expression_is_name (const char *text) {

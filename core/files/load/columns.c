@@ -5,7 +5,6 @@
  * names the columns, "NAME" or "NAME [unit]"; numbers are converted to SI units.  Blank lines and lines that begin with
  * # are skipped. */
 #include <math.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 #include "files.h"
@@ -29,14 +28,8 @@ typedef struct {
   pw_error *error;
 } columns;
 
-PW_PRINTF (2, 3) static int columns_fail (const columns *c, const char *format, ...) {
-  char text[300];
-  va_list arguments;
-  va_start (arguments, format);
-  vsnprintf (text, sizeof text, format, arguments);
-  va_end (arguments);
-  return pw_fail (c->error, PW_INPUT, "%.80s:%d: %s", c->shown, c->line, text);
-}
+#define columns_fail(c, ...) \
+  pw_fail ((c)->error, PW_INPUT, "%.80s:%d: %s", (c)->shown, (c)->line, PW_PRINTED (300, __VA_ARGS__))
 
 /* ---- Lines and cells ---- */
 

@@ -77,12 +77,9 @@ static int page_table (void *context, const char *path) {
 }
 
 static int page_text (pw_page *p, const pw_file *f, const pw_yaml *y, pw_error *error) {
-  size_t size;
-  const char *text = pw_yaml_text_of (y, &size), *path = pw_file_path (f);
-  char *copy = malloc (size + 1);
+  const char *path = pw_file_path (f);
   page_tables x = { p, (size_t)(strrchr (path, '/') - path) + 1, error };
-  if (copy) memcpy (copy, text, size);
-  int status = page_add (p, "model", copy, size, error);
+  int status = page_read (p, "model", path, error);
   if (status == PW_OK) status = page_tree (p, y, error);
   if (status == PW_OK) status = pw_file_tables (f, page_table, &x);
   return status == PW_OK ? PW_OK : pw_fail (error, status, "out of memory"); /* unless the reason is recorded */

@@ -1,8 +1,8 @@
 /* Specialised code: loads the compiled object from the cache, or compiles it.
  *
- * A file KEY.so in the cache is the object, then its text, its identity (code_job) and a checksum; it is loaded if
- * these are as expected.  KEY.c is locked while it is compiled, and deleted afterwards; if it does not compile, it is
- * kept, with the messages in KEY.log. */
+ * A file KEY.so in the cache is the object, then its source and a checksum; it is loaded if these are as expected.
+ * KEY.c is locked while it is compiled, and deleted afterwards; if it does not compile, it is kept, with the messages
+ * in KEY.log. */
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -24,16 +24,15 @@ struct pw_scene_code {
 /* The object to load. */
 typedef struct {
   const pw_system *system;
-  const char *text;
-  int lanes;           /* 0: for single runs */
-  char identity[2000]; /* what else determines the object: version, compiler, options, checksum of pinwheel.h */
-  char key[17];        /* checksum of text and identity, in hexadecimal */
+  int lanes;        /* 0: for single runs */
+  pw_stream source; /* ends with comments on what else determines the object */
+  char key[17];     /* checksum of the source, in hexadecimal */
   /* paths: KEY.c, KEY.log, the object while written, KEY.so */
-  char folder[PW_PATH], source[PW_PATH], log[PW_PATH], part[PW_PATH], object[PW_PATH];
+  char folder[PW_PATH], c_file[PW_PATH], log[PW_PATH], part[PW_PATH], object[PW_PATH];
   pw_scene_code *code; /* the result */
 } code_job;
 
-/* ---- Identity ---- */
+/* ---- Source ---- */
 
 /* Finds a command, on PATH unless it has a slash; an empty entry of PATH is the current folder.  0 if there is none. */
 static int code_find_program (const char *word, struct stat *info) {
@@ -47,24 +46,16 @@ static int code_find_program (const char *word, struct stat *info) {
   return 0;
 }
 
-/* Adds a line to the identity. */
-static void code_add (code_job *x, const char *text) {
-  size_t used = strlen (x->identity);
-  snprintf (x->identity + used, sizeof x->identity - used, "%s\n", text);
-}
-
-/* Adds the words of the compiler; of programs among them ("ccache gcc") also size, date and inode. */
-static int code_add_compiler (code_job *x) {
-  char *copy = strdup (pw_compiler ()), *rest = NULL;
-  for (char *w = copy ? strtok_r (copy, " \t", &rest) : NULL; w; w = strtok_r (NULL, " \t", &rest)) {
+/* Writes the words of a compiler, which are modified; of programs among them ("ccache gcc") also size, date, inode. */
+static void code_write_compiler (FILE *f, char *words) {
+  char *rest = NULL;
+  for (char *w = strtok_r (words, " \t", &rest); w; w = strtok_r (NULL, " \t", &rest)) {
     struct stat info;
-    code_add (x, w);
+    fprintf (f, "// %s\n", w);
     if (!code_find_program (w, &info)) continue;
-    code_add (x, PW_PRINTED (200, "%lld %lld %ld %llu", (long long)info.st_size, (long long)info.st_mtim.tv_sec,
-                             (long)info.st_mtim.tv_nsec, (unsigned long long)info.st_ino));
+    fprintf (f, "// %lld %lld %ld %llu\n", (long long)info.st_size, (long long)info.st_mtim.tv_sec,
+             (long)info.st_mtim.tv_nsec, (unsigned long long)info.st_ino);
   }
-  free (copy);
-  return copy && strlen (x->identity) < sizeof x->identity - 50 ? PW_OK : PW_RESOURCE; /* room for the checksum */
 }
 
 /* Reads a file.  PW_RETRY: it does not exist. */
@@ -73,25 +64,30 @@ static int code_read (const char *path, char **text, size_t *size, pw_error *err
   return status == PW_INPUT && *text == NULL && errno == ENOENT ? PW_RETRY : status;
 }
 
-static int code_identify (code_job *x, pw_error *error) {
-  char header[PW_PATH], *text = NULL, sum[40] = "";
+/* Stores a text as the source, followed by version, options, compiler and checksum of pinwheel.h. */
+static int code_source (code_job *x, const char *text, pw_error *error) {
+  char header[PW_PATH], *bytes = NULL, *compiler = strdup (pw_compiler ());
   size_t size;
-  code_add (x, "pinwheel " PW_VERSION);
-  for (const char *const *o = pw_scene_options (x->lanes); *o; o++) code_add (x, *o);
-  if (code_add_compiler (x) != PW_OK) return pw_fail (error, PW_RESOURCE, "out of memory, or CC is too long");
   int status = pw_search_header (header, error);
-  if (*header && code_read (header, &text, &size, NULL) == PW_OK)
-    snprintf (sum, sizeof sum, "%016llx", pw_check_sum (PW_CHECK, text, size));
-  code_add (x, sum);
-  snprintf (x->key, sizeof x->key, "%016llx",
-            pw_check_sum (pw_check_sum (PW_CHECK, x->text, strlen (x->text)), x->identity, strlen (x->identity)));
-  free (text);
+  FILE *f = pw_stream_open (&x->source);
+  if (f && compiler) {
+    fprintf (f, "%s\n// pinwheel " PW_VERSION "\n", text);
+    for (const char *const *o = pw_scene_options (x->lanes); *o; o++) fprintf (f, "// %s\n", *o);
+    code_write_compiler (f, compiler);
+    if (*header && code_read (header, &bytes, &size, NULL) == PW_OK)
+      fprintf (f, "// %016llx\n", pw_check_sum (PW_CHECK, bytes, size));
+  }
+  free (bytes);
+  free (compiler);
+  if (pw_stream_close (f, &x->source) != PW_OK || compiler == NULL)
+    return pw_fail (error, PW_RESOURCE, "out of memory");
+  snprintf (x->key, sizeof x->key, "%016llx", pw_check_sum (PW_CHECK, x->source.text, x->source.size));
   return status;
 }
 
 /* The object while written is named by process: the compiler of a killed one may still run. */
 static void code_paths (code_job *x) {
-  pw_path (x->source, "%s/%s.c", x->folder, x->key);
+  pw_path (x->c_file, "%s/%s.c", x->folder, x->key);
   pw_path (x->log, "%s/%s.log", x->folder, x->key);
   pw_path (x->part, "%s/%s.%ld.part", x->folder, x->key, (long)getpid ());
   pw_path (x->object, "%s/%s.so", x->folder, x->key);
@@ -99,17 +95,16 @@ static void code_paths (code_job *x) {
 
 /* ---- Loading ---- */
 
-/* Checks a cached object.  PW_RETRY: missing, or of another text or identity; PW_INPUT: damaged; PW_RESOURCE. */
+/* Checks a cached object.  PW_RETRY: missing, or of another source; PW_INPUT: damaged; PW_RESOURCE. */
 static int code_check (const code_job *x, pw_error *error) {
   char *bytes;
-  size_t size = 0, text_size = strlen (x->text), id_size = strlen (x->identity);
+  size_t size = 0, source_size = x->source.size;
   unsigned long long check = 0;
   int status = code_read (x->object, &bytes, &size, error);
   if (status == PW_OK && size >= sizeof check) memcpy (&check, bytes + (size -= sizeof check), sizeof check);
   if (status == PW_OK && pw_check_sum (PW_CHECK, bytes, size) != check)
     status = pw_fail (error, PW_INPUT, "it is damaged");
-  if (status == PW_OK && (size < text_size + id_size || memcmp (bytes + size - id_size, x->identity, id_size) != 0 ||
-                          memcmp (bytes + size - id_size - text_size, x->text, text_size) != 0))
+  if (status == PW_OK && (size < source_size || memcmp (bytes + size - source_size, x->source.text, source_size) != 0))
     status = PW_RETRY;
   free (bytes);
   return status;
@@ -144,19 +139,18 @@ static int code_load_cached (code_job *x) {
 
 /* ---- Compiling ---- */
 
-/* Appends text, identity and checksum to an object, and renames it. */
+/* Appends source and checksum to an object, and renames it. */
 static int code_complete (const code_job *x, pw_error *error) {
   char *bytes;
-  size_t size, text_size = strlen (x->text), identity_size = strlen (x->identity);
+  size_t size;
   pw_error cause = { 0 };
   int status = code_read (x->part, &bytes, &size, &cause);
   if (status == PW_RETRY) strcpy (cause.text, "the compiler has written no object");
   if (status != PW_OK) return free (bytes), pw_fail (error, PW_RESOURCE, "%s", cause.text);
-  unsigned long long check = pw_check_sum (pw_check_sum (pw_check_sum (PW_CHECK, bytes, size), x->text, text_size),
-                                           x->identity, identity_size);
+  unsigned long long check = pw_check_sum (pw_check_sum (PW_CHECK, bytes, size), x->source.text, x->source.size);
   free (bytes);
   FILE *f = fopen (x->part, "ab");
-  if (f) fprintf (f, "%s%s", x->text, x->identity);
+  if (f) fwrite (x->source.text, 1, x->source.size, f);
   if (f) fwrite (&check, sizeof check, 1, f);
   int failed = f == NULL || ferror (f);
   if (f && fclose (f) != 0) failed = 1;
@@ -165,77 +159,68 @@ static int code_complete (const code_job *x, pw_error *error) {
 }
 
 /* Compiles KEY.c, which this process has locked. */
-static int code_compile (code_job *x, FILE *source, pw_error *error) {
+static int code_compile (code_job *x, int file, pw_error *error) {
   int status = PW_OK;
-  if (fputs (x->text, source) < 0 || fflush (source) != 0)
-    status = pw_fail (error, PW_RESOURCE, "cannot write %s: %s", x->source, strerror (errno));
-  if (status == PW_OK) status = pw_compile_scene (x->source, x->part, x->log, x->lanes, error);
+  if (dprintf (file, "%s", x->source.text) < 0)
+    status = pw_fail (error, PW_RESOURCE, "cannot write %s: %s", x->c_file, strerror (errno));
+  if (status == PW_OK) status = pw_compile_scene (x->c_file, x->part, x->log, x->lanes, error);
   int keep = status == PW_METHOD;
   if (status == PW_OK) status = code_complete (x, error);
   if (status == PW_OK && (status = code_load (x, error)) != PW_OK) unlink (x->object);
   unlink (x->part);
-  if (!keep) unlink (x->source), unlink (x->log);
+  if (!keep) unlink (x->c_file), unlink (x->log);
   return status;
 }
 
-/* Creates and locks KEY.c, waiting while another process compiles it.  NULL after a minute, or if that fails. */
-static FILE *code_lock (const code_job *x) {
+/* Creates and locks KEY.c, waiting while another process compiles it.  -1 after a minute, or if that fails. */
+static int code_lock (const code_job *x) {
   const struct timespec pause = { .tv_nsec = 20000000 };
   int file, waits = 0;
-  while ((file = pw_lock_file (x->source, PW_LOCK_NEW)) < 0 && errno == EWOULDBLOCK && waits++ < CODE_MAX_WAITS)
+  while ((file = pw_lock_file (x->c_file, PW_LOCK_NEW)) < 0 && errno == EWOULDBLOCK && waits++ < CODE_MAX_WAITS)
     nanosleep (&pause, NULL);
-  FILE *f = file >= 0 ? fdopen (file, "wb") : NULL;
-  if (f == NULL && file >= 0) unlink (x->source), close (file);
-  return f;
+  return file;
 }
 
-/* Compiles into the cache.  PW_METHOD if the text does not compile, PW_STOPPED if a signal ended the compiler, else
- * PW_RETRY: the cache may be the cause, as it is if KEY.c was deleted meanwhile. */
-static int code_compile_cached (code_job *x, pw_error *error) {
-  pw_error cause = { 0 };
-  FILE *source = code_lock (x);
-  if (source == NULL) return PW_RETRY;
-  int status = code_check (x, NULL) == PW_OK ? code_load (x, NULL) : PW_RETRY; /* another process was faster */
-  if (status != PW_OK)
-    status = code_compile (x, source, &cause);
+/* Compiles in the folder, unless another process has done so meanwhile. */
+static int code_make (code_job *x, pw_error *error) {
+  int file = code_lock (x);
+  if (file < 0) return pw_fail (error, PW_RESOURCE, "cannot write into %s", x->folder);
+  int status = code_load_cached (x);
+  if (status == PW_OK)
+    unlink (x->c_file);
   else
-    unlink (x->source);
-  fclose (source);
-  if (status == PW_OK) pw_cache_trim (x->folder);
-  if (status == PW_STOPPED || (status == PW_METHOD && access (x->source, F_OK) == 0))
-    return pw_fail (error, status, "%s", cause.text);
-  return status == PW_OK ? PW_OK : PW_RETRY;
-}
-
-static int code_compile_temporary (code_job *x, pw_error *error) {
-  if (pw_temporary_folder (x->folder, error) != PW_OK) return PW_RESOURCE;
-  code_paths (x);
-  FILE *source = code_lock (x);
-  int status =
-      source ? code_compile (x, source, error) : pw_fail (error, PW_RESOURCE, "cannot write into %s", x->folder);
-  if (source) fclose (source);
-  unlink (x->object);
-  rmdir (x->folder); /* unless it keeps the source */
+    status = code_compile (x, file, error);
+  close (file);
   return status;
 }
 
+/* Uses a temporary folder after failures that the cache may have caused, as by the deletion of KEY.c. */
 static int code_open (code_job *x, pw_error *error) {
-  int status = code_identify (x, error);
-  if (pw_cache_folder (x->folder, x->code->notice, sizeof x->code->notice) && status == PW_OK) {
+  pw_error cause = { 0 };
+  if (pw_cache_folder (x->folder, x->code->notice, sizeof x->code->notice)) {
     code_paths (x);
-    status = code_load_cached (x);
-    if (status == PW_RETRY) status = code_compile_cached (x, error);
-    if (status != PW_RETRY) return status;
+    if (code_load_cached (x) == PW_OK) return PW_OK;
+    int status = code_make (x, &cause);
+    if (status == PW_OK) return pw_cache_trim (x->folder), PW_OK;
+    if (status == PW_STOPPED || (status == PW_METHOD && access (x->c_file, F_OK) == 0))
+      return pw_fail (error, status, "%s", cause.text);
   }
-  return status == PW_OK || status == PW_RETRY ? code_compile_temporary (x, error) : status;
+  if (pw_temporary_folder (x->folder, error) != PW_OK) return PW_RESOURCE;
+  code_paths (x);
+  int status = code_make (x, error);
+  unlink (x->object);
+  rmdir (x->folder); /* unless it keeps KEY.c */
+  return status;
 }
 
 pw_scene_code *pw_scene_lanes_open (const char *text, const pw_system *s, int lanes, pw_error *error) {
   if (pw_require (text, "specialised code", error) != PW_OK || pw_require (s, "a system", error) != PW_OK) return NULL;
   if (pw_scene_options (lanes) == NULL)
     return pw_fail (error, PW_INPUT, "%d runs at once: expected 2, 4 or %d", lanes, PW_LANES_MOST), NULL;
-  code_job x = { .system = s, .text = text, .lanes = lanes, .code = calloc (1, sizeof *x.code) };
-  int status = x.code ? code_open (&x, error) : pw_fail (error, PW_RESOURCE, "out of memory");
+  code_job x = { .system = s, .lanes = lanes, .code = calloc (1, sizeof *x.code) };
+  int status = x.code ? code_source (&x, text, error) : pw_fail (error, PW_RESOURCE, "out of memory");
+  if (status == PW_OK) status = code_open (&x, error);
+  free (x.source.text);
   if (status == PW_OK) return x.code;
   free (x.code);
   return NULL;

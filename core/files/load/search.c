@@ -86,30 +86,19 @@ static int search_entry (pw_search *s, const char *folder, const char *entry, pw
   return search_add_file (s, entry, strlen (entry) - strlen (ending), real, error);
 }
 
-/* A folder that has been searched, so that it is not searched again; the list begins with the last one. */
-struct pw_searched {
-  struct pw_searched *before;
-  char path[];
-};
-
-static int search_add_folder (pw_search *s, const char *real, pw_error *error) {
-  size_t n = strlen (real), used = strlen (s->folders);
-  struct pw_searched *folder = pw_arena_alloc (&s->arena, sizeof *folder + n + 1);
-  if (folder == NULL) return search_no_memory (error);
-  folder->before = s->searched;
-  memcpy (folder->path, real, n);
-  s->searched = folder;
-  if (used + n + 2 <= sizeof s->folders) sprintf (s->folders + used, "%s%s", used ? ":" : "", real);
-  return PW_OK;
+/* Adds a folder to the list for messages. */
+static void search_list_folder (pw_search *s, const char *real) {
+  size_t used = strlen (s->folders);
+  const char *listed = PW_PRINTED (sizeof s->folders + 2, ":%s:", s->folders);
+  if (used + strlen (real) + 2 <= sizeof s->folders && strstr (listed, PW_PRINTED (PW_PATH + 2, ":%s:", real)) == NULL)
+    sprintf (s->folders + used, "%s%s", used ? ":" : "", real);
 }
 
 /* Adds the models in a folder; skips missing and inaccessible folders, as shells do with PATH. */
 static int search_folder (pw_search *s, const char *folder, pw_error *error) {
   char real[PW_PATH];
   if (realpath (folder, real) == NULL) return errno == ENOMEM ? search_no_memory (error) : PW_OK;
-  for (const struct pw_searched *other = s->searched; other; other = other->before)
-    if (strcmp (other->path, real) == 0) return PW_OK;
-  if (search_add_folder (s, real, error) != PW_OK) return PW_RESOURCE;
+  search_list_folder (s, real);
   DIR *dir = opendir (folder);
   if (dir == NULL && (errno == ENOMEM || errno == EMFILE || errno == ENFILE))
     return pw_fail (error, PW_RESOURCE, "cannot look into the folder %s: %s", folder, strerror (errno));

@@ -1,4 +1,5 @@
 /* Checkpoints as files: a head in text, then the state of a run in binary, with a checksum of both. */
+#include <errno.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,11 +12,12 @@ static unsigned long long checkpoint_sum (const char *head, size_t head_size, co
 }
 
 int pw_checkpoint_put (pw_output *o, const char *head, const pw_archive *state, pw_error *error) {
-  const char *line = PW_PRINTED (100, "state = %zu bytes, check sum %016llx\n", state->used,
-                                 checkpoint_sum (head, strlen (head), state->at, state->used));
-  int status = pw_output_text (o, head, strlen (head), error);
-  if (status == PW_OK) status = pw_output_text (o, line, strlen (line), error);
-  if (status == PW_OK) status = pw_output_text (o, (const char *)state->at, state->used, error);
+  FILE *f = pw_output_stream (o);
+  errno = 0; /* for pw_output_check */
+  fprintf (f, "%sstate = %zu bytes, check sum %016llx\n", head, state->used,
+           checkpoint_sum (head, strlen (head), state->at, state->used));
+  if (state->used > 0) fwrite (state->at, 1, state->used, f);
+  int status = pw_output_check (o, error);
   if (status == PW_OK) return pw_output_finish (o, error);
   pw_output_discard (o);
   return status;

@@ -117,13 +117,15 @@ static void json_reactions (pw_json *j, const pw_system *s, const pw_sample *x) 
   pw_json_close (j, '}');
 }
 
+/* Opens an object for what is known; if that is NULL, writes null and returns 0. */
+static int json_object (pw_json *j, const char *key, const void *known) {
+  known ? pw_json_open (j, key, '{') : pw_json_text (j, key, NULL);
+  return known != NULL;
+}
+
 /* An object of numbers; null without values. */
 static void json_numbers (pw_json *j, const char *key, const char *const *name, const double *value, int count) {
-  if (value == NULL) {
-    pw_json_text (j, key, NULL);
-    return;
-  }
-  pw_json_open (j, key, '{');
+  if (!json_object (j, key, value)) return;
   for (int i = 0; i < count; i++) pw_json_number (j, name[i], value[i]);
   pw_json_close (j, '}');
 }
@@ -157,11 +159,7 @@ static void json_lists (pw_json *j, const char *const *redundant, const pw_syste
 
 static void json_reference (pw_json *j, const pw_reference_error *e) {
   static const char *const names[] = { "length", "angle", "speed", "rate" };
-  if (e == NULL) {
-    pw_json_text (j, "truth", NULL);
-    return;
-  }
-  pw_json_open (j, "truth", '{');
+  if (!json_object (j, "truth", e)) return;
   pw_json_text (j, "source", e->source);
   pw_json_number (j, "samples", e->samples);
   pw_json_number (j, "t", e->t);
@@ -174,11 +172,7 @@ static void json_reference (pw_json *j, const pw_reference_error *e) {
 static void json_statistics (pw_json *j, const pw_statistics *n, double cpu) {
   static const char *const residuals[] = { "position", "velocity" };
   json_numbers (j, "residual", residuals, n ? (const double[]){ n->position, n->velocity } : NULL, 2);
-  if (n == NULL) {
-    pw_json_text (j, "statistics", NULL);
-    return;
-  }
-  pw_json_open (j, "statistics", '{');
+  if (!json_object (j, "statistics", n)) return;
 #define JSON_COUNT(name) pw_json_number (j, #name, (double)n->name);
   PW_STATISTICS_COUNTS (JSON_COUNT)
   pw_json_number (j, "cpu_s", cpu);

@@ -180,12 +180,6 @@ int pw_output_check (pw_output *o, pw_error *error) {
   return output_fail (o, o->code, error);
 }
 
-int pw_output_text (pw_output *o, const char *text, size_t size, pw_error *error) {
-  errno = 0;
-  if (size > 0) fwrite (text, 1, size, o->stream);
-  return pw_output_check (o, error);
-}
-
 /* ---- Closing ---- */
 
 /* Flushes the stream and writes a regular file to the disk.  0, an errno value, or -1 for an unknown reason. */
@@ -295,16 +289,10 @@ int pw_output_finish (pw_output *o, pw_error *error) {
 /* Sets mark->check from the last OUTPUT_CHECKED bytes before mark->length; PW_RETRY if the file is shorter. */
 enum { OUTPUT_CHECKED = 65536 };
 static int output_checksum (int file, pw_mark *mark) {
-  char bytes[4096];
-  unsigned long long at = mark->length > OUTPUT_CHECKED ? mark->length - OUTPUT_CHECKED : 0;
-  mark->check = PW_CHECK;
-  while (at < mark->length) {
-    size_t want = mark->length - at < sizeof bytes ? (size_t)(mark->length - at) : sizeof bytes;
-    ssize_t n = pread (file, bytes, want, (off_t)at);
-    if (n <= 0) return PW_RETRY;
-    mark->check = pw_check_sum (mark->check, bytes, (size_t)n);
-    at += (unsigned long long)n;
-  }
+  char bytes[OUTPUT_CHECKED];
+  size_t size = mark->length < sizeof bytes ? (size_t)mark->length : sizeof bytes;
+  if (pread (file, bytes, size, (off_t)(mark->length - size)) != (ssize_t)size) return PW_RETRY;
+  mark->check = pw_check_sum (PW_CHECK, bytes, size);
   return PW_OK;
 }
 

@@ -52,42 +52,39 @@ static const pw_unit_name *yaml_other_unit (const char *unit, const char **name)
   return NULL;
 }
 
-/* Replaces a name in the unit by SI units.  *divides: 1 if the unit is divided by it; *power: its power. */
-static void yaml_replace_unit (char unit[YAML_UNIT], const pw_unit_name *other, const char *name, int *divides,
-                               int *power) {
+/* Replaces a name in the unit by SI units.  *conversion: what converts a value, "*deg" or "/1e-3^2". */
+static void yaml_replace_unit (char unit[YAML_UNIT], const pw_unit_name *other, const char *name, char conversion[40]) {
   char text[YAML_UNIT];
   const char *before = name, *after = name + strlen (other->name);
-  pw_unit_power (after, power);
+  int power;
+  pw_unit_power (after, &power);
   while (before > unit && before[-1] == ' ') before--;
-  *divides = before > unit && before[-1] == '/';
-  const int product = strpbrk (other->si, " /") && (*divides || *power != 1);
+  const int divides = before > unit && before[-1] == '/';
+  const int product = strpbrk (other->si, " /") && (divides || power != 1);
   snprintf (text, sizeof text, "%.*s%s%s%s%s", (int)(name - unit), unit, product ? "(" : "", other->si,
             product ? ")" : "", after);
   memcpy (unit, text, sizeof text);
+  snprintf (conversion, 40, power == 1 ? "%c%s" : "%c%s^%d", divides ? '/' : '*', other->factor, power);
 }
 
 /* Refuses a unit that contains this name of another unit than an SI unit, and says how to convert the value. */
 static int yaml_refuse_unit (const pw_reader *r, const pw_node *node, const pw_node *value, const pw_unit_name *other,
                              const char *unit, const char *name) {
   static const char why[] = "unit: numbers are in SI units, angles in radians, and no unit converts a value";
-  char si[YAML_UNIT];
+  char si[YAML_UNIT], conversion[40];
   double factor;
-  int divides, power,
-      number = value->type == PW_YAML_SCALAR && strlen (value->text) <= 30 &&
-               pw_expression_number (value->text, &(double){ 0 });
+  int names = 0, number = value->type == PW_YAML_SCALAR && strlen (value->text) <= 30 &&
+                          pw_expression_number (value->text, &(double){ 0 });
   if (strlen (unit) > 60 || pw_unit_factor (unit, NULL, &factor) != PW_OK) { /* not understood as a whole */
     pw_unit_factor (other->name, other->si, &factor);
     return pw_yaml_fail (r, node->at, "%s; convert it with 1 %s = %.15g %s, and write %s instead", why, other->name,
                          factor, other->si, other->si);
   }
   snprintf (si, sizeof si, "%s", unit);
-  yaml_replace_unit (si, other, si + (name - unit), &divides, &power);
-  const char *given = number ? value->text : "(..)", *next;
-  if (yaml_other_unit (si, &next) == NULL)
-    return pw_yaml_fail (r, node->at, "%s; write \"value: %s%c%s%s, unit: %s\"", why, given, divides ? '/' : '*',
-                         other->factor, power == 1 ? "" : PW_PRINTED (20, "^%d", power), si);
-  while ((other = yaml_other_unit (si, &next)) != NULL) yaml_replace_unit (si, other, next, &divides, &power);
-  return pw_yaml_fail (r, node->at, "%s; write \"value: %s*%.15g, unit: %s\"", why, given, factor, si);
+  for (; (other = yaml_other_unit (si, &name)) != NULL; names++) yaml_replace_unit (si, other, name, conversion);
+  if (names > 1) snprintf (conversion, sizeof conversion, "*%.15g", factor);
+  return pw_yaml_fail (r, node->at, "%s; write \"value: %s%s, unit: %s\"", why, number ? value->text : "(..)",
+                       conversion, si);
 }
 
 /* Reads the unit of a parameter; refuses a known one that is not an SI unit: 40 with the unit deg would mean 40 rad. */

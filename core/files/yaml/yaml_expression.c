@@ -1,7 +1,6 @@
 /* Expressions of time, and of states, in text models: signals, and the reference solution.  A signal becomes a function
  * signal, of which each compiled system has a copy (signal_open), since it may outlive the model. */
 #include <math.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 #include "yaml.h"
@@ -25,14 +24,8 @@ typedef struct {
 } reading;
 
 /* Reports an error at an offset of the expression. */
-PW_PRINTF (3, 4) static int reading_fail (const reading *e, size_t at, const char *format, ...) {
-  char text[300];
-  va_list arguments;
-  va_start (arguments, format);
-  vsnprintf (text, sizeof text, format, arguments);
-  va_end (arguments);
-  return pw_yaml_fail (e->r, pw_yaml_offset (e->r->y, e->node, at), "%s: %s", e->label, text);
-}
+#define reading_fail(e, at, ...) \
+  pw_yaml_fail ((e)->r, pw_yaml_offset ((e)->r->y, (e)->node, at), "%s: %s", (e)->label, PW_PRINTED (300, __VA_ARGS__))
 
 /* Reads the expression; `variable`: names, which end with NULL. */
 static int reading_expression (const reading *e, const char *const *variable, const char **text,
@@ -162,13 +155,6 @@ static void *signal_open (void *context) {
 
 /* ---- Reading of signals ---- */
 
-/* Stores the names that expressions may use, and their values, for `show`. */
-static void signal_store_names (const pw_reader *r) {
-  r->reference->names = r->scope->names;
-  r->reference->name = r->scope->name;
-  r->reference->value = r->scope->value;
-}
-
 /* Adds a state, unless it is known already. */
 static int signal_add_state (const reading *e, const char *name, size_t at) {
   signal_function *f = e->f;
@@ -267,7 +253,6 @@ int pw_yaml_time_signal (pw_reader *r, const pw_kind *kind, const char *label, c
   *signal = (pw_signal){ PW_FUNCTION, .function = { .eval = signal_eval, .context = f, .text = &f->text } };
   signal->function.open = signal_open;
   signal->function.close = free;
-  signal_store_names (r);
   if (signal_read_all (&(reading){ .r = r, .label = label, .f = f }, v) != PW_OK) return r->error->status;
   for (int i = 0; i < 3; i++)
     if (f->expression[i] && f->expression[i]->breaks) signal->function.breakpoint = signal_breakpoint;
@@ -303,8 +288,9 @@ int pw_yaml_reference (pw_reader *r) {
   const pw_node *map = r->y->reference;
   pw_reference_text *t = r->reference;
   pw_names seen = { .size = 0 };
+  if (map || r->operations > 0) /* expressions may use names, whose values `show` writes */
+    t->names = r->scope->names, t->name = r->scope->name, t->value = r->scope->value;
   if (map == NULL) return r->error->status;
-  signal_store_names (r);
   if (map->type != PW_YAML_MAP)
     return pw_yaml_fail (r, map->at, "truth: expected a map {STATE: EXPRESSION, ...}, found %s", pw_yaml_found (map));
   t->state = pw_arena_alloc (r->arena, ((size_t)map->count + 1) * sizeof *t->state);

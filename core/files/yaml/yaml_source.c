@@ -7,11 +7,6 @@
 
 enum { SOURCE_SHOWN = 84 }; /* bytes of a line in a message */
 
-const char *pw_yaml_text_of (const pw_yaml *y, size_t *size) {
-  *size = y->size;
-  return y->source;
-}
-
 /* ---- Messages ---- */
 
 int pw_yaml_line (const pw_yaml *y, size_t at) {
@@ -27,26 +22,16 @@ static int source_characters (const char *from, const char *to) {
 }
 
 /* The beginning of the line at an offset, and the part from *from to *to that is shown: of a long line the part around
- * the offset, cut between characters.  A byte order mark does not belong to the first line. */
+ * the offset, cut between characters. */
 static void source_window (const pw_yaml *y, size_t at, const char **begin, const char **from, const char **to) {
   const char *caret = y->source + at, *end = y->source + y->size;
   *begin = caret;
   while (*begin > y->source && (*begin)[-1] != '\n') --*begin;
-  if (*begin == y->source && strncmp (*begin, "\xEF\xBB\xBF", 3) == 0 && caret - *begin >= 3) *begin += 3;
   *from = caret - *begin > SOURCE_SHOWN / 2 ? caret - SOURCE_SHOWN / 2 : *begin;
   while (*from < caret && (**from & 0xC0) == 0x80) ++*from;
   *to = *from;
   while (*to < end && **to != '\n' && **to != '\r' && *to - *from < SOURCE_SHOWN) ++*to;
   while (*to > caret && (**to & 0xC0) == 0x80) --*to;
-}
-
-/* Shows invalid bytes as ?, control characters as blanks. */
-static void source_clean (char *text) {
-  for (int n; *text; text += n) {
-    n = pw_utf8_size (text);
-    if (n == 0 || (unsigned char)*text < ' ') *text = n ? ' ' : '?';
-    if (n == 0) n = 1;
-  }
 }
 
 int pw_yaml_fail (const pw_reader *r, size_t at, const char *format, ...) {
@@ -60,7 +45,8 @@ int pw_yaml_fail (const pw_reader *r, size_t at, const char *format, ...) {
   if (at > y->size) at = y->size;
   source_window (y, at, &begin, &from, &to);
   snprintf (shown, sizeof shown, "%s%.*s", from > begin ? "..." : "", (int)(to - from), from);
-  source_clean (shown);
+  pw_text_sanitise (shown);
+  for (char *tab = shown; (tab = strchr (tab, '\t')) != NULL;) *tab = ' '; /* one column, as in the line of the caret */
   size_t n = strlen (y->path);
   return pw_fail (r->error, PW_INPUT, "%s%s:%d:%d: error: %s\n  %s\n  %*s^", n > 100 ? "..." : "",
                   n > 100 ? y->path + n - 97 : y->path, pw_yaml_line (y, at),
@@ -82,7 +68,7 @@ static int source_check (const pw_reader *r) {
     if (n == 0) return pw_yaml_fail (r, at, "byte %02X is not UTF-8; a model file is text in UTF-8", (unsigned char)*p);
     if ((*p == 0 || pw_control (p)) && !(*p == '\r' && p[1] == '\n'))
       return pw_yaml_fail (r, at, "a control character, code %d, does not belong in a model file", pw_control (p));
-    if (*p == '%' && (at == 0 || p[-1] == '\n' || (at == 3 && p[-1] == '\xBF')))
+    if (*p == '%' && (at == 0 || p[-1] == '\n'))
       return pw_yaml_fail (r, at, "a line of a model file must not begin with %%");
     p += n;
   }
@@ -96,5 +82,9 @@ int pw_yaml_read_source (pw_yaml *y, const char *path, size_t max_bytes, pw_erro
   int status = pw_read_rest (f, max_bytes, y->path, "the limit for a model unless --max-file raises it", &y->source,
                              &y->size, error);
   fclose (f);
+  if (status == PW_OK && strncmp (y->source, "\xEF\xBB\xBF", 3) == 0) { /* a byte order mark */
+    y->size -= 3;
+    memmove (y->source, y->source + 3, y->size + 1);
+  }
   return status == PW_OK ? source_check (&(pw_reader){ .y = y, .error = error }) : status;
 }

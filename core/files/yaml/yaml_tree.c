@@ -16,14 +16,9 @@ typedef struct {
   pw_node *open[PW_YAML_DEPTH];  /* open lists and maps */
   pw_node **tail[PW_YAML_DEPTH]; /* where the next node of each goes */
   int depth;
-  int documents;
-  /* what the parser reads ahead of its events */
-  size_t processed;  /* bytes of the source up to the last event */
   size_t fed;        /* bytes given to the parser */
-  double indicators; /* [ ] { } , : between the two */
-  double opened;     /* opening minus closing brackets there */
-  int too_deep;      /* 1: too many open brackets */
-  int too_many;      /* 1: too many indicators */
+  double indicators; /* [ ] { } , : given since the last event */
+  double opened;     /* opening minus closing brackets among them */
   /* the last position converted */
   int line, column; /* from 0 */
   size_t offset;
@@ -33,14 +28,12 @@ typedef struct {
 /* The offset of a mark, computed from its line and its column (in characters): the offsets of libfyaml 0.7.12 are wrong
  * if the input is read in pieces.  Starts from the last mark: marks are nearly in order. */
 static unsigned tree_offset_of (tree *x, const struct fy_mark *mark) {
-  static const char bom[] = "\xEF\xBB\xBF"; /* byte order mark, not counted as a column */
   const char *source = x->y->source, *end = source + x->y->size, *p = source + x->offset;
   if (x->line != mark->line) {
     for (; x->line < mark->line && p < end; p++) x->line += *p == '\n';
     for (; p > source && (x->line > mark->line || p[-1] != '\n'); p--) x->line -= p[-1] == '\n';
     x->column = 0;
   }
-  if (p == source && strncmp (p, bom, 3) == 0) p += 3;
   for (; x->column < mark->column && p < end && *p != '\n'; x->column++) p += pw_utf8_size (p);
   for (; x->column > mark->column && p > source; x->column--)
     for (p--; p > source && (*p & 0xC0) == 0x80;) p--;
@@ -86,7 +79,7 @@ static long tree_text (tree *x, struct fy_token *token, char *to) {
   return error ? -1 : size;
 }
 
-static int tree_scalar (tree *x, struct fy_event *e) {
+static void tree_scalar (tree *x, struct fy_event *e) {
   struct fy_token *token = e->scalar.value;
   int quoted = token && (fy_token_scalar_style (token) == FYSS_SINGLE_QUOTED ||
                          fy_token_scalar_style (token) == FYSS_DOUBLE_QUOTED);
@@ -94,24 +87,25 @@ static int tree_scalar (tree *x, struct fy_event *e) {
   long size = tree_text (x, token, NULL);
   pw_node *n = tree_add (x, PW_YAML_SCALAR, at - (quoted && at > 0));
   char *text = n && size >= 0 ? pw_arena_alloc (&x->y->arena, (size_t)size + 1) : NULL;
-  if (text == NULL || tree_text (x, token, text) != size) return pw_yaml_no_memory (&x->r);
-  if (memchr (text, 0, (size_t)size)) return pw_yaml_fail (&x->r, n->at, "a text must not contain the character 0");
+  if (text == NULL || tree_text (x, token, text) != size) {
+    pw_yaml_no_memory (&x->r);
+    return;
+  }
+  if (memchr (text, 0, (size_t)size)) pw_yaml_fail (&x->r, n->at, "a text must not contain the character 0");
   for (const char *p = text; *p; p++) /* possible through escapes */
     if (pw_control (p))
-      return pw_yaml_fail (&x->r, n->at, "a text must not contain the control character of code %d", pw_control (p));
+      pw_yaml_fail (&x->r, n->at, "a text must not contain the control character of code %d", pw_control (p));
   n->text = text;
   n->quoted = quoted || (token && fy_token_scalar_style (token) != FYSS_PLAIN);
-  return PW_OK;
 }
 
-static int tree_begin (tree *x, struct fy_event *e, pw_yaml_type type) {
+static void tree_begin (tree *x, struct fy_event *e, pw_yaml_type type) {
   unsigned at = tree_event_offset (x, e);
-  if (x->depth == PW_YAML_DEPTH) return pw_yaml_fail (&x->r, at, "nested too deeply");
-  pw_node *n = tree_add (x, type, at);
-  if (n == NULL) return PW_RESOURCE;
+  if (x->depth == PW_YAML_DEPTH) pw_yaml_fail (&x->r, at, "nested too deeply");
+  pw_node *n = x->depth < PW_YAML_DEPTH ? tree_add (x, type, at) : NULL;
+  if (n == NULL) return;
   x->open[x->depth] = n;
   x->tail[x->depth++] = &n->first;
-  return PW_OK;
 }
 
 /* ---- Events ---- */
@@ -138,50 +132,37 @@ static int tree_refuse_anchor (tree *x, struct fy_event *e) {
  * indicators without an event, or too many open brackets. */
 enum { TREE_NESTED = 10000 };
 
-/* Adds (sign 1) or subtracts (-1) the indicators between two offsets. */
-static void tree_count (tree *x, size_t from, size_t to, int sign) {
-  for (const char *p = x->y->source + from; p < x->y->source + to; p++) {
-    int opens = *p == '[' || *p == '{', closes = *p == ']' || *p == '}';
-    x->opened += sign * (opens - closes);
-    x->indicators += sign * (opens || closes || *p == ',' || *p == ':');
-  }
-}
-
 static ssize_t tree_feed (void *user, void *to, size_t count) {
   tree *x = user;
+  const char *piece = x->y->source + x->fed;
   size_t rest = x->y->size - x->fed, n = count < rest ? count : rest;
   if (n > TREE_PIECE) n = TREE_PIECE;
-  memcpy (to, x->y->source + x->fed, n);
-  tree_count (x, x->fed, x->fed + n, 1);
+  memcpy (to, piece, n);
   x->fed += n;
-  x->too_deep = x->opened > TREE_NESTED;
-  x->too_many = x->indicators > x->y->max_ahead;
-  return x->too_deep || x->too_many ? 0 : (ssize_t)n; /* libfyaml 0.7.12 retries after an error */
+  for (const char *p = piece; p < piece + n; p++) {
+    int opens = *p == '[' || *p == '{', closes = *p == ']' || *p == '}';
+    x->opened += opens - closes;
+    x->indicators += opens || closes || *p == ',' || *p == ':';
+  }
+  if (x->opened > TREE_NESTED) pw_yaml_fail (&x->r, x->at, "nested too deeply");
+  if (x->indicators > x->y->max_ahead)
+    pw_yaml_fail (&x->r, x->at,
+                  "a list or map in brackets with more than %g commas, colons and brackets, which takes much memory: "
+                  "write its entries on separate lines, after \"- \" or \"key: \"",
+                  x->y->max_ahead);
+  return x->r.error->status == PW_OK ? (ssize_t)n : 0; /* libfyaml 0.7.12 retries after an error */
 }
 
-static int tree_event (tree *x, struct fy_event *e) {
-  if (tree_refuse_anchor (x, e) != PW_OK) return PW_INPUT;
-  size_t at = tree_event_offset (x, e);
-  if (at > x->fed) at = x->fed;
-  if (at > x->processed) tree_count (x, x->processed, at, -1), x->processed = at;
-  switch (e->type) {
-  case FYET_DOCUMENT_START:
-    if (x->documents++ == 0) return PW_OK;
-    return pw_yaml_fail (&x->r, tree_event_offset (x, e), "a second document; a file contains one model");
-  case FYET_SCALAR:
-    return tree_scalar (x, e);
-  case FYET_SEQUENCE_START:
-    return tree_begin (x, e, PW_YAML_LIST);
-  case FYET_MAPPING_START:
-    return tree_begin (x, e, PW_YAML_MAP);
-  case FYET_SEQUENCE_END:
-  case FYET_MAPPING_END:
-    x->depth--;
-    if (e->type == FYET_MAPPING_END) x->open[x->depth]->count /= 2;
-    return PW_OK;
-  default:
-    return PW_OK;
-  }
+static void tree_event (tree *x, struct fy_event *e) {
+  if (tree_refuse_anchor (x, e) != PW_OK) return;
+  x->indicators = x->opened = 0;
+  if (e->type == FYET_DOCUMENT_START && x->y->root)
+    pw_yaml_fail (&x->r, tree_event_offset (x, e), "a second document; a file contains one model");
+  if (e->type == FYET_SCALAR) tree_scalar (x, e);
+  if (e->type == FYET_SEQUENCE_START) tree_begin (x, e, PW_YAML_LIST);
+  if (e->type == FYET_MAPPING_START) tree_begin (x, e, PW_YAML_MAP);
+  if (e->type == FYET_MAPPING_END) x->open[x->depth - 1]->count /= 2;
+  if (e->type == FYET_MAPPING_END || e->type == FYET_SEQUENCE_END) x->depth--;
 }
 
 /* ---- Syntax ---- */
@@ -224,24 +205,14 @@ static int tree_syntax (tree *x) {
   return pw_yaml_fail (&x->r, at, "%s%s", message, tree_hint (x->y, at, message));
 }
 
-static int tree_refused (const tree *x) {
-  if (x->too_deep) return pw_yaml_fail (&x->r, x->processed, "nested too deeply");
-  return pw_yaml_fail (
-      &x->r, x->processed,
-      "a list or map in brackets with more than %g commas, colons and brackets, which takes much memory: "
-      "write its entries on separate lines, after \"- \" or \"key: \"",
-      x->y->max_ahead);
-}
-
-static int tree_parse (tree *x) {
+static void tree_parse (tree *x) {
+  const pw_error *error = x->r.error;
   struct fy_event *e;
-  int status = PW_OK;
-  while (status == PW_OK && (e = fy_parser_parse (x->parser)) != NULL) {
-    status = x->too_many ? tree_refused (x) : tree_event (x, e);
+  while (error->status == PW_OK && (e = fy_parser_parse (x->parser)) != NULL) {
+    if (error->status == PW_OK) tree_event (x, e); /* unless tree_feed has failed */
     fy_parser_event_free (x->parser, e);
   }
-  if (status == PW_OK && (x->too_deep || x->too_many)) return tree_refused (x);
-  return status == PW_OK && fy_parser_get_stream_error (x->parser) ? tree_syntax (x) : status;
+  if (error->status == PW_OK && fy_parser_get_stream_error (x->parser)) tree_syntax (x);
 }
 
 /* Out of memory, libfyaml reports a syntax error, drops a part of the text, or crashes when it opens. */
