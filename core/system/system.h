@@ -17,7 +17,7 @@ typedef struct {
   const pw_kind *kind;
   int row;           /* global index of its first constraint equation */
   int internal;      /* global index of its first internal coordinate */
-  const int *column; /* count x bodies: first coordinate of each body; s->coords for the ground */
+  int *column;       /* count x bodies: first coordinate of each body; s->coords for the ground */
   const char **name; /* count */
   double *J;         /* count x rows x cols */
   double *block;     /* count x cols: scratch for forces, energies, powers; count x 2 cols for saturation */
@@ -73,9 +73,15 @@ struct pw_workspace {
 /* Stores the entries of the ledger, at most two for each element.  Returns their number.  Signals must be compiled. */
 int pw_ledger_list (const pw_system *s, pw_entry *entry);
 
+/* What an element of a system is compiled from. */
+typedef struct {
+  const pw_element *element; /* of the model */
+  int body;                  /* the body on which an element that acts on every body acts, or -1 */
+} pw_compiled;
+
 /* Compiles the signals of all elements, which must be stored, because signals may read their internal coordinates.
- * batch_of: the batch of each element of the model.  PW_INPUT, PW_RESOURCE. */
-int pw_compile_signals (pw_system *s, const pw_model *m, const int *batch_of, pw_error *error);
+ * from: for each element of the system.  PW_INPUT, PW_RESOURCE. */
+int pw_compile_signals (pw_system *s, const pw_compiled *from, pw_error *error);
 
 static inline int pw_fail_memory (const pw_system *s, pw_error *error) {
   return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
