@@ -64,52 +64,65 @@ static int compile_names (compilation *job) {
   return PW_OK;
 }
 
-/* Lists the elements of a type, in the model from the first one on; those of an each_body type once for every body with
- * mass. */
-static int compile_list (compilation *job, const pw_element *first) {
+/* Lists the elements of a batch, in the model from the first one on; those of an each_body type once for every body
+ * with mass. */
+static int compile_list (compilation *job, const pw_element *first, pw_element_batch *k) {
   const pw_model *m = job->m;
-  int each = first->kind->each_body;
+  int each = k->kind->each_body;
   for (const pw_element *from = first; from < m->element + m->elements; from++)
-    for (int b = each ? 0 : -1; from->kind == first->kind && b < (each ? m->bodies : 0); b++) {
+    for (int b = each ? 0 : -1; from->kind == k->kind && b < (each ? m->bodies : 0); b++) {
       if (b >= 0 && !(m->body[b].mass > 0)) continue;
       if (job->listed == COMPILE_MOST) return compile_too_large (job);
       if (pw_grow (&job->list, (size_t)job->listed, &job->list_room, sizeof *job->list) != PW_OK)
         return compile_no_memory (job);
       job->list[job->listed++] = (pw_compiled){ from, b };
+      k->b.count++;
     }
   return PW_OK;
 }
 
-/* Lists and counts the elements: holonomic types in order of appearance, then nonholonomic ones, then forces. */
+/* A batch for each type: holonomic ones in order of appearance, then nonholonomic ones, then forces. */
 static int compile_types (compilation *job) {
   static const pw_level order[] = { PW_HOLONOMIC, PW_NONHOLONOMIC, PW_FORCE };
   const pw_model *m = job->m;
   pw_system *s = job->s;
   size_t room = 0;
-  if (m->bodies > COMPILE_MOST / 3) return compile_too_large (job);
-  s->bodies = m->bodies;
-  s->coords = 3 * m->bodies;
   if (pw_grow (&s->batch, 0, &room, sizeof *s->batch) != PW_OK) return compile_no_memory (job);
   for (int l = 0; l < 3; l++)
     for (int i = 0; i < m->elements; i++) {
       const pw_kind *kind = m->element[i].kind;
-      int k = 0, before = job->listed;
+      int k = 0;
       while (k < s->batches && s->batch[k].kind != kind) k++;
       if (kind->level != order[l] || k < s->batches) continue;
       if (pw_grow (&s->batch, (size_t)k, &room, sizeof *s->batch) != PW_OK) return compile_no_memory (job);
-      int status = compile_list (job, &m->element[i]), count = job->listed - before;
+      s->batch[s->batches++] = (pw_element_batch){ .kind = kind };
+      int status = compile_list (job, &m->element[i], &s->batch[k]);
       if (status != PW_OK) return status;
-      s->batch[s->batches++] = (pw_element_batch){ { count, 3 * kind->bodies + kind->internal, .element = NULL },
-                                                   .kind = kind,
-                                                   .row = s->rows,
-                                                   .internal = s->coords };
-      s->coords += count * kind->internal;
-      s->rows += count * kind->rows;
-      s->sources += count * kind->signals;
-      if (kind->level == PW_HOLONOMIC) s->holonomic = s->rows; /* these batches come first */
     }
-  if (s->coords > COMPILE_MOST || s->rows > COMPILE_MOST) return compile_too_large (job);
-  return s->bodies > 0 ? PW_OK : pw_fail (job->error, PW_INPUT, "model %s has no body", m->name);
+  return PW_OK;
+}
+
+static int compile_count (const compilation *job) {
+  const pw_model *m = job->m;
+  pw_system *s = job->s;
+  if (m->bodies == 0) return pw_fail (job->error, PW_INPUT, "model %s has no body", m->name);
+  if (m->bodies > COMPILE_MOST / 3) return compile_too_large (job);
+  s->bodies = m->bodies;
+  s->coords = 3 * m->bodies;
+  for (pw_element_batch *k = s->batch; k < s->batch + s->batches; k++) {
+    const pw_kind *kind = k->kind;
+    k->b.cols = 3 * kind->bodies + kind->internal;
+    k->row = s->rows;
+    k->internal = s->coords;
+    s->coords += k->b.count * kind->internal;
+    s->rows += k->b.count * kind->rows;
+    if (kind->level == PW_HOLONOMIC) s->holonomic = s->rows; /* these batches come first */
+    s->sources += k->b.count * kind->signals;
+    size_t cols = (size_t)k->b.count * (size_t)k->b.cols, block = kind->saturation ? 2 * cols : cols;
+    s->jacobian += (size_t)kind->rows * cols;
+    if (s->block < block) s->block = block;
+  }
+  return s->coords > COMPILE_MOST || s->rows > COMPILE_MOST ? compile_too_large (job) : PW_OK;
 }
 
 static int compile_arrays (const compilation *job) {
@@ -296,6 +309,7 @@ static int compile_all (compilation *job) {
   int status = compile_names (job);
   if (status == PW_OK) status = pw_check_model (job->m, &job->name, job->error);
   if (status == PW_OK) status = compile_types (job);
+  if (status == PW_OK) status = compile_count (job);
   if (status == PW_OK) status = compile_arrays (job);
   if (status == PW_OK) status = compile_bodies (job);
   if (status == PW_OK) status = compile_batches (job);

@@ -20,7 +20,7 @@ typedef struct {
   int *column;       /* count x bodies: first coordinate of each body; s->coords for the ground */
   const char **name; /* count */
   double *J;         /* count x rows x cols */
-  double *block;     /* count x cols: scratch for forces, energies, powers; count x 2 cols for saturation */
+  double *block;     /* pw_workspace.block, which all batches share */
   double *u;         /* count x signals x 3, as b.u */
   pw_source *source; /* count x signals, part of the array of all sources */
 } pw_element_batch;
@@ -42,6 +42,8 @@ struct pw_system {
   int sources;             /* signals */
   int state_dependent;     /* signals that depend on states */
   int reads;               /* number of states that they read, with repetitions */
+  size_t jacobian;         /* entries of J of all elements, zeros included */
+  size_t block;            /* numbers in pw_workspace.block */
   int rheonomic;           /* batches whose eta may be other than 0 */
   pw_scale scale;          /* with T = 1 s; T of a run is in its workspace */
   const char **body_name;  /* bodies */
@@ -59,11 +61,11 @@ struct pw_system {
 struct pw_workspace {
   const pw_system *s;
   pw_element_batch *batch;         /* batches: copies of the system's, with arrays of this workspace */
-  pw_element_batch **force;        /* those with a force that is not constant */
   pw_source *source;               /* sources: copies of the system's, with contexts of this workspace */
   double *u, *J;                   /* those of all batches: sources x 3; entries of J, element by element */
   pw_configuration *configuration; /* bodies + 1; the last is the ground */
   double *scratch;                 /* rows x 3 + coords + 3, for the function in progress */
+  double *block;                   /* results of a function of one batch, at most count x 2 cols; for the same */
   pw_scale scale;                  /* the run's */
   int hold;                        /* 1: signals of forces keep their values (pw_hold_signals) */
   double t_signal;                 /* time of the last evaluation of signals; NaN: evaluate them again */
