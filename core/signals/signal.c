@@ -93,42 +93,24 @@ int pw_signal_eval (const pw_source *source, double t) {
   const pw_signal *s = &source->signal;
   double *u = source->u;
   u[0] = u[1] = u[2] = 0;
-  if (s->type == PW_HARMONIC) /* the most frequent types before the switch: fewer instructions */
-    signal_harmonic (s, t, !source->of_force, u);
-  else if (s->type == PW_CONSTANT)
-    u[0] = s->constant;
-  else if (s->type == PW_FUNCTION)
-    return signal_function (source, t);
-  else
-    switch (s->type) {
-    case PW_TABLE:
-      pw_table_eval (s, source->spline, t, u);
-      break;
-    case PW_PULSE:
-      signal_pulse (s, t, u);
-      break;
-    case PW_RAMP:
-    case PW_SMOOTH_STEP:
-      signal_rise (s, t, u);
-      break;
-    case PW_CONSTANT:
-    case PW_HARMONIC:
-    case PW_FUNCTION:
-      break;
-    }
-  return 0;
-}
-
-int pw_signal_value_may_jump (const pw_signal *s) {
   switch (s->type) {
-  case PW_PULSE:
-  case PW_FUNCTION:
-    return 1;
   case PW_CONSTANT:
+    u[0] = s->constant;
+    break;
   case PW_HARMONIC:
+    signal_harmonic (s, t, !source->of_force, u);
+    break;
+  case PW_FUNCTION:
+    return signal_function (source, t);
+  case PW_TABLE:
+    pw_table_eval (s, source->spline, t, u);
+    break;
+  case PW_PULSE:
+    signal_pulse (s, t, u);
+    break;
   case PW_RAMP:
   case PW_SMOOTH_STEP:
-  case PW_TABLE:
+    signal_rise (s, t, u);
     break;
   }
   return 0;

@@ -30,7 +30,9 @@ typedef enum {
 double pw_signal_breakpoint (const pw_signal *s, pw_breakpoints which, double t);
 
 /* 1 if the value may jump: that of a pulse; that of a function, of which this is not known. */
-int pw_signal_value_may_jump (const pw_signal *s);
+static inline int pw_signal_value_may_jump (const pw_signal *s) {
+  return s->type == PW_PULSE || s->type == PW_FUNCTION;
+}
 
 /* ---- Tables (table.c) ---- */
 
