@@ -3,7 +3,6 @@
 #include "sine.h"
 #include "system.h"
 #include "signal.h"
-#include "unroll.h"
 
 void pw_point_to_internal (pw_workspace *w, const double *q, const double *v) {
   for (pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++) {
@@ -13,7 +12,7 @@ void pw_point_to_internal (pw_workspace *w, const double *q, const double *v) {
 }
 
 /* Two bodies at a time; singly the last of an odd number, and all from a pair with an angle beyond the limit on. */
-PW_INLINE void kinematics_configurations (pw_workspace *w, const double *q, const double *v) {
+void pw_update_configurations (pw_workspace *w, const double *q, const double *v) {
   if (w->s->coords > 3 * w->s->bodies) pw_point_to_internal (w, q, v);
   pw_configuration *p = w->configuration, *end = p + w->s->bodies;
   _Static_assert(PW_SINE_LANES == 2, "bodies are evaluated in pairs");
@@ -31,10 +30,6 @@ PW_INLINE void kinematics_configurations (pw_workspace *w, const double *q, cons
   }
 }
 
-void pw_update_configurations (pw_workspace *w, const double *q, const double *v) {
-  kinematics_configurations (w, q, v);
-}
-
 /* Copies the states that a function reads; q NULL: only velocities.  Returns the number of states copied. */
 static int kinematics_copy_states (const pw_workspace *w, const pw_source *source, const double *q, const double *v) {
   int copied = 0;
@@ -48,8 +43,8 @@ static int kinematics_copy_states (const pw_workspace *w, const pw_source *sourc
 }
 
 /* Evaluates the state-dependent signals (q NULL: only those that read velocities), or the signals of time alone. */
-PW_INLINE int kinematics_evaluate_signals (pw_workspace *w, int state_dependent, double t, const double *q,
-                                           const double *v) {
+static int kinematics_evaluate_signals (pw_workspace *w, int state_dependent, double t, const double *q,
+                                        const double *v) {
   for (pw_source *source = w->source, *end = source + w->s->sources; source < end; source++) {
     if ((source->reads > 0) != state_dependent || (w->hold && source->of_force)) continue;
     if (state_dependent && kinematics_copy_states (w, source, q, v) == 0) continue;
@@ -71,7 +66,7 @@ int pw_update_signals (pw_workspace *w, double t, const double *q, const double 
 }
 
 int pw_update_kinematics (pw_workspace *w, double t, const double *q, const double *v) {
-  kinematics_configurations (w, q, v);
+  pw_update_configurations (w, q, v);
   return t == w->t_signal && w->s->state_dependent == 0 ? PW_OK : pw_update_signals (w, t, q, v);
 }
 
