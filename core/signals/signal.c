@@ -116,7 +116,7 @@ int pw_signal_eval (const pw_source *source, double t) {
   return 0;
 }
 
-double pw_signal_breakpoint (const pw_signal *s, pw_breakpoints which, double t) {
+double pw_signal_breakpoint (const pw_signal *s, int kinks, double t) {
   switch (s->type) {
   case PW_CONSTANT:
   case PW_HARMONIC:
@@ -127,7 +127,7 @@ double pw_signal_breakpoint (const pw_signal *s, pw_breakpoints which, double t)
   case PW_PULSE:
     return signal_pulse_breakpoint (s, t);
   case PW_TABLE:
-    return pw_table_breakpoint (s, which, t);
+    return pw_table_breakpoint (s, kinks, t);
   case PW_FUNCTION:
     return s->function.breakpoint ? s->function.breakpoint (s->function.context, t) : INFINITY;
   }

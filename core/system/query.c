@@ -34,7 +34,7 @@ int pw_system_jumps (const pw_system *s, double t) {
   /* the other signals of forces are continuous, and their derivatives are not used */
   for (const pw_source *source = s->source, *end = source + s->sources; source < end; source++)
     if (!source->of_force || pw_signal_value_may_jump (&source->signal))
-      if (pw_signal_breakpoint (&source->signal, PW_BREAKS_2, t - near) <= t + near) return 1;
+      if (pw_signal_breakpoint (&source->signal, 0, t - near) <= t + near) return 1;
   return 0;
 }
 

@@ -127,7 +127,8 @@ void pw_update_configurations (pw_workspace *w, const double *q, const double *v
 /* Updates velocities, and signals that read them, at unchanged time and positions.  Returns as pw_update_kinematics. */
 int pw_update_velocities (pw_workspace *w, const double *v);
 
-/* Evaluates signals of time alone if t has changed, and state-dependent ones.  Returns as pw_update_kinematics. */
+/* Evaluates signals of time alone once per time, even if several stages of a step have the same time, and
+ * state-dependent ones; q NULL: only those that read velocities.  Returns as pw_update_kinematics. */
 int pw_update_signals (pw_workspace *w, double t, const double *q, const double *v);
 /* Points the batches to the internal coordinates in q, v; q NULL: only to their velocities. */
 void pw_point_to_internal (pw_workspace *w, const double *q, const double *v);
@@ -183,8 +184,8 @@ void pw_evaluate_velocity_residual (pw_workspace *w, const unsigned char *enforc
 void pw_worst_position (const pw_system *s, const double *g, const double *size, const unsigned char *enforced,
                         pw_residuals *r);
 
-/* The first time after t at which a step must end because of a signal, or INFINITY: PW_BREAKS_2 of all signals;
- * kinks: 1: PW_BREAKS_3 of those of constraints.  NaN if the breakpoint function of a signal returned no time > t. */
+/* The first time after t at which a step must end because of a signal, or INFINITY; kinks (pw_signal_breakpoint): only
+ * of signals of constraints.  NaN if the breakpoint function of a signal returned no time > t. */
 double pw_next_breakpoint (pw_workspace *w, int kinks, double t);
 
 /* 1 if a force, J or gamma is not finite at the current state; writes "force of spring S" to the buffer. */
