@@ -121,6 +121,10 @@ static int compile_count (const compilation *job) {
     size_t cols = (size_t)k->b.count * (size_t)k->b.cols, block = kind->saturation ? 2 * cols : cols;
     s->jacobian += (size_t)kind->rows * cols;
     if (s->block < block) s->block = block;
+    s->constraints += kind->rows > 0;
+    s->rheonomic += kind->eta != NULL;
+    s->forces += kind->force && !kind->constant;
+    s->saturates |= kind->saturation != NULL;
   }
   return s->coords > COMPILE_MOST || s->rows > COMPILE_MOST ? compile_too_large (job) : PW_OK;
 }
@@ -282,21 +286,14 @@ static void compile_metric (pw_system *s) {
     s->metric[j] = s->mass[j] > 0 ? s->mass[j] : weight * (pw_is_angle (s, j) ? L2 : 1);
 }
 
-/* Counts the batches that have a property, lists the ledger's entries, and evaluates the constant forces. */
+/* Lists the ledger's entries, and evaluates the constant forces. */
 static int compile_totals (const compilation *job) {
   pw_system *s = job->s;
   int constant = 0;
-  s->entry = compile_alloc (job, 2 * (size_t)pw_system_elements (s), sizeof *s->entry);
+  s->entry = compile_alloc (job, 2 * (size_t)job->listed, sizeof *s->entry);
   if (s->entry == NULL) return PW_RESOURCE;
   s->entries = pw_ledger_list (s, s->entry);
-  for (int i = 0; i < s->batches; i++) {
-    const pw_kind *kind = s->batch[i].kind;
-    s->constraints += kind->rows > 0;
-    s->rheonomic += kind->eta != NULL;
-    s->forces += kind->force && !kind->constant;
-    constant |= kind->force && kind->constant;
-    s->saturates |= kind->saturation != NULL;
-  }
+  for (int i = 0; i < s->batches; i++) constant |= s->batch[i].kind->constant;
   if (!constant) return PW_OK;
   pw_workspace *w = pw_workspace_new (s, job->error);
   if (w == NULL) return PW_RESOURCE;
