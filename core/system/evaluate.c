@@ -124,33 +124,26 @@ void pw_add_JT (const pw_workspace *w, const double *lambda, double *out) {
   }
 }
 
-/* The largest absolute and scaled residual so far, and the constraint equation of the latter.  NaN is the largest,
+/* Updates the largest scaled and absolute residual, and the constraint equation of the former.  NaN is the largest,
  * hence the negated comparisons. */
-typedef struct {
-  double largest, scaled;
-  int row;
-} evaluate_worst;
-
-static inline evaluate_worst evaluate_update_worst (evaluate_worst worst, int row, double residual, double size) {
-  double error = fabs (residual), scaled = error / size;
-  if (!(error <= worst.largest) && !isnan (worst.largest)) worst.largest = error;
-  if (!(scaled <= worst.scaled) && !isnan (worst.scaled)) worst.scaled = scaled, worst.row = row;
-  return worst;
+static inline void evaluate_update_worst (int i, double residual, double size, double *scaled, double *largest,
+                                          int *row) {
+  double error = fabs (residual), ratio = error / size;
+  if (!(error <= *largest) && !isnan (*largest)) *largest = error;
+  if (!(ratio <= *scaled) && !isnan (*scaled)) *scaled = ratio, *row = i;
 }
 
 void pw_worst_position (const pw_system *s, const double *g, const double *size, const unsigned char *enforced,
                         pw_residuals *r) {
-  evaluate_worst worst = { .row = -1 };
+  r->position = r->g = 0, r->row_position = -1;
   for (int i = 0; i < s->holonomic; i++)
-    if (enforced == NULL || enforced[i]) worst = evaluate_update_worst (worst, i, g[i], size[i]);
-  r->position = worst.scaled;
-  r->g = worst.largest;
-  r->row_position = worst.row;
+    if (enforced == NULL || enforced[i])
+      evaluate_update_worst (i, g[i], size[i], &r->position, &r->g, &r->row_position);
 }
 
 /* Updates the worst residual J v - eta with a batch; eta NULL: zero; unit: L / T of a run. */
-static evaluate_worst evaluate_worst_velocity (const pw_element_batch *k, const double *eta,
-                                               const unsigned char *enforced, double unit, evaluate_worst worst) {
+static void evaluate_worst_velocity (const pw_element_batch *k, const double *eta, const unsigned char *enforced,
+                                     double unit, pw_residuals *worst) {
   const double *J = k->J, *rate = k->b.v;
   const int bodies = k->kind->bodies, internal = k->kind->internal, *body = k->b.body;
   int i = k->row;
@@ -169,19 +162,16 @@ static evaluate_worst evaluate_worst_velocity (const pw_element_batch *k, const 
         size += fabs (term);
       }
       if (eta) sum -= eta[i], size += fabs (eta[i]);
-      if (enforced == NULL || enforced[i]) worst = evaluate_update_worst (worst, i, sum, size + unit);
+      if (enforced == NULL || enforced[i])
+        evaluate_update_worst (i, sum, size + unit, &worst->velocity, &worst->jv, &worst->row_velocity);
     }
-  return worst;
 }
 
 void pw_evaluate_velocity_residual (pw_workspace *w, const unsigned char *enforced, pw_residuals *r) {
   double *eta = w->s->rheonomic ? w->scratch : NULL, unit = w->scale.length / w->scale.time;
-  evaluate_worst worst = { .row = -1 };
+  r->velocity = r->jv = 0, r->row_velocity = -1;
   if (eta) pw_evaluate_eta (w, eta);
-  EACH_CONSTRAINT (k, w) worst = evaluate_worst_velocity (k, eta, enforced, unit, worst);
-  r->velocity = worst.scaled;
-  r->jv = worst.largest;
-  r->row_velocity = worst.row;
+  EACH_CONSTRAINT (k, w) evaluate_worst_velocity (k, eta, enforced, unit, r);
 }
 
 void pw_evaluate_position_residual (pw_workspace *w, const unsigned char *enforced, pw_residuals *r) {
