@@ -4,30 +4,23 @@
 
 /* ---- Ramps, smooth steps, pulses ---- */
 
-/* from + (to - from) x, x = (t - start) / duration */
-static void signal_ramp (const pw_signal *s, double x, double u[3]) {
-  double rise = s->ramp.to - s->ramp.from;
-  u[0] = s->ramp.from + rise * x;
-  u[1] = rise / s->ramp.duration;
-}
-
-/* from + (to - from) (10 x^3 - 15 x^4 + 6 x^5): first and second derivative are 0 at both ends
- * (Flash & Hogan 1985, Journal of Neuroscience 5, 1688-1703). */
-static void signal_smooth_step (const pw_signal *s, double x, double u[3]) {
-  double rise = s->ramp.to - s->ramp.from, T = s->ramp.duration;
-  u[0] = s->ramp.from + rise * (x * x * x * (10 + x * (6 * x - 15)));
-  u[1] = rise * (30 * x * x * (1 - x) * (1 - x)) / T;
-  u[2] = rise * (60 * x * (1 - x) * (1 - 2 * x)) / (T * T);
-}
-
-/* Ramps and smooth steps are constant before their start and after their end. */
+/* A ramp, from + (to - from) x with x = (t - start) / duration; or a smooth step, with 10 x^3 - 15 x^4 + 6 x^5 in place
+ * of x, whose first and second derivatives are 0 at both ends (Flash & Hogan 1985, Journal of Neuroscience 5,
+ * 1688-1703).  Both are constant before their start and after their end. */
 static void signal_rise (const pw_signal *s, double t, double u[3]) {
-  if (t < s->ramp.start)
-    u[0] = s->ramp.from;
-  else if (t >= s->ramp.start + s->ramp.duration)
+  double rise = s->ramp.to - s->ramp.from, T = s->ramp.duration, x = (t - s->ramp.start) / T;
+  u[0] = s->ramp.from;
+  if (t < s->ramp.start) return;
+  if (t >= s->ramp.start + T)
     u[0] = s->ramp.to;
-  else
-    (s->type == PW_RAMP ? signal_ramp : signal_smooth_step) (s, (t - s->ramp.start) / s->ramp.duration, u);
+  else if (s->type == PW_RAMP) {
+    u[0] += rise * x;
+    u[1] = rise / T;
+  } else {
+    u[0] += rise * (x * x * x * (10 + x * (6 * x - 15)));
+    u[1] = rise * (30 * x * x * (1 - x) * (1 - x)) / T;
+    u[2] = rise * (60 * x * (1 - x) * (1 - 2 * x)) / (T * T);
+  }
 }
 
 static double signal_rise_breakpoint (const pw_signal *s, double t) {
