@@ -87,7 +87,8 @@ static int compile_types (compilation *job) {
   const pw_model *m = job->m;
   pw_system *s = job->s;
   size_t room = 0;
-  if (pw_grow (&s->batch, 0, &room, sizeof *s->batch) != PW_OK) return compile_no_memory (job);
+  if (pw_grow (&s->batch, 0, &room, sizeof *s->batch) != PW_OK)
+    return compile_no_memory (job); /* for no element, too */
   for (int l = 0; l < 3; l++)
     for (int i = 0; i < m->elements; i++) {
       const pw_kind *kind = m->element[i].kind;

@@ -20,7 +20,7 @@ typedef struct {
   int *column;       /* count x bodies: first coordinate of each body; s->coords for the ground */
   const char **name; /* count */
   double *J;         /* count x rows x cols */
-  double *block;     /* pw_workspace.block, which all batches share */
+  double *block;     /* pw_workspace.block: scratch for forces, energies, powers, saturation; all batches share it */
   double *u;         /* count x signals x 3, as b.u */
   pw_source *source; /* count x signals, part of the array of all sources */
 } pw_element_batch;
@@ -43,7 +43,7 @@ struct pw_system {
   int state_dependent;     /* signals that depend on states */
   int reads;               /* number of states that they read, with repetitions */
   size_t jacobian;         /* entries of J of all elements, zeros included */
-  size_t block;            /* numbers in pw_workspace.block */
+  size_t block;            /* the largest count x cols of a batch, x 2 cols if its force saturates */
   int rheonomic;           /* batches whose eta may be other than 0 */
   pw_scale scale;          /* with T = 1 s; T of a run is in its workspace */
   const char **body_name;  /* bodies */
@@ -65,7 +65,7 @@ struct pw_workspace {
   double *u, *J;                   /* those of all batches: sources x 3; entries of J, element by element */
   pw_configuration *configuration; /* bodies + 1; the last is the ground */
   double *scratch;                 /* rows x 3 + coords + 3, for the function in progress */
-  double *block;                   /* results of a function of one batch, at most count x 2 cols; for the same */
+  double *block;                   /* results of one function of one batch, until the next one is called */
   pw_scale scale;                  /* the run's */
   int hold;                        /* 1: signals of forces keep their values (pw_hold_signals) */
   double t_signal;                 /* time of the last evaluation of signals; NaN: evaluate them again */
