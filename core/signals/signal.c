@@ -4,30 +4,23 @@
 
 /* ---- Ramps, smooth steps, pulses ---- */
 
-/* from + (to - from) x, x = (t - start) / duration */
-static void signal_ramp (const pw_signal *s, double x, double u[3]) {
-  double rise = s->ramp.to - s->ramp.from;
-  u[0] = s->ramp.from + rise * x;
-  u[1] = rise / s->ramp.duration;
-}
-
-/* from + (to - from) (10 x^3 - 15 x^4 + 6 x^5): first and second derivative are 0 at both ends
- * (Flash & Hogan 1985, Journal of Neuroscience 5, 1688-1703). */
-static void signal_smooth_step (const pw_signal *s, double x, double u[3]) {
-  double rise = s->ramp.to - s->ramp.from, T = s->ramp.duration;
-  u[0] = s->ramp.from + rise * (x * x * x * (10 + x * (6 * x - 15)));
-  u[1] = rise * (30 * x * x * (1 - x) * (1 - x)) / T;
-  u[2] = rise * (60 * x * (1 - x) * (1 - 2 * x)) / (T * T);
-}
-
-/* Ramps and smooth steps are constant before their start and after their end. */
+/* A ramp, from + (to - from) x with x = (t - start) / duration; or a smooth step, with 10 x^3 - 15 x^4 + 6 x^5 in place
+ * of x, whose first and second derivatives are 0 at both ends (Flash & Hogan 1985, Journal of Neuroscience 5,
+ * 1688-1703).  Both are constant before their start and after their end. */
 static void signal_rise (const pw_signal *s, double t, double u[3]) {
-  if (t < s->ramp.start)
-    u[0] = s->ramp.from;
-  else if (t >= s->ramp.start + s->ramp.duration)
+  double rise = s->ramp.to - s->ramp.from, T = s->ramp.duration, x = (t - s->ramp.start) / T;
+  u[0] = s->ramp.from;
+  if (t < s->ramp.start) return;
+  if (t >= s->ramp.start + T)
     u[0] = s->ramp.to;
-  else
-    (s->type == PW_RAMP ? signal_ramp : signal_smooth_step) (s, (t - s->ramp.start) / s->ramp.duration, u);
+  else if (s->type == PW_RAMP) {
+    u[0] += rise * x;
+    u[1] = rise / T;
+  } else {
+    u[0] += rise * (x * x * x * (10 + x * (6 * x - 15)));
+    u[1] = rise * (30 * x * x * (1 - x) * (1 - x)) / T;
+    u[2] = rise * (60 * x * (1 - x) * (1 - 2 * x)) / (T * T);
+  }
 }
 
 static double signal_rise_breakpoint (const pw_signal *s, double t) {
@@ -93,48 +86,30 @@ int pw_signal_eval (const pw_source *source, double t) {
   const pw_signal *s = &source->signal;
   double *u = source->u;
   u[0] = u[1] = u[2] = 0;
-  if (s->type == PW_HARMONIC) /* the most frequent types before the switch: fewer instructions */
-    signal_harmonic (s, t, !source->of_force, u);
-  else if (s->type == PW_CONSTANT)
-    u[0] = s->constant;
-  else if (s->type == PW_FUNCTION)
-    return signal_function (source, t);
-  else
-    switch (s->type) {
-    case PW_TABLE:
-      pw_table_eval (s, source->spline, t, u);
-      break;
-    case PW_PULSE:
-      signal_pulse (s, t, u);
-      break;
-    case PW_RAMP:
-    case PW_SMOOTH_STEP:
-      signal_rise (s, t, u);
-      break;
-    case PW_CONSTANT:
-    case PW_HARMONIC:
-    case PW_FUNCTION:
-      break;
-    }
-  return 0;
-}
-
-int pw_signal_value_may_jump (const pw_signal *s) {
   switch (s->type) {
-  case PW_PULSE:
-  case PW_FUNCTION:
-    return 1;
   case PW_CONSTANT:
+    u[0] = s->constant;
+    break;
   case PW_HARMONIC:
+    signal_harmonic (s, t, !source->of_force, u);
+    break;
+  case PW_FUNCTION:
+    return signal_function (source, t);
+  case PW_TABLE:
+    pw_table_eval (s, source->spline, t, u);
+    break;
+  case PW_PULSE:
+    signal_pulse (s, t, u);
+    break;
   case PW_RAMP:
   case PW_SMOOTH_STEP:
-  case PW_TABLE:
+    signal_rise (s, t, u);
     break;
   }
   return 0;
 }
 
-double pw_signal_breakpoint (const pw_signal *s, pw_breakpoints which, double t) {
+double pw_signal_breakpoint (const pw_signal *s, int kinks, double t) {
   switch (s->type) {
   case PW_CONSTANT:
   case PW_HARMONIC:
@@ -145,7 +120,7 @@ double pw_signal_breakpoint (const pw_signal *s, pw_breakpoints which, double t)
   case PW_PULSE:
     return signal_pulse_breakpoint (s, t);
   case PW_TABLE:
-    return pw_table_breakpoint (s, which, t);
+    return pw_table_breakpoint (s, kinks, t);
   case PW_FUNCTION:
     return s->function.breakpoint ? s->function.breakpoint (s->function.context, t) : INFINITY;
   }

@@ -20,17 +20,15 @@ typedef struct {
  * computes values that are not finite. */
 int pw_signal_eval (const pw_source *source, double t);
 
-/* Times at which a step must end: the signal or a derivative up to this order jumps. */
-typedef enum {
-  PW_BREAKS_2, /* second; and at the start and end of a smooth-step */
-  PW_BREAKS_3  /* third: also at the points of a cubic table */
-} pw_breakpoints;
-
-/* The first such time after t, or INFINITY; of a function signal, what its breakpoint function returns. */
-double pw_signal_breakpoint (const pw_signal *s, pw_breakpoints which, double t);
+/* The first time after t at which a step must end, or INFINITY: the signal, its first or its second derivative jumps,
+ * or a smooth-step starts or ends; kinks: 1: also where the second derivative has a kink, at the points of a cubic
+ * table.  Of a function signal, what its breakpoint function returns. */
+double pw_signal_breakpoint (const pw_signal *s, int kinks, double t);
 
 /* 1 if the value may jump: that of a pulse; that of a function, of which this is not known. */
-int pw_signal_value_may_jump (const pw_signal *s);
+static inline int pw_signal_value_may_jump (const pw_signal *s) {
+  return s->type == PW_PULSE || s->type == PW_FUNCTION;
+}
 
 /* ---- Tables (table.c) ---- */
 
@@ -45,6 +43,6 @@ static inline double pw_table_value (const pw_signal *s, int i) {
  * one meaningless), then the second derivatives. */
 void pw_table_spline (const pw_signal *s, double *spline);
 void pw_table_eval (const pw_signal *s, const double *spline, double t, double u[3]);
-double pw_table_breakpoint (const pw_signal *s, pw_breakpoints which, double t);
+double pw_table_breakpoint (const pw_signal *s, int kinks, double t);
 
 #endif

@@ -105,21 +105,11 @@ static void form_check_points (const pw_signal *s, int *point, char *text, size_
 
 /* The form of a signal that jumps or has kinks, for messages; NULL if it has neither or is a function. */
 static const char *form_with_kinks (const pw_signal *s) {
-  switch (s->type) {
-  case PW_PULSE:
-    return "a pulse";
-  case PW_RAMP:
-    return "a ramp";
-  case PW_TABLE:
-    if (s->table.interpolation == PW_LINEAR) return "a linear table";
-    return s->table.ends == PW_ENDS_FREE ? "a cubic table with free ends" : NULL;
-  case PW_CONSTANT:
-  case PW_HARMONIC:
-  case PW_SMOOTH_STEP:
-  case PW_FUNCTION:
-    break;
-  }
-  return NULL;
+  if (s->type == PW_PULSE) return "a pulse";
+  if (s->type == PW_RAMP) return "a ramp";
+  if (s->type != PW_TABLE) return NULL;
+  if (s->table.interpolation == PW_LINEAR) return "a linear table";
+  return s->table.ends == PW_ENDS_FREE ? "a cubic table with free ends" : NULL;
 }
 
 /* Kinks of prescribed positions and jumps of prescribed velocities would require infinite forces. */

@@ -89,9 +89,9 @@ void pw_table_eval (const pw_signal *s, const double *spline, double t, double u
 
 /* At each point of a linear table, and at the ends of a cubic one, the first or the second derivative jumps; at the
  * other points of a cubic table the second derivative has a kink. */
-double pw_table_breakpoint (const pw_signal *s, pw_breakpoints which, double t) {
+double pw_table_breakpoint (const pw_signal *s, int kinks, double t) {
   int n = s->table.count, next = table_passed (s, t);
   if (next == n) return INFINITY;
   int in_spline = s->table.interpolation == PW_CUBIC && next > 0;
-  return s->table.t[in_spline && which == PW_BREAKS_2 ? n - 1 : next];
+  return s->table.t[in_spline && !kinks ? n - 1 : next];
 }

@@ -1,7 +1,6 @@
 /* Compiles a model: names become indices, the elements of each type become one batch.
  *
- * All arrays of the system but that of the batches are in its arena; `scratch` has data needed only during
- * compilation. */
+ * All arrays of the system but that of the batches are in its arena. */
 #include <limits.h>
 #include <math.h>
 #include <stdlib.h>
@@ -18,11 +17,10 @@ typedef struct {
   const pw_model *m;
   pw_system *s;
   pw_error *error;
-  pw_arena scratch;
-  pw_names name;           /* of bodies: their indices; of elements: theirs plus the number of bodies */
-  int *batch_of;           /* for each element of the model: index of its batch */
-  size_t bytes;            /* of the largest element and its guard */
-  unsigned char *prepared; /* bytes: memory in which an element is prepared */
+  pw_names name;     /* of bodies: their indices; of elements: theirs plus the number of bodies */
+  pw_compiled *list; /* what each element of the system is compiled from, batch by batch */
+  int listed;
+  size_t list_room; /* entries allocated */
 } compilation;
 
 static int compile_no_memory (const compilation *job) {
@@ -66,59 +64,70 @@ static int compile_names (compilation *job) {
   return PW_OK;
 }
 
-/* Number of elements of the system for one element of the model: one, or one for each body with mass. */
-static int compile_copies (const pw_model *m, const pw_kind *kind) {
-  int massive = 0;
-  if (!kind->each_body) return 1;
-  for (int i = 0; i < m->bodies; i++) massive += m->body[i].mass > 0;
-  return massive;
+/* Lists the elements of a batch, in the model from the first one on; those of an each_body type once for every body
+ * with mass. */
+static int compile_list (compilation *job, const pw_element *first, pw_element_batch *k) {
+  const pw_model *m = job->m;
+  int each = k->kind->each_body;
+  for (const pw_element *from = first; from < m->element + m->elements; from++)
+    for (int b = each ? 0 : -1; from->kind == k->kind && b < (each ? m->bodies : 0); b++) {
+      if (b >= 0 && !(m->body[b].mass > 0)) continue;
+      if (job->listed == COMPILE_MOST) return compile_too_large (job);
+      if (pw_grow (&job->list, (size_t)job->listed, &job->list_room, sizeof *job->list) != PW_OK)
+        return compile_no_memory (job);
+      job->list[job->listed++] = (pw_compiled){ from, b };
+      k->b.count++;
+    }
+  return PW_OK;
 }
 
-/* Counts the elements of each batch: holonomic types in order of appearance, then nonholonomic ones, then forces. */
+/* A batch for each type: holonomic ones in order of appearance, then nonholonomic ones, then forces. */
 static int compile_types (compilation *job) {
   static const pw_level order[] = { PW_HOLONOMIC, PW_NONHOLONOMIC, PW_FORCE };
   const pw_model *m = job->m;
   pw_system *s = job->s;
   size_t room = 0;
-  double elements = 0;
-  job->batch_of = pw_arena_alloc (&job->scratch, (size_t)m->elements * sizeof *job->batch_of);
-  if (job->batch_of == NULL || pw_grow (&s->batch, 0, &room, sizeof *s->batch) != PW_OK) return compile_no_memory (job);
+  if (pw_grow (&s->batch, 0, &room, sizeof *s->batch) != PW_OK)
+    return compile_no_memory (job); /* for no element, too */
   for (int l = 0; l < 3; l++)
     for (int i = 0; i < m->elements; i++) {
       const pw_kind *kind = m->element[i].kind;
-      if (kind->level != order[l]) continue;
       int k = 0;
       while (k < s->batches && s->batch[k].kind != kind) k++;
-      if (k == s->batches) {
-        if (pw_grow (&s->batch, (size_t)k, &room, sizeof *s->batch) != PW_OK) return compile_no_memory (job);
-        s->batch[s->batches++] = (pw_element_batch){ .kind = kind };
-      }
-      int copies = compile_copies (m, kind);
-      elements += copies;
-      if (elements > COMPILE_MOST) return compile_too_large (job);
-      s->batch[k].b.count += copies;
-      job->batch_of[i] = k;
-      if (job->bytes < kind->element + COMPILE_GUARD) job->bytes = kind->element + COMPILE_GUARD;
+      if (kind->level != order[l] || k < s->batches) continue;
+      if (pw_grow (&s->batch, (size_t)k, &room, sizeof *s->batch) != PW_OK) return compile_no_memory (job);
+      s->batch[s->batches++] = (pw_element_batch){ .kind = kind };
+      int status = compile_list (job, &m->element[i], &s->batch[k]);
+      if (status != PW_OK) return status;
     }
-  job->prepared = pw_arena_alloc (&job->scratch, job->bytes);
-  return job->prepared ? PW_OK : compile_no_memory (job);
+  return PW_OK;
 }
 
 static int compile_count (const compilation *job) {
   const pw_model *m = job->m;
   pw_system *s = job->s;
-  double coords = 3.0 * m->bodies;
   if (m->bodies == 0) return pw_fail (job->error, PW_INPUT, "model %s has no body", m->name);
-  for (const pw_element_batch *k = s->batch; k < s->batch + s->batches; k++) {
-    coords += (double)k->b.count * k->kind->internal;
-    s->rows += k->b.count * k->kind->rows;
-    if (k->kind->level == PW_HOLONOMIC) s->holonomic = s->rows; /* these batches come first */
-    s->sources += k->b.count * k->kind->signals;
-  }
-  if (coords > COMPILE_MOST || s->rows > COMPILE_MOST) return compile_too_large (job);
+  if (m->bodies > COMPILE_MOST / 3) return compile_too_large (job);
   s->bodies = m->bodies;
-  s->coords = (int)coords;
-  return PW_OK;
+  s->coords = 3 * m->bodies;
+  for (pw_element_batch *k = s->batch; k < s->batch + s->batches; k++) {
+    const pw_kind *kind = k->kind;
+    k->b.cols = 3 * kind->bodies + kind->internal;
+    k->row = s->rows;
+    k->internal = s->coords;
+    s->coords += k->b.count * kind->internal;
+    s->rows += k->b.count * kind->rows;
+    if (kind->level == PW_HOLONOMIC) s->holonomic = s->rows; /* these batches come first */
+    s->sources += k->b.count * kind->signals;
+    size_t cols = (size_t)k->b.count * (size_t)k->b.cols, block = kind->saturation ? 2 * cols : cols;
+    s->jacobian += (size_t)kind->rows * cols;
+    if (s->block < block) s->block = block;
+    s->constraints += kind->rows > 0;
+    s->rheonomic += kind->eta != NULL;
+    s->forces += kind->force && !kind->constant;
+    s->saturates |= kind->saturation != NULL;
+  }
+  return s->coords > COMPILE_MOST || s->rows > COMPILE_MOST ? compile_too_large (job) : PW_OK;
 }
 
 static int compile_arrays (const compilation *job) {
@@ -160,59 +169,50 @@ static int compile_bodies (const compilation *job) {
   return s->model ? PW_OK : PW_RESOURCE;
 }
 
-/* Prepares an element in scratch memory, checks that `prepare` stays within its size, and copies it. */
+/* Prepares an element, and checks that `prepare` stays within its size; what follows it in memory is not used yet. */
 static int compile_prepare (const compilation *job, const pw_element *from, const pw_body *const *bodies,
-                            pw_internal *internal, void *element) {
+                            pw_internal *internal, unsigned char *element) {
   const pw_kind *kind = from->kind;
-  size_t size = kind->element;
   pw_error cause = { 0 };
-  memset (job->prepared, 0, size);
-  memset (job->prepared + size, COMPILE_MARK, COMPILE_GUARD);
-  int status = kind->prepare (from->definition, bodies, job->prepared, internal, &cause);
+  memset (element, 0, kind->element);
+  memset (element + kind->element, COMPILE_MARK, COMPILE_GUARD);
+  int status = kind->prepare (from->definition, bodies, element, internal, &cause);
   if (status != PW_OK)
     return pw_fail (job->error, status == PW_RESOURCE ? PW_RESOURCE : PW_INPUT, "model %s: %s %s: %s", job->m->name,
                     kind->name, pw_element_name (from), *cause.text ? cause.text : "prepare refuses it");
   for (size_t i = 0; i < COMPILE_GUARD; i++)
-    if (job->prepared[size + i] != COMPILE_MARK)
+    if (element[kind->element + i] != COMPILE_MARK)
       return pw_fail (job->error, PW_INPUT,
                       "model %s: element type %s: prepare writes more than the %zu bytes of .element", job->m->name,
-                      kind->name, size);
-  memcpy (element, job->prepared, size);
+                      kind->name, kind->element);
   return PW_OK;
 }
 
-/* The arrays of a batch while they are filled. */
-typedef struct {
-  char *element;
-  int *body, *column;
-  const char **name;
-} batch_arrays;
-
-/* Stores element e of a batch: bodies, columns, prepared element, internal coordinates.  body: the body on which an
- * each_body type acts, or -1. */
-static int compile_element (const compilation *job, const pw_element_batch *k, const batch_arrays *a, int e,
-                            const pw_element *from, int body) {
+/* Stores element e of a batch: name, bodies, columns, prepared element, internal coordinates. */
+static int compile_element (const compilation *job, const pw_element_batch *k, int e, const pw_compiled *from,
+                            int *body, unsigned char *element) {
   static const pw_body ground = { .name = "ground" };
   const pw_kind *kind = k->kind;
   pw_system *s = job->s;
   const pw_body *bodies[PW_MAX_BODIES];
+  const void *definition = from->element->definition;
+  if ((k->name[e] = compile_text (job, pw_element_name (from->element))) == NULL) return PW_RESOURCE;
   for (int n = 0; n < kind->bodies; n++) {
-    int index =
-        body >= 0 ? body
-                  : pw_names_find (&job->name, *(const char *const *)pw_field_at (kind, from->definition, PW_BODY, n));
+    int index = from->body;
+    if (index < 0) index = pw_names_find (&job->name, *(const char *const *)pw_field_at (kind, definition, PW_BODY, n));
     bodies[n] = index < 0 ? &ground : &job->m->body[index];
-    a->body[e * kind->bodies + n] = index < 0 ? s->bodies : index;
-    a->column[e * kind->bodies + n] = index < 0 ? s->coords : 3 * index;
+    body[n] = index < 0 ? s->bodies : index;
+    k->column[e * kind->bodies + n] = index < 0 ? s->coords : 3 * index;
   }
   if (kind->prepare == NULL) return PW_OK;
   pw_internal internal[PW_MAX_INTERNAL] = { { 0 } };
-  int status = compile_prepare (job, from, bodies, internal, a->element + (size_t)e * kind->element);
+  int status = compile_prepare (job, from->element, bodies, internal, element);
   if (status != PW_OK) return status;
   for (int n = 0, j = k->internal + e * kind->internal; n < kind->internal; n++, j++) {
     const char *expected = pw_domain_check (PW_NONNEGATIVE, internal[n].mass);
     if (*expected)
       return pw_fail (job->error, PW_INPUT, "model %s: %s %s: inertia of %s = %g: expected %s", job->m->name,
-                      kind->name, pw_element_name (from), kind->coordinate[n].name, internal[n].mass, expected);
+                      kind->name, k->name[e], kind->coordinate[n].name, internal[n].mass, expected);
     s->mass[j] = internal[n].mass;
     s->q0[j] = internal[n].start;
     s->v0[j] = internal[n].rate;
@@ -222,44 +222,23 @@ static int compile_element (const compilation *job, const pw_element_batch *k, c
   return PW_OK;
 }
 
-/* Stores the elements of batch i, those of an each_body type once for every body with mass. */
-static int compile_batch (const compilation *job, int i, const batch_arrays *a) {
-  const pw_element_batch *k = &job->s->batch[i];
-  int e = 0, status = PW_OK;
-  for (int n = 0; n < job->m->elements && status == PW_OK; n++) {
-    if (job->batch_of[n] != i) continue;
-    const pw_element *from = &job->m->element[n];
-    const char *name = compile_text (job, pw_element_name (from));
-    if (name == NULL) return PW_RESOURCE;
-    for (int b = k->kind->each_body ? 0 : -1; b < (k->kind->each_body ? job->s->bodies : 0); b++) {
-      if (b >= 0 && !(job->m->body[b].mass > 0)) continue;
-      a->name[e] = name;
-      if ((status = compile_element (job, k, a, e++, from, b)) != PW_OK) break;
-    }
-  }
-  return status;
-}
-
 static int compile_batches (const compilation *job) {
-  pw_system *s = job->s;
-  int row = 0, internal = 3 * s->bodies, status = PW_OK;
-  pw_source *source = s->source;
-  for (int i = 0; i < s->batches && status == PW_OK; i++) {
-    pw_element_batch *k = &s->batch[i];
-    const pw_kind *kind = k->kind;
-    int count = k->b.count;
-    size_t n = (size_t)count, bodies = n * (size_t)kind->bodies;
-    batch_arrays a = { compile_alloc (job, n, kind->element), compile_alloc (job, bodies, sizeof (int)),
-                       compile_alloc (job, bodies, sizeof (int)), compile_alloc (job, n, sizeof (char *)) };
-    if (!a.element || !a.body || !a.column || !a.name) return PW_RESOURCE;
-    *k = (pw_element_batch){
-      .kind = kind, .row = row, .internal = internal, .column = a.column, .name = a.name, .source = source
-    };
-    k->b = (pw_batch){ count, 3 * kind->bodies + kind->internal, .element = a.element, .body = a.body };
-    row += count * kind->rows;
-    internal += count * kind->internal;
-    source += count * kind->signals;
-    status = compile_batch (job, i, &a);
+  pw_source *source = job->s->source;
+  const pw_compiled *from = job->list;
+  int status = PW_OK;
+  for (pw_element_batch *k = job->s->batch; k < job->s->batch + job->s->batches; k++) {
+    size_t n = (size_t)k->b.count, size = k->kind->element, bodies = (size_t)k->kind->bodies;
+    unsigned char *element = compile_alloc (job, n * size + COMPILE_GUARD, 1);
+    int *body = compile_alloc (job, n * bodies, sizeof *body);
+    k->column = compile_alloc (job, n * bodies, sizeof *k->column);
+    k->name = compile_alloc (job, n, sizeof *k->name);
+    if (!element || !body || !k->column || !k->name) return PW_RESOURCE;
+    k->b.element = element;
+    k->b.body = body;
+    k->source = source;
+    source += k->b.count * k->kind->signals;
+    for (size_t e = 0; e < n && status == PW_OK; e++, from++)
+      status = compile_element (job, k, (int)e, from, body + e * bodies, element + e * size);
   }
   return status;
 }
@@ -308,21 +287,14 @@ static void compile_metric (pw_system *s) {
     s->metric[j] = s->mass[j] > 0 ? s->mass[j] : weight * (pw_is_angle (s, j) ? L2 : 1);
 }
 
-/* Counts the batches that have a property, lists the ledger's entries, and evaluates the constant forces. */
+/* Lists the ledger's entries, and evaluates the constant forces. */
 static int compile_totals (const compilation *job) {
   pw_system *s = job->s;
   int constant = 0;
-  s->entry = compile_alloc (job, 2 * (size_t)pw_system_elements (s), sizeof *s->entry);
+  s->entry = compile_alloc (job, 2 * (size_t)job->listed, sizeof *s->entry);
   if (s->entry == NULL) return PW_RESOURCE;
   s->entries = pw_ledger_list (s, s->entry);
-  for (int i = 0; i < s->batches; i++) {
-    const pw_kind *kind = s->batch[i].kind;
-    s->constraints += kind->rows > 0;
-    s->rheonomic += kind->eta != NULL;
-    s->forces += kind->force && !kind->constant;
-    constant |= kind->force && kind->constant;
-    s->saturates |= kind->saturation != NULL;
-  }
+  for (int i = 0; i < s->batches; i++) constant |= s->batch[i].kind->constant;
   if (!constant) return PW_OK;
   pw_workspace *w = pw_workspace_new (s, job->error);
   if (w == NULL) return PW_RESOURCE;
@@ -339,7 +311,7 @@ static int compile_all (compilation *job) {
   if (status == PW_OK) status = compile_arrays (job);
   if (status == PW_OK) status = compile_bodies (job);
   if (status == PW_OK) status = compile_batches (job);
-  if (status == PW_OK) status = pw_compile_signals (job->s, job->m, job->batch_of, job->error);
+  if (status == PW_OK) status = pw_compile_signals (job->s, job->list, job->error);
   if (status == PW_OK) status = compile_initial (job);
   if (status != PW_OK) return status;
   job->s->scale = (pw_scale){ compile_length (job), 1 };
@@ -358,7 +330,7 @@ pw_system *pw_system_compile (const pw_model *m, pw_error *error) {
   else
     status = job.s ? compile_all (&job) : compile_no_memory (&job);
   pw_names_close (&job.name);
-  pw_arena_free (&job.scratch);
+  free (job.list);
   if (status == PW_OK) return job.s;
   pw_system_free (job.s);
   return NULL;

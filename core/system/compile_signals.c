@@ -49,27 +49,15 @@ static int signals_source (pw_system *s, pw_source *source, const pw_signal *sig
   return signal->type == PW_FUNCTION ? signals_reads (s, source, element, error) : PW_OK;
 }
 
-/* Compiles the signals of element e of a batch. */
-static int signals_element (pw_system *s, const pw_element_batch *k, int e, const void *definition, pw_error *error) {
-  pw_source *source = k->source + e * k->kind->signals;
-  int status = PW_OK;
-  for (int u = 0; u < k->kind->signals && status == PW_OK; u++, source++) {
-    source->of_force = pw_kind_signals_force (k->kind);
-    status = signals_source (s, source, pw_field_at (k->kind, definition, PW_SIGNAL, u), k->name[e], error);
-  }
-  return status;
-}
-
-int pw_compile_signals (pw_system *s, const pw_model *m, const int *batch_of, pw_error *error) {
-  int *next = pw_arena_alloc (&s->arena, (size_t)s->batches * sizeof *next); /* next element of each batch */
-  if (next == NULL) return pw_fail_memory (s, error);
-  int status = PW_OK;
-  for (int n = 0; n < m->elements && status == PW_OK; n++) {
-    const pw_element *from = &m->element[n];
-    const pw_element_batch *k = &s->batch[batch_of[n]];
-    int *e = &next[batch_of[n]];
-    for (; *e < k->b.count && strcmp (k->name[*e], pw_element_name (from)) == 0 && status == PW_OK; ++*e)
-      status = signals_element (s, k, *e, from->definition, error);
-  }
-  return status;
+int pw_compile_signals (pw_system *s, const pw_compiled *from, pw_error *error) {
+  pw_source *source = s->source;
+  for (const pw_element_batch *k = s->batch; k < s->batch + s->batches; k++)
+    for (int e = 0; e < k->b.count; e++, from++)
+      for (int u = 0; u < k->kind->signals; u++, source++) {
+        source->of_force = pw_kind_signals_force (k->kind);
+        const pw_signal *signal = pw_field_at (k->kind, from->element->definition, PW_SIGNAL, u);
+        int status = signals_source (s, source, signal, k->name[e], error);
+        if (status != PW_OK) return status;
+      }
+  return PW_OK;
 }

@@ -99,39 +99,32 @@ int pw_workspace_forces (pw_workspace *w, double t, const double *q, const doubl
 
 /* ---- Equations ---- */
 
-/* Stores indices and values of the entries of J, unless out is NULL.  Returns their number. */
-static int elements_jacobian (const pw_workspace *w, pw_equations *out) {
-  const pw_system *s = w->s;
-  int entries = 0;
-  for (const pw_element_batch *k = w->batch; k < w->batch + s->constraints; k++)
-    for (int i = 0; i < k->b.count * k->kind->rows; i++)
-      for (int c = 0; c < k->b.cols; c++) {
-        int column = pw_global (k, i / k->kind->rows, c);
-        if (column >= s->coords) continue;
-        if (out) {
-          out->row[entries] = k->row + i;
-          out->column[entries] = column;
-          out->value[entries] = k->J[i * k->b.cols + c];
-        }
-        entries++;
-      }
-  return entries;
-}
-
-static int elements_allocate (const pw_workspace *w, pw_equations *out, pw_error *error) {
-  const pw_system *s = w->s;
-  size_t n = (size_t)s->coords, rows = (size_t)s->rows, entries = (size_t)elements_jacobian (w, NULL);
+static int elements_allocate (const pw_system *s, pw_equations *out, pw_error *error) {
+  size_t n = (size_t)s->coords, rows = (size_t)s->rows;
   double *indices;
   const pw_array array[] = { { &out->mass, n },      /* first: it is what pw_equations_free frees */
                              { &out->force, n + 3 }, /* three more entries: the ground's */
-                             { &out->g, rows },        { &out->eta, rows },  { &out->gamma, rows },
-                             { &out->value, entries }, { &indices, entries } }; /* two indices fit in one double */
-  *out =
-      (pw_equations){ .coordinates = s->coords, .rows = s->rows, .holonomic = s->holonomic, .entries = (int)entries };
+                             { &out->g, rows },        { &out->eta, rows },
+                             { &out->gamma, rows },    { &out->value, s->jacobian },
+                             { &indices, s->jacobian } }; /* two indices fit in one double */
+  out->coordinates = s->coords, out->rows = s->rows, out->holonomic = s->holonomic;
   if (pw_alloc_arrays (array, sizeof array / sizeof *array) == NULL) return pw_fail_memory (s, error);
   out->row = (int *)(void *)indices;
-  out->column = out->row + entries;
+  out->column = out->row + s->jacobian;
   return PW_OK;
+}
+
+/* Stores the entries of J that are not in columns of the ground. */
+static void elements_jacobian (const pw_workspace *w, pw_equations *out) {
+  for (const pw_element_batch *k = w->batch; k < w->batch + w->s->constraints; k++)
+    for (int i = 0; i < k->b.count * k->kind->rows; i++)
+      for (int c = 0; c < k->b.cols; c++) {
+        int column = pw_global (k, i / k->kind->rows, c);
+        if (column >= w->s->coords) continue;
+        out->row[out->entries] = k->row + i;
+        out->column[out->entries] = column;
+        out->value[out->entries++] = k->J[i * k->b.cols + c];
+      }
 }
 
 static int elements_evaluate (pw_workspace *w, double t, const double *q, const double *v, pw_equations *out,
@@ -151,7 +144,7 @@ int pw_system_equations (const pw_system *s, double t, const double *q, const do
                          pw_error *error) {
   *out = (pw_equations){ .rows = 0 };
   pw_workspace *w = pw_workspace_new (s, error);
-  int status = w ? elements_allocate (w, out, error) : s ? PW_RESOURCE : PW_INPUT;
+  int status = w ? elements_allocate (s, out, error) : s ? PW_RESOURCE : PW_INPUT;
   if (status == PW_OK) status = elements_evaluate (w, t, q, v, out, error);
   pw_workspace_free (w);
   return status;

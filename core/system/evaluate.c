@@ -2,10 +2,10 @@
 #include <math.h>
 #include <string.h>
 #include "system.h"
-#include "unroll.h"
 
+#define EACH_BATCH(k, w) for (const pw_element_batch *k = (w)->batch, *end = k + (w)->s->batches; k < end; k++)
 /* Batches with constraint equations come first. */
-#define EACH_CONSTRAINT(k, w) for (pw_element_batch *k = (w)->batch, *end = k + (w)->s->constraints; k < end; k++)
+#define EACH_CONSTRAINT(k, w) for (const pw_element_batch *k = (w)->batch, *end = k + (w)->s->constraints; k < end; k++)
 
 void pw_evaluate_J (pw_workspace *w) {
   EACH_CONSTRAINT (k, w) k->kind->J (&k->b, k->J);
@@ -40,46 +40,37 @@ void pw_evaluate_gamma (pw_workspace *w, double *gamma) {
   evaluate_rows (w, offsetof (pw_kind, gamma), w->s->rows, gamma);
 }
 
-static inline const double *evaluate_add (double *to, const double *force) {
-  to[0] += force[0];
-  to[1] += force[1];
-  to[2] += force[2];
-  return force + 3;
-}
-
-PW_NOINLINE void evaluate_add_internal (const pw_element_batch *k, double *f) {
-  const int internal = k->kind->internal, *column = k->column;
-  const double *block = k->block;
-  for (int e = 0; e < k->b.count; e++) {
-    for (int n = 0; n < k->kind->bodies; n++) block = evaluate_add (f + *column++, block);
-    for (int n = 0; n < internal; n++) f[k->internal + e * internal + n] += *block++;
+/* Adds the forces that are constant, or the others. */
+static void evaluate_add_forces (const pw_workspace *w, int constant, double *f) {
+  EACH_BATCH (k, w) {
+    if (k->kind->force == NULL || (k->kind->constant != 0) != constant) continue;
+    const double *block = k->block;
+    const int *column = k->column;
+    double *internal = f + k->internal;
+    k->kind->force (&k->b, k->block);
+    for (int e = 0; e < k->b.count; e++) {
+      for (int n = 0; n < k->kind->bodies; n++, column++, block += 3) {
+        f[*column] += block[0];
+        f[*column + 1] += block[1];
+        f[*column + 2] += block[2];
+      }
+      for (int n = 0; n < k->kind->internal; n++) *internal++ += *block++;
+    }
   }
-}
-
-static inline void evaluate_add_force (const pw_element_batch *k, double *f) {
-  k->kind->force (&k->b, k->block);
-  if (k->kind->internal > 0) {
-    evaluate_add_internal (k, f);
-    return;
-  }
-  const double *block = k->block;
-  for (const int *column = k->column, *end = column + k->b.count * k->kind->bodies; column < end; column++)
-    block = evaluate_add (f + *column, block);
 }
 
 void pw_evaluate_force (pw_workspace *w, double *f) {
   memcpy (f, w->s->constant, (size_t)w->s->coords * sizeof *f);
-  for (pw_element_batch **k = w->force, **end = k + w->s->forces; k < end; k++) evaluate_add_force (*k, f);
+  evaluate_add_forces (w, 0, f);
 }
 
 void pw_evaluate_constant (pw_workspace *w, double *f) {
-  for (pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++)
-    if (k->kind->force && k->kind->constant) evaluate_add_force (k, f);
+  evaluate_add_forces (w, 1, f);
 }
 
 double pw_potential (pw_workspace *w) {
   double sum = 0;
-  for (pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++) {
+  EACH_BATCH (k, w) {
     if (k->kind->energy == NULL) continue;
     k->kind->energy (&k->b, k->block);
     for (int e = 0; e < k->b.count; e++) sum += k->block[e];
@@ -88,7 +79,7 @@ double pw_potential (pw_workspace *w) {
 }
 
 void pw_evaluate_energies (pw_workspace *w, double *out) {
-  for (pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++) {
+  EACH_BATCH (k, w) {
     if (k->kind->energy) k->kind->energy (&k->b, out);
     out += k->b.count;
   }
@@ -100,37 +91,25 @@ double pw_kinetic (const pw_system *s, const double *v) {
   return sum / 2;
 }
 
-/* out = J x for a batch; for frequent types `bodies` and `internal` are constants after inlining. */
-PW_INLINE void evaluate_multiply_J (const pw_system *s, const pw_element_batch *k, const double *x, double *out,
-                                    int bodies, int internal) {
+void pw_mul_J (const pw_workspace *w, const double *x, double *out) {
   static const double ground[3] = { 0, 0, 0 };
-  const double *J = k->J, *X[PW_MAX_BODIES] = { 0 }, *y = x + k->internal; /* entries of x: of each body, internal */
-  const int *column = k->column;
-  for (int e = 0; e < k->b.count; e++, column += bodies, y += internal) {
-    PW_UNROLL for (int n = 0; n < bodies; n++) X[n] = column[n] < s->coords ? x + column[n] : ground;
-    for (int r = 0; r < k->kind->rows; r++) {
-      double sum = 0;
-      PW_UNROLL for (int n = 0; n < bodies; n++, J += 3) sum += J[0] * X[n][0] + J[1] * X[n][1] + J[2] * X[n][2];
-      for (int n = 0; n < internal; n++) sum += *J++ * y[n];
-      *out++ = sum;
+  EACH_CONSTRAINT (k, w) {
+    const double *J = k->J, *X[PW_MAX_BODIES], *y = x + k->internal; /* entries of x: of each body, internal */
+    const int bodies = k->kind->bodies, internal = k->kind->internal, *column = k->column;
+    for (int e = 0; e < k->b.count; e++, column += bodies, y += internal) {
+      for (int n = 0; n < bodies; n++) X[n] = column[n] < w->s->coords ? x + column[n] : ground;
+      for (int r = 0; r < k->kind->rows; r++) {
+        double sum = 0;
+        for (int n = 0; n < bodies; n++, J += 3) sum += J[0] * X[n][0] + J[1] * X[n][1] + J[2] * X[n][2];
+        for (int n = 0; n < internal; n++) sum += *J++ * y[n];
+        *out++ = sum;
+      }
     }
   }
 }
 
-void pw_mul_J (const pw_workspace *w, const double *x, double *out) {
-  for (const pw_element_batch *k = w->batch, *end = k + w->s->constraints; k < end; k++) {
-    double *to = out + k->row;
-    if (k->kind->internal == 0 && k->kind->bodies == 2)
-      evaluate_multiply_J (w->s, k, x, to, 2, 0);
-    else if (k->kind->internal == 0 && k->kind->bodies == 1)
-      evaluate_multiply_J (w->s, k, x, to, 1, 0);
-    else
-      evaluate_multiply_J (w->s, k, x, to, k->kind->bodies, k->kind->internal);
-  }
-}
-
 void pw_add_JT (const pw_workspace *w, const double *lambda, double *out) {
-  for (const pw_element_batch *k = w->batch; k < w->batch + w->s->constraints; k++) {
+  EACH_CONSTRAINT (k, w) {
     const double *J = k->J;
     for (int e = 0; e < k->b.count; e++)
       for (int r = 0; r < k->kind->rows; r++, lambda++) {
@@ -145,41 +124,33 @@ void pw_add_JT (const pw_workspace *w, const double *lambda, double *out) {
   }
 }
 
-/* The largest absolute and scaled residual so far, and the constraint equation of the latter.  NaN is the largest,
+/* Updates the largest scaled and absolute residual, and the constraint equation of the former.  NaN is the largest,
  * hence the negated comparisons. */
-typedef struct {
-  double largest, scaled;
-  int row;
-} evaluate_worst;
-
-static inline evaluate_worst evaluate_update_worst (evaluate_worst worst, int row, double residual, double size) {
-  double error = fabs (residual), scaled = error / size;
-  if (!(error <= worst.largest) && !isnan (worst.largest)) worst.largest = error;
-  if (!(scaled <= worst.scaled) && !isnan (worst.scaled)) worst.scaled = scaled, worst.row = row;
-  return worst;
+static inline void evaluate_update_worst (int i, double residual, double size, double *scaled, double *largest,
+                                          int *row) {
+  double error = fabs (residual), ratio = error / size;
+  if (!(error <= *largest) && !isnan (*largest)) *largest = error;
+  if (!(ratio <= *scaled) && !isnan (*scaled)) *scaled = ratio, *row = i;
 }
 
 void pw_worst_position (const pw_system *s, const double *g, const double *size, const unsigned char *enforced,
                         pw_residuals *r) {
-  evaluate_worst worst = { .row = -1 };
+  r->position = r->g = 0, r->row_position = -1;
   for (int i = 0; i < s->holonomic; i++)
-    if (enforced == NULL || enforced[i]) worst = evaluate_update_worst (worst, i, g[i], size[i]);
-  r->position = worst.scaled;
-  r->g = worst.largest;
-  r->row_position = worst.row;
+    if (enforced == NULL || enforced[i])
+      evaluate_update_worst (i, g[i], size[i], &r->position, &r->g, &r->row_position);
 }
 
 /* Updates the worst residual J v - eta with a batch; eta NULL: zero; unit: L / T of a run. */
-PW_INLINE evaluate_worst evaluate_worst_velocity (const pw_element_batch *k, const double *eta,
-                                                  const unsigned char *enforced, double unit, evaluate_worst worst,
-                                                  int bodies, int internal) {
+static void evaluate_worst_velocity (const pw_element_batch *k, const double *eta, const unsigned char *enforced,
+                                     double unit, pw_residuals *worst) {
   const double *J = k->J, *rate = k->b.v;
-  const int *body = k->b.body;
+  const int bodies = k->kind->bodies, internal = k->kind->internal, *body = k->b.body;
   int i = k->row;
   for (int e = 0; e < k->b.count; e++, body += bodies, rate += internal)
     for (int r = 0; r < k->kind->rows; r++, i++) {
       double sum = 0, size = 0;
-      PW_UNROLL for (int n = 0; n < bodies; n++, J += 3) {
+      for (int n = 0; n < bodies; n++, J += 3) {
         const pw_configuration *p = &k->b.configuration[body[n]];
         double x = J[0] * p->vx, y = J[1] * p->vy, phi = J[2] * p->omega; /* terms of J v */
         sum += x + y + phi;
@@ -191,32 +162,16 @@ PW_INLINE evaluate_worst evaluate_worst_velocity (const pw_element_batch *k, con
         size += fabs (term);
       }
       if (eta) sum -= eta[i], size += fabs (eta[i]);
-      if (enforced == NULL || enforced[i]) worst = evaluate_update_worst (worst, i, sum, size + unit);
+      if (enforced == NULL || enforced[i])
+        evaluate_update_worst (i, sum, size + unit, &worst->velocity, &worst->jv, &worst->row_velocity);
     }
-  return worst;
-}
-
-PW_NOINLINE evaluate_worst evaluate_worst_velocity_any (const pw_element_batch *k, const double *eta,
-                                                        const unsigned char *enforced, double unit,
-                                                        evaluate_worst worst) {
-  return evaluate_worst_velocity (k, eta, enforced, unit, worst, k->kind->bodies, k->kind->internal);
 }
 
 void pw_evaluate_velocity_residual (pw_workspace *w, const unsigned char *enforced, pw_residuals *r) {
   double *eta = w->s->rheonomic ? w->scratch : NULL, unit = w->scale.length / w->scale.time;
-  evaluate_worst worst = { .row = -1 };
+  r->velocity = r->jv = 0, r->row_velocity = -1;
   if (eta) pw_evaluate_eta (w, eta);
-  EACH_CONSTRAINT (k, w) {
-    if (k->kind->internal == 0 && k->kind->bodies == 2)
-      worst = evaluate_worst_velocity (k, eta, enforced, unit, worst, 2, 0);
-    else if (k->kind->internal == 0 && k->kind->bodies == 1)
-      worst = evaluate_worst_velocity (k, eta, enforced, unit, worst, 1, 0);
-    else
-      worst = evaluate_worst_velocity_any (k, eta, enforced, unit, worst);
-  }
-  r->velocity = worst.scaled;
-  r->jv = worst.largest;
-  r->row_velocity = worst.row;
+  EACH_CONSTRAINT (k, w) evaluate_worst_velocity (k, eta, enforced, unit, r);
 }
 
 void pw_evaluate_position_residual (pw_workspace *w, const unsigned char *enforced, pw_residuals *r) {

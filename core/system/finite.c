@@ -3,32 +3,25 @@
 #include <stdio.h>
 #include "system.h"
 
-/* The first of `count` elements, of `each` numbers, with one that is not finite; -1: there is none. */
-static int finite_first (const double *x, int count, int each) {
-  for (int i = 0; i < count * each; i++)
-    if (!isfinite (x[i])) return i / each;
-  return -1;
-}
-
 int pw_find_nonfinite (pw_workspace *w, char *buffer, size_t size) {
-  for (pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++) {
-    const char *what = "force";
-    int e = -1, rows = k->kind->rows, n = k->b.count;
-    if (k->kind->force) {
-      k->kind->force (&k->b, k->block);
-      e = finite_first (k->block, n, k->b.cols);
+  for (const pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++) {
+    const int rows = k->kind->rows, cols = k->b.cols;
+    const struct {
+      const char *name;
+      pw_batch_function *function;
+      double *value;
+      int each; /* numbers of an element */
+    } part[] = { { "force", k->kind->force, k->block, cols },
+                 { "J", rows ? k->kind->J : NULL, k->J, rows * cols },
+                 { "gamma", rows ? k->kind->gamma : NULL, w->scratch + k->row, rows } };
+    for (int p = 0; p < 3; p++) {
+      if (part[p].function) part[p].function (&k->b, part[p].value);
+      for (int i = 0; part[p].function && i < k->b.count * part[p].each; i++) {
+        if (isfinite (part[p].value[i])) continue;
+        snprintf (buffer, size, "%s of %s %s", part[p].name, k->kind->name, k->name[i / part[p].each]);
+        return 1;
+      }
     }
-    if (e < 0 && rows > 0) {
-      k->kind->J (&k->b, k->J);
-      what = "J", e = finite_first (k->J, n, rows * k->b.cols);
-    }
-    if (e < 0 && rows > 0 && k->kind->gamma) {
-      k->kind->gamma (&k->b, w->scratch + k->row);
-      what = "gamma", e = finite_first (w->scratch + k->row, n, rows);
-    }
-    if (e < 0) continue;
-    snprintf (buffer, size, "%s of %s %s", what, k->kind->name, k->name[e]);
-    return 1;
   }
   return 0;
 }

@@ -3,7 +3,6 @@
 #include "sine.h"
 #include "system.h"
 #include "signal.h"
-#include "unroll.h"
 
 void pw_point_to_internal (pw_workspace *w, const double *q, const double *v) {
   for (pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++) {
@@ -13,7 +12,7 @@ void pw_point_to_internal (pw_workspace *w, const double *q, const double *v) {
 }
 
 /* Two bodies at a time; singly the last of an odd number, and all from a pair with an angle beyond the limit on. */
-PW_INLINE void kinematics_configurations (pw_workspace *w, const double *q, const double *v) {
+void pw_update_configurations (pw_workspace *w, const double *q, const double *v) {
   if (w->s->coords > 3 * w->s->bodies) pw_point_to_internal (w, q, v);
   pw_configuration *p = w->configuration, *end = p + w->s->bodies;
   _Static_assert(PW_SINE_LANES == 2, "bodies are evaluated in pairs");
@@ -31,10 +30,6 @@ PW_INLINE void kinematics_configurations (pw_workspace *w, const double *q, cons
   }
 }
 
-void pw_update_configurations (pw_workspace *w, const double *q, const double *v) {
-  kinematics_configurations (w, q, v);
-}
-
 /* Copies the states that a function reads; q NULL: only velocities.  Returns the number of states copied. */
 static int kinematics_copy_states (const pw_workspace *w, const pw_source *source, const double *q, const double *v) {
   int copied = 0;
@@ -47,32 +42,24 @@ static int kinematics_copy_states (const pw_workspace *w, const pw_source *sourc
   return copied;
 }
 
-/* Evaluates the state-dependent signals (q NULL: only those that read velocities), or the signals of time alone. */
-PW_INLINE int kinematics_evaluate_signals (pw_workspace *w, int state_dependent, double t, const double *q,
-                                           const double *v) {
+int pw_update_signals (pw_workspace *w, double t, const double *q, const double *v) {
+  int new_time = t != w->t_signal;
+  if (!new_time && w->s->state_dependent == 0) return PW_OK;
+  if (new_time) w->t_signal = NAN; /* if a signal fails, others have changed already */
   for (pw_source *source = w->source, *end = source + w->s->sources; source < end; source++) {
-    if ((source->reads > 0) != state_dependent || (w->hold && source->of_force)) continue;
-    if (state_dependent && kinematics_copy_states (w, source, q, v) == 0) continue;
+    if (w->hold && source->of_force) continue;
+    if (kinematics_copy_states (w, source, q, v) == 0 && !(new_time && source->reads == 0)) continue;
     if (pw_signal_eval (source, t) == 0) continue;
     w->failed = source;
     return PW_METHOD;
   }
+  w->t_signal = t;
   return PW_OK;
 }
 
-/* Signals of time alone are evaluated once per time, even if several stages of a step have the same time. */
-int pw_update_signals (pw_workspace *w, double t, const double *q, const double *v) {
-  if (t != w->t_signal) {
-    w->t_signal = NAN; /* if a signal fails, others have changed already */
-    if (kinematics_evaluate_signals (w, 0, t, q, v) != PW_OK) return PW_METHOD;
-    w->t_signal = t;
-  }
-  return w->s->state_dependent > 0 ? kinematics_evaluate_signals (w, 1, t, q, v) : PW_OK;
-}
-
 int pw_update_kinematics (pw_workspace *w, double t, const double *q, const double *v) {
-  kinematics_configurations (w, q, v);
-  return t == w->t_signal && w->s->state_dependent == 0 ? PW_OK : pw_update_signals (w, t, q, v);
+  pw_update_configurations (w, q, v);
+  return pw_update_signals (w, t, q, v);
 }
 
 int pw_update_velocities (pw_workspace *w, const double *v) {
@@ -80,7 +67,7 @@ int pw_update_velocities (pw_workspace *w, const double *v) {
   for (pw_configuration *p = w->configuration, *end = p + w->s->bodies; p < end; p++, from += 3)
     p->vx = from[0], p->vy = from[1], p->omega = from[2];
   if (w->s->coords > 3 * w->s->bodies) pw_point_to_internal (w, NULL, v);
-  return w->s->state_dependent > 0 ? kinematics_evaluate_signals (w, 1, w->t_signal, NULL, v) : PW_OK;
+  return w->s->state_dependent > 0 ? pw_update_signals (w, w->t_signal, NULL, v) : PW_OK;
 }
 
 void pw_hold_signals (pw_workspace *w, int hold) {
@@ -91,8 +78,7 @@ void pw_hold_signals (pw_workspace *w, int hold) {
 double pw_next_breakpoint (pw_workspace *w, int kinks, double t) {
   double next = INFINITY;
   for (const pw_source *source = w->source, *end = source + w->s->sources; source < end; source++) {
-    double breakpoint =
-        pw_signal_breakpoint (&source->signal, kinks && !source->of_force ? PW_BREAKS_3 : PW_BREAKS_2, t);
+    double breakpoint = pw_signal_breakpoint (&source->signal, kinks && !source->of_force, t);
     if (breakpoint < next) next = breakpoint;
     if (breakpoint > t) continue;
     w->failed = source;

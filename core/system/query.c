@@ -34,7 +34,7 @@ int pw_system_jumps (const pw_system *s, double t) {
   /* the other signals of forces are continuous, and their derivatives are not used */
   for (const pw_source *source = s->source, *end = source + s->sources; source < end; source++)
     if (!source->of_force || pw_signal_value_may_jump (&source->signal))
-      if (pw_signal_breakpoint (&source->signal, PW_BREAKS_2, t - near) <= t + near) return 1;
+      if (pw_signal_breakpoint (&source->signal, 0, t - near) <= t + near) return 1;
   return 0;
 }
 
@@ -103,28 +103,24 @@ static int query_body_state (const pw_system *s, const char *name, pw_nearest *n
 
 typedef char *query_name (const pw_system *s, int i, char *buffer, size_t size);
 
-/* The index of near->sought among the names that name_of gives; fails if it is not there, with a hint: near->best, or
- * else the nearest name.  what: "state", ... */
-static int query_find (const pw_system *s, const char *what, int (*count_of) (const pw_system *s), query_name *name_of,
-                       pw_nearest *near, pw_error *error) {
+/* The index of near->sought among the `count` names that name_of gives; fails if it is not there, with a hint:
+ * near->best, or else the nearest name.  what: "state", ... */
+static int query_find (const pw_system *s, const char *what, int count, query_name *name_of, pw_nearest *near,
+                       pw_error *error) {
   char text[PW_NAME_BYTES];
   if (pw_require (s, "a system", error) != PW_OK) return PW_INPUT;
   if (near->sought == NULL) return pw_fail (error, PW_INPUT, "model %s: the name of a %s is missing", s->model, what);
-  int count = count_of (s), search = *near->best == 0;
+  int search = *near->best == 0;
   for (int i = 0; i < count; i++)
     if (strcmp (name_of (s, i, text, sizeof text), near->sought) == 0) return i;
   for (int i = 0; search && i < count; i++) pw_nearest_try (near, name_of (s, i, text, sizeof text));
   return pw_fail (error, PW_INPUT, "model %s has no %s \"%s\"%s", s->model, what, near->sought, pw_nearest_text (near));
 }
 
-static int query_state_count (const pw_system *s) {
-  return 2 * s->coords;
-}
-
 int pw_system_find_state (const pw_system *s, const char *name, pw_error *error) {
   pw_nearest near = { .sought = name };
   int state = s && name ? query_body_state (s, name, &near) : -1;
-  return state >= 0 ? state : query_find (s, "state", query_state_count, pw_system_state_name, &near, error);
+  return state >= 0 ? state : query_find (s, "state", s ? 2 * s->coords : 0, pw_system_state_name, &near, error);
 }
 
 int pw_system_row_element (const pw_system *s, int row) {
@@ -148,7 +144,7 @@ const char *pw_system_reaction_unit (const pw_system *s, int row) {
 }
 
 int pw_system_find_reaction (const pw_system *s, const char *name, pw_error *error) {
-  return query_find (s, "reaction", pw_system_rows, pw_system_reaction_name, &(pw_nearest){ .sought = name }, error);
+  return query_find (s, "reaction", s ? s->rows : 0, pw_system_reaction_name, &(pw_nearest){ .sought = name }, error);
 }
 
 char *pw_system_row_name (const pw_system *s, int row, char *buffer, size_t size) {
@@ -194,7 +190,7 @@ int pw_system_find_signal (const pw_system *s, const char *name, pw_error *error
     for (int e = 0; k->kind->signals == 1 && !k->kind->each_body && e < k->b.count; e++)
       if (strcmp (k->name[e], name) == 0) return (int)(k->source - s->source) + e;
   }
-  return query_find (s, "signal", pw_system_signals, pw_system_signal_name, &(pw_nearest){ .sought = name }, error);
+  return query_find (s, "signal", s ? s->sources : 0, pw_system_signal_name, &(pw_nearest){ .sought = name }, error);
 }
 
 char *pw_failed_signal (const pw_workspace *w, char *buffer, size_t size) {

@@ -17,10 +17,10 @@ typedef struct {
   const pw_kind *kind;
   int row;           /* global index of its first constraint equation */
   int internal;      /* global index of its first internal coordinate */
-  const int *column; /* count x bodies: first coordinate of each body; s->coords for the ground */
+  int *column;       /* count x bodies: first coordinate of each body; s->coords for the ground */
   const char **name; /* count */
   double *J;         /* count x rows x cols */
-  double *block;     /* count x cols: scratch for forces, energies, powers; count x 2 cols for saturation */
+  double *block;     /* pw_workspace.block: scratch for forces, energies, powers, saturation; all batches share it */
   double *u;         /* count x signals x 3, as b.u */
   pw_source *source; /* count x signals, part of the array of all sources */
 } pw_element_batch;
@@ -42,6 +42,8 @@ struct pw_system {
   int sources;             /* signals */
   int state_dependent;     /* signals that depend on states */
   int reads;               /* number of states that they read, with repetitions */
+  size_t jacobian;         /* entries of J of all elements, zeros included */
+  size_t block;            /* the largest count x cols of a batch, x 2 cols if its force saturates */
   int rheonomic;           /* batches whose eta may be other than 0 */
   pw_scale scale;          /* with T = 1 s; T of a run is in its workspace */
   const char **body_name;  /* bodies */
@@ -59,11 +61,11 @@ struct pw_system {
 struct pw_workspace {
   const pw_system *s;
   pw_element_batch *batch;         /* batches: copies of the system's, with arrays of this workspace */
-  pw_element_batch **force;        /* those with a force that is not constant */
   pw_source *source;               /* sources: copies of the system's, with contexts of this workspace */
   double *u, *J;                   /* those of all batches: sources x 3; entries of J, element by element */
   pw_configuration *configuration; /* bodies + 1; the last is the ground */
   double *scratch;                 /* rows x 3 + coords + 3, for the function in progress */
+  double *block;                   /* results of one function of one batch, until the next one is called */
   pw_scale scale;                  /* the run's */
   int hold;                        /* 1: signals of forces keep their values (pw_hold_signals) */
   double t_signal;                 /* time of the last evaluation of signals; NaN: evaluate them again */
@@ -73,9 +75,15 @@ struct pw_workspace {
 /* Stores the entries of the ledger, at most two for each element.  Returns their number.  Signals must be compiled. */
 int pw_ledger_list (const pw_system *s, pw_entry *entry);
 
+/* What an element of a system is compiled from. */
+typedef struct {
+  const pw_element *element; /* of the model */
+  int body;                  /* the body on which an element that acts on every body acts, or -1 */
+} pw_compiled;
+
 /* Compiles the signals of all elements, which must be stored, because signals may read their internal coordinates.
- * batch_of: the batch of each element of the model.  PW_INPUT, PW_RESOURCE. */
-int pw_compile_signals (pw_system *s, const pw_model *m, const int *batch_of, pw_error *error);
+ * from: for each element of the system.  PW_INPUT, PW_RESOURCE. */
+int pw_compile_signals (pw_system *s, const pw_compiled *from, pw_error *error);
 
 static inline int pw_fail_memory (const pw_system *s, pw_error *error) {
   return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
@@ -119,7 +127,8 @@ void pw_update_configurations (pw_workspace *w, const double *q, const double *v
 /* Updates velocities, and signals that read them, at unchanged time and positions.  Returns as pw_update_kinematics. */
 int pw_update_velocities (pw_workspace *w, const double *v);
 
-/* Evaluates signals of time alone if t has changed, and state-dependent ones.  Returns as pw_update_kinematics. */
+/* Evaluates signals of time alone once per time, even if several stages of a step have the same time, and
+ * state-dependent ones; q NULL: only those that read velocities.  Returns as pw_update_kinematics. */
 int pw_update_signals (pw_workspace *w, double t, const double *q, const double *v);
 /* Points the batches to the internal coordinates in q, v; q NULL: only to their velocities. */
 void pw_point_to_internal (pw_workspace *w, const double *q, const double *v);
@@ -175,8 +184,8 @@ void pw_evaluate_velocity_residual (pw_workspace *w, const unsigned char *enforc
 void pw_worst_position (const pw_system *s, const double *g, const double *size, const unsigned char *enforced,
                         pw_residuals *r);
 
-/* The first time after t at which a step must end because of a signal, or INFINITY: PW_BREAKS_2 of all signals;
- * kinks: 1: PW_BREAKS_3 of those of constraints.  NaN if the breakpoint function of a signal returned no time > t. */
+/* The first time after t at which a step must end because of a signal, or INFINITY; kinks (pw_signal_breakpoint): only
+ * of signals of constraints.  NaN if the breakpoint function of a signal returned no time > t. */
 double pw_next_breakpoint (pw_workspace *w, int kinks, double t);
 
 /* 1 if a force, J or gamma is not finite at the current state; writes "force of spring S" to the buffer. */

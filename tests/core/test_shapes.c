@@ -46,7 +46,7 @@ static void shapes_derivatives (const pw_signal *s) {
   pw_source source = shapes_source (s);
   for (double t = 0.033; t < 5; t += 0.1) {
     double u[3], up[3], down[3];
-    if (pw_signal_breakpoint (s, PW_BREAKS_2, t - 2 * h) < t + 2 * h) continue;
+    if (pw_signal_breakpoint (s, 0, t - 2 * h) < t + 2 * h) continue;
     shapes_at (&source, t, u);
     shapes_at (&source, t + h, up);
     shapes_at (&source, t - h, down);
@@ -62,7 +62,7 @@ static void shapes_breaks (const pw_signal *s, int count, int smooth) {
   pw_source source = shapes_source (s);
   double t = 0, u[3], before[3], after[3];
   for (int i = 0; i < count; i++) {
-    double next = pw_signal_breakpoint (s, PW_BREAKS_2, t);
+    double next = pw_signal_breakpoint (s, 0, t);
     assert_true (next > t && isfinite (next));
     int jumps = 0;
     shapes_at (&source, next, u);
@@ -76,7 +76,7 @@ static void shapes_breaks (const pw_signal *s, int count, int smooth) {
     assert_true (jumps || smooth == 2);
     t = next;
   }
-  if (s->pulse.period == 0 || s->type != PW_PULSE) assert_true (isinf (pw_signal_breakpoint (s, PW_BREAKS_2, t)));
+  if (s->pulse.period == 0 || s->type != PW_PULSE) assert_true (isinf (pw_signal_breakpoint (s, 0, t)));
 }
 
 TEST (forms) {
@@ -129,7 +129,7 @@ TEST (many_pulses) {
   pw_source source = { .signal = s };
   double t = 0, u[3];
   for (int i = 0; i < 20000; i++) {
-    t = pw_signal_breakpoint (&s, PW_BREAKS_2, t);
+    t = pw_signal_breakpoint (&s, 0, t);
     shapes_at (&source, t, u);
     assert_true (u[0] == (i % 2 == 0));
     shapes_at (&source, nextafter (t, 0), u);
@@ -140,14 +140,14 @@ TEST (many_pulses) {
 
 /* ---- Splines ---- */
 
-/* Points between the ends of a cubic table, where its third derivative jumps, are no breakpoints for PW_BREAKS_2. */
+/* Points between the ends of a cubic table, where its third derivative jumps, are breakpoints only with kinks. */
 TEST (knots) {
   for (int i = 0; i < SHAPES_POINTS - 1; i++) {
-    assert_true (pw_signal_breakpoint (&shapes_rest, PW_BREAKS_3, shapes_t[i]) == shapes_t[i + 1]);
-    assert_true (pw_signal_breakpoint (&shapes_rest, PW_BREAKS_2, shapes_t[i]) == shapes_t[SHAPES_POINTS - 1]);
+    assert_true (pw_signal_breakpoint (&shapes_rest, 1, shapes_t[i]) == shapes_t[i + 1]);
+    assert_true (pw_signal_breakpoint (&shapes_rest, 0, shapes_t[i]) == shapes_t[SHAPES_POINTS - 1]);
   }
-  assert_true (pw_signal_breakpoint (&shapes_rest, PW_BREAKS_3, shapes_t[0] - 1) == shapes_t[0]);
-  assert_true (isinf (pw_signal_breakpoint (&shapes_rest, PW_BREAKS_3, shapes_t[SHAPES_POINTS - 1])));
+  assert_true (pw_signal_breakpoint (&shapes_rest, 1, shapes_t[0] - 1) == shapes_t[0]);
+  assert_true (isinf (pw_signal_breakpoint (&shapes_rest, 1, shapes_t[SHAPES_POINTS - 1])));
 }
 
 /* A spline with free ends through points of a cubic polynomial is that polynomial. */
