@@ -66,15 +66,15 @@ void pw_dae_residual (pw_dae *x, const double *v, const double *a, const double 
 
 /* ---- Matrix ---- */
 
-/* The derivatives of the kinematics, by q: q_dot_factor I + D (G^T mu)_q, by v: -I, by mu: mu_factor D G^T.
- * mu: multipliers of all equations, or NULL. */
+/* The derivatives of the kinematics, by q: q_dot_factor I + D (G^T mu)_q, by v: -I, by mu: mu_factor D G^T. */
 static void dae_add_kinematics (pw_dae *x, const double *mu, double q_dot_factor, double mu_factor) {
   pw_tangent *t = &x->tangent;
   for (int j = 0; j < x->n; j++) {
     pw_scatter_add (&t->scatter, j, j, q_dot_factor);
     pw_scatter_add (&t->scatter, j, x->n + j, -1);
   }
-  if (mu == NULL) return;
+  if (x->mu_count == 0) return;
+  mu = pw_tangent_expand (t, mu, x->mu_count, t->lambda);
   pw_placement put = {
     .rows = t->run->s->holonomic, .factor = 1, .row_scale = t->D, .row_index = t->row_index, .lambda = mu
   };
@@ -108,8 +108,8 @@ void pw_dae_matrix (pw_dae *x, const double *v, const double *a, const double *l
                                  .lambda = 2 * n,
                                  .a_factor = v_dot_factor,
                                  .lambda_factor = multiplier_factor };
-  dae_add_kinematics (x, pw_tangent_expand_mu (t, lambda + x->rows, x->mu_count), q_dot_factor, multiplier_factor);
-  pw_tangent_add_momentum (t, &to, pw_tangent_expand_lambda (t, lambda));
+  dae_add_kinematics (x, lambda + x->rows, q_dot_factor, multiplier_factor);
+  pw_tangent_add_momentum (t, &to, pw_tangent_expand (t, lambda, x->rows, t->lambda));
   if (x->enforces_velocities || x->enforces_positions)
     dae_add_constraints (x, v);
   else

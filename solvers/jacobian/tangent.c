@@ -24,7 +24,6 @@ int pw_tangent_open (pw_tangent *x, pw_run *r) {
     x->row_index = pw_layout_alloc (&l, (size_t)s->rows, sizeof *x->row_index);
     x->row = pw_layout_alloc (&l, (size_t)s->rows, sizeof *x->row);
     x->lambda = pw_layout_alloc (&l, (size_t)s->rows, sizeof *x->lambda);
-    x->mu = pw_layout_alloc (&l, (size_t)s->rows, sizeof *x->mu);
     x->D = pw_layout_alloc (&l, (size_t)s->coords, sizeof *x->D);
   }
   if (x->memory == NULL) return PW_RESOURCE;
@@ -39,30 +38,15 @@ void pw_tangent_close (pw_tangent *x) {
   free (x->memory);
 }
 
-/* Values of all equations from those of the first `count` active ones: `active` itself if these are all, else `all`,
- * whose other entries stay 0. */
-static const double *tangent_expand_into (const pw_tangent *x, const double *active, int count, double *all) {
-  if (count == x->run->s->rows) return active;
+const double *pw_tangent_expand (const pw_tangent *x, const double *active, int count, double *all) {
+  memset (all, 0, (size_t)x->run->s->rows * sizeof *all);
   for (int i = 0; i < count; i++) all[x->row[i]] = active[i];
   return all;
 }
 
-const double *pw_tangent_expand_lambda (const pw_tangent *x, const double *active) {
-  return tangent_expand_into (x, active, x->rows, x->lambda);
-}
-
-const double *pw_tangent_expand_mu (const pw_tangent *x, const double *active, int count) {
-  return count > 0 ? tangent_expand_into (x, active, count, x->mu) : NULL;
-}
-
-void pw_tangent_expand (const pw_tangent *x, const double *active, double *all) {
-  memcpy (all, pw_tangent_expand_lambda (x, active), (size_t)x->run->s->rows * sizeof *all);
-}
-
 void pw_tangent_multiply_JT (const pw_tangent *x, const double *active, int count, double *out) {
   memset (out, 0, ((size_t)x->run->s->coords + 3) * sizeof *out);
-  if (count > 0)
-    pw_add_JT (x->run->w, tangent_expand_into (x, active, count, count == x->rows ? x->lambda : x->mu), out);
+  if (count > 0) pw_add_JT (x->run->w, pw_tangent_expand (x, active, count, x->lambda), out);
 }
 
 void pw_tangent_compress (const pw_tangent *x, const double *all, int count, double *active) {

@@ -17,7 +17,7 @@ typedef struct {
   int rows, holonomic; /* active equations; holonomic ones */
   int *row_index;      /* all equations: index among the active ones, or -1 */
   int *row;            /* rows: index among all equations */
-  double *lambda, *mu; /* all equations: multipliers last expanded, 0 for those that are not active */
+  double *lambda;      /* all equations: scratch for pw_tangent_expand */
   double *D;           /* coords: 1 for lengths, 1/L^2 for angles (dae.h) */
   pw_newton_scratch newton;
   pw_scatter_map scatter;
@@ -29,13 +29,9 @@ void pw_tangent_close (pw_tangent *x);
 
 /* ---- From values of the active equations to those of all, and back ---- */
 
-/* Multipliers of all equations, valid until the next call (or pw_tangent_multiply_JT) and while `active` is: lambda;
- * mu, of which `active` has `count`, or NULL if that is 0. */
-const double *pw_tangent_expand_lambda (const pw_tangent *x, const double *active);
-const double *pw_tangent_expand_mu (const pw_tangent *x, const double *active, int count);
-/* The same lambda in an array of all equations. */
-void pw_tangent_expand (const pw_tangent *x, const double *active, double *all);
-/* out (coords + 3) = J^T times the multipliers of the first `count` active equations, with the J last evaluated. */
+/* Fills `all`, which is returned: multipliers of the first `count` active equations, 0 for the others. */
+const double *pw_tangent_expand (const pw_tangent *x, const double *active, int count, double *all);
+/* out (coords + 3) = J^T times the same multipliers, with the J last evaluated.  Overwrites x->lambda. */
 void pw_tangent_multiply_JT (const pw_tangent *x, const double *active, int count, double *out);
 /* Values of the first `count` active equations from those of all. */
 void pw_tangent_compress (const pw_tangent *x, const double *all, int count, double *active);
