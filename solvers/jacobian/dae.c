@@ -78,10 +78,10 @@ static void dae_add_kinematics (pw_dae *x, const double *mu, double q_dot_factor
   pw_placement put = {
     .rows = t->run->s->holonomic, .factor = 1, .row_scale = t->D, .row_index = t->row_index, .lambda = mu
   };
-  pw_newton_add_block (&t->newton, t->run->w, &t->scatter, PW_JTL_Q, &put);
+  pw_tangent_add_block (t, PW_JTL_Q, &put);
   put.col = 2 * x->n + x->rows;
   put.factor = mu_factor;
-  pw_newton_add_JT (t->run->w, &t->scatter, &put);
+  pw_tangent_add_JT (t, &put);
 }
 
 /* The derivatives of J v - eta, where it is enforced, by q: (J v)_q - eta_q, by v: J; and of g, by q: G. */

@@ -42,15 +42,15 @@ static void linear_put (pw_linearisation *x, const double *v) {
                { PW_GAMMA_Q, n, 0, 1, NULL }, { PW_GAMMA_V, n, n, 1, NULL },  { PW_JW_Q, n, 0, -1, x->a },
                { PW_JW_Q, of_J, 0, 1, v },    { PW_ETA_Q, of_J, 0, -1, NULL } };
   for (size_t i = 0; i < sizeof part / sizeof *part; i++)
-    pw_newton_add_block (&x->tangent.newton, x->r->w, &x->tangent.scatter, part[i].block,
-                         &(pw_placement){ .row = part[i].row,
-                                          .col = part[i].col,
-                                          .rows = x->m,
-                                          .factor = part[i].factor,
-                                          .factor_nonholonomic = part[i].factor,
-                                          .direction = part[i].w,
-                                          .lambda = x->lambda });
-  pw_newton_add_signals (&x->tangent.newton, x->r->w, &x->tangent.scatter, 0, 0, n);
+    pw_tangent_add_block (&x->tangent, part[i].block,
+                          &(pw_placement){ .row = part[i].row,
+                                           .col = part[i].col,
+                                           .rows = x->m,
+                                           .factor = part[i].factor,
+                                           .factor_nonholonomic = part[i].factor,
+                                           .direction = part[i].w,
+                                           .lambda = x->lambda });
+  pw_tangent_add_signals (&x->tangent, 0, 0, n);
 }
 
 int pw_linear_derivatives (pw_linearisation *x) {
