@@ -31,18 +31,6 @@ static int elimination_degree (const pw_elimination *ldl, int p) {
   return degree;
 }
 
-/* Writes a comment with the names of unknown p and its partner, which may be -1. */
-static void elimination_comment (const pw_elimination *ldl, pw_emitter *emitter, int p, int partner) {
-  char name[PW_NAME_BYTES];
-  for (int k = 0, i = p; k < 1 + (partner >= 0); k++, i = partner) {
-    fputs (k ? " by " : "  /* ", emitter->code);
-    pw_emit_name (emitter->code, i < ldl->coordinates
-                                     ? pw_system_state_name (ldl->s, ldl->coordinates + i, name, sizeof name)
-                                     : pw_system_reaction_name (ldl->s, i - ldl->coordinates, name, sizeof name));
-  }
-  fputs (" */\n", emitter->code);
-}
-
 /* Gives p, and its partner unless it is -1, the next position in the order. */
 static void elimination_place (pw_elimination *ldl, int p, int partner) {
   ldl->partner[ldl->pivots] = partner;
@@ -93,7 +81,7 @@ static void elimination_update (pw_elimination *ldl, pw_emitter *emitter, int i,
 
 /* Eliminates unknown p with a 1 x 1 pivot, whose reciprocal is `inverse`. */
 static void elimination_pivot (pw_elimination *ldl, pw_emitter *emitter, int p, pw_term inverse) {
-  elimination_comment (ldl, emitter, p, -1);
+  fprintf (emitter->code, "  /* unknown %d */\n", p);
   elimination_place (ldl, p, -1);
   ldl->inverse[p] = inverse;
   for (int i = 0; i < ldl->n; i++)
@@ -106,7 +94,7 @@ static void elimination_pivot (pw_elimination *ldl, pw_emitter *emitter, int p, 
 /* Eliminates a massless coordinate c and an equation r with the pivot [ 0 d ; d 0 ].  FACTOR (k, c) = K_kc / d is the
  * entry of L in column r. */
 static void elimination_pair (pw_elimination *ldl, pw_emitter *emitter, int c, int r) {
-  elimination_comment (ldl, emitter, c, r);
+  fprintf (emitter->code, "  /* unknowns %d and %d */\n", c, r);
   elimination_place (ldl, c, r);
   ldl->inverse[c] = pw_emit_quotient (emitter, elimination_one, AT (r, c));
   for (int k = 0; k < ldl->n; k++) {
@@ -222,7 +210,7 @@ static int elimination_allocate (pw_elimination *ldl, const pw_term *K) {
 
 int pw_elimination_open (pw_elimination *ldl, const pw_system *s, const pw_term *K, const unsigned char *takes_part,
                          pw_emitter *emitter) {
-  *ldl = (pw_elimination){ .s = s, .original = K, .coordinates = s->coords, .n = s->coords + s->rows };
+  *ldl = (pw_elimination){ .original = K, .coordinates = s->coords, .n = s->coords + s->rows };
   if (elimination_allocate (ldl, K) != PW_OK) return PW_RESOURCE;
   for (int i = 0; i < ldl->n; i++) ldl->step[i] = i < s->coords || takes_part[i - s->coords] ? ldl->n : ldl->n + 1;
   for (int c, r; elimination_next_pair (ldl, s->mass, &c, &r);) {

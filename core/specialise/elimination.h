@@ -8,7 +8,6 @@
 #include "system.h"
 
 typedef struct {
-  const pw_system *s;
   int coordinates, n;      /* unknowns: the coordinates, then the constraint equations */
   pw_term *K, *L;          /* n x n: K, column p as it was when unknown p was eliminated; L of K = L D L^T */
   pw_term *inverse;        /* n: reciprocal pivots */

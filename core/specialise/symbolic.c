@@ -1,5 +1,4 @@
 /* Terms of generated code; see symbolic.h. */
-#include <ctype.h>
 #include <string.h>
 #include "symbolic.h"
 
@@ -74,8 +73,4 @@ pw_term pw_emit_quotient (pw_emitter *emitter, pw_term a, pw_term b) {
   if (b.type == PW_TERM_ONE) return b.sign < 0 ? pw_term_negative (a) : a;
   return emit_define (emitter, emit_is_constant (a) && emit_is_constant (b), a.sign * b.sign, a.value / b.value, a.name,
                       '/', b.name);
-}
-
-void pw_emit_name (FILE *out, const char *name) {
-  for (; *name; name++) fputc (isalnum ((unsigned char)*name) || strchr (" _-.[]()", *name) ? *name : '?', out);
 }

@@ -36,9 +36,6 @@ pw_term pw_emit_product (pw_emitter *emitter, pw_term a, pw_term b);            
 pw_term pw_emit_difference (pw_emitter *emitter, pw_term a, pw_term b, pw_term c); /* a - b c */
 pw_term pw_emit_quotient (pw_emitter *emitter, pw_term a, pw_term b);              /* a / b */
 
-/* Writes a name as part of a comment: all but ASCII letters and digits, spaces and _-.[]() become ?. */
-void pw_emit_name (FILE *out, const char *name);
-
 /* "-x3": the term with its sign, in the buffer unless it is 0. */
 const char *pw_term_text (pw_term a, char buffer[24]);
 
