@@ -129,8 +129,7 @@ static void specialise_product (const pw_generator *gen) {
 int pw_specialise_algebra (pw_generator *gen) {
   const pw_system *s = gen->s;
   pw_elimination all = { 0 }, position = { 0 };
-  gen->emitter =
-      (pw_emitter){ .prepare = pw_stream_open (&gen->prepare), .prepared = &gen->prepare.text, .code = gen->out };
+  gen->emitter = (pw_emitter){ .prepare = pw_stream_open (&gen->prepare), .code = gen->out };
   specialise_product (gen);
   pw_term *K = specialise_matrix (gen);
   int status = K && gen->emitter.prepare ? specialise_factor (gen, &all, K, "factor", s->rows) : PW_RESOURCE;

@@ -17,7 +17,6 @@ typedef struct {
 /* Where statements go. */
 typedef struct {
   FILE *prepare, *code;     /* those that compute constants; the others, of the function being written */
-  char *const *prepared;    /* the text of `prepare`, up to date after fflush */
   int constants, variables; /* how many C[0], C[1], ... and x0, x1, ... there are so far */
 } pw_emitter;
 
