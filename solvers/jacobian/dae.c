@@ -26,28 +26,17 @@ void pw_dae_close (pw_dae *x) {
 
 /* ---- Residual ---- */
 
-/* x->residual, which is J v - eta, becomes J a - gamma + 2 alpha (J v - eta) + beta^2 g; of nonholonomic equations
- * J a - gamma + alpha (J v - eta). */
-static void dae_stabilise (pw_dae *x, const double *a) {
-  const pw_run *r = x->tangent.run;
-  const pw_system *s = r->s;
-  for (int i = 0; i < s->rows; i++) x->residual[i] *= (i < s->holonomic ? 2 : 1) * r->alpha;
-  pw_mul_J (r->w, a, x->scratch);
-  for (int i = 0; i < s->rows; i++) x->residual[i] += x->scratch[i];
-  pw_evaluate_gamma (r->w, x->scratch);
-  for (int i = 0; i < s->rows; i++) x->residual[i] -= x->scratch[i];
-  if (r->beta == 0) return;
-  pw_evaluate_g (r->w, x->scratch);
-  for (int i = 0; i < s->holonomic; i++) x->residual[i] += r->beta * r->beta * x->scratch[i];
-}
-
 /* The residuals of the constraint equations that lambda enforces, then of g = 0 if mu enforces it. */
 static void dae_constraints (pw_dae *x, const double *v, const double *a, double *F) {
-  pw_workspace *w = x->tangent.run->w;
-  pw_mul_J (w, v, x->residual);
-  pw_evaluate_eta (w, x->scratch);
-  for (int i = 0; i < x->tangent.run->s->rows; i++) x->residual[i] -= x->scratch[i];
-  if (!x->enforces_velocities && !x->enforces_positions) dae_stabilise (x, a);
+  pw_run *r = x->tangent.run;
+  pw_workspace *w = r->w;
+  const int accelerations = !x->enforces_velocities && !x->enforces_positions;
+  pw_mul_J (w, accelerations ? a : v, x->residual);
+  if (accelerations)
+    pw_run_gamma (r, v, x->scratch);
+  else
+    pw_evaluate_eta (w, x->scratch);
+  for (int i = 0; i < r->s->rows; i++) x->residual[i] -= x->scratch[i];
   if (x->enforces_positions) pw_evaluate_g (w, x->enforces_velocities ? x->scratch : x->residual);
   pw_tangent_compress (&x->tangent, x->residual, x->rows, F);
   pw_tangent_compress (&x->tangent, x->scratch, x->mu_count, F + x->rows);
