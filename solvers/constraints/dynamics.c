@@ -22,7 +22,7 @@ void pw_run_gamma (pw_run *r, const double *v, double *gamma) {
   for (int i = 0; i < s->holonomic; i++) gamma[i] -= r->beta * r->beta * g[i];
 }
 
-/* Computes gamma by pw_run_gamma and returns the forces at the current configuration: those computed into f, or the system's array of
+/* Computes gamma and returns the forces at the current configuration: those computed into f, or the system's array of
  * constant forces if there are no others. */
 static inline const double *dynamics_right_side (pw_run *r, const double *v, double *f, double *gamma) {
   pw_run_gamma (r, v, gamma);
