@@ -309,6 +309,10 @@ static inline double pw_before_breakpoint (const pw_run *r, double t) {
   return t < r->breakpoint ? t : nextafter (r->breakpoint, -INFINITY);
 }
 
+/* gamma, less Baumgarte's terms if selected (dynamics.c), at the state for which kinematics are up to date and J is
+ * evaluated. */
+void pw_run_gamma (pw_run *r, const double *v, double *gamma);
+
 /* As pw_run_accelerate, at the state for which kinematics are up to date, J is evaluated and the saddle factorised. */
 void pw_run_accelerate_updated (pw_run *r, const double *v, double *a, double *lambda);
 

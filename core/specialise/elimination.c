@@ -31,18 +31,6 @@ static int elimination_degree (const pw_elimination *ldl, int p) {
   return degree;
 }
 
-/* Writes a comment with the names of unknown p and its partner, which may be -1. */
-static void elimination_comment (const pw_elimination *ldl, pw_emitter *emitter, int p, int partner) {
-  char name[PW_NAME_BYTES];
-  for (int k = 0, i = p; k < 1 + (partner >= 0); k++, i = partner) {
-    fputs (k ? " by " : "  /* ", emitter->code);
-    pw_emit_name (emitter->code, i < ldl->coordinates
-                                     ? pw_system_state_name (ldl->s, ldl->coordinates + i, name, sizeof name)
-                                     : pw_system_reaction_name (ldl->s, i - ldl->coordinates, name, sizeof name));
-  }
-  fputs (" */\n", emitter->code);
-}
-
 /* Gives p, and its partner unless it is -1, the next position in the order. */
 static void elimination_place (pw_elimination *ldl, int p, int partner) {
   ldl->partner[ldl->pivots] = partner;
@@ -91,40 +79,22 @@ static void elimination_update (pw_elimination *ldl, pw_emitter *emitter, int i,
   AT (j, i) = AT (i, j);
 }
 
-/* Subtracts the terms of both velocities vx, vy of a body, which have the same mass, from the diagonal entry of
- * equation i, if their entries there are the components of a vector of constant length.  Call it for p = vx, then for
- * p = vy.  Returns 1 if this equation is done, 0 if its entry for p is still to be subtracted. */
-static int elimination_constant_length (pw_elimination *ldl, pw_emitter *emitter, int i, int p) {
-  if (i < ldl->coordinates || p >= 3 * ldl->s->bodies || p % 3 == 2) return 0;
-  const int vx = p - p % 3;
-  pw_term a = ORIGINAL (i, vx), b = ORIGINAL (i, vx + 1);
-  if (!ldl->length[(size_t)(i - ldl->coordinates) * (size_t)ldl->s->bodies + (size_t)(p / 3)]) return 0;
-  if (a.type != PW_TERM_VARIABLE || b.type != PW_TERM_VARIABLE) return 0;
-  if (strcmp (a.name, AT (i, vx).name) != 0 || strcmp (b.name, AT (i, vx + 1).name) != 0) return 0;
-  if (p > vx) return 1;
-  a.type = b.type = PW_TERM_CONSTANT;
-  pw_term square = pw_emit_difference (emitter, pw_emit_product (emitter, a, a), pw_term_negative (b), b);
-  AT (i, i) = pw_emit_difference (emitter, AT (i, i), square, ldl->inverse[p]);
-  return 1;
-}
-
 /* Eliminates unknown p with a 1 x 1 pivot, whose reciprocal is `inverse`. */
 static void elimination_pivot (pw_elimination *ldl, pw_emitter *emitter, int p, pw_term inverse) {
-  elimination_comment (ldl, emitter, p, -1);
+  fprintf (emitter->code, "  /* unknown %d */\n", p);
   elimination_place (ldl, p, -1);
   ldl->inverse[p] = inverse;
   for (int i = 0; i < ldl->n; i++)
     if (elimination_couples (ldl, i, p)) FACTOR (i, p) = pw_emit_product (emitter, AT (i, p), ldl->inverse[p]);
   for (int i = 0; i < ldl->n; i++)
     for (int j = 0; j <= i && elimination_couples (ldl, i, p); j++)
-      if (elimination_couples (ldl, j, p) && !(i == j && elimination_constant_length (ldl, emitter, i, p)))
-        elimination_update (ldl, emitter, i, j, FACTOR (i, p), AT (j, p));
+      if (elimination_couples (ldl, j, p)) elimination_update (ldl, emitter, i, j, FACTOR (i, p), AT (j, p));
 }
 
 /* Eliminates a massless coordinate c and an equation r with the pivot [ 0 d ; d 0 ].  FACTOR (k, c) = K_kc / d is the
  * entry of L in column r. */
 static void elimination_pair (pw_elimination *ldl, pw_emitter *emitter, int c, int r) {
-  elimination_comment (ldl, emitter, c, r);
+  fprintf (emitter->code, "  /* unknowns %d and %d */\n", c, r);
   elimination_place (ldl, c, r);
   ldl->inverse[c] = pw_emit_quotient (emitter, elimination_one, AT (r, c));
   for (int k = 0; k < ldl->n; k++) {
@@ -238,10 +208,9 @@ static int elimination_allocate (pw_elimination *ldl, const pw_term *K) {
   return PW_OK;
 }
 
-int pw_elimination_open (pw_elimination *ldl, const pw_system *s, const pw_term *K, const unsigned char *length,
-                         const unsigned char *takes_part, pw_emitter *emitter) {
-  *ldl =
-      (pw_elimination){ .s = s, .original = K, .length = length, .coordinates = s->coords, .n = s->coords + s->rows };
+int pw_elimination_open (pw_elimination *ldl, const pw_system *s, const pw_term *K, const unsigned char *takes_part,
+                         pw_emitter *emitter) {
+  *ldl = (pw_elimination){ .original = K, .coordinates = s->coords, .n = s->coords + s->rows };
   if (elimination_allocate (ldl, K) != PW_OK) return PW_RESOURCE;
   for (int i = 0; i < ldl->n; i++) ldl->step[i] = i < s->coords || takes_part[i - s->coords] ? ldl->n : ldl->n + 1;
   for (int c, r; elimination_next_pair (ldl, s->mass, &c, &r);) {

@@ -1,11 +1,9 @@
 /* Sparsity of element types; see sparsity.h.  Elements on the ground, with more constant entries, do not count. */
-#include <math.h>
 #include <string.h>
 #include "random_scene.h"
 #include "sparsity.h"
 
 enum { SPARSITY_SCENES = 12, SPARSITY_STATES = 4 };
-#define SPARSITY_ROUND_OFF 1e-12 /* of entries of J */
 
 /* The type of an entry with this value that has not changed. */
 static unsigned char sparsity_of_value (double value) {
@@ -30,11 +28,6 @@ static void sparsity_state (const pw_element_batch *k, int e, int is_first, int 
     if (!known) out->J[i] = sparsity_of_value (value);
     if (value != first[i]) out->J[i] = PW_ENTRY_VARIABLE;
     if (out->J[i] < PW_ENTRY_CONSTANT && out->J[i] != sparsity_of_value (value)) out->J[i] = PW_ENTRY_CONSTANT;
-  }
-  for (int i = 0; i < k->kind->rows * k->kind->bodies; i++) {
-    int at = i / k->kind->bodies * k->b.cols + i % k->kind->bodies * 3;
-    const double *J = k->J + e * n + at;
-    if (fabs (hypot (J[0], J[1]) - hypot (first[at], first[at + 1])) > SPARSITY_ROUND_OFF) out->length[i] = 0;
   }
   for (int c = 0; k->kind->force && c < k->b.cols; c++)
     if (k->block[e * k->b.cols + c] != 0) out->force[c] = PW_ENTRY_VARIABLE;
@@ -67,17 +60,13 @@ int pw_sparsity_find (const pw_kind *kind, pw_sparsity *out) {
   pw_random random = { .state = 7 };
   int known = 0, status = PW_OK;
   memset (out, 0, sizeof *out);
-  memset (out->length, 1, sizeof out->length);
   for (int n = 0; pw_kind_is_built_in (kind) && n < SPARSITY_SCENES && status == PW_OK; n++) {
     pw_error why = { 0 };
     pw_system *s = pw_random_scene (kind, &random, &why);
     status = s ? sparsity_scene (s, &random, &known, out) : why.status == PW_RESOURCE ? PW_RESOURCE : PW_OK;
     pw_system_free (s);
   }
-  if (!known) {
-    memset (out, PW_ENTRY_VARIABLE, offsetof (pw_sparsity, length));
-    memset (out->length, 0, sizeof out->length);
-  }
+  if (!known) memset (out, PW_ENTRY_VARIABLE, sizeof *out);
   if (kind->force && memchr (out->force, PW_ENTRY_VARIABLE, sizeof out->force) == NULL)
     memset (out->force, PW_ENTRY_VARIABLE, sizeof out->force);
   return status;

@@ -10,8 +10,6 @@ typedef enum { PW_ENTRY_ZERO, PW_ENTRY_ONE, PW_ENTRY_MINUS_ONE, PW_ENTRY_CONSTAN
 typedef struct {
   unsigned char J[PW_MAX_ROWS * PW_MAX_COLS]; /* rows x cols: pw_entry_type */
   unsigned char force[PW_MAX_COLS];           /* cols: PW_ENTRY_ZERO or PW_ENTRY_VARIABLE */
-  /* rows x bodies: 1 if the vector of the entries of J for the body's vx and vy keeps its length during a motion */
-  unsigned char length[PW_MAX_ROWS * PW_MAX_COLS / 3];
 } pw_sparsity;
 
 /* All entries of a plug-in's type count as variable: the force of a wall, for example, is 0 at most states.  So do

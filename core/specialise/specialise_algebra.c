@@ -40,18 +40,6 @@ static pw_term *specialise_matrix (const pw_generator *gen) {
   return K;
 }
 
-/* The argument `length` of pw_elimination_open; malloced. */
-static unsigned char *specialise_lengths (const pw_generator *gen) {
-  unsigned char *length = calloc ((size_t)(gen->s->rows * gen->s->bodies) + 1, 1);
-  if (length == NULL) return NULL;
-  EACH_EQUATION (k, e, r, row)
-  for (int bodies = gen->s->batch[k].kind->bodies, n = 0; n < bodies; n++) {
-    int body = gen->s->batch[k].b.body[e * bodies + n];
-    if (body < gen->s->bodies) length[row * gen->s->bodies + body] = gen->sparsity[k].length[r * bodies + n];
-  }
-  return length;
-}
-
 typedef enum { SPECIALISE_ACCELERATION, SPECIALISE_VELOCITY, SPECIALISE_POSITION } specialise_unknown;
 
 /* Writes the function `solve`, which computes accelerations and multipliers from forces f and right-hand sides g, or
@@ -87,13 +75,12 @@ static int specialise_solve (pw_generator *gen, const pw_elimination *ldl, speci
 }
 
 /* Writes a function that factorises K with the independent equations among the first `rows`; ldl: for its solution. */
-static int specialise_factor (pw_generator *gen, pw_elimination *ldl, const pw_term *K, const unsigned char *length,
-                              const char *name, int rows) {
+static int specialise_factor (pw_generator *gen, pw_elimination *ldl, const pw_term *K, const char *name, int rows) {
   unsigned char takes_part[SPECIALISE_ROWS + 1];
   for (int i = 0; i < gen->s->rows; i++) takes_part[i] = i < rows && pw_specialise_is_independent (gen, i);
   pw_stream text;
   FILE *out = gen->emitter.code = pw_stream_open (&text);
-  int status = out ? pw_elimination_open (ldl, gen->s, K, length, takes_part, &gen->emitter) : PW_RESOURCE;
+  int status = out ? pw_elimination_open (ldl, gen->s, K, takes_part, &gen->emitter) : PW_RESOURCE;
   if (pw_stream_close (out, &text) != PW_OK) status = PW_RESOURCE;
   gen->emitter.code = gen->out;
   if (status == PW_OK)
@@ -142,17 +129,14 @@ static void specialise_product (const pw_generator *gen) {
 int pw_specialise_algebra (pw_generator *gen) {
   const pw_system *s = gen->s;
   pw_elimination all = { 0 }, position = { 0 };
-  gen->emitter =
-      (pw_emitter){ .prepare = pw_stream_open (&gen->prepare), .prepared = &gen->prepare.text, .code = gen->out };
+  gen->emitter = (pw_emitter){ .prepare = pw_stream_open (&gen->prepare), .code = gen->out };
   specialise_product (gen);
   pw_term *K = specialise_matrix (gen);
-  unsigned char *length = specialise_lengths (gen);
-  int status =
-      K && length && gen->emitter.prepare ? specialise_factor (gen, &all, K, length, "factor", s->rows) : PW_RESOURCE;
+  int status = K && gen->emitter.prepare ? specialise_factor (gen, &all, K, "factor", s->rows) : PW_RESOURCE;
   if (status == PW_OK) status = specialise_solve (gen, &all, SPECIALISE_ACCELERATION);
   if (status == PW_OK) status = specialise_solve (gen, &all, SPECIALISE_VELOCITY);
   int alone = PW_OK; /* PW_RETRY if the holonomic equations alone do not determine the massless coordinates */
-  if (status == PW_OK) alone = specialise_factor (gen, &position, K, length, "factor_position", s->holonomic);
+  if (status == PW_OK) alone = specialise_factor (gen, &position, K, "factor_position", s->holonomic);
   if (alone == PW_RESOURCE) status = PW_RESOURCE;
   if (status == PW_OK) status = specialise_solve (gen, alone == PW_OK ? &position : &all, SPECIALISE_POSITION);
   fprintf (gen->out, "\nenum { FACTORS = %d };\n",
@@ -162,6 +146,5 @@ int pw_specialise_algebra (pw_generator *gen) {
   pw_elimination_close (&all);
   pw_elimination_close (&position);
   free (K);
-  free (length);
   return status;
 }

@@ -21,11 +21,7 @@ void pw_specialise_list (FILE *out, const char *name, int n) {
 /* Opens a block with a batch `b` of element e alone; `more` ends the initialiser of b. */
 static void specialise_batch (const pw_generator *gen, int k, int e, const char *more) {
   const pw_element_batch *batch = &gen->s->batch[k];
-  fputs ("  { /* ", gen->out);
-  pw_emit_name (gen->out, batch->kind->name);
-  fputc (' ', gen->out);
-  pw_emit_name (gen->out, batch->name[e]);
-  fputs (" */\n    static const int body[] = { ", gen->out);
+  fprintf (gen->out, "  { /* %s */\n    static const int body[] = { ", batch->name[e]);
   for (int n = 0; n < batch->kind->bodies; n++)
     fprintf (gen->out, "%s%d", n ? ", " : "", batch->b.body[e * batch->kind->bodies + n]);
   fprintf (gen->out, "%s };\n    const pw_batch b = { .count = 1, .cols = %d, .body = body, .configuration = c,\n",

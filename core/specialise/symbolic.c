@@ -1,6 +1,4 @@
 /* Terms of generated code; see symbolic.h. */
-#include <ctype.h>
-#include <string.h>
 #include "symbolic.h"
 
 pw_term pw_term_named (pw_term_type type, const char *array, int i, double value) {
@@ -15,31 +13,16 @@ const char *pw_term_text (pw_term a, char buffer[24]) {
   return buffer;
 }
 
-/* The number of the constant that is defined by " = a op b;\n" already, or -1. */
-static int emit_find (const pw_emitter *emitter, const char *text) {
-  int i = -1;
-  fflush (emitter->prepare);
-  const char *at = strstr (*emitter->prepared, text);
-  while (at && at > *emitter->prepared && at[-1] != '[') at--;
-  if (at) sscanf (at, "%d", &i);
-  return i;
-}
-
-/* The term sign (a op b): a new variable or constant, or a constant that exists already. */
+/* The term sign (a op b): a new variable or constant. */
 static pw_term emit_define (pw_emitter *emitter, int constant, int sign, double value, const char *a, char op,
                             const char *b) {
-  pw_term out = { PW_TERM_VARIABLE, sign, "", value };
-  char text[80];
-  snprintf (text, sizeof text, " = %s %c %s;\n", a, op, b);
-  if (!constant) {
+  pw_term out = { constant ? PW_TERM_CONSTANT : PW_TERM_VARIABLE, sign, "", value };
+  if (constant)
+    snprintf (out.name, sizeof out.name, "C[%d]", emitter->constants++);
+  else
     snprintf (out.name, sizeof out.name, "x%d", emitter->variables++);
-    fprintf (emitter->code, "  const double %s%s", out.name, text);
-    return out;
-  }
-  int known = emit_find (emitter, text);
-  out = pw_term_named (PW_TERM_CONSTANT, "C", known < 0 ? emitter->constants++ : known, value);
-  out.sign = sign;
-  if (known < 0) fprintf (emitter->prepare, "  %s%s", out.name, text);
+  fprintf (constant ? emitter->prepare : emitter->code, "  %s%s = %s %c %s;\n", constant ? "" : "const double ",
+           out.name, a, op, b);
   return out;
 }
 
@@ -74,8 +57,4 @@ pw_term pw_emit_quotient (pw_emitter *emitter, pw_term a, pw_term b) {
   if (b.type == PW_TERM_ONE) return b.sign < 0 ? pw_term_negative (a) : a;
   return emit_define (emitter, emit_is_constant (a) && emit_is_constant (b), a.sign * b.sign, a.value / b.value, a.name,
                       '/', b.name);
-}
-
-void pw_emit_name (FILE *out, const char *name) {
-  for (; *name; name++) fputc (isalnum ((unsigned char)*name) || strchr (" _-.[]()", *name) ? *name : '?', out);
 }

@@ -17,7 +17,6 @@ typedef struct {
 /* Where statements go. */
 typedef struct {
   FILE *prepare, *code;     /* those that compute constants; the others, of the function being written */
-  char *const *prepared;    /* the text of `prepare`, up to date after fflush */
   int constants, variables; /* how many C[0], C[1], ... and x0, x1, ... there are so far */
 } pw_emitter;
 
@@ -35,9 +34,6 @@ pw_term pw_term_named (pw_term_type type, const char *array, int i, double value
 pw_term pw_emit_product (pw_emitter *emitter, pw_term a, pw_term b);               /* a b */
 pw_term pw_emit_difference (pw_emitter *emitter, pw_term a, pw_term b, pw_term c); /* a - b c */
 pw_term pw_emit_quotient (pw_emitter *emitter, pw_term a, pw_term b);              /* a / b */
-
-/* Writes a name as part of a comment: all but ASCII letters and digits, spaces and _-.[]() become ?. */
-void pw_emit_name (FILE *out, const char *name);
 
 /* "-x3": the term with its sign, in the buffer unless it is 0. */
 const char *pw_term_text (pw_term a, char buffer[24]);

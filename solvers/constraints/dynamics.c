@@ -9,10 +9,12 @@
 #include <string.h>
 #include "method.h"
 
-/* Subtracts Baumgarte's terms from gamma.  The first coords + 3 + rows numbers of r->scratch stay free for callers. */
-static void dynamics_stabilise (pw_run *r, const double *v, double *gamma) {
+/* The first coords + 3 + rows numbers of r->scratch stay free for callers. */
+void pw_run_gamma (pw_run *r, const double *v, double *gamma) {
   const pw_system *s = r->s;
   double *Jv = r->scratch + s->coords + 3 + s->rows, *eta = Jv + s->rows, *g = eta;
+  pw_evaluate_gamma (r->w, gamma);
+  if (r->alpha + r->beta == 0) return;
   pw_mul_J (r->w, v, Jv);
   pw_evaluate_eta (r->w, eta);
   for (int i = 0; i < s->rows; i++) gamma[i] -= (i < s->holonomic ? 2 : 1) * r->alpha * (Jv[i] - eta[i]);
@@ -23,8 +25,7 @@ static void dynamics_stabilise (pw_run *r, const double *v, double *gamma) {
 /* Computes gamma and returns the forces at the current configuration: those computed into f, or the system's array of
  * constant forces if there are no others. */
 static inline const double *dynamics_right_side (pw_run *r, const double *v, double *f, double *gamma) {
-  pw_evaluate_gamma (r->w, gamma);
-  if (r->alpha + r->beta > 0) dynamics_stabilise (r, v, gamma);
+  pw_run_gamma (r, v, gamma);
   if (r->s->forces == 0) return r->s->constant;
   pw_evaluate_force (r->w, f);
   return f;

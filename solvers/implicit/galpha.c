@@ -284,7 +284,7 @@ static void galpha_accept (pw_run *r) {
   memcpy (d->v, r->v, n);
   memcpy (d->a, d->a1, n);
   memcpy (d->w, d->w1, n);
-  pw_tangent_expand (&d->common.dae.tangent, d->y + 2 * d->common.dae.n, r->lambda);
+  pw_tangent_expand (&d->common.dae.tangent, d->y + 2 * d->common.dae.n, d->common.dae.rows, r->lambda);
 }
 
 static int galpha_advance (pw_run *r, double t_end, pw_error *error) {

@@ -86,10 +86,9 @@ static void drift_put_momentum (pw_run *r) {
   pw_tangent *x = &r->data->common.dae.tangent;
   const pw_system *s = r->s;
   for (int j = 0; j < s->coords; j++) pw_scatter_add (&x->scatter, j, j, s->mass[j]);
-  pw_newton_add_JT (
-      r->w, &x->scatter,
-      &(pw_placement){
-          .col = s->coords, .rows = s->rows, .factor = 1, .factor_nonholonomic = 1, .row_index = x->row_index });
+  pw_tangent_add_JT (
+      x, &(pw_placement){
+             .col = s->coords, .rows = s->rows, .factor = 1, .factor_nonholonomic = 1, .row_index = x->row_index });
 }
 
 /* Adds S + h/2 ((S u)_q - b_q); kinematics and J must be those at (t*, q*). */

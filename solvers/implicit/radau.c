@@ -134,7 +134,7 @@ static void radau_evaluate_reached (pw_run *r, double h) {
     pw_run_accelerate_updated (r, r->v, r->a, r->lambda);
   } else {
     for (int j = 0, n = d->dae.n; j < n; j++) r->a[j] = pw_radau_sum (0, radau_derivative_at_end, d->last.Z, n + j) / h;
-    pw_tangent_expand (&d->dae.tangent, lambda, r->lambda);
+    pw_tangent_expand (&d->dae.tangent, lambda, d->dae.rows, r->lambda);
   }
   pw_tangent_compress (&d->dae.tangent, r->lambda, d->dae.rows, lambda);
   memcpy (d->a_end, r->a, (size_t)d->dae.n * sizeof *d->a_end);
@@ -293,7 +293,7 @@ static void radau_fill_sample (pw_run *r, double x) {
   for (int i = 0; i < d->dae.size; i++) y[i] = pw_radau_sum (p->y[i], weight, p->Z, i);
   memcpy (r->q_at, y, (size_t)n * sizeof *y);
   memcpy (r->v_at, y + n, (size_t)n * sizeof *y);
-  pw_tangent_expand (&d->dae.tangent, y + 2 * n, r->lambda_at);
+  pw_tangent_expand (&d->dae.tangent, y + 2 * n, d->dae.rows, r->lambda_at);
   for (int j = 0; j < n; j++) r->a_at[j] = (1 - x) * p->a[j] + x * d->a_end[j];
   for (int e = 0; e < r->s->entries; e++) r->ledger_at[e] = pw_radau_sum (p->ledger[e], weight, p->ledger_change, e);
   radau_quintic (r, x, q, v);

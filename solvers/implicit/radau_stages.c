@@ -317,12 +317,10 @@ int pw_radau_work (pw_run *r, double h, double t1, double *error) {
     double t = pw_before_breakpoint (r, radau_time (r, k, h, t1));
     int status = pw_evaluate_J_at (r->w, t, d->Y, d->Y + d->dae.n);
     if (status != PW_OK) return status;
-    const double *lambda = pw_tangent_expand_lambda (&d->dae.tangent, d->Y + 2 * d->dae.n);
-    if (recomputes && pw_saddle_factor (r->saddle) == PW_OK) {
+    pw_tangent_expand (&d->dae.tangent, d->Y + 2 * d->dae.n, d->dae.rows, r->lambda_at);
+    if (recomputes && pw_saddle_factor (r->saddle) == PW_OK)
       pw_run_accelerate_updated (r, d->Y + d->dae.n, r->a_at, r->lambda_at);
-      lambda = r->lambda_at;
-    }
-    pw_ledger_rates (r, lambda, d->rate);
+    pw_ledger_rates (r, r->lambda_at, d->rate);
     for (int i = 0; i < STAGES; i++)
       for (int e = 0; e < entries; e++) d->now.ledger_change[i][e] += h * radau_A[i][k] * d->rate[e];
   }

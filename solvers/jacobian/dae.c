@@ -26,28 +26,17 @@ void pw_dae_close (pw_dae *x) {
 
 /* ---- Residual ---- */
 
-/* x->residual, which is J v - eta, becomes J a - gamma + 2 alpha (J v - eta) + beta^2 g; of nonholonomic equations
- * J a - gamma + alpha (J v - eta). */
-static void dae_stabilise (pw_dae *x, const double *a) {
-  const pw_run *r = x->tangent.run;
-  const pw_system *s = r->s;
-  for (int i = 0; i < s->rows; i++) x->residual[i] *= (i < s->holonomic ? 2 : 1) * r->alpha;
-  pw_mul_J (r->w, a, x->scratch);
-  for (int i = 0; i < s->rows; i++) x->residual[i] += x->scratch[i];
-  pw_evaluate_gamma (r->w, x->scratch);
-  for (int i = 0; i < s->rows; i++) x->residual[i] -= x->scratch[i];
-  if (r->beta == 0) return;
-  pw_evaluate_g (r->w, x->scratch);
-  for (int i = 0; i < s->holonomic; i++) x->residual[i] += r->beta * r->beta * x->scratch[i];
-}
-
 /* The residuals of the constraint equations that lambda enforces, then of g = 0 if mu enforces it. */
 static void dae_constraints (pw_dae *x, const double *v, const double *a, double *F) {
-  pw_workspace *w = x->tangent.run->w;
-  pw_mul_J (w, v, x->residual);
-  pw_evaluate_eta (w, x->scratch);
-  for (int i = 0; i < x->tangent.run->s->rows; i++) x->residual[i] -= x->scratch[i];
-  if (!x->enforces_velocities && !x->enforces_positions) dae_stabilise (x, a);
+  pw_run *r = x->tangent.run;
+  pw_workspace *w = r->w;
+  const int accelerations = !x->enforces_velocities && !x->enforces_positions;
+  pw_mul_J (w, accelerations ? a : v, x->residual);
+  if (accelerations)
+    pw_run_gamma (r, v, x->scratch);
+  else
+    pw_evaluate_eta (w, x->scratch);
+  for (int i = 0; i < r->s->rows; i++) x->residual[i] -= x->scratch[i];
   if (x->enforces_positions) pw_evaluate_g (w, x->enforces_velocities ? x->scratch : x->residual);
   pw_tangent_compress (&x->tangent, x->residual, x->rows, F);
   pw_tangent_compress (&x->tangent, x->scratch, x->mu_count, F + x->rows);
@@ -66,22 +55,22 @@ void pw_dae_residual (pw_dae *x, const double *v, const double *a, const double 
 
 /* ---- Matrix ---- */
 
-/* The derivatives of the kinematics, by q: q_dot_factor I + D (G^T mu)_q, by v: -I, by mu: mu_factor D G^T.
- * mu: multipliers of all equations, or NULL. */
+/* The derivatives of the kinematics, by q: q_dot_factor I + D (G^T mu)_q, by v: -I, by mu: mu_factor D G^T. */
 static void dae_add_kinematics (pw_dae *x, const double *mu, double q_dot_factor, double mu_factor) {
   pw_tangent *t = &x->tangent;
   for (int j = 0; j < x->n; j++) {
     pw_scatter_add (&t->scatter, j, j, q_dot_factor);
     pw_scatter_add (&t->scatter, j, x->n + j, -1);
   }
-  if (mu == NULL) return;
+  if (x->mu_count == 0) return;
+  mu = pw_tangent_expand (t, mu, x->mu_count, t->lambda);
   pw_placement put = {
     .rows = t->run->s->holonomic, .factor = 1, .row_scale = t->D, .row_index = t->row_index, .lambda = mu
   };
-  pw_newton_add_block (&t->newton, t->run->w, &t->scatter, PW_JTL_Q, &put);
+  pw_tangent_add_block (t, PW_JTL_Q, &put);
   put.col = 2 * x->n + x->rows;
   put.factor = mu_factor;
-  pw_newton_add_JT (t->run->w, &t->scatter, &put);
+  pw_tangent_add_JT (t, &put);
 }
 
 /* The derivatives of J v - eta, where it is enforced, by q: (J v)_q - eta_q, by v: J; and of g, by q: G. */
@@ -108,8 +97,8 @@ void pw_dae_matrix (pw_dae *x, const double *v, const double *a, const double *l
                                  .lambda = 2 * n,
                                  .a_factor = v_dot_factor,
                                  .lambda_factor = multiplier_factor };
-  dae_add_kinematics (x, pw_tangent_expand_mu (t, lambda + x->rows, x->mu_count), q_dot_factor, multiplier_factor);
-  pw_tangent_add_momentum (t, &to, pw_tangent_expand_lambda (t, lambda));
+  dae_add_kinematics (x, lambda + x->rows, q_dot_factor, multiplier_factor);
+  pw_tangent_add_momentum (t, &to, pw_tangent_expand (t, lambda, x->rows, t->lambda));
   if (x->enforces_velocities || x->enforces_positions)
     dae_add_constraints (x, v);
   else

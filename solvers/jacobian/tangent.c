@@ -16,69 +16,167 @@ static void tangent_number_rows (pw_tangent *x) {
   }
 }
 
+/* The largest block of a batch, and the largest count x cols. */
+static void tangent_sizes (const pw_system *s, size_t *block, size_t *direction) {
+  *block = *direction = 1;
+  for (const pw_element_batch *k = s->batch; k < s->batch + s->batches; k++) {
+    const size_t columns = (size_t)k->b.count * (size_t)k->b.cols,
+                 widths[] = { (size_t)k->b.cols, (size_t)k->kind->rows, (size_t)k->kind->signals }; /* last: force_u */
+    if (columns > *direction) *direction = columns;
+    for (int i = 0; i < 3; i++)
+      if (columns * widths[i] > *block) *block = columns * widths[i];
+  }
+}
+
 int pw_tangent_open (pw_tangent *x, pw_run *r) {
+  const pw_system *s = r->s;
+  size_t block, direction;
   *x = (pw_tangent){ .run = r };
   r->uses_derivatives = 1;
-  const pw_system *s = r->s;
+  tangent_sizes (s, &block, &direction);
   for (pw_layout l = { 0 }; pw_layout_pass (&l, &x->memory);) {
     x->row_index = pw_layout_alloc (&l, (size_t)s->rows, sizeof *x->row_index);
     x->row = pw_layout_alloc (&l, (size_t)s->rows, sizeof *x->row);
     x->lambda = pw_layout_alloc (&l, (size_t)s->rows, sizeof *x->lambda);
-    x->mu = pw_layout_alloc (&l, (size_t)s->rows, sizeof *x->mu);
     x->D = pw_layout_alloc (&l, (size_t)s->coords, sizeof *x->D);
+    x->block = pw_layout_alloc (&l, block, sizeof *x->block);
+    x->direction = pw_layout_alloc (&l, direction, sizeof *x->direction);
   }
   if (x->memory == NULL) return PW_RESOURCE;
   for (int j = 0; j < s->coords; j++) x->D[j] = pw_is_angle (s, j) ? 1 / (s->scale.length * s->scale.length) : 1;
   tangent_number_rows (x);
-  return pw_newton_open (&x->newton, r->s);
+  return PW_OK;
 }
 
 void pw_tangent_close (pw_tangent *x) {
   pw_scatter_close (&x->scatter);
-  pw_newton_close (&x->newton);
   free (x->memory);
 }
 
-/* Values of all equations from those of the first `count` active ones: `active` itself if these are all, else `all`,
- * whose other entries stay 0. */
-static const double *tangent_expand_into (const pw_tangent *x, const double *active, int count, double *all) {
-  if (count == x->run->s->rows) return active;
+const double *pw_tangent_expand (const pw_tangent *x, const double *active, int count, double *all) {
+  memset (all, 0, (size_t)x->run->s->rows * sizeof *all);
   for (int i = 0; i < count; i++) all[x->row[i]] = active[i];
   return all;
 }
 
-const double *pw_tangent_expand_lambda (const pw_tangent *x, const double *active) {
-  return tangent_expand_into (x, active, x->rows, x->lambda);
-}
-
-const double *pw_tangent_expand_mu (const pw_tangent *x, const double *active, int count) {
-  return count > 0 ? tangent_expand_into (x, active, count, x->mu) : NULL;
-}
-
-void pw_tangent_expand (const pw_tangent *x, const double *active, double *all) {
-  memcpy (all, pw_tangent_expand_lambda (x, active), (size_t)x->run->s->rows * sizeof *all);
-}
-
 void pw_tangent_multiply_JT (const pw_tangent *x, const double *active, int count, double *out) {
   memset (out, 0, ((size_t)x->run->s->coords + 3) * sizeof *out);
-  if (count > 0)
-    pw_add_JT (x->run->w, tangent_expand_into (x, active, count, count == x->rows ? x->lambda : x->mu), out);
+  if (count > 0) pw_add_JT (x->run->w, pw_tangent_expand (x, active, count, x->lambda), out);
 }
 
 void pw_tangent_compress (const pw_tangent *x, const double *all, int count, double *active) {
   for (int i = 0; i < count; i++) active[i] = all[x->row[i]];
 }
 
+/* ---- Blocks ---- */
+
+/* Copies the entries of a vector of coordinates that belong to the columns of each element; 0 for the ground. */
+static void tangent_gather (const pw_system *s, const pw_element_batch *k, const double *vector, double *local) {
+  for (int e = 0; e < k->b.count; e++)
+    for (int c = 0; c < k->b.cols; c++) {
+      int j = pw_global (k, e, c);
+      *local++ = j < s->coords ? vector[j] : 0;
+    }
+}
+
+/* What a batch adds: its rows of J, or their transpose; blocks whose rows are its constraint equations, or its
+ * coordinates. */
+typedef enum { TANGENT_J, TANGENT_JT, TANGENT_EQUATIONS, TANGENT_COORDINATES } tangent_part;
+
+/* 1 for a column of x or y, 0 for one of an angle. */
+static inline int tangent_is_length (int c) {
+  return c % 3 != 2;
+}
+
+/* 1 for an entry of a pin that is always zero: in columns of x and y its rows of J are constant, multiples of unit
+ * vectors, so that their derivatives are in columns of angles only, and those of J^T lambda in rows of angles only. */
+static inline int tangent_is_zero (tangent_part part, int r, int c) {
+  if (part == TANGENT_J || part == TANGENT_JT) return tangent_is_length (c) && c % 3 == 1 - r;
+  return tangent_is_length (c) || (part == TANGENT_COORDINATES && tangent_is_length (r));
+}
+
+/* Adds the values of a batch, rows x columns of each element. */
+static void tangent_put (pw_tangent *x, const pw_element_batch *k, tangent_part part, const double *value,
+                         const pw_placement *put) {
+  const pw_system *s = x->run->s;
+  pw_scatter_map *t = &x->scatter;
+  const int of_coordinates = part == TANGENT_COORDINATES, rows = of_coordinates ? k->b.cols : k->kind->rows,
+            transposed = part == TANGENT_JT, is_pin = k->kind == &pw_kind_pin;
+  const double factor = !of_coordinates && k->row >= s->holonomic ? put->factor_nonholonomic : put->factor;
+  for (int e = 0; e < k->b.count; e++)
+    for (int r = 0; r < rows; r++) {
+      int i = of_coordinates ? pw_global (k, e, r) : k->row + e * rows + r;
+      if (!of_coordinates && put->row_index) i = put->row_index[i];
+      for (int c = 0; c < k->b.cols; c++, value++) {
+        int j = pw_global (k, e, c), row = transposed ? j : i;
+        if (j >= s->coords || i < 0 || (of_coordinates && i >= s->coords)) continue;
+        if (is_pin && tangent_is_zero (part, r, c)) continue;
+        double scale = put->row_scale ? put->row_scale[row] : 1;
+        pw_scatter_add (t, put->row + row, put->col + (transposed ? i : j), t->recording ? 0 : factor * *value * scale);
+      }
+    }
+}
+
+void pw_tangent_add_block (pw_tangent *x, pw_block block, const pw_placement *put) {
+  pw_workspace *w = x->run->w;
+  for (pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++) {
+    int of_equations = block == PW_JW_Q || block == PW_ETA_Q || block == PW_GAMMA_Q || block == PW_GAMMA_V;
+    if ((of_equations || block == PW_JTL_Q) && (k->kind->rows == 0 || k->row >= put->rows)) continue;
+    if (pw_block_function (k->kind, block) == NULL) continue;
+    if (put->direction) tangent_gather (w->s, k, put->direction, x->direction);
+    k->b.w = x->direction;
+    k->b.lambda = put->lambda ? put->lambda + k->row : NULL;
+    if (!x->scatter.recording) pw_evaluate_block (w, k, block, x->block);
+    tangent_put (x, k, of_equations ? TANGENT_EQUATIONS : TANGENT_COORDINATES, x->block, put);
+  }
+}
+
+/* Adds J or J^T. */
+static void tangent_put_J (pw_tangent *x, tangent_part part, const pw_placement *put) {
+  const pw_workspace *w = x->run->w;
+  for (const pw_element_batch *k = w->batch; k < w->batch + w->s->constraints && k->row < put->rows; k++)
+    tangent_put (x, k, part, k->J, put);
+}
+
+void pw_tangent_add_JT (pw_tangent *x, const pw_placement *put) {
+  tangent_put_J (x, TANGENT_JT, put);
+}
+
+void pw_tangent_add_signals (pw_tangent *x, int row, int col_q, int col_v) {
+  pw_workspace *w = x->run->w;
+  pw_scatter_map *t = &x->scatter;
+  const pw_system *s = w->s;
+  for (pw_element_batch *k = w->batch; s->state_dependent > 0 && k < w->batch + s->batches; k++) {
+    int signals = k->kind->signals, cols = k->b.cols;
+    if (signals == 0 || k->kind->force_u == NULL) continue;
+    if (!t->recording) k->kind->force_u (&k->b, x->block);
+    for (int e = 0; e < k->b.count; e++)
+      for (int u = 0; u < signals; u++) {
+        const pw_source *source = &k->source[e * signals + u];
+        for (int read = 0; read < source->reads; read++) { /* source->x: values of the states read, derivatives */
+          int j = source->state[read], col = j < s->coords ? col_q + j : col_v + j - s->coords;
+          double slope = source->x[source->reads + read];
+          for (int c = 0; c < cols; c++) {
+            int i = pw_global (k, e, c);
+            if (i >= s->coords) continue;
+            pw_scatter_add (t, row + i, col, t->recording ? 0 : -x->block[(e * cols + c) * signals + u] * slope);
+          }
+        }
+      }
+  }
+}
+
+/* ---- Equations ---- */
+
 void pw_tangent_add_equations (pw_tangent *x, pw_block block, int row, int col, const double *w, double holonomic,
                                double nonholonomic) {
   const pw_placement put = { row,           col, x->run->s->rows, holonomic, nonholonomic, .row_index = x->row_index,
                              .direction = w };
-  pw_newton_add_block (&x->newton, x->run->w, &x->scatter, block, &put);
+  pw_tangent_add_block (x, block, &put);
 }
 
 void pw_tangent_add_J (pw_tangent *x, int count, int row, int col, double holonomic, double nonholonomic) {
-  pw_newton_add_J (x->run->w, &x->scatter,
-                   &(pw_placement){ row, col, count, holonomic, nonholonomic, .row_index = x->row_index });
+  tangent_put_J (x, TANGENT_J, &(pw_placement){ row, col, count, holonomic, nonholonomic, .row_index = x->row_index });
 }
 
 /* (J^T lambda)_q - f_q; -f_v; M; J^T: the derivatives with respect to q, v, a, lambda */
@@ -87,17 +185,17 @@ void pw_tangent_add_momentum (pw_tangent *x, const pw_tangent_layout *to, const 
   pw_placement put = {
     .row = to->momentum, .col = to->q, .rows = s->rows, .factor = 1, .row_index = x->row_index, .lambda = lambda
   };
-  pw_newton_add_block (&x->newton, x->run->w, &x->scatter, PW_JTL_Q, &put);
+  pw_tangent_add_block (x, PW_JTL_Q, &put);
   put.factor = -1;
-  pw_newton_add_block (&x->newton, x->run->w, &x->scatter, PW_FORCE_Q, &put);
+  pw_tangent_add_block (x, PW_FORCE_Q, &put);
   put.col = to->v;
-  pw_newton_add_block (&x->newton, x->run->w, &x->scatter, PW_FORCE_V, &put);
-  pw_newton_add_signals (&x->newton, x->run->w, &x->scatter, to->momentum, to->q, to->v);
+  pw_tangent_add_block (x, PW_FORCE_V, &put);
+  pw_tangent_add_signals (x, to->momentum, to->q, to->v);
   for (int j = 0; j < s->coords; j++)
     pw_scatter_add (&x->scatter, to->momentum + j, to->a + j, to->a_factor * s->mass[j]);
   put.factor = put.factor_nonholonomic = to->lambda_factor;
   put.col = to->lambda;
-  pw_newton_add_JT (x->run->w, &x->scatter, &put);
+  pw_tangent_add_JT (x, &put);
 }
 
 /* (J a)_q - gamma_q + 2 alpha ((J v)_q - eta_q) + beta^2 G; 2 alpha J - gamma_v; J */

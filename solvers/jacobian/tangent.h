@@ -1,5 +1,5 @@
-/* Derivatives of the equations of motion and of the active constraint equations, shared by the Newton matrices of
- * implicit methods:
+/* Derivatives of the equations of motion and of the active constraint equations in a sparse matrix: J and second-order
+ * blocks of the elements, for the linearisation; parts of the Newton matrices of implicit methods:
  *
  *   momentum        M a + J^T lambda - f
  *   accelerations   J a - gamma + 2 alpha (J v - eta) + beta^2 g   (nonholonomic: + alpha (J v - eta))
@@ -10,16 +10,18 @@
 #define PW_TANGENT_H
 
 #include "method.h"
-#include "newton.h"
+#include "scatter.h"
+#include "system.h"
 
 typedef struct {
   pw_run *run;
   int rows, holonomic; /* active equations; holonomic ones */
   int *row_index;      /* all equations: index among the active ones, or -1 */
   int *row;            /* rows: index among all equations */
-  double *lambda, *mu; /* all equations: multipliers last expanded, 0 for those that are not active */
+  double *lambda;      /* all equations: scratch for pw_tangent_expand */
   double *D;           /* coords: 1 for lengths, 1/L^2 for angles (dae.h) */
-  pw_newton_scratch newton;
+  double *block;       /* scratch: the largest block of a batch, or its force_u */
+  double *direction;   /* scratch: the largest count x cols */
   pw_scatter_map scatter;
   char *memory;
 } pw_tangent;
@@ -29,18 +31,34 @@ void pw_tangent_close (pw_tangent *x);
 
 /* ---- From values of the active equations to those of all, and back ---- */
 
-/* Multipliers of all equations, valid until the next call (or pw_tangent_multiply_JT) and while `active` is: lambda;
- * mu, of which `active` has `count`, or NULL if that is 0. */
-const double *pw_tangent_expand_lambda (const pw_tangent *x, const double *active);
-const double *pw_tangent_expand_mu (const pw_tangent *x, const double *active, int count);
-/* The same lambda in an array of all equations. */
-void pw_tangent_expand (const pw_tangent *x, const double *active, double *all);
-/* out (coords + 3) = J^T times the multipliers of the first `count` active equations, with the J last evaluated. */
+/* Fills `all`, which is returned: multipliers of the first `count` active equations, 0 for the others. */
+const double *pw_tangent_expand (const pw_tangent *x, const double *active, int count, double *all);
+/* out (coords + 3) = J^T times the same multipliers, with the J last evaluated.  Overwrites x->lambda. */
 void pw_tangent_multiply_JT (const pw_tangent *x, const double *active, int count, double *out);
 /* Values of the first `count` active equations from those of all. */
 void pw_tangent_compress (const pw_tangent *x, const double *all, int count, double *active);
 
-/* ---- Adding to the matrix ---- */
+/* ---- Adding to the matrix that `scatter` records or fills ---- */
+
+/* Where and how a block is added.  Its rows are coordinates or constraint equations. */
+typedef struct {
+  int row, col;               /* the row and column of the matrix for the block's first ones */
+  int rows;                   /* constraint equations included: all, s->rows, or the holonomic ones, s->holonomic */
+  double factor;              /* of blocks of forces and (J^T lambda)_q, and of what holonomic equations add */
+  double factor_nonholonomic; /* of what nonholonomic equations add: to J, J^T, and blocks whose rows they are */
+  const double *row_scale;    /* further factors, one for each row from `row` on; NULL: 1 */
+  const int *row_index;       /* equations: new index of each, -1: omitted; NULL: indices do not change */
+  const double *direction;    /* coordinates: w of the block (J w)_q; NULL for other blocks */
+  const double *lambda;       /* equations: multipliers of the block (J^T lambda)_q; NULL for other blocks */
+} pw_placement;
+
+/* Adds a block of every batch, at the kinematics last updated. */
+void pw_tangent_add_block (pw_tangent *x, pw_block block, const pw_placement *put);
+/* Adds J^T, with constraint equations as columns. */
+void pw_tangent_add_JT (pw_tangent *x, const pw_placement *put);
+/* Adds -(derivative of the force by signals) x (derivative of signals by states): rows from `row` on, q in columns from
+ * col_q on, v in columns from col_v on. */
+void pw_tangent_add_signals (pw_tangent *x, int row, int col_q, int col_v);
 
 /* Adds a block whose rows are the active constraint equations, from a row and column on, times the factors `holonomic`
  * and `nonholonomic`; w: the vector of the block (J w)_q. */

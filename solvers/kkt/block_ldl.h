@@ -95,7 +95,7 @@ typedef struct {
   int groups;
   double least_pivot;     /* smallest pivot of the last factorisation over its diagonal entry before elimination */
   int least_unknown;      /* index in y of its unknown; -1: there is none */
-  char *pattern, *memory; /* allocations of the arrays of columns, and of groups and chains */
+  char *pattern, *memory; /* allocations: of column, below and column_of_node; of groups and chains */
 } pw_block_ldl;
 
 /* ---- Planning (block_order.c) ---- */
@@ -132,8 +132,8 @@ static inline int pw_block_diagonal_values (int size) {
 /* Assembles S with the J last evaluated and factorises it; stops where least_pivot is not positive. */
 void pw_block_factor (pw_block_ldl *l);
 
-/* y, which holds gamma, then 0 for each -a_k, becomes lambda and -a_k; a = W^-1 (f - J^T lambda), not stored in groups
- * without weight.  f and a may be the same; f NULL: zero. */
+/* y, which holds gamma, then 0 for each -a_k, becomes lambda and -a_k; a = W^-1 (f - J^T lambda).  f and a may be the
+ * same; f NULL: zero. */
 void pw_block_solve (const pw_block_ldl *l, const double *f, double *y, double *a);
 
 /* A chain's part of pw_block_factor, and of pw_block_solve: forwards, where a column's elimination updates those after

@@ -6,40 +6,26 @@
 #include "block_ldl.h"
 #include "util.h"
 
-/* An order of elimination, and the rows below the diagonal of each column c, ascending: below[first[c]] to
- * below[first[c + 1] - 1]. */
-typedef struct {
-  int *node, *column; /* node of each column; column of each node */
-  int *first, *below;
-} order_variant;
-
 typedef struct {
   int nodes;
   const pw_plan_node *node;
   long pairs;
   const int *pair;
-  int *first, *list; /* neighbours of node n, with repetition: list[first[n]] to list[first[n + 1] - 1] */
-  int *parent;       /* of each column in the elimination tree, or -1 */
-  int *visited;      /* the last row whose paths in this tree have visited the column */
-  int *next;         /* of each node or column: its number of entries, then where the next one is listed */
-  order_variant minimum_degree, natural;
+  int *first, *list;   /* neighbours of node n, with repetition: list[first[n]] to list[first[n + 1] - 1] */
+  int *order, *column; /* node of each column; column of each node */
+  int *first_below;    /* as in pw_block_column */
+  int *parent;         /* of each column in the elimination tree, or -1 */
+  int *visited;        /* the last row whose paths in this tree have visited the column */
+  int *next;           /* of each node or column: its number of entries, then where the next one is listed */
   char *memory;
 } order_search;
 
 static int order_open (order_search *x) {
-  size_t n = (size_t)x->nodes + 1;
-  order_variant *const variant[] = { &x->minimum_degree, &x->natural };
+  int **const array[] = { &x->first, &x->order, &x->column, &x->first_below, &x->parent, &x->visited, &x->next };
   for (pw_layout l = { 0 }; pw_layout_pass (&l, &x->memory);) {
-    x->first = pw_layout_alloc (&l, n, sizeof *x->first);
     x->list = pw_layout_alloc (&l, (size_t)(2 * x->pairs), sizeof *x->list);
-    x->parent = pw_layout_alloc (&l, n, sizeof *x->parent);
-    x->visited = pw_layout_alloc (&l, n, sizeof *x->visited);
-    x->next = pw_layout_alloc (&l, n, sizeof *x->next);
-    for (int i = 0; i < 2; i++) {
-      variant[i]->node = pw_layout_alloc (&l, n, sizeof (int));
-      variant[i]->column = pw_layout_alloc (&l, n, sizeof (int));
-      variant[i]->first = pw_layout_alloc (&l, n, sizeof (int));
-    }
+    for (size_t i = 0; i < sizeof array / sizeof *array; i++)
+      *array[i] = pw_layout_alloc (&l, (size_t)x->nodes + 1, sizeof (int));
   }
   return x->memory ? PW_OK : PW_RESOURCE;
 }
@@ -69,50 +55,77 @@ static void order_list_neighbours (order_search *x, int rank) {
 
 /* Passes through the rows of L.  Row i has entries in the columns on the paths to i in the elimination tree that begin
  * at the columns in which row i of the matrix has entries (Davis 2005, Algorithm 849: LDL).  Counts them in
- * x->next of each column or, where v->below is allocated, lists them.  PW_RETRY if there are more than `most`. */
-static int order_pass (const order_search *x, int most, const order_variant *v) {
+ * x->next of each column or, if `below` is not NULL, lists them there.  PW_RETRY if there are more than `most`. */
+static int order_pass (const order_search *x, int most, int *below) {
   long count = 0;
   for (int i = 0; i < x->nodes; i++) x->visited[i] = x->parent[i] = -1;
   for (int i = 0; i < x->nodes && count <= most; i++) {
-    int node = v->node[i];
+    int node = x->order[i];
     x->visited[i] = i;
     for (int k = x->first[node]; k < x->first[node + 1]; k++)
-      for (int j = v->column[x->list[k]]; j < i && x->visited[j] != i; j = x->parent[j]) {
+      for (int j = x->column[x->list[k]]; j < i && x->visited[j] != i; j = x->parent[j]) {
         if (x->parent[j] < 0) x->parent[j] = i;
         x->visited[j] = i;
         count++;
-        if (v->below) v->below[x->next[j]] = i;
+        if (below) below[x->next[j]] = i;
         x->next[j]++;
       }
   }
   return count <= most ? PW_OK : PW_RETRY;
 }
 
-/* Sorts the nodes of an order by rank and lists the rows of each column, fill-in included.  PW_OK, PW_RESOURCE, or
- * PW_RETRY if there are more than `most`. */
-static int order_fill (order_search *x, int most, order_variant *v) {
+/* A matrix with the columns x->order, the rows below their diagonals not yet listed; NULL if out of memory. */
+static pw_block_ldl *order_allocate (const order_search *x) {
+  size_t n = (size_t)x->nodes;
+  pw_block_ldl *l = calloc (1, sizeof *l);
+  for (pw_layout lay = { 0 }; l && pw_layout_pass (&lay, &l->pattern);) {
+    l->column = pw_layout_alloc (&lay, n + 1, sizeof *l->column);
+    l->below = pw_layout_alloc (&lay, (size_t)x->first_below[n], sizeof *l->below);
+    l->column_of_node = pw_layout_alloc (&lay, n, sizeof *l->column_of_node);
+  }
+  if (l == NULL || l->pattern == NULL) return free (l), NULL;
+  l->nodes = x->nodes;
+  memcpy (l->column_of_node, x->column, n * sizeof *l->column_of_node);
+  for (int j = 0; j <= l->nodes; j++) l->column[j].first_below = x->first_below[j];
+  for (int j = 0; j < l->nodes; j++) {
+    const pw_plan_node *node = &x->node[x->order[j]];
+    l->column[j].unknown = node->unknown, l->column[j].size = (unsigned char)node->size;
+  }
+  return l;
+}
+
+/* Sorts x->order by rank and determines the pattern of L, fill-in included.  *status: PW_OK, PW_RESOURCE, or PW_RETRY
+ * if there are more than `most` blocks below the diagonal. */
+static pw_block_ldl *order_fill (order_search *x, int most, int *status) {
   int at = 0;
   for (int rank = 0; rank < PW_BLOCK_RANKS; rank++)
     for (int j = 0; j < x->nodes; j++)
-      if (x->node[v->node[j]].rank == rank) v->column[v->node[j]] = at++;
-  for (int n = 0; n < x->nodes; n++) v->node[v->column[n]] = n;
+      if (x->node[x->order[j]].rank == rank) x->column[x->order[j]] = at++;
+  for (int n = 0; n < x->nodes; n++) x->order[x->column[n]] = n;
   memset (x->next, 0, (size_t)x->nodes * sizeof *x->next);
-  if (order_pass (x, most, v) != PW_OK) return PW_RETRY;
-  order_begin_lists (x, v->first);
-  v->below = malloc (((size_t)v->first[x->nodes] + 1) * sizeof *v->below);
-  return v->below ? order_pass (x, most, v) : PW_RESOURCE;
+  *status = order_pass (x, most, NULL);
+  if (*status != PW_OK) return NULL;
+  order_begin_lists (x, x->first_below);
+  pw_block_ldl *l = order_allocate (x);
+  *status = l ? order_pass (x, most, l->below) : PW_RESOURCE;
+  return l;
 }
 
-/* The natural order or, if that has less fill-in, minimum degree in rank 0; NULL if out of memory or L is too large. */
-static const order_variant *order_choose (order_search *x) {
+/* In the natural order or, if that has less fill-in, minimum degree in rank 0; NULL if out of memory or L is too
+ * large. */
+static pw_block_ldl *order_choose (order_search *x) {
+  int status;
   if (order_open (x) != PW_OK) return NULL;
   order_list_neighbours (x, 0);
-  if (x->nodes > 0 && amd_order (x->nodes, x->first, x->list, x->minimum_degree.node, NULL, NULL) < 0) return NULL;
-  for (int n = 0; n < x->nodes; n++) x->natural.node[n] = n;
+  if (x->nodes > 0 && amd_order (x->nodes, x->first, x->list, x->order, NULL, NULL) < 0) return NULL;
   order_list_neighbours (x, PW_BLOCK_RANKS - 1);
-  if (order_fill (x, INT_MAX / 2, &x->minimum_degree) != PW_OK) return NULL;
-  int status = order_fill (x, x->minimum_degree.first[x->nodes], &x->natural);
-  return status == PW_OK ? &x->natural : status == PW_RETRY ? &x->minimum_degree : NULL;
+  pw_block_ldl *minimum_degree = order_fill (x, INT_MAX / 2, &status);
+  if (minimum_degree == NULL) return NULL;
+  for (int n = 0; n < x->nodes; n++) x->order[n] = n;
+  pw_block_ldl *natural = order_fill (x, minimum_degree->column[x->nodes].first_below, &status);
+  if (status == PW_RETRY) return minimum_degree;
+  pw_block_close (minimum_degree);
+  return natural;
 }
 
 /* ---- Layout ---- */
@@ -162,52 +175,30 @@ static void order_place_targets (pw_block_ldl *l) {
   }
 }
 
-/* Stores the chosen order. */
-static int order_store (pw_block_ldl *l, const pw_plan_node *node, const order_variant *v) {
-  size_t n = (size_t)l->nodes, below = (size_t)v->first[l->nodes], targets = 0;
-  for (int j = 0; j < l->nodes; j++) {
-    size_t rows = (size_t)(v->first[j + 1] - v->first[j]);
+int pw_block_lay_out (pw_block_ldl *l) {
+  size_t targets = 0;
+  if (order_place_columns (l) != PW_OK) return PW_RESOURCE;
+  for (const pw_block_column *c = l->column; c < l->column + l->nodes; c++) {
+    size_t rows = (size_t)(c[1].first_below - c->first_below);
     targets += rows * (rows - 1) / 2; /* one for each pair of rows of the column */
   }
-  for (pw_layout lay = { 0 }; pw_layout_pass (&lay, &l->pattern);) {
-    l->column = pw_layout_alloc (&lay, n + 1, sizeof *l->column);
-    l->below = pw_layout_alloc (&lay, below, sizeof *l->below);
-    l->target = pw_layout_alloc (&lay, targets, sizeof *l->target);
-    l->column_of_node = pw_layout_alloc (&lay, n, sizeof *l->column_of_node);
-  }
-  if (l->pattern == NULL) return PW_RESOURCE;
-  memcpy (l->below, v->below, below * sizeof *l->below);
-  memcpy (l->column_of_node, v->column, n * sizeof *l->column_of_node);
-  for (int j = 0; j < l->nodes; j++) {
-    const pw_plan_node *x = &node[v->node[j]];
-    l->column[j] =
-        (pw_block_column){ .unknown = x->unknown, .first_below = v->first[j], .size = (unsigned char)x->size };
-  }
-  l->column[l->nodes] = (pw_block_column){ .first_below = v->first[l->nodes] };
-  return PW_OK;
-}
-
-int pw_block_lay_out (pw_block_ldl *l) {
-  if (order_place_columns (l) != PW_OK) return PW_RESOURCE;
-  order_place_targets (l);
+  l->target = malloc ((targets + 1) * sizeof *l->target);
   l->value = malloc (((size_t)l->values + 1) * sizeof *l->value);
-  return l->value ? PW_OK : PW_RESOURCE;
+  if (l->target == NULL || l->value == NULL) return PW_RESOURCE;
+  order_place_targets (l);
+  return PW_OK;
 }
 
 pw_block_ldl *pw_block_open (int nodes, const pw_plan_node *node, long pairs, const int *pair) {
   order_search x = { .nodes = nodes, .node = node, .pairs = pairs, .pair = pair };
-  const order_variant *v = order_choose (&x);
-  pw_block_ldl *l = v ? calloc (1, sizeof *l) : NULL;
-  if (l) l->nodes = nodes;
-  if (l && order_store (l, node, v) != PW_OK) pw_block_close (l), l = NULL;
-  free (x.minimum_degree.below);
-  free (x.natural.below);
+  pw_block_ldl *l = order_choose (&x);
   free (x.memory);
   return l;
 }
 
 void pw_block_close (pw_block_ldl *l) {
   if (l == NULL) return;
+  free (l->target);
   free (l->value);
   free (l->pattern);
   free (l->memory);

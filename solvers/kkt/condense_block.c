@@ -67,18 +67,11 @@ static void condense_group (const pw_plan *plan, pw_block_ldl *l, int g, pw_grou
                                                              .size = (short)plan->node[i].size };
 }
 
-/* 0 for a body of a chain, and for a group without mass, whose accelerations massless.c computes. */
-static int condense_has_block (const pw_plan *plan, int g) {
-  int j = pw_group_first (plan->saddle->s, g), width = pw_group_width (plan->saddle->s, j), has_weight = 0;
-  for (int i = 0; i < width; i++) has_weight |= plan->weight[j + i] != 0;
-  return has_weight && !plan->is_linked[g];
-}
-
 /* Allocates and fills the groups' blocks, and the chains. */
 static int condense_fill (const pw_plan *plan, pw_block_ldl *l) {
   int contributions = 0, couplings = 0, filled = 0, uncondensed = plan->saddle->extra / 3;
   l->inverse_weight = plan->saddle->inverse_weight;
-  for (int g = 0; g < plan->groups; g++) l->groups += condense_has_block (plan, g);
+  l->groups = plan->groups - plan->linked; /* bodies of chains have no block */
   for (pw_layout lay = { 0 }; pw_layout_pass (&lay, &l->memory);) {
     l->group = pw_layout_alloc (&lay, (size_t)l->groups + 1, sizeof *l->group);
     l->contribution = pw_layout_alloc (&lay, (size_t)(plan->contributions - 2 * plan->linked + 2 * uncondensed),
@@ -92,7 +85,7 @@ static int condense_fill (const pw_plan *plan, pw_block_ldl *l) {
   l->chain[plan->chains] = (pw_chain){ .first_column = l->nodes + 1 };
   for (int last = 0; last < 2; last++) /* uncondensed bodies last: they add to diagonals that the others store */
     for (int g = 0; g < plan->groups; g++)
-      if (condense_has_block (plan, g) && (plan->uncondensed[g] >= 0) == last)
+      if (!plan->is_linked[g] && (plan->uncondensed[g] >= 0) == last)
         condense_group (plan, l, g, &l->group[filled++], &contributions, &couplings);
   l->group[filled] = (pw_group_block){ .first_contribution = contributions, .first_coupling = couplings };
   return PW_OK;

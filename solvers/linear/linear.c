@@ -42,7 +42,6 @@ static int linear_arrays (pw_linearisation *x, size_t bases) {
 
 void pw_linear_close (pw_linearisation *x) {
   pw_tangent_close (&x->tangent);
-  free (x->entry);
   free (x->memory);
 }
 

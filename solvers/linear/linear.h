@@ -16,12 +16,6 @@ typedef struct {
   double acceleration; /* the same in m/s^2, angles times L */
 } pw_linear_frame;
 
-/* An entry of the derivatives. */
-typedef struct {
-  int row, column;
-  double value;
-} pw_linear_entry;
-
 typedef struct {
   pw_run *r;
   int n, m;
@@ -44,8 +38,6 @@ typedef struct {
   double *probe, *probe_da;      /* 2 n, n: a variation at the current state, and its da (linear_frame.c) */
   double *probe_a;               /* n: accelerations at the current state */
   double *later;                 /* 2 n: a later state */
-  pw_linear_entry *entry;        /* entries: derivatives that are not 0 */
-  int entries;
   char *memory;
   int modes;            /* 1: PW_LINEAR_MODES, which needs the following */
   double *left_vectors; /* size^2 + size: left eigenvectors of A22^T, then imaginary parts of its eigenvalues */

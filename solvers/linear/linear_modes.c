@@ -25,7 +25,7 @@ static void modes_input (pw_linearisation *x, const pw_element_batch *k, int e, 
   memset (x->dx, 0, 2 * (size_t)x->n * sizeof *x->dx);
   memset (x->da, 0, ((size_t)x->n + 3) * sizeof *x->da);
   memset (x->row_scratch, 0, (size_t)x->m * sizeof *x->row_scratch);
-  for (int c = 0; c < cols; c++) x->da[pw_global (k, e, c)] += x->tangent.newton.block[(e * cols + c) * signals + u];
+  for (int c = 0; c < cols; c++) x->da[pw_global (k, e, c)] += x->tangent.block[(e * cols + c) * signals + u];
   pw_saddle_solve (x->r->saddle, x->da, x->row_scratch, x->da, x->scratch);
   pw_linear_coordinates (x, x->dx, x->da, x->r->s->sources, column);
 }
@@ -36,7 +36,7 @@ static void modes_inputs (pw_linearisation *x, double *B) {
   int inputs = x->r->s->sources;
   for (pw_element_batch *k = w->batch; k < w->batch + x->r->s->batches; k++) {
     if (k->kind->signals == 0) continue;
-    if (k->kind->force_u) k->kind->force_u (&k->b, x->tangent.newton.block);
+    if (k->kind->force_u) k->kind->force_u (&k->b, x->tangent.block);
     for (int i = 0; i < k->b.count * k->kind->signals; i++, B++)
       if (k->kind->force_u)
         modes_input (x, k, i / k->kind->signals, i % k->kind->signals, B);

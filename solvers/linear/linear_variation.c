@@ -23,7 +23,6 @@
  * Symmetry.) */
 #include <lapacke.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 #include "linear.h"
 #include "rank.h"
@@ -43,15 +42,15 @@ static void linear_put (pw_linearisation *x, const double *v) {
                { PW_GAMMA_Q, n, 0, 1, NULL }, { PW_GAMMA_V, n, n, 1, NULL },  { PW_JW_Q, n, 0, -1, x->a },
                { PW_JW_Q, of_J, 0, 1, v },    { PW_ETA_Q, of_J, 0, -1, NULL } };
   for (size_t i = 0; i < sizeof part / sizeof *part; i++)
-    pw_newton_add_block (&x->tangent.newton, x->r->w, &x->tangent.scatter, part[i].block,
-                         &(pw_placement){ .row = part[i].row,
-                                          .col = part[i].col,
-                                          .rows = x->m,
-                                          .factor = part[i].factor,
-                                          .factor_nonholonomic = part[i].factor,
-                                          .direction = part[i].w,
-                                          .lambda = x->lambda });
-  pw_newton_add_signals (&x->tangent.newton, x->r->w, &x->tangent.scatter, 0, 0, n);
+    pw_tangent_add_block (&x->tangent, part[i].block,
+                          &(pw_placement){ .row = part[i].row,
+                                           .col = part[i].col,
+                                           .rows = x->m,
+                                           .factor = part[i].factor,
+                                           .factor_nonholonomic = part[i].factor,
+                                           .direction = part[i].w,
+                                           .lambda = x->lambda });
+  pw_tangent_add_signals (&x->tangent, 0, 0, n);
 }
 
 int pw_linear_derivatives (pw_linearisation *x) {
@@ -59,18 +58,7 @@ int pw_linear_derivatives (pw_linearisation *x) {
   pw_scatter_begin_record (t);
   linear_put (x, x->r->v);
   int size = 2 * x->n > x->n + 2 * x->m ? 2 * x->n : x->n + 2 * x->m;
-  if (pw_scatter_lay_out (t, size) != PW_OK) return PW_RESOURCE;
-  x->entry = calloc (t->nonzeros + 1, sizeof *x->entry);
-  return x->entry ? PW_OK : PW_RESOURCE;
-}
-
-/* Lists the entries that are not 0, often one in five. */
-static void linear_pack (pw_linearisation *x) {
-  const pw_scatter_map *t = &x->tangent.scatter;
-  x->entries = 0;
-  for (int j = 0; j < 2 * x->n; j++)
-    for (int64_t i = t->colptr[j]; i < t->colptr[j + 1]; i++)
-      if (t->value[i] != 0) x->entry[x->entries++] = (pw_linear_entry){ (int)t->rowind[i], j, t->value[i] };
+  return pw_scatter_lay_out (t, size);
 }
 
 int pw_linear_evaluate (pw_linearisation *x, double t, const double *q, const double *v) {
@@ -78,14 +66,14 @@ int pw_linear_evaluate (pw_linearisation *x, double t, const double *q, const do
   if (status != PW_OK) return status;
   pw_scatter_begin_fill (&x->tangent.scatter, x->tangent.scatter.value);
   linear_put (x, v);
-  linear_pack (x);
   return PW_OK;
 }
 
 void pw_linear_multiply (pw_linearisation *x) {
+  const pw_scatter_map *t = &x->tangent.scatter;
   memset (x->product, 0, ((size_t)x->n + 2 * (size_t)x->m) * sizeof *x->product);
-  for (const pw_linear_entry *e = x->entry; e < x->entry + x->entries; e++)
-    x->product[e->row] += e->value * x->dx[e->column];
+  for (int j = 0; j < 2 * x->n; j++)
+    for (int64_t i = t->colptr[j]; i < t->colptr[j + 1]; i++) x->product[t->rowind[i]] += t->value[i] * x->dx[j];
 }
 
 void pw_linear_vary (pw_linearisation *x) {

@@ -132,7 +132,7 @@ static void ida_read (const pw_method_data *d, double *q, double *v, double *a, 
   memcpy (q, y, n * sizeof *q);
   memcpy (v, y + n, n * sizeof *v);
   memcpy (a, yp + n, n * sizeof *a);
-  pw_tangent_expand (&d->dae.tangent, ida_lambda (d, y, yp), lambda);
+  pw_tangent_expand (&d->dae.tangent, ida_lambda (d, y, yp), d->dae.rows, lambda);
 }
 
 /* Interpolates the state at t into the sample arrays and updates kinematics and J.  Accelerations and multipliers are

@@ -355,8 +355,7 @@ TEST (gallery) {
 
 /* ---- The text ---- */
 
-/* Names in the text end no comment and are no code; those of bodies and elements have no such characters to begin
- * with. */
+/* The name of the scene does not appear in the text; those of bodies and elements cannot end a comment. */
 TEST (names) {
   static const char *const name[] = { "*/ int x; /*", "\\n#include <y>",    "x\\",
                                       "?\?/",         "gr\xC3\xBC\xC3\x9F", "a\" \"%s%n" };

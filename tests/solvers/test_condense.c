@@ -72,8 +72,8 @@ static const pw_parameter platform_list[] = {
   { .name = NULL },
 };
 
-/* A platform with legs.  In the coordinates of a leg that stands on the ground its two pins are dependent; the second
- * one is therefore eliminated after the platform, or a slot in its place, which has fewer equations than the foot. */
+/* A platform with legs.  In the coordinates of a leg that stands on the ground its two pins are dependent; its foot is
+ * therefore eliminated after the platform. */
 SCENE_WITH (platform_build, platform_list, platform) {
   char leg[20], pin[20];
   for (int i = -1; i <= PLATFORM_LEGS; i++) {
