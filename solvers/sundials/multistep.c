@@ -123,7 +123,8 @@ static int multistep_power (pw_run *r, double t, double *rate) {
 
 static int multistep_open_arrays (pw_method_data *d, pw_run *r) {
   size_t n = (size_t)d->n + 3, rows = (size_t)r->s->rows;
-  const pw_array array[] = { { &d->q, n }, { &d->v, n }, { &d->a, n }, { &d->error, 2 * n }, { &d->lambda, rows } };
+  const pw_array array[] = { { &d->q, n },         { &d->v, n },         { &d->a, n },
+                             { &d->error, 2 * n }, { &d->lambda, rows }, { &d->newton.right, n + rows } };
   if (pw_sun_open (&d->sun, r, 2 * d->n) != PW_OK) return PW_RESOURCE;
   d->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   if (d->memory == NULL) return PW_RESOURCE;
@@ -222,7 +223,7 @@ static void multistep_evaluate (pw_method_data *d) {
 static int multistep_work (pw_method_data *d) {
   pw_run *r = d->sun.run;
   int order = 1;
-  if (d->sun.klu && pw_ledger_uses_multipliers (r->s)) multistep_evaluate (d);
+  if (d->sun.solver && pw_ledger_uses_multipliers (r->s)) multistep_evaluate (d);
   pw_ledger_rates (r, r->lambda, r->rate);
   CVodeGetLastOrder (d->cvode, &order);
   return pw_quadrature_step (&d->sun.quadrature, r, order);
