@@ -32,8 +32,7 @@ PW_CFLAGS = $(STRICT) $(THREADS) -D_POSIX_C_SOURCE=200809L $(INCLUDE) $(CPPFLAGS
 SUITESPARSE ?= /usr/include/suitesparse
 SYSTEM := -isystem $(SUITESPARSE)
 
-SOLVER_LIBS := -lsundials_idas -lsundials_cvodes -lsundials_nvecserial -lsundials_sunlinsolklu \
-               -lsundials_sunmatrixsparse -lklu -lamd -llapacke -lm
+SOLVER_LIBS := -lsundials_idas -lsundials_cvodes -lsundials_nvecserial -lklu -lamd -llapacke -lm
 FILES_LIBS  := -lfyaml -ldl -lm
 CLI_LIBS    := -lpopt -lgsl -lgslcblas -lnlopt
 LINK         = $(CC) $(CFLAGS) $(SAN) $(LDFLAGS) -Wl,--as-needed
@@ -290,9 +289,8 @@ $(PROGRAMS): $(BUILD)/%: $(BUILD)/obj/%.o $(LIB) $(FILES_LIB)
 	$(Q)$(LINK) -Wl,-rpath,'$$ORIGIN/..' -o $@ $(filter %.o,$^) $(OWN_LIBS) $(EXTRA_LIBS) -lm
 
 $(BUILD)/benchmarks/engine: $(call obj,$(ENGINE))
-$(BUILD)/benchmarks/engine $(BUILD)/benchmarks/peers: EXTRA_LIBS := $(SOLVER_LIBS) -lsundials_sunlinsoldense -lsundials_sunmatrixdense
+$(INSIDE): EXTRA_LIBS := $(SOLVER_LIBS) $(addprefix -lsundials_,sunlinsolklu sunmatrixsparse sunlinsoldense sunmatrixdense)
 $(BUILD)/benchmarks/peers: $(call obj,$(wildcard benchmarks/baseline/*.c) $(addprefix benchmarks/engine/,scenes.c count.c ladder.c by_hand.c))
-$(BUILD)/benchmarks/peers: EXTRA_LIBS := $(SOLVER_LIBS) -lsundials_sunlinsoldense -lsundials_sunmatrixdense
 $(BUILD)/benchmarks/effects: $(call obj,benchmarks/engine/count.c)
 $(BUILD)/benchmarks/hard: $(call obj,$(HARD))
 $(BUILD)/benchmarks/hard: EXTRA_LIBS := -lfyaml

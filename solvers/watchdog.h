@@ -12,39 +12,16 @@
 
 struct pw_run;
 
-/* The thresholds, of which a run has a copy; values and derivations are in thresholds.c.  Residuals are scaled; lengths
- * and motions are in units of L and rad.  A relative sine is the sine over the largest one of the run. */
+/* The thresholds, of which a run has a copy; definitions, values and derivations are in thresholds.c. */
 typedef struct {
-  double lost, lost_unstabilised; /* residuals above which constraints count as lost */
-  double redundant_residual;      /* residual of a redundant row that is round-off */
-  double redundant_ratio;         /* residual of a redundant row, over those of the active rows, that they explain */
-  double rank_lost;               /* sine below which J has lost rank */
-  double rank_suspect;            /* sine below which the rank is computed, */
-  double rank_refused;            /* or, where the scene is too large for that, the configuration refused */
-  double independent;             /* sine above which a row counts as independent */
-  double near, regular;           /* relative sines: near a singular configuration below; regular above */
-  double refine;                  /* sine in the metric of a saddle (saddle.h) below which its solutions are refined */
-  double turn_growth;             /* growth of the accelerations in a turn to another branch */
-  double turn_reference;          /* least acceleration norm to which growth refers */
-  double drift_turn;              /* residual over squared sine above which such a growth indicates a turn */
-  double drift_near;              /* the same above which accelerations are no reference for later ones */
-  double drift_far, drift_any;    /* residual, and the same over squared sine: above both any motion may be a turn */
-  double jump_growth;             /* growth of the accelerations in a jump */
-  double lipschitz;               /* change of the relative sine per unit of motion */
-  double step_growth;             /* length of a step over that of the last one */
-  double unresolved;              /* sine within a step, over those at its ends, of a corner that is not resolved */
-  double low;                     /* the same, and relative sine, of a possible change point */
-  double stride, progress;        /* of walks past a change point: length over the sine; gain over the length */
-  double floor, crossing;         /* sine of round-off, also the shortest stride; sine where branches cross */
-  double straight;                /* cosine of the largest angle of a straight passage */
-  double resolved;                /* length of a step over the distance of branches that it resolves */
-  double ends_singular;           /* sine at the end of a step over that at its beginning */
-  double agree, agree_best;       /* difference between two divisions of a step: acceptable; aimed at */
-  double sample, sample_best;     /* the same for a sample inside a step */
-  double reselect_ratio;          /* independence of the active rows, over the initial one, */
-  double reselect_below;          /* and itself: below both, other active rows are sought */
-  double extreme;                 /* the largest mass, and one over the smallest [kg]; the largest initial value */
-  double stalled;                 /* consecutive steps that do not advance */
+  double lost, lost_unstabilised, redundant_residual, redundant_ratio;
+  double rank_lost, rank_suspect, rank_refused, independent, reselect_ratio, reselect_below;
+  double near, regular, refine;
+  double turn_growth, turn_reference, drift_turn, drift_near, drift_far, drift_any, jump_growth;
+  double lipschitz, step_growth;
+  double unresolved, low, stride, progress, floor, crossing, straight, resolved;
+  double ends_singular, agree, agree_best, sample, sample_best;
+  double extreme, stalled;
 } pw_thresholds;
 
 extern const pw_thresholds pw_watchdog_thresholds;

@@ -15,16 +15,11 @@
  * parts moves like one body, up to round-off, and massless coordinates follow the massive ones.  (Kim & Vanderploeg
  * 1986, QR decomposition for state space representation of constrained mechanical dynamic systems: a basis kept while
  * it is well conditioned; Mani, Haug & Atkinson 1985, Application of singular value decomposition for analysis of
- * mechanical system dynamics.)
- *
- * At the beginning of the step K is symmetric positive definite, and its factorisation needs no pivoting; it is
- * repeated with pivoting if a pivot becomes small. */
-#include <lapacke.h>
+ * mechanical system dynamics.) */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "rk_step.h"
-#include "unroll.h"
 #include "util.h"
 
 /* ---- Opening ---- */
@@ -42,9 +37,8 @@ int pw_nullspace_open (pw_nullspace *b, pw_run *r, pw_error *error) {
     { &b->W_inv_J0T, n * m }, { &b->K, m * m }, { &b->mu, m }, { &b->eta, all }, { &b->v, n + 3 }
   };
   b->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
-  b->active_index = malloc ((2 * all + 1) * sizeof *b->active_index);
+  b->active_index = malloc ((all + 1) * sizeof *b->active_index);
   if (b->memory == NULL || b->active_index == NULL) return pw_fail_memory (s, error);
-  b->pivot = b->active_index + all;
   for (int i = 0, count = 0; i < s->rows; i++) b->active_index[i] = r->active && !r->active[i] ? -1 : count++;
   return PW_OK;
 }
@@ -55,95 +49,69 @@ void pw_nullspace_close (pw_nullspace *b) {
   *b = (pw_nullspace){ 0 };
 }
 
-/* ---- K mu = eta - J w; m: number of rows, a constant in the most frequent case, 4, so that loops are unrolled ---- */
+/* ---- K mu = eta - J w ---- */
 
-/* K_i += J_i W^-1 J0^T, mu_i -= J_i w, for the entries J of row i in columns j to j + width - 1: 3 of a body, or 1. */
-PW_INLINE void nullspace_gather (pw_nullspace *b, int i, int j, int width, const double *J, const double *w, int m) {
-  double *restrict K = b->K + i * m;
-  const double *restrict x = b->W_inv_J0T + (size_t)j * (size_t)m, *restrict y = x + m, *restrict phi = y + m;
-  if (width == 1) {
-    PW_UNROLL for (int n = 0; n < m; n++) K[n] += J[0] * x[n];
-    b->mu[i] -= J[0] * w[j];
-  } else {
-    const double J_x = J[0], J_y = J[1], J_phi = J[2];
-    PW_UNROLL for (int n = 0; n < m; n++) K[n] += J_x * x[n] + J_y * y[n] + J_phi * phi[n];
-    b->mu[i] -= J_x * w[j] + J_y * w[j + 1] + J_phi * w[j + 2];
-  }
-}
-
-/* Assembles K and mu = eta - J w with the J last evaluated. */
-PW_INLINE void nullspace_assemble (pw_nullspace *b, pw_run *r, const double *w, int m) {
+/* Computes K and mu = eta - J w with the J last evaluated. */
+static void nullspace_assemble (pw_nullspace *b, pw_run *r, const double *w) {
   const pw_system *s = r->s;
+  const int m = b->rows;
   memset (b->K, 0, (size_t)(m * m) * sizeof *b->K);
   if (s->rheonomic) pw_evaluate_eta (r->w, b->eta); /* else it stays 0 */
-  for (int i = 0; i < s->rows; i++)
-    if (b->active_index[i] >= 0) b->mu[b->active_index[i]] = b->eta[i];
-  for (const pw_element_batch *k = r->w->batch; k < r->w->batch + s->constraints; k++) {
-    const int cols = k->b.cols, of_bodies = 3 * k->kind->bodies;
-    const double *J = k->J;
-    for (int n = 0; n < k->b.count * k->kind->rows; n++, J += cols)
-      for (int i = b->active_index[k->row + n], c = i < 0 ? cols : 0, width; c < cols; c += width) {
+  for (const pw_element_batch *k = r->w->batch; k < r->w->batch + s->constraints; k++)
+    for (int n = 0; n < k->b.count * k->kind->rows; n++) {
+      int i = b->active_index[k->row + n];
+      if (i < 0) continue;
+      b->mu[i] = b->eta[k->row + n];
+      for (int c = 0; c < k->b.cols; c++) {
         int j = pw_global (k, n / k->kind->rows, c);
-        width = c < of_bodies ? 3 : 1;
-        if (j < s->coords) nullspace_gather (b, i, j, width, J + c, w, m); /* else: the ground */
+        double J = k->J[n * k->b.cols + c];
+        if (j >= s->coords) continue; /* the ground */
+        b->mu[i] -= J * w[j];
+        pw_add_scaled (b->K + i * m, b->W_inv_J0T + j * m, J, m);
       }
-  }
-}
-
-/* mu = K^-1 mu without pivoting; K is factorised in place.  Returns 0 if a pivot is not positive, or smaller than
- * `least` times its diagonal entry. */
-PW_INLINE int nullspace_eliminate (double *restrict K, double *restrict mu, int m) {
-  const double least = 0.01; /* two decimal digits are lost */
-  PW_UNROLL for (int p = 0; p < m; p++) {
-    double diagonal = K[p * m + p];
-    PW_UNROLL for (int i = 0; i < p; i++) {
-      double factor = K[p * m + i] * K[i * m + i];
-      PW_UNROLL for (int j = i + 1; j < m; j++) K[p * m + j] -= factor * K[i * m + j];
-      mu[p] -= factor * mu[i];
     }
-    if (!(K[p * m + p] > least * fabs (diagonal))) return 0;
-    K[p * m + p] = 1 / K[p * m + p];
-  }
-  PW_UNROLL for (int i = m - 1; i >= 0; i--) {
-    PW_UNROLL for (int j = i + 1; j < m; j++) mu[i] -= K[i * m + j] * mu[j];
-    mu[i] *= K[i * m + i];
-  }
-  return 1;
 }
 
-/* The same by LAPACK, with scaled rows and pivoting.  PW_RETRY if a pivot is round-off, as for dependent constraint
- * equations, or a row is 0 or not finite. */
-static int nullspace_eliminate_pivoted (pw_nullspace *b) {
-  const double least = 1e-13; /* some 500 eps; the largest entry of a row is 1 */
-  int m = b->rows;
-  double *K = b->K;
+/* Exchanges rows i and k. */
+static void nullspace_exchange (double *K, double *mu, int m, int i, int k) {
+  for (int j = 0; j < m; j++) {
+    double x = K[i * m + j];
+    K[i * m + j] = K[k * m + j], K[k * m + j] = x;
+  }
+  double x = mu[i];
+  mu[i] = mu[k], mu[k] = x;
+}
+
+/* mu = K^-1 mu by Gaussian elimination with pivoting; row i is scaled to the largest entry 1.  PW_RETRY if a pivot is
+ * round-off, as for dependent constraint equations, or a row is 0 or not finite. */
+static int nullspace_eliminate (double *K, double *mu, int m) {
+  const double least = 1e-13; /* some 500 eps */
   for (int i = 0; i < m; i++) {
     double most = 0;
     for (int j = 0; j < m; j++) most = pw_larger_or_nan (most, fabs (K[i * m + j]));
     if (!(most > 0 && isfinite (most))) return PW_RETRY;
-    for (int j = 0; j < m; j++) K[i * m + j] /= most;
-    b->mu[i] /= most;
+    for (int j = 0; j < m; j++) K[i * m + j] *= 1 / most;
+    mu[i] /= most;
   }
-  for (int i = 0; i < m; i++) /* transpose: LAPACK stores columns */
-    for (int j = 0; j < i; j++) {
-      double below = K[i * m + j];
-      K[i * m + j] = K[j * m + i], K[j * m + i] = below;
+  for (int p = 0; p < m; p++) {
+    int pivot = p;
+    for (int i = p + 1; i < m; i++)
+      if (fabs (K[i * m + p]) > fabs (K[pivot * m + p])) pivot = i;
+    if (!(fabs (K[pivot * m + p]) > least)) return PW_RETRY;
+    if (pivot != p) nullspace_exchange (K, mu, m, p, pivot);
+    double inverse = K[p * m + p] = 1 / K[p * m + p];
+    for (int i = p + 1; i < m; i++) {
+      double factor = K[i * m + p] * inverse;
+      if (factor == 0) continue; /* K is sparse: in chains it is banded */
+      pw_add_scaled (&K[i * m + p + 1], &K[p * m + p + 1], -factor, m - p - 1);
+      mu[i] -= factor * mu[p];
     }
-  LAPACKE_dgetrf_work (LAPACK_COL_MAJOR, m, m, K, m, b->pivot);
-  for (int p = 0; p < m; p++)
-    if (!(fabs (K[p * m + p]) > least)) return PW_RETRY;
-  LAPACKE_dgetrs_work (LAPACK_COL_MAJOR, 'N', m, 1, K, m, b->pivot, b->mu, m);
-  return PW_OK;
-}
-
-/* v += W^-1 J0^T mu */
-PW_INLINE void nullspace_add (const pw_nullspace *b, int coords, double *v, int m) {
-  const double *row = b->W_inv_J0T;
-  for (int j = 0; j < coords; j++, row += m) {
-    double sum = 0;
-    PW_UNROLL for (int n = 0; n < m; n++) sum += row[n] * b->mu[n];
-    v[j] += sum;
   }
+  for (int i = m - 1; i >= 0; i--) {
+    for (int j = i + 1; j < m; j++) mu[i] -= K[i * m + j] * mu[j];
+    mu[i] *= K[i * m + i];
+  }
+  return PW_OK;
 }
 
 /* ---- A step ---- */
@@ -161,23 +129,13 @@ int pw_nullspace_begin (pw_nullspace *b, pw_run *r) {
   return PW_OK;
 }
 
-/* v += W^-1 J0^T mu, with mu found without pivoting from w = v; returns 0 if a pivot is too small. */
-PW_INLINE int nullspace_solve (pw_nullspace *b, pw_run *r, double *v, int m) {
-  nullspace_assemble (b, r, v, m);
-  if (!nullspace_eliminate (b->K, b->mu, m)) return 0;
-  nullspace_add (b, r->s->coords, v, m);
-  return 1;
-}
-
-/* The same, if necessary with pivoting, at the J last evaluated.  Updates the velocity kinematics.  Returns as
- * pw_nullspace_velocities. */
+/* Replaces v at the J last evaluated; updates the velocity kinematics.  Returns as pw_nullspace_velocities. */
 static int nullspace_correct_velocities (pw_nullspace *b, pw_run *r, double *v) {
-  const int m = b->rows;
-  if (!(m == 4 ? nullspace_solve (b, r, v, 4) : nullspace_solve (b, r, v, m))) {
-    nullspace_assemble (b, r, v, m);
-    if (nullspace_eliminate_pivoted (b) != PW_OK) return PW_RETRY;
-    nullspace_add (b, r->s->coords, v, m);
-  }
+  const double *row = b->W_inv_J0T;
+  nullspace_assemble (b, r, v);
+  if (nullspace_eliminate (b->K, b->mu, b->rows) != PW_OK) return PW_RETRY;
+  for (int j = 0; j < r->s->coords; j++, row += b->rows)
+    for (int n = 0; n < b->rows; n++) v[j] += row[n] * b->mu[n];
   return pw_update_velocities (r->w, v);
 }
 

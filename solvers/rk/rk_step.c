@@ -8,48 +8,17 @@
 #include <math.h>
 #include <string.h>
 #include "rk_step.h"
-#include "unroll.h"
 
-/* Entries i and i + 1 of  out = y + sum_j factor_j slope_j. */
-PW_INLINE void rk_two (double *restrict out, const double *y, double *const *slope, const double *factor, int count,
-                       long i) {
-  double sum0 = y[i], sum1 = y[i + 1];
-  PW_UNROLL for (int j = 0; j < count; j++) {
-    sum0 += factor[j] * slope[j][i];
-    sum1 += factor[j] * slope[j][i + 1];
-  }
-  out[i] = sum0;
-  out[i + 1] = sum1;
-}
-
-/* (q, v) = the state reached + h sum_j weight_j (v_j, a_j), with the weights of a row of the tableau.  Two coordinates
- * are combined at a time, so the arrays have room for one more.  `count`, that of the weights, is a constant in the
- * copies for 1 and 4. */
-PW_INLINE void rk_combine_by (const pw_run *r, double *q, double *v, const pw_rk_row *row, double h, int count) {
-  const pw_method_data *d = r->data;
-  const double *q0 = r->q, *v0 = r->v;
-  double *stage_v[PW_RK_STAGES], *stage_a[PW_RK_STAGES], factor[PW_RK_STAGES];
-  PW_UNROLL for (int j = 0; j < count; j++) {
-    stage_v[j] = d->stage_v[row->stage[j]], stage_a[j] = d->stage_a[row->stage[j]];
-    factor[j] = h * row->weight[j];
-  }
-  for (long i = 0, n = r->s->coords; i < n; i += 2) {
-    rk_two (q, q0, stage_v, factor, count, i);
-    rk_two (v, v0, stage_a, factor, count, i);
-  }
-}
-
-PW_NOINLINE void rk_combine_any (const pw_run *r, double *q, double *v, const pw_rk_row *row, double h) {
-  rk_combine_by (r, q, v, row, h, row->count);
-}
-
+/* (q, v) = the state reached + h sum_j weight_j (v_j, a_j), with the weights of a row of the tableau. */
 static void rk_combine (const pw_run *r, double *q, double *v, const pw_rk_row *row, double h) {
-  if (row->count == 1) /* a stage of rk4; 4: its new state */
-    rk_combine_by (r, q, v, row, h, 1);
-  else if (row->count == 4)
-    rk_combine_by (r, q, v, row, h, 4);
-  else
-    rk_combine_any (r, q, v, row, h);
+  const pw_method_data *d = r->data;
+  const int n = r->s->coords;
+  memcpy (q, r->q, (size_t)n * sizeof *q);
+  memcpy (v, r->v, (size_t)n * sizeof *v);
+  for (int j = 0; j < row->count; j++) {
+    pw_add_scaled (q, d->stage_v[row->stage[j]], h * row->weight[j], n);
+    pw_add_scaled (v, d->stage_a[row->stage[j]], h * row->weight[j], n);
+  }
 }
 
 void pw_rk_ledger (const pw_run *r, double *end, const double *beginning, double h) {

@@ -14,11 +14,10 @@ typedef struct {
   int rows;          /* active constraint equations */
   int *active_index; /* all equations: index among the active ones, or -1 */
   double *W_inv_J0T; /* coords x rows: W^-1 J0^T */
-  double *K;         /* rows x rows: J W^-1 J0^T, factorised in place */
+  double *K;         /* rows x rows: J W^-1 J0^T, eliminated in place */
   double *mu;        /* rows: eta - J w, then the multipliers of the correction */
   double *eta;       /* all equations */
   double *v;         /* coords + 3: scratch */
-  int *pivot;        /* rows: row exchanges of LAPACK */
   char *memory;
 } pw_nullspace;
 

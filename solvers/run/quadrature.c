@@ -1,12 +1,9 @@
 /* Work and losses along the steps of a multistep method: the integral of a polynomial through the rates at the
  * states reached, of a degree one above the order of the step if enough are stored, at negligible cost; where that is
- * not accurate enough, Gauss quadrature inside the step.
+ * not accurate enough, of the rates that the method interpolates at nodes inside the step.
  *
- *   p (t) = sum_j [t_0 ... t_j] prod_(i < j) (t - t_i),   t_0 the end of the step, t_1 its beginning, ...
- *
- * with the divided differences [t_0 ... t_j] of the rates.  Its last term estimates its error.  Powers may vanish at
- * the ends of all steps but not between them, so the work and losses of a step are also compared with the change of
- * energy. */
+ * The difference from the polynomial of the next lower degree estimates the error.  Powers may vanish at the ends of
+ * all steps but not between them, so the work and losses of a step are also compared with the change of energy. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -41,54 +38,45 @@ void pw_quadrature_restart (pw_quadrature *x, pw_run *r) {
   quadrature_store_rates (x, r);
 }
 
-/* ---- The polynomial ---- */
+/* ---- Integrals ---- */
 
-/* w_j: the integrals of prod_(i < j) (s - s_i), j <= k, from 0 to `end`, with s = 0 at the beginning of the step and 1
- * at its end. */
-static void quadrature_weights (const double *s, int k, double end, double *w) {
-  double p[PW_QUADRATURE_POINTS + 1] = { 1 }; /* coefficients of the product, by powers of s */
-  for (int j = 0; j <= k; j++) {
-    double power = end;
-    w[j] = 0;
-    for (int m = 0; m <= j; m++, power *= end) w[j] += p[m] * power / (m + 1);
-    for (int m = j + 1; m > 0; m--) p[m] = p[m - 1] - s[j] * p[m];
-    p[0] *= -s[j];
-  }
-}
+enum { QUADRATURE_BY_METHOD = -1 }; /* in place of a degree */
 
-/* Stores the integrals of the polynomials of degree k up to `end` in x->integral; returns the norm of their last
- * terms. */
-static double quadrature_polynomial (pw_quadrature *x, int entries, int k, double end) {
-  double s[PW_QUADRATURE_POINTS], w[PW_QUADRATURE_POINTS], c[PW_QUADRATURE_POINTS], h = x->t[0] - x->t[1], last = 0;
-  for (int i = 0; i <= k; i++) s[i] = (x->t[i] - x->t[1]) / h;
-  quadrature_weights (s, k, end, w);
-  for (int e = 0; e < entries; e++) {
-    for (int i = 0; i <= k; i++) c[i] = x->rate[i][e]; /* divided differences replace them */
-    for (int j = 1; j <= k; j++)
-      for (int i = k; i >= j; i--) c[i] = (c[i] - c[i - 1]) / (s[i] - s[i - j]);
-    x->integral[e] = 0;
-    for (int j = 0; j <= k; j++) x->integral[e] += h * c[j] * w[j];
-    last += c[k] * c[k];
-  }
-  return fabs (h * w[k]) * sqrt (last);
-}
-
-/* ---- Nodes inside the step ---- */
-
-/* Stores the integrals between two times in x->finer, by Gauss quadrature with four nodes in each of equal parts. */
-static int quadrature_gauss (pw_quadrature *x, pw_run *r, double from, double to, int parts) {
-  static const double node[] = { 0.8611363115940526, 0.3399810435848563 },
-                      weight[] = { 0.3478548451374538, 0.6521451548625461 };
-  int entries = r->s->entries;
-  double half = (to - from) / parts / 2;
-  memset (x->finer, 0, (size_t)entries * sizeof *x->finer);
-  for (int i = 0; i < 4 * parts; i++) {
-    double middle = from + (2 * (i / 4) + 1) * half, side = i % 4 < 2 ? -1 : 1;
-    int status = x->rates (r, middle + side * node[i % 2] * half, x->node);
-    if (status != PW_OK) return status;
-    for (int e = 0; e < entries; e++) x->finer[e] += half * weight[i % 2] * x->node[e];
+/* The rates at t: of the polynomial of this degree through those at the newest states (Lagrange's formula), or
+ * QUADRATURE_BY_METHOD. */
+static int quadrature_rates (const pw_quadrature *x, pw_run *r, int degree, double t, double *rate) {
+  if (degree == QUADRATURE_BY_METHOD) return x->rates (r, t, rate);
+  memset (rate, 0, (size_t)r->s->entries * sizeof *rate);
+  for (int i = 0; i <= degree; i++) {
+    double at_t = 1, at_node = 1;
+    for (int j = 0; j <= degree; j++)
+      if (j != i) at_t *= t - x->t[j], at_node *= x->t[i] - x->t[j];
+    pw_add_scaled (rate, x->rate[i], at_t / at_node, r->s->entries);
   }
   return PW_OK;
+}
+
+/* The integrals between two times by Gauss quadrature with four nodes, exact up to degree 7, in each of equal parts. */
+static int quadrature_gauss (const pw_quadrature *x, pw_run *r, int degree, double from, double to, int parts,
+                             double *integral) {
+  static const double node[] = { 0.8611363115940526, 0.3399810435848563 },
+                      weight[] = { 0.3478548451374538, 0.6521451548625461 };
+  double half = (to - from) / parts / 2;
+  memset (integral, 0, (size_t)r->s->entries * sizeof *integral);
+  for (int i = 0; i < 4 * parts; i++) {
+    double middle = from + (2 * (i / 4) + 1) * half, side = i % 4 < 2 ? -1 : 1;
+    int status = quadrature_rates (x, r, degree, middle + side * node[i % 2] * half, x->node);
+    if (status != PW_OK) return status;
+    pw_add_scaled (integral, x->node, half * weight[i % 2], r->s->entries);
+  }
+  return PW_OK;
+}
+
+/* The norm of the difference between x->finer and x->integral. */
+static double quadrature_change (const pw_quadrature *x, int entries) {
+  double sum = 0;
+  for (int e = 0; e < entries; e++) sum += (x->finer[e] - x->integral[e]) * (x->finer[e] - x->integral[e]);
+  return sqrt (sum);
 }
 
 /* Halves the parts until the integrals, in x->integral, converge; stops if powers cannot be evaluated. */
@@ -96,10 +84,8 @@ static void quadrature_refine (pw_quadrature *x, pw_run *r, double from, double 
   const int most = 64; /* 256 nodes */
   double change = INFINITY;
   for (int parts = 1; parts <= most && change > tolerance; parts *= 2) {
-    if (quadrature_gauss (x, r, from, to, parts) != PW_OK) return;
-    change = 0;
-    for (int e = 0; e < r->s->entries; e++) change += (x->finer[e] - x->integral[e]) * (x->finer[e] - x->integral[e]);
-    change = sqrt (change);
+    if (quadrature_gauss (x, r, QUADRATURE_BY_METHOD, from, to, parts, x->finer) != PW_OK) return;
+    change = quadrature_change (x, r->s->entries);
     memcpy (x->integral, x->finer, (size_t)r->s->entries * sizeof *x->integral);
   }
 }
@@ -138,8 +124,11 @@ int pw_quadrature_step (pw_quadrature *x, pw_run *r, int order) {
   quadrature_store_rates (x, r);
   if (x->points <= last) x->points++;
   x->order = order;
-  double tolerance = pw_ledger_tolerance (r, h);
-  double error = quadrature_polynomial (x, entries, quadrature_degree (x, order), 1), defect = quadrature_defect (x, r);
+  const int degree = quadrature_degree (x, order);
+  (void)quadrature_gauss (x, r, degree, x->t[1], x->t[0], 1, x->integral);
+  (void)quadrature_gauss (x, r, degree - 1, x->t[1], x->t[0], 1, x->finer);
+  double tolerance = pw_ledger_tolerance (r, h), error = quadrature_change (x, entries);
+  double defect = quadrature_defect (x, r);
   x->refined = defect > method_defect * tolerance || error > tolerance || quadrature_is_long (x);
   if (x->refined) quadrature_refine (x, r, x->t[1], x->t[0], tolerance);
   for (int e = 0; e < entries; e++) r->ledger[e] += x->integral[e];
@@ -152,8 +141,7 @@ void pw_quadrature_at (pw_quadrature *x, pw_run *r, double t) {
     memcpy (r->ledger_at, r->ledger, (size_t)entries * sizeof (double));
     return;
   }
-  double h = x->t[0] - x->t[1];
-  quadrature_polynomial (x, entries, quadrature_degree (x, x->order), (t - x->t[1]) / h);
-  if (x->refined) quadrature_refine (x, r, x->t[1], t, pw_ledger_tolerance (r, h));
+  (void)quadrature_gauss (x, r, quadrature_degree (x, x->order), x->t[1], t, 1, x->integral);
+  if (x->refined) quadrature_refine (x, r, x->t[1], t, pw_ledger_tolerance (r, x->t[0] - x->t[1]));
   for (int e = 0; e < entries; e++) r->ledger_at[e] = x->ledger0[e] + x->integral[e];
 }

@@ -10,8 +10,7 @@
  *
  *   (T_a + gamma T_v + gamma^2 T_q) da + T_lambda dlambda = - T_q (b_q + gamma b_v) - T_v b_v
  *
- * T is evaluated when CVODES asks for a new Jacobian; gamma changes more often.  KLU orders the matrix once and keeps
- * its pivots unless the estimated condition number exceeds eps^(-2/3), with eps the machine precision. */
+ * T is evaluated when CVODES asks for a new Jacobian; gamma changes more often. */
 #include <stdlib.h>
 #include <string.h>
 #include <cvodes/cvodes.h>
@@ -51,7 +50,7 @@ static int newton_set_up (realtype t, N_Vector y, N_Vector derivative, SUNMatrix
                           N_Vector tmp3) {
   pw_method_data *d = data;
   pw_bdf_newton *w = &d->newton;
-  (void)derivative, (void)tmp1, (void)tmp2, (void)tmp3;
+  (void)derivative, (void)matrix, (void)tmp1, (void)tmp2, (void)tmp3;
   *evaluated = !reuse || d->sun.run->matrix_outdated;
   if (*evaluated) {
     int status = pw_multistep_accelerate (d, t, N_VGetArrayPointer (y));
@@ -63,7 +62,7 @@ static int newton_set_up (realtype t, N_Vector y, N_Vector derivative, SUNMatrix
     d->sun.run->statistics.jacobians++;
   }
   w->gamma = gamma;
-  pw_sun_begin_fill (matrix, &w->scatter);
+  pw_scatter_begin_fill (&w->scatter, w->scatter.value);
   newton_fill_matrix (w, d->n);
   d->sun.run->statistics.factorisations++; /* CVODES factorises next */
   return 0;
@@ -86,13 +85,13 @@ static void newton_right_side (const pw_method_data *d, const double *b, double 
 static int newton_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector vx, N_Vector vb, realtype tolerance) {
   pw_method_data *d = solver->content;
   pw_bdf_newton *w = &d->newton;
-  const double *b = N_VGetArrayPointer (vb), *da = N_VGetArrayPointer (w->change);
+  const double *b = N_VGetArrayPointer (vb), *da = w->right;
   double *x = N_VGetArrayPointer (vx);
   int n = d->n;
+  (void)matrix, (void)tolerance;
   if (d->sun.run->matrix_outdated) return SUNLS_PACKAGE_FAIL_REC; /* CVODES then requests a new matrix */
-  newton_right_side (d, b, N_VGetArrayPointer (w->right));
-  int flag = SUNLinSolSolve (d->sun.klu, matrix, w->change, w->right, tolerance);
-  if (flag != SUNLS_SUCCESS) return flag;
+  newton_right_side (d, b, w->right);
+  if (pw_sparse_solve (&d->sun.sparse, w->right) != PW_OK) return SUNLS_PACKAGE_FAIL_UNREC;
   for (int j = 0; j < n; j++) {
     x[n + j] = b[n + j] + w->gamma * da[j];
     x[j] = b[j] + w->gamma * x[n + j];
@@ -118,21 +117,14 @@ static int newton_lay_out (pw_method_data *d) {
 int pw_bdf_open_newton (pw_method_data *d) {
   pw_bdf_newton *w = &d->newton;
   pw_sun *x = &d->sun;
-  if (pw_tangent_open (&w->tangent, x->run) != PW_OK || newton_lay_out (d) != PW_OK) return PW_RESOURCE;
-  int size = d->n + w->tangent.rows;
-  w->right = pw_sun_vector (size, x->context);
-  w->change = pw_sun_vector (size, x->context);
-  if (!w->right || !w->change || pw_sun_open_matrix (x, size, &w->scatter) != PW_OK ||
-      pw_sun_open_solver (x, w->right, d, newton_solve) != PW_OK)
+  if (pw_tangent_open (&w->tangent, x->run) != PW_OK || newton_lay_out (d) != PW_OK ||
+      pw_sun_open_solver (x, d->n + w->tangent.rows, &w->scatter, d, newton_solve) != PW_OK)
     return PW_RESOURCE;
   int failed = CVodeSetLinearSolver (d->cvode, x->solver, x->matrix) || CVodeSetLinSysFn (d->cvode, newton_set_up);
   return failed ? PW_RESOURCE : PW_OK;
 }
 
 void pw_bdf_close_newton (pw_method_data *d) {
-  pw_bdf_newton *w = &d->newton;
-  if (w->right) N_VDestroy (w->right);
-  if (w->change) N_VDestroy (w->change);
-  pw_scatter_close (&w->scatter);
-  pw_tangent_close (&w->tangent);
+  pw_scatter_close (&d->newton.scatter);
+  pw_tangent_close (&d->newton.tangent);
 }

@@ -10,7 +10,7 @@ typedef struct {
   pw_tangent tangent;     /* the matrix in tangent.scatter is T */
   double gamma;           /* that of the matrix last set up */
   pw_scatter_map scatter; /* from the entries of T, in order, to the matrix */
-  N_Vector right, change; /* coords and active rows: right-hand side; da, dlambda */
+  double *right;          /* coords and rows: right-hand side, then da, dlambda */
 } pw_bdf_newton;
 
 struct pw_method_data {

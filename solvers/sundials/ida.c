@@ -49,9 +49,9 @@ static int ida_matrix (realtype t, realtype c, N_Vector vy, N_Vector vyp, N_Vect
   pw_method_data *d = data;
   pw_tangent *x = &d->dae.tangent;
   const double *y = N_VGetArrayPointer (vy), *yp = N_VGetArrayPointer (vyp), *v = y + d->dae.n;
-  (void)residual, (void)tmp1, (void)tmp2, (void)tmp3;
+  (void)residual, (void)matrix, (void)tmp1, (void)tmp2, (void)tmp3;
   if (ida_update (d, t, y) != PW_OK) return -1;
-  pw_sun_begin_fill (matrix, &x->scatter);
+  pw_scatter_begin_fill (&x->scatter, x->scatter.value);
   pw_dae_matrix (&d->dae, v, yp + d->dae.n, ida_lambda (d, y, yp), c, c);
   pw_matrix_evaluated (d->sun.run, y, v);
   return 0;
@@ -60,7 +60,7 @@ static int ida_matrix (realtype t, realtype c, N_Vector vy, N_Vector vyp, N_Vect
 static int ida_open_matrix (pw_method_data *d) {
   const double *y = N_VGetArrayPointer (d->sun.y), *yp = N_VGetArrayPointer (d->yp);
   if (pw_dae_lay_out (&d->dae, y + d->dae.n, yp + d->dae.n, ida_lambda (d, y, yp)) != PW_OK) return PW_RESOURCE;
-  return pw_sun_open_matrix (&d->sun, d->dae.size, &d->dae.tangent.scatter);
+  return pw_sun_open_solver (&d->sun, d->dae.size, &d->dae.tangent.scatter, d, NULL);
 }
 
 /* ---- Error weights ---- */
@@ -194,17 +194,10 @@ static int ida_open_vectors (pw_method_data *d, pw_run *r) {
   return PW_OK;
 }
 
-/* Called by IDA at the start and at each restart: the next factorisation orders the matrix and selects pivots anew. */
-static int ida_initialise (SUNLinearSolver solver) {
-  return SUNLinSolInitialize (((pw_sun *)solver->content)->klu);
-}
-
-static int ida_open_solver (pw_method_data *d) {
+static int ida_open_integrator (pw_method_data *d) {
   pw_sun *x = &d->sun;
   void *m = d->ida = IDACreate (x->context);
-  if (m == NULL || pw_sun_open_solver (x, x->y, d, NULL) != PW_OK) return PW_RESOURCE;
-  x->solver->ops->initialize = ida_initialise;
-  if (IDASetErrHandlerFn (m, pw_sun_message, x) || IDASetUserData (m, d) ||
+  if (m == NULL || IDASetErrHandlerFn (m, pw_sun_message, x) || IDASetUserData (m, d) ||
       IDAInit (m, ida_residual, x->run->t, x->y, d->yp) || IDAWFtolerances (m, ida_weigh) || IDASetId (m, d->id) ||
       IDASetSuppressAlg (m, 1) || IDASetMaxNumSteps (m, -1) || IDASetMaxConvFails (m, PW_SUN_ATTEMPTS) ||
       IDASetMaxErrTestFails (m, PW_SUN_ATTEMPTS) || IDASetInitStep (m, pw_first_step (x->run)) ||
@@ -220,7 +213,7 @@ static int ida_open (pw_run *r, pw_error *error) {
   pw_method_data *d = r->data = calloc (1, sizeof *d);
   if (d == NULL) return pw_sun_no_memory (r, error);
   if (pw_dae_open (&d->dae, r) != PW_OK || ida_open_vectors (d, r) != PW_OK || ida_open_matrix (d) != PW_OK ||
-      ida_open_solver (d) != PW_OK || pw_quadrature_open (&d->sun.quadrature, r, ida_power) != PW_OK)
+      ida_open_integrator (d) != PW_OK || pw_quadrature_open (&d->sun.quadrature, r, ida_power) != PW_OK)
     return pw_sun_no_memory (r, error);
   if (r->statistics.steps == 0)
     d->sun.before = (pw_statistics){ 0 }; /* without evaluations of the initial conditions */

@@ -123,7 +123,8 @@ static int multistep_power (pw_run *r, double t, double *rate) {
 
 static int multistep_open_arrays (pw_method_data *d, pw_run *r) {
   size_t n = (size_t)d->n + 3, rows = (size_t)r->s->rows;
-  const pw_array array[] = { { &d->q, n }, { &d->v, n }, { &d->a, n }, { &d->error, 2 * n }, { &d->lambda, rows } };
+  const pw_array array[] = { { &d->q, n },         { &d->v, n },         { &d->a, n },
+                             { &d->error, 2 * n }, { &d->lambda, rows }, { &d->newton.right, n + rows } };
   if (pw_sun_open (&d->sun, r, 2 * d->n) != PW_OK) return PW_RESOURCE;
   d->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   if (d->memory == NULL) return PW_RESOURCE;
@@ -205,16 +206,15 @@ static int multistep_fail (pw_method_data *d, int flag, pw_error *error) {
                       error);
 }
 
-/* Accelerations and multipliers of the state reached, whose kinematics and J are up to date, without effect on the
- * statistics.  In a singular configuration the multipliers of the last iterate remain. */
-static void multistep_evaluate (pw_method_data *d) {
+/* Accelerations and multipliers of the state reached, unless they are known.  In a singular configuration those of the
+ * last iterate remain.  Returns as pw_run_accelerate. */
+static int multistep_evaluate (pw_method_data *d) {
   pw_run *r = d->sun.run;
-  const pw_statistics statistics = r->statistics;
-  r->refused_sine = 0;
-  d->evaluated = pw_run_accelerate_evaluated (r, r->v, r->a, r->lambda) == PW_OK;
+  if (d->evaluated) return PW_OK;
+  int status = multistep_complete (d, pw_before_breakpoint (r, r->t), 0, r->q, r->v, r->a, r->lambda);
+  d->evaluated = status == PW_OK;
   if (!d->evaluated) memcpy (r->lambda, d->lambda, (size_t)r->s->rows * sizeof *r->lambda);
-  r->refused_sine = r->thresholds.rank_lost;
-  r->statistics = statistics;
+  return status;
 }
 
 /* Work and losses up to the state reached.  Multipliers of the last Newton iterate, which may be the prediction, are
@@ -222,7 +222,7 @@ static void multistep_evaluate (pw_method_data *d) {
 static int multistep_work (pw_method_data *d) {
   pw_run *r = d->sun.run;
   int order = 1;
-  if (d->sun.klu && pw_ledger_uses_multipliers (r->s)) multistep_evaluate (d);
+  if (d->sun.solver && pw_ledger_uses_multipliers (r->s)) (void)multistep_evaluate (d);
   pw_ledger_rates (r, r->lambda, r->rate);
   CVodeGetLastOrder (d->cvode, &order);
   return pw_quadrature_step (&d->sun.quadrature, r, order);
@@ -261,8 +261,7 @@ static int multistep_at (pw_run *r, double t, pw_error *error) {
   pw_method_data *d = r->data;
   int status = PW_OK;
   if (t == r->t) {
-    if (!d->evaluated) status = multistep_complete (d, pw_before_breakpoint (r, t), 0, r->q, r->v, r->a, r->lambda);
-    d->evaluated = status == PW_OK;
+    status = multistep_evaluate (d);
     if (status == PW_OK) pw_sample_reached (r);
   } else {
     if (t < r->t && r->s->entries > 0) pw_quadrature_at (&d->sun.quadrature, r, t);

@@ -32,9 +32,9 @@ int pw_sun_open (pw_sun *x, pw_run *r, int unknowns) {
 
 void pw_sun_close (pw_sun *x) {
   if (x->solver) SUNLinSolFreeEmpty (x->solver);
-  if (x->klu) SUNLinSolFree (x->klu);
   if (x->iteration) SUNNonlinSolFree (x->iteration);
-  if (x->matrix) SUNMatDestroy (x->matrix);
+  if (x->matrix) SUNMatFreeEmpty (x->matrix);
+  pw_sparse_close (&x->sparse);
   if (x->y) N_VDestroy (x->y);
   if (x->context) SUNContext_Free (&x->context);
   pw_quadrature_close (&x->quadrature);
@@ -51,44 +51,49 @@ void pw_sun_restart (pw_sun *x) {
 
 /* ---- Linear solver ---- */
 
-void pw_sun_begin_fill (SUNMatrix matrix, pw_scatter_map *t) {
-  size_t columns = (size_t)SUNSparseMatrix_Columns (matrix);
-  memcpy (SUNSparseMatrix_IndexPointers (matrix), t->colptr, (columns + 1) * sizeof *t->colptr);
-  memcpy (SUNSparseMatrix_IndexValues (matrix), t->rowind, t->nonzeros * sizeof *t->rowind);
-  pw_scatter_begin_fill (t, SUNSparseMatrix_Data (matrix));
-}
-
-int pw_sun_open_matrix (pw_sun *x, int size, pw_scatter_map *t) {
-  x->matrix = SUNSparseMatrix (size, size, (sunindextype)t->nonzeros, CSC_MAT, x->context);
-  if (x->matrix) pw_sun_begin_fill (x->matrix, t);
-  return x->matrix ? PW_OK : PW_RESOURCE;
-}
-
 static SUNLinearSolver_Type sun_solver_type (SUNLinearSolver solver) {
   (void)solver;
   return SUNLINEARSOLVER_DIRECT;
 }
 
-/* The content of each solver begins with its pw_sun. */
+static int sun_clear (SUNMatrix matrix) {
+  (void)matrix; /* the method clears the values */
+  return 0;
+}
+
+/* The content of each solver begins with its pw_sun.  Called at the start and at each restart. */
+static int sun_initialise (SUNLinearSolver solver) {
+  pw_sparse_forget_pivots (&((pw_sun *)solver->content)->sparse);
+  return SUNLS_SUCCESS;
+}
+
 static int sun_factorise (SUNLinearSolver solver, SUNMatrix matrix) {
-  return SUNLinSolSetup (((pw_sun *)solver->content)->klu, matrix);
+  pw_sun *x = solver->content;
+  (void)matrix;
+  x->factorised = pw_sparse_factor (&x->sparse, x->value);
+  return x->factorised == PW_OK ? SUNLS_SUCCESS : x->factorised < 0 ? SUNLS_PACKAGE_FAIL_UNREC : SUNLS_PACKAGE_FAIL_REC;
 }
 
 static int sun_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector result, N_Vector b, realtype tolerance) {
-  const pw_sun *x = solver->content;
+  pw_sun *x = solver->content;
+  (void)matrix, (void)tolerance;
   if (x->run->matrix_outdated) return SUNLS_PACKAGE_FAIL_REC;
-  return SUNLinSolSolve (x->klu, matrix, result, b, tolerance);
+  N_VScale (1, b, result);
+  return pw_sparse_solve (&x->sparse, N_VGetArrayPointer (result)) == PW_OK ? SUNLS_SUCCESS : SUNLS_PACKAGE_FAIL_UNREC;
 }
 
-int pw_sun_open_solver (pw_sun *x, N_Vector right, void *content, pw_sun_solve *solve) {
-  x->klu = SUNLinSol_KLU (right, x->matrix, x->context);
+int pw_sun_open_solver (pw_sun *x, int size, pw_scatter_map *map, void *content, pw_sun_solve *solve) {
+  x->value = map->value;
+  x->matrix = SUNMatNewEmpty (x->context);
   x->solver = SUNLinSolNewEmpty (x->context);
-  if (x->klu == NULL || x->solver == NULL) return PW_RESOURCE;
+  if (x->matrix == NULL || x->solver == NULL) return PW_RESOURCE;
+  x->matrix->ops->zero = sun_clear;
   x->solver->content = content;
   x->solver->ops->gettype = sun_solver_type;
+  x->solver->ops->initialize = sun_initialise;
   x->solver->ops->setup = sun_factorise;
   x->solver->ops->solve = solve ? solve : sun_solve;
-  return PW_OK;
+  return pw_sparse_open (&x->sparse, PW_SPARSE_REAL, size, map->colptr, map->rowind);
 }
 
 /* ---- Newton's iteration, error weights ---- */
@@ -144,8 +149,7 @@ int pw_sun_fail_restart (pw_sun *x, int flag, pw_error *error) {
 int pw_sun_fail (pw_sun *x, int flag, int singular, const char *why, pw_error *error) {
   pw_run *r = x->run;
   if (r->stopped) return r->interrupted = 1, PW_STOPPED;
-  if (flag == CV_LSETUP_FAIL && SUNLinSol_KLUGetCommon (x->klu)->status == KLU_OUT_OF_MEMORY)
-    return pw_sun_no_memory (r, error);
+  if (flag == CV_LSETUP_FAIL && x->factorised == PW_RESOURCE) return pw_sun_no_memory (r, error);
   if (flag == CV_RHSFUNC_FAIL) return pw_fail_signal (r->t, error);
   if (singular || pw_watchdog_near_state (r)) return pw_fail_singular (r, r->t, error);
   if (why == NULL)

@@ -5,12 +5,12 @@
 #include <stdint.h>
 #include <sundials/sundials_types.h>
 #include <sundials/sundials_context.h>
+#include <sundials/sundials_linearsolver.h>
 #include <nvector/nvector_serial.h>
-#include <sunlinsol/sunlinsol_klu.h>
-#include <sunmatrix/sunmatrix_sparse.h>
 #include <sunnonlinsol/sunnonlinsol_newton.h>
 #include "quadrature.h"
 #include "scatter.h"
+#include "sparse.h"
 
 /* Attempts at a step, each about a quarter of the one before, if the iteration does not converge or the error is too
  * large: from 1 s down to the round-off of the time.  SUNDIALS' defaults of 7 and 10, down to a millionth of the
@@ -20,9 +20,12 @@ enum { PW_SUN_ATTEMPTS = 27 };
 typedef struct {
   pw_run *run;
   SUNContext context;
-  N_Vector y;                   /* unknowns: q, v, then those of the method */
-  SUNMatrix matrix;             /* of Newton's iteration; NULL in adams, like both solvers */
-  SUNLinearSolver klu, solver;  /* KLU; the solver that the integrator calls, which calls KLU */
+  N_Vector y;       /* unknowns: q, v, then those of the method */
+  pw_sparse sparse; /* factors of the matrix of Newton's iteration; not in adams, as the next four */
+  double *value;    /* of the matrix */
+  int factorised;   /* status of the last factorisation */
+  SUNMatrix matrix; /* empty: the integrators require one */
+  SUNLinearSolver solver;
   SUNNonlinearSolver iteration; /* NULL: the default of the integrator */
   double correction;            /* size of the last Newton correction, for pw_sun_test_newton */
   pw_quadrature quadrature;     /* of work and losses */
@@ -42,16 +45,11 @@ void pw_sun_restart (pw_sun *x);
 /* A vector with the operations of vectors.c, as have its clones; NULL: out of memory. */
 N_Vector pw_sun_vector (sunindextype length, SUNContext context);
 
-/* Open x->matrix, of the pattern of a scatter map, and x->solver, which refuses an outdated matrix (tolerances.c)
- * so that the integrator requests a new one.  right: a vector of the size of the matrix; content: the method's data,
- * beginning with x, which `solve` finds in its solver; solve: NULL for KLU's; any other must itself refuse an outdated
- * matrix. */
+/* Opens x->solver for the matrix of this size that a scatter map fills.  It refuses an outdated matrix (tolerances.c)
+ * so that the integrator requests a new one.  content: the method's data, beginning with x, which `solve` finds in its
+ * solver; solve: NULL for that of the matrix; any other must itself refuse an outdated matrix. */
 typedef int pw_sun_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector x, N_Vector b, realtype tolerance);
-int pw_sun_open_matrix (pw_sun *x, int size, pw_scatter_map *t);
-int pw_sun_open_solver (pw_sun *x, N_Vector right, void *content, pw_sun_solve *solve);
-
-/* From now on contributions are added to this matrix.  Restores its pattern, which SUNDIALS clears with the values. */
-void pw_sun_begin_fill (SUNMatrix matrix, pw_scatter_map *t);
+int pw_sun_open_solver (pw_sun *x, int size, pw_scatter_map *map, void *content, pw_sun_solve *solve);
 
 /* Replaces the convergence test of x->iteration, a Newton iteration that the integrator uses already.  The test of
  * SUNDIALS multiplies the first correction by the convergence rate of previous steps, which is meaningless if a force

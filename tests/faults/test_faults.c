@@ -8,8 +8,6 @@
 #include <string.h>
 #include <unistd.h>
 #include <nvector/nvector_serial.h>
-#include <sunlinsol/sunlinsol_klu.h>
-#include <sunmatrix/sunmatrix_sparse.h>
 #include <sunnonlinsol/sunnonlinsol_fixedpoint.h>
 #include "check.h"
 #include "pinwheel-solvers.h"
@@ -61,14 +59,9 @@ typedef int faults_klu;
 /* clang-format off: one line each, for the Makefile */
 FAULT_FLAG (-1, SUNContext_Create, (void *comm, SUNContext *c), (comm, c))
 FAULT_ADDRESS (N_Vector, N_VNew_Serial, (sunindextype n, SUNContext c), (n, c))
-FAULT_ADDRESS (SUNMatrix, SUNSparseMatrix, (sunindextype m, sunindextype n, sunindextype nnz, int type, SUNContext c),
-               (m, n, nnz, type, c))
-FAULT_ADDRESS (SUNLinearSolver, SUNLinSol_KLU, (N_Vector y, SUNMatrix a, SUNContext c), (y, a, c))
+FAULT_ADDRESS (SUNMatrix, SUNMatNewEmpty, (SUNContext c), (c))
 FAULT_ADDRESS (SUNLinearSolver, SUNLinSolNewEmpty, (SUNContext c), (c))
 FAULT_ADDRESS (SUNNonlinearSolver, SUNNonlinSol_FixedPoint, (N_Vector y, int m, SUNContext c), (y, m, c))
-FAULT_FLAG (SUNLS_PACKAGE_FAIL_UNREC, SUNLinSolSetup, (SUNLinearSolver s, SUNMatrix a), (s, a))
-FAULT_FLAG (SUNLS_PACKAGE_FAIL_UNREC, SUNLinSolSolve,
-            (SUNLinearSolver s, SUNMatrix a, N_Vector x, N_Vector b, realtype tol), (s, a, x, b, tol))
 FAULT_ADDRESS (void *, IDACreate, (SUNContext c), (c))
 FAULT_FLAG (IDA_MEM_FAIL, IDAInit, (void *m, IDAResFn f, realtype t, N_Vector y, N_Vector yp), (m, f, t, y, yp))
 FAULT_FLAG (IDA_MEM_FAIL, IDAReInit, (void *m, realtype t, N_Vector y, N_Vector yp), (m, t, y, yp))
@@ -131,9 +124,10 @@ static int fault_run (pw_system *s, const char *method, pw_error *error) {
 }
 
 /* Calls whose failure the integrators may repair by themselves, with a smaller step or other pivots. */
-static int fault_may_pass (void) {
-  static const char *const name[] = { "SUNLinSolSetup", "SUNLinSolSolve",  "klu_l_refactor",
-                                      "klu_l_rcond",    "klu_zl_refactor", "klu_zl_rcond" };
+static int fault_may_pass (const char *method) {
+  static const char *const name[] = { "klu_l_refactor", "klu_l_rcond", "klu_zl_refactor", "klu_zl_rcond" };
+  const int is_sundials = strncmp (method, "bdf", 3) == 0 || strncmp (method, "ida", 3) == 0;
+  if (is_sundials && strcmp (fault.name, "klu_l_factor") == 0) return 1; /* the matrix seems to be singular */
   for (size_t i = 0; i < sizeof name / sizeof *name; i++)
     if (strcmp (fault.name, name[i]) == 0) return 1;
   return 0;
@@ -171,7 +165,7 @@ static void fault_each (pw_system *s, const char *method) {
     }
     int good = (status == PW_RESOURCE || status == PW_METHOD) && error.status == status && strlen (error.text) > 10 &&
                strstr (error.text, "s:  ") == NULL;
-    if (status == PW_OK) good = fault_may_pass ();
+    if (status == PW_OK) good = fault_may_pass (method);
     if (!good)
       print_error ("%s: call %ld, %s: status %d, \"%s\"\n", method, fault.fail, fault.name, status, error.text);
     assert_true (good);
