@@ -17,8 +17,8 @@ typedef struct {
   int unknowns, equations; /* entries of x and of F */
   double tolerance;        /* solutions have |F_i| <= tolerance */
   double rank_tolerance;   /* smaller singular values, relative to the largest one, count as 0; default 1e-9 */
-  /* Evaluates F (equations) and, unless dF is NULL, its derivatives with respect to u, by columns: equations x
-   * (unknowns + 1); both are 0 on entry.  A status; PW_RETRY, with or without an error: F cannot be evaluated at u. */
+  /* Evaluates F (equations) and, unless dF is NULL, its derivatives with respect to x, by columns: equations x
+   * unknowns; both are 0 on entry.  A status; PW_RETRY, with or without an error: F cannot be evaluated at u. */
   int (*evaluate) (void *context, const double *u, double *F, double *dF, pw_error *error);
   /* Whether two solutions are the same up to symmetries; NULL: only if their unknowns are. */
   int (*same) (void *context, const double *u, const double *other);

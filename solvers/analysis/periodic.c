@@ -47,7 +47,6 @@ static int periodic_arrays (pw_periodic *x) {
     { &x->re, states },
     { &x->im, states },
     { &x->work, (size_t)pw_steady_rate_count (x->s) + all },
-    { &x->beside, all + 2 * states },
   };
   x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   return x->memory ? PW_OK : PW_RESOURCE;
@@ -59,7 +58,7 @@ static int periodic_signal_period (pw_periodic *x, double *period) {
   const double value[] = { x->settings.first, pw_value_within (x->settings.first, x->settings.last) };
   *period = 0;
   for (int i = 0; i < 2 && *period == 0; i++) {
-    const pw_system *s = pw_periodic_system (x, PW_HERE, value[i]);
+    const pw_system *s = pw_periodic_system (x, value[i]);
     if (s == NULL && i > 0 && x->why.status != PW_RESOURCE) return x->why = (pw_error){ 0 }, PW_OK;
     if (s == NULL) return x->why.status;
     *period = pw_system_period (s);
@@ -114,7 +113,7 @@ static int periodic_open (pw_periodic *x, pw_error *error) {
   if (periodic_arrays (x) != PW_OK) return pw_fail_memory (s, error);
   int status = pw_branch_open (&x->branch, &problem, error);
   if (status != PW_OK) return status;
-  pw_run *r = pw_periodic_run (x, PW_HERE, x->settings.first, 0, NULL); /* verifies the signals */
+  pw_run *r = pw_periodic_run (x, x->settings.first, 0, NULL); /* verifies the signals */
   if (r == NULL) return pw_fail (error, x->why.status, "%s", x->why.text);
   pw_run_close (r);
   return PW_OK;
@@ -139,7 +138,7 @@ pw_periodic *pw_periodic_open (const pw_system *s, const pw_periodic_settings *s
 
 void pw_periodic_close (pw_periodic *x) {
   if (x == NULL) return;
-  for (pw_place place = PW_HERE; place < PW_PLACES; place++) pw_system_free (x->system[place].own);
+  pw_system_free (x->system.own);
   pw_branch_close (&x->branch);
   pw_steady_close (x->steady);
   free (x->memory);
@@ -173,15 +172,15 @@ static int periodic_turns (pw_periodic *x) {
 
 /* The motion of u, with its multipliers. */
 static int periodic_orbit (pw_periodic *x, const double *u, pw_periodic_orbit *out, pw_error *error) {
-  int status = pw_periodic_flow (x, u, PW_FLOW_MULTIPLIERS, PW_HERE, error);
+  int status = pw_periodic_flow (x, u, PW_FLOW_MULTIPLIERS, error);
   if (status == PW_OK) status = pw_periodic_multipliers (x, u, &out->trivial);
   if (status == PW_METHOD) return pw_fail (error, status, "model %s: no multipliers: LAPACK failed", x->s->model);
   out->rotation = x->work[PW_RATE_TURN]; /* the multipliers have set x->work */
-  if (status == PW_OK) status = pw_periodic_flow (x, u, PW_FLOW, PW_HERE, error);
+  if (status == PW_OK) status = pw_periodic_flow (x, u, PW_FLOW, error);
   if (status == PW_OK) status = periodic_turns (x);
   if (status != PW_OK) return status;
   out->parameter = pw_periodic_parameter (x, u);
-  out->period = x->last_period = x->settings.free ? u[pw_periodic_unknowns (x) - 1] * x->T : x->system[PW_HERE].period;
+  out->period = x->last_period = x->settings.free ? u[pw_periodic_unknowns (x) - 1] * x->T : x->system.period;
   out->q = x->y0, out->v = x->y0 + x->n, out->end = x->y1;
   out->multipliers = x->size;
   out->re = x->re, out->im = x->im;

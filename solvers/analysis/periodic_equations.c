@@ -73,8 +73,8 @@ static void equations_by_displacement (pw_periodic *x, const double *u, int rows
 
 /* The change of D (d) y by a change of y: positions and velocities rotate by the angle w. */
 static void equations_rotate (const pw_periodic *x, double w, const double *in, double *out) {
-  pw_linear_rotate (&x->steady->system[PW_HERE].linearisation, w, in, out);
-  pw_linear_rotate (&x->steady->system[PW_HERE].linearisation, w, in + x->n, out + x->n);
+  pw_linear_rotate (&x->steady->system.linearisation, w, in, out);
+  pw_linear_rotate (&x->steady->system.linearisation, w, in + x->n, out + x->n);
 }
 
 /* The angle by which the whole turns in the last flow: that of the first body whose angle no symmetry changes except by
@@ -93,7 +93,7 @@ int pw_periodic_guess_displacement (pw_periodic *x, double *u, pw_error *error) 
   enum { CORRECTIONS = 3 }; /* the rotation is known; for a given one translations are linear */
   int states = 2 * x->n, count = x->symmetries, rates = pw_steady_rate_count (x->s), rank;
   size_t rows = 2 * (size_t)states, work_size = rows + (size_t)(PW_PERIODIC_WORK * (states + count));
-  int status = count ? pw_periodic_flow (x, u, PW_FLOW, PW_HERE, error) : PW_OK;
+  int status = count ? pw_periodic_flow (x, u, PW_FLOW, error) : PW_OK;
   if (status != PW_OK || count == 0) return status;
   double *F = calloc (rows + rows * (size_t)count + work_size, sizeof *F), *M = F + rows,
          *work = M + rows * (size_t)count;
@@ -144,7 +144,7 @@ static void equations_shift (pw_periodic *x, int k) {
   const double *symmetry = x->steady->symmetry + k * pw_steady_rate_count (x->s);
   pw_steady_velocities (x->steady, symmetry, x->y0, x->change);
   memset (x->change + n, 0, bytes);
-  pw_linear_turn (&x->steady->system[PW_HERE].linearisation, symmetry[PW_RATE_TURN], x->y0 + n, x->change + n);
+  pw_linear_turn (&x->steady->system.linearisation, symmetry[PW_RATE_TURN], x->y0 + n, x->change + n);
 }
 
 /* The conditions that corrections are orthogonal to these directions. */
@@ -167,42 +167,18 @@ static void equations_by_period (pw_periodic *x, double *column) {
   }
 }
 
-/* The derivatives with respect to the parameter by central differences, at the end of its domain by one-sided ones. */
-static int equations_by_parameter (pw_periodic *x, const double *u, double *column, pw_error *error) {
-  const double h = 1e-5;
-  int unknowns = pw_periodic_unknowns (x), rows = 4 * x->n;
-  double *beside = x->beside, *F = beside + unknowns + 1, distance = 0;
-  memcpy (beside, u, ((size_t)unknowns + 1) * sizeof *u);
-  for (int side = -1; side <= 1; side += 2) {
-    beside[unknowns] = u[unknowns] + side * h;
-    int status = pw_periodic_flow (x, beside, PW_FLOW, PW_BESIDE, error);
-    if (status == PW_OK)
-      distance += h;
-    else if (status == PW_RETRY) {
-      beside[unknowns] = u[unknowns];
-      status = pw_periodic_flow (x, beside, PW_FLOW, PW_BESIDE, error);
-    }
-    if (status != PW_OK) return status;
-    equations_residual (x, beside, F);
-    for (int i = 0; i < rows; i++) column[i] += side * F[i];
-  }
-  for (int i = 0; i < rows; i++) column[i] /= distance;
-  return distance > 0 ? PW_OK : PW_RETRY;
-}
-
-/* The flows beside u come first, and that without derivatives last: the equations need its x->y0 to x->a1. */
+/* The flow without derivatives comes last: the equations need its x->y0 to x->a1. */
 int pw_periodic_evaluate (void *periodic, const double *u, double *F, double *dF, pw_error *error) {
   pw_periodic *x = periodic;
-  int rows = x->branch.problem.equations, states = 2 * x->n, unknowns = pw_periodic_unknowns (x), status = PW_OK;
-  if (dF && x->settings.compile) status = equations_by_parameter (x, u, dF + (size_t)unknowns * (size_t)rows, error);
-  if (status == PW_OK && dF) status = pw_periodic_flow (x, u, PW_FLOW_DERIVATIVES, PW_HERE, error);
-  if (status == PW_OK) status = pw_periodic_flow (x, u, PW_FLOW, PW_HERE, error);
+  int rows = x->branch.problem.equations, states = 2 * x->n;
+  int status = dF ? pw_periodic_flow (x, u, PW_FLOW_DERIVATIVES, error) : PW_OK;
+  if (status == PW_OK) status = pw_periodic_flow (x, u, PW_FLOW, error);
   if (status != PW_OK) return status;
   equations_residual (x, u, F);
   if (dF == NULL) return PW_OK;
   equations_by_state (x, u, rows, dF);
   equations_by_displacement (x, u, rows, dF + states * rows);
-  if (x->settings.free) equations_by_period (x, dF + (unknowns - 1) * rows);
+  if (x->settings.free) equations_by_period (x, dF + (pw_periodic_unknowns (x) - 1) * rows);
   equations_orthogonal (x, rows, dF);
   return PW_OK;
 }

@@ -10,9 +10,6 @@
 #include "continuation.h"
 #include "linear.h"
 
-/* The system at the value of the parameter in question, and that beside it, for differences. */
-typedef enum { PW_HERE, PW_BESIDE, PW_PLACES } pw_place;
-
 struct pw_steady {
   const pw_system *s; /* as described */
   pw_steady_settings settings;
@@ -34,7 +31,7 @@ struct pw_steady {
     pw_system *own; /* by settings.compile; NULL: s serves */
     pw_run *run;    /* NULL: not open */
     pw_linearisation linearisation;
-  } system[PW_PLACES];
+  } system;
   pw_initial_value *solution; /* 2 n: the last solution, where runs are opened; or that configuration at rest */
   int solved;                 /* 1: there is one */
 
@@ -118,10 +115,10 @@ enum { PW_STEADY_MAX_COORDINATES = 400 }; /* since the cost is cubic */
 /* The system of pw_steady_settings.compile; NULL and the reason if this returns none or records an error. */
 pw_system *pw_compile_at (pw_system *(*compile) (void *context, double value, pw_error *error), void *context,
                           double value, pw_error *why);
-/* Opens x->system[place] for a value of the parameter, unless it is open for it.  A status, with x->why if it fails;
+/* Opens x->system for a value of the parameter, unless it is open for it.  A status, with x->why if it fails;
  * PW_INPUT: its sizes differ; PW_RETRY: none at this value (x->why has the status of the error). */
-int pw_steady_open_system (pw_steady *x, pw_place place, double value);
-void pw_steady_close_system (pw_steady *x, pw_place place);
+int pw_steady_open_system (pw_steady *x, double value);
+void pw_steady_close_system (pw_steady *x);
 /* PW_INPUT and the reason unless both systems have as many bodies, coordinates and constraint equations. */
 int pw_steady_same_sizes (const pw_system *a, const pw_system *b, pw_error *why);
 
@@ -130,13 +127,12 @@ int pw_steady_same_sizes (const pw_system *a, const pw_system *b, pw_error *why)
 /* What can be held is numbered: the states, then PW_HOLD_OF_BODY quantities of each body. */
 enum { PW_HOLD_SPEED, PW_HOLD_RADIUS, PW_HOLD_CURVATURE, PW_HOLD_OF_BODY };
 /* The residual A - value B of what is held (steady_hold.c) in the state x->q, x->v, or if dq is not NULL its change by
- * the variation (dq, dv); its derivative with respect to the value.  All are divided by the unit of A. */
+ * the variation (dq, dv); divided by the unit of A. */
 double pw_hold_residual (const pw_steady *x, const pw_initial_value *hold, const double *dq, const double *dv);
-double pw_hold_slope (const pw_steady *x, const pw_initial_value *hold);
 
 /* ---- steady_start.c ---- */
 
-/* The unknowns, except the parameter, with which an attempt begins; x->system[PW_HERE] is open.  Attempt 0: the initial
+/* The unknowns, except the parameter, with which an attempt begins; x->system is open.  Attempt 0: the initial
  * state; 1: a state to which forces lead from there; then random states, even attempts near the initial one, odd ones
  * anywhere.  Of these, by attempt modulo 4: 0 and 1 need not be consistent; 2: a state to which forces lead as in
  * attempt 1; 3: consistent. */

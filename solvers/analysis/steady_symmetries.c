@@ -38,7 +38,7 @@ void pw_steady_velocities (const pw_steady *x, const double *rates, const double
 
 /* What displacements of these rates change in the equations at x->q, x->v, in units of the scene. */
 static void symmetry_violation (pw_steady *x, const double *rates, double *out) {
-  pw_linearisation *l = &x->system[PW_HERE].linearisation;
+  pw_linearisation *l = &x->system.linearisation;
   memset (l->dx, 0, 2 * (size_t)x->n * sizeof *l->dx);
   pw_steady_velocities (x, rates, x->q, l->dx);
   pw_linear_turn (l, rates[PW_RATE_TURN], x->v, l->dx + x->n);
@@ -47,7 +47,7 @@ static void symmetry_violation (pw_steady *x, const double *rates, double *out) 
 
 /* The largest change of an acceleration by a single coordinate, in units of the scene. */
 static double symmetry_largest_change (pw_steady *x) {
-  pw_linearisation *l = &x->system[PW_HERE].linearisation;
+  pw_linearisation *l = &x->system.linearisation;
   double most = 0;
   for (int c = 0; c < x->n; c++) {
     memset (l->dx, 0, 2 * (size_t)x->n * sizeof *l->dx);
@@ -128,7 +128,7 @@ static void symmetry_displace (pw_steady *x, double distance, int number) {
 /* Evaluates derivatives at state `number` in general position, but on the constraints: off them residuals rotate with
  * the whole.  near: greatest distance of a state from the initial one, or from that after a displacement. */
 static int symmetry_evaluate (pw_steady *x, double near, int number) {
-  pw_run *r = x->system[PW_HERE].run;
+  pw_run *r = x->system.run;
   pw_projector p;
   pw_irregular_state (r, near, number, x->q, x->v);
   if (number >= SYMMETRY_NEAR) symmetry_displace (x, x->L * pow (3, number - SYMMETRY_NEAR), number);
@@ -136,14 +136,14 @@ static int symmetry_evaluate (pw_steady *x, double near, int number) {
   int status = pw_project_positions (&p, r, x->settings.t, x->q, x->v);
   if (status == PW_OK) status = pw_project_velocities (&p, r, x->v);
   pw_projector_close (&p);
-  if (status == PW_OK) status = pw_linear_evaluate (&x->system[PW_HERE].linearisation, x->settings.t, x->q, x->v);
-  if (status == PW_OK) pw_rank_rows (r->w, x->system[PW_HERE].linearisation.R, x->system[PW_HERE].linearisation.norm);
+  if (status == PW_OK) status = pw_linear_evaluate (&x->system.linearisation, x->settings.t, x->q, x->v);
+  if (status == PW_OK) pw_rank_rows (r->w, x->system.linearisation.R, x->system.linearisation.norm);
   return status;
 }
 
 /* Number of residuals and accelerations by which an asymmetry is measured. */
 static int symmetry_length (const pw_steady *x) {
-  const pw_linearisation *l = &x->system[PW_HERE].linearisation;
+  const pw_linearisation *l = &x->system.linearisation;
   return l->holonomic + l->rank + x->n + 3; /* the last three are 0, so that there are at least as many as rates */
 }
 
@@ -244,7 +244,7 @@ int pw_steady_find_symmetries (pw_steady *x) {
 
 int pw_steady_keep_symmetries (pw_steady *x) {
   int rates = pw_steady_rate_count (x->s), count = x->symmetries, rows = symmetry_length (x);
-  int status = pw_linear_evaluate (&x->system[PW_HERE].linearisation, x->settings.t, x->q, x->v);
+  int status = pw_linear_evaluate (&x->system.linearisation, x->settings.t, x->q, x->v);
   if (status != PW_OK || count == 0) return status;
   double *M = calloc ((size_t)(rows + count + rates) * (size_t)count, sizeof *M), *c = M + rows * count,
          *kept = c + count * count;
@@ -270,7 +270,7 @@ int pw_steady_find_free_symmetries (pw_steady *x) {
     const double *symmetry = x->symmetry + k * pw_steady_rate_count (x->s);
     pw_steady_velocities (x, symmetry, x->q, x->dq);
     memset (x->dv, 0, (size_t)x->n * sizeof *x->dv);
-    pw_linear_turn (&x->system[PW_HERE].linearisation, symmetry[PW_RATE_TURN], x->v, x->dv);
+    pw_linear_turn (&x->system.linearisation, symmetry[PW_RATE_TURN], x->v, x->dv);
     for (int i = 0; i < holds; i++) M[k * rows + i] = pw_hold_residual (x, x->hold + i, x->dq, x->dv);
   }
   x->free_symmetries = symmetries ? pw_null_space (rows, symmetries, M, PW_STEADY_RANK, x->free_symmetry) : 0;
