@@ -25,22 +25,11 @@ static const double EQUATIONS_STEADY = 1e-4;
 
 /* ---- Displacements ---- */
 
-/* The state y displaced for unit time at these rates: the whole translates by t while it rotates by w about the origin,
- * p -> R p + V t, with R the rotation by w and V the mean of the rotations on the way. */
-static void equations_displace (const pw_periodic *x, const double *rates, const double *y, double *out) {
-  int n = x->n, bodies = x->s->bodies;
-  double w = rates[PW_RATE_TURN], c = pw_cos (w), s = pw_sin (w), half = pw_sin (w / 2);
-  double p = fabs (w) > 1e-8 ? s / w : 1, r = fabs (w) > 1e-8 ? 2 * half * half / w : w / 2; /* V = [ p -r ; r p ] */
-  const double *o = x->steady->origin, t[2] = { x->L * rates[PW_RATE_X], x->L * rates[PW_RATE_Y] };
-  memcpy (out, y, 2 * (size_t)n * sizeof *out);
-  for (int b = 0; b < bodies; b++) {
-    double *q = out + 3 * b, *v = out + n + 3 * b, dx = q[0] - o[0], dy = q[1] - o[1], vx = v[0], vy = v[1];
-    q[0] = o[0] + c * dx - s * dy + p * t[0] - r * t[1];
-    q[1] = o[1] + s * dx + c * dy + r * t[0] + p * t[1];
-    q[2] += w + rates[PW_RATE_ANGLES + b];
-    v[0] = c * vx - s * vy, v[1] = s * vx + c * vy;
-  }
-  for (int j = 3 * bodies; j < n; j++) out[j] += rates[pw_steady_angle_rate (x->s, j)];
+/* x->work = the rates of the displacement d, x->state = D (d) y at the initial state y = x->y0. */
+static void equations_displace (pw_periodic *x, const double *d) {
+  pw_steady_combine (x->steady, d, 1, x->work);
+  memcpy (x->state, x->y0, 2 * (size_t)x->n * sizeof *x->state);
+  pw_steady_displace (x->steady, x->work, 1, x->state, x->state + x->n);
 }
 
 /* ---- Equations ---- */
@@ -48,8 +37,7 @@ static void equations_displace (const pw_periodic *x, const double *rates, const
 /* After a flow from the state of u. */
 static void equations_residual (pw_periodic *x, const double *u, double *F) {
   int states = 2 * x->n;
-  pw_steady_combine (x->steady, u + states, 1, x->work);
-  equations_displace (x, x->work, x->y0, x->state);
+  equations_displace (x, u + states);
   for (int j = 0; j < states; j++) {
     F[j] = pw_periodic_difference (x, j, x->y1[j], x->state[j]) / pw_periodic_unit (x, j);
     F[states + j] = u[j] - x->y0[j] / pw_periodic_unit (x, j);
@@ -65,8 +53,7 @@ static void equations_by_displacement (pw_periodic *x, const double *u, int rows
     for (int side = -1; side <= 1; side += 2) {
       memcpy (d, u + states, (size_t)x->symmetries * sizeof *d);
       d[k] += side * h;
-      pw_steady_combine (x->steady, d, 1, x->work);
-      equations_displace (x, x->work, x->y0, x->state);
+      equations_displace (x, d);
       for (int j = 0; j < states; j++) column[j] -= side * x->state[j] / (2 * h) / pw_periodic_unit (x, j);
     }
 }

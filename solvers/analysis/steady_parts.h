@@ -24,7 +24,7 @@ struct pw_steady {
   double origin[2];      /* about which rates of rotation turn the whole [m] */
   double *symmetry;      /* symmetries x rates: a basis of the symmetries */
   int free_symmetries;   /* those that leave what is held unchanged; 0 before a solution is found */
-  double *free_symmetry; /* free_symmetries x symmetries: their coefficients in that basis */
+  double *free_symmetry; /* free_symmetries x symmetries: their coefficients in that basis; scratch */
 
   struct {
     double value;   /* of the parameter */
@@ -66,6 +66,8 @@ static inline int pw_steady_angle_rate (const pw_system *s, int j) {
 void pw_steady_combine (const pw_steady *x, const double *coefficient, double unit, double *rates);
 /* The velocities that rates cause at a configuration. */
 void pw_steady_velocities (const pw_steady *x, const double *rates, const double *q, double *v);
+/* Displaces a state at these rates for a time. */
+void pw_steady_displace (const pw_steady *x, const double *rates, double time, double *q, double *v);
 /* out: orthonormal rows of length n that span the null space of M (rows x n, by columns, destroyed; rows >= n > 0).
  * Singular values up to the tolerance, or up to round-off, count as 0.  Returns the number of rows, or a status < 0. */
 int pw_null_space (int rows, int n, double *M, double tolerance, double *out);
