@@ -15,8 +15,7 @@ static const double PERIODIC_EXACT = 1e-9, /* largest residual of a solution, in
     PERIODIC_CIRCLE = 1e-6,                /* distance from the unit circle that is not round-off */
     PERIODIC_MIN_STEP = 1e-5,              /* in scaled unknowns; the range of the parameter is 1 */
     PERIODIC_EVENT = 1e-7,                 /* accuracy of events, relative to the step */
-    PERIODIC_FOLD = 1e-3, /* largest distance of a fold from the crossing of a multiplier there, relative to the step */
-    PERIODIC_REAL = 1e-3; /* imaginary part, after location, of a pair that is about to become real */
+    PERIODIC_REAL = 1e-3;                  /* imaginary part, after location, of a pair that is about to become real */
 
 /* pw_branch_problem.same: up to symmetries, but not up to a shift in time. */
 static int periodic_same (void *periodic, const double *u, const double *other) {
@@ -251,44 +250,31 @@ static int periodic_test (void *periodic, const pw_branch_point *point, double *
   return status;
 }
 
-/* Locates where multiplier number `sought` crosses the unit circle between the last two points; `inside` is the one at
- * which it does not lie outside. */
-static int periodic_crossing (pw_periodic *x, const pw_branch_point *inside, pw_periodic_event *event,
-                              pw_error *error) {
+/* pw_branch_locate_mode: where a multiplier crosses the unit circle. */
+static int periodic_crossing (void *periodic, int mode, int change, int *event, int *modes, pw_error *error) {
+  pw_periodic *x = periodic;
   pw_branch *b = &x->branch;
   double value;
-  x->on_circle = 0;
-  int status = periodic_test (x, inside, &value, error);
+  x->sought = mode, x->on_circle = 0;
+  int status = periodic_test (x, change < 0 ? &b->reached : &b->previous, &value, error); /* not outside the circle */
   x->on_circle = fabs (value) < PERIODIC_CIRCLE;
   if (status == PW_OK) status = pw_branch_locate (b, periodic_test, x, error);
   if (status == PW_OK) status = periodic_test (x, &b->found, &value, error);
-  *event = fabs (x->im[x->sought]) > PERIODIC_REAL ? PW_PERIODIC_TORUS
-           : x->re[x->sought] > 0                  ? PW_PERIODIC_REAL
-                                                   : PW_PERIODIC_FLIP;
+  *event = fabs (x->im[mode]) > PERIODIC_REAL ? PW_PERIODIC_TORUS
+           : x->re[mode] > 0                  ? PW_PERIODIC_REAL
+                                              : PW_PERIODIC_FLIP;
+  *modes = *event == PW_PERIODIC_TORUS ? 2 : 1;
   return status;
 }
 
-/* pw_branch_find_events: multipliers that cross the unit circle.  At a fold, one that passes 1 is no event of its
- * own. */
+/* pw_branch_find_events: multipliers that cross the unit circle. */
 static int periodic_events (void *periodic, pw_error *error) {
   pw_periodic *x = periodic;
-  pw_branch *b = &x->branch;
   pw_periodic_orbit o;
-  int before = x->unstable, status = periodic_orbit (x, b->reached.u, &o, error);
+  int before = x->unstable, status = periodic_orbit (x, x->branch.reached.u, &o, error);
   if (status != PW_OK) return status;
   x->unstable = o.unstable;
-  int least = before < o.unstable ? before : o.unstable, most = before < o.unstable ? o.unstable : before;
-  double fold = b->folded ? b->queue[0].fraction : -1; /* -1: none */
-  if (before < 0 || most - least <= b->folded) return PW_OK;
-  for (x->sought = least; x->sought < most && b->queued < PW_BRANCH_QUEUE - 1; x->sought++) {
-    pw_periodic_event event;
-    status = periodic_crossing (x, before > x->unstable ? &b->reached : &b->previous, &event, error);
-    if (status != PW_OK) return status;
-    if (event != PW_PERIODIC_REAL || fabs (pw_branch_fraction (b, &b->found) - fold) > PERIODIC_FOLD)
-      pw_branch_queue (b, (int)event, 0);
-    x->sought += event == PW_PERIODIC_TORUS;
-  }
-  return PW_OK;
+  return before < 0 ? PW_OK : pw_branch_find_changes (&x->branch, before, o.unstable, periodic_crossing, error);
 }
 
 int pw_periodic_next (pw_periodic *x, pw_periodic_orbit *out, pw_error *error) {
