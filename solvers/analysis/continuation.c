@@ -11,6 +11,7 @@ static const double BRANCH_STEEP = 1e-3, /* smallest slope of p along a branch t
     BRANCH_TURN = 0.96,   /* cosine of the largest angle between the tangents of successive points, 16 degrees */
     BRANCH_APART = 0.3,   /* largest correction of a predictor, relative to the step */
     BRANCH_ASIDE = 0.002, /* largest correction of an interpolated point, relative to the distance of the two points */
+    BRANCH_FOLD = 1e-3,   /* largest distance of a fold from the change of a mode there, relative to the step */
     BRANCH_FINE = 1e-3, /* relative to max_change: so short a step may pass p of the first point twice beside a fold */
     /* Largest difference of the unit vectors along a chord and along the sum of the tangents at its ends: on a smooth
      * branch it is of second order in the step, from one branch to another it is not. */
@@ -52,14 +53,14 @@ static void branch_copy (const pw_branch *b, const pw_branch_point *from, pw_bra
 }
 
 /* Queues a point before those that are farther along. */
-static void branch_insert (pw_branch *b, const pw_branch_point *point, int event, double fraction, int tag) {
+static void branch_insert (pw_branch *b, const pw_branch_point *point, int event, double fraction, int unstable) {
   int i = b->queued++;
   for (; i > 0 && b->queue[i - 1].fraction > fraction; i--) {
     pw_branch_event last = b->queue[i];
     b->queue[i] = b->queue[i - 1];
     b->queue[i - 1] = last;
   }
-  b->queue[i].event = event, b->queue[i].fraction = fraction, b->queue[i].tag = tag;
+  b->queue[i].event = event, b->queue[i].fraction = fraction, b->queue[i].unstable = unstable;
   branch_copy (b, point, &b->queue[i].point);
 }
 
@@ -233,17 +234,37 @@ int pw_branch_locate (pw_branch *b, pw_branch_test *test, void *context, pw_erro
 
 /* ---- Events and ends ---- */
 
-double pw_branch_fraction (const pw_branch *b, const pw_branch_point *point) {
+/* Where b->found is: pw_branch_event.fraction. */
+static double branch_fraction (const pw_branch *b) {
   double part = 0, whole = 0;
   for (int j = 0; j <= b->problem.unknowns; j++) {
-    part += (point->u[j] - b->previous.u[j]) * b->previous.tangent[j];
+    part += (b->found.u[j] - b->previous.u[j]) * b->previous.tangent[j];
     whole += (b->reached.u[j] - b->previous.u[j]) * b->previous.tangent[j];
   }
   return fmin (part / whole, 1);
 }
 
-void pw_branch_queue (pw_branch *b, int event, int tag) {
-  branch_insert (b, &b->found, event, pw_branch_fraction (b, &b->found), tag);
+/* Sets the number of other unstable modes at a fold. */
+static void branch_set_fold (pw_branch *b, int unstable) {
+  for (int i = 0; i < b->queued; i++)
+    if (b->queue[i].event == PW_BRANCH_FOLD) b->queue[i].unstable = unstable;
+}
+
+/* At a fold, one real mode changes its stability. */
+int pw_branch_find_changes (pw_branch *b, int before, int now, pw_branch_locate_mode *locate, pw_error *error) {
+  const int least = before < now ? before : now, most = before < now ? now : before;
+  const double fold = b->folded ? b->queue[0].fraction : -1; /* -1: none */
+  branch_set_fold (b, least);
+  if (most - least <= b->folded) return PW_OK;
+  for (int mode = least, event, modes; mode < most && b->queued < PW_BRANCH_QUEUE - 1; mode += modes) {
+    int status = locate (b->problem.context, mode, now - before, &event, &modes, error);
+    if (status != PW_OK) return status;
+    if (event != PW_BRANCH_REAL || fabs (branch_fraction (b) - fold) > BRANCH_FOLD)
+      branch_insert (b, &b->found, event, branch_fraction (b), mode);
+    else
+      branch_set_fold (b, mode);
+  }
+  return PW_OK;
 }
 
 /* pw_branch_test for folds. */
@@ -271,7 +292,7 @@ static int branch_advance (pw_branch *b, pw_branch_find_events *find_events, pw_
   if (status == PW_RETRY) status = pw_branch_step (b, error);
   if (status == PW_OK && b->folded) {
     status = pw_branch_locate (b, branch_slope_of_p, b, error);
-    if (status == PW_OK) pw_branch_queue (b, PW_BRANCH_FOLD, 0);
+    if (status == PW_OK) branch_insert (b, &b->found, PW_BRANCH_FOLD, branch_fraction (b), 0);
   }
   if (status == PW_RETRY) pw_fail (why, PW_METHOD, "Newton's method fails at the smallest step");
   if (status == PW_OK) status = find_events (b->problem.context, error);

@@ -17,8 +17,8 @@ typedef struct {
   int unknowns, equations; /* entries of x and of F */
   double tolerance;        /* solutions have |F_i| <= tolerance */
   double rank_tolerance;   /* smaller singular values, relative to the largest one, count as 0; default 1e-9 */
-  /* Evaluates F (equations) and, unless dF is NULL, its derivatives with respect to u, by columns: equations x
-   * (unknowns + 1); both are 0 on entry.  A status; PW_RETRY, with or without an error: F cannot be evaluated at u. */
+  /* Evaluates F (equations) and, unless dF is NULL, its derivatives with respect to x, by columns: equations x
+   * unknowns; both are 0 on entry.  A status; PW_RETRY, with or without an error: F cannot be evaluated at u. */
   int (*evaluate) (void *context, const double *u, double *F, double *dF, pw_error *error);
   /* Whether two solutions are the same up to symmetries; NULL: only if their unknowns are. */
   int (*same) (void *context, const double *u, const double *other);
@@ -32,14 +32,15 @@ typedef struct {
   int interpolated;    /* 1: on the cubic through two points: Newton's method did not converge nearby */
 } pw_branch_point;
 
-/* What a point is; users number their own events from PW_BRANCH_OTHER. */
-enum { PW_BRANCH_POINT, PW_BRANCH_FOLD /* p has an extremum */, PW_BRANCH_OTHER };
+/* What a point is: p has an extremum; a real mode changes its stability; users number their own events from
+ * PW_BRANCH_OTHER. */
+enum { PW_BRANCH_POINT, PW_BRANCH_FOLD, PW_BRANCH_REAL, PW_BRANCH_OTHER };
 
 typedef struct {
   pw_branch_point point;
-  int event;       /* PW_BRANCH_POINT, PW_BRANCH_FOLD, ... */
+  int event;       /* PW_BRANCH_POINT, ... */
   double fraction; /* of the step: 0 at the point before, 1 at the point reached */
-  int tag;         /* a number that the caller attaches */
+  int unstable;    /* unstable modes at an event, without those that change */
 } pw_branch_event;
 
 enum { PW_BRANCH_QUEUE = 8 }; /* points and events of a step, at most */
@@ -73,10 +74,13 @@ typedef struct {
   char *memory;
 } pw_branch;
 
-/* Finds events between the last two points, without folds; queues them (pw_branch_queue).  PW_RETRY ends the branch. */
+/* Finds events between the last two points, without folds, by pw_branch_find_changes.  PW_RETRY ends the branch. */
 typedef int pw_branch_find_events (void *context, pw_error *error);
 /* Sets *value to a function of the branch whose zero is an event; PW_RETRY where it cannot be evaluated. */
 typedef int pw_branch_test (void *context, const pw_branch_point *point, double *value, pw_error *error);
+/* Sets b->found to where mode number `mode` of the unstable ones becomes stable or unstable, *event to what happens
+ * there, *modes to the number of modes that change there.  change: of the number of unstable modes by the step. */
+typedef int pw_branch_locate_mode (void *context, int mode, int change, int *event, int *modes, pw_error *error);
 
 /* Errors: PW_RESOURCE.  Close it in every case. */
 int pw_branch_open (pw_branch *b, const pw_branch_problem *problem, pw_error *error);
@@ -107,10 +111,9 @@ int pw_branch_next (pw_branch *b, pw_branch_find_events *find_events, pw_error *
  * does not converge nearby, as at bifurcations.  Where the test or F cannot be evaluated, as at singular points,
  * neighbouring points are tried. */
 int pw_branch_locate (pw_branch *b, pw_branch_test *test, void *context, pw_error *error);
-/* Where a point between the last two is: pw_branch_event.fraction. */
-double pw_branch_fraction (const pw_branch *b, const pw_branch_point *point);
-/* Queues b->found as an event; only if queued < PW_BRANCH_QUEUE - 1: the point reached follows. */
-void pw_branch_queue (pw_branch *b, int event, int tag);
+/* Queues the events of the last step, between whose ends the number of unstable modes changes.  A fold near which a
+ * real mode changes its stability is one event.  `locate` is called with problem.context. */
+int pw_branch_find_changes (pw_branch *b, int before, int now, pw_branch_locate_mode *locate, pw_error *error);
 
 /* ---- continuation_newton.c, for continuation.c only ---- */
 

@@ -15,8 +15,7 @@ static const double PERIODIC_EXACT = 1e-9, /* largest residual of a solution, in
     PERIODIC_CIRCLE = 1e-6,                /* distance from the unit circle that is not round-off */
     PERIODIC_MIN_STEP = 1e-5,              /* in scaled unknowns; the range of the parameter is 1 */
     PERIODIC_EVENT = 1e-7,                 /* accuracy of events, relative to the step */
-    PERIODIC_FOLD = 1e-3, /* largest distance of a fold from the crossing of a multiplier there, relative to the step */
-    PERIODIC_REAL = 1e-3; /* imaginary part, after location, of a pair that is about to become real */
+    PERIODIC_REAL = 1e-3;                  /* imaginary part, after location, of a pair that is about to become real */
 
 /* pw_branch_problem.same: up to symmetries, but not up to a shift in time. */
 static int periodic_same (void *periodic, const double *u, const double *other) {
@@ -47,7 +46,6 @@ static int periodic_arrays (pw_periodic *x) {
     { &x->re, states },
     { &x->im, states },
     { &x->work, (size_t)pw_steady_rate_count (x->s) + all },
-    { &x->beside, all + 2 * states },
   };
   x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   return x->memory ? PW_OK : PW_RESOURCE;
@@ -59,7 +57,7 @@ static int periodic_signal_period (pw_periodic *x, double *period) {
   const double value[] = { x->settings.first, pw_value_within (x->settings.first, x->settings.last) };
   *period = 0;
   for (int i = 0; i < 2 && *period == 0; i++) {
-    const pw_system *s = pw_periodic_system (x, PW_HERE, value[i]);
+    const pw_system *s = pw_periodic_system (x, value[i]);
     if (s == NULL && i > 0 && x->why.status != PW_RESOURCE) return x->why = (pw_error){ 0 }, PW_OK;
     if (s == NULL) return x->why.status;
     *period = pw_system_period (s);
@@ -114,7 +112,7 @@ static int periodic_open (pw_periodic *x, pw_error *error) {
   if (periodic_arrays (x) != PW_OK) return pw_fail_memory (s, error);
   int status = pw_branch_open (&x->branch, &problem, error);
   if (status != PW_OK) return status;
-  pw_run *r = pw_periodic_run (x, PW_HERE, x->settings.first, 0, NULL); /* verifies the signals */
+  pw_run *r = pw_periodic_run (x, x->settings.first, 0, NULL); /* verifies the signals */
   if (r == NULL) return pw_fail (error, x->why.status, "%s", x->why.text);
   pw_run_close (r);
   return PW_OK;
@@ -139,7 +137,7 @@ pw_periodic *pw_periodic_open (const pw_system *s, const pw_periodic_settings *s
 
 void pw_periodic_close (pw_periodic *x) {
   if (x == NULL) return;
-  for (pw_place place = PW_HERE; place < PW_PLACES; place++) pw_system_free (x->system[place].own);
+  pw_system_free (x->system.own);
   pw_branch_close (&x->branch);
   pw_steady_close (x->steady);
   free (x->memory);
@@ -173,15 +171,15 @@ static int periodic_turns (pw_periodic *x) {
 
 /* The motion of u, with its multipliers. */
 static int periodic_orbit (pw_periodic *x, const double *u, pw_periodic_orbit *out, pw_error *error) {
-  int status = pw_periodic_flow (x, u, PW_FLOW_MULTIPLIERS, PW_HERE, error);
+  int status = pw_periodic_flow (x, u, PW_FLOW_MULTIPLIERS, error);
   if (status == PW_OK) status = pw_periodic_multipliers (x, u, &out->trivial);
   if (status == PW_METHOD) return pw_fail (error, status, "model %s: no multipliers: LAPACK failed", x->s->model);
   out->rotation = x->work[PW_RATE_TURN]; /* the multipliers have set x->work */
-  if (status == PW_OK) status = pw_periodic_flow (x, u, PW_FLOW, PW_HERE, error);
+  if (status == PW_OK) status = pw_periodic_flow (x, u, PW_FLOW, error);
   if (status == PW_OK) status = periodic_turns (x);
   if (status != PW_OK) return status;
   out->parameter = pw_periodic_parameter (x, u);
-  out->period = x->last_period = x->settings.free ? u[pw_periodic_unknowns (x) - 1] * x->T : x->system[PW_HERE].period;
+  out->period = x->last_period = x->settings.free ? u[pw_periodic_unknowns (x) - 1] * x->T : x->system.period;
   out->q = x->y0, out->v = x->y0 + x->n, out->end = x->y1;
   out->multipliers = x->size;
   out->re = x->re, out->im = x->im;
@@ -252,44 +250,31 @@ static int periodic_test (void *periodic, const pw_branch_point *point, double *
   return status;
 }
 
-/* Locates where multiplier number `sought` crosses the unit circle between the last two points; `inside` is the one at
- * which it does not lie outside. */
-static int periodic_crossing (pw_periodic *x, const pw_branch_point *inside, pw_periodic_event *event,
-                              pw_error *error) {
+/* pw_branch_locate_mode: where a multiplier crosses the unit circle. */
+static int periodic_crossing (void *periodic, int mode, int change, int *event, int *modes, pw_error *error) {
+  pw_periodic *x = periodic;
   pw_branch *b = &x->branch;
   double value;
-  x->on_circle = 0;
-  int status = periodic_test (x, inside, &value, error);
+  x->sought = mode, x->on_circle = 0;
+  int status = periodic_test (x, change < 0 ? &b->reached : &b->previous, &value, error); /* not outside the circle */
   x->on_circle = fabs (value) < PERIODIC_CIRCLE;
   if (status == PW_OK) status = pw_branch_locate (b, periodic_test, x, error);
   if (status == PW_OK) status = periodic_test (x, &b->found, &value, error);
-  *event = fabs (x->im[x->sought]) > PERIODIC_REAL ? PW_PERIODIC_TORUS
-           : x->re[x->sought] > 0                  ? PW_PERIODIC_REAL
-                                                   : PW_PERIODIC_FLIP;
+  *event = fabs (x->im[mode]) > PERIODIC_REAL ? PW_PERIODIC_TORUS
+           : x->re[mode] > 0                  ? PW_PERIODIC_REAL
+                                              : PW_PERIODIC_FLIP;
+  *modes = *event == PW_PERIODIC_TORUS ? 2 : 1;
   return status;
 }
 
-/* pw_branch_find_events: multipliers that cross the unit circle.  At a fold, one that passes 1 is no event of its
- * own. */
+/* pw_branch_find_events: multipliers that cross the unit circle. */
 static int periodic_events (void *periodic, pw_error *error) {
   pw_periodic *x = periodic;
-  pw_branch *b = &x->branch;
   pw_periodic_orbit o;
-  int before = x->unstable, status = periodic_orbit (x, b->reached.u, &o, error);
+  int before = x->unstable, status = periodic_orbit (x, x->branch.reached.u, &o, error);
   if (status != PW_OK) return status;
   x->unstable = o.unstable;
-  int least = before < o.unstable ? before : o.unstable, most = before < o.unstable ? o.unstable : before;
-  double fold = b->folded ? b->queue[0].fraction : -1; /* -1: none */
-  if (before < 0 || most - least <= b->folded) return PW_OK;
-  for (x->sought = least; x->sought < most && b->queued < PW_BRANCH_QUEUE - 1; x->sought++) {
-    pw_periodic_event event;
-    status = periodic_crossing (x, before > x->unstable ? &b->reached : &b->previous, &event, error);
-    if (status != PW_OK) return status;
-    if (event != PW_PERIODIC_REAL || fabs (pw_branch_fraction (b, &b->found) - fold) > PERIODIC_FOLD)
-      pw_branch_queue (b, (int)event, 0);
-    x->sought += event == PW_PERIODIC_TORUS;
-  }
-  return PW_OK;
+  return before < 0 ? PW_OK : pw_branch_find_changes (&x->branch, before, o.unstable, periodic_crossing, error);
 }
 
 int pw_periodic_next (pw_periodic *x, pw_periodic_orbit *out, pw_error *error) {

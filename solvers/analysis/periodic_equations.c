@@ -25,22 +25,11 @@ static const double EQUATIONS_STEADY = 1e-4;
 
 /* ---- Displacements ---- */
 
-/* The state y displaced for unit time at these rates: the whole translates by t while it rotates by w about the origin,
- * p -> R p + V t, with R the rotation by w and V the mean of the rotations on the way. */
-static void equations_displace (const pw_periodic *x, const double *rates, const double *y, double *out) {
-  int n = x->n, bodies = x->s->bodies;
-  double w = rates[PW_RATE_TURN], c = pw_cos (w), s = pw_sin (w), half = pw_sin (w / 2);
-  double p = fabs (w) > 1e-8 ? s / w : 1, r = fabs (w) > 1e-8 ? 2 * half * half / w : w / 2; /* V = [ p -r ; r p ] */
-  const double *o = x->steady->origin, t[2] = { x->L * rates[PW_RATE_X], x->L * rates[PW_RATE_Y] };
-  memcpy (out, y, 2 * (size_t)n * sizeof *out);
-  for (int b = 0; b < bodies; b++) {
-    double *q = out + 3 * b, *v = out + n + 3 * b, dx = q[0] - o[0], dy = q[1] - o[1], vx = v[0], vy = v[1];
-    q[0] = o[0] + c * dx - s * dy + p * t[0] - r * t[1];
-    q[1] = o[1] + s * dx + c * dy + r * t[0] + p * t[1];
-    q[2] += w + rates[PW_RATE_ANGLES + b];
-    v[0] = c * vx - s * vy, v[1] = s * vx + c * vy;
-  }
-  for (int j = 3 * bodies; j < n; j++) out[j] += rates[pw_steady_angle_rate (x->s, j)];
+/* x->work = the rates of the displacement d, x->state = D (d) y at the initial state y = x->y0. */
+static void equations_displace (pw_periodic *x, const double *d) {
+  pw_steady_combine (x->steady, d, 1, x->work);
+  memcpy (x->state, x->y0, 2 * (size_t)x->n * sizeof *x->state);
+  pw_steady_displace (x->steady, x->work, 1, x->state, x->state + x->n);
 }
 
 /* ---- Equations ---- */
@@ -48,8 +37,7 @@ static void equations_displace (const pw_periodic *x, const double *rates, const
 /* After a flow from the state of u. */
 static void equations_residual (pw_periodic *x, const double *u, double *F) {
   int states = 2 * x->n;
-  pw_steady_combine (x->steady, u + states, 1, x->work);
-  equations_displace (x, x->work, x->y0, x->state);
+  equations_displace (x, u + states);
   for (int j = 0; j < states; j++) {
     F[j] = pw_periodic_difference (x, j, x->y1[j], x->state[j]) / pw_periodic_unit (x, j);
     F[states + j] = u[j] - x->y0[j] / pw_periodic_unit (x, j);
@@ -65,43 +53,26 @@ static void equations_by_displacement (pw_periodic *x, const double *u, int rows
     for (int side = -1; side <= 1; side += 2) {
       memcpy (d, u + states, (size_t)x->symmetries * sizeof *d);
       d[k] += side * h;
-      pw_steady_combine (x->steady, d, 1, x->work);
-      equations_displace (x, x->work, x->y0, x->state);
+      equations_displace (x, d);
       for (int j = 0; j < states; j++) column[j] -= side * x->state[j] / (2 * h) / pw_periodic_unit (x, j);
     }
 }
 
 /* The change of D (d) y by a change of y: positions and velocities rotate by the angle w. */
 static void equations_rotate (const pw_periodic *x, double w, const double *in, double *out) {
-  pw_linear_rotate (&x->steady->system[PW_HERE].linearisation, w, in, out);
-  pw_linear_rotate (&x->steady->system[PW_HERE].linearisation, w, in + x->n, out + x->n);
-}
-
-/* The angle by which the whole turns in the last flow: that of the first body whose angle no symmetry changes except by
- * turning the whole, or 0. */
-static double equations_turn (const pw_periodic *x) {
-  int rates = pw_steady_rate_count (x->s);
-  for (int b = 0; b < x->s->bodies; b++) {
-    int others = 0;
-    for (int k = 0; k < x->symmetries; k++) others += x->steady->symmetry[k * rates + PW_RATE_ANGLES + b] != 0;
-    if (others == 0) return x->y1[3 * b + 2] - x->y0[3 * b + 2];
-  }
-  return 0;
+  pw_linear_rotate (&x->steady->system.linearisation, w, in, out);
+  pw_linear_rotate (&x->steady->system.linearisation, w, in + x->n, out + x->n);
 }
 
 int pw_periodic_guess_displacement (pw_periodic *x, double *u, pw_error *error) {
-  enum { CORRECTIONS = 3 }; /* the rotation is known; for a given one translations are linear */
-  int states = 2 * x->n, count = x->symmetries, rates = pw_steady_rate_count (x->s), rank;
+  enum { CORRECTIONS = 10 }; /* translations are linear for a given rotation */
+  int states = 2 * x->n, count = x->symmetries, rank;
   size_t rows = 2 * (size_t)states, work_size = rows + (size_t)(PW_PERIODIC_WORK * (states + count));
-  int status = count ? pw_periodic_flow (x, u, PW_FLOW, PW_HERE, error) : PW_OK;
+  int status = count ? pw_periodic_flow (x, u, PW_FLOW, error) : PW_OK;
   if (status != PW_OK || count == 0) return status;
   double *F = calloc (rows + rows * (size_t)count + work_size, sizeof *F), *M = F + rows,
          *work = M + rows * (size_t)count;
   if (F == NULL) return pw_fail_memory (x->s, error);
-  for (int k = 0; k < count; k++) {
-    double turn = x->steady->symmetry[k * rates + PW_RATE_TURN];
-    if (turn != 0) u[states + k] = equations_turn (x) / turn;
-  }
   for (int i = 0; i < CORRECTIONS; i++) {
     equations_residual (x, u, F);
     memset (M, 0, rows * (size_t)count * sizeof *M);
@@ -144,7 +115,7 @@ static void equations_shift (pw_periodic *x, int k) {
   const double *symmetry = x->steady->symmetry + k * pw_steady_rate_count (x->s);
   pw_steady_velocities (x->steady, symmetry, x->y0, x->change);
   memset (x->change + n, 0, bytes);
-  pw_linear_turn (&x->steady->system[PW_HERE].linearisation, symmetry[PW_RATE_TURN], x->y0 + n, x->change + n);
+  pw_linear_turn (&x->steady->system.linearisation, symmetry[PW_RATE_TURN], x->y0 + n, x->change + n);
 }
 
 /* The conditions that corrections are orthogonal to these directions. */
@@ -167,42 +138,18 @@ static void equations_by_period (pw_periodic *x, double *column) {
   }
 }
 
-/* The derivatives with respect to the parameter by central differences, at the end of its domain by one-sided ones. */
-static int equations_by_parameter (pw_periodic *x, const double *u, double *column, pw_error *error) {
-  const double h = 1e-5;
-  int unknowns = pw_periodic_unknowns (x), rows = 4 * x->n;
-  double *beside = x->beside, *F = beside + unknowns + 1, distance = 0;
-  memcpy (beside, u, ((size_t)unknowns + 1) * sizeof *u);
-  for (int side = -1; side <= 1; side += 2) {
-    beside[unknowns] = u[unknowns] + side * h;
-    int status = pw_periodic_flow (x, beside, PW_FLOW, PW_BESIDE, error);
-    if (status == PW_OK)
-      distance += h;
-    else if (status == PW_RETRY) {
-      beside[unknowns] = u[unknowns];
-      status = pw_periodic_flow (x, beside, PW_FLOW, PW_BESIDE, error);
-    }
-    if (status != PW_OK) return status;
-    equations_residual (x, beside, F);
-    for (int i = 0; i < rows; i++) column[i] += side * F[i];
-  }
-  for (int i = 0; i < rows; i++) column[i] /= distance;
-  return distance > 0 ? PW_OK : PW_RETRY;
-}
-
-/* The flows beside u come first, and that without derivatives last: the equations need its x->y0 to x->a1. */
+/* The flow without derivatives comes last: the equations need its x->y0 to x->a1. */
 int pw_periodic_evaluate (void *periodic, const double *u, double *F, double *dF, pw_error *error) {
   pw_periodic *x = periodic;
-  int rows = x->branch.problem.equations, states = 2 * x->n, unknowns = pw_periodic_unknowns (x), status = PW_OK;
-  if (dF && x->settings.compile) status = equations_by_parameter (x, u, dF + (size_t)unknowns * (size_t)rows, error);
-  if (status == PW_OK && dF) status = pw_periodic_flow (x, u, PW_FLOW_DERIVATIVES, PW_HERE, error);
-  if (status == PW_OK) status = pw_periodic_flow (x, u, PW_FLOW, PW_HERE, error);
+  int rows = x->branch.problem.equations, states = 2 * x->n;
+  int status = dF ? pw_periodic_flow (x, u, PW_FLOW_DERIVATIVES, error) : PW_OK;
+  if (status == PW_OK) status = pw_periodic_flow (x, u, PW_FLOW, error);
   if (status != PW_OK) return status;
   equations_residual (x, u, F);
   if (dF == NULL) return PW_OK;
   equations_by_state (x, u, rows, dF);
   equations_by_displacement (x, u, rows, dF + states * rows);
-  if (x->settings.free) equations_by_period (x, dF + (unknowns - 1) * rows);
+  if (x->settings.free) equations_by_period (x, dF + (pw_periodic_unknowns (x) - 1) * rows);
   equations_orthogonal (x, rows, dF);
   return PW_OK;
 }

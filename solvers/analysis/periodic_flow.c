@@ -57,9 +57,9 @@ double pw_system_period (const pw_system *s) {
   return period;
 }
 
-/* Sets x->system[place].period: of the settings, else of the signals times settings.periods, else of the last motion.
+/* Sets x->system.period: of the settings, else of the signals times settings.periods, else of the last motion.
  * Verifies that signals repeat after it; with a free period, that they are constant during the time that is set. */
-static int flow_signals (pw_periodic *x, pw_place place, pw_run *r) {
+static int flow_signals (pw_periodic *x, pw_run *r) {
   double signals = pw_system_period (r->s), period = x->settings.free ? FLOW_TIMES * x->T : x->settings.period;
   int changed, status;
   if (period <= 0) period = signals == 0 ? x->last_period : x->settings.periods * signals;
@@ -71,7 +71,7 @@ static int flow_signals (pw_periodic *x, pw_place place, pw_run *r) {
   status = x->settings.free ? pw_signals_change (r, x->settings.t, 0, period, &changed, &x->why)
                             : pw_signals_change (r, x->settings.t, period, FLOW_PERIODS * period, &changed, &x->why);
   if (status != PW_OK) return status;
-  if (changed < 0) return x->system[place].period = period, PW_OK;
+  if (changed < 0) return x->system.period = period, PW_OK;
   const char *name = PW_NAME (pw_system_signal_name, r->s, changed);
   if (x->settings.free)
     return pw_fail (&x->why, PW_INPUT, "model %s: signal %s changes with time, so that the period is not free",
@@ -82,28 +82,28 @@ static int flow_signals (pw_periodic *x, pw_place place, pw_run *r) {
 
 /* ---- Runs ---- */
 
-const pw_system *pw_periodic_system (pw_periodic *x, pw_place place, double value) {
+const pw_system *pw_periodic_system (pw_periodic *x, double value) {
   if (x->settings.compile == NULL) return x->s;
-  if (x->system[place].own == NULL || x->system[place].value != value) {
-    pw_system_free (x->system[place].own);
-    x->system[place].value = value, x->system[place].period = 0;
-    x->system[place].own = pw_compile_at (x->settings.compile, x->settings.context, value, &x->why);
+  if (x->system.own == NULL || x->system.value != value) {
+    pw_system_free (x->system.own);
+    x->system.value = value, x->system.period = 0;
+    x->system.own = pw_compile_at (x->settings.compile, x->settings.context, value, &x->why);
   }
-  const pw_system *s = x->system[place].own;
+  const pw_system *s = x->system.own;
   return s && pw_steady_same_sizes (x->s, s, &x->why) == PW_OK ? s : NULL;
 }
 
-pw_run *pw_periodic_run (pw_periodic *x, pw_place place, double value, double rtol, const double *y) {
+pw_run *pw_periodic_run (pw_periodic *x, double value, double rtol, const double *y) {
   const pw_settings settings = { .t = x->settings.t,
                                  .span = x->settings.period > 0 ? x->settings.period : x->T,
                                  .rtol = rtol,
                                  .stop = x->settings.stop,
                                  .stop_context = x->settings.stop_context };
   x->why = (pw_error){ 0 };
-  const pw_system *s = pw_periodic_system (x, place, value);
+  const pw_system *s = pw_periodic_system (x, value);
   pw_run *r = s ? pw_run_open (s, x->settings.method, &settings, &x->why) : NULL;
   int status = r ? PW_OK : x->why.status;
-  if (status == PW_OK && x->system[place].period <= 0) status = flow_signals (x, place, r);
+  if (status == PW_OK && x->system.period <= 0) status = flow_signals (x, r);
   if (status == PW_OK && y) {
     status = pw_run_restart (r, y, y + x->n, &x->why);
     if (status == PW_INPUT) x->why.status = PW_RETRY; /* a trial with a value of 1e100, or NaN */
@@ -202,18 +202,18 @@ static int flow_run (pw_periodic *x, pw_run *r, double period, pw_flow_accuracy 
   return PW_OK;
 }
 
-int pw_periodic_flow (pw_periodic *x, const double *u, pw_flow_accuracy accuracy, pw_place place, pw_error *error) {
+int pw_periodic_flow (pw_periodic *x, const double *u, pw_flow_accuracy accuracy, pw_error *error) {
   double value = pw_periodic_parameter (x, u), rtol = fmax (x->settings.rtol, flow_min_rtol[accuracy]);
   double period = u[pw_periodic_unknowns (x) - 1] * x->T; /* if it is free */
   x->why = (pw_error){ 0 };
   if (x->settings.free && !(period * FLOW_FAR > x->last_period && period < FLOW_FAR * x->last_period)) return PW_RETRY;
   for (int j = 0; j < 2 * x->n; j++) x->state[j] = u[j] * pw_periodic_unit (x, j);
-  pw_run *r = pw_periodic_run (x, place, value, rtol, x->state);
-  int status = r ? flow_run (x, r, x->settings.free ? period : x->system[place].period, accuracy) : x->why.status;
+  pw_run *r = pw_periodic_run (x, value, rtol, x->state);
+  int status = r ? flow_run (x, r, x->settings.free ? period : x->system.period, accuracy) : x->why.status;
   pw_run_close (r);
   if (status == PW_OK) return PW_OK;
   if (status == PW_STOPPED) pw_fail (&x->why, PW_METHOD, "stopped");
-  int refused = x->settings.compile && x->system[place].own == NULL; /* the model refused the value of the parameter */
+  int refused = x->settings.compile && x->system.own == NULL; /* the model refused the value of the parameter */
   if (status == PW_RESOURCE) pw_fail_memory (x->s, &x->why);
   if (status == PW_RESOURCE || (status == PW_INPUT && r == NULL && !refused))
     return pw_fail (error, status, "%s", x->why.text);
@@ -265,9 +265,9 @@ static int flow_return (pw_periodic *x, pw_run *r) {
 
 int pw_periodic_settle (pw_periodic *x, double value, int periods) {
   pw_sample sample;
-  pw_run *r = pw_periodic_run (x, PW_HERE, value, FLOW_SETTLE_RTOL, NULL);
+  pw_run *r = pw_periodic_run (x, value, FLOW_SETTLE_RTOL, NULL);
   if (r == NULL) return x->why.status;
-  double end = r->t + periods * (x->settings.free ? x->last_period : x->system[PW_HERE].period);
+  double end = r->t + periods * (x->settings.free ? x->last_period : x->system.period);
   int status = pw_run_advance_to (r, end, end, &x->why);
   if (status == PW_OK && pw_run_stop_requested (r)) status = PW_STOPPED;
   if (status == PW_OK) status = pw_run_sample (r, pw_run_time (r), &sample, &x->why);

@@ -19,7 +19,7 @@ struct pw_periodic {
     double value;   /* of the parameter */
     pw_system *own; /* by settings.compile; NULL: s serves */
     double period;  /* verified; free: during which signals are constant [s]; 0: not yet */
-  } system[PW_PLACES];
+  } system;
   pw_branch branch;
   double *u;           /* scaled: 2 n of the state, displacement along symmetries in a period, free period; parameter */
   double last_period;  /* the period of the last motion, or a guess of a free one [s] */
@@ -33,11 +33,11 @@ struct pw_periodic {
   long steps;          /* of the run at the last iterate of Newton's method; 0: not yet known */
   double *monodromy;   /* size x size, by columns: the monodromy matrix; then scratch */
   double *re, *im;     /* size: its eigenvalues, the multipliers */
-  double *work, *beside; /* scratch: rates; unknowns and residuals beside a point */
-  pw_error why;          /* the last reason why a motion could not be computed, or why a branch ended */
-  int unstable;          /* multipliers outside the unit circle at the last point; -1: not known */
-  int sought;            /* index of the multiplier whose crossing of the unit circle is located */
-  int on_circle;         /* 1: this multiplier moves on the unit circle until it leaves it */
+  double *work;        /* scratch: rates, unknowns */
+  pw_error why;        /* the last reason why a motion could not be computed, or why a branch ended */
+  int unstable;        /* multipliers outside the unit circle at the last point; -1: not known */
+  int sought;          /* index of the multiplier whose crossing of the unit circle is located */
+  int on_circle;       /* 1: this multiplier moves on the unit circle until it leaves it */
   char *memory;
 };
 
@@ -58,14 +58,14 @@ static inline double pw_periodic_parameter (const pw_periodic *x, const double *
 /* ---- periodic_flow.c ---- */
 
 /* The system at a value of the parameter.  NULL, with x->why, if there is none. */
-const pw_system *pw_periodic_system (pw_periodic *x, pw_place place, double value);
+const pw_system *pw_periodic_system (pw_periodic *x, double value);
 /* Opens a run, which the caller closes, at a value of the parameter from the consistent state nearest to y, or if that
- * is NULL from the initial state, and determines the period of x->system[place].  rtol 0: the default of pw_settings.
+ * is NULL from the initial state, and determines the period of x->system.  rtol 0: the default of pw_settings.
  * NULL, with x->why, if it fails. */
-pw_run *pw_periodic_run (pw_periodic *x, pw_place place, double value, double rtol, const double *y);
+pw_run *pw_periodic_run (pw_periodic *x, double value, double rtol, const double *y);
 /* Integrates one period from the state of u: sets y0, a0, and then y1, a1, or with derivatives instead of these size,
  * basis, dual, Phi.  A status; PW_RETRY: there is no such motion, perhaps with x->why, or the search was stopped. */
-int pw_periodic_flow (pw_periodic *x, const double *u, pw_flow_accuracy accuracy, pw_place place, pw_error *error);
+int pw_periodic_flow (pw_periodic *x, const double *u, pw_flow_accuracy accuracy, pw_error *error);
 /* Sets x->state to the state after some periods of the motion from the initial state, displaced as by
  * pw_steady_move_to_start, and a free period that is not given to a guess.  A status; x->why contains the reason of a
  * failure, unless the search has been stopped. */

@@ -28,7 +28,7 @@ int pw_check_search (double first, double last, int points, pw_error *error) {
 
 static int steady_arrays (pw_steady *x) {
   size_t n = (size_t)x->n, m = (size_t)x->m, rates = (size_t)pw_steady_rate_count (x->s), unknowns = n + rates;
-  size_t holds = (size_t)x->settings.holds, equations = (size_t)x->holonomic + m + n + holds + rates;
+  size_t holds = (size_t)x->settings.holds;
   const pw_array array[] = {
     { &x->symmetry, rates * rates },
     { &x->free_symmetry, rates * rates },
@@ -39,7 +39,7 @@ static int steady_arrays (pw_steady *x) {
     { &x->rates, rates },
     { &x->combined, rates },
     { &x->u, unknowns + 1 },
-    { &x->F, equations + n * rates + (1 + PW_STEADY_WORK) * unknowns }, /* see pw_steady_nearest */
+    { &x->F, n * rates + (1 + PW_STEADY_WORK) * unknowns },
     { &x->scratch[0], n },
     { &x->scratch[1], n },
     { &x->scratch[2], n },
@@ -66,7 +66,7 @@ static double steady_last_breakpoint (pw_workspace *w, double t, double span) {
 /* PW_INPUT if a signal changes with time within the span: the message names the first one and, if no signal changes
  * after the last breakpoint, the time of this breakpoint, rounded up. */
 static int steady_constant (pw_steady *x, pw_error *error) {
-  pw_run *r = x->system[PW_HERE].run;
+  pw_run *r = x->system.run;
   char text[32];
   const double span = r->settings.span; /* with its default */
   int changed, later, status = pw_signals_change (r, x->settings.t, 0, span, &changed, error);
@@ -93,9 +93,8 @@ typedef enum { SIGNALS_CONSTANT, SIGNALS_MAY_CHANGE } signal_rule;
 
 /* Stores the initial state and scales at the first value of the parameter. */
 static int steady_begin (pw_steady *x, pw_error *error) {
-  if (pw_steady_open_system (x, PW_HERE, x->settings.first) != PW_OK)
-    return pw_fail (error, x->why.status, "%s", x->why.text);
-  const pw_run *r = x->system[PW_HERE].run;
+  if (pw_steady_open_system (x, x->settings.first) != PW_OK) return pw_fail (error, x->why.status, "%s", x->why.text);
+  const pw_run *r = x->system.run;
   x->L = x->s->scale.length;
   x->T = r->w->scale.time;
   memcpy (x->start, r->q, (size_t)x->n * sizeof *r->q);
@@ -108,17 +107,16 @@ static int steady_begin (pw_steady *x, pw_error *error) {
  * gravity, there may be more symmetries.  Leaves the system open at the first value. */
 static int steady_symmetries (pw_steady *x, signal_rule signals, pw_error *error) {
   const double first = x->settings.first;
-  int status = pw_steady_open_system (x, PW_HERE, pw_value_within (first, x->settings.last));
-  if (status != PW_OK) status = pw_steady_open_system (x, PW_HERE, first);
+  int status = pw_steady_open_system (x, pw_value_within (first, x->settings.last));
+  if (status != PW_OK) status = pw_steady_open_system (x, first);
   if (status != PW_OK) return pw_fail (error, x->why.status, "%s", x->why.text);
   if (signals == SIGNALS_CONSTANT) status = steady_constant (x, error);
   if (status != PW_OK) return status;
   status = pw_steady_find_symmetries (x);
   if (status == PW_RESOURCE) return pw_fail_memory (x->s, error);
-  if (status != PW_OK) return pw_fail_singular (x->system[PW_HERE].run, x->settings.t, error);
-  for (int i = 0; i < x->m; i++)
-    x->norm[i] = x->system[PW_HERE].linearisation.norm[i] > 0 ? x->system[PW_HERE].linearisation.norm[i] : 1;
-  status = pw_steady_open_system (x, PW_HERE, first);
+  if (status != PW_OK) return pw_fail_singular (x->system.run, x->settings.t, error);
+  for (int i = 0; i < x->m; i++) x->norm[i] = x->system.linearisation.norm[i] > 0 ? x->system.linearisation.norm[i] : 1;
+  status = pw_steady_open_system (x, first);
   return status == PW_OK ? PW_OK : pw_fail (error, x->why.status, "%s", x->why.text);
 }
 
@@ -178,7 +176,7 @@ pw_steady *pw_steady_open_symmetries (const pw_system *s, const pw_steady_settin
 
 void pw_steady_close (pw_steady *x) {
   if (x == NULL) return;
-  for (pw_place place = PW_HERE; place < PW_PLACES; place++) pw_steady_close_system (x, place);
+  pw_steady_close_system (x);
   pw_branch_close (&x->branch);
   pw_linear_free (&x->linear);
   pw_arena_free (&x->arena);
@@ -197,9 +195,9 @@ int pw_steady_symmetries (const pw_steady *x) {
 /* ---- Solutions ---- */
 
 int pw_steady_motion_at (pw_steady *x, const double *u, pw_steady_motion *out, pw_error *error) {
-  int status = pw_steady_open_system (x, PW_HERE, pw_steady_parameter (x, u));
+  int status = pw_steady_open_system (x, pw_steady_parameter (x, u));
   if (status != PW_OK) return pw_fail (error, x->why.status, "%s", x->why.text);
-  pw_run *r = x->system[PW_HERE].run;
+  pw_run *r = x->system.run;
   pw_steady_state (x, u);
   x->solved = 1;
   for (int j = 0; j < x->n; j++) x->solution[j].value = x->q[j], x->solution[x->n + j].value = x->v[j];
@@ -226,7 +224,7 @@ static int steady_family (pw_steady *x) {
   pw_error none = { 0 };
   int status = pw_steady_find_free_symmetries (x);
   if (status != PW_OK) return status;
-  memset (x->branch.J, 0, (size_t)equations * ((size_t)unknowns + 1) * sizeof *x->branch.J);
+  memset (x->branch.J, 0, (size_t)equations * (size_t)unknowns * sizeof *x->branch.J);
   status = pw_steady_evaluate (x, x->u, x->branch.F, x->branch.J, &none);
   if (status != PW_OK) return status == PW_RESOURCE ? status : PW_METHOD;
   return pw_null_space (equations, unknowns, x->branch.J, PW_STEADY_RANK, x->null_space);
@@ -280,7 +278,7 @@ int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_moti
   if (pw_require (x, "a search", error) != PW_OK) return PW_INPUT;
   if (attempt < 0) return pw_fail (error, PW_INPUT, "attempt = %d: expected a number >= 0", attempt);
   if (pw_check_parameter (parameter, error) != PW_OK) return PW_INPUT;
-  if (pw_steady_open_system (x, PW_HERE, parameter) != PW_OK) return pw_fail (error, x->why.status, "%s", x->why.text);
+  if (pw_steady_open_system (x, parameter) != PW_OK) return pw_fail (error, x->why.status, "%s", x->why.text);
   int status, known;
   do {
     status = steady_converge (x, attempt, parameter, out, error);
@@ -307,7 +305,7 @@ static double suggest_change (pw_steady *x, const pw_initial_value *hold, int re
   pw_steady_combine (x, z + x->n, x->T, x->combined);
   pw_steady_velocities (x, x->combined, x->q, dv);
   for (int j = 0; j < x->n; j++) dq[j] = z[j] * pw_unit (x->s, j);
-  pw_linear_turn (&x->system[PW_HERE].linearisation, x->rates[PW_RATE_TURN], dq, dv);
+  pw_linear_turn (&x->system.linearisation, x->rates[PW_RATE_TURN], dq, dv);
   return pw_hold_residual (x, hold, dq, dv) - (relative ? dq[2] : 0);
 }
 

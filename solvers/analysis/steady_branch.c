@@ -1,11 +1,11 @@
 /* Branches of steady motions: points, folds and changes of stability. */
 #include <math.h>
+#include <stdlib.h>
 #include "steady_parts.h"
 #include "util.h"
 
 static const double BRANCH_MIN_STEP = 1e-7, /* in scaled unknowns; the range of the parameter is 1 */
-    BRANCH_ACCURACY = 1e-9,                 /* of events, relative to the step */
-    BRANCH_FOLD = 1e-3; /* largest distance of a fold from the change of an eigenvalue there, relative to the step */
+    BRANCH_ACCURACY = 1e-9;                 /* of events, relative to the step */
 enum { BRANCH_MAX_POINTS = 100 /* as a multiple of those that the settings ask for */ };
 
 int pw_steady_follow (pw_steady *x, const double *q, const double *v, double parameter, int direction,
@@ -73,41 +73,27 @@ static int branch_pair (const pw_steady *x, int changing) {
   return x->neutral > x->neutral_at_ends ? x->neutral - x->neutral_at_ends >= 2 : im != 0;
 }
 
-/* Sets the tag of a fold, the number of other growing modes there. */
-static void branch_tag_fold (pw_branch *b, int growing) {
-  for (int i = 0; i < b->queued; i++)
-    if (b->queue[i].event == PW_BRANCH_FOLD) b->queue[i].tag = growing;
-}
-
-/* Locates each change of sign of a real part between `least` and `most` growing modes; its tag is the number of other
- * growing modes.  That of a real eigenvalue at a fold is no event of its own. */
-static int branch_changes (pw_steady *x, int least, int most, pw_error *error) {
-  int pair = 0;
-  pw_branch *b = &x->branch;
-  double fold = b->queued ? b->queue[0].fraction : -1; /* -1: none */
-  for (x->sought = least; x->sought < most && b->queued < PW_BRANCH_QUEUE - 1; x->sought += 1 + pair) {
-    int status = pw_branch_locate (b, branch_test, x, error);
-    if (status != PW_OK) return status;
-    pair = branch_pair (x, most - least);
-    if (pair || fabs (pw_branch_fraction (b, &b->found) - fold) > BRANCH_FOLD)
-      pw_branch_queue (b, pair ? PW_STEADY_OSCILLATION : PW_STEADY_REAL, x->sought);
-    else
-      branch_tag_fold (b, x->sought);
-  }
+/* pw_branch_locate_mode: changes of the sign of a real part. */
+static int branch_locate (void *steady, int mode, int change, int *event, int *modes, pw_error *error) {
+  pw_steady *x = steady;
+  x->sought = mode;
+  int status = pw_branch_locate (&x->branch, branch_test, x, error);
+  if (status != PW_OK) return status;
+  const int pair = branch_pair (x, abs (change));
+  *event = pair ? PW_STEADY_OSCILLATION : PW_STEADY_REAL, *modes = 1 + pair;
   return PW_OK;
 }
 
-/* pw_branch_find_events.  At a fold a real eigenvalue changes its sign. */
+/* pw_branch_find_events */
 static int branch_events (void *steady, pw_error *error) {
   pw_steady *x = steady;
   pw_steady_motion motion;
   int before = x->unstable, neutral = x->neutral, status = pw_steady_motion_at (x, x->branch.reached.u, &motion, error);
   if (status != PW_OK) return status;
-  int now = x->unstable = motion.unstable, least = before < now ? before : now, most = before < now ? now : before;
+  x->unstable = motion.unstable;
   x->neutral_at_ends = neutral == x->neutral ? neutral : -1;
   neutral = x->neutral;
-  branch_tag_fold (&x->branch, least);
-  if (most - least > x->branch.folded) status = branch_changes (x, least, most, error);
+  status = pw_branch_find_changes (&x->branch, before, x->unstable, branch_locate, error);
   x->neutral = neutral;
   return status;
 }
@@ -124,7 +110,7 @@ int pw_steady_next (pw_steady *x, pw_steady_motion *out, pw_error *error) {
   out->iterations = x->branch.iterations;
   out->residual = next->point.residual;
   status = pw_steady_motion_at (x, next->point.u, out, error);
-  if (next->event != PW_BRANCH_POINT) out->unstable = next->tag;
+  if (next->event != PW_BRANCH_POINT) out->unstable = next->unstable;
   x->neutral = neutral;
   return status;
 }

@@ -20,10 +20,6 @@
 #include "rank.h"
 #include "steady_parts.h"
 
-/* Step of central differences by a parameter of the model, relative to its range: its round-off is 1e-11, its
- * truncation error 2e-11 of the third derivative. */
-static const double STEADY_DIFFERENCE = 1e-5;
-
 double pw_steady_parameter (const pw_steady *x, const double *u) {
   return x->settings.first + (x->settings.last - x->settings.first) * u[x->n + x->symmetries];
 }
@@ -63,11 +59,11 @@ int pw_steady_nearest (pw_steady *x, const double *q, const double *v, double *u
 
 /* ---- Residuals ---- */
 
-/* The residuals g, J v - eta, a - W v of x->system[place] in the state x->q, x->v, at which its accelerations have been
+/* The residuals g, J v - eta, a - W v of x->system in the state x->q, x->v, at which its accelerations have been
  * evaluated. */
-static void steady_residual (pw_steady *x, pw_place place, double *F) {
-  pw_linearisation *l = &x->system[place].linearisation;
-  pw_workspace *w = x->system[place].run->w;
+static void steady_residual (pw_steady *x, double *F) {
+  pw_linearisation *l = &x->system.linearisation;
+  pw_workspace *w = x->system.run->w;
   double acceleration = x->T * x->T / x->L;
   pw_evaluate_g (w, F);
   for (int i = 0; i < x->holonomic; i++) F[i] /= x->norm[i] * x->L;
@@ -85,13 +81,13 @@ static void steady_residual (pw_steady *x, pw_place place, double *F) {
 
 /* The change of the residuals by the variation (dq, dv) in l->dx and the change dw of the angular velocity w. */
 static void steady_change (pw_steady *x, double dw, double *F) {
-  pw_linearisation *l = &x->system[PW_HERE].linearisation;
+  pw_linearisation *l = &x->system.linearisation;
   int n = x->n;
   double *dq = l->dx, *dv = l->dx + n;
-  pw_mul_J (x->system[PW_HERE].run->w, dq, l->row_scratch);
+  pw_mul_J (x->system.run->w, dq, l->row_scratch);
   for (int i = 0; i < x->holonomic; i++) *F++ = l->row_scratch[i] / (x->norm[i] * x->L);
   pw_linear_vary (l);
-  pw_mul_J (x->system[PW_HERE].run->w, dv, l->row_scratch);
+  pw_mul_J (x->system.run->w, dv, l->row_scratch);
   for (int i = 0; i < x->m; i++) *F++ = (l->row_scratch[i] + l->product[n + x->m + i]) * x->T / (x->norm[i] * x->L);
   pw_linear_turn (l, -x->rates[PW_RATE_TURN], dv, l->da);
   pw_linear_turn (l, -dw, x->v, l->da);
@@ -114,7 +110,7 @@ static void steady_conditions (pw_steady *x, double *dF) {
 
 /* Derivatives with respect to the unknowns q and xi. */
 static void steady_columns (pw_steady *x, double *dF) {
-  pw_linearisation *l = &x->system[PW_HERE].linearisation;
+  pw_linearisation *l = &x->system.linearisation;
   int n = x->n, equations = pw_steady_equations (x);
   for (int c = 0; c < pw_steady_unknowns (x); c++, dF += equations) {
     const double *symmetry = x->symmetry + (c < n ? 0 : c - n) * pw_steady_rate_count (x->s); /* only for c >= n */
@@ -130,52 +126,25 @@ static void steady_columns (pw_steady *x, double *dF) {
   }
 }
 
-/* Derivatives with respect to a parameter of the model by central differences, at the end of its domain by one-sided
- * ones. */
-static int steady_by_parameter (pw_steady *x, double value, const double *F, double *dF) {
-  double h = STEADY_DIFFERENCE * (x->settings.last - x->settings.first), distance = 0;
-  int length = x->holonomic + x->m + x->n, sides = 0;
-  for (int side = 1; side >= -1; side -= 2) {
-    int status = pw_steady_open_system (x, PW_BESIDE, value + side * h);
-    if (status < 0) return status;
-    pw_linearisation *l = &x->system[PW_BESIDE].linearisation;
-    if (status != PW_OK ||
-        pw_run_accelerate (x->system[PW_BESIDE].run, x->settings.t, x->q, x->v, l->a, l->lambda) != PW_OK)
-      continue;
-    steady_residual (x, PW_BESIDE, x->F);
-    for (int i = 0; i < length; i++) dF[i] += side * x->F[i];
-    distance += STEADY_DIFFERENCE;
-    sides += side;
-  }
-  for (int i = 0; i < length; i++) dF[i] = (dF[i] - sides * F[i]) / distance;
-  return distance > 0 ? PW_OK : PW_RETRY;
-}
-
 int pw_steady_evaluate (void *steady, const double *u, double *F, double *dF, pw_error *error) {
   pw_steady *x = steady;
-  int equations = pw_steady_equations (x), unknowns = pw_steady_unknowns (x);
-  int first_held = equations - x->symmetries - x->settings.holds, vary = x->settings.vary;
-  double value = pw_steady_parameter (x, u);
-  int status = pw_steady_open_system (x, PW_HERE, value);
+  int first_held = pw_steady_equations (x) - x->symmetries - x->settings.holds;
+  int status = pw_steady_open_system (x, pw_steady_parameter (x, u));
   if (status < 0) pw_fail (error, status, "%s", x->why.text);
   if (status != PW_OK) return status;
-  pw_linearisation *l = &x->system[PW_HERE].linearisation;
+  pw_linearisation *l = &x->system.linearisation;
   pw_steady_state (x, u);
   status = dF ? pw_linear_evaluate (l, x->settings.t, x->q, x->v)
-              : pw_run_accelerate (x->system[PW_HERE].run, x->settings.t, x->q, x->v, l->a, l->lambda);
+              : pw_run_accelerate (x->system.run, x->settings.t, x->q, x->v, l->a, l->lambda);
   if (status != PW_OK) {
     x->why = (pw_error){ 0 };
-    if (status > 0) pw_fail_singular (x->system[PW_HERE].run, x->settings.t, &x->why);
+    if (status > 0) pw_fail_singular (x->system.run, x->settings.t, &x->why);
     return PW_RETRY;
   }
-  steady_residual (x, PW_HERE, F);
+  steady_residual (x, F);
   for (int i = 0; i < x->settings.holds; i++) F[first_held + i] = pw_hold_residual (x, x->hold + i, NULL, NULL);
   if (dF == NULL) return PW_OK;
   steady_columns (x, dF);
   steady_conditions (x, dF);
-  dF += (size_t)unknowns * (size_t)equations;
-  if (vary >= 0) dF[first_held + vary] = pw_hold_slope (x, x->hold + vary) * (x->settings.last - x->settings.first);
-  status = x->settings.compile ? steady_by_parameter (x, value, F, dF) : PW_OK;
-  if (status < 0) pw_fail (error, status, "%s", x->why.text);
-  return status;
+  return PW_OK;
 }

@@ -77,7 +77,3 @@ double pw_hold_residual (const pw_steady *x, const pw_initial_value *hold, const
   const hold_pair pair = hold_terms (x->s, hold->state, x->q, x->v, dq, dv);
   return (pair.A - hold->value * pair.B) / hold_unit (x, hold->state);
 }
-
-double pw_hold_slope (const pw_steady *x, const pw_initial_value *hold) {
-  return -hold_terms (x->s, hold->state, x->q, x->v, NULL, NULL).B / hold_unit (x, hold->state);
-}

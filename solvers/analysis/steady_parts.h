@@ -10,9 +10,6 @@
 #include "continuation.h"
 #include "linear.h"
 
-/* The system at the value of the parameter in question, and that beside it, for differences. */
-typedef enum { PW_HERE, PW_BESIDE, PW_PLACES } pw_place;
-
 struct pw_steady {
   const pw_system *s; /* as described */
   pw_steady_settings settings;
@@ -27,14 +24,14 @@ struct pw_steady {
   double origin[2];      /* about which rates of rotation turn the whole [m] */
   double *symmetry;      /* symmetries x rates: a basis of the symmetries */
   int free_symmetries;   /* those that leave what is held unchanged; 0 before a solution is found */
-  double *free_symmetry; /* free_symmetries x symmetries: their coefficients in that basis */
+  double *free_symmetry; /* free_symmetries x symmetries: their coefficients in that basis; scratch */
 
   struct {
     double value;   /* of the parameter */
     pw_system *own; /* by settings.compile; NULL: s serves */
     pw_run *run;    /* NULL: not open */
     pw_linearisation linearisation;
-  } system[PW_PLACES];
+  } system;
   pw_initial_value *solution; /* 2 n: the last solution, where runs are opened; or that configuration at rest */
   int solved;                 /* 1: there is one */
 
@@ -69,6 +66,8 @@ static inline int pw_steady_angle_rate (const pw_system *s, int j) {
 void pw_steady_combine (const pw_steady *x, const double *coefficient, double unit, double *rates);
 /* The velocities that rates cause at a configuration. */
 void pw_steady_velocities (const pw_steady *x, const double *rates, const double *q, double *v);
+/* Displaces a state at these rates for a time. */
+void pw_steady_displace (const pw_steady *x, const double *rates, double time, double *q, double *v);
 /* out: orthonormal rows of length n that span the null space of M (rows x n, by columns, destroyed; rows >= n > 0).
  * Singular values up to the tolerance, or up to round-off, count as 0.  Returns the number of rows, or a status < 0. */
 int pw_null_space (int rows, int n, double *M, double tolerance, double *out);
@@ -118,10 +117,10 @@ enum { PW_STEADY_MAX_COORDINATES = 400 }; /* since the cost is cubic */
 /* The system of pw_steady_settings.compile; NULL and the reason if this returns none or records an error. */
 pw_system *pw_compile_at (pw_system *(*compile) (void *context, double value, pw_error *error), void *context,
                           double value, pw_error *why);
-/* Opens x->system[place] for a value of the parameter, unless it is open for it.  A status, with x->why if it fails;
+/* Opens x->system for a value of the parameter, unless it is open for it.  A status, with x->why if it fails;
  * PW_INPUT: its sizes differ; PW_RETRY: none at this value (x->why has the status of the error). */
-int pw_steady_open_system (pw_steady *x, pw_place place, double value);
-void pw_steady_close_system (pw_steady *x, pw_place place);
+int pw_steady_open_system (pw_steady *x, double value);
+void pw_steady_close_system (pw_steady *x);
 /* PW_INPUT and the reason unless both systems have as many bodies, coordinates and constraint equations. */
 int pw_steady_same_sizes (const pw_system *a, const pw_system *b, pw_error *why);
 
@@ -130,13 +129,12 @@ int pw_steady_same_sizes (const pw_system *a, const pw_system *b, pw_error *why)
 /* What can be held is numbered: the states, then PW_HOLD_OF_BODY quantities of each body. */
 enum { PW_HOLD_SPEED, PW_HOLD_RADIUS, PW_HOLD_CURVATURE, PW_HOLD_OF_BODY };
 /* The residual A - value B of what is held (steady_hold.c) in the state x->q, x->v, or if dq is not NULL its change by
- * the variation (dq, dv); its derivative with respect to the value.  All are divided by the unit of A. */
+ * the variation (dq, dv); divided by the unit of A. */
 double pw_hold_residual (const pw_steady *x, const pw_initial_value *hold, const double *dq, const double *dv);
-double pw_hold_slope (const pw_steady *x, const pw_initial_value *hold);
 
 /* ---- steady_start.c ---- */
 
-/* The unknowns, except the parameter, with which an attempt begins; x->system[PW_HERE] is open.  Attempt 0: the initial
+/* The unknowns, except the parameter, with which an attempt begins; x->system is open.  Attempt 0: the initial
  * state; 1: a state to which forces lead from there; then random states, even attempts near the initial one, odd ones
  * anywhere.  Of these, by attempt modulo 4: 0 and 1 need not be consistent; 2: a state to which forces lead as in
  * attempt 1; 3: consistent. */

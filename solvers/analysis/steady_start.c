@@ -18,7 +18,7 @@ static double start_random (uint64_t *state) {
 static int start_assemble (pw_steady *x, pw_projector *p) {
   double *q = x->scratch[0];
   memcpy (q, x->q, (size_t)x->n * sizeof *q);
-  int status = pw_project_positions (p, x->system[PW_HERE].run, x->settings.t, q, x->v);
+  int status = pw_project_positions (p, x->system.run, x->settings.t, q, x->v);
   if (status == PW_OK) memcpy (x->q, q, (size_t)x->n * sizeof *q);
   return status;
 }
@@ -26,10 +26,10 @@ static int start_assemble (pw_steady *x, pw_projector *p) {
 /* The accelerations in the moving frame at x->q, x->rates; returns the largest, divided by the unit of its coordinate
  * [1/s^2], or NaN if they are not determined. */
 static double start_accelerate (pw_steady *x, double *a) {
-  pw_linearisation *l = &x->system[PW_HERE].linearisation;
+  pw_linearisation *l = &x->system.linearisation;
   double most = 0;
   pw_steady_velocities (x, x->rates, x->q, x->v);
-  if (pw_run_accelerate (x->system[PW_HERE].run, x->settings.t, x->q, x->v, l->a, l->lambda) != PW_OK) return NAN;
+  if (pw_run_accelerate (x->system.run, x->settings.t, x->q, x->v, l->a, l->lambda) != PW_OK) return NAN;
   memcpy (a, l->a, (size_t)x->n * sizeof *a);
   pw_linear_turn (l, -x->rates[PW_RATE_TURN], x->v, a);
   for (int j = 0; j < x->n; j++) most = pw_larger_or_nan (most, fabs (a[j]) / pw_unit (x->s, j));
@@ -61,8 +61,8 @@ int pw_steady_start (pw_steady *x, int attempt, double *u, pw_error *error) {
     u[j] += wide * start_random (&state) * (j >= x->n ? 2 : pw_is_angle (x->s, j) ? PW_PI : 1);
   if (status != PW_OK || !consistent) return status;
   pw_steady_state (x, u);
-  if (pw_evaluate_J_at (x->system[PW_HERE].run->w, x->settings.t, x->q, x->v) != PW_OK) return PW_OK; /* as it is */
-  if (pw_projector_open (&p, x->system[PW_HERE].run, x->s->metric, x->s->metric, &x->why) != PW_OK)
+  if (pw_evaluate_J_at (x->system.run->w, x->settings.t, x->q, x->v) != PW_OK) return PW_OK; /* as it is */
+  if (pw_projector_open (&p, x->system.run, x->s->metric, x->s->metric, &x->why) != PW_OK)
     return pw_fail_memory (x->s, error);
   if (start_assemble (x, &p) == PW_OK && relaxed) start_relax (x, &p);
   pw_projector_close (&p);

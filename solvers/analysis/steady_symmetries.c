@@ -38,7 +38,7 @@ void pw_steady_velocities (const pw_steady *x, const double *rates, const double
 
 /* What displacements of these rates change in the equations at x->q, x->v, in units of the scene. */
 static void symmetry_violation (pw_steady *x, const double *rates, double *out) {
-  pw_linearisation *l = &x->system[PW_HERE].linearisation;
+  pw_linearisation *l = &x->system.linearisation;
   memset (l->dx, 0, 2 * (size_t)x->n * sizeof *l->dx);
   pw_steady_velocities (x, rates, x->q, l->dx);
   pw_linear_turn (l, rates[PW_RATE_TURN], x->v, l->dx + x->n);
@@ -47,7 +47,7 @@ static void symmetry_violation (pw_steady *x, const double *rates, double *out) 
 
 /* The largest change of an acceleration by a single coordinate, in units of the scene. */
 static double symmetry_largest_change (pw_steady *x) {
-  pw_linearisation *l = &x->system[PW_HERE].linearisation;
+  pw_linearisation *l = &x->system.linearisation;
   double most = 0;
   for (int c = 0; c < x->n; c++) {
     memset (l->dx, 0, 2 * (size_t)x->n * sizeof *l->dx);
@@ -108,56 +108,76 @@ void pw_irregular_state (const pw_run *r, double distance, int number, double *q
   }
 }
 
-/* Rotates positions and velocities by an angle about a point, which may be in q. */
-static void symmetry_rotate (const pw_steady *x, double angle, const double *about, double *q, double *v) {
-  double c = pw_cos (angle), s = pw_sin (angle), centre[2] = { about[0], about[1] };
+/* The whole translates by t while it rotates by w about the origin, p -> R p + V t, with R the rotation by w and V the
+ * mean of the rotations on the way. */
+void pw_steady_displace (const pw_steady *x, const double *rates, double time, double *q, double *v) {
+  const double *o = x->origin, t[2] = { time * x->L * rates[PW_RATE_X], time * x->L * rates[PW_RATE_Y] };
+  double w = time * rates[PW_RATE_TURN], c = pw_cos (w), s = pw_sin (w), half = pw_sin (w / 2);
+  double p = fabs (w) > 1e-8 ? s / w : 1, r = fabs (w) > 1e-8 ? 2 * half * half / w : w / 2; /* V = [ p -r ; r p ] */
   for (int j = 0; j < 3 * x->s->bodies; j += 3) {
-    double dx = q[j] - centre[0], dy = q[j + 1] - centre[1], vx = v[j], vy = v[j + 1];
-    q[j] = centre[0] + c * dx - s * dy, q[j + 1] = centre[1] + s * dx + c * dy, q[j + 2] += angle;
+    double dx = q[j] - o[0], dy = q[j + 1] - o[1], vx = v[j], vy = v[j + 1];
+    q[j] = o[0] + c * dx - s * dy + p * t[0] - r * t[1];
+    q[j + 1] = o[1] + s * dx + c * dy + r * t[0] + p * t[1];
+    q[j + 2] += w;
     v[j] = c * vx - s * vy, v[j + 1] = s * vx + c * vy;
   }
+  for (int j = 0; j < x->n; j++)
+    if (pw_is_angle (x->s, j)) q[j] += time * rates[pw_steady_angle_rate (x->s, j)];
 }
 
-/* Displaces the whole at x->q, x->v irregularly, by up to pi and `distance` along x and y. */
+/* Displaces the whole at x->q, x->v irregularly, by up to pi and `distance` units of length along x and y. */
 static void symmetry_displace (pw_steady *x, double distance, int number) {
-  symmetry_rotate (x, PW_PI * pw_irregular (0.9 + number, 1), x->origin, x->q, x->v);
-  for (int j = 0; j < 3 * x->s->bodies; j += 3)
-    for (int i = 0; i < 2; i++) x->q[j + i] += distance * pw_irregular (0.9 + number, 2 + i);
+  memset (x->combined, 0, (size_t)pw_steady_rate_count (x->s) * sizeof *x->combined);
+  for (int i = PW_RATE_X; i <= PW_RATE_TURN; i++)
+    x->combined[i] = (i == PW_RATE_TURN ? PW_PI : distance) * pw_irregular (0.9 + number, 1 + i);
+  pw_steady_displace (x, x->combined, 1, x->q, x->v);
 }
 
 /* Evaluates derivatives at state `number` in general position, but on the constraints: off them residuals rotate with
  * the whole.  near: greatest distance of a state from the initial one, or from that after a displacement. */
 static int symmetry_evaluate (pw_steady *x, double near, int number) {
-  pw_run *r = x->system[PW_HERE].run;
+  pw_run *r = x->system.run;
   pw_projector p;
   pw_irregular_state (r, near, number, x->q, x->v);
-  if (number >= SYMMETRY_NEAR) symmetry_displace (x, x->L * pow (3, number - SYMMETRY_NEAR), number);
+  if (number >= SYMMETRY_NEAR) symmetry_displace (x, pow (3, number - SYMMETRY_NEAR), number);
   if (pw_projector_open (&p, r, x->s->metric, x->s->metric, &x->why) != PW_OK) return PW_RESOURCE;
   int status = pw_project_positions (&p, r, x->settings.t, x->q, x->v);
   if (status == PW_OK) status = pw_project_velocities (&p, r, x->v);
   pw_projector_close (&p);
-  if (status == PW_OK) status = pw_linear_evaluate (&x->system[PW_HERE].linearisation, x->settings.t, x->q, x->v);
-  if (status == PW_OK) pw_rank_rows (r->w, x->system[PW_HERE].linearisation.R, x->system[PW_HERE].linearisation.norm);
+  if (status == PW_OK) status = pw_linear_evaluate (&x->system.linearisation, x->settings.t, x->q, x->v);
+  if (status == PW_OK) pw_rank_rows (r->w, x->system.linearisation.R, x->system.linearisation.norm);
   return status;
 }
 
 /* Number of residuals and accelerations by which an asymmetry is measured. */
 static int symmetry_length (const pw_steady *x) {
-  const pw_linearisation *l = &x->system[PW_HERE].linearisation;
+  const pw_linearisation *l = &x->system.linearisation;
   return l->holonomic + l->rank + x->n + 3; /* the last three are 0, so that there are at least as many as rates */
 }
 
-/* Stores the asymmetries of `count` displacements at x->q, x->v as columns of M, from one column to the next `rows`
+/* Stores the asymmetries of the rows of x->symmetry at x->q, x->v as columns of M, from one column to the next `rows`
  * later, relative to 1 + 1e-4 x the largest derivative of an acceleration, whose round-off they contain.  0 if one is
  * not finite. */
-static int symmetry_columns (pw_steady *x, int count, const double *displacement, int rows, double *M) {
+static int symmetry_columns (pw_steady *x, int rows, double *M) {
   const double scale = 1 / (1 + 1e-4 * symmetry_largest_change (x));
   int finite = 1, length = symmetry_length (x) - 3;
-  for (int c = 0; c < count; c++, M += rows) {
-    symmetry_violation (x, displacement + c * pw_steady_rate_count (x->s), M);
+  for (int c = 0; c < x->symmetries; c++, M += rows) {
+    symmetry_violation (x, x->symmetry + c * pw_steady_rate_count (x->s), M);
     for (int i = 0; i < length; i++) finite &= isfinite (M[i] *= scale);
   }
   return finite;
+}
+
+/* out: the rates of the combinations of rows of x->symmetry in the null space of M (rows x symmetries, by columns,
+ * destroyed; rows >= symmetries).  Returns their number, or a status < 0. */
+static int symmetry_combinations (const pw_steady *x, int rows, double *M, double tolerance, double *out) {
+  int count = x->symmetries;
+  double *c = malloc (((size_t)count * (size_t)count + 1) * sizeof *c);
+  if (c == NULL) return PW_RESOURCE;
+  int found = count ? pw_null_space (rows, count, M, tolerance, c) : 0;
+  for (int i = 0; i < found; i++) pw_steady_combine (x, c + i * count, 1, out + i * pw_steady_rate_count (x->s));
+  free (c);
+  return found;
 }
 
 /* Subtracts from the symmetries the combinations of them that displace nothing, such as a rotation of a pinned disc as
@@ -165,16 +185,14 @@ static int symmetry_columns (pw_steady *x, int count, const double *displacement
  * x->symmetries, or a status < 0.  x->q is in general position. */
 static int symmetry_remove_idle (pw_steady *x, int rates) {
   int n = x->n + 3, count = x->symmetries; /* at least as many rows as columns */
-  double *F = calloc ((size_t)(n + count + rates) * (size_t)count + 1, sizeof *F);
-  double *c = F + n * count, *idle_rates = c + count * count; /* combinations, and their rates */
+  double *F = calloc ((size_t)n * (size_t)count + 1, sizeof *F), *idle_rates = x->free_symmetry;
   if (F == NULL) return PW_RESOURCE;
   for (int k = 0; k < count; k++) {
     pw_steady_velocities (x, x->symmetry + k * rates, x->q, F + k * n);
     for (int j = 0; j < x->n; j++) F[k * n + j] /= pw_unit (x->s, j);
   }
-  int idle = count ? pw_null_space (n, count, F, PW_STEADY_RANK, c) : 0;
-  for (int i = 0; i < idle * count; i++)
-    for (int j = 0; j < rates; j++) idle_rates[i / count * rates + j] += c[i] * x->symmetry[i % count * rates + j];
+  int idle = symmetry_combinations (x, n, F, PW_STEADY_RANK, idle_rates);
+  free (F);
   symmetry_reduce (idle, rates, idle_rates);
   for (int i = 0; i < idle; i++) {
     int last = rates - 1; /* the pivot */
@@ -184,7 +202,6 @@ static int symmetry_remove_idle (pw_steady *x, int rates) {
       for (int j = 0; j < rates; j++) x->symmetry[k * rates + j] -= factor * idle_rates[i * rates + j];
     }
   }
-  free (F);
   return idle;
 }
 
@@ -215,27 +232,37 @@ static void symmetry_simplify (pw_steady *x, int idle) {
   symmetry_keep_one_turn (x, rates);
 }
 
-/* Adds the asymmetries at state `number` of all displacements, the rows of `unit`. */
-static int symmetry_add_state (pw_steady *x, int number, const double *unit, int rows, double *M) {
-  int rates = pw_steady_rate_count (x->s), status = symmetry_evaluate (x, SYMMETRY_DISTANCE, number);
+/* Leaves the combinations of symmetries in the null space of M.  A status. */
+static int symmetry_restrict (pw_steady *x, int rows, double *M) {
+  int left = symmetry_combinations (x, rows, M, PW_LINEAR_SYMMETRIC, x->free_symmetry);
+  if (left < 0) return left;
+  if (left == x->symmetries) return PW_OK; /* the basis remains as it is */
+  memcpy (x->symmetry, x->free_symmetry, (size_t)(left * pw_steady_rate_count (x->s)) * sizeof *x->symmetry);
+  x->symmetries = left;
+  return PW_OK;
+}
+
+/* Adds the asymmetries at state `number`. */
+static int symmetry_add_state (pw_steady *x, int number, int rows, double *M) {
+  int status = symmetry_evaluate (x, SYMMETRY_DISTANCE, number);
   M += number * symmetry_length (x);
   if (status == PW_RETRY) status = symmetry_evaluate (x, SYMMETRY_DISTANCE / 100, number);
-  const int finite = status == PW_OK && symmetry_columns (x, rates, unit, rows, M);
+  const int finite = status == PW_OK && symmetry_columns (x, rows, M);
   if (number < SYMMETRY_NEAR || status == PW_RESOURCE) return status;
-  for (int c = 0; c < rates && !finite; c++) memset (M + c * rows, 0, (size_t)symmetry_length (x) * sizeof *M);
+  for (int c = 0; c < x->symmetries && !finite; c++) memset (M + c * rows, 0, (size_t)symmetry_length (x) * sizeof *M);
   return PW_OK; /* the whole may be joined to the ground, or forces undefined far away */
 }
 
 int pw_steady_find_symmetries (pw_steady *x) {
   int rates = pw_steady_rate_count (x->s), rows = SYMMETRY_STATES * symmetry_length (x), status = PW_OK;
-  double *M = calloc ((size_t)(rows + rates) * (size_t)rates, sizeof *M), *unit = M + rows * rates;
+  double *M = calloc ((size_t)rows * (size_t)rates, sizeof *M);
   if (M == NULL) return PW_RESOURCE;
-  for (int c = 0; c < rates; c++) unit[c * rates + c] = 1;
-  for (int k = SYMMETRY_STATES; k-- > 0 && status == PW_OK;) status = symmetry_add_state (x, k, unit, rows, M);
-  if (status == PW_OK)
-    x->symmetries = x->s->bodies ? pw_null_space (rows, rates, M, PW_LINEAR_SYMMETRIC, x->symmetry) : 0;
+  for (int c = 0; c < rates; c++) x->symmetry[c * rates + c] = 1;
+  x->symmetries = x->s->bodies ? rates : 0;
+  for (int k = SYMMETRY_STATES; k-- > 0 && status == PW_OK;) status = symmetry_add_state (x, k, rows, M);
+  if (status == PW_OK) status = symmetry_restrict (x, rows, M);
   free (M);
-  if (status != PW_OK || x->symmetries < 0) return status != PW_OK ? status : x->symmetries;
+  if (status != PW_OK) return status;
   int idle = symmetry_remove_idle (x, rates); /* at state 0, evaluated last */
   if (idle < 0) return idle;
   symmetry_simplify (x, idle);
@@ -243,23 +270,15 @@ int pw_steady_find_symmetries (pw_steady *x) {
 }
 
 int pw_steady_keep_symmetries (pw_steady *x) {
-  int rates = pw_steady_rate_count (x->s), count = x->symmetries, rows = symmetry_length (x);
-  int status = pw_linear_evaluate (&x->system[PW_HERE].linearisation, x->settings.t, x->q, x->v);
+  int rows = symmetry_length (x), count = x->symmetries;
+  int status = pw_linear_evaluate (&x->system.linearisation, x->settings.t, x->q, x->v);
   if (status != PW_OK || count == 0) return status;
-  double *M = calloc ((size_t)(rows + count + rates) * (size_t)count, sizeof *M), *c = M + rows * count,
-         *kept = c + count * count;
+  double *M = calloc ((size_t)rows * (size_t)count, sizeof *M);
   if (M == NULL) return PW_RESOURCE;
-  int left = symmetry_columns (x, count, x->symmetry, rows, M) ? pw_null_space (rows, count, M, PW_LINEAR_SYMMETRIC, c)
-                                                               : count;
-  for (int i = 0; left < count && i < left * count; i++)
-    for (int j = 0; j < rates; j++) kept[i / count * rates + j] += c[i] * x->symmetry[i % count * rates + j];
-  if (left >= 0 && left < count) {
-    memcpy (x->symmetry, kept, (size_t)(left * rates) * sizeof *kept);
-    x->symmetries = left;
-    symmetry_simplify (x, 0);
-  }
+  if (symmetry_columns (x, rows, M)) status = symmetry_restrict (x, rows, M);
+  if (x->symmetries < count) symmetry_simplify (x, 0);
   free (M);
-  return left < 0 ? left : PW_OK;
+  return status;
 }
 
 int pw_steady_find_free_symmetries (pw_steady *x) {
@@ -270,7 +289,7 @@ int pw_steady_find_free_symmetries (pw_steady *x) {
     const double *symmetry = x->symmetry + k * pw_steady_rate_count (x->s);
     pw_steady_velocities (x, symmetry, x->q, x->dq);
     memset (x->dv, 0, (size_t)x->n * sizeof *x->dv);
-    pw_linear_turn (&x->system[PW_HERE].linearisation, symmetry[PW_RATE_TURN], x->v, x->dv);
+    pw_linear_turn (&x->system.linearisation, symmetry[PW_RATE_TURN], x->v, x->dv);
     for (int i = 0; i < holds; i++) M[k * rows + i] = pw_hold_residual (x, x->hold + i, x->dq, x->dv);
   }
   x->free_symmetries = symmetries ? pw_null_space (rows, symmetries, M, PW_STEADY_RANK, x->free_symmetry) : 0;
@@ -316,18 +335,12 @@ static double symmetry_time (const pw_steady *x, const double *rate, const doubl
 
 /* Displaces a state back along a symmetry. */
 static void symmetry_go_back (const pw_steady *x, const double *rate, double *q, double *v) {
-  double turn = rate[PW_RATE_TURN], time;
+  double turn = rate[PW_RATE_TURN], time = turn != 0 ? 0 : symmetry_time (x, rate, q);
   if (turn != 0) {
     double centre[2] = { x->origin[0] - x->L * rate[PW_RATE_Y] / turn, x->origin[1] + x->L * rate[PW_RATE_X] / turn };
     time = symmetry_angle (x, rate, centre, q) / turn;
-    symmetry_rotate (x, -turn * time, centre, q, v);
-  } else {
-    time = symmetry_time (x, rate, q);
-    for (int j = 0; j < 3 * x->s->bodies; j += 3)
-      q[j] -= time * x->L * rate[PW_RATE_X], q[j + 1] -= time * x->L * rate[PW_RATE_Y];
   }
-  for (int j = 0; j < x->n; j++)
-    if (pw_is_angle (x->s, j)) q[j] -= time * rate[pw_steady_angle_rate (x->s, j)];
+  pw_steady_displace (x, rate, -time, q, v);
 }
 
 /* The whole is turned first, since this changes what the other symmetries change; these commute, and the pivot of each
@@ -343,8 +356,10 @@ void pw_steady_move_to_start (const pw_steady *x, double *q, double *v) {
   int whole = 0, count = pw_steady_rate_count (x->s);
   for (int k = 0; k < x->symmetries; k++) whole += symmetry_of_whole (x->symmetry + k * count);
   if (x->free_symmetries < x->symmetries || whole < 3) return;
+  memset (x->combined, 0, (size_t)count * sizeof *x->combined);
+  x->combined[PW_RATE_TURN] = 1;
+  pw_steady_displace (x, x->combined, x->start[2] - q[2], q, v);
   double dx = x->start[0] - q[0], dy = x->start[1] - q[1];
-  symmetry_rotate (x, x->start[2] - q[2], q, q, v);
   for (int j = 0; j < 3 * x->s->bodies; j += 3) q[j] += dx, q[j + 1] += dy;
 }
 

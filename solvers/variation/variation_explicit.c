@@ -5,17 +5,17 @@
 #include "rk.h"
 #include "variation_parts.h"
 
-/* Adds h sum weight_k K_k to `out`: entries from `first` to `end` - 1. */
-static void explicit_combine (const pw_variation_column *c, const double *weight, int count, double h, int first,
-                              int end, double *out) {
-  for (int k = 0; k < count; k++) pw_add_scaled (out + first, c->K[k] + first, h * weight[k], end - first);
+/* Adds the first `length` entries of h sum weight_k K_k to `out`. */
+static void explicit_combine (const pw_variation_column *c, const double *weight, int count, double h, int length,
+                              double *out) {
+  for (int k = 0; k < count; k++) pw_add_scaled (out, c->K[k], h * weight[k], length);
 }
 
 /* `trial` = Y + h sum weight_k K_k of every column, over `count` stages. */
 static void explicit_stage (pw_variation *x, const double *weight, int count, double h) {
   PW_EACH_COLUMN (c, x) {
     memcpy (c->trial, c->Y, (size_t)x->size * sizeof *c->Y);
-    explicit_combine (c, weight, count, h, 0, x->size, c->trial);
+    explicit_combine (c, weight, count, h, x->size, c->trial);
   }
 }
 
@@ -26,7 +26,7 @@ int pw_variation_explicit_stages (pw_variation *x, double h, double t1, pw_error
   for (int k = 1; k < b->stages && status == PW_OK; weight += k++) {
     explicit_stage (x, weight, k, h);
     status = pw_variation_evaluate_at (x, k + 1 < b->stages ? x->t + b->c[k] * h : t1, error);
-    if (status == PW_OK) status = pw_variation_time_derivatives (x, k, error);
+    if (status == PW_OK) status = pw_variation_all_time_derivatives (x, k, error);
   }
   if (status != PW_OK) return status;
   explicit_stage (x, b->b, b->stages, h); /* the last stage has evaluated the state at t1 */
@@ -40,10 +40,10 @@ int pw_variation_explicit_stages (pw_variation *x, double h, double t1, pw_error
   return PW_OK;
 }
 
-void pw_variation_explicit_errors (pw_variation *x, double h, int first, int end) {
+void pw_variation_explicit_errors (pw_variation *x, double h) {
   for (pw_direction_copy *d = x->direction; d < x->direction + x->count; d++) {
-    memset (d->local_error + first, 0, (size_t)(end - first) * sizeof *d->local_error);
-    explicit_combine (&d->column[0], pw_erk5_tableau.e, PW_VARIATION_RATES, h, first, end, d->local_error);
+    memset (d->local_error, 0, (size_t)x->size * sizeof *d->local_error);
+    explicit_combine (&d->column[0], pw_erk5_tableau.e, PW_VARIATION_RATES, h, x->size, d->local_error);
   }
 }
 
@@ -57,7 +57,7 @@ double pw_variation_stiffness (const pw_variation *x, double h) {
   for (const pw_direction_copy *d = x->direction; d < x->direction + x->count; d++) {
     const pw_variation_column *c = d->column;
     memset (change, 0, 2 * (size_t)x->n * sizeof *change);
-    explicit_combine (c, weight, b->stages, h, 0, 2 * x->n, change);
+    explicit_combine (c, weight, b->stages, h, 2 * x->n, change);
     for (int j = 0; j < 2 * x->n; j++) rate[j] = h * (c->K[b->stages][j] - c->K[b->stages - 1][j]);
     if (pw_variation_norm (x, change) > 0)
       most = fmax (most, pw_variation_norm (x, rate) / pw_variation_norm (x, change));

@@ -170,7 +170,7 @@ static int implicit_powers (pw_variation *x, double h, double t1, pw_error *erro
     int status = pw_variation_evaluate_at (x, i + 1 < STAGES ? x->t + radau_c[i] * h : t1, error);
     if (status != PW_OK) return status;
     PW_EACH_COLUMN (c, x) memcpy (c->trial, c->K[STATE + i], (size_t)from * sizeof *c->trial);
-    status = pw_variation_time_derivatives (x, RATE + i, error);
+    status = pw_variation_all_time_derivatives (x, RATE + i, error);
     if (status != PW_OK) return status;
   }
   PW_EACH_COLUMN (c, x)

@@ -93,21 +93,22 @@ int pw_variation_outputs (pw_variation *x, const pw_variation_column *c, const d
   return status;
 }
 
-int pw_variation_ledger_rates (pw_variation *x, int k) {
+int pw_variation_time_derivatives (pw_variation *x, int c, int k, pw_error *error) {
   int status = PW_OK;
+  pw_variation_accelerate (x, c, k);
   if (!x->ledger) return PW_OK;
-  PW_EACH_COLUMN (c, x) {
-    if (status == PW_OK) status = pw_variation_outputs (x, c, c->trial, x->output);
-    memcpy (c->K[k] + 2 * x->n, x->output + 2, (size_t)x->entries * sizeof (double));
+  for (pw_direction_copy *d = x->direction; d < x->direction + x->count && status == PW_OK; d++) {
+    if (c >= d->columns) continue;
+    status = pw_variation_outputs (x, &d->column[c], d->column[c].trial, x->output);
+    memcpy (d->column[c].K[k] + 2 * x->n, x->output + 2, (size_t)x->entries * sizeof (double));
   }
   /* J and its factors are again those of the state */
   if (pw_evaluate_J_at (x->r->w, x->at, x->q, x->v) == PW_OK) pw_saddle_factor (x->r->saddle);
-  return status;
+  return status == PW_OK ? PW_OK : pw_fail_signal (x->at, error);
 }
 
-int pw_variation_time_derivatives (pw_variation *x, int k, pw_error *error) {
+int pw_variation_all_time_derivatives (pw_variation *x, int k, pw_error *error) {
   memcpy (x->a[k], x->linear.a, (size_t)x->n * sizeof *x->q);
-  pw_variation_accelerate (x, 0, k);
-  pw_variation_accelerate (x, 1, k);
-  return pw_variation_ledger_rates (x, k) == PW_OK ? PW_OK : pw_fail_signal (x->at, error);
+  int status = pw_variation_time_derivatives (x, 0, k, error);
+  return status == PW_OK ? pw_variation_time_derivatives (x, 1, k, error) : status;
 }

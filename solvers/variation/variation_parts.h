@@ -150,10 +150,10 @@ double pw_variation_step_along (const pw_variation_column *c);
 /* Derivatives of kinetic and potential energy, the ledger's rates, multipliers (of least norm) along a column whose
  * state is Y: 2 + entries + m numbers.  J is left at another state.  Non-zero if a signal fails. */
 int pw_variation_outputs (pw_variation *x, const pw_variation_column *c, const double *Y, double *out);
-/* Time derivatives of the work and losses of every column at its `trial`, into K[k].  Non-zero if a signal fails. */
-int pw_variation_ledger_rates (pw_variation *x, int k);
-/* All time derivatives of every column at its `trial`, into K[k]; accelerations of the run into a[k].  A status. */
-int pw_variation_time_derivatives (pw_variation *x, int k, pw_error *error);
+/* Time derivatives of column c of each direction at its `trial`, into K[k]; of every column, with accelerations of the
+ * run into a[k].  Return a status. */
+int pw_variation_time_derivatives (pw_variation *x, int c, int k, pw_error *error);
+int pw_variation_all_time_derivatives (pw_variation *x, int k, pw_error *error);
 
 /* ---- variation_step.c ---- */
 
@@ -168,8 +168,8 @@ int pw_variation_step (pw_variation *x, double t1, pw_error *error);
 /* Computes the columns after a step from x->t to t1 = x->t + h into `trial`, evaluates the state there, estimates
  * `motion_error` and adds the integral of the accelerations to `motion_defect`.  A status. */
 int pw_variation_explicit_stages (pw_variation *x, double h, double t1, pw_error *error);
-/* Entries from `first` to `end` - 1 of `local_error`, when the last time derivatives are known. */
-void pw_variation_explicit_errors (pw_variation *x, double h, int first, int end);
+/* `local_error`, when the last time derivatives of column 0 are known. */
+void pw_variation_explicit_errors (pw_variation *x, double h);
 /* h times the rate of the fastest component of the derivatives. */
 double pw_variation_stiffness (const pw_variation *x, double h);
 

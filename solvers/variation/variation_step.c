@@ -108,13 +108,13 @@ static double step_error (const pw_variation *x) {
   return most;
 }
 
-/* Adds to entries `first` to `end` - 1 of the errors of derivatives those of the step, and the part of the derivatives'
- * change that the run does not resolve, step_defect. */
-static void step_add_errors (pw_variation *x, double defect, int first, int end) {
+/* Adds to the errors of derivatives those of the step, and the part of the derivatives' change that the run does not
+ * resolve, step_defect. */
+static void step_add_errors (pw_variation *x, double defect) {
   for (pw_direction_copy *d = x->direction; d < x->direction + x->count; d++) {
     const pw_variation_column *derivative = &d->column[0];
     double *error = d->column[1].trial;
-    for (int j = first; j < end && d->columns > 1; j++) {
+    for (int j = 0; j < x->size && d->columns > 1; j++) {
       error[j] += d->local_error[j];
       error[j] += copysign (defect * (derivative->trial[j] - derivative->Y[j]), error[j]);
     }
@@ -137,9 +137,8 @@ static void step_implicit_errors (pw_variation *x) {
   step_scale_error (x->motion_error, step_motion_error (x), x->n);
 }
 
-/* Computes the stages, the new derivatives into `trial`, their time derivatives and errors.  The errors of dq and dv
- * follow from the time derivatives of column 0 and are added to column 1 before the time derivatives there are
- * evaluated.  Those of work and losses follow from all of these, and no time derivative depends on them. */
+/* Computes the stages, the new derivatives into `trial`, their time derivatives and errors.  The errors follow from the
+ * time derivatives of column 0, and are added to column 1 before the time derivatives there are evaluated. */
 static int step_stages (pw_variation *x, double h, double t1, pw_error *error) {
   int last = PW_VARIATION_RATES - 1;
   pw_variation_state (x, x->t, x->scratch);
@@ -149,18 +148,14 @@ static int step_stages (pw_variation *x, double h, double t1, pw_error *error) {
       x->implicit ? pw_variation_implicit_stages (x, h, t1, error) : pw_variation_explicit_stages (x, h, t1, error);
   if (status != PW_OK) return status;
   memcpy (x->a[last], x->linear.a, (size_t)x->n * sizeof *x->q);
-  pw_variation_accelerate (x, 0, last);
+  status = pw_variation_time_derivatives (x, 0, last, error);
+  if (status != PW_OK) return status;
   if (x->implicit)
     step_implicit_errors (x);
   else
-    pw_variation_explicit_errors (x, h, 0, 2 * x->n);
-  const double defect = step_defect (x, h);
-  step_add_errors (x, defect, 0, 2 * x->n);
-  pw_variation_accelerate (x, 1, last);
-  if (pw_variation_ledger_rates (x, last) != PW_OK) return pw_fail_signal (x->at, error);
-  if (x->implicit == NULL) pw_variation_explicit_errors (x, h, 2 * x->n, x->size);
-  step_add_errors (x, defect, 2 * x->n, x->size);
-  return PW_OK;
+    pw_variation_explicit_errors (x, h);
+  step_add_errors (x, step_defect (x, h));
+  return pw_variation_time_derivatives (x, 1, last, error);
 }
 
 /* The end of the step becomes the beginning of the next one. */
@@ -182,7 +177,7 @@ int pw_variation_restart (pw_variation *x, pw_error *error) {
     pw_variation_project (x, c);
     c->largest = fmax (c->largest, pw_variation_norm (x, c->trial));
   }
-  int status = pw_variation_time_derivatives (x, PW_VARIATION_RATES - 1, error);
+  int status = pw_variation_all_time_derivatives (x, PW_VARIATION_RATES - 1, error);
   if (status == PW_OK) step_accept (x);
   return status;
 }

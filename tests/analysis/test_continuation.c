@@ -16,7 +16,6 @@ static int cubic (void *context, const double *u, double *F, double *dF, pw_erro
   if (dF == NULL) return PW_OK;
   dF[0] = 3 * x * x - 1, dF[1] = 2 * dF[0];
   dF[5] = 1;
-  dF[6] = -1, dF[7] = -2;
   return PW_OK;
 }
 
@@ -71,14 +70,14 @@ static int pitchfork (void *context, const double *u, double *F, double *dF, pw_
   double off = u[0] - 3 * sin (u[1]), p = u[1] - *(double *)context;
   (void)error;
   F[0] = off * (p - off * off);
-  if (dF) dF[0] = p - 3 * off * off, dF[1] = off - 3 * cos (u[1]) * dF[0];
+  if (dF) dF[0] = p - 3 * off * off;
   return PW_OK;
 }
 
 static int pitchfork_sign (void *context, const pw_branch_point *point, double *value, pw_error *error) {
-  double F, dF[2] = { 0 };
-  int status = pitchfork (context, point->u, &F, dF, error);
-  *value = dF[0];
+  double F, dF = 0;
+  int status = pitchfork (context, point->u, &F, &dF, error);
+  *value = dF;
   return status;
 }
 
@@ -118,7 +117,7 @@ TEST (pitchforks) {
 static int gap (void *context, const double *u, double *F, double *dF, pw_error *error) {
   (void)context, (void)error;
   F[0] = u[0] - sin (u[1]);
-  if (dF) dF[0] = fabs (u[1] - 1) < 0.01 ? NAN : 1, dF[1] = -cos (u[1]);
+  if (dF) dF[0] = fabs (u[1] - 1) < 0.01 ? NAN : 1;
   return PW_OK;
 }
 
@@ -221,7 +220,7 @@ TEST (not_begun) {
 static int parabola (void *context, const double *u, double *F, double *dF, pw_error *error) {
   (void)context, (void)error;
   F[0] = u[0] * u[0] / 2 - u[1];
-  if (dF) dF[0] = u[0], dF[1] = -1;
+  if (dF) dF[0] = u[0];
   return PW_OK;
 }
 
@@ -299,7 +298,7 @@ static int wave (void *context, const double *u, double *F, double *dF, pw_error
   double climb = *(double *)context;
   (void)error;
   F[0] = 0.5 + 0.3 * sin (u[0]) + climb * (u[0] - PW_PI) - u[1];
-  if (dF) dF[0] = 0.3 * cos (u[0]) + climb, dF[1] = -1;
+  if (dF) dF[0] = 0.3 * cos (u[0]) + climb;
   return PW_OK;
 }
 
@@ -366,7 +365,7 @@ static int steep (void *context, const double *u, double *F, double *dF, pw_erro
   double y = u[0] - u[1];
   (void)context, (void)error;
   F[0] = atan (y);
-  if (dF) dF[0] = 1 / (1 + y * y), dF[1] = -dF[0];
+  if (dF) dF[0] = 1 / (1 + y * y);
   return PW_OK;
 }
 
@@ -386,7 +385,7 @@ static int cusp (void *context, const double *u, double *F, double *dF, pw_error
   double x = u[0], p = u[1] - 0.5;
   (void)context, (void)error;
   F[0] = x * x * x - p * p;
-  if (dF) dF[0] = 3 * x * x, dF[1] = -2 * p;
+  if (dF) dF[0] = 3 * x * x;
   return PW_OK;
 }
 
