@@ -79,68 +79,43 @@ void pw_fingerprint_initial (pw_text *t, const char **starts) {
 
 /* ---- Reading ---- */
 
-static const char fingerprint_last[] = "end\n", fingerprint_equals[] = " = ";
-
-/* A line: key and value, the key NULL if it has none. */
-typedef struct {
-  const char *key, *value;
-  size_t key_size, value_size;
-} fingerprint_entry;
-
-/* Reads the line at *at, which moves to the next one; 0 at the end, or if the line has no end. */
-static int fingerprint_read (const char **at, const char *end, fingerprint_entry *e) {
-  const char *line = *at, *newline = line < end ? memchr (line, '\n', (size_t)(end - line)) : NULL;
-  const size_t size = sizeof fingerprint_equals - 1;
-  *e = (fingerprint_entry){ .key = NULL };
-  if (newline == NULL) return 0;
-  *at = newline + 1;
-  const char *equals = memmem (line, (size_t)(newline - line), fingerprint_equals, size);
-  if (equals)
-    *e = (fingerprint_entry){ line, equals + size, (size_t)(equals - line), (size_t)(newline - equals) - size };
-  return 1;
+const char *pw_fingerprint_end (const char *magic, const char *at, const char *end) {
+  static const char last[] = "\nend\n";
+  size_t size = (size_t)(end - at), n = strlen (magic);
+  if (size < n || memcmp (at, magic, n) != 0) return NULL;
+  const char *found = memmem (at, size, last, strlen (last));
+  return found ? found + strlen (last) : NULL;
 }
 
-const char *pw_fingerprint_end (const char *magic, const char *at, const char *end) {
-  size_t n = strlen (magic), last = sizeof fingerprint_last - 1;
-  fingerprint_entry e;
-  if ((size_t)(end - at) < n || memcmp (at, magic, n) != 0) return NULL;
-  for (const char *line = at; fingerprint_read (&at, end, &e); line = at)
-    if ((size_t)(at - line) == last && memcmp (line, fingerprint_last, last) == 0) return at;
+/* The rest, of *size bytes, of the first line that begins with the `length` bytes of `front`, "KEY = ". */
+static const char *fingerprint_find (const char *at, const char *end, const char *front, size_t length, size_t *size) {
+  for (const char *newline; (newline = memchr (at, '\n', (size_t)(end - at))) != NULL; at = newline + 1) {
+    if ((size_t)(newline - at) < length || memcmp (at, front, length) != 0) continue;
+    *size = (size_t)(newline - at) - length;
+    return at + length;
+  }
   return NULL;
 }
 
-static int fingerprint_is_key (const fingerprint_entry *e, const char *key, size_t size) {
-  return e->key && e->key_size == size && memcmp (e->key, key, size) == 0;
-}
-
-/* Finds a key; 0 if there is none. */
-static int fingerprint_find (const char *at, const char *end, const char *key, size_t size, fingerprint_entry *e) {
-  while (fingerprint_read (&at, end, e))
-    if (fingerprint_is_key (e, key, size)) return 1;
-  return 0;
-}
-
 const char *pw_fingerprint_value (const char *at, const char *end, const char *key, size_t *size) {
-  fingerprint_entry e;
-  if (!fingerprint_find (at, end, key, strlen (key), &e)) return NULL;
-  *size = e.value_size;
-  return e.value;
+  const char *front = PW_PRINTED (100, "%s = ", key);
+  return fingerprint_find (at, end, front, strlen (front), size);
 }
 
 /* Describes the first entry of `a` that `b` does not have, or has with another value; 0 if there is none. */
 static int fingerprint_missing (pw_fingerprint a, pw_fingerprint b, const char *ignored, char *text, size_t size) {
   enum { SHOWN = 120 }; /* characters of a value, at most */
-  fingerprint_entry own, other;
-  for (const char *at = a.begin; fingerprint_read (&at, a.end, &own);) {
-    if (own.key == NULL || (ignored && fingerprint_is_key (&own, ignored, strlen (ignored)))) continue;
-    if (!fingerprint_find (b.begin, b.end, own.key, own.key_size, &other))
-      other.value = "not set", other.value_size = strlen (other.value);
-    else if (other.value_size == own.value_size && memcmp (other.value, own.value, own.value_size) == 0)
-      continue;
-    int shown = own.value_size < SHOWN ? (int)own.value_size : SHOWN,
-        other_shown = other.value_size < SHOWN ? (int)other.value_size : SHOWN;
-    snprintf (text, size, "%.*s is %.*s %s and %.*s %s", (int)own.key_size, own.key, shown, own.value, a.where,
-              other_shown, other.value, b.where);
+  for (const char *line = a.begin, *end; (end = memchr (line, '\n', (size_t)(a.end - line))); line = end + 1) {
+    const char *equals = memmem (line, (size_t)(end - line), " = ", 3);
+    if (equals == NULL) continue; /* the first and the last line */
+    size_t key = (size_t)(equals - line), own_size = (size_t)(end - equals) - 3, other_size;
+    const char *own = equals + 3, *other = fingerprint_find (b.begin, b.end, line, key + 3, &other_size);
+    if (ignored && strlen (ignored) == key && memcmp (ignored, line, key) == 0) continue;
+    if (other && other_size == own_size && memcmp (other, own, own_size) == 0) continue;
+    if (other == NULL) other = "not set", other_size = strlen (other);
+    int shown = own_size < SHOWN ? (int)own_size : SHOWN, other_shown = other_size < SHOWN ? (int)other_size : SHOWN;
+    snprintf (text, size, "%.*s is %.*s %s and %.*s %s", (int)key, line, shown, own, a.where, other_shown, other,
+              b.where);
     return 1;
   }
   return 0;
