@@ -192,6 +192,8 @@ TEST (kept) {
 
 TEST (direct) {
 #define OUTPUT_RUN "pinwheel run ezyroller -t 0.01 -o "
+/* waits until the last process in the background catches SIGTERM (15) */
+#define CATCHES "while kill -0 $! && ! grep -q 'SigCgt:.*[4-7c-f]...$' /proc/$!/status; do sleep 0.02; done\n"
   for (const char *const *n = (const char *const[]){ "-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1", NULL }; *n;
        n++) {
     if (**n == '/' && access ("/proc/self/fd/1", F_OK) != 0) continue;
@@ -207,12 +209,13 @@ TEST (direct) {
   cli_good ("mkfifo @/fifo; wc -l <@/fifo & " OUTPUT_RUN
             "@/fifo; wait; [ -p @/fifo ] && ls @/*.part 2>/dev/null || true");
   assert_string_equal (cli_out, "12\n");
-  cli_run (
-      "\"${PINWHEEL:-build/pinwheel}\" run ezyroller -t 1e6 -o @/fifo & sleep 0.3; kill -TERM $!; wait $!; echo $?");
+  cli_run ("\"${PINWHEEL:-build/pinwheel}\" run ezyroller -t 1e6 -o @/fifo &\n" CATCHES
+           "kill -TERM $!; wait $!; echo $?");
   assert_string_equal (cli_out, "130\n");
   /* a signal while a full pipe waits for its reader */
-  cli_run ("exec 3<>@/fifo\n\"${PINWHEEL:-build/pinwheel}\" run ezyroller -t 1e5 -o @/fifo & run=$!\n"
-           "sleep 0.5; kill -TERM $run; sleep 0.2; cat <&3 >/dev/null & wait $run; echo $?; kill $!");
+  cli_run ("exec 3<>@/fifo\n\"${PINWHEEL:-build/pinwheel}\" run ezyroller -t 1e5 -o @/fifo & run=$!\n" CATCHES
+           "while kill -0 $run && ! grep -q 'State:.S' /proc/$run/status; do sleep 0.02; done\n"
+           "kill -TERM $run; sleep 0.2; cat <&3 >/dev/null & wait $run; echo $?; kill $!");
   assert_string_equal (cli_out, "130\n");
   cli_bad ("pinwheel run ezyroller --checkpoint /dev/null", 2,
            "/dev/null: a checkpoint needs a regular file, which can be read again and replaced");
