@@ -72,10 +72,10 @@ static int columns_count (const columns *c, const char *line) {
   return n;
 }
 
-/* Copies cell i (from 0), if need be cut, to the buffer, without surrounding blanks and quotes. */
-static const char *columns_cell (const columns *c, const char *line, int i, char *buffer, size_t size) {
-  while (i-- > 0) line = columns_cell_end (line, c->separator) + 1;
-  const char *end = columns_cell_end (line, c->separator);
+/* Copies the cell that begins here, if need be cut, to the buffer, without surrounding blanks and quotes.  Returns the
+ * beginning of the next one. */
+static const char *columns_cell (const columns *c, const char *line, char *buffer, size_t size) {
+  const char *end = columns_cell_end (line, c->separator), *next = end + 1;
   while (line < end && *line == ' ') line++;
   while (line < end && end[-1] == ' ') end--;
   int quoted = end - line > 1 && *line == '"' && end[-1] == '"';
@@ -86,15 +86,23 @@ static const char *columns_cell (const columns *c, const char *line, int i, char
     line += quoted && line[0] == '"' && line[1] == '"';
   }
   buffer[n] = 0;
-  return buffer;
+  return next;
+}
+
+/* Copies cell i (from 0) of a line in the same way. */
+static void columns_cell_at (const columns *c, const char *line, int i, char *buffer, size_t size) {
+  while (i-- > 0) line = columns_cell_end (line, c->separator) + 1;
+  columns_cell (c, line, buffer, size);
 }
 
 /* Whether a line names the columns: none of its cells is a number. */
 static int columns_are_names (const columns *c, const char *line) {
   char cell[100];
   double value;
-  for (int i = 0; i < c->cells; i++)
-    if (pw_read_number (columns_cell (c, line, i, cell, sizeof cell), &value) == PW_OK) return 0;
+  for (int i = 0; i < c->cells; i++) {
+    line = columns_cell (c, line, cell, sizeof cell);
+    if (pw_read_number (cell, &value) == PW_OK) return 0;
+  }
   return 1;
 }
 
@@ -111,7 +119,8 @@ static int columns_find (const columns *c, const char *first, int named, const c
                          c->cells == 1 ? "" : "s");
   *index = -1;
   for (int i = 0; named && i < c->cells; i++) {
-    int matches = strcmp (columns_cell (c, first, i, cell, sizeof cell), name) == 0;
+    first = columns_cell (c, first, cell, sizeof cell);
+    int matches = strcmp (cell, name) == 0;
     cell[pw_unit_split (cell, unit, sizeof unit)] = 0;
     matches |= strcmp (cell, name) == 0;
     pw_nearest_try (&near, cell);
@@ -129,7 +138,7 @@ static int columns_open (const columns *c, const char *first, int named, const c
   char cell[COLUMNS_CELL], reason[260];
   source->factor = 1;
   if (columns_find (c, first, named, name, &source->index) != PW_OK) return PW_INPUT;
-  columns_cell (c, first, source->index, cell, sizeof cell);
+  columns_cell_at (c, first, source->index, cell, sizeof cell);
   if (strlen (cell) == sizeof cell - 1) return columns_fail (c, "the name of column %d is too long", source->index + 1);
   if (!named || pw_unit_check (cell, unit, &source->factor, reason, sizeof reason) == PW_OK) return PW_OK;
   return columns_fail (c, "%s", reason);
@@ -140,7 +149,7 @@ static int columns_open (const columns *c, const char *first, int named, const c
 /* A number in SI units; with gaps allowed, NaN for an empty cell or nan. */
 static int columns_number (const columns *c, const char *line, columns_source source, pw_gaps gaps, double *value) {
   char cell[COLUMNS_CELL];
-  columns_cell (c, line, source.index, cell, sizeof cell);
+  columns_cell_at (c, line, source.index, cell, sizeof cell);
   int number = strlen (cell) < sizeof cell - 1 && pw_read_number (cell, value) == PW_OK; /* not cut */
   if (gaps == PW_GAPS_ALLOWED && (*cell == 0 || (number && isnan (*value)))) return *value = NAN, PW_OK;
   if (!number || !isfinite (*value))

@@ -22,7 +22,7 @@ typedef struct {
   /* the last position converted */
   int line, column; /* from 0 */
   size_t offset;
-  unsigned at; /* of the last node, for events without a position */
+  unsigned at; /* of the last node, for events without a position, and for the limits of tree_feed */
 } tree;
 
 /* The offset of a mark, computed from its line and its column (in characters): the offsets of libfyaml 0.7.12 are wrong
@@ -92,7 +92,7 @@ static void tree_scalar (tree *x, struct fy_event *e) {
     return;
   }
   if (memchr (text, 0, (size_t)size)) pw_yaml_fail (&x->r, n->at, "a text must not contain the character 0");
-  for (const char *p = text; *p; p++) /* possible through escapes */
+  for (const char *p = text; *p && x->r.error->status == PW_OK; p++) /* possible through escapes */
     if (pw_control (p))
       pw_yaml_fail (&x->r, n->at, "a text must not contain the control character of code %d", pw_control (p));
   n->text = text;
