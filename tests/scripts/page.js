@@ -32,6 +32,8 @@
     await new Promise(done => setTimeout(done, 500));
     if (ends.length !== 3) throw new Error("the error of a run is estimated after another one has failed");
     engine.run = run;
+    for (const m of page.methods) await change("#page-method", m.name, "change");
+    if (!page.methods.some(m => m.name === "erk8+nullspace")) throw new Error("a method is missing");
     await change("#page-method", "erk5+projection", "change");
     await change("#page-accuracy", "-9", "input");
     await change('#parameters input[type=number][data-name="' + wanted.name + '"]', wanted.value, "change");

@@ -15,7 +15,7 @@ function importsOf (module) {
   for (const { module: from, name } of WebAssembly.Module.imports(module)) {
     imports[from] = imports[from] || {};
     imports[from][name] = from === "wasi_snapshot_preview1" ? () => notSupported
-      : () => { throw new Error("this scene needs " + name.replace(/^LAPACKE_.*/, "LAPACK").replace(/^amd_.*/, "AMD") + ", which pages do not have"); };
+      : () => { throw new Error("this scene needs " + name + ", which pages do not have"); };
   }
   imports.page = { now: () => performance.now() };
   return imports;

@@ -47,12 +47,13 @@ static int page_engine (pw_page *p, const char *source, pw_error *error) {
 
 /* ---- Text models ---- */
 
-static int page_tree (pw_page *p, const pw_yaml *y, pw_error *error) {
-  pw_stream tree;
-  FILE *f = pw_stream_open (&tree);
-  if (f) pw_yaml_write_tree (y, f);
-  pw_stream_close (f, &tree);
-  return page_add (p, "tree", tree.text, tree.size, error);
+static int page_write (pw_page *p, const char *name, void (*write) (const pw_yaml *y, FILE *f), const pw_yaml *y,
+                       pw_error *error) {
+  pw_stream part;
+  FILE *f = pw_stream_open (&part);
+  if (f) write (y, f);
+  pw_stream_close (f, &part);
+  return page_add (p, name, part.text, part.size, error);
 }
 
 enum { PAGE_PARTS = 3 }; /* files before the tables: engine, model, tree */
@@ -79,8 +80,10 @@ static int page_table (void *context, const char *path) {
 static int page_text (pw_page *p, const pw_file *f, const pw_yaml *y, pw_error *error) {
   const char *path = pw_file_path (f);
   page_tables x = { p, (size_t)(strrchr (path, '/') - path) + 1, error };
-  int status = page_read (p, "model", path, error);
-  if (status == PW_OK) status = page_tree (p, y, error);
+  int status = page_write (p, "model", pw_yaml_write_source, y, error); /* the file may have changed since */
+  if (status == PW_OK && p->file[p->files - 1].size > PAGE_MAX_BYTES)
+    status = pw_fail (error, PW_INPUT, "%s: a page takes a model of at most %d MB", path, PAGE_MAX_BYTES >> 20);
+  if (status == PW_OK) status = page_write (p, "tree", pw_yaml_write_tree, y, error);
   if (status == PW_OK) status = pw_file_tables (f, page_table, &x);
   return status == PW_OK ? PW_OK : pw_fail (error, status, "out of memory"); /* unless the reason is recorded */
 }

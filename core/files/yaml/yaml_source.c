@@ -45,7 +45,6 @@ int pw_yaml_fail (const pw_reader *r, size_t at, const char *format, ...) {
   if (at > y->size) at = y->size;
   source_window (y, at, &begin, &from, &to);
   snprintf (shown, sizeof shown, "%s%.*s", from > begin ? "..." : "", (int)(to - from), from);
-  pw_text_sanitise (shown);
   for (char *tab = shown; (tab = strchr (tab, '\t')) != NULL;) *tab = ' '; /* one column, as in the line of the caret */
   size_t n = strlen (y->path);
   return pw_fail (r->error, PW_INPUT, "%s%s:%d:%d: error: %s\n  %s\n  %*s^", n > 100 ? "..." : "",
@@ -87,4 +86,8 @@ int pw_yaml_read_source (pw_yaml *y, const char *path, size_t max_bytes, pw_erro
     memmove (y->source, y->source + 3, y->size + 1);
   }
   return status == PW_OK ? source_check (&(pw_reader){ .y = y, .error = error }) : status;
+}
+
+void pw_yaml_write_source (const pw_yaml *y, FILE *f) {
+  fwrite (y->source, 1, y->size, f);
 }
