@@ -213,7 +213,9 @@ static int multistep_evaluate (pw_method_data *d) {
   if (d->evaluated) return PW_OK;
   int status = multistep_complete (d, pw_before_breakpoint (r, r->t), 0, r->q, r->v, r->a, r->lambda);
   d->evaluated = status == PW_OK;
-  if (!d->evaluated) memcpy (r->lambda, d->lambda, (size_t)r->s->rows * sizeof *r->lambda);
+  if (d->evaluated) return PW_OK;
+  memcpy (r->a, d->a, (size_t)d->n * sizeof *r->a);
+  memcpy (r->lambda, d->lambda, (size_t)r->s->rows * sizeof *r->lambda);
   return status;
 }
 

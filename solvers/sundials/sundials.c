@@ -150,14 +150,14 @@ int pw_sun_fail (pw_sun *x, int flag, int singular, const char *why, pw_error *e
   pw_run *r = x->run;
   if (r->stopped) return r->interrupted = 1, PW_STOPPED;
   if (flag == CV_LSETUP_FAIL && x->factorised == PW_RESOURCE) return pw_sun_no_memory (r, error);
-  if (flag == CV_RHSFUNC_FAIL) return pw_fail_signal (r->t, error);
+  if (flag == CV_RHSFUNC_FAIL || flag == CV_LSETUP_FAIL) return pw_fail_signal (r->t, error);
   if (singular || pw_watchdog_near_state (r)) return pw_fail_singular (r, r->t, error);
   if (why == NULL)
-    why = flag == CV_ERR_FAILURE    ? "the error test fails however small the step"
-          : flag == CV_CONV_FAILURE ? "the iteration does not converge however small the step"
-          : flag == CV_LSETUP_FAIL  ? "the Newton matrix is singular"
-          : flag == CV_TOO_MUCH_ACC ? "the tolerance is beyond the accuracy of the machine"
-                                    : sun_reason (x, flag);
+    why = flag == CV_ERR_FAILURE         ? "the error test fails however small the step"
+          : flag == CV_TOO_MUCH_ACC      ? "the tolerance is beyond the accuracy of the machine"
+          : flag != CV_CONV_FAILURE      ? sun_reason (x, flag)
+          : x->factorised == PW_SINGULAR ? "the Newton matrix is singular however small the step"
+                                         : "the iteration does not converge however small the step";
   return pw_fail (error, PW_METHOD, "t = %.6g s: %s (rtol %.3g)", r->t, why, r->settings.rtol);
 }
 

@@ -54,6 +54,34 @@ TEST (signal_fails) {
   }
 }
 
+static int runs_fails_once (void *context, double t, const double *x, double value[3], double *gradient) {
+  (void)t;
+  value[0] = 0.1 * x[0];
+  if (gradient) gradient[0] = 0.1;
+  return --*(int *)context == 0;
+}
+
+/* Whichever evaluation fails, of a residual or of a Newton matrix, the error says so. */
+TEST (signal_fails_anywhere) {
+  static const char *const method[] = { "ida+ggl", "bdf+none", "bdf+projection" }, *const reads[] = { "steer.phi",
+                                                                                                      NULL };
+  for (int i = 0; i < 3; i++)
+    for (int n = 1; n <= 30; n++) {
+      int left = 0;
+      pw_error error = { 0 };
+      pw_model *m = scene_model (&scene_ezyroller, NULL);
+      pw_signal torque = { PW_FUNCTION, .function = { .eval = runs_fails_once, .context = &left, .reads = reads } };
+      check_ok (pw_model_set_signal (m, "rider", "value", &torque, &error), &error);
+      pw_system *s = scene_compile (m);
+      pw_run *r = runs_open (s, method[i], NULL);
+      left = n;
+      assert_int_equal (pw_run_advance_to (r, 1, 1, &error), PW_METHOD);
+      assert_non_null (strstr (error.text, "a signal failed"));
+      pw_run_close (r);
+      pw_system_free (s);
+    }
+}
+
 TEST (signal_fails_at_once) {
   runs_fuse fuse = { -1 };
   pw_error error = { 0 };
