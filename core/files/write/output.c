@@ -286,12 +286,17 @@ int pw_output_finish (pw_output *o, pw_error *error) {
 
 /* ---- Continuation of an interrupted run ---- */
 
-/* Sets mark->check from the last OUTPUT_CHECKED bytes before mark->length; PW_RETRY if the file is shorter. */
+/* Sets mark->check from the last OUTPUT_CHECKED bytes before mark->length; PW_RETRY if the file is shorter or
+ * cannot be read. */
 enum { OUTPUT_CHECKED = 65536 };
 static int output_checksum (int file, pw_mark *mark) {
   char bytes[OUTPUT_CHECKED];
   size_t size = mark->length < sizeof bytes ? (size_t)mark->length : sizeof bytes;
-  if (pread (file, bytes, size, (off_t)(mark->length - size)) != (ssize_t)size) return PW_RETRY;
+  for (size_t left = size; left > 0;) {
+    ssize_t n = pread (file, bytes + size - left, left, (off_t)(mark->length - left));
+    if (n == 0 || (n < 0 && errno != EINTR)) return PW_RETRY;
+    if (n > 0) left -= (size_t)n;
+  }
   mark->check = pw_check_sum (PW_CHECK, bytes, size);
   return PW_OK;
 }
