@@ -196,7 +196,9 @@ static int compile_element (const compilation *job, const pw_element_batch *k, i
   pw_system *s = job->s;
   const pw_body *bodies[PW_MAX_BODIES];
   const void *definition = from->element->definition;
-  if ((k->name[e] = compile_text (job, pw_element_name (from->element))) == NULL) return PW_RESOURCE;
+  int again = e > 0 && from[-1].element == from->element; /* on another body */
+  k->name[e] = again ? k->name[e - 1] : compile_text (job, pw_element_name (from->element));
+  if (k->name[e] == NULL) return PW_RESOURCE;
   for (int n = 0; n < kind->bodies; n++) {
     int index = from->body;
     if (index < 0) index = pw_names_find (&job->name, *(const char *const *)pw_field_at (kind, definition, PW_BODY, n));
@@ -226,7 +228,7 @@ static int compile_batches (const compilation *job) {
   pw_source *source = job->s->source;
   const pw_compiled *from = job->list;
   int status = PW_OK;
-  for (pw_element_batch *k = job->s->batch; k < job->s->batch + job->s->batches; k++) {
+  for (pw_element_batch *k = job->s->batch; k < job->s->batch + job->s->batches && status == PW_OK; k++) {
     size_t n = (size_t)k->b.count, size = k->kind->element, bodies = (size_t)k->kind->bodies;
     unsigned char *element = compile_alloc (job, n * size + COMPILE_GUARD, 1);
     int *body = compile_alloc (job, n * bodies, sizeof *body);

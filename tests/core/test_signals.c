@@ -135,6 +135,8 @@ TEST (velocities) {
   }
 }
 
+static signals_context signals_driven;
+
 /* A signal of time alone is evaluated once for stages at the same time; a held one is not evaluated. */
 TEST (sharing_and_hold) {
   signals_context c = { 0 };
@@ -163,6 +165,37 @@ TEST (sharing_and_hold) {
   pw_system_free (s);
 }
 
+SCENE (signals_of_both) {
+  static const char *const omega[] = { "disc.omega", NULL };
+  static signals_context speed;
+  pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 1 });
+  pw_add_torque (
+      m, &(pw_torque){ .name = "A",
+                       .body = { "disc", "ground" },
+                       .value = { PW_FUNCTION, .function = { .eval = signals_of_time, .context = &signals_driven } } });
+  pw_add_torque (
+      m, &(pw_torque){
+             .name = "B",
+             .body = { "disc", "ground" },
+             .value = { PW_FUNCTION, .function = { .eval = signals_of_angle, .context = &speed, .reads = omega } } });
+}
+
+/* New velocities do not evaluate signals of time alone, even if no time has been stored. */
+TEST (velocities_without_time) {
+  signals_driven = (signals_context){ 0 };
+  pw_system *s = scene_system (&signals_of_both_table, NULL);
+  pw_workspace *w = pw_workspace_new (s, NULL);
+  double q[3] = { 0 }, v[3] = { 0 };
+  assert_int_equal (pw_update_kinematics (w, 2, q, v), PW_OK);
+  pw_hold_signals (w, 0);
+  assert_int_equal (pw_update_velocities (w, v), PW_OK);
+  assert_int_equal (signals_driven.calls, 1);
+  assert_int_equal (pw_update_kinematics (w, 2, q, v), PW_OK);
+  assert_int_equal (signals_driven.calls, 2);
+  pw_workspace_free (w);
+  pw_system_free (s);
+}
+
 /* Jumps are found up to the round-off of sums of steps, also at the time 0; ramps of forces do not jump. */
 TEST (jumps) {
   for (double start = -2; start <= 2; start += 2) {
@@ -179,8 +212,6 @@ TEST (jumps) {
 }
 
 /* ---- A constraint, which needs the derivatives of its signal ---- */
-
-static signals_context signals_driven;
 
 SCENE (signals_build) {
   pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 1 });
