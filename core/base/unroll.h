@@ -12,9 +12,6 @@
 /* Replaces `static` of a function that is compiled once per set of constant arguments, such as a size. */
 #define PW_INLINE static inline __attribute__ ((always_inline))
 
-/* Replaces `static` of a rarely called function, so that the frequent path of its caller saves no registers. */
-#define PW_NOINLINE static __attribute__ ((noinline))
-
 /* At the top of a file that reads pairs of numbers shortly after storing them one by one: a vector load would stall
  * until both stores are complete. */
 #ifndef __clang__

@@ -20,9 +20,9 @@ typedef struct {
  * computes values that are not finite. */
 int pw_signal_eval (const pw_source *source, double t);
 
-/* The first time after t at which a step must end, or INFINITY: the signal, its first or its second derivative jumps,
- * or a smooth-step starts or ends; kinks: 1: also where the second derivative has a kink, at the points of a cubic
- * table.  Of a function signal, what its breakpoint function returns. */
+/* The first time after t at which the signal, its first or its second derivative jumps, or a smooth-step starts or
+ * ends, so that a step must end there; INFINITY if there is none.  kinks: 1: also where the second derivative has a
+ * kink, at the points of a cubic table.  Of a function signal, what its breakpoint function returns. */
 double pw_signal_breakpoint (const pw_signal *s, int kinks, double t);
 
 /* 1 if the value may jump: that of a pulse; that of a function, of which this is not known. */

@@ -50,7 +50,7 @@ int pw_workspace_contact_points (pw_workspace *w, double t, const double *q, con
                                  pw_error *error) {
   int status = elements_update (w, t, q, v, error);
   if (status != PW_OK) return status;
-  for (const pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++) {
+  PW_EACH_BATCH (k, w) {
     if (k->kind->contact == NULL) continue;
     k->kind->contact (&k->b, out[0]);
     out += k->b.count;
@@ -89,7 +89,7 @@ int pw_workspace_forces (pw_workspace *w, double t, const double *q, const doubl
   if (status != PW_OK) return status;
   memset (out, 0, (size_t)pw_system_force_size (w->s) * sizeof *out);
   pw_evaluate_J (w);
-  for (const pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++) {
+  PW_EACH_BATCH (k, w) {
     if (k->kind->rows) elements_reactions (k, lambda + k->row, out);
     if (k->kind->force) elements_applied (k, out);
     out += 3 * k->b.count * k->kind->bodies;
@@ -116,7 +116,7 @@ static int elements_allocate (const pw_system *s, pw_equations *out, pw_error *e
 
 /* Stores the entries of J that are not in columns of the ground. */
 static void elements_jacobian (const pw_workspace *w, pw_equations *out) {
-  for (const pw_element_batch *k = w->batch; k < w->batch + w->s->constraints; k++)
+  PW_EACH_CONSTRAINT (k, w)
     for (int i = 0; i < k->b.count * k->kind->rows; i++)
       for (int c = 0; c < k->b.cols; c++) {
         int column = pw_global (k, i / k->kind->rows, c);

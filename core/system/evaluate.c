@@ -3,17 +3,13 @@
 #include <string.h>
 #include "system.h"
 
-#define EACH_BATCH(k, w) for (const pw_element_batch *k = (w)->batch, *end = k + (w)->s->batches; k < end; k++)
-/* Batches with constraint equations come first. */
-#define EACH_CONSTRAINT(k, w) for (const pw_element_batch *k = (w)->batch, *end = k + (w)->s->constraints; k < end; k++)
-
 void pw_evaluate_J (pw_workspace *w) {
-  EACH_CONSTRAINT (k, w) k->kind->J (&k->b, k->J);
+  PW_EACH_CONSTRAINT (k, w) k->kind->J (&k->b, k->J);
 }
 
 /* Fills an array over constraint equations by the function at this offset of each type's table; NULL gives zeros. */
 static void evaluate_rows (pw_workspace *w, size_t function, int rows, double *out) {
-  EACH_CONSTRAINT (k, w) {
+  PW_EACH_CONSTRAINT (k, w) {
     if (k->row >= rows) break;
     pw_batch_function *f = pw_kind_function (k->kind, function);
     if (f)
@@ -42,7 +38,7 @@ void pw_evaluate_gamma (pw_workspace *w, double *gamma) {
 
 /* Adds the forces that are constant, or the others. */
 static void evaluate_add_forces (const pw_workspace *w, int constant, double *f) {
-  EACH_BATCH (k, w) {
+  PW_EACH_BATCH (k, w) {
     if (k->kind->force == NULL || (k->kind->constant != 0) != constant) continue;
     const double *block = k->block;
     const int *column = k->column;
@@ -70,7 +66,7 @@ void pw_evaluate_constant (pw_workspace *w, double *f) {
 
 double pw_potential (pw_workspace *w) {
   double sum = 0;
-  EACH_BATCH (k, w) {
+  PW_EACH_BATCH (k, w) {
     if (k->kind->energy == NULL) continue;
     k->kind->energy (&k->b, k->block);
     for (int e = 0; e < k->b.count; e++) sum += k->block[e];
@@ -79,7 +75,7 @@ double pw_potential (pw_workspace *w) {
 }
 
 void pw_evaluate_energies (pw_workspace *w, double *out) {
-  EACH_BATCH (k, w) {
+  PW_EACH_BATCH (k, w) {
     if (k->kind->energy) k->kind->energy (&k->b, out);
     out += k->b.count;
   }
@@ -93,7 +89,7 @@ double pw_kinetic (const pw_system *s, const double *v) {
 
 void pw_mul_J (const pw_workspace *w, const double *x, double *out) {
   static const double ground[3] = { 0, 0, 0 };
-  EACH_CONSTRAINT (k, w) {
+  PW_EACH_CONSTRAINT (k, w) {
     const double *J = k->J, *X[PW_MAX_BODIES], *y = x + k->internal; /* entries of x: of each body, internal */
     const int bodies = k->kind->bodies, internal = k->kind->internal, *column = k->column;
     for (int e = 0; e < k->b.count; e++, column += bodies, y += internal) {
@@ -109,7 +105,7 @@ void pw_mul_J (const pw_workspace *w, const double *x, double *out) {
 }
 
 void pw_add_JT (const pw_workspace *w, const double *lambda, double *out) {
-  EACH_CONSTRAINT (k, w) {
+  PW_EACH_CONSTRAINT (k, w) {
     const double *J = k->J;
     for (int e = 0; e < k->b.count; e++)
       for (int r = 0; r < k->kind->rows; r++, lambda++) {
@@ -171,7 +167,7 @@ void pw_evaluate_velocity_residual (pw_workspace *w, const unsigned char *enforc
   double *eta = w->s->rheonomic ? w->scratch : NULL, unit = w->scale.length / w->scale.time;
   r->velocity = r->jv = 0, r->row_velocity = -1;
   if (eta) pw_evaluate_eta (w, eta);
-  EACH_CONSTRAINT (k, w) evaluate_worst_velocity (k, eta, enforced, unit, r);
+  PW_EACH_CONSTRAINT (k, w) evaluate_worst_velocity (k, eta, enforced, unit, r);
 }
 
 void pw_evaluate_position_residual (pw_workspace *w, const unsigned char *enforced, pw_residuals *r) {

@@ -4,7 +4,7 @@
 #include "system.h"
 
 int pw_find_nonfinite (pw_workspace *w, char *buffer, size_t size) {
-  for (const pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++) {
+  PW_EACH_BATCH (k, w) {
     const int rows = k->kind->rows, cols = k->b.cols;
     const struct {
       const char *name;

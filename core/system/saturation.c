@@ -18,8 +18,8 @@ static int saturation_state (const pw_system *s, const pw_element_batch *k, int 
 }
 
 /* Loops over the entries i of the blocks of saturating batches k. */
-#define EACH_SATURATION(k, i, w)                                                         \
-  for (const pw_element_batch *k = (w)->batch, *end = k + (w)->s->batches; k < end; k++) \
+#define EACH_SATURATION(k, i, w) \
+  PW_EACH_BATCH (k, w)           \
     for (int i = 0, n = saturation_fill (k); i < n; i++)
 
 void pw_evaluate_saturation (pw_workspace *w, double *least) {

@@ -43,7 +43,7 @@ struct pw_system {
   int state_dependent;     /* signals that depend on states */
   int reads;               /* number of states that they read, with repetitions */
   size_t jacobian;         /* entries of J of all elements, zeros included */
-  size_t block;            /* the largest count x cols of a batch, x 2 cols if its force saturates */
+  size_t block;            /* the largest count x cols of a batch; twice that if its force saturates */
   int rheonomic;           /* batches whose eta may be other than 0 */
   pw_scale scale;          /* with T = 1 s; T of a run is in its workspace */
   const char **body_name;  /* bodies */
@@ -113,6 +113,11 @@ static inline int pw_is_angle (const pw_system *s, int j) {
 static inline double pw_unit (const pw_system *s, int j) {
   return pw_is_angle (s, j) ? 1 : s->scale.length;
 }
+
+/* Loops over the batches k of a workspace; over those with constraint equations, which come first. */
+#define PW_EACH_BATCH(k, w) for (const pw_element_batch *k = (w)->batch, *end = k + (w)->s->batches; k < end; k++)
+#define PW_EACH_CONSTRAINT(k, w) \
+  for (const pw_element_batch *k = (w)->batch, *end = k + (w)->s->constraints; k < end; k++)
 
 /* The larger of two numbers by one comparison; b if one is NaN. */
 static inline double pw_larger (double a, double b) {

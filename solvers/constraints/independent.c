@@ -57,7 +57,7 @@ static void independent_activate (pw_run *r, const unsigned char *active) {
   const pw_system *s = r->s;
   r->active = memmove (r->active_array, active, (size_t)s->rows);
   r->redundant = r->redundant_drive = 0;
-  for (const pw_element_batch *k = r->w->batch; k < r->w->batch + s->constraints; k++)
+  PW_EACH_CONSTRAINT (k, r->w)
     for (int i = k->row; i < k->row + k->b.count * k->kind->rows; i++) {
       if (active[i]) continue;
       r->redundant_row[r->redundant++] = i;

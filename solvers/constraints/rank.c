@@ -17,7 +17,7 @@ void pw_rank_rows (const pw_workspace *w, double *rows, double *norm) {
   const pw_system *s = w->s;
   int n = s->coords;
   memset (rows, 0, (size_t)s->rows * (size_t)n * sizeof *rows);
-  for (const pw_element_batch *k = w->batch; k < w->batch + w->s->constraints; k++)
+  PW_EACH_CONSTRAINT (k, w)
     for (int i = 0; i < k->b.count * k->kind->rows; i++) {
       double *row = rows + (size_t)(k->row + i) * (size_t)n, square = 0;
       for (int c = 0; c < k->b.cols; c++) {

@@ -44,7 +44,7 @@ const pw_thresholds pw_watchdog_thresholds = {
    * accelerations, at least turn_reference L / T^2, have grown by a factor of 3 (turn_growth) when it is 0.02 to 0.07
    * (drift_turn).  From half of that on (drift_near) they are no reference for later ones.  Where d itself counts as
    * lost (drift_far), d / s^2 must be below its value in the sharpest turn (drift_any), whatever the accelerations.
-   * Above `regular`, relative, the sine is not that of a singular configuration, however large the drift. */
+   * Where the relative sine is above `regular`, the configuration is not singular, however large the drift. */
   .regular = 0.6,
   .turn_growth = 3,
   .turn_reference = 0.1,
@@ -63,9 +63,9 @@ const pw_thresholds pw_watchdog_thresholds = {
   .step_growth = 2,
 
   /* Change points (change_point.c): a sine within a step below an eighth of those at its ends (unresolved) belongs to a
-   * turn that the step cannot resolve; half of them (low) indicates that there may be one.  Strides of 0.3 times the
-   * sine stay on a curve whose radius is the sine.  A stride that approaches its destination by less than a tenth of
-   * its length (progress) leads elsewhere. */
+   * turn that the step cannot resolve; below half of them, or a relative sine below half (low), there may be a change
+   * point.  Strides of 0.3 times the sine stay on a curve whose radius is the sine.  A stride that approaches its
+   * destination by less than a tenth of its length (progress) leads elsewhere. */
   .unresolved = 0.125,
   .low = 0.5,
   .stride = 0.3,

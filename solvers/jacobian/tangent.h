@@ -54,7 +54,7 @@ typedef struct {
 
 /* Adds a block of every batch, at the kinematics last updated. */
 void pw_tangent_add_block (pw_tangent *x, pw_block block, const pw_placement *put);
-/* Adds J^T, with constraint equations as columns. */
+/* Adds J^T, with the J last evaluated; its columns are constraint equations. */
 void pw_tangent_add_JT (pw_tangent *x, const pw_placement *put);
 /* Adds -(derivative of the force by signals) x (derivative of signals by states): rows from `row` on, q in columns from
  * col_q on, v in columns from col_v on. */

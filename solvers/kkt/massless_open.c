@@ -44,7 +44,7 @@ static int massless_is_active (const massless_plan *p, int row) {
 /* Unites massless groups that share an active row, and marks them as members. */
 static void massless_unite (massless_plan *p) {
   int group[PW_MASSLESS_GROUPS], column[PW_MASSLESS_GROUPS];
-  for (const pw_element_batch *k = p->w->batch; k < p->w->batch + p->s->constraints; k++)
+  PW_EACH_CONSTRAINT (k, p->w)
     for (int e = 0; e < k->b.count; e++) {
       int active = 0, last = -1, n = massless_element_groups (p->s, k, e, group, column);
       for (int i = 0; i < k->kind->rows; i++) active |= massless_is_active (p, k->row + e * k->kind->rows + i);
@@ -79,7 +79,7 @@ static void massless_add_row (const pw_system *s, pw_component *c, int row, int 
  * rows, and the groups with repetition. */
 static void massless_add_rows (massless_plan *p, pw_massless *m) {
   int group[PW_MASSLESS_GROUPS], column[PW_MASSLESS_GROUPS];
-  for (const pw_element_batch *k = p->w->batch; k < p->w->batch + p->s->constraints; k++)
+  PW_EACH_CONSTRAINT (k, p->w)
     for (int e = 0; e < k->b.count; e++) {
       int n = massless_element_groups (p->s, k, e, group, column), first = 0;
       while (first < n && !massless_is_group (p, group[first])) first++;

@@ -57,7 +57,7 @@ static void nullspace_assemble (pw_nullspace *b, pw_run *r, const double *w) {
   const int m = b->rows;
   memset (b->K, 0, (size_t)(m * m) * sizeof *b->K);
   if (s->rheonomic) pw_evaluate_eta (r->w, b->eta); /* else it stays 0 */
-  for (const pw_element_batch *k = r->w->batch; k < r->w->batch + s->constraints; k++)
+  PW_EACH_CONSTRAINT (k, r->w)
     for (int n = 0; n < k->b.count * k->kind->rows; n++) {
       int i = b->active_index[k->row + n];
       if (i < 0) continue;
@@ -120,7 +120,7 @@ int pw_nullspace_begin (pw_nullspace *b, pw_run *r) {
   const pw_system *s = r->s;
   int status = pw_evaluate_J_at (r->w, r->t, r->q, r->v);
   if (status != PW_OK) return status;
-  for (const pw_element_batch *k = r->w->batch; k < r->w->batch + s->constraints; k++)
+  PW_EACH_CONSTRAINT (k, r->w)
     for (int n = 0; n < k->b.count * k->kind->rows; n++)
       for (int i = b->active_index[k->row + n], c = i < 0 ? k->b.cols : 0; c < k->b.cols; c++) {
         int j = pw_global (k, n / k->kind->rows, c);
@@ -129,7 +129,7 @@ int pw_nullspace_begin (pw_nullspace *b, pw_run *r) {
   return PW_OK;
 }
 
-/* Replaces v at the J last evaluated; updates the velocity kinematics.  Returns as pw_nullspace_velocities. */
+/* Corrects v with the J last evaluated; updates the velocity kinematics.  Returns as pw_nullspace_velocities. */
 static int nullspace_correct_velocities (pw_nullspace *b, pw_run *r, double *v) {
   const double *row = b->W_inv_J0T;
   nullspace_assemble (b, r, v);

@@ -104,7 +104,7 @@ TEST (family) {
 TEST (held) {
   static const char *const names[] = { "trailer1.speed", "trailer1.radius", "trailer1.curvature", "trailer1.vx" };
   const double step = 1e-6;
-  double dq[9], dv[9], r[3];
+  double dq[9], dv[9], r[2];
   steady t = { .s = gallery_open ("n-trailer", NULL), .set.vary = -1 };
   steady_open (&t);
   pw_steady *x = t.x;
@@ -114,7 +114,7 @@ TEST (held) {
     for (int side = 0; side < 3; side++) {
       double h = side < 2 ? (2 * side - 1) * step : 0;
       for (int j = 0; j < 9; j++) x->q[j] = sin (j) + h * dq[j], x->v[j] = cos (2 * j) + h * dv[j];
-      r[side] = pw_hold_residual (x, &hold, NULL, NULL);
+      if (side < 2) r[side] = pw_hold_residual (x, &hold, NULL, NULL); /* last, the state itself */
     }
     check_close (names[k], pw_hold_residual (x, &hold, dq, dv), (r[1] - r[0]) / (2 * step), 1e-9, "differences");
   }

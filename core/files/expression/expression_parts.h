@@ -76,9 +76,10 @@ typedef struct {
 /* Monotonicity of a function of one argument, for interval arithmetic. */
 typedef enum { PW_INCREASING, PW_DECREASING, PW_NOT_MONOTONIC } pw_trend;
 
+/* A function or constant. */
 typedef struct {
   const char *name;
-  short op;          /* PW_OP_FUNCTION_OF_ONE, PW_OP_FUNCTION_OF_TWO, or an operation of its own; PW_OP_CONSTANT */
+  short op; /* PW_OP_FUNCTION_OF_ONE, PW_OP_FUNCTION_OF_TWO, or an operation of its own; PW_OP_CONSTANT of a constant */
   short least, most; /* arguments; most = 0: any number */
   double (*of_one) (double);
   double (*of_two) (double, double);
@@ -88,7 +89,7 @@ typedef struct {
   double value;    /* of a constant, without arguments */
 } pw_expression_function;
 
-extern const pw_expression_function pw_expression_functions[]; /* ends with a NULL name */
+extern const pw_expression_function pw_expression_functions[]; /* and constants; ends with a NULL name */
 
 /* The index of a function or constant, or -1. */
 int pw_expression_find_function (const char *name);

@@ -69,9 +69,10 @@ static void yaml_replace_unit (char unit[YAML_UNIT], const pw_unit_name *other, 
 
 /* Refuses a unit that contains this name of another unit than an SI unit, and says how to convert the value. */
 static int yaml_refuse_unit (const pw_reader *r, const pw_node *node, const pw_node *value, const pw_unit_name *other,
-                             const char *unit, const char *name) {
+                             const char *unit) {
   static const char why[] = "unit: numbers are in SI units, angles in radians, and no unit converts a value";
   char si[YAML_UNIT], conversion[40];
+  const char *name;
   double factor;
   int names = 0, number = value->type == PW_YAML_SCALAR && strlen (value->text) <= 30 &&
                           pw_expression_number (value->text, &(double){ 0 });
@@ -92,7 +93,7 @@ static int yaml_unit (const pw_reader *r, const pw_node *node, const pw_node *va
   const char *name;
   if (node == NULL || pw_yaml_text (r, node, "unit", unit) != PW_OK) return r->error->status;
   const pw_unit_name *other = yaml_other_unit (*unit, &name);
-  return other ? yaml_refuse_unit (r, node, value, other, *unit, name) : PW_OK;
+  return other ? yaml_refuse_unit (r, node, value, other, *unit) : PW_OK;
 }
 
 /* A default must not depend on other parameters: --set would have to change it, too. */
