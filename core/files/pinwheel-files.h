@@ -190,8 +190,7 @@ char *pw_output_path (const char *path, pw_error *error);
 /* Opens a file for reading and writing, creates it if there is none, and locks it until the descriptor that is returned
  * is closed.  A symbolic link is not followed.  -1 and PW_RESOURCE, also if another process has it. */
 int pw_lock_path (const char *path, pw_error *error);
-/* Locks a folder until the descriptor returned is closed.  -1 and PW_RESOURCE, also if another process has locked
- * it. */
+/* Locks a folder until the descriptor returned is closed.  -1 and PW_RESOURCE, also if another process has it. */
 int pw_lock_folder (const char *path, pw_error *error);
 
 /* The position in a file from which another process continues. */

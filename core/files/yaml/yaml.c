@@ -7,9 +7,7 @@
 #include "yaml.h"
 
 #define YAML_MAX_AHEAD 1e6 /* pw_yaml.max_ahead for the default limit of bytes: each indicator takes 350 bytes */
-enum {
-  YAML_UNIT = 400
-}; /* bytes of a unit of up to 60 characters with SI units in place of others, its end included */
+enum { YAML_UNIT = 400 /* bytes of a unit of up to 60 characters with SI units in place of others, and its end */ };
 
 /* ---- Parameters ---- */
 
@@ -78,9 +76,10 @@ static void yaml_replace_unit (char unit[YAML_UNIT], const pw_unit_name *other, 
 
 /* Refuses a unit that contains this other unit than an SI unit, and says how to convert the value. */
 static int yaml_refuse_unit (const pw_reader *r, const pw_node *node, const pw_node *value, const pw_unit_name *other,
-                             const char *unit, const char *at) {
+                             const char *unit) {
   static const char why[] = "unit: numbers are in SI units, angles in radians, and no unit converts a value";
   char si[YAML_UNIT], conversion[40];
+  const char *at;
   double factor;
   int replaced = 0, number = value->type == PW_YAML_SCALAR && strlen (value->text) <= 30 &&
                              pw_expression_number (value->text, &(double){ 0 });
@@ -103,7 +102,7 @@ static int yaml_unit (const pw_reader *r, const pw_node *node, const pw_node *va
   const char *in = strstr (*unit, " in "); /* "persons in lane": no inches, unless it is a product of units */
   const pw_unit_name *other = yaml_other_unit (*unit, &at);
   if (other == NULL || (in && at == in + 1 && pw_unit_factor (*unit, NULL, &(double){ 0 }) != PW_OK)) return PW_OK;
-  return yaml_refuse_unit (r, node, value, other, *unit, at);
+  return yaml_refuse_unit (r, node, value, other, *unit);
 }
 
 /* A default must not depend on other parameters: --set would have to change it, too. */
