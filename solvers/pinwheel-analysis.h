@@ -28,10 +28,10 @@ typedef struct {
   int unknowns;    /* of the linearisation: positions + velocities */
   double *A;       /* unknowns x unknowns, by rows [1/s], positions first; NULL: not computed, like all below */
   double *re, *im; /* its eigenvalues [1/s], by decreasing real part, im > 0 before im < 0; parts below round-off: 0 */
-  unsigned char *rigid; /* unknowns: 1 for rigid displacements of the whole, under which the equations are invariant */
+  unsigned char *rigid; /* per eigenvalue: 1 if its mode is a rigid displacement, which changes no equation */
   int symmetries;       /* number of symmetry directions among x, y, phi */
   pw_steadiness steady;
-  double twist[3];     /* velocity of the frame's origin, at a body or the mean of all; of its rotation [m/s, rad/s] */
+  double twist[3];     /* velocity of the frame's origin (a body or the mean of all); angular velocity [m/s, rad/s] */
   double acceleration; /* the largest in that frame; angles multiplied by the length scale [m/s^2] */
   /* Of pw_run_linear_modes, otherwise NULL; axes are those of the frame, which are the world's at this moment. */
   double *B;     /* unknowns x signals, by rows: x' = A x + B u, u added to the signals of forces [m/s per unit of the
@@ -74,9 +74,10 @@ typedef struct {
   const double *initial; /* copied; NULL with neighbours */
 } pw_direction;
 
-/* p of neighbour i, minus that of the run; the weight of its value of a function of p in the extrapolated differences
- * that approximate the derivative, or (of_error) in the estimate of their error. */
+/* p of neighbour i, minus that of the run. */
 double pw_direction_offset (const pw_direction *d, int i);
+/* The weight of f (p of neighbour i) in the extrapolated difference that approximates df/dp, or (of_error) in the
+ * estimate of its error. */
 double pw_direction_weight (const pw_direction *d, int of_error, int i);
 
 /* Derivatives of the motion of a run, integrated with it. */
@@ -89,9 +90,9 @@ typedef struct pw_variation pw_variation;
  * PW_METHOD if the state or a breakpoint is not differentiable; PW_RESOURCE. */
 pw_variation *pw_variation_open (pw_run *r, const pw_direction *d, int count, int ledger, pw_error *error);
 
-/* Advances the run and the derivatives to time t <= t_end, which is then in the last step of the run; but where
- * pw_system_may_jump, the run is ahead of it: take samples of another run with the same settings.  Returns as
- * pw_run_advance; also PW_METHOD where the motion is not differentiable. */
+/* Advances the run and the derivatives to time t <= t_end, which is then in the last step of the run.  If
+ * pw_system_may_jump, it may not be: the run is ahead, so take samples of another run with the same settings.  Returns
+ * as pw_run_advance; also PW_METHOD where the motion is not differentiable. */
 int pw_variation_advance (pw_variation *x, double t, double t_end, pw_error *error);
 
 /* The derivative along direction i of the sample at the time reached by pw_variation_advance (at a breakpoint, after
@@ -101,13 +102,13 @@ int pw_variation_advance (pw_variation *x, double t, double t_end, pw_error *err
  * the next call. */
 int pw_variation_sample (pw_variation *x, int i, pw_sample *derivative, pw_sample *error_of, pw_error *error);
 
-/* The first breakpoint of the run after the time reached, or INFINITY; *slope: the derivative along direction i of that
- * breakpoint, or of one at the time reached until pw_variation_sample passes it. */
+/* The first breakpoint of the run after the time reached, or INFINITY; *slope: its derivative along direction i.  If
+ * the time reached is a breakpoint that pw_variation_sample has not passed yet, *slope is that of this one. */
 double pw_variation_breakpoint (const pw_variation *x, int i, double *slope);
 
 /* Where pw_system_may_jump, advances the run to time t, but not beyond its next breakpoint nor farther than 256 states
- * ahead, and returns the time just after the first jump of its accelerations with the state after the time reached, or
- * INFINITY.  NAN and the error if that fails; NAN without an error if the run was stopped (PW_STOPPED). */
+ * ahead, and returns the time just after the first jump after the time reached that is due to the state (not to a
+ * signal), or INFINITY.  NAN and the error if that fails; NAN without an error if the run was stopped (PW_STOPPED). */
 double pw_variation_next_jump (pw_variation *x, double t, double t_end, pw_error *error);
 /* The derivative along direction i of the time of the last jump or breakpoint passed. */
 double pw_variation_jump_slope (const pw_variation *x, int i);
@@ -116,9 +117,9 @@ double pw_variation_jump_slope (const pw_variation *x, int i);
 double pw_variation_step_size (const pw_variation *x);
 
 /* The step of direction i with which its differences would be more accurate; its own if their error, relative to the
- * effects of p up to the time reached, is below 1e-7 (round-off) or 1e-4 (remainder, before extrapolation).  A step
- * below 1e-10 without any effect counts as too small.  Larger ones reduce round-off, which is proportional to 1 / step,
- * smaller ones the remainder, whose estimate is proportional to its square. */
+ * effects of p up to the time reached, is below 1e-7 if more than a tenth of it is round-off, else (the remainder
+ * before extrapolation) below 1e-4.  A step below 1e-10 without any effect counts as too small.  Larger steps reduce
+ * round-off, proportional to 1 / step, smaller ones the remainder, whose estimate is proportional to step^2. */
 double pw_variation_better_step (const pw_variation *x, int i);
 
 void pw_variation_close (pw_variation *x);
@@ -141,8 +142,8 @@ typedef struct {
   double span;        /* as in pw_settings, default 1 s: signals must be constant in it */
   double first, last; /* range of the parameter; to follow a branch they must differ */
   int vary;           /* the parameter is the value of hold[vary]; -1: it is that of `compile`, if any */
-  /* Compiles the system for a value of the parameter.  The search frees it.  NULL or an error: there is no system
-   * for this value.  May be NULL. */
+  /* Compiles the system for a value of the parameter; the search frees it.  If it returns NULL or an error, there is no
+   * system for this value.  The pointer itself may be NULL. */
   pw_system *(*compile) (void *context, double value, pw_error *error);
   void *context;
   int points; /* in the range, at least; default 50 */
@@ -164,7 +165,7 @@ typedef struct {
   const double *q, *v; /* pw_system_coordinates */
   double residual;     /* the largest, in units of the scene (pw_scale): L, L/T, L/T^2 */
   int iterations;
-  int family;   /* from pw_steady_solve: further quantities to hold so that it is isolated, up to symmetries */
+  int family;   /* from pw_steady_solve: number of further quantities to hold to isolate it, up to symmetries */
   int unstable; /* growing modes; at an event, without those that change */
   pw_steady_event event;
   const pw_linear *linear; /* NULL if it is not a solution */
@@ -177,12 +178,12 @@ typedef struct pw_steady pw_steady;
 pw_steady *pw_steady_open (const pw_system *s, const pw_steady_settings *settings, pw_error *error);
 void pw_steady_close (pw_steady *x);
 
-/* Newton's method at a value of the parameter, with corrections of least norm, from the initial state (attempt 0), a
- * state to which forces lead from there (1), or a random one (2, 3, ...).  PW_RETRY, without an error, if it finds
- * none: residual and state are where it ended.  Errors: as `compile` and pw_run_open; PW_INPUT also if the
- * parameter changes the number of bodies or constraint equations. */
+/* Newton's method at a value of the parameter, with corrections of least norm, from the initial state (attempt 0), the
+ * end of a relaxation from there (1: positions moved along the accelerations), or a random state (2, 3, ...).
+ * PW_RETRY, without an error, if it finds no solution: residual and state are where it ended.  Errors: as `compile`,
+ * pw_run_open and pw_run_linearise; also PW_INPUT if the parameter changes the number of bodies or equations. */
 int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_motion *out, pw_error *error);
-/* Why the system could last not be evaluated during the search, or why a branch ended within the range; or "". */
+/* Why the system could not be evaluated the last time this happened, or why a branch ended within the range, or "". */
 const char *pw_steady_reason (const pw_steady *x);
 /* Number of symmetries: displacements of the whole, and angles on which nothing depends.  It decreases when
  * pw_steady_solve reaches a solution without some of them; solutions found before may then count as different. */
@@ -194,10 +195,10 @@ int pw_steady_same (pw_steady *x, const double *q1, const double *v1, const doub
 int pw_steady_suggest (pw_steady *x, pw_initial_value *hold, int most);
 
 /* Follows the branch of a solution, initially towards the end of the range (direction 1) or its beginning (-1).
- * pw_steady_next returns its points, the first one included, and events in between, then PW_STEADY_END: at an end of
+ * pw_steady_next stores its points, the first one included, and events in between, then PW_STEADY_END: at an end of
  * the range or the start of a closed branch, where Newton's method fails at the smallest step, or after 100 times
- * `points` points (pw_steady_reason).  It returns PW_STEADY_END also before and after a branch, and after
- * pw_steady_follow has failed.  Errors of pw_steady_follow: those of pw_steady_solve; PW_INPUT also if first = last, q
+ * `points` points (pw_steady_reason).  It also stores PW_STEADY_END before and after a branch, and after
+ * pw_steady_follow has failed.  Errors: those of pw_steady_solve; of pw_steady_follow also PW_INPUT if first = last, q
  * or v is NULL, or the direction is another; PW_METHOD if Newton's method does not converge from this state, or the
  * branch has a fold there. */
 int pw_steady_follow (pw_steady *x, const double *q, const double *v, double parameter, int direction, pw_error *error);
@@ -216,7 +217,7 @@ typedef struct {
   void *stop_context;
   double t;           /* initial time [s] */
   double period;      /* [s]; 0: that of the signals at each value of the parameter; with `free` the first guess */
-  int periods;        /* of the signals in one of the motion, if `period` is 0; default 1 */
+  int periods;        /* number of periods of the signals in one period of the motion, if `period` is 0; default 1 */
   int free;           /* 1: the period is sought; signals must not change with time */
   double first, last; /* as in pw_steady_settings */
   pw_system *(*compile) (void *context, double value, pw_error *error); /* as in pw_steady_settings */
@@ -260,8 +261,9 @@ pw_periodic *pw_periodic_open (const pw_system *s, const pw_periodic_settings *s
 void pw_periodic_close (pw_periodic *x);
 
 /* Newton's method at a value of the parameter, from the state after `settle` >= 0 of the periods, with corrections of
- * least norm.  A free period that is not given is that of the first return of the motion then.  PW_RETRY, without an
- * error, if it does not converge: the residual is that where it ended. */
+ * least norm.  If a free period is not given, the first guess is the time of the motion's first return after settling.
+ * PW_RETRY, without an error, if it finds no solution: the residual is that where it ended.  Errors: PW_INPUT if settle
+ * is < 0 or the parameter not finite; PW_METHOD if LAPACK fails; PW_RESOURCE. */
 int pw_periodic_solve (pw_periodic *x, int settle, double parameter, pw_periodic_orbit *out, pw_error *error);
 /* Why the last motion could not be computed, or why a branch ended within the range; or "". */
 const char *pw_periodic_reason (const pw_periodic *x);
@@ -271,8 +273,9 @@ int pw_periodic_symmetries (const pw_periodic *x);
 /* Follows the branch of the motion that pw_periodic_solve has found last towards the end of the range (direction 1) or
  * its beginning (-1).  Errors: PW_INPUT if pw_periodic_solve has failed, first = last, or the direction is another;
  * PW_METHOD at a fold; PW_RESOURCE.
- * pw_periodic_next returns its points, the first one included, and events in between, then PW_PERIODIC_END (perhaps
- * with pw_periodic_reason); so also before and after a branch, and after pw_periodic_follow has failed. */
+ * pw_periodic_next stores its points, the first one included, and events in between, then PW_PERIODIC_END (perhaps
+ * with pw_periodic_reason), which it also stores before and after a branch, and after pw_periodic_follow has failed.
+ * Errors: PW_INPUT if no run of a compiled system can be opened; PW_METHOD if LAPACK fails; PW_RESOURCE. */
 int pw_periodic_follow (pw_periodic *x, int direction, pw_error *error);
 int pw_periodic_next (pw_periodic *x, pw_periodic_orbit *out, pw_error *error);
 

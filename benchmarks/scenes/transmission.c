@@ -172,16 +172,17 @@ static const pw_parameter parameters[] = {
   { PW_AT (model, x), 0.8, "m", "initial position of the carriage", PW_REAL },
   { PW_AT (model, y), 0.5, "rad", "initial angle of the first disc", PW_REAL },
   { PW_AT (model, rate), 0.6, "rad/s", "its initial angular velocity", PW_REAL },
-  { PW_AT (model, k), 1, "N/m", "stiffness that holds the carriage, of 1 kg", PW_POSITIVE },
-  { PW_AT (model, k1), 1.7, "N m/rad", "stiffness that holds the first disc, of 1 kg m^2", PW_NONNEGATIVE },
-  { PW_AT (model, k2), 2.3, "N m/rad", "stiffness that holds the second disc, of 1 kg m^2", PW_NONNEGATIVE },
+  { PW_AT (model, k), 1, "N/m", "stiffness of the spring of the carriage (mass 1 kg)", PW_POSITIVE },
+  { PW_AT (model, k1), 1.7, "N m/rad", "stiffness of the spring of the first disc (1 kg m^2 about its axle)",
+    PW_NONNEGATIVE },
+  { PW_AT (model, k2), 2.3, "N m/rad", "stiffness of the spring of the second disc (1 kg m^2)", PW_NONNEGATIVE },
   { PW_AT (model, rest), 0.3, "rad", "angle of the first disc without load", PW_REAL },
-  { PW_AT (model, off), 0.1, "m", "eccentricity of the first disc, of 1 kg", PW_REAL },
+  { PW_AT (model, off), 0.1, "m", "eccentricity of the first disc (mass 1 kg), from -1 to 1", PW_REAL },
   { PW_AT (model, g), 9.81, "m/s^2", "gravity, along -y", PW_REAL },
   { .name = NULL },
 };
 
-/* The spring of the carriage is linear: its other end is on the line of the rail, 10 m away. */
+/* The spring of the carriage has the free length 0: its force -k x is linear on both sides. */
 static void build (pw_model *m, const void *parameter) {
   const model *p = parameter;
   double r1 = p->a1 + p->b1 * p->x, r2 = p->a2 + p->b2 * p->x, c = cos (p->y), s = sin (p->y), w = p->rate;
@@ -189,6 +190,7 @@ static void build (pw_model *m, const void *parameter) {
     pw_model_refuse (m, "a2 + b2 x = 0: the second disc has no radius at x = %g", p->x);
     return;
   }
+  if (fabs (p->off) > 1) pw_model_refuse (m, "off = %g: expected a number from -1 to 1", p->off);
   pw_add_body (m, &(pw_body){ .name = "carriage", .mass = 1, .start = { p->x, 0, 0 } });
   pw_add_body (m, &(pw_body){ .name = "first",
                               .mass = 1,
@@ -204,11 +206,7 @@ static void build (pw_model *m, const void *parameter) {
       &(belt){
           .name = "belt", .body = { "first", "second", "carriage" }, .a = { p->a1, p->a2 }, .b = { p->b1, p->b2 } });
   pw_add (m, &gyro_kind, &(gyro){ .name = "gyro", .body = { "first", "carriage" }, .beta = p->beta });
-  pw_add_spring (m, &(pw_spring){ .name = "carriage-spring",
-                                  .body = { "carriage", "ground" },
-                                  .at = { { 0, 0 }, { -10, 0 } },
-                                  .stiffness = p->k,
-                                  .length = 10 });
+  pw_add_spring (m, &(pw_spring){ .name = "carriage-spring", .body = { "carriage", "ground" }, .stiffness = p->k });
   pw_add_rotational_spring (
       m, &(pw_rotational_spring){
              .name = "spring1", .body = { "first", "ground" }, .stiffness = p->k1, .angle = p->rest });

@@ -18,14 +18,15 @@ enum { PW_INTERRUPTED = 130, PW_CLOSED_PIPE = 141 };
 
 /* ---- Requests to stop; commands check them between steps or more often (stop.c) ---- */
 
-/* Not 0: all runs stop.  Each SIGINT or SIGTERM adds 1; after an error that ends a command, its threads set it to 1. */
+/* 1: all runs stop.  Set by SIGINT and SIGTERM, and by the threads of a command after an error that ends it. */
 extern volatile sig_atomic_t pw_stop;
 
 /* Counts these signals from now on.  The first requests a stop at the next check.  The third ends the program, in case
  * that check never comes; the second does not, since some senders signal both a process and its group. */
 void pw_stop_catch (void);
-/* From now on a signal ends the program, with a message and PW_INTERRUPTED; commands begin so. */
-void pw_stop_release (void);
+/* From now on a signal ends the program, with a message and PW_INTERRUPTED; commands begin so.  Returns the number of
+ * signals since pw_stop_catch. */
+int pw_stop_release (void);
 
 /* A limit of the processor time of a run, measured by the clock of its thread. */
 typedef struct {

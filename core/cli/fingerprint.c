@@ -109,8 +109,8 @@ static int fingerprint_missing (pw_fingerprint a, pw_fingerprint b, const char *
     const char *equals = memmem (line, (size_t)(end - line), " = ", 3);
     if (equals == NULL) continue; /* the first and the last line */
     size_t key = (size_t)(equals - line), own_size = (size_t)(end - equals) - 3, other_size;
-    const char *own = equals + 3, *other = fingerprint_find (b.begin, b.end, line, key + 3, &other_size);
     if (ignored && strlen (ignored) == key && memcmp (ignored, line, key) == 0) continue;
+    const char *own = equals + 3, *other = fingerprint_find (b.begin, b.end, line, key + 3, &other_size);
     if (other && other_size == own_size && memcmp (other, own, own_size) == 0) continue;
     if (other == NULL) other = "not set", other_size = strlen (other);
     int shown = own_size < SHOWN ? (int)own_size : SHOWN, other_shown = other_size < SHOWN ? (int)other_size : SHOWN;

@@ -1,5 +1,4 @@
 /* The progress bar of commands, or lines of text without a terminal. */
-#define _DEFAULT_SOURCE /* CLOCK_MONOTONIC_COARSE */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -21,13 +20,8 @@ double pw_seconds (clockid_t id) {
   return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-/* A clock that takes no system call and few nanoseconds, since commands call pw_progress_at after every step. */
-static double progress_clock (void) {
-  return pw_seconds (CLOCK_MONOTONIC_COARSE);
-}
-
 void pw_progress_start (pw_progress *p, const char *title, const char *unit, double first, double last) {
-  double now = progress_clock ();
+  double now = pw_seconds (CLOCK_MONOTONIC);
   int lines = !isatty (STDERR_FILENO);
   *p = (pw_progress){ .title = title, .unit = unit, .first = first, .last = last, .start = now, .lines = lines };
   p->next = now + (lines ? PROGRESS_LINE_INTERVAL : PROGRESS_DELAY);
@@ -61,7 +55,7 @@ static void progress_draw (const pw_progress *p, double fraction, const char *te
 
 void pw_progress_at (pw_progress *p, double reached) {
   if (p->title == NULL || (p->no_bar && !p->lines)) return;
-  double now = progress_clock ();
+  double now = pw_seconds (CLOCK_MONOTONIC);
   if (now < p->next) return;
   p->next = now + (p->lines ? PROGRESS_LINE_INTERVAL : PROGRESS_BAR_INTERVAL);
   double fraction = fmin (fmax (reached / p->last, 0), 1);

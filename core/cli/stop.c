@@ -7,18 +7,21 @@
 #include "cli.h"
 
 volatile sig_atomic_t pw_stop;
-enum { STOP_NOW = 3 }; /* pw_stop when a signal ends the program, see pw_stop_catch */
+static volatile sig_atomic_t stop_signals; /* since pw_stop_catch */
+enum { STOP_NOW = 3 };                     /* the signal that ends the program, see pw_stop_catch */
 
 static void stop_on_signal (int number) {
-  if (++pw_stop < STOP_NOW) return;
+  pw_stop = 1;
+  if (++stop_signals < STOP_NOW) return;
   signal (number, SIG_DFL);
   raise (number);
 }
 
 static pthread_t stop_thread; /* of the command */
 
-/* Outside of the loops that check pw_stop.  The command's thread blocks signals until it has removed temporary files;
- * then another one, as of a BLAS library, receives them. */
+/* The handler outside the loops that check pw_stop.  While the command's thread blocks signals (build_defer, until
+ * temporary files are removed), another thread, such as one of a BLAS library, may receive them; it passes them on to
+ * the command's thread. */
 static void stop_at_once (int number) {
   static const char text[] = "pinwheel: interrupted\n";
   if (!pthread_equal (pthread_self (), stop_thread)) {
@@ -30,8 +33,9 @@ static void stop_at_once (int number) {
   _exit (PW_INTERRUPTED);
 }
 
-/* Sets the handler of SIGINT and SIGTERM; a signal that the program was started to ignore, by nohup or in a script's
- * background, stays ignored.  SA_RESTART: a write that waits for the reader of a pipe goes on. */
+/* Sets the handler of SIGINT and SIGTERM.  A signal that was already ignored when the program started, by trap '' or
+ * because a script runs it in the background, stays ignored.  SA_RESTART: a write that waits for the reader of a pipe
+ * goes on. */
 static void stop_set (void (*handler) (int)) {
   static const int caught[] = { SIGINT, SIGTERM };
   struct sigaction action = { .sa_handler = handler, .sa_flags = SA_RESTART }, before;
@@ -41,12 +45,14 @@ static void stop_set (void (*handler) (int)) {
 }
 
 void pw_stop_catch (void) {
+  stop_signals = 0;
   stop_set (stop_on_signal);
 }
 
-void pw_stop_release (void) {
+int pw_stop_release (void) {
   stop_thread = pthread_self ();
   stop_set (stop_at_once);
+  return stop_signals;
 }
 
 /* ---- Limits ---- */
@@ -55,8 +61,8 @@ void pw_limit_start (pw_limit *limit) {
   limit->start = pw_seconds (CLOCK_THREAD_CPUTIME_ID);
 }
 
-/* Reading the thread's clock takes a system call, so it is read only when a coarse clock, which does not, has advanced:
- * about 250 times a second. */
+/* Reading the thread's clock takes a system call.  It is therefore read only when a coarse clock, which can be read
+ * without one, has advanced: about 250 times a second. */
 int pw_limit_over (void *context) {
   pw_limit *limit = context;
   if (pw_stop) return 1;

@@ -14,7 +14,7 @@ typedef struct pw_file pw_file;
 
 /* Opens a model, given its name or path.
  *
- * A name ("ezyroller") is searched as NAME.so, NAME.yaml in the folders of the environment variable PINWHEEL_MODELS
+ * A name ("ezyroller") is searched for as NAME.so, NAME.yaml in the folders of the environment variable PINWHEEL_MODELS
  * (separated by ":"), and in those that belong to the running program and this library: models/ next to them or one
  * up, lib/pinwheel/models/ of the installation.  A path has a "/" or an ending: a .so is loaded, a .c compiled by $CC
  * or cc in a private temporary folder, its messages passed through on standard error; a .yaml is read
@@ -75,7 +75,7 @@ typedef struct pw_scene_code pw_scene_code;
  * (pw_specialised_fits), and so may processes at the same time.
  *
  * NULL and PW_INPUT without compiler or pinwheel.h; PW_METHOD if the text does not compile, with the path at which it
- * is kept; PW_STOPPED if a signal ended the compiler; PW_RESOURCE. */
+ * is kept; PW_STOPPED if a Unix signal (such as SIGINT) ended the compiler; PW_RESOURCE. */
 pw_scene_code *pw_scene_code_open (const char *text, const pw_system *s, pw_error *error);
 /* The same for 2, 4 or 8 runs at once (pw_runs_advance), if pw_system_has_lanes. */
 pw_scene_code *pw_scene_lanes_open (const char *text, const pw_system *s, int lanes, pw_error *error);
@@ -153,7 +153,7 @@ typedef struct {
 } pw_use;
 
 /* Refuses a file that is both read and written, or written twice, under any name: files are compared by device and
- * inode, those that do not exist yet by that of their folder and their name.  PW_INPUT, PW_RESOURCE. */
+ * inode, files that do not exist yet by device and inode of their folder, and their name.  PW_INPUT, PW_RESOURCE. */
 int pw_check_paths (const pw_use *use, int count, pw_error *error);
 
 /* ---- Complete files ---- */
@@ -179,8 +179,8 @@ int pw_output_ready (pw_output *o, pw_error *error);
 int pw_output_finish (pw_output *o, pw_error *error);
 /* The same for several outputs, some of which may be NULL: completes all, or leaves all under their temporary names. */
 int pw_output_finish_all (pw_output *const *o, int count, pw_error *error);
-/* Gives up and frees: NAME.part remains, of a text its complete lines.  Its path is written to the buffer, which is
- * returned; NULL, and "" in the buffer, if there is no such file (standard output, a device). */
+/* Gives up and frees: NAME.part remains; a text is cut after its last complete line.  The path of NAME.part is written
+ * to the buffer, which is returned; NULL, and "" in the buffer, if there is none (standard output, a device). */
 char *pw_output_abandon (pw_output *o, char *buffer, size_t size);
 /* Gives up and frees, and removes NAME.part. */
 void pw_output_discard (pw_output *o);
@@ -190,8 +190,7 @@ char *pw_output_path (const char *path, pw_error *error);
 /* Opens a file for reading and writing, creates it if there is none, and locks it until the descriptor that is returned
  * is closed.  A symbolic link is not followed.  -1 and PW_RESOURCE, also if another process has it. */
 int pw_lock_path (const char *path, pw_error *error);
-/* Locks a folder until the descriptor returned is closed.  -1 and PW_RESOURCE, also if another process has locked
- * it. */
+/* Locks a folder until the descriptor returned is closed.  -1 and PW_RESOURCE, also if another process has it. */
 int pw_lock_folder (const char *path, pw_error *error);
 
 /* The position in a file from which another process continues. */
@@ -289,7 +288,8 @@ typedef struct {
   double t;           /* of the last one [s] */
   double end[4];      /* at t: of lengths [m], angles [rad], velocities [m/s], angular velocities [rad/s] */
   double most[4];     /* the largest of the run, in the same order */
-  double reactions;   /* the largest, not at jumps, relative to the reference's largest of the unit, to 1 if it is 0 */
+  double reactions;   /* the largest, not at jumps, relative to the largest reference reaction of the same unit, or to
+                         1 if that is 0 */
 } pw_reference_error;
 
 /* What a run was and how it ended; `reason` is "" when the status is ok. */

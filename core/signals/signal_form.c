@@ -82,23 +82,26 @@ static void form_check_pulse (const pw_signal *s, char *text, size_t size) {
 }
 
 static void form_check_points (const pw_signal *s, int *point, char *text, size_t size) {
-  const double *t = s->table.t;
+  const double *t = s->table.t, *y = s->table.value;
   int cubic = s->table.interpolation == PW_CUBIC, least = cubic && s->table.ends == PW_ENDS_FREE ? 4 : 2;
-  if (s->table.count < least || t == NULL || s->table.value == NULL) {
-    int count = t && s->table.value ? s->table.count : 0;
+  if (s->table.count < least || t == NULL || y == NULL) {
+    int count = t && y ? s->table.count : 0;
     snprintf (text, size, "a %s table%s needs at least %d points, found %d", form_interpolation[cubic],
               least == 4 ? " with free ends" : "", least, count);
     return;
   }
   for (int i = 0; i < s->table.count && !*text; i++) {
     *point = i;
-    if (!isfinite (t[i]) || !isfinite (s->table.value[i]))
-      snprintf (text, size, "point %d is (%g, %g): expected finite numbers", i + 1, t[i], s->table.value[i]);
+    if (!isfinite (t[i]) || !isfinite (y[i]))
+      snprintf (text, size, "point %d is (%g, %g): expected finite numbers", i + 1, t[i], y[i]);
     else if (!isfinite (pw_table_value (s, i)))
-      snprintf (text, size, "point %d: offset + scale * %g is not finite", i + 1, s->table.value[i]);
+      snprintf (text, size, "point %d: offset + scale * %g is not finite", i + 1, y[i]);
     else if (i > 0 && !(t[i] > t[i - 1]))
       snprintf (text, size, "point %d is at t = %.9g s, after one at %.9g s: expected increasing times", i + 1, t[i],
                 t[i - 1]);
+    else if (i > 0 && !isfinite ((pw_table_value (s, i) - pw_table_value (s, i - 1)) / (t[i] - t[i - 1])))
+      snprintf (text, size, "points %d (%g, %g) and %d (%g, %g): the slope between them is not finite", i, t[i - 1],
+                y[i - 1], i + 1, t[i], y[i]);
   }
   if (!*text) *point = -1;
 }

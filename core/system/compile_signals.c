@@ -1,9 +1,10 @@
 /* Compiles the signals of all elements: their tables, the states that they read, the contexts of functions. */
+#include <math.h>
 #include <string.h>
 #include "system.h"
 
 /* Copies the points of a table and computes its spline. */
-static int signals_table (pw_system *s, pw_source *source, pw_error *error) {
+static int signals_table (pw_system *s, pw_source *source, const char *element, pw_error *error) {
   pw_points *table = &source->signal.table;
   size_t n = (size_t)table->count;
   double *t = pw_arena_alloc (&s->arena, 4 * n * sizeof *t), *value = t + n;
@@ -15,6 +16,10 @@ static int signals_table (pw_system *s, pw_source *source, pw_error *error) {
   table->scale = 1, table->offset = 0;
   source->spline = value + n;
   pw_table_spline (&source->signal, source->spline);
+  for (size_t i = 0; i < 2 * n; i++)
+    if (!isfinite (source->spline[i]))
+      return pw_fail (error, PW_INPUT, "model %s: element %s: the derivatives of the table are not finite at t = %g s",
+                      s->model, element, t[i % n]);
   return PW_OK;
 }
 
@@ -45,7 +50,7 @@ static int signals_source (pw_system *s, pw_source *source, const pw_signal *sig
   if (opens && context == NULL) return pw_fail_memory (s, error);
   source->signal = *signal;
   if (context) source->signal.function.context = context;
-  if (signal->type == PW_TABLE) return signals_table (s, source, error);
+  if (signal->type == PW_TABLE) return signals_table (s, source, element, error);
   return signal->type == PW_FUNCTION ? signals_reads (s, source, element, error) : PW_OK;
 }
 

@@ -154,7 +154,7 @@ static double branch_longest_step (const pw_branch *b) {
   return b->max_change / fmax (fabs (b->reached.tangent[b->problem.unknowns]), BRANCH_STEEP);
 }
 
-/* Moves to the end of the range, or to p of the first point, if the next step would reach it: without evaluations
+/* Moves to the end of the range, or to p of the first point, if the next step would reach it: without steps
  * beyond the end, where the parameter may not be admissible.  PW_RETRY if it would not, or no point is found there. */
 static int branch_step_to_end (pw_branch *b, pw_error *error) {
   int n = b->problem.unknowns;

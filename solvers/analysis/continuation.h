@@ -111,8 +111,8 @@ int pw_branch_next (pw_branch *b, pw_branch_find_events *find_events, pw_error *
  * does not converge nearby, as at bifurcations.  Where the test or F cannot be evaluated, as at singular points,
  * neighbouring points are tried. */
 int pw_branch_locate (pw_branch *b, pw_branch_test *test, void *context, pw_error *error);
-/* Queues the events of the last step, between whose ends the number of unstable modes changes.  A fold near which a
- * real mode changes its stability is one event.  `locate` is called with problem.context. */
+/* Queues the changes of stability in the last step, at whose ends `before` and `now` modes are unstable.  A fold near
+ * which a real mode changes its stability is one event.  `locate` is called with problem.context. */
 int pw_branch_find_changes (pw_branch *b, int before, int now, pw_branch_locate_mode *locate, pw_error *error);
 
 /* ---- continuation_newton.c, for continuation.c only ---- */

@@ -10,7 +10,8 @@ enum {
   NEWTON_SLOW = 4       /* an iteration that divides |F| by less has reached round-off, below the tolerance */
 };
 static const double NEWTON_DAMPING = 0.1, /* factor of |F| in the square of the damping */
-    NEWTON_DIFFERENCE = 1e-5;             /* of p: round-off 1e-11, truncation error 2e-11 of the third derivative */
+    NEWTON_DIFFERENCE =
+        1e-5; /* of p: errors of F are multiplied by 1e5, round-off gives 1e-11; 2e-11 of the third derivative */
 
 /* The largest |F_i|; NaN if one is NaN. */
 static double newton_residual (const pw_branch *b) {
@@ -49,9 +50,10 @@ static int newton_linearise (pw_branch *b, const double *u, pw_error *error) {
     for (int i = 0; i < m; i++) by_p[i] += side * b->F[i];
     sum += side, count++;
   }
+  if (count == 0) return PW_RETRY;
   int status = newton_evaluate (b, u, b->J, error);
   for (int i = 0; i < m; i++) by_p[i] = (by_p[i] - sum * b->F[i]) / (count * NEWTON_DIFFERENCE);
-  return count > 0 ? status : PW_RETRY;
+  return status;
 }
 
 /* Adds `extra` rows to the n columns of J: the row c, or if c is NULL rows with `diagonal` on their diagonal. */

@@ -225,9 +225,7 @@ int pw_periodic_solve (pw_periodic *x, int settle, double parameter, pw_periodic
 int pw_periodic_follow (pw_periodic *x, int direction, pw_error *error) {
   if (pw_require (x, "a search", error) != PW_OK) return PW_INPUT;
   pw_branch_end (&x->branch);
-  if (pw_check_direction (direction, error) != PW_OK) return PW_INPUT;
-  if (x->settings.first == x->settings.last)
-    return pw_fail (error, PW_INPUT, "first = last = %.9g: expected a range", x->settings.first);
+  if (pw_check_branch (direction, x->settings.first, x->settings.last, error) != PW_OK) return PW_INPUT;
   if (!(x->begin_period > 0))
     return pw_fail (error, PW_INPUT, "no motion has been found from which to follow a branch");
   x->last_period = x->begin_period, x->steps = 0;

@@ -64,15 +64,31 @@ static void equations_rotate (const pw_periodic *x, double w, const double *in, 
   pw_linear_rotate (&x->steady->system.linearisation, w, in + x->n, out + x->n);
 }
 
+/* The angle by which the whole turns in the last flow: that of the first body whose angle no symmetry changes except by
+ * turning the whole, or 0. */
+static double equations_turn (const pw_periodic *x) {
+  int rates = pw_steady_rate_count (x->s);
+  for (int b = 0; b < x->s->bodies; b++) {
+    int others = 0;
+    for (int k = 0; k < x->symmetries; k++) others += x->steady->symmetry[k * rates + PW_RATE_ANGLES + b] != 0;
+    if (others == 0) return x->y1[3 * b + 2] - x->y0[3 * b + 2];
+  }
+  return 0;
+}
+
 int pw_periodic_guess_displacement (pw_periodic *x, double *u, pw_error *error) {
-  enum { CORRECTIONS = 10 }; /* translations are linear for a given rotation */
-  int states = 2 * x->n, count = x->symmetries, rank;
+  enum { CORRECTIONS = 3 }; /* the rotation is known; for a given one translations are linear */
+  int states = 2 * x->n, count = x->symmetries, rates = pw_steady_rate_count (x->s), rank;
   size_t rows = 2 * (size_t)states, work_size = rows + (size_t)(PW_PERIODIC_WORK * (states + count));
   int status = count ? pw_periodic_flow (x, u, PW_FLOW, error) : PW_OK;
   if (status != PW_OK || count == 0) return status;
   double *F = calloc (rows + rows * (size_t)count + work_size, sizeof *F), *M = F + rows,
          *work = M + rows * (size_t)count;
   if (F == NULL) return pw_fail_memory (x->s, error);
+  for (int k = 0; k < count; k++) {
+    double turn = x->steady->symmetry[k * rates + PW_RATE_TURN];
+    if (turn != 0) u[states + k] = equations_turn (x) / turn;
+  }
   for (int i = 0; i < CORRECTIONS; i++) {
     equations_residual (x, u, F);
     memset (M, 0, rows * (size_t)count * sizeof *M);

@@ -224,7 +224,7 @@ static int steady_family (pw_steady *x) {
   pw_error none = { 0 };
   int status = pw_steady_find_free_symmetries (x);
   if (status != PW_OK) return status;
-  memset (x->branch.J, 0, (size_t)equations * (size_t)unknowns * sizeof *x->branch.J);
+  memset (x->branch.J, 0, (size_t)equations * ((size_t)unknowns + 1) * sizeof *x->branch.J);
   status = pw_steady_evaluate (x, x->u, x->branch.F, x->branch.J, &none);
   if (status != PW_OK) return status == PW_RESOURCE ? status : PW_METHOD;
   return pw_null_space (equations, unknowns, x->branch.J, PW_STEADY_RANK, x->null_space);

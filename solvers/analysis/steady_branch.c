@@ -15,14 +15,13 @@ int pw_steady_follow (pw_steady *x, const double *q, const double *v, double par
   if (pw_require (x, "a search", error) != PW_OK) return PW_INPUT;
   pw_branch_end (&x->branch);
   if (pw_require (q, "q", error) != PW_OK || pw_require (v, "v", error) != PW_OK) return PW_INPUT;
-  if (pw_check_direction (direction, error) != PW_OK || pw_check_parameter (parameter, error) != PW_OK) return PW_INPUT;
-  int unknowns = pw_steady_unknowns (x);
-  double range = x->settings.last - x->settings.first;
-  if (range == 0) return pw_fail (error, PW_INPUT, "first = last = %.9g: expected a range", x->settings.first);
+  const double first = x->settings.first, last = x->settings.last;
+  if (pw_check_branch (direction, first, last, error) != PW_OK || pw_check_parameter (parameter, error) != PW_OK)
+    return PW_INPUT;
   pw_steady_motion motion;
   x->free_symmetries = 0;
   int status = pw_steady_nearest (x, q, v, x->u, error);
-  x->u[unknowns] = (parameter - x->settings.first) / range;
+  x->u[pw_steady_unknowns (x)] = (parameter - first) / (last - first);
   if (status == PW_OK) status = pw_branch_solve (&x->branch, x->u, error);
   if (status == PW_OK) status = pw_steady_motion_at (x, x->u, &motion, error);
   if (status == PW_OK) status = pw_steady_find_free_symmetries (x);
@@ -31,8 +30,7 @@ int pw_steady_follow (pw_steady *x, const double *q, const double *v, double par
   if (status != PW_OK)
     return status < 0 && error->status ? status : pw_fail (error, PW_METHOD, "the branch cannot be followed from here");
   x->unstable = motion.unstable;
-  x->branch.max_change = 1.0 / x->settings.points;
-  x->branch.step = x->branch.max_change / 4;
+  x->branch.max_change = 1.0 / x->settings.points, x->branch.step = x->branch.max_change / 4;
   x->branch.min_step = BRANCH_MIN_STEP, x->branch.event_accuracy = BRANCH_ACCURACY;
   x->branch.max_points = BRANCH_MAX_POINTS * x->settings.points;
   return PW_OK;

@@ -51,12 +51,12 @@ typedef struct {
 static hold_pair hold_terms (const pw_system *s, int held, const double *q, const double *v, const double *dq,
                              const double *dv) {
   int index = held - 2 * s->coords, b = 3 * (index / PW_HOLD_OF_BODY);
-  double one = dq ? 0 : 1;
-  if (held < s->coords) return (hold_pair){ dq ? dq[held] : q[held], one };
-  if (index < 0) return (hold_pair){ dq ? dv[held - s->coords] : v[held - s->coords], one };
+  double B_constant = dq ? 0 : 1; /* B = 1, or its change */
+  if (held < s->coords) return (hold_pair){ dq ? dq[held] : q[held], B_constant };
+  if (index < 0) return (hold_pair){ dq ? dv[held - s->coords] : v[held - s->coords], B_constant };
   double c = pw_cos (q[b + 2]), sine = pw_sin (q[b + 2]), speed = c * v[b] + sine * v[b + 1], omega = v[b + 2];
   if (dq) speed = c * dv[b] + sine * dv[b + 1] + (c * v[b + 1] - sine * v[b]) * dq[b + 2], omega = dv[b + 2];
-  return index % PW_HOLD_OF_BODY == PW_HOLD_SPEED    ? (hold_pair){ speed, one }
+  return index % PW_HOLD_OF_BODY == PW_HOLD_SPEED    ? (hold_pair){ speed, B_constant }
          : index % PW_HOLD_OF_BODY == PW_HOLD_RADIUS ? (hold_pair){ speed, omega }
                                                      : (hold_pair){ omega, speed };
 }

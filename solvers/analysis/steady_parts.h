@@ -151,14 +151,15 @@ int pw_signals_change (pw_run *r, double t, double period, double span, int *cha
 
 /* PW_INPUT, with the name, unless these settings of a search for steady or periodic motions are valid. */
 int pw_check_search (double first, double last, int points, pw_error *error);
-/* PW_INPUT unless the parameter is finite; unless the direction is 1 or -1. */
+/* PW_INPUT unless the parameter is finite; unless the direction is 1 or -1 and the range is not empty. */
 static inline int pw_check_parameter (double parameter, pw_error *error) {
   if (isfinite (parameter)) return PW_OK;
   return pw_fail (error, PW_INPUT, "parameter = %g: expected a finite number", parameter);
 }
-static inline int pw_check_direction (int direction, pw_error *error) {
-  if (direction == 1 || direction == -1) return PW_OK;
-  return pw_fail (error, PW_INPUT, "direction = %d: expected 1 or -1", direction);
+static inline int pw_check_branch (int direction, double first, double last, pw_error *error) {
+  if (direction != 1 && direction != -1)
+    return pw_fail (error, PW_INPUT, "direction = %d: expected 1 or -1", direction);
+  return first == last ? pw_fail (error, PW_INPUT, "first = last = %.9g: expected a range", first) : PW_OK;
 }
 
 /* As pw_steady_open, for searches that need only scales and symmetries: signals may change. */

@@ -1,8 +1,10 @@
 /* Condensation of a saddle-point system to its constraint equations: planned by condense*.c, carried out by block_*.c.
  *
- * Equations are grouped into nodes of 1 or 2 with the same columns.  A node contributes to each group (massless.h) of
- * its coordinates of which at least one has a finite weight other than 0.  Two nodes that contribute to the same group,
- * unless it is an uncondensed body, are coupled: they have a block in S = J W^-1 J^T. */
+ * Equations are grouped into nodes of 1 or 2 with the same columns.  A node contributes to a group of its coordinates
+ * (massless.h) if at least one coordinate of that group has a finite weight other than 0.  An uncondensed body
+ * (block_ldl.h) adds two nodes of its own, for -a_k.  Coupled, i.e. with a block in the matrix, are two nodes that
+ * contribute to the same condensed group, and the two nodes of an uncondensed body with every node that contributes to
+ * it. */
 #ifndef PW_CONDENSE_H
 #define PW_CONDENSE_H
 
@@ -63,11 +65,11 @@ typedef struct {
 /* Ranks the nodes of a scene with uncondensed bodies.  PW_OK or PW_RESOURCE. */
 int pw_condense_rank (pw_plan *plan);
 
-/* Makes the saddle's block L D L^T.  Errors: PW_RESOURCE. */
+/* Opens and lays out saddle->block, without factorising.  Errors: PW_RESOURCE. */
 int pw_condense_block (pw_plan *plan);
 
-/* Finds the chains, and marks their inner columns.  The contributions to each group in plan->list must be sorted by
- * column.  PW_OK or PW_RESOURCE. */
+/* Finds the chains, and marks their inner columns (in_chain).  The contributions to each group in plan->list must be
+ * sorted by the columns of their nodes in l.  PW_OK or PW_RESOURCE. */
 int pw_condense_chains (pw_plan *plan, pw_block_ldl *l);
 
 #endif

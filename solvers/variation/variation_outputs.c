@@ -94,16 +94,17 @@ int pw_variation_outputs (pw_variation *x, const pw_variation_column *c, const d
 }
 
 int pw_variation_time_derivatives (pw_variation *x, int c, int k, pw_error *error) {
-  int status = PW_OK;
+  int status = PW_OK, evaluated = 0;
   pw_variation_accelerate (x, c, k);
   if (!x->ledger) return PW_OK;
   for (pw_direction_copy *d = x->direction; d < x->direction + x->count && status == PW_OK; d++) {
     if (c >= d->columns) continue;
     status = pw_variation_outputs (x, &d->column[c], d->column[c].trial, x->output);
     memcpy (d->column[c].K[k] + 2 * x->n, x->output + 2, (size_t)x->entries * sizeof (double));
+    evaluated = 1;
   }
   /* J and its factors are again those of the state */
-  if (pw_evaluate_J_at (x->r->w, x->at, x->q, x->v) == PW_OK) pw_saddle_factor (x->r->saddle);
+  if (evaluated && pw_evaluate_J_at (x->r->w, x->at, x->q, x->v) == PW_OK) pw_saddle_factor (x->r->saddle);
   return status == PW_OK ? PW_OK : pw_fail_signal (x->at, error);
 }
 

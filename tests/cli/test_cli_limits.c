@@ -7,6 +7,7 @@
 #include <unistd.h>
 #include "check.h"
 #include "cli.h"
+#include "cli/cli.h"
 #include "cli/parallel.h"
 
 /* What there is so far is kept, the exit status is 4, and the limit is named. */
@@ -168,6 +169,23 @@ TEST (last_step) {
                         "PW_MODEL (.about = \"raises a signal\", .build = build);\n");
   assert_int_equal (cli_run ("pinwheel run @/raise.c --t-end 1 --step 0.1 -o @/raise.csv && wc -l <@/raise.csv"), 0);
   assert_string_equal (cli_out, "12\n");
+}
+
+/* The third signal ends the program, whatever has set pw_stop before, and however many came in an earlier part. */
+TEST (two_signals) {
+  for (int part = 0; part < 2; part++) {
+    pw_stop = 1;
+    pw_stop_catch ();
+    raise (SIGINT);
+    raise (SIGTERM);
+    assert_int_equal (pw_stop_release (), 2);
+    assert_int_equal (pw_stop, 1);
+  }
+  pw_stop_catch ();
+  assert_int_equal (pw_stop_release (), 0);
+  pw_stop = 0;
+  signal (SIGINT, SIG_DFL);
+  signal (SIGTERM, SIG_DFL);
 }
 
 static int limits_no_task (void *context, int i, pw_error *error) {

@@ -270,6 +270,9 @@ TEST (faults) {
                   FAULT "point 3 is (1.5, nan): expected finite numbers");
   shapes_refused (SHAPES_FORCE, (pw_signal){ PW_TABLE, .table = { t, t, 4, PW_LINEAR, 0, 1e308, 1e308 } },
                   FAULT "point 2: offset + scale * 1 is not finite");
+  static const double adjacent[] = { 0, 1e-200 };
+  shapes_refused (SHAPES_FORCE, (pw_signal){ PW_TABLE, .table = { adjacent, t, 2, PW_CUBIC, PW_ENDS_REST, 0, 0 } },
+                  "model ezyroller: element X: the derivatives of the table are not finite at t = 0 s");
   shapes_refused (SHAPES_FORCE, shapes_points (t, t, 1, PW_LINEAR),
                   FAULT "a linear table needs at least 2 points, found 1");
   shapes_refused (SHAPES_FORCE, shapes_points (NULL, t, 3, PW_LINEAR),

@@ -70,6 +70,19 @@ TEST (parameters) {
   pw_file_close (f);
 }
 
+/* A unit that contains the name of a unit as part of a word, or "in" as a preposition, is only displayed. */
+TEST (units_in_words) {
+  static const char *const unit[] = { "persons in lane", "µgal", "mµs per ångström", "hôtel", "göteborg" };
+  char source[200];
+  for (int i = 0; i < 5; i++) {
+    snprintf (source, sizeof source,
+              "pinwheel: 1\nparameters: [{name: a, value: 1, unit: %s}]\nbodies: [{name: b, mass: a}]\n", unit[i]);
+    gallery_scene x = text_of (source, NULL, 0);
+    assert_string_equal (pw_file_table (x.file)->parameters->unit, unit[i]);
+    gallery_close (&x);
+  }
+}
+
 /* ---- What is built ---- */
 
 TEST (let) {

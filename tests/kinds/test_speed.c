@@ -120,7 +120,7 @@ SCENE (speed_nothing) {
 
 TEST (refused) {
   scene_refused (scene_model (&speed_nothing_table, NULL),
-                 "model scene: pfaffian none: a and b are all zero: expected at least one other number");
+                 "model scene: pfaffian none: all numbers of a and b are 0: expected at least one that is not");
 }
 
 /* ---- By all methods: points off the centres of mass, rotating bodies, variable signals ---- */

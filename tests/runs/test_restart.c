@@ -43,11 +43,11 @@ TEST (slower) {
   pw_system *s = scene_system (&scene_ezyroller, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 2, .ledger = 1 });
   pw_sample before = runs_to (r, 2);
-  double work = before.work, left = before.kinetic / 4;
+  double work = before.work, remaining = before.kinetic / 4;
   for (int j = 0; j < 6; j++) v[j] = before.v[j] / 2;
   check_ok (pw_run_restart (r, NULL, v, &error), &error);
   pw_sample now = runs_to (r, 2.001);
-  check_close ("work of a step", now.work - work, now.kinetic - left, 1e-13, "the method's error in one step, h^5");
+  check_close ("work of a step", now.work - work, now.kinetic - remaining, 1e-13, "error of one step, h^5");
   pw_run_close (r);
   pw_system_free (s);
 }
@@ -70,13 +70,13 @@ TEST (lost) {
   pw_system_free (s);
 }
 
-/* A refused restart leaves the run unchanged, to the bit. */
+/* A refused restart leaves the run unchanged, up to round-off. */
 TEST (refused) {
   pw_system *s = scene_system (&scene_ezyroller, NULL), *same = scene_system (&scene_ezyroller, NULL);
   pw_settings settings = { .step = 1e-3, .span = 2, .ledger = 1 };
-  pw_run *r = runs_open (s, "rk4+projection", &settings), *left = runs_open (same, "rk4+projection", &settings);
+  pw_run *r = runs_open (s, "rk4+projection", &settings), *untouched = runs_open (same, "rk4+projection", &settings);
   pw_sample now = runs_to (r, 1);
-  runs_to (left, 1);
+  runs_to (untouched, 1);
   pw_error error = { 0 };
   double q[6];
   memcpy (q, now.q, sizeof q);
@@ -90,16 +90,16 @@ TEST (refused) {
   assert_int_equal (pw_run_advance_to (r, 2, NAN, NULL), PW_INPUT);
   assert_int_equal (pw_run_sample (r, NAN, &now, NULL), PW_INPUT);
   now = runs_to (r, 2);
-  pw_sample other = runs_to (left, 2);
+  pw_sample other = runs_to (untouched, 2);
   for (int i = 0; i < 6; i++)
-    check_close ("positions", now.q[i], other.q[i], 1e-13, "round-off of a factorisation anew");
+    check_close ("positions", now.q[i], other.q[i], 1e-13, "round-off: the matrix is factorised again");
   check_close ("balance", now.balance, other.balance, 1e-13, "round-off");
-  pw_run_close (r), pw_run_close (left);
+  pw_run_close (r), pw_run_close (untouched);
   pw_system_free (s), pw_system_free (same);
 }
 
-/* A torque that jumps at 0.5 s.  *context: 1: evaluations fail once it has been asked for its next jump, which makes it
- * 2. */
+/* A torque that jumps at 0.5 s.  *context: 0: evaluations succeed; 1: until restart_next_jump is called, which makes it
+ * 2; 2: they fail. */
 static int restart_jump (void *context, double t, const double *x, double value[3], double *gradient) {
   (void)x, (void)gradient;
   value[0] = t < 0.5 ? 0 : 0.1;
@@ -123,14 +123,14 @@ TEST (refused_at_jump) {
   check_ok (pw_model_set_signal (m, "rider", "value", &jump, &error), &error);
   pw_system *s = scene_compile (m);
   for (int i = 0; i < 5; i++) {
-    pw_run *r = runs_open (s, method[i], &settings), *left = runs_open (s, method[i], &settings);
-    runs_to (r, 0.5), runs_to (left, 0.5);
+    pw_run *r = runs_open (s, method[i], &settings), *untouched = runs_open (s, method[i], &settings);
+    runs_to (r, 0.5), runs_to (untouched, 0.5);
     fails = 1;
     assert_int_equal (pw_run_restart (r, NULL, NULL, NULL), PW_METHOD);
     fails = 0;
-    check_close (method[i], runs_to (r, 1).q[2], runs_to (left, 1).q[2], 1e-12, "round-off");
-    assert_int_equal (pw_run_statistics (r)->steps, pw_run_statistics (left)->steps);
-    pw_run_close (r), pw_run_close (left);
+    check_close (method[i], runs_to (r, 1).q[2], runs_to (untouched, 1).q[2], 1e-12, "round-off");
+    assert_int_equal (pw_run_statistics (r)->steps, pw_run_statistics (untouched)->steps);
+    pw_run_close (r), pw_run_close (untouched);
   }
   pw_system_free (s);
 }
@@ -151,8 +151,8 @@ TEST (refused_by_method) {
   const pw_method *const own[] = { &refusing, NULL };
   pw_system *s = scene_system (&scene_ezyroller, NULL);
   pw_settings settings = { .step = 1e-3, .span = 2, .ledger = 1, .methods = own };
-  pw_run *r = runs_open (s, "refusing+projection", &settings), *left = runs_open (s, "rk4+projection", &settings);
-  pw_sample now = runs_to (r, 1), before = runs_to (left, 1);
+  pw_run *r = runs_open (s, "refusing+projection", &settings), *untouched = runs_open (s, "rk4+projection", &settings);
+  pw_sample now = runs_to (r, 1), before = runs_to (untouched, 1);
   pw_error error = { 0 };
   double v[6], given[6];
   memcpy (given, pw_run_initial (r)->v_given, sizeof given);
@@ -168,16 +168,15 @@ TEST (refused_by_method) {
   check_bits ("velocities", now.v, before.v, 6);
   check_bits ("accelerations", now.a, before.a, 6);
   check_bits ("balance", &now.balance, &before.balance, 1);
-  now = runs_to (r, 2), before = runs_to (left, 2);
+  now = runs_to (r, 2), before = runs_to (untouched, 2);
   assert_int_equal (restart_calls, 3); /* the last one before the first step that succeeds */
   for (int j = 0; j < 6; j++)
     check_close ("positions", now.q[j], before.q[j], 1e-12, "steps end at other times by round-off");
-  pw_run_close (r), pw_run_close (left);
+  pw_run_close (r), pw_run_close (untouched);
   pw_system_free (s);
 }
 
-/* Energy added by the caller is not an error of the method: the balance contains only the latter, before and after.
- * */
+/* Energy added by the caller is not an error of the method: the balance contains only the latter, at once and later. */
 TEST (kick) {
   pw_error error = { 0 };
   double v[6];
@@ -189,13 +188,14 @@ TEST (kick) {
   check_ok (pw_run_restart (r, NULL, v, &error), &error);
   check_ok (pw_run_sample (r, 1, &now, &error), &error);
   check_close ("kick", now.kinetic, 9 * kinetic, 1e-14, "round-off");
-  check_close ("balance", now.balance, 0, 1e-10, "(h w)^4");
+  check_close ("balance at once", now.balance, 0, 1e-10, "(h w)^4");
+  check_close ("balance later", runs_to (r, 2).balance, 0, 1e-10, "(h w)^4");
   pw_run_close (r);
   pw_system_free (s);
 }
 
 /* The same where only the total energy is known. */
-TEST (kick_unkept) {
+TEST (kick_without_ledger) {
   pw_error error = { 0 };
   double v[30];
   pw_system *s = scene_named ("n-four-bar", "N", 2);
@@ -238,7 +238,7 @@ static double restart_controlled (const char *method, double step) {
   return phi;
 }
 
-/* A restart for which a signal fails names the signal. */
+/* If a signal fails in a restart, the error names it. */
 TEST (signal_fails) {
   pw_error error = { 0 };
   double u = 0;
@@ -254,7 +254,7 @@ TEST (signal_fails) {
   runs_close (r, s);
 }
 
-/* After a restart, the method uses the new value of a function: its order is unchanged. */
+/* After a restart, the method uses the new value of a function, so that the order of the method is unchanged. */
 TEST (controlled) {
   static const char *const method[] = { "rk4+projection", "galpha+ggl", "leapfrog" };
   static const double order[] = { 4, 2, 2 };

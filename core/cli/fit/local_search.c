@@ -182,7 +182,7 @@ static void search_evaluate (local_search *local, const double *scaled, int slop
   if (!local->failed) search_keep (local);
   if (status == PW_RESOURCE) {
     *local->error = error;
-    pw_stop = pw_stop ? pw_stop : 1; /* ends the other searches, too */
+    pw_stop = 1; /* ends the other searches, too */
   }
   if (status == PW_RESOURCE || local->repeat) nlopt_force_stop (local->optimiser);
 }

@@ -26,7 +26,7 @@ typedef struct {
   pw_cli_model model;
   pw_files files;
   pw_unknowns unknowns;
-  pw_arena arena;      /* of the arrays below, except trials */
+  pw_arena arena;      /* of the arrays below and those of the searches, except their `trials` */
   const char **output; /* outputs, as text: the objective, then the left sides of the constraints */
   char (*unit)[80];    /* outputs */
   double *sign;        /* outputs: 1 or -1; of the objective: sign x objective is minimised */
@@ -55,7 +55,8 @@ typedef struct {
 /* 1 if the outputs of a run satisfy the constraints, up to a pw_search_violation of 1e-6. */
 int pw_search_feasible (const pw_optimise *problem, const double *output);
 /* The largest violation of a constraint by the outputs of a run, relative to its bound if that is not 0; <= 0: there is
- * none.  *constraint: the index of that output; not set without constraints. */
+ * none.  *constraint: the index in `output` of the constraint with that violation, from 1; not set without
+ * constraints. */
 double pw_search_violation (const pw_optimise *problem, const double *output, int *constraint);
 
 /* Tasks of pw_parallel: the search from start i; refinement i.  The context is the pw_optimise. */
@@ -71,7 +72,7 @@ int pw_search_effect (void *context, int i, pw_error *error);
 int pw_optimise_same (const pw_optimise *problem, const pw_search *a, const pw_search *b);
 
 /* Print the result; write it as JSON, with this status ("ok", ...), and as YAML; draw figures of the runs into the
- * folder.  problem->best is not NULL. */
+ * folder plots_path.  problem->best is not NULL. */
 void pw_optimise_print (const pw_optimise *problem);
 void pw_optimise_json (const pw_optimise *problem, const char *status, FILE *f);
 void pw_optimise_yaml (const pw_optimise *problem, FILE *f);

@@ -165,7 +165,7 @@ int pw_figure_undrawn (const char *folder, const char *const *names, const char 
 
 int pw_figure_draw (const char *folder, const char *const *names, pw_error *error) {
   char script[FIGURE_SCRIPTS][40], *argv[2 + FIGURE_SCRIPTS + 1] = { "gnuplot", "-d" /* no settings of the user */ };
-  int wait_status, signals = pw_stop;
+  int wait_status;
   for (int i = 0; i < FIGURE_SCRIPTS && names[i]; i++) {
     snprintf (script[i], sizeof script[i], "%s.gp", names[i]);
     argv[2 + i] = script[i];
@@ -174,15 +174,15 @@ int pw_figure_draw (const char *folder, const char *const *names, pw_error *erro
   gnuplot_remove_pictures (folder, names);
   pw_stop_catch (); /* Ctrl-C ends gnuplot, too; the command still completes its files */
   int failed = gnuplot_run (folder, argv, &wait_status);
-  pw_stop_release ();
+  int interrupted = pw_stop_release () > 0;
   if (failed == ENOENT) return pw_figure_undrawn (folder, names, "gnuplot was not found");
   if (failed) return pw_fail (error, PW_RESOURCE, "cannot run gnuplot: %s", strerror (failed));
   if (WIFEXITED (wait_status) && WEXITSTATUS (wait_status) == 0) {
-    if (pw_stop == signals) return PW_OK;
+    if (!interrupted) return PW_OK;
     pw_cli_say ("pinwheel: interrupted; the figures are complete\n");
     return PW_INTERRUPTED;
   }
-  if (pw_stop > signals) return pw_figure_undrawn (folder, names, "gnuplot was interrupted"), PW_INTERRUPTED;
+  if (interrupted) return pw_figure_undrawn (folder, names, "gnuplot was interrupted"), PW_INTERRUPTED;
   gnuplot_remove_pictures (folder, names);
   int signalled = WIFSIGNALED (wait_status);
   return pw_fail (error, PW_RESOURCE, "gnuplot %s %d; its message is above, data and scripts are in %s",

@@ -168,7 +168,7 @@ int pw_checkpoints_save (pw_run_cli *command, pw_error *error) {
   if (table) pw_archive_bytes (&checkpoints->state, &mark, sizeof mark);
   checkpoints_serialise (command, &checkpoints->state);
   int status = pw_run_save (command->run, &checkpoints->state, error); /* reopens the method, as resuming does */
-  if (status > 0) return PW_OK; /* near a singular configuration: still due, so the next step tries again */
+  if (status > 0) return PW_OK; /* near a singular configuration: still due, so the next batch tries again */
   if (status != PW_OK) return status;
   checkpoints_schedule (checkpoints, t);
   if (checkpoints->state.failed) return pw_fail (error, PW_RESOURCE, "out of memory while saving a checkpoint");

@@ -1,12 +1,17 @@
 /* pinwheel run: integrates a model and writes the results.
  *
- * Between two times at which a sample or checkpoint is due only the method runs, and only its time is measured. */
+ * Steps are taken in batches that end where a sample is due, so that between samples only the method runs, and only its
+ * time is measured. */
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "run_command.h"
 #include "report.h"
+
+#define RUN_SHORT 0.01     /* processor time of a batch [s] below which the next one is longer */
+#define RUN_LONG 0.04      /* above which it is shorter: the progress bar waits for its end */
+enum { RUN_BATCH = 4096 }; /* calls of pw_run_advance_towards in a batch, at most */
 
 /* ---- Before the run ---- */
 
@@ -173,19 +178,22 @@ static int run_store_samples (pw_run_cli *command, pw_error *error) {
   return status;
 }
 
-/* Advances to the next sample or checkpoint, or a request to stop. */
-static int run_to_due (pw_run_cli *command, pw_error *error) {
+/* Advances to the next sample or checkpoint, the end of the batch, or a request to stop. */
+static int run_batch (pw_run_cli *command, pw_error *error) {
   double due = fmin (command->checkpoints.next_time, command->t_end);
   due = fmin (due, run_next_row_time (command));
   due = fmin (due, pw_motion_next_time (&command->comparison.motion));
   if (command->plots) due = fmin (due, pw_plots_next (command->plots));
   double start = pw_seconds (CLOCK_PROCESS_CPUTIME_ID);
   int status;
+  long steps = 0;
   do {
     status = pw_run_advance_towards (command->run, due, command->t_end, error);
-    pw_progress_at (&command->progress, pw_run_time (command->run));
-  } while (status == PW_OK && pw_run_time (command->run) < due && !pw_stop);
-  command->cpu += pw_seconds (CLOCK_PROCESS_CPUTIME_ID) - start;
+  } while (status == PW_OK && ++steps < command->batch && pw_run_time (command->run) < due && !pw_stop);
+  double cpu = pw_seconds (CLOCK_PROCESS_CPUTIME_ID) - start;
+  command->cpu += cpu;
+  if (cpu < RUN_SHORT && steps == command->batch && command->batch < RUN_BATCH) command->batch *= 2;
+  if (cpu > RUN_LONG && command->batch > 1) command->batch /= 2;
   return status;
 }
 
@@ -193,10 +201,11 @@ static int run_steps (pw_run_cli *command, pw_error *error) {
   /* a checkpoint has the samples up to its time */
   int status = command->checkpoints.resume_path ? PW_OK : run_store_samples (command, error);
   while (status == PW_OK && pw_run_time (command->run) < command->t_end && !pw_stop) {
-    status = run_to_due (command, error);
+    status = run_batch (command, error);
     if (status == PW_OK) status = run_store_samples (command, error);
     if (status == PW_OK && pw_run_time (command->run) >= command->checkpoints.next_time)
       status = pw_checkpoints_save (command, error);
+    pw_progress_at (&command->progress, pw_run_time (command->run));
   }
   return status;
 }
@@ -206,6 +215,7 @@ static int run_is_stdout (const char *path) {
 }
 
 static int run_integrate (pw_run_cli *command, pw_error *error) {
+  command->batch = 1;
   pw_stop_catch ();
   pw_progress_start (&command->progress, pw_file_name (command->compiled.file), "s", pw_run_time (command->run),
                      command->t_end);

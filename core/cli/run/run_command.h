@@ -49,6 +49,7 @@ typedef struct {
   long rows;                            /* written to the table */
   int limited;                          /* 1: --limit, --max-steps or a signal during a step has stopped the run */
   int loaded;                           /* 1: the state of the checkpoint has been loaded */
+  long batch;                           /* calls of pw_run_advance_towards between updates of the progress, at most */
   double cpu;                           /* processor time of the method [s] */
   int write_failed;                     /* 1: the table or the summary could not be written */
   char kept_path[PW_RUN_OUTPUTS][4200]; /* of incomplete files that are kept, PATH_MAX and an ending, or "" */

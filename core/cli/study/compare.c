@@ -141,16 +141,17 @@ static int compare_plan (pw_study *study, pw_error *error) {
   pw_compare *compare = (pw_compare *)study;
   compare_ladder ladders[2] = { { 0.1, 1e-4 }, { 1e-3, 1e-12 } }; /* steps, tolerances */
   study->t_end = pw_cli_defaults (pw_file_table (study->compiled.file)).t_end;
-  study->limit.seconds = 10;
+  study->cpu_limit = 10;
   compare->repeats = 9;
   int status = pw_cli_number ("--t-end", study->line.t_end, PW_POSITIVE, &study->t_end, error);
-  if (status == PW_OK) status = pw_cli_number ("--limit", study->line.limit, PW_POSITIVE, &study->limit.seconds, error);
+  if (status == PW_OK) status = pw_cli_number ("--limit", study->line.limit, PW_POSITIVE, &study->cpu_limit, error);
   if (status == PW_OK) status = pw_cli_number ("--repeats", compare->repeats_text, PW_COUNT, &compare->repeats, error);
   if (status == PW_OK && compare->repeats > COMPARE_REPEATS)
     return pw_fail (error, PW_INPUT, "--repeats %s: at most %d", compare->repeats_text, COMPARE_REPEATS);
   if (status == PW_OK) status = pw_study_read_methods (study, compare_default_methods, error);
   if (status == PW_OK) status = compare_read_ladder ("--step-ladder", compare->step_text, &ladders[0], error);
   if (status == PW_OK) status = compare_read_ladder ("--rtol-ladder", compare->rtol_text, &ladders[1], error);
+  study->limit.seconds = study->cpu_limit;
   compare->finest_step = ladders[0].to;
   return status == PW_OK ? compare_plan_rows (study, ladders, error) : status;
 }
@@ -196,7 +197,7 @@ static double compare_order (const pw_compare *compare, const pw_row *row) {
 static int compare_measure_times (pw_compare *compare, pw_row *row, pw_error *error) {
   double cpu[COMPARE_REPEATS], sum = 0;
   int n = 0;
-  while (n < compare->repeats && !(n >= COMPARE_FEW && sum > COMPARE_ENOUGH) && sum <= compare->study.limit.seconds) {
+  while (n < compare->repeats && !(n >= COMPARE_FEW && sum > COMPARE_ENOUGH) && sum <= compare->study.cpu_limit) {
     int status = pw_motion_run (&compare->study, row, NULL, error);
     if (status != PW_OK) return status;
     sum += cpu[n++] = row->cpu;
@@ -240,8 +241,8 @@ static int compare_measure (pw_study *study, pw_row *row, pw_error *error) {
   pw_compare *compare = (pw_compare *)study;
   pw_error run_error = { 0 };
   double predicted = compare_predicted_time (row);
-  const char *limit = PW_DIGITS (study->limit.seconds, 4);
-  if (predicted > study->limit.seconds) {
+  const char *limit = PW_DIGITS (study->cpu_limit, 4);
+  if (predicted > study->cpu_limit) {
     row->state = ROW_SKIPPED;
     const char *text = isfinite (predicted) ? PW_PRINTED (60, ", about %.2g s", predicted) : "";
     snprintf (row->reason, sizeof row->reason, "too slow%s; the limit is %s s", text, limit);

@@ -185,7 +185,7 @@ static void conclusion_print_failures (const pw_study *study, int method) {
 
 /* One line for all methods with runs that the limit has stopped or prevented. */
 static void conclusion_print_limited (const pw_study *study) {
-  const char *beginning = PW_PRINTED (80, "stopped by the limit of %s s: ", PW_DIGITS (study->limit.seconds, 4));
+  const char *beginning = PW_PRINTED (80, "stopped by the limit of %s s: ", PW_DIGITS (study->cpu_limit, 4));
   const char *before = beginning;
   for (int i = 0; i < study->methods; i++) {
     const pw_row *first;

@@ -34,9 +34,7 @@ int pw_motion_run (pw_study *study, pw_row *row, pw_motion *motion, pw_error *er
   pw_settings settings = { .span = study->t_end, .ledger = motion != NULL };
   *(row->adaptive ? &settings.rtol : &settings.step) = row->level;
   if (motion) row->balance = motion->taken = 0;
-  int status = pw_study_run (study, row, &settings, motion ? &visitor.base : NULL, error);
-  if (status == PW_STOPPED && pw_stop == 0) row->state = ROW_STOPPED;
-  return status;
+  return pw_study_run (study, row, &settings, motion ? &visitor.base : NULL, error);
 }
 
 /* ---- Uncertainty ---- */

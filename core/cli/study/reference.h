@@ -26,8 +26,8 @@ typedef struct {
   } partner[REFERENCE_CANDIDATES - 1];
 } pw_reference;
 
-/* One run of a row at its level, as pw_study_run; ROW_STOPPED if the limit ends it.  Stores the samples of a motion and
- * the largest energy balance; motion NULL: without samples or limit, for the measurement of times. */
+/* One run of a row at its level, as pw_study_run.  Stores the samples of a motion and the largest energy balance;
+ * motion NULL: without samples, for the measurement of times. */
 int pw_motion_run (pw_study *study, pw_row *row, pw_motion *motion, pw_error *error);
 
 /* Finds the reference.  step: the smallest step size of the comparison [s].  Sets the study's t_end to the end of a

@@ -5,7 +5,11 @@
 #include "report.h"
 #include "study.h"
 
-enum { STUDY_REPORTS = 50 }; /* times that a run shows its progress */
+/* The thread's clock is read after a batch of calls of pw_run_advance_towards.  If the batch has taken less processor
+ * time than STUDY_SHORT, the next one is twice as long; if more than STUDY_LONG, half as long [s]. */
+#define STUDY_SHORT 0.005
+#define STUDY_LONG 0.02
+enum { STUDY_FIRST_BATCH = 8, STUDY_LONGEST_BATCH = 65536 }; /* calls of pw_run_advance_towards */
 
 /* ---- Methods ---- */
 
@@ -91,15 +95,29 @@ void pw_study_progress (pw_study *study, pw_row *row, double part) {
 }
 
 /* Advances a run to the end. */
-static int study_advance (pw_study *study, pw_row *row, pw_run *run, pw_visitor *visitor, pw_error *error) {
+static int study_advance (pw_study *study, pw_row *row, pw_run *run, const pw_limit *limit, pw_visitor *visitor,
+                          pw_error *error) {
   int status = PW_OK;
-  double report = 0; /* when the progress is shown next [s] */
+  long batch = STUDY_FIRST_BATCH;
   while (status == PW_OK && pw_run_time (run) < study->t_end) {
-    status = pw_run_advance_towards (run, visitor ? visitor->due : study->t_end, study->t_end, error);
-    if (status == PW_OK && visitor && pw_run_time (run) >= visitor->due) status = visitor->visit (visitor, run, error);
-    if (pw_run_time (run) < report) continue;
-    report = pw_run_time (run) + study->t_end / STUDY_REPORTS;
+    double start = pw_seconds (CLOCK_THREAD_CPUTIME_ID);
+    long n = 0;
+    do {
+      status = pw_run_advance_towards (run, visitor ? visitor->due : study->t_end, study->t_end, error);
+      if (status == PW_OK && visitor && pw_run_time (run) >= visitor->due)
+        status = visitor->visit (visitor, run, error);
+    } while (status == PW_OK && ++n < batch && pw_run_time (run) < study->t_end);
+    double used = pw_seconds (CLOCK_THREAD_CPUTIME_ID) - start;
+    row->cpu += used;
+    if (used < STUDY_SHORT && n == batch && batch < STUDY_LONGEST_BATCH) batch *= 2;
+    if (used > STUDY_LONG && batch > 1) batch /= 2;
     pw_study_progress (study, row, study->run_share * (row->runs + pw_run_time (run) / study->t_end));
+    int stopped = status == PW_STOPPED;
+    if (stopped && (pw_stop || isinf (study->cpu_limit))) return pw_limit_status (limit, pw_run_time (run), error);
+    if (stopped || (status == PW_OK && row->cpu > study->cpu_limit && pw_run_time (run) < study->t_end)) {
+      row->state = ROW_STOPPED;
+      return PW_RETRY;
+    }
   }
   return status;
 }
@@ -108,15 +126,14 @@ int pw_study_run (pw_study *study, pw_row *row, const pw_settings *settings, pw_
   pw_settings run_settings = *settings;
   pw_limit limit = study->limit;
   if (visitor == NULL) limit.seconds = INFINITY; /* timed: not slowed down by readings of the clock in every step */
+  row->cpu = 0;
   pw_limit_start (&limit);
   run_settings.stop = pw_limit_over;
   run_settings.stop_context = &limit;
   run_settings.specialised = pw_scene_code_table (study->engine.code);
   pw_run *run = pw_run_open (study->compiled.system, row->method, &run_settings, error);
   if (run == NULL) return error->status;
-  double start = pw_seconds (CLOCK_THREAD_CPUTIME_ID);
-  int status = study_advance (study, row, run, visitor, error);
-  row->cpu = pw_seconds (CLOCK_THREAD_CPUTIME_ID) - start;
+  int status = study_advance (study, row, run, &limit, visitor, error);
   row->t = pw_run_time (run);
   row->statistics = *pw_run_statistics (run);
   row->runs += status == PW_OK;
@@ -130,14 +147,13 @@ int pw_study_parallel (pw_study *study, int count, pw_task *task, void *context,
   return status;
 }
 
-int pw_study_record_run (const pw_study *study, pw_row *row, int status, pw_error *run_error, pw_error *error) {
+int pw_study_record_run (const pw_study *study, pw_row *row, int status, const pw_error *run_error, pw_error *error) {
   const pw_statistics *stats = &row->statistics;
   const long count[] = { stats->steps, stats->rejected, stats->rhs, stats->jacobians, stats->factorisations };
   for (int i = 0; i < 5; i++) row->value[study->type->first_count_column + i] = (double)count[i];
   row->value[study->type->time_column] = row->t;
   if (status == PW_OK || row->state == ROW_STOPPED) return PW_OK;
   if (status == PW_RESOURCE || status == PW_INITIAL) return pw_fail (error, status, "%s", run_error->text);
-  if (status == PW_STOPPED) status = pw_limit_status (&study->limit, row->t, run_error);
   if (pw_stop) return PW_RETRY;
   row->state = status == PW_INPUT ? ROW_REFUSED : ROW_FAILED;
   snprintf (row->reason, sizeof row->reason, "%s",
@@ -175,6 +191,7 @@ static double study_estimated_steps (const pw_study *study) {
 static int study_open (pw_study *study, pw_error *error) {
   pw_specialise when;
   study->run_share = 1;
+  study->cpu_limit = INFINITY;
   pthread_mutex_init (&study->mutex, NULL);
   int status = pw_cli_open (&study->compiled, &study->line, error);
   if (status == PW_OK) status = pw_parallel_jobs (study->jobs_text, &study->jobs, error);

@@ -99,8 +99,9 @@ struct pw_study {
   int methods;
   int jobs; /* number of concurrent runs */
   pw_settings settings;
-  pw_limit limit; /* of a run with a visitor */
-  double t_end;   /* [s] */
+  pw_limit limit;   /* of a run with a visitor, checked in every step */
+  double cpu_limit; /* of every run, checked between batches of steps [s]: ROW_STOPPED; INFINITY: the run fails */
+  double t_end;     /* [s] */
   pw_figures figures;
   pw_arena arena; /* of the points of rows, and of what a command keeps there */
   /* in progress */
@@ -139,8 +140,9 @@ typedef struct pw_visitor {
   pw_row *row;
 } pw_visitor;
 
-/* One run of a row to the end: fills t, statistics and cpu.  The visitor may be NULL.  Runs of different rows may be
- * concurrent.  A status; PW_STOPPED, without an error, by the limit or a signal. */
+/* One run of a row to the end or a limit: fills t, statistics, cpu, and if cpu_limit stops it, state.  The visitor may
+ * be NULL.  Runs of different rows may be concurrent.  A status; PW_RETRY, without an error: stopped by cpu_limit or a
+ * signal. */
 int pw_study_run (pw_study *study, pw_row *row, const pw_settings *settings, pw_visitor *visitor, pw_error *error);
 /* Performs tasks as pw_parallel does, those of a study that is timed as pw_parallel_timed, and ends their progress. */
 int pw_study_parallel (pw_study *study, int count, pw_task *task, void *context, pw_error *error);
@@ -150,7 +152,7 @@ void pw_study_begin_progress (pw_study *study, const char *what, const char *uni
 void pw_study_progress (pw_study *study, pw_row *row, double part);
 /* Stores the time reached, the counts and, if the last pw_study_run of the row failed, its failure: `status` and
  * `run_error` are what that returned.  Returns PW_OK, or the status that ends the study. */
-int pw_study_record_run (const pw_study *study, pw_row *row, int status, pw_error *run_error, pw_error *error);
+int pw_study_record_run (const pw_study *study, pw_row *row, int status, const pw_error *run_error, pw_error *error);
 
 /* ---- Tables and figures (study_table.c) ---- */
 

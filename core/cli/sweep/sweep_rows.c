@@ -220,7 +220,7 @@ static void rows_store (sweep_rows *sweep, const sweep_row *row, int status, con
     pw_fail (sweep->error, PW_RESOURCE, "row %ld of the grid: %s", row->number + 1, row->error.text);
   else if (pw_journal_add (sweep->journal, sweep->plan, row->number, -status, text->chars, sweep->error) == PW_OK)
     pw_progress_at (&sweep->progress, (double)sweep->journal->done);
-  if (sweep->error->status != PW_OK && pw_stop == 0) pw_stop = 1;
+  if (sweep->error->status != PW_OK) pw_stop = 1;
 }
 
 /* The next missing row of the part; -1 if there is none, or after a request to stop. */

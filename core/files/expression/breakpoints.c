@@ -1,7 +1,8 @@
 /* Breakpoints: times at which an expression jumps or has a kink.
  *
- * An interval of time is excluded if interval arithmetic proves that no comparison or other discontinuous operation
- * changes in it, not even because an operand becomes NaN at the end of a function's domain.
+ * An interval of time is excluded if interval arithmetic proves that in it, wherever the value depends on them, the
+ * discrete parts of operations stay the same (the result of a comparison, the sign of the operand of abs, and so on),
+ * and no operand of a comparison, sign, min or max becomes NaN at the end of a function's domain.
  * Otherwise it is bisected, the earlier half first, down to a least width, at first 2^-36 |t| (Moore, Kearfott &
  * Cloud 2009, Introduction to Interval Analysis, chapter 8).  If an operation differs between the ends of such an
  * interval, bisection finds the two adjacent floating-point numbers between which it changes: steps must end there.
@@ -14,11 +15,11 @@
 
 #define LATEST 1e18                  /* breakpoints after it are not found [s] */
 #define FIRST_WIDTH 1e-9             /* of the first interval, relative to 1 s + |t|; each next one is twice as wide */
-#define LEAST_WIDTH 0x1p-36          /* of bisected intervals, at first, relative to |t| + least_width s */
+#define LEAST_WIDTH 0x1p-36          /* initial value of search.least_width */
 #define GREATEST_LEAST_WIDTH 0x1p-10 /* to which it grows */
 #define SMALLEST_INTERVAL 1e-18      /* [s]: not bisected either, for t near 0 */
 enum { NOISE_CHANGES = 8 };          /* more changes in an interval of the least width and just after it are noise */
-enum { NOISE_SAMPLES = 256 };        /* at which they are counted, in the interval, and as many after it */
+enum { NOISE_SAMPLES = 256 };        /* times in the interval at which changes are counted; as many again after it */
 #define NOISE_WIDTH 1e-6             /* of the time after the interval, relative to 1 s + |t| */
 #define NOISE_DURATION 1e-2          /* for which changes of a noisy operation are ignored, relative to 1 s + |t| */
 
@@ -26,10 +27,10 @@ typedef struct {
   const pw_expression *expression;
   double from;                              /* time at which the search begins */
   int remaining;                            /* intervals that may still be tested */
-  int undecided;                            /* intervals of the least width, not excluded, without a change so far */
+  int undecided;                            /* intervals so far of the least width, not excluded, without a change */
   int undecided_to_double;                  /* number of these after which the least width doubles */
-  double least_width;                       /* relative to |t| + least_width s, so that it grows near t = 0, too */
-  double noise_end;                         /* time until which noisy operations are ignored; INFINITY without any */
+  double least_width;                       /* w: intervals up to w (|t| + w 1 s) are not bisected; w^2: for t near 0 */
+  double noise_end;                         /* time until which noisy operations are ignored; INFINITY: none is noisy */
   unsigned char noisy[PW_EXPRESSION_CODES]; /* 1: this operation is noisy */
 } search;
 
@@ -106,5 +107,5 @@ double pw_expression_breakpoint (const pw_expression *expression, double t) {
     found = search_first (&s, a, a + width);
     a += width;
   }
-  return fmin (found, s.noise_end);
+  return fmin (found, s.noise_end); /* noise_end is no breakpoint, but a new search begins there */
 }

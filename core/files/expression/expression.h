@@ -74,9 +74,9 @@ double pw_expression_value (const pw_expression *expression, const double *varia
 void pw_expression_derivatives (const pw_expression *expression, const double *variable, int by, double u[3]);
 
 /* The first time after t at which the value, or a time derivative, may jump whatever the other variables are; INFINITY
- * if there is none.  If the search would take too long: a time after t up to which there is none.  Not found are jumps
- * whose times depend on other variables, jumps too frequent for steps to end at each (breakpoints.c), and kinks at the
- * end of a function's domain, as of sqrt (t^2). */
+ * if there is none.  If the search would take too long, or jumps are too frequent for steps to end at each
+ * (breakpoints.c): a time after t up to which there are no others.  Not found are jumps whose times depend on other
+ * variables, and kinks at the end of a function's domain, as of sqrt (t^2). */
 double pw_expression_breakpoint (const pw_expression *expression, double t);
 
 /* ---- Words ---- */

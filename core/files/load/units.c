@@ -9,7 +9,7 @@
 #include <string.h>
 #include "files.h"
 
-/* The name km/h, and parentheses, are for messages of yaml.c, which take the first name found in a text. */
+/* The name km/h, and parentheses, are for messages of yaml.c, which take the first name of this list in a text. */
 const pw_unit_name pw_unit_names[] = {
   { "m", "1", "m" },
   { "kg", "1", "kg" },
@@ -30,7 +30,6 @@ const pw_unit_name pw_unit_names[] = {
   { "km/h", "(1/3.6)", "m/s" },
   { "mph", "0.44704", "m/s" },
   { "ft", "0.3048", "m" },
-  { "in", "0.0254", "m" },
   { "mi", "1609.344", "m" },
   { "um", "1e-6", "m" },
   { "\xC2\xB5m", "1e-6", "m" }, /* the micro sign, then the Greek letter */
@@ -52,10 +51,15 @@ const pw_unit_name pw_unit_names[] = {
   { "kNm", "1e3", "N m" },
   { "Nmm", "1e-3", "N m" },
   { "g", "1e-3", "kg" },
+  { "mg", "1e-6", "kg" },
+  { "ug", "1e-9", "kg" },
+  { "\xC2\xB5g", "1e-9", "kg" },
+  { "\xCE\xBCg", "1e-9", "kg" },
   { "lb", "0.45359237", "kg" },
   { "lbf", "4.4482216152605", "N" },
   { "kJ", "1e3", "J" },
   { "kW", "1e3", "W" },
+  { "in", "0.0254", "m" }, /* the last: yaml.c takes other units first, since it may be a preposition */
   { .name = NULL },
 };
 

@@ -7,9 +7,7 @@
 #include "yaml.h"
 
 #define YAML_MAX_AHEAD 1e6 /* pw_yaml.max_ahead for the default limit of bytes: each indicator takes 350 bytes */
-enum {
-  YAML_UNIT = 400
-}; /* bytes of a unit of up to 60 characters with SI units in place of others, its end included */
+enum { YAML_UNIT = 400 /* bytes of a unit of up to 60 characters with SI units in place of others, and its end */ };
 
 /* ---- Parameters ---- */
 
@@ -36,64 +34,75 @@ static int yaml_domain (const pw_reader *r, const pw_node *domain, const pw_node
   return status;
 }
 
-/* The first place where a name is a word of its own in a text, or NULL. */
-static const char *yaml_find_word (const char *text, const char *name) {
-  for (const char *at = strstr (text, name); at; at = strstr (at + 1, name))
-    if ((at == text || !isalpha ((unsigned char)at[-1])) && !isalpha ((unsigned char)at[strlen (name)])) return at;
-  return NULL;
+/* Whether a UTF-8 character is a letter, not a sign like those of multiplication (·, U+22C5) or a raised digit. */
+static int yaml_is_letter (const char *character) {
+  const unsigned char first = (unsigned char)*character;
+  if (first < 0xC3 || strncmp (character, "×", 2) == 0) return isalpha (first) || strncmp (character, "µ", 2) == 0;
+  return first != 0xE2; /* U+2000 to U+2FFF */
 }
 
-/* The first unit other than an SI unit in a text, and its place; NULL: there is none. */
-static const pw_unit_name *yaml_other_unit (const char *unit, const char **name) {
-  for (const pw_unit_name *other = pw_unit_names; other->name; other++) {
-    if (strcmp (other->factor, "1") == 0 || (strchr (other->name, '/') && strcmp (other->name, unit) != 0)) continue;
-    if ((*name = yaml_find_word (unit, other->name)) != NULL) return other;
+/* The first place where a name is a word of its own in a text, or NULL. */
+static const char *yaml_find_word (const char *text, const char *name) {
+  for (const char *at = strstr (text, name), *before; at; at = strstr (at + 1, name)) {
+    for (before = at; before > text && ((unsigned char)*--before & 0xC0) == 0x80;) continue;
+    if ((at == text || !yaml_is_letter (before)) && !yaml_is_letter (at + strlen (name))) return at;
   }
   return NULL;
 }
 
-/* Replaces a name in the unit by SI units.  *conversion: what converts a value, "*deg" or "/1e-3^2". */
-static void yaml_replace_unit (char unit[YAML_UNIT], const pw_unit_name *other, const char *name, char conversion[40]) {
+/* The first of pw_unit_names that is not an SI unit and occurs in a text, and its place; NULL: there is none. */
+static const pw_unit_name *yaml_other_unit (const char *unit, const char **at) {
+  for (const pw_unit_name *other = pw_unit_names; other->name; other++) {
+    if (strcmp (other->factor, "1") == 0 || (strchr (other->name, '/') && strcmp (other->name, unit) != 0)) continue;
+    if ((*at = yaml_find_word (unit, other->name)) != NULL) return other;
+  }
+  return NULL;
+}
+
+/* Replaces the other unit, at a place in the unit, by SI units.  conversion: of a value, "*deg" or "/1e-3^2". */
+static void yaml_replace_unit (char unit[YAML_UNIT], const pw_unit_name *other, const char *at, char conversion[40]) {
   char text[YAML_UNIT];
-  const char *before = name, *after = name + strlen (other->name);
+  const char *before = at, *after = at + strlen (other->name);
   int power;
   pw_unit_power (after, &power);
   while (before > unit && before[-1] == ' ') before--;
   const int divides = before > unit && before[-1] == '/';
   const int product = strpbrk (other->si, " /") && (divides || power != 1);
-  snprintf (text, sizeof text, "%.*s%s%s%s%s", (int)(name - unit), unit, product ? "(" : "", other->si,
+  snprintf (text, sizeof text, "%.*s%s%s%s%s", (int)(at - unit), unit, product ? "(" : "", other->si,
             product ? ")" : "", after);
   memcpy (unit, text, sizeof text);
   snprintf (conversion, 40, power == 1 ? "%c%s" : "%c%s^%d", divides ? '/' : '*', other->factor, power);
 }
 
-/* Refuses a unit that contains this name of another unit than an SI unit, and says how to convert the value. */
+/* Refuses a unit that contains this other unit than an SI unit, and says how to convert the value. */
 static int yaml_refuse_unit (const pw_reader *r, const pw_node *node, const pw_node *value, const pw_unit_name *other,
                              const char *unit) {
   static const char why[] = "unit: numbers are in SI units, angles in radians, and no unit converts a value";
   char si[YAML_UNIT], conversion[40];
-  const char *name;
+  const char *at;
   double factor;
-  int names = 0, number = value->type == PW_YAML_SCALAR && strlen (value->text) <= 30 &&
-                          pw_expression_number (value->text, &(double){ 0 });
+  int replaced = 0, number = value->type == PW_YAML_SCALAR && strlen (value->text) <= 30 &&
+                             pw_expression_number (value->text, &(double){ 0 });
   if (strlen (unit) > 60 || pw_unit_factor (unit, NULL, &factor) != PW_OK) { /* not understood as a whole */
     pw_unit_factor (other->name, other->si, &factor);
     return pw_yaml_fail (r, node->at, "%s; convert it with 1 %s = %.15g %s, and write %s instead", why, other->name,
                          factor, other->si, other->si);
   }
   snprintf (si, sizeof si, "%s", unit);
-  for (; (other = yaml_other_unit (si, &name)) != NULL; names++) yaml_replace_unit (si, other, name, conversion);
-  if (names > 1) snprintf (conversion, sizeof conversion, "*%.15g", factor);
+  for (; (other = yaml_other_unit (si, &at)) != NULL; replaced++) yaml_replace_unit (si, other, at, conversion);
+  if (replaced > 1) snprintf (conversion, sizeof conversion, "*%.15g", factor);
   return pw_yaml_fail (r, node->at, "%s; write \"value: %s%s, unit: %s\"", why, number ? value->text : "(..)",
                        conversion, si);
 }
 
 /* Reads the unit of a parameter; refuses a known one that is not an SI unit: 40 with the unit deg would mean 40 rad. */
 static int yaml_unit (const pw_reader *r, const pw_node *node, const pw_node *value, const char **unit) {
-  const char *name;
+  const char *at;
   if (node == NULL || pw_yaml_text (r, node, "unit", unit) != PW_OK) return r->error->status;
-  const pw_unit_name *other = yaml_other_unit (*unit, &name);
-  return other ? yaml_refuse_unit (r, node, value, other, *unit) : PW_OK;
+  const char *in = strstr (*unit, " in "); /* "persons in lane": no inches, unless it is a product of units */
+  const pw_unit_name *other = yaml_other_unit (*unit, &at);
+  if (other == NULL || (in && at == in + 1 && pw_unit_factor (*unit, NULL, &(double){ 0 }) != PW_OK)) return PW_OK;
+  return yaml_refuse_unit (r, node, value, other, *unit);
 }
 
 /* A default must not depend on other parameters: --set would have to change it, too. */

@@ -5,9 +5,9 @@
  *   gamma = u' - omega1 (p(A).r1' + p(B).r2')           so that S v' = gamma; p(A) = A turned by +90 degrees
  *
  * (Neimark & Fufaev 1972, Dynamics of Nonholonomic Systems, chapter I.)
- * The reaction F = -lambda acts on body 1 as the force F A and the moment F a3, on body 2 as F B and F b3: [N] if A and
- * B have no unit; [N m] if A = B = 0 and a3, b3 have no unit.  The two forces need not balance: their sum is an
- * external force.  The power is F u. */
+ * The reaction F = -lambda acts on body 1 as the force F A and the moment F a3, on body 2 as F B and F b3.  F is in
+ * N if A and B have no unit, in N m if A = B = 0 and a3, b3 have no unit.  The two forces need not balance: their sum
+ * is an external force.  The power is F u. */
 #include <string.h>
 #include "batch.h"
 
@@ -37,7 +37,7 @@ PREPARE (pfaffian_prepare, pw_pfaffian, pfaffian) {
   memcpy (element->b, definition->b, sizeof element->b);
   for (int i = 0; i < 3; i++)
     if (definition->a[i] != 0 || definition->b[i] != 0) return PW_OK;
-  return pw_fail (error, PW_INPUT, "a and b are all zero: expected at least one other number");
+  return pw_fail (error, PW_INPUT, "all numbers of a and b are 0: expected at least one that is not");
 }
 
 PER_ELEMENT (pfaffian_J, pfaffian, 6) {
