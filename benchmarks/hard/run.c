@@ -19,10 +19,11 @@ typedef struct {
 
 /* ---- Opening ---- */
 
-/* Specialised code, if the scene has one, and a run that uses it. */
+/* Loads specialised code, if the scene can have any, and reopens the run with it. */
 static void run_specialise (run_cell *x, const char *method, pw_settings *settings, pw_error *error) {
-  pw_error ignored = { 0 }; /* the scene has no code */
-  char *text = pw_run_source (x->run, &ignored);
+  pw_error own = { 0 }; /* why the scene cannot have code: then the general engine is measured */
+  char *text = pw_run_source (x->run, &own);
+  if (own.status == PW_RESOURCE) *error = own;
   if (text) x->code = pw_scene_code_open (text, x->system, error);
   free (text);
   if (x->code == NULL) return;
@@ -123,12 +124,17 @@ void hard_run (const hard_case *c, const char *method, int specialised, hard_res
 
 /* ---- Verdict ---- */
 
+/* 1 if the method, or the program before the run, has rejected the case: not when memory is short. */
+static int run_refused (int status) {
+  return status == PW_INPUT || status == PW_INITIAL || status == PW_METHOD;
+}
+
 hard_verdict hard_verdict_of (const hard_case *c, const hard_result *r) {
   hard_verdict worst = HARD_PASS;
   if (*c->stops && r->status != PW_OK && strstr (r->reason, c->stops))
     return r->t <= c->stop_time[0] ? HARD_PASS : r->t <= c->stop_time[1] ? HARD_LIMITED : HARD_WRONG;
   if (*c->stops && r->status == PW_OK) return HARD_WRONG;
-  if (r->status != PW_OK) return *r->reason && r->status < PW_RESOURCE ? HARD_REFUSE : HARD_WRONG;
+  if (r->status != PW_OK) return *r->reason && run_refused (r->status) ? HARD_REFUSE : HARD_WRONG;
   if (r->t < c->t_end) return HARD_WRONG;
   for (int k = 0; k < HARD_MEASURES; k++) {
     const double *bound = c->bound[k], value = r->measure[k];

@@ -175,8 +175,8 @@ void pw_tangent_add_equations (pw_tangent *x, pw_block block, int row, int col, 
   pw_tangent_add_block (x, block, &put);
 }
 
-void pw_tangent_add_J (pw_tangent *x, int count, int row, int col, double holonomic, double nonholonomic) {
-  tangent_put_J (x, TANGENT_J, &(pw_placement){ row, col, count, holonomic, nonholonomic, .row_index = x->row_index });
+void pw_tangent_add_J (pw_tangent *x, int rows, int row, int col, double holonomic, double nonholonomic) {
+  tangent_put_J (x, TANGENT_J, &(pw_placement){ row, col, rows, holonomic, nonholonomic, .row_index = x->row_index });
 }
 
 /* (J^T lambda)_q - f_q; -f_v; M; J^T: the derivatives with respect to q, v, a, lambda */
@@ -198,7 +198,7 @@ void pw_tangent_add_momentum (pw_tangent *x, const pw_tangent_layout *to, const 
   pw_tangent_add_JT (x, &put);
 }
 
-/* (J a)_q - gamma_q + 2 alpha ((J v)_q - eta_q) + beta^2 G; 2 alpha J - gamma_v; J */
+/* (J a)_q - gamma_q + 2 alpha ((J v)_q - eta_q) + beta^2 J (holonomic); 2 alpha J - gamma_v; J */
 void pw_tangent_add_accelerations (pw_tangent *x, const pw_tangent_layout *to, const double *v, const double *a) {
   const pw_run *r = x->run;
   const int rows = r->s->rows, row = to->constraint;

@@ -1,11 +1,11 @@
-/* Derivatives of the equations of motion and of the active constraint equations in a sparse matrix: J and second-order
- * blocks of the elements, for the linearisation; parts of the Newton matrices of implicit methods:
+/* Adds derivatives of the equations of motion to a sparse matrix: for the linearisation, J and the second-order blocks
+ * (system.h) of all elements; for the Newton matrices of implicit methods, the rows of these equations:
  *
  *   momentum        M a + J^T lambda - f
  *   accelerations   J a - gamma + 2 alpha (J v - eta) + beta^2 g   (nonholonomic: + alpha (J v - eta))
  *
- * with Baumgarte's alpha and beta; G: the rows of J of the holonomic equations.  Some methods have further multipliers
- * mu, of the first of the active equations (dae.h). */
+ * with Baumgarte's alpha and beta.  Some methods have further multipliers mu, one for each of the first mu_count
+ * active equations (dae.h). */
 #ifndef PW_TANGENT_H
 #define PW_TANGENT_H
 
@@ -42,7 +42,7 @@ void pw_tangent_compress (const pw_tangent *x, const double *all, int count, dou
 
 /* Where and how a block is added.  Its rows are coordinates or constraint equations. */
 typedef struct {
-  int row, col;               /* the row and column of the matrix for the block's first ones */
+  int row, col;               /* row and column of the matrix for coordinate or equation 0 */
   int rows;                   /* constraint equations included: all, s->rows, or the holonomic ones, s->holonomic */
   double factor;              /* of blocks of forces and (J^T lambda)_q, and of what holonomic equations add */
   double factor_nonholonomic; /* of what nonholonomic equations add: to J, J^T, and blocks whose rows they are */
@@ -56,16 +56,17 @@ typedef struct {
 void pw_tangent_add_block (pw_tangent *x, pw_block block, const pw_placement *put);
 /* Adds J^T, with the J last evaluated; its columns are constraint equations. */
 void pw_tangent_add_JT (pw_tangent *x, const pw_placement *put);
-/* Adds -(derivative of the force by signals) x (derivative of signals by states): rows from `row` on, q in columns from
- * col_q on, v in columns from col_v on. */
+/* Adds -(derivative of the force with respect to signals) x (derivative of signals with respect to states): rows from
+ * `row` on, q in columns from col_q on, v in columns from col_v on. */
 void pw_tangent_add_signals (pw_tangent *x, int row, int col_q, int col_v);
 
 /* Adds a block whose rows are the active constraint equations, from a row and column on, times the factors `holonomic`
  * and `nonholonomic`; w: the vector of the block (J w)_q. */
 void pw_tangent_add_equations (pw_tangent *x, pw_block block, int row, int col, const double *w, double holonomic,
                                double nonholonomic);
-/* Adds in the same way the rows of J of those among the first `count` of all equations that are active. */
-void pw_tangent_add_J (pw_tangent *x, int count, int row, int col, double holonomic, double nonholonomic);
+/* Adds in the same way the active rows of J: of all equations (rows = s->rows), or of the holonomic ones
+ * (s->holonomic). */
+void pw_tangent_add_J (pw_tangent *x, int rows, int row, int col, double holonomic, double nonholonomic);
 
 /* Where the parts of the equations are in the matrix, and factors of derivatives. */
 typedef struct {

@@ -23,19 +23,19 @@ typedef struct {
   char *memory;
 } pw_dense_output;
 
-/* Errors: PW_RESOURCE. */
+/* With a projection, J must be evaluated at a typical configuration.  PW_OK or PW_RESOURCE; close it in every case. */
 int pw_dense_output_open (pw_dense_output *b, pw_run *r, pw_dense_projection projection, pw_error *error);
 void pw_dense_output_close (pw_dense_output *b);
 
-/* Integrates the ledger over the last step by the trapezoidal rule, with kinematics, J and r->lambda of its end, and
- * updates r->rate. */
+/* Integrates the ledger over the last step by the trapezoidal rule.  Kinematics, J and r->lambda must be those of its
+ * end; updates r->rate. */
 void pw_dense_output_integrate_ledger (pw_dense_output *b, pw_run *r);
 
 /* Reports that t is outside the last step, which begins at t0 (NaN: unknown).  PW_INPUT. */
 int pw_fail_outside (const pw_run *r, double t0, double t, pw_error *error);
 
-/* Computes the state at t inside the last step, in the run's sample arrays (r->projected_at has been set to
- * r->projected), with kinematics and J evaluated.  Returns as pw_project_positions. */
+/* Computes the state at t inside the last step, in the run's sample arrays, with kinematics and J evaluated.  The
+ * caller has set r->projected_at to r->projected; change it if it differs at t.  Returns as pw_project_positions. */
 typedef int pw_interpolate (void *method, pw_run *r, double t);
 
 /* A method's `at`: the state at t in the sample arrays; inside the last step, which begins at t0, by `interpolate`,

@@ -262,6 +262,39 @@ TEST (bound_without_derivative) {
       "t = 0 s: a signal failed: torque T: value is not a finite number");
 }
 
+/* Only the product k s has an effect; s ends at a bound, where the steps of its differences are unequal. */
+TEST (undetermined_at_a_bound) {
+  fit_write (0);
+  cli_shell (FIT "--free k --free s=1:3 --set k=6 --method rk4:inputs=held");
+  assert_true (cli_says (cli_file ("fit.json"), "derivatives", "differences"));
+  assert_non_null (strstr (cli_out, "The data do not determine k, s: changes in the ratio 4.88 : -1 have no effect\n"));
+}
+
+/* The run with a smaller k fails; then Ctrl-C stops that with a larger one. */
+TEST (interrupted_after_a_failure) {
+  cli_write ("stop.c",
+             "#include <signal.h>\n#include \"pinwheel.h\"\n"
+             "typedef struct { double k; } numbers;\n"
+             "static const pw_parameter list[] = { { PW_AT (numbers, k), 3 }, { .name = NULL } };\n"
+             "static double k;\n"
+             "static int force (void *c, double t, const double *x, double *u, double *g) {\n"
+             "  (void)c, (void)x, (void)g;\n"
+             "  u[0] = k * t, u[1] = k, u[2] = 0;\n"
+             "  if (k > 3 + 1e-9) raise (SIGINT);\n"
+             "  return k < 3 - 1e-9;\n"
+             "}\n"
+             "static void build (pw_model *m, const void *p) {\n"
+             "  k = ((const numbers *)p)->k;\n"
+             "  pw_add_body (m, &(pw_body){ .name = \"w\", .mass = 1, .inertia = 1 });\n"
+             "  pw_add_force (m, &(pw_force){ .name = \"F\", .body = \"w\",\n"
+             "    .fx = { PW_FUNCTION, .function = { .eval = force } } });\n"
+             "}\n"
+             "PW_MODEL (.about = \"interrupts\", .parameters = list, .parameters_size = sizeof (numbers),\n"
+             "          .run = { .t_end = 1, .step = 0.1, .method = \"rk4:inputs=held\" }, .build = build);\n");
+  cli_write ("stop.csv", "t,w.x\n0.5,1\n1,2\n");
+  assert_int_equal (cli_run ("pinwheel fit @/stop.c --data @/stop.csv --columns w.x --free k --jobs 1"), 130);
+}
+
 /* A sum of squares that overflows. */
 TEST (overflow) {
   fit_write (0);

@@ -32,12 +32,13 @@ typedef struct {
   double *standard_error; /* unknowns; INFINITY: not determined by the data, NaN: not known */
   double *covariance;     /* unknowns x unknowns */
   /* of the Jacobian of the residuals at the estimate, its columns scaled to length 1: */
-  double *singular_value;  /* unknowns, the largest one first */
-  double *singular_vector; /* unknowns x unknowns: right singular vectors, in columns */
-  double *column_length;   /* unknowns: before scaling; 0: the unknown has no effect */
-  int rank;                /* singular values that differ from 0 */
-  double chi2;             /* sum of squares of the residuals (model - data) / sigma */
-  double initial_chi2;     /* where the first search begins */
+  double *derivative_error; /* unknowns: order of the relative error of each column */
+  double *singular_value;   /* unknowns, the largest one first */
+  double *singular_vector;  /* unknowns x unknowns: right singular vectors, in columns */
+  double *column_length;    /* unknowns: before scaling; 0: the unknown has no effect */
+  int rank;                 /* singular values that differ from 0 */
+  double chi2;              /* sum of squares of the residuals (model - data) / sigma */
+  double initial_chi2;      /* where the first search begins */
   int by_differences; /* 1: derivatives are differences of runs, since the variational equations could not be used */
   int converged, iterations;
   int interrupted; /* 1: by Ctrl-C; the estimate is the best so far, its standard errors are NaN */
@@ -56,10 +57,8 @@ int pw_fit_run (const pw_fit *fit, const double *unknowns, double *out, pw_error
 
 /* Derivatives of the model's values, `values` at these unknowns, with respect to each unknown: jacobian is unknowns x
  * (columns x rows).  By the variational equations; from the first run on in which these cannot be used, by central
- * differences of concurrent runs.  A status; PW_RETRY after Ctrl-C. */
+ * differences of concurrent runs.  Sets fit->derivative_error.  A status; PW_RETRY after Ctrl-C. */
 int pw_fit_jacobian (pw_fit *fit, const double *unknowns, const double *values, double *jacobian, pw_error *error);
-/* Relative error of these derivatives. */
-double pw_fit_derivative_error (const pw_fit *fit);
 
 /* Minimises the sum of squares from all starts and sets the results.  A status; PW_RETRY after Ctrl-C. */
 int pw_fit_solve (pw_fit *fit, pw_error *error);

@@ -49,11 +49,6 @@ static double jacobian_noise (const pw_fit *fit) {
   return pw_cli_adaptive (fit->unknowns.method) == 1 ? fit->unknowns.settings.rtol : DBL_EPSILON;
 }
 
-double pw_fit_derivative_error (const pw_fit *fit) {
-  double noise = jacobian_noise (fit);
-  return fit->by_differences ? pow (noise, 2. / 3) : fmax (noise, JACOBIAN_ERROR);
-}
-
 /* The arguments of pw_fit_jacobian. */
 typedef struct {
   const pw_fit *fit;
@@ -61,16 +56,17 @@ typedef struct {
   double *jacobian;
 } jacobian_differences;
 
-/* Derivatives with respect to unknown j by central differences; by one-sided ones if the run on one side failed and no
- * bound leaves less than a tenth of the step on the other side.  The step h, relative to the value or, if that is
- * larger, to a hundredth of the scale, is the cube root of the noise: the truncation error of central differences, of
- * order h^2, and noise / h are both noise^(2/3). */
+/* Derivatives with respect to unknown j by central differences; bounds shorten the step on their side, down to 0.  If
+ * the run on one side fails, by one-sided differences, provided that the step on the other side is at least a tenth of
+ * the failed one.  The step h, relative to the value or, if that is larger, to a hundredth of the scale, is the cube
+ * root of the noise: with equal steps the truncation error, of order h^2, and noise / h are both noise^(2/3).  Unequal
+ * steps add an error of half their difference, relative to the same quantity. */
 static int jacobian_column (void *context, int j, pw_error *error) {
   const jacobian_differences *d = context;
   const pw_unknown *unknown = d->fit->unknowns.list + j;
   const size_t n = (size_t)d->fit->unknowns.count, cells = (size_t)d->fit->columns * (size_t)d->fit->rows;
-  const double middle = d->unknowns[j],
-               size = fmax (fabs (middle), 1e-2 * unknown->scale) * cbrt (jacobian_noise (d->fit));
+  const double middle = d->unknowns[j], noise = jacobian_noise (d->fit),
+               unit = fmax (fabs (middle), 1e-2 * unknown->scale), size = unit * cbrt (noise);
   double *x = malloc ((n + cells) * sizeof *x), *out = d->jacobian + (size_t)j * cells, step[2];
   if (x == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   const double *side[2] = { out, x + n };
@@ -80,14 +76,15 @@ static int jacobian_column (void *context, int j, pw_error *error) {
     x[j] = fmin (fmax (middle + (k ? size : -size), unknown->low), unknown->high);
     step[k] = x[j] - middle;
     own[k].status = pw_fit_run (d->fit, x, k ? x + n : out, &own[k]);
+    if (own[k].status == PW_RETRY || own[k].status == PW_RESOURCE) *error = own[k];
   }
   for (int k = 0; k < 2 && error->status == PW_OK; k++) {
-    int status = own[k].status, pinched = fabs (step[!k]) < fabs (step[k]) / 10;
-    if (status == PW_OK) continue;
-    if (status == PW_RETRY || status == PW_RESOURCE || own[!k].status != PW_OK || pinched) *error = own[k];
+    if (own[k].status == PW_OK) continue;
+    if (own[!k].status != PW_OK || fabs (step[!k]) < fabs (step[k]) / 10) *error = own[k];
     side[k] = d->values, step[k] = 0;
   }
   for (size_t i = 0; i < cells; i++) out[i] = (side[1][i] - side[0][i]) / (step[1] - step[0]);
+  d->fit->derivative_error[j] = fmax (pow (noise, 2. / 3), fabs (step[0] + step[1]) / (2 * unit));
   free (x);
   return error->status;
 }
@@ -118,11 +115,15 @@ static int jacobian_by_variation (const pw_fit *fit, const double *unknowns, dou
 }
 
 int pw_fit_jacobian (pw_fit *fit, const double *unknowns, const double *values, double *jacobian, pw_error *error) {
-  pw_error own = { 0 };
-  int status = fit->by_differences ? PW_METHOD : jacobian_by_variation (fit, unknowns, jacobian, &own);
-  if (status == PW_RESOURCE) *error = own;
-  if (status == PW_OK || status == PW_RETRY || status == PW_RESOURCE) return status;
-  fit->by_differences = 1;
+  if (!fit->by_differences) {
+    pw_error own = { 0 };
+    int status = jacobian_by_variation (fit, unknowns, jacobian, &own);
+    if (status == PW_RESOURCE) *error = own;
+    for (int j = 0; j < fit->unknowns.count; j++)
+      fit->derivative_error[j] = fmax (jacobian_noise (fit), JACOBIAN_ERROR);
+    if (status == PW_OK || status == PW_RETRY || status == PW_RESOURCE) return status;
+    fit->by_differences = 1;
+  }
   fit->runs += 2 * (long)fit->unknowns.count;
   return pw_parallel (fit->jobs, fit->unknowns.count, jacobian_column,
                       &(jacobian_differences){ fit, unknowns, values, jacobian }, error);

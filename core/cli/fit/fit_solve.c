@@ -246,7 +246,8 @@ static void solve_scale (pw_fit *fit, gsl_matrix *J) {
 /* At a minimum the residuals are very small or orthogonal to the columns of J, which have length 1; unknowns at a bound
  * do not count. */
 static int solve_converged (const pw_fit *fit, const gsl_matrix *J) {
-  double norm = sqrt (fit->chi2), worst = 0, cosine = fmax (SOLVE_GRADIENT, pw_fit_derivative_error (fit));
+  double norm = sqrt (fit->chi2);
+  int orthogonal = 1;
   for (int j = 0; j < fit->unknowns.count; j++) {
     const pw_unknown *unknown = fit->unknowns.list + j;
     double dot = 0, near = PW_FIT_MARGIN * unknown->scale;
@@ -254,9 +255,9 @@ static int solve_converged (const pw_fit *fit, const gsl_matrix *J) {
     for (int i = 0, k = 0; i < fit->columns * fit->rows; i++)
       if (!isnan (fit->data[i]))
         dot += gsl_matrix_get (J, (size_t)k++, (size_t)j) * (fit->fitted[i] - fit->data[i]) / fit->sigma[i];
-    worst = fmax (worst, fabs (dot));
+    orthogonal &= fabs (dot) <= fmax (SOLVE_GRADIENT, fit->derivative_error[j]) * norm;
   }
-  return worst <= cosine * norm ||
+  return orthogonal ||
          norm < fmax (SOLVE_EXACT * sqrt (fit->initial_chi2), SOLVE_ROUND_OFF * sqrt (solve_sum (fit, NULL)));
 }
 
@@ -266,7 +267,9 @@ static int solve_converged (const pw_fit *fit, const gsl_matrix *J) {
 static void solve_covariance (pw_fit *fit) {
   const double *length = fit->column_length;
   int n = fit->unknowns.count;
-  double least = fmax (SOLVE_RANK, 10 /* a margin */ * pw_fit_derivative_error (fit)) * fit->singular_value[0];
+  double error = 0;
+  for (int j = 0; j < n; j++) error = fmax (error, fit->derivative_error[j]);
+  double least = fmax (SOLVE_RANK, 10 /* a margin */ * error) * fit->singular_value[0];
   for (fit->rank = 0; fit->rank < n && fit->singular_value[fit->rank] > least;) fit->rank++;
   int freedom = pw_fit_degrees_of_freedom (fit);
   double variance = fit->weighted ? 1 : freedom > 0 ? fit->chi2 / freedom : NAN;
@@ -308,11 +311,12 @@ static int solve_open (fit_solver *solver) {
   pw_fit *fit = solver->fit;
   size_t n = (size_t)fit->unknowns.count, cells = (size_t)fit->columns * (size_t)fit->rows;
   solver->last_value = pw_arena_alloc (&fit->arena, (2 * n + (1 + n) * cells) * sizeof *solver->last_value);
-  fit->estimate = pw_arena_alloc (&fit->arena, (4 * n + 2 * n * n + cells) * sizeof *fit->estimate);
+  fit->estimate = pw_arena_alloc (&fit->arena, (5 * n + 2 * n * n + cells) * sizeof *fit->estimate);
   if (solver->last_value == NULL || fit->estimate == NULL) return pw_fail (solver->error, PW_RESOURCE, "out of memory");
   solver->u = solver->last_value + n, solver->values = solver->u + n, solver->jacobian = solver->values + cells;
   fit->standard_error = fit->estimate + n, fit->singular_value = fit->standard_error + n,
-  fit->column_length = fit->singular_value + n, fit->covariance = fit->column_length + n;
+  fit->column_length = fit->singular_value + n, fit->derivative_error = fit->column_length + n;
+  fit->covariance = fit->derivative_error + n;
   fit->singular_vector = fit->covariance + n * n, fit->fitted = fit->singular_vector + n * n;
   /* the errors are not known until solve_covariance; nor are combinations of unknowns that are not determined */
   for (size_t i = 0; i < n; i++) fit->standard_error[i] = NAN;
