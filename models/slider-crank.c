@@ -1,9 +1,9 @@
-/* Slider-crank: a crank on the ground, a rod, and a slider; two drives keep its y and its angle at 0, so that it stays
- * on the x axis.
+/* Slider-crank: a crank on the ground, a rod, and a slider; two drives keep the slider's y and angle at 0, so that it
+ * stays on the x axis.
  *
- * With equal lengths the rod has the angle -theta if the crank has theta, and the slider passes over the crank's pivot,
- * a singular configuration in which the rod could turn with the crank instead.  For crank and rod of mass m and length 1 m and a slider of mass ms, without gravity, theta
- * follows from the constant kinetic energy
+ * With equal lengths crank and rod have the angles theta and -theta, and the slider passes over the crank's pivot, a
+ * singular configuration in which the rod could turn with the crank instead.  For crank and rod of mass m and length
+ * 1 m and a slider of mass ms, without gravity, theta follows from the constant kinetic energy
  * (5/12 + 9/4 sin^2 theta + 1/4 cos^2 theta) m theta'^2 / 2 + 4 ms sin^2 theta theta'^2 / 2. */
 #include <math.h>
 #include "pinwheel.h"

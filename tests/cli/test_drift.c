@@ -122,9 +122,8 @@ TEST (options) {
 
 /* The options of the integrator apply where those of stabilisations vary; those of a given stabilisation do not. */
 TEST (integrator_options) {
-  cli_good (
-      "pinwheel drift pendulum --t-end 1 --step 0.01 --vary alpha=5 --vary beta=10 --vary every=4 "
-      "--methods galpha+ggl,erk5+projection:every=2:steps=fixed:inputs=held -o @/own");
+  cli_good ("pinwheel drift pendulum --t-end 1 --step 0.01 --vary alpha=5 --vary beta=10 --vary every=4 "
+            "--methods galpha+ggl,erk5+projection:every=2:steps=fixed:inputs=held -o @/own");
   const char *f = "own/drift.csv";
   assert_true (drift_number (f, "erk5+baumgarte:alpha=5:beta=10:steps=fixed:inputs=held", STEPS) == 100);
   assert_true (drift_number (f, "erk5+projection:metric=mass:every=4:steps=fixed:inputs=held", STEPS) == 100);

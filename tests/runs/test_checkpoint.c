@@ -66,8 +66,8 @@ static void saved_keep (saved_end *e, const double *x, int n) {
   e->size += n;
 }
 
-/* Advances to the end; on the way saves the run at the SAVED_MOMENTS equally spaced times, from number `moment` (from 0)
- * on, each into its archive, or after a later step if a save is refused near a singular configuration. */
+/* Advances to the end; on the way saves the run at the SAVED_MOMENTS equally spaced times, from number `moment` (from
+ * 0) on, each into its archive, or after a later step if a save is refused near a singular configuration. */
 static void saved_finish (pw_run *r, pw_system *s, int scene, pw_archive *archive, int moment, saved_end *e) {
   pw_error error = { 0 };
   double t_end = saved_scenes[scene].t_end;
@@ -264,7 +264,8 @@ TEST (identity) {
     check_ok (pw_run_advance_to (r, 0.1, 1, &error), &error);
     check_ok (pw_run_save (r, &a, &error), &error);
     for (int k = 0; k < METHODS; k++)
-      assert_int_equal (saved_load_and_close (&a, runs_open (s, method[k], &own), saved_refusal), k == i ? PW_OK : PW_INPUT);
+      assert_int_equal (saved_load_and_close (&a, runs_open (s, method[k], &own), saved_refusal),
+                        k == i ? PW_OK : PW_INPUT);
     for (size_t k = 0; k < sizeof changed / sizeof *changed; k++)
       assert_int_equal (saved_load_and_close (&a, runs_open (s, method[i], &changed[k]), saved_refusal), PW_INPUT);
     assert_int_equal (saved_load_and_close (&a, runs_open (faster, method[i], &own), saved_refusal), PW_INPUT);

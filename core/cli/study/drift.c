@@ -83,8 +83,8 @@ static int drift_read_values (pw_drift *drift, const char *text, pw_error *error
 
 /* ---- Rows ---- */
 
-/* Forms a method from the first integrator in the list that has this option, with the options given there that belong
- * to every stabilisation, and from a stabilisation with its options; rk4 if no integrator in the list has it. */
+/* Forms the method of a stabilisation with its options and the first integrator of --methods that has `option`, else
+ * rk4.  Options given there are kept if they do not belong to a stabilisation. */
 static void drift_method (char method[STUDY_NAME], const pw_study *study, int option, const char *stabilisation) {
   const pw_method *integrator;
   char hint[PW_HINT];
@@ -96,7 +96,8 @@ static void drift_method (char method[STUDY_NAME], const pw_study *study, int op
     snprintf (method, STUDY_NAME, "%s+%s", integrator->name, stabilisation);
     for (const pw_option *o = integrator->options; o->name; o++) {
       const char *given = o->with ? NULL : strstr (study->method[i], PW_PRINTED (60, ":%s=", o->name));
-      if (given) strncat (method, given, strcspn (given + 1, ":") + 1);
+      size_t end = strlen (method);
+      if (given) snprintf (method + end, STUDY_NAME - end, "%.*s", 1 + (int)strcspn (given + 1, ":"), given);
     }
     return;
   }
