@@ -120,7 +120,7 @@ TEST (options) {
   assert_true (drift_number (f, "rk4+projection:metric=identity:every=4", EVERY) == 4);
 }
 
-/* The options of the integrator apply where those of stabilisations vary; those of a given stabilisation do not. */
+/* Where options of a stabilisation vary, the integrator keeps its own, not those of its stabilisation in --methods. */
 TEST (integrator_options) {
   cli_good ("pinwheel drift pendulum --t-end 1 --step 0.01 --vary alpha=5 --vary beta=10 --vary every=4 "
             "--methods galpha+ggl,erk5+projection:every=2:steps=fixed:inputs=held -o @/own");
