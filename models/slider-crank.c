@@ -1,8 +1,9 @@
-/* Slider-crank: a crank on the ground, a rod, and a slider on the x axis, whose y and angle two drives keep at 0.
+/* Slider-crank: a crank on the ground, a rod, and a slider; two drives keep the slider's y and angle at 0, so that it
+ * stays on the x axis.
  *
- * With equal lengths the slider passes over the crank's pivot, a singular configuration in which the rod could turn
- * with the crank instead.  For crank and rod of mass m and length 1 m and a slider of mass ms, without gravity, the
- * angle theta of the crank follows from the constant kinetic energy
+ * With equal lengths crank and rod have the angles theta and -theta, and the slider passes over the crank's pivot, a
+ * singular configuration in which the rod could turn with the crank instead.  For crank and rod of mass m and length
+ * 1 m and a slider of mass ms, without gravity, theta follows from the constant kinetic energy
  * (5/12 + 9/4 sin^2 theta + 1/4 cos^2 theta) m theta'^2 / 2 + 4 ms sin^2 theta theta'^2 / 2. */
 #include <math.h>
 #include "pinwheel.h"
@@ -26,7 +27,9 @@ static const pw_parameter parameters[] = {
 static void build (pw_model *m, const void *parameter) {
   const slider_crank *p = parameter;
   double c = cos (p->theta), s = sin (p->theta), w = p->omega;
-  double beta = -asin (p->l1 * s / p->l2), rate = -p->l1 * c * w / (p->l2 * cos (beta));
+  int equal = p->l1 == p->l2; /* asin is inaccurate near pi/2, and beyond it folds the rod back onto the crank */
+  double beta = equal ? -p->theta : -asin (p->l1 * s / p->l2);
+  double rate = equal ? -w : -p->l1 * c * w / (p->l2 * cos (beta));
   if (!(fabs (rate) <= 1e6 * fabs (w))) { /* NaN if it does not reach */
     pw_model_refuse (m, "l2 = %g: the rod does not reach the slider's axis at theta = %g, or is perpendicular to it",
                      p->l2, p->theta);

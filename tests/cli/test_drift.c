@@ -120,6 +120,15 @@ TEST (options) {
   assert_true (drift_number (f, "rk4+projection:metric=identity:every=4", EVERY) == 4);
 }
 
+/* Where options of a stabilisation vary, the integrator keeps its own, not those of its stabilisation in --methods. */
+TEST (integrator_options) {
+  cli_good ("pinwheel drift pendulum --t-end 1 --step 0.01 --vary alpha=5 --vary beta=10 --vary every=4 "
+            "--methods galpha+ggl,erk5+projection:every=2:steps=fixed:inputs=held -o @/own");
+  const char *f = "own/drift.csv";
+  assert_true (drift_number (f, "erk5+baumgarte:alpha=5:beta=10:steps=fixed:inputs=held", STEPS) == 100);
+  assert_true (drift_number (f, "erk5+projection:metric=mass:every=4:steps=fixed:inputs=held", STEPS) == 100);
+}
+
 /* Each method of the curves against time has its points, the last one at the end. */
 TEST (times) {
   cli_good (

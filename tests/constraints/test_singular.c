@@ -120,6 +120,26 @@ TEST (slider_crank) {
   }
 }
 
+/* Where the crank starts near the vertical or beyond it, the rod has the opposite angle and angular velocity; the angle
+ * of the crank follows from the kinetic energy. */
+TEST (slider_crank_start) {
+  static const double theta[] = { 1.57079, 1.5708, 2, 4, -2 };
+  for (size_t i = 0; i < sizeof theta / sizeof *theta; i++) {
+    pw_system *s = scene_named ("slider-crank", "theta", theta[i]);
+    pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 0.3, .ledger = 1 });
+    for (int k = 0; k < 2; k++) {
+      pw_sample x = runs_to (r, 0.3 * k);
+      double phi = trial_state (s, &x, "crank.phi"), omega = trial_state (s, &x, "crank.omega");
+      double inertia = 5. / 12 + 2.25 * pow (sin (phi), 2) + 0.25 * pow (cos (phi), 2) + 4 * pow (sin (phi), 2);
+      check_close ("rod.phi", trial_state (s, &x, "rod.phi"), -phi, 1e-9, "an isosceles triangle");
+      check_close ("rod.omega", trial_state (s, &x, "rod.omega"), -omega, 1e-9, "an isosceles triangle");
+      check_close ("kinetic energy", x.kinetic, inertia * omega * omega / 2, 1e-8, "relative to 14 J");
+    }
+    check_close ("balance", runs_to (r, 0.3).balance, 0, 1e-8, "energy is kept");
+    runs_close (r, s);
+  }
+}
+
 /* An adaptive method passes or stops with a message; it never ends with status ok and a wrong result. */
 static void singular_passes_or_stops (const char *model, const char *method, double rtol, const char *name, double t,
                                       double exact, double period) {

@@ -66,7 +66,8 @@ static void saved_keep (saved_end *e, const double *x, int n) {
   e->size += n;
 }
 
-/* Advances to the end, and saves the run to the next archive of the list at each time not yet passed. */
+/* Advances to the end; on the way saves the run at the SAVED_MOMENTS equally spaced times, from number `moment` (from
+ * 0) on, each into its archive, or after a later step if a save is refused near a singular configuration. */
 static void saved_finish (pw_run *r, pw_system *s, int scene, pw_archive *archive, int moment, saved_end *e) {
   pw_error error = { 0 };
   double t_end = saved_scenes[scene].t_end;
@@ -179,7 +180,8 @@ TEST (kicked) {
   pw_system_free (s);
 }
 
-/* Invalid counts anywhere in the saved state are refused, or have no effect. */
+/* Replaces each number in the saved state that equals the number of steps by LONG_MAX: some of these states are
+ * refused, and loading the others is harmless. */
 TEST (counts) {
   static const char *const method[] = { "rk4+projection", "leapfrog", "ida+ggl" };
   for (size_t m = 0; m < sizeof method / sizeof *method; m++) {
@@ -208,6 +210,19 @@ TEST (counts) {
   }
 }
 
+static const char saved_refusal[] = "the saved state does not belong to this run";
+
+/* Loads a saved state into a run, which is closed; if refused, it must be with PW_INPUT and this text.  Returns the
+ * status. */
+static int saved_load_and_close (const pw_archive *saved, pw_run *r, const char *text) {
+  pw_error error = { 0 };
+  pw_archive from = { .at = saved->at, .size = saved->used, .loading = 1 };
+  int status = pw_run_load (r, &from, &error);
+  if (status != PW_OK) check_error (&error, PW_INPUT, text);
+  pw_run_close (r);
+  return status;
+}
+
 /* Archives of other runs, and truncated ones, are refused. */
 TEST (other) {
   pw_error error = { 0 };
@@ -218,35 +233,19 @@ TEST (other) {
   check_ok (pw_run_save (r, &archive, &error), &error);
   pw_run_close (r);
   for (size_t size = 0; size < archive.used; size += 1 + archive.used / 50) {
-    pw_archive from = { .at = archive.at, .size = size, .loading = 1 };
-    error = (pw_error){ 0 };
+    const pw_archive truncated = { .at = archive.at, .used = size };
     r = saved_open (s, 0, "erk8+projection");
-    assert_int_equal (pw_run_load (r, &from, &error), PW_INPUT);
-    assert_string_equal (error.text, "the saved state does not belong to this run");
-    pw_run_close (r);
+    assert_int_equal (saved_load_and_close (&truncated, r, saved_refusal), PW_INPUT);
   }
-  pw_archive from = { .at = archive.at, .size = archive.used, .loading = 1 };
-  error = (pw_error){ 0 };
   r = saved_open (other, 2, "erk8+projection");
-  assert_int_equal (pw_run_load (r, &from, &error), PW_INPUT);
-  pw_run_close (r);
+  assert_int_equal (saved_load_and_close (&archive, r, saved_refusal), PW_INPUT);
   pw_archive_free (&archive);
   pw_system_free (s);
   pw_system_free (other);
 }
 
-static int saved_load (const pw_archive *saved, pw_run *r, const char *text) {
-  pw_error error = { 0 };
-  pw_archive from = { .at = saved->at, .size = saved->used, .loading = 1 };
-  int status = pw_run_load (r, &from, &error);
-  if (status != PW_OK) check_error (&error, PW_INPUT, text);
-  pw_run_close (r);
-  return status;
-}
-
 /* Method, options, settings and system must be those of the saved run, and the run must not have advanced. */
 TEST (identity) {
-  static const char other[] = "the saved state does not belong to this run";
   static const char *const method[] = { "rk4+baumgarte", "rk4+none", "rk4+projection:every=2",
                                         "erk5",          "erk8",     "erk5:steps=fixed",
                                         "radau",         "bdf",      "ida",
@@ -265,13 +264,14 @@ TEST (identity) {
     check_ok (pw_run_advance_to (r, 0.1, 1, &error), &error);
     check_ok (pw_run_save (r, &a, &error), &error);
     for (int k = 0; k < METHODS; k++)
-      assert_int_equal (saved_load (&a, runs_open (s, method[k], &own), other), k == i ? PW_OK : PW_INPUT);
+      assert_int_equal (saved_load_and_close (&a, runs_open (s, method[k], &own), saved_refusal),
+                        k == i ? PW_OK : PW_INPUT);
     for (size_t k = 0; k < sizeof changed / sizeof *changed; k++)
-      assert_int_equal (saved_load (&a, runs_open (s, method[i], &changed[k]), other), PW_INPUT);
-    assert_int_equal (saved_load (&a, runs_open (faster, method[i], &own), other), PW_INPUT);
+      assert_int_equal (saved_load_and_close (&a, runs_open (s, method[i], &changed[k]), saved_refusal), PW_INPUT);
+    assert_int_equal (saved_load_and_close (&a, runs_open (faster, method[i], &own), saved_refusal), PW_INPUT);
     char text[120];
     snprintf (text, sizeof text, "the run has advanced to t = %g s: a saved state needs a new one", pw_run_time (r));
-    assert_int_equal (saved_load (&a, r, text), PW_INPUT);
+    assert_int_equal (saved_load_and_close (&a, r, text), PW_INPUT);
     pw_archive_free (&a);
   }
   pw_system_free (s);
@@ -343,7 +343,8 @@ SCENE (saved_build) {
                                   .value = { PW_FUNCTION, .function = { .eval = saved_torque, .reads = reads } } });
 }
 
-/* The run stays where it was, and continues; if the method has been opened again, samples begin there. */
+/* After a failed save the run stays where it was, and continues; if the method has been opened again, earlier times can
+ * no longer be sampled. */
 static void saved_fail (pw_system *s, const char *method, double phi) {
   pw_sample x;
   int reopened = 0;
@@ -381,20 +382,17 @@ TEST (failing) {
 
 /* ---- An arm without inertia, in line with the rod that determines its angle ---- */
 
-static void undetermined_build (pw_model *m, const void *parameters) {
-  (void)parameters;
+SCENE (undetermined_build) {
   pw_add_body (m, &(pw_body){ .name = "arm", .mass = 1 });
   pw_add_rod (m,
               &(pw_rod){ .name = "rod", .body = { "arm", "ground" }, .at = { { 0.5, 0 }, { 0.5, 1 } }, .length = 1 });
 }
 
-/* Matrices cannot be planned again there. */
+/* In this state matrices cannot be planned again: saving fails, and the run cannot continue. */
 TEST (undetermined) {
-  static const pw_parameter none[] = { { .name = NULL } };
-  static const pw_plugin_table table = SCENE_TABLE_WITH (undetermined_build, none, 0);
   pw_error error = { 0 };
   pw_archive a = { 0 };
-  pw_system *s = scene_system (&table, NULL);
+  pw_system *s = scene_system (&undetermined_build_table, NULL);
   pw_run *r = runs_open (s, "rk4", NULL);
   r->q[0] = 0.5, r->q[1] = -0.5, r->q[2] = PW_PI / 2;
   assert_int_equal (pw_run_save (r, &a, &error), PW_INPUT);

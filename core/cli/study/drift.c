@@ -32,8 +32,8 @@ typedef struct {
 
 /* ---- Columns ---- */
 
-/* Indices in drift_columns; COLUMN_QUANTITY: the first value of the first quantity. */
-enum { COLUMN_ALPHA = 2, COLUMN_BETA, COLUMN_EVERY, COLUMN_T = 6, COLUMN_QUANTITY, COLUMN_STEPS = 16 };
+/* Indices in drift_columns: COLUMN_ALPHA + an option; COLUMN_QUANTITY: the first value of the first quantity. */
+enum { COLUMN_ALPHA = 2, COLUMN_BETA = COLUMN_ALPHA + DRIFT_BETA, COLUMN_T = 6, COLUMN_QUANTITY, COLUMN_STEPS = 16 };
 
 static const char *drift_group_name (const pw_row *row) {
   return drift_group[row->group];
@@ -83,40 +83,50 @@ static int drift_read_values (pw_drift *drift, const char *text, pw_error *error
 
 /* ---- Rows ---- */
 
-/* The first integrator in the list that has this option; rk4 if none has it. */
-static const char *drift_integrator (const pw_study *study, const char *option) {
-  const pw_method *method;
-  int stabilisation;
-  for (int i = 0; i < study->methods; i++)
-    if (pw_method_parse (study->method[i], &method, &stabilisation, NULL) == PW_OK)
-      for (const pw_option *o = method->options; o && o->name; o++)
-        if (strcmp (o->name, option) == 0) return method->name;
-  return "rk4";
+/* Forms the method of a stabilisation with its options and the first integrator of --methods that has `option`, else
+ * rk4.  Options given there are kept if they do not belong to a stabilisation. */
+static void drift_method (char method[STUDY_NAME], const pw_study *study, int option, const char *stabilisation) {
+  const pw_method *integrator;
+  char hint[PW_HINT];
+  snprintf (method, STUDY_NAME, "rk4+%s", stabilisation);
+  for (int i = 0; i < study->methods; i++) {
+    if (pw_method_parse (study->method[i], &integrator, NULL, NULL) != PW_OK ||
+        pw_find_name (integrator->options, sizeof *integrator->options, drift_option[option], hint) < 0)
+      continue;
+    snprintf (method, STUDY_NAME, "%s+%s", integrator->name, stabilisation);
+    for (const pw_option *o = integrator->options; o->name; o++) {
+      const char *given = o->with ? NULL : strstr (study->method[i], PW_PRINTED (60, ":%s=", o->name));
+      size_t end = strlen (method);
+      if (given) snprintf (method + end, STUDY_NAME - end, "%.*s", 1 + (int)strcspn (given + 1, ":"), given);
+    }
+    return;
+  }
 }
 
 /* Adds a row for a value of an option, which is also the abscissa of its point in the figure. */
-static int drift_add (pw_drift *drift, int group, int curve, const char *method, const char *label, int option_column,
+static int drift_add (pw_drift *drift, int group, int curve, const char *stabilisation, const char *label, int option,
                       double value, pw_error *error) {
+  char method[STUDY_NAME];
+  drift_method (method, &drift->study, option, stabilisation);
   pw_row *row = pw_study_add (&drift->study, group, curve, method, 1, error);
   if (row == NULL) return PW_RESOURCE;
   snprintf (row->label, sizeof row->label, "%s", label);
-  row->point[0][0] = row->value[option_column] = value;
+  row->point[0][0] = row->value[COLUMN_ALPHA + option] = value;
   if (group == DRIFT_BAUMGARTE) row->value[COLUMN_BETA] = pw_axis_value (&drift->axis[DRIFT_BETA], curve);
   return PW_OK;
 }
 
 /* Pairs of alpha and beta; the figure has a curve for each beta. */
 static int drift_plan_baumgarte (pw_drift *drift, pw_error *error) {
-  const char *integrator = drift_integrator (&drift->study, "alpha");
   const pw_axis *alphas = &drift->axis[DRIFT_ALPHA], *betas = &drift->axis[DRIFT_BETA];
   int status = PW_OK;
   for (long j = 0; j < betas->count; j++)
     for (long i = 0; i < alphas->count && status == PW_OK; i++) {
       double alpha = pw_axis_value (alphas, i), beta = pw_axis_value (betas, j);
       const char *label = PW_PRINTED (60, "beta = %s /s", PW_DIGITS (beta, 6));
-      const char *method = PW_PRINTED (STUDY_NAME, "%s+baumgarte:alpha=%s:beta=%s", integrator, PW_DIGITS (alpha, 9),
-                                       PW_DIGITS (beta, 9));
-      status = drift_add (drift, DRIFT_BAUMGARTE, (int)j, method, label, COLUMN_ALPHA, alpha, error);
+      const char *stabilisation =
+          PW_PRINTED (80, "baumgarte:alpha=%s:beta=%s", PW_DIGITS (alpha, 9), PW_DIGITS (beta, 9));
+      status = drift_add (drift, DRIFT_BAUMGARTE, (int)j, stabilisation, label, DRIFT_ALPHA, alpha, error);
     }
   return status;
 }
@@ -124,13 +134,12 @@ static int drift_plan_baumgarte (pw_drift *drift, pw_error *error) {
 /* Intervals between projections; the figure has a curve for each metric. */
 static int drift_plan_projection (pw_drift *drift, pw_error *error) {
   static const char *const metric[] = { "metric=mass", "metric=identity" };
-  const char *integrator = drift_integrator (&drift->study, "every");
   int status = PW_OK;
   for (int j = 0; j < 2; j++)
     for (long i = 0; i < drift->axis[DRIFT_EVERY].count && status == PW_OK; i++) {
       double every = pw_axis_value (&drift->axis[DRIFT_EVERY], i);
-      const char *method = PW_PRINTED (STUDY_NAME, "%s+projection:%s:every=%.0f", integrator, metric[j], every);
-      status = drift_add (drift, DRIFT_PROJECTION, j, method, metric[j], COLUMN_EVERY, every, error);
+      const char *stabilisation = PW_PRINTED (80, "projection:%s:every=%.0f", metric[j], every);
+      status = drift_add (drift, DRIFT_PROJECTION, j, stabilisation, metric[j], DRIFT_EVERY, every, error);
     }
   return status;
 }
@@ -178,13 +187,15 @@ static void drift_raise_largest (double *largest, double value) {
   if (!isnan (*largest) && !(value <= *largest)) *largest = value;
 }
 
-/* The part of the run that contains a time; its end belongs to a part, up to round-off. */
+/* The part of the run that contains a time; a time on the border of two parts, up to round-off, belongs to the earlier
+ * one. */
 static int drift_part (const pw_study *study, double t) {
   int k = (int)ceil (t / study->t_end * DRIFT_PARTS - 1e-9) - 1;
   return k < 0 ? 0 : k < DRIFT_PARTS ? k : DRIFT_PARTS - 1;
 }
 
-/* Called after every accepted step: samples inside a step of a method with projection show no drift. */
+/* Called after every accepted step: samples inside a step of a method with projection show no drift.  Last values and
+ * points are NaN until a step ends in their part; fmax ignores that NaN. */
 static int drift_visit (pw_visitor *visitor, pw_run *run, pw_error *error) {
   pw_row *row = visitor->row;
   pw_sample sample;
