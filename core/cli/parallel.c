@@ -44,7 +44,7 @@ typedef struct {
   void *context;
   int status; /* of the first task that failed */
   pw_error *error;
-  int threads, bound;          /* number of threads; of those bound to their cores */
+  int threads, bound;          /* number of threads; how many of them are bound to their cores so far */
   const parallel_cores *cores; /* NULL: threads run on any processor */
 } parallel;
 

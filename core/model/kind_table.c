@@ -69,7 +69,7 @@ static const char *fault_fields (const pw_kind *kind, char *buffer, size_t size)
   if (kind->fields == NULL) return "no table of fields";
   for (const pw_field *f = kind->fields; f->name; f++) {
     const char *fault = fault_field (kind, f);
-    if (*fault) return snprintf (buffer, size, "field %s: %s", f->name, fault), buffer;
+    if (*fault) return snprintf (buffer, size, "field %.50s: %s", f->name, fault), buffer;
     if (f->type == PW_BODY) bodies += pw_field_count (f);
     if (f->type == PW_SIGNAL) signals += pw_field_count (f);
   }
@@ -90,6 +90,7 @@ static const char *fault_functions (const pw_kind *kind) {
     return "declared constant, but it has no force, or has signals";
   if (kind->signals > 0 && kind->rows == 0 && kind->force && kind->force_u == NULL)
     return "a force with signals, but no force_u";
+  if (kind->force == NULL && kind->force_u) return "force_u, but no force";
   if (kind->rows > 0 && kind->J == NULL) return "constraint equations without J";
   if (kind->level == PW_HOLONOMIC && kind->g == NULL) return "holonomic constraint equations without g";
   if (kind->level != PW_HOLONOMIC && kind->g) return "g, but no holonomic constraint equations";
@@ -101,13 +102,14 @@ static const char *fault_names (const pw_kind *kind) {
   int names = 0;
   for (int i = 0; i < kind->rows; i++) {
     const pw_quantity *q = kind->reaction ? &kind->reaction[i] : NULL;
-    if (!q || !q->name || !q->unit) return "constraint equations without names of their reactions";
-    if (is_bad_text (q->name) || is_bad_text (q->unit)) return "name or unit of a reaction" FAULT_TEXT;
+    if (!q || !q->name || !(q->unit || kind->reaction_unit))
+      return "constraint equations whose reactions lack a name or unit";
+    if (is_bad_text (q->name) || (q->unit && is_bad_text (q->unit))) return "name or unit of a reaction" FAULT_TEXT;
     name[names++] = q->name;
   }
   for (int i = 0; i < kind->internal; i++) {
     const pw_quantity *q = kind->coordinate ? &kind->coordinate[i] : NULL;
-    if (!q || !q->name || !q->rate || !q->unit) return "internal coordinates without names";
+    if (!q || !q->name || !q->rate || !q->unit) return "internal coordinates without name, rate or unit";
     if (is_bad_text (q->name) || is_bad_text (q->rate) || is_bad_text (q->unit))
       return "name or unit of an internal coordinate" FAULT_TEXT;
     if (strcmp (q->unit, "rad") != 0) return "an internal coordinate whose unit is not rad";

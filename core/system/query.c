@@ -30,8 +30,8 @@ const char *pw_system_body_name (const pw_system *s, int body) {
 }
 
 int pw_system_jumps (const pw_system *s, double t) {
-  const double near = 8 * DBL_EPSILON * fmax (fabs (t), 1); /* round-off of sums of steps, which also end near 0 */
-  /* the other signals of forces are continuous, and their derivatives are not used */
+  const double near = 8 * DBL_EPSILON * fmax (fabs (t), 1); /* round-off of sums of steps, also near 0 */
+  /* signals of forces count only if their values may jump: their derivatives are not used */
   for (const pw_source *source = s->source, *end = source + s->sources; source < end; source++)
     if (!source->of_force || pw_signal_value_may_jump (&source->signal))
       if (pw_signal_breakpoint (&source->signal, 0, t - near) <= t + near) return 1;
@@ -97,7 +97,7 @@ static int query_body_state (const pw_system *s, const char *name, pw_nearest *n
   }
   nearest.sought = name;
   *near = nearest;
-  snprintf (near->best, sizeof near->best, "%s.%.10s", s->body_name[b], nearest.best); /* none has more characters */
+  snprintf (near->best, sizeof near->best, "%s.%.10s", s->body_name[b], nearest.best); /* names of states have fewer */
   return -1;
 }
 
@@ -125,8 +125,8 @@ int pw_system_find_state (const pw_system *s, const char *name, pw_error *error)
 
 int pw_system_row_element (const pw_system *s, int row) {
   int element, n;
-  for (const pw_element_batch *k = query_find_element (s, offsetof (pw_kind, rows), row, &element, &n); k > s->batch;)
-    element += (--k)->b.count;
+  const pw_element_batch *k = query_find_element (s, offsetof (pw_kind, rows), row, &element, &n);
+  while (k > s->batch) element += (--k)->b.count; /* the elements of earlier batches */
   return element;
 }
 

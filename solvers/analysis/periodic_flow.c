@@ -5,9 +5,9 @@
 #include "periodic_parts.h"
 
 enum {
-  FLOW_MULTIPLES = 24, /* of the period of a signal, that are tried as a common period */
+  FLOW_MULTIPLES = 24, /* of the longer period that are tried as a common period */
   FLOW_PERIODS = 3,    /* during which signals are compared with those one period later */
-  FLOW_TIMES = 20,     /* scales of time T during which they must be constant if the period is free */
+  FLOW_TIMES = 20,     /* scales of time T during which signals must be constant if the period is free */
   /* Largest ratio of the steps of a trial of Newton's method to those of the iterate before it: a trial far away, with
    * enormous velocities, would take millions. */
   FLOW_STEPS = 20,
@@ -15,7 +15,7 @@ enum {
   RETURN_STEPS = 20       /* samples per scale of time T */
 };
 static const double FLOW_SETTLE_RTOL = 1e-9, /* of the run that settles */
-    FLOW_FAR = 4,                            /* largest ratio of a free period to the last one known, or reverse */
+    FLOW_FAR = 4,                            /* largest ratio of a free period to the last one known, or the reverse */
     RETURN_NEAR = 0.2,   /* distance of a return from the first state, relative to the largest one on the way */
     RETURN_MOVED = 1e-6; /* least distance that counts as motion, in units of the scene */
 
@@ -57,16 +57,18 @@ double pw_system_period (const pw_system *s) {
   return period;
 }
 
-/* Sets x->system.period: of the settings, else of the signals times settings.periods, else of the last motion.
- * Verifies that signals repeat after it; with a free period, that they are constant during the time that is set. */
+/* Sets x->system.period: of the settings, else of the signals times settings.periods, else of the last motion; verifies
+ * that signals repeat after it.  If the period is free, sets it to a time during which signals are constant. */
 static int flow_signals (pw_periodic *x, pw_run *r) {
-  double signals = pw_system_period (r->s), period = x->settings.free ? FLOW_TIMES * x->T : x->settings.period;
+  double own_period = pw_system_period (r->s), period = x->settings.period;
   int changed, status;
-  if (period <= 0) period = signals == 0 ? x->last_period : x->settings.periods * signals;
+  if (x->settings.free) period = fmax (period, FLOW_TIMES * x->T);
+  if (period <= 0) period = own_period == 0 ? x->last_period : x->settings.periods * own_period;
   if (!(period > 0))
     return pw_fail (&x->why, PW_INPUT,
-                    isnan (signals) ? "model %s: the periods of its signals have no common multiple: a period is needed"
-                                    : "model %s: no signal has a known period: a period is needed",
+                    isnan (own_period)
+                        ? "model %s: the periods of its signals have no common multiple: a period is needed"
+                        : "model %s: no signal has a known period: a period is needed",
                     x->s->model);
   status = x->settings.free ? pw_signals_change (r, x->settings.t, 0, period, &changed, &x->why)
                             : pw_signals_change (r, x->settings.t, period, FLOW_PERIODS * period, &changed, &x->why);
@@ -74,10 +76,11 @@ static int flow_signals (pw_periodic *x, pw_run *r) {
   if (changed < 0) return x->system.period = period, PW_OK;
   const char *name = PW_NAME (pw_system_signal_name, r->s, changed);
   if (x->settings.free)
-    return pw_fail (&x->why, PW_INPUT, "model %s: signal %s changes with time, so that the period is not free",
+    return pw_fail (&x->why, PW_INPUT, "model %s: signal %s changes with time, so the period cannot be free",
                     x->s->model, name);
   return pw_fail (&x->why, PW_INPUT, "model %s: signal %s does not repeat after %.12g s%s", x->s->model, name, period,
-                  x->settings.period > 0 ? "; without a given period that of harmonic signals and pulses is used" : "");
+                  x->settings.period > 0 ? "; if no period is given, that of the harmonic signals and pulses is used"
+                                         : "");
 }
 
 /* ---- Runs ---- */
@@ -133,8 +136,8 @@ static int flow_nearest (pw_periodic *x, pw_run *r, int j) {
   return status;
 }
 
-/* Sets x->basis and x->dual at the initial state of the run.  nearest: 1 if x->dual is to hold for any change of
- * x->state, by the change of the nearest consistent state; 0: for changes that satisfy the constraints. */
+/* Sets x->basis and x->dual at the initial state of the run.  nearest: 1: x->dual applies to any change of
+ * x->state, by way of the change of the nearest consistent state; 0: only to changes that satisfy the constraints. */
 static int flow_basis (pw_periodic *x, pw_run *r, int nearest) {
   pw_linearisation l;
   int n = x->n, status = pw_linear_open (&l, r, PW_LINEAR_BASES);
@@ -193,9 +196,9 @@ static int flow_run (pw_periodic *x, pw_run *r, double period, pw_flow_accuracy 
   if (accuracy != PW_FLOW) return flow_derivatives (x, r, end);
   while (status == PW_OK && pw_run_time (r) < end) {
     status = pw_run_advance (r, end, &x->why);
-    if (x->steps > 0 && pw_run_statistics (r)->steps > FLOW_STEPS * x->steps) return PW_RETRY;
+    if (status == PW_OK && x->steps > 0 && pw_run_statistics (r)->steps > FLOW_STEPS * x->steps) return PW_RETRY;
   }
-  if (x->steps == 0) x->steps = pw_run_statistics (r)->steps;
+  if (status == PW_OK && x->steps == 0) x->steps = pw_run_statistics (r)->steps;
   if (status == PW_OK) status = pw_run_sample (r, end, &sample, &x->why);
   if (status != PW_OK) return status;
   flow_state (x, &sample, x->y1), memcpy (x->a1, sample.a, bytes);
@@ -230,8 +233,8 @@ double pw_periodic_difference (const pw_periodic *x, int j, double a, double b) 
   return keeps_turns ? a - b : remainder (a - b, 2 * PW_PI);
 }
 
-/* Sets y to the canonical state of a run at time t (pw_steady_canonical), and *distance to that from x->y0 to y, in
- * units of the scene. */
+/* Sets y to the canonical state of a run at time t (pw_steady_canonical), and *distance to its distance from x->y0
+ * in units of the scene. */
 static int flow_distance (pw_periodic *x, pw_run *r, double t, double *y, double *distance) {
   pw_sample sample;
   int n = x->n, status = pw_run_sample (r, t, &sample, &x->why);
@@ -255,6 +258,7 @@ static int flow_return (pw_periodic *x, pw_run *r) {
     status = pw_run_advance_to (r, t, t0 + RETURN_SAMPLES * step, &x->why);
     if (status == PW_OK && pw_run_stop_requested (r)) return PW_STOPPED;
     if (status == PW_OK) status = flow_distance (x, r, t, x->y1, &d[2]);
+    if (status != PW_OK) break;
     far = fmax (far, d[2]);
     if (i > 2 && far > RETURN_MOVED && d[1] < RETURN_NEAR * far && d[1] < d[0] && d[1] <= d[2])
       return x->last_period = t - step - t0, PW_OK;

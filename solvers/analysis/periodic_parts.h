@@ -68,7 +68,7 @@ pw_run *pw_periodic_run (pw_periodic *x, double value, double rtol, const double
 int pw_periodic_flow (pw_periodic *x, const double *u, pw_flow_accuracy accuracy, pw_error *error);
 /* Sets x->state to the state after some periods of the motion from the initial state, displaced as by
  * pw_steady_move_to_start, and a free period that is not given to a guess.  A status; x->why contains the reason of a
- * failure, unless the search has been stopped. */
+ * failure. */
 int pw_periodic_settle (pw_periodic *x, double value, int periods);
 
 /* ---- periodic_equations.c ---- */

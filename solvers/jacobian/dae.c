@@ -55,7 +55,7 @@ void pw_dae_residual (pw_dae *x, const double *v, const double *a, const double 
 
 /* ---- Matrix ---- */
 
-/* The derivatives of the kinematics, by q: q_dot_factor I + D (G^T mu)_q, by v: -I, by mu: mu_factor D G^T. */
+/* The derivatives of the kinematics with respect to q: q_dot_factor I + D (G^T mu)_q; v: -I; mu: mu_factor D G^T. */
 static void dae_add_kinematics (pw_dae *x, const double *mu, double q_dot_factor, double mu_factor) {
   pw_tangent *t = &x->tangent;
   for (int j = 0; j < x->n; j++) {
@@ -73,7 +73,7 @@ static void dae_add_kinematics (pw_dae *x, const double *mu, double q_dot_factor
   pw_tangent_add_JT (t, &put);
 }
 
-/* The derivatives of J v - eta, where it is enforced, by q: (J v)_q - eta_q, by v: J; and of g, by q: G. */
+/* The derivatives of J v - eta, where it is enforced, with respect to q: (J v)_q - eta_q; v: J; and of g, q: G. */
 static void dae_add_constraints (pw_dae *x, const double *v) {
   pw_tangent *t = &x->tangent;
   const pw_system *s = t->run->s;

@@ -6,7 +6,7 @@
  *   constraints, by stabilisation:
  *     none, baumgarte   J a - gamma + 2 alpha (J v - eta) + beta^2 g   (nonholonomic: + alpha (J v - eta)), no mu
  *     index2            J v - eta                                      no mu
- *     index3            g,  of nonholonomic constraints J v - eta      no mu
+ *     index3, rattle    g,  of nonholonomic constraints J v - eta      no mu
  *     ggl, si1          J v - eta,  g
  *
  * with G the rows of J of the holonomic equations, D diagonal: 1 for lengths, 1/L^2 for angles, so that mu has one unit
@@ -19,7 +19,7 @@
 
 typedef struct {
   pw_tangent tangent;
-  int enforces_velocities;     /* 1: J v = eta of holonomic equations (index3: of the others only): index2, ggl, si1 */
+  int enforces_velocities;     /* 1: J v = eta of holonomic equations, too: index2, ggl, si1 */
   int enforces_positions;      /* 1: index3, rattle (leapfrog), ggl, si1; both are 0 for none and baumgarte */
   int integrates_multipliers;  /* 1: si1 */
   int n, rows, mu_count, size; /* numbers of coordinates, independent equations, multipliers mu, unknowns */

@@ -62,7 +62,7 @@ static int rk_allocate (pw_method_data *d, const pw_system *s) {
     { &d->q, state },           { &d->weight, 2 * n },   { &d->last.q, state },          { &d->last.ledger, entries },
     { &d->last.rate, entries }, { &d->second.q, state }, { &d->second.ledger, entries }, { &d->second.rate, entries }
   };
-  for (int i = 1; i <= stages; i++) { /* those of stage 0 are the state reached */
+  for (int i = 1; i <= stages; i++) { /* stage 0 has r->v, r->a and r->rate */
     array[count++] = (pw_array){ &d->stage_rate[i], entries };
     if (i == stages) break; /* velocities and accelerations of the new state are in d->v, d->a */
     array[count++] = (pw_array){ &d->stage_v[i], n };

@@ -101,7 +101,7 @@ static int newton_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector vx, 
 
 /* ---- Opening ---- */
 
-/* Records the patterns of T and of the matrix, with all values 0. */
+/* Records the patterns of T and of the matrix; there are no values yet. */
 static int newton_lay_out (pw_method_data *d) {
   pw_bdf_newton *w = &d->newton;
   pw_tangent *x = &w->tangent;

@@ -214,7 +214,7 @@ TEST (bad) {
   };
   cli_bad_each ("optimise", bad, sizeof bad / sizeof *bad);
   cli_bad ("pinwheel optimise @/point.yaml --free a=-2:-1 --maximise 'sqrt(p.x)' --starts 2", 4,
-           "none of 2 runs succeeded, the first one: sqrt(p.x) is nan");
+           "no run succeeded (2 runs); the first failed: sqrt(p.x) is nan");
   cli_bad ("pinwheel optimise @/point.yaml --free a=-2:0 --maximise p.x --subject-to 'p.x>=1' --starts 2", 4,
            "no run from 2 starts satisfies --subject-to; in the nearest one p.x is 0 m and must be at least 1 m");
   cli_bad (

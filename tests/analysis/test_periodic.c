@@ -293,12 +293,12 @@ TEST (refused) {
   assert_null (pw_periodic_open (s, &(pw_periodic_settings){ .period = 1.9 }, &error));
   check_error (
       &error, PW_INPUT,
-      "model snakeboard: signal swing.value does not repeat after 1.9 s; without a given period that of harmonic "
+      "model snakeboard: signal swing.value does not repeat after 1.9 s; if no period is given, that of the harmonic "
       "signals and pulses is used");
   error = (pw_error){ 0 };
   assert_null (pw_periodic_open (s, &(pw_periodic_settings){ .free = 1 }, &error));
   check_error (&error, PW_INPUT,
-               "model snakeboard: signal swing.value changes with time, so that the period is not free");
+               "model snakeboard: signal swing.value changes with time, so the period cannot be free");
   error = (pw_error){ 0 };
   pw_periodic *x = periodic_open (s, &(pw_periodic_settings){ .period = 4 });
   assert_int_equal (pw_periodic_follow (x, 1, &error), PW_INPUT);

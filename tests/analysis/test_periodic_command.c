@@ -282,11 +282,11 @@ TEST (limit) {
 
 TEST (bad) {
   static const cli_wrong each[] = {
-    { "snakeboard --period 1.9", "model snakeboard: signal swing.value does not repeat after 1.9 s; without a given "
-                                 "period that of harmonic signals and pulses is used" },
+    { "snakeboard --period 1.9", "model snakeboard: signal swing.value does not repeat after 1.9 s; if no period is "
+                                 "given, that of the harmonic signals and pulses is used" },
     { "snakeboard --period 1e-308", "--period: expected at least 1e-100 s" },
     { "snakeboard --period free",
-      "model snakeboard: signal swing.value changes with time, so that the period is not free" },
+      "model snakeboard: signal swing.value changes with time, so the period cannot be free" },
     { "snakeboard --period fast", "--period: \"fast\" is not a number" },
     { "snakeboard --period -1", "--period -1: expected a number > 0" },
     { "snakeboard --periods 0", "--periods 0: expected a whole number >= 1" },
@@ -311,9 +311,10 @@ TEST (bad) {
            "two: the periods of its signals have no common multiple: give --period T");
   cli_bad ("pinwheel periodic @/oscillator.yaml --vary n=1:3", 2,
            "--vary n=1:3: n counts something and cannot vary continuously; use `pinwheel sweep`");
-  cli_bad ("pinwheel periodic @/oscillator.yaml --period 2.5*pi --vary w=0.8:1", 2,
-           "model oscillator: signal drive.value does not repeat after 7.85398163397 s; without a given period that of "
-           "harmonic signals and pulses is used");
+  cli_bad (
+      "pinwheel periodic @/oscillator.yaml --period 2.5*pi --vary w=0.8:1", 2,
+      "model oscillator: signal drive.value does not repeat after 7.85398163397 s; if no period is given, that of the "
+      "harmonic signals and pulses is used");
 }
 
 /* Without losses the snakeboard is faster after each period; a pendulum at rest stays there. */
@@ -338,16 +339,17 @@ TEST (vanishing) {
   cli_write ("grow.yaml", "pinwheel: 1\nbodies: [{name: m, mass: 1, inertia: 1, rate: {vx: 1}}]\nelements:\n"
                           "  - {force: f, body: m, fx: '-(1 + 0.5*cos (1.7*t))*m.x'}\n");
   cli_bad ("pinwheel periodic @/grow.yaml --period pi", 2,
-           "model grow: signal f.fx does not repeat after 3.14159265359 s; without a given period that of harmonic "
+           "model grow: signal f.fx does not repeat after 3.14159265359 s; if no period is given, that of the harmonic "
            "signals and pulses is used");
   cli_bad ("pinwheel periodic @/grow.yaml --period free", 2,
-           "model grow: signal f.fx changes with time, so that the period is not free");
+           "model grow: signal f.fx changes with time, so the period cannot be free");
   cli_write ("short.yaml", "pinwheel: 1\nbodies: [{name: m, mass: 1, inertia: 1}]\nelements:\n"
                            "  - {force: f, body: m, fx: {harmonic: {amplitude: 1, omega: 2*pi}}}\n"
                            "  - {force: g, body: m, fx: {pulse: {height: 1, start: 1.501, width: 0.002}}}\n");
-  cli_bad ("pinwheel periodic @/short.yaml --period 1", 2,
-           "model short: signal g.fx does not repeat after 1 s; without a given period that of harmonic signals and "
-           "pulses is used");
+  cli_bad (
+      "pinwheel periodic @/short.yaml --period 1", 2,
+      "model short: signal g.fx does not repeat after 1 s; if no period is given, that of the harmonic signals and "
+      "pulses is used");
 }
 
 const check_fixture fixture = { cli_setup, cli_teardown };

@@ -233,8 +233,8 @@ TEST (faults) {
   KINDS_FAULT (bodies, 5, "at most 4 bodies, 4 internal coordinates, 6 constraint equations and 4 signals");
   KINDS_FAULT (bodies, 0, "neither a body nor an internal coordinate");
   KINDS_FAULT (level, PW_FORCE, "rows and level are inconsistent");
-  KINDS_FAULT (reaction, NULL, "constraint equations without names of their reactions");
-  KINDS_FAULT (internal, 1, "internal coordinates without names");
+  KINDS_FAULT (reaction, NULL, "constraint equations whose reactions lack a name or unit");
+  KINDS_FAULT (internal, 1, "internal coordinates without name, rate or unit");
   KINDS_FAULT (prepare, NULL, "a prepared element (.element > 0) or internal coordinates, but no prepare function");
   KINDS_FAULT (element, SIZE_MAX, "a prepared element of more than 2147483647 bytes");
   KINDS_FAULT (fields, NULL, "no table of fields");
@@ -251,6 +251,7 @@ TEST (faults) {
   KINDS_FAULT (constant, 1, "declared constant, but it has no force, or has signals");
   KINDS_FAULT (J, pw_by_differences, "PW_BY_DIFFERENCES is permitted only for second-order blocks");
   KINDS_FAULT (J, NULL, "constraint equations without J");
+  KINDS_FAULT (force_u, pw_kind_torque.force_u, "force_u, but no force");
   KINDS_FAULT (g, NULL, "holonomic constraint equations without g");
   KINDS_FAULT (level, PW_NONHOLONOMIC, "g, but no holonomic constraint equations");
 #undef KINDS_FAULT

@@ -16,7 +16,7 @@ enum { OPTIMISE_REFINED = 3 }; /* results that are refined, at most */
 
 /* ---- Starts ---- */
 
-/* Allocates the searches, those from the starts with their first points. */
+/* Allocates all searches, and sets the first points of those from the starts. */
 static int optimise_open_searches (pw_optimise *problem, pw_error *error) {
   const size_t n = (size_t)problem->unknowns.count, width = 2 * n + (size_t)problem->outputs,
                starts = (size_t)problem->starts, all = starts + OPTIMISE_REFINED;
@@ -66,7 +66,7 @@ static int optimise_refine (pw_optimise *problem, pw_error *error) {
   return pw_parallel (problem->jobs, problem->refinements, pw_search_fine, problem, error);
 }
 
-/* PW_METHOD if the search with the best result did not converge, or made only one run that did not fail, or ended at a
+/* PW_METHOD if the search with the best result did not converge, or all its runs but one failed, or it ended at a
  * very large value of an unknown without bounds. */
 static int optimise_converged (const pw_optimise *problem, pw_error *error) {
   const pw_search *search = problem->best;
@@ -213,7 +213,7 @@ static int optimise_infeasible (const pw_optimise *problem, pw_error *error) {
   char unit[90] = "";
   int i = 0;
   if (problem->failed == problem->runs && problem->first_error)
-    return pw_fail (error, problem->first_error->status, "none of %s succeeded, the first one: %s",
+    return pw_fail (error, problem->first_error->status, "no run succeeded (%s); the first failed: %s",
                     PW_COUNTED (problem->runs, "run"), problem->first_error->text);
   const double *output = optimise_nearest (problem, &i);
   if (*problem->unit[i]) snprintf (unit, sizeof unit, " %s", problem->unit[i]);

@@ -3,7 +3,8 @@
  *   3, "2 * M0"                                    a constant
  *   {constant: 3}                                  the same
  *   {harmonic: {amplitude: 3, omega: 2}}           and ramp, smooth-step, pulse: their fields are in signal_form.c
- *   {table: {points: [[0, 1], [2, 3]]}}            or {file: M.csv, columns: [t, M]}, by default columns 1 and 2
+ *   {table: {points: [[0, 1], [2, 3]]}}            points
+ *   {table: {file: M.csv, columns: [t, M]}}        points of a file, by default in columns 1 and 2
  *   "M0 * cos (omega * t)"                         an expression of the time t; in forces also of states: BODY.phi
  *   {expression: .., rate: .., acceleration: ..}   the same; in constraints, its time derivatives may be given
  */
@@ -111,7 +112,7 @@ static int signal_fields (pw_reader *r, const pw_signal_form *form, const char *
     if (value[i] == NULL && f->required) pw_yaml_fail (r, node->at, "%s is missing", text);
     if (f->type == PW_NUMBER) pw_yaml_number (r, value[i], text, f->domain, at);
     if (f->type == PW_CHOICE) pw_yaml_choice (r, value[i], text, f->choices, at);
-    /* in the structure 0 means an omitted scale, 1 */
+    /* 0 in the structure stands for a scale that is not given, which is 1 */
     if (value[i] && form->type == PW_TABLE && strcmp (f->name, "scale") == 0 && signal->table.scale == 0)
       pw_yaml_fail (r, value[i]->at, "%s: 0 is not permitted", text);
   }
