@@ -43,7 +43,7 @@ static int kinematics_copy_states (const pw_workspace *w, const pw_source *sourc
 }
 
 int pw_update_signals (pw_workspace *w, double t, const double *q, const double *v) {
-  int new_time = q && t != w->t_signal;
+  int new_time = t != w->t_signal && !isnan (t); /* NaN: pw_update_velocities, after a failure */
   if (!new_time && w->s->state_dependent == 0) return PW_OK;
   if (new_time) w->t_signal = NAN; /* if a signal fails, others have changed already */
   for (pw_source *source = w->source, *end = source + w->s->sources; source < end; source++) {

@@ -133,7 +133,7 @@ void pw_update_configurations (pw_workspace *w, const double *q, const double *v
 int pw_update_velocities (pw_workspace *w, const double *v);
 
 /* Evaluates signals of time alone once per time, even if several stages of a step have the same time, and
- * state-dependent ones; q NULL: only those that read velocities.  Returns as pw_update_kinematics. */
+ * state-dependent ones; of these, if q is NULL, only those that read velocities.  Returns as pw_update_kinematics. */
 int pw_update_signals (pw_workspace *w, double t, const double *q, const double *v);
 /* Points the batches to the internal coordinates in q, v; q NULL: only to their velocities. */
 void pw_point_to_internal (pw_workspace *w, const double *q, const double *v);
