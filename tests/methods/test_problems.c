@@ -102,6 +102,7 @@ TEST (eccentricity) {
   check_ok (pw_model_set (m, "off", -2, &error), &error);
   pw_model_build (m, &error);
   check_error (&error, PW_INPUT, "model transmission: off = -2: expected a number from -1 to 1");
+  pw_model_free (m);
   pw_file_close (f);
 }
 
