@@ -157,7 +157,7 @@ ALL_LAYERS := $(CORE_LAYERS) $(FILE_LAYERS) $(SOLVER_LAYERS)
 # Functions of tests that replace those of other libraries must be visible to these.
 $(BUILD)/obj/tests/%.o:      STRICT += -fvisibility=default
 $(BUILD)/obj/tests/%.o:      INCLUDE := $(call layer,tests/support tests/faults tests/solvers $(ALL_LAYERS)) $(SYSTEM)
-$(BUILD)/obj/tests/analysis/test_outcome.o: INCLUDE := $(call layer,tests/support $(ALL_LAYERS) core/cli/analyse)
+$(BUILD)/obj/tests/outputs/test_outcome.o: INCLUDE := $(call layer,tests/support $(ALL_LAYERS) core/cli/analyse)
 $(BUILD)/obj/tests/fuzz/%.o: INCLUDE := $(call layer,tests/fuzz $(ALL_LAYERS) $(CLI_LAYERS))
 $(BUILD)/obj/benchmarks/%.o: INCLUDE := -I$(BUILD)/include
 $(BUILD)/obj/benchmarks/engine.o $(addprefix $(BUILD)/obj/benchmarks/,effects.o peers.o) $(BUILD)/obj/benchmarks/engine/%.o $(BUILD)/obj/benchmarks/baseline/%.o: INCLUDE := $(call layer,$(ALL_LAYERS) benchmarks) $(SYSTEM)
