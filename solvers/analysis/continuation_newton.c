@@ -10,8 +10,8 @@ enum {
   NEWTON_SLOW = 4       /* an iteration that divides |F| by less has reached round-off, below the tolerance */
 };
 static const double NEWTON_DAMPING = 0.1, /* factor of |F| in the square of the damping */
-    NEWTON_DIFFERENCE =
-        1e-5; /* of p: errors of F are multiplied by 1e5, round-off gives 1e-11; 2e-11 of the third derivative */
+    /* Of p.  The error is 2e-11 of the third derivative, and that of F divided by this: 1e-11 for round-off. */
+    NEWTON_DIFFERENCE = 1e-5;
 
 /* The largest |F_i|; NaN if one is NaN. */
 static double newton_residual (const pw_branch *b) {
