@@ -30,8 +30,7 @@ struct pw_run {
   int redundant_drive;         /* 1: one of them has an eta, so that work depends on its multiplier */
   int *redundant_row;          /* redundant: their indices */
   unsigned char *active_array; /* rows: what `active` points to */
-  double *coefficient;         /* redundant x rows: each redundant row as a combination of active rows */
-  double *normal;              /* redundant x (redundant + 1): normal equations in redundancy.c, right side last */
+  double *coefficient;         /* 5 x rows: a redundant row as a combination of active rows; scratch of redundancy.c */
   double *row_force;           /* coords + 3: right-hand side for the coefficients of a redundant row; 0 between uses */
   double *least_norm;          /* rows: least-norm multipliers for the ledger */
   double independence;         /* of the active rows at the state reached (rank.h) */

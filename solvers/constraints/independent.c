@@ -70,10 +70,9 @@ static int independent_store (pw_run *r, const unsigned char *active, size_t red
   size_t rows = (size_t)r->s->rows, number = sizeof *r->coefficient;
   r->active_array = pw_arena_alloc (&r->arena, rows);
   r->redundant_row = pw_arena_alloc (&r->arena, redundant * sizeof *r->redundant_row);
-  r->coefficient = pw_arena_alloc (&r->arena, redundant * rows * number);
-  r->normal = pw_arena_alloc (&r->arena, redundant * (redundant + 1) * number);
+  r->coefficient = pw_arena_alloc (&r->arena, 5 * rows * number);
   r->row_force = pw_arena_alloc (&r->arena, ((size_t)r->s->coords + 3 + rows) * number);
-  if (!r->active_array || !r->redundant_row || !r->coefficient || !r->normal || !r->row_force) return PW_RESOURCE;
+  if (!r->active_array || !r->redundant_row || !r->coefficient || !r->row_force) return PW_RESOURCE;
   r->least_norm = r->row_force + r->s->coords + 3;
   independent_activate (r, active);
   return PW_OK;

@@ -114,6 +114,62 @@ static int condense_sort (pw_plan *plan) {
   return PW_OK;
 }
 
+/* ---- Dependent equations ---- */
+
+typedef struct {
+  pw_plan *plan;
+  int *capacity; /* groups: coordinates that no equation takes yet */
+  int *taken;    /* contributions: equations of the node that take a coordinate of the group */
+  int *by, *of;  /* groups: the contribution by which the search has come, and that which gives way; -1: none */
+  int *queue, *visited, queued, search;
+} condense_matching;
+
+/* Queues the groups to which node n contributes; contribution `of` gives way to one of them (-1: a new equation). */
+static void matching_queue (condense_matching *m, int n, int of) {
+  const pw_plan *plan = m->plan;
+  int end = n + 1 < plan->nodes ? plan->node[n + 1].first_contribution : plan->contributions;
+  for (int p = plan->node[n].first_contribution; p < end; p++) {
+    int g = plan->contribution[p].group;
+    if (m->visited[g] == m->search) continue;
+    m->visited[g] = m->search, m->by[g] = p, m->of[g] = of;
+    m->queue[m->queued++] = g;
+  }
+}
+
+/* Lets an equation of node n take a coordinate; others give way to theirs.  0 if none is left (Berge 1957). */
+static int matching_augment (condense_matching *m, int n) {
+  const pw_plan *plan = m->plan;
+  m->search++, m->queued = 0;
+  matching_queue (m, n, -1);
+  for (int i = 0; i < m->queued; i++) {
+    int g = m->queue[i];
+    for (int x = plan->start[g]; m->capacity[g] == 0 && x < plan->start[g + 1]; x++)
+      if (m->taken[plan->list[x]]) matching_queue (m, plan->contribution[plan->list[x]].node, plan->list[x]);
+    if (m->capacity[g] == 0) continue;
+    for (m->capacity[g]--; m->taken[m->by[g]]++, m->of[g] >= 0; g = plan->contribution[m->of[g]].group)
+      m->taken[m->of[g]]--;
+    return 1;
+  }
+  return 0;
+}
+
+/* Finds out whether the equations depend on each other in every configuration, since some of them are more than the
+ * coordinates in which they have entries, such as those of ten pins between the same two bodies.  Then *row is one of
+ * them, else it stays. */
+static int condense_find_dependent (pw_plan *plan, int *row) {
+  size_t groups = (size_t)plan->groups + 1;
+  condense_matching m = { .plan = plan, .capacity = pw_arena_alloc (&plan->arena, 5 * groups * sizeof (int)) };
+  m.taken = pw_arena_alloc (&plan->arena, ((size_t)plan->contributions + 1) * sizeof *m.taken);
+  if (m.capacity == NULL || m.taken == NULL) return PW_RESOURCE;
+  m.by = m.capacity + groups, m.of = m.by + groups, m.queue = m.of + groups, m.visited = m.queue + groups;
+  for (int j = 0; j < plan->saddle->s->coords; j++)
+    m.capacity[pw_group_of (plan->saddle->s, j)] += plan->saddle->inverse_weight[j] > 0;
+  for (int n = 0; n < plan->nodes; n++)
+    for (int i = 0; i < plan->node[n].size; i++)
+      if (!matching_augment (&m, n)) return *row = plan->node[n].unknown + i, PW_OK;
+  return PW_OK;
+}
+
 /* ---- Bodies that are not condensed ---- */
 
 /* A body to which more nodes than this contribute is not condensed, if its weights are finite and not 0: n nodes have
@@ -160,8 +216,11 @@ int pw_condense (struct pw_saddle *saddle, const double *weight, const unsigned 
   condense_elements (&plan, active);
   condense_components (&plan);
   int status = condense_sort (&plan);
-  if (status == PW_OK) status = condense_uncondensed (&plan);
-  if (status == PW_OK) status = pw_condense_block (&plan);
+  if (status == PW_OK) status = condense_find_dependent (&plan, &saddle->dependent_row);
+  if (saddle->dependent_row < 0) {
+    if (status == PW_OK) status = condense_uncondensed (&plan);
+    if (status == PW_OK) status = pw_condense_block (&plan);
+  }
   free (plan.node);
   free (plan.contribution);
   free (plan.pair);

@@ -22,7 +22,8 @@ struct pw_saddle {
   double *force;          /* coords: f~ of massless.h */
   int extra;              /* unknowns besides the multipliers of rows: 3 for each uncondensed body */
   double *y;              /* s->rows + extra: right-hand side and solution; NULL without extra unknowns */
-  pw_block_ldl *block;
+  pw_block_ldl *block; /* NULL if there is a dependent_row: nothing is planned then */
+  int dependent_row;   /* one that depends on others in every configuration; -1: none */
   int *inactive; /* rows outside massless components whose multiplier is 0 */
   int inactive_count;
   double pivot;  /* smallest when last factorised: of `block`, the squared sine of the angle between a row and those
