@@ -18,16 +18,18 @@ static int independent_rank (const pw_run *r, pw_row_basis *b) {
   return pw_row_basis_select (b, r->w, r->thresholds.independent, NULL, r->s->rows, r->s->rows);
 }
 
-/* The n-th direction that the constraints allow, of largest component 1 in units of the scene: along the velocities v
- * (n = 0), or an arbitrary one. */
-static void independent_direction (const pw_system *s, const pw_row_basis *b, const double *v, int n,
-                                   double *direction) {
+/* The n-th direction that the constraints allow, of largest component 1 in units of the scene: along the velocities (n =
+ * 0), or an arbitrary one.  p->velocity: with the metric of lengths. */
+static int independent_direction (const pw_projector *p, pw_run *r, int n, double *direction) {
+  const pw_system *s = r->s;
   double most = 0;
   for (int j = 0; j < s->coords; j++)
-    direction[j] = n == 0 ? v[j] * pw_length_factor (s, j) : pw_irregular (1.7, (j + 1) * n);
-  pw_row_basis_orthogonalise (b, direction, 0);
-  for (int j = 0; j < s->coords; j++) most = fmax (most, fabs (direction[j]));
-  for (int j = 0; most > 0 && j < s->coords; j++) direction[j] *= s->scale.length / most / pw_length_factor (s, j);
+    direction[j] = n == 0 ? r->v[j] : pw_irregular (1.7, (j + 1) * n) / pw_length_factor (s, j);
+  if (pw_saddle_factor (p->velocity) != PW_OK) return PW_RETRY;
+  pw_project_error (r, p->velocity, direction, s->rows);
+  for (int j = 0; j < s->coords; j++) most = fmax (most, fabs (direction[j]) * pw_length_factor (s, j));
+  for (int j = 0; most > 0 && j < s->coords; j++) direction[j] *= s->scale.length / most;
+  return PW_OK;
 }
 
 /* The rank after a short motion in the n-th direction; 0 if no consistent configuration is found there. */
@@ -39,13 +41,14 @@ static int independent_rank_nearby (pw_run *r, pw_row_basis *b, int n) {
   int rank = 0;
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return 0;
   independent_rank (r, b);
-  independent_direction (s, b, r->v, n, q);
-  for (int j = 0; j < s->coords; j++) q[j] = r->q[j] + INDEPENDENT_MOTION * q[j];
   const unsigned char *former = r->active;
   r->active = b->active;
-  if (pw_projector_open (&p, r, s->metric, NULL, &unused) == PW_OK) {
+  pw_length_weights (s, q);
+  if (pw_projector_open (&p, r, s->metric, q, &unused) == PW_OK) {
     p.ignores_inactive = 1;
-    if (pw_project_positions (&p, r, r->t, q, r->v) == PW_OK) rank = independent_rank (r, b);
+    int status = independent_direction (&p, r, n, q);
+    for (int j = 0; j < s->coords; j++) q[j] = r->q[j] + INDEPENDENT_MOTION * q[j];
+    if (status == PW_OK && pw_project_positions (&p, r, r->t, q, r->v) == PW_OK) rank = independent_rank (r, b);
     pw_projector_close (&p);
   }
   r->active = former;

@@ -7,7 +7,8 @@
  * nodes at one end have rank 2: at the ground, or at one of the two bodies.  Then multipliers of rank 0 that exert no
  * force on the bodies of a leg exert none on the body at its other end either, since the forces of a joint on its two
  * bodies are opposite: dependent equations of rank 0 are dependent in the whole mechanism.  Nodes of uncondensed bodies
- * alone have rank 2, too: with these at rest their equations would be empty. */
+ * alone have rank 2, too: with these at rest their equations would be empty.  The rolling equation of a wheel has rank 0:
+ * no other equation contains the wheel's spin. */
 #include "condense.h"
 
 /* The end of the contributions of node n: one after the last. */
@@ -28,6 +29,7 @@ static int rank_turn (const pw_plan *plan, int n) {
 static int rank_join (const pw_plan *plan, int *parent, int n) {
   const int first = plan->node[n].first_contribution, end = rank_end (plan, n);
   int at_rest = plan->node[n].grounded ? plan->groups : -1, root = -1, moves = first == end;
+  if (plan->node[n].rolls && plan->contribution[end - 1].group >= plan->saddle->s->bodies) return 1;
   for (int p = first; p < end; p++) {
     moves |= plan->uncondensed[plan->contribution[p].group] < 0;
     root = pw_root (parent, plan->contribution[p].group);
