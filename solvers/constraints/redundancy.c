@@ -170,7 +170,7 @@ char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size) {
   redundancy_coefficients (r, i);
   const double *c = r->coefficient, least = round_off * redundancy_norm (r->w, row);
   for (int a = 0; a < s->rows; a++) {
-    if (fabs (c[a]) * redundancy_norm (r->w, a) <= least) continue;
+    if (c[a] == 0 || fabs (c[a]) * redundancy_norm (r->w, a) <= least) continue;
     partners++, last = a;
     const char *element = PW_NAME (pw_system_row_name, s, a);
     if (elements > MAX_ELEMENTS || strcmp (element, own) == 0 || strcmp (element, before) == 0) continue;

@@ -126,14 +126,28 @@ PW_INLINE void block_eliminate_row (int ki, const pw_block_ldl *l, const pw_bloc
   if (ki == 2 && kj == 2) A[3] = L.yy;
 }
 
+/* Finds the targets of row p of a long column; to be called for its rows in descending order. */
+static const int *block_find_targets (const pw_block_ldl *l, const pw_block_column *c, int p) {
+  int *at = l->cursor, *row = at + (c[1].first_below - c->first_below);
+  for (int q = c->first_below; q < p; q++, at++, row++) {
+    const pw_block_column *d = &l->column[l->below[q]];
+    if (p + 1 == c[1].first_below) *at = d[1].first_value, *row = d[1].first_below;
+    do *at -= d->size * l->column[l->below[--*row]].size;
+    while (l->below[*row] != l->below[p]);
+  }
+  return l->cursor;
+}
+
 /* Eliminates a column of kj unknowns; returns the next column's targets. */
 PW_INLINE const int *block_eliminate (int kj, pw_block_ldl *l, const pw_block_column *c, const int *target) {
   double *D = l->value + c->first_value, *B = D + pw_block_diagonal_values (kj), *A = l->value + c[1].first_value;
+  const int is_long = c[1].first_below - c->first_below > PW_BLOCK_LISTED;
   block_pivot (kj, D, l, c->unknown);
-  for (int p = c[1].first_below - 1; p >= c->first_below; target += p-- - c->first_below) {
+  for (int p = c[1].first_below - 1; p >= c->first_below; p--) {
     int ki = l->column[l->below[p]].size;
     A -= ki * kj;
-    BLOCK_SIZE (ki, block_eliminate_row, l, c, p, A, B, D, target, kj);
+    BLOCK_SIZE (ki, block_eliminate_row, l, c, p, A, B, D, is_long ? block_find_targets (l, c, p) : target, kj);
+    if (!is_long) target += p - c->first_below;
   }
   return target;
 }
