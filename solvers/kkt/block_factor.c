@@ -35,6 +35,11 @@ PW_INLINE void block_contribute (int ka, int width, const pw_block_ldl *l, const
     BLOCK_SIZE (b->size, block_couple, ka, width, l->value + *coupling++, R, b->J, b->row_stride);
 }
 
+/* The pivot of an acceleration in -W_k; -1 of one that is 0 or massless, whose column of J is left out. */
+static inline double block_inertia (double inverse_weight) {
+  return inverse_weight > 0 ? -1 / inverse_weight : -1;
+}
+
 /* Adds an uncondensed body: -W_k, and its columns of J.  The original diagonal entries of the equations eliminated
  * after the body grow as if it were condensed. */
 static void block_uncondensed (const pw_block_ldl *l, const pw_group_block *p) {
@@ -42,14 +47,14 @@ static void block_uncondensed (const pw_block_ldl *l, const pw_group_block *p) {
   const double *w = l->inverse_weight + p->j;
   const int *coupling = l->coupling + p->first_coupling;
   double *D = l->value + own[0].diagonal, *inertia = l->value + own[1].diagonal;
-  D[0] = D[3] = -1 / w[0], D[2] = D[4] = -1 / w[1], inertia[0] = inertia[1] = -1 / w[2];
+  D[0] = D[3] = block_inertia (w[0]), D[2] = D[4] = block_inertia (w[1]), inertia[0] = inertia[1] = block_inertia (w[2]);
   for (const pw_contribution *a = l->contribution + p->first_contribution; a < own; a++)
     for (int n = 0; n < 3; n += 2) { /* its first node has the columns 0 and 1, its second one column 2 */
       double *K = l->value + *coupling++, *original = l->value + a->diagonal + a->size * (a->size + 1) / 2;
       int later = a->diagonal > own->diagonal, size = n == 0 ? 2 : 1;
       for (int i = 0; i < a->size; i++)
         for (int c = 0; c < size; c++) {
-          double J = a->J[i * a->row_stride + n + c];
+          double J = w[n + c] > 0 ? a->J[i * a->row_stride + n + c] : 0;
           K[later ? i * size + c : c * a->size + i] = J;
           if (later) original[i] += J * w[n + c] * J;
         }

@@ -105,7 +105,7 @@ typedef struct {
 typedef struct {
   int size;               /* unknowns */
   int rank;               /* 0 to PW_BLOCK_RANKS - 1 */
-  int grounded;           /* 1: touches prescribed coordinates, or pw_is_grounded (massless.h) */
+  int grounded;           /* 1: touches a group that does not move, or pw_is_grounded (massless.h) */
   int rolls;              /* 1: the rolling equation of a wheel, alone */
   int unknown;            /* index in y of its first unknown: its first row, or beyond the rows for -a_k */
   int first_contribution; /* index of the first one; they end at that of the next node */

@@ -12,21 +12,22 @@ static void condense_add_node (pw_plan *plan, pw_plan_node node) {
   if (!plan->failed) plan->node[plan->nodes++] = node;
 }
 
-/* Adds the contribution of the last node to the group that begins with coordinate j, unless these coordinates are all
- * prescribed or massless; a prescribed one makes the node `grounded`. */
+/* Adds the contribution of the last node to the group that begins with coordinate j.  If these coordinates are all
+ * prescribed or massless there is none, and a prescribed one makes the node `grounded`. */
 static void condense_contribute (pw_plan *plan, const double *J, int row_stride, int j, int is_pin) {
-  int moves = 0;
+  int moves = 0, is_prescribed = 0;
   if (plan->failed) return;
   for (int n = 0; n < pw_group_width (plan->saddle->s, j); n++) {
     moves |= plan->saddle->inverse_weight[j + n] > 0;
-    plan->node[plan->nodes - 1].grounded |= isinf (plan->weight[j + n]) != 0;
+    is_prescribed |= isinf (plan->weight[j + n]) != 0;
   }
+  if (!moves) plan->node[plan->nodes - 1].grounded |= is_prescribed;
   if (!moves) return;
   plan->failed = pw_grow (&plan->contribution, (size_t)plan->contributions, &plan->contribution_room,
                           sizeof *plan->contribution) != PW_OK;
   if (!plan->failed)
     plan->contribution[plan->contributions++] =
-        (pw_plan_contribution){ J, plan->nodes - 1, row_stride, pw_group_of (plan->saddle->s, j), is_pin };
+        (pw_plan_contribution){ J, plan->nodes - 1, row_stride, pw_group_of (plan->saddle->s, j), is_pin, is_prescribed };
 }
 
 /* Adds the node of `size` rows from row n of a batch on. */
@@ -174,16 +175,9 @@ static int condense_find_dependent (pw_plan *plan, int *row) {
 
 /* ---- Bodies that are not condensed ---- */
 
-/* A body to which more nodes than this contribute is not condensed, if its weights are finite and not 0: n nodes have
- * n (n - 1) / 2 couplings, but only 2 n with an uncondensed body, fewer from n = 6.  Measured: 0.6 to 0.9 of the time
- * with 7 nodes, 0.7 to 1.0 with 6. */
+/* A body to which more nodes than this contribute is not condensed: n nodes have n (n - 1) / 2 couplings, but only 2 n
+ * with an uncondensed body, fewer from n = 6.  Measured: 0.6 to 0.9 of the time with 7 nodes, 0.7 to 1.0 with 6. */
 enum { CONDENSE_NODES = 6 };
-
-static int condense_is_crowded (const pw_plan *plan, int group) {
-  if (plan->start[group + 1] - plan->start[group] <= CONDENSE_NODES || group >= plan->saddle->s->bodies) return 0;
-  const double *w = plan->saddle->inverse_weight + 3 * group;
-  return w[0] > 0 && w[1] > 0 && w[2] > 0;
-}
 
 /* Adds two nodes for every body that is not condensed, and ranks all nodes. */
 static int condense_uncondensed (pw_plan *plan) {
@@ -192,7 +186,7 @@ static int condense_uncondensed (pw_plan *plan) {
   if (plan->uncondensed == NULL) return PW_RESOURCE;
   for (int g = 0; g < plan->groups; g++) {
     plan->uncondensed[g] = -1;
-    if (!condense_is_crowded (plan, g)) continue;
+    if (plan->start[g + 1] - plan->start[g] <= CONDENSE_NODES || g >= saddle->s->bodies) continue;
     plan->uncondensed[g] = plan->nodes;
     condense_add_node (plan, (pw_plan_node){ .size = 2, .rank = 1, .unknown = saddle->s->rows + saddle->extra });
     condense_add_node (plan, (pw_plan_node){ .size = 1, .rank = 1, .unknown = saddle->s->rows + saddle->extra + 2 });

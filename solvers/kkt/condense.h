@@ -42,6 +42,7 @@ typedef struct {
   int row_stride; /* from row to row of J */
   int group;
   int is_pin; /* 1: both rows of a pin, whose x and y columns are the unit matrix or its negative */
+  int is_prescribed; /* 1: some of the group's coordinates are prescribed */
 } pw_plan_contribution;
 
 typedef struct {
