@@ -86,11 +86,12 @@ static int independent_search (pw_run *r, pw_row_basis *b, pw_error *error) {
   const pw_system *s = r->s;
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   int rank = independent_rank (r, b), largest = rank;
-  for (int n = 0; n < INDEPENDENT_NEARBY; n++) {
+  for (int n = 0; n < INDEPENDENT_NEARBY && !r->stopped; n++) {
     int nearby = independent_rank_nearby (r, b, n);
     if (nearby > largest) largest = nearby;
   }
   r->w->failed = NULL;
+  if (r->stopped) return PW_STOPPED;
   if (largest > rank)
     return pw_fail (
         error, PW_INITIAL,
@@ -100,12 +101,14 @@ static int independent_search (pw_run *r, pw_row_basis *b, pw_error *error) {
   if (rank == s->rows) return PW_OK;
   (void)pw_evaluate_J_at (r->w, r->t, r->q, r->v);
   independent_rank (r, b);
+  if (r->stopped) return PW_STOPPED;
   return independent_store (r, b->active, (size_t)(s->rows - rank)) == PW_OK ? PW_OK : pw_fail_memory (s, error);
 }
 
 int pw_rank_open (pw_run *r, pw_error *error) {
   pw_row_basis b;
   int status = pw_row_basis_open (&b, r->s);
+  b.run = r;
   status = status == PW_OK ? independent_search (r, &b, error) : pw_fail_memory (r->s, error);
   pw_row_basis_close (&b);
   (void)pw_evaluate_J_at (r->w, r->t, r->q, r->v);

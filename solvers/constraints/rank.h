@@ -61,7 +61,7 @@ int pw_rank_select (const pw_workspace *w, double tol, const unsigned char *fixe
 /* Selects r->active, a maximal set of independent rows, for the run at its consistent initial state.  The saddle must
  * be open, and opened again afterwards.  r->active stays NULL if all rows are independent: then pw_rank_reselect,
  * _independence and _least_norm must not be called.  Errors: PW_RESOURCE; PW_INITIAL if the rank is higher nearby: the
- * initial configuration is singular; PW_METHOD if a signal failed. */
+ * initial configuration is singular; PW_METHOD if a signal failed; PW_STOPPED without a text. */
 int pw_rank_open (struct pw_run *r, pw_error *error);
 
 /* Selects r->active again with the J last evaluated.  Returns 1 if another set of the same rank is now active, else 0.
