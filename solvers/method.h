@@ -268,6 +268,16 @@ static inline int pw_run_stop_requested (pw_run *r) {
   return r->stopped;
 }
 
+/* 1 if searching for consistent initial values and independent equations takes a noticeable time. */
+static inline int pw_is_large (const pw_system *s) {
+  return (double)s->rows * s->coords >= 1e4;
+}
+
+/* pw_run_stop_requested while the run is opened, if its scene is large. */
+static inline int pw_run_stop_opening (pw_run *r) {
+  return pw_is_large (r->s) && pw_run_stop_requested (r);
+}
+
 /* Before each attempted step: PW_OK; PW_STOPPED if the caller requests it; PW_METHOD at max_steps, if adaptive. */
 int pw_run_check_limits (pw_run *r, pw_error *error);
 

@@ -6,8 +6,6 @@
 #include "rank.h"
 #include "util.h"
 
-#define RANK_LARGE 1e4 /* rows times coordinates of a scene that is not small */
-
 double pw_length_factor (const pw_system *s, int j) {
   return pw_is_angle (s, j) ? s->scale.length : 1;
 }
@@ -90,7 +88,7 @@ static int rank_take (pw_row_basis *b, int i, int queued) {
  * scenes they stay in the basis, so that of the others the most independent of them, too, are selected. */
 static void rank_take_private (pw_row_basis *b, const pw_system *s) {
   const double least = 1e-3; /* entry of a row of length 1: its sine with the others is at least that */
-  const int is_small = (double)s->rows * s->coords < RANK_LARGE;
+  const int is_large = pw_is_large (s);
   int queued = 0;
   memset (b->active, 0, (size_t)s->rows);
   memset (b->count, 0, (size_t)s->coords * sizeof *b->count);
@@ -98,7 +96,7 @@ static void rank_take_private (pw_row_basis *b, const pw_system *s) {
   for (int i = 0; i < s->rows; i++)
     for (int c = b->first[i]; c < b->first[i + 1]; c++)
       if (b->value[c] != 0) b->count[b->column[c]]++, b->sum[b->column[c]] += i;
-  for (int j = 0; j < s->coords && !is_small; j++)
+  for (int j = 0; j < s->coords && is_large; j++)
     if (b->count[j] == 1) b->queue[queued++] = j;
   for (int n = 0; n < queued; n++) {
     int j = b->queue[n], i = (int)b->sum[j], c = b->first[i];
@@ -157,7 +155,7 @@ static void rank_keep (pw_row_basis *b, double tol, int max_rank, int first, int
     if (!b->active[i]) b->norm[i] = rank_orthogonalise (b, rank_row (b, i), 0);
   for (int next; b->rank < max_rank && (next = rank_pivot (b, first, end)) >= 0;) {
     double *row = rank_row (b, next), norm = b->norm[next] = rank_orthogonalise (b, row, 0);
-    if (b->run && pw_run_stop_requested (b->run)) return;
+    if (b->run && pw_run_stop_opening (b->run)) return;
     if (!(norm > tol)) {
       b->norm[next] = 0;
       continue;

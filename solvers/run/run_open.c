@@ -97,7 +97,7 @@ static double run_time_scale (const pw_run *r) {
 
 /* After a part of the opening: PW_STOPPED if the caller requests it. */
 static int run_check_stop (pw_run *r, int status) {
-  return status >= PW_OK && pw_run_stop_requested (r) ? PW_STOPPED : status;
+  return status >= PW_OK && pw_run_stop_opening (r) ? PW_STOPPED : status;
 }
 
 /* Opens the saddle at the consistent initial state and evaluates the accelerations there; if some rows are nearly
