@@ -66,6 +66,11 @@ TEST (periods) {
   check_close ("re", cli_number (json, "motions", "multipliers", "re", NULL),
                0.265099104796 * 0.265099104796 - 0.621015774681 * 0.621015774681, 4e-8,
                "steps of the derivatives: 1e-9 each");
+  /* also where the branch begins, at a value without a signal that changes */
+  cli_good ("pinwheel periodic @/oscillator.yaml --periods 2 --vary A=0:0.2 -o @/two");
+  double period;
+  assert_int_equal (sscanf (strchr (cli_file ("two/periodic.csv"), '\n'), "\n0,point,%lf", &period), 1);
+  check_close ("period", period, 5 * PW_PI, 16 * CHECK_EPS * period, "twice 2 pi / 0.8");
 }
 
 TEST (free_period) {
@@ -330,6 +335,10 @@ TEST (none) {
                           "value: {harmonic: {amplitude: 1, omega: w, offset: 1}}}\n");
   assert_int_equal (cli_run ("pinwheel periodic @/grow.yaml --vary w=2:3"), 4);
   assert_non_null (strstr (cli_err, "no periodic motion with period 3.14159265 s found")); /* that of w = 2 */
+  assert_int_equal (cli_run ("pinwheel periodic @/grow.yaml --vary w=2:3 --periods 3"), 4);
+  assert_non_null (strstr (cli_err, "no periodic motion with period 9.42477796 s found"));
+  assert_int_equal (cli_run ("pinwheel periodic @/grow.yaml --periods 5"), 4);
+  assert_non_null (strstr (cli_err, "no periodic motion with period 10 s found"));
   assert_int_equal (cli_run ("pinwheel periodic @/oscillator.yaml --set A=0 --period free --guess 6"), 4);
   assert_non_null (strstr (cli_err, "Newton's method leads to a steady motion or an equilibrium"));
 }

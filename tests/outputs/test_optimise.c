@@ -71,6 +71,18 @@ TEST (constraint) {
   assert_non_null (strstr (cli_out, "at least -5"));
 }
 
+/* Three unknowns and two constraints, both reached: the derivatives of each of them decide. */
+TEST (constraints) {
+  cli_shell ("pinwheel optimise @/point.yaml --maximise p.x+p.y+p.phi --free a=-3:3 --free b=-3:3 --free p.omega=-3:3 "
+             "--subject-to 'p.x^2+p.y^2 <= 2' --subject-to 'p.y+2*p.phi <= 3' --starts 1 --json @/o.json");
+  const char *json = cli_file ("o.json");
+  /* p.phi = (3 - p.y) / 2: the highest point of p.x + p.y / 2 + 3 / 2 over the disc */
+  check_close ("a", optimise_value (json, "a"), sqrt (2 / 1.25), 1e-6, "the allowance, 1e-7 of 2");
+  check_close ("b", optimise_value (json, "b"), sqrt (2 / 1.25) / 2, 1e-6, "the allowance");
+  check_close ("p.omega", optimise_value (json, "p.omega"), 1.5 - sqrt (2 / 1.25) / 4, 1e-6, "the allowance");
+  assert_in_range (cli_number (json, "derivatives", NULL), 1, 40);
+}
+
 TEST (bound) {
   cli_shell (
       "pinwheel optimise @/point.yaml --maximise p.x --free a=-2:0.5 --free p.vy=0:1 --json @/o.json -o @/o.yaml");
@@ -132,6 +144,48 @@ TEST (edge) {
         "--starts 1 --set b=0.1 --json @/o.json",
         options[i]));
     check_close ("a", optimise_value (cli_file ("o.json"), "a"), 0.25, 1e-3, "square root of 1e-6");
+  }
+}
+
+/* The search begins near the edge, and its first steps fail: they must not count as good as the first run, nor as
+ * nearer to what a constraint requires. */
+TEST (failing_first) {
+  static const char *const options[] = { "--minimise '(p.x + 1.5)^2 + 0*sqrt(0.3 - p.x)'",
+                                         "--minimise '(p.x + 1.5)^2 + p.y^2 + 0*sqrt(0.3 - p.x)' --free b=-1:1",
+                                         "--minimise '(p.x + 1.5)^2 + 0*sqrt(0.3 - p.x)' --subject-to 'p.x<=1'",
+                                         "--minimise 'p.x^2 + 0*sqrt(0.3 - p.x)' --subject-to 'p.x<=-1.5'",
+                                         "--minimise 'p.x^2 + 0*sqrt(0.3 - p.x)' --subject-to 'p.x>=-9' "
+                                         "--subject-to 'p.x<=-1.5'" };
+  for (size_t i = 0; i < sizeof options / sizeof *options; i++)
+    for (int k = 0; k < 2; k++) {
+      cli_shell (check_text ("pinwheel optimise @/point.yaml %s --free a=-2:2 --set a=%s --starts 1 --json @/o.json",
+                             options[i], k ? "0.29" : "-0.1"));
+      check_close (options[i], optimise_value (cli_file ("o.json"), "a"), -1.5, 1e-4, "last steps of 1e-7 of 4");
+    }
+}
+
+/* Valleys beside runs that fail.  If these count as good as the best run, or as the worst so far, the searches end
+ * elsewhere. */
+TEST (failing_beside) {
+  static const struct {
+    const char *options;
+    double a;
+  } all[] = {
+    { "--minimise '(p.x - 0.2915)^2 + 30*(p.y + 0.5595405964390703*(p.x - 0.2915))^2 + (p.phi - p.y)^2 + 0*sqrt(0.4915 - "
+      "p.x) - 5' --set a=0.4887 --free p.omega=-1:1",
+      0.2915 },
+    { "--minimise '(p.x + 1.3985)^2 + 5*(p.y + 0.3*p.x)^2 + 0*sqrt(-1.0985 - p.x - 0.5*p.y)' --set a=-1.1085 "
+      "--subject-to 'p.y<=1'",
+      -1.3985 },
+    { "--minimise '(p.x + 0.2053)^2 + 30*(p.y - 0.5614163214483201*(p.x + 0.2053))^2 + (p.phi - p.y)^2 + 0*sqrt(-0.1553 "
+      "- p.x)' --set a=-0.1572 --free p.omega=-1:1 --subject-to 'p.y<=1'",
+      -0.2053 }
+  };
+  for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
+    cli_shell (check_text (
+        "pinwheel optimise @/point.yaml %s --free a=-2:2 --free b=-1:1 --set b=0 --starts 1 --json @/o.json",
+        all[i].options));
+    check_close (all[i].options, optimise_value (cli_file ("o.json"), "a"), all[i].a, 1e-4, "last steps of 1e-7 of 4");
   }
 }
 

@@ -86,6 +86,7 @@ same_lanes 'parameters, work of a signal' ezyroller --t-end 2 --vary m1=lin:0.8:
 same_lanes 'motors' roller-racer --t-end 2 --vary swing=lin:0.4:0.8:5 --vary m1=4,5
 same_lanes 'tyres, without stabilisation' car-tyres --method rk4+none --t-end 2 --vary car.vy=lin:0:1:9
 same_lanes 'springs, runs that fail' andrews-squeezer --method rk4+projection --t-end 0.01 --vary K1.omega=lin:-100:200:5
+same_lanes 'rows with code of their own' n-trailer --t-end 1 --vary n=2,3 --vary w=lin:1:2:8
 same_lanes 'singular configurations' slider-crank --t-end 3 --vary crank.omega=lin:1:5:9
 same_lanes 'order 8' car-two-trailers --method erk8+projection:steps=fixed --t-end 2 --vary car.vx=lin:1:2:5
 same_lanes 'numbers of bodies' n-trailer --t-end 1 --vary n=1,2,3 --vary tractor.vx=lin:0.5:1:5

@@ -36,6 +36,7 @@ typedef struct {
    * the run succeeded; or NLopt does not know the constraints, and a run that violates one is the best */
   int repeat;
   double least, most; /* extrema of sign x objective in the runs that succeeded */
+  double violated;    /* the largest violation in these, at least 0 */
   pw_error *error;    /* of a run that ends all searches, out of memory */
 } local_search;
 
@@ -206,13 +207,14 @@ static double search_objective (unsigned unknowns, const double *scaled, double 
   return isfinite (most) ? most + (beyond > 0 ? beyond : 1) : 0;
 }
 
-/* The constraints of NLopt: their violations, which are 1 for a run that failed. */
+/* The constraints of NLopt: their violations, for a run that failed more than in all others. */
 static void search_constraints (unsigned count, double *violation, unsigned unknowns, const double *scaled,
                                 double *grad, void *context) {
   local_search *local = context;
   search_evaluate (local, scaled, grad != NULL);
   for (int i = 1; i <= (int)count; i++) {
-    violation[i - 1] = local->failed ? 1 : search_violation (local->problem, i, local->output);
+    violation[i - 1] = local->failed ? 1 + local->violated : search_violation (local->problem, i, local->output);
+    local->violated = fmax (local->violated, local->failed ? 0 : violation[i - 1]);
     search_gradient (local, i, search_factor (local->problem, i), grad ? grad + (unsigned)(i - 1) * unknowns : NULL);
   }
 }
