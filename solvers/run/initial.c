@@ -54,7 +54,11 @@ static const double INITIAL_AMPLIFIED = 10, INITIAL_CHANGE = 0.1;
 static const double INITIAL_ROUND = 1e-10;
 /* A column of G (rows of length 1) is independent of others if a part longer than this is left of it. */
 static const double INITIAL_INDEPENDENT = 1e-7;
-enum { INITIAL_ATTEMPTS = 200 };
+/* The most attempts to keep values.  In scenes of more coordinates than this, attempts and searches are fewer in
+ * inverse proportion to them, so that the costs do not grow faster than those of one search. */
+enum { INITIAL_ATTEMPTS = 200, INITIAL_SMALL = 100 };
+/* Below this share of them, many values are prescribed in one step. */
+static const double INITIAL_SMALL_SHARE = 0.1;
 
 /* Importance of a value. */
 enum {
@@ -89,7 +93,8 @@ typedef struct {
   pw_scatter_map map;                   /* of the matrix */
   pw_sparse matrix;
   double least; /* the largest change of a candidate in the least change of all */
-  int attempts, out_of_memory;
+  double share; /* of the most attempts and searches: less than 1 in large scenes */
+  int attempts, most_attempts, most_iterations, out_of_memory;
   int failed_row;   /* the equation that remains violated; -1: unknown */
   double failed_by; /* [m, rad, m/s, rad/s] */
   char *memory;
@@ -238,8 +243,8 @@ static double initial_step (initial_search *x, double damping, pw_residuals *now
 }
 
 /* Levenberg and Marquardt's method from the positions x->value, with those of infinite weight at their targets, to
- * round-off.  1 if it converges; 0: x->failed_row, and where it ends.  *iterations (or NULL): their number. */
-static int initial_converge (initial_search *x, int *iterations) {
+ * round-off.  1 if it converges within so many iterations; 0: x->failed_row, and where it ends. */
+static int initial_converge (initial_search *x, int iterations) {
   pw_run *r = x->r;
   const size_t bytes = (size_t)x->s->coords * sizeof (double), rows = (size_t)x->rows * sizeof (double);
   double *before = r->scratch + x->s->rows; /* residuals at x->last */
@@ -251,7 +256,7 @@ static int initial_converge (initial_search *x, int *iterations) {
   initial_units (x);
   const double accepted = PW_RESIDUAL_ACCEPTED * pw_largest_angle (x->s, r->q);
   double sum = initial_objective (x, &now), damping = fmin (1e-2, now.position), previous = INFINITY;
-  for (; n < INITIAL_ITERATIONS && isfinite (sum) && now.position > PW_RESIDUAL_CONVERGED && slow < INITIAL_SLOW; n++) {
+  for (; n < iterations && isfinite (sum) && now.position > PW_RESIDUAL_CONVERGED && slow < INITIAL_SLOW; n++) {
     const int near = now.position <= INITIAL_NEAR;
     if (near && now.position > previous / 4) break; /* at round-off, since convergence is quadratic */
     previous = near ? now.position : INFINITY;
@@ -273,7 +278,6 @@ static int initial_converge (initial_search *x, int *iterations) {
     damping = fmax (damping * (next < 0.1 * sum ? 0.01 : 0.1), INITIAL_LEAST_DAMPING);
     sum = next;
   }
-  if (iterations) *iterations = n;
   if (now.position <= accepted) return 1;
   x->failed_row = now.row_position;
   if (now.row_position >= 0) x->failed_by = fabs (x->residual[now.row_position]);
@@ -302,7 +306,7 @@ static void initial_relax (initial_search *x) {
     for (int j = 0; j < n; j++)
       if (pw_is_angle (x->s, j)) most = fmax (most, fabs (x->step[j]));
     for (int j = 0; j < n; j++) x->value[j] += INITIAL_RELAXED / most * x->step[j];
-    if (initial_converge (x, NULL) && initial_distance (x) < 0.9999 * before) continue;
+    if (initial_converge (x, x->most_iterations) && initial_distance (x) < 0.9999 * before) continue;
     memcpy (x->value, x->nearest, (size_t)n * sizeof (double));
     return;
   }
@@ -323,7 +327,7 @@ static void initial_begin (initial_search *x, int n, int free) {
 static int initial_search_positions (initial_search *x) {
   const pw_system *s = x->s;
   const size_t bytes = (size_t)s->coords * sizeof (double);
-  const int starts = s->coords <= 100 ? INITIAL_STARTS : 1 + 100 * INITIAL_STARTS / s->coords;
+  const int starts = (int)fmax (2, INITIAL_STARTS * x->share);
   int free = 0, mass = 0, found = 0, failed_row = -1;
   double failed_by = 0;
   initial_change best = { .sum = INFINITY };
@@ -336,7 +340,7 @@ static int initial_search_positions (initial_search *x) {
     for (int stage = n == 0 && mass ? -1 : 0; stage < INITIAL_STAGES && !converged; stage++) {
       if (stage <= 0) initial_begin (x, n, free);
       initial_stage_weights (x, stage);
-      converged = initial_converge (x, NULL);
+      converged = initial_converge (x, x->most_iterations);
     }
     if (n == 0) failed_row = x->failed_row, failed_by = x->failed_by;
     if (converged && n > 0) initial_relax (x);
@@ -368,12 +372,11 @@ static int initial_reach (initial_search *x, double least_part) {
   while (done < 1 && part >= least_part) {
     const double to = fmin (1, done + part);
     double most = 0;
-    int iterations;
     for (int j = 0; j < n; j++) x->target[j] = to == 1 ? x->given[j] : x->from[j] + to * (x->given[j] - x->from[j]);
-    const int converged = initial_converge (x, &iterations);
+    const int converged = initial_converge (x, INITIAL_QUADRATIC);
     for (int j = 0; j < n; j++)
       if (pw_is_angle (x->s, j)) most = fmax (most, fabs (x->value[j] - x->nearest[j]));
-    if (converged && iterations <= INITIAL_QUADRATIC && most <= INITIAL_STEP) {
+    if (converged && most <= INITIAL_STEP) {
       done = to, part *= 2;
       memcpy (x->nearest, x->value, bytes);
     } else {
@@ -531,10 +534,11 @@ static int initial_try (initial_search *x, int first, int end) {
   memcpy (x->best, x->value, bytes);
   for (int i = first; i < end; i++) x->importance[x->list[i]] = INITIAL_KEPT;
   x->attempts++;
-  int status = x->level == INITIAL_VELOCITIES
-                   ? initial_prescribe_velocities (x, INITIAL_KEPT)
-                   : initial_reach (x, end - first > 1 ? INITIAL_PART_OF_MANY : INITIAL_PART);
-  if (status == PW_OK && !(initial_changes (x).candidate <= fmax (INITIAL_AMPLIFIED * x->least, INITIAL_CHANGE)))
+  const double part = x->share < INITIAL_SMALL_SHARE ? 1 : end - first > 1 ? INITIAL_PART_OF_MANY : INITIAL_PART;
+  int status =
+      x->level == INITIAL_VELOCITIES ? initial_prescribe_velocities (x, INITIAL_KEPT) : initial_reach (x, part);
+  if (status == PW_OK && x->level == INITIAL_POSITIONS &&
+      !(initial_changes (x).candidate <= fmax (INITIAL_AMPLIFIED * x->least, INITIAL_CHANGE)))
     status = PW_RETRY;
   if (status != PW_RETRY) return status;
   memcpy (x->value, x->best, bytes);
@@ -542,19 +546,19 @@ static int initial_try (initial_search *x, int first, int end) {
   return PW_RETRY;
 }
 
-/* Keeps as many of the values list[0] .. list[count - 1] as possible, the first ones first; the others become free.
- * Returns their number, or an error. */
+/* Keeps as many of the values list[0] .. list[count - 1] as possible, the first ones first; the others become free.  All
+ * are tried at once, then few, and twice as many after each success.  Returns the number of the others, or an error. */
 static int initial_keep_list (initial_search *x, int count) {
-  int released = 0, status = PW_OK;
-  for (int i = 0, size = count; i < count && status >= 0;) {
-    if (size > count - i) size = count - i;
-    status = x->attempts < INITIAL_ATTEMPTS ? initial_try (x, i, i + size) : PW_RETRY;
+  int released = 0, status = PW_OK, first = 0;
+  for (int size = count; first < count && status >= 0;) {
+    if (size > count - first) size = count - first;
+    status = x->attempts < x->most_attempts ? initial_try (x, first, first + size) : PW_RETRY;
     if (status == PW_OK) {
-      i += size, size *= 2;
-    } else if (status == PW_RETRY && size > 1 && x->attempts < INITIAL_ATTEMPTS) {
-      size /= 2;
+      first += size, size *= 2;
+    } else if (status == PW_RETRY && size > 1 && x->attempts < x->most_attempts) {
+      size = first == 0 && size == count ? 1 : size / 2;
     } else if (status == PW_RETRY) {
-      x->importance[x->list[i++]] = INITIAL_FREE;
+      x->importance[x->list[first++]] = INITIAL_FREE;
       released++;
     }
   }
@@ -631,6 +635,9 @@ static int initial_open (initial_search *x, pw_run *r, initial_level level, cons
   const pw_system *s = r->s;
   const size_t n = (size_t)s->coords, rows = (size_t)s->rows;
   *x = (initial_search){ .r = r, .s = s, .level = level, .failed_row = -1 };
+  x->share = fmin (1, (double)INITIAL_SMALL / s->coords);
+  x->most_attempts = (int)fmax (8, INITIAL_ATTEMPTS * x->share);
+  x->most_iterations = (int)fmax (20, INITIAL_ITERATIONS * x->share);
   x->rows = level == INITIAL_VELOCITIES ? s->rows : s->holonomic;
   x->value = level == INITIAL_VELOCITIES ? r->v : r->q;
   x->given = level == INITIAL_VELOCITIES ? r->v_given : r->q_given;
