@@ -27,9 +27,29 @@
 #include "sparse.h"
 #include "util.h"
 
-/* Weights of free values relative to candidates in a search: none of the candidates moves, then little, then alike. */
-enum { INITIAL_STAGES = 4 };
-static const double initial_weight_of_free[INITIAL_STAGES] = { 0, 1e-6, 1e-3, 1 };
+/* Importance of a value. */
+enum {
+  INITIAL_FREE,
+  INITIAL_MASS,          /* left out, of a coordinate with mass, where massless ones can move instead */
+  INITIAL_SPECIFIED = 2, /* 0; one more: not 0.  From here on: candidates */
+  INITIAL_ZERO = 4,      /* as INITIAL_MASS, a position 0 in C, which may be specified */
+  INITIAL_GIVEN = 5,     /* 0; one more: not 0 */
+  INITIAL_KEPT = 7       /* prescribed */
+};
+
+/* Stages of a search: the least importance of values that are prescribed, and the weights of free values relative to
+ * other candidates (0: the metric).  A stage with another set of prescribed values begins anew, except the last set; it
+ * and the others go on where the stage before has failed.  Large scenes skip stages in which free values weigh little,
+ * since these need many iterations. */
+static const struct initial_stage {
+  int prescribed;
+  double weight_of_free;
+} initial_stage[] = {
+  { INITIAL_MASS, 0 },  { INITIAL_SPECIFIED, 0 }, { INITIAL_GIVEN, 1e-6 }, { INITIAL_GIVEN, 1e-3 },
+  { INITIAL_GIVEN, 1 }, { INITIAL_KEPT, 1e-6 },   { INITIAL_KEPT, 1e-3 },  { INITIAL_KEPT, 1 },
+};
+static const int INITIAL_STAGES = sizeof initial_stage / sizeof *initial_stage;
+static const struct initial_stage initial_least_change = { INITIAL_KEPT, 1e-6 };
 
 /* Searches: the distances at which they begin [units of L and rad]; their number in a scene of at most 100 coordinates;
  * where one ends as a solution that is as near as can be told: the changes of candidates, the turn of free angles. */
@@ -41,7 +61,13 @@ static const double INITIAL_LESS = 1e-9;
 
 /* Iterations of a search; those that may hardly reduce the residual; the scaled residual from which Newton's method
  * converges; damping relative to the largest diagonal entry of G W^-1 G^T. */
-enum { INITIAL_ITERATIONS = 60, INITIAL_SLOW = 5, INITIAL_RELAXATIONS = 12, INITIAL_QUADRATIC = 15 };
+enum {
+  INITIAL_ITERATIONS = 60,
+  INITIAL_ITERATIONS_LARGE = 30,
+  INITIAL_SLOW = 5,
+  INITIAL_RELAXATIONS = 12,
+  INITIAL_QUADRATIC = 15
+};
 static const double INITIAL_NEAR = 1e-9, INITIAL_LEAST_DAMPING = DBL_EPSILON / 2, INITIAL_MOST_DAMPING = 1e3,
                     INITIAL_RELAXING = 1e-12;
 /* Largest turn in a step towards a nearer solution, and towards prescribed values; the smallest part of the way in such
@@ -58,17 +84,7 @@ static const double INITIAL_INDEPENDENT = 1e-7;
  * inverse proportion to them, so that the costs do not grow faster than those of one search. */
 enum { INITIAL_ATTEMPTS = 200, INITIAL_SMALL = 100 };
 /* Below this share of them, many values are prescribed in one step. */
-static const double INITIAL_SMALL_SHARE = 0.1;
-
-/* Importance of a value. */
-enum {
-  INITIAL_FREE,
-  INITIAL_MASS,          /* left out, of a coordinate with mass, where massless ones can move instead */
-  INITIAL_SPECIFIED = 2, /* 0; one more: not 0.  From here on: candidates */
-  INITIAL_ZERO = 4,      /* as INITIAL_MASS, a position 0 in C, which may be specified */
-  INITIAL_GIVEN = 5,     /* 0; one more: not 0 */
-  INITIAL_KEPT = 7       /* prescribed */
-};
+static const double INITIAL_SMALL_SHARE = 0.1, INITIAL_GROWTH = 100;
 
 typedef enum { INITIAL_POSITIONS, INITIAL_VELOCITIES } initial_level;
 
@@ -94,7 +110,7 @@ typedef struct {
   pw_sparse matrix;
   double least; /* the largest change of a candidate in the least change of all */
   double share; /* of the most attempts and searches: less than 1 in large scenes */
-  int attempts, most_attempts, most_iterations, out_of_memory;
+  int attempts, most_attempts, out_of_memory;
   int failed_row;   /* the equation that remains violated; -1: unknown */
   double failed_by; /* [m, rad, m/s, rad/s] */
   char *memory;
@@ -190,14 +206,23 @@ static void initial_weights (initial_search *x, const double *metric, int import
   }
 }
 
-/* The weights of a stage of a search; -1: as stage 0, but coordinates of INITIAL_MASS are prescribed, too. */
-static void initial_stage_weights (initial_search *x, int stage) {
-  const pw_system *s = x->s;
-  if (stage <= 0) initial_weights (x, s->metric, stage < 0 ? INITIAL_MASS : INITIAL_SPECIFIED);
-  for (int j = 0; j < s->coords && stage > 0; j++) {
-    const double length = pw_length_factor (s, j);
-    x->weight[j] = length * length * (x->importance[j] >= INITIAL_SPECIFIED ? 1 : initial_weight_of_free[stage]);
+static void initial_stage_weights (initial_search *x, const struct initial_stage *stage) {
+  initial_weights (x, x->s->metric, stage->prescribed);
+  for (int j = 0; j < x->s->coords && stage->weight_of_free > 0; j++) {
+    const double length = pw_length_factor (x->s, j), free = x->importance[j] < INITIAL_SPECIFIED;
+    if (!isinf (x->weight[j])) x->weight[j] = length * length * (free ? stage->weight_of_free : 1);
   }
+}
+
+/* 1 if a stage differs from the ones before it, in the n-th search. */
+static int initial_uses_stage (const initial_search *x, const struct initial_stage *stage, int n) {
+  int mass = 0, given = 0;
+  for (int j = 0; j < x->s->coords; j++) {
+    mass |= x->importance[j] == INITIAL_MASS;
+    given |= x->importance[j] >= INITIAL_GIVEN;
+  }
+  if (x->share < INITIAL_SMALL_SHARE && stage->weight_of_free > 0 && stage->weight_of_free < 1) return 0;
+  return stage->prescribed == INITIAL_MASS ? n == 0 && mass : stage->prescribed != INITIAL_GIVEN || given;
 }
 
 typedef struct {
@@ -255,7 +280,11 @@ static int initial_converge (initial_search *x, int iterations) {
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return 0;
   initial_units (x);
   const double accepted = PW_RESIDUAL_ACCEPTED * pw_largest_angle (x->s, r->q);
-  double sum = initial_objective (x, &now), damping = fmin (1e-2, now.position), previous = INFINITY;
+  double sum = initial_objective (x, &now), previous = INFINITY;
+  /* In long chains damping slows the iteration down: Newton's method, whose residual may grow at first, begins. */
+  const int is_large = x->share < INITIAL_SMALL_SHARE;
+  const double growth = is_large ? INITIAL_GROWTH : 1;
+  double damping = is_large ? INITIAL_LEAST_DAMPING : fmin (1e-2, now.position);
   for (; n < iterations && isfinite (sum) && now.position > PW_RESIDUAL_CONVERGED && slow < INITIAL_SLOW; n++) {
     const int near = now.position <= INITIAL_NEAR;
     if (near && now.position > previous / 4) break; /* at round-off, since convergence is quadratic */
@@ -264,12 +293,12 @@ static int initial_converge (initial_search *x, int iterations) {
     memcpy (x->last, x->value, bytes);
     memcpy (before, x->residual, rows);
     double next = initial_step (x, near ? 0 : damping, &now);
-    while (!near && !(next < sum) && damping < INITIAL_MOST_DAMPING) {
+    while (!near && !(next < growth * sum) && damping < INITIAL_MOST_DAMPING) {
       memcpy (x->residual, before, rows);
       damping = fmax (4 * damping, 1e-12);
       next = initial_step (x, damping, &now);
     }
-    if (!near && !(next < sum)) {
+    if (!near && !(next < growth * sum)) {
       memcpy (x->value, x->last, bytes);
       (void)initial_objective (x, &now);
       break;
@@ -306,7 +335,7 @@ static void initial_relax (initial_search *x) {
     for (int j = 0; j < n; j++)
       if (pw_is_angle (x->s, j)) most = fmax (most, fabs (x->step[j]));
     for (int j = 0; j < n; j++) x->value[j] += INITIAL_RELAXED / most * x->step[j];
-    if (initial_converge (x, x->most_iterations) && initial_distance (x) < 0.9999 * before) continue;
+    if (initial_converge (x, INITIAL_ITERATIONS) && initial_distance (x) < 0.9999 * before) continue;
     memcpy (x->value, x->nearest, (size_t)n * sizeof (double));
     return;
   }
@@ -328,19 +357,19 @@ static int initial_search_positions (initial_search *x) {
   const pw_system *s = x->s;
   const size_t bytes = (size_t)s->coords * sizeof (double);
   const int starts = (int)fmax (2, INITIAL_STARTS * x->share);
-  int free = 0, mass = 0, found = 0, failed_row = -1;
+  int free = 0, found = 0, failed_row = -1;
   double failed_by = 0;
   initial_change best = { .sum = INFINITY };
-  for (int j = 0; j < s->coords; j++) {
-    free += x->importance[j] < INITIAL_SPECIFIED && !x->unused[j];
-    mass |= x->importance[j] == INITIAL_MASS;
-  }
+  for (int j = 0; j < s->coords; j++) free += x->importance[j] < INITIAL_SPECIFIED && !x->unused[j];
   for (int n = 0; n < starts && !(found && (free == 0 || n > INITIAL_STARTS_FOUND)); n++) {
-    int converged = 0;
-    for (int stage = n == 0 && mass ? -1 : 0; stage < INITIAL_STAGES && !converged; stage++) {
-      if (stage <= 0) initial_begin (x, n, free);
+    int converged = 0, begun = INITIAL_FREE;
+    for (const struct initial_stage *stage = initial_stage; stage < initial_stage + INITIAL_STAGES && !converged;
+         stage++) {
+      if (!initial_uses_stage (x, stage, n)) continue;
+      if (stage->prescribed != begun && stage->prescribed < INITIAL_KEPT) initial_begin (x, n, free);
+      begun = stage->prescribed;
       initial_stage_weights (x, stage);
-      converged = initial_converge (x, x->most_iterations);
+      converged = initial_converge (x, INITIAL_ITERATIONS);
     }
     if (n == 0) failed_row = x->failed_row, failed_by = x->failed_by;
     if (converged && n > 0) initial_relax (x);
@@ -373,7 +402,8 @@ static int initial_reach (initial_search *x, double least_part) {
     const double to = fmin (1, done + part);
     double most = 0;
     for (int j = 0; j < n; j++) x->target[j] = to == 1 ? x->given[j] : x->from[j] + to * (x->given[j] - x->from[j]);
-    const int converged = initial_converge (x, INITIAL_QUADRATIC);
+    const int converged =
+        initial_converge (x, x->share < INITIAL_SMALL_SHARE ? INITIAL_ITERATIONS_LARGE : INITIAL_QUADRATIC);
     for (int j = 0; j < n; j++)
       if (pw_is_angle (x->s, j)) most = fmax (most, fabs (x->value[j] - x->nearest[j]));
     if (converged && most <= INITIAL_STEP) {
@@ -592,7 +622,7 @@ static int initial_list_round (initial_search *x) {
 /* Keeps as many candidates as possible, from the least change of all. */
 static int initial_keep (initial_search *x) {
   int released = 1, count = 0, mass = 0;
-  while (released > 0) {
+  while (released > 0 && x->attempts < x->most_attempts) {
     if (x->level == INITIAL_POSITIONS && pw_evaluate_J_at (x->r->w, x->r->t, x->r->q, x->r->v) != PW_OK)
       return PW_METHOD;
     if (initial_select (x) != PW_OK) return PW_RESOURCE;
@@ -637,7 +667,6 @@ static int initial_open (initial_search *x, pw_run *r, initial_level level, cons
   *x = (initial_search){ .r = r, .s = s, .level = level, .failed_row = -1 };
   x->share = fmin (1, (double)INITIAL_SMALL / s->coords);
   x->most_attempts = (int)fmax (8, INITIAL_ATTEMPTS * x->share);
-  x->most_iterations = (int)fmax (20, INITIAL_ITERATIONS * x->share);
   x->rows = level == INITIAL_VELOCITIES ? s->rows : s->holonomic;
   x->value = level == INITIAL_VELOCITIES ? r->v : r->q;
   x->given = level == INITIAL_VELOCITIES ? r->v_given : r->q_given;
@@ -677,7 +706,7 @@ static int initial_positions (initial_search *x) {
 static int initial_velocities (initial_search *x) {
   int status = initial_prescribe_velocities (x, INITIAL_SPECIFIED);
   if (status != PW_RETRY) return status;
-  initial_stage_weights (x, 1);
+  initial_stage_weights (x, &initial_least_change);
   status = initial_project_velocities (x);
   x->least = initial_changes (x).candidate;
   return status == PW_OK ? initial_keep (x) : status;
