@@ -29,6 +29,10 @@ const char *pw_system_body_name (const pw_system *s, int body) {
   return s->body_name[body];
 }
 
+int pw_system_unturned (const pw_system *s, int body) {
+  return pw_is_unturned (s, 3 * body + 2);
+}
+
 int pw_system_jumps (const pw_system *s, double t) {
   const double near = 8 * DBL_EPSILON * fmax (fabs (t), 1); /* round-off of sums of steps, also near 0 */
   /* signals of forces count only if their values may jump: their derivatives are not used */
