@@ -171,9 +171,9 @@ int pw_uses_angle (const pw_workspace *w, const pw_element_batch *k, int e, int 
   const struct {
     pw_batch_function *function;
     int size, width; /* entries; those of each local column in a row, 0: they do not belong to columns */
-  } part[] = { { kind->g, kind->rows, 0 },        { kind->eta, kind->rows, 0 },
-               { kind->gamma, kind->rows, 0 },    { kind->J, kind->rows * cols, 1 },
-               { kind->force, cols, 1 },          { kind->force_u, cols * kind->signals, kind->signals } };
+  } part[] = { { kind->g, kind->rows, 0 },     { kind->eta, kind->rows, 0 },
+               { kind->gamma, kind->rows, 0 }, { kind->J, kind->rows * cols, 1 },
+               { kind->force, cols, 1 },       { kind->force_u, cols * kind->signals, kind->signals } };
   blocks_single one, other;
   double u[3 * PW_MAX_SIGNALS], x[PW_MAX_COLS * PW_MAX_ROWS], y[PW_MAX_COLS * PW_MAX_ROWS];
   if (!pw_kind_is_built_in (kind)) return 1;

@@ -138,8 +138,10 @@ static int compile_arrays (const compilation *job) {
   s->angle_user = compile_alloc (job, bodies, sizeof *s->angle_user);
   s->M = compile_alloc (job, 6 * coords + 3, sizeof *s->M); /* and those after it */
   s->origin = compile_alloc (job, 2 * coords, 1);
-  if (s->source == NULL || s->body_name == NULL || s->angle_user == NULL || s->M == NULL || s->origin == NULL) return PW_RESOURCE;
-  s->mass = s->M + coords, s->metric = s->mass + coords, s->q0 = s->metric + coords, s->v0 = s->q0 + coords, s->constant = s->v0 + coords;
+  if (s->source == NULL || s->body_name == NULL || s->angle_user == NULL || s->M == NULL || s->origin == NULL)
+    return PW_RESOURCE;
+  s->mass = s->M + coords, s->metric = s->mass + coords, s->q0 = s->metric + coords, s->v0 = s->q0 + coords,
+  s->constant = s->v0 + coords;
   return PW_OK;
 }
 

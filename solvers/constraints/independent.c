@@ -1,7 +1,6 @@
 /* Selects the independent constraint equations that a run enforces; the redundant ones are only monitored.
  *
- * The rank is computed at the initial configuration and at up to three consistent ones a short motion away.  During the
- * motion the set may become ill-conditioned while another one is not; then that is selected.  (Garcia de Jalon &
+ * The rank is computed at the initial configuration and at up to three a short motion away.  During the motion the set may become ill-conditioned while another one is not; then that is selected.  (Garcia de Jalon &
  * Gutierrez-Lopez 2013, Multibody dynamics with redundant constraints and singular mass matrix.) */
 #include <math.h>
 #include <stdlib.h>
@@ -150,7 +149,8 @@ static int independent_fail (pw_run *r, pw_row_basis *b, int rank, int n, double
   if (independent_store (r, b->active, (size_t)(s->rows - rank)) != PW_OK) return pw_fail_memory (s, error);
   int i = independent_singular_row (r, q, nearby);
   (void)pw_evaluate_J_at (r->w, r->t, r->q, r->v);
-  if (pw_run_open_saddle (r, error) == PW_RESOURCE) return PW_RESOURCE;
+  int status = pw_run_open_saddle (r, error);
+  if (status != PW_OK) return status;
   pw_run_redundancy (r, i, equation, sizeof equation);
   r->w->failed = NULL;
   if (regular)

@@ -132,7 +132,8 @@ static int massless_undetermined (const pw_system *s, int j, pw_error *error) {
   return pw_fail (error, PW_INPUT,
                   "model %s: %s has no %s, and no constraint determines how it moves%s; give it %s, or constrain it",
                   s->model, PW_NAME (pw_system_state_name, s, j), lacking,
-                  user < 0 ? "" : PW_PRINTED (300, ", although %s %s %s on it", element.kind->name, element.name, depends),
+                  user < 0 ? ""
+                           : PW_PRINTED (300, ", although %s %s %s on it", element.kind->name, element.name, depends),
                   lacking);
 }
 

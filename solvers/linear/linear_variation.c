@@ -100,8 +100,8 @@ double pw_linear_least (pw_linearisation *x) {
   int n = x->n, rank = x->rank;
   double least = INFINITY;
   linear_independent_rows (x);
-  int failed = rank && LAPACKE_dgesvj_work (LAPACK_COL_MAJOR, 'G', 'N', 'N', n, rank, linear_column (x, 0), n, x->row_scratch, 0, NULL,
-                                            1, x->scratch, n + x->m + 3) != 0;
+  int failed = rank && LAPACKE_dgesvj_work (LAPACK_COL_MAJOR, 'G', 'N', 'N', n, rank, linear_column (x, 0), n,
+                                            x->row_scratch, 0, NULL, 1, x->scratch, n + x->m + 3) != 0;
   for (int k = 0; k < rank; k++) least = fmin (least, x->scratch[0] * x->row_scratch[k]);
   return rank && !failed ? least : NAN;
 }
