@@ -1,7 +1,8 @@
 /* Selects the independent constraint equations that a run enforces; the redundant ones are only monitored.
  *
- * The rank is computed at the initial configuration and at up to three a short motion away.  During the motion the set may become ill-conditioned while another one is not; then that is selected.  (Garcia de Jalon &
- * Gutierrez-Lopez 2013, Multibody dynamics with redundant constraints and singular mass matrix.) */
+ * The rank is computed at the initial configuration and at up to three a short motion away.  During the motion the set
+ * may become ill-conditioned while another one is not; then that is selected.  (Garcia de Jalon & Gutierrez-Lopez 2013,
+ * Multibody dynamics with redundant constraints and singular mass matrix.) */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
