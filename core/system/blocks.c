@@ -176,7 +176,6 @@ int pw_uses_angle (const pw_workspace *w, const pw_element_batch *k, int e, int 
                { kind->force, cols, 1 },       { kind->force_u, cols * kind->signals, kind->signals } };
   blocks_single one, other;
   double u[3 * PW_MAX_SIGNALS], x[PW_MAX_COLS * PW_MAX_ROWS], y[PW_MAX_COLS * PW_MAX_ROWS];
-  if (!pw_kind_is_built_in (kind)) return 1;
   blocks_scatter (w, k, e, n, 0, &one, u);
   blocks_scatter (w, k, e, n, 1, &other, u);
   for (size_t f = 0; f < sizeof part / sizeof *part; f++) {

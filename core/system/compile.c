@@ -293,7 +293,8 @@ static int compile_angle_users (const compilation *job) {
       for (int n = 0; n < k->kind->bodies; n++) {
         int b = k->b.body[e * k->kind->bodies + n];
         if (b == s->bodies || s->M[3 * b + 2] > 0 || s->angle_user[b] >= 0) continue;
-        if (pw_uses_angle (w, k, e, n)) s->angle_user[b] = element;
+        if (pw_kind_acts (k->kind) && (!pw_kind_is_built_in (k->kind) || pw_uses_angle (w, k, e, n)))
+          s->angle_user[b] = element;
       }
       for (const pw_source *x = k->source + e * k->kind->signals; x < k->source + (e + 1) * k->kind->signals; x++)
         for (int i = 0; i < x->reads; i++) {

@@ -233,7 +233,7 @@ int pw_block_missing (const pw_workspace *w, const pw_element_batch *k, int e, p
 int pw_find_missing_block (pw_workspace *w, double t, const double *q, const double *v, char *buffer, size_t size);
 
 /* 1 if the equations of element e depend on the angle of its n-th body or its angular velocity, or contribute to the
- * equation of that angle; always of a type that is not built-in. */
+ * equation of that angle, at two irregular states. */
 int pw_uses_angle (const pw_workspace *w, const pw_element_batch *k, int e, int n);
 
 /* A block of element e by central differences, whatever the type provides, but 0 in columns of the ground. */

@@ -141,6 +141,7 @@ static int independent_fail (pw_run *r, pw_row_basis *b, int rank, int n, double
   const pw_system *s = r->s;
   unsigned char *nearby = (unsigned char *)(q + s->coords);
   char equation[250];
+  pw_error why = { 0 };
   int regular = independent_is_regular_nearby (r, b, rank, q);
   (void)independent_rank_nearby (r, b, n, q);
   memcpy (nearby, b->active, (size_t)s->rows);
@@ -150,8 +151,9 @@ static int independent_fail (pw_run *r, pw_row_basis *b, int rank, int n, double
   if (independent_store (r, b->active, (size_t)(s->rows - rank)) != PW_OK) return pw_fail_memory (s, error);
   int i = independent_singular_row (r, q, nearby);
   (void)pw_evaluate_J_at (r->w, r->t, r->q, r->v);
-  int status = pw_run_open_saddle (r, error);
-  if (status != PW_OK) return status;
+  pw_saddle_close (r->saddle);
+  r->saddle = pw_saddle_open (r->w, s->mass, s->rows, r->active, &why);
+  if (r->saddle == NULL) return pw_fail (error, why.status, "%s", why.text);
   pw_run_redundancy (r, i, equation, sizeof equation);
   r->w->failed = NULL;
   if (regular)
