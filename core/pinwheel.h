@@ -776,6 +776,10 @@ const char *pw_system_body_name (const pw_system *s, int body);
 const double *pw_system_mass (const pw_system *s);
 double pw_system_length (const pw_system *s);
 
+/* 1 if a body has no inertia and nothing turns it: no constraint, force or signal depends on its angle or acts on it.
+ * The angle is left out of the equations of motion and keeps its velocity. */
+int pw_system_unturned (const pw_system *s, int body);
+
 /* The initial conditions as described, or set by pw_model_set_initial: coordinates and velocities. */
 const double *pw_system_initial_q (const pw_system *s);
 const double *pw_system_initial_v (const pw_system *s);

@@ -20,13 +20,17 @@ MEMBER (int, pw_system_holonomic, holonomic)
 MEMBER (int, pw_system_signals, sources)
 MEMBER (int, pw_system_ledger_entries, entries)
 MEMBER (const char *, pw_system_name, model)
-MEMBER (const double *, pw_system_mass, mass)
+MEMBER (const double *, pw_system_mass, M)
 MEMBER (double, pw_system_length, scale.length)
 MEMBER (const double *, pw_system_initial_q, q0)
 MEMBER (const double *, pw_system_initial_v, v0)
 
 const char *pw_system_body_name (const pw_system *s, int body) {
   return s->body_name[body];
+}
+
+int pw_system_unturned (const pw_system *s, int body) {
+  return pw_is_unturned (s, 3 * body + 2);
 }
 
 int pw_system_jumps (const pw_system *s, double t) {

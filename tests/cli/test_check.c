@@ -89,7 +89,8 @@ TEST (many_findings) {
 
 TEST (singular) {
   cli_write ("loose.yaml", "pinwheel: 1\nbodies:\n  - {name: a, mass: 1, inertia: 1}\n  - {name: ghost}\n"
-                           "elements:\n  - {pin: A, body: [a, ghost], at: [[1, 0], [0, 0]]}\n");
+                           "elements:\n  - {pin: A, body: [a, ghost], at: [[1, 0], [0, 0]]}\n"
+                           "  - {wheel: W, body: ghost, at: [0, 0]}\n");
   assert_int_equal (cli_run ("pinwheel check @/loose.yaml"), 2);
   cli_shows ("saddle-point matrix                singular; see below");
   cli_shows ("  FAILED: model loose: ");
@@ -99,6 +100,72 @@ TEST (singular) {
   assert_true (cli_says (cli_out, "status", "failed"));
   assert_int_equal (cli_run ("pinwheel check ezyroller --start frame.vx=1e120"), 2);
   cli_shows ("saddle-point matrix                not known\n");
+}
+
+/* ---- Point masses: angles that nothing turns ---- */
+
+/* A point mass on a rod from an arm, with one more element. */
+static void check_point_mass (const char *element) {
+  char text[1000];
+  snprintf (text, sizeof text,
+            "pinwheel: 1\nrun: {t_end: 0.1}\nbodies:\n"
+            "  - {name: m, mass: 1, start: {x: 0.6, y: -0.8}, rate: {omega: 2}}\n"
+            "  - {name: arm, mass: 1, inertia: 1, rate: {omega: 1}}\nelements:\n"
+            "  - {gravity: g, acceleration: [0, -9.81]}\n  - {pin: O, body: [arm, ground], at: [[0, 0], [0, 0]]}\n"
+            "  - {rod: R, body: [m, arm], at: [[0, 0], [0, 0]], length: 1}\n  - {%s}\n",
+            element);
+  cli_write ("point.yaml", text);
+}
+
+TEST (point_mass) {
+  static const char *const good[] = {
+    "spring: S, body: [m, arm], at: [[0, 0], [0.2, 0]], stiffness: 3, damping: 1",
+    "force: F, body: m, at: [0, 0], fx: 1",
+    "drag: D, body: m, linear: 1, quadratic: 2",
+    "slot: P, body: [m, arm], at: [[0, 0], [0, 0]], heading: -0.9272952180016122",
+    "sliding-friction: P, body: [m, arm], at: [[0, 0], [0, 0]], viscous: 1",
+    "torque: T, body: [arm, ground], value: {expression: \"m.x + m.vy\"}",
+    "pfaffian: F, body: [arm, m], a: [0, 0, 1], b: [0, 1, 0]",
+    "marker: M, body: m, at: [0.1, 0]",
+  };
+  for (size_t i = 0; i < sizeof good / sizeof *good; i++) {
+    check_point_mass (good[i]);
+    cli_good ("pinwheel check @/point.yaml");
+    cli_shows ("    m has no inertia: nothing turns it, its angle is left out of the motion\n");
+    cli_shows (strstr (good[i], "slot:") ? "degrees of freedom, configuration  1\n"
+                                         : "degrees of freedom, configuration  2\n");
+    cli_good ("pinwheel check @/point.yaml --json -");
+    cli_shows ("\"unturned\": [\"m\"]");
+  }
+}
+
+/* What reads the angle of a point mass, or acts on it, makes it undetermined, unless constraints determine it. */
+TEST (point_mass_refused) {
+  static const char *const bad[][2] = {
+    { "wheel W", "wheel: W, body: m, at: [0, 0]" },
+    { "speed W", "speed: W, body: m, value: 1" },
+    { "tyre T", "tyre: T, body: m, at: [0, 0], stiffness: 1, speed: 1" },
+    { "force F", "force: F, body: m, at: [0, 0], axes: body, fx: 0" },
+    { "force F", "force: F, body: m, at: [0.1, 0], fx: 0" },
+    { "torque T", "torque: T, body: [m, ground], value: 0" },
+    { "torque T", "torque: T, body: [arm, ground], value: {expression: m.phi}" },
+    { "torque T", "torque: T, body: [arm, ground], value: {expression: m.omega}" },
+    { "rotational-spring S", "rotational-spring: S, body: [arm, m], stiffness: 1, damping: 0" },
+    { "friction F", "friction: F, body: [arm, m], viscous: 1" },
+    { "drag D", "drag: D, body: m, turning: 1" },
+    { "spring S", "spring: S, body: [m, arm], at: [[0, 0.1], [0, 0]], stiffness: 3" },
+  };
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+    check_point_mass (bad[i][1]);
+    assert_int_equal (cli_run ("pinwheel run @/point.yaml"), 2);
+    assert_non_null (strstr (cli_err, "m.phi has no inertia, and no constraint determines how it moves, although "));
+    assert_non_null (strstr (cli_err, bad[i][0]));
+  }
+  check_point_mass ("wheel: W, body: m, at: [0.1, 0]"); /* it determines the angle */
+  cli_good ("pinwheel check @/point.yaml");
+  cli_shows ("    m has no inertia\n");
+  cli_good ("pinwheel check @/point.yaml --json -");
+  cli_shows ("\"unturned\": []");
 }
 
 /* A plug-in's own kind whose force is not the gradient of its energy, and whose force_q is missing. */

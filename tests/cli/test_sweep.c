@@ -168,8 +168,7 @@ TEST (failures) {
 TEST (all_fail) {
   cli_bad ("pinwheel sweep ezyroller --vary omega=1,2 --set c=0 --set d=0 --t-end 0.01 -o @/all.csv", 2,
            "all 2 runs failed, the first one: model ezyroller: steer.phi has no inertia, and no constraint determines "
-           "how it "
-           "moves; give it inertia, or constrain it");
+           "how it moves, although wheel C depends on it; give it inertia, or constrain it");
   assert_non_null (cli_file ("all.csv"));
   cli_bad ("pinwheel sweep tests/scenes/chain.c --vary pull=-1,-2 --t-end 0.01 -o @/none.csv", 2,
            "model chain: the spring\n\"pulls\", -1 N/m does not");
