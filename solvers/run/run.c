@@ -182,6 +182,7 @@ int pw_run_advance (pw_run *r, double t_end, pw_error *error) {
   if (status == PW_OK) status = pw_run_check_resolution (r, error);
   if (status == PW_OK) pw_ledger_record (r);
   if (status == PW_OK) status = run_check_progress (r, before, error);
+  if (status == PW_METHOD) status = pw_dead_point_explain (r, error);
   if (status != PW_OK) return pw_run_annotate_error (r, status, error);
   run_measure_independence (r);
   return PW_OK;
