@@ -13,24 +13,27 @@
 #include "rank.h"
 
 enum { DEAD_STEPS = 600, DEAD_STARTS = 24 }; /* the most steps of a walk, and states at which it tries to begin */
-static const double DEAD_STRIDE = 0.3; /* the longest step, and the largest correction, in units of the scene */
-static const double DEAD_RATIO = 1e4;  /* |x| over the largest prescribed velocity, from which on it is unbounded */
-static const double DEAD_SHARE = 0.1;  /* of the largest power, or force, from which on an element takes part */
+static const double DEAD_STRIDE = 0.3;       /* the longest step, and the largest correction, in units of the scene */
+/* |x| over the largest prescribed velocity: a typical value, and the growth above it that counts as unbounded. */
+static const double DEAD_RATIO = 100, DEAD_GROWTH = 100;
+static const double DEAD_SHARE = 0.1; /* of the largest power, or force, from which on an element takes part */
 
 typedef struct {
   pw_run *r;
   pw_projector projector;
-  double *row_length, *eta, *mu;   /* rows: lengths of the rows of J; eta; multipliers of x */
-  double *x;                       /* coords: scratch */
-  double *state, *next;            /* (q, v, a, lambda): where the walk is; scratch for the next one */
-  double t, ratio;                 /* of `state`; |x| over the largest prescribed velocity there, 0: none */
-  double ahead, step, last_ahead;  /* estimated 2 p (t* - t), INFINITY: |x| does not grow; the last step; ahead before */
+  double *row_length, *eta, *mu;  /* rows: lengths of the rows of J; eta; multipliers of x */
+  double *x;                      /* coords: scratch */
+  double *state, *next, *start;   /* (q, v, a, lambda): where the walk is; scratch for the next; where it begins */
+  double t, ratio;                /* of `state`; |x| over `prescribed` there, 0: no velocities are prescribed */
+  double prescribed;              /* the largest prescribed velocity so far: it may vanish where a drive reverses */
+  double unbounded;               /* the ratio from which on |x| is unbounded */
+  double ahead, step, last_ahead; /* estimated 2 p (t* - t), INFINITY: |x| does not grow; the last step; ahead before */
 } dead_walk;
 
 /* The ratio where J is evaluated, with row lengths, eta and mu.  Columns of angles are divided by L. */
 static double dead_ratio (dead_walk *walk) {
   pw_run *r = walk->r;
-  double square = 0, prescribed = 0;
+  double square = 0, *prescribed = &walk->prescribed;
   memset (walk->row_length, 0, (size_t)r->s->rows * sizeof *walk->row_length);
   PW_EACH_CONSTRAINT (k, r->w)
     for (int i = 0; i < k->b.count * k->kind->rows; i++)
@@ -44,9 +47,9 @@ static double dead_ratio (dead_walk *walk) {
   pw_saddle_solve (r->watchdog.saddle, NULL, walk->eta, walk->x, walk->mu);
   for (int i = 0; i < r->s->rows; i++) {
     square -= walk->mu[i] * walk->eta[i];
-    if (walk->row_length[i] > 0) prescribed = fmax (prescribed, fabs (walk->eta[i]) / walk->row_length[i]);
+    if (walk->row_length[i] > 0) *prescribed = fmax (*prescribed, fabs (walk->eta[i]) / walk->row_length[i]);
   }
-  return prescribed > 0 ? sqrt (square) / prescribed : 0;
+  return *prescribed > 0 ? sqrt (square) / *prescribed : 0;
 }
 
 /* Projects walk->next at time t and makes it the state, unless that moves it by more than `most`, in units of the
@@ -68,21 +71,26 @@ static int dead_move (dead_walk *walk, double t, double most) {
 
 /* Begins at the state last checked.  If that has drifted to or beyond the dead point, where the constraints cannot be
  * satisfied, the walk begins as little earlier as possible, at most by `most`; the distance to such a state grows with
- * the square root of the time. */
+ * the square root of the time.  Earlier states show what is bounded. */
 static int dead_begin (dead_walk *walk, double most) {
   const pw_run *r = walk->r;
   const int coords = r->s->coords;
   const double *q = r->watchdog.previous_q, *v = q + coords + 3;
-  double back = 0, speed = 0;
+  double back = 0, speed = 0, t = NAN, least = INFINITY;
   for (int j = 0; j < coords; j++) speed = fmax (speed, fabs (v[j]) / pw_unit (r->s, j));
-  for (int i = 0; i < DEAD_STARTS; i++) {
+  for (int i = 0; i < DEAD_STARTS && !(least <= DEAD_RATIO); i++) {
     double away = speed > 0 ? DEAD_STRIDE * sqrt (back / most) / speed : 0;
     memcpy (walk->next, q, 2 * ((size_t)coords + 3) * sizeof *q);
     for (int j = 0; j < coords; j++) walk->next[j] -= away * v[j];
-    if (dead_move (walk, r->watchdog.previous_t - back, DEAD_STRIDE) == PW_OK) return PW_OK;
+    if (dead_move (walk, r->watchdog.previous_t - back, DEAD_STRIDE) == PW_OK) {
+      if (isnan (t)) t = walk->t, memcpy (walk->start, walk->state, pw_state_length (r->s) * sizeof *q);
+      least = fmin (least, walk->ratio);
+    }
     back = most * pow (0.25, DEAD_STARTS - 1 - i);
   }
-  return PW_RETRY;
+  walk->unbounded = DEAD_GROWTH * fmax (DEAD_RATIO, least);
+  memcpy (walk->next, walk->start, pw_state_length (r->s) * sizeof *q);
+  return isnan (t) ? PW_RETRY : dead_move (walk, t, DEAD_STRIDE);
 }
 
 /* A step of second order, of a length up to `most`: the free motions are smooth, the projection determines others. */
@@ -107,13 +115,13 @@ static double dead_find (dead_walk *walk, double t_end) {
   const double least = 4 * DBL_EPSILON * fmax (fabs (walk->t), walk->r->w->scale.time);
   double h = (t_end - walk->t) / 100;
   walk->ahead = walk->last_ahead = INFINITY;
-  for (int i = 0; i < DEAD_STEPS && h >= least && !(walk->ratio > DEAD_RATIO); i++) {
+  for (int i = 0; i < DEAD_STEPS && h >= least && !(walk->ratio > walk->unbounded); i++) {
     /* the dead point may be at a distance of about 1 / ratio */
     double most = isfinite (walk->ahead) ? DEAD_STRIDE : DEAD_STRIDE / fmax (1, walk->ratio);
     if (walk->ratio == 0 || walk->t >= t_end) return NAN;
     h = dead_step (walk, h, most) == PW_OK ? fmin (2 * h, walk->ahead / 4) : h / 4;
   }
-  if (!(walk->ratio > DEAD_RATIO)) return NAN;
+  if (!(walk->ratio > walk->unbounded)) return NAN;
   if (!isfinite (walk->ahead)) return walk->t;
   double rate = walk->ahead < walk->last_ahead ? (walk->last_ahead - walk->ahead) / walk->step : 1; /* 1 / (2 p) */
   double t = walk->t + walk->ahead / (isfinite (rate) ? rate : 1);
@@ -143,20 +151,22 @@ static int dead_fail (dead_walk *walk, double t, pw_error *error) {
   char drives[180], elements[180];
   unsigned char *which = (unsigned char *)walk->next; /* 1: a drive that takes part; 2: another element */
   double power = 0, force = 0;
+  int digits = 6; /* fewer for drives on velocities, whose positions have the errors of the method */
   for (int i = 0; i < s->rows; i++) {
     power -= walk->mu[i] * walk->eta[i];
     force = fmax (force, fabs (walk->mu[i]) * walk->row_length[i]);
   }
   for (int i = 0; i < s->rows; i++) {
     int drives_it = -walk->mu[i] * walk->eta[i] > DEAD_SHARE * power;
+    if (drives_it && i >= s->holonomic) digits = 4;
     which[i] = drives_it ? 1 : fabs (walk->mu[i]) * walk->row_length[i] > DEAD_SHARE * force ? 2 : 0;
   }
   dead_list (s, which, 1, drives, sizeof drives);
   dead_list (s, which, 2, elements, sizeof elements);
   if (error) *error = (pw_error){ 0 };
   return pw_fail (error, PW_METHOD,
-                  "t = %.6g s: dead point: %s cannot go on: at the limit of %s, it requires unbounded velocities", t,
-                  drives, *elements ? elements : "its motion");
+                  "t = %.*g s: dead point: %s cannot go on: at the limit of %s, it requires unbounded velocities",
+                  digits, t, drives, *elements ? elements : "its motion");
 }
 
 /* PW_METHOD if a dead point follows the state last checked, up to t_end.  The run stays as it is. */
@@ -165,8 +175,13 @@ static int dead_check (pw_run *r, double t_end, pw_error *error) {
   const size_t n = pw_state_length (r->s), rows = (size_t)r->s->rows;
   dead_walk walk = { .r = r };
   if (watch->saddle == NULL || r->saddle == NULL || r->s->rheonomic == 0 || r->w->failed) return PW_OK;
-  const pw_array array[] = { { &walk.state, n },   { &walk.next, n },  { &walk.row_length, rows },
-                             { &walk.eta, rows }, { &walk.mu, rows }, { &walk.x, (size_t)r->s->coords + 3 } };
+  const pw_array array[] = { { &walk.state, n },
+                             { &walk.next, n },
+                             { &walk.start, n },
+                             { &walk.row_length, rows },
+                             { &walk.eta, rows },
+                             { &walk.mu, rows },
+                             { &walk.x, (size_t)r->s->coords + 3 } };
   char *memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   if (memory == NULL) return PW_OK;
   const pw_statistics statistics = r->statistics;
