@@ -122,6 +122,28 @@ static int check_kinds (pw_check *check, pw_error *error) {
   return status;
 }
 
+/* ---- Gravity ---- */
+
+/* Wheels roll in the plane of the model.  Seen from above, no gravity acts in it, and on a slope of angle a that of
+ * g sin (a), which is below CHECK_SLOPE up to 45 degrees. */
+static const double CHECK_SLOPE = 7; /* m/s^2 */
+
+static void check_gravity (pw_check *check) {
+  int count;
+  const pw_element *element = pw_model_elements (check->model.model, &count), *wheel = NULL;
+  for (const pw_element *e = element; e < element + count && wheel == NULL; e++)
+    if (e->kind->contact && (e->kind->rows || e->kind->force)) wheel = e;
+  for (const pw_element *e = element; e < element + count && wheel; e++) {
+    if (strcmp (e->kind->name, "gravity") != 0) continue;
+    const double *a = ((const pw_gravity *)e->definition)->acceleration, most = hypot (a[0], a[1]);
+    if (most > CHECK_SLOPE)
+      check_add (&check->finding,
+                 "gravity %s acts with %s m/s^2 in the plane in which %s %s rolls: seen from above, gravity is "
+                 "perpendicular to that plane and left out; on a slope of angle a it is 9.81 sin (a)",
+                 pw_element_name (e), PW_DIGITS (most, 4), wheel->kind->name, pw_element_name (wheel));
+  }
+}
+
 /* ---- Linearisation ---- */
 
 /* The fastest eigenvalue, and the largest step of RK4 that is stable for all; both without rigid displacements. */
@@ -165,6 +187,7 @@ static int check_model (pw_check *check, pw_error *error) {
   check->rk4_limit = check->doubling_time = INFINITY;
   check->fastest = -1;
   pw_report_model (&check->model);
+  check_gravity (check);
   check_open_run (check);
   if (check->run) {
     check_given_values (check);
