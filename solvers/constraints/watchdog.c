@@ -105,9 +105,10 @@ static int watchdog_fail_lost (pw_run *r, int contradicts, pw_error *error) {
   int in_position = isnan (now.position) || now.position > now.velocity;
   int row = in_position ? now.row_position : now.row_velocity;
   const char *element = row >= 0 ? PW_NAME (pw_system_row_name, r->s, row) : "a constraint", *advice = "";
-  if (contradicts)
+  if (contradicts) {
     snprintf (cause, sizeof cause, "constraints contradict each other");
-  else if (pw_stabilised_by (r, PW_UNSTABILISED))
+    if (row >= 0) advice = pw_advice_on_wheel (r->s, row);
+  } else if (pw_stabilised_by (r, PW_UNSTABILISED))
     advice = r->fixed_steps ? "; a smaller step or a stabilisation reduces it"
                             : "; a smaller tolerance or a stabilisation reduces it";
   else if (r->fixed_steps)
