@@ -104,6 +104,26 @@ TEST (gravity) {
   }
 }
 
+/* Wheels steered in parallel allow no motion, unlike those of Ackermann's steering and a driven car. */
+TEST (locked_wheels) {
+  static const char *const rest[] = { "heading: 0.3}\n", "heading: atan(1)}\n",
+                                      "heading: 0}\n  - {speed: engine, body: a, at: [0, 0], value: t}\n" };
+  for (int i = 0; i < 3; i++) {
+    cli_write ("locked.yaml",
+               check_text ("pinwheel: 1\nbodies: [{name: a, mass: 1, inertia: 1}]\nelements:\n"
+                           "  - {wheel: left, body: a, at: [-1, 0.5]}\n  - {wheel: right, body: a, at: [-1, -0.5]}\n"
+                           "  - {wheel: other, body: a, at: [1, 0.5], heading: %s}\n"
+                           "  - {wheel: front, body: a, at: [1, -0.5], %s",
+                           i == 0   ? "0.3"
+                           : i == 1 ? "atan(2)"
+                                    : "0",
+                           rest[i]));
+    cli_good ("pinwheel check @/locked.yaml 2>/dev/null");
+    int found = strstr (cli_out, "the wheels allow no motion; wheels that slip sideways are of type tyre") != NULL;
+    if (found != (i == 0)) fail_msg ("%d: %s", i, cli_out);
+  }
+}
+
 TEST (singular) {
   cli_write ("loose.yaml", "pinwheel: 1\nbodies:\n  - {name: a, mass: 1, inertia: 1}\n  - {name: ghost}\n"
                            "elements:\n  - {pin: A, body: [a, ghost], at: [[1, 0], [0, 0]]}\n");
