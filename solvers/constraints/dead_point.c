@@ -71,8 +71,9 @@ static int dead_move (dead_walk *walk, double t, double most) {
 
 /* Begins at the state last checked.  If that has drifted to or beyond the dead point, where the constraints cannot be
  * satisfied, the walk begins as little earlier as possible, at most by `most`; the distance to such a state grows with
- * the square root of the time.  Earlier states show what is bounded. */
-static int dead_begin (dead_walk *walk, double most) {
+ * the square root of the time.  Earlier states show what is bounded.  still: 1 to begin with the least velocities, in the
+ * metric M, in place of the last ones, which may be far off near the dead point. */
+static int dead_begin (dead_walk *walk, double most, int still) {
   const pw_run *r = walk->r;
   const int coords = r->s->coords;
   const double *q = r->watchdog.previous_q, *v = q + coords + 3;
@@ -82,6 +83,7 @@ static int dead_begin (dead_walk *walk, double most) {
     double away = speed > 0 ? DEAD_STRIDE * sqrt (back / most) / speed : 0;
     memcpy (walk->next, q, 2 * ((size_t)coords + 3) * sizeof *q);
     for (int j = 0; j < coords; j++) walk->next[j] -= away * v[j];
+    if (still) memset (walk->next + coords + 3, 0, (size_t)coords * sizeof *q);
     if (dead_move (walk, r->watchdog.previous_t - back, DEAD_STRIDE) == PW_OK) {
       if (isnan (t)) t = walk->t, memcpy (walk->start, walk->state, pw_state_length (r->s) * sizeof *q);
       least = fmin (least, walk->ratio);
@@ -89,8 +91,10 @@ static int dead_begin (dead_walk *walk, double most) {
     back = most * pow (0.25, DEAD_STARTS - 1 - i);
   }
   walk->unbounded = DEAD_GROWTH * fmax (DEAD_RATIO, least);
+  if (isnan (t)) return PW_RETRY;
   memcpy (walk->next, walk->start, pw_state_length (r->s) * sizeof *q);
-  return isnan (t) ? PW_RETRY : dead_move (walk, t, DEAD_STRIDE);
+  (void)dead_move (walk, t, DEAD_STRIDE); /* if it fails, it is too near the dead point: the earlier state remains */
+  return PW_OK;
 }
 
 /* A step of second order, of a length up to `most`: the free motions are smooth, the projection determines others. */
@@ -110,7 +114,7 @@ static int dead_step (dead_walk *walk, double h, double most) {
   return PW_OK;
 }
 
-/* The time of the dead point, NAN if there is none up to t_end. */
+/* The time of the dead point, INFINITY if there is none up to t_end; NAN: not known. */
 static double dead_find (dead_walk *walk, double t_end) {
   const double least = 4 * DBL_EPSILON * fmax (fabs (walk->t), walk->r->w->scale.time);
   double h = (t_end - walk->t) / 100;
@@ -118,14 +122,14 @@ static double dead_find (dead_walk *walk, double t_end) {
   for (int i = 0; i < DEAD_STEPS && h >= least && !(walk->ratio > walk->unbounded); i++) {
     /* the dead point may be at a distance of about 1 / ratio */
     double most = isfinite (walk->ahead) ? DEAD_STRIDE : DEAD_STRIDE / fmax (1, walk->ratio);
-    if (walk->ratio == 0 || walk->t >= t_end) return NAN;
+    if (walk->ratio == 0 || walk->t >= t_end) return INFINITY;
     h = dead_step (walk, h, most) == PW_OK ? fmin (2 * h, walk->ahead / 4) : h / 4;
   }
   if (!(walk->ratio > walk->unbounded)) return NAN;
   if (!isfinite (walk->ahead)) return walk->t;
   double rate = walk->ahead < walk->last_ahead ? (walk->last_ahead - walk->ahead) / walk->step : 1; /* 1 / (2 p) */
   double t = walk->t + walk->ahead / (isfinite (rate) ? rate : 1);
-  return t <= t_end ? t : NAN;
+  return t <= t_end ? t : INFINITY;
 }
 
 /* Names the elements of the rows with which[i] = wanted. */
@@ -192,8 +196,10 @@ static int dead_check (pw_run *r, double t_end, pw_error *error) {
   r->refused_sine = 0;
   if (pw_evaluate_J_at (r->w, watch->previous_t, watch->previous_q, r->v) == PW_OK &&
       pw_projector_open (&walk.projector, r, NULL, NULL, NULL) == PW_OK) {
-    if (dead_begin (&walk, t_end - watch->previous_t) == PW_OK) t = dead_find (&walk, fmin (t_end, r->breakpoint));
-    if (!isnan (t)) status = dead_fail (&walk, t, error);
+    for (int still = 0; still < 2 && isnan (t); still++)
+      if (dead_begin (&walk, t_end - watch->previous_t, still) == PW_OK)
+        t = dead_find (&walk, fmin (t_end, r->breakpoint));
+    if (isfinite (t)) status = dead_fail (&walk, t, error);
     pw_projector_close (&walk.projector);
   }
   free (memory);
@@ -211,6 +217,6 @@ int pw_dead_point_passed (pw_run *r, pw_error *error) {
 
 int pw_dead_point_explain (pw_run *r, pw_error *error) {
   double step = r->fixed_steps ? r->settings.step : r->t - r->watchdog.previous_t;
-  (void)dead_check (r, r->watchdog.previous_t + fmax (10 * step, 0.1 * r->w->scale.time), error);
+  (void)dead_check (r, r->watchdog.previous_t + fmax (10 * step, 0.5 * r->w->scale.time), error);
   return PW_METHOD;
 }
