@@ -272,8 +272,8 @@ static int initial_locked (pw_run *r, pw_error *error) {
   }
   if (*elements == 0) return PW_OK;
   return pw_fail (error, PW_INITIAL,
-                  "model %s: the given velocities would have to be removed entirely: %s allow no such motion%s", s->model,
-                  elements, advice);
+                  "model %s: the given velocities would have to be removed entirely: %s allow no such motion%s",
+                  s->model, elements, advice);
 }
 
 /* Sets of prescribed states, in the order tried: positions and velocities by origin; and whether the positions of

@@ -36,8 +36,8 @@ TEST (long_advice) {
   cli_shows (" --hold a_body_with_a_rather_long_name_5.omega=0\n");
 }
 
-/* A trailer whose axle passes under the hitch, and two wheels of which one passes the other: the constraints are singular
- * there, and eigenvalues become infinite.  The branches end on both sides, without events. */
+/* A trailer whose axle passes under the hitch, and two wheels of which one passes the other: the constraints are
+ * singular there, and eigenvalues become infinite.  The branches end on both sides, without events. */
 TEST (singular_constraints) {
   static const char *const model[] = {
     "pinwheel: 1\nparameters: [{name: d, value: 1, unit: m}]\nbodies:\n"

@@ -1,4 +1,4 @@
-/* Dead points: every method ends with the drive, the time and the elements at their limit; motions that can go on do. */
+/* Dead points: every method ends with the drive, the time and the elements at their limit; other motions go on. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
