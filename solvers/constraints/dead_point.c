@@ -71,8 +71,8 @@ static int dead_move (dead_walk *walk, double t, double most) {
 
 /* Begins at the state last checked.  If that has drifted to or beyond the dead point, where the constraints cannot be
  * satisfied, the walk begins as little earlier as possible, at most by `most`; the distance to such a state grows with
- * the square root of the time.  Earlier states show what is bounded.  still: 1 to begin with the least velocities, in the
- * metric M, in place of the last ones, which may be far off near the dead point. */
+ * the square root of the time.  Earlier states show what is bounded.  still: 1 to begin with the least velocities, in
+ * the metric M, in place of the last ones, which may be far off near the dead point. */
 static int dead_begin (dead_walk *walk, double most, int still) {
   const pw_run *r = walk->r;
   const int coords = r->s->coords;
