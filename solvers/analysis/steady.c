@@ -135,6 +135,7 @@ static int steady_open_branch (pw_steady *x, pw_error *error) {
                                       .tolerance = STEADY_EXACT,
                                       .evaluate = pw_steady_evaluate,
                                       .same = pw_steady_same_motion,
+                                      .check_step = pw_steady_check_step,
                                       .context = x };
   return pw_branch_open (&x->branch, &problem, error);
 }

@@ -769,6 +769,7 @@ static int initial_locked (pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
   double given = 0, left = 0, speed = 0, *Jv = r->scratch, *eta = Jv + s->rows;
   char element[PW_NAME_BYTES], previous[PW_NAME_BYTES] = "", elements[300] = "";
+  const char *advice = "";
   for (int j = 0; j < s->coords; j++) {
     given += s->metric[j] * r->v_given[j] * r->v_given[j];
     left += s->metric[j] * r->v[j] * r->v[j];
@@ -780,13 +781,14 @@ static int initial_locked (pw_run *r, pw_error *error) {
   for (int i = s->holonomic; i < s->rows && strlen (elements) < 150; i++) {
     size_t length = strlen (elements);
     if (fabs (Jv[i] - eta[i]) <= 1e-10 * speed) continue;
-    if (strcmp (pw_system_row_name (s, i, element, sizeof element), previous) != 0)
-      snprintf (elements + length, sizeof elements - length, "%s%s", length ? ", " : "", strcpy (previous, element));
+    if (strcmp (pw_system_row_name (s, i, element, sizeof element), previous) == 0) continue;
+    if (length) advice = pw_advice_on_wheel (s, i);
+    snprintf (elements + length, sizeof elements - length, "%s%s", length ? ", " : "", strcpy (previous, element));
   }
   if (*elements == 0) return PW_OK;
   return pw_fail (error, PW_INITIAL,
-                  "model %s: the given velocities would have to be removed entirely: %s allow no such motion", s->model,
-                  elements);
+                  "model %s: the given velocities would have to be removed entirely: %s allow no such motion%s",
+                  s->model, elements, advice);
 }
 
 int pw_run_make_consistent (pw_run *r, const unsigned char *origin, pw_error *error) {

@@ -87,6 +87,43 @@ TEST (many_findings) {
   cli_shows ("b11.x = 1 m, but the constraints require 0 m\"]");
 }
 
+/* Gravity in the plane in which wheels roll, but not along a slope, nor with markers. */
+TEST (gravity) {
+  static const char *const wheel[] = { "wheel: W, body: a, at: [0, 0]",
+                                       "tyre: W, body: a, at: [0, 0], stiffness: 100, speed: 1",
+                                       "rolling-wheel: W, body: a, at: [0, 0], radius: 0.1, inertia: 0",
+                                       "steered-wheel: W, body: a, at: [0, 0], heading: 0.1",
+                                       "marker: W, body: a, at: [0, 0]" };
+  for (int i = 0; i < 10; i++) {
+    cli_write ("g.yaml", check_text ("pinwheel: 1\nbodies: [{name: a, mass: 1, inertia: 1}]\nelements:\n"
+                                     "  - {%s}\n  - {gravity: G, acceleration: [%s]}\n",
+                                     wheel[i / 2], i % 2 ? "3, -4" : "0, -9.81"));
+    cli_good ("pinwheel check @/g.yaml");
+    int found = strstr (cli_out, "gravity G acts with 9.81 m/s^2 in the plane in which ") != NULL;
+    if (found != (i < 8 && i % 2 == 0)) fail_msg ("%s: %s", wheel[i / 2], cli_out);
+  }
+}
+
+/* Wheels steered in parallel allow no motion, unlike those of Ackermann's steering and a driven car. */
+TEST (locked_wheels) {
+  static const char *const rest[] = { "heading: 0.3}\n", "heading: atan(1)}\n",
+                                      "heading: 0}\n  - {speed: engine, body: a, at: [0, 0], value: t}\n" };
+  for (int i = 0; i < 3; i++) {
+    cli_write ("locked.yaml",
+               check_text ("pinwheel: 1\nbodies: [{name: a, mass: 1, inertia: 1}]\nelements:\n"
+                           "  - {wheel: left, body: a, at: [-1, 0.5]}\n  - {wheel: right, body: a, at: [-1, -0.5]}\n"
+                           "  - {wheel: other, body: a, at: [1, 0.5], heading: %s}\n"
+                           "  - {wheel: front, body: a, at: [1, -0.5], %s",
+                           i == 0   ? "0.3"
+                           : i == 1 ? "atan(2)"
+                                    : "0",
+                           rest[i]));
+    cli_good ("pinwheel check @/locked.yaml 2>/dev/null");
+    int found = strstr (cli_out, "the wheels allow no motion; wheels that slip sideways are of type tyre") != NULL;
+    if (found != (i == 0)) fail_msg ("%d: %s", i, cli_out);
+  }
+}
+
 TEST (singular) {
   cli_write ("loose.yaml", "pinwheel: 1\nbodies:\n  - {name: a, mass: 1, inertia: 1}\n  - {name: ghost}\n"
                            "elements:\n  - {pin: A, body: [a, ghost], at: [[1, 0], [0, 0]]}\n"

@@ -122,6 +122,36 @@ static int check_kinds (pw_check *check, pw_error *error) {
   return status;
 }
 
+/* ---- Wheels ---- */
+
+/* Wheels roll in the plane of the model.  Seen from above, no gravity acts in it, and on a slope of angle a that of
+ * g sin (a), which is below CHECK_SLOPE up to 45 degrees. */
+static const double CHECK_SLOPE = 7; /* m/s^2 */
+
+static void check_gravity (pw_check *check, const pw_element *gravity, const pw_element *wheel) {
+  const double *a = ((const pw_gravity *)gravity->definition)->acceleration, most = hypot (a[0], a[1]);
+  if (most > CHECK_SLOPE)
+    check_add (&check->finding,
+               "gravity %s acts with %s m/s^2 in the plane in which %s %s rolls: seen from above, gravity is "
+               "perpendicular to that plane and left out; on a slope of angle a it is 9.81 sin (a)",
+               pw_element_name (gravity), PW_DIGITS (most, 4), wheel->kind->name, pw_element_name (wheel));
+}
+
+static void check_wheels (pw_check *check) {
+  int count, prescribed = 0;
+  const pw_linear *linear = &check->linear;
+  const pw_element *element = pw_model_elements (check->model.model, &count), *wheel = NULL;
+  for (const pw_element *e = element; e < element + count; e++) {
+    if (wheel == NULL && e->kind->contact && (e->kind->rows || e->kind->force)) wheel = e;
+    prescribed |= e->kind->eta != NULL;
+  }
+  if (wheel == NULL) return;
+  for (const pw_element *e = element; e < element + count; e++)
+    if (strcmp (e->kind->name, "gravity") == 0) check_gravity (check, e, wheel);
+  if (check->run && linear->positions > 0 && linear->velocities == 0 && !prescribed)
+    check_add (&check->finding, "the wheels allow no motion; wheels that slip sideways are of type tyre");
+}
+
 /* ---- Linearisation ---- */
 
 /* The fastest eigenvalue, and the largest step of RK4 that is stable for all; both without rigid displacements. */
@@ -171,6 +201,7 @@ static int check_model (pw_check *check, pw_error *error) {
     status = check_reference (check, error);
     if (status == PW_OK) status = check_linear (check, error);
   }
+  if (status == PW_OK) check_wheels (check);
   if (status == PW_OK) status = check_kinds (check, error);
   int out_of_memory = check->problem.out_of_memory || check->finding.out_of_memory;
   return status == PW_OK && out_of_memory ? pw_fail (error, PW_RESOURCE, "out of memory") : status;
