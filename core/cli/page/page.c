@@ -10,13 +10,14 @@
 
 /* Integrators in the engine, which has neither SUNDIALS nor KLU. */
 static const char *const page_integrators[] = { "rk4", "erk5", "erk8", NULL };
-#define PAGE_INTEGRATOR "erk8"                    /* in place of one of the model with fixed steps, which takes longer */
+#define PAGE_INTEGRATOR "erk8" /* in place of one of the model with fixed steps, which takes longer */
 #define PAGE_METHOD PAGE_INTEGRATOR "+projection" /* in place of a method that has options or that the engine lacks */
 
 typedef struct {
   pw_cli_line line;
-  const char *path;      /* of -o */
-  const char *source[2]; /* the model's source and NULL, if it is used in place of a plug-in */
+  const char *path;        /* of -o */
+  char *source;            /* of the model, if it is used in place of a plug-in */
+  const char *argument[2]; /* then the arguments */
   pw_cli_model compiled;
   pw_page content; /* files for the engine */
   char *base64;    /* scratch: the longest of these files as text */
@@ -145,8 +146,7 @@ static int page_find_source (page *cmd, pw_error *error) {
   int compiled = ending && strcmp (ending, ".so") == 0;
   if (compiled) strcpy (ending, ".c");
   if (compiled && access (path, R_OK) == 0) {
-    cmd->source[0] = path;
-    cmd->line.argument = cmd->source;
+    *(cmd->line.argument = cmd->argument) = cmd->source = path;
     return PW_OK;
   }
   free (path);
@@ -177,7 +177,7 @@ static int page_command (void *options, pw_error *error) {
   if (o) pw_output_finish (o, error);
   pw_run_close (cmd->run);
   free (cmd->base64);
-  free ((void *)cmd->source[0]);
+  free (cmd->source);
   pw_page_close (&cmd->content);
   pw_cli_close_model (&cmd->compiled);
   return error->status;

@@ -133,14 +133,14 @@ function serve () {
 /* ---- The Worker, so that the page responds during a run ---- */
 
 const shortRun = 40, usualRun = 4000, longRun = 8000; /* limits of the computing time of a run [ms] */
-const patience = 300; /* for the result of settings that have changed meanwhile [ms] */
+const patience = 1000; /* for the result of settings that have changed meanwhile [ms] */
 const interrupted = new Error("the settings have changed");
 
 /* An engine in a Worker; on this thread if the browser has no Workers.  One call follows the other. */
 class Service {
-  static async open ({ name, parameters, files: { engine, ...files } }) {
+  static async open ({ files: { engine, ...files }, ...page }) {
     const service = new Service(), code = [bytesOf, importsOf, Engine, serve, "serve();"].join("\n");
-    service.page = { name, parameters, files };
+    service.page = { ...page, files };
     service.url = URL.createObjectURL(new Blob(['"use strict";\n' + code], { type: "text/javascript" }));
     service.module = await WebAssembly.compile(bytesOf(engine));
     service.last = service.ready = service.start();
@@ -291,6 +291,7 @@ function fillPanel () {
   const add = (parent, quantity, about, value, first, domain, set) => unchecked.push({ set, value: first,
     ...control(parent, quantity.name, quantity.unit, about, value, ...rangeOf(first, domain), x => { set(settings, x); simulate(); }) });
   unchecked = [];
+  delete document.documentElement.dataset.narrowed;
   page.parameters.forEach((p, i) => add($("parameters"), p, p.about, settings.parameters[i], p.value, p.domain,
     (s, x) => { s.parameters[i] = x; }));
   page.states.forEach((state, i) => add($("states"), state, "", settings.initial.get(i) ?? state.value, state.value, "real",
@@ -364,7 +365,9 @@ async function showRun (change) {
 
 /* While a slider is held, the address does not change: browsers refuse more than a few changes per second. */
 function setAddress () {
-  history.replaceState(null, "", "#" + link(settings));
+  try {
+    history.replaceState(null, "", "#" + link(settings));
+  } catch (error) { /* a frame whose text is given by srcdoc has no address, as in notebooks */ }
 }
 
 /* Estimates the error of the result of these settings by a reference: erk8+projection with a tolerance of 1e-13. */
@@ -428,11 +431,12 @@ function showValues () {
   fillTable("page-values", run.bodies.flatMap((body, b) => placement(b, at).map((x, k) => [body.name + [".x", ".y", ".phi"][k], x.toPrecision(10)])));
 }
 
-/* One colour for each method; dashes by stabilisation. */
-const methodColours = [...palette, "#5b45c8", "#7a4f2a", "#66a61e", "#d35fc6"];
+/* One colour for each method: warm ones for rk4, greens for erk5, blues for erk8; dashes by stabilisation. */
+const methodColours = ["#7a4f2a", "#cc6622", "#e0556a", "#b08a00", "#808080", "#2299bb", "#228833", "#66a61e",
+  "#5b45c8", "#d35fc6", "#3a74b4", "#aa3377"];
 function methodPen (method) {
   const i = page.methods.findIndex(m => m.name === method);
-  return { colour: methodColours[i % methodColours.length], dash: dashes[i % dashes.length] };
+  return { colour: methodColours[i % methodColours.length], dash: dashes[i % dashes.length], sign: dashSigns[i % dashes.length] };
 }
 
 /* Error over computing time, both logarithmic; the last run is filled, curves of other parameters are faint. */
@@ -478,10 +482,10 @@ function plotRuns () {
 /* The legend of the plot: a button for each curve, which sets the settings of its most accurate run. */
 function fillRunKey (curves) {
   $("page-curves").replaceChildren(...curves.map(curve => {
-    const button = document.createElement("button"), { colour, dash } = methodPen(curve[0].method), { link } = curve[curve.length - 1];
+    const button = document.createElement("button"), pen = methodPen(curve[0].method), { link } = curve[curve.length - 1];
     button.type = "button";
-    button.textContent = curve[0].method + (curve[0].others && ": " + curve[0].others);
-    button.style.borderLeft = "1.2em " + (dash.length ? "dashed " : "solid ") + colour;
+    button.textContent = pen.sign + " " + curve[0].method + (curve[0].others && ": " + curve[0].others);
+    button.style.color = pen.colour;
     button.title = "use the settings of its most accurate run";
     button.addEventListener("click", () => use(link));
     return button;
