@@ -174,7 +174,7 @@ report 'a page begins with a method that chooses its steps, although the model h
   "$pinwheel" page pendulum -o "$work/page.html" --step 0.01 && grep -q '"method": "rk4+projection"' "$work/page.html"
 report 'but with the method of --method, and that of the model for --step' $?
 
-# The name of a model suffices, in any folder; a plug-in alone does not.
+# The name of a model suffices, in any folder, if the source lies next to the plug-in.
 for model in $("$pinwheel" list models | sed -n 's|.*models/\([a-z0-9-]*\)\.so$|\1|p'); do
   (cd "$work" && "$pinwheel" page "$model" -o here.html) >"$work/log" 2>&1 || echo "$model: $(cat "$work/log")"
 done >"$work/failures"

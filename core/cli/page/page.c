@@ -199,10 +199,11 @@ const pw_command pw_cli_page = {
   .name = "page",
   .synopsis = "MODEL -o FILE.html [OPTION...]",
   .summary = "write a page that simulates the model in the browser",
-  .help = "Write one file that needs no network and no server: the model, the integrators rk4, erk5 and erk8, sliders "
-          "for parameters, initial values, tolerance and final time, the animation, curves, and the error at the "
-          "end next to the cost. The options set what the page begins with. A model in C is compiled to WebAssembly by "
-          "clang.",
+  .help =
+      "Write one file that needs no network and no server: the model, the integrators rk4, erk5 and erk8, sliders "
+      "for parameters, initial values, tolerance and final time, the animation, curves, and the error at the "
+      "end next to the cost. The options set what the page begins with; erk8 takes the place of a model's rk4. A model "
+      "in C is compiled from its source to WebAssembly by clang.",
   .options_size = sizeof (page),
   .function = page_command,
   .options = page_options,

@@ -367,7 +367,9 @@ async function showRun (change) {
 function setAddress () {
   try {
     history.replaceState(null, "", "#" + link(settings));
-  } catch (error) { /* a frame whose text is given by srcdoc has no address, as in notebooks */ }
+  } catch (error) {
+    $("page-link").hidden = true; /* in a frame of another document the page has no address of its own */
+  }
 }
 
 /* Estimates the error of the result of these settings by a reference: erk8+projection with a tolerance of 1e-13. */
