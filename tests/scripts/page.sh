@@ -181,9 +181,12 @@ done >"$work/failures"
 mv "$work/failures" "$work/log"
 [ ! -s "$work/log" ] && [ -s "$work/here.html" ]
 report 'pages of all compiled models of the gallery by their names, from another folder' $?
-cp "$(dirname "$pinwheel")/models/ezyroller.so" "$work/alone.so" && "$pinwheel" page "$work/alone.so" -o "$work/x.html" 2>"$work/log"
-[ $? = 2 ] && grep -q 'alone.so: .* no source lies next to the plug-in: name its source, a .c file' "$work/log" && [ ! -e "$work/x.html" ]
-report 'a compiled model without its source is refused' $?
+mkdir "$work/alone" && cp "$(dirname "$pinwheel")/models/ezyroller.so" "$work/alone/alone.so"
+for model in alone "$work/alone/alone.so" "$(dirname "$pinwheel")/models/ezyroller.so"; do
+  PINWHEEL_MODELS=$work/alone "$pinwheel" page "$model" -o "$work/x.html" 2>"$work/log"
+  [ $? = 2 ] && grep -q '\.so: .* name its source, a .c file; .* installed in share/doc/pinwheel/examples' "$work/log" && [ ! -e "$work/x.html" ]
+  report "a compiled model without its source, or one by its path, is refused: ${model##*/}" $?
+done
 "$pinwheel" page snakeboard --method ida+ggl -o "$work/x.html" 2>"$work/log"
 [ $? = 2 ] && grep -q 'pages have rk4, erk5 and erk8' "$work/log" && [ ! -e "$work/x.html" ]
 report 'a method that pages do not have is refused' $?

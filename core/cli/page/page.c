@@ -16,8 +16,8 @@ static const char *const page_integrators[] = { "rk4", "erk5", "erk8", NULL };
 typedef struct {
   pw_cli_line line;
   const char *path;        /* of -o */
-  char *source;            /* of the model, if it is used in place of a plug-in */
-  const char *argument[2]; /* then the arguments */
+  char *source;            /* of the model, in place of a plug-in */
+  const char *argument[2]; /* the arguments with it */
   pw_cli_model compiled;
   pw_page content; /* files for the engine */
   char *base64;    /* scratch: the longest of these files as text */
@@ -139,17 +139,20 @@ static int page_open_files (page *cmd, pw_error *error) {
   return cmd->base64 ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
 }
 
-/* Names the source next to a plug-in, if there is one, instead of the plug-in: browsers need another compilation. */
+static int page_is_plugin (const char *path) {
+  const char *ending = strrchr (path, '.');
+  return ending && strcmp (ending, ".so") == 0;
+}
+
+/* Replaces the name of a plug-in, unless it is a path, by the source next to it: browsers need another compilation. */
 static int page_find_source (page *cmd, pw_error *error) {
-  char *path = pw_file_find (*cmd->line.argument, error);
-  char *ending = path ? strrchr (path, '.') : NULL;
-  int compiled = ending && strcmp (ending, ".so") == 0;
-  if (compiled) strcpy (ending, ".c");
-  if (compiled && access (path, R_OK) == 0) {
-    *(cmd->line.argument = cmd->argument) = cmd->source = path;
-    return PW_OK;
+  const char *model = *cmd->line.argument;
+  if (strchr (model, '/') || page_is_plugin (model)) return PW_OK;
+  char *path = cmd->source = pw_file_find (model, error);
+  if (path && page_is_plugin (path)) {
+    strcpy (strrchr (path, '.'), ".c");
+    if (access (path, R_OK) == 0) *(cmd->line.argument = cmd->argument) = path;
   }
-  free (path);
   return error->status;
 }
 

@@ -95,8 +95,8 @@ int pw_page_open (pw_page *p, const pw_file *f, pw_error *error) {
   const pw_yaml *y = pw_file_yaml (f);
   if (y == NULL && !pw_ends_with (path, ".c"))
     return pw_fail (error, PW_INPUT,
-                    "%s: a page contains the model compiled for browsers, and no source lies next to the plug-in: "
-                    "name its source, a .c file",
+                    "%s: a page contains the model compiled for browsers: name its source, a .c file; "
+                    "those of the gallery are installed in share/doc/pinwheel/examples",
                     path);
   int status = page_engine (p, y ? NULL : path, error);
   return status == PW_OK && y ? page_text (p, f, y, error) : status;
