@@ -267,7 +267,11 @@ function simulate () {
   if (run) { load(result); key(); seek(t); } else begin(result);
   showCost(result, null);
   showValues();
-  history.replaceState(null, "", "#" + link());
+  try {
+    history.replaceState(null, "", "#" + link());
+  } catch (error) {
+    $("page-link").hidden = true; /* in a frame of another document the page has no address of its own */
+  }
   document.documentElement.dataset.simulated = "yes";
   if (!result.reason) estimateTimer = setTimeout(() => estimate(result, used), 300);
 }
