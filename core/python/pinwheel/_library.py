@@ -288,8 +288,14 @@ class Call:
         return self
 
     def __exit__(self, *_):
-        self._active = False  # from here on exceptions of handlers pass, also where this one is not removed
         thread.call = self._outer
+        try:
+            self._active = False  # from here on exceptions of handlers pass
+            self._restore()
+        finally:
+            self._restore()  # what such an exception has left
+
+    def _restore(self):
         for number, handler in self._handlers.items():
             if isinstance(getattr(signal.getsignal(number), "__self__", None), Call):  # no function has set another one
                 signal.signal(number, handler)
@@ -302,6 +308,17 @@ class Call:
                 self.failure = failure
             if self.inside or not self._active:
                 raise
+
+    def passing(self, function, *arguments):
+        """Calls a function in Python that handlers of signals may interrupt; raises also what they have raised in finalizers."""
+        with self:
+            try:
+                self.inside = True
+                result = function(*arguments)
+            finally:
+                self.inside = False
+        self.check(pw_error())
+        return result
 
     def check(self, error) -> None:
         """Raises what a function or a handler has raised, else the exception of the library's error."""

@@ -273,10 +273,7 @@ class Model:
             self._set_signal(model, name, _callback(name, function), None, keep)
             if self.signals.checked.get(name) is not function:
                 call, count = lib.Call(), _derivatives(model.pointer, name.partition(".")[0])
-                with call:
-                    call.inside = True
-                    _check_derivatives(name, function, count, self.defaults["t_end"], call)
-                call.check(error)
+                call.passing(_check_derivatives, name, function, count, self.defaults["t_end"], call)
                 self.signals.checked[name] = function
         cells = {name: c.c_double(value) for name, value in lib.numbers(inputs or {}, "inputs").items()}
         reads_cell = c.cast(lib.core.pw_input_signal, c.c_void_p).value
@@ -494,13 +491,16 @@ def _check_derivatives(name, function, count, t_end, call):
     It is compared at a few times before t_end with central differences of many widths, one of which must agree within 1 %:
     the function may interpolate.  call: the lib.Call during which it is called.
     """
+    def returned(t):
+        return _numbers_of(function(t), name)[::-1]
+
     widths = min(1, t_end / 10) * 0.5 ** np.arange(4, 24)  # [s]
     for i in range(1, count + 1):
         found, size = [], 0.0
         for t in (0.03137 * t_end, 0.17321 * t_end, 0.41231 * t_end):  # arbitrary, hardly a point of a table
             try:
-                given, value = function(t)[i], function(t)[i - 1]
-                slopes = [(function(t + h)[i - 1] - function(t - h)[i - 1]) / (2 * h) for h in widths]
+                value, given = returned(t)[i - 1:i + 1]
+                slopes = [(returned(t + h)[i - 1] - returned(t - h)[i - 1]) / (2 * h) for h in widths]
                 slope = min(slopes, key=lambda x: abs(x - given))
                 if math.isfinite(given + slope):
                     found.append((t, given, slope))
@@ -543,8 +543,8 @@ def _numbers_of(result, name):
     expected = f"signal {name}: expected a number, or value, rate and acceleration"
     try:
         is_number = not hasattr(result, "__len__") or getattr(result, "shape", None) == ()
-        found = [float(x) for x in ([result] if is_number else result)]
-    except (TypeError, ValueError) as failure:
+        found = [float(result)] if is_number else [float(result[i]) for i in range(len(result))]
+    except (TypeError, ValueError, LookupError) as failure:
         raise lib.InputError(f"{expected}: {failure}") from failure
     if len(found) not in (1, 3):
         raise lib.InputError(f"{expected}, found {len(found)} numbers")

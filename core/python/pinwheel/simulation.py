@@ -304,23 +304,25 @@ class Simulation:
             times = self._times(lib.core.pw_run_time(run), t_end, every, times)
             rows = _Rows(lib.core.pw_run_record_width(run), 4096 if times is None else len(times))
             try:
-                self._record(run, times, t_end, rows, progress)
+                call = lib.Call()
+                call.passing(self._record, run, times, t_end, rows, progress, call)
             except BaseException as failure:
-                by_function, method_fails = lib.raised_by_function(failure), isinstance(failure, (lib.MethodError, lib.ResourceError))
-                if by_function:
-                    result = self._result(run, rows, t_end, "failed", f"{by_function}: {type(failure).__name__}: {failure}")
-                elif method_fails:
+                in_function = lib.raised_by_function(failure)
+                if in_function:
+                    result = self._result(run, rows, t_end, "failed", f"{in_function}: {type(failure).__name__}: {failure}")
+                elif isinstance(failure, (lib.MethodError, lib.ResourceError)):
                     result = self._result(run, rows, t_end, "failed", str(failure))
+                    if rows.count:
+                        return result
                 else:
                     what = "interrupted" if isinstance(failure, KeyboardInterrupt) else f"{type(failure).__name__}: {failure}"
                     result = self._result(run, rows, t_end, "stopped", f"{what} at t = {lib.core.pw_run_time(run):.6g} s")
-                if by_function or not method_fails or rows.count == 0:
-                    lib.set_attribute(failure, "result", result)
-                    raise
-                return result
+                lib.set_attribute(failure, "result", result)
+                raise
             return self._result(run, rows, t_end, "ok", "")
 
     def _result(self, run, rows, t_end, status, reason):
+        """The rows as a Result."""
         units, groups = self._columns()
         result = Result(rows.used, groups, units, status, reason, self._statistics(run), self.model,
                         {"method": self.method, "t_end": t_end, **self._given})
@@ -350,8 +352,11 @@ class Simulation:
                                  f"found shape {times.shape}")
         return times
 
-    def _record(self, run, times, t_end, rows=None, progress=False):
-        """Advances and adds the samples at these times, or after every step (None), to the rows, which are returned."""
+    def _record(self, run, times, t_end, rows=None, progress=False, call=None):
+        """Advances and adds the samples at these times, or after every step (None), to the rows, which are returned.
+
+        call: the lib.Call that keeps what handlers of signals raise; None: they may raise in finalizers without effect.
+        """
         rows = rows or _Rows(lib.core.pw_run_record_width(run), len(times))
         start, now = lib.core.pw_run_time(run), lib.core.pw_run_time
         if self._restart:
@@ -366,6 +371,8 @@ class Simulation:
                 report(min(1.0, done))
                 if self._cancelled():
                     raise KeyboardInterrupt
+                if call and call.failure:
+                    raise call.failure
             report(1.0)
         return rows
 
