@@ -6,6 +6,7 @@ tests compare functions, members and constants with the public headers.
 
 from __future__ import annotations
 
+import _signal as signal  # what the module signal wraps in Python, without its conversions: it is used at every call
 import contextlib
 import ctypes as c
 import ctypes.util
@@ -13,7 +14,6 @@ import functools
 import operator
 import os
 import pathlib
-import signal
 import threading
 
 import numpy as np
@@ -248,7 +248,7 @@ class Handle:
 # ---- Calls during which the library calls functions in Python ----
 
 class _Thread(threading.local):
-    call = None  # the innermost Call
+    call: Call | None = None  # the innermost one
 
 
 thread = _Thread()

@@ -527,7 +527,7 @@ def _callback(name, function):
                 result = function(t)
                 call.inside = False
                 # the value last: without one, C has a failure
-                value[2], value[1], value[0] = _numbers_of(result, name)
+                value[2], value[1], value[0] = (math.nan, math.nan, result) if result.__class__ is float else _numbers_of(result, name)
         except BaseException as failure:  # noqa: BLE001: nothing may pass through C
             call.inside, lib.thread.call = False, call
             if call.failure is None:
