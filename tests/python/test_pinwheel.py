@@ -31,7 +31,7 @@ def program(*words):
 
 
 def table(path):
-    rows = list(csv.reader(open(path, encoding="utf-8")))
+    rows = list(csv.reader(path.read_text(encoding="utf-8").splitlines()))
     return {name.split(" [")[0]: np.array(column, float) for name, column in zip(rows[0], zip(*rows[1:]))}
 
 
@@ -194,8 +194,7 @@ def test_every_column_of_the_program_has_its_name_and_unit(model, tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of initial values
         r = pw.Model(model).run(t_end=0.01, every=0.005, energy=True, specialise="never")
-    with open(tmp_path / "t.csv", encoding="utf-8") as file:
-        rows = list(csv.reader(file))
+    rows = list(csv.reader((tmp_path / "t.csv").read_text(encoding="utf-8").splitlines()))
     for cell, column in zip(rows[0], zip(*rows[1:])):
         name, _, unit = cell.partition(" [")
         assert np.array_equal(r[name], np.array(column, float), equal_nan=True) and r.units[name] == unit.rstrip("]"), name
@@ -288,16 +287,6 @@ def test_archives_have_the_numbers_of_tables(tmp_path):
         assert archive.files == list(expected)
         for name in archive.files:
             assert np.array_equal(archive[name], expected[name]), name
-
-
-def test_units_are_those_of_the_program(tmp_path):
-    program("run", "ezyroller", "--t-end", "0.1", "-o", str(tmp_path / "t.csv"))
-    header = next(csv.reader(open(tmp_path / "t.csv", encoding="utf-8")))
-    r = pw.Model("ezyroller").run(t_end=0.1)
-    for cell in header:
-        name, _, unit = cell.partition(" [")
-        if name in r:
-            assert r.units[name] == unit.rstrip("]"), name
 
 
 def test_columns_are_views():
@@ -417,8 +406,7 @@ def test_the_page_of_a_notebook_computes(tmp_path):
         field.value = 2;
         field.dispatchEvent(new Event("change", { bubbles: true }));
         await until(() => root().simulated === "yes");
-        $("verdict") || (document.getElementById("verdict").textContent =
-          [before, root().simulated, $("page-link").hidden, $("reason").textContent].join("|"));""", tmp_path)
+        document.getElementById("verdict").textContent = [before, root().simulated, $("page-link").hidden, $("reason").textContent].join("|");""", tmp_path)
     assert text == "1.5|yes|true|"
 
 
@@ -460,7 +448,7 @@ def test_a_sweep_of_which_all_runs_fail_has_its_columns():
 
 
 def table_of_sweep(path):
-    rows = list(csv.reader(line for line in open(path, encoding="utf-8") if not line.startswith("#")))
+    rows = list(csv.reader(line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")))
     columns = {}
     for name, column in zip(rows[0], zip(*rows[1:])):
         try:

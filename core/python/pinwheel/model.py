@@ -33,7 +33,7 @@ class _System(lib.Handle):
     needed: C objects to which it refers; signals: functions and cells; in_python: whether there are functions in Python.
     """
 
-    _compiling = threading.Lock()  # one specialised code at a time
+    _compiling = threading.RLock()  # one specialised code at a time; a function of a signal may run other models
 
     def __init__(self, pointer, needed, signals, in_python):
         super().__init__(pointer, lib.core.pw_system_free, *needed)
@@ -93,8 +93,9 @@ class _Described:
     def __init__(self, name: str, text: str):
         if not isinstance(name, str) or not name or len(name) > 50 or set(name) & set("/\\\0"):
             raise lib.InputError(f"describe: name = {name!r:.60}: expected at most 50 characters, without / and \\")
-        while _unused_folders:
-            _unused_folders.pop()()
+        with contextlib.suppress(IndexError):
+            while True:
+                _unused_folders.pop()()
         self._name, self._text, folder = name, text, tempfile.mkdtemp(prefix="pinwheel-")
         delete = multiprocessing.util.Finalize(None, shutil.rmtree, (folder, True), exitpriority=0)
         self._delete = functools.partial(_unused_folders.append, delete)
@@ -393,6 +394,9 @@ class Model:
         Raises
         ------
         InputError, InitialError, MethodError
+        Exception
+            What functions in Python and handlers of signals raise, with the samples in its attribute ``result``: see
+            :meth:`Simulation.record`.
         """
         model = self.replace(start=start) if start else self
         end = self.defaults["t_end"] if t_end is None else lib.number(t_end, "t_end")
