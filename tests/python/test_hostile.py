@@ -262,6 +262,26 @@ def test_every_call_passes_exceptions(call):
         eval(f"model.{call}")  # noqa: S307
 
 
+def test_exceptions_stay_in_their_thread():
+    def value(t):
+        time.sleep(1e-4)  # the others continue
+        if t > 0.005 and threading.current_thread().name != "good":
+            raise RuntimeError(threading.current_thread().name)
+        return 0.1
+    model, seen = signals(value), {}
+
+    def work(name):
+        try:
+            seen[name] = model.run("rk4", t_end=0.01).status
+        except RuntimeError as failure:
+            seen[name] = str(failure), failure.result.status
+    threads = [threading.Thread(target=work, args=(name,), name=name) for name in ("a", "good", "b", "c")]
+    for call in (threading.Thread.start, threading.Thread.join):
+        for thread in threads:
+            call(thread)
+    assert seen == {"good": "ok", **{name: (name, "failed") for name in "abc"}}
+
+
 def test_an_interrupt_that_a_function_catches_ends_the_run(alarm):
     """It may have been a library below the function, which then returns anything."""
     def value(t):
