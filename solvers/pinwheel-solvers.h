@@ -175,9 +175,13 @@ const pw_statistics *pw_run_statistics (const pw_run *r);
 const pw_initial_report *pw_run_initial (const pw_run *r);
 const pw_scale *pw_run_scale (const pw_run *r);
 
-/* 1 if making the initial state consistent changed this state (numbered as in pw_system_find_state) by more than
- * round-off. */
+/* Whether making the initial state consistent changed this state (numbered as in pw_system_find_state) by more than
+ * round-off.  0: no; 1: by less than 1e-2 of its unit, as if it were rounded; 2: more.  The unit is L or 1 rad, that of
+ * velocities the largest described one, speed (over L), or L / T (1 rad / T) if all are 0. */
 int pw_initial_moved (const pw_system *s, const pw_initial_report *report, int state);
+/* Why a state that moved could not begin as described: "pin A would be open by 0.02 m", the equation that is violated
+ * most if this state alone has the described value; "" if none is.  Before the run advances.  Returns the buffer. */
+char *pw_run_initial_reason (pw_run *r, int state, char *buffer, size_t size);
 /* 1 if the model or the user specifies the initial value of this state. */
 int pw_initial_specified (const pw_initial_report *report, int state);
 /* 1 if the user gives it: pw_model_set_initial, pw_settings.initial. */

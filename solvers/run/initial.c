@@ -78,6 +78,8 @@ static const double INITIAL_RELAXED = 0.3, INITIAL_STEP = 0.7, INITIAL_PART = 1.
 static const double INITIAL_AMPLIFIED = 10, INITIAL_CHANGE = 0.1;
 /* Changes that may be due to the round-off of other values, relative. */
 static const double INITIAL_ROUND = 1e-10;
+/* Smaller changes, in units of the scene, are those of a value that was rounded. */
+static const double INITIAL_ROUNDED = 1e-2;
 /* A column of G (rows of length 1) is independent of others if a part longer than this is left of it. */
 static const double INITIAL_INDEPENDENT = 1e-7;
 /* The most attempts to keep values.  In scenes of more coordinates than this, attempts and searches are fewer in
@@ -742,17 +744,52 @@ int pw_initial_moved (const pw_system *s, const pw_initial_report *report, int s
   int is_velocity = state >= s->coords, j = is_velocity ? state - s->coords : state;
   double unit = pw_unit (s, j) / (is_velocity ? report->time : 1);
   double from = is_velocity ? report->v_given[j] : report->q_given[j], to = is_velocity ? report->v[j] : report->q[j];
-  return !(fabs (to - from) <= 16 * DBL_EPSILON * (fabs (to) + unit));
+  if (fabs (to - from) <= 16 * DBL_EPSILON * (fabs (to) + unit)) return 0;
+  if (is_velocity && report->speed > 0) unit = report->speed / pw_length_factor (s, j);
+  return fabs (to - from) < INITIAL_ROUNDED * unit ? 1 : 2;
 }
 
 void pw_run_count_moved (pw_run *r) {
-  r->initial.moved = r->initial.changed = 0;
-  r->initial.time = r->w->scale.time;
+  pw_initial_report *report = &r->initial;
+  report->moved = report->changed = report->rounded = 0;
+  report->time = r->w->scale.time;
+  report->speed = 0;
+  for (int j = 0; j < r->s->coords; j++)
+    report->speed = fmax (report->speed, fabs (report->v_given[j]) * pw_length_factor (r->s, j));
   for (int j = 0; j < 2 * r->s->coords; j++) {
-    if (!pw_initial_moved (r->s, &r->initial, j)) continue;
-    r->initial.moved++;
-    r->initial.changed += (r->origin[j] & (PW_GIVEN | PW_SPECIFIED)) == PW_SPECIFIED;
+    const int moved = pw_initial_moved (r->s, report, j), origin = r->origin[j] & (PW_GIVEN | PW_SPECIFIED);
+    report->moved += moved > 0;
+    report->changed += moved > 0 && origin == PW_SPECIFIED;
+    report->rounded += moved == 1 && origin != 0;
   }
+}
+
+char *pw_run_initial_reason (pw_run *r, int state, char *buffer, size_t size) {
+  const pw_system *s = r->s;
+  const int is_velocity = state >= s->coords, j = is_velocity ? state - s->coords : state;
+  double *value = is_velocity ? r->v + j : r->q + j, kept = *value, *Jv = r->scratch, *eta = Jv + s->rows;
+  pw_residuals now = { .row_position = -1, .row_velocity = -1 };
+  *buffer = 0;
+  *value = is_velocity ? r->v_given[j] : r->q_given[j];
+  if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) == PW_OK) {
+    pw_evaluate_residuals (r->w, NULL, &now);
+    if (is_velocity) {
+      pw_mul_J (r->w, r->v, Jv);
+      pw_evaluate_eta (r->w, eta);
+    } else {
+      pw_evaluate_g (r->w, Jv);
+      memset (eta, 0, (size_t)s->rows * sizeof *eta);
+    }
+    const int row = is_velocity ? now.row_velocity : now.row_position;
+    const double by = row < 0 ? 0 : fabs (Jv[row] - eta[row]);
+    const int is_angle = row >= 0 && strcmp (pw_system_reaction_unit (s, row), "N m") == 0;
+    if (by > 0 && (is_velocity ? now.velocity : now.position) > PW_RESIDUAL_ACCEPTED)
+      snprintf (buffer, size, "%s would be %s by %.3g %s%s", PW_NAME (pw_system_row_name, s, row),
+                is_velocity ? "violated" : "open", by, is_angle ? "rad" : "m", is_velocity ? "/s" : "");
+  }
+  *value = kept;
+  (void)pw_evaluate_J_at (r->w, r->t, r->q, r->v);
+  return buffer;
 }
 
 int pw_initial_specified (const pw_initial_report *report, int state) {

@@ -33,17 +33,19 @@ static void check_open_run (pw_check *check) {
     check->redundant = pw_report_redundancies (check->run);
 }
 
-/* Initial values given by the model or the user that the consistent initialisation has changed. */
+/* Initial values specified by the model or given by the user that were changed by more than rounding. */
 static void check_given_values (pw_check *check) {
   const pw_system *s = check->model.system;
   const pw_initial_report *initial = pw_run_initial (check->run);
   for (int i = 0; i < 2 * pw_system_coordinates (s); i++) {
-    if (!pw_initial_moved (s, initial, i) || !pw_initial_specified (initial, i)) continue;
+    char reason[300];
+    if (pw_initial_moved (s, initial, i) < 2 || !pw_initial_specified (initial, i)) continue;
     pw_state_change c = pw_cli_state_change (s, initial, i);
     if (fabs (c.consistent) < 1e-12 * fabs (c.given)) c.consistent = 0; /* round-off */
-    check_add (&check->finding, "%s %s = %s %s, but the constraints require %s %s",
+    pw_run_initial_reason (check->run, i, reason, sizeof reason);
+    check_add (&check->finding, "%s %s = %s %s, which was changed to %s %s%s%s",
                pw_initial_given (initial, i) ? "--start gives" : "the model specifies", c.name, PW_DIGITS (c.given, 10),
-               c.unit, PW_DIGITS (c.consistent, 10), c.unit);
+               c.unit, PW_DIGITS (c.consistent, 10), c.unit, *reason ? "; otherwise " : "", reason);
   }
 }
 

@@ -14,7 +14,7 @@ void pw_report_settings (pw_run *run, const pw_system *system, const char *metho
                          const pw_settings *settings);
 
 /* Derivatives by differences, states changed by the consistent initialisation, redundant constraint equations. */
-void pw_report_initialisation (const pw_run *run, const pw_system *system, const char *const *redundant);
+void pw_report_initialisation (pw_run *run, const pw_system *system, const char *const *redundant);
 
 /* States that the consistent initialisation changes, if it succeeds.  PW_OK or PW_RESOURCE. */
 int pw_report_initial_state (const pw_cli_model *m, pw_error *error);

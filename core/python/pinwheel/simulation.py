@@ -174,11 +174,12 @@ class Simulation:
         s, core, report, changed, texts = self._system.pointer, lib.core, lib.core.pw_run_initial(self._run.pointer), {}, []
         n, x = core.pw_system_coordinates(s), report.contents
         for i in range(2 * n):
-            if not core.pw_initial_moved(s, report, i):
+            moved = core.pw_initial_moved(s, report, i)
+            if not moved:
                 continue
             name = lib.name_of(core.pw_system_state_name, s, i)
             changed[name] = (x.q_given[i], x.q[i]) if i < n else (x.v_given[i - n], x.v[i - n])
-            if self.model._warns_of(report, i):
+            if moved > 1 and self.model._warns_of(report, i):  # not of rounded values
                 texts.append(f"{name} from {changed[name][0]:.10g} to {changed[name][1]:.10g} {lib.text(core.pw_system_state_unit(s, i))}"
                              + ("" if core.pw_initial_given(report, i) else " (specified by the model)"))
         if texts[8:]:
