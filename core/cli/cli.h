@@ -182,6 +182,9 @@ pw_file *pw_cli_file (const pw_cli_line *line, pw_error *error);
 int pw_cli_open (pw_cli_model *m, const pw_cli_line *line, pw_error *error);
 void pw_cli_close_model (pw_cli_model *m);
 
+/* Prints notices of tables that do not cover a run from 0 to t_end, and of rows of their files that are left out. */
+void pw_cli_report_tables (const pw_system *s, double t_end);
+
 /* Reads "NAME=VALUE" of an option.  PW_INPUT if it does not have this form, which messages call `form`. */
 enum { PW_ASSIGNED_NAME = 200 }; /* longest name, its end included */
 int pw_cli_assignment (const char *option, const char *text, const char *form, char name[PW_ASSIGNED_NAME],

@@ -117,6 +117,7 @@ static int linearise_run (pw_linearise_command *cmd, pw_error *error) {
   if (cmd->steady) return PW_OK;
   int status = pw_report_initial_state (&cmd->m, error);
   if (cmd->t == 0 || status != PW_OK) return status;
+  pw_cli_report_tables (cmd->m.system, cmd->t);
   status = linearise_advance (cmd, error);
   return status == PW_OK ? pw_run_restart (cmd->r, NULL, NULL, error) : status;
 }

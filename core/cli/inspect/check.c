@@ -66,6 +66,15 @@ static int check_reference (pw_check *check, pw_error *error) {
   return status;
 }
 
+/* Tables that do not cover the model's run, and rows of their files that are left out. */
+static void check_tables (pw_check *check) {
+  const pw_system *s = check->model.system;
+  const double t_end = pw_cli_defaults (pw_file_table (check->model.file)).t_end;
+  char notice[PW_NOTICE_BYTES];
+  for (int i = 0; i < pw_system_signals (s); i++)
+    if (*pw_system_table_notice (s, i, t_end, notice, sizeof notice)) check_add (&check->finding, "%s", notice);
+}
+
 /* ---- Element types ---- */
 
 /* Tests an element type in random scenes; records the reason if none can be generated. */
@@ -165,6 +174,7 @@ static int check_model (pw_check *check, pw_error *error) {
   check->rk4_limit = check->doubling_time = INFINITY;
   check->fastest = -1;
   pw_report_model (&check->model);
+  check_tables (check);
   check_open_run (check);
   if (check->run) {
     check_given_values (check);

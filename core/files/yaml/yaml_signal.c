@@ -5,11 +5,13 @@
  *   {harmonic: {amplitude: 3, omega: 2}}           and ramp, smooth-step, pulse: their fields are in signal_form.c
  *   {table: {points: [[0, 1], [2, 3]]}}            points
  *   {table: {file: M.csv, columns: [t, M]}}        points of a file, by default in columns 1 and 2
+ *   {table: {file: M.csv, time: t, columns: [M]}}  the same
  *   "M0 * cos (omega * t)"                         an expression of the time t; in forces also of states: BODY.phi
  *   {expression: .., rate: .., acceleration: ..}   the same; in constraints, its time derivatives may be given
  */
 #define _XOPEN_SOURCE 700 /* realpath */
 #include <errno.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "yaml.h"
@@ -62,13 +64,36 @@ static const char *table_unit (const pw_reader *r) {
   return strcmp (choice->choices[chosen], "angle") == 0 ? "rad" : "m";
 }
 
-static int table_file (pw_reader *r, const char *label, const pw_node *node, const pw_node *columns, pw_signal *s) {
-  const char *name, *reason, *column[2] = { "1", "2" }, *const unit[2] = { "s", table_unit (r) };
+/* The columns of times and values: `columns` has both, or that of the values alone if `time` is given; NULL by default. */
+static int table_columns (pw_reader *r, const char *label, const pw_node *columns, const pw_node *time,
+                          const char *column[2]) {
   const char *text = PW_PRINTED (240, "%s: columns", label);
+  const pw_node *value = columns && columns->type == PW_YAML_LIST ? columns->first : NULL;
+  column[0] = column[1] = NULL;
+  if (pw_yaml_list_of (r, columns, text, time ? 1 : 2,
+                       time ? "column, [value], beside time" : "columns, [time, value]") != PW_OK)
+    return r->error->status;
+  pw_yaml_text (r, time ? time : value, PW_PRINTED (240, "%s: %s", label, time ? "time" : "columns"), &column[0]);
+  return pw_yaml_text (r, time || value == NULL ? value : value->next, text, &column[1]);
+}
+
+/* Leaves out rows without a time or value. */
+static void table_skip_gaps (pw_points *table, double *t, double *value) {
+  const int rows = table->count;
+  table->count = 0;
+  for (int i = 0; i < rows; i++) {
+    if (isnan (t[i]) || isnan (value[i])) continue;
+    t[table->count] = t[i];
+    value[table->count++] = value[i];
+  }
+  table->skipped = rows - table->count;
+}
+
+static int table_file (pw_reader *r, const char *label, const pw_node *node, const pw_node *columns,
+                       const pw_node *time, pw_signal *s) {
+  const char *name, *reason, *column[2], *const unit[2] = { "s", table_unit (r) };
   pw_error cause = { 0 };
-  if (pw_yaml_list_of (r, columns, text, 2, "columns, [time, value]") != PW_OK) return r->error->status;
-  pw_yaml_text (r, columns ? columns->first : NULL, text, &column[0]);
-  pw_yaml_text (r, columns ? columns->first->next : NULL, text, &column[1]);
+  if (table_columns (r, label, columns, time, column) != PW_OK) return r->error->status;
   if (pw_yaml_text (r, node, label, &name) != PW_OK) return r->error->status;
   errno = 0;
   FILE *f = table_open (r->y, name, &reason);
@@ -81,19 +106,21 @@ static int table_file (pw_reader *r, const char *label, const pw_node *node, con
   if (t == NULL || pw_model_keep (r->model, t, free) != PW_OK) return pw_yaml_no_memory (r);
   s->table.t = t;
   s->table.value = t + s->table.count;
+  table_skip_gaps (&s->table, t, t + s->table.count);
   return PW_OK;
 }
 
-static const char *const table_keys[] = { "points", "file", "columns" }; /* besides the fields of the form */
+static const char *const table_keys[] = { "points", "file", "columns", "time" }; /* besides the fields of the form */
 
 /* Reads points or columns of a file.  Limits the points of all tables together: many may read the same large file. */
-static int table_points (pw_reader *r, const char *label, const pw_node *node, const pw_node *const v[3],
+static int table_points (pw_reader *r, const char *label, const pw_node *node, const pw_node *const v[4],
                          pw_signal *s) {
-  const pw_node *points = v[0], *file = v[1], *columns = v[2]; /* as table_keys */
+  const pw_node *points = v[0], *file = v[1], *columns = v[2], *time = v[3]; /* as table_keys */
   if ((points != NULL) == (file != NULL))
     return pw_yaml_fail (r, node->at, "%s: a table has either points or a file", label);
   if (points && columns) return pw_yaml_fail (r, columns->at, "%s: columns belong to a file", label);
-  int status = points ? table_list (r, label, points, s) : table_file (r, label, file, columns, s);
+  if (points && time) return pw_yaml_fail (r, time->at, "%s: a column of times belongs to a file", label);
+  int status = points ? table_list (r, label, points, s) : table_file (r, label, file, columns, time, s);
   if (status == PW_OK) r->points += s->table.count;
   if (status != PW_OK || r->points <= PW_YAML_MAX_POINTS) return status;
   return pw_yaml_fail (r, node->at, "%s: the tables up to here have more than %d points, the limit for a model", label,
@@ -113,7 +140,7 @@ static int signal_fields (pw_reader *r, const pw_signal_form *form, const char *
     if (f->type == PW_NUMBER) pw_yaml_number (r, value[i], text, f->domain, at);
     if (f->type == PW_CHOICE) pw_yaml_choice (r, value[i], text, f->choices, at);
     /* 0 in the structure stands for a scale that is not given, which is 1 */
-    if (value[i] && form->type == PW_TABLE && strcmp (f->name, "scale") == 0 && signal->table.scale == 0)
+    if (value[i] && form->type == PW_TABLE && strstr (f->name, "scale") && *(const double *)at == 0)
       pw_yaml_fail (r, value[i]->at, "%s: 0 is not permitted", text);
   }
   return r->error->status;
@@ -138,7 +165,7 @@ static int signal_read_form (pw_reader *r, const pw_kind *kind, const pw_signal_
   int fields = 0, n, is_table = form->type == PW_TABLE;
   *signal = (pw_signal){ .type = form->type };
   for (const pw_field *f = form->fields; f->name; f++) key[fields++] = f->name;
-  for (n = fields; is_table && n < fields + 3; n++) key[n] = table_keys[n - fields];
+  for (n = fields; is_table && n < fields + 4; n++) key[n] = table_keys[n - fields];
   key[n] = NULL;
   if (pw_yaml_keys (r, node, key, PW_PRINTED (100, "a %s", form->name), v) != PW_OK ||
       signal_fields (r, form, label, node, v, signal) != PW_OK ||
