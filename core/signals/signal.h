@@ -40,7 +40,7 @@ static inline double pw_table_value (const pw_signal *s, int i) {
 
 static inline double pw_table_time (const pw_signal *s, int i) {
   double scale = s->table.time_scale == 0 ? 1 : s->table.time_scale;
-  return s->table.time_offset + scale * s->table.t[i];
+  return scale * (s->table.t[i] + s->table.time_offset / scale); /* whole numbers of ms since an epoch stay exact */
 }
 
 /* pw_table_spline and pw_table_eval ignore scales and offsets, which compilation has applied to the points.

@@ -115,7 +115,7 @@ static int data_keep_rows (pw_fit *fit, double *table, int columns, pw_error *er
       pw_cli_number ("--time-offset", fit->time_offset_text, PW_REAL, &offset, error) != PW_OK)
     return error->status;
   for (int i = 0; i < rows; i++) {
-    table[i] = offset + scale * table[i];
+    table[i] = scale * (table[i] + offset / scale);
     kept += table[i] <= t_end;
     if (isnan (table[i])) continue;
     if (timed++ == 0) fit->first = table[i];

@@ -64,17 +64,23 @@ static const char *table_unit (const pw_reader *r) {
   return strcmp (choice->choices[chosen], "angle") == 0 ? "rad" : "m";
 }
 
-/* The columns of times and values: `columns` has both, or that of the values alone if `time` is given; NULL by default. */
+/* The columns of times and values: `columns` has both or, if `time` is given, perhaps that of the values alone; NULL by
+ * default. */
 static int table_columns (pw_reader *r, const char *label, const pw_node *columns, const pw_node *time,
                           const char *column[2]) {
   const char *text = PW_PRINTED (240, "%s: columns", label);
-  const pw_node *value = columns && columns->type == PW_YAML_LIST ? columns->first : NULL;
+  const int count = time && columns && columns->count != 2 ? 1 : 2;
   column[0] = column[1] = NULL;
-  if (pw_yaml_list_of (r, columns, text, time ? 1 : 2,
-                       time ? "column, [value], beside time" : "columns, [time, value]") != PW_OK)
+  if (pw_yaml_list_of (r, columns, text, count, count == 1 ? "column, [value]" : "columns, [time, value]") != PW_OK)
     return r->error->status;
-  pw_yaml_text (r, time ? time : value, PW_PRINTED (240, "%s: %s", label, time ? "time" : "columns"), &column[0]);
-  return pw_yaml_text (r, time || value == NULL ? value : value->next, text, &column[1]);
+  const pw_node *first = columns ? columns->first : NULL;
+  pw_yaml_text (r, time, PW_PRINTED (240, "%s: time", label), &column[0]);
+  pw_yaml_text (r, count == 2 && first ? first->next : first, text, &column[1]);
+  if (count == 1 || r->error->status != PW_OK) return r->error->status;
+  if (time && first && first->type == PW_YAML_SCALAR && strcmp (first->text, column[0]) != 0)
+    return pw_yaml_fail (r, first->at, "%s: the first one is that of the times, but time is \"%.60s\"", text,
+                         column[0]);
+  return pw_yaml_text (r, time ? NULL : first, text, &column[0]);
 }
 
 /* Leaves out rows without a time or value. */
