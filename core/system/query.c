@@ -207,11 +207,11 @@ static char *query_signal_label (const pw_system *s, int signal, char *buffer, s
 static void query_coverage (const pw_points *table, double t_end, char *text, size_t size) {
   const double first = table->t[0], last = table->t[table->count - 1], before = fmin (fmax (first, 0), t_end),
                after = fmin (fmax (t_end - last, 0), t_end), covered = t_end - before - after, least = 1e-9 * t_end;
-  const char *times = PW_PRINTED (80, "the table has times from %.12g to %.12g s", first, last);
+  const char *times = PW_PRINTED (80, "the table has times from %.15g to %.15g s", first, last);
   *text = 0;
   if (first > t_end)
     snprintf (text, size,
-              "%s, after the run, which ends at %.6g s: its first value holds throughout; time_offset: %.12g "
+              "%s, after the run, which ends at %.6g s: its first value holds throughout; time_offset: %.15g "
               "lets it begin at 0",
               times, t_end, -first);
   else if (last < 0)

@@ -70,17 +70,17 @@ static int data_check_sigma (pw_fit *fit, const fit_sigma *given, pw_error *erro
   return PW_OK;
 }
 
-#define FIT_TIMES "--data %s: its times, from %.12g to %.12g s,"
+#define FIT_TIMES "--data %s: its times, from %.15g to %.15g s,"
 
 /* Refuses times that are not those of the run, which does not begin before 0. */
 static int data_check_times (const pw_fit *fit, pw_error *error) {
   const double t_end = fit->t_end, first = fit->first, last = fit->last;
   if (first < 0)
-    return pw_fail (error, PW_INPUT, FIT_TIMES " begin before the run: --time-offset %.12g lets them begin at 0",
+    return pw_fail (error, PW_INPUT, FIT_TIMES " begin before the run: --time-offset %.15g lets them begin at 0",
                     fit->data_path, first, last, -first);
   if (first > t_end)
     return pw_fail (error, PW_INPUT,
-                    FIT_TIMES " are after the run, which ends at %.6g s: give --t-end, or --time-offset %.12g, which "
+                    FIT_TIMES " are after the run, which ends at %.6g s: give --t-end, or --time-offset %.15g, which "
                               "lets them begin at 0",
                     fit->data_path, first, last, t_end, -first);
   if (last > FIT_LONGER * t_end && fit->line.t_end == NULL)
