@@ -6,9 +6,6 @@
 
 title = 'data and fitted model'
 left = 58.0 # for the digits of residuals
-gap = 64.0
-eval two_columns
-panel_height = panel_width*(panel_columns == 1 ? 0.5 : 0.6)
 array lowest[2*panels] # of the data and the model, then of the residuals
 array highest[2*panels]
 do for [i = 1:panels] {
@@ -20,7 +17,12 @@ do for [i = 1:panels] {
   highest[i] = max(data_max, model_max) + sigma_max
   lowest[panels + i] = residual_min - sigma_max
   highest[panels + i] = residual_max + sigma_max
+  left = margin_of(lowest[i], highest[i], 0)
+  left = margin_of(lowest[panels + i], highest[panels + i], 0)
 }
+gap = left + 6
+eval two_columns
+panel_height = panel_width*(panel_columns == 1 ? 0.5 : 0.6)
 residual_height = max(0.6*panel_height, 66.0)
 block_height = panel_height + 8 + residual_height + 40
 legend_top = top

@@ -108,6 +108,6 @@ range(z, lo, hi, n) = (largest = max(abs(lo), abs(hi)), edge = largest > 0 ? 0.1
 margin_of(lo, hi, n) = (largest = max(abs(lo), abs(hi))/10.0**n, extent = abs(hi - lo)/10.0**n, \
   extent = max(extent, largest*(extent > 1e-6*largest ? 1e-6 : 0.2)), \
   whole = largest > 0 ? int(floor(log10(largest))) : 0, step = extent > 0 ? int(floor(log10(extent/5))) : 0, \
-  digits = abs(whole) > 4 ? max(whole - step, 0) + 5 : max(whole, 0) + 1 + (step < 0 ? 1 - step : 0), \
+  digits = abs(whole) > 4 ? max(whole - step, 0) + 6 : max(whole, 0) + 1 + (step < 0 ? 1 - step : 0), \
   max(left, 22 + 5.5*(digits + (lo < 0))))
 axis(label, unit, n) = label.' ['.(n ? sprintf('10^{%d} ', n) : '').unit.']'

@@ -6,9 +6,9 @@
 # run, the unknowns, the output, 1 if the constraints are satisfied.
 
 title = 'runs of the optimisation'
-gap = 40.0
 stats 'optimise.dat' using 2 + unknowns name 'output' nooutput
 left = margin_of(output_min, output_max, 0)
+gap = left - 4
 array lowest[panels]
 array highest[panels]
 do for [i = 1:panels] {
