@@ -283,6 +283,12 @@ void pw_files_close (pw_files *files);
 
 /* PW_INPUT if the path of -o (NULL: none) ends in .npz: NumPy archives cannot contain the texts of some tables. */
 int pw_cli_check_csv (const char *path, pw_error *error);
+/* Whether a name ends as that of a file: ".csv", ".png", ... */
+int pw_cli_names_file (const char *path);
+/* Refuses a file in a format that is not written, and a new folder with the name of a file.  A status. */
+int pw_cli_check_format (const pw_use *use, pw_error *error);
+/* Endings of formats, for pw_use. */
+extern const char *const pw_cli_csv[], *const pw_cli_json[];
 
 /* ---- Messages ---- */
 

@@ -149,7 +149,9 @@ typedef struct {
   const char *what; /* "--json", "the model"; for messages */
   const char *path; /* "-" is standard output; NULL: not used */
   pw_use_how how;
-  const char *const *names; /* PW_WRITES_INTO a folder: endings of the names of the files it gets, NULL at the end */
+  /* NULL at the end: PW_WRITES_INTO a folder: endings of the names of the files it gets; PW_WRITES: endings of formats
+   * that are written (".csv"), NULL for any */
+  const char *const *names;
 } pw_use;
 
 /* Refuses a file that is both read and written, or written twice, under any name: files are compared by device and

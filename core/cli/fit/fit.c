@@ -190,7 +190,6 @@ static int fit_read_data (pw_fit *fit, pw_error *error) {
 /* ---- The command ---- */
 
 #define FIT_RUNS 50.       /* usual number of runs of a search, to choose the engine */
-#define FIT_ITERATIONS 20. /* usual number of iterations of a search, to show progress */
 
 enum { FIT_TABLE = 2, FIT_SUMMARY }; /* indices in the list of files of fit_open */
 
@@ -230,8 +229,8 @@ static int fit_open (pw_fit *fit, pw_error *error) {
   static const char *const figures[] = { "fit.dat", "fit.gp", "fit.svg", "fit.png", "fit.pdf", NULL };
   pw_use use[] = { PW_CLI_MODEL_USE,
                    { "--data", fit->data_path, PW_READS, NULL },
-                   { "-o", fit->table_path, PW_WRITES, NULL },
-                   { "--json", fit->json_path, PW_WRITES, NULL },
+                   { "-o", fit->table_path, PW_WRITES, pw_cli_csv },
+                   { "--json", fit->json_path, PW_WRITES, pw_cli_json },
                    { "--plots", fit->plots_path, PW_WRITES_INTO, figures } };
   int status = fit_options (fit, error);
   if (status == PW_OK) status = pw_cli_open (&fit->model, &fit->line, error);
@@ -242,7 +241,7 @@ static int fit_open (pw_fit *fit, pw_error *error) {
 
 static int fit_search (pw_fit *fit, pw_error *error) {
   pw_stop_catch ();
-  pw_progress_start (&fit->progress, pw_file_name (fit->model.file), "iterations", 0, FIT_ITERATIONS * fit->starts);
+  pw_progress_start (&fit->progress, pw_file_name (fit->model.file), "", 0, 1);
   int status = pw_fit_solve (fit, error);
   pw_progress_end (&fit->progress);
   pw_stop_release ();

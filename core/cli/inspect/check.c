@@ -201,7 +201,7 @@ enum { CHECK_JSON = 1 }; /* index in the list of files of check_command */
 static int check_command (void *options, pw_error *error) {
   pw_check *check = options;
   pw_files files = { .folder = { .made = 0 } };
-  pw_use use[] = { PW_CLI_MODEL_USE, { "--json", check->json_path, PW_WRITES, NULL } };
+  pw_use use[] = { PW_CLI_MODEL_USE, { "--json", check->json_path, PW_WRITES, pw_cli_json } };
   int status = pw_cli_open (&check->model, &check->line, error);
   if (status == PW_OK) status = pw_files_open (&files, &check->line, &check->model, use, 2, error);
   if (status == PW_OK) status = check_model (check, error);

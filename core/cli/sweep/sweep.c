@@ -83,7 +83,7 @@ static int sweep_read_settings (pw_sweep *sweep, pw_error *error) {
 }
 
 static int sweep_open (pw_sweep *sweep, pw_error *error) {
-  pw_use use[] = { PW_CLI_MODEL_USE, { "-o", sweep->path, PW_WRITES, NULL } };
+  pw_use use[] = { PW_CLI_MODEL_USE, { "-o", sweep->path, PW_WRITES, pw_cli_csv } };
   sweep->plan.file = pw_cli_file (&sweep->line, error);
   if (sweep->plan.file == NULL) return error->status;
   int status = sweep_read_settings (sweep, error);
