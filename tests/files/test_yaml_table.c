@@ -349,8 +349,7 @@ TEST (coverage) {
   cli_shell ("pinwheel check @/model/m.yaml");
   assert_non_null (strstr (cli_out, "torque T: value: 2 rows with empty cells are left out of the table"));
   static const char *const command[] = {
-    "sweep @/model/m.yaml --vary a.x=1,2 -t 20 --step 0.1 -o @/s.csv",
-    "compare @/model/m.yaml --methods rk4 -t 20",
+    "sweep @/model/m.yaml --vary a.x=1,2 -t 20 --step 0.1 -o @/s.csv", "compare @/model/m.yaml --methods rk4 -t 20",
     "sensitivity @/model/m.yaml --of a.phi --by a.omega -t 20 --step 0.1",
     "optimise @/model/m.yaml --maximise a.phi --free a.omega=0:1 -t 20 --step 0.1"
   };
