@@ -130,11 +130,9 @@ typedef struct {
   int count;           /* number of points: >= 2; cubic with free ends: >= 4 */
   int interpolation;   /* PW_LINEAR; PW_CUBIC: a spline with continuous first and second derivatives */
   int ends;            /* of a spline: PW_ENDS_FREE: not-a-knot; PW_ENDS_REST: first derivative 0 */
-  int skipped;         /* rows of its file without a value, which are not among the points; for messages only */
   double scale;        /* the signal is offset + scale value; 0 stands for 1 */
   double offset;       /* unit of the signal */
-  double time_scale;   /* a point is at the time time_offset + time_scale t; 0 stands for 1 */
-  double time_offset;  /* [s] */
+  int skipped;         /* rows of its file without a value, which are not among the points; for messages only */
 } pw_points;
 
 /* A signal; zero-initialised, it is the constant 0. */
@@ -766,8 +764,8 @@ char *pw_system_signal_name (const pw_system *s, int signal, char *buffer, size_
 const char *pw_system_signal_unit (const pw_system *s, int signal);
 int pw_system_signal_of_force (const pw_system *s, int signal);
 
-/* What the user should know of a signal that is a table: that its times do not cover a run from 0 to t_end, or that rows
- * of its file are left out.  "torque T: value: ...", in the buffer, which is returned; "" if there is nothing. */
+/* What the user should know of a signal that is a table: that its times do not cover a run from 0 to t_end, or that
+ * rows of its file are left out.  "torque T: value: ...", in the buffer, which is returned; "" if there is nothing. */
 enum { PW_NOTICE_BYTES = 600 }; /* size of buffers in which it fits */
 char *pw_system_table_notice (const pw_system *s, int signal, double t_end, char *buffer, size_t size);
 

@@ -39,6 +39,13 @@ static int files_listed (const char *ending, const char *const *list) {
   return *list != NULL;
 }
 
+/* Whether the format is one of the list; so is that of "a.csv.old" if ".csv" is listed. */
+static int files_written (const char *path, const char *ending, const char *const *list) {
+  const char *within = NULL;
+  for (const char *const *e = list; *e && within == NULL; e++) within = strstr (path, *e);
+  return files_listed (ending, list) || (within && within < ending);
+}
+
 int pw_cli_names_file (const char *path) {
   static const char *const formats[] = { ".csv", ".npz", ".json", ".html", ".yaml", ".svg",
                                          ".png", ".pdf", ".xlsx", ".txt",  NULL };
@@ -54,7 +61,7 @@ int pw_cli_check_format (const pw_use *use, pw_error *error) {
     return pw_fail (error, PW_INPUT, "%s %.200s: expected the name of a folder, in which files are written", use->what,
                     use->path);
   }
-  if (use->names == NULL || files_listed (ending, use->names)) return PW_OK;
+  if (use->names == NULL || files_written (use->path, ending, use->names)) return PW_OK;
   for (const char *const *name = use->names; *name; name++)
     strcat (strcat (list, name == use->names ? "" : name[1] ? ", " : " or "), *name);
   return pw_fail (error, PW_INPUT, "%s %.200s: the format %s is not written: expected a name that ends in %s",

@@ -61,8 +61,8 @@ uint64_t pw_fingerprint_tables (uint64_t sum, const pw_model *m) {
       if (s->type != PW_TABLE) continue;
       size_t bytes = (size_t)s->table.count * sizeof (double);
       sum = pw_check_sum (pw_check_sum (sum ? sum : PW_CHECK, s->table.t, bytes), s->table.value, bytes);
-      const double map[] = { s->table.scale, s->table.offset, s->table.time_scale, s->table.time_offset };
-      sum = pw_check_sum (sum, map, sizeof map);
+      const double map[2] = { s->table.scale, s->table.offset };
+      if (map[0] != 0 || map[1] != 0) sum = pw_check_sum (sum, map, sizeof map);
     }
   return sum;
 }

@@ -32,18 +32,13 @@ static inline int pw_signal_value_may_jump (const pw_signal *s) {
 
 /* ---- Tables (table.c) ---- */
 
-/* The signal at point i of a table, and the time of the point. */
+/* The signal at point i of a table. */
 static inline double pw_table_value (const pw_signal *s, int i) {
   double scale = s->table.scale == 0 ? 1 : s->table.scale;
   return s->table.offset + scale * s->table.value[i];
 }
 
-static inline double pw_table_time (const pw_signal *s, int i) {
-  double scale = s->table.time_scale == 0 ? 1 : s->table.time_scale;
-  return scale * (s->table.t[i] + s->table.time_offset / scale); /* whole numbers of ms since an epoch stay exact */
-}
-
-/* pw_table_spline and pw_table_eval ignore scales and offsets, which compilation has applied to the points.
+/* pw_table_spline and pw_table_eval ignore scale and offset, which compilation has applied to the values.
  * Computes the spline of a checked table, 2 count numbers: the first derivative just after each point (after the last
  * one meaningless), then the second derivatives. */
 void pw_table_spline (const pw_signal *s, double *spline);

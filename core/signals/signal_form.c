@@ -42,9 +42,6 @@ static const pw_field form_table[] = {
     .about = "end conditions of a cubic table: free (not-a-knot), or at rest (zero slope)" },
   { FORM_AT (table, scale), PW_NUMBER, .about = "factor of the values, not 0; omitted: 1" },
   { FORM_AT (table, offset), PW_NUMBER, .about = "added to the scaled values" },
-  { FORM_AT (table, time_scale), PW_NUMBER, .domain = PW_NONNEGATIVE,
-    .about = "factor of the times, such as 1e-3 for ms; omitted: 1" },
-  { FORM_AT (table, time_offset), PW_NUMBER, .unit = "s", .about = "added to the scaled times" },
   { .name = NULL },
 };
 
@@ -85,10 +82,10 @@ static void form_check_pulse (const pw_signal *s, char *text, size_t size) {
 }
 
 static void form_check_points (const pw_signal *s, int *point, char *text, size_t size) {
-  const double *y = s->table.value;
+  const double *t = s->table.t, *y = s->table.value;
   int cubic = s->table.interpolation == PW_CUBIC, least = cubic && s->table.ends == PW_ENDS_FREE ? 4 : 2;
-  if (s->table.count < least || s->table.t == NULL || y == NULL) {
-    int count = s->table.t && y ? s->table.count : 0, used;
+  if (s->table.count < least || t == NULL || y == NULL) {
+    int count = t && y ? s->table.count : 0, used;
     used = snprintf (text, size, "a %s table%s needs at least %d points, found %d", form_interpolation[cubic],
                      least == 4 ? " with free ends" : "", least, count);
     if (s->table.skipped && (size_t)used < size)
@@ -96,18 +93,17 @@ static void form_check_points (const pw_signal *s, int *point, char *text, size_
     return;
   }
   for (int i = 0; i < s->table.count && !*text; i++) {
-    double t = pw_table_time (s, i), last = i > 0 ? pw_table_time (s, i - 1) : -INFINITY;
     *point = i;
-    if (!isfinite (t) || !isfinite (y[i]))
-      snprintf (text, size, "point %d is (%g, %g): expected finite numbers", i + 1, t, y[i]);
+    if (!isfinite (t[i]) || !isfinite (y[i]))
+      snprintf (text, size, "point %d is (%g, %g): expected finite numbers", i + 1, t[i], y[i]);
     else if (!isfinite (pw_table_value (s, i)))
       snprintf (text, size, "point %d: offset + scale * %g is not finite", i + 1, y[i]);
-    else if (!(t > last))
-      snprintf (text, size, "point %d is at t = %.9g s, after one at %.9g s: expected increasing times", i + 1, t,
-                last);
-    else if (i > 0 && !isfinite ((pw_table_value (s, i) - pw_table_value (s, i - 1)) / (t - last)))
-      snprintf (text, size, "points %d (%g, %g) and %d (%g, %g): the slope between them is not finite", i, last,
-                y[i - 1], i + 1, t, y[i]);
+    else if (i > 0 && !(t[i] > t[i - 1]))
+      snprintf (text, size, "point %d is at t = %.9g s, after one at %.9g s: expected increasing times", i + 1, t[i],
+                t[i - 1]);
+    else if (i > 0 && !isfinite ((pw_table_value (s, i) - pw_table_value (s, i - 1)) / (t[i] - t[i - 1])))
+      snprintf (text, size, "points %d (%g, %g) and %d (%g, %g): the slope between them is not finite", i, t[i - 1],
+                y[i - 1], i + 1, t[i], y[i]);
   }
   if (!*text) *point = -1;
 }

@@ -9,13 +9,11 @@ static int signals_table (pw_system *s, pw_source *source, const char *element, 
   size_t n = (size_t)table->count;
   double *t = pw_arena_alloc (&s->arena, 4 * n * sizeof *t), *value = t + n;
   if (t == NULL) return pw_fail_memory (s, error);
-  for (size_t i = 0; i < n; i++) {
-    t[i] = pw_table_time (&source->signal, (int)i);
-    value[i] = pw_table_value (&source->signal, (int)i);
-  }
+  memcpy (t, table->t, n * sizeof *t);
+  for (size_t i = 0; i < n; i++) value[i] = pw_table_value (&source->signal, (int)i);
   table->t = t;
   table->value = value;
-  table->scale = table->time_scale = 1, table->offset = table->time_offset = 0;
+  table->scale = 1, table->offset = 0;
   source->spline = value + n;
   pw_table_spline (&source->signal, source->spline);
   for (size_t i = 0; i < 2 * n; i++)

@@ -189,7 +189,7 @@ static int fit_read_data (pw_fit *fit, pw_error *error) {
 
 /* ---- The command ---- */
 
-#define FIT_RUNS 50.       /* usual number of runs of a search, to choose the engine */
+#define FIT_RUNS 50. /* usual number of runs of a search, to choose the engine */
 
 enum { FIT_TABLE = 2, FIT_SUMMARY }; /* indices in the list of files of fit_open */
 

@@ -46,11 +46,9 @@ static void yaml_function (const pw_signal *s) {
 /* The points of a table; with fewer digits than YAML_DIGITS only their number and their first and last times. */
 static void yaml_points (const pw_signal *s, int digits) {
   const double *t = s->table.t;
-  const double scale = s->table.time_scale == 0 ? 1 : s->table.time_scale, offset = s->table.time_offset;
   int count = s->table.count;
   if (digits < YAML_DIGITS) {
-    printf ("%d from %s to %s s", count, PW_DIGITS (offset + scale * t[0], digits),
-            PW_DIGITS (offset + scale * t[count - 1], digits));
+    printf ("%d from %s to %s s", count, PW_DIGITS (t[0], digits), PW_DIGITS (t[count - 1], digits));
     return;
   }
   for (int i = 0; i < count; i++)

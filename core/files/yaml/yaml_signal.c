@@ -18,12 +18,12 @@
 
 /* ---- Points of tables, in the model ---- */
 
-static int table_list (pw_reader *r, const char *label, const pw_node *list, pw_signal *s) {
+static int table_list (pw_reader *r, const char *label, const pw_node *list, double **times, pw_signal *s) {
   if (pw_yaml_list (r, list, label) != PW_OK) return r->error->status;
   size_t bytes = (size_t)list->count * sizeof (double);
   double *t = pw_arena_alloc (r->arena, bytes), *value = pw_arena_alloc (r->arena, bytes);
   if (t == NULL || value == NULL) return pw_yaml_no_memory (r);
-  s->table.t = t;
+  s->table.t = *times = t;
   s->table.value = value;
   for (const pw_node *n = list->first; n; n = n->next) {
     double point[2] = { 0 };
@@ -96,7 +96,7 @@ static void table_skip_gaps (pw_points *table, double *t, double *value) {
 }
 
 static int table_file (pw_reader *r, const char *label, const pw_node *node, const pw_node *columns,
-                       const pw_node *time, pw_signal *s) {
+                       const pw_node *time, double **times, pw_signal *s) {
   const char *name, *reason, *column[2], *const unit[2] = { "s", table_unit (r) };
   pw_error cause = { 0 };
   if (table_columns (r, label, columns, time, column) != PW_OK) return r->error->status;
@@ -110,23 +110,36 @@ static int table_file (pw_reader *r, const char *label, const pw_node *node, con
   fclose (f);
   if (cause.status == PW_INPUT) return pw_yaml_fail (r, node->at, "%s: %s", label, cause.text);
   if (t == NULL || pw_model_keep (r->model, t, free) != PW_OK) return pw_yaml_no_memory (r);
-  s->table.t = t;
+  s->table.t = *times = t;
   s->table.value = t + s->table.count;
   table_skip_gaps (&s->table, t, t + s->table.count);
   return PW_OK;
 }
 
-static const char *const table_keys[] = { "points", "file", "columns", "time" }; /* besides the fields of the form */
+/* Besides the fields of the form. */
+static const char *const table_keys[] = { "points", "file", "columns", "time", "time_scale", "time_offset" };
+enum { TABLE_KEYS = sizeof table_keys / sizeof *table_keys };
+
+/* Converts the times to time_offset + time_scale t; whole numbers of ms since an epoch stay exact. */
+static int table_times (pw_reader *r, const char *label, const pw_node *const v[2], int count, double *t) {
+  double scale = 1, offset = 0;
+  pw_yaml_number (r, v[0], PW_PRINTED (240, "%s: time_scale", label), PW_POSITIVE, &scale);
+  pw_yaml_number (r, v[1], PW_PRINTED (240, "%s: time_offset", label), PW_REAL, &offset);
+  for (int i = 0; i < count; i++) t[i] = scale * (t[i] + offset / scale);
+  return r->error->status;
+}
 
 /* Reads points or columns of a file.  Limits the points of all tables together: many may read the same large file. */
-static int table_points (pw_reader *r, const char *label, const pw_node *node, const pw_node *const v[4],
+static int table_points (pw_reader *r, const char *label, const pw_node *node, const pw_node *const v[TABLE_KEYS],
                          pw_signal *s) {
   const pw_node *points = v[0], *file = v[1], *columns = v[2], *time = v[3]; /* as table_keys */
   if ((points != NULL) == (file != NULL))
     return pw_yaml_fail (r, node->at, "%s: a table has either points or a file", label);
   if (points && columns) return pw_yaml_fail (r, columns->at, "%s: columns belong to a file", label);
   if (points && time) return pw_yaml_fail (r, time->at, "%s: a column of times belongs to a file", label);
-  int status = points ? table_list (r, label, points, s) : table_file (r, label, file, columns, time, s);
+  double *t = NULL;
+  int status = points ? table_list (r, label, points, &t, s) : table_file (r, label, file, columns, time, &t, s);
+  if (status == PW_OK) status = table_times (r, label, v + 4, s->table.count, t);
   if (status == PW_OK) r->points += s->table.count;
   if (status != PW_OK || r->points <= PW_YAML_MAX_POINTS) return status;
   return pw_yaml_fail (r, node->at, "%s: the tables up to here have more than %d points, the limit for a model", label,
@@ -146,7 +159,7 @@ static int signal_fields (pw_reader *r, const pw_signal_form *form, const char *
     if (f->type == PW_NUMBER) pw_yaml_number (r, value[i], text, f->domain, at);
     if (f->type == PW_CHOICE) pw_yaml_choice (r, value[i], text, f->choices, at);
     /* 0 in the structure stands for a scale that is not given, which is 1 */
-    if (value[i] && form->type == PW_TABLE && strstr (f->name, "scale") && *(const double *)at == 0)
+    if (value[i] && form->type == PW_TABLE && strcmp (f->name, "scale") == 0 && signal->table.scale == 0)
       pw_yaml_fail (r, value[i]->at, "%s: 0 is not permitted", text);
   }
   return r->error->status;
@@ -171,7 +184,7 @@ static int signal_read_form (pw_reader *r, const pw_kind *kind, const pw_signal_
   int fields = 0, n, is_table = form->type == PW_TABLE;
   *signal = (pw_signal){ .type = form->type };
   for (const pw_field *f = form->fields; f->name; f++) key[fields++] = f->name;
-  for (n = fields; is_table && n < fields + 4; n++) key[n] = table_keys[n - fields];
+  for (n = fields; is_table && n < fields + TABLE_KEYS; n++) key[n] = table_keys[n - fields];
   key[n] = NULL;
   if (pw_yaml_keys (r, node, key, PW_PRINTED (100, "a %s", form->name), v) != PW_OK ||
       signal_fields (r, form, label, node, v, signal) != PW_OK ||
