@@ -132,6 +132,7 @@ typedef struct {
   int ends;            /* of a spline: PW_ENDS_FREE: not-a-knot; PW_ENDS_REST: first derivative 0 */
   double scale;        /* the signal is offset + scale value; 0 stands for 1 */
   double offset;       /* unit of the signal */
+  int skipped;         /* rows of its file without a value, which are not among the points; for messages only */
 } pw_points;
 
 /* A signal; zero-initialised, it is the constant 0. */
@@ -762,6 +763,11 @@ int pw_system_signals (const pw_system *s);
 char *pw_system_signal_name (const pw_system *s, int signal, char *buffer, size_t size);
 const char *pw_system_signal_unit (const pw_system *s, int signal);
 int pw_system_signal_of_force (const pw_system *s, int signal);
+
+/* What the user should know of a signal that is a table: that its times do not cover a run from 0 to t_end, or that
+ * rows of its file are left out.  "torque T: value: ...", in the buffer, which is returned; "" if there is nothing. */
+enum { PW_NOTICE_BYTES = 600 }; /* size of buffers in which it fits */
+char *pw_system_table_notice (const pw_system *s, int signal, double t_end, char *buffer, size_t size);
 
 /* The signal of this name; the name of an element suffices if the element has one signal.  PW_INPUT and the error, with
  * the nearest name, if there is none. */

@@ -309,6 +309,25 @@ def test_failures_keep_the_samples():
     assert r.status == "failed" and "max_steps" in r.reason.replace("-", "_") and len(r) > 2
 
 
+def test_tables_that_do_not_cover_the_run_are_reported(tmp_path):
+    def torque(**table):
+        return pw.describe(bodies=[pw.Body("a", mass=1, inertia=1)],
+                           elements=[pw.Torque("T", body=["a", "ground"], value={"table": {"points": [[0, 1], [4000, 1]], **table}})])
+    model = torque(time_scale=1e-3)
+    with pytest.warns(UserWarning, match="torque T: value: the table has times from 0 to 4 s and covers 40 % of the run, which ends at 10 s"):
+        model.run(t_end=10)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        model.run(t_end=4)
+        torque(time_scale=1e-3, time_offset=-1).run(t_end=3)
+    (tmp_path / "M.csv").write_text("t;M\n0;1,5\n1;\n10;2,5\n")
+    (tmp_path / "m.yaml").write_text("pinwheel: 1\nbodies: [{name: a, mass: 1, inertia: 1}]\n"
+                                     "elements: [{torque: T, body: [a, ground], value: {table: {file: M.csv, time: t}}}]\n")
+    with pytest.warns(UserWarning, match="torque T: value: 1 row with empty cells is left out of the table"):
+        r = pw.Model(tmp_path / "m.yaml").run("rk4", t_end=10, step=0.1)
+    assert r["a.omega"][-1] == pytest.approx(20)
+
+
 def test_changed_initial_values_are_reported():
     model = pw.Model("ezyroller")
     assert model.run(t_end=0.01).changed == {}

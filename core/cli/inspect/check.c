@@ -68,6 +68,15 @@ static int check_reference (pw_check *check, pw_error *error) {
   return status;
 }
 
+/* Tables that do not cover the model's run, and rows of their files that are left out. */
+static void check_tables (pw_check *check) {
+  const pw_system *s = check->model.system;
+  const double t_end = pw_cli_defaults (pw_file_table (check->model.file)).t_end;
+  char notice[PW_NOTICE_BYTES];
+  for (int i = 0; i < pw_system_signals (s); i++)
+    if (*pw_system_table_notice (s, i, t_end, notice, sizeof notice)) check_add (&check->finding, "%s", notice);
+}
+
 /* ---- Element types ---- */
 
 /* Tests an element type in random scenes; records the reason if none can be generated. */
@@ -197,6 +206,7 @@ static int check_model (pw_check *check, pw_error *error) {
   check->rk4_limit = check->doubling_time = INFINITY;
   check->fastest = -1;
   pw_report_model (&check->model);
+  check_tables (check);
   check_open_run (check);
   if (check->run) {
     check_given_values (check);
@@ -224,7 +234,7 @@ enum { CHECK_JSON = 1 }; /* index in the list of files of check_command */
 static int check_command (void *options, pw_error *error) {
   pw_check *check = options;
   pw_files files = { .folder = { .made = 0 } };
-  pw_use use[] = { PW_CLI_MODEL_USE, { "--json", check->json_path, PW_WRITES, NULL } };
+  pw_use use[] = { PW_CLI_MODEL_USE, { "--json", check->json_path, PW_WRITES, pw_cli_json } };
   int status = pw_cli_open (&check->model, &check->line, error);
   if (status == PW_OK) status = pw_files_open (&files, &check->line, &check->model, use, 2, error);
   if (status == PW_OK) status = check_model (check, error);

@@ -47,6 +47,7 @@ static void report_atol (pw_run *run, const pw_system *system, double atol) {
 void pw_report_settings (pw_run *run, const pw_system *system, const char *method, const pw_cli_line *line,
                          const pw_settings *settings) {
   pw_cli_report_unused (method, line);
+  pw_cli_report_tables (system, settings->span);
   if (pw_cli_adaptive (method) == 1)
     report_atol (run, system, settings->atol);
   else

@@ -9,7 +9,8 @@
 /* Initial phi and headings that are probably degrees; expressions that may jump with states. */
 void pw_report_model (const pw_cli_model *m);
 
-/* Options without effect, long fixed steps, an absolute tolerance within which a force saturates. */
+/* Options without effect, tables that do not cover the run, long fixed steps, an absolute tolerance within which a
+ * force saturates. */
 void pw_report_settings (pw_run *run, const pw_system *system, const char *method, const pw_cli_line *line,
                          const pw_settings *settings);
 

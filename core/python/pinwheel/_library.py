@@ -211,6 +211,7 @@ _declare(core, _i, ("pw_system_coordinates", _p), ("pw_system_rows", _p), ("pw_s
 _declare(core, _s, ("pw_system_state_name", _p, _i, _s, _z), ("pw_system_reaction_name", _p, _i, _s, _z),
          ("pw_system_ledger_name", _p, _i, _s, _z), ("pw_system_signal_name", _p, _i, _s, _z),
          ("pw_system_contact_name", _p, _i, _s, _z),
+         ("pw_system_table_notice", _p, _i, _d, _s, _z),
          ("pw_system_state_unit", _p, _i), ("pw_system_reaction_unit", _p, _i), ("pw_system_signal_unit", _p, _i))
 _declare(core, _i, ("pw_run_advance_to", _p, _d, _d, _e), ("pw_run_restart", _p, _p, _p, _e),
          ("pw_run_record_width", _p), ("pw_run_linear_modes", _p, _i, c.POINTER(pw_linear), _e),
@@ -385,7 +386,7 @@ free.restype, free.argtypes = None, [c.c_void_p]
 
 
 def name_of(function, *arguments) -> str:
-    """The name that a function of the library writes into a buffer."""
-    buffer = c.create_string_buffer(400)
-    function(*arguments, buffer, 400)
+    """The name or notice that a function of the library writes into a buffer."""
+    buffer = c.create_string_buffer(600)
+    function(*arguments, buffer, 600)
     return buffer.value.decode()

@@ -170,7 +170,7 @@ class Simulation:
         self._restart = True
 
     def _initial(self):
-        """The attribute `changed`; warns of it."""
+        """The attribute `changed`; warns of it, and of tables that do not cover the run."""
         s, core, report, changed, texts = self._system.pointer, lib.core, lib.core.pw_run_initial(self._run.pointer), {}, []
         n, x = core.pw_system_coordinates(s), report.contents
         for i in range(2 * n):
@@ -186,6 +186,9 @@ class Simulation:
             texts[8:] = [f"and {len(texts) - 8} more"]
         if texts:
             warnings.warn(f"model {self.model.name}: initial values were changed to satisfy the constraints: {', '.join(texts)}", stacklevel=4)
+        for i in range(core.pw_system_signals(s)):
+            if notice := lib.name_of(core.pw_system_table_notice, s, i, self._settings.span):
+                warnings.warn(f"model {self.model.name}: {notice}", stacklevel=4)
         return changed
 
     def __enter__(self) -> Simulation:
