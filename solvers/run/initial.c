@@ -69,7 +69,7 @@ enum {
   INITIAL_QUADRATIC = 15
 };
 static const double INITIAL_NEAR = 1e-9, INITIAL_LEAST_DAMPING = DBL_EPSILON / 2, INITIAL_MOST_DAMPING = 1e3,
-                    INITIAL_RELAXING = 1e-12;
+                    INITIAL_RELAXING = 1e-12, INITIAL_LEAST_SQUARES = 1e-8;
 /* Largest turn in a step towards a nearer solution, and towards prescribed values; the smallest part of the way in such
  * a step, alone and together with other values. */
 static const double INITIAL_RELAXED = 0.3, INITIAL_STEP = 0.7, INITIAL_PART = 1. / 32, INITIAL_PART_OF_MANY = 1. / 4;
@@ -714,17 +714,49 @@ static int initial_velocities (initial_search *x) {
   return status == PW_OK ? initial_keep (x) : status;
 }
 
-static int initial_fail (const initial_search *x, pw_error *error) {
+/* Writes the elements whose equations for velocities contradict each other: those that the least squares of all leave
+ * violated, since a combination of these equations has no velocity in it.  0 if there is none. */
+static int initial_contradiction (initial_search *x, char *text, size_t size) {
   const pw_system *s = x->s;
+  double *eta = x->r->scratch, *Jv = eta + s->rows, most = 0;
+  char element[PW_NAME_BYTES], previous[PW_NAME_BYTES] = "";
+  *text = 0;
+  memset (x->importance, INITIAL_FREE, (size_t)s->coords);
+  initial_stage_weights (x, &initial_least_change);
+  initial_units (x);
+  pw_mul_J (x->r->w, x->given, x->residual);
+  pw_evaluate_eta (x->r->w, eta);
+  for (int i = 0; i < s->rows; i++) x->residual[i] -= eta[i];
+  if (initial_solve (x, INITIAL_LEAST_SQUARES, NULL) != PW_OK) return 0;
+  pw_mul_J (x->r->w, x->step, Jv);
+  for (int i = 0; i < s->rows; i++) {
+    x->residual[i] = fabs (x->residual[i] + Jv[i]) / x->unit[i];
+    most = fmax (most, x->residual[i]);
+  }
+  for (int i = 0; i < s->rows && strlen (text) < 200; i++) {
+    const size_t length = strlen (text);
+    if (x->residual[i] > 1e-3 * most && strcmp (pw_system_row_name (s, i, element, sizeof element), previous) != 0)
+      snprintf (text + length, size - length, "%s%s", length ? ", " : "", strcpy (previous, element));
+  }
+  return *text != 0;
+}
+
+static int initial_fail (initial_search *x, pw_error *error) {
+  const pw_system *s = x->s;
+  char elements[300];
   if (x->out_of_memory) return pw_fail_memory (s, error);
+  if (x->level == INITIAL_VELOCITIES && initial_contradiction (x, elements, sizeof elements))
+    return pw_fail (error, PW_INITIAL, "model %s: no velocities satisfy the constraints: %s contradict%s", s->model,
+                    elements, strchr (elements, ',') ? " each other" : "s itself");
   if (x->failed_row < 0)
     return pw_fail (error, PW_INITIAL, "model %s: the initial state cannot be made consistent", s->model);
   const char *element = PW_NAME (pw_system_row_name, s, x->failed_row);
   const char *unit = strcmp (pw_system_reaction_unit (s, x->failed_row), "N m") == 0 ? "rad" : "m";
-  const int is_open = x->level == INITIAL_POSITIONS;
-  return pw_fail (error, PW_INITIAL, "model %s: the initial state cannot be made consistent: %s is %s by %.6g %s%s",
-                  s->model, element, is_open ? "open" : "violated", x->failed_by, unit,
-                  is_open ? "; if it can close, begin nearer to where it does" : "/s");
+  return pw_fail (
+      error, PW_INITIAL,
+      "model %s: the initial state cannot be made consistent: %s is open by %.6g %s; if it can close, begin "
+      "nearer to where it does",
+      s->model, element, x->failed_by, unit);
 }
 
 /* Makes positions, or velocities at consistent positions, consistent. */
