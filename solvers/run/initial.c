@@ -69,7 +69,7 @@ enum {
   INITIAL_QUADRATIC = 15
 };
 static const double INITIAL_NEAR = 1e-9, INITIAL_LEAST_DAMPING = DBL_EPSILON / 2, INITIAL_MOST_DAMPING = 1e3,
-                    INITIAL_RELAXING = 1e-12, INITIAL_LEAST_SQUARES = 1e-8;
+                    INITIAL_SMALL_DAMPING = 1e-12, INITIAL_LEAST_SQUARES = 1e-8;
 /* Largest turn in a step towards a nearer solution, and towards prescribed values; the smallest part of the way in such
  * a step, alone and together with other values. */
 static const double INITIAL_RELAXED = 0.3, INITIAL_STEP = 0.7, INITIAL_PART = 1. / 32, INITIAL_PART_OF_MANY = 1. / 4;
@@ -80,8 +80,6 @@ static const double INITIAL_AMPLIFIED = 10, INITIAL_CHANGE = 0.1;
 static const double INITIAL_ROUND = 1e-10;
 /* Smaller changes, in units of the scene, are those of a value that was rounded. */
 static const double INITIAL_ROUNDED = 1e-2;
-/* A column of G (rows of length 1) is independent of others if a part longer than this is left of it. */
-static const double INITIAL_INDEPENDENT = 1e-7;
 /* The most attempts to keep values.  In scenes of more coordinates than this, attempts and searches are fewer in
  * inverse proportion to them, so that the costs do not grow faster than those of one search. */
 enum { INITIAL_ATTEMPTS = 200, INITIAL_SMALL = 100 };
@@ -146,14 +144,20 @@ static void initial_fill (initial_search *x, double damping) {
 /* Solves for x->step with x->residual and force (coords; NULL: 0), at the J last evaluated. */
 static int initial_solve (initial_search *x, double damping, const double *force) {
   const int n = x->s->coords;
-  initial_fill (x, damping);
-  x->r->statistics.factorisations++;
-  int status = pw_sparse_factor (&x->matrix, x->map.value);
+  int status;
+  do {
+    initial_fill (x, damping);
+    x->r->statistics.factorisations++;
+    status = pw_sparse_factor (&x->matrix, x->map.value);
+    damping = damping == 0 ? INITIAL_SMALL_DAMPING : 100 * damping;
+  } while (status == PW_SINGULAR && damping < INITIAL_MOST_DAMPING); /* pivots may cancel to 0 */
   x->out_of_memory |= status == PW_RESOURCE;
   if (status != PW_OK) return PW_RETRY;
   for (int j = 0; j < n; j++) x->step[j] = force && !isinf (x->weight[j]) ? force[j] : 0;
   for (int i = 0; i < x->rows; i++) x->step[n + i] = -x->residual[i];
-  return pw_sparse_solve (&x->matrix, x->step);
+  status = pw_sparse_solve (&x->matrix, x->step);
+  x->out_of_memory |= status == PW_RESOURCE;
+  return status == PW_OK ? PW_OK : PW_RETRY;
 }
 
 /* The unit of each equation, the diagonal of G W^-1 G^T (without massless coordinates of weight 0) and its largest
@@ -289,7 +293,7 @@ static int initial_converge (initial_search *x, int iterations) {
   double damping = is_large ? INITIAL_LEAST_DAMPING : fmin (1e-2, now.position);
   for (; n < iterations && isfinite (sum) && now.position > PW_RESIDUAL_CONVERGED && slow < INITIAL_SLOW; n++) {
     const int near = now.position <= INITIAL_NEAR;
-    if (near && now.position > previous / 4) break; /* at round-off, since convergence is quadratic */
+    if (now.position <= accepted && now.position > previous / 4) break; /* at round-off: convergence is quadratic */
     previous = near ? now.position : INFINITY;
     pw_evaluate_J (r->w);
     memcpy (x->last, x->value, bytes);
@@ -332,7 +336,7 @@ static void initial_relax (initial_search *x) {
     memcpy (x->nearest, x->value, (size_t)n * sizeof (double));
     for (int j = 0; j < n; j++) force[j] = isinf (x->weight[j]) ? 0 : x->weight[j] * (x->given[j] - x->value[j]);
     memset (x->residual, 0, (size_t)x->rows * sizeof (double));
-    if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK || initial_solve (x, INITIAL_RELAXING, force) != PW_OK)
+    if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK || initial_solve (x, INITIAL_SMALL_DAMPING, force) != PW_OK)
       return;
     for (int j = 0; j < n; j++)
       if (pw_is_angle (x->s, j)) most = fmax (most, fabs (x->step[j]));
@@ -471,10 +475,10 @@ typedef struct {
 
 /* Takes column j into the basis if it is independent of those before it: 1, 0, or PW_RESOURCE.  (Gilbert & Peierls
  * 1988, Sparse partial pivoting in time proportional to arithmetic operations.) */
-static int initial_enter (const initial_search *x, initial_factors *f, int j) {
+static int initial_enter (const initial_search *x, initial_factors *f, int j, double independent) {
   const int n = x->s->coords;
   int first = f->rank, best = -1;
-  double most = INITIAL_INDEPENDENT;
+  double most = independent;
   const size_t begin = f->entries; /* of the list of its rows without a pivot, each once or more */
   for (int64_t p = x->map.colptr[j]; p < x->map.colptr[j + 1]; p++) {
     const int i = (int)x->map.rowind[p] - n;
@@ -522,6 +526,17 @@ static int initial_order (const initial_search *x, int m) {
   return m >= 3 * x->s->bodies ? m : m % 3 == 0 ? m + 2 : m - 1;
 }
 
+/* The order in which columns of these importances enter the basis, if a part longer than this is left of them (rows of G
+ * have length 1).  Among values of one origin, those that the others determine well come first. */
+static const struct {
+  int first, last;
+  double independent;
+} initial_pass[] = {
+  { INITIAL_FREE, INITIAL_MASS, 1e-7 },      { INITIAL_SPECIFIED, INITIAL_ZERO, 1e-2 },
+  { INITIAL_SPECIFIED, INITIAL_ZERO, 1e-7 }, { INITIAL_GIVEN, INITIAL_KEPT - 1, 1e-2 },
+  { INITIAL_GIVEN, INITIAL_KEPT - 1, 1e-7 }, { INITIAL_KEPT, INITIAL_KEPT, 1e-7 },
+};
+
 /* Sets x->basis to 1 for a maximal set of coordinates that the equations determine, given the others, at the J last
  * evaluated.  The least important ones enter it first, so that the others are those of most importance that can be
  * prescribed together.  (Oxley 2011, Matroid Theory, section 1.8: the greedy algorithm; section 2.1: duals.) */
@@ -545,13 +560,14 @@ static int initial_select (initial_search *x) {
     for (int64_t p = x->map.colptr[j]; p < x->map.colptr[j + 1]; p++)
       if (x->map.rowind[p] >= n) f.norm[x->map.rowind[p] - n] += pow (x->map.value[p] / pw_length_factor (x->s, j), 2);
   for (int i = 0; i < x->rows; i++) f.norm[i] = f.norm[i] > 0 ? sqrt (f.norm[i]) : 1, f.pivot_of[i] = -1;
-  for (int importance = INITIAL_FREE; importance <= INITIAL_KEPT; importance++)
-    for (int m = n - 1; m >= 0 && f.rank < x->rows && status >= 0; m--) {
-      const int j = initial_order (x, m);
-      if (x->importance[j] != importance) continue;
-      status = initial_enter (x, &f, j);
-      x->basis[j] = status > 0;
-    }
+  for (size_t i = 0; i < sizeof initial_pass / sizeof *initial_pass; i++)
+    for (int importance = initial_pass[i].first; importance <= initial_pass[i].last; importance++)
+      for (int m = n - 1; m >= 0 && f.rank < x->rows && status >= 0; m--) {
+        const int j = initial_order (x, m);
+        if (x->importance[j] != importance || x->basis[j]) continue;
+        status = initial_enter (x, &f, j, initial_pass[i].independent);
+        x->basis[j] = status > 0;
+      }
   free (f.entry);
   free (memory);
   return status < 0 ? PW_RESOURCE : PW_OK;

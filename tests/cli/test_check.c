@@ -82,9 +82,9 @@ TEST (many_findings) {
   cli_write ("many.yaml", text);
   cli_good ("pinwheel check @/many.yaml");
   cli_shows ("\n12 findings\n");
-  cli_shows ("b7.x = 1 m, but the constraints require 0 m\n  and 4 more\n");
+  cli_shows ("b7.x = 1 m, which was changed to 0 m; otherwise pin p7 would be open by 1 m\n  and 4 more\n");
   cli_good ("pinwheel check @/many.yaml --json -");
-  cli_shows ("b11.x = 1 m, but the constraints require 0 m\"]");
+  cli_shows ("b11.x = 1 m, which was changed to 0 m; otherwise pin p11 would be open by 1 m\"]");
 }
 
 /* Gravity in the plane in which wheels roll, but not along a slope, nor with markers. */

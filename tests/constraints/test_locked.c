@@ -113,7 +113,7 @@ TEST (crossed_wheels_locked) {
   check_error (
       &error, PW_INITIAL,
       "model scene: the given velocities would have to be removed entirely: rolling-wheel along, rolling-wheel "
-      "across allow no such motion");
+      "across allow no such motion; wheels that slip sideways are of type tyre");
   pw_system_free (s);
 }
 

@@ -420,7 +420,7 @@ TEST (changed_values) {
                     0);
   assert_non_null (strstr (
       cli_err, "pinwheel: given initial values of this result were changed to satisfy the constraints, at worst "
-               "frame.omega from 7 to 2 rad/s\n"));
+               "frame.vy from 0 to 3.5 m/s\n"));
 }
 
 /* The engine is chosen for runs to the last datum, not to the final time of the model. */

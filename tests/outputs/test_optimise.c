@@ -347,7 +347,7 @@ TEST (changed_values) {
       0);
   assert_string_equal (
       cli_err, "pinwheel: given initial values of this result were changed to satisfy the constraints, at worst "
-               "frame.omega from 7 to 2 rad/s\n");
+               "frame.vy from 0 to 3.5 m/s\n");
 }
 
 const check_fixture fixture = { optimise_setup, cli_teardown };
