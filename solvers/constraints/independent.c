@@ -160,6 +160,12 @@ static int independent_fail (pw_run *r, pw_row_basis *b, int rank, int n, double
     return pw_fail (error, PW_INITIAL,
                     "model %s: the initial configuration is singular: %s, but not nearby; begin slightly off it",
                     s->model, equation);
+  if (r->redundant_row[i] >= s->holonomic)
+    return pw_fail (
+        error, PW_INITIAL,
+        "model %s: the initial configuration is singular: %s, except for a part of less than 1e-6; place these "
+        "elements farther apart, or leave one out",
+        s->model, equation);
   return pw_fail (error, PW_INITIAL,
                   "model %s: the initial configuration is singular: %s, but forbids a change of %s, which nothing else "
                   "prevents; prevent it by another element (a weld in place of a pin), or allow it (a slot in place of "
