@@ -34,6 +34,9 @@ SYSTEM := -isystem $(SUITESPARSE)
 
 SOLVER_LIBS := -lsundials_idas -lsundials_cvodes -lsundials_nvecserial -lklu -lamd -llapacke -lm
 FILES_LIBS  := -lfyaml -ldl -lm
+# What these need if they are linked statically; the Fortran libraries where the compiler has them.
+STATIC_LIBS  = -lbtf -lcolamd -lsuitesparseconfig -llapack -lblas $(foreach l,gfortran quadmath,$(if \
+               $(filter /%,$(shell $(CC) -print-file-name=lib$l.a)),-l$l)) -lm
 CLI_LIBS    := -lpopt -lgsl -lgslcblas -lnlopt
 LINK         = $(CC) $(CFLAGS) $(SAN) $(LDFLAGS) -Wl,--as-needed
 SHARED       = $(LINK) -shared -Wl,--no-undefined
@@ -487,7 +490,7 @@ Description: planar multibody systems with pin joints and knife-edge wheels
 Version: $(VERSION)
 Cflags: -I"$${includedir}"
 Libs: -L"$${libdir}" -lpinwheel-files -lpinwheel
-Libs.private: $(FILES_LIBS) $(SOLVER_LIBS)
+Libs.private: $(FILES_LIBS) $(SOLVER_LIBS) $(STATIC_LIBS)
 endef
 export PKGCONFIG
 

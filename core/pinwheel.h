@@ -51,7 +51,8 @@ PW_BEGIN
 typedef enum {
   PW_OK = 0,        /* success */
   PW_RETRY = 1,     /* step rejected; a smaller one may succeed */
-  PW_STOPPED = 2,   /* pw_settings.stop stopped the run after its last accepted step; it can continue */
+  PW_STOPPED = 2,   /* pw_settings.stop stopped the run after its last accepted step; it can continue.  As an error:
+                     * before its first step */
   PW_RESOURCE = -1, /* out of memory, or a file cannot be written */
   PW_INPUT = -2,    /* the description or an option is wrong */
   PW_INITIAL = -3,  /* no consistent initial state found */
@@ -813,6 +814,8 @@ int pw_specialised_lanes_fit (const pw_specialised_lanes *code, const pw_system 
 int pw_specialised_lanes_count (const pw_specialised_lanes *code);
 /* Memory for the runs of one thread; NULL if out of memory.  Free it. */
 void *pw_specialised_lanes_memory (const pw_specialised_lanes *code);
+/* PW_OK; PW_INPUT if the system is too large for pw_system_source. */
+int pw_system_check_source (const pw_system *s, pw_error *error);
 /* 1 if the code can be compiled for several runs at once: all element types are built-in, signals depend on time alone,
  * and the system is not too large.  The runs must not have redundant equations. */
 int pw_system_has_lanes (const pw_system *s);

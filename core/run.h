@@ -29,8 +29,8 @@ typedef struct {
   /* Limits of long runs. */
   long max_steps; /* adaptive methods: attempted steps, including rejected ones; default PW_MAX_STEPS */
   /* Called before each attempted step (specialised code: before up to 16 steps of fixed size), each evaluation of
-   * adams, bdf and ida, and each sample inside a step; if it returns non-zero, the call returns PW_STOPPED.  May be
-   * NULL. */
+   * adams, bdf and ida, and each sample inside a step; if it returns non-zero, the call returns PW_STOPPED.  Called
+   * while the run of a large scene is opened, too: then pw_run_open fails with PW_STOPPED.  May be NULL. */
   int (*stop) (void *context);
   void *stop_context; /* passed to stop */
 

@@ -30,8 +30,7 @@ struct pw_run {
   int redundant_drive;         /* 1: one of them has an eta, so that work depends on its multiplier */
   int *redundant_row;          /* redundant: their indices */
   unsigned char *active_array; /* rows: what `active` points to */
-  double *coefficient;         /* redundant x rows: each redundant row as a combination of active rows */
-  double *normal;              /* redundant x (redundant + 1): normal equations in redundancy.c, right side last */
+  double *coefficient;         /* 5 x rows: a redundant row as a combination of active rows; scratch of redundancy.c */
   double *row_force;           /* coords + 3: right-hand side for the coefficients of a redundant row; 0 between uses */
   double *least_norm;          /* rows: least-norm multipliers for the ledger */
   double independence;         /* of the active rows at the state reached (rank.h) */
@@ -274,6 +273,16 @@ int pw_run_watchdog (pw_run *r, pw_error *error);
 static inline int pw_run_stop_requested (pw_run *r) {
   if (r->settings.stop && r->settings.stop (r->settings.stop_context)) r->stopped = 1;
   return r->stopped;
+}
+
+/* 1 if searching for consistent initial values and independent equations takes a noticeable time. */
+static inline int pw_is_large (const pw_system *s) {
+  return (double)s->rows * s->coords >= 1e4;
+}
+
+/* pw_run_stop_requested while the run is opened, if its scene is large. */
+static inline int pw_run_stop_opening (pw_run *r) {
+  return pw_is_large (r->s) && pw_run_stop_requested (r);
 }
 
 /* Before each attempted step: PW_OK; PW_STOPPED if the caller requests it; PW_METHOD at max_steps, if adaptive. */

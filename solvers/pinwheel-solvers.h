@@ -72,7 +72,7 @@ extern const pw_method *const pw_methods[];
  * which only reads it: any number of runs, in any threads, may share it.  Errors: PW_INPUT for an unknown or invalid
  * method, option or setting, with the nearest valid name, and if the method uses a derivative that an element type
  * omits though it is not zero; PW_INITIAL if the initial state cannot be made consistent; PW_METHOD if it cannot be
- * evaluated; PW_RESOURCE. */
+ * evaluated; PW_STOPPED if settings->stop requests it; PW_RESOURCE. */
 pw_run *pw_run_open (const pw_system *s, const char *method, const pw_settings *settings, pw_error *error);
 
 /* Checks name and options of a built-in method without a system; returns integrator and index of the stabilisation,

@@ -8,6 +8,7 @@
 
 #include <popt.h>
 #include <signal.h>
+#include <stdatomic.h>
 #include "pinwheel-files.h"
 #include "pinwheel-solvers.h"
 #include "progress.h"
@@ -19,7 +20,7 @@ enum { PW_INTERRUPTED = 130, PW_CLOSED_PIPE = 141 };
 /* ---- Requests to stop; commands check them between steps or more often (stop.c) ---- */
 
 /* 1: all runs stop.  Set by SIGINT and SIGTERM, and by the threads of a command after an error that ends it. */
-extern volatile sig_atomic_t pw_stop;
+extern atomic_int pw_stop;
 
 /* Counts these signals from now on.  The first requests a stop at the next check.  The third ends the program, in case
  * that check never comes; the second does not, since some senders signal both a process and its group. */
@@ -43,6 +44,9 @@ int pw_limit_over (void *context);
 /* Why a run returned PW_STOPPED at time t: PW_RETRY, without an error, if pw_stop is set (after a signal the command
  * returns PW_INTERRUPTED); else PW_METHOD with an error that names the limit. */
 int pw_limit_status (const pw_limit *limit, double t, pw_error *error);
+/* Opens a run whose settings.stop is pw_limit_over; the clock must have been started.  If the run is stopped then, the
+ * error is that of pw_limit_status, without a text if that is PW_RETRY. */
+pw_run *pw_limit_open (const pw_system *s, const char *method, const pw_settings *settings, pw_error *error);
 
 /* ---- Commands ---- */
 

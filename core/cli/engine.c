@@ -26,6 +26,7 @@ static void engine_keep_reason (pw_cli_engine *e, const pw_system *s, int has_te
 }
 
 char *pw_cli_source (const pw_system *s, pw_error *error) {
+  if (pw_system_check_source (s, error) != PW_OK) return NULL;
   pw_run *r = pw_run_open (s, "rk4+none", NULL, NULL); /* makes no step: any method will do */
   char *text = r ? pw_run_source (r, error) : pw_system_source (s, NULL, error);
   pw_run_close (r);

@@ -66,7 +66,7 @@ const char *pw_cli_status_word (int status) {
 }
 
 int pw_cli_report_error (const pw_error *error) {
-  if (error->status == PW_OK) return 0;
+  if (error->status >= PW_OK) return 0; /* also PW_RETRY, after a request to stop */
   if (error->status == PW_RESOURCE && say_pipe_closed ()) return PW_CLOSED_PIPE;
   fflush (stdout);
   int has_location = strstr (error->text, ": error: ") != NULL; /* the format of compilers, which editors recognise */

@@ -1,13 +1,15 @@
 /* Requests to stop: pw_stop, set by signals or after an error in a thread, and limits of processor time. */
 #define _DEFAULT_SOURCE /* CLOCK_MONOTONIC_COARSE */
+#include <errno.h>
 #include <math.h>
 #include <pthread.h>
 #include <time.h>
 #include <unistd.h>
 #include "cli.h"
 
-volatile sig_atomic_t pw_stop;
-static volatile sig_atomic_t stop_signals; /* since pw_stop_catch */
+_Static_assert (ATOMIC_INT_LOCK_FREE == 2, "a handler of signals may change only atomic objects without a lock");
+atomic_int pw_stop;
+static atomic_int stop_signals; /* since pw_stop_catch */
 enum { STOP_NOW = 3 };                     /* the signal that ends the program, see pw_stop_catch */
 
 static void stop_on_signal (int number) {
@@ -25,7 +27,9 @@ static pthread_t stop_thread; /* of the command */
 static void stop_at_once (int number) {
   static const char text[] = "pinwheel: interrupted\n";
   if (!pthread_equal (pthread_self (), stop_thread)) {
+    const int before = errno; /* of the interrupted thread */
     pthread_kill (stop_thread, number);
+    errno = before;
     return;
   }
   ssize_t written = write (STDERR_FILENO, text, sizeof text - 1);
@@ -72,6 +76,21 @@ int pw_limit_over (void *context) {
   if (pw_seconds (CLOCK_THREAD_CPUTIME_ID) - limit->start > limit->seconds) return 1; /* and in all later calls */
   limit->last_check = now;
   return 0;
+}
+
+pw_run *pw_limit_open (const pw_system *s, const char *method, const pw_settings *settings, pw_error *error) {
+  const pw_limit *limit = settings->stop_context;
+  pw_error own = { 0 };
+  pw_run *r = pw_run_open (s, method, settings, &own);
+  if (own.status == PW_STOPPED && pw_stop)
+    own = (pw_error){ .status = PW_RETRY };
+  else if (own.status == PW_STOPPED) {
+    own.status = PW_OK;
+    pw_fail (&own, PW_METHOD, "model %s: the limit of %s s of processor time is reached before the first step (--limit)",
+             pw_system_name (s), PW_DIGITS (limit->seconds, 6));
+  }
+  if (error->status == PW_OK) *error = own;
+  return r;
 }
 
 int pw_limit_status (const pw_limit *limit, double t, pw_error *error) {

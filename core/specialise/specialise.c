@@ -162,7 +162,7 @@ void *pw_specialised_lanes_memory (const pw_specialised_lanes *code) {
 
 char *pw_system_source (const pw_system *s, const unsigned char *independent, pw_error *error) {
   pw_stream text;
-  if (pw_require (s, "a system", error) != PW_OK || pw_specialise_check_limits (s, error) != PW_OK) return NULL;
+  if (pw_require (s, "a system", error) != PW_OK || pw_system_check_source (s, error) != PW_OK) return NULL;
   pw_generator gen = { .s = s, .independent = independent, .out = pw_stream_open (&text) };
   int status = gen.out ? specialise_open (&gen) : PW_RESOURCE;
   if (status == PW_OK) status = specialise_write (&gen);

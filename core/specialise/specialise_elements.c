@@ -173,7 +173,7 @@ void pw_specialise_signals (const pw_generator *gen) {
 
 /* ---- Lanes ---- */
 
-int pw_specialise_check_limits (const pw_system *s, pw_error *error) {
+int pw_system_check_source (const pw_system *s, pw_error *error) {
   const struct {
     int count, most;
     const char *what;
@@ -190,7 +190,7 @@ int pw_specialise_check_limits (const pw_system *s, pw_error *error) {
 int pw_system_has_lanes (const pw_system *s) {
   for (int k = 0; k < s->batches; k++)
     if (!pw_kind_is_built_in (s->batch[k].kind) || s->batch[k].kind->element % sizeof (double)) return 0;
-  return s->state_dependent == 0 && pw_specialise_check_limits (s, NULL) == PW_OK;
+  return s->state_dependent == 0 && pw_system_check_source (s, NULL) == PW_OK;
 }
 
 /* A run's data, as doubles: the elements of all batches, then for each signal a pw_harmonic or a constant and zeros. */

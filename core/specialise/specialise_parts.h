@@ -25,8 +25,6 @@ typedef struct {
   pw_emitter emitter;
 } pw_generator;
 
-/* PW_INPUT if a system has too many constraint equations, elements or bodies for specialised code. */
-int pw_specialise_check_limits (const pw_system *s, pw_error *error);
 /* "rolling_wheel", in the buffer, which is returned. */
 char *pw_specialise_identifier (const pw_kind *kind, char *buffer, size_t size);
 /* The first entry of J of element e of batch k. */

@@ -106,6 +106,7 @@ pw_run *pw_periodic_run (pw_periodic *x, double value, double rtol, const double
   const pw_system *s = pw_periodic_system (x, value);
   pw_run *r = s ? pw_run_open (s, x->settings.method, &settings, &x->why) : NULL;
   int status = r ? PW_OK : x->why.status;
+  if (status == PW_STOPPED) x->why = (pw_error){ PW_METHOD, "stopped" };
   if (status == PW_OK && x->system.period <= 0) status = flow_signals (x, r);
   if (status == PW_OK && y) {
     status = pw_run_restart (r, y, y + x->n, &x->why);

@@ -16,7 +16,7 @@ enum { INDEPENDENT_NEARBY = 3 };
 static const double INDEPENDENT_MOTION = 0.03;
 
 static int independent_rank (const pw_run *r, pw_row_basis *b, double sine) {
-  return pw_row_basis_select (b, r->w, sine, NULL, r->s->rows, r->s->rows);
+  return pw_row_basis_select (b, r->w, sine, r->s->rows, r->s->rows);
 }
 
 /* The rank at the initial configuration, where equations with smaller sines than a run accepts are dependent: a
@@ -25,29 +25,38 @@ static int independent_rank_initially (const pw_run *r, pw_row_basis *b) {
   return independent_rank (r, b, fmax (r->thresholds.independent, r->thresholds.rank_lost));
 }
 
-/* The n-th direction that the constraints allow, of largest component 1 in units of the scene: along the velocities v
- * (n = 0), or an arbitrary one. */
-static void independent_direction (const pw_system *s, const pw_row_basis *b, const double *v, int n,
-                                   double *direction) {
+/* The n-th direction that the constraints allow, of largest component 1 in units of the scene: along the velocities (n =
+ * 0), or an arbitrary one.  p->velocity: with the metric of lengths. */
+static int independent_direction (const pw_projector *p, pw_run *r, int n, double *direction) {
+  const pw_system *s = r->s;
   double most = 0;
   for (int j = 0; j < s->coords; j++)
-    direction[j] = n == 0 ? v[j] * pw_length_factor (s, j) : pw_irregular (1.7, (j + 1) * n);
-  pw_row_basis_orthogonalise (b, direction, 0);
-  for (int j = 0; j < s->coords; j++) most = fmax (most, fabs (direction[j]));
-  for (int j = 0; most > 0 && j < s->coords; j++) direction[j] *= s->scale.length / most / pw_length_factor (s, j);
+    direction[j] = n == 0 ? r->v[j] : pw_irregular (1.7, (j + 1) * n) / pw_length_factor (s, j);
+  if (pw_saddle_factor (p->velocity) != PW_OK) return PW_RETRY;
+  pw_project_error (r, p->velocity, direction, s->rows);
+  for (int j = 0; j < s->coords; j++) most = fmax (most, fabs (direction[j]) * pw_length_factor (s, j));
+  for (int j = 0; most > 0 && j < s->coords; j++) direction[j] *= s->scale.length / most;
+  return PW_OK;
 }
 
-/* Projects q onto the equations selected in the basis, and selects anew there those that exceed a sine.  Returns the
- * rank; 0 if that fails, or unless `ignores_others`, if another position equation is violated there. */
-static int independent_rank_at (pw_run *r, pw_row_basis *b, double *q, double sine, int ignores_others) {
+/* Selects anew, among the equations that exceed a sine, at the projection of q onto those selected in the basis.  n >= 0:
+ * q is set to a short motion in the n-th direction first.  Returns the rank; 0 if that fails, or unless `ignores_others`,
+ * if another position equation is violated there. */
+static int independent_rank_at (pw_run *r, pw_row_basis *b, int n, double *q, double sine, int ignores_others) {
+  const pw_system *s = r->s;
   pw_projector p;
   pw_error unused = { 0 };
-  int rank = 0;
+  int rank = 0, status = PW_OK;
   const unsigned char *former = r->active;
   r->active = b->active;
-  if (pw_projector_open (&p, r, r->s->metric, NULL, &unused) == PW_OK) {
+  if (n >= 0) pw_length_weights (s, q);
+  if (pw_projector_open (&p, r, s->metric, n >= 0 ? q : NULL, &unused) == PW_OK) {
     p.ignores_inactive = ignores_others;
-    if (pw_project_positions (&p, r, r->t, q, r->v) == PW_OK) rank = independent_rank (r, b, sine);
+    if (n >= 0) {
+      status = independent_direction (&p, r, n, q);
+      for (int j = 0; j < s->coords; j++) q[j] = r->q[j] + INDEPENDENT_MOTION * q[j];
+    }
+    if (status == PW_OK && pw_project_positions (&p, r, r->t, q, r->v) == PW_OK) rank = independent_rank (r, b, sine);
     pw_projector_close (&p);
   }
   r->active = former;
@@ -57,12 +66,9 @@ static int independent_rank_at (pw_run *r, pw_row_basis *b, double *q, double si
 /* The rank after a short motion in the n-th direction to q, where the initially redundant equations may be violated; 0
  * if the others are not satisfied there. */
 static int independent_rank_nearby (pw_run *r, pw_row_basis *b, int n, double *q) {
-  const pw_system *s = r->s;
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return 0;
   independent_rank_initially (r, b);
-  independent_direction (s, b, r->v, n, q);
-  for (int j = 0; j < s->coords; j++) q[j] = r->q[j] + INDEPENDENT_MOTION * q[j];
-  return independent_rank_at (r, b, q, r->thresholds.independent, 1);
+  return independent_rank_at (r, b, n, q, r->thresholds.independent, 1);
 }
 
 /* Makes these rows the run's active ones and lists the others. */
@@ -83,10 +89,9 @@ static int independent_store (pw_run *r, const unsigned char *active, size_t red
   size_t rows = (size_t)r->s->rows, number = sizeof *r->coefficient;
   r->active_array = pw_arena_alloc (&r->arena, rows);
   r->redundant_row = pw_arena_alloc (&r->arena, redundant * sizeof *r->redundant_row);
-  r->coefficient = pw_arena_alloc (&r->arena, redundant * rows * number);
-  r->normal = pw_arena_alloc (&r->arena, redundant * (redundant + 1) * number);
+  r->coefficient = pw_arena_alloc (&r->arena, 5 * rows * number);
   r->row_force = pw_arena_alloc (&r->arena, ((size_t)r->s->coords + 3 + rows) * number);
-  if (!r->active_array || !r->redundant_row || !r->coefficient || !r->normal || !r->row_force) return PW_RESOURCE;
+  if (!r->active_array || !r->redundant_row || !r->coefficient || !r->row_force) return PW_RESOURCE;
   r->least_norm = r->row_force + r->s->coords + 3;
   independent_activate (r, active);
   return PW_OK;
@@ -99,7 +104,7 @@ static int independent_store (pw_run *r, const unsigned char *active, size_t red
 static int independent_is_regular_nearby (pw_run *r, pw_row_basis *b, int rank, double *q) {
   for (int n = 0; n < INDEPENDENT_NEARBY; n++)
     if (independent_rank_nearby (r, b, n, q) > rank &&
-        independent_rank_at (r, b, q, r->thresholds.rank_refused, 0) > rank)
+        independent_rank_at (r, b, -1, q, r->thresholds.rank_refused, 0) > rank)
       return 1;
   return 0;
 }
@@ -107,12 +112,13 @@ static int independent_is_regular_nearby (pw_run *r, pw_row_basis *b, int rank, 
 /* The coordinate, rather an angle than a length, in which the most nearly dependent equation of the basis changes most
  * when all others hold. */
 static int independent_changed (const pw_system *s, const pw_row_basis *b) {
-  int weakest = b->kept[0], changed = 0;
+  int weakest = b->rank > 0 ? b->kept[0] : 0, changed = 0;
   double most = -1;
   for (int k = 0; k < b->rank; k++)
     if (b->norm[b->kept[k]] < b->norm[weakest]) weakest = b->kept[k];
-  for (int j = 0; j < s->coords; j++) {
-    double change = fabs (b->rows[(size_t)weakest * (size_t)s->coords + (size_t)j]) * (pw_is_angle (s, j) ? 2 : 1);
+  for (int j = 0; j < s->coords && b->rank > 0; j++) {
+    double entry = b->count[j] > 0 ? b->rows[(size_t)weakest * (size_t)b->coords + (size_t)b->queue[j]] : 0;
+    double change = fabs (entry) * (pw_is_angle (s, j) ? 2 : 1);
     if (change > most) most = change, changed = j;
   }
   return changed;
@@ -180,22 +186,24 @@ static int independent_search (pw_run *r, pw_row_basis *b, pw_error *error) {
   int rank = independent_rank_initially (r, b), largest = rank, direction = 0;
   double *q = malloc ((size_t)s->coords * sizeof *q + (size_t)s->rows);
   if (q == NULL) return pw_fail_memory (s, error);
-  for (int n = 0; n < INDEPENDENT_NEARBY; n++) {
+  for (int n = 0; n < INDEPENDENT_NEARBY && !r->stopped; n++) {
     int nearby = independent_rank_nearby (r, b, n, q);
     if (nearby > largest) largest = nearby, direction = n;
   }
   r->w->failed = NULL;
-  int status = largest > rank ? independent_fail (r, b, rank, direction, q, error) : PW_OK;
+  int status = r->stopped ? PW_STOPPED : largest > rank ? independent_fail (r, b, rank, direction, q, error) : PW_OK;
   free (q);
   if (status != PW_OK || rank == s->rows) return status;
   (void)pw_evaluate_J_at (r->w, r->t, r->q, r->v);
   independent_rank_initially (r, b);
+  if (r->stopped) return PW_STOPPED;
   return independent_store (r, b->active, (size_t)(s->rows - rank)) == PW_OK ? PW_OK : pw_fail_memory (s, error);
 }
 
 int pw_rank_open (pw_run *r, pw_error *error) {
   pw_row_basis b;
   int status = pw_row_basis_open (&b, r->s);
+  b.run = r;
   status = status == PW_OK ? independent_search (r, &b, error) : pw_fail_memory (r->s, error);
   pw_row_basis_close (&b);
   (void)pw_evaluate_J_at (r->w, r->t, r->q, r->v);
@@ -209,7 +217,7 @@ int pw_rank_reselect (pw_run *r) {
   int holonomic = 0, rank = s->rows - r->redundant;
   if (pw_row_basis_open (&b, s) != PW_OK) return PW_RESOURCE;
   for (int i = 0; i < s->holonomic; i++) holonomic += r->active[i];
-  int found = pw_row_basis_select (&b, r->w, r->thresholds.independent, NULL, holonomic, rank);
+  int found = pw_row_basis_select (&b, r->w, r->thresholds.independent, holonomic, rank);
   int changes = found == rank && memcmp (b.active, r->active, (size_t)s->rows) != 0;
   if (changes) independent_activate (r, b.active);
   pw_row_basis_close (&b);

@@ -2,6 +2,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "method.h"
 #include "rank.h"
 #include "util.h"
 
@@ -31,13 +32,19 @@ void pw_rank_rows (const pw_workspace *w, double *rows, double *norm) {
 }
 
 int pw_row_basis_open (pw_row_basis *b, const pw_system *s) {
-  size_t rows = (size_t)s->rows;
+  size_t rows = (size_t)s->rows, columns = (size_t)s->coords + 1;
   *b = (pw_row_basis){ .coords = s->coords };
   for (pw_layout l = { 0 }; pw_layout_pass (&l, &b->memory);) {
     b->rows = pw_layout_alloc (&l, rows * (size_t)s->coords, sizeof *b->rows);
     b->norm = pw_layout_alloc (&l, rows, sizeof *b->norm);
     b->kept = pw_layout_alloc (&l, rows, sizeof *b->kept);
     b->active = pw_layout_alloc (&l, rows, 1);
+    b->value = pw_layout_alloc (&l, s->jacobian, sizeof *b->value);
+    b->column = pw_layout_alloc (&l, s->jacobian, sizeof *b->column);
+    b->first = pw_layout_alloc (&l, rows + 1, sizeof *b->first);
+    b->count = pw_layout_alloc (&l, columns, sizeof *b->count);
+    b->sum = pw_layout_alloc (&l, columns, sizeof *b->sum);
+    b->queue = pw_layout_alloc (&l, columns, sizeof *b->queue);
   }
   return b->memory ? PW_OK : PW_RESOURCE;
 }
@@ -46,19 +53,85 @@ void pw_row_basis_close (pw_row_basis *b) {
   free (b->memory);
 }
 
+/* Stores the entries of all rows, of length 1. */
+static void rank_read (pw_row_basis *b, const pw_workspace *w) {
+  int entry = 0;
+  PW_EACH_CONSTRAINT (k, w)
+    for (int i = 0; i < k->b.count * k->kind->rows; i++, entry += k->b.cols) {
+      double square = 0;
+      b->first[k->row + i] = entry;
+      for (int c = 0; c < k->b.cols; c++) {
+        int j = pw_global (k, i / k->kind->rows, c), is_ground = j >= w->s->coords;
+        double x = is_ground ? 0 : k->J[i * k->b.cols + c] / pw_length_factor (w->s, j);
+        b->column[entry + c] = is_ground ? 0 : j, b->value[entry + c] = x;
+        square += x * x;
+      }
+      for (int c = entry; square > 0 && c < entry + k->b.cols; c++) b->value[c] /= sqrt (square);
+    }
+  b->first[w->s->rows] = entry;
+}
+
+/* Takes a row out of the counts of its columns; those that it leaves to one other row are queued. */
+static int rank_take (pw_row_basis *b, int i, int queued) {
+  b->active[i] = 1;
+  for (int c = b->first[i]; c < b->first[i + 1]; c++) {
+    if (b->value[c] == 0) continue;
+    b->sum[b->column[c]] -= i;
+    if (--b->count[b->column[c]] == 1) b->queue[queued++] = b->column[c];
+  }
+  return queued;
+}
+
+/* Activates the rows that belong to every maximal independent set: those that alone have an entry in some column, then
+ * those for which this holds without them, and so on.  The pins of a tree of bodies are all of this kind.  In small
+ * scenes they stay in the basis, so that of the others the most independent of them, too, are selected. */
+static void rank_take_private (pw_row_basis *b, const pw_system *s) {
+  const double least = 1e-3; /* entry of a row of length 1: its sine with the others is at least that */
+  const int is_large = pw_is_large (s);
+  int queued = 0;
+  memset (b->active, 0, (size_t)s->rows);
+  memset (b->count, 0, (size_t)s->coords * sizeof *b->count);
+  memset (b->sum, 0, (size_t)s->coords * sizeof *b->sum);
+  for (int i = 0; i < s->rows; i++)
+    for (int c = b->first[i]; c < b->first[i + 1]; c++)
+      if (b->value[c] != 0) b->count[b->column[c]]++, b->sum[b->column[c]] += i;
+  for (int j = 0; j < s->coords && is_large; j++)
+    if (b->count[j] == 1) b->queue[queued++] = j;
+  for (int n = 0; n < queued; n++) {
+    int j = b->queue[n], i = (int)b->sum[j], c = b->first[i];
+    if (b->count[j] != 1) continue;
+    while (b->column[c] != j || b->value[c] == 0) c++;
+    if (fabs (b->value[c]) >= least) queued = rank_take (b, i, queued);
+  }
+}
+
 static double *rank_row (const pw_row_basis *b, int i) {
   return b->rows + (size_t)i * (size_t)b->coords;
 }
 
-double pw_row_basis_orthogonalise (const pw_row_basis *b, double *vector, int first) {
+/* Makes the rows that are not active yet dense, in the columns that they have. */
+static void rank_fill (pw_row_basis *b, const pw_system *s) {
+  b->rank = b->coords = 0;
+  for (int j = 0; j < s->coords; j++)
+    if (b->count[j] > 0) b->queue[j] = b->coords++;
+  for (int i = 0; i < s->rows; i++) {
+    if (b->active[i]) continue;
+    memset (rank_row (b, i), 0, (size_t)b->coords * sizeof *b->rows);
+    for (int c = b->first[i]; c < b->first[i + 1]; c++)
+      if (b->value[c] != 0) rank_row (b, i)[b->queue[b->column[c]]] += b->value[c];
+  }
+}
+
+/* Orthogonalises a row against the rows kept from number `first` on; returns its norm afterwards. */
+static double rank_orthogonalise (const pw_row_basis *b, double *row, int first) {
   double square = 0;
   for (int k = first; k < b->rank; k++) {
     const double *kept = rank_row (b, b->kept[k]);
     double dot = 0;
-    for (int j = 0; j < b->coords; j++) dot += vector[j] * kept[j];
-    for (int j = 0; j < b->coords; j++) vector[j] -= dot * kept[j];
+    for (int j = 0; j < b->coords; j++) dot += row[j] * kept[j];
+    for (int j = 0; j < b->coords; j++) row[j] -= dot * kept[j];
   }
-  for (int j = 0; j < b->coords; j++) square += vector[j] * vector[j];
+  for (int j = 0; j < b->coords; j++) square += row[j] * row[j];
   return sqrt (square);
 }
 
@@ -77,9 +150,11 @@ static int rank_pivot (const pw_row_basis *b, int first, int end) {
  * one is kept, and once more before it is kept itself (Giraud, Langou & Rozloznik 2005, The loss of orthogonality in
  * the Gram-Schmidt orthogonalization process). */
 static void rank_keep (pw_row_basis *b, double tol, int max_rank, int first, int end) {
-  for (int i = first; i < end; i++) b->norm[i] = pw_row_basis_orthogonalise (b, rank_row (b, i), 0);
+  for (int i = first; i < end; i++)
+    if (!b->active[i]) b->norm[i] = rank_orthogonalise (b, rank_row (b, i), 0);
   for (int next; b->rank < max_rank && (next = rank_pivot (b, first, end)) >= 0;) {
-    double *row = rank_row (b, next), norm = b->norm[next] = pw_row_basis_orthogonalise (b, row, 0);
+    double *row = rank_row (b, next), norm = b->norm[next] = rank_orthogonalise (b, row, 0);
+    if (b->run && pw_run_stop_opening (b->run)) return;
     if (!(norm > tol)) {
       b->norm[next] = 0;
       continue;
@@ -88,31 +163,18 @@ static void rank_keep (pw_row_basis *b, double tol, int max_rank, int first, int
     b->active[next] = 1;
     b->kept[b->rank++] = next;
     for (int i = first; i < end; i++)
-      if (!b->active[i] && b->norm[i] > 0) b->norm[i] = pw_row_basis_orthogonalise (b, rank_row (b, i), b->rank - 1);
+      if (!b->active[i] && b->norm[i] > 0) b->norm[i] = rank_orthogonalise (b, rank_row (b, i), b->rank - 1);
   }
 }
 
-int pw_row_basis_select (pw_row_basis *b, const pw_workspace *w, double tol, const unsigned char *fixed,
-                         int max_holonomic, int max_rows) {
+int pw_row_basis_select (pw_row_basis *b, const pw_workspace *w, double tol, int max_holonomic, int max_rows) {
   const pw_system *s = w->s;
-  pw_rank_rows (w, b->rows, NULL);
-  for (int i = 0; fixed && i < s->rows * s->coords; i++)
-    if (fixed[i % s->coords]) b->rows[i] = 0;
-  memset (b->active, 0, (size_t)s->rows);
-  b->rank = 0;
-  rank_keep (b, tol, max_holonomic, 0, s->holonomic);
-  rank_keep (b, tol, max_rows, s->holonomic, s->rows);
-  return b->rank;
-}
-
-int pw_rank_select (const pw_workspace *w, double tol, const unsigned char *fixed, unsigned char *active) {
-  const pw_system *s = w->s;
-  pw_row_basis b;
-  int rank = PW_RESOURCE;
-  if (pw_row_basis_open (&b, s) == PW_OK) {
-    rank = pw_row_basis_select (&b, w, tol, fixed, s->rows, s->rows);
-    memcpy (active, b.active, (size_t)s->rows);
-  }
-  pw_row_basis_close (&b);
-  return rank;
+  int holonomic = 0, all = 0; /* those taken without computation */
+  rank_read (b, w);
+  rank_take_private (b, s);
+  rank_fill (b, s);
+  for (int i = 0; i < s->rows; i++) all += b->active[i], holonomic += b->active[i] && i < s->holonomic;
+  rank_keep (b, tol, max_holonomic - holonomic, 0, s->holonomic);
+  rank_keep (b, tol, max_rows - all, s->holonomic, s->rows);
+  return all + b->rank;
 }

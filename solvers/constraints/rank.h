@@ -27,14 +27,20 @@ static inline double pw_irregular (double phase, int n) {
   return pw_sin (phase + 2.39996 * n);
 }
 
-/* Independent rows of J, kept as an orthonormal basis of the range of J^T. */
+/* Independent rows of J.  Those that belong to every maximal independent set are found by their pattern; of the others, an
+ * orthonormal basis is kept. */
 typedef struct {
-  int rank;              /* number of rows kept */
+  struct pw_run *run;    /* whose settings.stop ends the selection (r->stopped), or NULL */
+  unsigned char *active; /* rows: 1 for the independent ones */
+  int rank;              /* number of rows in the basis */
   int *kept;             /* rank: their indices */
-  unsigned char *active; /* rows: 1 for those kept */
   double *rows;          /* rows x coords: those kept are the basis, the others scratch */
   double *norm;          /* rows: scratch */
-  int coords;
+  int coords;            /* columns in which the others have entries */
+  int *first, *column;   /* rows + 1: the first entry of each row; column of each entry of J */
+  double *value;         /* of these entries */
+  int *count, *queue;    /* columns: number of remaining rows with an entry; scratch */
+  long *sum;             /* columns: sum of the indices of these rows */
   char *memory;
 } pw_row_basis;
 int pw_row_basis_open (pw_row_basis *b, const pw_system *s); /* PW_OK or PW_RESOURCE */
@@ -43,22 +49,13 @@ void pw_row_basis_close (pw_row_basis *b);
 /* Selects at most `max_holonomic` holonomic equations, and at most `max_rows` in all, by Gram-Schmidt on the J last
  * evaluated, rows of length 1: those of which a part longer than tol is independent of the ones kept before.  Holonomic
  * equations come first, since a nonholonomic one must not replace a holonomic one; of each kind the most independent
- * ones, in order where they are about equal.  fixed (coords, or NULL): 1 for coordinates that are left out, after the
- * rows have been scaled.  Returns the rank. */
-int pw_row_basis_select (pw_row_basis *b, const pw_workspace *w, double tol, const unsigned char *fixed,
-                         int max_holonomic, int max_rows);
-
-/* Orthogonalises a vector (coords) against the rows kept from number `first` on; returns its norm afterwards. */
-double pw_row_basis_orthogonalise (const pw_row_basis *b, double *vector, int first);
-
-/* Sets active[i] to 1 for a maximal set of independent equations, selected as by pw_row_basis_select, else to 0.
- * Returns the rank, or PW_RESOURCE. */
-int pw_rank_select (const pw_workspace *w, double tol, const unsigned char *fixed, unsigned char *active);
+ * ones, in order where they are about equal.  Returns the rank. */
+int pw_row_basis_select (pw_row_basis *b, const pw_workspace *w, double tol, int max_holonomic, int max_rows);
 
 /* Selects r->active, a maximal set of independent rows, for the run at its consistent initial state.  The saddle must
  * be open, and opened again afterwards.  r->active stays NULL if all rows are independent: then pw_rank_reselect,
  * _independence and _least_norm must not be called.  Errors: PW_RESOURCE; PW_INITIAL if the rank is higher nearby: the
- * initial configuration is singular; PW_METHOD if a signal failed. */
+ * initial configuration is singular; PW_METHOD if a signal failed; PW_STOPPED without a text. */
 int pw_rank_open (struct pw_run *r, pw_error *error);
 
 /* Selects r->active again with the J last evaluated.  Returns 1 if another set of the same rank is now active, else 0.

@@ -2,9 +2,8 @@
  *
  * A redundant row of J is J_i = sum_a c_ia J_a over active rows a.  Its coefficients come from the saddle-point system:
  * with f = J_i^T and gamma = 0 the multipliers are c_i.  The vectors n_i = e_i - sum_a c_ia e_a, with unit vectors e,
- * span the multipliers without force, J^T n_i = 0, so the least-norm ones are lambda + sum_i z_i n_i with z from a
- * small least-squares problem. */
-#include <lapacke.h>
+ * span the multipliers without force, J^T n_i = 0, so the least-norm ones are lambda + N z, N = [n_1 n_2 ...], with z
+ * from a least-squares problem.  N is not stored: products with it take a solution of the saddle-point system. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -61,7 +60,7 @@ static void redundancy_solve (pw_run *r, double *c) {
 /* Computes c of the i-th redundant row, where J is evaluated and the saddle factorised. */
 static void redundancy_coefficients (pw_run *r, int i) {
   redundancy_add_row (r->w, r->redundant_row[i], 1, r->row_force);
-  redundancy_solve (r, r->coefficient + i * r->s->rows);
+  redundancy_solve (r, r->coefficient);
 }
 
 /* One solution, for a sum of all redundant rows; their weights are irregular so that terms do not cancel. */
@@ -79,29 +78,50 @@ double pw_rank_independence (pw_run *r) {
   return isnan (most) ? 0 : 1 / most;
 }
 
-/* Component `row` of n_i for the i-th redundant row. */
-static inline double redundancy_null (const pw_run *r, int i, int row) {
-  return (r->redundant_row[i] == row) - r->coefficient[i * r->s->rows + row];
+/* change = N z, where z has entries for redundant rows only. */
+static void redundancy_change (pw_run *r, const double *z, double *change) {
+  double *c = r->coefficient;
+  pw_add_JT (r->w, z, r->row_force);
+  redundancy_solve (r, c);
+  for (int i = 0; i < r->s->rows; i++) change[i] = z[i] - c[i];
 }
 
-/* Minimises sum ((lambda + N z) / unit)^2 over the rows, N = [n_1 n_2 ...], by the normal equations A z = b. */
+/* slope = -N^T (lambda / square), without entries for active rows; (c_i, x) = J_i a with J_a a = x. */
+static void redundancy_slope (pw_run *r, const double *lambda, const double *square, double *slope) {
+  double *x = r->coefficient, *a = r->row_force;
+  for (int i = 0; i < r->s->rows; i++) x[i] = r->active[i] ? lambda[i] / square[i] : 0;
+  pw_saddle_solve (r->saddle, NULL, x, a, x);
+  pw_mul_J (r->w, a, slope);
+  for (int i = 0; i < r->s->rows; i++) slope[i] = r->active[i] ? 0 : slope[i] - lambda[i] / square[i];
+  memset (a, 0, (size_t)r->s->coords * sizeof *a);
+}
+
+/* sum x_i y_i scale_i, or with inverse = 1 sum x_i y_i / scale_i */
+static double redundancy_product (const pw_run *r, const double *x, const double *y, const double *square,
+                                  int inverse) {
+  double sum = 0;
+  for (int i = 0; i < r->s->rows; i++) sum += inverse ? x[i] * y[i] / square[i] : x[i] * y[i] * square[i];
+  return sum;
+}
+
+/* Minimises sum (lambda / unit)^2 by conjugate gradients (CGLS: Bjorck 1996, Numerical Methods for Least Squares
+ * Problems, section 7.4), with multipliers in these units: then the slope is at least the distance to the minimum.
+ * There are as many different eigenvalues as redundant rows, or as active rows and one, at most. */
 void pw_rank_least_norm (pw_run *r, double *lambda) {
-  int rows = r->s->rows, redundant = r->redundant;
-  double *A = r->normal, *z = A + redundant * redundant; /* z: b, then the solution */
-  for (int i = 0; i < redundant; i++) redundancy_coefficients (r, i);
-  memset (A, 0, (size_t)(redundant * (redundant + 1)) * sizeof *A);
-  for (int row = 0; row < rows; row++) {
-    double unit = pw_rank_multiplier_unit (r->w, row), weight = 1 / (unit * unit);
-    for (int i = 0; i < redundant; i++) {
-      double n = redundancy_null (r, i, row);
-      z[i] -= weight * n * lambda[row];
-      for (int j = 0; j <= i; j++) A[i * redundant + j] += weight * n * redundancy_null (r, j, row);
-    }
+  const double accepted = 1e-14;
+  const int rows = r->s->rows, most = r->redundant < rows - r->redundant ? r->redundant : rows - r->redundant + 1;
+  double *square = r->coefficient + rows, *slope = square + rows, *z = slope + rows, *change = z + rows, before = 0;
+  for (int i = 0; i < rows; i++) square[i] = pow (pw_rank_multiplier_unit (r->w, i), 2), z[i] = 0;
+  for (int n = 0; n <= most; n++) {
+    redundancy_slope (r, lambda, square, slope);
+    double now = redundancy_product (r, slope, slope, square, 0);
+    if (now <= accepted * accepted * redundancy_product (r, lambda, lambda, square, 1)) return;
+    for (int i = 0; i < rows; i++) z[i] = slope[i] * square[i] + (n > 0 ? now / before * z[i] : 0);
+    redundancy_change (r, z, change);
+    double length = now / redundancy_product (r, change, change, square, 1);
+    for (int i = 0; i < rows; i++) lambda[i] += length * change[i];
+    before = now;
   }
-  if (LAPACKE_dposv_work (LAPACK_COL_MAJOR, 'U', redundant, 1, A, redundant, z, redundant) != 0)
-    z[0] = NAN; /* multipliers become NaN */
-  for (int row = 0; row < rows; row++)
-    for (int i = 0; i < redundant; i++) lambda[row] += z[i] * redundancy_null (r, i, row);
 }
 
 /* ---- Description ---- */
@@ -149,9 +169,9 @@ char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size) {
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return buffer;
   if (pw_saddle_factor (r->saddle) != PW_OK) return buffer;
   redundancy_coefficients (r, i);
-  const double *c = r->coefficient + i * s->rows, least = round_off * redundancy_norm (r->w, row);
+  const double *c = r->coefficient, least = round_off * redundancy_norm (r->w, row);
   for (int a = 0; a < s->rows; a++) {
-    if (fabs (c[a]) * redundancy_norm (r->w, a) <= least) continue;
+    if (c[a] == 0 || fabs (c[a]) * redundancy_norm (r->w, a) <= least) continue;
     partners++, last = a;
     const char *element = PW_NAME (pw_system_row_name, s, a);
     if (elements > MAX_ELEMENTS || strcmp (element, own) == 0 || strcmp (element, before) == 0) continue;

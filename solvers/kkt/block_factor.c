@@ -35,6 +35,11 @@ PW_INLINE void block_contribute (int ka, int width, const pw_block_ldl *l, const
     BLOCK_SIZE (b->size, block_couple, ka, width, l->value + *coupling++, R, b->J, b->row_stride);
 }
 
+/* The pivot of an acceleration in -W_k; -1 of one that is 0 or massless, whose column of J is left out. */
+static inline double block_inertia (double inverse_weight) {
+  return inverse_weight > 0 ? -1 / inverse_weight : -1;
+}
+
 /* Adds an uncondensed body: -W_k, and its columns of J.  The original diagonal entries of the equations eliminated
  * after the body grow as if it were condensed. */
 static void block_uncondensed (const pw_block_ldl *l, const pw_group_block *p) {
@@ -42,14 +47,15 @@ static void block_uncondensed (const pw_block_ldl *l, const pw_group_block *p) {
   const double *w = l->inverse_weight + p->j;
   const int *coupling = l->coupling + p->first_coupling;
   double *D = l->value + own[0].diagonal, *inertia = l->value + own[1].diagonal;
-  D[0] = D[3] = -1 / w[0], D[2] = D[4] = -1 / w[1], inertia[0] = inertia[1] = -1 / w[2];
+  D[0] = D[3] = block_inertia (w[0]), D[2] = D[4] = block_inertia (w[1]),
+  inertia[0] = inertia[1] = block_inertia (w[2]);
   for (const pw_contribution *a = l->contribution + p->first_contribution; a < own; a++)
     for (int n = 0; n < 3; n += 2) { /* its first node has the columns 0 and 1, its second one column 2 */
       double *K = l->value + *coupling++, *original = l->value + a->diagonal + a->size * (a->size + 1) / 2;
       int later = a->diagonal > own->diagonal, size = n == 0 ? 2 : 1;
       for (int i = 0; i < a->size; i++)
         for (int c = 0; c < size; c++) {
-          double J = a->J[i * a->row_stride + n + c];
+          double J = w[n + c] > 0 ? a->J[i * a->row_stride + n + c] : 0;
           K[later ? i * size + c : c * a->size + i] = J;
           if (later) original[i] += J * w[n + c] * J;
         }
@@ -126,14 +132,28 @@ PW_INLINE void block_eliminate_row (int ki, const pw_block_ldl *l, const pw_bloc
   if (ki == 2 && kj == 2) A[3] = L.yy;
 }
 
+/* Finds the targets of row p of a long column; to be called for its rows in descending order. */
+static const int *block_find_targets (const pw_block_ldl *l, const pw_block_column *c, int p) {
+  int *at = l->cursor, *row = at + (c[1].first_below - c->first_below);
+  for (int q = c->first_below; q < p; q++, at++, row++) {
+    const pw_block_column *d = &l->column[l->below[q]];
+    if (p + 1 == c[1].first_below) *at = d[1].first_value, *row = d[1].first_below;
+    do *at -= d->size * l->column[l->below[--*row]].size;
+    while (l->below[*row] != l->below[p]);
+  }
+  return l->cursor;
+}
+
 /* Eliminates a column of kj unknowns; returns the next column's targets. */
 PW_INLINE const int *block_eliminate (int kj, pw_block_ldl *l, const pw_block_column *c, const int *target) {
   double *D = l->value + c->first_value, *B = D + pw_block_diagonal_values (kj), *A = l->value + c[1].first_value;
+  const int is_long = c[1].first_below - c->first_below > PW_BLOCK_LISTED;
   block_pivot (kj, D, l, c->unknown);
-  for (int p = c[1].first_below - 1; p >= c->first_below; target += p-- - c->first_below) {
+  for (int p = c[1].first_below - 1; p >= c->first_below; p--) {
     int ki = l->column[l->below[p]].size;
     A -= ki * kj;
-    BLOCK_SIZE (ki, block_eliminate_row, l, c, p, A, B, D, target, kj);
+    BLOCK_SIZE (ki, block_eliminate_row, l, c, p, A, B, D, is_long ? block_find_targets (l, c, p) : target, kj);
+    if (!is_long) target += p - c->first_below;
   }
   return target;
 }

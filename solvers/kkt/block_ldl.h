@@ -33,7 +33,8 @@
 
 enum {
   PW_BLOCK_NODE = 2, /* most unknowns in a node */
-  PW_BLOCK_RANKS = 3 /* ranks of nodes: nodes of a lower rank are eliminated first */
+  PW_BLOCK_RANKS = 3, /* ranks of nodes: nodes of a lower rank are eliminated first */
+  PW_BLOCK_LISTED = 64 /* most rows below the diagonal of a column whose targets are stored: n (n - 1) / 2 for n rows */
 };
 
 /* The vector y holds the right-hand side, then the solution: unknowns lambda, and -a_k after them. */
@@ -83,6 +84,7 @@ typedef struct {
   pw_block_column *column; /* nodes + 1: the last one ends the ranges */
   int *below;              /* rows below the diagonal of each column, as numbers of columns, ascending */
   int *target; /* for each column, for its rows p descending, for its rows q < p: index in `value` of K_pq */
+  int *cursor; /* of a column with more rows: for its rows q, index in `value` of K_pq; then index in `below` of p */
   int *column_of_node;
   double *value;                /* K, then its factors */
   int values;                   /* length of `value` */
@@ -103,7 +105,8 @@ typedef struct {
 typedef struct {
   int size;               /* unknowns */
   int rank;               /* 0 to PW_BLOCK_RANKS - 1 */
-  int grounded;           /* 1: touches prescribed coordinates, or pw_is_grounded (massless.h) */
+  int grounded;           /* 1: touches a group that does not move, or pw_is_grounded (massless.h) */
+  int rolls;              /* 1: the rolling equation of a wheel, alone */
   int unknown;            /* index in y of its first unknown: its first row, or beyond the rows for -a_k */
   int first_contribution; /* index of the first one; they end at that of the next node */
 } pw_plan_node;

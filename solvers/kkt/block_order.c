@@ -161,6 +161,7 @@ static void order_place_targets (pw_block_ldl *l) {
   for (const pw_block_column *c = l->column; c < l->column + l->nodes; c++) {
     int n = c[1].first_below - c->first_below;
     const int *below = l->below + c->first_below;
+    if (n > PW_BLOCK_LISTED) continue;
     for (int q = 0; q < n; q++) {
       const pw_block_column *d = &l->column[below[q]];
       int at = d->first_value + pw_block_diagonal_values (d->size), i = d->first_below;
@@ -176,15 +177,19 @@ static void order_place_targets (pw_block_ldl *l) {
 }
 
 int pw_block_lay_out (pw_block_ldl *l) {
-  size_t targets = 0;
+  size_t targets = 0, longest = 0;
   if (order_place_columns (l) != PW_OK) return PW_RESOURCE;
   for (const pw_block_column *c = l->column; c < l->column + l->nodes; c++) {
     size_t rows = (size_t)(c[1].first_below - c->first_below);
-    targets += rows * (rows - 1) / 2; /* one for each pair of rows of the column */
+    if (rows <= PW_BLOCK_LISTED)
+      targets += rows * (rows - 1) / 2; /* one for each pair of rows of the column */
+    else if (rows > longest)
+      longest = rows;
   }
+  l->cursor = malloc ((2 * longest + 1) * sizeof *l->cursor);
   l->target = malloc ((targets + 1) * sizeof *l->target);
   l->value = malloc (((size_t)l->values + 1) * sizeof *l->value);
-  if (l->target == NULL || l->value == NULL) return PW_RESOURCE;
+  if (l->cursor == NULL || l->target == NULL || l->value == NULL) return PW_RESOURCE;
   order_place_targets (l);
   return PW_OK;
 }
@@ -198,6 +203,7 @@ pw_block_ldl *pw_block_open (int nodes, const pw_plan_node *node, long pairs, co
 
 void pw_block_close (pw_block_ldl *l) {
   if (l == NULL) return;
+  free (l->cursor);
   free (l->target);
   free (l->value);
   free (l->pattern);

@@ -12,28 +12,32 @@ static void condense_add_node (pw_plan *plan, pw_plan_node node) {
   if (!plan->failed) plan->node[plan->nodes++] = node;
 }
 
-/* Adds the contribution of the last node to the group that begins with coordinate j, unless these coordinates are all
- * prescribed or massless; a prescribed one makes the node `grounded`. */
+/* Adds the contribution of the last node to the group that begins with coordinate j.  If these coordinates are all
+ * prescribed or massless there is none, and a prescribed one makes the node `grounded`. */
 static void condense_contribute (pw_plan *plan, const double *J, int row_stride, int j, int is_pin) {
-  int moves = 0;
+  int moves = 0, is_prescribed = 0;
   if (plan->failed) return;
   for (int n = 0; n < pw_group_width (plan->saddle->s, j); n++) {
     moves |= plan->saddle->inverse_weight[j + n] > 0;
-    plan->node[plan->nodes - 1].grounded |= isinf (plan->weight[j + n]) != 0;
+    is_prescribed |= isinf (plan->weight[j + n]) != 0;
   }
+  if (!moves) plan->node[plan->nodes - 1].grounded |= is_prescribed;
   if (!moves) return;
   plan->failed = pw_grow (&plan->contribution, (size_t)plan->contributions, &plan->contribution_room,
                           sizeof *plan->contribution) != PW_OK;
   if (!plan->failed)
-    plan->contribution[plan->contributions++] =
-        (pw_plan_contribution){ J, plan->nodes - 1, row_stride, pw_group_of (plan->saddle->s, j), is_pin };
+    plan->contribution[plan->contributions++] = (pw_plan_contribution){ J,          plan->nodes - 1,
+                                                                        row_stride, pw_group_of (plan->saddle->s, j),
+                                                                        is_pin,     is_prescribed };
 }
 
 /* Adds the node of `size` rows from row n of a batch on. */
 static void condense_element (pw_plan *plan, const pw_element_batch *b, int n, int size) {
   const int e = n / b->kind->rows, is_pin = b->kind == &pw_kind_pin && size == 2;
-  condense_add_node (
-      plan, (pw_plan_node){ .size = size, .unknown = b->row + n, .grounded = pw_is_grounded (plan->saddle->s, b, e) });
+  condense_add_node (plan, (pw_plan_node){ .size = size,
+                                           .unknown = b->row + n,
+                                           .grounded = pw_is_grounded (plan->saddle->s, b, e),
+                                           .rolls = b->kind == &pw_kind_rolling_wheel && size == 1 && n % 2 == 1 });
   for (int x = 0; x < b->b.cols; x += pw_group_columns (b->kind, x)) {
     int j = pw_global (b, e, x);
     if (j < plan->saddle->s->coords) condense_contribute (plan, b->J + n * b->b.cols + x, b->b.cols, j, is_pin);
@@ -114,18 +118,67 @@ static int condense_sort (pw_plan *plan) {
   return PW_OK;
 }
 
+/* ---- Dependent equations ---- */
+
+typedef struct {
+  pw_plan *plan;
+  int *capacity; /* groups: coordinates that no equation takes yet */
+  int *taken;    /* contributions: equations of the node that take a coordinate of the group */
+  int *by, *of;  /* groups: the contribution by which the search has come, and that which gives way; -1: none */
+  int *queue, *visited, queued, search;
+} condense_matching;
+
+/* Queues the groups to which node n contributes; contribution `of` gives way to one of them (-1: a new equation). */
+static void matching_queue (condense_matching *m, int n, int of) {
+  const pw_plan *plan = m->plan;
+  int end = n + 1 < plan->nodes ? plan->node[n + 1].first_contribution : plan->contributions;
+  for (int p = plan->node[n].first_contribution; p < end; p++) {
+    int g = plan->contribution[p].group;
+    if (m->visited[g] == m->search) continue;
+    m->visited[g] = m->search, m->by[g] = p, m->of[g] = of;
+    m->queue[m->queued++] = g;
+  }
+}
+
+/* Lets an equation of node n take a coordinate; others give way to theirs.  0 if none is left (Berge 1957). */
+static int matching_augment (condense_matching *m, int n) {
+  const pw_plan *plan = m->plan;
+  m->search++, m->queued = 0;
+  matching_queue (m, n, -1);
+  for (int i = 0; i < m->queued; i++) {
+    int g = m->queue[i];
+    for (int x = plan->start[g]; m->capacity[g] == 0 && x < plan->start[g + 1]; x++)
+      if (m->taken[plan->list[x]]) matching_queue (m, plan->contribution[plan->list[x]].node, plan->list[x]);
+    if (m->capacity[g] == 0) continue;
+    for (m->capacity[g]--; m->taken[m->by[g]]++, m->of[g] >= 0; g = plan->contribution[m->of[g]].group)
+      m->taken[m->of[g]]--;
+    return 1;
+  }
+  return 0;
+}
+
+/* Finds out whether the equations depend on each other in every configuration, since some of them are more than the
+ * coordinates in which they have entries, such as those of ten pins between the same two bodies.  Then *row is one of
+ * them, else it stays. */
+static int condense_find_dependent (pw_plan *plan, int *row) {
+  size_t groups = (size_t)plan->groups + 1;
+  condense_matching m = { .plan = plan, .capacity = pw_arena_alloc (&plan->arena, 5 * groups * sizeof (int)) };
+  m.taken = pw_arena_alloc (&plan->arena, ((size_t)plan->contributions + 1) * sizeof *m.taken);
+  if (m.capacity == NULL || m.taken == NULL) return PW_RESOURCE;
+  m.by = m.capacity + groups, m.of = m.by + groups, m.queue = m.of + groups, m.visited = m.queue + groups;
+  for (int j = 0; j < plan->saddle->s->coords; j++)
+    m.capacity[pw_group_of (plan->saddle->s, j)] += plan->saddle->inverse_weight[j] > 0;
+  for (int n = 0; n < plan->nodes; n++)
+    for (int i = 0; i < plan->node[n].size; i++)
+      if (!matching_augment (&m, n)) return *row = plan->node[n].unknown + i, PW_OK;
+  return PW_OK;
+}
+
 /* ---- Bodies that are not condensed ---- */
 
-/* A body to which more nodes than this contribute is not condensed, if its weights are finite and not 0: n nodes have
- * n (n - 1) / 2 couplings, but only 2 n with an uncondensed body, fewer from n = 6.  Measured: 0.6 to 0.9 of the time
- * with 7 nodes, 0.7 to 1.0 with 6. */
+/* A body to which more nodes than this contribute is not condensed: n nodes have n (n - 1) / 2 couplings, but only 2 n
+ * with an uncondensed body, fewer from n = 6.  Measured: 0.6 to 0.9 of the time with 7 nodes, 0.7 to 1.0 with 6. */
 enum { CONDENSE_NODES = 6 };
-
-static int condense_is_crowded (const pw_plan *plan, int group) {
-  if (plan->start[group + 1] - plan->start[group] <= CONDENSE_NODES || group >= plan->saddle->s->bodies) return 0;
-  const double *w = plan->saddle->inverse_weight + 3 * group;
-  return w[0] > 0 && w[1] > 0 && w[2] > 0;
-}
 
 /* Adds two nodes for every body that is not condensed, and ranks all nodes. */
 static int condense_uncondensed (pw_plan *plan) {
@@ -134,7 +187,7 @@ static int condense_uncondensed (pw_plan *plan) {
   if (plan->uncondensed == NULL) return PW_RESOURCE;
   for (int g = 0; g < plan->groups; g++) {
     plan->uncondensed[g] = -1;
-    if (!condense_is_crowded (plan, g)) continue;
+    if (plan->start[g + 1] - plan->start[g] <= CONDENSE_NODES || g >= saddle->s->bodies) continue;
     plan->uncondensed[g] = plan->nodes;
     condense_add_node (plan, (pw_plan_node){ .size = 2, .rank = 1, .unknown = saddle->s->rows + saddle->extra });
     condense_add_node (plan, (pw_plan_node){ .size = 1, .rank = 1, .unknown = saddle->s->rows + saddle->extra + 2 });
@@ -160,8 +213,11 @@ int pw_condense (struct pw_saddle *saddle, const double *weight, const unsigned 
   condense_elements (&plan, active);
   condense_components (&plan);
   int status = condense_sort (&plan);
-  if (status == PW_OK) status = condense_uncondensed (&plan);
-  if (status == PW_OK) status = pw_condense_block (&plan);
+  if (status == PW_OK) status = condense_find_dependent (&plan, &saddle->dependent_row);
+  if (saddle->dependent_row < 0) {
+    if (status == PW_OK) status = condense_uncondensed (&plan);
+    if (status == PW_OK) status = pw_condense_block (&plan);
+  }
   free (plan.node);
   free (plan.contribution);
   free (plan.pair);

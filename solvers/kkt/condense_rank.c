@@ -7,7 +7,8 @@
  * nodes at one end have rank 2: at the ground, or at one of the two bodies.  Then multipliers of rank 0 that exert no
  * force on the bodies of a leg exert none on the body at its other end either, since the forces of a joint on its two
  * bodies are opposite: dependent equations of rank 0 are dependent in the whole mechanism.  Nodes of uncondensed bodies
- * alone have rank 2, too: with these at rest their equations would be empty. */
+ * alone have rank 2, too: with these at rest their equations would be empty.  The rolling equation of a wheel has rank 0:
+ * no other equation contains the wheel's spin. */
 #include "condense.h"
 
 /* The end of the contributions of node n: one after the last. */
@@ -15,19 +16,28 @@ static int rank_end (const pw_plan *plan, int n) {
   return n + 1 < plan->nodes ? plan->node[n + 1].first_contribution : plan->contributions;
 }
 
-/* 1 for a node that touches an uncondensed body; of the others 2 if it touches the ground, else 0. */
+/* 1 if node n touches the ground, or prescribed coordinates of a condensed body, which are at rest as well. */
+static int rank_is_grounded (const pw_plan *plan, int n) {
+  int grounded = plan->node[n].grounded;
+  for (int p = plan->node[n].first_contribution; p < rank_end (plan, n); p++)
+    grounded |= plan->contribution[p].is_prescribed && plan->uncondensed[plan->contribution[p].group] < 0;
+  return grounded;
+}
+
+/* 1 for a node that touches an uncondensed body; of the others 2 if it is grounded, else 0. */
 static int rank_turn (const pw_plan *plan, int n) {
   for (int p = plan->node[n].first_contribution; p < rank_end (plan, n); p++)
     if (plan->uncondensed[plan->contribution[p].group] >= 0) return 1;
-  return plan->node[n].grounded ? 2 : 0;
+  return rank_is_grounded (plan, n) ? 2 : 0;
 }
 
-/* Joins the groups of node n, and the ground if the node is `grounded`.  Returns 0, without joining, if that would
+/* Joins the groups of node n, and the ground if the node is grounded.  Returns 0, without joining, if that would
  * connect two uncondensed bodies, or one with the ground, or if the node touches uncondensed bodies alone.  parent:
  * groups and the ground: union-find, in which uncondensed bodies and the ground are roots. */
 static int rank_join (const pw_plan *plan, int *parent, int n) {
   const int first = plan->node[n].first_contribution, end = rank_end (plan, n);
-  int at_rest = plan->node[n].grounded ? plan->groups : -1, root = -1, moves = first == end;
+  int at_rest = rank_is_grounded (plan, n) ? plan->groups : -1, root = -1, moves = first == end;
+  if (plan->node[n].rolls && plan->contribution[end - 1].group >= plan->saddle->s->bodies) return 1;
   for (int p = first; p < end; p++) {
     moves |= plan->uncondensed[plan->contribution[p].group] < 0;
     root = pw_root (parent, plan->contribution[p].group);

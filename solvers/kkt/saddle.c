@@ -22,7 +22,7 @@ pw_saddle *pw_saddle_open (pw_workspace *w, const double *weight, int rows, cons
   int status = PW_RESOURCE;
   pw_saddle *saddle = calloc (1, sizeof *saddle);
   if (saddle) {
-    *saddle = (pw_saddle){ .s = w->s, .w = w, .rows = rows, .pivot = INFINITY, .pivot_row = -1 };
+    *saddle = (pw_saddle){ .s = w->s, .w = w, .rows = rows, .pivot = INFINITY, .pivot_row = -1, .dependent_row = -1 };
     status = pw_massless_open (&saddle->massless, w, weight, rows, active, error);
     if (status == PW_OK) status = pw_condense (saddle, weight, active);
   }
@@ -47,7 +47,8 @@ void pw_saddle_postpone (pw_saddle *saddle, double pivot) {
 
 int pw_saddle_factor (pw_saddle *saddle) {
   saddle->postponed = 0;
-  saddle->pivot_row = -1;
+  saddle->pivot_row = saddle->dependent_row;
+  if (saddle->block == NULL) return saddle->pivot = 0, PW_RETRY;
   saddle->pivot = saddle->massless.components ? pw_massless_factor (&saddle->massless) : INFINITY;
   if (!(saddle->pivot > SADDLE_ROUND_OFF)) return PW_RETRY;
   pw_block_factor (saddle->block);

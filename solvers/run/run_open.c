@@ -95,17 +95,22 @@ static double run_time_scale (const pw_run *r) {
   return 1 / fastest;
 }
 
+/* After a part of the opening: PW_STOPPED if the caller requests it. */
+static int run_check_stop (pw_run *r, int status) {
+  return status >= PW_OK && pw_run_stop_opening (r) ? PW_STOPPED : status;
+}
+
 /* Opens the saddle at the consistent initial state and evaluates the accelerations there; if some rows are nearly
  * dependent, an independent set is selected first.  A scene too large for that fails below the sine rank_refused. */
 static int run_first_evaluation (pw_run *r, pw_error *error) {
-  int status = pw_run_open_saddle (r, error);
+  int status = run_check_stop (r, pw_run_open_saddle (r, error));
   if (status != PW_OK) return status;
   double sine = pw_watchdog_sine (r, NULL);
   int large = (double)r->s->rows * r->s->coords > PW_RANK_MAX_ENTRIES;
   if (sine < (large ? r->thresholds.rank_refused : r->thresholds.rank_suspect)) {
     if (large) return pw_fail_singular (r, r->t, error);
-    status = pw_rank_open (r, error);
-    if (status == PW_OK && r->redundant) status = pw_run_open_saddle (r, error);
+    status = run_check_stop (r, pw_rank_open (r, error));
+    if (status == PW_OK && r->redundant) status = run_check_stop (r, pw_run_open_saddle (r, error));
     if (status != PW_OK) return status;
   }
   status = pw_run_evaluate (r, error);
@@ -161,7 +166,7 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   r->t = r->settings.t;
   pw_hold_signals (r->w, 0);
   r->w->scale.time = r->settings.span; /* until the accelerations are known */
-  status = pw_run_make_consistent (r, r->origin, error);
+  status = run_check_stop (r, pw_run_make_consistent (r, r->origin, error));
   if (status == PW_OK) status = run_first_evaluation (r, error);
   if (status == PW_OK) status = run_check_finite (r, error);
   if (status != PW_OK) return status;
@@ -176,7 +181,7 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   if (pw_stabilised_by (r, PW_BAUMGARTE)) r->alpha = pw_run_option (r, "alpha"), r->beta = pw_run_option (r, "beta");
   r->identity = pw_run_identity (r);
   status = pw_specialised_open (r, error);
-  if (status == PW_OK) status = r->method->open (r, error);
+  if (status == PW_OK) status = run_check_stop (r, r->method->open (r, error));
   if (status != PW_OK || !r->uses_derivatives) return status;
   return pw_run_check_derivatives (r, method, "needs", error);
 }
@@ -190,7 +195,9 @@ pw_run *pw_run_open (const pw_system *s, const char *method, const pw_settings *
   }
   r->s = s;
   r->w = pw_workspace_new (s, error);
-  if (r->w && pw_run_annotate_error (r, run_open (r, method, settings, error), error) == PW_OK) return r;
+  int status = r->w ? pw_run_annotate_error (r, run_open (r, method, settings, error), error) : PW_RESOURCE;
+  if (status == PW_OK) return r;
+  if (status == PW_STOPPED) pw_fail (error, PW_STOPPED, "model %s: stopped before the first step", s->model);
   pw_run_close (r);
   return NULL;
 }

@@ -66,6 +66,16 @@ if command -v pkg-config >/dev/null; then
     -Wl,-rpath,\"$(pkg-config --variable=libdir pinwheel)\"" && ./analyse ./car-trailer.yaml >analysis) >"$work/log" 2>&1 &&
     [ -s "$work/expected" ] && diff "$work/expected" "$work/analysis" >"$work/log"
   report 'a program that analyses, with the results in analysis.md' $?
+  # As pkg-config --static says: with shared libraries, with Pinwheel's archives, with archives alone.
+  static_link () { # what, edit of the libraries
+    (cd "$work" && rm -f analyse && eval "$cc -std=c11 analyse.c -o analyse $(pkg-config --cflags pinwheel) \
+      $(pkg-config --static --libs pinwheel | sed "$2") -Wl,-rpath,\"$(pkg-config --variable=libdir pinwheel)\"" &&
+      ./analyse ./car-trailer.yaml >analysis) >"$work/log" 2>&1 && diff "$work/expected" "$work/analysis" >"$work/log"
+    report "a program linked by pkg-config --static with $1" $?
+  }
+  static_link 'shared libraries' ''
+  static_link 'archives of Pinwheel' 's/-l\(pinwheel[a-z-]*\)/-l:lib\1.a/g'
+  static_link 'archives alone' 's/^/-static /'
   [ "$(pkg-config --modversion pinwheel)" = "$("$top/bin/pinwheel" --version | sed -n '1s/^pinwheel \([^ ]*\).*/\1/p')" ] &&
     grep -q "^version: $(pkg-config --modversion pinwheel)\$" docs/CITATION.cff
   report 'one version everywhere' $?

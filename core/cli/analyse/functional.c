@@ -223,7 +223,7 @@ static void functional_end (functional_step *step, double span) {
 }
 
 int pw_outcomes_run (pw_outcomes *set, const char *method, const pw_settings *settings, double t_end, pw_error *error) {
-  pw_run *r = pw_run_open (set->system, method, settings, error);
+  pw_run *r = pw_limit_open (set->system, method, settings, error);
   if (r == NULL) return error->status;
   const double begin = pw_run_time (r);
   functional_step step = { set, r, begin, begin, PW_OK, error };

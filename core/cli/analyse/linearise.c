@@ -112,10 +112,10 @@ static int linearise_run (pw_linearise_command *cmd, pw_error *error) {
     settings.initial = cmd->initial;
     settings.initials = 2 * pw_system_coordinates (cmd->m.system);
   }
-  cmd->r = pw_run_open (cmd->m.system, d.method, &settings, error);
+  cmd->r = pw_limit_open (cmd->m.system, d.method, &settings, error);
   if (cmd->r == NULL) return error->status;
   if (cmd->steady) return PW_OK;
-  int status = pw_report_initial_state (&cmd->m, error);
+  int status = pw_report_initial_state (&cmd->m, cmd->limit.seconds, error);
   if (cmd->t == 0 || status != PW_OK) return status;
   pw_cli_report_tables (cmd->m.system, cmd->t);
   status = linearise_advance (cmd, error);

@@ -145,6 +145,7 @@ static int periodic_compute (pw_periodic_command *cmd, pw_error *error) {
   pw_periodic_orbit o;
   pw_limit_start (&cmd->limit);
   cmd->search = pw_periodic_open (cmd->m.system, &cmd->settings, error);
+  if (cmd->search == NULL && error->status == PW_METHOD && periodic_set_stopped (cmd)) *error = (pw_error){ 0 };
   if (cmd->search == NULL) return error->status;
   pw_stop_catch ();
   int status = periodic_find (cmd, &o, error);

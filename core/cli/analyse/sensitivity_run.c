@@ -337,9 +337,9 @@ static int sensitivity_open_runs (pw_sensitivity *sens, pw_error *error) {
   if (status == PW_OK) status = pw_outcomes_open (&sens->outcomes, sens->base.m.system, "--of", sens->of, count, error);
   if (status != PW_OK) return status;
   sens->base.settings.ledger = sens->outcomes.ledger;
-  sens->base.run = pw_run_open (sens->base.m.system, sens->unknowns.method, &sens->base.settings, error);
+  sens->base.run = pw_limit_open (sens->base.m.system, sens->unknowns.method, &sens->base.settings, error);
   if (sens->base.run && pw_system_may_jump (sens->base.m.system))
-    sens->sampled = pw_run_open (sens->base.m.system, sens->unknowns.method, &sens->base.settings, error);
+    sens->sampled = pw_limit_open (sens->base.m.system, sens->unknowns.method, &sens->base.settings, error);
   if (error->status != PW_OK) return error->status;
   status = pw_unknowns_directions (sens->direction, &sens->unknowns, sens->unknown_value, &sens->base, sens->neighbours,
                                    error);

@@ -126,7 +126,11 @@ int pw_unknowns_differentiated (pw_unknowns *u, const char **list, pw_error *err
   while (list[u->count]) u->count++;
   u->list = calloc ((size_t)u->count, sizeof *u->list);
   if (u->list == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  pw_run *r = pw_run_open (u->m->system, u->method, &u->settings, error);
+  pw_limit limit = { .seconds = u->limit };
+  pw_settings settings = u->settings;
+  settings.stop = pw_limit_over, settings.stop_context = &limit;
+  pw_limit_start (&limit);
+  pw_run *r = pw_limit_open (u->m->system, u->method, &settings, error);
   int status = r ? PW_OK : error->status;
   for (int i = 0; i < u->count && status == PW_OK; i++) {
     status = unknown_of_run (&u->list[i], u->m, r, list[i], error);
@@ -225,7 +229,7 @@ static int unknown_direction (pw_direction *d, const pw_unknowns *u, int i, doub
       status = pw_fail (error, PW_INPUT,
                         "%s changes the number of bodies or elements: derivatives with respect to it do not exist",
                         u->list[i].name);
-    if (status == PW_OK) d->neighbour[k] = near->run = pw_run_open (near->m.system, u->method, &general, error);
+    if (status == PW_OK) d->neighbour[k] = near->run = pw_limit_open (near->m.system, u->method, &general, error);
     if (status == PW_OK && near->run == NULL) status = error->status;
   }
   x[i] = value;

@@ -33,7 +33,7 @@ int pw_fit_run (const pw_fit *fit, const double *unknowns, double *out, pw_error
   if (status == PW_OK)
     status = pw_outcomes_open (&outcomes, run.m.system, "--columns", fit->column_name, fit->columns, error);
   run.settings.ledger = outcomes.ledger;
-  if (status == PW_OK) run.run = pw_run_open (run.m.system, fit->unknowns.method, &run.settings, error);
+  if (status == PW_OK) run.run = pw_limit_open (run.m.system, fit->unknowns.method, &run.settings, error);
   if (status == PW_OK) status = run.run ? fit_sample (fit, &outcomes, run.run, out, error) : error->status;
   if (status == PW_STOPPED) status = pw_limit_status (&run.limit, pw_run_time (run.run), error);
   pw_outcomes_close (&outcomes);

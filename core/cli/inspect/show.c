@@ -183,7 +183,7 @@ static int show_matrices (const pw_cli_line *line, const pw_cli_model *m, double
   if (t > 0) defaults.t_end = t;
   if (pw_cli_settings (line, &defaults, &(double){ 0 }, &settings, &limit, error) != PW_OK) return error->status;
   pw_limit_start (&limit);
-  pw_run *run = pw_run_open (m->system, defaults.method, &settings, error);
+  pw_run *run = pw_limit_open (m->system, defaults.method, &settings, error);
   if (run == NULL) return error->status;
   pw_sample sample;
   pw_equations eq = { .rows = 0 };

@@ -17,8 +17,9 @@ void pw_report_settings (pw_run *run, const pw_system *system, const char *metho
 /* Derivatives by differences, states changed by the consistent initialisation, redundant constraint equations. */
 void pw_report_initialisation (pw_run *run, const pw_system *system, const char *const *redundant);
 
-/* States that the consistent initialisation changes, if it succeeds.  PW_OK or PW_RESOURCE. */
-int pw_report_initial_state (const pw_cli_model *m, pw_error *error);
+/* States that the consistent initialisation changes, if it succeeds within this processor time [s].  PW_OK or
+ * PW_RESOURCE. */
+int pw_report_initial_state (const pw_cli_model *m, double limit, pw_error *error);
 
 /* After the run: a relative energy defect of more than 1 % (NaN: not known), speeds that grow beyond any plausible
  * scale. */

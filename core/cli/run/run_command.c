@@ -130,7 +130,7 @@ static int run_open (pw_run_cli *command, pw_error *error) {
                                command->line.starts != NULL, command->t_end, error);
   if (status != PW_OK) return status;
   pw_limit_start (&command->limit);
-  command->run = pw_run_open (system, command->method, &command->settings, error);
+  command->run = pw_limit_open (system, command->method, &command->settings, error);
   if (command->run == NULL) return error->status;
   command->redundant = pw_report_redundancies (command->run);
   pw_report_model (&command->compiled);

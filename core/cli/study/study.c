@@ -132,6 +132,12 @@ int pw_study_run (pw_study *study, pw_row *row, const pw_settings *settings, pw_
   run_settings.stop_context = &limit;
   run_settings.specialised = pw_scene_code_table (study->engine.code);
   pw_run *run = pw_run_open (study->compiled.system, row->method, &run_settings, error);
+  if (run == NULL && error->status == PW_STOPPED) {
+    *error = (pw_error){ 0 };
+    if (pw_stop || isinf (study->cpu_limit)) return pw_limit_status (&limit, settings->t, error);
+    row->state = ROW_STOPPED, row->t = settings->t;
+    return PW_RETRY;
+  }
   if (run == NULL) return error->status;
   int status = study_advance (study, row, run, &limit, visitor, error);
   row->t = pw_run_time (run);
@@ -197,7 +203,7 @@ static int study_open (pw_study *study, pw_error *error) {
   if (status == PW_OK) status = pw_parallel_jobs (study->jobs_text, &study->jobs, error);
   if (status == PW_OK) status = study->type->plan (study, error);
   if (status == PW_OK) status = pw_cli_read_specialise (study->line.specialise, &when, error);
-  if (status == PW_OK) status = pw_report_initial_state (&study->compiled, error);
+  if (status == PW_OK) status = pw_report_initial_state (&study->compiled, study->limit.seconds, error);
   if (status != PW_OK) return status;
   pw_cli_report_tables (study->compiled.system, study->t_end);
   /* one engine for all runs, since `compare` compares their processor times */

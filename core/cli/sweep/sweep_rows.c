@@ -178,7 +178,7 @@ static void row_open (sweep_row *row, const pw_plan *plan) {
   settings.initial = initial;
   pw_limit_start (&row->limit);
   if (initial)
-    row->run = pw_run_open (row->system->model.system, plan->method, &settings, &row->error);
+    row->run = pw_limit_open (row->system->model.system, plan->method, &settings, &row->error);
   else
     pw_fail (&row->error, PW_RESOURCE, "out of memory");
   row->status = row->error.status;
