@@ -54,8 +54,8 @@ static const struct initial_stage initial_least_change = { INITIAL_KEPT, 1e-6 };
 /* Searches: the distances at which they begin [units of L and rad]; their number in a scene of at most 100 coordinates;
  * where one ends as a solution that is as near as can be told: the changes of candidates, the turn of free angles. */
 static const double initial_start[] = { 0, 0.1, 0.3, 0.6, 1, 1.5, 2, 2, 3 };
-enum { INITIAL_STARTS = 20, INITIAL_STARTS_TO_TURN_LESS = 6, INITIAL_STARTS_FOUND = 10 };
-static const double INITIAL_UNCHANGED = 1e-4, INITIAL_TURNED = 0.5;
+enum { INITIAL_STARTS = 20, INITIAL_STARTS_TO_TURN_LESS = 10, INITIAL_STARTS_FOUND = 10 };
+static const double INITIAL_UNCHANGED = 1e-4, INITIAL_TURNED = 0.2;
 /* How much less a turned angle counts than a changed candidate, squares compared. */
 static const double INITIAL_LESS = 1e-9;
 
@@ -358,6 +358,22 @@ static void initial_begin (initial_search *x, int n, int free) {
   }
 }
 
+/* Takes whole turns out of the changes of free angles, if the constraints allow it. */
+static void initial_unwind (initial_search *x) {
+  const size_t bytes = (size_t)x->s->coords * sizeof (double);
+  const double before = initial_changes (x).sum;
+  int turns = 0;
+  memcpy (x->nearest, x->value, bytes);
+  for (int j = 0; j < x->s->coords; j++) {
+    const double change = x->value[j] - x->given[j];
+    if (!pw_is_angle (x->s, j) || x->importance[j] >= INITIAL_SPECIFIED || fabs (change) <= PW_PI) continue;
+    x->value[j] = x->given[j] + remainder (change, 2 * PW_PI);
+    turns = 1;
+  }
+  if (turns && !(initial_converge (x, INITIAL_ITERATIONS) && initial_changes (x).sum < before))
+    memcpy (x->value, x->nearest, bytes);
+}
+
 /* Consistent positions in x->value: the nearest ones that the searches find.  PW_OK or PW_RETRY. */
 static int initial_search_positions (initial_search *x) {
   const pw_system *s = x->s;
@@ -378,6 +394,7 @@ static int initial_search_positions (initial_search *x) {
       converged = initial_converge (x, INITIAL_ITERATIONS);
     }
     if (n == 0) failed_row = x->failed_row, failed_by = x->failed_by;
+    if (converged) initial_unwind (x);
     if (converged && n > 0) initial_relax (x);
     const initial_change change = initial_changes (x);
     if (converged && change.sum < 0.99 * best.sum) {

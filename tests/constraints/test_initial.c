@@ -168,8 +168,8 @@ static void random_make (int number) {
   runs_close (r, s);
 }
 
-/* Specifies each value with this probability, as changed by `change`; the others begin at 0. */
-static void random_specify (double probability, double (*change) (double)) {
+/* Specifies each position and velocity with these probabilities, as changed by `change`; the others begin at 0. */
+static void random_specify (double positions, double velocities, double (*change) (double)) {
   for (int j = 0; j < 6 * now.bodies; j++) {
     const int b = j % (3 * now.bodies) / 3, is_rate = j >= 3 * now.bodies, k = j % 3;
     double *to = is_rate ? now.rate + 3 * b + k : now.start + 3 * b + k;
@@ -177,7 +177,7 @@ static void random_specify (double probability, double (*change) (double)) {
     const unsigned flag = PW_SPECIFIES_X << (3 * is_rate + k);
     if (j < 3 * now.bodies && k == 0) now.specified[b] = PW_SPECIFIES_NOTHING;
     *to = 0;
-    if (random_between (0, 1) > probability) continue;
+    if (random_between (0, 1) > (is_rate ? velocities : positions)) continue;
     now.specified[b] |= flag;
     *to = change ? change (value) : value;
   }
@@ -249,7 +249,8 @@ static void count_level (const pw_run *r, int velocities, counts *count) {
   unsigned char kept[3 * BODIES] = { 0 }, specified[3 * BODIES];
   for (int j = 0; j < s->coords; j++) {
     specified[j] = (r->origin[velocities * s->coords + j] & PW_SPECIFIED) != 0;
-    kept[j] = specified[j] && is[j] == was[j];
+    kept[j] =
+        specified[j] && (is[j] == was[j] || (velocities && !pw_initial_moved (s, pw_run_initial (r), s->coords + j)));
     count->specified += specified[j], count->kept += kept[j];
   }
   pw_evaluate_J_at (r->w, r->t, r->q, r->v);
@@ -297,7 +298,8 @@ static double sketched (double x) {
   return x + random_between (-0.1, 0.1);
 }
 
-TEST (subsets) {
+/* Any part of a consistent state is kept, and so is a maximal part of one that was rounded or sketched. */
+TEST (positions) {
   static double (*const change[]) (double) = { NULL, rounded, sketched };
   static const char *const name[] = { "exact", "rounded", "sketched" };
   for (int c = 0; c < 3; c++)
@@ -305,10 +307,99 @@ TEST (subsets) {
       counts position = { 0 }, velocity = { 0 };
       for (int i = 0; i < 120; i++) {
         random_make (i);
-        random_specify (0.25 * part, change[c]);
+        random_specify (0.25 * part, 0.25 * part, change[c]);
         count_scene (&position, &velocity);
       }
       print_counts (check_text ("%s, %d %%, positions", name[c], 25 * part), &position);
       print_counts (check_text ("%s, %d %%, velocities", name[c], 25 * part), &velocity);
+      assert_int_equal (position.lost + velocity.lost + position.refused, 0);
+      if (change[c] == NULL) assert_int_equal (position.kept, position.specified);
+      check_below ("unattainable", position.unattainable, 0.02 * position.specified,
+                   "sketches off by 0.1 of bars of 0.4 to 2, beyond what these reach");
     }
+}
+
+/* Velocities that belong to consistent ones are kept at consistent positions; to round-off, since they satisfy the
+ * constraints to round-off only. */
+TEST (velocities) {
+  for (int part = 1; part <= 4; part++) {
+    counts position = { 0 }, velocity = { 0 };
+    for (int i = 0; i < 300; i++) {
+      random_make (i);
+      random_specify (1, 0.25 * part, NULL);
+      count_scene (&position, &velocity);
+    }
+    print_counts (check_text ("all positions, %d %% of the velocities", 25 * part), &velocity);
+    assert_int_equal (position.kept, position.specified);
+    assert_int_equal (velocity.kept, velocity.specified);
+  }
+}
+
+/* ---- Four-bar linkages by one angle ---- */
+
+/* A four-bar linkage whose crank has this angle, and nothing else is specified. */
+static void four_bar (const double length[4], double angle) {
+  now = (random_scene){ .bodies = 3 };
+  for (int b = 0; b < 3; b++) {
+    now.mass[b] = 1, now.specified[b] = b == 0 ? PW_SPECIFIES_PHI : PW_SPECIFIES_NOTHING;
+    now.joint[now.joints++] = (random_joint){ .type = PIN,
+                                              .body = { b - 1, b },
+                                              .at = { { b ? length[b - 1] / 2 : 0, 0 }, { -length[b] / 2, 0 } } };
+  }
+  now.joint[now.joints++] =
+      (random_joint){ .type = PIN, .body = { 2, -1 }, .at = { { length[2] / 2, 0 }, { length[3], 0 } } };
+  now.start[2] = angle;
+}
+
+/* The least sum of squares of the angles of coupler and rocker with which the crank can have this angle. */
+static double nearest_branch (const double length[4], double angle) {
+  const double x = length[3] - length[0] * cos (angle), y = -length[0] * sin (angle), d = hypot (x, y);
+  const double inner = acos ((length[1] * length[1] + d * d - length[2] * length[2]) / (2 * length[1] * d));
+  double least = INFINITY;
+  for (int sign = -1; sign <= 1; sign += 2) {
+    const double coupler = atan2 (y, x) + sign * inner;
+    const double rocker = atan2 (y - length[1] * sin (coupler), x - length[1] * cos (coupler));
+    least = fmin (least, pow (remainder (coupler, 2 * PW_PI), 2) + rocker * rocker);
+  }
+  return least;
+}
+
+/* The angle of the crank is kept where it can be reached, which the law of cosines tells; elsewhere it is changed, to one
+ * that can be reached, or the run is refused. */
+TEST (crank_angles) {
+  int kept = 0, nearest = 0, changed = 0, refused = 0;
+  random_state = 5;
+  for (int i = 0; i < 300; i++) {
+    double length[4];
+    for (int k = 0; k < 4; k++) length[k] = random_between (0.5, 3);
+    const double angle = random_between (-PW_PI, PW_PI);
+    const double diagonal = hypot (length[3] - length[0] * cos (angle), length[0] * sin (angle));
+    const double slack = fmin (length[1] + length[2] - diagonal, diagonal - fabs (length[1] - length[2]));
+    if (fabs (slack) < 1e-3) continue; /* nearly a dead point */
+    four_bar (length, angle);
+    pw_error error = { 0 };
+    pw_system *s = scene_system (&random_table, NULL);
+    pw_run *r = pw_run_open (s, "rk4", NULL, &error);
+    if (slack > 0) {
+      assert_non_null (r);
+      const double *q = pw_run_initial (r)->q;
+      assert_true (q[2] == angle && pw_run_initial (r)->changed == 0);
+      kept++, nearest += q[5] * q[5] + q[8] * q[8] < nearest_branch (length, angle) + 1e-9;
+    } else if (r) {
+      char reason[200];
+      assert_true (pw_run_initial (r)->q[2] != angle && pw_run_initial (r)->changed == 1);
+      assert_non_null (strstr (pw_run_initial_reason (r, 2, reason, sizeof reason), "pin j"));
+      changed++;
+    } else {
+      double longest = 0, sum = 0;
+      for (int k = 0; k < 4; k++) longest = fmax (longest, length[k]), sum += length[k];
+      assert_true (error.status == PW_INITIAL && longest > sum - longest); /* no such linkage closes */
+      refused++;
+    }
+    pw_run_close (r);
+    pw_system_free (s);
+  }
+  print_message ("%d angles kept, %d on the nearest branch, %d changed, %d linkages refused\n", kept, nearest, changed,
+                 refused);
+  assert_true (kept > 150 && nearest >= kept);
 }
