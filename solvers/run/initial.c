@@ -74,7 +74,7 @@ static const double INITIAL_NEAR = 1e-9, INITIAL_LEAST_DAMPING = DBL_EPSILON / 2
  * a step, alone and together with other values. */
 static const double INITIAL_RELAXED = 0.3, INITIAL_STEP = 0.7, INITIAL_PART = 1. / 32, INITIAL_PART_OF_MANY = 1. / 4;
 
-/* What prescribed values may change others: so many times the least change, or so much [units of L and rad]. */
+/* How far prescribed values may change others: multiples of the least change, or a distance [units of L and rad]. */
 static const double INITIAL_AMPLIFIED = 10, INITIAL_CHANGE = 0.1;
 /* Changes that may be due to the round-off of other values, relative. */
 static const double INITIAL_ROUND = 1e-10;
@@ -274,7 +274,7 @@ static double initial_step (initial_search *x, double damping, pw_residuals *now
 }
 
 /* Levenberg and Marquardt's method from the positions x->value, with those of infinite weight at their targets, to
- * round-off.  1 if it converges within so many iterations; 0: x->failed_row, and where it ends. */
+ * round-off.  1 if it converges within the number of iterations given; 0: x->failed_row, and where it ends. */
 static int initial_converge (initial_search *x, int iterations) {
   pw_run *r = x->r;
   const size_t bytes = (size_t)x->s->coords * sizeof (double), rows = (size_t)x->rows * sizeof (double);
