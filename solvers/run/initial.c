@@ -52,7 +52,7 @@ static const int INITIAL_STAGES = sizeof initial_stage / sizeof *initial_stage;
 static const struct initial_stage initial_least_change = { INITIAL_KEPT, 1e-6 };
 
 /* Searches: the distances at which they begin [units of L and rad]; their number in a scene of at most 100 coordinates;
- * where one ends as a solution that is as near as can be told: the changes of candidates, the turn of free angles. */
+ * where they end: the changes of candidates and the turn of free angles of a solution that is near enough. */
 static const double initial_start[] = { 0, 0.1, 0.3, 0.6, 1, 1.5, 2, 2, 3 };
 enum { INITIAL_STARTS = 20, INITIAL_STARTS_TO_TURN_LESS = 10, INITIAL_STARTS_FOUND = 10 };
 static const double INITIAL_UNCHANGED = 1e-4, INITIAL_TURNED = 0.2;
