@@ -264,6 +264,11 @@ static double initial_objective (initial_search *x, pw_residuals *now) {
   return isfinite (sum) ? sum : INFINITY;
 }
 
+/* 1 if the caller requests a stop while the run is opened: all work then fails. */
+static int initial_is_stopped (initial_search *x) {
+  return x->origin && pw_run_stop_opening (x->r);
+}
+
 /* A step from x->last, at the J there, and the objective at its end; INFINITY if there is no step. */
 static double initial_step (initial_search *x, double damping, pw_residuals *now) {
   const int n = x->s->coords;
@@ -293,6 +298,7 @@ static int initial_converge (initial_search *x, int iterations) {
   double damping = is_large ? INITIAL_LEAST_DAMPING : fmin (1e-2, now.position);
   for (; n < iterations && isfinite (sum) && now.position > PW_RESIDUAL_CONVERGED && slow < INITIAL_SLOW; n++) {
     const int near = now.position <= INITIAL_NEAR;
+    if (initial_is_stopped (x)) return 0;
     if (now.position <= accepted && now.position > previous / 4) break; /* at round-off: convergence is quadratic */
     previous = near ? now.position : INFINITY;
     pw_evaluate_J (r->w);
@@ -797,6 +803,7 @@ static int initial_level_consistent (pw_run *r, initial_level level, const unsig
   initial_search x;
   int status = initial_open (&x, r, level, origin);
   if (status == PW_OK) status = level == INITIAL_POSITIONS ? initial_positions (&x) : initial_velocities (&x);
+  if (status == PW_RETRY && initial_is_stopped (&x)) status = PW_STOPPED;
   if (status == PW_RETRY || x.out_of_memory) status = initial_fail (&x, error);
   if (status == PW_RESOURCE) status = pw_fail_memory (r->s, error);
   initial_close (&x);
