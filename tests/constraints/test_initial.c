@@ -364,8 +364,8 @@ static double nearest_branch (const double length[4], double angle) {
   return least;
 }
 
-/* The angle of the crank is kept where it can be reached, by the law of cosines; elsewhere it is changed, or the linkage
- * does not close. */
+/* The angle of the crank is kept where it can be reached, by the law of cosines; elsewhere it is changed, or no linkage
+ * closes. */
 TEST (crank_angles) {
   int kept = 0, nearest = 0, changed = 0, refused = 0;
   random_state = 5;
