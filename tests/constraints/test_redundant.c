@@ -1,7 +1,9 @@
 /* Redundant constraint equations: the motion is that of the scene without them, reactions have the least norm, and
  * messages name the elements. */
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
+#include <sys/resource.h>
 #include "check.h"
 #include "redundant.h"
 #include "scene.h"
@@ -297,4 +299,84 @@ TEST (restart) {
     pw_run_close (r);
   }
   pw_system_free (s);
+}
+
+/* ---- Thousands of equations of the same bodies ---- */
+
+enum { MANY = 1000, MANY_COORDS = 6 };
+
+typedef struct {
+  double kind, count;
+} many;
+
+static const pw_parameter many_list[] = { { PW_AT (many, kind), .about = "of the elements" },
+                                          { PW_AT (many, count), .about = "number of elements" },
+                                          { .name = NULL } };
+
+enum { PINS, PINS_APART, PINS_TO_GROUND, WELDS, RODS, SLIDERS, WHEELS, ROLLING_WHEELS, MANY_KINDS };
+
+static const char *const many_name[] = { "pins",  "pins apart", "pins to ground", "welds",
+                                         "rods",  "sliders",    "wheels",         "rolling wheels" };
+
+/* An element of the bodies a and b, or of one of them and the ground. */
+static void many_add (pw_model *m, int kind, int i, double count) {
+  char name[20];
+  double x = kind == PINS_APART || kind == WELDS ? cos (i) : 0, y = sin (1.7 * i);
+  snprintf (name, sizeof name, "e%d", i);
+  if (kind == PINS || kind == PINS_APART)
+    pw_add_pin (m, &(pw_pin){ .name = name, .body = { "a", "b" }, .at = { { x + 1, x }, { x, x } } });
+  if (kind == PINS_TO_GROUND)
+    pw_add_pin (m, &(pw_pin){ .name = name, .body = { "b", "ground" }, .at = { { 1, 0 }, { 2, 0 } } });
+  if (kind == WELDS)
+    pw_add_weld (m, &(pw_weld){ .name = name, .body = { "a", "b" }, .at = { { x + 1, y }, { x, y } } });
+  if (kind == RODS)
+    pw_add_rod (m, &(pw_rod){ .name = name, .body = { "b", "ground" }, .at = { { 1, 0 }, { 2, 1 } }, .length = 1 });
+  if (kind == SLIDERS)
+    pw_add_slider (m,
+                   &(pw_slider){ .name = name, .body = { "a", "b" }, .at = { { 0 }, { -1, 0 } }, .heading = 0.3 });
+  if (kind == WHEELS) pw_add_wheel (m, &(pw_wheel){ .name = name, .body = "b", .at = { 1, y } });
+  if (kind == ROLLING_WHEELS)
+    pw_add_rolling_wheel (
+        m, &(pw_rolling_wheel){ .name = name, .body = "b", .at = { 1, 0.5 }, .radius = 0.1, .inertia = 0.01 / count });
+}
+
+SCENE_WITH (many_build, many_list, many) {
+  pw_add_body (m, &(pw_body){ .name = "a", .mass = 1, .inertia = 0.5 });
+  pw_add_body (m, &(pw_body){ .name = "b", .mass = 2, .inertia = 0.3, .start = { 1, 0, 0 } });
+  pw_add_pin (m, &(pw_pin){ .name = "hook", .body = { "a", "ground" } });
+  for (int i = 0; i < (int)p->count; i++) many_add (m, (int)p->kind, i, p->count);
+  pw_add_gravity (m, &(pw_gravity){ .name = "gravity", .acceleration = { 1, -9.81 } });
+}
+
+/* A scene of many elements moves like that of a few; they share the reaction of one. */
+static void many_check (int kind, const char *method) {
+  const int few = kind == PINS_APART ? 5 : 1, is_shared = kind != PINS_APART && kind != WELDS && kind < WHEELS;
+  pw_settings settings = { .step = 0.01, .rtol = 1e-9 };
+  pw_system *s = scene_system (&many_build_table, "kind", (double)kind, "count", (double)MANY, NULL),
+            *twin = scene_system (&many_build_table, "kind", (double)kind, "count", (double)few, NULL);
+  pw_run *r = runs_open (s, method, &settings), *one = runs_open (twin, method, &settings);
+  pw_sample x = runs_to (r, 0.1), y = runs_to (one, 0.1);
+  int per_element = (pw_system_rows (s) - pw_system_rows (twin)) / (MANY - few);
+  for (int j = 0; j < MANY_COORDS; j++) {
+    check_close (many_name[kind], x.q[j], y.q[j], 1e-9, "equivalent equations: round-off");
+    check_close (many_name[kind], x.v[j], y.v[j], 1e-8, "equivalent equations: round-off");
+  }
+  for (int i = 0, first = 2; is_shared && i < per_element; i++) /* after those of the hook */
+    for (int e = 0; e < MANY; e++)
+      check_close (many_name[kind], MANY * x.lambda[first + per_element * e + i], y.lambda[first + i],
+                   1e-6 * (1 + fabs (y.lambda[first + i])), "each has an equal part");
+  assert_true (pw_run_redundant (r) >= MANY - 3);
+  runs_close (r, s);
+  runs_close (one, twin);
+}
+
+TEST (many) {
+  struct rusage before, after;
+  getrusage (RUSAGE_SELF, &before);
+  for (int kind = 0; kind < MANY_KINDS; kind++) many_check (kind, "rk4+projection");
+  many_check (PINS, "ida+ggl");
+  many_check (PINS_TO_GROUND, "radau");
+  getrusage (RUSAGE_SELF, &after);
+  check_below ("memory [MB]", (double)(after.ru_maxrss - before.ru_maxrss) / 1e3, 30,
+               "some arrays of numbers for each equation, but no matrix of 2000 times 2000 of them");
 }

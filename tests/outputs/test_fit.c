@@ -191,6 +191,34 @@ TEST (unweighted) {
   assert_int_equal (strncmp (cli_file ("fit.csv"), "t [s],w.phi [rad],w.phi.model [rad],w.phi.residual [rad]", 56), 0);
 }
 
+/* A few data: half the width of an interval is a tabulated quantile of Student's distribution. */
+TEST (few_data) {
+  static const struct {
+    int data;
+    const char *confidence;
+    double quantile;
+  } all[] = { { 3, "0.95", 12.706204736432095 }, { 4, "0.95", 4.302652729911275 }, { 7, "0.95", 2.570581835636314 },
+              { 4, "0.99", 9.924843200918295 },  { 7, "0.8", 1.475884048824481 } };
+  for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
+    char text[1000], *at = text;
+    at += sprintf (at, "t,w.phi\n");
+    for (int k = 1; k <= all[i].data; k++)
+      at += sprintf (at, "%.9g,%.9g\n", 0.3 * k, fit_exact (0.3 * k) + 0.02 * fit_noise ());
+    cli_write ("few.csv", text);
+    cli_shell (check_text (
+        "pinwheel fit @/wheel.yaml --data @/few.csv --columns w.phi --free k --free c --json @/fit.json --confidence %s",
+        all[i].confidence));
+    const char *json = cli_file ("fit.json");
+    assert_true (cli_number (json, "freedom", NULL) == all[i].data - 2);
+    for (int c = 0; c < 2; c++) {
+      const char *name = c ? "c" : "k";
+      double error = fit_value (json, name, "standard_error"), value = fit_value (json, name, "value");
+      check_close (name, (fit_value (json, name, "to") - value) / error, all[i].quantile, 1e-6, "that of tables");
+      check_close (name, (value - fit_value (json, name, "from")) / error, all[i].quantile, 1e-6, "that of tables");
+    }
+  }
+}
+
 /* Only s k has an effect, and n has none. */
 TEST (undetermined) {
   fit_write (1);

@@ -138,6 +138,31 @@ TEST (light_body) {
   }
 }
 
+/* The angle of a double pendulum by its initial value: steps of the run have no error, those of derivatives do.  Exact
+ * values: extrapolation (Gragg, Bulirsch, Stoer) with 30 digits. */
+TEST (own_error) {
+  static const char *const method[] = { "rk4+projection --step 1e-4", "rk4+projection --step 1e-4 --every 0.1",
+                                        "rk4+projection --step 1e-4 --every 0.01", "erk8 --rtol 1e-12" };
+  static const double exact[] = { 2.67724679526883532, -0.467773208803388543 }; /* after 3 s and 4 s */
+  cli_write ("double.yaml",
+             "pinwheel: 1\nparameters: [{name: p, value: 1.5}]\nbodies:\n"
+             "  - {name: a, mass: 1, inertia: 0.1, start: {x: 0.5*sin (p), y: -0.5*cos (p), phi: p - pi/2}}\n"
+             "  - {name: b, mass: 1, inertia: 0.1, start: {x: sin (p) + 0.5, y: -cos (p), phi: 0}}\n"
+             "elements:\n  - {pin: O, body: [ground, a], at: [[0, 0], [-0.5, 0]]}\n"
+             "  - {pin: P, body: [a, b], at: [[0.5, 0], [-0.5, 0]]}\n"
+             "  - {gravity: G, acceleration: [0, -9.81]}\n");
+  for (int i = 0; i < 2; i++)
+    for (size_t k = 0; k < sizeof method / sizeof *method; k++) {
+      double x, error;
+      cli_shell (check_text ("pinwheel sensitivity @/double.yaml --of a.phi --by p -o @/sens --t-end %d --method %s",
+                             3 + i, method[k]));
+      cli_sensitivity ("derivative", &x);
+      cli_sensitivity ("error", &error);
+      check_close (method[k], x, exact[i], error, "the claim");
+      check_below (method[k], error, 1e-6, "the tolerance, amplified");
+    }
+}
+
 /* A chain of ten rods amplifies errors of integration, which differ with the rows of the table, by 1e9 in 3 s. */
 TEST (chaos) {
   double x[2], error[2];

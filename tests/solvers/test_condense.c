@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "check.h"
+#include "condense.h"
 #include "saddle.h"
 #include "scene.h"
 
@@ -191,4 +192,57 @@ TEST (stretched_leg) {
   pw_saddle_close (k);
   pw_workspace_free (w);
   pw_system_free (s);
+}
+
+/* ---- Platforms on many legs, with prescribed coordinates ---- */
+
+enum { STOOL_LEGS = 80 };
+static const pw_parameter stool_list[] = { { .name = "legs", .about = "that stand on the ground" }, { .name = NULL } };
+
+/* A platform on bent legs of two links; further links hang from it. */
+SCENE_WITH (stool_build, stool_list, double) {
+  char name[5][20];
+  pw_add_body (m, &(pw_body){ .name = "platform", .mass = 1, .inertia = 0.3, .start = { 0.2, 0.1, 0.3 } });
+  for (int i = 0; i < STOOL_LEGS; i++) {
+    static const char *const part[] = { "thigh", "shank", "hip", "knee", "foot" };
+    for (int k = 0; k < 5; k++) snprintf (name[k], sizeof name[k], "%s%d", part[k], i);
+    for (int k = 0; k < 2; k++)
+      pw_add_body (m, &(pw_body){ .name = name[k], .mass = 0.1, .inertia = 0.01, .start = { i, k, 0.7 * i + k } });
+    pw_add_pin (m, &(pw_pin){ .name = name[2], .body = { name[0], "platform" }, .at = { { 0.5, 0 }, { i, 0 } } });
+    pw_add_pin (m, &(pw_pin){ .name = name[3], .body = { name[0], name[1] }, .at = { { -0.5, 0 }, { 0.5, 0 } } });
+    if (i < *p) pw_add_pin (m, &(pw_pin){ .name = name[4], .body = { name[1], "ground" }, .at = { { -0.5, 0 } } });
+  }
+}
+
+/* Solutions satisfy the equations, whichever coordinates of the platform are prescribed; it is not condensed. */
+TEST (stool) {
+  for (int legs = 0; legs <= STOOL_LEGS; legs += STOOL_LEGS)
+    for (int prescribed = 0; prescribed < 7; prescribed++) {
+      pw_system *s = scene_system (&stool_build_table, "legs", (double)legs, NULL);
+      pw_workspace *w = pw_workspace_new (s, NULL);
+      const size_t n = (size_t)s->coords, rows = (size_t)s->rows;
+      double *weight = calloc (6 * n + 4 * rows + 6, sizeof *weight), *f = weight + n, *a = f + n, *sum = a + n + 3;
+      double *lambda = sum + n + 3, *gamma = lambda + rows, *Ja = gamma + rows;
+      for (int j = 0; j < s->coords; j++) weight[j] = j < 3 && prescribed & 1 << j ? INFINITY : s->mass[j];
+      for (int j = 0; j < s->coords; j++) f[j] = cos (j);
+      for (int i = 0; i < s->rows; i++) gamma[i] = sin (3 * i);
+      pw_saddle *k = condense_open (w, weight);
+      assert_int_equal (k->extra, 3);
+      assert_int_equal (pw_saddle_factor (k), PW_OK);
+      pw_saddle_solve (k, f, gamma, a, lambda);
+      pw_add_JT (w, lambda, sum);
+      pw_mul_J (w, a, Ja);
+      double unit = 1e4 * CHECK_EPS;
+      for (int j = 0; j < s->coords; j++)
+        if (isinf (weight[j]))
+          check_close ("prescribed", a[j], 0, 0, "it does not move");
+        else
+          check_close ("force", s->mass[j] * a[j] + sum[j], f[j], unit * (1 + fabs (sum[j])), "round-off over a sine^2");
+      for (int i = 0; i < s->rows; i++)
+        check_close ("acceleration", Ja[i], gamma[i], 1e4 * unit, "round-off of accelerations of 1e3");
+      free (weight);
+      pw_saddle_close (k);
+      pw_workspace_free (w);
+      pw_system_free (s);
+    }
 }
