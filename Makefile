@@ -69,7 +69,8 @@ LIB_OBJ   := $(call obj,$(CORE) $(SOLVERS))
 BASE_OBJ  := $(call obj,$(addprefix core/base/,characters.c nearest.c store.c stream.c))
 FILES_OBJ := $(call obj,$(FILES))
 CLI_OBJ   := $(call obj,$(CLI))
-PLUGINS   := $(MODELS:%.c=$(BUILD)/%.so) $(patsubst %,$(BUILD)/%,$(wildcard models/*.yaml))
+# Interactive pages need the sources of plug-ins, next to them.
+PLUGINS   := $(MODELS:%.c=$(BUILD)/%.so) $(patsubst %,$(BUILD)/%,$(MODELS) $(wildcard models/*.yaml))
 TESTS     := $(patsubst %.c,$(BUILD)/tests/%,$(notdir $(QUICK)))
 SLOWS     := $(patsubst %.c,$(BUILD)/tests/%,$(notdir $(SLOW)))
 PROGRAMS  := $(BENCH:%.c=$(BUILD)/%) $(EMBED:%.c=$(BUILD)/%)
@@ -271,7 +272,10 @@ $(BUILD)/models/%.so: models/%.c | $(INCLUDES) $(FIRST)
 # A link: $(BUILD)/pinwheel searches models/, too, and a file found twice counts once.  It is relative, so that the tree can be
 # copied.  A plug-in of the same name, from when the model was written in C, is removed.
 $(BUILD)/models/%.yaml: models/%.yaml
-	@mkdir -p $(@D) && rm -f $(@:.yaml=.so)
+	@mkdir -p $(@D) && rm -f $(@:.yaml=.so) $(@:.yaml=.c)
+	@ln -sfr $< $@ 2>/dev/null || ln -sf "$(CURDIR)/$<" $@
+$(BUILD)/models/%.c: models/%.c
+	@mkdir -p $(@D)
 	@ln -sfr $< $@ 2>/dev/null || ln -sf "$(CURDIR)/$<" $@
 
 OWN_LIBS = -L$(BUILD) -lpinwheel-files -lpinwheel

@@ -89,9 +89,9 @@ typedef struct {
 
 /* A signal computed by the caller.  `eval` stores the value in value[0] and, for a signal of a constraint, its time
  * derivatives in value[1] and value[2].  x contains the states named in `reads`; gradient, unless NULL, receives the
- * derivatives of value[0] with respect to x.  A non-zero return stops the run (radau may try shorter steps first).
- * Equal t and x must give equal values; if the function changes between steps (a controller sets a new torque), call
- * pw_run_restart. */
+ * derivatives of value[0] with respect to x.  A non-zero return, or no value, stops the run (radau may try shorter steps
+ * first).  Equal t and x must give equal values; if the function changes between steps (a controller sets a new torque),
+ * call pw_run_restart. */
 typedef struct {
   int (*eval) (void *context, double t, const double *x, double value[3], double *gradient);
   void *context;            /* passed to eval and breakpoint; must outlive the systems, unless open replaces it */
@@ -133,6 +133,7 @@ typedef struct {
   int ends;            /* of a spline: PW_ENDS_FREE: not-a-knot; PW_ENDS_REST: first derivative 0 */
   double scale;        /* the signal is offset + scale value; 0 stands for 1 */
   double offset;       /* unit of the signal */
+  int skipped;         /* rows of its file without a value, which are not among the points; for messages only */
 } pw_points;
 
 /* A signal; zero-initialised, it is the constant 0. */
@@ -764,6 +765,11 @@ char *pw_system_signal_name (const pw_system *s, int signal, char *buffer, size_
 const char *pw_system_signal_unit (const pw_system *s, int signal);
 int pw_system_signal_of_force (const pw_system *s, int signal);
 
+/* What the user should know of a signal that is a table: that its times do not cover a run from 0 to t_end, or that
+ * rows of its file are left out.  "torque T: value: ...", in the buffer, which is returned; "" if there is nothing. */
+enum { PW_NOTICE_BYTES = 600 }; /* size of buffers in which it fits */
+char *pw_system_table_notice (const pw_system *s, int signal, double t_end, char *buffer, size_t size);
+
 /* The signal of this name; the name of an element suffices if the element has one signal.  PW_INPUT and the error, with
  * the nearest name, if there is none. */
 int pw_system_find_signal (const pw_system *s, const char *name, pw_error *error);
@@ -776,6 +782,10 @@ const char *pw_system_name (const pw_system *s);
 const char *pw_system_body_name (const pw_system *s, int body);
 const double *pw_system_mass (const pw_system *s);
 double pw_system_length (const pw_system *s);
+
+/* 1 if a body has no inertia and nothing turns it: no constraint, force or signal depends on its angle or acts on it.
+ * The angle is left out of the equations of motion and keeps its velocity. */
+int pw_system_unturned (const pw_system *s, int body);
 
 /* The initial conditions as described, or set by pw_model_set_initial: coordinates and velocities. */
 const double *pw_system_initial_q (const pw_system *s);

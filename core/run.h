@@ -96,10 +96,12 @@ typedef struct {
   const double *q, *v;             /* the initial state of the run; valid until it advances */
   int moved;                       /* number of states that differ by more than round-off */
   const unsigned char *origin;     /* for pw_initial_specified */
-  int released;                    /* 1: some of the user's values could not be kept */
+  int released;                    /* 1: some of the user's values were not kept */
   int changed;                     /* number of moved states that the model specifies and the user does not give */
+  int rounded;                     /* number of states given or specified that moved by less than 1e-2 of their unit */
   double position, velocity;       /* scaled residuals of the described state */
   double time;                     /* time scale of the run [s] */
+  double speed;                    /* the largest described velocity, those of angles times L [m/s] */
 } pw_initial_report;
 
 /* ---- Saved states ---- */

@@ -219,6 +219,13 @@ unsigned long long pw_run_identity (const pw_run *r);
 /* Opens the saddle and the method anew at the state reached, where J is evaluated. */
 int pw_run_renew (pw_run *r, pw_error *error);
 
+/* Advice where wheels lock, that is where the equation of a row contradicts others; "" if the row is not of a wheel. */
+static inline const char *pw_advice_on_wheel (const pw_system *s, int row) {
+  return pw_system_element (s, pw_system_row_element (s, row)).kind->contact
+             ? "; wheels that slip sideways are of type tyre"
+             : "";
+}
+
 /* The length of q, v, a and lambda of a state together. */
 static inline size_t pw_state_length (const pw_system *s) {
   return 3 * ((size_t)s->coords + 3) + (size_t)s->rows;

@@ -175,9 +175,13 @@ const pw_statistics *pw_run_statistics (const pw_run *r);
 const pw_initial_report *pw_run_initial (const pw_run *r);
 const pw_scale *pw_run_scale (const pw_run *r);
 
-/* 1 if making the initial state consistent changed this state (numbered as in pw_system_find_state) by more than
- * round-off. */
+/* Whether making the initial state consistent changed this state (numbered as in pw_system_find_state) by more than
+ * round-off.  0: no; 1: by less than 1e-2 of its unit, as if it were rounded; 2: more.  The unit is L or 1 rad, that of
+ * velocities the largest described one, speed (over L), or L / T (1 rad / T) if all are 0. */
 int pw_initial_moved (const pw_system *s, const pw_initial_report *report, int state);
+/* Why a state that moved could not begin as described: "pin A would be open by 0.02 m", the equation that is violated
+ * most if this state alone has the described value; "" if none is.  Before the run advances.  Returns the buffer. */
+char *pw_run_initial_reason (pw_run *r, int state, char *buffer, size_t size);
 /* 1 if the model or the user specifies the initial value of this state. */
 int pw_initial_specified (const pw_initial_report *report, int state);
 /* 1 if the user gives it: pw_model_set_initial, pw_settings.initial. */
@@ -220,7 +224,8 @@ void pw_profile_free (pw_profile *p);
  * when t_end is reached, the rows are full, or after `steps` calls of pw_run_advance_towards (times: NULL: of
  * pw_run_advance): call it again, with the rest of the times; otherwise as pw_run_advance.  A row is t, scaled
  * residuals of g = 0 and J v = eta, kinetic and potential energy, work, loss, energy added by projections, balance
- * (PW_RECORD_STATES numbers), then q, v, a, reactions (-lambda) and, with pw_settings.ledger, the ledger's entries. */
+ * (PW_RECORD_STATES numbers), then q, v, a, x and y of the contact points, reactions (-lambda) and, with
+ * pw_settings.ledger, the ledger's entries. */
 enum { PW_RECORD_STATES = 9 }; /* index of the first coordinate in a row */
 int pw_run_record_width (const pw_run *r);
 int pw_run_record (pw_run *r, double t_end, const double *times, long count, long steps, double *rows, long *recorded,

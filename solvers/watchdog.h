@@ -41,7 +41,7 @@ typedef struct {
   int may_have_crossed;       /* 1: the motion may recently have passed a point where branches cross */
   double step_length;         /* of the last step, in the units of `moved` */
   double previous_t;          /* at the state last checked, the beginning of the step to be checked: the time, */
-  double *previous_q;         /* the coordinates, */
+  double *previous_q;         /* the coordinates and, from number coords + 3 on, the velocities, */
   double previous_sine;       /* and the sine; NaN: not computed */
 } pw_watchdog;
 
@@ -73,5 +73,12 @@ int pw_change_point_check (struct pw_run *r, double sine, pw_error *error);
 /* Checks that a step of fixed size resolves a change point that the motion has passed at a small distance; last_sine:
  * that one state earlier, NaN if it was not computed.  Adaptive methods have error control instead. */
 int pw_change_point_resolve (struct pw_run *r, double last_sine, pw_error *error);
+
+/* PW_METHOD if the last step has passed a dead point, from which prescribed motions cannot go on (dead_point.c). */
+int pw_dead_point_passed (struct pw_run *r, pw_error *error);
+
+/* After a step that has failed with PW_METHOD: if a dead point follows the state last checked, `error` says so.
+ * Returns PW_METHOD. */
+int pw_dead_point_explain (struct pw_run *r, pw_error *error);
 
 #endif

@@ -186,6 +186,9 @@ pw_file *pw_cli_file (const pw_cli_line *line, pw_error *error);
 int pw_cli_open (pw_cli_model *m, const pw_cli_line *line, pw_error *error);
 void pw_cli_close_model (pw_cli_model *m);
 
+/* Prints notices of tables that do not cover a run from 0 to t_end, and of rows of their files that are left out. */
+void pw_cli_report_tables (const pw_system *s, double t_end);
+
 /* Reads "NAME=VALUE" of an option.  PW_INPUT if it does not have this form, which messages call `form`. */
 enum { PW_ASSIGNED_NAME = 200 }; /* longest name, its end included */
 int pw_cli_assignment (const char *option, const char *text, const char *form, char name[PW_ASSIGNED_NAME],
@@ -284,6 +287,12 @@ void pw_files_close (pw_files *files);
 
 /* PW_INPUT if the path of -o (NULL: none) ends in .npz: NumPy archives cannot contain the texts of some tables. */
 int pw_cli_check_csv (const char *path, pw_error *error);
+/* Whether a name ends as that of a file: ".csv", ".png", ... */
+int pw_cli_names_file (const char *path);
+/* Refuses a file in a format that is not written, and a new folder with the name of a file.  A status. */
+int pw_cli_check_format (const pw_use *use, pw_error *error);
+/* Endings of formats, for pw_use. */
+extern const char *const pw_cli_csv[], *const pw_cli_json[];
 
 /* ---- Messages ---- */
 

@@ -2,6 +2,7 @@
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include "cli.h"
@@ -23,6 +24,50 @@ static int files_check_table (void *context, const char *path) {
   return pw_check_paths (check->use, check->count, check->error);
 }
 
+const char *const pw_cli_csv[] = { ".csv", NULL }, *const pw_cli_json[] = { ".json", NULL };
+
+/* The ending of a file's name that states its format, such as ".csv"; NULL for another ending, such as ".5". */
+static const char *files_format (const char *path) {
+  static const char letters[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ", digits[] = "0123456789";
+  const char *slash = strrchr (path, '/'), *name = slash ? slash + 1 : path, *dot = strrchr (name, '.');
+  size_t n = dot && dot > name ? strspn (dot + 1, letters) : 0;
+  return n > 0 && n <= 5 && strspn (dot + 1 + n, digits) == strlen (dot + 1 + n) ? dot : NULL;
+}
+
+static int files_listed (const char *ending, const char *const *list) {
+  while (*list && strcasecmp (*list, ending) != 0) list++;
+  return *list != NULL;
+}
+
+/* Whether the format is one of the list; so is that of "a.csv.old" if ".csv" is listed. */
+static int files_written (const char *path, const char *ending, const char *const *list) {
+  const char *within = NULL;
+  for (const char *const *e = list; *e && within == NULL; e++) within = strstr (path, *e);
+  return files_listed (ending, list) || (within && within < ending);
+}
+
+int pw_cli_names_file (const char *path) {
+  static const char *const formats[] = { ".csv", ".npz", ".json", ".html", ".yaml", ".svg",
+                                         ".png", ".pdf", ".xlsx", ".txt",  NULL };
+  return files_format (path) && files_listed (files_format (path), formats);
+}
+
+int pw_cli_check_format (const pw_use *use, pw_error *error) {
+  const char *ending = use->path ? files_format (use->path) : NULL;
+  char list[80] = "";
+  if (ending == NULL || use->how == PW_READS) return PW_OK;
+  if (use->how == PW_WRITES_INTO) {
+    if (!pw_cli_names_file (use->path) || access (use->path, F_OK) == 0) return PW_OK;
+    return pw_fail (error, PW_INPUT, "%s %.200s: expected the name of a folder, in which files are written", use->what,
+                    use->path);
+  }
+  if (use->names == NULL || files_written (use->path, ending, use->names)) return PW_OK;
+  for (const char *const *name = use->names; *name; name++)
+    strcat (strcat (list, name == use->names ? "" : name[1] ? ", " : " or "), *name);
+  return pw_fail (error, PW_INPUT, "%s %.200s: the format %s is not written: expected a name that ends in %s",
+                  use->what, use->path, ending, list);
+}
+
 int pw_cli_check_uses (const pw_cli_line *line, const pw_file *file, pw_use *use, int count, pw_error *error) {
   files_check check = { use, count, error };
   pw_error own = { 0 };
@@ -31,6 +76,7 @@ int pw_cli_check_uses (const pw_cli_line *line, const pw_file *file, pw_use *use
   int status = own.status == PW_RESOURCE ? pw_fail (error, PW_RESOURCE, "%s", own.text) : PW_OK;
   if (status == PW_OK) status = pw_check_paths (use, count, error); /* opening the model reports what else is wrong */
   if (status == PW_OK && file) status = pw_file_tables (file, files_check_table, &check);
+  for (int i = 1; i < count && status == PW_OK && file; i++) status = pw_cli_check_format (&use[i], error);
   use[0].path = NULL;
   free (path);
   return status;
@@ -38,7 +84,7 @@ int pw_cli_check_uses (const pw_cli_line *line, const pw_file *file, pw_use *use
 
 int pw_cli_check_csv (const char *path, pw_error *error) {
   const char *ending = path ? strrchr (path, '.') : NULL;
-  if (ending == NULL || strcmp (ending, ".npz") != 0) return PW_OK;
+  if (ending == NULL || strcasecmp (ending, ".npz") != 0) return PW_OK;
   return pw_fail (error, PW_INPUT, "-o %s: this command writes no NumPy archives: expected a name that ends in .csv",
                   path);
 }

@@ -74,6 +74,12 @@ void pw_cli_close_model (pw_cli_model *m) {
   *m = (pw_cli_model){ .file = NULL };
 }
 
+void pw_cli_report_tables (const pw_system *s, double t_end) {
+  char notice[PW_NOTICE_BYTES];
+  for (int i = 0; i < pw_system_signals (s); i++)
+    if (*pw_system_table_notice (s, i, t_end, notice, sizeof notice)) pw_cli_say ("pinwheel: %s\n", notice);
+}
+
 pw_state_change pw_cli_state_change (const pw_system *system, const pw_initial_report *initial, int state) {
   int n = pw_system_coordinates (system);
   pw_state_change change = { .unit = pw_system_state_unit (system, state),

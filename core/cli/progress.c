@@ -24,6 +24,7 @@ void pw_progress_start (pw_progress *p, const char *title, const char *unit, dou
   double now = pw_seconds (CLOCK_MONOTONIC);
   int lines = !isatty (STDERR_FILENO);
   *p = (pw_progress){ .title = title, .unit = unit, .first = first, .last = last, .start = now, .lines = lines };
+  p->remaining = INFINITY;
   p->next = now + (lines ? PROGRESS_LINE_INTERVAL : PROGRESS_DELAY);
 }
 
@@ -53,16 +54,30 @@ static void progress_draw (const pw_progress *p, double fraction, const char *te
   fprintf (stderr, "\r%.*s [%s] %s\033[K", shown, p->title, bar, text);
 }
 
+/* The remaining time: estimated from the rate so far when something was done last, and falling since then.  It is not
+ * known, NaN, if it is over, or if twice as much remains as was shown before. */
+static double progress_remaining (pw_progress *p, double now) {
+  const double rate = (p->reached - p->first) / (p->changed - p->start),
+               estimate = (p->last - p->reached) / rate - (now - p->changed), before = p->remaining;
+  if (p->reached >= p->last) return 0;
+  if (!(rate > 0 && estimate > 0)) return NAN;
+  p->remaining = fmin (estimate, before);
+  return estimate < 2 * before + 5 ? p->remaining : NAN;
+}
+
 void pw_progress_at (pw_progress *p, double reached) {
   if (p->title == NULL || (p->no_bar && !p->lines)) return;
   double now = pw_seconds (CLOCK_MONOTONIC);
+  if (reached != p->reached) p->reached = reached, p->changed = now;
   if (now < p->next) return;
   p->next = now + (p->lines ? PROGRESS_LINE_INTERVAL : PROGRESS_BAR_INTERVAL);
   double fraction = fmin (fmax (reached / p->last, 0), 1);
   char remaining[24], done[80] = "", text[200];
-  progress_duration ((now - p->start) / (reached - p->first) * (p->last - reached), remaining, sizeof remaining);
+  progress_duration (progress_remaining (p, now), remaining, sizeof remaining);
   if (strcmp (p->unit, "s") == 0)
-    snprintf (done, sizeof done, "t = %.4g of %.4g s  ", reached, p->last);
+    snprintf (done, sizeof done, "t = %.4g of %.4g s  ", fmin (reached, p->last), p->last);
+  else if (*p->unit && reached > p->last)
+    snprintf (done, sizeof done, "%.9g %.40s  ", floor (reached), p->unit);
   else if (*p->unit) /* a count may include a part of what is in progress */
     snprintf (done, sizeof done, "%.9g of %.9g %.40s  ", floor (reached), p->last, p->unit);
   snprintf (text, sizeof text, "%*.0f %%  %s%s to go%s%s", p->lines ? 0 : 3, floor (100 * fraction), done, remaining,

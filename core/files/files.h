@@ -95,10 +95,11 @@ const pw_yaml *pw_file_yaml (const pw_file *f);
 
 /* ---- Tables of numbers (columns.c) ---- */
 
-/* Whether empty cells and nan are errors, or become NaN; in the first column, the time, they are errors. */
+/* Whether nan in a column other than the time is an error, or a gap like an empty cell. */
 typedef enum { PW_GAPS_REFUSED, PW_GAPS_ALLOWED } pw_gaps;
 
-/* As pw_read_columns, from a stream, which stays open; `shown` is its path in messages, "SHOWN:LINE: REASON". */
+/* As pw_read_columns, from a stream, which stays open; `shown` is its path in messages, "SHOWN:LINE: REASON".  NULL in
+ * place of a column: the first one, or the second one, which is not the time. */
 double *pw_columns_from_stream (FILE *f, const char *shown, const char *const *column, const char *const *unit,
                                 int width, pw_gaps gaps, int *rows, pw_error *error);
 

@@ -128,9 +128,9 @@ size_t pw_unit_split (const char *cell, char *unit, size_t size);
 int pw_unit_check (const char *cell, const char *wanted, double *factor, char *why, size_t size);
 
 /* Reads columns of a table by their names or numbers ("1", ...), in SI units: `unit` of each, or NULL for any.  The
- * first one is the time, which increases; in the others empty cells and nan are gaps, NaN.  Returns `width` arrays of
- * *rows numbers (0 if the table has only names), one after the other; free it.  NULL and PW_INPUT with file, line and
- * nearest name, or PW_RESOURCE. */
+ * first one is the time, which increases.  Empty cells are gaps, NaN, in the time too; so is nan in the others.
+ * Returns `width` arrays of *rows numbers (0 if the table has only names), one after the other; free it.  NULL and
+ * PW_INPUT with file, line and nearest name, or PW_RESOURCE. */
 double *pw_read_columns (const char *path, const char *const *column, const char *const *unit, int width, int *rows,
                          pw_error *error);
 
@@ -149,7 +149,9 @@ typedef struct {
   const char *what; /* "--json", "the model"; for messages */
   const char *path; /* "-" is standard output; NULL: not used */
   pw_use_how how;
-  const char *const *names; /* PW_WRITES_INTO a folder: endings of the names of the files it gets, NULL at the end */
+  /* NULL at the end: PW_WRITES_INTO a folder: endings of the names of the files it gets; PW_WRITES: endings of formats
+   * that are written (".csv"), NULL for any */
+  const char *const *names;
 } pw_use;
 
 /* Refuses a file that is both read and written, or written twice, under any name: files are compared by device and

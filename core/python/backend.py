@@ -25,7 +25,7 @@ def _contents():
     for path in [*sorted(build.glob("libpinwheel*.so.*")), build / "pinwheel"]:
         if path.exists():
             yield f"pinwheel/lib/{path.name}", path
-    for folder, pattern in (("models", "*.so"), ("models", "*.yaml"), ("include", "*.h"), ("page", "pinwheel*")):
+    for folder, pattern in (("models", "*.so"), ("models", "*.c"), ("models", "*.yaml"), ("include", "*.h"), ("page", "pinwheel*")):
         for path in sorted((build / folder).glob(pattern)):
             yield f"pinwheel/lib/{folder}/{path.name}", path
 

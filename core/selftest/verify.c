@@ -84,7 +84,7 @@ static void verify_force_sizes (verified_scene *scene) {
   double L = scene->workspace->scale.length, T = scene->workspace->scale.time, largest = 0;
   for (int j = 0; j < s->coords; j++) {
     double unit = pw_is_angle (s, j) ? L : 1;
-    largest = fmax (largest, fmax (scene->force.size[j] / unit, s->mass[j] / (unit * unit) * L / (T * T)));
+    largest = fmax (largest, fmax (scene->force.size[j] / unit, s->M[j] / (unit * unit) * L / (T * T)));
   }
   for (int j = 0; j < s->coords; j++) scene->force.size[j] = pw_is_angle (s, j) ? largest * L : largest;
 }
@@ -111,7 +111,7 @@ static void verify_all (verified_scene *scene, const double *v, const double *a,
                         pw_verification *result) {
   const pw_system *s = scene->s;
   double L = scene->workspace->scale.length, T = scene->workspace->scale.time;
-  for (int j = 0; j < s->coords; j++) verify_add (&scene->force, j, s->mass[j] * a[j]);
+  for (int j = 0; j < s->coords; j++) verify_add (&scene->force, j, s->M[j] * a[j]);
   for (int i = 0; i < s->batches; i++) {
     const pw_element_batch *k = &scene->workspace->batch[i];
     if (k->kind->rows > 0) verify_rows (scene, k, v, a, lambda);

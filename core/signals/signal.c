@@ -63,10 +63,12 @@ static double signal_pulse_breakpoint (const pw_signal *s, double t) {
 
 /* ---- All signals ---- */
 
-/* Fails if a number that is needed is not finite. */
+/* Fails if a number that is needed is not finite, or no value is stored: a callback in another language that ends before
+ * its first statement may return 0. */
 static int signal_function (const pw_source *source, double t) {
   const pw_function *f = &source->signal.function;
   double *u = source->u;
+  u[0] = NAN;
   int status = f->eval (f->context, t, source->x, u, source->reads ? source->x + source->reads : NULL);
   if (status != 0) return status;
   return !isfinite (u[0]) || (!source->of_force && !(isfinite (u[1]) && isfinite (u[2])));

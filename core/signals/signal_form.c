@@ -85,9 +85,11 @@ static void form_check_points (const pw_signal *s, int *point, char *text, size_
   const double *t = s->table.t, *y = s->table.value;
   int cubic = s->table.interpolation == PW_CUBIC, least = cubic && s->table.ends == PW_ENDS_FREE ? 4 : 2;
   if (s->table.count < least || t == NULL || y == NULL) {
-    int count = t && y ? s->table.count : 0;
-    snprintf (text, size, "a %s table%s needs at least %d points, found %d", form_interpolation[cubic],
-              least == 4 ? " with free ends" : "", least, count);
+    int count = t && y ? s->table.count : 0, used;
+    used = snprintf (text, size, "a %s table%s needs at least %d points, found %d", form_interpolation[cubic],
+                     least == 4 ? " with free ends" : "", least, count);
+    if (s->table.skipped && (size_t)used < size)
+      snprintf (text + used, size - (size_t)used, " and %d rows with empty cells", s->table.skipped);
     return;
   }
   for (int i = 0; i < s->table.count && !*text; i++) {

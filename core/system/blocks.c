@@ -145,6 +145,49 @@ int pw_block_missing (const pw_workspace *w, const pw_element_batch *k, int e, p
   return 0;
 }
 
+/* Moves an element to an irregular state, with other angle and angular velocity of its body n if `turned`. */
+static void blocks_scatter (const pw_workspace *w, const pw_element_batch *k, int e, int n, int turned,
+                            blocks_single *one, double *u) {
+  const pw_kind *kind = k->kind;
+  double L = w->scale.length;
+  int i = 1;
+  blocks_isolate (k, e, one);
+  for (int b = 0; b < kind->bodies; b++) {
+    pw_configuration *p = &one->configuration[b];
+    double turn = turned && b == n ? 1.1 : 0;
+    if (k->column[e * kind->bodies + b] >= w->s->coords) continue;
+    p->x = L * pw_sin (2.4 * i++), p->y = L * pw_sin (2.4 * i++), p->phi = pw_sin (2.4 * i++) + turn;
+    p->vx = L * pw_sin (2.4 * i++), p->vy = L * pw_sin (2.4 * i++), p->omega = pw_sin (2.4 * i++) + turn;
+    pw_sin_cos (p->phi, &p->sin, &p->cos);
+  }
+  for (int c = 0; c < kind->internal; c++) one->q[c] = pw_sin (2.4 * i++), one->v[c] = pw_sin (2.4 * i++);
+  for (int c = 0; c < 3 * kind->signals; c++) u[c] = pw_sin (2.4 * i++);
+  one->b.u = u;
+}
+
+int pw_uses_angle (const pw_workspace *w, const pw_element_batch *k, int e, int n) {
+  const pw_kind *kind = k->kind;
+  const int cols = k->b.cols, column = 3 * n + 2;
+  const struct {
+    pw_batch_function *function;
+    int size, width; /* entries; those of each local column in a row, 0: they do not belong to columns */
+  } part[] = { { kind->g, kind->rows, 0 },     { kind->eta, kind->rows, 0 },
+               { kind->gamma, kind->rows, 0 }, { kind->J, kind->rows * cols, 1 },
+               { kind->force, cols, 1 },       { kind->force_u, cols * kind->signals, kind->signals } };
+  blocks_single one, other;
+  double u[3 * PW_MAX_SIGNALS], x[PW_MAX_COLS * PW_MAX_ROWS], y[PW_MAX_COLS * PW_MAX_ROWS];
+  blocks_scatter (w, k, e, n, 0, &one, u);
+  blocks_scatter (w, k, e, n, 1, &other, u);
+  for (size_t f = 0; f < sizeof part / sizeof *part; f++) {
+    if (part[f].function == NULL) continue;
+    part[f].function (&one.b, x);
+    part[f].function (&other.b, y);
+    for (int i = 0; i < part[f].size; i++)
+      if (x[i] != y[i] || (part[f].width && i / part[f].width % cols == column && x[i] != 0)) return 1;
+  }
+  return 0;
+}
+
 /* d(J^T lambda)/dq of element e from its d(J w)/dq: entry (r, c) is sum_i lambda_i dJ_ir/dq_c, where w = e_r gives
  * column r of J. */
 static void blocks_transpose (const pw_element_batch *k, int e, pw_batch_function *jw_q, double *out) {

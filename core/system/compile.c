@@ -135,10 +135,13 @@ static int compile_arrays (const compilation *job) {
   size_t coords = (size_t)s->coords, bodies = (size_t)s->bodies;
   s->source = compile_alloc (job, (size_t)s->sources, sizeof *s->source);
   s->body_name = compile_alloc (job, bodies, sizeof *s->body_name);
-  s->mass = compile_alloc (job, 5 * coords + 3, sizeof *s->mass); /* and those after it */
+  s->angle_user = compile_alloc (job, bodies, sizeof *s->angle_user);
+  s->M = compile_alloc (job, 6 * coords + 3, sizeof *s->M); /* and those after it */
   s->origin = compile_alloc (job, 2 * coords, 1);
-  if (s->source == NULL || s->body_name == NULL || s->mass == NULL || s->origin == NULL) return PW_RESOURCE;
-  s->metric = s->mass + coords, s->q0 = s->metric + coords, s->v0 = s->q0 + coords, s->constant = s->v0 + coords;
+  if (s->source == NULL || s->body_name == NULL || s->angle_user == NULL || s->M == NULL || s->origin == NULL)
+    return PW_RESOURCE;
+  s->mass = s->M + coords, s->metric = s->mass + coords, s->q0 = s->metric + coords, s->v0 = s->q0 + coords,
+  s->constant = s->v0 + coords;
   return PW_OK;
 }
 
@@ -157,8 +160,8 @@ static int compile_bodies (const compilation *job) {
     const pw_body *b = &job->m->body[i];
     s->body_name[i] = compile_text (job, b->name);
     if (s->body_name[i] == NULL) return PW_RESOURCE;
-    s->mass[3 * i] = s->mass[3 * i + 1] = b->mass;
-    s->mass[3 * i + 2] = b->inertia;
+    s->M[3 * i] = s->M[3 * i + 1] = b->mass;
+    s->M[3 * i + 2] = b->inertia;
     memcpy (s->q0 + 3 * i, b->start, sizeof b->start);
     memcpy (s->v0 + 3 * i, b->rate, sizeof b->rate);
     for (int k = 0; k < 3; k++) {
@@ -215,7 +218,7 @@ static int compile_element (const compilation *job, const pw_element_batch *k, i
     if (*expected)
       return pw_fail (job->error, PW_INPUT, "model %s: %s %s: inertia of %s = %g: expected %s", job->m->name,
                       kind->name, k->name[e], kind->coordinate[n].name, internal[n].mass, expected);
-    s->mass[j] = internal[n].mass;
+    s->M[j] = internal[n].mass;
     s->q0[j] = internal[n].start;
     s->v0[j] = internal[n].rate;
     s->origin[j] = internal[n].specified[0] ? PW_SPECIFIED : 0;
@@ -277,16 +280,47 @@ static double compile_length (const compilation *job) {
   return L > 0 ? L : 1;
 }
 
-/* M with zeros replaced by 1e-6 of the mean of its other entries, where inertias count as inertia / L^2: independent of
- * units, and of whether a mass or an inertia is zero. */
+/* Finds the elements that depend on angles of bodies without inertia. */
+static int compile_angle_users (const compilation *job) {
+  pw_system *s = job->s;
+  int inertialess = 0, element = 0;
+  for (int b = 0; b < s->bodies; b++) s->angle_user[b] = -1, inertialess += s->M[3 * b + 2] == 0;
+  if (inertialess == 0) return PW_OK;
+  pw_workspace *w = pw_workspace_new (s, job->error);
+  if (w == NULL) return PW_RESOURCE;
+  PW_EACH_BATCH (k, w)
+    for (int e = 0; e < k->b.count; e++, element++) {
+      for (int n = 0; n < k->kind->bodies; n++) {
+        int b = k->b.body[e * k->kind->bodies + n];
+        if (b == s->bodies || s->M[3 * b + 2] > 0 || s->angle_user[b] >= 0) continue;
+        if (pw_kind_acts (k->kind) && (!pw_kind_is_built_in (k->kind) || pw_uses_angle (w, k, e, n)))
+          s->angle_user[b] = element;
+      }
+      for (const pw_source *x = k->source + e * k->kind->signals; x < k->source + (e + 1) * k->kind->signals; x++)
+        for (int i = 0; i < x->reads; i++) {
+          int j = x->state[i] % s->coords;
+          if (j < 3 * s->bodies && j % 3 == 2 && s->angle_user[j / 3] < 0) s->angle_user[j / 3] = element;
+        }
+    }
+  pw_workspace_free (w);
+  return PW_OK;
+}
+
+/* `mass` and `metric`: M with zeros replaced by the mean of its other entries where nothing turns a body, in the metric
+ * otherwise by 1e-6 of it.  Inertias count as inertia / L^2: independent of units, and of whether a mass or an inertia
+ * is zero. */
 static void compile_metric (pw_system *s) {
   double sum = 0, L2 = s->scale.length * s->scale.length;
   int massive = 0;
   for (int j = 0; j < s->coords; j++)
-    if (s->mass[j] > 0) sum += s->mass[j] / (pw_is_angle (s, j) ? L2 : 1), massive++;
-  double weight = massive ? 1e-6 * sum / massive : 1;
-  for (int j = 0; j < s->coords; j++)
-    s->metric[j] = s->mass[j] > 0 ? s->mass[j] : weight * (pw_is_angle (s, j) ? L2 : 1);
+    if (s->M[j] > 0) sum += s->M[j] / (pw_is_angle (s, j) ? L2 : 1), massive++;
+  double mean = massive ? sum / massive : 1;
+  for (int j = 0; j < s->coords; j++) {
+    double unit = pw_is_angle (s, j) ? L2 : 1, small = (massive ? 1e-6 : 1) * mean * unit;
+    int is_unturned = j < 3 * s->bodies && j % 3 == 2 && s->M[j] == 0 && s->angle_user[j / 3] < 0;
+    s->mass[j] = is_unturned ? mean * unit : s->M[j];
+    s->metric[j] = s->mass[j] > 0 ? s->mass[j] : small;
+  }
 }
 
 /* Lists the ledger's entries, and evaluates the constant forces. */
@@ -317,6 +351,8 @@ static int compile_all (compilation *job) {
   if (status == PW_OK) status = compile_initial (job);
   if (status != PW_OK) return status;
   job->s->scale = (pw_scale){ compile_length (job), 1 };
+  status = compile_angle_users (job);
+  if (status != PW_OK) return status;
   compile_metric (job->s);
   return compile_totals (job);
 }

@@ -83,7 +83,7 @@ void pw_evaluate_energies (pw_workspace *w, double *out) {
 
 double pw_kinetic (const pw_system *s, const double *v) {
   double sum = 0;
-  for (int j = 0; j < s->coords; j++) sum += s->mass[j] * v[j] * v[j];
+  for (int j = 0; j < s->coords; j++) sum += s->M[j] * v[j] * v[j];
   return sum / 2;
 }
 

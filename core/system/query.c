@@ -20,13 +20,17 @@ MEMBER (int, pw_system_holonomic, holonomic)
 MEMBER (int, pw_system_signals, sources)
 MEMBER (int, pw_system_ledger_entries, entries)
 MEMBER (const char *, pw_system_name, model)
-MEMBER (const double *, pw_system_mass, mass)
+MEMBER (const double *, pw_system_mass, M)
 MEMBER (double, pw_system_length, scale.length)
 MEMBER (const double *, pw_system_initial_q, q0)
 MEMBER (const double *, pw_system_initial_v, v0)
 
 const char *pw_system_body_name (const pw_system *s, int body) {
   return s->body_name[body];
+}
+
+int pw_system_unturned (const pw_system *s, int body) {
+  return pw_is_unturned (s, 3 * body + 2);
 }
 
 int pw_system_jumps (const pw_system *s, double t) {
@@ -193,15 +197,60 @@ int pw_system_find_signal (const pw_system *s, const char *name, pw_error *error
   return query_find (s, "signal", s ? s->sources : 0, pw_system_signal_name, &(pw_nearest){ .sought = name }, error);
 }
 
-char *pw_failed_signal (const pw_workspace *w, char *buffer, size_t size) {
-  buffer[0] = 0;
-  if (w->failed == NULL) return buffer;
+/* "torque T: value" */
+static char *query_signal_label (const pw_system *s, int signal, char *buffer, size_t size) {
   int e, n;
   const pw_field *f;
   char field[80];
-  const pw_element_batch *k = query_signal (w->s, (int)(w->failed - w->source), &e, &f, &n);
+  const pw_element_batch *k = query_signal (s, signal, &e, &f, &n);
   snprintf (buffer, size, "%s %s: %s", k->kind->name, k->name[e], pw_field_value_name (f, n, field, sizeof field));
   return buffer;
+}
+
+/* Which part of a run its table covers; "" if it covers the run, which lasts for a good part of the table. */
+static void query_coverage (const pw_points *table, double t_end, char *text, size_t size) {
+  const double first = table->t[0], last = table->t[table->count - 1], before = fmin (fmax (first, 0), t_end),
+               after = fmin (fmax (t_end - last, 0), t_end), covered = t_end - before - after, least = 1e-9 * t_end;
+  const char *times = PW_PRINTED (80, "the table has times from %.15g to %.15g s", first, last);
+  *text = 0;
+  if (first > t_end)
+    snprintf (text, size,
+              "%s, after the run, which ends at %.6g s: its first value holds throughout; time_offset: %.15g "
+              "lets it begin at 0",
+              times, t_end, -first);
+  else if (last < 0)
+    snprintf (text, size, "%s, before the run: its last value holds throughout", times);
+  else if (before > least || after > least)
+    snprintf (
+        text, size, "%s and covers %.3g %% of the run, which ends at %.6g s: %s%s%s", times, 100 * covered / t_end,
+        t_end, before > least ? PW_PRINTED (80, "its first value holds for %.6g s before", before) : "",
+        before > least && after > least ? ", " : "",
+        after > least ? PW_PRINTED (80, "its last value %sfor %.6g s after", before > least ? "" : "holds ", after)
+                      : "");
+  else if (t_end < 0.05 * (last - fmax (first, 0)))
+    snprintf (text, size,
+              "%s, of which the run, which ends at %.6g s, uses %.2g %%: if they are in ms, add time_scale: 1e-3",
+              times, t_end, 100 * t_end / (last - fmax (first, 0)));
+}
+
+char *pw_system_table_notice (const pw_system *s, int signal, double t_end, char *buffer, size_t size) {
+  const pw_points *table = &s->source[signal].signal.table;
+  char coverage[300] = "", skipped[80] = "";
+  *buffer = 0;
+  if (s->source[signal].signal.type != PW_TABLE || !(t_end > 0)) return buffer;
+  query_coverage (table, t_end, coverage, sizeof coverage);
+  if (table->skipped)
+    snprintf (skipped, sizeof skipped, "%d row%s with empty cells %s left out of the table", table->skipped,
+              table->skipped == 1 ? "" : "s", table->skipped == 1 ? "is" : "are");
+  if (*coverage || *skipped)
+    snprintf (buffer, size, "%s: %s%s%s", query_signal_label (s, signal, (char[PW_NAME_BYTES]){ 0 }, PW_NAME_BYTES),
+              coverage, *coverage && *skipped ? "; " : "", skipped);
+  return buffer;
+}
+
+char *pw_failed_signal (const pw_workspace *w, char *buffer, size_t size) {
+  buffer[0] = 0;
+  return w->failed ? query_signal_label (w->s, (int)(w->failed - w->source), buffer, size) : buffer;
 }
 
 int pw_fail_evaluation (const pw_workspace *w, double t, pw_error *error) {

@@ -47,7 +47,9 @@ struct pw_system {
   int rheonomic;           /* batches whose eta may be other than 0 */
   pw_scale scale;          /* with T = 1 s; T of a run is in its workspace */
   const char **body_name;  /* bodies */
-  double *mass;            /* coords: diagonal of M */
+  double *M;               /* coords: diagonal of M */
+  double *mass;            /* coords: the same, but the mean where nothing turns a body (pw_is_unturned) */
+  int *angle_user;         /* bodies: of one without inertia the first element that depends on its angle; -1: none */
   double *constant;        /* coords + 3: sum of the constant forces */
   double *metric;          /* coords: M, and small weights where M is zero */
   double *q0, *v0;         /* coords: the described initial state, or values of pw_model_set_initial */
@@ -107,6 +109,12 @@ int pw_fail_evaluation (const pw_workspace *w, double t, pw_error *error); /* re
 /* 1 for an angle, 0 for a length; internal coordinates are angles. */
 static inline int pw_is_angle (const pw_system *s, int j) {
   return j >= 3 * s->bodies || j % 3 == 2;
+}
+
+/* 1 for the angle of a body without inertia that nothing turns: no constraint, force or signal depends on it.  Its
+ * acceleration is 0, whatever stands for its inertia in the equations. */
+static inline int pw_is_unturned (const pw_system *s, int j) {
+  return s->M[j] == 0 && s->mass[j] > 0;
 }
 
 /* The scene's unit of a coordinate: L or 1 rad. */
@@ -223,6 +231,10 @@ int pw_block_missing (const pw_workspace *w, const pw_element_batch *k, int e, p
  * 0 if there is none; PW_RESOURCE.  Update the kinematics afterwards: until then the batches point to internal
  * coordinates in released memory. */
 int pw_find_missing_block (pw_workspace *w, double t, const double *q, const double *v, char *buffer, size_t size);
+
+/* 1 if the equations of element e depend on the angle of its n-th body or its angular velocity, or contribute to the
+ * equation of that angle, at two irregular states. */
+int pw_uses_angle (const pw_workspace *w, const pw_element_batch *k, int e, int n);
 
 /* A block of element e by central differences, whatever the type provides, but 0 in columns of the ground. */
 void pw_difference (const pw_workspace *w, const pw_element_batch *k, int e, pw_block block, double *out);

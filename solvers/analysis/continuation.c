@@ -132,12 +132,18 @@ static int branch_passes_end (const pw_branch *b) {
   return from * to < 0 || (folded && from * (from + b->step * slope) < 0);
 }
 
+/* PW_RETRY if the step to b->next may not be made. */
+static int branch_check (pw_branch *b, pw_error *error) {
+  if (!branch_smooth (b, &b->reached, &b->next)) return PW_RETRY;
+  return b->problem.check_step ? b->problem.check_step (b->problem.context, b->reached.u, b->next.u, error) : PW_OK;
+}
+
 /* A step of length b->step to b->next. */
 static int branch_try (pw_branch *b, pw_error *error) {
   for (int j = 0; j <= b->problem.unknowns; j++) b->next.u[j] = b->reached.u[j] + b->step * b->reached.tangent[j];
   int status = branch_correct (b, b->reached.tangent, BRANCH_APART * b->step, &b->next, error);
   if (status != PW_OK) return status;
-  return (b->bounded && branch_passes_end (b)) || !branch_smooth (b, &b->reached, &b->next) ? PW_RETRY : PW_OK;
+  return b->bounded && branch_passes_end (b) ? PW_RETRY : branch_check (b, error);
 }
 
 /* Makes b->next the point reached. */
@@ -164,8 +170,8 @@ static int branch_step_to_end (pw_branch *b, pw_error *error) {
   for (int j = 0; j < n; j++) b->next.u[j] = b->reached.u[j] + step * b->reached.tangent[j];
   b->next.u[n] = end;
   int status = branch_correct (b, NULL, BRANCH_APART * step, &b->next, error);
+  if (status == PW_OK) status = branch_check (b, error);
   if (status != PW_OK) return status;
-  if (!branch_smooth (b, &b->reached, &b->next)) return PW_RETRY;
   branch_accept (b);
   b->ended = end == 0 || end == 1;
   return PW_OK;

@@ -22,6 +22,9 @@ typedef struct {
   int (*evaluate) (void *context, const double *u, double *F, double *dF, pw_error *error);
   /* Whether two solutions are the same up to symmetries; NULL: only if their unknowns are. */
   int (*same) (void *context, const double *u, const double *other);
+  /* PW_RETRY, with the reason left to the caller of pw_branch_next in *why, if the step between two solutions must not
+   * be made, so that the branch ends before it; or another status.  NULL: all may be made. */
+  int (*check_step) (void *context, const double *from, const double *to, pw_error *error);
   void *context;
 } pw_branch_problem;
 

@@ -49,7 +49,7 @@ static int steady_arrays (pw_steady *x) {
   };
   x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   x->solution = pw_arena_alloc (&x->arena, 2 * n * sizeof *x->solution);
-  x->hold = pw_arena_alloc (&x->arena, holds * sizeof *x->hold);
+  x->hold = pw_arena_alloc (&x->arena, (holds + n) * sizeof *x->hold);
   if (!x->memory || !x->solution || !x->hold) return PW_RESOURCE;
   if (holds) memcpy (x->hold, x->settings.hold, holds * sizeof *x->hold);
   for (int j = 0; j < 2 * x->n; j++) x->solution[j].state = j;
@@ -120,12 +120,22 @@ static int steady_symmetries (pw_steady *x, signal_rule signals, pw_error *error
   return status == PW_OK ? PW_OK : pw_fail (error, x->why.status, "%s", x->why.text);
 }
 
+/* Holds the velocities of angles that nothing turns, which they keep. */
+static void steady_hold_unturned (pw_steady *x) {
+  for (int j = 0; j < x->n; j++) {
+    int held = !pw_is_unturned (x->s, j);
+    for (int i = 0; i < x->settings.holds; i++) held |= x->hold[i].state == x->n + j;
+    if (!held) x->hold[x->settings.holds++] = (pw_initial_value){ .state = x->n + j, .value = x->start[x->n + j] };
+  }
+}
+
 static int steady_open_branch (pw_steady *x, pw_error *error) {
   const pw_branch_problem problem = { .unknowns = pw_steady_unknowns (x),
                                       .equations = pw_steady_equations (x),
                                       .tolerance = STEADY_EXACT,
                                       .evaluate = pw_steady_evaluate,
                                       .same = pw_steady_same_motion,
+                                      .check_step = pw_steady_check_step,
                                       .context = x };
   return pw_branch_open (&x->branch, &problem, error);
 }
@@ -143,6 +153,7 @@ static pw_steady *steady_open (const pw_system *s, const pw_steady_settings *set
                       s->model, x->n, PW_STEADY_MAX_COORDINATES);
   if (status == PW_OK && steady_arrays (x) != PW_OK) status = pw_fail_memory (s, error);
   if (status == PW_OK) status = steady_begin (x, error);
+  if (status == PW_OK && signals == SIGNALS_CONSTANT) steady_hold_unturned (x);
   if (status == PW_OK) status = steady_symmetries (x, signals, error);
   if (status == PW_OK) status = steady_open_branch (x, error);
   if (status == PW_OK) return x;

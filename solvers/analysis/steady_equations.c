@@ -16,6 +16,7 @@
  * (Relative equilibria: Marsden & Ratiu 1999, Introduction to Mechanics and Symmetry.) */
 #include <lapacke.h>
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 #include "rank.h"
 #include "steady_parts.h"
@@ -147,4 +148,62 @@ int pw_steady_evaluate (void *steady, const double *u, double *F, double *dF, pw
   steady_columns (x, dF);
   steady_conditions (x, dF);
   return PW_OK;
+}
+
+/* ---- Singular constraints ---- */
+
+/* Evaluates the rows of J at u, of length 1 (m x n); active (m, or NULL): 1 for independent ones. */
+static int steady_rows (pw_steady *x, const double *u, double *rows, unsigned char *active, pw_error *error) {
+  int status = pw_steady_open_system (x, pw_steady_parameter (x, u));
+  if (status < 0) pw_fail (error, status, "%s", x->why.text);
+  if (status != PW_OK) return status;
+  pw_run *r = x->system.run;
+  pw_steady_state (x, u);
+  if (pw_evaluate_J_at (r->w, x->settings.t, x->q, x->v) != PW_OK) return PW_RETRY;
+  pw_rank_rows (r->w, rows, NULL);
+  for (int i = 0; active && i < x->m; i++) active[i] = r->active == NULL || r->active[i];
+  return PW_OK;
+}
+
+/* 1 if det (A B^T) < 0 for the active rows of A and B (m x n): between them, J has lost rank.  G: m x m, scratch. */
+static int steady_loses_rank (const pw_steady *x, const unsigned char *active, const double *A, const double *B,
+                              double *G, int *pivot) {
+  int rank = 0, negative = 0;
+  for (int i = 0; i < x->m; i++) rank += active[i];
+  for (int i = 0, row = 0; i < x->m; i++) {
+    for (int k = 0, column = 0; active[i] && k < x->m; k++) {
+      double sum = 0;
+      for (int j = 0; active[k] && j < x->n; j++) sum += A[i * x->n + j] * B[k * x->n + j];
+      if (active[k]) G[row * rank + column++] = sum;
+    }
+    row += active[i];
+  }
+  if (rank == 0 || LAPACKE_dgetrf (LAPACK_ROW_MAJOR, rank, rank, G, rank, pivot) != 0) return rank > 0;
+  for (int i = 0; i < rank; i++) negative ^= (G[i * rank + i] < 0) ^ (pivot[i] != i + 1);
+  return negative;
+}
+
+int pw_steady_check_step (void *steady, const double *from, const double *to, pw_error *error) {
+  pw_steady *x = steady;
+  const size_t m = (size_t)x->m, entries = m * (size_t)x->n;
+  double *A = malloc ((2 * entries + m * m + 1) * sizeof *A + m * (1 + sizeof (int)));
+  if (A == NULL) return pw_fail_memory (x->s, error);
+  double *B = A + entries, *G = B + entries;
+  int *pivot = (int *)(G + m * m), row = -1;
+  unsigned char *active = (unsigned char *)(pivot + m);
+  int status = steady_rows (x, from, A, active, error), redundant = status == PW_OK ? x->system.run->redundant : 0;
+  if (status == PW_OK) status = steady_rows (x, to, B, NULL, error);
+  pw_run *r = x->system.run;
+  if (status == PW_OK && (r->redundant > redundant || steady_loses_rank (x, active, A, B, G, pivot))) {
+    status = PW_RETRY;
+    if (r->redundant > redundant)
+      row = r->redundant_row[0];
+    else
+      pw_watchdog_sine (r, &row);
+    x->why = (pw_error){ 0 };
+    pw_fail (&x->why, PW_METHOD, "the constraints become singular: %s depends on other constraints",
+             row >= 0 ? PW_NAME (pw_system_row_name, x->s, row) : "one of them");
+  }
+  free (A);
+  return status;
 }

@@ -103,6 +103,9 @@ enum { PW_STEADY_WORK = 40 };              /* numbers of work space of LAPACK's 
 /* pw_branch_problem.evaluate, .same. */
 int pw_steady_evaluate (void *steady, const double *u, double *F, double *dF, pw_error *error);
 int pw_steady_same_motion (void *steady, const double *u, const double *other);
+/* pw_branch_problem.check_step: no step passes a value of the parameter at which constraint equations
+ * become dependent; x->why names one.  Eigenvalues may be infinite there. */
+int pw_steady_check_step (void *steady, const double *from, const double *to, pw_error *error);
 /* Sets x->q, x->v and x->rates to those of the unknowns u, and in x->hold the value that varies. */
 void pw_steady_state (pw_steady *x, const double *u);
 /* Sets u, except the parameter, to the motion along symmetries at q with velocities nearest to v, by least squares.

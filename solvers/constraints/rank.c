@@ -53,8 +53,8 @@ void pw_row_basis_close (pw_row_basis *b) {
   free (b->memory);
 }
 
-/* Stores the entries of all rows, of length 1; those of fixed coordinates become 0 afterwards. */
-static void rank_read (pw_row_basis *b, const pw_workspace *w, const unsigned char *fixed) {
+/* Stores the entries of all rows, of length 1. */
+static void rank_read (pw_row_basis *b, const pw_workspace *w) {
   int entry = 0;
   PW_EACH_CONSTRAINT (k, w)
     for (int i = 0; i < k->b.count * k->kind->rows; i++, entry += k->b.cols) {
@@ -66,8 +66,7 @@ static void rank_read (pw_row_basis *b, const pw_workspace *w, const unsigned ch
         b->column[entry + c] = is_ground ? 0 : j, b->value[entry + c] = x;
         square += x * x;
       }
-      for (int c = entry; square > 0 && c < entry + k->b.cols; c++)
-        b->value[c] = fixed && fixed[b->column[c]] ? 0 : b->value[c] / sqrt (square);
+      for (int c = entry; square > 0 && c < entry + k->b.cols; c++) b->value[c] /= sqrt (square);
     }
   b->first[w->s->rows] = entry;
 }
@@ -168,27 +167,14 @@ static void rank_keep (pw_row_basis *b, double tol, int max_rank, int first, int
   }
 }
 
-int pw_row_basis_select (pw_row_basis *b, const pw_workspace *w, double tol, const unsigned char *fixed,
-                         int max_holonomic, int max_rows) {
+int pw_row_basis_select (pw_row_basis *b, const pw_workspace *w, double tol, int max_holonomic, int max_rows) {
   const pw_system *s = w->s;
   int holonomic = 0, all = 0; /* those taken without computation */
-  rank_read (b, w, fixed);
+  rank_read (b, w);
   rank_take_private (b, s);
   rank_fill (b, s);
   for (int i = 0; i < s->rows; i++) all += b->active[i], holonomic += b->active[i] && i < s->holonomic;
   rank_keep (b, tol, max_holonomic - holonomic, 0, s->holonomic);
   rank_keep (b, tol, max_rows - all, s->holonomic, s->rows);
   return all + b->rank;
-}
-
-int pw_rank_select (const pw_workspace *w, double tol, const unsigned char *fixed, unsigned char *active) {
-  const pw_system *s = w->s;
-  pw_row_basis b;
-  int rank = PW_RESOURCE;
-  if (pw_row_basis_open (&b, s) == PW_OK) {
-    rank = pw_row_basis_select (&b, w, tol, fixed, s->rows, s->rows);
-    memcpy (active, b.active, (size_t)s->rows);
-  }
-  pw_row_basis_close (&b);
-  return rank;
 }

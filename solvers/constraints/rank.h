@@ -49,14 +49,8 @@ void pw_row_basis_close (pw_row_basis *b);
 /* Selects at most `max_holonomic` holonomic equations, and at most `max_rows` in all, by Gram-Schmidt on the J last
  * evaluated, rows of length 1: those of which a part longer than tol is independent of the ones kept before.  Holonomic
  * equations come first, since a nonholonomic one must not replace a holonomic one; of each kind the most independent
- * ones, in order where they are about equal.  fixed (coords, or NULL): 1 for coordinates that are left out, after the
- * rows have been scaled.  Returns the rank. */
-int pw_row_basis_select (pw_row_basis *b, const pw_workspace *w, double tol, const unsigned char *fixed,
-                         int max_holonomic, int max_rows);
-
-/* Sets active[i] to 1 for a maximal set of independent equations, selected as by pw_row_basis_select, else to 0.
- * Returns the rank, or PW_RESOURCE. */
-int pw_rank_select (const pw_workspace *w, double tol, const unsigned char *fixed, unsigned char *active);
+ * ones, in order where they are about equal.  Returns the rank. */
+int pw_row_basis_select (pw_row_basis *b, const pw_workspace *w, double tol, int max_holonomic, int max_rows);
 
 /* Selects r->active, a maximal set of independent rows, for the run at its consistent initial state.  The saddle must
  * be open, and opened again afterwards.  r->active stays NULL if all rows are independent: then pw_rank_reselect,

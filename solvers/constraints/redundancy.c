@@ -97,7 +97,8 @@ static void redundancy_slope (pw_run *r, const double *lambda, const double *squ
 }
 
 /* sum x_i y_i scale_i, or with inverse = 1 sum x_i y_i / scale_i */
-static double redundancy_product (const pw_run *r, const double *x, const double *y, const double *square, int inverse) {
+static double redundancy_product (const pw_run *r, const double *x, const double *y, const double *square,
+                                  int inverse) {
   double sum = 0;
   for (int i = 0; i < r->s->rows; i++) sum += inverse ? x[i] * y[i] / square[i] : x[i] * y[i] * square[i];
   return sum;

@@ -65,7 +65,7 @@ void pw_watchdog_begin (pw_run *r) {
   watch->sine_before_checked = NAN;
   watch->may_have_crossed = 0;
   watch->singular_ahead = 1;
-  memcpy (watch->previous_q, r->q, (size_t)r->s->coords * sizeof *watch->previous_q);
+  memcpy (watch->previous_q, r->q, 2 * ((size_t)r->s->coords + 3) * sizeof *watch->previous_q);
 }
 
 /* Checks the step to the state reached, where J is evaluated.  PW_METHOD if it has left its branch, or passed a change
@@ -83,6 +83,8 @@ static int watchdog_follow (pw_run *r, pw_error *error) {
     watchdog_record_sine (r, pw_watchdog_sine (r, &watch->dependent_row));
     status = pw_change_point_check (r, watch->checked_sine, error);
     if (status == PW_OK) status = pw_change_point_resolve (r, last, error);
+    if (status == PW_OK) status = pw_dead_point_passed (r, error);
+    if (status != PW_OK) return status;
     watch->sine_before_checked = last;
   } else
     watch->sine_before_checked = NAN, watch->sine_slope = 0, watch->may_have_crossed = 0;
@@ -90,7 +92,7 @@ static int watchdog_follow (pw_run *r, pw_error *error) {
   watch->singular_ahead = may_be_near && watchdog_reaches (r, near, ahead);
   watch->previous_t = r->t;
   watch->previous_sine = may_be_near ? watch->checked_sine : NAN;
-  memcpy (watch->previous_q, r->q, (size_t)r->s->coords * sizeof *watch->previous_q);
+  memcpy (watch->previous_q, r->q, 2 * ((size_t)r->s->coords + 3) * sizeof *watch->previous_q);
   return status;
 }
 
@@ -103,9 +105,10 @@ static int watchdog_fail_lost (pw_run *r, int contradicts, pw_error *error) {
   int in_position = isnan (now.position) || now.position > now.velocity;
   int row = in_position ? now.row_position : now.row_velocity;
   const char *element = row >= 0 ? PW_NAME (pw_system_row_name, r->s, row) : "a constraint", *advice = "";
-  if (contradicts)
+  if (contradicts) {
     snprintf (cause, sizeof cause, "constraints contradict each other");
-  else if (pw_stabilised_by (r, PW_UNSTABILISED))
+    if (row >= 0) advice = pw_advice_on_wheel (r->s, row);
+  } else if (pw_stabilised_by (r, PW_UNSTABILISED))
     advice = r->fixed_steps ? "; a smaller step or a stabilisation reduces it"
                             : "; a smaller tolerance or a stabilisation reduces it";
   else if (r->fixed_steps)

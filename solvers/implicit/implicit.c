@@ -48,7 +48,7 @@ void pw_implicit_scale (const pw_dae *x, double c, double e, double *row_factor,
   const pw_system *s = x->tangent.run->s;
   int n = x->n, g_rows = x->enforces_velocities ? 0 : x->tangent.holonomic; /* in which g = 0 replaces J v = eta */
   double mass = 0;
-  for (int j = 0; j < n; j++) mass = fmax (mass, s->mass[j]);
+  for (int j = 0; j < n; j++) mass = fmax (mass, s->M[j]);
   if (mass == 0) mass = 1; /* all coordinates are massless */
   for (int j = 0; j < n; j++) {
     row_factor[j] = 1 / c, column_factor[j] = 1;

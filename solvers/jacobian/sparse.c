@@ -33,7 +33,7 @@ int pw_sparse_factor (pw_sparse *x, double *value) {
   if (sparse_refactor (x, value)) return PW_OK;
   pw_sparse_forget_pivots (x);
   x->factors = SPARSE_KLU (x, factor, x->colptr, x->rowind, value, x->symbolic, &x->common);
-  if (x->factors == NULL) return x->common.status == KLU_OUT_OF_MEMORY ? PW_RESOURCE : PW_SINGULAR;
+  if (x->factors == NULL) return x->common.status == KLU_SINGULAR ? PW_SINGULAR : PW_RESOURCE;
   if (!SPARSE_KLU (x, rcond, x->symbolic, x->factors, &x->common)) return PW_RESOURCE;
   x->least_pivot_ratio = 0.01 * x->common.rcond; /* two digits may be lost */
   return x->common.rcond > 0 ? PW_OK : PW_SINGULAR;

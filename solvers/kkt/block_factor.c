@@ -47,7 +47,8 @@ static void block_uncondensed (const pw_block_ldl *l, const pw_group_block *p) {
   const double *w = l->inverse_weight + p->j;
   const int *coupling = l->coupling + p->first_coupling;
   double *D = l->value + own[0].diagonal, *inertia = l->value + own[1].diagonal;
-  D[0] = D[3] = block_inertia (w[0]), D[2] = D[4] = block_inertia (w[1]), inertia[0] = inertia[1] = block_inertia (w[2]);
+  D[0] = D[3] = block_inertia (w[0]), D[2] = D[4] = block_inertia (w[1]),
+  inertia[0] = inertia[1] = block_inertia (w[2]);
   for (const pw_contribution *a = l->contribution + p->first_contribution; a < own; a++)
     for (int n = 0; n < 3; n += 2) { /* its first node has the columns 0 and 1, its second one column 2 */
       double *K = l->value + *coupling++, *original = l->value + a->diagonal + a->size * (a->size + 1) / 2;

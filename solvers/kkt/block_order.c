@@ -181,8 +181,10 @@ int pw_block_lay_out (pw_block_ldl *l) {
   if (order_place_columns (l) != PW_OK) return PW_RESOURCE;
   for (const pw_block_column *c = l->column; c < l->column + l->nodes; c++) {
     size_t rows = (size_t)(c[1].first_below - c->first_below);
-    if (rows <= PW_BLOCK_LISTED) targets += rows * (rows - 1) / 2; /* one for each pair of rows of the column */
-    else if (rows > longest) longest = rows;
+    if (rows <= PW_BLOCK_LISTED)
+      targets += rows * (rows - 1) / 2; /* one for each pair of rows of the column */
+    else if (rows > longest)
+      longest = rows;
   }
   l->cursor = malloc ((2 * longest + 1) * sizeof *l->cursor);
   l->target = malloc ((targets + 1) * sizeof *l->target);

@@ -88,7 +88,8 @@ static void block_right (const pw_block_ldl *l, const double *f, double *y) {
   for (const pw_group_block *p = l->group, *last = p + l->groups; p < last; p++)
     if (p->uncondensed)
       for (int n = 0; n < 3; n++)
-        y[l->contribution[p[1].first_contribution - 2].unknown + n] -= l->inverse_weight[p->j + n] > 0 ? f[p->j + n] : 0;
+        y[l->contribution[p[1].first_contribution - 2].unknown + n] -=
+            l->inverse_weight[p->j + n] > 0 ? f[p->j + n] : 0;
     else
       BLOCK_WIDTH (p->width, block_right_of, l, p, f, y);
 }

@@ -26,8 +26,9 @@ static void condense_contribute (pw_plan *plan, const double *J, int row_stride,
   plan->failed = pw_grow (&plan->contribution, (size_t)plan->contributions, &plan->contribution_room,
                           sizeof *plan->contribution) != PW_OK;
   if (!plan->failed)
-    plan->contribution[plan->contributions++] =
-        (pw_plan_contribution){ J, plan->nodes - 1, row_stride, pw_group_of (plan->saddle->s, j), is_pin, is_prescribed };
+    plan->contribution[plan->contributions++] = (pw_plan_contribution){ J,          plan->nodes - 1,
+                                                                        row_stride, pw_group_of (plan->saddle->s, j),
+                                                                        is_pin,     is_prescribed };
 }
 
 /* Adds the node of `size` rows from row n of a batch on. */

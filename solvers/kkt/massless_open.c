@@ -126,9 +126,15 @@ static int massless_lay_out (pw_massless *m, const massless_plan *p) {
 
 static int massless_undetermined (const pw_system *s, int j, pw_error *error) {
   const char *lacking = pw_is_angle (s, j) ? "inertia" : "mass";
+  int user = j < 3 * s->bodies && j % 3 == 2 ? s->angle_user[j / 3] : -1;
+  const pw_element_info element = user < 0 ? (pw_element_info){ 0 } : pw_system_element (s, user);
+  const char *depends = user >= 0 && pw_kind_is_built_in (element.kind) ? "depends" : "may depend";
   return pw_fail (error, PW_INPUT,
-                  "model %s: %s has no %s, and no constraint determines how it moves; give it %s, or constrain it",
-                  s->model, PW_NAME (pw_system_state_name, s, j), lacking, lacking);
+                  "model %s: %s has no %s, and no constraint determines how it moves%s; give it %s, or constrain it",
+                  s->model, PW_NAME (pw_system_state_name, s, j), lacking,
+                  user < 0 ? ""
+                           : PW_PRINTED (300, ", although %s %s %s on it", element.kind->name, element.name, depends),
+                  lacking);
 }
 
 /* Marks the massless columns and matches them; reports a column that no row determines. */

@@ -22,12 +22,13 @@ typedef struct {
   pw_tangent tangent;  /* independent equations; in tangent.scatter the derivatives: columns q, v; rows as `product` */
   int holonomic, rank; /* independent constraint equations: holonomic ones; all, those first */
   int positions, velocities, size; /* minimal coordinates: of positions, of velocities, all */
+  int unturned;                    /* angles that nothing turns (pw_is_unturned), which are left out */
   const int *row;                  /* rank: indices of the independent equations */
   pw_linear_frame frame;
   double *a, *lambda;            /* n + 3, m: at the state last evaluated */
   double *norm;                  /* m: lengths of the rows of J, columns of angles divided by L */
   double *R;                     /* rank x rank: J^T = Q R, by columns; before that the rows of J, n long each */
-  double *Q;                     /* n x n, by columns */
+  double *Q;                     /* n x n, by columns: the unturned angles; J^T; its null space */
   double *A;                     /* size x size, by rows: in the result */
   double *symmetry;              /* 3 x size: symmetry directions in minimal coordinates */
   double *dx;                    /* 2 n: a variation */

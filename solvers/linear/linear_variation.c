@@ -84,9 +84,9 @@ void pw_linear_vary (pw_linearisation *x) {
 
 /* ---- Bases ---- */
 
-/* Column j of Q. */
+/* Column j of Q without those of the unturned angles. */
 static double *linear_column (const pw_linearisation *x, int j) {
-  return x->Q + (size_t)j * (size_t)x->n;
+  return x->Q + (size_t)(x->unturned + j) * (size_t)x->n;
 }
 
 /* The rows of J of the independent equations, of length 1, to Q. */
@@ -100,20 +100,23 @@ double pw_linear_least (pw_linearisation *x) {
   int n = x->n, rank = x->rank;
   double least = INFINITY;
   linear_independent_rows (x);
-  int failed = rank && LAPACKE_dgesvj_work (LAPACK_COL_MAJOR, 'G', 'N', 'N', n, rank, x->Q, n, x->row_scratch, 0, NULL,
-                                            1, x->scratch, n + x->m + 3) != 0;
+  int failed = rank && LAPACKE_dgesvj_work (LAPACK_COL_MAJOR, 'G', 'N', 'N', n, rank, linear_column (x, 0), n,
+                                            x->row_scratch, 0, NULL, 1, x->scratch, n + x->m + 3) != 0;
   for (int k = 0; k < rank; k++) least = fmin (least, x->scratch[0] * x->row_scratch[k]);
   return rank && !failed ? least : NAN;
 }
 
 void pw_linear_bases (pw_linearisation *x) {
   int n = x->n, rank = x->rank;
-  double *tau = x->da;
+  double *tau = x->da, *unit = x->Q;
   linear_independent_rows (x);
-  LAPACKE_dgeqrf_work (LAPACK_COL_MAJOR, n, rank, x->Q, n, tau, x->scratch, n);
+  memset (x->Q, 0, (size_t)x->unturned * (size_t)n * sizeof *x->Q);
+  for (int j = 0; j < n; j++)
+    if (pw_is_unturned (x->r->s, j)) unit[j] = 1, unit += n;
+  LAPACKE_dgeqrf_work (LAPACK_COL_MAJOR, n, x->unturned + rank, x->Q, n, tau, x->scratch, n);
   for (int k = 0; k < rank; k++)
-    memcpy (x->R + (size_t)k * (size_t)rank, linear_column (x, k), (size_t)(k + 1) * sizeof *x->R);
-  LAPACKE_dorgqr_work (LAPACK_COL_MAJOR, n, n, rank, x->Q, n, tau, x->scratch, n);
+    memcpy (x->R + (size_t)k * (size_t)rank, linear_column (x, k) + x->unturned, (size_t)(k + 1) * sizeof *x->R);
+  LAPACKE_dorgqr_work (LAPACK_COL_MAJOR, n, n, x->unturned + rank, x->Q, n, tau, x->scratch, n);
 }
 
 /* ---- The reduced system ---- */

@@ -71,7 +71,7 @@ static void several_record (pw_run *r, const pw_scene_steps *x) {
   watch->step_length = x->watch.step, watch->moved = x->watch.moved, watch->singular_ahead = 0;
   watch->sine_before_checked = NAN, watch->sine_slope = 0, watch->may_have_crossed = 0;
   watch->previous_t = r->t, watch->previous_sine = NAN;
-  memcpy (watch->previous_q, r->q, (size_t)r->s->coords * sizeof *watch->previous_q);
+  memcpy (watch->previous_q, r->q, 2 * ((size_t)r->s->coords + 3) * sizeof *watch->previous_q);
 }
 
 /* Fills x for the next steps, up to the first that reaches t, and returns their number; 0: fewer than two can be taken

@@ -7,7 +7,18 @@
 /* ---- Rows of samples (r->s->rows: the number of constraint equations) ---- */
 
 int pw_run_record_width (const pw_run *r) {
-  return PW_RECORD_STATES + 3 * r->s->coords + r->s->rows + (r->settings.ledger ? r->s->entries : 0);
+  return PW_RECORD_STATES + 3 * r->s->coords + 2 * pw_system_contacts (r->s) + r->s->rows +
+         (r->settings.ledger ? r->s->entries : 0);
+}
+
+/* Stores x and y of all contact points at the sample, where kinematics are evaluated, and returns the end. */
+static double *record_contacts (const pw_run *r, double *to) {
+  PW_EACH_BATCH (k, r->w) {
+    if (k->kind->contact == NULL) continue;
+    k->kind->contact (&k->b, k->block);
+    for (int e = 0; e < k->b.count; e++, to += 2) memcpy (to, k->block + 3 * e, 2 * sizeof *to);
+  }
+  return to;
 }
 
 /* Stores a sample in the next row. */
@@ -24,7 +35,7 @@ static int record_sample (pw_run *r, double t, double *rows, long *recorded, pw_
   memcpy (row, x.q, n * sizeof *row);
   memcpy (row + n, x.v, n * sizeof *row);
   memcpy (row + 2 * n, x.a, n * sizeof *row);
-  row += 3 * n;
+  row = record_contacts (r, row + 3 * n);
   for (int i = 0; i < r->s->rows; i++) row[i] = 0 - x.lambda[i]; /* reactions; no negative zeros */
   if (x.ledger) memcpy (row + r->s->rows, x.ledger, (size_t)r->s->entries * sizeof *row);
   return PW_OK;

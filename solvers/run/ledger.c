@@ -11,7 +11,7 @@
 static double ledger_scene_energy (const pw_run *r) {
   const pw_system *s = r->s;
   double sum = 0;
-  for (int j = 0; j < s->coords; j++) sum += 0.5 * s->mass[j] * pw_unit (s, j) * pw_unit (s, j);
+  for (int j = 0; j < s->coords; j++) sum += 0.5 * s->M[j] * pw_unit (s, j) * pw_unit (s, j);
   return sum / (r->settings.span * r->settings.span);
 }
 

@@ -162,6 +162,7 @@ int pw_run_advance (pw_run *r, double t_end, pw_error *error) {
   if (run_has_no_method (r, error)) return PW_RESOURCE;
   r->stopped = 0;
   status = pw_run_check_limits (r, error);
+  if (status == PW_METHOD) return pw_dead_point_explain (r, error);
   if (status != PW_OK) return status;
   pw_forget_residuals (r);
   if (r->stalled == 0) r->w->failed = NULL; /* otherwise it is the signal that stops the run */
@@ -182,6 +183,7 @@ int pw_run_advance (pw_run *r, double t_end, pw_error *error) {
   if (status == PW_OK) status = pw_run_check_resolution (r, error);
   if (status == PW_OK) pw_ledger_record (r);
   if (status == PW_OK) status = run_check_progress (r, before, error);
+  if (status == PW_METHOD) status = pw_dead_point_explain (r, error);
   if (status != PW_OK) return pw_run_annotate_error (r, status, error);
   run_measure_independence (r);
   return PW_OK;

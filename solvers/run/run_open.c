@@ -54,7 +54,7 @@ static int run_allocate (pw_run *r) {
                              { &r->tolerance_bound, 2 * n },
                              { &r->matrix_state, states },
                              { &r->matrix_range, states },
-                             { &r->watchdog.previous_q, n } };
+                             { &r->watchdog.previous_q, 2 * n } };
   r->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   r->origin = malloc (2 * n);
   if (r->memory == NULL || r->origin == NULL) return PW_RESOURCE;

@@ -77,7 +77,7 @@ static double ida_leading_coefficient (const pw_method_data *d) {
 static double ida_force_scale (const pw_run *r) {
   const pw_system *s = r->s;
   double L = s->scale.length, T = r->w->scale.time, force = 0;
-  for (int j = 0; j < s->coords; j++) force = fmax (force, s->mass[j] / (T * T) * (pw_is_angle (s, j) ? 1 / L : L));
+  for (int j = 0; j < s->coords; j++) force = fmax (force, s->M[j] / (T * T) * (pw_is_angle (s, j) ? 1 / L : L));
   if (force > 0) return force;
   for (int i = 0; i < s->rows; i++) force = fmax (force, fabs (r->lambda[i]));
   return force > 0 ? force : 1;

@@ -11,12 +11,12 @@
 /* sum m v dv + sum dm/dp v^2 / 2 */
 static double output_kinetic (const pw_variation *x, const pw_variation_column *c, const double *v, const double *dv) {
   const pw_direction *d = &c->direction->given;
-  const double *mass = x->r->s->mass;
+  const double *mass = x->r->s->M;
   double sum = 0;
   for (int j = 0; j < x->n; j++) sum += mass[j] * v[j] * dv[j];
   for (int i = 0; i < PW_VARIATION_NEIGHBOURS && d->initial == NULL; i++) {
     double weight = pw_direction_weight (d, pw_variation_column_index (c), i);
-    const double *other = d->neighbour[i]->s->mass;
+    const double *other = d->neighbour[i]->s->M;
     for (int j = 0; j < x->n; j++) sum += weight * (other[j] - mass[j]) * v[j] * v[j] / 2;
   }
   return sum;

@@ -41,14 +41,16 @@ TEST (finding) {
       "elements:\n  - {pin: P, body: [rod, ground], at: [[-1, 0], [0, 0]]}\n";
   cli_write ("rod.yaml", check_text (body, "x: 1", "vy: 3, vx: 0.25, omega: 3"));
   cli_good ("pinwheel check @/rod.yaml");
-  cli_shows ("\n1 finding\n  the model specifies rod.vx = 0.25 m/s, but the constraints require 0 m/s\n");
+  cli_shows ("\n1 finding\n  the model specifies rod.vx = 0.25 m/s, which was changed to 0 m/s; otherwise pin P "
+             "would be violated by 0.25 m/s\n");
   cli_good ("pinwheel check @/rod.yaml --json -");
   cli_shows ("\"findings\": [\"the model specifies rod.vx");
   cli_write ("rod.yaml", check_text (body, "x: 1", "vy: 3, omega: 3"));
   cli_good ("pinwheel check @/rod.yaml");
   cli_shows ("\nNo problems found\n");
   cli_good ("pinwheel check @/rod.yaml --start rod.vx=0.25");
-  cli_shows ("\n1 finding\n  --start gives rod.vx = 0.25 m/s, but the constraints require 0 m/s\n");
+  cli_shows ("\n1 finding\n  --start gives rod.vx = 0.25 m/s, which was changed to 0 m/s; otherwise pin P would "
+             "be violated by 0.25 m/s\n");
 }
 
 /* Hundreds of defective zeros, which round-off spreads over a circle: the QR algorithm converges, and they are

@@ -96,6 +96,34 @@ TEST (trivial) {
                           "  - {friction: bearing, body: [disc, ground], viscous: 0.1}\n");
   cli_good ("pinwheel periodic @/disc.yaml --period free");
   cli_shows ("  trivial multipliers          2, of symmetries and a shift in time\n");
+  cli_shows ("  rotation per period          0 rad\n  relative to the whole        bob: 1 whole turn\n  mean speed ");
+}
+
+/* A flywheel on a driven pendulum, and rolling wheels: their free rotations are named, as the figure shows them. */
+TEST (free_rotation) {
+  cli_write ("flywheel.yaml",
+             "pinwheel: 1\n"
+             "bodies:\n"
+             "  - {name: bob, mass: 1, inertia: 1, start: {y: -1}}\n"
+             "  - {name: flywheel, mass: 1, inertia: 0.1, start: {y: -2}, rate: {omega: 2}}\n"
+             "elements:\n"
+             "  - {pin: pivot, body: [bob, ground], at: [[0, 1], [0, 0]]}\n"
+             "  - {pin: axle, body: [flywheel, bob], at: [[0, 0], [0, -1]]}\n"
+             "  - {gravity: gravity, acceleration: [0, -1]}\n"
+             "  - {torque: drive, body: [bob, ground], value: {harmonic: {amplitude: 0.1, omega: 4}}}\n");
+  cli_good ("pinwheel periodic @/flywheel.yaml -o @/flywheel");
+  cli_shows ("  relative to the whole        flywheel: a free rotation by 3.14159 rad\n");
+  const char *json = cli_file ("flywheel/periodic.json");
+  check_close ("rotation", cli_number (json, "motions", "rotations", "flywheel", NULL), PW_PI, 1e-9,
+               "2 rad/s for pi/2 s");
+  check_close ("bob", cli_number (json, "motions", "rotations", "bob", NULL), 0, 0, "rounded");
+  cli_write ("rolls.yaml", "pinwheel: 1\nbodies: [{name: car, mass: 2, inertia: 1, rate: {vx: 1}}]\nelements:\n"
+                           "  - {rolling-wheel: rear, body: car, at: [-0.4, 0], radius: 0.1, inertia: 0.01}\n"
+                           "  - {wheel: front, body: car, at: [0.5, 0]}\n"
+                           "  - {speed: engine, body: car, at: [-0.4, 0], "
+                           "value: {harmonic: {amplitude: 0.3, omega: 4, offset: 1}}}\n");
+  cli_good ("pinwheel periodic @/rolls.yaml");
+  cli_shows ("  relative to the whole        rear.spin: a free rotation by 15.708 rad\n");
 }
 
 /* A pendulum that runs round: its multiplier is exp (-0.1 T) (Liouville).  A spring counts the turns. */

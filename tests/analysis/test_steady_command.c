@@ -36,6 +36,41 @@ TEST (long_advice) {
   cli_shows (" --hold a_body_with_a_rather_long_name_5.omega=0\n");
 }
 
+/* A trailer whose axle passes under the hitch, and two wheels of which one passes the other: the constraints are
+ * singular there, and eigenvalues become infinite.  The branches end on both sides, without events. */
+TEST (singular_constraints) {
+  static const char *const model[] = {
+    "pinwheel: 1\nparameters: [{name: d, value: 1, unit: m}]\nbodies:\n"
+    "  - {name: car, mass: 10, inertia: 4, rate: {vx: 1}}\n"
+    "  - {name: trailer, mass: 10, inertia: 4, start: {x: -1}, rate: {vx: 1}}\nelements:\n"
+    "  - {wheel: rear, body: car, at: [0, 0]}\n"
+    "  - {pin: hitch, body: [car, trailer], at: [[0, 0], [1, 0]]}\n"
+    "  - {wheel: axle, body: trailer, at: [1 - d, 0]}\n",
+    "pinwheel: 1\nparameters: [{name: d, value: 1, unit: m}]\nbodies:\n"
+    "  - {name: car, mass: 10, inertia: 4, rate: {vx: 1}}\nelements:\n"
+    "  - {wheel: rear, body: car, at: [0.3, 0]}\n"
+    "  - {wheel: front, body: car, at: [0.3 + d, 0]}\n"
+  };
+  static const char *const range[] = { "1:-1", "-0.5:1", "0.7:-0.1" };
+  for (int i = 0; i < 6; i++) {
+    int ends = 0;
+    cli_write ("singular.yaml", model[i / 3]);
+    assert_int_equal (cli_run (check_text ("pinwheel steady @/singular.yaml --vary d=%s -o @/singular", range[i % 3])),
+                      0);
+    assert_null (strstr (cli_out, "zero eigenvalue"));
+    for (const char *line = strstr (cli_out, "Branch "); line; line = strstr (line + 1, "Branch ")) {
+      assert_non_null (strstr (line, "singular"));
+      assert_true (strstr (line, "depends on other constraints") ||
+                   strstr (line, ": the same lateral constraint, except "));
+      ends++;
+    }
+    assert_int_equal (ends, i < 3 ? 4 : 2);
+    for (const char *line = strstr (cli_out, "  ends  "); line; line = strstr (line + 1, "  ends  "))
+      check_below ("distance of an end from the singular constraints", fabs (strtod (line + 7, NULL)), 1e-5,
+                   "steps of 1e-7 of the range, residuals over their sine");
+  }
+}
+
 /* Number `column` (from 0) of a line of a table. */
 static double table_number (const char *line, int column) {
   for (; column > 0; column--) line = strchr (line, ',') + 1;
@@ -352,8 +387,8 @@ TEST (bad) {
            "at 1 at "
            "best, in units of the scene (L, L/T, L/T^2); change what is held, or begin nearer to one (--start)");
   cli_bad ("pinwheel steady slider-crank --set theta=pi/2", 3,
-           "model slider-crank: the initial configuration is singular: 7 constraint equations are independent there, 8 "
-           "nearby; begin slightly off it");
+           "model slider-crank: the initial configuration is singular: pin B (B.Fy) follows from pin A, pin C, drive "
+           "guide, but not nearby; begin slightly off it");
   cli_bad ("pinwheel linearise n-trailer --hold tractor.speed=1", 2, "--hold needs --steady");
 }
 

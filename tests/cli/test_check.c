@@ -82,14 +82,52 @@ TEST (many_findings) {
   cli_write ("many.yaml", text);
   cli_good ("pinwheel check @/many.yaml");
   cli_shows ("\n12 findings\n");
-  cli_shows ("b7.x = 1 m, but the constraints require 0 m\n  and 4 more\n");
+  cli_shows ("b7.x = 1 m, which was changed to 0 m; otherwise pin p7 would be open by 1 m\n  and 4 more\n");
   cli_good ("pinwheel check @/many.yaml --json -");
-  cli_shows ("b11.x = 1 m, but the constraints require 0 m\"]");
+  cli_shows ("b11.x = 1 m, which was changed to 0 m; otherwise pin p11 would be open by 1 m\"]");
+}
+
+/* Gravity in the plane in which wheels roll, but not along a slope, nor with markers. */
+TEST (gravity) {
+  static const char *const wheel[] = { "wheel: W, body: a, at: [0, 0]",
+                                       "tyre: W, body: a, at: [0, 0], stiffness: 100, speed: 1",
+                                       "rolling-wheel: W, body: a, at: [0, 0], radius: 0.1, inertia: 0",
+                                       "steered-wheel: W, body: a, at: [0, 0], heading: 0.1",
+                                       "marker: W, body: a, at: [0, 0]" };
+  for (int i = 0; i < 10; i++) {
+    cli_write ("g.yaml", check_text ("pinwheel: 1\nbodies: [{name: a, mass: 1, inertia: 1}]\nelements:\n"
+                                     "  - {%s}\n  - {gravity: G, acceleration: [%s]}\n",
+                                     wheel[i / 2], i % 2 ? "3, -4" : "0, -9.81"));
+    cli_good ("pinwheel check @/g.yaml");
+    int found = strstr (cli_out, "gravity G acts with 9.81 m/s^2 in the plane in which ") != NULL;
+    if (found != (i < 8 && i % 2 == 0)) fail_msg ("%s: %s", wheel[i / 2], cli_out);
+  }
+}
+
+/* Wheels steered in parallel allow no motion, unlike those of Ackermann's steering and a driven car. */
+TEST (locked_wheels) {
+  static const char *const rest[] = { "heading: 0.3}\n", "heading: atan(1)}\n",
+                                      "heading: 0}\n  - {speed: engine, body: a, at: [0, 0], value: t}\n" };
+  for (int i = 0; i < 3; i++) {
+    cli_write ("locked.yaml",
+               check_text ("pinwheel: 1\nbodies: [{name: a, mass: 1, inertia: 1}]\nelements:\n"
+                           "  - {wheel: left, body: a, at: [-1, 0.5]}\n  - {wheel: right, body: a, at: [-1, -0.5]}\n"
+                           "  - {wheel: other, body: a, at: [1, 0.5], heading: %s}\n"
+                           "  - {wheel: front, body: a, at: [1, -0.5], %s",
+                           i == 0   ? "0.3"
+                           : i == 1 ? "atan(2)"
+                                    : "0",
+                           rest[i]));
+    cli_good ("pinwheel check @/locked.yaml 2>/dev/null");
+    int found = strstr (cli_out, "the wheels allow no motion; wheels that slip sideways are of type tyre") != NULL;
+    if (found != (i == 0)) fail_msg ("%d: %s", i, cli_out);
+  }
 }
 
 TEST (singular) {
   cli_write ("loose.yaml", "pinwheel: 1\nbodies:\n  - {name: a, mass: 1, inertia: 1}\n  - {name: ghost}\n"
-                           "elements:\n  - {pin: A, body: [a, ghost], at: [[1, 0], [0, 0]]}\n");
+                           "elements:\n  - {pin: A, body: [a, ghost], at: [[1, 0], [0, 0]]}\n"
+                           "  - {wheel: W, body: ghost, at: [0, 0]}\n");
   assert_int_equal (cli_run ("pinwheel check @/loose.yaml"), 2);
   cli_shows ("saddle-point matrix                singular; see below");
   cli_shows ("  FAILED: model loose: ");
@@ -99,6 +137,72 @@ TEST (singular) {
   assert_true (cli_says (cli_out, "status", "failed"));
   assert_int_equal (cli_run ("pinwheel check ezyroller --start frame.vx=1e120"), 2);
   cli_shows ("saddle-point matrix                not known\n");
+}
+
+/* ---- Point masses: angles that nothing turns ---- */
+
+/* A point mass on a rod from an arm, with one more element. */
+static void check_point_mass (const char *element) {
+  char text[1000];
+  snprintf (text, sizeof text,
+            "pinwheel: 1\nrun: {t_end: 0.1}\nbodies:\n"
+            "  - {name: m, mass: 1, start: {x: 0.6, y: -0.8}, rate: {omega: 2}}\n"
+            "  - {name: arm, mass: 1, inertia: 1, rate: {omega: 1}}\nelements:\n"
+            "  - {gravity: g, acceleration: [0, -9.81]}\n  - {pin: O, body: [arm, ground], at: [[0, 0], [0, 0]]}\n"
+            "  - {rod: R, body: [m, arm], at: [[0, 0], [0, 0]], length: 1}\n  - {%s}\n",
+            element);
+  cli_write ("point.yaml", text);
+}
+
+TEST (point_mass) {
+  static const char *const good[] = {
+    "spring: S, body: [m, arm], at: [[0, 0], [0.2, 0]], stiffness: 3, damping: 1",
+    "force: F, body: m, at: [0, 0], fx: 1",
+    "drag: D, body: m, linear: 1, quadratic: 2",
+    "slot: P, body: [m, arm], at: [[0, 0], [0, 0]], heading: -0.9272952180016122",
+    "sliding-friction: P, body: [m, arm], at: [[0, 0], [0, 0]], viscous: 1",
+    "torque: T, body: [arm, ground], value: {expression: \"m.x + m.vy\"}",
+    "pfaffian: F, body: [arm, m], a: [0, 0, 1], b: [0, 1, 0]",
+    "marker: M, body: m, at: [0.1, 0]",
+  };
+  for (size_t i = 0; i < sizeof good / sizeof *good; i++) {
+    check_point_mass (good[i]);
+    cli_good ("pinwheel check @/point.yaml");
+    cli_shows ("    m has no inertia: nothing turns it, its angle is left out of the motion\n");
+    cli_shows (strstr (good[i], "slot:") ? "degrees of freedom, configuration  1\n"
+                                         : "degrees of freedom, configuration  2\n");
+    cli_good ("pinwheel check @/point.yaml --json -");
+    cli_shows ("\"unturned\": [\"m\"]");
+  }
+}
+
+/* What reads the angle of a point mass, or acts on it, makes it undetermined, unless constraints determine it. */
+TEST (point_mass_refused) {
+  static const char *const bad[][2] = {
+    { "wheel W", "wheel: W, body: m, at: [0, 0]" },
+    { "speed W", "speed: W, body: m, value: 1" },
+    { "tyre T", "tyre: T, body: m, at: [0, 0], stiffness: 1, speed: 1" },
+    { "force F", "force: F, body: m, at: [0, 0], axes: body, fx: 0" },
+    { "force F", "force: F, body: m, at: [0.1, 0], fx: 0" },
+    { "torque T", "torque: T, body: [m, ground], value: 0" },
+    { "torque T", "torque: T, body: [arm, ground], value: {expression: m.phi}" },
+    { "torque T", "torque: T, body: [arm, ground], value: {expression: m.omega}" },
+    { "rotational-spring S", "rotational-spring: S, body: [arm, m], stiffness: 1, damping: 0" },
+    { "friction F", "friction: F, body: [arm, m], viscous: 1" },
+    { "drag D", "drag: D, body: m, turning: 1" },
+    { "spring S", "spring: S, body: [m, arm], at: [[0, 0.1], [0, 0]], stiffness: 3" },
+  };
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+    check_point_mass (bad[i][1]);
+    assert_int_equal (cli_run ("pinwheel run @/point.yaml"), 2);
+    assert_non_null (strstr (cli_err, "m.phi has no inertia, and no constraint determines how it moves, although "));
+    assert_non_null (strstr (cli_err, bad[i][0]));
+  }
+  check_point_mass ("wheel: W, body: m, at: [0.1, 0]"); /* it determines the angle */
+  cli_good ("pinwheel check @/point.yaml");
+  cli_shows ("    m has no inertia\n");
+  cli_good ("pinwheel check @/point.yaml --json -");
+  cli_shows ("\"unturned\": []");
 }
 
 /* A plug-in's own kind whose force is not the gradient of its energy, and whose force_q is missing. */

@@ -187,6 +187,49 @@ TEST (lines) {
   assert_string_equal (text, "pinwheel: ezyroller: 25 %  t = 2.5 of 10 s  3:00 to go\n");
 }
 
+/* Whatever is reported, no count is above the one that it is "of", and the remaining time is not negative and never
+ * rises: not if the final count was an estimate, the work slows down, or nothing is done for a while. */
+TEST (remaining) {
+  static const double reached[][12] = { { 1, 2, 5, 10, 19, 20, 21, 30, 40 }, /* of 20 */
+                                        { 1, 1, 1, 1, 2, 2, 2, 3, 3, 20 },
+                                        { 10, 12, 12.5, 12.6, 12.61, 12.62, 19, 20 },
+                                        { 0.5, 0.5, 19, 18, 17, 21, 3, 22 } };
+  for (int k = 0; k < 8; k++) {
+    char text[4000] = "";
+    pw_progress p;
+    int before = dup (STDERR_FILENO), file = open (cli_path ("lines"), O_RDWR | O_CREAT | O_TRUNC, 0600), lines = 0;
+    assert_true (before >= 0 && file >= 0);
+    dup2 (file, STDERR_FILENO);
+    pw_progress_start (&p, "model", k % 2 ? "s" : "iterations", 0, 20);
+    p.lines = 1;
+    for (int i = 0; i < 12 && reached[k / 2][i] > 0; i++) {
+      p.start -= 100, p.next = 0;
+      pw_progress_at (&p, reached[k / 2][i]);
+    }
+    pw_progress_end (&p);
+    dup2 (before, STDERR_FILENO);
+    close (before);
+    assert_true (pread (file, text, sizeof text - 1, 0) > 0);
+    close (file);
+    double least = INFINITY;
+    for (char *line = strtok (text, "\n"); line; line = strtok (NULL, "\n"), lines++) {
+      double count, of, hours = 0, minutes, seconds;
+      const char *time = strstr (line, " to go"), *counted = strstr (line, "%  ") + 3;
+      if (sscanf (counted, k % 2 ? "t = %lf of %lf s" : "%lf of %lf", &count, &of) == 2) assert_true (count <= of);
+      assert_non_null (time);
+      while (time > line && time[-1] != ' ') time--;
+      if (strncmp (time, "- to go", 7) == 0) continue; /* not known */
+      if (sscanf (time, "%lf:%lf:%lf", &hours, &minutes, &seconds) != 3)
+        assert_int_equal (sscanf (time, "%lf:%lf", &minutes, &seconds) + (int)(hours = 0), 2);
+      seconds += 60 * (minutes + 60 * hours);
+      if (!(seconds >= 0 && seconds <= least && minutes >= 0)) print_error ("%s\n", line);
+      assert_true (seconds >= 0 && seconds <= least && minutes >= 0);
+      least = seconds;
+    }
+    assert_true (lines >= 8 && isfinite (least));
+  }
+}
+
 /* Speeds that have grown a thousand times beyond the scene's are reported; the same speed from the start is not. */
 TEST (growth) {
   cli_write ("spin.yaml", "pinwheel: 1\nabout: a rotor\nrun: {t_end: 3000, method: erk8+projection}\n"

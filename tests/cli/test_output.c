@@ -403,6 +403,43 @@ TEST (forged) {
   output_forge (-2, -1); /* as an integer: negative */
 }
 
+/* Formats that are not written are refused with those that are, before anything is written; so are folders with the
+ * names of files.  What follows a dot need not be a format. */
+TEST (formats) {
+  static const char csv_or_npz[] = "the format %s is not written: expected a name that ends in .csv or .npz",
+                    folder[] = "expected the name of a folder, in which files are written";
+  static const char *const ending[] = { ".xlsx", ".mat", ".json", ".h5", ".txt", ".html" };
+  cli_good ("mkdir -p @/formats/old.csv");
+  for (size_t i = 0; i < sizeof ending / sizeof *ending; i++) {
+    cli_bad (check_text ("pinwheel run pendulum -t 1 -o @/formats/a%s", ending[i]), 2,
+             check_text ("-o @/formats/a%s: %s", ending[i], check_text (csv_or_npz, ending[i])));
+  }
+  const cli_wrong each[] = {
+    { "sweep pendulum --vary l=1,2 -o @/formats/a.xlsx", "is not written: expected a name that ends in .csv" },
+    { "optimise pendulum --maximise bob.phi --free l=1:2 -o @/formats/a.csv",
+      "expected a name that ends in .yaml or .yml" },
+    { "run pendulum --json @/formats/a.txt", "the format .txt is not written: expected a name that ends in .json" },
+    { "run pendulum --plots @/formats/a.png", folder },
+    { "compare pendulum -o @/formats/a.csv", folder },
+    { "drift pendulum -o @/formats/a.pdf", folder },
+    { "steady pendulum -o @/formats/a.json", folder },
+    { "sensitivity pendulum --of bob.phi --by l -o @/formats/a.csv", folder },
+    { "linearise pendulum -o @/formats/a.json", "expected a NAME, for NAME.json, NAME.csv and NAME.npz" },
+    { "check pendulum --json @/formats/a.yaml", "expected a name that ends in .json" },
+  };
+  for (size_t i = 0; i < sizeof each / sizeof *each; i++) {
+    assert_int_equal (cli_run (check_text ("pinwheel %s", each[i].arguments)), 2);
+    if (!strstr (cli_err, each[i].message)) print_error ("%s\n%s", each[i].arguments, cli_err);
+    assert_non_null (strstr (cli_err, each[i].message));
+  }
+  cli_good ("ls @/formats");
+  assert_string_equal (cli_out, "old.csv\n");
+  cli_shell ("pinwheel run pendulum -t 0.01 --every 0.01 -o @/formats/l=0.5 --plots @/formats/old.csv");
+  cli_shell ("pinwheel run pendulum -t 0.01 --every 0.01 -o @/formats/A.CSV");
+  cli_shell ("pinwheel run pendulum -t 0.01 --every 0.01 -o @/formats/a.csv.old");
+  cli_good ("cmp @/formats/l=0.5 @/formats/A.CSV; cmp @/formats/l=0.5 @/formats/a.csv.old");
+}
+
 /* A checkpoint that cannot be written leaves nothing, and the message names nothing. */
 TEST (not_written) {
   char head[6000];

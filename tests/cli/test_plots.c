@@ -84,6 +84,127 @@ TEST (layouts) {
   assert_null (strstr (cli_file ("drawn/energy.svg"), "potential"));
 }
 
+/* In a picture, the label of each y axis is on the page and left of the numbers at its tics, which precede it. */
+static void plots_check_labels (const char *name) {
+  const double digit = 6.4, ascent = 7, descent = 2; /* of a font of 10 pixels */
+  double left = 1e9;
+  int labels = 0;
+  for (const char *at = cli_file (name); (at = strstr (at, "translate(")) != NULL; at++) {
+    const double x = strtod (at + strlen ("translate("), NULL);
+    const char *end = strstr (at, "</g>"), *anchor = strstr (at, "text-anchor=\"end\""),
+               *turned = strstr (at, "rotate(270");
+    if (x > 150 || end == NULL || strstr (at, "<text></text>") == strstr (at, "<text>"))
+      continue; /* of another panel, of a colour bar, or empty */
+    if (anchor && anchor < end) {
+      int characters = 0, is_tag = 0;
+      for (const char *c = strstr (at, "<text>"); c < end; c++) {
+        is_tag = *c == '<' || (is_tag && *c != '>');
+        characters += !is_tag && *c != '>' && *c != ' ' && *c != '\n' && *c != '\t' && (*c & 0xC0) != 0x80;
+      }
+      if (x - digit * characters < left) left = x - digit * characters;
+    } else if (turned && turned < end) {
+      if (x - ascent < 0 || x + descent > left) print_error ("%s: a label at %g, numbers from %g\n", name, x, left);
+      assert_true (x - ascent >= 0 && x + descent <= left);
+      left = 1e9;
+      labels++;
+    }
+  }
+  assert_true (labels > 0);
+}
+
+static void plots_check (const char *model) {
+  plots_draw (model);
+  assert_string_equal (cli_err, "");
+  static const char *const figures[] = { "paths", "velocities", "angular", "energy", "mechanism" };
+  for (int i = 0; i < 5; i++) plots_check_labels (check_text ("drawn/%s.svg", figures[i]));
+}
+
+/* Motions that do not move, or little compared with their place; of very long and very short extents. */
+TEST (extents) {
+  static const char *const states[] = { "",
+                                        "start: {x: 1e10, y: -3e8}",
+                                        "start: {x: 500000, y: 5e6, phi: 3}, rate: {vx: 2, vy: 1, omega: 0.1}",
+                                        "start: {x: 3}, rate: {vx: 1e-12, omega: 1e-14}",
+                                        "start: {x: 3, phi: 1e-7}, rate: {vx: 1e-7, omega: -1e-7}",
+                                        "start: {x: -1e-6, y: 2e-5}, rate: {vx: -1e-5, vy: 1e-6, omega: 1e-3}",
+                                        "rate: {vx: -12345.6, vy: 1, omega: 0.12345}",
+                                        "rate: {vx: 3e9, vy: -1e9}",
+                                        "rate: {vx: 1, vy: 1e-300}" };
+  for (size_t i = 0; i < 2 * sizeof states / sizeof *states; i++) {
+    cli_write ("b.yaml",
+               check_text (
+                   "pinwheel: 1\nrun: {t_end: 1, step: 0.125, method: erk8, rtol: 1e-6}\nbodies: [{name: b, mass: 1, "
+                   "inertia: 1%s%s}]\n%s",
+                   *states[i / 2] ? ", " : "", states[i / 2],
+                   i % 2 ? "elements: [{marker: m, body: b, at: [0, 0]}, {torque: T, body: [b, ground], value: 1e-9}]\n"
+                         : ""));
+    plots_check ("@/b.yaml");
+    if (i == 0) assert_non_null (strstr (cli_file ("drawn/paths.svg"), "gpPt6")); /* a point */
+  }
+  assert_non_null (strstr (cli_file ("drawn/velocities.svg"), "10"));
+  plots_check ("car-tyres -t 3");
+  plots_check ("car-tyres -t 3 --width 85mm");
+  plots_check ("andrews-squeezer -t 0.02");
+}
+
+/* A title of any length, with or without blanks, and any characters. */
+TEST (titles) {
+  static const char body[] = "bodies: [{name: b, mass: 1, inertia: 1, rate: {vx: 1}}]\n";
+  char text[30000] = "pinwheel: 1\nrun: {t_end: 1, step: 0.125, method: rk4}\nabout: \"";
+  const size_t head = strlen (text);
+  for (int i = 0; i < 3; i++) {
+    static const char *const part[] = { "d'Alembert's 'principle' ", "xyzw", "\xC3\xA4\xE6\x97\xA5" };
+    text[head] = 0;
+    while (strlen (text) < 20000) strcat (text, part[i]);
+    strcat (strcat (text, "\"\n"), body);
+    cli_write ("t.yaml", text);
+    plots_check ("@/t.yaml --width 85mm");
+    const char *svg = cli_file ("drawn/energy.svg");
+    assert_non_null (strstr (svg, "\xE2\x80\xA6"));
+    assert_non_null (strstr (svg, i == 0 ? "D'Alembert's 'principle'" : i == 1 ? "Xyzw" : part[2]));
+    assert_true (strtod (strstr (svg, "height=\"") + strlen ("height=\""), NULL) < 600);
+  }
+}
+
+/* Long names in the figures of analyses; results that do not change. */
+TEST (analyses) {
+#define LONG "the_left_front_wheel_carrier_of_the_vehicle"
+  static const char *const command[] = {
+    "run @/long.yaml --every 0.05 -o @/l.csv",
+    "fit @/long.yaml --data @/l.csv --columns " LONG ".phi," LONG ".x --sigma " LONG ".phi=1e-5 --sigma " LONG
+    ".x=1e-5 --free stiffness_of_the_torsion_spring --plots @/l",
+    "optimise @/long.yaml --maximise max:" LONG
+    ".omega --free stiffness_of_the_torsion_spring=1:5 --starts 2 --plots @/l",
+    "sensitivity @/long.yaml --of " LONG ".omega --by stiffness_of_the_torsion_spring --by c -o @/l",
+    "periodic @/long.yaml --set c=0 --period free --guess 3 --vary stiffness_of_the_torsion_spring=4:5 -o @/l",
+    "steady @/long.yaml --vary stiffness_of_the_torsion_spring=1:5 -o @/l",
+    "run @/rest.yaml --every 0.05 -o @/l.csv",
+    "fit @/rest.yaml --data @/l.csv --columns " LONG ".phi --free " LONG ".omega --plots @/l",
+    "optimise @/rest.yaml --maximise " LONG ".phi --free c=0:1 --starts 1 --plots @/l",
+    "sensitivity @/rest.yaml --of " LONG ".phi --by c -o @/l",
+    "periodic @/rest.yaml --set c=0 --period 1 -o @/l"
+  };
+  static const char *const figure[] = { NULL, "fit", "optimise", "sensitivity", "periodic", "steady",
+                                        NULL, "fit", "optimise", "sensitivity", "periodic" };
+  for (int rest = 0; rest < 2; rest++)
+    cli_write (
+        rest ? "rest.yaml" : "long.yaml",
+        check_text (
+            "pinwheel: 1\nrun: {t_end: 2, step: 0.05, method: rk4}\nparameters:\n"
+            "  - {name: stiffness_of_the_torsion_spring, value: 4, domain: positive}\n  - {name: c, value: 0.3}\n"
+            "bodies: [{name: " LONG ", mass: 1, inertia: 1, start: {phi: %s}}]\nelements:\n"
+            "  - {pin: P, body: [" LONG ", ground], at: [[2e-5, 0], [0, 0]]}\n"
+            "  - {torque: T, body: [" LONG ", ground], value: -stiffness_of_the_torsion_spring*" LONG ".phi - c*" LONG
+            ".omega}\n",
+            rest ? "0" : "0.5"));
+  for (size_t i = 0; i < sizeof command / sizeof *command; i++) {
+    cli_shell (check_text ("pinwheel %s", command[i]));
+    assert_null (strstr (cli_err, "arning")); /* of gnuplot */
+    if (figure[i]) plots_check_labels (check_text ("l/%s.svg", figure[i]));
+    if (figure[i]) assert_null (strstr (cli_file (check_text ("l/%s.svg", figure[i])), LONG));
+  }
+}
+
 /* A plate is its convex outline, with a line to what is attached inside; what lies on a line is one. */
 TEST (outline) {
   cli_write ("plate.yaml", "pinwheel: 1\nbodies:\n  - {name: plate, mass: 1, inertia: 1, rate: {vx: 1}}\n"

@@ -93,6 +93,35 @@ TEST (expressions) {
   assert_non_null (strstr (cli_err, "torque U: value: \"sign(a.omega - 1)\" may jump as states change"));
 }
 
+/* Only operations are named whose arguments can reach a jump. */
+TEST (jumps) {
+  static const struct {
+    const char *expression;
+    int jumps;
+  } of[] = { { "atan2(a.vx, 1)", 0 },
+             { "atan2(a.vx, 2 + cos(a.phi))", 0 },
+             { "atan2(1 + a.vy^2, a.vx)", 0 },
+             { "sign(a.vx^2 + 1)", 0 },
+             { "round(0.3*sin(a.phi))", 0 },
+             { "mod(0.5 + 0.1*tanh(a.vx), 1)", 0 },
+             { "cos(a.phi) < 2 ? a.vx : 1", 0 },
+             { "atan2(a.vx, -1)", 1 },
+             { "atan2(a.vx, cos(a.phi))", 1 },
+             { "sign(a.vx^2 - 1)", 1 },
+             { "floor(3*sin(a.phi))", 1 },
+             { "mod(a.phi, 2*pi)", 1 },
+             { "t + atan2(a.vx, 1 - t)", 1 },
+             { "cos(a.phi) < 0.5 ? a.vx : 1", 1 } };
+  for (size_t i = 0; i < sizeof of / sizeof *of; i++) {
+    cli_write ("j.yaml", check_text ("pinwheel: 1\nbodies: [{name: a, mass: 1, inertia: 1}]\nelements:\n"
+                                     "  - {torque: T, body: [a, ground], value: \"%s\"}\n",
+                                     of[i].expression));
+    assert_int_equal (cli_run ("pinwheel run @/j.yaml -t 1e-3"), 0);
+    if ((strstr (cli_err, "may jump as states change") != NULL) != of[i].jumps)
+      fail_msg ("%s: %s", of[i].expression, cli_err);
+  }
+}
+
 TEST (no_text) {
   cli_write ("f.c", cli_function);
   cli_bad ("pinwheel show @/f.c --yaml", 2,

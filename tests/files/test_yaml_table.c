@@ -1,4 +1,4 @@
-/* Tables of text models in files: their formats, and the folders in which they may be. */
+/* Tables of text models: formats of their files, the folders in which these may be, times, coverage of a run. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -251,8 +251,114 @@ TEST (contents) {
   table_bad ("{file: nul.csv}", "value: nul.csv: a table is text, and this has a byte 0\n");
   cli_write ("model/twice.csv", "t,u,u [m]\n0,1,2\n1,2,3\n");
   table_bad ("{file: twice.csv, columns: [t, u]}", "value: twice.csv:1: columns 2 and 3 are both named \"u\"\n");
-  cli_write ("model/comma.csv", "t;u\n0;1,5\n");
-  table_bad ("{file: comma.csv}", "value: comma.csv:2: column 2: expected a finite number, found \"1,5\"");
+}
+
+/* Decimal commas, and blanks between cells: read where they are not ambiguous, otherwise refused with the remedy. */
+TEST (separators) {
+  static const char *const csv[] = { "0;1\n0,5;-2\n2;3e-1\n",
+                                     "Zeit [s];M [N m]\n0,0;1,0\n0,5;-2,0\n2,0;0,3\n",
+                                     "t\tM\n0,0\t1,0\r\n0,5\t-2\r\n2\t0,3\r\n",
+                                     "0 1\n.5 -2\n2 .3\n",
+                                     "  t [s]   M [N m]\n 0.0     1\n 0.5\t-2  \n 2     0.3\n",
+                                     "t (s) M (mN m)\n0 1000\n0,5 -2000,0\n2 300\n",
+                                     "# t M\n0,0 1,0\n\n0,5 -2,0\n2,0 0,3\n",
+                                     "Position 1,Position 2\n0,1\n0.5,-2\n2,.3\n",
+                                     "0, 1\n0.5, -2\n2, .3\n" };
+  for (size_t i = 0; i < sizeof csv / sizeof *csv; i++) table_good (csv[i], "{file: data.csv}");
+  cli_write ("model/data.csv", "t;\"M, left\"\n0;1,0\n0.5;-2\n2;3e-1\n");
+  table_bad ("{file: data.csv}",
+             "data.csv:3: column 1: a decimal point, but line 2 has a decimal comma: use one of them");
+  static const char hint[] = "; with decimal commas, separate cells by semicolons or tabs";
+  cli_write ("model/data.csv", "t,M\n0,0,1,5\n1,0,2,5\n");
+  table_bad ("{file: data.csv}", check_text ("data.csv:2: expected 2 cells as in the first line, found 4%s", hint));
+  cli_write ("model/data.csv", "t,M\n0,\"1,5\"\n1,\"2,5\"\n");
+  table_bad ("{file: data.csv}", check_text ("column 2: expected a finite number, found \"1,5\"%s", hint));
+  cli_write ("model/data.csv", "0,0,1,5\n1,0,2,5\n2,0,3,0\n");
+  table_bad ("{file: data.csv}", "data.csv:1: without names, 4 cells of whole numbers: with decimal commas, separate");
+  assert_true (table_build ("{file: data.csv, columns: [1, 3]}", &(pw_signal){ 0 }, (double[2][3]){ { 0 } }).status ==
+               PW_OK);
+  cli_write ("model/data.csv", "t;M\n0;1.234,5\n1;2\n");
+  table_bad ("{file: data.csv}", "found \"1.234,5\"; nothing may separate thousands");
+  cli_write ("model/data.csv", "t|M\n0|1\n1|2\n");
+  table_bad ("{file: data.csv}", "the line has 1 cell; separate cells by commas, semicolons, tabs or blanks");
+}
+
+/* Times in other units and since an epoch; the column of times. */
+TEST (times) {
+  static const char csv[] = "M,ms,extra\n1,5000,0\n-2,5500,0\n3e-1,7000,0\n";
+  table_good ("", "{points: [[1000, 1], [1500, -2], [3000, 0.3]], time_scale: 1e-3, time_offset: -1}");
+  table_good (csv, "{file: data.csv, time: ms, time_scale: 1e-3, time_offset: -5}");
+  table_good (csv, "{file: data.csv, time: 2, columns: [M], time_scale: 1/1000, time_offset: -5}");
+  table_good (csv, "{file: data.csv, time: ms, columns: [ms, M], time_scale: 1e-3, time_offset: -5}");
+  table_good (csv, "{file: data.csv, columns: [ms, M], time_scale: 1e-3, time_offset: -5}");
+  table_good ("x,t\n0,1\n.5,-2\n2,.3\n", "{file: data.csv, time: x}");
+  cli_write ("model/data.csv", csv);
+  table_bad ("{file: data.csv, time: ns}", "there is no column \"ns\"; did you mean \"ms\"?");
+  table_bad ("{file: data.csv, time: ms, columns: [M, extra]}", "but time is \"ms\"");
+  table_bad ("{file: data.csv, time: ms, columns: [M, ms, extra]}",
+             "expected a list of 1 column, [value], found one of 3");
+  table_bad ("{points: [[0, 1], [1, 2]], time: t}", "a column of times belongs to a file");
+  table_bad ("{points: [[0, 1], [1, 2]], time_scale: 0}", "time_scale = 0: expected a number > 0");
+  table_bad ("{points: [[0, 1], [1, 2]], time_scale: -1}", "time_scale = -1: expected a number > 0");
+  table_bad ("{points: [[0, 1], [1, 2]], time_offset: 1e200, time_scale: 1e-9}", "expected increasing times");
+}
+
+/* Rows with empty cells are left out and counted. */
+TEST (gaps) {
+  table_good ("t,M,x\n0,1,\n0.2,,\n0.5,-2,\n,9,\n2,.3,\n,,\n", "{file: data.csv}");
+  table_good ("t;M\n;\n0;1,0\n0,2;\n0,5;-2,0\n2;0,3\n", "{file: data.csv}");
+  cli_write ("model/data.csv", "t,M\n0,1\n0.2,\n,3\n");
+  table_bad ("{file: data.csv}", "a linear table needs at least 2 points, found 1 and 2 rows with empty cells");
+  cli_write ("model/data.csv", "t,M\n0,1\n,\n-1,3\n");
+  table_bad ("{file: data.csv}", "data.csv:4: -1 comes after 0: expected increasing times");
+}
+
+/* Which part of a run from 0 to 10 s the table covers. */
+static void table_covers (const char *table, const char *text) {
+  pw_error error = table_build (table, &(pw_signal){ 0 }, (double[2][3]){ { 0 } });
+  check_ok (error.status, &error);
+  cli_shell ("pinwheel run @/model/m.yaml --method rk4 --step 0.1 --specialise never");
+  if (*text == 0) assert_string_equal (cli_err, "");
+  if (strstr (cli_err, text) == NULL) print_error ("told:\n%s\nexpected:\n%s\n", cli_err, text);
+  assert_non_null (strstr (cli_err, text));
+}
+
+TEST (coverage) {
+  table_covers ("{points: [[0, 1], [10, 2]]}", "");
+  table_covers ("{points: [[-1, 1], [12, 2]]}", "");
+  table_covers (
+      "{points: [[0, 1], [3, 2]]}",
+      "pinwheel: torque T: value: the table has times from 0 to 3 s and covers 30 % of the run, which ends at 10 "
+      "s: its last value holds for 7 s after\n");
+  table_covers (
+      "{points: [[2, 1], [6, 2]]}",
+      "covers 40 % of the run, which ends at 10 s: its first value holds for 2 s before, its last value for 4 s "
+      "after\n");
+  table_covers ("{points: [[2, 1], [60, 2]]}",
+                "covers 80 % of the run, which ends at 10 s: its first value holds for 2 s");
+  table_covers ("{points: [[1700000000, 1], [1700000020, 2]]}",
+                "from 1700000000 to 1700000020 s, after the run, which ends at 10 s: its first value holds throughout; "
+                "time_offset: -1700000000 lets it begin at 0\n");
+  table_covers ("{points: [[1700000000, 1], [1700000020, 2]], time_offset: -1.7e9}", "");
+  table_covers ("{points: [[-9, 1], [-1, 2]]}", "from -9 to -1 s, before the run: its last value holds throughout\n");
+  table_covers ("{points: [[0, 1], [12000, 2]]}", "uses 0.083 %: if they are in ms, add time_scale: 1e-3\n");
+  table_covers ("{points: [[0, 1], [12000, 2]], time_scale: 1e-3}", "");
+  cli_write ("model/data.csv", "0,1\n1,\n4,2\n,\n10,3\n");
+  table_covers ("{file: data.csv}", "pinwheel: torque T: value: 2 rows with empty cells are left out of the table\n");
+  cli_shell ("pinwheel check @/model/m.yaml");
+  assert_non_null (strstr (cli_out, "torque T: value: 2 rows with empty cells are left out of the table"));
+  static const char *const command[] = {
+    "sweep @/model/m.yaml --vary a.x=1,2 -t 20 --step 0.1 -o @/s.csv", "compare @/model/m.yaml --methods rk4 -t 20",
+    "sensitivity @/model/m.yaml --of a.phi --by a.omega -t 20 --step 0.1",
+    "optimise @/model/m.yaml --maximise a.phi --free a.omega=0:1 -t 20 --step 0.1"
+  };
+  for (size_t i = 0; i < sizeof command / sizeof *command; i++) {
+    cli_shell (check_text ("pinwheel %s", command[i]));
+    const char *said =
+        strstr (cli_err, "covers 50 % of the run, which ends at 20 s: its last value holds for 10 s after");
+    assert_non_null (said);
+    assert_null (strstr (said + 1, "covers"));
+  }
 }
 
 /* Nothing outside the model's folder is read, however it is named. */

@@ -340,6 +340,46 @@ TEST (bound) {
 
 /* ---- Wrong input ---- */
 
+/* Times of data in ms without a unit, since an epoch, in a column of another name, with decimal commas. */
+TEST (times) {
+  fit_write (0);
+  cli_shell ("awk -F, 'NR == 1 { print \"t,w.phi [mrad]\" } NR > 1 { print $1 \",\" $2 }' @/data.csv >@/ms.csv");
+  cli_shell ("awk -F, 'NR == 1 { print \"t,w.phi [mrad]\" } NR > 1 { printf \"%.0f,%s\\n\", 1.7e12 + $1, $2 }' "
+             "@/data.csv >@/far.csv");
+  cli_shell ("sed 's/,/;/; 1s/t;/stamp;/; 1!s/[.]/,/' @/far.csv >@/epoch.csv");
+  cli_write ("late.csv", "t,w.phi\n10.5,0.1\n11,0.2\n");
+  cli_write ("early.csv", "t,w.phi\n-1,0.1\n1,0.2\n");
+  static const char *const good[] = { "epoch.csv --time stamp --time-scale 1e-3 --time-offset -1.7e9",
+                                      "ms.csv --time-scale 1e-3", "data.csv --t-end 3.5" };
+  for (int i = 0; i < 3; i++) {
+    cli_shell (check_text (
+        "pinwheel fit @/wheel.yaml --columns w.phi --json @/fit.json --free k --set c=0.4 --data @/%s", good[i]));
+    check_close ("k", fit_value (cli_file ("fit.json"), "k", "value"), fit_k, 1e-5, "(w h)^4, 4e-6");
+    assert_non_null (
+        strstr (cli_err, i < 2 ? "from 0.05 to 4 s, cover 39.5 % of the run, which ends at 10 s; runs end "
+                                 "at the last datum\n"
+                               : "left out are 10 empty cells, 0 rows without a time, 10 rows after --t-end\n"));
+  }
+  static const cli_wrong wrong[] = {
+    { "ms.csv", "from 50 to 4000 s, are after the run, which ends at 10 s: give --t-end, or --time-offset -50" },
+    { "far.csv", "are after the run, which ends at 10 s: give --t-end, or --time-offset -1700000000050, which lets" },
+    { "far.csv --time-offset -1700000000050",
+      "from 0 to 3950 s, last far longer than the run, which ends at 10 s: give --time-scale 1e-3 if they are in ms" },
+    { "late.csv", "from 10.5 to 11 s, are after the run, which ends at 10 s: give --t-end" },
+    { "data.csv --t-end 0.01", "from 0.05 to 4 s, are after the run, which ends at 0.01 s" },
+    { "early.csv", "from -1 to 1 s, begin before the run: --time-offset 1 lets them begin at 0" },
+    { "ms.csv --time-scale 0", "--time-scale 0: expected a number > 0" },
+  };
+  for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
+    assert_int_equal (
+        cli_run (check_text ("ulimit -t 20; pinwheel fit @/wheel.yaml --columns w.phi --free k --data @/%s",
+                             wrong[i].arguments)),
+        2);
+    if (strstr (cli_err, wrong[i].message) == NULL) print_error ("told: %s\n", cli_err);
+    assert_non_null (strstr (cli_err, wrong[i].message));
+  }
+}
+
 TEST (bad) {
   static const cli_wrong bad[] = {
     { "@/wheel.yaml --columns w.phi --free k", "no data: add --data FILE.csv" },
@@ -408,7 +448,7 @@ TEST (changed_values) {
                     0);
   assert_non_null (strstr (
       cli_err, "pinwheel: given initial values of this result were changed to satisfy the constraints, at worst "
-               "frame.omega from 7 to 2 rad/s\n"));
+               "frame.vy from 0 to 3.5 m/s\n"));
 }
 
 /* The engine is chosen for runs to the last datum, not to the final time of the model. */

@@ -41,6 +41,29 @@ TEST (valley) {
   check_close ("value", cli_number (json, "value", NULL), 0, 1e-10, "square of the distance");
 }
 
+/* In a long curved valley searches from the starts end far from where those that continue do.  Some search from a start
+ * has led to every result that is reported. */
+TEST (long_valley) {
+  static const char *const problem[] = { "--free p=-20:20 --free q=-20:20 --subject-to 'a.y<=1' --starts 1",
+                                         "--free p=-20:20 --free q=-20:20 --subject-to 'a.y<=1' --starts 3",
+                                         "--free p=-200:200 --free q=-200:200 --subject-to 'a.y<=1' --starts 2",
+                                         "--free p=-20:20 --free q=-20:20 --subject-to 'a.y>=-1' --starts 1 --set p=-5",
+                                         "--free p=-20:20 --free q=-20:20 --starts 2" };
+  cli_write ("rosenbrock.yaml",
+             "pinwheel: 1\nrun: {t_end: 0.01, step: 0.01, method: rk4}\n"
+             "parameters: [{name: p, value: -1.2}, {name: q, value: 1}]\n"
+             "bodies: [{name: a, mass: 1, inertia: 1, start: {x: (1-p)^2 + 100*(q-p^2)^2, y: q-p}}]\n");
+  for (size_t i = 0; i < sizeof problem / sizeof *problem; i++) {
+    int status = cli_run (check_text ("pinwheel optimise @/rosenbrock.yaml --minimise a.x %s", problem[i]));
+    assert_true (status == 0 || status == 4); /* 4: not converged */
+    const char *ends = strstr (cli_out, " of which end");
+    assert_non_null (ends);
+    while (ends[-1] != ' ') ends--;
+    if (!(atoi (ends) > 0)) print_error ("%s\n%s", problem[i], cli_out);
+    assert_true (atoi (ends) > 0);
+  }
+}
+
 /* Three unknowns: smooth outputs have derivatives, unless the method has none; with an extremum they have not. */
 TEST (derivatives) {
   static const char *const more[] = { "", " + 0*max:p.x", "' --method 'rk4:inputs=held" };
@@ -378,7 +401,7 @@ TEST (changed_values) {
       0);
   assert_string_equal (
       cli_err, "pinwheel: given initial values of this result were changed to satisfy the constraints, at worst "
-               "frame.omega from 7 to 2 rad/s\n");
+               "frame.vy from 0 to 3.5 m/s\n");
 }
 
 const check_fixture fixture = { optimise_setup, cli_teardown };

@@ -1,18 +1,21 @@
 """The Python package against the program and against closed forms."""
 
 import concurrent.futures
+import contextlib
 import csv
 import json
 import math
 import os
 import pathlib
 import pickle
+import re
 import shutil
 import signal
 import subprocess
 import sys
 import threading
 import time
+import warnings
 
 import numpy as np
 import pytest
@@ -28,7 +31,7 @@ def program(*words):
 
 
 def table(path):
-    rows = list(csv.reader(open(path, encoding="utf-8")))
+    rows = list(csv.reader(path.read_text(encoding="utf-8").splitlines()))
     return {name.split(" [")[0]: np.array(column, float) for name, column in zip(rows[0], zip(*rows[1:]))}
 
 
@@ -88,6 +91,47 @@ def test_functions_as_signals():
     assert r["disc.phi"][-1] == pytest.approx((1 - math.cos(3)) / 2, abs=1e-11)
 
 
+class Unsized:
+    """A number as arrays of other packages have them."""
+    shape = ()
+
+    def __init__(self, value):
+        self.value = value
+
+    def __len__(self):
+        raise TypeError("len() of a 0-d array")
+
+    def __float__(self):
+        return float(self.value)
+
+
+NUMBERS = [np.array, np.float64, np.float32, Unsized, lambda x: np.where(True, x, 0), lambda x: np.array([x]), lambda x: [x], lambda x: (np.array(x),)]
+
+
+@pytest.mark.filterwarnings("ignore:model snakeboard. initial values")
+@pytest.mark.parametrize("form", NUMBERS)
+def test_arrays_without_dimension_are_numbers(form):
+    """In signals of forces, and as value, rate and acceleration of constraints, where derivatives are compared, too."""
+    push = pw.Model("ezyroller", signals={"rider": lambda t: form(0.25)}).run(t_end=0.1)
+    assert np.array_equal(push.rows, pw.Model("ezyroller", signals={"rider": lambda t: 0.25}).run(t_end=0.1).rows)
+
+    def swing(of):
+        return lambda t: (of(0.7 + 0.5 * t), of(0.5), of(0.0))
+    if form not in NUMBERS[5:]:
+        turned, plain = (pw.Model("snakeboard", signals={"swing": swing(of)}).run(t_end=0.1) for of in (form, float))
+        assert np.allclose(turned.rows, plain.rows, rtol=0, atol=1e-5)
+        with pytest.raises(pw.InputError, match="the rate at"):
+            pw.Model("snakeboard", signals={"swing": lambda t: (form(0.7 + 0.5 * t), form(0.6), form(0))})
+
+
+def test_interpolations_of_scipy_are_signals():
+    interpolate = pytest.importorskip("scipy.interpolate")
+    t = np.linspace(0, 1, 21)
+    for make in (interpolate.CubicSpline, interpolate.interp1d, interpolate.PchipInterpolator, interpolate.make_interp_spline):
+        model = pw.describe(bodies=[pw.Body("disc", mass=1, inertia=2)], elements=[pw.Torque("motor", body=["disc", "ground"], value=make(t, t))])
+        assert model.run("rk4", t_end=0.5)["disc.omega"][-1] == pytest.approx(0.0625, abs=1e-9)
+
+
 def swinging(rate, acceleration, w=math.pi):
     """The snakeboard with a swing of 0.7 rad, whose derivatives have these factors."""
     return pw.Model("snakeboard", signals={"swing": lambda t: (
@@ -123,9 +167,10 @@ def test_functions_of_forces_are_not_called_before_the_run():
 
 def test_a_failing_function_stops_the_run(capfd):
     element = {"torque": "motor", "body": ["disc", "ground"], "value": lambda t: 1 / 0 if t > 1 else 0}
-    r = pw.describe(bodies=[{"name": "disc", "mass": 1, "inertia": 2}], elements=[element]).run(t_end=3)
-    assert r.status == "failed" and 0.9 < r.t[-1] <= 1.01 and "motor" in r.reason
-    assert "ZeroDivisionError" in r.reason and isinstance(r.cause, ZeroDivisionError)
+    with pytest.raises(ZeroDivisionError) as raised:
+        pw.describe(bodies=[{"name": "disc", "mass": 1, "inertia": 2}], elements=[element]).run(t_end=3)
+    r = raised.value.result
+    assert r.status == "failed" and 0.9 < r.t[-1] <= 1.01 and "motor" in r.reason and "ZeroDivisionError" in r.reason
     assert capfd.readouterr() == ("", "")
 
 
@@ -138,10 +183,55 @@ def test_same_bits_as_the_program(model, method, tmp_path):
     program("run", model, "--method", method, "--t-end", "2", "--every", "0.25", "--energy", "-o", str(tmp_path / "t.csv"))
     expected = table(tmp_path / "t.csv")
     r = pw.Model(model).run(method, t_end=2, every=0.25, energy=True)
-    compared = [name for name in expected if name in r]
-    assert len(compared) > 8
-    for name in compared:
+    assert len(expected) > 8
+    for name in expected:
         assert np.array_equal(r[name], expected[name]), name
+
+
+@pytest.mark.parametrize("model", list(pw.models()))
+def test_every_column_of_the_program_has_its_name_and_unit(model, tmp_path):
+    program("run", model, "--t-end", "0.01", "--every", "0.005", "--specialise", "never", "--energy", "-o", str(tmp_path / "t.csv"))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of initial values
+        r = pw.Model(model).run(t_end=0.01, every=0.005, energy=True, specialise="never")
+    rows = list(csv.reader((tmp_path / "t.csv").read_text(encoding="utf-8").splitlines()))
+    for cell, column in zip(rows[0], zip(*rows[1:])):
+        name, _, unit = cell.partition(" [")
+        assert np.array_equal(r[name], np.array(column, float), equal_nan=True) and r.units[name] == unit.rstrip("]"), name
+
+
+def test_wheels_and_markers_have_positions():
+    model = pw.describe(bodies=[pw.Body("a", mass=1, inertia=1, start={"x": 3, "phi": math.pi / 2}, rate={"vy": 1})],
+                        elements=[pw.Wheel("edge", body="a", at=[-1, 0]), pw.Marker("tip", body="a", at=[2, 1])])
+    r = model.run(t_end=1)
+    assert [r.final[name] for name in ("edge.x", "edge.y", "tip.x", "tip.y")] == pytest.approx([3, 0, 2, 3], abs=1e-12)
+    assert pw.sweep(model, {"a.vy": [2.0]}, t_end=1)["tip.y"] == pytest.approx(4, abs=1e-12)
+
+
+@pytest.mark.parametrize("method, settings", [
+    ("erk8+projection", {"step": 0.01}), ("rk4", {"rtol": 1e-3}), ("rk4", {"atol": 1e-3}), ("rk4", {"max_steps": 100, "step": 0.01}),
+    ("galpha", {"max_steps": 100, "rtol": 1e-3}), ("radau:steps=fixed", {"rtol": 1e-3}), ("radau", {"step": 0.01}),
+    ("rk4", {"step": 0.01, "rtol": 1e-3}), ("erk5", {"step": 0.01, "rtol": 1e-3}), ("bdf", {"max_steps": 10000}), ("rk4+nothing", {"rtol": 1})])
+def test_settings_without_effect_are_those_of_the_program(method, settings):
+    """Of runs, of open runs, and once of a sweep."""
+    words = [f"--{name.replace('_', '-')}={value}" for name, value in settings.items()]
+    done = subprocess.run([lib.program(), "run", "pendulum", "--t-end", "0.1", "--method", method, *words], capture_output=True, text=True)
+    expected = [re.sub("--(\\w+)-?", r"\1_", line).replace("_ ", " ").replace("_,", ",").rstrip("_").partition(": ")[2]
+                for line in done.stderr.splitlines() if "no effect" in line]
+    model = pw.Model("pendulum")
+    for call in (lambda: model.run(method, t_end=0.1, **settings), lambda: model.open(method, **settings),
+                 lambda: pw.sweep(model, {"m": [1, 2, 3]}, method=method, t_end=0.1, **settings)):
+        with warnings.catch_warnings(record=True) as shown:
+            warnings.simplefilter("always")
+            with contextlib.suppress(pw.InputError):
+                call()
+        assert [str(w.message) for w in shown] == expected
+        assert all(w.filename in (__file__, pw.model.__file__, pw.studies.__file__) for w in shown)
+
+
+def test_specialised_code_that_is_impossible_is_reported():
+    with pytest.warns(UserWarning, match="general engine: .*specialised code has at most"):
+        pw.Model("chain", n=200).run(t_end=0.01, specialise="always")
 
 
 @pytest.mark.parametrize("model, method, settings", [
@@ -168,6 +258,7 @@ def test_functions_with_specialised_code():
     assert np.allclose(r["frame.x"], general["frame.x"], rtol=0, atol=1e-13)
 
 
+@pytest.mark.filterwarnings("ignore:general engine")
 def test_models_without_specialised_code_run():
     r = pw.Model("chain", n=200).run(t_end=0.01, specialise="always")
     assert r.status == "ok" and r.statistics["specialised"] == 0
@@ -198,16 +289,6 @@ def test_archives_have_the_numbers_of_tables(tmp_path):
             assert np.array_equal(archive[name], expected[name]), name
 
 
-def test_units_are_those_of_the_program(tmp_path):
-    program("run", "ezyroller", "--t-end", "0.1", "-o", str(tmp_path / "t.csv"))
-    header = next(csv.reader(open(tmp_path / "t.csv", encoding="utf-8")))
-    r = pw.Model("ezyroller").run(t_end=0.1)
-    for cell in header:
-        name, _, unit = cell.partition(" [")
-        if name in r:
-            assert r.units[name] == unit.rstrip("]"), name
-
-
 def test_columns_are_views():
     r = pw.Model("pendulum").run(t_end=1, every=0.1)
     assert r["bob.x"].base is r.rows or np.shares_memory(r["bob.x"], r.rows)
@@ -217,13 +298,34 @@ def test_columns_are_views():
 def test_ctrl_c_keeps_the_samples():
     timer = threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT))
     # started when the run has begun: before, specialised code may be compiled
-    r = pw.Model("ezyroller").run(t_end=1e5, progress=lambda done: timer.ident or timer.start())
+    with pytest.raises(KeyboardInterrupt) as raised:
+        pw.Model("ezyroller").run(t_end=1e5, progress=lambda done: timer.ident or timer.start())
+    r = raised.value.result
     assert r.status == "stopped" and 0 < r.t[-1] < 1e5 and "interrupted" in r.reason
 
 
 def test_failures_keep_the_samples():
     r = pw.Model("ezyroller").run("erk8+projection", rtol=1e-12, max_steps=20)
     assert r.status == "failed" and "max_steps" in r.reason.replace("-", "_") and len(r) > 2
+
+
+def test_tables_that_do_not_cover_the_run_are_reported(tmp_path):
+    def torque(**table):
+        return pw.describe(bodies=[pw.Body("a", mass=1, inertia=1)],
+                           elements=[pw.Torque("T", body=["a", "ground"], value={"table": {"points": [[0, 1], [4000, 1]], **table}})])
+    model = torque(time_scale=1e-3)
+    with pytest.warns(UserWarning, match="torque T: value: the table has times from 0 to 4 s and covers 40 % of the run, which ends at 10 s"):
+        model.run(t_end=10)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        model.run(t_end=4)
+        torque(time_scale=1e-3, time_offset=-1).run(t_end=3)
+    (tmp_path / "M.csv").write_text("t;M\n0;1,5\n1;\n10;2,5\n")
+    (tmp_path / "m.yaml").write_text("pinwheel: 1\nbodies: [{name: a, mass: 1, inertia: 1}]\n"
+                                     "elements: [{torque: T, body: [a, ground], value: {table: {file: M.csv, time: t}}}]\n")
+    with pytest.warns(UserWarning, match="torque T: value: 1 row with empty cells is left out of the table"):
+        r = pw.Model(tmp_path / "m.yaml").run("rk4", t_end=10, step=0.1)
+    assert r["a.omega"][-1] == pytest.approx(20)
 
 
 def test_changed_initial_values_are_reported():
@@ -295,12 +397,45 @@ def test_notebook_shows_the_animation():
     assert page.startswith("<iframe srcdoc=") and "pendulum" in page
 
 
+def shown_in_a_notebook(page, script, folder):
+    """What a browser has in an element "verdict" at the end of a script that waits for a page inside another one."""
+    browser = os.environ.get("BROWSER") or next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if browser is None:
+        pytest.skip("no browser")
+    (folder / "notebook.html").write_text(f"""<!DOCTYPE html><html><body>{page}<pre id="verdict"></pre><script>
+        (async () => {{
+          const frame = document.querySelector("iframe"), $ = id => frame.contentDocument.getElementById(id);
+          const until = async good => {{ for (let i = 0; i < 500 && !good(); i++) await new Promise(done => setTimeout(done, 20)); }};
+          const root = () => frame.contentDocument?.documentElement?.dataset || {{}};
+          {script}
+        }})();</script></body></html>""", encoding="utf-8")
+    done = subprocess.run([browser, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={folder}/profile", "--virtual-time-budget=30000",
+                           "--enable-logging=stderr", "--v=0", "--dump-dom", f"file://{folder}/notebook.html"], capture_output=True, text=True, timeout=120)
+    assert ":CONSOLE" not in done.stderr, done.stderr
+    return re.search(r'<pre id="verdict">(.*?)</pre>', done.stdout, re.S).group(1)
+
+
+def test_the_page_of_a_notebook_computes(tmp_path):
+    """An iframe with srcdoc, which has no address of its own."""
+    text = shown_in_a_notebook(pw.Model("pendulum", l=1.5)._repr_html_(), """
+        await until(() => root().simulated === "yes");
+        const field = document.querySelector("iframe").contentDocument.querySelector('#parameters input[type=number][data-name="l"]');
+        const before = field.value;
+        root().simulated = "";
+        field.value = 2;
+        field.dispatchEvent(new Event("change", { bubbles: true }));
+        await until(() => root().simulated === "yes");
+        document.getElementById("verdict").textContent = [before, root().simulated, $("page-link").hidden, $("reason").textContent].join("|");""", tmp_path)
+    assert text == "1.5|yes|true|"
+
+
 def test_notebook_shows_the_animation_of_the_settings_that_were_used(tmp_path, monkeypatch):
     words = []
     monkeypatch.setattr(pw.results._program, "run", lambda given: words.extend(given) or (tmp_path / "no page").read_text())
     with pw.Model("pendulum").open(step="2e-3") as simulation:
         r = simulation.record(1)
     r._repr_html_()
+    monkeypatch.undo()
     assert r.settings["step"] == 0.002 and "--step=0.002" in words
     with pw.Model("ezyroller").open(inputs={"rider": 0.1}) as simulation:
         assert "cannot set inputs" in simulation.record(1)._repr_html_()
@@ -332,7 +467,7 @@ def test_a_sweep_of_which_all_runs_fail_has_its_columns():
 
 
 def table_of_sweep(path):
-    rows = list(csv.reader(line for line in open(path, encoding="utf-8") if not line.startswith("#")))
+    rows = list(csv.reader(line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")))
     columns = {}
     for name, column in zip(rows[0], zip(*rows[1:])):
         try:

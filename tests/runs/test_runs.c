@@ -122,6 +122,7 @@ SCENE (runs_loose) {
 SCENE (runs_hanging) {
   runs_loose (m, parameter);
   pw_add_pin (m, &(pw_pin){ .name = "P", .body = { "loose", "ground" } });
+  pw_add_torque (m, &(pw_torque){ .name = "T", .body = { "loose", "ground" } });
 }
 
 /* Of a pinned body only the angle is not determined. */
@@ -133,8 +134,8 @@ TEST (massless) {
     { &runs_loose_table,
       "model scene: loose.x has no mass, and no constraint determines how it moves; give it mass, or constrain it" },
     { &runs_hanging_table,
-      "model scene: loose.phi has no inertia, and no constraint determines how it moves; give it inertia, or constrain "
-      "it" },
+      "model scene: loose.phi has no inertia, and no constraint determines how it moves, although torque T depends on "
+      "it; give it inertia, or constrain it" },
   };
   for (size_t k = 0; k < sizeof scene / sizeof *scene; k++) {
     pw_error error = { 0 };

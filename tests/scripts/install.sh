@@ -19,6 +19,10 @@ report 'install' $?
 cd "$work" && unset PINWHEEL_MODELS
 "$top/bin/pinwheel" run ezyroller --t-end 1 >"$work/log" 2>&1
 report 'the program runs an installed model' $?
+for model in ezyroller car; do
+  "$top/bin/pinwheel" page $model -o "$model.html" 2>"$work/log" && [ -s "$model.html" ] || grep -q 'built without the engine' "$work/log"
+  report "its page: $model" $?
+done
 "$top/bin/pinwheel" list models >"$work/log" 2>&1 && grep -q '^ *chaplygin-sleigh' "$work/log"
 report 'the program lists the installed models' $?
 

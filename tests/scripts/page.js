@@ -17,23 +17,27 @@
   try {
     await until("the first run", () => root.simulated === "yes");
     await until("its error", () => root.estimated !== undefined);
-    const run = engine.run, ends = [], end = settings.end; /* ends: final times of the runs */
-    const count = function (s, limit) { ends.push(s.end); return run.call(engine, s, limit); };
-    engine.run = count;
+    const call = engine.call, ends = [], end = settings.end; /* ends: final times of the runs */
+    const count = (name, s, ...rest) => { if (name === "run") ends.push(s.end); return call.call(engine, name, s, ...rest); };
+    engine.call = count;
     simulate();
+    await until("a run", () => root.simulated === "yes");
     settings.end = end / 2;
     await until("the run of reference", () => ends.length === 2);
     settings.end = end;
     if (ends[1] !== end) throw new Error("the reference has other settings than the run: " + ends);
     simulate();
-    engine.run = () => { throw new Error("as wanted"); };
+    await until("a run", () => root.simulated === "yes");
+    engine.call = () => Promise.reject(new Error("as wanted"));
     simulate();
-    engine.run = count;
+    await until("a failure", () => root.simulated === "error");
+    engine.call = count;
     await new Promise(done => setTimeout(done, 500));
     if (ends.length !== 3) throw new Error("the error of a run is estimated after another one has failed");
-    engine.run = run;
-    for (const m of page.methods) await change("#page-method", m.name, "change");
+    engine.call = call;
     if (!page.methods.some(m => m.name === "erk8+nullspace")) throw new Error("a method is missing");
+    if (window.checkPlot) await checkPlot(change, until);
+    if (window.checkWorker) await checkWorker(change, until);
     await change("#page-method", "erk5+projection", "change");
     await change("#page-accuracy", "-9", "input");
     await change('#parameters input[type=number][data-name="' + wanted.name + '"]', wanted.value, "change");

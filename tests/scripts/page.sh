@@ -1,6 +1,7 @@
 #!/bin/sh
 # Interactive pages: in a headless browser, tests/scripts/page.js changes a parameter, the method and the tolerance, and
-# the values that the page displays at the end are those of the program.  Reads PINWHEEL, BROWSER.
+# the values that the page displays at the end are those of the program; page-checks.js checks the plot, the Worker, and the
+# layout on phones.  Reads PINWHEEL, BROWSER.
 
 . "$(dirname "$0")/../support/report.sh"
 here=$(cd "$(dirname "$0")" && pwd)
@@ -17,13 +18,25 @@ if "$pinwheel" page snakeboard -o "$work/snakeboard.html" 2>"$work/log"; then :;
   exit $bad
 fi
 
-# browse PAGE: the verdict of page.js in $work/verdict, messages in $work/console
-browse () {
-  { sed '$d' "$1" | sed '$d'; echo '<script>'; cat "$here/${script:-page.js}"; echo '</script></body></html>'; } >"$work/use.html"
+# The browser writes the document when it is loaded, that is, not before this frame is closed, with the verdict.
+hold='<script>{ const hold = document.createElement("iframe"); hold.hidden = true; document.body.append(hold);
+  hold.contentDocument.open();
+  const timer = setInterval(() => { if (document.getElementById("verdict")) { clearInterval(timer); hold.contentDocument.close(); } }, 50); }</script>'
+
+# show PAGE: its verdict in $work/verdict, messages in $work/console
+show () {
   timeout 120 "$browser" --headless --no-sandbox --disable-gpu --user-data-dir="$work/profile" --window-size=1200,800 \
-    --virtual-time-budget=30000 --enable-logging=stderr --v=0 --dump-dom "file://$work/use.html" >"$work/dom" 2>"$work/messages"
+    --enable-logging=stderr --v=0 --dump-dom "file://$1" >"$work/dom" 2>"$work/messages"
   grep ':CONSOLE' "$work/messages" >"$work/console"
-  sed -n '/<pre id="verdict">/,/<\/pre>/p' "$work/dom" | sed 's/<[^>]*>//g' >"$work/verdict"
+  sed -n '/<pre id="verdict">/,/<\/pre>/p' "$work/dom" | sed 's/.*<pre id="verdict">//; s/<[^>]*>//g' >"$work/verdict"
+}
+
+# browse PAGE SCRIPT...: shows it with these scripts at its end
+browse () {
+  file=$1
+  shift
+  { sed '$d' "$file" | sed '$d'; echo "$hold<script>"; cat "$@"; echo '</script></body></html>'; } >"$work/use.html"
+  show "$work/use.html"
 }
 
 # same NAME: the positions in $work/verdict are those of $work/run.json, to 9 of the 10 digits displayed, and to 1e-10 in the table
@@ -41,7 +54,7 @@ same () {
   report "$1: displays the values of the program" $?
 }
 
-# try NAME MODEL PARAMETER VALUE T_END [OPTION...]
+# try NAME MODEL PARAMETER VALUE T_END [OPTION...]: with page-checks.js if $checks is set, without what $forbidden matches
 try () {
   name=$1 model=$2 parameter=$3 value=$4 t_end=$5
   shift 5
@@ -50,17 +63,19 @@ try () {
   ! grep -Eq '(src|href)=|https?://|@import|\bNaN\b' "$work/page.html" && tail -n 1 "$work/page.html" | grep -q '</html>'
   report "$name: it is complete and needs nothing else" $?
   [ -n "$browser" ] || { echo "# skipped: no browser was found to show it"; return; }
-  sed -i "s|</head>|<script>const wanted = { name: \"$parameter\", value: $value };</script></head>|" "$work/page.html"
-  browse "$work/page.html"
+  sed -i "s|</head>|<script>const wanted = { name: \"$parameter\", value: $value };</script></head>|${forbidden:+; s/$forbidden//}" "$work/page.html"
+  browse "$work/page.html" ${checks:+"$here/page-checks.js"} "$here/page.js"
   "$pinwheel" run "$model" --set "$parameter=$value" --t-end "$t_end" "$@" --method erk5+projection --rtol 1e-9 --json "$work/run.json" >/dev/null 2>&1
   same "$name"
-  [ ! -s "$work/console" ]
+  [ "$forbidden" ] || [ ! -s "$work/console" ]
   report "$name: nothing on the console" $?
   cat "$work/console"
 }
 
+checks= forbidden=
 try snakeboard snakeboard swing 0.55 10
-try 'a model in C' models/ezyroller.c a 0.7 10
+checks=yes try 'a model in C' models/ezyroller.c a 0.7 10
+forbidden='worker-src blob:;' try 'without Workers' models/ezyroller.c a 0.7 10
 try 'sliders whose ends are moved' models/slider-crank.c l1 1.2 1
 try 'redundant constraints' models/redundant-parallelogram.c l 1.25 3
 try 'initial values of --start' pendulum m 2 1 --start bob.vy=2
@@ -101,10 +116,13 @@ cat >"$work/reach.js" <<'J'
   image.src = "https://example.org/x.png";
   try { new WebSocket("wss://example.org/"); } catch (error) { /* counted */ }
   try { eval("document.title = 'taken'"); } catch (error) { /* counted */ }
+  const code = "fetch('https://example.org/').then(() => postMessage('taken'), () => postMessage('refused'))";
+  const worker = new Worker(URL.createObjectURL(new Blob([code])));
+  const said = await new Promise(done => { worker.onmessage = e => done(e.data); });
   await new Promise(done => setTimeout(done, 300));
   const pre = document.createElement("pre");
   pre.id = "verdict";
-  pre.textContent = [refused, document.title, document.querySelectorAll("img, b").length, $("about").textContent.slice(0, 9)].join(" ");
+  pre.textContent = [refused, document.title, document.querySelectorAll("img, b").length, $("about").textContent.slice(0, 9), said].join(" ");
   document.body.append(pre);
 })();
 J
@@ -113,11 +131,35 @@ J
 report 'pages of a model with hostile texts are written' $?
 for page in page animation; do
   [ -n "$browser" ] || break
-  here=$work script=reach.js
-  browse "$work/$page.html"
-  grep -q '4 hostile . Pinwheel 0 &lt;/script' "$work/verdict"
+  browse "$work/$page.html" "$work/reach.js"
+  grep -q '4 hostile . Pinwheel 0 &lt;/script.* refused' "$work/verdict"
   report "$page: hostile texts are texts; fetch, image, socket and eval are refused" $?
   cat "$work/verdict"
+done
+
+# On phones, in a frame without an address, as in notebooks; a browser's window has 500 pixels at least.
+"$pinwheel" page chaplygin-sleigh -o "$work/page.html" 2>"$work/log" &&
+  "$pinwheel" run chaplygin-sleigh --animate "$work/animation.html" >/dev/null 2>>"$work/log"
+report 'pages for phones are written' $?
+for kind in page animation; do
+  [ -n "$browser" ] || break
+  { sed '$d' "$work/$kind.html" | sed '$d'; echo '<script>'; cat "$here/page-checks.js"
+    cat <<'J'; echo '</script></body></html>'; } | sed 's/&/\&amp;/g; s/"/\&quot;/g' >"$work/phone.text"
+(async () => {
+  const root = document.documentElement.dataset, done = () => root.ready && (!window.start_page || root.simulated === "yes");
+  for (let i = 0; i < 500 && !done(); i++) await later(20);
+  const pre = parent.document.createElement("pre");
+  pre.id = "verdict";
+  pre.textContent = done() ? await checkPhone() : "not ready: " + $("reason").textContent;
+  parent.document.body.append(pre);
+})();
+J
+  { echo '<!DOCTYPE html><html><body>'; printf '<iframe width="390" height="780" srcdoc="'; cat "$work/phone.text"
+    echo "\"></iframe>$hold</body></html>"; } >"$work/phone.html"
+  show "$work/phone.html"
+  cp "$work/verdict" "$work/log"
+  grep -Eq '^390 [1-9][0-9]* good' "$work/verdict" && [ ! -s "$work/console" ]
+  report "$kind: on a phone, picture and sliders are visible together, sliders are 40 px high, no help for keyboards" $?
 done
 
 "$pinwheel" page "$work/table.yaml" --t-end 5 -o "$work/table.html" 2>"$work/log"
@@ -126,9 +168,25 @@ report 'the page contains the tables of its model' $?
 grep -q '"method": "erk8+projection"' "$work/table.html"
 report 'a default method of a model that pages do not have is replaced' $?
 
-"$pinwheel" page ezyroller -o "$work/x.html" 2>"$work/log"
-[ $? = 2 ] && grep -q 'name its source, a .c file; .* installed in share/doc/pinwheel/examples' "$work/log"
-report 'a compiled model without its source is refused' $?
+grep -q '"method": "erk8+projection"' "$work/page.html"
+report 'a page begins with a method that chooses its steps, although the model has another one' $?
+"$pinwheel" page pendulum -o "$work/page.html" --method rk4+nullspace && grep -q '"method": "rk4+nullspace"' "$work/page.html" &&
+  "$pinwheel" page pendulum -o "$work/page.html" --step 0.01 && grep -q '"method": "rk4+projection"' "$work/page.html"
+report 'but with the method of --method, and that of the model for --step' $?
+
+# The name of a model suffices, in any folder, if the source lies next to the plug-in.
+for model in $("$pinwheel" list models | sed -n 's|.*models/\([a-z0-9-]*\)\.so$|\1|p'); do
+  (cd "$work" && "$pinwheel" page "$model" -o here.html) >"$work/log" 2>&1 || echo "$model: $(cat "$work/log")"
+done >"$work/failures"
+mv "$work/failures" "$work/log"
+[ ! -s "$work/log" ] && [ -s "$work/here.html" ]
+report 'pages of all compiled models of the gallery by their names, from another folder' $?
+mkdir "$work/alone" && cp "$(dirname "$pinwheel")/models/ezyroller.so" "$work/alone/alone.so"
+for model in alone "$work/alone/alone.so" "$(dirname "$pinwheel")/models/ezyroller.so"; do
+  PINWHEEL_MODELS=$work/alone "$pinwheel" page "$model" -o "$work/x.html" 2>"$work/log"
+  [ $? = 2 ] && grep -q '\.so: .* name its source, a .c file; .* installed in share/doc/pinwheel/examples' "$work/log" && [ ! -e "$work/x.html" ]
+  report "a compiled model without its source, or one by its path, is refused: ${model##*/}" $?
+done
 "$pinwheel" page snakeboard --method ida+ggl -o "$work/x.html" 2>"$work/log"
 [ $? = 2 ] && grep -q 'pages have rk4, erk5 and erk8' "$work/log" && [ ! -e "$work/x.html" ]
 report 'a method that pages do not have is refused' $?

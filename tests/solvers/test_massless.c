@@ -1,7 +1,8 @@
 /* Massless coordinates follow the constraints: projections do not move massive coordinates instead, whatever the
- * units and the masses of other bodies. */
+ * units and the masses of other bodies.  An angle that nothing turns needs no inertia. */
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 #include "check.h"
 #include "runs.h"
 #include "scene.h"
@@ -129,4 +130,84 @@ TEST (agree) {
     massless_agree (&massless_chain_table, methods[i]);
     massless_agree (&massless_car_table, methods[i]);
   }
+}
+
+/* ---- Point masses: nothing turns them, whatever their inertia ---- */
+
+typedef struct {
+  double inertia;
+} points;
+
+static const pw_parameter points_list[] = {
+  { PW_AT (points, inertia), 0, "kg m^2", "of the point masses", PW_NONNEGATIVE },
+  { .name = NULL },
+};
+
+/* Two point masses, one pinned to an arm, and a massless node that a spring pulls. */
+SCENE_WITH (points_scene, points_list, points) {
+  double I = p->inertia;
+  pw_add_body (m, &(pw_body){ .name = "arm", .mass = 1, .inertia = 0.2, .start = { 0.5, 0, 0 } });
+  pw_add_body (m, &(pw_body){ .name = "a", .mass = 1, .inertia = I, .start = { 1, 0, 0.5 }, .rate = { 0, 0, 3 } });
+  pw_add_body (m, &(pw_body){ .name = "b", .mass = 2, .inertia = I, .start = { 1, -1, 0 } });
+  pw_add_body (m, &(pw_body){ .name = "node", .inertia = I, .start = { 2, -1, 0 }, .rate = { 0, 0, -1 } });
+  pw_add_pin (m, &(pw_pin){ .name = "O", .body = { "arm", "ground" }, .at = { { -0.5, 0 }, { 0, 0 } } });
+  pw_add_pin (m, &(pw_pin){ .name = "A", .body = { "arm", "a" }, .at = { { 0.5, 0 }, { 0, 0 } } });
+  pw_add_rod (m, &(pw_rod){ .name = "ab", .body = { "a", "b" }, .length = 1 });
+  pw_add_rod (m, &(pw_rod){ .name = "an", .body = { "a", "node" }, .length = sqrt (2) });
+  pw_add_rod (m, &(pw_rod){ .name = "bn", .body = { "b", "node" }, .length = 1 });
+  pw_add_spring (
+      m, &(pw_spring){ .name = "S", .body = { "node", "ground" }, .at = { { 0, 0 }, { 2, -2 } }, .stiffness = 30 });
+  pw_add_drag (m, &(pw_drag){ .name = "D", .body = "b", .linear = 0.3 });
+  pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 } });
+}
+
+/* The state at 1 s, its energy without the spin, and the energy balance. */
+static void points_at (const char *method, double inertia, double *q, double *v, double *balance) {
+  pw_system *s = scene_system (&points_scene_table, "inertia", inertia, NULL);
+  pw_run *r = runs_open (s, method, &(pw_settings){ .rtol = 1e-9, .step = 1e-3, .span = 1 });
+  pw_sample x = runs_to (r, 1);
+  const double *M = pw_system_mass (s);
+  double kinetic = 0;
+  for (int j = 0; j < 12; j++) kinetic += M[j] * x.v[j] * x.v[j] / 2;
+  for (int b = 1; b < 4; b++) assert_int_equal (pw_system_unturned (s, b), inertia == 0);
+  assert_int_equal (pw_system_unturned (s, 0), 0);
+  assert_true (M[5] == inertia);
+  check_close (method, x.kinetic, kinetic, 1e-12, "round-off");
+  memcpy (q, x.q, 12 * sizeof *q);
+  memcpy (v, x.v, 12 * sizeof *v);
+  *balance = x.balance;
+  runs_close (r, s);
+}
+
+TEST (points) {
+  const pw_method *m;
+  char method[40];
+  for (int i = 0; (m = runs_method (i, method)) != NULL; i++) {
+    double q[12], v[12], q1[12], v1[12], balance, balance1, worst = 0;
+    const double bound = m->adaptive ? 1e-5 : 100 * pow (1e-3, m->order);
+    points_at (method, 1, q1, v1, &balance1);
+    points_at (method, 0, q, v, &balance);
+    for (int j = 0; j < 12; j++) worst = fmax (worst, fmax (fabs (q[j] - q1[j]), fabs (v[j] - v1[j])));
+    check_below (method, worst, bound, "1e4 rtol, or 100 h^order");
+    check_close (method, balance, balance1, bound, "1e4 rtol, or 100 h^order");
+    check_close (method, q[5], 3.5, 1e-9, "round-off and the tolerance of a linear motion");
+    check_close (method, q[11], -1, 1e-9, "round-off and the tolerance of a linear motion");
+    check_close (method, v[5], 3, 1e-9, "round-off and the tolerance of a linear motion");
+  }
+}
+
+/* The steady motion is isolated, with the spins kept; the linearisation is that without the angles. */
+TEST (points_steady) {
+  pw_error error = { 0 };
+  pw_system *s = scene_system (&points_scene_table, NULL);
+  pw_steady *x = pw_steady_open (s, &(pw_steady_settings){ .vary = -1 }, &error);
+  pw_steady_motion motion;
+  check_ok (x ? PW_OK : error.status, &error);
+  assert_int_equal (pw_steady_solve (x, 1, 0, &motion, &error), PW_OK);
+  assert_int_equal (motion.family, 0);
+  check_close ("spin of a", motion.v[5], 3, 1e-9, "round-off");
+  assert_int_equal (motion.linear->unknowns, 4); /* the arm and the triangle turn */
+  for (int i = 0; i < 4; i++) assert_true (motion.linear->im[i] != 0);
+  pw_steady_close (x);
+  pw_system_free (s);
 }

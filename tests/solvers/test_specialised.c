@@ -250,6 +250,23 @@ TEST (arguments) {
   both_close (&x);
 }
 
+/* A point mass, whose angle nothing turns, on a rod from an arm. */
+SCENE (point_mass) {
+  pw_add_body (m, &(pw_body){ .name = "arm", .mass = 1, .inertia = 1, .start = { 0.5, 0, 0 } });
+  pw_add_body (m, &(pw_body){ .name = "bob", .mass = 1, .start = { 1, -1, 0 }, .rate = { 0, 0, 2 } });
+  pw_add_pin (m, &(pw_pin){ .name = "O", .body = { "arm", "ground" }, .at = { { -0.5, 0 }, { 0, 0 } } });
+  pw_add_rod (m, &(pw_rod){ .name = "R", .body = { "arm", "bob" }, .at = { { 0.5, 0 }, { 0, 0 } }, .length = 1 });
+  pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 } });
+}
+
+TEST (point_mass) {
+  both x;
+  both_open (&x, scene_system (&point_mass_table, NULL), "rk4+projection", &(pw_settings){ .step = 0.01, .span = 1 });
+  both_run (&x, 1);
+  assert_true (both_specialised (&x) >= 350);
+  both_close (&x);
+}
+
 /* Passing singular configurations, the guards leave some evaluations to the general engine, and the result is right. */
 TEST (singular) {
   both x;

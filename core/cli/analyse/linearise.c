@@ -117,6 +117,7 @@ static int linearise_run (pw_linearise_command *cmd, pw_error *error) {
   if (cmd->steady) return PW_OK;
   int status = pw_report_initial_state (&cmd->m, cmd->limit.seconds, error);
   if (cmd->t == 0 || status != PW_OK) return status;
+  pw_cli_report_tables (cmd->m.system, cmd->t);
   status = linearise_advance (cmd, error);
   return status == PW_OK ? pw_run_restart (cmd->r, NULL, NULL, error) : status;
 }
@@ -143,7 +144,7 @@ enum { LINEARISE_JSON = 1, LINEARISE_CSV, LINEARISE_NPZ, LINEARISE_PAGE };
 static int linearise_open_files (pw_linearise_command *cmd, pw_error *error) {
   enum { PATH = 4096 };
   const char *name = cmd->name, *slash = name ? strrchr (name, '/') : NULL, *last = slash ? slash + 1 : name;
-  if (last && (*last == 0 || strcmp (last, ".") == 0 || strcmp (last, "..") == 0))
+  if (last && (*last == 0 || strcmp (last, ".") == 0 || strcmp (last, "..") == 0 || pw_cli_names_file (last)))
     return pw_fail (error, PW_INPUT, "-o %s: expected a NAME, for NAME.json, NAME.csv and NAME.npz", name);
   if (name && strlen (name) + sizeof ".json" > PATH) return pw_fail (error, PW_INPUT, "-o: the name is too long");
   if (cmd->page_path && pw_animation_check ("--animate", cmd->page_path, error) != PW_OK) return error->status;

@@ -163,7 +163,7 @@ static int periodic_command (void *options, pw_error *error) {
   if (status == PW_OK) status = periodic_read_options (cmd, error);
   if (status == PW_OK)
     status = pw_figure_lock_folder (&cmd->line, &cmd->m, cmd->folder, "periodic", &cmd->files, error);
-  if (status == PW_OK) pw_report_model (&cmd->m);
+  if (status == PW_OK) pw_report_model (&cmd->m), pw_cli_report_tables (cmd->m.system, cmd->settings.period);
   if (status == PW_OK) status = periodic_compute (cmd, error);
   if (status == PW_OK && cmd->points) pw_periodic_print (cmd);
   if (status == PW_OK && cmd->points && cmd->folder) status = pw_periodic_write (cmd, error);

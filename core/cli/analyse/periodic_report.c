@@ -17,6 +17,7 @@ enum {
 };
 /* [SI units]  Smaller displacements, rotations, speeds and states are printed as 0, displacements also drawn as 0. */
 #define PERIODIC_SMALL 1e-9
+#define PERIODIC_WHOLE 1e-7 /* turns: the largest distance of a rotation from whole ones */
 
 /* The names of pw_periodic_event; PW_PERIODIC_END has none: it is not stored. */
 static const char *const periodic_events[] = { "point", "fold", "branch point", "period doubling", "Neimark-Sacker" };
@@ -42,7 +43,41 @@ static double periodic_round (double value) {
   return pw_rounded (value, PERIODIC_SMALL);
 }
 
+/* Change in one period of the angle of a body relative to the whole [rad], or of an internal coordinate: whole turns, or
+ * by a symmetry, since nothing depends on it.  i: number of the body; of the coordinate, from number `bodies` on. */
+static double periodic_rotation (const pw_system *s, const pw_periodic_orbit *o, int i) {
+  const int bodies = pw_system_bodies (s), j = i < bodies ? 3 * i + 2 : i + 2 * bodies;
+  return periodic_round (o->end[j] - o->q[j] - (i < bodies ? o->rotation : 0));
+}
+
+static int periodic_rotations (const pw_system *s) {
+  return pw_system_coordinates (s) - 2 * pw_system_bodies (s);
+}
+
+/* The name of what turns: a body, or a coordinate. */
+static const char *periodic_rotation_name (const pw_system *s, int i, char *text, size_t size) {
+  const int bodies = pw_system_bodies (s);
+  return i < bodies ? pw_system_body_name (s, i) : pw_system_state_name (s, i + 2 * bodies, text, size);
+}
+
 /* ---- Text ---- */
+
+static void periodic_print_rotations (const pw_system *s, const pw_periodic_orbit *o) {
+  char text[PW_NAME_BYTES];
+  int shown = 0;
+  for (int i = 0; i < periodic_rotations (s) && shown <= PERIODIC_MOST; i++) {
+    const double rotation = periodic_rotation (s, o, i), turns = rotation / (2 * PW_PI), whole = round (turns);
+    const char *name = periodic_rotation_name (s, i, text, sizeof text);
+    if (rotation == 0) continue;
+    printf (shown++ ? "                               " : "  relative to the whole        ");
+    if (shown > PERIODIC_MOST)
+      puts ("...");
+    else if (fabs (turns - whole) < PERIODIC_WHOLE)
+      printf ("%s: %.0f whole turn%s\n", name, whole, fabs (whole) == 1 ? "" : "s");
+    else
+      printf ("%s: a free rotation by %.6g rad\n", name, rotation);
+  }
+}
 
 static void periodic_print_multipliers (const pw_periodic_orbit *o, int symmetries) {
   int nontrivial = o->multipliers - o->trivial, shown = 0, shift = o->trivial > symmetries;
@@ -81,6 +116,7 @@ static void periodic_print_motion (const pw_periodic_command *cmd, const pw_peri
   printf (periodic_round (d.total) > 0 ? ": %.6g m along %s, %.6g m to its left\n" : "\n", periodic_round (d.along),
           pw_system_body_name (cmd->m.system, 0), periodic_round (d.left));
   printf ("  rotation per period          %.6g rad\n", periodic_round (o->rotation));
+  periodic_print_rotations (cmd->m.system, o);
   printf ("  mean speed                   %.6g m/s\n", periodic_round (d.total / o->period));
   periodic_print_multipliers (o, pw_periodic_symmetries (cmd->search));
   printf ("  stability                    %s\n", periodic_stability (o, text, sizeof text));
@@ -136,6 +172,7 @@ void pw_periodic_print (const pw_periodic_command *cmd) {
 /* ---- JSON ---- */
 
 static void periodic_point_json (const pw_periodic_command *cmd, const pw_periodic_orbit *o, pw_json *j) {
+  char text[PW_NAME_BYTES];
   int n = pw_system_coordinates (cmd->m.system);
   const periodic_displacement d = periodic_displace (o);
   j->line = 1;
@@ -147,6 +184,11 @@ static void periodic_point_json (const pw_periodic_command *cmd, const pw_period
   pw_json_number (j, "along", d.along);
   pw_json_number (j, "left", d.left);
   pw_json_number (j, "rotation", o->rotation);
+  pw_json_open (j, "rotations", '{');
+  for (int i = 0; i < periodic_rotations (cmd->m.system); i++)
+    pw_json_number (j, periodic_rotation_name (cmd->m.system, i, text, sizeof text),
+                    periodic_rotation (cmd->m.system, o, i));
+  pw_json_close (j, '}');
   pw_json_number (j, "residual", o->residual);
   pw_json_number (j, "iterations", o->iterations);
   pw_json_number (j, "growing", o->unstable);

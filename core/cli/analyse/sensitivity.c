@@ -177,14 +177,14 @@ static int sensitivity_csv (const void *context, FILE *f, pw_error *error) {
 
 /* The label of a curve of sensitivity_data. */
 static void sensitivity_label (const pw_sensitivity *sens, int output, int unknown, char *label, size_t size) {
-  char unit[SENSITIVITY_UNIT];
-  const char *name = sens->unknowns.list[unknown].name;
+  char unit[SENSITIVITY_UNIT], buffer[FIGURE_NAME + 4];
+  const char *name = pw_figure_name (sens->unknowns.list[unknown].name, buffer);
   if (sens->unknowns.list[unknown].value != 0) {
     pw_outcome_unit (&sens->outcomes, output, unit, sizeof unit);
-    snprintf (label, size, *unit ? "%.100s × ∂/∂%.100s [%s]" : "%.100s × ∂/∂%.100s", name, name, unit);
+    snprintf (label, size, *unit ? "%s × ∂/∂%s [%s]" : "%s × ∂/∂%s", name, name, unit);
   } else {
     sensitivity_unit (sens, output, unknown, unit);
-    snprintf (label, size, *unit ? "∂/∂%.100s [%s]" : "∂/∂%.100s", name, unit);
+    snprintf (label, size, *unit ? "∂/∂%s [%s]" : "∂/∂%s", name, unit);
   }
 }
 

@@ -49,6 +49,7 @@ int pw_unknowns_engine (pw_unknowns *u, double runs, int starts, pw_error *error
   if (starts > 1 && u->count > PW_UNKNOWNS_SOBOL_MOST)
     return pw_fail (error, PW_INPUT, "at most %d unknowns with more than one start; give --starts 1",
                     PW_UNKNOWNS_SOBOL_MOST);
+  pw_cli_report_tables (u->m->system, u->t_end);
   pw_cli_engine_open (&u->engine, u->m->system, u->when,
                       runs * starts * pw_method_steps (u->method, &u->settings, d.step, u->t_end));
   return PW_OK;

@@ -9,6 +9,8 @@
 
 /* ---- The data: columns of a table and their standard deviations ---- */
 
+#define FIT_LONGER 100. /* data that last longer than this many runs of the model have other units of time */
+
 /* The standard deviation of a column of data as given by --sigma: a number, or the name of a column of the table. */
 typedef struct {
   const char *text; /* NULL: not given */
@@ -68,6 +70,66 @@ static int data_check_sigma (pw_fit *fit, const fit_sigma *given, pw_error *erro
   return PW_OK;
 }
 
+#define FIT_TIMES "--data %s: its times, from %.15g to %.15g s,"
+
+/* Refuses times that are not those of the run, which does not begin before 0. */
+static int data_check_times (const pw_fit *fit, pw_error *error) {
+  const double t_end = fit->t_end, first = fit->first, last = fit->last;
+  if (first < 0)
+    return pw_fail (error, PW_INPUT, FIT_TIMES " begin before the run: --time-offset %.15g lets them begin at 0",
+                    fit->data_path, first, last, -first);
+  if (first > t_end)
+    return pw_fail (error, PW_INPUT,
+                    FIT_TIMES " are after the run, which ends at %.6g s: give --t-end, or --time-offset %.15g, which "
+                              "lets them begin at 0",
+                    fit->data_path, first, last, t_end, -first);
+  if (last > FIT_LONGER * t_end && fit->line.t_end == NULL)
+    return pw_fail (error, PW_INPUT,
+                    FIT_TIMES " last far longer than the run, which ends at %.6g s: give --time-scale 1e-3 if they are "
+                              "in ms, else --t-end",
+                    fit->data_path, first, last, t_end);
+  return PW_OK;
+}
+
+/* Reports which part of the run the data cover, and what is not used. */
+static void data_report (const pw_fit *fit) {
+  const double t_end = fit->t_end, covered = fmin (fit->last, t_end) - fit->first;
+  const int empty = fit->columns * fit->rows - fit->residuals;
+  if (covered < 0.9 * t_end || (fit->last > t_end * (1 + 1e-9) && fit->line.t_end == NULL))
+    pw_cli_say ("pinwheel: " FIT_TIMES " cover %.3g %% of the run, which ends at %.6g s%s\n", fit->data_path,
+                fit->first, fit->last, 100 * covered / t_end, t_end,
+                fit->line.t_end ? "" : "; runs end at the last datum");
+  if (empty || fit->untimed || fit->late)
+    pw_cli_say ("pinwheel: --data %s: left out are %s, %s without a time, %s after --t-end\n", fit->data_path,
+                PW_COUNTED (empty, "empty cell"), PW_COUNTED (fit->untimed, "row"), PW_COUNTED (fit->late, "row"));
+}
+
+/* Converts the times to seconds, and copies the rows of the table that have one, up to --t-end. */
+static int data_keep_rows (pw_fit *fit, double *table, int columns, pw_error *error) {
+  const double t_end = fit->line.t_end ? fit->t_end * (1 + 1e-9) : INFINITY;
+  double scale = 1, offset = 0;
+  int rows = fit->rows, kept = 0, timed = 0;
+  fit->table = pw_arena_alloc (&fit->arena, (size_t)columns * (size_t)rows * sizeof *table);
+  if (fit->table == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  if (pw_cli_number ("--time-scale", fit->time_scale_text, PW_POSITIVE, &scale, error) != PW_OK ||
+      pw_cli_number ("--time-offset", fit->time_offset_text, PW_REAL, &offset, error) != PW_OK)
+    return error->status;
+  for (int i = 0; i < rows; i++) {
+    table[i] = scale * (table[i] + offset / scale);
+    kept += table[i] <= t_end;
+    if (isnan (table[i])) continue;
+    if (timed++ == 0) fit->first = table[i];
+    fit->last = table[i];
+  }
+  for (int i = 0, k = 0; i < rows; i++) {
+    if (!(table[i] <= t_end)) continue;
+    for (int j = 0; j < columns; j++) fit->table[j * kept + k] = table[j * rows + i];
+    k++;
+  }
+  fit->rows = kept, fit->untimed = rows - timed, fit->late = timed - kept;
+  return timed ? data_check_times (fit, error) : pw_fail (error, PW_INPUT, "--data %s: no rows", fit->data_path);
+}
+
 /* Reads times, data, and columns of standard deviations. */
 static int data_read_table (pw_fit *fit, const fit_sigma *given, pw_error *error) {
   const size_t most = 1 + 2 * (size_t)fit->columns;
@@ -75,18 +137,19 @@ static int data_read_table (pw_fit *fit, const fit_sigma *given, pw_error *error
   int count = 1;
   if (column == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   const char **unit = column + most;
-  column[0] = "t", unit[0] = "s";
+  column[0] = fit->time_name ? fit->time_name : "t", unit[0] = "s";
   for (int i = 0; i < fit->columns; i++) column[count] = fit->column_name[i], unit[count++] = fit->column_unit[i];
   for (int i = 0; i < fit->columns; i++)
     if (isnan (given[i].number)) column[count] = given[i].text, unit[count++] = fit->column_unit[i];
-  fit->table = pw_read_columns (fit->data_path, column, unit, count, &fit->rows, error);
-  return fit->table ? PW_OK : error->status;
+  double *table = pw_read_columns (fit->data_path, column, unit, count, &fit->rows, error);
+  int status = table ? data_keep_rows (fit, table, count, error) : error->status;
+  free (table);
+  return status;
 }
 
 /* Reads the data, and sets the standard deviation of each datum. */
 static int data_read (pw_fit *fit, const fit_sigma *given, pw_error *error) {
   if (data_read_table (fit, given, error) != PW_OK) return error->status;
-  if (fit->rows == 0) return pw_fail (error, PW_INPUT, "--data %s: no rows", fit->data_path);
   size_t rows = (size_t)fit->rows, cells = (size_t)fit->columns * rows;
   fit->t = fit->table, fit->data = fit->table + rows;
   fit->sigma = pw_arena_alloc (&fit->arena, cells * sizeof *fit->sigma);
@@ -102,8 +165,6 @@ static int data_read (pw_fit *fit, const fit_sigma *given, pw_error *error) {
 
 /* Counts the data, each of which needs a positive standard deviation. */
 static int data_check (pw_fit *fit, pw_error *error) {
-  if (fit->t[0] < 0)
-    return pw_fail (error, PW_INPUT, "--data %s: time %g s is before the start of the run", fit->data_path, fit->t[0]);
   for (int i = 0; i < fit->columns * fit->rows; i++) {
     if (isnan (fit->data[i])) continue;
     fit->residuals++;
@@ -128,8 +189,7 @@ static int fit_read_data (pw_fit *fit, pw_error *error) {
 
 /* ---- The command ---- */
 
-#define FIT_RUNS 50.       /* usual number of runs of a search, to choose the engine */
-#define FIT_ITERATIONS 20. /* usual number of iterations of a search, to show progress */
+#define FIT_RUNS 50. /* usual number of runs of a search, to choose the engine */
 
 enum { FIT_TABLE = 2, FIT_SUMMARY }; /* indices in the list of files of fit_open */
 
@@ -153,8 +213,9 @@ static int fit_options (pw_fit *fit, pw_error *error) {
 
 /* Reads the data and the unknowns; runs end at the time of the last row. */
 static int fit_open_data (pw_fit *fit, pw_error *error) {
-  int status = fit_read_data (fit, error);
-  if (status == PW_OK) status = pw_unknowns_open (&fit->unknowns, &fit->line, &fit->model, error);
+  int status = pw_unknowns_open (&fit->unknowns, &fit->line, &fit->model, error);
+  fit->t_end = fit->unknowns.t_end;
+  if (status == PW_OK) status = fit_read_data (fit, error);
   if (status == PW_OK) status = pw_unknowns_read (&fit->unknowns, fit->free, error);
   if (status != PW_OK) return status;
   if (fit->residuals < fit->unknowns.count)
@@ -168,8 +229,8 @@ static int fit_open (pw_fit *fit, pw_error *error) {
   static const char *const figures[] = { "fit.dat", "fit.gp", "fit.svg", "fit.png", "fit.pdf", NULL };
   pw_use use[] = { PW_CLI_MODEL_USE,
                    { "--data", fit->data_path, PW_READS, NULL },
-                   { "-o", fit->table_path, PW_WRITES, NULL },
-                   { "--json", fit->json_path, PW_WRITES, NULL },
+                   { "-o", fit->table_path, PW_WRITES, pw_cli_csv },
+                   { "--json", fit->json_path, PW_WRITES, pw_cli_json },
                    { "--plots", fit->plots_path, PW_WRITES_INTO, figures } };
   int status = fit_options (fit, error);
   if (status == PW_OK) status = pw_cli_open (&fit->model, &fit->line, error);
@@ -180,7 +241,7 @@ static int fit_open (pw_fit *fit, pw_error *error) {
 
 static int fit_search (pw_fit *fit, pw_error *error) {
   pw_stop_catch ();
-  pw_progress_start (&fit->progress, pw_file_name (fit->model.file), "iterations", 0, FIT_ITERATIONS * fit->starts);
+  pw_progress_start (&fit->progress, pw_file_name (fit->model.file), "", 0, 1);
   int status = pw_fit_solve (fit, error);
   pw_progress_end (&fit->progress);
   pw_stop_release ();
@@ -194,6 +255,7 @@ static int fit_search (pw_fit *fit, pw_error *error) {
 static int fit_finish (pw_fit *fit, pw_error *error) {
   FILE *table = pw_files_stream (&fit->files, FIT_TABLE), *summary = pw_files_stream (&fit->files, FIT_SUMMARY);
   pw_error drawing = { 0 };
+  data_report (fit);
   pw_fit_print (fit);
   pw_unknowns_report (&fit->unknowns, fit->estimate);
   const int drawn = fit->plots_path ? pw_fit_draw (fit, &drawing) : PW_OK;
@@ -217,7 +279,6 @@ static int fit_command (void *options, pw_error *error) {
   if (status == PW_OK) status = fit_finish (fit, error);
   pw_files_close (&fit->files);
   pw_arena_free (&fit->arena);
-  free (fit->table);
   pw_unknowns_close (&fit->unknowns);
   pw_cli_close_model (&fit->model);
   return status;
@@ -227,6 +288,9 @@ static const struct poptOption fit_options_table[] = {
   PW_OPTION_GROUP ("Fit"),
   PW_TEXT_OPTION (pw_fit, data_path, "data", 0, "FILE.csv",
                   "Measured data: a table with t and columns named as those of `run`; empty cells are gaps"),
+  PW_TEXT_OPTION (pw_fit, time_name, "time", 0, "NAME", "Column of the times in the data (default t)"),
+  PW_TEXT_OPTION (pw_fit, time_scale_text, "time-scale", 0, "K", "Factor of these times, 1e-3 for ms"),
+  PW_TEXT_OPTION (pw_fit, time_offset_text, "time-offset", 0, "T", "Added to the scaled times [s]"),
   PW_TEXT_OPTION (pw_fit, columns_text, "columns", 0, "NAME,...", "Columns of the data to compare with the model"),
   PW_LIST_OPTION (pw_fit, free, "free", 0, "NAME[=LOW:HIGH]",
                   "Determine a parameter or initial value, such as frame.vx, within bounds if given; repeatable"),
@@ -243,6 +307,7 @@ static const struct poptOption fit_options_table[] = {
   PW_OPTION_GROUP ("Integration"),
   PW_TEXT_OPTION (pw_cli_line, method, "method", 'm', "METHOD",
                   "Integrator and stabilisation, see `pinwheel list methods`"),
+  PW_TEXT_OPTION (pw_cli_line, t_end, "t-end", 't', "T", "Leave out data after this time [s]"),
   PW_TEXT_OPTION (pw_cli_line, step, "step", 0, "H", "Step size of fixed-step methods [s]"),
   PW_TEXT_OPTION (pw_cli_line, rtol, "rtol", 0, "R", "Relative tolerance of adaptive methods"),
   PW_TEXT_OPTION (pw_cli_line, atol, "atol", 0, "A", "Absolute tolerance of every state"),

@@ -8,7 +8,7 @@
 typedef struct {
   pw_cli_line line;
   const char *data_path, *columns_text, *table_path, *json_path, *plots_path, *confidence_text, *starts_text,
-      *jobs_text;
+      *jobs_text, *time_name, *time_scale_text, *time_offset_text;
   const char **free, **sigma_texts;
   pw_cli_model model;
   pw_files files;
@@ -18,8 +18,11 @@ typedef struct {
   /* data */
   pw_arena arena;                          /* of all arrays but the table */
   const char **column_name, **column_unit; /* columns, ended by NULL */
-  double *table;                           /* as read: times, data, columns of standard deviations */
+  double *table;                           /* times, data, columns of standard deviations */
   int columns, rows;                       /* of the data */
+  int untimed, late;                       /* rows that are left out: without a time, after --t-end */
+  double first, last;                      /* times in the table, those after --t-end included [s] */
+  double t_end;                            /* of the run of the model, or --t-end [s] */
   const double *t;                         /* rows [s] */
   const double *data;                      /* columns x rows; NaN: none */
   double *sigma;                           /* columns x rows: standard deviations; 1 if not weighted */

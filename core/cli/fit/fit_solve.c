@@ -23,7 +23,7 @@
 #define SOLVE_EXACT 1e-8 /* norm of the residuals of an exact fit, relative to the initial one */
 #define SOLVE_ROUND_OFF 1e-12 /* the same, relative to the norm of the data: round-off of a run */
 #define SOLVE_TOLERANCE 1e-10 /* of GSL: relative step in u, and gradient */
-enum { SOLVE_ITERATIONS = 100 /* of a search, at most */ };
+enum { SOLVE_ITERATIONS = 100 /* of a search, at most */, SOLVE_USUAL = 20 /* to show progress */ };
 
 typedef struct {
   pw_fit *fit;
@@ -34,6 +34,7 @@ typedef struct {
   int known;          /* 1: the last run succeeded */
   int status;         /* PW_OK, or else the fit ends, with `error` */
   pw_error *error;
+  int searches; /* that have ended */
   double worst; /* largest norm of the residuals of the runs of this search that succeeded */
   double least; /* sum of squares at the best end of a search, fit->estimate; INFINITY: none is completed yet */
 } fit_solver;
@@ -145,13 +146,20 @@ static void solve_store (fit_solver *solver, double chi2) {
   memcpy (fit->fitted, solver->values, (size_t)fit->columns * (size_t)fit->rows * sizeof *fit->fitted);
 }
 
-/* `moved`: 1 if the last run is the position reached, the result if Ctrl-C comes before a search is completed. */
-static void solve_progress (fit_solver *solver, int moved, const gsl_multifit_nlinear_workspace *w) {
+/* The part of a search that is done after i iterations, of which SOLVE_USUAL are usual. */
+static double solve_part (double i) {
+  return i < SOLVE_USUAL ? 0.9 * i / SOLVE_USUAL : 1 - 0.1 * SOLVE_USUAL / i;
+}
+
+/* After iteration i.  `moved`: 1 if the last run is the position reached, the result if Ctrl-C comes before a search is
+ * completed. */
+static void solve_progress (fit_solver *solver, int i, int moved, const gsl_multifit_nlinear_workspace *w) {
   double norm = gsl_blas_dnrm2 (gsl_multifit_nlinear_residual (w));
   if (isnan (solver->fit->initial_chi2)) solver->fit->initial_chi2 = norm * norm;
   if (!isfinite (solver->least) && moved) solve_store (solver, norm * norm);
-  snprintf (solver->fit->progress.note, sizeof solver->fit->progress.note, "residual %.6g", norm);
-  pw_progress_at (&solver->fit->progress, solver->fit->iterations);
+  snprintf (solver->fit->progress.note, sizeof solver->fit->progress.note, "iteration %d, residual %.6g",
+            solver->fit->iterations, norm);
+  pw_progress_at (&solver->fit->progress, (solver->searches + solve_part (i)) / solver->fit->starts);
 }
 
 /* Iterates from u, where the last run was made.  Unlike gsl_multifit_nlinear_driver, it ends when derivatives cannot be
@@ -160,13 +168,13 @@ static void solve_progress (fit_solver *solver, int moved, const gsl_multifit_nl
 static int solve_iterate (fit_solver *solver, gsl_vector *u, gsl_multifit_nlinear_fdf *f,
                           gsl_multifit_nlinear_workspace *w) {
   int info, status = gsl_multifit_nlinear_init (u, f, w), more = status == GSL_SUCCESS;
-  if (more) solve_progress (solver, 1, w);
+  if (more) solve_progress (solver, 0, 1, w);
   for (int i = 1; i <= SOLVE_ITERATIONS && more; i++) {
     status = gsl_multifit_nlinear_iterate (w);
     if (solver->status != PW_OK) break;
     solver->fit->iterations++;
     if (status != GSL_SUCCESS && (status != GSL_ENOPROG || i == 1)) break;
-    solve_progress (solver, status == GSL_SUCCESS, w);
+    solve_progress (solver, i, status == GSL_SUCCESS, w);
     more = gsl_multifit_nlinear_test (SOLVE_TOLERANCE, SOLVE_TOLERANCE, 0, &info, w) == GSL_CONTINUE;
   }
   return status;
@@ -217,7 +225,8 @@ static void solve_searches (fit_solver *solver) {
     fit->ends[i * (1 + n)] = INFINITY;
     memcpy (fit->ends + i * (1 + n) + 1, start + i * n, n * sizeof *start);
   }
-  for (size_t i = 0; i < starts && solver->status == PW_OK; i++) solve_search (solver, w, fit->ends + i * (1 + n));
+  for (; solver->searches < fit->starts && solver->status == PW_OK; solver->searches++)
+    solve_search (solver, w, fit->ends + (size_t)solver->searches * (1 + n));
   free (start);
   if (w) gsl_multifit_nlinear_free (w);
   if (solver->status == PW_OK && !isfinite (solver->least))

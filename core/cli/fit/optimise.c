@@ -174,10 +174,11 @@ enum { OPTIMISE_RESULT = 1, OPTIMISE_SUMMARY }; /* indices in the list of files 
 
 static int optimise_open (pw_optimise *problem, pw_error *error) {
   static const char *const figures[] = { "optimise.dat", "optimise.gp",  "optimise.svg",
-                                         "optimise.png", "optimise.pdf", NULL };
+                                         "optimise.png", "optimise.pdf", NULL },
+                           *const texts[] = { ".yaml", ".yml", NULL };
   pw_use use[] = { PW_CLI_MODEL_USE,
-                   { "-o", problem->path, PW_WRITES, NULL },
-                   { "--json", problem->json_path, PW_WRITES, NULL },
+                   { "-o", problem->path, PW_WRITES, texts },
+                   { "--json", problem->json_path, PW_WRITES, pw_cli_json },
                    { "--plots", problem->plots_path, PW_WRITES_INTO, figures } };
   int status = pw_cli_open (&problem->model, &problem->line, error);
   problem->differentiable = 1;

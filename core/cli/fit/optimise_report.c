@@ -80,8 +80,12 @@ static void report_outputs (const pw_optimise *problem) {
 
 void pw_optimise_print (const pw_optimise *problem) {
   char options[PW_UNKNOWNS_OPTIONS];
+  /* a search from a start also ends at a result that continues from there */
+  const pw_search *best = problem->best, continued = { .feasible = 1, .to = best->from };
   int same = 0;
-  for (int i = 0; i < problem->starts; i++) same += pw_optimise_same (problem, problem->search + i, problem->best);
+  for (int i = 0; i < problem->starts; i++)
+    same += pw_optimise_same (problem, problem->search + i, best) ||
+            (best - problem->search >= problem->starts && pw_optimise_same (problem, problem->search + i, &continued));
   report_unknowns (problem);
   report_outputs (problem);
   printf ("\n%s from %s, %d of which %s\n", PW_COUNTED (problem->runs, "run"), PW_COUNTED (problem->starts, "start"),

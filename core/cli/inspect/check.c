@@ -33,17 +33,19 @@ static void check_open_run (pw_check *check) {
     check->redundant = pw_report_redundancies (check->run);
 }
 
-/* Initial values given by the model or the user that the consistent initialisation has changed. */
+/* Initial values specified by the model or given by the user that were changed by more than rounding. */
 static void check_given_values (pw_check *check) {
   const pw_system *s = check->model.system;
   const pw_initial_report *initial = pw_run_initial (check->run);
   for (int i = 0; i < 2 * pw_system_coordinates (s); i++) {
-    if (!pw_initial_moved (s, initial, i) || !pw_initial_specified (initial, i)) continue;
+    char reason[300];
+    if (pw_initial_moved (s, initial, i) < 2 || !pw_initial_specified (initial, i)) continue;
     pw_state_change c = pw_cli_state_change (s, initial, i);
     if (fabs (c.consistent) < 1e-12 * fabs (c.given)) c.consistent = 0; /* round-off */
-    check_add (&check->finding, "%s %s = %s %s, but the constraints require %s %s",
+    pw_run_initial_reason (check->run, i, reason, sizeof reason);
+    check_add (&check->finding, "%s %s = %s %s, which was changed to %s %s%s%s",
                pw_initial_given (initial, i) ? "--start gives" : "the model specifies", c.name, PW_DIGITS (c.given, 10),
-               c.unit, PW_DIGITS (c.consistent, 10), c.unit);
+               c.unit, PW_DIGITS (c.consistent, 10), c.unit, *reason ? "; otherwise " : "", reason);
   }
 }
 
@@ -64,6 +66,15 @@ static int check_reference (pw_check *check, pw_error *error) {
   }
   free (reference);
   return status;
+}
+
+/* Tables that do not cover the model's run, and rows of their files that are left out. */
+static void check_tables (pw_check *check) {
+  const pw_system *s = check->model.system;
+  const double t_end = pw_cli_defaults (pw_file_table (check->model.file)).t_end;
+  char notice[PW_NOTICE_BYTES];
+  for (int i = 0; i < pw_system_signals (s); i++)
+    if (*pw_system_table_notice (s, i, t_end, notice, sizeof notice)) check_add (&check->finding, "%s", notice);
 }
 
 /* ---- Element types ---- */
@@ -122,6 +133,36 @@ static int check_kinds (pw_check *check, pw_error *error) {
   return status;
 }
 
+/* ---- Wheels ---- */
+
+/* Wheels roll in the plane of the model.  Seen from above, no gravity acts in it, and on a slope of angle a that of
+ * g sin (a), which is below CHECK_SLOPE up to 45 degrees. */
+static const double CHECK_SLOPE = 7; /* m/s^2 */
+
+static void check_gravity (pw_check *check, const pw_element *gravity, const pw_element *wheel) {
+  const double *a = ((const pw_gravity *)gravity->definition)->acceleration, most = hypot (a[0], a[1]);
+  if (most > CHECK_SLOPE)
+    check_add (&check->finding,
+               "gravity %s acts with %s m/s^2 in the plane in which %s %s rolls: seen from above, gravity is "
+               "perpendicular to that plane and left out; on a slope of angle a it is 9.81 sin (a)",
+               pw_element_name (gravity), PW_DIGITS (most, 4), wheel->kind->name, pw_element_name (wheel));
+}
+
+static void check_wheels (pw_check *check) {
+  int count, prescribed = 0;
+  const pw_linear *linear = &check->linear;
+  const pw_element *element = pw_model_elements (check->model.model, &count), *wheel = NULL;
+  for (const pw_element *e = element; e < element + count; e++) {
+    if (wheel == NULL && e->kind->contact && (e->kind->rows || e->kind->force)) wheel = e;
+    prescribed |= e->kind->eta != NULL;
+  }
+  if (wheel == NULL) return;
+  for (const pw_element *e = element; e < element + count; e++)
+    if (strcmp (e->kind->name, "gravity") == 0) check_gravity (check, e, wheel);
+  if (check->run && linear->positions > 0 && linear->velocities == 0 && !prescribed)
+    check_add (&check->finding, "the wheels allow no motion; wheels that slip sideways are of type tyre");
+}
+
 /* ---- Linearisation ---- */
 
 /* The fastest eigenvalue, and the largest step of RK4 that is stable for all; both without rigid displacements. */
@@ -165,12 +206,14 @@ static int check_model (pw_check *check, pw_error *error) {
   check->rk4_limit = check->doubling_time = INFINITY;
   check->fastest = -1;
   pw_report_model (&check->model);
+  check_tables (check);
   check_open_run (check);
   if (check->run) {
     check_given_values (check);
     status = check_reference (check, error);
     if (status == PW_OK) status = check_linear (check, error);
   }
+  if (status == PW_OK) check_wheels (check);
   if (status == PW_OK) status = check_kinds (check, error);
   int out_of_memory = check->problem.out_of_memory || check->finding.out_of_memory;
   return status == PW_OK && out_of_memory ? pw_fail (error, PW_RESOURCE, "out of memory") : status;
@@ -191,7 +234,7 @@ enum { CHECK_JSON = 1 }; /* index in the list of files of check_command */
 static int check_command (void *options, pw_error *error) {
   pw_check *check = options;
   pw_files files = { .folder = { .made = 0 } };
-  pw_use use[] = { PW_CLI_MODEL_USE, { "--json", check->json_path, PW_WRITES, NULL } };
+  pw_use use[] = { PW_CLI_MODEL_USE, { "--json", check->json_path, PW_WRITES, pw_cli_json } };
   int status = pw_cli_open (&check->model, &check->line, error);
   if (status == PW_OK) status = pw_files_open (&files, &check->line, &check->model, use, 2, error);
   if (status == PW_OK) status = check_model (check, error);

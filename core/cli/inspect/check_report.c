@@ -123,9 +123,14 @@ static void report_mass (pw_json *j, const pw_check *check) {
     int which = (M[3 * b] == 0) + 2 * (M[3 * b + 2] == 0);
     const char *name = pw_system_body_name (s, b);
     if (which == 0) continue;
-    report_item (j, &listed, name, PW_PRINTED (300, "%s has %s", name, lack[which]));
+    const char *unturned = pw_system_unturned (s, b) ? ": nothing turns it, its angle is left out of the motion" : "";
+    report_item (j, &listed, name, PW_PRINTED (300, "%s has %s%s", name, lack[which], unturned));
   }
   report_end_list (j, listed);
+  report_section (j, "unturned", '[', NULL); /* those of them whose angle is left out */
+  for (int b = 0; b < pw_system_bodies (s); b++)
+    if (pw_system_unturned (s, b)) pw_json_text (j, NULL, pw_system_body_name (s, b));
+  pw_json_close (j, ']');
   report_text (j, "saddle-point matrix", "%s%s", condition ? condition : "not known", is_singular ? "; see below" : "");
   report_line (j);
   pw_json_text (j, "saddle_point", condition);
@@ -163,7 +168,7 @@ static void report_initial (pw_json *j, const pw_check *check) {
     report_print (j, "  consistent as described\n");
   else
     report_print (j, "  %d value%s changed%s\n", initial->moved, initial->moved == 1 ? " was" : "s were",
-                  initial->released ? ", including given ones, which cannot all be satisfied" : "");
+                  initial->released ? ", including given ones" : "");
   for (int i = 0; i < 2 * n; i++)
     if (pw_initial_moved (check->model.system, initial, i)) report_change (j, check, i, &listed);
   report_end_list (j, listed);

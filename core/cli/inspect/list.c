@@ -204,6 +204,9 @@ static void list_signal (pw_table *t, const pw_signal_form *s) {
   list_row (t, "points", "list", "", "[[TIME, VALUE], ...]; only in a text model");
   list_row (t, "file", "text", "", "CSV file in the model's folder, in place of `points`; only in a text model");
   list_row (t, "columns", "2 x text", "[1, 2]", "names or numbers of the columns of times and values in this file");
+  list_row (t, "time", "text", "1", "the column of times; `columns` then has that of values alone");
+  list_row (t, "time_scale", "number", "1 (> 0)", "factor of the times, such as 1e-3 for ms; only in a text model");
+  list_row (t, "time_offset", "number [s]", "0", "added to the scaled times; only in a text model");
 }
 
 static int list_signals (const char **name, pw_error *error) {

@@ -3,9 +3,9 @@
  * of its curves, seek() a time; $, number, raised, size, place, placement, save, count, bodies, colours, palette and circle
  * are from there, too. */
 
-/* ---- The engine: the model and the integrators, compiled to WebAssembly ---- */
+/* ---- The engine: the model and the integrators, compiled to WebAssembly.  Workers contain the code down to serve() ---- */
 
-const bytesOf = text => Uint8Array.from(atob(text), c => c.charCodeAt(0));
+function bytesOf (text) { return Uint8Array.from(atob(text), c => c.charCodeAt(0)); }
 
 /* What the engine imports: the clock, system calls that fail, and functions of libraries that it does not have, which stop
  * the run. */
@@ -21,13 +21,9 @@ function importsOf (module) {
   return imports;
 }
 
-const shortRun = 40, usualRun = 4000, longRun = 8000; /* limits of the computing time of a run [ms] */
-
 class Engine {
-  static async open (page) {
-    const module = await WebAssembly.compile(bytesOf(page.files.engine)), engine = new Engine();
-    engine.module = module;
-    engine.page = page;
+  static async open (page, module) {
+    const engine = Object.assign(new Engine(), { page, module });
     await engine.restart();
     return engine;
   }
@@ -36,11 +32,10 @@ class Engine {
   async restart () {
     this.wasm = (await WebAssembly.instantiate(this.module, importsOf(this.module))).exports;
     this.wasm._initialize();
-    for (const [name, text] of Object.entries(this.page.files))
-      if (name !== "engine") {
-        const bytes = bytesOf(text);
-        this.wasm.file(this.text(name), this.copy(bytes), bytes.length);
-      }
+    for (const [name, text] of Object.entries(this.page.files)) {
+      const bytes = bytesOf(text);
+      this.wasm.file(this.text(name), this.copy(bytes), bytes.length);
+    }
     if (this.wasm.open(this.text(this.page.name)) !== 0) throw new Error(this.error());
   }
 
@@ -76,8 +71,8 @@ class Engine {
   }
 
   /* The least of three computing times, without samples [ms]. */
-  time (s) {
-    return Math.min(...[1, 2, 3].map(() => this.integrate(s, longRun, 0).ms));
+  time (s, limit) {
+    return Math.min(...[1, 2, 3].map(() => this.integrate(s, limit, 0).ms));
   }
 
   /* A run for load(), with its computing time [ms] and statistics. */
@@ -109,11 +104,94 @@ class Engine {
     return { t: columns(0, 1), energy: columns(1, 6), motion: next(6 * scene.bodies.length),
       contact: next(3 * scene.wheels.length), force: next(2 * scene.links.length) };
   }
+
+  /* Calls a function of this class; if it fails, the next one has a new instance. */
+  async call (name, values) {
+    try {
+      return this[name](...values);
+    } catch (error) {
+      await this.restart();
+      throw error;
+    }
+  }
+}
+
+/* What a Worker does: opens an engine with its first message, and calls functions of it with the others. */
+function serve () {
+  let engine;
+  onmessage = async ({ data: { name, values } }) => {
+    try {
+      if (name === "open") engine = await Engine.open(...values);
+      const result = name === "open" ? null : await engine.call(name, values);
+      postMessage({ result }, Object.values(result ?? {}).filter(ArrayBuffer.isView).map(array => array.buffer));
+    } catch (error) {
+      postMessage({ error: error.message });
+    }
+  };
+}
+
+/* ---- The Worker, so that the page responds during a run ---- */
+
+const shortRun = 40, usualRun = 4000, longRun = 8000; /* limits of the computing time of a run [ms] */
+const patience = 1000; /* for the result of settings that have changed meanwhile [ms] */
+const interrupted = new Error("the settings have changed");
+
+/* An engine in a Worker; on this thread if the browser has no Workers.  One call follows the other. */
+class Service {
+  static async open ({ files: { engine, ...files }, ...page }) {
+    const service = new Service(), code = [bytesOf, importsOf, Engine, serve, "serve();"].join("\n");
+    service.page = { ...page, files };
+    service.url = URL.createObjectURL(new Blob(['"use strict";\n' + code], { type: "text/javascript" }));
+    service.module = await WebAssembly.compile(bytesOf(engine));
+    service.last = service.ready = service.start();
+    await service.ready;
+    return service;
+  }
+
+  async start () {
+    try {
+      this.worker = new Worker(this.url);
+      await this.send("open", [this.page, this.module]);
+    } catch (error) {
+      this.worker = null;
+      this.local = await Engine.open(this.page, this.module);
+    }
+  }
+
+  /* The promise of the result of a message. */
+  send (name, values) {
+    const worker = this.worker;
+    this.since = performance.now();
+    return new Promise((resolve, reject) => {
+      this.reject = name === "open" ? null : reject;
+      worker.onmessage = ({ data }) => data.error === undefined ? resolve(data.result) : reject(new Error(data.error));
+      worker.onerror = event => { event.preventDefault(); reject(new Error(event.message || "there is no Worker")); };
+      worker.postMessage({ name, values });
+    }).finally(() => { this.reject = null; });
+  }
+
+  /* The promise of the result of a function of the engine. */
+  call (name, ...values) {
+    const result = this.last.then(() => this.ready)
+      .then(() => this.worker ? this.send(name, values) : this.local.call(name, values));
+    this.last = result.catch(() => {});
+    return result;
+  }
+
+  /* Lets the present call fail if it has taken long, and replaces its Worker, which cannot be stopped otherwise. */
+  interrupt () {
+    if (!this.worker || !this.reject || performance.now() - this.since < patience) return;
+    this.worker.terminate();
+    const { reject } = this;
+    this.ready = this.start();
+    reject(interrupted);
+  }
 }
 
 /* ---- The panel ---- */
 
-/* page: the data of the model; settings: those of the panel; runs: { method, ms, error } in the plot. */
+/* page: the data of the model; settings: those of the panel; runs: { method, accuracy, others, link, ms, error } in the
+ * plot, in which `others` are the settings that are not those of the page, apart from method and accuracy. */
 let engine, page, settings, runs = [];
 
 const byName = name => page.methods.find(m => m.name === name);
@@ -129,7 +207,8 @@ function accuracy (s) {
  * page begins: indices of states depend on them. */
 function engineSettings (s) {
   const otherCounts = page.parameters.some((p, i) => p.domain === "count" && s.parameters[i] !== p.value);
-  return { ...s, parameters: [...s.parameters], initial: otherCounts ? [] : [...s.initial], step: accuracy(s), rtol: accuracy(s) };
+  return { ...s, parameters: [...s.parameters], initial: otherCounts ? [] : [...s.initial], step: accuracy(s), rtol: accuracy(s),
+    link: link(s) };
 }
 
 /* Adds a label with a slider and a field for a number; `change` is called with a new number. */
@@ -162,23 +241,25 @@ function control (parent, name, unit, about, value, low, high, step, change) {
   return { slider, number };
 }
 
-/* Sliders whose ends are still to be checked, each with its first value and a function that sets a value in settings. */
+/* Sliders whose ends are to be checked, each with its first value and a function that sets a value in settings. */
 let unchecked = [];
 
-/* Moves the ends of the next slider towards its first value, by half of the distance up to six times, then to that value,
- * until a run can begin there and does not fail within shortRun; then continues with the next slider. */
+/* Moves the ends of sliders towards their first values, by half of the distance up to six times, then to that value, until
+ * a run can begin there and does not fail within shortRun. */
 async function narrowSliders () {
-  const next = unchecked.shift();
-  if (!next) { document.documentElement.dataset.narrowed = true; return; }
-  const { slider, number, value, set } = next, valid = slider.step === "1" ? Math.round : x => x;
-  for (const end of ["min", "max"]) {
-    let x = Number(slider[end]);
-    for (let k = 0; x !== value && !await runsWith(set, x); k++) x = k < 6 ? valid(value + (x - value) / 2) : value;
-    slider[end] = Math[end](x, Number(number.value));
+  const sliders = unchecked;
+  for (const { slider, number, value, set } of sliders) {
+    const valid = slider.step === "1" ? Math.round : x => x;
+    for (const end of ["min", "max"]) {
+      let x = Number(slider[end]);
+      for (let k = 0; x !== value && !await runsWith(set, x); k++) x = k < 6 ? valid(value + (x - value) / 2) : value;
+      if (sliders !== unchecked) return; /* the panel has been filled again */
+      slider[end] = Math[end](x, Number(number.value));
+    }
+    slider.disabled = slider.min === slider.max;
+    if (slider.disabled) slider.title = "the model does not run with other values near this one";
   }
-  slider.disabled = slider.min === slider.max;
-  if (slider.disabled) slider.title = "the model does not run with other values near this one";
-  setTimeout(narrowSliders, 0);
+  document.documentElement.dataset.narrowed = true;
 }
 
 /* Whether the engine can run with the value x of a slider, at least until the limit of computing time stops it. */
@@ -186,10 +267,9 @@ async function runsWith (set, x) {
   const s = pageSettings();
   set(s, x);
   try {
-    return /^(stopped at.*)?$/.test(engine.integrate(engineSettings(s), shortRun, 0).reason);
+    return /^(stopped at.*)?$/.test((await engine.call("integrate", engineSettings(s), shortRun, 0)).reason);
   } catch (error) {
-    await engine.restart();
-    return false;
+    return error === interrupted ? runsWith(set, x) : false;
   }
 }
 
@@ -209,8 +289,9 @@ function fillPanel () {
   $("page-end").value = settings.end;
   for (const id of ["parameters", "states"]) while ($(id).querySelector("label")) $(id).querySelector("label").remove();
   const add = (parent, quantity, about, value, first, domain, set) => unchecked.push({ set, value: first,
-    ...control(parent, quantity.name, quantity.unit, about, value, ...rangeOf(first, domain), x => { set(settings, x); simulateSoon(); }) });
+    ...control(parent, quantity.name, quantity.unit, about, value, ...rangeOf(first, domain), x => { set(settings, x); simulate(); }) });
   unchecked = [];
+  delete document.documentElement.dataset.narrowed;
   page.parameters.forEach((p, i) => add($("parameters"), p, p.about, settings.parameters[i], p.value, p.domain,
     (s, x) => { s.parameters[i] = x; }));
   page.states.forEach((state, i) => add($("states"), state, "", settings.initial.get(i) ?? state.value, state.value, "real",
@@ -232,13 +313,6 @@ function fillAccuracy () {
 
 /* ---- Runs ---- */
 
-/* Simulates when the settings have not changed for 20 ms. */
-let timer = 0;
-function simulateSoon () {
-  clearTimeout(timer);
-  timer = setTimeout(simulate, 20);
-}
-
 /* The largest difference of x, y [m] and phi [rad] of the bodies at the end. */
 function difference (a, b) {
   let most = 0;
@@ -247,18 +321,34 @@ function difference (a, b) {
   return most;
 }
 
-/* Runs with the settings of the panel and shows the result; 300 ms later, if the run was complete and no other one has
- * followed, estimates its error. */
-let estimateTimer = 0;
-function simulate () {
-  const used = engineSettings(settings);
-  let result;
+/* Runs with the settings of the panel, and again if they have changed meanwhile. */
+let changes = 0; /* of settings */
+let simulating = false, estimateTimer = 0;
+async function simulate () {
+  if (!engine) return; /* not yet */
+  changes++;
   clearTimeout(estimateTimer);
   document.documentElement.dataset.simulated = "";
+  engine.interrupt();
+  if (simulating) return;
+  simulating = true;
   try {
-    result = engine.run(used, usualRun);
+    for (let last; last !== changes;) await showRun(last = changes);
+  } finally {
+    simulating = false;
+  }
+}
+
+/* Shows the result of the settings after this change, or after the next one if they have changed meanwhile: a slider that
+ * is dragged shows every run that is ready.  If they are the last ones and the run was complete, estimates its error
+ * 300 ms later. */
+async function showRun (change) {
+  const used = engineSettings(settings);
+  let result;
+  try {
+    result = await engine.call("run", used, usualRun);
   } catch (error) {
-    engine.restart();
+    if (change !== changes) return;
     $("reason").textContent = error.message + (run ? ". The run before it is still shown." : "");
     document.documentElement.dataset.simulated = "error";
     return;
@@ -267,24 +357,54 @@ function simulate () {
   if (run) { load(result); key(); seek(t); } else begin(result);
   showCost(result, null);
   showValues();
-  history.replaceState(null, "", "#" + link());
+  if (change !== changes) return;
+  if (!document.querySelector("#panel input:active")) setAddress();
   document.documentElement.dataset.simulated = "yes";
-  if (!result.reason) estimateTimer = setTimeout(() => estimate(result, used), 300);
+  if (!result.reason) estimateTimer = setTimeout(() => estimate(result, used, change), 300);
+}
+
+/* While a slider is held, the address does not change: browsers refuse more than a few changes per second. */
+function setAddress () {
+  try {
+    history.replaceState(null, "", "#" + link(settings));
+  } catch (error) {
+    $("page-link").hidden = true; /* in a frame of another document the page has no address of its own */
+  }
 }
 
 /* Estimates the error of the result of these settings by a reference: erk8+projection with a tolerance of 1e-13. */
-function estimate (result, used) {
+async function estimate (result, used, change) {
   try {
-    const reference = engine.run({ ...used, method: "erk8+projection", rtol: 1e-13 }, longRun);
-    if (reference.reason) return;
+    const reference = await engine.call("run", { ...used, method: "erk8+projection", rtol: 1e-13 }, longRun);
+    if (change !== changes || reference.reason) return;
+    result.ms = Math.max(await engine.call("time", used, longRun), 0.01); /* logarithmic axes have no 0 */
+    if (change !== changes) return;
     const error = difference(result, reference);
-    result.ms = Math.max(engine.time(used), 0.01); /* logarithmic axes have no 0 */
-    runs.push({ method: result.method, ms: result.ms, error: Math.max(error, 1e-16) });
+    addRun(used, result.ms, Math.max(error, 1e-16));
     showCost(result, error);
     document.documentElement.dataset.estimated = error;
-  } catch (error) {
-    engine.restart();
+  } catch (error) { /* without a reference, the error remains unknown */ }
+}
+
+/* Adds a run to the plot, in place of one with the same settings. */
+const mostRuns = 200;
+function addRun ({ method, step, link }, ms, error) {
+  const others = new URLSearchParams(link);
+  others.delete("method");
+  others.delete("accuracy");
+  const added = { method, accuracy: step, others: [...others].map(pair => pair.join(" = ")).join(", "), link, ms, error };
+  const same = r => ["method", "accuracy", "others"].every(key => r[key] === added[key]);
+  runs = [...runs.filter(r => !same(r)).slice(1 - mostRuns), added];
+}
+
+/* The runs by the same method with the same parameters, by accuracy: one list for each curve. */
+function curvesOfRuns () {
+  const curves = new Map();
+  for (const r of runs) {
+    const name = r.method + " " + r.others;
+    curves.set(name, [...(curves.get(name) || []), r]);
   }
+  return [...curves.values()].map(curve => curve.sort((a, b) => b.accuracy - a.accuracy));
 }
 
 function fillTable (id, list) {
@@ -313,15 +433,25 @@ function showValues () {
   fillTable("page-values", run.bodies.flatMap((body, b) => placement(b, at).map((x, k) => [body.name + [".x", ".y", ".phi"][k], x.toPrecision(10)])));
 }
 
-/* Error over computing time, both logarithmic; the last run is filled. */
+/* One colour for each method: warm ones for rk4, greens for erk5, blues for erk8; dashes by stabilisation. */
+const methodColours = ["#7a4f2a", "#cc6622", "#e0556a", "#b08a00", "#808080", "#2299bb", "#228833", "#66a61e",
+  "#5b45c8", "#d35fc6", "#3a74b4", "#aa3377"];
+function methodPen (method) {
+  const i = page.methods.findIndex(m => m.name === method);
+  return { colour: methodColours[i % methodColours.length], dash: dashes[i % dashes.length], sign: dashSigns[i % dashes.length] };
+}
+
+/* Error over computing time, both logarithmic; the last run is filled, curves of other parameters are faint. */
 function plotRuns () {
-  const area = size($("page-plot")), g = area.g, points = runs.slice(-60);
+  const area = size($("page-plot")), g = area.g, curves = curvesOfRuns(), last = runs[runs.length - 1];
   g.clearRect(0, 0, area.width, area.height);
-  if (points.length === 0) return;
-  const logs = pick => points.map(p => Math.log10(p[pick])), box = list => [Math.floor(Math.min(...list) - 0.2), Math.ceil(Math.max(...list) + 0.2)];
+  fillRunKey(curves);
+  if (!last) return;
+  const logs = pick => runs.map(p => Math.log10(p[pick])), box = list => [Math.floor(Math.min(...list) - 0.2), Math.ceil(Math.max(...list) + 0.2)];
   const [x0, x1] = box(logs("ms")), [y0, y1] = box(logs("error"));
   const X = x => 38 + (area.width - 48) * (x - x0) / (x1 - x0), Y = y => area.height - 26 - (area.height - 36) * (y - y0) / (y1 - y0);
   g.font = "11px system-ui, sans-serif";
+  g.lineWidth = 1;
   g.strokeStyle = colours.grid;
   g.fillStyle = colours.faint;
   g.beginPath();
@@ -334,21 +464,40 @@ function plotRuns () {
   g.stroke();
   g.textAlign = "center";
   g.fillText("error over computing time [ms]", area.width / 2, area.height - 2);
-  const colour = method => palette[page.methods.findIndex(m => m.name === method) % palette.length];
-  g.textAlign = "right";
-  [...new Set(points.map(p => p.method))].forEach((method, i) => { g.fillStyle = colour(method); g.fillText(method, area.width - 12, 16 + 13 * i); });
-  points.forEach((p, i) => {
-    g.strokeStyle = g.fillStyle = colour(p.method);
-    g.beginPath();
-    g.arc(X(Math.log10(p.ms)), Y(Math.log10(p.error)), i === points.length - 1 ? 5 : 3.5, 0, circle);
-    i === points.length - 1 ? g.fill() : g.stroke();
-  });
+  for (const curve of curves) {
+    const pen = methodPen(curve[0].method), points = curve.map(r => [X(Math.log10(r.ms)), Y(Math.log10(r.error))]);
+    g.strokeStyle = g.fillStyle = pen.colour;
+    g.lineWidth = 1.5;
+    g.globalAlpha = curve[0].others === last.others ? 1 : 0.35;
+    g.setLineDash(pen.dash);
+    strokePath(g, points);
+    g.setLineDash([]);
+    points.forEach(([x, y], i) => {
+      g.beginPath();
+      g.arc(x, y, curve[i] === last ? 5 : 3.5, 0, circle);
+      curve[i] === last ? g.fill() : g.stroke();
+    });
+  }
+  g.globalAlpha = 1;
+}
+
+/* The legend of the plot: a button for each curve, which sets the settings of its most accurate run. */
+function fillRunKey (curves) {
+  $("page-curves").replaceChildren(...curves.map(curve => {
+    const button = document.createElement("button"), pen = methodPen(curve[0].method), { link } = curve[curve.length - 1];
+    button.type = "button";
+    button.textContent = pen.sign + " " + curve[0].method + (curve[0].others && ": " + curve[0].others);
+    button.style.color = pen.colour;
+    button.title = "use the settings of its most accurate run";
+    button.addEventListener("click", () => use(link));
+    return button;
+  }));
 }
 
 /* ---- Links, files, controls ---- */
 
 /* What differs from the page's own settings, as in "method=rk4+projection&a=0.7&start.frame.x=1". */
-function link () {
+function link (settings) {
   const list = new URLSearchParams();
   if (settings.method !== page.method) list.set("method", settings.method);
   if (settings.accuracy !== null) list.set("accuracy", settings.accuracy);
@@ -359,9 +508,9 @@ function link () {
   return list.toString();
 }
 
-/* Sets the settings from the address of the page, as link() writes them. */
-function readLink () {
-  const list = new URLSearchParams(location.hash.slice(1)), number = (key, otherwise, low = -Infinity) => {
+/* Sets the settings from an address, as link() writes them. */
+function readLink (text) {
+  const list = new URLSearchParams(text), number = (key, otherwise, low = -Infinity) => {
     const text = (list.get(key) || "").trim(), x = Number(text);
     return text && isFinite(x) && x > low ? x : otherwise;
   };
@@ -373,6 +522,14 @@ function readLink () {
   page.states.forEach((state, i) => { const x = number("start." + state.name, null); if (x !== null) settings.initial.set(i, x); });
 }
 
+/* Simulates with the settings of an address. */
+function use (text) {
+  readLink(text);
+  fillPanel();
+  simulate();
+  narrowSliders();
+}
+
 function csv () {
   const names = run.bodies.flatMap(body => ["x [m]", "y [m]", "phi [rad]", "vx [m/s]", "vy [m/s]", "omega [rad/s]"].map(n => body.name + "." + n));
   const lines = [["t [s]", ...names].join(",")];
@@ -381,14 +538,16 @@ function csv () {
 }
 
 function addListeners () {
-  $("page-method").addEventListener("change", e => { settings.method = e.target.value; settings.accuracy = null; fillAccuracy(); simulateSoon(); });
+  $("page-method").addEventListener("change", e => { settings.method = e.target.value; settings.accuracy = null; fillAccuracy(); simulate(); });
   $("page-accuracy").addEventListener("input", e => {
     settings.accuracy = Number(Math.pow(10, Number(e.target.value)).toPrecision(3));
     $("page-accuracy-value").textContent = rounded(settings.accuracy);
-    simulateSoon();
+    simulate();
   });
-  $("page-end").addEventListener("change", e => { if (Number(e.target.value) > 0) { settings.end = Number(e.target.value); simulateSoon(); } });
-  $("page-reset").addEventListener("click", () => { settings = pageSettings(); runs = []; fillPanel(); simulate(); narrowSliders(); });
+  $("page-end").addEventListener("change", e => { if (Number(e.target.value) > 0) { settings.end = Number(e.target.value); simulate(); } });
+  $("panel").addEventListener("change", setAddress);
+  $("page-reset").addEventListener("click", () => { runs = []; use(""); });
+  $("page-clear").addEventListener("click", () => { runs = []; plotRuns(); });
   $("page-csv").addEventListener("click", () => save(page.name + ".csv", new Blob([csv()], { type: "text/csv" })));
   $("page-link").addEventListener("click", async () => {
     try {
@@ -401,7 +560,7 @@ function addListeners () {
   $("values").addEventListener("toggle", showValues);
   $("scrub").addEventListener("input", showValues);
   window.addEventListener("resize", plotRuns);
-  window.addEventListener("hashchange", () => { if (location.hash.slice(1) !== link()) { readLink(); fillPanel(); simulate(); narrowSliders(); } });
+  window.addEventListener("hashchange", () => { if (location.hash.slice(1) !== link(settings)) use(location.hash.slice(1)); });
 }
 
 /* Starts the page with the data that page.c writes. */
@@ -409,7 +568,7 @@ async function start_page (data) {
   page = data;
   $("model").textContent = page.name;
   $("about").textContent = page.about;
-  readLink();
+  readLink(location.hash.slice(1));
   fillPanel();
   addListeners();
   if (typeof WebAssembly !== "object") {
@@ -417,7 +576,7 @@ async function start_page (data) {
     return;
   }
   try {
-    engine = await Engine.open(page);
+    engine = await Service.open(page);
     simulate();
     narrowSliders();
   } catch (error) {

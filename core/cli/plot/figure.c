@@ -84,10 +84,25 @@ static const struct {
 #include "templates.inc"
 };
 
+/* Shortens a text to `most` bytes, of which the last `tail` ones remain; the buffer has 4 bytes more. */
+static const char *figure_shorten (const char *text, size_t most, size_t tail, char *buffer) {
+  size_t length = strlen (text), head = most - tail, end = length - tail;
+  if (length <= most) return text;
+  while (((unsigned char)text[head] & 0xC0) == 0x80) head--; /* not in the middle of a character */
+  while (((unsigned char)text[end] & 0xC0) == 0x80) end++;
+  snprintf (buffer, most + 4, "%.*s…%s", (int)head, text, text + end);
+  return buffer;
+}
+
+const char *pw_figure_name (const char *name, char buffer[FIGURE_NAME + 4]) {
+  return figure_shorten (name, FIGURE_NAME, FIGURE_NAME / 2, buffer);
+}
+
 pw_output *pw_figure_begin (const pw_figures *f, const char *name, pw_error *error) {
   pw_output *o = pw_figure_open_file (f->folder, PW_PRINTED (40, "%s.gp", name), error);
   if (o == NULL) return NULL;
   FILE *out = pw_output_stream (o);
+  char title[FIGURE_TITLE + 4];
   fprintf (out,
            "# A figure by Pinwheel.  After changes draw it again, in this folder, by:  gnuplot %s.gp\n"
            "reset session\n",
@@ -95,7 +110,7 @@ pw_output *pw_figure_begin (const pw_figures *f, const char *name, pw_error *err
   pw_figure_text (out, "name", name);
   pw_figure_text (out, "model", f->model);
   pw_figure_text (out, "incomplete", f->incomplete);
-  pw_figure_text (out, "about", f->about && *f->about ? f->about : f->model);
+  pw_figure_text (out, "about", figure_shorten (f->about && *f->about ? f->about : f->model, FIGURE_TITLE, 0, title));
   fprintf (out, "width = %.2f\n", (f->width > 0 ? f->width : FIGURE_WIDTH) / 25.4 * 72); /* points of 1/72 inch */
   return o;
 }
@@ -111,7 +126,9 @@ void pw_figure_element (FILE *f, const char *variable, int i, const char *value)
 }
 
 void pw_figure_label (FILE *f, const char *variable, int i, const char *name, const char *unit) {
-  const char *label = *unit ? PW_PRINTED (300, "%s [%s]", name, unit) : name;
+  char shown[FIGURE_NAME + 4];
+  const char *label =
+      *unit ? PW_PRINTED (300, "%s [%s]", pw_figure_name (name, shown), unit) : pw_figure_name (name, shown);
   i ? pw_figure_element (f, variable, i, label) : pw_figure_text (f, variable, label);
 }
 

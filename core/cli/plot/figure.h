@@ -8,6 +8,8 @@
 enum {
   FIGURE_SCRIPTS = 8, /* drawn at a time, at most */
   FIGURE_WIDTH = 170, /* [mm]: both columns of a page */
+  FIGURE_TITLE = 300, /* bytes of the title, at most */
+  FIGURE_NAME = 20,   /* bytes of a name in the label of an axis, at most */
   FIGURE_PATH = 4096  /* longest path of a file, its end included */
 };
 
@@ -54,6 +56,8 @@ int pw_figure_end (pw_output *o, const char *template_name, pw_error *error);
 void pw_figure_text (FILE *f, const char *variable, const char *value);
 void pw_figure_element (FILE *f, const char *variable, int i, const char *value);
 void pw_figure_label (FILE *f, const char *variable, int i, const char *name, const char *unit);
+/* A name of at most FIGURE_NAME bytes, shortened in the middle if need be. */
+const char *pw_figure_name (const char *name, char buffer[FIGURE_NAME + 4]);
 /* Writes and draws the figure of a command that has one, NAME: `data` writes NAME.dat, `variables` those of the
  * template of this name.  A status. */
 int pw_figure_write (const pw_cli_line *line, const pw_cli_model *model, const char *folder, const char *name,

@@ -47,6 +47,7 @@ static void report_atol (pw_run *run, const pw_system *system, double atol) {
 void pw_report_settings (pw_run *run, const pw_system *system, const char *method, const pw_cli_line *line,
                          const pw_settings *settings) {
   pw_cli_report_unused (method, line);
+  pw_cli_report_tables (system, settings->span);
   if (pw_cli_adaptive (method) == 1)
     report_atol (run, system, settings->atol);
   else
@@ -94,21 +95,27 @@ void pw_report_model (const pw_cli_model *m) {
 /* ---- Initialisation ---- */
 
 /* States that the consistent initialisation has changed. */
-static void report_initial (const pw_system *system, const pw_initial_report *initial) {
+static void report_initial (pw_run *run, const pw_system *system) {
+  const pw_initial_report *initial = pw_run_initial (run);
   int n = pw_system_coordinates (system), moved = initial->moved, listed = 0;
-  char changed[80] = "";
+  char changed[80] = "", rounded[80] = "", reason[300];
   if (moved == 0) return;
   if (initial->changed) snprintf (changed, sizeof changed, ", %d of them specified by the model", initial->changed);
-  pw_cli_say ("pinwheel: the initial values did not satisfy the constraints; %d of them %s changed%s%s:\n", moved,
-              moved == 1 ? "was" : "were",
-              initial->released ? ", including given ones, which cannot all be satisfied" : "", changed);
-  for (int state = 0; state < 2 * n && listed < REPORT_MESSAGES; state++) {
-    if (!pw_initial_moved (system, initial, state)) continue;
-    const pw_state_change c = pw_cli_state_change (system, initial, state);
-    pw_cli_say ("  %s from %s to %s %s%s\n", c.name, PW_DIGITS (c.given, 10), PW_DIGITS (c.consistent, 10), c.unit,
-                initial->changed && pw_initial_specified (initial, state) ? " (specified)" : "");
-    listed++;
-  }
+  if (initial->rounded)
+    snprintf (rounded, sizeof rounded, " (%d by less than 1e-2 of its unit, as if rounded)", initial->rounded);
+  pw_cli_say ("pinwheel: the initial values did not satisfy the constraints; %d of them %s changed%s%s%s:\n", moved,
+              moved == 1 ? "was" : "were", initial->released ? ", including given ones" : "", changed, rounded);
+  for (int specified = 1; specified >= 0; specified--)
+    for (int state = 0; state < 2 * n && listed < REPORT_MESSAGES; state++) {
+      if (!pw_initial_moved (system, initial, state) || pw_initial_specified (initial, state) != specified) continue;
+      const pw_state_change c = pw_cli_state_change (system, initial, state);
+      const char *origin = pw_initial_given (initial, state) ? "given" : "specified";
+      if (specified) pw_run_initial_reason (run, state, reason, sizeof reason);
+      pw_cli_say ("  %s from %s to %s %s", c.name, PW_DIGITS (c.given, 10), PW_DIGITS (c.consistent, 10), c.unit);
+      if (specified) pw_cli_say (" (%s%s%s)", origin, *reason ? "; otherwise " : "", reason);
+      pw_cli_say ("\n");
+      listed++;
+    }
   report_more (stderr, moved - listed, "");
 }
 
@@ -118,17 +125,17 @@ int pw_report_initial_state (const pw_cli_model *m, double limit, pw_error *erro
   const pw_settings settings = { .stop = pw_limit_over, .stop_context = &seconds };
   pw_limit_start (&seconds);
   pw_run *run = pw_run_open (m->system, "rk4+none", &settings, &own); /* makes no step: any method will do */
-  if (run) report_initial (m->system, pw_run_initial (run));
+  if (run) report_initial (run, m->system);
   pw_run_close (run);
   return own.status == PW_RESOURCE ? pw_fail (error, own.status, "%s", own.text) : PW_OK;
 }
 
-void pw_report_initialisation (const pw_run *run, const pw_system *system, const char *const *redundant) {
+void pw_report_initialisation (pw_run *run, const pw_system *system, const char *const *redundant) {
   int differences = pw_system_differences (system), count = 0;
   for (int i = 0; i < differences && i < REPORT_MESSAGES; i++)
     pw_cli_say ("pinwheel: derivatives by differences: %s\n", PW_NAME (pw_system_difference_name, system, i));
   report_more (stderr, differences - REPORT_MESSAGES, "");
-  report_initial (system, pw_run_initial (run));
+  report_initial (run, system);
   for (; redundant && redundant[count]; count++)
     if (count < REPORT_MESSAGES) pw_cli_say ("pinwheel: redundant: %s\n", redundant[count]);
   report_more (stderr, count - REPORT_MESSAGES, "");

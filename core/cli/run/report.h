@@ -9,12 +9,13 @@
 /* Initial phi and headings that are probably degrees; expressions that may jump with states. */
 void pw_report_model (const pw_cli_model *m);
 
-/* Options without effect, long fixed steps, an absolute tolerance within which a force saturates. */
+/* Options without effect, tables that do not cover the run, long fixed steps, an absolute tolerance within which a
+ * force saturates. */
 void pw_report_settings (pw_run *run, const pw_system *system, const char *method, const pw_cli_line *line,
                          const pw_settings *settings);
 
 /* Derivatives by differences, states changed by the consistent initialisation, redundant constraint equations. */
-void pw_report_initialisation (const pw_run *run, const pw_system *system, const char *const *redundant);
+void pw_report_initialisation (pw_run *run, const pw_system *system, const char *const *redundant);
 
 /* States that the consistent initialisation changes, if it succeeds within this processor time [s].  PW_OK or
  * PW_RESOURCE. */

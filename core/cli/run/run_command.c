@@ -6,6 +6,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include "run_command.h"
 #include "report.h"
 
@@ -20,12 +21,13 @@ static int run_check_paths (pw_run_cli *command, pw_error *error) {
   const pw_checkpoints *checkpoints = &command->checkpoints;
   const char *resume_path = checkpoints->resume_path;
   if (resume_path && checkpoints->path && strcmp (resume_path, checkpoints->path) == 0) resume_path = NULL;
+  static const char *const tables[] = { ".csv", ".npz", NULL };
   pw_use use[] = { PW_CLI_MODEL_USE,
                    { "--reference", command->reference_path, PW_READS, NULL },
                    { "--resume", resume_path, checkpoints->path ? PW_READS : PW_WRITES, NULL },
                    { "--checkpoint", checkpoints->path, PW_WRITES, NULL },
-                   { "-o", command->table_path, PW_WRITES, NULL },
-                   { "--json", command->summary_path, PW_WRITES, NULL },
+                   { "-o", command->table_path, PW_WRITES, tables },
+                   { "--json", command->summary_path, PW_WRITES, pw_cli_json },
                    { "--animate", command->page_path, PW_WRITES, NULL },
                    { "--plots", command->plots_path, PW_WRITES_INTO, pw_figure_endings } };
   return pw_cli_check_uses (&command->line, command->compiled.file, use, sizeof use / sizeof *use, error);
@@ -43,7 +45,7 @@ static int run_open_output (pw_run_cli *command, int which, const char **path, p
  * verified. */
 static int run_open_outputs (pw_run_cli *command, pw_error *error) {
   const char *ending = command->table_path ? strrchr (command->table_path, '.') : NULL;
-  if (ending && strcmp (ending, ".npz") == 0 && (command->checkpoints.path || command->checkpoints.resume_path))
+  if (ending && strcasecmp (ending, ".npz") == 0 && (command->checkpoints.path || command->checkpoints.resume_path))
     return pw_fail (error, PW_INPUT, "-o %s: an .npz archive cannot be continued after a checkpoint: write a .csv",
                     command->table_path);
   int has_plots = command->plots_path != NULL;

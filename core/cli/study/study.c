@@ -205,6 +205,7 @@ static int study_open (pw_study *study, pw_error *error) {
   if (status == PW_OK) status = pw_cli_read_specialise (study->line.specialise, &when, error);
   if (status == PW_OK) status = pw_report_initial_state (&study->compiled, study->limit.seconds, error);
   if (status != PW_OK) return status;
+  pw_cli_report_tables (study->compiled.system, study->t_end);
   /* one engine for all runs, since `compare` compares their processor times */
   pw_cli_engine_open (&study->engine, study->compiled.system, when, study_estimated_steps (study));
   return study_open_folder (study, error);

@@ -83,16 +83,16 @@ static int sweep_read_settings (pw_sweep *sweep, pw_error *error) {
 }
 
 static int sweep_open (pw_sweep *sweep, pw_error *error) {
-  pw_use use[] = { PW_CLI_MODEL_USE, { "-o", sweep->path, PW_WRITES, NULL } };
+  pw_use use[] = { PW_CLI_MODEL_USE, { "-o", sweep->path, PW_WRITES, pw_cli_csv } };
   sweep->plan.file = pw_cli_file (&sweep->line, error);
   if (sweep->plan.file == NULL) return error->status;
   int status = sweep_read_settings (sweep, error);
+  if (status == PW_OK)
+    status = pw_cli_check_uses (&sweep->line, sweep->plan.file, use, sizeof use / sizeof *use, error);
   if (status == PW_OK) status = pw_plan_open (&sweep->plan, sweep->ranges, error);
   if (status == PW_OK && sweep->plan.parts > sweep->plan.grid.rows)
     status = pw_fail (error, PW_INPUT, "--part %s: more parts than the %ld rows of the grid", sweep->part_text,
                       sweep->plan.grid.rows);
-  if (status == PW_OK)
-    status = pw_cli_check_uses (&sweep->line, sweep->plan.file, use, sizeof use / sizeof *use, error);
   if (status == PW_OK) status = pw_journal_open (&sweep->journal, &sweep->plan, sweep->path, error);
   if (status != PW_OK) return status;
   if (sweep->journal.done > 0)

@@ -341,8 +341,9 @@ int pw_sweep_merge (const char *const *parts, int count, const char *path, pw_ta
   table_part *part = calloc ((size_t)count, sizeof *part);
   int status = part ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
   for (int i = 0; i < count && status == PW_OK; i++) {
-    const pw_use use[] = { { "-o", path, PW_WRITES, NULL }, { "the part", parts[i], PW_READS, NULL } };
+    const pw_use use[] = { { "-o", path, PW_WRITES, pw_cli_csv }, { "the part", parts[i], PW_READS, NULL } };
     status = pw_check_paths (use, 2, error);
+    if (status == PW_OK) status = pw_cli_check_format (use, error);
     if (status == PW_OK) status = table_open_part (part + i, parts[i], error);
   }
   if (status == PW_OK) status = table_match_parts (part, count, error);

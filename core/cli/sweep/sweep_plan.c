@@ -104,6 +104,7 @@ typedef struct {
 static void plan_open_engines (pw_plan *plan, const pw_system *system) {
   pw_run_defaults defaults = pw_cli_defaults (pw_file_table (plan->file));
   double steps = (double)plan->grid.rows * pw_method_steps (plan->method, &plan->settings, defaults.step, plan->t_end);
+  pw_cli_report_tables (system, plan->t_end);
   pw_cli_engine_open (&plan->engine, system, plan->specialise, steps);
   const char *reason = plan->with_cpu                   ? "--cpu measures each run"
                        : isfinite (plan->limit.seconds) ? "--limit stops each run by itself"

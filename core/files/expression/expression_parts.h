@@ -131,4 +131,8 @@ typedef struct {
 /* The range over a time interval, without breaks of operations that are marked in `noisy`, one mark per operation. */
 pw_range pw_expression_range (const pw_expression *expression, const unsigned char *noisy, double lo, double hi);
 
+/* Whether the last of these operations, a part of an expression, may jump at some time in some state: atan2 (x, 1) and
+ * sign (x^2 + 1) do not. */
+int pw_expression_may_jump (const pw_expression_code *code, int codes);
+
 #endif

@@ -137,7 +137,8 @@ static parser_part parser_operation (parser *p, parser_part part, int depends, i
   }
   if (pw_expression_breaks (op) && part.depends & DEPENDS_ON_TIME) p->breaks = 1;
   int at_one_point = op == PW_OP_EQUAL || op == PW_OP_UNEQUAL; /* jumps, and back at once */
-  if (pw_expression_jumps (op) && !at_one_point && part.depends & DEPENDS_ON_STATES && p->jump == NULL) {
+  if (!at_one_point && part.depends & DEPENDS_ON_STATES && p->jump == NULL &&
+      pw_expression_may_jump (p->code + part.first, p->codes - part.first)) {
     p->jump = p->text + part.from;
     p->jump_size = (int)(p->previous_end - part.from);
   }

@@ -330,9 +330,10 @@ static pw_range range_apply (const pw_expression_code *c, const pw_range *x, int
   return r;
 }
 
-pw_range pw_expression_range (const pw_expression *expression, const unsigned char *noisy, double lo, double hi) {
-  pw_range stack[PW_EXPRESSION_STACK], *top = stack;
-  for (const pw_expression_code *c = expression->code, *end = c + expression->codes; c < end; c++) {
+/* Evaluates operations on a stack; returns its top.  noisy may be NULL. */
+static pw_range *range_run (const pw_expression_code *code, int codes, const unsigned char *noisy, double lo, double hi,
+                            pw_range *top) {
+  for (const pw_expression_code *c = code, *end = c + codes; c < end; c++) {
     int operands = pw_expression_operands (c->op), operands_break = 0;
     top -= operands;
     for (int i = 0; i < operands; i++) operands_break |= top[i].breaks;
@@ -343,8 +344,21 @@ pw_range pw_expression_range (const pw_expression *expression, const unsigned ch
     else
       *top = c->index == PW_EXPRESSION_TIME ? range_between (lo, hi)
                                             : (pw_range){ .lo = -DBL_MAX, .hi = DBL_MAX, .of_states = 1 };
-    if (noisy[c - expression->code]) top->breaks &= operands_break;
+    if (noisy && noisy[c - code]) top->breaks &= operands_break;
     top++;
   }
-  return top[-1];
+  return top;
+}
+
+pw_range pw_expression_range (const pw_expression *expression, const unsigned char *noisy, double lo, double hi) {
+  pw_range stack[PW_EXPRESSION_STACK];
+  return range_run (expression->code, expression->codes, noisy, lo, hi, stack)[-1];
+}
+
+int pw_expression_may_jump (const pw_expression_code *code, int codes) {
+  pw_range stack[PW_EXPRESSION_STACK];
+  const pw_expression_code *last = code + codes - 1;
+  int operands = pw_expression_operands (last->op);
+  const pw_range *top = range_run (code, codes - 1, NULL, -DBL_MAX, DBL_MAX, stack);
+  return pw_expression_jumps (last->op) && range_result (last, top - operands, operands).breaks;
 }

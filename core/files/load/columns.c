@@ -1,9 +1,9 @@
 /* Reads columns of numbers from a CSV file.
  *
- * The separator is a comma if the first line has one outside quotes, else a semicolon if it has one, else a tab.  A
- * cell in double quotes may contain it, and "" for a quote (RFC 4180), but no line end.  A first line without numbers
- * names the columns, "NAME" or "NAME [unit]"; numbers are converted to SI units.  Blank lines and lines that begin with
- * # are skipped. */
+ * Tabs, semicolons, commas or blanks separate the cells: the separator is the one by which the second line, or the only
+ * one, has most numbers.  Unless it is a comma, numbers may have decimal commas.  A cell in double quotes may contain
+ * the separator, and "" for a quote (RFC 4180), but no line end.  A first line without numbers names the columns,
+ * "NAME" or "NAME [unit]"; numbers are converted to SI units.  Blank lines and lines that begin with # are skipped. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -23,8 +23,9 @@ typedef struct {
   int cells;              /* per line */
   columns_source *source; /* of each column to read; the first one is the time */
   int columns;
-  pw_gaps gaps;      /* in all but the time */
-  char separator[2]; /* "" before the first line */
+  pw_gaps gaps;
+  const char *separator; /* one of columns_separators */
+  int comma, point;      /* numbers of the last lines with a decimal comma or point, or 0 */
   pw_error *error;
 } columns;
 
@@ -33,51 +34,32 @@ typedef struct {
 
 /* ---- Lines and cells ---- */
 
-/* The end of the cell that begins here: the next of the separators outside quotes, or the end of the line. */
-static const char *columns_cell_end (const char *cell, const char *separators) {
-  const char *p = cell + strspn (cell, " ");
+/* Characters that end a cell; several blanks are one separator. */
+static const char *const columns_separators[] = { "\t\n", ";\n", ",\n", " \t\n" };
+
+/* Blanks before a cell. */
+static const char *columns_blanks (const char *separator) {
+  return *separator == ' ' ? " \t" : " ";
+}
+
+/* The end of the cell that begins here: the next separator outside quotes, or the end of the line.  Between blanks, a
+ * unit in brackets belongs to the name before it. */
+static const char *columns_cell_end (const char *cell, const char *separator) {
+  const char *p = cell + strspn (cell, columns_blanks (separator));
   if (*p == '"') /* to the closing quote, which is not doubled */
     for (p++; *p && (*p != '"' || p[1] == '"'); p++) p += *p == '"';
-  return p + strcspn (p, separators);
+  p += strcspn (p, separator);
+  const char *unit = *separator == ' ' ? p + strspn (p, " \t") : "";
+  const char *close = *unit == '[' ? strchr (unit, ']') : *unit == '(' ? strchr (unit, ')') : NULL;
+  return close ? close + strcspn (close, separator) : p;
 }
 
-static char columns_find_separator (const char *line) {
-  static const char separators[] = ",;\t";
-  int semicolon = 0;
-  for (const char *end = columns_cell_end (line, separators); *end; end = columns_cell_end (end + 1, separators)) {
-    if (*end == ',') return ',';
-    semicolon |= *end == ';';
-  }
-  return semicolon ? ';' : '\t';
-}
-
-/* The next line that is neither blank nor a comment, or NULL. */
-static char *columns_line (columns *c) {
-  while (*c->rest) {
-    char *line = c->rest, *end = line + strcspn (line, "\n");
-    c->rest = *end ? end + 1 : end;
-    c->line++;
-    *end = 0;
-    if (*line == '#' || line[strspn (line, " \t\r")] == 0) continue;
-    if (*c->separator == 0) *c->separator = columns_find_separator (line);
-    while (strchr (*c->separator == '\t' ? " \r" : " \t\r", end[-1])) *--end = 0;
-    return line;
-  }
-  return NULL;
-}
-
-static int columns_count (const columns *c, const char *line) {
-  int n = 1;
-  while (*(line = columns_cell_end (line, c->separator))) line++, n++;
-  return n;
-}
-
-/* Copies the cell that begins here, if need be cut, to the buffer, without surrounding blanks and quotes.  Returns the
- * beginning of the next one. */
-static const char *columns_cell (const columns *c, const char *line, char *buffer, size_t size) {
-  const char *end = columns_cell_end (line, c->separator), *next = end + 1;
-  while (line < end && *line == ' ') line++;
-  while (line < end && end[-1] == ' ') end--;
+/* Copies the cell that begins here, if need be cut, to the buffer, without surrounding blanks and quotes.  Returns its
+ * end. */
+static const char *columns_cell (const char *separator, const char *line, char *buffer, size_t size) {
+  const char *end = columns_cell_end (line, separator), *const next = end;
+  line += strspn (line, columns_blanks (separator));
+  while (line < end && strchr (" \r", end[-1])) end--;
   int quoted = end - line > 1 && *line == '"' && end[-1] == '"';
   if (quoted) line++, end--;
   size_t n = 0;
@@ -89,21 +71,74 @@ static const char *columns_cell (const columns *c, const char *line, char *buffe
   return next;
 }
 
-/* Copies cell i (from 0) of a line in the same way. */
-static void columns_cell_at (const columns *c, const char *line, int i, char *buffer, size_t size) {
-  while (i-- > 0) line = columns_cell_end (line, c->separator) + 1;
-  columns_cell (c, line, buffer, size);
+/* Reads a number; if commas do not separate cells, also with a decimal comma. */
+static int columns_read (const char *separator, char *cell, double *value) {
+  char *comma = *separator == ',' ? NULL : strchr (cell, ',');
+  if (comma && comma > cell && strspn (comma - 1, "0123456789") == 1 && strspn (comma + 1, "0123456789") > 0)
+    *comma = '.';
+  int status = pw_read_number (cell, value);
+  if (comma) *comma = ','; /* for messages */
+  return status;
 }
 
-/* Whether a line names the columns: none of its cells is a number. */
-static int columns_are_names (const columns *c, const char *line) {
+static int columns_count (const char *separator, const char *line) {
+  int n = 1;
+  while (*(line = columns_cell_end (line, separator)) && *line != '\n') line++, n++;
+  return n;
+}
+
+/* Counts the cells that are numbers, and subtracts a little for each one that is neither a number nor empty. */
+static double columns_numbers (const char *separator, const char *line) {
   char cell[100];
-  double value;
-  for (int i = 0; i < c->cells; i++) {
-    line = columns_cell (c, line, cell, sizeof cell);
-    if (pw_read_number (cell, &value) == PW_OK) return 0;
+  double count = 0, value;
+  for (;; line++) {
+    line = columns_cell (separator, line, cell, sizeof cell);
+    if (*cell) count += columns_read (separator, cell, &value) == PW_OK ? 1 : -1e-6;
+    if (*line == 0 || *line == '\n') return count;
   }
-  return 1;
+}
+
+/* The first line from here that is neither blank nor a comment, or the end of the text; counts the lines passed. */
+static char *columns_skip (char *text, int *lines) {
+  while (*text && (*text == '#' || strchr ("\n", text[strspn (text, " \t\r")]))) {
+    text += strcspn (text, "\n");
+    text += *text == '\n';
+    ++*lines;
+  }
+  return text;
+}
+
+/* Finds the separator: the one by which the second line, or the only one, has most numbers; without numbers, the one by
+ * which the first line has most cells. */
+static const char *columns_find_separator (char *text) {
+  char *first = columns_skip (text, &(int){ 0 }), *second = columns_skip (first + strcspn (first, "\n"), &(int){ 0 });
+  const char *best = NULL;
+  double most = 0;
+  for (int by_numbers = 1; best == NULL; by_numbers--)
+    for (int i = 0; i < 4; i++) {
+      const char *separator = columns_separators[i];
+      double count =
+          by_numbers ? columns_numbers (separator, *second ? second : first) : columns_count (separator, first);
+      if (count > most) most = count, best = separator;
+    }
+  return best;
+}
+
+/* The next line that is neither blank nor a comment, or NULL. */
+static char *columns_line (columns *c) {
+  char *line = columns_skip (c->rest, &c->line), *end = line + strcspn (line, "\n");
+  c->rest = *end ? end + 1 : end;
+  if (*line == 0) return NULL;
+  c->line++;
+  *end = 0;
+  while (strchr (*c->separator == '\t' ? " \r" : " \t\r", end[-1])) *--end = 0;
+  return line;
+}
+
+/* Copies cell i (from 0) of a line. */
+static void columns_cell_at (const columns *c, const char *line, int i, char *buffer, size_t size) {
+  while (i-- > 0) line = columns_cell_end (line, c->separator) + 1;
+  columns_cell (c->separator, line, buffer, size);
 }
 
 /* ---- Selection of columns ---- */
@@ -115,11 +150,12 @@ static int columns_find (const columns *c, const char *first, int named, const c
   long number = strtol (name, &end, 10);
   if (*end == 0 && number >= 1 && number <= c->cells) return *index = (int)number - 1, PW_OK;
   if (*end == 0)
-    return columns_fail (c, "there is no column %.20s: the line has %d cell%s", name, c->cells,
-                         c->cells == 1 ? "" : "s");
+    return columns_fail (c, "there is no column %.20s: the line has %d cell%s%s", name, c->cells,
+                         c->cells == 1 ? "" : "s",
+                         c->cells == 1 ? "; separate cells by commas, semicolons, tabs or blanks" : "");
   *index = -1;
   for (int i = 0; named && i < c->cells; i++) {
-    first = columns_cell (c, first, cell, sizeof cell);
+    columns_cell_at (c, first, i, cell, sizeof cell);
     int matches = strcmp (cell, name) == 0;
     cell[pw_unit_split (cell, unit, sizeof unit)] = 0;
     matches |= strcmp (cell, name) == 0;
@@ -146,14 +182,28 @@ static int columns_open (const columns *c, const char *first, int named, const c
 
 /* ---- Numbers ---- */
 
-/* A number in SI units; with gaps allowed, NaN for an empty cell or nan. */
-static int columns_number (const columns *c, const char *line, columns_source source, pw_gaps gaps, double *value) {
+/* A table has either decimal commas or decimal points; where both occur, some separate thousands. */
+static int columns_check_decimals (columns *c, const char *cell, int is_comma, columns_source source) {
+  if (is_comma) c->comma = c->line;
+  if (!is_comma && strchr (cell, '.')) c->point = c->line;
+  if (c->comma == 0 || c->point == 0) return PW_OK;
+  return columns_fail (c, "column %d: a decimal %s, but line %d has a decimal %s: use one of them", source.index + 1,
+                       is_comma ? "comma" : "point", is_comma ? c->point : c->comma, is_comma ? "point" : "comma");
+}
+
+/* A number in SI units; NaN for an empty cell or, if it may be a gap, for nan. */
+static int columns_number (columns *c, const char *line, columns_source source, pw_gaps gaps, double *value) {
   char cell[COLUMNS_CELL];
   columns_cell_at (c, line, source.index, cell, sizeof cell);
-  int number = strlen (cell) < sizeof cell - 1 && pw_read_number (cell, value) == PW_OK; /* not cut */
-  if (gaps == PW_GAPS_ALLOWED && (*cell == 0 || (number && isnan (*value)))) return *value = NAN, PW_OK;
+  const char *comma = strchr (cell, ',');
+  int number = strlen (cell) < sizeof cell - 1 && columns_read (c->separator, cell, value) == PW_OK; /* not cut */
+  if (*cell == 0 || (gaps == PW_GAPS_ALLOWED && number && isnan (*value))) return *value = NAN, PW_OK;
   if (!number || !isfinite (*value))
-    return columns_fail (c, "column %d: expected a finite number, found \"%.40s\"", source.index + 1, cell);
+    return columns_fail (c, "column %d: expected a finite number, found \"%.40s\"%s", source.index + 1, cell,
+                         comma == NULL          ? ""
+                         : *c->separator == ',' ? "; with decimal commas, separate cells by semicolons or tabs"
+                                                : "; nothing may separate thousands");
+  if (columns_check_decimals (c, cell, comma != NULL, source) != PW_OK) return PW_INPUT;
   *value *= source.factor;
   if (isfinite (*value)) return PW_OK;
   return columns_fail (c, "column %d: \"%.40s\" is too large in SI units", source.index + 1, cell);
@@ -161,15 +211,36 @@ static int columns_number (const columns *c, const char *line, columns_source so
 
 /* Reads this line and all that follow into columns of `room` numbers; *rows: the number of lines read. */
 static int columns_rows (columns *c, char *line, double *value, size_t room, int *rows) {
+  double last = -INFINITY; /* time */
   for (int n = 0; line; line = columns_line (c), *rows = ++n) {
-    int cells = columns_count (c, line);
-    if (cells != c->cells) return columns_fail (c, "expected %d cells as in the first line, found %d", c->cells, cells);
+    int cells = columns_count (c->separator, line);
+    if (cells != c->cells)
+      return columns_fail (c, "expected %d cells as in the first line, found %d%s", c->cells, cells,
+                           cells > c->cells && *c->separator == ','
+                               ? "; with decimal commas, separate cells by semicolons or tabs"
+                               : "");
     for (int k = 0; k < c->columns; k++)
       if (columns_number (c, line, c->source[k], k ? c->gaps : PW_GAPS_REFUSED, &value[(size_t)k * room + (size_t)n]) !=
           PW_OK)
         return PW_INPUT;
-    if (n > 0 && !(value[n] > value[n - 1]))
-      return columns_fail (c, "%.9g comes after %.9g: expected increasing times", value[n], value[n - 1]);
+    if (value[n] <= last) return columns_fail (c, "%.9g comes after %.9g: expected increasing times", value[n], last);
+    if (!isnan (value[n])) last = value[n];
+  }
+  return PW_OK;
+}
+
+/* Which column to read: the one that is given, else the first two, of which the second is not the time. */
+static int columns_select (columns *c, char *line, int named, const char *const *column, const char *const *unit) {
+  const int whole = strchr (line, '.') == NULL && strchr (c->rest, '.') == NULL;
+  if (!named && *c->separator == ',' && c->cells > 2 && c->cells % 2 == 0 && whole && !column[0] && !column[1])
+    return columns_fail (c,
+                         "without names, %d cells of whole numbers: with decimal commas, separate cells by semicolons "
+                         "or tabs; otherwise write columns: [1, 2]",
+                         c->cells);
+  for (int k = 0; k < c->columns; k++) {
+    const char *other = k && c->source[0].index == 1 ? "1" : "2";
+    if (columns_open (c, line, named, column[k] ? column[k] : k ? other : "1", unit[k], &c->source[k]) != PW_OK)
+      return PW_INPUT;
   }
   return PW_OK;
 }
@@ -178,13 +249,13 @@ static int columns_rows (columns *c, char *line, double *value, size_t room, int
 static int columns_all (columns *c, const char *const *column, const char *const *unit, double **value, int *rows) {
   size_t lines = 1;
   for (const char *p = c->rest; (p = strchr (p, '\n')) != NULL && p[1]; p++) lines++;
+  c->separator = columns_find_separator (c->rest);
   char *line = columns_line (c);
   if (line == NULL) return columns_fail (c, "the file is empty");
   if (lines > COLUMNS_MAX_LINES) return columns_fail (c, "more than %d lines", COLUMNS_MAX_LINES);
-  c->cells = columns_count (c, line);
-  int named = columns_are_names (c, line);
-  for (int k = 0; k < c->columns; k++)
-    if (columns_open (c, line, named, column[k], unit[k], &c->source[k]) != PW_OK) return PW_INPUT;
+  c->cells = columns_count (c->separator, line);
+  int named = columns_numbers (c->separator, line) < 0.5;
+  if (columns_select (c, line, named, column, unit) != PW_OK) return PW_INPUT;
   *value = malloc ((size_t)c->columns * lines * sizeof **value);
   if (*value == NULL) return pw_fail (c->error, PW_RESOURCE, "%s: out of memory", c->shown);
   if (columns_rows (c, named ? columns_line (c) : line, *value, lines, rows) != PW_OK) return PW_INPUT;

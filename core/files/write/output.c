@@ -6,6 +6,7 @@
 #include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <unistd.h>
 #include "files.h"
 
@@ -302,7 +303,8 @@ static int output_checksum (int file, pw_mark *mark) {
 }
 
 int pw_output_named (const pw_output *o, const char *ending) {
-  return pw_ends_with (o->path, ending);
+  const size_t length = strlen (o->path), size = strlen (ending);
+  return length > size && strcasecmp (o->path + length - size, ending) == 0;
 }
 
 int pw_output_continued (const pw_output *o) {

@@ -5,23 +5,25 @@
  *   {harmonic: {amplitude: 3, omega: 2}}           and ramp, smooth-step, pulse: their fields are in signal_form.c
  *   {table: {points: [[0, 1], [2, 3]]}}            points
  *   {table: {file: M.csv, columns: [t, M]}}        points of a file, by default in columns 1 and 2
+ *   {table: {file: M.csv, time: t, columns: [M]}}  the same
  *   "M0 * cos (omega * t)"                         an expression of the time t; in forces also of states: BODY.phi
  *   {expression: .., rate: .., acceleration: ..}   the same; in constraints, its time derivatives may be given
  */
 #define _XOPEN_SOURCE 700 /* realpath */
 #include <errno.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "yaml.h"
 
 /* ---- Points of tables, in the model ---- */
 
-static int table_list (pw_reader *r, const char *label, const pw_node *list, pw_signal *s) {
+static int table_list (pw_reader *r, const char *label, const pw_node *list, double **times, pw_signal *s) {
   if (pw_yaml_list (r, list, label) != PW_OK) return r->error->status;
   size_t bytes = (size_t)list->count * sizeof (double);
   double *t = pw_arena_alloc (r->arena, bytes), *value = pw_arena_alloc (r->arena, bytes);
   if (t == NULL || value == NULL) return pw_yaml_no_memory (r);
-  s->table.t = t;
+  s->table.t = *times = t;
   s->table.value = value;
   for (const pw_node *n = list->first; n; n = n->next) {
     double point[2] = { 0 };
@@ -62,13 +64,42 @@ static const char *table_unit (const pw_reader *r) {
   return strcmp (choice->choices[chosen], "angle") == 0 ? "rad" : "m";
 }
 
-static int table_file (pw_reader *r, const char *label, const pw_node *node, const pw_node *columns, pw_signal *s) {
-  const char *name, *reason, *column[2] = { "1", "2" }, *const unit[2] = { "s", table_unit (r) };
+/* The columns of times and values: `columns` has both or, if `time` is given, perhaps that of the values alone; NULL by
+ * default. */
+static int table_columns (pw_reader *r, const char *label, const pw_node *columns, const pw_node *time,
+                          const char *column[2]) {
   const char *text = PW_PRINTED (240, "%s: columns", label);
+  const int count = time && columns && columns->count != 2 ? 1 : 2;
+  column[0] = column[1] = NULL;
+  if (pw_yaml_list_of (r, columns, text, count, count == 1 ? "column, [value]" : "columns, [time, value]") != PW_OK)
+    return r->error->status;
+  const pw_node *first = columns ? columns->first : NULL;
+  pw_yaml_text (r, time, PW_PRINTED (240, "%s: time", label), &column[0]);
+  pw_yaml_text (r, count == 2 && first ? first->next : first, text, &column[1]);
+  if (count == 1 || r->error->status != PW_OK) return r->error->status;
+  if (time && first && first->type == PW_YAML_SCALAR && strcmp (first->text, column[0]) != 0)
+    return pw_yaml_fail (r, first->at, "%s: the first one is that of the times, but time is \"%.60s\"", text,
+                         column[0]);
+  return pw_yaml_text (r, time ? NULL : first, text, &column[0]);
+}
+
+/* Leaves out rows without a time or value. */
+static void table_skip_gaps (pw_points *table, double *t, double *value) {
+  const int rows = table->count;
+  table->count = 0;
+  for (int i = 0; i < rows; i++) {
+    if (isnan (t[i]) || isnan (value[i])) continue;
+    t[table->count] = t[i];
+    value[table->count++] = value[i];
+  }
+  table->skipped = rows - table->count;
+}
+
+static int table_file (pw_reader *r, const char *label, const pw_node *node, const pw_node *columns,
+                       const pw_node *time, double **times, pw_signal *s) {
+  const char *name, *reason, *column[2], *const unit[2] = { "s", table_unit (r) };
   pw_error cause = { 0 };
-  if (pw_yaml_list_of (r, columns, text, 2, "columns, [time, value]") != PW_OK) return r->error->status;
-  pw_yaml_text (r, columns ? columns->first : NULL, text, &column[0]);
-  pw_yaml_text (r, columns ? columns->first->next : NULL, text, &column[1]);
+  if (table_columns (r, label, columns, time, column) != PW_OK) return r->error->status;
   if (pw_yaml_text (r, node, label, &name) != PW_OK) return r->error->status;
   errno = 0;
   FILE *f = table_open (r->y, name, &reason);
@@ -79,21 +110,36 @@ static int table_file (pw_reader *r, const char *label, const pw_node *node, con
   fclose (f);
   if (cause.status == PW_INPUT) return pw_yaml_fail (r, node->at, "%s: %s", label, cause.text);
   if (t == NULL || pw_model_keep (r->model, t, free) != PW_OK) return pw_yaml_no_memory (r);
-  s->table.t = t;
+  s->table.t = *times = t;
   s->table.value = t + s->table.count;
+  table_skip_gaps (&s->table, t, t + s->table.count);
   return PW_OK;
 }
 
-static const char *const table_keys[] = { "points", "file", "columns" }; /* besides the fields of the form */
+/* Besides the fields of the form. */
+static const char *const table_keys[] = { "points", "file", "columns", "time", "time_scale", "time_offset" };
+enum { TABLE_KEYS = sizeof table_keys / sizeof *table_keys };
+
+/* Converts the times to time_offset + time_scale t; whole numbers of ms since an epoch stay exact. */
+static int table_times (pw_reader *r, const char *label, const pw_node *const v[2], int count, double *t) {
+  double scale = 1, offset = 0;
+  pw_yaml_number (r, v[0], PW_PRINTED (240, "%s: time_scale", label), PW_POSITIVE, &scale);
+  pw_yaml_number (r, v[1], PW_PRINTED (240, "%s: time_offset", label), PW_REAL, &offset);
+  for (int i = 0; i < count; i++) t[i] = scale * (t[i] + offset / scale);
+  return r->error->status;
+}
 
 /* Reads points or columns of a file.  Limits the points of all tables together: many may read the same large file. */
-static int table_points (pw_reader *r, const char *label, const pw_node *node, const pw_node *const v[3],
+static int table_points (pw_reader *r, const char *label, const pw_node *node, const pw_node *const v[TABLE_KEYS],
                          pw_signal *s) {
-  const pw_node *points = v[0], *file = v[1], *columns = v[2]; /* as table_keys */
+  const pw_node *points = v[0], *file = v[1], *columns = v[2], *time = v[3]; /* as table_keys */
   if ((points != NULL) == (file != NULL))
     return pw_yaml_fail (r, node->at, "%s: a table has either points or a file", label);
   if (points && columns) return pw_yaml_fail (r, columns->at, "%s: columns belong to a file", label);
-  int status = points ? table_list (r, label, points, s) : table_file (r, label, file, columns, s);
+  if (points && time) return pw_yaml_fail (r, time->at, "%s: a column of times belongs to a file", label);
+  double *t = NULL;
+  int status = points ? table_list (r, label, points, &t, s) : table_file (r, label, file, columns, time, &t, s);
+  if (status == PW_OK) status = table_times (r, label, v + 4, s->table.count, t);
   if (status == PW_OK) r->points += s->table.count;
   if (status != PW_OK || r->points <= PW_YAML_MAX_POINTS) return status;
   return pw_yaml_fail (r, node->at, "%s: the tables up to here have more than %d points, the limit for a model", label,
@@ -138,7 +184,7 @@ static int signal_read_form (pw_reader *r, const pw_kind *kind, const pw_signal_
   int fields = 0, n, is_table = form->type == PW_TABLE;
   *signal = (pw_signal){ .type = form->type };
   for (const pw_field *f = form->fields; f->name; f++) key[fields++] = f->name;
-  for (n = fields; is_table && n < fields + 3; n++) key[n] = table_keys[n - fields];
+  for (n = fields; is_table && n < fields + TABLE_KEYS; n++) key[n] = table_keys[n - fields];
   key[n] = NULL;
   if (pw_yaml_keys (r, node, key, PW_PRINTED (100, "a %s", form->name), v) != PW_OK ||
       signal_fields (r, form, label, node, v, signal) != PW_OK ||

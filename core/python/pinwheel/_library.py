@@ -6,10 +6,17 @@ tests compare functions, members and constants with the public headers.
 
 from __future__ import annotations
 
+import _signal as signal  # what the module signal wraps in Python, without its conversions: it is used at every call
+import contextlib
 import ctypes as c
 import ctypes.util
+import functools
+import operator
 import os
 import pathlib
+import threading
+
+import numpy as np
 
 VERSION = "0.1.0"
 PW_OK, PW_RETRY, PW_STOPPED, PW_RESOURCE, PW_INPUT, PW_INITIAL, PW_METHOD = 0, 1, 2, -1, -2, -3, -4
@@ -203,11 +210,15 @@ _declare(core, _i, ("pw_system_coordinates", _p), ("pw_system_rows", _p), ("pw_s
          ("pw_system_ledger_entries", _p), ("pw_system_find_state", _p, _s, _e))
 _declare(core, _s, ("pw_system_state_name", _p, _i, _s, _z), ("pw_system_reaction_name", _p, _i, _s, _z),
          ("pw_system_ledger_name", _p, _i, _s, _z), ("pw_system_signal_name", _p, _i, _s, _z),
+         ("pw_system_contact_name", _p, _i, _s, _z),
+         ("pw_system_table_notice", _p, _i, _d, _s, _z),
          ("pw_system_state_unit", _p, _i), ("pw_system_reaction_unit", _p, _i), ("pw_system_signal_unit", _p, _i))
 _declare(core, _i, ("pw_run_advance_to", _p, _d, _d, _e), ("pw_run_restart", _p, _p, _p, _e),
          ("pw_run_record_width", _p), ("pw_run_linear_modes", _p, _i, c.POINTER(pw_linear), _e),
          ("pw_run_record", _p, _d, _p, c.c_long, c.c_long, _p, c.POINTER(c.c_long), _e))
 _declare(core, _d, ("pw_run_time", _p))
+_declare(core, _i, ("pw_method_parse", _s, c.POINTER(_p), _p, _e), ("pw_method_adaptive", _p, _s),
+         ("pw_system_contacts", _p))
 _declare(core, c.POINTER(pw_element), ("pw_model_elements", _p, c.POINTER(_i)))
 _declare(core, c.POINTER(pw_initial_report), ("pw_run_initial", _p))
 _declare(core, _i, ("pw_initial_moved", _p, c.POINTER(pw_initial_report), _i), ("pw_initial_given", c.POINTER(pw_initial_report), _i),
@@ -219,6 +230,122 @@ def check(error) -> None:
     """Raises the exception of a library error, if there is one."""
     if error.status < 0:
         raise _EXCEPTIONS.get(error.status, Error)(error.text.decode(errors="replace"))
+
+
+class Handle:
+    """A C object, deleted with this one, and the objects that it needs, which live longer.
+
+    Python drops what handlers of signals raise in finalizers, therefore this one has no instructions of Python.  Arrays of
+    objects hide from Python's collector of cycles that the other objects can be deleted, too.
+    """
+
+    __del__ = property(operator.attrgetter("_delete"))
+
+    def __init__(self, pointer, delete, *needed):
+        self.pointer, self._delete, self._needed = pointer, functools.partial(delete, pointer), np.empty(1, object)
+        self._needed[0] = needed
+
+
+# ---- Calls during which the library calls functions in Python ----
+
+class _Thread(threading.local):
+    call: Call | None = None  # the innermost one
+
+
+thread = _Thread()
+
+
+class Call:
+    """A context for calls of the library that call functions in Python.
+
+    No exception passes through C: the functions return a failure, and `check` raises the exception.  Python calls handlers
+    of signals between any two instructions, also before the first one of a function that C calls or after its last one,
+    where ctypes would drop what they raise.  They are therefore replaced: what one raises passes only while `inside` is
+    set, and is kept in every case.
+    """
+
+    failure: BaseException | None = None  # what a function or a handler has raised; functions fail from then on
+    of_function = False  # a function has raised it
+    inside = False  # set while exceptions pass: they reach a function that is prepared for them
+    _active = False
+
+    def __init__(self):
+        self._handlers, self._outer = {}, None
+
+    def __enter__(self) -> Call:
+        self._outer, thread.call = thread.call, self
+        try:
+            for number in range(1, signal.NSIG) if threading.current_thread() is threading.main_thread() else ():
+                handler = signal.getsignal(number)
+                while isinstance(owner := getattr(handler, "__self__", None), Call) and not owner._active:
+                    handler = owner._handlers[number]  # an interrupt has kept it from being removed
+                if callable(handler):
+                    self._handlers[number] = handler
+                    signal.signal(number, self._handle)
+            self._active = True
+        except BaseException:
+            self.__exit__()
+            raise
+        return self
+
+    def __exit__(self, *_):
+        thread.call = self._outer
+        try:
+            self._active = False  # from here on exceptions of handlers pass
+            self._restore()
+        finally:
+            self._restore()  # what such an exception has left
+
+    def _restore(self):
+        for number, handler in self._handlers.items():
+            if isinstance(getattr(signal.getsignal(number), "__self__", None), Call):  # no function has set another one
+                signal.signal(number, handler)
+
+    def _handle(self, number, frame):
+        try:
+            self._handlers[number](number, frame)
+        except BaseException as failure:
+            if self._active and self.failure is None:
+                self.failure = failure
+            if self.inside or not self._active:
+                raise
+
+    def passing(self, function, *arguments):
+        """Calls a function in Python that handlers of signals may interrupt; raises also what they have raised in finalizers."""
+        with self:
+            try:
+                self.inside = True
+                result = function(*arguments)
+            finally:
+                self.inside = False
+        self.check(pw_error())
+        return result
+
+    def check(self, error) -> None:
+        """Raises what a function or a handler has raised, else the exception of the library's error."""
+        failure, self.failure = self.failure, None
+        if failure is None:
+            check(error)
+            return
+        if self.of_function:
+            reason = text(error.text) or "a signal failed"
+            set_attribute(failure, "_reason", reason)
+            set_attribute(failure, "__notes__", [*getattr(failure, "__notes__", ()), reason])  # tracebacks show them
+        try:
+            raise failure
+        finally:
+            del failure  # a cycle: its traceback has this frame
+
+
+def raised_by_function(failure: BaseException) -> str:
+    """The library's text on the signal whose function has raised this exception; "" if none has."""
+    return getattr(failure, "_reason", "")
+
+
+def set_attribute(failure: BaseException, name: str, value) -> None:
+    """Sets an attribute of an exception, also of one whose class forbids that to its users."""
+    with contextlib.suppress(AttributeError):
+        BaseException.__setattr__(failure, name, value)
 
 
 def text(value: bytes | None) -> str:
@@ -259,7 +386,7 @@ free.restype, free.argtypes = None, [c.c_void_p]
 
 
 def name_of(function, *arguments) -> str:
-    """The name that a function of the library writes into a buffer."""
-    buffer = c.create_string_buffer(400)
-    function(*arguments, buffer, 400)
+    """The name or notice that a function of the library writes into a buffer."""
+    buffer = c.create_string_buffer(600)
+    function(*arguments, buffer, 600)
     return buffer.value.decode()

@@ -39,6 +39,8 @@ def run(arguments):
 def animation(result) -> str:
     """An HTML frame that animates a run of the result's model and settings; a text with the reason if there is none."""
     given = result.settings
+    if result.model is None:
+        return html.escape(f"{result!r}, not shown: the copy of a result has no functions in Python")
     if "inputs" in given:
         return html.escape(f"{result!r}, not shown: the program cannot set inputs")
     settings = [f"--method={given['method']}", f"--t-end={given['t_end']!r}",

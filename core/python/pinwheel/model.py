@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes as c
 import functools
 import json
 import math
+import multiprocessing.util
+import operator
+import os
 import pathlib
+import shutil
 import tempfile
 import threading
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -18,76 +24,82 @@ import numpy as np
 from . import _library as lib
 from . import _program, studies
 from .results import Result, _nearest
-from .simulation import Simulation, specialised
+from .simulation import Simulation, specialised, warn_of_unused
 
 
-class _Handle:
-    """A C object and the function that deletes it."""
-
-    def __init__(self, pointer, free):
-        self.pointer, self._free = pointer, free
-
-    def __del__(self):
-        if self.pointer:
-            self._free(self.pointer)
-
-
-class _System(_Handle):
+class _System(lib.Handle):
     """A compiled system, which simulations share.
 
-    keep: objects to which the system refers; raised: exceptions raised by signals in Python, by thread, see _callback.
+    needed: C objects to which it refers; signals: functions and cells; in_python: whether there are functions in Python.
     """
 
-    _compiling = threading.Lock()  # one specialised code at a time
+    _compiling = threading.RLock()  # one specialised code at a time; a function of a signal may run other models
 
-    def __init__(self, pointer, keep, raised):
-        super().__init__(pointer, lib.core.pw_system_free)
-        self._keep, self._raised = keep, raised
-        self._code = _Handle(None, lib.files.pw_scene_code_close)
-        self._code_tried = False
+    def __init__(self, pointer, needed, signals, in_python):
+        super().__init__(pointer, lib.core.pw_system_free, *needed)
+        self._signals, self._in_python = signals, in_python
+        self._code = lib.Handle(None, lib.files.pw_scene_code_close)
+        self._code_tried, self.no_code = False, ""
 
     def code(self) -> int | None:
-        """Specialised code, compiled or from the cache; None if there cannot be any."""
+        """Specialised code, compiled or from the cache; None, with the reason in no_code, if there cannot be any."""
         with self._compiling:
             if not self._code_tried:
-                text = self._source()
-                if text:
-                    self._code.pointer = lib.files.pw_scene_code_open(text, self.pointer, None)
+                try:
+                    text, error = self._source(), lib.pw_error()
+                    self._code = lib.Handle(lib.files.pw_scene_code_open(text, self.pointer, c.byref(error)), lib.files.pw_scene_code_close)
                     lib.free(text)
+                    lib.check(error)
+                except lib.Error as failure:
+                    self.no_code = str(failure)
                 self._code_tried = True
         return lib.files.pw_scene_code_table(self._code.pointer)
 
     def _source(self):
         """The text of the code for the independent constraint equations, which a run selects."""
-        run = lib.core.pw_run_open(self.pointer, b"rk4+none", None, None)
-        if run is None:
-            return lib.core.pw_system_source(self.pointer, None, None)
-        text = lib.core.pw_run_source(run, None)
-        lib.core.pw_run_close(run)
-        return text
-
-    def check(self, error) -> None:
-        """Raises the exception of a library error; what a function in Python has raised is its cause."""
-        raised = self._raised.pop(threading.get_ident(), None)
-        if raised is not None and not isinstance(raised, Exception):  # KeyboardInterrupt, even if the method continued
-            raise raised
-        if error.status < 0 and raised is not None:
-            error.text += f": {type(raised).__name__}: {raised}".encode()[:499 - len(error.text)]
         try:
-            lib.check(error)
-        except lib.Error as failure:
-            raise failure from raised
+            run = self.call(lib.core.pw_run_open, self.pointer, b"rk4+none", None)
+        except lib.Error:
+            return self.call(lib.core.pw_system_source, self.pointer, None)
+        try:
+            return self.call(lib.core.pw_run_source, run)
+        finally:
+            lib.core.pw_run_close(run)
+
+    def call(self, function, *arguments):
+        """The result of a function of the library that evaluates the system, whose last argument is an error."""
+        error, call = lib.pw_error(), lib.Call()
+        with call if self._in_python else contextlib.nullcontext():
+            result = function(*arguments, c.byref(error))
+        try:
+            call.check(error)
+        except BaseException:
+            if function is lib.core.pw_run_open:
+                lib.core.pw_run_close(result)
+            raise
+        return result
+
+
+# Functions that delete folders, with the next description or at the end of the process, if it has made them and not a
+# parent that it is a copy of.
+_unused_folders: list = []
 
 
 class _Described:
     """The text of a model described in Python, as a file that exists as long as this object; str() is its path."""
 
+    __del__ = property(operator.attrgetter("_delete"))  # as that of lib.Handle
+
     def __init__(self, name: str, text: str):
         if not isinstance(name, str) or not name or len(name) > 50 or set(name) & set("/\\\0"):
             raise lib.InputError(f"describe: name = {name!r:.60}: expected at most 50 characters, without / and \\")
-        self._name, self._text = name, text
-        self._folder = tempfile.TemporaryDirectory(prefix="pinwheel-")
-        path = pathlib.Path(self._folder.name) / f"{name}.yaml"
+        with contextlib.suppress(IndexError):
+            while True:
+                _unused_folders.pop()()
+        self._name, self._text, folder = name, text, tempfile.mkdtemp(prefix="pinwheel-")
+        delete = multiprocessing.util.Finalize(None, shutil.rmtree, (folder, True), exitpriority=0)
+        self._delete = functools.partial(_unused_folders.append, delete)
+        path = pathlib.Path(folder) / f"{name}.yaml"
         path.write_text(text, encoding="utf-8")
         self._path = str(path)
 
@@ -136,11 +148,12 @@ def models() -> dict:
 
     @c.CFUNCTYPE(c.c_int, c.c_void_p, c.c_char_p, c.c_char_p)
     def add(_, name, path):
-        found[name.decode()] = path.decode()
+        found[os.fsdecode(name)] = os.fsdecode(path)
         return 0
 
-    lib.files.pw_file_list(add, None, c.byref(error))
-    lib.check(error)
+    with lib.Call() as call:
+        lib.files.pw_file_list(add, None, c.byref(error))
+    call.check(error)
     return found
 
 
@@ -178,6 +191,8 @@ class Model:
 
     _warns_of = staticmethod(lib.core.pw_initial_specified)  # whether a run warns of a changed initial value
 
+    _warns_of_unused = True  # whether a run warns of settings without effect
+
     def __init__(self, model, *, start: dict | None = None, signals: dict[str, Callable] | None = None, **parameters):
         self._origin = model if isinstance(model, _Described) else str(model)  # keeps the file of a described model
         self.source = str(model)
@@ -185,7 +200,7 @@ class Model:
         error = lib.pw_error()
         pointer = lib.files.pw_file_open(lib.encode(self.source, "model"), c.byref(error))
         lib.check(error)
-        self._file = _Handle(pointer, lib.files.pw_file_close)
+        self._file = lib.Handle(pointer, lib.files.pw_file_close)
         table = lib.files.pw_file_table(pointer).contents
         self.name, self.about = lib.text(lib.files.pw_file_name(pointer)), lib.text(table.about)
         self.defaults: dict[str, Any] = {"method": lib.text(table.run__method) or "rk4+projection", "t_end": table.run__t_end or 10.0,
@@ -244,8 +259,8 @@ class Model:
         """The compiled system, and the cells (C doubles) that its inputs read, by name."""
         if not inputs and self._compiled:
             return self._compiled
-        error, keep, raised = lib.pw_error(), [self._file], {}
-        model = _Handle(lib.files.pw_file_model(self._file.pointer, c.byref(error)), lib.core.pw_model_free)
+        error, keep = lib.pw_error(), []
+        model = lib.Handle(lib.files.pw_file_model(self._file.pointer, c.byref(error)), lib.core.pw_model_free)
         lib.check(error)
         for name, value in self._given.items():
             lib.core.pw_model_set(model.pointer, name.encode(), value, c.byref(error))
@@ -256,9 +271,10 @@ class Model:
             lib.core.pw_model_set_initial(model.pointer, state.encode(), value, c.byref(error))
         lib.check(error)
         for name, function in self.signals.items():
-            self._set_signal(model, name, _callback(function, raised), None, keep)
+            self._set_signal(model, name, _callback(name, function), None, keep)
             if self.signals.checked.get(name) is not function:
-                _check_derivatives(name, function, _derivatives(model.pointer, name.partition(".")[0]), self.defaults["t_end"])
+                call, count = lib.Call(), _derivatives(model.pointer, name.partition(".")[0])
+                call.passing(_check_derivatives, name, function, count, self.defaults["t_end"], call)
                 self.signals.checked[name] = function
         cells = {name: c.c_double(value) for name, value in lib.numbers(inputs or {}, "inputs").items()}
         reads_cell = c.cast(lib.core.pw_input_signal, c.c_void_p).value
@@ -266,7 +282,7 @@ class Model:
             self._set_signal(model, name, reads_cell, c.addressof(cell), keep)
         pointer = lib.core.pw_system_compile(model.pointer, c.byref(error))
         lib.check(error)
-        system = _System(pointer, (keep, model, cells), raised)
+        system = _System(pointer, (self._file, model), (keep, cells), bool(self.signals))
         if not inputs:
             self._compiled = system, cells
         return system, cells
@@ -333,8 +349,12 @@ class Model:
         method = self.defaults["method"] if method is None else method
         steps = lib.core.pw_method_steps(lib.encode(method, "method"), c.byref(settings), self.defaults["step"], settings.span)
         system, cells = self._compile(inputs or {})
+        if self._warns_of_unused:
+            warn_of_unused(method, given, 3)
         if specialised(specialise, steps):
             settings.specialised = system.code()
+            if system.no_code and self._warns_of_unused:
+                warnings.warn(f"general engine: {system.no_code}", stacklevel=3)
         return Simulation(self, system, cells, method, settings, given)
 
     def _setting(self, name, value):
@@ -374,6 +394,9 @@ class Model:
         Raises
         ------
         InputError, InitialError, MethodError
+        Exception
+            What functions in Python and handlers of signals raise, with the samples in its attribute ``result``: see
+            :meth:`Simulation.record`.
         """
         model = self.replace(start=start) if start else self
         end = self.defaults["t_end"] if t_end is None else lib.number(t_end, "t_end")
@@ -406,12 +429,11 @@ class Model:
         with self.open(t_end=at or None) as simulation:
             if at:
                 simulation.advance(at)
-            linear, error = lib.pw_linear(), lib.pw_error()
-            with simulation._used() as run:
-                lib.core.pw_run_linear_modes(run, min(most, 2**31 - 1), c.byref(linear), c.byref(error))
+            linear, system = lib.pw_linear(), simulation._system
             try:
-                simulation._system.check(error)
-                return self._linear(linear, simulation._system.pointer)
+                with simulation._used() as run:
+                    system.call(lib.core.pw_run_linear_modes, run, min(most, 2**31 - 1), c.byref(linear))
+                return self._linear(linear, system.pointer)
             finally:
                 lib.core.pw_linear_free(c.byref(linear))
 
@@ -467,24 +489,29 @@ def _derivatives(model, element):
     return 0 if kind.force_u else {lib.PW_HOLONOMIC: 2, lib.PW_NONHOLONOMIC: 1}.get(kind.level, 0)
 
 
-def _check_derivatives(name, function, count, t_end):
+def _check_derivatives(name, function, count, t_end, call):
     """Refuses a function of a constraint if one of its first `count` derivatives is not the derivative of the one before it.
 
     It is compared at a few times before t_end with central differences of many widths, one of which must agree within 1 %:
-    the function may interpolate.
+    the function may interpolate.  call: the lib.Call during which it is called.
     """
+    def returned(t):
+        return _numbers_of(function(t), name)[::-1]
+
     widths = min(1, t_end / 10) * 0.5 ** np.arange(4, 24)  # [s]
     for i in range(1, count + 1):
         found, size = [], 0.0
         for t in (0.03137 * t_end, 0.17321 * t_end, 0.41231 * t_end):  # arbitrary, hardly a point of a table
             try:
-                given, value = function(t)[i], function(t)[i - 1]
-                slopes = [(function(t + h)[i - 1] - function(t - h)[i - 1]) / (2 * h) for h in widths]
+                value, given = returned(t)[i - 1:i + 1]
+                slopes = [(returned(t + h)[i - 1] - returned(t - h)[i - 1]) / (2 * h) for h in widths]
                 slope = min(slopes, key=lambda x: abs(x - given))
                 if math.isfinite(given + slope):
                     found.append((t, given, slope))
                     size = max(size, abs(given) + abs(slope) + 1e-6 * abs(value))
             except Exception:  # noqa: BLE001: it ends the run, if that gets there
+                if call.failure:
+                    raise
                 continue
         for t, given, slope in found:
             if abs(given - slope) > 0.01 * size:
@@ -492,25 +519,40 @@ def _check_derivatives(name, function, count, t_end):
                 raise lib.InputError(f"signal {name}: the {what} at t = {t:.5g} s is {given:.6g}, but the derivative is {slope:.4g}")
 
 
-def _callback(function, raised):
-    """A function of the time as the library calls it; an exception stops the run and is kept in `raised`, by thread."""
+def _callback(name, function):
+    """The function of a signal as the library calls it, within a lib.Call."""
 
     @lib.eval_function
     def evaluate(_context, t, _x, value, _gradient):
+        call = lib.thread.call
         try:
-            result = function(t)
-            if not hasattr(result, "__len__"):
-                value[0], value[1], value[2] = float(result), math.nan, math.nan
-            elif len(result) in (1, 3):
-                value[0], value[1], value[2] = map(float, result if len(result) == 3 else (result[0], math.nan, math.nan))
-            else:
-                raise ValueError(f"expected a number, or value, rate and acceleration, found {len(result)}")
-            return 0
+            if call.failure is None:
+                call.inside = True
+                result = function(t)
+                call.inside = False
+                # the value last: without one, C has a failure
+                value[2], value[1], value[0] = (math.nan, math.nan, result) if result.__class__ is float else _numbers_of(result, name)
         except BaseException as failure:  # noqa: BLE001: nothing may pass through C
-            raised[threading.get_ident()] = failure
-            return 1
+            call.inside, lib.thread.call = False, call
+            if call.failure is None:
+                call.failure, call.of_function = failure, True
+        lib.thread.call = call  # also if it has run models of its own, and these were interrupted
+        return call.failure is not None
 
     return evaluate
+
+
+def _numbers_of(result, name):
+    """Acceleration, rate and value that a signal has returned; NaN: not given."""
+    expected = f"signal {name}: expected a number, or value, rate and acceleration"
+    try:
+        is_number = not hasattr(result, "__len__") or getattr(result, "shape", None) == ()
+        found = [float(result)] if is_number else [float(result[i]) for i in range(len(result))]
+    except (TypeError, ValueError, LookupError) as failure:
+        raise lib.InputError(f"{expected}: {failure}") from failure
+    if len(found) not in (1, 3):
+        raise lib.InputError(f"{expected}, found {len(found)} numbers")
+    return found[::-1] if len(found) == 3 else (math.nan, math.nan, found[0])
 
 
 def describe(name: str = "model", *, about: str = "", bodies=(), elements=(), parameters=(), let: dict | None = None,

@@ -21,25 +21,24 @@ class Result:
     states, reactions, ledger : list of str
         Names of columns: coordinates and velocities; reactions; work and losses by element.
     status : {"ok", "stopped", "failed"}
+        "stopped" by an exception of a handler of signals (Ctrl-C) or of ``progress``.
     reason : str
         Why the run ended early, or "".
     statistics : dict
         Numbers of steps and evaluations, the latter in all and by specialised code; largest constraint residuals.
     changed : dict of tuple
         Initial values that the constraints have changed: (described, consistent) by name of the state.
-    cause : Exception or None
-        What a function in Python raised, if that ended the run.
-    model : Model
+    model : Model or None
+        None in copies, and in other processes, if the model has functions in Python.
     settings : dict
         Method, t_end and the settings that were given.
 
     Notes
     -----
-    The columns are the time, residuals of the constraints, energies, then coordinates and velocities (``states``),
-    accelerations (the velocity's name and '), reactions and, with ``energy``, the ledger.
+    The columns are those of ``pinwheel run -o``, and more: the time, residuals of the constraints, energies, then
+    coordinates and velocities (``states``), accelerations (the velocity's name and '), positions of wheels and markers,
+    reactions and, with ``energy``, the ledger.
     """
-
-    cause: BaseException | None = None
 
     def __init__(self, rows, groups, units, status="ok", reason="", statistics=None, model=None, settings=None):
         self.rows = rows
@@ -50,6 +49,9 @@ class Result:
         self.changed: dict[str, tuple[float, float]] = {}
         self._column = {name: i for i, name in enumerate(units)}
         self.t = rows[:, 0]
+
+    def __getstate__(self):
+        return {**self.__dict__, "model": None if self.model is not None and self.model.signals else self.model}
 
     def __getitem__(self, name: str) -> np.ndarray:
         """The column of this name, shape (samples,), without copying."""

@@ -16,7 +16,7 @@ from . import _library as lib
 from ._progress import watched
 from .results import Result, _nearest
 
-_FIRST_COLUMNS = {"t": "s", "position_residual": "", "velocity_residual": "", "kinetic": "J", "potential": "J", "work": "J",
+_FIRST_COLUMNS = {"t": "s", "residual.position": "", "residual.velocity": "", "kinetic": "J", "potential": "J", "work": "J",
                   "loss": "J", "projection": "J", "balance": "J"}  # of every table, with their units
 _MEMORY = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")  # of the machine [bytes]
 
@@ -97,6 +97,20 @@ def specialised(when: str, steps: float) -> bool:
     return when == "always" or (when == "auto" and steps >= lib.PW_SPECIALISE_STEPS)
 
 
+def warn_of_unused(method: str, given, stacklevel: int) -> None:
+    """Warns of settings (their names) without effect on a method, as the program does."""
+    integrator = c.c_void_p()
+    if lib.core.pw_method_parse(lib.encode(method, "method"), c.byref(integrator), None, None) != lib.PW_OK:
+        return  # opening the run refuses it
+    adaptive, tolerances = lib.core.pw_method_adaptive(integrator, method.encode()), [name for name in ("rtol", "atol") if name in given]
+    if adaptive and "step" in given and not tolerances:
+        warnings.warn(f"step has no effect: {method} chooses its steps by rtol, atol", stacklevel=stacklevel + 1)
+    if not adaptive and "max_steps" in given:
+        warnings.warn(f"max_steps has no effect: {method} takes as many steps as step requires", stacklevel=stacklevel + 1)
+    if not adaptive and tolerances and "step" not in given:
+        warnings.warn(f"{tolerances[0]} has no effect: {method} takes steps of step", stacklevel=stacklevel + 1)
+
+
 def columns(s, ledger) -> tuple[dict, dict]:
     """Of a compiled system: units of all columns by name, in their order; names of columns by group, as in :class:`Result`."""
     n, core = lib.core.pw_system_coordinates(s), lib.core
@@ -107,6 +121,8 @@ def columns(s, ledger) -> tuple[dict, dict]:
     for i, name in enumerate(groups["states"][n:]):
         unit = units[name]
         units[name + "'"] = unit[:-1] + "s^2" if unit.endswith("/s") else unit + "/s"
+    for i in range(2 * core.pw_system_contacts(s)):
+        units[lib.name_of(core.pw_system_contact_name, s, i)] = "m"
     groups["reactions"] = [lib.name_of(core.pw_system_reaction_name, s, i) for i in range(core.pw_system_rows(s))]
     for i, name in enumerate(groups["reactions"]):
         units[name] = lib.text(core.pw_system_reaction_unit(s, i))
@@ -145,9 +161,8 @@ class Simulation:
         self.model, self._system, self._settings = model, system, settings
         self.method, self._given, self._restart = method, given, False
         self._lock, self._steps_per_call = threading.Lock(), 16
-        error = lib.pw_error()
-        self._run = lib.core.pw_run_open(system.pointer, lib.encode(method, "method"), c.byref(settings), c.byref(error))
-        system.check(error)
+        run = system.call(lib.core.pw_run_open, system.pointer, lib.encode(method, "method"), c.byref(settings))
+        self._run = lib.Handle(run, lib.core.pw_run_close, system)
         self.inputs = Inputs(cells, self._input_changed)
         self.changed = self._initial()
 
@@ -155,28 +170,33 @@ class Simulation:
         self._restart = True
 
     def _initial(self):
-        """The attribute `changed`; warns of it."""
-        s, core, report, changed, texts = self._system.pointer, lib.core, lib.core.pw_run_initial(self._run), {}, []
+        """The attribute `changed`; warns of it, and of tables that do not cover the run."""
+        s, core, report, changed, texts = self._system.pointer, lib.core, lib.core.pw_run_initial(self._run.pointer), {}, []
         n, x = core.pw_system_coordinates(s), report.contents
         for i in range(2 * n):
-            if not core.pw_initial_moved(s, report, i):
+            moved = core.pw_initial_moved(s, report, i)
+            if not moved:
                 continue
             name = lib.name_of(core.pw_system_state_name, s, i)
             changed[name] = (x.q_given[i], x.q[i]) if i < n else (x.v_given[i - n], x.v[i - n])
-            if self.model._warns_of(report, i):
+            if moved > 1 and self.model._warns_of(report, i):  # not of rounded values
                 texts.append(f"{name} from {changed[name][0]:.10g} to {changed[name][1]:.10g} {lib.text(core.pw_system_state_unit(s, i))}"
                              + ("" if core.pw_initial_given(report, i) else " (specified by the model)"))
         if texts[8:]:
             texts[8:] = [f"and {len(texts) - 8} more"]
         if texts:
             warnings.warn(f"model {self.model.name}: initial values were changed to satisfy the constraints: {', '.join(texts)}", stacklevel=4)
+        for i in range(core.pw_system_signals(s)):
+            if notice := lib.name_of(core.pw_system_table_notice, s, i, self._settings.span):
+                warnings.warn(f"model {self.model.name}: {notice}", stacklevel=4)
         return changed
 
     def __enter__(self) -> Simulation:
         return self
 
-    def __exit__(self, *_):
-        self.close()
+    def __exit__(self, leaving, *_):
+        with contextlib.suppress(lib.Error) if leaving else contextlib.nullcontext():
+            self.close()
 
     def __reduce_ex__(self, _):
         raise TypeError("an open run cannot be copied or sent to other processes")
@@ -191,20 +211,15 @@ class Simulation:
         try:
             if self._run is None:
                 raise lib.Error("the run is closed")
-            yield self._run
+            yield self._run.pointer
         finally:
             self._lock.release()
 
     def close(self) -> None:
         """Frees the run; a closed one can be closed again."""
         if self._run is not None:
-            with self._used() as run:
+            with self._used():
                 self._run = None
-                lib.core.pw_run_close(run)
-
-    def __del__(self):
-        if self._run is not None:
-            lib.core.pw_run_close(self._run)
 
     @property
     def t(self) -> float:
@@ -216,9 +231,13 @@ class Simulation:
     def statistics(self) -> dict:
         """Numbers of steps and evaluations, in all and by specialised code; largest constraint residuals so far."""
         with self._used() as run:
-            s = lib.core.pw_run_statistics(run).contents
-            return {name: getattr(s, name) for name in ("steps", "rejected", "rhs", "jacobians", "factorisations", "specialised",
-                                                        "position", "velocity", "g", "jv")}
+            return self._statistics(run)
+
+    @staticmethod
+    def _statistics(run):
+        s = lib.core.pw_run_statistics(run).contents
+        return {name: getattr(s, name) for name in ("steps", "rejected", "rhs", "jacobians", "factorisations", "specialised",
+                                                    "position", "velocity", "g", "jv")}
 
     def _columns(self):
         return columns(self._system.pointer, self._settings.ledger)
@@ -274,30 +293,44 @@ class Simulation:
         Returns
         -------
         Result
-            Ctrl-C and failing methods end it early: see ``status`` and ``reason``.
+            A method that fails ends it early: see ``status`` and ``reason``.
 
         Raises
         ------
         InputError, MethodError, ResourceError
             The last two only if the run fails before the first sample.
+        Exception
+            What a function of a signal or ``progress`` raises, or a handler of signals, such as KeyboardInterrupt of
+            Ctrl-C.  Its attribute ``result`` is the Result up to there; the run can continue.
         """
         with self._used() as run:
             t_end = self._later(run, t_end, "t_end")
             times = self._times(lib.core.pw_run_time(run), t_end, every, times)
-            status, reason, rows = "ok", "", _Rows(lib.core.pw_run_record_width(run), 4096 if times is None else len(times))
-            cause: BaseException | None = None
+            rows = _Rows(lib.core.pw_run_record_width(run), 4096 if times is None else len(times))
             try:
-                self._record(run, times, t_end, rows, progress)
-            except KeyboardInterrupt:
-                status, reason = "stopped", f"interrupted at t = {lib.core.pw_run_time(run):.6g} s"
-            except (lib.MethodError, lib.ResourceError) as failure:
-                if rows.count == 0:
-                    raise
-                status, reason, cause = "failed", str(failure), failure.__cause__
-            units, groups = self._columns()
-        result = Result(rows.used, groups, units, status, reason, self.statistics, self.model,
+                call = lib.Call()
+                call.passing(self._record, run, times, t_end, rows, progress, call)
+            except BaseException as failure:
+                in_function = lib.raised_by_function(failure)
+                if in_function:
+                    result = self._result(run, rows, t_end, "failed", f"{in_function}: {type(failure).__name__}: {failure}")
+                elif isinstance(failure, (lib.MethodError, lib.ResourceError)):
+                    result = self._result(run, rows, t_end, "failed", str(failure))
+                    if rows.count:
+                        return result
+                else:
+                    what = "interrupted" if isinstance(failure, KeyboardInterrupt) else f"{type(failure).__name__}: {failure}"
+                    result = self._result(run, rows, t_end, "stopped", f"{what} at t = {lib.core.pw_run_time(run):.6g} s")
+                lib.set_attribute(failure, "result", result)
+                raise
+            return self._result(run, rows, t_end, "ok", "")
+
+    def _result(self, run, rows, t_end, status, reason):
+        """The rows as a Result."""
+        units, groups = self._columns()
+        result = Result(rows.used, groups, units, status, reason, self._statistics(run), self.model,
                         {"method": self.method, "t_end": t_end, **self._given})
-        result.cause, result.changed = cause, self.changed
+        result.changed = self.changed
         return result
 
     @staticmethod
@@ -305,6 +338,8 @@ class Simulation:
         """The times of samples; None: every step."""
         if times is None and every is None:
             return None
+        if times is not None and every is not None:
+            warnings.warn("every has no effect: times are given", stacklevel=4)
         if times is None:
             every = lib.number(every, "every", above=0)
             count = np.floor((t_end - start) / every * (1 + 1e-12))
@@ -321,13 +356,15 @@ class Simulation:
                                  f"found shape {times.shape}")
         return times
 
-    def _record(self, run, times, t_end, rows=None, progress=False):
-        """Advances and adds the samples at these times, or after every step (None), to the rows, which are returned."""
+    def _record(self, run, times, t_end, rows=None, progress=False, call=None):
+        """Advances and adds the samples at these times, or after every step (None), to the rows, which are returned.
+
+        call: the lib.Call that keeps what handlers of signals raise; None: they may raise in finalizers without effect.
+        """
         rows = rows or _Rows(lib.core.pw_run_record_width(run), len(times))
-        start, now, error = lib.core.pw_run_time(run), lib.core.pw_run_time, lib.pw_error()
+        start, now = lib.core.pw_run_time(run), lib.core.pw_run_time
         if self._restart:
-            lib.core.pw_run_restart(run, None, None, c.byref(error))
-            self._system.check(error)
+            self._system.call(lib.core.pw_run_restart, run, None, None)
             self._restart = False
         if times is None:
             self._call(run, np.array([start]), start, rows, 1.0)
@@ -338,16 +375,18 @@ class Simulation:
                 report(min(1.0, done))
                 if self._cancelled():
                     raise KeyboardInterrupt
+                if call and call.failure:
+                    raise call.failure
             report(1.0)
         return rows
 
     def _call(self, run, times, t_end, rows, done):
         """One call of the library, of 40 to 100 ms, so that Python reacts to Ctrl-C soon."""
-        recorded, error, room, began = c.c_long(), lib.pw_error(), rows.room(done), time.perf_counter()
+        recorded, room, began = c.c_long(), rows.room(done), time.perf_counter()
         room = room if times is None else room[:len(times)]
         try:
-            lib.core.pw_run_record(run, t_end, None if times is None else times.ctypes.data, len(room), self._steps_per_call,
-                                   room.ctypes.data, c.byref(recorded), c.byref(error))
+            self._system.call(lib.core.pw_run_record, run, t_end, None if times is None else times.ctypes.data, len(room),
+                              self._steps_per_call, room.ctypes.data, c.byref(recorded))
         finally:
             rows.count += recorded.value
         seconds = time.perf_counter() - began
@@ -355,4 +394,3 @@ class Simulation:
             self._steps_per_call = min(10**7, 2 * self._steps_per_call)
         elif seconds > 0.1:
             self._steps_per_call = max(1, self._steps_per_call // 2)
-        self._system.check(error)

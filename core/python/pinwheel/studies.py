@@ -17,7 +17,7 @@ import numpy as np
 from . import _library as lib
 from . import _program
 from ._progress import watched
-from .simulation import columns, specialised
+from .simulation import columns, specialised, warn_of_unused
 
 # ---- Sweeps ----
 
@@ -27,7 +27,7 @@ def _final(model, parameters, start, method, t_end, settings, cancelled=None):
     Executors call it in threads or other processes; cancelled: a function that says whether to stop.
     """
     varied = model.replace(start=start, **parameters)
-    varied._warns_of = lib.core.pw_initial_given  # as the program does
+    varied._warns_of, varied._warns_of_unused = lib.core.pw_initial_given, False  # as the program does
     end = varied.defaults["t_end"] if t_end is None else t_end
     units, _ = columns(varied._compile()[0].pointer, settings.get("energy"))
     try:
@@ -37,6 +37,10 @@ def _final(model, parameters, start, method, t_end, settings, cancelled=None):
             return simulation.sample(), units, ""
     except (lib.InitialError, lib.MethodError) as failure:
         return {}, units, str(failure)
+    except Exception as failure:
+        if not (reason := lib.raised_by_function(failure)):
+            raise
+        return {}, units, f"{reason}: {type(failure).__name__}: {failure}"
 
 
 def _points(vary):
@@ -57,9 +61,10 @@ def _specialise(model, runs, method, t_end, settings):
     when, given = settings.pop("specialise", "auto"), lib.pw_settings()
     for name in ("step", "rtol"):
         setattr(given, name, model._setting(name, settings.get(name)))
-    method = lib.encode(model.defaults["method"] if method is None else method, "method")
+    method = model.defaults["method"] if method is None else method
+    warn_of_unused(method, [name for name, value in settings.items() if value is not None], 3)
     end = model.defaults["t_end"] if t_end is None else t_end
-    steps = runs * lib.core.pw_method_steps(method, c.byref(given), model.defaults["step"], end)
+    steps = runs * lib.core.pw_method_steps(lib.encode(method, "method"), c.byref(given), model.defaults["step"], end)
     return "always" if specialised(when, steps) else "never"
 
 

@@ -1,9 +1,12 @@
-/* The two library functions that explicit methods call, for scenes small enough to run in a web page: AMD's
- * fill-reducing order and LAPACK's solution by a Cholesky factorisation. */
+/* The functions of libraries that explicit methods call, for scenes small enough to run in a web page: AMD's
+ * fill-reducing order, LAPACK's solution by a Cholesky factorisation, KLU's factorisation. */
 #include <amd.h>
 #include <lapacke.h>
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
+#include "pinwheel.h"
+#include "sparse.h"
 
 enum { LIBRARIES_NODES = 4000 }; /* of a graph, at most: it takes a byte for each pair of nodes */
 
@@ -62,4 +65,59 @@ lapack_int LAPACKE_dposv_work (int layout, char uplo, lapack_int n, lapack_int n
     b[i] /= a[i + i * lda];
   }
   return 0;
+}
+
+/* ---- Factorisation of a sparse matrix (sparse.h) as a dense one, by columns, with partial pivoting ---- */
+
+int pw_sparse_open (pw_sparse *x, pw_sparse_numbers numbers, int n, int64_t *colptr, int64_t *rowind) {
+  *x = (pw_sparse){ .numbers = numbers, .colptr = colptr, .rowind = rowind };
+  x->symbolic = calloc (1, sizeof *x->symbolic);
+  x->factors = n <= LIBRARIES_NODES ? calloc ((size_t)n * (size_t)(n + 1) + 1, sizeof (double)) : NULL;
+  if (x->symbolic) x->symbolic->n = n;
+  return x->symbolic && x->factors ? PW_OK : PW_RESOURCE;
+}
+
+void pw_sparse_close (pw_sparse *x) {
+  free (x->symbolic);
+  free (x->factors);
+}
+
+/* The factors, column by column, and after them the row of each pivot. */
+int pw_sparse_factor (pw_sparse *x, double *value) {
+  const int n = (int)x->symbolic->n;
+  double *a = memset (x->factors, 0, (size_t)n * (size_t)(n + 1) * sizeof (double)), *row = a + n * n;
+  for (int j = 0; j < n; j++)
+    for (int64_t p = x->colptr[j]; p < x->colptr[j + 1]; p++) a[x->rowind[p] + j * n] = value[p];
+  for (int k = 0; k < n; k++) {
+    int best = k;
+    for (int i = k + 1; i < n; i++)
+      if (fabs (a[i + k * n]) > fabs (a[best + k * n])) best = i;
+    if (!(fabs (a[best + k * n]) > 0)) return PW_SINGULAR;
+    row[k] = best;
+    for (int j = 0; j < n; j++) {
+      const double swapped = a[best + j * n];
+      a[best + j * n] = a[k + j * n], a[k + j * n] = swapped;
+    }
+    for (int i = k + 1; i < n; i++) a[i + k * n] /= a[k + k * n];
+    for (int j = k + 1; j < n; j++)
+      for (int i = k + 1; i < n && a[k + j * n] != 0; i++) a[i + j * n] -= a[i + k * n] * a[k + j * n];
+  }
+  return PW_OK;
+}
+
+int pw_sparse_solve (pw_sparse *x, double *right) {
+  const int n = (int)x->symbolic->n;
+  const double *a = (const double *)x->factors, *row = a + n * n;
+  for (int k = 0; k < n; k++) {
+    const int best = (int)row[k];
+    const double swapped = right[best];
+    right[best] = right[k], right[k] = swapped;
+  }
+  for (int k = 0; k < n; k++)
+    for (int i = k + 1; i < n; i++) right[i] -= a[i + k * n] * right[k];
+  for (int k = n - 1; k >= 0; k--) {
+    right[k] /= a[k + k * n];
+    for (int i = 0; i < k; i++) right[i] -= a[i + k * n] * right[k];
+  }
+  return PW_OK;
 }

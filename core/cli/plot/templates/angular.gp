@@ -21,6 +21,7 @@ detail = most_extrema < 30 ? 0 : most_extrema <= 60 ? 0.2 : most_extrema <= 120 
 title = 'angular velocities'.(detail > 0 ? ', and their last part in detail' : '')
 panel_height = detail > 0 ? 112.0 : narrow ? 130.0 : 170.0
 omega_exponent = power(omega_min, omega_max)
+left = margin_of(omega_min, omega_max, omega_exponent)
 height = top + panel_height + (detail > 0 ? 30 + panel_height : 0) + bottom
 do for [form in forms] {
   eval page(form)
@@ -29,7 +30,7 @@ do for [form in forms] {
   set ylabel axis('ω', 'rad/s', omega_exponent)
   set xrange [0:t_end]
   eval panel(left, width - right, top, top + panel_height)
-  eval yrange(omega_min, omega_max, omega_exponent)
+  eval range('y', omega_min, omega_max, omega_exponent)
   eval draw(1, 7, omega_exponent, 1)
   if (detail > 0) {
     set xrange [t_end*(1 - detail):t_end]

@@ -22,8 +22,3 @@ draw(x, y, n, titled) = numbered ? \
   sprintf('plot data using %d:($%d/1e%d):%d with lines lw 0.7 dt 1 lc palette', x, y, n, number_column) : \
   sprintf('plot for [i = 1:curves] data index i - 1 using %d:($%d/1e%d) with lines lt i ', x, y, n). \
   (titled ? 'title short(label[i])' : 'notitle')
-
-# gnuplot chooses the range unless the values are nearly constant.
-yrange(lo, hi, n) = (largest = max(abs(lo), abs(hi)), edge = largest > 0 ? 0.1*largest : 1, \
-  hi - lo > 1e-6*largest ? 'set yrange [*:*]' : \
-  sprintf('set yrange [%.9g:%.9g]', (lo - edge)/10.0**n, (hi + edge)/10.0**n))

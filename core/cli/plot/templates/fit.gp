@@ -6,7 +6,21 @@
 
 title = 'data and fitted model'
 left = 58.0 # for the digits of residuals
-gap = 64.0
+array lowest[2*panels] # of the data and the model, then of the residuals
+array highest[2*panels]
+do for [i = 1:panels] {
+  stats 'fit.dat' index i - 1 using 2 name 'data' nooutput
+  stats 'fit.dat' index i - 1 using 4 name 'model' nooutput
+  stats 'fit.dat' index i - 1 using (column(4) - column(2)) name 'residual' nooutput
+  stats 'fit.dat' index i - 1 using (weighted ? column(3) : 0) name 'sigma' nooutput
+  lowest[i] = min(data_min, model_min) - sigma_max
+  highest[i] = max(data_max, model_max) + sigma_max
+  lowest[panels + i] = residual_min - sigma_max
+  highest[panels + i] = residual_max + sigma_max
+  left = margin_of(lowest[i], highest[i], 0)
+  left = margin_of(lowest[panels + i], highest[panels + i], 0)
+}
+gap = left + 6
 eval two_columns
 panel_height = panel_width*(panel_columns == 1 ? 0.5 : 0.6)
 residual_height = max(0.6*panel_height, 66.0)
@@ -33,11 +47,13 @@ do for [form in forms] {
     set format y '%g'
     set xlabel ''
     set ylabel label[i] noenhanced
+    eval range('y', lowest[i], highest[i], 0)
     eval bars(i, 'column(2)').', "" index '.(i - 1).' using 1:4 with lines ls 2 notitle'
     eval panel(x, x + panel_width, y + panel_height + 8, y + panel_height + 8 + residual_height)
     set format x '%g'
     set xlabel 't [s]'
     set ylabel 'residual'
+    eval range('y', lowest[panels + i], highest[panels + i], 0)
     eval bars(i, 'column(4) - column(2)')
   }
   eval finish

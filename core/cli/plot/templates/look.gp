@@ -43,18 +43,24 @@ right = 12.0
 bottom = 32.0
 narrow = width < 300 # one column of a page with two
 
-# Breaks a text between words, with `between` in place of the blank, into lines of at most n characters, if possible.
-space(s, n) = n < 2 || s[n:n] eq ' ' ? n : space(s, n - 1)
-wrap(s, n, between) = strlen(s) <= n || space(s, n) < 2 ? s : \
-  s[1:space(s, n) - 1].between.wrap(s[space(s, n) + 1:*], n, between)
-# The title begins with a capital; the special characters of enhanced text are escaped.
-escaped = ''
-do for [i = 1:strlen(about)] {
-  c = about[i:i]
-  small = i == 1 ? strstrt('abcdefghijklmnopqrstuvwxyz', c) : 0
-  escaped = escaped.(strstrt('\_^{}@&~', c) ? '\' : '').(small ? 'ABCDEFGHIJKLMNOPQRSTUVWXYZ'[small:small] : c)
+# The title begins with a capital, and has lines of at most `letters` characters, broken between words where possible; the
+# special characters of enhanced text are escaped.
+heading = ''
+remains = about
+letters = int((width - 16)/5.2)
+while (strlen(remains)) {
+  cut = min(letters, strlen(remains))
+  if (cut < strlen(remains)) {
+    do for [i = 2:letters + 1] { if (remains[i:i] eq ' ') { cut = i - 1 } }
+  }
+  do for [i = 1:cut] {
+    c = remains[i:i]
+    small = i == 1 && !strlen(heading) ? strstrt('abcdefghijklmnopqrstuvwxyz', c) : 0
+    heading = heading.(strstrt('\_^{}@&~', c) ? '\' : '').(small ? 'ABCDEFGHIJKLMNOPQRSTUVWXYZ'[small:small] : c)
+  }
+  remains = remains[cut + (remains[cut + 1:cut + 1] eq ' ' ? 2 : 1):*]
+  if (strlen(remains)) { heading = heading."}\n{/*1.13 " }
 }
-heading = wrap(escaped, int((width - 16)/5.2), "}\n{/*1.13 ")
 top = 30.0 # end of the title; templates add the legend
 do for [i = 1:strlen(heading)] { if (heading[i:i] eq "\n") { top = top + 11 } }
 
@@ -94,4 +100,14 @@ short(s) = strlen(s) > 24 ? s[1:24].'…' : s
 # The exponent of a power of ten in the label of an axis, instead of long numbers at its tics; 0: none.
 power(lo, hi) = (largest = max(abs(lo), abs(hi)), exponent = largest > 0 ? int(floor(log10(largest))) : 0, \
                  exponent > 3 || exponent < -2 ? exponent : 0)
+# The range of axis z of values from lo to hi in units of 10^n: gnuplot chooses it unless they are nearly constant.
+range(z, lo, hi, n) = (largest = max(abs(lo), abs(hi)), edge = largest > 0 ? 0.1*largest : 1, \
+  hi - lo > 1e-6*largest ? sprintf('set %srange [*:*]', z) : \
+  sprintf('set %srange [%.15g:%.15g]', z, (lo - edge)/10.0**n, (hi + edge)/10.0**n))
+# The left margin for the label and tics of such a y axis.
+margin_of(lo, hi, n) = (largest = max(abs(lo), abs(hi))/10.0**n, extent = abs(hi - lo)/10.0**n, \
+  extent = max(extent, largest*(extent > 1e-6*largest ? 1e-6 : 0.2)), \
+  whole = largest > 0 ? int(floor(log10(largest))) : 0, step = extent > 0 ? int(floor(log10(extent/5))) : 0, \
+  digits = abs(whole) > 4 ? max(whole - step, 0) + 6 : max(whole, 0) + 1 + (step < 0 ? 1 - step : 0), \
+  max(left, 22 + 5.5*(digits + (lo < 0))))
 axis(label, unit, n) = label.' ['.(n ? sprintf('10^{%d} ', n) : '').unit.']'

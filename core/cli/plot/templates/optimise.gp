@@ -6,7 +6,16 @@
 # run, the unknowns, the output, 1 if the constraints are satisfied.
 
 title = 'runs of the optimisation'
-gap = 40.0
+stats 'optimise.dat' using 2 + unknowns name 'output' nooutput
+left = margin_of(output_min, output_max, 0)
+gap = left - 4
+array lowest[panels]
+array highest[panels]
+do for [i = 1:panels] {
+  stats 'optimise.dat' using 1 + i name 'unknown' nooutput
+  lowest[i] = unknown_min
+  highest[i] = unknown_max
+}
 eval two_columns
 panel_height = panel_width*(panel_columns == 1 ? 0.6 : 0.7)
 legend_top = top
@@ -27,7 +36,9 @@ do for [form in forms] {
     y = top + ((i - 1)/panel_columns)*(panel_height + gap)
     eval panel(x, x + panel_width, y, y + panel_height)
     set xlabel label[i] noenhanced
-    set ylabel (x == left ? short(objective) : '') noenhanced
+    set ylabel (x == left ? objective : '') noenhanced
+    eval range('x', lowest[i], highest[i], 0)
+    eval range('y', output_min, output_max, 0)
     plot 'optimise.dat' using 1 + i:(column(3 + unknowns) == 0 ? column(2 + unknowns) : NaN) with points ls 2 notitle, \
       '' using 1 + i:(column(3 + unknowns) == 1 ? column(2 + unknowns) : NaN) with points ls 1 notitle, \
       '+' using (best[i]):(value) every 100000 with points ls 3 notitle

@@ -27,18 +27,17 @@ if (branch) {
   do for [k = 1:3] { panels = panels + (high[k] - low[k] > 1e-9*abs(high[k])) }
   first_height = panels*(panel_height + 10) - 10
 } else {
-  x_min = 1e300
-  x_max = -1e300
-  y_min = 1e300
-  y_max = -1e300
-  do for [i = 1:bodies] {
-    stats data index 0 using (column(4*i - 2)) name 'a' nooutput
-    x_min = min(x_min, a_min)
-    x_max = max(x_max, a_max)
-    stats data index 0 using (column(4*i - 1)) name 'a' nooutput
-    y_min = min(y_min, a_min)
-    y_max = max(y_max, a_max)
-  }
+  array lowest[4] = [1e300, 1e300, 1e300, 1e300] # of x, y, phi, omega
+  array highest[4] = [-1e300, -1e300, -1e300, -1e300]
+  do for [i = 1:bodies] { do for [k = 1:4] {
+    stats data index 0 using (column(4*i - 3 + k)) name 'a' nooutput
+    lowest[k] = min(lowest[k], a_min)
+    highest[k] = max(highest[k], a_max)
+  }}
+  x_min = lowest[1]
+  x_max = highest[1]
+  y_min = lowest[2]
+  y_max = highest[2]
   edge = 0.05*max(x_max - x_min, y_max - y_min)
   if (edge < 1e-9) { edge = 0.1 }
   first_height = full_width*min(max((y_max - y_min + 2*edge)/(x_max - x_min + 2*edge), 0.2), 0.6)
@@ -75,7 +74,8 @@ do for [form in forms] {
       for [i = 1:bodies] '' index 0 using (column(4*i - 2)):(column(4*i - 1)) every 400 with points pt 7 ps 0.5 \
         lc rgb colour(i) notitle
     unset key
-    set autoscale
+    eval range('x', lowest[3], highest[3], 0)
+    eval range('y', lowest[4], highest[4], 0)
     set offsets graph 0.05,graph 0.05,graph 0.05,graph 0.05
     set xlabel 'φ [rad]'
     set ylabel 'ω [rad/s]'

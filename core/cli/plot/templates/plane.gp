@@ -34,11 +34,22 @@ do for [i = 1:panels] {
 }
 do for [i = 1:panels] {
   edge = 0.05*max(x1[i] - x0[i], y1[i] - y0[i])
-  if (edge == 0) { edge = 1 }
+  # not below the resolution of the data, 10 digits
+  if (edge <= 1e-9*max(max(abs(x0[i]), abs(x1[i])), max(abs(y0[i]), abs(y1[i])))) {
+    edge = max(1, 1e-6*max(max(abs(x0[i]), abs(x1[i])), max(abs(y0[i]), abs(y1[i]))))
+  }
   x0[i] = x0[i] - edge
   x1[i] = x1[i] + edge
   y0[i] = y0[i] - edge
   y1[i] = y1[i] + edge
+}
+# Far from the origin, and for very long or short motions, the tics of an axis count from a round number, in units of a
+# power of ten; otherwise gnuplot chooses them.
+origin(lo, hi) = max(abs(lo), abs(hi)) < 2e3*(hi - lo) ? 0 : \
+  (unit = 10.0**(floor(log10(hi - lo)) + 1), unit*floor(0.5*(lo + hi)/unit + 0.5))
+do for [i = 1:panels] {
+  from = origin(y0[i], y1[i])
+  left = margin_of(y0[i] - from, y1[i] - from, power(y0[i] - from, y1[i] - from))
 }
 aspect(i, least, most) = min(max((y1[i] - y0[i])/(x1[i] - x0[i]), least), most)
 most_height = narrow ? 300.0 : 380.0 # highest panel
@@ -64,9 +75,9 @@ if (panels == 1) {
   px0[2] = left
   px1[2] = left + full_width
 } else { # side by side
-  panel_width = full_width - 40
+  panel_width = full_width - (left - 4)
   px1[1] = left + 0.4*panel_width
-  px0[2] = px1[1] + 40
+  px0[2] = px1[1] + left - 4
   px1[2] = left + full_width
   py0[1] = top + 13
   py0[2] = py0[1]
@@ -92,7 +103,27 @@ do for [i = 1:panels] {
   y0[i] = y - 0.5*high
   y1[i] = y + 0.5*high
 }
-axes = "set xlabel 'x [m]'; set ylabel 'y [m]'; unset xzeroaxis"
+# Tics and label of axis k: x of panel 1, y of panel 1, ...
+array tics[2*panels]
+array label_of[2*panels]
+do for [k = 1:2*panels] {
+  i = (k + 1)/2
+  lo = k % 2 ? x0[i] : y0[i]
+  hi = k % 2 ? x1[i] : y1[i]
+  from = origin(lo, hi)
+  n = power(lo - from, hi - from)
+  label_of[k] = axis((k % 2 ? 'x' : 'y').(from != 0 ? sprintf(from < 0 ? ' + %.12g' : ' − %.12g', abs(from)) : ''), 'm', n)
+  tics[k] = ''
+  unit = 10.0**floor(log10((hi - lo)/6))
+  step = unit*((hi - lo)/unit < 9 ? 1 : (hi - lo)/unit < 21 ? 2 : (hi - lo)/unit < 45 ? 5 : 10)
+  do for [j = int(ceil((lo - from)/step)):(n || from != 0 ? int(floor((hi - from)/step)) : -2147483647)] {
+    tics[k] = tics[k].sprintf(", '%s%g' %.15g", j < 0 ? '−' : '', abs(j*step/10.0**n), from + j*step)
+  }
+  tics[k] = strlen(tics[k]) ? '('.tics[k][3:*].')' : 'autofreq'
+}
+axes = 'unset xzeroaxis'
 place(i) = panel(px0[i], px1[i], py0[i], py1[i]). \
-  sprintf('; set xrange [%.9g:%.9g]; set yrange [%.9g:%.9g]', x0[i], x1[i], y0[i], y1[i]). \
+  sprintf("; set xlabel '%s'; set ylabel '%s'; ", label_of[2*i - 1], label_of[2*i]). \
+  sprintf('set xtics %s; set ytics %s; ', tics[2*i - 1], tics[2*i]). \
+  sprintf('set xrange [%.15g:%.15g]; set yrange [%.15g:%.15g]', x0[i], x1[i], y0[i], y1[i]). \
   (panels == 1 ? '' : i == 1 ? "; set title 'whole run'" : sprintf("; set title 'the first %.3g s'", t_closeup))

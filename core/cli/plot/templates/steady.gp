@@ -15,7 +15,8 @@ height = top + 3*panel_height + 10 + bottom + 6 + bottom
 slow = 5*max(re_max, im_max)
 if (slow > -5e-3*re_min) { re_min = max(re_min, -slow) }
 unset offsets
-margin = 0.04*max(re_max - re_min, 1e-3)
+margin = max(0.04*max(re_max - re_min, 1e-3), 0.05*max(abs(re_min), abs(re_max))*(re_max - re_min < 1e-3*abs(re_min)))
+left = margin_of(re_min - margin, re_max + margin, 0)
 bar_low = re_min - margin # vertical lines across the panel
 bar_length = re_max - re_min + 2*margin
 do for [form in forms] {
