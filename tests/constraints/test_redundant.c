@@ -370,6 +370,70 @@ static void many_check (int kind, const char *method) {
   runs_close (one, twin);
 }
 
+/* Subtracts from n numbers their part in the direction `from`, unless that is round-off. */
+static void many_subtract (double *to, const double *from, int n) {
+  double dot = 0, square = 0;
+  for (int i = 0; i < n; i++) dot += to[i] * from[i], square += from[i] * from[i];
+  for (int i = 0; i < n && square > 1e-20; i++) to[i] -= dot / square * from[i];
+}
+
+/* Multipliers of least norm are combinations of the columns of J. */
+TEST (least_norm) {
+  static const int kind[] = { PINS_APART, WHEELS, RODS };
+  for (int k = 0; k < 3; k++) {
+    pw_system *s = scene_system (&many_build_table, "kind", (double)kind[k], "count", 9., NULL);
+    pw_run *r = runs_open (s, "rk4+projection", NULL);
+    pw_sample x = runs_to (r, 0.1);
+    pw_equations eq = { .rows = 0 };
+    double rest[40], size = 0, column[MANY_COORDS][40] = { { 0 } };
+    check_ok (pw_system_equations (s, x.t, x.q, x.v, &eq, NULL), NULL);
+    for (int n = 0; n < eq.entries; n++) column[eq.column[n]][eq.row[n]] = eq.value[n];
+    for (int i = 0; i < eq.rows; i++) rest[i] = x.lambda[i], size += rest[i] * rest[i];
+    for (int j = 0; j < MANY_COORDS; j++) {
+      for (int l = 0; l < j; l++) many_subtract (column[j], column[l], eq.rows);
+      many_subtract (rest, column[j], eq.rows);
+    }
+    for (int i = 0; i < eq.rows; i++) check_close (many_name[kind[k]], rest[i] / sqrt (size), 0, 1e-11, "round-off");
+    assert_true (pw_run_redundant (r) > 7);
+    pw_equations_free (&eq);
+    runs_close (r, s);
+  }
+}
+
+enum { LINKS = 100 };
+static const pw_parameter links_list[] = { { .name = "pins", .about = "that hold the first one" }, { .name = NULL } };
+
+SCENE_WITH (links_build, links_list, double) {
+  char link[20] = "ground", before[20], pin[20];
+  for (int i = 0; i < LINKS; i++) {
+    strcpy (before, link);
+    snprintf (link, sizeof link, "link%d", i);
+    snprintf (pin, sizeof pin, "pin%d", i);
+    pw_add_body (m, &(pw_body){ .name = link, .mass = 1, .inertia = 0.1, .start = { i + 0.5, 0, 0 } });
+    pw_add_pin (m, &(pw_pin){ .name = pin, .body = { before, link }, .at = { { i ? 0.5 : 0, 0 }, { -0.5, 0 } } });
+  }
+  for (int i = 1; i < *p; i++) {
+    snprintf (pin, sizeof pin, "more%d", i);
+    pw_add_pin (m, &(pw_pin){ .name = pin, .body = { "link50", "link51" }, .at = { { 0.5, 0 }, { -0.5, 0 } } });
+  }
+  pw_add_gravity (m, &(pw_gravity){ .name = "gravity", .acceleration = { 0, -9.81 } });
+}
+
+/* A chain with a pin in three parts: in a large scene the other equations are found to be independent by their pattern. */
+TEST (chain) {
+  pw_system *s = scene_system (&links_build_table, "pins", 3., NULL),
+            *twin = scene_system (&links_build_table, "pins", 1., NULL);
+  pw_run *r = runs_open (s, "rk4+projection", NULL), *one = runs_open (twin, "rk4+projection", NULL);
+  pw_sample x = runs_to (r, 0.02), y = runs_to (one, 0.02);
+  char text[300];
+  assert_int_equal (pw_run_redundant (r), 4);
+  for (int i = 0; i < 4; i++)
+    assert_non_null (strstr (pw_run_redundancy (r, i, text, sizeof text), "pin51"));
+  for (int j = 0; j < 3 * LINKS; j++) check_close ("position", x.q[j], y.q[j], 1e-11, "the same equations: round-off");
+  runs_close (r, s);
+  runs_close (one, twin);
+}
+
 TEST (many) {
   struct rusage before, after;
   getrusage (RUSAGE_SELF, &before);

@@ -159,12 +159,17 @@ TEST (order_with_slots) {
   platform_check (1);
 }
 
+static const pw_parameter bent_leg_list[] = { { .name = "base", .about = "1: the leg stands on a body" },
+                                              { .name = NULL } };
+
 /* A platform with free arms, on a leg of two links that is bent. */
-SCENE (bent_leg_build) {
+SCENE_WITH (bent_leg_build, bent_leg_list, double) {
+  const char *below = *p != 0 ? "base" : "ground";
+  if (*p != 0) pw_add_body (m, &(pw_body){ .name = "base", .mass = 1, .inertia = 1, .start = { 0, 1, 0 } });
   pw_add_body (m, &(pw_body){ .name = "thigh", .mass = 0.2, .inertia = 0.01, .start = { 0, 0, 0.5 } });
   pw_add_body (m, &(pw_body){ .name = "shank", .mass = 0.2, .inertia = 0.01 });
   pw_add_body (m, &(pw_body){ .name = "platform", .mass = 1, .inertia = 0.3 });
-  pw_add_pin (m, &(pw_pin){ .name = "hip", .body = { "ground", "thigh" }, .at = { { 0, 1 }, { 0, 0.5 } } });
+  pw_add_pin (m, &(pw_pin){ .name = "hip", .body = { below, "thigh" }, .at = { { 0, *p != 0 ? 0 : 1 }, { 0, 0.5 } } });
   pw_add_pin (m, &(pw_pin){ .name = "knee", .body = { "thigh", "shank" }, .at = { { 0, -0.5 }, { 0, 0.5 } } });
   pw_add_pin (m, &(pw_pin){ .name = "foot", .body = { "shank", "platform" }, .at = { { 0, -0.5 }, { 0, 0 } } });
   for (int i = 0; i < PLATFORM_LEGS; i++) {
@@ -176,19 +181,57 @@ SCENE (bent_leg_build) {
   }
 }
 
-/* A stretched leg is singular for a platform at rest, not for one that moves. */
-TEST (stretched_leg) {
-  pw_system *s = scene_system (&bent_leg_build_table, NULL);
+/* A stretched leg is singular for a platform at rest, not for one that moves; also if it stands on a body whose centre
+ * does not move. */
+static void stretched_leg (int on_base) {
+  pw_system *s = scene_system (&bent_leg_build_table, "base", (double)on_base, NULL);
   pw_workspace *w = pw_workspace_new (s, NULL);
-  double *q = calloc ((size_t)s->coords, sizeof *q);
+  double *q = calloc (2 * (size_t)s->coords, sizeof *q), *weight = q + s->coords;
   int row;
-  pw_saddle *k = condense_open (w, s->mass);
+  memcpy (weight, s->mass, (size_t)s->coords * sizeof *weight);
+  if (on_base) weight[0] = weight[1] = INFINITY, q[1] = 1;
+  pw_saddle *k = condense_open (w, weight);
   assert_int_equal (pw_saddle_factor (k), PW_OK);
   assert_int_equal (pw_update_kinematics (w, 0, q, s->v0), PW_OK);
   pw_evaluate_J (w);
   assert_int_equal (pw_saddle_factor (k), PW_OK);
   assert_true (pw_saddle_sine (k, &row) > 0.05);
   free (q);
+  pw_saddle_close (k);
+  pw_workspace_free (w);
+  pw_system_free (s);
+}
+
+TEST (stretched_leg) {
+  for (int on_base = 0; on_base < 2; on_base++) stretched_leg (on_base);
+}
+
+enum { CART_WHEELS = 50 };
+
+SCENE (cart_build) {
+  char name[20];
+  pw_add_body (m, &(pw_body){ .name = "cart", .mass = 1, .inertia = 1 });
+  for (int i = 0; i < CART_WHEELS; i++) {
+    snprintf (name, sizeof name, "wheel%d", i);
+    pw_add_rolling_wheel (
+        m,
+        &(pw_rolling_wheel){ .name = name, .body = "cart", .at = { 0, sin (i) }, .radius = 0.1, .inertia = 0.001 });
+  }
+}
+
+/* Wheels that roll are coupled with their body only. */
+TEST (rolling_wheels) {
+  pw_system *s = scene_system (&cart_build_table, NULL);
+  pw_workspace *w = pw_workspace_new (s, NULL);
+  unsigned char active[2 * CART_WHEELS];
+  pw_error error = { 0 };
+  for (int i = 0; i < s->rows; i++) active[i] = i == 0 || i % 2 == 1;
+  assert_int_equal (pw_update_kinematics (w, 0, s->q0, s->v0), PW_OK);
+  pw_evaluate_J (w);
+  pw_saddle *k = pw_saddle_open (w, s->mass, s->rows, active, &error);
+  check_ok (k ? PW_OK : error.status, &error);
+  assert_int_equal (pw_saddle_factor (k), PW_OK);
+  assert_in_range (k->block->values, CART_WHEELS, 10 * CART_WHEELS);
   pw_saddle_close (k);
   pw_workspace_free (w);
   pw_system_free (s);
