@@ -200,7 +200,7 @@ $(BUILD)/obj/core/cli/plot/templates.inc: $(wildcard core/cli/plot/templates/*.g
 WASM_FLAGS := --target=wasm32-wasi -std=c11 -O2 -ffp-contract=off -ffunction-sections -fdata-sections \
   -D_POSIX_C_SOURCE=200809L -D_WASI_EMULATED_SIGNAL -include core/cli/page/engine/wasi.h '-DPW_METHODS=PW_METHOD (rk4) PW_METHOD (erk5) PW_METHOD (erk8)' \
   $(call layer,$(CORE_LAYERS) core/kinds $(SOLVER_LAYERS) $(FILE_LAYERS) core/cli core/cli/plot $(BUILD)/obj/core/cli/plot) $(SYSTEM)
-WASM       := $(filter-out solvers/jacobian/sparse.c solvers/analysis/% solvers/linear/% solvers/variation/% solvers/run/timing.c solvers/implicit/% solvers/sundials/% core/specialise/specialise_%,$(CORE) $(SOLVERS)) \
+WASM       := $(filter-out solvers/jacobian/sparse.c solvers/analysis/% solvers/linear/% solvers/run/timing.c solvers/implicit/% solvers/sundials/% core/specialise/specialise_%,$(CORE) $(SOLVERS)) \
   $(filter-out core/files/yaml/yaml_tree.c,$(wildcard core/files/expression/*.c core/files/yaml/*.c)) \
   $(addprefix core/files/,number.c path.c write/json.c load/columns.c load/units.c load/read.c) $(addprefix core/cli/plot/,plot_samples.c plot_shapes.c plot_symbols.c plot_figures.c animate.c) \
   $(wildcard core/cli/page/engine/*.c)

@@ -15,6 +15,8 @@ typedef struct {
   double value;
 } pw_initial_value;
 
+struct pw_sample;
+
 /* How to integrate; zeros select the defaults. */
 typedef struct {
   double t; /* initial time [s] */
@@ -25,6 +27,14 @@ typedef struct {
   double rtol; /* adaptive methods: relative tolerance; default PW_RTOL */
   double atol; /* absolute tolerance of every state; default rtol x (L, 1 rad, L/T, 1/T), see pw_scale */
   int ledger;  /* 1: samples contain the work or loss of each element, and the energy added by projections */
+
+  /* Integrals over the run, from its initial time on, of `integrals` functions of its state, by the method's stages and
+   * in its error control, like work and losses.  `integrand` stores the functions at a state, a sample of which only t,
+   * q, v, lambda, kinetic, potential and, in place of ledger, work and loss, their rates [W] are set.  Runs with
+   * integrals do not use specialised code. */
+  int integrals;
+  void (*integrand) (void *context, const struct pw_sample *state, double *value);
+  void *integrand_context;
 
   /* Limits of long runs. */
   long max_steps; /* adaptive methods: attempted steps, including rejected ones; default PW_MAX_STEPS */
@@ -69,7 +79,7 @@ typedef struct {
 } pw_statistics;
 
 /* The state at one time.  The arrays belong to the run and are valid until the next call. */
-typedef struct {
+typedef struct pw_sample {
   double t;
   const double *q, *v;  /* coordinates and velocities: pw_system_coordinates each */
   const double *a;      /* accelerations */
@@ -83,6 +93,7 @@ typedef struct {
   double loss;          /* dissipated since the initial time [J] */
   double projection;    /* energy added by projections after steps [J]; 0 without pw_settings.ledger, and with bdf */
   double balance;       /* change of (kinetic + potential) - work + loss - projection [J] */
+  const double *integral; /* pw_settings.integrals */
 } pw_sample;
 
 /* Entries of the energy ledger: work or loss of an element.  Their names are like "rider.work", "damper.loss";

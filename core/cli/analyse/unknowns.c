@@ -38,7 +38,7 @@ int pw_unknowns_open (pw_unknowns *u, const pw_cli_line *line, const pw_cli_mode
   if (status != PW_OK) return status;
   u->settings.stop = NULL;
   if (u->settings.rtol == 0)
-    u->settings.rtol = PW_RTOL; /* sensitivity.c estimates errors by runs with a multiple of it */
+    u->settings.rtol = PW_RTOL;
   u->limit = limit.seconds;
   pw_cli_report_unused (u->method, line);
   return PW_OK;
@@ -162,7 +162,6 @@ int pw_unknown_run_prepare (pw_unknown_run *to, const pw_unknowns *u, const doub
 
 void pw_unknown_run_close (pw_unknown_run *run) {
   pw_run_close (run->run);
-  pw_workspace_free (run->workspace);
   pw_cli_close_model (&run->m);
   *run = (pw_unknown_run){ .run = NULL };
 }
@@ -178,65 +177,12 @@ void pw_unknowns_report (const pw_unknowns *u, const double *x) {
   pw_unknown_run_close (&r);
 }
 
-/* ---- Directions ---- */
-
-/* u->step if that is not 0, else PW_UNKNOWN_STEP times the typical size of the unknown: |value|, but at least 0.1 rad
- * for angles, the unit of the scene for states, 1e-3 of the scale in searches; for a parameter that is 0 its default
- * value, or 1 if that is 0, too. */
-static double unknown_step (const pw_unknown *u, double value, const pw_run *r) {
-  if (u->step > 0) return u->step;
+void pw_unknown_measure (pw_unknown *u, double value, const pw_run *r) {
   double size = fabs (value), length = pw_run_scale (r)->length, time = pw_run_scale (r)->time;
   if (strcmp (u->unit, "rad") == 0) size = fmax (size, 0.1);
   if (u->state >= 0) size = fmax (size, (*u->unit == 'm' ? length : 1) / (strchr (u->unit, 's') ? time : 1));
   if (size == 0 && u->parameter) size = fabs (u->parameter->value);
-  return PW_UNKNOWN_STEP * fmax (size > 0 ? size : 1, 1e-3 * u->scale);
-}
-
-/* Keeps the neighbours within the domain of a parameter: in the open domain > 0 by a step of at most value / 4, next to
- * a bound that belongs to the domain, 0 or 1, by neighbours on its inner side alone. */
-static void unknown_stay_inside (const pw_unknown *u, double value, pw_direction *d) {
-  pw_domain domain = u->parameter ? u->parameter->domain : PW_REAL;
-  if (domain == PW_POSITIVE) d->step = fmin (d->step, value / 4);
-  d->one_sided = (domain == PW_NONNEGATIVE || domain == PW_FRACTION) && value - 2 * d->step < 0;
-  if (domain != PW_FRACTION || value + 2 * d->step <= 1) return;
-  d->one_sided = 1;
-  d->step = -d->step;
-}
-
-static int unknown_same_size (const pw_system *a, const pw_system *b) {
-  return pw_system_elements (a) == pw_system_elements (b) && pw_system_coordinates (a) == pw_system_coordinates (b) &&
-         pw_system_rows (a) == pw_system_rows (b);
-}
-
-static int unknown_direction (pw_direction *d, const pw_unknowns *u, int i, double *x, const pw_unknown_run *run,
-                              pw_unknown_run *neighbours, pw_error *error) {
-  const double value = x[i];
-  pw_settings general = run->settings;
-  general.specialised = NULL;
-  int status = PW_OK;
-  *d = (pw_direction){ .step = unknown_step (&u->list[i], value, run->run) };
-  unknown_stay_inside (&u->list[i], value, d);
-  for (int k = 0; k < 4 && status == PW_OK; k++) {
-    pw_unknown_run *near = neighbours + k;
-    x[i] = value + pw_direction_offset (d, k);
-    status = pw_unknowns_system (&near->m, u, x, error);
-    if (status == PW_OK && !unknown_same_size (run->m.system, near->m.system))
-      status = pw_fail (error, PW_INPUT,
-                        "%s changes the number of bodies or elements: derivatives with respect to it do not exist",
-                        u->list[i].name);
-    if (status == PW_OK) d->neighbour[k] = near->run = pw_run_open (near->m.system, u->method, &general, error);
-    if (status == PW_OK && near->run == NULL) status = error->status;
-  }
-  x[i] = value;
-  return status;
-}
-
-int pw_unknowns_directions (pw_direction *d, const pw_unknowns *u, double *x, const pw_unknown_run *run,
-                            pw_unknown_run *neighbours, pw_error *error) {
-  int status = PW_OK;
-  for (int i = 0; i < u->count && status == PW_OK; i++)
-    status = unknown_direction (d + i, u, i, x, run, neighbours + 4 * i, error);
-  return status;
+  u->size = size > 0 ? size : 1;
 }
 
 /* ---- Starts and results of searches ---- */
