@@ -91,6 +91,7 @@ typedef struct {
   double derivative, error; /* error INFINITY: none */
   double noise;             /* the part of the error that is due to the runs */
   double below, above;      /* one-sided ones if they differ by more than their errors; else NaN */
+  double jump;              /* of the one-sided derivatives at the smallest step where they differ; 0: nowhere */
   int same;                 /* 1: all values are the same */
 } difference_estimate;
 
@@ -159,9 +160,13 @@ static difference_estimate difference_at (const difference *x, const difference_
   if (e.same) noise = 4 * DBL_EPSILON * fabs (f0);
   for (int k = 0; k < MOST && most == MOST && l->side == 0; k++) sixth += binomial[k / 2] * f[k * n];
   const double fine = difference_formula (l->side, most, f0, f, n, &size),
-               coarse = most > 2 ? difference_formula (l->side, most - 2, f0, f, n, &least) : fine;
+               coarse = most > 2 ? difference_formula (l->side, most - 2, f0, f, n, &least) : fine,
+               coarsest = most > 4 ? difference_formula (l->side, most - 4, f0, f, n, &least) : coarse;
+  double remainder = fabs (fine - coarse);
+  /* formulas whose remainders do not decrease do not converge yet */
+  if (most > 4 && remainder > noise * size && remainder > 0.1 * fabs (coarse - coarsest)) remainder *= 10;
   e.derivative = fine / h, e.noise = noise * size / fabs (h);
-  e.error = fabs (fine - coarse) / fabs (h) + e.noise;
+  e.error = remainder / fabs (h) + e.noise;
   if (most == MOST && l->side == 0) e.error = fmax (e.error, fabs (sixth) / 10 * size / fabs (h));
   if (!isfinite (e.error)) return e.derivative = NAN, e.error = INFINITY, e;
   if (l->side || most < MOST) return e;
@@ -245,8 +250,24 @@ static int difference_evaluate (difference *x) {
 
 /* ---- The choice of levels ---- */
 
-/* The estimate of output i by parameter p: that of the level of least error, which grows by the contradiction of the
- * best other level; *best: this level, or -1. */
+/* By how much the estimate of level a contradicts those with smaller steps, which are nearer to a derivative; that with
+ * the smallest step, the next larger one. */
+static double difference_contradiction (const difference_parameter *p, const difference_estimate *e, int a) {
+  double most = 0;
+  int next = -1, finest = 1;
+  for (int b = 0; b < p->levels; b++) {
+    if (b == a || !isfinite (e[b].error)) continue;
+    const int finer = p->level[b].decade > p->level[a].decade;
+    if (finer) most = fmax (most, fabs (e[a].derivative - e[b].derivative) - e[b].error);
+    if (!finer && (next < 0 || p->level[b].decade > p->level[next].decade)) next = b;
+    finest &= !finer;
+  }
+  if (finest && next >= 0) most = fabs (e[a].derivative - e[next].derivative) - e[next].error - e[a].error;
+  return fmax (most, 0);
+}
+
+/* The estimate of output i by parameter p: that of the level of least error, contradictions included; *best: this level,
+ * or -1. */
 static difference_estimate difference_best (const difference *x, const difference_parameter *p, int i, int *best) {
   difference_estimate found = { .derivative = NAN, .error = INFINITY, .noise = INFINITY, .below = NAN, .above = NAN },
                       e[LEVELS];
@@ -256,20 +277,18 @@ static difference_estimate difference_best (const difference *x, const differenc
     e[a] = difference_at (x, &p->level[a], i);
     if (!isnan (e[a].below) && (jump < 0 || p->level[a].decade > p->level[jump].decade)) jump = a;
   }
-  /* larger steps with the same jump are more accurate */
-  for (int a = 0, finest = jump; a < p->levels && finest >= 0; a++) {
-    const double near = 0.01 * fabs (e[finest].above - e[finest].below);
-    if (p->level[a].decade < p->level[jump].decade && fabs (e[a].below - e[finest].below) < near &&
-        fabs (e[a].above - e[finest].above) < near)
-      jump = a;
+  /* one-sided derivatives must agree at three steps; of these, the largest one is the most accurate */
+  int same = 0, coarsest = jump;
+  for (int a = 0; a < p->levels && jump >= 0; a++) {
+    const double near = 0.02 * fabs (e[jump].above - e[jump].below);
+    if (!(fabs (e[a].below - e[jump].below) < near && fabs (e[a].above - e[jump].above) < near)) continue;
+    same++;
+    if (p->level[a].decade < p->level[coarsest].decade) coarsest = a;
   }
-  if (jump >= 0) found.below = e[jump].below, found.above = e[jump].above;
+  if (jump >= 0) found.jump = fabs (e[jump].above - e[jump].below);
+  if (same >= 3) found.below = e[coarsest].below, found.above = e[coarsest].above;
   for (int a = 0; a < p->levels; a++) {
-    int other = -1;
-    for (int b = 0; b < p->levels; b++)
-      if (b != a && isfinite (e[b].error) && (other < 0 || e[b].error < e[other].error)) other = b;
-    double error = e[a].error;
-    if (other >= 0) error += fmax (fabs (e[a].derivative - e[other].derivative) - e[other].error, 0);
+    const double error = e[a].error + difference_contradiction (p, e, a);
     if (!(error < found.error)) continue;
     found.derivative = e[a].derivative, found.error = error, found.noise = e[a].noise, found.same = e[a].same;
     *best = a;
@@ -315,15 +334,14 @@ static void difference_improve (const difference *x, difference_parameter *p, in
       if (l->failed[0] != l->failed[1] && l->side == 0 && l->decade == finest)
         difference_want (p, l->decade, l->failed[0] ? 1 : -1);
     }
-    double jump = fabs (e.above - e.below), step = p->size * pow (10, -finest);
-    if (isnan (jump) ? finest < FINEST / 2 : x->run_error[i] / step * 400 < jump) difference_want (p, finest + 1, 0);
+    if (e.jump > 0 ? x->run_error[i] / (p->size * pow (10, -finest)) * 400 < e.jump : finest < FINEST / 2)
+      difference_want (p, finest + 1, 0);
     return;
   }
-  int at_coarsest = p->level[best].decade == coarsest, at_finest = p->level[best].decade == finest;
-  if (at_coarsest && !coarse_failed && e.noise > e.error / 4)
+  const double noise = e.noise * pow (10, finest + 1 - p->level[best].decade); /* at the next smaller step */
+  if (p->level[best].decade == coarsest && !coarse_failed && e.noise > e.error / 4)
     difference_want (p, coarsest - (e.same || e.noise > fabs (e.derivative) ? SMALL : 1), 0);
-  if (at_finest && e.noise < e.error / 4) difference_want (p, finest + 1, 0);
-  if (!at_coarsest && !at_finest && e.same) difference_want (p, coarsest - SMALL, 0);
+  if (noise < e.error / 4) difference_want (p, finest + 1, 0);
 }
 
 #include <stdio.h>
@@ -478,6 +496,6 @@ const char *pw_accurate_method (const pw_system *s, const pw_settings *settings,
   if (implicit_steps < 0) return NULL;
   if (isfinite (explicit_steps) || isfinite (implicit_steps))
     return method[ratio * implicit_steps < explicit_steps];
-  pw_fail (error, own[0].status, "%s", own[0].text);
+  pw_fail (error, PW_METHOD, "no method is accurate enough for derivatives: %s", own[0].text);
   return NULL;
 }

@@ -117,8 +117,7 @@ static void sensitivity_warn (const pw_sensitivity *sens) {
         used += (size_t)snprintf (list + used, sizeof list - used, "%s%s by %s", used ? ", " : "", sens->outputs.of[o],
                                   sens->outputs.unknowns->list[p].name);
   if (used)
-    pw_cli_say ("pinwheel: derivatives with errors above 1 %%, which the motion amplifies: %s%s\n", list,
-                used < sizeof list ? "" : " ...");
+    pw_cli_say ("pinwheel: derivatives with errors above 1 %%: %s%s\n", list, used < sizeof list ? "" : " ...");
 }
 
 /* ---- Files ---- */
@@ -198,6 +197,20 @@ static int sensitivity_csv (const void *context, FILE *f, pw_error *error) {
   return status;
 }
 
+/* 1 if an output has a panel of the figure: there are derivatives along the run. */
+static int sensitivity_is_drawn (const pw_sensitivity *sens, int output) {
+  int points = 0;
+  for (int p = 0; p < sens->outputs.unknowns->count; p++)
+    for (int i = 0; i < sens->outputs.rows; i++) points += isfinite (pw_sensitivity_of (sens, output, p, i)->value);
+  return points > 0;
+}
+
+static int sensitivity_panels (const pw_sensitivity *sens) {
+  int panels = 0;
+  for (int i = 0; i < sens->outputs.count; i++) panels += sensitivity_is_drawn (sens, i);
+  return panels;
+}
+
 /* The label of a curve of sensitivity_data. */
 static void sensitivity_label (const pw_sensitivity *sens, int output, int unknown, char *label, size_t size) {
   char unit[SENSITIVITY_UNIT];
@@ -220,18 +233,12 @@ static int sensitivity_data (const void *context, FILE *f, pw_error *error) {
   for (int k = 0; k < sens->outputs.count * u->count; k++) {
     const int o = k / u->count, p = k % u->count;
     double factor = u->list[p].value != 0 ? u->list[p].value : 1;
-    if (!pw_outcome_is_final (&sens->outcomes, o)) continue;
+    if (!sensitivity_is_drawn (sens, o)) continue;
     for (int i = 0; i < sens->outputs.rows; i++)
       fprintf (f, "%.9g %.9g\n", sens->outputs.t[i], pw_sensitivity_of (sens, o, p, i)->value * factor);
     fputs ("\n\n", f);
   }
   return PW_OK;
-}
-
-static int sensitivity_panels (const pw_sensitivity *sens) {
-  int panels = 0;
-  for (int i = 0; i < sens->outputs.count; i++) panels += pw_outcome_is_final (&sens->outcomes, i);
-  return panels;
 }
 
 static void sensitivity_variables (const void *context, FILE *f) {
@@ -241,7 +248,7 @@ static void sensitivity_variables (const void *context, FILE *f) {
   fprintf (f, "panels = %d\narray output[%d]\narray label[%d]\n", panels, panels, panels * unknowns);
   for (int i = 0, k = 0; i < sens->outputs.count; i++) {
     char label[300];
-    if (!pw_outcome_is_final (&sens->outcomes, i)) continue;
+    if (!sensitivity_is_drawn (sens, i)) continue;
     pw_figure_element (f, "output", ++k, sens->outputs.of[i]);
     for (int p = 0; p < unknowns; p++) {
       sensitivity_label (sens, i, p, label, sizeof label);
