@@ -192,7 +192,6 @@ typedef struct {
   double rtol;                 /* default 1e-12 */
   int (*stop) (void *context); /* as in pw_settings, but a stop counts as PW_RETRY, reason "stopped"; or NULL */
   void *stop_context;
-  int jobs;           /* threads for runs that differ by their initial state, which then call `stop`; default 1 */
   double t;           /* initial time [s] */
   double period;      /* [s]; 0: that of the signals at each value of the parameter; with `free` the first guess */
   int periods;        /* number of periods of the signals in one period of the motion, if `period` is 0; default 1 */

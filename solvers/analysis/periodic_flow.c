@@ -21,7 +21,7 @@ static const double FLOW_SETTLE_RTOL = 1e-9, /* of the run that settles */
 
 /* Least relative tolerances.  Derivatives, of which differences of runs have two thirds of the digits, need fewer than
  * states: Newton's method converges all the same. */
-static const double flow_min_rtol[] = { [PW_FLOW] = 0, [PW_FLOW_DERIVATIVES] = 1e-8, [PW_FLOW_MULTIPLIERS] = 1e-12 };
+static const double flow_min_rtol[] = { [PW_FLOW] = 0, [PW_FLOW_DERIVATIVES] = 1e-10, [PW_FLOW_MULTIPLIERS] = 1e-12 };
 
 /* ---- The period of signals ---- */
 
@@ -193,7 +193,7 @@ static int flow_changed (void *context, const double *c, double rtol, double *va
 }
 
 /* Differentiates the state at the end of the period along x->basis, into x->Phi. */
-static int flow_derivatives (pw_periodic *x, pw_run *r, double end) {
+static int flow_derivatives (pw_periodic *x, pw_run *r, double end, pw_flow_accuracy accuracy) {
   const int size = x->size, n = x->n;
   double *zero = calloc (2 * (size_t)size + 2, sizeof *zero), *L = zero + size + 1;
   pw_derivative *derivative = calloc (2 * (size_t)n * (size_t)size + 1, sizeof *derivative);
@@ -204,8 +204,8 @@ static int flow_derivatives (pw_periodic *x, pw_run *r, double end) {
                             .outputs = 2 * n,
                             .size = L,
                             .rtol = r->settings.rtol,
-                            .neighbours = 2,
-                            .jobs = x->settings.jobs };
+                            .neighbours = accuracy == PW_FLOW_MULTIPLIERS ? 4 : 2,
+                            .jobs = 1 };
   int status = zero && derivative ? PW_OK : pw_fail_memory (x->s, &x->why);
   for (int c = 0; c < size && zero; c++) L[c] = x->L;
   if (status == PW_OK && size > 0) status = pw_differentiate (&d, derivative, NULL, &x->why);
@@ -227,7 +227,7 @@ static int flow_run (pw_periodic *x, pw_run *r, double period, pw_flow_accuracy 
   if (status != PW_OK) return status;
   flow_state (x, &sample, x->y0), memcpy (x->a0, sample.a, bytes);
   if (accuracy != PW_FLOW) x->steps = 0; /* the PW_FLOW that follows, at the same state, sets it */
-  if (accuracy != PW_FLOW) return flow_derivatives (x, r, end);
+  if (accuracy != PW_FLOW) return flow_derivatives (x, r, end, accuracy);
   while (status == PW_OK && pw_run_time (r) < end) {
     status = pw_run_advance (r, end, &x->why);
     if (status == PW_OK && x->steps > 0 && pw_run_statistics (r)->steps > FLOW_STEPS * x->steps) return PW_RETRY;

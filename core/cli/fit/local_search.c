@@ -85,7 +85,7 @@ static int search_differentiate (local_search *local, pw_error *error) {
                             .low = size + n,
                             .high = size + 2 * n,
                             .rtol = pw_unknowns_noise (unknowns),
-                            .neighbours = 2,
+                            .neighbours = 4,
                             .value = local->output,
                             .jobs = 1 };
   int status = size && derivative ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
