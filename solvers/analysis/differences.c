@@ -103,8 +103,9 @@ typedef struct {
   int levels, wanted; /* wanted: those that have not been run yet, the last ones */
 } difference_parameter;
 
-/* A run: at x (parameter AT_X), with ten times the tolerance (AT_X_LOOSE), or a neighbour. */
-enum { AT_X = -1, AT_X_LOOSE = -2 };
+/* A run: at x (parameter AT_X); with a larger tolerance (AT_X_LOOSE, of index `neighbour`); or a neighbour. */
+enum { AT_X = -1, AT_X_LOOSE = -2, LOOSE = 3 };
+static const double loose[LOOSE] = { 10, 30, 100 }; /* larger tolerances that show the errors of runs */
 typedef struct {
   int parameter, level, neighbour;
 } difference_task;
@@ -112,7 +113,7 @@ typedef struct {
 typedef struct {
   const pw_difference_settings *d;
   difference_parameter *parameter;
-  double *value, *loose; /* outputs: at x; with ten times the tolerance */
+  double *value, *loose; /* outputs: at x; LOOSE x outputs: with larger tolerances */
   double *run_error;     /* outputs */
   difference_task *task;
   int tasks;
@@ -189,7 +190,7 @@ static void difference_failed (difference *x, const difference_task *task, int s
     if (x->status == PW_OK && x->error) *x->error = *own;
     x->status = status;
   } else if (task->parameter == AT_X_LOOSE) {
-    for (int i = 0; i < x->d->outputs; i++) x->loose[i] = NAN;
+    for (int i = 0; i < x->d->outputs; i++) x->loose[task->neighbour * x->d->outputs + i] = NAN;
   } else {
     difference_level *l = &x->parameter[task->parameter].level[task->level];
     l->failed[difference_node (l->side, task->neighbour) > 0] = 1;
@@ -200,7 +201,7 @@ static void difference_failed (difference *x, const difference_task *task, int s
 static void difference_do (difference *x, const difference_task *task) {
   const pw_difference_settings *d = x->d;
   const int j = task->parameter;
-  double *y = malloc ((size_t)d->parameters * sizeof *y), *value = j == AT_X ? x->value : x->loose;
+  double *y = malloc ((size_t)d->parameters * sizeof *y), *value = x->value;
   pw_error own = { 0 };
   int status = y ? PW_OK : pw_fail (&own, PW_RESOURCE, "out of memory");
   if (y) memcpy (y, d->x, (size_t)d->parameters * sizeof *y);
@@ -209,7 +210,8 @@ static void difference_do (difference *x, const difference_task *task) {
     y[j] += difference_node (l->side, task->neighbour) * l->step;
     value = l->value + task->neighbour * d->outputs;
   }
-  if (y) status = d->evaluate (d->context, y, j == AT_X_LOOSE ? 10 * d->rtol : d->rtol, value, &own);
+  if (j == AT_X_LOOSE) value = x->loose + task->neighbour * d->outputs;
+  if (y) status = d->evaluate (d->context, y, (j == AT_X_LOOSE ? loose[task->neighbour] : 1) * d->rtol, value, &own);
   if (status != PW_OK) difference_failed (x, task, status, &own);
   free (y);
 }
@@ -416,17 +418,29 @@ static int difference_open (difference *x) {
   const pw_difference_settings *d = x->d;
   const size_t n = (size_t)d->outputs;
   x->parameter = calloc ((size_t)d->parameters, sizeof *x->parameter);
-  x->value = calloc (3 * n, sizeof *x->value);
+  x->value = calloc ((2 + LOOSE) * n, sizeof *x->value);
   if (x->parameter == NULL || x->value == NULL) return pw_fail (x->error, PW_RESOURCE, "out of memory");
-  x->loose = x->value + n, x->run_error = x->loose + n;
+  x->run_error = x->value + n, x->loose = x->run_error + n;
   for (int j = 0; j < d->parameters; j++) {
     const double size = d->size ? fabs (d->size[j]) : fabs (d->x[j]);
     x->parameter[j] = (difference_parameter){ .d = d, .parameter = j, .size = size > 0 ? size : 1 };
   }
   if (d->value) memcpy (x->value, d->value, n * sizeof *x->value);
   if (d->value == NULL) (void)difference_add (x, AT_X, 0, 0);
-  if (d->neighbours == MOST) (void)difference_add (x, AT_X_LOOSE, 0, 0);
+  for (int k = 0; k < LOOSE && d->neighbours == MOST; k++) (void)difference_add (x, AT_X_LOOSE, 0, k);
   return x->status;
+}
+
+/* The error of an output of a run: tolerance by tolerance the change by a larger one, which is about that many times the
+ * error, but at events may be small by chance; at least that of one decade. */
+static void difference_measure_run (difference *x, int i) {
+  const double f = x->value[i];
+  double most = x->d->rtol * fabs (f);
+  for (int k = 0; k < LOOSE; k++) {
+    double change = fabs (x->loose[k * x->d->outputs + i] - f);
+    most = fmax (most, isnan (change) && isfinite (f) ? INFINITY : change / loose[k] * loose[0]);
+  }
+  x->run_error[i] = most;
 }
 
 /* Starts with two steps, together with the runs at x. */
@@ -435,10 +449,7 @@ static int difference_controlled (difference *x) {
   for (int j = 0; j < x->d->parameters; j++)
     for (int k = 0, found = 0; k <= FINEST && found < 2; k++) found += difference_want (&x->parameter[j], FIRST + k, 0);
   int status = difference_evaluate (x);
-  for (int i = 0; i < x->d->outputs && status == PW_OK; i++) {
-    const double f = x->value[i], change = fabs (x->loose[i] - f);
-    x->run_error[i] = fmax (x->d->rtol * fabs (f), isnan (change) && isfinite (f) ? INFINITY : change);
-  }
+  for (int i = 0; i < x->d->outputs && status == PW_OK; i++) difference_measure_run (x, i);
   for (int more = 1; more && status == PW_OK;) {
     more = 0;
     for (int j = 0; j < x->d->parameters; j++) {
