@@ -157,7 +157,7 @@ ALL_LAYERS := $(CORE_LAYERS) $(FILE_LAYERS) $(SOLVER_LAYERS)
 # Functions of tests that replace those of other libraries must be visible to these.
 $(BUILD)/obj/tests/%.o:      STRICT += -fvisibility=default
 $(BUILD)/obj/tests/%.o:      INCLUDE := $(call layer,tests/support tests/faults tests/solvers $(ALL_LAYERS)) $(SYSTEM)
-$(BUILD)/obj/tests/outputs/test_outcome.o: INCLUDE := $(call layer,tests/support $(ALL_LAYERS) core/cli/analyse)
+$(BUILD)/obj/tests/outputs/test_outcome.o $(BUILD)/obj/tests/outputs/slow_derivatives.o: INCLUDE := $(call layer,tests/support $(ALL_LAYERS) core/cli/analyse)
 $(BUILD)/obj/tests/fuzz/%.o: INCLUDE := $(call layer,tests/fuzz $(ALL_LAYERS) $(CLI_LAYERS))
 $(BUILD)/obj/benchmarks/%.o: INCLUDE := -I$(BUILD)/include
 $(BUILD)/obj/benchmarks/engine.o $(addprefix $(BUILD)/obj/benchmarks/,effects.o peers.o) $(BUILD)/obj/benchmarks/engine/%.o $(BUILD)/obj/benchmarks/baseline/%.o: INCLUDE := $(call layer,$(ALL_LAYERS) benchmarks) $(SYSTEM)
@@ -318,7 +318,7 @@ $(BUILD)/tests/test_cli_faults: WRAP = -pthread $(addprefix -Wl$(comma)--wrap=,$
 $(BUILD)/tests/test_memory $(BUILD)/tests/slow_memory: WRAP = -pthread $(addprefix -Wl$(comma)--wrap=,$(ALLOC_WRAP))
 $(BUILD)/tests/test_cli_faults $(BUILD)/tests/test_memory $(BUILD)/tests/slow_memory: $(filter-out %/main.o,$(CLI_OBJ))
 $(BUILD)/tests/test_cli_limits: $(call obj,$(addprefix core/cli/,progress.c parallel.c command.c say.c stop.c))
-$(BUILD)/tests/test_outcome: $(call obj,core/cli/analyse/outcome.c core/cli/analyse/functional.c core/cli/stop.c core/cli/progress.c)
+$(BUILD)/tests/test_outcome $(BUILD)/tests/slow_derivatives: $(call obj,core/cli/analyse/outcome.c core/cli/analyse/functional.c core/cli/stop.c core/cli/progress.c)
 # It wraps every call of other libraries that it lists.
 $(BUILD)/tests/test_faults: WRAP = $(shell sed -n 's/^FAULT_[A-Z]* .[^,]*, \([A-Za-z_]*\),.*/-Wl,--wrap=\1/p' tests/faults/test_faults.c)
 # A part of SUNDIALS that is used for comparison only.
