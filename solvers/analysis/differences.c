@@ -18,7 +18,6 @@
 enum {
   MOST = 6,        /* neighbours */
   FIRST = 2,       /* the first steps are 10^-2 and 10^-3 of the size */
-  ONE_SIDED = 5,   /* from 10^-5 on, neighbours that fail on one side only are replaced by those on the other */
   LEAST = -14,     /* steps are at most 10^14 ... */
   FINEST = 12,     /* ... and at least 10^-12 of the size */
   LEVELS = 12,     /* steps that are tried for a parameter, at most */
@@ -96,7 +95,7 @@ typedef struct {
 } difference_estimate;
 
 typedef struct {
-  const pw_difference_settings *d;
+  struct difference *x;
   int parameter; /* its index */
   double size;
   difference_level level[LEVELS];
@@ -110,7 +109,7 @@ typedef struct {
   int parameter, level, neighbour;
 } difference_task;
 
-typedef struct {
+typedef struct difference {
   const pw_difference_settings *d;
   difference_parameter *parameter;
   double *value, *loose; /* outputs: at x; LOOSE x outputs: with larger tolerances */
@@ -129,7 +128,7 @@ static double difference_bound (const double *bound, int j, double otherwise) {
 /* Adds a level to those wanted: central, or beside a bound on its inner side.  0 if there is no room for its neighbours,
  * or it is there. */
 static int difference_want (difference_parameter *p, int decade, int side) {
-  const pw_difference_settings *d = p->d;
+  const pw_difference_settings *d = p->x->d;
   const double x = d->x[p->parameter], low = difference_bound (d->low, p->parameter, -INFINITY),
                high = difference_bound (d->high, p->parameter, INFINITY);
   int half = d->neighbours / 2;
@@ -142,7 +141,10 @@ static int difference_want (difference_parameter *p, int decade, int side) {
   for (int i = 0; i < p->levels; i++)
     if (p->level[i].decade == decade && p->level[i].side == side) return 0;
   double *value = malloc ((size_t)d->neighbours * (size_t)d->outputs * sizeof *value);
-  if (value == NULL) return 0;
+  if (value == NULL) {
+    p->x->status = pw_fail (p->x->error, PW_RESOURCE, "out of memory");
+    return 0;
+  }
   p->level[p->levels++] = (difference_level){ .decade = decade, .side = side, .step = step, .value = value };
   p->wanted++;
   return 1;
@@ -234,6 +236,7 @@ static int difference_add (difference *x, int parameter, int level, int neighbou
 
 /* Makes the runs of the tasks and of all levels that are wanted, in several threads, of which the caller is one. */
 static int difference_evaluate (difference *x) {
+  if (x->status != PW_OK) return x->status;
   for (int j = 0; j < x->d->parameters; j++)
     for (difference_parameter *p = &x->parameter[j]; p->wanted > 0; p->wanted--)
       for (int k = 0; k < x->d->neighbours; k++)
@@ -252,20 +255,20 @@ static int difference_evaluate (difference *x) {
 
 /* ---- The choice of levels ---- */
 
-/* By how much the estimate of level a contradicts those with smaller steps, which are nearer to a derivative; that with
- * the smallest step, the next larger one. */
+/* What is added to the error of level a: by how much it contradicts estimates with smaller steps, which are nearer to a
+ * derivative.  That with the smallest step must agree with one of a larger step that has two digits or a similar error;
+ * otherwise its error may be small by chance. */
 static double difference_contradiction (const difference_parameter *p, const difference_estimate *e, int a) {
   double most = 0;
-  int next = -1, finest = 1;
+  int finest = 1, agrees = 0;
   for (int b = 0; b < p->levels; b++) {
     if (b == a || !isfinite (e[b].error)) continue;
-    const int finer = p->level[b].decade > p->level[a].decade;
-    if (finer) most = fmax (most, fabs (e[a].derivative - e[b].derivative) - e[b].error);
-    if (!finer && (next < 0 || p->level[b].decade > p->level[next].decade)) next = b;
-    finest &= !finer;
+    const double off = fabs (e[a].derivative - e[b].derivative);
+    if (p->level[b].decade > p->level[a].decade) finest = 0, most = fmax (most, off - e[b].error);
+    agrees |= off <= e[a].error + e[b].error &&
+              (e[b].error < 0.01 * fabs (e[b].derivative) || e[b].error <= 30 * e[a].error);
   }
-  if (finest && next >= 0) most = fabs (e[a].derivative - e[next].derivative) - e[next].error - e[a].error;
-  return fmax (most, 0);
+  return finest && !agrees ? 9 * e[a].error : most;
 }
 
 /* The estimate of output i by parameter p: that of the level of least error, contradictions included; *best: this level,
@@ -331,11 +334,9 @@ static void difference_improve (const difference *x, difference_parameter *p, in
     return;
   difference_range (p, &coarsest, &finest, &coarse_failed);
   if (best < 0) { /* no level is consistent, or all have failed */
-    for (int a = 0; a < p->levels && finest >= ONE_SIDED; a++) {
-      const difference_level *l = &p->level[a];
-      if (l->failed[0] != l->failed[1] && l->side == 0 && l->decade == finest)
-        difference_want (p, l->decade, l->failed[0] ? 1 : -1);
-    }
+    for (int a = 0, levels = p->levels; a < levels; a++) /* neighbours on the other side of those that fail */
+      if (p->level[a].failed[0] != p->level[a].failed[1] && p->level[a].side == 0)
+        difference_want (p, p->level[a].decade, p->level[a].failed[0] ? 1 : -1);
     if (e.jump > 0 ? x->run_error[i] / (p->size * pow (10, -finest)) * 400 < e.jump : finest < FINEST / 2)
       difference_want (p, finest + 1, 0);
     return;
@@ -346,18 +347,8 @@ static void difference_improve (const difference *x, difference_parameter *p, in
   if (noise < e.error / 4) difference_want (p, finest + 1, 0);
 }
 
-#include <stdio.h>
-static void difference_debug (const difference *x, const difference_parameter *p, int i) {
-  if (getenv ("PWD_DEBUG"))
-  for (int a = 0; a < p->levels; a++) {
-    difference_estimate e = difference_at (x, &p->level[a], i);
-    fprintf (stderr, "par %d out %d level %d side %d step %.3g D %.12g err %.3g noise %.3g [%g %g] failed %d %d run_error %g\n", p->parameter, i,
-             p->level[a].decade, p->level[a].side, p->level[a].step, e.derivative, e.error, e.noise, e.below, e.above, p->level[a].failed[0], p->level[a].failed[1], x->run_error[i]);
-  }
-}
 static pw_derivative difference_result (const difference *x, const difference_parameter *p, int i) {
   int best;
-  difference_debug (x, p, i);
   const difference_estimate e = difference_best (x, p, i, &best);
   const double size = fmax (fabs (x->d->x[p->parameter]), p->size);
   pw_derivative out = { PW_UNKNOWN, NAN, NAN, NAN, NAN };
@@ -379,7 +370,7 @@ static int difference_fixed (difference *x) {
   const pw_difference_settings *d = x->d;
   for (int j = 0; j < d->parameters; j++) {
     x->parameter[j].size *= pow (d->rtol, 1. / (d->neighbours + 1));
-    if (!difference_want (&x->parameter[j], 0, 0))
+    if (!difference_want (&x->parameter[j], 0, 0) && x->status == PW_OK)
       return pw_fail (x->error, PW_METHOD, "parameter %d: its bounds leave no room for differences", j);
   }
   int status = difference_evaluate (x);
@@ -423,7 +414,7 @@ static int difference_open (difference *x) {
   x->run_error = x->value + n, x->loose = x->run_error + n;
   for (int j = 0; j < d->parameters; j++) {
     const double size = d->size ? fabs (d->size[j]) : fabs (d->x[j]);
-    x->parameter[j] = (difference_parameter){ .d = d, .parameter = j, .size = size > 0 ? size : 1 };
+    x->parameter[j] = (difference_parameter){ .x = x, .parameter = j, .size = size > 0 ? size : 1 };
   }
   if (d->value) memcpy (x->value, d->value, n * sizeof *x->value);
   if (d->value == NULL) (void)difference_add (x, AT_X, 0, 0);
@@ -456,7 +447,7 @@ static int difference_controlled (difference *x) {
       for (int i = 0; i < steering; i++) difference_improve (x, &x->parameter[j], i);
       more |= x->parameter[j].wanted > 0;
     }
-    if (more) status = difference_evaluate (x);
+    status = more ? difference_evaluate (x) : x->status;
   }
   return status;
 }

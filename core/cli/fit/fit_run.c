@@ -3,8 +3,13 @@
 #include <stdlib.h>
 #include "fit.h"
 
-int pw_fit_run (const pw_fit *fit, const double *unknowns, double *out, pw_error *error) {
+#define FIT_RTOL 1e-8 /* largest relative tolerance of runs that are compared */
+
+/* Runs the model with its own settings, or if rtol > 0 with this tolerance. */
+static int fit_run (const pw_fit *fit, const double *unknowns, double rtol, double *out, pw_error *error) {
   const pw_run_outputs outputs = { .unknowns = &fit->unknowns,
+                                   .method = rtol > 0 ? fit->unknowns.method : NULL,
+                                   .rtol = rtol,
                                    .option = "--columns",
                                    .of = fit->column_name,
                                    .count = fit->columns,
@@ -13,17 +18,25 @@ int pw_fit_run (const pw_fit *fit, const double *unknowns, double *out, pw_error
   return pw_run_outputs_at (&outputs, unknowns, NULL, out, error);
 }
 
-static int fit_evaluate (void *fit, const double *x, double rtol, double *value, pw_error *error) {
+int pw_fit_run (const pw_fit *fit, const double *unknowns, double *out, pw_error *error) {
+  return fit_run (fit, unknowns, 0, out, error);
+}
+
+static int fit_own (void *fit, const double *x, double rtol, double *value, pw_error *error) {
   (void)rtol;
-  return pw_fit_run (fit, x, value, error);
+  return fit_run (fit, x, 0, value, error);
+}
+
+static int fit_accurate (void *fit, const double *x, double rtol, double *value, pw_error *error) {
+  return fit_run (fit, x, rtol, value, error);
 }
 
 int pw_fit_jacobian (pw_fit *fit, const double *unknowns, const double *values, double *jacobian, pw_error *error) {
   const int n = fit->unknowns.count, cells = fit->columns * fit->rows;
-  const double noise = pw_unknowns_noise (&fit->unknowns);
+  const double own = pw_unknowns_noise (&fit->unknowns), noise = fmin (own, FIT_RTOL);
   double *size = malloc (3 * (size_t)n * sizeof *size);
   pw_derivative *derivative = malloc ((size_t)n * (size_t)cells * sizeof *derivative);
-  const pw_difference_settings d = { .evaluate = fit_evaluate,
+  const pw_difference_settings d = { .evaluate = noise < own ? fit_accurate : fit_own,
                             .context = fit,
                             .x = unknowns,
                             .parameters = n,
@@ -33,7 +46,7 @@ int pw_fit_jacobian (pw_fit *fit, const double *unknowns, const double *values, 
                             .high = size + 2 * n,
                             .rtol = noise,
                             .neighbours = 2,
-                            .value = values,
+                            .value = noise < own ? NULL : values,
                             .jobs = fit->jobs };
   int status = size && derivative ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
   for (int j = 0; j < n && status == PW_OK; j++) {
