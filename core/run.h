@@ -15,7 +15,23 @@ typedef struct {
   double value;
 } pw_initial_value;
 
-struct pw_sample;
+/* The state at one time.  The arrays belong to the run and are valid until the next call. */
+typedef struct {
+  double t;
+  const double *q, *v;  /* coordinates and velocities: pw_system_coordinates each */
+  const double *a;      /* accelerations */
+  const double *lambda; /* multipliers, M a + J^T lambda = f: pw_system_rows */
+  double position;      /* scaled residual of g = 0 */
+  double velocity;      /* scaled residual of J v = eta */
+  double kinetic;       /* [J] */
+  double potential;     /* [J] */
+  const double *ledger; /* pw_system_ledger_entries: work or loss of each entry [J]; NULL without pw_settings.ledger */
+  double work;          /* supplied since the initial time, by torques, forces, motors, drives, ... [J] */
+  double loss;          /* dissipated since the initial time [J] */
+  double projection;    /* energy added by projections after steps [J]; 0 without pw_settings.ledger, and with bdf */
+  double balance;       /* change of (kinetic + potential) - work + loss - projection [J] */
+  const double *integral; /* pw_settings.integrals: integrals of the functions since the initial time */
+} pw_sample;
 
 /* How to integrate; zeros select the defaults. */
 typedef struct {
@@ -33,7 +49,7 @@ typedef struct {
    * q, v, lambda, kinetic, potential and, in place of ledger, work and loss, their rates [W] are set.  Runs with
    * integrals do not use specialised code. */
   int integrals;
-  void (*integrand) (void *context, const struct pw_sample *state, double *value);
+  void (*integrand) (void *context, const pw_sample *state, double *value);
   void *integrand_context;
 
   /* Limits of long runs. */
@@ -77,24 +93,6 @@ typedef struct {
   double g;            /* worst |g| [m] or [rad] */
   double jv;           /* worst |J v - eta| [m/s] or [rad/s] */
 } pw_statistics;
-
-/* The state at one time.  The arrays belong to the run and are valid until the next call. */
-typedef struct pw_sample {
-  double t;
-  const double *q, *v;  /* coordinates and velocities: pw_system_coordinates each */
-  const double *a;      /* accelerations */
-  const double *lambda; /* multipliers, M a + J^T lambda = f: pw_system_rows */
-  double position;      /* scaled residual of g = 0 */
-  double velocity;      /* scaled residual of J v = eta */
-  double kinetic;       /* [J] */
-  double potential;     /* [J] */
-  const double *ledger; /* pw_system_ledger_entries: work or loss of each entry [J]; NULL without pw_settings.ledger */
-  double work;          /* supplied since the initial time, by torques, forces, motors, drives, ... [J] */
-  double loss;          /* dissipated since the initial time [J] */
-  double projection;    /* energy added by projections after steps [J]; 0 without pw_settings.ledger, and with bdf */
-  double balance;       /* change of (kinetic + potential) - work + loss - projection [J] */
-  const double *integral; /* pw_settings.integrals */
-} pw_sample;
 
 /* Entries of the energy ledger: work or loss of an element.  Their names are like "rider.work", "damper.loss";
  * "drag.frame.loss" for an element that acts on every body. */

@@ -59,13 +59,19 @@ static int steered (void *context, const double *angle, double rtol, double *phi
 /* Differentiates it with respect to the steering angle, by runs at neighbouring angles in two threads. */
 static void steering (variant *steer, pw_error *e) {
   static const double angle = 0.02;
-  const pw_difference_settings d = { .evaluate = steered, .context = steer, .x = &angle, .parameters = 1,
-                                     .outputs = 1, .rtol = 1e-12, .neighbours = 6, .jobs = 2 };
+  const pw_difference_settings d = { .evaluate = steered,
+                                     .context = steer,
+                                     .x = &angle,
+                                     .parameters = 1,
+                                     .outputs = 1,
+                                     .rtol = 1e-12,
+                                     .neighbours = 6,
+                                     .jobs = 2 };
   pw_derivative slope;
   double phi;
   if (pw_differentiate (&d, &slope, &phi, e) == PW_OK && slope.type == PW_DERIVATIVE)
-    printf ("after 5 s at %g rad the trailer's angle is %.5f rad, its derivative %.4f +- %.1g\n", angle, phi, slope.value,
-            slope.error);
+    printf ("after 5 s at %g rad the trailer's angle is %.5f rad, its derivative %.4f +- %.1g\n", angle, phi,
+            slope.value, slope.error);
 }
 
 int main (int count, char **argument) {

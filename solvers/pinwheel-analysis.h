@@ -55,7 +55,7 @@ void pw_linear_free (pw_linear *l);
  * re > 0 counts as 0.  INFINITY if im = 0 and re >= 0. */
 double pw_rk4_limit (double re, double im);
 
-/* ---- Derivatives of the outputs of runs (differences.c) ---- */
+/* ---- Derivatives of the outputs of runs (derivatives.c) ---- */
 
 /* Stores the outputs of runs at values x of the parameters, made with this relative tolerance; NaN for one that is not
  * a number.  Called by several threads at once.  PW_RETRY and PW_RESOURCE end pw_differentiate; after another error
@@ -66,7 +66,7 @@ typedef int pw_outputs (void *context, const double *x, double rtol, double *val
 typedef struct {
   pw_outputs *evaluate;
   void *context;
-  const double *x;          /* parameters: where */
+  const double *x; /* parameters: where */
   int parameters, outputs;
   int steering;             /* the first outputs, which determine the steps; 0: all */
   const double *size;       /* parameters: typical sizes; NULL: |x|, or 1 where that is 0 */

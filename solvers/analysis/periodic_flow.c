@@ -198,14 +198,14 @@ static int flow_derivatives (pw_periodic *x, pw_run *r, double end, pw_flow_accu
   double *zero = calloc (2 * (size_t)size + 2, sizeof *zero), *L = zero + size + 1;
   pw_derivative *derivative = calloc (2 * (size_t)n * (size_t)size + 1, sizeof *derivative);
   const pw_difference_settings d = { .evaluate = flow_changed,
-                            .context = &(flow_from){ x, r, end },
-                            .x = zero,
-                            .parameters = size,
-                            .outputs = 2 * n,
-                            .size = L,
-                            .rtol = r->settings.rtol,
-                            .neighbours = accuracy == PW_FLOW_MULTIPLIERS ? 4 : 2,
-                            .jobs = 1 };
+                                     .context = &(flow_from){ x, r, end },
+                                     .x = zero,
+                                     .parameters = size,
+                                     .outputs = 2 * n,
+                                     .size = L,
+                                     .rtol = r->settings.rtol,
+                                     .neighbours = accuracy == PW_FLOW_MULTIPLIERS ? 4 : 2,
+                                     .jobs = 1 };
   int status = zero && derivative ? PW_OK : pw_fail_memory (x->s, &x->why);
   for (int c = 0; c < size && zero; c++) L[c] = x->L;
   if (status == PW_OK && size > 0) status = pw_differentiate (&d, derivative, NULL, &x->why);

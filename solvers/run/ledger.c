@@ -132,8 +132,9 @@ int pw_ledger_uses_multipliers (const pw_run *r) {
 
 /* If kinetic and potential energies are negligible, as for light bodies against friction, the scale is the work done,
  * which grows without bound; so that of a time T at the most. */
-static const double ledger_share = 5, /* sqrt (25): the error of one of 25 states whose root mean square is 1 tolerance */
-    ledger_round_off = 1e-11;         /* of powers and integrands, due to multipliers */
+static const double ledger_share =
+                        5,    /* sqrt (25): the error of one of 25 states whose root mean square is 1 tolerance */
+    ledger_round_off = 1e-11; /* of powers and integrands, due to multipliers */
 
 double pw_ledger_tolerance (const pw_run *r, double h) {
   const pw_settings *settings = &r->settings;

@@ -56,10 +56,11 @@ static void campaign_count (const char *what, double derivative, double error, r
 static void campaign_report (const char *name) {
   qsort (counts.ratio, (size_t)counts.known, sizeof (double), campaign_order);
   qsort (counts.digits, (size_t)counts.known, sizeof (double), campaign_order);
-  print_message ("%s: %d derivatives, %d of them of motions with events; %d outside of their stated errors, %d unknown; "
-                 "medians: stated over true error %.1f, stated error %.1g of the derivative\n",
-                 name, counts.all, counts.events, counts.outside, counts.unknown, counts.ratio[counts.known / 2],
-                 counts.digits[counts.known / 2]);
+  print_message (
+      "%s: %d derivatives, %d of them of motions with events; %d outside of their stated errors, %d unknown; "
+      "medians: stated over true error %.1f, stated error %.1g of the derivative\n",
+      name, counts.all, counts.events, counts.outside, counts.unknown, counts.ratio[counts.known / 2],
+      counts.digits[counts.known / 2]);
 }
 
 /* ---- A particle on a line, with a force that changes at events ---- */
@@ -127,15 +128,57 @@ static real ball (int mode, real t, const real *y, const real *p) {
 }
 
 static const line_model line_models[] = {
-  { "switching velocity", "b.vx > c ? -a : -b", thrust, threshold_v, { 2, 0.5, 0.1, 0, -1, 1 }, { 4, 1.5, 0.6, 0, 1, 2 }, 3, 10 },
+  { "switching velocity",
+    "b.vx > c ? -a : -b",
+    thrust,
+    threshold_v,
+    { 2, 0.5, 0.1, 0, -1, 1 },
+    { 4, 1.5, 0.6, 0, 1, 2 },
+    3,
+    10 },
   { "gear", "b.vx > c ? b : a", gear, threshold_v, { 1, 0.2, 1, 0, -1, 0 }, { 3, 0.8, 2, 0, 1, 0.5 }, 3, 10 },
   { "position", "b.x > c ? b : a", gear, threshold_x, { 0.2, -1, 0.3, 0, -1, 0.5 }, { 2, 1, 1, 0, 0, 2 }, 3, 10 },
-  { "wall", "-a*max (0, b.x - c) - b*b.vx", wall, threshold_x, { 1e2, 0.01, 0.5, 0, 0, 1 }, { 1e4, 0.3, 1, 0, 0.2, 2 }, 3, 100 },
-  { "breakpoint", "(t > c ? a : 0) - b*b.x", pulse, threshold_t, { 1, 1, 0.2, 0, -1, -1 }, { 3, 9, 1.5, 0, 1, 1 }, 3, 10 },
-  { "bilinear spring", "(b.x > 0 ? -a : -b)*b.x + c*cos (d*t)", bilinear, at_zero, { 5, 10, 1, 1, 0.5, -1 }, { 9, 30, 3, 4, 1, 1 }, 4, 10 },
-  { "relay", "(b.x > c ? -a : a) - b*b.vx", relay, threshold_x, { 1, 0.1, -0.2, 0, -1, -1 }, { 3, 0.5, 0.2, 0, 1, 1 }, 3, 10 },
+  { "wall",
+    "-a*max (0, b.x - c) - b*b.vx",
+    wall,
+    threshold_x,
+    { 1e2, 0.01, 0.5, 0, 0, 1 },
+    { 1e4, 0.3, 1, 0, 0.2, 2 },
+    3,
+    100 },
+  { "breakpoint",
+    "(t > c ? a : 0) - b*b.x",
+    pulse,
+    threshold_t,
+    { 1, 1, 0.2, 0, -1, -1 },
+    { 3, 9, 1.5, 0, 1, 1 },
+    3,
+    10 },
+  { "bilinear spring",
+    "(b.x > 0 ? -a : -b)*b.x + c*cos (d*t)",
+    bilinear,
+    at_zero,
+    { 5, 10, 1, 1, 0.5, -1 },
+    { 9, 30, 3, 4, 1, 1 },
+    4,
+    10 },
+  { "relay",
+    "(b.x > c ? -a : a) - b*b.vx",
+    relay,
+    threshold_x,
+    { 1, 0.1, -0.2, 0, -1, -1 },
+    { 3, 0.5, 0.2, 0, 1, 1 },
+    3,
+    10 },
   { "bounces", "-b - a*min (0, b.x)", ball, at_zero, { 1e2, 5, 0, 0, 0.2, -1 }, { 1e4, 10, 0, 0, 1, 1 }, 2, 100 },
-  { "smooth", "-a*sin (b.x) - b*b.vx*abs (1 + b.vx^2) + c*sin (d*t)", smooth, NULL, { 1, 0.05, 0.5, 1, -1, -1 }, { 9, 0.2, 3, 4, 1, 1 }, 4, 10 },
+  { "smooth",
+    "-a*sin (b.x) - b*b.vx*abs (1 + b.vx^2) + c*sin (d*t)",
+    smooth,
+    NULL,
+    { 1, 0.05, 0.5, 1, -1, -1 },
+    { 9, 0.2, 3, 4, 1, 1 },
+    4,
+    10 },
 };
 enum { LINE_MODELS = sizeof line_models / sizeof *line_models };
 
@@ -161,8 +204,10 @@ static real line_root (const line_model *m, line_event *g, int mode, real t, rea
   for (int i = 0; i < 80; i++) {
     real middle = (low + high) / 2;
     line_step (m, mode, t, middle, y, p, z);
-    if ((g (t + middle, z, p) > 0) == (sign > 0)) low = middle;
-    else high = middle;
+    if ((g (t + middle, z, p) > 0) == (sign > 0))
+      low = middle;
+    else
+      high = middle;
   }
   return high;
 }
@@ -198,11 +243,14 @@ static void line_run (const line_model *m, const real *p, double t_end, real *ou
     }
     memcpy (y, z, sizeof y);
     most = fmaxl (most, y[0]), least = fminl (least, y[0]);
-    if (changes) mode = !mode, t += h, ++*events;
-    else t = end, i++;
+    if (changes)
+      mode = !mode, t += h, ++*events;
+    else
+      t = end, i++;
   }
-  const real values[LINE_OUTPUTS] = { y[0], y[1],  y[2],  sqrtl (y[3] / t_end), (y[0] - p[4]) / t_end, y[4],
-                                      most, least };
+  const real values[LINE_OUTPUTS] = {
+    y[0], y[1], y[2], sqrtl (y[3] / t_end), (y[0] - p[4]) / t_end, y[4], most, least
+  };
   memcpy (out, values, sizeof values);
 }
 
@@ -349,8 +397,10 @@ static void scene_choose (scene_trial *x) {
   char name[200];
   for (int i = 0; i < SCENE_OUTPUTS; i++) {
     int which = (int)campaign_random (0, i == 5 && rows ? rows : n);
-    if (i == 5 && rows) pw_system_reaction_name (scene.system, which, name, sizeof name);
-    else pw_system_state_name (scene.system, which, name, sizeof name);
+    if (i == 5 && rows)
+      pw_system_reaction_name (scene.system, which, name, sizeof name);
+    else
+      pw_system_state_name (scene.system, which, name, sizeof name);
     snprintf (x->output[i], sizeof x->output[i], "%s%.150s", prefix[i], name);
   }
   for (int p = 0; p < 2; p++) {
@@ -380,7 +430,7 @@ static void scene_check (scene_trial *x, int event) {
     for (int i = 0; i < SCENE_OUTPUTS; i++) {
       double d[2];
       for (int size = 0; size < 2; size++) {
-        const double(*y)[SCENE_OUTPUTS] = (const double(*)[SCENE_OUTPUTS])f[size];
+        const double (*y)[SCENE_OUTPUTS] = (const double (*)[SCENE_OUTPUTS])f[size];
         d[size] = (8 * (y[2][i] - y[1][i]) - (y[3][i] - y[0][i])) / (12 * step[size]);
       }
       snprintf (what, sizeof what, "%s: %s by %s", x->file, x->output[i], x->parameter[p]);
@@ -405,14 +455,13 @@ static void scene_write (void) {
              "  - {name: b, mass: 0.5, inertia: 0.1, start: {x: 1}, rate: {vx: 1}}\nelements:\n"
              "  - {pin: p, body: [a, b], at: [[0.5, 0], [-0.5, 0]]}\n  - {wheel: w, body: a, at: [-0.3, 0]}\n"
              "  - {torque: t, body: [b, a], value: '(b.phi - a.phi > h ? -amp : amp) - 0.5*(b.omega - a.omega)'}\n");
-  cli_write ("pulse.yaml",
-             "pinwheel: 1\nparameters: [{name: s, value: 0.4}, {name: w, value: 0.3}]\nbodies:\n"
-             "  - {name: a, mass: 1, inertia: 0.1, start: {x: 0.5}}\n"
-             "  - {name: b, mass: 0.5, inertia: 0.05, start: {x: 1.5}}\nelements:\n"
-             "  - {pin: P, body: [ground, a], at: [[0, 0], [-0.5, 0]]}\n"
-             "  - {pin: Q, body: [a, b], at: [[0.5, 0], [-0.5, 0]]}\n"
-             "  - {torque: T, body: [a, ground], value: {pulse: {height: 3, start: s, width: w}}}\n"
-             "  - {gravity: g, acceleration: [0, -9.81]}\n");
+  cli_write ("pulse.yaml", "pinwheel: 1\nparameters: [{name: s, value: 0.4}, {name: w, value: 0.3}]\nbodies:\n"
+                           "  - {name: a, mass: 1, inertia: 0.1, start: {x: 0.5}}\n"
+                           "  - {name: b, mass: 0.5, inertia: 0.05, start: {x: 1.5}}\nelements:\n"
+                           "  - {pin: P, body: [ground, a], at: [[0, 0], [-0.5, 0]]}\n"
+                           "  - {pin: Q, body: [a, b], at: [[0.5, 0], [-0.5, 0]]}\n"
+                           "  - {torque: T, body: [a, ground], value: {pulse: {height: 3, start: s, width: w}}}\n"
+                           "  - {gravity: g, acceleration: [0, -9.81]}\n");
 }
 
 TEST (scenes) {
@@ -420,11 +469,11 @@ TEST (scenes) {
     const char *file, *parameter[2];
     double t_end;
     int event;
-  } scene[] = { { "ezyroller", { "a", "M0" }, 4, 0 },       { "snakeboard", { "swing", "m" }, 2, 0 },
-                { "roller-racer", { "a", "swing" }, 2, 0 },    { "car", { "a", "u0" }, 3, 0 },
-                { "pendulum", { "l", "g" }, 3, 0 },         { "slider-crank", { "l1", "m1" }, 1, 0 },
+  } scene[] = { { "ezyroller", { "a", "M0" }, 4, 0 },         { "snakeboard", { "swing", "m" }, 2, 0 },
+                { "roller-racer", { "a", "swing" }, 2, 0 },   { "car", { "a", "u0" }, 3, 0 },
+                { "pendulum", { "l", "g" }, 3, 0 },           { "slider-crank", { "l1", "m1" }, 1, 0 },
                 { "knife-edge-incline", { "g", "w" }, 3, 0 }, { "stop.yaml", { "k", "s" }, 0.8, 1 },
-                { "switch.yaml", { "amp", "h" }, 0.6, 1 },  { "pulse.yaml", { "s", "w" }, 1, 1 } };
+                { "switch.yaml", { "amp", "h" }, 0.6, 1 },    { "pulse.yaml", { "s", "w" }, 1, 1 } };
   memset (&counts, 0, sizeof counts);
   scene_write ();
   for (size_t i = 0; i < 3 * sizeof scene / sizeof *scene; i++) {

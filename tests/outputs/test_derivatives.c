@@ -29,8 +29,7 @@ static void derivatives_check (const char *options, int count, const double *exp
 /* Thrust -f while v > w, then -g: dv/dw = 1 - g/f, dx/dw = (T - t1) (1 - g/f); f while v < u, then g. */
 TEST (switching_velocity) {
   const double f = 3, g = 1, w = 0.4, v0 = 1.3, T = 1.7, t1 = (v0 - w) / f, k = 1 - g / f, x = (T - t1) * k,
-               y = t1 + (T - t1) * g / f,
-               expected[] = { k, g / f, x, y, x, y };
+               y = t1 + (T - t1) * g / f, expected[] = { k, g / f, x, y, x, y };
   derivatives_write ("{name: f, value: 3}, {name: g, value: 1}, {name: w, value: 0.4}", v0, "fx: 'b.vx > w ? -f : -g'");
   derivatives_check ("--of b.vx --of b.x --of integral:b.vx --by w --by b.vx -t 1.7", 6, expected, 0);
   derivatives_check ("--of b.vx --of b.x --of integral:b.vx --by w --by b.vx -t 1.7 -m bdf", 6, expected, 0);
@@ -59,12 +58,11 @@ TEST (contact) {
 /* Two equal bodies exchange their velocities in a contact. */
 TEST (exchange) {
   const double expected[] = { 0, 1, 1, 0 };
-  cli_write ("line.yaml",
-             "pinwheel: 1\nparameters: [{name: u, value: 1}, {name: w, value: -0.3}]\nbodies:\n"
-             "  - {name: a, mass: 1, inertia: 1, rate: {vx: u}}\n"
-             "  - {name: b, mass: 1, inertia: 1, start: {x: 1}, rate: {vx: w}}\nelements:\n"
-             "  - {force: A, body: a, fx: '-1e4*max (0, a.x + 0.2 - b.x)'}\n"
-             "  - {force: B, body: b, fx: '1e4*max (0, a.x + 0.2 - b.x)'}\n");
+  cli_write ("line.yaml", "pinwheel: 1\nparameters: [{name: u, value: 1}, {name: w, value: -0.3}]\nbodies:\n"
+                          "  - {name: a, mass: 1, inertia: 1, rate: {vx: u}}\n"
+                          "  - {name: b, mass: 1, inertia: 1, start: {x: 1}, rate: {vx: w}}\nelements:\n"
+                          "  - {force: A, body: a, fx: '-1e4*max (0, a.x + 0.2 - b.x)'}\n"
+                          "  - {force: B, body: b, fx: '1e4*max (0, a.x + 0.2 - b.x)'}\n");
   derivatives_check ("--of a.vx --of b.vx --by u --by w -t 2", 4, expected, 0);
 }
 
@@ -84,17 +82,14 @@ TEST (reaction) {
   static const char *const methods[] = { "rk4", "erk8", "radau", "bdf", "ida", "galpha" };
   const double A = 2, w = 3, p = 0.4, T = 2.3, s = sin (w * T + p),
                square = 0.5 + (sin (2 * (w * T + p)) - sin (2 * p)) / (4 * w * T),
-               expected[] = { -(s - sin (p)) / w,
-                              -A / w * (T * cos (w * T + p) - (s - sin (p)) / w),
-                              sqrt (square),
+               expected[] = { -(s - sin (p)) / w, -A / w * (T * cos (w * T + p) - (s - sin (p)) / w), sqrt (square),
                               A / (2 * sqrt (square)) *
                                   (cos (2 * (w * T + p)) / (2 * w) -
                                    (sin (2 * (w * T + p)) - sin (2 * p)) / (4 * w * w * T)) };
   derivatives_write ("{name: A, value: 2}, {name: w, value: 3}, {name: p, value: 0.4}", 0, "fy: 'A*cos (w*t + p)'");
   for (size_t i = 0; i < sizeof methods / sizeof *methods; i++)
-    derivatives_check (
-        check_text ("--of integral:s.N --of rms:s.N --by A --by w -t 2.3 --step 1e-3 -m %s", methods[i]), 4, expected,
-        0);
+    derivatives_check (check_text ("--of integral:s.N --of rms:s.N --by A --by w -t 2.3 --step 1e-3 -m %s", methods[i]),
+                       4, expected, 0);
 }
 
 /* A gust, a bump that reflects the body, and their values. */
@@ -118,7 +113,8 @@ TEST (kink) {
   for (int i = 1; i < 8; i++)
     for (int side = -1; side <= 1; side += 2) {
       const double away = side * pow (10, -i);
-      cli_shell (check_text ("pinwheel sensitivity @/line.yaml --of b.x --by p -t 2 -o @/sens --set p=%.17g", 1 + away));
+      cli_shell (
+          check_text ("pinwheel sensitivity @/line.yaml --of b.x --by p -t 2 -o @/sens --set p=%.17g", 1 + away));
       cli_sensitivity ("derivative", &x);
       cli_sensitivity ("error", &error);
       check_close ("beside the kink", x, side > 0 ? 2 : 0, error, "the claim");

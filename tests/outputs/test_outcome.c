@@ -147,7 +147,7 @@ TEST (bad) {
     { "max:motor-2.work", "--of max:motor-2.work: no column \"motor-2.work\"; did you mean \"motor-1.work\"?" },
     { "wheel.phi/works", "--of wheel.phi/works: no column \"works\"; did you mean \"work\"?" },
     { "maxi:wheel.phi", "--of maxi:wheel.phi: no \"maxi:\"; valid are final:, max:, min:, mean:, integral: and rms:" },
-    { "mean:balance", "--of mean:balance: balance tells how the run is integrated: it has no mean" },
+    { "mean:balance", "--of mean:balance: balance describes the integration, not the motion: it has no mean" },
     { "rms:motor-1.work", "--of rms:motor-1.work: no rms: of work and losses; valid are final:, max:, min:, mean: and "
                           "integral:" },
     { "wheel.phi +", "--of wheel.phi +: something is missing after \"+\"" },

@@ -315,7 +315,8 @@ static void sensitivity_interrupt (const char *reads) {
   cli_good (command);
   snprintf (complete, sizeof complete, "%.1999s", cli_out);
   for (; status == 130; calls += 4000) {
-    snprintf (command, sizeof command, "%s CALLS=%d pinwheel sensitivity @/stop.c --of max:a.x --by k --jobs 1", reads, calls);
+    snprintf (command, sizeof command, "%s CALLS=%d pinwheel sensitivity @/stop.c --of max:a.x --by k --jobs 1", reads,
+              calls);
     status = cli_run (command);
     if (status == 130) assert_non_null (strstr (cli_err, "pinwheel: interrupted; results are incomplete\n"));
     interrupted += status == 130;

@@ -88,8 +88,7 @@ static double functional_of_integral (const pw_functional *f, double integral, d
 
 /* Keeps a value if it is beyond the extremum so far. */
 static void functional_update_extremum (pw_functional *f, double t, double value) {
-  if (f->type == PW_MAX ? value > f->value : value < f->value)
-    f->value = value, f->t = t;
+  if (f->type == PW_MAX ? value > f->value : value < f->value) f->value = value, f->t = t;
 }
 
 typedef struct {
@@ -145,9 +144,8 @@ static void functional_extremum (functional_step *step, pw_functional *f, const 
 
 /* Times in a step: its beginning, just after it, five times between, just before the end, the end. */
 static void functional_times (const functional_step *step, double t[PW_FUNCTIONAL_TIMES]) {
-  static const double part[PW_FUNCTIONAL_TIMES] = {
-    0, FUNCTIONAL_INSET, 0.047, 0.231, 0.5, 0.769, 0.953, 1 - FUNCTIONAL_INSET, 1
-  };
+  static const double part[PW_FUNCTIONAL_TIMES] = { 0,     FUNCTIONAL_INSET,     0.047, 0.231, 0.5, 0.769,
+                                                    0.953, 1 - FUNCTIONAL_INSET, 1 };
   for (int i = 0; i < FUNCTIONAL_END; i++) t[i] = step->t0 + part[i] * (step->t1 - step->t0);
   t[FUNCTIONAL_END] = step->t1;
 }

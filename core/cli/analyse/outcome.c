@@ -120,11 +120,11 @@ static int outcome_add_term (pw_outcomes *set, pw_outcome *o, const char *origin
                           "%s: no \"%s:\"; valid are final:, max:, min:, mean:, integral: and rms:", origin, name)
                : pw_fail (error, PW_INPUT, "%s", own.text);
   if (pw_is_integral (type) && outcome_is_diagnostic (c.type))
-    return pw_fail (error, PW_INPUT, "%s: %s tells how the run is integrated: it has no %s", origin, name,
+    return pw_fail (error, PW_INPUT, "%s: %s describes the integration, not the motion: it has no %s", origin, name,
                     type == PW_INTEGRAL ? "integral" : "mean");
   if (type == PW_RMS && pw_column_is_integrated (c.type))
-    return pw_fail (error, PW_INPUT, "%s: no rms: of work and losses; valid are final:, max:, min:, mean: and integral:",
-                    origin);
+    return pw_fail (error, PW_INPUT,
+                    "%s: no rms: of work and losses; valid are final:, max:, min:, mean: and integral:", origin);
   int f = outcome_add_functional (set, type, c), i = 0;
   if (f < 0) return pw_fail (error, PW_RESOURCE, "out of memory");
   while (i < o->terms && o->term[i] != f) i++;

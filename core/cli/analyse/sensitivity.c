@@ -46,7 +46,7 @@ static const char *sensitivity_unit (const pw_sensitivity *sens, int output, int
 static double sensitivity_elasticity (const pw_sensitivity *sens, int output, int unknown) {
   const double largest = 1e12, /* elasticities above it are those of an output that is 0 but for round-off */
       value = sens->outputs.unknowns->list[unknown].value,
-      elasticity = pw_sensitivity_of (sens, output, unknown, -1)->value * value / sens->value[output];
+               elasticity = pw_sensitivity_of (sens, output, unknown, -1)->value * value / sens->value[output];
   return value == 0 || !(fabs (elasticity) < largest) ? NAN : elasticity;
 }
 
@@ -67,9 +67,10 @@ static void sensitivity_print_row (const pw_sensitivity *sens, pw_table *table, 
   const pw_derivative *d = pw_sensitivity_of (sens, output, unknown, -1);
   pw_cell_unit (table, -14, u->name, u->unit);
   pw_cell_number (table, 12, u->value, SENSITIVITY_DIGITS);
-  pw_cell (table, 12, d->type == PW_NO_DERIVATIVE ? "none"
-                      : d->type == PW_UNKNOWN     ? "unknown"
-                                                  : PW_DIGITS (d->value, SENSITIVITY_DIGITS));
+  pw_cell (table, 12,
+           d->type == PW_NO_DERIVATIVE ? "none"
+           : d->type == PW_UNKNOWN     ? "unknown"
+                                       : PW_DIGITS (d->value, SENSITIVITY_DIGITS));
   pw_cell (table, -8, sensitivity_unit (sens, output, unknown, unit));
   pw_cell_number (table, 12, d->error, 2);
   pw_cell_number (table, 12, sensitivity_elasticity (sens, output, unknown), 5);
@@ -116,8 +117,7 @@ static void sensitivity_warn (const pw_sensitivity *sens) {
       if (sensitivity_is_uncertain (sens, o, p))
         used += (size_t)snprintf (list + used, sizeof list - used, "%s%s by %s", used ? ", " : "", sens->outputs.of[o],
                                   sens->outputs.unknowns->list[p].name);
-  if (used)
-    pw_cli_say ("pinwheel: derivatives with errors above 1 %%: %s%s\n", list, used < sizeof list ? "" : " ...");
+  if (used) pw_cli_say ("pinwheel: derivatives with errors above 1 %%: %s%s\n", list, used < sizeof list ? "" : " ...");
 }
 
 /* ---- Files ---- */
@@ -180,9 +180,9 @@ static int sensitivity_csv (const void *context, FILE *f, pw_error *error) {
     if (!pw_outcome_is_final (&sens->outcomes, o)) continue;
     sensitivity_cell (&t, sens->outputs.of[o], pw_outcome_unit (&sens->outcomes, o, unit, sizeof unit));
     for (int p = 0; p < cmd->unknowns.count; p++)
-      sensitivity_cell (
-          &t, PW_PRINTED (SENSITIVITY_NAME, "d(%s)/d(%s)", sens->outputs.of[o], cmd->unknowns.list[p].name),
-          sensitivity_unit (sens, o, p, unit));
+      sensitivity_cell (&t,
+                        PW_PRINTED (SENSITIVITY_NAME, "d(%s)/d(%s)", sens->outputs.of[o], cmd->unknowns.list[p].name),
+                        sensitivity_unit (sens, o, p, unit));
   }
   int status = pw_text_line (&t, f, cmd->folder, error);
   for (int i = 0; i < sens->outputs.rows && status == PW_OK; i++) {

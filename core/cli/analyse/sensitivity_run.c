@@ -107,17 +107,17 @@ static int sensitivity_differentiate (pw_sensitivity *sens, const double *values
   sens->derivative = pw_arena_alloc (&sens->arena, P * (size_t)outputs * sizeof *sens->derivative);
   if (size == NULL || sens->derivative == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   const pw_difference_settings d = { .evaluate = sensitivity_evaluate,
-                            .context = sens,
-                            .x = values,
-                            .parameters = u->count,
-                            .outputs = outputs,
-                            .steering = sens->outputs.count,
-                            .size = size,
-                            .low = size + P,
-                            .high = size + 2 * P,
-                            .rtol = SENSITIVITY_RTOL,
-                            .neighbours = 6,
-                            .jobs = sens->jobs };
+                                     .context = sens,
+                                     .x = values,
+                                     .parameters = u->count,
+                                     .outputs = outputs,
+                                     .steering = sens->outputs.count,
+                                     .size = size,
+                                     .low = size + P,
+                                     .high = size + 2 * P,
+                                     .rtol = SENSITIVITY_RTOL,
+                                     .neighbours = 6,
+                                     .jobs = sens->jobs };
   for (size_t p = 0; p < P; p++) {
     pw_domain domain = u->list[p].parameter ? u->list[p].parameter->domain : PW_REAL;
     size[p] = u->list[p].size;

@@ -37,8 +37,7 @@ int pw_unknowns_open (pw_unknowns *u, const pw_cli_line *line, const pw_cli_mode
   if (status == PW_OK) status = pw_cli_read_specialise (line->specialise, &u->when, error);
   if (status != PW_OK) return status;
   u->settings.stop = NULL;
-  if (u->settings.rtol == 0)
-    u->settings.rtol = PW_RTOL;
+  if (u->settings.rtol == 0) u->settings.rtol = PW_RTOL;
   u->limit = limit.seconds;
   pw_cli_report_unused (u->method, line);
   return PW_OK;

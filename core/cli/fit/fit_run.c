@@ -37,17 +37,17 @@ int pw_fit_jacobian (pw_fit *fit, const double *unknowns, const double *values, 
   double *size = malloc (3 * (size_t)n * sizeof *size);
   pw_derivative *derivative = malloc ((size_t)n * (size_t)cells * sizeof *derivative);
   const pw_difference_settings d = { .evaluate = noise < own ? fit_accurate : fit_own,
-                            .context = fit,
-                            .x = unknowns,
-                            .parameters = n,
-                            .outputs = cells,
-                            .size = size,
-                            .low = size + n,
-                            .high = size + 2 * n,
-                            .rtol = noise,
-                            .neighbours = 2,
-                            .value = noise < own ? NULL : values,
-                            .jobs = fit->jobs };
+                                     .context = fit,
+                                     .x = unknowns,
+                                     .parameters = n,
+                                     .outputs = cells,
+                                     .size = size,
+                                     .low = size + n,
+                                     .high = size + 2 * n,
+                                     .rtol = noise,
+                                     .neighbours = 2,
+                                     .value = noise < own ? NULL : values,
+                                     .jobs = fit->jobs };
   int status = size && derivative ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
   for (int j = 0; j < n && status == PW_OK; j++) {
     const pw_unknown *u = &fit->unknowns.list[j];

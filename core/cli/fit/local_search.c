@@ -77,17 +77,17 @@ static int search_differentiate (local_search *local, pw_error *error) {
   double *size = malloc (3 * n * sizeof *size);
   pw_derivative *derivative = malloc (n * outputs * sizeof *derivative);
   const pw_difference_settings d = { .evaluate = search_neighbour,
-                            .context = local->problem,
-                            .x = local->unknown,
-                            .parameters = unknowns->count,
-                            .outputs = (int)outputs,
-                            .size = size,
-                            .low = size + n,
-                            .high = size + 2 * n,
-                            .rtol = pw_unknowns_noise (unknowns),
-                            .neighbours = 4,
-                            .value = local->output,
-                            .jobs = 1 };
+                                     .context = local->problem,
+                                     .x = local->unknown,
+                                     .parameters = unknowns->count,
+                                     .outputs = (int)outputs,
+                                     .size = size,
+                                     .low = size + n,
+                                     .high = size + 2 * n,
+                                     .rtol = pw_unknowns_noise (unknowns),
+                                     .neighbours = 4,
+                                     .value = local->output,
+                                     .jobs = 1 };
   int status = size && derivative ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
   for (size_t j = 0; j < n && status == PW_OK; j++) {
     const pw_unknown *u = &unknowns->list[j];

@@ -35,9 +35,13 @@ static int functions (void *context, const double *x, double rtol, double *value
 }
 
 static pw_difference_settings settings (const double *x, double rtol, int neighbours) {
-  return (pw_difference_settings){
-    .evaluate = functions, .x = x, .parameters = 2, .outputs = FUNCTIONS, .rtol = rtol, .neighbours = neighbours, .jobs = 1
-  };
+  return (pw_difference_settings){ .evaluate = functions,
+                                   .x = x,
+                                   .parameters = 2,
+                                   .outputs = FUNCTIONS,
+                                   .rtol = rtol,
+                                   .neighbours = neighbours,
+                                   .jobs = 1 };
 }
 
 static void contains (const pw_derivative *d, double truth, double most) {
@@ -96,12 +100,16 @@ TEST (bounds) {
   for (int neighbours = 2; neighbours <= 6; neighbours += 2)
     for (int refused = 0; refused < 2; refused++) {
       pw_difference_settings d = settings (x, 1e-12, neighbours);
-      if (refused) d.context = x;
-      else d.low = low, d.high = high;
+      if (refused)
+        d.context = x;
+      else
+        d.low = low, d.high = high;
       check_ok (pw_differentiate (&d, out, NULL, &error), &error);
       check_close ("at a bound", out[SINE].value, cos (2), neighbours == 2 ? 1e-7 : 1e-8, "the order");
-      if (neighbours > 2) contains (&out[SINE], cos (2), neighbours == 4 ? 1e-5 : 1e-7);
-      else assert_true (isnan (out[SINE].error));
+      if (neighbours > 2)
+        contains (&out[SINE], cos (2), neighbours == 4 ? 1e-5 : 1e-7);
+      else
+        assert_true (isnan (out[SINE].error));
     }
 }
 

@@ -16,12 +16,12 @@
 #include "util.h"
 
 enum {
-  MOST = 6,        /* neighbours */
-  FIRST = 2,       /* the first steps are 10^-2 and 10^-3 of the size */
-  LEAST = -14,     /* steps are at most 10^14 ... */
-  FINEST = 12,     /* ... and at least 10^-12 of the size */
-  LEVELS = 12,     /* steps that are tried for a parameter, at most */
-  SMALL = 3        /* decades to the next step where there is no effect */
+  MOST = 6,    /* neighbours */
+  FIRST = 2,   /* the first steps are 10^-2 and 10^-3 of the size */
+  LEAST = -14, /* steps are at most 10^14 ... */
+  FINEST = 12, /* ... and at least 10^-12 of the size */
+  LEVELS = 12, /* steps that are tried for a parameter, at most */
+  SMALL = 3    /* decades to the next step where there is no effect */
 };
 static const double ENOUGH = 1e-8, /* relative error of a derivative that needs no better step */
     NO_EFFECT = 1e-9,              /* likewise its error relative to output / parameter, if it may be 0 */
@@ -79,10 +79,10 @@ static double difference_one_sided (int side, int order, double f0, const double
 /* ---- Levels: steps that are tried ---- */
 
 typedef struct {
-  int decade, side;  /* step 10^-decade of the size; 0: central; 1, -1: the side of the neighbours */
+  int decade, side; /* step 10^-decade of the size; 0: central; 1, -1: the side of the neighbours */
   double step;
-  double *value;     /* neighbours x outputs */
-  int failed[2];     /* 1: a neighbour below, above could not be run */
+  double *value; /* neighbours x outputs */
+  int failed[2]; /* 1: a neighbour below, above could not be run */
 } difference_level;
 
 /* A derivative at a level. */
@@ -265,8 +265,8 @@ static double difference_contradiction (const difference_parameter *p, const dif
     if (b == a || !isfinite (e[b].error)) continue;
     const double off = fabs (e[a].derivative - e[b].derivative);
     if (p->level[b].decade > p->level[a].decade) finest = 0, most = fmax (most, off - e[b].error);
-    agrees |= off <= e[a].error + e[b].error &&
-              (e[b].error < 0.01 * fabs (e[b].derivative) || e[b].error <= 30 * e[a].error);
+    agrees |=
+        off <= e[a].error + e[b].error && (e[b].error < 0.01 * fabs (e[b].derivative) || e[b].error <= 30 * e[a].error);
   }
   return finest && !agrees ? 9 * e[a].error : most;
 }
@@ -333,7 +333,7 @@ static void difference_improve (const difference *x, difference_parameter *p, in
   if (isfinite (e.error) && e.error * natural <= NO_EFFECT * size && fabs (e.derivative) * natural <= NO_EFFECT * size)
     return;
   difference_range (p, &coarsest, &finest, &coarse_failed);
-  if (best < 0) { /* no level is consistent, or all have failed */
+  if (best < 0) {                                        /* no level is consistent, or all have failed */
     for (int a = 0, levels = p->levels; a < levels; a++) /* neighbours on the other side of those that fail */
       if (p->level[a].failed[0] != p->level[a].failed[1] && p->level[a].side == 0)
         difference_want (p, p->level[a].decade, p->level[a].failed[0] ? 1 : -1);
@@ -460,7 +460,8 @@ int pw_differentiate (const pw_difference_settings *d, pw_derivative *out, doubl
   if (status == PW_OK) status = d->neighbours < MOST ? difference_fixed (&x) : difference_controlled (&x);
   for (int j = 0; j < d->parameters && status == PW_OK; j++)
     for (int i = 0; i < d->outputs; i++)
-      out[j * d->outputs + i] = (d->neighbours < MOST ? difference_of_fixed : difference_result) (&x, &x.parameter[j], i);
+      out[j * d->outputs + i] =
+          (d->neighbours < MOST ? difference_of_fixed : difference_result) (&x, &x.parameter[j], i);
   if (value && status == PW_OK) memcpy (value, x.value, (size_t)d->outputs * sizeof *value);
   for (int j = 0; x.parameter && j < d->parameters; j++)
     for (int a = 0; a < x.parameter[j].levels; a++) free (x.parameter[j].level[a].value);
@@ -496,8 +497,7 @@ const char *pw_accurate_method (const pw_system *s, const pw_settings *settings,
   if (explicit_steps < few) return method[0];
   double implicit_steps = difference_steps (s, method[1], settings, t_end, 20000, &own[1]);
   if (implicit_steps < 0) return NULL;
-  if (isfinite (explicit_steps) || isfinite (implicit_steps))
-    return method[ratio * implicit_steps < explicit_steps];
+  if (isfinite (explicit_steps) || isfinite (implicit_steps)) return method[ratio * implicit_steps < explicit_steps];
   pw_fail (error, PW_METHOD, "no method is accurate enough for derivatives: %s", own[0].text);
   return NULL;
 }
