@@ -283,7 +283,7 @@ static void line_trial (const line_model *m) {
   double value[MOST_P], derivative[CLI_MOST], error[CLI_MOST], of_truth[MOST_P][LINE_OUTPUTS];
   real p[MOST_P], truth[MOST_P][LINE_OUTPUTS];
   int events, count, used = 0;
-  char by[200] = "", what[200];
+  char by[200] = "", what[400];
   for (int j = 0; j < MOST_P; j++) p[j] = value[j] = campaign_random (m->low[j], m->high[j]);
   for (int j = 0; j < MOST_P; j++)
     if (j < m->parameters || j > 3) sprintf (by + strlen (by), " --by %s", name[j]), used++;
@@ -302,7 +302,8 @@ static void line_trial (const line_model *m) {
   for (int i = 0; i < LINE_OUTPUTS; i++)
     for (int j = 0, k = 0; j < MOST_P; j++) {
       if (j >= m->parameters && j < 4) continue;
-      snprintf (what, sizeof what, "%s, output %d by %s", m->name, i, name[j]);
+      snprintf (what, sizeof what, "%s, a %.17g b %.17g c %.17g d %.17g x %.17g v %.17g to %.17g, output %d by %s", m->name,
+                value[0], value[1], value[2], value[3], value[4], value[5], t_end, i, name[j]);
       campaign_count (what, derivative[i * used + k], error[i * used + k], truth[j][i], of_truth[j][i], events > 0);
       k++;
     }

@@ -87,6 +87,11 @@ TEST (functionals) {
     { "erk8", 0, 1e-12, 1e-10, "100 rtol" },
     { "radau", 0, 1e-9, 1e-7, "100 rtol" },
     { "bdf", 0, 1e-8, 1e-5, "error of 1000 steps" },
+    { "erk5+nullspace", 0, 1e-10, 1e-7, "1000 rtol" },
+    { "adams", 0, 1e-9, 1e-5, "error of 1000 steps" },
+    { "ida", 0, 1e-9, 1e-5, "error of 1000 steps" },
+    { "galpha", 1e-3, 0, 1e-5, "(w h)^2, 1e-5" },
+    { "leapfrog", 1e-3, 0, 1e-5, "(w h)^2, 1e-5" },
   };
   for (size_t k = 0; k < sizeof way / sizeof *way; k++)
     for (size_t i = 0; i < sizeof expected / sizeof *expected; i++)
