@@ -474,30 +474,33 @@ int pw_differentiate (const pw_difference_settings *d, pw_derivative *out, doubl
 
 /* ---- The method of the runs ---- */
 
-/* The steps of a run with the tolerance 1e-6, of which it may try at most `most`; INFINITY if it fails, -1 if stopped. */
-static double difference_steps (const pw_system *s, const char *method, const pw_settings *settings, double t_end,
-                                long most, pw_error *error) {
+/* The steps of a run with the tolerance 1e-6, of which it may try at most `most`; INFINITY if it fails.  PW_OK, PW_STOPPED
+ * or PW_RESOURCE. */
+static int difference_steps (const pw_system *s, const char *method, const pw_settings *settings, double t_end,
+                             long most, double *steps, pw_error *error) {
   pw_settings own = *settings;
   own.rtol = 1e-6, own.atol = 0, own.max_steps = most;
   pw_run *r = pw_run_open (s, method, &own, error);
-  int status = r ? PW_OK : PW_METHOD;
+  int status = r ? PW_OK : error->status;
   while (status == PW_OK && pw_run_time (r) < t_end) status = pw_run_advance (r, t_end, error);
-  double steps = status == PW_OK ? (double)pw_run_statistics (r)->steps : status == PW_STOPPED ? -1 : INFINITY;
+  *steps = status == PW_OK ? (double)pw_run_statistics (r)->steps : INFINITY;
   pw_run_close (r);
-  return steps;
+  return status == PW_STOPPED || status == PW_RESOURCE ? status : PW_OK;
 }
 
 const char *pw_accurate_method (const pw_system *s, const pw_settings *settings, double t_end, pw_error *error) {
   static const char *const method[] = { "erk8+projection", "radau" };
+  static const long most[] = { 200000, 20000 };
   const double few = 2000, ratio = 20; /* a step of radau costs as much as 2 to 10 of erk8; it has a lower order */
   pw_error own[2] = { 0 };
+  double steps[2] = { INFINITY, INFINITY };
   if (pw_require (s, "a system", error) != PW_OK || pw_require (settings, "settings", error) != PW_OK) return NULL;
-  double explicit_steps = difference_steps (s, method[0], settings, t_end, 200000, &own[0]);
-  if (explicit_steps < 0) return NULL;
-  if (explicit_steps < few) return method[0];
-  double implicit_steps = difference_steps (s, method[1], settings, t_end, 20000, &own[1]);
-  if (implicit_steps < 0) return NULL;
-  if (isfinite (explicit_steps) || isfinite (implicit_steps)) return method[ratio * implicit_steps < explicit_steps];
+  for (int i = 0; i < 2 && !(steps[0] < few); i++) {
+    int status = difference_steps (s, method[i], settings, t_end, most[i], &steps[i], &own[i]);
+    if (status == PW_RESOURCE) pw_fail (error, PW_RESOURCE, "%s", own[i].text);
+    if (status != PW_OK) return NULL;
+  }
+  if (isfinite (steps[0]) || isfinite (steps[1])) return method[ratio * steps[1] < steps[0]];
   pw_fail (error, PW_METHOD, "no method is accurate enough for derivatives: %s", own[0].text);
   return NULL;
 }

@@ -66,7 +66,9 @@ static int sensitivity_check (const pw_sensitivity *sens, const double *values, 
   int status = PW_OK;
   for (int side = -1; side <= 1 && status == PW_OK; side += 2) {
     pw_unknown_run run = { .run = NULL };
-    int opened = sensitivity_neighbour (sens, values, p, side * step, &run, &(pw_error){ 0 });
+    pw_error own = { 0 };
+    int opened = sensitivity_neighbour (sens, values, p, side * step, &run, &own);
+    if (opened == PW_RESOURCE) status = pw_fail (error, opened, "%s", own.text);
     if (opened == PW_OK && !sensitivity_same_size (s, run.m.system))
       status = pw_fail (error, PW_INPUT,
                         "%s changes the number of bodies or elements: derivatives with respect to it do not exist",
