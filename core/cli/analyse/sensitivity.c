@@ -57,7 +57,7 @@ static const char *sensitivity_reason (const pw_unknown *u, const pw_derivative 
               fabs (d->below) < 1e-6 * fabs (d->above) ? 0 : d->below,
               fabs (d->above) < 1e-6 * fabs (d->below) ? 0 : d->above);
   else
-    snprintf (text, size, "unknown: the runs are not accurate enough for a digit of the derivative");
+    snprintf (text, size, "unknown by %s: no step of the differences of runs gives a digit of the derivative", u->name);
   return text;
 }
 
