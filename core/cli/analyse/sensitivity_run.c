@@ -103,30 +103,17 @@ static int sensitivity_evaluate (void *context, const double *x, double rtol, do
 
 static int sensitivity_differentiate (pw_sensitivity *sens, const double *values, pw_error *error) {
   const pw_unknowns *u = sens->outputs.unknowns;
-  const size_t P = (size_t)u->count;
   const int outputs = sens->outputs.count * (1 + sens->outputs.rows);
-  double *size = pw_arena_alloc (&sens->arena, 3 * P * sizeof *size);
-  sens->derivative = pw_arena_alloc (&sens->arena, P * (size_t)outputs * sizeof *sens->derivative);
-  if (size == NULL || sens->derivative == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  sens->derivative = pw_arena_alloc (&sens->arena, (size_t)u->count * (size_t)outputs * sizeof *sens->derivative);
+  if (sens->derivative == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   const pw_difference_settings d = { .evaluate = sensitivity_evaluate,
                                      .context = sens,
-                                     .x = values,
-                                     .parameters = u->count,
                                      .outputs = outputs,
                                      .steering = sens->outputs.count,
-                                     .size = size,
-                                     .low = size + P,
-                                     .high = size + 2 * P,
                                      .rtol = SENSITIVITY_RTOL,
                                      .neighbours = 6,
                                      .jobs = sens->jobs };
-  for (size_t p = 0; p < P; p++) {
-    pw_domain domain = u->list[p].parameter ? u->list[p].parameter->domain : PW_REAL;
-    size[p] = u->list[p].size;
-    size[P + p] = domain == PW_POSITIVE ? DBL_MIN : domain == PW_NONNEGATIVE || domain == PW_FRACTION ? 0 : -INFINITY;
-    size[2 * P + p] = domain == PW_FRACTION ? 1 : INFINITY;
-  }
-  return pw_differentiate (&d, sens->derivative, NULL, error);
+  return pw_unknowns_differentiate (u, values, d, sens->derivative, error);
 }
 
 /* The method of the runs that are compared, and the sizes of the unknowns. */

@@ -7,16 +7,18 @@
 #include "unknowns.h"
 
 int pw_unknown_find (pw_unknown *u, const pw_cli_model *m, const char *name, pw_error *error) {
-  *u = (pw_unknown){ .parameter = pw_cli_parameter (m->model, name), .state = -1 };
+  *u = (pw_unknown){ .parameter = pw_cli_parameter (m->model, name), .state = -1, .high = INFINITY };
   snprintf (u->name, sizeof u->name, "%s", name);
   if (u->parameter) {
     u->value = pw_model_parameter (m->model, u->parameter);
+    u->low = u->parameter->domain == PW_REAL ? -INFINITY : 0;
+    if (u->parameter->domain == PW_FRACTION) u->high = 1;
     snprintf (u->unit, sizeof u->unit, "%s", u->parameter->unit ? u->parameter->unit : "");
     return PW_OK;
   }
   if (strchr (name, '.') == NULL) /* no parameter: fails with the nearest name */
     return pw_model_set (m->model, name, 0, error);
-  u->state = pw_system_find_state (m->system, name, error);
+  u->state = pw_system_find_state (m->system, name, error), u->low = -INFINITY;
   if (u->state < 0) return error->status;
   int n = pw_system_coordinates (m->system);
   u->value = u->state < n ? pw_system_initial_q (m->system)[u->state] : pw_system_initial_v (m->system)[u->state - n];
@@ -88,10 +90,7 @@ static int unknown_add (pw_unknowns *u, const char *text, pw_error *error) {
     if (strcmp (u->list[i].name, name) == 0) return pw_fail (error, PW_INPUT, "--free %s is given twice", name);
   u->count++;
   int status = pw_unknown_find (added, u->m, name, error);
-  pw_domain domain = added->parameter ? added->parameter->domain : PW_REAL;
-  added->low = domain == PW_REAL ? -INFINITY : 0;
-  added->high = domain == PW_FRACTION ? 1 : INFINITY;
-  if (domain == PW_COUNT)
+  if (added->parameter && added->parameter->domain == PW_COUNT)
     status = pw_fail (error, PW_INPUT, "--free %s: it is a count, and only continuous parameters can be free", name);
   if (status == PW_OK && text[size]) status = unknown_read_bounds (added, text + size + 1, error);
   added->scale = added->has_bounds ? added->high - added->low : added->value != 0 ? fabs (added->value) : 1;
@@ -182,6 +181,22 @@ void pw_unknown_measure (pw_unknown *u, double value, const pw_run *r) {
   if (u->state >= 0) size = fmax (size, (*u->unit == 'm' ? length : 1) / (strchr (u->unit, 's') ? time : 1));
   if (size == 0 && u->parameter) size = fabs (u->parameter->value);
   u->size = size > 0 ? size : 1;
+}
+
+int pw_unknowns_differentiate (const pw_unknowns *u, const double *x, pw_difference_settings d, pw_derivative *out,
+                               pw_error *error) {
+  const size_t n = (size_t)u->count;
+  double *size = malloc (3 * n * sizeof *size);
+  if (size == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  for (size_t j = 0; j < n; j++) {
+    const pw_unknown *unknown = &u->list[j];
+    size[j] = unknown->size > 0 ? unknown->size : fmax (fabs (x[j]), 1e-2 * unknown->scale);
+    size[n + j] = unknown->low, size[2 * n + j] = unknown->high;
+  }
+  d.x = x, d.parameters = u->count, d.size = size, d.low = size + n, d.high = size + 2 * n;
+  int status = pw_differentiate (&d, out, NULL, error);
+  free (size);
+  return status;
 }
 
 /* ---- Starts and results of searches ---- */

@@ -12,11 +12,11 @@ typedef struct {
   int state;                     /* its number; -1 for a parameter */
   double value;                  /* in the model of the command line */
   char unit[16];
-  double size; /* a typical size: set by pw_unknown_measure */
-  /* for searches: */
+  double size;      /* a typical size: set by pw_unknown_measure; else 0 */
   double low, high; /* bounds, of --free or else of the parameter's domain; infinite without one */
-  double scale;     /* size of typical changes: high - low of --free, else |value|, else 1 */
-  int has_bounds;   /* 1: the bounds are those of --free, which are finite */
+  /* for searches: */
+  double scale;   /* size of typical changes: high - low of --free, else |value|, else 1 */
+  int has_bounds; /* 1: the bounds are those of --free, which are finite */
 } pw_unknown;
 
 /* Finds the parameter or state of this name in an open model, and its value there.  PW_INPUT, with the nearest name,
@@ -70,6 +70,11 @@ void pw_unknown_run_close (pw_unknown_run *run);
 /* Sets the typical size of an unknown: |value|, but at least 0.1 rad for angles and the unit of the scene for states;
  * for a parameter that is 0 its default value, or 1 if that is 0, too. */
 void pw_unknown_measure (pw_unknown *u, double value, const pw_run *r);
+
+/* Differentiates outputs at values x of the unknowns, within their bounds; d: all but x, parameters, size, low, high.
+ * out, errors: as pw_differentiate. */
+int pw_unknowns_differentiate (const pw_unknowns *u, const double *x, pw_difference_settings d, pw_derivative *out,
+                               pw_error *error);
 
 /* Points where searches begin, `count` x unknowns: the unknowns' values; then points of Sobol's sequence, shifted
  * modulo 1 by random numbers from the seed, between the bounds of --free, else within `scale` of the values.  If count

@@ -34,30 +34,19 @@ static int fit_accurate (void *fit, const double *x, double rtol, double *value,
 int pw_fit_jacobian (pw_fit *fit, const double *unknowns, const double *values, double *jacobian, pw_error *error) {
   const int n = fit->unknowns.count, cells = fit->columns * fit->rows;
   const double own = pw_unknowns_noise (&fit->unknowns), noise = fmin (own, FIT_RTOL);
-  double *size = malloc (3 * (size_t)n * sizeof *size);
   pw_derivative *derivative = malloc ((size_t)n * (size_t)cells * sizeof *derivative);
   const pw_difference_settings d = { .evaluate = noise < own ? fit_accurate : fit_own,
                                      .context = fit,
-                                     .x = unknowns,
-                                     .parameters = n,
                                      .outputs = cells,
-                                     .size = size,
-                                     .low = size + n,
-                                     .high = size + 2 * n,
                                      .rtol = noise,
                                      .neighbours = 2,
                                      .value = noise < own ? NULL : values,
                                      .jobs = fit->jobs };
-  int status = size && derivative ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
-  for (int j = 0; j < n && status == PW_OK; j++) {
-    const pw_unknown *u = &fit->unknowns.list[j];
-    size[j] = fmax (fabs (unknowns[j]), 1e-2 * u->scale), size[n + j] = u->low, size[2 * n + j] = u->high;
-    fit->derivative_error[j] = pow (noise, 2. / 3);
-  }
-  if (status == PW_OK) status = pw_differentiate (&d, derivative, NULL, error);
+  int status = derivative ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+  if (status == PW_OK) status = pw_unknowns_differentiate (&fit->unknowns, unknowns, d, derivative, error);
   for (int i = 0; i < n * cells && status == PW_OK; i++) jacobian[i] = derivative[i].value;
+  for (int j = 0; j < n; j++) fit->derivative_error[j] = pow (noise, 2. / 3);
   fit->runs += 2 * (long)n;
-  free (size);
   free (derivative);
   return status;
 }

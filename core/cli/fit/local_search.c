@@ -73,31 +73,19 @@ static int search_neighbour (void *problem, const double *x, double rtol, double
 /* Stores the derivatives of the last run in local->slope. */
 static int search_differentiate (local_search *local, pw_error *error) {
   const pw_unknowns *unknowns = &local->problem->unknowns;
-  const size_t n = (size_t)unknowns->count, outputs = (size_t)local->problem->outputs;
-  double *size = malloc (3 * n * sizeof *size);
-  pw_derivative *derivative = malloc (n * outputs * sizeof *derivative);
+  const int n = unknowns->count, outputs = local->problem->outputs;
+  pw_derivative *derivative = malloc ((size_t)n * (size_t)outputs * sizeof *derivative);
   const pw_difference_settings d = { .evaluate = search_neighbour,
                                      .context = local->problem,
-                                     .x = local->unknown,
-                                     .parameters = unknowns->count,
-                                     .outputs = (int)outputs,
-                                     .size = size,
-                                     .low = size + n,
-                                     .high = size + 2 * n,
+                                     .outputs = outputs,
                                      .rtol = pw_unknowns_noise (unknowns),
                                      .neighbours = 4,
                                      .value = local->output,
                                      .jobs = 1 };
-  int status = size && derivative ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
-  for (size_t j = 0; j < n && status == PW_OK; j++) {
-    const pw_unknown *u = &unknowns->list[j];
-    size[j] = fmax (fabs (local->unknown[j]), 1e-2 * u->scale), size[n + j] = u->low, size[2 * n + j] = u->high;
-  }
-  if (status == PW_OK) status = pw_differentiate (&d, derivative, NULL, error);
-  for (size_t j = 0; j < n && status == PW_OK; j++)
-    for (size_t i = 0; i < outputs; i++)
-      local->slope[i * n + j] = unknowns->list[j].scale * derivative[j * outputs + i].value;
-  free (size);
+  int status = derivative ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+  if (status == PW_OK) status = pw_unknowns_differentiate (unknowns, local->unknown, d, derivative, error);
+  for (int k = 0; k < n * outputs && status == PW_OK; k++)
+    local->slope[k % outputs * n + k / outputs] = unknowns->list[k / outputs].scale * derivative[k].value;
   free (derivative);
   local->search->derivatives += status == PW_OK;
   return status;
