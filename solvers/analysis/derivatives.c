@@ -2,10 +2,9 @@
  *
  * At x + k h, k = -3 ... 3, central differences have the orders 2, 4, 6; beside a bound k = 0 ... 6.  The error of the
  * last one is at most about its difference from the one before, plus the errors of the runs over h.  The latter are
- * measured at x by a run with ten times the tolerance, and by the sixth difference.  Steps h, by factors of ten, become
- * larger while the errors of the runs dominate, smaller while the formulas disagree or one-sided formulas show that the
- * derivative jumps.  The result is the one of least error; by as much as it contradicts that of the next step, this
- * error grows. */
+ * measured at x by runs with larger tolerances, and by the sixth difference.  Steps h, by factors of ten, become larger
+ * while the errors of the runs dominate, smaller while the formulas disagree or one-sided formulas show that the
+ * derivative jumps.  The result is the one of least error, which grows by as much as it contradicts smaller steps. */
 #include <float.h>
 #include <math.h>
 #include <pthread.h>
@@ -21,7 +20,7 @@ enum {
   LEAST = -14, /* steps are at most 10^14 ... */
   FINEST = 12, /* ... and at least 10^-12 of the size */
   LEVELS = 12, /* steps that are tried for a parameter, at most */
-  SMALL = 3    /* decades to the next step where there is no effect */
+  SKIPPED = 3  /* decades to the next larger step where there is no effect */
 };
 static const double ENOUGH = 1e-8, /* relative error of a derivative that needs no better step */
     NO_EFFECT = 1e-9,              /* likewise its error relative to output / parameter, if it may be 0 */
@@ -343,7 +342,7 @@ static void difference_improve (const difference *x, difference_parameter *p, in
   }
   const double noise = e.noise * pow (10, finest + 1 - p->level[best].decade); /* at the next smaller step */
   if (p->level[best].decade == coarsest && !coarse_failed && e.noise > e.error / 4)
-    difference_want (p, coarsest - (e.same || e.noise > fabs (e.derivative) ? SMALL : 1), 0);
+    difference_want (p, coarsest - (e.same || e.noise > fabs (e.derivative) ? SKIPPED : 1), 0);
   if (noise < e.error / 4) difference_want (p, finest + 1, 0);
 }
 
@@ -369,7 +368,9 @@ static pw_derivative difference_result (const difference *x, const difference_pa
 static int difference_fixed (difference *x) {
   const pw_difference_settings *d = x->d;
   for (int j = 0; j < d->parameters; j++) {
-    x->parameter[j].size *= pow (d->rtol, 1. / (d->neighbours + 1));
+    const double range = difference_bound (d->high, j, INFINITY) - difference_bound (d->low, j, -INFINITY);
+    x->parameter[j].size =
+        fmin (x->parameter[j].size * pow (d->rtol, 1. / (d->neighbours + 1)), range / (4 * d->neighbours));
     if (!difference_want (&x->parameter[j], 0, 0) && x->status == PW_OK)
       return pw_fail (x->error, PW_METHOD, "parameter %d: its bounds leave no room for differences", j);
   }

@@ -113,6 +113,19 @@ TEST (bounds) {
     }
 }
 
+/* Bounds nearer to each other than the usual steps. */
+TEST (narrow) {
+  const double x[] = { 2, 1 }, low[] = { 2 - 1e-6, -1 }, high[] = { 2 + 1e-6, INFINITY };
+  pw_derivative out[2 * FUNCTIONS];
+  pw_error error = { 0 };
+  for (int neighbours = 2; neighbours <= 6; neighbours += 2) {
+    pw_difference_settings d = settings (x, 1e-12, neighbours);
+    d.low = low, d.high = high;
+    check_ok (pw_differentiate (&d, out, NULL, &error), &error);
+    check_close ("narrow", out[SINE].value, cos (2), 1e-4, "1e-12 over steps of 1e-7");
+  }
+}
+
 TEST (fixed) {
   const double x[] = { 0.7, 1 };
   pw_derivative out[2 * FUNCTIONS];
