@@ -91,7 +91,7 @@ typedef struct {
 } pw_derivative;
 
 /* Differentiates outputs with respect to parameters, by differences of runs at neighbouring values: beside a bound, or a
- * value that the runs refuse, on one side only.  The errors of runs are measured by one with ten times the tolerance.
+ * value that the runs refuse, on one side only.  The errors of runs are measured by others with larger tolerances.
  * out: parameters x outputs; value, unless NULL: outputs at x.  Errors: PW_INPUT for an invalid description; those of
  * `evaluate` at x; with 2 or 4 neighbours also those of these; PW_RESOURCE. */
 int pw_differentiate (const pw_difference_settings *d, pw_derivative *out, double *value, pw_error *error);
