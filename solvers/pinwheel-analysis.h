@@ -97,9 +97,11 @@ typedef struct {
 int pw_differentiate (const pw_difference_settings *d, pw_derivative *out, double *value, pw_error *error);
 
 /* The method by which runs of a system are most accurate at small tolerances: "erk8+projection", or "radau" if that
- * takes much fewer steps, since the motion is stiff.  settings: as of the runs, their rtol is not used; NULL and the
- * error if both fail; if settings->stop requests a stop: NULL without an error. */
-const char *pw_accurate_method (const pw_system *s, const pw_settings *settings, double t_end, pw_error *error);
+ * takes much fewer steps, since the motion is stiff.  settings: as of the runs, their rtol is not used; *most_steps: a
+ * limit of steps for runs that are compared with this one, which may be very different.  NULL and the error if both fail;
+ * if settings->stop requests a stop: NULL without an error. */
+const char *pw_accurate_method (const pw_system *s, const pw_settings *settings, double t_end, long *most_steps,
+                                pw_error *error);
 
 /* ---- Steady motions (steady*.c) ---- */
 

@@ -170,7 +170,8 @@ TEST (failures) {
   error = (pw_error){ 0 };
   assert_int_equal (pw_differentiate (NULL, out, NULL, &error), PW_INPUT);
   error = (pw_error){ 0 };
-  assert_null (pw_accurate_method (NULL, &(pw_settings){ 0 }, 1, &error));
+  long most;
+  assert_null (pw_accurate_method (NULL, &(pw_settings){ 0 }, 1, &most, &error));
   check_error (&error, PW_INPUT, "a system is missing");
 }
 

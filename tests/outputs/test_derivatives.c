@@ -139,4 +139,11 @@ TEST (sizes) {
   derivatives_check ("--of b.x --by p -t 1.5", 1, &three, 0);
 }
 
+/* Neighbours of large steps, b < 0, slide along the jump, with steps without end: they are given up. */
+TEST (sliding_neighbours) {
+  const double expected[] = { 0, 0 };
+  derivatives_write ("{name: a, value: 2}, {name: b, value: 0.77}, {name: c, value: 5}", 0.2, "fx: 'b.vx > c ? b : a'");
+  derivatives_check ("--of b.x --of rms:b.vx --by b -t 1.4", 2, expected, 0);
+}
+
 const check_fixture fixture = { cli_setup, cli_teardown };

@@ -15,6 +15,7 @@ typedef struct {
   int count;
   const char *method; /* NULL: that of the unknowns, with their settings */
   double rtol;        /* with a method */
+  long max_steps;     /* likewise; 0: that of the settings */
   const double *t;    /* rows: times of a table, see pw_outcome_table; NULL: none */
   int rows;
 } pw_run_outputs;

@@ -20,6 +20,7 @@ int pw_run_outputs_at (const pw_run_outputs *outputs, const double *x, double *v
   if (status == PW_OK)
     status = pw_outcomes_open (&outcomes, run.m.system, outputs->option, outputs->of, outputs->count, error);
   if (outputs->method) run.settings.rtol = outputs->rtol, run.settings.atol = 0;
+  if (outputs->max_steps) run.settings.max_steps = outputs->max_steps;
   if (status == PW_OK)
     status = pw_outcomes_run (&outcomes, outputs->method ? outputs->method : outputs->unknowns->method, &run.settings,
                               outputs->unknowns->t_end, outputs->t ? &rows : NULL, error);
@@ -127,7 +128,7 @@ static int sensitivity_prepare (pw_sensitivity *sens, const double *values, pw_e
   for (int p = 0; p < u->count && status == PW_OK; p++) pw_unknown_measure (&u->list[p], values[p], r);
   if (status == PW_OK) {
     pw_limit_start (&run.limit);
-    sens->outputs.method = pw_accurate_method (run.m.system, &run.settings, u->t_end, error);
+    sens->outputs.method = pw_accurate_method (run.m.system, &run.settings, u->t_end, &sens->outputs.max_steps, error);
     if (sens->outputs.method == NULL && error->status == PW_OK)
       status = pw_limit_status (&run.limit, pw_run_time (r), error);
     else if (sens->outputs.method == NULL)
