@@ -504,7 +504,7 @@ const char *pw_accurate_method (const pw_system *s, const pw_settings *settings,
     if (status != PW_OK) return NULL;
   }
   const int best = ratio * steps[1] < steps[0];
-  *most_steps = (long)fmin (more * (steps[best] + 50), 1e9);
+  *most_steps = (long)fmin (more * (steps[best] + 1000), 1e9);
   if (isfinite (steps[best])) return method[best];
   pw_fail (error, PW_METHOD, "no method is accurate enough for derivatives: %s", own[0].text);
   return NULL;
