@@ -402,15 +402,18 @@ def shown_in_a_notebook(page, script, folder):
     browser = os.environ.get("BROWSER") or next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
     if browser is None:
         pytest.skip("no browser")
+    # The browser writes the document when it is loaded, that is, not before the second frame is closed, with the verdict.
     (folder / "notebook.html").write_text(f"""<!DOCTYPE html><html><body>{page}<pre id="verdict"></pre><script>
         (async () => {{
           const frame = document.querySelector("iframe"), $ = id => frame.contentDocument.getElementById(id);
-          const until = async good => {{ for (let i = 0; i < 500 && !good(); i++) await new Promise(done => setTimeout(done, 20)); }};
+          const until = async good => {{ for (let i = 0; i < 1500 && !good(); i++) await new Promise(done => setTimeout(done, 20)); }};
           const root = () => frame.contentDocument?.documentElement?.dataset || {{}};
-          {script}
+          const hold = document.body.appendChild(document.createElement("iframe"));
+          hold.contentDocument.open();
+          try {{ {script} }} finally {{ hold.contentDocument.close(); }}
         }})();</script></body></html>""", encoding="utf-8")
-    done = subprocess.run([browser, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={folder}/profile", "--virtual-time-budget=30000",
-                           "--enable-logging=stderr", "--v=0", "--dump-dom", f"file://{folder}/notebook.html"], capture_output=True, text=True, timeout=120)
+    done = subprocess.run([browser, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={folder}/profile", "--enable-logging=stderr",
+                           "--v=0", "--dump-dom", f"file://{folder}/notebook.html"], capture_output=True, text=True, timeout=240)
     assert ":CONSOLE" not in done.stderr, done.stderr
     return re.search(r'<pre id="verdict">(.*?)</pre>', done.stdout, re.S).group(1)
 
