@@ -52,7 +52,7 @@ static const int INITIAL_STAGES = sizeof initial_stage / sizeof *initial_stage;
 static const struct initial_stage initial_least_change = { INITIAL_KEPT, 1e-6 };
 
 /* Searches: the distances at which they begin [units of L and rad]; their number in a scene of at most 100 coordinates;
- * where one ends as a solution that is as near as can be told: the changes of candidates, the turn of free angles. */
+ * where the first solution is taken as the nearest one: the changes of candidates, the turn of free angles. */
 static const double initial_start[] = { 0, 0.1, 0.3, 0.6, 1, 1.5, 2, 2, 3 };
 enum { INITIAL_STARTS = 20, INITIAL_STARTS_TO_TURN_LESS = 6, INITIAL_STARTS_FOUND = 10 };
 static const double INITIAL_UNCHANGED = 1e-4, INITIAL_TURNED = 0.5;
@@ -74,7 +74,7 @@ static const double INITIAL_NEAR = 1e-9, INITIAL_LEAST_DAMPING = DBL_EPSILON / 2
  * a step, alone and together with other values. */
 static const double INITIAL_RELAXED = 0.3, INITIAL_STEP = 0.7, INITIAL_PART = 1. / 32, INITIAL_PART_OF_MANY = 1. / 4;
 
-/* What prescribed values may change others: so many times the least change, or so much [units of L and rad]. */
+/* What prescribed values may change others: that many times the least change, or that much [units of L and rad]. */
 static const double INITIAL_AMPLIFIED = 10, INITIAL_CHANGE = 0.1;
 /* Changes that may be due to the round-off of other values, relative. */
 static const double INITIAL_ROUND = 1e-10;
@@ -119,8 +119,8 @@ typedef struct {
 /* ---- Linear systems ---- */
 
 /* The matrix, or its pattern while the map is recorded; columns of prescribed values are those of the identity.
- * damping: relative to the largest diagonal entry of G W^-1 G^T, for all equations alike; 0: for Newton's method, to the
- * round-off of each entry, so that dependent equations have a solution. */
+ * damping: relative to the largest diagonal entry of G W^-1 G^T, for all equations alike; 0: for Newton's method, to
+ * the round-off of each entry, so that dependent equations have a solution. */
 static void initial_fill (initial_search *x, double damping) {
   const int n = x->s->coords;
   pw_scatter_map *map = &x->map;
@@ -274,7 +274,7 @@ static double initial_step (initial_search *x, double damping, pw_residuals *now
 }
 
 /* Levenberg and Marquardt's method from the positions x->value, with those of infinite weight at their targets, to
- * round-off.  1 if it converges within so many iterations; 0: x->failed_row, and where it ends. */
+ * round-off.  1 if it converges within that many iterations; 0: x->failed_row, and where it ends. */
 static int initial_converge (initial_search *x, int iterations) {
   pw_run *r = x->r;
   const size_t bytes = (size_t)x->s->coords * sizeof (double), rows = (size_t)x->rows * sizeof (double);
@@ -526,8 +526,8 @@ static int initial_order (const initial_search *x, int m) {
   return m >= 3 * x->s->bodies ? m : m % 3 == 0 ? m + 2 : m - 1;
 }
 
-/* The order in which columns of these importances enter the basis, if a part longer than this is left of them (rows of G
- * have length 1).  Among values of one origin, those that the others determine well come first. */
+/* The order in which columns of these importances enter the basis, if a part longer than this is left of them (rows of
+ * G have length 1).  Among values of one origin, those that the others determine well come first. */
 static const struct {
   int first, last;
   double independent;
@@ -594,8 +594,9 @@ static int initial_try (initial_search *x, int first, int end) {
   return PW_RETRY;
 }
 
-/* Keeps as many of the values list[0] .. list[count - 1] as possible, the first ones first; the others become free.  All
- * are tried at once, then few, and twice as many after each success.  Returns the number of the others, or an error. */
+/* Keeps as many of the values list[0] .. list[count - 1] as possible, the first ones first; the others become free.
+ * All are tried at once, then few, and twice as many after each success.  Returns the number of the others, or an
+ * error. */
 static int initial_keep_list (initial_search *x, int count) {
   int released = 0, status = PW_OK, first = 0;
   for (int size = count; first < count && status >= 0;) {

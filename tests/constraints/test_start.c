@@ -166,7 +166,8 @@ TEST (specified_zero) {
   runs_close (r, s);
 }
 
-/* Of specified positions that contradict the pin the angle is kept, which comes first, and so are specified velocities. */
+/* Of specified positions that contradict the pin the angle is kept, which comes first, and so are specified
+ * velocities. */
 TEST (overspecified) {
   pw_system *s;
   pw_run *r;

@@ -333,11 +333,11 @@ def test_changed_initial_values_are_reported():
     assert model.run(t_end=0.01).changed == {}
     r = model.run(t_end=0.01, start={"frame.vy": 1})
     assert r.changed["frame.omega"] == (0, pytest.approx(2, rel=1e-12)) and len(r.changed) == 3
-    with pytest.warns(UserWarning, match="model ezyroller: initial values were changed to satisfy the constraints: frame.vy from 1 to .*, frame.omega from 0"):
+    with pytest.warns(UserWarning, match="model ezyroller: initial values were changed to satisfy the constraints: frame.omega from 0 to 2 rad/s$"):
         model.run(t_end=0.01, start={"frame.vy": 1, "frame.omega": 0})
     sleigh = pw.describe(bodies=[pw.Body("sleigh", mass=1, inertia=0.5, rate={"vx": 1, "vy": 0.1, "omega": 0.8})],
                          elements=[pw.Wheel("edge", body="sleigh", at=[-0.25, 0])])
-    with pytest.warns(UserWarning, match="vy from 0.1 to 0.18.* m/s .specified by the model., sleigh.omega from 0.8 to 0.75"):
+    with pytest.warns(UserWarning, match="constraints: sleigh.vy from 0.1 to 0.2 m/s .specified by the model.$"):
         sleigh.run(t_end=0.01)
     with pytest.warns(UserWarning, match="constraints: sleigh.omega from 0.8 to 0 rad/s .specified by the model.$"):
         sleigh.run(t_end=0.01, start={"sleigh.vy": 0, "sleigh.vx": 1})

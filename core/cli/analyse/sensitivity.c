@@ -339,7 +339,8 @@ static int sensitivity_command (void *options, pw_error *error) {
   int status = sensitivity_open (cmd, error);
   if (status == PW_OK)
     status = pw_figure_lock_folder (&cmd->line, &cmd->m, cmd->folder, "sensitivity", &cmd->files, error);
-  if (status == PW_OK) pw_report_model (&cmd->m), status = pw_report_initial_state (&cmd->m, cmd->sens.unknowns.limit, error);
+  if (status == PW_OK)
+    pw_report_model (&cmd->m), status = pw_report_initial_state (&cmd->m, cmd->sens.unknowns.limit, error);
   const double start = pw_seconds (CLOCK_PROCESS_CPUTIME_ID);
   if (status == PW_OK) status = sensitivity_compute (sens, error);
   const int without_errors = status == PW_RETRY && sens->loose; /* interrupted when all derivatives were known */
