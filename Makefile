@@ -271,12 +271,13 @@ $(BUILD)/models/%.so: models/%.c | $(INCLUDES) $(FIRST)
 
 # A link: $(BUILD)/pinwheel searches models/, too, and a file found twice counts once.  It is relative, so that the tree can be
 # copied.  A plug-in of the same name, from when the model was written in C, is removed.
+TO_SOURCE = ln -sfr $< $@ 2>/dev/null || ln -sf "$(CURDIR)/$<" $@
 $(BUILD)/models/%.yaml: models/%.yaml
 	@mkdir -p $(@D) && rm -f $(@:.yaml=.so) $(@:.yaml=.c)
-	@ln -sfr $< $@ 2>/dev/null || ln -sf "$(CURDIR)/$<" $@
+	@$(TO_SOURCE)
 $(BUILD)/models/%.c: models/%.c
 	@mkdir -p $(@D)
-	@ln -sfr $< $@ 2>/dev/null || ln -sf "$(CURDIR)/$<" $@
+	@$(TO_SOURCE)
 
 OWN_LIBS = -L$(BUILD) -lpinwheel-files -lpinwheel
 
