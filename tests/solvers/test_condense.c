@@ -237,7 +237,8 @@ TEST (stool) {
         if (isinf (weight[j]))
           check_close ("prescribed", a[j], 0, 0, "it does not move");
         else
-          check_close ("force", s->mass[j] * a[j] + sum[j], f[j], unit * (1 + fabs (sum[j])), "round-off over a sine^2");
+          check_close ("force", s->mass[j] * a[j] + sum[j], f[j], unit * (1 + fabs (sum[j])),
+                       "round-off over a sine^2");
       for (int i = 0; i < s->rows; i++)
         check_close ("acceleration", Ja[i], gamma[i], 1e4 * unit, "round-off of accelerations of 1e3");
       free (weight);
