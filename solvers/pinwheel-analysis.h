@@ -90,16 +90,16 @@ typedef struct {
   double below, above;
 } pw_derivative;
 
-/* Differentiates outputs with respect to parameters, by differences of runs at neighbouring values: beside a bound, or a
- * value that the runs refuse, on one side only.  The errors of runs are measured by others with larger tolerances.
+/* Differentiates outputs with respect to parameters, by differences of runs at neighbouring values: beside a bound, or
+ * a value that the runs refuse, on one side only.  The errors of runs are measured by others with larger tolerances.
  * out: parameters x outputs; value, unless NULL: outputs at x.  Errors: PW_INPUT for an invalid description; those of
  * `evaluate` at x; with 2 or 4 neighbours also those of these; PW_RESOURCE. */
 int pw_differentiate (const pw_difference_settings *d, pw_derivative *out, double *value, pw_error *error);
 
 /* The method by which runs of a system are most accurate at small tolerances: "erk8+projection", or "radau" if that
  * takes much fewer steps, since the motion is stiff.  settings: as of the runs, their rtol is not used; *most_steps: a
- * limit of steps for runs that are compared with this one, which may be very different.  NULL and the error if both fail;
- * if settings->stop requests a stop: NULL without an error. */
+ * limit of steps for runs that are compared with this one, which may be very different.  NULL and the error if both
+ * fail; if settings->stop requests a stop: NULL without an error. */
 const char *pw_accurate_method (const pw_system *s, const pw_settings *settings, double t_end, long *most_steps,
                                 pw_error *error);
 

@@ -124,8 +124,8 @@ static double difference_bound (const double *bound, int j, double otherwise) {
   return bound ? bound[j] : otherwise;
 }
 
-/* Adds a level to those wanted: central, or beside a bound on its inner side.  0 if there is no room for its neighbours,
- * or it is there. */
+/* Adds a level to those wanted: central, or beside a bound on its inner side.  0 if there is no room for its
+ * neighbours, or it is there. */
 static int difference_want (difference_parameter *p, int decade, int side) {
   const pw_difference_settings *d = p->x->d;
   const double x = d->x[p->parameter], low = difference_bound (d->low, p->parameter, -INFINITY),
@@ -270,8 +270,8 @@ static double difference_contradiction (const difference_parameter *p, const dif
   return finest && !agrees ? 9 * e[a].error : most;
 }
 
-/* The estimate of output i by parameter p: that of the level of least error, contradictions included; *best: this level,
- * or -1. */
+/* The estimate of output i by parameter p: that of the level of least error, contradictions included; *best: this
+ * level, or -1. */
 static difference_estimate difference_best (const difference *x, const difference_parameter *p, int i, int *best) {
   difference_estimate found = { .derivative = NAN, .error = INFINITY, .noise = INFINITY, .below = NAN, .above = NAN },
                       e[LEVELS];
@@ -423,8 +423,8 @@ static int difference_open (difference *x) {
   return x->status;
 }
 
-/* The error of an output of a run: tolerance by tolerance the change by a larger one, which is about that many times the
- * error, but at events may be small by chance; at least that of one decade. */
+/* The error of an output of a run: tolerance by tolerance the change by a larger one, which is about that many times
+ * the error, but at events may be small by chance; at least that of one decade. */
 static void difference_measure_run (difference *x, int i) {
   const double f = x->value[i];
   double most = x->d->rtol * fabs (f);
@@ -475,8 +475,8 @@ int pw_differentiate (const pw_difference_settings *d, pw_derivative *out, doubl
 
 /* ---- The method of the runs ---- */
 
-/* The steps of a run with the tolerance 1e-6, of which it may try at most `most`; INFINITY if it fails.  PW_OK, PW_STOPPED
- * or PW_RESOURCE. */
+/* The steps of a run with the tolerance 1e-6, of which it may try at most `most`; INFINITY if it fails.  PW_OK,
+ * PW_STOPPED or PW_RESOURCE. */
 static int difference_steps (const pw_system *s, const char *method, const pw_settings *settings, double t_end,
                              long most, double *steps, pw_error *error) {
   pw_settings own = *settings;

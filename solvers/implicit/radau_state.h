@@ -4,8 +4,8 @@
 
 #include "implicit.h"
 
-/* Coefficients of the Radau IIA method of order 5 (Hairer & Wanner 1996, section IV.8); A and gamma were computed with 60
- * digits from the nodes c. */
+/* Coefficients of the Radau IIA method of order 5 (Hairer & Wanner 1996, section IV.8); A and gamma were computed with
+ * 60 digits from the nodes c. */
 enum { PW_RADAU_STAGES = 3 };
 
 static const double radau_c[PW_RADAU_STAGES] = { 0.15505102572168219018, 0.64494897427831780982, 1 };

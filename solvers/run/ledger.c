@@ -1,5 +1,5 @@
-/* The energy of a run and its ledger of work, losses and integrals: scales, tolerance, energy defect.  Every run keeps a
- * ledger, since samples contain the total work and loss; in adaptive Runge-Kutta methods, radau included, its error
+/* The energy of a run and its ledger of work, losses and integrals: scales, tolerance, energy defect.  Every run keeps
+ * a ledger, since samples contain the total work and loss; in adaptive Runge-Kutta methods, radau included, its error
  * takes part in step-size control. */
 #include <float.h>
 #include <math.h>
@@ -15,8 +15,8 @@ static double ledger_scene_energy (const pw_run *r) {
   return sum / (r->settings.span * r->settings.span);
 }
 
-/* Evaluates kinematics at an arbitrary state: displaced by about L and 1 rad, at velocities of about L / T and 1 / T, at
- * the time t.  A status. */
+/* Evaluates kinematics at an arbitrary state: displaced by about L and 1 rad, at velocities of about L / T and 1 / T,
+ * at the time t.  A status. */
 static int ledger_displace (pw_run *r, double t) {
   double *q = r->scratch, *v = q + r->s->coords + 3;
   for (int j = 0; j < r->s->coords; j++) {

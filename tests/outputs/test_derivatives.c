@@ -1,5 +1,5 @@
-/* Derivatives of outputs with closed forms: conditions on velocities and positions, contacts, friction, reactions, kinks
- * in parameters.  Each is within its stated error, which is small. */
+/* Derivatives of outputs with closed forms: conditions on velocities and positions, contacts, friction, reactions,
+ * kinks in parameters.  Each is within its stated error, which is small. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

@@ -1,5 +1,5 @@
-/* Outputs of runs as functions of unknowns, and their derivatives, for `sensitivity`, `fit` and `optimise`.  There are P
- * unknowns; comments on arrays begin with their sizes. */
+/* Outputs of runs as functions of unknowns, and their derivatives, for `sensitivity`, `fit` and `optimise`.  There are
+ * P unknowns; comments on arrays begin with their sizes. */
 #ifndef PW_SENSITIVITY_H
 #define PW_SENSITIVITY_H
 
@@ -43,9 +43,9 @@ typedef struct {
   pw_arena arena;
 } pw_sensitivity;
 
-/* Makes the run, and differentiates the outputs at the values of the unknowns.  Set the members up to `progress` before,
- * the method excepted, the others to zero.  Close it in every case.  Errors: those of the run; PW_INPUT if constraints
- * determine an initial value, or a parameter changes the number of bodies; PW_RETRY after Ctrl-C. */
+/* Makes the run, and differentiates the outputs at the values of the unknowns.  Set the members up to `progress`
+ * before, the method excepted, the others to zero.  Close it in every case.  Errors: those of the run; PW_INPUT if
+ * constraints determine an initial value, or a parameter changes the number of bodies; PW_RETRY after Ctrl-C. */
 int pw_sensitivity_compute (pw_sensitivity *sens, pw_error *error);
 void pw_sensitivity_close (pw_sensitivity *sens); /* but not its unknowns */
 /* The derivative of an output, or of its value in a row of the table, with respect to an unknown; row -1: output. */
