@@ -161,7 +161,7 @@ ALL_LAYERS := $(CORE_LAYERS) $(FILE_LAYERS) $(SOLVER_LAYERS)
 # Functions of tests that replace those of other libraries must be visible to these.
 $(BUILD)/obj/tests/%.o:      STRICT += -fvisibility=default
 $(BUILD)/obj/tests/%.o:      INCLUDE := $(call layer,tests/support tests/faults tests/solvers $(ALL_LAYERS)) $(SYSTEM)
-$(BUILD)/obj/tests/outputs/test_outcome.o: INCLUDE := $(call layer,tests/support $(ALL_LAYERS) core/cli/analyse)
+$(BUILD)/obj/tests/outputs/test_outcome.o $(BUILD)/obj/tests/outputs/slow_derivatives.o: INCLUDE := $(call layer,tests/support $(ALL_LAYERS) core/cli/analyse)
 $(BUILD)/obj/tests/fuzz/%.o: INCLUDE := $(call layer,tests/fuzz $(ALL_LAYERS) $(CLI_LAYERS))
 $(BUILD)/obj/benchmarks/%.o: INCLUDE := -I$(BUILD)/include
 $(BUILD)/obj/benchmarks/engine.o $(addprefix $(BUILD)/obj/benchmarks/,effects.o peers.o) $(BUILD)/obj/benchmarks/engine/%.o $(BUILD)/obj/benchmarks/baseline/%.o: INCLUDE := $(call layer,$(ALL_LAYERS) benchmarks) $(SYSTEM)
@@ -204,7 +204,7 @@ $(BUILD)/obj/core/cli/plot/templates.inc: $(wildcard core/cli/plot/templates/*.g
 WASM_FLAGS := --target=wasm32-wasi -std=c11 -O2 -ffp-contract=off -ffunction-sections -fdata-sections \
   -D_POSIX_C_SOURCE=200809L -D_WASI_EMULATED_SIGNAL -include core/cli/page/engine/wasi.h '-DPW_METHODS=PW_METHOD (rk4) PW_METHOD (erk5) PW_METHOD (erk8)' \
   $(call layer,$(CORE_LAYERS) core/kinds $(SOLVER_LAYERS) $(FILE_LAYERS) core/cli core/cli/plot $(BUILD)/obj/core/cli/plot) $(SYSTEM)
-WASM       := $(filter-out solvers/jacobian/sparse.c solvers/analysis/% solvers/linear/% solvers/variation/% solvers/run/timing.c solvers/implicit/% solvers/sundials/% core/specialise/specialise_%,$(CORE) $(SOLVERS)) \
+WASM       := $(filter-out solvers/jacobian/sparse.c solvers/analysis/% solvers/linear/% solvers/run/timing.c solvers/implicit/% solvers/sundials/% core/specialise/specialise_%,$(CORE) $(SOLVERS)) \
   $(filter-out core/files/yaml/yaml_tree.c,$(wildcard core/files/expression/*.c core/files/yaml/*.c)) \
   $(addprefix core/files/,number.c path.c write/json.c load/columns.c load/units.c load/read.c) $(addprefix core/cli/plot/,plot_samples.c plot_shapes.c plot_symbols.c plot_figures.c animate.c) \
   $(wildcard core/cli/page/engine/*.c)
@@ -271,12 +271,13 @@ $(BUILD)/models/%.so: models/%.c | $(INCLUDES) $(FIRST)
 
 # A link: $(BUILD)/pinwheel searches models/, too, and a file found twice counts once.  It is relative, so that the tree can be
 # copied.  A plug-in of the same name, from when the model was written in C, is removed.
+TO_SOURCE = ln -sfr $< $@ 2>/dev/null || ln -sf "$(CURDIR)/$<" $@
 $(BUILD)/models/%.yaml: models/%.yaml
 	@mkdir -p $(@D) && rm -f $(@:.yaml=.so) $(@:.yaml=.c)
-	@ln -sfr $< $@ 2>/dev/null || ln -sf "$(CURDIR)/$<" $@
+	@$(TO_SOURCE)
 $(BUILD)/models/%.c: models/%.c
 	@mkdir -p $(@D)
-	@ln -sfr $< $@ 2>/dev/null || ln -sf "$(CURDIR)/$<" $@
+	@$(TO_SOURCE)
 
 OWN_LIBS = -L$(BUILD) -lpinwheel-files -lpinwheel
 
@@ -325,7 +326,7 @@ $(BUILD)/tests/test_cli_faults: WRAP = -pthread $(addprefix -Wl$(comma)--wrap=,$
 $(BUILD)/tests/test_memory $(BUILD)/tests/slow_memory: WRAP = -pthread $(addprefix -Wl$(comma)--wrap=,$(ALLOC_WRAP))
 $(BUILD)/tests/test_cli_faults $(BUILD)/tests/test_memory $(BUILD)/tests/slow_memory: $(filter-out %/main.o,$(CLI_OBJ))
 $(BUILD)/tests/test_cli_limits: $(call obj,$(addprefix core/cli/,progress.c parallel.c command.c say.c stop.c))
-$(BUILD)/tests/test_outcome: $(call obj,core/cli/analyse/outcome.c core/cli/analyse/functional.c core/cli/stop.c core/cli/progress.c)
+$(BUILD)/tests/test_outcome $(BUILD)/tests/slow_derivatives: $(call obj,core/cli/analyse/outcome.c core/cli/analyse/functional.c core/cli/stop.c core/cli/progress.c)
 # It wraps every call of other libraries that it lists.
 $(BUILD)/tests/test_faults: WRAP = $(shell sed -n 's/^FAULT_[A-Z]* .[^,]*, \([A-Za-z_]*\),.*/-Wl,--wrap=\1/p' tests/faults/test_faults.c)
 # A part of SUNDIALS that is used for comparison only.

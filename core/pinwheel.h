@@ -89,9 +89,9 @@ typedef struct {
 
 /* A signal computed by the caller.  `eval` stores the value in value[0] and, for a signal of a constraint, its time
  * derivatives in value[1] and value[2].  x contains the states named in `reads`; gradient, unless NULL, receives the
- * derivatives of value[0] with respect to x.  A non-zero return, or no value, stops the run (radau may try shorter steps
- * first).  Equal t and x must give equal values; if the function changes between steps (a controller sets a new torque),
- * call pw_run_restart. */
+ * derivatives of value[0] with respect to x.  A non-zero return, or no value, stops the run (radau may try shorter
+ * steps first).  Equal t and x must give equal values; if the function changes between steps (a controller sets a new
+ * torque), call pw_run_restart. */
 typedef struct {
   int (*eval) (void *context, double t, const double *x, double value[3], double *gradient);
   void *context;            /* passed to eval and breakpoint; must outlive the systems, unless open replaces it */

@@ -15,6 +15,24 @@ typedef struct {
   double value;
 } pw_initial_value;
 
+/* The state at one time.  The arrays belong to the run and are valid until the next call. */
+typedef struct {
+  double t;
+  const double *q, *v;  /* coordinates and velocities: pw_system_coordinates each */
+  const double *a;      /* accelerations */
+  const double *lambda; /* multipliers, M a + J^T lambda = f: pw_system_rows */
+  double position;      /* scaled residual of g = 0 */
+  double velocity;      /* scaled residual of J v = eta */
+  double kinetic;       /* [J] */
+  double potential;     /* [J] */
+  const double *ledger; /* pw_system_ledger_entries: work or loss of each entry [J]; NULL without pw_settings.ledger */
+  double work;          /* supplied since the initial time, by torques, forces, motors, drives, ... [J] */
+  double loss;          /* dissipated since the initial time [J] */
+  double projection;    /* energy added by projections after steps [J]; 0 without pw_settings.ledger, and with bdf */
+  double balance;       /* change of (kinetic + potential) - work + loss - projection [J] */
+  const double *integral; /* pw_settings.integrals: integrals of the functions since the initial time */
+} pw_sample;
+
 /* How to integrate; zeros select the defaults. */
 typedef struct {
   double t; /* initial time [s] */
@@ -25,6 +43,14 @@ typedef struct {
   double rtol; /* adaptive methods: relative tolerance; default PW_RTOL */
   double atol; /* absolute tolerance of every state; default rtol x (L, 1 rad, L/T, 1/T), see pw_scale */
   int ledger;  /* 1: samples contain the work or loss of each element, and the energy added by projections */
+
+  /* Integrals over the run, from its initial time on, of `integrals` functions of its state, by the method's stages and
+   * in its error control, like work and losses.  `integrand` stores the functions at a state, a sample of which only t,
+   * q, v, lambda, kinetic, potential and, in place of ledger, work and loss, their rates [W] are set.  Runs with
+   * integrals do not use specialised code. */
+  int integrals;
+  void (*integrand) (void *context, const pw_sample *state, double *value);
+  void *integrand_context;
 
   /* Limits of long runs. */
   long max_steps; /* adaptive methods: attempted steps, including rejected ones; default PW_MAX_STEPS */
@@ -67,23 +93,6 @@ typedef struct {
   double g;            /* worst |g| [m] or [rad] */
   double jv;           /* worst |J v - eta| [m/s] or [rad/s] */
 } pw_statistics;
-
-/* The state at one time.  The arrays belong to the run and are valid until the next call. */
-typedef struct {
-  double t;
-  const double *q, *v;  /* coordinates and velocities: pw_system_coordinates each */
-  const double *a;      /* accelerations */
-  const double *lambda; /* multipliers, M a + J^T lambda = f: pw_system_rows */
-  double position;      /* scaled residual of g = 0 */
-  double velocity;      /* scaled residual of J v = eta */
-  double kinetic;       /* [J] */
-  double potential;     /* [J] */
-  const double *ledger; /* pw_system_ledger_entries: work or loss of each entry [J]; NULL without pw_settings.ledger */
-  double work;          /* supplied since the initial time, by torques, forces, motors, drives, ... [J] */
-  double loss;          /* dissipated since the initial time [J] */
-  double projection;    /* energy added by projections after steps [J]; 0 without pw_settings.ledger, and with bdf */
-  double balance;       /* change of (kinetic + potential) - work + loss - projection [J] */
-} pw_sample;
 
 /* Entries of the energy ledger: work or loss of an element.  Their names are like "rider.work", "damper.loss";
  * "drag.frame.loss" for an element that acts on every body. */

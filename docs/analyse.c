@@ -45,26 +45,33 @@ static void reverse (variant *speed, pw_error *e) {
   pw_linear_free (&linear), pw_run_close (run), pw_system_free (system);
 }
 
-/* Steers for 5 s and differentiates the angle of the trailer with respect to the steering angle. */
+/* Steers for 5 s at an angle: the angle of the trailer at the end. */
+static int steered (void *context, const double *angle, double rtol, double *phi, pw_error *e) {
+  pw_sample end;
+  pw_system *system = compile (context, *angle, e);
+  pw_run *run = pw_run_open (system, "erk8+projection", &(pw_settings){ .rtol = rtol, .span = 5 }, e);
+  if (pw_run_advance_to (run, 5, 5, e) == PW_OK && pw_run_sample (run, 5, &end, e) == PW_OK)
+    *phi = end.q[pw_system_find_state (system, "trailer.phi", e)];
+  pw_run_close (run), pw_system_free (system);
+  return e->status;
+}
+
+/* Differentiates it with respect to the steering angle, by runs at neighbouring angles in two threads. */
 static void steering (variant *steer, pw_error *e) {
-  static const double angle = 0.02, step = 1e-6;
-  pw_direction direction = { .step = step };
-  pw_settings settings = { .step = 1e-3 };
-  pw_system *system[5];
-  pw_run *run[5];
-  pw_sample now, slope;
-  for (int i = 0; i < 5; i++) system[i] = compile (steer, angle + (i - 2) * step, e);
-  for (int i = 0; i < 5; i++) run[i] = pw_run_open (system[i], "rk4+projection", &settings, e);
-  for (int i = 0; i < 4; i++) direction.neighbour[i] = run[i < 2 ? i : i + 1];
-  pw_variation *variation = pw_variation_open (run[2], &direction, 1, 0, e);
-  int phi = pw_system_find_state (system[2], "trailer.phi", e);
-  if (pw_variation_advance (variation, 5, 5, e) == PW_OK && pw_run_sample (run[2], 5, &now, e) == PW_OK &&
-      pw_variation_sample (variation, 0, &slope, NULL, e) == PW_OK)
-    printf ("after 5 s at %g rad the trailer's angle is %.5f rad, its derivative %.4f\n", angle, now.q[phi],
-            slope.q[phi]);
-  pw_variation_close (variation);
-  for (int i = 0; i < 5; i++) pw_run_close (run[i]);
-  for (int i = 0; i < 5; i++) pw_system_free (system[i]);
+  static const double angle = 0.02;
+  const pw_difference_settings d = { .evaluate = steered,
+                                     .context = steer,
+                                     .x = &angle,
+                                     .parameters = 1,
+                                     .outputs = 1,
+                                     .rtol = 1e-12,
+                                     .neighbours = 6,
+                                     .jobs = 2 };
+  pw_derivative slope;
+  double phi;
+  if (pw_differentiate (&d, &slope, &phi, e) == PW_OK && slope.type == PW_DERIVATIVE)
+    printf ("after 5 s at %g rad the trailer's angle is %.5f rad, its derivative %.4f +- %.1g\n", angle, phi,
+            slope.value, slope.error);
 }
 
 int main (int count, char **argument) {

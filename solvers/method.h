@@ -15,7 +15,7 @@ enum { PW_MAX_OPTIONS = 12 };
 struct pw_scene_step;
 
 /* Lengths of arrays: coords, rows, entries are the numbers of coordinates, of constraint equations, and of entries of
- * the ledger, which holds the work or loss of each element that exchanges energy. */
+ * the ledger, which holds the work or loss of each element that exchanges energy, then pw_settings.integrals. */
 struct pw_run {
   const pw_system *s;
   pw_workspace *w; /* results of evaluations of s */
@@ -24,6 +24,7 @@ struct pw_run {
   double option[PW_MAX_OPTIONS]; /* one per method->options */
   pw_settings settings;
   int fixed_steps;             /* 1: fixed step size */
+  int entries;                 /* of the ledger: s->entries, then settings.integrals */
   pw_saddle *saddle;           /* matrix of M and all active rows: for accelerations, impulses */
   const unsigned char *active; /* rows: 0 for redundant ones; NULL: none is redundant */
   int redundant;               /* number of redundant rows; what follows, to reselect_below, only if there are any */
@@ -55,8 +56,8 @@ struct pw_run {
   double t;
   double *q, *v, *a; /* coords + 3 each */
   double *lambda;    /* rows; contiguous with q, v, a: pw_state_length numbers */
-  double *ledger;    /* entries: work and losses up to t */
-  double *rate;      /* entries: powers at t */
+  double *ledger;    /* entries: work, losses and integrals up to t */
+  double *rate;      /* entries: powers and integrands at t */
   double projected;  /* energy added by projections up to t; only with settings.ledger; 0 in bdf */
 
   /* The state requested from pw_run_sample, where `at` leaves kinematics and J evaluated; otherwise scratch. */
@@ -72,9 +73,12 @@ struct pw_run {
   double energy0, potential0; /* initial energy and potential energy [J]; energy0 includes changes by pw_run_restart */
   double exchanged;           /* the largest kinetic energy or change of potential energy so far [J] (ledger.c) */
   double power;               /* the largest sum of the absolute values of the ledger's rates so far [W] */
-  double scene_energy;        /* kinetic energy [J] of moving by L and 1 rad in the span; if massless: see ledger.c */
-  double *scratch;            /* 2 (coords + 3) + 3 rows, for projections and evaluations */
-  double *tolerance_bound;    /* 2 coords, from pw_kind.saturation; INFINITY: unbounded */
+  double
+      *integrand_size; /* integrals: the largest absolute value of each integrand so far, and at a state about L away */
+  double *integrand_state; /* 2 coords: the state at which integrands are evaluated */
+  double scene_energy;     /* kinetic energy [J] of moving by L and 1 rad in the span; if massless: see ledger.c */
+  double *scratch;         /* 2 (coords + 3) + 3 rows, for projections and evaluations */
+  double *tolerance_bound; /* 2 coords, from pw_kind.saturation; INFINITY: unbounded */
   double *matrix_state, *matrix_range; /* 2 coords: state at which the Newton matrix was evaluated, range around it
                                         * in which it is valid (pw_kind.saturation); only if the system `saturates` */
   int matrix_outdated;                 /* 1: a state reached since is outside that range */
@@ -306,17 +310,20 @@ static inline double pw_energy (const pw_run *r, const double *v) {
 void pw_ledger_begin (pw_run *r);
 void pw_ledger_record (pw_run *r);
 
-/* Powers of the ledger's entries [W] from the multipliers of the active rows, where kinematics are up to date and J is
- * evaluated.  Work is divided between redundant drives like their least-norm reactions. */
+/* Powers of the ledger's entries [W], and integrands, from the multipliers of the active rows, where kinematics are up
+ * to date and J is evaluated.  Work is divided between redundant drives like their least-norm reactions. */
 void pw_ledger_rates (pw_run *r, const double *lambda, double *rate);
 
-/* 1 if work or losses depend on multipliers. */
-int pw_ledger_uses_multipliers (const pw_system *s);
+/* 1 if work, losses or integrals may depend on multipliers. */
+int pw_ledger_uses_multipliers (const pw_run *r);
 
 /* Tolerance of the total work and loss of a step of size h [J]: 5 rtol (5 atol / max (L, 1), if larger) times the
  * largest of r->scene_energy, r->exchanged and the work and losses so far, at most those of a time T; plus round-off.
  * DBL_MAX if that is zero or not finite. */
 double pw_ledger_tolerance (const pw_run *r, double h);
+/* The norm of a change of the entries in a step of size h, such as its error, in tolerances; that of an integral is 5
+ * rtol times the largest integrand so far, times T, plus round-off. */
+double pw_ledger_norm (const pw_run *r, double h, const double *change);
 
 /* ---- Dynamics ---- */
 

@@ -55,74 +55,53 @@ void pw_linear_free (pw_linear *l);
  * re > 0 counts as 0.  INFINITY if im = 0 and re >= 0. */
 double pw_rk4_limit (double re, double im);
 
-/* ---- Derivatives of a run (variation*.c) ---- */
+/* ---- Derivatives of the outputs of runs (derivatives.c) ---- */
 
-/* What the motion is differentiated with respect to: a number p that changes the system, the initial state, or both.
- *
- * Its effect is computed by differences of four neighbouring runs, opened by the caller with the method and settings of
- * the run, at p + k step with k = -2, -1, 1, 2 (one_sided: 0, 1, 2, 4, at the end of a domain).  Their systems have the
- * bodies and elements of the run's.  They are only evaluated, never advanced, and must outlive the derivatives.
- * Steps of 1e-5 of p leave an error of about 1e-10.
- *
- * `initial` (2 x coordinates) in their place is the derivative of the state (q, v) reached, consistent with the
- * constraints. */
+/* Stores the outputs of runs at values x of the parameters, made with this relative tolerance; NaN for one that is not
+ * a number.  Called by several threads at once.  PW_RETRY and PW_RESOURCE end pw_differentiate; after another error
+ * there is no run at x, and steps that do not need it are chosen. */
+typedef int pw_outputs (void *context, const double *x, double rtol, double *value, pw_error *error);
+
+/* What is differentiated: any outputs as functions of parameters and initial values. */
 typedef struct {
-  pw_run *neighbour[4];  /* NULL with `initial` */
-  double step;           /* in the unit of p; not 0 */
-  int one_sided;         /* 1: k = 0, 1, 2, 4 */
-  int no_error;          /* 1: without an estimate of the error, at about half the cost */
-  const double *initial; /* copied; NULL with neighbours */
-} pw_direction;
+  pw_outputs *evaluate;
+  void *context;
+  const double *x; /* parameters: where */
+  int parameters, outputs;
+  int steering;             /* the first outputs, which determine the steps; 0: all */
+  const double *size;       /* parameters: typical sizes; NULL: |x|, or 1 where that is 0 */
+  const double *low, *high; /* parameters: bounds; NULL: none */
+  double rtol;              /* of the runs */
+  /* 6: steps are chosen, with `size` at the beginning, until derivatives have 8 digits or no step gives more.  2 or 4:
+   * steps of size rtol^(1/3) or rtol^(1/5), for relative errors of about rtol^(2/3) or rtol^(4/5). */
+  int neighbours;
+  const double *value; /* outputs: at x; NULL: not known */
+  int jobs;            /* threads, of which the caller is one; at least 1 */
+} pw_difference_settings;
 
-/* p of neighbour i, minus that of the run. */
-double pw_direction_offset (const pw_direction *d, int i);
-/* The weight of f (p of neighbour i) in the extrapolated difference that approximates df/dp, or (of_error) in the
- * estimate of its error. */
-double pw_direction_weight (const pw_direction *d, int of_error, int i);
+typedef struct {
+  enum {
+    PW_DERIVATIVE,
+    PW_NO_DERIVATIVE, /* it jumps: `below`, `above` are one-sided ones, to a few digits */
+    PW_UNKNOWN        /* no step gives a digit, as in chaotic motions; or the output is not a number */
+  } type;
+  double value;
+  double error; /* it contains the true one; NaN with 2 neighbours */
+  double below, above;
+} pw_derivative;
 
-/* Derivatives of the motion of a run, integrated with it. */
-typedef struct pw_variation pw_variation;
+/* Differentiates outputs with respect to parameters, by differences of runs at neighbouring values: beside a bound, or
+ * a value that the runs refuse, on one side only.  The errors of runs are measured by others with larger tolerances.
+ * out: parameters x outputs; value, unless NULL: outputs at x.  Errors: PW_INPUT for an invalid description; those of
+ * `evaluate` at x; with 2 or 4 neighbours also those of these; PW_RESOURCE. */
+int pw_differentiate (const pw_difference_settings *d, pw_derivative *out, double *value, pw_error *error);
 
-/* Begins at the state reached; with neighbours, the run must not have advanced.  It must outlive the derivatives, and
- * only pw_variation_advance and _next_jump may advance it from now on.  ledger: 1: with derivatives of work and losses,
- * at about twice the cost.  Errors: PW_INPUT if the run has advanced (with neighbours), a system differs in its bodies
- * or elements, the run has the option inputs=held, or an element type leaves out a derivative that is not zero;
- * PW_METHOD if the state or a breakpoint is not differentiable; PW_RESOURCE. */
-pw_variation *pw_variation_open (pw_run *r, const pw_direction *d, int count, int ledger, pw_error *error);
-
-/* Advances the run and the derivatives to time t <= t_end, which is then in the last step of the run.  If
- * pw_system_may_jump, it may not be: the run is ahead, so take samples of another run with the same settings.  Returns
- * as pw_run_advance; also PW_METHOD where the motion is not differentiable. */
-int pw_variation_advance (pw_variation *x, double t, double t_end, pw_error *error);
-
-/* The derivative along direction i of the sample at the time reached by pw_variation_advance (at a breakpoint, after
- * it): each number in it is that of the sample differentiated at constant time (residuals, projection, balance: 0;
- * without `ledger`, work, loss and ledger: NaN).  error_of, unless NULL, receives an estimate of its error due to
- * differences and to integration, without that due to the error of the run (0 with `no_error`).  Arrays are valid until
- * the next call. */
-int pw_variation_sample (pw_variation *x, int i, pw_sample *derivative, pw_sample *error_of, pw_error *error);
-
-/* The first breakpoint of the run after the time reached, or INFINITY; *slope: its derivative along direction i.  If
- * the time reached is a breakpoint that pw_variation_sample has not passed yet, *slope is that of this one. */
-double pw_variation_breakpoint (const pw_variation *x, int i, double *slope);
-
-/* Where pw_system_may_jump, advances the run to time t, but not beyond its next breakpoint nor farther than 256 states
- * ahead, and returns the time just after the first jump after the time reached that is due to the state (not to a
- * signal), or INFINITY.  NAN and the error if that fails; NAN without an error if the run was stopped (PW_STOPPED). */
-double pw_variation_next_jump (pw_variation *x, double t, double t_end, pw_error *error);
-/* The derivative along direction i of the time of the last jump or breakpoint passed. */
-double pw_variation_jump_slope (const pw_variation *x, int i);
-
-/* The size of the next step of the derivatives [s], over which they are smooth. */
-double pw_variation_step_size (const pw_variation *x);
-
-/* The step of direction i with which its differences would be more accurate; its own if their error, relative to the
- * effects of p up to the time reached, is below 1e-7 if more than a tenth of it is round-off, else (the remainder
- * before extrapolation) below 1e-4.  A step below 1e-10 without any effect counts as too small.  Larger steps reduce
- * round-off, proportional to 1 / step, smaller ones the remainder, whose estimate is proportional to step^2. */
-double pw_variation_better_step (const pw_variation *x, int i);
-
-void pw_variation_close (pw_variation *x);
+/* The method by which runs of a system are most accurate at small tolerances: "erk8+projection", or "radau" if that
+ * takes much fewer steps, since the motion is stiff.  settings: as of the runs, their rtol is not used; *most_steps: a
+ * limit of steps for runs that are compared with this one, which may be very different.  NULL and the error if both
+ * fail; if settings->stop requests a stop: NULL without an error. */
+const char *pw_accurate_method (const pw_system *s, const pw_settings *settings, double t_end, long *most_steps,
+                                pw_error *error);
 
 /* ---- Steady motions (steady*.c) ---- */
 

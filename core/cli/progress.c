@@ -45,10 +45,11 @@ static void progress_duration (double seconds, char *text, size_t size) {
 static void progress_draw (const pw_progress *p, double fraction, const char *text) {
   struct winsize size = { .ws_col = 0 };
   char bar[PROGRESS_WIDTH + 1] = "";
-  int shown = (int)strnlen (p->title, PROGRESS_TITLE);
-  while (shown > 0 && (p->title[shown] & 0xC0) == 0x80) shown--; /* not in the middle of a character */
   int columns = ioctl (STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : PROGRESS_COLUMNS;
-  int width = columns - shown - (int)strlen (" [] ") - (int)strlen (text) - 1;
+  int room = columns - (int)strlen (" [] ") - (int)strlen (text) - 1, shown = (int)strnlen (p->title, PROGRESS_TITLE);
+  if (shown > room) shown = room > 0 ? room : 0;
+  while (shown > 0 && (p->title[shown] & 0xC0) == 0x80) shown--; /* not in the middle of a character */
+  int width = room - shown;
   width = width < 0 ? 0 : width > PROGRESS_WIDTH ? PROGRESS_WIDTH : width;
   for (int i = 0; i < width; i++) bar[i] = i < (int)(fraction * width) ? '#' : '.';
   fprintf (stderr, "\r%.*s [%s] %s\033[K", shown, p->title, bar, text);

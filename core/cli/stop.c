@@ -7,10 +7,10 @@
 #include <unistd.h>
 #include "cli.h"
 
-_Static_assert (ATOMIC_INT_LOCK_FREE == 2, "a handler of signals may change only atomic objects without a lock");
+_Static_assert(ATOMIC_INT_LOCK_FREE == 2, "a handler of signals may change only atomic objects without a lock");
 atomic_int pw_stop;
 static atomic_int stop_signals; /* since pw_stop_catch */
-enum { STOP_NOW = 3 };                     /* the signal that ends the program, see pw_stop_catch */
+enum { STOP_NOW = 3 };          /* the signal that ends the program, see pw_stop_catch */
 
 static void stop_on_signal (int number) {
   pw_stop = 1;
@@ -86,7 +86,8 @@ pw_run *pw_limit_open (const pw_system *s, const char *method, const pw_settings
     own = (pw_error){ .status = PW_RETRY };
   else if (own.status == PW_STOPPED) {
     own.status = PW_OK;
-    pw_fail (&own, PW_METHOD, "model %s: the limit of %s s of processor time is reached before the first step (--limit)",
+    pw_fail (&own, PW_METHOD,
+             "model %s: the limit of %s s of processor time is reached before the first step (--limit)",
              pw_system_name (s), PW_DIGITS (limit->seconds, 6));
   }
   if (error->status == PW_OK) *error = own;

@@ -108,10 +108,8 @@ typedef struct pw_formula pw_formula;
  * PW_RESOURCE. */
 #define PW_FORMULA_NAMES 32
 pw_formula *pw_formula_open (const char *text, const char *const *names, pw_error *error);
-/* The value for values of the names, and its derivative with respect to name `by`; both may be non-finite.  At a jump
- * or kink, the derivative is the one on the right. */
+/* The value for values of the names; it may be non-finite. */
 double pw_formula_value (const pw_formula *f, const double *value);
-double pw_formula_derivative (const pw_formula *f, const double *value, int by);
 void pw_formula_close (pw_formula *f);
 
 /* ---- Tables of numbers: units in their headers, "NAME [UNIT]" (units.c), and columns (columns.c) ---- */

@@ -63,8 +63,8 @@ static double signal_pulse_breakpoint (const pw_signal *s, double t) {
 
 /* ---- All signals ---- */
 
-/* Fails if a number that is needed is not finite, or no value is stored: a callback in another language that ends before
- * its first statement may return 0. */
+/* Fails if a number that is needed is not finite, or no value is stored: a callback in another language that ends
+ * before its first statement may return 0. */
 static int signal_function (const pw_source *source, double t) {
   const pw_function *f = &source->signal.function;
   double *u = source->u;

@@ -74,13 +74,6 @@ double pw_potential (pw_workspace *w) {
   return sum;
 }
 
-void pw_evaluate_energies (pw_workspace *w, double *out) {
-  PW_EACH_BATCH (k, w) {
-    if (k->kind->energy) k->kind->energy (&k->b, out);
-    out += k->b.count;
-  }
-}
-
 double pw_kinetic (const pw_system *s, const double *v) {
   double sum = 0;
   for (int j = 0; j < s->coords; j++) sum += s->M[j] * v[j] * v[j];

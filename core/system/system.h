@@ -166,8 +166,6 @@ void pw_evaluate_saturation (pw_workspace *w, double *least);
  * pw_system_find_state, or -1 if all are INFINITY. */
 int pw_find_saturation (pw_workspace *w, double *least, char *element, size_t size);
 double pw_potential (pw_workspace *w);
-/* The potential energy of each element [J], in the order of the batches; entries of types without one are not set. */
-void pw_evaluate_energies (pw_workspace *w, double *out);
 double pw_kinetic (const pw_system *s, const double *v);
 /* Power of each entry of the ledger [W]; does not need J. */
 void pw_evaluate_ledger (pw_workspace *w, const double *lambda, double *rate);

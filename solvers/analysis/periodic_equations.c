@@ -6,8 +6,8 @@
  *
  *     phi (P (y)) - D (d) P (y) = 0,    y - P (y) = 0,
  *
- * and corrections are orthogonal to symmetries and, with a free period, to the motion.  Derivatives of phi are those of
- * the variational equations (variation.c), along a basis B of perturbations on the constraints (x->basis).  P' = B B^+
+ * and corrections are orthogonal to symmetries and, with a free period, to the motion.  Derivatives of phi are
+ * differences of runs (derivatives.c), along a basis B of perturbations on the constraints (x->basis).  P' = B B^+
  * (x->dual: B^+) is exact for such perturbations; on branches, whose tangents need all others, P' is computed by
  * differences.
  *

@@ -19,8 +19,9 @@ static const double FLOW_SETTLE_RTOL = 1e-9, /* of the run that settles */
     RETURN_NEAR = 0.2,   /* distance of a return from the first state, relative to the largest one on the way */
     RETURN_MOVED = 1e-6; /* least distance that counts as motion, in units of the scene */
 
-/* Least relative tolerances.  Derivatives need fewer digits than states: Newton's method converges all the same. */
-static const double flow_min_rtol[] = { [PW_FLOW] = 0, [PW_FLOW_DERIVATIVES] = 1e-6, [PW_FLOW_MULTIPLIERS] = 1e-8 };
+/* Least relative tolerances.  Derivatives, of which differences of runs have two thirds of the digits, need fewer than
+ * states: Newton's method converges all the same. */
+static const double flow_min_rtol[] = { [PW_FLOW] = 0, [PW_FLOW_DERIVATIVES] = 1e-10, [PW_FLOW_MULTIPLIERS] = 1e-12 };
 
 /* ---- The period of signals ---- */
 
@@ -164,21 +165,54 @@ static void flow_state (const pw_periodic *x, const pw_sample *sample, double *y
   memcpy (y + x->n, sample->v, (size_t)x->n * sizeof *y);
 }
 
-/* Integrates the derivatives of the state along x->basis to the end of the period, into x->Phi. */
-static int flow_derivatives (pw_periodic *x, pw_run *r, double end) {
-  int size = x->size, n = x->n;
-  pw_direction *d = calloc ((size_t)size + 1, sizeof *d);
+/* The run whose end is differentiated, at its initial state. */
+typedef struct {
+  const pw_periodic *x;
+  const pw_run *r;
+  double end;
+} flow_from;
+
+/* pw_outputs: the state at the end after a change of the initial state by c, in minimal coordinates. */
+static int flow_changed (void *context, const double *c, double rtol, double *value, pw_error *error) {
+  const flow_from *from = context;
+  const pw_periodic *x = from->x;
+  const int n = x->n;
+  pw_settings settings = from->r->settings;
   pw_sample sample;
-  if (d == NULL) return pw_fail_memory (x->s, &x->why);
-  for (int c = 0; c < size; c++) d[c].initial = x->basis + 2 * n * c, d[c].no_error = 1;
-  pw_variation *variation = pw_variation_open (r, d, size, 0, &x->why);
-  int status = variation ? pw_variation_advance (variation, end, end, &x->why) : x->why.status;
-  for (int c = 0; c < size && status == PW_OK; c++) {
-    status = pw_variation_sample (variation, c, &sample, NULL, &x->why);
-    if (status == PW_OK) flow_state (x, &sample, x->Phi + 2 * n * c);
-  }
-  pw_variation_close (variation);
-  free (d);
+  settings.rtol = rtol;
+  memcpy (value, from->r->q, (size_t)n * sizeof *value);
+  memcpy (value + n, from->r->v, (size_t)n * sizeof *value);
+  for (int k = 0; k < x->size; k++)
+    for (int i = 0; i < 2 * n && c[k] != 0; i++) value[i] += c[k] * x->basis[2 * n * k + i];
+  pw_run *r = pw_run_open (from->r->s, x->settings.method, &settings, error);
+  int status = r ? pw_run_restart (r, value, value + n, error) : error->status;
+  while (status == PW_OK && pw_run_time (r) < from->end) status = pw_run_advance (r, from->end, error);
+  if (status == PW_OK) status = pw_run_sample (r, from->end, &sample, error);
+  if (status == PW_OK) flow_state (x, &sample, value);
+  pw_run_close (r);
+  return status;
+}
+
+/* Differentiates the state at the end of the period along x->basis, into x->Phi. */
+static int flow_derivatives (pw_periodic *x, pw_run *r, double end, pw_flow_accuracy accuracy) {
+  const int size = x->size, n = x->n;
+  double *zero = calloc (2 * (size_t)size + 2, sizeof *zero), *L = zero + size + 1;
+  pw_derivative *derivative = calloc (2 * (size_t)n * (size_t)size + 1, sizeof *derivative);
+  const pw_difference_settings d = { .evaluate = flow_changed,
+                                     .context = &(flow_from){ x, r, end },
+                                     .x = zero,
+                                     .parameters = size,
+                                     .outputs = 2 * n,
+                                     .size = L,
+                                     .rtol = r->settings.rtol,
+                                     .neighbours = accuracy == PW_FLOW_MULTIPLIERS ? 4 : 2,
+                                     .jobs = 1 };
+  int status = zero && derivative ? PW_OK : pw_fail_memory (x->s, &x->why);
+  for (int c = 0; c < size && zero; c++) L[c] = x->L;
+  if (status == PW_OK && size > 0) status = pw_differentiate (&d, derivative, NULL, &x->why);
+  for (int i = 0; i < 2 * n * size && status == PW_OK; i++) x->Phi[i] = derivative[i].value;
+  free (zero);
+  free (derivative);
   return status;
 }
 
@@ -194,7 +228,7 @@ static int flow_run (pw_periodic *x, pw_run *r, double period, pw_flow_accuracy 
   if (status != PW_OK) return status;
   flow_state (x, &sample, x->y0), memcpy (x->a0, sample.a, bytes);
   if (accuracy != PW_FLOW) x->steps = 0; /* the PW_FLOW that follows, at the same state, sets it */
-  if (accuracy != PW_FLOW) return flow_derivatives (x, r, end);
+  if (accuracy != PW_FLOW) return flow_derivatives (x, r, end, accuracy);
   while (status == PW_OK && pw_run_time (r) < end) {
     status = pw_run_advance (r, end, &x->why);
     if (status == PW_OK && x->steps > 0 && pw_run_statistics (r)->steps > FLOW_STEPS * x->steps) return PW_RETRY;

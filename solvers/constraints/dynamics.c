@@ -89,7 +89,7 @@ int pw_run_accelerate (pw_run *r, double t, const double *q, const double *v, do
 
 void pw_sample_reached (pw_run *r) {
   memcpy (r->q_at, r->q, pw_state_length (r->s) * sizeof *r->q);
-  memcpy (r->ledger_at, r->ledger, (size_t)r->s->entries * sizeof (double));
+  memcpy (r->ledger_at, r->ledger, (size_t)r->entries * sizeof (double));
   r->projected_at = r->projected;
   (void)pw_evaluate_J_at (r->w, r->t, r->q_at, r->v_at);
 }

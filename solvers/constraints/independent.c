@@ -25,8 +25,8 @@ static int independent_rank_initially (const pw_run *r, pw_row_basis *b) {
   return independent_rank (r, b, fmax (r->thresholds.independent, r->thresholds.rank_lost));
 }
 
-/* The n-th direction that the constraints allow, of largest component 1 in units of the scene: along the velocities (n =
- * 0), or an arbitrary one.  p->velocity: with the metric of lengths. */
+/* The n-th direction that the constraints allow, of largest component 1 in units of the scene: along the velocities
+ * (n = 0), or an arbitrary one.  p->velocity: with the metric of lengths. */
 static int independent_direction (const pw_projector *p, pw_run *r, int n, double *direction) {
   const pw_system *s = r->s;
   double most = 0;
@@ -39,9 +39,9 @@ static int independent_direction (const pw_projector *p, pw_run *r, int n, doubl
   return PW_OK;
 }
 
-/* Selects anew, among the equations that exceed a sine, at the projection of q onto those selected in the basis.  n >= 0:
- * q is set to a short motion in the n-th direction first.  Returns the rank; 0 if that fails, or unless `ignores_others`,
- * if another position equation is violated there. */
+/* Selects anew, among the equations that exceed a sine, at the projection of q onto those selected in the basis.
+ * n >= 0: q is set to a short motion in the n-th direction first.  Returns the rank; 0 if that fails, or unless
+ * `ignores_others`, if another position equation is violated there. */
 static int independent_rank_at (pw_run *r, pw_row_basis *b, int n, double *q, double sine, int ignores_others) {
   const pw_system *s = r->s;
   pw_projector p;

@@ -27,8 +27,8 @@ static inline double pw_irregular (double phase, int n) {
   return pw_sin (phase + 2.39996 * n);
 }
 
-/* Independent rows of J.  Those that belong to every maximal independent set are found by their pattern; of the others, an
- * orthonormal basis is kept. */
+/* Independent rows of J.  Those that belong to every maximal independent set are found by their pattern; of the others,
+ * an orthonormal basis is kept. */
 typedef struct {
   struct pw_run *run;    /* whose settings.stop ends the selection (r->stopped), or NULL */
   unsigned char *active; /* rows: 1 for the independent ones */

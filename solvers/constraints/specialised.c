@@ -36,7 +36,7 @@ static int specialised_allocate (pw_run *r, int constants) {
 
 int pw_specialised_open (pw_run *r, pw_error *error) {
   const pw_specialised *code = r->settings.specialised;
-  if (code == NULL) return PW_OK;
+  if (code == NULL || r->settings.integrals > 0) return PW_OK;
   if (!pw_specialised_fits (code, r->s))
     return pw_fail (error, PW_INPUT, "model %s: the specialised code belongs to another scene", r->s->model);
   if (specialised_allocate (r, code->constants) != PW_OK) return pw_fail_memory (r->s, error);

@@ -77,7 +77,7 @@ static int radau_allocate (pw_run *r) {
   pw_method_data *d = r->data;
   enum { SINGLE = 16, OF_STAGE = 6, ALL = SINGLE + OF_STAGE * STAGES + 1 };
   const size_t n = (size_t)d->dae.size + 6; /* of all arrays of unknowns, with room for three more coordinates */
-  const size_t entries = (size_t)r->s->entries;
+  const size_t entries = (size_t)r->entries;
   pw_array array[ALL] = {
     { &d->B, n },         { &d->unit, n },       { &d->tolerance, n },        { &d->newton_tolerance, n },
     { &d->round_off, n }, { &d->row_factor, n }, { &d->column_factor, n },    { &d->Y, n },
@@ -145,7 +145,7 @@ static void radau_evaluate_reached (pw_run *r, double h) {
 /* The last stage becomes the state reached.  PW_OK, or PW_METHOD if a signal failed. */
 static int radau_accept (pw_run *r, double h, double t1) {
   pw_method_data *d = r->data;
-  size_t n = (size_t)d->dae.n * sizeof (double), entries = (size_t)r->s->entries;
+  size_t n = (size_t)d->dae.n * sizeof (double), entries = (size_t)r->entries;
   radau_step done = d->now;
   pw_radau_stage (d, STAGES - 1);
   int status = pw_evaluate_J_at (r->w, pw_before_breakpoint (r, t1), d->Y, d->Y + d->dae.n);
@@ -189,7 +189,7 @@ static int radau_try (pw_run *r, double h, double t1, int filter_twice, double *
   r->near_singular = 0;
   int status = pw_radau_solve (r, h, t1);
   if (status == PW_OK && !r->fixed_steps) status = pw_radau_estimate (r, h, filter_twice, error);
-  if (status == PW_OK && r->s->entries > 0 && (*error < 1 || r->fixed_steps)) status = pw_radau_work (r, h, t1, error);
+  if (status == PW_OK && r->entries > 0 && (*error < 1 || r->fixed_steps)) status = pw_radau_work (r, h, t1, error);
   return status;
 }
 
@@ -295,7 +295,7 @@ static void radau_fill_sample (pw_run *r, double x) {
   memcpy (r->v_at, y + n, (size_t)n * sizeof *y);
   pw_tangent_expand (&d->dae.tangent, y + 2 * n, d->dae.rows, r->lambda_at);
   for (int j = 0; j < n; j++) r->a_at[j] = (1 - x) * p->a[j] + x * d->a_end[j];
-  for (int e = 0; e < r->s->entries; e++) r->ledger_at[e] = pw_radau_sum (p->ledger[e], weight, p->ledger_change, e);
+  for (int e = 0; e < r->entries; e++) r->ledger_at[e] = pw_radau_sum (p->ledger[e], weight, p->ledger_change, e);
   radau_quintic (r, x, q, v);
   if (!radau_quintic_agrees (r, q, v)) return;
   memcpy (r->q_at, q, (size_t)n * sizeof *q);

@@ -309,8 +309,7 @@ int pw_radau_estimate (pw_run *r, double h, int filter_twice, double *error) {
 int pw_radau_work (pw_run *r, double h, double t1, double *error) {
   pw_method_data *d = r->data;
   /* the multipliers of the stages are not accurate enough in index3 */
-  int entries = r->s->entries, recomputes = !d->dae.enforces_velocities && pw_ledger_uses_multipliers (r->s);
-  double sum = 0;
+  int entries = r->entries, recomputes = !d->dae.enforces_velocities && pw_ledger_uses_multipliers (r);
   for (int k = 0; k < STAGES; k++) memset (d->now.ledger_change[k], 0, (size_t)entries * sizeof (double));
   for (int k = 0; k < STAGES; k++) {
     pw_radau_stage (d, k);
@@ -324,12 +323,9 @@ int pw_radau_work (pw_run *r, double h, double t1, double *error) {
     for (int i = 0; i < STAGES; i++)
       for (int e = 0; e < entries; e++) d->now.ledger_change[i][e] += h * radau_A[i][k] * d->rate[e];
   }
-  for (int e = 0; e < entries; e++) {
-    double err = pw_radau_sum (h * r->rate[e], radau_e, d->now.ledger_change, e);
-    sum += err * err;
-  }
+  for (int e = 0; e < entries; e++)
+    r->ledger_at[e] = pw_radau_sum (h * r->rate[e], radau_e, d->now.ledger_change, e) / radau_gamma;
   /* the estimate has order 3, like that of the states */
-  double tolerance = pw_ledger_tolerance (r, h) * fmax (1, pw_radau_rtol (r) / r->settings.rtol);
-  *error = fmax (*error, sqrt (sum) / radau_gamma / tolerance);
+  *error = fmax (*error, pw_ledger_norm (r, h, r->ledger_at) / fmax (1, pw_radau_rtol (r) / r->settings.rtol));
   return PW_OK;
 }

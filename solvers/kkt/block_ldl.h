@@ -32,8 +32,8 @@
 #include "pinwheel.h"
 
 enum {
-  PW_BLOCK_NODE = 2, /* most unknowns in a node */
-  PW_BLOCK_RANKS = 3, /* ranks of nodes: nodes of a lower rank are eliminated first */
+  PW_BLOCK_NODE = 2,   /* most unknowns in a node */
+  PW_BLOCK_RANKS = 3,  /* ranks of nodes: nodes of a lower rank are eliminated first */
   PW_BLOCK_LISTED = 64 /* most rows below the diagonal of a column whose targets are stored: n (n - 1) / 2 for n rows */
 };
 

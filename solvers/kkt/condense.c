@@ -34,10 +34,11 @@ static void condense_contribute (pw_plan *plan, const double *J, int row_stride,
 /* Adds the node of `size` rows from row n of a batch on. */
 static void condense_element (pw_plan *plan, const pw_element_batch *b, int n, int size) {
   const int e = n / b->kind->rows, is_pin = b->kind == &pw_kind_pin && size == 2;
+  const int is_rolling_wheel = pw_kind_is_built_in (b->kind) && b->kind->contact && b->kind->internal == 1;
   condense_add_node (plan, (pw_plan_node){ .size = size,
                                            .unknown = b->row + n,
                                            .grounded = pw_is_grounded (plan->saddle->s, b, e),
-                                           .rolls = b->kind == &pw_kind_rolling_wheel && size == 1 && n % 2 == 1 });
+                                           .rolls = is_rolling_wheel && size == 1 && n % 2 == 1 });
   for (int x = 0; x < b->b.cols; x += pw_group_columns (b->kind, x)) {
     int j = pw_global (b, e, x);
     if (j < plan->saddle->s->coords) condense_contribute (plan, b->J + n * b->b.cols + x, b->b.cols, j, is_pin);

@@ -22,9 +22,9 @@ struct pw_saddle {
   double *force;          /* coords: f~ of massless.h */
   int extra;              /* unknowns besides the multipliers of rows: 3 for each uncondensed body */
   double *y;              /* s->rows + extra: right-hand side and solution; NULL without extra unknowns */
-  pw_block_ldl *block; /* NULL if there is a dependent_row: nothing is planned then */
-  int dependent_row;   /* one that depends on others in every configuration; -1: none */
-  int *inactive; /* rows outside massless components whose multiplier is 0 */
+  pw_block_ldl *block;    /* NULL if there is a dependent_row: nothing is planned then */
+  int dependent_row;      /* one that depends on others in every configuration; -1: none */
+  int *inactive;          /* rows outside massless components whose multiplier is 0 */
   int inactive_count;
   double pivot;  /* smallest when last factorised: of `block`, the squared sine of the angle between a row and those
                   * before it; of `massless`, see pw_massless_factor */
@@ -41,7 +41,7 @@ typedef struct {
   int node;
   int row_stride; /* from row to row of J */
   int group;
-  int is_pin; /* 1: both rows of a pin, whose x and y columns are the unit matrix or its negative */
+  int is_pin;        /* 1: both rows of a pin, whose x and y columns are the unit matrix or its negative */
   int is_prescribed; /* 1: some of the group's coordinates are prescribed */
 } pw_plan_contribution;
 

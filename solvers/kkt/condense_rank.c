@@ -7,8 +7,8 @@
  * nodes at one end have rank 2: at the ground, or at one of the two bodies.  Then multipliers of rank 0 that exert no
  * force on the bodies of a leg exert none on the body at its other end either, since the forces of a joint on its two
  * bodies are opposite: dependent equations of rank 0 are dependent in the whole mechanism.  Nodes of uncondensed bodies
- * alone have rank 2, too: with these at rest their equations would be empty.  The rolling equation of a wheel has rank 0:
- * no other equation contains the wheel's spin. */
+ * alone have rank 2, too: with these at rest their equations would be empty.  The rolling equation of a wheel has rank
+ * 0: no other equation contains the wheel's spin. */
 #include "condense.h"
 
 /* The end of the contributions of node n: one after the last. */

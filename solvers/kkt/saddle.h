@@ -21,8 +21,8 @@ pw_saddle *pw_saddle_open (pw_workspace *w, const double *weight, int rows, cons
 void pw_saddle_close (pw_saddle *saddle); /* may be NULL */
 
 /* Factorises with the J last evaluated.  Returns PW_OK, or PW_RETRY if the smallest pivot is the round-off of a
- * dependent row, or NaN.  If more rows were included than the coordinates of some bodies allow to be independent, nothing
- * has been planned: then it always returns PW_RETRY, and there are no solutions. */
+ * dependent row, or NaN.  If more rows were included than the coordinates of some bodies allow to be independent,
+ * nothing has been planned: then it always returns PW_RETRY, and there are no solutions. */
 int pw_saddle_factor (pw_saddle *saddle);
 
 /* J has been evaluated by specialised code, which found pivots of at least `pivot`, a squared sine: the saddle will be

@@ -12,9 +12,9 @@ static const double erk5_A[] = {
 };
 static const double erk5_b[] = { 35. / 384, 0, 500. / 1113, 125. / 192, -2187. / 6784, 11. / 84 };
 static const double erk5_e[] = { 71. / 57600, 0, -71. / 16695, 71. / 1920, -17253. / 339200, 22. / 525, -1. / 40 };
-const pw_tableau pw_erk5_tableau = {
+static const pw_tableau erk5_tableau = {
   .stages = 6, .c = erk5_c, .A = erk5_A, .b = erk5_b, .e = erk5_e, .exponent = 1. / 5, .memory = 0.04
 };
 
-PW_RK_METHOD (erk5, pw_erk5_tableau, .about = "explicit Runge-Kutta of order 5(4), adaptive (Dormand & Prince 1980)",
+PW_RK_METHOD (erk5, erk5_tableau, .about = "explicit Runge-Kutta of order 5(4), adaptive (Dormand & Prince 1980)",
               .adaptive = 1, .order = 5, .options = pw_rk_adaptive_options);

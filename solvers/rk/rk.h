@@ -18,8 +18,6 @@ typedef struct {
   double memory;       /* exponent of the previous error there (Gustafsson 1991) */
 } pw_tableau;
 
-extern const pw_tableau pw_erk5_tableau;
-
 int pw_rk_open (pw_run *r, const pw_tableau *tableau, pw_error *error);
 int pw_rk_advance (pw_run *r, double t_end, pw_error *error);
 int pw_rk_at (pw_run *r, double t, pw_error *error);

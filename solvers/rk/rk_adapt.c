@@ -112,11 +112,11 @@ static double adapt_state (pw_run *r, int projected) {
 static double adapt_ledger (pw_run *r, double h) {
   pw_method_data *d = r->data;
   const pw_tableau *tableau = d->tableau;
-  double square[3] = { 0 }, tolerance = pw_ledger_tolerance (r, h); /* square: of e5, e3, e6 */
+  double square[3] = { 0 }; /* of e5, e3, e6 */
   pw_ledger_rates (r, d->lambda, d->stage_rate[tableau->stages]);
   for (int k = 0; k < (tableau->e3 ? 3 : 1); k++) {
-    adapt_estimate (&d->estimate[k], d->stage_rate, r->s->entries, r->ledger_at);
-    for (int i = 0; i < r->s->entries; i++) square[k] += r->ledger_at[i] * r->ledger_at[i] / (tolerance * tolerance);
+    adapt_estimate (&d->estimate[k], d->stage_rate, r->entries, r->ledger_at);
+    square[k] = pow (pw_ledger_norm (r, h, r->ledger_at), 2);
   }
   double err =
       tableau->e3 ? fmax (adapt_combine (square[0], square[1]), adapt_guard (square[2], square[0])) : sqrt (square[0]);
@@ -160,7 +160,7 @@ static int adapt_step (pw_run *r, double h, double t1, int project, double *adde
   int status = pw_rk_step (r, h, t1, project, added_energy);
   if (status == PW_OK && before < t1) status = pw_run_accelerate (r, before, d->q, d->v, d->a, d->lambda);
   *err = status == PW_OK ? h * adapt_state (r, project) : INFINITY;
-  if (r->s->entries > 0 && *err <= 1) *err = fmax (*err, h * adapt_ledger (r, h)); /* else it is rejected anyway */
+  if (r->entries > 0 && *err <= 1) *err = fmax (*err, h * adapt_ledger (r, h)); /* else it is rejected anyway */
   if (r->s->saturates && *err <= 1) *err = hypot (*err, pow (r->settings.rtol, 0.25) * h * adapt_reversal (r));
   if (status == PW_OK && before < t1) status = pw_run_accelerate (r, t1, d->q, d->v, d->a, d->lambda);
   if (status != PW_OK) *err = INFINITY;

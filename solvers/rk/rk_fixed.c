@@ -31,7 +31,7 @@ static int fixed_two_parts (pw_run *r, const pw_step_start *from, double between
   if (status != PW_OK) return status;
   d->second.t = between, d->second.projected = r->projected_at;
   memcpy (d->second.q, d->q, pw_state_length (r->s) * sizeof *d->q);
-  memcpy (d->second.ledger, r->ledger_at, (size_t)r->s->entries * sizeof (double));
+  memcpy (d->second.ledger, r->ledger_at, (size_t)r->entries * sizeof (double));
   pw_ledger_rates (r, d->lambda, d->second.rate);
   return fixed_step_from (r, &d->second, t, project, 1);
 }

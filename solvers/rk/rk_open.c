@@ -54,9 +54,9 @@ static void rk_list_weights (pw_method_data *d) {
     if (estimate[k]) d->estimate[k] = rk_nonzero_weights (estimate[k], tableau->stages + 1);
 }
 
-static int rk_allocate (pw_method_data *d, const pw_system *s) {
+static int rk_allocate (pw_method_data *d, const pw_run *r) {
   enum { ONCE = 8 }; /* arrays that exist once, not for each stage */
-  size_t n = (size_t)s->coords + 3, state = pw_state_length (s), entries = (size_t)s->entries, count = ONCE;
+  size_t n = (size_t)r->s->coords + 3, state = pw_state_length (r->s), entries = (size_t)r->entries, count = ONCE;
   int stages = d->tableau->stages;
   pw_array array[ONCE + 3 * PW_RK_STAGES] = {
     { &d->q, state },           { &d->weight, 2 * n },   { &d->last.q, state },          { &d->last.ledger, entries },
@@ -84,7 +84,7 @@ int pw_rk_open (pw_run *r, const pw_tableau *tableau, pw_error *error) {
   d->uses_nullspace = pw_stabilised_by (r, PW_NULLSPACE);
   d->nullspace_projects = d->uses_nullspace && pw_run_option (r, "positions") == 0;
   d->every = (int)pw_run_option (r, "every");
-  if (rk_allocate (d, r->s) != PW_OK) return pw_fail_memory (r->s, error);
+  if (rk_allocate (d, r) != PW_OK) return pw_fail_memory (r->s, error);
   int status = d->projects || d->nullspace_projects ? pw_projector_open_by_options (&d->projector, r, error) : PW_OK;
   if (status == PW_OK && d->uses_nullspace) status = pw_nullspace_open (&d->nullspace, r, error);
   return status == PW_OK ? pw_rk_restart (r, error) : status;

@@ -24,7 +24,7 @@ static void rk_combine (const pw_run *r, double *q, double *v, const pw_rk_row *
 void pw_rk_ledger (const pw_run *r, double *end, const double *beginning, double h) {
   const pw_method_data *d = r->data;
   const pw_rk_row *b = &d->row[0];
-  for (int i = 0; i < r->s->entries; i++) {
+  for (int i = 0; i < r->entries; i++) {
     double sum = beginning[i];
     for (int j = 0; j < b->count; j++) sum += h * b->weight[j] * d->stage_rate[b->stage[j]][i];
     end[i] = sum;

@@ -7,7 +7,7 @@
 #include "util.h"
 
 int pw_dense_output_open (pw_dense_output *b, pw_run *r, pw_dense_projection projection, pw_error *error) {
-  size_t state = pw_state_length (r->s), entries = (size_t)r->s->entries;
+  size_t state = pw_state_length (r->s), entries = (size_t)r->entries;
   *b = (pw_dense_output){ .start.t = r->t, .projection = projection };
   const pw_array array[] = { { &b->start.q, state }, { &b->start.ledger, entries }, { &b->start.rate, entries } };
   b->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
@@ -21,7 +21,7 @@ void pw_dense_output_close (pw_dense_output *b) {
 }
 
 void pw_store_start (pw_step_start *x, const pw_run *r) {
-  size_t entries = (size_t)r->s->entries * sizeof (double);
+  size_t entries = (size_t)r->entries * sizeof (double);
   x->t = r->t, x->projected = r->projected;
   memcpy (x->q, r->q, pw_state_length (r->s) * sizeof *r->q);
   memcpy (x->ledger, r->ledger, entries);
@@ -30,7 +30,7 @@ void pw_store_start (pw_step_start *x, const pw_run *r) {
 
 void pw_dense_output_integrate_ledger (pw_dense_output *b, pw_run *r) {
   pw_ledger_rates (r, r->lambda, r->rate);
-  for (int i = 0; i < r->s->entries; i++) r->ledger[i] += 0.5 * (r->t - b->start.t) * (b->start.rate[i] + r->rate[i]);
+  for (int i = 0; i < r->entries; i++) r->ledger[i] += 0.5 * (r->t - b->start.t) * (b->start.rate[i] + r->rate[i]);
 }
 
 /* Cubic Hermite interpolation at x in [0, 1] in a step of size h: values y0, y1 and derivatives dy0, dy1 at its
@@ -52,7 +52,7 @@ static int dense_interpolate (void *dense_output, pw_run *r, double t) {
     r->a_at[j] = (1 - x) * a0[j] + x * r->a[j];
   }
   for (int i = 0; i < s->rows; i++) r->lambda_at[i] = (1 - x) * lambda0[i] + x * r->lambda[i];
-  for (int i = 0; i < s->entries; i++)
+  for (int i = 0; i < r->entries; i++)
     r->ledger_at[i] = start->ledger[i] + h * x * (start->rate[i] + 0.5 * x * (r->rate[i] - start->rate[i]));
   r->projected_at = (1 - x) * start->projected + x * r->projected;
   if (b->projection == PW_DENSE_UNPROJECTED) return pw_evaluate_J_at (r->w, t, r->q_at, r->v_at);

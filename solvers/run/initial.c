@@ -119,8 +119,8 @@ typedef struct {
 /* ---- Linear systems ---- */
 
 /* The matrix, or its pattern while the map is recorded; columns of prescribed values are those of the identity.
- * damping: relative to the largest diagonal entry of G W^-1 G^T, for all equations alike; 0: for Newton's method, to the
- * round-off of each entry, so that dependent equations have a solution. */
+ * damping: relative to the largest diagonal entry of G W^-1 G^T, for all equations alike; 0: for Newton's method, to
+ * the round-off of each entry, so that dependent equations have a solution. */
 static void initial_fill (initial_search *x, double damping) {
   const int n = x->s->coords;
   pw_scatter_map *map = &x->map;
@@ -549,8 +549,8 @@ static int initial_order (const initial_search *x, int m) {
   return m >= 3 * x->s->bodies ? m : m % 3 == 0 ? m + 2 : m - 1;
 }
 
-/* The order in which columns of these importances enter the basis, if a part longer than this is left of them (rows of G
- * have length 1).  Among values of one origin, those that the others determine well come first. */
+/* The order in which columns of these importances enter the basis, if a part longer than this is left of them (rows of
+ * G have length 1).  Among values of one origin, those that the others determine well come first. */
 static const struct {
   int first, last;
   double independent;
@@ -617,8 +617,9 @@ static int initial_try (initial_search *x, int first, int end) {
   return PW_RETRY;
 }
 
-/* Keeps as many of the values list[0] .. list[count - 1] as possible, the first ones first; the others become free.  All
- * are tried at once, then few, and twice as many after each success.  Returns the number of the others, or an error. */
+/* Keeps as many of the values list[0] .. list[count - 1] as possible, the first ones first; the others become free.
+ * All are tried at once, then few, and twice as many after each success.  Returns the number of the others, or an
+ * error. */
 static int initial_keep_list (initial_search *x, int count) {
   int released = 0, status = PW_OK, first = 0;
   for (int size = count; first < count && status >= 0;) {

@@ -201,6 +201,7 @@ static void run_fill_energies (pw_run *r, pw_sample *sample) {
   for (int i = 0; i < s->entries; i++)
     *(s->entry[i].type == PW_WORK ? &sample->work : &sample->loss) += r->ledger_at[i];
   if (r->settings.ledger) sample->ledger = r->ledger_at, sample->projection = r->projected_at;
+  if (r->settings.integrals) sample->integral = r->ledger_at + s->entries;
   sample->balance = sample->kinetic + sample->potential - r->energy0 - sample->work + sample->loss - sample->projection;
 }
 

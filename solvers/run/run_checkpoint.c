@@ -63,7 +63,7 @@ unsigned long long pw_run_identity (const pw_run *r) {
 static int checkpoint_same (pw_run *r, pw_archive *a) {
   unsigned long long identity = r->identity;
   pw_archive_bytes (a, &identity, sizeof identity);
-  const int own[] = { r->s->coords, r->s->rows, r->s->entries, r->redundant };
+  const int own[] = { r->s->coords, r->s->rows, r->entries, r->redundant };
   enum { SIZES = sizeof own / sizeof *own };
   int same = identity == r->identity;
   for (int i = 0; i < SIZES; i++) {
@@ -91,7 +91,7 @@ static void checkpoint_statistics (pw_statistics *s, pw_archive *a) {
 }
 
 static void checkpoint_state (pw_run *r, pw_archive *a) {
-  size_t n = (size_t)r->s->coords * sizeof (double), entries = (size_t)r->s->entries * sizeof (double);
+  size_t n = (size_t)r->s->coords * sizeof (double), entries = (size_t)r->entries * sizeof (double);
   double *const number[] = {
     &r->t,     &r->breakpoint,      &r->projected,     &r->energy0,      &r->potential0,     &r->exchanged,
     &r->power, &r->reference_level, &r->previous_norm, &r->independence, &r->reselect_below, &r->watchdog.largest_sine

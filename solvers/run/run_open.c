@@ -41,7 +41,7 @@ static int run_settings (pw_settings *to, const pw_settings *from, int fixed_ste
 
 static int run_allocate (pw_run *r) {
   const pw_system *s = r->s;
-  size_t n = (size_t)s->coords + 3, rows = (size_t)s->rows, entries = (size_t)s->entries;
+  size_t n = (size_t)s->coords + 3, rows = (size_t)s->rows, entries = (size_t)r->entries;
   size_t state = pw_state_length (s), scratch = 2 * n + 3 * rows, states = s->saturates ? 2 * n : 0;
   const pw_array array[] = { { &r->q, state },
                              { &r->ledger, entries },
@@ -54,7 +54,9 @@ static int run_allocate (pw_run *r) {
                              { &r->tolerance_bound, 2 * n },
                              { &r->matrix_state, states },
                              { &r->matrix_range, states },
-                             { &r->watchdog.previous_q, 2 * n } };
+                             { &r->watchdog.previous_q, 2 * n },
+                             { &r->integrand_size, (size_t)r->settings.integrals },
+                             { &r->integrand_state, 2 * n } };
   r->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   r->origin = malloc (2 * n);
   if (r->memory == NULL || r->origin == NULL) return PW_RESOURCE;
@@ -155,6 +157,7 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   if (settings == NULL) settings = &none;
   r->thresholds = pw_watchdog_thresholds;
   r->refused_sine = r->thresholds.rank_lost;
+  r->settings.integrals = settings->integrals, r->entries = r->s->entries + settings->integrals;
   if (run_allocate (r) != PW_OK) return pw_fail_memory (r->s, error);
   int status = run_initial_values (r, settings, error);
   if (status == PW_OK)

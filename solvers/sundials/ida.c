@@ -170,7 +170,7 @@ static int ida_work (pw_method_data *d, int factorised) {
   pw_run *r = d->sun.run;
   int order = 1;
   const double *lambda = r->lambda;
-  if (factorised && d->dae.enforces_velocities && pw_ledger_uses_multipliers (r->s)) {
+  if (factorised && d->dae.enforces_velocities && pw_ledger_uses_multipliers (r)) {
     pw_run_accelerate_updated (r, r->v, r->a_at, r->lambda_at);
     lambda = r->lambda_at;
   }
@@ -278,7 +278,7 @@ static int ida_reach (pw_method_data *d) {
   if (status < 0) return status;
   if (status == PW_OK && !d->dae.enforces_velocities) pw_run_accelerate_updated (r, r->v, r->a_at, r->lambda);
   r->near_singular = status != PW_OK || pw_watchdog_near (r);
-  return r->s->entries > 0 ? ida_work (d, status == PW_OK) : PW_OK;
+  return r->entries > 0 ? ida_work (d, status == PW_OK) : PW_OK;
 }
 
 static int ida_advance (pw_run *r, double t_end, pw_error *error) {
@@ -295,7 +295,7 @@ static int ida_advance (pw_run *r, double t_end, pw_error *error) {
 
 static int ida_at (pw_run *r, double t, pw_error *error) {
   pw_method_data *d = r->data;
-  if (t <= r->t && r->s->entries > 0) pw_quadrature_at (&d->sun.quadrature, r, t);
+  if (t <= r->t && r->entries > 0) pw_quadrature_at (&d->sun.quadrature, r, t);
   int flag = ida_interpolate (d, t);
   if (flag == IDA_BAD_T) return pw_fail_outside (r, NAN, t, error);
   if (flag == IDA_RES_FAIL) return pw_fail_signal (t, error);

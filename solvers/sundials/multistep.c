@@ -224,7 +224,7 @@ static int multistep_evaluate (pw_method_data *d) {
 static int multistep_work (pw_method_data *d) {
   pw_run *r = d->sun.run;
   int order = 1;
-  if (d->sun.solver && pw_ledger_uses_multipliers (r->s)) (void)multistep_evaluate (d);
+  if (d->sun.solver && pw_ledger_uses_multipliers (r)) (void)multistep_evaluate (d);
   pw_ledger_rates (r, r->lambda, r->rate);
   CVodeGetLastOrder (d->cvode, &order);
   return pw_quadrature_step (&d->sun.quadrature, r, order);
@@ -244,7 +244,7 @@ static int multistep_reach (pw_method_data *d, double t, pw_error *error) {
   if (pw_evaluate_J_at (r->w, pw_before_breakpoint (r, t), r->q, r->v) != PW_OK)
     return multistep_fail (d, CV_RHSFUNC_FAIL, error);
   pw_bound_tolerances (r);
-  if (r->s->entries > 0 && multistep_work (d) != PW_OK) return multistep_fail (d, CV_RHSFUNC_FAIL, error);
+  if (r->entries > 0 && multistep_work (d) != PW_OK) return multistep_fail (d, CV_RHSFUNC_FAIL, error);
   pw_forget_residuals (r); /* those of projections before and inside the step */
   return PW_OK;
 }
@@ -266,7 +266,7 @@ static int multistep_at (pw_run *r, double t, pw_error *error) {
     status = multistep_evaluate (d);
     if (status == PW_OK) pw_sample_reached (r);
   } else {
-    if (t < r->t && r->s->entries > 0) pw_quadrature_at (&d->sun.quadrature, r, t);
+    if (t < r->t && r->entries > 0) pw_quadrature_at (&d->sun.quadrature, r, t);
     int flag = multistep_interpolate (d, t);
     if (flag == CV_BAD_T) return pw_fail_outside (r, NAN, t, error);
     if (flag != CV_SUCCESS) return multistep_fail (d, flag, error);

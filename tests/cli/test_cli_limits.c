@@ -74,13 +74,15 @@ static void limits_write_struts (const char *file) {
 
 /* The limit contains the opening of a run: each command ends with its name, a sweep has a row for each run. */
 TEST (limit_opening) {
-  static const char *const command[] = { "run @/struts.yaml -o @/o.csv --json @/o.json", "run @/struts.yaml --t-end 1e4",
-                                         "show @/struts.yaml --at 1", "sensitivity @/struts.yaml --by m --of kinetic",
+  static const char *const command[] = { "run @/struts.yaml -o @/o.csv --json @/o.json",
+                                         "run @/struts.yaml --t-end 1e4", "show @/struts.yaml --at 1",
+                                         "sensitivity @/struts.yaml --by m --of kinetic",
                                          "optimise @/struts.yaml --free m=1:2 --maximise kinetic --starts 1" };
   limits_write_struts ("struts.yaml");
   for (size_t i = 0; i < sizeof command / sizeof *command; i++) {
     assert_int_equal (cli_run (check_text ("pinwheel %s --limit 0.1", command[i])), 4);
-    assert_non_null (strstr (cli_err, "the limit of 0.1 s of processor time is reached before the first step (--limit)"));
+    assert_non_null (strstr (cli_err, "the limit of 0.1 s of processor time is reached before the first "
+                                      "step (--limit)"));
   }
   assert_null (cli_file ("o.csv"));
   assert_true (cli_says (cli_file ("o.json"), "status", "method"));
@@ -89,8 +91,8 @@ TEST (limit_opening) {
   assert_non_null (table);
   table = strstr (table, "before the first step");
   assert_true (table && strstr (table + 1, "before the first step"));
-  assert_int_equal (
-      cli_run ("pinwheel compare @/struts.yaml --methods rk4 --repeats 1 --limit 0.1 --step-ladder 1e-3"), 4);
+  assert_int_equal (cli_run ("pinwheel compare @/struts.yaml --methods rk4 --repeats 1 --limit 0.1 --step-ladder 1e-3"),
+                    4);
   assert_non_null (strstr (cli_err, "no method has reached the end within the limit"));
 }
 

@@ -304,16 +304,17 @@ TEST (jobs) {
 /* Threads whose runs are timed never share a processor; on a machine with one core there is one of them.  Without /sys,
  * cores are not known: each processor counts as one. */
 TEST (cores) {
-  cli_good ("OPENBLAS_NUM_THREADS=1 \"${PINWHEEL:-build/pinwheel}\" compare ezyroller --specialise never --methods "
-            "rk4,rk4+none,rk4+baumgarte" ONCE "--step-ladder 1e-8 --jobs 3 --limit 60 >@/cores.txt 2>&1 &\n"
-            "cat /sys/devices/system/cpu/cpu[0-9]*/topology/thread_siblings_list 2>@/null | sort -u | wc -l >@/physical\n"
-            "[ $(cat @/physical) -gt 0 ] || nproc >@/physical\n"
-            "threads=$(cat @/physical); [ $threads -le 3 ] || threads=3\n"
-            "for i in $(seq 200); do\n"
-            "  sleep 0.05; cat /proc/$!/task/*/status | sed -n 's/^Cpus_allowed_list:.//p' >@/lists\n"
-            "  [ $(sort -u @/lists | wc -l) -lt $threads ] || break\n"
-            "done; kill $!; wait $!\n"
-            "test -s @/lists");
+  cli_good (
+      "OPENBLAS_NUM_THREADS=1 \"${PINWHEEL:-build/pinwheel}\" compare ezyroller --specialise never --methods "
+      "rk4,rk4+none,rk4+baumgarte" ONCE "--step-ladder 1e-8 --jobs 3 --limit 60 >@/cores.txt 2>&1 &\n"
+      "cat /sys/devices/system/cpu/cpu[0-9]*/topology/thread_siblings_list 2>@/null | sort -u | wc -l >@/physical\n"
+      "[ $(cat @/physical) -gt 0 ] || nproc >@/physical\n"
+      "threads=$(cat @/physical); [ $threads -le 3 ] || threads=3\n"
+      "for i in $(seq 200); do\n"
+      "  sleep 0.05; cat /proc/$!/task/*/status | sed -n 's/^Cpus_allowed_list:.//p' >@/lists\n"
+      "  [ $(sort -u @/lists | wc -l) -lt $threads ] || break\n"
+      "done; kill $!; wait $!\n"
+      "test -s @/lists");
   char *line = strdup (cli_file ("lists"));
   long threads = 0, physical = strtol (cli_file ("physical"), NULL, 10);
   cli_good ("tr ',' '\\n' <@/lists | sort | uniq -d | wc -l");

@@ -315,8 +315,8 @@ static const pw_parameter many_list[] = { { PW_AT (many, kind), .about = "of the
 
 enum { PINS, PINS_APART, PINS_TO_GROUND, WELDS, RODS, SLIDERS, WHEELS, ROLLING_WHEELS, MANY_KINDS };
 
-static const char *const many_name[] = { "pins",  "pins apart", "pins to ground", "welds",
-                                         "rods",  "sliders",    "wheels",         "rolling wheels" };
+static const char *const many_name[] = { "pins", "pins apart", "pins to ground", "welds",
+                                         "rods", "sliders",    "wheels",         "rolling wheels" };
 
 /* An element of the bodies a and b, or of one of them and the ground. */
 static void many_add (pw_model *m, int kind, int i, double count) {
@@ -332,8 +332,7 @@ static void many_add (pw_model *m, int kind, int i, double count) {
   if (kind == RODS)
     pw_add_rod (m, &(pw_rod){ .name = name, .body = { "b", "ground" }, .at = { { 1, 0 }, { 2, 1 } }, .length = 1 });
   if (kind == SLIDERS)
-    pw_add_slider (m,
-                   &(pw_slider){ .name = name, .body = { "a", "b" }, .at = { { 0 }, { -1, 0 } }, .heading = 0.3 });
+    pw_add_slider (m, &(pw_slider){ .name = name, .body = { "a", "b" }, .at = { { 0 }, { -1, 0 } }, .heading = 0.3 });
   if (kind == WHEELS) pw_add_wheel (m, &(pw_wheel){ .name = name, .body = "b", .at = { 1, y } });
   if (kind == ROLLING_WHEELS)
     pw_add_rolling_wheel (
@@ -427,8 +426,7 @@ TEST (chain) {
   pw_sample x = runs_to (r, 0.02), y = runs_to (one, 0.02);
   char text[300];
   assert_int_equal (pw_run_redundant (r), 4);
-  for (int i = 0; i < 4; i++)
-    assert_non_null (strstr (pw_run_redundancy (r, i, text, sizeof text), "pin51"));
+  for (int i = 0; i < 4; i++) assert_non_null (strstr (pw_run_redundancy (r, i, text, sizeof text), "pin51"));
   for (int j = 0; j < 3 * LINKS; j++) check_close ("position", x.q[j], y.q[j], 1e-11, "the same equations: round-off");
   runs_close (r, s);
   runs_close (one, twin);

@@ -211,7 +211,7 @@ TEST (reading) {
   memory_each (1, "linearise car-tyres --animate @/o/a.html");
   cli_run ("pinwheel page pendulum -o @/a.html");
   if (strstr (cli_err, "built without the engine") == NULL) memory_each (1, "page pendulum -o @/o/a.html");
-  memory_each (1, "sensitivity pendulum --of bob.x --of max:bob.y --by l --by bob.phi --t-end 0.02");
+  memory_each (1, "sensitivity pendulum --of bob.x --of max:bob.y --by l --by bob.phi --t-end 0.02 --jobs 1");
   memory_each (1, "new @/o/mine.yaml");
 }
 

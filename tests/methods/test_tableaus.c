@@ -11,7 +11,6 @@
 #define pw_method_rk4 tableaus_rk4
 #define pw_method_erk5 tableaus_erk5
 #define pw_method_erk8 tableaus_erk8
-#define pw_erk5_tableau erk5_tableau
 #include "../../solvers/rk/rk4.c"
 #include "../../solvers/rk/erk5.c"
 #include "../../solvers/rk/erk8.c"

@@ -64,13 +64,13 @@ TEST (incline) {
   check_close ("dy/dg", x[6], 0.5 * y, 1e-8, "steps of 1e-9, 10 s");
 }
 
-/* A torque that no step resolves, so late that steps vanish in the round-off of the time before they are 1e-12 T. */
+/* A torque that no step resolves, so late that steps vanish in the round-off of the time. */
 TEST (late) {
   cli_write ("late.yaml", "pinwheel: 1\nrun: {t_end: 2e5, method: rk4, step: 1e3}\nparameters: [{name: p, value: 1}]\n"
                           "bodies: [{name: b, mass: 1, inertia: 1, rate: {omega: 1e4}}]\nelements:\n"
                           "  - {torque: T, body: [b, ground], value: \"p*1e12*max(0, t - 1e5)*sin(1e15*t)\"}\n");
   assert_int_equal (cli_run ("pinwheel sensitivity @/late.yaml --of b.phi --by p --limit 20"), 4);
-  assert_non_null (strstr (cli_err, "no step of the derivatives meets their tolerance"));
+  assert_non_null (strstr (cli_err, "pinwheel: t = "));
 }
 
 /* ---- Outputs of every type, against differences of runs ---- */
@@ -81,12 +81,12 @@ static const char sensitivity_outputs[] = " --of frame.x --of rider.work --of A.
 
 static void sensitivity_values (const char *name, double value, double *out) {
   char command[800];
-  snprintf (command, sizeof command, "pinwheel sensitivity ezyroller -t 3%s--by b --%s=%.17g -o @/sens",
+  snprintf (command, sizeof command, "pinwheel sensitivity ezyroller -t 3%s--by M0 --%s=%.17g -o @/sens",
             sensitivity_outputs, name, value);
   double all[CLI_MOST];
   cli_shell (command); /* initial values changed by the constraints are reported */
   assert_int_equal (cli_sensitivity ("value", all), 26);
-  for (int i = 0; i < 13; i++) out[i] = all[2 * i]; /* each output's, then that of b */
+  for (int i = 0; i < 13; i++) out[i] = all[2 * i]; /* each output's, then that of M0 */
 }
 
 static void sensitivity_compare (const char *by, const char *name, double value, double step) {
@@ -122,9 +122,10 @@ TEST (parameters) {
   cli_good ("pinwheel sensitivity @/wheels.yaml --of free.phi --of D.work --by s --by z --by I -t 2 -o @/sens");
   assert_int_equal (cli_sensitivity ("derivative", x), 6);
   assert_int_equal (cli_sensitivity ("error", error), 6);
-  check_close ("dphi/ds", x[0], 2, 1e-10, "h^4/30, h = 1e-5 s, and round-off of 1e-16/h");
-  check_close ("error", error[0], 4e-4 * 4e-4 / 6 * 2, 1e-8, "the error of differences, h^2/6");
-  check_close ("dphi/dz", x[1], 2, 1e-9, "h^3, h = 1e-5, and round-off of 1e-16/h, times 10");
+  check_close ("dphi/ds", x[0], 2, error[0], "the claim");
+  check_below ("error", error[0], 1e-8, "eight digits");
+  check_close ("dphi/dz", x[1], 2, error[1], "the claim");
+  check_below ("error", error[1], 1e-7, "one-sided formulas, with larger weights");
   check_close ("dwork/dI", x[5], pow (sin (2), 2) / 2, 1e-9, "steps of 1e-9");
 }
 
@@ -282,10 +283,10 @@ TEST (long_names) {
   assert_int_equal (strncmp (cli_file ("sens/sensitivity.csv"), column, strlen (column)), 0);
 }
 
-/* Ctrl-C at a certain evaluation, in each part of the computation: it is no failure of that part, and its result is not
- * taken for complete. */
+/* Ctrl-C at a certain evaluation, in any of the runs: it is no failure of that run, and the result is not taken for
+ * complete. */
 static void sensitivity_interrupt (const char *reads) {
-  int status = 130, interrupted = 0, without_errors = 0, calls = 4000;
+  int status = 130, interrupted = 0, calls = 4000;
   cli_write ("stop.c",
              "#include <signal.h>\n#include <stdlib.h>\n#include \"pinwheel.h\"\n"
              "typedef struct { double k; } numbers;\n"
@@ -310,22 +311,22 @@ static void sensitivity_interrupt (const char *reads) {
              "PW_MODEL (.about = \"interrupts\", .parameters = list, .parameters_size = sizeof (numbers),\n"
              "          .run = { .t_end = 20, .method = \"erk5+projection\" }, .build = build);\n");
   char command[200], complete[2000];
-  snprintf (command, sizeof command, "%s CALLS=0 pinwheel sensitivity @/stop.c --of max:a.x --by k", reads);
+  snprintf (command, sizeof command, "%s CALLS=0 pinwheel sensitivity @/stop.c --of max:a.x --by k --jobs 1", reads);
   cli_good (command);
   snprintf (complete, sizeof complete, "%.1999s", cli_out);
-  for (; status == 130; calls += 800) {
-    snprintf (command, sizeof command, "%s CALLS=%d pinwheel sensitivity @/stop.c --of max:a.x --by k", reads, calls);
+  for (; status == 130; calls += 4000) {
+    snprintf (command, sizeof command, "%s CALLS=%d pinwheel sensitivity @/stop.c --of max:a.x --by k --jobs 1", reads,
+              calls);
     status = cli_run (command);
     if (status == 130) assert_non_null (strstr (cli_err, "pinwheel: interrupted; results are incomplete\n"));
     interrupted += status == 130;
-    if (status == 130 && strstr (cli_out, "max:a.x = ")) without_errors++; /* in the run that estimates them */
   }
   assert_int_equal (status, 0); /* it ended before */
   assert_string_equal (cli_err, "");
-  assert_true (interrupted > 5 && without_errors > 0 && strcmp (cli_out, complete) == 0);
+  assert_true (interrupted > 5 && strcmp (cli_out, complete) == 0);
 }
 
-/* The second force may jump with the state: the run is searched for jumps ahead of the derivatives. */
+/* The second force depends on the state. */
 TEST (interrupt) {
   sensitivity_interrupt ("");
   sensitivity_interrupt ("READS=1");

@@ -38,7 +38,9 @@ TEST (steps) {
                     place[i], place[i]));
     cli_shell ("pinwheel sensitivity @/large.yaml --of b.x --by x0 -o @/sens");
     cli_sensitivity ("derivative", &x);
-    check_close (place[i], x, 1 - cos (2 * sqrt (20)), 1e-6, "a linear oscillation near x0");
+    cli_sensitivity ("error", &error);
+    check_close (place[i], x, 1 - cos (2 * sqrt (20)), error, "a linear oscillation near x0");
+    check_below (place[i], error, 1e-2, "round-off of x0 over a step of 1e-2 m, in which the force is linear");
   }
 }
 
@@ -60,7 +62,9 @@ TEST (no_effect) {
   cli_shell ("pinwheel sensitivity @/none.yaml --of B.x --of B.y --by p -o @/sens");
   assert_int_equal (cli_sensitivity ("derivative", x), 2);
   assert_int_equal (cli_sensitivity ("error", error), 2);
-  for (int i = 0; i < 2; i++) assert_true (x[i] == 0 && error[i] == 0);
+  for (int i = 0; i < 2; i++) assert_true (x[i] == 0);
+  check_below ("error", error[0], 1e-12, "round-off of 2 m over steps of 0.03");
+  assert_true (error[1] == 0);
 }
 
 /* A fast or heavy body whose energy does not depend on the parameter. */
@@ -115,9 +119,6 @@ TEST (run_error) {
     check_close (method[i], x, expected, error, "the claim");
     check_below (method[i], error, 2000 * fabs (x - expected) + 1e-9, "the order of the real one");
   }
-  cli_run ("pinwheel sensitivity pendulum --method erk5 --rtol 1e-4 --of max:kinetic --by m -o @/sens");
-  assert_non_null (strstr (cli_err, "errors are unknown: the run with 10 times the tolerances fails: t = "));
-  assert_non_null (strstr (cli_file ("sens/sensitivity.json"), "\"error\": null"));
 }
 
 /* A light body that follows its force within 1e-5 s, as the derivative (2 x 9 / k^2 at most) shows: by accelerations
@@ -163,19 +164,29 @@ TEST (own_error) {
     }
 }
 
-/* A chain of ten rods amplifies errors of integration, which differ with the rows of the table, by 1e9 in 3 s. */
+/* A chain of ten rods amplifies the errors of runs by 1e9 in 3 s; a double pendulum by 1e8 in 20 s (differences of runs
+ * in 80-bit numbers), and by more than all digits in 40 s. */
 TEST (chaos) {
-  double x[2], error[2];
-  for (int i = 0; i < 2; i++) {
-    cli_shell (i ? "pinwheel sensitivity chain --of link1.x --by l --every 0.1 -o @/sens"
-                 : "pinwheel sensitivity chain --of link1.x --by l -o @/sens");
-    assert_int_equal (cli_sensitivity ("derivative", x + i), 1);
-    assert_int_equal (cli_sensitivity ("error", error + i), 1);
-    assert_string_equal (cli_err, "pinwheel: derivatives with errors above 1 %, which the motion amplifies or the "
-                                  "steps of the run cause: link1.x by l\n");
-  }
-  assert_true (fabs (x[1] - x[0]) > 0.01 * fabs (x[0]));
-  check_below ("difference", fabs (x[1] - x[0]), error[0] + error[1], "the estimated errors");
+  double x, error;
+  cli_shell ("pinwheel sensitivity chain --of link1.x --by l -o @/sens");
+  cli_sensitivity ("derivative", &x);
+  cli_sensitivity ("error", &error);
+  assert_true (error > 0.01 * fabs (x));
+  assert_string_equal (cli_err, "pinwheel: derivatives with errors above 1 %: link1.x by l\n");
+  cli_write ("double.yaml",
+             "pinwheel: 1\nparameters: [{name: l, value: 1}]\n"
+             "bodies:\n  - {name: a, mass: 1, inertia: 0.1, start: {x: l}}\n"
+             "  - {name: b, mass: 1, inertia: 0.1, start: {x: 3*l}}\n"
+             "elements:\n  - {pin: A, body: [ground, a], at: [[0, 0], [-l, 0]]}\n"
+             "  - {pin: B, body: [a, b], at: [[l, 0], [-l, 0]]}\n  - {gravity: g, acceleration: [0, -9.81]}\n");
+  cli_shell ("pinwheel sensitivity @/double.yaml --of b.x --by l -t 20 -o @/sens");
+  cli_sensitivity ("derivative", &x);
+  cli_sensitivity ("error", &error);
+  check_close ("20 s", x, 9.0481e6, error, "the claim");
+  cli_shell ("pinwheel sensitivity @/double.yaml --of b.x --by l -t 40 -o @/sens");
+  cli_sensitivity ("derivative", &x);
+  assert_true (isnan (x));
+  assert_non_null (strstr (cli_out, "unknown"));
 }
 
 const check_fixture fixture = { cli_setup, cli_teardown };

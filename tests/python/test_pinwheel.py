@@ -333,11 +333,11 @@ def test_changed_initial_values_are_reported():
     assert model.run(t_end=0.01).changed == {}
     r = model.run(t_end=0.01, start={"frame.vy": 1})
     assert r.changed["frame.omega"] == (0, pytest.approx(2, rel=1e-12)) and len(r.changed) == 3
-    with pytest.warns(UserWarning, match="model ezyroller: initial values were changed to satisfy the constraints: frame.vy from 1 to .*, frame.omega from 0"):
+    with pytest.warns(UserWarning, match="model ezyroller: initial values were changed to satisfy the constraints: frame.omega from 0 to 2 rad/s$"):
         model.run(t_end=0.01, start={"frame.vy": 1, "frame.omega": 0})
     sleigh = pw.describe(bodies=[pw.Body("sleigh", mass=1, inertia=0.5, rate={"vx": 1, "vy": 0.1, "omega": 0.8})],
                          elements=[pw.Wheel("edge", body="sleigh", at=[-0.25, 0])])
-    with pytest.warns(UserWarning, match="vy from 0.1 to 0.18.* m/s .specified by the model., sleigh.omega from 0.8 to 0.75"):
+    with pytest.warns(UserWarning, match="constraints: sleigh.vy from 0.1 to 0.2 m/s .specified by the model.$"):
         sleigh.run(t_end=0.01)
     with pytest.warns(UserWarning, match="constraints: sleigh.omega from 0.8 to 0 rad/s .specified by the model.$"):
         sleigh.run(t_end=0.01, start={"sleigh.vy": 0, "sleigh.vx": 1})
@@ -402,15 +402,18 @@ def shown_in_a_notebook(page, script, folder):
     browser = os.environ.get("BROWSER") or next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
     if browser is None:
         pytest.skip("no browser")
+    # The browser writes the document when it is loaded, that is, not before the second frame is closed, with the verdict.
     (folder / "notebook.html").write_text(f"""<!DOCTYPE html><html><body>{page}<pre id="verdict"></pre><script>
         (async () => {{
           const frame = document.querySelector("iframe"), $ = id => frame.contentDocument.getElementById(id);
-          const until = async good => {{ for (let i = 0; i < 500 && !good(); i++) await new Promise(done => setTimeout(done, 20)); }};
+          const until = async good => {{ for (let i = 0; i < 1500 && !good(); i++) await new Promise(done => setTimeout(done, 20)); }};
           const root = () => frame.contentDocument?.documentElement?.dataset || {{}};
-          {script}
+          const hold = document.body.appendChild(document.createElement("iframe"));
+          hold.contentDocument.open();
+          try {{ {script} }} finally {{ hold.contentDocument.close(); }}
         }})();</script></body></html>""", encoding="utf-8")
-    done = subprocess.run([browser, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={folder}/profile", "--virtual-time-budget=30000",
-                           "--enable-logging=stderr", "--v=0", "--dump-dom", f"file://{folder}/notebook.html"], capture_output=True, text=True, timeout=120)
+    done = subprocess.run([browser, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={folder}/profile", "--enable-logging=stderr",
+                           "--v=0", "--dump-dom", f"file://{folder}/notebook.html"], capture_output=True, text=True, timeout=240)
     assert ":CONSOLE" not in done.stderr, done.stderr
     return re.search(r'<pre id="verdict">(.*?)</pre>', done.stdout, re.S).group(1)
 

@@ -214,8 +214,7 @@ SCENE (cart_build) {
   for (int i = 0; i < CART_WHEELS; i++) {
     snprintf (name, sizeof name, "wheel%d", i);
     pw_add_rolling_wheel (
-        m,
-        &(pw_rolling_wheel){ .name = name, .body = "cart", .at = { 0, sin (i) }, .radius = 0.1, .inertia = 0.001 });
+        m, &(pw_rolling_wheel){ .name = name, .body = "cart", .at = { 0, sin (i) }, .radius = 0.1, .inertia = 0.001 });
   }
 }
 
@@ -280,7 +279,8 @@ TEST (stool) {
         if (isinf (weight[j]))
           check_close ("prescribed", a[j], 0, 0, "it does not move");
         else
-          check_close ("force", s->mass[j] * a[j] + sum[j], f[j], unit * (1 + fabs (sum[j])), "round-off over a sine^2");
+          check_close ("force", s->mass[j] * a[j] + sum[j], f[j], unit * (1 + fabs (sum[j])),
+                       "round-off over a sine^2");
       for (int i = 0; i < s->rows; i++)
         check_close ("acceleration", Ja[i], gamma[i], 1e4 * unit, "round-off of accelerations of 1e3");
       free (weight);

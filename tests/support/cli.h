@@ -50,7 +50,7 @@ void cli_shows (const char *text);
 /* The number under the keys of a summary, in order: cli_number (json, "bodies", "frame", "x", NULL). */
 double cli_number (const char *json, ...);
 
-enum { CLI_MOST = 40 };
+enum { CLI_MOST = 60 };
 
 /* Numbers under a key of sens/sensitivity.json, in order, at most CLI_MOST; NaN for null.  Returns their number. */
 int cli_sensitivity (const char *key, double *value);

@@ -1,25 +1,21 @@
 /* Functionals of columns, evaluated along a run.
  *
- * Each step, of size h, is sampled at its middle and end: with its beginning, a column has the values x0, xm and x1.
- * Where its bend |x0 - 2 xm + x1| is below 1e-4 max |x|, Simpson's formula gives its integral: for x = cos (w t) the
- * bend is at most (w h)^2 / 4, and the relative error of the formula (w h)^4 / 2880, so 6e-11; 1e-9 for x^2.  Where
- * the bend is below |x1 - x0| / 5, the parabola through the three values is monotonic: the extremum is at an end.
+ * Integrals are entries of the run's ledger.  That of work or a loss W with the rate P, from the time t0 on, is
+ * (t - t0) W - integral of (t - t0) P.
  *
- * Otherwise the step is sampled at the 5 nodes of the Gauss-Legendre formula, for all columns.  Integrals: the step is
- * halved, at most 4 times, until the interpolatory formula of nodes 1, 3 and 5 agrees to 1e-3 of the largest value.
- * For cos (w t) in a part of length h Gauss' formula has the relative error 4e-10 (w h / 2)^10, the other one 3e-3
- * (w h / 2)^4: agreement to 1e-3 makes the integral accurate to 3e-11.  Extrema: the largest or least value at the
- * nodes and ends, refined by Brent's method between its neighbours.  Values jump at breakpoints, where steps end: a
- * step before a jump is always sampled at the nodes. */
+ * For extrema each step is sampled at its middle and end.  With its beginning, a column has the values x0, xm and x1;
+ * where its bend |x0 - 2 xm + x1| is below |x1 - x0| / 5, the parabola through them is monotonic: the extremum is at an
+ * end.  Otherwise, if it may be beyond the extremum so far, the step is sampled at 5 times between and beside its ends:
+ * values jump at breakpoints, where steps end, so that a step before a jump is always sampled so.  The largest or least
+ * value is refined by Brent's method between its neighbours. */
 #include <gsl/gsl_errno.h>
 #include <gsl/gsl_min.h>
 #include <math.h>
 #include "cli.h"
 #include "outcome.h"
 
-#define FUNCTIONAL_SIMPSON 1e-4 /* largest bend for Simpson's formula, relative to max |x| */
-#define FUNCTIONAL_LINEAR 0.2   /* largest bend of a column that counts as monotonic, relative to |x1 - x0| */
-#define FUNCTIONAL_AGREE 1e-3   /* largest difference of two formulas that agree, relative to the largest value */
+#define FUNCTIONAL_LINEAR 0.2 /* largest bend of a column that counts as monotonic, relative to |x1 - x0| */
+#define FUNCTIONAL_INSET 1e-6 /* distance from the ends of a step of the times beside them, relative to its size */
 /* Brent's method ends when its interval has shrunk by this factor: nearer to the extremum, the column changes by less
  * than round-off. */
 #define FUNCTIONAL_WIDTH 1e-8
@@ -27,16 +23,8 @@ enum {
   FUNCTIONAL_MIDDLE = 4,                    /* index of the time in the middle of a step, see functional_times */
   FUNCTIONAL_END = PW_FUNCTIONAL_TIMES - 1, /* and at its end */
   FUNCTIONAL_OTHER = PW_FUNCTIONAL_TIMES,   /* index of any other time */
-  FUNCTIONAL_DIVISIONS = 4,                 /* of a step into halves, at most */
   FUNCTIONAL_ITERATIONS = 60                /* of Brent's method, at most; golden sections alone would need 39 */
 };
-
-/* Nodes and weights of Gauss' formula (Abramowitz and Stegun, table 25.4), and weights of the interpolatory formula of
- * nodes 1, 3 and 5, which are 1 / (3 x^2) and 2 - 2 / (3 x^2), x node 5. */
-const double pw_gauss_x[] = { -0.90617984593866399, -0.53846931010568309, 0, 0.53846931010568309, 0.90617984593866399 },
-             pw_gauss_w[] = { 0.23692688505618909, 0.47862867049936647, 0.56888888888888889, 0.47862867049936647,
-                              0.23692688505618909 };
-static const double functional_coarse_w[] = { 0.40592924385869443, 0, 1.18814151228261114, 0, 0.40592924385869443 };
 
 /* A step of a run. */
 typedef struct {
@@ -49,7 +37,8 @@ typedef struct {
 
 /* ---- Values ---- */
 
-int pw_outcomes_read (pw_outcomes *set, const pw_sample *s, int at, pw_error *error) {
+/* Stores the columns in a sample as values[at] of their functionals. */
+static int functional_read (pw_outcomes *set, const pw_sample *s, int at, pw_error *error) {
   int contacts = 0, status = PW_OK;
   for (int i = 0; i < set->functionals; i++) contacts |= set->functional[i].column.type == PW_COLUMN_CONTACT;
   if (contacts) status = pw_workspace_contact_points (set->workspace, s->t, s->q, s->v, set->contact, error);
@@ -65,7 +54,7 @@ int pw_outcomes_read (pw_outcomes *set, const pw_sample *s, int at, pw_error *er
 static void functional_sample (functional_step *step, double t, int at) {
   pw_sample s;
   if (step->status == PW_OK) step->status = pw_run_sample (step->run, t, &s, step->error);
-  if (step->status == PW_OK) step->status = pw_outcomes_read (step->set, &s, at, step->error);
+  if (step->status == PW_OK) step->status = functional_read (step->set, &s, at, step->error);
 }
 
 /* The column of a functional at time t in the step; NaN if that fails. */
@@ -76,34 +65,30 @@ static double functional_at (functional_step *step, const pw_functional *f, doub
 
 /* ---- Integrals ---- */
 
-/* Adds the integral of the column, or of its square, over [t0, t1], a part of the step, from its values at the nodes,
- * or from those in the halves if the two formulas do not agree.  depth: number of divisions so far. */
-static void functional_integrate (functional_step *step, pw_functional *f, double t0, double t1, const double *value,
-                                  int depth) {
-  double fine = 0, coarse = 0, largest = 0, h = (t1 - t0) / 2;
-  for (int i = 0; i < PW_GAUSS_NODES; i++) {
-    double y = f->type == PW_RMS ? value[i] * value[i] : value[i];
-    fine += pw_gauss_w[i] * y;
-    coarse += functional_coarse_w[i] * y;
-    largest = fmax (largest, fabs (y));
+/* pw_settings.integrand, NaN where contact points cannot be evaluated. */
+static void functional_integrands (void *context, const pw_sample *s, double *value) {
+  pw_outcomes *set = context;
+  const int status = functional_read (set, s, FUNCTIONAL_OTHER, NULL);
+  for (const pw_functional *f = set->functional; f < set->functional + set->functionals; f++) {
+    double x = status == PW_OK ? f->values[FUNCTIONAL_OTHER] : NAN;
+    if (!pw_is_integral (f->type)) continue;
+    *value++ = f->type == PW_RMS ? x * x : pw_column_is_integrated (f->column.type) ? (s->t - set->begin) * x : x;
   }
-  if (fabs (fine - coarse) > FUNCTIONAL_AGREE * 2 * largest && depth < FUNCTIONAL_DIVISIONS) {
-    for (int half = 0; half < 2 && step->status == PW_OK; half++) {
-      double from = half ? t0 + h : t0, to = half ? t1 : t0 + h, inside[PW_GAUSS_NODES];
-      for (int i = 0; i < PW_GAUSS_NODES; i++) inside[i] = functional_at (step, f, pw_gauss_time (from, to, i));
-      functional_integrate (step, f, from, to, inside, depth + 1);
-    }
-    return;
-  }
-  f->value += h * fine;
+}
+
+/* The value of a functional at the end of the run, where columns are their values[FUNCTIONAL_END]; integral: of its
+ * integrand, over the span [s]. */
+static double functional_of_integral (const pw_functional *f, double integral, double span) {
+  if (pw_column_is_integrated (f->column.type)) integral = span * f->values[FUNCTIONAL_END] - integral;
+  if (f->type == PW_INTEGRAL) return integral;
+  return f->type == PW_MEAN ? integral / span : sqrt (fmax (integral / span, 0));
 }
 
 /* ---- Extrema ---- */
 
 /* Keeps a value if it is beyond the extremum so far. */
-static void functional_update_extremum (const functional_step *step, pw_functional *f, double t, double value) {
-  if (f->type == PW_MAX ? value > f->value : value < f->value)
-    f->value = value, f->t = t, f->step = step->t1 - step->t0;
+static void functional_update_extremum (pw_functional *f, double t, double value) {
+  if (f->type == PW_MAX ? value > f->value : value < f->value) f->value = value, f->t = t;
 }
 
 typedef struct {
@@ -137,7 +122,7 @@ static void functional_refine (functional_step *step, pw_functional *f, const do
   }
   double least = gsl_min_fminimizer_f_minimum (m);
   if (step->status == PW_OK)
-    functional_update_extremum (step, f, t[1] + gsl_min_fminimizer_x_minimum (m), f->type == PW_MAX ? -least : least);
+    functional_update_extremum (f, t[1] + gsl_min_fminimizer_x_minimum (m), f->type == PW_MAX ? -least : least);
   gsl_min_fminimizer_free (m);
 }
 
@@ -153,48 +138,29 @@ static void functional_extremum (functional_step *step, pw_functional *f, const 
   for (int i = 0; i < PW_FUNCTIONAL_TIMES; i++) range = fmax (range, y[i] - y[best]);
   int inside = best > 0 && best < FUNCTIONAL_END && y[best] < y[best - 1] && y[best] < y[best + 1];
   int may_lead = y[best] - range < (f->type == PW_MAX ? -f->value : f->value);
-  functional_update_extremum (step, f, t[best], value[best]);
+  functional_update_extremum (f, t[best], value[best]);
   if (inside && may_lead) functional_refine (step, f, t + best - 1, y + best - 1);
 }
 
-/* ---- Along the run ---- */
-
-static void functional_begin (functional_step *step) {
-  functional_sample (step, step->t1, 0);
-  for (pw_functional *f = step->set->functional; f < step->set->functional + step->set->functionals; f++) {
-    f->value = pw_is_integral (f->type) ? 0 : f->values[0];
-    f->t = step->t1;
-  }
-}
-
-/* Times in a step: its beginning, just after it, the nodes of Gauss' formula, just before the end, the end. */
+/* Times in a step: its beginning, just after it, five times between, just before the end, the end. */
 static void functional_times (const functional_step *step, double t[PW_FUNCTIONAL_TIMES]) {
-  const double h = step->t1 - step->t0;
-  t[0] = step->t0, t[1] = step->t0 + PW_FUNCTIONAL_INSET * h;
-  for (int i = 0; i < PW_GAUSS_NODES; i++) t[2 + i] = pw_gauss_time (step->t0, step->t1, i);
-  t[FUNCTIONAL_END - 1] = step->t1 - PW_FUNCTIONAL_INSET * h, t[FUNCTIONAL_END] = step->t1;
+  static const double part[PW_FUNCTIONAL_TIMES] = { 0,     FUNCTIONAL_INSET,     0.047, 0.231, 0.5, 0.769,
+                                                    0.953, 1 - FUNCTIONAL_INSET, 1 };
+  for (int i = 0; i < FUNCTIONAL_END; i++) t[i] = step->t0 + part[i] * (step->t1 - step->t0);
+  t[FUNCTIONAL_END] = step->t1;
 }
 
-/* 1 if the values at the ends and in the middle do not suffice: the column of an integral bends too much; or that of an
- * extremum is not nearly linear, and in the step may be beyond the extremum so far. */
+/* 1 if the values at the ends and in the middle do not suffice: the column is not nearly linear, and in the step may be
+ * beyond the extremum so far. */
 static int functional_needs_nodes (const pw_functional *f) {
   double x0 = f->values[0], xm = f->values[FUNCTIONAL_MIDDLE], x1 = f->values[FUNCTIONAL_END],
-         bend = fabs (x0 - 2 * xm + x1), largest = fmax (fabs (x0), fmax (fabs (xm), fabs (x1)));
-  if (pw_is_integral (f->type)) return bend > FUNCTIONAL_SIMPSON * largest;
-  double lead = f->type == PW_MAX ? fmax (x0, fmax (xm, x1)) - f->value : f->value - fmin (x0, fmin (xm, x1));
+         bend = fabs (x0 - 2 * xm + x1),
+         lead = f->type == PW_MAX ? fmax (x0, fmax (xm, x1)) - f->value : f->value - fmin (x0, fmin (xm, x1));
   return pw_is_extremum (f->type) && bend > FUNCTIONAL_LINEAR * fabs (x1 - x0) && lead + bend + fabs (x1 - x0) > 0;
 }
 
-static void functional_simpson (const functional_step *step, pw_functional *f) {
-  static const int time[] = { 0, FUNCTIONAL_MIDDLE, FUNCTIONAL_END };
-  const double h = step->t1 - step->t0;
-  for (int i = 0; i < 3; i++) {
-    double value = f->values[time[i]];
-    f->value += (i == 1 ? 4 : 1) * h / 6 * (f->type == PW_RMS ? value * value : value);
-  }
-}
-
-static void functional_advance (functional_step *step) {
+/* Updates the extrema after a step. */
+static void functional_extrema (functional_step *step) {
   double t[PW_FUNCTIONAL_TIMES];
   int nodes = pw_system_jumps (step->set->system, step->t1);
   pw_functional *const begin = step->set->functional, *const end = begin + step->set->functionals;
@@ -205,35 +171,60 @@ static void functional_advance (functional_step *step) {
   for (int i = 1; nodes && i < FUNCTIONAL_END; i++)
     if (i != FUNCTIONAL_MIDDLE) functional_sample (step, t[i], i);
   for (pw_functional *f = begin; f < end && step->status == PW_OK; f++) {
-    if (pw_is_integral (f->type) && nodes) functional_integrate (step, f, step->t0, step->t1, f->values + 2, 0);
-    if (pw_is_integral (f->type) && !nodes) functional_simpson (step, f);
     if (pw_is_extremum (f->type) && nodes) functional_extremum (step, f, t, f->values);
-    if (pw_is_extremum (f->type) && !nodes) functional_update_extremum (step, f, step->t1, f->values[FUNCTIONAL_END]);
+    if (pw_is_extremum (f->type) && !nodes) functional_update_extremum (f, step->t1, f->values[FUNCTIONAL_END]);
     f->values[0] = f->values[FUNCTIONAL_END];
   }
 }
 
-/* span: the duration of the run [s]. */
-static void functional_end (functional_step *step, double span) {
-  for (pw_functional *f = step->set->functional; f < step->set->functional + step->set->functionals; f++) {
-    if (f->type == PW_MEAN) f->value /= span;
-    if (f->type == PW_RMS) f->value = sqrt (f->value / span);
-    if (f->type == PW_FINAL) f->value = functional_at (step, f, step->t1);
+/* ---- Along the run ---- */
+
+static void functional_begin (functional_step *step) {
+  functional_sample (step, step->t1, 0);
+  for (pw_functional *f = step->set->functional; f < step->set->functional + step->set->functionals; f++)
+    f->value = f->values[0], f->t = step->t1;
+}
+
+/* Fills a row of the table, at a time in the last step. */
+static void functional_row (functional_step *step, const pw_outcome_table *table, int row) {
+  pw_outcomes *set = step->set;
+  functional_sample (step, table->t[row], FUNCTIONAL_OTHER);
+  for (pw_functional *f = set->functional; f < set->functional + set->functionals; f++)
+    if (f->type == PW_FINAL) f->value = f->values[FUNCTIONAL_OTHER];
+  for (int o = 0; o < set->outcomes; o++)
+    table->value[o * table->rows + row] = pw_outcome_is_final (set, o) ? pw_outcome_value (set, o) : NAN;
+}
+
+static void functional_end (functional_step *step) {
+  pw_outcomes *set = step->set;
+  pw_sample s = { .t = step->t1 };
+  if (step->status == PW_OK) step->status = pw_run_sample (step->run, step->t1, &s, step->error);
+  if (step->status == PW_OK) step->status = functional_read (set, &s, FUNCTIONAL_END, step->error);
+  for (pw_functional *f = set->functional; f < set->functional + set->functionals && step->status == PW_OK; f++) {
+    if (pw_is_integral (f->type)) f->value = functional_of_integral (f, *s.integral++, step->t1 - set->begin);
+    if (f->type == PW_FINAL) f->value = f->values[FUNCTIONAL_END];
   }
 }
 
-int pw_outcomes_run (pw_outcomes *set, const char *method, const pw_settings *settings, double t_end, pw_error *error) {
-  pw_run *r = pw_limit_open (set->system, method, settings, error);
+int pw_outcomes_run (pw_outcomes *set, const char *method, const pw_settings *settings, double t_end,
+                     const pw_outcome_table *table, pw_error *error) {
+  pw_settings own = *settings;
+  own.ledger |= set->ledger;
+  own.integrals = set->integrals, own.integrand = functional_integrands, own.integrand_context = set;
+  set->begin = own.t;
+  pw_run *r = pw_limit_open (set->system, method, &own, error);
   if (r == NULL) return error->status;
-  const double begin = pw_run_time (r);
-  functional_step step = { set, r, begin, begin, PW_OK, error };
+  functional_step step = { set, r, own.t, own.t, PW_OK, error };
   functional_begin (&step);
-  while (step.status == PW_OK && step.t1 < t_end) {
-    step.status = pw_run_advance (r, t_end, error);
+  for (int row = 0, rows = table ? table->rows : 0; step.status == PW_OK;) {
+    for (; row < rows && table->t[row] <= step.t1 && step.status == PW_OK; row++) functional_row (&step, table, row);
+    if (step.status != PW_OK || !(step.t1 < t_end)) break;
+    step.status = set->extrema ? pw_run_advance (r, t_end, error)
+                               : pw_run_advance_to (r, row < rows ? table->t[row] : t_end, t_end, error);
     step.t0 = step.t1, step.t1 = pw_run_time (r);
-    if (step.status == PW_OK && set->along_run) functional_advance (&step);
+    if (step.status == PW_OK && set->extrema) functional_extrema (&step);
   }
-  functional_end (&step, step.t1 - begin);
+  functional_end (&step);
   if (step.status == PW_STOPPED) step.status = pw_limit_status (settings->stop_context, step.t1, error);
   pw_run_close (r);
   return step.status;

@@ -91,7 +91,7 @@ static int outcome_add_functional (pw_outcomes *set, pw_functional_type type, pw
   set->functional = more;
   set->functional[set->functionals] = (pw_functional){ .type = type, .column = c };
   set->ledger |= c.type > PW_COLUMN_POTENTIAL;
-  set->along_run |= type != PW_FINAL;
+  set->extrema += pw_is_extremum (type), set->integrals += pw_is_integral (type);
   return set->functionals++;
 }
 
@@ -100,6 +100,11 @@ enum { OUTCOME_VARIABLE = 20 };
 static const char *outcome_variable (char name[OUTCOME_VARIABLE], int i) {
   snprintf (name, OUTCOME_VARIABLE, "column%d", i + 1);
   return name;
+}
+
+static int outcome_is_diagnostic (pw_column_type type) {
+  return type == PW_COLUMN_POSITION || type == PW_COLUMN_VELOCITY || type == PW_COLUMN_PROJECTION ||
+         type == PW_COLUMN_BALANCE;
 }
 
 /* Adds the functional `name`, [TYPE:]NAME, to an output, unless it is there, and writes the name of its variable.
@@ -114,6 +119,12 @@ static int outcome_add_term (pw_outcomes *set, pw_outcome *o, const char *origin
                ? pw_fail (error, PW_INPUT,
                           "%s: no \"%s:\"; valid are final:, max:, min:, mean:, integral: and rms:", origin, name)
                : pw_fail (error, PW_INPUT, "%s", own.text);
+  if (pw_is_integral (type) && outcome_is_diagnostic (c.type))
+    return pw_fail (error, PW_INPUT, "%s: %s describes the integration, not the motion: it has no %s", origin, name,
+                    type == PW_INTEGRAL ? "integral" : "mean");
+  if (type == PW_RMS && pw_column_is_integrated (c.type))
+    return pw_fail (error, PW_INPUT,
+                    "%s: no rms: of work and losses; valid are final:, max:, min:, mean: and integral:", origin);
   int f = outcome_add_functional (set, type, c), i = 0;
   if (f < 0) return pw_fail (error, PW_RESOURCE, "out of memory");
   while (i < o->terms && o->term[i] != f) i++;
@@ -217,14 +228,18 @@ void pw_outcomes_close (pw_outcomes *set) {
 
 /* ---- Values ---- */
 
-double pw_outcome_value (const pw_outcomes *set, int outcome, double *gradient) {
+double pw_outcome_value (const pw_outcomes *set, int outcome) {
   const pw_outcome *o = set->outcome + outcome;
   double value[PW_FORMULA_NAMES] = { 0 };
   for (int i = 0; i < o->terms; i++) value[i] = set->functional[o->term[i]].value;
-  for (int i = 0; gradient && i < set->functionals; i++) gradient[i] = 0;
-  for (int i = 0; gradient && i < o->terms; i++)
-    gradient[o->term[i]] = o->formula ? pw_formula_derivative (o->formula, value, i) : 1;
   return o->formula ? pw_formula_value (o->formula, value) : value[0];
+}
+
+int pw_outcome_is_final (const pw_outcomes *set, int outcome) {
+  const pw_outcome *o = set->outcome + outcome;
+  for (int i = 0; i < o->terms; i++)
+    if (set->functional[o->term[i]].type != PW_FINAL) return 0;
+  return 1;
 }
 
 const char *pw_outcome_unit (const pw_outcomes *set, int outcome, char *buffer, size_t size) {

@@ -5,7 +5,7 @@
  *   COLUMN   a column of the table of `run`, or the total work or loss
  *
  * Final values, extrema, means and integrals of columns are functionals of the run.  They are as accurate as the run:
- * extrema and integrals are evaluated inside its steps. */
+ * integrals are entries of its ledger (pw_settings.integrals), and extrema are located by its dense output. */
 #ifndef PW_OUTCOME_H
 #define PW_OUTCOME_H
 
@@ -39,16 +39,19 @@ typedef struct {
  * none. */
 int pw_column_find (const pw_system *s, const char *name, const char *origin, pw_column *c, pw_error *error);
 const char *pw_column_unit (const pw_system *s, pw_column c);
-/* Its value in a sample, or its derivative if the sample contains derivatives, as columns are linear in the sample; NaN
- * for contact points, which are not, and for entries of the ledger without pw_settings.ledger. */
+/* Its value in a sample; NaN for contact points, and for entries of the ledger without pw_settings.ledger. */
 double pw_column_value (const pw_system *s, pw_column c, const pw_sample *sample);
+
+/* 1 for work and losses: their rates are known, and they are integrals themselves. */
+static inline int pw_column_is_integrated (pw_column_type type) {
+  return type == PW_COLUMN_LEDGER || type == PW_COLUMN_WORK || type == PW_COLUMN_LOSS;
+}
 
 typedef enum { PW_FINAL, PW_MAX, PW_MIN, PW_MEAN, PW_INTEGRAL, PW_RMS } pw_functional_type;
 
 enum { PW_FUNCTIONAL_TIMES = 9 }; /* at which a step of the run is sampled before refinements (functional.c) */
-/* Columns may jump at the ends of a step: it is sampled also at this distance from them, relative to its size. */
-#define PW_FUNCTIONAL_INSET 1e-6
 
+/* 1 if it is the integral of a column over the run, or a function of that: mean, root mean square. */
 static inline int pw_is_integral (pw_functional_type type) {
   return type == PW_MEAN || type == PW_INTEGRAL || type == PW_RMS;
 }
@@ -56,21 +59,12 @@ static inline int pw_is_extremum (pw_functional_type type) {
   return type == PW_MAX || type == PW_MIN;
 }
 
-/* Nodes and weights of Gauss' formula of order 10 on [-1, 1]. */
-enum { PW_GAUSS_NODES = 5 };
-extern const double pw_gauss_x[PW_GAUSS_NODES], pw_gauss_w[PW_GAUSS_NODES];
-/* The time of a node in [t0, t1]. */
-static inline double pw_gauss_time (double t0, double t1, int node) {
-  return (t0 + t1) / 2 + pw_gauss_x[node] * (t1 - t0) / 2;
-}
-
 /* A functional of a column. */
 typedef struct {
   pw_functional_type type;
   pw_column column;
-  double value;                           /* set by pw_outcomes_run; final ones also by pw_sensitivity_compute */
+  double value;                           /* set by pw_outcomes_run */
   double t;                               /* time of the extremum so far [s] */
-  double step;                            /* size of the step of the run that contains the extremum [s] */
   double values[PW_FUNCTIONAL_TIMES + 1]; /* of the column: set by pw_outcomes_read */
 } pw_functional;
 
@@ -89,8 +83,10 @@ typedef struct {
   pw_functional *functional; /* each once */
   int functionals;
   int ledger;    /* 1: runs need pw_settings.ledger */
-  int along_run; /* 1: there are extrema or integrals, for which every step of the run is sampled */
+  int extrema;   /* their number; every step of the run is sampled for them */
+  int integrals; /* number of integrals, means and root mean squares */
   /* private */
+  double begin;            /* initial time of the run [s] */
   pw_workspace *workspace; /* for contact points */
   double (*contact)[3];
 } pw_outcomes;
@@ -101,16 +97,22 @@ int pw_outcomes_open (pw_outcomes *set, const pw_system *s, const char *option, 
                       pw_error *error);
 void pw_outcomes_close (pw_outcomes *set);
 
-/* Stores the columns in a sample as values[at] of their functionals.  pw_outcomes_run overwrites these: by the columns
- * at times of the current step, [0] at its beginning, and at another one, [PW_FUNCTIONAL_TIMES]. */
-int pw_outcomes_read (pw_outcomes *set, const pw_sample *s, int at, pw_error *error);
-/* Evaluates the functionals along a run to t_end; settings.stop_context is a pw_limit.  A status: that of
- * pw_limit_status if the run is stopped. */
-int pw_outcomes_run (pw_outcomes *set, const char *method, const pw_settings *settings, double t_end, pw_error *error);
+/* Values of outputs along a run, all of whose terms are final values. */
+typedef struct {
+  const double *t; /* rows: increasing times from that of the initial state to the end of the run [s] */
+  int rows;
+  double *value; /* outcomes x rows; NaN for outputs with other terms */
+} pw_outcome_table;
 
-/* The value of output number `outcome`.  gradient, unless NULL, receives its derivatives with respect to all
- * functionals of the set. */
-double pw_outcome_value (const pw_outcomes *set, int outcome, double *gradient);
+/* 1 if all terms of an output are final values. */
+int pw_outcome_is_final (const pw_outcomes *set, int outcome);
+/* Evaluates the functionals along a run to t_end, and a table unless that is NULL; settings.stop_context is a pw_limit.
+ * A status: that of pw_limit_status if the run is stopped. */
+int pw_outcomes_run (pw_outcomes *set, const char *method, const pw_settings *settings, double t_end,
+                     const pw_outcome_table *table, pw_error *error);
+
+/* The value of output number `outcome`. */
+double pw_outcome_value (const pw_outcomes *set, int outcome);
 /* Its unit, in the buffer, which is returned; "" for expressions, whose units are not derived. */
 const char *pw_outcome_unit (const pw_outcomes *set, int outcome, char *buffer, size_t size);
 

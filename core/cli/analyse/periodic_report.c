@@ -43,8 +43,8 @@ static double periodic_round (double value) {
   return pw_rounded (value, PERIODIC_SMALL);
 }
 
-/* Change in one period of the angle of a body relative to the whole [rad], or of an internal coordinate: whole turns, or
- * by a symmetry, since nothing depends on it.  i: number of the body; of the coordinate, from number `bodies` on. */
+/* Change in one period of the angle of a body relative to the whole [rad], or of an internal coordinate: whole turns,
+ * or by a symmetry, since nothing depends on it.  i: number of the body; of the coordinate, from number `bodies` on. */
 static double periodic_rotation (const pw_system *s, const pw_periodic_orbit *o, int i) {
   const int bodies = pw_system_bodies (s), j = i < bodies ? 3 * i + 2 : i + 2 * bodies;
   return periodic_round (o->end[j] - o->q[j] - (i < bodies ? o->rotation : 0));

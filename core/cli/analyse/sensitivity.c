@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "figure.h"
+#include "parallel.h"
 #include "print_table.h"
 #include "report.h"
 #include "sensitivity.h"
@@ -14,15 +15,17 @@ enum {
   SENSITIVITY_UNIT = 64,    /* longest unit, its end included */
   SENSITIVITY_NAME = 10000, /* likewise the name of a column of the table; longer names are cut off */
   SENSITIVITY_ROWS = 1000,  /* of the table after the first, unless --every is given */
-  SENSITIVITY_REPEATED = 5  /* computations with better steps of the differences, at most */
+  SENSITIVITY_RUNS = 14     /* usual number of runs for an unknown, for the progress */
 };
 
 typedef struct {
   pw_cli_line line;
   const char **by; /* of --by, ended by NULL */
-  const char *every, *folder;
+  const char **of; /* of --of, ended by NULL */
+  const char *every, *folder, *jobs_text;
   pw_cli_model m;
   pw_files files;
+  pw_unknowns unknowns;
   pw_sensitivity sens;
   double cpu; /* processor time of the computation [s] */
 } sensitivity;
@@ -32,113 +35,127 @@ typedef struct {
 /* The unit of a derivative, "m per kg"; "" if it has none, or the output is a formula, whose unit is unknown. */
 static const char *sensitivity_unit (const pw_sensitivity *sens, int output, int unknown, char unit[SENSITIVITY_UNIT]) {
   char of[SENSITIVITY_UNIT / 2];
-  const char *by = sens->unknowns.list[unknown].unit;
+  const char *by = sens->outputs.unknowns->list[unknown].unit;
   pw_outcome_unit (&sens->outcomes, output, of, sizeof of);
   if (sens->outcomes.outcome[output].formula) return strcpy (unit, "");
   snprintf (unit, SENSITIVITY_UNIT, *by ? "%s per %s" : "%s", *of || *by == 0 ? of : "1", by);
   return unit;
 }
 
-typedef struct {
-  double derivative, error;
-  double elasticity; /* relative change of the output per relative change of the unknown; NaN: there is none */
-} sensitivity_result;
+/* The relative change of the output per relative change of the unknown; NaN: there is none. */
+static double sensitivity_elasticity (const pw_sensitivity *sens, int output, int unknown) {
+  const double largest = 1e12, /* elasticities above it are those of an output that is 0 but for round-off */
+      value = sens->outputs.unknowns->list[unknown].value,
+               elasticity = pw_sensitivity_of (sens, output, unknown, -1)->value * value / sens->value[output];
+  return value == 0 || !(fabs (elasticity) < largest) ? NAN : elasticity;
+}
 
-/* The error is that of the differences and of the integration of derivatives, plus that of the run, which is estimated
- * by the change of the derivative with larger tolerances. */
-static sensitivity_result sensitivity_of (const pw_sensitivity *sens, int output, int unknown) {
-  const double largest = 1e12; /* elasticities above it are those of an output that is 0 but for round-off */
-  double derivative = pw_sensitivity_derivative (sens, output, unknown, sens->run_slope),
-         error = fabs (pw_sensitivity_derivative (sens, output, unknown, sens->run_slope_error)),
-         value = sens->unknowns.list[unknown].value,
-         elasticity = derivative * value / pw_outcome_value (&sens->outcomes, output, NULL);
-  if (sens->loose) error += fabs (derivative - sens->loose[output * sens->unknowns.count + unknown]);
-  if (value == 0 || !(fabs (elasticity) < largest)) elasticity = NAN;
-  return (sensitivity_result){ derivative, error, elasticity };
+/* Why there is no derivative, in the buffer, which is returned. */
+static const char *sensitivity_reason (const pw_unknown *u, const pw_derivative *d, char *text, size_t size) {
+  if (d->type == PW_NO_DERIVATIVE)
+    snprintf (text, size, "no derivative at %s = %.9g: %.5g from below, %.5g from above", u->name, u->value,
+              fabs (d->below) < 1e-6 * fabs (d->above) ? 0 : d->below,
+              fabs (d->above) < 1e-6 * fabs (d->below) ? 0 : d->above);
+  else
+    snprintf (text, size, "unknown by %s: no step of the differences of runs gives a digit of the derivative", u->name);
+  return text;
+}
+
+static void sensitivity_print_row (const pw_sensitivity *sens, pw_table *table, int output, int unknown) {
+  char unit[SENSITIVITY_UNIT];
+  const pw_unknown *u = &sens->outputs.unknowns->list[unknown];
+  const pw_derivative *d = pw_sensitivity_of (sens, output, unknown, -1);
+  pw_cell_unit (table, -14, u->name, u->unit);
+  pw_cell_number (table, 12, u->value, SENSITIVITY_DIGITS);
+  pw_cell (table, 12,
+           d->type == PW_NO_DERIVATIVE ? "none"
+           : d->type == PW_UNKNOWN     ? "unknown"
+                                       : PW_DIGITS (d->value, SENSITIVITY_DIGITS));
+  pw_cell (table, -8, sensitivity_unit (sens, output, unknown, unit));
+  pw_cell_number (table, 12, d->error, 2);
+  pw_cell_number (table, 12, sensitivity_elasticity (sens, output, unknown), 5);
+  pw_row_end (table);
 }
 
 static void sensitivity_print (const pw_sensitivity *sens) {
-  char unit[SENSITIVITY_UNIT];
-  printf ("%s by %s to t = %.9g s\n", pw_file_name (sens->unknowns.m->file), sens->unknowns.method,
-          pw_run_time (sens->base.run));
-  for (int o = 0; o < sens->outcomes.outcomes && !sens->stopped; o++) {
+  const pw_unknowns *u = sens->outputs.unknowns;
+  char unit[SENSITIVITY_UNIT], reason[500];
+  printf ("%s by %s to t = %.9g s\n", pw_file_name (u->m->file), u->method, u->t_end);
+  for (int o = 0; o < sens->outputs.count; o++) {
     pw_outcome_unit (&sens->outcomes, o, unit, sizeof unit);
-    pw_cli_print (stdout, "\n%s = %s %s\n", sens->of[o], PW_DIGITS (pw_outcome_value (&sens->outcomes, o, NULL), 12),
-                  unit);
+    pw_cli_print (stdout, "\n%s = %s %s\n", sens->outputs.of[o], PW_DIGITS (sens->value[o], 12), unit);
     for (pw_table table = { 0 }; pw_table_pass (&table);) {
       pw_cell (&table, -14, "by");
       pw_cell (&table, 12, "value");
       pw_cell (&table, 12, "derivative");
       pw_cell (&table, -8, "unit");
       pw_head (&table, 12, 12, (const char *[]){ "error", "elasticity", NULL });
-      for (int p = 0; p < sens->unknowns.count; p++) {
-        const sensitivity_result result = sensitivity_of (sens, o, p);
-        const pw_unknown *u = &sens->unknowns.list[p];
-        pw_cell_unit (&table, -14, u->name, u->unit);
-        pw_cell_number (&table, 12, u->value, SENSITIVITY_DIGITS);
-        pw_cell (&table, 12, isnan (result.derivative) ? "none" : PW_DIGITS (result.derivative, SENSITIVITY_DIGITS));
-        pw_cell (&table, -8, sensitivity_unit (sens, o, p, unit));
-        pw_cell_number (&table, 12, result.error, 2);
-        pw_cell_number (&table, 12, result.elasticity, 5);
-        pw_row_end (&table);
-      }
+      for (int p = 0; p < u->count; p++) sensitivity_print_row (sens, &table, o, p);
+    }
+    for (int p = 0; p < u->count; p++) {
+      const pw_derivative *d = pw_sensitivity_of (sens, o, p, -1);
+      if (d->type != PW_DERIVATIVE)
+        pw_cli_print (stdout, "  %s\n", sensitivity_reason (&u->list[p], d, reason, sizeof reason));
     }
   }
 }
 
 /* 1 if the error exceeds 1 % of the derivative and, times the size of the unknown, 1 % of the output and 1e-6 in SI
- * units. */
+ * units; or nothing is known. */
 static int sensitivity_is_uncertain (const pw_sensitivity *sens, int output, int unknown) {
-  const sensitivity_result result = sensitivity_of (sens, output, unknown);
-  return result.error > 0.01 * fabs (result.derivative) &&
-         result.error * sens->unknowns.list[unknown].size >
-             fmax (0.01 * fabs (pw_outcome_value (&sens->outcomes, output, NULL)), 1e-6);
+  const pw_derivative *d = pw_sensitivity_of (sens, output, unknown, -1);
+  if (d->type != PW_DERIVATIVE) return d->type == PW_UNKNOWN;
+  return d->error > 0.01 * fabs (d->value) &&
+         d->error * sens->outputs.unknowns->list[unknown].size > fmax (0.01 * fabs (sens->value[output]), 1e-6);
 }
 
 static void sensitivity_warn (const pw_sensitivity *sens) {
   char list[1000] = "";
   size_t used = 0;
-  for (int o = 0; o < sens->outcomes.outcomes && !sens->stopped; o++)
-    for (int p = 0; p < sens->unknowns.count && used < sizeof list; p++)
+  for (int o = 0; o < sens->outputs.count; o++)
+    for (int p = 0; p < sens->outputs.unknowns->count && used < sizeof list; p++)
       if (sensitivity_is_uncertain (sens, o, p))
-        used += (size_t)snprintf (list + used, sizeof list - used, "%s%s by %s", used ? ", " : "", sens->of[o],
-                                  sens->unknowns.list[p].name);
-  if (used)
-    pw_cli_say ("pinwheel: derivatives with errors above 1 %%, which the motion amplifies or the steps of the run "
-                "cause: %s%s\n",
-                list, used < sizeof list ? "" : " ...");
+        used += (size_t)snprintf (list + used, sizeof list - used, "%s%s by %s", used ? ", " : "", sens->outputs.of[o],
+                                  sens->outputs.unknowns->list[p].name);
+  if (used) pw_cli_say ("pinwheel: derivatives with errors above 1 %%: %s%s\n", list, used < sizeof list ? "" : " ...");
 }
 
 /* ---- Files ---- */
+
+static void sensitivity_json_derivative (const pw_sensitivity *sens, pw_json *j, int output, int unknown) {
+  char unit[SENSITIVITY_UNIT], reason[500];
+  const pw_unknown *u = &sens->outputs.unknowns->list[unknown];
+  const pw_derivative *d = pw_sensitivity_of (sens, output, unknown, -1);
+  pw_json_open (j, NULL, '{');
+  pw_json_text (j, "by", u->name);
+  pw_json_number (j, "value", u->value);
+  pw_json_text (j, "unit", sensitivity_unit (sens, output, unknown, unit));
+  pw_json_number (j, "derivative", d->value);
+  pw_json_number (j, "error", d->error);
+  pw_json_number (j, "elasticity", sensitivity_elasticity (sens, output, unknown));
+  if (d->type != PW_DERIVATIVE) pw_json_text (j, "reason", sensitivity_reason (u, d, reason, sizeof reason));
+  pw_json_close (j, '}');
+}
 
 static void sensitivity_json (const void *context, pw_json *j) {
   const sensitivity *cmd = context;
   const pw_sensitivity *sens = &cmd->sens;
   char unit[SENSITIVITY_UNIT];
   pw_json_open (j, NULL, '{');
-  pw_json_text (j, "model", pw_file_name (sens->unknowns.m->file));
-  pw_json_text (j, "method", sens->unknowns.method);
-  pw_json_number (j, "t_end", pw_run_time (sens->base.run));
-  pw_json_flag (j, "complete", !sens->stopped);
+  pw_json_text (j, "model", pw_file_name (cmd->unknowns.m->file));
+  pw_json_text (j, "method", cmd->unknowns.method);
+  pw_json_text (j, "derivatives_by", sens->outputs.method);
+  pw_json_number (j, "t_end", cmd->unknowns.t_end);
+  pw_json_flag (j, "complete", 1);
   pw_json_number (j, "cpu_seconds", cmd->cpu);
   pw_json_open (j, "outputs", '[');
-  for (int o = 0; o < sens->outcomes.outcomes && !sens->stopped; o++) {
+  for (int o = 0; o < sens->outputs.count; o++) {
     pw_json_open (j, NULL, '{');
-    pw_json_text (j, "output", sens->of[o]);
+    pw_json_text (j, "output", sens->outputs.of[o]);
     pw_json_text (j, "unit", pw_outcome_unit (&sens->outcomes, o, unit, sizeof unit));
-    pw_json_number (j, "value", pw_outcome_value (&sens->outcomes, o, NULL));
+    pw_json_number (j, "value", sens->value[o]);
     pw_json_open (j, "derivatives", '[');
-    for (int p = 0; p < sens->unknowns.count; p++) {
-      const sensitivity_result result = sensitivity_of (sens, o, p);
-      pw_json_open (j, NULL, '{');
-      pw_json_text (j, "by", sens->unknowns.list[p].name);
-      pw_json_number (j, "value", sens->unknowns.list[p].value);
-      pw_json_text (j, "unit", sensitivity_unit (sens, o, p, unit));
-      pw_json_number (j, "derivative", result.derivative);
-      pw_json_number (j, "error", result.error);
-      pw_json_number (j, "elasticity", result.elasticity);
-      pw_json_close (j, '}');
-    }
+    for (int p = 0; p < cmd->unknowns.count; p++) sensitivity_json_derivative (sens, j, o, p);
     pw_json_close (j, ']');
     pw_json_close (j, '}');
   }
@@ -159,27 +176,46 @@ static int sensitivity_csv (const void *context, FILE *f, pw_error *error) {
   char unit[SENSITIVITY_UNIT];
   pw_text t = { 0 };
   pw_text_cell (&t, "t [s]");
-  for (int o = 0; o < sens->outcomes.outcomes; o++) {
-    if (!pw_sensitivity_in_table (sens, o)) continue;
-    sensitivity_cell (&t, sens->of[o], pw_outcome_unit (&sens->outcomes, o, unit, sizeof unit));
-    for (int p = 0; p < sens->unknowns.count; p++)
-      sensitivity_cell (&t, PW_PRINTED (SENSITIVITY_NAME, "d(%s)/d(%s)", sens->of[o], sens->unknowns.list[p].name),
+  for (int o = 0; o < sens->outputs.count; o++) {
+    if (!pw_outcome_is_final (&sens->outcomes, o)) continue;
+    sensitivity_cell (&t, sens->outputs.of[o], pw_outcome_unit (&sens->outcomes, o, unit, sizeof unit));
+    for (int p = 0; p < cmd->unknowns.count; p++)
+      sensitivity_cell (&t,
+                        PW_PRINTED (SENSITIVITY_NAME, "d(%s)/d(%s)", sens->outputs.of[o], cmd->unknowns.list[p].name),
                         sensitivity_unit (sens, o, p, unit));
   }
   int status = pw_text_line (&t, f, cmd->folder, error);
-  for (int i = 0; i < sens->rows && status == PW_OK; i++) {
-    for (int k = 0; k < sens->columns; k++)
-      pw_text_number (&t, sens->row[(size_t)i * (size_t)sens->columns + (size_t)k]);
+  for (int i = 0; i < sens->outputs.rows && status == PW_OK; i++) {
+    pw_text_number (&t, sens->outputs.t[i]);
+    for (int o = 0; o < sens->outputs.count; o++) {
+      if (!pw_outcome_is_final (&sens->outcomes, o)) continue;
+      pw_text_number (&t, sens->table[o * sens->outputs.rows + i]);
+      for (int p = 0; p < cmd->unknowns.count; p++) pw_text_number (&t, pw_sensitivity_of (sens, o, p, i)->value);
+    }
     status = pw_text_line (&t, f, cmd->folder, error);
   }
   return status;
 }
 
+/* 1 if an output has a panel of the figure: there are derivatives along the run. */
+static int sensitivity_is_drawn (const pw_sensitivity *sens, int output) {
+  int points = 0;
+  for (int p = 0; p < sens->outputs.unknowns->count; p++)
+    for (int i = 0; i < sens->outputs.rows; i++) points += isfinite (pw_sensitivity_of (sens, output, p, i)->value);
+  return points > 0;
+}
+
+static int sensitivity_panels (const pw_sensitivity *sens) {
+  int panels = 0;
+  for (int i = 0; i < sens->outputs.count; i++) panels += sensitivity_is_drawn (sens, i);
+  return panels;
+}
+
 /* The label of a curve of sensitivity_data. */
 static void sensitivity_label (const pw_sensitivity *sens, int output, int unknown, char *label, size_t size) {
   char unit[SENSITIVITY_UNIT], buffer[FIGURE_NAME + 4];
-  const char *name = pw_figure_name (sens->unknowns.list[unknown].name, buffer);
-  if (sens->unknowns.list[unknown].value != 0) {
+  const char *name = pw_figure_name (sens->outputs.unknowns->list[unknown].name, buffer);
+  if (sens->outputs.unknowns->list[unknown].value != 0) {
     pw_outcome_unit (&sens->outcomes, output, unit, sizeof unit);
     snprintf (label, size, *unit ? "%s × ∂/∂%s [%s]" : "%s × ∂/∂%s", name, name, unit);
   } else {
@@ -192,15 +228,14 @@ static void sensitivity_label (const pw_sensitivity *sens, int output, int unkno
  * compared. */
 static int sensitivity_data (const void *context, FILE *f, pw_error *error) {
   const pw_sensitivity *sens = &((const sensitivity *)context)->sens;
-  const double *row = sens->row;
-  size_t columns = (size_t)sens->columns;
+  const pw_unknowns *u = sens->outputs.unknowns;
   (void)error;
-  for (int c = 1; c < sens->columns; c++) {
-    int p = (c - 1) % (1 + sens->unknowns.count) - 1; /* -1: the output itself */
-    if (p < 0) continue;
-    double factor = sens->unknowns.list[p].value != 0 ? sens->unknowns.list[p].value : 1;
-    for (int k = 0; k < sens->rows; k++)
-      fprintf (f, "%.9g %.9g\n", row[(size_t)k * columns], row[(size_t)k * columns + (size_t)c] * factor);
+  for (int k = 0; k < sens->outputs.count * u->count; k++) {
+    const int o = k / u->count, p = k % u->count;
+    double factor = u->list[p].value != 0 ? u->list[p].value : 1;
+    if (!sensitivity_is_drawn (sens, o)) continue;
+    for (int i = 0; i < sens->outputs.rows; i++)
+      fprintf (f, "%.9g %.9g\n", sens->outputs.t[i], pw_sensitivity_of (sens, o, p, i)->value * factor);
     fputs ("\n\n", f);
   }
   return PW_OK;
@@ -208,159 +243,94 @@ static int sensitivity_data (const void *context, FILE *f, pw_error *error) {
 
 static void sensitivity_variables (const void *context, FILE *f) {
   const pw_sensitivity *sens = &((const sensitivity *)context)->sens;
-  int panels = 0;
-  fprintf (f, "unknowns = %d\nt_end = %.10g\n", sens->unknowns.count, sens->unknowns.t_end);
-  for (int i = 0; i < sens->outcomes.outcomes; i++) panels += pw_sensitivity_in_table (sens, i);
-  fprintf (f, "panels = %d\narray output[%d]\narray label[%d]\n", panels, panels, panels * sens->unknowns.count);
-  for (int i = 0, k = 0; i < sens->outcomes.outcomes; i++) {
+  const int panels = sensitivity_panels (sens), unknowns = sens->outputs.unknowns->count;
+  fprintf (f, "unknowns = %d\nt_end = %.10g\n", unknowns, sens->outputs.unknowns->t_end);
+  fprintf (f, "panels = %d\narray output[%d]\narray label[%d]\n", panels, panels, panels * unknowns);
+  for (int i = 0, k = 0; i < sens->outputs.count; i++) {
     char label[300];
-    if (!pw_sensitivity_in_table (sens, i)) continue;
-    pw_figure_element (f, "output", ++k, sens->of[i]);
-    for (int p = 0; p < sens->unknowns.count; p++) {
+    if (!sensitivity_is_drawn (sens, i)) continue;
+    pw_figure_element (f, "output", ++k, sens->outputs.of[i]);
+    for (int p = 0; p < unknowns; p++) {
       sensitivity_label (sens, i, p, label, sizeof label);
-      pw_figure_element (f, "label", (k - 1) * sens->unknowns.count + p + 1, label);
+      pw_figure_element (f, "label", (k - 1) * unknowns + p + 1, label);
     }
   }
 }
 
 static int sensitivity_write (const sensitivity *cmd, pw_error *error) {
   int status = pw_figure_write_tables (cmd->folder, "sensitivity", 5, cmd, sensitivity_csv, sensitivity_json, error);
-  if (status != PW_OK || cmd->sens.columns < 2 || cmd->sens.rows < 2) return status;
+  if (status != PW_OK || sensitivity_panels (&cmd->sens) == 0 || cmd->sens.outputs.rows < 2) return status;
   return pw_figure_write (&cmd->line, &cmd->m, cmd->folder, "sensitivity", cmd, sensitivity_data, sensitivity_variables,
                           error);
 }
 
 /* ---- The command ---- */
 
-static int sensitivity_open (sensitivity *cmd, pw_error *error) {
-  pw_sensitivity *sens = &cmd->sens;
-  int status = pw_cli_open (&cmd->m, &cmd->line, error);
-  if (status == PW_OK) status = pw_unknowns_open (&sens->unknowns, &cmd->line, &cmd->m, error);
-  if (status == PW_OK) status = pw_unknowns_engine (&sens->unknowns, 1, 1, error);
-  if (status != PW_OK) return status;
-  if (cmd->folder) sens->row_interval = sens->unknowns.t_end / SENSITIVITY_ROWS;
-  status = pw_cli_requires ("--every", cmd->every, "-o DIR", cmd->folder != NULL, error);
-  if (status == PW_OK) status = pw_cli_number ("--every", cmd->every, PW_POSITIVE, &sens->row_interval, error);
-  if (status != PW_OK) return status;
-  if (cmd->by == NULL) return pw_fail (error, PW_INPUT, "--by is missing: expected a parameter or an initial value");
-  if (sens->of == NULL) return pw_fail (error, PW_INPUT, "--of is missing: expected an output, such as frame.x");
-  return pw_unknowns_differentiated (&sens->unknowns, cmd->by, error);
-}
-
-/* Sets better steps of the differences for parameters; 1 if there are any. */
-static int sensitivity_improve_steps (pw_sensitivity *sens) {
-  int better = 0;
-  for (int p = 0; p < sens->unknowns.count && !sens->stopped; p++) {
-    pw_unknown *u = &sens->unknowns.list[p];
-    double used = sens->direction[p].step, step = pw_variation_better_step (sens->variation, p);
-    u->last_step = fabs (used);
-    if (u->size == 0) u->size = u->last_step / PW_UNKNOWN_STEP;
-    if (u->parameter == NULL || step == used) continue;
-    u->step = fabs (step);
-    better = 1;
-  }
-  return better;
-}
-
-/* The problem without its results. */
-static pw_sensitivity sensitivity_copy (const pw_sensitivity *sens) {
-  return (pw_sensitivity){ .of = sens->of, .unknowns = sens->unknowns, .row_interval = sens->row_interval };
-}
-
-/* Computes all derivatives again, with the steps now set. */
-static int sensitivity_repeat (pw_sensitivity *sens, pw_progress *progress, pw_error *error) {
-  pw_sensitivity_close (sens);
-  *sens = sensitivity_copy (sens);
-  return pw_sensitivity_compute (sens, NULL, progress, error);
-}
-
-#define SENSITIVITY_LOOSE 10. /* factor of the larger tolerances with which the error of a run is estimated */
-
-/* Computes the derivatives with larger tolerances.  They are NaN if that fails; PW_RETRY after Ctrl-C. */
-static int sensitivity_loosen (pw_sensitivity *sens, pw_progress *progress, pw_error *error) {
-  int outputs = sens->outcomes.outcomes, unknowns = sens->unknowns.count;
-  pw_sensitivity other = sensitivity_copy (sens);
-  other.no_error = 1;
-  other.row_interval = 0;
-  other.unknowns.settings.rtol = fmin (0.1, SENSITIVITY_LOOSE * sens->unknowns.settings.rtol); /* must be below 1 */
-  other.unknowns.settings.atol *= SENSITIVITY_LOOSE;
-  sens->loose = pw_arena_alloc (&sens->arena, (size_t)(outputs * unknowns) * sizeof *sens->loose);
-  if (sens->loose == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  int status = pw_sensitivity_compute (&other, NULL, progress, error);
-  if (status == PW_OK && other.stopped)
-    status = pw_limit_status (&other.base.limit, pw_run_time (other.base.run), error);
-  for (int i = 0; i < outputs * unknowns; i++)
-    sens->loose[i] =
-        status == PW_OK ? pw_sensitivity_derivative (&other, i / unknowns, i % unknowns, other.run_slope) : NAN;
-  pw_sensitivity_close (&other);
-  return status;
-}
-
-/* Estimates the part of the errors that the error of the run causes. */
-static int sensitivity_estimate_run_error (pw_sensitivity *sens, pw_progress *progress, pw_error *error) {
-  if (sens->stopped || pw_cli_adaptive (sens->unknowns.method) == 0) return PW_OK;
-  int status = sensitivity_loosen (sens, progress, error);
-  if (status == PW_OK || status == PW_RESOURCE || status == PW_RETRY) return status;
-  pw_cli_say ("pinwheel: errors are unknown: the run with %g times the tolerances fails: %s\n", SENSITIVITY_LOOSE,
-              error->text);
-  *error = (pw_error){ 0 };
+/* Sets the times of the table: from 0 to the end, `every` apart. */
+static int sensitivity_set_rows (sensitivity *cmd, double every, pw_error *error) {
+  const double t_end = cmd->unknowns.t_end, count = ceil (t_end / every * (1 - 1e-12)); /* no row beside the last one */
+  if (count > 1e7) return pw_fail (error, PW_INPUT, "--every %g: expected at most 1e7 rows", every);
+  double *t = pw_arena_alloc (&cmd->sens.arena, ((size_t)count + 2) * sizeof *t);
+  if (t == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  for (int i = 0; i < (int)count; i++) t[i] = i * every;
+  t[(int)count] = t_end;
+  cmd->sens.outputs.t = t, cmd->sens.outputs.rows = (int)count + 1;
   return PW_OK;
 }
 
-static int sensitivity_compute (pw_sensitivity *sens, pw_error *error) {
+static int sensitivity_open (sensitivity *cmd, pw_error *error) {
+  double every = 0;
+  int status = pw_cli_open (&cmd->m, &cmd->line, error);
+  if (status == PW_OK) status = pw_unknowns_open (&cmd->unknowns, &cmd->line, &cmd->m, error);
+  if (status == PW_OK) status = pw_unknowns_engine (&cmd->unknowns, SENSITIVITY_RUNS, 1, error);
+  if (status == PW_OK) status = pw_parallel_jobs (cmd->jobs_text, &cmd->sens.jobs, error);
+  if (status == PW_OK) status = pw_cli_requires ("--every", cmd->every, "-o DIR", cmd->folder != NULL, error);
+  if (status == PW_OK) status = pw_cli_number ("--every", cmd->every, PW_POSITIVE, &every, error);
+  if (status != PW_OK) return status;
+  if (cmd->by == NULL) return pw_fail (error, PW_INPUT, "--by is missing: expected a parameter or an initial value");
+  if (cmd->of == NULL) return pw_fail (error, PW_INPUT, "--of is missing: expected an output, such as frame.x");
+  if (strstr (cmd->unknowns.method, ":inputs=held"))
+    return pw_fail (error, PW_INPUT, "derivatives need inputs=stage: held inputs depend on the steps");
+  cmd->sens.outputs.unknowns = &cmd->unknowns, cmd->sens.outputs.option = "--of", cmd->sens.outputs.of = cmd->of;
+  while (cmd->of[cmd->sens.outputs.count]) cmd->sens.outputs.count++;
+  if (cmd->folder)
+    status = sensitivity_set_rows (cmd, every > 0 ? every : cmd->unknowns.t_end / SENSITIVITY_ROWS, error);
+  return status == PW_OK ? pw_unknowns_differentiated (&cmd->unknowns, cmd->by, error) : status;
+}
+
+static int sensitivity_compute (sensitivity *cmd, pw_error *error) {
   pw_progress progress;
   pw_stop_catch ();
-  pw_progress_start (&progress, pw_file_name (sens->unknowns.m->file), "s", 0, sens->unknowns.t_end);
-  int status = pw_sensitivity_compute (sens, NULL, &progress, error);
-  for (int i = 0; i < SENSITIVITY_REPEATED && status == PW_OK && sensitivity_improve_steps (sens); i++) {
-    status = sensitivity_repeat (sens, &progress, error);
-    if (status == PW_OK || status == PW_RESOURCE || pw_limit_over (&sens->base.limit)) continue; /* or after Ctrl-C */
-    for (int p = 0; p < sens->unknowns.count; p++) sens->unknowns.list[p].step = sens->unknowns.list[p].last_step;
-    *error = (pw_error){ 0 }; /* such as that of a model that refuses the value of a neighbour */
-    status = sensitivity_repeat (sens, &progress, error);
-    break;
-  }
-  if (status == PW_OK) status = sensitivity_estimate_run_error (sens, &progress, error);
+  pw_progress_start (&progress, pw_file_name (cmd->m.file), "runs", 0, SENSITIVITY_RUNS * cmd->unknowns.count);
+  cmd->sens.progress = &progress;
+  int status = pw_sensitivity_compute (&cmd->sens, error);
   pw_progress_end (&progress);
   pw_stop_release ();
   return status;
 }
 
-static int sensitivity_check (const pw_sensitivity *sens, pw_error *error) {
-  for (int o = 0; o < sens->outcomes.outcomes && !sens->stopped; o++)
-    if (!isfinite (pw_outcome_value (&sens->outcomes, o, NULL)))
-      return pw_fail (error, PW_METHOD, "%.300s is not a finite number at the end of the run", sens->of[o]);
-  return PW_OK;
-}
-
 static int sensitivity_command (void *options, pw_error *error) {
   sensitivity *cmd = options;
-  pw_sensitivity *sens = &cmd->sens;
   int status = sensitivity_open (cmd, error);
   if (status == PW_OK)
     status = pw_figure_lock_folder (&cmd->line, &cmd->m, cmd->folder, "sensitivity", &cmd->files, error);
-  if (status == PW_OK) pw_report_model (&cmd->m), status = pw_report_initial_state (&cmd->m, cmd->sens.unknowns.limit, error);
+  if (status == PW_OK)
+    pw_report_model (&cmd->m), status = pw_report_initial_state (&cmd->m, cmd->unknowns.limit, error);
   const double start = pw_seconds (CLOCK_PROCESS_CPUTIME_ID);
-  if (status == PW_OK) status = sensitivity_compute (sens, error);
-  const int without_errors = status == PW_RETRY && sens->loose; /* interrupted when all derivatives were known */
-  if (without_errors) status = PW_OK;
+  if (status == PW_OK) status = sensitivity_compute (cmd, error);
   cmd->cpu = pw_seconds (CLOCK_PROCESS_CPUTIME_ID) - start;
-  if (status == PW_OK) status = sensitivity_check (sens, error);
-  if (status == PW_OK) sensitivity_print (sens), sensitivity_warn (sens);
+  if (status == PW_OK) sensitivity_print (&cmd->sens), sensitivity_warn (&cmd->sens);
   if (status == PW_OK && cmd->folder) status = sensitivity_write (cmd, error);
-  if (status == PW_OK && sens->stopped)
-    status = pw_limit_status (&sens->base.limit, pw_run_time (sens->base.run), error);
-  if (status == PW_OK && without_errors) status = PW_RETRY;
   pw_files_close (&cmd->files);
-  pw_sensitivity_close (sens);
-  pw_unknowns_close (&sens->unknowns);
+  pw_sensitivity_close (&cmd->sens);
+  pw_unknowns_close (&cmd->unknowns);
   pw_cli_close_model (&cmd->m);
   return status == PW_RETRY ? pw_cli_incomplete (&cmd->line, error) : status;
 }
 
 static const struct poptOption sensitivity_options[] = {
   PW_OPTION_GROUP ("Sensitivity"),
-  PW_LIST_OPTION (sensitivity, sens.of, "of", 0, "OUTPUT",
+  PW_LIST_OPTION (sensitivity, of, "of", 0, "OUTPUT",
                   "A column of the table of `run` at the end, or its max:, min:, mean:, integral: or rms:, such as "
                   "max:B.Fx; or an expression of these; repeatable"),
   PW_LIST_OPTION (sensitivity, by, "by", 0, "NAME",
@@ -370,6 +340,7 @@ static const struct poptOption sensitivity_options[] = {
   PW_TEXT_OPTION (sensitivity, folder, "output", 'o', "DIR",
                   "Write sensitivity.csv (outputs and derivatives along the run), sensitivity.json and a figure into a "
                   "folder"),
+  PW_TEXT_OPTION (sensitivity, jobs_text, "jobs", 'j', "N", "Number of concurrent runs (default: one per processor)"),
   PW_WIDTH_OPTION,
   PW_METHOD_OPTIONS,
   PW_MODEL_OPTIONS,
@@ -381,8 +352,8 @@ const pw_command pw_cli_sensitivity = {
   .synopsis = "MODEL --of OUTPUT --by NAME [OPTION...]",
   .summary = "differentiate outputs of a run with respect to parameters and initial values",
   .help = "Differentiate outputs of a run with respect to parameters and initial values, at the end and along the run, "
-          "by the variational equations: exact in the states, by differences of compiled models in the parameters, "
-          "with the error of these and, if the method controls its error, of the run.",
+          "by differences of accurate runs at neighbouring values, whatever the method of the run, with an error that "
+          "contains the true one.",
   .options_size = sizeof (sensitivity),
   .function = sensitivity_command,
   .options = sensitivity_options,

@@ -1,5 +1,5 @@
-/* Derivatives of outputs of a run with respect to unknowns, for `sensitivity`, `fit` and `optimise`.  There are F
- * functionals and P unknowns; comments on arrays begin with their sizes. */
+/* Outputs of runs as functions of unknowns, and their derivatives, for `sensitivity`, `fit` and `optimise`.  There are
+ * P unknowns; comments on arrays begin with their sizes. */
 #ifndef PW_SENSITIVITY_H
 #define PW_SENSITIVITY_H
 
@@ -7,50 +7,48 @@
 #include "progress.h"
 #include "unknowns.h"
 
+/* Outputs of the runs of unknowns. */
 typedef struct {
-  const char **of; /* the texts of the outputs, ended by NULL */
-  pw_unknowns unknowns;
-  double row_interval; /* between rows of the table [s]; 0: 20 intervals */
-  int no_error;        /* 1: neither errors nor a check that the constraints leave the unknowns free */
+  const pw_unknowns *unknowns;
+  const char *option; /* "--of", in messages */
+  const char **of;    /* count: texts */
+  int count;
+  const char *method; /* NULL: that of the unknowns, with their settings */
+  double rtol;        /* with a method */
+  long max_steps;     /* likewise; 0: that of the settings */
+  const double *t;    /* rows: times of a table, see pw_outcome_table; NULL: none */
+  int rows;
+} pw_run_outputs;
+
+/* Runs the model with these values of the unknowns; stores the outputs, unless `value` is NULL, and the table, count x
+ * rows.  Called by several threads at once.  A status; PW_RETRY after Ctrl-C. */
+int pw_run_outputs_at (const pw_run_outputs *outputs, const double *x, double *value, double *table, pw_error *error);
+
+/* Relative noise of outputs as functions of the unknowns: the tolerance of an adaptive method, or round-off with fixed
+ * steps. */
+double pw_unknowns_noise (const pw_unknowns *u);
+
+typedef struct {
+  pw_run_outputs outputs; /* with the method of the runs that are compared */
+  int jobs;               /* threads */
+  pw_progress *progress;
   /* results */
-  pw_outcomes outcomes;                /* of the run */
-  double *run_slope, *run_slope_error; /* F x P: derivatives of the functionals, and their errors; NaN: none exists */
-  int rows, columns;                   /* of the table: t, then each output that is in it, with its derivatives */
-  double *row;                         /* rows x columns */
-  double *loose;                       /* outputs x P: derivatives with larger tolerances, NaN: failed; or NULL */
-  int stopped;                         /* 1: stopped before t_end, by Ctrl-C or the limit */
-  pw_unknown_run base;                 /* the run, at the given values of the unknowns; its limit is that of all runs */
-  pw_direction *direction;             /* P */
-  /* at the time last evaluated, where the columns of the functionals are their values[0]: */
-  double *slope, *slope_error; /* F x P: derivatives of the columns, and their errors */
+  pw_outcomes outcomes;      /* of the run, for texts and units */
+  double *value;             /* count: of the run by the method of the unknowns */
+  double *table;             /* count x rows; NaN for outputs that are not in the table */
+  pw_derivative *derivative; /* P x (count + count x rows): of the outputs, then of the table */
   /* private */
-  double *gradient;           /* F: scratch, of an output */
-  double *unknown_value;      /* P: the given values */
-  pw_unknown_run *neighbours; /* 4 P: those of each direction */
-  pw_variation *variation;
-  pw_run *sampled;        /* the run of which samples are taken; NULL: base.run */
-  double last_breakpoint; /* that has been reached [s] */
-  double *before;         /* F + F P: values and derivatives before a jump */
-  double *q;              /* coordinates: scratch */
-  char *memory;           /* of gradient, slope, run_slope, their errors, before and q */
-  pw_arena arena;         /* of loose, direction, unknown_value and neighbours */
-  size_t room;            /* rows allocated */
+  pthread_mutex_t lock;
+  int runs;
+  pw_arena arena;
 } pw_sensitivity;
 
-/* Begins the run with its derivatives at these values of the unknowns; NULL: their own.  Set the members up to
- * `no_error` before, the others to zero.  Close it in every case. */
-int pw_sensitivity_start (pw_sensitivity *sens, const double *values, pw_error *error);
-/* Advances the run to a time, and sets slope, slope_error and the functionals' values[0] there.  Returns as
- * pw_variation_advance. */
-int pw_sensitivity_at (pw_sensitivity *sens, double t, pw_error *error);
-/* Starts the run, advances it to the end, and computes all results except `loose`.  PW_OK with `stopped` if it is
- * stopped while it computes derivatives; the status of pw_outcomes_run if before. */
-int pw_sensitivity_compute (pw_sensitivity *sens, const double *values, pw_progress *progress, pw_error *error);
+/* Makes the run, and differentiates the outputs at the values of the unknowns.  Set the members up to `progress`
+ * before, the method excepted, the others to zero.  Close it in every case.  Errors: those of the run; PW_INPUT if
+ * constraints determine an initial value, or a parameter changes the number of bodies; PW_RETRY after Ctrl-C. */
+int pw_sensitivity_compute (pw_sensitivity *sens, pw_error *error);
 void pw_sensitivity_close (pw_sensitivity *sens); /* but not its unknowns */
-/* 1 if an output is in the table: it is a function of columns at one time, without extrema and integrals. */
-int pw_sensitivity_in_table (const pw_sensitivity *sens, int output);
-/* The derivative of an output with respect to an unknown from those of the functionals, slope or run_slope; or its
- * error from theirs, slope_error or run_slope_error. */
-double pw_sensitivity_derivative (const pw_sensitivity *sens, int output, int unknown, const double *slope);
+/* The derivative of an output, or of its value in a row of the table, with respect to an unknown; row -1: output. */
+const pw_derivative *pw_sensitivity_of (const pw_sensitivity *sens, int output, int unknown, int row);
 
 #endif

@@ -7,16 +7,18 @@
 #include "unknowns.h"
 
 int pw_unknown_find (pw_unknown *u, const pw_cli_model *m, const char *name, pw_error *error) {
-  *u = (pw_unknown){ .parameter = pw_cli_parameter (m->model, name), .state = -1 };
+  *u = (pw_unknown){ .parameter = pw_cli_parameter (m->model, name), .state = -1, .high = INFINITY };
   snprintf (u->name, sizeof u->name, "%s", name);
   if (u->parameter) {
     u->value = pw_model_parameter (m->model, u->parameter);
+    u->low = u->parameter->domain == PW_REAL ? -INFINITY : 0;
+    if (u->parameter->domain == PW_FRACTION) u->high = 1;
     snprintf (u->unit, sizeof u->unit, "%s", u->parameter->unit ? u->parameter->unit : "");
     return PW_OK;
   }
   if (strchr (name, '.') == NULL) /* no parameter: fails with the nearest name */
     return pw_model_set (m->model, name, 0, error);
-  u->state = pw_system_find_state (m->system, name, error);
+  u->state = pw_system_find_state (m->system, name, error), u->low = -INFINITY;
   if (u->state < 0) return error->status;
   int n = pw_system_coordinates (m->system);
   u->value = u->state < n ? pw_system_initial_q (m->system)[u->state] : pw_system_initial_v (m->system)[u->state - n];
@@ -37,8 +39,7 @@ int pw_unknowns_open (pw_unknowns *u, const pw_cli_line *line, const pw_cli_mode
   if (status == PW_OK) status = pw_cli_read_specialise (line->specialise, &u->when, error);
   if (status != PW_OK) return status;
   u->settings.stop = NULL;
-  if (u->settings.rtol == 0)
-    u->settings.rtol = PW_RTOL; /* sensitivity.c estimates errors by runs with a multiple of it */
+  if (u->settings.rtol == 0) u->settings.rtol = PW_RTOL;
   u->limit = limit.seconds;
   pw_cli_report_unused (u->method, line);
   return PW_OK;
@@ -90,10 +91,7 @@ static int unknown_add (pw_unknowns *u, const char *text, pw_error *error) {
     if (strcmp (u->list[i].name, name) == 0) return pw_fail (error, PW_INPUT, "--free %s is given twice", name);
   u->count++;
   int status = pw_unknown_find (added, u->m, name, error);
-  pw_domain domain = added->parameter ? added->parameter->domain : PW_REAL;
-  added->low = domain == PW_REAL ? -INFINITY : 0;
-  added->high = domain == PW_FRACTION ? 1 : INFINITY;
-  if (domain == PW_COUNT)
+  if (added->parameter && added->parameter->domain == PW_COUNT)
     status = pw_fail (error, PW_INPUT, "--free %s: it is a count, and only continuous parameters can be free", name);
   if (status == PW_OK && text[size]) status = unknown_read_bounds (added, text + size + 1, error);
   added->scale = added->has_bounds ? added->high - added->low : added->value != 0 ? fabs (added->value) : 1;
@@ -167,7 +165,6 @@ int pw_unknown_run_prepare (pw_unknown_run *to, const pw_unknowns *u, const doub
 
 void pw_unknown_run_close (pw_unknown_run *run) {
   pw_run_close (run->run);
-  pw_workspace_free (run->workspace);
   pw_cli_close_model (&run->m);
   *run = (pw_unknown_run){ .run = NULL };
 }
@@ -183,64 +180,27 @@ void pw_unknowns_report (const pw_unknowns *u, const double *x) {
   pw_unknown_run_close (&r);
 }
 
-/* ---- Directions ---- */
-
-/* u->step if that is not 0, else PW_UNKNOWN_STEP times the typical size of the unknown: |value|, but at least 0.1 rad
- * for angles, the unit of the scene for states, 1e-3 of the scale in searches; for a parameter that is 0 its default
- * value, or 1 if that is 0, too. */
-static double unknown_step (const pw_unknown *u, double value, const pw_run *r) {
-  if (u->step > 0) return u->step;
+void pw_unknown_measure (pw_unknown *u, double value, const pw_run *r) {
   double size = fabs (value), length = pw_run_scale (r)->length, time = pw_run_scale (r)->time;
   if (strcmp (u->unit, "rad") == 0) size = fmax (size, 0.1);
   if (u->state >= 0) size = fmax (size, (*u->unit == 'm' ? length : 1) / (strchr (u->unit, 's') ? time : 1));
   if (size == 0 && u->parameter) size = fabs (u->parameter->value);
-  return PW_UNKNOWN_STEP * fmax (size > 0 ? size : 1, 1e-3 * u->scale);
+  u->size = size > 0 ? size : 1;
 }
 
-/* Keeps the neighbours within the domain of a parameter: in the open domain > 0 by a step of at most value / 4, next to
- * a bound that belongs to the domain, 0 or 1, by neighbours on its inner side alone. */
-static void unknown_stay_inside (const pw_unknown *u, double value, pw_direction *d) {
-  pw_domain domain = u->parameter ? u->parameter->domain : PW_REAL;
-  if (domain == PW_POSITIVE) d->step = fmin (d->step, value / 4);
-  d->one_sided = (domain == PW_NONNEGATIVE || domain == PW_FRACTION) && value - 2 * d->step < 0;
-  if (domain != PW_FRACTION || value + 2 * d->step <= 1) return;
-  d->one_sided = 1;
-  d->step = -d->step;
-}
-
-static int unknown_same_size (const pw_system *a, const pw_system *b) {
-  return pw_system_elements (a) == pw_system_elements (b) && pw_system_coordinates (a) == pw_system_coordinates (b) &&
-         pw_system_rows (a) == pw_system_rows (b);
-}
-
-static int unknown_direction (pw_direction *d, const pw_unknowns *u, int i, double *x, const pw_unknown_run *run,
-                              pw_unknown_run *neighbours, pw_error *error) {
-  const double value = x[i];
-  pw_settings general = run->settings;
-  general.specialised = NULL;
-  int status = PW_OK;
-  *d = (pw_direction){ .step = unknown_step (&u->list[i], value, run->run) };
-  unknown_stay_inside (&u->list[i], value, d);
-  for (int k = 0; k < 4 && status == PW_OK; k++) {
-    pw_unknown_run *near = neighbours + k;
-    x[i] = value + pw_direction_offset (d, k);
-    status = pw_unknowns_system (&near->m, u, x, error);
-    if (status == PW_OK && !unknown_same_size (run->m.system, near->m.system))
-      status = pw_fail (error, PW_INPUT,
-                        "%s changes the number of bodies or elements: derivatives with respect to it do not exist",
-                        u->list[i].name);
-    if (status == PW_OK) d->neighbour[k] = near->run = pw_limit_open (near->m.system, u->method, &general, error);
-    if (status == PW_OK && near->run == NULL) status = error->status;
+int pw_unknowns_differentiate (const pw_unknowns *u, const double *x, pw_difference_settings d, pw_derivative *out,
+                               pw_error *error) {
+  const size_t n = (size_t)u->count;
+  double *size = malloc (3 * n * sizeof *size);
+  if (size == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  for (size_t j = 0; j < n; j++) {
+    const pw_unknown *unknown = &u->list[j];
+    size[j] = unknown->size > 0 ? unknown->size : fmax (fabs (x[j]), 1e-2 * unknown->scale);
+    size[n + j] = unknown->low, size[2 * n + j] = unknown->high;
   }
-  x[i] = value;
-  return status;
-}
-
-int pw_unknowns_directions (pw_direction *d, const pw_unknowns *u, double *x, const pw_unknown_run *run,
-                            pw_unknown_run *neighbours, pw_error *error) {
-  int status = PW_OK;
-  for (int i = 0; i < u->count && status == PW_OK; i++)
-    status = unknown_direction (d + i, u, i, x, run, neighbours + 4 * i, error);
+  d.x = x, d.parameters = u->count, d.size = size, d.low = size + n, d.high = size + 2 * n;
+  int status = pw_differentiate (&d, out, NULL, error);
+  free (size);
   return status;
 }
 

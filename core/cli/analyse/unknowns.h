@@ -12,16 +12,12 @@ typedef struct {
   int state;                     /* its number; -1 for a parameter */
   double value;                  /* in the model of the command line */
   char unit[16];
-  double step;      /* of differences; 0: PW_UNKNOWN_STEP times the typical size of the unknown */
-  double last_step; /* of the differences computed last */
-  double size;      /* the typical size, from the first step; 0: not computed yet */
-  /* for searches: */
+  double size;      /* a typical size: set by pw_unknown_measure; else 0 */
   double low, high; /* bounds, of --free or else of the parameter's domain; infinite without one */
-  double scale;     /* size of typical changes: high - low of --free, else |value|, else 1 */
-  int has_bounds;   /* 1: the bounds are those of --free, which are finite */
+  /* for searches: */
+  double scale;   /* size of typical changes: high - low of --free, else |value|, else 1 */
+  int has_bounds; /* 1: the bounds are those of --free, which are finite */
 } pw_unknown;
-
-#define PW_UNKNOWN_STEP 1e-5 /* leaves an error of about 1e-10 in extrapolated differences, mostly round-off */
 
 /* Finds the parameter or state of this name in an open model, and its value there.  PW_INPUT, with the nearest name,
  * if there is none. */
@@ -65,17 +61,20 @@ typedef struct {
   pw_settings settings;
   pw_limit limit; /* set by pw_unknown_run_prepare */
   pw_run *run;
-  pw_workspace *workspace; /* for contact points; NULL: not needed yet */
 } pw_unknown_run;
 /* Compiles the model and sets m and settings, with the engine and a limit of its own, whose clock starts; the caller
  * opens `run`.  *to must not move, since settings points to its limit.  Close it in every case. */
 int pw_unknown_run_prepare (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error);
 void pw_unknown_run_close (pw_unknown_run *run);
 
-/* Directions of the derivatives of a run with respect to all unknowns at x, which is changed and restored.  Opens
- * neighbours, 4 zero-initialised runs for each unknown, without specialised code; close all of them in every case. */
-int pw_unknowns_directions (pw_direction *d, const pw_unknowns *u, double *x, const pw_unknown_run *run,
-                            pw_unknown_run *neighbours, pw_error *error);
+/* Sets the typical size of an unknown: |value|, but at least 0.1 rad for angles and the unit of the scene for states;
+ * for a parameter that is 0 its default value, or 1 if that is 0, too. */
+void pw_unknown_measure (pw_unknown *u, double value, const pw_run *r);
+
+/* Differentiates outputs at values x of the unknowns, within their bounds; d: all but x, parameters, size, low, high.
+ * out, errors: as pw_differentiate. */
+int pw_unknowns_differentiate (const pw_unknowns *u, const double *x, pw_difference_settings d, pw_derivative *out,
+                               pw_error *error);
 
 /* Points where searches begin, `count` x unknowns: the unknowns' values; then points of Sobol's sequence, shifted
  * modulo 1 by random numbers from the seed, between the bounds of --free, else within `scale` of the values.  If count

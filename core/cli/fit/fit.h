@@ -42,10 +42,9 @@ typedef struct {
   int rank;                 /* singular values that differ from 0 */
   double chi2;              /* sum of squares of the residuals (model - data) / sigma */
   double initial_chi2;      /* where the first search begins */
-  int by_differences; /* 1: derivatives are differences of runs, since the variational equations could not be used */
   int converged, iterations;
   int interrupted; /* 1: by Ctrl-C; the estimate is the best so far, its standard errors are NaN */
-  long runs;       /* without those of the variational equations */
+  long runs;
   pw_progress progress;
 } pw_fit;
 
@@ -59,8 +58,8 @@ typedef struct {
 int pw_fit_run (const pw_fit *fit, const double *unknowns, double *out, pw_error *error);
 
 /* Derivatives of the model's values, `values` at these unknowns, with respect to each unknown: jacobian is unknowns x
- * (columns x rows).  By the variational equations; from the first run on in which these cannot be used, by central
- * differences of concurrent runs.  Sets fit->derivative_error.  A status; PW_RETRY after Ctrl-C. */
+ * (columns x rows).  By central differences of concurrent runs.  Sets fit->derivative_error.  A status; PW_RETRY after
+ * Ctrl-C. */
 int pw_fit_jacobian (pw_fit *fit, const double *unknowns, const double *values, double *jacobian, pw_error *error);
 
 /* Minimises the sum of squares from all starts and sets the results.  A status; PW_RETRY after Ctrl-C. */

@@ -175,8 +175,8 @@ void pw_fit_print (const pw_fit *fit) {
             fit->initial_chi2);
   report_correlations (fit);
   report_undetermined (fit);
-  printf ("\n%s, %s, derivatives by %s\n", PW_COUNTED (fit->runs, "run"), PW_COUNTED (fit->iterations, "iteration"),
-          fit->by_differences ? "differences of runs" : "the variational equations");
+  printf ("\n%s, %s, derivatives by differences of runs\n", PW_COUNTED (fit->runs, "run"),
+          PW_COUNTED (fit->iterations, "iteration"));
   report_ends (fit);
   if (pw_unknowns_options (&fit->unknowns, fit->estimate, options)) printf ("\n%s\n", options);
 }
@@ -259,8 +259,8 @@ void pw_fit_json (const pw_fit *fit, const char *status, FILE *f) {
   pw_json_number (j, "confidence", fit->confidence);
   pw_json_number (j, "rank", fit->rank);
   pw_json_number (j, "runs", (double)fit->runs);
+  pw_json_text (j, "derivatives", "differences");
   pw_json_number (j, "iterations", fit->iterations);
-  pw_json_text (j, "derivatives", fit->by_differences ? "differences" : "variational");
   pw_json_open (j, "unknowns", '[');
   for (int i = 0; i < fit->unknowns.count; i++) report_json_unknown (fit, j, i);
   pw_json_close (j, ']');

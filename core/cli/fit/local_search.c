@@ -54,42 +54,40 @@ static double search_scaled (const pw_unknown *unknown, double value) {
 /* Runs the model with these values of the unknowns and stores the outputs; a run with outputs that are not finite
  * fails. */
 static int search_run (const pw_optimise *problem, const double *unknown, double *output, pw_error *error) {
-  const pw_unknowns *unknowns = &problem->unknowns;
-  pw_outcomes outcomes = { .system = NULL };
-  pw_unknown_run run;
-  int status = pw_unknown_run_prepare (&run, unknowns, unknown, error);
-  if (status == PW_OK)
-    status = pw_outcomes_open (&outcomes, run.m.system, "output", problem->output, problem->outputs, error);
-  run.settings.ledger = outcomes.ledger;
-  if (status == PW_OK) status = pw_outcomes_run (&outcomes, unknowns->method, &run.settings, unknowns->t_end, error);
-  for (int i = 0; status == PW_OK && i < problem->outputs; i++) {
-    output[i] = pw_outcome_value (&outcomes, i, NULL);
+  const pw_run_outputs outputs = {
+    .unknowns = &problem->unknowns, .option = "output", .of = problem->output, .count = problem->outputs
+  };
+  int status = pw_run_outputs_at (&outputs, unknown, output, NULL, error);
+  for (int i = 0; status == PW_OK && i < problem->outputs; i++)
     if (!isfinite (output[i]))
       status = pw_fail (error, PW_METHOD, "%s is %s", problem->output[i], PW_DIGITS (output[i], 9));
-  }
-  pw_outcomes_close (&outcomes);
-  pw_unknown_run_close (&run);
   return status;
 }
 
-/* The same with derivatives. */
+/* ---- Derivatives ---- */
+
+static int search_neighbour (void *problem, const double *x, double rtol, double *value, pw_error *error) {
+  (void)rtol;
+  return search_run (problem, x, value, error);
+}
+
+/* Stores the derivatives of the last run in local->slope. */
 static int search_differentiate (local_search *local, pw_error *error) {
-  const pw_optimise *problem = local->problem;
-  const pw_unknowns *unknowns = &problem->unknowns;
-  pw_progress silent = { 0 };
-  pw_sensitivity s = { .of = problem->output, .unknowns = *unknowns, .no_error = 1 };
-  int status = pw_sensitivity_compute (&s, local->unknown, &silent, error);
-  if (status == PW_OK && s.stopped) status = pw_limit_status (&s.base.limit, pw_run_time (s.base.run), error);
-  for (int i = 0; i < problem->outputs && status == PW_OK; i++) {
-    local->output[i] = pw_outcome_value (&s.outcomes, i, NULL);
-    for (int j = 0; j < unknowns->count && status == PW_OK; j++) {
-      double *slope = local->slope + i * unknowns->count + j;
-      *slope = unknowns->list[j].scale * pw_sensitivity_derivative (&s, i, j, s.run_slope);
-      if (!isfinite (local->output[i] + *slope))
-        status = pw_fail (error, PW_METHOD, "%s has no derivative", problem->output[i]);
-    }
-  }
-  pw_sensitivity_close (&s);
+  const pw_unknowns *unknowns = &local->problem->unknowns;
+  const int n = unknowns->count, outputs = local->problem->outputs;
+  pw_derivative *derivative = malloc ((size_t)n * (size_t)outputs * sizeof *derivative);
+  const pw_difference_settings d = { .evaluate = search_neighbour,
+                                     .context = local->problem,
+                                     .outputs = outputs,
+                                     .rtol = pw_unknowns_noise (unknowns),
+                                     .neighbours = 4,
+                                     .value = local->output,
+                                     .jobs = 1 };
+  int status = derivative ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+  if (status == PW_OK) status = pw_unknowns_differentiate (unknowns, local->unknown, d, derivative, error);
+  for (int k = 0; k < n * outputs && status == PW_OK; k++)
+    local->slope[k % outputs * n + k / outputs] = unknowns->list[k / outputs].scale * derivative[k].value;
+  free (derivative);
   local->search->derivatives += status == PW_OK;
   return status;
 }
@@ -156,11 +154,12 @@ static void search_keep (local_search *local) {
 /* Makes a run, with derivatives if `slopes`.  If only the derivatives fail, the search ends. */
 static int search_try (local_search *local, int slopes, pw_error *error) {
   pw_error own = { 0 };
-  int status = slopes ? search_differentiate (local, &own) : PW_METHOD;
-  if (status == PW_OK || status == PW_RETRY || status == PW_RESOURCE) return *error = own, status;
-  status = search_run (local->problem, local->unknown, local->output, error);
-  local->repeat |= slopes && status == PW_OK;
-  return status;
+  int status = search_run (local->problem, local->unknown, local->output, error);
+  if (status != PW_OK || !slopes) return status;
+  status = search_differentiate (local, &own);
+  if (status == PW_RETRY || status == PW_RESOURCE) return *error = own, status;
+  local->repeat |= status != PW_OK;
+  return PW_OK;
 }
 
 /* Makes the run with these scaled unknowns the last one unless it already is, with derivatives if `slopes`. */

@@ -31,12 +31,6 @@ double pw_formula_value (const pw_formula *f, const double *value) {
   return pw_expression_run (f->expression->code, f->expression->codes, value, &may_jump);
 }
 
-double pw_formula_derivative (const pw_formula *f, const double *value, int by) {
-  double u[3];
-  pw_expression_derivatives (f->expression, value, by, u);
-  return u[1];
-}
-
 void pw_formula_close (pw_formula *f) {
   if (f) pw_arena_free (&f->arena);
   free (f);
