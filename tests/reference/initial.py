@@ -68,28 +68,27 @@ def nearby(m, r):
     return described(m, [x + r.uniform(-OFF, OFF) for x in m.q], [x + r.uniform(-0.3, 0.3) for x in m.v])
 
 
-def outside_range(A, b):
-    """The part of b that is not in the range of A, relative to b."""
-    size = np.linalg.norm(b)
-    return 0.0 if size < 1e-13 else np.linalg.norm(b - A @ np.linalg.lstsq(A, b, rcond=1e-9)[0]) / size
+def freedom_left(J, n, kept):
+    """The number of independent motions that the constraints allow while these coordinates do not move."""
+    if len(J) == 0:
+        return n - len(kept)
+    _, s, V = np.linalg.svd(J)
+    N = V[int(np.sum(s > 1e-7 * s[0])):]  # of motions
+    return len(N) - (np.linalg.matrix_rank(N[:, kept], tol=1e-7) if kept and len(N) else 0)
 
 
 def wrong_correction(m, row):
-    """Checks the correction from the described start of m to the start in a row of a table, by the equations of the
-    manual: None, or a text that says what is wrong.  Velocities: M dv = J^T mu.  Positions: M dq = G^T mu up to the
-    curvature of the constraints, which is of the size of dq."""
+    """Checks the start in a row of a table, of a model that specifies all values near consistent ones: None, or a text
+    that says what is wrong.  The values that are kept must determine all others."""
     positions, velocities = m.names()
     q, v = np.array([row[k] for k in positions]), np.array([row[k] for k in velocities])
     J, held, state = rows_at(m, q, v)
     residual = max([abs(state.rows[i][2]) for i in held] + [abs(r.x) for _, r, _ in state.rows] + [0.0])
     if residual > 1e-12:
         return "not consistent by %.2g" % residual
-    e = outside_range(J.T, m.mass * (v - m.v)) if len(J) else 0.0
-    if e > 1e-9:
-        return "the correction of velocities is not the smallest, by %.2g" % e
-    dq = q - m.q
-    e = outside_range(J[held].T, m.mass * dq) if held else 0.0
-    # G is that of the last iterate, not of the described start; curvatures are about 1 to 10.
-    if e > 20 * np.linalg.norm(dq):
-        return "the correction of positions is not the smallest, by %.2g of it" % e
+    for what, rows, now, described_values in ("positions", J[held], q, m.q), ("velocities", J, v, m.v):
+        kept = [i for i in range(m.n) if now[i] == described_values[i]]
+        left = freedom_left(rows, m.n, kept)
+        if left > 0:
+            return "%d more of the %s could be kept" % (left, what)
     return None
