@@ -226,7 +226,10 @@ static void *difference_thread (void *argument) {
 static int difference_add (difference *x, int parameter, int level, int neighbour) {
   if ((x->tasks & (x->tasks + 1)) == 0) { /* room is doubled */
     void *more = realloc (x->task, 2 * ((size_t)x->tasks + 1) * sizeof *x->task);
-    if (more == NULL) return x->status = pw_fail (x->error, PW_RESOURCE, "out of memory");
+    if (more == NULL) {
+      x->status = pw_fail (x->error, PW_RESOURCE, "out of memory");
+      return PW_RESOURCE;
+    }
     x->task = more;
   }
   x->task[x->tasks++] = (difference_task){ parameter, level, neighbour };
