@@ -215,7 +215,8 @@ static void initial_weights (initial_search *x, const double *metric, int import
 static void initial_stage_weights (initial_search *x, const struct initial_stage *stage) {
   initial_weights (x, x->s->metric, stage->prescribed);
   for (int j = 0; j < x->s->coords && stage->weight_of_free > 0; j++) {
-    const double length = pw_length_factor (x->s, j), free = x->importance[j] < INITIAL_SPECIFIED;
+    const double length = pw_length_factor (x->s, j);
+    const int free = x->importance[j] < INITIAL_SPECIFIED;
     if (!isinf (x->weight[j])) x->weight[j] = length * length * (free ? stage->weight_of_free : 1);
   }
 }
