@@ -124,7 +124,8 @@ static void random_loop (int n) {
 static void random_tree (int n) {
   now.bodies = n;
   for (int b = 0; b < n; b++) {
-    const int parent = random_below (b + 1) - 1, type = random_below (3);
+    const int parent = random_below (b + 1) - 1;
+    const joint_type type = (joint_type)random_below (3);
     double *q = now.q + 3 * b, x = random_between (-2, 2), y = random_between (-2, 2);
     q[0] = x + random_between (0.3, 1), q[1] = y + random_between (-1, -0.3), q[2] = random_between (-1, 1);
     random_joint *j = join (type, parent, b, x, y);
