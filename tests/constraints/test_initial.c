@@ -28,8 +28,10 @@ static int random_below (int n) {
   return (int)random_between (0, n);
 }
 
+typedef enum { PIN, SLOT, ROD, WHEEL } joint_type;
+
 typedef struct {
-  enum { PIN, SLOT, ROD, WHEEL } type;
+  joint_type type;
   int body[2]; /* -1: ground */
   double at[2][2], heading, length;
 } random_joint;
@@ -85,7 +87,7 @@ static void build (pw_model *m, const void *none __attribute__ ((unused))) {
 static const pw_plugin_table random_table = SCENE_TABLE (build);
 
 /* Joins two bodies at a point of the world. */
-static random_joint *join (int type, int one, int two, double x, double y) {
+static random_joint *join (joint_type type, int one, int two, double x, double y) {
   random_joint *j = &now.joint[now.joints++];
   *j = (random_joint){ .type = type, .body = { one, two }, .length = 1 };
   for (int i = 0; i < 2; i++) {
@@ -122,7 +124,8 @@ static void random_loop (int n) {
 static void random_tree (int n) {
   now.bodies = n;
   for (int b = 0; b < n; b++) {
-    const int parent = random_below (b + 1) - 1, type = random_below (3);
+    const int parent = random_below (b + 1) - 1;
+    const joint_type type = (joint_type)random_below (3);
     double *q = now.q + 3 * b, x = random_between (-2, 2), y = random_between (-2, 2);
     q[0] = x + random_between (0.3, 1), q[1] = y + random_between (-1, -0.3), q[2] = random_between (-1, 1);
     random_joint *j = join (type, parent, b, x, y);
@@ -174,7 +177,7 @@ static void random_specify (double positions, double velocities, double (*change
     const int b = j % (3 * now.bodies) / 3, is_rate = j >= 3 * now.bodies, k = j % 3;
     double *to = is_rate ? now.rate + 3 * b + k : now.start + 3 * b + k;
     const double value = is_rate ? now.v[3 * b + k] : now.q[3 * b + k];
-    const unsigned flag = PW_SPECIFIES_X << (3 * is_rate + k);
+    const unsigned flag = (unsigned)PW_SPECIFIES_X << (3 * is_rate + k);
     if (j < 3 * now.bodies && k == 0) now.specified[b] = PW_SPECIFIES_NOTHING;
     *to = 0;
     if (random_between (0, 1) > (is_rate ? velocities : positions)) continue;
@@ -228,7 +231,7 @@ static int attainable (const pw_run *r, const unsigned char *kept, int more) {
   for (int b = 0; b < now.bodies; b++) now.specified[b] = PW_SPECIFIES_NOTHING;
   for (int j = 0; j < 3 * now.bodies; j++) {
     const int is_kept = kept[j] || j == more;
-    if (is_kept) now.specified[j / 3] |= PW_SPECIFIES_X << j % 3;
+    if (is_kept) now.specified[j / 3] |= (unsigned)PW_SPECIFIES_X << j % 3;
     now.start[j] = is_kept ? r->q_given[j] : 0, now.rate[j] = 0;
   }
   pw_system *s = scene_system (&random_table, NULL);

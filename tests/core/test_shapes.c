@@ -170,7 +170,7 @@ TEST (cubic) {
 /* With ends at rest, two points give 3 x^2 - 2 x^3; rates at the ends are 0. */
 TEST (rest) {
   static const double t[] = { 1, 3 }, y[] = { 2, 7 };
-  pw_signal s = { PW_TABLE, .table = { t, y, 2, PW_CUBIC, PW_ENDS_REST, 0, 0 } };
+  pw_signal s = { PW_TABLE, .table = { t, y, 2, PW_CUBIC, PW_ENDS_REST, 0, 0, 0 } };
   pw_source source = shapes_source (&s);
   double u[3];
   for (double x = 0; x < 1; x += 0.1) {
@@ -204,7 +204,7 @@ SCENE (shapes_car) {
   pw_add_speed (m, &(pw_speed){ .name = "engine",
                                 .body = "car",
                                 .at = { -0.3 },
-                                .value = { PW_TABLE, .table = { t, y, 3, PW_LINEAR, 0, 0, 0 } } });
+                                .value = { PW_TABLE, .table = { t, y, 3, PW_LINEAR, 0, 0, 0, 0 } } });
   pw_add_motor (m, &(pw_motor){ .name = "tow",
                                 .body = { "trailer", "car" },
                                 .stiffness = 3,
@@ -217,7 +217,7 @@ SCENE (shapes_car) {
   pw_add_drive (m, &(pw_drive){ .name = "swing",
                                 .body = { "boom", "car" },
                                 .what = PW_DRIVE_ANGLE,
-                                .value = { PW_TABLE, .table = { t, y, 3, PW_CUBIC, PW_ENDS_REST, 0, 0 } } });
+                                .value = { PW_TABLE, .table = { t, y, 3, PW_CUBIC, PW_ENDS_REST, 0, 0, 0 } } });
 }
 
 TEST (methods) {
@@ -256,7 +256,7 @@ TEST (refused) {
 }
 
 static pw_signal shapes_points (const double *t, const double *y, int count, int interpolation) {
-  return (pw_signal){ PW_TABLE, .table = { t, y, count, interpolation, 0, 0, 0 } };
+  return (pw_signal){ PW_TABLE, .table = { t, y, count, interpolation, 0, 0, 0, 0 } };
 }
 
 TEST (faults) {
@@ -268,10 +268,10 @@ TEST (faults) {
                   FAULT "point 4 is at t = -0.3 s, after one at 0.7 s: expected increasing times");
   shapes_refused (SHAPES_FORCE, shapes_points (shapes_t, y, 4, PW_LINEAR),
                   FAULT "point 3 is (1.5, nan): expected finite numbers");
-  shapes_refused (SHAPES_FORCE, (pw_signal){ PW_TABLE, .table = { t, t, 4, PW_LINEAR, 0, 1e308, 1e308 } },
+  shapes_refused (SHAPES_FORCE, (pw_signal){ PW_TABLE, .table = { t, t, 4, PW_LINEAR, 0, 1e308, 1e308, 0 } },
                   FAULT "point 2: offset + scale * 1 is not finite");
   static const double adjacent[] = { 0, 1e-200 };
-  shapes_refused (SHAPES_FORCE, (pw_signal){ PW_TABLE, .table = { adjacent, t, 2, PW_CUBIC, PW_ENDS_REST, 0, 0 } },
+  shapes_refused (SHAPES_FORCE, (pw_signal){ PW_TABLE, .table = { adjacent, t, 2, PW_CUBIC, PW_ENDS_REST, 0, 0, 0 } },
                   "model ezyroller: element X: the derivatives of the table are not finite at t = 0 s");
   shapes_refused (SHAPES_FORCE, shapes_points (t, t, 1, PW_LINEAR),
                   FAULT "a linear table needs at least 2 points, found 1");

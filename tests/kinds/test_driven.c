@@ -42,10 +42,10 @@ static pw_signal driven_torque (int i) {
   const pw_signal torque[] = {
     { PW_RAMP, .ramp = { 0, 0.2, 1 / 3., 1.77 } },
     { PW_PULSE, .pulse = { 0.2, 1 / 3., 0.41, 1.13, -0.1 } },
-    { PW_TABLE, .table = { little_t, little_y, 4, PW_LINEAR, 0, 0, 0 } },
+    { PW_TABLE, .table = { little_t, little_y, 4, PW_LINEAR, 0, 0, 0, 0 } },
     { PW_SMOOTH_STEP, .ramp = { 0, 0.2, 1 / 3., 1.77 } },
-    { PW_TABLE, .table = { little_t, little_y, 4, PW_CUBIC, PW_ENDS_FREE, 0, 0 } },
-    { PW_TABLE, .table = { driven_wave_t, driven_wave_y, DRIVEN_POINTS, PW_CUBIC, PW_ENDS_REST, 0, 0 } },
+    { PW_TABLE, .table = { little_t, little_y, 4, PW_CUBIC, PW_ENDS_FREE, 0, 0, 0 } },
+    { PW_TABLE, .table = { driven_wave_t, driven_wave_y, DRIVEN_POINTS, PW_CUBIC, PW_ENDS_REST, 0, 0, 0 } },
   };
   return torque[i];
 }
@@ -116,7 +116,7 @@ TEST (short_pulse) {
 /* The model copies the points of a table. */
 TEST (copies) {
   double t[] = { 0, 1, 2, 3 }, y[] = { 0, 0.1, 0.2, 0.1 }, q[2][6], v[6];
-  pw_signal torque = { PW_TABLE, .table = { t, y, 4, PW_CUBIC, 0, 0, 0 } };
+  pw_signal torque = { PW_TABLE, .table = { t, y, 4, PW_CUBIC, 0, 0, 0, 0 } };
   pw_error error = { 0 };
   driven_run (&torque, "rk4", &(pw_settings){ .step = 0.01 }, q[0], NULL);
   pw_model *m = scene_model (&scene_ezyroller, NULL);

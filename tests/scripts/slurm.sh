@@ -15,6 +15,10 @@ host=$(hostname -s) top=$work
 stop () {
   for pid in "$top"/*.pid; do [ ! -f "$pid" ] || kill "$(cat "$pid")" 2>/dev/null; done
   pkill -KILL -f "$top/" 2>/dev/null
+  for pid in "$top"/*.pid; do # the daemons write files until they end, and then remove these
+    tries=0
+    while [ -f "$pid" ] && kill -0 "$(cat "$pid")" 2>/dev/null && [ $((tries += 1)) -le 100 ]; do sleep 0.1; done
+  done
   rm -rf "$top"
 }
 trap stop EXIT
