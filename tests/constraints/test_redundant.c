@@ -418,7 +418,8 @@ SCENE_WITH (links_build, links_list, double) {
   pw_add_gravity (m, &(pw_gravity){ .name = "gravity", .acceleration = { 0, -9.81 } });
 }
 
-/* A chain with a pin in three parts: in a large scene the other equations are found to be independent by their pattern. */
+/* A chain with a pin in three parts: in a large scene the other equations are found to be independent by their pattern.
+ * */
 TEST (chain) {
   pw_system *s = scene_system (&links_build_table, "pins", 3., NULL),
             *twin = scene_system (&links_build_table, "pins", 1., NULL);

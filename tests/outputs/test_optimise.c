@@ -177,8 +177,8 @@ TEST (failing_first) {
                                          "--minimise '(p.x + 1.5)^2 + p.y^2 + 0*sqrt(0.3 - p.x)' --free b=-1:1",
                                          "--minimise '(p.x + 1.5)^2 + 0*sqrt(0.3 - p.x)' --subject-to 'p.x<=1'",
                                          "--minimise 'p.x^2 + 0*sqrt(0.3 - p.x)' --subject-to 'p.x<=-1.5'",
-                                         "--minimise 'p.x^2 + 0*sqrt(0.3 - p.x)' --subject-to 'p.x>=-9' "
-                                         "--subject-to 'p.x<=-1.5'" };
+                                         ("--minimise 'p.x^2 + 0*sqrt(0.3 - p.x)' --subject-to 'p.x>=-9' "
+                                          "--subject-to 'p.x<=-1.5'") };
   for (size_t i = 0; i < sizeof options / sizeof *options; i++)
     for (int k = 0; k < 2; k++) {
       cli_shell (check_text ("pinwheel optimise @/point.yaml %s --free a=-2:2 --set a=%s --starts 1 --json @/o.json",
