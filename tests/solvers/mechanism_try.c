@@ -2,6 +2,7 @@
  * satisfied, and the motion depends neither on the frame, nor on the order of the description, nor on the method. */
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include "check.h"
 #include "mechanism.h"
@@ -157,15 +158,26 @@ static int try_prescribed (const mechanism *m) {
 }
 
 /* Makes the initial state of the mechanism consistent: which of several contradictory values are kept depends on their
- * order and on zeros, which views change.  0 if there is no such state. */
+ * order and on zeros, which views change.  Velocities change as little as possible, as by the impulse of a restart.  0 if
+ * there is no such state. */
 static int try_consistent (const pw_system *s, mechanism *m) {
+  const size_t n = (size_t)pw_system_coordinates (s);
   pw_run *r = pw_run_open (s, "rk4", NULL, NULL);
-  for (int b = 0; r && b < m->bodies; b++) {
+  double *q = calloc (2 * n + 1, sizeof *q), *v = q + n;
+  assert_non_null (q);
+  if (r) {
+    memcpy (q, pw_run_initial (r)->q, n * sizeof *q);
+    memcpy (v, pw_run_initial (r)->v, n * sizeof *v);
+    for (int b = 0; b < m->bodies; b++) memcpy (v + 3 * b, m->body[b].rate, sizeof m->body[b].rate);
+  }
+  const int good = r && pw_run_restart (r, q, v, NULL) == PW_OK;
+  for (int b = 0; good && b < m->bodies; b++) {
     memcpy (m->body[b].start, pw_run_initial (r)->q + 3 * b, sizeof m->body[b].start);
     memcpy (m->body[b].rate, pw_run_initial (r)->v + 3 * b, sizeof m->body[b].rate);
   }
   pw_run_close (r);
-  return r != NULL;
+  free (q);
+  return good;
 }
 
 static void try_seed (try_count *n) {
