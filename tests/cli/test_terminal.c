@@ -12,7 +12,7 @@
 #include "check.h"
 #include "cli.h"
 
-enum { TERMINAL_COLUMNS = 60 };
+enum { TERMINAL_COLUMNS = 70 }; /* the longest title, time and remaining time fit */
 
 /* Starts a command whose standard output or error is the far end of a new terminal; returns the near end.  NULL instead
  * of `option`: no option. */
