@@ -193,7 +193,13 @@ class Case:
             for part, values in zip(names, (m.q, m.v)):
                 if name in part:
                     values[part.index(name)] = float(value)
-        rows, _ = run(self.program, self.path, "erk5+projection", 1e-3, 1e-3, [], self.options)
+        try:
+            rows, _ = run(self.program, self.path, "erk5+projection", 1e-3, 1e-3, [], self.options)
+        except Refused as e:
+            if "removed entirely" not in str(e) or not importance or not initial.locked(self.m, m.v, importance):
+                raise
+            self.table = None
+            return
         q, v = (np.array([rows[0][k] for k in part]) for part in names)
         want = self.m.named(self.m.q, self.m.v)
         lost = ["%s by %.2g" % (k, rows[0][k] - want[k]) for k in kept if rows[0][k] != want[k]]

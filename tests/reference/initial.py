@@ -7,6 +7,7 @@ from mechanisms import SPAN
 from simulator import Failure, Mechanism, State
 
 OFF = 0.02  # largest error of a described position [m, rad]
+WELL = 1e-2  # least singular value, relative, of the equations for values that are determined well
 CHANGE = 0.05  # what a position that is kept may change others, at least [units of L and rad]
 
 
@@ -84,7 +85,8 @@ def nearby(m, r):
     for names, values, left_out in zip(m.names(), (q, v), (0.05, 0.2)):
         for name, x in zip(names, values):
             given = r.random() < 0.2
-            importance[name] = 0 if not given and r.random() < left_out else 1 + (x != 0) + 2 * given
+            left_out_here = r.random() < left_out or x == 0 and name.endswith(".spin_rate")  # 0: from rolling
+            importance[name] = 0 if not given and left_out_here else 1 + (x != 0) + 2 * given
             options += ["--start", "%s=%r" % (name, x)] if given else []
     return without(m, described(m, q, v), {k for k, i in importance.items() if i == 0}), options, importance
 
@@ -97,7 +99,8 @@ def inconsistent(m, q, v):
 
 
 def with_values(m, level, q, v, held, values):
-    """The positions (level 0) or velocities (1) next to q or v with those `held` at their values, or None."""
+    """The positions (level 0) or velocities (1) next to q or v with those `held` at their values, or None: there are none,
+    or others would not be determined well."""
     state = [np.array(q), np.array(v)]
     state[level][held] = values[held]
     others = [j for j in range(m.n) if j not in held]
@@ -108,7 +111,7 @@ def with_values(m, level, q, v, held, values):
         if len(b) == 0 or max(abs(b)) < 1e-12:
             return state[level]
         if others:
-            state[level][others] -= np.linalg.lstsq(A[:, others], b, rcond=1e-6)[0]
+            state[level][others] -= np.linalg.lstsq(A[:, others], b, rcond=WELL)[0]
     return None
 
 
@@ -137,6 +140,15 @@ def not_kept(m, row, importance):
                 return "%s is not kept, though it could be together with %s; it changes others by %.2g" % (
                     names[j], ", ".join(names[k] for k in kept), max(abs(other - values)[order] / unit[order]))
     return None
+
+
+def locked(m, v, importance):
+    """Whether the constraints allow none of the most important velocities that are not 0 to move, at the start of m."""
+    J, names = rows_at(m, m.q, m.v)[0], m.names()[1]
+    N = np.linalg.svd(J)[2][np.linalg.matrix_rank(J, 1e-9):] if len(J) else np.eye(m.n)
+    moving = [j for j in range(m.n) if v[j] != 0 and importance[names[j]]]
+    first = max([importance[names[j]] for j in moving], default=0)
+    return all(np.linalg.norm(N[:, j]) < 1e-9 for j in moving if importance[names[j]] == first)
 
 
 def wrong_start(m, row, importance):
