@@ -904,6 +904,7 @@ int pw_run_make_consistent (pw_run *r, const unsigned char *origin, pw_error *er
                                     .time = r->w->scale.time };
   for (int j = 0; j < 2 * s->coords && origin && status == PW_OK; j++)
     r->initial.released |= origin[j] & PW_GIVEN && pw_initial_moved (s, &r->initial, j);
-  if (status == PW_OK && origin) status = initial_locked (r, origin, error); /* wheels may absorb the impulse of a restart */
+  if (status == PW_OK && origin)
+    status = initial_locked (r, origin, error); /* wheels may absorb the impulse of a restart */
   return status == PW_METHOD ? pw_fail_signal (r->t, error) : status;
 }
