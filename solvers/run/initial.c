@@ -875,18 +875,20 @@ int pw_initial_given (const pw_initial_report *report, int state) {
 }
 
 /* Fails if less than 1e-10 of the given velocities is left, in the norm of the metric, and nonholonomic equations are
- * among those that they violate. */
-static int initial_locked (pw_run *r, pw_error *error) {
+ * among those that they violate.  Velocities given as 0 alone ask for rest. */
+static int initial_locked (pw_run *r, const unsigned char *origin, pw_error *error) {
   const pw_system *s = r->s;
   double given = 0, left = 0, speed = 0, *Jv = r->scratch, *eta = Jv + s->rows;
   char element[PW_NAME_BYTES], previous[PW_NAME_BYTES] = "", elements[300] = "";
   const char *advice = "";
+  int rest = 0, motion = 0;
   for (int j = 0; j < s->coords; j++) {
+    if (origin[s->coords + j] & PW_GIVEN) *(r->v_given[j] == 0 ? &rest : &motion) = 1;
     given += s->metric[j] * r->v_given[j] * r->v_given[j];
     left += s->metric[j] * r->v[j] * r->v[j];
     speed = fmax (speed, fabs (r->v_given[j]) * pw_length_factor (s, j));
   }
-  if (s->rows == s->holonomic || given == 0 || left > 1e-20 * given) return PW_OK;
+  if (s->rows == s->holonomic || given == 0 || left > 1e-20 * given || rest > motion) return PW_OK;
   pw_mul_J (r->w, r->v_given, Jv);
   pw_evaluate_eta (r->w, eta);
   for (int i = s->holonomic; i < s->rows && strlen (elements) < 150; i++) {
@@ -928,6 +930,7 @@ int pw_run_make_consistent (pw_run *r, const unsigned char *origin, pw_error *er
                                     .time = r->w->scale.time };
   for (int j = 0; j < 2 * s->coords && origin && status == PW_OK; j++)
     r->initial.released |= origin[j] & PW_GIVEN && pw_initial_moved (s, &r->initial, j);
-  if (status == PW_OK && origin) status = initial_locked (r, error); /* wheels may absorb the impulse of a restart */
+  if (status == PW_OK && origin)
+    status = initial_locked (r, origin, error); /* wheels may absorb the impulse of a restart */
   return status == PW_METHOD ? pw_fail_signal (r->t, error) : status;
 }

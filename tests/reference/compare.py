@@ -161,39 +161,56 @@ def accepted(integrator, group, history, least, refine):
 
 
 class Case:
-    """A mechanism with one of four kinds of starts in turn: consistent, independent coordinates and velocities given,
-    near a consistent one, independent velocities given.
+    """A mechanism with one of five kinds of starts in turn: consistent, independent values given, near a consistent one,
+    independent velocities specified, independent positions and velocities specified.
 
-    path: its model; options: of the program; table: that of the reference."""
+    path: its model; options: of the program; table: that of the reference, or None if it cannot follow the motion."""
 
     def __init__(self, seed, folder, program, hard):
         self.m, self.table = random_mechanism(seed, hard)
         self.program, self.options = program, []
         self.path = os.path.join(folder, "m%d.yaml" % seed)
         model, r = self.m.model, random.Random(seed)
-        self.kind = "consistent" if hard else ("consistent", "free", "nearby", "specified")[seed % 4]
+        self.kind = "consistent" if hard else ("consistent", "free", "nearby", "specified", "few specified")[seed % 5]
+        kept, importance = [], None
         if self.kind == "free":
-            model, self.options = initial.by_free(self.m, r)
-        if self.kind == "specified":
-            model = initial.specified(self.m)
+            model, self.options, kept = initial.by_free(self.m, r)
+        if "specified" in self.kind:
+            model, kept = initial.specified(self.m, positions=self.kind == "few specified")
         if self.kind == "nearby":
-            model = initial.nearby(self.m, r)
+            model, self.options, importance = initial.nearby(self.m, r)
         with open(self.path, "w") as f:
             json.dump(model, f)
         if self.kind != "consistent":
-            self.start(Mechanism(model))
+            self.start(model, kept, importance)
 
-    def start(self, m):
+    def start(self, model, kept, importance):
         """Checks the start that Pinwheel makes consistent; if others are possible, the reference starts from it,
         too."""
-        rows, _ = run(self.program, self.path, "erk5+projection", 1e-3, 1e-3, [], self.options)
-        names = self.m.names()
+        m, names = Mechanism(model), self.m.names()
+        for x in self.options[1::2]:
+            name, value = x.split("=")
+            for part, values in zip(names, (m.q, m.v)):
+                if name in part:
+                    values[part.index(name)] = float(value)
+        try:
+            rows, _ = run(self.program, self.path, "erk5+projection", 1e-3, 1e-3, [], self.options)
+        except Refused as e:
+            if "removed entirely" not in str(e) or not importance or not initial.locked(self.m, m.v, importance):
+                raise
+            self.table = None
+            return
         q, v = (np.array([rows[0][k] for k in part]) for part in names)
-        if self.kind == "nearby":
-            wrong = initial.wrong_correction(m, rows[0])
-            if wrong:
-                raise Failure(wrong)
-            self.m, self.table = m, m.run(q, v, [SPAN / 2, SPAN])
+        want = self.m.named(self.m.q, self.m.v)
+        lost = ["%s by %.2g" % (k, rows[0][k] - want[k]) for k in kept if rows[0][k] != want[k]]
+        wrong = initial.wrong_start(m, rows[0], importance) if importance else initial.inconsistent(m, q, v)
+        if lost or wrong:
+            raise Failure("not kept: " + ", ".join(lost) if lost else wrong)
+        if self.kind in ("nearby", "few specified"):
+            try:
+                self.m, self.table = m, m.run(q, v, [SPAN / 2, SPAN])
+            except Failure:
+                self.table = None
         elif max(abs(np.concatenate([q - self.m.q, v - self.m.v]))) > FLOOR:
             raise Failure("the given values do not lead to the only consistent state")
 
@@ -242,6 +259,9 @@ class Campaign:
             self.mismatch("seed %d: the start: %s" % (seed, e))
             return
         self.seen.update(features(case.m) | {"start " + case.kind})
+        if case.table is None:
+            self.counts["start alone"] += 1
+            return
         if all([self.by_method(case, seed, method) for method in self.methods]) and a.keep:
             os.remove(case.path)
 
@@ -271,8 +291,8 @@ class Campaign:
             print("largest error of %s by %s: %.3g times the tolerance" % (group, integrator, x))
         for (integrator, reason), k in self.reasons.most_common():
             print("failed: %4d %s: %s" % (k, integrator, reason))
-        print("%d mechanisms x %d methods: %d compared, %d failed with a reason, %d mismatches" % (
-            self.args.count, len(self.methods), n["compared"], n["failed"], n["mismatches"]))
+        print("%d mechanisms x %d methods: %d compared, %d failed with a reason, %d mismatches; %d starts alone" % (
+            self.args.count, len(self.methods), n["compared"], n["failed"], n["mismatches"], n["start alone"]))
         return 1 if n["mismatches"] or n["failed"] > FAILURES * (n["compared"] + n["failed"]) else 0
 
 
