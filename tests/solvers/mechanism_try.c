@@ -158,8 +158,8 @@ static int try_prescribed (const mechanism *m) {
 }
 
 /* Makes the initial state of the mechanism consistent: which of several contradictory values are kept depends on their
- * order and on zeros, which views change.  Velocities change as little as possible, as by the impulse of a restart.  0 if
- * there is no such state. */
+ * order and on zeros, which views change.  Velocities change as little as possible, as by the impulse of a restart.  0
+ * if there is no such state. */
 static int try_consistent (const pw_system *s, mechanism *m) {
   const size_t n = (size_t)pw_system_coordinates (s);
   pw_run *r = pw_run_open (s, "rk4", NULL, NULL);
