@@ -83,7 +83,8 @@ static const double INITIAL_ROUNDED = 1e-2;
 /* The most attempts to keep values.  In scenes of more coordinates than this, attempts and searches are fewer in
  * inverse proportion to them, so that the costs do not grow faster than those of one search. */
 enum { INITIAL_ATTEMPTS = 200, INITIAL_SMALL = 100 };
-/* Below this share of them, many values are prescribed in one step. */
+/* Below this share of them, values are prescribed in one step, and the residual may grow by this factor in an
+ * iteration. */
 static const double INITIAL_SMALL_SHARE = 0.1, INITIAL_GROWTH = 100;
 
 typedef enum { INITIAL_POSITIONS, INITIAL_VELOCITIES } initial_level;
