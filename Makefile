@@ -66,7 +66,7 @@ LIB       := $(BUILD)/libpinwheel.so
 FILES_LIB := $(BUILD)/libpinwheel-files.so
 LIB_OBJ   := $(call obj,$(CORE) $(SOLVERS))
 # Utilities that the libraries do not export: the program and each library contain them.
-BASE_OBJ  := $(call obj,$(addprefix core/base/,characters.c nearest.c store.c stream.c))
+BASE_OBJ  := $(call obj,$(addprefix core/base/,text.c store.c))
 FILES_OBJ := $(call obj,$(FILES))
 CLI_OBJ   := $(call obj,$(CLI))
 # Interactive pages need the sources of plug-ins, next to them.
@@ -148,15 +148,15 @@ $(BUILD)/obj/solvers/%.o:    INCLUDE := $(call layer,$(CORE_LAYERS) $(SOLVER_LAY
 $(BUILD)/obj/core/files/%.o: INCLUDE := $(call layer,core core/base $(FILE_LAYERS)) $(SYSTEM)
 $(BUILD)/obj/core/files/expression/%.o: INCLUDE := $(call layer,core core/base core/files core/files/expression)
 $(BUILD)/obj/core/cli/%.o:   INCLUDE := $(call layer,core core/base core/files solvers $(CLI_LAYERS))
-$(call obj,core/cli/plot/animate.c core/cli/plot/figure.c core/cli/inspect/new.c): INCLUDE += $(addprefix -iquote $(BUILD)/obj/core/cli/,plot inspect)
-$(call obj,core/cli/inspect/new.c): $(BUILD)/obj/core/cli/inspect/new.inc
+$(call obj,core/cli/plot/animate.c core/cli/plot/figure.c core/cli/inspect/list.c): INCLUDE += $(addprefix -iquote $(BUILD)/obj/core/cli/,plot inspect)
+$(call obj,core/cli/inspect/list.c): $(BUILD)/obj/core/cli/inspect/new.inc
 $(call obj,core/cli/page/page.c): $(BUILD)/obj/core/cli/page/page.inc
 $(call obj,core/cli/page/page.c): INCLUDE += -iquote $(BUILD)/obj/core/cli/page
 $(call obj,core/cli/plot/animate.c): $(BUILD)/obj/core/cli/plot/animate.inc
 $(call obj,core/cli/plot/figure.c): $(BUILD)/obj/core/cli/plot/templates.inc
 $(call obj,core/specialise/specialise.c): $(BUILD)/obj/core/specialise/source_texts.inc
 $(call obj,core/specialise/specialise.c): INCLUDE += -iquote $(BUILD)/obj/core/specialise
-$(call obj,core/cli/parallel.c core/cli/sweep/sweep_rows.c $(wildcard core/cli/fit/*.c)) $(BUILD)/pinwheel: private THREADS = -pthread
+$(call obj,core/cli/parallel.c core/cli/sweep/sweep.c $(wildcard core/cli/fit/*.c)) $(BUILD)/pinwheel: private THREADS = -pthread
 ALL_LAYERS := $(CORE_LAYERS) $(FILE_LAYERS) $(SOLVER_LAYERS)
 # Functions of tests that replace those of other libraries must be visible to these.
 $(BUILD)/obj/tests/%.o:      STRICT += -fvisibility=default
@@ -206,7 +206,7 @@ WASM_FLAGS := --target=wasm32-wasi -std=c11 -O2 -ffp-contract=off -ffunction-sec
   $(call layer,$(CORE_LAYERS) core/kinds $(SOLVER_LAYERS) $(FILE_LAYERS) core/cli core/cli/plot $(BUILD)/obj/core/cli/plot) $(SYSTEM)
 WASM       := $(filter-out solvers/jacobian/sparse.c solvers/analysis/% solvers/linear/% solvers/run/timing.c solvers/implicit/% solvers/sundials/% core/specialise/specialise_%,$(CORE) $(SOLVERS)) \
   $(filter-out core/files/yaml/yaml_tree.c,$(wildcard core/files/expression/*.c core/files/yaml/*.c)) \
-  $(addprefix core/files/,number.c path.c write/json.c load/columns.c load/units.c load/read.c) $(addprefix core/cli/plot/,plot_samples.c plot_shapes.c plot_symbols.c plot_figures.c animate.c) \
+  $(addprefix core/files/,number.c read.c write/json.c load/columns.c) $(addprefix core/cli/plot/,plot_samples.c plot_shapes.c animate.c) \
   $(wildcard core/cli/page/engine/*.c)
 WASM_OBJ   := $(WASM:%.c=$(BUILD)/wasm/%.o)
 
@@ -325,8 +325,8 @@ $(BUILD)/tests/test_alloc: WRAP := $(addprefix -Wl$(comma)--wrap=,$(ALLOC_WRAP))
 $(BUILD)/tests/test_cli_faults: WRAP = -pthread $(addprefix -Wl$(comma)--wrap=,$(ALLOC_WRAP) $(FILES_WRAP))
 $(BUILD)/tests/test_memory $(BUILD)/tests/slow_memory: WRAP = -pthread $(addprefix -Wl$(comma)--wrap=,$(ALLOC_WRAP))
 $(BUILD)/tests/test_cli_faults $(BUILD)/tests/test_memory $(BUILD)/tests/slow_memory: $(filter-out %/main.o,$(CLI_OBJ))
-$(BUILD)/tests/test_cli_limits: $(call obj,$(addprefix core/cli/,progress.c parallel.c command.c say.c stop.c))
-$(BUILD)/tests/test_outcome $(BUILD)/tests/slow_derivatives: $(call obj,core/cli/analyse/outcome.c core/cli/analyse/functional.c core/cli/stop.c core/cli/progress.c)
+$(BUILD)/tests/test_cli_limits: $(call obj,$(addprefix core/cli/,terminal.c parallel.c command.c))
+$(BUILD)/tests/test_outcome $(BUILD)/tests/slow_derivatives: $(call obj,core/cli/analyse/outcome.c core/cli/terminal.c)
 # It wraps every call of other libraries that it lists.
 $(BUILD)/tests/test_faults: WRAP = $(shell sed -n 's/^FAULT_[A-Z]* .[^,]*, \([A-Za-z_]*\),.*/-Wl,--wrap=\1/p' tests/faults/test_faults.c)
 # A part of SUNDIALS that is used for comparison only.

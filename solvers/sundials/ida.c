@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <idas/idas.h>
-#include "dae.h"
+#include "tangent.h"
 #include "dense_output.h"
 #include "rank.h"
 #include "sundials.h"

@@ -4,7 +4,7 @@
 
 #include "motion.h"
 #include "plot.h"
-#include "text.h"
+#include "cli.h"
 
 typedef struct {
   /* as given, or NULL; without --checkpoint, `path` is that of --resume */

@@ -6,8 +6,8 @@
 
 #include <pthread.h>
 #include "figure.h"
-#include "parallel.h"
-#include "text.h"
+#include "cli.h"
+#include "cli.h"
 
 enum {
   STUDY_NAME = 200,     /* longest name of a method with its options, end included */
