@@ -16,7 +16,7 @@
 
 struct pw_run;
 
-/* The thresholds, of which a run has a copy; definitions, values and derivations are in thresholds.c. */
+/* The thresholds, of which a run has a copy; definitions, values and derivations are in watchdog.c. */
 typedef struct {
   double lost, lost_unstabilised, redundant_residual, redundant_ratio;
   double rank_lost, rank_suspect, rank_refused, independent, reselect_ratio, reselect_below;
@@ -71,14 +71,14 @@ int pw_watchdog_check_values (const struct pw_run *r, pw_error *error);
 int pw_watchdog_near (struct pw_run *r);
 
 /* Checks that the motion has come from watchdog.previous_q to the state reached without leaving its branch; sine: that
- * at the state reached (change_point.c).  PW_METHOD; PW_RESOURCE. */
+ * at the state reached (watchdog.c).  PW_METHOD; PW_RESOURCE. */
 int pw_change_point_check (struct pw_run *r, double sine, pw_error *error);
 
 /* Checks that a step of fixed size resolves a change point that the motion has passed at a small distance; last_sine:
  * that one state earlier, NaN if it was not computed.  Adaptive methods have error control instead. */
 int pw_change_point_resolve (struct pw_run *r, double last_sine, pw_error *error);
 
-/* PW_METHOD if the last step has passed a dead point, from which prescribed motions cannot go on (dead_point.c). */
+/* PW_METHOD if the last step has passed a dead point, from which prescribed motions cannot go on (watchdog.c). */
 int pw_dead_point_passed (struct pw_run *r, pw_error *error);
 
 /* After a step that has failed with PW_METHOD: if a dead point follows the state last checked, `error` says so.
@@ -108,7 +108,7 @@ struct pw_run {
   int redundant_drive;         /* 1: one of them has an eta, so that work depends on its multiplier */
   int *redundant_row;          /* redundant: their indices */
   unsigned char *active_array; /* rows: what `active` points to */
-  double *coefficient;         /* 5 x rows: a redundant row as a combination of active rows; scratch of redundancy.c */
+  double *coefficient;         /* 5 x rows: a redundant row as a combination of active rows; scratch of independent.c */
   double *row_force;           /* coords + 3: right-hand side for the coefficients of a redundant row; 0 between uses */
   double *least_norm;          /* rows: least-norm multipliers for the ledger */
   double independence;         /* of the active rows at the state reached (rank.h) */
@@ -144,16 +144,16 @@ struct pw_run {
   int stopped;     /* 1: settings.stop has requested a stop */
   int interrupted; /* 1: the method must be restarted: at a breakpoint, after a failed restart or an interrupted step */
   struct {
-    double time, speed; /* time since the start [s]; the largest speed then, in units of the scene (limits.c) */
+    double time, speed; /* time since the start [s]; the largest speed then, in units of the scene (run.c) */
   } speed_record, earlier_record; /* the last record; the one before, at half its time or less */
 
   double energy0, potential0; /* initial energy and potential energy [J]; energy0 includes changes by pw_run_restart */
-  double exchanged;           /* the largest kinetic energy or change of potential energy so far [J] (ledger.c) */
+  double exchanged;           /* the largest kinetic energy or change of potential energy so far [J] (run.c) */
   double power;               /* the largest sum of the absolute values of the ledger's rates so far [W] */
   double
       *integrand_size; /* integrals: the largest absolute value of each integrand so far, and at a state about L away */
   double *integrand_state; /* 2 coords: the state at which integrands are evaluated */
-  double scene_energy;     /* kinetic energy [J] of moving by L and 1 rad in the span; if massless: see ledger.c */
+  double scene_energy;     /* kinetic energy [J] of moving by L and 1 rad in the span; if massless: see run.c */
   double *scratch;         /* 2 (coords + 3) + 3 rows, for projections and evaluations */
   double *tolerance_bound; /* 2 coords, from pw_kind.saturation; INFINITY: unbounded */
   double *matrix_state, *matrix_range; /* 2 coords: state at which the Newton matrix was evaluated, range around it
@@ -181,7 +181,7 @@ static inline double pw_atol (const pw_run *r, int state) {
   return state < n ? atol : atol / r->w->scale.time;
 }
 /* Updates r->tolerance_bound, the bounds of tolerances due to saturating forces, and r->matrix_outdated at the state
- * reached, whose kinematics must be up to date (tolerances.c). */
+ * reached, whose kinematics must be up to date (run.c). */
 void pw_bound_tolerances (pw_run *r);
 /* Change of a state (numbered as in pw_system_find_state) from the state reached over which a saturating force changes
  * by its own magnitude. */
@@ -348,7 +348,7 @@ double pw_run_acceleration_norm (const pw_run *r);
  * each other, if the motion has jumped to another branch, or does not resolve a change point; PW_RESOURCE. */
 int pw_run_watchdog (pw_run *r, pw_error *error);
 
-/* ---- Limits (limits.c) ---- */
+/* ---- Limits (run.c) ---- */
 
 /* 1 if the caller requests a stop, or has done so since r->stopped, which this sets, was last cleared. */
 static inline int pw_run_stop_requested (pw_run *r) {
@@ -376,7 +376,7 @@ enum { PW_CHECK_INTERVAL = 16 };
 /* After each step: records speeds; PW_METHOD if coordinates are too large for double precision to resolve the scene. */
 int pw_run_check_resolution (pw_run *r, pw_error *error);
 
-/* ---- Energy (ledger.c) ---- */
+/* ---- Energy (run.c) ---- */
 
 /* Kinetic and potential energy [J] at the velocities v; kinematics must be up to date. */
 static inline double pw_energy (const pw_run *r, const double *v) {
@@ -423,7 +423,7 @@ int pw_run_accelerate_evaluated (pw_run *r, const double *v, double *a, double *
 void pw_sample_reached (pw_run *r);
 
 /* Reports why the J last evaluated is unusable at time t: rank lost or nearly lost, or values too extreme
- * (singular.c).  PW_METHOD. */
+ * (rank.c).  PW_METHOD. */
 int pw_fail_singular (pw_run *r, double t, pw_error *error);
 
 /* Completes r->residuals at the state just evaluated, some of which a projection may have computed, and updates the
@@ -481,7 +481,7 @@ int pw_project_state (pw_projector *p, pw_run *r, double t, double *q, double *v
  * removes, in the metric of `saddle` (all rows), which must be factorised at the current configuration. */
 void pw_project_error (pw_run *r, pw_saddle *saddle, double *e, int rows);
 
-/* ---- Specialised code (specialised.c) ---- */
+/* ---- Specialised code (dynamics.c) ---- */
 
 /* Opens the settings' specialised code, if any; the scales, alpha and beta must be known.  Errors: PW_INPUT,
  * PW_RESOURCE. */

@@ -49,7 +49,7 @@ void pw_progress_end (pw_progress *p);
 /* Exit statuses after SIGINT or SIGTERM, and after SIGPIPE: 128 + SIGINT and 128 + SIGPIPE, as shells report them. */
 enum { PW_INTERRUPTED = 130, PW_CLOSED_PIPE = 141 };
 
-/* ---- Requests to stop; commands check them between steps or more often (stop.c) ---- */
+/* ---- Requests to stop; commands check them between steps or more often (terminal.c) ---- */
 
 /* 1: all runs stop.  Set by SIGINT and SIGTERM, and by the threads of a command after an error that ends it. */
 extern atomic_int pw_stop;

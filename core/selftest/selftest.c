@@ -546,7 +546,7 @@ int pw_selftest_scene (const pw_system *s, double T, const pw_kind *kind, double
   return status;
 }
 
-/* The probe of the self-tests: see probe.h. */
+/* The probe of the self-tests: see selftest.h. */
 
 static const struct {
   const char *name, *about; /* as in pw_selftest_check */

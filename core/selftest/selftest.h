@@ -1,4 +1,4 @@
-/* Random numbers, and random scenes of elements of one type, for the self-test and sparsity.c. */
+/* Random numbers, and random scenes of elements of one type, for the self-test and specialise.c. */
 #ifndef PW_SELFTEST_H_
 #define PW_SELFTEST_H_
 #include <stdint.h>

@@ -1,4 +1,4 @@
-/* Signals: values, first two time derivatives and breakpoints of each form; tables are in table.c. */
+/* Signals: values, first two time derivatives and breakpoints of each form; tables are in signal.c. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

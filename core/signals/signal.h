@@ -30,7 +30,7 @@ static inline int pw_signal_value_may_jump (const pw_signal *s) {
   return s->type == PW_PULSE || s->type == PW_FUNCTION;
 }
 
-/* ---- Tables (table.c) ---- */
+/* ---- Tables (signal.c) ---- */
 
 /* The signal at point i of a table. */
 static inline double pw_table_value (const pw_signal *s, int i) {

@@ -280,7 +280,7 @@ void pw_elimination_solve (const pw_elimination *ldl, pw_emitter *emitter, pw_te
   for (int m = ldl->pivots - 1; m >= 0; m--) elimination_backward (ldl, emitter, right, m);
 }
 
-/* Terms of generated code; see symbolic.h. */
+/* Terms of generated code; see elimination.h. */
 
 pw_term pw_term_named (pw_term_type type, const char *array, int i, double value) {
   pw_term a = { type, 1, "", value };

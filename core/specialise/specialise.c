@@ -613,7 +613,7 @@ void pw_specialise_data (const pw_generator *gen) {
   pw_specialise_list (gen->out, "WATCH", (int)(sizeof (pw_scene_watch) / sizeof (double)));
 }
 
-/* Sparsity of element types; see sparsity.h.  Elements on the ground, with more constant entries, do not count. */
+/* Sparsity of element types; see specialise.c.  Elements on the ground, with more constant entries, do not count. */
 
 enum { SPARSITY_SCENES = 12, SPARSITY_STATES = 4 };
 

@@ -1,4 +1,4 @@
-/* The search for relative periodic motions, and their branches; equations in periodic_equations.c. */
+/* The search for relative periodic motions, and their branches; equations in periodic.c. */
 #include <lapacke.h>
 #include <math.h>
 #include <stdlib.h>

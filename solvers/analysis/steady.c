@@ -1,4 +1,4 @@
-/* The search for steady motions; equations in steady_equations.c. */
+/* The search for steady motions; equations in steady.c. */
 #include <lapacke.h>
 #include <math.h>
 #include <stdint.h>
@@ -496,12 +496,12 @@ int pw_steady_next (pw_steady *x, pw_steady_motion *out, pw_error *error) {
  * xi_2 S_2 (q) + ... with constant xi.  In the frame that moves with it its velocities are constant: with the angular
  * velocity w of the whole and W (x, y, phi) = w (-y, x, 0) for each body,
  *
- *     g (q, t) = 0,   J v = eta,   a (q, v) = W v,   A - value B = 0 for what is held (steady_hold.c).
+ *     g (q, t) = 0,   J v = eta,   a (q, v) = W v,   A - value B = 0 for what is held (steady_symmetries.c).
  *
  * The unknowns are u = (q, xi), both scaled by units of the scene, and on a branch the parameter.  There are more
  * equations than unknowns, and they depend on each other, since symmetries and conservation laws make steady motions
  * families; continuation.h solves them by least squares.  Their exact derivatives are those of the linearisation
- * (linear_variation.c) for the variations dq, dv = W dq + dxi_k S_k.  On a branch, corrections are orthogonal to the
+ * (linear.c) for the variations dq, dv = W dq + dxi_k S_k.  On a branch, corrections are orthogonal to the
  * symmetries that leave what is held unchanged.
  *
  * (Relative equilibria: Marsden & Ratiu 1999, Introduction to Mechanics and Symmetry.) */

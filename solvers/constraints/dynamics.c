@@ -34,7 +34,7 @@ static inline const double *dynamics_right_side (pw_run *r, const double *v, dou
 }
 
 /* Iterative refinement (Wilkinson 1963): near a singular configuration the factorisation has an error of eps / sine^2
- * (thresholds.c); refinement reduces it to eps / sine. */
+ * (watchdog.c); refinement reduces it to eps / sine. */
 static void dynamics_refine (pw_run *r, const double *v, double *a, double *lambda) {
   const pw_system *s = r->s;
   double *f = r->scratch, *gamma = f + s->coords + 3;                                  /* residuals */

@@ -179,7 +179,7 @@ int pw_row_basis_select (pw_row_basis *b, const pw_workspace *w, double tol, int
   return all + b->rank;
 }
 
-/* The sine that measures how far the constraints are from a singular configuration; see watchdog.h. */
+/* The sine that measures how far the constraints are from a singular configuration; see method.h. */
 
 /* ---- Opening ---- */
 

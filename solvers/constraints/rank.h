@@ -1,5 +1,5 @@
 /* Independent constraint equations (rank.c, independent.c), and the redundant ones as combinations of them
- * (redundancy.c). */
+ * (independent.c). */
 #ifndef PW_RANK_H
 #define PW_RANK_H
 

@@ -1,7 +1,7 @@
 /* Checks after each step that the run still follows the motion: that constraints are neither lost nor contradictory,
  * and that the motion has not jumped to another branch at a singular configuration.
  *
- * The sine (watchdog.h) changes by at most a multiple of the motion of the bodies (`lipschitz`), so it is computed
+ * The sine (method.h) changes by at most a multiple of the motion of the bodies (`lipschitz`), so it is computed
  * again only when the motion since could have made it small. */
 #include <math.h>
 #include <stdio.h>
@@ -142,7 +142,7 @@ static double watchdog_residual (const pw_run *r) {
 }
 
 /* 1 if a constraint residual d may decide which branch is followed: if the sine s is below its regular value, and s^2
- * below d / ratio.  Drifted constraints, x y = d in place of x y = 0 (thresholds.c), connect branches that cross by a
+ * below d / ratio.  Drifted constraints, x y = d in place of x y = 0 (watchdog.c), connect branches that cross by a
  * turn, which a method follows however small its steps. */
 static int watchdog_unresolved (pw_run *r, double residual, double ratio) {
   int row;
@@ -200,7 +200,7 @@ int pw_run_watchdog (pw_run *r, pw_error *error) {
 
 /* Change points: configurations at which branches of a motion cross, or nearly do.
  *
- * In suitable coordinates the constraints near one are x y = e; the sine (watchdog.h) is |(x, y)|.  For e = 0 the
+ * In suitable coordinates the constraints near one are x y = e; the sine (method.h) is |(x, y)|.  For e = 0 the
  * branches cross and the motion goes straight on; for e != 0 it turns within a distance of sqrt (|e|), and a step that
  * is longer than that can go straight on to the other branch, where all constraints hold again.  Neither residuals nor
  * energies reveal this.
@@ -433,7 +433,7 @@ int pw_change_point_check (pw_run *r, double sine, pw_error *error) {
   return suspect ? change_report (r, &walk, verdict, sine, length, error) : PW_OK;
 }
 
-/* The thresholds of the watchdog and of the run; see watchdog.h. */
+/* The thresholds of the watchdog and of the run; see method.h. */
 
 /* Residuals are scaled; lengths and motions are in units of L and rad; a relative sine is the sine over the largest one
  * of the run.  s: the sine; d: the residual; eps: the machine precision.  Where branches cross, the constraints are
@@ -496,7 +496,7 @@ const pw_thresholds pw_watchdog_thresholds = {
   .lipschitz = 2,
   .step_growth = 2,
 
-  /* Change points (change_point.c): a sine within a step below an eighth of those at its ends (unresolved) belongs to a
+  /* Change points (watchdog.c): a sine within a step below an eighth of those at its ends (unresolved) belongs to a
    * turn that the step cannot resolve; below half of them, or a relative sine below half (low), there may be a change
    * point.  Strides of 0.3 times the sine stay on a curve whose radius is the sine.  A stride that approaches its
    * destination by less than a tenth of its length (progress) leads elsewhere. */

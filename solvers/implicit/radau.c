@@ -7,7 +7,7 @@
  *   index2    0 = eta - J v,             mu = 0
  *   index3    0 = -g,   0 = b - S v,     mu = 0
  *
- * with G the holonomic rows of J, S and b the nonholonomic rows of J and eta, D as in dae.h, B = diag (1, M, 0).  The
+ * with G the holonomic rows of J, S and b the nonholonomic rows of J and eta, D as in tangent.h, B = diag (1, M, 0).  The
  * stages y + Z_i at t + c_i h satisfy  B sum_j (A^-1)_ij Z_j = h F (t + c_i h, y + Z_i);  the last one is the new
  * state.  T^-1 A^-1 T = diag (gamma, [ alpha -beta ; beta alpha ]) decouples Newton's equations for W, Z = T W:
  *
@@ -32,7 +32,7 @@
 #include "dense_output.h"
 #include "util.h"
 
-/* Private to radau: the data that the method (radau.c) and the stages of a step (radau_stages.c) share. */
+/* Private to radau: the data that the method (radau.c) and the stages of a step (radau.c) share. */
 
 /* Coefficients of the Radau IIA method of order 5 (Hairer & Wanner 1996, section IV.8); A and gamma were computed with
  * 60 digits from the nodes c. */
@@ -455,7 +455,7 @@ static const double radau_inverse_T[STAGES][STAGES] = {
 };
 static const double radau_alpha = 2.68108287362775213390, radau_beta = 3.05043019924741056943;
 
-/* F (t, y), the right-hand side of B y' = F (radau.c): minus the residual of dae.h without its terms B y'.  Leaves
+/* F (t, y), the right-hand side of B y' = F (radau.c): minus the residual of tangent.h without its terms B y'.  Leaves
  * kinematics and J at (t, y). */
 static int radau_evaluate (pw_run *r, double t, const double *y, double *F) {
   pw_method_data *d = r->data;
@@ -657,7 +657,7 @@ static pw_convergence radau_test (pw_run *r, int done, double size, double befor
   d->reduction = 0.5;
   if (!isfinite (size)) return PW_DIVERGED;
   if (size == 0) return PW_CONVERGED;
-  if (done == 0) { /* where forces saturate, the first correction may be small far from the solution (tolerances.c) */
+  if (done == 0) { /* where forces saturate, the first correction may be small far from the solution (run.c) */
     if (fixed || r->s->saturates) return PW_ITERATE;
     d->remaining = pow (fmax (d->remaining, DBL_EPSILON), 0.8);
     return d->remaining * size <= 1 ? PW_CONVERGED : PW_ITERATE;

@@ -213,7 +213,7 @@ void pw_tangent_add_accelerations (pw_tangent *x, const pw_tangent_layout *to, c
   if (to->a != to->v) pw_tangent_add_J (x, rows, row, to->a, to->a_factor, to->a_factor);
 }
 
-/* Residual and Newton matrix of the equations of motion as differential-algebraic equations; see dae.h. */
+/* Residual and Newton matrix of the equations of motion as differential-algebraic equations; see tangent.h. */
 
 int pw_dae_open (pw_dae *x, pw_run *r) {
   const pw_system *s = r->s;
@@ -324,7 +324,7 @@ int pw_dae_lay_out (pw_dae *x, const double *v, const double *a, const double *l
   return pw_scatter_lay_out (&t->scatter, x->size);
 }
 
-/* Recording and layout of the sequence of contributions to a sparse matrix; see scatter.h. */
+/* Recording and layout of the sequence of contributions to a sparse matrix; see tangent.h. */
 
 void pw_scatter_begin_record (pw_scatter_map *t) {
   *t = (pw_scatter_map){ .recording = 1 };

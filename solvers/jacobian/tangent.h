@@ -54,7 +54,7 @@ static inline void pw_scatter_add (pw_scatter_map *t, int row, int col, double v
  *   accelerations   J a - gamma + 2 alpha (J v - eta) + beta^2 g   (nonholonomic: + alpha (J v - eta))
  *
  * with Baumgarte's alpha and beta.  Some methods have further multipliers mu, one for each of the first mu_count
- * active equations (dae.h). */
+ * active equations (tangent.h). */
 
 typedef struct {
   pw_run *run;
@@ -62,7 +62,7 @@ typedef struct {
   int *row_index;      /* all equations: index among the active ones, or -1 */
   int *row;            /* rows: index among all equations */
   double *lambda;      /* all equations: scratch for pw_tangent_expand */
-  double *D;           /* coords: 1 for lengths, 1/L^2 for angles (dae.h) */
+  double *D;           /* coords: 1 for lengths, 1/L^2 for angles (tangent.h) */
   double *block;       /* scratch: the largest block of a batch, or its force_u */
   double *direction;   /* scratch: the largest count x cols */
   pw_scatter_map scatter;

@@ -48,7 +48,7 @@ typedef struct {
   double x, y;
 } block_pair;
 
-/* (x, y) divided by a diagonal block of k unknowns with the factors 1 / d_1, l_21, 1 / d_2 of block_factor.c in D. */
+/* (x, y) divided by a diagonal block of k unknowns with the factors 1 / d_1, l_21, 1 / d_2 of block_ldl.c in D. */
 static inline block_pair block_divide (int k, const double *D, double x, double y) {
   if (k == 1) return (block_pair){ .x = x * D[0] };
   double z = (y - D[1] * x) * D[2];
@@ -472,7 +472,7 @@ PW_INLINE chain_square chain_coupling (chain_body p) {
   return (chain_square){ mass + x * p.a.x, x * p.a.y, y * p.a.x, mass + y * p.a.y };
 }
 
-/* (x, y) divided by a block with the factors d, e, f, as block_divide (block_parts.h). */
+/* (x, y) divided by a block with the factors d, e, f, as block_divide (block_ldl.c). */
 PW_INLINE chain_pair chain_divide (chain_lanes d, chain_lanes e, chain_lanes f, chain_lanes x, chain_lanes y) {
   const chain_lanes z = (y - e * x) * f;
   return (chain_pair){ x * d - e * z, z };
@@ -486,7 +486,7 @@ PW_INLINE chain_pair chain_divide_stored (const chain_sweep *s, chain_lanes x, c
 
 /* ---- Factorisation ---- */
 
-/* Factorises the diagonal block of each lane as block_pivot (block_factor.c).  D: as in pw_block_column: xx, yx, yy,
+/* Factorises the diagonal block of each lane as block_pivot (block_ldl.c).  D: as in pw_block_column: xx, yx, yy,
  * then xx and yy before elimination.  The smallest pivot rarely changes, so one test of both lanes comes first. */
 PW_INLINE void chain_pivot (chain_lanes *D, pw_block_ldl *l, const chain_sweep *s) {
   const chain_lanes a = D[0], minor = a * D[2] - D[1] * D[1], least = { l->least_pivot, l->least_pivot };

@@ -13,7 +13,7 @@
  *     [ J_k^T -W_k ] [ -a_k   ] = [ f_k              ]      with S of all other bodies,
  *
  * quasi-definite, so that L D L^T needs no pivoting (Vanderbei 1995, Symmetric quasi-definite matrices), with two nodes
- * of -a_k (x and y; the angle; rank 1) after the equations of rank 0 and before those of rank 2 (condense_rank.c).
+ * of -a_k (x and y; the angle; rank 1) after the equations of rank 0 and before those of rank 2 (saddle.c).
  *
  * Chains are bodies one after another, each pinned to the one before and the one after.  Nothing else touches the pins
  * inside a chain, so their part of the matrix is block tridiagonal and need not be stored.  In a body's columns, J is
@@ -100,7 +100,7 @@ typedef struct {
   char *pattern, *memory; /* allocations: of column, below and column_of_node; of groups and chains */
 } pw_block_ldl;
 
-/* ---- Planning (block_order.c) ---- */
+/* ---- Planning (block_ldl.c) ---- */
 
 typedef struct {
   int size;               /* unknowns */
@@ -130,7 +130,7 @@ static inline int pw_block_diagonal_values (int size) {
   return size * (size + 3) / 2;
 }
 
-/* ---- Factorisation and solution (block_factor.c, block_solve.c, block_chain.c) ---- */
+/* ---- Factorisation and solution (block_ldl.c, block_ldl.c, block_ldl.c) ---- */
 
 /* Assembles S with the J last evaluated and factorises it; stops where least_pivot is not positive. */
 void pw_block_factor (pw_block_ldl *l);

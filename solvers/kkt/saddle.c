@@ -15,7 +15,7 @@
 
 /* A pivot is 1 minus a squared cosine.  Round-off leaves the pivot of a dependent row at about eps / s^2, with s the
  * smallest sine of the rows before it: at this one if s = 0.07.  With a smaller s such a row passes, but its sine is
- * below `rank_suspect` (thresholds.c), where opening a run computes the rank. */
+ * below `rank_suspect` (watchdog.c), where opening a run computes the rank. */
 #define SADDLE_ROUND_OFF (200 * DBL_EPSILON)
 
 pw_saddle *pw_saddle_open (pw_workspace *w, const double *weight, int rows, const unsigned char *active,

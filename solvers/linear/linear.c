@@ -1,4 +1,4 @@
-/* Mobility and linearisation of a run at the state reached; equations in linear_variation.c. */
+/* Mobility and linearisation of a run at the state reached; equations in linear.c. */
 #include <complex.h>
 #include <float.h>
 #include <lapacke.h>
@@ -9,7 +9,7 @@
 #include "util.h"
 #include "rank.h"
 
-/* Column c of A: z' and u' for a variation along minimal coordinate c (linear_variation.c). */
+/* Column c of A: z' and u' for a variation along minimal coordinate c (linear.c). */
 static void linear_column_of_A (pw_linearisation *x, int c) {
   double *dq = x->dx, *dv = x->dx + x->n, w = x->frame.twist[2];
   pw_linear_tangent (x, c);
@@ -588,7 +588,7 @@ pw_steadiness pw_linear_steady (pw_linearisation *x) {
 /* Inputs, states and mode shapes of a linearisation.
  *
  * A signal of a force changes the accelerations by the solution of the saddle-point system with the right-hand side
- * (f_u, 0); its column of the input matrix B is (0, T N_v^T da), with T and N_v of linear_variation.c.
+ * (f_u, 0); its column of the input matrix B is (0, T N_v^T da), with T and N_v of linear.c.
  *
  * With the reflections Q that split off k rigid displacements, A = Q [ A11 A12 ; 0 A22 ] Q^T.  An eigenvector y2 of A22
  * for the eigenvalue mu has the rigid part y1 with  (A11 - mu) y1 = -A12 y2  and belongs to the mode Q (y1, y2). */
@@ -725,12 +725,12 @@ int pw_linear_shapes (pw_linearisation *x, int k, pw_linear *l) {
  *     [ M J^T ; J 0 ] (da, dlambda) = ( (f_q - (J^T lambda)_q) dq + f_v dv,  (gamma_q - (J a)_q) dq + gamma_v dv ),
  *
  * at constant time.  In a steady motion every body moves with the twist (vx, vy, w) of one frame (exceptions:
- * linear_frame.c), in which the state and the constraint manifold are at rest.  The components of vectors in that frame
+ * linear.c), in which the state and the constraint manifold are at rest.  The components of vectors in that frame
  * rotate at -w, hence
  *
  *     z' = N_q^T (dv - W dq),   u' = T N_v^T (da - W dv),   W (x, y, phi) = w (-y, x, 0) for each body.
  *
- * Perturbations of a steady motion grow as exp (mu t) with the eigenvalues mu of this matrix A; linear_frame.c finds
+ * Perturbations of a steady motion grow as exp (mu t) with the eigenvalues mu of this matrix A; linear.c finds
  * the frame, and whether the motion is steady.  (Null-space form: Garcia de Jalon & Bayo 1994, Kinematic and Dynamic
  * Simulation of Multibody Systems.  Relative equilibria: Marsden & Ratiu 1999, Introduction to Mechanics and
  * Symmetry.) */

@@ -1,6 +1,6 @@
 /* A linearisation in progress, for linear*.c and for analyses that need its parts.  The system has n coordinates and m
  * constraint equations; a variation of the state is dx = (dq, dv), and has `size` minimal coordinates: first those of
- * positions, then those of velocities.  The equations are in linear_variation.c. */
+ * positions, then those of velocities.  The equations are in linear.c. */
 #ifndef PW_LINEAR_H
 #define PW_LINEAR_H
 
@@ -8,7 +8,7 @@
 #include "pinwheel-analysis.h"
 #include "tangent.h"
 
-/* The co-moving frame (linear_frame.c). */
+/* The co-moving frame (linear.c). */
 typedef struct {
   double origin[2];    /* of the frame [m] */
   double twist[3];     /* velocity of the origin, angular velocity [m/s, rad/s] */
@@ -36,13 +36,13 @@ typedef struct {
   double *da;                    /* n + 3: the resulting variation of accelerations */
   double *scratch, *row_scratch; /* n + 3 m + 3, m */
   double *residual;              /* 3 x (2 m + n): asymmetries of rigid displacements; then scratch for dgesvd */
-  double *probe, *probe_da;      /* 2 n, n: a variation at the current state, and its da (linear_frame.c) */
+  double *probe, *probe_da;      /* 2 n, n: a variation at the current state, and its da (linear.c) */
   double *probe_a;               /* n: accelerations at the current state */
   double *later;                 /* 2 n: a later state */
   char *memory;
   int modes;            /* 1: PW_LINEAR_MODES, which needs the following */
   double *left_vectors; /* size^2 + size: left eigenvectors of A22^T, then imaginary parts of its eigenvalues */
-  double *upper_rows;   /* 3 x size: [ A11 A12 ] (linear_modes.c); then scratch, size */
+  double *upper_rows;   /* 3 x size: [ A11 A12 ] (linear.c); then scratch, size */
   double tau[3];        /* scalars of the reflections in `symmetry` */
 } pw_linearisation;
 
@@ -61,7 +61,7 @@ typedef enum { PW_LINEAR_COUNTS, PW_LINEAR_DERIVATIVES, PW_LINEAR_BASES, PW_LINE
 int pw_linear_open (pw_linearisation *x, pw_run *r, pw_linear_extent extent);
 void pw_linear_close (pw_linearisation *x);
 
-/* ---- linear_variation.c ---- */
+/* ---- linear.c ---- */
 
 /* Records the scatter map of the derivatives.  PW_OK or PW_RESOURCE. */
 int pw_linear_derivatives (pw_linearisation *x);
@@ -83,21 +83,21 @@ void pw_linear_turn (const pw_linearisation *x, double w, const double *in, doub
 /* out = in with (x, y) of each body rotated by an angle. */
 void pw_linear_rotate (const pw_linearisation *x, double angle, const double *in, double *out);
 
-/* ---- linear_eigenvalues.c ---- */
+/* ---- linear.c ---- */
 
 /* Fills re, im and rigid, sorted, and with modes the shapes.  Rigid displacements of the whole are split off, an
  * invariant subspace with known eigenvalues (in a rotating frame a displaced motion rotates at -w), so that they do not
  * cause defective zeros; if that fails, l->symmetries becomes 0.  Errors: PW_METHOD, PW_RESOURCE. */
 int pw_linear_eigenvalues (pw_linearisation *x, pw_linear *l, pw_error *error);
 
-/* ---- linear_modes.c ---- */
+/* ---- linear.c ---- */
 
 /* Allocates B, basis and shape, and fills B and basis.  PW_OK or PW_RESOURCE, as the next one. */
 int pw_linear_matrices (pw_linearisation *x, pw_linear *l);
 /* Fills the shapes after k rigid displacements have been split off; eigenvalues are not yet sorted. */
 int pw_linear_shapes (pw_linearisation *x, int k, pw_linear *l);
 
-/* ---- linear_frame.c ---- */
+/* ---- linear.c ---- */
 
 /* Chooses a frame with small accelerations of the evaluated state; one that rotates only if it halves them. */
 void pw_linear_choose_frame (pw_linearisation *x);

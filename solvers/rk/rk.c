@@ -478,8 +478,8 @@ int pw_rk_advance_adaptive (pw_run *r, double t_end, pw_error *error) {
   }
 }
 
-/* Explicit Runge-Kutta methods: options, opening and closing, choice between fixed steps (rk_fixed.c) and step-size
- * control (rk_adapt.c). */
+/* Explicit Runge-Kutta methods: options, opening and closing, choice between fixed steps (rk.c) and step-size
+ * control (rk.c). */
 
 static const char *const rk_steps[] = { "adaptive", "fixed", NULL };
 static const char *const rk_positions[] = { "projected", "drift", NULL };
@@ -597,11 +597,11 @@ int pw_rk_advance (pw_run *r, double t_end, pw_error *error) {
 
 /* Several steps of fixed size in one call of specialised code.
  *
- * Results are bit-identical to those of single steps.  What a run does less often than every step (limits.c, ledger.c)
+ * Results are bit-identical to those of single steps.  What a run does less often than every step (run.c, run.c)
  * is done after the last of them, so there are never more than PW_CHECK_INTERVAL. */
 
 /* 1 if the specialised function `steps` does everything that a step of this run needs.  The ledger records the first
- * steps one by one (ledger.c). */
+ * steps one by one (run.c). */
 static int several_possible (const pw_run *r) {
   const pw_method_data *d = r->data;
   if (r->method->advance != pw_rk_advance || d == NULL || !r->fixed_steps || d->holds_signals || d->uses_nullspace ||
@@ -615,7 +615,7 @@ static int several_possible (const pw_run *r) {
 
 /* The number of whole steps that can be taken at once: up to t_end and the next breakpoint, with the tolerance of
  * pw_step_end; up to the first that reaches t; up to a multiple of PW_CHECK_INTERVAL and the next record of speeds
- * (limits.c).  Each must be twice as long as a step that counts as stalled (run.c). */
+ * (run.c).  Each must be twice as long as a step that counts as stalled (run.c). */
 static int several_count (const pw_run *r, double t, double t_end) {
   const pw_method_data *d = r->data;
   const double h = r->settings.step, stop = fmin (t_end, r->breakpoint) - PW_STEP_LONGER * h,

@@ -13,7 +13,7 @@ typedef struct {
   const double *c, *b; /* stages: nodes, weights */
   const double *A;     /* rows 1, 2, ... (counted from 0) below the diagonal, one after the other */
   const double *e;     /* stages + 1: weights of the error estimate, the last at the new state; NULL: fixed steps */
-  const double *e3;    /* the same of an estimate of lower order (rk_adapt.c); NULL: there is only e */
+  const double *e3;    /* the same of an estimate of lower order (rk.c); NULL: there is only e */
   const double *e6;    /* the same of an estimate of higher order, together with e3 only */
   double exponent;     /* of the error in the next step size: 1 / (order of the estimate + 1) */
   double memory;       /* exponent of the previous error there (Gustafsson 1991) */
@@ -39,8 +39,8 @@ extern const pw_option pw_rk_adaptive_options[], pw_rk_fixed_options[]; /* of me
   .stabilisations = pw_rk_stabilisations, .advance = pw_rk_advance, .at = pw_rk_at, .restart = pw_rk_restart, \
   .close = pw_rk_close, .serialise = pw_rk_serialise
 
-/* Private to the explicit Runge-Kutta methods: stages and steps (rk_step.c), step-size control (rk_adapt.c), fixed
- * steps and samples (rk_fixed.c), null-space velocities (nullspace.c). */
+/* Private to the explicit Runge-Kutta methods: stages and steps (rk.c), step-size control (rk.c), fixed
+ * steps and samples (rk.c), null-space velocities (nullspace.c). */
 
 enum { PW_NULLSPACE_MOST = 256 }; /* constraint equations: their matrix is dense */
 

@@ -1,4 +1,4 @@
-/* ida: the variable-order BDF code IDAS of SUNDIALS (Hindmarsh et al. 2005), on the equations of dae.h.
+/* ida: the variable-order BDF code IDAS of SUNDIALS (Hindmarsh et al. 2005), on the equations of tangent.h.
  *
  * The Newton matrix is exact and sparse, factorised by KLU.  The error test covers positions and velocities, including
  * those of massless coordinates; in si1 it covers all unknowns. */

@@ -7,7 +7,7 @@
  * adams: Adams-Moulton formulas of orders 1 to 12, for non-stiff scenes.  The fixed-point iteration needs no matrix
  * and converges only if the step resolves every motion.  bdf: backward differentiation formulas of orders 1 to 5, for
  * stiff scenes (Curtiss & Hirschfelder 1952; Gear 1971).  It uses Newton's iteration with an exact matrix
- * (bdf_newton.c); steps and their errors may be projected (Eich 1993).  (Hindmarsh et al. 2005, SUNDIALS: Suite of
+ * (multistep.c); steps and their errors may be projected (Eich 1993).  (Hindmarsh et al. 2005, SUNDIALS: Suite of
  * nonlinear and differential/algebraic equation solvers.) */
 #include <cvodes/cvodes.h>
 #include <math.h>
@@ -19,9 +19,9 @@
 #include "dense_output.h"
 #include "util.h"
 
-/* The data of adams and bdf (multistep.c), and Newton's iteration of bdf (bdf_newton.c). */
+/* The data of adams and bdf (multistep.c), and Newton's iteration of bdf (multistep.c). */
 
-/* Named as at the top of bdf_newton.c. */
+/* Named as at the top of multistep.c. */
 typedef struct {
   pw_tangent tangent;     /* the matrix in tangent.scatter is T */
   double gamma;           /* that of the matrix last set up */
@@ -84,7 +84,7 @@ static int multistep_project (pw_method_data *d, double t, double *q, double *v)
 }
 
 /* Leaves the part of the error tangential to the constraints (Eich 1993), in the metric of the projection, plus a small
- * part of the whole error, so that the displacement off the constraints is at most rtol^(3/4) as in rk_adapt.c.  That
+ * part of the whole error, so that the displacement off the constraints is at most rtol^(3/4) as in rk.c.  That
  * displacement has tangential effects that the estimate misses: the accelerations of the step are those of the
  * displaced state. */
 static void multistep_project_error (pw_method_data *d, double *e) {

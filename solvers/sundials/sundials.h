@@ -78,10 +78,10 @@ void pw_sun_close (pw_sun *x);
 /* Stores the state reached in y, t0 and `before`; the method then restarts its integrator. */
 void pw_sun_restart (pw_sun *x);
 
-/* A vector with the operations of vectors.c, as have its clones; NULL: out of memory. */
+/* A vector with the operations of sundials.c, as have its clones; NULL: out of memory. */
 N_Vector pw_sun_vector (sunindextype length, SUNContext context);
 
-/* Opens x->solver for the matrix of this size that a scatter map fills.  It refuses an outdated matrix (tolerances.c)
+/* Opens x->solver for the matrix of this size that a scatter map fills.  It refuses an outdated matrix (run.c)
  * so that the integrator requests a new one.  content: the method's data, beginning with x, which `solve` finds in its
  * solver; solve: NULL for that of the matrix; any other must itself refuse an outdated matrix. */
 typedef int pw_sun_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector x, N_Vector b, realtype tolerance);

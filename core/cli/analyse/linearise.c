@@ -9,7 +9,7 @@
 #include "report.h"
 #include "states.h"
 
-/* The command `pinwheel linearise`, its result and its reports (linearise_report.c). */
+/* The command `pinwheel linearise`, its result and its reports (linearise.c). */
 
 typedef struct {
   pw_cli_line line;

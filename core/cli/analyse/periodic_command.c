@@ -8,7 +8,7 @@
 #include "cli.h"
 #include "states.h"
 
-/* The command `pinwheel periodic`, its result and its reports (periodic_report.c). */
+/* The command `pinwheel periodic`, its result and its reports (periodic_command.c). */
 
 /* A periodic motion found, or a point of a branch. */
 typedef struct {

@@ -8,7 +8,7 @@
 #include "report.h"
 #include "cli.h"
 
-/* The command `pinwheel steady`, its result and its reports (steady_report.c). */
+/* The command `pinwheel steady`, its result and its reports (steady_command.c). */
 
 /* A steady motion found, or a point of a branch. */
 typedef struct {

@@ -79,7 +79,7 @@ static inline int pw_fit_degrees_of_freedom (const pw_fit *fit) {
   return fit->residuals - fit->rank;
 }
 
-/* Reports (fit_report.c): text, JSON with this status ("ok", ...), the table of data and residuals, figures. */
+/* Reports (fit.c): text, JSON with this status ("ok", ...), the table of data and residuals, figures. */
 void pw_fit_print (const pw_fit *fit);
 void pw_fit_json (const pw_fit *fit, const char *status, FILE *f);
 int pw_fit_table (const pw_fit *fit, FILE *f, pw_error *error);

@@ -57,7 +57,7 @@ typedef struct {
   double least; /* sign x best objective so far */
 } pw_optimise;
 
-/* ---- Searches (local_search.c) ---- */
+/* ---- Searches (optimise.c) ---- */
 
 #define PW_SEARCH_FINE 1e-7 /* last steps of refinements, relative to the scales of the unknowns */
 
@@ -74,7 +74,7 @@ int pw_search_fine (void *context, int i, pw_error *error);
 /* Sets without_effect[i] and objective_same[i], by two runs; their failure is an effect. */
 int pw_search_effect (void *context, int i, pw_error *error);
 
-/* ---- Results (optimise_report.c) ---- */
+/* ---- Results (optimise.c) ---- */
 
 /* 1 if two searches have results, and these are the same optimum: they differ little in all unknowns but those without
  * effect. */

@@ -1,4 +1,4 @@
-/* The command `pinwheel run`: its options, what it has open, and its checkpoints (checkpoints.c). */
+/* The command `pinwheel run`: its options, what it has open, and its checkpoints (run_command.c). */
 #ifndef PW_RUN_COMMAND_H
 #define PW_RUN_COMMAND_H
 

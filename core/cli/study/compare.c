@@ -46,7 +46,7 @@ void pw_reference_print (const pw_reference *reference, int partners);
 int pw_reference_write (const pw_reference *reference, const char *folder, const pw_study_column *error_columns,
                         pw_error *error);
 
-/* ---- The conclusion of a comparison (conclusion.c) ---- */
+/* ---- The conclusion of a comparison (compare.c) ---- */
 
 /* Prints the processor time of each method for numbers of digits that agree with a known reference, and failures.
  * error_column: index of the largest error of lengths in the values of a row; that of angles follows. */

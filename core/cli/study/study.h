@@ -154,7 +154,7 @@ void pw_study_progress (pw_study *study, pw_row *row, double part);
  * `run_error` are what that returned.  Returns PW_OK, or the status that ends the study. */
 int pw_study_record_run (const pw_study *study, pw_row *row, int status, const pw_error *run_error, pw_error *error);
 
-/* ---- Tables and figures (study_table.c) ---- */
+/* ---- Tables and figures (study.c) ---- */
 
 /* Opens the CSV file with its first line. */
 int pw_study_open_table (pw_study *study, pw_error *error);

@@ -90,7 +90,7 @@ int pw_journal_add (pw_journal *journal, const pw_plan *plan, long row, int stat
 /* Closes the journal; removes it if it was begun here and has no rows. */
 void pw_journal_close (pw_journal *journal);
 
-/* ---- Rows (sweep_rows.c) ---- */
+/* ---- Rows (sweep.c) ---- */
 
 /* Computes the missing rows in `jobs` threads, until all are there or pw_stop is set.  PW_RESOURCE. */
 int pw_sweep_rows (const pw_plan *plan, pw_journal *journal, int jobs, pw_error *error);

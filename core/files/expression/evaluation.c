@@ -347,7 +347,7 @@ double pw_expression_mod (double x, double y) {
 
 /* ---- Elliptic functions ----
  *
- * With the arithmetic-geometric mean a, b, c of core/base/elliptic.h, the angles phi_n of am (elliptic.c), the
+ * With the arithmetic-geometric mean a, b, c of core/base/elliptic.h, the angles phi_n of am (maths.c), the
  * incomplete elliptic integral E of the second kind, s and c the sine and cosine of am, dn = sqrt (1 - m s^2), and R =
  * sum of 2^(n-1) c_n^2 / m from n = 1,
  *

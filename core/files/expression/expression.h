@@ -75,7 +75,7 @@ void pw_expression_derivatives (const pw_expression *expression, const double *v
 
 /* The first time after t at which the value, or a time derivative, may jump whatever the other variables are; INFINITY
  * if there is none.  If the search would take too long, or jumps are too frequent for steps to end at each
- * (breakpoints.c): a time after t up to which there are no others.  Not found are jumps whose times depend on other
+ * (range.c): a time after t up to which there are no others.  Not found are jumps whose times depend on other
  * variables, and kinks at the end of a function's domain, as of sqrt (t^2). */
 double pw_expression_breakpoint (const pw_expression *expression, double t);
 

@@ -66,7 +66,7 @@ static inline int pw_expression_compare (int op, pw_order order) {
   return equal || less || greater || (order != PW_ORDER_EQUAL && op == PW_OP_UNEQUAL);
 }
 
-/* ---- Functions (functions.c) ---- */
+/* ---- Functions (evaluation.c) ---- */
 
 /* First and second partial derivatives of a function f (x, y), or of f (x). */
 typedef struct {
@@ -95,7 +95,7 @@ extern const pw_expression_function pw_expression_functions[]; /* and constants;
 int pw_expression_find_function (const char *name);
 
 /* The length of the name at p, which may contain dots (frame.phi), or of the number: digits, perhaps with a decimal
- * point and an exponent; 0 if there is none (words.c). */
+ * point and an exponent; 0 if there is none (parser.c). */
 size_t pw_expression_name_size (const char *p);
 size_t pw_expression_number_size (const char *p);
 

@@ -1,12 +1,12 @@
 /* Text models: interface between the files of this folder, each of which uses those above it.
  *
- *   yaml_source.c      reads and checks the text; messages with line, column and caret
+ *   yaml_read.c      reads and checks the text; messages with line, column and caret
  *   yaml_tree.c        builds a tree of scalars, lists and maps from libfyaml's events
- *   yaml_stored.c      the tree as bytes
+ *   yaml_read.c      the tree as bytes
  *   yaml_read.c        keys, numbers and names from the tree
  *   yaml_expression.c  signals that are expressions of time and states; the reference solution
- *   yaml_signal.c      other signals, points of tables
- *   yaml_build.c       bodies and elements, through the field tables of their types
+ *   yaml_expression.c      other signals, points of tables
+ *   yaml.c       bodies and elements, through the field tables of their types
  *   yaml.c             the head of a model: parameters and default run settings, stored in a plug-in's table
  *
  * After an error, functions with the same reader return an error status, and only the first error is recorded: a
@@ -68,7 +68,7 @@ enum { PW_YAML_DEPTH = 30 }; /* most lists and maps inside each other */
  * bodies, elements, parameters; points of all tables; operations of all expressions. */
 enum { PW_YAML_MAX_ITEMS = 1000000, PW_YAML_MAX_POINTS = 20000000, PW_YAML_MAX_OPERATIONS = 30000000 };
 
-/* ---- The text (yaml_source.c) ---- */
+/* ---- The text (yaml_read.c) ---- */
 
 /* Reads a file of at most `max_bytes` bytes into y->source and y->size, and checks its characters. */
 int pw_yaml_read_source (pw_yaml *y, const char *path, size_t max_bytes, pw_error *error);
@@ -85,7 +85,7 @@ int pw_yaml_line (const pw_yaml *y, size_t at);
 
 int pw_yaml_read_tree (pw_yaml *y, pw_error *error);
 
-/* Loads what pw_yaml_write_tree wrote (yaml_stored.c).  PW_INPUT if it is incomplete; PW_RESOURCE. */
+/* Loads what pw_yaml_write_tree wrote (yaml_read.c).  PW_INPUT if it is incomplete; PW_RESOURCE. */
 int pw_yaml_load_tree (pw_yaml *y, const char *bytes, size_t size, pw_error *error);
 
 /* ---- Reading the tree (yaml_read.c) ---- */
@@ -131,13 +131,13 @@ void pw_yaml_suggest_bodies (const pw_reader *r, pw_nearest *near);
 int pw_yaml_time_signal (pw_reader *r, const pw_kind *kind, const char *label, const pw_node *const v[3],
                          pw_signal *signal);
 
-/* Reads a signal of an element type into a field (yaml_signal.c). */
+/* Reads a signal of an element type into a field (yaml_expression.c). */
 int pw_yaml_signal (pw_reader *r, const pw_kind *kind, const char *label, const pw_node *node, pw_signal *signal);
 
 /* Reads the reference solution, after bodies and elements (yaml_expression.c). */
 int pw_yaml_reference (pw_reader *r);
 
-/* The build function; the parameters are an array of numbers in the order of y->parameter (yaml_build.c). */
+/* The build function; the parameters are an array of numbers in the order of y->parameter (yaml.c). */
 void pw_yaml_build (pw_model *m, const void *parameters);
 
 #endif

@@ -310,7 +310,7 @@ int pw_yaml_reference (pw_reader *r) {
  *
  *   3, "2 * M0"                                    a constant
  *   {constant: 3}                                  the same
- *   {harmonic: {amplitude: 3, omega: 2}}           and ramp, smooth-step, pulse: their fields are in signal_form.c
+ *   {harmonic: {amplitude: 3, omega: 2}}           and ramp, smooth-step, pulse: their fields are in signal.c
  *   {table: {points: [[0, 1], [2, 3]]}}            points
  *   {table: {file: M.csv, columns: [t, M]}}        points of a file, by default in columns 1 and 2
  *   {table: {file: M.csv, time: t, columns: [M]}}  the same

@@ -40,7 +40,7 @@ static int page_find_file (const char *name) {
   return i;
 }
 
-/* The next four functions replace those of location.c, libc and yaml_tree.c, which the engine does not contain. */
+/* The next four functions replace those of file.c, libc and yaml_tree.c, which the engine does not contain. */
 
 FILE *pw_open_input (const char *path, const char **why) {
   int i = page_find_file (path);
