@@ -131,8 +131,8 @@ int pw_steady_same_sizes (const pw_system *a, const pw_system *b, pw_error *why)
 
 /* What can be held is numbered: the states, then PW_HOLD_OF_BODY quantities of each body. */
 enum { PW_HOLD_SPEED, PW_HOLD_RADIUS, PW_HOLD_CURVATURE, PW_HOLD_OF_BODY };
-/* The residual A - value B of what is held (steady_symmetries.c) in the state x->q, x->v, or if dq is not NULL its change by
- * the variation (dq, dv); divided by the unit of A. */
+/* The residual A - value B of what is held (steady_symmetries.c) in the state x->q, x->v, or if dq is not NULL its
+ * change by the variation (dq, dv); divided by the unit of A. */
 double pw_hold_residual (const pw_steady *x, const pw_initial_value *hold, const double *dq, const double *dv);
 
 /* ---- steady.c ---- */

@@ -7,8 +7,8 @@
  *   index2    0 = eta - J v,             mu = 0
  *   index3    0 = -g,   0 = b - S v,     mu = 0
  *
- * with G the holonomic rows of J, S and b the nonholonomic rows of J and eta, D as in tangent.h, B = diag (1, M, 0).  The
- * stages y + Z_i at t + c_i h satisfy  B sum_j (A^-1)_ij Z_j = h F (t + c_i h, y + Z_i);  the last one is the new
+ * with G the holonomic rows of J, S and b the nonholonomic rows of J and eta, D as in tangent.h, B = diag (1, M, 0).
+ * The stages y + Z_i at t + c_i h satisfy  B sum_j (A^-1)_ij Z_j = h F (t + c_i h, y + Z_i);  the last one is the new
  * state.  T^-1 A^-1 T = diag (gamma, [ alpha -beta ; beta alpha ]) decouples Newton's equations for W, Z = T W:
  *
  *   (gamma/h B - F_y) dW_1 = r_1,    ((alpha + i beta)/h B - F_y) (dW_2 + i dW_3) = r_2 + i r_3
