@@ -45,7 +45,7 @@ SHARED       = $(LINK) -shared -Wl,--no-undefined
 
 obj = $(patsubst %.c,$(BUILD)/obj/%.o,$(1))
 
-FILES   := $(wildcard core/files/*.c core/files/*/*.c)
+FILES   := $(wildcard core/files/*.c)
 CLI     := $(wildcard core/cli/*.c core/cli/*/*.c)
 CORE    := $(filter-out $(FILES) $(CLI),$(wildcard core/*/*.c core/kinds/*/*.c))
 SOLVERS := $(wildcard solvers/*/*.c)
@@ -66,7 +66,7 @@ LIB       := $(BUILD)/libpinwheel.so
 FILES_LIB := $(BUILD)/libpinwheel-files.so
 LIB_OBJ   := $(call obj,$(CORE) $(SOLVERS))
 # Utilities that the libraries do not export: the program and each library contain them.
-BASE_OBJ  := $(call obj,$(addprefix core/base/,characters.c nearest.c store.c stream.c))
+BASE_OBJ  := $(call obj,$(addprefix core/base/,text.c store.c))
 FILES_OBJ := $(call obj,$(FILES))
 CLI_OBJ   := $(call obj,$(CLI))
 # Interactive pages need the sources of plug-ins, next to them.
@@ -132,42 +132,29 @@ deps:
 	@CC='$(CC)' CPPFLAGS='$(CPPFLAGS) $(SYSTEM)' LDFLAGS='$(LDFLAGS)' BUILD='$(BUILD)' NO_DEPS='$(NO_DEPS)' \
 	  sh .ci/deps.sh $(if $(filter deps,$(MAKECMDGOALS)),fresh) $(TOOLS)
 
-# ---- Objects; a folder finds only headers that it may include (-iquote: core/signals/signal.h is not <signal.h>) ----
+# ---- Objects; .ci/layers checks which folder includes what (-iquote: core/system/signal.h is not <signal.h>) ----
 
-layer = $(addprefix -iquote ,$(1))
-CORE_LAYERS   := core $(addprefix core/,base signals model system selftest specialise)
-SOLVER_LAYERS := $(patsubst %/,%,$(wildcard solvers/ solvers/*/))
-FILE_LAYERS   := $(patsubst %/,%,$(wildcard core/files/ core/files/*/))
-CLI_LAYERS    := $(patsubst %/,%,$(wildcard core/cli/ core/cli/*/))
+DIRS := $(patsubst %/,%,$(sort $(dir $(wildcard core/*.h core/*/*.h core/*/*/*.h solvers/*.h solvers/*/*.h))))
+ALL  := $(DIRS:%=-iquote %)
+INCLUDE = $(ALL) $(SYSTEM)
 
-$(BUILD)/obj/core/%.o:       INCLUDE := $(call layer,$(CORE_LAYERS))
 # Otherwise gcc would compute numbers that a kind stores as a pair twice, or later loads would wait for the store.
 $(BUILD)/obj/core/kinds/%.o: STRICT += $(ONE_BY_ONE)
-$(BUILD)/obj/core/kinds/%.o: INCLUDE := $(call layer,core core/kinds)
-$(BUILD)/obj/solvers/%.o:    INCLUDE := $(call layer,$(CORE_LAYERS) $(SOLVER_LAYERS)) $(SYSTEM)
-$(BUILD)/obj/core/files/%.o: INCLUDE := $(call layer,core core/base $(FILE_LAYERS)) $(SYSTEM)
-$(BUILD)/obj/core/files/expression/%.o: INCLUDE := $(call layer,core core/base core/files core/files/expression)
-$(BUILD)/obj/core/cli/%.o:   INCLUDE := $(call layer,core core/base core/files solvers $(CLI_LAYERS))
-$(call obj,core/cli/plot/animate.c core/cli/plot/figure.c core/cli/inspect/new.c): INCLUDE += $(addprefix -iquote $(BUILD)/obj/core/cli/,plot inspect)
-$(call obj,core/cli/inspect/new.c): $(BUILD)/obj/core/cli/inspect/new.inc
+# Texts that become parts of the program are generated beside its objects.
+$(BUILD)/obj/core/cli/%.o $(BUILD)/obj/core/specialise/%.o: INCLUDE += -iquote $(@D)
+$(call obj,core/cli/list.c): $(BUILD)/obj/core/cli/new.inc
 $(call obj,core/cli/page/page.c): $(BUILD)/obj/core/cli/page/page.inc
-$(call obj,core/cli/page/page.c): INCLUDE += -iquote $(BUILD)/obj/core/cli/page
 $(call obj,core/cli/plot/animate.c): $(BUILD)/obj/core/cli/plot/animate.inc
 $(call obj,core/cli/plot/figure.c): $(BUILD)/obj/core/cli/plot/templates.inc
 $(call obj,core/specialise/specialise.c): $(BUILD)/obj/core/specialise/source_texts.inc
-$(call obj,core/specialise/specialise.c): INCLUDE += -iquote $(BUILD)/obj/core/specialise
-$(call obj,core/cli/parallel.c core/cli/sweep/sweep_rows.c $(wildcard core/cli/fit/*.c)) $(BUILD)/pinwheel: private THREADS = -pthread
-ALL_LAYERS := $(CORE_LAYERS) $(FILE_LAYERS) $(SOLVER_LAYERS)
+$(call obj,core/cli/parallel.c core/cli/run/sweep.c $(addprefix core/cli/analyse/,fit.c optimise.c)) $(BUILD)/pinwheel: private THREADS = -pthread
 # Functions of tests that replace those of other libraries must be visible to these.
 $(BUILD)/obj/tests/%.o:      STRICT += -fvisibility=default
-$(BUILD)/obj/tests/%.o:      INCLUDE := $(call layer,tests/support tests/faults tests/solvers $(ALL_LAYERS)) $(SYSTEM)
-$(BUILD)/obj/tests/outputs/test_outcome.o $(BUILD)/obj/tests/outputs/slow_derivatives.o: INCLUDE := $(call layer,tests/support $(ALL_LAYERS) core/cli/analyse)
-$(BUILD)/obj/tests/fuzz/%.o: INCLUDE := $(call layer,tests/fuzz $(ALL_LAYERS) $(CLI_LAYERS))
-$(BUILD)/obj/benchmarks/%.o: INCLUDE := -I$(BUILD)/include
-$(BUILD)/obj/benchmarks/engine.o $(addprefix $(BUILD)/obj/benchmarks/,effects.o peers.o) $(BUILD)/obj/benchmarks/engine/%.o $(BUILD)/obj/benchmarks/baseline/%.o: INCLUDE := $(call layer,$(ALL_LAYERS) benchmarks) $(SYSTEM)
-$(BUILD)/obj/benchmarks/hard/%.o: INCLUDE := -I$(BUILD)/include
-$(BUILD)/obj/docs/%.o:       INCLUDE := -I$(BUILD)/include
-$(BUILD)/models/%.so:        INCLUDE := -I$(BUILD)/include
+$(BUILD)/obj/tests/%.o:      INCLUDE = $(addprefix -iquote tests/,support faults solvers) $(ALL) $(SYSTEM)
+$(BUILD)/obj/tests/fuzz/%.o: INCLUDE = -iquote tests/fuzz -iquote core/cli $(ALL) $(SYSTEM)
+$(BUILD)/obj/benchmarks/%.o $(BUILD)/obj/docs/%.o: INCLUDE = -I$(BUILD)/include
+$(BUILD)/obj/benchmarks/engine.o $(addprefix $(BUILD)/obj/benchmarks/,effects.o peers.o) $(BUILD)/obj/benchmarks/engine/%.o $(BUILD)/obj/benchmarks/baseline/%.o: INCLUDE = $(ALL) -iquote benchmarks $(SYSTEM)
+$(BUILD)/models/%.so:        INCLUDE = -I$(BUILD)/include
 
 $(BUILD)/obj/%.o: %.c | $(FIRST)
 	@mkdir -p $(@D)
@@ -185,7 +172,7 @@ $(BUILD)/obj/%.inc: %.html
 	@mkdir -p $(@D)
 	@$(AS_STRINGS) $< >$@
 
-$(BUILD)/obj/core/cli/inspect/new.inc: $(wildcard core/cli/inspect/*.in)
+$(BUILD)/obj/core/cli/new.inc: $(wildcard core/cli/*.in)
 	@mkdir -p $(@D)
 	@for f in $^; do echo "static const char *const $$(basename $$f .in | tr .- _)[] = {"; $(AS_STRINGS) $$f; echo 'NULL };'; done >$@
 
@@ -203,11 +190,10 @@ $(BUILD)/obj/core/cli/plot/templates.inc: $(wildcard core/cli/plot/templates/*.g
 # The engine of interactive pages, in WebAssembly: all that rk4, erk5 and erk8 need, without libraries.
 WASM_FLAGS := --target=wasm32-wasi -std=c11 -O2 -ffp-contract=off -ffunction-sections -fdata-sections \
   -D_POSIX_C_SOURCE=200809L -D_WASI_EMULATED_SIGNAL -include core/cli/page/engine/wasi.h '-DPW_METHODS=PW_METHOD (rk4) PW_METHOD (erk5) PW_METHOD (erk8)' \
-  $(call layer,$(CORE_LAYERS) core/kinds $(SOLVER_LAYERS) $(FILE_LAYERS) core/cli core/cli/plot $(BUILD)/obj/core/cli/plot) $(SYSTEM)
-WASM       := $(filter-out solvers/jacobian/sparse.c solvers/analysis/% solvers/linear/% solvers/run/timing.c solvers/implicit/% solvers/sundials/% core/specialise/specialise_%,$(CORE) $(SOLVERS)) \
-  $(filter-out core/files/yaml/yaml_tree.c,$(wildcard core/files/expression/*.c core/files/yaml/*.c)) \
-  $(addprefix core/files/,number.c path.c write/json.c load/columns.c load/units.c load/read.c) $(addprefix core/cli/plot/,plot_samples.c plot_shapes.c plot_symbols.c plot_figures.c animate.c) \
-  $(wildcard core/cli/page/engine/*.c)
+  $(ALL) -iquote $(BUILD)/obj/core/cli/plot $(SYSTEM)
+WASM       := $(filter-out solvers/matrices/sparse.c solvers/analysis/% solvers/run/timing.c solvers/implicit/% solvers/sundials/% core/specialise/specialise_%,$(CORE) $(SOLVERS)) \
+  $(addprefix core/files/,parser.c evaluation.c range.c yaml.c yaml_read.c yaml_expression.c number.c read.c json.c columns.c) $(addprefix core/cli/plot/,plot_samples.c plot_shapes.c animate.c) \
+  core/cli/page/engine/page_engine.c
 WASM_OBJ   := $(WASM:%.c=$(BUILD)/wasm/%.o)
 
 $(BUILD)/wasm/%.o: %.c $(BUILD)/obj/core/cli/plot/animate.inc $(BUILD)/obj/core/specialise/source_texts.inc | $(FIRST)
@@ -325,8 +311,8 @@ $(BUILD)/tests/test_alloc: WRAP := $(addprefix -Wl$(comma)--wrap=,$(ALLOC_WRAP))
 $(BUILD)/tests/test_cli_faults: WRAP = -pthread $(addprefix -Wl$(comma)--wrap=,$(ALLOC_WRAP) $(FILES_WRAP))
 $(BUILD)/tests/test_memory $(BUILD)/tests/slow_memory: WRAP = -pthread $(addprefix -Wl$(comma)--wrap=,$(ALLOC_WRAP))
 $(BUILD)/tests/test_cli_faults $(BUILD)/tests/test_memory $(BUILD)/tests/slow_memory: $(filter-out %/main.o,$(CLI_OBJ))
-$(BUILD)/tests/test_cli_limits: $(call obj,$(addprefix core/cli/,progress.c parallel.c command.c say.c stop.c))
-$(BUILD)/tests/test_outcome $(BUILD)/tests/slow_derivatives: $(call obj,core/cli/analyse/outcome.c core/cli/analyse/functional.c core/cli/stop.c core/cli/progress.c)
+$(BUILD)/tests/test_cli_limits: $(call obj,$(addprefix core/cli/,terminal.c parallel.c command.c))
+$(BUILD)/tests/test_outcome $(BUILD)/tests/slow_derivatives: $(call obj,core/cli/analyse/outcome.c core/cli/terminal.c)
 # It wraps every call of other libraries that it lists.
 $(BUILD)/tests/test_faults: WRAP = $(shell sed -n 's/^FAULT_[A-Z]* .[^,]*, \([A-Za-z_]*\),.*/-Wl,--wrap=\1/p' tests/faults/test_faults.c)
 # A part of SUNDIALS that is used for comparison only.

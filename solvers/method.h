@@ -1,14 +1,91 @@
-/* The data of a run and the functions that the integrators share.  For solvers/ only. */
-#ifndef PW_METHOD_H
-#define PW_METHOD_H
-
+/* The watchdog checks that the states of a run follow the motion of the mechanism: constraints are not lost, and the
+ * motion does not jump to another branch at a singular configuration.
+ *
+ * Singular configurations are a property of J alone, with rows of length 1 and columns of angles divided by L: neither
+ * masses nor the initial configuration matter.  "The sine" measures the distance from them: it is that of the smallest
+ * angle between a row of J and the space spanned by the rows before it.  Branches are the motions between which a
+ * closed loop can change in a singular configuration, a change point. */
+#ifndef PW_METHOD_H_
+#define PW_METHOD_H_
+#include "saddle.h"
 #include <float.h>
 #include <math.h>
 #include "pinwheel-method.h"
-#include "saddle.h"
 #include "system.h"
 #include "util.h"
-#include "watchdog.h"
+
+struct pw_run;
+
+/* The thresholds, of which a run has a copy; definitions, values and derivations are in watchdog.c. */
+typedef struct {
+  double lost, lost_unstabilised, redundant_residual, redundant_ratio;
+  double rank_lost, rank_suspect, rank_refused, independent, reselect_ratio, reselect_below;
+  double near, regular, refine;
+  double turn_growth, turn_reference, drift_turn, drift_near, drift_far, drift_any, jump_growth;
+  double lipschitz, step_growth;
+  double unresolved, low, stride, progress, floor, crossing, straight, resolved;
+  double ends_singular, agree, agree_best, sample, sample_best;
+  double extreme, stalled;
+} pw_thresholds;
+
+extern const pw_thresholds pw_watchdog_thresholds;
+
+/* The sine along a run, at the states reached. */
+typedef struct {
+  pw_saddle *saddle;          /* of weights 1 and L^2, as in rank.h; NULL: a tree of holonomic joints, never singular */
+  int loops;                  /* 1: bodies form closed loops, whose branches can meet */
+  double evaluated_sine;      /* of the J last checked by pw_watchdog_near, perhaps of a stage */
+  double largest_sine;        /* 0: not known yet */
+  double checked_sine;        /* at the last state for which it was computed */
+  double moved;               /* motion since then [units of L, rad] */
+  double sine_before_checked; /* one state before that; NaN: not computed */
+  double sine_slope;          /* fastest recent change of the sine per unit of motion */
+  int dependent_row;          /* the row that is most nearly dependent */
+  int singular_ahead;         /* 1: a singular configuration may be within the next step */
+  int may_have_crossed;       /* 1: the motion may recently have passed a point where branches cross */
+  double step_length;         /* of the last step, in the units of `moved` */
+  double previous_t;          /* at the state last checked, the beginning of the step to be checked: the time, */
+  double *previous_q;         /* the coordinates and, from number coords + 3 on, the velocities, */
+  double previous_sine;       /* and the sine; NaN: not computed */
+} pw_watchdog;
+
+/* Opens r->watchdog.saddle anew for the active rows.  Errors: PW_RESOURCE. */
+int pw_watchdog_open (struct pw_run *r, pw_error *error);
+
+/* Restarts at the state reached, where J is evaluated. */
+void pw_watchdog_begin (struct pw_run *r);
+
+/* The smallest sine of the angle between a row of the J last evaluated and those before it, 1 without a saddle; *row
+ * (unless NULL): that row, or -1. */
+double pw_watchdog_sine (struct pw_run *r, int *row);
+
+/* pw_watchdog_near at the state reached, where it evaluates J, factorises r->saddle and sets singular_ahead to 1. */
+int pw_watchdog_near_state (struct pw_run *r);
+
+/* Rejects initial values and, in scenes with constraints, masses and inertias whose products overflow.  Errors:
+ * PW_INPUT. */
+int pw_watchdog_check_values (const struct pw_run *r, pw_error *error);
+
+/* 1 if watchdog.singular_ahead and the J last evaluated, for which r->saddle must be factorised, is near a singular
+ * configuration; watchdog.evaluated_sine is then its sine.  Adaptive methods: only where solutions are refined. */
+int pw_watchdog_near (struct pw_run *r);
+
+/* Checks that the motion has come from watchdog.previous_q to the state reached without leaving its branch; sine: that
+ * at the state reached (watchdog.c).  PW_METHOD; PW_RESOURCE. */
+int pw_change_point_check (struct pw_run *r, double sine, pw_error *error);
+
+/* Checks that a step of fixed size resolves a change point that the motion has passed at a small distance; last_sine:
+ * that one state earlier, NaN if it was not computed.  Adaptive methods have error control instead. */
+int pw_change_point_resolve (struct pw_run *r, double last_sine, pw_error *error);
+
+/* PW_METHOD if the last step has passed a dead point, from which prescribed motions cannot go on (watchdog.c). */
+int pw_dead_point_passed (struct pw_run *r, pw_error *error);
+
+/* After a step that has failed with PW_METHOD: if a dead point follows the state last checked, `error` says so.
+ * Returns PW_METHOD. */
+int pw_dead_point_explain (struct pw_run *r, pw_error *error);
+
+/* The data of a run and the functions that the integrators share.  For solvers/ only. */
 
 enum { PW_MAX_OPTIONS = 12 };
 
@@ -31,7 +108,7 @@ struct pw_run {
   int redundant_drive;         /* 1: one of them has an eta, so that work depends on its multiplier */
   int *redundant_row;          /* redundant: their indices */
   unsigned char *active_array; /* rows: what `active` points to */
-  double *coefficient;         /* 5 x rows: a redundant row as a combination of active rows; scratch of redundancy.c */
+  double *coefficient;         /* 5 x rows: a redundant row as a combination of active rows; scratch of independent.c */
   double *row_force;           /* coords + 3: right-hand side for the coefficients of a redundant row; 0 between uses */
   double *least_norm;          /* rows: least-norm multipliers for the ledger */
   double independence;         /* of the active rows at the state reached (rank.h) */
@@ -67,16 +144,16 @@ struct pw_run {
   int stopped;     /* 1: settings.stop has requested a stop */
   int interrupted; /* 1: the method must be restarted: at a breakpoint, after a failed restart or an interrupted step */
   struct {
-    double time, speed; /* time since the start [s]; the largest speed then, in units of the scene (limits.c) */
+    double time, speed;           /* time since the start [s]; the largest speed then, in units of the scene (run.c) */
   } speed_record, earlier_record; /* the last record; the one before, at half its time or less */
 
   double energy0, potential0; /* initial energy and potential energy [J]; energy0 includes changes by pw_run_restart */
-  double exchanged;           /* the largest kinetic energy or change of potential energy so far [J] (ledger.c) */
+  double exchanged;           /* the largest kinetic energy or change of potential energy so far [J] (run.c) */
   double power;               /* the largest sum of the absolute values of the ledger's rates so far [W] */
   double
       *integrand_size; /* integrals: the largest absolute value of each integrand so far, and at a state about L away */
   double *integrand_state; /* 2 coords: the state at which integrands are evaluated */
-  double scene_energy;     /* kinetic energy [J] of moving by L and 1 rad in the span; if massless: see ledger.c */
+  double scene_energy;     /* kinetic energy [J] of moving by L and 1 rad in the span; if massless: see run.c */
   double *scratch;         /* 2 (coords + 3) + 3 rows, for projections and evaluations */
   double *tolerance_bound; /* 2 coords, from pw_kind.saturation; INFINITY: unbounded */
   double *matrix_state, *matrix_range; /* 2 coords: state at which the Newton matrix was evaluated, range around it
@@ -104,7 +181,7 @@ static inline double pw_atol (const pw_run *r, int state) {
   return state < n ? atol : atol / r->w->scale.time;
 }
 /* Updates r->tolerance_bound, the bounds of tolerances due to saturating forces, and r->matrix_outdated at the state
- * reached, whose kinematics must be up to date (tolerances.c). */
+ * reached, whose kinematics must be up to date (run.c). */
 void pw_bound_tolerances (pw_run *r);
 /* Change of a state (numbered as in pw_system_find_state) from the state reached over which a saturating force changes
  * by its own magnitude. */
@@ -271,7 +348,7 @@ double pw_run_acceleration_norm (const pw_run *r);
  * each other, if the motion has jumped to another branch, or does not resolve a change point; PW_RESOURCE. */
 int pw_run_watchdog (pw_run *r, pw_error *error);
 
-/* ---- Limits (limits.c) ---- */
+/* ---- Limits (run.c) ---- */
 
 /* 1 if the caller requests a stop, or has done so since r->stopped, which this sets, was last cleared. */
 static inline int pw_run_stop_requested (pw_run *r) {
@@ -299,7 +376,7 @@ enum { PW_CHECK_INTERVAL = 16 };
 /* After each step: records speeds; PW_METHOD if coordinates are too large for double precision to resolve the scene. */
 int pw_run_check_resolution (pw_run *r, pw_error *error);
 
-/* ---- Energy (ledger.c) ---- */
+/* ---- Energy (run.c) ---- */
 
 /* Kinetic and potential energy [J] at the velocities v; kinematics must be up to date. */
 static inline double pw_energy (const pw_run *r, const double *v) {
@@ -346,7 +423,7 @@ int pw_run_accelerate_evaluated (pw_run *r, const double *v, double *a, double *
 void pw_sample_reached (pw_run *r);
 
 /* Reports why the J last evaluated is unusable at time t: rank lost or nearly lost, or values too extreme
- * (singular.c).  PW_METHOD. */
+ * (rank.c).  PW_METHOD. */
 int pw_fail_singular (pw_run *r, double t, pw_error *error);
 
 /* Completes r->residuals at the state just evaluated, some of which a projection may have computed, and updates the
@@ -404,7 +481,7 @@ int pw_project_state (pw_projector *p, pw_run *r, double t, double *q, double *v
  * removes, in the metric of `saddle` (all rows), which must be factorised at the current configuration. */
 void pw_project_error (pw_run *r, pw_saddle *saddle, double *e, int rows);
 
-/* ---- Specialised code (specialised.c) ---- */
+/* ---- Specialised code (dynamics.c) ---- */
 
 /* Opens the settings' specialised code, if any; the scales, alpha and beta must be known.  Errors: PW_INPUT,
  * PW_RESOURCE. */

@@ -19,7 +19,7 @@ static inline int pw_require (const void *object, const char *type, pw_error *er
   X (steps) X (rejected) X (rhs) X (jacobians) X (factorisations) X (restarts) X (specialised)
 #define PW_STATISTICS_RESIDUALS(X) X (position) X (velocity) X (g) X (jv)
 
-/* ---- Nearest names, domains of numbers (nearest.c) ---- */
+/* ---- Nearest names, domains of numbers (text.c) ---- */
 
 enum { PW_HINT = 140 }; /* "; did you mean \"...\"?" with the longest name */
 
@@ -62,7 +62,7 @@ static inline double pw_value_within (double first, double last) {
   return first + 0.382 * (last - first);
 }
 
-/* ---- Zero-terminated texts (characters.c) ---- */
+/* ---- Zero-terminated texts (text.c) ---- */
 
 /* Bytes of the UTF-8 character at the beginning of a text; 0 if invalid. */
 int pw_utf8_size (const char *text);
@@ -82,7 +82,7 @@ char *pw_print (char *buffer, size_t size, const char *format, ...) PW_PRINTF (3
 /* The result of pw_system_state_name, or a function like it, in such a buffer. */
 #define PW_NAME(function, s, i) function (s, i, (char[PW_NAME_BYTES]){ 0 }, PW_NAME_BYTES)
 
-/* ---- Streams into memory (stream.c) ---- */
+/* ---- Streams into memory (text.c) ---- */
 
 typedef struct {
   char *text;        /* zero-terminated; up to date after fflush */

@@ -1,23 +1,55 @@
-/* The program's commands and their common functions.
- *
- * A command is a table pw_cli_NAME in a file of its own; PW_COMMANDS lists them.  Its function returns PW_OK, a
- * negative status with the error set, or a positive exit status if it has reported everything.  Exit statuses are
- * 0 success, 1 resource error, 2 input, 3 initial conditions, 4 method, 130 interrupted, 141 closed pipe. */
-#ifndef PW_CLI_H
-#define PW_CLI_H
-
+/* The progress of a long run and the remaining time on standard error: a bar on a terminal, else a line a minute. */
+#ifndef PW_CLI_H_
+#define PW_CLI_H_
+#include <time.h>
 #include <popt.h>
 #include <signal.h>
 #include <stdatomic.h>
 #include "pinwheel-files.h"
 #include "pinwheel-solvers.h"
-#include "progress.h"
 #include "util.h"
+#include <stdint.h>
+#include <stdio.h>
+
+/* Zero-initialised, it shows nothing. */
+typedef struct {
+  const char *title; /* printed before the bar */
+  const char *unit;  /* "s" for time; else what is counted; "": a fraction of 1 */
+  double first;      /* initial time or count; not 0 if a run or sweep is resumed */
+  double last;       /* final time [s] or count */
+  double start;      /* clock when the work started [s] */
+  double next;       /* clock before which nothing is drawn or written [s] */
+  double reached;    /* time or count of the last call, */
+  double changed;    /* and the clock when it was reached [s] */
+  double remaining;  /* the remaining time last shown, which does not rise [s]; INFINITY: none yet */
+  int drawn;         /* 1: there is a bar to erase */
+  int no_bar;        /* 1: no bar on a terminal, as the results are printed there; set after the start */
+  int lines;         /* 1: no terminal: lines in place of the bar */
+  char note[60];     /* printed at the end of the line; "" at first */
+} pw_progress;
+
+/* The time of a clock [s]. */
+double pw_seconds (clockid_t id);
+
+/* Starts the progress of a run from time `first` to `last`, with the unit "s"; or of work that is counted in `unit`
+ * ("runs"): `first` of `last` are done already. */
+void pw_progress_start (pw_progress *p, const char *title, const char *unit, double first, double last);
+/* Draws the bar for the time or count reached, at most ten times a second, or writes a line.  A count may exceed the
+ * final one if that was an estimate. */
+void pw_progress_at (pw_progress *p, double reached);
+/* Erases the bar. */
+void pw_progress_end (pw_progress *p);
+
+/* The program's commands and their common functions.
+ *
+ * A command is a table pw_cli_NAME in a file of its own; PW_COMMANDS lists them.  Its function returns PW_OK, a
+ * negative status with the error set, or a positive exit status if it has reported everything.  Exit statuses are
+ * 0 success, 1 resource error, 2 input, 3 initial conditions, 4 method, 130 interrupted, 141 closed pipe. */
 
 /* Exit statuses after SIGINT or SIGTERM, and after SIGPIPE: 128 + SIGINT and 128 + SIGPIPE, as shells report them. */
 enum { PW_INTERRUPTED = 130, PW_CLOSED_PIPE = 141 };
 
-/* ---- Requests to stop; commands check them between steps or more often (stop.c) ---- */
+/* ---- Requests to stop; commands check them between steps or more often (terminal.c) ---- */
 
 /* 1: all runs stop.  Set by SIGINT and SIGTERM, and by the threads of a command after an error that ends it. */
 extern atomic_int pw_stop;
@@ -322,5 +354,112 @@ const char *pw_cli_status_word (int status);
 /* Prints an error, if there is one, as "pinwheel: TEXT" on standard error, without "pinwheel:" if TEXT begins with a
  * file and line; returns the exit status.  A closed pipe on standard output is not reported: PW_CLOSED_PIPE. */
 int pw_cli_report_error (const pw_error *error);
+
+/* Strings of variable length, and the cells of a line of a CSV table. */
+
+/* A string; zero-initialised, it is empty. */
+typedef struct {
+  char *chars;   /* zero-terminated; NULL before anything is added */
+  size_t length; /* bytes, without the terminating zero */
+  size_t room;   /* bytes allocated */
+  int failed;    /* 1: out of memory, so that text is missing */
+} pw_text;
+
+void pw_text_clear (pw_text *t);
+void pw_text_free (pw_text *t);
+void pw_text_add (pw_text *t, const char *text);
+void pw_text_add_bytes (pw_text *t, const char *bytes, size_t count);
+/* Add a cell, after a comma unless it is the first of its line: a number with 17 digits, nan if not finite; or text. */
+void pw_text_number (pw_text *t, double value);
+void pw_text_cell (pw_text *t, const char *text);
+/* Adds the cell "NAME [UNIT]"; no unit if it is NULL or "". */
+void pw_text_name (pw_text *t, const char *name, const char *unit);
+/* Adds a cell in quotes; line ends in it become blanks. */
+void pw_text_quoted (pw_text *t, const char *text);
+/* Writes the text and a line end to a file, and frees the text.  PW_OK, or PW_RESOURCE with the file's folder. */
+int pw_text_line (pw_text *t, FILE *f, const char *folder, pw_error *error);
+
+/* Closes an incomplete table: it remains as NAME.part, whose path goes to the buffer; without rows it is removed, and
+ * the path is "". */
+void pw_cli_abandon_table (pw_output *o, long rows, char *part, size_t size);
+/* Closes a table that was written with this status: with PW_OK as NAME, else as NAME.part, and says so.  A status. */
+int pw_cli_close_table (pw_output *o, int status, pw_error *error);
+
+/* Fingerprints of checkpoints and journals of sweeps: a first line that names the format (`magic`, with its "\n"),
+ * lines "KEY = VALUE" with everything that determines the results of a run or a sweep, and a line "end". */
+
+/* ---- Writing ---- */
+
+/* Adds the line "KEY NAME = VALUE", where the key is that of a list of values; or, if `name` is NULL, "KEY = VALUE". */
+void pw_fingerprint_line (pw_text *t, const char *key, const char *name, const char *value);
+void pw_fingerprint_number (pw_text *t, const char *key, const char *name, double value);
+/* Adds a line with the name of a file and a checksum of its contents.  PW_INPUT or PW_RESOURCE if it cannot be read. */
+int pw_fingerprint_file (pw_text *t, const char *key, const char *name, const char *path, pw_error *error);
+/* Adds the first lines of the fingerprint of a run or sweep: `magic`, version, model, the checksum of its tables
+ * (pw_fingerprint_tables) unless it is 0, method, span, step and tolerances.  Errors as of pw_fingerprint_file. */
+int pw_fingerprint_run (pw_text *t, const char *magic, const pw_file *file, uint64_t table_sum, const char *method,
+                        const pw_settings *settings, pw_error *error);
+/* Continues a checksum, 0 at first, with the tables in the signals of a model. */
+uint64_t pw_fingerprint_tables (uint64_t sum, const pw_model *m);
+/* Adds a line for each state of a list of "STATE=VALUE", its last value; the list ends with NULL, or is NULL. */
+void pw_fingerprint_initial (pw_text *t, const char **starts);
+
+/* ---- Reading ---- */
+
+/* The end of the fingerprint at the beginning of a text; NULL if it is incomplete or its first line is not `magic`. */
+const char *pw_fingerprint_end (const char *magic, const char *at, const char *end);
+/* The value of a key, of *size bytes and not zero-terminated; NULL if there is none. */
+const char *pw_fingerprint_value (const char *at, const char *end, const char *key, size_t *size);
+
+typedef struct {
+  const char *begin, *end;
+  const char *where; /* in messages: "here", "there" */
+} pw_fingerprint;
+
+/* 1 if fingerprints differ in a key other than `ignored` (may be NULL); `text` is then the first difference: "step is
+ * 0.001 there and 0.002 here". */
+int pw_fingerprint_differ (pw_fingerprint a, pw_fingerprint b, const char *ignored, char *text, size_t size);
+
+/* Independent tasks in several threads, for sweeps, studies and searches. */
+
+/* The number of concurrent tasks: the value of --jobs, else OMP_NUM_THREADS, else that of available processors. */
+int pw_parallel_jobs (const char *text, int *jobs, pw_error *error);
+
+/* Task number i; returns a status. */
+typedef int pw_task (void *context, int i, pw_error *error);
+
+/* Calls task (context, i) for each i < count in any order, in at most `jobs` threads, of which the caller is one.
+ * After the first task that does not return PW_OK no further ones are called; its status and error are returned.
+ * PW_RESOURCE if a thread cannot be started: no task has been called. */
+int pw_parallel (int jobs, int count, pw_task *task, void *context, pw_error *error);
+/* The same for tasks that are timed: each thread has physical cores of its own, so there are no more threads than
+ * cores.  If the cores are unknown, the tasks are called one after the other. */
+int pw_parallel_timed (int jobs, int count, pw_task *task, void *context, pw_error *error);
+
+/* Printed tables: columns as wide as their widest cell. */
+
+/* Write the rows in a loop, which is passed twice, first to measure the columns:
+ *
+ *     for (pw_table t = { 0 }; pw_table_pass (&t);)
+ *       for (...) { pw_cell (&t, -8, name); pw_cell_number (&t, 13, value, 8); pw_row_end (&t); } */
+typedef struct {
+  FILE *f;               /* NULL: standard output */
+  int pass;              /* 1: measures, 2: prints */
+  int column, width[12]; /* the current column, of at most 12 */
+  int pad;               /* blanks before the next cell */
+  int indent;            /* characters of the row so far, with those blanks */
+} pw_table;
+
+int pw_table_pass (pw_table *table);
+/* A cell after two blanks, of at least |width| characters, aligned to the right; width <= 0: to the left.  Returns 1 if
+ * it is printed in this pass. */
+int pw_cell (pw_table *table, int width, const char *text);
+/* A number with this number of digits; empty if it is NaN. */
+int pw_cell_number (pw_table *table, int width, double value, int digits);
+/* A cell "NAME [UNIT]". */
+int pw_cell_unit (pw_table *table, int width, const char *name, const char *unit);
+void pw_row_end (pw_table *table);
+/* A row of headings, or the rest of one, ended by NULL: the first in a cell of width `first`, others of `width`. */
+void pw_head (pw_table *table, int first, int width, const char *const *heading);
 
 #endif

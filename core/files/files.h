@@ -7,14 +7,14 @@
 #include "pinwheel-files.h"
 #include "util.h"
 
-/* ---- Paths (path.c) ---- */
+/* ---- Paths (number.c) ---- */
 
 /* The size of a buffer for a path: a path that is cut to it is still too long for the system, which refuses it. */
 enum { PW_PATH = PATH_MAX + 1 };
 /* Prints a path into the buffer, which is returned. */
 char *pw_path (char path[PW_PATH], const char *format, ...) PW_PRINTF (2, 3);
 
-/* ---- Search path for models (search.c) ---- */
+/* ---- Search path for models (file.c) ---- */
 
 typedef struct {
   char *name; /* "ezyroller" */
@@ -43,7 +43,7 @@ int pw_search_page_file (const char *file, char path[PW_PATH], pw_error *error);
 /* Whether a name has an ending such as ".so", after at least one character. */
 int pw_ends_with (const char *name, const char *ending);
 
-/* ---- Model files in C (build.c) ---- */
+/* ---- Model files in C (compiler.c) ---- */
 
 /* What is done with the compiled object at a path; it is deleted afterwards. */
 typedef int pw_object_user (void *context, const char *object, pw_error *error);
@@ -67,7 +67,7 @@ const char *pw_compiler (void);
 /* Makes a new folder in TMPDIR that only the user can use.  PW_OK or PW_RESOURCE. */
 int pw_temporary_folder (char folder[PW_PATH], pw_error *error);
 
-/* ---- The cache (cache.c) ---- */
+/* ---- The cache (compiler.c) ---- */
 
 /* Stores the path of the cache's folder, which is created if it does not exist; 0 if there is none, with a notice in
  * the buffer (otherwise unchanged) if one exists but others could have written to it, or it is unusable. */
@@ -85,7 +85,7 @@ void pw_yaml_close (pw_yaml *y);
 const pw_plugin_table *pw_yaml_table (const pw_yaml *y);
 /* Writes the text, as read but for a byte order mark. */
 void pw_yaml_write_source (const pw_yaml *y, FILE *f);
-/* Writes the tree as bytes, for programs without libfyaml (yaml_stored.c). */
+/* Writes the tree as bytes, for programs without libfyaml (yaml_read.c). */
 void pw_yaml_write_tree (const pw_yaml *y, FILE *f);
 /* As pw_file_tables. */
 int pw_yaml_tables (const pw_yaml *y, int (*each) (void *context, const char *path), void *context);
@@ -103,7 +103,7 @@ typedef enum { PW_GAPS_REFUSED, PW_GAPS_ALLOWED } pw_gaps;
 double *pw_columns_from_stream (FILE *f, const char *shown, const char *const *column, const char *const *unit,
                                 int width, pw_gaps gaps, int *rows, pw_error *error);
 
-/* ---- Units (units.c) ---- */
+/* ---- Units (columns.c) ---- */
 
 /* A known unit: "mm" is "1e-3" of "m".  The first four are the base units. */
 typedef struct {
@@ -125,7 +125,7 @@ int pw_read_file (const char *failure, const char *path, size_t max_bytes, const
 int pw_read_rest (FILE *f, size_t max_bytes, const char *path, const char *limit, char **text, size_t *size,
                   pw_error *error);
 
-/* ---- Names of files (location.c) ---- */
+/* ---- Names of files (file.c) ---- */
 
 /* Why a file is refused: "it is a directory, not a regular file". */
 const char *pw_not_regular (mode_t mode);
@@ -144,7 +144,7 @@ typedef struct {
 /* 0 or an errno value. */
 int pw_locate (pw_location *p, const char *path);
 
-/* ---- Locks (lock.c) ---- */
+/* ---- Locks (file.c) ---- */
 
 typedef enum {
   PW_LOCK_NEW,     /* a new file; removes one left by a killed process */

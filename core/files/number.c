@@ -3,10 +3,12 @@
 #include <ctype.h>
 #include <locale.h>
 #include <math.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "pinwheel-files.h"
+#include "files.h"
 
 /* strfromd, since printf takes a slower path once LAPACK has loaded libquadmath. */
 #ifndef __GLIBC__
@@ -44,4 +46,14 @@ int pw_read_number (const char *text, double *value) {
   if (*end) return PW_INPUT;
   *value = x;
   return PW_OK;
+}
+
+/* Paths in buffers. */
+
+char *pw_path (char path[PW_PATH], const char *format, ...) {
+  va_list arguments;
+  va_start (arguments, format);
+  vsnprintf (path, PW_PATH, format, arguments);
+  va_end (arguments);
+  return path;
 }

@@ -100,7 +100,7 @@ int pw_read_number (const char *text, double *value);
 /* The same for numbers and expressions of numbers, as in text models: "30*deg", "2*pi/3". */
 int pw_read_expression (const char *text, double *value);
 
-/* ---- Formulas: expressions of named numbers, the same language (formula.c) ---- */
+/* ---- Formulas: expressions of named numbers, the same language (parser.c) ---- */
 
 typedef struct pw_formula pw_formula;
 
@@ -112,7 +112,7 @@ pw_formula *pw_formula_open (const char *text, const char *const *names, pw_erro
 double pw_formula_value (const pw_formula *f, const double *value);
 void pw_formula_close (pw_formula *f);
 
-/* ---- Tables of numbers: units in their headers, "NAME [UNIT]" (units.c), and columns (columns.c) ---- */
+/* ---- Tables of numbers: units in their headers, "NAME [UNIT]" (columns.c), and columns (columns.c) ---- */
 
 /* Finds the factor from a unit to SI units.  PW_INPUT if it is unknown, PW_RETRY if its dimension is not that of
  * `wanted`, unless that is NULL or unknown. */

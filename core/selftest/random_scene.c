@@ -2,7 +2,7 @@
 #include <math.h>
 #include <string.h>
 #include "model.h"
-#include "random_scene.h"
+#include "selftest.h"
 
 double pw_random_between (pw_random *r, double low, double high) {
   return low + (high - low) * ldexp ((double)(pw_random_bits (&r->state) >> 11), -53);

@@ -53,7 +53,7 @@ typedef struct pw_scene_step {
   double *lambda;              /* scratch: multipliers of a stage */
 } pw_scene_step;
 
-/* The watchdog (watchdog.h) in specialised code.  The motion of a step is the largest change of a body's coordinate, in
+/* The watchdog (method.h) in specialised code.  The motion of a step is the largest change of a body's coordinate, in
  * units of the scene; `sine` is that of the smallest angle between a row of J and those before it.  All members are of
  * the type double, since specialised code copies them as an array. */
 typedef struct {

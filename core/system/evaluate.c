@@ -1,7 +1,11 @@
 /* Evaluation of all batches, and products with J. */
 #include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include "system.h"
+#include "sine.h"
+#include "signal.h"
 
 void pw_evaluate_J (pw_workspace *w) {
   PW_EACH_CONSTRAINT (k, w) k->kind->J (&k->b, k->J);
@@ -173,4 +177,665 @@ void pw_evaluate_position_residual (pw_workspace *w, const unsigned char *enforc
 void pw_evaluate_residuals (pw_workspace *w, const unsigned char *enforced, pw_residuals *r) {
   pw_evaluate_position_residual (w, enforced, r);
   pw_evaluate_velocity_residual (w, enforced, r);
+}
+
+/* Kinematics of a state: configurations of all bodies, signals of all elements. */
+
+void pw_point_to_internal (pw_workspace *w, const double *q, const double *v) {
+  for (pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++) {
+    if (q) k->b.q = q + k->internal;
+    k->b.v = v + k->internal;
+  }
+}
+
+/* Two bodies at a time; singly the last of an odd number, and all from a pair with an angle beyond the limit on. */
+void pw_update_configurations (pw_workspace *w, const double *q, const double *v) {
+  if (w->s->coords > 3 * w->s->bodies) pw_point_to_internal (w, q, v);
+  pw_configuration *p = w->configuration, *end = p + w->s->bodies;
+  _Static_assert(PW_SINE_LANES == 2, "bodies are evaluated in pairs");
+  for (; p + 1 < end; p += 2, q += 6, v += 6) {
+    pw_lanes c, s;
+    if (!(fabs (q[2]) < PW_SINE_LIMIT && fabs (q[5]) < PW_SINE_LIMIT)) break;
+    pw_sin_cos_lanes ((pw_lanes){ q[2], q[5] }, &s, &c);
+    p[0] = (pw_configuration){ q[0], q[1], q[2], c[0], s[0], v[0], v[1], v[2] };
+    p[1] = (pw_configuration){ q[3], q[4], q[5], c[1], s[1], v[3], v[4], v[5] };
+  }
+  for (; p < end; p++, q += 3, v += 3) {
+    double c, s;
+    pw_sin_cos (q[2], &s, &c);
+    *p = (pw_configuration){ q[0], q[1], q[2], c, s, v[0], v[1], v[2] };
+  }
+}
+
+/* Copies the states that a function reads; q NULL: only velocities.  Returns the number of states copied. */
+static int kinematics_copy_states (const pw_workspace *w, const pw_source *source, const double *q, const double *v) {
+  int copied = 0;
+  for (int r = 0; r < source->reads; r++) {
+    int j = source->state[r], velocity = j >= w->s->coords;
+    if (q == NULL && !velocity) continue;
+    source->x[r] = velocity ? v[j - w->s->coords] : q[j];
+    copied++;
+  }
+  return copied;
+}
+
+int pw_update_signals (pw_workspace *w, double t, const double *q, const double *v) {
+  int new_time = t != w->t_signal && !isnan (t); /* NaN: pw_update_velocities, after a failure */
+  if (!new_time && w->s->state_dependent == 0) return PW_OK;
+  if (new_time) w->t_signal = NAN; /* if a signal fails, others have changed already */
+  for (pw_source *source = w->source, *end = source + w->s->sources; source < end; source++) {
+    if (w->hold && source->of_force) continue;
+    if (kinematics_copy_states (w, source, q, v) == 0 && !(new_time && source->reads == 0)) continue;
+    if (pw_signal_eval (source, t) == 0) continue;
+    w->failed = source;
+    return PW_METHOD;
+  }
+  if (new_time) w->t_signal = t;
+  return PW_OK;
+}
+
+int pw_update_kinematics (pw_workspace *w, double t, const double *q, const double *v) {
+  pw_update_configurations (w, q, v);
+  return pw_update_signals (w, t, q, v);
+}
+
+int pw_update_velocities (pw_workspace *w, const double *v) {
+  const double *from = v;
+  for (pw_configuration *p = w->configuration, *end = p + w->s->bodies; p < end; p++, from += 3)
+    p->vx = from[0], p->vy = from[1], p->omega = from[2];
+  if (w->s->coords > 3 * w->s->bodies) pw_point_to_internal (w, NULL, v);
+  return w->s->state_dependent > 0 ? pw_update_signals (w, w->t_signal, NULL, v) : PW_OK;
+}
+
+void pw_hold_signals (pw_workspace *w, int hold) {
+  w->hold = hold;
+  w->t_signal = NAN;
+}
+
+double pw_next_breakpoint (pw_workspace *w, int kinks, double t) {
+  double next = INFINITY;
+  for (const pw_source *source = w->source, *end = source + w->s->sources; source < end; source++) {
+    double breakpoint = pw_signal_breakpoint (&source->signal, kinks && !source->of_force, t);
+    if (breakpoint < next) next = breakpoint;
+    if (breakpoint > t) continue;
+    w->failed = source;
+    return NAN;
+  }
+  return next;
+}
+
+/* Second-order blocks, by formulas or by differences.
+ *
+ * Central differences with step h = eps^(1/3) in units of the scene (more for values above 1, see blocks_step):
+ * truncation and round-off are both of the order eps^(2/3) (Dennis & Schnabel 1983, section 5.6). */
+
+/* Each block is the derivative of `original` of the type's table, or of its product with w or lambda.  `function`: the
+ * type's function for it; for PW_JTL_Q jw_q, from which blocks_transpose computes the block. */
+#define BLOCKS_ENTRY(f, g) .function = offsetof (pw_kind, f), .original = offsetof (pw_kind, g)
+static const struct {
+  size_t function, original;
+  enum { BLOCKS_NONE, BLOCKS_J_W, BLOCKS_JT_LAMBDA } product;
+  int velocity; /* 1: derivative with respect to v; 0: to q */
+  int square;   /* 1: it has as many rows as local columns; 0: kind->rows */
+} blocks_table[PW_BLOCKS] = {
+  [PW_JW_Q] = { BLOCKS_ENTRY (jw_q, J), .product = BLOCKS_J_W },
+  [PW_JTL_Q] = { BLOCKS_ENTRY (jw_q, J), .product = BLOCKS_JT_LAMBDA, .square = 1 },
+  [PW_ETA_Q] = { BLOCKS_ENTRY (eta_q, eta) },
+  [PW_GAMMA_Q] = { BLOCKS_ENTRY (gamma_q, gamma) },
+  [PW_GAMMA_V] = { BLOCKS_ENTRY (gamma_v, gamma), .velocity = 1 },
+  [PW_FORCE_Q] = { BLOCKS_ENTRY (force_q, force), .square = 1 },
+  [PW_FORCE_V] = { BLOCKS_ENTRY (force_v, force), .velocity = 1, .square = 1 },
+};
+
+pw_batch_function *pw_block_function (const pw_kind *kind, pw_block block) {
+  return pw_kind_function (kind, blocks_table[block].function);
+}
+
+int pw_block_rows (const pw_kind *kind, pw_block block) {
+  return blocks_table[block].square ? 3 * kind->bodies + kind->internal : kind->rows;
+}
+
+/* A batch of one element with a copy of its configurations, which can be changed without affecting other elements. */
+typedef struct {
+  pw_batch b;
+  int body[PW_MAX_BODIES];
+  pw_configuration configuration[PW_MAX_BODIES];
+  double q[PW_MAX_INTERNAL], v[PW_MAX_INTERNAL];
+} blocks_single;
+
+static void blocks_isolate (const pw_element_batch *k, int e, blocks_single *one) {
+  const pw_kind *kind = k->kind;
+  one->b = k->b;
+  one->b.count = 1;
+  one->b.element = (const char *)k->b.element + (size_t)e * kind->element;
+  for (int n = 0; n < kind->bodies; n++) {
+    one->configuration[n] = k->b.configuration[k->b.body[e * kind->bodies + n]];
+    one->body[n] = n;
+  }
+  for (int n = 0; n < kind->internal; n++) {
+    one->q[n] = k->b.q[e * kind->internal + n];
+    one->v[n] = k->b.v[e * kind->internal + n];
+  }
+  one->b.body = one->body;
+  one->b.configuration = one->configuration;
+  one->b.q = one->q;
+  one->b.v = one->v;
+  one->b.u = k->b.u + 3 * e * kind->signals;
+  if (k->b.w) one->b.w = k->b.w + e * k->b.cols;
+  if (k->b.lambda) one->b.lambda = k->b.lambda + e * kind->rows;
+}
+
+/* The coordinate or velocity of local column c. */
+static double *blocks_variable (const pw_kind *kind, blocks_single *one, int c, int velocity) {
+  if (c >= 3 * kind->bodies) return (velocity ? one->v : one->q) + c - 3 * kind->bodies;
+  pw_configuration *p = &one->configuration[c / 3];
+  double *const q[] = { &p->x, &p->y, &p->phi }, *const v[] = { &p->vx, &p->vy, &p->omega };
+  return velocity ? v[c % 3] : q[c % 3];
+}
+
+/* y = the function or product whose derivative the block is. */
+static void blocks_value (const pw_kind *kind, pw_block block, blocks_single *one, double *y) {
+  pw_batch_function *original = pw_kind_function (kind, blocks_table[block].original);
+  int rows = kind->rows, cols = one->b.cols;
+  double J[PW_MAX_ROWS * PW_MAX_COLS] = { 0 };
+  memset (y, 0, PW_MAX_COLS * sizeof *y);
+  for (int n = 0; n < kind->bodies; n++) {
+    pw_configuration *p = &one->configuration[n];
+    pw_sin_cos (p->phi, &p->sin, &p->cos);
+  }
+  if (original == NULL) return;
+  if (blocks_table[block].product == BLOCKS_NONE) {
+    original (&one->b, y);
+    return;
+  }
+  original (&one->b, J);
+  for (int r = 0; r < rows; r++)
+    for (int c = 0; c < cols; c++) {
+      if (blocks_table[block].product == BLOCKS_J_W)
+        y[r] += J[r * cols + c] * one->b.w[c];
+      else
+        y[c] += J[r * cols + c] * one->b.lambda[r];
+    }
+}
+
+/* The scene's unit of a local column, or of its velocity. */
+static double blocks_unit (const pw_workspace *w, const pw_kind *kind, int c, int velocity) {
+  double unit = c < 3 * kind->bodies && c % 3 < 2 ? w->scale.length : 1;
+  return velocity ? unit / w->scale.time : unit;
+}
+
+/* An exactly representable step h that balances truncation, (h / unit)^2, and round-off, eps x / h, eps = 2.3e-16. */
+static double blocks_step (const pw_workspace *w, const pw_kind *kind, int c, int velocity, double x) {
+  double unit = blocks_unit (w, kind, c, velocity);
+  volatile double moved = x + unit * cbrt (2.3e-16 * fmax (1, fabs (x) / unit));
+  return moved - x;
+}
+
+void pw_difference (const pw_workspace *w, const pw_element_batch *k, int e, pw_block block, double *out) {
+  const pw_kind *kind = k->kind;
+  int velocity = blocks_table[block].velocity, rows = pw_block_rows (kind, block), cols = k->b.cols;
+  blocks_single one;
+  blocks_isolate (k, e, &one);
+  for (int c = 0; c < cols; c++) {
+    double plus[PW_MAX_COLS], minus[PW_MAX_COLS], *x = blocks_variable (kind, &one, c, velocity), x0 = *x;
+    double h = blocks_step (w, kind, c, velocity, x0);
+    *x = x0 + h;
+    blocks_value (kind, block, &one, plus);
+    *x = x0 - h;
+    blocks_value (kind, block, &one, minus);
+    *x = x0;
+    int ground = c < 3 * kind->bodies && k->column[e * kind->bodies + c / 3] >= w->s->coords;
+    for (int r = 0; r < rows; r++) out[r * cols + c] = ground ? 0 : (plus[r] - minus[r]) / (2 * h);
+  }
+}
+
+/* A derivative per unit of the variable is taken for 0 if it is at most this part of the function's value; that of a
+ * constant function is round-off, eps / h = 4e-11 of the value. */
+#define BLOCKS_ZERO 1e-6
+
+int pw_block_missing (const pw_workspace *w, const pw_element_batch *k, int e, pw_block block) {
+  double value[PW_MAX_COLS], slope[PW_MAX_COLS * PW_MAX_COLS], most = 0;
+  const pw_kind *kind = k->kind;
+  int rows = pw_block_rows (kind, block), cols = k->b.cols;
+  blocks_single one;
+  if (pw_block_function (kind, block) || pw_kind_function (kind, blocks_table[block].original) == NULL) return 0;
+  blocks_isolate (k, e, &one);
+  blocks_value (kind, block, &one, value);
+  for (int r = 0; r < rows; r++) most = fmax (most, fabs (value[r]));
+  pw_difference (w, k, e, block, slope);
+  for (int i = 0; i < rows * cols; i++)
+    if (fabs (slope[i]) * blocks_unit (w, kind, i % cols, blocks_table[block].velocity) > BLOCKS_ZERO * most) return 1;
+  return 0;
+}
+
+/* Moves an element to an irregular state, with other angle and angular velocity of its body n if `turned`. */
+static void blocks_scatter (const pw_workspace *w, const pw_element_batch *k, int e, int n, int turned,
+                            blocks_single *one, double *u) {
+  const pw_kind *kind = k->kind;
+  double L = w->scale.length;
+  int i = 1;
+  blocks_isolate (k, e, one);
+  for (int b = 0; b < kind->bodies; b++) {
+    pw_configuration *p = &one->configuration[b];
+    double turn = turned && b == n ? 1.1 : 0;
+    if (k->column[e * kind->bodies + b] >= w->s->coords) continue;
+    p->x = L * pw_sin (2.4 * i++), p->y = L * pw_sin (2.4 * i++), p->phi = pw_sin (2.4 * i++) + turn;
+    p->vx = L * pw_sin (2.4 * i++), p->vy = L * pw_sin (2.4 * i++), p->omega = pw_sin (2.4 * i++) + turn;
+    pw_sin_cos (p->phi, &p->sin, &p->cos);
+  }
+  for (int c = 0; c < kind->internal; c++) one->q[c] = pw_sin (2.4 * i++), one->v[c] = pw_sin (2.4 * i++);
+  for (int c = 0; c < 3 * kind->signals; c++) u[c] = pw_sin (2.4 * i++);
+  one->b.u = u;
+}
+
+int pw_uses_angle (const pw_workspace *w, const pw_element_batch *k, int e, int n) {
+  const pw_kind *kind = k->kind;
+  const int cols = k->b.cols, column = 3 * n + 2;
+  const struct {
+    pw_batch_function *function;
+    int size, width; /* entries; those of each local column in a row, 0: they do not belong to columns */
+  } part[] = { { kind->g, kind->rows, 0 },     { kind->eta, kind->rows, 0 },
+               { kind->gamma, kind->rows, 0 }, { kind->J, kind->rows * cols, 1 },
+               { kind->force, cols, 1 },       { kind->force_u, cols * kind->signals, kind->signals } };
+  blocks_single one, other;
+  double u[3 * PW_MAX_SIGNALS], x[PW_MAX_COLS * PW_MAX_ROWS], y[PW_MAX_COLS * PW_MAX_ROWS];
+  blocks_scatter (w, k, e, n, 0, &one, u);
+  blocks_scatter (w, k, e, n, 1, &other, u);
+  for (size_t f = 0; f < sizeof part / sizeof *part; f++) {
+    if (part[f].function == NULL) continue;
+    part[f].function (&one.b, x);
+    part[f].function (&other.b, y);
+    for (int i = 0; i < part[f].size; i++)
+      if (x[i] != y[i] || (part[f].width && i / part[f].width % cols == column && x[i] != 0)) return 1;
+  }
+  return 0;
+}
+
+/* d(J^T lambda)/dq of element e from its d(J w)/dq: entry (r, c) is sum_i lambda_i dJ_ir/dq_c, where w = e_r gives
+ * column r of J. */
+static void blocks_transpose (const pw_element_batch *k, int e, pw_batch_function *jw_q, double *out) {
+  double w[PW_MAX_COLS] = { 0 }, slope[PW_MAX_ROWS * PW_MAX_COLS];
+  int cols = k->b.cols;
+  blocks_single one;
+  blocks_isolate (k, e, &one);
+  one.b.w = w;
+  memset (out, 0, (size_t)(cols * cols) * sizeof *out);
+  for (int r = 0; r < cols; r++) {
+    w[r] = 1;
+    jw_q (&one.b, slope);
+    w[r] = 0;
+    for (int i = 0; i < k->kind->rows; i++)
+      for (int c = 0; c < cols; c++) out[r * cols + c] += k->b.lambda[e * k->kind->rows + i] * slope[i * cols + c];
+  }
+}
+
+int pw_evaluate_block (const pw_workspace *w, const pw_element_batch *k, pw_block block, double *out) {
+  pw_batch_function *function = pw_block_function (k->kind, block);
+  if (function == NULL) return 0;
+  if (function != pw_by_differences && block != PW_JTL_Q) {
+    function (&k->b, out);
+    return 1;
+  }
+  for (int e = 0, size = pw_block_rows (k->kind, block) * k->b.cols; e < k->b.count; e++, out += size)
+    if (function == pw_by_differences)
+      pw_difference (w, k, e, block, out);
+    else
+      blocks_transpose (k, e, function, out);
+  return 1;
+}
+
+/* The changes of positions and velocities that reverse saturating forces, such as friction (pw_kind.saturation). */
+
+/* Fills the batch's block, 2 cols per element, if its forces saturate.  Returns the number of entries. */
+static int saturation_fill (const pw_element_batch *k) {
+  int n = k->kind->saturation ? k->b.count * 2 * k->b.cols : 0;
+  for (int i = 0; i < n; i++) k->block[i] = INFINITY;
+  if (n > 0) k->kind->saturation (&k->b, k->block);
+  return n;
+}
+
+/* The state of entry i of the block, numbered as in pw_system_find_state; -1: the ground's. */
+static int saturation_state (const pw_system *s, const pw_element_batch *k, int i) {
+  int cols = k->b.cols, c = i % (2 * cols), j = pw_global (k, i / (2 * cols), c % cols);
+  return j >= s->coords ? -1 : c < cols ? j : s->coords + j;
+}
+
+/* Loops over the entries i of the blocks of saturating batches k. */
+#define EACH_SATURATION(k, i, w) \
+  PW_EACH_BATCH (k, w)           \
+    for (int i = 0, n = saturation_fill (k); i < n; i++)
+
+void pw_evaluate_saturation (pw_workspace *w, double *least) {
+  for (int j = 0; j < 2 * w->s->coords; j++) least[j] = INFINITY;
+  EACH_SATURATION (k, i, w) {
+    int state = saturation_state (w->s, k, i);
+    if (state >= 0) least[state] = fmin (least[state], k->block[i]);
+  }
+}
+
+int pw_find_saturation (pw_workspace *w, double *least, char *element, size_t size) {
+  int found = -1;
+  *least = INFINITY;
+  EACH_SATURATION (k, i, w) {
+    int state = saturation_state (w->s, k, i);
+    if (state < w->s->coords || !(k->block[i] < *least)) continue;
+    *least = k->block[i], found = state;
+    snprintf (element, size, "%s %s", k->kind->name, k->name[i / (2 * k->b.cols)]);
+  }
+  return found;
+}
+
+/* Finds the element with non-finite values, for error messages. */
+
+int pw_find_nonfinite (pw_workspace *w, char *buffer, size_t size) {
+  PW_EACH_BATCH (k, w) {
+    const int rows = k->kind->rows, cols = k->b.cols;
+    const struct {
+      const char *name;
+      pw_batch_function *function;
+      double *value;
+      int each; /* numbers of an element */
+    } part[] = { { "force", k->kind->force, k->block, cols },
+                 { "J", rows ? k->kind->J : NULL, k->J, rows * cols },
+                 { "gamma", rows ? k->kind->gamma : NULL, w->scratch + k->row, rows } };
+    for (int p = 0; p < 3; p++) {
+      if (part[p].function) part[p].function (&k->b, part[p].value);
+      for (int i = 0; part[p].function && i < k->b.count * part[p].each; i++) {
+        if (isfinite (part[p].value[i])) continue;
+        snprintf (buffer, size, "%s of %s %s", part[p].name, k->kind->name, k->name[i / part[p].each]);
+        return 1;
+      }
+    }
+  }
+  return 0;
+}
+
+/* The ledger: which elements do work or dissipate energy, and their power. */
+
+/* 1 if an element may do work: its type has a function `power` or eta.  A position prescribed by constants does no
+ * work. */
+static int ledger_has_work (const pw_element_batch *k, int element) {
+  const pw_kind *kind = k->kind;
+  int constants = 0;
+  if (kind->power) return 1;
+  if (kind->rows == 0 || kind->eta == NULL) return 0;
+  for (int u = 0; u < kind->signals; u++)
+    constants += k->source[element * kind->signals + u].signal.type == PW_CONSTANT;
+  return kind->level != PW_HOLONOMIC || constants < kind->signals;
+}
+
+int pw_ledger_list (const pw_system *s, pw_entry *entry) {
+  int count = 0;
+  for (int i = 0; i < s->batches; i++) {
+    const pw_element_batch *k = &s->batch[i];
+    for (int loss = 0; loss < 2; loss++)
+      for (int e = 0; e < k->b.count; e++)
+        if (loss ? k->kind->loss != NULL : ledger_has_work (k, e))
+          entry[count++] = (pw_entry){ i, e, loss ? PW_LOSS : PW_WORK };
+  }
+  return count;
+}
+
+char *pw_system_ledger_name (const pw_system *s, int entry, char *buffer, size_t size) {
+  const pw_entry *listed = &s->entry[entry];
+  return pw_member_name (s, &s->batch[listed->batch], listed->element, listed->type == PW_WORK ? "work" : "loss",
+                         buffer, size);
+}
+
+void pw_evaluate_ledger (pw_workspace *w, const double *lambda, double *rate) {
+  const pw_element_batch *last = NULL;
+  int type = -1;
+  double *eta = w->scratch;
+  for (int i = 0; i < w->s->entries; i++) {
+    const pw_entry *entry = &w->s->entry[i];
+    pw_element_batch *k = &w->batch[entry->batch];
+    int by_eta = k->kind->rows > 0 && entry->type == PW_WORK && k->kind->power == NULL; /* see the end of the loop */
+    if (k != last || (int)entry->type != type) {
+      k->b.lambda = lambda + k->row;
+      (by_eta                   ? k->kind->eta
+       : entry->type == PW_WORK ? k->kind->power
+                                : k->kind->loss) (&k->b, by_eta ? eta : k->block);
+      last = k;
+      type = (int)entry->type;
+    }
+    if (!by_eta) {
+      rate[i] = k->block[entry->element];
+      continue;
+    }
+    rate[i] = 0; /* the constraint force -J^T lambda has the power -lambda . J v = -lambda . eta */
+    for (int r = 0, n = k->kind->rows; r < n; r++)
+      rate[i] -= k->b.lambda[entry->element * n + r] * eta[entry->element * n + r];
+  }
+}
+
+/* Workspaces: data that a run modifies. */
+
+/* Copies batches and signals of the system, with arrays of the workspace; x: for the states that signals read. */
+static void workspace_fill (pw_workspace *w, double *x) {
+  const pw_system *s = w->s;
+  double *J = w->J;
+  for (int i = 0; i < s->batches; i++) {
+    pw_element_batch *k = &w->batch[i];
+    *k = s->batch[i];
+    k->J = J, k->block = w->block;
+    J += k->b.count * k->kind->rows * k->b.cols;
+    k->source = w->source + (k->source - s->source);
+    k->b.u = k->u = w->u + 3 * (k->source - w->source);
+    k->b.configuration = w->configuration;
+    k->b.q = s->q0 + k->internal, k->b.v = s->v0 + k->internal; /* until kinematics are updated */
+  }
+  for (int i = 0; i < s->sources; i++) {
+    w->source[i] = s->source[i];
+    w->source[i].u = w->u + 3 * i;
+    w->source[i].x = x;
+    x += 2 * s->source[i].reads; /* values, gradient */
+  }
+  w->configuration[s->bodies].cos = 1;
+}
+
+/* Opens a context of this workspace for each function signal with `open`. */
+static int workspace_open_signals (pw_workspace *w) {
+  int status = PW_OK;
+  for (pw_source *source = w->source; source < w->source + w->s->sources; source++) {
+    pw_function *f = &source->signal.function;
+    if (source->signal.type != PW_FUNCTION || f->open == NULL) continue;
+    f->context = status == PW_OK ? f->open (f->context) : NULL;
+    if (f->context) continue;
+    status = PW_RESOURCE; /* pw_close_signals must skip this signal and the following ones, which are not opened */
+    f->close = NULL;
+  }
+  return status;
+}
+
+void pw_close_signals (const pw_source *source, int count) {
+  for (int i = 0; i < count; i++) {
+    const pw_signal *signal = &source[i].signal;
+    if (signal->type == PW_FUNCTION && signal->function.open && signal->function.close)
+      signal->function.close (signal->function.context);
+  }
+}
+
+pw_workspace *pw_workspace_new (const pw_system *s, pw_error *error) {
+  if (pw_require (s, "a system", error) != PW_OK) return NULL;
+  pw_workspace all = { .s = s, .scale = s->scale, .t_signal = NAN }, *w = NULL;
+  char *memory;
+  double *x = NULL;
+  for (pw_layout l = { 0 }; pw_layout_pass (&l, &memory);) {
+    w = pw_layout_alloc (&l, 1, sizeof *w);
+    all.batch = pw_layout_alloc (&l, (size_t)s->batches, sizeof *all.batch);
+    all.source = pw_layout_alloc (&l, (size_t)s->sources, sizeof *all.source);
+    all.configuration = pw_layout_alloc (&l, (size_t)s->bodies + 1, sizeof *all.configuration);
+    all.scratch = pw_layout_alloc (&l, (size_t)(3 * s->rows + s->coords) + 3, sizeof *all.scratch);
+    all.u = pw_layout_alloc (&l, 3 * (size_t)s->sources, sizeof *all.u);
+    all.J = pw_layout_alloc (&l, s->jacobian, sizeof *all.J);
+    all.block = pw_layout_alloc (&l, s->block, sizeof *all.block);
+    x = pw_layout_alloc (&l, 2 * (size_t)s->reads, sizeof *x);
+  }
+  if (w) {
+    *w = all;
+    workspace_fill (w, x);
+    if (workspace_open_signals (w) == PW_OK) return w;
+  }
+  pw_workspace_free (w);
+  pw_fail_memory (s, error);
+  return NULL;
+}
+
+void pw_workspace_free (pw_workspace *w) {
+  if (w) pw_close_signals (w->source, w->s->sources);
+  free (w);
+}
+
+/* Elements: their properties, contact points and forces; the equations of motion. */
+
+int pw_system_elements (const pw_system *s) {
+  int count = 0;
+  for (int i = 0; i < s->batches; i++) count += s->batch[i].b.count;
+  return count;
+}
+
+pw_element_info pw_system_element (const pw_system *s, int element) {
+  pw_element_info info = { .contact = 0 };
+  const pw_element_batch *k = s->batch;
+  for (; element >= k->b.count; element -= k++->b.count) {
+    info.contact += k->kind->contact ? k->b.count : 0;
+    info.force += 3 * k->b.count * k->kind->bodies;
+  }
+  info.kind = k->kind;
+  info.name = k->name[element];
+  info.body = k->b.body + element * k->kind->bodies;
+  info.row = k->row + element * k->kind->rows;
+  info.coordinate = k->internal + element * k->kind->internal;
+  info.contact = k->kind->contact ? info.contact + element : -1;
+  info.force += 3 * element * k->kind->bodies;
+  return info;
+}
+
+static int elements_update (pw_workspace *w, double t, const double *q, const double *v, pw_error *error) {
+  if (pw_require (w, "a workspace", error) != PW_OK) return PW_INPUT;
+  return pw_update_kinematics (w, t, q, v) == PW_OK ? PW_OK : pw_fail_evaluation (w, t, error);
+}
+
+/* ---- Contact points ---- */
+
+int pw_system_contacts (const pw_system *s) {
+  int count = 0;
+  for (int i = 0; i < s->batches; i++) count += s->batch[i].kind->contact ? s->batch[i].b.count : 0;
+  return count;
+}
+
+char *pw_system_contact_name (const pw_system *s, int i, char *buffer, size_t size) {
+  const pw_element_batch *k = s->batch;
+  int contact = i / 2;
+  for (; k->kind->contact == NULL || contact >= k->b.count; k++) contact -= k->kind->contact ? k->b.count : 0;
+  return pw_member_name (s, k, contact, i % 2 ? "y" : "x", buffer, size);
+}
+
+int pw_workspace_contact_points (pw_workspace *w, double t, const double *q, const double *v, double (*out)[3],
+                                 pw_error *error) {
+  int status = elements_update (w, t, q, v, error);
+  if (status != PW_OK) return status;
+  PW_EACH_BATCH (k, w) {
+    if (k->kind->contact == NULL) continue;
+    k->kind->contact (&k->b, out[0]);
+    out += k->b.count;
+  }
+  return PW_OK;
+}
+
+/* ---- Forces ---- */
+
+/* F -= J^T lambda of each element, only the columns of bodies. */
+static void elements_reactions (const pw_element_batch *k, const double *lambda, double *F) {
+  const double *J = k->J;
+  int cols = 3 * k->kind->bodies;
+  for (int e = 0; e < k->b.count; e++, F += cols)
+    for (int i = 0; i < k->kind->rows; i++, J += k->b.cols, lambda++)
+      for (int c = 0; c < cols; c++) F[c] -= J[c] * *lambda;
+}
+
+/* F += the force of each element, only the components of bodies. */
+static void elements_applied (const pw_element_batch *k, double *F) {
+  int cols = 3 * k->kind->bodies;
+  k->kind->force (&k->b, k->block);
+  for (int e = 0; e < k->b.count; e++, F += cols)
+    for (int c = 0; c < cols; c++) F[c] += k->block[e * k->b.cols + c];
+}
+
+int pw_system_force_size (const pw_system *s) {
+  int size = 0;
+  for (int i = 0; i < s->batches; i++) size += 3 * s->batch[i].b.count * s->batch[i].kind->bodies;
+  return size;
+}
+
+int pw_workspace_forces (pw_workspace *w, double t, const double *q, const double *v, const double *lambda, double *out,
+                         pw_error *error) {
+  int status = elements_update (w, t, q, v, error);
+  if (status != PW_OK) return status;
+  memset (out, 0, (size_t)pw_system_force_size (w->s) * sizeof *out);
+  pw_evaluate_J (w);
+  PW_EACH_BATCH (k, w) {
+    if (k->kind->rows) elements_reactions (k, lambda + k->row, out);
+    if (k->kind->force) elements_applied (k, out);
+    out += 3 * k->b.count * k->kind->bodies;
+  }
+  return PW_OK;
+}
+
+/* ---- Equations ---- */
+
+static int elements_allocate (const pw_system *s, pw_equations *out, pw_error *error) {
+  size_t n = (size_t)s->coords, rows = (size_t)s->rows;
+  double *indices;
+  const pw_array array[] = { { &out->mass, n },      /* first: it is what pw_equations_free frees */
+                             { &out->force, n + 3 }, /* three more entries: the ground's */
+                             { &out->g, rows },        { &out->eta, rows },
+                             { &out->gamma, rows },    { &out->value, s->jacobian },
+                             { &indices, s->jacobian } }; /* two indices fit in one double */
+  out->coordinates = s->coords, out->rows = s->rows, out->holonomic = s->holonomic;
+  if (pw_alloc_arrays (array, sizeof array / sizeof *array) == NULL) return pw_fail_memory (s, error);
+  out->row = (int *)(void *)indices;
+  out->column = out->row + s->jacobian;
+  return PW_OK;
+}
+
+/* Stores the entries of J that are not in columns of the ground. */
+static void elements_jacobian (const pw_workspace *w, pw_equations *out) {
+  PW_EACH_CONSTRAINT (k, w)
+    for (int i = 0; i < k->b.count * k->kind->rows; i++)
+      for (int c = 0; c < k->b.cols; c++) {
+        int column = pw_global (k, i / k->kind->rows, c);
+        if (column >= w->s->coords) continue;
+        out->row[out->entries] = k->row + i;
+        out->column[out->entries] = column;
+        out->value[out->entries++] = k->J[i * k->b.cols + c];
+      }
+}
+
+static int elements_evaluate (pw_workspace *w, double t, const double *q, const double *v, pw_equations *out,
+                              pw_error *error) {
+  if (elements_update (w, t, q, v, error) != PW_OK) return PW_METHOD;
+  pw_evaluate_J (w);
+  elements_jacobian (w, out);
+  memcpy (out->mass, w->s->M, (size_t)w->s->coords * sizeof *out->mass);
+  pw_evaluate_force (w, out->force);
+  pw_evaluate_g (w, out->g);
+  pw_evaluate_eta (w, out->eta);
+  pw_evaluate_gamma (w, out->gamma);
+  return PW_OK;
+}
+
+int pw_system_equations (const pw_system *s, double t, const double *q, const double *v, pw_equations *out,
+                         pw_error *error) {
+  *out = (pw_equations){ .rows = 0 };
+  pw_workspace *w = pw_workspace_new (s, error);
+  int status = w ? elements_allocate (s, out, error) : s ? PW_RESOURCE : PW_INPUT;
+  if (status == PW_OK) status = elements_evaluate (w, t, q, v, out, error);
+  pw_workspace_free (w);
+  return status;
+}
+
+void pw_equations_free (pw_equations *e) {
+  free (e->mass);
+  *e = (pw_equations){ .rows = 0 };
 }

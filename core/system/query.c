@@ -263,3 +263,20 @@ int pw_system_may_jump (const pw_system *s) {
     if (!pw_kind_is_built_in (s->batch[i].kind)) return 1;
   return s->state_dependent > 0;
 }
+
+/* ---- Reference solution ---- */
+
+int pw_system_reference (const pw_model *m, const pw_system *s, double t, double *q, double *v, pw_error *error) {
+  if (pw_require (m, "a model", error) != PW_OK || pw_require (s, "a system", error) != PW_OK) return PW_INPUT;
+  int n = pw_system_coordinates (s);
+  for (int j = 0; j < n; j++) q[j] = v[j] = NAN;
+  if (m->table->reference) m->table->reference (m->parameters, t, q, v);
+  const pw_reference_text *text = pw_model_reference_text (m);
+  for (int i = 0; i < text->states; i++) {
+    int state = pw_system_find_state (s, text->state[i], error);
+    if (state < 0) return state;
+    double *entry = state < n ? &q[state] : &v[state - n];
+    *entry = text->eval (text->context, i, t);
+  }
+  return PW_OK;
+}

@@ -118,7 +118,7 @@ int pw_branch_locate (pw_branch *b, pw_branch_test *test, void *context, pw_erro
  * which a real mode changes its stability is one event.  `locate` is called with problem.context. */
 int pw_branch_find_changes (pw_branch *b, int before, int now, pw_branch_locate_mode *locate, pw_error *error);
 
-/* ---- continuation_newton.c, for continuation.c only ---- */
+/* ---- continuation.c, for continuation.c only ---- */
 
 enum { PW_BRANCH_MOST = 8 };                /* iterations of a point of a branch: a shorter step is the better remedy */
 static const double PW_BRANCH_EXACT = 1e-4; /* |F| relative to the tolerance that needs no further iteration */

@@ -55,7 +55,7 @@ static inline double pw_periodic_parameter (const pw_periodic *x, const double *
   return x->settings.first + u[pw_periodic_unknowns (x)] * (x->settings.last - x->settings.first);
 }
 
-/* ---- periodic_flow.c ---- */
+/* ---- periodic.c ---- */
 
 /* The system at a value of the parameter.  NULL, with x->why, if there is none. */
 const pw_system *pw_periodic_system (pw_periodic *x, double value);
@@ -71,7 +71,7 @@ int pw_periodic_flow (pw_periodic *x, const double *u, pw_flow_accuracy accuracy
  * failure. */
 int pw_periodic_settle (pw_periodic *x, double value, int periods);
 
-/* ---- periodic_equations.c ---- */
+/* ---- periodic.c ---- */
 
 enum { PW_PERIODIC_WORK = 34 }; /* numbers of work space of LAPACK per minimal coordinate */
 /* Sets the displacement in u to the one that agrees best with a flow of one period from the state of u.  A status. */

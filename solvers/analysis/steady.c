@@ -1,10 +1,13 @@
-/* The search for steady motions; equations in steady_equations.c. */
-#include "steady_parts.h"
+/* The search for steady motions; equations in steady.c. */
+#include <lapacke.h>
 #include <math.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include "steady_parts.h"
 #include "util.h"
+#include "rank.h"
 
 enum {
   STEADY_POINTS = 50,       /* of a branch, by default */
@@ -373,4 +376,502 @@ int pw_steady_suggest (pw_steady *x, pw_initial_value *hold, int most) {
   }
   free (basis);
   return count;
+}
+
+/* Branches of steady motions: points, folds and changes of stability. */
+
+static const double BRANCH_MIN_STEP = 1e-7, /* in scaled unknowns; the range of the parameter is 1 */
+    BRANCH_ACCURACY = 1e-9;                 /* of events, relative to the step */
+enum { BRANCH_MAX_POINTS = 100 /* as a multiple of those that the settings ask for */ };
+
+int pw_steady_follow (pw_steady *x, const double *q, const double *v, double parameter, int direction,
+                      pw_error *error) {
+  pw_error ignored = { 0 };
+  if (error == NULL) error = &ignored;
+  if (pw_require (x, "a search", error) != PW_OK) return PW_INPUT;
+  pw_branch_end (&x->branch);
+  if (pw_require (q, "q", error) != PW_OK || pw_require (v, "v", error) != PW_OK) return PW_INPUT;
+  const double first = x->settings.first, last = x->settings.last;
+  if (pw_check_branch (direction, first, last, error) != PW_OK || pw_check_parameter (parameter, error) != PW_OK)
+    return PW_INPUT;
+  pw_steady_motion motion;
+  x->free_symmetries = 0;
+  int status = pw_steady_nearest (x, q, v, x->u, error);
+  x->u[pw_steady_unknowns (x)] = (parameter - first) / (last - first);
+  if (status == PW_OK) status = pw_branch_solve (&x->branch, x->u, error);
+  if (status == PW_OK) status = pw_steady_motion_at (x, x->u, &motion, error);
+  if (status == PW_OK) status = pw_steady_find_free_symmetries (x);
+  if (status == PW_OK) status = pw_branch_start (&x->branch, x->u, direction, error);
+  if (status == PW_RESOURCE) return pw_fail_memory (x->s, error);
+  if (status != PW_OK)
+    return status < 0 && error->status ? status : pw_fail (error, PW_METHOD, "the branch cannot be followed from here");
+  x->unstable = motion.unstable;
+  x->branch.max_change = 1.0 / x->settings.points, x->branch.step = x->branch.max_change / 4;
+  x->branch.min_step = BRANCH_MIN_STEP, x->branch.event_accuracy = BRANCH_ACCURACY;
+  x->branch.max_points = BRANCH_MAX_POINTS * x->settings.points;
+  return PW_OK;
+}
+
+/* ---- Events ---- */
+
+/* The real part of eigenvalue number `sought` of those whose real part is not 0, without rigid displacements, and its
+ * imaginary part; -1 if there are fewer. */
+static double branch_eigenvalue (const pw_steady *x, int sought, double *im) {
+  const pw_linear *l = &x->linear;
+  for (int i = 0; i < l->unknowns; i++) {
+    if (l->re[i] == 0 || l->rigid[i]) continue;
+    if (sought-- == 0) return *im = l->im[i], l->re[i];
+  }
+  return *im = 0, -1;
+}
+
+/* pw_branch_test.  If as many eigenvalues have real part 0 as at both ends of the step (x->neutral_at_ends): the real
+ * part that changes its sign; if more have: 0; otherwise 1 if more than `sought` modes grow, or else -1. */
+static int branch_test (void *steady, const pw_branch_point *point, double *value, pw_error *error) {
+  pw_steady *x = steady;
+  pw_steady_motion motion;
+  double im;
+  int status = pw_steady_motion_at (x, point->u, &motion, error);
+  if (status != PW_OK) return status;
+  *value = motion.unstable > x->sought ? 1 : -1;
+  if (x->neutral_at_ends == x->neutral) *value = branch_eigenvalue (x, x->sought, &im);
+  if (x->neutral_at_ends >= 0 && x->neutral_at_ends < x->neutral) *value = 0;
+  return PW_OK;
+}
+
+/* Whether a conjugate pair changes the sign of its real part at the point located; in the step `changing` modes do. */
+static int branch_pair (const pw_steady *x, int changing) {
+  double im;
+  branch_eigenvalue (x, x->sought, &im);
+  if (x->neutral_at_ends < 0) return im != 0 || changing == 2;
+  return x->neutral > x->neutral_at_ends ? x->neutral - x->neutral_at_ends >= 2 : im != 0;
+}
+
+/* pw_branch_locate_mode: changes of the sign of a real part. */
+static int branch_locate (void *steady, int mode, int change, int *event, int *modes, pw_error *error) {
+  pw_steady *x = steady;
+  x->sought = mode;
+  int status = pw_branch_locate (&x->branch, branch_test, x, error);
+  if (status != PW_OK) return status;
+  const int pair = branch_pair (x, abs (change));
+  *event = pair ? PW_STEADY_OSCILLATION : PW_STEADY_REAL, *modes = 1 + pair;
+  return PW_OK;
+}
+
+/* pw_branch_find_events */
+static int branch_events (void *steady, pw_error *error) {
+  pw_steady *x = steady;
+  pw_steady_motion motion;
+  int before = x->unstable, neutral = x->neutral, status = pw_steady_motion_at (x, x->branch.reached.u, &motion, error);
+  if (status != PW_OK) return status;
+  x->unstable = motion.unstable;
+  x->neutral_at_ends = neutral == x->neutral ? neutral : -1;
+  neutral = x->neutral;
+  status = pw_branch_find_changes (&x->branch, before, x->unstable, branch_locate, error);
+  x->neutral = neutral;
+  return status;
+}
+
+int pw_steady_next (pw_steady *x, pw_steady_motion *out, pw_error *error) {
+  int status = pw_require (x, "a search", error);
+  *out = (pw_steady_motion){ .event = PW_STEADY_END };
+  if (status != PW_OK) return status;
+  const pw_branch_event *next;
+  status = pw_branch_next (&x->branch, branch_events, &x->why, &next, error);
+  if (next == NULL) return status;
+  int neutral = x->neutral;
+  out->event = (pw_steady_event)next->event;
+  out->iterations = x->branch.iterations;
+  out->residual = next->point.residual;
+  status = pw_steady_motion_at (x, next->point.u, out, error);
+  if (next->event != PW_BRANCH_POINT) out->unstable = next->unstable;
+  x->neutral = neutral;
+  return status;
+}
+
+/* The equations of steady motions.
+ *
+ * The system has symmetries: displacements of the whole, and of angles on which nothing depends.  S_k (q) is the
+ * velocity of a displacement along the k-th one at unit rate.  A steady motion has the velocities v = xi_1 S_1 (q) +
+ * xi_2 S_2 (q) + ... with constant xi.  In the frame that moves with it its velocities are constant: with the angular
+ * velocity w of the whole and W (x, y, phi) = w (-y, x, 0) for each body,
+ *
+ *     g (q, t) = 0,   J v = eta,   a (q, v) = W v,   A - value B = 0 for what is held (steady_symmetries.c).
+ *
+ * The unknowns are u = (q, xi), both scaled by units of the scene, and on a branch the parameter.  There are more
+ * equations than unknowns, and they depend on each other, since symmetries and conservation laws make steady motions
+ * families; continuation.h solves them by least squares.  Their exact derivatives are those of the linearisation
+ * (linear.c) for the variations dq, dv = W dq + dxi_k S_k.  On a branch, corrections are orthogonal to the
+ * symmetries that leave what is held unchanged.
+ *
+ * (Relative equilibria: Marsden & Ratiu 1999, Introduction to Mechanics and Symmetry.) */
+
+double pw_steady_parameter (const pw_steady *x, const double *u) {
+  return x->settings.first + (x->settings.last - x->settings.first) * u[x->n + x->symmetries];
+}
+
+void pw_steady_state (pw_steady *x, const double *u) {
+  for (int j = 0; j < x->n; j++) x->q[j] = u[j] * pw_unit (x->s, j);
+  pw_steady_combine (x, u + x->n, x->T, x->rates);
+  pw_steady_velocities (x, x->rates, x->q, x->v);
+  if (x->settings.vary >= 0) x->hold[x->settings.vary].value = pw_steady_parameter (x, u);
+}
+
+int pw_steady_same_motion (void *steady, const double *u, const double *other) {
+  pw_steady *x = steady;
+  size_t n = (size_t)x->n;
+  double *q = x->null_space, *v = q + n;
+  pw_steady_state (x, u);
+  memcpy (q, x->q, n * sizeof *q), memcpy (v, x->v, n * sizeof *v);
+  pw_steady_state (x, other);
+  return pw_steady_distance (x, q, v, x->q, x->v) <= PW_BRANCH_SAME;
+}
+
+int pw_steady_nearest (pw_steady *x, const double *q, const double *v, double *u, pw_error *error) {
+  int n = x->n, columns = x->symmetries, rank;
+  double *S = x->F, *right = S + n * columns, *work = right + n + columns;
+  memset (x->branch.pivot, 0, (size_t)columns * sizeof *x->branch.pivot);
+  for (int j = 0; j < n; j++) u[j] = q[j] / pw_unit (x->s, j), right[j] = v[j] / pw_unit (x->s, j) * x->T;
+  for (int k = 0; k < columns; k++) {
+    pw_steady_velocities (x, x->symmetry + k * pw_steady_rate_count (x->s), q, S + k * n);
+    for (int j = 0; j < n; j++) S[k * n + j] /= pw_unit (x->s, j);
+  }
+  if (columns && LAPACKE_dgelsy_work (LAPACK_COL_MAJOR, n, columns, 1, S, n, right, n > columns ? n : columns,
+                                      x->branch.pivot, PW_STEADY_RANK, &rank, work, PW_STEADY_WORK * (n + columns)))
+    return pw_fail (error, PW_METHOD, "the symmetries cannot be separated");
+  memcpy (u + n, right, (size_t)columns * sizeof *u);
+  return PW_OK;
+}
+
+/* ---- Residuals ---- */
+
+/* The residuals g, J v - eta, a - W v of x->system in the state x->q, x->v, at which its accelerations have been
+ * evaluated. */
+static void steady_residual (pw_steady *x, double *F) {
+  pw_linearisation *l = &x->system.linearisation;
+  pw_workspace *w = x->system.run->w;
+  double acceleration = x->T * x->T / x->L;
+  pw_evaluate_g (w, F);
+  for (int i = 0; i < x->holonomic; i++) F[i] /= x->norm[i] * x->L;
+  F += x->holonomic;
+  pw_mul_J (w, x->v, F);
+  if (x->s->rheonomic) pw_evaluate_eta (w, l->row_scratch);
+  for (int i = 0; i < x->m; i++) F[i] = (F[i] - (x->s->rheonomic ? l->row_scratch[i] : 0)) * x->T / (x->norm[i] * x->L);
+  F += x->m;
+  memcpy (F, l->a, (size_t)x->n * sizeof *F);
+  pw_linear_turn (l, -x->rates[PW_RATE_TURN], x->v, F);
+  for (int j = 0; j < x->n; j++) F[j] *= pw_length_factor (x->s, j) * acceleration;
+}
+
+/* ---- Derivatives ---- */
+
+/* The change of the residuals by the variation (dq, dv) in l->dx and the change dw of the angular velocity w. */
+static void steady_change (pw_steady *x, double dw, double *F) {
+  pw_linearisation *l = &x->system.linearisation;
+  int n = x->n;
+  double *dq = l->dx, *dv = l->dx + n;
+  pw_mul_J (x->system.run->w, dq, l->row_scratch);
+  for (int i = 0; i < x->holonomic; i++) *F++ = l->row_scratch[i] / (x->norm[i] * x->L);
+  pw_linear_vary (l);
+  pw_mul_J (x->system.run->w, dv, l->row_scratch);
+  for (int i = 0; i < x->m; i++) *F++ = (l->row_scratch[i] + l->product[n + x->m + i]) * x->T / (x->norm[i] * x->L);
+  pw_linear_turn (l, -x->rates[PW_RATE_TURN], dv, l->da);
+  pw_linear_turn (l, -dw, x->v, l->da);
+  for (int j = 0; j < n; j++) *F++ = l->da[j] * pw_length_factor (x->s, j) * x->T * x->T / x->L;
+  for (int i = 0; i < x->settings.holds; i++) *F++ = pw_hold_residual (x, x->hold + i, dq, dv);
+}
+
+/* The conditions that dq is orthogonal to the free symmetries. */
+static void steady_conditions (pw_steady *x, double *dF) {
+  int equations = pw_steady_equations (x);
+  dF += equations - x->symmetries;
+  for (int i = 0; i < x->free_symmetries; i++) {
+    double square = 0;
+    pw_steady_combine (x, x->free_symmetry + i * x->symmetries, 1, x->combined);
+    pw_steady_velocities (x, x->combined, x->q, x->dq);
+    for (int j = 0; j < x->n; j++) x->dq[j] /= pw_unit (x->s, j), square += x->dq[j] * x->dq[j];
+    for (int j = 0; j < x->n; j++) dF[j * equations + i] = x->dq[j] / sqrt (square);
+  }
+}
+
+/* Derivatives with respect to the unknowns q and xi. */
+static void steady_columns (pw_steady *x, double *dF) {
+  pw_linearisation *l = &x->system.linearisation;
+  int n = x->n, equations = pw_steady_equations (x);
+  for (int c = 0; c < pw_steady_unknowns (x); c++, dF += equations) {
+    const double *symmetry = x->symmetry + (c < n ? 0 : c - n) * pw_steady_rate_count (x->s); /* only for c >= n */
+    memset (l->dx, 0, 2 * (size_t)n * sizeof *l->dx);
+    if (c < n) {
+      l->dx[c] = pw_unit (x->s, c);
+      pw_linear_turn (l, x->rates[PW_RATE_TURN], l->dx, l->dx + n);
+    } else {
+      pw_steady_velocities (x, symmetry, x->q, l->dx + n);
+      for (int j = n; j < 2 * n; j++) l->dx[j] /= x->T;
+    }
+    steady_change (x, c < n ? 0 : symmetry[PW_RATE_TURN] / x->T, dF);
+  }
+}
+
+int pw_steady_evaluate (void *steady, const double *u, double *F, double *dF, pw_error *error) {
+  pw_steady *x = steady;
+  int first_held = pw_steady_equations (x) - x->symmetries - x->settings.holds;
+  int status = pw_steady_open_system (x, pw_steady_parameter (x, u));
+  if (status < 0) pw_fail (error, status, "%s", x->why.text);
+  if (status != PW_OK) return status;
+  pw_linearisation *l = &x->system.linearisation;
+  pw_steady_state (x, u);
+  status = dF ? pw_linear_evaluate (l, x->settings.t, x->q, x->v)
+              : pw_run_accelerate (x->system.run, x->settings.t, x->q, x->v, l->a, l->lambda);
+  if (status != PW_OK) {
+    x->why = (pw_error){ 0 };
+    if (status > 0) pw_fail_singular (x->system.run, x->settings.t, &x->why);
+    return PW_RETRY;
+  }
+  steady_residual (x, F);
+  for (int i = 0; i < x->settings.holds; i++) F[first_held + i] = pw_hold_residual (x, x->hold + i, NULL, NULL);
+  if (dF == NULL) return PW_OK;
+  steady_columns (x, dF);
+  steady_conditions (x, dF);
+  return PW_OK;
+}
+
+/* ---- Singular constraints ---- */
+
+/* Evaluates the rows of J at u, of length 1 (m x n); active (m, or NULL): 1 for independent ones. */
+static int steady_rows (pw_steady *x, const double *u, double *rows, unsigned char *active, pw_error *error) {
+  int status = pw_steady_open_system (x, pw_steady_parameter (x, u));
+  if (status < 0) pw_fail (error, status, "%s", x->why.text);
+  if (status != PW_OK) return status;
+  pw_run *r = x->system.run;
+  pw_steady_state (x, u);
+  if (pw_evaluate_J_at (r->w, x->settings.t, x->q, x->v) != PW_OK) return PW_RETRY;
+  pw_rank_rows (r->w, rows, NULL);
+  for (int i = 0; active && i < x->m; i++) active[i] = r->active == NULL || r->active[i];
+  return PW_OK;
+}
+
+/* 1 if det (A B^T) < 0 for the active rows of A and B (m x n): between them, J has lost rank.  G: m x m, scratch. */
+static int steady_loses_rank (const pw_steady *x, const unsigned char *active, const double *A, const double *B,
+                              double *G, int *pivot) {
+  int rank = 0, negative = 0;
+  for (int i = 0; i < x->m; i++) rank += active[i];
+  for (int i = 0, row = 0; i < x->m; i++) {
+    for (int k = 0, column = 0; active[i] && k < x->m; k++) {
+      double sum = 0;
+      for (int j = 0; active[k] && j < x->n; j++) sum += A[i * x->n + j] * B[k * x->n + j];
+      if (active[k]) G[row * rank + column++] = sum;
+    }
+    row += active[i];
+  }
+  if (rank == 0 || LAPACKE_dgetrf (LAPACK_ROW_MAJOR, rank, rank, G, rank, pivot) != 0) return rank > 0;
+  for (int i = 0; i < rank; i++) negative ^= (G[i * rank + i] < 0) ^ (pivot[i] != i + 1);
+  return negative;
+}
+
+int pw_steady_check_step (void *steady, const double *from, const double *to, pw_error *error) {
+  pw_steady *x = steady;
+  const size_t m = (size_t)x->m, entries = m * (size_t)x->n;
+  double *A = malloc ((2 * entries + m * m + 1) * sizeof *A + m * (1 + sizeof (int)));
+  if (A == NULL) return pw_fail_memory (x->s, error);
+  double *B = A + entries, *G = B + entries;
+  int *pivot = (int *)(G + m * m), row = -1;
+  unsigned char *active = (unsigned char *)(pivot + m);
+  int status = steady_rows (x, from, A, active, error), redundant = status == PW_OK ? x->system.run->redundant : 0;
+  if (status == PW_OK) status = steady_rows (x, to, B, NULL, error);
+  pw_run *r = x->system.run;
+  if (status == PW_OK && (r->redundant > redundant || steady_loses_rank (x, active, A, B, G, pivot))) {
+    status = PW_RETRY;
+    if (r->redundant > redundant)
+      row = r->redundant_row[0];
+    else
+      pw_watchdog_sine (r, &row);
+    x->why = (pw_error){ 0 };
+    pw_fail (&x->why, PW_METHOD, "the constraints become singular: %s depends on other constraints",
+             row >= 0 ? PW_NAME (pw_system_row_name, x->s, row) : "one of them");
+  }
+  free (A);
+  return status;
+}
+
+/* Where the search for steady motions begins: the initial state, states that forces lead to, random states. */
+
+enum { START_STEPS = 300 };               /* of a relaxation, at most */
+static const double START_FAR = 0.2,      /* longest of its steps, in units of the scene */
+    START_GROW = 1.1, START_SHRINK = 0.4; /* factors of the next step */
+
+/* A random number between -1 and 1. */
+static double start_random (uint64_t *state) {
+  return (double)(int64_t)pw_random_bits (state) * 0x1p-63;
+}
+
+/* Makes the positions x->q consistent, if possible. */
+static int start_assemble (pw_steady *x, pw_projector *p) {
+  double *q = x->scratch[0];
+  memcpy (q, x->q, (size_t)x->n * sizeof *q);
+  int status = pw_project_positions (p, x->system.run, x->settings.t, q, x->v);
+  if (status == PW_OK) memcpy (x->q, q, (size_t)x->n * sizeof *q);
+  return status;
+}
+
+/* The accelerations in the moving frame at x->q, x->rates; returns the largest, divided by the unit of its coordinate
+ * [1/s^2], or NaN if they are not determined. */
+static double start_accelerate (pw_steady *x, double *a) {
+  pw_linearisation *l = &x->system.linearisation;
+  double most = 0;
+  pw_steady_velocities (x, x->rates, x->q, x->v);
+  if (pw_run_accelerate (x->system.run, x->settings.t, x->q, x->v, l->a, l->lambda) != PW_OK) return NAN;
+  memcpy (a, l->a, (size_t)x->n * sizeof *a);
+  pw_linear_turn (l, -x->rates[PW_RATE_TURN], x->v, a);
+  for (int j = 0; j < x->n; j++) most = pw_larger_or_nan (most, fabs (a[j]) / pw_unit (x->s, j));
+  return most;
+}
+
+/* Moves positions along the accelerations, at constant rates: towards a minimum of the potential, if forces have one.
+ * Steps become longer while the direction of the accelerations changes by less than 90 degrees, otherwise shorter. */
+static void start_relax (pw_steady *x, pw_projector *p) {
+  double *a = x->scratch[1], *before = x->scratch[2], most = start_accelerate (x, a), step = START_FAR / most;
+  for (int i = 0; i < START_STEPS && most > 0 && isfinite (step); i++) {
+    double dot = 0;
+    for (int j = 0; j < x->n; j++) x->q[j] += fmin (step, START_FAR / most) * a[j];
+    if (start_assemble (x, p) != PW_OK) return;
+    memcpy (before, a, (size_t)x->n * sizeof *a);
+    most = start_accelerate (x, a);
+    for (int j = 0; j < x->n; j++) dot += a[j] * before[j] / (pw_unit (x->s, j) * pw_unit (x->s, j));
+    step *= dot > 0 ? START_GROW : START_SHRINK;
+  }
+}
+
+int pw_steady_start (pw_steady *x, int attempt, double *u, pw_error *error) {
+  int status = pw_steady_nearest (x, x->start, x->start + x->n, u, error);
+  uint64_t state = (uint64_t)attempt * 0xd1342543de82ef95; /* of the random numbers; far apart between attempts */
+  double wide = attempt % 2 ? 1 : 0.2;                     /* of lengths L, angles pi, rates 2 / T */
+  const int relaxed = attempt == 1 || attempt % 4 == 2, consistent = relaxed || attempt % 4 == 3;
+  pw_projector p;
+  for (int j = 0; attempt > 1 && j < pw_steady_unknowns (x); j++)
+    u[j] += wide * start_random (&state) * (j >= x->n ? 2 : pw_is_angle (x->s, j) ? PW_PI : 1);
+  if (status != PW_OK || !consistent) return status;
+  pw_steady_state (x, u);
+  if (pw_evaluate_J_at (x->system.run->w, x->settings.t, x->q, x->v) != PW_OK) return PW_OK; /* as it is */
+  if (pw_projector_open (&p, x->system.run, x->s->metric, x->s->metric, &x->why) != PW_OK)
+    return pw_fail_memory (x->s, error);
+  if (start_assemble (x, &p) == PW_OK && relaxed) start_relax (x, &p);
+  pw_projector_close (&p);
+  for (int j = 0; j < x->n; j++) u[j] = x->q[j] / pw_unit (x->s, j);
+  return PW_OK;
+}
+
+/* The systems and runs of a search for steady motions, at values of the parameter. */
+
+void pw_steady_close_system (pw_steady *x) {
+  pw_linear_close (&x->system.linearisation);
+  if (x->system.run) pw_run_close (x->system.run);
+  pw_system_free (x->system.own);
+  memset (&x->system, 0, sizeof x->system);
+}
+
+int pw_steady_same_sizes (const pw_system *a, const pw_system *b, pw_error *why) {
+  if (b->coords == a->coords && b->rows == a->rows && b->holonomic == a->holonomic && b->bodies == a->bodies)
+    return PW_OK;
+  return pw_fail (why, PW_INPUT, "model %s: the parameter changes the number of bodies or constraint equations",
+                  b->model);
+}
+
+/* Opens a run at the last solution, or if that cannot be made consistent, at rest in its configuration. */
+static int steady_open_run (pw_steady *x, const pw_system *s) {
+  const pw_settings settings = {
+    .t = x->settings.t, .span = x->settings.span, .initial = x->solution, .initials = x->solved ? 2 * x->n : 0
+  };
+  x->system.run = pw_run_open (s, "rk4+projection", &settings, &x->why);
+  if (x->system.run == NULL && x->why.status == PW_INITIAL && x->solved) {
+    for (int j = x->n; j < 2 * x->n; j++) x->solution[j].value = 0;
+    x->why = (pw_error){ 0 };
+    x->system.run = pw_run_open (s, "rk4+projection", &settings, &x->why);
+  }
+  if (x->system.run == NULL) return x->why.status;
+  int status = pw_linear_open (&x->system.linearisation, x->system.run, PW_LINEAR_BASES);
+  return status == PW_OK ? PW_OK : pw_fail_memory (s, &x->why);
+}
+
+pw_system *pw_compile_at (pw_system *(*compile) (void *context, double value, pw_error *error), void *context,
+                          double value, pw_error *why) {
+  *why = (pw_error){ 0 };
+  pw_system *s = compile (context, value, why);
+  if (s && why->status == PW_OK) return s;
+  pw_fail (why, PW_INPUT, "there is no system at %.9g", value);
+  pw_system_free (s);
+  return NULL;
+}
+
+int pw_steady_open_system (pw_steady *x, double value) {
+  const pw_system *s = x->s;
+  if (x->system.run && (x->settings.compile == NULL || x->system.value == value)) return PW_OK;
+  pw_steady_close_system (x);
+  x->why = (pw_error){ 0 };
+  x->system.value = value;
+  if (x->settings.compile) s = x->system.own = pw_compile_at (x->settings.compile, x->settings.context, value, &x->why);
+  int refused = s && pw_steady_same_sizes (x->s, s, &x->why) != PW_OK;
+  int status = s && !refused ? steady_open_run (x, s) : x->why.status;
+  if (status != PW_OK) pw_steady_close_system (x);
+  return status == PW_OK || status == PW_RESOURCE || refused ? status : PW_RETRY;
+}
+
+/* Whether signals change with time, or repeat after a period, for the searches for steady and periodic motions. */
+
+enum { SIGNAL_TIMES = 16 };             /* times at which signals are compared, and as many between breakpoints */
+static const double SIGNAL_SAME = 1e-8; /* largest difference of equal signals, relative to their largest value */
+
+typedef struct {
+  pw_run *r;
+  double *state;                /* 2 n: q, v */
+  double *values;               /* count: at the first of two times */
+  double *largest, *difference; /* count: largest magnitude and difference so far */
+  int count;                    /* value and two derivatives of each signal */
+} signal_comparison;
+
+/* Compares signals at two times, in the run's state (number 0) or one up to a unit of the scene away (number 1), since
+ * a signal may be multiplied by a state that is 0.  A status; in the second state signals may fail. */
+static int signals_compare (signal_comparison *x, int number, double t0, double t1) {
+  pw_run *r = x->r;
+  pw_workspace *w = r->w;
+  double *q = x->state, *v = q + r->s->coords;
+  pw_irregular_state (r, number, number, q, v);
+  int status = pw_update_kinematics (w, t0, q, v);
+  if (status == PW_OK && x->count) memcpy (x->values, w->u, (size_t)x->count * sizeof *w->u);
+  if (status == PW_OK) status = pw_update_kinematics (w, t1, q, v);
+  for (int i = 0; status == PW_OK && i < x->count; i++) {
+    if (i % 3 > 0 && r->s->source[i / 3].of_force) continue; /* these derivatives are meaningless */
+    x->difference[i] = pw_larger_or_nan (x->difference[i], fabs (w->u[i] - x->values[i]));
+    x->largest[i] = fmax (x->largest[i], fmax (fabs (x->values[i]), fabs (w->u[i])));
+  }
+  return number > 0 ? PW_OK : status;
+}
+
+/* The middle between the first two breakpoints after *t, or the first one and t1; INFINITY without one before t1.
+ * Moves *t to the first one. */
+static double signals_next_interval (pw_workspace *w, double *t, double t1) {
+  *t = pw_next_breakpoint (w, 1, *t);
+  return *t < t1 ? *t + (fmin (pw_next_breakpoint (w, 1, *t), t1) - *t) / 2 : INFINITY;
+}
+
+int pw_signals_change (pw_run *r, double t, double period, double span, int *changed, pw_error *error) {
+  signal_comparison x = { .r = r, .count = 3 * r->s->sources };
+  size_t count = (size_t)x.count;
+  double at = t, breakpoint = t;
+  int status = PW_OK;
+  x.values = calloc (3 * count + 2 * (size_t)r->s->coords + 1, sizeof *x.values);
+  if (x.values == NULL) return pw_fail_memory (r->s, error);
+  x.largest = x.values + count, x.difference = x.largest + count, x.state = x.difference + count;
+  for (int k = 1; status == PW_OK && k <= 2 * SIGNAL_TIMES && isfinite (at); k++) {
+    double part = k / (double)SIGNAL_TIMES;
+    at = k > SIGNAL_TIMES ? signals_next_interval (r->w, &breakpoint, t + span)
+         : period > 0     ? t + span * fmod (0.618034 * k, 1) /* golden ratio: equidistributed */
+                          : t + span * part * part;               /* denser at first */
+    for (int number = 0; number < 2 && status == PW_OK && isfinite (at); number++)
+      status = signals_compare (&x, number, period > 0 ? at : t, period > 0 ? at + period : at);
+  }
+  *changed = -1;
+  for (int i = x.count; i-- > 0;)
+    if (!(x.difference[i] <= SIGNAL_SAME * x.largest[i])) *changed = i / 3;
+  free (x.values);
+  return status == PW_OK ? PW_OK : pw_run_annotate_error (r, pw_fail_signal (at, error), error);
 }

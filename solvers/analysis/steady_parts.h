@@ -2,7 +2,7 @@
  *
  * Names: n coordinates, m constraint equations.  "Units of the scene" are L for lengths, 1 rad for angles, T for times
  * (pw_scale); pw_unit is that of a coordinate.  The unknowns u are q in units of the scene, then the coefficients xi of
- * the symmetries times T (steady_equations.c), then the parameter, from 0 to 1 over its range. */
+ * the symmetries times T (steady.c), then the parameter, from 0 to 1 over its range. */
 #ifndef PW_STEADY_H
 #define PW_STEADY_H
 
@@ -89,7 +89,7 @@ void pw_steady_canonical (const pw_steady *x, double *q, double *v);
 /* Displaces a state so that the first body is where it was initially, if the whole can be displaced freely. */
 void pw_steady_move_to_start (const pw_steady *x, double *q, double *v);
 
-/* ---- steady_equations.c ---- */
+/* ---- steady.c ---- */
 
 /* Numbers of unknowns, without the parameter, and of equations. */
 static inline int pw_steady_unknowns (const pw_steady *x) {
@@ -113,7 +113,7 @@ void pw_steady_state (pw_steady *x, const double *u);
 int pw_steady_nearest (pw_steady *x, const double *q, const double *v, double *u, pw_error *error);
 double pw_steady_parameter (const pw_steady *x, const double *u);
 
-/* ---- steady_systems.c ---- */
+/* ---- steady.c ---- */
 
 enum { PW_STEADY_MAX_COORDINATES = 400 }; /* since the cost is cubic */
 
@@ -127,15 +127,15 @@ void pw_steady_close_system (pw_steady *x);
 /* PW_INPUT and the reason unless both systems have as many bodies, coordinates and constraint equations. */
 int pw_steady_same_sizes (const pw_system *a, const pw_system *b, pw_error *why);
 
-/* ---- steady_hold.c ---- */
+/* ---- steady_symmetries.c ---- */
 
 /* What can be held is numbered: the states, then PW_HOLD_OF_BODY quantities of each body. */
 enum { PW_HOLD_SPEED, PW_HOLD_RADIUS, PW_HOLD_CURVATURE, PW_HOLD_OF_BODY };
-/* The residual A - value B of what is held (steady_hold.c) in the state x->q, x->v, or if dq is not NULL its change by
- * the variation (dq, dv); divided by the unit of A. */
+/* The residual A - value B of what is held (steady_symmetries.c) in the state x->q, x->v, or if dq is not NULL its
+ * change by the variation (dq, dv); divided by the unit of A. */
 double pw_hold_residual (const pw_steady *x, const pw_initial_value *hold, const double *dq, const double *dv);
 
-/* ---- steady_start.c ---- */
+/* ---- steady.c ---- */
 
 /* The unknowns, except the parameter, with which an attempt begins; x->system is open.  Attempt 0: the initial
  * state; 1: a state to which forces lead from there; then random states, even attempts near the initial one, odd ones
@@ -143,7 +143,7 @@ double pw_hold_residual (const pw_steady *x, const pw_initial_value *hold, const
  * attempt 1; 3: consistent. */
 int pw_steady_start (pw_steady *x, int attempt, double *u, pw_error *error);
 
-/* ---- signal_change.c ---- */
+/* ---- steady.c ---- */
 
 /* *changed: the first signal that (or a derivative of which) changes within the span after time t, or if period > 0,
  * differs between times in this span and one period later; -1: none.  Signals are compared in the run's state and in

@@ -9,7 +9,7 @@
  *   index3    g = 0,              S v' = b,      mu = 0
  *   ggl       g = 0,              J v' = eta     stabilised index 2 (Gear, Gupta & Leimkuhler 1985)
  *
- * with G the holonomic rows of J, S and b the nonholonomic rows of J and eta, D as in dae.h.  The acceleration-like
+ * with G the holonomic rows of J, S and b the nonholonomic rows of J and eta, D as in tangent.h.  The acceleration-like
  * variable w approximates the acceleration at t + shift h, shift = alpha_m - alpha_f, with an error of order h^2.  The
  * coefficients follow from the spectral radius rho at infinite frequency.
  *
@@ -21,7 +21,7 @@
  * this would amplify them a hundredfold; then a-dot is the change of a in a trial step from w = a.
  *
  * Newton's iteration has the unknowns q', v', lambda', mu; w' and a' follow from v'.  With c = gamma / (h beta) and
- * e = (1 - alpha_m) / ((1 - alpha_f) h gamma) the equations are those of dae.h, in which
+ * e = (1 - alpha_m) / ((1 - alpha_f) h gamma) the equations are those of tangent.h, in which
  *
  *   c (q' - q - h v - h^2 (1/2 - beta) w - h^2 beta w')
  *

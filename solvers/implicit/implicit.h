@@ -3,7 +3,7 @@
 #ifndef PW_IMPLICIT_H
 #define PW_IMPLICIT_H
 
-#include "dae.h"
+#include "tangent.h"
 #include "dense_output.h"
 #include "sparse.h"
 #include "util.h"

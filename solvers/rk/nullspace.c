@@ -19,7 +19,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "rk_step.h"
+#include "rk.h"
 #include "util.h"
 
 /* ---- Opening ---- */

@@ -23,7 +23,7 @@
 #include <string.h>
 #include "method.h"
 #include "rank.h"
-#include "scatter.h"
+#include "tangent.h"
 #include "sparse.h"
 #include "util.h"
 

@@ -1,4 +1,4 @@
-/* The functions of pinwheel-method.h for one-step methods of users; pw_run_option: options.c; pw_run_accelerate:
+/* The functions of pinwheel-method.h for one-step methods of users; pw_run_option: dynamics.c; pw_run_accelerate:
  * dynamics.c. */
 #include <math.h>
 #include <stdlib.h>
@@ -113,4 +113,92 @@ int pw_step_accept (pw_run *r, int status, double h, double *q, double *v, pw_er
 
 int pw_step_at (pw_run *r, double t, pw_error *error) {
   return pw_dense_output_at (&r->data->last, r, t, error);
+}
+
+/* Dense output: positions and velocities by cubic Hermite interpolation, of order 4, projected onto the constraints as
+ * pw_dense_projection says; accelerations, multipliers, the ledger's rates and the energy added by projections by
+ * linear interpolation, with errors of order h^2. */
+
+int pw_dense_output_open (pw_dense_output *b, pw_run *r, pw_dense_projection projection, pw_error *error) {
+  size_t state = pw_state_length (r->s), entries = (size_t)r->entries;
+  *b = (pw_dense_output){ .start.t = r->t, .projection = projection };
+  const pw_array array[] = { { &b->start.q, state }, { &b->start.ledger, entries }, { &b->start.rate, entries } };
+  b->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
+  if (b->memory == NULL) return pw_fail_memory (r->s, error);
+  return projection == PW_DENSE_UNPROJECTED ? PW_OK : pw_projector_open (&b->projector, r, NULL, NULL, error);
+}
+
+void pw_dense_output_close (pw_dense_output *b) {
+  pw_projector_close (&b->projector);
+  free (b->memory);
+}
+
+void pw_store_start (pw_step_start *x, const pw_run *r) {
+  size_t entries = (size_t)r->entries * sizeof (double);
+  x->t = r->t, x->projected = r->projected;
+  memcpy (x->q, r->q, pw_state_length (r->s) * sizeof *r->q);
+  memcpy (x->ledger, r->ledger, entries);
+  memcpy (x->rate, r->rate, entries);
+}
+
+void pw_dense_output_integrate_ledger (pw_dense_output *b, pw_run *r) {
+  pw_ledger_rates (r, r->lambda, r->rate);
+  for (int i = 0; i < r->entries; i++) r->ledger[i] += 0.5 * (r->t - b->start.t) * (b->start.rate[i] + r->rate[i]);
+}
+
+/* Cubic Hermite interpolation at x in [0, 1] in a step of size h: values y0, y1 and derivatives dy0, dy1 at its
+ * ends. */
+static double dense_hermite (double x, double h, double y0, double dy0, double y1, double dy1) {
+  double blend = x * x * (3 - 2 * x);
+  return y0 + blend * (y1 - y0) + h * x * (1 - x) * ((1 - x) * dy0 - x * dy1);
+}
+
+static int dense_interpolate (void *dense_output, pw_run *r, double t) {
+  pw_dense_output *b = dense_output;
+  const pw_step_start *start = &b->start;
+  const pw_system *s = r->s;
+  const double *q0 = start->q, *v0 = q0 + (r->v - r->q), *a0 = q0 + (r->a - r->q), *lambda0 = q0 + (r->lambda - r->q);
+  double h = r->t - start->t, x = (t - start->t) / h;
+  for (int j = 0; j < s->coords; j++) {
+    r->q_at[j] = dense_hermite (x, h, q0[j], v0[j], r->q[j], r->v[j]);
+    r->v_at[j] = dense_hermite (x, h, v0[j], a0[j], r->v[j], r->a[j]);
+    r->a_at[j] = (1 - x) * a0[j] + x * r->a[j];
+  }
+  for (int i = 0; i < s->rows; i++) r->lambda_at[i] = (1 - x) * lambda0[i] + x * r->lambda[i];
+  for (int i = 0; i < r->entries; i++)
+    r->ledger_at[i] = start->ledger[i] + h * x * (start->rate[i] + 0.5 * x * (r->rate[i] - start->rate[i]));
+  r->projected_at = (1 - x) * start->projected + x * r->projected;
+  if (b->projection == PW_DENSE_UNPROJECTED) return pw_evaluate_J_at (r->w, t, r->q_at, r->v_at);
+  int status = pw_project_positions (&b->projector, r, t, r->q_at, r->v_at);
+  if (status != PW_OK || b->projection == PW_DENSE_POSITIONS) return status;
+  return pw_project_velocities (&b->projector, r, r->v_at);
+}
+
+int pw_dense_output_at (pw_dense_output *b, pw_run *r, double t, pw_error *error) {
+  return pw_sample_last_step (r, b->start.t, t, dense_interpolate, b, error);
+}
+
+int pw_fail_outside (const pw_run *r, double t0, double t, pw_error *error) {
+  if (isnan (t0))
+    return pw_fail (error, PW_INPUT, "t = %.17g s lies outside the last step, which ends at %.17g s", t, r->t);
+  return pw_fail (error, PW_INPUT, "t = %.17g s lies outside the last step, %.17g to %.17g s", t, t0, r->t);
+}
+
+int pw_sample_last_step (pw_run *r, double t0, double t, pw_interpolate *interpolate, void *method, pw_error *error) {
+  if (t > r->t || t < t0) return pw_fail_outside (r, t0, t, error);
+  if (t == r->t) {
+    pw_sample_reached (r);
+    return PW_OK;
+  }
+  const pw_statistics statistics = r->statistics;
+  r->projected_at = r->projected;
+  int status = interpolate (method, r, t);
+  r->statistics = statistics;
+  if (status == PW_OK) return PW_OK;
+  if (status == PW_METHOD) return pw_fail_signal (t, error);
+  if (r->near_singular) return pw_fail_singular (r, t, error);
+  return pw_fail (error, PW_METHOD,
+                  "t = %.6g s: no state near the interpolated one satisfies the constraints; "
+                  "the step of %.6g s may be too large",
+                  t, r->t - t0);
 }

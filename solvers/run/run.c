@@ -330,3 +330,323 @@ const pw_initial_report *pw_run_initial (const pw_run *r) {
 const pw_scale *pw_run_scale (const pw_run *r) {
   return &r->w->scale;
 }
+
+/* Limits that end a run: the caller's request, the number of attempted steps of an adaptive method, coordinates too
+ * large for double precision to resolve the scene.  Unbounded growth of velocities is reported.
+ *
+ * With the unit u of a coordinate (L, or 1 rad) and the round-off eps, q has an error of eps |q|.  From eps |q| = 0.01
+ * u on, round-off alone violates a constraint by a residual with which it counts as lost (1e-2, scaled), and changes
+ * directions of forces by 0.01 rad.
+ *
+ * A constant torque or force that nothing opposes accelerates a scene from rest to the speed N u/T in the time N T (T:
+ * the time scale of its initial accelerations), and turns it by N^2/2.  Growth beyond N = 1e3, some 80,000 turns,
+ * is reported.  It may be intended, so it is not an error; but the number of steps grows with the number of turns, like
+ * the square of the time. */
+
+#define LIMITS_RESOLVED 1e-2 /* in u: error eps |q| beyond which a run fails */
+#define LIMITS_FAST 1e3      /* in u / T: speeds beyond which growth is reported */
+#define LIMITS_GROWTH 0.25   /* exponent p of t^p above which a velocity counts as growing */
+
+/* The largest velocity at the state reached, in u / T; *state: its index among the states. */
+static double limits_speed (const pw_run *r, int *state) {
+  const pw_system *s = r->s;
+  double most = 0;
+  *state = s->coords;
+  for (int j = 0; j < s->coords; j++) {
+    double speed = fabs (r->v[j]) * r->w->scale.time / pw_unit (s, j);
+    if (speed > most) most = speed, *state = s->coords + j;
+  }
+  return most;
+}
+
+double pw_run_growth (const pw_run *r, int *state, double *power) {
+  double now = limits_speed (r, state), span = r->t - r->settings.t;
+  /* the last record may be of this moment, the one before is at half its time or less */
+  *power = r->earlier_record.time > 0 && r->earlier_record.speed > 0
+               ? log (now / r->earlier_record.speed) / log (span / r->earlier_record.time)
+               : 0;
+  return now > LIMITS_FAST && *power > LIMITS_GROWTH ? now : 0;
+}
+
+/* Records the largest speed whenever the elapsed time has doubled.  Returns 1 at such a time. */
+static int limits_record_speed (pw_run *r) {
+  int state;
+  double span = r->t - r->settings.t;
+  if (span < 2 * r->speed_record.time) return 0;
+  r->earlier_record = r->speed_record;
+  r->speed_record.time = span, r->speed_record.speed = limits_speed (r, &state);
+  return 1;
+}
+
+static int limits_fail_steps (const pw_run *r, pw_error *error) {
+  const pw_statistics *now = &r->statistics;
+  char grows[240] = "";
+  int state;
+  double power, growth = pw_run_growth (r, &state, &power);
+  if (growth > 0)
+    snprintf (grows, sizeof grows,
+              "; the motion grows without bound: %s = %.3g %s, %.2g times the scene's own speed, as t^%.1f",
+              PW_NAME (pw_system_state_name, r->s, state), r->v[state - r->s->coords],
+              pw_system_state_unit (r->s, state), growth, power);
+  return pw_fail (error, PW_METHOD,
+                  "t = %.6g s: the limit max-steps is reached: %ld attempted steps, %ld of them rejected%s", r->t,
+                  now->steps + now->rejected, now->rejected, grows);
+}
+
+int pw_run_check_limits (pw_run *r, pw_error *error) {
+  if (pw_run_stop_requested (r)) return PW_STOPPED;
+  if (r->statistics.steps + r->statistics.rejected < r->settings.max_steps || r->fixed_steps) return PW_OK;
+  return limits_fail_steps (r, error);
+}
+
+int pw_run_check_resolution (pw_run *r, pw_error *error) {
+  const pw_system *s = r->s;
+  if (!limits_record_speed (r) && r->statistics.steps % PW_CHECK_INTERVAL != 0) return PW_OK;
+  for (int j = 0; j < s->coords; j++) {
+    double round_off = fabs (r->q[j]) * DBL_EPSILON;
+    if (!(round_off > LIMITS_RESOLVED * pw_unit (s, j))) continue;
+    if (r->fixed_steps && fabs (r->v[j]) * r->settings.step > 0.1 * fabs (r->q[j])) /* within a few steps */
+      return pw_fail (error, PW_METHOD,
+                      "t = %.6g s: the step of %.6g s is too large: the state grows beyond all bounds", r->t,
+                      r->settings.step);
+    return pw_fail (error, PW_METHOD,
+                    "t = %.6g s: the motion has grown beyond what numbers resolve: %s = %.3g %s, known to %.2g only",
+                    r->t, PW_NAME (pw_system_state_name, s, j), r->q[j], pw_system_state_unit (s, j), round_off);
+  }
+  return PW_OK;
+}
+
+/* The energy of a run and its ledger of work, losses and integrals: scales, tolerance, energy defect.  Every run keeps
+ * a ledger, since samples contain the total work and loss; in adaptive Runge-Kutta methods, radau included, its error
+ * takes part in step-size control. */
+
+/* Kinetic energy [J] of the scene moving by L and turning by 1 rad in the span of the run. */
+static double ledger_scene_energy (const pw_run *r) {
+  const pw_system *s = r->s;
+  double sum = 0;
+  for (int j = 0; j < s->coords; j++) sum += 0.5 * s->M[j] * pw_unit (s, j) * pw_unit (s, j);
+  return sum / (r->settings.span * r->settings.span);
+}
+
+/* Evaluates kinematics at an arbitrary state: displaced by about L and 1 rad, at velocities of about L / T and 1 / T,
+ * at the time t.  A status. */
+static int ledger_displace (pw_run *r, double t) {
+  double *q = r->scratch, *v = q + r->s->coords + 3;
+  for (int j = 0; j < r->s->coords; j++) {
+    double displacement = pw_unit (r->s, j) * (1 + 0.37 * (j % 5)) / 2;
+    q[j] = r->q[j] + displacement;
+    v[j] = displacement / r->w->scale.time;
+  }
+  return pw_update_kinematics (r->w, t, q, v);
+}
+
+static void ledger_return (pw_run *r) {
+  r->w->failed = NULL;
+  pw_update_kinematics (r->w, r->t, r->q, r->v);
+}
+
+/* Energy scale [J] of a massless scene: work and losses in a time T at the velocities of an arbitrary state, and the
+ * change of potential energy. */
+static double ledger_massless_energy (pw_run *r) {
+  const pw_system *s = r->s;
+  double *lambda = r->lambda_at, T = r->w->scale.time, sum = 0;
+  memset (lambda, 0, (size_t)s->rows * sizeof *lambda);
+  if (ledger_displace (r, r->t) == PW_OK) {
+    pw_evaluate_ledger (r->w, lambda, r->ledger_at);
+    for (int i = 0; i < s->entries; i++) sum += T * fabs (r->ledger_at[i]);
+    sum += fabs (pw_potential (r->w) - r->potential0);
+  }
+  ledger_return (r);
+  return sum;
+}
+
+/* Evaluates the integrands at the state of the workspace; power: those of the ledger's entries. */
+static void ledger_integrands (pw_run *r, const double *lambda, const double *power, double *value) {
+  const pw_system *s = r->s;
+  double *q = r->integrand_state, *v = q + s->coords;
+  for (int b = 0; b < s->bodies; b++) {
+    const pw_configuration *c = &r->w->configuration[b];
+    q[3 * b] = c->x, q[3 * b + 1] = c->y, q[3 * b + 2] = c->phi;
+    v[3 * b] = c->vx, v[3 * b + 1] = c->vy, v[3 * b + 2] = c->omega;
+  }
+  for (const pw_element_batch *k = r->w->batch; k < r->w->batch + s->batches; k++)
+    for (int j = 0; j < k->b.count * k->kind->internal; j++)
+      q[k->internal + j] = k->b.q[j], v[k->internal + j] = k->b.v[j];
+  pw_sample state = { .t = r->w->t_signal,
+                      .q = q,
+                      .v = v,
+                      .lambda = lambda,
+                      .kinetic = pw_kinetic (s, v),
+                      .potential = pw_potential (r->w),
+                      .ledger = power };
+  for (int i = 0; i < s->entries; i++) *(s->entry[i].type == PW_WORK ? &state.work : &state.loss) += power[i];
+  r->settings.integrand (r->settings.integrand_context, &state, value);
+}
+
+static void ledger_record_integrands (pw_run *r, const double *value) {
+  for (int i = 0; i < r->settings.integrals; i++)
+    if (isfinite (value[i])) r->integrand_size[i] = fmax (r->integrand_size[i], fabs (value[i]));
+}
+
+/* Sizes of integrands that may be zero on the way: those at an arbitrary state after a time T, with multipliers that
+ * accelerate the scene by L / T^2. */
+static void ledger_measure_integrands (pw_run *r) {
+  const pw_system *s = r->s;
+  double *lambda = r->lambda_at, T = r->w->scale.time, energy = 0;
+  for (int j = 0; j < s->coords; j++) energy += s->mass[j] * pw_unit (s, j) * pw_unit (s, j) / (T * T);
+  for (int i = 0; i < s->rows; i++) lambda[i] = energy / s->scale.length * pw_rank_multiplier_unit (r->w, i);
+  if (ledger_displace (r, r->t + T) == PW_OK) {
+    pw_evaluate_ledger (r->w, lambda, r->ledger_at);
+    ledger_integrands (r, lambda, r->ledger_at, r->ledger_at + s->entries);
+    ledger_record_integrands (r, r->ledger_at + s->entries);
+  }
+  ledger_return (r);
+}
+
+void pw_ledger_begin (pw_run *r) {
+  r->potential0 = pw_potential (r->w);
+  r->exchanged = pw_kinetic (r->s, r->v);
+  r->energy0 = r->exchanged + r->potential0;
+  r->scene_energy = ledger_scene_energy (r);
+  if (r->scene_energy == 0 && r->s->entries > 0) r->scene_energy = ledger_massless_energy (r);
+  if (r->settings.integrals) ledger_measure_integrands (r);
+  ledger_record_integrands (r, r->rate + r->s->entries);
+}
+
+/* Samples the first PW_CHECK_INTERVAL steps and every PW_CHECK_INTERVAL-th: sufficient for a scale, at negligible
+ * cost. */
+void pw_ledger_record (pw_run *r) {
+  double power = 0;
+  ledger_record_integrands (r, r->rate + r->s->entries);
+  if (r->statistics.steps > PW_CHECK_INTERVAL && r->statistics.steps % PW_CHECK_INTERVAL != 0) return;
+  double exchanged = fmax (pw_kinetic (r->s, r->v), fabs (pw_potential (r->w) - r->potential0));
+  for (int i = 0; i < r->s->entries; i++) power += fabs (r->rate[i]);
+  if (exchanged > r->exchanged && isfinite (exchanged)) r->exchanged = exchanged;
+  if (power > r->power && isfinite (power)) r->power = power;
+}
+
+void pw_ledger_rates (pw_run *r, const double *lambda, double *rate) {
+  const int integrals = r->settings.integrals, unique = r->redundant_drive || (integrals && r->redundant);
+  if (unique && pw_saddle_factor (r->saddle) == PW_OK) {
+    memcpy (r->least_norm, lambda, (size_t)r->s->rows * sizeof *lambda);
+    pw_rank_least_norm (r, r->least_norm);
+    lambda = r->least_norm;
+  }
+  pw_evaluate_ledger (r->w, lambda, rate);
+  if (integrals) ledger_integrands (r, lambda, rate, rate + r->s->entries);
+}
+
+int pw_ledger_uses_multipliers (const pw_run *r) {
+  const pw_system *s = r->s;
+  int reacts = r->settings.integrals > 0 && s->rows > 0;
+  for (int i = 0; i < s->entries; i++) reacts |= s->batch[s->entry[i].batch].kind->rows > 0;
+  return reacts;
+}
+
+/* If kinetic and potential energies are negligible, as for light bodies against friction, the scale is the work done,
+ * which grows without bound; so that of a time T at the most. */
+static const double ledger_share =
+                        5,    /* sqrt (25): the error of one of 25 states whose root mean square is 1 tolerance */
+    ledger_round_off = 1e-11; /* of powers and integrands, due to multipliers */
+
+double pw_ledger_tolerance (const pw_run *r, double h) {
+  const pw_settings *settings = &r->settings;
+  double work = 0, rtol = fmax (settings->rtol, settings->atol > 0 ? settings->atol / fmax (r->s->scale.length, 1) : 0);
+  for (int i = 0; i < r->s->entries; i++) work += fabs (r->ledger[i]);
+  double energy = fmax (fmax (r->scene_energy, r->exchanged), fmin (work, r->power * r->w->scale.time));
+  double tolerance = ledger_share * rtol * energy + ledger_round_off * fabs (h) * r->power + 16 * DBL_EPSILON * work;
+  return tolerance > 0 && isfinite (tolerance) ? tolerance : DBL_MAX;
+}
+
+double pw_ledger_norm (const pw_run *r, double h, const double *change) {
+  const double tolerance = pw_ledger_tolerance (r, h), T = r->w->scale.time;
+  double sum = 0;
+  for (int i = 0; i < r->entries; i++) {
+    const int k = i - r->s->entries;
+    double own = k < 0 ? tolerance
+                       : r->integrand_size[k] * (ledger_share * r->settings.rtol * T + ledger_round_off * fabs (h)) +
+                             16 * DBL_EPSILON * fabs (r->ledger[i]);
+    if (own > 0) sum += change[i] / own * (change[i] / own);
+  }
+  return sqrt (sum);
+}
+
+double pw_run_energy_defect (const pw_run *r, const pw_sample *sample) {
+  double defect = sample->kinetic + sample->potential - r->energy0 - sample->work + sample->loss;
+  double scale = fmax (r->exchanged, fmax (sample->kinetic, fabs (sample->potential - r->potential0)));
+  scale = fmax (scale, ledger_scene_energy (r));
+  if (scale == 0) scale = fmax (fabs (sample->work), sample->loss); /* no masses, no stored energy */
+  return defect == 0 ? 0 : fabs (defect) / scale;
+}
+
+const char *pw_run_energy_advice (const pw_run *r, double defect) {
+  const double least_rtol = 1e-12; /* smaller ones gain little over round-off */
+  const double per_step = 10;      /* acceptable defect of a step over rtol */
+  const pw_statistics *now = &r->statistics;
+  int projects = pw_stabilised_by (r, PW_PROJECTION);
+  if (!projects && fmax (now->position, now->velocity) > 0.1 * defect)
+    return "the constraints have drifted; a method with projection satisfies them";
+  if (r->fixed_steps) return "a smaller step, or another method, follows the motion better";
+  if (r->settings.rtol <= least_rtol) return "the tolerance cannot be much smaller; compare with another method";
+  if (defect > per_step * r->settings.rtol * (double)now->steps)
+    return "that is more than the tolerance explains; compare with another method";
+  return "a smaller tolerance, or another method, follows the motion better";
+}
+
+/* Saturating forces, such as friction, which change by their own magnitude within a small range of velocities: bounds
+ * on tolerances and on the use of Newton matrices.
+ *
+ * With a Newton matrix evaluated inside that range, at rest, where the force is steep, and used where it has saturated,
+ * corrections are about as small as the range, however large the residual is: the iteration would seem to converge with
+ * the force of another state.  So tolerances stay below the range, and a matrix is reused only while no state has moved
+ * by more than the range of the state where it was evaluated. */
+
+#define TOLERANCES_PART 0.1 /* largest error of a state over its change that changes a force by the force itself */
+
+/* The root mean square of n errors in units of their tolerances may be 1, so a single error may be sqrt (n) times its
+ * tolerance. */
+void pw_bound_tolerances (pw_run *r) {
+  int coords = r->s->coords, n = 2 * coords;
+  if (!r->s->saturates) return;
+  pw_evaluate_saturation (r->w, r->tolerance_bound);
+  for (int j = 0; j < n; j++) {
+    double y = j < coords ? r->q[j] : r->v[j - coords];
+    r->matrix_outdated |= fabs (y - r->matrix_state[j]) > r->matrix_range[j];
+    r->tolerance_bound[j] *= TOLERANCES_PART / sqrt (n);
+  }
+}
+
+double pw_saturation_range (const pw_run *r, int state) {
+  return r->tolerance_bound[state] * sqrt (2 * r->s->coords) / TOLERANCES_PART;
+}
+
+void pw_matrix_evaluated (pw_run *r, const double *q, const double *v) {
+  int coords = r->s->coords;
+  r->matrix_outdated = 0;
+  if (!r->s->saturates) return;
+  memcpy (r->matrix_state, q, (size_t)coords * sizeof *q);
+  memcpy (r->matrix_state + coords, v, (size_t)coords * sizeof *v);
+  pw_evaluate_saturation (r->w, r->matrix_range);
+}
+
+double pw_first_step (const pw_run *r) {
+  double T = r->w->scale.time, h = 0.5 * T * sqrt (r->settings.rtol);
+  for (int j = 0, n = r->s->coords; j < n; j++) {
+    if (r->v[j] != 0) h = fmin (h, fmax (r->tolerance_bound[j] / fabs (r->v[j]), 1e-9 * T));
+    if (r->a[j] != 0) h = fmin (h, fmax (r->tolerance_bound[n + j] / fabs (r->a[j]), 1e-9 * T));
+  }
+  return h;
+}
+
+int pw_run_saturation (pw_run *r, double *least, char *element, size_t size) {
+  if (!r->s->saturates) return -1;
+  double *at_rest = r->scratch;
+  for (int j = 0; j < r->s->coords; j++) at_rest[j] = 0;
+  (void)pw_update_kinematics (r->w, r->t, r->q, r->v); /* since a sample, the workspace may be at another state */
+  pw_hold_signals (r->w, 1);                           /* a signal that reads velocities may have no value at rest */
+  (void)pw_update_kinematics (r->w, r->t, r->q, at_rest);
+  int state = pw_find_saturation (r->w, least, element, size);
+  pw_hold_signals (r->w, 0);
+  (void)pw_update_kinematics (r->w, r->t, r->q, r->v);
+  return state;
+}

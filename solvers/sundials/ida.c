@@ -1,4 +1,4 @@
-/* ida: the variable-order BDF code IDAS of SUNDIALS (Hindmarsh et al. 2005), on the equations of dae.h.
+/* ida: the variable-order BDF code IDAS of SUNDIALS (Hindmarsh et al. 2005), on the equations of tangent.h.
  *
  * The Newton matrix is exact and sparse, factorised by KLU.  The error test covers positions and velocities, including
  * those of massless coordinates; in si1 it covers all unknowns. */
@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <idas/idas.h>
-#include "dae.h"
+#include "tangent.h"
 #include "dense_output.h"
 #include "rank.h"
 #include "sundials.h"

@@ -1,16 +1,52 @@
-/* What adams, bdf and ida share: they use integrators of SUNDIALS, version 6 (tested with 6.4). */
-#ifndef PW_SUNDIALS_H
-#define PW_SUNDIALS_H
-
+/* Work and losses along the steps of a multistep method, from their rates at the states it has reached. */
+#ifndef PW_SUNDIALS_H_
+#define PW_SUNDIALS_H_
+#include "method.h"
 #include <stdint.h>
 #include <sundials/sundials_types.h>
 #include <sundials/sundials_context.h>
 #include <sundials/sundials_linearsolver.h>
 #include <nvector/nvector_serial.h>
 #include <sunnonlinsol/sunnonlinsol_newton.h>
-#include "quadrature.h"
-#include "scatter.h"
+#include "tangent.h"
 #include "sparse.h"
+
+enum { PW_QUADRATURE_POINTS = 7 }; /* at most: a polynomial through more would cost more than nodes inside the step */
+
+/* The rates of the ledger's entries at a time inside the last step, by the method's interpolation; changes the run's
+ * sample arrays, the kinematics, J and the saddle's factors.  PW_OK, or another status if they cannot be evaluated. */
+typedef int pw_rates_at (pw_run *r, double t, double *rate);
+
+typedef struct {
+  pw_rates_at *rates;
+  int points;                         /* states whose rates are known: at most those since the last restart */
+  int order;                          /* of the last step */
+  int refined;                        /* 1: the last step was integrated by nodes inside it */
+  double t[PW_QUADRATURE_POINTS];     /* times of these states, newest first */
+  double *rate[PW_QUADRATURE_POINTS]; /* entries: rates there */
+  double *ledger0;                    /* entries: at the beginning of the last step */
+  double *integral;                   /* entries: over the last step, or a part of it */
+  double *finer, *node; /* entries: scratch: the same with more nodes or of a lower degree; rates at a node */
+  double energy;        /* kinetic + potential energy of the state reached [J] */
+  char *memory;
+} pw_quadrature;
+
+/* At the state reached, as pw_quadrature_restart.  PW_OK or PW_RESOURCE. */
+int pw_quadrature_open (pw_quadrature *x, pw_run *r, pw_rates_at *rates);
+void pw_quadrature_close (pw_quadrature *x);
+
+/* Restarts at the state reached; kinematics and r->rate must be up to date. */
+void pw_quadrature_restart (pw_quadrature *x, pw_run *r);
+
+/* Integrates the ledger over the step, of this order, to the state reached, where kinematics, J and r->rate must be up
+ * to date, and stay so.  Returns as pw_update_kinematics. */
+int pw_quadrature_step (pw_quadrature *x, pw_run *r, int order);
+
+/* Stores the ledger at a time inside the last step in r->ledger_at; call it before the interpolation of the sample,
+ * since pw_rates_at may overwrite the other sample arrays and the kinematics. */
+void pw_quadrature_at (pw_quadrature *x, pw_run *r, double t);
+
+/* What adams, bdf and ida share: they use integrators of SUNDIALS, version 6 (tested with 6.4). */
 
 /* Attempts at a step, each about a quarter of the one before, if the iteration does not converge or the error is too
  * large: from 1 s down to the round-off of the time.  SUNDIALS' defaults of 7 and 10, down to a millionth of the
@@ -42,10 +78,10 @@ void pw_sun_close (pw_sun *x);
 /* Stores the state reached in y, t0 and `before`; the method then restarts its integrator. */
 void pw_sun_restart (pw_sun *x);
 
-/* A vector with the operations of vectors.c, as have its clones; NULL: out of memory. */
+/* A vector with the operations of sundials.c, as have its clones; NULL: out of memory. */
 N_Vector pw_sun_vector (sunindextype length, SUNContext context);
 
-/* Opens x->solver for the matrix of this size that a scatter map fills.  It refuses an outdated matrix (tolerances.c)
+/* Opens x->solver for the matrix of this size that a scatter map fills.  It refuses an outdated matrix (run.c)
  * so that the integrator requests a new one.  content: the method's data, beginning with x, which `solve` finds in its
  * solver; solve: NULL for that of the matrix; any other must itself refuse an outdated matrix. */
 typedef int pw_sun_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector x, N_Vector b, realtype tolerance);

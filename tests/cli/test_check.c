@@ -4,7 +4,7 @@
 #include <string.h>
 #include "check.h"
 #include "cli.h"
-#include "probe.h"
+#include "selftest.h"
 #include "scene.h"
 #include "toys.h"
 #include "trial.h"

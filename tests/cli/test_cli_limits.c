@@ -11,7 +11,7 @@
 #include "check.h"
 #include "cli.h"
 #include "cli/cli.h"
-#include "cli/parallel.h"
+#include "cli/cli.h"
 
 /* What there is so far is kept, the exit status is 4, and the limit is named. */
 TEST (max_steps) {

@@ -7,8 +7,8 @@
 #include <string.h>
 #include "check.h"
 #include "model.h"
-#include "probe.h"
-#include "random_scene.h"
+#include "selftest.h"
+#include "selftest.h"
 #include "pinwheel-selftest.h"
 #include "scene.h"
 #include "toys.h"

@@ -3,7 +3,7 @@
 #include <stdio.h>
 #include "check.h"
 #include "expressions.h"
-#include "random_scene.h"
+#include "selftest.h"
 
 TEST (breakpoints) {
   static const struct {

@@ -4,7 +4,7 @@
 #include <string.h>
 #include "check.h"
 #include "expressions.h"
-#include "random_scene.h"
+#include "selftest.h"
 
 /* The same operations in C, in the same order, give the same bits. */
 TEST (values) {

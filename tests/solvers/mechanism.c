@@ -4,7 +4,7 @@
 #include "mechanism.h"
 #include <math.h>
 #include <string.h>
-#include "random_scene.h"
+#include "selftest.h"
 
 static const char *const mechanism_body[MECHANISM_BODIES] = { "b0", "b1", "b2", "b3", "b4", "b5", "b6", "b7", "b8" };
 static const char *const mechanism_name[MECHANISM_ELEMENTS] = {

@@ -10,7 +10,7 @@
 #include "check.h"
 #include "mechanism.h"
 #include "method.h"
-#include "rk_step.h"
+#include "rk.h"
 #include "runs.h"
 #include "saddle_scene.h"
 #include "scene.h"

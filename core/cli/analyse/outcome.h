@@ -49,7 +49,7 @@ static inline int pw_column_is_integrated (pw_column_type type) {
 
 typedef enum { PW_FINAL, PW_MAX, PW_MIN, PW_MEAN, PW_INTEGRAL, PW_RMS } pw_functional_type;
 
-enum { PW_FUNCTIONAL_TIMES = 9 }; /* at which a step of the run is sampled before refinements (functional.c) */
+enum { PW_FUNCTIONAL_TIMES = 9 }; /* at which a step of the run is sampled before refinements (outcome.c) */
 
 /* 1 if it is the integral of a column over the run, or a function of that: mean, root mean square. */
 static inline int pw_is_integral (pw_functional_type type) {

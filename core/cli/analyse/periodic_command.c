@@ -2,9 +2,44 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "unknowns.h"
 #include "figure.h"
-#include "periodic_report.h"
 #include "report.h"
+#include "cli.h"
+#include "states.h"
+
+/* The command `pinwheel periodic`, its result and its reports (periodic_command.c). */
+
+/* A periodic motion found, or a point of a branch. */
+typedef struct {
+  pw_periodic_orbit orbit; /* its arrays are in `state` */
+  double *state;           /* q, v at the beginning, q, v at the end; then re, im of the multipliers */
+} pw_periodic_point;
+
+enum { PW_PERIODIC_ATTEMPTS = 3 }; /* of Newton's method, each from the state after more periods of a run */
+
+typedef struct {
+  pw_cli_line line;
+  const char *period_text, *periods_text, *guess_text, *vary_text, *folder;
+  pw_cli_model m;
+  pw_files files;
+  pw_limit limit;
+  pw_periodic_settings settings;
+  const char *source; /* of the period: "of the signals", "--period", "found" */
+  pw_vary vary;
+  pw_periodic *search;
+  pw_periodic_point *point; /* points: the motion, or those of the branch */
+  int points;
+  size_t room;                           /* points allocated */
+  double residual[PW_PERIODIC_ATTEMPTS]; /* of Newton's method, in units of the scene; INFINITY: not begun */
+  char reason[300];                      /* why the attempt with the least residual failed, or "" */
+  int stopped;                           /* 1: by Ctrl-C or --limit */
+} pw_periodic_command;
+
+/* Prints the motion or the branch; there is at least one point. */
+void pw_periodic_print (const pw_periodic_command *cmd);
+/* Writes periodic.json, periodic.csv and the figure into the folder.  A status. */
+int pw_periodic_write (const pw_periodic_command *cmd, pw_error *error);
 
 enum { PERIODIC_PERIODS = 100000 }; /* of the signals in one period of the motion, at most */
 #define PERIODIC_LEAST 1e-100       /* shortest period that is sought [s] */
@@ -205,3 +240,356 @@ const pw_command pw_cli_periodic = {
   .function = periodic_command,
   .options = periodic_options_table,
 };
+
+/* The reports of `pinwheel periodic`: text, JSON, table and figure. */
+
+enum {
+  PERIODIC_MOST = 12,     /* multipliers in the text, at most */
+  PERIODIC_POINTS = 12,   /* of a branch that are not events, in the text, about */
+  PERIODIC_BODIES = 20,   /* in the figure, at most */
+  PERIODIC_SAMPLES = 400, /* of one motion, in its figure */
+  PERIODIC_CURVES = 3     /* over the parameter, see periodic_curve */
+};
+/* [SI units]  Smaller displacements, rotations, speeds and states are printed as 0, displacements also drawn as 0. */
+#define PERIODIC_SMALL 1e-9
+#define PERIODIC_WHOLE 1e-7 /* turns: the largest distance of a rotation from whole ones */
+
+/* The names of pw_periodic_event; PW_PERIODIC_END has none: it is not stored. */
+static const char *const periodic_events[] = { "point", "fold", "branch point", "period doubling", "Neimark-Sacker" };
+
+/* ---- Quantities ---- */
+
+/* Displacement of the first body in one period [m]: along its initial x axis, to the left of that, and in total. */
+typedef struct {
+  double along, left, total;
+} periodic_displacement;
+
+static periodic_displacement periodic_displace (const pw_periodic_orbit *o) {
+  double x = o->end[0] - o->q[0], y = o->end[1] - o->q[1], c = cos (o->q[2]), s = sin (o->q[2]);
+  return (periodic_displacement){ c * x + s * y, c * y - s * x, hypot (x, y) };
+}
+
+/* The largest modulus of the multipliers that are not trivial; NaN if there is none. */
+static double periodic_largest (const pw_periodic_orbit *o) {
+  return o->multipliers > o->trivial ? hypot (o->re[0], o->im[0]) : NAN;
+}
+
+static double periodic_round (double value) {
+  return pw_rounded (value, PERIODIC_SMALL);
+}
+
+/* Change in one period of the angle of a body relative to the whole [rad], or of an internal coordinate: whole turns,
+ * or by a symmetry, since nothing depends on it.  i: number of the body; of the coordinate, from number `bodies` on. */
+static double periodic_rotation (const pw_system *s, const pw_periodic_orbit *o, int i) {
+  const int bodies = pw_system_bodies (s), j = i < bodies ? 3 * i + 2 : i + 2 * bodies;
+  return periodic_round (o->end[j] - o->q[j] - (i < bodies ? o->rotation : 0));
+}
+
+static int periodic_rotations (const pw_system *s) {
+  return pw_system_coordinates (s) - 2 * pw_system_bodies (s);
+}
+
+/* The name of what turns: a body, or a coordinate. */
+static const char *periodic_rotation_name (const pw_system *s, int i, char *text, size_t size) {
+  const int bodies = pw_system_bodies (s);
+  return i < bodies ? pw_system_body_name (s, i) : pw_system_state_name (s, i + 2 * bodies, text, size);
+}
+
+/* ---- Text ---- */
+
+static void periodic_print_rotations (const pw_system *s, const pw_periodic_orbit *o) {
+  char text[PW_NAME_BYTES];
+  int shown = 0;
+  for (int i = 0; i < periodic_rotations (s) && shown <= PERIODIC_MOST; i++) {
+    const double rotation = periodic_rotation (s, o, i), turns = rotation / (2 * PW_PI), whole = round (turns);
+    const char *name = periodic_rotation_name (s, i, text, sizeof text);
+    if (rotation == 0) continue;
+    printf (shown++ ? "                               " : "  relative to the whole        ");
+    if (shown > PERIODIC_MOST)
+      puts ("...");
+    else if (fabs (turns - whole) < PERIODIC_WHOLE)
+      printf ("%s: %.0f whole turn%s\n", name, whole, fabs (whole) == 1 ? "" : "s");
+    else
+      printf ("%s: a free rotation by %.6g rad\n", name, rotation);
+  }
+}
+
+static void periodic_print_multipliers (const pw_periodic_orbit *o, int symmetries) {
+  int nontrivial = o->multipliers - o->trivial, shown = 0, shift = o->trivial > symmetries;
+  printf ("  Floquet multipliers          ");
+  for (int i = 0; i < nontrivial; i++) {
+    if (o->im[i] < 0 || shown++ >= PERIODIC_MOST) continue;
+    if (shown > 1) printf ("\n                               ");
+    printf (o->im[i] > 0 ? "%.6g +- %.6g i, modulus %.6g" : "%.6g", o->re[i], o->im[i], hypot (o->re[i], o->im[i]));
+  }
+  puts (nontrivial == 0 ? "none" : shown > PERIODIC_MOST ? " ..." : "");
+  printf ("  trivial multipliers          %d%s%s\n", o->trivial, symmetries ? ", of symmetries" : "",
+          !shift       ? ""
+          : symmetries ? " and a shift in time"
+                       : ", of a shift in time");
+}
+
+static const char *periodic_stability (const pw_periodic_orbit *o, char *text, size_t size) {
+  double largest = periodic_largest (o);
+  if (o->multipliers == o->trivial) return "no perturbations but trivial ones";
+  if (o->unstable)
+    snprintf (text, size, "unstable: %d growing, the fastest by a factor of %.6g per period", o->unstable, largest);
+  else if (largest > 1 - 1e-6) /* with the tolerance of pw_periodic_orbit.unstable */
+    snprintf (text, size, "neutral: not all perturbations decay");
+  else
+    snprintf (text, size, "stable: perturbations shrink to %.6g or less per period", largest);
+  return text;
+}
+
+static void periodic_print_motion (const pw_periodic_command *cmd, const pw_periodic_orbit *o) {
+  const periodic_displacement d = periodic_displace (o);
+  char text[200];
+  printf ("%s: a periodic motion%s\n\n", pw_file_name (cmd->m.file),
+          pw_states_symmetries (pw_periodic_symmetries (cmd->search), text));
+  printf ("  period                       %.9g s, %s\n", o->period, cmd->source);
+  printf ("  displacement per period      %.6g m", periodic_round (d.total));
+  printf (periodic_round (d.total) > 0 ? ": %.6g m along %s, %.6g m to its left\n" : "\n", periodic_round (d.along),
+          pw_system_body_name (cmd->m.system, 0), periodic_round (d.left));
+  printf ("  rotation per period          %.6g rad\n", periodic_round (o->rotation));
+  periodic_print_rotations (cmd->m.system, o);
+  printf ("  mean speed                   %.6g m/s\n", periodic_round (d.total / o->period));
+  periodic_print_multipliers (o, pw_periodic_symmetries (cmd->search));
+  printf ("  stability                    %s\n", periodic_stability (o, text, sizeof text));
+  printf ("  residual                     %.1e after %s\n", o->residual, PW_COUNTED (o->iterations, "iteration"));
+  puts ("\nInitial state");
+  pw_states_print (cmd->m.system, o->q, o->v, 8, PERIODIC_SMALL);
+}
+
+/* Prints a row for each event and about PERIODIC_POINTS other points. */
+static void periodic_print_branch (const pw_periodic_command *cmd) {
+  static const char *const head[] = { "period [s]", "displacement [m]",   "rotation [rad]",
+                                      "growing",    "largest multiplier", NULL };
+  char text[40];
+  printf ("%s: a branch of periodic motions%s, %s from %.9g to %.9g, %s\n\n", pw_file_name (cmd->m.file),
+          pw_states_symmetries (pw_periodic_symmetries (cmd->search), text), cmd->vary.name, cmd->settings.first,
+          cmd->settings.last, PW_COUNTED (cmd->points, "point"));
+  for (pw_table t = { 0 }; pw_table_pass (&t);) {
+    pw_cell (&t, -15, "event");
+    pw_cell_unit (&t, 12, cmd->vary.name, cmd->vary.unit);
+    pw_head (&t, 12, 12, head);
+    for (int i = 0; i < cmd->points; i++) {
+      const pw_periodic_orbit *o = &cmd->point[i].orbit;
+      int stride = cmd->points / PERIODIC_POINTS + 1;
+      const periodic_displacement d = periodic_displace (o);
+      if (o->event == PW_PERIODIC_POINT && i % stride && i + 1 < cmd->points) continue;
+      pw_cell (&t, -15,
+               o->event != PW_PERIODIC_POINT ? periodic_events[o->event]
+               : i == 0                      ? "begins"
+               : i + 1 < cmd->points         ? ""
+               : cmd->stopped                ? "stopped"
+                                             : "ends");
+      pw_cell_number (&t, 12, o->parameter, 9);
+      pw_cell_number (&t, 12, o->period, 7);
+      pw_cell_number (&t, 12, periodic_round (d.total), 6);
+      pw_cell_number (&t, 12, periodic_round (o->rotation), 6);
+      pw_cell_number (&t, 7, o->unstable, 3);
+      pw_cell_number (&t, 12, periodic_largest (o), 6);
+      pw_row_end (&t);
+    }
+  }
+  double last = cmd->point[cmd->points - 1].orbit.parameter;
+  if (!cmd->stopped && *pw_periodic_reason (cmd->search))
+    printf ("\nThe branch ends at %s = %.9g: %s\n", cmd->vary.name, last, pw_periodic_reason (cmd->search));
+}
+
+void pw_periodic_print (const pw_periodic_command *cmd) {
+  if (cmd->vary_text)
+    periodic_print_branch (cmd);
+  else
+    periodic_print_motion (cmd, &cmd->point->orbit);
+}
+
+/* ---- JSON ---- */
+
+static void periodic_point_json (const pw_periodic_command *cmd, const pw_periodic_orbit *o, pw_json *j) {
+  char text[PW_NAME_BYTES];
+  int n = pw_system_coordinates (cmd->m.system);
+  const periodic_displacement d = periodic_displace (o);
+  j->line = 1;
+  pw_json_open (j, NULL, '{');
+  if (cmd->vary_text) pw_json_number (j, "parameter", o->parameter);
+  if (cmd->vary_text) pw_json_text (j, "event", periodic_events[o->event]);
+  pw_json_number (j, "period", o->period);
+  pw_json_number (j, "displacement", d.total);
+  pw_json_number (j, "along", d.along);
+  pw_json_number (j, "left", d.left);
+  pw_json_number (j, "rotation", o->rotation);
+  pw_json_open (j, "rotations", '{');
+  for (int i = 0; i < periodic_rotations (cmd->m.system); i++)
+    pw_json_number (j, periodic_rotation_name (cmd->m.system, i, text, sizeof text),
+                    periodic_rotation (cmd->m.system, o, i));
+  pw_json_close (j, '}');
+  pw_json_number (j, "residual", o->residual);
+  pw_json_number (j, "iterations", o->iterations);
+  pw_json_number (j, "growing", o->unstable);
+  pw_states_json (cmd->m.system, o->q, o->v, "start", j);
+  pw_states_json (cmd->m.system, o->end, o->end + n, "end", j);
+  pw_json_open (j, "multipliers", '[');
+  for (int i = 0; i < o->multipliers; i++) {
+    pw_json_open (j, NULL, '{');
+    pw_json_number (j, "re", o->re[i]);
+    pw_json_number (j, "im", o->im[i]);
+    pw_json_flag (j, "trivial", i >= o->multipliers - o->trivial);
+    pw_json_close (j, '}');
+  }
+  pw_json_close (j, ']');
+  pw_json_close (j, '}');
+}
+
+static void periodic_json (const void *context, pw_json *j) {
+  const pw_periodic_command *cmd = context;
+  pw_json_open (j, NULL, '{');
+  pw_json_number (j, "schema", 1);
+  pw_json_text (j, "model", pw_file_name (cmd->m.file));
+  pw_json_text (j, "parameter", cmd->vary_text ? cmd->vary.name : NULL);
+  pw_json_text (j, "unit", cmd->vary.unit);
+  pw_json_text (j, "method", cmd->settings.method);
+  pw_json_number (j, "symmetries", pw_periodic_symmetries (cmd->search));
+  pw_json_flag (j, "complete", !cmd->stopped);
+  pw_json_open (j, "motions", '[');
+  for (int i = 0; i < cmd->points; i++) periodic_point_json (cmd, &cmd->point[i].orbit, j);
+  pw_json_close (j, ']');
+  pw_json_close (j, '}');
+}
+
+/* ---- The table ---- */
+
+static int periodic_csv (const void *context, FILE *f, pw_error *error) {
+  const pw_periodic_command *cmd = context;
+  const pw_system *s = cmd->m.system;
+  int states = 2 * pw_system_coordinates (s), multipliers = cmd->point->orbit.multipliers; /* of every point */
+  pw_text t = { .chars = NULL };
+  pw_text_name (&t, cmd->vary_text ? cmd->vary.name : "parameter", cmd->vary.unit);
+  pw_text_cell (&t, "event,period [s],displacement [m],rotation [rad],growing,residual");
+  pw_states_header (s, &t);
+  pw_complex_header (&t, multipliers, "");
+  int status = pw_text_line (&t, f, cmd->folder, error);
+  for (const pw_periodic_point *p = cmd->point; status == PW_OK && p < cmd->point + cmd->points; p++) {
+    const pw_periodic_orbit *o = &p->orbit;
+    const periodic_displacement d = periodic_displace (o);
+    pw_text_number (&t, cmd->vary_text ? o->parameter : NAN);
+    pw_text_cell (&t, periodic_events[o->event]);
+    const double number[] = { o->period, d.total, o->rotation, o->unstable, o->residual };
+    for (int k = 0; k < 5; k++) pw_text_number (&t, number[k]);
+    for (int i = 0; i < states; i++) pw_text_number (&t, p->state[i]);
+    pw_complex_cells (&t, o->re, o->im, o->multipliers, multipliers);
+    status = pw_text_line (&t, f, cmd->folder, error);
+  }
+  return status;
+}
+
+/* ---- The figure: paths and angular velocities, or curves over the parameter; multipliers and the unit circle ----
+ * Data sets of gnuplot end with two blank lines; a row of nan keeps each from being empty. */
+
+/* Writes t / T, then x, y, phi, omega of the bodies, over one period T. */
+static int periodic_write_motion (const pw_periodic_command *cmd, const pw_periodic_orbit *o, FILE *f,
+                                  pw_error *error) {
+  const pw_settings settings = { .span = o->period, .rtol = 1e-9 }; /* finer than lines in a figure */
+  int bodies = pw_system_bodies (cmd->m.system), status;
+  pw_run *r = pw_run_open (cmd->m.system, cmd->settings.method, &settings, error);
+  if (r == NULL) return error->status;
+  status = pw_run_restart (r, o->q, o->v, error);
+  for (int i = 0; i <= PERIODIC_SAMPLES && status == PW_OK; i++) {
+    double t = o->period * i / PERIODIC_SAMPLES;
+    pw_sample sample;
+    status = pw_run_advance_to (r, t, o->period, error);
+    if (status == PW_OK) status = pw_run_sample (r, t, &sample, error);
+    if (status != PW_OK) break;
+    fprintf (f, "%.9g", (double)i / PERIODIC_SAMPLES);
+    for (int b = 0; b < bodies && b < PERIODIC_BODIES; b++)
+      fprintf (f, " %.9g %.9g %.9g %.9g", sample.q[3 * b], sample.q[3 * b + 1], sample.q[3 * b + 2],
+               sample.v[3 * b + 2]);
+    fputs ("\n", f);
+  }
+  pw_run_close (r);
+  return status;
+}
+
+/* The ordinate of curve k over the parameter: displacement [m], modulus of the largest multiplier, period [s]. */
+static double periodic_curve (const pw_periodic_orbit *o, int k) {
+  const periodic_displacement d = periodic_displace (o);
+  return k == 0 ? periodic_round (d.total) : k == 1 ? periodic_largest (o) : o->period;
+}
+
+/* Writes the parts of the branch whose motions have no growing perturbations (`stable`: 1), or have some (0), each part
+ * followed by a blank line.  A point where one part ends and the next begins belongs to both.  From an event on, the
+ * stability is that of the next point. */
+static void periodic_write_parts (const pw_periodic_command *cmd, FILE *f, int stable) {
+  int inside = 0; /* 1: the last point began or continued a part */
+  for (const pw_periodic_point *p = cmd->point; p < cmd->point + cmd->points; p++) {
+    int last = p + 1 == cmd->point + cmd->points;
+    const pw_periodic_point *after = p->orbit.event == PW_PERIODIC_POINT ? p : p + 1;
+    int here = !last && (after->orbit.unstable == 0) == stable;
+    if (here || inside) {
+      fprintf (f, "%.10g", p->orbit.parameter);
+      for (int k = 0; k < PERIODIC_CURVES; k++) fprintf (f, " %.9g", periodic_curve (&p->orbit, k));
+      fputs ("\n", f);
+    }
+    if (inside && !here) fputs ("\n", f);
+    inside = here;
+  }
+  fputs ("nan nan nan nan\n\n\n", f);
+}
+
+/* Writes the multipliers that are trivial, or those that are not, with the parameter. */
+static void periodic_write_multipliers (const pw_periodic_command *cmd, FILE *f, int trivial) {
+  for (const pw_periodic_point *p = cmd->point; p < cmd->point + cmd->points; p++)
+    for (int i = 0; i < p->orbit.multipliers; i++)
+      if ((i >= p->orbit.multipliers - p->orbit.trivial) == trivial)
+        fprintf (f, "%.9g %.9g %.10g\n", p->orbit.re[i], p->orbit.im[i], p->orbit.parameter);
+  fputs ("nan nan nan\n\n\n", f);
+}
+
+static int periodic_data (const void *context, FILE *f, pw_error *error) {
+  const pw_periodic_command *cmd = context;
+  int status = PW_OK;
+  if (cmd->vary_text) {
+    fputs ("# parameter, displacement [m], largest multiplier, period [s]: stable parts; unstable ones; events; "
+           "multipliers; trivial ones\n",
+           f);
+    for (int stable = 1; stable >= 0; stable--) periodic_write_parts (cmd, f, stable);
+    for (const pw_periodic_point *p = cmd->point; p < cmd->point + cmd->points; p++)
+      if (p->orbit.event != PW_PERIODIC_POINT) fprintf (f, "%.10g %d\n", p->orbit.parameter, p->orbit.event);
+    fputs ("nan nan\n\n\n", f);
+  } else {
+    fputs ("# t / T, then x [m], y [m], phi [rad], omega [rad/s] of each body; multipliers; trivial ones\n", f);
+    status = periodic_write_motion (cmd, &cmd->point->orbit, f, error);
+    fputs ("\n\n", f);
+  }
+  for (int trivial = 0; trivial < 2; trivial++) periodic_write_multipliers (cmd, f, trivial);
+  return status;
+}
+
+static void periodic_variables (const void *context, FILE *f) {
+  const pw_periodic_command *cmd = context;
+  int bodies = pw_system_bodies (cmd->m.system);
+  double largest = 0;
+  if (bodies > PERIODIC_BODIES) bodies = PERIODIC_BODIES;
+  pw_figure_label (f, "label_of_x", 0, cmd->vary.name, cmd->vary.unit);
+  fprintf (f, "branch = %d\nfirst = %.10g\nlast = %.10g\nbodies = %d\narray body[%d]\n", cmd->vary_text != NULL,
+           fmin (cmd->settings.first, cmd->settings.last), fmax (cmd->settings.first, cmd->settings.last), bodies,
+           bodies ? bodies : 1);
+  for (int i = 0; i < cmd->points; i++) largest = fmax (largest, periodic_largest (&cmd->point[i].orbit));
+  fprintf (f, "largest = %.9g\narray low[3]\narray high[3]\n", largest);
+  for (int k = 0; k < PERIODIC_CURVES; k++) {
+    double low = INFINITY, high = -INFINITY;
+    for (int i = 0; i < cmd->points; i++) {
+      low = fmin (low, periodic_curve (&cmd->point[i].orbit, k));
+      high = fmax (high, periodic_curve (&cmd->point[i].orbit, k));
+    }
+    fprintf (f, "low[%d] = %.9g\nhigh[%d] = %.9g\n", k + 1, isfinite (low) ? low : 0, k + 1,
+             isfinite (high) ? high : 0);
+  }
+  for (int b = 0; b < bodies; b++) pw_figure_element (f, "body", b + 1, pw_system_body_name (cmd->m.system, b));
+}
+
+int pw_periodic_write (const pw_periodic_command *cmd, pw_error *error) {
+  int status = pw_figure_write_tables (cmd->folder, "periodic", 1, cmd, periodic_csv, periodic_json, error);
+  if (status != PW_OK) return status;
+  return pw_figure_write (&cmd->line, &cmd->m, cmd->folder, "periodic", cmd, periodic_data, periodic_variables, error);
+}

@@ -4,7 +4,7 @@
 #define PW_SENSITIVITY_H
 
 #include "outcome.h"
-#include "progress.h"
+#include "cli.h"
 #include "unknowns.h"
 
 /* Outputs of the runs of unknowns. */

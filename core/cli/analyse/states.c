@@ -1,6 +1,6 @@
 /* States in options and reports of `linearise`, `steady` and `periodic`. */
 #include "states.h"
-#include "print_table.h"
+#include "cli.h"
 
 enum { STATES_BODIES = 20 }; /* printed, at most */
 

@@ -106,7 +106,7 @@ typedef struct {
 
 /* A stroke of a symbol, a polygonal line.  A vertex a, x, y, b is the point  p1 + a d + b d' + u (x e + y n), where p1
  * and p2 are the first and the last end of the link, d = p2 - p1, d' is d turned to the left by 90 degrees, u the unit
- * of symbols, e the direction of the symbol (plot_symbols.c) and n is e turned to the left by 90 degrees. */
+ * of symbols, e the direction of the symbol (plot_shapes.c) and n is e turned to the left by 90 degrees. */
 typedef struct {
   int vertices;
   int closed;  /* 1: the last vertex is the first one, and the area inside hides what is below */

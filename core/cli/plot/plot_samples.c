@@ -1,8 +1,8 @@
 /* Samples for figures: equally spaced in time, for a limited number of bodies and wheels. */
-#include "plot.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "plot.h"
 
 const char *pw_plot_name (const pw_plots *plots, const pw_tracks *tracks, int k) {
   return tracks == &plots->bodies ? pw_system_body_name (plots->system, tracks->system_index[k])
@@ -159,4 +159,265 @@ void pw_plots_serialise (pw_plots *plots, pw_archive *archive) {
   plots->samples = samples;
   pw_archive_bytes (archive, plots->data, (size_t)samples * (size_t)plots->sample_size * sizeof *plots->data);
   if (samples > 0) pw_plot_measure (plots);
+}
+
+/* The figures of a run: data files, plain columns with a comment line of names and units at the top, and scripts. */
+
+enum {
+  FIGURES_NAMED = 12,     /* curves with a name each, at most */
+  FIGURES_COLOURS = 8,    /* of bodies */
+  FIGURES_SNAPSHOTS = 60, /* at most, before their stride is rounded down */
+  FIGURES_FEWEST = 8,     /* snapshots, at least */
+  FIGURES_CLOSEUP = 12    /* samples of a close-up, at least */
+};
+#define FIGURES_FAR 10    /* extent of a motion with a close-up, at least, in sizes of the mechanism (pw_plots.size) */
+#define FIGURES_NEAR 4    /* extent of the close-up, at most, in sizes of the mechanism */
+#define FIGURES_WHEEL 1.6 /* half the length of a wheel, in units of symbols */
+
+/* Numbers separated by spaces, then an end. */
+static void data_row (FILE *f, const double *value, int count, const char *end) {
+  for (int i = 0; i < count; i++) fprintf (f, "%s%s", i ? " " : "", PW_DIGITS (value[i], 10));
+  fputs (end, f);
+}
+
+/* 1 if a body has attachment points, or there is a wheel or marker. */
+static int data_extended (const pw_plots *plots) {
+  int b = 0;
+  while (b < plots->bodies.drawn && plots->shape[b].attachments == 0) b++;
+  return b < plots->bodies.drawn || plots->wheels.drawn > 0;
+}
+
+/* Number of initial samples in a close-up, a separate panel for a mechanism that travels so far that it is small in a
+ * figure of the whole run; 0: none.  A single point has no size. */
+static int data_closeup (const pw_plots *plots) {
+  pw_plot_box all = pw_plot_ground (plots), first = PLOT_EMPTY;
+  double diagonal = 0;
+  int n = 0;
+  if (!data_extended (plots)) return 0;
+  for (int i = 0; i < plots->samples; i++) diagonal = pw_plot_extend (&all, plots, i);
+  if (diagonal < FIGURES_FAR * plots->size) return 0;
+  while (n < plots->samples && pw_plot_extend (&first, plots, n) <= FIGURES_NEAR * plots->size) n++;
+  return n < FIGURES_CLOSEUP ? 0 : n;
+}
+
+/* ---- Files ---- */
+
+/* One block per curve: time, the numbers of the body or wheel, its number among all of them, from 1. */
+static int data_tracks (const pw_plots *plots, const pw_tracks *tracks, pw_error *error) {
+  pw_output *o = tracks->curves ? pw_figure_open_data (&plots->figures, tracks->file, error) : NULL;
+  if (o == NULL) return tracks->curves ? PW_RESOURCE : PW_OK;
+  FILE *out = pw_output_stream (o);
+  for (int c = 0; c < tracks->curves; c++) {
+    int k = pw_plot_pick (c, tracks->curves, tracks->drawn);
+    fprintf (out, "%s# %s: %s, number\n", c ? "\n\n" : "", pw_plot_name (plots, tracks, k), tracks->columns);
+    for (int i = 0; i < plots->samples; i++) {
+      data_row (out, pw_plot_sample (plots, i), 1, " ");
+      data_row (out, pw_plot_track (plots, i, tracks, k), tracks->numbers, " ");
+      fprintf (out, "%d\n", pw_plot_pick (k, tracks->drawn, tracks->count) + 1);
+    }
+  }
+  return pw_output_finish (o, error);
+}
+
+/* A file of `rows` rows of `width` numbers, of which the first `count` are written; no file without rows. */
+static int data_table (const pw_plots *plots, const char *name, const char *heading, const double *row, int width,
+                       int count, int rows, pw_error *error) {
+  pw_output *o = rows ? pw_figure_open_data (&plots->figures, name, error) : NULL;
+  if (o == NULL) return rows ? PW_RESOURCE : PW_OK;
+  fprintf (pw_output_stream (o), "# %s\n", heading);
+  for (int i = 0; i < rows; i++, row += width) data_row (pw_output_stream (o), row, count, "\n");
+  return pw_output_finish (o, error);
+}
+
+/* ---- The mechanism: lines "x y t body", blank ones between polygons; body: from 1; 0: element; -1: not drawn ---- */
+
+static void data_vertex (FILE *f, const double *at, double t, int body, const char *end) {
+  data_row (f, (const double[]){ at[0], at[1], t, body + 1 }, 4, end);
+}
+
+static void data_segment (FILE *f, const double *from, const double *to, double t, int body) {
+  data_vertex (f, from, t, body, "\n");
+  data_vertex (f, to, t, body, "\n\n");
+}
+
+/* Bodies of sample i: their outlines, and lines from the centre of mass to the attachment points inside, all of them if
+ * there is no outline. */
+static void data_bodies (FILE *f, const pw_plots *plots, int i) {
+  double t = pw_plot_sample (plots, i)[PLOT_T], point[2];
+  for (int b = 0; b < plots->bodies.drawn; b++) {
+    const pw_plot_body *shape = &plots->shape[b];
+    const double *motion = pw_plot_track (plots, i, &plots->bodies, b);
+    for (int k = 0; k <= shape->corners && shape->corners; k++) {
+      pw_plot_point (motion, shape->corner[k % shape->corners], point);
+      data_vertex (f, point, t, b, k < shape->corners ? "\n" : "\n\n");
+    }
+    for (int k = 0; k < shape->attachments; k++) {
+      if (!pw_plot_inside (shape, k)) continue;
+      pw_plot_point (motion, shape->attachment[k], point);
+      data_segment (f, motion, point, t, b);
+    }
+  }
+}
+
+/* Wheels of sample i: lines along their headings. */
+static void data_wheels (FILE *f, const pw_plots *plots, int i) {
+  for (int w = 0; w < plots->wheels.drawn; w++) {
+    if (!pw_plot_rolls (plots, w)) continue;
+    const double *contact = pw_plot_track (plots, i, &plots->wheels, w), half = FIGURES_WHEEL * plots->symbol_unit;
+    double end[2][2];
+    pw_plot_point (contact, (const double[]){ -half, 0 }, end[0]);
+    pw_plot_point (contact, (const double[]){ half, 0 }, end[1]);
+    data_segment (f, end[0], end[1], pw_plot_sample (plots, i)[PLOT_T],
+                  plots->body_index[pw_system_element (plots->system, plots->wheels.system_index[w]).body[0]]);
+  }
+}
+
+/* Bodies of sample i that are points: without attachment points, or with mass but no inertia. */
+static void data_centres (FILE *f, const pw_plots *plots, int i) {
+  for (int b = 0; b < plots->bodies.drawn; b++)
+    if (plots->shape[b].attachments == 0 || plots->shape[b].is_point_mass)
+      data_vertex (f, pw_plot_track (plots, i, &plots->bodies, b), pw_plot_sample (plots, i)[PLOT_T], b, "\n");
+}
+
+/* Massless straight elements such as rods at sample i: their symbols begin with a stroke from one end to the other. */
+static void data_rods (FILE *f, const pw_plots *plots, int i) {
+  double end[2][2];
+  for (const pw_plot_link *l = plots->link; l < plots->link + plots->links; l++) {
+    if (l->ends != 2 || l->kind->level != PW_HOLONOMIC || !l->kind->symbol ||
+        strncmp (l->kind->symbol, "0 0 0 1 0 0", 11) != 0)
+      continue;
+    for (int n = 0; n < 2; n++) pw_plot_end (plots, i, l, n, end[n]);
+    data_segment (f, end[0], end[1], pw_plot_sample (plots, i)[PLOT_T], -1);
+  }
+}
+
+/* The open or the closed strokes of a symbol at the last of n samples. */
+static void data_symbol (FILE *f, const pw_plots *plots, const pw_plot_link *link, int n, int closed) {
+  pw_plot_stroke stroke[PLOT_STROKES];
+  double point[PLOT_VERTICES][2];
+  int strokes = pw_plot_strokes (plots, link, n, stroke);
+  for (const pw_plot_stroke *s = stroke; s < stroke + strokes; s++) {
+    if (s->closed != closed) continue;
+    pw_plot_place (plots, n - 1, link, s, point);
+    for (int k = 0; k < s->vertices; k++)
+      data_vertex (f, point[k], pw_plot_sample (plots, n - 1)[PLOT_T], -1, k < s->vertices - 1 ? "\n" : "\n\n");
+  }
+}
+
+/* The number of samples from one snapshot to the next, of the first n: the body with the longest path moves by about a
+ * third of the size of the mechanism. */
+static int data_stride (const pw_plots *plots, int n) {
+  double longest = 0;
+  for (int b = 0; b < plots->bodies.drawn; b++) {
+    double path = 0;
+    for (int i = 1; i < n; i++) {
+      const double *from = pw_plot_track (plots, i - 1, &plots->bodies, b),
+                   *to = pw_plot_track (plots, i, &plots->bodies, b);
+      path += hypot (to[0] - from[0], to[1] - from[1]);
+    }
+    longest = fmax (longest, path);
+  }
+  int stride = (int)((n - 1) / fmin (fmax (3 * longest / plots->size, FIGURES_FEWEST), FIGURES_SNAPSHOTS));
+  return stride < 1 ? 1 : stride;
+}
+
+/* Blocks: snapshots out of the first n samples; then the last of these samples; then its symbols, open and closed
+ * strokes.  gnuplot does not count blocks without data, so each begins with a point that is not drawn. */
+static int data_mechanism (const pw_plots *plots, const char *name, int n, pw_error *error) {
+  static const struct {
+    const char *title;
+    void (*write) (FILE *f, const pw_plots *plots, int i);
+  } block[] = {
+    { "bodies", data_bodies }, { "wheels", data_wheels }, { "point masses", data_centres }, { "rods", data_rods }
+  };
+  static const char first[] = "nan nan nan nan\n\n";
+  pw_output *o = pw_figure_open_data (&plots->figures, name, error);
+  if (o == NULL) return PW_RESOURCE;
+  FILE *f = pw_output_stream (o);
+  int stride = data_stride (plots, n);
+  for (int last = 0; last < 2; last++)
+    for (int k = 0; k < 4; k++) {
+      fprintf (f, "%s# %s, %s: x [m], y [m], t [s], number of the body\n%s", last || k ? "\n\n" : "", block[k].title,
+               last ? "at the end" : "before", first);
+      for (int i = last ? n - 1 : 0; i < n - !last; i += stride) block[k].write (f, plots, i);
+    }
+  for (int closed = 0; closed < 2; closed++) {
+    fprintf (f, "\n\n# symbols, %s\n%s", closed ? "closed" : "open", first);
+    for (int i = 0; i < plots->links; i++) data_symbol (f, plots, &plots->link[i], n, closed);
+  }
+  return pw_output_finish (o, error);
+}
+
+static int data_write (const pw_plots *plots, int closeup, pw_error *error) {
+  static const char energy[] = "t [s], kinetic [J], potential [J], work [J], loss [J], projection [J], balance [J]";
+  int status = data_tracks (plots, &plots->bodies, error);
+  if (status == PW_OK) status = data_tracks (plots, &plots->wheels, error);
+  if (status == PW_OK)
+    status =
+        data_table (plots, "energy.dat", energy, plots->data, plots->sample_size, PLOT_FIRST, plots->samples, error);
+  if (status == PW_OK)
+    status = data_table (plots, "ground.dat", "points of the ground: x [m], y [m]", *plots->ground, 2, 2,
+                         plots->grounds, error);
+  if (status == PW_OK) status = data_mechanism (plots, "mechanism.dat", plots->samples, error);
+  if (status == PW_OK && closeup > 0) status = data_mechanism (plots, "mechanism-closeup.dat", closeup, error);
+  return status;
+}
+
+/* ---- Scripts: values of the templates' variables ---- */
+
+/* Curves, with a label each unless there are too many; which of them, from 0, are paths of markers. */
+static void figures_curves (FILE *f, const pw_plots *plots, const pw_tracks *tracks) {
+  pw_figure_text (f, "data", tracks->file);
+  pw_figure_text (f, "what", tracks->noun);
+  fprintf (f, "curves = %d\nnumbers = %d\nnumber_column = %d\narray label[%d]\n", tracks->curves, tracks->count,
+           tracks->numbers + 2, tracks->curves);
+  for (int i = 0; i < tracks->curves && tracks->curves <= FIGURES_NAMED; i++)
+    pw_figure_element (f, "label", i + 1, pw_plot_name (plots, tracks, i));
+  fputs ("markers = '", f);
+  for (int i = 0; i < tracks->curves && tracks == &plots->wheels; i++)
+    if (!pw_plot_rolls (plots, pw_plot_pick (i, tracks->curves, tracks->drawn))) fprintf (f, "%d ", i);
+  fputs ("'\n", f);
+}
+
+/* The names of bodies unless there are too many, and the colours of those with an area. */
+static void figures_bodies (FILE *f, const pw_plots *plots) {
+  int bodies = plots->bodies.drawn, named = bodies <= FIGURES_NAMED ? bodies : 0, area[FIGURES_COLOURS] = { 0 };
+  fprintf (f, "bodies = %d\narray body[%d]\n", named, bodies);
+  for (int b = 0; b < bodies; b++) area[b % FIGURES_COLOURS] |= plots->shape[b].corners > 0;
+  fputs ("areas = '", f);
+  for (int c = 0; c < FIGURES_COLOURS; c++)
+    if (area[c]) fprintf (f, "%d ", c + 1);
+  fputs ("'\n", f);
+  for (int b = 0; b < named; b++) pw_figure_element (f, "body", b + 1, pw_plot_name (plots, &plots->bodies, b));
+}
+
+static int figures_write (const pw_plots *plots, const char *name, int closeup, pw_error *error) {
+  int mechanism = strcmp (name, "mechanism") == 0, paths = mechanism || strcmp (name, "paths") == 0;
+  pw_output *o = pw_figure_begin (&plots->figures, name, error);
+  if (o == NULL) return PW_RESOURCE;
+  FILE *f = pw_output_stream (o);
+  fprintf (f, "t_end = %.9g\nt_closeup = %.9g\n", pw_plot_sample (plots, plots->samples - 1)[PLOT_T],
+           closeup > 0 ? pw_plot_sample (plots, closeup - 1)[PLOT_T] : 0);
+  figures_curves (f, plots, paths && plots->wheels.drawn ? &plots->wheels : &plots->bodies);
+  fprintf (f, "ground = %d\nby_time = %d\n", plots->grounds > 0, plots->by_time);
+  if (mechanism) figures_bodies (f, plots);
+  return pw_figure_end (o, name, error);
+}
+
+int pw_plots_finish (pw_plots *plots, int draw, pw_error *error) {
+  static const char *const names[] = { "paths", "velocities", "angular", "energy", "mechanism", NULL };
+  const char *folder = plots->figures.folder;
+  if (folder == NULL) return PW_OK;
+  if (plots->samples < 2) {
+    pw_cli_say ("pinwheel: the run is too short for figures: none are drawn in %s\n", folder);
+    return PW_OK;
+  }
+  if (plots->samples < plots->planned)
+    snprintf (plots->figures.incomplete, sizeof plots->figures.incomplete, ", incomplete: up to t = %s s of %s s",
+              PW_DIGITS (pw_plot_sample (plots, plots->samples - 1)[PLOT_T], 4), PW_DIGITS (plots->t_end, 4));
+  int closeup = data_closeup (plots), status = data_write (plots, closeup, error);
+  for (const char *const *name = names; status == PW_OK && *name; name++)
+    status = figures_write (plots, *name, closeup, error);
+  if (status != PW_OK) return status;
+  return draw ? pw_figure_draw (folder, names, error) : pw_figure_undrawn (folder, names, "the run was interrupted");
 }

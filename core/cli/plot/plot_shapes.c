@@ -1,4 +1,5 @@
 /* Shapes of bodies in figures and animations, and the elements drawn between them (links), with their forces. */
+#include <ctype.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -205,4 +206,190 @@ void pw_plot_measure (pw_plots *plots) {
       reach = fmax (reach, hypot (plots->shape[b].attachment[k][0], plots->shape[b].attachment[k][1]));
   plots->size = size > 0 ? size : pw_system_length (plots->system);
   plots->symbol_unit = SHAPES_UNIT * (reach > 0 ? fmin (plots->size, 4 * reach) : plots->size);
+}
+
+/* Symbols of elements in figures, and the hatching of the ground.
+ *
+ * The text of a symbol (pw_kind.symbol) consists of strokes separated by semicolons.  A stroke is a list of vertices
+ * "a x y": the point p1 + a (p2 - p1) + u (x e + y n), as in pw_plot_stroke, where p1 and p2 are the points of the
+ * first and the last body, u the unit of symbols, e a direction and n its normal to the left.  For a contact point e is
+ * its heading; for a symbol with a rail, the field `heading` in the last body; otherwise the direction from p1 to p2,
+ * or the x axis of the first body if these coincide.  In a rail, x = inf and x = -inf are the ends of the travel of p1
+ * along e.
+ *
+ * "o a x y r" is a circle of radius u r around that point; "g1" and "g2" are the pitch circles of gears with the axles
+ * p1 and p2 and the field `ratio`.  A stroke whose last vertex is its first encloses an area, which hides what is
+ * below.  "NAME:" before a stroke: it is drawn if that field of the element is not zero; "NAME=2:": if it is 2. */
+
+enum { SYMBOL_CIRCLE = 24 }; /* sides of the polygon of a circle */
+#define SYMBOL_HATCH 0.6     /* distance of the strokes of a hatching, in units of symbols */
+#define SYMBOL_OVERHANG 2.5  /* of a rail beyond the travel, in units of symbols */
+
+/* The value of a number or a choice of an element; 0 if it has no such field. */
+static double symbol_field (const pw_plot_link *link, const char *name, size_t length) {
+  const pw_field *f = link->kind->fields;
+  while (f->name && (strncmp (f->name, name, length) != 0 || f->name[length])) f++;
+  if (f->name == NULL) return 0;
+  const void *at = (const char *)link->definition + f->offset;
+  return f->type == PW_NUMBER ? *(const double *)at : f->type == PW_CHOICE ? *(const int *)at : 0;
+}
+
+double pw_plot_heading (const pw_plot_link *link) {
+  return symbol_field (link, "heading", 7);
+}
+
+/* Reads a condition; 0 if it does not hold. */
+static int symbol_condition (const pw_plot_link *link, const char **text) {
+  const char *name = *text, *colon = name + strcspn (name, ":;");
+  size_t length = strcspn (name, "=:");
+  if (*colon != ':') return 1;
+  double value = symbol_field (link, name, length);
+  *text = colon + 1;
+  return name[length] == '=' ? value == strtod (name + length + 1, NULL) : value != 0;
+}
+
+/* A circle around a vertex, of radius u r or d |p2 - p1|: r or d is 0. */
+static void symbol_circle (pw_plot_stroke *stroke, const double *centre, double r, double d) {
+  const double step = 2 * PW_PI / SYMBOL_CIRCLE;
+  for (int i = 0; i <= SYMBOL_CIRCLE; i++) {
+    double c = cos (step * (i % SYMBOL_CIRCLE)), s = sin (step * (i % SYMBOL_CIRCLE));
+    double vertex[] = { centre[0] + d * c, centre[1] + r * c, centre[2] + r * s, d * s };
+    memcpy (stroke->vertex[stroke->vertices++], vertex, sizeof vertex);
+  }
+}
+
+/* A pitch circle of gears of the ratio i: the radii R1 and R2 = |i| R1 have R1 + R2 = |p2 - p1| if i < 0, and
+ * |R1 - R2| = |p2 - p1| if i > 0 and one is a ring (Willis 1870); equal circles for i = 1. */
+static void symbol_gear (const pw_plot_link *link, pw_plot_stroke *stroke, int second) {
+  double i = symbol_field (link, "ratio", 5), first = i == 1 ? 0.5 : 1 / fabs (1 - i);
+  symbol_circle (stroke, (const double[]){ second, 0, 0 }, 0, second ? first * fabs (i) : first);
+}
+
+/* Reads numbers, at most `most`; returns how many there are. */
+static int symbol_numbers (const char **text, double *out, int most) {
+  char *end;
+  int n = 0;
+  for (; n < most; n++, *text = end) {
+    out[n] = strtod (*text, &end);
+    if (end == *text) break;
+  }
+  return n;
+}
+
+/* Reads the next stroke of a symbol, without vertices if its condition does not hold; 0 after the last one. */
+static int symbol_next (const pw_plot_link *link, const char **text, pw_plot_stroke *stroke) {
+  double number[4];
+  stroke->vertices = stroke->upright = 0;
+  while (isspace ((unsigned char)**text) || **text == ';') ++*text;
+  if (**text == 0) return 0;
+  int drawn = symbol_condition (link, text);
+  *text += strspn (*text, " ");
+  if (**text == 'g') {
+    symbol_gear (link, stroke, (*text)[1] == '2');
+  } else if (**text == 'o' && ++*text && symbol_numbers (text, number, 4) == 4) {
+    symbol_circle (stroke, number, number[3], 0);
+  } else {
+    while (stroke->vertices < PLOT_VERTICES && symbol_numbers (text, number, 3) == 3)
+      memcpy (stroke->vertex[stroke->vertices++], (const double[]){ number[0], number[1], number[2], 0 },
+              sizeof *stroke->vertex);
+  }
+  *text += strcspn (*text, ";");
+  stroke->closed = stroke->vertices > 2 &&
+                   memcmp (stroke->vertex[0], stroke->vertex[stroke->vertices - 1], sizeof *stroke->vertex) == 0;
+  if (!drawn) stroke->vertices = 0;
+  return 1;
+}
+
+/* ---- In the inertial frame ---- */
+
+/* The frame of a symbol, as in pw_plot_stroke. */
+typedef struct {
+  double p1[2], d[2], e[2];
+} symbol_frame;
+
+void pw_plot_end (const pw_plots *plots, int i, const pw_plot_link *link, int n, double out[2]) {
+  static const double ground[3] = { 0 };
+  int body = link->end[n].body;
+  pw_plot_point (body < 0 ? ground : pw_plot_track (plots, i, &plots->bodies, body), link->end[n].at, out);
+}
+
+static symbol_frame symbol_frame_at (const pw_plots *plots, int i, const pw_plot_link *link) {
+  symbol_frame frame;
+  int last = link->ends - 1, body = link->end[link->rail ? last : 0].body;
+  double p2[2], angle = body < 0 ? 0 : pw_plot_track (plots, i, &plots->bodies, body)[2];
+  pw_plot_end (plots, i, link, 0, frame.p1);
+  pw_plot_end (plots, i, link, last, p2);
+  frame.d[0] = p2[0] - frame.p1[0], frame.d[1] = p2[1] - frame.p1[1];
+  if (link->wheel >= 0)
+    angle = pw_plot_track (plots, i, &plots->wheels, link->wheel)[2];
+  else if (link->rail)
+    angle += pw_plot_heading (link);
+  else if (hypot (frame.d[0], frame.d[1]) > 1e-9 * plots->symbol_unit)
+    angle = atan2 (frame.d[1], frame.d[0]);
+  frame.e[0] = cos (angle), frame.e[1] = sin (angle);
+  return frame;
+}
+
+/* The ends of a rail along e from p2, in units of symbols: beyond those of the travel of p1. */
+static void symbol_travel (const pw_plots *plots, const pw_plot_link *link, int samples, double *low, double *high) {
+  *low = *high = 0;
+  for (int i = 0; i < samples && link->rail; i++) {
+    symbol_frame frame = symbol_frame_at (plots, i, link);
+    double travel = -(frame.d[0] * frame.e[0] + frame.d[1] * frame.e[1]) / plots->symbol_unit;
+    *low = fmin (*low, travel), *high = fmax (*high, travel);
+  }
+  *low -= SYMBOL_OVERHANG, *high += SYMBOL_OVERHANG;
+}
+
+/* Hatching below the line from x0 to x1 at height y relative to p1 + d; returns the number of strokes. */
+static int symbol_hatch (double x0, double x1, double y, int upright, pw_plot_stroke *stroke) {
+  int strokes = (int)fmin (PLOT_HATCHES, ceil ((x1 - x0) / SYMBOL_HATCH));
+  for (int k = 0; k < strokes; k++) {
+    double x = x0 + (x1 - x0) * (k + 0.5) / strokes;
+    stroke[k] = (pw_plot_stroke){ 2, 0, upright, { { 1, x + 0.25, y }, { 1, x - 0.25, y - 0.5 } } };
+  }
+  return strokes;
+}
+
+/* The hatching of a rail on the ground; else the support of a joint, or of p1 on a rail, on the ground.  Returns the
+ * number of strokes. */
+static int symbol_ground (double low, double high, const pw_plot_link *link, pw_plot_stroke *stroke) {
+  static const pw_plot_stroke support = {
+    6, 0, 1, { { 1, 1.1, -1.5 }, { 1, .8, -1.5 }, { 1, 0, 0 }, { 1, -.8, -1.5 }, { 1, -1.1, -1.5 }, { 1, 1.1, -1.5 } }
+  };
+  const double groove = -.4; /* y of the lower edge of a slot, "1 -inf -.4" in its symbol; a rail has y = 0 */
+  if (link->rail && link->end[link->ends - 1].body < 0)
+    return symbol_hatch (low, high, strstr (link->kind->symbol, "1 -inf -") ? groove : 0, 0, stroke);
+  *stroke = support;
+  return 1 + symbol_hatch (-1.1, 1.1, -1.5, 1, stroke + 1);
+}
+
+int pw_plot_strokes (const pw_plots *plots, const pw_plot_link *link, int samples,
+                     pw_plot_stroke stroke[PLOT_STROKES]) {
+  int ground = link->end[link->ends - 1].body < 0 || link->end[0].body < 0, n = 0;
+  double low, high;
+  if (link->kind->symbol == NULL) return 0;
+  symbol_travel (plots, link, samples, &low, &high);
+  if (ground) n = symbol_ground (low, high, link, stroke);
+  for (const char *text = link->kind->symbol; n < PLOT_STROKES && symbol_next (link, &text, &stroke[n]);) {
+    pw_plot_stroke *s = &stroke[n];
+    for (int k = 0; k < s->vertices; k++)
+      if (isinf (s->vertex[k][1])) s->vertex[k][1] = s->vertex[k][1] > 0 ? high : low;
+    n += s->vertices > 0;
+  }
+  return n;
+}
+
+void pw_plot_place (const pw_plots *plots, int i, const pw_plot_link *link, const pw_plot_stroke *stroke,
+                    double (*out)[2]) {
+  symbol_frame frame = symbol_frame_at (plots, i, link);
+  if (stroke->upright) frame.e[0] = 1, frame.e[1] = 0;
+  if (stroke->upright && link->end[0].body < 0) frame.d[0] = frame.d[1] = 0;
+  for (int k = 0; k < stroke->vertices; k++) {
+    const double *vertex = stroke->vertex[k];
+    out[k][0] = frame.p1[0] + vertex[0] * frame.d[0] - vertex[3] * frame.d[1] +
+                plots->symbol_unit * (vertex[1] * frame.e[0] - vertex[2] * frame.e[1]);
+    out[k][1] = frame.p1[1] + vertex[0] * frame.d[1] + vertex[3] * frame.d[0] +
+                plots->symbol_unit * (vertex[1] * frame.e[1] + vertex[2] * frame.e[0]);
+  }
 }

@@ -1,10 +1,10 @@
-/* The command `pinwheel run`: its options, what it has open, and its checkpoints (checkpoints.c). */
+/* The command `pinwheel run`: its options, what it has open, and its checkpoints (run_command.c). */
 #ifndef PW_RUN_COMMAND_H
 #define PW_RUN_COMMAND_H
 
 #include "motion.h"
 #include "plot.h"
-#include "text.h"
+#include "cli.h"
 
 typedef struct {
   /* as given, or NULL; without --checkpoint, `path` is that of --resume */

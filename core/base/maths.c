@@ -1,0 +1,53 @@
+/* Sine and cosine of one angle [rad]; from PW_SINE_LIMIT on, and for infinity and NaN, those of the C library. */
+#include <math.h>
+#include "pinwheel.h"
+#include "sine.h"
+#include "elliptic.h"
+
+void pw_sin_cos (double x, double *sine, double *cosine) {
+  if (fabs (x) < PW_SINE_LIMIT) {
+    pw_lanes s, c;
+    pw_sin_cos_lanes ((pw_lanes){ x }, &s, &c);
+    *sine = s[0];
+    *cosine = c[0];
+  } else {
+    *sine = sin (x);
+    *cosine = cos (x);
+  }
+}
+
+double pw_sin (double x) {
+  double s, c;
+  pw_sin_cos (x, &s, &c);
+  return s;
+}
+
+double pw_cos (double x) {
+  double s, c;
+  pw_sin_cos (x, &s, &c);
+  return c;
+}
+
+/* The complete elliptic integral K and Jacobi's amplitude am, which give the exact motion of a pendulum, from the
+ * arithmetic-geometric mean a_N of N steps:
+ *
+ *     K (m) = pi / (2 a_N),   am (u | m) = phi_0,
+ *     phi_N = 2^N a_N u,      2 phi_(n-1) = phi_n + asin (c_n sin phi_n / a_n)
+ *
+ * (Abramowitz & Stegun 1964, sections 16.4 and 17.6.) */
+
+double pw_elliptic_K (double m) {
+  double a, c_by_a[PW_ELLIPTIC_STEPS], c_by_m[PW_ELLIPTIC_STEPS];
+  if (!(m < 1)) return m == 1 ? INFINITY : NAN;
+  pw_elliptic_mean (m, &a, c_by_a, c_by_m);
+  return PW_PI / (2 * a);
+}
+
+double pw_jacobi_am (double u, double m) {
+  double a, c_by_a[PW_ELLIPTIC_STEPS], c_by_m[PW_ELLIPTIC_STEPS];
+  if (!(m < 1)) return m == 1 ? 2 * atan (tanh (u / 2)) : NAN;
+  int n = pw_elliptic_mean (m, &a, c_by_a, c_by_m);
+  double phi = ldexp (a * u, n);
+  while (n-- > 0) phi = (phi + asin (c_by_a[n] * pw_sin (phi))) / 2;
+  return phi;
+}

@@ -1,0 +1,1111 @@
+/* pinwheel fit: parameters and initial values with which a model agrees best with measured data. */
+#define _POSIX_C_SOURCE 200809L
+#include <gsl/gsl_blas.h>
+#include <gsl/gsl_cdf.h>
+#include <gsl/gsl_errno.h>
+#include <gsl/gsl_linalg.h>
+#include <gsl/gsl_multifit_nlinear.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "sensitivity.h"
+#include "figure.h"
+#include "cli.h"
+
+/* A least-squares fit for `pinwheel fit`: its options, data and results.  Comments on arrays begin with their sizes;
+ * arrays "columns x rows" have the rows of the first column, then those of the second one, ... */
+
+typedef struct {
+  pw_cli_line line;
+  const char *data_path, *columns_text, *table_path, *json_path, *plots_path, *confidence_text, *starts_text,
+      *jobs_text, *time_name, *time_scale_text, *time_offset_text;
+  const char **free, **sigma_texts;
+  pw_cli_model model;
+  pw_files files;
+  pw_unknowns unknowns;
+  double confidence; /* probability of confidence intervals */
+  int jobs, starts;
+  /* data */
+  pw_arena arena;                          /* of all arrays but the table */
+  const char **column_name, **column_unit; /* columns, ended by NULL */
+  double *table;                           /* times, data, columns of standard deviations */
+  int columns, rows;                       /* of the data */
+  int untimed, late;                       /* rows that are left out: without a time, after --t-end */
+  double first, last;                      /* times in the table, those after --t-end included [s] */
+  double t_end;                            /* of the run of the model, or --t-end [s] */
+  const double *t;                         /* rows [s] */
+  const double *data;                      /* columns x rows; NaN: none */
+  double *sigma;                           /* columns x rows: standard deviations; 1 if not weighted */
+  int weighted;                            /* 1: standard deviations are given */
+  int residuals;                           /* number of data that are not NaN */
+  /* results */
+  double *ends;           /* starts x (1 + unknowns): sum of squares, values; without a result INFINITY, the start */
+  double *estimate;       /* unknowns */
+  double *fitted;         /* columns x rows: values of the model at the estimate */
+  double *standard_error; /* unknowns; INFINITY: not determined by the data, NaN: not known */
+  double *covariance;     /* unknowns x unknowns */
+  /* of the Jacobian of the residuals at the estimate, its columns scaled to length 1: */
+  double *derivative_error; /* unknowns: order of the relative error of each column */
+  double *singular_value;   /* unknowns, the largest one first */
+  double *singular_vector;  /* unknowns x unknowns: right singular vectors, in columns */
+  double *column_length;    /* unknowns: before scaling; 0: the unknown has no effect */
+  int rank;                 /* singular values that differ from 0 */
+  double chi2;              /* sum of squares of the residuals (model - data) / sigma */
+  double initial_chi2;      /* where the first search begins */
+  int converged, iterations;
+  int interrupted; /* 1: by Ctrl-C; the estimate is the best so far, its standard errors are NaN */
+  long runs;
+  pw_progress progress;
+} pw_fit;
+
+/* An unknown nearer to a bound than this, relative to its scale, counts as at the bound; no search begins nearer. */
+#define PW_FIT_MARGIN 1e-3
+
+/* An unknown belongs to a combination that the data do not determine, a singular vector, if its component is larger. */
+#define PW_FIT_COMPONENT 0.01
+
+/* Runs the model with these values of the unknowns; out: columns x rows.  A status; PW_RETRY after Ctrl-C. */
+int pw_fit_run (const pw_fit *fit, const double *unknowns, double *out, pw_error *error);
+
+/* Derivatives of the model's values, `values` at these unknowns, with respect to each unknown: jacobian is unknowns x
+ * (columns x rows).  By central differences of concurrent runs.  Sets fit->derivative_error.  A status; PW_RETRY after
+ * Ctrl-C. */
+int pw_fit_jacobian (pw_fit *fit, const double *unknowns, const double *values, double *jacobian, pw_error *error);
+
+/* Minimises the sum of squares from all starts and sets the results.  A status; PW_RETRY after Ctrl-C. */
+int pw_fit_solve (pw_fit *fit, pw_error *error);
+
+static inline int pw_fit_degrees_of_freedom (const pw_fit *fit) {
+  return fit->residuals - fit->rank;
+}
+
+/* Reports (fit.c): text, JSON with this status ("ok", ...), the table of data and residuals, figures. */
+void pw_fit_print (const pw_fit *fit);
+void pw_fit_json (const pw_fit *fit, const char *status, FILE *f);
+int pw_fit_table (const pw_fit *fit, FILE *f, pw_error *error);
+int pw_fit_draw (const pw_fit *fit, pw_error *error);
+
+/* ---- The data: columns of a table and their standard deviations ---- */
+
+#define FIT_LONGER 100. /* data that last longer than this many runs of the model have other units of time */
+
+/* The standard deviation of a column of data as given by --sigma: a number, or the name of a column of the table. */
+typedef struct {
+  const char *text; /* NULL: not given */
+  double number;    /* NaN: the text is the name of a column of the table */
+} fit_sigma;
+
+/* Splits "NAME,..." of --columns. */
+static int data_read_columns (pw_fit *fit, pw_error *error) {
+  size_t count = 2; /* one name more than commas, and NULL at the end */
+  for (const char *text = fit->columns_text; *text; text++) count += *text == ',';
+  char *name = pw_arena_copy (&fit->arena, fit->columns_text);
+  fit->column_name = pw_arena_alloc (&fit->arena, 2 * count * sizeof *fit->column_name);
+  if (name == NULL || fit->column_name == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  fit->column_unit = fit->column_name + count;
+  while (name) {
+    char *comma = strchr (name, ',');
+    pw_column column;
+    if (comma) *comma = 0;
+    if (pw_column_find (fit->model.system, name, "--columns", &column, error) != PW_OK) return error->status;
+    for (int i = 0; i < fit->columns; i++)
+      if (strcmp (fit->column_name[i], name) == 0)
+        return pw_fail (error, PW_INPUT, "--columns: %s is given twice", name);
+    fit->column_unit[fit->columns] = pw_column_unit (fit->model.system, column);
+    fit->column_name[fit->columns++] = name;
+    name = comma ? comma + 1 : NULL;
+  }
+  return PW_OK;
+}
+
+/* Reads "COLUMN=VALUE" or "COLUMN=NAME" of --sigma. */
+static int data_read_sigma (const pw_fit *fit, const char *text, fit_sigma *given, pw_error *error) {
+  const int length = (int)strcspn (text, "="); /* of the column's name */
+  const char *value = text + length + 1;
+  int i = 0;
+  if (text[length] == 0) return pw_fail (error, PW_INPUT, "--sigma %s: expected COLUMN=VALUE or COLUMN=NAME", text);
+  while (i < fit->columns && (strncmp (fit->column_name[i], text, (size_t)length) != 0 || fit->column_name[i][length]))
+    i++;
+  if (i == fit->columns) return pw_fail (error, PW_INPUT, "--sigma %.*s: it is not among --columns", length, text);
+  if (given[i].text) return pw_fail (error, PW_INPUT, "--sigma %.*s is given twice", length, text);
+  given[i] = (fit_sigma){ value, NAN };
+  if (pw_read_expression (value, &given[i].number) == PW_OK && !(given[i].number > 0 && isfinite (given[i].number)))
+    return pw_fail (error, PW_INPUT, "--sigma %s: expected a finite number > 0", text);
+  return PW_OK;
+}
+
+/* Checks that standard deviations are given for all columns or, if all have the same unit, for none. */
+static int data_check_sigma (pw_fit *fit, const fit_sigma *given, pw_error *error) {
+  for (int i = 0; i < fit->columns; i++) fit->weighted |= given[i].text != NULL;
+  for (int i = 0; i < fit->columns; i++) {
+    if (fit->weighted && given[i].text == NULL)
+      return pw_fail (error, PW_INPUT, "--sigma is given for other columns, but not for %s", fit->column_name[i]);
+    if (!fit->weighted && strcmp (fit->column_unit[i], fit->column_unit[0]) != 0)
+      return pw_fail (error, PW_INPUT,
+                      "%s [%s] and %s [%s] have different units: add --sigma COLUMN=VALUE for each column",
+                      fit->column_name[0], fit->column_unit[0], fit->column_name[i], fit->column_unit[i]);
+  }
+  return PW_OK;
+}
+
+#define FIT_TIMES "--data %s: its times, from %.15g to %.15g s,"
+
+/* Refuses times that are not those of the run, which does not begin before 0. */
+static int data_check_times (const pw_fit *fit, pw_error *error) {
+  const double t_end = fit->t_end, first = fit->first, last = fit->last;
+  if (first < 0)
+    return pw_fail (error, PW_INPUT, FIT_TIMES " begin before the run: --time-offset %.15g lets them begin at 0",
+                    fit->data_path, first, last, -first);
+  if (first > t_end)
+    return pw_fail (error, PW_INPUT,
+                    FIT_TIMES " are after the run, which ends at %.6g s: give --t-end, or --time-offset %.15g, which "
+                              "lets them begin at 0",
+                    fit->data_path, first, last, t_end, -first);
+  if (last > FIT_LONGER * t_end && fit->line.t_end == NULL)
+    return pw_fail (error, PW_INPUT,
+                    FIT_TIMES " last far longer than the run, which ends at %.6g s: give --time-scale 1e-3 if they are "
+                              "in ms, else --t-end",
+                    fit->data_path, first, last, t_end);
+  return PW_OK;
+}
+
+/* Reports which part of the run the data cover, and what is not used. */
+static void data_report (const pw_fit *fit) {
+  const double t_end = fit->t_end, covered = fmin (fit->last, t_end) - fit->first;
+  const int empty = fit->columns * fit->rows - fit->residuals;
+  if (covered < 0.9 * t_end || (fit->last > t_end * (1 + 1e-9) && fit->line.t_end == NULL))
+    pw_cli_say ("pinwheel: " FIT_TIMES " cover %.3g %% of the run, which ends at %.6g s%s\n", fit->data_path,
+                fit->first, fit->last, 100 * covered / t_end, t_end,
+                fit->line.t_end ? "" : "; runs end at the last datum");
+  if (empty || fit->untimed || fit->late)
+    pw_cli_say ("pinwheel: --data %s: left out are %s, %s without a time, %s after --t-end\n", fit->data_path,
+                PW_COUNTED (empty, "empty cell"), PW_COUNTED (fit->untimed, "row"), PW_COUNTED (fit->late, "row"));
+}
+
+/* Converts the times to seconds, and copies the rows of the table that have one, up to --t-end. */
+static int data_keep_rows (pw_fit *fit, double *table, int columns, pw_error *error) {
+  const double t_end = fit->line.t_end ? fit->t_end * (1 + 1e-9) : INFINITY;
+  double scale = 1, offset = 0;
+  int rows = fit->rows, kept = 0, timed = 0;
+  fit->table = pw_arena_alloc (&fit->arena, (size_t)columns * (size_t)rows * sizeof *table);
+  if (fit->table == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  if (pw_cli_number ("--time-scale", fit->time_scale_text, PW_POSITIVE, &scale, error) != PW_OK ||
+      pw_cli_number ("--time-offset", fit->time_offset_text, PW_REAL, &offset, error) != PW_OK)
+    return error->status;
+  for (int i = 0; i < rows; i++) {
+    table[i] = scale * (table[i] + offset / scale);
+    kept += table[i] <= t_end;
+    if (isnan (table[i])) continue;
+    if (timed++ == 0) fit->first = table[i];
+    fit->last = table[i];
+  }
+  for (int i = 0, k = 0; i < rows; i++) {
+    if (!(table[i] <= t_end)) continue;
+    for (int j = 0; j < columns; j++) fit->table[j * kept + k] = table[j * rows + i];
+    k++;
+  }
+  fit->rows = kept, fit->untimed = rows - timed, fit->late = timed - kept;
+  return timed ? data_check_times (fit, error) : pw_fail (error, PW_INPUT, "--data %s: no rows", fit->data_path);
+}
+
+/* Reads times, data, and columns of standard deviations. */
+static int data_read_table (pw_fit *fit, const fit_sigma *given, pw_error *error) {
+  const size_t most = 1 + 2 * (size_t)fit->columns;
+  const char **column = pw_arena_alloc (&fit->arena, 2 * most * sizeof *column);
+  int count = 1;
+  if (column == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  const char **unit = column + most;
+  column[0] = fit->time_name ? fit->time_name : "t", unit[0] = "s";
+  for (int i = 0; i < fit->columns; i++) column[count] = fit->column_name[i], unit[count++] = fit->column_unit[i];
+  for (int i = 0; i < fit->columns; i++)
+    if (isnan (given[i].number)) column[count] = given[i].text, unit[count++] = fit->column_unit[i];
+  double *table = pw_read_columns (fit->data_path, column, unit, count, &fit->rows, error);
+  int status = table ? data_keep_rows (fit, table, count, error) : error->status;
+  free (table);
+  return status;
+}
+
+/* Reads the data, and sets the standard deviation of each datum. */
+static int data_read (pw_fit *fit, const fit_sigma *given, pw_error *error) {
+  if (data_read_table (fit, given, error) != PW_OK) return error->status;
+  size_t rows = (size_t)fit->rows, cells = (size_t)fit->columns * rows;
+  fit->t = fit->table, fit->data = fit->table + rows;
+  fit->sigma = pw_arena_alloc (&fit->arena, cells * sizeof *fit->sigma);
+  if (fit->sigma == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  const double *next = fit->data + cells;
+  for (int i = 0; i < fit->columns; i++) {
+    const double *column = isnan (given[i].number) ? next : NULL, all = given[i].text ? given[i].number : 1;
+    for (size_t k = 0; k < rows; k++) fit->sigma[(size_t)i * rows + k] = column ? column[k] : all;
+    if (column) next += rows;
+  }
+  return PW_OK;
+}
+
+/* Counts the data, each of which needs a positive standard deviation. */
+static int data_check (pw_fit *fit, pw_error *error) {
+  for (int i = 0; i < fit->columns * fit->rows; i++) {
+    if (isnan (fit->data[i])) continue;
+    fit->residuals++;
+    if (!(fit->sigma[i] > 0))
+      return pw_fail (error, PW_INPUT,
+                      "--data %s: the standard deviation of %s at t = %g s is %g; expected a number > 0",
+                      fit->data_path, fit->column_name[i / fit->rows], fit->t[i % fit->rows], fit->sigma[i]);
+  }
+  return PW_OK;
+}
+
+static int fit_read_data (pw_fit *fit, pw_error *error) {
+  if (data_read_columns (fit, error) != PW_OK) return error->status;
+  fit_sigma *given = pw_arena_alloc (&fit->arena, (size_t)fit->columns * sizeof *given);
+  int status = given ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+  for (const char **text = fit->sigma_texts; status == PW_OK && text && *text; text++)
+    status = data_read_sigma (fit, *text, given, error);
+  if (status == PW_OK) status = data_check_sigma (fit, given, error);
+  if (status == PW_OK) status = data_read (fit, given, error);
+  return status == PW_OK ? data_check (fit, error) : status;
+}
+
+/* ---- The command ---- */
+
+#define FIT_RUNS 50. /* usual number of runs of a search, to choose the engine */
+
+enum { FIT_TABLE = 2, FIT_SUMMARY }; /* indices in the list of files of fit_open */
+
+static int fit_options (pw_fit *fit, pw_error *error) {
+  double starts = 1;
+  fit->confidence = 0.95;
+  if (fit->data_path == NULL) return pw_fail (error, PW_INPUT, "no data: add --data FILE.csv");
+  if (fit->columns_text == NULL)
+    return pw_fail (error, PW_INPUT, "nothing to compare: add --columns NAME,..., columns of the data such as frame.x");
+  int status = pw_cli_number ("--confidence", fit->confidence_text, PW_POSITIVE, &fit->confidence, error);
+  if (status == PW_OK && !(fit->confidence < 1))
+    status = pw_fail (error, PW_INPUT, "--confidence %s: expected a number between 0 and 1", fit->confidence_text);
+  if (status == PW_OK) status = pw_cli_number ("--starts", fit->starts_text, PW_COUNT, &starts, error);
+  if (status == PW_OK && starts > 1e5) status = pw_fail (error, PW_INPUT, "--starts: at most 100000");
+  fit->starts = (int)starts;
+  if (status == PW_OK) status = pw_cli_check_csv (fit->table_path, error);
+  if (status == PW_OK)
+    status = pw_cli_requires ("--width", fit->line.width, "--plots DIR", fit->plots_path != NULL, error);
+  return status == PW_OK ? pw_parallel_jobs (fit->jobs_text, &fit->jobs, error) : status;
+}
+
+/* Reads the data and the unknowns; runs end at the time of the last row. */
+static int fit_open_data (pw_fit *fit, pw_error *error) {
+  int status = pw_unknowns_open (&fit->unknowns, &fit->line, &fit->model, error);
+  fit->t_end = fit->unknowns.t_end;
+  if (status == PW_OK) status = fit_read_data (fit, error);
+  if (status == PW_OK) status = pw_unknowns_read (&fit->unknowns, fit->free, error);
+  if (status != PW_OK) return status;
+  if (fit->residuals < fit->unknowns.count)
+    return pw_fail (error, PW_INPUT, "--data %s has fewer data (%d) than there are unknowns (%d)", fit->data_path,
+                    fit->residuals, fit->unknowns.count);
+  fit->unknowns.t_end = fit->unknowns.settings.span = fit->t[fit->rows - 1];
+  return pw_unknowns_engine (&fit->unknowns, FIT_RUNS, fit->starts, error);
+}
+
+static int fit_open (pw_fit *fit, pw_error *error) {
+  static const char *const figures[] = { "fit.dat", "fit.gp", "fit.svg", "fit.png", "fit.pdf", NULL };
+  pw_use use[] = { PW_CLI_MODEL_USE,
+                   { "--data", fit->data_path, PW_READS, NULL },
+                   { "-o", fit->table_path, PW_WRITES, pw_cli_csv },
+                   { "--json", fit->json_path, PW_WRITES, pw_cli_json },
+                   { "--plots", fit->plots_path, PW_WRITES_INTO, figures } };
+  int status = fit_options (fit, error);
+  if (status == PW_OK) status = pw_cli_open (&fit->model, &fit->line, error);
+  if (status == PW_OK) status = fit_open_data (fit, error);
+  return status == PW_OK ? pw_files_open (&fit->files, &fit->line, &fit->model, use, sizeof use / sizeof *use, error)
+                         : status;
+}
+
+static int fit_search (pw_fit *fit, pw_error *error) {
+  pw_stop_catch ();
+  pw_progress_start (&fit->progress, pw_file_name (fit->model.file), "", 0, 1);
+  int status = pw_fit_solve (fit, error);
+  pw_progress_end (&fit->progress);
+  pw_stop_release ();
+  fit->interrupted = status == PW_RETRY;
+  if (!fit->interrupted) return status;
+  if (fit->iterations > 0) return PW_OK;
+  pw_cli_say ("pinwheel: interrupted before the first iteration was done\n");
+  return PW_INTERRUPTED;
+}
+
+static int fit_finish (pw_fit *fit, pw_error *error) {
+  FILE *table = pw_files_stream (&fit->files, FIT_TABLE), *summary = pw_files_stream (&fit->files, FIT_SUMMARY);
+  pw_error drawing = { 0 };
+  data_report (fit);
+  pw_fit_print (fit);
+  pw_unknowns_report (&fit->unknowns, fit->estimate);
+  const int drawn = fit->plots_path ? pw_fit_draw (fit, &drawing) : PW_OK;
+  const char *word = pw_cli_status_word (drawn != PW_OK || fit->converged ? drawn : PW_METHOD);
+  int status = table ? pw_fit_table (fit, table, error) : PW_OK;
+  if (summary) pw_fit_json (fit, fit->interrupted ? "interrupted" : word, summary);
+  if (status == PW_OK) status = pw_files_finish (&fit->files, error);
+  status = pw_figure_status (drawn, &drawing, status, error);
+  if (fit->interrupted) pw_cli_say ("pinwheel: interrupted; these are the values so far, without their errors\n");
+  if (status == PW_OK && fit->interrupted) return PW_INTERRUPTED;
+  if (status == PW_OK && !fit->converged)
+    status = pw_fail (error, PW_METHOD, "no minimum was found in %s; begin nearer to it, by --set or --start",
+                      PW_COUNTED (fit->iterations, "iteration"));
+  return status;
+}
+
+static int fit_command (void *options, pw_error *error) {
+  pw_fit *fit = options;
+  int status = fit_open (fit, error);
+  if (status == PW_OK) status = fit_search (fit, error);
+  if (status == PW_OK) status = fit_finish (fit, error);
+  pw_files_close (&fit->files);
+  pw_arena_free (&fit->arena);
+  pw_unknowns_close (&fit->unknowns);
+  pw_cli_close_model (&fit->model);
+  return status;
+}
+
+static const struct poptOption fit_options_table[] = {
+  PW_OPTION_GROUP ("Fit"),
+  PW_TEXT_OPTION (pw_fit, data_path, "data", 0, "FILE.csv",
+                  "Measured data: a table with t and columns named as those of `run`; empty cells are gaps"),
+  PW_TEXT_OPTION (pw_fit, time_name, "time", 0, "NAME", "Column of the times in the data (default t)"),
+  PW_TEXT_OPTION (pw_fit, time_scale_text, "time-scale", 0, "K", "Factor of these times, 1e-3 for ms"),
+  PW_TEXT_OPTION (pw_fit, time_offset_text, "time-offset", 0, "T", "Added to the scaled times [s]"),
+  PW_TEXT_OPTION (pw_fit, columns_text, "columns", 0, "NAME,...", "Columns of the data to compare with the model"),
+  PW_LIST_OPTION (pw_fit, free, "free", 0, "NAME[=LOW:HIGH]",
+                  "Determine a parameter or initial value, such as frame.vx, within bounds if given; repeatable"),
+  PW_LIST_OPTION (pw_fit, sigma_texts, "sigma", 0, "COLUMN=VALUE",
+                  "Standard deviation of a column, a number or the name of a column of the data; repeatable"),
+  PW_TEXT_OPTION (pw_fit, confidence_text, "confidence", 0, "P", "Probability of confidence intervals (default 0.95)"),
+  PW_TEXT_OPTION (pw_fit, starts_text, "starts", 0, "N",
+                  "Search from N points: the initial values, and others between the bounds (default 1)"),
+  PW_TEXT_OPTION (pw_fit, jobs_text, "jobs", 'j', "N", "Number of concurrent runs (default: one per processor)"),
+  PW_TEXT_OPTION (pw_fit, table_path, "output", 'o', "FILE.csv", "Write data, model values and residuals to this file"),
+  PW_TEXT_OPTION (pw_fit, json_path, "json", 0, "FILE.json", "Write a summary"),
+  PW_TEXT_OPTION (pw_fit, plots_path, "plots", 0, "DIR", "Write figures of data, model and residuals into a folder"),
+  PW_WIDTH_OPTION,
+  PW_OPTION_GROUP ("Integration"),
+  PW_TEXT_OPTION (pw_cli_line, method, "method", 'm', "METHOD",
+                  "Integrator and stabilisation, see `pinwheel list methods`"),
+  PW_TEXT_OPTION (pw_cli_line, t_end, "t-end", 't', "T", "Leave out data after this time [s]"),
+  PW_TEXT_OPTION (pw_cli_line, step, "step", 0, "H", "Step size of fixed-step methods [s]"),
+  PW_TEXT_OPTION (pw_cli_line, rtol, "rtol", 0, "R", "Relative tolerance of adaptive methods"),
+  PW_TEXT_OPTION (pw_cli_line, atol, "atol", 0, "A", "Absolute tolerance of every state"),
+  PW_TEXT_OPTION (pw_cli_line, limit, "limit", 0, "SECONDS", "Stop a run after this much processor time"),
+  PW_ENGINE_OPTION,
+  PW_MODEL_OPTIONS,
+  POPT_TABLEEND
+};
+
+const pw_command pw_cli_fit = {
+  .name = "fit",
+  .synopsis = "MODEL --data FILE.csv --columns NAME,... --free NAME[=LOW:HIGH]... [OPTION...]",
+  .summary = "fit parameters and initial values to measured data",
+  .help = "Determine parameters and initial values of a model by least squares, so that it agrees with measured data. "
+          "Prints estimates with standard errors, confidence intervals and correlations, and unknowns that the data do "
+          "not determine.",
+  .options_size = sizeof (pw_fit),
+  .function = fit_command,
+  .options = fit_options_table,
+};
+
+/* Runs of a fit, which give the model's values at the times of the data, and derivatives of these values. */
+
+#define FIT_RTOL 1e-8 /* largest relative tolerance of runs that are compared */
+
+/* Runs the model with its own settings, or if rtol > 0 with this tolerance. */
+static int fit_run (const pw_fit *fit, const double *unknowns, double rtol, double *out, pw_error *error) {
+  const pw_run_outputs outputs = { .unknowns = &fit->unknowns,
+                                   .method = rtol > 0 ? fit->unknowns.method : NULL,
+                                   .rtol = rtol,
+                                   .option = "--columns",
+                                   .of = fit->column_name,
+                                   .count = fit->columns,
+                                   .t = fit->t,
+                                   .rows = fit->rows };
+  return pw_run_outputs_at (&outputs, unknowns, NULL, out, error);
+}
+
+int pw_fit_run (const pw_fit *fit, const double *unknowns, double *out, pw_error *error) {
+  return fit_run (fit, unknowns, 0, out, error);
+}
+
+static int fit_own (void *fit, const double *x, double rtol, double *value, pw_error *error) {
+  (void)rtol;
+  return fit_run (fit, x, 0, value, error);
+}
+
+static int fit_accurate (void *fit, const double *x, double rtol, double *value, pw_error *error) {
+  return fit_run (fit, x, rtol, value, error);
+}
+
+int pw_fit_jacobian (pw_fit *fit, const double *unknowns, const double *values, double *jacobian, pw_error *error) {
+  const int n = fit->unknowns.count, cells = fit->columns * fit->rows;
+  const double own = pw_unknowns_noise (&fit->unknowns), noise = fmin (own, FIT_RTOL);
+  pw_derivative *derivative = malloc ((size_t)n * (size_t)cells * sizeof *derivative);
+  const pw_difference_settings d = { .evaluate = noise < own ? fit_accurate : fit_own,
+                                     .context = fit,
+                                     .outputs = cells,
+                                     .rtol = noise,
+                                     .neighbours = 2,
+                                     .value = noise < own ? NULL : values,
+                                     .jobs = fit->jobs };
+  int status = derivative ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+  if (status == PW_OK) status = pw_unknowns_differentiate (&fit->unknowns, unknowns, d, derivative, error);
+  for (int i = 0; i < n * cells && status == PW_OK; i++) jacobian[i] = derivative[i].value;
+  for (int j = 0; j < n; j++) fit->derivative_error[j] = pow (noise, 2. / 3);
+  fit->runs += 2 * (long)n;
+  free (derivative);
+  return status;
+}
+
+/* The solution of a least-squares fit, by GSL's Levenberg-Marquardt method, and the errors of the estimate.
+ *
+ * The method does not know bounds: it varies a vector u, and the value of an unknown is (James & Roos 1975, MINUIT)
+ *
+ *   low + (high - low) (1 + sin u) / 2      between two bounds
+ *   low + scale (sqrt (1 + u^2) - 1)        above a lower bound
+ *   scale u                                 without bounds */
+
+/* An unknown has no effect if the norm of its column of the Jacobian, times its scale, relative to the largest such
+ * product, is below this. */
+#define SOLVE_EFFECT 1e-9
+#define SOLVE_GRADIENT 1e-4 /* largest cosine between the residuals and a column of the Jacobian at a minimum */
+#define SOLVE_RANK 1e-6  /* singular values of the scaled Jacobian count as 0 below it, relative to the largest one */
+#define SOLVE_EXACT 1e-8 /* norm of the residuals of an exact fit, relative to the initial one */
+#define SOLVE_ROUND_OFF 1e-12 /* the same, relative to the norm of the data: round-off of a run */
+#define SOLVE_TOLERANCE 1e-10 /* of GSL: relative step in u, and gradient */
+enum { SOLVE_ITERATIONS = 100 /* of a search, at most */, SOLVE_USUAL = 20 /* to show progress */ };
+
+typedef struct {
+  pw_fit *fit;
+  double *u;          /* unknowns: where a search begins and ends */
+  double *last_value; /* unknowns: in the last run */
+  double *values;     /* columns x rows: of the model, in the last run */
+  double *jacobian;   /* unknowns x (columns x rows) */
+  int known;          /* 1: the last run succeeded */
+  int status;         /* PW_OK, or else the fit ends, with `error` */
+  pw_error *error;
+  int searches; /* that have ended */
+  double worst; /* largest norm of the residuals of the runs of this search that succeeded */
+  double least; /* sum of squares at the best end of a search, fit->estimate; INFINITY: none is completed yet */
+} fit_solver;
+
+/* ---- Bounds: an unknown with an upper bound has a lower one, too ---- */
+
+static double solve_value (const pw_unknown *unknown, double u) {
+  if (isfinite (unknown->high)) return unknown->low + (unknown->high - unknown->low) * (1 + sin (u)) / 2;
+  if (isfinite (unknown->low)) return unknown->low + unknown->scale * (sqrt (1 + u * u) - 1);
+  return u * unknown->scale;
+}
+
+/* The derivative of the value with respect to u. */
+static double solve_slope (const pw_unknown *unknown, double u) {
+  if (isfinite (unknown->high)) return (unknown->high - unknown->low) * cos (u) / 2;
+  if (isfinite (unknown->low)) return unknown->scale * u / sqrt (1 + u * u);
+  return unknown->scale;
+}
+
+/* u of a value where a search begins, moved away from bounds, at which solve_slope is 0. */
+static double solve_start (const pw_unknown *unknown, double value) {
+  double range = isfinite (unknown->high) ? unknown->high - unknown->low : unknown->scale,
+         part = fmax ((value - unknown->low) / range, PW_FIT_MARGIN);
+  if (isfinite (unknown->high)) return asin (2 * fmin (part, 1 - PW_FIT_MARGIN) - 1);
+  return isfinite (unknown->low) ? sqrt ((1 + part) * (1 + part) - 1) : value / unknown->scale;
+}
+
+/* ---- Residuals ---- */
+
+/* Ends the fit if memory is short, after Ctrl-C, or if what failed is `essential`: no search can do without it. */
+static void solve_fail (fit_solver *solver, int essential, const pw_error *error, int status) {
+  if (status == PW_OK || !(essential || status == PW_RETRY || status == PW_RESOURCE)) return;
+  solver->status = status;
+  *solver->error = *error;
+}
+
+/* The sum of squares of (values - data) / sigma, or of data / sigma if `values` is NULL. */
+static double solve_sum (const pw_fit *fit, const double *values) {
+  double sum = 0;
+  for (int i = 0; i < fit->columns * fit->rows; i++)
+    if (!isnan (fit->data[i])) sum += pow (((values ? values[i] : 0) - fit->data[i]) / fit->sigma[i], 2);
+  return sum;
+}
+
+/* Runs the model at u, unless the last run was there.  If the first run of the fit fails, the fit ends.  A status. */
+static int solve_run (fit_solver *solver, const gsl_vector *u) {
+  pw_fit *fit = solver->fit;
+  int same = solver->known;
+  pw_error own = { 0 };
+  for (int i = 0; i < fit->unknowns.count; i++) {
+    double value = solve_value (fit->unknowns.list + i, gsl_vector_get (u, (size_t)i));
+    same &= value == solver->last_value[i];
+    solver->last_value[i] = value;
+  }
+  if (same) return PW_OK;
+  int status = pw_fit_run (fit, solver->last_value, solver->values, &own);
+  if (status == PW_OK && !isfinite (solve_sum (fit, solver->values)))
+    status = pw_fail (&own, PW_METHOD, "the sum of the squares of the residuals is not finite");
+  solver->known = status == PW_OK;
+  fit->runs++;
+  solve_fail (solver, fit->runs == 1, &own, status);
+  return status;
+}
+
+/* The residuals (model - data) / sigma.  They are large for a run that failed, so that GSL tries a shorter step. */
+static int solve_residuals (const gsl_vector *u, void *context, gsl_vector *f) {
+  fit_solver *solver = context;
+  const pw_fit *fit = solver->fit;
+  int failed = solve_run (solver, u) != PW_OK;
+  if (solver->status != PW_OK) return GSL_EBADFUNC;
+  for (int i = 0, k = 0; i < fit->columns * fit->rows; i++) {
+    if (isnan (fit->data[i])) continue;
+    double residual = failed ? 10 * solver->worst + 1 : (solver->values[i] - fit->data[i]) / fit->sigma[i];
+    gsl_vector_set (f, (size_t)k++, residual);
+  }
+  if (!failed) solver->worst = fmax (solver->worst, sqrt (solve_sum (fit, solver->values)));
+  return GSL_SUCCESS;
+}
+
+/* Derivatives of the residuals with respect to u at u; or if u is NULL, with respect to the unknowns at the estimate.
+ * Without derivatives a search ends; the fit ends if no search is completed. */
+static int solve_derivatives (const gsl_vector *u, void *context, gsl_matrix *J) {
+  fit_solver *solver = context;
+  pw_fit *fit = solver->fit;
+  int cells = fit->columns * fit->rows;
+  pw_error own = { 0 };
+  if (u && solve_run (solver, u) != PW_OK) return GSL_EBADFUNC;
+  const double *value = u ? solver->last_value : fit->estimate, *values = u ? solver->values : fit->fitted;
+  int status = pw_fit_jacobian (fit, value, values, solver->jacobian, &own);
+  solve_fail (solver, u == NULL || !isfinite (solver->least), &own, status);
+  if (status != PW_OK) return GSL_EBADFUNC;
+  for (int j = 0; j < fit->unknowns.count; j++) {
+    double slope = u ? solve_slope (fit->unknowns.list + j, gsl_vector_get (u, (size_t)j)) : 1;
+    for (int i = 0, k = 0; i < cells; i++)
+      if (!isnan (fit->data[i]))
+        gsl_matrix_set (J, (size_t)k++, (size_t)j,
+                        solver->jacobian[(size_t)j * (size_t)cells + (size_t)i] * slope / fit->sigma[i]);
+  }
+  return GSL_SUCCESS;
+}
+
+/* ---- Minimum ---- */
+
+/* Makes the last run the result. */
+static void solve_store (fit_solver *solver, double chi2) {
+  pw_fit *fit = solver->fit;
+  fit->chi2 = chi2;
+  memcpy (fit->estimate, solver->last_value, (size_t)fit->unknowns.count * sizeof *fit->estimate);
+  memcpy (fit->fitted, solver->values, (size_t)fit->columns * (size_t)fit->rows * sizeof *fit->fitted);
+}
+
+/* The part of a search that is done after i iterations, of which SOLVE_USUAL are usual. */
+static double solve_part (double i) {
+  return i < SOLVE_USUAL ? 0.9 * i / SOLVE_USUAL : 1 - 0.1 * SOLVE_USUAL / i;
+}
+
+/* After iteration i.  `moved`: 1 if the last run is the position reached, the result if Ctrl-C comes before a search is
+ * completed. */
+static void solve_progress (fit_solver *solver, int i, int moved, const gsl_multifit_nlinear_workspace *w) {
+  double norm = gsl_blas_dnrm2 (gsl_multifit_nlinear_residual (w));
+  if (isnan (solver->fit->initial_chi2)) solver->fit->initial_chi2 = norm * norm;
+  if (!isfinite (solver->least) && moved) solve_store (solver, norm * norm);
+  snprintf (solver->fit->progress.note, sizeof solver->fit->progress.note, "iteration %d, residual %.6g",
+            solver->fit->iterations, norm);
+  pw_progress_at (&solver->fit->progress, (solver->searches + solve_part (i)) / solver->fit->starts);
+}
+
+/* Iterates from u, where the last run was made.  Unlike gsl_multifit_nlinear_driver, it ends when derivatives cannot be
+ * evaluated (GSL_EBADFUNC).  An iteration that rejects many steps (GSL_ENOPROG) ends the search only if it is the
+ * first: the next one begins with a new damping parameter. */
+static int solve_iterate (fit_solver *solver, gsl_vector *u, gsl_multifit_nlinear_fdf *f,
+                          gsl_multifit_nlinear_workspace *w) {
+  int info, status = gsl_multifit_nlinear_init (u, f, w), more = status == GSL_SUCCESS;
+  if (more) solve_progress (solver, 0, 1, w);
+  for (int i = 1; i <= SOLVE_ITERATIONS && more; i++) {
+    status = gsl_multifit_nlinear_iterate (w);
+    if (solver->status != PW_OK) break;
+    solver->fit->iterations++;
+    if (status != GSL_SUCCESS && (status != GSL_ENOPROG || i == 1)) break;
+    solve_progress (solver, i, status == GSL_SUCCESS, w);
+    more = gsl_multifit_nlinear_test (SOLVE_TOLERANCE, SOLVE_TOLERANCE, 0, &info, w) == GSL_CONTINUE;
+  }
+  return status;
+}
+
+/* Stores where a search has ended, perhaps without converging: sum of squares, values.  The best end is the result. */
+static void solve_keep (fit_solver *solver, double *end) {
+  *end = solve_sum (solver->fit, solver->values);
+  memcpy (end + 1, solver->last_value, (size_t)solver->fit->unknowns.count * sizeof *solver->last_value);
+  if (!(*end < solver->least)) return;
+  solver->least = *end;
+  solve_store (solver, *end);
+}
+
+/* A search from the values in end + 1, which its result replaces, see fit->ends; *end is INFINITY without a result. */
+static void solve_search (fit_solver *solver, gsl_multifit_nlinear_workspace *w, double *end) {
+  pw_fit *fit = solver->fit;
+  size_t n = (size_t)fit->unknowns.count;
+  gsl_multifit_nlinear_fdf f = {
+    .f = solve_residuals, .df = solve_derivatives, .n = (size_t)fit->residuals, .p = n, .params = solver
+  };
+  gsl_vector_view view = gsl_vector_view_array (solver->u, n);
+  gsl_vector *u = &view.vector;
+  for (size_t i = 0; i < n; i++) solver->u[i] = solve_start (fit->unknowns.list + i, end[1 + i]);
+  *end = INFINITY;
+  solver->worst = 0;
+  if (solve_run (solver, u) != PW_OK) return;
+  int status = solve_iterate (solver, u, &f, w);
+  if (solver->status != PW_OK) return;
+  if (status != GSL_SUCCESS && status != GSL_ENOPROG) return;
+  gsl_vector_memcpy (u, gsl_multifit_nlinear_position (w));
+  if (solve_run (solver, u) == PW_OK) solve_keep (solver, end);
+}
+
+/* Searches from all starts. */
+static void solve_searches (fit_solver *solver) {
+  pw_fit *fit = solver->fit;
+  size_t n = (size_t)fit->unknowns.count, starts = (size_t)fit->starts;
+  const gsl_multifit_nlinear_parameters parameters = gsl_multifit_nlinear_default_parameters ();
+  gsl_multifit_nlinear_workspace *w =
+      gsl_multifit_nlinear_alloc (gsl_multifit_nlinear_trust, &parameters, (size_t)fit->residuals, n);
+  double *start = pw_unknowns_starts (&fit->unknowns, fit->starts, 1);
+  fit->ends = pw_arena_alloc (&fit->arena, starts * (1 + n) * sizeof *fit->ends);
+  if (w == NULL || start == NULL || fit->ends == NULL)
+    solver->status = pw_fail (solver->error, PW_RESOURCE, "out of memory");
+  solver->least = INFINITY;
+  for (size_t i = 0; i < starts && solver->status == PW_OK; i++) {
+    fit->ends[i * (1 + n)] = INFINITY;
+    memcpy (fit->ends + i * (1 + n) + 1, start + i * n, n * sizeof *start);
+  }
+  for (; solver->searches < fit->starts && solver->status == PW_OK; solver->searches++)
+    solve_search (solver, w, fit->ends + (size_t)solver->searches * (1 + n));
+  free (start);
+  if (w) gsl_multifit_nlinear_free (w);
+  if (solver->status == PW_OK && !isfinite (solver->least))
+    solver->status = pw_fail (solver->error, PW_METHOD,
+                              "no search could be completed; begin nearer to a minimum, by --set or --start");
+}
+
+/* ---- Errors of the estimates ---- */
+
+/* Scales the columns of J to length 1, or to 0 for an unknown without effect. */
+static void solve_scale (pw_fit *fit, gsl_matrix *J) {
+  double largest = 0, *length = fit->column_length;
+  int n = fit->unknowns.count;
+  for (int j = 0; j < n; j++) {
+    gsl_vector_view column = gsl_matrix_column (J, (size_t)j);
+    length[j] = gsl_blas_dnrm2 (&column.vector);
+    largest = fmax (largest, length[j] * fit->unknowns.list[j].scale);
+  }
+  for (int j = 0; j < n; j++) {
+    gsl_vector_view column = gsl_matrix_column (J, (size_t)j);
+    if (!(length[j] * fit->unknowns.list[j].scale > SOLVE_EFFECT * largest)) length[j] = 0;
+    gsl_vector_scale (&column.vector, length[j] > 0 ? 1 / length[j] : 0);
+  }
+}
+
+/* At a minimum the residuals are very small or orthogonal to the columns of J, which have length 1; unknowns at a bound
+ * do not count. */
+static int solve_converged (const pw_fit *fit, const gsl_matrix *J) {
+  double norm = sqrt (fit->chi2);
+  int orthogonal = 1;
+  for (int j = 0; j < fit->unknowns.count; j++) {
+    const pw_unknown *unknown = fit->unknowns.list + j;
+    double dot = 0, near = PW_FIT_MARGIN * unknown->scale;
+    if (fit->estimate[j] - unknown->low < near || unknown->high - fit->estimate[j] < near) continue;
+    for (int i = 0, k = 0; i < fit->columns * fit->rows; i++)
+      if (!isnan (fit->data[i]))
+        dot += gsl_matrix_get (J, (size_t)k++, (size_t)j) * (fit->fitted[i] - fit->data[i]) / fit->sigma[i];
+    orthogonal &= fabs (dot) <= fmax (SOLVE_GRADIENT, fit->derivative_error[j]) * norm;
+  }
+  return orthogonal ||
+         norm < fmax (SOLVE_EXACT * sqrt (fit->initial_chi2), SOLVE_ROUND_OFF * sqrt (solve_sum (fit, NULL)));
+}
+
+/* J D^-1 = U S V^T, where D has the lengths of the columns of J: the covariance of the unknowns is
+ * variance D^-1 V S^-2 V^T D^-1, over the singular values that differ from 0.  The variance of the residuals is 1 if
+ * standard deviations are given, else it is estimated. */
+static void solve_covariance (pw_fit *fit) {
+  const double *length = fit->column_length;
+  int n = fit->unknowns.count;
+  double error = 0;
+  for (int j = 0; j < n; j++) error = fmax (error, fit->derivative_error[j]);
+  double least = fmax (SOLVE_RANK, 10 /* a margin */ * error) * fit->singular_value[0];
+  for (fit->rank = 0; fit->rank < n && fit->singular_value[fit->rank] > least;) fit->rank++;
+  int freedom = pw_fit_degrees_of_freedom (fit);
+  double variance = fit->weighted ? 1 : freedom > 0 ? fit->chi2 / freedom : NAN;
+  for (int i = 0; i < n; i++)
+    for (int j = 0; j < n; j++) {
+      double sum = 0;
+      for (int k = 0; k < fit->rank; k++)
+        sum += fit->singular_vector[i * n + k] * fit->singular_vector[j * n + k] /
+               (fit->singular_value[k] * fit->singular_value[k]);
+      fit->covariance[i * n + j] = length[i] > 0 && length[j] > 0 ? variance * sum / (length[i] * length[j]) : 0;
+    }
+  for (int i = 0; i < n; i++) {
+    fit->standard_error[i] = sqrt (fit->covariance[i * n + i]);
+    for (int k = fit->rank; k < n; k++)
+      if (fabs (fit->singular_vector[i * n + k]) > PW_FIT_COMPONENT) fit->standard_error[i] = INFINITY;
+  }
+}
+
+/* Covariance and standard errors of the estimate. */
+static void solve_errors (fit_solver *solver) {
+  pw_fit *fit = solver->fit;
+  size_t n = (size_t)fit->unknowns.count;
+  gsl_matrix *J = gsl_matrix_alloc ((size_t)fit->residuals, n);
+  gsl_matrix_view V = gsl_matrix_view_array (fit->singular_vector, n, n);
+  gsl_vector_view S = gsl_vector_view_array (fit->singular_value, n);
+  if (J == NULL) solver->status = pw_fail (solver->error, PW_RESOURCE, "out of memory");
+  if (J && solve_derivatives (NULL, solver, J) == GSL_SUCCESS) {
+    solve_scale (fit, J);
+    fit->converged = solve_converged (fit, J);
+    gsl_linalg_SV_decomp_jacobi (J, &V.matrix, &S.vector);
+    solve_covariance (fit);
+  }
+  if (J) gsl_matrix_free (J);
+}
+
+/* ---- The fit ---- */
+
+static int solve_open (fit_solver *solver) {
+  pw_fit *fit = solver->fit;
+  size_t n = (size_t)fit->unknowns.count, cells = (size_t)fit->columns * (size_t)fit->rows;
+  solver->last_value = pw_arena_alloc (&fit->arena, (2 * n + (1 + n) * cells) * sizeof *solver->last_value);
+  fit->estimate = pw_arena_alloc (&fit->arena, (5 * n + 2 * n * n + cells) * sizeof *fit->estimate);
+  if (solver->last_value == NULL || fit->estimate == NULL) return pw_fail (solver->error, PW_RESOURCE, "out of memory");
+  solver->u = solver->last_value + n, solver->values = solver->u + n, solver->jacobian = solver->values + cells;
+  fit->standard_error = fit->estimate + n, fit->singular_value = fit->standard_error + n,
+  fit->column_length = fit->singular_value + n, fit->derivative_error = fit->column_length + n;
+  fit->covariance = fit->derivative_error + n;
+  fit->singular_vector = fit->covariance + n * n, fit->fitted = fit->singular_vector + n * n;
+  /* the errors are not known until solve_covariance; nor are combinations of unknowns that are not determined */
+  for (size_t i = 0; i < n; i++) fit->standard_error[i] = NAN;
+  for (size_t i = 0; i < n * n; i++) fit->covariance[i] = NAN;
+  fit->rank = fit->unknowns.count;
+  return PW_OK;
+}
+
+int pw_fit_solve (pw_fit *fit, pw_error *error) {
+  fit_solver solver = { .fit = fit, .error = error };
+  fit->initial_chi2 = NAN;
+  solver.status = solve_open (&solver);
+  if (solver.status == PW_OK) solve_searches (&solver);
+  if (solver.status == PW_OK) solve_errors (&solver);
+  return solver.status;
+}
+
+/* The reports of `pinwheel fit`. */
+
+enum {
+  REPORT_DIGITS = 7,
+  REPORT_CORRELATIONS = 9, /* unknowns whose correlations fit in a line, at most */
+  REPORT_PANELS = 4        /* of a figure, at most: one for each column */
+};
+
+static double report_covariance (const pw_fit *fit, int i, int j) {
+  return fit->covariance[i * fit->unknowns.count + j];
+}
+
+/* NaN if either unknown is not determined. */
+static double report_correlation (const pw_fit *fit, int i, int j) {
+  double size = sqrt (report_covariance (fit, i, i) * report_covariance (fit, j, j));
+  return size > 0 && isfinite (fit->standard_error[i]) && isfinite (fit->standard_error[j])
+             ? report_covariance (fit, i, j) / size
+             : NAN;
+}
+
+/* Half the width of confidence intervals in standard errors: from the normal distribution if standard deviations are
+ * given, else from Student's. */
+static double report_quantile (const pw_fit *fit) {
+  double tail = (1 - fit->confidence) / 2;
+  return fit->weighted ? gsl_cdf_gaussian_Qinv (tail, 1)
+                       : gsl_cdf_tdist_Qinv (tail, fmax (pw_fit_degrees_of_freedom (fit), 1));
+}
+
+/* The lower (side -1) or upper (side 1) end of the confidence interval of unknown i; NaN if there is none. */
+static double report_interval_end (const pw_fit *fit, int i, int side) {
+  return isfinite (fit->standard_error[i]) ? fit->estimate[i] + side * report_quantile (fit) * fit->standard_error[i]
+                                           : NAN;
+}
+
+/* "at its lower bound", "at its upper bound"; "" if the estimate of unknown i is at neither. */
+static const char *report_bound (const pw_fit *fit, int i) {
+  const pw_unknown *unknown = fit->unknowns.list + i;
+  const double value = fit->estimate[i], near = PW_FIT_MARGIN * unknown->scale;
+  return value - unknown->low < near ? "at its lower bound" : unknown->high - value < near ? "at its upper bound" : "";
+}
+
+/* The root mean square of model - data in a column, and the number of its data. */
+static double report_rms (const pw_fit *fit, int column, int *count) {
+  double sum = 0;
+  *count = 0;
+  for (int k = column * fit->rows; k < (column + 1) * fit->rows; k++)
+    if (!isnan (fit->data[k])) sum += pow (fit->fitted[k] - fit->data[k], 2), ++*count;
+  return sqrt (sum / *count);
+}
+
+/* ---- Text ---- */
+
+static void report_unknowns (const pw_fit *fit) {
+  const char *from = PW_PRINTED (80, "%g %% confidence:  from", 100 * fit->confidence);
+  const char *const head[] = { "free", "initially", "estimate", "standard error", from, "to", NULL };
+  for (pw_table t = { 0 }; pw_table_pass (&t);) {
+    pw_head (&t, -12, 12, head);
+    for (int i = 0; i < fit->unknowns.count; i++) {
+      pw_cell_unit (&t, -12, fit->unknowns.list[i].name, fit->unknowns.list[i].unit);
+      pw_cell_number (&t, 12, fit->unknowns.list[i].value, REPORT_DIGITS);
+      pw_cell_number (&t, 12, fit->estimate[i], REPORT_DIGITS);
+      pw_cell_number (&t, 12, isfinite (fit->standard_error[i]) ? fit->standard_error[i] : NAN, 3);
+      pw_cell_number (&t, 12, report_interval_end (fit, i, -1), REPORT_DIGITS);
+      pw_cell_number (&t, 12, report_interval_end (fit, i, 1), REPORT_DIGITS);
+      pw_cell (&t, -1, isinf (fit->standard_error[i]) ? "not determined by the data" : report_bound (fit, i));
+      pw_row_end (&t);
+    }
+  }
+}
+
+static void report_correlations (const pw_fit *fit) {
+  int n = fit->unknowns.count;
+  if (n < 2 || n > REPORT_CORRELATIONS) return;
+  putchar ('\n');
+  for (pw_table t = { 0 }; pw_table_pass (&t);)
+    for (int i = 0; i < n; i++) {
+      pw_cell (&t, -12, i ? fit->unknowns.list[i].name : "correlations");
+      for (int j = 0; j < n - 1; j++)
+        if (i == 0)
+          pw_cell (&t, 8, fit->unknowns.list[j].name);
+        else if (j < i)
+          pw_cell_number (&t, 8, round (1e4 * report_correlation (fit, i, j)) / 1e4 + 0 /* not -0 */, 4);
+      pw_row_end (&t);
+    }
+}
+
+static void report_columns (const pw_fit *fit) {
+  putchar ('\n');
+  for (pw_table t = { 0 }; pw_table_pass (&t);) {
+    pw_cell (&t, -12, "data");
+    pw_cell (&t, 8, "number");
+    pw_cell (&t, 12, "rms residual");
+    pw_row_end (&t);
+    for (int i = 0; i < fit->columns; i++) {
+      int count;
+      double rms = report_rms (fit, i, &count);
+      pw_cell_unit (&t, -12, fit->column_name[i], fit->column_unit[i]);
+      pw_cell_number (&t, 8, count, 9);
+      pw_cell_number (&t, 12, rms, 4);
+      pw_row_end (&t);
+    }
+  }
+}
+
+/* 1 if unknown i belongs to a combination, the singular vector of this number. */
+static int report_contains (const pw_fit *fit, int combination, int i) {
+  return fabs (fit->singular_vector[i * fit->unknowns.count + combination]) > PW_FIT_COMPONENT;
+}
+
+/* Prints the ratio of changes of the unknowns along a singular vector; the change of the first one is its estimate, or
+ * 1 if this is 0. */
+static void report_ratio (const pw_fit *fit, int combination) {
+  double scale = 0;
+  for (int i = 0; i < fit->unknowns.count; i++) {
+    double change = fit->singular_vector[i * fit->unknowns.count + combination] / fit->column_length[i];
+    if (!report_contains (fit, combination, i)) continue;
+    printf (scale != 0 ? " : " : ": changes in the ratio ");
+    if (scale == 0) scale = (fit->estimate[i] != 0 ? fit->estimate[i] : 1) / change;
+    printf ("%.3g", change * scale);
+  }
+  puts (" have no effect");
+}
+
+/* Prints combinations of unknowns that change no model value: singular vectors with the singular value 0. */
+static void report_undetermined (const pw_fit *fit) {
+  for (int k = fit->rank; k < fit->unknowns.count; k++) {
+    int count = 0;
+    for (int i = 0; i < fit->unknowns.count; i++)
+      if (report_contains (fit, k, i))
+        pw_cli_print (stdout, "%s%s", count++ ? ", " : "\nThe data do not determine ", fit->unknowns.list[i].name);
+    if (count == 1)
+      puts (", which has no effect");
+    else
+      report_ratio (fit, k);
+  }
+}
+
+/* 1 if a search ended at the estimate, up to round-off and the tolerances of searches. */
+static int report_is_best (const pw_fit *fit, const double *end) {
+  return *end <= fit->chi2 + 1e-6 * fit->chi2 + 1e-12 * fit->initial_chi2;
+}
+
+/* Prints how many searches ended at the estimate, and the best other end, where that search need not have converged. */
+static void report_ends (const pw_fit *fit) {
+  char options[PW_UNKNOWNS_OPTIONS];
+  const double *next = NULL;
+  int equal = 0;
+  for (int i = 0; i < fit->starts; i++) {
+    const double *end = fit->ends + i * (1 + fit->unknowns.count);
+    equal += report_is_best (fit, end);
+    if (!report_is_best (fit, end) && isfinite (*end) && (next == NULL || *end < *next)) next = end;
+  }
+  if (fit->starts > 1) printf ("%d of %d searches end at this estimate", equal, fit->starts);
+  if (next && pw_unknowns_options (&fit->unknowns, next + 1, options))
+    printf ("; the best other end is %.6g at %s", *next, options);
+  if (fit->starts > 1) putchar ('\n');
+}
+
+void pw_fit_print (const pw_fit *fit) {
+  char options[PW_UNKNOWNS_OPTIONS];
+  int dof = pw_fit_degrees_of_freedom (fit);
+  report_unknowns (fit);
+  report_columns (fit);
+  if (fit->weighted)
+    printf ("\nchi^2 %.6g with %s of freedom (initially %.6g); it is larger with probability %.2g\n", fit->chi2,
+            PW_COUNTED (dof, "degree"), fit->initial_chi2, dof > 0 ? gsl_cdf_chisq_Q (fit->chi2, dof) : 1);
+  else
+    printf ("\nsum of squares %.6g with %s of freedom (initially %.6g)\n", fit->chi2, PW_COUNTED (dof, "degree"),
+            fit->initial_chi2);
+  report_correlations (fit);
+  report_undetermined (fit);
+  printf ("\n%s, %s, derivatives by differences of runs\n", PW_COUNTED (fit->runs, "run"),
+          PW_COUNTED (fit->iterations, "iteration"));
+  report_ends (fit);
+  if (pw_unknowns_options (&fit->unknowns, fit->estimate, options)) printf ("\n%s\n", options);
+}
+
+/* ---- Files ---- */
+
+static void report_json_unknown (const pw_fit *fit, pw_json *j, int i) {
+  const pw_unknown *u = fit->unknowns.list + i;
+  pw_json_open (j, NULL, '{');
+  pw_json_text (j, "name", u->name);
+  pw_json_text (j, "unit", u->unit);
+  pw_json_number (j, "initial", u->value);
+  pw_json_number (j, "value", fit->estimate[i]);
+  pw_json_number (j, "standard_error", fit->standard_error[i]);
+  pw_json_number (j, "from", report_interval_end (fit, i, -1));
+  pw_json_number (j, "to", report_interval_end (fit, i, 1));
+  if (fit->interrupted)
+    pw_json_text (j, "determined", NULL);
+  else
+    pw_json_flag (j, "determined", !isinf (fit->standard_error[i]));
+  pw_json_flag (j, "bound", *report_bound (fit, i) != 0);
+  pw_json_close (j, '}');
+}
+
+static void report_json_columns (const pw_fit *fit, pw_json *j) {
+  pw_json_open (j, "columns", '[');
+  for (int i = 0; i < fit->columns; i++) {
+    int count;
+    double rms = report_rms (fit, i, &count);
+    pw_json_open (j, NULL, '{');
+    pw_json_text (j, "name", fit->column_name[i]);
+    pw_json_text (j, "unit", fit->column_unit[i]);
+    pw_json_number (j, "data", count);
+    pw_json_number (j, "rms", rms);
+    pw_json_close (j, '}');
+  }
+  pw_json_close (j, ']');
+}
+
+/* Writes a matrix, unknowns x unknowns, with these entries. */
+static void report_json_matrix (const pw_fit *fit, pw_json *j, const char *key,
+                                double (*entry) (const pw_fit *fit, int i, int j)) {
+  int n = fit->unknowns.count;
+  pw_json_open (j, key, '[');
+  for (int i = 0; i < n; i++) {
+    pw_json_open (j, NULL, '[');
+    for (int k = 0; k < n; k++) pw_json_number (j, NULL, entry (fit, i, k));
+    pw_json_close (j, ']');
+  }
+  pw_json_close (j, ']');
+}
+
+/* Writes pw_fit.ends. */
+static void report_json_ends (const pw_fit *fit, pw_json *j) {
+  int n = fit->unknowns.count;
+  pw_json_open (j, "searches", '[');
+  for (const double *end = fit->ends; end < fit->ends + fit->starts * (1 + n); end += 1 + n) {
+    pw_json_open (j, NULL, '{');
+    pw_json_number (j, "chi2", *end);
+    pw_json_numbers (j, "values", end + 1, n);
+    pw_json_close (j, '}');
+  }
+  pw_json_close (j, ']');
+}
+
+void pw_fit_json (const pw_fit *fit, const char *status, FILE *f) {
+  pw_json json = { .f = f, .lines = 2 }, *j = &json;
+  char options[PW_UNKNOWNS_OPTIONS];
+  pw_json_open (j, NULL, '{');
+  pw_json_number (j, "schema", 1);
+  pw_json_text (j, "model", pw_file_name (fit->model.file));
+  pw_json_text (j, "status", status);
+  pw_json_text (j, "data", fit->data_path);
+  pw_json_text (j, "options", pw_unknowns_options (&fit->unknowns, fit->estimate, options));
+  pw_json_text (j, "method", fit->unknowns.method);
+  pw_json_number (j, "residuals", fit->residuals);
+  pw_json_number (j, "freedom", pw_fit_degrees_of_freedom (fit));
+  pw_json_flag (j, "weighted", fit->weighted);
+  pw_json_number (j, "chi2", fit->chi2);
+  pw_json_number (j, "confidence", fit->confidence);
+  pw_json_number (j, "rank", fit->rank);
+  pw_json_number (j, "runs", (double)fit->runs);
+  pw_json_text (j, "derivatives", "differences");
+  pw_json_number (j, "iterations", fit->iterations);
+  pw_json_open (j, "unknowns", '[');
+  for (int i = 0; i < fit->unknowns.count; i++) report_json_unknown (fit, j, i);
+  pw_json_close (j, ']');
+  report_json_columns (fit, j);
+  report_json_matrix (fit, j, "covariance", report_covariance);
+  report_json_matrix (fit, j, "correlation", report_correlation);
+  report_json_ends (fit, j);
+  pw_json_close (j, '}');
+}
+
+int pw_fit_table (const pw_fit *fit, FILE *f, pw_error *error) {
+  static const char *const part[] = { "", ".model", ".residual", ".sigma" };
+  pw_text t = { .chars = NULL };
+  pw_text_name (&t, "t", "s");
+  for (int i = 0; i < fit->columns; i++)
+    for (int k = 0; k < 4; k++)
+      pw_text_name (&t, PW_PRINTED (300, "%s%s", fit->column_name[i], part[k]), fit->column_unit[i]);
+  int status = pw_text_line (&t, f, fit->table_path, error);
+  for (int row = 0; row < fit->rows && status == PW_OK; row++) {
+    pw_text_number (&t, fit->t[row]);
+    for (int i = 0; i < fit->columns; i++) {
+      int k = i * fit->rows + row;
+      const double value[] = { fit->data[k], fit->fitted[k], fit->fitted[k] - fit->data[k],
+                               fit->weighted ? fit->sigma[k] : NAN };
+      for (int c = 0; c < 4; c++) pw_text_number (&t, value[c]);
+    }
+    status = pw_text_line (&t, f, fit->table_path, error);
+  }
+  return status;
+}
+
+/* ---- Figures ---- */
+
+static int report_data (const void *context, FILE *f, pw_error *error) {
+  const pw_fit *fit = context;
+  (void)error;
+  fputs ("# t [s], data, standard deviation, model; a block per column\n", f);
+  for (int i = 0; i < fit->columns; i++) {
+    for (int k = 0; k < fit->rows; k++) {
+      int c = i * fit->rows + k;
+      const double value[] = { fit->t[k], fit->data[c], fit->weighted ? fit->sigma[c] : 0, fit->fitted[c] };
+      for (int v = 0; v < 4; v++) fprintf (f, "%s%s", v ? " " : "", PW_DIGITS (value[v], 12));
+      fputc ('\n', f);
+    }
+    fputs ("\n\n", f);
+  }
+  return PW_OK;
+}
+
+static void report_variables (const void *context, FILE *f) {
+  const pw_fit *fit = context;
+  int panels = fit->columns < REPORT_PANELS ? fit->columns : REPORT_PANELS;
+  fprintf (f, "panels = %d\nweighted = %d\narray label[%d]\n", panels, fit->weighted, panels);
+  for (int i = 0; i < panels; i++) pw_figure_label (f, "label", i + 1, fit->column_name[i], fit->column_unit[i]);
+}
+
+int pw_fit_draw (const pw_fit *fit, pw_error *error) {
+  return pw_figure_write (&fit->line, &fit->model, fit->plots_path, "fit", fit, report_data, report_variables, error);
+}

@@ -1,0 +1,467 @@
+/* The common part of compare and drift: reads --methods, performs the runs, opens and finishes the output. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "report.h"
+#include "study.h"
+
+/* The thread's clock is read after a batch of calls of pw_run_advance_towards.  If the batch has taken less processor
+ * time than STUDY_SHORT, the next one is twice as long; if more than STUDY_LONG, half as long [s]. */
+#define STUDY_SHORT 0.005
+#define STUDY_LONG 0.02
+enum { STUDY_FIRST_BATCH = 8, STUDY_LONGEST_BATCH = 65536 }; /* calls of pw_run_advance_towards */
+
+/* ---- Methods ---- */
+
+static int methods_add (pw_study *study, const char *name, pw_error *error) {
+  const pw_method *integrator;
+  int stabilisation, status = pw_method_parse (name, &integrator, &stabilisation, error);
+  if (status != PW_OK) return status;
+  for (int i = 0; i < study->methods; i++)
+    if (strcmp (study->method[i], name) == 0) return PW_OK;
+  void *more = realloc (study->method, (size_t)(study->methods + 1) * sizeof *study->method);
+  if (more == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  study->method = more;
+  strcpy (study->method[study->methods++], name);
+  return PW_OK;
+}
+
+/* Adds the methods of "all", "INTEGRATOR+all", "all+STABILISATION", or a method. */
+static int methods_add_pattern (pw_study *study, char *pattern, pw_error *error) {
+  char *tail = pattern + strcspn (pattern, "+:");
+  int any_integrator = strncmp (pattern, "all+", 4) == 0 || strcmp (pattern, "all") == 0;
+  const char *stabilisation = any_integrator && *tail && strcmp (tail, "+all") != 0 ? tail + 1 : NULL; /* NULL: all */
+  const pw_method *integrator = NULL;                                                                  /* NULL: all */
+  pw_nearest near = { .sought = stabilisation };
+  int index, status = PW_OK, found = 0;
+  if (!any_integrator && strcmp (tail, "+all") != 0) return methods_add (study, pattern, error);
+  *tail = 0;
+  if (!any_integrator) status = pw_method_parse (pattern, &integrator, &index, error);
+  for (int i = 0; pw_methods[i]; i++)
+    for (const pw_stabilisation *s = pw_methods[i]->stabilisations; status == PW_OK && s->name; s++) {
+      if (integrator && integrator != pw_methods[i]) continue;
+      if (stabilisation) pw_nearest_try (&near, s->name);
+      if (stabilisation && strcmp (stabilisation, s->name) != 0) continue;
+      status = methods_add (study, PW_PRINTED (STUDY_NAME, "%s+%s", pw_methods[i]->name, s->name), error);
+      found = 1;
+    }
+  if (status != PW_OK || found) return status;
+  return pw_fail (error, PW_INPUT, "--methods all+%.60s: no integrator has this stabilisation%s", stabilisation,
+                  pw_nearest_text (&near));
+}
+
+int pw_study_read_methods (pw_study *study, const char *otherwise, pw_error *error) {
+  const char *text = study->methods_text ? study->methods_text : otherwise;
+  for (const char *rest = text;; rest++) {
+    char pattern[STUDY_NAME];
+    size_t n = strcspn (rest, ",");
+    if (n == 0 || n >= sizeof pattern)
+      return pw_fail (error, PW_INPUT, "--methods \"%.80s\": %s", text, n ? "too long a name" : "a name is missing");
+    snprintf (pattern, sizeof pattern, "%.*s", (int)n, rest);
+    int status = methods_add_pattern (study, pattern, error);
+    rest += n;
+    if (status != PW_OK || *rest == 0) return status;
+  }
+}
+
+/* ---- Rows ---- */
+
+pw_row *pw_study_add (pw_study *study, int group, int curve, const char *method, int points, pw_error *error) {
+  pw_row *row = realloc (study->row, (size_t)(study->rows + 1) * sizeof *row);
+  double (*point)[STUDY_COORDINATES] = pw_arena_alloc (&study->arena, (size_t)points * sizeof *point);
+  if (row) study->row = row;
+  if (row == NULL || point == NULL) return pw_fail (error, PW_RESOURCE, "out of memory"), NULL;
+  row += study->rows++;
+  *row = (pw_row){ .group = group, .curve = curve, .points = points, .point = point };
+  snprintf (row->method, sizeof row->method, "%s", method);
+  snprintf (row->label, sizeof row->label, "%s", method);
+  for (int i = 0; i < STUDY_COLUMNS; i++) row->value[i] = NAN;
+  for (int k = 0; k < points; k++)
+    for (int i = 0; i < STUDY_COORDINATES; i++) row->point[k][i] = NAN;
+  return row;
+}
+
+void pw_study_begin_progress (pw_study *study, const char *what, const char *unit, int rows) {
+  study->progress_sum = 0;
+  pw_progress_start (&study->progress, what, unit, 0, rows);
+}
+
+void pw_study_progress (pw_study *study, pw_row *row, double part) {
+  pthread_mutex_lock (&study->mutex);
+  study->progress_sum += fmin (part, 1) - row->progress;
+  row->progress = fmin (part, 1);
+  pw_progress_at (&study->progress, study->progress_sum);
+  pthread_mutex_unlock (&study->mutex);
+}
+
+/* Advances a run to the end. */
+static int study_advance (pw_study *study, pw_row *row, pw_run *run, const pw_limit *limit, pw_visitor *visitor,
+                          pw_error *error) {
+  int status = PW_OK;
+  long batch = STUDY_FIRST_BATCH;
+  while (status == PW_OK && pw_run_time (run) < study->t_end) {
+    double start = pw_seconds (CLOCK_THREAD_CPUTIME_ID);
+    long n = 0;
+    do {
+      status = pw_run_advance_towards (run, visitor ? visitor->due : study->t_end, study->t_end, error);
+      if (status == PW_OK && visitor && pw_run_time (run) >= visitor->due)
+        status = visitor->visit (visitor, run, error);
+    } while (status == PW_OK && ++n < batch && pw_run_time (run) < study->t_end);
+    double used = pw_seconds (CLOCK_THREAD_CPUTIME_ID) - start;
+    row->cpu += used;
+    if (used < STUDY_SHORT && n == batch && batch < STUDY_LONGEST_BATCH) batch *= 2;
+    if (used > STUDY_LONG && batch > 1) batch /= 2;
+    pw_study_progress (study, row, study->run_share * (row->runs + pw_run_time (run) / study->t_end));
+    int stopped = status == PW_STOPPED;
+    if (stopped && (pw_stop || isinf (study->cpu_limit))) return pw_limit_status (limit, pw_run_time (run), error);
+    if (stopped || (status == PW_OK && row->cpu > study->cpu_limit && pw_run_time (run) < study->t_end)) {
+      row->state = ROW_STOPPED;
+      return PW_RETRY;
+    }
+  }
+  return status;
+}
+
+int pw_study_run (pw_study *study, pw_row *row, const pw_settings *settings, pw_visitor *visitor, pw_error *error) {
+  pw_settings run_settings = *settings;
+  pw_limit limit = study->limit;
+  if (visitor == NULL) limit.seconds = INFINITY; /* timed: not slowed down by readings of the clock in every step */
+  row->cpu = 0;
+  pw_limit_start (&limit);
+  run_settings.stop = pw_limit_over;
+  run_settings.stop_context = &limit;
+  run_settings.specialised = pw_scene_code_table (study->engine.code);
+  pw_run *run = pw_run_open (study->compiled.system, row->method, &run_settings, error);
+  if (run == NULL && error->status == PW_STOPPED) {
+    *error = (pw_error){ 0 };
+    if (pw_stop || isinf (study->cpu_limit)) return pw_limit_status (&limit, settings->t, error);
+    row->state = ROW_STOPPED, row->t = settings->t;
+    return PW_RETRY;
+  }
+  if (run == NULL) return error->status;
+  int status = study_advance (study, row, run, &limit, visitor, error);
+  row->t = pw_run_time (run);
+  row->statistics = *pw_run_statistics (run);
+  row->runs += status == PW_OK;
+  pw_run_close (run);
+  return status;
+}
+
+int pw_study_parallel (pw_study *study, int count, pw_task *task, void *context, pw_error *error) {
+  int status = (study->type->timed ? pw_parallel_timed : pw_parallel) (study->jobs, count, task, context, error);
+  pw_progress_end (&study->progress);
+  return status;
+}
+
+int pw_study_record_run (const pw_study *study, pw_row *row, int status, const pw_error *run_error, pw_error *error) {
+  const pw_statistics *stats = &row->statistics;
+  const long count[] = { stats->steps, stats->rejected, stats->rhs, stats->jacobians, stats->factorisations };
+  for (int i = 0; i < 5; i++) row->value[study->type->first_count_column + i] = (double)count[i];
+  row->value[study->type->time_column] = row->t;
+  if (status == PW_OK || row->state == ROW_STOPPED) return PW_OK;
+  if (status == PW_RESOURCE || status == PW_INITIAL) return pw_fail (error, status, "%s", run_error->text);
+  if (pw_stop) return PW_RETRY;
+  row->state = status == PW_INPUT ? ROW_REFUSED : ROW_FAILED;
+  snprintf (row->reason, sizeof row->reason, "%s",
+            run_error->status ? run_error->text : "the method failed without giving a reason");
+  return PW_OK;
+}
+
+/* ---- The command ---- */
+
+static int study_open_folder (pw_study *study, pw_error *error) {
+  const char *const *tables = study->type->table_names;
+  const char *const names[] = { ".dat", ".gp", ".svg", ".png", ".pdf", tables[0], tables[1], NULL };
+  pw_use use[] = { PW_CLI_MODEL_USE,
+                   { "--reference", study->reference_path, PW_READS, NULL },
+                   { "-o", study->folder, PW_WRITES_INTO, names } };
+  if (study->folder == NULL) return pw_cli_requires ("--width", study->line.width, "-o DIR", 0, error);
+  int status = pw_figures_of (&study->figures, &study->line, &study->compiled, study->folder, error);
+  if (status == PW_OK)
+    status = pw_files_open (&study->files, &study->line, &study->compiled, use, sizeof use / sizeof *use, error);
+  return status == PW_OK ? pw_study_open_table (study, error) : status;
+}
+
+/* Estimated number of steps of all runs. */
+static double study_estimated_steps (const pw_study *study) {
+  pw_run_defaults defaults = pw_cli_defaults (pw_file_table (study->compiled.file));
+  double steps = 0;
+  for (const pw_row *row = study->row; row < study->row + study->rows; row++) {
+    pw_settings settings = study->settings;
+    if (row->level > 0) settings.step = settings.rtol = row->level;
+    steps += study->type->runs_per_row * pw_method_steps (row->method, &settings, defaults.step, study->t_end);
+  }
+  return steps;
+}
+
+static int study_open (pw_study *study, pw_error *error) {
+  pw_specialise when;
+  study->run_share = 1;
+  study->cpu_limit = INFINITY;
+  pthread_mutex_init (&study->mutex, NULL);
+  int status = pw_cli_open (&study->compiled, &study->line, error);
+  if (status == PW_OK) status = pw_parallel_jobs (study->jobs_text, &study->jobs, error);
+  if (status == PW_OK) status = study->type->plan (study, error);
+  if (status == PW_OK) status = pw_cli_read_specialise (study->line.specialise, &when, error);
+  if (status == PW_OK) status = pw_report_initial_state (&study->compiled, study->limit.seconds, error);
+  if (status != PW_OK) return status;
+  pw_cli_report_tables (study->compiled.system, study->t_end);
+  /* one engine for all runs, since `compare` compares their processor times */
+  pw_cli_engine_open (&study->engine, study->compiled.system, when, study_estimated_steps (study));
+  return study_open_folder (study, error);
+}
+
+/* Measures a row, then writes the measured rows before the first one that is not: rows are written in their order. */
+static int study_measure_row (void *context, int i, pw_error *error) {
+  pw_study *study = context;
+  int status = study->type->measure (study, &study->row[i], error);
+  if (status != PW_OK) return status;
+  pw_study_progress (study, &study->row[i], 1);
+  pthread_mutex_lock (&study->mutex);
+  study->row[i].measured = 1;
+  pw_progress_end (&study->progress);
+  for (; status == PW_OK && study->written < study->rows && study->row[study->written].measured; study->written++)
+    status = pw_study_write_row (study, &study->row[study->written], error);
+  pthread_mutex_unlock (&study->mutex);
+  return status;
+}
+
+/* Measures the rows of a method one after the other; if a study is timed, the curves are its methods. */
+static int study_measure_method (void *context, int curve, pw_error *error) {
+  const pw_study *study = context;
+  int status = PW_OK;
+  for (int i = 0; status == PW_OK && i < study->rows; i++)
+    if (study->row[i].curve == curve) status = study_measure_row (context, i, error);
+  return status;
+}
+
+/* Writes the measured rows after one that an interruption has stopped.  PW_RETRY, or the status of a failure. */
+static int study_write_kept (pw_study *study, pw_error *error) {
+  for (const pw_row *row = study->row + study->written; row < study->row + study->rows; row++) {
+    if (row->measured && pw_study_write_row (study, row, error) != PW_OK) return error->status;
+    study->written += row->measured;
+  }
+  return PW_RETRY;
+}
+
+static int study_perform (pw_study *study, pw_error *error) {
+  pw_stop_catch ();
+  int status = study->type->begin (study, error);
+  if (status == PW_OK)
+    printf ("all runs use %s%s\n\n",
+            study->engine.code ? "code specialised for this scene, if their method can use it" : "the general engine: ",
+            study->engine.code ? "" : study->engine.reason);
+  pw_study_begin_progress (study, pw_file_name (study->compiled.file), study->type->row_noun, study->rows);
+  if (status == PW_OK)
+    status = study->type->timed ? pw_study_parallel (study, study->methods, study_measure_method, study, error)
+                                : pw_study_parallel (study, study->rows, study_measure_row, study, error);
+  if (status == PW_RETRY && pw_stop) status = study_write_kept (study, error);
+  if (status == PW_OK && study->type->conclude) study->type->conclude (study);
+  pw_stop_release ();
+  return status;
+}
+
+/* Gives a complete CSV file its final name and draws the figures; an incomplete one remains as NAME.part. */
+static int study_finish (pw_study *study, int status, pw_error *error) {
+  char part_path[FIGURE_PATH + 16] = "";
+  if (study->csv && status == PW_OK)
+    status = pw_output_finish (study->csv, error);
+  else if (study->csv)
+    pw_cli_abandon_table (study->csv, study->written, part_path, sizeof part_path);
+  if (status == PW_RETRY && pw_stop) {
+    pw_cli_say ("pinwheel: interrupted; %d of %d %s are done%s%s\n", study->written, study->rows, study->type->row_noun,
+                *part_path ? ", and kept in " : "", part_path);
+    return PW_INTERRUPTED;
+  }
+  if (*part_path) pw_cli_say ("pinwheel: the %s so far are kept in %s\n", study->type->row_noun, part_path);
+  if (study->csv && status == PW_OK) status = study->type->figures (study, error);
+  return status == PW_OK && study->scripts[0] ? pw_figure_draw (study->folder, study->scripts, error) : status;
+}
+
+/* A study in which no run has reached the end is a failure. */
+static int study_require_success (const pw_study *study, pw_error *error) {
+  const pw_row *failed = NULL;
+  for (const pw_row *row = study->row; row < study->row + study->rows; row++) {
+    if (row->state == ROW_DONE) return PW_OK;
+    if (row->state == ROW_FAILED || row->state == ROW_REFUSED) failed = row;
+  }
+  return failed ? pw_fail (error, PW_METHOD, "no method has reached the end; the last error: %s", failed->reason)
+                : pw_fail (error, PW_METHOD, "no method has reached the end within the limit; see --limit");
+}
+
+int pw_study_command (pw_study *study, const pw_study_type *type, pw_error *error) {
+  study->type = type;
+  int status = study_open (study, error);
+  if (status == PW_OK) status = study_perform (study, error);
+  status = study_finish (study, status, error);
+  if (status == PW_OK) status = study_require_success (study, error);
+  pw_files_close (&study->files);
+  if (type->close) type->close (study);
+  pw_arena_free (&study->arena);
+  free (study->row);
+  free (study->method);
+  pthread_mutex_destroy (&study->mutex);
+  pw_cli_engine_close (&study->engine);
+  pw_cli_close_model (&study->compiled);
+  return status == PW_INTERRUPTED ? status : error->status;
+}
+
+/* Writes the tables and figures of studies: rows on the terminal and in a CSV file, points of figures in data files. */
+
+const char *pw_study_method (const pw_row *row) {
+  return row->method;
+}
+
+const char *pw_study_status (const pw_row *row) {
+  static const char *const status[] = { "ok", "failed", "refused", "stopped", "not run" };
+  return status[row->state];
+}
+
+/* ---- CSV ---- */
+
+/* Rows are written as they finish, to NAME.part, which remains if the study is stopped. */
+int pw_study_open_table (pw_study *study, pw_error *error) {
+  const pw_study_column *column = study->type->column;
+  pw_text line = { .chars = NULL };
+  study->csv = pw_figure_open_file (study->folder, study->type->table_names[0], error);
+  if (study->csv == NULL) return error->status;
+  for (int i = 0; i < study->type->columns; i++)
+    if (column[i].name) pw_text_name (&line, column[i].name, column[i].unit);
+  pw_text_cell (&line, "reason");
+  return pw_text_line (&line, pw_output_stream (study->csv), study->folder, error);
+}
+
+static int table_write_csv (const pw_study *study, const pw_row *row, pw_error *error) {
+  const pw_study_column *column = study->type->column;
+  pw_text line = { .chars = NULL };
+  for (int i = 0; i < study->type->columns; i++)
+    if (column[i].text)
+      pw_text_cell (&line, column[i].text (row));
+    else if (column[i].name)
+      pw_text_number (&line, row->value[i]);
+  pw_text_quoted (&line, row->reason);
+  return pw_text_line (&line, pw_output_stream (study->csv), study->folder, error);
+}
+
+/* ---- Terminal ---- */
+
+/* The width of the first column, which contains the methods. */
+static int table_width (const pw_study *study) {
+  size_t width = strlen ("method");
+  for (const pw_row *row = study->row; row < study->row + study->rows; row++)
+    if (strlen (row->method) > width) width = strlen (row->method);
+  return (int)width;
+}
+
+static void table_heading (pw_study *study, int group) {
+  const pw_study_column *column = study->type->column;
+  int width = table_width (study);
+  printf ("%s%-*s%s\n%-*s", study->headed ? "\n" : "", width, study->type->group[group], study->type->heading_above,
+          width, "method");
+  for (int i = 0; i < study->type->columns; i++)
+    if (column[i].head) printf ("%*s", column[i].width, column[i].head);
+  putchar ('\n');
+  study->headed = group + 1;
+}
+
+/* Prints a value, "-" if it is unknown, "<1e-9" if it is an upper bound. */
+static void table_number (const pw_row *row, const pw_study_column *column, int value_index) {
+  char text[32] = "<", *number = text + (row->upper_bounds >> value_index & 1);
+  if (isnan (row->value[value_index]))
+    strcpy (number, "-");
+  else
+    snprintf (number, sizeof text - 1, column->format, row->value[value_index]);
+  printf ("%*s", column->width, text);
+}
+
+/* Prints a row: columns after the status only if its runs have reached the end, else the reason. */
+static void table_print (const pw_study *study, const pw_row *row) {
+  const pw_study_column *column = study->type->column;
+  int shown = 1;
+  printf ("%-*s", table_width (study), row->method);
+  for (int i = 0; shown && i < study->type->columns; i++) {
+    if (column[i].head) table_number (row, &column[i], i);
+    if (column[i].text == pw_study_status) shown = row->state == ROW_DONE;
+  }
+  if (row->state != ROW_DONE) {
+    printf ("  %s", pw_study_status (row));
+    if (row->state == ROW_FAILED && strncmp (row->reason, "t = ", 4) != 0)
+      printf (" at t = %s s", PW_DIGITS (row->t, 4));
+    printf (": %s", row->reason);
+  }
+  putchar ('\n');
+  fflush (stdout);
+}
+
+int pw_study_write_row (pw_study *study, const pw_row *row, pw_error *error) {
+  if (!study->quiet && study->headed != row->group + 1) table_heading (study, row->group);
+  if (!study->quiet) table_print (study, row);
+  return study->csv ? table_write_csv (study, row, error) : PW_OK;
+}
+
+/* ---- Figures ---- */
+
+/* The coordinates of the next defined point of a group, after point *point of *row; NULL after the last one.  A point
+ * is defined if its coordinates 1, 2, ... are, which are set together. */
+static const double *table_next_point (const pw_study *study, int group, const pw_row **row, int *point) {
+  for (; *row < study->row + study->rows; ++*row, *point = -1)
+    while ((*row)->group == group && ++*point < (*row)->points)
+      if (!isnan ((*row)->point[*point][1])) return (*row)->point[*point];
+  return NULL;
+}
+
+int pw_study_positive (const pw_study *study, int group, int coordinate) {
+  const pw_row *row = study->row;
+  const double *point;
+  int k = -1;
+  while ((point = table_next_point (study, group, &row, &k)) != NULL)
+    if (point[coordinate] > 0 && isfinite (point[coordinate])) return 1;
+  return 0;
+}
+
+int pw_study_write_data (const pw_study *study, int group, const char *name, const char *heading, int count,
+                         pw_error *error) {
+  pw_output *output = pw_figure_open_file (study->folder, PW_PRINTED (40, "%s.dat", name), error);
+  if (output == NULL) return PW_RESOURCE;
+  FILE *f = pw_output_stream (output);
+  const pw_row *row = study->row;
+  const double *point;
+  fprintf (f, "# %s\n", heading);
+  for (int k = -1, curve = -1; (point = table_next_point (study, group, &row, &k)) != NULL; curve = row->curve) {
+    if (row->curve != curve) fprintf (f, "%s# %s\n", curve < 0 ? "" : "\n\n", row->label);
+    for (int i = 0; i < count; i++) /* only positive numbers have logarithms */
+      fprintf (f, "%s%s", i ? " " : "", point[i] > 0 ? PW_DIGITS (point[i], 9) : "NaN");
+    fputc ('\n', f);
+  }
+  return pw_output_finish (output, error);
+}
+
+/* Writes the labels of the curves that have points, with stabilisations if they are methods, unless f is NULL; returns
+ * the number of these curves. */
+static int table_write_labels (const pw_study *study, int group, FILE *f) {
+  const pw_row *row = study->row;
+  const pw_method *integrator;
+  int stabilisation, curves = 0;
+  for (int k = -1, curve = -1; table_next_point (study, group, &row, &k) != NULL; curve = row->curve) {
+    if (row->curve == curve) continue;
+    curves++;
+    if (f == NULL) continue;
+    int known = pw_method_parse (row->label, &integrator, &stabilisation, NULL) == PW_OK;
+    pw_figure_element (f, "label", curves, row->label);
+    pw_figure_element (f, "stabilisation", curves, known ? integrator->stabilisations[stabilisation].name : "");
+  }
+  return curves;
+}
+
+int pw_study_write_script (pw_study *study, int group, const char *name, const char *template_name,
+                           const char *variables, pw_error *error) {
+  pw_output *output = pw_figure_begin (&study->figures, name, error);
+  int script = 0, curves = table_write_labels (study, group, NULL);
+  if (output == NULL) return PW_RESOURCE;
+  FILE *f = pw_output_stream (output);
+  fprintf (f, "%smethods = %d\narray label[%d]\narray stabilisation[%d]\n", variables, curves, curves, curves);
+  table_write_labels (study, group, f);
+  while (study->scripts[script]) script++;
+  study->scripts[script] = name;
+  return pw_figure_end (output, template_name, error);
+}

@@ -1,0 +1,563 @@
+/* pinwheel sweep: a table of runs, for all combinations of varied parameters and initial values.
+ *
+ * Every run depends only on its row of the grid.  A journal keeps the rows in the order of completion; at the end they
+ * are sorted into the order of the grid.  So the table does not depend on the number of threads or on interruptions of
+ * the sweep. */
+#include <math.h>
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+#include "cli.h"
+#include "sweep.h"
+
+typedef struct {
+  /* as given */
+  pw_cli_line line;
+  const char *path, *part_text, *jobs_text, *lanes_text; /* path: -o */
+  const char **ranges;                                   /* --vary */
+  int merge;                                             /* 1: --merge */
+  /* as understood */
+  pw_plan plan;
+  pw_journal journal;
+  int jobs;
+} pw_sweep;
+
+/* ---- Before the sweep ---- */
+
+/* Refuses missing or unsuitable options and arguments. */
+static int sweep_check_options (const pw_sweep *sweep, pw_error *error) {
+  if (sweep->line.arguments == 0)
+    return pw_fail (error, PW_INPUT, "missing argument; usage: pinwheel sweep %s",
+                    sweep->merge ? "--merge PART... -o FILE.csv" : pw_cli_sweep.synopsis);
+  if (sweep->path == NULL || *sweep->path == 0)
+    return pw_fail (error, PW_INPUT, "nowhere to write the table: add -o FILE.csv");
+  if (strcmp (sweep->path, "-") == 0)
+    return pw_fail (error, PW_INPUT, "-o -: a sweep needs a file, next to which it keeps what it has done");
+  if (pw_cli_check_csv (sweep->path, error) != PW_OK) return PW_INPUT;
+  if (!sweep->merge && sweep->ranges == NULL)
+    return pw_fail (error, PW_INPUT, "nothing is varied: add --vary NAME=lin:FIRST:LAST:COUNT, log:..., or V1,V2,...");
+  return sweep->merge ? PW_OK : pw_cli_at_most_one (&pw_cli_sweep, &sweep->line, error);
+}
+
+/* The first option given that cannot be combined with --merge; NULL if there is none. */
+static const char *sweep_not_for_merge (const pw_sweep *sweep) {
+  for (const struct poptOption *o = pw_cli_sweep.options; o->longName || o->descrip; o++) {
+    if (o->longName == NULL || strcmp (o->longName, "output") == 0 || strcmp (o->longName, "merge") == 0) continue;
+    const void *value = (const char *)sweep + (size_t)o->arg;
+    if (o->argInfo == POPT_ARG_NONE ? *(const int *)value : *(const void *const *)value != NULL) return o->longName;
+  }
+  return NULL;
+}
+
+/* --part I/N; without it the sweep is its only part. */
+static int sweep_read_part (pw_sweep *sweep, pw_error *error) {
+  pw_plan *plan = &sweep->plan;
+  char rest;
+  plan->part = plan->parts = 1;
+  if (sweep->part_text == NULL || (sscanf (sweep->part_text, "%7d/%7d%c", &plan->part, &plan->parts, &rest) == 2 &&
+                                   1 <= plan->part && plan->part <= plan->parts && plan->parts <= 1000000))
+    return PW_OK;
+  return pw_fail (error, PW_INPUT, "--part %.60s: expected I/N, whole numbers with 1 <= I <= N <= 1000000",
+                  sweep->part_text);
+}
+
+#define SWEEP_LANES "1, 2, 4 or 8" /* the powers of 2 up to PW_LANES_MOST */
+_Static_assert(PW_LANES_MOST == 8, "SWEEP_LANES, and numbers of one digit");
+
+static int sweep_read_lanes (pw_sweep *sweep, pw_error *error) {
+  const char *text = sweep->lanes_text;
+  int lanes = sweep->plan.lanes = text ? *text - '0' : 0;
+  if (text && (lanes < 1 || lanes > PW_LANES_MOST || (lanes & (lanes - 1)) != 0 || text[1]))
+    return pw_fail (error, PW_INPUT, "--lanes %.60s: expected " SWEEP_LANES, text);
+  return PW_OK;
+}
+
+static int sweep_read_settings (pw_sweep *sweep, pw_error *error) {
+  pw_plan *plan = &sweep->plan;
+  pw_run_defaults defaults = pw_cli_defaults (pw_file_table (plan->file));
+  plan->line = &sweep->line;
+  plan->method = sweep->line.method ? sweep->line.method : defaults.method;
+  int status = pw_cli_settings (&sweep->line, &defaults, &plan->t_end, &plan->settings, &plan->limit, error);
+  if (status == PW_OK) pw_cli_report_unused (plan->method, &sweep->line);
+  if (status == PW_OK) status = pw_cli_read_specialise (sweep->line.specialise, &plan->specialise, error);
+  if (status == PW_OK) status = sweep_read_lanes (sweep, error);
+  if (status == PW_OK) status = pw_parallel_jobs (sweep->jobs_text, &sweep->jobs, error);
+  return status == PW_OK ? sweep_read_part (sweep, error) : status;
+}
+
+static int sweep_open (pw_sweep *sweep, pw_error *error) {
+  pw_use use[] = { PW_CLI_MODEL_USE, { "-o", sweep->path, PW_WRITES, pw_cli_csv } };
+  sweep->plan.file = pw_cli_file (&sweep->line, error);
+  if (sweep->plan.file == NULL) return error->status;
+  int status = sweep_read_settings (sweep, error);
+  if (status == PW_OK)
+    status = pw_cli_check_uses (&sweep->line, sweep->plan.file, use, sizeof use / sizeof *use, error);
+  if (status == PW_OK) status = pw_plan_open (&sweep->plan, sweep->ranges, error);
+  if (status == PW_OK && sweep->plan.parts > sweep->plan.grid.rows)
+    status = pw_fail (error, PW_INPUT, "--part %s: more parts than the %ld rows of the grid", sweep->part_text,
+                      sweep->plan.grid.rows);
+  if (status == PW_OK) status = pw_journal_open (&sweep->journal, &sweep->plan, sweep->path, error);
+  if (status != PW_OK) return status;
+  if (sweep->journal.done > 0)
+    pw_cli_say ("pinwheel: continuing with %s: %ld of %ld runs are done\n", sweep->journal.path, sweep->journal.done,
+                sweep->journal.rows);
+  return PW_OK;
+}
+
+/* ---- The end ---- */
+
+static void sweep_report_failures (const pw_tally *tally) {
+  if (tally->failed > 0)
+    pw_cli_say ("pinwheel: %ld of %ld runs failed, the first of them: %s\n", tally->failed, tally->rows, tally->reason);
+}
+
+/* A failed run has its row in the table, too; the sweep fails only if all runs failed.  tally->status: exit status of
+ * the first failure, the negative of its error status. */
+static int sweep_conclude (const pw_tally *tally, pw_error *error) {
+  if (tally->failed == tally->rows)
+    return pw_fail (error, -tally->status, "all %ld runs failed, the first one: %s", tally->rows, tally->reason);
+  sweep_report_failures (tally);
+  return PW_OK;
+}
+
+static int sweep_merge (pw_sweep *sweep, pw_error *error) {
+  pw_tally tally;
+  const char *option = sweep_not_for_merge (sweep);
+  if (option)
+    return pw_fail (error, PW_INPUT, "--%s cannot be combined with --merge: the parts define the sweep", option);
+  int status = pw_sweep_merge (sweep->line.argument, sweep->line.arguments, sweep->path, &tally, error);
+  return status == PW_OK ? sweep_conclude (&tally, error) : status;
+}
+
+static int sweep_finish (pw_sweep *sweep, pw_error *error) {
+  pw_tally tally;
+  if (sweep->journal.done == 0) {
+    fputs ("pinwheel: interrupted before the first run was done\n", stderr);
+    return PW_INTERRUPTED;
+  }
+  if (sweep->journal.done < sweep->journal.rows) {
+    pw_cli_say ("pinwheel: interrupted; %ld of %ld runs are kept in %s; the same command continues from there\n",
+                sweep->journal.done, sweep->journal.rows, sweep->journal.path);
+    return PW_INTERRUPTED;
+  }
+  int status = pw_sweep_finish (&sweep->journal, &sweep->plan, &tally, error);
+  if (status != PW_OK) return status;
+  if (sweep->plan.parts == 1) return sweep_conclude (&tally, error);
+  sweep_report_failures (&tally); /* whether all have failed is known after the merge */
+  return PW_OK;
+}
+
+static void sweep_close (pw_sweep *sweep) {
+  pw_journal_close (&sweep->journal);
+  pw_plan_close (&sweep->plan);
+  pw_file_close (sweep->plan.file);
+}
+
+static int sweep_command (void *options, pw_error *error) {
+  pw_sweep *sweep = options;
+  sweep->journal.descriptor = -1;
+  int status = sweep_check_options (sweep, error);
+  if (status == PW_OK && sweep->merge)
+    status = sweep_merge (sweep, error);
+  else if (status == PW_OK) {
+    status = sweep_open (sweep, error);
+    if (status == PW_OK) status = pw_sweep_rows (&sweep->plan, &sweep->journal, sweep->jobs, error);
+    if (status == PW_OK) status = sweep_finish (sweep, error);
+  }
+  sweep_close (sweep);
+  return status;
+}
+
+static const struct poptOption sweep_options[] = {
+  PW_OPTION_GROUP ("Sweep"),
+  PW_LIST_OPTION (pw_sweep, ranges, "vary", 'v', "NAME=RANGE",
+                  "Vary a parameter or an initial value such as frame.vx; repeatable, the last one varies fastest. "
+                  "RANGE: lin:FIRST:LAST:COUNT, log:FIRST:LAST:COUNT, or a list V1,V2,..."),
+  PW_TEXT_OPTION (pw_sweep, path, "output", 'o', "FILE.csv", "Write the table to this file"),
+  PW_TEXT_OPTION (pw_sweep, jobs_text, "jobs", 'j', "N", "Number of threads (default: one per processor)"),
+  PW_TEXT_OPTION (pw_sweep, lanes_text, "lanes", 0, "N",
+                  "Runs that a thread advances at once, " SWEEP_LANES ", with steps of fixed size and specialised code "
+                  "(default: as many as are worthwhile)"),
+  PW_TEXT_OPTION (pw_sweep, part_text, "part", 0, "I/N",
+                  "Compute every N-th row, from the I-th on, for a later --merge"),
+  PW_FLAG_OPTION (pw_sweep, merge, "merge", "Merge the parts of a sweep: the arguments are their files"),
+  PW_FLAG_OPTION (pw_sweep, plan.with_cpu, "cpu",
+                  "Add a column with the processor time of each run, which is never reproducible"),
+  PW_METHOD_OPTIONS,
+  PW_MODEL_OPTIONS,
+  POPT_TABLEEND,
+};
+
+const pw_command pw_cli_sweep = {
+  .name = "sweep",
+  .synopsis = "MODEL --vary NAME=RANGE... -o FILE.csv [OPTION...]",
+  .summary = "tabulate runs for all combinations of varied parameters",
+  .any_arguments = 1, /* --merge takes several */
+  .help =
+      "Run a model for all combinations of varied parameters and initial values, and write a table with one row per "
+      "run. A sweep that was interrupted is continued by the same command. A sweep may be divided into parts, which "
+      "`pinwheel sweep --merge PART... -o FILE.csv` puts together.",
+  .options_size = sizeof (pw_sweep),
+  .function = sweep_command,
+  .options = sweep_options,
+};
+
+/* Computes the missing rows of a sweep in several threads.
+ *
+ * Rows with the same parameters follow each other and share a compiled system; systems of the same structure share
+ * specialised code. */
+
+/* A compiled system, shared by rows with the same parameters. */
+typedef struct {
+  long parameters;            /* pw_grid_parameter_index of these rows */
+  int users;                  /* number of runs that use it, and one more while it is the latest system */
+  int ready;                  /* 0: a thread is compiling it */
+  pw_cli_model model;         /* model.file is NULL */
+  int *state;                 /* index of the state in each column of the table; -1: the system does not have it */
+  const pw_specialised *code; /* NULL: the general engine */
+  pw_error error;             /* why it could not be compiled */
+} row_system;
+
+/* Specialised code of systems whose structure differs from that of the plan's engine. */
+typedef struct row_code {
+  char *text;          /* in C */
+  int ready;           /* 0: a thread is compiling it */
+  pw_scene_code *code; /* NULL: it could not be compiled */
+  struct row_code *next;
+} row_code;
+
+typedef struct {
+  const pw_plan *plan;
+  int jobs; /* threads */
+  /* accessed by the thread that holds the lock */
+  pthread_mutex_t lock;
+  pthread_cond_t compiled;
+  row_system *latest;
+  row_code *codes;
+  long next;             /* number of rows of the whole grid taken so far, in the order of pw_grid_scheduled_row */
+  long missing_at_start; /* number of rows to compute */
+  pw_journal *journal;
+  pw_progress progress;
+  pw_error *error;
+  long opened_runs;
+  long changed_runs;     /* those whose given initial values the constraints have changed */
+  double largest_change; /* pw_cli_largest_change */
+  char largest_change_text[PW_CHANGE_TEXT];
+} sweep_rows;
+
+/* A row that is being computed. */
+typedef struct {
+  long number;        /* in the grid */
+  row_system *system; /* NULL: no row */
+  pw_run *run;        /* NULL: it could not be opened */
+  pw_limit limit;
+  int status; /* other than PW_OK: the run has ended */
+  pw_error error;
+} sweep_row;
+
+/* ---- Specialised code ---- */
+
+/* The code of a text, compiled by the first thread that needs it; `sweep` owns the text from now on.  The caller
+ * holds the lock, which is released meanwhile. */
+static const pw_specialised *rows_compile (sweep_rows *sweep, char *text, const pw_system *system, pw_error *error) {
+  row_code *entry = sweep->codes;
+  while (entry && strcmp (entry->text, text) != 0) entry = entry->next;
+  if (entry) {
+    free (text);
+    while (!entry->ready) pthread_cond_wait (&sweep->compiled, &sweep->lock);
+    return pw_scene_code_table (entry->code);
+  }
+  if ((entry = malloc (sizeof *entry)) == NULL) {
+    free (text);
+    return pw_fail (error, PW_RESOURCE, "out of memory"), NULL;
+  }
+  *entry = (row_code){ .text = text, .next = sweep->codes };
+  sweep->codes = entry;
+  pthread_mutex_unlock (&sweep->lock);
+  entry->code = pw_scene_code_open (text, system, error);
+  pthread_mutex_lock (&sweep->lock);
+  entry->ready = 1;
+  pthread_cond_broadcast (&sweep->compiled);
+  return pw_scene_code_table (entry->code);
+}
+
+/* Chooses the code of a new system, independently of the order of runs: that of the plan's engine if it fits, else code
+ * generated for this system. */
+static void rows_specialise (sweep_rows *sweep, row_system *system) {
+  const pw_specialised *plan_code = pw_scene_code_table (sweep->plan->engine.code);
+  pw_error code_error = { 0 };
+  if (plan_code == NULL) return;
+  if (pw_specialised_fits (plan_code, system->model.system)) {
+    system->code = plan_code;
+    return;
+  }
+  char *text = pw_cli_source (system->model.system, NULL);
+  if (text == NULL) return;
+  pthread_mutex_lock (&sweep->lock);
+  system->code = rows_compile (sweep, text, system->model.system, &code_error);
+  pthread_mutex_unlock (&sweep->lock);
+  if (code_error.status != PW_OK && pw_stop == 0) pw_cli_say ("pinwheel: general engine: %s\n", code_error.text);
+  if (system->code == NULL && pw_stop) system->error.status = PW_RETRY; /* Ctrl-C ends the compiler, too */
+}
+
+/* ---- Compiled systems ---- */
+
+/* Compiles the system of a row, and finds the states of the table in it. */
+static int system_open (row_system *system, const pw_plan *plan, long row, pw_error *error) {
+  char name[PW_NAME_BYTES];
+  if (pw_plan_compile (plan, row, &system->model, error) != PW_OK) return error->status;
+  system->state = malloc ((size_t)plan->columns * sizeof *system->state);
+  if (system->state == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  for (int i = 0; i < plan->columns; i++) system->state[i] = -1;
+  for (int i = 0; i < 2 * pw_system_coordinates (system->model.system); i++) {
+    int column = pw_names_find (&plan->column_of, pw_system_state_name (system->model.system, i, name, sizeof name));
+    if (column < 0)
+      return pw_fail (error, PW_INPUT,
+                      "%s has no column: not in the first or last row, nor in the first with one count changed", name);
+    system->state[column] = i;
+  }
+  return PW_OK;
+}
+
+/* Ends the use of a system; the last user frees it.  The caller holds the lock. */
+static void system_release (row_system *system) {
+  if (system == NULL || --system->users > 0) return;
+  pw_cli_close_model (&system->model);
+  free (system->state);
+  free (system);
+}
+
+/* The system of a row: the latest one if it has the same parameters, else a new one.  The caller holds the lock, which
+ * is released meanwhile.  NULL if out of memory. */
+static row_system *system_of (sweep_rows *sweep, long row) {
+  long parameters = pw_grid_parameter_index (&sweep->plan->grid, row);
+  row_system *system = sweep->latest;
+  if (system && system->parameters == parameters) {
+    system->users++;
+    while (!system->ready) pthread_cond_wait (&sweep->compiled, &sweep->lock);
+    return system;
+  }
+  if ((system = malloc (sizeof *system)) == NULL) return NULL;
+  *system = (row_system){ .parameters = parameters, .users = 2 };
+  system_release (sweep->latest);
+  sweep->latest = system;
+  pthread_mutex_unlock (&sweep->lock);
+  if (system_open (system, sweep->plan, row, &system->error) == PW_OK) rows_specialise (sweep, system);
+  pthread_mutex_lock (&sweep->lock);
+  system->ready = 1;
+  pthread_cond_broadcast (&sweep->compiled);
+  return system;
+}
+
+/* ---- One run ---- */
+
+/* The initial values that the grid varies, malloced, and their number. */
+static pw_initial_value *row_initial (const pw_plan *plan, const sweep_row *row, int *count) {
+  pw_initial_value *initial = malloc (((size_t)plan->grid.axes + 1) * sizeof *initial);
+  *count = 0;
+  for (int i = 0; initial && i < plan->grid.axes; i++)
+    if (plan->grid.axis[i].parameter == NULL)
+      initial[(*count)++] =
+          (pw_initial_value){ pw_system_find_state (row->system->model.system, plan->grid.axis[i].name, NULL),
+                              pw_grid_value (&plan->grid, i, row->number) };
+  return initial;
+}
+
+static void row_open (sweep_row *row, const pw_plan *plan) {
+  row->run = NULL;
+  row->error = row->system->error;
+  row->status = row->error.status;
+  if (row->status != PW_OK) return;
+  row->limit = plan->limit;
+  pw_settings settings = plan->settings;
+  settings.stop_context = &row->limit;
+  settings.specialised = row->system->code;
+  pw_initial_value *initial = row_initial (plan, row, &settings.initials);
+  settings.initial = initial;
+  pw_limit_start (&row->limit);
+  if (initial)
+    row->run = pw_limit_open (row->system->model.system, plan->method, &settings, &row->error);
+  else
+    pw_fail (&row->error, PW_RESOURCE, "out of memory");
+  row->status = row->error.status;
+  free (initial);
+}
+
+static int row_ended (const sweep_row *row, const pw_plan *plan) {
+  return row->status != PW_OK || !(pw_run_time (row->run) < plan->t_end);
+}
+
+/* Closes the run and appends the cells of its row, without the end of the line, even if the run failed; returns its
+ * status.  No cells are written if this is PW_RETRY, after a request to stop, or PW_RESOURCE. */
+static int row_close (sweep_row *row, const pw_plan *plan, pw_text *text) {
+  pw_sample sample, *last = NULL;
+  pw_error sample_error = { 0 };
+  if (row->status == PW_STOPPED) row->status = pw_limit_status (&row->limit, pw_run_time (row->run), &row->error);
+  if (row->run && pw_run_sample (row->run, pw_run_time (row->run), &sample, &sample_error) == PW_OK) last = &sample;
+  if (row->status == PW_OK && last == NULL) row->status = sample_error.status, row->error = sample_error;
+  /* PW_RETRY, from a method, without a request to stop */
+  if (row->status > 0 && pw_stop == 0) row->status = pw_fail (&row->error, PW_METHOD, "the method gave up");
+  if (row->status != PW_RETRY && row->status != PW_RESOURCE) {
+    pw_plan_row shown = { row->number, row->status, row->error.text, row->run, .last = last };
+    if (plan->with_cpu && row->run) shown.cpu = pw_seconds (CLOCK_THREAD_CPUTIME_ID) - row->limit.start;
+    if (last) shown.coordinates = pw_system_coordinates (row->system->model.system), shown.state = row->system->state;
+    pw_plan_cells (plan, &shown, text);
+  }
+  pw_run_close (row->run);
+  if (!text->failed) return row->status;
+  row->error = (pw_error){ 0 };
+  return pw_fail (&row->error, PW_RESOURCE, "out of memory");
+}
+
+/* ---- Rows; the caller holds the lock ---- */
+
+/* Adds a row to the journal, or keeps the first error, which stops all threads. */
+static void rows_store (sweep_rows *sweep, const sweep_row *row, int status, const pw_text *text) {
+  if (status == PW_RETRY || sweep->error->status != PW_OK) return;
+  if (status == PW_RESOURCE)
+    pw_fail (sweep->error, PW_RESOURCE, "row %ld of the grid: %s", row->number + 1, row->error.text);
+  else if (pw_journal_add (sweep->journal, sweep->plan, row->number, -status, text->chars, sweep->error) == PW_OK)
+    pw_progress_at (&sweep->progress, (double)sweep->journal->done);
+  if (sweep->error->status != PW_OK) pw_stop = 1;
+}
+
+/* The next missing row of the part; -1 if there is none, or after a request to stop. */
+static long rows_next (sweep_rows *sweep) {
+  const pw_plan *plan = sweep->plan;
+  while (pw_stop == 0 && sweep->next < plan->grid.rows) {
+    long number = pw_grid_scheduled_row (&plan->grid, sweep->next++);
+    if (number % plan->parts == plan->part - 1 && sweep->journal->offset[number / plan->parts] == 0) return number;
+  }
+  return -1;
+}
+
+/* Counts a run that was opened; keeps the largest change of given initial values by the constraints. */
+static void rows_count_change (sweep_rows *sweep, double change, const char *text) {
+  sweep->opened_runs++;
+  sweep->changed_runs += change > 0;
+  if (!(change > sweep->largest_change)) return;
+  sweep->largest_change = change;
+  memcpy (sweep->largest_change_text, text, sizeof sweep->largest_change_text);
+}
+
+/* ---- Threads ---- */
+
+/* A thread and the rows that it computes at once.  With more than one there are neither --cpu nor --limit: both refer
+ * to the processor time of the thread. */
+typedef struct {
+  sweep_rows *sweep;
+  const pw_specialised_lanes *lanes_code; /* NULL: none */
+  void *lanes_memory;
+  int width; /* number of rows: at most that of lanes; 1 without lanes_code */
+  sweep_row row[PW_LANES_MOST];
+  pw_text text; /* cells of a row */
+} sweep_worker;
+
+/* Opens the run of the next row; 0 if there is none.  The caller holds the lock, which is released meanwhile. */
+static int worker_begin (sweep_rows *sweep, sweep_row *row) {
+  char text[PW_CHANGE_TEXT];
+  long number = rows_next (sweep);
+  if (number < 0) return 0;
+  *row = (sweep_row){ .number = number, .system = system_of (sweep, number) };
+  if (row->system == NULL) {
+    rows_store (sweep, row, pw_fail (&row->error, PW_RESOURCE, "out of memory"), NULL);
+    return 0;
+  }
+  pthread_mutex_unlock (&sweep->lock);
+  row_open (row, sweep->plan);
+  double change = row->run ? pw_cli_largest_change (row->run, row->system->model.system, text) : 0;
+  pthread_mutex_lock (&sweep->lock);
+  if (row->run) rows_count_change (sweep, change, text);
+  return 1;
+}
+
+/* Stores a row whose run has ended.  The caller holds the lock, which is released meanwhile. */
+static void worker_end (sweep_worker *worker, sweep_row *row) {
+  sweep_rows *sweep = worker->sweep;
+  pthread_mutex_unlock (&sweep->lock);
+  pw_text_clear (&worker->text);
+  int status = row_close (row, sweep->plan, &worker->text);
+  pthread_mutex_lock (&sweep->lock);
+  rows_store (sweep, row, status, &worker->text);
+  system_release (row->system);
+  row->system = NULL;
+}
+
+/* Advances the runs until one of them ends: in lanes if all use the code of the plan's engine, else one after the
+ * other. */
+static void worker_advance (sweep_worker *worker) {
+  const pw_plan *plan = worker->sweep->plan;
+  sweep_row *running[PW_LANES_MOST];
+  pw_run *run[PW_LANES_MOST];
+  int status[PW_LANES_MOST], n = 0, same_code = 1, ended = 0;
+  pw_error error[PW_LANES_MOST];
+  for (sweep_row *row = worker->row; row < worker->row + worker->width; row++) {
+    if (row->system == NULL) continue;
+    if (row_ended (row, plan)) return; /* it could not be opened, and is stored first */
+    same_code &= row->system->code == pw_scene_code_table (plan->engine.code);
+    running[n] = row, error[n] = (pw_error){ 0 }, run[n++] = row->run;
+  }
+  while (!ended) {
+    pw_runs_advance (run, n, plan->t_end, same_code ? worker->lanes_code : NULL, worker->lanes_memory, status, error);
+    for (int i = 0; i < n; i++) ended |= status[i] != PW_OK || !(pw_run_time (run[i]) < plan->t_end);
+  }
+  for (int i = 0; i < n; i++) running[i]->status = status[i], running[i]->error = error[i];
+}
+
+/* Computes rows until there are none. */
+static int worker_thread (void *context, int i, pw_error *error) {
+  sweep_rows *sweep = context;
+  sweep_worker worker = { .sweep = sweep, .lanes_code = pw_scene_code_lanes (sweep->plan->lanes_code), .width = 1 };
+  (void)i, (void)error;
+  if (worker.lanes_code && (worker.lanes_memory = pw_specialised_lanes_memory (worker.lanes_code)) != NULL)
+    worker.width = pw_specialised_lanes_count (worker.lanes_code);
+  pthread_mutex_lock (&sweep->lock);
+  while (worker.width > 1 && sweep->missing_at_start < (long)worker.width * sweep->jobs)
+    worker.width--; /* all threads are to have rows */
+  int rows;
+  do {
+    rows = 0;
+    for (int k = 0; k < worker.width; k++) rows += worker.row[k].system != NULL || worker_begin (sweep, &worker.row[k]);
+    pthread_mutex_unlock (&sweep->lock);
+    if (rows) worker_advance (&worker);
+    pthread_mutex_lock (&sweep->lock);
+    for (int k = 0; k < worker.width; k++)
+      if (worker.row[k].system && row_ended (&worker.row[k], sweep->plan)) worker_end (&worker, &worker.row[k]);
+  } while (rows > 0);
+  pthread_mutex_unlock (&sweep->lock);
+  pw_text_free (&worker.text);
+  free (worker.lanes_memory);
+  return PW_OK;
+}
+
+static void rows_close (sweep_rows *sweep) {
+  for (row_code *entry = sweep->codes, *next; entry; entry = next) {
+    next = entry->next;
+    pw_scene_code_close (entry->code);
+    free (entry->text);
+    free (entry);
+  }
+  system_release (sweep->latest);
+  pthread_cond_destroy (&sweep->compiled);
+  pthread_mutex_destroy (&sweep->lock);
+}
+
+int pw_sweep_rows (const pw_plan *plan, pw_journal *journal, int jobs, pw_error *error) {
+  const long left = journal->rows - journal->done;
+  sweep_rows sweep = {
+    .plan = plan, .journal = journal, .missing_at_start = left, .jobs = jobs < left ? jobs : (int)left, .error = error
+  };
+  pthread_mutex_init (&sweep.lock, NULL);
+  pthread_cond_init (&sweep.compiled, NULL);
+  pw_stop_catch ();
+  pw_progress_start (&sweep.progress, pw_file_name (plan->file), "runs", (double)journal->done, (double)journal->rows);
+  pw_parallel (sweep.jobs, sweep.jobs, worker_thread, &sweep, error);
+  pw_progress_end (&sweep.progress);
+  pw_stop_release (); /* the rest can be interrupted and repeated */
+  if (error->status == PW_OK && sweep.changed_runs)
+    pw_cli_say (
+        "pinwheel: in %ld of %ld runs given initial values were changed to satisfy the constraints, at worst %s\n",
+        sweep.changed_runs, sweep.opened_runs, sweep.largest_change_text);
+  rows_close (&sweep);
+  return error->status;
+}

@@ -1,0 +1,606 @@
+/* Makes the plan of a sweep: finds the parameters that are varied, the columns of the table and the fingerprint. */
+#define _GNU_SOURCE /* asprintf */
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include "cli.h"
+#include "sweep.h"
+
+enum { PLAN_TRIES = 1000 }; /* failures to build a model after which no other values are tried */
+
+/* ---- Models ---- */
+
+/* Builds the model of a row: --set, varied parameters, --start.  Varied initial values are set when its run begins. */
+static int plan_build (const pw_plan *plan, long row, pw_model *model, pw_error *error) {
+  int status = pw_cli_apply (model, "--set", plan->line->sets, pw_model_set, error);
+  for (int i = 0; i < plan->grid.axes && status == PW_OK; i++)
+    if (plan->grid.axis[i].parameter)
+      status = pw_model_set (model, plan->grid.axis[i].name, pw_grid_value (&plan->grid, i, row), error);
+  if (status == PW_OK) status = pw_cli_apply (model, "--start", plan->line->starts, pw_model_set_initial, error);
+  return status == PW_OK ? pw_model_build (model, error) : status;
+}
+
+int pw_plan_compile (const pw_plan *plan, long row, pw_cli_model *compiled, pw_error *error) {
+  *compiled = (pw_cli_model){ .model = pw_file_model (plan->file, error) };
+  if (compiled->model && plan_build (plan, row, compiled->model, error) == PW_OK)
+    compiled->system = pw_system_compile (compiled->model, error);
+  if (compiled->system == NULL) return error->status;
+  for (const pw_axis *axis = plan->grid.axis; axis < plan->grid.axis + plan->grid.axes; axis++)
+    if (axis->parameter == NULL && pw_system_find_state (compiled->system, axis->name, error) < 0) return PW_INPUT;
+  return PW_OK;
+}
+
+/* ---- Axes ---- */
+
+/* 1 if a list of "NAME=VALUE", which ends with NULL or is NULL, has this name. */
+static int plan_has_name (const char **list, const char *name) {
+  size_t n = strlen (name);
+  for (; list && *list; list++)
+    if (strncmp (*list, name, n) == 0 && (*list)[n] == '=') return 1;
+  return 0;
+}
+
+/* Finds the parameter of an axis, in whose domain all values must lie.  Other names with a dot are those of states,
+ * which exist only in a compiled model. */
+static int plan_match_axis (const pw_plan *plan, pw_axis *axis, pw_model *model, pw_error *error) {
+  const pw_parameter *parameter = axis->parameter = pw_cli_parameter (model, axis->name);
+  if (parameter) axis->unit = parameter->unit;
+  if (plan_has_name (parameter ? plan->line->sets : plan->line->starts, axis->name))
+    return pw_fail (error, PW_INPUT, "%s is given by --vary and by %s", axis->name, parameter ? "--set" : "--start");
+  if (parameter == NULL && strchr (axis->name, '.')) return PW_OK;
+  for (long i = 0; i < axis->count; i++)
+    if (parameter == NULL || *pw_domain_check (parameter->domain, pw_axis_value (axis, i)))
+      return pw_model_set (model, axis->name, pw_axis_value (axis, i), error); /* fails with the reason */
+  return PW_OK;
+}
+
+/* ---- Columns ---- */
+
+/* The index of the i-th state in the order of the table: positions and velocities of each body, then each internal
+ * coordinate and its velocity.  In a system all coordinates come before all velocities. */
+static int plan_table_state (const pw_system *system, int i) {
+  int n = pw_system_coordinates (system), bodies = pw_system_bodies (system), internal = i - 6 * bodies;
+  if (internal >= 0) return 3 * bodies + internal / 2 + (internal % 2 ? n : 0);
+  return 3 * (i / 6) + i % 3 + (i % 6 < 3 ? 0 : n);
+}
+
+/* Makes room for a column; a larger hash table of names is filled anew. */
+static int plan_reserve_column (pw_plan *plan) {
+  if ((size_t)plan->columns < plan->column_room) return PW_OK;
+  if (pw_grow (&plan->column, (size_t)plan->columns, &plan->column_room, sizeof *plan->column) != PW_OK)
+    return PW_RESOURCE;
+  pw_names_close (&plan->column_of);
+  if (pw_names_open (&plan->column_of, plan->column_room) != PW_OK) return PW_RESOURCE;
+  for (int i = 0; i < plan->columns; i++) pw_names_add (&plan->column_of, plan->column[i].name, i);
+  return PW_OK;
+}
+
+/* Adds the new states of a system, and the units of varied initial values. */
+static int plan_add_columns (pw_plan *plan, const pw_system *system, pw_error *error) {
+  for (int i = 0; i < 2 * pw_system_coordinates (system); i++) {
+    int state = plan_table_state (system, i);
+    const char *name = PW_NAME (pw_system_state_name, system, state);
+    if (plan->column_room && pw_names_find (&plan->column_of, name) >= 0) continue;
+    const char *copy = pw_arena_copy (&plan->arena, name);
+    if (copy == NULL || plan_reserve_column (plan) != PW_OK) return pw_fail (error, PW_RESOURCE, "out of memory");
+    plan->column[plan->columns] = (struct pw_column){ copy, pw_system_state_unit (system, state) };
+    pw_names_add (&plan->column_of, copy, plan->columns++);
+  }
+  for (pw_axis *axis = plan->grid.axis; axis < plan->grid.axis + plan->grid.axes; axis++)
+    if (axis->parameter == NULL)
+      axis->unit = pw_system_state_unit (system, pw_system_find_state (system, axis->name, error));
+  return PW_OK;
+}
+
+/* Models built to find the columns. */
+typedef struct {
+  int built;            /* 1: at least one */
+  int complete;         /* 1: at least one has all states that are varied */
+  int failed;           /* number of the others */
+  pw_error first_error; /* why the first of these failed */
+} plan_scan;
+
+/* Chooses what evaluates the equations, of one run and of several at once: the same in all parts of a sweep, since
+ * results of different codes differ by round-off. */
+static void plan_open_engines (pw_plan *plan, const pw_system *system) {
+  pw_run_defaults defaults = pw_cli_defaults (pw_file_table (plan->file));
+  double steps = (double)plan->grid.rows * pw_method_steps (plan->method, &plan->settings, defaults.step, plan->t_end);
+  pw_cli_report_tables (system, plan->t_end);
+  pw_cli_engine_open (&plan->engine, system, plan->specialise, steps);
+  const char *reason = plan->with_cpu                   ? "--cpu measures each run"
+                       : isfinite (plan->limit.seconds) ? "--limit stops each run by itself"
+                                                        : NULL;
+  if (reason == NULL) plan->lanes_code = pw_cli_engine_lanes (&plan->engine, system, plan->method, plan->lanes, steps);
+  if (reason && plan->lanes > 1) pw_cli_say ("pinwheel: one run after the other: %s\n", reason);
+}
+
+static int plan_scan_row (pw_plan *plan, long row, plan_scan *scan, pw_error *error) {
+  pw_cli_model compiled;
+  pw_error row_error = { 0 };
+  int status = pw_plan_compile (plan, row, &compiled, &row_error);
+  if (status == PW_OK) plan->tables_sum = pw_fingerprint_tables (plan->tables_sum, compiled.model);
+  if (status == PW_OK) status = plan_add_columns (plan, compiled.system, &row_error);
+  if (status == PW_OK && !scan->complete) plan_open_engines (plan, compiled.system);
+  scan->built |= compiled.system != NULL;
+  pw_cli_close_model (&compiled);
+  if (status == PW_RESOURCE) return pw_fail (error, status, "%s", row_error.text);
+  scan->complete |= status == PW_OK;
+  if (status != PW_OK && scan->failed++ == 0) scan->first_error = row_error;
+  return PW_OK;
+}
+
+/* The bodies, and so the states, may depend on integer parameters: models are built for the first row, for each value
+ * of an integer with all else as in the first row, and for the last row.  Values of other axes are tried in the same
+ * way until a model can be built; without integers the last row is not tried. */
+static int plan_find_columns (pw_plan *plan, pw_error *error) {
+  plan_scan scan = { .built = 0 };
+  int any_integer = 0, status = plan_scan_row (plan, 0, &scan, error);
+  for (const pw_axis *axis = plan->grid.axis; axis < plan->grid.axis + plan->grid.axes; axis++) {
+    int integer = axis->parameter && axis->parameter->domain == PW_COUNT;
+    any_integer |= integer;
+    for (long i = 1; i < axis->count && (integer || !scan.built) && scan.failed < PLAN_TRIES && status == PW_OK; i++)
+      status = plan_scan_row (plan, i * axis->stride, &scan, error);
+  }
+  if (status == PW_OK && any_integer) status = plan_scan_row (plan, plan->grid.rows - 1, &scan, error);
+  if (status != PW_OK || scan.complete) return status;
+  return pw_fail (error, scan.first_error.status, "%s", scan.first_error.text);
+}
+
+/* ---- Cells ---- */
+
+/* A cell of a row or, if that is NULL, of the heading, which alone uses name and unit. */
+static void plan_cell (const pw_plan_row *row, pw_text *text, const char *name, const char *unit, double value) {
+  row ? pw_text_number (text, value) : pw_text_name (text, name, unit);
+}
+
+void pw_plan_cells (const pw_plan *plan, const pw_plan_row *row, pw_text *text) {
+  const pw_run *run = row ? row->run : NULL;
+  const pw_sample *last = row ? row->last : NULL;
+  const pw_statistics *statistics = run ? pw_run_statistics (run) : NULL;
+  for (int i = 0; i < plan->grid.axes; i++) {
+    const pw_axis *axis = &plan->grid.axis[i];
+    const char *name = row ? NULL : PW_PRINTED (300, "%s%s", axis->parameter ? "" : "start.", axis->name);
+    plan_cell (row, text, name, axis->unit, row ? pw_grid_value (&plan->grid, i, row->number) : 0);
+  }
+  pw_text_cell (text, row ? pw_cli_status_word (row->status) : "status");
+  plan_cell (row, text, "t", "s", run ? pw_run_time (run) : NAN);
+  for (int i = 0; i < plan->columns; i++) {
+    int state = last ? row->state[i] : -1, n = last ? row->coordinates : 0;
+    plan_cell (row, text, plan->column[i].name, plan->column[i].unit,
+               state < 0   ? NAN
+               : state < n ? last->q[state]
+                           : last->v[state - n]);
+  }
+  plan_cell (row, text, "kinetic", "J", last ? last->kinetic : NAN);
+  plan_cell (row, text, "residual.position", NULL, run ? statistics->position : NAN);
+  plan_cell (row, text, "residual.velocity", NULL, run ? statistics->velocity : NAN);
+  plan_cell (row, text, "steps", NULL, run ? (double)statistics->steps : NAN);
+  plan_cell (row, text, "rhs", NULL, run ? (double)statistics->rhs : NAN);
+  if (plan->with_cpu) plan_cell (row, text, "cpu", "s", row ? row->cpu : 0);
+  row ? pw_text_quoted (text, row->reason) : pw_text_cell (text, "reason");
+}
+
+/* ---- The fingerprint ---- */
+
+/* The values of parameters that are not varied: the model's or those of --set. */
+static void plan_fingerprint_parameters (pw_plan *plan, const pw_model *model) {
+  for (const pw_parameter *parameter = pw_model_table (model)->parameters; parameter && parameter->name; parameter++) {
+    int is_varied = 0;
+    for (int i = 0; i < plan->grid.axes; i++) is_varied |= plan->grid.axis[i].parameter == parameter;
+    if (!is_varied)
+      pw_fingerprint_number (&plan->fingerprint, "parameter", parameter->name, pw_model_parameter (model, parameter));
+  }
+}
+
+static void plan_fingerprint_grid (pw_plan *plan) {
+  pw_text *text = &plan->fingerprint;
+  pw_fingerprint_initial (text, plan->line->starts);
+  pw_text order = { .chars = NULL }; /* of the axes, which determines the order of the rows */
+  for (int i = 0; i < plan->grid.axes; i++) {
+    pw_fingerprint_line (text, "vary", plan->grid.axis[i].name, plan->grid.axis[i].range);
+    pw_text_cell (&order, plan->grid.axis[i].name);
+  }
+  text->failed |= order.failed;
+  pw_fingerprint_line (text, "order", NULL, order.chars ? order.chars : "");
+  pw_text_free (&order);
+}
+
+static int plan_fingerprint (pw_plan *plan, const pw_model *model, pw_error *error) {
+  pw_text *text = &plan->fingerprint;
+  if (pw_fingerprint_run (text, PW_SWEEP_MAGIC, plan->file, plan->tables_sum, plan->method, &plan->settings, error) !=
+      PW_OK)
+    return error->status;
+  if (plan->settings.max_steps != PW_MAX_STEPS)
+    pw_fingerprint_number (text, "max-steps", NULL, (double)plan->settings.max_steps);
+  if (isfinite (plan->limit.seconds)) pw_fingerprint_number (text, "limit", NULL, plan->limit.seconds);
+  if (plan->engine.code) pw_fingerprint_line (text, "engine", NULL, "specialised");
+  plan_fingerprint_parameters (plan, model);
+  plan_fingerprint_grid (plan);
+  pw_fingerprint_number (text, "rows", NULL, (double)plan->grid.rows);
+  pw_fingerprint_line (text, "columns", NULL, plan->heading.chars ? plan->heading.chars : "");
+  pw_fingerprint_line (text, "part", NULL, PW_PRINTED (60, "%d/%d", plan->part, plan->parts));
+  pw_text_add (text, "end\n");
+  if (text->failed || plan->heading.failed) return pw_fail (error, PW_RESOURCE, "out of memory");
+  return PW_OK;
+}
+
+/* ---- The plan ---- */
+
+int pw_plan_open (pw_plan *plan, const char **ranges, pw_error *error) {
+  const pw_method *method;
+  int stabilisation, status = pw_method_parse (plan->method, &method, &stabilisation, error);
+  if (status == PW_OK) status = pw_grid_read (&plan->grid, (const char *const *)ranges, &plan->arena, error);
+  if (status != PW_OK) return status;
+  pw_model *model = pw_file_model (plan->file, error);
+  if (model == NULL) return error->status;
+  status = pw_cli_apply (model, "--set", plan->line->sets, pw_model_set, error);
+  for (int i = 0; i < plan->grid.axes && status == PW_OK; i++)
+    status = plan_match_axis (plan, plan->grid.axis + i, model, error);
+  if (status == PW_OK) status = plan_find_columns (plan, error);
+  if (status == PW_OK) pw_plan_cells (plan, NULL, &plan->heading);
+  if (status == PW_OK) status = plan_fingerprint (plan, model, error);
+  pw_model_free (model);
+  return status;
+}
+
+void pw_plan_close (pw_plan *plan) {
+  pw_cli_engine_close (&plan->engine);
+  pw_scene_code_close (plan->lanes_code);
+  pw_names_close (&plan->column_of);
+  pw_arena_free (&plan->arena);
+  pw_text_free (&plan->heading);
+  pw_text_free (&plan->fingerprint);
+  free (plan->column);
+}
+
+/* Journals and parts of a sweep, and the table made of them.
+ *
+ * A journal has rows in the order of completion, each appended by one write.  If the program is killed, the fingerprint
+ * and complete lines remain, and perhaps an incomplete line.  The next start removes the first line that is incomplete
+ * or damaged, and all after it, whose rows are computed again.  A lock excludes other processes; it ends with the
+ * process.  The table is written under another name in the order of the grid and renamed, then the journal is removed:
+ * if the program is killed in between, the same command finds the journal complete and writes the same bytes again.
+ * The file of a part, which is written like a table, has the fingerprint and the lines of its journal in the order of
+ * the grid.
+ *
+ *     pinwheel sweep 1              the fingerprint: lines "KEY = VALUE"
+ *     ...
+ *     part = 2/4
+ *     end
+ *     17 0 83c1f0a2 1.5,0.05,ok,... a row's number, its run's exit status, a checksum, its line of the table */
+
+typedef struct {
+  long row;         /* its number in the grid */
+  int status;       /* exit status of the run */
+  const char *text; /* the table's line, which ends with a newline */
+  size_t text_size; /* bytes of that line, the newline included */
+  size_t line_size; /* bytes of the journal's line, the newline included */
+} journal_line;
+
+/* A file in memory, read only, and not ended by 0. */
+typedef struct {
+  char *begin, *end;
+} journal_map;
+
+/* ---- Lines ---- */
+
+/* FNV-1a (Fowler, Noll, Vo) of a row's number, status and text. */
+static uint32_t journal_line_checksum (long row, int status, const char *text, size_t size) {
+  uint32_t h = 2166136261u;
+  for (int i = 0; i < 32; i += 8) h = (h ^ (((uint32_t)row >> i) & 255)) * 16777619u;
+  h = (h ^ (uint32_t)status) * 16777619u;
+  for (size_t i = 0; i < size; i++) h = (h ^ (unsigned char)text[i]) * 16777619u;
+  return h;
+}
+
+static void journal_line_format (pw_text *line, long row, int status, const char *text) {
+  size_t size = strlen (text);
+  pw_text_add (line, PW_PRINTED (60, "%ld %d %08lx ", row, status,
+                                 (unsigned long)journal_line_checksum (row, status, text, size)));
+  pw_text_add_bytes (line, text, size);
+  pw_text_add (line, "\n");
+}
+
+/* Reads the line that begins here; 0 if it is incomplete or damaged. */
+static int journal_line_read (const char *begin, const char *end, journal_line *line) {
+  const char *newline = begin < end ? memchr (begin, '\n', (size_t)(end - begin)) : NULL;
+  char front[40]; /* up to the line of the table */
+  int n = 0;
+  unsigned long checksum;
+  if (newline == NULL) return 0;
+  snprintf (front, sizeof front, "%.*s", (int)(newline - begin < 39 ? newline - begin : 39), begin);
+  if (sscanf (front, "%10ld %1d %8lx %n", &line->row, &line->status, &checksum, &n) != 3 || n == 0) return 0;
+  line->text = begin + n;
+  line->text_size = (size_t)(newline + 1 - line->text);
+  line->line_size = (size_t)(newline + 1 - begin);
+  return line->row >= 0 && line->status >= 0 && line->status <= 4 &&
+         journal_line_checksum (line->row, line->status, line->text, line->text_size - 1) == (uint32_t)checksum;
+}
+
+static int journal_map_open (journal_map *map, int descriptor) {
+  struct stat info;
+  map->begin = map->end = "";
+  if (fstat (descriptor, &info) != 0) return PW_RESOURCE;
+  if (info.st_size == 0) return PW_OK;
+  void *bytes = mmap (NULL, (size_t)info.st_size, PROT_READ, MAP_PRIVATE, descriptor, 0);
+  if (bytes == MAP_FAILED) return PW_RESOURCE;
+  map->begin = bytes;
+  map->end = map->begin + info.st_size;
+  return PW_OK;
+}
+
+static void journal_map_close (journal_map *map) {
+  if (map->end > map->begin) munmap (map->begin, (size_t)(map->end - map->begin));
+  *map = (journal_map){ NULL, NULL };
+}
+
+/* ---- The journal ---- */
+
+/* Appends a text to the journal, all or nothing. */
+static int journal_write (pw_journal *journal, const char *text, size_t size, pw_error *error) {
+  size_t done = 0;
+  while (done < size) {
+    ssize_t n = pwrite (journal->descriptor, text + done, size - done, journal->size + (off_t)done);
+    if (n <= 0) {
+      const char *why = n < 0 ? strerror (errno) : "nothing was written";
+      int removed = done == 0 || ftruncate (journal->descriptor, journal->size) == 0;
+      (void)removed; /* if not, the next start removes the incomplete line */
+      return pw_fail (error, PW_RESOURCE, "cannot write %s: %s; the same command will continue after its %ld rows",
+                      journal->path, why, journal->done);
+    }
+    done += (size_t)n;
+  }
+  journal->size += (off_t)size;
+  return PW_OK;
+}
+
+/* Stores the offset of each row; stops at a line that is incomplete, damaged, a duplicate or of another part. */
+static void journal_read_rows (pw_journal *journal, const pw_plan *plan, const journal_map *map, const char *at) {
+  journal_line line;
+  for (; journal_line_read (at, map->end, &line); at += line.line_size) {
+    long k = line.row / plan->parts;
+    if (line.row % plan->parts != plan->part - 1 || k >= journal->rows || journal->offset[k] != 0) break;
+    journal->offset[k] = (off_t)(at - map->begin);
+    journal->done++;
+  }
+  journal->size = (off_t)(at - map->begin);
+}
+
+/* Verifies that the journal is one of this sweep, and reads its rows; journal->size is where the next row goes. */
+static int journal_read (pw_journal *journal, const pw_plan *plan, const journal_map *map, pw_error *error) {
+  char difference[400];
+  size_t size = (size_t)(map->end - map->begin), magic_size = strlen (PW_SWEEP_MAGIC);
+  const char *rows = pw_fingerprint_end (PW_SWEEP_MAGIC, map->begin, map->end), *fingerprint = plan->fingerprint.chars;
+  journal->size = 0;
+  if (rows == NULL) { /* with an incomplete fingerprint there are no rows */
+    if (memcmp (map->begin, PW_SWEEP_MAGIC, size < magic_size ? size : magic_size) == 0) return PW_OK;
+    return pw_fail (error, PW_INPUT, "%s exists and is not the journal of a sweep: remove it if it is not needed",
+                    journal->path);
+  }
+  const pw_fingerprint there = { map->begin, rows, "there" };
+  const pw_fingerprint here = { fingerprint, fingerprint + plan->fingerprint.length, "here" };
+  if (pw_fingerprint_differ (there, here, NULL, difference, sizeof difference))
+    return pw_fail (error, PW_INPUT,
+                    "%.80s belongs to another sweep: %.300s; finish that one with its own command, or remove the file",
+                    journal->path, difference);
+  journal_read_rows (journal, plan, map, rows);
+  return PW_OK;
+}
+
+static int journal_begin (pw_journal *journal, const pw_plan *plan, pw_error *error) {
+  journal_map map;
+  if (journal_map_open (&map, journal->descriptor) != PW_OK)
+    return pw_fail (error, PW_RESOURCE, "cannot read %s: %s", journal->path, strerror (errno));
+  int status = journal_read (journal, plan, &map, error);
+  off_t file_size = (off_t)(map.end - map.begin);
+  journal_map_close (&map);
+  if (status != PW_OK) return status;
+  if (file_size > journal->size && ftruncate (journal->descriptor, journal->size) != 0)
+    return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", journal->path, strerror (errno));
+  journal->begun = journal->size == 0;
+  return journal->begun ? journal_write (journal, plan->fingerprint.chars, plan->fingerprint.length, error) : PW_OK;
+}
+
+int pw_journal_open (pw_journal *journal, const pw_plan *plan, const char *path, pw_error *error) {
+  long rows = plan->grid.rows / plan->parts + (plan->grid.rows % plan->parts >= plan->part);
+  *journal = (pw_journal){ .descriptor = -1, .rows = rows };
+  journal->table_path = pw_output_path (path, error);
+  if (journal->table_path == NULL) return error->status;
+  if (asprintf (&journal->path, "%s.part", journal->table_path) < 0) journal->path = NULL;
+  journal->offset = calloc ((size_t)journal->rows + 1, sizeof *journal->offset);
+  if (journal->path == NULL || journal->offset == NULL)
+    return pw_fail (error, PW_RESOURCE, "out of memory for a sweep of %ld rows", journal->rows);
+  journal->descriptor = pw_lock_path (journal->path, error);
+  return journal->descriptor >= 0 ? journal_begin (journal, plan, error) : error->status;
+}
+
+int pw_journal_add (pw_journal *journal, const pw_plan *plan, long row, int status, const char *text, pw_error *error) {
+  off_t at = journal->size;
+  pw_text_clear (&journal->line);
+  journal_line_format (&journal->line, row, status, text);
+  if (journal->line.failed) return pw_fail (error, PW_RESOURCE, "out of memory");
+  if (journal_write (journal, journal->line.chars, journal->line.length, error) != PW_OK) return error->status;
+  journal->offset[row / plan->parts] = at;
+  journal->done++;
+  return PW_OK;
+}
+
+void pw_journal_close (pw_journal *journal) {
+  if (journal->begun && journal->done == 0 && journal->descriptor >= 0) unlink (journal->path);
+  if (journal->descriptor >= 0) close (journal->descriptor);
+  pw_text_free (&journal->line);
+  free (journal->offset);
+  free (journal->path);
+  free (journal->table_path);
+  *journal = (pw_journal){ .descriptor = -1 };
+}
+
+/* ---- The table of a journal ---- */
+
+/* The reason is the last cell and the only one in quotes, which are doubled inside. */
+static void table_reason (const journal_line *line, char *reason, size_t size) {
+  const char *c = line->text, *end = line->text + line->text_size - 2;
+  while (c < end && !(c[0] == ',' && c[1] == '"')) c++;
+  size_t n = 0;
+  for (c += 2; c < end && n + 1 < size; c++) {
+    reason[n++] = *c;
+    if (*c == '"') c++;
+  }
+  reason[n] = 0;
+}
+
+/* Reads the line of a row, and counts how its run ended; 0 if it is another line. */
+static int table_read_row (const char *at, const char *end, long row, journal_line *line, pw_tally *tally) {
+  if (!journal_line_read (at, end, line) || line->row != row) return 0;
+  tally->rows++;
+  if (line->status == 0 || tally->failed++ > 0) return 1;
+  tally->status = line->status;
+  table_reason (line, tally->reason, sizeof tally->reason);
+  return 1;
+}
+
+/* Completes the file if there is no error so far, else removes it. */
+static int table_close (pw_output *output, pw_error *error) {
+  if (error->status == PW_OK) return pw_output_finish (output, error);
+  pw_output_discard (output);
+  return error->status;
+}
+
+static int table_write (const pw_journal *journal, const pw_plan *plan, const journal_map *map, FILE *stream,
+                        pw_tally *tally, pw_error *error) {
+  int is_part = plan->parts > 1;
+  fputs (is_part ? plan->fingerprint.chars : plan->heading.chars, stream);
+  if (!is_part) putc ('\n', stream);
+  for (long k = 0; k < journal->rows; k++) {
+    const char *at = map->begin + journal->offset[k];
+    journal_line line;
+    if (!table_read_row (at, map->end, plan->part - 1 + k * plan->parts, &line, tally))
+      return pw_fail (error, PW_RESOURCE, "%s was changed by another program", journal->path);
+    fwrite (is_part ? at : line.text, 1, is_part ? line.line_size : line.text_size, stream);
+  }
+  return PW_OK;
+}
+
+int pw_sweep_finish (pw_journal *journal, const pw_plan *plan, pw_tally *tally, pw_error *error) {
+  journal_map map;
+  pw_error failure = { 0 };
+  *tally = (pw_tally){ .rows = 0 };
+  if (journal_map_open (&map, journal->descriptor) != PW_OK)
+    return pw_fail (error, PW_RESOURCE, "cannot read %s: %s", journal->path, strerror (errno));
+  pw_output *output = pw_output_open_as (journal->table_path, ".sorted", &failure);
+  if (output) table_write (journal, plan, &map, pw_output_stream (output), tally, &failure);
+  if (output) table_close (output, &failure);
+  journal_map_close (&map);
+  if (failure.status != PW_OK)
+    return pw_fail (error, failure.status, "%.300s; all rows are in %.150s, so the same command only has to sort them",
+                    failure.text, journal->path);
+  if (unlink (journal->path) == 0) return PW_OK;
+  return pw_fail (error, PW_RESOURCE, "%s is complete, but %s cannot be removed: %s", journal->table_path,
+                  journal->path, strerror (errno));
+}
+
+/* ---- The table of all parts ---- */
+
+typedef struct {
+  const char *path;
+  journal_map map;
+  const char *first_row, *next_row; /* the lines of these rows */
+  int number, parts;                /* part I of N */
+} table_part;
+
+/* Opens a part and finds its number and first row. */
+static int table_open_part (table_part *part, const char *path, pw_error *error) {
+  const char *reason;
+  char text[40] = "";
+  size_t size;
+  FILE *f = pw_open_input (path, &reason);
+  part->path = path;
+  if (f == NULL) return pw_fail (error, pw_open_input_status (), "cannot open the part %s: %s", path, reason);
+  int status = journal_map_open (&part->map, fileno (f)), why = errno;
+  fclose (f);
+  if (status != PW_OK) return pw_fail (error, PW_RESOURCE, "cannot read the part %s: %s", path, strerror (why));
+  part->first_row = part->next_row = pw_fingerprint_end (PW_SWEEP_MAGIC, part->map.begin, part->map.end);
+  const char *value = part->first_row ? pw_fingerprint_value (part->map.begin, part->first_row, "part", &size) : NULL;
+  if (value) snprintf (text, sizeof text, "%.*s", (int)(size < 39 ? size : 39), value); /* sscanf needs its end */
+  if (sscanf (text, "%9d/%9d", &part->number, &part->parts) != 2 || part->parts < 1 || part->number < 1 ||
+      part->number > part->parts)
+    return pw_fail (error, PW_INPUT, "%s is not a part of a sweep: parts are written by --part I/N", path);
+  return PW_OK;
+}
+
+static int table_by_part (const void *a, const void *b) {
+  return ((const table_part *)a)->number - ((const table_part *)b)->number;
+}
+
+/* Sorts the parts; they must be all those of one sweep, each of them once. */
+static int table_match_parts (table_part *part, int count, pw_error *error) {
+  char difference[400];
+  for (int i = 1; i < count; i++) {
+    const pw_fingerprint first = { part[0].map.begin, part[0].first_row, "in the first" };
+    const pw_fingerprint second = { part[i].map.begin, part[i].first_row, "in the second" };
+    if (pw_fingerprint_differ (first, second, "part", difference, sizeof difference))
+      return pw_fail (error, PW_INPUT, "%.80s and %.80s are parts of different sweeps: %.300s", part[0].path,
+                      part[i].path, difference);
+    if (part[i].parts != part[0].parts)
+      return pw_fail (error, PW_INPUT, "%.200s is one of %d parts, %.200s one of %d", part[0].path, part[0].parts,
+                      part[i].path, part[i].parts);
+  }
+  qsort (part, (size_t)count, sizeof *part, table_by_part);
+  for (int i = 0; i < count; i++) {
+    if (i > 0 && part[i].number == part[i - 1].number)
+      return pw_fail (error, PW_INPUT, "%.200s and %.200s are both part %d of %d", part[i - 1].path, part[i].path,
+                      part[i].number, part[0].parts);
+    if (part[i].number != i + 1) return pw_fail (error, PW_INPUT, "part %d of %d is missing", i + 1, part[0].parts);
+  }
+  if (count < part[0].parts) return pw_fail (error, PW_INPUT, "part %d of %d is missing", count + 1, part[0].parts);
+  return PW_OK;
+}
+
+/* Writes the table from sorted parts: row r is the next one of part[r % count]. */
+static int table_merge (table_part *part, int count, FILE *stream, pw_tally *tally, pw_error *error) {
+  size_t size = 0;
+  const char *rows_value = pw_fingerprint_value (part->map.begin, part->first_row, "rows", &size);
+  const char *heading = pw_fingerprint_value (part->map.begin, part->first_row, "columns", &size);
+  if (rows_value == NULL || heading == NULL)
+    return pw_fail (error, PW_INPUT, "%s has no number of rows or no columns: it was changed", part->path);
+  long rows = strtol (rows_value, NULL, 10);
+  fwrite (heading, 1, size, stream);
+  putc ('\n', stream);
+  for (long r = 0; r < rows; r++) {
+    table_part *source = part + r % count;
+    journal_line line;
+    if (!table_read_row (source->next_row, source->map.end, r, &line, tally))
+      return pw_fail (error, PW_INPUT, "%s is not complete: row %ld is missing; finish that part first", source->path,
+                      r + 1);
+    fwrite (line.text, 1, line.text_size, stream);
+    source->next_row += line.line_size;
+  }
+  for (int i = 0; i < count; i++)
+    if (part[i].next_row != part[i].map.end)
+      return pw_fail (error, PW_INPUT, "%s has too many rows: it was changed", part[i].path);
+  return PW_OK;
+}
+
+int pw_sweep_merge (const char *const *parts, int count, const char *path, pw_tally *tally, pw_error *error) {
+  *tally = (pw_tally){ .rows = 0 };
+  pw_output *output = NULL;
+  table_part *part = calloc ((size_t)count, sizeof *part);
+  int status = part ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+  for (int i = 0; i < count && status == PW_OK; i++) {
+    const pw_use use[] = { { "-o", path, PW_WRITES, pw_cli_csv }, { "the part", parts[i], PW_READS, NULL } };
+    status = pw_check_paths (use, 2, error);
+    if (status == PW_OK) status = pw_cli_check_format (use, error);
+    if (status == PW_OK) status = table_open_part (part + i, parts[i], error);
+  }
+  if (status == PW_OK) status = table_match_parts (part, count, error);
+  if (status == PW_OK && (output = pw_output_open_as (path, ".sorted", error)) == NULL) status = error->status;
+  if (output) table_merge (part, count, pw_output_stream (output), tally, error);
+  if (output) status = table_close (output, error);
+  for (int i = 0; part && i < count; i++) journal_map_close (&part[i].map);
+  free (part);
+  return status;
+}

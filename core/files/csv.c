@@ -1,0 +1,277 @@
+/* Tables of samples: CSV with a line per sample, or NumPy archives.  The columns are
+ *
+ *   t [s] | states of each body, of each internal coordinate | contact points | reactions | residuals | energies
+ *
+ * The functions of a group of columns write their names or their values, as pw_csv.content says. */
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "files.h"
+
+typedef enum { CSV_NAMES, CSV_VALUES } csv_content;
+
+struct pw_csv {
+  const pw_system *system;
+  int ledger;
+  pw_workspace *workspace; /* for contact points; NULL if the system has none */
+  double (*contact)[3];    /* contact points of the system */
+  pw_output *output;
+  FILE *f;
+  csv_content content; /* of the current line */
+  int cells;           /* written in the current line */
+  int failed;          /* 1: memory was exhausted */
+  /* of an archive, whose arrays are written when the table is closed */
+  int is_archive;
+  double *value;                /* line by line */
+  size_t values, room, columns; /* so far; allocated; values per line */
+  pw_npz npz;
+};
+
+/* ---- Cells ---- */
+
+/* Adds the next column to the archive. */
+static void csv_array (pw_csv *c, const char *name) {
+  size_t rows = c->columns ? c->values / c->columns : 0;
+  double *column = malloc ((rows + 1) * sizeof *column);
+  c->failed |= column == NULL;
+  for (size_t row = 0; column && row < rows; row++) column[row] = c->value[row * c->columns + (size_t)c->cells];
+  if (column) pw_npz_add (&c->npz, name, (long)rows, -1, 1, column);
+  free (column);
+}
+
+static void csv_name (pw_csv *c, const char *name, const char *unit) {
+  if (c->is_archive) {
+    csv_array (c, name);
+  } else {
+    fprintf (c->f, "%s%s", c->cells ? "," : "", name);
+    if (unit && *unit) fprintf (c->f, " [%s]", unit);
+  }
+  c->cells++;
+}
+
+static void csv_number (pw_csv *c, double value) {
+  char text[32];
+  if (c->is_archive) {
+    c->failed |= pw_grow (&c->value, c->values, &c->room, sizeof *c->value) != PW_OK;
+    if (!c->failed) c->value[c->values++] = value;
+  } else {
+    if (c->cells) fputc (',', c->f);
+    fputs (isfinite (value) ? pw_format (text, value, 17) : "nan", c->f);
+  }
+  c->cells++;
+}
+
+/* Writes the name of the next column or its value, and evaluates only that. */
+#define CSV_CELL(c, name, unit, value) ((c)->content == CSV_NAMES ? csv_name (c, name, unit) : csv_number (c, value))
+
+/* ---- Lines ---- */
+
+static void csv_state (pw_csv *c, const pw_sample *x, int state) {
+  int n = pw_system_coordinates (c->system);
+  CSV_CELL (c, PW_NAME (pw_system_state_name, c->system, state), pw_system_state_unit (c->system, state),
+            state < n ? x->q[state] : x->v[state - n]);
+}
+
+static void csv_states (pw_csv *c, const pw_sample *x) {
+  int bodies = pw_system_bodies (c->system), n = pw_system_coordinates (c->system);
+  for (int b = 0; b < bodies; b++)
+    for (int i = 0; i < 6; i++) csv_state (c, x, i < 3 ? 3 * b + i : n + 3 * b + i - 3);
+  for (int state = 3 * bodies; state < n; state++) {
+    csv_state (c, x, state);
+    csv_state (c, x, n + state);
+  }
+}
+
+static void csv_contacts (pw_csv *c) {
+  for (int i = 0; c->workspace && i < 2 * pw_system_contacts (c->system); i++)
+    CSV_CELL (c, PW_NAME (pw_system_contact_name, c->system, i), "m", c->contact[i / 2][i % 2]);
+}
+
+static void csv_reactions (pw_csv *c, const pw_sample *x) {
+  for (int i = 0; i < pw_system_rows (c->system); i++)
+    CSV_CELL (c, PW_NAME (pw_system_reaction_name, c->system, i), pw_system_reaction_unit (c->system, i),
+              0 - x->lambda[i]); /* avoids -0 */
+}
+
+static void csv_ledger (pw_csv *c, const pw_sample *x) {
+  CSV_CELL (c, "kinetic", "J", x->kinetic);
+  CSV_CELL (c, "potential", "J", x->potential);
+  for (int i = 0; i < pw_system_ledger_entries (c->system); i++)
+    CSV_CELL (c, PW_NAME (pw_system_ledger_name, c->system, i), "J", x->ledger ? x->ledger[i] : NAN);
+  CSV_CELL (c, "projection", "J", x->projection);
+  CSV_CELL (c, "balance", "J", x->balance);
+}
+
+static int csv_line (pw_csv *c, csv_content content, const pw_sample *x, pw_error *error) {
+  errno = 0; /* for pw_output_check */
+  c->content = content;
+  c->cells = 0;
+  CSV_CELL (c, "t", "s", x->t);
+  csv_states (c, x);
+  csv_contacts (c);
+  csv_reactions (c, x);
+  CSV_CELL (c, "residual.position", NULL, x->position);
+  CSV_CELL (c, "residual.velocity", NULL, x->velocity);
+  if (c->ledger) csv_ledger (c, x);
+  c->columns = (size_t)c->cells;
+  if (c->failed) return pw_fail (error, PW_RESOURCE, "out of memory while writing a table");
+  if (c->is_archive) return PW_OK;
+  fputc ('\n', c->f);
+  return pw_output_check (c->output, error);
+}
+
+/* ---- The table ---- */
+
+static void csv_free (pw_csv *c) {
+  if (c == NULL) return;
+  pw_workspace_free (c->workspace);
+  free (c->value);
+  free (c->contact);
+  free (c);
+}
+
+pw_csv *pw_csv_open (const pw_system *s, int ledger, pw_output *o, pw_error *error) {
+  if (pw_require (s, "a system", error) != PW_OK || pw_require (o, "an output", error) != PW_OK) return NULL;
+  int contacts = pw_system_contacts (s), is_archive = pw_output_named (o, ".npz"), continued = pw_output_continued (o);
+  if (is_archive && continued) {
+    pw_fail (error, PW_INPUT, "an archive of arrays cannot be continued: write a table that ends in .csv");
+    return NULL;
+  }
+  pw_csv *c = calloc (1, sizeof *c);
+  if (c) {
+    *c = (pw_csv){ .system = s, .ledger = ledger, .output = o, .f = pw_output_stream (o), .is_archive = is_archive };
+    c->npz.f = c->f;
+    c->contact = calloc ((size_t)contacts + 1, sizeof *c->contact);
+    c->workspace = contacts > 0 ? pw_workspace_new (s, error) : NULL;
+  }
+  int complete = c && c->contact && (c->workspace || contacts == 0);
+  if (complete && (is_archive || continued || csv_line (c, CSV_NAMES, &(pw_sample){ 0 }, error) == PW_OK)) return c;
+  pw_fail (error, PW_RESOURCE, "out of memory while writing a table");
+  csv_free (c);
+  return NULL;
+}
+
+int pw_csv_write (pw_csv *c, const pw_system *s, const pw_sample *sample, pw_error *error) {
+  int status = pw_require (c, "a table", error);
+  (void)s; /* the table has that of pw_csv_open */
+  if (status == PW_OK && c->workspace)
+    status = pw_workspace_contact_points (c->workspace, sample->t, sample->q, sample->v, c->contact, error);
+  return status == PW_OK ? csv_line (c, CSV_VALUES, sample, error) : status;
+}
+
+int pw_csv_close (pw_csv *c, pw_error *error) {
+  int status = PW_OK;
+  if (c && c->is_archive) {
+    status = csv_line (c, CSV_NAMES, &(pw_sample){ 0 }, error);
+    int end = pw_npz_end (&c->npz, error);
+    if (status == PW_OK) status = end == PW_OK ? pw_output_check (c->output, error) : end;
+  }
+  csv_free (c);
+  return status;
+}
+
+/* NumPy archives: a zip file (PKWARE's APPNOTE), not compressed, with a .npy file per array (numpy.lib.format 1.0). */
+
+enum { NPZ_HEAD = 128 };   /* bytes before the data of a .npy file, a multiple of 64 */
+enum { NPZ_MOST = 65535 }; /* files of an archive */
+
+/* The first four bytes of the header of a file, of its entry in the directory, of the end record; the version 2.0. */
+#define NPZ_FILE 0x04034b50
+#define NPZ_ENTRY 0x02014b50
+#define NPZ_END 0x06054b50
+#define NPZ_VERSION 20
+
+struct pw_npz_entry {
+  char name[312];
+  unsigned long check, size, offset;
+};
+
+/* CRC-32 with the polynomial 0xedb88320, as in zip files, four bits at a time, continued from `check`, at first 0. */
+static unsigned long npz_crc (unsigned long check, const void *data, size_t size) {
+  static const unsigned long part[16] = { 0x00000000, 0x1db71064, 0x3b6e20c8, 0x26d930ac, 0x76dc4190, 0x6b6b51f4,
+                                          0x4db26158, 0x5005713c, 0xedb88320, 0xf00f9344, 0xd6d6a3e8, 0xcb61b38c,
+                                          0x9b64c2b0, 0x86d3d2d4, 0xa00ae278, 0xbdbdf21c };
+  check ^= 0xffffffff;
+  for (const unsigned char *c = data, *end = c + size; c < end; c++) {
+    check ^= *c;
+    for (int half = 0; half < 2; half++) check = check >> 4 ^ part[check & 15];
+  }
+  return check ^ 0xffffffff;
+}
+
+static void npz_bytes (pw_npz *z, const void *data, size_t size) {
+  fwrite (data, 1, size, z->f);
+  z->at += size;
+}
+
+/* Writes a number of `bytes` bytes, the lowest first. */
+static void npz_number (pw_npz *z, unsigned long value, int bytes) {
+  for (; bytes > 0; bytes--, value >>= 8) npz_bytes (z, &(unsigned char){ (unsigned char)value }, 1);
+}
+
+/* Writes what the header of a file and its entry in the directory share: version 2.0, flags (names in UTF-8), method
+ * (stored), 1 January 1980, checksum, compressed and original size, lengths of the name and of extra fields. */
+static void npz_describe (pw_npz *z, const struct pw_npz_entry *e) {
+  npz_number (z, NPZ_VERSION, 2);
+  npz_number (z, 0x0800, 4);
+  npz_number (z, 0x00210000, 4);
+  npz_number (z, e->check, 4);
+  npz_number (z, e->size, 4);
+  npz_number (z, e->size, 4);
+  npz_number (z, strlen (e->name), 2);
+  npz_number (z, 0, 2);
+}
+
+void pw_npz_add (pw_npz *z, const char *name, long rows, long columns, int parts, const double *value) {
+  char head[NPZ_HEAD + 1] = "\x93NUMPY\x01";
+  size_t size = (size_t)rows * (size_t)(columns < 0 ? 1 : columns) * (size_t)parts * sizeof *value;
+  z->failed |= pw_grow (&z->entry, (size_t)z->count, &z->room, sizeof *z->entry) != PW_OK;
+  if (z->failed) return;
+  struct pw_npz_entry *e = z->entry + z->count++;
+  const char *shape = columns < 0 ? PW_PRINTED (60, "%ld,", rows) : PW_PRINTED (60, "%ld, %ld", rows, columns);
+  head[8] = NPZ_HEAD - 10; /* bytes of the header after its length, in two bytes */
+  sprintf (head + 10, "{'descr': '%c%s', 'fortran_order': False, 'shape': (%s), }",
+           *(const char *)&(int){ 1 } ? '<' : '>', parts == 2 ? "c16" : "f8", shape);
+  memset (strchr (head + 10, 0), ' ', (size_t)(head + NPZ_HEAD - strchr (head + 10, 0)));
+  head[NPZ_HEAD - 1] = '\n';
+  snprintf (e->name, sizeof e->name, "%.300s.npy", name);
+  e->check = npz_crc (npz_crc (0, head, NPZ_HEAD), value, size);
+  e->size = NPZ_HEAD + size;
+  e->offset = z->at;
+  npz_number (z, NPZ_FILE, 4);
+  npz_describe (z, e);
+  npz_bytes (z, e->name, strlen (e->name));
+  npz_bytes (z, head, NPZ_HEAD);
+  npz_bytes (z, value, size);
+}
+
+/* Writes the directory, and the end record: disk 0, entries, size and offset of the directory, no comment. */
+static void npz_directory (pw_npz *z) {
+  unsigned long start = z->at;
+  for (const struct pw_npz_entry *e = z->entry; e < z->entry + z->count; e++) {
+    npz_number (z, NPZ_ENTRY, 4);
+    npz_number (z, NPZ_VERSION, 2);
+    npz_describe (z, e);
+    npz_number (z, 0, 10); /* comment, disk, internal and external attributes */
+    npz_number (z, e->offset, 4);
+    npz_bytes (z, e->name, strlen (e->name));
+  }
+  unsigned long size = z->at - start;
+  npz_number (z, NPZ_END, 4);
+  npz_number (z, 0, 4);
+  npz_number (z, (unsigned long)z->count, 2);
+  npz_number (z, (unsigned long)z->count, 2);
+  npz_number (z, size, 4);
+  npz_number (z, start, 4);
+  npz_number (z, 0, 2);
+}
+
+int pw_npz_end (pw_npz *z, pw_error *error) {
+  npz_directory (z);
+  free (z->entry);
+  z->entry = NULL;
+  if (z->failed) return pw_fail (error, PW_RESOURCE, "out of memory");
+  if (z->at <= 0xffffffff && z->count <= NPZ_MOST) return PW_OK;
+  return pw_fail (error, PW_RESOURCE, "an .npz archive has at most 4 GB and %d arrays; write a .csv", NPZ_MOST);
+}

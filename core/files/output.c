@@ -1,0 +1,447 @@
+/* Output files: written as NAME.part, renamed when complete.
+ *
+ * The temporary file is locked until its folder is on the disk, so that two processes never write the same output.
+ * Files that are not regular (a terminal, a pipe, /dev/null) and descriptors of the process are written directly. */
+#include <errno.h>
+#include <fcntl.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <unistd.h>
+#include "files.h"
+
+struct pw_output {
+  FILE *stream;       /* NULL: closed, but not renamed yet */
+  char path[PW_PATH]; /* as the user knows it */
+  char real[PW_PATH]; /* of the file itself, links followed */
+  char part[PW_PATH]; /* its temporary name; "": written directly */
+  char old[PW_PATH];  /* second name of the file that it replaces, while several are renamed */
+  int file;           /* keeps the temporary file locked; -1: written directly */
+  int folder;         /* that contains it; -1: written directly, or the folder is not readable */
+  int code;           /* errno of the first failed write; -1: unknown; 0: none has failed */
+  int continued;      /* 1: opened by pw_output_continue */
+  int discard;        /* 1: the temporary file is removed if finishing fails */
+};
+
+static void output_free (pw_output *o) {
+  if (o == NULL) return;
+  if (o->file >= 0) close (o->file);
+  if (o->folder >= 0) close (o->folder);
+  free (o);
+}
+
+static const char *output_shown (const pw_output *o) {
+  return strcmp (o->path, "-") == 0 ? "standard output" : o->path;
+}
+
+/* The reason for messages; code: an errno value, or -1 if it is unknown. */
+static const char *output_reason (const pw_output *o, int code) {
+  return code <= 0 ? "a write failed" : *o->part ? pw_lock_reason (code) : strerror (code);
+}
+
+static int output_fail (const pw_output *o, int code, pw_error *error) {
+  return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", output_shown (o), output_reason (o, code));
+}
+
+/* The same, and names the temporary file, if that remains. */
+static int output_fail_with_part (const pw_output *o, int code, pw_error *error) {
+  if (*o->part == 0 || o->discard) return output_fail (o, code, error);
+  return pw_fail (error, PW_RESOURCE, "cannot write %.200s: %s; what was written is in %.200s", output_shown (o),
+                  output_reason (o, code), o->part);
+}
+
+/* ---- Opening ---- */
+
+/* Makes a stream of a descriptor, which may be -1.  0 or an errno value. */
+static int output_stream_of (pw_output *o, int file, const char *mode) {
+  o->stream = file < 0 ? NULL : fdopen (file, mode);
+  if (o->stream) return 0;
+  int code = errno;
+  if (file >= 0) close (file);
+  return code;
+}
+
+/* Opens a descriptor of the process or a file that is not regular.  A FIFO waits for a reader or a signal. */
+static int output_open_direct (pw_output *o, const pw_location *p) {
+  int flags = p->descriptor < 0 ? O_WRONLY : fcntl (p->descriptor, F_GETFL);
+  if (flags < 0) return errno;
+  if ((flags & O_ACCMODE) == O_RDONLY) return EBADF;
+  if (p->descriptor == STDOUT_FILENO) {
+    o->stream = stdout;
+    return 0;
+  }
+  int file =
+      p->descriptor < 0 ? open (p->path, O_WRONLY | O_NOCTTY | O_CLOEXEC) : fcntl (p->descriptor, F_DUPFD_CLOEXEC, 3);
+  return output_stream_of (o, file, "w");
+}
+
+/* Gives the new file owner and group of the old one, or the group alone, as permitted, and its mode; without the owner
+ * no set-user-ID bit, without the group no set-group-ID bit either. */
+static int output_inherit (int file, const struct stat *old) {
+  struct stat now;
+  if (fstat (file, &now) != 0) return errno;
+  int owner = (now.st_uid == old->st_uid && now.st_gid == old->st_gid) || fchown (file, old->st_uid, old->st_gid) == 0;
+  int group = owner || fchown (file, (uid_t)-1, old->st_gid) == 0;
+  mode_t mode = old->st_mode & (owner ? 07777 : group ? 03777 : 0777);
+  return (now.st_mode & 07777) != mode && fchmod (file, mode) != 0 ? errno : 0;
+}
+
+/* The stream has a separate descriptor, so that the lock outlives it. */
+static int output_stream (pw_output *o) {
+  return output_stream_of (o, fcntl (o->file, F_DUPFD_CLOEXEC, 3), "r+");
+}
+
+static int output_open_part (pw_output *o, pw_lock_mode lock_mode) {
+  char folder[PW_PATH];
+  o->folder = open (pw_folder_of (folder, o->real), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (o->folder < 0 && errno != EACCES) return errno; /* a folder that cannot be listed may still be writable */
+  o->file = pw_lock_file (o->part, lock_mode);
+  return o->file < 0 ? errno : 0;
+}
+
+/* Finds the location of a file to be written; *direct is 1 if it is written directly. */
+static int output_locate (const char *path, pw_location *p, int *direct) {
+  int code = pw_locate (p, path);
+  if (code) return code;
+  if (p->exists && S_ISDIR (p->info.st_mode)) return EISDIR;
+  *direct = p->descriptor >= 0 || (p->exists && !S_ISREG (p->info.st_mode));
+  return !*direct && p->exists && access (p->path, W_OK) != 0 ? errno : 0;
+}
+
+char *pw_output_path (const char *path, pw_error *error) {
+  pw_location p;
+  int direct, code = output_locate (path, &p, &direct);
+  char *copy = code || direct ? NULL : strdup (p.path);
+  const char *why = code ? strerror (code) : direct ? pw_not_regular (p.info.st_mode) : "out of memory";
+  if (copy == NULL) pw_fail (error, PW_RESOURCE, "cannot write %s: %s", path, why);
+  return copy;
+}
+
+/* Finds the location `p`, and the other names of the file unless it is written directly. */
+static int output_name (pw_output *o, pw_location *p, const char *ending) {
+  int direct, code = output_locate (o->path, p, &direct);
+  if (code || direct) return code;
+  pw_path (o->real, "%s", p->path);
+  pw_path (o->part, "%s%s", o->real, ending);
+  pw_path (o->old, "%s.old", o->part);
+  return 0;
+}
+
+static int output_open_file (pw_output *o, const char *ending) {
+  pw_location p;
+  int code = output_name (o, &p, ending);
+  if (code) return code;
+  if (*o->part == 0) return output_open_direct (o, &p);
+  code = output_open_part (o, PW_LOCK_NEW);
+  if (code == 0 && p.exists) code = output_inherit (o->file, &p.info);
+  if (code == 0) code = output_stream (o);
+  if (code && o->file >= 0) unlink (o->part);
+  return code;
+}
+
+static pw_output *output_new (const char *path, pw_error *error) {
+  if (pw_require (path, "the name of a file to write", error) != PW_OK) return NULL;
+  pw_output *o = *path ? calloc (1, sizeof *o) : NULL;
+  if (o == NULL) {
+    pw_fail (error, *path ? PW_RESOURCE : PW_INPUT, *path ? "out of memory" : "the name of a file to write is empty");
+    return NULL;
+  }
+  o->file = o->folder = -1;
+  pw_path (o->path, "%s", path);
+  return o;
+}
+
+pw_output *pw_output_open_as (const char *path, const char *ending, pw_error *error) {
+  pw_output *o = output_new (path, error);
+  if (o == NULL) return NULL;
+  o->discard = strcmp (ending, ".part") != 0;
+  int code = output_open_file (o, ending);
+  if (code == 0) return o;
+  if (code == ENOMEM) pw_fail (error, PW_RESOURCE, "cannot write %s: out of memory", path);
+  output_fail (o, code, error);
+  output_free (o);
+  return NULL;
+}
+
+pw_output *pw_output_open (const char *path, pw_error *error) {
+  return pw_output_open_as (path, ".part", error);
+}
+
+FILE *pw_output_stream (pw_output *o) {
+  return o->stream;
+}
+
+int pw_output_is_file (const pw_output *o) {
+  return *o->part != 0;
+}
+
+int pw_output_check (pw_output *o, pw_error *error) {
+  if (!ferror (o->stream)) return PW_OK;
+  if (o->code == 0) o->code = errno;
+  return output_fail (o, o->code, error);
+}
+
+/* ---- Closing ---- */
+
+/* Flushes the stream and writes a regular file to the disk.  0, an errno value, or -1 for an unknown reason. */
+static int output_sync (pw_output *o) {
+  if (ferror (o->stream)) return o->code ? o->code : -1;
+  errno = 0;
+  if (fflush (o->stream) == 0 && (o->file < 0 || fsync (o->file) == 0)) return 0;
+  return errno ? errno : -1;
+}
+
+/* Closes the stream, except standard output.  Returns `code` unless it is 0, else as output_sync. */
+static int output_close (pw_output *o, int code) {
+  FILE *f = o->stream;
+  o->stream = NULL;
+  errno = 0;
+  if (f == NULL || f == stdout || fclose (f) == 0 || code) return code;
+  return errno ? errno : -1;
+}
+
+int pw_output_ready (pw_output *o, pw_error *error) {
+  if (o->stream) o->code = output_close (o, output_sync (o));
+  return o->code ? output_fail_with_part (o, o->code, error) : PW_OK;
+}
+
+/* Truncates the temporary file after its last complete line. */
+static void output_truncate (pw_output *o) {
+  char c;
+  off_t end = lseek (o->file, 0, SEEK_END), keep = end;
+  while (keep > 0 && pread (o->file, &c, 1, keep - 1) == 1 && c != '\n') keep--;
+  if (keep < end && ftruncate (o->file, keep) != 0) return; /* keep the incomplete line */
+}
+
+char *pw_output_abandon (pw_output *o, char *buffer, size_t size) {
+  if (o->stream) output_close (o, fflush (o->stream));
+  buffer[0] = 0;
+  if (*o->part && !pw_output_named (o, ".npz")) output_truncate (o); /* archives are complete, and have no lines */
+  if (*o->part) snprintf (buffer, size, "%s", o->part);
+  output_free (o);
+  return *buffer ? buffer : NULL;
+}
+
+void pw_output_discard (pw_output *o) {
+  output_close (o, 0);
+  if (*o->part) unlink (o->part);
+  output_free (o);
+}
+
+/* Writes the folder, with the new name, to the disk; file systems that refuse this do not need it. */
+static int output_sync_folder (const pw_output *o, pw_error *error) {
+  if (o->folder < 0 || fsync (o->folder) == 0 || errno == EINVAL || errno == EROFS || errno == ENOTSUP) return PW_OK;
+  return pw_fail (error, PW_RESOURCE, "%s is written, but its folder cannot be written to disk: %s", o->path,
+                  strerror (errno));
+}
+
+/* Keeps the file that will be replaced under its second name, a hard link; without hard links, under that name only.
+ * 0, also if there is none, or -1. */
+static int output_keep_old (const pw_output *o) {
+  struct stat info;
+  unlink (o->old);
+  if (link (o->real, o->old) == 0 || stat (o->real, &info) != 0 || !S_ISREG (info.st_mode)) return 0;
+  return rename (o->real, o->old);
+}
+
+/* Renames all files or none: replaced files are kept until the last one is renamed. */
+static int output_rename_all (pw_output *const *o, int count, pw_error *error) {
+  int last = count - 1, failed = count, status = PW_OK; /* failed: the file that cannot be renamed */
+  while (last > 0 && (o[last] == NULL || *o[last]->part == 0)) last--;
+  for (int i = 0; i <= last && status == PW_OK; i++) {
+    if (o[i] == NULL || *o[i]->part == 0) continue;
+    if ((i == last || output_keep_old (o[i]) == 0) && rename (o[i]->part, o[i]->real) == 0) continue;
+    status = output_fail_with_part (o[failed = i], errno, error);
+  }
+  for (int i = 0; i < last; i++) {
+    if (o[i] == NULL || *o[i]->part == 0) continue;
+    if (status != PW_OK && i < failed) (void)rename (o[i]->real, o[i]->part);
+    if (status != PW_OK && i <= failed) (void)rename (o[i]->old, o[i]->real);
+    unlink (o[i]->old);
+  }
+  return status;
+}
+
+int pw_output_finish_all (pw_output *const *o, int count, pw_error *error) {
+  int status = PW_OK;
+  for (int i = 0; i < count; i++)
+    if (o[i] && status == PW_OK) status = pw_output_ready (o[i], error);
+  if (status == PW_OK) status = output_rename_all (o, count, error);
+  int complete = status == PW_OK;
+  for (int i = 0; i < count; i++) {
+    if (o[i] == NULL) continue;
+    if (complete && status == PW_OK) status = output_sync_folder (o[i], error);
+    if (complete)
+      output_free (o[i]);
+    else if (o[i]->discard)
+      pw_output_discard (o[i]);
+    else
+      pw_output_abandon (o[i], (char[2]){ 0 }, 2);
+  }
+  return status;
+}
+
+int pw_output_finish (pw_output *o, pw_error *error) {
+  return pw_output_finish_all (&o, 1, error);
+}
+
+/* ---- Continuation of an interrupted run ---- */
+
+/* Sets mark->check from the last OUTPUT_CHECKED bytes before mark->length; PW_RETRY if the file is shorter or
+ * cannot be read. */
+enum { OUTPUT_CHECKED = 65536 };
+static int output_checksum (int file, pw_mark *mark) {
+  char bytes[OUTPUT_CHECKED];
+  size_t size = mark->length < sizeof bytes ? (size_t)mark->length : sizeof bytes;
+  for (size_t left = size; left > 0;) {
+    ssize_t n = pread (file, bytes + size - left, left, (off_t)(mark->length - left));
+    if (n == 0 || (n < 0 && errno != EINTR)) return PW_RETRY;
+    if (n > 0) left -= (size_t)n;
+  }
+  mark->check = pw_check_sum (PW_CHECK, bytes, size);
+  return PW_OK;
+}
+
+int pw_output_named (const pw_output *o, const char *ending) {
+  const size_t length = strlen (o->path), size = strlen (ending);
+  return length > size && strcasecmp (o->path + length - size, ending) == 0;
+}
+
+int pw_output_continued (const pw_output *o) {
+  return o->continued;
+}
+
+int pw_output_mark (pw_output *o, pw_mark *mark, pw_error *error) {
+  if (*o->part == 0)
+    return pw_fail (error, PW_INPUT, "%s cannot be continued: it is not a regular file",
+                    o->stream == stdout ? "standard output" : o->path);
+  int code = output_sync (o);
+  if (code) return output_fail (o, code, error);
+  mark->length = (unsigned long long)ftello (o->stream);
+  if (output_checksum (o->file, mark) == PW_OK) return PW_OK;
+  return pw_fail (error, PW_RESOURCE, "cannot read %s", o->part);
+}
+
+/* 1 if the temporary file begins with the marked contents. */
+static int output_is_marked (const pw_output *o, const pw_mark *mark) {
+  pw_mark now = { .length = mark->length };
+  return output_checksum (o->file, &now) == PW_OK && now.check == mark->check;
+}
+
+/* Takes a table under its final name, which a process killed just after completing it has left. */
+static int output_restore_part (pw_output *o, const pw_mark *mark) {
+  int file = pw_lock_file (o->real, PW_LOCK_EXISTING);
+  if (file < 0) return errno;
+  o->file = file;
+  return output_is_marked (o, mark) && rename (o->real, o->part) != 0 ? errno : 0;
+}
+
+static int output_reopen (pw_output *o, const pw_mark *mark, pw_error *error) {
+  pw_location p;
+  int code = output_name (o, &p, ".part");
+  if (code) return output_fail (o, code, error);
+  if (*o->part == 0) return pw_fail (error, PW_INPUT, "cannot continue %s: it is not a regular file", o->path);
+  code = output_open_part (o, PW_LOCK_EXISTING);
+  int absent = code == ENOENT;
+  if (absent) code = output_restore_part (o, mark);
+  if (code == ENOENT) return pw_fail (error, PW_INPUT, "cannot continue %s: there is no %s", o->path, o->part);
+  if (code) return output_fail (o, code, error);
+  if (!output_is_marked (o, mark))
+    return pw_fail (error, PW_INPUT, "cannot continue %s: %s is not the table that the checkpoint belongs to", o->path,
+                    absent ? "it" : o->part);
+  code = output_stream (o);
+  if (code == 0 &&
+      (fseeko (o->stream, (off_t)mark->length, SEEK_SET) != 0 || ftruncate (o->file, (off_t)mark->length) != 0))
+    code = errno;
+  return code ? pw_fail (error, PW_RESOURCE, "cannot write %s: %s", o->part, strerror (code)) : PW_OK;
+}
+
+pw_output *pw_output_continue (const char *path, const pw_mark *mark, pw_error *error) {
+  pw_output *o = output_new (path, error);
+  if (o && output_reopen (o, mark, error) == PW_OK) {
+    o->continued = 1;
+    return o;
+  }
+  if (o && o->stream) fclose (o->stream);
+  output_free (o);
+  return NULL;
+}
+
+/* Checkpoints as files: a head in text, then the state of a run in binary, with a checksum of both. */
+
+/* ---- Writing ---- */
+
+static unsigned long long checkpoint_sum (const char *head, size_t head_size, const void *state, size_t state_size) {
+  return pw_check_sum (pw_check_sum (PW_CHECK, head, head_size), state, state_size);
+}
+
+int pw_checkpoint_put (pw_output *o, const char *head, const pw_archive *state, pw_error *error) {
+  FILE *f = pw_output_stream (o);
+  errno = 0; /* for pw_output_check */
+  fprintf (f, "%sstate = %zu bytes, check sum %016llx\n", head, state->used,
+           checkpoint_sum (head, strlen (head), state->at, state->used));
+  if (state->used > 0) fwrite (state->at, 1, state->used, f);
+  int status = pw_output_check (o, error);
+  if (status == PW_OK) return pw_output_finish (o, error);
+  pw_output_discard (o);
+  return status;
+}
+
+int pw_checkpoint_write (const char *path, const char *head, const pw_archive *state, pw_error *error) {
+  pw_output *o = pw_output_open_as (path, ".next", error); /* as the program names the next checkpoint of a run */
+  return o ? pw_checkpoint_put (o, head, state, error) : error ? error->status : PW_RESOURCE;
+}
+
+/* ---- Reading ---- */
+
+#define CHECKPOINT_MAX_BYTES (SIZE_MAX / 4) /* no limit in practice; sums of sizes do not overflow */
+
+static int checkpoint_version (const char *path, const char *text, pw_error *error) {
+  static const char magic[] = PW_CHECKPOINT_MAGIC;
+  size_t word = strcspn (magic, "0123456789");
+  if (strncmp (text, magic, word) != 0) return pw_fail (error, PW_INPUT, "%s is not a checkpoint of Pinwheel", path);
+  long format = strtol (text + word, NULL, 10), readable = strtol (magic + word, NULL, 10);
+  if (format > 0 && format != readable)
+    return pw_fail (error, PW_INPUT, "%s is a checkpoint of format %ld; this Pinwheel reads format %ld", path, format,
+                    readable);
+  if (strncmp (text, magic, sizeof magic - 1) == 0) return PW_OK;
+  return pw_fail (error, PW_INPUT, "the checkpoint %s is truncated or damaged", path);
+}
+
+/* Finds the end of the head, and the state after it, in a file of `size` bytes. */
+static int checkpoint_parse (const char *path, pw_checkpoint *c, size_t size, pw_error *error) {
+  size_t state_size = 0;
+  unsigned long long sum = 0;
+  int n = 0; /* length of the line after the head */
+  static const char last[] = "\nend\n";
+  const char *end = strstr (c->text, last);
+  c->head_end = end ? end + strlen (last) : NULL;
+  if (end == NULL || sscanf (c->head_end, "state = %zu bytes, check sum %16llx%n", &state_size, &sum, &n) != 2 ||
+      c->head_end[n] != '\n')
+    return pw_fail (error, PW_INPUT, "the checkpoint %s is truncated or damaged", path);
+  const char *state = c->head_end + n + 1;
+  size_t head_size = (size_t)(c->head_end - c->text), found = size - (size_t)(state - c->text);
+  if (found < state_size)
+    return pw_fail (error, PW_INPUT, "the checkpoint %s is truncated: found %zu bytes of %zu", path, size,
+                    size - found + state_size);
+  if (found > state_size || checkpoint_sum (c->text, head_size, state, state_size) != sum)
+    return pw_fail (error, PW_INPUT, "the checkpoint %s is damaged: its checksum is wrong", path);
+  c->state = (pw_archive){ .at = (unsigned char *)c->text + (state - c->text), .size = state_size, .loading = 1 };
+  return PW_OK;
+}
+
+int pw_checkpoint_read (const char *path, pw_checkpoint *c, pw_error *error) {
+  size_t size = 0;
+  *c = (pw_checkpoint){ .text = NULL };
+  if (pw_require (path, "the name of a checkpoint", error) != PW_OK) return PW_INPUT;
+  int status = pw_read_file ("cannot read the checkpoint", path, CHECKPOINT_MAX_BYTES, "the limit for a checkpoint",
+                             &c->text, &size, error);
+  if (status == PW_OK) status = checkpoint_version (path, c->text, error);
+  return status == PW_OK ? checkpoint_parse (path, c, size, error) : status;
+}
+
+void pw_checkpoint_free (pw_checkpoint *c) {
+  free (c->text);
+  *c = (pw_checkpoint){ .text = NULL };
+}

@@ -1,0 +1,461 @@
+/* Recursive-descent parser: converts the text of an expression to operations in postfix order.  { } repeats, [ ] is
+ * optional:
+ *
+ *   choice   = binary [? choice : choice]
+ *   binary   = unary {operator unary}           by precedence, left-associative
+ *   unary    = + unary | - unary | operand [^ unary]
+ *   operand  = number | name | function (choice, ...) | (choice)
+ *
+ * Parts without variables are evaluated immediately.  Errors are reported at their position. */
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "expression_parts.h"
+#include "pinwheel.h"
+#include "pinwheel-files.h"
+
+enum { PARSER_MAX_LENGTH = 4000, PARSER_MAX_DEPTH = 200 };
+
+/* What the value of a part depends on; variables other than the time are states. */
+enum { DEPENDS_ON_TIME = 1, DEPENDS_ON_STATES = 2 };
+
+/* ---- Tokens ---- */
+
+typedef struct {
+  const char *name;
+  short op, precedence;
+} parser_operator;
+
+/* An operator that begins with another one comes before it; precedence 1 binds least. */
+static const parser_operator parser_operators[] = {
+  { "||", PW_OP_SELECT, 1 },        { "&&", PW_OP_SELECT, 2 },  { "<=", PW_OP_LESS_EQUAL, 3 },
+  { ">=", PW_OP_GREATER_EQUAL, 3 }, { "==", PW_OP_EQUAL, 3 },   { "!=", PW_OP_UNEQUAL, 3 },
+  { "<", PW_OP_LESS, 3 },           { ">", PW_OP_GREATER, 3 },  { "+", PW_OP_ADD, 4 },
+  { "-", PW_OP_SUBTRACT, 4 },       { "*", PW_OP_MULTIPLY, 5 }, { "/", PW_OP_DIVIDE, 5 },
+  { "^", PW_OP_POWER, 6 },          { .name = NULL },
+};
+
+typedef struct {
+  const pw_scope *scope;
+  const char *const *variable;
+  const char *text;
+  size_t at, size;               /* of the current token */
+  size_t previous, previous_end; /* start and end of the token before it */
+  char type;                     /* 'n' name, '0' number, 'o' operator, 0 the end; or ( ) , ? : itself */
+  const parser_operator *symbol; /* of a token of type 'o'; else NULL */
+  int depth, stacked;            /* of the recursion; operands on the stack during evaluation */
+  int status;                    /* PW_OK until the first error */
+  pw_expression_error *error;
+  /* of the pw_expression being made */
+  int breaks;
+  const char *jump;
+  int jump_size;
+  int codes;
+  pw_expression_code code[PW_EXPRESSION_CODES];
+} parser;
+
+typedef struct {
+  size_t from;   /* offset in the text */
+  int first;     /* its first operation; its last one is the last of parser.code */
+  int depends;   /* DEPENDS_ON_TIME | DEPENDS_ON_STATES */
+  int condition; /* 1: its value is 1 or 0 */
+} parser_part;
+
+/* Records an error at an offset, unless there is one already.  Returns an empty part for the caller to return. */
+PW_PRINTF (3, 4) static parser_part parser_fail (parser *p, size_t at, const char *format, ...) {
+  if (p->status != PW_OK) return (parser_part){ 0 };
+  p->status = PW_INPUT;
+  p->error->at = at;
+  va_list arguments;
+  va_start (arguments, format);
+  vsnprintf (p->error->text, sizeof p->error->text, format, arguments);
+  va_end (arguments);
+  return (parser_part){ 0 };
+}
+
+static void parser_next (parser *p) {
+  const char *word = p->text + p->at + p->size;
+  p->previous = p->at;
+  p->previous_end = p->at + p->size;
+  word += strspn (word, " \t\r\n");
+  p->at = (size_t)(word - p->text);
+  p->symbol = NULL;
+  size_t name = pw_expression_name_size (word), number = pw_expression_number_size (word);
+  p->size = name ? name : number ? number : *word != 0;
+  p->type = name ? 'n' : number ? '0' : *word;
+  if (name || number || *word == 0 || strchr ("(),?:", *word)) return;
+  for (const parser_operator *o = parser_operators; o->name && !p->symbol; o++)
+    if (strncmp (word, o->name, strlen (o->name)) == 0) p->symbol = o;
+  p->type = 'o';
+  if (p->symbol == NULL && *word == '=')
+    parser_fail (p, p->at, "\"=\" would assign; equality is written ==");
+  else if (p->symbol == NULL)
+    parser_fail (p, p->at, "%s does not belong in an expression",
+                 *word & 0x80 ? "a non-ASCII character" : (char[]){ '"', *word, '"', 0 });
+  else if (word[0] == '*' && word[1] == '*')
+    parser_fail (p, p->at, "a power is written with ^");
+  else
+    p->size = strlen (p->symbol->name);
+}
+
+/* ---- Operations ---- */
+
+static void parser_push (parser *p, int op, int index, double value) {
+  if (p->status != PW_OK) return;
+  p->stacked += 1 - pw_expression_operands (op);
+  if (p->stacked > PW_EXPRESSION_STACK || p->codes == PW_EXPRESSION_CODES)
+    parser_fail (p, p->at, "the nesting is too deep here");
+  else
+    p->code[p->codes++] = (pw_expression_code){ (short)op, (short)index, value };
+}
+
+/* The part that begins with the current token. */
+static parser_part parser_begin (const parser *p) {
+  return (parser_part){ .from = p->at, .first = p->codes };
+}
+
+/* A constant or variable, the current token. */
+static parser_part parser_leaf (parser *p, int op, int index, double value) {
+  parser_part part = parser_begin (p);
+  if (op == PW_OP_VARIABLE) part.depends = index == PW_EXPRESSION_TIME ? DEPENDS_ON_TIME : DEPENDS_ON_STATES;
+  parser_push (p, op, index, value);
+  parser_next (p);
+  return part;
+}
+
+/* Appends an operation on `part` and operands that depend on `depends`; a constant result is replaced by its value. */
+static parser_part parser_operation (parser *p, parser_part part, int depends, int op, int index) {
+  int may_jump = 0;
+  part.depends |= depends;
+  part.condition = op >= PW_OP_LESS && op <= PW_OP_UNEQUAL;
+  parser_push (p, op, index, 0);
+  if (p->status != PW_OK) return part;
+  if (part.depends == 0) {
+    double value = pw_expression_run (p->code + part.first, p->codes - part.first, NULL, &may_jump);
+    p->codes = part.first + 1;
+    p->code[part.first] = (pw_expression_code){ PW_OP_CONSTANT, 0, value };
+  }
+  if (pw_expression_breaks (op) && part.depends & DEPENDS_ON_TIME) p->breaks = 1;
+  int at_one_point = op == PW_OP_EQUAL || op == PW_OP_UNEQUAL; /* jumps, and back at once */
+  if (!at_one_point && part.depends & DEPENDS_ON_STATES && p->jump == NULL &&
+      pw_expression_may_jump (p->code + part.first, p->codes - part.first)) {
+    p->jump = p->text + part.from;
+    p->jump_size = (int)(p->previous_end - part.from);
+  }
+  return part;
+}
+
+/* Converts a condition to 1 or 0. */
+static parser_part parser_condition (parser *p, parser_part part) {
+  if (part.condition) return part;
+  parser_push (p, PW_OP_CONSTANT, 0, 0);
+  return parser_operation (p, part, 0, PW_OP_UNEQUAL, 0);
+}
+
+/* ---- Operands ---- */
+
+static parser_part parser_choice (parser *p);
+
+/* Whether the recursion may go deeper; the caller counts p->depth down again. */
+static int parser_enter (parser *p) {
+  if (++p->depth > PARSER_MAX_DEPTH)
+    parser_fail (p, p->at, "%s", p->type == '(' ? "too many parentheses" : "the nesting is too deep here");
+  return p->status == PW_OK;
+}
+
+/* Reports an unexpected token.  open: a '(' or '?' at offset `at` that is not complete; 0 if there is none. */
+static parser_part parser_unexpected (parser *p, char open, size_t at) {
+  if (p->type == 'n' || p->type == '0' || p->type == '(')
+    return parser_fail (p, p->at, "an operator such as * is missing before \"%s\"", (char[2]){ p->text[p->at], 0 });
+  if (open == '?') return parser_fail (p, at, "there is no \":\" for this \"?\"");
+  if (p->type == ',') return parser_fail (p, p->at, "a comma belongs between the arguments of a function");
+  if (p->type == ')') return parser_fail (p, p->at, "there is no \"(\" for this \")\"");
+  if (open && p->type == 0) return parser_fail (p, at, "there is no \")\" for this \"(\"");
+  return parser_fail (p, p->at, "this does not belong here");
+}
+
+/* Reports that no operand begins here. */
+static parser_part parser_missing (parser *p) {
+  if (p->status != PW_OK) return (parser_part){ 0 };
+  if (p->type == 0 && p->previous_end == 0) return parser_fail (p, 0, "an expression is missing");
+  if (p->type == 0 || (p->type == ')' && p->previous_end))
+    return parser_fail (
+        p, p->previous, "something is missing after \"%s\"",
+        PW_PRINTED (PW_EXPRESSION_NAME, "%.*s", (int)(p->previous_end - p->previous), p->text + p->previous));
+  return parser_fail (p, p->at, "this does not belong here");
+}
+
+static parser_part parser_unknown (parser *p, const char *name) {
+  pw_nearest near = { .sought = name };
+  for (const char *const *v = p->variable; v && *v; v++) pw_nearest_try (&near, *v);
+  for (int i = 0; p->scope && i < p->scope->names; i++) pw_nearest_try (&near, p->scope->name[i]);
+  for (const pw_expression_function *f = pw_expression_functions; f->name; f++) pw_nearest_try (&near, f->name);
+  if (strcmp (name, "T") == 0) pw_nearest_try (&near, "t"); /* the time, defined in some expressions only */
+  return parser_fail (p, p->at, "there is no \"%s\"%s", name, pw_nearest_text (&near));
+}
+
+static int parser_is_call (const parser *p) {
+  const char *after = p->text + p->at + p->size;
+  return after[strspn (after, " \t\r\n")] == '(';
+}
+
+/* constant: the constant of this name, or NULL; other names have precedence. */
+static parser_part parser_name (parser *p, const char *name, const pw_expression_function *constant) {
+  int variable = 0, named = p->scope ? pw_names_find (&p->scope->index, name) : -1;
+  while (p->variable && p->variable[variable] && strcmp (p->variable[variable], name) != 0) variable++;
+  int is_variable = p->variable && p->variable[variable];
+  if (!is_variable && named < 0 && constant == NULL) return parser_unknown (p, name);
+  if (parser_is_call (p))
+    return parser_fail (p, p->at, "\"%s\" is a number, not a function; a product is written with *", name);
+  if (is_variable) return parser_leaf (p, PW_OP_VARIABLE, variable, 0);
+  return parser_leaf (p, PW_OP_CONSTANT, 0, named >= 0 ? p->scope->value[named] : constant->value);
+}
+
+/* min and max combine more than two arguments pairwise. */
+static parser_part parser_call (parser *p, int index) {
+  const pw_expression_function *f = &pw_expression_functions[index];
+  parser_part part = parser_begin (p);
+  int arguments = 0;
+  parser_next (p);
+  size_t open = p->at;
+  do {
+    if (!parser_enter (p)) return part;
+    parser_next (p);
+    if (p->type == ')' && arguments == 0) break;
+    int depends = parser_choice (p).depends;
+    p->depth--;
+    if (f->most == 0 && arguments) part = parser_operation (p, part, depends, f->op, index);
+    part.depends |= depends, arguments++;
+  } while (p->type == ',' && p->status == PW_OK);
+  if (p->status != PW_OK) return part;
+  if (p->type != ')') return parser_unexpected (p, '(', open);
+  if (arguments < f->least) return parser_fail (p, p->at, "too few arguments");
+  if (f->most && arguments > f->most) return parser_fail (p, p->at, "too many arguments");
+  parser_next (p);
+  return f->most ? parser_operation (p, part, part.depends, f->op, index) : part;
+}
+
+static parser_part parser_group (parser *p) {
+  size_t open = p->at;
+  if (!parser_enter (p)) return (parser_part){ 0 };
+  parser_next (p);
+  parser_part part = parser_choice (p);
+  p->depth--;
+  part.from = open;
+  if (p->status != PW_OK) return part;
+  if (p->type != ')') return parser_unexpected (p, '(', open);
+  parser_next (p);
+  return part;
+}
+
+static parser_part parser_number (parser *p) {
+  char digits[PARSER_MAX_LENGTH + 1];
+  double value = 0;
+  snprintf (digits, sizeof digits, "%.*s", (int)p->size, p->text + p->at);
+  if (pw_read_number (digits, &value) != PW_OK) p->status = PW_RESOURCE;
+  return parser_leaf (p, PW_OP_CONSTANT, 0, value);
+}
+
+static parser_part parser_operand (parser *p) {
+  if (p->status != PW_OK) return (parser_part){ 0 };
+  if (p->type == '0') return parser_number (p);
+  if (p->type == '(') return parser_group (p);
+  if (p->type != 'n') return parser_missing (p);
+  const char *name = PW_PRINTED (PW_EXPRESSION_NAME, "%.*s", (int)p->size, p->text + p->at);
+  int index = pw_expression_find_function (name);
+  const pw_expression_function *f = index < 0 ? NULL : &pw_expression_functions[index];
+  if (f == NULL || f->op == PW_OP_CONSTANT) return parser_name (p, name, f);
+  if (parser_is_call (p)) return parser_call (p, index);
+  return parser_fail (p, p->at, "\"%s\" is a function: write its argument in parentheses", name);
+}
+
+/* ---- Operators ---- */
+
+static parser_part parser_unary (parser *p) {
+  parser_part part = parser_begin (p);
+  int op = p->symbol ? p->symbol->op : 0;
+  int sign = op == PW_OP_ADD || op == PW_OP_SUBTRACT;
+  if (!sign) part = parser_operand (p);
+  if (!sign && (p->symbol == NULL || p->symbol->op != PW_OP_POWER)) return part;
+  if (!parser_enter (p)) return part;
+  parser_next (p);
+  part.depends |= parser_unary (p).depends;
+  p->depth--;
+  if (op == PW_OP_ADD) return part;
+  return parser_operation (p, part, part.depends, sign ? PW_OP_NEGATE : PW_OP_POWER, 0);
+}
+
+static parser_part parser_binary (parser *p, int precedence) {
+  parser_part part = parser_unary (p);
+  while (p->status == PW_OK && p->symbol && p->symbol->precedence >= precedence) {
+    const parser_operator *o = p->symbol;
+    int logical = o->op == PW_OP_SELECT;
+    if (logical) part = parser_condition (p, part);
+    if (logical && *o->name == '|') parser_push (p, PW_OP_CONSTANT, 0, 1);
+    parser_next (p);
+    parser_part right = parser_binary (p, o->precedence + 1);
+    if (logical) right = parser_condition (p, right);
+    if (logical && *o->name == '&') parser_push (p, PW_OP_CONSTANT, 0, 0);
+    part = parser_operation (p, part, right.depends, o->op, 0);
+    part.condition |= logical;
+  }
+  return part;
+}
+
+static parser_part parser_choice (parser *p) {
+  parser_part part = parser_binary (p, 1);
+  size_t question = p->at;
+  if (p->status != PW_OK || p->type != '?' || !parser_enter (p)) return part;
+  part = parser_condition (p, part);
+  parser_next (p);
+  int depends = parser_choice (p).depends;
+  if (p->status == PW_OK && p->type != ':') return parser_unexpected (p, '?', question);
+  parser_next (p);
+  depends |= parser_choice (p).depends;
+  p->depth--;
+  return parser_operation (p, part, depends, PW_OP_SELECT, 0);
+}
+
+/* ---- Whole expressions ---- */
+
+static int parser_read (parser *p, const pw_scope *s, const char *const *variable, const char *text,
+                        pw_expression_error *error) {
+  memset (p, 0, offsetof (parser, code));
+  p->scope = s, p->variable = variable, p->text = text, p->error = error;
+  error->at = 0;
+  if (strlen (text) > PARSER_MAX_LENGTH)
+    return parser_fail (p, 0, "an expression of more than %d characters", PARSER_MAX_LENGTH), p->status;
+  parser_next (p);
+  parser_choice (p);
+  if (p->status == PW_OK && p->type != 0) parser_unexpected (p, 0, 0);
+  return p->status;
+}
+
+size_t pw_expression_size (const pw_expression *x) {
+  return sizeof *x + (size_t)x->codes * sizeof *x->code;
+}
+
+int pw_expression_read (const pw_scope *s, const char *const *variable, const char *text, pw_arena *arena,
+                        const pw_expression **x, pw_expression_error *error) {
+  parser p;
+  if (parser_read (&p, s, variable, text, error) != PW_OK) return p.status;
+  pw_expression head = { p.codes, p.breaks, p.jump, p.jump_size },
+                *copy = pw_arena_alloc (arena, pw_expression_size (&head));
+  if (copy == NULL) return PW_RESOURCE;
+  *copy = head;
+  memcpy (copy->code, p.code, (size_t)p.codes * sizeof *p.code);
+  *x = copy;
+  return PW_OK;
+}
+
+int pw_expression_constant (const pw_scope *s, const char *text, double *value, pw_expression_error *error) {
+  parser p;
+  if (parser_read (&p, s, NULL, text, error) == PW_OK) *value = p.code[0].value;
+  return p.status;
+}
+
+int pw_read_expression (const char *text, double *value) {
+  pw_expression_error error;
+  if (pw_read_number (text, value) == PW_OK) return PW_OK;
+  return pw_expression_constant (NULL, text, value, &error);
+}
+
+/* Names and numbers in a text, and named numbers. */
+
+#define DIGITS "0123456789"
+#define LETTERS "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ_"
+
+size_t pw_expression_name_size (const char *p) {
+  return strspn (p, LETTERS) ? strspn (p, LETTERS DIGITS ".") : 0;
+}
+
+size_t pw_expression_number_size (const char *p) {
+  size_t whole = strspn (p, DIGITS), decimals = p[whole] == '.' ? strspn (p + whole + 1, DIGITS) : 0;
+  if (whole + decimals == 0) return 0;
+  const char *end = p + whole + (p[whole] == '.' ? 1 + decimals : 0); /* of the mantissa */
+  if (*end != 'e' && *end != 'E') return (size_t)(end - p);
+  const char *exponent = end + 1 + (end[1] == '+' || end[1] == '-');
+  size_t digits = strspn (exponent, DIGITS);
+  return (size_t)(digits ? exponent + digits - p : end - p);
+}
+
+int pw_expression_number (const char *text, double *value) {
+  size_t sign = *text == '+' || *text == '-', n = pw_expression_number_size (text + sign);
+  return n && text[sign + n] == 0 && pw_read_number (text, value) == PW_OK;
+}
+
+int pw_expression_is_reserved (const char *text) {
+  return pw_expression_find_function (text) >= 0;
+}
+
+int pw_expression_is_name (const char *text) {
+  size_t n = pw_expression_name_size (text);
+  return n && text[n] == 0 && n < 64 && strchr (text, '.') == NULL;
+}
+
+const char *pw_expression_next_name (const char **rest, char name[PW_EXPRESSION_NAME]) {
+  while (**rest) {
+    const char *p = *rest;
+    size_t n = pw_expression_name_size (p), number = n ? 0 : pw_expression_number_size (p);
+    *rest += n ? n : number ? number : 1;
+    if (n == 0) continue;
+    snprintf (name, PW_EXPRESSION_NAME, "%.*s", (int)n, p);
+    return p;
+  }
+  return NULL;
+}
+
+/* ---- Named numbers ---- */
+
+int pw_scope_open (pw_scope *s, int room, pw_arena *arena) {
+  size_t n = (size_t)room + 1; /* never an empty allocation */
+  s->name = pw_arena_alloc (arena, n * sizeof *s->name);
+  s->value = pw_arena_alloc (arena, n * sizeof *s->value);
+  return s->name && s->value ? pw_names_open (&s->index, (size_t)room) : PW_RESOURCE;
+}
+
+void pw_scope_close (pw_scope *s) {
+  pw_names_close (&s->index);
+}
+
+void pw_scope_add (pw_scope *s, const char *name, double value) {
+  s->name[s->names] = name;
+  s->value[s->names] = value;
+  pw_names_add (&s->index, name, s->names++);
+}
+
+/* Formulas: expressions of named numbers, none of which is the time. */
+
+struct pw_formula {
+  pw_arena arena;
+  const pw_expression *expression;
+};
+
+pw_formula *pw_formula_open (const char *text, const char *const *names, pw_error *error) {
+  pw_expression_error why;
+  int status = PW_RESOURCE, count = 0;
+  if (pw_require (text, "an expression", error) != PW_OK || pw_require (names, "the list of names", error) != PW_OK)
+    return NULL;
+  while (names[count]) count++;
+  if (count > PW_FORMULA_NAMES) {
+    pw_fail (error, PW_INPUT, "more than %d names", PW_FORMULA_NAMES);
+    return NULL;
+  }
+  pw_formula *f = calloc (1, sizeof *f);
+  if (f) status = pw_expression_read (NULL, names, text, &f->arena, &f->expression, &why);
+  if (status == PW_OK) return f;
+  pw_fail (error, status, "%s", status == PW_INPUT ? why.text : "out of memory");
+  pw_formula_close (f);
+  return NULL;
+}
+
+double pw_formula_value (const pw_formula *f, const double *value) {
+  int may_jump; /* unused: without a time, there is no value just after a jump */
+  return pw_expression_run (f->expression->code, f->expression->codes, value, &may_jump);
+}
+
+void pw_formula_close (pw_formula *f) {
+  if (f) pw_arena_free (&f->arena);
+  free (f);
+}

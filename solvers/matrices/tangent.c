@@ -1,0 +1,375 @@
+/* Derivatives of the equations of motion in a sparse matrix; see tangent.h. */
+#include <stdlib.h>
+#include <string.h>
+#include "tangent.h"
+#include "util.h"
+
+/* Numbers the active equations. */
+static void tangent_number_rows (pw_tangent *x) {
+  const pw_run *r = x->run;
+  for (int i = 0; i < r->s->rows; i++) {
+    int active = r->active == NULL || r->active[i];
+    x->row_index[i] = active ? x->rows : -1;
+    if (!active) continue;
+    x->holonomic += i < r->s->holonomic;
+    x->row[x->rows++] = i;
+  }
+}
+
+/* The largest block of a batch, and the largest count x cols. */
+static void tangent_sizes (const pw_system *s, size_t *block, size_t *direction) {
+  *block = *direction = 1;
+  for (const pw_element_batch *k = s->batch; k < s->batch + s->batches; k++) {
+    const size_t columns = (size_t)k->b.count * (size_t)k->b.cols,
+                 widths[] = { (size_t)k->b.cols, (size_t)k->kind->rows, (size_t)k->kind->signals }; /* last: force_u */
+    if (columns > *direction) *direction = columns;
+    for (int i = 0; i < 3; i++)
+      if (columns * widths[i] > *block) *block = columns * widths[i];
+  }
+}
+
+int pw_tangent_open (pw_tangent *x, pw_run *r) {
+  const pw_system *s = r->s;
+  size_t block, direction;
+  *x = (pw_tangent){ .run = r };
+  r->uses_derivatives = 1;
+  tangent_sizes (s, &block, &direction);
+  for (pw_layout l = { 0 }; pw_layout_pass (&l, &x->memory);) {
+    x->row_index = pw_layout_alloc (&l, (size_t)s->rows, sizeof *x->row_index);
+    x->row = pw_layout_alloc (&l, (size_t)s->rows, sizeof *x->row);
+    x->lambda = pw_layout_alloc (&l, (size_t)s->rows, sizeof *x->lambda);
+    x->D = pw_layout_alloc (&l, (size_t)s->coords, sizeof *x->D);
+    x->block = pw_layout_alloc (&l, block, sizeof *x->block);
+    x->direction = pw_layout_alloc (&l, direction, sizeof *x->direction);
+  }
+  if (x->memory == NULL) return PW_RESOURCE;
+  for (int j = 0; j < s->coords; j++) x->D[j] = pw_is_angle (s, j) ? 1 / (s->scale.length * s->scale.length) : 1;
+  tangent_number_rows (x);
+  return PW_OK;
+}
+
+void pw_tangent_close (pw_tangent *x) {
+  pw_scatter_close (&x->scatter);
+  free (x->memory);
+}
+
+const double *pw_tangent_expand (const pw_tangent *x, const double *active, int count, double *all) {
+  memset (all, 0, (size_t)x->run->s->rows * sizeof *all);
+  for (int i = 0; i < count; i++) all[x->row[i]] = active[i];
+  return all;
+}
+
+void pw_tangent_multiply_JT (const pw_tangent *x, const double *active, int count, double *out) {
+  memset (out, 0, ((size_t)x->run->s->coords + 3) * sizeof *out);
+  if (count > 0) pw_add_JT (x->run->w, pw_tangent_expand (x, active, count, x->lambda), out);
+}
+
+void pw_tangent_compress (const pw_tangent *x, const double *all, int count, double *active) {
+  for (int i = 0; i < count; i++) active[i] = all[x->row[i]];
+}
+
+/* ---- Blocks ---- */
+
+/* Copies the entries of a vector of coordinates that belong to the columns of each element; 0 for the ground. */
+static void tangent_gather (const pw_system *s, const pw_element_batch *k, const double *vector, double *local) {
+  for (int e = 0; e < k->b.count; e++)
+    for (int c = 0; c < k->b.cols; c++) {
+      int j = pw_global (k, e, c);
+      *local++ = j < s->coords ? vector[j] : 0;
+    }
+}
+
+/* What a batch adds: its rows of J, or their transpose; blocks whose rows are its constraint equations, or its
+ * coordinates. */
+typedef enum { TANGENT_J, TANGENT_JT, TANGENT_EQUATIONS, TANGENT_COORDINATES } tangent_part;
+
+/* 1 for a column of x or y, 0 for one of an angle. */
+static inline int tangent_is_length (int c) {
+  return c % 3 != 2;
+}
+
+/* 1 for an entry of a pin that is always zero: in columns of x and y its rows of J are constant, multiples of unit
+ * vectors, so that their derivatives are in columns of angles only, and those of J^T lambda in rows of angles only. */
+static inline int tangent_is_zero (tangent_part part, int r, int c) {
+  if (part == TANGENT_J || part == TANGENT_JT) return tangent_is_length (c) && c % 3 == 1 - r;
+  return tangent_is_length (c) || (part == TANGENT_COORDINATES && tangent_is_length (r));
+}
+
+/* Adds the values of a batch, rows x columns of each element. */
+static void tangent_put (pw_tangent *x, const pw_element_batch *k, tangent_part part, const double *value,
+                         const pw_placement *put) {
+  const pw_system *s = x->run->s;
+  pw_scatter_map *t = &x->scatter;
+  const int of_coordinates = part == TANGENT_COORDINATES, rows = of_coordinates ? k->b.cols : k->kind->rows,
+            transposed = part == TANGENT_JT, is_pin = k->kind == &pw_kind_pin;
+  const double factor = !of_coordinates && k->row >= s->holonomic ? put->factor_nonholonomic : put->factor;
+  for (int e = 0; e < k->b.count; e++)
+    for (int r = 0; r < rows; r++) {
+      int i = of_coordinates ? pw_global (k, e, r) : k->row + e * rows + r;
+      if (!of_coordinates && put->row_index) i = put->row_index[i];
+      for (int c = 0; c < k->b.cols; c++, value++) {
+        int j = pw_global (k, e, c), row = transposed ? j : i;
+        if (j >= s->coords || i < 0 || (of_coordinates && i >= s->coords)) continue;
+        if (is_pin && tangent_is_zero (part, r, c)) continue;
+        double scale = put->row_scale ? put->row_scale[row] : 1;
+        pw_scatter_add (t, put->row + row, put->col + (transposed ? i : j), t->recording ? 0 : factor * *value * scale);
+      }
+    }
+}
+
+void pw_tangent_add_block (pw_tangent *x, pw_block block, const pw_placement *put) {
+  pw_workspace *w = x->run->w;
+  for (pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++) {
+    int of_equations = block == PW_JW_Q || block == PW_ETA_Q || block == PW_GAMMA_Q || block == PW_GAMMA_V;
+    if ((of_equations || block == PW_JTL_Q) && (k->kind->rows == 0 || k->row >= put->rows)) continue;
+    if (pw_block_function (k->kind, block) == NULL) continue;
+    if (put->direction) tangent_gather (w->s, k, put->direction, x->direction);
+    k->b.w = x->direction;
+    k->b.lambda = put->lambda ? put->lambda + k->row : NULL;
+    if (!x->scatter.recording) pw_evaluate_block (w, k, block, x->block);
+    tangent_put (x, k, of_equations ? TANGENT_EQUATIONS : TANGENT_COORDINATES, x->block, put);
+  }
+}
+
+/* Adds J or J^T. */
+static void tangent_put_J (pw_tangent *x, tangent_part part, const pw_placement *put) {
+  const pw_workspace *w = x->run->w;
+  for (const pw_element_batch *k = w->batch; k < w->batch + w->s->constraints && k->row < put->rows; k++)
+    tangent_put (x, k, part, k->J, put);
+}
+
+void pw_tangent_add_JT (pw_tangent *x, const pw_placement *put) {
+  tangent_put_J (x, TANGENT_JT, put);
+}
+
+void pw_tangent_add_signals (pw_tangent *x, int row, int col_q, int col_v) {
+  pw_workspace *w = x->run->w;
+  pw_scatter_map *t = &x->scatter;
+  const pw_system *s = w->s;
+  for (pw_element_batch *k = w->batch; s->state_dependent > 0 && k < w->batch + s->batches; k++) {
+    int signals = k->kind->signals, cols = k->b.cols;
+    if (signals == 0 || k->kind->force_u == NULL) continue;
+    if (!t->recording) k->kind->force_u (&k->b, x->block);
+    for (int e = 0; e < k->b.count; e++)
+      for (int u = 0; u < signals; u++) {
+        const pw_source *source = &k->source[e * signals + u];
+        for (int read = 0; read < source->reads; read++) { /* source->x: values of the states read, derivatives */
+          int j = source->state[read], col = j < s->coords ? col_q + j : col_v + j - s->coords;
+          double slope = source->x[source->reads + read];
+          for (int c = 0; c < cols; c++) {
+            int i = pw_global (k, e, c);
+            if (i >= s->coords) continue;
+            pw_scatter_add (t, row + i, col, t->recording ? 0 : -x->block[(e * cols + c) * signals + u] * slope);
+          }
+        }
+      }
+  }
+}
+
+/* ---- Equations ---- */
+
+void pw_tangent_add_equations (pw_tangent *x, pw_block block, int row, int col, const double *w, double holonomic,
+                               double nonholonomic) {
+  const pw_placement put = { row,           col, x->run->s->rows, holonomic, nonholonomic, .row_index = x->row_index,
+                             .direction = w };
+  pw_tangent_add_block (x, block, &put);
+}
+
+void pw_tangent_add_J (pw_tangent *x, int rows, int row, int col, double holonomic, double nonholonomic) {
+  tangent_put_J (x, TANGENT_J, &(pw_placement){ row, col, rows, holonomic, nonholonomic, .row_index = x->row_index });
+}
+
+/* (J^T lambda)_q - f_q; -f_v; M; J^T: the derivatives with respect to q, v, a, lambda */
+void pw_tangent_add_momentum (pw_tangent *x, const pw_tangent_layout *to, const double *lambda) {
+  const pw_system *s = x->run->s;
+  pw_placement put = {
+    .row = to->momentum, .col = to->q, .rows = s->rows, .factor = 1, .row_index = x->row_index, .lambda = lambda
+  };
+  pw_tangent_add_block (x, PW_JTL_Q, &put);
+  put.factor = -1;
+  pw_tangent_add_block (x, PW_FORCE_Q, &put);
+  put.col = to->v;
+  pw_tangent_add_block (x, PW_FORCE_V, &put);
+  pw_tangent_add_signals (x, to->momentum, to->q, to->v);
+  for (int j = 0; j < s->coords; j++)
+    pw_scatter_add (&x->scatter, to->momentum + j, to->a + j, to->a_factor * s->mass[j]);
+  put.factor = put.factor_nonholonomic = to->lambda_factor;
+  put.col = to->lambda;
+  pw_tangent_add_JT (x, &put);
+}
+
+/* (J a)_q - gamma_q + 2 alpha ((J v)_q - eta_q) + beta^2 J (holonomic); 2 alpha J - gamma_v; J */
+void pw_tangent_add_accelerations (pw_tangent *x, const pw_tangent_layout *to, const double *v, const double *a) {
+  const pw_run *r = x->run;
+  const int rows = r->s->rows, row = to->constraint;
+  const double alpha = r->alpha, a_in_v = to->a == to->v ? to->a_factor : 0; /* what a adds to the columns of v */
+  pw_tangent_add_equations (x, PW_JW_Q, row, to->q, a, 1, 1);
+  pw_tangent_add_equations (x, PW_JW_Q, row, to->q, v, 2 * alpha, alpha);
+  pw_tangent_add_equations (x, PW_ETA_Q, row, to->q, NULL, -2 * alpha, -alpha);
+  pw_tangent_add_equations (x, PW_GAMMA_Q, row, to->q, NULL, -1, -1);
+  pw_tangent_add_equations (x, PW_GAMMA_V, row, to->v, NULL, -1, -1);
+  pw_tangent_add_J (x, rows, row, to->v, a_in_v + 2 * alpha, a_in_v + alpha);
+  pw_tangent_add_J (x, r->s->holonomic, row, to->q, r->beta * r->beta, 0);
+  if (to->a != to->v) pw_tangent_add_J (x, rows, row, to->a, to->a_factor, to->a_factor);
+}
+
+/* Residual and Newton matrix of the equations of motion as differential-algebraic equations; see tangent.h. */
+
+int pw_dae_open (pw_dae *x, pw_run *r) {
+  const pw_system *s = r->s;
+  size_t n = (size_t)s->coords, m = (size_t)s->rows;
+  const pw_stabilisation_kind kind = r->method->stabilisations[r->stabilisation].kind;
+  *x = (pw_dae){ .integrates_multipliers = kind == PW_SI1, .n = s->coords };
+  x->enforces_positions = kind == PW_GGL || kind == PW_SI1 || kind == PW_INDEX3 || kind == PW_RATTLE;
+  x->enforces_velocities = kind == PW_GGL || kind == PW_SI1 || kind == PW_INDEX2;
+  const pw_array array[] = { { &x->reaction, n + 3 }, { &x->force, n + 3 }, { &x->residual, m }, { &x->scratch, m } };
+  x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
+  if (x->memory == NULL || pw_tangent_open (&x->tangent, r) != PW_OK) return PW_RESOURCE;
+  x->rows = x->tangent.rows;
+  x->mu_count = x->enforces_positions && x->enforces_velocities ? x->tangent.holonomic : 0;
+  x->size = 2 * x->n + x->rows + x->mu_count;
+  return PW_OK;
+}
+
+void pw_dae_close (pw_dae *x) {
+  pw_tangent_close (&x->tangent);
+  free (x->memory);
+}
+
+/* ---- Residual ---- */
+
+/* The residuals of the constraint equations that lambda enforces, then of g = 0 if mu enforces it. */
+static void dae_constraints (pw_dae *x, const double *v, const double *a, double *F) {
+  pw_run *r = x->tangent.run;
+  pw_workspace *w = r->w;
+  const int accelerations = !x->enforces_velocities && !x->enforces_positions;
+  pw_mul_J (w, accelerations ? a : v, x->residual);
+  if (accelerations)
+    pw_run_gamma (r, v, x->scratch);
+  else
+    pw_evaluate_eta (w, x->scratch);
+  for (int i = 0; i < r->s->rows; i++) x->residual[i] -= x->scratch[i];
+  if (x->enforces_positions) pw_evaluate_g (w, x->enforces_velocities ? x->scratch : x->residual);
+  pw_tangent_compress (&x->tangent, x->residual, x->rows, F);
+  pw_tangent_compress (&x->tangent, x->scratch, x->mu_count, F + x->rows);
+}
+
+void pw_dae_residual (pw_dae *x, const double *v, const double *a, const double *lambda, double *F) {
+  const pw_run *r = x->tangent.run;
+  int n = x->n;
+  pw_tangent_multiply_JT (&x->tangent, lambda + x->rows, x->mu_count, x->reaction);
+  for (int j = 0; j < n; j++) F[j] = x->tangent.D[j] * x->reaction[j];
+  pw_tangent_multiply_JT (&x->tangent, lambda, x->rows, x->reaction);
+  pw_evaluate_force (r->w, x->force);
+  for (int j = 0; j < n; j++) F[n + j] = (a ? r->s->mass[j] * a[j] : 0) + x->reaction[j] - x->force[j];
+  dae_constraints (x, v, a, F + 2 * n);
+}
+
+/* ---- Matrix ---- */
+
+/* The derivatives of the kinematics with respect to q: q_dot_factor I + D (G^T mu)_q; v: -I; mu: mu_factor D G^T. */
+static void dae_add_kinematics (pw_dae *x, const double *mu, double q_dot_factor, double mu_factor) {
+  pw_tangent *t = &x->tangent;
+  for (int j = 0; j < x->n; j++) {
+    pw_scatter_add (&t->scatter, j, j, q_dot_factor);
+    pw_scatter_add (&t->scatter, j, x->n + j, -1);
+  }
+  if (x->mu_count == 0) return;
+  mu = pw_tangent_expand (t, mu, x->mu_count, t->lambda);
+  pw_placement put = {
+    .rows = t->run->s->holonomic, .factor = 1, .row_scale = t->D, .row_index = t->row_index, .lambda = mu
+  };
+  pw_tangent_add_block (t, PW_JTL_Q, &put);
+  put.col = 2 * x->n + x->rows;
+  put.factor = mu_factor;
+  pw_tangent_add_JT (t, &put);
+}
+
+/* The derivatives of J v - eta, where it is enforced, with respect to q: (J v)_q - eta_q; v: J; and of g, q: G. */
+static void dae_add_constraints (pw_dae *x, const double *v) {
+  pw_tangent *t = &x->tangent;
+  const pw_system *s = t->run->s;
+  const int n = x->n, g_row = x->enforces_velocities ? 2 * n + x->rows : 2 * n;
+  const double holonomic_factor = x->enforces_velocities ? 1 : 0; /* 0: g replaces J v - eta of holonomic equations */
+  pw_tangent_add_equations (t, PW_JW_Q, 2 * n, 0, v, holonomic_factor, 1);
+  pw_tangent_add_equations (t, PW_ETA_Q, 2 * n, 0, NULL, -holonomic_factor, -1);
+  pw_tangent_add_J (t, s->rows, 2 * n, n, holonomic_factor, 1);
+  if (x->enforces_positions) pw_tangent_add_J (t, s->holonomic, g_row, 0, 1, 0);
+}
+
+void pw_dae_matrix (pw_dae *x, const double *v, const double *a, const double *lambda, double q_dot_factor,
+                    double v_dot_factor) {
+  const int n = x->n;
+  pw_tangent *t = &x->tangent;
+  const double multiplier_factor = x->integrates_multipliers ? v_dot_factor : 1;
+  const pw_tangent_layout to = { .momentum = n,
+                                 .constraint = 2 * n,
+                                 .v = n,
+                                 .a = n,
+                                 .lambda = 2 * n,
+                                 .a_factor = v_dot_factor,
+                                 .lambda_factor = multiplier_factor };
+  dae_add_kinematics (x, lambda + x->rows, q_dot_factor, multiplier_factor);
+  pw_tangent_add_momentum (t, &to, pw_tangent_expand (t, lambda, x->rows, t->lambda));
+  if (x->enforces_velocities || x->enforces_positions)
+    dae_add_constraints (x, v);
+  else
+    pw_tangent_add_accelerations (t, &to, v, a);
+}
+
+int pw_dae_lay_out (pw_dae *x, const double *v, const double *a, const double *lambda) {
+  pw_tangent *t = &x->tangent;
+  pw_scatter_begin_record (&t->scatter);
+  pw_dae_matrix (x, v, a, lambda, 1, 1);
+  return pw_scatter_lay_out (&t->scatter, x->size);
+}
+
+/* Recording and layout of the sequence of contributions to a sparse matrix; see tangent.h. */
+
+void pw_scatter_begin_record (pw_scatter_map *t) {
+  *t = (pw_scatter_map){ .recording = 1 };
+}
+
+void pw_scatter_record_entry (pw_scatter_map *t, int row, int col) {
+  t->failed |= pw_grow (&t->entry, t->count, &t->room, sizeof *t->entry) != PW_OK;
+  if (t->failed) return;
+  t->entry[t->count] = (struct pw_scatter_entry){ row, col, t->count };
+  t->count++;
+}
+
+/* By columns, then by rows. */
+static int scatter_compare (const void *a, const void *b) {
+  const struct pw_scatter_entry *x = a, *y = b;
+  return x->col != y->col ? (x->col > y->col) - (x->col < y->col) : (x->row > y->row) - (x->row < y->row);
+}
+
+int pw_scatter_lay_out (pw_scatter_map *t, int n) {
+  t->place = malloc ((t->count + 1) * sizeof *t->place);
+  t->colptr = malloc (((size_t)n + 1) * sizeof *t->colptr);
+  t->rowind = malloc ((t->count + 1) * sizeof *t->rowind);
+  if (t->failed || !t->place || !t->colptr || !t->rowind) return PW_RESOURCE;
+  const struct pw_scatter_entry *e = t->entry;
+  if (t->count > 0) qsort (t->entry, t->count, sizeof *t->entry, scatter_compare);
+  for (int c = 0; c < n; c++) {
+    t->colptr[c] = (int64_t)t->nonzeros;
+    for (int last_row = -1; e < t->entry + t->count && e->col == c; e++) {
+      if (e->row != last_row) t->rowind[t->nonzeros++] = last_row = e->row;
+      t->place[e->number] = t->nonzeros - 1;
+    }
+  }
+  t->colptr[n] = (int64_t)t->nonzeros;
+  free (t->entry);
+  t->entry = NULL;
+  t->recording = 0;
+  t->value = malloc ((t->nonzeros + 1) * sizeof *t->value);
+  return t->value ? PW_OK : PW_RESOURCE;
+}
+
+void pw_scatter_close (pw_scatter_map *t) {
+  free (t->entry);
+  free (t->place);
+  free (t->colptr);
+  free (t->rowind);
+  free (t->value);
+  *t = (pw_scatter_map){ 0 };
+}

@@ -1,0 +1,229 @@
+/* Accelerations a and multipliers lambda of a run, with Baumgarte's terms if selected:
+ *
+ *   M a + J^T lambda = f
+ *   J a = gamma - 2 alpha (J v - eta) - beta^2 g     for holonomic rows
+ *   J a = gamma - alpha (J v - eta)                  for nonholonomic ones
+ *
+ * (Baumgarte 1972, Stabilization of constraints and integrals of motion in dynamical systems.) */
+#include <math.h>
+#include <string.h>
+#include "method.h"
+#include "specialised.h"
+#include "util.h"
+
+/* The first coords + 3 + rows numbers of r->scratch stay free for callers. */
+void pw_run_gamma (pw_run *r, const double *v, double *gamma) {
+  const pw_system *s = r->s;
+  double *Jv = r->scratch + s->coords + 3 + s->rows, *eta = Jv + s->rows, *g = eta;
+  pw_evaluate_gamma (r->w, gamma);
+  if (r->alpha + r->beta == 0) return;
+  pw_mul_J (r->w, v, Jv);
+  pw_evaluate_eta (r->w, eta);
+  for (int i = 0; i < s->rows; i++) gamma[i] -= (i < s->holonomic ? 2 : 1) * r->alpha * (Jv[i] - eta[i]);
+  pw_evaluate_g (r->w, g);
+  for (int i = 0; i < s->holonomic; i++) gamma[i] -= r->beta * r->beta * g[i];
+}
+
+/* Computes gamma and returns the forces at the current configuration: those computed into f, or the system's array of
+ * constant forces if there are no others. */
+static inline const double *dynamics_right_side (pw_run *r, const double *v, double *f, double *gamma) {
+  pw_run_gamma (r, v, gamma);
+  if (r->s->forces == 0) return r->s->constant;
+  pw_evaluate_force (r->w, f);
+  return f;
+}
+
+/* Iterative refinement (Wilkinson 1963): near a singular configuration the factorisation has an error of eps / sine^2
+ * (watchdog.c); refinement reduces it to eps / sine. */
+static void dynamics_refine (pw_run *r, const double *v, double *a, double *lambda) {
+  const pw_system *s = r->s;
+  double *f = r->scratch, *gamma = f + s->coords + 3;                                  /* residuals */
+  double *da = r->w->scratch, *dlambda = da + s->coords + 3, *Jda = dlambda + s->rows; /* corrections */
+  if (dynamics_right_side (r, v, f, gamma) != f) pw_evaluate_force (r->w, f);
+  for (int j = 0; j < s->coords; j++) da[j] = a[j];
+  for (int i = 0; i < s->rows; i++) dlambda[i] = lambda[i];
+  for (int pass = 0; pass < 3; pass++) { /* the first solution is the correction of a = 0, lambda = 0 */
+    for (int j = 0; j < s->coords; j++) f[j] -= s->mass[j] * da[j];
+    for (int i = 0; i < s->rows; i++) dlambda[i] = -dlambda[i];
+    pw_add_JT (r->w, dlambda, f);
+    pw_mul_J (r->w, da, Jda);
+    for (int i = 0; i < s->rows; i++) gamma[i] -= Jda[i];
+    pw_saddle_solve (r->saddle, f, gamma, da, dlambda);
+    for (int j = 0; j < s->coords; j++) a[j] += da[j];
+    for (int i = 0; i < s->rows; i++) lambda[i] += dlambda[i];
+  }
+}
+
+void pw_run_accelerate_updated (pw_run *r, const double *v, double *a, double *lambda) {
+  const double *f = dynamics_right_side (r, v, r->scratch, lambda);
+  r->statistics.rhs++;
+  pw_saddle_solve (r->saddle, f, lambda, a, lambda);
+  if (pw_saddle_sine_below (r->saddle, r->thresholds.refine)) dynamics_refine (r, v, a, lambda);
+}
+
+/* Factorises and solves, with gamma in the array of lambda; *near = 1 near a singular configuration, where the status
+ * is PW_RETRY if the sine is at most r->refused_sine. */
+static inline int dynamics_solve (pw_run *r, const double *v, double *a, double *lambda, int *near) {
+  const double *f = dynamics_right_side (r, v, r->scratch, lambda);
+  r->statistics.rhs++;
+  r->statistics.factorisations++;
+  int status = pw_saddle_factor (r->saddle);
+  if (status == PW_OK) pw_saddle_solve (r->saddle, f, lambda, a, lambda);
+  *near = pw_watchdog_near (r);
+  if (*near && r->watchdog.evaluated_sine <= r->refused_sine) return PW_RETRY;
+  if (status == PW_OK && pw_saddle_sine_below (r->saddle, r->thresholds.refine)) dynamics_refine (r, v, a, lambda);
+  return status;
+}
+
+int pw_run_accelerate_evaluated (pw_run *r, const double *v, double *a, double *lambda) {
+  int near;
+  return dynamics_solve (r, v, a, lambda, &near);
+}
+
+int pw_run_accelerate (pw_run *r, double t, const double *q, const double *v, double *a, double *lambda) {
+  if (pw_specialised_evaluate (r, t, q, v, a, lambda)) return PW_OK;
+  int near, status = pw_evaluate_J_at (r->w, t, q, v);
+  if (status != PW_OK) return status;
+  status = dynamics_solve (r, v, a, lambda, &near);
+  if (near) r->near_singular = 1;
+  return status;
+}
+
+void pw_sample_reached (pw_run *r) {
+  memcpy (r->q_at, r->q, pw_state_length (r->s) * sizeof *r->q);
+  memcpy (r->ledger_at, r->ledger, (size_t)r->entries * sizeof (double));
+  r->projected_at = r->projected;
+  (void)pw_evaluate_J_at (r->w, r->t, r->q_at, r->v_at);
+}
+
+void pw_record_residuals (pw_run *r) {
+  pw_residuals *now = &r->residuals;
+  pw_statistics *largest = &r->statistics;
+  pw_specialised_residuals (r);
+  if (isnan (now->position)) pw_evaluate_position_residual (r->w, NULL, now);
+  if (isnan (now->velocity)) pw_evaluate_velocity_residual (r->w, NULL, now);
+  largest->position = pw_larger (largest->position, now->position);
+  largest->velocity = pw_larger (largest->velocity, now->velocity);
+  largest->g = pw_larger (largest->g, now->g);
+  largest->jv = pw_larger (largest->jv, now->jv);
+}
+
+/* Use of specialised code, compiled for one scene, in place of the general evaluation and projection.  It refuses
+ * states at which a pivot is small or a value extreme; the general functions evaluate these. */
+
+/* pw_scene.update: evaluates the signals for the compiled code. */
+static int specialised_update (void *workspace, double t, const double *q, const double *v) {
+  return pw_update_signals (workspace, t, q, v);
+}
+
+/* Makes r->scene, the data of the compiled code; PW_OK or PW_RESOURCE. */
+static int specialised_allocate (pw_run *r, int constants) {
+  const pw_system *s = r->s;
+  const void **element = pw_arena_alloc (&r->arena, (size_t)s->batches * sizeof *element);
+  const pw_kind **kind = pw_arena_alloc (&r->arena, (size_t)s->batches * sizeof *kind);
+  const pw_signal **signal = pw_arena_alloc (&r->arena, (size_t)s->sources * sizeof *signal);
+  double *constant = pw_arena_alloc (&r->arena, (size_t)constants * sizeof *constant); /* filled by `prepare` */
+  r->scene = pw_arena_alloc (&r->arena, sizeof *r->scene);
+  if (!element || !kind || !signal || !constant || !r->scene) return PW_RESOURCE;
+  for (int i = 0; i < s->batches; i++) element[i] = s->batch[i].b.element, kind[i] = s->batch[i].kind;
+  for (int i = 0; i < s->sources; i++) signal[i] = &r->w->source[i].signal;
+  *r->scene = (pw_scene){ .element = element,
+                          .kind = kind,
+                          .signal = signal,
+                          .constant = constant,
+                          .mass = s->mass,
+                          .force = s->constant,
+                          .u = r->w->u,
+                          .t_signal = &r->w->t_signal,
+                          .update = specialised_update,
+                          .workspace = r->w };
+  return PW_OK;
+}
+
+int pw_specialised_open (pw_run *r, pw_error *error) {
+  const pw_specialised *code = r->settings.specialised;
+  if (code == NULL || r->settings.integrals > 0) return PW_OK;
+  if (!pw_specialised_fits (code, r->s))
+    return pw_fail (error, PW_INPUT, "model %s: the specialised code belongs to another scene", r->s->model);
+  if (specialised_allocate (r, code->constants) != PW_OK) return pw_fail_memory (r->s, error);
+  r->scene->length = r->w->scale.length, r->scene->speed = r->scene->length / r->w->scale.time;
+  r->scene->redundant_residual = r->thresholds.redundant_residual;
+  r->scene->alpha = r->alpha, r->scene->beta = r->beta;
+  if (code->prepare (r->scene) != 0) r->scene = NULL;
+  pw_specialised_select (r);
+  return PW_OK;
+}
+
+void pw_specialised_select (pw_run *r) {
+  const pw_specialised *code = r->settings.specialised;
+  int suits = r->scene != NULL;
+  for (int i = 0; suits && i < r->s->rows; i++) suits = code->independent[i] == (r->active == NULL || r->active[i]);
+  r->specialised = suits ? code : NULL;
+}
+
+/* 0 also where a singular configuration may be ahead and steps are fixed: the general functions then compute the sine
+ * of every stage.  Adaptive methods need it only below the pivots that the specialised code accepts. */
+int pw_specialised_suits (const pw_run *r) {
+  const pw_watchdog *watch = &r->watchdog;
+  return r->specialised && !r->redundant_drive && !(watch->singular_ahead && watch->saddle && r->fixed_steps) &&
+         !r->near_singular && !r->w->hold;
+}
+
+void pw_specialised_count (pw_run *r, long evaluations, long iterations) {
+  r->statistics.rhs += evaluations;
+  r->statistics.specialised += evaluations;
+  r->statistics.factorisations += evaluations + iterations;
+}
+
+/* After an evaluation at (q, v): makes the workspace and the saddle consistent with it, and counts it. */
+static void specialised_finish (pw_run *r, const double *q, const double *v, long iterations) {
+  if (r->s->coords > 3 * r->s->bodies) pw_point_to_internal (r->w, q, v);
+  pw_saddle_postpone (r->saddle, PW_SCENE_PIVOT);
+  pw_specialised_count (r, 1, iterations);
+}
+
+int pw_specialised_evaluate (pw_run *r, double t, const double *q, const double *v, double *a, double *lambda) {
+  if (!pw_specialised_suits (r)) return 0;
+  if (r->specialised->evaluate (r->scene, t, q, v, a, lambda, r->w->configuration, r->w->J)) return 0;
+  specialised_finish (r, q, v, 0);
+  return 1;
+}
+
+/* The first stage of a step is the state reached, which has been evaluated. */
+int pw_specialised_stages (pw_run *r, const pw_scene_step *x) {
+  if (!pw_specialised_suits (r) || r->specialised->stages (r->scene, x)) return 0;
+  pw_specialised_count (r, x->stages - 1, 0);
+  return 1;
+}
+
+static void specialised_copy_residuals (pw_run *r) {
+  const pw_scene *x = r->scene;
+  r->residuals = (pw_residuals){ .position = x->position, .g = x->g, .velocity = x->velocity, .jv = x->jv };
+}
+
+int pw_specialised_project (const pw_projector *p, pw_run *r, double t, double *q, double *v, double *a,
+                            double *lambda) {
+  if (p->owns_velocity || !pw_specialised_suits (r)) return 0;
+  if (r->specialised->project (r->scene, t, q, v, a, lambda, r->w->configuration, r->w->J)) return 0;
+  specialised_finish (r, q, v, r->scene->iterations);
+  if (r->active)
+    pw_forget_residuals (r);
+  else
+    specialised_copy_residuals (r);
+  return 1;
+}
+
+void pw_specialised_residuals (pw_run *r) {
+  if (!pw_specialised_suits (r) || r->active || !isnan (r->residuals.position) || !isnan (r->residuals.velocity))
+    return;
+  r->specialised->residuals (r->scene, r->q, r->v, r->w->configuration, r->w->J);
+  specialised_copy_residuals (r);
+}
+
+/* The options of a run's method, for the methods themselves; methods.c, which reads options, depends on all methods. */
+
+double pw_run_option (const pw_run *r, const char *name) {
+  int i = 0;
+  while (r->method->options[i].name && strcmp (r->method->options[i].name, name) != 0) i++;
+  return r->method->options[i].name ? r->option[i] : 0;
+}
