@@ -6,6 +6,7 @@
 
 PW_BEGIN
 
+#define PW_STEP 1e-3          /* default step of fixed-step methods [s] */
 #define PW_RTOL 1e-6          /* default relative tolerance of adaptive methods */
 #define PW_MAX_STEPS 10000000 /* default limit of attempted steps of adaptive methods */
 
@@ -39,7 +40,7 @@ typedef struct {
   /* Approximate duration of the run [s], for the scale of energy, and an upper bound of the time scale; default 1 s, or
    * 1000 steps of a fixed size. */
   double span;
-  double step; /* fixed-step methods: step size [s]; default 1e-3 */
+  double step; /* fixed-step methods: step size [s]; default PW_STEP */
   double rtol; /* adaptive methods: relative tolerance; default PW_RTOL */
   double atol; /* absolute tolerance of every state; default rtol x (L, 1 rad, L/T, 1/T), see pw_scale */
   int ledger;  /* 1: samples contain the work or loss of each element, and the energy added by projections */

@@ -103,6 +103,27 @@ int pw_differentiate (const pw_difference_settings *d, pw_derivative *out, doubl
 const char *pw_accurate_method (const pw_system *s, const pw_settings *settings, double t_end, long *most_steps,
                                 pw_error *error);
 
+/* ---- The error of a run, from its repetition (repetition.c) ---- */
+
+/* The repetition of a run with a tenth of the tolerance (with ten times the tolerance if that is too small for the
+ * method), or half the step.  Runs are compared at `count` increasing times from the initial one on, which must outlive
+ * the repetition, as must the system, the method and what the settings refer to.  NULL and the error: PW_INPUT,
+ * PW_RESOURCE. */
+typedef struct pw_repetition pw_repetition;
+pw_repetition *pw_repetition_open (const pw_system *s, const char *method, const pw_settings *settings,
+                                   const double *times, long count, pw_error *error);
+/* Makes the repetition, perhaps in another thread than the run.  Errors: as pw_run_open and pw_run_advance. */
+int pw_repetition_run (pw_repetition *r, pw_error *error);
+/* States the errors of the first `count` rows of the run, as pw_run_record stores them at the times of the repetition,
+ * which has been made: of each number at the last of these times, and the largest at any; NAN of the time, residuals,
+ * energy of projections and balance.  They contain the true ones if the repetition has at most half the error of the
+ * run.  PW_METHOD and the reason if no error can be stated: the difference is larger than 1 % of the motion and does not
+ * become smaller in a second repetition, made now, with a hundredth of the tolerance or a quarter of the step. */
+int pw_repetition_error (pw_repetition *r, const double *rows, long count, double *end, double *largest,
+                         pw_error *error);
+const char *pw_repetition_text (const pw_repetition *r); /* "a tenth of the tolerance", "half the step", ... */
+void pw_repetition_close (pw_repetition *r);
+
 /* ---- Steady motions (steady*.c) ---- */
 
 /* Finds by name a quantity that can be held: a state, numbered as in pw_system_find_state; after these, of each body,

@@ -228,6 +228,10 @@ void pw_profile_free (pw_profile *p);
  * pw_settings.ledger, the ledger's entries. */
 enum { PW_RECORD_STATES = 9 }; /* index of the first coordinate in a row */
 int pw_run_record_width (const pw_run *r);
+int pw_system_record_width (const pw_system *s, int ledger); /* of runs with pw_settings.ledger = ledger */
+/* Name and unit of a number of a row, as in tables; those of accelerations: the velocity's name and "'". */
+char *pw_system_record_name (const pw_system *s, int i, char *buffer, size_t size);
+const char *pw_system_record_unit (const pw_system *s, int i);
 int pw_run_record (pw_run *r, double t_end, const double *times, long count, long steps, double *rows, long *recorded,
                    pw_error *error);
 

@@ -169,6 +169,24 @@ static void json_reference (pw_json *j, const pw_reference_error *e) {
   pw_json_close (j, '}');
 }
 
+static void json_errors (pw_json *j, const char *key, const pw_system *s, const pw_stated_error *e,
+                         const double *value) {
+  if (!json_object (j, key, e->unknown ? NULL : e)) return;
+  for (int i = 0; i < e->columns; i++)
+    if (!isnan (value[i])) pw_json_number (j, PW_NAME (e->name, s, i), value[i]);
+  pw_json_close (j, '}');
+}
+
+static void json_stated (pw_json *j, const pw_system *s, const pw_stated_error *e) {
+  if (!json_object (j, "error", e)) return;
+  pw_json_text (j, "repeated", e->repeated);
+  pw_json_text (j, "unknown", e->unknown);
+  pw_json_number (j, "t", e->t);
+  json_errors (j, "end", s, e, e->end);
+  json_errors (j, "largest", s, e, e->largest);
+  pw_json_close (j, '}');
+}
+
 static void json_statistics (pw_json *j, const pw_statistics *n, double cpu) {
   static const char *const residuals[] = { "position", "velocity" };
   json_numbers (j, "residual", residuals, n ? (const double[]){ n->position, n->velocity } : NULL, 2);
@@ -198,6 +216,7 @@ int pw_json_write (const pw_summary *summary, const pw_system *s, const pw_sampl
   pw_json_number (&j, "unbalanced", summary->energy_defect);
   json_lists (&j, summary->redundant, s);
   json_reference (&j, summary->reference);
+  json_stated (&j, s, summary->stated);
   json_statistics (&j, statistics, summary->cpu);
   pw_json_close (&j, '}');
   return pw_output_check (o, error);

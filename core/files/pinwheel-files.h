@@ -292,6 +292,16 @@ typedef struct {
                          1 if that is 0 */
 } pw_reference_error;
 
+/* The errors of a run that its repetition states, of the numbers of a row of pw_run_record. */
+typedef struct {
+  const char *repeated;        /* with what: "a tenth of the tolerance", ... */
+  const char *unknown;         /* why no error can be stated; NULL: the errors are stated */
+  double t;                    /* of the last comparison [s] */
+  int columns;                 /* numbers of a row */
+  const double *end, *largest; /* columns: errors at t, and the largest of the run; NaN: of residuals */
+  char *(*name) (const pw_system *s, int column, char *buffer, size_t size);
+} pw_stated_error;
+
 /* What a run was and how it ended; `reason` is "" when the status is ok. */
 typedef struct {
   const char *model, *method;
@@ -300,6 +310,7 @@ typedef struct {
   double cpu;                          /* [s], integration alone */
   const char *const *redundant;        /* a message per redundant constraint equation, ended by NULL; may be NULL */
   const pw_reference_error *reference; /* NULL: no reference */
+  const pw_stated_error *stated;       /* NULL: not asked for */
   const char *general;                 /* why the general engine was used; "": it was not; NULL: no run */
   double energy_defect;                /* relative, as pw_run_energy_defect says; NaN: not known */
 } pw_summary;

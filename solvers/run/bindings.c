@@ -1,14 +1,43 @@
 /* For programs in other languages: samples in rows of an array, signals whose value they set, layouts of structures. */
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 #include "method.h"
 #include "pinwheel-analysis.h"
 
 /* ---- Rows of samples (r->s->rows: the number of constraint equations) ---- */
 
+int pw_system_record_width (const pw_system *s, int ledger) {
+  return PW_RECORD_STATES + 3 * s->coords + 2 * pw_system_contacts (s) + s->rows + (ledger ? s->entries : 0);
+}
+
 int pw_run_record_width (const pw_run *r) {
-  return PW_RECORD_STATES + 3 * r->s->coords + 2 * pw_system_contacts (r->s) + r->s->rows +
-         (r->settings.ledger ? r->s->entries : 0);
+  return pw_system_record_width (r->s, r->settings.ledger);
+}
+
+char *pw_system_record_name (const pw_system *s, int i, char *buffer, size_t size) {
+  static const char *const first[PW_RECORD_STATES] = { "t",       "residual.position", "residual.velocity",
+                                                       "kinetic", "potential",         "work",
+                                                       "loss",    "projection",        "balance" };
+  const int n = s->coords, contacts = 2 * pw_system_contacts (s);
+  if (i < PW_RECORD_STATES) return snprintf (buffer, size, "%s", first[i]), buffer;
+  if ((i -= PW_RECORD_STATES) < 2 * n) return pw_system_state_name (s, i, buffer, size);
+  if (i < 3 * n) {
+    pw_system_state_name (s, i - n, buffer, size);
+    return strncat (buffer, "'", size - strlen (buffer) - 1);
+  }
+  if ((i -= 3 * n) < contacts) return pw_system_contact_name (s, i, buffer, size);
+  if ((i -= contacts) < s->rows) return pw_system_reaction_name (s, i, buffer, size);
+  return pw_system_ledger_name (s, i - s->rows, buffer, size);
+}
+
+const char *pw_system_record_unit (const pw_system *s, int i) {
+  const int n = s->coords, contacts = 2 * pw_system_contacts (s);
+  if (i < PW_RECORD_STATES) return i == 0 ? "s" : i < 3 ? "" : "J";
+  if ((i -= PW_RECORD_STATES) < 2 * n) return pw_system_state_unit (s, i);
+  if (i < 3 * n) return pw_system_state_unit (s, i - 2 * n)[0] == 'm' ? "m/s^2" : "rad/s^2";
+  if ((i -= 3 * n) < contacts) return "m";
+  return i - contacts < s->rows ? pw_system_reaction_unit (s, i - contacts) : "J";
 }
 
 /* Stores x and y of all contact points at the sample, where kinematics are evaluated, and returns the end. */

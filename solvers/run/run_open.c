@@ -29,7 +29,7 @@ static int run_settings (pw_settings *to, const pw_settings *from, int fixed_ste
   if (from->max_steps < 0)
     return pw_fail (error, PW_INPUT, "setting max_steps = %ld: expected a number > 0", from->max_steps);
   *to = *from;
-  if (to->step == 0) to->step = 1e-3;
+  if (to->step == 0) to->step = PW_STEP;
   if (to->rtol == 0) to->rtol = PW_RTOL;
   if (to->max_steps == 0) to->max_steps = PW_MAX_STEPS;
   if (to->span == 0) to->span = fixed_steps ? fmin (1000 * to->step, DBL_MAX) : 1;

@@ -273,7 +273,8 @@ pw_summary pw_run_summary (pw_run_cli *command, const pw_sample *last, const pw_
                          .redundant = command->redundant,
                          .general = run ? report_general_reason (command) : NULL,
                          .reference =
-                             run ? pw_comparison_errors (&command->comparison, command->compiled.system) : NULL };
+                             run ? pw_comparison_errors (&command->comparison, command->compiled.system) : NULL,
+                         .stated = command->stated.known ? &command->stated.result : NULL };
   if (error->status == PW_OK && pw_stop) {
     snprintf (reason, PW_RUN_REASON, "interrupted at t = %s s", PW_DIGITS (pw_run_time (run), 6));
     summary.status = "interrupted";

@@ -141,7 +141,8 @@ static int run_open (pw_run_cli *command, pw_error *error) {
   pw_output *table = command->output[PW_RUN_TABLE];
   if (table && (command->table = pw_csv_open (system, command->with_energies, table, error)) == NULL)
     return error->status;
-  return pw_checkpoints_resume (command, error);
+  status = pw_error_run_start (command, error);
+  return status == PW_OK ? pw_checkpoints_resume (command, error) : status;
 }
 
 /* ---- The run ---- */
@@ -179,6 +180,8 @@ static int run_store_samples (pw_run_cli *command, pw_error *error) {
     status = pw_run_sample (run, pw_motion_next_time (motion), &sample, error);
     if (status == PW_OK) pw_motion_add (motion, command->compiled.system, &sample);
   }
+  while (status == PW_OK && pw_error_run_next (&command->stated) <= now)
+    status = pw_error_run_add (&command->stated, run, error);
   return status;
 }
 
@@ -187,14 +190,15 @@ static int run_batch (pw_run_cli *command, pw_error *error) {
   double due = fmin (command->checkpoints.next_time, command->t_end);
   due = fmin (due, run_next_row_time (command));
   due = fmin (due, pw_motion_next_time (&command->comparison.motion));
+  due = fmin (due, pw_error_run_next (&command->stated));
   if (command->plots) due = fmin (due, pw_plots_next (command->plots));
-  double start = pw_seconds (CLOCK_PROCESS_CPUTIME_ID);
+  double start = pw_seconds (CLOCK_THREAD_CPUTIME_ID);
   int status;
   long steps = 0;
   do {
     status = pw_run_advance_towards (command->run, due, command->t_end, error);
   } while (status == PW_OK && ++steps < command->batch && pw_run_time (command->run) < due && !pw_stop);
-  double cpu = pw_seconds (CLOCK_PROCESS_CPUTIME_ID) - start;
+  double cpu = pw_seconds (CLOCK_THREAD_CPUTIME_ID) - start;
   command->cpu += cpu;
   if (cpu < RUN_SHORT && steps == command->batch && command->batch < RUN_BATCH) command->batch *= 2;
   if (cpu > RUN_LONG && command->batch > 1) command->batch /= 2;
@@ -226,8 +230,13 @@ static int run_integrate (pw_run_cli *command, pw_error *error) {
   command->progress.no_bar = run_is_stdout (command->table_path);
   int status = run_steps (command, error);
   pw_progress_end (&command->progress);
+  int complete = status == PW_OK && pw_run_time (command->run) >= command->t_end;
+  int stated = pw_error_run_finish (&command->stated, complete, error);
   pw_stop_release ();
-  if (status == PW_OK && pw_run_time (command->run) >= command->t_end) pw_stop = 0; /* too late: the run is complete */
+  if (complete) {
+    pw_stop = 0; /* too late: the run is complete */
+    status = stated;
+  }
   const pw_statistics *statistics = pw_run_statistics (command->run);
   int too_many_steps = status == PW_METHOD && pw_cli_adaptive (command->method) == 1 &&
                        statistics->steps + statistics->rejected >= command->settings.max_steps;
@@ -314,6 +323,7 @@ static int run_finish (pw_run_cli *command, pw_error *error) {
   run_close_table (command, error->status == PW_OK && !interrupted, error);
   pw_summary summary = pw_run_summary (command, last, error, reason);
   if (last && command->table_path == NULL && command->summary_path == NULL) pw_report_end (command, &summary, last);
+  pw_report_stated (command, prints_file ? stderr : stdout);
   if (error->status == PW_OK) pw_report_warnings (run, system, summary.energy_defect);
   int undrawn = run_finish_figures (command, summary.reason, error);
   if (!interrupted) summary.status = pw_cli_status_word (error->status); /* summary.reason is the text of the error */
@@ -337,6 +347,7 @@ static void run_close (pw_run_cli *command) {
   pw_checkpoints_close (&command->checkpoints);
   pw_plots_close (command->plots);
   pw_comparison_close (&command->comparison);
+  pw_error_run_close (&command->stated);
   pw_run_close (command->run);
   free (command->redundant);
   pw_cli_engine_close (&command->engine);
@@ -365,6 +376,8 @@ static const struct poptOption run_options[] = {
                   "What the colours of snapshots show: body (default) or time"),
   PW_TEXT_OPTION (pw_run_cli, page_path, "animate", 0, "FILE.html", "Write an animation as a page for web browsers"),
   PW_FLAG_OPTION (pw_run_cli, with_energies, "energy", "Show energies, work and losses"),
+  PW_FLAG_OPTION (pw_run_cli, with_error, "error",
+                  "State the error, from a repetition with a tenth of the tolerance or half the step"),
   PW_TEXT_OPTION (pw_run_cli, reference_path, "reference", 0, "FILE.csv",
                   "Measure errors against this table, with columns as in -o, instead of the model's exact solution"),
   PW_ALIAS_OPTION (pw_run_cli, reference_path, "truth"),

@@ -2,7 +2,10 @@
 #ifndef PW_RUN_COMMAND_H
 #define PW_RUN_COMMAND_H
 
+#include <pthread.h>
+#include <stdatomic.h>
 #include "motion.h"
+#include "pinwheel-analysis.h"
 #include "plot.h"
 #include "cli.h"
 
@@ -20,14 +23,35 @@ typedef struct {
   pw_output *lock;       /* FILE.part, empty, which locks out other processes during the whole run */
 } pw_checkpoints;
 
+enum { PW_ERROR_TIMES = 100 };
+
+/* `--error` (run_error.c): the repetition of the run, in a thread of its own. */
+typedef struct {
+  double t[PW_ERROR_TIMES]; /* at which the runs are compared [s] */
+  int taken;                /* rows of the run stored so far */
+  int width;                /* numbers of a row */
+  double *rows, *end;       /* those of the run; the errors at the end, and the largest ones, after them */
+  pw_repetition *repetition;
+  pw_settings settings;
+  pw_limit limit;       /* of the repetition */
+  atomic_int cancelled; /* 1: the run has ended early */
+  pthread_t thread;
+  int started; /* 1: the thread has not been joined */
+  int status;  /* of the repetition */
+  pw_error failure;
+  int known; /* 1: `result` is */
+  char unknown[40 + sizeof (pw_error)];
+  pw_stated_error result;
+} pw_error_run;
+
 enum { PW_RUN_TABLE, PW_RUN_PAGE, PW_RUN_SUMMARY, PW_RUN_OUTPUTS };
 
-typedef struct {
+typedef struct pw_run_cli {
   /* as given */
   pw_cli_line line;
   const char *row_interval_text; /* --every */
   const char *table_path, *summary_path, *plots_path, *page_path, *reference_path, *colour;
-  int with_energies, profile; /* 1: --energy, --profile */
+  int with_energies, with_error, profile; /* 1: --energy, --error, --profile */
   pw_checkpoints checkpoints;
   /* as understood */
   pw_cli_model compiled;
@@ -42,6 +66,7 @@ typedef struct {
   pw_csv *table;
   pw_plots *plots;
   pw_comparison comparison;
+  pw_error_run stated;
   pw_run *run;
   const char **redundant; /* a description of each redundant constraint equation; NULL: there are none */
   pw_progress progress;
@@ -66,6 +91,19 @@ int pw_checkpoints_resume (pw_run_cli *command, pw_error *error);
 /* Saves a checkpoint that is due; near a singular configuration it is postponed. */
 int pw_checkpoints_save (pw_run_cli *command, pw_error *error);
 void pw_checkpoints_close (pw_checkpoints *checkpoints);
+
+/* ---- The error (run_error.c); without --error these do nothing ---- */
+
+/* Starts the repetition; the run is open. */
+int pw_error_run_start (struct pw_run_cli *command, pw_error *error);
+double pw_error_run_next (const pw_error_run *e); /* the time of the next sample; INFINITY: there is none */
+/* Stores the next sample of the run, whose last step contains its time. */
+int pw_error_run_add (pw_error_run *e, pw_run *run, pw_error *error);
+/* Ends the repetition, and states the error if the run is complete.  PW_RESOURCE. */
+int pw_error_run_finish (pw_error_run *e, int complete, pw_error *error);
+void pw_error_run_close (pw_error_run *e);
+/* Prints the stated errors: of the bodies at the end, the largest of the table's other columns; or why they are unknown. */
+void pw_report_stated (const struct pw_run_cli *command, FILE *f);
 
 /* ---- The summary and the report (report.c) ---- */
 

@@ -1,0 +1,187 @@
+/* The error of a run, stated from its repetition with a tenth of the tolerance, or half the step.
+ *
+ * If a repetition has at most half the error of the run, the error is at most twice the difference of both.  A
+ * difference can vanish by chance, so that the error at the end is taken from the last fifth of the samples.  Where the
+ * difference is a large part of the motion, a second repetition shows whether it becomes smaller at all: it does not in
+ * chaotic motions, and when the run takes another branch. */
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "pinwheel-analysis.h"
+#include "util.h"
+
+static const double SAFETY = 2,   /* error over difference, if the repetition has half the error of the run */
+    LARGE = 0.01,                 /* of a difference over the range of the motion, above which a second one is made */
+    SMALLER = 0.5,                /* of the differences of two repetitions, at most */
+    ROUND_OFF = 64 * DBL_EPSILON; /* of the largest value of a column, in addition */
+enum { LAST = 5 };                /* the last fifth of the samples */
+
+struct pw_repetition {
+  const pw_system *s;
+  const char *method;
+  pw_settings settings; /* of the run */
+  int adaptive, coarse; /* coarse: 1 if no smaller tolerance is possible, so that the tolerance is ten times larger */
+  const double *times;
+  long count;    /* times */
+  int width;     /* numbers of a row */
+  double *first; /* rows of the repetition: count x width */
+};
+
+/* The settings of repetition 1 or 2. */
+static pw_settings repetition_settings (const pw_repetition *r, int number) {
+  pw_settings x = r->settings;
+  const double tolerance = r->coarse ? 10 : pow (10, -number);
+  if (!r->adaptive)
+    x.step = (x.step > 0 ? x.step : PW_STEP) / pow (2, number);
+  else
+    x.rtol = (x.rtol > 0 ? x.rtol : PW_RTOL) * tolerance, x.atol *= tolerance;
+  return x;
+}
+
+/* Opens a repetition; if its tolerance is too small for the method, one with a larger tolerance. */
+static pw_run *repetition_run (pw_repetition *r, int number, pw_error *error) {
+  pw_settings settings = repetition_settings (r, number);
+  pw_error own = { 0 };
+  pw_run *run = pw_run_open (r->s, r->method, &settings, &own);
+  if (run || !r->adaptive || number > 1 || own.status != PW_INPUT) {
+    if (run == NULL) pw_fail (error, own.status, "%s", own.text);
+    return run;
+  }
+  r->coarse = 1;
+  settings = repetition_settings (r, number);
+  return pw_run_open (r->s, r->method, &settings, error);
+}
+
+static int repetition_record (pw_repetition *r, int number, double *rows, pw_error *error) {
+  long recorded, all = 0;
+  pw_run *run = repetition_run (r, number, error);
+  int status = run ? PW_OK : error->status;
+  while (status == PW_OK && all < r->count) {
+    status = pw_run_record (run, r->times[r->count - 1], r->times + all, r->count - all, 1000, rows + all * r->width,
+                            &recorded, error);
+    all += recorded;
+  }
+  pw_run_close (run);
+  return status;
+}
+
+pw_repetition *pw_repetition_open (const pw_system *s, const char *method, const pw_settings *settings,
+                                   const double *times, long count, pw_error *error) {
+  const pw_method *integrator;
+  if (pw_require (s, "a system", error) != PW_OK || pw_require (settings, "settings", error) != PW_OK) return NULL;
+  if (pw_method_parse (method, &integrator, NULL, error) != PW_OK) return NULL;
+  if (count < 1 || times == NULL) {
+    pw_fail (error, PW_INPUT, "no times at which runs are compared");
+    return NULL;
+  }
+  pw_repetition *r = calloc (1, sizeof *r);
+  const int width = pw_system_record_width (s, settings->ledger);
+  double *first = calloc ((size_t)count * (size_t)width, sizeof *first);
+  if (r && first) {
+    *r = (pw_repetition){ .s = s, .method = method, .settings = *settings, .times = times, .count = count };
+    r->adaptive = pw_method_adaptive (integrator, method), r->width = width, r->first = first;
+    return r;
+  }
+  free (r);
+  free (first);
+  pw_fail (error, PW_RESOURCE, "out of memory");
+  return NULL;
+}
+
+void pw_repetition_close (pw_repetition *r) {
+  if (r == NULL) return;
+  free (r->first);
+  free (r);
+}
+
+int pw_repetition_run (pw_repetition *r, pw_error *error) {
+  return repetition_record (r, 1, r->first, error);
+}
+
+const char *pw_repetition_text (const pw_repetition *r) {
+  return !r->adaptive ? "half the step" : r->coarse ? "ten times the tolerance" : "a tenth of the tolerance";
+}
+
+/* ---- Differences ---- */
+
+/* The range of a column in the first rows. */
+static double repetition_range (const double *rows, long count, int width, int column) {
+  double least = INFINITY, largest = -INFINITY;
+  for (long k = 0; k < count; k++) {
+    least = fmin (least, rows[k * width + column]);
+    largest = fmax (largest, rows[k * width + column]);
+  }
+  return largest - least;
+}
+
+/* The largest difference of a column in the rows from `from` on. */
+static double repetition_difference (const double *a, const double *b, long from, long count, int width, int column) {
+  double most = 0;
+  for (long k = from; k < count; k++) {
+    double d = fabs (a[k * width + column] - b[k * width + column]);
+    if (d > most || isnan (d)) most = d;
+  }
+  return most;
+}
+
+/* The largest difference of any state, divided by the range of the states of its unit; *state: which. */
+static double repetition_relative (const pw_repetition *r, const double *a, const double *b, long count, int *state) {
+  const int n = pw_system_coordinates (r->s);
+  double most = 0;
+  *state = 0;
+  for (int i = 0; i < 2 * n; i++) {
+    const char *unit = pw_system_state_unit (r->s, i);
+    double range = 0, d = repetition_difference (a, b, 0, count, r->width, PW_RECORD_STATES + i);
+    for (int j = 0; j < 2 * n; j++)
+      if (strcmp (pw_system_state_unit (r->s, j), unit) == 0)
+        range = fmax (range, repetition_range (a, count, r->width, PW_RECORD_STATES + j));
+    if (!(d <= most * range)) most = range > 0 ? d / range : INFINITY, *state = i;
+  }
+  return most;
+}
+
+/* Whether a second repetition approaches the first one, where that is far from the run. */
+static int repetition_converges (pw_repetition *r, const double *rows, long count, int state, pw_error *error) {
+  double *second = calloc ((size_t)r->count * (size_t)r->width, sizeof *second);
+  pw_error own = { 0 };
+  if (second == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  int status = r->coarse ? PW_METHOD : repetition_record (r, 2, second, &own), column = PW_RECORD_STATES + state;
+  const double before = repetition_difference (rows, r->first, 0, count, r->width, column),
+               after = status == PW_OK ? repetition_difference (r->first, second, 0, count, r->width, column) : NAN;
+  free (second);
+  if (status == PW_RESOURCE || status == PW_STOPPED) return pw_fail (error, status, "%s", own.text);
+  if (after <= SMALLER * before) return PW_OK;
+  char name[PW_NAME_BYTES];
+  const char *unit = pw_system_state_unit (r->s, state);
+  pw_system_state_name (r->s, state, name, sizeof name);
+  if (isnan (after))
+    return pw_fail (error, PW_METHOD, "%s differs by %.3g %s in the repetition with %s", name, before, unit,
+                    pw_repetition_text (r));
+  return pw_fail (error, PW_METHOD,
+                  "%s differs by %.3g %s in the repetition with %s, and that by %.3g %s from a further one: the "
+                  "motion is chaotic, takes another branch, or needs a smaller %s",
+                  name, before, unit, pw_repetition_text (r), after, unit, r->adaptive ? "tolerance" : "step");
+}
+
+/* The time, constraint residuals, energy of projections and balance, which have no error that this could state. */
+static int repetition_is_residual (int column) {
+  return column < 3 || column == PW_RECORD_STATES - 2 || column == PW_RECORD_STATES - 1;
+}
+
+int pw_repetition_error (pw_repetition *r, const double *rows, long count, double *end, double *largest,
+                         pw_error *error) {
+  int state, status = PW_OK;
+  if (count < 1 || count > r->count) return pw_fail (error, PW_INPUT, "%ld rows: expected 1 to %ld", count, r->count);
+  if (!(repetition_relative (r, rows, r->first, count, &state) <= LARGE))
+    status = repetition_converges (r, rows, count, state, error);
+  for (int i = 0; status == PW_OK && i < r->width; i++) {
+    double size = 0;
+    for (long k = 0; k < count; k++) size = fmax (size, fabs (rows[k * r->width + i]));
+    const double least = ROUND_OFF * size;
+    end[i] = SAFETY * repetition_difference (rows, r->first, count - 1 - count / LAST, count, r->width, i) + least;
+    largest[i] = SAFETY * repetition_difference (rows, r->first, 0, count, r->width, i) + least;
+    if (repetition_is_residual (i)) end[i] = largest[i] = NAN;
+  }
+  return status;
+}
