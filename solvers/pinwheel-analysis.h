@@ -112,8 +112,9 @@ const char *pw_accurate_method (const pw_system *s, const pw_settings *settings,
 typedef struct pw_repetition pw_repetition;
 pw_repetition *pw_repetition_open (const pw_system *s, const char *method, const pw_settings *settings,
                                    const double *times, long count, pw_error *error);
-/* Makes the repetition, perhaps in another thread than the run.  Errors: as pw_run_open and pw_run_advance. */
-int pw_repetition_run (pw_repetition *r, pw_error *error);
+/* Makes the repetition, perhaps in another thread than the run.  PW_RETRY, without an error: it needs more than this
+ * number of steps (0: no limit); call it again.  Errors: as pw_run_open and pw_run_advance. */
+int pw_repetition_run (pw_repetition *r, long steps, pw_error *error);
 /* States the errors of the first `count` rows of the run, as pw_run_record stores them at the times of the repetition,
  * which has been made: of each number at the last of these times, and the largest at any; NAN of the time, residuals,
  * energy of projections and balance.  They contain the true ones if the repetition has at most half the error of the

@@ -5,14 +5,17 @@
  * difference is a large part of the motion, a second repetition shows whether it becomes smaller at all: it does not in
  * chaotic motions, and when the run takes another branch. */
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "pinwheel-analysis.h"
 #include "util.h"
 
-static const double SAFETY = 2,   /* error over difference, if the repetition has half the error of the run */
-    LARGE = 0.01,                 /* of a difference over the range of the motion, above which a second one is made */
+/* Error over difference, with fixed and with adaptive steps. */
+static const double SAFETY[] = { 3, 5 };
+static const double LARGE = 0.01, /* a second repetition is made above this difference over the range of the motion */
+    STILL = 1e-3,                 /* the least range of a motion, in units of the scene */
     SMALLER = 0.5,                /* of the differences of two repetitions, at most */
     ROUND_OFF = 64 * DBL_EPSILON; /* of the largest value of a column, in addition */
 enum { LAST = 5 };                /* the last fifth of the samples */
@@ -23,9 +26,12 @@ struct pw_repetition {
   pw_settings settings; /* of the run */
   int adaptive, coarse; /* coarse: 1 if no smaller tolerance is possible, so that the tolerance is ten times larger */
   const double *times;
-  long count;    /* times */
-  int width;     /* numbers of a row */
+  long count; /* times */
+  int width;  /* numbers of a row */
+  pw_scale scale;
   double *first; /* rows of the repetition: count x width */
+  pw_run *run;   /* open, and its rows recorded so far */
+  long recorded;
 };
 
 /* The settings of repetition 1 or 2. */
@@ -40,7 +46,7 @@ static pw_settings repetition_settings (const pw_repetition *r, int number) {
 }
 
 /* Opens a repetition; if its tolerance is too small for the method, one with a larger tolerance. */
-static pw_run *repetition_run (pw_repetition *r, int number, pw_error *error) {
+static pw_run *repetition_open_run (pw_repetition *r, int number, pw_error *error) {
   pw_settings settings = repetition_settings (r, number);
   pw_error own = { 0 };
   pw_run *run = pw_run_open (r->s, r->method, &settings, &own);
@@ -53,16 +59,17 @@ static pw_run *repetition_run (pw_repetition *r, int number, pw_error *error) {
   return pw_run_open (r->s, r->method, &settings, error);
 }
 
-static int repetition_record (pw_repetition *r, int number, double *rows, pw_error *error) {
-  long recorded, all = 0;
-  pw_run *run = repetition_run (r, number, error);
-  int status = run ? PW_OK : error->status;
-  while (status == PW_OK && all < r->count) {
-    status = pw_run_record (run, r->times[r->count - 1], r->times + all, r->count - all, 1000, rows + all * r->width,
-                            &recorded, error);
-    all += recorded;
-  }
-  pw_run_close (run);
+/* Continues a repetition, r->run, whose first r->recorded rows are stored; in at most this number of steps, if > 0. */
+static int repetition_record (pw_repetition *r, int number, double *rows, long steps, pw_error *error) {
+  long recorded;
+  if (r->run == NULL && (r->run = repetition_open_run (r, number, error)) == NULL) return error->status;
+  r->scale = *pw_run_scale (r->run);
+  int status = pw_run_record (r->run, r->times[r->count - 1], r->times + r->recorded, r->count - r->recorded,
+                              steps > 0 ? steps : LONG_MAX, rows + r->recorded * r->width, &recorded, error);
+  r->recorded += recorded;
+  if (status == PW_OK && r->recorded < r->count) return PW_RETRY;
+  pw_run_close (r->run);
+  r->run = NULL, r->recorded = 0;
   return status;
 }
 
@@ -91,12 +98,13 @@ pw_repetition *pw_repetition_open (const pw_system *s, const char *method, const
 
 void pw_repetition_close (pw_repetition *r) {
   if (r == NULL) return;
+  pw_run_close (r->run);
   free (r->first);
   free (r);
 }
 
-int pw_repetition_run (pw_repetition *r, pw_error *error) {
-  return repetition_record (r, 1, r->first, error);
+int pw_repetition_run (pw_repetition *r, long steps, pw_error *error) {
+  return repetition_record (r, 1, r->first, steps, error);
 }
 
 const char *pw_repetition_text (const pw_repetition *r) {
@@ -132,11 +140,12 @@ static double repetition_relative (const pw_repetition *r, const double *a, cons
   *state = 0;
   for (int i = 0; i < 2 * n; i++) {
     const char *unit = pw_system_state_unit (r->s, i);
-    double range = 0, d = repetition_difference (a, b, 0, count, r->width, PW_RECORD_STATES + i);
+    const double size = (*unit == 'm' ? r->scale.length : 1) / (i < n ? 1 : r->scale.time);
+    double range = STILL * size, d = repetition_difference (a, b, 0, count, r->width, PW_RECORD_STATES + i);
     for (int j = 0; j < 2 * n; j++)
       if (strcmp (pw_system_state_unit (r->s, j), unit) == 0)
         range = fmax (range, repetition_range (a, count, r->width, PW_RECORD_STATES + j));
-    if (!(d <= most * range)) most = range > 0 ? d / range : INFINITY, *state = i;
+    if (!(d <= most * range)) most = d / range, *state = i;
   }
   return most;
 }
@@ -146,7 +155,7 @@ static int repetition_converges (pw_repetition *r, const double *rows, long coun
   double *second = calloc ((size_t)r->count * (size_t)r->width, sizeof *second);
   pw_error own = { 0 };
   if (second == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  int status = r->coarse ? PW_METHOD : repetition_record (r, 2, second, &own), column = PW_RECORD_STATES + state;
+  int status = r->coarse ? PW_METHOD : repetition_record (r, 2, second, 0, &own), column = PW_RECORD_STATES + state;
   const double before = repetition_difference (rows, r->first, 0, count, r->width, column),
                after = status == PW_OK ? repetition_difference (r->first, second, 0, count, r->width, column) : NAN;
   free (second);
@@ -179,8 +188,10 @@ int pw_repetition_error (pw_repetition *r, const double *rows, long count, doubl
     double size = 0;
     for (long k = 0; k < count; k++) size = fmax (size, fabs (rows[k * r->width + i]));
     const double least = ROUND_OFF * size;
-    end[i] = SAFETY * repetition_difference (rows, r->first, count - 1 - count / LAST, count, r->width, i) + least;
-    largest[i] = SAFETY * repetition_difference (rows, r->first, 0, count, r->width, i) + least;
+    end[i] =
+        SAFETY[r->adaptive] * repetition_difference (rows, r->first, count - 1 - count / LAST, count, r->width, i) +
+        least;
+    largest[i] = SAFETY[r->adaptive] * repetition_difference (rows, r->first, 0, count, r->width, i) + least;
     if (repetition_is_residual (i)) end[i] = largest[i] = NAN;
   }
   return status;

@@ -14,7 +14,7 @@ static int error_stop (void *context) {
 static void *error_repeat (void *argument) {
   pw_error_run *e = argument;
   pw_limit_start (&e->limit);
-  e->status = pw_repetition_run (e->repetition, &e->failure);
+  e->status = pw_repetition_run (e->repetition, 0, &e->failure);
   if (e->status == PW_STOPPED) pw_fail (&e->failure, PW_STOPPED, "stopped by %s", pw_stop ? "a signal" : "--limit");
   return NULL;
 }

@@ -3,11 +3,13 @@
  * Every run depends only on its row of the grid.  A journal keeps the rows in the order of completion; at the end they
  * are sorted into the order of the grid.  So the table does not depend on the number of threads or on interruptions of
  * the sweep. */
+#include <limits.h>
 #include <math.h>
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
 #include "cli.h"
+#include "pinwheel-analysis.h"
 #include "sweep.h"
 
 typedef struct {
@@ -181,6 +183,8 @@ static const struct poptOption sweep_options[] = {
   PW_TEXT_OPTION (pw_sweep, part_text, "part", 0, "I/N",
                   "Compute every N-th row, from the I-th on, for a later --merge"),
   PW_FLAG_OPTION (pw_sweep, merge, "merge", "Merge the parts of a sweep: the arguments are their files"),
+  PW_FLAG_OPTION (pw_sweep, plan.with_error, "error",
+                  "Add the stated errors of the final states, from repetitions as by `pinwheel run --error`"),
   PW_FLAG_OPTION (pw_sweep, plan.with_cpu, "cpu",
                   "Add a column with the processor time of each run, which is never reproducible"),
   PW_METHOD_OPTIONS,
@@ -247,9 +251,10 @@ typedef struct {
 
 /* A row that is being computed. */
 typedef struct {
-  long number;        /* in the grid */
-  row_system *system; /* NULL: no row */
-  pw_run *run;        /* NULL: it could not be opened */
+  long number;         /* in the grid */
+  row_system *system;  /* NULL: no row */
+  pw_run *run;         /* NULL: it could not be opened */
+  double *state_error; /* of each state at the end; NULL: not known */
   pw_limit limit;
   int status; /* other than PW_OK: the run has ended */
   pw_error error;
@@ -363,8 +368,35 @@ static pw_initial_value *row_initial (const pw_plan *plan, const sweep_row *row,
   return initial;
 }
 
+/* Makes the whole run and its repetition; stores the stated errors of the states at the end, unless they are unknown. */
+static void row_state_error (sweep_row *row, const pw_plan *plan, const pw_settings *settings) {
+  enum { TIMES = 100 };
+  const int width = pw_run_record_width (row->run), states = 2 * pw_system_coordinates (row->system->model.system);
+  double t[TIMES], *rows = malloc ((TIMES + 2) * (size_t)width * sizeof *rows),
+                   *end = rows ? rows + TIMES * width : NULL;
+  long recorded;
+  pw_error own = { 0 };
+  for (int k = 0; k < TIMES; k++) t[k] = k + 1 < TIMES ? plan->t_end * (k + 1) / TIMES : plan->t_end;
+  row->state_error = malloc ((size_t)states * sizeof *end);
+  if (rows == NULL || row->state_error == NULL)
+    row->status = pw_fail (&row->error, PW_RESOURCE, "out of memory");
+  else
+    row->status = pw_run_record (row->run, plan->t_end, t, TIMES, LONG_MAX, rows, &recorded, &row->error);
+  int known = row->status == PW_OK;
+  pw_repetition *r =
+      !known ? NULL : pw_repetition_open (row->system->model.system, plan->method, settings, t, TIMES, &own);
+  known = r && pw_repetition_run (r, 0, &own) == PW_OK &&
+          pw_repetition_error (r, rows, TIMES, end, end + width, &own) == PW_OK;
+  for (int i = 0; known && i < states; i++) row->state_error[i] = end[PW_RECORD_STATES + i];
+  if (own.status == PW_RESOURCE) row->status = own.status, row->error = own;
+  if (row->status == PW_OK && pw_stop) row->status = PW_STOPPED; /* the repetition is missing */
+  if (!known) free (row->state_error), row->state_error = NULL;
+  pw_repetition_close (r);
+  free (rows);
+}
+
 static void row_open (sweep_row *row, const pw_plan *plan) {
-  row->run = NULL;
+  row->run = NULL, row->state_error = NULL;
   row->error = row->system->error;
   row->status = row->error.status;
   if (row->status != PW_OK) return;
@@ -380,6 +412,7 @@ static void row_open (sweep_row *row, const pw_plan *plan) {
   else
     pw_fail (&row->error, PW_RESOURCE, "out of memory");
   row->status = row->error.status;
+  if (row->run && plan->with_error) row_state_error (row, plan, &settings);
   free (initial);
 }
 
@@ -400,10 +433,12 @@ static int row_close (sweep_row *row, const pw_plan *plan, pw_text *text) {
   if (row->status != PW_RETRY && row->status != PW_RESOURCE) {
     pw_plan_row shown = { row->number, row->status, row->error.text, row->run, .last = last };
     if (plan->with_cpu && row->run) shown.cpu = pw_seconds (CLOCK_THREAD_CPUTIME_ID) - row->limit.start;
+    shown.error = row->state_error;
     if (last) shown.coordinates = pw_system_coordinates (row->system->model.system), shown.state = row->system->state;
     pw_plan_cells (plan, &shown, text);
   }
   pw_run_close (row->run);
+  free (row->state_error);
   if (!text->failed) return row->status;
   row->error = (pw_error){ 0 };
   return pw_fail (&row->error, PW_RESOURCE, "out of memory");

@@ -21,6 +21,7 @@ typedef struct {
   double t_end;    /* [s] */
   pw_limit limit;  /* of each run */
   int with_cpu;    /* 1: a column with each run's processor time */
+  int with_error;  /* 1: columns with the stated errors of states */
   int part, parts; /* --part; 1, 1 if it is not given */
   pw_specialise specialise;
   int lanes; /* --lanes, runs that a thread advances at once by vector instructions; 0: not given */
@@ -58,6 +59,7 @@ typedef struct {
   const pw_sample *last; /* NULL: there is none */
   int coordinates;       /* of its system */
   const int *state;      /* index of the state in each column; -1: the system does not have it; unused without `last` */
+  const double *error;   /* stated errors of its states at the end; NULL: not known */
   double cpu;            /* [s] */
 } pw_plan_row;
 

@@ -112,6 +112,7 @@ static void plan_open_engines (pw_plan *plan, const pw_system *system) {
   pw_cli_report_tables (system, plan->t_end);
   pw_cli_engine_open (&plan->engine, system, plan->specialise, steps);
   const char *reason = plan->with_cpu                   ? "--cpu measures each run"
+                       : plan->with_error               ? "--error repeats each run"
                        : isfinite (plan->limit.seconds) ? "--limit stops each run by itself"
                                                         : NULL;
   if (reason == NULL) plan->lanes_code = pw_cli_engine_lanes (&plan->engine, system, plan->method, plan->lanes, steps);
@@ -175,6 +176,11 @@ void pw_plan_cells (const pw_plan *plan, const pw_plan_row *row, pw_text *text) 
                : state < n ? last->q[state]
                            : last->v[state - n]);
   }
+  for (int i = 0; plan->with_error && i < plan->columns; i++) {
+    const char *name = row ? NULL : PW_PRINTED (PW_NAME_BYTES + 10, "error.%s", plan->column[i].name);
+    int known = row && row->error && row->state[i] >= 0;
+    plan_cell (row, text, name, plan->column[i].unit, known ? row->error[row->state[i]] : NAN);
+  }
   plan_cell (row, text, "kinetic", "J", last ? last->kinetic : NAN);
   plan_cell (row, text, "residual.position", NULL, run ? statistics->position : NAN);
   plan_cell (row, text, "residual.velocity", NULL, run ? statistics->velocity : NAN);
@@ -216,6 +222,7 @@ static int plan_fingerprint (pw_plan *plan, const pw_model *model, pw_error *err
     return error->status;
   if (plan->settings.max_steps != PW_MAX_STEPS)
     pw_fingerprint_number (text, "max-steps", NULL, (double)plan->settings.max_steps);
+  if (plan->with_error) pw_fingerprint_line (text, "error", NULL, "stated");
   if (isfinite (plan->limit.seconds)) pw_fingerprint_number (text, "limit", NULL, plan->limit.seconds);
   if (plan->engine.code) pw_fingerprint_line (text, "engine", NULL, "specialised");
   plan_fingerprint_parameters (plan, model);

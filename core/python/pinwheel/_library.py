@@ -216,6 +216,9 @@ _declare(core, _s, ("pw_system_state_name", _p, _i, _s, _z), ("pw_system_reactio
 _declare(core, _i, ("pw_run_advance_to", _p, _d, _d, _e), ("pw_run_restart", _p, _p, _p, _e),
          ("pw_run_record_width", _p), ("pw_run_linear_modes", _p, _i, c.POINTER(pw_linear), _e),
          ("pw_run_record", _p, _d, _p, c.c_long, c.c_long, _p, c.POINTER(c.c_long), _e))
+_declare(core, _p, ("pw_repetition_open", _p, _s, c.POINTER(pw_settings), _p, c.c_long, _e))
+_declare(core, _i, ("pw_repetition_run", _p, c.c_long, _e), ("pw_repetition_error", _p, _p, c.c_long, _p, _p, _e))
+_declare(core, None, ("pw_repetition_close", _p))
 _declare(core, _d, ("pw_run_time", _p))
 _declare(core, _i, ("pw_method_parse", _s, c.POINTER(_p), _p, _e), ("pw_method_adaptive", _p, _s),
          ("pw_system_contacts", _p))

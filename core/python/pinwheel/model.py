@@ -367,7 +367,8 @@ class Model:
         return int(value) if name == "max_steps" else value
 
     def run(self, method: str | None = None, *, t_end: float | None = None, every: float | None = None, times=None,
-            start: dict | None = None, progress: Callable[[float], object] | bool | None = None, **settings) -> Result:
+            start: dict | None = None, progress: Callable[[float], object] | bool | None = None, error: bool = False,
+            **settings) -> Result:
         """Integrates and returns the samples.
 
         Parameters
@@ -384,6 +385,8 @@ class Model:
             Initial values of states [m, rad, m/s, rad/s].
         progress : callable or bool, optional
             Called now and then with the fraction done; True: a progress bar, False: none; default: a bar in notebooks.
+        error : bool
+            Repeat the run with a tenth of the tolerance or half the step, and state its errors: ``result.error``.
         **settings
             step, rtol, atol, max_steps, energy, inputs, specialise: see :meth:`open`.
 
@@ -401,7 +404,10 @@ class Model:
         model = self.replace(start=start) if start else self
         end = self.defaults["t_end"] if t_end is None else lib.number(t_end, "t_end")
         with model.open(method, t_end=end or None, **settings) as simulation:
-            return simulation.record(end, every, times, progress)
+            result = simulation.record(end, every, times, progress)
+            if error and result.status == "ok":
+                simulation._state_error(result)
+            return result
 
     # ---- Analyses ----
 

@@ -28,6 +28,10 @@ class Result:
         Numbers of steps and evaluations, the latter in all and by specialised code; largest constraint residuals.
     changed : dict of tuple
         Initial values that the constraints have changed: (described, consistent) by name of the state.
+    error : dict of tuple or None
+        Stated errors by column, at the end and the largest of the run, if :meth:`Model.run` was asked for them.
+    error_unknown : str
+        Why no errors can be stated, or "".
     model : Model or None
         None in copies, and in other processes, if the model has functions in Python.
     settings : dict
@@ -47,6 +51,8 @@ class Result:
         self.model, self.settings = model, settings or {}
         self.states, self.reactions, self.ledger = groups["states"], groups["reactions"], groups["ledger"]
         self.changed: dict[str, tuple[float, float]] = {}
+        self.error: dict[str, tuple[float, float]] | None = None
+        self.error_unknown = ""
         self._column = {name: i for i, name in enumerate(units)}
         self.t = rows[:, 0]
 

@@ -333,6 +333,24 @@ class Simulation:
         result.changed = self.changed
         return result
 
+    def _state_error(self, result) -> None:
+        """Repeats a complete run with a tenth of the tolerance or half the step, and states its errors (repetition.c)."""
+        times, rows = np.ascontiguousarray(result.t), np.ascontiguousarray(result.rows)
+        end, largest = np.empty((2, rows.shape[1]))
+        r = self._system.call(lib.core.pw_repetition_open, self._system.pointer, lib.encode(self.method, "method"),
+                              c.byref(self._settings), times.ctypes.data, len(times))
+        try:
+            while self._system.call(lib.core.pw_repetition_run, r, 20000) == lib.PW_RETRY:
+                if self._cancelled():
+                    raise KeyboardInterrupt
+            self._system.call(lib.core.pw_repetition_error, r, rows.ctypes.data, len(rows), end.ctypes.data, largest.ctypes.data)
+        except lib.MethodError as unknown:
+            result.error_unknown = str(unknown)
+        else:
+            result.error = {name: (a, b) for name, a, b in zip(result, end.tolist(), largest.tolist()) if a == a}
+        finally:
+            lib.core.pw_repetition_close(r)
+
     @staticmethod
     def _times(start, t_end, every, times):
         """The times of samples; None: every step."""

@@ -21,7 +21,7 @@ from .simulation import columns, specialised, warn_of_unused
 
 # ---- Sweeps ----
 
-def _final(model, parameters, start, method, t_end, settings, cancelled=None):
+def _final(model, parameters, start, method, t_end, settings, error=False, cancelled=None):
     """The last sample of one run, {} if it failed; the units of its columns; why it failed, or "".
 
     Executors call it in threads or other processes; cancelled: a function that says whether to stop.
@@ -33,8 +33,15 @@ def _final(model, parameters, start, method, t_end, settings, cancelled=None):
     try:
         with varied.open(method, t_end=end or None, **settings) as simulation:
             simulation._cancelled = cancelled or simulation._cancelled
-            simulation.advance(end)
-            return simulation.sample(), units, ""
+            if not error:
+                simulation.advance(end)
+                return simulation.sample(), units, ""
+            result = simulation.record(end, times=np.linspace(0, end, 101))
+            if result.status == "failed":
+                return {}, units, result.reason
+            simulation._state_error(result)
+            stated = {f"error.{name}": (result.error or {}).get(name, (np.nan,))[0] for name in result.states}
+            return result.final | stated, units | {f"error.{name}": units[name] for name in result.states}, ""
     except (lib.InitialError, lib.MethodError) as failure:
         return {}, units, str(failure)
     except Exception as failure:
@@ -69,7 +76,7 @@ def _specialise(model, runs, method, t_end, settings):
 
 
 def sweep(model, vary: dict, *, method: str | None = None, t_end: float | None = None,
-          executor: concurrent.futures.Executor | None = None, progress=None, **settings):
+          executor: concurrent.futures.Executor | None = None, progress=None, error: bool = False, **settings):
     """Runs a model for all combinations of values; the last one varies fastest.
 
     Parameters
@@ -83,6 +90,8 @@ def sweep(model, vary: dict, *, method: str | None = None, t_end: float | None =
         Threads on all processors by default; process pools, Dask clients' and mpi4py's executors work too.
     progress : callable or bool, optional
         As in :meth:`Model.run`.
+    error : bool
+        Add the stated errors of the final states, "error.NAME", as :meth:`Model.run` states them.
 
     Returns
     -------
@@ -105,7 +114,7 @@ def sweep(model, vary: dict, *, method: str | None = None, t_end: float | None =
     try:
         starts = {n for n in names if n not in model.parameters and "." in n}
         pending = [pool.submit(_final, model, {n: x for n, x in p.items() if n not in starts},
-                               {n: x for n, x in p.items() if n in starts}, method, t_end, settings, *watch)
+                               {n: x for n, x in p.items() if n in starts}, method, t_end, settings, error, *watch)
                    for p in points]
         with watched(progress) as report:
             rows = [(future.result(), report((i + 1) / len(pending)))[0] for i, future in enumerate(pending)]
