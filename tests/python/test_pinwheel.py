@@ -271,12 +271,34 @@ def test_summaries_follow_their_schema(tmp_path):
     validator = jsonschema.Draft202012Validator(schema)
     runs = [(name, "--energy") for name in pw.models()]
     runs += [("elliptic-wire",), ("nothing",), ("theo-jansen", "--method", "rk4", "--step", "0.05", "--t-end", "20")]
+    runs += [("pendulum", "--error"), ("pendulum", "--error", "--method", "erk8", "--rtol", "1e-4")]
     for words in runs:
         file = tmp_path / "summary.json"
         file.unlink(missing_ok=True)
         time = () if "--t-end" in words else ("--t-end", "0.1")
         subprocess.run([lib.program(), "run", *words, *time, "--json", str(file)], capture_output=True)
         validator.validate(json.loads(file.read_text()))
+
+
+def test_stated_errors_contain_the_true_ones():
+    pendulum, time = pw.Model("pendulum"), 5
+    exact = pendulum.run("erk8+projection", rtol=1e-13, t_end=time).final
+    for settings in {"method": "erk8+projection", "rtol": 1e-6}, {"method": "rk4+projection", "step": 0.01}:
+        run = pendulum.run(t_end=time, every=0.05, error=True, **settings)
+        for name in run.states:
+            end, largest = run.error[name]
+            assert abs(run.final[name] - exact[name]) <= end <= largest < 1e-3
+    assert pendulum.run(t_end=1).error is None
+    sweep = pw.sweep(pendulum, {"l": [1, 2]}, method="erk8+projection", t_end=1, error=True)
+    assert (np.asarray(sweep["error.bob.x"]) > 0).all() and (np.asarray(sweep["error.bob.x"]) < 1e-4).all()
+
+
+def test_errors_of_chaotic_runs_are_unknown():
+    m = pw.describe(bodies=[pw.Body("a", mass=1, inertia=0.1, start={"phi": 2.5}), pw.Body("b", mass=1, inertia=0.1, start={"phi": 2.8})],
+                    elements=[pw.Gravity("g", acceleration=[0, -9.81]), pw.Pin("A", body=["a", "ground"], at=[[-0.5, 0], [0, 0]]),
+                              pw.Pin("B", body=["a", "b"], at=[[0.5, 0], [-0.5, 0]])])
+    run = m.run("rk4+projection", step=0.02, t_end=40, every=0.5, error=True)
+    assert run.error is None and "chaotic" in run.error_unknown
 
 
 def test_archives_have_the_numbers_of_tables(tmp_path):
