@@ -337,8 +337,9 @@ class Simulation:
         """Repeats a complete run with a tenth of the tolerance or half the step, and states its errors (repetition.c)."""
         times, rows = np.ascontiguousarray(result.t), np.ascontiguousarray(result.rows)
         end, largest = np.empty((2, rows.shape[1]))
-        r = self._system.call(lib.core.pw_repetition_open, self._system.pointer, lib.encode(self.method, "method"),
-                              c.byref(self._settings), times.ctypes.data, len(times))
+        method = lib.encode(self.method, "method")  # the repetition keeps a pointer to it
+        r = self._system.call(lib.core.pw_repetition_open, self._system.pointer, method, c.byref(self._settings),
+                              times.ctypes.data, len(times))
         try:
             while self._system.call(lib.core.pw_repetition_run, r, 20000) == lib.PW_RETRY:
                 if self._cancelled():
