@@ -101,17 +101,19 @@ $(FUZZERS): $(BUILD)/fuzz/%: $(BUILD)/obj/tests/fuzz/%.o $(call obj,$(FUZZ_SHARE
 	  $(FILES_LIBS) $(SOLVER_LIBS) $(CLI_LIBS)
 
 # clang's libFuzzer, TIME seconds for each target; inputs that reach new code go to the corpus in $(VARIANT)/fuzz, those that
-# make a target fail to $(VARIANT)/fuzz/found.
+# make a target fail to $(VARIANT)/fuzz/found.  tests/support/entries.sh adds those to be kept to tests/fuzz/TARGET.txt.
 TIME ?= 60
 fuzz:
 	@$(MAKE) --no-print-directory NO_DEPS=1 CC=clang FUZZING=1 BUILD=$(VARIANT)/fuzz CFLAGS='-O1 -g' \
 	  SAN='-fsanitize=address,undefined,fuzzer-no-link -fno-sanitize-recover=undefined' fuzzers
-	@mkdir -p $(VARIANT)/fuzz/found
+	@mkdir -p $(VARIANT)/fuzz/found && rm -rf $(VARIANT)/fuzz/seeds
+	@for set in $(FUZZ:.c=.txt) tests/bad-models.txt; do \
+	  sh tests/support/entries.sh unpack $$set $(VARIANT)/fuzz/seeds/$$(basename $$set .txt) || exit 1; done
 	@for t in $(notdir $(FUZZERS)); do echo "$$t: $(TIME) s"; mkdir -p $(VARIANT)/fuzz/corpus/$$t; \
 	  TMPDIR=$$([ -d /dev/shm ] && echo /dev/shm || echo /tmp) $(VARIANT)/fuzz/fuzz/$$t -max_total_time=$(TIME) -timeout=25 \
 	    -rss_limit_mb=4000 -max_len=4096 -dict=tests/fuzz/words.dict -print_final_stats=1 -verbosity=0 \
-	    -artifact_prefix="$$(cd $(VARIANT)/fuzz/found && pwd)/$$t-" $(VARIANT)/fuzz/corpus/$$t tests/fuzz/corpus/$$t \
-	    $$([ $$t = model ] && echo models tests/models tests/bad-models) 2>$(VARIANT)/fuzz/$$t.log || \
+	    -artifact_prefix="$$(cd $(VARIANT)/fuzz/found && pwd)/$$t-" $(VARIANT)/fuzz/corpus/$$t $(VARIANT)/fuzz/seeds/$$t \
+	    $$([ $$t = model ] && echo models tests/models $(VARIANT)/fuzz/seeds/bad-models) 2>$(VARIANT)/fuzz/$$t.log || \
 	    { tail -n 40 $(VARIANT)/fuzz/$$t.log; exit 1; }; grep -h 'number_of_executed' $(VARIANT)/fuzz/$$t.log; done
 fuzz: $(FIRST)
 
