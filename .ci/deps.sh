@@ -1,5 +1,5 @@
 #!/bin/sh
-# Finds the libraries and programs that Pinwheel needs, and installs those that are missing with the system's package manager.
+# Finds the libraries and programs that Pinwheel needs, and installs those that are missing by apt; without apt, it lists all.
 #
 #   deps.sh [fresh] [style] [browser] [slurm] [reference] [page] [python]
 #
@@ -7,7 +7,7 @@
 # headless one, for the tests of pages; slurm: for tests/scripts/slurm.sh; reference: Python's numpy and scipy, for
 # tests/reference/reference.sh; page: a compiler for WebAssembly, for interactive pages; python: for tests of the package.
 #
-# Reads CC, CPPFLAGS, LDFLAGS, BUILD, NO_DEPS.  Only apt has been tried; dnf, pacman and brew are unverified.
+# Reads CC, CPPFLAGS, LDFLAGS, BUILD, NO_DEPS.
 
 CC=${CC:-cc} BUILD=${BUILD:-build}
 [ -z "$NO_DEPS" ] || { echo "deps: skipped (NO_DEPS=$NO_DEPS)"; exit 0; }
@@ -128,55 +128,23 @@ look () {
 # ---- Packages ----
 
 package_of () {
-  case $manager-$1 in
-  apt-cc) echo gcc libc6-dev ;;
-  apt-sundials) echo libsundials-dev ;;
-  apt-suitesparse) echo libsuitesparse-dev ;;
-  apt-gnuplot) echo gnuplot-nox ;;
-  apt-clang | apt-clang-format | apt-chromium | apt-python3-*) echo "$1" ;;
-  apt-wasm-ld) echo lld ;;
-  apt-wasi-libc) echo wasi-libc ;;
-  apt-wasi-builtins) echo libclang-rt-14-dev-wasm32 ;;
-  apt-libfyaml) echo libfyaml-dev ;;
-  apt-slurmctld) echo slurm-wlm ;;
-  apt-munged) echo munge ;;
-  apt-*) echo "lib$1-dev" ;;
-
-  # unverified from here on
-  dnf-cc) echo gcc ;;
-  dnf-lapacke) echo lapack-devel ;;
-  dnf-nlopt) echo NLopt-devel ;;
-  dnf-cmocka) echo libcmocka-devel ;;
-  dnf-gnuplot) echo gnuplot ;;
-  dnf-clang) echo clang ;;
-  dnf-clang-format) echo clang-tools-extra ;;
-  dnf-chromium) echo chromium ;;
-  dnf-python3-*) echo "$1" ;;
-  dnf-*) echo "$1-devel" ;;
-
-  pacman-cc) echo gcc ;;
-  pacman-python3-*) echo "python-${1#python3-}" ;;
-  pacman-clang-format) echo clang ;;
-  brew-cc) echo gcc ;;
-  brew-lapacke) echo lapack ;;
-  brew-suitesparse) echo suite-sparse ;;
-  brew-clang) echo llvm ;;
-  brew-python3-*) echo "${1#python3-}" ;;
-  *) echo "$1" ;;
+  case $1 in
+  cc) echo gcc libc6-dev ;;
+  gnuplot) echo gnuplot-nox ;;
+  clang | clang-format | chromium | python3-* | wasi-libc) echo "$1" ;;
+  wasm-ld) echo lld ;;
+  wasi-builtins) echo libclang-rt-14-dev-wasm32 ;;
+  libfyaml) echo libfyaml-dev ;;
+  slurmctld) echo slurm-wlm ;;
+  munged) echo munge ;;
+  *) echo "lib$1-dev" ;;
   esac
 }
 
-# compose SUDO: sets $command, which installs $packages; apt's package lists are updated only if $update is set.
+# compose SUDO: sets $command, which installs $packages; the package lists are updated only if $update is set.
 compose () {
-  as=$1
-  case $manager in
-  apt)
-    command="${as}env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends $packages"
-    [ -z "$update" ] || command="${as}apt-get update -q && $command" ;;
-  dnf) command="${as}dnf install -y $packages" ;;
-  pacman) command="${as}pacman -S --needed --noconfirm $packages" ;;
-  brew) command="brew install $packages" ;;
-  esac
+  command="${1}env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends $packages"
+  [ -z "$update" ] || command="${1}apt-get update -q && $command"
 }
 
 # ---- The work ----
@@ -189,24 +157,20 @@ if [ -z "$missing" ]; then
 fi
 echo "deps: missing:$missing"
 
-manager=
-for m in apt-get dnf pacman brew; do
-  command -v $m >/dev/null && { manager=${m%-get}; break; }
-done
-if [ -z "$manager" ]; then
-  echo "deps: no apt, dnf, pacman or brew here: please install what is missing, then say NO_DEPS=1" >&2
+if ! command -v apt-get >/dev/null; then
+  echo "deps: no apt here: please install what is missing of a C compiler, SUNDIALS (6.0 or later), SuiteSparse, LAPACKE," \
+    "libfyaml, popt, GSL, NLopt, cmocka and gnuplot, with their headers; then say NO_DEPS=1" >&2
   exit 1
 fi
-[ "$manager" = apt ] || echo "deps: the package names for $manager are unverified"
 
 packages=
 for n in $missing; do packages="$packages $(package_of "$n")"; done
 packages=${packages# } update=
-if [ "$manager" = apt ]; then apt-cache show $packages >/dev/null 2>&1 || update=1; fi
+apt-cache show $packages >/dev/null 2>&1 || update=1
 
 sudo=
 command -v sudo >/dev/null && sudo='sudo '
-if [ "$(id -u)" = 0 ] || [ "$manager" = brew ]; then
+if [ "$(id -u)" = 0 ]; then
   as=
 elif [ -t 0 ] && [ -n "$sudo" ]; then
   as=$sudo
@@ -221,7 +185,7 @@ compose "$as"
 echo "deps: $command"
 if ! sh -c "$command"; then
   # Package lists that are out of date name files the server no longer has.
-  [ "$manager-$update" = apt- ] || exit 1
+  [ -z "$update" ] || exit 1
   update=1
   compose "$as"
   echo "deps: $command"

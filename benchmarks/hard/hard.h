@@ -48,7 +48,7 @@ typedef struct {
 
 /* A case: a model, a time span, a reference solution or invariant, and the verdict expected of each method. */
 typedef struct {
-  char group[80], group_about[600], name[HARD_NAME], about[200], source[200];
+  char group[80], group_about[200], name[HARD_NAME], about[200], source[200];
   char model[300];
   hard_value set[HARD_VALUES], initial[HARD_VALUES], reference[HARD_VALUES];
   int sets, initials, references;
@@ -97,7 +97,7 @@ typedef struct {
 
 /* The matrix and the counts as text for a terminal. */
 void hard_print (const hard_matrix *m, FILE *out);
-/* The matrix as a page of the documentation. */
+/* A page of the documentation: the cases, counts by method, and where there is no result. */
 void hard_page (const hard_matrix *m, FILE *out);
 /* One line of CSV per cell: what was run, measured and reported. */
 void hard_table (const hard_matrix *m, FILE *out);

@@ -90,8 +90,8 @@ TEST (null) {
   assert_string_equal (pw_scene_code_notice (NULL), "");
   assert_int_equal (pw_file_tables (NULL, NULL, NULL), 0);
   assert_int_equal (pw_checkpoint_write ("/nonexistent/a.ck", "", &(pw_archive){ .used = 0 }, NULL), PW_RESOURCE);
-  assert_null (pw_file_open ("tests/bad-models/no-such.yaml", NULL));
-  assert_null (pw_file_open ("tests/bad-models/key-unknown.yaml", NULL));
+  assert_null (pw_file_open ("tests/no-such.yaml", NULL));
+  assert_null (pw_file_open ("tests/bad-models.txt", NULL));
   pw_system_free (s);
 }
 

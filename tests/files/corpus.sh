@@ -7,8 +7,11 @@ for target in "${BUILD:-build}"/fuzz/*; do
   name=$(basename "$target")
   case $name in *.*) continue ;; esac
   more=
-  [ "$name" != model ] || more='models tests/models tests/bad-models'
-  timeout 300 "$target" "tests/fuzz/corpus/$name" $more >"$work/log" 2>&1
-  report "$name: $(tail -n 1 "$work/log")" $?
+  [ "$name" != model ] || more="models tests/models $work/bad-models"
+  sh tests/support/entries.sh unpack "tests/fuzz/$name.txt" "$work/$name" >"$work/log" 2>&1 &&
+    sh tests/support/entries.sh unpack tests/bad-models.txt "$work/bad-models" >"$work/log" 2>&1 &&
+    timeout 300 "$target" "$work/$name" $more >"$work/log" 2>&1
+  status=$?
+  report "$name: $(tail -n 1 "$work/log" | sed "s,^$work/,,")" $status
 done
 exit $bad

@@ -143,7 +143,7 @@ TEST (no_derivative) {
 }
 
 /* Constraints take what is continuous where it breaks, however fast it changes; what is not is refused
- * (tests/bad-models). */
+ * (tests/bad-models.txt). */
 TEST (continuous) {
   static const char *const value[] = { "t < 1 ? t^3 : 3*t - 2",        "abs(sin(3*t))^3",           "max(0, t - 1)^2",
                                        "sin(1e9*t) + max(0, t - 1)^2", "1e8*max(0, t - 1)^3 + 1e8", "t > 5 || 1" };

@@ -1,4 +1,4 @@
-/* Text models that are wrong: each file in tests/bad-models/ begins with a comment that says what it is told,
+/* Text models that are wrong: each entry of tests/bad-models.txt begins with a comment that says what it is told,
  * "# LINE:COLUMN: TEXT"; a caret below its own line points to the column.  Run from the top folder. */
 #include <dirent.h>
 #include <stdio.h>
@@ -8,8 +8,6 @@
 #include "check.h"
 #include "cli.h"
 #include "pinwheel-files.h"
-
-#define BAD_FOLDER "tests/bad-models"
 
 /* Opens, builds and compiles as the program does. */
 static pw_error bad_open (const char *path) {
@@ -59,12 +57,13 @@ static int bad_file (const char *path) {
 TEST (bad_models) {
   int files = 0, failed = 0;
   struct dirent *entry;
-  DIR *d = opendir (BAD_FOLDER);
+  cli_good ("sh tests/support/entries.sh unpack tests/bad-models.txt @/bad");
+  DIR *d = opendir (cli_path ("bad"));
   assert_non_null (d);
   while ((entry = readdir (d)) != NULL) {
     char path[300];
     if (strstr (entry->d_name, ".yaml") == NULL) continue;
-    snprintf (path, sizeof path, BAD_FOLDER "/%s", entry->d_name);
+    snprintf (path, sizeof path, "%s/%s", cli_path ("bad"), entry->d_name);
     failed += bad_file (path);
     files++;
   }

@@ -65,7 +65,7 @@ def apply(mutation, files):
     name, found = re.compile(r"(?<!\w)" + re.escape(mutation["function"]) + r"(?!\w)(?=\s*[(\[=]|\s*$)"), []
     places = 0
     for path, text in files.items():
-        if mutation["function"] not in text:
+        if mutation["function"] not in path + text:
             continue
         for header, start, end in [(path, 0, len(text))] if path == "Makefile" else definitions(text):
             if name.search(re.sub(r"^(PER_ELEMENT|PREPARE) \((\w+).*", r"\2 (", header.strip(), flags=re.S)):
