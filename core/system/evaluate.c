@@ -277,7 +277,7 @@ static const struct {
   enum { BLOCKS_NONE, BLOCKS_J_W, BLOCKS_JT_LAMBDA } product;
   int velocity; /* 1: derivative with respect to v; 0: to q */
   int square;   /* 1: it has as many rows as local columns; 0: kind->rows */
-} blocks_table[PW_BLOCKS] = {
+} blocks_table[] = {
   [PW_JW_Q] = { BLOCKS_ENTRY (jw_q, J), .product = BLOCKS_J_W },
   [PW_JTL_Q] = { BLOCKS_ENTRY (jw_q, J), .product = BLOCKS_JT_LAMBDA, .square = 1 },
   [PW_ETA_Q] = { BLOCKS_ENTRY (eta_q, eta) },
@@ -285,6 +285,7 @@ static const struct {
   [PW_GAMMA_V] = { BLOCKS_ENTRY (gamma_v, gamma), .velocity = 1 },
   [PW_FORCE_Q] = { BLOCKS_ENTRY (force_q, force), .square = 1 },
   [PW_FORCE_V] = { BLOCKS_ENTRY (force_v, force), .velocity = 1, .square = 1 },
+  [PW_G_Q] = { BLOCKS_ENTRY (J, g) },
 };
 
 pw_batch_function *pw_block_function (const pw_kind *kind, pw_block block) {
