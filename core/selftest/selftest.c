@@ -98,28 +98,15 @@ static int probe_open (probe *x, pw_error *error) {
   x->elements = x->batch->b.count, x->rows = x->kind->rows, x->cols = x->batch->b.cols;
   x->width = x->cols > x->rows ? x->cols : x->rows;
   if (x->width < PW_MAX_SIGNALS) x->width = PW_MAX_SIGNALS;
-  size_t n = (size_t)x->s->coords, rows = (size_t)(x->elements * x->rows), cols = (size_t)x->cols;
-  size_t values = (size_t)(x->elements * x->width), m = values + PROBE_GUARD;
-  const pw_array array[] = { { &x->q, n },
-                             { &x->v, n },
-                             { &x->a, n },
-                             { &x->dq, n },
-                             { &x->dv, n },
-                             { &x->q_now, n },
-                             { &x->v_now, n },
-                             { &x->w, (size_t)x->elements * cols },
-                             { &x->lambda, rows },
-                             { &x->J, rows * cols + PROBE_GUARD },
-                             { &x->eta, rows + PROBE_GUARD },
-                             { &x->plus, m },
-                             { &x->minus, m },
-                             { &x->derivative, m },
-                             { &x->value, m },
-                             { &x->terms, m },
-                             { &x->size, m },
-                             { &x->error, m },
-                             { &x->expected, m },
-                             { &x->block, values * (size_t)x->width + PROBE_GUARD } };
+  size_t n = (size_t)x->s->coords, rows = (size_t)(x->elements * x->rows), w = (size_t)(x->elements * x->cols);
+  size_t J = rows * (size_t)x->cols + PROBE_GUARD, eta = rows + PROBE_GUARD;
+  size_t m = (size_t)(x->elements * x->width) + PROBE_GUARD, block = m * (size_t)x->width;
+  const pw_array array[] = {
+    { &x->q, n },     { &x->v, n },     { &x->a, n },     { &x->dq, n },         { &x->dv, n },
+    { &x->q_now, n }, { &x->v_now, n }, { &x->w, w },     { &x->lambda, rows },  { &x->J, J },
+    { &x->eta, eta }, { &x->plus, m },  { &x->minus, m }, { &x->derivative, m }, { &x->value, m },
+    { &x->terms, m }, { &x->size, m },  { &x->error, m }, { &x->expected, m },   { &x->block, block },
+  };
   x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   x->batch->b.w = x->w, x->batch->b.lambda = x->lambda;
   return x->memory ? PW_OK : pw_fail_memory (x->s, error);

@@ -4,6 +4,77 @@
 #include <string.h>
 #include "elimination.h"
 
+pw_term pw_term_named (pw_term_type type, const char *array, int i, double value) {
+  pw_term a = { type, 1, "", value };
+  snprintf (a.name, sizeof a.name, "%s[%d]", array, i);
+  return a;
+}
+
+const char *pw_term_text (pw_term a, char buffer[24]) {
+  if (a.type == PW_TERM_ZERO) return "0";
+  snprintf (buffer, 24, "%s%s", a.sign < 0 ? "-" : "", a.type == PW_TERM_ONE ? "1" : a.name);
+  return buffer;
+}
+
+static pw_term term_negative (pw_term a) {
+  a.sign = -a.sign;
+  a.value = -a.value;
+  return a;
+}
+
+/* ---- Terms; these functions write a statement unless none is needed, and return the term of its result ---- */
+
+/* The term sign (a op b): a new variable or constant. */
+static pw_term emit_define (pw_emitter *emitter, int constant, int sign, double value, const char *a, char op,
+                            const char *b) {
+  pw_term out = { constant ? PW_TERM_CONSTANT : PW_TERM_VARIABLE, sign, "", value };
+  if (constant)
+    snprintf (out.name, sizeof out.name, "C[%d]", emitter->constants++);
+  else
+    snprintf (out.name, sizeof out.name, "x%d", emitter->variables++);
+  fprintf (constant ? emitter->prepare : emitter->code, "  %s%s = %s %c %s;\n", constant ? "" : "const double ",
+           out.name, a, op, b);
+  return out;
+}
+
+static int emit_is_constant (pw_term a) {
+  return a.type != PW_TERM_VARIABLE;
+}
+
+/* a b */
+static pw_term emit_product (pw_emitter *emitter, pw_term a, pw_term b) {
+  if (a.type == PW_TERM_ZERO || b.type == PW_TERM_ZERO) return pw_term_zero ();
+  if (a.type == PW_TERM_ONE) return a.sign < 0 ? term_negative (b) : b;
+  if (b.type == PW_TERM_ONE) return b.sign < 0 ? term_negative (a) : a;
+  return emit_define (emitter, emit_is_constant (a) && emit_is_constant (b), a.sign * b.sign, a.value * b.value, a.name,
+                      '*', b.name);
+}
+
+/* a - b c */
+static pw_term emit_difference (pw_emitter *emitter, pw_term a, pw_term b, pw_term c) {
+  char text[60];
+  if (b.type == PW_TERM_ZERO || c.type == PW_TERM_ZERO) return a;
+  if (a.type == PW_TERM_ZERO) return term_negative (emit_product (emitter, b, c));
+  if (emit_is_constant (b) && emit_is_constant (c) && !emit_is_constant (a)) { /* the product once and for all */
+    b = emit_product (emitter, b, c);
+    c = (pw_term){ PW_TERM_ONE, 1, "1", 1 };
+  }
+  int constant = emit_is_constant (a) && emit_is_constant (b) && emit_is_constant (c);
+  const char *left = b.type == PW_TERM_ONE ? "" : b.name, *right = c.type == PW_TERM_ONE && *left ? "" : c.name;
+  snprintf (text, sizeof text, "%s%s%s", left, *left && *right ? " * " : "", right);
+  return emit_define (emitter, constant, a.sign, a.value - b.value * c.value, a.name,
+                      b.sign * c.sign * a.sign > 0 ? '-' : '+', text);
+}
+
+/* a / b */
+static pw_term emit_quotient (pw_emitter *emitter, pw_term a, pw_term b) {
+  if (b.type == PW_TERM_ONE) return b.sign < 0 ? term_negative (a) : a;
+  return emit_define (emitter, emit_is_constant (a) && emit_is_constant (b), a.sign * b.sign, a.value / b.value, a.name,
+                      '/', b.name);
+}
+
+/* ---- Elimination ---- */
+
 static const pw_term elimination_one = { PW_TERM_ONE, 1, "1", 1 };
 
 #define AT(p, q) ldl->K[(size_t)(p) * (size_t)ldl->n + (size_t)(q)]
@@ -75,7 +146,7 @@ static void elimination_guard_column (const pw_elimination *ldl, pw_emitter *emi
 
 /* K_ij -= a b, and its mirror image. */
 static void elimination_update (pw_elimination *ldl, pw_emitter *emitter, int i, int j, pw_term a, pw_term b) {
-  AT (i, j) = pw_emit_difference (emitter, AT (i, j), a, b);
+  AT (i, j) = emit_difference (emitter, AT (i, j), a, b);
   AT (j, i) = AT (i, j);
 }
 
@@ -85,7 +156,7 @@ static void elimination_pivot (pw_elimination *ldl, pw_emitter *emitter, int p, 
   elimination_place (ldl, p, -1);
   ldl->inverse[p] = inverse;
   for (int i = 0; i < ldl->n; i++)
-    if (elimination_couples (ldl, i, p)) FACTOR (i, p) = pw_emit_product (emitter, AT (i, p), ldl->inverse[p]);
+    if (elimination_couples (ldl, i, p)) FACTOR (i, p) = emit_product (emitter, AT (i, p), ldl->inverse[p]);
   for (int i = 0; i < ldl->n; i++)
     for (int j = 0; j <= i && elimination_couples (ldl, i, p); j++)
       if (elimination_couples (ldl, j, p)) elimination_update (ldl, emitter, i, j, FACTOR (i, p), AT (j, p));
@@ -96,10 +167,10 @@ static void elimination_pivot (pw_elimination *ldl, pw_emitter *emitter, int p, 
 static void elimination_pair (pw_elimination *ldl, pw_emitter *emitter, int c, int r) {
   fprintf (emitter->code, "  /* unknowns %d and %d */\n", c, r);
   elimination_place (ldl, c, r);
-  ldl->inverse[c] = pw_emit_quotient (emitter, elimination_one, AT (r, c));
+  ldl->inverse[c] = emit_quotient (emitter, elimination_one, AT (r, c));
   for (int k = 0; k < ldl->n; k++) {
     if (!elimination_couples (ldl, k, c)) continue;
-    FACTOR (k, c) = pw_emit_product (emitter, AT (k, c), ldl->inverse[c]);
+    FACTOR (k, c) = emit_product (emitter, AT (k, c), ldl->inverse[c]);
     for (int l = 0; l < ldl->n; l++)
       if (elimination_couples (ldl, l, r)) elimination_update (ldl, emitter, k, l, FACTOR (k, c), AT (l, r));
   }
@@ -154,14 +225,14 @@ static int elimination_rows (pw_elimination *ldl, pw_emitter *emitter) {
       status = PW_RETRY;
     } else if (p < 0 || elimination_is_zero (AT (q, p))) {
       for (int i = 0; i < ldl->n; i++) before_p[i] = AT (i, i);
-      elimination_guard_row (emitter, pw_term_negative (AT (q, q)), pw_term_negative (diagonal[q]));
-      elimination_pivot (ldl, emitter, q, pw_emit_quotient (emitter, elimination_one, AT (q, q)));
+      elimination_guard_row (emitter, term_negative (AT (q, q)), term_negative (diagonal[q]));
+      elimination_pivot (ldl, emitter, q, emit_quotient (emitter, elimination_one, AT (q, q)));
       p = AT (q, q).type == PW_TERM_VARIABLE ? q : -1;
     } else {
-      pw_term a = AT (p, p), b = AT (q, p), ac = pw_emit_product (emitter, a, before_p[q]);
-      pw_term det = pw_emit_difference (emitter, ac, b, b);
-      elimination_guard_row (emitter, det, pw_emit_product (emitter, a, diagonal[q]));
-      elimination_pivot (ldl, emitter, q, pw_emit_quotient (emitter, a, det));
+      pw_term a = AT (p, p), b = AT (q, p), ac = emit_product (emitter, a, before_p[q]);
+      pw_term det = emit_difference (emitter, ac, b, b);
+      elimination_guard_row (emitter, det, emit_product (emitter, a, diagonal[q]));
+      elimination_pivot (ldl, emitter, q, emit_quotient (emitter, a, det));
       p = -1;
     }
   }
@@ -220,7 +291,7 @@ int pw_elimination_open (pw_elimination *ldl, const pw_system *s, const pw_term 
   for (int j = 0; j < s->coords; j++) {
     if (ldl->step[j] < ldl->n) continue;
     if (s->mass[j] == 0) return PW_RETRY;
-    elimination_pivot (ldl, emitter, j, pw_emit_quotient (emitter, elimination_one, AT (j, j)));
+    elimination_pivot (ldl, emitter, j, emit_quotient (emitter, elimination_one, AT (j, j)));
   }
   int status = elimination_rows (ldl, emitter);
   return status == PW_OK ? elimination_keep_all (ldl, emitter) : status;
@@ -239,19 +310,19 @@ void pw_elimination_close (pw_elimination *ldl) {
 static void elimination_forward (const pw_elimination *ldl, pw_emitter *emitter, pw_term *y, int m) {
   int p = ldl->order[m], r = ldl->partner[m];
   if (r >= 0) {
-    pw_term f = pw_emit_product (emitter, y[p], ldl->inverse[p]), gamma = y[r];
+    pw_term f = emit_product (emitter, y[p], ldl->inverse[p]), gamma = y[r];
     EACH_LATER (i, m) {
-      y[i] = pw_emit_difference (emitter, y[i], AT (i, r), f);
-      y[i] = pw_emit_difference (emitter, y[i], FACTOR (i, p), gamma);
+      y[i] = emit_difference (emitter, y[i], AT (i, r), f);
+      y[i] = emit_difference (emitter, y[i], FACTOR (i, p), gamma);
     }
     y[r] = f;
     y[p] = gamma;
     return;
   }
-  pw_term z = pw_emit_product (emitter, y[p], ldl->inverse[p]);
+  pw_term z = emit_product (emitter, y[p], ldl->inverse[p]);
   EACH_LATER (i, m) {
-    y[i] = p < ldl->coordinates ? pw_emit_difference (emitter, y[i], AT (i, p), z)
-                                : pw_emit_difference (emitter, y[i], FACTOR (i, p), y[p]);
+    y[i] = p < ldl->coordinates ? emit_difference (emitter, y[i], AT (i, p), z)
+                                : emit_difference (emitter, y[i], FACTOR (i, p), y[p]);
   }
   y[p] = z;
 }
@@ -262,80 +333,20 @@ static void elimination_backward (const pw_elimination *ldl, pw_emitter *emitter
   pw_term sum = r >= 0 ? y[p] : pw_term_zero ();
   EACH_LATER (i, m) {
     if (r >= 0) {
-      y[r] = pw_emit_difference (emitter, y[r], FACTOR (i, p), y[i]);
-      sum = pw_emit_difference (emitter, sum, AT (i, r), y[i]);
+      y[r] = emit_difference (emitter, y[r], FACTOR (i, p), y[i]);
+      sum = emit_difference (emitter, sum, AT (i, r), y[i]);
     } else if (p < ldl->coordinates)
-      sum = pw_emit_difference (emitter, sum, AT (i, p), y[i]);
+      sum = emit_difference (emitter, sum, AT (i, p), y[i]);
     else
-      y[p] = pw_emit_difference (emitter, y[p], FACTOR (i, p), y[i]);
+      y[p] = emit_difference (emitter, y[p], FACTOR (i, p), y[i]);
   }
   if (r >= 0)
-    y[p] = pw_emit_product (emitter, sum, ldl->inverse[p]);
+    y[p] = emit_product (emitter, sum, ldl->inverse[p]);
   else if (p < ldl->coordinates)
-    y[p] = pw_emit_difference (emitter, y[p], pw_term_negative (sum), ldl->inverse[p]);
+    y[p] = emit_difference (emitter, y[p], term_negative (sum), ldl->inverse[p]);
 }
 
 void pw_elimination_solve (const pw_elimination *ldl, pw_emitter *emitter, pw_term *right) {
   for (int m = 0; m < ldl->pivots; m++) elimination_forward (ldl, emitter, right, m);
   for (int m = ldl->pivots - 1; m >= 0; m--) elimination_backward (ldl, emitter, right, m);
-}
-
-/* Terms of generated code; see elimination.h. */
-
-pw_term pw_term_named (pw_term_type type, const char *array, int i, double value) {
-  pw_term a = { type, 1, "", value };
-  snprintf (a.name, sizeof a.name, "%s[%d]", array, i);
-  return a;
-}
-
-const char *pw_term_text (pw_term a, char buffer[24]) {
-  if (a.type == PW_TERM_ZERO) return "0";
-  snprintf (buffer, 24, "%s%s", a.sign < 0 ? "-" : "", a.type == PW_TERM_ONE ? "1" : a.name);
-  return buffer;
-}
-
-/* The term sign (a op b): a new variable or constant. */
-static pw_term emit_define (pw_emitter *emitter, int constant, int sign, double value, const char *a, char op,
-                            const char *b) {
-  pw_term out = { constant ? PW_TERM_CONSTANT : PW_TERM_VARIABLE, sign, "", value };
-  if (constant)
-    snprintf (out.name, sizeof out.name, "C[%d]", emitter->constants++);
-  else
-    snprintf (out.name, sizeof out.name, "x%d", emitter->variables++);
-  fprintf (constant ? emitter->prepare : emitter->code, "  %s%s = %s %c %s;\n", constant ? "" : "const double ",
-           out.name, a, op, b);
-  return out;
-}
-
-static int emit_is_constant (pw_term a) {
-  return a.type != PW_TERM_VARIABLE;
-}
-
-pw_term pw_emit_product (pw_emitter *emitter, pw_term a, pw_term b) {
-  if (a.type == PW_TERM_ZERO || b.type == PW_TERM_ZERO) return pw_term_zero ();
-  if (a.type == PW_TERM_ONE) return a.sign < 0 ? pw_term_negative (b) : b;
-  if (b.type == PW_TERM_ONE) return b.sign < 0 ? pw_term_negative (a) : a;
-  return emit_define (emitter, emit_is_constant (a) && emit_is_constant (b), a.sign * b.sign, a.value * b.value, a.name,
-                      '*', b.name);
-}
-
-pw_term pw_emit_difference (pw_emitter *emitter, pw_term a, pw_term b, pw_term c) {
-  char text[60];
-  if (b.type == PW_TERM_ZERO || c.type == PW_TERM_ZERO) return a;
-  if (a.type == PW_TERM_ZERO) return pw_term_negative (pw_emit_product (emitter, b, c));
-  if (emit_is_constant (b) && emit_is_constant (c) && !emit_is_constant (a)) { /* the product once and for all */
-    b = pw_emit_product (emitter, b, c);
-    c = (pw_term){ PW_TERM_ONE, 1, "1", 1 };
-  }
-  int constant = emit_is_constant (a) && emit_is_constant (b) && emit_is_constant (c);
-  const char *left = b.type == PW_TERM_ONE ? "" : b.name, *right = c.type == PW_TERM_ONE && *left ? "" : c.name;
-  snprintf (text, sizeof text, "%s%s%s", left, *left && *right ? " * " : "", right);
-  return emit_define (emitter, constant, a.sign, a.value - b.value * c.value, a.name,
-                      b.sign * c.sign * a.sign > 0 ? '-' : '+', text);
-}
-
-pw_term pw_emit_quotient (pw_emitter *emitter, pw_term a, pw_term b) {
-  if (b.type == PW_TERM_ONE) return b.sign < 0 ? pw_term_negative (a) : a;
-  return emit_define (emitter, emit_is_constant (a) && emit_is_constant (b), a.sign * b.sign, a.value / b.value, a.name,
-                      '/', b.name);
 }

@@ -23,18 +23,7 @@ typedef struct {
 static inline pw_term pw_term_zero (void) {
   return (pw_term){ PW_TERM_ZERO, 1, "0", 0 };
 }
-static inline pw_term pw_term_negative (pw_term a) {
-  a.sign = -a.sign;
-  a.value = -a.value;
-  return a;
-}
 pw_term pw_term_named (pw_term_type type, const char *array, int i, double value); /* array[i] */
-
-/* Write a statement unless none is needed, and return the term of its result. */
-pw_term pw_emit_product (pw_emitter *emitter, pw_term a, pw_term b);               /* a b */
-pw_term pw_emit_difference (pw_emitter *emitter, pw_term a, pw_term b, pw_term c); /* a - b c */
-pw_term pw_emit_quotient (pw_emitter *emitter, pw_term a, pw_term b);              /* a / b */
-
 /* "-x3": the term with its sign, in the buffer unless it is 0. */
 const char *pw_term_text (pw_term a, char buffer[24]);
 
