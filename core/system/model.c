@@ -7,7 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include "model.h"
-#include "signal.h"
 
 /* An object that the model owns. */
 struct pw_kept {
