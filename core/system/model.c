@@ -1,4 +1,4 @@
-/* Models: parameters, bodies and elements as the build function declares them. */
+/* Models: element types and their fields; checks; parameters, bodies and elements as the build function declares them. */
 #include <ctype.h>
 #include <limits.h>
 #include <math.h>
@@ -7,6 +7,296 @@
 #include <stdlib.h>
 #include <string.h>
 #include "model.h"
+
+/* ---- Element types: a table is checked before use, so that a mistake in a plug-in does not crash the program ---- */
+
+const pw_kind *const pw_kinds[] = {
+#define PW_KIND(k) &pw_kind_##k,
+  PW_KINDS
+#undef PW_KIND
+      NULL
+};
+
+int pw_kind_is_built_in (const pw_kind *kind) {
+  for (const pw_kind *const *k = pw_kinds; *k; k++)
+    if (*k == kind) return 1;
+  return 0;
+}
+
+size_t pw_field_bytes (pw_field_type type) {
+  static const size_t bytes[] = {
+    [PW_NUMBER] = sizeof (double), [PW_POINT] = sizeof (double[2]),  [PW_VECTOR] = sizeof (double[2]),
+    [PW_BODY] = sizeof (char *),   [PW_SIGNAL] = sizeof (pw_signal), [PW_CHOICE] = sizeof (int)
+  };
+  return (size_t)type < sizeof bytes / sizeof *bytes ? bytes[type] : 0;
+}
+
+const void *pw_field_at (const pw_kind *kind, const void *definition, pw_field_type type, int index) {
+  for (const pw_field *f = kind->fields; f->name; f++) {
+    if (f->type != type) continue;
+    if (index < pw_field_count (f)) return (const char *)definition + f->offset + (size_t)index * pw_field_bytes (type);
+    index -= pw_field_count (f);
+  }
+  return NULL;
+}
+
+char *pw_field_value_name (const pw_field *f, int i, char *buffer, size_t size) {
+  return pw_field_count (f) > 1 ? pw_print (buffer, size, "%s[%d]", f->name, i)
+                                : pw_print (buffer, size, "%s", f->name);
+}
+
+_Static_assert(PW_NAME_MAX == 50, "as in FAULT_TEXT");
+#define FAULT_TEXT ": expected at most 50 bytes of UTF-8 without control characters"
+
+/* 1 if a name or unit is too long or not one line: it would spoil tables and files. */
+static int is_bad_text (const char *text) {
+  return strlen (text) > PW_NAME_MAX || !pw_is_line (text);
+}
+
+/* The fault of one field, or "". */
+static const char *fault_field (const pw_kind *kind, const pw_field *f) {
+  size_t bytes = pw_field_bytes (f->type) * (size_t)pw_field_count (f);
+  if (is_bad_text (f->name) || (f->unit && is_bad_text (f->unit))) return "name or unit" FAULT_TEXT;
+  if (bytes == 0) return "its type does not exist";
+  if ((size_t)f->domain > PW_FRACTION) return "its domain does not exist";
+  if (f->offset < sizeof (char *) || bytes > kind->definition || f->offset > kind->definition - bytes)
+    return "outside the definition, whose first member is its name and whose sizeof is .definition";
+  if (f->type == PW_CHOICE && (f->choices == NULL || f->choices[0] == NULL)) return "a choice without choices";
+  return "";
+}
+
+/* The fault of the fields, or ""; the text may be in the buffer. */
+static const char *fault_fields (const pw_kind *kind, char *buffer, size_t size) {
+  int bodies = 0, signals = 0;
+  if (kind->fields == NULL) return "no table of fields";
+  for (const pw_field *f = kind->fields; f->name; f++) {
+    const char *fault = fault_field (kind, f);
+    if (*fault) return pw_print (buffer, size, "field %.50s: %s", f->name, fault);
+    if (f->type == PW_BODY) bodies += pw_field_count (f);
+    if (f->type == PW_SIGNAL) signals += pw_field_count (f);
+  }
+  if (kind->each_body && (bodies > 0 || kind->bodies != 1))
+    return "an element type that acts on each body has one body and no body fields";
+  if (!kind->each_body && bodies != kind->bodies) return "bodies is not the sum of the counts of PW_BODY fields";
+  if (signals != kind->signals) return "signals is not the sum of the counts of PW_SIGNAL fields";
+  return "";
+}
+
+static const char *fault_functions (const pw_kind *kind) {
+  pw_batch_function *const exact[] = { kind->g,     kind->g_size, kind->eta,     kind->J,
+                                       kind->gamma, kind->force,  kind->force_u, kind->energy,
+                                       kind->power, kind->loss,   kind->contact, kind->saturation };
+  for (size_t i = 0; i < sizeof exact / sizeof *exact; i++)
+    if (exact[i] == PW_BY_DIFFERENCES) return "PW_BY_DIFFERENCES is permitted only for second-order blocks";
+  if (kind->constant && (kind->force == NULL || kind->signals > 0))
+    return "declared constant, but it has no force, or has signals";
+  if (kind->signals > 0 && kind->rows == 0 && kind->force && kind->force_u == NULL)
+    return "a force with signals, but no force_u";
+  if (kind->force == NULL && kind->force_u) return "force_u, but no force";
+  if (kind->rows > 0 && kind->J == NULL) return "constraint equations without J";
+  if (kind->level == PW_HOLONOMIC && kind->g == NULL) return "holonomic constraint equations without g";
+  if (kind->level != PW_HOLONOMIC && kind->g) return "g, but no holonomic constraint equations";
+  return "";
+}
+
+static const char *fault_names (const pw_kind *kind) {
+  const char *name[PW_MAX_ROWS + 2 * PW_MAX_INTERNAL];
+  int names = 0;
+  for (int i = 0; i < kind->rows; i++) {
+    const pw_quantity *q = kind->reaction ? &kind->reaction[i] : NULL;
+    if (!q || !q->name || !(q->unit || kind->reaction_unit))
+      return "constraint equations whose reactions lack a name or unit";
+    if (is_bad_text (q->name) || (q->unit && is_bad_text (q->unit))) return "name or unit of a reaction" FAULT_TEXT;
+    name[names++] = q->name;
+  }
+  for (int i = 0; i < kind->internal; i++) {
+    const pw_quantity *q = kind->coordinate ? &kind->coordinate[i] : NULL;
+    if (!q || !q->name || !q->rate || !q->unit) return "internal coordinates without name, rate or unit";
+    if (is_bad_text (q->name) || is_bad_text (q->rate) || is_bad_text (q->unit))
+      return "name or unit of an internal coordinate" FAULT_TEXT;
+    if (strcmp (q->unit, "rad") != 0) return "an internal coordinate whose unit is not rad";
+    name[names++] = q->name, name[names++] = q->rate;
+  }
+  for (int i = 0; i < names; i++)
+    for (int n = 0; n < i; n++)
+      if (strcmp (name[i], name[n]) == 0) return "two reactions or internal coordinates of the same name";
+  return "";
+}
+
+const char *pw_kind_check (const pw_kind *kind, char *buffer, size_t size) {
+  if (kind->name == NULL || *kind->name == 0) return "no name";
+  if (is_bad_text (kind->name)) return "its name" FAULT_TEXT;
+  if (kind->definition < sizeof (char *)) return "the definition has no room for its name";
+  if (kind->bodies < 0 || kind->bodies > PW_MAX_BODIES || kind->internal < 0 || kind->internal > PW_MAX_INTERNAL ||
+      kind->rows < 0 || kind->rows > PW_MAX_ROWS || kind->signals < 0 || kind->signals > PW_MAX_SIGNALS)
+    return pw_print (buffer, size, "at most %d bodies, %d internal coordinates, %d constraint equations and %d signals",
+                     PW_MAX_BODIES, PW_MAX_INTERNAL, PW_MAX_ROWS, PW_MAX_SIGNALS);
+  if (kind->bodies + kind->internal == 0) return "neither a body nor an internal coordinate";
+  if (kind->level < PW_FORCE || kind->level > PW_NONHOLONOMIC || (kind->rows > 0) != (kind->level != PW_FORCE))
+    return "rows and level are inconsistent";
+  if ((kind->internal > 0 || kind->element > 0) && kind->prepare == NULL)
+    return "a prepared element (.element > 0) or internal coordinates, but no prepare function";
+  if (kind->element > INT_MAX) return "a prepared element of more than 2147483647 bytes";
+  const char *fault = fault_names (kind);
+  if (*fault == 0) fault = fault_fields (kind, buffer, size);
+  return *fault ? fault : fault_functions (kind);
+}
+
+void pw_by_differences (const pw_batch *b, double *out) {
+  (void)b; /* only its address is used */
+  (void)out;
+}
+
+/* ---- Checks of plug-ins, bodies and elements ---- */
+
+/* Names and units are one line, since tables have them in their heads; a description may have several lines. */
+static int check_parameter (const pw_plugin_table *t, const pw_parameter *p, const char *what, pw_error *error) {
+  const char *expected = pw_domain_check (p->domain, p->value);
+  if (!pw_is_line (p->name) || (p->unit && !pw_is_line (p->unit)) || (p->about && !pw_is_text (p->about)))
+    return pw_fail (error, PW_INPUT,
+                    "%s: name, unit or meaning of parameter %s is not text: expected UTF-8 without control characters",
+                    what, p->name);
+  if (p->offset > t->parameters_size || t->parameters_size - p->offset < sizeof (double))
+    return pw_fail (error, PW_INPUT,
+                    "%s: parameter %s lies outside the model's structure: set .parameters_size to its sizeof", what,
+                    p->name);
+  if ((size_t)p->domain > PW_FRACTION)
+    return pw_fail (error, PW_INPUT, "%s: parameter %s: its domain does not exist", what, p->name);
+  if (*expected == 0) return PW_OK;
+  return pw_fail (error, PW_INPUT, "%s: parameter %s has the default %g: expected %s", what, p->name, p->value,
+                  expected);
+}
+
+int pw_plugin_check (const pw_plugin_table *t, const char *what, pw_error *error) {
+  if (pw_require (t, "the table of a model", error) != PW_OK) return PW_INPUT;
+  if (t->abi != PW_ABI || t->size != sizeof *t)
+    return pw_fail (error, PW_INPUT,
+                    "%s was compiled for another Pinwheel (ABI %u, this one has %u; table of %zu bytes, here %zu): "
+                    "recompile it",
+                    what, t->abi, (unsigned)PW_ABI, t->size, sizeof *t);
+  if (t->build == NULL)
+    return pw_fail (error, PW_INPUT, "%s has no build function: PW_MODEL (...) at its end must set .build", what);
+  if (t->about && !pw_is_text (t->about))
+    return pw_fail (error, PW_INPUT, "%s: .about is not text: expected UTF-8 without control characters", what);
+  for (const pw_parameter *p = t->parameters; p && p->name; p++)
+    if (check_parameter (t, p, what, error) != PW_OK) return PW_INPUT;
+  return PW_OK;
+}
+
+/* `type`: "body" or an element type, for messages. */
+static int check_name (const pw_model *m, const char *type, const char *name, pw_error *error) {
+  if (name == NULL || *name == 0) return pw_fail (error, PW_INPUT, "model %s: a %s without a name", m->name, type);
+  if (strlen (name) > PW_NAME_MAX)
+    return pw_fail (error, PW_INPUT, "model %s: %s \"%.*s...\": a name has at most %d bytes, this one %zu", m->name,
+                    type, PW_NAME_MAX, name, PW_NAME_MAX, strlen (name));
+  if (strcmp (name, "ground") == 0)
+    return pw_fail (error, PW_INPUT, "model %s: %s \"ground\": this name is reserved for the ground", m->name, type);
+  int valid = pw_is_text (name);
+  for (const unsigned char *c = (const unsigned char *)name; *c; c++)
+    valid &= isalnum (*c) || *c == '_' || *c == '-' || *c >= 0x80; /* the latter: any character beyond ASCII */
+  if (valid) return PW_OK;
+  return pw_fail (error, PW_INPUT, "model %s: %s \"%s\": expected letters, digits, _, - and characters beyond ASCII",
+                  m->name, type, name);
+}
+
+int pw_model_check_body (const pw_model *m, const pw_body *b, pw_error *error) {
+  if (pw_require (m, "a model", error) != PW_OK || pw_require (b, "a body", error) != PW_OK) return PW_INPUT;
+  if (check_name (m, "body", b->name, error) != PW_OK) return PW_INPUT;
+  const struct {
+    const char *name;
+    double value;
+    pw_domain domain;
+  } field[] = {
+    { "mass", b->mass, PW_NONNEGATIVE }, { "inertia", b->inertia, PW_NONNEGATIVE }, { "start x", b->start[0], PW_REAL },
+    { "start y", b->start[1], PW_REAL }, { "start phi", b->start[2], PW_REAL },     { "rate vx", b->rate[0], PW_REAL },
+    { "rate vy", b->rate[1], PW_REAL },  { "rate omega", b->rate[2], PW_REAL },
+  };
+  for (size_t i = 0; i < sizeof field / sizeof *field; i++) {
+    const char *expected = pw_domain_check (field[i].domain, field[i].value);
+    if (*expected)
+      return pw_fail (error, PW_INPUT, "model %s: body %s: %s = %g: expected %s", m->name, b->name, field[i].name,
+                      field[i].value, expected);
+  }
+  return PW_OK;
+}
+
+/* names: of all bodies of the model, or NULL while it is built: then any name passes. */
+static int check_body_name (const pw_model *m, const pw_element *e, const char *body, const pw_names *names,
+                            pw_error *error) {
+  const char *kind = e->kind->name, *name = pw_element_name (e);
+  if (body == NULL || *body == 0)
+    return pw_fail (error, PW_INPUT, "model %s: %s %s: a body is missing (the ground is \"ground\")", m->name, kind,
+                    name);
+  int found = names ? pw_names_find (names, body) : -1;
+  if (strcmp (body, "ground") == 0 || names == NULL || (found >= 0 && found < m->bodies)) return PW_OK;
+  pw_nearest near = { .sought = body };
+  for (int i = 0; i < m->bodies; i++) pw_nearest_try (&near, m->body[i].name);
+  pw_nearest_try (&near, "ground");
+  return pw_fail (error, PW_INPUT, "model %s: %s %s: there is no body \"%s\"%s", m->name, kind, name, body,
+                  pw_nearest_text (&near));
+}
+
+/* Writes what is wrong with a value of a field, if anything, to `text`. */
+static void check_value (const pw_kind *kind, const pw_field *f, const void *at, char *text, size_t size) {
+  int point, choices = 0, numbers = f->type == PW_NUMBER ? 1 : f->type == PW_POINT || f->type == PW_VECTOR ? 2 : 0;
+  for (int k = 0; k < numbers && !*text; k++) {
+    const double value = ((const double *)at)[k];
+    const char *expected = pw_domain_check (f->type == PW_NUMBER ? f->domain : PW_REAL, value);
+    if (*expected) snprintf (text, size, " = %g: expected %s", value, expected);
+  }
+  if (f->type == PW_SIGNAL) pw_signal_check (at, kind, &point, text, size);
+  if (f->type != PW_CHOICE) return;
+  while (f->choices[choices]) choices++;
+  const int value = *(const int *)at;
+  if (value < 0 || value >= choices) snprintf (text, size, " = %d: expected 0 to %d", value, choices - 1);
+}
+
+static int check_field (const pw_model *m, const pw_element *e, const pw_field *f, const pw_names *names,
+                        pw_error *error) {
+  char name[PW_NAME_BYTES], fault[300];
+  for (int i = 0; i < pw_field_count (f); i++) {
+    const void *at = (const char *)e->definition + f->offset + (size_t)i * pw_field_bytes (f->type);
+    *fault = 0;
+    if (f->type == PW_BODY && check_body_name (m, e, *(const char *const *)at, names, error) != PW_OK) return PW_INPUT;
+    check_value (e->kind, f, at, fault, sizeof fault);
+    if (*fault)
+      return pw_fail (error, PW_INPUT, "model %s: %s %s: %s%s%s", m->name, e->kind->name, pw_element_name (e),
+                      pw_field_value_name (f, i, name, sizeof name), f->type == PW_SIGNAL ? ": " : "", fault);
+  }
+  return PW_OK;
+}
+
+static int check_element (const pw_model *m, const pw_element *e, const pw_names *names, pw_error *error) {
+  if (check_name (m, e->kind->name, pw_element_name (e), error) != PW_OK) return PW_INPUT;
+  for (const pw_field *f = e->kind->fields; f->name; f++)
+    if (check_field (m, e, f, names, error) != PW_OK) return PW_INPUT;
+  for (int i = 0; i < e->kind->bodies && !e->kind->each_body; i++) {
+    const char *body = *(const char *const *)pw_field_at (e->kind, e->definition, PW_BODY, i);
+    for (int n = 0; n < i; n++)
+      if (strcmp (*(const char *const *)pw_field_at (e->kind, e->definition, PW_BODY, n), body) == 0)
+        return pw_fail (error, PW_INPUT, "model %s: %s %s: %s of its bodies are \"%s\": expected different ones",
+                        m->name, e->kind->name, pw_element_name (e), e->kind->bodies > 2 ? "two" : "both", body);
+    if (e->kind->bodies == 1 && strcmp (body, "ground") == 0)
+      return pw_fail (error, PW_INPUT, "model %s: %s %s: expected a body other than the ground, which does not move",
+                      m->name, e->kind->name, pw_element_name (e));
+  }
+  return PW_OK;
+}
+
+int pw_model_check_element (const pw_model *m, const pw_element *e, pw_error *error) {
+  if (pw_require (m, "a model", error) != PW_OK || pw_require (e, "an element", error) != PW_OK) return PW_INPUT;
+  return check_element (m, e, NULL, error);
+}
+
+int pw_check_model (const pw_model *m, const pw_names *names, pw_error *error) {
+  for (int i = 0; i < m->bodies; i++)
+    if (pw_model_check_body (m, &m->body[i], error) != PW_OK) return PW_INPUT;
+  for (int i = 0; i < m->elements; i++)
+    if (check_element (m, &m->element[i], names, error) != PW_OK) return PW_INPUT;
+  return PW_OK;
+}
+
+/* ---- Models ---- */
 
 /* An object that the model owns. */
 struct pw_kept {
@@ -29,9 +319,7 @@ pw_model *pw_model_new (const char *name, const pw_plugin_table *table, pw_error
     pw_fail (error, PW_INPUT, "a model has no %s", name ? "table" : "name");
     return NULL;
   }
-  char what[200];
-  snprintf (what, sizeof what, "model %s", name);
-  if (pw_plugin_check (table, what, error) != PW_OK) return NULL;
+  if (pw_plugin_check (table, PW_PRINTED (200, "model %s", name), error) != PW_OK) return NULL;
   pw_model *m = calloc (1, sizeof *m);
   if (m) {
     m->table = table;
@@ -92,10 +380,6 @@ int pw_model_refuse (pw_model *m, const char *format, ...) {
   return pw_fail (&m->error, PW_INPUT, "model %s: %s", m->name, text);
 }
 
-static int model_grow (pw_model *m, void *array, int count, size_t *room, size_t size) {
-  return pw_grow (array, (size_t)count, room, size) == PW_OK ? PW_OK : model_no_memory (m);
-}
-
 static void *model_copy (pw_model *m, const void *from, size_t bytes) {
   void *copy = pw_arena_alloc (&m->arena, bytes);
   if (copy) return memcpy (copy, from, bytes);
@@ -111,8 +395,8 @@ static const char *model_copy_text (pw_model *m, const char *text) {
 
 int pw_add_body (pw_model *m, const pw_body *body) {
   if (m == NULL || body == NULL) return m ? pw_model_refuse (m, "pw_add_body without a body") : PW_INPUT;
-  if (m->error.status != PW_OK || model_grow (m, &m->body, m->bodies, &m->body_room, sizeof *m->body) != PW_OK)
-    return m->error.status;
+  if (m->error.status != PW_OK) return m->error.status;
+  if (pw_grow (&m->body, (size_t)m->bodies, &m->body_room, sizeof *m->body) != PW_OK) return model_no_memory (m);
   pw_body *b = &m->body[m->bodies++];
   *b = *body;
   b->name = model_copy_text (m, body->name);
@@ -147,9 +431,9 @@ static int model_check_kind (pw_model *m, const pw_kind *kind) {
 
 int pw_add (pw_model *m, const pw_kind *kind, const void *definition) {
   if (m == NULL) return PW_INPUT;
-  if (m->error.status != PW_OK || model_check_kind (m, kind) != PW_OK ||
-      model_grow (m, &m->element, m->elements, &m->element_room, sizeof *m->element) != PW_OK)
-    return m->error.status;
+  if (m->error.status != PW_OK || model_check_kind (m, kind) != PW_OK) return m->error.status;
+  if (pw_grow (&m->element, (size_t)m->elements, &m->element_room, sizeof *m->element) != PW_OK)
+    return model_no_memory (m);
   if (definition == NULL) return pw_model_refuse (m, "pw_add of element type %s without a definition", kind->name);
   void *copy = model_copy (m, definition, kind->definition);
   if (copy == NULL) return m->error.status;
@@ -255,314 +539,14 @@ int pw_model_set_initial (pw_model *m, const char *state, double value, pw_error
   const char *expected = pw_domain_check (PW_REAL, value);
   if (*expected)
     return pw_fail (error, PW_INPUT, "model %s: start %s = %g: expected %s", m->name, state, value, expected);
-  if (model_grow (m, &m->initial, m->initials, &m->initial_room, sizeof *m->initial) == PW_OK) {
-    m->initial[m->initials] = (pw_initial_setting){ model_copy_text (m, state), value };
-    if (m->initial[m->initials].state) m->initials++;
-  }
+  const char *copy = model_copy_text (m, state);
+  if (copy && pw_grow (&m->initial, (size_t)m->initials, &m->initial_room, sizeof *m->initial) == PW_OK)
+    m->initial[m->initials++] = (pw_initial_setting){ copy, value };
+  else
+    model_no_memory (m);
   return model_status (m, error);
 }
 
-/* ---- Reference solution: a function in C, or expressions of a text model ---- */
-
 int pw_model_has_reference (const pw_model *m) {
   return m->table->reference != NULL || pw_model_reference_text (m)->states > 0;
-}
-
-/* Checks the table of a plug-in, and the bodies and elements of a model, before these are used. */
-
-/* Names and units are one line, since tables have them in their heads; a description may have several lines. */
-static int check_parameter (const pw_plugin_table *t, const pw_parameter *p, const char *what, pw_error *error) {
-  const char *expected = pw_domain_check (p->domain, p->value);
-  if (!pw_is_line (p->name) || (p->unit && !pw_is_line (p->unit)) || (p->about && !pw_is_text (p->about)))
-    return pw_fail (error, PW_INPUT,
-                    "%s: name, unit or meaning of parameter %s is not text: expected UTF-8 without control characters",
-                    what, p->name);
-  if (p->offset > t->parameters_size || t->parameters_size - p->offset < sizeof (double))
-    return pw_fail (error, PW_INPUT,
-                    "%s: parameter %s lies outside the model's structure: set .parameters_size to its sizeof", what,
-                    p->name);
-  if ((size_t)p->domain > PW_FRACTION)
-    return pw_fail (error, PW_INPUT, "%s: parameter %s: its domain does not exist", what, p->name);
-  if (*expected == 0) return PW_OK;
-  return pw_fail (error, PW_INPUT, "%s: parameter %s has the default %g: expected %s", what, p->name, p->value,
-                  expected);
-}
-
-int pw_plugin_check (const pw_plugin_table *t, const char *what, pw_error *error) {
-  if (pw_require (t, "the table of a model", error) != PW_OK) return PW_INPUT;
-  if (t->abi != PW_ABI || t->size != sizeof *t)
-    return pw_fail (error, PW_INPUT,
-                    "%s was compiled for another Pinwheel (ABI %u, this one has %u; table of %zu bytes, here %zu): "
-                    "recompile it",
-                    what, t->abi, (unsigned)PW_ABI, t->size, sizeof *t);
-  if (t->build == NULL)
-    return pw_fail (error, PW_INPUT, "%s has no build function: PW_MODEL (...) at its end must set .build", what);
-  if (t->about && !pw_is_text (t->about))
-    return pw_fail (error, PW_INPUT, "%s: .about is not text: expected UTF-8 without control characters", what);
-  for (const pw_parameter *p = t->parameters; p && p->name; p++)
-    if (check_parameter (t, p, what, error) != PW_OK) return PW_INPUT;
-  return PW_OK;
-}
-
-/* `type`: "body" or an element type, for messages. */
-static int check_name (const pw_model *m, const char *type, const char *name, pw_error *error) {
-  if (name == NULL || *name == 0) return pw_fail (error, PW_INPUT, "model %s: a %s without a name", m->name, type);
-  if (strlen (name) > PW_NAME_MAX)
-    return pw_fail (error, PW_INPUT, "model %s: %s \"%.*s...\": a name has at most %d bytes, this one %zu", m->name,
-                    type, PW_NAME_MAX, name, PW_NAME_MAX, strlen (name));
-  if (strcmp (name, "ground") == 0)
-    return pw_fail (error, PW_INPUT, "model %s: %s \"ground\": this name is reserved for the ground", m->name, type);
-  int valid = pw_is_text (name);
-  for (const unsigned char *c = (const unsigned char *)name; *c; c++)
-    valid &= isalnum (*c) || *c == '_' || *c == '-' || *c >= 0x80; /* the latter: any character beyond ASCII */
-  if (valid) return PW_OK;
-  return pw_fail (error, PW_INPUT, "model %s: %s \"%s\": expected letters, digits, _, - and characters beyond ASCII",
-                  m->name, type, name);
-}
-
-int pw_model_check_body (const pw_model *m, const pw_body *b, pw_error *error) {
-  if (pw_require (m, "a model", error) != PW_OK || pw_require (b, "a body", error) != PW_OK) return PW_INPUT;
-  if (check_name (m, "body", b->name, error) != PW_OK) return PW_INPUT;
-  const struct {
-    const char *name;
-    double value;
-    pw_domain domain;
-  } field[] = {
-    { "mass", b->mass, PW_NONNEGATIVE }, { "inertia", b->inertia, PW_NONNEGATIVE }, { "start x", b->start[0], PW_REAL },
-    { "start y", b->start[1], PW_REAL }, { "start phi", b->start[2], PW_REAL },     { "rate vx", b->rate[0], PW_REAL },
-    { "rate vy", b->rate[1], PW_REAL },  { "rate omega", b->rate[2], PW_REAL },
-  };
-  for (size_t i = 0; i < sizeof field / sizeof *field; i++) {
-    const char *expected = pw_domain_check (field[i].domain, field[i].value);
-    if (*expected)
-      return pw_fail (error, PW_INPUT, "model %s: body %s: %s = %g: expected %s", m->name, b->name, field[i].name,
-                      field[i].value, expected);
-  }
-  return PW_OK;
-}
-
-/* names: of all bodies of the model, or NULL while it is built: then any name passes. */
-static int check_body_name (const pw_model *m, const pw_element *e, const char *body, const pw_names *names,
-                            pw_error *error) {
-  const char *kind = e->kind->name, *name = pw_element_name (e);
-  if (body == NULL || *body == 0)
-    return pw_fail (error, PW_INPUT, "model %s: %s %s: a body is missing (the ground is \"ground\")", m->name, kind,
-                    name);
-  int found = names ? pw_names_find (names, body) : -1;
-  if (strcmp (body, "ground") == 0 || names == NULL || (found >= 0 && found < m->bodies)) return PW_OK;
-  pw_nearest near = { .sought = body };
-  for (int i = 0; i < m->bodies; i++) pw_nearest_try (&near, m->body[i].name);
-  pw_nearest_try (&near, "ground");
-  return pw_fail (error, PW_INPUT, "model %s: %s %s: there is no body \"%s\"%s", m->name, kind, name, body,
-                  pw_nearest_text (&near));
-}
-
-/* ---- Values: these functions write what is wrong, if anything, to `text` ---- */
-
-static void check_numbers (const pw_field *f, const double *value, char *text, size_t size) {
-  for (int k = 0; k < (f->type == PW_NUMBER ? 1 : 2) && !*text; k++) {
-    const char *expected = pw_domain_check (f->type == PW_NUMBER ? f->domain : PW_REAL, value[k]);
-    if (*expected) snprintf (text, size, " = %g: expected %s", value[k], expected);
-  }
-}
-
-static void check_choice (const pw_field *f, int value, char *text, size_t size) {
-  int choices = 0;
-  while (f->choices[choices]) choices++;
-  if (value < 0 || value >= choices) snprintf (text, size, " = %d: expected 0 to %d", value, choices - 1);
-}
-
-static int check_field (const pw_model *m, const pw_element *e, const pw_field *f, const pw_names *names,
-                        pw_error *error) {
-  char name[PW_NAME_BYTES], fault[300];
-  int point; /* the faulty point of a table; not used here */
-  for (int i = 0; i < pw_field_count (f); i++) {
-    const void *at = (const char *)e->definition + f->offset + (size_t)i * pw_field_bytes (f->type);
-    *fault = 0;
-    if (f->type == PW_BODY && check_body_name (m, e, *(const char *const *)at, names, error) != PW_OK) return PW_INPUT;
-    if (f->type == PW_NUMBER || f->type == PW_POINT || f->type == PW_VECTOR) check_numbers (f, at, fault, sizeof fault);
-    if (f->type == PW_SIGNAL) pw_signal_check (at, e->kind, &point, fault, sizeof fault);
-    if (f->type == PW_CHOICE) check_choice (f, *(const int *)at, fault, sizeof fault);
-    if (*fault)
-      return pw_fail (error, PW_INPUT, "model %s: %s %s: %s%s%s", m->name, e->kind->name, pw_element_name (e),
-                      pw_field_value_name (f, i, name, sizeof name), f->type == PW_SIGNAL ? ": " : "", fault);
-  }
-  return PW_OK;
-}
-
-/* ---- Elements and models ---- */
-
-static int check_element (const pw_model *m, const pw_element *e, const pw_names *names, pw_error *error) {
-  if (check_name (m, e->kind->name, pw_element_name (e), error) != PW_OK) return PW_INPUT;
-  for (const pw_field *f = e->kind->fields; f->name; f++)
-    if (check_field (m, e, f, names, error) != PW_OK) return PW_INPUT;
-  for (int i = 0; i < e->kind->bodies && !e->kind->each_body; i++) {
-    const char *body = *(const char *const *)pw_field_at (e->kind, e->definition, PW_BODY, i);
-    for (int n = 0; n < i; n++)
-      if (strcmp (*(const char *const *)pw_field_at (e->kind, e->definition, PW_BODY, n), body) == 0)
-        return pw_fail (error, PW_INPUT, "model %s: %s %s: %s of its bodies are \"%s\": expected different ones",
-                        m->name, e->kind->name, pw_element_name (e), e->kind->bodies > 2 ? "two" : "both", body);
-    if (e->kind->bodies == 1 && strcmp (body, "ground") == 0)
-      return pw_fail (error, PW_INPUT, "model %s: %s %s: expected a body other than the ground, which does not move",
-                      m->name, e->kind->name, pw_element_name (e));
-  }
-  return PW_OK;
-}
-
-int pw_model_check_element (const pw_model *m, const pw_element *e, pw_error *error) {
-  if (pw_require (m, "a model", error) != PW_OK || pw_require (e, "an element", error) != PW_OK) return PW_INPUT;
-  return check_element (m, e, NULL, error);
-}
-
-int pw_check_model (const pw_model *m, const pw_names *names, pw_error *error) {
-  for (int i = 0; i < m->bodies; i++)
-    if (pw_model_check_body (m, &m->body[i], error) != PW_OK) return PW_INPUT;
-  for (int i = 0; i < m->elements; i++)
-    if (check_element (m, &m->element[i], names, error) != PW_OK) return PW_INPUT;
-  return PW_OK;
-}
-
-/* Element types: the list of built-in ones, the fields of a definition, and checks of a type's table.  A table is
- * checked before use, so that a mistake in a plug-in is reported instead of crashing the program. */
-
-const pw_kind *const pw_kinds[] = {
-#define PW_KIND(k) &pw_kind_##k,
-  PW_KINDS
-#undef PW_KIND
-      NULL
-};
-
-int pw_kind_is_built_in (const pw_kind *kind) {
-  for (const pw_kind *const *k = pw_kinds; *k; k++)
-    if (*k == kind) return 1;
-  return 0;
-}
-
-size_t pw_field_bytes (pw_field_type type) {
-  static const size_t bytes[] = {
-    [PW_NUMBER] = sizeof (double), [PW_POINT] = sizeof (double[2]),  [PW_VECTOR] = sizeof (double[2]),
-    [PW_BODY] = sizeof (char *),   [PW_SIGNAL] = sizeof (pw_signal), [PW_CHOICE] = sizeof (int)
-  };
-  return (size_t)type < sizeof bytes / sizeof *bytes ? bytes[type] : 0;
-}
-
-const void *pw_field_at (const pw_kind *kind, const void *definition, pw_field_type type, int index) {
-  for (const pw_field *f = kind->fields; f->name; f++) {
-    if (f->type != type) continue;
-    if (index < pw_field_count (f)) return (const char *)definition + f->offset + (size_t)index * pw_field_bytes (type);
-    index -= pw_field_count (f);
-  }
-  return NULL;
-}
-
-char *pw_field_value_name (const pw_field *f, int i, char *buffer, size_t size) {
-  if (pw_field_count (f) > 1)
-    snprintf (buffer, size, "%s[%d]", f->name, i);
-  else
-    snprintf (buffer, size, "%s", f->name);
-  return buffer;
-}
-
-_Static_assert(PW_NAME_MAX == 50, "as in FAULT_TEXT");
-#define FAULT_TEXT ": expected at most 50 bytes of UTF-8 without control characters"
-
-/* 1 if a name or unit is too long or not one line: it would spoil tables and files. */
-static int is_bad_text (const char *text) {
-  return strlen (text) > PW_NAME_MAX || !pw_is_line (text);
-}
-
-/* The fault of one field, or "". */
-static const char *fault_field (const pw_kind *kind, const pw_field *f) {
-  size_t bytes = pw_field_bytes (f->type) * (size_t)pw_field_count (f);
-  if (is_bad_text (f->name) || (f->unit && is_bad_text (f->unit))) return "name or unit" FAULT_TEXT;
-  if (bytes == 0) return "its type does not exist";
-  if ((size_t)f->domain > PW_FRACTION) return "its domain does not exist";
-  if (f->offset < sizeof (char *) || bytes > kind->definition || f->offset > kind->definition - bytes)
-    return "outside the definition, whose first member is its name and whose sizeof is .definition";
-  if (f->type == PW_CHOICE && (f->choices == NULL || f->choices[0] == NULL)) return "a choice without choices";
-  return "";
-}
-
-/* The fault of the fields, or ""; the text may be in the buffer. */
-static const char *fault_fields (const pw_kind *kind, char *buffer, size_t size) {
-  int bodies = 0, signals = 0;
-  if (kind->fields == NULL) return "no table of fields";
-  for (const pw_field *f = kind->fields; f->name; f++) {
-    const char *fault = fault_field (kind, f);
-    if (*fault) return snprintf (buffer, size, "field %.50s: %s", f->name, fault), buffer;
-    if (f->type == PW_BODY) bodies += pw_field_count (f);
-    if (f->type == PW_SIGNAL) signals += pw_field_count (f);
-  }
-  if (kind->each_body && (bodies > 0 || kind->bodies != 1))
-    return "an element type that acts on each body has one body and no body fields";
-  if (!kind->each_body && bodies != kind->bodies) return "bodies is not the sum of the counts of PW_BODY fields";
-  if (signals != kind->signals) return "signals is not the sum of the counts of PW_SIGNAL fields";
-  return "";
-}
-
-static const char *fault_functions (const pw_kind *kind) {
-  pw_batch_function *const exact[] = { kind->g,     kind->g_size, kind->eta,     kind->J,
-                                       kind->gamma, kind->force,  kind->force_u, kind->energy,
-                                       kind->power, kind->loss,   kind->contact, kind->saturation };
-  for (size_t i = 0; i < sizeof exact / sizeof *exact; i++)
-    if (exact[i] == PW_BY_DIFFERENCES) return "PW_BY_DIFFERENCES is permitted only for second-order blocks";
-  if (kind->constant && (kind->force == NULL || kind->signals > 0))
-    return "declared constant, but it has no force, or has signals";
-  if (kind->signals > 0 && kind->rows == 0 && kind->force && kind->force_u == NULL)
-    return "a force with signals, but no force_u";
-  if (kind->force == NULL && kind->force_u) return "force_u, but no force";
-  if (kind->rows > 0 && kind->J == NULL) return "constraint equations without J";
-  if (kind->level == PW_HOLONOMIC && kind->g == NULL) return "holonomic constraint equations without g";
-  if (kind->level != PW_HOLONOMIC && kind->g) return "g, but no holonomic constraint equations";
-  return "";
-}
-
-static const char *fault_names (const pw_kind *kind) {
-  const char *name[PW_MAX_ROWS + 2 * PW_MAX_INTERNAL];
-  int names = 0;
-  for (int i = 0; i < kind->rows; i++) {
-    const pw_quantity *q = kind->reaction ? &kind->reaction[i] : NULL;
-    if (!q || !q->name || !(q->unit || kind->reaction_unit))
-      return "constraint equations whose reactions lack a name or unit";
-    if (is_bad_text (q->name) || (q->unit && is_bad_text (q->unit))) return "name or unit of a reaction" FAULT_TEXT;
-    name[names++] = q->name;
-  }
-  for (int i = 0; i < kind->internal; i++) {
-    const pw_quantity *q = kind->coordinate ? &kind->coordinate[i] : NULL;
-    if (!q || !q->name || !q->rate || !q->unit) return "internal coordinates without name, rate or unit";
-    if (is_bad_text (q->name) || is_bad_text (q->rate) || is_bad_text (q->unit))
-      return "name or unit of an internal coordinate" FAULT_TEXT;
-    if (strcmp (q->unit, "rad") != 0) return "an internal coordinate whose unit is not rad";
-    name[names++] = q->name, name[names++] = q->rate;
-  }
-  for (int i = 0; i < names; i++)
-    for (int n = 0; n < i; n++)
-      if (strcmp (name[i], name[n]) == 0) return "two reactions or internal coordinates of the same name";
-  return "";
-}
-
-const char *pw_kind_check (const pw_kind *kind, char *buffer, size_t size) {
-  if (kind->name == NULL || *kind->name == 0) return "no name";
-  if (is_bad_text (kind->name)) return "its name" FAULT_TEXT;
-  if (kind->definition < sizeof (char *)) return "the definition has no room for its name";
-  if (kind->bodies < 0 || kind->bodies > PW_MAX_BODIES || kind->internal < 0 || kind->internal > PW_MAX_INTERNAL ||
-      kind->rows < 0 || kind->rows > PW_MAX_ROWS || kind->signals < 0 || kind->signals > PW_MAX_SIGNALS) {
-    snprintf (buffer, size, "at most %d bodies, %d internal coordinates, %d constraint equations and %d signals",
-              PW_MAX_BODIES, PW_MAX_INTERNAL, PW_MAX_ROWS, PW_MAX_SIGNALS);
-    return buffer;
-  }
-  if (kind->bodies + kind->internal == 0) return "neither a body nor an internal coordinate";
-  if (kind->level < PW_FORCE || kind->level > PW_NONHOLONOMIC || (kind->rows > 0) != (kind->level != PW_FORCE))
-    return "rows and level are inconsistent";
-  if ((kind->internal > 0 || kind->element > 0) && kind->prepare == NULL)
-    return "a prepared element (.element > 0) or internal coordinates, but no prepare function";
-  if (kind->element > INT_MAX) return "a prepared element of more than 2147483647 bytes";
-  const char *fault = fault_names (kind);
-  if (*fault == 0) fault = fault_fields (kind, buffer, size);
-  return *fault ? fault : fault_functions (kind);
-}
-
-void pw_by_differences (const pw_batch *b, double *out) {
-  (void)b; /* only its address is used */
-  (void)out;
 }

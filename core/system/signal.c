@@ -25,11 +25,6 @@ static void signal_rise (const pw_signal *s, double t, double u[3]) {
   }
 }
 
-static double signal_rise_breakpoint (const pw_signal *s, double t) {
-  double end = s->ramp.start + s->ramp.duration;
-  return t < s->ramp.start ? s->ramp.start : t < end ? end : INFINITY;
-}
-
 /* The beginning of the period that contains t, and of the next one, for t >= start. */
 static void signal_pulse_period (const pw_signal *s, double t, double *begin, double *next) {
   double start = s->pulse.start, period = s->pulse.period;
@@ -209,21 +204,12 @@ int pw_signal_eval (const pw_source *source, double t) {
 }
 
 double pw_signal_breakpoint (const pw_signal *s, int kinks, double t) {
-  switch (s->type) {
-  case PW_CONSTANT:
-  case PW_HARMONIC:
-    break;
-  case PW_RAMP:
-  case PW_SMOOTH_STEP:
-    return signal_rise_breakpoint (s, t);
-  case PW_PULSE:
-    return signal_pulse_breakpoint (s, t);
-  case PW_TABLE:
-    return table_breakpoint (s, kinks, t);
-  case PW_FUNCTION:
-    return s->function.breakpoint ? s->function.breakpoint (s->function.context, t) : INFINITY;
-  }
-  return INFINITY;
+  if (s->type == PW_PULSE) return signal_pulse_breakpoint (s, t);
+  if (s->type == PW_TABLE) return table_breakpoint (s, kinks, t);
+  if (s->type == PW_FUNCTION && s->function.breakpoint) return s->function.breakpoint (s->function.context, t);
+  if (s->type != PW_RAMP && s->type != PW_SMOOTH_STEP) return INFINITY;
+  double end = s->ramp.start + s->ramp.duration;
+  return t < s->ramp.start ? s->ramp.start : t < end ? end : INFINITY;
 }
 
 /* ---- Forms of signals ---- */
@@ -300,12 +286,6 @@ static void form_check_fields (const pw_signal *s, const pw_signal_form *form, c
   }
 }
 
-static void form_check_pulse (const pw_signal *s, char *text, size_t size) {
-  double width = s->pulse.width, period = s->pulse.period;
-  if (period > 0 && !(width > 0 && width < period))
-    snprintf (text, size, "a pulse every %g s: expected a width > 0 and < %g s, found %g s", period, period, width);
-}
-
 static void form_check_points (const pw_signal *s, int *point, char *text, size_t size) {
   const double *t = s->table.t, *y = s->table.value;
   int cubic = s->table.interpolation == PW_CUBIC, least = cubic && s->table.ends == PW_ENDS_FREE ? 4 : 2;
@@ -357,26 +337,24 @@ static void form_check_continuity (const pw_signal *s, const pw_kind *kind, char
               form);
 }
 
-static void form_check_function (const pw_signal *s, const pw_kind *kind, char *text, size_t size) {
-  if (s->function.eval == NULL)
-    snprintf (text, size, "a function signal without eval");
-  else if (s->function.reads && !pw_kind_signals_force (kind))
-    snprintf (text, size, "a constraint's signal may depend on time only");
-}
-
 char *pw_signal_check (const pw_signal *s, const pw_kind *kind, int *point, char *buffer, size_t size) {
   const pw_signal_form *form = pw_signal_form_of (s);
   *buffer = 0;
   *point = -1;
-  if (s->type == PW_FUNCTION)
-    form_check_function (s, kind, buffer, size);
+  if (s->type == PW_FUNCTION && s->function.eval == NULL)
+    snprintf (buffer, size, "a function signal without eval");
+  else if (s->type == PW_FUNCTION && s->function.reads && !pw_kind_signals_force (kind))
+    snprintf (buffer, size, "a constraint's signal may depend on time only");
   else if (s->type == PW_CONSTANT && !isfinite (s->constant))
     snprintf (buffer, size, "%g: expected a finite number", s->constant);
   else if (form)
     form_check_fields (s, form, buffer, size);
-  else if (s->type != PW_CONSTANT)
+  else if (s->type != PW_CONSTANT && s->type != PW_FUNCTION)
     snprintf (buffer, size, "signal type %d does not exist", (int)s->type);
-  if (!*buffer && s->type == PW_PULSE) form_check_pulse (s, buffer, size);
+  const pw_pulse *p = s->type == PW_PULSE ? &s->pulse : NULL;
+  if (!*buffer && p && p->period > 0 && !(p->width > 0 && p->width < p->period))
+    snprintf (buffer, size, "a pulse every %g s: expected a width > 0 and < %g s, found %g s", p->period, p->period,
+              p->width);
   if (!*buffer && s->type == PW_TABLE) form_check_points (s, point, buffer, size);
   if (!*buffer) form_check_continuity (s, kind, buffer, size);
   return buffer;
