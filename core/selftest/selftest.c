@@ -89,10 +89,8 @@ typedef struct {
   double *block;                     /* elements x width x width */
 } probe;
 
-/* Computes numbers at the moved state; `out` has room for PROBE_GUARD more. */
-typedef void probe_function (probe *x, double *out);
+typedef void probe_function (probe *x, double *out); /* `out` has room for PROBE_GUARD more numbers */
 
-/* Allocates the arrays of a probe whose s, workspace, batch and report are set.  PW_OK or PW_RESOURCE. */
 static int probe_open (probe *x, pw_error *error) {
   x->kind = x->batch->kind;
   x->elements = x->batch->b.count, x->rows = x->kind->rows, x->cols = x->batch->b.cols;
@@ -112,7 +110,6 @@ static int probe_open (probe *x, pw_error *error) {
   return x->memory ? PW_OK : pw_fail_memory (x->s, error);
 }
 
-/* Updates the kinematics to the state moved by h. */
 static void probe_update (probe *x, probe_move move, double h) {
   double step = move == PROBE_MOTION ? h * x->tau : 0;
   for (int j = 0; j < x->s->coords; j++) {
@@ -153,12 +150,10 @@ PROBE_FUNCTION (energy, x->elements)
 PROBE_FUNCTION (power, x->elements)
 PROBE_FUNCTION (loss, x->elements)
 
-/* 1: local column c of element e belongs to the ground. */
 static int probe_ground (const probe *x, int e, int c) {
   return pw_global (x->batch, e, c) >= x->s->coords;
 }
 
-/* The entry of local column c of element e in a vector with an entry for each coordinate; 0 for the ground. */
 static double probe_local (const probe *x, const double *vector, int e, int c) {
   return probe_ground (x, e, c) ? 0 : vector[pw_global (x->batch, e, c)];
 }
@@ -283,7 +278,6 @@ static void selftest_gamma (probe *x) {
   selftest_compare (x, "gamma", x->rows, 1, size, value, reference);
 }
 
-/* Adds h to signal u of each element. */
 static void selftest_shift (probe *x, int u, double h) {
   for (int e = 0; e < x->elements; e++) x->batch->u[3 * (e * x->kind->signals + u)] += h;
 }
@@ -333,7 +327,6 @@ static void selftest_blocks (probe *x) {
   selftest_block (x, PW_FORCE_V, size_force);
 }
 
-/* Makes a check at velocities multiplied by a factor. */
 static void selftest_at_speed (probe *x, double factor, void (*check) (probe *x)) {
   double v[PW_SCENE_COORDS];
   memcpy (v, x->v, (size_t)x->s->coords * sizeof *v);
@@ -392,7 +385,6 @@ static void selftest_saturation (probe *x) {
   }
 }
 
-/* x . y of n numbers */
 static double selftest_dot (int n, const double *x, const double *y) {
   double sum = 0;
   for (int i = 0; i < n; i++) sum += x[i] * y[i];
@@ -464,11 +456,8 @@ static void selftest_randomise (probe *x, pw_random *r) {
   x->t = pw_random_between (r, 0.1, 3);
   x->tau = 1;
   for (int j = 0; j < x->s->coords; j++) {
-    x->q[j] = pw_random_between (r, -0.5, 0.5);
-    if (pw_is_angle (x->s, j))
-      x->q[j] = pw_random_between (r, -3, 3);
-    else
-      x->q[j] += corner[j / 3][j % 3];
+    x->q[j] =
+        pw_is_angle (x->s, j) ? pw_random_between (r, -3, 3) : corner[j / 3][j % 3] + pw_random_between (r, -0.5, 0.5);
     x->v[j] = pw_random_between (r, -1.5, 1.5);
     x->a[j] = pw_random_between (r, -1.5, 1.5);
   }
@@ -592,7 +581,6 @@ static void scene_signals (probe *x, double *out) {
   for (int i = 0; i < x->elements * x->kind->signals; i++) out[i] = x->batch->u[3 * i];
 }
 
-/* Compares the gradients of signals that read states. */
 static void scene_gradients (probe *x, probe_move move) {
   int signals = x->kind->signals, coords = x->s->coords;
   for (int i = 0; i < x->elements * signals; i++) {
@@ -677,30 +665,23 @@ int pw_selftest_scene (const pw_system *s, double T, const pw_kind *kind, double
 
 /* ---- Blocks of a scene that are computed by differences; non-zero ones that are NULL in the table ---- */
 
-/* The batch of the i-th block that is computed by differences, and which *block of it, a pw_block; NULL if there are
- * fewer.  PW_JTL_Q is not counted: a type gives it by jw_q. */
-static const pw_element_batch *differences_find (const pw_system *s, int i, int *block) {
-  for (const pw_element_batch *k = s->batch; k < s->batch + s->batches; k++)
-    for (*block = 0; *block < PW_BLOCKS; ++*block)
-      if (*block != PW_JTL_Q && pw_block_function (k->kind, (pw_block)*block) == pw_by_differences && i-- == 0)
-        return k;
-  return NULL;
-}
-
-int pw_system_differences (const pw_system *s) {
-  int block, count = 0;
-  while (differences_find (s, count, &block)) count++;
-  return count;
-}
-
 static char *differences_name (const pw_kind *kind, int block, char *buffer, size_t size) {
   return pw_print (buffer, size, "%s of element type %s", selftest_block_name[block], kind->name);
 }
 
+/* "" after the last one.  PW_JTL_Q is not counted: a type gives it by jw_q. */
 char *pw_system_difference_name (const pw_system *s, int i, char *buffer, size_t size) {
-  int block;
-  const pw_element_batch *k = differences_find (s, i, &block);
-  return k ? differences_name (k->kind, block, buffer, size) : pw_print (buffer, size, "%s", "");
+  for (const pw_element_batch *k = s->batch; k < s->batch + s->batches; k++)
+    for (int block = 0; block < PW_BLOCKS; block++)
+      if (block != PW_JTL_Q && pw_block_function (k->kind, (pw_block)block) == pw_by_differences && i-- == 0)
+        return differences_name (k->kind, block, buffer, size);
+  return pw_print (buffer, size, "%s", "");
+}
+
+int pw_system_differences (const pw_system *s) {
+  int count = 0;
+  while (*PW_NAME (pw_system_difference_name, s, count)) count++;
+  return count;
 }
 
 /* Searches the first, the last and a middle element of a batch, with random k->b.w, multipliers and signals.  Returns

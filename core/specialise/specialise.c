@@ -1,12 +1,12 @@
 /* Writes C code for one compiled system: the source texts of its element types, called for one element at a time with
  * constant indices, and a factorisation without loops.  scene_head.inc explains the macros in the code. */
 #define _POSIX_C_SOURCE 200809L
+#include <math.h>
 #include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "system.h"
-#include "elimination.h"
 #include "specialised.h"
 #include "selftest.h"
 
@@ -17,6 +17,382 @@ enum {
   SPECIALISE_INLINE = 8      /* up to this number of rows all functions are inlined: common parts are computed once */
 };
 
+/* ---- Terms: values that generated code has when it runs, and the statements that compute them ---- */
+
+typedef enum { TERM_ZERO, TERM_ONE, TERM_CONSTANT, TERM_VARIABLE } term_type;
+
+/* sign times 0, 1, a value that is constant during a run (M[0], J[3], or C[2] computed by `prepare`), or a variable. */
+typedef struct {
+  term_type type;
+  int sign;
+  char name[20]; /* as printed without the sign: "C[3]", "x12", "J[7]" */
+  double value;  /* at the initial state, including the sign, to choose pivots; 1 for f and g of solutions */
+} term;
+
+/* Where statements go. */
+typedef struct {
+  FILE *prepare, *code;     /* those that compute constants; the others, of the function being written */
+  int constants, variables; /* how many C[0], C[1], ... and x0, x1, ... there are so far */
+} emitter;
+
+static term term_zero (void) {
+  return (term){ TERM_ZERO, 1, "0", 0 };
+}
+
+/* array[i] */
+static term term_named (term_type type, const char *array, int i, double value) {
+  term a = { type, 1, "", value };
+  snprintf (a.name, sizeof a.name, "%s[%d]", array, i);
+  return a;
+}
+
+/* "-x3": the term with its sign, in the buffer unless it is 0. */
+static const char *term_text (term a, char buffer[24]) {
+  if (a.type == TERM_ZERO) return "0";
+  snprintf (buffer, 24, "%s%s", a.sign < 0 ? "-" : "", a.type == TERM_ONE ? "1" : a.name);
+  return buffer;
+}
+
+static term term_negative (term a) {
+  a.sign = -a.sign;
+  a.value = -a.value;
+  return a;
+}
+
+/* The following functions write a statement unless none is needed, and return the term of its result. */
+
+/* The term sign (a op b): a new variable or constant. */
+static term emit_define (emitter *to, int constant, int sign, double value, const char *a, char op, const char *b) {
+  term out = { constant ? TERM_CONSTANT : TERM_VARIABLE, sign, "", value };
+  if (constant)
+    snprintf (out.name, sizeof out.name, "C[%d]", to->constants++);
+  else
+    snprintf (out.name, sizeof out.name, "x%d", to->variables++);
+  fprintf (constant ? to->prepare : to->code, "  %s%s = %s %c %s;\n", constant ? "" : "const double ", out.name, a, op,
+           b);
+  return out;
+}
+
+static int emit_is_constant (term a) {
+  return a.type != TERM_VARIABLE;
+}
+
+/* a b */
+static term emit_product (emitter *to, term a, term b) {
+  if (a.type == TERM_ZERO || b.type == TERM_ZERO) return term_zero ();
+  if (a.type == TERM_ONE) return a.sign < 0 ? term_negative (b) : b;
+  if (b.type == TERM_ONE) return b.sign < 0 ? term_negative (a) : a;
+  return emit_define (to, emit_is_constant (a) && emit_is_constant (b), a.sign * b.sign, a.value * b.value, a.name, '*',
+                      b.name);
+}
+
+/* a - b c */
+static term emit_difference (emitter *to, term a, term b, term c) {
+  char text[60];
+  if (b.type == TERM_ZERO || c.type == TERM_ZERO) return a;
+  if (a.type == TERM_ZERO) return term_negative (emit_product (to, b, c));
+  if (emit_is_constant (b) && emit_is_constant (c) && !emit_is_constant (a)) { /* the product once and for all */
+    b = emit_product (to, b, c);
+    c = (term){ TERM_ONE, 1, "1", 1 };
+  }
+  int constant = emit_is_constant (a) && emit_is_constant (b) && emit_is_constant (c);
+  const char *left = b.type == TERM_ONE ? "" : b.name, *right = c.type == TERM_ONE && *left ? "" : c.name;
+  snprintf (text, sizeof text, "%s%s%s", left, *left && *right ? " * " : "", right);
+  return emit_define (to, constant, a.sign, a.value - b.value * c.value, a.name,
+                      b.sign * c.sign * a.sign > 0 ? '-' : '+', text);
+}
+
+/* a / b */
+static term emit_quotient (emitter *to, term a, term b) {
+  if (b.type == TERM_ONE) return b.sign < 0 ? term_negative (a) : a;
+  return emit_define (to, emit_is_constant (a) && emit_is_constant (b), a.sign * b.sign, a.value / b.value, a.name, '/',
+                      b.name);
+}
+
+/* ---- Symbolic elimination of the saddle-point system K = [ M J^T ; J 0 ] of a scene ----
+ *
+ * K = L D L^T with symmetric 1 x 1 and 2 x 2 pivots, in an order fixed when the code is generated: massless coordinates
+ * with the constraint equations that determine them, coordinates with mass, constraint equations by least fill-in
+ * (Duff, Erisman & Reid 2017, chapters 5 and 7). */
+
+typedef struct {
+  int coordinates, n;   /* unknowns: the coordinates, then the constraint equations */
+  term *K, *L;          /* n x n: K, column p as it was when unknown p was eliminated; L of K = L D L^T */
+  term *inverse;        /* n: reciprocal pivots */
+  int *order, *partner; /* n: unknowns in their order; partner of a 2 x 2 pivot, or -1 */
+  int *step;            /* n: position in the order; n: not eliminated yet; n + 1: takes no part */
+  int pivots;           /* entries of `order` so far */
+  int factors;          /* entries of F, an array of the generated code */
+  const term *original; /* n x n: K before the elimination; the caller's */
+} elimination;
+
+static const term elimination_one = { TERM_ONE, 1, "1", 1 };
+
+#define AT(p, q) ldl->K[(size_t)(p) * (size_t)ldl->n + (size_t)(q)]
+#define FACTOR(p, q) ldl->L[(size_t)(p) * (size_t)ldl->n + (size_t)(q)]
+#define ORIGINAL(p, q) ldl->original[(size_t)(p) * (size_t)ldl->n + (size_t)(q)]
+
+/* Loops over the unknowns eliminated after the m-th pivot. */
+#define EACH_LATER(i, m)           \
+  for (int i = 0; i < ldl->n; i++) \
+    if (ldl->step[i] > (m) && ldl->step[i] <= ldl->n)
+
+static int elimination_is_zero (term a) {
+  return a.type == TERM_ZERO;
+}
+
+/* 1 if unknown i is not eliminated yet and coupled to p. */
+static int elimination_couples (const elimination *ldl, int i, int p) {
+  return ldl->step[i] == ldl->n && i != p && !elimination_is_zero (AT (i, p));
+}
+
+static int elimination_degree (const elimination *ldl, int p) {
+  int degree = 0;
+  for (int i = 0; i < ldl->n; i++) degree += elimination_couples (ldl, i, p);
+  return degree;
+}
+
+/* Gives p, and its partner unless it is -1, the next position in the order. */
+static void elimination_place (elimination *ldl, int p, int partner) {
+  ldl->partner[ldl->pivots] = partner;
+  ldl->order[ldl->pivots] = p;
+  ldl->step[p] = ldl->pivots++;
+  if (partner >= 0) ldl->step[partner] = ldl->step[p];
+}
+
+/* The general engine takes over if the pivot of an equation is not larger than this part of its diagonal entry, or if
+ * the square of a variable pivot in a massless coordinate's column is not above this part of its sum of squares. */
+#define ELIMINATION_ROW "PW_SCENE_PIVOT"
+#define ELIMINATION_COLUMN "0.04" /* (1/5)^2; elimination_is_large demands 2/5 of the largest entry */
+
+static void elimination_guard_row (emitter *to, term pivot, term diagonal) {
+  char a[24], b[24];
+  int constant = pivot.type != TERM_VARIABLE && diagonal.type != TERM_VARIABLE;
+  if (!constant && strcmp (pivot.name, diagonal.name) == 0)
+    return; /* a sum of squares; evaluation finds it out if it is 0 */
+  fprintf (constant ? to->prepare : to->code, "  GUARD (%s > " ELIMINATION_ROW " * %s);\n", term_text (pivot, a),
+           term_text (diagonal, b));
+}
+
+/* Compares the pivot of column c with the entries of all equations there, now and before the elimination. */
+static void elimination_guard_column (const elimination *ldl, emitter *to, int c, term pivot) {
+  if (pivot.type != TERM_VARIABLE) return;
+  fprintf (to->code, "  GUARD (%s * %s > " ELIMINATION_COLUMN " * (", pivot.name, pivot.name);
+  const char *plus = "";
+  for (int i = ldl->coordinates; i < ldl->n; i++) {
+    term now = AT (i, c), was = ORIGINAL (i, c);
+    for (int k = 0; k < 2; k++, now = was) {
+      if (elimination_is_zero (now) || (k == 1 && strcmp (AT (i, c).name, was.name) == 0)) continue;
+      fprintf (to->code, "%s%s * %s", plus, now.name, now.name);
+      plus = " + ";
+    }
+  }
+  fprintf (to->code, "));\n");
+}
+
+static void elimination_update (elimination *ldl, emitter *to, int i, int j, term a, term b) {
+  AT (i, j) = emit_difference (to, AT (i, j), a, b);
+  AT (j, i) = AT (i, j);
+}
+
+/* Eliminates unknown p with a 1 x 1 pivot, whose reciprocal is `inverse`. */
+static void elimination_pivot (elimination *ldl, emitter *to, int p, term inverse) {
+  fprintf (to->code, "  /* unknown %d */\n", p);
+  elimination_place (ldl, p, -1);
+  ldl->inverse[p] = inverse;
+  for (int i = 0; i < ldl->n; i++)
+    if (elimination_couples (ldl, i, p)) FACTOR (i, p) = emit_product (to, AT (i, p), ldl->inverse[p]);
+  for (int i = 0; i < ldl->n; i++)
+    for (int j = 0; j <= i && elimination_couples (ldl, i, p); j++)
+      if (elimination_couples (ldl, j, p)) elimination_update (ldl, to, i, j, FACTOR (i, p), AT (j, p));
+}
+
+/* Eliminates a massless coordinate c and an equation r with the pivot [ 0 d ; d 0 ].  FACTOR (k, c) = K_kc / d is the
+ * entry of L in column r. */
+static void elimination_pair (elimination *ldl, emitter *to, int c, int r) {
+  fprintf (to->code, "  /* unknowns %d and %d */\n", c, r);
+  elimination_place (ldl, c, r);
+  ldl->inverse[c] = emit_quotient (to, elimination_one, AT (r, c));
+  for (int k = 0; k < ldl->n; k++) {
+    if (!elimination_couples (ldl, k, c)) continue;
+    FACTOR (k, c) = emit_product (to, AT (k, c), ldl->inverse[c]);
+    for (int l = 0; l < ldl->n; l++)
+      if (elimination_couples (ldl, l, r)) elimination_update (ldl, to, k, l, FACTOR (k, c), AT (l, r));
+  }
+}
+
+/* 1 if the entry of equation i in column j can be a pivot: no other one is much larger at the initial state. */
+static int elimination_is_large (const elimination *ldl, int i, int j) {
+  double most = 0;
+  for (int k = ldl->coordinates; k < ldl->n; k++)
+    if (elimination_couples (ldl, k, j)) most = fmax (most, fabs (AT (k, j).value));
+  return fabs (AT (i, j).value) > 0.4 * most;
+}
+
+/* Finds the next pair of a massless coordinate c and an equation r: a pivot of 1, else a constant, else a variable one;
+ * among these the one with the least fill-in, which is far below 1e6.  0 if there is none. */
+static int elimination_next_pair (const elimination *ldl, const double *mass, int *c, int *r) {
+  long least = -1;
+  for (int j = 0; j < ldl->coordinates; j++)
+    for (int i = ldl->coordinates; mass[j] == 0 && ldl->step[j] == ldl->n && i < ldl->n; i++) {
+      if (!elimination_couples (ldl, i, j) || !elimination_is_large (ldl, i, j)) continue;
+      long rank = AT (i, j).type == TERM_ONE ? 0 : AT (i, j).type == TERM_CONSTANT ? 1 : 2;
+      long cost = rank * 1000000 + (long)(elimination_degree (ldl, j) - 1) * (elimination_degree (ldl, i) - 1);
+      if (least < 0 || cost < least) least = cost, *c = j, *r = i;
+    }
+  return least >= 0;
+}
+
+/* The next equation: that of least degree, with an addition for variable pivots, so that constant ones are preferred,
+ * and a larger one for zero pivots.  -1 after the last one. */
+static int elimination_next_row (const elimination *ldl) {
+  int best = -1, least = 0;
+  for (int i = ldl->coordinates; i < ldl->n; i++) {
+    if (ldl->step[i] != ldl->n) continue;
+    int degree = elimination_degree (ldl, i) + (elimination_is_zero (AT (i, i)) ? ldl->n : 0) +
+                 (AT (i, i).type == TERM_VARIABLE ? ldl->n / 2 : 0);
+    if (best < 0 || degree < least) best = i, least = degree;
+  }
+  return best;
+}
+
+/* Eliminates the equations, coupled ones in pairs p, q: with the entries [ a b ; b c ] of their block, the pivots are a
+ * and c - b^2 / a, whose reciprocals 1 / a and a / (a c - b^2) need not be computed one after the other. */
+static int elimination_rows (elimination *ldl, emitter *to) {
+  const size_t n = (size_t)ldl->n;
+  term *diagonal = malloc ((2 * n + 1) * sizeof *diagonal); /* of K before the equations are eliminated */
+  term *before_p = diagonal + n;                            /* that before p was */
+  if (diagonal == NULL) return PW_RESOURCE;
+  for (int i = 0; i < ldl->n; i++) diagonal[i] = AT (i, i);
+  int status = PW_OK, p = -1; /* p: the equation eliminated last, if the next one may be its q */
+  for (int q; status == PW_OK && (q = elimination_next_row (ldl)) >= 0;) {
+    if (elimination_is_zero (AT (q, q))) {
+      status = PW_RETRY;
+    } else if (p < 0 || elimination_is_zero (AT (q, p))) {
+      for (int i = 0; i < ldl->n; i++) before_p[i] = AT (i, i);
+      elimination_guard_row (to, term_negative (AT (q, q)), term_negative (diagonal[q]));
+      elimination_pivot (ldl, to, q, emit_quotient (to, elimination_one, AT (q, q)));
+      p = AT (q, q).type == TERM_VARIABLE ? q : -1;
+    } else {
+      term a = AT (p, p), b = AT (q, p), ac = emit_product (to, a, before_p[q]);
+      term det = emit_difference (to, ac, b, b);
+      elimination_guard_row (to, det, emit_product (to, a, diagonal[q]));
+      elimination_pivot (ldl, to, q, emit_quotient (to, a, det));
+      p = -1;
+    }
+  }
+  free (diagonal);
+  return status;
+}
+
+/* Stores a variable x12, local to the factorisation, in F, unless that is done; slot: its index in F by its number. */
+static void elimination_keep (elimination *ldl, emitter *to, int *slot, term *a) {
+  if (a->type != TERM_VARIABLE || a->name[0] != 'x') return;
+  int v = atoi (a->name + 1);
+  if (slot[v] < 0) fprintf (to->code, "  F[%d] = %s;\n", slot[v] = ldl->factors++, a->name);
+  snprintf (a->name, sizeof a->name, "F[%d]", slot[v]);
+}
+
+static int elimination_keep_all (elimination *ldl, emitter *to) {
+  int *slot = malloc (((size_t)to->variables + 1) * sizeof *slot);
+  if (slot == NULL) return PW_RESOURCE;
+  for (int v = 0; v < to->variables; v++) slot[v] = -1;
+  for (int m = 0; m < ldl->pivots; m++) {
+    int p = ldl->order[m], r = ldl->partner[m];
+    elimination_keep (ldl, to, slot, &ldl->inverse[p]);
+    EACH_LATER (i, m) {
+      if (p < ldl->coordinates && r < 0)
+        elimination_keep (ldl, to, slot, &AT (i, p));
+      else
+        elimination_keep (ldl, to, slot, &FACTOR (i, p));
+      if (r >= 0) elimination_keep (ldl, to, slot, &AT (i, r));
+    }
+  }
+  free (slot);
+  return PW_OK;
+}
+
+static int elimination_allocate (elimination *ldl, const term *K) {
+  size_t n = (size_t)ldl->n, terms = 2 * n * n + n;
+  ldl->K = malloc (terms * sizeof *ldl->K + 3 * (n + 1) * sizeof (int));
+  if (ldl->K == NULL) return PW_RESOURCE;
+  ldl->L = ldl->K + n * n;
+  ldl->inverse = ldl->L + n * n;
+  ldl->order = (int *)(void *)(ldl->K + terms), ldl->partner = ldl->order + n, ldl->step = ldl->partner + n;
+  memcpy (ldl->K, K, n * n * sizeof *K);
+  for (size_t i = 0; i < n * n; i++) ldl->L[i] = term_zero ();
+  return PW_OK;
+}
+
+/* K: n x n, symmetric, n = coordinates + rows; takes_part: rows, 0 for an equation that is ignored.
+ * Writes the statements of the factorisation; the last of them store in F what the solution needs.  PW_RETRY if a
+ * massless coordinate is determined by no equation, or an equation has no pivot; PW_RESOURCE.  Free ldl->K in every case. */
+static int elimination_open (elimination *ldl, const pw_system *s, const term *K, const unsigned char *takes_part,
+                             emitter *to) {
+  *ldl = (elimination){ .original = K, .coordinates = s->coords, .n = s->coords + s->rows };
+  if (elimination_allocate (ldl, K) != PW_OK) return PW_RESOURCE;
+  for (int i = 0; i < ldl->n; i++) ldl->step[i] = i < s->coords || takes_part[i - s->coords] ? ldl->n : ldl->n + 1;
+  for (int c, r; elimination_next_pair (ldl, s->mass, &c, &r);) {
+    elimination_guard_column (ldl, to, c, AT (r, c));
+    elimination_pair (ldl, to, c, r);
+  }
+  for (int j = 0; j < s->coords; j++) {
+    if (ldl->step[j] < ldl->n) continue;
+    if (s->mass[j] == 0) return PW_RETRY;
+    elimination_pivot (ldl, to, j, emit_quotient (to, elimination_one, AT (j, j)));
+  }
+  int status = elimination_rows (ldl, to);
+  return status == PW_OK ? elimination_keep_all (ldl, to) : status;
+}
+
+/* Divides by the m-th pivot, and eliminates its unknowns from the later rows.  Row p of a pivot [ 0 d ; d 0 ]
+ * determines the multiplier of equation r, and row r the coordinate p: their entries of y are exchanged.
+ * elimination_backward divides that of the coordinate. */
+static void elimination_forward (const elimination *ldl, emitter *to, term *y, int m) {
+  int p = ldl->order[m], r = ldl->partner[m];
+  if (r >= 0) {
+    term f = emit_product (to, y[p], ldl->inverse[p]), gamma = y[r];
+    EACH_LATER (i, m) {
+      y[i] = emit_difference (to, y[i], AT (i, r), f);
+      y[i] = emit_difference (to, y[i], FACTOR (i, p), gamma);
+    }
+    y[r] = f;
+    y[p] = gamma;
+    return;
+  }
+  term z = emit_product (to, y[p], ldl->inverse[p]);
+  EACH_LATER (i, m) {
+    y[i] = p < ldl->coordinates ? emit_difference (to, y[i], AT (i, p), z)
+                                : emit_difference (to, y[i], FACTOR (i, p), y[p]);
+  }
+  y[p] = z;
+}
+
+/* Completes the unknowns of the m-th pivot from the later ones. */
+static void elimination_backward (const elimination *ldl, emitter *to, term *y, int m) {
+  int p = ldl->order[m], r = ldl->partner[m];
+  term sum = r >= 0 ? y[p] : term_zero ();
+  EACH_LATER (i, m) {
+    if (r >= 0) {
+      y[r] = emit_difference (to, y[r], FACTOR (i, p), y[i]);
+      sum = emit_difference (to, sum, AT (i, r), y[i]);
+    } else if (p < ldl->coordinates)
+      sum = emit_difference (to, sum, AT (i, p), y[i]);
+    else
+      y[p] = emit_difference (to, y[p], FACTOR (i, p), y[i]);
+  }
+  if (r >= 0)
+    y[p] = emit_product (to, sum, ldl->inverse[p]);
+  else if (p < ldl->coordinates)
+    y[p] = emit_difference (to, y[p], term_negative (sum), ldl->inverse[p]);
+}
+
+/* Writes the statements that solve K x = right; x replaces the n terms of `right`. */
+static void elimination_solve (const elimination *ldl, emitter *to, term *right) {
+  for (int m = 0; m < ldl->pivots; m++) elimination_forward (ldl, to, right, m);
+  for (int m = ldl->pivots - 1; m >= 0; m--) elimination_backward (ldl, to, right, m);
+}
+
 /* ---- Sparsity of element types, found at random states of random scenes ----
  *
  * All entries of a plug-in's type count as variable: the force of a wall, for example, is 0 at most states.  So do
@@ -26,18 +402,17 @@ enum {
 enum { SPARSITY_SCENES = 12, SPARSITY_STATES = 4 };
 
 typedef struct {
-  /* rows x cols: PW_TERM_ZERO, PW_TERM_ONE or -PW_TERM_ONE for every definition; PW_TERM_CONSTANT during a motion; or
-   * PW_TERM_VARIABLE */
+  /* rows x cols: TERM_ZERO, TERM_ONE or -TERM_ONE for every definition; TERM_CONSTANT during a motion; or
+   * TERM_VARIABLE */
   signed char J[PW_MAX_ROWS * PW_MAX_COLS];
-  signed char force[PW_MAX_COLS]; /* cols: PW_TERM_ZERO or PW_TERM_VARIABLE */
+  signed char force[PW_MAX_COLS]; /* cols: TERM_ZERO or TERM_VARIABLE */
 } sparsity;
 
 /* The type of an entry with this value that has not changed. */
 static signed char sparsity_of_value (double value) {
-  return value == 0 ? PW_TERM_ZERO : value == 1 ? PW_TERM_ONE : value == -1 ? -PW_TERM_ONE : PW_TERM_CONSTANT;
+  return value == 0 ? TERM_ZERO : value == 1 ? TERM_ONE : value == -1 ? -TERM_ONE : TERM_CONSTANT;
 }
 
-/* 1 if one of the element's bodies is the ground. */
 static int sparsity_is_grounded (const pw_system *s, const pw_element_batch *k, int e) {
   for (int n = 0; n < k->kind->bodies; n++)
     if (k->column[e * k->kind->bodies + n] >= s->coords) return 1;
@@ -52,11 +427,11 @@ static void sparsity_state (const pw_element_batch *k, int e, int is_first, int 
     double value = k->J[e * n + i];
     if (is_first) first[i] = value;
     if (!known) out->J[i] = sparsity_of_value (value);
-    if (value != first[i]) out->J[i] = PW_TERM_VARIABLE;
-    if (out->J[i] < PW_TERM_CONSTANT && out->J[i] != sparsity_of_value (value)) out->J[i] = PW_TERM_CONSTANT;
+    if (value != first[i]) out->J[i] = TERM_VARIABLE;
+    if (out->J[i] < TERM_CONSTANT && out->J[i] != sparsity_of_value (value)) out->J[i] = TERM_CONSTANT;
   }
   for (int c = 0; k->kind->force && c < k->b.cols; c++)
-    if (k->block[e * k->b.cols + c] != 0) out->force[c] = PW_TERM_VARIABLE;
+    if (k->block[e * k->b.cols + c] != 0) out->force[c] = TERM_VARIABLE;
 }
 
 static int sparsity_scene (const pw_system *s, pw_random *random, int *known, sparsity *out) {
@@ -82,7 +457,6 @@ static int sparsity_scene (const pw_system *s, pw_random *random, int *known, sp
   return PW_OK;
 }
 
-/* PW_OK or PW_RESOURCE. */
 static int sparsity_find (const pw_kind *kind, sparsity *out) {
   pw_random random = { .state = 7 };
   int known = 0, status = PW_OK;
@@ -93,9 +467,9 @@ static int sparsity_find (const pw_kind *kind, sparsity *out) {
     status = s ? sparsity_scene (s, &random, &known, out) : why.status == PW_RESOURCE ? PW_RESOURCE : PW_OK;
     pw_system_free (s);
   }
-  if (!known) memset (out, PW_TERM_VARIABLE, sizeof *out);
-  if (kind->force && memchr (out->force, PW_TERM_VARIABLE, sizeof out->force) == NULL)
-    memset (out->force, PW_TERM_VARIABLE, sizeof out->force);
+  if (!known) memset (out, TERM_VARIABLE, sizeof *out);
+  if (kind->force && memchr (out->force, TERM_VARIABLE, sizeof out->force) == NULL)
+    memset (out->force, TERM_VARIABLE, sizeof out->force);
   return status;
 }
 
@@ -108,10 +482,9 @@ typedef struct {
   pw_workspace *w;                  /* at the initial state */
   sparsity *sparsity;               /* batches */
   pw_stream prepare;                /* statements of the generated function `prepare` */
-  pw_emitter emitter;
+  emitter emitter;
 } generator;
 
-/* The first entry of J of element e of batch k. */
 static int specialise_J (const generator *gen, int k, int e) {
   const pw_element_batch *batch = &gen->w->batch[k];
   return (int)(batch->J - gen->w->J) + e * batch->kind->rows * batch->b.cols;
@@ -138,7 +511,6 @@ static void specialise_list (FILE *out, const char *name, int n) {
 
 /* ---- Texts of source files ---- */
 
-/* The text of a source file. */
 typedef struct {
   const char *name;        /* "pin.c" */
   const char *const *line; /* each with its line end; ends with NULL */
@@ -225,7 +597,7 @@ static int specialise_forces_on (const generator *gen, int j) {
   for (int k = 0; k < gen->s->batches; k++) {
     const pw_element_batch *batch = &gen->s->batch[k];
     for (int i = 0; batch->kind->force && i < batch->b.count * batch->b.cols; i++)
-      if (gen->sparsity[k].force[i % batch->b.cols] != PW_TERM_ZERO &&
+      if (gen->sparsity[k].force[i % batch->b.cols] != TERM_ZERO &&
           pw_global (batch, i / batch->b.cols, i % batch->b.cols) == j)
         forces |= batch->kind->constant ? SPECIALISE_CONSTANT : SPECIALISE_CHANGING;
   }
@@ -246,7 +618,7 @@ static void specialise_forces (const generator *gen) {
       fprintf (gen->out, "    double f[%d];\n", batch->b.cols);
       specialise_call (gen, k, "force", "f");
       for (int c = 0; c < batch->b.cols; c++)
-        if (gen->sparsity[k].force[c] != PW_TERM_ZERO && pw_global (batch, e, c) < s->coords)
+        if (gen->sparsity[k].force[c] != TERM_ZERO && pw_global (batch, e, c) < s->coords)
           fprintf (gen->out, "    out[%d] += f[%d];\n", pw_global (batch, e, c), c);
       fputs ("  }\n", gen->out);
     }
@@ -345,13 +717,12 @@ static void specialise_data (const generator *gen) {
 
 /* ---- Products with J, factorisations, solutions ---- */
 
-/* The entry of J in row r and column c of element e of batch k. */
-static pw_term specialise_entry (const generator *gen, int k, int e, int r, int c) {
+static term specialise_entry (const generator *gen, int k, int e, int r, int c) {
   const int cols = gen->s->batch[k].b.cols, type = gen->sparsity[k].J[r * cols + c];
   const int at = specialise_J (gen, k, e) + r * cols + c;
-  if (type == PW_TERM_ZERO) return pw_term_zero ();
-  if (type == PW_TERM_ONE || type == -PW_TERM_ONE) return (pw_term){ PW_TERM_ONE, type, "1", type };
-  return pw_term_named ((pw_term_type)type, "J", at, gen->w->J[at]);
+  if (type == TERM_ZERO) return term_zero ();
+  if (type == TERM_ONE || type == -TERM_ONE) return (term){ TERM_ONE, type, "1", type };
+  return term_named ((term_type)type, "J", at, gen->w->J[at]);
 }
 
 /* Loops over row r of element e of batch k; i: its constraint equation. */
@@ -361,16 +732,15 @@ static pw_term specialise_entry (const generator *gen, int k, int e, int r, int 
       for (int r = 0; r < gen->s->batch[k].kind->rows; r++, i++)
 
 /* K = [ M J^T ; J 0 ]; malloced. */
-static pw_term *specialise_matrix (const generator *gen) {
+static term *specialise_matrix (const generator *gen) {
   const pw_system *s = gen->s;
   size_t n = (size_t)(s->coords + s->rows);
-  pw_term *K = malloc ((n * n + 1) * sizeof *K);
+  term *K = malloc ((n * n + 1) * sizeof *K);
   if (K == NULL) return NULL;
-  for (size_t i = 0; i < n * n; i++) K[i] = pw_term_zero ();
+  for (size_t i = 0; i < n * n; i++) K[i] = term_zero ();
   for (int j = 0; j < s->coords; j++)
     if (s->mass[j] > 0) /* one mass for vx and vy */
-      K[(size_t)j * n + (size_t)j] =
-          pw_term_named (PW_TERM_CONSTANT, "M", j - (j < 3 * s->bodies && j % 3 == 1), s->mass[j]);
+      K[(size_t)j * n + (size_t)j] = term_named (TERM_CONSTANT, "M", j - (j < 3 * s->bodies && j % 3 == 1), s->mass[j]);
   EACH_EQUATION (k, e, r, row)
   for (int c = 0; c < s->batch[k].b.cols; c++) {
     size_t i = (size_t)(s->coords + row), j = (size_t)pw_global (&s->batch[k], e, c);
@@ -384,10 +754,10 @@ static void specialise_row_product (const generator *gen, int k, int e, int r, i
   const char *plus = "";
   for (int c = 0; c < gen->s->batch[k].b.cols; c++) {
     int j = pw_global (&gen->s->batch[k], e, c);
-    pw_term a = j < gen->s->coords ? specialise_entry (gen, k, e, r, c) : pw_term_zero ();
-    if (a.type == PW_TERM_ZERO) continue;
+    term a = j < gen->s->coords ? specialise_entry (gen, k, e, r, c) : term_zero ();
+    if (a.type == TERM_ZERO) continue;
     fprintf (gen->out, "%s%s", absolute || a.sign > 0 ? plus : *plus ? " - " : "-", absolute ? "fabs (" : "");
-    if (a.type != PW_TERM_ONE) fprintf (gen->out, "%s * ", a.name);
+    if (a.type != TERM_ONE) fprintf (gen->out, "%s * ", a.name);
     fprintf (gen->out, "w[%d]%s", j, absolute ? ")" : "");
     plus = " + ";
   }
@@ -412,43 +782,43 @@ typedef enum { SPECIALISE_ACCELERATION, SPECIALISE_VELOCITY, SPECIALISE_POSITION
 
 /* Writes the function `solve`, which computes accelerations and multipliers from forces f and right-hand sides g, or
  * solve_velocity or solve_position: changes of velocities or positions from right-hand sides g alone. */
-static int specialise_solve (generator *gen, const pw_elimination *ldl, specialise_unknown unknown) {
+static int specialise_solve (generator *gen, const elimination *ldl, specialise_unknown unknown) {
   static const char *const name[] = { "solve", "solve_velocity", "solve_position" };
   const pw_system *s = gen->s;
   char text[24], next[24];
-  pw_term *right = malloc ((size_t)ldl->n * sizeof *right + 1);
+  term *right = malloc ((size_t)ldl->n * sizeof *right + 1);
   if (right == NULL) return PW_RESOURCE;
   for (int i = 0; i < ldl->n; i++) {
     int row = i - s->coords, force = row < 0 && unknown == SPECIALISE_ACCELERATION;
-    right[i] = row >= 0 ? pw_term_named (PW_TERM_VARIABLE, "g", row, 1) : pw_term_zero ();
-    if (force && specialise_forces_on (gen, i)) right[i] = pw_term_named (PW_TERM_VARIABLE, "f", i, 1);
-    if (row >= 0 && !specialise_is_independent (gen, row)) right[i] = pw_term_zero ();
-    if (unknown == SPECIALISE_POSITION && row >= s->holonomic) right[i] = pw_term_zero ();
+    right[i] = row >= 0 ? term_named (TERM_VARIABLE, "g", row, 1) : term_zero ();
+    if (force && specialise_forces_on (gen, i)) right[i] = term_named (TERM_VARIABLE, "f", i, 1);
+    if (row >= 0 && !specialise_is_independent (gen, row)) right[i] = term_zero ();
+    if (unknown == SPECIALISE_POSITION && row >= s->holonomic) right[i] = term_zero ();
   }
   fprintf (gen->out,
            "\nINLINE void %s (const double *C, const double *J, const double *F, %sconst double *g, double *a%s) {\n"
            "  (void)C, (void)J, (void)F, (void)g, (void)a;\n",
            name[unknown], unknown == SPECIALISE_ACCELERATION ? "const double *f, " : "",
            unknown == SPECIALISE_ACCELERATION ? ", double *lambda" : "");
-  pw_elimination_solve (ldl, &gen->emitter, right);
+  elimination_solve (ldl, &gen->emitter, right);
   for (int j = 0; j + 1 < s->coords; j += 2)
-    fprintf (gen->out, "  STORE_PAIR (a + %d, %s, %s);\n", j, pw_term_text (right[j], text),
-             pw_term_text (right[j + 1], next));
-  if (s->coords % 2) fprintf (gen->out, "  a[%d] = %s;\n", s->coords - 1, pw_term_text (right[s->coords - 1], text));
+    fprintf (gen->out, "  STORE_PAIR (a + %d, %s, %s);\n", j, term_text (right[j], text),
+             term_text (right[j + 1], next));
+  if (s->coords % 2) fprintf (gen->out, "  a[%d] = %s;\n", s->coords - 1, term_text (right[s->coords - 1], text));
   for (int i = 0; i < s->rows && unknown == SPECIALISE_ACCELERATION; i++)
-    fprintf (gen->out, "  lambda[%d] = %s;\n", i, pw_term_text (right[s->coords + i], text));
+    fprintf (gen->out, "  lambda[%d] = %s;\n", i, term_text (right[s->coords + i], text));
   fputs ("}\n", gen->out);
   free (right);
   return PW_OK;
 }
 
 /* Writes a function that factorises K with the independent equations among the first `rows`; ldl: for its solution. */
-static int specialise_factor (generator *gen, pw_elimination *ldl, const pw_term *K, const char *name, int rows) {
+static int specialise_factor (generator *gen, elimination *ldl, const term *K, const char *name, int rows) {
   unsigned char takes_part[SPECIALISE_ROWS + 1];
   for (int i = 0; i < gen->s->rows; i++) takes_part[i] = i < rows && specialise_is_independent (gen, i);
   pw_stream text;
   FILE *out = gen->emitter.code = pw_stream_open (&text);
-  int status = out ? pw_elimination_open (ldl, gen->s, K, takes_part, &gen->emitter) : PW_RESOURCE;
+  int status = out ? elimination_open (ldl, gen->s, K, takes_part, &gen->emitter) : PW_RESOURCE;
   if (pw_stream_close (out, &text) != PW_OK) status = PW_RESOURCE;
   gen->emitter.code = gen->out;
   if (status == PW_OK)
@@ -462,10 +832,10 @@ static int specialise_factor (generator *gen, pw_elimination *ldl, const pw_term
 
 static int specialise_algebra (generator *gen) {
   const pw_system *s = gen->s;
-  pw_elimination all = { 0 }, position = { 0 };
-  gen->emitter = (pw_emitter){ .prepare = pw_stream_open (&gen->prepare), .code = gen->out };
+  elimination all = { 0 }, position = { 0 };
+  gen->emitter = (emitter){ .prepare = pw_stream_open (&gen->prepare), .code = gen->out };
   specialise_product (gen);
-  pw_term *K = specialise_matrix (gen);
+  term *K = specialise_matrix (gen);
   int status = K && gen->emitter.prepare ? specialise_factor (gen, &all, K, "factor", s->rows) : PW_RESOURCE;
   if (status == PW_OK) status = specialise_solve (gen, &all, SPECIALISE_ACCELERATION);
   if (status == PW_OK) status = specialise_solve (gen, &all, SPECIALISE_VELOCITY);
@@ -477,8 +847,8 @@ static int specialise_algebra (generator *gen) {
            1 + (all.factors > position.factors ? all.factors : position.factors));
   if (alone != PW_OK) fputs ("#define factor_position factor\n", gen->out);
   if (pw_stream_close (gen->emitter.prepare, &gen->prepare) != PW_OK) status = PW_RESOURCE;
-  pw_elimination_close (&all);
-  pw_elimination_close (&position);
+  free (all.K);
+  free (position.K);
   free (K);
   return status;
 }

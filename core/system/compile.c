@@ -37,7 +37,6 @@ static int compile_too_large (const compilation *job) {
   return pw_fail (job->error, PW_INPUT, "model %s is too large", job->m->name);
 }
 
-/* Memory that belongs to the system.  NULL and the error if out of memory. */
 static void *compile_alloc (const compilation *job, size_t count, size_t size) {
   void *p = pw_arena_alloc (&job->s->arena, count * size);
   if (p == NULL) compile_no_memory (job);
@@ -193,7 +192,6 @@ static int compile_prepare (const compilation *job, const pw_element *from, cons
   return PW_OK;
 }
 
-/* Stores element e of a batch: name, bodies, columns, prepared element, internal coordinates. */
 static int compile_element (const compilation *job, const pw_element_batch *k, int e, const compiled *from, int *body,
                             unsigned char *element) {
   static const pw_body ground = { .name = "ground" };
@@ -252,7 +250,6 @@ static int compile_batches (const compilation *job) {
 
 /* ---- Signals ---- */
 
-/* Copies the points of a table and computes its spline. */
 static int compile_table (const compilation *job, pw_source *source, const char *element) {
   pw_points *table = &source->signal.table;
   size_t n = (size_t)table->count;
@@ -272,7 +269,6 @@ static int compile_table (const compilation *job, pw_source *source, const char 
   return PW_OK;
 }
 
-/* Converts the names of the states that a function reads to indices. */
 static int compile_reads (const compilation *job, pw_source *source, const char *element) {
   const char *const *reads = source->signal.function.reads;
   pw_system *s = job->s;
@@ -349,7 +345,6 @@ static double compile_length (const compilation *job) {
   return L > 0 ? L : 1;
 }
 
-/* Finds the elements that depend on angles of bodies without inertia. */
 static int compile_angle_users (const compilation *job) {
   pw_system *s = job->s;
   int inertialess = 0, element = 0;

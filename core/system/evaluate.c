@@ -320,7 +320,6 @@ static void blocks_isolate (const pw_element_batch *k, int e, blocks_single *one
   if (k->b.lambda) one->b.lambda = k->b.lambda + e * kind->rows;
 }
 
-/* The coordinate or velocity of local column c. */
 static double *blocks_variable (const pw_kind *kind, blocks_single *one, int c, int velocity) {
   if (c >= 3 * kind->bodies) return (velocity ? one->v : one->q) + c - 3 * kind->bodies;
   pw_configuration *p = &one->configuration[c / 3];
@@ -595,7 +594,6 @@ static void workspace_fill (pw_workspace *w, double *x) {
   w->configuration[s->bodies].cos = 1;
 }
 
-/* Opens a context of this workspace for each function signal with `open`. */
 static int workspace_open_signals (pw_workspace *w) {
   int status = PW_OK;
   for (pw_source *source = w->source; source < w->source + w->s->sources; source++) {
@@ -755,7 +753,6 @@ static int elements_allocate (const pw_system *s, pw_equations *out, pw_error *e
   return PW_OK;
 }
 
-/* Stores the entries of J that are not in columns of the ground. */
 static void elements_jacobian (const pw_workspace *w, pw_equations *out) {
   PW_EACH_CONSTRAINT (k, w)
     for (int i = 0; i < k->b.count * k->kind->rows; i++)

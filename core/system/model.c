@@ -53,7 +53,6 @@ static int is_bad_text (const char *text) {
   return strlen (text) > PW_NAME_MAX || !pw_is_line (text);
 }
 
-/* The fault of one field, or "". */
 static const char *fault_field (const pw_kind *kind, const pw_field *f) {
   size_t bytes = pw_field_bytes (f->type) * (size_t)pw_field_count (f);
   if (is_bad_text (f->name) || (f->unit && is_bad_text (f->unit))) return "name or unit" FAULT_TEXT;
@@ -236,7 +235,6 @@ static int check_body_name (const pw_model *m, const pw_element *e, const char *
                   pw_nearest_text (&near));
 }
 
-/* Writes what is wrong with a value of a field, if anything, to `text`. */
 static void check_value (const pw_kind *kind, const pw_field *f, const void *at, char *text, size_t size) {
   int point, choices = 0, numbers = f->type == PW_NUMBER ? 1 : f->type == PW_POINT || f->type == PW_VECTOR ? 2 : 0;
   for (int k = 0; k < numbers && !*text; k++) {
@@ -309,7 +307,6 @@ static int model_no_memory (pw_model *m) {
   return pw_fail (&m->error, PW_RESOURCE, "model %s: out of memory", m->name ? m->name : "");
 }
 
-/* Passes on the first error of the model. */
 static int model_status (const pw_model *m, pw_error *error) {
   return m->error.status == PW_OK ? PW_OK : pw_fail (error, m->error.status, "%s", m->error.text);
 }
@@ -419,7 +416,6 @@ static void model_copy_signal (pw_model *m, pw_signal *s) {
   s->table.value = model_copy (m, s->table.value, (size_t)s->table.count * sizeof (double));
 }
 
-/* Checks an element type; that of the previous element has been checked. */
 static int model_check_kind (pw_model *m, const pw_kind *kind) {
   if (m->elements > 0 && m->element[m->elements - 1].kind == kind) return PW_OK;
   char buffer[200];
@@ -496,7 +492,6 @@ pw_error *pw_model_error (pw_model *m) {
   return &m->error;
 }
 
-/* The signal of this name in an element, or NULL; *near collects the names. */
 static pw_signal *model_find_signal (const pw_element *e, const char *name, pw_nearest *near) {
   char known[80];
   for (const pw_field *f = e->kind->fields; f->name; f++)

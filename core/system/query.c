@@ -154,7 +154,6 @@ char *pw_system_row_name (const pw_system *s, int row, char *buffer, size_t size
   return pw_print (buffer, size, "%s %s", k->kind->name, k->name[e]);
 }
 
-/* The batch, element and field of a signal, and its index in this field. */
 static const pw_element_batch *query_signal (const pw_system *s, int signal, int *element, const pw_field **field,
                                              int *index) {
   const pw_element_batch *k = query_find_element (s, offsetof (pw_kind, signals), signal, element, index);

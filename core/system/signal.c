@@ -85,7 +85,6 @@ static void table_row (const double *t, const double *y, int n, int ends, int i,
   if (i == n - 2) row[1] += after + after * (after / before), row[0] -= after * (after / before);
 }
 
-/* M at a free end, extrapolated linearly from the next two points. */
 static double table_extrapolate (double t0, double t1, double t2, double M1, double M2) {
   return M1 + (M1 - M2) * ((t1 - t0) / (t2 - t1));
 }
@@ -119,7 +118,6 @@ void pw_table_spline (const pw_signal *s, double *spline) {
   }
 }
 
-/* Number of points at or before t. */
 static int table_passed (const pw_signal *s, double t) {
   int low = 0, high = s->table.count;
   while (low < high) {

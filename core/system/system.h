@@ -233,17 +233,8 @@ static inline pw_batch_function *pw_kind_function (const pw_kind *kind, size_t o
 
 /* Second-order blocks: the terms of exact Newton matrices other than M, J and J^T.  JW_Q: d(J w)/dq; JTL_Q: d(J^T
  * lambda)/dq; ETA_Q: d eta/dq; ... */
-typedef enum {
-  PW_JW_Q,
-  PW_JTL_Q,
-  PW_ETA_Q,
-  PW_GAMMA_Q,
-  PW_GAMMA_V,
-  PW_FORCE_Q,
-  PW_FORCE_V,
-  PW_BLOCKS,
-  PW_G_Q = PW_BLOCKS /* not a second-order block: J of holonomic constraint equations, for the self-tests */
-} pw_block;
+typedef enum { PW_JW_Q, PW_JTL_Q, PW_ETA_Q, PW_GAMMA_Q, PW_GAMMA_V, PW_FORCE_Q, PW_FORCE_V, PW_BLOCKS } pw_block;
+#define PW_G_Q PW_BLOCKS /* dg/dq, which is J of holonomic constraint equations; for the self-tests alone */
 
 /* The type's function for a block (PW_JTL_Q: its jw_q): NULL if identically zero, or pw_by_differences. */
 pw_batch_function *pw_block_function (const pw_kind *kind, pw_block block);
