@@ -21,7 +21,7 @@ enum {
 
 typedef enum { TERM_ZERO, TERM_ONE, TERM_CONSTANT, TERM_VARIABLE } term_type;
 
-/* sign times 0, 1, a value that is constant during a run (M[0], J[3], or C[2] computed by `prepare`), or a variable. */
+/* sign times 0 (any sign), 1, a value that is constant during a run (M[0], J[3], or C[2] computed by `prepare`), or a variable. */
 typedef struct {
   term_type type;
   int sign;
@@ -33,11 +33,8 @@ typedef struct {
 typedef struct {
   FILE *prepare, *code;     /* those that compute constants; the others, of the function being written */
   int constants, variables; /* how many C[0], C[1], ... and x0, x1, ... there are so far */
+  pw_arena memory;          /* of all terms, which are 0 at first */
 } emitter;
-
-static term term_zero (void) {
-  return (term){ TERM_ZERO, 1, "0", 0 };
-}
 
 /* array[i] */
 static term term_named (term_type type, const char *array, int i, double value) {
@@ -79,7 +76,7 @@ static int emit_is_constant (term a) {
 
 /* a b */
 static term emit_product (emitter *to, term a, term b) {
-  if (a.type == TERM_ZERO || b.type == TERM_ZERO) return term_zero ();
+  if (a.type == TERM_ZERO || b.type == TERM_ZERO) return (term){ 0 };
   if (a.type == TERM_ONE) return a.sign < 0 ? term_negative (b) : b;
   if (b.type == TERM_ONE) return b.sign < 0 ? term_negative (a) : a;
   return emit_define (to, emit_is_constant (a) && emit_is_constant (b), a.sign * b.sign, a.value * b.value, a.name, '*',
@@ -260,15 +257,14 @@ static int elimination_next_row (const elimination *ldl) {
  * and c - b^2 / a, whose reciprocals 1 / a and a / (a c - b^2) need not be computed one after the other. */
 static int elimination_rows (elimination *ldl, emitter *to) {
   const size_t n = (size_t)ldl->n;
-  term *diagonal = malloc ((2 * n + 1) * sizeof *diagonal); /* of K before the equations are eliminated */
-  term *before_p = diagonal + n;                            /* that before p was */
+  term *diagonal = pw_arena_alloc (&to->memory, 2 * n * sizeof *diagonal); /* of K before this elimination */
+  term *before_p = diagonal + n;                                           /* that before p was eliminated */
   if (diagonal == NULL) return PW_RESOURCE;
   for (int i = 0; i < ldl->n; i++) diagonal[i] = AT (i, i);
-  int status = PW_OK, p = -1; /* p: the equation eliminated last, if the next one may be its q */
-  for (int q; status == PW_OK && (q = elimination_next_row (ldl)) >= 0;) {
-    if (elimination_is_zero (AT (q, q))) {
-      status = PW_RETRY;
-    } else if (p < 0 || elimination_is_zero (AT (q, p))) {
+  int p = -1; /* the equation eliminated last, if the next one may be its q */
+  for (int q; (q = elimination_next_row (ldl)) >= 0;) {
+    if (elimination_is_zero (AT (q, q))) return PW_RETRY;
+    if (p < 0 || elimination_is_zero (AT (q, p))) {
       for (int i = 0; i < ldl->n; i++) before_p[i] = AT (i, i);
       elimination_guard_row (to, term_negative (AT (q, q)), term_negative (diagonal[q]));
       elimination_pivot (ldl, to, q, emit_quotient (to, elimination_one, AT (q, q)));
@@ -281,22 +277,23 @@ static int elimination_rows (elimination *ldl, emitter *to) {
       p = -1;
     }
   }
-  free (diagonal);
-  return status;
+  return PW_OK;
 }
 
-/* Stores a variable x12, local to the factorisation, in F, unless that is done; slot: its index in F by its number. */
+/* Stores a variable x12, local to the factorisation, in F, unless that is done; slot: its index in F plus 1 by its number. */
 static void elimination_keep (elimination *ldl, emitter *to, int *slot, term *a) {
   if (a->type != TERM_VARIABLE || a->name[0] != 'x') return;
   int v = atoi (a->name + 1);
-  if (slot[v] < 0) fprintf (to->code, "  F[%d] = %s;\n", slot[v] = ldl->factors++, a->name);
-  snprintf (a->name, sizeof a->name, "F[%d]", slot[v]);
+  if (slot[v] == 0) {
+    slot[v] = ++ldl->factors;
+    fprintf (to->code, "  F[%d] = %s;\n", slot[v] - 1, a->name);
+  }
+  snprintf (a->name, sizeof a->name, "F[%d]", slot[v] - 1);
 }
 
 static int elimination_keep_all (elimination *ldl, emitter *to) {
-  int *slot = malloc (((size_t)to->variables + 1) * sizeof *slot);
+  int *slot = pw_arena_alloc (&to->memory, (size_t)to->variables * sizeof *slot);
   if (slot == NULL) return PW_RESOURCE;
-  for (int v = 0; v < to->variables; v++) slot[v] = -1;
   for (int m = 0; m < ldl->pivots; m++) {
     int p = ldl->order[m], r = ldl->partner[m];
     elimination_keep (ldl, to, slot, &ldl->inverse[p]);
@@ -308,29 +305,21 @@ static int elimination_keep_all (elimination *ldl, emitter *to) {
       if (r >= 0) elimination_keep (ldl, to, slot, &AT (i, r));
     }
   }
-  free (slot);
-  return PW_OK;
-}
-
-static int elimination_allocate (elimination *ldl, const term *K) {
-  size_t n = (size_t)ldl->n, terms = 2 * n * n + n;
-  ldl->K = malloc (terms * sizeof *ldl->K + 3 * (n + 1) * sizeof (int));
-  if (ldl->K == NULL) return PW_RESOURCE;
-  ldl->L = ldl->K + n * n;
-  ldl->inverse = ldl->L + n * n;
-  ldl->order = (int *)(void *)(ldl->K + terms), ldl->partner = ldl->order + n, ldl->step = ldl->partner + n;
-  memcpy (ldl->K, K, n * n * sizeof *K);
-  for (size_t i = 0; i < n * n; i++) ldl->L[i] = term_zero ();
   return PW_OK;
 }
 
 /* K: n x n, symmetric, n = coordinates + rows; takes_part: rows, 0 for an equation that is ignored.
  * Writes the statements of the factorisation; the last of them store in F what the solution needs.  PW_RETRY if a
- * massless coordinate is determined by no equation, or an equation has no pivot; PW_RESOURCE.  Free ldl->K in every case. */
+ * massless coordinate is determined by no equation, or an equation has no pivot; PW_RESOURCE. */
 static int elimination_open (elimination *ldl, const pw_system *s, const term *K, const unsigned char *takes_part,
                              emitter *to) {
   *ldl = (elimination){ .original = K, .coordinates = s->coords, .n = s->coords + s->rows };
-  if (elimination_allocate (ldl, K) != PW_OK) return PW_RESOURCE;
+  const size_t n = (size_t)ldl->n, terms = 2 * n * n + n;
+  ldl->K = pw_arena_alloc (&to->memory, terms * sizeof *ldl->K + 3 * n * sizeof (int));
+  if (ldl->K == NULL) return PW_RESOURCE;
+  ldl->L = ldl->K + n * n, ldl->inverse = ldl->L + n * n;
+  ldl->order = (int *)(void *)(ldl->K + terms), ldl->partner = ldl->order + n, ldl->step = ldl->partner + n;
+  memcpy (ldl->K, K, n * n * sizeof *K);
   for (int i = 0; i < ldl->n; i++) ldl->step[i] = i < s->coords || takes_part[i - s->coords] ? ldl->n : ldl->n + 1;
   for (int c, r; elimination_next_pair (ldl, s->mass, &c, &r);) {
     elimination_guard_column (ldl, to, c, AT (r, c));
@@ -371,7 +360,7 @@ static void elimination_forward (const elimination *ldl, emitter *to, term *y, i
 /* Completes the unknowns of the m-th pivot from the later ones. */
 static void elimination_backward (const elimination *ldl, emitter *to, term *y, int m) {
   int p = ldl->order[m], r = ldl->partner[m];
-  term sum = r >= 0 ? y[p] : term_zero ();
+  term sum = r >= 0 ? y[p] : (term){ 0 };
   EACH_LATER (i, m) {
     if (r >= 0) {
       y[r] = emit_difference (to, y[r], FACTOR (i, p), y[i]);
@@ -720,7 +709,7 @@ static void specialise_data (const generator *gen) {
 static term specialise_entry (const generator *gen, int k, int e, int r, int c) {
   const int cols = gen->s->batch[k].b.cols, type = gen->sparsity[k].J[r * cols + c];
   const int at = specialise_J (gen, k, e) + r * cols + c;
-  if (type == TERM_ZERO) return term_zero ();
+  if (type == TERM_ZERO) return (term){ 0 };
   if (type == TERM_ONE || type == -TERM_ONE) return (term){ TERM_ONE, type, "1", type };
   return term_named ((term_type)type, "J", at, gen->w->J[at]);
 }
@@ -731,13 +720,12 @@ static term specialise_entry (const generator *gen, int k, int e, int r, int c) 
     for (int e = 0; e < gen->s->batch[k].b.count; e++) \
       for (int r = 0; r < gen->s->batch[k].kind->rows; r++, i++)
 
-/* K = [ M J^T ; J 0 ]; malloced. */
-static term *specialise_matrix (const generator *gen) {
+/* K = [ M J^T ; J 0 ] */
+static term *specialise_matrix (generator *gen) {
   const pw_system *s = gen->s;
   size_t n = (size_t)(s->coords + s->rows);
-  term *K = malloc ((n * n + 1) * sizeof *K);
+  term *K = pw_arena_alloc (&gen->emitter.memory, n * n * sizeof *K);
   if (K == NULL) return NULL;
-  for (size_t i = 0; i < n * n; i++) K[i] = term_zero ();
   for (int j = 0; j < s->coords; j++)
     if (s->mass[j] > 0) /* one mass for vx and vy */
       K[(size_t)j * n + (size_t)j] = term_named (TERM_CONSTANT, "M", j - (j < 3 * s->bodies && j % 3 == 1), s->mass[j]);
@@ -754,7 +742,7 @@ static void specialise_row_product (const generator *gen, int k, int e, int r, i
   const char *plus = "";
   for (int c = 0; c < gen->s->batch[k].b.cols; c++) {
     int j = pw_global (&gen->s->batch[k], e, c);
-    term a = j < gen->s->coords ? specialise_entry (gen, k, e, r, c) : term_zero ();
+    term a = j < gen->s->coords ? specialise_entry (gen, k, e, r, c) : (term){ 0 };
     if (a.type == TERM_ZERO) continue;
     fprintf (gen->out, "%s%s", absolute || a.sign > 0 ? plus : *plus ? " - " : "-", absolute ? "fabs (" : "");
     if (a.type != TERM_ONE) fprintf (gen->out, "%s * ", a.name);
@@ -786,14 +774,13 @@ static int specialise_solve (generator *gen, const elimination *ldl, specialise_
   static const char *const name[] = { "solve", "solve_velocity", "solve_position" };
   const pw_system *s = gen->s;
   char text[24], next[24];
-  term *right = malloc ((size_t)ldl->n * sizeof *right + 1);
+  term *right = pw_arena_alloc (&gen->emitter.memory, (size_t)ldl->n * sizeof *right);
   if (right == NULL) return PW_RESOURCE;
   for (int i = 0; i < ldl->n; i++) {
-    int row = i - s->coords, force = row < 0 && unknown == SPECIALISE_ACCELERATION;
-    right[i] = row >= 0 ? term_named (TERM_VARIABLE, "g", row, 1) : term_zero ();
-    if (force && specialise_forces_on (gen, i)) right[i] = term_named (TERM_VARIABLE, "f", i, 1);
-    if (row >= 0 && !specialise_is_independent (gen, row)) right[i] = term_zero ();
-    if (unknown == SPECIALISE_POSITION && row >= s->holonomic) right[i] = term_zero ();
+    const int row = i - s->coords, is_used = unknown != SPECIALISE_POSITION || row < s->holonomic;
+    if (row >= 0 && is_used && specialise_is_independent (gen, row)) right[i] = term_named (TERM_VARIABLE, "g", row, 1);
+    if (row < 0 && unknown == SPECIALISE_ACCELERATION && specialise_forces_on (gen, i))
+      right[i] = term_named (TERM_VARIABLE, "f", i, 1);
   }
   fprintf (gen->out,
            "\nINLINE void %s (const double *C, const double *J, const double *F, %sconst double *g, double *a%s) {\n"
@@ -808,7 +795,6 @@ static int specialise_solve (generator *gen, const elimination *ldl, specialise_
   for (int i = 0; i < s->rows && unknown == SPECIALISE_ACCELERATION; i++)
     fprintf (gen->out, "  lambda[%d] = %s;\n", i, term_text (right[s->coords + i], text));
   fputs ("}\n", gen->out);
-  free (right);
   return PW_OK;
 }
 
@@ -833,7 +819,7 @@ static int specialise_factor (generator *gen, elimination *ldl, const term *K, c
 static int specialise_algebra (generator *gen) {
   const pw_system *s = gen->s;
   elimination all = { 0 }, position = { 0 };
-  gen->emitter = (emitter){ .prepare = pw_stream_open (&gen->prepare), .code = gen->out };
+  gen->emitter.prepare = pw_stream_open (&gen->prepare), gen->emitter.code = gen->out;
   specialise_product (gen);
   term *K = specialise_matrix (gen);
   int status = K && gen->emitter.prepare ? specialise_factor (gen, &all, K, "factor", s->rows) : PW_RESOURCE;
@@ -847,9 +833,6 @@ static int specialise_algebra (generator *gen) {
            1 + (all.factors > position.factors ? all.factors : position.factors));
   if (alone != PW_OK) fputs ("#define factor_position factor\n", gen->out);
   if (pw_stream_close (gen->emitter.prepare, &gen->prepare) != PW_OK) status = PW_RESOURCE;
-  free (all.K);
-  free (position.K);
-  free (K);
   return status;
 }
 
@@ -950,7 +933,7 @@ static int specialise_write (generator *gen) {
 
 static int specialise_open (generator *gen) {
   const pw_system *s = gen->s;
-  gen->sparsity = malloc (((size_t)s->batches + 1) * sizeof *gen->sparsity);
+  gen->sparsity = pw_arena_alloc (&gen->emitter.memory, (size_t)s->batches * sizeof *gen->sparsity);
   gen->w = pw_workspace_new (s, NULL);
   if (gen->sparsity == NULL || gen->w == NULL) return PW_RESOURCE;
   if (pw_update_kinematics (gen->w, 0, s->q0, s->v0) == PW_OK) pw_evaluate_J (gen->w); /* else J = 0: no pivot */
@@ -981,7 +964,7 @@ char *pw_system_source (const pw_system *s, const unsigned char *independent, pw
   if (status == PW_OK) status = specialise_write (&gen);
   if (pw_stream_close (gen.out, &text) != PW_OK) status = PW_RESOURCE;
   pw_workspace_free (gen.w);
-  free (gen.sparsity);
+  pw_arena_free (&gen.emitter.memory);
   free (gen.prepare.text);
   if (status == PW_OK) return text.text;
   free (text.text);
