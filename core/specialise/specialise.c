@@ -474,6 +474,8 @@ typedef struct {
   emitter emitter;
 } generator;
 
+#define WRITE(...) fprintf (gen->out, __VA_ARGS__)
+
 static int specialise_J (const generator *gen, int k, int e) {
   const pw_element_batch *batch = &gen->w->batch[k];
   return (int)(batch->J - gen->w->J) + e * batch->kind->rows * batch->b.cols;
@@ -527,18 +529,18 @@ static void specialise_text (FILE *out, const char *name, unsigned char done[SPE
 /* Opens a block with a batch `b` of element e alone; `more` ends the initialiser of b. */
 static void specialise_batch (const generator *gen, int k, int e, const char *more) {
   const pw_element_batch *batch = &gen->s->batch[k];
-  fprintf (gen->out, "  { /* %s */\n    static const int body[] = { ", batch->name[e]);
+  WRITE ("  { /* %s */\n    static const int body[] = { ", batch->name[e]);
   for (int n = 0; n < batch->kind->bodies; n++)
-    fprintf (gen->out, "%s%d", n ? ", " : "", batch->b.body[e * batch->kind->bodies + n]);
-  fprintf (gen->out, "%s };\n    const pw_batch b = { .count = 1, .cols = %d, .body = body, .configuration = c,\n",
-           batch->kind->bodies ? "" : "0", batch->b.cols);
-  fprintf (gen->out, "      .element = (const char *)s->element[%d] + %zu", k, (size_t)e * batch->kind->element);
+    WRITE ("%s%d", n ? ", " : "", batch->b.body[e * batch->kind->bodies + n]);
+  WRITE ("%s };\n    const pw_batch b = { .count = 1, .cols = %d, .body = body, .configuration = c,\n",
+         batch->kind->bodies ? "" : "0", batch->b.cols);
+  WRITE ("      .element = (const char *)s->element[%d] + %zu", k, (size_t)e * batch->kind->element);
   if (batch->kind->internal)
-    fprintf (gen->out, ", .q = q + %d, .v = v + %d", batch->internal + e * batch->kind->internal,
-             batch->internal + e * batch->kind->internal);
+    WRITE (", .q = q + %d, .v = v + %d", batch->internal + e * batch->kind->internal,
+           batch->internal + e * batch->kind->internal);
   if (batch->kind->signals)
-    fprintf (gen->out, ", .u = s->u + %d", 3 * ((int)(batch->source - gen->s->source) + e * batch->kind->signals));
-  fprintf (gen->out, "%s };\n", more);
+    WRITE (", .u = s->u + %d", 3 * ((int)(batch->source - gen->s->source) + e * batch->kind->signals));
+  WRITE ("%s };\n", more);
 }
 
 /* Writes the call of a function of the type of batch k, which stores the result at `to`.  scene_TYPE is the table of a
@@ -547,9 +549,9 @@ static void specialise_call (const generator *gen, int k, const char *function, 
   char name[80];
   const pw_kind *kind = gen->s->batch[k].kind;
   if (pw_kind_is_built_in (kind))
-    fprintf (gen->out, "    scene_%s.%s (&b, %s);\n", specialise_identifier (kind, name, sizeof name), function, to);
+    WRITE ("    scene_%s.%s (&b, %s);\n", specialise_identifier (kind, name, sizeof name), function, to);
   else
-    fprintf (gen->out, "    s->kind[%d]->%s (&b, %s);\n", k, function, to);
+    WRITE ("    s->kind[%d]->%s (&b, %s);\n", k, function, to);
 }
 
 /* The parameters of the generated functions, and statements that mark them as used. */
@@ -560,22 +562,21 @@ static void specialise_call (const generator *gen, int k, const char *function, 
  * of `function`, the member of the types' tables at `offset`; zeros for types where that is NULL. */
 static void specialise_rows (const generator *gen, const char *name, const char *function, size_t offset, int rows) {
   char to[40];
-  fprintf (gen->out, "\nINLINE void %s (" ARGUMENTS ") {\n" UNUSED, name);
+  WRITE ("\nINLINE void %s (" ARGUMENTS ") {\n" UNUSED, name);
   for (int k = 0; k < gen->s->constraints && gen->s->batch[k].row < rows; k++) {
     const pw_element_batch *batch = &gen->s->batch[k];
     for (int e = 0; e < batch->b.count; e++) {
       int first = e * batch->kind->rows, exists = pw_kind_function (batch->kind, offset) != NULL;
-      for (int r = 0; !exists && r < batch->kind->rows; r++)
-        fprintf (gen->out, "  out[%d] = 0;\n", batch->row + first + r);
+      for (int r = 0; !exists && r < batch->kind->rows; r++) WRITE ("  out[%d] = 0;\n", batch->row + first + r);
       if (!exists) continue;
       specialise_batch (gen, k, e, "");
       int at = offset == offsetof (pw_kind, J) ? specialise_J (gen, k, e) : batch->row + first;
       snprintf (to, sizeof to, "out + %d", at);
       specialise_call (gen, k, function, to);
-      fputs ("  }\n", gen->out);
+      WRITE ("  }\n");
     }
   }
-  fputs ("}\n", gen->out);
+  WRITE ("}\n");
 }
 
 /* Which forces act on coordinate j: 0, or a sum of these. */
@@ -595,47 +596,45 @@ static int specialise_forces_on (const generator *gen, int j) {
 
 static void specialise_forces (const generator *gen) {
   const pw_system *s = gen->s;
-  fprintf (gen->out, "\nINLINE void forces (" ARGUMENTS ") {\n" UNUSED);
+  WRITE ("\nINLINE void forces (" ARGUMENTS ") {\n" UNUSED);
   for (int j = 0; j < s->coords; j++)
-    fprintf (gen->out,
-             specialise_forces_on (gen, j) & SPECIALISE_CONSTANT ? "  out[%d] = s->force[%d];\n" : "  out[%d] = 0;\n",
-             j, j);
+    WRITE (specialise_forces_on (gen, j) & SPECIALISE_CONSTANT ? "  out[%d] = s->force[%d];\n" : "  out[%d] = 0;\n", j,
+           j);
   for (int k = 0; k < s->batches; k++) {
     const pw_element_batch *batch = &s->batch[k];
     for (int e = 0; batch->kind->force && !batch->kind->constant && e < batch->b.count; e++) {
       specialise_batch (gen, k, e, "");
-      fprintf (gen->out, "    double f[%d];\n", batch->b.cols);
+      WRITE ("    double f[%d];\n", batch->b.cols);
       specialise_call (gen, k, "force", "f");
       for (int c = 0; c < batch->b.cols; c++)
         if (gen->sparsity[k].force[c] != TERM_ZERO && pw_global (batch, e, c) < s->coords)
-          fprintf (gen->out, "    out[%d] += f[%d];\n", pw_global (batch, e, c), c);
-      fputs ("  }\n", gen->out);
+          WRITE ("    out[%d] += f[%d];\n", pw_global (batch, e, c), c);
+      WRITE ("  }\n");
     }
   }
-  fputs ("}\n", gen->out);
+  WRITE ("}\n");
 }
 
 /* Writes the function of the ledger's powers (pw_evaluate_ledger); that of a constraint is -lambda^T eta by default. */
 static void specialise_ledger (const generator *gen) {
   const pw_system *s = gen->s;
   char more[40];
-  fputs ("\nINLINE void ledger (const pw_scene *s, const pw_configuration *c, const double *q, const double *v,\n"
-         "                           const double *lambda, double *out) {\n" UNUSED "  (void)lambda;\n",
-         gen->out);
+  WRITE ("\nINLINE void ledger (const pw_scene *s, const pw_configuration *c, const double *q, const double *v,\n"
+         "                           const double *lambda, double *out) {\n" UNUSED "  (void)lambda;\n");
   for (int i = 0; i < s->entries; i++) {
     const pw_element_batch *batch = &s->batch[s->entry[i].batch];
     int k = s->entry[i].batch, e = s->entry[i].element, rows = batch->kind->rows, row = batch->row + e * rows;
     int by_eta = rows > 0 && s->entry[i].type == PW_WORK && batch->kind->power == NULL;
     snprintf (more, sizeof more, ", .lambda = lambda + %d", row);
     specialise_batch (gen, k, e, more);
-    fprintf (gen->out, "    double y[%d];\n", rows > 0 ? rows : 1);
+    WRITE ("    double y[%d];\n", rows > 0 ? rows : 1);
     specialise_call (gen, k, by_eta ? "eta" : s->entry[i].type == PW_WORK ? "power" : "loss", "y");
-    fprintf (gen->out, "    out[%d] = ", i);
-    if (!by_eta) fputs ("y[0]", gen->out);
-    for (int r = 0; by_eta && r < rows; r++) fprintf (gen->out, "%s - lambda[%d] * y[%d]", r ? "" : "0", row + r, r);
-    fputs (";\n  }\n", gen->out);
+    WRITE ("    out[%d] = ", i);
+    if (!by_eta) WRITE ("y[0]");
+    for (int r = 0; by_eta && r < rows; r++) WRITE ("%s - lambda[%d] * y[%d]", r ? "" : "0", row + r, r);
+    WRITE (";\n  }\n");
   }
-  fputs ("}\n", gen->out);
+  WRITE ("}\n");
 }
 
 static void specialise_elements (const generator *gen) {
@@ -661,23 +660,21 @@ static int specialise_is_simple (const pw_system *s) {
 static void specialise_signals (const generator *gen) {
   const pw_system *s = gen->s;
   const int simple = specialise_is_simple (s);
-  fputs ("\nGUARDED signals (pw_scene *s, double t, const double *q, const double *v) {\n  GUARDS;\n"
-         "  (void)s, (void)t, (void)q, (void)v;\n",
-         gen->out);
+  WRITE ("\nGUARDED signals (pw_scene *s, double t, const double *q, const double *v) {\n  GUARDS;\n"
+         "  (void)s, (void)t, (void)q, (void)v;\n");
   if (!simple)
-    fprintf (gen->out, "#ifndef PW_LANES\n  %sreturn s->update (s->workspace, t, q, v);\n#endif\n",
-             s->state_dependent ? "" : "if (t != *s->t_signal) ");
+    WRITE ("#ifndef PW_LANES\n  %sreturn s->update (s->workspace, t, q, v);\n#endif\n",
+           s->state_dependent ? "" : "if (t != *s->t_signal) ");
   for (int i = 0; i < s->sources && simple; i++) {
-    if (i == 0) fputs ("  SIGNALS_BEGIN (t);\n", gen->out);
+    if (i == 0) WRITE ("  SIGNALS_BEGIN (t);\n");
     if (s->source[i].signal.type == PW_CONSTANT) {
-      fprintf (gen->out, "  s->u[%d] = CONSTANT (%d);\n", 3 * i, i);
-      if (!s->source[i].of_force) fprintf (gen->out, "  s->u[%d] = s->u[%d] = 0;\n", 3 * i + 1, 3 * i + 2);
+      WRITE ("  s->u[%d] = CONSTANT (%d);\n", 3 * i, i);
+      if (!s->source[i].of_force) WRITE ("  s->u[%d] = s->u[%d] = 0;\n", 3 * i + 1, 3 * i + 2);
     } else
-      fprintf (gen->out, "  GUARD_CALL (harmonic (HARMONIC (%d), t, %d, s->u + %d));\n", i, !s->source[i].of_force,
-               3 * i);
+      WRITE ("  GUARD_CALL (harmonic (HARMONIC (%d), t, %d, s->u + %d));\n", i, !s->source[i].of_force, 3 * i);
   }
-  if (simple) fputs ("  SIGNALS_END (t);\n", gen->out);
-  fputs ("  GUARDS_HOLD;\n}\n", gen->out);
+  if (simple) WRITE ("  SIGNALS_END (t);\n");
+  WRITE ("  GUARDS_HOLD;\n}\n");
 }
 
 /* A run's data, as doubles: the elements of all batches, then for each signal a pw_harmonic or a constant and zeros. */
@@ -685,16 +682,16 @@ static void specialise_data (const generator *gen) {
   const pw_system *s = gen->s;
   const int per_signal = sizeof (pw_harmonic) / sizeof (double);
   int data = 0;
-  fputs ("\nstatic const int datum_begin[] = { ", gen->out);
+  WRITE ("\nstatic const int datum_begin[] = { ");
   for (int k = 0; k < s->batches; k++) {
-    fprintf (gen->out, "%d, ", data);
+    WRITE ("%d, ", data);
     data += s->batch[k].b.count * (int)(s->batch[k].kind->element / sizeof (double));
   }
-  fprintf (gen->out, "%d };\nenum { BATCHES = %d, SIGNALS = %d, SIMPLE = %d, DATA = %d, FIXED = %d };\n", data,
-           s->batches, s->sources, specialise_is_simple (s), data + per_signal * s->sources, gen->emitter.constants);
-  fputs ("static const unsigned char is_harmonic[] = { ", gen->out);
-  for (int i = 0; i < s->sources; i++) fprintf (gen->out, "%d, ", s->source[i].signal.type == PW_HARMONIC);
-  fputs ("0 };\n", gen->out);
+  WRITE ("%d };\nenum { BATCHES = %d, SIGNALS = %d, SIMPLE = %d, DATA = %d, FIXED = %d };\n", data, s->batches,
+         s->sources, specialise_is_simple (s), data + per_signal * s->sources, gen->emitter.constants);
+  WRITE ("static const unsigned char is_harmonic[] = { ");
+  for (int i = 0; i < s->sources; i++) WRITE ("%d, ", s->source[i].signal.type == PW_HARMONIC);
+  WRITE ("0 };\n");
   specialise_list (gen->out, "DATUM", data + per_signal * s->sources);
   specialise_list (gen->out, "SIGNAL", 3 * s->sources);
   specialise_list (gen->out, "ENTRY", (int)s->jacobian);
@@ -744,9 +741,9 @@ static void specialise_row_product (const generator *gen, int k, int e, int r, i
     int j = pw_global (&gen->s->batch[k], e, c);
     term a = j < gen->s->coords ? specialise_entry (gen, k, e, r, c) : (term){ 0 };
     if (a.type == TERM_ZERO) continue;
-    fprintf (gen->out, "%s%s", absolute || a.sign > 0 ? plus : *plus ? " - " : "-", absolute ? "fabs (" : "");
-    if (a.type != TERM_ONE) fprintf (gen->out, "%s * ", a.name);
-    fprintf (gen->out, "w[%d]%s", j, absolute ? ")" : "");
+    WRITE ("%s%s", absolute || a.sign > 0 ? plus : *plus ? " - " : "-", absolute ? "fabs (" : "");
+    if (a.type != TERM_ONE) WRITE ("%s * ", a.name);
+    WRITE ("w[%d]%s", j, absolute ? ")" : "");
     plus = " + ";
   }
   fputs (*plus ? ";\n" : "0;\n", gen->out);
@@ -754,16 +751,15 @@ static void specialise_row_product (const generator *gen, int k, int e, int r, i
 
 /* Writes the function `product`: out = J w; size: the sums of the absolute values of its terms. */
 static void specialise_product (const generator *gen) {
-  fputs ("\nINLINE void product (const double *J, const double *w, double *out, double *size) {\n  (void)J, (void)w, "
-         "(void)out, (void)size;\n",
-         gen->out);
+  WRITE ("\nINLINE void product (const double *J, const double *w, double *out, double *size) {\n  (void)J, (void)w, "
+         "(void)out, (void)size;\n");
   EACH_EQUATION (k, e, r, i) {
-    fprintf (gen->out, "  out[%d] = ", i);
+    WRITE ("  out[%d] = ", i);
     specialise_row_product (gen, k, e, r, 0);
-    fprintf (gen->out, "  size[%d] = ", i);
+    WRITE ("  size[%d] = ", i);
     specialise_row_product (gen, k, e, r, 1);
   }
-  fputs ("}\n", gen->out);
+  WRITE ("}\n");
 }
 
 typedef enum { SPECIALISE_ACCELERATION, SPECIALISE_VELOCITY, SPECIALISE_POSITION } specialise_unknown;
@@ -782,19 +778,17 @@ static int specialise_solve (generator *gen, const elimination *ldl, specialise_
     if (row < 0 && unknown == SPECIALISE_ACCELERATION && specialise_forces_on (gen, i))
       right[i] = term_named (TERM_VARIABLE, "f", i, 1);
   }
-  fprintf (gen->out,
-           "\nINLINE void %s (const double *C, const double *J, const double *F, %sconst double *g, double *a%s) {\n"
-           "  (void)C, (void)J, (void)F, (void)g, (void)a;\n",
-           name[unknown], unknown == SPECIALISE_ACCELERATION ? "const double *f, " : "",
-           unknown == SPECIALISE_ACCELERATION ? ", double *lambda" : "");
+  WRITE ("\nINLINE void %s (const double *C, const double *J, const double *F, %sconst double *g, double *a%s) {\n"
+         "  (void)C, (void)J, (void)F, (void)g, (void)a;\n",
+         name[unknown], unknown == SPECIALISE_ACCELERATION ? "const double *f, " : "",
+         unknown == SPECIALISE_ACCELERATION ? ", double *lambda" : "");
   elimination_solve (ldl, &gen->emitter, right);
   for (int j = 0; j + 1 < s->coords; j += 2)
-    fprintf (gen->out, "  STORE_PAIR (a + %d, %s, %s);\n", j, term_text (right[j], text),
-             term_text (right[j + 1], next));
-  if (s->coords % 2) fprintf (gen->out, "  a[%d] = %s;\n", s->coords - 1, term_text (right[s->coords - 1], text));
+    WRITE ("  STORE_PAIR (a + %d, %s, %s);\n", j, term_text (right[j], text), term_text (right[j + 1], next));
+  if (s->coords % 2) WRITE ("  a[%d] = %s;\n", s->coords - 1, term_text (right[s->coords - 1], text));
   for (int i = 0; i < s->rows && unknown == SPECIALISE_ACCELERATION; i++)
-    fprintf (gen->out, "  lambda[%d] = %s;\n", i, term_text (right[s->coords + i], text));
-  fputs ("}\n", gen->out);
+    WRITE ("  lambda[%d] = %s;\n", i, term_text (right[s->coords + i], text));
+  WRITE ("}\n");
   return PW_OK;
 }
 
@@ -808,10 +802,9 @@ static int specialise_factor (generator *gen, elimination *ldl, const term *K, c
   if (pw_stream_close (out, &text) != PW_OK) status = PW_RESOURCE;
   gen->emitter.code = gen->out;
   if (status == PW_OK)
-    fprintf (gen->out,
-             "\nGUARDED %s (const double *M, const double *C, const double *J, double *F) {\n  GUARDS;\n"
-             "  (void)M, (void)C, (void)J, (void)F;\n%s  GUARDS_HOLD;\n}\n",
-             name, text.text);
+    WRITE ("\nGUARDED %s (const double *M, const double *C, const double *J, double *F) {\n  GUARDS;\n"
+           "  (void)M, (void)C, (void)J, (void)F;\n%s  GUARDS_HOLD;\n}\n",
+           name, text.text);
   free (text.text);
   return status;
 }
@@ -829,9 +822,8 @@ static int specialise_algebra (generator *gen) {
   if (status == PW_OK) alone = specialise_factor (gen, &position, K, "factor_position", s->holonomic);
   if (alone == PW_RESOURCE) status = PW_RESOURCE;
   if (status == PW_OK) status = specialise_solve (gen, alone == PW_OK ? &position : &all, SPECIALISE_POSITION);
-  fprintf (gen->out, "\nenum { FACTORS = %d };\n",
-           1 + (all.factors > position.factors ? all.factors : position.factors));
-  if (alone != PW_OK) fputs ("#define factor_position factor\n", gen->out);
+  WRITE ("\nenum { FACTORS = %d };\n", 1 + (all.factors > position.factors ? all.factors : position.factors));
+  if (alone != PW_OK) WRITE ("#define factor_position factor\n");
   if (pw_stream_close (gen->emitter.prepare, &gen->prepare) != PW_OK) status = PW_RESOURCE;
   return status;
 }
@@ -849,22 +841,20 @@ static void specialise_coordinates (FILE *out, int n) {
 
 static void specialise_constants (const generator *gen) {
   const pw_system *s = gen->s;
-  fprintf (gen->out,
-           "\n/* ---- The scene ---- */\n\nenum { BODIES = %d, N = %d, ROWS = %d, HOLONOMIC = %d, INTERNAL = %d,\n"
-           "  ENTRIES = %d, REDUNDANT = %d, LEDGER = %d, RHEONOMIC = %d, STATE_DEPENDENT = %d };\n",
-           s->bodies, s->coords, s->rows, s->holonomic, s->coords - 3 * s->bodies, (int)s->jacobian,
-           gen->independent != NULL, s->entries, s->rheonomic > 0, s->state_dependent > 0);
-  fprintf (gen->out, "#define INLINE static inline%s\n",
-           s->rows <= SPECIALISE_INLINE ? " __attribute__ ((always_inline))" : "");
+  WRITE ("\n/* ---- The scene ---- */\n\nenum { BODIES = %d, N = %d, ROWS = %d, HOLONOMIC = %d, INTERNAL = %d,\n"
+         "  ENTRIES = %d, REDUNDANT = %d, LEDGER = %d, RHEONOMIC = %d, STATE_DEPENDENT = %d };\n",
+         s->bodies, s->coords, s->rows, s->holonomic, s->coords - 3 * s->bodies, (int)s->jacobian,
+         gen->independent != NULL, s->entries, s->rheonomic > 0, s->state_dependent > 0);
+  WRITE ("#define INLINE static inline%s\n", s->rows <= SPECIALISE_INLINE ? " __attribute__ ((always_inline))" : "");
   specialise_list (gen->out, "BODY", s->bodies);
   specialise_list (gen->out, "ROW", s->rows);
   specialise_list (gen->out, "HOLONOMIC", s->holonomic);
   specialise_list (gen->out, "INTERNAL", s->coords - 3 * s->bodies);
   specialise_coordinates (gen->out, s->coords);
-  for (int b = 0; b < s->bodies; b++) fprintf (gen->out, "/* body %d: %s */\n", b, s->body_name[b]);
-  fputs ("\nstatic const unsigned char independent[] = { ", gen->out);
-  for (int i = 0; i < s->rows; i++) fprintf (gen->out, "%d, ", specialise_is_independent (gen, i));
-  fputs ("0 };\n", gen->out);
+  for (int b = 0; b < s->bodies; b++) WRITE ("/* body %d: %s */\n", b, s->body_name[b]);
+  WRITE ("\nstatic const unsigned char independent[] = { ");
+  for (int i = 0; i < s->rows; i++) WRITE ("%d, ", specialise_is_independent (gen, i));
+  WRITE ("0 };\n");
 }
 
 /* Hash of the structure that a system must share with generated code; independent equations are compared separately. */
@@ -894,9 +884,8 @@ static unsigned long specialise_shape (const pw_system *s) {
 static int specialise_write (generator *gen) {
   unsigned char done[SPECIALISE_TEXTS] = { 0 };
   char name[80], file[90];
-  fputs ("/* Generated by Pinwheel.  Compile with: cc -std=c11 -O2 -ffp-contract=off -fPIC -shared */\n"
-         "#include <math.h>\n#include <string.h>\n#include \"pinwheel.h\"\n",
-         gen->out);
+  WRITE ("/* Generated by Pinwheel.  Compile with: cc -std=c11 -O2 -ffp-contract=off -fPIC -shared */\n"
+         "#include <math.h>\n#include <string.h>\n#include \"pinwheel.h\"\n");
   specialise_text (gen->out, "specialised.h", done);
   specialise_text (gen->out, "sine.h", done);
   specialise_text (gen->out, "batch.h", done);
@@ -911,23 +900,20 @@ static int specialise_write (generator *gen) {
   specialise_data (gen);
   specialise_signals (gen);
   specialise_text (gen->out, "scene_both.inc", done); /* for single runs and for several */
-  fputs ("\n#ifdef PW_LANES\n", gen->out);
+  WRITE ("\n#ifdef PW_LANES\n");
   specialise_text (gen->out, "scene_lanes.inc", done);
-  fprintf (gen->out,
-           "\nPW_EXPORT const pw_specialised_lanes pw_specialised_scene_lanes = {\n"
-           "  PW_SCENE_ABI, LANES_SERVED, %luu, sizeof (run_lanes), lanes_steps\n};\n#else\n",
-           specialise_shape (gen->s));
+  WRITE ("\nPW_EXPORT const pw_specialised_lanes pw_specialised_scene_lanes = {\n"
+         "  PW_SCENE_ABI, LANES_SERVED, %luu, sizeof (run_lanes), lanes_steps\n};\n#else\n",
+         specialise_shape (gen->s));
   specialise_text (gen->out, "scene_tail.inc", done); /* for single runs */
-  fprintf (gen->out,
-           "\nstatic int prepare (pw_scene *s) {\n  const double *const M = s->mass;\n  double *const C = s->constant, "
-           "J[ENTRIES + 1];\n"
-           "  reference_jacobian (s, J);\n  (void)M, (void)C, (void)J;\n%s  return 0;\n}\n",
-           gen->prepare.text ? gen->prepare.text : "");
-  fprintf (gen->out,
-           "\nPW_EXPORT const pw_specialised pw_specialised_scene = {\n"
-           "  PW_SCENE_ABI, %d, %luu, independent, prepare, evaluate, project, stages, compute_residuals, "
-           "steps\n};\n#endif\n",
-           gen->emitter.constants + 1, specialise_shape (gen->s));
+  WRITE ("\nstatic int prepare (pw_scene *s) {\n  const double *const M = s->mass;\n  double *const C = s->constant, "
+         "J[ENTRIES + 1];\n"
+         "  reference_jacobian (s, J);\n  (void)M, (void)C, (void)J;\n%s  return 0;\n}\n",
+         gen->prepare.text ? gen->prepare.text : "");
+  WRITE ("\nPW_EXPORT const pw_specialised pw_specialised_scene = {\n"
+         "  PW_SCENE_ABI, %d, %luu, independent, prepare, evaluate, project, stages, compute_residuals, "
+         "steps\n};\n#endif\n",
+         gen->emitter.constants + 1, specialise_shape (gen->s));
   return status;
 }
 
