@@ -279,7 +279,7 @@ static void selftest_gamma (probe *x) {
 }
 
 static void selftest_shift (probe *x, int u, double h) {
-  for (int e = 0; e < x->elements; e++) x->batch->u[3 * (e * x->kind->signals + u)] += h;
+  for (int e = 0; e < x->elements; e++) *x->batch->source[e * x->kind->signals + u].u += h;
 }
 
 static void selftest_force_u (probe *x) {
@@ -578,7 +578,7 @@ static void scene_holonomic (probe *x) {
 }
 
 static void scene_signals (probe *x, double *out) {
-  for (int i = 0; i < x->elements * x->kind->signals; i++) out[i] = x->batch->u[3 * i];
+  for (int i = 0; i < x->elements * x->kind->signals; i++) out[i] = *x->batch->source[i].u;
 }
 
 static void scene_gradients (probe *x, probe_move move) {
@@ -692,7 +692,7 @@ static int differences_search (pw_workspace *w, pw_element_batch *k, pw_random *
   double *x = malloc (((size_t)cols + (size_t)rows + 1) * sizeof *x);
   if (x == NULL) return PW_RESOURCE;
   for (int i = 0; i < cols + rows; i++) x[i] = pw_random_between (random, -1, 1);
-  for (int i = 0; i < 3 * k->b.count * k->kind->signals; i++) k->u[i] = pw_random_between (random, -1, 1);
+  for (int i = 0; i < 3 * k->b.count * k->kind->signals; i++) k->source->u[i] = pw_random_between (random, -1, 1);
   k->b.w = x, k->b.lambda = x + cols;
   for (int i = 0; i < 3 * PW_BLOCKS && k->b.count > 0 && !found; i++) {
     found = pw_block_missing (w, k, element[i % 3], (pw_block)(i / 3));

@@ -581,7 +581,7 @@ static void workspace_fill (pw_workspace *w, double *x) {
     k->J = J, k->block = w->block;
     J += k->b.count * k->kind->rows * k->b.cols;
     k->source = w->source + (k->source - s->source);
-    k->b.u = k->u = w->u + 3 * (k->source - w->source);
+    k->b.u = w->u + 3 * (k->source - w->source);
     k->b.configuration = w->configuration;
     k->b.q = s->q0 + k->internal, k->b.v = s->v0 + k->internal; /* until kinematics are updated */
   }

@@ -21,7 +21,7 @@ typedef struct {
 } pw_source;
 
 /* One element type in use: its batch, and the indices of its constraint equations and coordinates.  What a run modifies
- * (J, block, u, and q, v, u, w, lambda and the configurations of b) is NULL in a system: workspaces have it. */
+ * (J, block, and q, v, u, w, lambda and the configurations of b) is NULL in a system: workspaces have it. */
 typedef struct {
   pw_batch b; /* the argument of the type's functions */
   const pw_kind *kind;
@@ -31,7 +31,6 @@ typedef struct {
   const char **name; /* count */
   double *J;         /* count x rows x cols */
   double *block;     /* pw_workspace.block: scratch for forces, energies, powers, saturation; all batches share it */
-  double *u;         /* count x signals x 3, as b.u */
   pw_source *source; /* count x signals, part of the array of all sources */
 } pw_element_batch;
 
