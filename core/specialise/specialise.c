@@ -21,7 +21,7 @@ enum {
 
 typedef enum { TERM_ZERO, TERM_ONE, TERM_CONSTANT, TERM_VARIABLE } term_type;
 
-/* sign times 0 (any sign), 1, a value that is constant during a run (M[0], J[3], or C[2] computed by `prepare`), or a variable. */
+/* sign times 0 (any sign), 1, a constant of a run (M[0], J[3], or C[2] computed by `prepare`), or a variable. */
 typedef struct {
   term_type type;
   int sign;
@@ -280,7 +280,7 @@ static int elimination_rows (elimination *ldl, emitter *to) {
   return PW_OK;
 }
 
-/* Stores a variable x12, local to the factorisation, in F, unless that is done; slot: its index in F plus 1 by its number. */
+/* Stores a variable x12, local to the factorisation, in F, unless that is done; slot[12]: 1 plus its index in F. */
 static void elimination_keep (elimination *ldl, emitter *to, int *slot, term *a) {
   if (a->type != TERM_VARIABLE || a->name[0] != 'x') return;
   int v = atoi (a->name + 1);

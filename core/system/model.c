@@ -1,4 +1,4 @@
-/* Models: element types and their fields; checks; parameters, bodies and elements as the build function declares them. */
+/* Models: element types; checks; parameters, bodies and elements as the build function declares them. */
 #include <ctype.h>
 #include <limits.h>
 #include <math.h>
