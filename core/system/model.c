@@ -344,8 +344,8 @@ void pw_model_free (pw_model *m) {
 }
 
 int pw_model_set (pw_model *m, const char *parameter, double value, pw_error *error) {
-  if (pw_require (m, "a model", error) != PW_OK || pw_require (parameter, "the name of a parameter", error) != PW_OK)
-    return PW_INPUT;
+  if (pw_require (m, "a model", error) != PW_OK) return PW_INPUT;
+  if (parameter == NULL) return pw_fail (error, PW_INPUT, "model %s: the name of a parameter is missing", m->name);
   char hint[PW_HINT];
   int i = pw_find_name (m->table->parameters, sizeof (pw_parameter), parameter, hint);
   if (i < 0) return pw_fail (error, PW_INPUT, "model %s has no parameter \"%s\"%s", m->name, parameter, hint);
@@ -504,9 +504,12 @@ static pw_signal *model_find_signal (const pw_element *e, const char *name, pw_n
 
 int pw_model_set_signal (pw_model *m, const char *element, const char *field, const pw_signal *signal,
                          pw_error *error) {
-  if (pw_require (m, "a model", error) != PW_OK || pw_require (element, "the name of an element", error) != PW_OK ||
-      pw_require (field, "the name of a field", error) != PW_OK || pw_require (signal, "a signal", error) != PW_OK)
-    return PW_INPUT;
+  if (pw_require (m, "a model", error) != PW_OK) return PW_INPUT;
+  if (element == NULL || field == NULL || signal == NULL)
+    return pw_fail (error, PW_INPUT, "model %s: %s is missing", m->name,
+                    element == NULL ? "the name of an element"
+                    : field == NULL ? "the name of a field"
+                                    : "a signal");
   pw_nearest elements = { .sought = element }, fields = { .sought = field };
   const pw_element *e = NULL;
   for (int i = 0; i < m->elements && e == NULL; i++) {
@@ -526,8 +529,8 @@ int pw_model_set_signal (pw_model *m, const char *element, const char *field, co
 }
 
 int pw_model_set_initial (pw_model *m, const char *state, double value, pw_error *error) {
-  if (pw_require (m, "a model", error) != PW_OK || pw_require (state, "the name of a state", error) != PW_OK)
-    return PW_INPUT;
+  if (pw_require (m, "a model", error) != PW_OK) return PW_INPUT;
+  if (state == NULL) return pw_fail (error, PW_INPUT, "model %s: the name of a state is missing", m->name);
   const char *expected = pw_domain_check (PW_REAL, value);
   if (*expected)
     return pw_fail (error, PW_INPUT, "model %s: start %s = %g: expected %s", m->name, state, value, expected);
