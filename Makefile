@@ -108,7 +108,7 @@ deps:
 	@CC='$(CC)' CPPFLAGS='$(CPPFLAGS) $(SYSTEM)' LDFLAGS='$(LDFLAGS)' BUILD='$(BUILD)' NO_DEPS='$(NO_DEPS)' \
 	  sh .ci/deps.sh $(if $(filter deps,$(MAKECMDGOALS)),fresh) $(TOOLS)
 
-# ---- Objects; .ci/layers checks which folder includes what (-iquote: core/system/signal.h is not <signal.h>) ----
+# ---- Objects; .ci/layers checks which folder includes what ----
 
 DIRS := $(patsubst %/,%,$(sort $(dir $(wildcard core/*.h core/*/*.h core/*/*/*.h solvers/*.h solvers/*/*.h))))
 ALL  := $(DIRS:%=-iquote %)

@@ -1,7 +1,6 @@
-/* Checks of external texts: UTF-8 without control characters, which could move a terminal's cursor; printing into
- * buffers. */
-#define _GNU_SOURCE /* fopencookie */
-#include <ctype.h>
+/* External texts: UTF-8 without control characters, which could move a terminal's cursor; suggestions of names; domains
+ * of numbers; streams into memory. */
+#define _GNU_SOURCE /* fopencookie, strcasecmp */
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -58,7 +57,7 @@ char *pw_print (char *buffer, size_t size, const char *format, ...) {
   return buffer;
 }
 
-/* Suggestions of valid names for unknown ones, and the domains of numbers, for messages. */
+/* ---- Suggestions of valid names for unknown ones, domains of numbers ---- */
 
 /* Edit distance, in which exchanging neighbours is one change (Damerau 1964, optimal string alignment), keeping three
  * rows of the table; for a candidate longer than a row, its length. */
@@ -87,12 +86,6 @@ static int nearest_is_near (const char *a, size_t n, const char *b, size_t m, si
          (shorter > 0 && (memcmp (a, b, shorter) == 0 || memcmp (a + n - shorter, b + m - shorter, shorter) == 0));
 }
 
-/* 1 if two names are equal except for capitals. */
-static int nearest_equal (const char *a, const char *b) {
-  while (*a && tolower ((unsigned char)*a) == tolower ((unsigned char)*b)) a++, b++;
-  return *a == *b;
-}
-
 static void nearest_append (pw_nearest *n, const char *candidate) {
   size_t used = strlen (n->all), more = strlen (candidate);
   if (n->overflow || strstr (PW_PRINTED (96, ", %s,", n->all), PW_PRINTED (96, ", %s,", candidate))) return;
@@ -104,7 +97,7 @@ static void nearest_append (pw_nearest *n, const char *candidate) {
 
 void pw_nearest_try (pw_nearest *n, const char *candidate) {
   size_t a = strlen (n->sought), b = strlen (candidate), length = a > b ? a : b;
-  size_t distance = nearest_equal (n->sought, candidate) ? 0 : nearest_distance (n->sought, candidate);
+  size_t distance = strcasecmp (n->sought, candidate) == 0 ? 0 : nearest_distance (n->sought, candidate);
   nearest_append (n, candidate);
   if (*n->best && distance * n->length >= n->distance * length) return;
   snprintf (n->best, sizeof n->best, "%s", candidate);
@@ -156,8 +149,9 @@ const char *pw_domain_check (pw_domain domain, double value) {
   return "";
 }
 
-/* Streams into memory that report if any part of the text is missing.  open_memstream of glibc 2.36 does not: out of
- * memory, it drops what is written without setting the error indicator. */
+/* ---- Streams into memory that report if any part of the text is missing ----
+ *
+ * open_memstream of glibc 2.36 does not: out of memory, it drops what is written, and the error indicator stays 0. */
 
 static ssize_t stream_write (void *cookie, const char *bytes, size_t count) {
   pw_stream *t = cookie;

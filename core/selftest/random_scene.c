@@ -10,7 +10,6 @@ double pw_random_between (pw_random *r, double low, double high) {
 
 /* ---- Random definitions ---- */
 
-/* The parameters of the build function. */
 typedef struct {
   const pw_kind *kind;
   pw_random *random;

@@ -1,12 +1,199 @@
-/* The self-test of an element type in random scenes: most checks compare one function of its table with differences of
- * another. */
+/* The self-tests of element types: in a random scene, and in a scene that uses the type.  Most checks compare one
+ * function of its table with differences of another. */
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include "model.h"
 #include "selftest.h"
+
+/* ---- Checks ---- */
+
+static const struct {
+  const char *name, *about; /* as in pw_selftest_check */
+} selftest_checks[] = {
+  { "table", "consistent sizes, fields and functions" },
+  { "size", "each function fills exactly its array" },
+  { "J", "J = dg/dq" },
+  { "eta", "eta = -dg/dt" },
+  { "g_size", "g_size >= |g|" },
+  { "gamma", "J a - gamma = d(J v - eta)/dt" },
+  { "force_u", "force_u = d force/du" },
+  { "constant", "a constant force does not change" },
+  { "jw_q", "jw_q = d(J w)/dq" },
+  { "eta_q", "eta_q = d eta/dq" },
+  { "gamma_q", "gamma_q = d gamma/dq" },
+  { "gamma_v", "gamma_v = d gamma/dv" },
+  { "force_q", "force_q = d force/dq" },
+  { "force_v", "force_v = d force/dv" },
+  { "saturation", "saturation velocity of a saturating force" },
+  { "power", "force . v = power - loss - d energy/dt" },
+  { "loss", "loss >= 0" },
+  { "gradient", "gradient = d signal/d state" },
+};
+_Static_assert(sizeof selftest_checks / sizeof *selftest_checks <= PW_SELFTEST_CHECKS, "a report has room for all");
+
+/* The checks of blocks have the names of the functions that give them. */
+static const char *const selftest_block_name[] = {
+  [PW_JW_Q] = "jw_q",       [PW_JTL_Q] = "jw_q",      [PW_ETA_Q] = "eta_q",     [PW_GAMMA_Q] = "gamma_q",
+  [PW_GAMMA_V] = "gamma_v", [PW_FORCE_Q] = "force_q", [PW_FORCE_V] = "force_v", [PW_G_Q] = "J",
+};
+
+/* Records the result of a check, keeping the worst. */
+static void selftest_record (pw_selftest_report *r, const char *check, double error, double bound, const char *reason,
+                             const char *where) {
+  pw_selftest_check *c = r->check;
+  while (c < r->check + r->checks && strcmp (c->name, check) != 0) c++;
+  if (c == r->check + r->checks) {
+    int i = 0;
+    while (strcmp (selftest_checks[i].name, check) != 0) i++;
+    r->checks++;
+    *c = (pw_selftest_check){ check, selftest_checks[i].about, -1, bound, reason, .failed = 0 };
+  }
+  if (isnan (error)) error = INFINITY;
+  if (!(error <= bound) && !c->failed) c->failed = 1, r->failed++;
+  if (error <= c->error) return;
+  c->error = error;
+  snprintf (c->where, sizeof c->where, "%s", where);
+}
+
+/* ---- The probe: the batch of one element type in a scene, at a state that is moved to compute differences ---- */
+
+enum { PROBE_GUARD = 8 }; /* guard numbers after an array, which must not change */
+
+/* Moves by h: along dq; along dv; in time, by h tau; in time and along the motion q + v s + a s^2 / 2, s = h tau. */
+typedef enum { PROBE_Q, PROBE_V, PROBE_TIME, PROBE_MOTION } probe_move;
+
+typedef struct {
+  const pw_kind *kind;
+  const pw_system *s;
+  pw_workspace *workspace;
+  pw_element_batch *batch;     /* of the element type, in the workspace */
+  int elements, rows, cols;    /* rows and cols per element */
+  double t, tau;               /* the time, and the unit of its changes [s] */
+  double *q, *v, *a, *dq, *dv; /* coords: the state and its acceleration; directions of moves */
+  double *q_now, *v_now;       /* coords: the state as moved by the last update */
+  double *w, *lambda;          /* elements x cols, elements x rows: the vector w of jw_q, the multipliers */
+  double *J, *eta;             /* at the moved state */
+  int failed;                  /* 1: a signal failed */
+  int check_sizes;             /* 1: also checks that each function fills exactly its array */
+  pw_selftest_report *report;
+  char *memory; /* of the arrays; the caller frees it in every case */
+
+  /* Of the test in a scene: elements x width numbers; width: the most values of an element in any comparison. */
+  int width;
+  double *plus, *minus, *derivative; /* a function after steps forwards and backwards; its derivative by differences */
+  double *value, *terms;             /* what is compared with it; the sum of the absolute values of its terms */
+  double *size;                      /* in the check of J: g_size; in other checks: 0 */
+  double *error, *expected;          /* the least error of all steps; the derivative by differences of that step */
+  double *block;                     /* elements x width x width */
+} probe;
+
+typedef void probe_function (probe *x, double *out); /* `out` has room for PROBE_GUARD more numbers */
+
+static int probe_open (probe *x, pw_error *error) {
+  x->kind = x->batch->kind;
+  x->elements = x->batch->b.count, x->rows = x->kind->rows, x->cols = x->batch->b.cols;
+  x->width = x->cols > x->rows ? x->cols : x->rows;
+  if (x->width < PW_MAX_SIGNALS) x->width = PW_MAX_SIGNALS;
+  size_t n = (size_t)x->s->coords, rows = (size_t)(x->elements * x->rows), w = (size_t)(x->elements * x->cols);
+  size_t J = rows * (size_t)x->cols + PROBE_GUARD, eta = rows + PROBE_GUARD;
+  size_t m = (size_t)(x->elements * x->width) + PROBE_GUARD, block = m * (size_t)x->width;
+  const pw_array array[] = {
+    { &x->q, n },     { &x->v, n },     { &x->a, n },     { &x->dq, n },         { &x->dv, n },
+    { &x->q_now, n }, { &x->v_now, n }, { &x->w, w },     { &x->lambda, rows },  { &x->J, J },
+    { &x->eta, eta }, { &x->plus, m },  { &x->minus, m }, { &x->derivative, m }, { &x->value, m },
+    { &x->terms, m }, { &x->size, m },  { &x->error, m }, { &x->expected, m },   { &x->block, block },
+  };
+  x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
+  x->batch->b.w = x->w, x->batch->b.lambda = x->lambda;
+  return x->memory ? PW_OK : pw_fail_memory (x->s, error);
+}
+
+static void probe_update (probe *x, probe_move move, double h) {
+  double step = move == PROBE_MOTION ? h * x->tau : 0;
+  for (int j = 0; j < x->s->coords; j++) {
+    x->q_now[j] = x->q[j] + step * (x->v[j] + step * x->a[j] / 2) + (move == PROBE_Q ? h * x->dq[j] : 0);
+    x->v_now[j] = x->v[j] + step * x->a[j] + (move == PROBE_V ? h * x->dv[j] : 0);
+  }
+  const double t = move == PROBE_TIME || move == PROBE_MOTION ? x->t + h * x->tau : x->t;
+  x->failed |= pw_update_kinematics (x->workspace, t, x->q_now, x->v_now) != PW_OK;
+}
+
+/* Calls a function of the type, which fills n numbers; NULL gives zeros.  name: of the function, for the report. */
+static void probe_evaluate (probe *x, pw_batch_function *f, const char *name, int n, double *out) {
+  for (int i = 0; i < n + PROBE_GUARD; i++) out[i] = f ? NAN : 0;
+  if (f == NULL) return;
+  f (&x->batch->b, out);
+  if (!x->check_sizes) return;
+  char where[120];
+  int untouched = 0, beyond = 0;
+  for (int i = 0; i < n; i++) untouched += !isfinite (out[i]);
+  for (int i = n; i < n + PROBE_GUARD; i++) beyond += !isnan (out[i]);
+  snprintf (where, sizeof where, "%s: %d of %d entries missing or not finite, %d written beyond", name, untouched, n,
+            beyond);
+  selftest_record (x->report, "size", untouched + beyond, 0, "exact", where);
+}
+
+/* probe_g, ...: the function of this name, which fills `count` numbers. */
+#define PROBE_FUNCTION(function, count)                           \
+  static void probe_##function (probe *x, double *out) {          \
+    probe_evaluate (x, x->kind->function, #function, count, out); \
+  }
+PROBE_FUNCTION (g, x->elements * x->rows)
+PROBE_FUNCTION (g_size, x->elements * x->rows)
+PROBE_FUNCTION (eta, x->elements * x->rows)
+PROBE_FUNCTION (J, x->elements * x->rows * x->cols)
+PROBE_FUNCTION (gamma, x->elements * x->rows)
+PROBE_FUNCTION (force, x->elements * x->cols)
+PROBE_FUNCTION (energy, x->elements)
+PROBE_FUNCTION (power, x->elements)
+PROBE_FUNCTION (loss, x->elements)
+
+static int probe_ground (const probe *x, int e, int c) {
+  return pw_global (x->batch, e, c) >= x->s->coords;
+}
+
+static double probe_local (const probe *x, const double *vector, int e, int c) {
+  return probe_ground (x, e, c) ? 0 : vector[pw_global (x->batch, e, c)];
+}
+
+/* out += factor x block x vector, element by element: the block has `rows` rows per element, the vector an entry for
+ * each coordinate of the scene.  terms, unless NULL, += absolute values of the terms. */
+static void probe_multiply (const probe *x, const double *block, int rows, const double *vector, double factor,
+                            double *out, double *terms) {
+  for (int i = 0; i < x->elements * rows; i++)
+    for (int c = 0; c < x->cols; c++) {
+      double term = factor * block[i * x->cols + c] * probe_local (x, vector, i / rows, c);
+      out[i] += term;
+      if (terms) terms[i] += fabs (term);
+    }
+}
+
+/* out = J vector */
+static void probe_multiply_J (probe *x, const double *vector, double *out) {
+  probe_J (x, x->J);
+  memset (out, 0, (size_t)(x->elements * x->rows) * sizeof *out);
+  probe_multiply (x, x->J, x->rows, vector, 1, out, NULL);
+}
+
+/* J w */
+static void probe_Jw (probe *x, double *out) {
+  probe_J (x, x->J);
+  for (int i = 0; i < x->elements * x->rows; i++) {
+    out[i] = 0;
+    for (int c = 0; c < x->cols; c++) out[i] += x->J[i * x->cols + c] * x->w[i / x->rows * x->cols + c];
+  }
+}
+
+/* J v - eta */
+static void probe_drift (probe *x, double *out) {
+  probe_eta (x, x->eta);
+  probe_multiply_J (x, x->v_now, out);
+  for (int i = 0; i < x->elements * x->rows; i++) out[i] -= x->eta[i];
+}
+
+/* ---- In random scenes ---- */
 
 /* Central differences with a step of about eps^(1/3) = 6e-6 have an error of the order eps^(2/3) times the function's
  * size, from truncation and from round-off alike (Dennis & Schnabel 1983, section 5.6).  All numbers in the scene are
@@ -16,7 +203,7 @@
 static const char selftest_reason[] = "100 eps^(2/3) of the largest term: central differences";
 
 /* The numbers that a function fills, with guards. */
-typedef double selftest_numbers[PW_PROBE_OUT + PW_PROBE_GUARD];
+typedef double selftest_numbers[PW_SCENE_OUT + PROBE_GUARD];
 
 static double selftest_largest (int n, const double *y) {
   double most = 0;
@@ -25,201 +212,179 @@ static double selftest_largest (int n, const double *y) {
 }
 
 /* The derivatives of n values of f along a move.  Returns the largest value. */
-static double selftest_derivative (pw_probe *probe, pw_probe_function *f, pw_probe_move move, int n,
-                                   double *derivative) {
+static double selftest_derivative (probe *x, probe_function *f, probe_move move, int n, double *derivative) {
   selftest_numbers plus, minus;
-  pw_probe_update (probe, move, SELFTEST_STEP);
-  f (probe, plus);
-  pw_probe_update (probe, move, -SELFTEST_STEP);
-  f (probe, minus);
-  pw_probe_update (probe, move, 0);
+  probe_update (x, move, SELFTEST_STEP);
+  f (x, plus);
+  probe_update (x, move, -SELFTEST_STEP);
+  f (x, minus);
+  probe_update (x, move, 0);
   for (int i = 0; i < n; i++) derivative[i] = (plus[i] - minus[i]) / (2 * SELFTEST_STEP);
   return selftest_largest (n, plus);
 }
 
 /* Compares elements x rows x cols entries, except columns of the ground, for which there is no reference, relative to
  * the larger of 1 + size and the largest reference; size: the largest value of the function differenced. */
-static void selftest_compare (pw_probe *probe, pw_check check, int rows, int cols, double size, const double *value,
+static void selftest_compare (probe *x, const char *check, int rows, int cols, double size, const double *value,
                               const double *reference) {
-  int n = probe->elements * rows * cols, at = 0;
+  int n = x->elements * rows * cols, at = 0;
   double worst = -1, scale = fmax (1 + size, selftest_largest (n, reference));
   for (int i = 0; i < n; i++) {
-    if (cols == probe->cols && pw_probe_ground (probe, i / (rows * cols), i % cols)) continue;
+    if (cols == x->cols && probe_ground (x, i / (rows * cols), i % cols)) continue;
     double error = fabs (value[i] - reference[i]) / scale;
     if (isnan (error)) error = INFINITY;
     if (error > worst) worst = error, at = i;
   }
   char where[120];
-  snprintf (where, sizeof where, "%s, row %d, column %d: %.9g, expected %.9g", probe->batch->name[at / (rows * cols)],
+  snprintf (where, sizeof where, "%s, row %d, column %d: %.9g, expected %.9g", x->batch->name[at / (rows * cols)],
             at / cols % rows, at % cols, value[at], reference[at]);
-  pw_probe_record (probe->report, check, worst, SELFTEST_BOUND, selftest_reason, where);
+  selftest_record (x->report, check, worst, SELFTEST_BOUND, selftest_reason, where);
 }
 
-/* ---- First-order checks ---- */
+static void selftest_block (probe *x, pw_block block, double size) {
+  selftest_numbers value, reference;
+  int rows = pw_block_rows (x->kind, block);
+  pw_batch_function *function = pw_block_function (x->kind, block);
+  if (function == pw_by_differences) return; /* it would be compared with itself */
+  probe_evaluate (x, function, selftest_block_name[block], x->elements * rows * x->cols, value);
+  for (int e = 0; e < x->elements; e++)
+    pw_difference (x->workspace, x->batch, e, block, reference + e * rows * x->cols);
+  selftest_compare (x, selftest_block_name[block], rows, x->cols, size, value, reference);
+}
 
-static void selftest_holonomic (pw_probe *probe) {
-  selftest_numbers value, reference = { 0 }, derivative;
-  double size = 0;
-  int n = probe->elements * probe->rows;
-  for (int j = 0; j < probe->s->coords; j++) {
-    for (int i = 0; i < probe->s->coords; i++) probe->dq[i] = i == j;
-    size = selftest_derivative (probe, pw_probe_g, PW_PROBE_Q, n, derivative);
-    for (int i = 0; i < n * probe->cols; i++)
-      if (pw_global (probe->batch, i / (probe->rows * probe->cols), i % probe->cols) == j)
-        reference[i] = derivative[i / probe->cols];
-  }
-  pw_probe_J (probe, value);
-  selftest_compare (probe, PW_CHECK_J, probe->rows, probe->cols, size, value, reference);
-
-  size = selftest_derivative (probe, pw_probe_g, PW_PROBE_TIME, n, reference);
+static void selftest_holonomic (probe *x) {
+  selftest_numbers value, reference;
+  int n = x->elements * x->rows;
+  double size = selftest_derivative (x, probe_g, PROBE_TIME, n, reference);
   for (int i = 0; i < n; i++) reference[i] = -reference[i];
-  pw_probe_eta (probe, value);
-  selftest_compare (probe, PW_CHECK_eta, probe->rows, 1, size, value, reference);
+  probe_eta (x, value);
+  selftest_compare (x, "eta", x->rows, 1, size, value, reference);
+  selftest_block (x, PW_G_Q, size);
 
-  pw_probe_g (probe, reference);
-  pw_probe_g_size (probe, value);
+  probe_g (x, reference);
+  probe_g_size (x, value);
   /* a sufficient g_size is its own reference */
   for (int i = 0; i < n; i++) reference[i] = fmax (value[i], fabs (reference[i]));
-  selftest_compare (probe, PW_CHECK_g_size, probe->rows, 1, size, value, reference);
+  selftest_compare (x, "g_size", x->rows, 1, size, value, reference);
 }
 
-static void selftest_gamma (pw_probe *probe) {
+static void selftest_gamma (probe *x) {
   selftest_numbers value, gamma, reference;
-  int n = probe->elements * probe->rows;
-  double size = selftest_derivative (probe, pw_probe_drift, PW_PROBE_MOTION, n, reference);
-  pw_probe_multiply_J (probe, probe->a, value);
-  pw_probe_gamma (probe, gamma);
+  int n = x->elements * x->rows;
+  double size = selftest_derivative (x, probe_drift, PROBE_MOTION, n, reference);
+  probe_multiply_J (x, x->a, value);
+  probe_gamma (x, gamma);
   for (int i = 0; i < n; i++) value[i] -= gamma[i];
-  selftest_compare (probe, PW_CHECK_gamma, probe->rows, 1, size, value, reference);
+  selftest_compare (x, "gamma", x->rows, 1, size, value, reference);
 }
 
-/* Adds h to signal u of each element. */
-static void selftest_shift (pw_probe *probe, int u, double h) {
-  for (int e = 0; e < probe->elements; e++) probe->batch->u[3 * (e * probe->kind->signals + u)] += h;
+static void selftest_shift (probe *x, int u, double h) {
+  for (int e = 0; e < x->elements; e++) *x->batch->source[e * x->kind->signals + u].u += h;
 }
 
-static void selftest_force_u (pw_probe *probe) {
+static void selftest_force_u (probe *x) {
   selftest_numbers value, reference, plus, minus;
-  int signals = probe->kind->signals, n = probe->elements * probe->cols;
+  int signals = x->kind->signals, n = x->elements * x->cols;
   for (int u = 0; u < signals; u++) {
-    selftest_shift (probe, u, SELFTEST_STEP);
-    pw_probe_force (probe, plus);
-    selftest_shift (probe, u, -2 * SELFTEST_STEP);
-    pw_probe_force (probe, minus);
-    selftest_shift (probe, u, SELFTEST_STEP);
+    selftest_shift (x, u, SELFTEST_STEP);
+    probe_force (x, plus);
+    selftest_shift (x, u, -2 * SELFTEST_STEP);
+    probe_force (x, minus);
+    selftest_shift (x, u, SELFTEST_STEP);
     for (int i = 0; i < n; i++) reference[i * signals + u] = (plus[i] - minus[i]) / (2 * SELFTEST_STEP);
   }
-  pw_probe_evaluate (probe, probe->kind->force_u, "force_u", n * signals, value);
-  selftest_compare (probe, PW_CHECK_force_u, probe->cols * signals, 1, selftest_largest (n, plus), value, reference);
+  probe_evaluate (x, x->kind->force_u, "force_u", n * signals, value);
+  selftest_compare (x, "force_u", x->cols * signals, 1, selftest_largest (n, plus), value, reference);
 }
 
-static void selftest_constant (pw_probe *probe) {
+static void selftest_constant (probe *x) {
   selftest_numbers before, after;
-  int n = probe->elements * probe->cols, changed = 0;
-  pw_probe_force (probe, before);
-  pw_probe_update (probe, PW_PROBE_MOTION, 1);
-  pw_probe_force (probe, after);
-  pw_probe_update (probe, PW_PROBE_MOTION, 0);
+  int n = x->elements * x->cols, changed = 0;
+  probe_force (x, before);
+  probe_update (x, PROBE_MOTION, 1);
+  probe_force (x, after);
+  probe_update (x, PROBE_MOTION, 0);
   for (int i = 0; i < n; i++) changed += before[i] != after[i];
-  pw_probe_record (probe->report, PW_CHECK_constant, changed, 0, "exact", "");
+  selftest_record (x->report, "constant", changed, 0, "exact", "");
 }
 
-/* ---- Second-order blocks ---- */
-
-static void selftest_block (pw_probe *probe, pw_block block, pw_check check, double size) {
-  selftest_numbers value, reference;
-  int rows = pw_block_rows (probe->kind, block);
-  pw_batch_function *function = pw_block_function (probe->kind, block);
-  if (function == pw_by_differences) return; /* it would be compared with itself */
-  pw_probe_evaluate (probe, function, pw_check_name (check), probe->elements * rows * probe->cols, value);
-  for (int e = 0; e < probe->elements; e++)
-    pw_difference (probe->workspace, probe->batch, e, block, reference + e * rows * probe->cols);
-  selftest_compare (probe, check, rows, probe->cols, size, value, reference);
-}
-
-static void selftest_blocks (pw_probe *probe) {
+static void selftest_blocks (probe *x) {
   selftest_numbers J, gamma, force;
-  int n = probe->elements * probe->rows;
-  pw_probe_update (probe, PW_PROBE_TIME, 0);
-  pw_probe_J (probe, J);
-  pw_probe_gamma (probe, gamma);
-  pw_probe_force (probe, force);
-  double size_J = selftest_largest (n * probe->cols, J), size_gamma = selftest_largest (n, gamma);
-  if (probe->rows > 0) {
-    selftest_block (probe, PW_JW_Q, PW_CHECK_jw_q, size_J);
-    selftest_block (probe, PW_ETA_Q, PW_CHECK_eta_q, 0);
-    selftest_block (probe, PW_GAMMA_Q, PW_CHECK_gamma_q, size_gamma);
-    selftest_block (probe, PW_GAMMA_V, PW_CHECK_gamma_v, size_gamma);
+  int n = x->elements * x->rows;
+  probe_update (x, PROBE_TIME, 0);
+  probe_J (x, J);
+  probe_gamma (x, gamma);
+  probe_force (x, force);
+  double size_J = selftest_largest (n * x->cols, J), size_gamma = selftest_largest (n, gamma);
+  if (x->rows > 0) {
+    selftest_block (x, PW_JW_Q, size_J);
+    selftest_block (x, PW_ETA_Q, 0);
+    selftest_block (x, PW_GAMMA_Q, size_gamma);
+    selftest_block (x, PW_GAMMA_V, size_gamma);
   }
-  double size_force = selftest_largest (probe->elements * probe->cols, force);
-  selftest_block (probe, PW_FORCE_Q, PW_CHECK_force_q, size_force);
-  selftest_block (probe, PW_FORCE_V, PW_CHECK_force_v, size_force);
+  double size_force = selftest_largest (x->elements * x->cols, force);
+  selftest_block (x, PW_FORCE_Q, size_force);
+  selftest_block (x, PW_FORCE_V, size_force);
 }
 
-/* Makes a check at velocities multiplied by a factor. */
-static void selftest_at_speed (pw_probe *probe, double factor, void (*check) (pw_probe *probe)) {
+static void selftest_at_speed (probe *x, double factor, void (*check) (probe *x)) {
   double v[PW_SCENE_COORDS];
-  memcpy (v, probe->v, (size_t)probe->s->coords * sizeof *v);
-  for (int j = 0; j < probe->s->coords; j++) probe->v[j] *= factor;
-  pw_probe_update (probe, PW_PROBE_TIME, 0);
-  check (probe);
-  memcpy (probe->v, v, (size_t)probe->s->coords * sizeof *v);
+  memcpy (v, x->v, (size_t)x->s->coords * sizeof *v);
+  for (int j = 0; j < x->s->coords; j++) x->v[j] *= factor;
+  probe_update (x, PROBE_TIME, 0);
+  check (x);
+  memcpy (x->v, v, (size_t)x->s->coords * sizeof *v);
 }
 
 /* Near rest, squares of velocities underflow to 0 and their inverses are infinite; results must still be finite. */
-static void selftest_rest (pw_probe *probe) {
+static void selftest_rest (probe *x) {
   static const pw_block blocks[] = { PW_GAMMA_Q, PW_GAMMA_V, PW_FORCE_Q, PW_FORCE_V };
   selftest_numbers out;
-  pw_probe_evaluate (probe, probe->kind->gamma, "gamma near rest", probe->elements * probe->rows, out);
-  pw_probe_evaluate (probe, probe->kind->force, "force near rest", probe->elements * probe->cols, out);
-  pw_probe_evaluate (probe, probe->kind->loss, "loss near rest", probe->elements, out);
+  probe_evaluate (x, x->kind->gamma, "gamma near rest", x->elements * x->rows, out);
+  probe_evaluate (x, x->kind->force, "force near rest", x->elements * x->cols, out);
+  probe_evaluate (x, x->kind->loss, "loss near rest", x->elements, out);
   for (size_t i = 0; i < sizeof blocks / sizeof *blocks; i++) {
-    pw_batch_function *function = pw_block_function (probe->kind, blocks[i]);
-    int n = probe->elements * pw_block_rows (probe->kind, blocks[i]) * probe->cols;
-    if (function != pw_by_differences) pw_probe_evaluate (probe, function, "a derivative near rest", n, out);
+    pw_batch_function *function = pw_block_function (x->kind, blocks[i]);
+    int n = x->elements * pw_block_rows (x->kind, blocks[i]) * x->cols;
+    if (function != pw_by_differences) probe_evaluate (x, function, "a derivative near rest", n, out);
   }
 }
 
-/* ---- Saturation ---- */
-
 /* The change of the force of element e from `rest` when local velocity c changes from 0 to v. */
-static double selftest_change (pw_probe *probe, int e, int c, double v, const double *rest) {
+static double selftest_change (probe *x, int e, int c, double v, const double *rest) {
   selftest_numbers force;
   double change = 0;
-  int j = pw_global (probe->batch, e, c);
-  probe->v[j] = v;
-  pw_probe_update (probe, PW_PROBE_TIME, 0);
-  pw_probe_force (probe, force);
-  probe->v[j] = 0;
-  for (int i = e * probe->cols; i < (e + 1) * probe->cols; i++) change = fmax (change, fabs (force[i] - rest[i]));
+  int j = pw_global (x->batch, e, c);
+  x->v[j] = v;
+  probe_update (x, PROBE_TIME, 0);
+  probe_force (x, force);
+  x->v[j] = 0;
+  for (int i = e * x->cols; i < (e + 1) * x->cols; i++) change = fmax (change, fabs (force[i] - rest[i]));
   return change;
 }
 
 /* From rest, a hundredth of the declared saturation velocity, or of a large velocity if none is declared, must
  * change the force by at most half of the change by the whole velocity. */
-static void selftest_saturation (pw_probe *probe) {
+static void selftest_saturation (probe *x) {
   const double large = 1000;
   selftest_numbers declared, rest;
-  int cols = probe->cols;
-  pw_probe_force (probe, rest);
-  for (int i = 0; i < probe->elements * 2 * cols; i++) declared[i] = INFINITY;
-  if (probe->kind->saturation) probe->kind->saturation (&probe->batch->b, declared);
-  for (int i = 0; i < probe->elements * cols; i++) {
+  int cols = x->cols;
+  probe_force (x, rest);
+  for (int i = 0; i < x->elements * 2 * cols; i++) declared[i] = INFINITY;
+  if (x->kind->saturation) x->kind->saturation (&x->batch->b, declared);
+  for (int i = 0; i < x->elements * cols; i++) {
     int e = i / cols, c = i % cols;
-    if (pw_probe_ground (probe, e, c)) continue;
+    if (probe_ground (x, e, c)) continue;
     double velocity = declared[(2 * e + 1) * cols + c]; /* after the changes of coordinates of element e */
     if (!isfinite (velocity)) velocity = large;
-    double all = selftest_change (probe, e, c, velocity, rest);
-    double part = selftest_change (probe, e, c, velocity / 100, rest);
-    if (all < 1e-9 * (1 + selftest_largest (probe->elements * cols, rest))) continue; /* round-off */
-    pw_probe_record (probe->report, PW_CHECK_saturation, part / all, 0.5,
-                     "a hundredth of the velocity, half of the change", probe->batch->name[e]);
+    double all = selftest_change (x, e, c, velocity, rest);
+    double part = selftest_change (x, e, c, velocity / 100, rest);
+    if (all < 1e-9 * (1 + selftest_largest (x->elements * cols, rest))) continue; /* round-off */
+    selftest_record (x->report, "saturation", part / all, 0.5, "a hundredth of the velocity, half of the change",
+                     x->batch->name[e]);
   }
 }
 
-/* ---- Energy ---- */
-
-/* x . y of n numbers */
 static double selftest_dot (int n, const double *x, const double *y) {
   double sum = 0;
   for (int i = 0; i < n; i++) sum += x[i] * y[i];
@@ -228,15 +393,15 @@ static double selftest_dot (int n, const double *x, const double *y) {
 
 /* Satisfies J v = eta of element e by the change of v of least norm: its rows of J are made orthogonal (Gram-Schmidt).
  * Returns 0 if they are dependent. */
-static int selftest_satisfy (pw_probe *probe, int e) {
+static int selftest_satisfy (probe *x, int e) {
   double row[PW_MAX_ROWS][PW_MAX_COLS + 1], square[PW_MAX_ROWS]; /* row: of J, with the entry of J v - eta at its end */
-  const int n = probe->cols;
+  const int n = x->cols;
   selftest_numbers off;
-  pw_probe_update (probe, PW_PROBE_TIME, 0);
-  pw_probe_drift (probe, off);
-  for (int r = 0; r < probe->rows; r++) {
-    for (int c = 0; c < n; c++) row[r][c] = pw_probe_ground (probe, e, c) ? 0 : probe->J[(e * probe->rows + r) * n + c];
-    row[r][n] = off[e * probe->rows + r];
+  probe_update (x, PROBE_TIME, 0);
+  probe_drift (x, off);
+  for (int r = 0; r < x->rows; r++) {
+    for (int c = 0; c < n; c++) row[r][c] = probe_ground (x, e, c) ? 0 : x->J[(e * x->rows + r) * n + c];
+    row[r][n] = off[e * x->rows + r];
     for (int p = 0; p < r; p++) {
       double along = selftest_dot (n, row[p], row[r]) / square[p];
       for (int c = 0; c <= n; c++) row[r][c] -= along * row[p][c];
@@ -244,7 +409,7 @@ static int selftest_satisfy (pw_probe *probe, int e) {
     square[r] = selftest_dot (n, row[r], row[r]);
     if (!(square[r] > 1e-6)) return 0; /* entries of J are of the order 1 */
     for (int c = 0; c < n; c++)
-      if (!pw_probe_ground (probe, e, c)) probe->v[pw_global (probe->batch, e, c)] -= row[r][c] * row[r][n] / square[r];
+      if (!probe_ground (x, e, c)) x->v[pw_global (x->batch, e, c)] -= row[r][c] * row[r][n] / square[r];
   }
   return 1;
 }
@@ -252,70 +417,66 @@ static int selftest_satisfy (pw_probe *probe, int e) {
 /* The power of the forces of element e on its bodies, including constraint forces -J^T lambda, must equal the supplied
  * power minus losses and the rate of its potential energy.  A type without the function `power` supplies -lambda . eta
  * by its constraints. */
-static void selftest_power_of (pw_probe *probe, int e) {
+static void selftest_power_of (probe *x, int e) {
   selftest_numbers derivative, force, power, loss, Jv;
-  double sum = 0, size = selftest_derivative (probe, pw_probe_energy, PW_PROBE_MOTION, probe->elements, derivative);
-  pw_probe_force (probe, force);
-  pw_probe_power (probe, power);
-  pw_probe_loss (probe, loss);
+  double sum = 0, size = selftest_derivative (x, probe_energy, PROBE_MOTION, x->elements, derivative);
+  probe_force (x, force);
+  probe_power (x, power);
+  probe_loss (x, loss);
   size = fmax (size, fmax (fabs (power[e]), fabs (loss[e])));
-  for (int c = 0; c < probe->cols; c++) sum += force[e * probe->cols + c] * pw_probe_local (probe, probe->v, e, c);
-  if (probe->rows > 0) {
-    pw_probe_multiply_J (probe, probe->v, Jv);
-    pw_probe_eta (probe, probe->eta);
+  for (int c = 0; c < x->cols; c++) sum += force[e * x->cols + c] * probe_local (x, x->v, e, c);
+  if (x->rows > 0) {
+    probe_multiply_J (x, x->v, Jv);
+    probe_eta (x, x->eta);
   }
-  for (int r = e * probe->rows; r < (e + 1) * probe->rows; r++) {
-    sum -= probe->lambda[r] * Jv[r];
-    if (probe->kind->power == NULL) power[e] -= probe->lambda[r] * probe->eta[r];
+  for (int r = e * x->rows; r < (e + 1) * x->rows; r++) {
+    sum -= x->lambda[r] * Jv[r];
+    if (x->kind->power == NULL) power[e] -= x->lambda[r] * x->eta[r];
   }
   double error = fabs (sum + derivative[e] - power[e] + loss[e]) / (1 + size + fabs (sum));
   char where[120];
-  snprintf (where, sizeof where, "%s: %.9g, expected %.9g", probe->batch->name[e], sum,
-            power[e] - loss[e] - derivative[e]);
-  pw_probe_record (probe->report, PW_CHECK_power, error, SELFTEST_BOUND, selftest_reason, where);
-  if (probe->kind->loss) pw_probe_record (probe->report, PW_CHECK_loss, fmax (-loss[e], 0), 0, "exact", where);
+  snprintf (where, sizeof where, "%s: %.9g, expected %.9g", x->batch->name[e], sum, power[e] - loss[e] - derivative[e]);
+  selftest_record (x->report, "power", error, SELFTEST_BOUND, selftest_reason, where);
+  if (x->kind->loss) selftest_record (x->report, "loss", fmax (-loss[e], 0), 0, "exact", where);
 }
 
-static void selftest_power (pw_probe *probe) {
+static void selftest_power (probe *x) {
   double v[PW_SCENE_COORDS];
-  if (!probe->kind->force && !probe->kind->energy && !probe->kind->power && !probe->kind->loss) return;
-  for (int e = 0; e < probe->elements; e++) {
-    memcpy (v, probe->v, (size_t)probe->s->coords * sizeof *v);
-    if (probe->rows == 0 || selftest_satisfy (probe, e)) selftest_power_of (probe, e);
-    memcpy (probe->v, v, (size_t)probe->s->coords * sizeof *v);
+  if (!x->kind->force && !x->kind->energy && !x->kind->power && !x->kind->loss) return;
+  for (int e = 0; e < x->elements; e++) {
+    memcpy (v, x->v, (size_t)x->s->coords * sizeof *v);
+    if (x->rows == 0 || selftest_satisfy (x, e)) selftest_power_of (x, e);
+    memcpy (x->v, v, (size_t)x->s->coords * sizeof *v);
   }
 }
 
 /* Bodies near the corners of a square, everything else at random. */
-static void selftest_randomise (pw_probe *probe, pw_random *r) {
+static void selftest_randomise (probe *x, pw_random *r) {
   static const double corner[PW_SCENE_BODIES][2] = { { 2, 2 }, { -2, 2 }, { -2, -2 }, { 2, -2 } };
-  probe->t = pw_random_between (r, 0.1, 3);
-  probe->tau = 1;
-  for (int j = 0; j < probe->s->coords; j++) {
-    probe->q[j] = pw_random_between (r, -0.5, 0.5);
-    if (pw_is_angle (probe->s, j))
-      probe->q[j] = pw_random_between (r, -3, 3);
-    else
-      probe->q[j] += corner[j / 3][j % 3];
-    probe->v[j] = pw_random_between (r, -1.5, 1.5);
-    probe->a[j] = pw_random_between (r, -1.5, 1.5);
+  x->t = pw_random_between (r, 0.1, 3);
+  x->tau = 1;
+  for (int j = 0; j < x->s->coords; j++) {
+    x->q[j] =
+        pw_is_angle (x->s, j) ? pw_random_between (r, -3, 3) : corner[j / 3][j % 3] + pw_random_between (r, -0.5, 0.5);
+    x->v[j] = pw_random_between (r, -1.5, 1.5);
+    x->a[j] = pw_random_between (r, -1.5, 1.5);
   }
-  for (int i = 0; i < probe->elements * probe->cols; i++) probe->w[i] = pw_random_between (r, -1.5, 1.5);
-  for (int i = 0; i < probe->elements * probe->rows; i++) probe->lambda[i] = pw_random_between (r, -1.5, 1.5);
+  for (int i = 0; i < x->elements * x->cols; i++) x->w[i] = pw_random_between (r, -1.5, 1.5);
+  for (int i = 0; i < x->elements * x->rows; i++) x->lambda[i] = pw_random_between (r, -1.5, 1.5);
 }
 
-static void selftest_all (pw_probe *probe) {
+static void selftest_all (probe *x) {
   selftest_numbers out;
-  pw_probe_update (probe, PW_PROBE_TIME, 0);
-  if (probe->kind->level == PW_HOLONOMIC) selftest_holonomic (probe);
-  if (probe->rows > 0) selftest_gamma (probe);
-  if (probe->kind->signals > 0) selftest_force_u (probe);
-  if (probe->kind->constant) selftest_constant (probe);
-  selftest_blocks (probe);
-  selftest_at_speed (probe, 1e-310, selftest_rest);
-  if (probe->kind->force && !probe->kind->constant) selftest_at_speed (probe, 0, selftest_saturation);
-  selftest_power (probe);
-  pw_probe_evaluate (probe, probe->kind->contact, "contact", 3 * probe->elements, out);
+  probe_update (x, PROBE_TIME, 0);
+  if (x->kind->level == PW_HOLONOMIC) selftest_holonomic (x);
+  if (x->rows > 0) selftest_gamma (x);
+  if (x->kind->signals > 0) selftest_force_u (x);
+  if (x->kind->constant) selftest_constant (x);
+  selftest_blocks (x);
+  selftest_at_speed (x, 1e-310, selftest_rest);
+  if (x->kind->force && !x->kind->constant) selftest_at_speed (x, 0, selftest_saturation);
+  selftest_power (x);
+  probe_evaluate (x, x->kind->contact, "contact", 3 * x->elements, out);
 }
 
 int pw_selftest (const pw_kind *kind, unsigned seed, pw_selftest_report *report, pw_error *error) {
@@ -323,27 +484,26 @@ int pw_selftest (const pw_kind *kind, unsigned seed, pw_selftest_report *report,
   if (pw_require (kind, "an element type", error) != PW_OK || pw_require (report, "a report", error) != PW_OK)
     return PW_INPUT;
   const char *fault = pw_kind_check (kind, buffer, sizeof buffer);
-  pw_probe_record (report, PW_CHECK_table, *fault != 0, 0, "exact", fault);
+  selftest_record (report, "table", *fault != 0, 0, "exact", fault);
   if (*fault) return PW_OK;
   pw_random random = { seed };
   pw_error cause = { 0 };
   pw_system *s = pw_random_scene (kind, &random, &cause);
   if (s == NULL) return pw_fail (error, cause.status, "%s", cause.text);
   pw_workspace *w = pw_workspace_new (s, error);
-  pw_probe probe = { .s = s, .workspace = w, .batch = w ? w->batch : NULL, .check_sizes = 1, .report = report };
-  int status = w ? pw_probe_open (&probe, error) : PW_RESOURCE;
+  probe x = { .s = s, .workspace = w, .batch = w ? w->batch : NULL, .check_sizes = 1, .report = report };
+  int status = w ? probe_open (&x, error) : PW_RESOURCE;
   if (status == PW_OK) {
-    selftest_randomise (&probe, &random);
-    selftest_all (&probe);
+    selftest_randomise (&x, &random);
+    selftest_all (&x);
   }
-  free (probe.memory);
+  free (x.memory);
   pw_workspace_free (w);
   pw_system_free (s);
   return status;
 }
 
-/* The self-test of an element type in a scene that uses it, with the scene's elements, signals, parameters and
- * configuration.
+/* ---- In a scene that uses the type, with its elements, signals, parameters and configuration ----
  *
  * The scene moves randomly around the configuration, in its units.  The type's derivatives along that motion are
  * compared with differences over steps from 2^-8 to 2^-20; for each entry the least error counts.  A correct formula
@@ -352,175 +512,134 @@ int pw_selftest (const pw_kind *kind, unsigned seed, pw_selftest_report *report,
 #define SCENE_BOUND 1e-5
 static const char scene_reason[] = "1e-5 of the sum of all terms: the best of several differences";
 
-typedef struct {
-  pw_probe probe;
-  int width; /* largest number of values per element in any comparison; arrays have elements x width entries */
-  double *plus, *minus, *derivative; /* a function after steps forwards and backwards; its derivative by differences */
-  double *value, *terms;             /* what is compared with it; the sum of the absolute values of its terms */
-  double *size;                      /* in the check of J: g_size; in other checks: 0 */
-  double *error, *expected;          /* the least error of all steps; the derivative by differences of that step */
-  double *block;                     /* elements x width x width */
-  char *memory;
-} scene_test;
-
-/* ---- Comparing ---- */
-
-/* The largest of `terms` in the element of entry k: the round-off of test->value is proportional to it. */
-static double scene_largest_term (const scene_test *test, int k, int rows) {
-  double most = 0;
-  for (int i = k - k % rows; i < k - k % rows + rows; i++) most = fmax (most, test->terms[i]);
-  return most;
-}
-
 /* Updates the least error of each entry by differences with step h. */
-static void scene_differences (scene_test *test, pw_probe_function *f, pw_probe_move move, int rows, double h) {
-  int n = test->probe.elements * rows;
+static void scene_differences (probe *x, probe_function *f, probe_move move, int rows, double h) {
+  int n = x->elements * rows;
   static const double weight[] = { 4. / 3, -1. / 3 }; /* of steps h and 2 h: Richardson extrapolation */
-  for (int k = 0; k < n; k++) test->derivative[k] = 0;
+  for (int k = 0; k < n; k++) x->derivative[k] = 0;
   for (int i = 0; i < 2; i++) {
     double far = ldexp (h, i);
-    pw_probe_update (&test->probe, move, far);
-    f (&test->probe, test->plus);
-    pw_probe_update (&test->probe, move, -far);
-    f (&test->probe, test->minus);
-    for (int k = 0; k < n; k++) test->derivative[k] += weight[i] * (test->plus[k] - test->minus[k]) / (2 * far);
+    probe_update (x, move, far);
+    f (x, x->plus);
+    probe_update (x, move, -far);
+    f (x, x->minus);
+    for (int k = 0; k < n; k++) x->derivative[k] += weight[i] * (x->plus[k] - x->minus[k]) / (2 * far);
   }
   for (int k = 0; k < n; k++) {
-    double noise = /* round-off of f, divided by h, and of test->value; 256: a factor for the number of operations */
-        256 * DBL_EPSILON * ((fabs (test->plus[k]) + test->size[k]) / h + scene_largest_term (test, k, rows));
-    double excess = fabs (test->value[k] - test->derivative[k]) - noise;
-    double error = fmax (0, excess) / (test->terms[k] + fabs (test->derivative[k]) + DBL_MIN);
-    if (isfinite (excess) && error < test->error[k]) test->error[k] = error, test->expected[k] = test->derivative[k];
+    double noise = /* round-off of f, divided by h, and of x->value; 256: a factor for the number of operations */
+        256 * DBL_EPSILON * ((fabs (x->plus[k]) + x->size[k]) / h + selftest_largest (rows, x->terms + k - k % rows));
+    double excess = fabs (x->value[k] - x->derivative[k]) - noise;
+    double error = fmax (0, excess) / (x->terms[k] + fabs (x->derivative[k]) + DBL_MIN);
+    if (isfinite (excess) && error < x->error[k]) x->error[k] = error, x->expected[k] = x->derivative[k];
   }
 }
 
-/* Compares test->value, `rows` per element, with the derivative of f, given test->terms and test->size.  Clears these
+/* Compares x->value, `rows` per element, with the derivative of f, given x->terms and x->size.  Clears these
  * three arrays. */
-static void scene_compare (scene_test *test, pw_check check, int rows, pw_probe_function *f, pw_probe_move move) {
-  int n = test->probe.elements * rows, at = 0;
+static void scene_compare (probe *x, const char *check, int rows, probe_function *f, probe_move move) {
+  int n = x->elements * rows, at = 0;
   char where[120] = "";
-  for (int k = 0; k < n; k++) test->error[k] = INFINITY, test->expected[k] = NAN;
-  for (int power = -8; power >= -20; power -= 4) scene_differences (test, f, move, rows, ldexp (1, power));
-  pw_probe_update (&test->probe, PW_PROBE_Q, 0);
+  for (int k = 0; k < n; k++) x->error[k] = INFINITY, x->expected[k] = NAN;
+  for (int power = -8; power >= -20; power -= 4) scene_differences (x, f, move, rows, ldexp (1, power));
+  probe_update (x, PROBE_Q, 0);
   for (int k = 0; k < n; k++)
-    if (!(test->error[k] <= test->error[at])) at = k;
+    if (!(x->error[k] <= x->error[at])) at = k;
   if (n > 0)
-    snprintf (where, sizeof where, "%s %s, row %d: %.9g, expected %.9g", test->probe.kind->name,
-              test->probe.batch->name[at / rows], at % rows, test->value[at], test->expected[at]);
-  pw_probe_record (test->probe.report, check, n > 0 ? test->error[at] : 0, SCENE_BOUND, scene_reason, where);
-  for (int i = 0; i < test->probe.elements * test->width; i++) test->value[i] = test->terms[i] = test->size[i] = 0;
+    snprintf (where, sizeof where, "%s %s, row %d: %.9g, expected %.9g", x->kind->name, x->batch->name[at / rows],
+              at % rows, x->value[at], x->expected[at]);
+  selftest_record (x->report, check, n > 0 ? x->error[at] : 0, SCENE_BOUND, scene_reason, where);
+  for (int i = 0; i < x->elements * x->width; i++) x->value[i] = x->terms[i] = x->size[i] = 0;
 }
 
-static void scene_holonomic (scene_test *test) {
-  pw_probe_J (&test->probe, test->block);
-  pw_probe_multiply (&test->probe, test->block, test->probe.rows, test->probe.dq, 1, test->value, test->terms);
-  pw_probe_g_size (&test->probe, test->size);
-  scene_compare (test, PW_CHECK_J, test->probe.rows, pw_probe_g, PW_PROBE_Q);
-  pw_probe_eta (&test->probe, test->value);
-  for (int i = 0; i < test->probe.elements * test->probe.rows; i++) test->value[i] *= -test->probe.tau;
-  scene_compare (test, PW_CHECK_eta, test->probe.rows, pw_probe_g, PW_PROBE_TIME);
+static void scene_acceleration (probe *x) {
+  int n = x->elements * x->rows;
+  double tau = x->tau, *gamma = x->derivative; /* not used before the comparison */
+  probe_gamma (x, gamma);
+  probe_J (x, x->block);
+  probe_multiply (x, x->block, x->rows, x->a, tau, x->value, x->terms);
+  for (int i = 0; i < n; i++) x->value[i] -= tau * gamma[i], x->terms[i] += fabs (tau * gamma[i]);
+  scene_compare (x, "gamma", x->rows, probe_drift, PROBE_MOTION);
 }
 
-static void scene_acceleration (scene_test *test) {
-  int n = test->probe.elements * test->probe.rows;
-  double tau = test->probe.tau, *gamma = test->derivative; /* not used before the comparison */
-  pw_probe_gamma (&test->probe, gamma);
-  pw_probe_J (&test->probe, test->block);
-  pw_probe_multiply (&test->probe, test->block, test->probe.rows, test->probe.a, tau, test->value, test->terms);
-  for (int i = 0; i < n; i++) test->value[i] -= tau * gamma[i], test->terms[i] += fabs (tau * gamma[i]);
-  scene_compare (test, PW_CHECK_gamma, test->probe.rows, pw_probe_drift, PW_PROBE_MOTION);
+static void scene_block (probe *x, pw_block block, probe_function *f) {
+  int rows = pw_block_rows (x->kind, block);
+  probe_move move = block == PW_GAMMA_V || block == PW_FORCE_V ? PROBE_V : PROBE_Q;
+  if (pw_evaluate_block (x->workspace, x->batch, block, x->block))
+    probe_multiply (x, x->block, rows, move == PROBE_V ? x->dv : x->dq, 1, x->value, x->terms);
+  scene_compare (x, selftest_block_name[block], rows, f, move);
 }
 
-static void scene_block (scene_test *test, pw_block block, pw_check check, pw_probe_function *f) {
-  int rows = pw_block_rows (test->probe.kind, block);
-  pw_probe_move move = block == PW_GAMMA_V || block == PW_FORCE_V ? PW_PROBE_V : PW_PROBE_Q;
-  if (pw_evaluate_block (test->probe.workspace, test->probe.batch, block, test->block))
-    pw_probe_multiply (&test->probe, test->block, rows, move == PW_PROBE_V ? test->probe.dv : test->probe.dq, 1,
-                       test->value, test->terms);
-  scene_compare (test, check, rows, f, move);
+static void scene_holonomic (probe *x) {
+  probe_g_size (x, x->size);
+  scene_block (x, PW_G_Q, probe_g);
+  probe_eta (x, x->value);
+  for (int i = 0; i < x->elements * x->rows; i++) x->value[i] *= -x->tau;
+  scene_compare (x, "eta", x->rows, probe_g, PROBE_TIME);
 }
 
-static void scene_signals (pw_probe *probe, double *out) {
-  for (int i = 0; i < probe->elements * probe->kind->signals; i++) out[i] = probe->batch->u[3 * i];
+static void scene_signals (probe *x, double *out) {
+  for (int i = 0; i < x->elements * x->kind->signals; i++) out[i] = *x->batch->source[i].u;
 }
 
-/* Compares the gradients of signals that read states. */
-static void scene_gradients (scene_test *test, pw_probe_move move) {
-  int signals = test->probe.kind->signals, coords = test->probe.s->coords;
-  for (int i = 0; i < test->probe.elements * signals; i++) {
-    const pw_source *source = &test->probe.batch->source[i];
+static void scene_gradients (probe *x, probe_move move) {
+  int signals = x->kind->signals, coords = x->s->coords;
+  for (int i = 0; i < x->elements * signals; i++) {
+    const pw_source *source = &x->batch->source[i];
     for (int k = 0; k < source->reads; k++) {
       int j = source->state[k], velocity = j >= coords;
-      if (velocity != (move == PW_PROBE_V)) continue;
+      if (velocity != (move == PROBE_V)) continue;
       double gradient = source->x[source->reads + k];
-      double term = gradient * (velocity ? test->probe.dv[j - coords] : test->probe.dq[j]);
-      test->value[i] += term, test->terms[i] += fabs (term);
+      double term = gradient * (velocity ? x->dv[j - coords] : x->dq[j]);
+      x->value[i] += term, x->terms[i] += fabs (term);
     }
   }
-  scene_compare (test, PW_CHECK_gradient, signals, scene_signals, move);
+  scene_compare (x, "gradient", signals, scene_signals, move);
 }
 
-static void scene_all (scene_test *test) {
-  const pw_kind *kind = test->probe.kind;
-  pw_probe_update (&test->probe, PW_PROBE_Q, 0);
-  if (kind->level == PW_HOLONOMIC) scene_holonomic (test);
+static void scene_all (probe *x) {
+  const pw_kind *kind = x->kind;
+  probe_update (x, PROBE_Q, 0);
+  if (kind->level == PW_HOLONOMIC) scene_holonomic (x);
   if (kind->rows > 0) {
-    scene_acceleration (test);
-    scene_block (test, PW_JW_Q, PW_CHECK_jw_q, pw_probe_Jw);
-    scene_block (test, PW_ETA_Q, PW_CHECK_eta_q, pw_probe_eta);
-    scene_block (test, PW_GAMMA_Q, PW_CHECK_gamma_q, pw_probe_gamma);
-    scene_block (test, PW_GAMMA_V, PW_CHECK_gamma_v, pw_probe_gamma);
+    scene_acceleration (x);
+    scene_block (x, PW_JW_Q, probe_Jw);
+    scene_block (x, PW_ETA_Q, probe_eta);
+    scene_block (x, PW_GAMMA_Q, probe_gamma);
+    scene_block (x, PW_GAMMA_V, probe_gamma);
   }
-  if (kind->force_u && test->probe.s->state_dependent) {
-    scene_gradients (test, PW_PROBE_Q);
-    scene_gradients (test, PW_PROBE_V);
+  if (kind->force_u && x->s->state_dependent) {
+    scene_gradients (x, PROBE_Q);
+    scene_gradients (x, PROBE_V);
   }
-  pw_hold_signals (test->probe.workspace, 1); /* force_q and force_v exclude the dependence of signals on the state */
-  scene_block (test, PW_FORCE_Q, PW_CHECK_force_q, pw_probe_force);
-  scene_block (test, PW_FORCE_V, PW_CHECK_force_v, pw_probe_force);
-  pw_hold_signals (test->probe.workspace, 0);
+  pw_hold_signals (x->workspace, 1); /* force_q and force_v exclude the dependence of signals on the state */
+  scene_block (x, PW_FORCE_Q, probe_force);
+  scene_block (x, PW_FORCE_V, probe_force);
+  pw_hold_signals (x->workspace, 0);
 }
 
-/* ---- The motion ---- */
-
-static int scene_randomise (pw_probe *probe, const double *q, const double *v, pw_random *r, pw_error *error) {
-  double T = probe->workspace->scale.time, *w = probe->v_now; /* w of jw_q; not used before the update */
-  for (int j = 0; j < probe->s->coords; j++) {
-    double unit = pw_unit (probe->s, j);
-    probe->q[j] = q[j];
-    probe->v[j] = v[j] + unit / T * pw_random_between (r, -1, 1);
-    probe->a[j] = unit / T / T * pw_random_between (r, -1, 1);
-    probe->dq[j] = unit * pw_random_between (r, -1, 1);
-    probe->dv[j] = unit / T * pw_random_between (r, -1, 1);
+static int scene_randomise (probe *x, const double *q, const double *v, pw_random *r, pw_error *error) {
+  double T = x->workspace->scale.time, *w = x->v_now; /* w of jw_q; not used before the update */
+  for (int j = 0; j < x->s->coords; j++) {
+    double unit = pw_unit (x->s, j);
+    x->q[j] = q[j];
+    x->v[j] = v[j] + unit / T * pw_random_between (r, -1, 1);
+    x->a[j] = unit / T / T * pw_random_between (r, -1, 1);
+    x->dq[j] = unit * pw_random_between (r, -1, 1);
+    x->dv[j] = unit / T * pw_random_between (r, -1, 1);
     w[j] = unit * pw_random_between (r, -1, 1);
   }
-  for (int i = 0; i < probe->elements * probe->cols; i++)
-    probe->w[i] = pw_probe_local (probe, w, i / probe->cols, i % probe->cols);
-  for (int i = 0; i < probe->elements * probe->rows; i++) probe->lambda[i] = pw_random_between (r, -1, 1);
+  for (int i = 0; i < x->elements * x->cols; i++) x->w[i] = probe_local (x, w, i / x->cols, i % x->cols);
+  for (int i = 0; i < x->elements * x->rows; i++) x->lambda[i] = pw_random_between (r, -1, 1);
   /* no signal has a breakpoint between the times used, which are later than one that is too near for differences */
-  double next = pw_next_breakpoint (probe->workspace, 0, probe->t);
-  if (next - probe->t < 1e-6 * fabs (probe->t)) probe->t = next, next = pw_next_breakpoint (probe->workspace, 0, next);
+  double next = pw_next_breakpoint (x->workspace, 0, x->t);
+  if (next - x->t < 1e-6 * fabs (x->t)) x->t = next, next = pw_next_breakpoint (x->workspace, 0, next);
   char signal[PW_NAME_BYTES];
   if (isnan (next))
-    return pw_fail (error, PW_METHOD, "t = %.6g s: %s: its breakpoint function returned a time that is not later",
-                    probe->t, pw_failed_signal (probe->workspace, signal, sizeof signal));
-  probe->tau = fmin (T, next - probe->t) / 2;
-  probe->t += probe->tau;
+    return pw_fail (error, PW_METHOD, "t = %.6g s: %s: its breakpoint function returned a time that is not later", x->t,
+                    pw_failed_signal (x->workspace, signal, sizeof signal));
+  x->tau = fmin (T, next - x->t) / 2;
+  x->t += x->tau;
   return PW_OK;
-}
-
-static int scene_open (scene_test *test, pw_error *error) {
-  if (pw_probe_open (&test->probe, error) != PW_OK) return PW_RESOURCE;
-  test->width = test->probe.cols > test->probe.rows ? test->probe.cols : test->probe.rows;
-  if (test->width < PW_MAX_SIGNALS) test->width = PW_MAX_SIGNALS;
-  size_t values = (size_t)(test->probe.elements * test->width), n = values + PW_PROBE_GUARD;
-  const pw_array array[] = {
-    { &test->plus, n },  { &test->minus, n },    { &test->derivative, n },
-    { &test->value, n }, { &test->terms, n },    { &test->error, n },
-    { &test->size, n },  { &test->expected, n }, { &test->block, values * (size_t)test->width + PW_PROBE_GUARD },
-  };
-  test->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
-  return test->memory ? PW_OK : pw_fail_memory (test->probe.s, error);
 }
 
 int pw_selftest_scene (const pw_system *s, double T, const pw_kind *kind, double t, const double *q, const double *v,
@@ -529,211 +648,56 @@ int pw_selftest_scene (const pw_system *s, double T, const pw_kind *kind, double
   pw_workspace *w = pw_workspace_new (s, error);
   if (w == NULL) return s ? PW_RESOURCE : PW_INPUT;
   w->scale.time = T;
-  scene_test test = { .probe = { .s = s, .workspace = w, .batch = w->batch, .t = t, .report = report } };
-  pw_probe *probe = &test.probe;
-  const pw_element_batch *end = w->batch + s->batches;
-  while (probe->batch < end && probe->batch->kind != kind) probe->batch++;
-  int used = probe->batch < end && probe->batch->b.count > 0, status = used ? scene_open (&test, error) : PW_OK;
-  if (used && status == PW_OK) status = scene_randomise (probe, q, v, &random, error);
-  if (used && status == PW_OK) {
-    scene_all (&test);
-    if (probe->failed) status = pw_fail_evaluation (w, probe->t, error);
+  probe x = { .s = s, .workspace = w, .batch = w->batch, .t = t, .report = report };
+  while (x.batch < w->batch + s->batches && x.batch->kind != kind) x.batch++;
+  int status = PW_OK;
+  if (x.batch < w->batch + s->batches && x.batch->b.count > 0) {
+    status = probe_open (&x, error);
+    if (status == PW_OK) status = scene_randomise (&x, q, v, &random, error);
+    if (status == PW_OK) scene_all (&x);
+    if (x.failed) status = pw_fail_evaluation (w, x.t, error);
   }
   if (status != PW_OK) *report = (pw_selftest_report){ 0 }; /* checks with a failed signal mean nothing */
-  free (test.memory);
-  free (probe->memory);
+  free (x.memory);
   pw_workspace_free (w);
   return status;
 }
 
-/* The probe of the self-tests: see selftest.h. */
+/* ---- Blocks of a scene that are computed by differences; non-zero ones that are NULL in the table ---- */
 
-static const struct {
-  const char *name, *about; /* as in pw_selftest_check */
-} probe_checks[] = {
-#define PW_PROBE_CHECK(name, about) { #name, about },
-  PW_PROBE_CHECKS
-};
-_Static_assert(sizeof probe_checks / sizeof *probe_checks <= PW_SELFTEST_CHECKS, "a report has room for all checks");
-
-const char *pw_check_name (pw_check check) {
-  return probe_checks[check].name;
+static char *differences_name (const pw_kind *kind, int block, char *buffer, size_t size) {
+  return pw_print (buffer, size, "%s of element type %s", selftest_block_name[block], kind->name);
 }
 
-void pw_probe_record (pw_selftest_report *r, pw_check check, double error, double bound, const char *reason,
-                      const char *where) {
-  pw_selftest_check *c = r->check;
-  while (c < r->check + r->checks && strcmp (c->name, probe_checks[check].name) != 0) c++;
-  if (c == r->check + r->checks) {
-    r->checks++;
-    *c = (pw_selftest_check){ probe_checks[check].name, probe_checks[check].about, -1, bound, reason, .failed = 0 };
-  }
-  if (isnan (error)) error = INFINITY;
-  if (!(error <= bound) && !c->failed) c->failed = 1, r->failed++;
-  if (error <= c->error) return;
-  c->error = error;
-  snprintf (c->where, sizeof c->where, "%s", where);
-}
-
-int pw_probe_open (pw_probe *probe, pw_error *error) {
-  probe->kind = probe->batch->kind;
-  probe->elements = probe->batch->b.count, probe->rows = probe->kind->rows, probe->cols = probe->batch->b.cols;
-  size_t n = (size_t)probe->s->coords, rows = (size_t)(probe->elements * probe->rows), cols = (size_t)probe->cols;
-  const pw_array array[] = {
-    { &probe->q, n },
-    { &probe->v, n },
-    { &probe->a, n },
-    { &probe->dq, n },
-    { &probe->dv, n },
-    { &probe->q_now, n },
-    { &probe->v_now, n },
-    { &probe->w, (size_t)probe->elements * cols },
-    { &probe->lambda, rows },
-    { &probe->J, rows * cols + PW_PROBE_GUARD },
-    { &probe->eta, rows + PW_PROBE_GUARD },
-  };
-  probe->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
-  probe->batch->b.w = probe->w, probe->batch->b.lambda = probe->lambda;
-  return probe->memory ? PW_OK : pw_fail_memory (probe->s, error);
-}
-
-void pw_probe_update (pw_probe *probe, pw_probe_move move, double h) {
-  double step = move == PW_PROBE_MOTION ? h * probe->tau : 0;
-  for (int j = 0; j < probe->s->coords; j++) {
-    probe->q_now[j] =
-        probe->q[j] + step * (probe->v[j] + step * probe->a[j] / 2) + (move == PW_PROBE_Q ? h * probe->dq[j] : 0);
-    probe->v_now[j] = probe->v[j] + step * probe->a[j] + (move == PW_PROBE_V ? h * probe->dv[j] : 0);
-  }
-  const double t = move == PW_PROBE_TIME || move == PW_PROBE_MOTION ? probe->t + h * probe->tau : probe->t;
-  probe->failed |= pw_update_kinematics (probe->workspace, t, probe->q_now, probe->v_now) != PW_OK;
-}
-
-/* ---- Functions ---- */
-
-void pw_probe_evaluate (pw_probe *probe, pw_batch_function *f, const char *name, int n, double *out) {
-  for (int i = 0; i < n + PW_PROBE_GUARD; i++) out[i] = f ? NAN : 0;
-  if (f == NULL) return;
-  f (&probe->batch->b, out);
-  if (!probe->check_sizes) return;
-  char where[120];
-  int untouched = 0, beyond = 0;
-  for (int i = 0; i < n; i++) untouched += !isfinite (out[i]);
-  for (int i = n; i < n + PW_PROBE_GUARD; i++) beyond += !isnan (out[i]);
-  snprintf (where, sizeof where, "%s: %d of %d entries missing or not finite, %d written beyond", name, untouched, n,
-            beyond);
-  pw_probe_record (probe->report, PW_CHECK_size, untouched + beyond, 0, "exact", where);
-}
-
-/* pw_probe_g, ...: the function of this name, which fills `count` numbers. */
-#define PROBE_FUNCTION(function, count)                                      \
-  void pw_probe_##function (pw_probe *probe, double *out) {                  \
-    pw_probe_evaluate (probe, probe->kind->function, #function, count, out); \
-  }
-PROBE_FUNCTION (g, probe->elements * probe->rows)
-PROBE_FUNCTION (g_size, probe->elements * probe->rows)
-PROBE_FUNCTION (eta, probe->elements * probe->rows)
-PROBE_FUNCTION (J, probe->elements * probe->rows * probe->cols)
-PROBE_FUNCTION (gamma, probe->elements * probe->rows)
-PROBE_FUNCTION (force, probe->elements * probe->cols)
-PROBE_FUNCTION (energy, probe->elements)
-PROBE_FUNCTION (power, probe->elements)
-PROBE_FUNCTION (loss, probe->elements)
-
-void pw_probe_Jw (pw_probe *probe, double *out) {
-  pw_probe_J (probe, probe->J);
-  for (int i = 0; i < probe->elements * probe->rows; i++) {
-    out[i] = 0;
-    for (int c = 0; c < probe->cols; c++)
-      out[i] += probe->J[i * probe->cols + c] * probe->w[i / probe->rows * probe->cols + c];
-  }
-}
-
-void pw_probe_drift (pw_probe *probe, double *out) {
-  pw_probe_eta (probe, probe->eta);
-  pw_probe_multiply_J (probe, probe->v_now, out);
-  for (int i = 0; i < probe->elements * probe->rows; i++) out[i] -= probe->eta[i];
-}
-
-/* ---- Products ---- */
-
-int pw_probe_ground (const pw_probe *probe, int e, int c) {
-  return pw_global (probe->batch, e, c) >= probe->s->coords;
-}
-
-double pw_probe_local (const pw_probe *probe, const double *vector, int e, int c) {
-  return pw_probe_ground (probe, e, c) ? 0 : vector[pw_global (probe->batch, e, c)];
-}
-
-void pw_probe_multiply (const pw_probe *probe, const double *block, int rows, const double *vector, double factor,
-                        double *out, double *terms) {
-  for (int i = 0; i < probe->elements * rows; i++)
-    for (int c = 0; c < probe->cols; c++) {
-      double term = factor * block[i * probe->cols + c] * pw_probe_local (probe, vector, i / rows, c);
-      out[i] += term;
-      if (terms) terms[i] += fabs (term);
-    }
-}
-
-void pw_probe_multiply_J (pw_probe *probe, const double *vector, double *out) {
-  pw_probe_J (probe, probe->J);
-  memset (out, 0, (size_t)(probe->elements * probe->rows) * sizeof *out);
-  pw_probe_multiply (probe, probe->J, probe->rows, vector, 1, out, NULL);
-}
-
-/* Second-order blocks of a scene that are computed by differences, and non-zero ones that are NULL in the table. */
-
-static const char *const differences_name[PW_BLOCKS] = {
-  [PW_JW_Q] = "jw_q",       [PW_JTL_Q] = "jw_q",      [PW_ETA_Q] = "eta_q",     [PW_GAMMA_Q] = "gamma_q",
-  [PW_GAMMA_V] = "gamma_v", [PW_FORCE_Q] = "force_q", [PW_FORCE_V] = "force_v",
-};
-
-/* The batch of the i-th block that is computed by differences, and which *block of it, a pw_block; NULL if there are
- * fewer.  PW_JTL_Q is not counted: a type gives it by jw_q. */
-static const pw_element_batch *differences_find (const pw_system *s, int i, int *block) {
+/* "" after the last one.  PW_JTL_Q is not counted: a type gives it by jw_q. */
+char *pw_system_difference_name (const pw_system *s, int i, char *buffer, size_t size) {
   for (const pw_element_batch *k = s->batch; k < s->batch + s->batches; k++)
-    for (*block = 0; *block < PW_BLOCKS; ++*block)
-      if (*block != PW_JTL_Q && pw_block_function (k->kind, (pw_block)*block) == pw_by_differences && i-- == 0)
-        return k;
-  return NULL;
+    for (int block = 0; block < PW_BLOCKS; block++)
+      if (block != PW_JTL_Q && pw_block_function (k->kind, (pw_block)block) == pw_by_differences && i-- == 0)
+        return differences_name (k->kind, block, buffer, size);
+  return pw_print (buffer, size, "%s", "");
 }
 
 int pw_system_differences (const pw_system *s) {
-  int block, count = 0;
-  while (differences_find (s, count, &block)) count++;
+  int count = 0;
+  while (*PW_NAME (pw_system_difference_name, s, count)) count++;
   return count;
 }
 
-char *pw_system_difference_name (const pw_system *s, int i, char *buffer, size_t size) {
-  int block;
-  const pw_element_batch *k = differences_find (s, i, &block);
-  if (size > 0) buffer[0] = 0;
-  if (k) snprintf (buffer, size, "%s of element type %s", differences_name[block], k->kind->name);
-  return buffer;
-}
-
-/* ---- Missing blocks ---- */
-
-/* Tests each block of the first, the last and a middle element of the batch: 1 if one is missing, with its name. */
-static int differences_test (const pw_workspace *w, pw_element_batch *k, char *buffer, size_t size) {
-  const int element[] = { 0, k->b.count - 1, k->b.count / 2 };
-  for (int block = 0; block < PW_BLOCKS; block++)
-    for (int i = 0; i < 3 && k->b.count > 0; i++) {
-      if (!pw_block_missing (w, k, element[i], (pw_block)block)) continue;
-      snprintf (buffer, size, "%s of element type %s", differences_name[block], k->kind->name);
-      return 1;
-    }
-  return 0;
-}
-
-/* Searches a batch, with random k->b.w, multipliers and signals.  Returns as pw_find_missing_block. */
+/* Searches the first, the last and a middle element of a batch, with random k->b.w, multipliers and signals.  Returns
+ * as pw_find_missing_block. */
 static int differences_search (pw_workspace *w, pw_element_batch *k, pw_random *random, char *buffer, size_t size) {
-  int cols = k->b.count * k->b.cols, rows = k->b.count * k->kind->rows;
+  const int element[] = { 0, k->b.count - 1, k->b.count / 2 };
+  int cols = k->b.count * k->b.cols, rows = k->b.count * k->kind->rows, found = 0;
   double *x = malloc (((size_t)cols + (size_t)rows + 1) * sizeof *x);
   if (x == NULL) return PW_RESOURCE;
   for (int i = 0; i < cols + rows; i++) x[i] = pw_random_between (random, -1, 1);
-  for (int i = 0; i < 3 * k->b.count * k->kind->signals; i++) k->u[i] = pw_random_between (random, -1, 1);
+  for (int i = 0; i < 3 * k->b.count * k->kind->signals; i++) k->source->u[i] = pw_random_between (random, -1, 1);
   k->b.w = x, k->b.lambda = x + cols;
-  int found = differences_test (w, k, buffer, size);
+  for (int i = 0; i < 3 * PW_BLOCKS && k->b.count > 0 && !found; i++) {
+    found = pw_block_missing (w, k, element[i % 3], (pw_block)(i / 3));
+    if (found) differences_name (k->kind, i / 3, buffer, size);
+  }
   k->b.w = k->b.lambda = NULL;
   free (x);
   return found;

@@ -34,7 +34,6 @@ static const double *verify_evaluate (const pw_element_batch *k, pw_batch_functi
   return out;
 }
 
-/* Adds J v, J a and J^T lambda of a batch. */
 static void verify_products (verified_scene *scene, const pw_element_batch *k, const double *v, const double *a,
                              const double *lambda) {
   int rows = k->kind->rows, cols = k->b.cols;

@@ -13,12 +13,18 @@ enum { COMPILE_GUARD = 64, COMPILE_MARK = 0xa5 };
 /* The most elements, coordinates, constraint equations: products with columns and signals of an element must be int. */
 enum { COMPILE_MOST = INT_MAX / 64 };
 
+/* What an element of a system is compiled from. */
+typedef struct {
+  const pw_element *element; /* of the model */
+  int body;                  /* the body on which an element that acts on every body acts, or -1 */
+} compiled;
+
 typedef struct {
   const pw_model *m;
   pw_system *s;
   pw_error *error;
-  pw_names name;     /* of bodies: their indices; of elements: theirs plus the number of bodies */
-  pw_compiled *list; /* what each element of the system is compiled from, batch by batch */
+  pw_names name;  /* of bodies: their indices; of elements: theirs plus the number of bodies */
+  compiled *list; /* what each element of the system is compiled from, batch by batch */
   int listed;
   size_t list_room; /* entries allocated */
 } compilation;
@@ -31,7 +37,6 @@ static int compile_too_large (const compilation *job) {
   return pw_fail (job->error, PW_INPUT, "model %s is too large", job->m->name);
 }
 
-/* Memory that belongs to the system.  NULL and the error if out of memory. */
 static void *compile_alloc (const compilation *job, size_t count, size_t size) {
   void *p = pw_arena_alloc (&job->s->arena, count * size);
   if (p == NULL) compile_no_memory (job);
@@ -75,7 +80,7 @@ static int compile_list (compilation *job, const pw_element *first, pw_element_b
       if (job->listed == COMPILE_MOST) return compile_too_large (job);
       if (pw_grow (&job->list, (size_t)job->listed, &job->list_room, sizeof *job->list) != PW_OK)
         return compile_no_memory (job);
-      job->list[job->listed++] = (pw_compiled){ from, b };
+      job->list[job->listed++] = (compiled){ from, b };
       k->b.count++;
     }
   return PW_OK;
@@ -103,7 +108,7 @@ static int compile_types (compilation *job) {
   return PW_OK;
 }
 
-static int compile_count (const compilation *job) {
+static int compile_sizes (const compilation *job) {
   const pw_model *m = job->m;
   pw_system *s = job->s;
   if (m->bodies == 0) return pw_fail (job->error, PW_INPUT, "model %s has no body", m->name);
@@ -127,11 +132,7 @@ static int compile_count (const compilation *job) {
     s->forces += kind->force && !kind->constant;
     s->saturates |= kind->saturation != NULL;
   }
-  return s->coords > COMPILE_MOST || s->rows > COMPILE_MOST ? compile_too_large (job) : PW_OK;
-}
-
-static int compile_arrays (const compilation *job) {
-  pw_system *s = job->s;
+  if (s->coords > COMPILE_MOST || s->rows > COMPILE_MOST) return compile_too_large (job);
   size_t coords = (size_t)s->coords, bodies = (size_t)s->bodies;
   s->source = compile_alloc (job, (size_t)s->sources, sizeof *s->source);
   s->body_name = compile_alloc (job, bodies, sizeof *s->body_name);
@@ -191,9 +192,8 @@ static int compile_prepare (const compilation *job, const pw_element *from, cons
   return PW_OK;
 }
 
-/* Stores element e of a batch: name, bodies, columns, prepared element, internal coordinates. */
-static int compile_element (const compilation *job, const pw_element_batch *k, int e, const pw_compiled *from,
-                            int *body, unsigned char *element) {
+static int compile_element (const compilation *job, const pw_element_batch *k, int e, const compiled *from, int *body,
+                            unsigned char *element) {
   static const pw_body ground = { .name = "ground" };
   const pw_kind *kind = k->kind;
   pw_system *s = job->s;
@@ -229,7 +229,7 @@ static int compile_element (const compilation *job, const pw_element_batch *k, i
 
 static int compile_batches (const compilation *job) {
   pw_source *source = job->s->source;
-  const pw_compiled *from = job->list;
+  const compiled *from = job->list;
   int status = PW_OK;
   for (pw_element_batch *k = job->s->batch; k < job->s->batch + job->s->batches && status == PW_OK; k++) {
     size_t n = (size_t)k->b.count, size = k->kind->element, bodies = (size_t)k->kind->bodies;
@@ -248,7 +248,72 @@ static int compile_batches (const compilation *job) {
   return status;
 }
 
-/* ---- Initial values, scales ---- */
+/* ---- Signals ---- */
+
+static int compile_table (const compilation *job, pw_source *source, const char *element) {
+  pw_points *table = &source->signal.table;
+  size_t n = (size_t)table->count;
+  double *t = compile_alloc (job, 4 * n, sizeof *t), *value = t + n;
+  if (t == NULL) return PW_RESOURCE;
+  memcpy (t, table->t, n * sizeof *t);
+  for (size_t i = 0; i < n; i++) value[i] = pw_table_value (&source->signal, (int)i);
+  table->t = t, table->value = value;
+  table->scale = 1, table->offset = 0;
+  source->spline = value + n;
+  pw_table_spline (&source->signal, source->spline);
+  for (size_t i = 0; i < 2 * n; i++)
+    if (!isfinite (source->spline[i]))
+      return pw_fail (job->error, PW_INPUT,
+                      "model %s: element %s: the derivatives of the table are not finite at t = %g s", job->m->name,
+                      element, t[i % n]);
+  return PW_OK;
+}
+
+static int compile_reads (const compilation *job, pw_source *source, const char *element) {
+  const char *const *reads = source->signal.function.reads;
+  pw_system *s = job->s;
+  while (reads && reads[source->reads]) source->reads++;
+  int *state = compile_alloc (job, (size_t)source->reads, sizeof *state);
+  source->state = state;
+  if (state == NULL) return PW_RESOURCE;
+  for (int i = 0; i < source->reads; i++) {
+    pw_error cause = { 0 };
+    state[i] = pw_system_find_state (s, reads[i], &cause);
+    if (state[i] < 0)
+      return pw_fail (job->error, PW_INPUT, "model %s: element %s reads a state: %s", s->model, element, cause.text);
+  }
+  s->reads += source->reads;
+  s->state_dependent += source->reads > 0;
+  return PW_OK;
+}
+
+static int compile_signal (const compilation *job, pw_source *source, const pw_signal *signal, const char *element) {
+  const pw_function *opens = signal->type == PW_FUNCTION && signal->function.open ? &signal->function : NULL;
+  void *context = opens ? opens->open (opens->context) : NULL;
+  if (opens && context == NULL) return compile_no_memory (job);
+  source->signal = *signal;
+  if (context) source->signal.function.context = context;
+  if (signal->type == PW_TABLE) return compile_table (job, source, element);
+  return signal->type == PW_FUNCTION ? compile_reads (job, source, element) : PW_OK;
+}
+
+/* After all elements are stored, because signals may read their internal coordinates. */
+static int compile_signals (const compilation *job) {
+  pw_system *s = job->s;
+  const compiled *from = job->list;
+  pw_source *source = s->source;
+  for (const pw_element_batch *k = s->batch; k < s->batch + s->batches; k++)
+    for (int e = 0; e < k->b.count; e++, from++)
+      for (int u = 0; u < k->kind->signals; u++, source++) {
+        source->of_force = pw_kind_signals_force (k->kind);
+        const pw_signal *signal = pw_field_at (k->kind, from->element->definition, PW_SIGNAL, u);
+        int status = compile_signal (job, source, signal, k->name[e]);
+        if (status != PW_OK) return status;
+      }
+  return PW_OK;
+}
+
+/* ---- Initial values, scales, ledger ---- */
 
 /* Values of pw_model_set_initial. */
 static int compile_initial (const compilation *job) {
@@ -280,7 +345,6 @@ static double compile_length (const compilation *job) {
   return L > 0 ? L : 1;
 }
 
-/* Finds the elements that depend on angles of bodies without inertia. */
 static int compile_angle_users (const compilation *job) {
   pw_system *s = job->s;
   int inertialess = 0, element = 0;
@@ -323,18 +387,41 @@ static void compile_metric (pw_system *s) {
   }
 }
 
-/* Lists the ledger's entries, and evaluates the constant forces. */
-static int compile_totals (const compilation *job) {
+/* 1 if an element may do work: its type has a function `power` or eta.  A position prescribed by constants does no
+ * work. */
+static int compile_has_work (const pw_element_batch *k, int element) {
+  const pw_kind *kind = k->kind;
+  int constants = 0;
+  if (kind->power) return 1;
+  if (kind->rows == 0 || kind->eta == NULL) return 0;
+  for (int u = 0; u < kind->signals; u++)
+    constants += k->source[element * kind->signals + u].signal.type == PW_CONSTANT;
+  return kind->level != PW_HOLONOMIC || constants < kind->signals;
+}
+
+/* Lists the entries of the ledger, at most two for each element. */
+static int compile_ledger (const compilation *job) {
   pw_system *s = job->s;
-  int constant = 0;
   s->entry = compile_alloc (job, 2 * (size_t)job->listed, sizeof *s->entry);
   if (s->entry == NULL) return PW_RESOURCE;
-  s->entries = pw_ledger_list (s, s->entry);
+  for (int i = 0; i < s->batches; i++) {
+    const pw_element_batch *k = &s->batch[i];
+    for (int loss = 0; loss < 2; loss++)
+      for (int e = 0; e < k->b.count; e++)
+        if (loss ? k->kind->loss != NULL : compile_has_work (k, e))
+          s->entry[s->entries++] = (pw_entry){ i, e, loss ? PW_LOSS : PW_WORK };
+  }
+  return PW_OK;
+}
+
+static int compile_constant_forces (const compilation *job) {
+  pw_system *s = job->s;
+  int constant = 0;
   for (int i = 0; i < s->batches; i++) constant |= s->batch[i].kind->constant;
   if (!constant) return PW_OK;
   pw_workspace *w = pw_workspace_new (s, job->error);
   if (w == NULL) return PW_RESOURCE;
-  pw_evaluate_constant (w, s->constant);
+  pw_add_forces (w, 1, s->constant);
   pw_workspace_free (w);
   return PW_OK;
 }
@@ -343,18 +430,17 @@ static int compile_all (compilation *job) {
   int status = compile_names (job);
   if (status == PW_OK) status = pw_check_model (job->m, &job->name, job->error);
   if (status == PW_OK) status = compile_types (job);
-  if (status == PW_OK) status = compile_count (job);
-  if (status == PW_OK) status = compile_arrays (job);
+  if (status == PW_OK) status = compile_sizes (job);
   if (status == PW_OK) status = compile_bodies (job);
   if (status == PW_OK) status = compile_batches (job);
-  if (status == PW_OK) status = pw_compile_signals (job->s, job->list, job->error);
+  if (status == PW_OK) status = compile_signals (job);
   if (status == PW_OK) status = compile_initial (job);
   if (status != PW_OK) return status;
   job->s->scale = (pw_scale){ compile_length (job), 1 };
   status = compile_angle_users (job);
-  if (status != PW_OK) return status;
-  compile_metric (job->s);
-  return compile_totals (job);
+  if (status == PW_OK) compile_metric (job->s);
+  if (status == PW_OK) status = compile_ledger (job);
+  return status == PW_OK ? compile_constant_forces (job) : status;
 }
 
 pw_system *pw_system_compile (const pw_model *m, pw_error *error) {
@@ -380,70 +466,4 @@ void pw_system_free (pw_system *s) {
   pw_arena_free (&s->arena);
   free (s->batch);
   free (s);
-}
-
-/* Compiles the signals of all elements: their tables, the states that they read, the contexts of functions. */
-
-/* Copies the points of a table and computes its spline. */
-static int signals_table (pw_system *s, pw_source *source, const char *element, pw_error *error) {
-  pw_points *table = &source->signal.table;
-  size_t n = (size_t)table->count;
-  double *t = pw_arena_alloc (&s->arena, 4 * n * sizeof *t), *value = t + n;
-  if (t == NULL) return pw_fail_memory (s, error);
-  memcpy (t, table->t, n * sizeof *t);
-  for (size_t i = 0; i < n; i++) value[i] = pw_table_value (&source->signal, (int)i);
-  table->t = t;
-  table->value = value;
-  table->scale = 1, table->offset = 0;
-  source->spline = value + n;
-  pw_table_spline (&source->signal, source->spline);
-  for (size_t i = 0; i < 2 * n; i++)
-    if (!isfinite (source->spline[i]))
-      return pw_fail (error, PW_INPUT, "model %s: element %s: the derivatives of the table are not finite at t = %g s",
-                      s->model, element, t[i % n]);
-  return PW_OK;
-}
-
-/* Converts the names of the states that a function reads to indices. */
-static int signals_reads (pw_system *s, pw_source *source, const char *element, pw_error *error) {
-  const char *const *reads = source->signal.function.reads;
-  int count = 0;
-  while (reads && reads[count]) count++;
-  int *state = pw_arena_alloc (&s->arena, (size_t)count * sizeof *state);
-  if (state == NULL) return pw_fail_memory (s, error);
-  for (int i = 0; i < count; i++) {
-    pw_error cause = { 0 };
-    state[i] = pw_system_find_state (s, reads[i], &cause);
-    if (state[i] < 0)
-      return pw_fail (error, PW_INPUT, "model %s: element %s reads a state: %s", s->model, element, cause.text);
-  }
-  source->state = state;
-  source->reads = count;
-  s->reads += count;
-  s->state_dependent += count > 0;
-  return PW_OK;
-}
-
-static int signals_source (pw_system *s, pw_source *source, const pw_signal *signal, const char *element,
-                           pw_error *error) {
-  const pw_function *opens = signal->type == PW_FUNCTION && signal->function.open ? &signal->function : NULL;
-  void *context = opens ? opens->open (opens->context) : NULL;
-  if (opens && context == NULL) return pw_fail_memory (s, error);
-  source->signal = *signal;
-  if (context) source->signal.function.context = context;
-  if (signal->type == PW_TABLE) return signals_table (s, source, element, error);
-  return signal->type == PW_FUNCTION ? signals_reads (s, source, element, error) : PW_OK;
-}
-
-int pw_compile_signals (pw_system *s, const pw_compiled *from, pw_error *error) {
-  pw_source *source = s->source;
-  for (const pw_element_batch *k = s->batch; k < s->batch + s->batches; k++)
-    for (int e = 0; e < k->b.count; e++, from++)
-      for (int u = 0; u < k->kind->signals; u++, source++) {
-        source->of_force = pw_kind_signals_force (k->kind);
-        const pw_signal *signal = pw_field_at (k->kind, from->element->definition, PW_SIGNAL, u);
-        int status = signals_source (s, source, signal, k->name[e], error);
-        if (status != PW_OK) return status;
-      }
-  return PW_OK;
 }

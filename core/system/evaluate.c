@@ -1,11 +1,10 @@
-/* Evaluation of all batches, and products with J. */
+/* The workspace of a run: kinematics, evaluation of all batches, products with J, second-order blocks, ledger. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "system.h"
 #include "sine.h"
-#include "signal.h"
 
 void pw_evaluate_J (pw_workspace *w) {
   PW_EACH_CONSTRAINT (k, w) k->kind->J (&k->b, k->J);
@@ -40,8 +39,7 @@ void pw_evaluate_gamma (pw_workspace *w, double *gamma) {
   evaluate_rows (w, offsetof (pw_kind, gamma), w->s->rows, gamma);
 }
 
-/* Adds the forces that are constant, or the others. */
-static void evaluate_add_forces (const pw_workspace *w, int constant, double *f) {
+void pw_add_forces (const pw_workspace *w, int constant, double *f) {
   PW_EACH_BATCH (k, w) {
     if (k->kind->force == NULL || (k->kind->constant != 0) != constant) continue;
     const double *block = k->block;
@@ -61,11 +59,7 @@ static void evaluate_add_forces (const pw_workspace *w, int constant, double *f)
 
 void pw_evaluate_force (pw_workspace *w, double *f) {
   memcpy (f, w->s->constant, (size_t)w->s->coords * sizeof *f);
-  evaluate_add_forces (w, 0, f);
-}
-
-void pw_evaluate_constant (pw_workspace *w, double *f) {
-  evaluate_add_forces (w, 1, f);
+  pw_add_forces (w, 0, f);
 }
 
 double pw_potential (pw_workspace *w) {
@@ -179,7 +173,7 @@ void pw_evaluate_residuals (pw_workspace *w, const unsigned char *enforced, pw_r
   pw_evaluate_velocity_residual (w, enforced, r);
 }
 
-/* Kinematics of a state: configurations of all bodies, signals of all elements. */
+/* ---- Kinematics ---- */
 
 void pw_point_to_internal (pw_workspace *w, const double *q, const double *v) {
   for (pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++) {
@@ -264,7 +258,7 @@ double pw_next_breakpoint (pw_workspace *w, int kinks, double t) {
   return next;
 }
 
-/* Second-order blocks, by formulas or by differences.
+/* ---- Second-order blocks, by formulas or by differences ----
  *
  * Central differences with step h = eps^(1/3) in units of the scene (more for values above 1, see blocks_step):
  * truncation and round-off are both of the order eps^(2/3) (Dennis & Schnabel 1983, section 5.6). */
@@ -277,7 +271,7 @@ static const struct {
   enum { BLOCKS_NONE, BLOCKS_J_W, BLOCKS_JT_LAMBDA } product;
   int velocity; /* 1: derivative with respect to v; 0: to q */
   int square;   /* 1: it has as many rows as local columns; 0: kind->rows */
-} blocks_table[PW_BLOCKS] = {
+} blocks_table[] = {
   [PW_JW_Q] = { BLOCKS_ENTRY (jw_q, J), .product = BLOCKS_J_W },
   [PW_JTL_Q] = { BLOCKS_ENTRY (jw_q, J), .product = BLOCKS_JT_LAMBDA, .square = 1 },
   [PW_ETA_Q] = { BLOCKS_ENTRY (eta_q, eta) },
@@ -285,6 +279,7 @@ static const struct {
   [PW_GAMMA_V] = { BLOCKS_ENTRY (gamma_v, gamma), .velocity = 1 },
   [PW_FORCE_Q] = { BLOCKS_ENTRY (force_q, force), .square = 1 },
   [PW_FORCE_V] = { BLOCKS_ENTRY (force_v, force), .velocity = 1, .square = 1 },
+  [PW_G_Q] = { BLOCKS_ENTRY (J, g) },
 };
 
 pw_batch_function *pw_block_function (const pw_kind *kind, pw_block block) {
@@ -325,7 +320,6 @@ static void blocks_isolate (const pw_element_batch *k, int e, blocks_single *one
   if (k->b.lambda) one->b.lambda = k->b.lambda + e * kind->rows;
 }
 
-/* The coordinate or velocity of local column c. */
 static double *blocks_variable (const pw_kind *kind, blocks_single *one, int c, int velocity) {
   if (c >= 3 * kind->bodies) return (velocity ? one->v : one->q) + c - 3 * kind->bodies;
   pw_configuration *p = &one->configuration[c / 3];
@@ -484,7 +478,7 @@ int pw_evaluate_block (const pw_workspace *w, const pw_element_batch *k, pw_bloc
   return 1;
 }
 
-/* The changes of positions and velocities that reverse saturating forces, such as friction (pw_kind.saturation). */
+/* ---- Changes that reverse saturating forces, such as friction (pw_kind.saturation) ---- */
 
 /* Fills the batch's block, 2 cols per element, if its forces saturate.  Returns the number of entries. */
 static int saturation_fill (const pw_element_batch *k) {
@@ -525,8 +519,6 @@ int pw_find_saturation (pw_workspace *w, double *least, char *element, size_t si
   return found;
 }
 
-/* Finds the element with non-finite values, for error messages. */
-
 int pw_find_nonfinite (pw_workspace *w, char *buffer, size_t size) {
   PW_EACH_BATCH (k, w) {
     const int rows = k->kind->rows, cols = k->b.cols;
@@ -550,31 +542,7 @@ int pw_find_nonfinite (pw_workspace *w, char *buffer, size_t size) {
   return 0;
 }
 
-/* The ledger: which elements do work or dissipate energy, and their power. */
-
-/* 1 if an element may do work: its type has a function `power` or eta.  A position prescribed by constants does no
- * work. */
-static int ledger_has_work (const pw_element_batch *k, int element) {
-  const pw_kind *kind = k->kind;
-  int constants = 0;
-  if (kind->power) return 1;
-  if (kind->rows == 0 || kind->eta == NULL) return 0;
-  for (int u = 0; u < kind->signals; u++)
-    constants += k->source[element * kind->signals + u].signal.type == PW_CONSTANT;
-  return kind->level != PW_HOLONOMIC || constants < kind->signals;
-}
-
-int pw_ledger_list (const pw_system *s, pw_entry *entry) {
-  int count = 0;
-  for (int i = 0; i < s->batches; i++) {
-    const pw_element_batch *k = &s->batch[i];
-    for (int loss = 0; loss < 2; loss++)
-      for (int e = 0; e < k->b.count; e++)
-        if (loss ? k->kind->loss != NULL : ledger_has_work (k, e))
-          entry[count++] = (pw_entry){ i, e, loss ? PW_LOSS : PW_WORK };
-  }
-  return count;
-}
+/* ---- The ledger ---- */
 
 char *pw_system_ledger_name (const pw_system *s, int entry, char *buffer, size_t size) {
   const pw_entry *listed = &s->entry[entry];
@@ -583,32 +551,25 @@ char *pw_system_ledger_name (const pw_system *s, int entry, char *buffer, size_t
 }
 
 void pw_evaluate_ledger (pw_workspace *w, const double *lambda, double *rate) {
-  const pw_element_batch *last = NULL;
-  int type = -1;
+  const pw_entry *last = NULL;
   double *eta = w->scratch;
   for (int i = 0; i < w->s->entries; i++) {
     const pw_entry *entry = &w->s->entry[i];
     pw_element_batch *k = &w->batch[entry->batch];
-    int by_eta = k->kind->rows > 0 && entry->type == PW_WORK && k->kind->power == NULL; /* see the end of the loop */
-    if (k != last || (int)entry->type != type) {
+    pw_batch_function *power = entry->type == PW_WORK ? k->kind->power : k->kind->loss; /* NULL: by eta */
+    if (last == NULL || entry->batch != last->batch || entry->type != last->type) {
       k->b.lambda = lambda + k->row;
-      (by_eta                   ? k->kind->eta
-       : entry->type == PW_WORK ? k->kind->power
-                                : k->kind->loss) (&k->b, by_eta ? eta : k->block);
-      last = k;
-      type = (int)entry->type;
+      (power ? power : k->kind->eta) (&k->b, power ? k->block : eta);
     }
-    if (!by_eta) {
-      rate[i] = k->block[entry->element];
-      continue;
-    }
-    rate[i] = 0; /* the constraint force -J^T lambda has the power -lambda . J v = -lambda . eta */
-    for (int r = 0, n = k->kind->rows; r < n; r++)
+    last = entry;
+    rate[i] = power ? k->block[entry->element] : 0;
+    if (power) continue;
+    for (int r = 0, n = k->kind->rows; r < n; r++) /* the constraint force -J^T lambda has the power -lambda . J v */
       rate[i] -= k->b.lambda[entry->element * n + r] * eta[entry->element * n + r];
   }
 }
 
-/* Workspaces: data that a run modifies. */
+/* ---- Workspaces ---- */
 
 /* Copies batches and signals of the system, with arrays of the workspace; x: for the states that signals read. */
 static void workspace_fill (pw_workspace *w, double *x) {
@@ -620,7 +581,7 @@ static void workspace_fill (pw_workspace *w, double *x) {
     k->J = J, k->block = w->block;
     J += k->b.count * k->kind->rows * k->b.cols;
     k->source = w->source + (k->source - s->source);
-    k->b.u = k->u = w->u + 3 * (k->source - w->source);
+    k->b.u = w->u + 3 * (k->source - w->source);
     k->b.configuration = w->configuration;
     k->b.q = s->q0 + k->internal, k->b.v = s->v0 + k->internal; /* until kinematics are updated */
   }
@@ -633,7 +594,6 @@ static void workspace_fill (pw_workspace *w, double *x) {
   w->configuration[s->bodies].cos = 1;
 }
 
-/* Opens a context of this workspace for each function signal with `open`. */
 static int workspace_open_signals (pw_workspace *w) {
   int status = PW_OK;
   for (pw_source *source = w->source; source < w->source + w->s->sources; source++) {
@@ -686,7 +646,7 @@ void pw_workspace_free (pw_workspace *w) {
   free (w);
 }
 
-/* Elements: their properties, contact points and forces; the equations of motion. */
+/* ---- Elements: properties, contact points and forces; the equations of motion ---- */
 
 int pw_system_elements (const pw_system *s) {
   int count = 0;
@@ -716,8 +676,6 @@ static int elements_update (pw_workspace *w, double t, const double *q, const do
   return pw_update_kinematics (w, t, q, v) == PW_OK ? PW_OK : pw_fail_evaluation (w, t, error);
 }
 
-/* ---- Contact points ---- */
-
 int pw_system_contacts (const pw_system *s) {
   int count = 0;
   for (int i = 0; i < s->batches; i++) count += s->batch[i].kind->contact ? s->batch[i].b.count : 0;
@@ -742,8 +700,6 @@ int pw_workspace_contact_points (pw_workspace *w, double t, const double *q, con
   }
   return PW_OK;
 }
-
-/* ---- Forces ---- */
 
 /* F -= J^T lambda of each element, only the columns of bodies. */
 static void elements_reactions (const pw_element_batch *k, const double *lambda, double *F) {
@@ -782,8 +738,6 @@ int pw_workspace_forces (pw_workspace *w, double t, const double *q, const doubl
   return PW_OK;
 }
 
-/* ---- Equations ---- */
-
 static int elements_allocate (const pw_system *s, pw_equations *out, pw_error *error) {
   size_t n = (size_t)s->coords, rows = (size_t)s->rows;
   double *indices;
@@ -799,7 +753,6 @@ static int elements_allocate (const pw_system *s, pw_equations *out, pw_error *e
   return PW_OK;
 }
 
-/* Stores the entries of J that are not in columns of the ground. */
 static void elements_jacobian (const pw_workspace *w, pw_equations *out) {
   PW_EACH_CONSTRAINT (k, w)
     for (int i = 0; i < k->b.count * k->kind->rows; i++)

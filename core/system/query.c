@@ -66,16 +66,13 @@ static const pw_element_batch *query_find_element (const pw_system *s, size_t me
 char *pw_member_name (const pw_system *s, const pw_element_batch *k, int e, const char *what, char *buffer,
                       size_t size) {
   const char *body = k->kind->each_body ? s->body_name[k->b.body[e]] : "";
-  snprintf (buffer, size, "%s%s%s.%s", k->name[e], *body ? "." : "", body, what);
-  return buffer;
+  return pw_print (buffer, size, "%s%s%s.%s", k->name[e], *body ? "." : "", body, what);
 }
 
 char *pw_system_state_name (const pw_system *s, int state, char *buffer, size_t size) {
   int velocity = state >= s->coords, j = velocity ? state - s->coords : state, e, n;
-  if (j < 3 * s->bodies) {
-    snprintf (buffer, size, "%s.%s", s->body_name[j / 3], query_states[3 * velocity + j % 3]);
-    return buffer;
-  }
+  if (j < 3 * s->bodies)
+    return pw_print (buffer, size, "%s.%s", s->body_name[j / 3], query_states[3 * velocity + j % 3]);
   const pw_element_batch *k = query_find_element (s, offsetof (pw_kind, internal), j - 3 * s->bodies, &e, &n);
   const pw_quantity *x = &k->kind->coordinate[n];
   return pw_member_name (s, k, e, velocity ? x->rate : x->name, buffer, size);
@@ -154,11 +151,9 @@ int pw_system_find_reaction (const pw_system *s, const char *name, pw_error *err
 char *pw_system_row_name (const pw_system *s, int row, char *buffer, size_t size) {
   int e, n;
   const pw_element_batch *k = query_find_element (s, offsetof (pw_kind, rows), row, &e, &n);
-  snprintf (buffer, size, "%s %s", k->kind->name, k->name[e]);
-  return buffer;
+  return pw_print (buffer, size, "%s %s", k->kind->name, k->name[e]);
 }
 
-/* The batch, element and field of a signal, and its index in this field. */
 static const pw_element_batch *query_signal (const pw_system *s, int signal, int *element, const pw_field **field,
                                              int *index) {
   const pw_element_batch *k = query_find_element (s, offsetof (pw_kind, signals), signal, element, index);
@@ -203,8 +198,8 @@ static char *query_signal_label (const pw_system *s, int signal, char *buffer, s
   const pw_field *f;
   char field[80];
   const pw_element_batch *k = query_signal (s, signal, &e, &f, &n);
-  snprintf (buffer, size, "%s %s: %s", k->kind->name, k->name[e], pw_field_value_name (f, n, field, sizeof field));
-  return buffer;
+  return pw_print (buffer, size, "%s %s: %s", k->kind->name, k->name[e],
+                   pw_field_value_name (f, n, field, sizeof field));
 }
 
 /* Which part of a run its table covers; "" if it covers the run, which lasts for a good part of the table. */
@@ -243,8 +238,8 @@ char *pw_system_table_notice (const pw_system *s, int signal, double t_end, char
     snprintf (skipped, sizeof skipped, "%d row%s with empty cells %s left out of the table", table->skipped,
               table->skipped == 1 ? "" : "s", table->skipped == 1 ? "is" : "are");
   if (*coverage || *skipped)
-    snprintf (buffer, size, "%s: %s%s%s", query_signal_label (s, signal, (char[PW_NAME_BYTES]){ 0 }, PW_NAME_BYTES),
-              coverage, *coverage && *skipped ? "; " : "", skipped);
+    snprintf (buffer, size, "%s: %s%s%s", PW_NAME (query_signal_label, s, signal), coverage,
+              *coverage && *skipped ? "; " : "", skipped);
   return buffer;
 }
 

@@ -1,8 +1,8 @@
-/* Signals: values, first two time derivatives and breakpoints of each form; tables are in signal.c. */
+/* Signals: values, first two time derivatives and breakpoints of each form; their fields and checks. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include "signal.h"
+#include "system.h"
 
 /* ---- Ramps, smooth steps, pulses ---- */
 
@@ -23,11 +23,6 @@ static void signal_rise (const pw_signal *s, double t, double u[3]) {
     u[1] = rise * (30 * x * x * (1 - x) * (1 - x)) / T;
     u[2] = rise * (60 * x * (1 - x) * (1 - 2 * x)) / (T * T);
   }
-}
-
-static double signal_rise_breakpoint (const pw_signal *s, double t) {
-  double end = s->ramp.start + s->ramp.duration;
-  return t < s->ramp.start ? s->ramp.start : t < end ? end : INFINITY;
 }
 
 /* The beginning of the period that contains t, and of the next one, for t >= start. */
@@ -61,6 +56,99 @@ static double signal_pulse_breakpoint (const pw_signal *s, double t) {
   signal_pulse_period (s, t, &begin, &next);
   double end = signal_pulse_end (s, begin);
   return t < end ? end : next > t ? next : INFINITY; /* next == t if the period is below the resolution of t */
+}
+
+/* ---- Tables: signals that interpolate points (t_i, y_i) ----
+ *
+ *   u = y_i + b_i x + M_i x^2 / 2 + (M_j - M_i) x^3 / (6 h_i),   x = t - t_i,  j = i + 1,  h_i = t_j - t_i
+ *
+ * between two points; outside, the signal is constant.  b_i and M_i are the first and second derivative just after t_i.
+ * In a cubic table the M_i make the first derivative continuous (de Boor 2001, A Practical Guide to Splines, chapter
+ * IV):
+ *
+ *   h_k M_k + 2 (h_k + h_i) M_i + h_i M_j = 6 ((y_j - y_i) / h_i - (y_i - y_k) / h_k),   k = i - 1
+ *
+ * With free ends the first two intervals share one cubic, and so do the last two ("not a knot"); with ends at rest the
+ * first derivative is 0 at both.  A linear table has M = 0. */
+
+/* Row i of the equations for M: coefficients of M_k, M_i and M_j, and the right-hand side.  At free ends the formula of
+ * table_extrapolate has eliminated M_0 and M_(n-1). */
+static void table_row (const double *t, const double *y, int n, int ends, int i, double row[4]) {
+  double before = i > 0 ? t[i] - t[i - 1] : 0, after = i < n - 1 ? t[i + 1] - t[i] : 0;
+  double slope_before = i > 0 ? (y[i] - y[i - 1]) / before : 0, slope_after = i < n - 1 ? (y[i + 1] - y[i]) / after : 0;
+  row[0] = before;
+  row[1] = 2 * (before + after);
+  row[2] = after;
+  row[3] = 6 * (slope_after - slope_before);
+  if (ends == PW_ENDS_REST) return;
+  if (i == 1) row[1] += before + before * (before / after), row[2] -= before * (before / after);
+  if (i == n - 2) row[1] += after + after * (after / before), row[0] -= after * (after / before);
+}
+
+static double table_extrapolate (double t0, double t1, double t2, double M1, double M2) {
+  return M1 + (M1 - M2) * ((t1 - t0) / (t2 - t1));
+}
+
+/* Solves the tridiagonal equations for M without pivoting; they are diagonally dominant.  `upper`: memory for n
+ * numbers, the upper diagonal after elimination. */
+static void table_second_derivatives (const double *t, const double *y, int n, int ends, double *M, double *upper) {
+  int first = ends == PW_ENDS_REST ? 0 : 1, last = n - 1 - first;
+  double row[4];
+  for (int i = first; i <= last; i++) {
+    table_row (t, y, n, ends, i, row);
+    double pivot = row[1] - (i > first ? row[0] * upper[i - 1] : 0);
+    upper[i] = row[2] / pivot;
+    M[i] = (row[3] - (i > first ? row[0] * M[i - 1] : 0)) / pivot;
+  }
+  for (int i = last - 1; i >= first; i--) M[i] -= upper[i] * M[i + 1];
+  if (ends == PW_ENDS_REST) return;
+  M[0] = table_extrapolate (t[0], t[1], t[2], M[1], M[2]);
+  M[n - 1] = table_extrapolate (t[n - 1], t[n - 2], t[n - 3], M[n - 2], M[n - 3]);
+}
+
+void pw_table_spline (const pw_signal *s, double *spline) {
+  const double *t = s->table.t, *y = s->table.value;
+  int n = s->table.count;
+  double *b = spline, *M = spline + n;
+  memset (spline, 0, 2 * (size_t)n * sizeof *spline);
+  if (s->table.interpolation == PW_CUBIC) table_second_derivatives (t, y, n, s->table.ends, M, b);
+  for (int i = 0; i < n - 1; i++) {
+    double h = t[i + 1] - t[i];
+    b[i] = (y[i + 1] - y[i]) / h - h * (2 * M[i] + M[i + 1]) / 6;
+  }
+}
+
+static int table_passed (const pw_signal *s, double t) {
+  int low = 0, high = s->table.count;
+  while (low < high) {
+    int middle = low + (high - low) / 2;
+    if (s->table.t[middle] <= t)
+      low = middle + 1;
+    else
+      high = middle;
+  }
+  return low;
+}
+
+static void table_eval (const pw_signal *s, const double *spline, double t, double u[3]) {
+  int n = s->table.count, passed = table_passed (s, t), i = passed - 1;
+  u[0] = s->table.value[i < 0 ? 0 : i];
+  u[1] = u[2] = 0;
+  if (passed == 0 || passed == n) return;
+  double x = t - s->table.t[i], b = spline[i], M = spline[n + i];
+  double third_derivative = (spline[n + i + 1] - M) / (s->table.t[i + 1] - s->table.t[i]);
+  u[0] += x * (b + x * (M / 2 + x * (third_derivative / 6)));
+  u[1] = b + x * (M + x * (third_derivative / 2));
+  u[2] = M + x * third_derivative;
+}
+
+/* At each point of a linear table, and at the ends of a cubic one, the first or the second derivative jumps; at the
+ * other points of a cubic table the second derivative has a kink. */
+static double table_breakpoint (const pw_signal *s, int kinks, double t) {
+  int n = s->table.count, next = table_passed (s, t);
+  if (next == n) return INFINITY;
+  int in_spline = s->table.interpolation == PW_CUBIC && next > 0;
+  return s->table.t[in_spline && !kinks ? n - 1 : next];
 }
 
 /* ---- All signals ---- */
@@ -100,7 +188,7 @@ int pw_signal_eval (const pw_source *source, double t) {
   case PW_FUNCTION:
     return signal_function (source, t);
   case PW_TABLE:
-    pw_table_eval (s, source->spline, t, u);
+    table_eval (s, source->spline, t, u);
     break;
   case PW_PULSE:
     signal_pulse (s, t, u);
@@ -114,24 +202,15 @@ int pw_signal_eval (const pw_source *source, double t) {
 }
 
 double pw_signal_breakpoint (const pw_signal *s, int kinks, double t) {
-  switch (s->type) {
-  case PW_CONSTANT:
-  case PW_HARMONIC:
-    break;
-  case PW_RAMP:
-  case PW_SMOOTH_STEP:
-    return signal_rise_breakpoint (s, t);
-  case PW_PULSE:
-    return signal_pulse_breakpoint (s, t);
-  case PW_TABLE:
-    return pw_table_breakpoint (s, kinks, t);
-  case PW_FUNCTION:
-    return s->function.breakpoint ? s->function.breakpoint (s->function.context, t) : INFINITY;
-  }
-  return INFINITY;
+  if (s->type == PW_PULSE) return signal_pulse_breakpoint (s, t);
+  if (s->type == PW_TABLE) return table_breakpoint (s, kinks, t);
+  if (s->type == PW_FUNCTION && s->function.breakpoint) return s->function.breakpoint (s->function.context, t);
+  if (s->type != PW_RAMP && s->type != PW_SMOOTH_STEP) return INFINITY;
+  double end = s->ramp.start + s->ramp.duration;
+  return t < s->ramp.start ? s->ramp.start : t < end ? end : INFINITY;
 }
 
-/* Forms of signals: their fields, and checks of signals. */
+/* ---- Forms of signals ---- */
 
 #define FORM_AT(form, member) .name = #member, .offset = offsetof (pw_signal, form.member)
 
@@ -205,12 +284,6 @@ static void form_check_fields (const pw_signal *s, const pw_signal_form *form, c
   }
 }
 
-static void form_check_pulse (const pw_signal *s, char *text, size_t size) {
-  double width = s->pulse.width, period = s->pulse.period;
-  if (period > 0 && !(width > 0 && width < period))
-    snprintf (text, size, "a pulse every %g s: expected a width > 0 and < %g s, found %g s", period, period, width);
-}
-
 static void form_check_points (const pw_signal *s, int *point, char *text, size_t size) {
   const double *t = s->table.t, *y = s->table.value;
   int cubic = s->table.interpolation == PW_CUBIC, least = cubic && s->table.ends == PW_ENDS_FREE ? 4 : 2;
@@ -262,122 +335,25 @@ static void form_check_continuity (const pw_signal *s, const pw_kind *kind, char
               form);
 }
 
-static void form_check_function (const pw_signal *s, const pw_kind *kind, char *text, size_t size) {
-  if (s->function.eval == NULL)
-    snprintf (text, size, "a function signal without eval");
-  else if (s->function.reads && !pw_kind_signals_force (kind))
-    snprintf (text, size, "a constraint's signal may depend on time only");
-}
-
 char *pw_signal_check (const pw_signal *s, const pw_kind *kind, int *point, char *buffer, size_t size) {
   const pw_signal_form *form = pw_signal_form_of (s);
   *buffer = 0;
   *point = -1;
-  if (s->type == PW_FUNCTION)
-    form_check_function (s, kind, buffer, size);
+  if (s->type == PW_FUNCTION && s->function.eval == NULL)
+    snprintf (buffer, size, "a function signal without eval");
+  else if (s->type == PW_FUNCTION && s->function.reads && !pw_kind_signals_force (kind))
+    snprintf (buffer, size, "a constraint's signal may depend on time only");
   else if (s->type == PW_CONSTANT && !isfinite (s->constant))
     snprintf (buffer, size, "%g: expected a finite number", s->constant);
   else if (form)
     form_check_fields (s, form, buffer, size);
-  else if (s->type != PW_CONSTANT)
+  else if (s->type != PW_CONSTANT && s->type != PW_FUNCTION)
     snprintf (buffer, size, "signal type %d does not exist", (int)s->type);
-  if (!*buffer && s->type == PW_PULSE) form_check_pulse (s, buffer, size);
+  const pw_pulse *p = s->type == PW_PULSE ? &s->pulse : NULL;
+  if (!*buffer && p && p->period > 0 && !(p->width > 0 && p->width < p->period))
+    snprintf (buffer, size, "a pulse every %g s: expected a width > 0 and < %g s, found %g s", p->period, p->period,
+              p->width);
   if (!*buffer && s->type == PW_TABLE) form_check_points (s, point, buffer, size);
   if (!*buffer) form_check_continuity (s, kind, buffer, size);
   return buffer;
-}
-
-/* Tables: signals that interpolate points (t_i, y_i).
- *
- *   u = y_i + b_i x + M_i x^2 / 2 + (M_j - M_i) x^3 / (6 h_i),   x = t - t_i,  j = i + 1,  h_i = t_j - t_i
- *
- * between two points; outside, the signal is constant.  b_i and M_i are the first and second derivative just after t_i.
- * In a cubic table the M_i make the first derivative continuous (de Boor 2001, A Practical Guide to Splines, chapter
- * IV):
- *
- *   h_k M_k + 2 (h_k + h_i) M_i + h_i M_j = 6 ((y_j - y_i) / h_i - (y_i - y_k) / h_k),   k = i - 1
- *
- * With free ends the first two intervals share one cubic, and so do the last two ("not a knot"); with ends at rest the
- * first derivative is 0 at both.  A linear table has M = 0. */
-
-/* Row i of the equations for M: coefficients of M_k, M_i and M_j, and the right-hand side.  At free ends the formula of
- * table_extrapolate has eliminated M_0 and M_(n-1). */
-static void table_row (const double *t, const double *y, int n, int ends, int i, double row[4]) {
-  double before = i > 0 ? t[i] - t[i - 1] : 0, after = i < n - 1 ? t[i + 1] - t[i] : 0;
-  double slope_before = i > 0 ? (y[i] - y[i - 1]) / before : 0, slope_after = i < n - 1 ? (y[i + 1] - y[i]) / after : 0;
-  row[0] = before;
-  row[1] = 2 * (before + after);
-  row[2] = after;
-  row[3] = 6 * (slope_after - slope_before);
-  if (ends == PW_ENDS_REST) return;
-  if (i == 1) row[1] += before + before * (before / after), row[2] -= before * (before / after);
-  if (i == n - 2) row[1] += after + after * (after / before), row[0] -= after * (after / before);
-}
-
-/* M at a free end, extrapolated linearly from the next two points. */
-static double table_extrapolate (double t0, double t1, double t2, double M1, double M2) {
-  return M1 + (M1 - M2) * ((t1 - t0) / (t2 - t1));
-}
-
-/* Solves the tridiagonal equations for M without pivoting; they are diagonally dominant.  `upper`: memory for n
- * numbers, the upper diagonal after elimination. */
-static void table_second_derivatives (const double *t, const double *y, int n, int ends, double *M, double *upper) {
-  int first = ends == PW_ENDS_REST ? 0 : 1, last = n - 1 - first;
-  double row[4];
-  for (int i = first; i <= last; i++) {
-    table_row (t, y, n, ends, i, row);
-    double pivot = row[1] - (i > first ? row[0] * upper[i - 1] : 0);
-    upper[i] = row[2] / pivot;
-    M[i] = (row[3] - (i > first ? row[0] * M[i - 1] : 0)) / pivot;
-  }
-  for (int i = last - 1; i >= first; i--) M[i] -= upper[i] * M[i + 1];
-  if (ends == PW_ENDS_REST) return;
-  M[0] = table_extrapolate (t[0], t[1], t[2], M[1], M[2]);
-  M[n - 1] = table_extrapolate (t[n - 1], t[n - 2], t[n - 3], M[n - 2], M[n - 3]);
-}
-
-void pw_table_spline (const pw_signal *s, double *spline) {
-  const double *t = s->table.t, *y = s->table.value;
-  int n = s->table.count;
-  double *b = spline, *M = spline + n;
-  memset (spline, 0, 2 * (size_t)n * sizeof *spline);
-  if (s->table.interpolation == PW_CUBIC) table_second_derivatives (t, y, n, s->table.ends, M, b);
-  for (int i = 0; i < n - 1; i++) {
-    double h = t[i + 1] - t[i];
-    b[i] = (y[i + 1] - y[i]) / h - h * (2 * M[i] + M[i + 1]) / 6;
-  }
-}
-
-/* Number of points at or before t. */
-static int table_passed (const pw_signal *s, double t) {
-  int low = 0, high = s->table.count;
-  while (low < high) {
-    int middle = low + (high - low) / 2;
-    if (s->table.t[middle] <= t)
-      low = middle + 1;
-    else
-      high = middle;
-  }
-  return low;
-}
-
-void pw_table_eval (const pw_signal *s, const double *spline, double t, double u[3]) {
-  int n = s->table.count, passed = table_passed (s, t), i = passed - 1;
-  u[0] = s->table.value[i < 0 ? 0 : i];
-  u[1] = u[2] = 0;
-  if (passed == 0 || passed == n) return;
-  double x = t - s->table.t[i], b = spline[i], M = spline[n + i];
-  double third_derivative = (spline[n + i + 1] - M) / (s->table.t[i + 1] - s->table.t[i]);
-  u[0] += x * (b + x * (M / 2 + x * (third_derivative / 6)));
-  u[1] = b + x * (M + x * (third_derivative / 2));
-  u[2] = M + x * third_derivative;
-}
-
-/* At each point of a linear table, and at the ends of a cubic one, the first or the second derivative jumps; at the
- * other points of a cubic table the second derivative has a kink. */
-double pw_table_breakpoint (const pw_signal *s, int kinks, double t) {
-  int n = s->table.count, next = table_passed (s, t);
-  if (next == n) return INFINITY;
-  int in_spline = s->table.interpolation == PW_CUBIC && next > 0;
-  return s->table.t[in_spline && !kinks ? n - 1 : next];
 }

@@ -8,10 +8,20 @@
 
 #include "run.h"
 #include "model.h"
-#include "signal.h"
+
+/* A signal of one element, and the states it reads. */
+typedef struct {
+  pw_signal signal;
+  int reads;        /* number of states a function signal reads */
+  const int *state; /* their indices: coordinate j, or coordinates + j for a velocity */
+  double *x;        /* 2 reads: values of these states, then the gradient */
+  double *spline;   /* of a table: see pw_table_spline */
+  double *u;        /* 3: receives value, first and second time derivative; x, u: NULL except in a workspace */
+  int of_force;     /* 1: belongs to a force, which needs no derivatives */
+} pw_source;
 
 /* One element type in use: its batch, and the indices of its constraint equations and coordinates.  What a run modifies
- * (J, block, u, and q, v, u, w, lambda and the configurations of b) is NULL in a system: workspaces have it. */
+ * (J, block, and q, v, u, w, lambda and the configurations of b) is NULL in a system: workspaces have it. */
 typedef struct {
   pw_batch b; /* the argument of the type's functions */
   const pw_kind *kind;
@@ -21,7 +31,6 @@ typedef struct {
   const char **name; /* count */
   double *J;         /* count x rows x cols */
   double *block;     /* pw_workspace.block: scratch for forces, energies, powers, saturation; all batches share it */
-  double *u;         /* count x signals x 3, as b.u */
   pw_source *source; /* count x signals, part of the array of all sources */
 } pw_element_batch;
 
@@ -74,19 +83,6 @@ struct pw_workspace {
   const pw_source *failed;         /* the last signal that failed, or NULL */
 };
 
-/* Stores the entries of the ledger, at most two for each element.  Returns their number.  Signals must be compiled. */
-int pw_ledger_list (const pw_system *s, pw_entry *entry);
-
-/* What an element of a system is compiled from. */
-typedef struct {
-  const pw_element *element; /* of the model */
-  int body;                  /* the body on which an element that acts on every body acts, or -1 */
-} pw_compiled;
-
-/* Compiles the signals of all elements, which must be stored, because signals may read their internal coordinates.
- * from: for each element of the system.  PW_INPUT, PW_RESOURCE. */
-int pw_compile_signals (pw_system *s, const pw_compiled *from, pw_error *error);
-
 static inline int pw_fail_memory (const pw_system *s, pw_error *error) {
   return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
 }
@@ -132,6 +128,33 @@ static inline double pw_larger (double a, double b) {
   return a > b ? a : b;
 }
 
+/* ---- Signals ---- */
+
+/* Stores value, first and second time derivative at time t in source->u; of a force's signal the derivatives are
+ * meaningless.  source->x: the states that a function reads.  Returns non-zero if the user's function does so or
+ * computes values that are not finite. */
+int pw_signal_eval (const pw_source *source, double t);
+
+/* The first time after t at which the signal, its first or its second derivative jumps, or a smooth-step starts or
+ * ends, so that a step must end there; INFINITY if there is none.  kinks: 1: also where the second derivative has a
+ * kink, at the points of a cubic table.  Of a function signal, what its breakpoint function returns. */
+double pw_signal_breakpoint (const pw_signal *s, int kinks, double t);
+
+/* 1 if the value may jump: that of a pulse; that of a function, of which this is not known. */
+static inline int pw_signal_value_may_jump (const pw_signal *s) {
+  return s->type == PW_PULSE || s->type == PW_FUNCTION;
+}
+
+/* The signal at point i of a table. */
+static inline double pw_table_value (const pw_signal *s, int i) {
+  double scale = s->table.scale == 0 ? 1 : s->table.scale;
+  return s->table.offset + scale * s->table.value[i];
+}
+
+/* Computes the spline of a checked table, 2 count numbers: the first derivative just after each point (after the last
+ * one meaningless), then the second derivatives.  Ignores scale and offset, which compilation has applied. */
+void pw_table_spline (const pw_signal *s, double *spline);
+
 /* ---- Kinematics: configurations and signals at (t, q, v), which all evaluations below use ---- */
 
 /* The workspace refers to the internal coordinates in q and v from now on.  Returns PW_METHOD if a signal fails. */
@@ -157,8 +180,8 @@ void pw_evaluate_g (pw_workspace *w, double *g);         /* holonomic */
 void pw_evaluate_g_size (pw_workspace *w, double *size); /* holonomic, in units of g; at least L, for angles L rad */
 void pw_evaluate_eta (pw_workspace *w, double *eta);
 void pw_evaluate_gamma (pw_workspace *w, double *gamma);
-void pw_evaluate_force (pw_workspace *w, double *f);    /* constant forces included */
-void pw_evaluate_constant (pw_workspace *w, double *f); /* adds the constant forces, for compilation */
+void pw_evaluate_force (pw_workspace *w, double *f);                 /* constant forces included */
+void pw_add_forces (const pw_workspace *w, int constant, double *f); /* adds those that are constant, or the others */
 /* 2 coords: the smallest change of each state that reverses a saturating force or changes it by its own magnitude;
  * INFINITY if there is none. */
 void pw_evaluate_saturation (pw_workspace *w, double *least);
@@ -210,6 +233,7 @@ static inline pw_batch_function *pw_kind_function (const pw_kind *kind, size_t o
 /* Second-order blocks: the terms of exact Newton matrices other than M, J and J^T.  JW_Q: d(J w)/dq; JTL_Q: d(J^T
  * lambda)/dq; ETA_Q: d eta/dq; ... */
 typedef enum { PW_JW_Q, PW_JTL_Q, PW_ETA_Q, PW_GAMMA_Q, PW_GAMMA_V, PW_FORCE_Q, PW_FORCE_V, PW_BLOCKS } pw_block;
+#define PW_G_Q PW_BLOCKS /* dg/dq, which is J of holonomic constraint equations; for the self-tests alone */
 
 /* The type's function for a block (PW_JTL_Q: its jw_q): NULL if identically zero, or pw_by_differences. */
 pw_batch_function *pw_block_function (const pw_kind *kind, pw_block block);

@@ -4,7 +4,7 @@
 #include <math.h>
 #include "check.h"
 #include "scene.h"
-#include "signal.h"
+#include "system.h"
 #include "trial.h"
 
 /* ---- Shapes ---- */

@@ -3,7 +3,6 @@
 #include <string.h>
 #include "check.h"
 #include "scene.h"
-#include "signal.h"
 #include "system.h"
 #include "toys.h"
 #include "trial.h"
