@@ -120,14 +120,6 @@ typedef struct {
   int known;          /* 1: `folder` was found */
 } location_use;
 
-/* Ignores files that cannot be located, since opening them reports it. */
-static void location_use_find (location_use *u, const pw_use *use) {
-  char folder[PW_PATH];
-  u->use = use;
-  if (use->path == NULL || locate (&u->at, use->path) != 0) return;
-  u->known = stat (pw_folder_of (folder, u->at.path), &u->folder) == 0;
-}
-
 /* The length of the first `size` bytes of a name without one of the endings; `size` if they have none of these. */
 static size_t location_without (const char *name, size_t size, const char *const *ending) {
   for (; *ending; ending++) {
@@ -169,7 +161,12 @@ static int location_fail (const pw_use *a, const pw_use *b, pw_error *error) {
 int pw_check_paths (const pw_use *use, int count, pw_error *error) {
   location_use *u = calloc ((size_t)count, sizeof *u);
   int status = u ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
-  for (int i = 0; i < count && u; i++) location_use_find (u + i, use + i);
+  for (int i = 0; i < count && u; i++) {
+    char folder[PW_PATH];
+    u[i].use = use + i;
+    if (use[i].path == NULL || locate (&u[i].at, use[i].path) != 0) continue; /* opening it reports the reason */
+    u[i].known = stat (pw_folder_of (folder, u[i].at.path), &u[i].folder) == 0;
+  }
   for (int i = 0; i < count && status == PW_OK; i++)
     for (int k = 0; k < count && status == PW_OK; k++)
       if (i != k && location_conflicts (u + i, u + k)) status = location_fail (u[i].use, u[k].use, error);
@@ -295,7 +292,7 @@ static int output_fail_with_part (const pw_output *o, int code, pw_error *error)
 
 /* ---- Opening ---- */
 
-/* Makes a stream of a descriptor, which may be -1.  0 or an errno value. */
+/* Makes a stream of a descriptor, which may be -1.  Like the functions below, returns 0 or an errno value. */
 static int output_stream_of (pw_output *o, int file, const char *mode) {
   o->stream = file < 0 ? NULL : fdopen (file, mode);
   if (o->stream) return 0;
@@ -556,8 +553,7 @@ int pw_output_continued (const pw_output *o) {
 
 int pw_output_mark (pw_output *o, pw_mark *mark, pw_error *error) {
   if (*o->part == 0)
-    return pw_fail (error, PW_INPUT, "%s cannot be continued: it is not a regular file",
-                    o->stream == stdout ? "standard output" : o->path);
+    return pw_fail (error, PW_INPUT, "%s cannot be continued: it is not a regular file", output_shown (o));
   int code = output_sync (o);
   if (code) return output_fail (o, code, error);
   mark->length = (unsigned long long)ftello (o->stream);

@@ -19,7 +19,6 @@ enum { PW_PATH = PATH_MAX + 1 };
 typedef struct pw_yaml pw_yaml;
 pw_yaml *pw_yaml_open (const char *path, const char *shown, size_t max_bytes, pw_error *error);
 void pw_yaml_close (pw_yaml *y);
-const pw_plugin_table *pw_yaml_table (const pw_yaml *y);
 /* Writes the text, as read but for a byte order mark. */
 void pw_yaml_write_source (const pw_yaml *y, FILE *f);
 /* Writes the tree as bytes, for programs without libfyaml (yaml_text.c). */

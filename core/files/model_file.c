@@ -14,7 +14,7 @@
 #include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
-#include "files.h"
+#include "yaml.h"
 
 #define PAGE_TOOLS "clang, lld, wasi-libc and libclang-rt-14-dev-wasm32 (make deps TOOLS=page)"
 
@@ -25,10 +25,10 @@ static int ends_with (const char *name, const char *ending) {
 
 /* ---- The search path ----
  *
- * Models are in the folders of PINWHEEL_MODELS, then in those of the running program and of this library.  Folders next
- * to the program, or one level up (tests), serve the build tree; ../lib and ../include serve an installation; the folder
- * of the library serves programs installed elsewhere.  The order of the folders decides only about headers and pages, of
- * which the first is taken: a name that two models have is refused. */
+ * Models are in the folders of PINWHEEL_MODELS, then in those of the running program and of this library.  Folders
+ * next to the program, or one level up (tests), serve the build tree; ../lib and ../include serve an installation; the
+ * folder of the library serves programs installed elsewhere.  The order of the folders decides only about headers and
+ * pages, of which the first is taken: a name that two models have is refused. */
 
 static int search_no_memory (pw_error *error) {
   return pw_fail (error, PW_RESOURCE, "out of memory while looking for models");
@@ -119,7 +119,7 @@ static int search_folder (search *s, const char *folder, pw_error *error) {
   if (used + strlen (real) + 2 <= sizeof s->folders && strstr (listed, PW_PRINTED (PW_PATH + 2, ":%s:", real)) == NULL)
     sprintf (s->folders + used, "%s%s", used ? ":" : "", real);
   DIR *dir = opendir (folder);
-  if (dir == NULL && (errno == ENOMEM || errno == EMFILE || errno == ENFILE))
+  if (dir == NULL && pw_open_input_status () == PW_RESOURCE)
     return pw_fail (error, PW_RESOURCE, "cannot look into the folder %s: %s", folder, strerror (errno));
   if (dir == NULL) return PW_OK;
   int status = PW_OK;
@@ -387,7 +387,7 @@ static int model_open_path (pw_file *f, const char *shown, size_t max_bytes, pw_
   pw_path (f->name, "%.*s", (int)(strlen (base) - strlen (model_endings[ending])), base);
   if (ending == MODEL_YAML) {
     f->yaml = pw_yaml_open (f->path, shown, max_bytes, error);
-    if (f->yaml) f->table = pw_yaml_table (f->yaml);
+    if (f->yaml) f->table = &f->yaml->table;
     return f->yaml ? PW_OK : error->status;
   }
   return ending == MODEL_C ? build_file (f->path, NULL, model_load, f, error) : model_load (f, f->path, error);
@@ -662,8 +662,8 @@ static const char *const *code_options (int lanes) {
 
 /* ---- The cache ----
  *
- * A folder below XDG_CACHE_HOME or ~/.cache whose files may be deleted at any time.  Objects in it are executed, so it is
- * used only if nobody else can write to it. */
+ * A folder below XDG_CACHE_HOME or ~/.cache whose files may be deleted at any time.  Objects in it are executed, so it
+ * is used only if nobody else can write to it. */
 
 enum { CACHE_MAX_BYTES = 64 << 20 };
 
@@ -684,17 +684,15 @@ static void cache_make (char *path) {
   mkdir (path, 0700);
 }
 
-typedef enum { CACHE_PARENT, CACHE_FOLDER } cache_role;
-
 /* Why a folder cannot be used, or NULL: others can write to it or, if it is the parent, replace what it contains. */
-static const char *cache_defect (const char *path, cache_role role) {
+static const char *cache_defect (const char *path, int is_parent) {
   struct stat info;
-  if ((role == CACHE_FOLDER ? lstat : stat) (path, &info) != 0) return strerror (errno);
-  int by_root = role == CACHE_PARENT && info.st_uid == 0, sticky = role == CACHE_PARENT && info.st_mode & S_ISVTX;
+  if ((is_parent ? stat : lstat) (path, &info) != 0) return strerror (errno);
+  int by_root = is_parent && info.st_uid == 0, sticky = is_parent && info.st_mode & S_ISVTX;
   if (!S_ISDIR (info.st_mode)) return "it is not a folder";
   if (info.st_uid != geteuid () && !by_root) return "it belongs to another user";
   if (info.st_mode & 022 && !sticky) return "others can write to it";
-  return role == CACHE_FOLDER && access (path, R_OK | W_OK | X_OK) != 0 ? strerror (errno) : NULL;
+  return !is_parent && access (path, R_OK | W_OK | X_OK) != 0 ? strerror (errno) : NULL;
 }
 
 /* Stores the path of the cache's folder, which is created if it does not exist; 0 if there is none, with a notice in
@@ -703,8 +701,8 @@ static int cache_folder (char path[PW_PATH], char *notice, size_t size) {
   char parent[PW_PATH];
   if (cache_parent (parent) == NULL) return 0;
   cache_make (pw_path (path, "%s/pinwheel", parent));
-  const char *faulty = parent, *defect = cache_defect (parent, CACHE_PARENT);
-  if (defect == NULL) defect = cache_defect (faulty = path, CACHE_FOLDER);
+  const char *faulty = parent, *defect = cache_defect (parent, 1);
+  if (defect == NULL) defect = cache_defect (faulty = path, 0);
   if (defect) snprintf (notice, size, "the cache %s is not used: %s", faulty, defect);
   return defect == NULL;
 }
@@ -902,18 +900,12 @@ static int code_compile (code_job *x, int file, pw_error *error) {
   return status;
 }
 
-/* Creates and locks KEY.c, waiting while another process compiles it.  -1 after a minute, or if that fails. */
-static int code_lock (const code_job *x) {
+/* Compiles in the folder, unless another process has done so meanwhile. */
+static int code_make (code_job *x, pw_error *error) {
   const struct timespec pause = { .tv_nsec = 20000000 };
   int file, waits = 0;
   while ((file = pw_lock_file (x->c_file, PW_LOCK_NEW)) < 0 && errno == EWOULDBLOCK && waits++ < CODE_MAX_WAITS)
     nanosleep (&pause, NULL);
-  return file;
-}
-
-/* Compiles in the folder, unless another process has done so meanwhile. */
-static int code_make (code_job *x, pw_error *error) {
-  int file = code_lock (x);
   if (file < 0) return pw_fail (error, PW_RESOURCE, "cannot write into %s", x->folder);
   int status = code_load_cached (x);
   if (status == PW_OK)

@@ -176,14 +176,9 @@ static void parser_push (parser *p, int op, int index, double value) {
     p->code[p->codes++] = (pw_expression_code){ (short)op, (short)index, value };
 }
 
-/* The part that begins with the current token. */
-static parser_part parser_begin (const parser *p) {
-  return (parser_part){ .from = p->at, .first = p->codes };
-}
-
 /* A constant or variable, the current token. */
 static parser_part parser_leaf (parser *p, int op, int index, double value) {
-  parser_part part = parser_begin (p);
+  parser_part part = { .from = p->at, .first = p->codes };
   if (op == PW_OP_VARIABLE) part.depends = index == PW_EXPRESSION_TIME ? DEPENDS_ON_TIME : DEPENDS_ON_STATES;
   parser_push (p, op, index, value);
   parser_next (p);
@@ -280,7 +275,7 @@ static parser_part parser_name (parser *p, const char *name, const pw_expression
 /* min and max combine more than two arguments pairwise. */
 static parser_part parser_call (parser *p, int index) {
   const pw_expression_function *f = &pw_expression_functions[index];
-  parser_part part = parser_begin (p);
+  parser_part part = { .from = p->at, .first = p->codes };
   int arguments = 0;
   parser_next (p);
   size_t open = p->at;
@@ -338,7 +333,7 @@ static parser_part parser_operand (parser *p) {
 /* ---- Operators ---- */
 
 static parser_part parser_unary (parser *p) {
-  parser_part part = parser_begin (p);
+  parser_part part = { .from = p->at, .first = p->codes };
   int op = p->symbol ? p->symbol->op : 0;
   int sign = op == PW_OP_ADD || op == PW_OP_SUBTRACT;
   if (!sign) part = parser_operand (p);
@@ -416,6 +411,7 @@ int pw_expression_read (const pw_scope *s, const char *const *variable, const ch
 
 int pw_expression_constant (const pw_scope *s, const char *text, double *value, pw_expression_error *error) {
   parser p;
+  if (pw_expression_number (text, value)) return PW_OK;
   if (parser_read (&p, s, NULL, text, error) == PW_OK) *value = p.code[0].value;
   return p.status;
 }

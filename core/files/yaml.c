@@ -1,6 +1,6 @@
-/* Text models, read from the tree of a file: keys and numbers; signals; bodies and elements, through the field tables of
- * their types; the head, parameters and default run settings, which is stored in a plug-in's table, so that text models
- * can be used like compiled ones.
+/* Reads text models from the tree of a file: keys and numbers; signals; bodies and elements, through the field tables
+ * of their types; the head, parameters and default run settings, which is stored in a plug-in's table, so that text
+ * models can be used like compiled ones.
  *
  * After an error, functions with the same reader return its status, and only the first error is recorded: a sequence of
  * calls needs one check.  `label` ("torque T: value") begins their messages.  A NULL node is absent. */
@@ -89,8 +89,8 @@ static int read_key (const reader *r, const pw_node *node, const char *const *ke
   return read_fail (r, node->at, "%s has no \"%.60s\"%s", owner, node->text, *hint ? hint : pw_nearest_text (&near));
 }
 
-/* Finds known keys (ending with NULL) in the pairs from a node on: value[i] becomes the value of key[i], or NULL.  Other
- * keys, repeated keys and empty values are refused; `owner` ("a body") is for messages. */
+/* Finds known keys (ending with NULL) in the pairs from a node on: value[i] becomes the value of key[i], or NULL.
+ * Other keys, repeated keys and empty values are refused; `owner` ("a body") is for messages. */
 static int read_keys_from (const reader *r, const pw_node *first, const char *const *key, const char *owner,
                            const pw_node **value) {
   for (int i = 0; key[i]; i++) value[i] = NULL;
@@ -157,8 +157,7 @@ static int read_number (const reader *r, const pw_node *node, const char *label,
   if (node == NULL || r->error->status != PW_OK) return r->error->status;
   if (node->type != PW_YAML_SCALAR)
     return read_fail (r, node->at, "%s: expected a number, found %s", label, node_found (node));
-  int status =
-      pw_expression_number (node->text, value) ? PW_OK : pw_expression_constant (r->scope, node->text, value, &error);
+  int status = pw_expression_constant (r->scope, node->text, value, &error);
   if (status == PW_RESOURCE) return read_no_memory (r);
   if (status != PW_OK)
     return read_fail (r, source_offset (r->y, node, error.at), "%s: %s", label,
@@ -217,9 +216,8 @@ static int read_expression (reader *r, const pw_node *node, const char *const *v
   if (status == PW_INPUT) return expression_fail (r, node, error.at, "%s", error.text);
   if (status != PW_OK) return read_no_memory (r);
   if ((r->operations += (*expression)->codes) <= MAX_OPERATIONS) return PW_OK;
-  return read_fail (r, node->at,
-                    "%s: the expressions up to here have more than %d operations, the limit for a model", r->label,
-                    MAX_OPERATIONS);
+  return read_fail (r, node->at, "%s: the expressions up to here have more than %d operations, the limit for a model",
+                    r->label, MAX_OPERATIONS);
 }
 
 /* Indexes all elements, including those not built yet, whose errors are reported later. */
@@ -271,7 +269,7 @@ static int state_check (reader *r, const pw_node *node, const char *name, size_t
 
 /* ---- Signals that are expressions ----
  *
- * Such a signal is a function, of which each compiled system has a copy (signal_open), since it may outlive the model. */
+ * Such a signal is a function, of which each compiled system has a copy (signal_open): it may outlive the model. */
 
 enum { MAX_SIGNAL_STATES = 16, MAX_CHECKED_BREAKPOINTS = 100 };
 
@@ -460,18 +458,12 @@ static double *table_list (reader *r, const pw_node *list, pw_signal *s) {
   return t;
 }
 
-static int table_has_parent (const char *name) {
-  for (const char *part = name; part; part = strchr (part, '/'), part = part ? part + 1 : NULL)
-    if (strncmp (part, "..", 2) == 0 && (part[2] == '/' || part[2] == 0)) return 1;
-  return 0;
-}
-
 /* A model may only read files in its folder. */
 static FILE *table_open (const pw_yaml *y, const char *name, const char **reason) {
   char joined[PW_PATH], path[PW_PATH];
   size_t n = strlen (y->folder); /* 0 for the root */
   *reason = "a table must be in the model's folder: its path is relative and has no \"..\"";
-  if (*name == '/' || table_has_parent (name)) return NULL;
+  if (*name == '/' || strstr (PW_PRINTED (PW_PATH + 2, "/%s/", name), "/../")) return NULL;
   if (realpath (pw_path (joined, "%s/%s", y->folder, name), path) == NULL) return *reason = strerror (errno), NULL;
   *reason = "it is a link that leads out of the model's folder";
   int is_inside = strncmp (path, y->folder, n) == 0 && (path[n] == '/' || path[n] == 0);
@@ -695,18 +687,6 @@ static int build_fail (const reader *r, const pw_node *node, const pw_error *cau
   return read_fail (r, node->at, "%s", text);
 }
 
-/* Reads three initial coordinates or velocities; sets bit first_bit + i of *specified if value i is given. */
-static void build_triple (const reader *r, const pw_node *node, const char *label, const char *const key[4],
-                          double value[3], unsigned *specified, int first_bit) {
-  const pw_node *v[4];
-  read_keys (r, node, key, label, v);
-  for (int i = 0; i < 3; i++) {
-    if (v[i] == NULL) continue;
-    read_number (r, v[i], PW_PRINTED (200, "%s: %s", label, key[i]), PW_REAL, &value[i]);
-    *specified |= 1u << (first_bit + i);
-  }
-}
-
 static int build_body (reader *r, const pw_node *node) {
   static const char *const key[] = { "name", "mass", "inertia", "start", "rate", NULL };
   static const char *const state[][4] = { { "x", "y", "phi", NULL }, { "vx", "vy", "omega", NULL } };
@@ -723,7 +703,14 @@ static int build_body (reader *r, const pw_node *node) {
   }
   for (int i = 0; i < 2; i++) {
     const char *label = PW_PRINTED (160, "%s of body %.60s", key[3 + i], body.name);
-    build_triple (r, v[3 + i], label, state[i], i ? body.rate : body.start, &body.specified, 3 * i);
+    const pw_node *given[4];
+    read_keys (r, v[3 + i], state[i], label, given);
+    for (int k = 0; k < 3; k++) {
+      if (given[k] == NULL) continue;
+      double *value = (i ? body.rate : body.start) + k;
+      read_number (r, given[k], PW_PRINTED (200, "%s: %s", label, state[i][k]), PW_REAL, value);
+      body.specified |= 1u << (3 * i + k);
+    }
   }
   if (r->error->status != PW_OK) return r->error->status;
   if (pw_model_check_body (r->model, &body, &cause) != PW_OK) return build_fail (r, name, &cause);
@@ -1031,26 +1018,12 @@ static int head_parameters (pw_yaml *y, const reader *r, const pw_node *list, pw
   return PW_OK;
 }
 
-static void head_run (pw_yaml *y, const reader *r, const pw_node *run) {
-  static const char *const key[] = { "t_end", "step", "rtol", "method", NULL };
-  const pw_node *v[sizeof key / sizeof *key];
-  double *number[] = { &y->table.run.t_end, &y->table.run.step, &y->table.run.rtol };
-  read_keys (r, run, key, "run", v);
-  for (int i = 0; i < 3; i++) read_number (r, v[i], key[i], PW_POSITIVE, number[i]);
-  read_text (r, v[3], key[3], &y->table.run.method);
-}
-
-static void head_let (const reader *r, const pw_node *let, pw_names *names) {
-  if (let && let->type != PW_YAML_MAP)
-    read_fail (r, let->at, "let: expected a map {NAME: NUMBER, ...}, found %s", node_found (let));
-  for (const pw_node *n = let ? let->first : NULL; n && r->error->status == PW_OK; n = n->next->next)
-    head_name (r, n, "name", names);
-}
-
 static int read_head (pw_yaml *y, const reader *r) {
   static const char *const key[] = { "pinwheel", "about",    "run",   "parameters", "let",
                                      "bodies",   "elements", "truth", NULL };
-  const pw_node *v[sizeof key / sizeof *key];
+  static const char *const run_key[] = { "t_end", "step", "rtol", "method", NULL };
+  const pw_node *v[sizeof key / sizeof *key], *run[sizeof run_key / sizeof *run_key];
+  double *number[] = { &y->table.run.t_end, &y->table.run.step, &y->table.run.rtol };
   pw_names names = { .size = 0 };
   if (y->root == NULL) return read_fail (r, 0, "the file is empty; a model begins with \"pinwheel: 1\"");
   if (read_keys (r, y->root, key, "a model", v) != PW_OK) return r->error->status;
@@ -1058,16 +1031,22 @@ static int read_head (pw_yaml *y, const reader *r) {
   if (!node_is (v[0], "1"))
     return read_fail (r, v[0]->at, "pinwheel: expected 1, the version of the format that this Pinwheel reads");
   read_text (r, v[1], "about", &y->table.about);
-  head_run (y, r, v[2]);
-  const pw_node *parameters = v[3];
+  read_keys (r, v[2], run_key, "run", run);
+  for (int i = 0; i < 3; i++) read_number (r, run[i], run_key[i], PW_POSITIVE, number[i]);
+  read_text (r, run[3], run_key[3], &y->table.run.method);
+  const pw_node *parameters = v[3], *let = v[4];
   /* the key of the reference solution is "truth" */
-  y->let = v[4], y->bodies = v[5], y->elements = v[6], y->reference = v[7];
+  y->let = let, y->bodies = v[5], y->elements = v[6], y->reference = v[7];
   for (int i = 3; key[i]; i++) /* from "parameters" on: lists and maps */
     if (v[i] && v[i]->count > MAX_ITEMS)
       read_fail (r, v[i]->at, "%s: %d entries; a model may have %d", key[i], v[i]->count, MAX_ITEMS);
-  size_t count = (size_t)(parameters ? parameters->count : 0) + (size_t)(y->let ? y->let->count : 0);
+  size_t count = (size_t)(parameters ? parameters->count : 0) + (size_t)(let ? let->count : 0);
   if (r->error->status == PW_OK && pw_names_open (&names, count) != PW_OK) read_no_memory (r);
-  if (r->error->status == PW_OK && head_parameters (y, r, parameters, &names) == PW_OK) head_let (r, y->let, &names);
+  if (r->error->status == PW_OK) head_parameters (y, r, parameters, &names);
+  if (r->error->status == PW_OK && let && let->type != PW_YAML_MAP)
+    read_fail (r, let->at, "let: expected a map {NAME: NUMBER, ...}, found %s", node_found (let));
+  for (const pw_node *n = let ? let->first : NULL; n && r->error->status == PW_OK; n = n->next->next)
+    head_name (r, n, "name", &names);
   pw_names_close (&names);
   return r->error->status;
 }
@@ -1099,10 +1078,6 @@ void pw_yaml_close (pw_yaml *y) {
   pw_arena_free (&y->arena);
   free (y->source);
   free (y);
-}
-
-const pw_plugin_table *pw_yaml_table (const pw_yaml *y) {
-  return &y->table;
 }
 
 /* Calls `each` with the path of every file named below a node, until it returns non-zero, which is returned. */

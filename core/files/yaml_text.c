@@ -21,35 +21,27 @@ static int source_characters (const char *from, const char *to) {
   return n;
 }
 
-/* The beginning of the line at an offset, and the part from *from to *to that is shown: of a long line the part around
- * the offset, cut between characters. */
-static void source_window (const pw_yaml *y, size_t at, const char **begin, const char **from, const char **to) {
-  const char *caret = y->source + at, *end = y->source + y->size;
-  *begin = caret;
-  while (*begin > y->source && (*begin)[-1] != '\n') --*begin;
-  *from = caret - *begin > SOURCE_SHOWN / 2 ? caret - SOURCE_SHOWN / 2 : *begin;
-  while (*from < caret && (**from & 0xC0) == 0x80) ++*from;
-  *to = *from;
-  while (*to < end && **to != '\n' && **to != '\r' && *to - *from < SOURCE_SHOWN) ++*to;
-  while (*to > caret && (**to & 0xC0) == 0x80) --*to;
-}
-
 int pw_yaml_fail (const pw_yaml *y, pw_error *error, size_t at, const char *format, ...) {
   char text[220], shown[SOURCE_SHOWN + 4];
-  const char *begin, *from, *to;
   va_list arguments;
   va_start (arguments, format);
   vsnprintf (text, sizeof text, format, arguments);
   va_end (arguments);
   if (at > y->size) at = y->size;
-  source_window (y, at, &begin, &from, &to);
+  /* What is shown of a long line is the part around the offset, cut between characters. */
+  const char *caret = y->source + at, *end = y->source + y->size, *begin = caret;
+  while (begin > y->source && begin[-1] != '\n') begin--;
+  const char *from = caret - begin > SOURCE_SHOWN / 2 ? caret - SOURCE_SHOWN / 2 : begin;
+  while (from < caret && (*from & 0xC0) == 0x80) from++;
+  const char *to = from;
+  while (to < end && *to != '\n' && *to != '\r' && to - from < SOURCE_SHOWN) to++;
+  while (to > caret && (*to & 0xC0) == 0x80) to--;
   snprintf (shown, sizeof shown, "%s%.*s", from > begin ? "..." : "", (int)(to - from), from);
   for (char *tab = shown; (tab = strchr (tab, '\t')) != NULL;) *tab = ' '; /* one column, as in the line of the caret */
   size_t n = strlen (y->path);
   return pw_fail (error, PW_INPUT, "%s%s:%d:%d: error: %s\n  %s\n  %*s^", n > 100 ? "..." : "",
-                  n > 100 ? y->path + n - 97 : y->path, pw_yaml_line (y, at),
-                  1 + source_characters (begin, y->source + at), text, shown,
-                  source_characters (from, y->source + at) + 3 * (from > begin), "");
+                  n > 100 ? y->path + n - 97 : y->path, pw_yaml_line (y, at), 1 + source_characters (begin, caret),
+                  text, shown, source_characters (from, caret) + 3 * (from > begin), "");
 }
 
 int pw_yaml_no_memory (const pw_yaml *y, pw_error *error) {
@@ -63,9 +55,11 @@ static int source_check (const pw_yaml *y, pw_error *error) {
   while (p < end) {
     size_t at = (size_t)(p - begin);
     int n = pw_utf8_size (p);
-    if (n == 0) return pw_yaml_fail (y, error, at, "byte %02X is not UTF-8; a model file is text in UTF-8", (unsigned char)*p);
+    if (n == 0)
+      return pw_yaml_fail (y, error, at, "byte %02X is not UTF-8; a model file is text in UTF-8", (unsigned char)*p);
     if ((*p == 0 || pw_control (p)) && !(*p == '\r' && p[1] == '\n'))
-      return pw_yaml_fail (y, error, at, "a control character, code %d, does not belong in a model file", pw_control (p));
+      return pw_yaml_fail (y, error, at, "a control character, code %d, does not belong in a model file",
+                           pw_control (p));
     if (*p == '%' && (at == 0 || p[-1] == '\n'))
       return pw_yaml_fail (y, error, at, "a line of a model file must not begin with %%");
     p += n;

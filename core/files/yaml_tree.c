@@ -205,21 +205,13 @@ static int tree_syntax (tree *x) {
   return pw_yaml_fail (x->y, x->error, at, "%s%s", message, tree_hint (x->y, at, message));
 }
 
-static void tree_parse (tree *x) {
-  struct fy_event *e;
-  while (x->error->status == PW_OK && (e = fy_parser_parse (x->parser)) != NULL) {
-    if (x->error->status == PW_OK) tree_event (x, e); /* unless tree_feed has failed */
-    fy_parser_event_free (x->parser, e);
-  }
-  if (x->error->status == PW_OK && fy_parser_get_stream_error (x->parser)) tree_syntax (x);
-}
-
 /* Out of memory, libfyaml reports a syntax error, drops a part of the text, or crashes when it opens. */
 enum { TREE_RESERVE = 1 << 16 };
 
 int pw_yaml_read_tree (pw_yaml *y, pw_error *error) {
   pw_error cause = { 0 };
   struct fy_diag_cfg quiet;
+  struct fy_event *e;
   tree x = { .y = y, .error = &cause };
   fy_diag_cfg_default (&quiet);
   quiet.fp = NULL;
@@ -231,10 +223,13 @@ int pw_yaml_read_tree (pw_yaml *y, pw_error *error) {
     x.parser = fy_parser_create (&how);
     x.pieces = fy_token_iter_create (NULL);
   }
-  if (x.parser && x.pieces && fy_parser_set_input_callback (x.parser, &x, tree_feed) == 0)
-    tree_parse (&x);
-  else
+  if (!x.parser || !x.pieces || fy_parser_set_input_callback (x.parser, &x, tree_feed) != 0)
     pw_yaml_no_memory (y, &cause);
+  while (cause.status == PW_OK && (e = fy_parser_parse (x.parser)) != NULL) {
+    if (cause.status == PW_OK) tree_event (&x, e); /* unless tree_feed has failed */
+    fy_parser_event_free (x.parser, e);
+  }
+  if (cause.status == PW_OK && fy_parser_get_stream_error (x.parser)) tree_syntax (&x);
   if (errno == ENOMEM) cause.status = PW_OK, pw_yaml_no_memory (y, &cause);
   fy_token_iter_destroy (x.pieces);
   if (x.parser) fy_parser_destroy (x.parser);
