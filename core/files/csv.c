@@ -26,8 +26,6 @@ struct pw_csv {
   pw_npz npz;
 };
 
-/* ---- Cells ---- */
-
 /* Adds the next column to the archive. */
 static void csv_array (pw_csv *c, const char *name) {
   size_t rows = c->columns ? c->values / c->columns : 0;
@@ -62,8 +60,6 @@ static void csv_number (pw_csv *c, double value) {
 
 /* Writes the name of the next column or its value, and evaluates only that. */
 #define CSV_CELL(c, name, unit, value) ((c)->names ? csv_name (c, name, unit) : csv_number (c, value))
-
-/* ---- Lines ---- */
 
 static void csv_state (pw_csv *c, const pw_sample *x, int state) {
   int n = pw_system_coordinates (c->system);
@@ -103,8 +99,6 @@ static int csv_line (pw_csv *c, int names, const pw_sample *x, pw_error *error) 
   fputc ('\n', c->f);
   return pw_output_check (c->output, error);
 }
-
-/* ---- The table ---- */
 
 static void csv_free (pw_csv *c) {
   if (c == NULL) return;

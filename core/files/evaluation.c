@@ -13,7 +13,7 @@
 #include "pinwheel.h"
 #include "elliptic.h"
 
-/* ---- Functions f of one argument x: f', f'' (Abramowitz & Stegun 1964, chapters 4 and 17) ---- */
+/* ---- Derivatives of functions (Abramowitz & Stegun 1964, chapters 4 and 17) ---- */
 
 #define PARTIALS_OF_ONE(name, first, second)                          \
   static pw_partials partials_##name (double x, double y, double f) { \
@@ -34,8 +34,6 @@ PARTIALS_OF_ONE (exp, f, f)
 PARTIALS_OF_ONE (log, 1 / x, -1 / (x * x))
 PARTIALS_OF_ONE (log10, 1 / (x * log (10)), -1 / (x * x * log (10)))
 PARTIALS_OF_ONE (sqrt, 0.5 / f, -0.25 / (f * x))
-
-/* ---- Functions of two arguments ---- */
 
 /* Of atan2 (y, x): member x of the result belongs to the first argument, which is y here. */
 static pw_partials partials_atan2 (double y, double x, double f) {
@@ -203,7 +201,7 @@ static inline double value_step (int op, double x, int *may_jump) {
   return y;
 }
 
-/* See pw_expression_apply; sets *may_jump to 1 where the operation may jump. */
+/* The value of an operation of `right` alone or of `left` and `right`; *may_jump: 1 where it may jump. */
 static inline double value_of (const pw_expression_code *c, double left, double right, int *may_jump) {
   switch (c->op) {
   case PW_OP_NEGATE:
@@ -283,8 +281,6 @@ static jet jet_chain (double f, const pw_partials *s, const jet *x, const jet *y
   return r;
 }
 
-/* ---- Derivatives of operations with jumps or kinks ---- */
-
 /* The sign just after: that of the first number that is not 0. */
 static inline int jet_sign (const jet *x) {
   double first = x->v != 0 ? x->v : x->d != 0 ? x->d : x->dd;
@@ -328,8 +324,6 @@ static jet jet_mod (const jet *x, const jet *y, double *q) {
   *q -= 1;
   return m;
 }
-
-/* ---- Operations ---- */
 
 static jet jet_unary (const pw_expression_code *c, const jet *x, double *discrete) {
   if (c->op == PW_OP_NEGATE) return (jet){ -x->v, -x->d, -x->dd, x->varies };

@@ -290,8 +290,6 @@ static int output_fail_with_part (const pw_output *o, int code, pw_error *error)
                   output_reason (o, code), o->part);
 }
 
-/* ---- Opening ---- */
-
 /* Makes a stream of a descriptor, which may be -1.  Like the functions below, returns 0 or an errno value. */
 static int output_stream_of (pw_output *o, int file, const char *mode) {
   o->stream = file < 0 ? NULL : fdopen (file, mode);
@@ -420,8 +418,6 @@ int pw_output_check (pw_output *o, pw_error *error) {
   if (o->code == 0) o->code = errno;
   return output_fail (o, o->code, error);
 }
-
-/* ---- Closing ---- */
 
 /* Flushes the stream and writes a regular file to the disk.  0, an errno value, or -1 for an unknown reason. */
 static int output_sync (pw_output *o) {

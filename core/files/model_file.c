@@ -622,7 +622,7 @@ void pw_page_close (pw_page *p) {
   free (p->file);
 }
 
-/* ---- Specialised scenes: options of the compiler ---- */
+/* ---- Specialised scenes ---- */
 
 int pw_processor_lanes (void) {
 #if defined __x86_64__

@@ -7,8 +7,6 @@
 
 enum { SOURCE_SHOWN = 84 }; /* bytes of a line in a message */
 
-/* ---- Messages ---- */
-
 int pw_yaml_line (const pw_yaml *y, size_t at) {
   int line = 1;
   for (const char *p = y->source; (p = memchr (p, '\n', (size_t)(y->source + at - p))) != NULL; p++) line++;
@@ -47,8 +45,6 @@ int pw_yaml_fail (const pw_yaml *y, pw_error *error, size_t at, const char *form
 int pw_yaml_no_memory (const pw_yaml *y, pw_error *error) {
   return pw_fail (error, PW_RESOURCE, "%s: out of memory", y->path);
 }
-
-/* ---- Checks of the text ---- */
 
 static int source_check (const pw_yaml *y, pw_error *error) {
   const char *begin = y->source, *p = begin, *end = begin + y->size;

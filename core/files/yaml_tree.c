@@ -108,8 +108,6 @@ static void tree_begin (tree *x, struct fy_event *e, pw_yaml_type type) {
   x->tail[x->depth++] = &n->first;
 }
 
-/* ---- Events ---- */
-
 /* Refuses aliases, anchors and tags. */
 static int tree_refuse_anchor (tree *x, struct fy_event *e) {
   struct fy_token *anchor = fy_event_get_anchor_token (e), *tag = fy_event_get_tag_token (e);
@@ -124,8 +122,6 @@ static int tree_refuse_anchor (tree *x, struct fy_event *e) {
                        : anchor              ? "anchors (&)"
                                              : "tags (!)");
 }
-
-/* ---- Input ---- */
 
 /* libfyaml cannot tell a list or map in brackets from a key before it has seen what follows the closing bracket, and
  * until then keeps some 350 bytes for each indicator.  So it receives the source in pieces, and none after too many
