@@ -12,20 +12,6 @@ enum { PW_PATH = PATH_MAX + 1 };
 /* Prints a path into the buffer, which is returned. */
 #define pw_path(path, ...) pw_print (path, PW_PATH, __VA_ARGS__)
 
-/* ---- Models in YAML (yaml.c) ---- */
-
-/* A text model in memory, with a plug-in's table.  `path`: absolute, links resolved; `shown`: the path in messages.
- * `error` is not NULL: PW_INPUT with the position; PW_RESOURCE.  Bodies and elements are read when a model is built. */
-typedef struct pw_yaml pw_yaml;
-pw_yaml *pw_yaml_open (const char *path, const char *shown, size_t max_bytes, pw_error *error);
-void pw_yaml_close (pw_yaml *y);
-/* Writes the text, as read but for a byte order mark. */
-void pw_yaml_write_source (const pw_yaml *y, FILE *f);
-/* Writes the tree as bytes, for programs without libfyaml (yaml_text.c). */
-void pw_yaml_write_tree (const pw_yaml *y, FILE *f);
-/* As pw_file_tables. */
-int pw_yaml_tables (const pw_yaml *y, int (*each) (void *context, const char *path), void *context);
-
 /* ---- Tables of numbers (columns.c) ---- */
 
 /* Whether nan in a column other than the time is an error, or a gap like an empty cell. */

@@ -504,7 +504,8 @@ const char *pw_file_path (const pw_file *f) {
 }
 
 int pw_file_tables (const pw_file *f, int (*each) (void *context, const char *path), void *context) {
-  return f && f->yaml ? pw_yaml_tables (f->yaml, each, context) : 0;
+  /* not in let, where "file" is the name of a number */
+  return f && f->yaml ? pw_yaml_tables (f->yaml, f->yaml->elements, each, context) : 0;
 }
 
 int pw_file_list (int (*each) (void *context, const char *name, const char *path), void *context, pw_error *error) {
@@ -562,15 +563,6 @@ static int page_engine (pw_page *p, const char *source, pw_error *error) {
   return status;
 }
 
-static int page_write (pw_page *p, const char *name, void (*write) (const pw_yaml *y, FILE *f), const pw_yaml *y,
-                       pw_error *error) {
-  pw_stream part;
-  FILE *f = pw_stream_open (&part);
-  if (f) write (y, f);
-  pw_stream_close (f, &part);
-  return page_add (p, name, part.text, part.size, error);
-}
-
 enum { PAGE_PARTS = 3 }; /* files before the tables: engine, model, tree */
 
 typedef struct {
@@ -593,12 +585,18 @@ static int page_table (void *context, const char *path) {
 }
 
 static int page_text (pw_page *p, const pw_file *f, pw_error *error) {
+  const pw_yaml *y = f->yaml;
   page_tables x = { p, (size_t)(strrchr (f->path, '/') - f->path) + 1, error };
-  int status = page_write (p, "model", pw_yaml_write_source, f->yaml, error); /* the file may have changed since */
-  if (status == PW_OK && p->file[p->files - 1].size > PAGE_MAX_BYTES)
-    status = pw_fail (error, PW_INPUT, "%s: a page takes a model of at most %d MB", f->path, PAGE_MAX_BYTES >> 20);
-  if (status == PW_OK) status = page_write (p, "tree", pw_yaml_write_tree, f->yaml, error);
-  if (status == PW_OK) status = pw_file_tables (f, page_table, &x);
+  pw_stream tree;
+  if (y->size > PAGE_MAX_BYTES)
+    return pw_fail (error, PW_INPUT, "%s: a page takes a model of at most %d MB", f->path, PAGE_MAX_BYTES >> 20);
+  char *source = malloc (y->size + 1); /* not of the file, which may have changed since */
+  int status = page_add (p, "model", source ? memcpy (source, y->source, y->size + 1) : NULL, y->size, error);
+  FILE *to = pw_stream_open (&tree);
+  if (to) pw_yaml_write_tree (y, to);
+  pw_stream_close (to, &tree);
+  if (page_add (p, "tree", tree.text, tree.size, error) != PW_OK || status != PW_OK) return PW_RESOURCE;
+  status = pw_file_tables (f, page_table, &x);
   return status == PW_OK ? PW_OK : pw_fail (error, status, "out of memory"); /* unless the reason is recorded */
 }
 

@@ -1080,22 +1080,17 @@ void pw_yaml_close (pw_yaml *y) {
   free (y);
 }
 
-/* Calls `each` with the path of every file named below a node, until it returns non-zero, which is returned. */
-static int yaml_each_table (const pw_yaml *y, const pw_node *node, int (*each) (void *context, const char *path),
-                            void *context) {
+int pw_yaml_tables (const pw_yaml *y, const pw_node *node, int (*each) (void *context, const char *path),
+                    void *context) {
   int stop = 0;
-  for (const pw_node *n = node->type == PW_YAML_SCALAR ? NULL : node->first; n && !stop; n = n->next) {
+  for (const pw_node *n = node == NULL || node->type == PW_YAML_SCALAR ? NULL : node->first; n && !stop; n = n->next) {
     const pw_node *key = node->type == PW_YAML_MAP ? n : NULL;
     if (key) n = key->next; /* its value */
     if (key && node_is (key, "file") && n->type == PW_YAML_SCALAR) {
       char path[PW_PATH];
       stop = each (context, pw_path (path, "%s/%s", y->folder, n->text));
     } else
-      stop = yaml_each_table (y, n, each, context);
+      stop = pw_yaml_tables (y, n, each, context);
   }
   return stop;
-}
-
-int pw_yaml_tables (const pw_yaml *y, int (*each) (void *context, const char *path), void *context) {
-  return y->elements ? yaml_each_table (y, y->elements, each, context) : 0; /* in let, "file" is the name of a number */
 }

@@ -23,7 +23,8 @@ typedef struct pw_node {
   unsigned char quoted; /* 1: in quotes, or a block after | or > */
 } pw_node;
 
-struct pw_yaml {
+/* A text model in memory, with a plug-in's table.  Bodies and elements are read when a model is built. */
+typedef struct {
   pw_plugin_table table; /* first: the address of a text model's table is that of its pw_yaml */
   char *path;            /* as shown in messages */
   char *folder;          /* of the file, links resolved */
@@ -34,9 +35,19 @@ struct pw_yaml {
   const pw_node *root;
   const pw_node *bodies, *elements, *let, *reference; /* or NULL */
   int parameter_count;                                /* of table.parameters */
-};
+} pw_yaml;
 
 enum { PW_YAML_DEPTH = 30 }; /* most lists and maps inside each other */
+
+/* `path`: absolute, links resolved; `shown`: the path in messages.  `error` is not NULL: PW_INPUT with the position;
+ * PW_RESOURCE. */
+pw_yaml *pw_yaml_open (const char *path, const char *shown, size_t max_bytes, pw_error *error);
+void pw_yaml_close (pw_yaml *y);
+
+/* Calls `each` with the path of every file named below a node, which may be NULL, until it returns non-zero; returns
+ * that, or 0. */
+int pw_yaml_tables (const pw_yaml *y, const pw_node *node, int (*each) (void *context, const char *path),
+                    void *context);
 
 /* Reads a file of at most `max_bytes` bytes into y->source and y->size, and checks its characters. */
 int pw_yaml_read_source (pw_yaml *y, const char *path, size_t max_bytes, pw_error *error);
@@ -51,7 +62,8 @@ int pw_yaml_line (const pw_yaml *y, size_t at);
 /* Stores the tree of the source. */
 int pw_yaml_read_tree (pw_yaml *y, pw_error *error);
 
-/* Loads what pw_yaml_write_tree wrote.  PW_INPUT if it is incomplete; PW_RESOURCE. */
+/* Writes the tree as bytes, for programs without libfyaml; loads it.  PW_INPUT if it is incomplete; PW_RESOURCE. */
+void pw_yaml_write_tree (const pw_yaml *y, FILE *f);
 int pw_yaml_load_tree (pw_yaml *y, char *bytes, size_t size, pw_error *error);
 
 #endif

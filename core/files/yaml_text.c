@@ -77,10 +77,6 @@ int pw_yaml_read_source (pw_yaml *y, const char *path, size_t max_bytes, pw_erro
   return status == PW_OK ? source_check (y, error) : status;
 }
 
-void pw_yaml_write_source (const pw_yaml *y, FILE *f) {
-  fwrite (y->source, 1, y->size, f);
-}
-
 /* Trees of text models as bytes, for programs without libfyaml: interactive pages.  A node is its type, whether it is
  * quoted, its offset and its count or, of a scalar, its size; then its entries or its text. */
 
