@@ -94,17 +94,6 @@ extern const pw_expression_function pw_expression_functions[]; /* and constants;
 /* The index of a function or constant, or -1. */
 int pw_expression_find_function (const char *name);
 
-/* The length of the name at p, which may contain dots (frame.phi), or of the number: digits, perhaps with a decimal
- * point and an exponent; 0 if there is none (parser.c). */
-size_t pw_expression_name_size (const char *p);
-size_t pw_expression_number_size (const char *p);
-
-/* x^y and its derivatives, with respect to x alone unless the exponent y varies. */
-double pw_expression_power (double x, double y);
-pw_partials pw_expression_power_partials (double x, double y, double f, int exponent_varies);
-/* The remainder with the sign of the divisor: an angle modulo 2 pi lies from 0 to 2 pi. */
-double pw_expression_mod (double x, double y);
-
 /* ---- Evaluation ---- */
 
 /* The value of operations; *may_jump becomes 1 if one of them may jump there: at equal numbers, at poles. */

@@ -1,191 +1,24 @@
-/* The search path for models: the folders of PINWHEEL_MODELS, then those of the running program and of this library.
- *
- * Folders next to the program, or one level up (tests), serve the build tree; ../lib and ../include serve an
- * installation; the folder of the library serves programs installed elsewhere.  The order of the folders decides only
- * about headers and pages, of which the first is taken: a name that two models have is refused (model_file.c). */
-#define _GNU_SOURCE /* dladdr1 */
-#include <dirent.h>
-#include <dlfcn.h>
+/* Files: reading; names, conflicts between them, locks; outputs, which are renamed when complete; checkpoints. */
 #include <errno.h>
 #include <fcntl.h>
-#include <limits.h>
-#include <link.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/file.h>
 #include <unistd.h>
 #include "files.h"
 
-int pw_ends_with (const char *name, const char *ending) {
-  size_t n = strlen (name), e = strlen (ending);
-  return n > e && strcmp (name + n - e, ending) == 0;
+/* ---- Reading ---- */
+
+const char *pw_not_regular (mode_t mode) {
+  return S_ISDIR (mode)    ? "it is a directory, not a regular file"
+         : S_ISFIFO (mode) ? "it is a FIFO or pipe, not a regular file"
+         : S_ISCHR (mode)  ? "it is a character device, not a regular file"
+         : S_ISBLK (mode)  ? "it is a block device, not a regular file"
+         : S_ISSOCK (mode) ? "it is a socket, not a regular file"
+                           : "it is not a regular file";
 }
-
-static int search_no_memory (pw_error *error) {
-  return pw_fail (error, PW_RESOURCE, "out of memory while looking for models");
-}
-
-/* What folders are relative to: the folder of the running program, that of this library. */
-enum { SEARCH_PROGRAM, SEARCH_LIBRARY, SEARCH_ANCHORS };
-
-typedef char search_anchor_paths[SEARCH_ANCHORS][PW_PATH];
-
-/* Stores these folders; "" if one is unknown. */
-static int search_find_anchors (search_anchor_paths anchor, pw_error *error) {
-  static const char here = 0; /* an address inside this library */
-  Dl_info info;
-  struct link_map *object = NULL;
-  ssize_t n = readlink ("/proc/self/exe", anchor[SEARCH_PROGRAM], PATH_MAX - 1);
-  anchor[SEARCH_PROGRAM][n > 0 ? n : 0] = 0;
-  /* l_name is "" if the program contains the library */
-  const char *library = dladdr1 (&here, &info, (void **)&object, RTLD_DL_LINKMAP) ? object->l_name : NULL;
-  if (library && (library = realpath (library, anchor[SEARCH_LIBRARY])) == NULL && errno == ENOMEM)
-    return search_no_memory (error);
-  if (library == NULL) *anchor[SEARCH_LIBRARY] = 0;
-  for (int i = 0; i < SEARCH_ANCHORS; i++) {
-    char *slash = strrchr (anchor[i], '/');
-    if (slash) slash[slash == anchor[i]] = 0; /* "/" of the root */
-  }
-  return PW_OK;
-}
-
-/* Folders relative to each anchor. */
-typedef const char *const search_folders[SEARCH_ANCHORS][3];
-enum { SEARCH_FOLDERS = 3 * SEARCH_ANCHORS };
-
-/* Stores the i-th of these folders, which need not exist; 0 if its anchor is unknown. */
-static int search_place (search_anchor_paths anchor, search_folders where, int i, char folder[PW_PATH]) {
-  pw_path (folder, "%s/%s", anchor[i / 3], where[i / 3][i % 3]);
-  return *anchor[i / 3] != 0;
-}
-
-/* ---- Model files ---- */
-
-/* Adds a model, whose name is the first `length` bytes of `name`, unless it is in the list already. */
-static int search_add_file (pw_search *s, const char *name, size_t length, const char *path, pw_error *error) {
-  for (int i = 0; i < s->count; i++)
-    if (strcmp (s->found[i].path, path) == 0 && strncmp (s->found[i].name, name, length) == 0 &&
-        s->found[i].name[length] == 0)
-      return PW_OK;
-  if (pw_grow (&s->found, (size_t)s->count, &s->room, sizeof *s->found) != PW_OK) return search_no_memory (error);
-  pw_found *f = &s->found[s->count];
-  f->path = pw_arena_copy (&s->arena, path);
-  f->name = pw_arena_copy (&s->arena, name);
-  if (f->path == NULL || f->name == NULL) return search_no_memory (error);
-  f->name[length] = 0;
-  s->count++;
-  return PW_OK;
-}
-
-static int search_entry (pw_search *s, const char *folder, const char *entry, pw_error *error) {
-  const char *ending = pw_ends_with (entry, ".so") ? ".so" : pw_ends_with (entry, ".yaml") ? ".yaml" : NULL;
-  if (ending == NULL || entry[0] == '.' || !pw_is_line (entry)) return PW_OK;
-  char path[PW_PATH], real[PW_PATH];
-  struct stat info;
-  if (realpath (pw_path (path, "%s/%s", folder, entry), real) == NULL)
-    return errno == ENOMEM ? search_no_memory (error) : PW_OK;
-  if (stat (real, &info) != 0 || !S_ISREG (info.st_mode)) return PW_OK;
-  return search_add_file (s, entry, strlen (entry) - strlen (ending), real, error);
-}
-
-/* Adds a folder to the list for messages. */
-static void search_list_folder (pw_search *s, const char *real) {
-  size_t used = strlen (s->folders);
-  const char *listed = PW_PRINTED (sizeof s->folders + 2, ":%s:", s->folders);
-  if (used + strlen (real) + 2 <= sizeof s->folders && strstr (listed, PW_PRINTED (PW_PATH + 2, ":%s:", real)) == NULL)
-    sprintf (s->folders + used, "%s%s", used ? ":" : "", real);
-}
-
-/* Adds the models in a folder; skips missing and inaccessible folders, as shells do with PATH. */
-static int search_folder (pw_search *s, const char *folder, pw_error *error) {
-  char real[PW_PATH];
-  if (realpath (folder, real) == NULL) return errno == ENOMEM ? search_no_memory (error) : PW_OK;
-  search_list_folder (s, real);
-  DIR *dir = opendir (folder);
-  if (dir == NULL && (errno == ENOMEM || errno == EMFILE || errno == ENFILE))
-    return pw_fail (error, PW_RESOURCE, "cannot look into the folder %s: %s", folder, strerror (errno));
-  if (dir == NULL) return PW_OK;
-  int status = PW_OK;
-  struct dirent *entry;
-  while (status == PW_OK && (entry = readdir (dir)) != NULL) status = search_entry (s, folder, entry->d_name, error);
-  closedir (dir);
-  return status;
-}
-
-/* Whether a folder can be searched; if not, adds it to s->unread with the reason. */
-static int search_is_readable (pw_search *s, const char *folder) {
-  char inside[PW_PATH];
-  size_t used = strlen (s->unread);
-  if (access (pw_path (inside, "%s/.", folder), R_OK | X_OK) == 0) return 1;
-  snprintf (s->unread + used, sizeof s->unread - used, "%s%.80s (%s)", used ? ", " : "", folder, strerror (errno));
-  return 0;
-}
-
-static int search_environment (pw_search *s, pw_error *error) {
-  const char *list = getenv ("PINWHEEL_MODELS");
-  if (list == NULL) return PW_OK;
-  char *copy = strdup (list), *rest = copy, *folder;
-  if (copy == NULL) return search_no_memory (error);
-  int status = PW_OK;
-  while (status == PW_OK && (folder = strsep (&rest, ":")) != NULL)
-    if (*folder && search_is_readable (s, folder)) status = search_folder (s, folder, error);
-  free (copy);
-  return status;
-}
-
-static int search_order (const void *a, const void *b) {
-  const pw_found *f = a, *g = b;
-  int names = strcmp (f->name, g->name);
-  return names ? names : strcmp (f->path, g->path);
-}
-
-int pw_search_open (pw_search *s, pw_error *error) {
-  static const search_folders where = { { "models", "../models", "../lib/pinwheel/models" },
-                                        { "models", "../models", "pinwheel/models" } };
-  search_anchor_paths anchor;
-  char folder[PW_PATH];
-  *s = (pw_search){ .count = 0 };
-  int status = search_environment (s, error);
-  if (status == PW_OK) status = search_find_anchors (anchor, error);
-  for (int i = 0; i < SEARCH_FOLDERS && status == PW_OK; i++)
-    if (search_place (anchor, where, i, folder)) status = search_folder (s, folder, error);
-  if (s->count > 1) qsort (s->found, (size_t)s->count, sizeof *s->found, search_order);
-  return status;
-}
-
-void pw_search_close (pw_search *s) {
-  pw_arena_free (&s->arena);
-  free (s->found);
-}
-
-/* ---- Other files ---- */
-
-/* Stores the path of the first of the files of this name that can be read; "" if there is none. */
-static int search_find (search_folders where, const char *file, char path[PW_PATH], pw_error *error) {
-  search_anchor_paths anchor;
-  char folder[PW_PATH];
-  int status = search_find_anchors (anchor, error);
-  for (int i = 0; i < SEARCH_FOLDERS && status == PW_OK; i++)
-    if (search_place (anchor, where, i, folder) && access (pw_path (path, "%s/%s", folder, file), R_OK) == 0)
-      return PW_OK;
-  *path = 0;
-  return status;
-}
-
-int pw_search_header (char path[PW_PATH], pw_error *error) {
-  static const search_folders where = { { "include", "../include", "../include/pinwheel" },
-                                        { "include", "../include", "../include/pinwheel" } };
-  return search_find (where, "pinwheel.h", path, error);
-}
-
-int pw_search_page_file (const char *file, char path[PW_PATH], pw_error *error) {
-  static const search_folders where = { { "page", "../page", "../lib/pinwheel/page" },
-                                        { "page", "../page", "pinwheel/page" } };
-  return search_find (where, file, path, error);
-}
-
-/* Opens files for reading; follows links, also to files that do not exist; finds conflicts between the files that a
- * command reads and writes, under any name. */
 
 FILE *pw_open_input (const char *path, const char **why) {
   struct stat info;
@@ -204,16 +37,28 @@ int pw_open_input_status (void) {
   return errno == ENOMEM || errno == EMFILE || errno == ENFILE ? PW_RESOURCE : PW_INPUT;
 }
 
-enum { LOCATION_LINKS = 40 }; /* a longer chain counts as a cycle */
-
-const char *pw_not_regular (mode_t mode) {
-  return S_ISDIR (mode)    ? "it is a directory, not a regular file"
-         : S_ISFIFO (mode) ? "it is a FIFO or pipe, not a regular file"
-         : S_ISCHR (mode)  ? "it is a character device, not a regular file"
-         : S_ISBLK (mode)  ? "it is a block device, not a regular file"
-         : S_ISSOCK (mode) ? "it is a socket, not a regular file"
-                           : "it is not a regular file";
+int pw_read_file (const char *failure, const char *path, size_t max_bytes, const char *limit, char **text, size_t *size,
+                  pw_error *error) {
+  const char *why;
+  FILE *f = pw_open_input (path, &why);
+  *text = NULL;
+  if (f == NULL) return pw_fail (error, pw_open_input_status (), "%s %s: %s", failure, path, why);
+  int status = pw_read_rest (f, max_bytes, path, limit, text, size, error);
+  fclose (f);
+  return status;
 }
+
+/* ---- Locations ---- */
+
+/* The location of an existing or future file, links followed. */
+typedef struct {
+  char path[PW_PATH]; /* of the file itself, or naming the descriptor */
+  int descriptor;     /* descriptor of this process that the path names ("-", /dev/stdout, /dev/fd/3), or -1 */
+  int exists;         /* 1: `info` is known */
+  struct stat info;
+} location;
+
+enum { LOCATION_LINKS = 40 }; /* a longer chain counts as a cycle */
 
 static const char *location_base (const char *path) {
   const char *slash = strrchr (path, '/');
@@ -242,7 +87,7 @@ static int location_descriptor (const char *path) {
 }
 
 /* Replaces the path of a link by its target.  0 or an errno value. */
-static int location_follow (pw_location *p) {
+static int location_follow (location *p) {
   char target[PW_PATH], folder[PW_PATH];
   ssize_t n = readlink (p->path, target, sizeof target - 1);
   if (n < 0) return errno;
@@ -252,8 +97,9 @@ static int location_follow (pw_location *p) {
   return 0;
 }
 
-int pw_locate (pw_location *p, const char *path) {
-  *p = (pw_location){ .descriptor = strcmp (path, "-") == 0 ? STDOUT_FILENO : -1 };
+/* 0 or an errno value. */
+static int locate (location *p, const char *path) {
+  *p = (location){ .descriptor = strcmp (path, "-") == 0 ? STDOUT_FILENO : -1 };
   pw_path (p->path, "%s", path);
   for (int links = 0, code; links < LOCATION_LINKS; links++) {
     if (p->descriptor < 0) p->descriptor = location_descriptor (p->path);
@@ -269,18 +115,10 @@ int pw_locate (pw_location *p, const char *path) {
 
 typedef struct {
   const pw_use *use;
-  pw_location location;
+  location at;
   struct stat folder; /* that contains it */
   int known;          /* 1: `folder` was found */
 } location_use;
-
-/* Ignores files that cannot be located, since opening them reports it. */
-static void location_use_find (location_use *u, const pw_use *use) {
-  char folder[PW_PATH];
-  u->use = use;
-  if (use->path == NULL || pw_locate (&u->location, use->path) != 0) return;
-  u->known = stat (pw_folder_of (folder, u->location.path), &u->folder) == 0;
-}
 
 /* The length of the first `size` bytes of a name without one of the endings; `size` if they have none of these. */
 static size_t location_without (const char *name, size_t size, const char *const *ending) {
@@ -300,17 +138,16 @@ static int location_is_null_device (const struct stat *info) {
 static int location_conflicts (const location_use *a, const location_use *b) {
   /* Endings of temporary files: of outputs, of sorted tables, of checkpoints. */
   static const char *const temporary[] = { ".part", ".part.old", ".sorted", ".next", NULL };
-  const struct stat *info = &a->location.info;
+  const struct stat *info = &a->at.info;
   if (a->use->how == PW_READS || !a->known || !b->known) return 0;
-  const char *name = location_base (b->location.path), *own = location_base (a->location.path);
+  const char *name = location_base (b->at.path), *own = location_base (a->at.path);
   size_t size = strlen (name), final = location_without (name, size, temporary);
   if (a->use->how == PW_WRITES_INTO)
-    return a->location.exists && location_same (info, &b->folder) &&
+    return a->at.exists && location_same (info, &b->folder) &&
            (location_without (name, size, a->use->names) < size ||
             location_without (name, final, a->use->names) < final);
-  if (a->location.exists && b->location.exists && location_same (info, &b->location.info))
-    return !location_is_null_device (info);
-  if (a->location.descriptor >= 0 || b->location.descriptor >= 0 || !location_same (&a->folder, &b->folder)) return 0;
+  if (a->at.exists && b->at.exists && location_same (info, &b->at.info)) return !location_is_null_device (info);
+  if (a->at.descriptor >= 0 || b->at.descriptor >= 0 || !location_same (&a->folder, &b->folder)) return 0;
   return strcmp (name, own) == 0 || (strlen (own) == final && memcmp (name, own, final) == 0);
 }
 
@@ -324,7 +161,12 @@ static int location_fail (const pw_use *a, const pw_use *b, pw_error *error) {
 int pw_check_paths (const pw_use *use, int count, pw_error *error) {
   location_use *u = calloc ((size_t)count, sizeof *u);
   int status = u ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
-  for (int i = 0; i < count && u; i++) location_use_find (u + i, use + i);
+  for (int i = 0; i < count && u; i++) {
+    char folder[PW_PATH];
+    u[i].use = use + i;
+    if (use[i].path == NULL || locate (&u[i].at, use[i].path) != 0) continue; /* opening it reports the reason */
+    u[i].known = stat (pw_folder_of (folder, u[i].at.path), &u[i].folder) == 0;
+  }
   for (int i = 0; i < count && status == PW_OK; i++)
     for (int k = 0; k < count && status == PW_OK; k++)
       if (i != k && location_conflicts (u + i, u + k)) status = location_fail (u[i].use, u[k].use, error);
@@ -332,7 +174,7 @@ int pw_check_paths (const pw_use *use, int count, pw_error *error) {
   return status;
 }
 
-/* Files and folders that are locked while a process uses them.
+/* ---- Locks of files and folders ----
  *
  * The lock counts, not the existence of the file: a lock ends with its process, so a file that one left is no lock. */
 
@@ -347,7 +189,8 @@ static int lock_acquire (int file) {
   return 0;
 }
 
-const char *pw_lock_reason (int code) {
+/* Of an errno value, for messages. */
+static const char *lock_reason (int code) {
   return code == EWOULDBLOCK ? "another process is writing it"
          : code == ELOOP     ? "its temporary name is a symbolic link"
          : code == ENODEV    ? "its temporary name is not that of a regular file"
@@ -388,7 +231,7 @@ int pw_lock_file (const char *path, pw_lock_mode mode) {
 
 int pw_lock_path (const char *path, pw_error *error) {
   int file = pw_lock_file (path, PW_LOCK_KEEP);
-  if (file < 0) pw_fail (error, PW_RESOURCE, "cannot write %s: %s", path, pw_lock_reason (errno));
+  if (file < 0) pw_fail (error, PW_RESOURCE, "cannot write %s: %s", path, lock_reason (errno));
   return file;
 }
 
@@ -401,4 +244,434 @@ int pw_lock_folder (const char *path, pw_error *error) {
   pw_fail (error, PW_RESOURCE, "cannot write into %s: %s", path,
            code == EWOULDBLOCK ? "another process is writing into it" : strerror (code));
   return -1;
+}
+
+/* ---- Outputs ----
+ *
+ * The temporary file is locked until its folder is on the disk, so that two processes never write the same output. */
+
+struct pw_output {
+  FILE *stream;       /* NULL: closed, but not renamed yet */
+  char path[PW_PATH]; /* as the user knows it */
+  char real[PW_PATH]; /* of the file itself, links followed */
+  char part[PW_PATH]; /* its temporary name; "": written directly */
+  char old[PW_PATH];  /* second name of the file that it replaces, while several are renamed */
+  int file;           /* keeps the temporary file locked; -1: written directly */
+  int folder;         /* that contains it; -1: written directly, or the folder is not readable */
+  int code;           /* errno of the first failed write; -1: unknown; 0: none has failed */
+  int continued;      /* 1: opened by pw_output_continue */
+  int discard;        /* 1: the temporary file is removed if finishing fails */
+};
+
+static void output_free (pw_output *o) {
+  if (o == NULL) return;
+  if (o->file >= 0) close (o->file);
+  if (o->folder >= 0) close (o->folder);
+  free (o);
+}
+
+static const char *output_shown (const pw_output *o) {
+  return strcmp (o->path, "-") == 0 ? "standard output" : o->path;
+}
+
+/* The reason for messages; code: an errno value, or -1 if it is unknown. */
+static const char *output_reason (const pw_output *o, int code) {
+  return code <= 0 ? "a write failed" : *o->part ? lock_reason (code) : strerror (code);
+}
+
+static int output_fail (const pw_output *o, int code, pw_error *error) {
+  return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", output_shown (o), output_reason (o, code));
+}
+
+/* The same, and names the temporary file, if that remains. */
+static int output_fail_with_part (const pw_output *o, int code, pw_error *error) {
+  if (*o->part == 0 || o->discard) return output_fail (o, code, error);
+  return pw_fail (error, PW_RESOURCE, "cannot write %.200s: %s; what was written is in %.200s", output_shown (o),
+                  output_reason (o, code), o->part);
+}
+
+/* Makes a stream of a descriptor, which may be -1.  Like the functions below, returns 0 or an errno value. */
+static int output_stream_of (pw_output *o, int file, const char *mode) {
+  o->stream = file < 0 ? NULL : fdopen (file, mode);
+  if (o->stream) return 0;
+  int code = errno;
+  if (file >= 0) close (file);
+  return code;
+}
+
+/* Opens a descriptor of the process or a file that is not regular.  A FIFO waits for a reader or a signal. */
+static int output_open_direct (pw_output *o, const location *p) {
+  int flags = p->descriptor < 0 ? O_WRONLY : fcntl (p->descriptor, F_GETFL);
+  if (flags < 0) return errno;
+  if ((flags & O_ACCMODE) == O_RDONLY) return EBADF;
+  if (p->descriptor == STDOUT_FILENO) {
+    o->stream = stdout;
+    return 0;
+  }
+  int file =
+      p->descriptor < 0 ? open (p->path, O_WRONLY | O_NOCTTY | O_CLOEXEC) : fcntl (p->descriptor, F_DUPFD_CLOEXEC, 3);
+  return output_stream_of (o, file, "w");
+}
+
+/* Gives the new file owner and group of the old one, or the group alone, as permitted, and its mode; without the owner
+ * no set-user-ID bit, without the group no set-group-ID bit either. */
+static int output_inherit (int file, const struct stat *old) {
+  struct stat now;
+  if (fstat (file, &now) != 0) return errno;
+  int owner = (now.st_uid == old->st_uid && now.st_gid == old->st_gid) || fchown (file, old->st_uid, old->st_gid) == 0;
+  int group = owner || fchown (file, (uid_t)-1, old->st_gid) == 0;
+  mode_t mode = old->st_mode & (owner ? 07777 : group ? 03777 : 0777);
+  return (now.st_mode & 07777) != mode && fchmod (file, mode) != 0 ? errno : 0;
+}
+
+/* The stream has a separate descriptor, so that the lock outlives it. */
+static int output_stream (pw_output *o) {
+  return output_stream_of (o, fcntl (o->file, F_DUPFD_CLOEXEC, 3), "r+");
+}
+
+static int output_open_part (pw_output *o, pw_lock_mode lock_mode) {
+  char folder[PW_PATH];
+  o->folder = open (pw_folder_of (folder, o->real), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (o->folder < 0 && errno != EACCES) return errno; /* a folder that cannot be listed may still be writable */
+  o->file = pw_lock_file (o->part, lock_mode);
+  return o->file < 0 ? errno : 0;
+}
+
+/* Finds the location of a file to be written; *direct is 1 if it is written directly. */
+static int output_locate (const char *path, location *p, int *direct) {
+  int code = locate (p, path);
+  if (code) return code;
+  if (p->exists && S_ISDIR (p->info.st_mode)) return EISDIR;
+  *direct = p->descriptor >= 0 || (p->exists && !S_ISREG (p->info.st_mode));
+  return !*direct && p->exists && access (p->path, W_OK) != 0 ? errno : 0;
+}
+
+char *pw_output_path (const char *path, pw_error *error) {
+  location p;
+  int direct, code = output_locate (path, &p, &direct);
+  char *copy = code || direct ? NULL : strdup (p.path);
+  const char *why = code ? strerror (code) : direct ? pw_not_regular (p.info.st_mode) : "out of memory";
+  if (copy == NULL) pw_fail (error, PW_RESOURCE, "cannot write %s: %s", path, why);
+  return copy;
+}
+
+/* Finds the location `p`, and the other names of the file unless it is written directly. */
+static int output_name (pw_output *o, location *p, const char *ending) {
+  int direct, code = output_locate (o->path, p, &direct);
+  if (code || direct) return code;
+  pw_path (o->real, "%s", p->path);
+  pw_path (o->part, "%s%s", o->real, ending);
+  pw_path (o->old, "%s.old", o->part);
+  return 0;
+}
+
+static int output_open_file (pw_output *o, const char *ending) {
+  location p;
+  int code = output_name (o, &p, ending);
+  if (code) return code;
+  if (*o->part == 0) return output_open_direct (o, &p);
+  code = output_open_part (o, PW_LOCK_NEW);
+  if (code == 0 && p.exists) code = output_inherit (o->file, &p.info);
+  if (code == 0) code = output_stream (o);
+  if (code && o->file >= 0) unlink (o->part);
+  return code;
+}
+
+static pw_output *output_new (const char *path, pw_error *error) {
+  if (pw_require (path, "the name of a file to write", error) != PW_OK) return NULL;
+  pw_output *o = *path ? calloc (1, sizeof *o) : NULL;
+  if (o == NULL) {
+    pw_fail (error, *path ? PW_RESOURCE : PW_INPUT, *path ? "out of memory" : "the name of a file to write is empty");
+    return NULL;
+  }
+  o->file = o->folder = -1;
+  pw_path (o->path, "%s", path);
+  return o;
+}
+
+pw_output *pw_output_open_as (const char *path, const char *ending, pw_error *error) {
+  pw_output *o = output_new (path, error);
+  if (o == NULL) return NULL;
+  o->discard = strcmp (ending, ".part") != 0;
+  int code = output_open_file (o, ending);
+  if (code == 0) return o;
+  if (code == ENOMEM) pw_fail (error, PW_RESOURCE, "cannot write %s: out of memory", path);
+  output_fail (o, code, error);
+  output_free (o);
+  return NULL;
+}
+
+pw_output *pw_output_open (const char *path, pw_error *error) {
+  return pw_output_open_as (path, ".part", error);
+}
+
+FILE *pw_output_stream (pw_output *o) {
+  return o->stream;
+}
+
+int pw_output_is_file (const pw_output *o) {
+  return *o->part != 0;
+}
+
+int pw_output_check (pw_output *o, pw_error *error) {
+  if (!ferror (o->stream)) return PW_OK;
+  if (o->code == 0) o->code = errno;
+  return output_fail (o, o->code, error);
+}
+
+/* Flushes the stream and writes a regular file to the disk.  0, an errno value, or -1 for an unknown reason. */
+static int output_sync (pw_output *o) {
+  if (ferror (o->stream)) return o->code ? o->code : -1;
+  errno = 0;
+  if (fflush (o->stream) == 0 && (o->file < 0 || fsync (o->file) == 0)) return 0;
+  return errno ? errno : -1;
+}
+
+/* Closes the stream, except standard output.  Returns `code` unless it is 0, else as output_sync. */
+static int output_close (pw_output *o, int code) {
+  FILE *f = o->stream;
+  o->stream = NULL;
+  errno = 0;
+  if (f == NULL || f == stdout || fclose (f) == 0 || code) return code;
+  return errno ? errno : -1;
+}
+
+int pw_output_ready (pw_output *o, pw_error *error) {
+  if (o->stream) o->code = output_close (o, output_sync (o));
+  return o->code ? output_fail_with_part (o, o->code, error) : PW_OK;
+}
+
+/* Truncates the temporary file after its last complete line. */
+static void output_truncate (pw_output *o) {
+  char c;
+  off_t end = lseek (o->file, 0, SEEK_END), keep = end;
+  while (keep > 0 && pread (o->file, &c, 1, keep - 1) == 1 && c != '\n') keep--;
+  if (keep < end && ftruncate (o->file, keep) != 0) return; /* keep the incomplete line */
+}
+
+char *pw_output_abandon (pw_output *o, char *buffer, size_t size) {
+  if (o->stream) output_close (o, fflush (o->stream));
+  buffer[0] = 0;
+  if (*o->part && !pw_output_named (o, ".npz")) output_truncate (o); /* archives are complete, and have no lines */
+  if (*o->part) snprintf (buffer, size, "%s", o->part);
+  output_free (o);
+  return *buffer ? buffer : NULL;
+}
+
+void pw_output_discard (pw_output *o) {
+  output_close (o, 0);
+  if (*o->part) unlink (o->part);
+  output_free (o);
+}
+
+/* Writes the folder, with the new name, to the disk; file systems that refuse this do not need it. */
+static int output_sync_folder (const pw_output *o, pw_error *error) {
+  if (o->folder < 0 || fsync (o->folder) == 0 || errno == EINVAL || errno == EROFS || errno == ENOTSUP) return PW_OK;
+  return pw_fail (error, PW_RESOURCE, "%s is written, but its folder cannot be written to disk: %s", o->path,
+                  strerror (errno));
+}
+
+/* Keeps the file that will be replaced under its second name, a hard link; without hard links, under that name only.
+ * 0, also if there is none, or -1. */
+static int output_keep_old (const pw_output *o) {
+  struct stat info;
+  unlink (o->old);
+  if (link (o->real, o->old) == 0 || stat (o->real, &info) != 0 || !S_ISREG (info.st_mode)) return 0;
+  return rename (o->real, o->old);
+}
+
+/* Renames all files or none: replaced files are kept until the last one is renamed. */
+static int output_rename_all (pw_output *const *o, int count, pw_error *error) {
+  int last = count - 1, failed = count, status = PW_OK; /* failed: the file that cannot be renamed */
+  while (last > 0 && (o[last] == NULL || *o[last]->part == 0)) last--;
+  for (int i = 0; i <= last && status == PW_OK; i++) {
+    if (o[i] == NULL || *o[i]->part == 0) continue;
+    if ((i == last || output_keep_old (o[i]) == 0) && rename (o[i]->part, o[i]->real) == 0) continue;
+    status = output_fail_with_part (o[failed = i], errno, error);
+  }
+  for (int i = 0; i < last; i++) {
+    if (o[i] == NULL || *o[i]->part == 0) continue;
+    if (status != PW_OK && i < failed) (void)rename (o[i]->real, o[i]->part);
+    if (status != PW_OK && i <= failed) (void)rename (o[i]->old, o[i]->real);
+    unlink (o[i]->old);
+  }
+  return status;
+}
+
+int pw_output_finish_all (pw_output *const *o, int count, pw_error *error) {
+  int status = PW_OK;
+  for (int i = 0; i < count; i++)
+    if (o[i] && status == PW_OK) status = pw_output_ready (o[i], error);
+  if (status == PW_OK) status = output_rename_all (o, count, error);
+  int complete = status == PW_OK;
+  for (int i = 0; i < count; i++) {
+    if (o[i] == NULL) continue;
+    if (complete && status == PW_OK) status = output_sync_folder (o[i], error);
+    if (complete)
+      output_free (o[i]);
+    else if (o[i]->discard)
+      pw_output_discard (o[i]);
+    else
+      pw_output_abandon (o[i], (char[2]){ 0 }, 2);
+  }
+  return status;
+}
+
+int pw_output_finish (pw_output *o, pw_error *error) {
+  return pw_output_finish_all (&o, 1, error);
+}
+
+/* ---- Continuation of an interrupted run ---- */
+
+/* Sets mark->check from the last OUTPUT_CHECKED bytes before mark->length; PW_RETRY if the file is shorter or
+ * cannot be read. */
+enum { OUTPUT_CHECKED = 65536 };
+static int output_checksum (int file, pw_mark *mark) {
+  char bytes[OUTPUT_CHECKED];
+  size_t size = mark->length < sizeof bytes ? (size_t)mark->length : sizeof bytes;
+  for (size_t left = size; left > 0;) {
+    ssize_t n = pread (file, bytes + size - left, left, (off_t)(mark->length - left));
+    if (n == 0 || (n < 0 && errno != EINTR)) return PW_RETRY;
+    if (n > 0) left -= (size_t)n;
+  }
+  mark->check = pw_check_sum (PW_CHECK, bytes, size);
+  return PW_OK;
+}
+
+int pw_output_named (const pw_output *o, const char *ending) {
+  const size_t length = strlen (o->path), size = strlen (ending);
+  return length > size && strcasecmp (o->path + length - size, ending) == 0;
+}
+
+int pw_output_continued (const pw_output *o) {
+  return o->continued;
+}
+
+int pw_output_mark (pw_output *o, pw_mark *mark, pw_error *error) {
+  if (*o->part == 0)
+    return pw_fail (error, PW_INPUT, "%s cannot be continued: it is not a regular file", output_shown (o));
+  int code = output_sync (o);
+  if (code) return output_fail (o, code, error);
+  mark->length = (unsigned long long)ftello (o->stream);
+  if (output_checksum (o->file, mark) == PW_OK) return PW_OK;
+  return pw_fail (error, PW_RESOURCE, "cannot read %s", o->part);
+}
+
+/* 1 if the temporary file begins with the marked contents. */
+static int output_is_marked (const pw_output *o, const pw_mark *mark) {
+  pw_mark now = { .length = mark->length };
+  return output_checksum (o->file, &now) == PW_OK && now.check == mark->check;
+}
+
+/* Takes a table under its final name, which a process killed just after completing it has left. */
+static int output_restore_part (pw_output *o, const pw_mark *mark) {
+  int file = pw_lock_file (o->real, PW_LOCK_EXISTING);
+  if (file < 0) return errno;
+  o->file = file;
+  return output_is_marked (o, mark) && rename (o->real, o->part) != 0 ? errno : 0;
+}
+
+static int output_reopen (pw_output *o, const pw_mark *mark, pw_error *error) {
+  location p;
+  int code = output_name (o, &p, ".part");
+  if (code) return output_fail (o, code, error);
+  if (*o->part == 0) return pw_fail (error, PW_INPUT, "cannot continue %s: it is not a regular file", o->path);
+  code = output_open_part (o, PW_LOCK_EXISTING);
+  int absent = code == ENOENT;
+  if (absent) code = output_restore_part (o, mark);
+  if (code == ENOENT) return pw_fail (error, PW_INPUT, "cannot continue %s: there is no %s", o->path, o->part);
+  if (code) return output_fail (o, code, error);
+  if (!output_is_marked (o, mark))
+    return pw_fail (error, PW_INPUT, "cannot continue %s: %s is not the table that the checkpoint belongs to", o->path,
+                    absent ? "it" : o->part);
+  code = output_stream (o);
+  if (code == 0 &&
+      (fseeko (o->stream, (off_t)mark->length, SEEK_SET) != 0 || ftruncate (o->file, (off_t)mark->length) != 0))
+    code = errno;
+  return code ? pw_fail (error, PW_RESOURCE, "cannot write %s: %s", o->part, strerror (code)) : PW_OK;
+}
+
+pw_output *pw_output_continue (const char *path, const pw_mark *mark, pw_error *error) {
+  pw_output *o = output_new (path, error);
+  if (o && output_reopen (o, mark, error) == PW_OK) {
+    o->continued = 1;
+    return o;
+  }
+  if (o && o->stream) fclose (o->stream);
+  output_free (o);
+  return NULL;
+}
+
+/* ---- Checkpoints ---- */
+
+static unsigned long long checkpoint_sum (const char *head, size_t head_size, const void *state, size_t state_size) {
+  return pw_check_sum (pw_check_sum (PW_CHECK, head, head_size), state, state_size);
+}
+
+int pw_checkpoint_put (pw_output *o, const char *head, const pw_archive *state, pw_error *error) {
+  FILE *f = pw_output_stream (o);
+  errno = 0; /* for pw_output_check */
+  fprintf (f, "%sstate = %zu bytes, check sum %016llx\n", head, state->used,
+           checkpoint_sum (head, strlen (head), state->at, state->used));
+  if (state->used > 0) fwrite (state->at, 1, state->used, f);
+  int status = pw_output_check (o, error);
+  if (status == PW_OK) return pw_output_finish (o, error);
+  pw_output_discard (o);
+  return status;
+}
+
+int pw_checkpoint_write (const char *path, const char *head, const pw_archive *state, pw_error *error) {
+  pw_output *o = pw_output_open_as (path, ".next", error); /* as the program names the next checkpoint of a run */
+  return o ? pw_checkpoint_put (o, head, state, error) : error ? error->status : PW_RESOURCE;
+}
+
+#define CHECKPOINT_MAX_BYTES (SIZE_MAX / 4) /* no limit in practice; sums of sizes do not overflow */
+
+static int checkpoint_version (const char *path, const char *text, pw_error *error) {
+  static const char magic[] = PW_CHECKPOINT_MAGIC;
+  size_t word = strcspn (magic, "0123456789");
+  if (strncmp (text, magic, word) != 0) return pw_fail (error, PW_INPUT, "%s is not a checkpoint of Pinwheel", path);
+  long format = strtol (text + word, NULL, 10), readable = strtol (magic + word, NULL, 10);
+  if (format > 0 && format != readable)
+    return pw_fail (error, PW_INPUT, "%s is a checkpoint of format %ld; this Pinwheel reads format %ld", path, format,
+                    readable);
+  if (strncmp (text, magic, sizeof magic - 1) == 0) return PW_OK;
+  return pw_fail (error, PW_INPUT, "the checkpoint %s is truncated or damaged", path);
+}
+
+/* Finds the end of the head, and the state after it, in a file of `size` bytes. */
+static int checkpoint_parse (const char *path, pw_checkpoint *c, size_t size, pw_error *error) {
+  size_t state_size = 0;
+  unsigned long long sum = 0;
+  int n = 0; /* length of the line after the head */
+  static const char last[] = "\nend\n";
+  const char *end = strstr (c->text, last);
+  c->head_end = end ? end + strlen (last) : NULL;
+  if (end == NULL || sscanf (c->head_end, "state = %zu bytes, check sum %16llx%n", &state_size, &sum, &n) != 2 ||
+      c->head_end[n] != '\n')
+    return pw_fail (error, PW_INPUT, "the checkpoint %s is truncated or damaged", path);
+  const char *state = c->head_end + n + 1;
+  size_t head_size = (size_t)(c->head_end - c->text), found = size - (size_t)(state - c->text);
+  if (found < state_size)
+    return pw_fail (error, PW_INPUT, "the checkpoint %s is truncated: found %zu bytes of %zu", path, size,
+                    size - found + state_size);
+  if (found > state_size || checkpoint_sum (c->text, head_size, state, state_size) != sum)
+    return pw_fail (error, PW_INPUT, "the checkpoint %s is damaged: its checksum is wrong", path);
+  c->state = (pw_archive){ .at = (unsigned char *)c->text + (state - c->text), .size = state_size, .loading = 1 };
+  return PW_OK;
+}
+
+int pw_checkpoint_read (const char *path, pw_checkpoint *c, pw_error *error) {
+  size_t size = 0;
+  *c = (pw_checkpoint){ .text = NULL };
+  if (pw_require (path, "the name of a checkpoint", error) != PW_OK) return PW_INPUT;
+  int status = pw_read_file ("cannot read the checkpoint", path, CHECKPOINT_MAX_BYTES, "the limit for a checkpoint",
+                             &c->text, &size, error);
+  if (status == PW_OK) status = checkpoint_version (path, c->text, error);
+  return status == PW_OK ? checkpoint_parse (path, c, size, error) : status;
+}
+
+void pw_checkpoint_free (pw_checkpoint *c) {
+  free (c->text);
+  *c = (pw_checkpoint){ .text = NULL };
 }

@@ -110,13 +110,6 @@ static void json_elements (pw_json *j, const pw_system *s, const pw_sample *x) {
   pw_json_close (j, '}');
 }
 
-static void json_reactions (pw_json *j, const pw_system *s, const pw_sample *x) {
-  pw_json_open (j, "reactions", '{');
-  for (int i = 0; i < pw_system_rows (s); i++)
-    pw_json_number (j, PW_NAME (pw_system_reaction_name, s, i), 0 - x->lambda[i]);
-  pw_json_close (j, '}');
-}
-
 /* Opens an object for what is known; if that is NULL, writes null and returns 0. */
 static int json_object (pw_json *j, const char *key, const void *known) {
   known ? pw_json_open (j, key, '{') : pw_json_text (j, key, NULL);
@@ -140,7 +133,10 @@ static void json_sample (pw_json *j, const pw_system *s, const pw_sample *x, int
   pw_json_number (j, "t", x->t);
   json_bodies (j, s, x);
   json_elements (j, s, x);
-  json_reactions (j, s, x);
+  pw_json_open (j, "reactions", '{');
+  for (int i = 0; i < pw_system_rows (s); i++)
+    pw_json_number (j, PW_NAME (pw_system_reaction_name, s, i), 0 - x->lambda[i]);
+  pw_json_close (j, '}');
   const double energy[] = { x->kinetic, x->potential, x->work, x->loss, x->projection, x->balance };
   json_numbers (j, "energy", names, ledger ? energy : NULL, 6);
 }
@@ -197,12 +193,10 @@ static void json_statistics (pw_json *j, const pw_statistics *n, double cpu) {
   pw_json_close (j, '}');
 }
 
-enum { JSON_ALL_LEVELS = 99 };
-
 int pw_json_write (const pw_summary *summary, const pw_system *s, const pw_sample *sample, int ledger,
                    const pw_statistics *statistics, pw_output *o, pw_error *error) {
   if (pw_require (summary, "a summary", error) != PW_OK || pw_require (o, "an output", error) != PW_OK) return PW_INPUT;
-  pw_json j = { .f = pw_output_stream (o), .lines = JSON_ALL_LEVELS };
+  pw_json j = { .f = pw_output_stream (o), .lines = 99 /* all levels */ };
   errno = 0;
   pw_json_open (&j, NULL, '{');
   pw_json_number (&j, "schema", 1);

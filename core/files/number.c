@@ -1,13 +1,12 @@
-/* Numbers as text, with a decimal point in every locale. */
+/* Numbers as text, with a decimal point in every locale; texts of limited size. */
 #define __STDC_WANT_IEC_60559_BFP_EXT__ 1 /* strfromd */
 #include <ctype.h>
+#include <errno.h>
 #include <locale.h>
 #include <math.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include "pinwheel-files.h"
 #include "files.h"
 
 /* strfromd, since printf takes a slower path once LAPACK has loaded libquadmath. */
@@ -48,12 +47,21 @@ int pw_read_number (const char *text, double *value) {
   return PW_OK;
 }
 
-/* Paths in buffers. */
+enum { READ_CHUNK = 1 << 16 }; /* bytes */
 
-char *pw_path (char path[PW_PATH], const char *format, ...) {
-  va_list arguments;
-  va_start (arguments, format);
-  vsnprintf (path, PW_PATH, format, arguments);
-  va_end (arguments);
-  return path;
+int pw_read_rest (FILE *f, size_t max_bytes, const char *path, const char *limit, char **text, size_t *size,
+                  pw_error *error) {
+  size_t room = 0;
+  *text = NULL;
+  *size = 0;
+  for (size_t n = 1; n > 0; *size += n) {
+    if (pw_grow (text, *size + READ_CHUNK, &room, 1) != PW_OK)
+      return pw_fail (error, PW_RESOURCE, "%s: out of memory", path);
+    n = fread (*text + *size, 1, room - *size - 1, f);
+    (*text)[*size + n] = 0;
+    if (*size + n > max_bytes)
+      return pw_fail (error, PW_INPUT, "%s: the file has more than %g MB, %s", path, (double)(max_bytes >> 10) / 1024,
+                      limit);
+  }
+  return ferror (f) ? pw_fail (error, PW_INPUT, "cannot read %s: %s", path, strerror (errno)) : PW_OK;
 }

@@ -15,6 +15,72 @@
 #include "pinwheel.h"
 #include "pinwheel-files.h"
 
+/* ---- Names and numbers in a text ---- */
+
+#define DIGITS "0123456789"
+#define LETTERS "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ_"
+
+/* The length of the name at p, which may contain dots (frame.phi); 0 if there is none. */
+static size_t name_size (const char *p) {
+  return strspn (p, LETTERS) ? strspn (p, LETTERS DIGITS ".") : 0;
+}
+
+/* The length of the number at p: digits, perhaps with a decimal point and an exponent; 0 if there is none. */
+static size_t number_size (const char *p) {
+  size_t whole = strspn (p, DIGITS), decimals = p[whole] == '.' ? strspn (p + whole + 1, DIGITS) : 0;
+  if (whole + decimals == 0) return 0;
+  const char *end = p + whole + (p[whole] == '.' ? 1 + decimals : 0); /* of the mantissa */
+  if (*end != 'e' && *end != 'E') return (size_t)(end - p);
+  const char *exponent = end + 1 + (end[1] == '+' || end[1] == '-');
+  size_t digits = strspn (exponent, DIGITS);
+  return (size_t)(digits ? exponent + digits - p : end - p);
+}
+
+int pw_expression_number (const char *text, double *value) {
+  size_t sign = *text == '+' || *text == '-', n = number_size (text + sign);
+  return n && text[sign + n] == 0 && pw_read_number (text, value) == PW_OK;
+}
+
+int pw_expression_is_reserved (const char *text) {
+  return pw_expression_find_function (text) >= 0;
+}
+
+int pw_expression_is_name (const char *text) {
+  size_t n = name_size (text);
+  return n && text[n] == 0 && n < 64 && strchr (text, '.') == NULL;
+}
+
+const char *pw_expression_next_name (const char **rest, char name[PW_EXPRESSION_NAME]) {
+  while (**rest) {
+    const char *p = *rest;
+    size_t n = name_size (p), number = n ? 0 : number_size (p);
+    *rest += n ? n : number ? number : 1;
+    if (n == 0) continue;
+    snprintf (name, PW_EXPRESSION_NAME, "%.*s", (int)n, p);
+    return p;
+  }
+  return NULL;
+}
+
+/* ---- Named numbers ---- */
+
+int pw_scope_open (pw_scope *s, int room, pw_arena *arena) {
+  size_t n = (size_t)room + 1; /* never an empty allocation */
+  s->name = pw_arena_alloc (arena, n * sizeof *s->name);
+  s->value = pw_arena_alloc (arena, n * sizeof *s->value);
+  return s->name && s->value ? pw_names_open (&s->index, (size_t)room) : PW_RESOURCE;
+}
+
+void pw_scope_close (pw_scope *s) {
+  pw_names_close (&s->index);
+}
+
+void pw_scope_add (pw_scope *s, const char *name, double value) {
+  s->name[s->names] = name;
+  s->value[s->names] = value;
+  pw_names_add (&s->index, name, s->names++);
+}
+
 enum { PARSER_MAX_LENGTH = 4000, PARSER_MAX_DEPTH = 200 };
 
 /* What the value of a part depends on; variables other than the time are states. */
@@ -81,7 +147,7 @@ static void parser_next (parser *p) {
   word += strspn (word, " \t\r\n");
   p->at = (size_t)(word - p->text);
   p->symbol = NULL;
-  size_t name = pw_expression_name_size (word), number = pw_expression_number_size (word);
+  size_t name = name_size (word), number = number_size (word);
   p->size = name ? name : number ? number : *word != 0;
   p->type = name ? 'n' : number ? '0' : *word;
   if (name || number || *word == 0 || strchr ("(),?:", *word)) return;
@@ -110,14 +176,9 @@ static void parser_push (parser *p, int op, int index, double value) {
     p->code[p->codes++] = (pw_expression_code){ (short)op, (short)index, value };
 }
 
-/* The part that begins with the current token. */
-static parser_part parser_begin (const parser *p) {
-  return (parser_part){ .from = p->at, .first = p->codes };
-}
-
 /* A constant or variable, the current token. */
 static parser_part parser_leaf (parser *p, int op, int index, double value) {
-  parser_part part = parser_begin (p);
+  parser_part part = { .from = p->at, .first = p->codes };
   if (op == PW_OP_VARIABLE) part.depends = index == PW_EXPRESSION_TIME ? DEPENDS_ON_TIME : DEPENDS_ON_STATES;
   parser_push (p, op, index, value);
   parser_next (p);
@@ -126,13 +187,12 @@ static parser_part parser_leaf (parser *p, int op, int index, double value) {
 
 /* Appends an operation on `part` and operands that depend on `depends`; a constant result is replaced by its value. */
 static parser_part parser_operation (parser *p, parser_part part, int depends, int op, int index) {
-  int may_jump = 0;
   part.depends |= depends;
   part.condition = op >= PW_OP_LESS && op <= PW_OP_UNEQUAL;
   parser_push (p, op, index, 0);
   if (p->status != PW_OK) return part;
   if (part.depends == 0) {
-    double value = pw_expression_run (p->code + part.first, p->codes - part.first, NULL, &may_jump);
+    double value = pw_expression_run (p->code + part.first, p->codes - part.first, NULL, &(int){ 0 });
     p->codes = part.first + 1;
     p->code[part.first] = (pw_expression_code){ PW_OP_CONSTANT, 0, value };
   }
@@ -215,7 +275,7 @@ static parser_part parser_name (parser *p, const char *name, const pw_expression
 /* min and max combine more than two arguments pairwise. */
 static parser_part parser_call (parser *p, int index) {
   const pw_expression_function *f = &pw_expression_functions[index];
-  parser_part part = parser_begin (p);
+  parser_part part = { .from = p->at, .first = p->codes };
   int arguments = 0;
   parser_next (p);
   size_t open = p->at;
@@ -273,7 +333,7 @@ static parser_part parser_operand (parser *p) {
 /* ---- Operators ---- */
 
 static parser_part parser_unary (parser *p) {
-  parser_part part = parser_begin (p);
+  parser_part part = { .from = p->at, .first = p->codes };
   int op = p->symbol ? p->symbol->op : 0;
   int sign = op == PW_OP_ADD || op == PW_OP_SUBTRACT;
   if (!sign) part = parser_operand (p);
@@ -351,6 +411,7 @@ int pw_expression_read (const pw_scope *s, const char *const *variable, const ch
 
 int pw_expression_constant (const pw_scope *s, const char *text, double *value, pw_expression_error *error) {
   parser p;
+  if (pw_expression_number (text, value)) return PW_OK;
   if (parser_read (&p, s, NULL, text, error) == PW_OK) *value = p.code[0].value;
   return p.status;
 }
@@ -361,71 +422,7 @@ int pw_read_expression (const char *text, double *value) {
   return pw_expression_constant (NULL, text, value, &error);
 }
 
-/* Names and numbers in a text, and named numbers. */
-
-#define DIGITS "0123456789"
-#define LETTERS "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ_"
-
-size_t pw_expression_name_size (const char *p) {
-  return strspn (p, LETTERS) ? strspn (p, LETTERS DIGITS ".") : 0;
-}
-
-size_t pw_expression_number_size (const char *p) {
-  size_t whole = strspn (p, DIGITS), decimals = p[whole] == '.' ? strspn (p + whole + 1, DIGITS) : 0;
-  if (whole + decimals == 0) return 0;
-  const char *end = p + whole + (p[whole] == '.' ? 1 + decimals : 0); /* of the mantissa */
-  if (*end != 'e' && *end != 'E') return (size_t)(end - p);
-  const char *exponent = end + 1 + (end[1] == '+' || end[1] == '-');
-  size_t digits = strspn (exponent, DIGITS);
-  return (size_t)(digits ? exponent + digits - p : end - p);
-}
-
-int pw_expression_number (const char *text, double *value) {
-  size_t sign = *text == '+' || *text == '-', n = pw_expression_number_size (text + sign);
-  return n && text[sign + n] == 0 && pw_read_number (text, value) == PW_OK;
-}
-
-int pw_expression_is_reserved (const char *text) {
-  return pw_expression_find_function (text) >= 0;
-}
-
-int pw_expression_is_name (const char *text) {
-  size_t n = pw_expression_name_size (text);
-  return n && text[n] == 0 && n < 64 && strchr (text, '.') == NULL;
-}
-
-const char *pw_expression_next_name (const char **rest, char name[PW_EXPRESSION_NAME]) {
-  while (**rest) {
-    const char *p = *rest;
-    size_t n = pw_expression_name_size (p), number = n ? 0 : pw_expression_number_size (p);
-    *rest += n ? n : number ? number : 1;
-    if (n == 0) continue;
-    snprintf (name, PW_EXPRESSION_NAME, "%.*s", (int)n, p);
-    return p;
-  }
-  return NULL;
-}
-
-/* ---- Named numbers ---- */
-
-int pw_scope_open (pw_scope *s, int room, pw_arena *arena) {
-  size_t n = (size_t)room + 1; /* never an empty allocation */
-  s->name = pw_arena_alloc (arena, n * sizeof *s->name);
-  s->value = pw_arena_alloc (arena, n * sizeof *s->value);
-  return s->name && s->value ? pw_names_open (&s->index, (size_t)room) : PW_RESOURCE;
-}
-
-void pw_scope_close (pw_scope *s) {
-  pw_names_close (&s->index);
-}
-
-void pw_scope_add (pw_scope *s, const char *name, double value) {
-  s->name[s->names] = name;
-  s->value[s->names] = value;
-  pw_names_add (&s->index, name, s->names++);
-}
-
-/* Formulas: expressions of named numbers, none of which is the time. */
+/* ---- Formulas: expressions of named numbers, none of which is the time ---- */
 
 struct pw_formula {
   pw_arena arena;
@@ -451,8 +448,8 @@ pw_formula *pw_formula_open (const char *text, const char *const *names, pw_erro
 }
 
 double pw_formula_value (const pw_formula *f, const double *value) {
-  int may_jump; /* unused: without a time, there is no value just after a jump */
-  return pw_expression_run (f->expression->code, f->expression->codes, value, &may_jump);
+  /* jumps do not matter: without a time, there is no value just after one */
+  return pw_expression_run (f->expression->code, f->expression->codes, value, &(int){ 0 });
 }
 
 void pw_formula_close (pw_formula *f) {

@@ -112,7 +112,7 @@ pw_formula *pw_formula_open (const char *text, const char *const *names, pw_erro
 double pw_formula_value (const pw_formula *f, const double *value);
 void pw_formula_close (pw_formula *f);
 
-/* ---- Tables of numbers: units in their headers, "NAME [UNIT]" (columns.c), and columns (columns.c) ---- */
+/* ---- Tables of numbers, and units in their headers, "NAME [UNIT]" (columns.c) ---- */
 
 /* Finds the factor from a unit to SI units.  PW_INPUT if it is unknown, PW_RETRY if its dimension is not that of
  * `wanted`, unless that is NULL or unknown. */

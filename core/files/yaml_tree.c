@@ -8,8 +8,8 @@
 enum { TREE_PIECE = 4096 }; /* bytes given to the parser at once */
 
 typedef struct {
-  pw_reader r;
-  pw_yaml *y; /* r.y; receives the nodes */
+  pw_yaml *y; /* receives the nodes */
+  pw_error *error;
   struct fy_parser *parser;
   struct fy_diag *diag;
   struct fy_token_iter *pieces;  /* iterates over the pieces of a scalar */
@@ -50,7 +50,7 @@ static unsigned tree_event_offset (tree *x, struct fy_event *e) {
 
 static pw_node *tree_add (tree *x, pw_yaml_type type, unsigned at) {
   pw_node *n = pw_arena_alloc (&x->y->arena, sizeof *n);
-  if (n == NULL) return pw_yaml_no_memory (&x->r), NULL;
+  if (n == NULL) return pw_yaml_no_memory (x->y, x->error), NULL;
   n->type = (unsigned char)type;
   n->at = x->at = at;
   if (x->depth == 0) {
@@ -88,27 +88,25 @@ static void tree_scalar (tree *x, struct fy_event *e) {
   pw_node *n = tree_add (x, PW_YAML_SCALAR, at - (quoted && at > 0));
   char *text = n && size >= 0 ? pw_arena_alloc (&x->y->arena, (size_t)size + 1) : NULL;
   if (text == NULL || tree_text (x, token, text) != size) {
-    pw_yaml_no_memory (&x->r);
+    pw_yaml_no_memory (x->y, x->error);
     return;
   }
-  if (memchr (text, 0, (size_t)size)) pw_yaml_fail (&x->r, n->at, "a text must not contain the character 0");
-  for (const char *p = text; *p && x->r.error->status == PW_OK; p++) /* possible through escapes */
+  if (memchr (text, 0, (size_t)size)) pw_yaml_fail (x->y, x->error, n->at, "a text must not contain the character 0");
+  for (const char *p = text; *p && x->error->status == PW_OK; p++) /* possible through escapes */
     if (pw_control (p))
-      pw_yaml_fail (&x->r, n->at, "a text must not contain the control character of code %d", pw_control (p));
+      pw_yaml_fail (x->y, x->error, n->at, "a text must not contain the control character of code %d", pw_control (p));
   n->text = text;
   n->quoted = quoted || (token && fy_token_scalar_style (token) != FYSS_PLAIN);
 }
 
 static void tree_begin (tree *x, struct fy_event *e, pw_yaml_type type) {
   unsigned at = tree_event_offset (x, e);
-  if (x->depth == PW_YAML_DEPTH) pw_yaml_fail (&x->r, at, "nested too deeply");
+  if (x->depth == PW_YAML_DEPTH) pw_yaml_fail (x->y, x->error, at, "nested too deeply");
   pw_node *n = x->depth < PW_YAML_DEPTH ? tree_add (x, type, at) : NULL;
   if (n == NULL) return;
   x->open[x->depth] = n;
   x->tail[x->depth++] = &n->first;
 }
-
-/* ---- Events ---- */
 
 /* Refuses aliases, anchors and tags. */
 static int tree_refuse_anchor (tree *x, struct fy_event *e) {
@@ -119,13 +117,11 @@ static int tree_refuse_anchor (tree *x, struct fy_event *e) {
   size_t at = mark && mark->line >= 0 ? tree_offset_of (x, mark) : tree_event_offset (x, e);
   const char *source = x->y->source;
   while (at > 0 && !strchr ("&*!", source[at]) && source[at - 1] != '\n') at--; /* a mark may be that of the name */
-  return pw_yaml_fail (&x->r, at, "%s do not belong in a model file; use parameters",
+  return pw_yaml_fail (x->y, x->error, at, "%s do not belong in a model file; use parameters",
                        e->type == FYET_ALIAS ? "aliases (*)"
                        : anchor              ? "anchors (&)"
                                              : "tags (!)");
 }
-
-/* ---- Input ---- */
 
 /* libfyaml cannot tell a list or map in brackets from a key before it has seen what follows the closing bracket, and
  * until then keeps some 350 bytes for each indicator.  So it receives the source in pieces, and none after too many
@@ -144,20 +140,20 @@ static ssize_t tree_feed (void *user, void *to, size_t count) {
     x->opened += opens - closes;
     x->indicators += opens || closes || *p == ',' || *p == ':';
   }
-  if (x->opened > TREE_NESTED) pw_yaml_fail (&x->r, x->at, "nested too deeply");
+  if (x->opened > TREE_NESTED) pw_yaml_fail (x->y, x->error, x->at, "nested too deeply");
   if (x->indicators > x->y->max_ahead)
-    pw_yaml_fail (&x->r, x->at,
+    pw_yaml_fail (x->y, x->error, x->at,
                   "a list or map in brackets with more than %g commas, colons and brackets, which takes much memory: "
                   "write its entries on separate lines, after \"- \" or \"key: \"",
                   x->y->max_ahead);
-  return x->r.error->status == PW_OK ? (ssize_t)n : 0; /* libfyaml 0.7.12 retries after an error */
+  return x->error->status == PW_OK ? (ssize_t)n : 0; /* libfyaml 0.7.12 retries after an error */
 }
 
 static void tree_event (tree *x, struct fy_event *e) {
   if (tree_refuse_anchor (x, e) != PW_OK) return;
   x->indicators = x->opened = 0;
   if (e->type == FYET_DOCUMENT_START && x->y->root)
-    pw_yaml_fail (&x->r, tree_event_offset (x, e), "a second document; a file contains one model");
+    pw_yaml_fail (x->y, x->error, tree_event_offset (x, e), "a second document; a file contains one model");
   if (e->type == FYET_SCALAR) tree_scalar (x, e);
   if (e->type == FYET_SEQUENCE_START) tree_begin (x, e, PW_YAML_LIST);
   if (e->type == FYET_MAPPING_START) tree_begin (x, e, PW_YAML_MAP);
@@ -194,7 +190,7 @@ static const char *tree_hint (const pw_yaml *y, size_t at, const char *message) 
 static int tree_syntax (tree *x) {
   void *first = NULL;
   struct fy_diag_error *e = fy_diag_errors_iterate (x->diag, &first);
-  if (e == NULL) return pw_yaml_fail (&x->r, x->at, "this is not YAML");
+  if (e == NULL) return pw_yaml_fail (x->y, x->error, x->at, "this is not YAML");
   const char *source = x->y->source;
   size_t at = tree_offset_of (x, &(struct fy_mark){ .line = e->line - 1, .column = e->column - 1 });
   if (at + strspn (source + at, " \t\r\n") == x->y->size && x->depth > 0) {
@@ -202,17 +198,7 @@ static int tree_syntax (tree *x) {
     if (source[begin] == '[' || source[begin] == '{') at = begin;
   }
   const char *message = e->msg ? e->msg : "this is not YAML";
-  return pw_yaml_fail (&x->r, at, "%s%s", message, tree_hint (x->y, at, message));
-}
-
-static void tree_parse (tree *x) {
-  const pw_error *error = x->r.error;
-  struct fy_event *e;
-  while (error->status == PW_OK && (e = fy_parser_parse (x->parser)) != NULL) {
-    if (error->status == PW_OK) tree_event (x, e); /* unless tree_feed has failed */
-    fy_parser_event_free (x->parser, e);
-  }
-  if (error->status == PW_OK && fy_parser_get_stream_error (x->parser)) tree_syntax (x);
+  return pw_yaml_fail (x->y, x->error, at, "%s%s", message, tree_hint (x->y, at, message));
 }
 
 /* Out of memory, libfyaml reports a syntax error, drops a part of the text, or crashes when it opens. */
@@ -221,7 +207,8 @@ enum { TREE_RESERVE = 1 << 16 };
 int pw_yaml_read_tree (pw_yaml *y, pw_error *error) {
   pw_error cause = { 0 };
   struct fy_diag_cfg quiet;
-  tree x = { .r = { .y = y, .error = &cause }, .y = y };
+  struct fy_event *e;
+  tree x = { .y = y, .error = &cause };
   fy_diag_cfg_default (&quiet);
   quiet.fp = NULL;
   errno = 0;
@@ -232,11 +219,14 @@ int pw_yaml_read_tree (pw_yaml *y, pw_error *error) {
     x.parser = fy_parser_create (&how);
     x.pieces = fy_token_iter_create (NULL);
   }
-  if (x.parser && x.pieces && fy_parser_set_input_callback (x.parser, &x, tree_feed) == 0)
-    tree_parse (&x);
-  else
-    pw_yaml_no_memory (&x.r);
-  if (errno == ENOMEM) cause.status = PW_OK, pw_yaml_no_memory (&x.r);
+  if (!x.parser || !x.pieces || fy_parser_set_input_callback (x.parser, &x, tree_feed) != 0)
+    pw_yaml_no_memory (y, &cause);
+  while (cause.status == PW_OK && (e = fy_parser_parse (x.parser)) != NULL) {
+    if (cause.status == PW_OK) tree_event (&x, e); /* unless tree_feed has failed */
+    fy_parser_event_free (x.parser, e);
+  }
+  if (cause.status == PW_OK && fy_parser_get_stream_error (x.parser)) tree_syntax (&x);
+  if (errno == ENOMEM) cause.status = PW_OK, pw_yaml_no_memory (y, &cause);
   fy_token_iter_destroy (x.pieces);
   if (x.parser) fy_parser_destroy (x.parser);
   if (x.diag) fy_diag_destroy (x.diag);

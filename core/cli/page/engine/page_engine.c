@@ -81,7 +81,7 @@ PAGE_EXPORT (open) int page_open (const char *name) {
   page_table = &pw_plugin;
   if (page_table == NULL) {
     pw_yaml *y = pw_yaml_open ("/model", name, PW_FILE_DEFAULT_BYTES, &page_error);
-    page_table = y ? pw_yaml_table (y) : NULL;
+    page_table = y ? &y->table : NULL;
   }
   return page_error.status;
 }

@@ -1,0 +1,127 @@
+/* The text of a model file, messages that point into it, and its tree as bytes.
+ *
+ * The text is checked first: UTF-8, no control characters, no lines that begin with %: some hang libfyaml 0.7.12. */
+#include <stdarg.h>
+#include <string.h>
+#include "yaml.h"
+
+enum { SOURCE_SHOWN = 84 }; /* bytes of a line in a message */
+
+int pw_yaml_line (const pw_yaml *y, size_t at) {
+  int line = 1;
+  for (const char *p = y->source; (p = memchr (p, '\n', (size_t)(y->source + at - p))) != NULL; p++) line++;
+  return line;
+}
+
+static int source_characters (const char *from, const char *to) {
+  int n = 0;
+  for (; from < to; from++) n += (*from & 0xC0) != 0x80;
+  return n;
+}
+
+int pw_yaml_fail (const pw_yaml *y, pw_error *error, size_t at, const char *format, ...) {
+  char text[220], shown[SOURCE_SHOWN + 4];
+  va_list arguments;
+  va_start (arguments, format);
+  vsnprintf (text, sizeof text, format, arguments);
+  va_end (arguments);
+  if (at > y->size) at = y->size;
+  /* What is shown of a long line is the part around the offset, cut between characters. */
+  const char *caret = y->source + at, *end = y->source + y->size, *begin = caret;
+  while (begin > y->source && begin[-1] != '\n') begin--;
+  const char *from = caret - begin > SOURCE_SHOWN / 2 ? caret - SOURCE_SHOWN / 2 : begin;
+  while (from < caret && (*from & 0xC0) == 0x80) from++;
+  const char *to = from;
+  while (to < end && *to != '\n' && *to != '\r' && to - from < SOURCE_SHOWN) to++;
+  while (to > caret && (*to & 0xC0) == 0x80) to--;
+  snprintf (shown, sizeof shown, "%s%.*s", from > begin ? "..." : "", (int)(to - from), from);
+  for (char *tab = shown; (tab = strchr (tab, '\t')) != NULL;) *tab = ' '; /* one column, as in the line of the caret */
+  size_t n = strlen (y->path);
+  return pw_fail (error, PW_INPUT, "%s%s:%d:%d: error: %s\n  %s\n  %*s^", n > 100 ? "..." : "",
+                  n > 100 ? y->path + n - 97 : y->path, pw_yaml_line (y, at), 1 + source_characters (begin, caret),
+                  text, shown, source_characters (from, caret) + 3 * (from > begin), "");
+}
+
+int pw_yaml_no_memory (const pw_yaml *y, pw_error *error) {
+  return pw_fail (error, PW_RESOURCE, "%s: out of memory", y->path);
+}
+
+static int source_check (const pw_yaml *y, pw_error *error) {
+  const char *begin = y->source, *p = begin, *end = begin + y->size;
+  while (p < end) {
+    size_t at = (size_t)(p - begin);
+    int n = pw_utf8_size (p);
+    if (n == 0)
+      return pw_yaml_fail (y, error, at, "byte %02X is not UTF-8; a model file is text in UTF-8", (unsigned char)*p);
+    if ((*p == 0 || pw_control (p)) && !(*p == '\r' && p[1] == '\n'))
+      return pw_yaml_fail (y, error, at, "a control character, code %d, does not belong in a model file",
+                           pw_control (p));
+    if (*p == '%' && (at == 0 || p[-1] == '\n'))
+      return pw_yaml_fail (y, error, at, "a line of a model file must not begin with %%");
+    p += n;
+  }
+  return PW_OK;
+}
+
+int pw_yaml_read_source (pw_yaml *y, const char *path, size_t max_bytes, pw_error *error) {
+  const char *why;
+  FILE *f = pw_open_input (path, &why);
+  if (f == NULL) return pw_fail (error, pw_open_input_status (), "cannot open the model file %s: %s", y->path, why);
+  int status = pw_read_rest (f, max_bytes, y->path, "the limit for a model unless --max-file raises it", &y->source,
+                             &y->size, error);
+  fclose (f);
+  if (status == PW_OK && strncmp (y->source, "\xEF\xBB\xBF", 3) == 0) { /* a byte order mark */
+    y->size -= 3;
+    memmove (y->source, y->source + 3, y->size + 1);
+  }
+  return status == PW_OK ? source_check (y, error) : status;
+}
+
+/* Trees of text models as bytes, for programs without libfyaml: interactive pages.  A node is its type, whether it is
+ * quoted, its offset and its count or, of a scalar, its size; then its entries or its text. */
+
+typedef struct {
+  unsigned char type, quoted, unused[2]; /* no padding, which would be written uninitialised */
+  unsigned at, count;
+} stored_head;
+
+static void stored_write (const pw_node *n, FILE *f) {
+  int scalar = n->type == PW_YAML_SCALAR;
+  stored_head h = { n->type, n->quoted, { 0 }, n->at, scalar ? (unsigned)strlen (n->text) : (unsigned)n->count };
+  fwrite (&h, sizeof h, 1, f);
+  if (scalar) fwrite (n->text, 1, h.count, f);
+  for (const pw_node *entry = scalar ? NULL : n->first; entry; entry = entry->next) stored_write (entry, f);
+}
+
+void pw_yaml_write_tree (const pw_yaml *y, FILE *f) {
+  if (y->root) stored_write (y->root, f);
+}
+
+/* NULL if the bytes are incomplete, and a->failed is set, or memory is short. */
+static pw_node *stored_read (pw_archive *a, pw_arena *arena, int depth) {
+  stored_head h = { 0 };
+  pw_archive_bytes (a, &h, sizeof h);
+  if (a->failed || depth > PW_YAML_DEPTH || h.count > a->size - a->used) return a->failed = 1, NULL;
+  pw_node *n = pw_arena_alloc (arena, sizeof *n), **to;
+  if (n == NULL) return NULL;
+  *n = (pw_node){ .at = h.at, .count = (int)h.count, .type = h.type, .quoted = h.quoted };
+  if (h.type == PW_YAML_SCALAR) {
+    char *text = pw_arena_alloc (arena, (size_t)h.count + 1);
+    if (text) pw_archive_bytes (a, text, h.count);
+    n->text = text;
+    n->count = 0;
+    return text ? n : NULL;
+  }
+  to = &n->first;
+  for (unsigned i = 0; i < h.count * (h.type == PW_YAML_MAP ? 2 : 1); i++, to = &(*to)->next)
+    if ((*to = stored_read (a, arena, depth + 1)) == NULL) return NULL;
+  return n;
+}
+
+int pw_yaml_load_tree (pw_yaml *y, char *bytes, size_t size, pw_error *error) {
+  pw_archive a = { .at = (unsigned char *)bytes, .size = size, .loading = 1 };
+  y->root = stored_read (&a, &y->arena, 0);
+  if (y->root) return PW_OK;
+  if (!a.failed) return pw_yaml_no_memory (y, error);
+  return pw_fail (error, PW_INPUT, "%s: the stored tree is incomplete", y->path);
+}
