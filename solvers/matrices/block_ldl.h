@@ -31,6 +31,16 @@
 
 #include "pinwheel.h"
 
+/* Replaces `static` of a function that is compiled once per set of constant arguments, such as a size. */
+#define PW_INLINE static inline __attribute__ ((always_inline))
+
+/* Before a loop whose length, at most 8, is constant after inlining.  Clang unrolls it without a pragma. */
+#ifndef __clang__
+#define PW_UNROLL _Pragma ("GCC unroll 8")
+#else
+#define PW_UNROLL
+#endif
+
 enum {
   PW_BLOCK_NODE = 2,   /* most unknowns in a node */
   PW_BLOCK_RANKS = 3,  /* ranks of nodes: nodes of a lower rank are eliminated first */
@@ -100,7 +110,7 @@ typedef struct {
   char *pattern, *memory; /* allocations: of column, below and column_of_node; of groups and chains */
 } pw_block_ldl;
 
-/* ---- Planning (block_ldl.c) ---- */
+/* ---- Planning ---- */
 
 typedef struct {
   int size;               /* unknowns */
@@ -130,7 +140,7 @@ static inline int pw_block_diagonal_values (int size) {
   return size * (size + 3) / 2;
 }
 
-/* ---- Factorisation and solution (block_ldl.c, block_ldl.c, block_ldl.c) ---- */
+/* ---- Factorisation and solution ---- */
 
 /* Assembles S with the J last evaluated and factorises it; stops where least_pivot is not positive. */
 void pw_block_factor (pw_block_ldl *l);
@@ -138,11 +148,5 @@ void pw_block_factor (pw_block_ldl *l);
 /* y, which holds gamma, then 0 for each -a_k, becomes lambda and -a_k; a = W^-1 (f - J^T lambda).  f and a may be the
  * same; f NULL: zero. */
 void pw_block_solve (const pw_block_ldl *l, const double *f, double *y, double *a);
-
-/* A chain's part of pw_block_factor, and of pw_block_solve: forwards, where a column's elimination updates those after
- * it; backwards, with the accelerations of its bodies. */
-void pw_chain_factor (pw_block_ldl *l, const pw_chain *c);
-void pw_chain_forward (const pw_block_ldl *l, const pw_chain *c, const double *f, double *y);
-void pw_chain_backward (const pw_block_ldl *l, const pw_chain *c, const double *f, double *y, double *a);
 
 #endif

@@ -2,7 +2,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include "massless.h"
-#include "unroll.h"
+#include "block_ldl.h"
 #include "util.h"
 
 /* `pivots` is c->pivots: an argument, since it is the constant 3 in most calls, so that loops are unrolled. */
