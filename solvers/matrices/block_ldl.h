@@ -89,7 +89,7 @@ typedef struct {
   int includes_last; /* 1: the last pin is eliminated with the chain; 0: it only receives the update by the others */
 } pw_chain;
 
-typedef struct {
+typedef struct pw_block_ldl {
   int nodes;
   pw_block_column *column; /* nodes + 1: the last one ends the ranges */
   int *below;              /* rows below the diagonal of each column, as numbers of columns, ascending */
@@ -115,7 +115,7 @@ typedef struct {
 typedef struct {
   int size;               /* unknowns */
   int rank;               /* 0 to PW_BLOCK_RANKS - 1 */
-  int grounded;           /* 1: touches a group that does not move, or pw_is_grounded (massless.h) */
+  int grounded;           /* 1: touches a group that does not move, or is_grounded in saddle.c */
   int rolls;              /* 1: the rolling equation of a wheel, alone */
   int unknown;            /* index in y of its first unknown: its first row, or beyond the rows for -a_k */
   int first_contribution; /* index of the first one; they end at that of the next node */
