@@ -278,7 +278,7 @@ PW_INLINE chain_pair chain_forward_body (const pw_block_ldl *l, chain_sweep *s, 
 }
 
 /* A chain's part of pw_block_solve, forwards. */
-static void chain_forward (const pw_block_ldl *l, const pw_chain *c, const double *f, double *y) {
+PW_SELDOM void chain_forward (const pw_block_ldl *l, const pw_chain *c, const double *f, double *y) {
   const int pairs = c->includes_last ? c->bodies / 2 : 0, singles = c->bodies - 2 * pairs;
   chain_sweep s = chain_begin (l, c);
   chain_pair at = chain_unknowns (&s, y);
@@ -321,7 +321,7 @@ PW_INLINE chain_pair chain_backward_body (const pw_block_ldl *l, chain_sweep *s,
 }
 
 /* The same backwards, with the accelerations of the chain's bodies. */
-static void chain_backward (const pw_block_ldl *l, const pw_chain *c, const double *f, double *y, double *a) {
+PW_SELDOM void chain_backward (const pw_block_ldl *l, const pw_chain *c, const double *f, double *y, double *a) {
   const int pairs = c->includes_last ? c->bodies / 2 : 0, singles = c->bodies - 2 * pairs;
   chain_sweep ends = chain_begin (l, c);
   chain_move (&ends, pairs, -1);

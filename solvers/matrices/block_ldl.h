@@ -34,6 +34,9 @@
 /* Replaces `static` of a function that is compiled once per set of constant arguments, such as a size. */
 #define PW_INLINE static inline __attribute__ ((always_inline))
 
+/* The same of a function that few scenes call: inlined, it would add to the cost of its caller. */
+#define PW_SELDOM static __attribute__ ((noinline))
+
 /* Before a loop whose length, at most 8, is constant after inlining.  Clang unrolls it without a pragma. */
 #ifndef __clang__
 #define PW_UNROLL _Pragma ("GCC unroll 8")

@@ -257,9 +257,9 @@ static int massless_match (pw_component *c) {
 
 /* Eliminates with the J last evaluated, and matches again if a pivot has become much smaller than when it was matched.
  * Returns the square of the least of all `least_pivot`, at most 1; 0 if singular. */
-static double massless_factor (pw_saddle *saddle) {
+PW_SELDOM double massless_factor (pw_saddle *saddle) {
   double least = INFINITY;
-  for (pw_component *c = saddle->component; c < saddle->component + saddle->components; c++) {
+  for (pw_component *c = saddle->component, *end = c + saddle->components; c < end; c++) {
     int found = c->pivots == 3 ? massless_reduce (c, 0, 3) : massless_reduce (c, 0, c->pivots);
     if (found < c->pivots && massless_match (c) < c->pivots) return 0;
     for (int i = c->pivots; i < c->rows; i++) {
@@ -272,9 +272,8 @@ static double massless_factor (pw_saddle *saddle) {
   return least > 1 ? 1 : least * least;
 }
 
-/* First half of a solution: f becomes f~ at the massive coordinates, gamma becomes gamma~ at `unknown` of unmatched
- * rows.  Computes gamma~, then w in place of lambda, then f~. */
-PW_INLINE void massless_forward (pw_component *c, double *f, double *gamma, int pivots) {
+/* gamma~, then w in place of lambda, then f~. */
+PW_INLINE void massless_forward_component (pw_component *c, double *f, double *gamma, int pivots) {
   massless_row *row = c->row;
   for (int i = 0; i < c->rows; i++) {
     const double *L = c->A + i * c->stride + c->first_L_column;
@@ -295,9 +294,18 @@ PW_INLINE void massless_forward (pw_component *c, double *f, double *gamma, int 
   }
 }
 
-/* Second half: from a of the massive coordinates and lambda at `unknown` of unmatched rows, a of the massless
- * coordinates and lambda of all rows.  Computes gamma~ - H' a, then a_P and lambda_p from the last pivot to the first. */
-PW_INLINE void massless_backward (pw_component *c, double *a, double *lambda, int pivots) {
+/* First half of a solution: saddle->force becomes f~ at the massive coordinates, gamma becomes gamma~ at `unknown` of
+ * unmatched rows. */
+PW_SELDOM void massless_forward (pw_saddle *saddle, double *gamma) {
+  for (pw_component *c = saddle->component, *end = c + saddle->components; c < end; c++)
+    if (c->pivots == 3)
+      massless_forward_component (c, saddle->force, gamma, 3);
+    else
+      massless_forward_component (c, saddle->force, gamma, c->pivots);
+}
+
+/* gamma~ - H' a, then a_P and lambda_p from the last pivot to the first. */
+PW_INLINE void massless_backward_component (pw_component *c, double *a, double *lambda, int pivots) {
   massless_row *row = c->row;
   for (const int *column = c->massive; column < c->massive + c->massives; column++) {
     double x = a[c->global[*column]];
@@ -314,6 +322,16 @@ PW_INLINE void massless_backward (pw_component *c, double *a, double *lambda, in
     for (int i = p + 1; i < c->rows; i++) row[p].lambda -= c->A[i * c->stride + c->first_L_column + p] * row[i].lambda;
     lambda[row[p].equation] = row[p].lambda;
   }
+}
+
+/* Second half: from a of the massive coordinates and lambda at `unknown` of unmatched rows, a of the massless
+ * coordinates and lambda of all rows. */
+PW_SELDOM void massless_backward (pw_saddle *saddle, double *a, double *lambda) {
+  for (pw_component *c = saddle->component, *end = c + saddle->components; c < end; c++)
+    if (c->pivots == 3)
+      massless_backward_component (c, a, lambda, 3);
+    else
+      massless_backward_component (c, a, lambda, c->pivots);
 }
 
 /* ---- Components of massless coordinates, by union-find over the groups that contain them, here called massless ---- */
@@ -1032,19 +1050,16 @@ double pw_saddle_sine (pw_saddle *saddle, int *row) {
 void pw_saddle_solve (pw_saddle *saddle, const double *f, const double *gamma, double *a, double *lambda) {
   const size_t bytes = (size_t)saddle->rows * sizeof *lambda;
   double *y = saddle->extra ? saddle->y : lambda;
-  pw_component *const end = saddle->component + saddle->components;
   if (saddle->postponed > 0) pw_saddle_factor (saddle);
   if (y != gamma) memcpy (y, gamma, bytes);
   for (int i = 0; i < saddle->extra; i++) y[saddle->s->rows + i] = 0;
   if (saddle->components) {
     for (int j = 0; j < saddle->s->coords; j++) saddle->force[j] = f ? f[j] : 0;
     f = saddle->force;
-    for (pw_component *c = saddle->component; c < end; c++)
-      c->pivots == 3 ? massless_forward (c, saddle->force, y, 3) : massless_forward (c, saddle->force, y, c->pivots);
+    massless_forward (saddle, y);
   }
   pw_block_solve (saddle->block, f, y, a);
   if (y != lambda) memcpy (lambda, y, bytes);
   for (int i = 0; i < saddle->inactive_count; i++) lambda[saddle->inactive[i]] = 0;
-  for (pw_component *c = saddle->component; c < end; c++)
-    c->pivots == 3 ? massless_backward (c, a, lambda, 3) : massless_backward (c, a, lambda, c->pivots);
+  if (saddle->components) massless_backward (saddle, a, lambda);
 }
