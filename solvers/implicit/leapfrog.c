@@ -271,19 +271,17 @@ static int leapfrog_advance (pw_run *r, double t_end, pw_error *error) {
   return pw_implicit_advance (r, t_end, leapfrog_step, leapfrog_accept, error);
 }
 
-static const pw_stabilisation leapfrog_stabilisations[] = {
-  { "rattle", "positions and velocities both enforced by the step's own multipliers (Andersen 1983)", PW_RATTLE },
-  { .name = NULL },
-};
-
-static const pw_option leapfrog_options[] = { { .name = NULL } };
-
 const pw_method pw_method_leapfrog = {
   .name = "leapfrog",
   .about = "reversible leapfrog of order 2, fixed step, for long runs (Andersen 1983, McLachlan & Perlmutter 2006)",
   .order = 2,
-  .stabilisations = leapfrog_stabilisations,
-  .options = leapfrog_options,
+  .stabilisations =
+      (const pw_stabilisation[]){
+          { "rattle", "positions and velocities both enforced by the step's own multipliers (Andersen 1983)",
+            PW_RATTLE },
+          { .name = NULL },
+      },
+  .options = (const pw_option[]){ { .name = NULL } },
   .open = leapfrog_open,
   .advance = leapfrog_advance,
   PW_IMPLICIT_FUNCTIONS,
