@@ -644,16 +644,6 @@ typedef struct {
   char *memory;
 } order_search;
 
-static int order_open (order_search *x) {
-  int **const array[] = { &x->first, &x->order, &x->column, &x->first_below, &x->parent, &x->visited, &x->next };
-  for (pw_layout l = { 0 }; pw_layout_pass (&l, &x->memory);) {
-    x->list = pw_layout_alloc (&l, (size_t)(2 * x->pairs), sizeof *x->list);
-    for (size_t i = 0; i < sizeof array / sizeof *array; i++)
-      *array[i] = pw_layout_alloc (&l, (size_t)x->nodes + 1, sizeof (int));
-  }
-  return x->memory ? PW_OK : PW_RESOURCE;
-}
-
 /* Gives each list as many entries as x->next has counted: first[c] and x->next[c] become its beginning. */
 static void order_begin_lists (order_search *x, int *first) {
   first[0] = 0;
@@ -748,8 +738,14 @@ static pw_block_ldl *order_fill (order_search *x, int most, int *status) {
 /* In the natural order or, if that has less fill-in, minimum degree in rank 0; NULL if out of memory or L is too
  * large. */
 static pw_block_ldl *order_choose (order_search *x) {
+  int **const array[] = { &x->first, &x->order, &x->column, &x->first_below, &x->parent, &x->visited, &x->next };
+  for (pw_layout l = { 0 }; pw_layout_pass (&l, &x->memory);) {
+    x->list = pw_layout_alloc (&l, (size_t)(2 * x->pairs), sizeof *x->list);
+    for (size_t i = 0; i < sizeof array / sizeof *array; i++)
+      *array[i] = pw_layout_alloc (&l, (size_t)x->nodes + 1, sizeof (int));
+  }
   int status;
-  if (order_open (x) != PW_OK) return NULL;
+  if (x->memory == NULL) return NULL;
   order_list_neighbours (x, 0);
   if (x->nodes > 0 && amd_order (x->nodes, x->first, x->list, x->order, NULL, NULL) < 0) return NULL;
   order_list_neighbours (x, PW_BLOCK_RANKS - 1);

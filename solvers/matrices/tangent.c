@@ -4,18 +4,6 @@
 #include "tangent.h"
 #include "util.h"
 
-/* Numbers the active equations. */
-static void tangent_number_rows (pw_tangent *x) {
-  const pw_run *r = x->run;
-  for (int i = 0; i < r->s->rows; i++) {
-    int active = r->active == NULL || r->active[i];
-    x->row_index[i] = active ? x->rows : -1;
-    if (!active) continue;
-    x->holonomic += i < r->s->holonomic;
-    x->row[x->rows++] = i;
-  }
-}
-
 /* The largest block of a batch, and the largest count x cols. */
 static void tangent_sizes (const pw_system *s, size_t *block, size_t *direction) {
   *block = *direction = 1;
@@ -44,7 +32,13 @@ int pw_tangent_open (pw_tangent *x, pw_run *r) {
   }
   if (x->memory == NULL) return PW_RESOURCE;
   for (int j = 0; j < s->coords; j++) x->D[j] = pw_is_angle (s, j) ? 1 / (s->scale.length * s->scale.length) : 1;
-  tangent_number_rows (x);
+  for (int i = 0; i < s->rows; i++) {
+    int active = r->active == NULL || r->active[i];
+    x->row_index[i] = active ? x->rows : -1;
+    if (!active) continue;
+    x->holonomic += i < s->holonomic;
+    x->row[x->rows++] = i;
+  }
   return PW_OK;
 }
 
@@ -325,10 +319,6 @@ int pw_dae_lay_out (pw_dae *x, const double *v, const double *a, const double *l
 }
 
 /* Recording and layout of the sequence of contributions to a sparse matrix; see tangent.h. */
-
-void pw_scatter_begin_record (pw_scatter_map *t) {
-  *t = (pw_scatter_map){ .recording = 1 };
-}
 
 void pw_scatter_record_entry (pw_scatter_map *t, int row, int col) {
   t->failed |= pw_grow (&t->entry, t->count, &t->room, sizeof *t->entry) != PW_OK;

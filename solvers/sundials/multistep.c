@@ -269,7 +269,7 @@ static int multistep_open_arrays (pw_method_data *d, pw_run *r) {
   size_t n = (size_t)d->n + 3, rows = (size_t)r->s->rows;
   const pw_array array[] = { { &d->q, n },         { &d->v, n },         { &d->a, n },
                              { &d->error, 2 * n }, { &d->lambda, rows }, { &d->newton.right, n + rows } };
-  if (pw_sun_open (&d->sun, r, 2 * d->n) != PW_OK) return PW_RESOURCE;
+  if (pw_sun_open (&d->sun, r, 2 * d->n, multistep_power) != PW_OK) return PW_RESOURCE;
   d->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   if (d->memory == NULL) return PW_RESOURCE;
   d->evaluated = 1;
@@ -308,9 +308,7 @@ static int multistep_open (pw_run *r, int formula, pw_error *error) {
   d->projects = pw_stabilised_by (r, PW_PROJECTION);
   int status = d->projects ? pw_projector_open_by_options (&d->projector, r, error) : PW_OK;
   if (status != PW_OK) return status;
-  if (multistep_open_arrays (d, r) == PW_OK && multistep_open_solver (d, formula) == PW_OK &&
-      pw_quadrature_open (&d->sun.quadrature, r, multistep_power) == PW_OK)
-    return PW_OK;
+  if (multistep_open_arrays (d, r) == PW_OK && multistep_open_solver (d, formula) == PW_OK) return PW_OK;
   return pw_sun_no_memory (r, error);
 }
 
@@ -365,14 +363,14 @@ static int multistep_evaluate (pw_method_data *d) {
 }
 
 /* Work and losses up to the state reached.  Multipliers of the last Newton iterate, which may be the prediction, are
- * not accurate enough.  Returns as pw_quadrature_step. */
+ * not accurate enough.  Returns as pw_sun_integrate_ledger. */
 static int multistep_work (pw_method_data *d) {
   pw_run *r = d->sun.run;
   int order = 1;
   if (d->sun.solver && pw_ledger_uses_multipliers (r)) (void)multistep_evaluate (d);
   pw_ledger_rates (r, r->lambda, r->rate);
   CVodeGetLastOrder (d->cvode, &order);
-  return pw_quadrature_step (&d->sun.quadrature, r, order);
+  return pw_sun_integrate_ledger (&d->sun, order);
 }
 
 /* Makes y the state reached at t and updates the ledger.  Accelerations and multipliers remain those of the last
@@ -411,7 +409,7 @@ static int multistep_at (pw_run *r, double t, pw_error *error) {
     status = multistep_evaluate (d);
     if (status == PW_OK) pw_sample_reached (r);
   } else {
-    if (t < r->t && r->entries > 0) pw_quadrature_at (&d->sun.quadrature, r, t);
+    if (t < r->t && r->entries > 0) pw_sun_ledger_at (&d->sun, t);
     int flag = multistep_interpolate (d, t);
     if (flag == CV_BAD_T) return pw_fail_outside (r, NAN, t, error);
     if (flag != CV_SUCCESS) return multistep_fail (d, flag, error);
@@ -427,7 +425,6 @@ static int multistep_restart (pw_run *r, pw_error *error) {
   d->evaluated = 1;
   int flag = CVodeReInit (d->cvode, r->t, d->sun.y);
   if (flag == CV_SUCCESS) flag = CVodeSetInitStep (d->cvode, pw_first_step (r));
-  pw_quadrature_restart (&d->sun.quadrature, r);
   return flag == CV_SUCCESS ? PW_OK : pw_sun_fail_restart (&d->sun, flag, error);
 }
 
