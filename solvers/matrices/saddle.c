@@ -229,7 +229,8 @@ PW_INLINE void massless_eliminate (pw_component *c, int p, int pivots) {
 }
 
 /* Eliminates with the J last evaluated and the pivots matched before or, if `matches` is 1, matches the massless
- * coordinates to rows, with complete pivoting over their columns.  Returns the number of pivots that are large enough. */
+ * coordinates to rows, with complete pivoting over their columns.  Returns the number of pivots that are large
+ * enough. */
 PW_INLINE int massless_reduce (pw_component *c, int matches, int pivots) {
   massless_copy (c);
   c->least_pivot = INFINITY;
@@ -334,7 +335,7 @@ PW_SELDOM void massless_backward (pw_saddle *saddle, double *a, double *lambda) 
       massless_backward_component (c, a, lambda, c->pivots);
 }
 
-/* ---- Components of massless coordinates, by union-find over the groups that contain them, here called massless ---- */
+/* ---- Components, by union-find over the groups that contain massless coordinates, here called massless groups ---- */
 
 /* 1 if a group contains a massless coordinate. */
 static int massless_is_group (const saddle_plan *p, int group) {
@@ -477,8 +478,8 @@ static int massless_check (const saddle_plan *p, pw_component *c, pw_error *erro
   return PW_OK;
 }
 
-/* Finds the components and matches them.  PW_OK, PW_RESOURCE, or PW_INPUT with the error that names a coordinate that no
- * row determines, such as one of a massless group in no active row. */
+/* Finds the components and matches them.  PW_OK, PW_RESOURCE, or PW_INPUT with the error that names a coordinate that
+ * no row determines, such as one of a massless group in no active row. */
 static int massless_open (saddle_plan *p, pw_error *error) {
   pw_saddle *saddle = p->saddle;
   int status = PW_OK;

@@ -258,9 +258,9 @@ char *pw_library_versions (char *buffer, size_t size) {
 
 /* ---- Work and losses along the steps ----
  *
- * The integral of a polynomial through the rates at the states reached, of a degree one above the order of the step if
- * enough are stored, at negligible cost; where that is not accurate enough, of the rates that the method interpolates at
- * nodes inside the step.
+ * The integral of a polynomial through the rates at the states reached, of a degree one above the order of the step
+ * if enough are stored, at negligible cost; where that is not accurate enough, of the rates that the method
+ * interpolates at nodes inside the step.
  *
  * The difference from the polynomial of the next lower degree estimates the error.  Powers may vanish at the ends of
  * all steps but not between them, so the work and losses of a step are also compared with the change of energy. */
