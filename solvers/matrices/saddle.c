@@ -6,10 +6,9 @@
  * weight do not meet in S, so S has the pattern of the mechanism: a chain is block tridiagonal.
  *
  * Equations are grouped into nodes of 1 or 2 with the same columns.  A node contributes to a group of its coordinates
- * if at least one coordinate of that group has a finite weight other than 0.  An uncondensed body
- * (block_ldl.h) adds two nodes of its own, for -a_k.  Coupled, i.e. with a block in the matrix, are two nodes that
- * contribute to the same condensed group, and the two nodes of an uncondensed body with every node that contributes to
- * it.
+ * if at least one coordinate of that group has a finite weight other than 0.  An uncondensed body (block_ldl.h) adds
+ * two nodes of its own, for -a_k.  Coupled, i.e. with a block in the matrix, are two nodes that contribute to the same
+ * condensed group, and the two nodes of an uncondensed body with every node that contributes to it.
  *
  * Coordinates without weight, called massless, are eliminated first; the others are massive.  Each massless one is
  * matched to a constraint row and substituted out of the other rows.
@@ -916,21 +915,6 @@ static void chain_join (saddle_plan *plan, pw_block_ldl *l, const chain_between 
   }
 }
 
-/* Counts as sources the columns eliminated earlier that have both a column and the next one below them: fill-in. */
-static void chain_fill (const pw_block_ldl *l, chain_between *between) {
-  for (int p = 0; p < l->nodes; p++)
-    for (int i = l->column[p].first_below + 1; i < l->column[p + 1].first_below; i++)
-      if (l->below[i] == l->below[i - 1] + 1) between[l->below[i - 1]].sources++;
-}
-
-/* Counts a body as a source; its contributions are in the order of their columns. */
-static void chain_count (const saddle_plan *plan, const pw_block_ldl *l, int body, chain_between *between) {
-  for (int x = plan->start[body] + 1; x < plan->start[body + 1]; x++) {
-    int column = l->column_of_node[plan->contribution[plan->list[x - 1]].node];
-    if (l->column_of_node[plan->contribution[plan->list[x]].node] == column + 1) between[column].sources++;
-  }
-}
-
 /* Finds the chains, and marks their inner columns.  The contributions to each group in plan->list must be sorted by the
  * columns of their nodes in l.  PW_OK or PW_RESOURCE. */
 static int condense_chains (saddle_plan *plan, pw_block_ldl *l) {
@@ -944,9 +928,15 @@ static int condense_chains (saddle_plan *plan, pw_block_ldl *l) {
     pw_chain link;
     int column = chain_link (plan, l, body, &link);
     if (column >= 0) between[column].link = link;
-    chain_count (plan, l, body, between);
+    for (int x = plan->start[body] + 1; x < plan->start[body + 1]; x++) { /* contributions by ascending columns */
+      column = l->column_of_node[plan->contribution[plan->list[x - 1]].node];
+      if (l->column_of_node[plan->contribution[plan->list[x]].node] == column + 1) between[column].sources++;
+    }
   }
-  chain_fill (l, between);
+  /* fill-in: by columns eliminated earlier that have both a column and the next one below them */
+  for (int p = 0; p < l->nodes; p++)
+    for (int i = l->column[p].first_below + 1; i < l->column[p + 1].first_below; i++)
+      if (l->below[i] == l->below[i - 1] + 1) between[l->below[i - 1]].sources++;
   chain_join (plan, l, between);
   return PW_OK;
 }

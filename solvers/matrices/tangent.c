@@ -53,11 +53,6 @@ const double *pw_tangent_expand (const pw_tangent *x, const double *active, int 
   return all;
 }
 
-void pw_tangent_multiply_JT (const pw_tangent *x, const double *active, int count, double *out) {
-  memset (out, 0, ((size_t)x->run->s->coords + 3) * sizeof *out);
-  if (count > 0) pw_add_JT (x->run->w, pw_tangent_expand (x, active, count, x->lambda), out);
-}
-
 void pw_tangent_compress (const pw_tangent *x, const double *all, int count, double *active) {
   for (int i = 0; i < count; i++) active[i] = all[x->row[i]];
 }
@@ -232,6 +227,13 @@ void pw_dae_close (pw_dae *x) {
 
 /* ---- Residual ---- */
 
+/* out (coords + 3) = J^T times the multipliers of the first `count` active equations, with the J last evaluated.
+ * Overwrites x->lambda. */
+static void dae_multiply_JT (const pw_tangent *x, const double *active, int count, double *out) {
+  memset (out, 0, ((size_t)x->run->s->coords + 3) * sizeof *out);
+  if (count > 0) pw_add_JT (x->run->w, pw_tangent_expand (x, active, count, x->lambda), out);
+}
+
 /* The residuals of the constraint equations that lambda enforces, then of g = 0 if mu enforces it. */
 static void dae_constraints (pw_dae *x, const double *v, const double *a, double *F) {
   pw_run *r = x->tangent.run;
@@ -251,9 +253,9 @@ static void dae_constraints (pw_dae *x, const double *v, const double *a, double
 void pw_dae_residual (pw_dae *x, const double *v, const double *a, const double *lambda, double *F) {
   const pw_run *r = x->tangent.run;
   int n = x->n;
-  pw_tangent_multiply_JT (&x->tangent, lambda + x->rows, x->mu_count, x->reaction);
+  dae_multiply_JT (&x->tangent, lambda + x->rows, x->mu_count, x->reaction);
   for (int j = 0; j < n; j++) F[j] = x->tangent.D[j] * x->reaction[j];
-  pw_tangent_multiply_JT (&x->tangent, lambda, x->rows, x->reaction);
+  dae_multiply_JT (&x->tangent, lambda, x->rows, x->reaction);
   pw_evaluate_force (r->w, x->force);
   for (int j = 0; j < n; j++) F[n + j] = (a ? r->s->mass[j] * a[j] : 0) + x->reaction[j] - x->force[j];
   dae_constraints (x, v, a, F + 2 * n);

@@ -78,8 +78,6 @@ void pw_tangent_close (pw_tangent *x);
 
 /* Fills `all`, which is returned: multipliers of the first `count` active equations, 0 for the others. */
 const double *pw_tangent_expand (const pw_tangent *x, const double *active, int count, double *all);
-/* out (coords + 3) = J^T times the same multipliers, with the J last evaluated.  Overwrites x->lambda. */
-void pw_tangent_multiply_JT (const pw_tangent *x, const double *active, int count, double *out);
 /* Values of the first `count` active equations from those of all. */
 void pw_tangent_compress (const pw_tangent *x, const double *all, int count, double *active);
 

@@ -51,9 +51,9 @@ struct pw_method_data {
 
 /* ---- Null-space velocities ----
  *
- * u = B^T W v.  The columns of B are a basis of ker J0, with J0 the constraint matrix at the
- * beginning of the step, constant over the step.  W is the metric of positions: the mass matrix, with small weights for
- * massless coordinates.  The equations integrated are
+ * u = B^T W v.  The columns of B are a basis of ker J0, with J0 the constraint matrix at the beginning of the step,
+ * constant over the step.  W is the metric of positions: the mass matrix, with small weights for massless coordinates.
+ * The equations integrated are
  *
  *   q' = v(t, q, u),    u' = B^T W a(t, q, v),      v:  J(t, q) v = eta,  B^T W v = u
  *
@@ -934,17 +934,6 @@ static void several_add (several_lanes *x, int i, double t_end) {
   if (several_plan (x->run[i], t_end, t_end, &x->steps[x->used]) > 0) x->index[x->used++] = i;
 }
 
-/* Takes the steps of all lanes; empty lanes repeat those of the first lane. */
-static void several_take (several_lanes *x, const pw_specialised_lanes *code, void *memory) {
-  pw_scene_steps *steps[PW_LANES_MOST];
-  pw_scene *scene[PW_LANES_MOST];
-  for (int k = 0; k < code->lanes; k++) {
-    if (k >= x->used) x->steps[k] = x->steps[0], x->index[k] = x->index[0];
-    steps[k] = &x->steps[k], scene[k] = x->run[x->index[k]]->scene;
-  }
-  code->steps (scene, steps, memory);
-}
-
 void pw_runs_advance (pw_run *const *runs, int count, double t_end, const pw_specialised_lanes *code, void *memory,
                       int *status, pw_error *error) {
   several_lanes x = { .run = runs };
@@ -958,7 +947,13 @@ void pw_runs_advance (pw_run *const *runs, int count, double t_end, const pw_spe
       several_add (&x, i, t_end);
   }
   if (x.used > 0 && 2 * x.used > code->lanes) { /* with half of them empty, one run after the other is faster */
-    several_take (&x, code, memory);
+    pw_scene_steps *steps[PW_LANES_MOST];
+    pw_scene *scene[PW_LANES_MOST];
+    for (int k = 0; k < code->lanes; k++) { /* empty lanes repeat the steps of the first one */
+      if (k >= x.used) x.steps[k] = x.steps[0], x.index[k] = x.index[0];
+      steps[k] = &x.steps[k], scene[k] = runs[x.index[k]]->scene;
+    }
+    code->steps (scene, steps, memory);
     for (int k = 0; k < x.used; k++) {
       int i = x.index[k];
       status[i] = several_finish (runs[i], &x.steps[k], error ? &error[i] : NULL);

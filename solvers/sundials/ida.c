@@ -57,12 +57,6 @@ static int ida_matrix (realtype t, realtype c, N_Vector vy, N_Vector vyp, N_Vect
   return 0;
 }
 
-static int ida_open_matrix (pw_method_data *d) {
-  const double *y = N_VGetArrayPointer (d->sun.y), *yp = N_VGetArrayPointer (d->yp);
-  if (pw_dae_lay_out (&d->dae, y + d->dae.n, yp + d->dae.n, ida_lambda (d, y, yp)) != PW_OK) return PW_RESOURCE;
-  return pw_sun_open_solver (&d->sun, d->dae.size, &d->dae.tangent.scatter, d, NULL);
-}
-
 /* ---- Error weights ---- */
 
 /* The coefficient c in the matrix dF/dy + c dF/dy' of the current step, 1 / h before the first; at least 1 / T. */
@@ -212,7 +206,10 @@ static int ida_open_integrator (pw_method_data *d) {
 static int ida_open (pw_run *r, pw_error *error) {
   pw_method_data *d = r->data = calloc (1, sizeof *d);
   if (d == NULL) return pw_sun_no_memory (r, error);
-  if (pw_dae_open (&d->dae, r) != PW_OK || ida_open_vectors (d, r) != PW_OK || ida_open_matrix (d) != PW_OK ||
+  if (pw_dae_open (&d->dae, r) != PW_OK || ida_open_vectors (d, r) != PW_OK) return pw_sun_no_memory (r, error);
+  const double *y = N_VGetArrayPointer (d->sun.y), *yp = N_VGetArrayPointer (d->yp);
+  if (pw_dae_lay_out (&d->dae, y + d->dae.n, yp + d->dae.n, ida_lambda (d, y, yp)) != PW_OK ||
+      pw_sun_open_solver (&d->sun, d->dae.size, &d->dae.tangent.scatter, d, NULL) != PW_OK ||
       ida_open_integrator (d) != PW_OK)
     return pw_sun_no_memory (r, error);
   if (r->statistics.steps == 0)

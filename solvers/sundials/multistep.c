@@ -265,17 +265,6 @@ static int multistep_power (pw_run *r, double t, double *rate) {
 
 /* ---- Opening ---- */
 
-static int multistep_open_arrays (pw_method_data *d, pw_run *r) {
-  size_t n = (size_t)d->n + 3, rows = (size_t)r->s->rows;
-  const pw_array array[] = { { &d->q, n },         { &d->v, n },         { &d->a, n },
-                             { &d->error, 2 * n }, { &d->lambda, rows }, { &d->newton.right, n + rows } };
-  if (pw_sun_open (&d->sun, r, 2 * d->n, multistep_power) != PW_OK) return PW_RESOURCE;
-  d->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
-  if (d->memory == NULL) return PW_RESOURCE;
-  d->evaluated = 1;
-  return PW_OK;
-}
-
 static int multistep_open_iteration (pw_method_data *d, int formula) {
   pw_sun *x = &d->sun;
   int newton = formula == CV_BDF;
@@ -308,8 +297,15 @@ static int multistep_open (pw_run *r, int formula, pw_error *error) {
   d->projects = pw_stabilised_by (r, PW_PROJECTION);
   int status = d->projects ? pw_projector_open_by_options (&d->projector, r, error) : PW_OK;
   if (status != PW_OK) return status;
-  if (multistep_open_arrays (d, r) == PW_OK && multistep_open_solver (d, formula) == PW_OK) return PW_OK;
-  return pw_sun_no_memory (r, error);
+  size_t n = (size_t)d->n + 3, rows = (size_t)r->s->rows;
+  const pw_array array[] = { { &d->q, n },         { &d->v, n },         { &d->a, n },
+                             { &d->error, 2 * n }, { &d->lambda, rows }, { &d->newton.right, n + rows } };
+  d->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
+  d->evaluated = 1;
+  if (d->memory == NULL || pw_sun_open (&d->sun, r, 2 * d->n, multistep_power) != PW_OK ||
+      multistep_open_solver (d, formula) != PW_OK)
+    return pw_sun_no_memory (r, error);
+  return PW_OK;
 }
 
 static void multistep_close (pw_run *r) {
