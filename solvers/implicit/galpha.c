@@ -191,9 +191,8 @@ static int galpha_open (pw_run *r, pw_error *error) {
     d->common.q1 = d->y, d->common.v1 = d->y + x->n;
     status = pw_dae_lay_out (x, d->common.v1, d->a1, d->y + 2 * x->n);
   }
-  if (status == PW_OK) status = pw_implicit_open_matrix (&d->common, x->size);
   pw_dense_projection projection = x->enforces_velocities ? PW_DENSE_POSITIONS_AND_VELOCITIES : PW_DENSE_POSITIONS;
-  return pw_implicit_complete (r, status, projection, error);
+  return pw_implicit_complete (r, status, x->size, projection, error);
 }
 
 /* ---- Initialisation ---- */

@@ -15,14 +15,12 @@ int pw_implicit_open (pw_implicit *x, pw_run *r, const pw_array *array, size_t c
   return x->memory ? pw_dae_open (&x->dae, r) : PW_RESOURCE;
 }
 
-int pw_implicit_open_matrix (pw_implicit *x, int size) {
+int pw_implicit_complete (pw_run *r, int status, int size, pw_dense_projection projection, pw_error *error) {
+  pw_implicit *x = implicit_of (r);
   const pw_scatter_map *pattern = &x->dae.tangent.scatter;
-  return pw_sparse_open (&x->sparse, PW_SPARSE_REAL, size, pattern->colptr, pattern->rowind);
-}
-
-int pw_implicit_complete (pw_run *r, int status, pw_dense_projection projection, pw_error *error) {
+  if (status == PW_OK) status = pw_sparse_open (&x->sparse, PW_SPARSE_REAL, size, pattern->colptr, pattern->rowind);
   if (status != PW_OK) return pw_fail_memory (r->s, error);
-  status = pw_dense_output_open (&implicit_of (r)->last, r, projection, error);
+  status = pw_dense_output_open (&x->last, r, projection, error);
   return status == PW_OK ? pw_implicit_restart (r, error) : status;
 }
 

@@ -25,12 +25,9 @@ typedef struct {
 /* Allocates the method's arrays, `count` of them, and opens x->dae: PW_OK or PW_RESOURCE. */
 int pw_implicit_open (pw_implicit *x, pw_run *r, const pw_array *array, size_t count);
 
-/* Opens the Newton matrix of this size, with the pattern in x->dae.tangent.scatter: PW_OK or PW_RESOURCE. */
-int pw_implicit_open_matrix (pw_implicit *x, int size);
-
-/* Completes the opening with a dense output of this projection; if `status`, of the functions before, is not PW_OK,
- * reports that memory is exhausted. */
-int pw_implicit_complete (pw_run *r, int status, pw_dense_projection projection, pw_error *error);
+/* Completes the opening with the Newton matrix of this size, of the pattern in x->dae.tangent.scatter, and a dense
+ * output of this projection; if `status`, of the functions before, is not PW_OK, reports that memory is exhausted. */
+int pw_implicit_complete (pw_run *r, int status, int size, pw_dense_projection projection, pw_error *error);
 
 /* Factors of the rows and columns of the matrix of pw_dae_matrix with q_dot_factor c and v_dot_factor e: with them its
  * entries are of about the same size for every step size (equations in galpha.c).  radau uses them, too. */

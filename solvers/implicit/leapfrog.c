@@ -105,18 +105,6 @@ static void drift_put_end (pw_run *r) {
   pw_tangent_add_J (&r->data->common.dae.tangent, r->s->holonomic, r->s->coords, 0, 1, 0);
 }
 
-static int drift_open_matrix (pw_run *r) {
-  pw_method_data *d = r->data;
-  pw_tangent *x = &d->common.dae.tangent;
-  const int size = r->s->coords + x->rows;
-  pw_scatter_begin_record (&x->scatter);
-  drift_put_momentum (r);
-  drift_put_middle (r, 1); /* any step size but 0: only the pattern counts */
-  drift_put_end (r);
-  if (pw_scatter_lay_out (&x->scatter, size) != PW_OK) return PW_RESOURCE;
-  return pw_implicit_open_matrix (&d->common, size);
-}
-
 static int drift_factor (pw_run *r, double h, double t1) {
   pw_method_data *d = r->data;
   pw_scatter_map *matrix = &d->common.dae.tangent.scatter;
@@ -248,8 +236,16 @@ static int leapfrog_open (pw_run *r, pw_error *error) {
                              { &d->dv, n },     { &d->f, n },         { &d->residual, rows }, { &d->mu, rows },
                              { &d->eta, rows }, { &d->z, n + rows } };
   int status = pw_implicit_open (&d->common, r, array, sizeof array / sizeof *array);
-  if (status == PW_OK) status = drift_open_matrix (r);
-  return pw_implicit_complete (r, status, PW_DENSE_POSITIONS_AND_VELOCITIES, error);
+  pw_tangent *x = &d->common.dae.tangent;
+  const int size = r->s->coords + x->rows;
+  if (status == PW_OK) { /* the pattern of the matrix */
+    pw_scatter_begin_record (&x->scatter);
+    drift_put_momentum (r);
+    drift_put_middle (r, 1); /* any step size but 0 */
+    drift_put_end (r);
+    status = pw_scatter_lay_out (&x->scatter, size);
+  }
+  return pw_implicit_complete (r, status, size, PW_DENSE_POSITIONS_AND_VELOCITIES, error);
 }
 
 static void leapfrog_serialise (pw_run *r, pw_archive *a) {
@@ -271,19 +267,17 @@ static int leapfrog_advance (pw_run *r, double t_end, pw_error *error) {
   return pw_implicit_advance (r, t_end, leapfrog_step, leapfrog_accept, error);
 }
 
-static const pw_stabilisation leapfrog_stabilisations[] = {
-  { "rattle", "positions and velocities both enforced by the step's own multipliers (Andersen 1983)", PW_RATTLE },
-  { .name = NULL },
-};
-
-static const pw_option leapfrog_options[] = { { .name = NULL } };
-
 const pw_method pw_method_leapfrog = {
   .name = "leapfrog",
   .about = "reversible leapfrog of order 2, fixed step, for long runs (Andersen 1983, McLachlan & Perlmutter 2006)",
   .order = 2,
-  .stabilisations = leapfrog_stabilisations,
-  .options = leapfrog_options,
+  .stabilisations =
+      (const pw_stabilisation[]){
+          { "rattle", "positions and velocities both enforced by the step's own multipliers (Andersen 1983)",
+            PW_RATTLE },
+          { .name = NULL },
+      },
+  .options = (const pw_option[]){ { .name = NULL } },
   .open = leapfrog_open,
   .advance = leapfrog_advance,
   PW_IMPLICIT_FUNCTIONS,

@@ -1,4 +1,4 @@
-/* Assembly and elimination of the block L D L^T; see block_ldl.h.
+/* Assembly, elimination, solution, order and layout of the block L D L^T; see block_ldl.h.
  *
  *   for each body:      K_ba += J_b W^-1 J_a^T  for its contributions a, and b from a on
  *   for each column j:  D = K_jj,  L_pj = K_pj D^-1,  K_pq -= L_pj K_qj^T  for all p >= q below j
@@ -12,11 +12,17 @@
 #include <stdlib.h>
 #include <string.h>
 #include "block_ldl.h"
-#include "unroll.h"
 #include "util.h"
 
-/* Operations on blocks of up to 2 x 2 and on rows of a body's columns, for block_*.c; see block_ldl.h.  Sizes are
- * constants where these functions are inlined; kj is the size of column j, and so on. */
+/* This file reads pairs of numbers shortly after storing them one by one: a vector load would stall until both stores
+ * are complete. */
+#ifndef __clang__
+#pragma GCC optimize("no-tree-slp-vectorize")
+#endif
+
+/* ---- Operations on blocks of up to 2 x 2 and on rows of a body's columns ----
+ *
+ * Sizes are constants where these functions are inlined; kj is the size of column j, and so on. */
 
 /* Calls f with a constant in place of a size that is 1 or 2, or of a width that is 1 or 3. */
 #define BLOCK_SIZE(size, f, ...) ((size) == 2 ? f (2, __VA_ARGS__) : f (1, __VA_ARGS__))
@@ -48,7 +54,7 @@ typedef struct {
   double x, y;
 } block_pair;
 
-/* (x, y) divided by a diagonal block of k unknowns with the factors 1 / d_1, l_21, 1 / d_2 of block_ldl.c in D. */
+/* (x, y) divided by a diagonal block of k unknowns with the factors 1 / d_1, l_21, 1 / d_2 in D. */
 static inline block_pair block_divide (int k, const double *D, double x, double y) {
   if (k == 1) return (block_pair){ .x = x * D[0] };
   double z = (y - D[1] * x) * D[2];
@@ -58,6 +64,280 @@ static inline block_pair block_divide (int k, const double *D, double x, double 
 /* (x, y) times a row A of kj entries. */
 static inline double block_dot (int kj, double x, double y, const double *A) {
   return kj == 2 ? x * A[0] + y * A[1] : x * A[0];
+}
+
+/* ---- Chains ----
+ *
+ * Each elimination waits for the one before it.  A chain that can be eliminated from both ends (includes_last) is
+ * therefore swept in the two lanes of vector registers, from the ends to the middle; in any other chain both lanes do
+ * the same, from the first pin to the last. */
+
+enum { CHAIN_BLOCK = 5 }; /* values of a diagonal block of 2 unknowns */
+
+/* GNU C's vectors: operations work on both lanes. */
+typedef double chain_lanes __attribute__ ((vector_size (2 * sizeof (double))));
+
+/* In each lane a body of the chain, one of whose pins is eliminated. */
+typedef struct {
+  const double *J[2], *J_next[2]; /* J at this pin, and at the next one */
+  double *factor[2];              /* of this pin's diagonal block */
+  ptrdiff_t j[2], unknown[2];     /* the body's first coordinate; index in y of this pin's first unknown */
+  ptrdiff_t J_stride, j_stride, unknown_stride; /* from body to body in lane 0; in lane 1 times 1 or -1, `direction` */
+  ptrdiff_t row_stride;                         /* from row to row of J */
+} chain_sweep;
+
+/* J of a pin in a body's columns: the unit matrix times `sign`, then the angle's column (x, y). */
+typedef struct {
+  chain_lanes sign, x, y;
+} chain_jacobian;
+
+/* A body: J at the pin that is eliminated, and at the next one; the inverses of its mass and inertia. */
+typedef struct {
+  chain_jacobian a, b;
+  chain_lanes m, i;
+} chain_body;
+
+typedef struct {
+  chain_lanes x, y;
+} chain_pair;
+
+typedef struct {
+  chain_lanes x, y, angle;
+} chain_vector;
+
+typedef struct {
+  chain_lanes xx, xy, yx, yy;
+} chain_square;
+
+/* Entry i of two arrays, one for each lane. */
+PW_INLINE chain_lanes chain_load (const double *a, const double *b, ptrdiff_t i) {
+  return (chain_lanes){ a[i], b[i] };
+}
+
+PW_INLINE void chain_store (double *a, double *b, ptrdiff_t i, chain_lanes value) {
+  a[i] = value[0], b[i] = value[1];
+}
+
+/* Moves both lanes on by some bodies. */
+PW_INLINE void chain_move (chain_sweep *s, ptrdiff_t bodies, int direction) {
+  PW_UNROLL for (int k = 0; k < 2; k++, bodies *= direction) {
+    s->J[k] += bodies * s->J_stride, s->J_next[k] += bodies * s->J_stride, s->factor[k] += 3 * bodies;
+    s->j[k] += bodies * s->j_stride, s->unknown[k] += bodies * s->unknown_stride;
+  }
+}
+
+/* Both lanes begin at the first pin, or the second one at the last pin if the chain includes it. */
+static chain_sweep chain_begin (const pw_block_ldl *l, const pw_chain *c) {
+  const ptrdiff_t more = c->includes_last ? c->bodies - 1 : 0, pin = c->includes_last ? c->bodies : 0;
+  const double *first = c->J_first + more * c->J_stride, *second = c->J_second + more * c->J_stride;
+  double *factor = l->chain_factor + c->first_factor;
+  return (chain_sweep){ .J = { c->J_first, c->includes_last ? second : first },
+                        .J_next = { c->J_second, c->includes_last ? first : second },
+                        .factor = { factor, factor + 3 * pin },
+                        .j = { c->j, c->j + more * c->j_stride },
+                        .unknown = { c->unknown, c->unknown + pin * c->unknown_stride },
+                        .J_stride = c->J_stride,
+                        .j_stride = c->j_stride,
+                        .unknown_stride = c->unknown_stride,
+                        .row_stride = c->row_stride };
+}
+
+PW_INLINE chain_jacobian chain_read_J (const chain_sweep *s, const double *const *J) {
+  return (chain_jacobian){ chain_load (J[0], J[1], 0), chain_load (J[0], J[1], 2),
+                           chain_load (J[0], J[1], s->row_stride + 2) };
+}
+
+PW_INLINE chain_body chain_read (const pw_block_ldl *l, const chain_sweep *s) {
+  const double *first = l->inverse_weight + s->j[0], *second = l->inverse_weight + s->j[1];
+  return (chain_body){ chain_read_J (s, s->J), chain_read_J (s, s->J_next), chain_load (first, second, 0),
+                       chain_load (first, second, 2) };
+}
+
+/* y of the pins that are eliminated. */
+PW_INLINE chain_pair chain_unknowns (const chain_sweep *s, const double *y) {
+  const double *first = y + s->unknown[0], *second = y + s->unknown[1];
+  return (chain_pair){ chain_load (first, second, 0), chain_load (first, second, 1) };
+}
+
+PW_INLINE void chain_store_unknowns (const chain_sweep *s, double *y, chain_pair value) {
+  double *first = y + s->unknown[0], *second = y + s->unknown[1];
+  chain_store (first, second, 0, value.x);
+  chain_store (first, second, 1, value.y);
+}
+
+/* The forces on the bodies. */
+PW_INLINE chain_vector chain_forces (const chain_sweep *s, const double *f) {
+  const double *first = f + s->j[0], *second = f + s->j[1];
+  return (chain_vector){ chain_load (first, second, 0), chain_load (first, second, 1), chain_load (first, second, 2) };
+}
+
+/* K of block_ldl.h: rows of the next pin, columns of the one that is eliminated. */
+PW_INLINE chain_square chain_coupling (chain_body p) {
+  const chain_lanes mass = p.m * p.a.sign * p.b.sign, x = p.i * p.b.x, y = p.i * p.b.y;
+  return (chain_square){ mass + x * p.a.x, x * p.a.y, y * p.a.x, mass + y * p.a.y };
+}
+
+/* (x, y) divided by a block with the factors d, e, f, as in block_divide. */
+PW_INLINE chain_pair chain_divide (chain_lanes d, chain_lanes e, chain_lanes f, chain_lanes x, chain_lanes y) {
+  const chain_lanes z = (y - e * x) * f;
+  return (chain_pair){ x * d - e * z, z };
+}
+
+/* The same by the stored factors of the pins that are eliminated. */
+PW_INLINE chain_pair chain_divide_stored (const chain_sweep *s, chain_lanes x, chain_lanes y) {
+  const double *a = s->factor[0], *b = s->factor[1];
+  return chain_divide (chain_load (a, b, 0), chain_load (a, b, 1), chain_load (a, b, 2), x, y);
+}
+
+/* Factorises the diagonal block of each lane as block_pivot does.  D: as in pw_block_column: xx, yx, yy, then xx and yy
+ * before elimination.  The smallest pivot rarely changes, so one test of both lanes comes first. */
+PW_INLINE void chain_pivot (chain_lanes *D, pw_block_ldl *l, const chain_sweep *s) {
+  const chain_lanes a = D[0], minor = a * D[2] - D[1] * D[1], least = { l->least_pivot, l->least_pivot };
+  const chain_lanes bound = least * D[3], minor_bound = least * a * D[4];
+  const int larger = a[0] > bound[0] && a[1] > bound[1] && minor[0] > minor_bound[0] && minor[1] > minor_bound[1];
+  for (int k = 0; k < 2 && !larger; k++) {
+    block_track_pivot (l, a[k], D[3][k], (int)s->unknown[k]);
+    block_track_pivot (l, minor[k], fabs (a[k]) * D[4][k], (int)s->unknown[k] + 1);
+  }
+  D[0] = 1 / a;
+  D[1] = D[1] * D[0], D[2] = a / minor;
+}
+
+/* Eliminates the pins.  D: their diagonal blocks without the contributions of the bodies of s, which are added; then
+ * those of the next pins, without the contributions of the next bodies. */
+PW_INLINE void chain_eliminate (pw_block_ldl *l, chain_sweep *s, int direction, chain_lanes *D) {
+  const chain_body p = chain_read (l, s);
+  const chain_square K = chain_coupling (p);
+  const chain_lanes ax = p.i * p.a.x, ay = p.i * p.a.y, xx = p.m + ax * p.a.x, yy = p.m + ay * p.a.y;
+  D[0] += xx, D[1] += ax * p.a.y, D[2] += yy, D[3] += xx, D[4] += yy;
+  chain_pivot (D, l, s);
+  for (int n = 0; n < 3; n++) chain_store (s->factor[0], s->factor[1], n, D[n]);
+  /* The rows of L = K D^-1. */
+  const chain_pair x = chain_divide (D[0], D[1], D[2], K.xx, K.xy), y = chain_divide (D[0], D[1], D[2], K.yx, K.yy);
+  const chain_lanes bx = p.i * p.b.x, by = p.i * p.b.y;
+  D[3] = p.m + bx * p.b.x, D[4] = p.m + by * p.b.y;
+  D[0] = D[3] - (x.x * K.xx + x.y * K.xy);
+  D[1] = bx * p.b.y - (y.x * K.xx + y.y * K.xy);
+  D[2] = D[4] - (y.x * K.yx + y.y * K.yy);
+  chain_move (s, 1, direction);
+}
+
+/* The second lane joins the first one. */
+static inline void chain_meet (chain_sweep *s) {
+  s->J[1] = s->J[0], s->J_next[1] = s->J_next[0], s->factor[1] = s->factor[0];
+  s->j[1] = s->j[0], s->unknown[1] = s->unknown[0];
+}
+
+/* Without includes_last, eliminates all pins but the last, one by one.  With includes_last, eliminates pairs of pins
+ * from both ends, then the pin before the middle body if the number of bodies is odd, and finally the remaining middle
+ * pin. */
+static void chain_factor (pw_block_ldl *l, const pw_chain *c) {
+  const int pairs = c->includes_last ? c->bodies / 2 : 0, singles = c->bodies - 2 * pairs;
+  const double *first = l->value + l->column[c->first_column].first_value;
+  double *last = l->value + l->column[c->first_column + c->bodies].first_value;
+  chain_sweep s = chain_begin (l, c);
+  chain_lanes D[CHAIN_BLOCK];
+  double other[CHAIN_BLOCK]; /* the second lane's contribution to the middle pin */
+  for (int n = 0; n < CHAIN_BLOCK; n++) D[n] = (chain_lanes){ first[n], c->includes_last ? last[n] : first[n] };
+  for (int n = pairs; n > 0 && l->least_pivot > 0; n--) chain_eliminate (l, &s, -1, D);
+  for (int n = 0; n < CHAIN_BLOCK && c->includes_last; n++) other[n] = D[n][1], D[n][1] = D[n][0];
+  chain_meet (&s);
+  for (int n = singles; n > 0 && l->least_pivot > 0; n--) chain_eliminate (l, &s, 1, D);
+  if (!(l->least_pivot > 0)) return;
+  if (!c->includes_last) {
+    for (int n = 0; n < CHAIN_BLOCK; n++) last[n] += D[n][0];
+    return;
+  }
+  for (int n = 0; n < CHAIN_BLOCK; n++) D[n] += other[n];
+  chain_pivot (D, l, &s);
+  for (int n = 0; n < 3; n++) s.factor[0][n] = D[n][0];
+}
+
+/* Subtracts J W^-1 f from y of both pins of the body, then K D^-1 y_c from y_(c+1).  at: y of the pins that are
+ * eliminated.  Returns y of the next ones. */
+PW_INLINE chain_pair chain_forward_body (const pw_block_ldl *l, chain_sweep *s, int direction, const double *f,
+                                         double *y, chain_pair at) {
+  const chain_body p = chain_read (l, s);
+  const chain_lanes mass = p.m * p.a.sign * p.b.sign;
+  const double *first = y + s->unknown[0] + s->unknown_stride,
+               *second = y + s->unknown[1] + direction * s->unknown_stride;
+  chain_pair next = { chain_load (first, second, 0), chain_load (first, second, 1) };
+  if (f) {
+    const chain_vector force = chain_forces (s, f);
+    const chain_lanes ax = p.m * force.x, ay = p.m * force.y, angular = p.i * force.angle;
+    at.x -= p.a.sign * ax + p.a.x * angular, at.y -= p.a.sign * ay + p.a.y * angular;
+    next.x -= p.b.sign * ax + p.b.x * angular, next.y -= p.b.sign * ay + p.b.y * angular;
+  }
+  chain_store_unknowns (s, y, at);
+  const chain_pair z = chain_divide_stored (s, at.x, at.y);
+  const chain_lanes turn = p.i * (p.a.x * z.x + p.a.y * z.y);
+  next.x -= mass * z.x + turn * p.b.x;
+  next.y -= mass * z.y + turn * p.b.y;
+  chain_move (s, 1, direction);
+  return next;
+}
+
+/* A chain's part of pw_block_solve, forwards. */
+PW_SELDOM void chain_forward (const pw_block_ldl *l, const pw_chain *c, const double *f, double *y) {
+  const int pairs = c->includes_last ? c->bodies / 2 : 0, singles = c->bodies - 2 * pairs;
+  chain_sweep s = chain_begin (l, c);
+  chain_pair at = chain_unknowns (&s, y);
+  double change_x = 0, change_y = 0; /* by the second lane to the middle pin */
+  if (c->includes_last) {
+    for (int n = pairs; n > 0; n--) at = chain_forward_body (l, &s, -1, f, y, at);
+    change_x = at.x[1] - y[s.unknown[1]], change_y = at.y[1] - y[s.unknown[1] + 1];
+    chain_meet (&s);
+    at.x[1] = at.x[0], at.y[1] = at.y[0];
+  }
+  for (int n = singles; n > 0; n--) at = chain_forward_body (l, &s, 1, f, y, at);
+  y[s.unknown[0]] = at.x[0] + change_x;
+  y[s.unknown[0] + 1] = at.y[0] + change_y;
+}
+
+/* Goes back to the pins before; returns their lambda, from that of the next ones, `next`, and stores it in y; also
+ * stores the accelerations a of the bodies between them. */
+PW_INLINE chain_pair chain_backward_body (const pw_block_ldl *l, chain_sweep *s, int direction, const double *f,
+                                          double *y, double *a, chain_pair next) {
+  chain_move (s, -1, direction);
+  const chain_body p = chain_read (l, s);
+  const chain_square K = chain_coupling (p);
+  const chain_pair own = chain_unknowns (s, y);
+  const chain_pair z =
+      chain_divide_stored (s, own.x + (K.xx * next.x + K.yx * next.y), own.y + (K.xy * next.x + K.yy * next.y));
+  const chain_pair at = { -z.x, -z.y };
+  chain_store_unknowns (s, y, at);
+  /* f - J^T lambda */
+  chain_vector net = { -(p.b.sign * next.x + p.a.sign * at.x), -(p.b.sign * next.y + p.a.sign * at.y),
+                       -(p.b.x * next.x + p.b.y * next.y + (p.a.x * at.x + p.a.y * at.y)) };
+  if (f) {
+    const chain_vector force = chain_forces (s, f);
+    net.x += force.x, net.y += force.y, net.angle += force.angle;
+  }
+  double *first = a + s->j[0], *second = a + s->j[1];
+  chain_store (first, second, 0, p.m * net.x);
+  chain_store (first, second, 1, p.m * net.y);
+  chain_store (first, second, 2, p.i * net.angle);
+  return at;
+}
+
+/* The same backwards, with the accelerations of the chain's bodies. */
+PW_SELDOM void chain_backward (const pw_block_ldl *l, const pw_chain *c, const double *f, double *y, double *a) {
+  const int pairs = c->includes_last ? c->bodies / 2 : 0, singles = c->bodies - 2 * pairs;
+  chain_sweep ends = chain_begin (l, c);
+  chain_move (&ends, pairs, -1);
+  chain_sweep middle = ends; /* where chain_forward ended */
+  chain_meet (&middle);
+  chain_move (&middle, singles, 1);
+  chain_pair at = chain_unknowns (&middle, y);
+  if (c->includes_last) {
+    const chain_pair z = chain_divide_stored (&middle, at.x, at.y);
+    at = (chain_pair){ -z.x, -z.y };
+    y[middle.unknown[0]] = at.x[0], y[middle.unknown[0] + 1] = at.y[0];
+  }
+  const chain_pair lambda = at;
+  for (int n = singles; n > 0; n--) at = chain_backward_body (l, &middle, 1, f, y, a, at);
+  at.x[1] = lambda.x[1], at.y[1] = lambda.y[1];
+  for (int n = pairs; n > 0; n--) at = chain_backward_body (l, &ends, -1, f, y, a, at);
 }
 
 /* ---- Assembly ---- */
@@ -217,7 +497,7 @@ void pw_block_factor (pw_block_ldl *l) {
   block_assemble (l);
   for (int j = 0; j < l->nodes && l->least_pivot > 0;)
     if (chain->first_column == j) {
-      pw_chain_factor (l, chain);
+      chain_factor (l, chain);
       j += chain->bodies + chain->includes_last;
       chain++;
     } else {
@@ -226,14 +506,14 @@ void pw_block_factor (pw_block_ldl *l) {
     }
 }
 
-/* Solution with the factors; see block_ldl.h.  Of an uncondensed body k, y_k begins as -f_k and becomes -a_k.
+/* ---- Solution ----
+ *
+ * Of an uncondensed body k, y_k begins as -f_k and becomes -a_k.
  *
  *   for each body:                y_p -= J_p W^-1 f
  *   for each column j:            y_p -= L_pj y_j
  *   for each column j backwards:  y_j = -D^-1 y_j - sum_p L_pj^T y_p
  *   for each body:                a = W^-1 (f - sum_p J_p^T y_p) */
-
-/* ---- Bodies ---- */
 
 /* y -= J z */
 PW_INLINE void block_gather (int size, int width, double *y, const double *J, int row_stride, block_row z) {
@@ -271,8 +551,6 @@ PW_INLINE void block_accelerate (int width, const pw_block_ldl *l, const pw_grou
   if (width == 3) a[p->j + 1] = w[1] * z.y, a[p->j + 2] = w[2] * z.angle;
 }
 
-/* ---- Columns ---- */
-
 /* to -= L from, L: ki x kj, its rows kj apart */
 PW_INLINE void block_forward (int ki, double *to, const double *L, const double *from, int kj) {
   to[0] -= block_dot (kj, from[0], from[kj - 1], L);
@@ -308,8 +586,6 @@ PW_INLINE void block_backward_column (int kj, const pw_block_ldl *l, const pw_bl
   if (kj == 2) to[1] = sum[1];
 }
 
-/* ---- All bodies and columns ---- */
-
 static void block_right (const pw_block_ldl *l, const double *f, double *y) {
   for (const pw_group_block *p = l->group, *last = p + l->groups; p < last; p++)
     if (p->uncondensed)
@@ -334,7 +610,7 @@ void pw_block_solve (const pw_block_ldl *l, const double *f, double *y, double *
   if (f) block_right (l, f, y);
   for (int j = 0; j < l->nodes;)
     if (chain->first_column == j) {
-      pw_chain_forward (l, chain, f, y);
+      chain_forward (l, chain, f, y);
       j += chain->bodies + chain->includes_last;
       chain++;
     } else {
@@ -343,7 +619,7 @@ void pw_block_solve (const pw_block_ldl *l, const double *f, double *y, double *
     }
   for (int j = l->nodes; j > 0;)
     if (chain > l->chain && chain[-1].first_column + chain[-1].bodies + chain[-1].includes_last == j) {
-      pw_chain_backward (l, --chain, f, y, a);
+      chain_backward (l, --chain, f, y, a);
       j = chain->first_column;
     } else {
       j--;
@@ -352,287 +628,7 @@ void pw_block_solve (const pw_block_ldl *l, const double *f, double *y, double *
   block_accelerations (l, f, y, a);
 }
 
-/* Factorisation and solution along chains; see block_ldl.h.  Each elimination waits for the one before it.  A chain
- * that can be eliminated from both ends (includes_last) is therefore swept in the two lanes of vector registers, from
- * the ends to the middle; in any other chain both lanes do the same, from the first pin to the last. */
-
-PW_ONE_BY_ONE
-
-enum { CHAIN_BLOCK = 5 }; /* values of a diagonal block of 2 unknowns */
-
-/* GNU C's vectors: operations work on both lanes. */
-typedef double chain_lanes __attribute__ ((vector_size (2 * sizeof (double))));
-
-/* A body of the chain, one of whose pins is eliminated. */
-typedef struct {
-  const double *J_eliminated, *J_next; /* J at this pin, and at the next one */
-  double *factor;                      /* of this pin's diagonal block */
-  ptrdiff_t j;                         /* first coordinate of the body */
-  ptrdiff_t unknown;                   /* index in y of this pin's first unknown */
-} chain_lane;
-
-typedef struct {
-  chain_lane first, second;
-  ptrdiff_t J_stride, j_stride, unknown_stride; /* from body to body in the first lane; in the second one times
-                                                 * 1 or -1, the argument `direction` of functions */
-  ptrdiff_t row_stride;                         /* from row to row of J */
-} chain_sweep;
-
-/* J of a pin in a body's columns: the unit matrix times `sign`, then the angle's column (x, y). */
-typedef struct {
-  chain_lanes sign, x, y;
-} chain_jacobian;
-
-/* A body: J at the pin that is eliminated, and at the next one; the inverses of its mass and inertia. */
-typedef struct {
-  chain_jacobian a, b;
-  chain_lanes m, i;
-} chain_body;
-
-typedef struct {
-  chain_lanes x, y;
-} chain_pair;
-
-typedef struct {
-  chain_lanes x, y, angle;
-} chain_vector;
-
-typedef struct {
-  chain_lanes xx, xy, yx, yy;
-} chain_square;
-
-/* ---- Lanes ---- */
-
-PW_INLINE void chain_advance (chain_lane *x, const chain_sweep *s, ptrdiff_t bodies) {
-  x->J_eliminated += bodies * s->J_stride, x->J_next += bodies * s->J_stride, x->factor += 3 * bodies;
-  x->j += bodies * s->j_stride, x->unknown += bodies * s->unknown_stride;
-}
-
-/* direction: 1, both lanes begin at the first pin; -1, the second lane begins at the last pin. */
-static chain_sweep chain_begin (const pw_block_ldl *l, const pw_chain *c, int direction) {
-  chain_sweep s = {
-    .J_stride = c->J_stride, .j_stride = c->j_stride, .unknown_stride = c->unknown_stride, .row_stride = c->row_stride
-  };
-  s.first = s.second = (chain_lane){ c->J_first, c->J_second, l->chain_factor + c->first_factor, c->j, c->unknown };
-  if (direction > 0) return s;
-  chain_advance (&s.second, &s, c->bodies - 1);
-  const double *J = s.second.J_eliminated;
-  s.second.J_eliminated = s.second.J_next, s.second.J_next = J;
-  s.second.factor += 3, s.second.unknown += s.unknown_stride;
-  return s;
-}
-
-/* Moves both lanes on by some bodies. */
-PW_INLINE void chain_move (chain_sweep *s, ptrdiff_t bodies, int direction) {
-  chain_advance (&s->first, s, bodies);
-  chain_advance (&s->second, s, direction * bodies);
-}
-
-/* Entry i of two arrays, one for each lane. */
-PW_INLINE chain_lanes chain_load (const double *a, const double *b, ptrdiff_t i) {
-  return (chain_lanes){ a[i], b[i] };
-}
-
-PW_INLINE void chain_store (double *a, double *b, ptrdiff_t i, chain_lanes value) {
-  a[i] = value[0], b[i] = value[1];
-}
-
-PW_INLINE chain_jacobian chain_read_J (const chain_sweep *s, const double *a, const double *b) {
-  return (chain_jacobian){ chain_load (a, b, 0), chain_load (a, b, 2), chain_load (a, b, s->row_stride + 2) };
-}
-
-PW_INLINE chain_body chain_read (const pw_block_ldl *l, const chain_sweep *s) {
-  const double *first = l->inverse_weight + s->first.j, *second = l->inverse_weight + s->second.j;
-  return (chain_body){ chain_read_J (s, s->first.J_eliminated, s->second.J_eliminated),
-                       chain_read_J (s, s->first.J_next, s->second.J_next), chain_load (first, second, 0),
-                       chain_load (first, second, 2) };
-}
-
-/* y of the pins that are eliminated. */
-PW_INLINE chain_pair chain_unknowns (const chain_sweep *s, const double *y) {
-  const double *first = y + s->first.unknown, *second = y + s->second.unknown;
-  return (chain_pair){ chain_load (first, second, 0), chain_load (first, second, 1) };
-}
-
-PW_INLINE void chain_store_unknowns (const chain_sweep *s, double *y, chain_pair value) {
-  double *first = y + s->first.unknown, *second = y + s->second.unknown;
-  chain_store (first, second, 0, value.x);
-  chain_store (first, second, 1, value.y);
-}
-
-/* The forces on the bodies. */
-PW_INLINE chain_vector chain_forces (const chain_sweep *s, const double *f) {
-  const double *first = f + s->first.j, *second = f + s->second.j;
-  return (chain_vector){ chain_load (first, second, 0), chain_load (first, second, 1), chain_load (first, second, 2) };
-}
-
-/* K of block_ldl.h: rows of the next pin, columns of the one that is eliminated. */
-PW_INLINE chain_square chain_coupling (chain_body p) {
-  const chain_lanes mass = p.m * p.a.sign * p.b.sign, x = p.i * p.b.x, y = p.i * p.b.y;
-  return (chain_square){ mass + x * p.a.x, x * p.a.y, y * p.a.x, mass + y * p.a.y };
-}
-
-/* (x, y) divided by a block with the factors d, e, f, as block_divide (block_ldl.c). */
-PW_INLINE chain_pair chain_divide (chain_lanes d, chain_lanes e, chain_lanes f, chain_lanes x, chain_lanes y) {
-  const chain_lanes z = (y - e * x) * f;
-  return (chain_pair){ x * d - e * z, z };
-}
-
-/* The same by the stored factors of the pins that are eliminated. */
-PW_INLINE chain_pair chain_divide_stored (const chain_sweep *s, chain_lanes x, chain_lanes y) {
-  const double *a = s->first.factor, *b = s->second.factor;
-  return chain_divide (chain_load (a, b, 0), chain_load (a, b, 1), chain_load (a, b, 2), x, y);
-}
-
-/* ---- Factorisation ---- */
-
-/* Factorises the diagonal block of each lane as block_pivot (block_ldl.c).  D: as in pw_block_column: xx, yx, yy,
- * then xx and yy before elimination.  The smallest pivot rarely changes, so one test of both lanes comes first. */
-PW_INLINE void chain_pivot (chain_lanes *D, pw_block_ldl *l, const chain_sweep *s) {
-  const chain_lanes a = D[0], minor = a * D[2] - D[1] * D[1], least = { l->least_pivot, l->least_pivot };
-  const chain_lanes bound = least * D[3], minor_bound = least * a * D[4];
-  const int larger = a[0] > bound[0] && a[1] > bound[1] && minor[0] > minor_bound[0] && minor[1] > minor_bound[1];
-  for (int k = 0; k < 2 && !larger; k++) {
-    const int unknown = (int)(k ? s->second.unknown : s->first.unknown);
-    block_track_pivot (l, a[k], D[3][k], unknown);
-    block_track_pivot (l, minor[k], fabs (a[k]) * D[4][k], unknown + 1);
-  }
-  D[0] = 1 / a;
-  D[1] = D[1] * D[0], D[2] = a / minor;
-}
-
-/* Eliminates the pins.  D: their diagonal blocks without the contributions of the bodies of s, which are added; then
- * those of the next pins, without the contributions of the next bodies. */
-PW_INLINE void chain_eliminate (pw_block_ldl *l, chain_sweep *s, int direction, chain_lanes *D) {
-  const chain_body p = chain_read (l, s);
-  const chain_square K = chain_coupling (p);
-  const chain_lanes ax = p.i * p.a.x, ay = p.i * p.a.y, xx = p.m + ax * p.a.x, yy = p.m + ay * p.a.y;
-  D[0] += xx, D[1] += ax * p.a.y, D[2] += yy, D[3] += xx, D[4] += yy;
-  chain_pivot (D, l, s);
-  for (int n = 0; n < 3; n++) chain_store (s->first.factor, s->second.factor, n, D[n]);
-  /* The rows of L = K D^-1. */
-  const chain_pair x = chain_divide (D[0], D[1], D[2], K.xx, K.xy), y = chain_divide (D[0], D[1], D[2], K.yx, K.yy);
-  const chain_lanes bx = p.i * p.b.x, by = p.i * p.b.y;
-  D[3] = p.m + bx * p.b.x, D[4] = p.m + by * p.b.y;
-  D[0] = D[3] - (x.x * K.xx + x.y * K.xy);
-  D[1] = bx * p.b.y - (y.x * K.xx + y.y * K.xy);
-  D[2] = D[4] - (y.x * K.yx + y.y * K.yy);
-  chain_move (s, 1, direction);
-}
-
-/* Without includes_last, eliminates all pins but the last, one by one.  With includes_last, eliminates pairs of pins
- * from both ends, then the pin before the middle body if the number of bodies is odd, and finally the remaining middle
- * pin. */
-void pw_chain_factor (pw_block_ldl *l, const pw_chain *c) {
-  const int pairs = c->includes_last ? c->bodies / 2 : 0, singles = c->bodies - 2 * pairs;
-  const double *first = l->value + l->column[c->first_column].first_value;
-  double *last = l->value + l->column[c->first_column + c->bodies].first_value;
-  chain_sweep s = chain_begin (l, c, c->includes_last ? -1 : 1);
-  chain_lanes D[CHAIN_BLOCK];
-  double other[CHAIN_BLOCK]; /* the second lane's contribution to the middle pin */
-  for (int n = 0; n < CHAIN_BLOCK; n++) D[n] = (chain_lanes){ first[n], c->includes_last ? last[n] : first[n] };
-  for (int n = pairs; n > 0 && l->least_pivot > 0; n--) chain_eliminate (l, &s, -1, D);
-  for (int n = 0; n < CHAIN_BLOCK && c->includes_last; n++) other[n] = D[n][1], D[n][1] = D[n][0];
-  if (c->includes_last) s.second = s.first;
-  for (int n = singles; n > 0 && l->least_pivot > 0; n--) chain_eliminate (l, &s, 1, D);
-  if (!(l->least_pivot > 0)) return;
-  if (!c->includes_last) {
-    for (int n = 0; n < CHAIN_BLOCK; n++) last[n] += D[n][0];
-    return;
-  }
-  for (int n = 0; n < CHAIN_BLOCK; n++) D[n] += other[n];
-  chain_pivot (D, l, &s);
-  for (int n = 0; n < 3; n++) s.first.factor[n] = D[n][0];
-}
-
-/* ---- Solution ---- */
-
-/* Subtracts J W^-1 f from y of both pins of the body, then K D^-1 y_c from y_(c+1).  at: y of the pins that are
- * eliminated.  Returns y of the next ones. */
-PW_INLINE chain_pair chain_forward (const pw_block_ldl *l, chain_sweep *s, int direction, const double *f, double *y,
-                                    chain_pair at) {
-  const chain_body p = chain_read (l, s);
-  const chain_lanes mass = p.m * p.a.sign * p.b.sign;
-  const double *first = y + s->first.unknown + s->unknown_stride,
-               *second = y + s->second.unknown + direction * s->unknown_stride;
-  chain_pair next = { chain_load (first, second, 0), chain_load (first, second, 1) };
-  if (f) {
-    const chain_vector force = chain_forces (s, f);
-    const chain_lanes ax = p.m * force.x, ay = p.m * force.y, angular = p.i * force.angle;
-    at.x -= p.a.sign * ax + p.a.x * angular, at.y -= p.a.sign * ay + p.a.y * angular;
-    next.x -= p.b.sign * ax + p.b.x * angular, next.y -= p.b.sign * ay + p.b.y * angular;
-  }
-  chain_store_unknowns (s, y, at);
-  const chain_pair z = chain_divide_stored (s, at.x, at.y);
-  const chain_lanes turn = p.i * (p.a.x * z.x + p.a.y * z.y);
-  next.x -= mass * z.x + turn * p.b.x;
-  next.y -= mass * z.y + turn * p.b.y;
-  chain_move (s, 1, direction);
-  return next;
-}
-
-void pw_chain_forward (const pw_block_ldl *l, const pw_chain *c, const double *f, double *y) {
-  const int pairs = c->includes_last ? c->bodies / 2 : 0, singles = c->bodies - 2 * pairs;
-  chain_sweep s = chain_begin (l, c, c->includes_last ? -1 : 1);
-  chain_pair at = chain_unknowns (&s, y);
-  double change_x = 0, change_y = 0; /* by the second lane to the middle pin */
-  if (c->includes_last) {
-    for (int n = pairs; n > 0; n--) at = chain_forward (l, &s, -1, f, y, at);
-    change_x = at.x[1] - y[s.second.unknown], change_y = at.y[1] - y[s.second.unknown + 1];
-    s.second = s.first;
-    at.x[1] = at.x[0], at.y[1] = at.y[0];
-  }
-  for (int n = singles; n > 0; n--) at = chain_forward (l, &s, 1, f, y, at);
-  y[s.first.unknown] = at.x[0] + change_x;
-  y[s.first.unknown + 1] = at.y[0] + change_y;
-}
-
-/* Goes back to the pins before; returns their lambda, from that of the next ones, `next`, and stores it in y; also
- * stores the accelerations of the bodies between them. */
-PW_INLINE chain_pair chain_backward (const pw_block_ldl *l, chain_sweep *s, int direction, const double *f, double *y,
-                                     double *acceleration, chain_pair next) {
-  chain_move (s, -1, direction);
-  const chain_body p = chain_read (l, s);
-  const chain_square K = chain_coupling (p);
-  const chain_pair own = chain_unknowns (s, y);
-  const chain_pair z =
-      chain_divide_stored (s, own.x + (K.xx * next.x + K.yx * next.y), own.y + (K.xy * next.x + K.yy * next.y));
-  const chain_pair at = { -z.x, -z.y };
-  chain_store_unknowns (s, y, at);
-  /* f - J^T lambda */
-  chain_vector net = { -(p.b.sign * next.x + p.a.sign * at.x), -(p.b.sign * next.y + p.a.sign * at.y),
-                       -(p.b.x * next.x + p.b.y * next.y + (p.a.x * at.x + p.a.y * at.y)) };
-  if (f) {
-    const chain_vector force = chain_forces (s, f);
-    net.x += force.x, net.y += force.y, net.angle += force.angle;
-  }
-  double *first = acceleration + s->first.j, *second = acceleration + s->second.j;
-  chain_store (first, second, 0, p.m * net.x);
-  chain_store (first, second, 1, p.m * net.y);
-  chain_store (first, second, 2, p.i * net.angle);
-  return at;
-}
-
-void pw_chain_backward (const pw_block_ldl *l, const pw_chain *c, const double *f, double *y, double *a) {
-  const int pairs = c->includes_last ? c->bodies / 2 : 0, singles = c->bodies - 2 * pairs;
-  chain_sweep ends = chain_begin (l, c, c->includes_last ? -1 : 1);
-  chain_move (&ends, pairs, -1);
-  chain_sweep middle = ends; /* where pw_chain_forward ended */
-  middle.second = middle.first;
-  chain_move (&middle, singles, 1);
-  chain_pair at = chain_unknowns (&middle, y);
-  if (c->includes_last) {
-    const chain_pair z = chain_divide_stored (&middle, at.x, at.y);
-    at = (chain_pair){ -z.x, -z.y };
-    y[middle.first.unknown] = at.x[0], y[middle.first.unknown + 1] = at.y[0];
-  }
-  const chain_pair lambda = at;
-  for (int n = singles; n > 0; n--) at = chain_backward (l, &middle, 1, f, y, a, at);
-  at.x[1] = lambda.x[1], at.y[1] = lambda.y[1];
-  for (int n = pairs; n > 0; n--) at = chain_backward (l, &ends, -1, f, y, a, at);
-}
-
-/* Elimination order and layout of a block L D L^T; see block_ldl.h. */
+/* ---- Elimination order ---- */
 
 typedef struct {
   int nodes;
@@ -647,16 +643,6 @@ typedef struct {
   int *next;           /* of each node or column: its number of entries, then where the next one is listed */
   char *memory;
 } order_search;
-
-static int order_open (order_search *x) {
-  int **const array[] = { &x->first, &x->order, &x->column, &x->first_below, &x->parent, &x->visited, &x->next };
-  for (pw_layout l = { 0 }; pw_layout_pass (&l, &x->memory);) {
-    x->list = pw_layout_alloc (&l, (size_t)(2 * x->pairs), sizeof *x->list);
-    for (size_t i = 0; i < sizeof array / sizeof *array; i++)
-      *array[i] = pw_layout_alloc (&l, (size_t)x->nodes + 1, sizeof (int));
-  }
-  return x->memory ? PW_OK : PW_RESOURCE;
-}
 
 /* Gives each list as many entries as x->next has counted: first[c] and x->next[c] become its beginning. */
 static void order_begin_lists (order_search *x, int *first) {
@@ -702,6 +688,16 @@ static int order_pass (const order_search *x, int most, int *below) {
   return count <= most ? PW_OK : PW_RETRY;
 }
 
+void pw_block_close (pw_block_ldl *l) {
+  if (l == NULL) return;
+  free (l->cursor);
+  free (l->target);
+  free (l->value);
+  free (l->pattern);
+  free (l->memory);
+  free (l);
+}
+
 /* A matrix with the columns x->order, the rows below their diagonals not yet listed; NULL if out of memory. */
 static pw_block_ldl *order_allocate (const order_search *x) {
   size_t n = (size_t)x->nodes;
@@ -742,8 +738,14 @@ static pw_block_ldl *order_fill (order_search *x, int most, int *status) {
 /* In the natural order or, if that has less fill-in, minimum degree in rank 0; NULL if out of memory or L is too
  * large. */
 static pw_block_ldl *order_choose (order_search *x) {
+  int **const array[] = { &x->first, &x->order, &x->column, &x->first_below, &x->parent, &x->visited, &x->next };
+  for (pw_layout l = { 0 }; pw_layout_pass (&l, &x->memory);) {
+    x->list = pw_layout_alloc (&l, (size_t)(2 * x->pairs), sizeof *x->list);
+    for (size_t i = 0; i < sizeof array / sizeof *array; i++)
+      *array[i] = pw_layout_alloc (&l, (size_t)x->nodes + 1, sizeof (int));
+  }
   int status;
-  if (order_open (x) != PW_OK) return NULL;
+  if (x->memory == NULL) return NULL;
   order_list_neighbours (x, 0);
   if (x->nodes > 0 && amd_order (x->nodes, x->first, x->list, x->order, NULL, NULL) < 0) return NULL;
   order_list_neighbours (x, PW_BLOCK_RANKS - 1);
@@ -827,14 +829,4 @@ pw_block_ldl *pw_block_open (int nodes, const pw_plan_node *node, long pairs, co
   pw_block_ldl *l = order_choose (&x);
   free (x.memory);
   return l;
-}
-
-void pw_block_close (pw_block_ldl *l) {
-  if (l == NULL) return;
-  free (l->cursor);
-  free (l->target);
-  free (l->value);
-  free (l->pattern);
-  free (l->memory);
-  free (l);
 }

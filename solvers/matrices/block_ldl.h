@@ -31,6 +31,19 @@
 
 #include "pinwheel.h"
 
+/* Replaces `static` of a function that is compiled once per set of constant arguments, such as a size. */
+#define PW_INLINE static inline __attribute__ ((always_inline))
+
+/* The same of a function that few scenes call: inlined, it would add to the cost of its caller. */
+#define PW_SELDOM static __attribute__ ((noinline))
+
+/* Before a loop whose length, at most 8, is constant after inlining.  Clang unrolls it without a pragma. */
+#ifndef __clang__
+#define PW_UNROLL _Pragma ("GCC unroll 8")
+#else
+#define PW_UNROLL
+#endif
+
 enum {
   PW_BLOCK_NODE = 2,   /* most unknowns in a node */
   PW_BLOCK_RANKS = 3,  /* ranks of nodes: nodes of a lower rank are eliminated first */
@@ -79,7 +92,7 @@ typedef struct {
   int includes_last; /* 1: the last pin is eliminated with the chain; 0: it only receives the update by the others */
 } pw_chain;
 
-typedef struct {
+typedef struct pw_block_ldl {
   int nodes;
   pw_block_column *column; /* nodes + 1: the last one ends the ranges */
   int *below;              /* rows below the diagonal of each column, as numbers of columns, ascending */
@@ -100,12 +113,12 @@ typedef struct {
   char *pattern, *memory; /* allocations: of column, below and column_of_node; of groups and chains */
 } pw_block_ldl;
 
-/* ---- Planning (block_ldl.c) ---- */
+/* ---- Planning ---- */
 
 typedef struct {
   int size;               /* unknowns */
   int rank;               /* 0 to PW_BLOCK_RANKS - 1 */
-  int grounded;           /* 1: touches a group that does not move, or pw_is_grounded (massless.h) */
+  int grounded;           /* 1: touches a group that does not move, or is_grounded in saddle.c */
   int rolls;              /* 1: the rolling equation of a wheel, alone */
   int unknown;            /* index in y of its first unknown: its first row, or beyond the rows for -a_k */
   int first_contribution; /* index of the first one; they end at that of the next node */
@@ -130,7 +143,7 @@ static inline int pw_block_diagonal_values (int size) {
   return size * (size + 3) / 2;
 }
 
-/* ---- Factorisation and solution (block_ldl.c, block_ldl.c, block_ldl.c) ---- */
+/* ---- Factorisation and solution ---- */
 
 /* Assembles S with the J last evaluated and factorises it; stops where least_pivot is not positive. */
 void pw_block_factor (pw_block_ldl *l);
@@ -138,11 +151,5 @@ void pw_block_factor (pw_block_ldl *l);
 /* y, which holds gamma, then 0 for each -a_k, becomes lambda and -a_k; a = W^-1 (f - J^T lambda).  f and a may be the
  * same; f NULL: zero. */
 void pw_block_solve (const pw_block_ldl *l, const double *f, double *y, double *a);
-
-/* A chain's part of pw_block_factor, and of pw_block_solve: forwards, where a column's elimination updates those after
- * it; backwards, with the accelerations of its bodies. */
-void pw_chain_factor (pw_block_ldl *l, const pw_chain *c);
-void pw_chain_forward (const pw_block_ldl *l, const pw_chain *c, const double *f, double *y);
-void pw_chain_backward (const pw_block_ldl *l, const pw_chain *c, const double *f, double *y, double *a);
 
 #endif

@@ -3,99 +3,513 @@
  *   S lambda = J W^-1 f - gamma,  S = J W^-1 J^T,     a = W^-1 (f - J^T lambda)
  *
  * (Golub & Greif 2003, On solving block-structured indefinite linear systems.)  Equations that share no coordinate with
- * weight do not meet in S, so S has the pattern of the mechanism: a chain is block tridiagonal.  Coordinates without
- * weight are eliminated first, in massless.c. */
+ * weight do not meet in S, so S has the pattern of the mechanism: a chain is block tridiagonal.
+ *
+ * Equations are grouped into nodes of 1 or 2 with the same columns.  A node contributes to a group of its coordinates
+ * if at least one coordinate of that group has a finite weight other than 0.  An uncondensed body (block_ldl.h) adds
+ * two nodes of its own, for -a_k.  Coupled, i.e. with a block in the matrix, are two nodes that contribute to the same
+ * condensed group, and the two nodes of an uncondensed body with every node that contributes to it.
+ *
+ * Coordinates without weight, called massless, are eliminated first; the others are massive.  Each massless one is
+ * matched to a constraint row and substituted out of the other rows.
+ *
+ * The rows and coordinates concerned form independent components, such as a massless body and its joints.  In each,
+ * Gaussian elimination of the massless columns, with the matched rows p as pivot rows, leaves
+ *
+ *     [ P H ]   [ L 0 ] [ U H' ]       P, H: matched rows in the massless and in the massive columns
+ *     [ K Z ] = [ R 1 ] [ 0 Z' ]       K, Z: unmatched rows i
+ *
+ * With  f_P  the forces at the massless coordinates,  w = U^-T f_P,  f~ = f - H'^T w,  gamma~ = [ L 0 ; R 1 ]^-1 gamma,
+ * the rows Z' and the massive coordinates form a system without the massless ones.  Its solution yields
+ *
+ *     a_P = U^-1 (gamma~_p - H' a),       lambda_p = L^-T (w - R^T lambda_i). */
 #include <float.h>
 #include <limits.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "saddle.h"
-#include "condense.h"
+#include "block_ldl.h"
+#include "util.h"
 
 /* A pivot is 1 minus a squared cosine.  Round-off leaves the pivot of a dependent row at about eps / s^2, with s the
  * smallest sine of the rows before it: at this one if s = 0.07.  With a smaller s such a row passes, but its sine is
  * below `rank_suspect` (watchdog.c), where opening a run computes the rank. */
 #define SADDLE_ROUND_OFF (200 * DBL_EPSILON)
 
-pw_saddle *pw_saddle_open (pw_workspace *w, const double *weight, int rows, const unsigned char *active,
-                           pw_error *error) {
-  int status = PW_RESOURCE;
-  pw_saddle *saddle = calloc (1, sizeof *saddle);
-  if (saddle) {
-    *saddle = (pw_saddle){ .s = w->s, .w = w, .rows = rows, .pivot = INFINITY, .pivot_row = -1, .dependent_row = -1 };
-    status = pw_massless_open (&saddle->massless, w, weight, rows, active, error);
-    if (status == PW_OK) status = pw_condense (saddle, weight, active);
+enum { MASSLESS_GROUPS = PW_MAX_BODIES + PW_MAX_INTERNAL }; /* most groups of one element */
+
+/* Groups of coordinates: each body's three, then each internal coordinate alone.  The group of coordinate j. */
+static inline int group_of (const pw_system *s, int j) {
+  return j < 3 * s->bodies ? j / 3 : j - 2 * s->bodies;
+}
+/* The first coordinate of a group. */
+static inline int group_first (const pw_system *s, int group) {
+  return group < s->bodies ? 3 * group : group + 2 * s->bodies;
+}
+/* The number of coordinates in the group that begins with coordinate j. */
+static inline int group_width (const pw_system *s, int j) {
+  return j < 3 * s->bodies ? 3 : 1;
+}
+
+/* The number of columns in the group that begins with local column x of an element. */
+static inline int group_columns (const pw_kind *kind, int x) {
+  return x < 3 * kind->bodies ? 3 : 1;
+}
+
+/* 1 if an element's equations may change under a rigid displacement of its bodies: it touches the ground, acts on
+ * fewer than two bodies, or is nonholonomic. */
+static inline int is_grounded (const pw_system *s, const pw_element_batch *k, int e) {
+  int grounded = k->kind->bodies < 2 || k->row >= s->holonomic;
+  for (int b = 0; b < k->kind->bodies; b++) grounded |= k->column[e * k->kind->bodies + b] >= s->coords;
+  return grounded;
+}
+
+/* A group of a component, whose coordinates are numbered as its local columns. */
+typedef struct {
+  int j, width; /* first global coordinate; 3 of a body, or 1 */
+  int column;   /* first local column */
+} massless_group;
+
+/* A row of a component.  Entries in columns of angles are multiplied by 1 / L before they are compared with others. */
+typedef struct {
+  int equation;          /* its constraint equation */
+  int pivot_column;      /* matched rows: the local column of the coordinate */
+  double largest;        /* largest entry when last matched */
+  double pivot_scale;    /* matched rows: factor that makes the pivot relative to `largest` */
+  double rematch_below;  /* matched rows: the relative pivot below which the component is matched again */
+  double squared_terms;  /* unmatched rows: sum of squares: entries, and what is subtracted from the massive ones */
+  double gamma;          /* gamma~ */
+  double lambda;         /* the multiplier; of matched rows w before that */
+  const double **source; /* groups: its entries in the batch, or zeros */
+} massless_row;
+
+typedef struct pw_component {
+  int rows, cols, groups;
+  int pivots;   /* matched rows */
+  int grounded; /* 1: one of its elements is (is_grounded) */
+  massless_group *group;
+  int *global;                   /* cols: global coordinate */
+  unsigned char *is_massless;    /* cols: 1 for a coordinate without weight */
+  int *massive, massives;        /* local columns of the others */
+  double *squared_scale;         /* cols: 1, or for an angle 1 / L^2 */
+  double *massive_squared_scale; /* cols: the same, 0 for a massless coordinate */
+  massless_row *row;             /* the matched ones first, in the order of elimination */
+  int *unknown; /* rows: index in gamma and lambda for the unmatched row i, whichever row that is after matching again;
+                 * -1: its multiplier is 0 */
+  double *A;    /* rows x stride: U, with inverses on its diagonal, and H', or 0 and Z'; then L, or R */
+  int first_L_column; /* of L and R in A: cols rounded up to an even number */
+  int stride;         /* from row to row of A */
+  double least_pivot; /* the smallest pivot relative to its row, or norm of a row of Z' relative to its terms */
+} pw_component;
+
+/* The contribution of a node to a group. */
+typedef struct {
+  const double *J; /* its entry in the node's first row and the group's first column */
+  int node;
+  int row_stride; /* from row to row of J */
+  int group;
+  int is_pin;        /* 1: both rows of a pin, whose x and y columns are the unit matrix or its negative */
+  int is_prescribed; /* 1: some of the group's coordinates are prescribed */
+} plan_contribution;
+
+typedef struct {
+  pw_saddle *saddle;
+  const double *weight;
+  const unsigned char *active;
+  int *parent; /* groups: union-find of massless groups; see massless_unite */
+  int *member; /* groups: -1: in no active row; at a root, once they are numbered: the number of its component */
+  pw_plan_node *node;
+  plan_contribution *contribution; /* those of a node follow one another */
+  int *pair;                       /* 2 x pairs: coupled nodes */
+  int nodes, contributions;
+  long pairs;
+  size_t node_room, contribution_room, pair_room; /* number of entries for which each has room */
+  int failed;                                     /* 1: out of memory */
+  int groups;
+  int *start, *list; /* contributions to group g: list[start[g]] to list[start[g + 1] - 1] */
+  int *uncondensed;  /* groups: first of the two nodes of an uncondensed body, or -1 */
+  pw_chain *chain;
+  int chains, linked;       /* number of chains; number of bodies in them */
+  unsigned char *is_linked; /* groups: 1 for a body in a chain */
+  pw_arena arena;           /* contains the arrays whose length is known beforehand */
+} saddle_plan;
+
+/* ---- Massless coordinates: elimination ----
+ *
+ * `pivots` is c->pivots: an argument, since it is the constant 3 in most calls, so that loops are unrolled. */
+
+/* Copies J to A. */
+PW_INLINE void massless_copy (pw_component *c) {
+  const massless_group *end = c->group + c->groups;
+  double *row = c->A;
+  for (const massless_row *r = c->row; r < c->row + c->rows; r++, row += c->stride) {
+    const double **from = r->source;
+    for (const massless_group *g = c->group; g < end; g++) {
+      const double *J = *from++;
+      double *A = row + g->column;
+      A[0] = J[0];
+      if (g->width == 3) A[1] = J[1], A[2] = J[2];
+    }
   }
-  if (status == PW_OK) return saddle;
-  pw_saddle_close (saddle);
-  pw_fail (error, status, "model %s: out of memory", w->s->model);
-  return NULL;
 }
 
-void pw_saddle_close (pw_saddle *saddle) {
-  if (saddle == NULL) return;
-  pw_massless_close (&saddle->massless);
-  pw_block_close (saddle->block);
-  free (saddle->y);
-  free (saddle->memory);
-  free (saddle);
+/* The weighted sum of the squares of the entries of row i. */
+static double massless_square (const pw_component *c, int i, const double *weight) {
+  const double *A = c->A + i * c->stride;
+  double sum = 0;
+  for (int n = 0; n < c->cols; n++) sum += weight[n] * A[n] * A[n];
+  return sum;
 }
 
-void pw_saddle_postpone (pw_saddle *saddle, double pivot) {
-  saddle->postponed = pivot;
-}
-
-int pw_saddle_factor (pw_saddle *saddle) {
-  saddle->postponed = 0;
-  saddle->pivot_row = saddle->dependent_row;
-  if (saddle->block == NULL) return saddle->pivot = 0, PW_RETRY;
-  saddle->pivot = saddle->massless.components ? pw_massless_factor (&saddle->massless) : INFINITY;
-  if (!(saddle->pivot > SADDLE_ROUND_OFF)) return PW_RETRY;
-  pw_block_factor (saddle->block);
-  if (!(saddle->block->least_pivot >= saddle->pivot)) {
-    const int row = saddle->block->least_unknown;
-    saddle->pivot = saddle->block->least_pivot;
-    saddle->pivot_row = row >= 0 && row < saddle->s->rows && saddle->massless.component_of_row[row] < 0 ? row : -1;
+/* Exchanges two rows. */
+static void massless_swap (pw_component *c, int a, int b) {
+  if (a == b) return;
+  massless_row row = c->row[a];
+  c->row[a] = c->row[b];
+  c->row[b] = row;
+  for (int n = 0; n < c->stride; n++) {
+    double x = c->A[a * c->stride + n];
+    c->A[a * c->stride + n] = c->A[b * c->stride + n];
+    c->A[b * c->stride + n] = x;
   }
-  return saddle->pivot > SADDLE_ROUND_OFF ? PW_OK : PW_RETRY;
 }
 
-int pw_saddle_sine_below (pw_saddle *saddle, double sine) {
-  if (sine * sine <= saddle->postponed) return 0;
-  if (saddle->postponed > 0) pw_saddle_factor (saddle);
-  return !(saddle->pivot >= sine * sine);
+/* Entries below this, relative to the terms or the largest entry of their row, are what round-off leaves of 0. */
+#define MASSLESS_ROUND_OFF 1e-12
+
+/* 1 if an entry of row i of Z' is larger than what round-off leaves of its terms; column: local. */
+static int massless_is_entry (const pw_component *c, int i, int column) {
+  return fabs (c->A[i * c->stride + column]) * sqrt (c->squared_scale[column]) >
+         MASSLESS_ROUND_OFF * sqrt (c->row[i].squared_terms);
 }
 
-double pw_saddle_sine (pw_saddle *saddle, int *row) {
-  if (saddle->postponed > 0) pw_saddle_factor (saddle);
-  if (row) *row = saddle->pivot_row;
-  return saddle->pivot > 0 ? sqrt (fmin (saddle->pivot, 1)) : 0;
-}
-
-void pw_saddle_solve (pw_saddle *saddle, const double *f, const double *gamma, double *a, double *lambda) {
-  const size_t bytes = (size_t)saddle->rows * sizeof *lambda;
-  double *y = saddle->extra ? saddle->y : lambda;
-  if (saddle->postponed > 0) pw_saddle_factor (saddle);
-  if (y != gamma) memcpy (y, gamma, bytes);
-  for (int i = 0; i < saddle->extra; i++) y[saddle->s->rows + i] = 0;
-  if (saddle->massless.components) {
-    for (int j = 0; j < saddle->s->coords; j++) saddle->force[j] = f ? f[j] : 0;
-    f = saddle->force;
-    pw_massless_forward (&saddle->massless, saddle->force, y);
+/* Matches the row with the largest entry in a massless column, each row scaled by its largest original entry (so that
+ * the remainder of a dependent row is small), and moves it to p.  Returns 0 if all entries are round-off; the component
+ * is then matched again at the next factorisation. */
+static int massless_select_pivot (pw_component *c, int p) {
+  const double guard = 0.1; /* a pivot may lose a digit before the component is matched again */
+  int row = -1, column = -1;
+  double best = MASSLESS_ROUND_OFF;
+  for (int i = p; i < c->rows; i++)
+    for (int n = 0; n < c->cols; n++) {
+      if (!c->is_massless[n]) continue;
+      double scaled = sqrt (c->squared_scale[n]) * fabs (c->A[i * c->stride + n]) / c->row[i].largest;
+      if (scaled > best) best = scaled, row = i, column = n;
+    }
+  if (row < 0) {
+    for (int i = 0; i < c->pivots; i++) c->row[i].rematch_below = NAN;
+    return 0;
   }
-  pw_block_solve (saddle->block, f, y, a);
-  if (y != lambda) memcpy (lambda, y, bytes);
-  for (int i = 0; i < saddle->inactive_count; i++) lambda[saddle->inactive[i]] = 0;
-  if (saddle->massless.components) pw_massless_backward (&saddle->massless, a, lambda);
+  massless_swap (c, p, row);
+  c->row[p].pivot_column = column;
+  c->row[p].pivot_scale = sqrt (c->squared_scale[column]) / c->row[p].largest;
+  c->row[p].rematch_below = guard * best;
+  return 1;
 }
 
-/* Plans the condensed matrix: its nodes, and the bodies that are not condensed; see condense.h. */
+/* Subtracts multiples of row p from the rows after it, two columns at a time. */
+PW_INLINE void massless_eliminate (pw_component *c, int p, int pivots) {
+  const int pivot = c->row[p].pivot_column, cols = c->cols;
+  double *P = c->A + p * c->stride, inverse = 1 / P[pivot];
+  double square = c->rows > pivots ? massless_square (c, p, c->massive_squared_scale) : 0;
+  for (int i = p + 1; i < c->rows; i++) {
+    double *A = c->A + i * c->stride, l = A[pivot] * inverse;
+    A[c->first_L_column + p] = l;
+    if (l == 0) continue;
+    for (int k = 0; k < cols; k += 2) {
+      double even = A[k] - l * P[k], odd = A[k + 1] - l * P[k + 1];
+      A[k] = even, A[k + 1] = odd;
+    }
+    A[pivot] = 0;
+    c->row[i].squared_terms += l * l * square;
+  }
+  P[pivot] = inverse;
+}
 
-/* ---- Nodes ---- */
+/* Eliminates with the J last evaluated and the pivots matched before or, if `matches` is 1, matches the massless
+ * coordinates to rows, with complete pivoting over their columns.  Returns the number of pivots that are large
+ * enough. */
+PW_INLINE int massless_reduce (pw_component *c, int matches, int pivots) {
+  massless_copy (c);
+  c->least_pivot = INFINITY;
+  for (int i = matches ? 0 : pivots; i < c->rows; i++)
+    c->row[i].squared_terms = massless_square (c, i, c->squared_scale);
+  for (int i = 0; matches && i < c->rows; i++) {
+    c->row[i].largest = 0;
+    for (int k = 0; k < c->cols; k++)
+      c->row[i].largest = fmax (c->row[i].largest, sqrt (c->squared_scale[k]) * fabs (c->A[i * c->stride + k]));
+  }
+  PW_UNROLL for (int p = 0; p < pivots; p++) {
+    if (matches && !massless_select_pivot (c, p)) return p;
+    const massless_row *row = &c->row[p];
+    double pivot = fabs (c->A[p * c->stride + row->pivot_column]) * row->pivot_scale;
+    if (!(pivot >= c->least_pivot)) c->least_pivot = pivot;
+    if (!matches && !(pivot >= row->rematch_below)) return p;
+    massless_eliminate (c, p, pivots);
+  }
+  return pivots;
+}
+
+static int massless_match (pw_component *c) {
+  return massless_reduce (c, 1, c->pivots);
+}
+
+/* Eliminates with the J last evaluated, and matches again if a pivot has become much smaller than when it was matched.
+ * Returns the square of the least of all `least_pivot`, at most 1; 0 if singular. */
+PW_SELDOM double massless_factor (pw_saddle *saddle) {
+  double least = INFINITY;
+  for (pw_component *c = saddle->component, *end = c + saddle->components; c < end; c++) {
+    int found = c->pivots == 3 ? massless_reduce (c, 0, 3) : massless_reduce (c, 0, c->pivots);
+    if (found < c->pivots && massless_match (c) < c->pivots) return 0;
+    for (int i = c->pivots; i < c->rows; i++) {
+      double terms = c->row[i].squared_terms, square = massless_square (c, i, c->massive_squared_scale);
+      double remainder = terms > 0 ? sqrt (square / terms) : 0;
+      if (!(remainder >= c->least_pivot)) c->least_pivot = remainder;
+    }
+    if (!(c->least_pivot >= least)) least = c->least_pivot;
+  }
+  return least > 1 ? 1 : least * least;
+}
+
+/* gamma~, then w in place of lambda, then f~. */
+PW_INLINE void massless_forward_component (pw_component *c, double *f, double *gamma, int pivots) {
+  massless_row *row = c->row;
+  for (int i = 0; i < c->rows; i++) {
+    const double *L = c->A + i * c->stride + c->first_L_column;
+    row[i].gamma = gamma[row[i].equation];
+    PW_UNROLL for (int p = 0; p < pivots; p++) row[i].gamma -= p < i ? L[p] * row[p].gamma : 0;
+  }
+  for (int i = pivots; i < c->rows; i++)
+    if (c->unknown[i] >= 0) gamma[c->unknown[i]] = row[i].gamma;
+  PW_UNROLL for (int p = 0; p < pivots; p++) {
+    double w = f[c->global[row[p].pivot_column]];
+    PW_UNROLL for (int q = 0; q < p; q++) w -= c->A[q * c->stride + row[p].pivot_column] * row[q].lambda;
+    row[p].lambda = w * c->A[p * c->stride + row[p].pivot_column];
+  }
+  for (const int *column = c->massive; column < c->massive + c->massives; column++) {
+    double change = 0;
+    PW_UNROLL for (int p = 0; p < pivots; p++) change += c->A[p * c->stride + *column] * row[p].lambda;
+    f[c->global[*column]] -= change;
+  }
+}
+
+/* First half of a solution: saddle->force becomes f~ at the massive coordinates, gamma becomes gamma~ at `unknown` of
+ * unmatched rows. */
+PW_SELDOM void massless_forward (pw_saddle *saddle, double *gamma) {
+  for (pw_component *c = saddle->component, *end = c + saddle->components; c < end; c++)
+    if (c->pivots == 3)
+      massless_forward_component (c, saddle->force, gamma, 3);
+    else
+      massless_forward_component (c, saddle->force, gamma, c->pivots);
+}
+
+/* gamma~ - H' a, then a_P and lambda_p from the last pivot to the first. */
+PW_INLINE void massless_backward_component (pw_component *c, double *a, double *lambda, int pivots) {
+  massless_row *row = c->row;
+  for (const int *column = c->massive; column < c->massive + c->massives; column++) {
+    double x = a[c->global[*column]];
+    PW_UNROLL for (int p = 0; p < pivots; p++) row[p].gamma -= c->A[p * c->stride + *column] * x;
+  }
+  /* reads all before storing any: one row's index may be the `unknown` of another */
+  for (int i = pivots; i < c->rows; i++) row[i].lambda = c->unknown[i] < 0 ? 0 : lambda[c->unknown[i]];
+  for (int i = pivots; i < c->rows; i++) lambda[row[i].equation] = row[i].lambda;
+  PW_UNROLL for (int p = pivots - 1; p >= 0; p--) {
+    const double *A = c->A + p * c->stride;
+    double x = row[p].gamma;
+    PW_UNROLL for (int q = p + 1; q < pivots; q++) x -= A[row[q].pivot_column] * a[c->global[row[q].pivot_column]];
+    a[c->global[row[p].pivot_column]] = x * A[row[p].pivot_column];
+    for (int i = p + 1; i < c->rows; i++) row[p].lambda -= c->A[i * c->stride + c->first_L_column + p] * row[i].lambda;
+    lambda[row[p].equation] = row[p].lambda;
+  }
+}
+
+/* Second half: from a of the massive coordinates and lambda at `unknown` of unmatched rows, a of the massless
+ * coordinates and lambda of all rows. */
+PW_SELDOM void massless_backward (pw_saddle *saddle, double *a, double *lambda) {
+  for (pw_component *c = saddle->component, *end = c + saddle->components; c < end; c++)
+    if (c->pivots == 3)
+      massless_backward_component (c, a, lambda, 3);
+    else
+      massless_backward_component (c, a, lambda, c->pivots);
+}
+
+/* ---- Components, by union-find over the groups that contain massless coordinates, here called massless groups ---- */
+
+/* 1 if a group contains a massless coordinate. */
+static int massless_is_group (const saddle_plan *p, int group) {
+  int j = group_first (p->saddle->s, group);
+  for (int n = 0; n < group_width (p->saddle->s, j); n++)
+    if (p->weight[j + n] == 0) return 1;
+  return 0;
+}
+
+/* The groups of an element's coordinates, without the ground, and the first local column of each.  Returns their
+ * number. */
+static int massless_element_groups (const pw_system *s, const pw_element_batch *k, int e, int *group, int *column) {
+  int n = 0;
+  for (int x = 0; x < k->b.cols; x += group_columns (k->kind, x)) {
+    int j = pw_global (k, e, x);
+    if (j >= s->coords) continue;
+    column[n] = x;
+    group[n++] = group_of (s, j);
+  }
+  return n;
+}
+
+static int massless_is_active (const saddle_plan *p, int row) {
+  return row < p->saddle->rows && (p->active == NULL || p->active[row]);
+}
+
+/* Unites massless groups that share an active row, and marks them as members. */
+static void massless_unite (saddle_plan *p) {
+  int group[MASSLESS_GROUPS], column[MASSLESS_GROUPS];
+  PW_EACH_CONSTRAINT (k, p->saddle->w)
+    for (int e = 0; e < k->b.count; e++) {
+      int active = 0, last = -1, n = massless_element_groups (p->saddle->s, k, e, group, column);
+      for (int i = 0; i < k->kind->rows; i++) active |= massless_is_active (p, k->row + e * k->kind->rows + i);
+      for (int i = 0; active && i < n; i++) {
+        if (!massless_is_group (p, group[i])) continue;
+        p->member[group[i]] = 0;
+        if (last >= 0) p->parent[pw_root (p->parent, group[i])] = pw_root (p->parent, last);
+        last = group[i];
+      }
+    }
+}
+
+/* The index of a group in a component; adds it if it is not there. */
+static int massless_add_group (const pw_system *s, pw_component *c, int g) {
+  int j = group_first (s, g), width = group_width (s, j);
+  for (int i = 0; i < c->groups; i++)
+    if (c->group[i].j == j) return i;
+  c->group[c->groups] = (massless_group){ j, width, c->cols };
+  for (int n = 0; n < width; n++) c->global[c->cols++] = j + n;
+  return c->groups++;
+}
+
+/* Adds each active row with a massless group, and its groups, to the component of that group; before massless_lay_out,
+ * only counts the rows, and the groups with repetition. */
+static void massless_add_rows (saddle_plan *p) {
+  pw_saddle *saddle = p->saddle;
+  int group[MASSLESS_GROUPS], column[MASSLESS_GROUPS];
+  PW_EACH_CONSTRAINT (k, saddle->w)
+    for (int e = 0; e < k->b.count; e++) {
+      int n = massless_element_groups (saddle->s, k, e, group, column), first = 0;
+      while (first < n && !massless_is_group (p, group[first])) first++;
+      for (int i = e * k->kind->rows; first < n && i < (e + 1) * k->kind->rows; i++) {
+        const int row = k->row + i;
+        if (!massless_is_active (p, row)) continue;
+        saddle->component_of_row[row] = p->member[pw_root (p->parent, group[first])];
+        pw_component *c = &saddle->component[saddle->component_of_row[row]];
+        c->grounded |= is_grounded (saddle->s, k, e);
+        if (c->row)
+          for (int g = 0; g < n; g++)
+            c->row[c->rows].source[massless_add_group (saddle->s, c, group[g])] = k->J + i * k->b.cols + column[g];
+        else
+          c->groups += n;
+        if (c->row) c->row[c->rows].equation = row;
+        c->rows++;
+      }
+    }
+}
+
+/* Allocates the components' arrays.  A component has at most as many groups as were counted with repetition, at most
+ * those of the scene, and at most as many pivots as rows. */
+static int massless_lay_out (const saddle_plan *p) {
+  static const double zero[3] = { 0 };
+  pw_saddle *saddle = p->saddle;
+  for (pw_layout l = { 0 }; pw_layout_pass (&l, &saddle->component_memory);)
+    for (pw_component *c = saddle->component; c < saddle->component + saddle->components; c++) {
+      size_t rows = (size_t)c->rows, groups = (size_t)(c->groups < p->groups ? c->groups : p->groups),
+             cols = 3 * groups;
+      c->group = pw_layout_alloc (&l, groups, sizeof *c->group);
+      c->global = pw_layout_alloc (&l, cols, sizeof *c->global);
+      c->is_massless = pw_layout_alloc (&l, cols, 1);
+      c->massive = pw_layout_alloc (&l, cols, sizeof *c->massive);
+      c->squared_scale = pw_layout_alloc (&l, cols, sizeof *c->squared_scale);
+      c->massive_squared_scale = pw_layout_alloc (&l, cols, sizeof *c->massive_squared_scale);
+      c->row = pw_layout_alloc (&l, rows, sizeof *c->row);
+      c->unknown = pw_layout_alloc (&l, rows, sizeof *c->unknown);
+      c->A = pw_layout_alloc (&l, rows * (cols + rows + 1), sizeof *c->A);
+      const double **from = pw_layout_alloc (&l, rows * groups, sizeof *from);
+      if (l.base == NULL) continue;
+      for (size_t i = 0; i < rows; i++) c->row[i].source = from + i * groups;
+      for (size_t i = 0; i < rows * groups; i++) from[i] = zero;
+      c->rows = c->groups = 0;
+    }
+  return saddle->component_memory ? PW_OK : PW_RESOURCE;
+}
+
+static int massless_undetermined (const pw_system *s, int j, pw_error *error) {
+  const char *lacking = pw_is_angle (s, j) ? "inertia" : "mass";
+  int user = j < 3 * s->bodies && j % 3 == 2 ? s->angle_user[j / 3] : -1;
+  const pw_element_info element = user < 0 ? (pw_element_info){ 0 } : pw_system_element (s, user);
+  const char *depends = user >= 0 && pw_kind_is_built_in (element.kind) ? "depends" : "may depend";
+  return pw_fail (error, PW_INPUT,
+                  "model %s: %s has no %s, and no constraint determines how it moves%s; give it %s, or constrain it",
+                  s->model, PW_NAME (pw_system_state_name, s, j), lacking,
+                  user < 0 ? ""
+                           : PW_PRINTED (300, ", although %s %s %s on it", element.kind->name, element.name, depends),
+                  lacking);
+}
+
+/* Marks a component's massless columns and matches them; reports a column that no row determines. */
+static int massless_check (const saddle_plan *p, pw_component *c, pw_error *error) {
+  const pw_system *s = p->saddle->s;
+  int massless = 0, found;
+  for (int n = 0; n < c->cols; n++) {
+    int j = c->global[n];
+    c->squared_scale[n] = pw_is_angle (s, j) ? 1 / (s->scale.length * s->scale.length) : 1;
+    c->is_massless[n] = p->weight[j] == 0;
+    c->massive_squared_scale[n] = c->is_massless[n] ? 0 : c->squared_scale[n];
+    if (!c->is_massless[n]) c->massive[c->massives++] = n;
+    massless += c->is_massless[n];
+  }
+  c->pivots = massless < c->rows ? massless : c->rows;
+  c->first_L_column = c->cols + c->cols % 2;
+  c->stride = c->first_L_column + c->pivots;
+  found = massless_match (c);
+  for (int n = 0; found < massless && n < c->cols; n++) {
+    int used = 0;
+    for (int q = 0; q < found; q++) used |= c->row[q].pivot_column == n;
+    if (c->is_massless[n] && !used) return massless_undetermined (s, c->global[n], error);
+  }
+  return PW_OK;
+}
+
+/* Finds the components and matches them.  PW_OK, PW_RESOURCE, or PW_INPUT with the error that names a coordinate that
+ * no row determines, such as one of a massless group in no active row. */
+static int massless_open (saddle_plan *p, pw_error *error) {
+  pw_saddle *saddle = p->saddle;
+  int status = PW_OK;
+  p->parent = pw_arena_alloc (&p->arena, (size_t)p->groups * sizeof *p->parent);
+  p->member = pw_arena_alloc (&p->arena, (size_t)p->groups * sizeof *p->member);
+  if (p->parent == NULL || p->member == NULL) return PW_RESOURCE;
+  for (int g = 0; g < p->groups; g++) p->parent[g] = g, p->member[g] = -1;
+  for (int i = 0; i < saddle->s->rows; i++) saddle->component_of_row[i] = -1;
+  massless_unite (p);
+  for (int g = 0; g < p->groups; g++) {
+    int j = group_first (saddle->s, g);
+    if (!massless_is_group (p, g)) continue;
+    while (p->weight[j] != 0) j++;
+    if (p->member[g] < 0) return massless_undetermined (saddle->s, j, error);
+    if (pw_root (p->parent, g) == g) p->member[g] = saddle->components++;
+  }
+  if (saddle->components == 0) return PW_OK;
+  saddle->component = calloc ((size_t)saddle->components, sizeof *saddle->component);
+  if (saddle->component == NULL) return PW_RESOURCE;
+  massless_add_rows (p);
+  if (massless_lay_out (p) != PW_OK) return PW_RESOURCE;
+  massless_add_rows (p);
+  for (int c = 0; c < saddle->components && status == PW_OK; c++)
+    status = massless_check (p, &saddle->component[c], error);
+  return status;
+}
+
+/* ---- Nodes of the condensed matrix ---- */
 
 /* Begins a node: the contributions that follow are its own. */
-static void condense_add_node (pw_plan *plan, pw_plan_node node) {
+static void condense_add_node (saddle_plan *plan, pw_plan_node node) {
   plan->failed |= pw_grow (&plan->node, (size_t)plan->nodes, &plan->node_room, sizeof *plan->node) != PW_OK;
   node.first_contribution = plan->contributions;
   if (!plan->failed) plan->node[plan->nodes++] = node;
@@ -103,10 +517,10 @@ static void condense_add_node (pw_plan *plan, pw_plan_node node) {
 
 /* Adds the contribution of the last node to the group that begins with coordinate j.  If these coordinates are all
  * prescribed or massless there is none, and a prescribed one makes the node `grounded`. */
-static void condense_contribute (pw_plan *plan, const double *J, int row_stride, int j, int is_pin) {
+static void condense_contribute (saddle_plan *plan, const double *J, int row_stride, int j, int is_pin) {
   int moves = 0, is_prescribed = 0;
   if (plan->failed) return;
-  for (int n = 0; n < pw_group_width (plan->saddle->s, j); n++) {
+  for (int n = 0; n < group_width (plan->saddle->s, j); n++) {
     moves |= plan->saddle->inverse_weight[j + n] > 0;
     is_prescribed |= isinf (plan->weight[j + n]) != 0;
   }
@@ -115,20 +529,19 @@ static void condense_contribute (pw_plan *plan, const double *J, int row_stride,
   plan->failed = pw_grow (&plan->contribution, (size_t)plan->contributions, &plan->contribution_room,
                           sizeof *plan->contribution) != PW_OK;
   if (!plan->failed)
-    plan->contribution[plan->contributions++] = (pw_plan_contribution){ J,          plan->nodes - 1,
-                                                                        row_stride, pw_group_of (plan->saddle->s, j),
-                                                                        is_pin,     is_prescribed };
+    plan->contribution[plan->contributions++] =
+        (plan_contribution){ J, plan->nodes - 1, row_stride, group_of (plan->saddle->s, j), is_pin, is_prescribed };
 }
 
 /* Adds the node of `size` rows from row n of a batch on. */
-static void condense_element (pw_plan *plan, const pw_element_batch *b, int n, int size) {
+static void condense_element (saddle_plan *plan, const pw_element_batch *b, int n, int size) {
   const int e = n / b->kind->rows, is_pin = b->kind == &pw_kind_pin && size == 2;
   const int is_rolling_wheel = pw_kind_is_built_in (b->kind) && b->kind->contact && b->kind->internal == 1;
   condense_add_node (plan, (pw_plan_node){ .size = size,
                                            .unknown = b->row + n,
-                                           .grounded = pw_is_grounded (plan->saddle->s, b, e),
+                                           .grounded = is_grounded (plan->saddle->s, b, e),
                                            .rolls = is_rolling_wheel && size == 1 && n % 2 == 1 });
-  for (int x = 0; x < b->b.cols; x += pw_group_columns (b->kind, x)) {
+  for (int x = 0; x < b->b.cols; x += group_columns (b->kind, x)) {
     int j = pw_global (b, e, x);
     if (j < plan->saddle->s->coords) condense_contribute (plan, b->J + n * b->b.cols + x, b->b.cols, j, is_pin);
   }
@@ -136,10 +549,10 @@ static void condense_element (pw_plan *plan, const pw_element_batch *b, int n, i
 
 /* 1 for row n of a batch that becomes part of a node: active, not in a massless component, and with an entry other than
  * 0 at a coordinate that is not prescribed, or without prescribed coordinates. */
-static int condense_takes_part (const pw_plan *plan, const pw_element_batch *b, int n, const unsigned char *active) {
+static int condense_takes_part (const saddle_plan *plan, const pw_element_batch *b, int n) {
   const double *J = b->J + n * b->b.cols, *inverse = plan->saddle->inverse_weight;
   int i = b->row + n, prescribed = 0;
-  if ((active && !active[i]) || plan->saddle->massless.component_of_row[i] >= 0) return 0;
+  if ((plan->active && !plan->active[i]) || plan->saddle->component_of_row[i] >= 0) return 0;
   for (int x = 0; x < b->b.cols; x++) {
     int j = pw_global (b, n / b->kind->rows, x);
     if (j < plan->saddle->s->coords && inverse[j] > 0 && J[x] != 0) return 1;
@@ -160,34 +573,35 @@ static int condense_joins (const pw_element_batch *b, int n) {
 }
 
 /* Makes nodes of the rows that become part of one; others are inactive unless they are in a massless component. */
-static void condense_elements (pw_plan *plan, const unsigned char *active) {
-  struct pw_saddle *saddle = plan->saddle;
+static void condense_elements (saddle_plan *plan) {
+  pw_saddle *saddle = plan->saddle;
   for (const pw_element_batch *b = saddle->w->batch;
        b < saddle->w->batch + saddle->s->constraints && b->row < saddle->rows; b++)
     for (int n = 0, end = b->b.count * b->kind->rows, size; n < end; n += size ? size : 1) {
       for (size = 0; n + size < end && size < PW_BLOCK_NODE; size++)
-        if (!condense_takes_part (plan, b, n + size, active) || (size > 0 && !condense_joins (b, n))) break;
+        if (!condense_takes_part (plan, b, n + size) || (size > 0 && !condense_joins (b, n))) break;
       if (size > 0)
         condense_element (plan, b, n, size);
-      else if (saddle->massless.component_of_row[b->row + n] < 0)
+      else if (saddle->component_of_row[b->row + n] < 0)
         saddle->inactive[saddle->inactive_count++] = b->row + n;
     }
 }
 
 /* 1 for an unmatched row i that becomes a node: it has an entry other than round-off at a massive coordinate that is
  * not prescribed, or its component has massive coordinates and none is prescribed. */
-static int condense_remains (const pw_plan *plan, const pw_component *p, int i) {
+static int condense_remains (const saddle_plan *plan, const pw_component *p, int i) {
   int prescribed = 0;
   for (int n = 0; n < p->cols; n++) {
-    if (plan->saddle->inverse_weight[p->global[n]] > 0 && pw_massless_is_entry (p, i, n)) return 1;
+    if (plan->saddle->inverse_weight[p->global[n]] > 0 && massless_is_entry (p, i, n)) return 1;
     prescribed |= !p->is_massless[n] && plan->saddle->inverse_weight[p->global[n]] == 0;
   }
   return p->massives > 0 && !prescribed;
 }
 
 /* Adds the unmatched rows of the massless components; the multiplier of one that does not become a node is 0. */
-static void condense_components (pw_plan *plan) {
-  for (pw_component *p = plan->saddle->massless.component; p < plan->saddle->massless.end; p++)
+static void condense_components (saddle_plan *plan) {
+  const pw_saddle *saddle = plan->saddle;
+  for (pw_component *p = saddle->component; p < saddle->component + saddle->components; p++)
     for (int i = p->pivots; i < p->rows; i++) {
       p->unknown[i] = condense_remains (plan, p, i) ? p->row[i].equation : -1;
       if (p->unknown[i] < 0) continue;
@@ -198,7 +612,7 @@ static void condense_components (pw_plan *plan) {
 }
 
 /* Sorts the contributions by group. */
-static int condense_sort (pw_plan *plan) {
+static int condense_sort (saddle_plan *plan) {
   plan->start = pw_arena_alloc (&plan->arena, ((size_t)plan->groups + 2) * sizeof *plan->start);
   plan->list = pw_arena_alloc (&plan->arena, (size_t)plan->contributions * sizeof *plan->list);
   if (plan->failed || plan->start == NULL || plan->list == NULL) return PW_RESOURCE;
@@ -210,8 +624,13 @@ static int condense_sort (pw_plan *plan) {
 
 /* ---- Dependent equations ---- */
 
+/* The end of the contributions of node n: one after the last. */
+static int condense_end (const saddle_plan *plan, int n) {
+  return n + 1 < plan->nodes ? plan->node[n + 1].first_contribution : plan->contributions;
+}
+
 typedef struct {
-  pw_plan *plan;
+  saddle_plan *plan;
   int *capacity; /* groups: coordinates that no equation takes yet */
   int *taken;    /* contributions: equations of the node that take a coordinate of the group */
   int *by, *of;  /* groups: the contribution by which the search has come, and that which gives way; -1: none */
@@ -220,9 +639,8 @@ typedef struct {
 
 /* Queues the groups to which node n contributes; contribution `of` gives way to one of them (-1: a new equation). */
 static void matching_queue (condense_matching *m, int n, int of) {
-  const pw_plan *plan = m->plan;
-  int end = n + 1 < plan->nodes ? plan->node[n + 1].first_contribution : plan->contributions;
-  for (int p = plan->node[n].first_contribution; p < end; p++) {
+  const saddle_plan *plan = m->plan;
+  for (int p = plan->node[n].first_contribution; p < condense_end (plan, n); p++) {
     int g = plan->contribution[p].group;
     if (m->visited[g] == m->search) continue;
     m->visited[g] = m->search, m->by[g] = p, m->of[g] = of;
@@ -232,7 +650,7 @@ static void matching_queue (condense_matching *m, int n, int of) {
 
 /* Lets an equation of node n take a coordinate; others give way to theirs.  0 if none is left (Berge 1957). */
 static int matching_augment (condense_matching *m, int n) {
-  const pw_plan *plan = m->plan;
+  const saddle_plan *plan = m->plan;
   m->search++, m->queued = 0;
   matching_queue (m, n, -1);
   for (int i = 0; i < m->queued; i++) {
@@ -250,17 +668,74 @@ static int matching_augment (condense_matching *m, int n) {
 /* Finds out whether the equations depend on each other in every configuration, since some of them are more than the
  * coordinates in which they have entries, such as those of ten pins between the same two bodies.  Then *row is one of
  * them, else it stays. */
-static int condense_find_dependent (pw_plan *plan, int *row) {
+static int condense_find_dependent (saddle_plan *plan, int *row) {
   size_t groups = (size_t)plan->groups + 1;
   condense_matching m = { .plan = plan, .capacity = pw_arena_alloc (&plan->arena, 5 * groups * sizeof (int)) };
   m.taken = pw_arena_alloc (&plan->arena, ((size_t)plan->contributions + 1) * sizeof *m.taken);
   if (m.capacity == NULL || m.taken == NULL) return PW_RESOURCE;
   m.by = m.capacity + groups, m.of = m.by + groups, m.queue = m.of + groups, m.visited = m.queue + groups;
   for (int j = 0; j < plan->saddle->s->coords; j++)
-    m.capacity[pw_group_of (plan->saddle->s, j)] += plan->saddle->inverse_weight[j] > 0;
+    m.capacity[group_of (plan->saddle->s, j)] += plan->saddle->inverse_weight[j] > 0;
   for (int n = 0; n < plan->nodes; n++)
     for (int i = 0; i < plan->node[n].size; i++)
       if (!matching_augment (&m, n)) return *row = plan->node[n].unknown + i, PW_OK;
+  return PW_OK;
+}
+
+/* ---- Ranks of the nodes of a scene with uncondensed bodies ----
+ *
+ * Nodes of rank 0 are eliminated before the uncondensed bodies, as if these were at rest; those of rank 2 after them.
+ * The matrix of rank 0 must be regular wherever the mechanism is.  A leg is a set of bodies joined by nodes that touch
+ * neither uncondensed bodies nor the ground.  If a leg joins an uncondensed body to the ground, or to another
+ * uncondensed body, and both its ends were at rest, the matrix would be singular where the leg is stretched.  So the
+ * nodes at one end have rank 2: at the ground, or at one of the two bodies.  Then multipliers of rank 0 that exert no
+ * force on the bodies of a leg exert none on the body at its other end either, since the forces of a joint on its two
+ * bodies are opposite: dependent equations of rank 0 are dependent in the whole mechanism.  Nodes of uncondensed bodies
+ * alone have rank 2, too: with these at rest their equations would be empty.  The rolling equation of a wheel has rank
+ * 0: no other equation contains the wheel's spin. */
+
+/* 1 if node n touches the ground, or prescribed coordinates of a condensed body, which are at rest as well. */
+static int rank_is_grounded (const saddle_plan *plan, int n) {
+  int grounded = plan->node[n].grounded;
+  for (int p = plan->node[n].first_contribution; p < condense_end (plan, n); p++)
+    grounded |= plan->contribution[p].is_prescribed && plan->uncondensed[plan->contribution[p].group] < 0;
+  return grounded;
+}
+
+/* 1 for a node that touches an uncondensed body; of the others 2 if it is grounded, else 0. */
+static int rank_turn (const saddle_plan *plan, int n) {
+  for (int p = plan->node[n].first_contribution; p < condense_end (plan, n); p++)
+    if (plan->uncondensed[plan->contribution[p].group] >= 0) return 1;
+  return rank_is_grounded (plan, n) ? 2 : 0;
+}
+
+/* Joins the groups of node n, and the ground if the node is grounded.  Returns 0, without joining, if that would
+ * connect two uncondensed bodies, or one with the ground, or if the node touches uncondensed bodies alone.  parent:
+ * groups and the ground: union-find, in which uncondensed bodies and the ground are roots. */
+static int rank_join (const saddle_plan *plan, int *parent, int n) {
+  const int first = plan->node[n].first_contribution, end = condense_end (plan, n);
+  int at_rest = rank_is_grounded (plan, n) ? plan->groups : -1, root = -1, moves = first == end;
+  if (plan->node[n].rolls && plan->contribution[end - 1].group >= plan->saddle->s->bodies) return 1;
+  for (int p = first; p < end; p++) {
+    moves |= plan->uncondensed[plan->contribution[p].group] < 0;
+    root = pw_root (parent, plan->contribution[p].group);
+    if (root != plan->groups && plan->uncondensed[root] < 0) continue;
+    if (at_rest >= 0 && at_rest != root) return 0;
+    at_rest = root;
+  }
+  if (!moves) return 0;
+  if (at_rest >= 0) root = at_rest;
+  for (int p = first; p < end; p++) parent[pw_root (parent, plan->contribution[p].group)] = root;
+  return 1;
+}
+
+static int condense_rank (saddle_plan *plan) {
+  int *parent = pw_arena_alloc (&plan->arena, ((size_t)plan->groups + 1) * sizeof *parent);
+  if (parent == NULL) return PW_RESOURCE;
+  for (int g = 0; g <= plan->groups; g++) parent[g] = g;
+  for (int turn = 0; turn < 3; turn++) /* the legs, then their ends at uncondensed bodies, then those at the ground */
+    for (int n = 0; n < plan->nodes; n++)
+      if (rank_turn (plan, n) == turn && !rank_join (plan, parent, n)) plan->node[n].rank = 2;
   return PW_OK;
 }
 
@@ -271,8 +746,8 @@ static int condense_find_dependent (pw_plan *plan, int *row) {
 enum { CONDENSE_NODES = 6 };
 
 /* Adds two nodes for every body that is not condensed, and ranks all nodes. */
-static int condense_uncondensed (pw_plan *plan) {
-  struct pw_saddle *saddle = plan->saddle;
+static int condense_uncondensed (saddle_plan *plan) {
+  pw_saddle *saddle = plan->saddle;
   plan->uncondensed = pw_arena_alloc (&plan->arena, (size_t)plan->groups * sizeof *plan->uncondensed);
   if (plan->uncondensed == NULL) return PW_RESOURCE;
   for (int g = 0; g < plan->groups; g++) {
@@ -285,41 +760,12 @@ static int condense_uncondensed (pw_plan *plan) {
   }
   if (saddle->extra == 0) return PW_OK;
   saddle->y = malloc ((size_t)(saddle->s->rows + saddle->extra) * sizeof *saddle->y);
-  return plan->failed || saddle->y == NULL ? PW_RESOURCE : pw_condense_rank (plan);
+  return plan->failed || saddle->y == NULL ? PW_RESOURCE : condense_rank (plan);
 }
 
-/* ---- Opening ---- */
+/* ---- Pattern of S ---- */
 
-int pw_condense (struct pw_saddle *saddle, const double *weight, const unsigned char *active) {
-  size_t n = (size_t)saddle->s->coords;
-  pw_plan plan = { .saddle = saddle, .weight = weight, .groups = pw_groups (saddle->s) };
-  for (pw_layout l = { 0 }; pw_layout_pass (&l, &saddle->memory);) {
-    saddle->inverse_weight = pw_layout_alloc (&l, n + 3, sizeof *saddle->inverse_weight);
-    saddle->force = pw_layout_alloc (&l, saddle->massless.components ? n : 0, sizeof *saddle->force);
-    saddle->inactive = pw_layout_alloc (&l, (size_t)saddle->rows, sizeof *saddle->inactive);
-  }
-  if (saddle->memory == NULL) return PW_RESOURCE;
-  for (size_t j = 0; j < n; j++) saddle->inverse_weight[j] = weight[j] > 0 ? 1 / weight[j] : 0;
-  condense_elements (&plan, active);
-  condense_components (&plan);
-  int status = condense_sort (&plan);
-  if (status == PW_OK) status = condense_find_dependent (&plan, &saddle->dependent_row);
-  if (saddle->dependent_row < 0) {
-    if (status == PW_OK) status = condense_uncondensed (&plan);
-    if (status == PW_OK) status = pw_condense_block (&plan);
-  }
-  free (plan.node);
-  free (plan.contribution);
-  free (plan.pair);
-  pw_arena_free (&plan.arena);
-  return status;
-}
-
-/* Plans the block L D L^T: the pattern of S and the group blocks; see condense.h and block_ldl.h. */
-
-/* ---- Pattern ---- */
-
-static void condense_add_pair (pw_plan *plan, int a, int b) {
+static void condense_add_pair (saddle_plan *plan, int a, int b) {
   plan->failed |= pw_grow (&plan->pair, (size_t)plan->pairs, &plan->pair_room, 2 * sizeof *plan->pair) != PW_OK;
   if (plan->failed) return;
   plan->pair[2 * plan->pairs] = a, plan->pair[2 * plan->pairs + 1] = b;
@@ -327,7 +773,7 @@ static void condense_add_pair (pw_plan *plan, int a, int b) {
 }
 
 /* Lists the pairs of nodes that meet at a group, or, if that is an uncondensed body, each of them with its nodes. */
-static void condense_pairs (pw_plan *plan) {
+static void condense_pairs (saddle_plan *plan) {
   for (int g = 0; g < plan->groups; g++) {
     int body = plan->uncondensed[g];
     for (int x = plan->start[g]; x < plan->start[g + 1]; x++) {
@@ -340,7 +786,7 @@ static void condense_pairs (pw_plan *plan) {
 }
 
 /* Sorts the contributions of each group by column; by insertion, since there are few. */
-static void condense_sort_columns (const pw_plan *plan, const int *column_of_node) {
+static void condense_sort_columns (const saddle_plan *plan, const int *column_of_node) {
   for (int g = 0; g < plan->groups; g++) {
     int *list = plan->list + plan->start[g], count = plan->start[g + 1] - plan->start[g];
     for (int x = 1; x < count; x++)
@@ -355,16 +801,16 @@ static void condense_sort_columns (const pw_plan *plan, const int *column_of_nod
 /* ---- Groups ---- */
 
 /* Fills the block p of group g; *contributions, *couplings: numbers of those filled so far. */
-static void condense_group (const pw_plan *plan, pw_block_ldl *l, int g, pw_group_block *p, int *contributions,
+static void condense_group (const saddle_plan *plan, pw_block_ldl *l, int g, pw_group_block *p, int *contributions,
                             int *couplings) {
-  int j = pw_group_first (plan->saddle->s, g), body = plan->uncondensed[g];
+  int j = group_first (plan->saddle->s, g), body = plan->uncondensed[g];
   *p = (pw_group_block){ .j = j,
                          .first_contribution = *contributions,
                          .first_coupling = *couplings,
-                         .width = (unsigned char)pw_group_width (plan->saddle->s, j),
+                         .width = (unsigned char)group_width (plan->saddle->s, j),
                          .uncondensed = body >= 0 };
   for (int x = plan->start[g]; x < plan->start[g + 1]; x++) {
-    const pw_plan_contribution *a = &plan->contribution[plan->list[x]];
+    const plan_contribution *a = &plan->contribution[plan->list[x]];
     const pw_plan_node *n = &plan->node[a->node];
     l->contribution[(*contributions)++] =
         (pw_contribution){ a->J, n->unknown, l->column[l->column_of_node[a->node]].first_value, a->row_stride,
@@ -382,7 +828,7 @@ static void condense_group (const pw_plan *plan, pw_block_ldl *l, int g, pw_grou
 }
 
 /* Allocates and fills the groups' blocks, and the chains. */
-static int condense_fill (const pw_plan *plan, pw_block_ldl *l) {
+static int condense_fill (const saddle_plan *plan, pw_block_ldl *l) {
   int contributions = 0, couplings = 0, filled = 0, uncondensed = plan->saddle->extra / 3;
   l->inverse_weight = plan->saddle->inverse_weight;
   l->groups = plan->groups - plan->linked; /* bodies of chains have no block */
@@ -405,18 +851,7 @@ static int condense_fill (const pw_plan *plan, pw_block_ldl *l) {
   return PW_OK;
 }
 
-int pw_condense_block (pw_plan *plan) {
-  condense_pairs (plan);
-  if (plan->failed || plan->pairs >= INT_MAX / 2) return PW_RESOURCE;
-  pw_block_ldl *l = plan->saddle->block = pw_block_open (plan->nodes, plan->node, plan->pairs, plan->pair);
-  if (l == NULL) return PW_RESOURCE;
-  condense_sort_columns (plan, l->column_of_node);
-  int status = pw_condense_chains (plan, l);
-  if (status == PW_OK) status = pw_block_lay_out (l);
-  return status == PW_OK ? condense_fill (plan, l) : status;
-}
-
-/* Finds the chains of a scene; see condense.h and block_ldl.h. */
+/* ---- Chains ---- */
 
 /* A column, and the block between it and the next one. */
 typedef struct {
@@ -427,10 +862,10 @@ typedef struct {
 
 /* Fills link for a body whose two nodes are a column and the next one, the only row below it.  Returns the column; -1
  * if the body cannot be in a chain. */
-static int chain_link (const pw_plan *plan, const pw_block_ldl *l, int body, pw_chain *link) {
+static int chain_link (const saddle_plan *plan, const pw_block_ldl *l, int body, pw_chain *link) {
   const int j = 3 * body, *list = plan->list + plan->start[body];
   if (plan->start[body + 1] - plan->start[body] != 2) return -1;
-  const pw_plan_contribution *a = &plan->contribution[list[0]], *b = &plan->contribution[list[1]];
+  const plan_contribution *a = &plan->contribution[list[0]], *b = &plan->contribution[list[1]];
   int column = l->column_of_node[a->node];
   if (!a->is_pin || !b->is_pin || plan->saddle->inverse_weight[j] != plan->saddle->inverse_weight[j + 1]) return -1;
   if (l->column_of_node[b->node] != column + 1 ||
@@ -460,7 +895,7 @@ static int chain_add (pw_chain *chain, const pw_chain *last, const pw_chain *lin
 }
 
 /* Joins links to chains. */
-static void chain_join (pw_plan *plan, pw_block_ldl *l, const chain_between *between) {
+static void chain_join (saddle_plan *plan, pw_block_ldl *l, const chain_between *between) {
   for (int p = 0; p < l->nodes;) {
     const chain_between *b = &between[p++];
     if (b->sources != 1 || b->link.bodies == 0) continue;
@@ -480,22 +915,9 @@ static void chain_join (pw_plan *plan, pw_block_ldl *l, const chain_between *bet
   }
 }
 
-/* Counts as sources the columns eliminated earlier that have both a column and the next one below them: fill-in. */
-static void chain_fill (const pw_block_ldl *l, chain_between *between) {
-  for (int p = 0; p < l->nodes; p++)
-    for (int i = l->column[p].first_below + 1; i < l->column[p + 1].first_below; i++)
-      if (l->below[i] == l->below[i - 1] + 1) between[l->below[i - 1]].sources++;
-}
-
-/* Counts a body as a source; its contributions are in the order of their columns. */
-static void chain_count (const pw_plan *plan, const pw_block_ldl *l, int body, chain_between *between) {
-  for (int x = plan->start[body] + 1; x < plan->start[body + 1]; x++) {
-    int column = l->column_of_node[plan->contribution[plan->list[x - 1]].node];
-    if (l->column_of_node[plan->contribution[plan->list[x]].node] == column + 1) between[column].sources++;
-  }
-}
-
-int pw_condense_chains (pw_plan *plan, pw_block_ldl *l) {
+/* Finds the chains, and marks their inner columns.  The contributions to each group in plan->list must be sorted by the
+ * columns of their nodes in l.  PW_OK or PW_RESOURCE. */
+static int condense_chains (saddle_plan *plan, pw_block_ldl *l) {
   size_t nodes = (size_t)l->nodes;
   chain_between *between = pw_arena_alloc (&plan->arena, nodes * sizeof *between);
   plan->chain = pw_arena_alloc (&plan->arena, nodes * sizeof *plan->chain);
@@ -506,71 +928,129 @@ int pw_condense_chains (pw_plan *plan, pw_block_ldl *l) {
     pw_chain link;
     int column = chain_link (plan, l, body, &link);
     if (column >= 0) between[column].link = link;
-    chain_count (plan, l, body, between);
+    for (int x = plan->start[body] + 1; x < plan->start[body + 1]; x++) { /* contributions by ascending columns */
+      column = l->column_of_node[plan->contribution[plan->list[x - 1]].node];
+      if (l->column_of_node[plan->contribution[plan->list[x]].node] == column + 1) between[column].sources++;
+    }
   }
-  chain_fill (l, between);
+  /* fill-in: by columns eliminated earlier that have both a column and the next one below them */
+  for (int p = 0; p < l->nodes; p++)
+    for (int i = l->column[p].first_below + 1; i < l->column[p + 1].first_below; i++)
+      if (l->below[i] == l->below[i - 1] + 1) between[l->below[i - 1]].sources++;
   chain_join (plan, l, between);
   return PW_OK;
 }
 
-/* Ranks the nodes of a scene with uncondensed bodies; see condense.h and block_ldl.h.
- *
- * Nodes of rank 0 are eliminated before the uncondensed bodies, as if these were at rest; those of rank 2 after them.
- * The matrix of rank 0 must be regular wherever the mechanism is.  A leg is a set of bodies joined by nodes that touch
- * neither uncondensed bodies nor the ground.  If a leg joins an uncondensed body to the ground, or to another
- * uncondensed body, and both its ends were at rest, the matrix would be singular where the leg is stretched.  So the
- * nodes at one end have rank 2: at the ground, or at one of the two bodies.  Then multipliers of rank 0 that exert no
- * force on the bodies of a leg exert none on the body at its other end either, since the forces of a joint on its two
- * bodies are opposite: dependent equations of rank 0 are dependent in the whole mechanism.  Nodes of uncondensed bodies
- * alone have rank 2, too: with these at rest their equations would be empty.  The rolling equation of a wheel has rank
- * 0: no other equation contains the wheel's spin. */
-
-/* The end of the contributions of node n: one after the last. */
-static int rank_end (const pw_plan *plan, int n) {
-  return n + 1 < plan->nodes ? plan->node[n + 1].first_contribution : plan->contributions;
+static int condense_block (saddle_plan *plan) {
+  condense_pairs (plan);
+  if (plan->failed || plan->pairs >= INT_MAX / 2) return PW_RESOURCE;
+  pw_block_ldl *l = plan->saddle->block = pw_block_open (plan->nodes, plan->node, plan->pairs, plan->pair);
+  if (l == NULL) return PW_RESOURCE;
+  condense_sort_columns (plan, l->column_of_node);
+  int status = condense_chains (plan, l);
+  if (status == PW_OK) status = pw_block_lay_out (l);
+  return status == PW_OK ? condense_fill (plan, l) : status;
 }
 
-/* 1 if node n touches the ground, or prescribed coordinates of a condensed body, which are at rest as well. */
-static int rank_is_grounded (const pw_plan *plan, int n) {
-  int grounded = plan->node[n].grounded;
-  for (int p = plan->node[n].first_contribution; p < rank_end (plan, n); p++)
-    grounded |= plan->contribution[p].is_prescribed && plan->uncondensed[plan->contribution[p].group] < 0;
-  return grounded;
+void pw_saddle_close (pw_saddle *saddle) {
+  if (saddle == NULL) return;
+  free (saddle->component);
+  free (saddle->component_memory);
+  pw_block_close (saddle->block);
+  free (saddle->y);
+  free (saddle->memory);
+  free (saddle);
 }
 
-/* 1 for a node that touches an uncondensed body; of the others 2 if it is grounded, else 0. */
-static int rank_turn (const pw_plan *plan, int n) {
-  for (int p = plan->node[n].first_contribution; p < rank_end (plan, n); p++)
-    if (plan->uncondensed[plan->contribution[p].group] >= 0) return 1;
-  return rank_is_grounded (plan, n) ? 2 : 0;
-}
+/* ---- Opening ---- */
 
-/* Joins the groups of node n, and the ground if the node is grounded.  Returns 0, without joining, if that would
- * connect two uncondensed bodies, or one with the ground, or if the node touches uncondensed bodies alone.  parent:
- * groups and the ground: union-find, in which uncondensed bodies and the ground are roots. */
-static int rank_join (const pw_plan *plan, int *parent, int n) {
-  const int first = plan->node[n].first_contribution, end = rank_end (plan, n);
-  int at_rest = rank_is_grounded (plan, n) ? plan->groups : -1, root = -1, moves = first == end;
-  if (plan->node[n].rolls && plan->contribution[end - 1].group >= plan->saddle->s->bodies) return 1;
-  for (int p = first; p < end; p++) {
-    moves |= plan->uncondensed[plan->contribution[p].group] < 0;
-    root = pw_root (parent, plan->contribution[p].group);
-    if (root != plan->groups && plan->uncondensed[root] < 0) continue;
-    if (at_rest >= 0 && at_rest != root) return 0;
-    at_rest = root;
+static int saddle_plan_all (saddle_plan *plan, pw_error *error) {
+  pw_saddle *saddle = plan->saddle;
+  size_t n = (size_t)saddle->s->coords;
+  for (pw_layout l = { 0 }; pw_layout_pass (&l, &saddle->memory);) {
+    saddle->inverse_weight = pw_layout_alloc (&l, n + 3, sizeof *saddle->inverse_weight);
+    saddle->force = pw_layout_alloc (&l, n, sizeof *saddle->force);
+    saddle->inactive = pw_layout_alloc (&l, (size_t)saddle->rows, sizeof *saddle->inactive);
+    saddle->component_of_row = pw_layout_alloc (&l, (size_t)saddle->s->rows, sizeof *saddle->component_of_row);
   }
-  if (!moves) return 0;
-  if (at_rest >= 0) root = at_rest;
-  for (int p = first; p < end; p++) parent[pw_root (parent, plan->contribution[p].group)] = root;
-  return 1;
+  if (saddle->memory == NULL) return PW_RESOURCE;
+  for (size_t j = 0; j < n; j++) saddle->inverse_weight[j] = plan->weight[j] > 0 ? 1 / plan->weight[j] : 0;
+  int status = massless_open (plan, error);
+  if (status != PW_OK) return status;
+  condense_elements (plan);
+  condense_components (plan);
+  status = condense_sort (plan);
+  if (status == PW_OK) status = condense_find_dependent (plan, &saddle->dependent_row);
+  if (status != PW_OK || saddle->dependent_row >= 0) return status;
+  status = condense_uncondensed (plan);
+  return status == PW_OK ? condense_block (plan) : status;
 }
 
-int pw_condense_rank (pw_plan *plan) {
-  int *parent = pw_arena_alloc (&plan->arena, ((size_t)plan->groups + 1) * sizeof *parent);
-  if (parent == NULL) return PW_RESOURCE;
-  for (int g = 0; g <= plan->groups; g++) parent[g] = g;
-  for (int turn = 0; turn < 3; turn++) /* the legs, then their ends at uncondensed bodies, then those at the ground */
-    for (int n = 0; n < plan->nodes; n++)
-      if (rank_turn (plan, n) == turn && !rank_join (plan, parent, n)) plan->node[n].rank = 2;
-  return PW_OK;
+pw_saddle *pw_saddle_open (pw_workspace *w, const double *weight, int rows, const unsigned char *active,
+                           pw_error *error) {
+  saddle_plan plan = { .weight = weight, .active = active, .groups = w->s->coords - 2 * w->s->bodies };
+  pw_saddle *saddle = plan.saddle = calloc (1, sizeof *saddle);
+  int status = PW_RESOURCE;
+  if (saddle) {
+    *saddle = (pw_saddle){ .s = w->s, .w = w, .rows = rows, .pivot = INFINITY, .pivot_row = -1, .dependent_row = -1 };
+    status = saddle_plan_all (&plan, error);
+  }
+  free (plan.node);
+  free (plan.contribution);
+  free (plan.pair);
+  pw_arena_free (&plan.arena);
+  if (status == PW_OK) return saddle;
+  pw_saddle_close (saddle);
+  pw_fail (error, status, "model %s: out of memory", w->s->model);
+  return NULL;
+}
+
+/* ---- Factorisation and solution ---- */
+
+void pw_saddle_postpone (pw_saddle *saddle, double pivot) {
+  saddle->postponed = pivot;
+}
+
+int pw_saddle_factor (pw_saddle *saddle) {
+  saddle->postponed = 0;
+  saddle->pivot_row = saddle->dependent_row;
+  if (saddle->block == NULL) return saddle->pivot = 0, PW_RETRY;
+  saddle->pivot = saddle->components ? massless_factor (saddle) : INFINITY;
+  if (!(saddle->pivot > SADDLE_ROUND_OFF)) return PW_RETRY;
+  pw_block_factor (saddle->block);
+  if (!(saddle->block->least_pivot >= saddle->pivot)) {
+    const int row = saddle->block->least_unknown;
+    saddle->pivot = saddle->block->least_pivot;
+    saddle->pivot_row = row >= 0 && row < saddle->s->rows && saddle->component_of_row[row] < 0 ? row : -1;
+  }
+  return saddle->pivot > SADDLE_ROUND_OFF ? PW_OK : PW_RETRY;
+}
+
+int pw_saddle_sine_below (pw_saddle *saddle, double sine) {
+  if (sine * sine <= saddle->postponed) return 0;
+  if (saddle->postponed > 0) pw_saddle_factor (saddle);
+  return !(saddle->pivot >= sine * sine);
+}
+
+double pw_saddle_sine (pw_saddle *saddle, int *row) {
+  if (saddle->postponed > 0) pw_saddle_factor (saddle);
+  if (row) *row = saddle->pivot_row;
+  return saddle->pivot > 0 ? sqrt (fmin (saddle->pivot, 1)) : 0;
+}
+
+void pw_saddle_solve (pw_saddle *saddle, const double *f, const double *gamma, double *a, double *lambda) {
+  const size_t bytes = (size_t)saddle->rows * sizeof *lambda;
+  double *y = saddle->extra ? saddle->y : lambda;
+  if (saddle->postponed > 0) pw_saddle_factor (saddle);
+  if (y != gamma) memcpy (y, gamma, bytes);
+  for (int i = 0; i < saddle->extra; i++) y[saddle->s->rows + i] = 0;
+  if (saddle->components) {
+    for (int j = 0; j < saddle->s->coords; j++) saddle->force[j] = f ? f[j] : 0;
+    f = saddle->force;
+    massless_forward (saddle, y);
+  }
+  pw_block_solve (saddle->block, f, y, a);
+  if (y != lambda) memcpy (lambda, y, bytes);
+  for (int i = 0; i < saddle->inactive_count; i++) lambda[saddle->inactive[i]] = 0;
+  if (saddle->components) massless_backward (saddle, a, lambda);
 }

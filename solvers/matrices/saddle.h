@@ -10,7 +10,28 @@
 
 #include "system.h"
 
-typedef struct pw_saddle pw_saddle;
+/* Private, except for tests. */
+typedef struct {
+  const pw_system *s;
+  const pw_workspace *w; /* contains J */
+  int rows;              /* of J: all, or the holonomic ones */
+  double postponed;      /* > 0: not factorised yet; the pivots are at least this (pw_saddle_postpone) */
+  int components;        /* of rows and massless coordinates */
+  struct pw_component *component;
+  int *component_of_row;      /* s->rows; -1: inactive, or without massless coordinates */
+  double *inverse_weight;     /* coords + 3: 1 / weight; 0 for prescribed and massless coordinates, and the ground's */
+  double *force;              /* coords: f~ of saddle.c */
+  int extra;                  /* unknowns besides the multipliers of rows: 3 for each uncondensed body */
+  double *y;                  /* s->rows + extra: right-hand side and solution; NULL without extra unknowns */
+  struct pw_block_ldl *block; /* NULL if there is a dependent_row: nothing is planned then */
+  int dependent_row;          /* one that depends on others in every configuration; -1: none */
+  int *inactive;              /* rows outside massless components whose multiplier is 0 */
+  int inactive_count;
+  double pivot;  /* smallest when last factorised: of `block`, the squared sine of the angle between a row and those
+                  * before it; of massless coordinates, see massless_factor */
+  int pivot_row; /* that row; -1: none, or one of a massless component */
+  char *memory, *component_memory;
+} pw_saddle;
 
 /* rows: number of rows of J included (all, or the holonomic ones); of these only those with active[i] != 0 if active is
  * given.  J must be evaluated at a typical configuration.  weight: coords.  The saddle refers to w, but not to weight

@@ -4,18 +4,6 @@
 #include "tangent.h"
 #include "util.h"
 
-/* Numbers the active equations. */
-static void tangent_number_rows (pw_tangent *x) {
-  const pw_run *r = x->run;
-  for (int i = 0; i < r->s->rows; i++) {
-    int active = r->active == NULL || r->active[i];
-    x->row_index[i] = active ? x->rows : -1;
-    if (!active) continue;
-    x->holonomic += i < r->s->holonomic;
-    x->row[x->rows++] = i;
-  }
-}
-
 /* The largest block of a batch, and the largest count x cols. */
 static void tangent_sizes (const pw_system *s, size_t *block, size_t *direction) {
   *block = *direction = 1;
@@ -44,7 +32,13 @@ int pw_tangent_open (pw_tangent *x, pw_run *r) {
   }
   if (x->memory == NULL) return PW_RESOURCE;
   for (int j = 0; j < s->coords; j++) x->D[j] = pw_is_angle (s, j) ? 1 / (s->scale.length * s->scale.length) : 1;
-  tangent_number_rows (x);
+  for (int i = 0; i < s->rows; i++) {
+    int active = r->active == NULL || r->active[i];
+    x->row_index[i] = active ? x->rows : -1;
+    if (!active) continue;
+    x->holonomic += i < s->holonomic;
+    x->row[x->rows++] = i;
+  }
   return PW_OK;
 }
 
@@ -57,11 +51,6 @@ const double *pw_tangent_expand (const pw_tangent *x, const double *active, int 
   memset (all, 0, (size_t)x->run->s->rows * sizeof *all);
   for (int i = 0; i < count; i++) all[x->row[i]] = active[i];
   return all;
-}
-
-void pw_tangent_multiply_JT (const pw_tangent *x, const double *active, int count, double *out) {
-  memset (out, 0, ((size_t)x->run->s->coords + 3) * sizeof *out);
-  if (count > 0) pw_add_JT (x->run->w, pw_tangent_expand (x, active, count, x->lambda), out);
 }
 
 void pw_tangent_compress (const pw_tangent *x, const double *all, int count, double *active) {
@@ -238,6 +227,13 @@ void pw_dae_close (pw_dae *x) {
 
 /* ---- Residual ---- */
 
+/* out (coords + 3) = J^T times the multipliers of the first `count` active equations, with the J last evaluated.
+ * Overwrites x->lambda. */
+static void dae_multiply_JT (const pw_tangent *x, const double *active, int count, double *out) {
+  memset (out, 0, ((size_t)x->run->s->coords + 3) * sizeof *out);
+  if (count > 0) pw_add_JT (x->run->w, pw_tangent_expand (x, active, count, x->lambda), out);
+}
+
 /* The residuals of the constraint equations that lambda enforces, then of g = 0 if mu enforces it. */
 static void dae_constraints (pw_dae *x, const double *v, const double *a, double *F) {
   pw_run *r = x->tangent.run;
@@ -257,9 +253,9 @@ static void dae_constraints (pw_dae *x, const double *v, const double *a, double
 void pw_dae_residual (pw_dae *x, const double *v, const double *a, const double *lambda, double *F) {
   const pw_run *r = x->tangent.run;
   int n = x->n;
-  pw_tangent_multiply_JT (&x->tangent, lambda + x->rows, x->mu_count, x->reaction);
+  dae_multiply_JT (&x->tangent, lambda + x->rows, x->mu_count, x->reaction);
   for (int j = 0; j < n; j++) F[j] = x->tangent.D[j] * x->reaction[j];
-  pw_tangent_multiply_JT (&x->tangent, lambda, x->rows, x->reaction);
+  dae_multiply_JT (&x->tangent, lambda, x->rows, x->reaction);
   pw_evaluate_force (r->w, x->force);
   for (int j = 0; j < n; j++) F[n + j] = (a ? r->s->mass[j] * a[j] : 0) + x->reaction[j] - x->force[j];
   dae_constraints (x, v, a, F + 2 * n);
@@ -325,10 +321,6 @@ int pw_dae_lay_out (pw_dae *x, const double *v, const double *a, const double *l
 }
 
 /* Recording and layout of the sequence of contributions to a sparse matrix; see tangent.h. */
-
-void pw_scatter_begin_record (pw_scatter_map *t) {
-  *t = (pw_scatter_map){ .recording = 1 };
-}
 
 void pw_scatter_record_entry (pw_scatter_map *t, int row, int col) {
   t->failed |= pw_grow (&t->entry, t->count, &t->room, sizeof *t->entry) != PW_OK;

@@ -25,7 +25,9 @@ typedef struct {
 } pw_scatter_map;
 
 /* From now on contributions are recorded; their values are ignored.  *t: new or closed; it is overwritten. */
-void pw_scatter_begin_record (pw_scatter_map *t);
+static inline void pw_scatter_begin_record (pw_scatter_map *t) {
+  *t = (pw_scatter_map){ .recording = 1 };
+}
 
 /* Ends the recording, of a matrix with n columns.  PW_OK or PW_RESOURCE; close the map in both cases. */
 int pw_scatter_lay_out (pw_scatter_map *t, int n);
@@ -54,7 +56,7 @@ static inline void pw_scatter_add (pw_scatter_map *t, int row, int col, double v
  *   accelerations   J a - gamma + 2 alpha (J v - eta) + beta^2 g   (nonholonomic: + alpha (J v - eta))
  *
  * with Baumgarte's alpha and beta.  Some methods have further multipliers mu, one for each of the first mu_count
- * active equations (tangent.h). */
+ * active equations. */
 
 typedef struct {
   pw_run *run;
@@ -62,7 +64,7 @@ typedef struct {
   int *row_index;      /* all equations: index among the active ones, or -1 */
   int *row;            /* rows: index among all equations */
   double *lambda;      /* all equations: scratch for pw_tangent_expand */
-  double *D;           /* coords: 1 for lengths, 1/L^2 for angles (tangent.h) */
+  double *D;           /* coords: 1 for lengths, 1/L^2 for angles, as below */
   double *block;       /* scratch: the largest block of a batch, or its force_u */
   double *direction;   /* scratch: the largest count x cols */
   pw_scatter_map scatter;
@@ -76,8 +78,6 @@ void pw_tangent_close (pw_tangent *x);
 
 /* Fills `all`, which is returned: multipliers of the first `count` active equations, 0 for the others. */
 const double *pw_tangent_expand (const pw_tangent *x, const double *active, int count, double *all);
-/* out (coords + 3) = J^T times the same multipliers, with the J last evaluated.  Overwrites x->lambda. */
-void pw_tangent_multiply_JT (const pw_tangent *x, const double *active, int count, double *out);
 /* Values of the first `count` active equations from those of all. */
 void pw_tangent_compress (const pw_tangent *x, const double *all, int count, double *active);
 

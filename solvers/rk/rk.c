@@ -1,4 +1,4 @@
-/* A step of an explicit Runge-Kutta method with the coefficients A, b on q' = v, v' = a (t, q, v).
+/* Explicit Runge-Kutta methods with the coefficients A, b on q' = v, v' = a (t, q, v).
  *
  *   stage i      q_i = q + h sum_j A_ij v_j,   v_i = v + h sum_j A_ij a_j,   j < i
  *   new state    q + h sum_j b_j v_j,          v + h sum_j b_j a_j
@@ -11,7 +11,210 @@
 #include <string.h>
 #include "rk.h"
 #include "dense_output.h"
+#include "specialised.h"
 #include "util.h"
+
+enum { NULLSPACE_MOST = 256 }; /* constraint equations: their matrix is dense */
+
+/* Null-space velocities; see below. */
+typedef struct {
+  int rows;          /* active constraint equations */
+  int *active_index; /* all equations: index among the active ones, or -1 */
+  double *W_inv_J0T; /* coords x rows: W^-1 J0^T */
+  double *K;         /* rows x rows: J W^-1 J0^T, eliminated in place */
+  double *mu;        /* rows: eta - J w, then the multipliers of the correction */
+  double *eta;       /* all equations */
+  double *v;         /* coords + 3: scratch */
+  char *memory;
+} rk_nullspace;
+
+struct pw_method_data {
+  const pw_tableau *tableau;
+  pw_rk_row row[PW_RK_STAGES]; /* nonzero weights: [i] of stage i > 0; [0] of the new state, as stage 0 has none */
+  pw_rk_row estimate[3];       /* those of e, e3, e6 */
+  int projects, every;         /* 1: coordinate projection; steps from one projection to the next */
+  int uses_nullspace;          /* 1: stabilisation nullspace */
+  int nullspace_projects;      /* 1: with positions projected after each step */
+  int holds_signals;           /* 1: signals of forces are constant over a step */
+  pw_projector projector;
+  rk_nullspace nullspace;
+  pw_step_counter counter; /* of fixed steps */
+  int off_grid;            /* 1: the last step was divided and ended between the multiples of the step size */
+  /* velocities, accelerations, and rates of the ledger's entries at the stages, then at the new state */
+  double *stage_v[PW_RK_STAGES], *stage_a[PW_RK_STAGES], *stage_rate[PW_RK_STAGES];
+  double *q, *v, *a, *lambda; /* the new state, laid out as in pw_run; before: q, lambda of a stage */
+  double h, last_error;       /* adaptive: size of the next step, error of the last one */
+  double *weight;             /* adaptive: reciprocal tolerances: [2 j] of q_j, [2 j + 1] of v_j */
+  pw_step_start last, second; /* of the last step, for samples inside it; of the second part of a divided step */
+  char *memory;
+};
+
+/* ---- Null-space velocities ----
+ *
+ * u = B^T W v.  The columns of B are a basis of ker J0, with J0 the constraint matrix at the beginning of the step,
+ * constant over the step.  W is the metric of positions: the mass matrix, with small weights for massless coordinates.
+ * The equations integrated are
+ *
+ *   q' = v(t, q, u),    u' = B^T W a(t, q, v),      v:  J(t, q) v = eta,  B^T W v = u
+ *
+ * so that all velocity constraints hold at every stage, for any step size.  u has as many entries as there are degrees
+ * of freedom.  Since B is constant, a Runge-Kutta stage of u is B^T W w, with w the stage of v by the same formula.
+ * Then B^T W (v - w) = 0, which puts v - w in the range of W^-1 J0^T.  So no basis is formed, and the result is
+ * independent of its choice:
+ *
+ *   v = w + W^-1 J0^T mu,    K mu = eta - J w,    K = J W^-1 J0^T
+ *
+ * The next step uses another basis; v, and with it the motion, does not change.  With this W a body made of two welded
+ * parts moves like one body, up to round-off, and massless coordinates follow the massive ones.  (Kim & Vanderploeg
+ * 1986, QR decomposition for state space representation of constrained mechanical dynamic systems: a basis kept while
+ * it is well conditioned; Mani, Haug & Atkinson 1985, Application of singular value decomposition for analysis of
+ * mechanical system dynamics.) */
+
+/* Errors: PW_INPUT if the scene has more than NULLSPACE_MOST independent constraint equations; PW_RESOURCE. */
+static int nullspace_open (rk_nullspace *b, pw_run *r, pw_error *error) {
+  const pw_system *s = r->s;
+  *b = (rk_nullspace){ .rows = s->rows - r->redundant };
+  if (b->rows > NULLSPACE_MOST)
+    return pw_fail (error, PW_INPUT,
+                    "model %s: stabilisation nullspace works with dense matrices, for up to %d constraint rows, and "
+                    "this scene has %d; use %s+projection",
+                    s->model, NULLSPACE_MOST, b->rows, r->method->name);
+  const size_t m = (size_t)b->rows, all = (size_t)s->rows, n = (size_t)s->coords;
+  const pw_array array[] = {
+    { &b->W_inv_J0T, n * m }, { &b->K, m * m }, { &b->mu, m }, { &b->eta, all }, { &b->v, n + 3 }
+  };
+  b->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
+  b->active_index = malloc ((all + 1) * sizeof *b->active_index);
+  if (b->memory == NULL || b->active_index == NULL) return pw_fail_memory (s, error);
+  for (int i = 0, count = 0; i < s->rows; i++) b->active_index[i] = r->active && !r->active[i] ? -1 : count++;
+  return PW_OK;
+}
+
+static void nullspace_close (rk_nullspace *b) {
+  free (b->memory);
+  free (b->active_index);
+}
+
+/* Computes K and mu = eta - J w with the J last evaluated. */
+static void nullspace_assemble (rk_nullspace *b, pw_run *r, const double *w) {
+  const pw_system *s = r->s;
+  const int m = b->rows;
+  memset (b->K, 0, (size_t)(m * m) * sizeof *b->K);
+  if (s->rheonomic) pw_evaluate_eta (r->w, b->eta); /* else it stays 0 */
+  PW_EACH_CONSTRAINT (k, r->w)
+    for (int n = 0; n < k->b.count * k->kind->rows; n++) {
+      int i = b->active_index[k->row + n];
+      if (i < 0) continue;
+      b->mu[i] = b->eta[k->row + n];
+      for (int c = 0; c < k->b.cols; c++) {
+        int j = pw_global (k, n / k->kind->rows, c);
+        double J = k->J[n * k->b.cols + c];
+        if (j >= s->coords) continue; /* the ground */
+        b->mu[i] -= J * w[j];
+        pw_add_scaled (b->K + i * m, b->W_inv_J0T + j * m, J, m);
+      }
+    }
+}
+
+/* mu = K^-1 mu by Gaussian elimination with pivoting; row i is scaled to the largest entry 1.  PW_RETRY if a pivot is
+ * round-off, as for dependent constraint equations, or a row is 0 or not finite. */
+static int nullspace_eliminate (double *K, double *mu, int m) {
+  const double least = 1e-13; /* some 500 eps */
+  for (int i = 0; i < m; i++) {
+    double most = 0;
+    for (int j = 0; j < m; j++) most = pw_larger_or_nan (most, fabs (K[i * m + j]));
+    if (!(most > 0 && isfinite (most))) return PW_RETRY;
+    for (int j = 0; j < m; j++) K[i * m + j] *= 1 / most;
+    mu[i] /= most;
+  }
+  for (int p = 0; p < m; p++) {
+    int pivot = p;
+    for (int i = p + 1; i < m; i++)
+      if (fabs (K[i * m + p]) > fabs (K[pivot * m + p])) pivot = i;
+    if (!(fabs (K[pivot * m + p]) > least)) return PW_RETRY;
+    for (int j = 0; j < m; j++) {
+      double x = K[p * m + j];
+      K[p * m + j] = K[pivot * m + j], K[pivot * m + j] = x;
+    }
+    double x = mu[p], inverse;
+    mu[p] = mu[pivot], mu[pivot] = x;
+    inverse = K[p * m + p] = 1 / K[p * m + p];
+    for (int i = p + 1; i < m; i++) {
+      double factor = K[i * m + p] * inverse;
+      if (factor == 0) continue; /* K is sparse: in chains it is banded */
+      pw_add_scaled (&K[i * m + p + 1], &K[p * m + p + 1], -factor, m - p - 1);
+      mu[i] -= factor * mu[p];
+    }
+  }
+  for (int i = m - 1; i >= 0; i--) {
+    for (int j = i + 1; j < m; j++) mu[i] -= K[i * m + j] * mu[j];
+    mu[i] *= K[i * m + i];
+  }
+  return PW_OK;
+}
+
+/* Sets W^-1 J0^T for a step from the state reached.  PW_METHOD if a signal failed. */
+static int nullspace_begin (rk_nullspace *b, pw_run *r) {
+  const pw_system *s = r->s;
+  int status = pw_evaluate_J_at (r->w, r->t, r->q, r->v);
+  if (status != PW_OK) return status;
+  PW_EACH_CONSTRAINT (k, r->w)
+    for (int n = 0; n < k->b.count * k->kind->rows; n++)
+      for (int i = b->active_index[k->row + n], c = i < 0 ? k->b.cols : 0; c < k->b.cols; c++) {
+        int j = pw_global (k, n / k->kind->rows, c);
+        if (j < s->coords) b->W_inv_J0T[j * b->rows + i] = k->J[n * k->b.cols + c] / s->metric[j];
+      }
+  return PW_OK;
+}
+
+/* Corrects v with the J last evaluated; updates the velocity kinematics.  Returns as nullspace_velocities. */
+static int nullspace_correct_velocities (rk_nullspace *b, pw_run *r, double *v) {
+  const double *row = b->W_inv_J0T;
+  nullspace_assemble (b, r, v);
+  if (nullspace_eliminate (b->K, b->mu, b->rows) != PW_OK) return PW_RETRY;
+  for (int j = 0; j < r->s->coords; j++, row += b->rows)
+    for (int n = 0; n < b->rows; n++) v[j] += row[n] * b->mu[n];
+  return pw_update_velocities (r->w, v);
+}
+
+/* Replaces v by the velocities at (t, q) with the same null-space velocities; updates kinematics and J.  PW_RETRY if
+ * the step is too large for its basis, or the configuration is singular; PW_METHOD if a signal failed. */
+static int nullspace_velocities (rk_nullspace *b, pw_run *r, double t, const double *q, double *v) {
+  int status = pw_evaluate_J_at (r->w, t, q, v);
+  return status == PW_OK ? nullspace_correct_velocities (b, r, v) : status;
+}
+
+/* Accelerations and multipliers right after nullspace_velocities.  Returns as pw_run_accelerate. */
+static int nullspace_accelerate (pw_run *r, const double *v, double *a, double *lambda) {
+  int status = pw_run_accelerate_evaluated (r, v, a, lambda);
+  if (pw_watchdog_near (r)) r->near_singular = 1;
+  return status;
+}
+
+/* At the end of a step: projects positions onto g = 0 unless p is NULL, then as nullspace_velocities; *added_energy,
+ * unless it is NULL, grows by the energy [J] that the projection adds. */
+static int nullspace_finalise (rk_nullspace *b, pw_projector *p, pw_run *r, double t, double *q, double *v,
+                               double *added_energy) {
+  int status = PW_OK;
+  double before = 0;
+  if (p == NULL || r->s->holonomic == 0) return nullspace_velocities (b, r, t, q, v);
+  if (added_energy) { /* before the projection, with the same null-space velocities */
+    memcpy (b->v, v, (size_t)r->s->coords * sizeof *v);
+    status = nullspace_velocities (b, r, t, q, b->v);
+    if (status == PW_OK) before = pw_energy (r, b->v);
+  }
+  if (status == PW_OK) status = pw_project_positions (p, r, t, q, v);
+  if (status == PW_OK) status = nullspace_correct_velocities (b, r, v);
+  if (status == PW_OK && added_energy) *added_energy += pw_energy (r, v) - before;
+  return status;
+}
+
+/* ---- A step ---- */
+
+/* 1 if the next step ends with a coordinate projection. */
+static int rk_projects_next (const pw_run *r) {
+  return r->data->projects && (r->statistics.steps + 1) % r->data->every == 0;
+}
 
 /* (q, v) = the state reached + h sum_j weight_j (v_j, a_j), with the weights of a row of the tableau. */
 static void rk_combine (const pw_run *r, double *q, double *v, const pw_rk_row *row, double h) {
@@ -25,7 +228,8 @@ static void rk_combine (const pw_run *r, double *q, double *v, const pw_rk_row *
   }
 }
 
-void pw_rk_ledger (const pw_run *r, double *end, const double *beginning, double h) {
+/* The ledger at the end of a step, from that at its beginning: end = beginning + h sum_j b_j rate_j. */
+static void rk_ledger (const pw_run *r, double *end, const double *beginning, double h) {
   const pw_method_data *d = r->data;
   const pw_rk_row *b = &d->row[0];
   for (int i = 0; i < r->entries; i++) {
@@ -41,8 +245,8 @@ static inline int rk_evaluate_stage (pw_run *r, double t, double *v, double *a, 
   pw_method_data *d = r->data;
   int status;
   if (d->uses_nullspace) {
-    status = pw_nullspace_velocities (&d->nullspace, r, t, d->q, v);
-    if (status == PW_OK) status = pw_nullspace_accelerate (r, v, a, d->lambda);
+    status = nullspace_velocities (&d->nullspace, r, t, d->q, v);
+    if (status == PW_OK) status = nullspace_accelerate (r, v, a, d->lambda);
   } else {
     status = pw_run_accelerate (r, t, d->q, v, a, d->lambda);
   }
@@ -83,40 +287,44 @@ static int rk_stages (pw_run *r, double h) {
   return pw_is_finite_state (r, d->q, d->v) ? PW_OK : PW_RETRY;
 }
 
-int pw_rk_step (pw_run *r, double h, double t1, int project, double *added_energy) {
+/* A step from the state reached to the new state at t1 = t + h: d->q, d->v, d->a, d->lambda.  project: 1 to project the
+ * new state onto the constraints; *added_energy, unless it is NULL, grows by the energy [J] that projections add.
+ * PW_RETRY if a smaller step may succeed; PW_METHOD if a signal failed. */
+static int rk_step (pw_run *r, double h, double t1, int project, double *added_energy) {
   pw_method_data *d = r->data;
-  int status = d->uses_nullspace ? pw_nullspace_begin (&d->nullspace, r) : PW_OK;
+  int status = d->uses_nullspace ? nullspace_begin (&d->nullspace, r) : PW_OK;
   if (status == PW_OK) status = rk_stages (r, h);
   if (status != PW_OK) return status;
   if (project) return pw_project_state (&d->projector, r, t1, d->q, d->v, d->a, d->lambda, added_energy);
   if (!d->uses_nullspace) return pw_run_accelerate (r, t1, d->q, d->v, d->a, d->lambda);
-  status = pw_nullspace_finalise (&d->nullspace, d->nullspace_projects ? &d->projector : NULL, r, t1, d->q, d->v,
-                                  added_energy);
-  return status == PW_OK ? pw_nullspace_accelerate (r, d->v, d->a, d->lambda) : status;
+  status =
+      nullspace_finalise (&d->nullspace, d->nullspace_projects ? &d->projector : NULL, r, t1, d->q, d->v, added_energy);
+  return status == PW_OK ? nullspace_accelerate (r, d->v, d->a, d->lambda) : status;
 }
 
-void pw_rk_accept (pw_run *r, double h, double t1, double added_energy) {
+/* Makes the new state the state reached. */
+static void rk_accept (pw_run *r, double h, double t1, double added_energy) {
   pw_method_data *d = r->data;
   pw_store_start (&d->last, r);
   memcpy (r->q, d->q, pw_state_length (r->s) * sizeof *r->q);
   r->t = t1;
-  pw_rk_ledger (r, r->ledger, d->last.ledger, h);
+  rk_ledger (r, r->ledger, d->last.ledger, h);
   r->projected += added_energy;
   pw_ledger_rates (r, r->lambda, r->rate);
 }
 
-double pw_rk_distance (const pw_run *r) {
-  const pw_system *s = r->s;
-  const pw_method_data *d = r->data;
+double pw_rk_distance (const pw_run *r, const double *q, const double *v) {
   double most = 0;
-  for (int j = 0; j < s->coords; j++) {
-    double q = fabs (d->q[j] - r->q_at[j]), v = r->w->scale.time * fabs (d->v[j] - r->v_at[j]);
-    most = pw_larger_or_nan (most, pw_larger_or_nan (q, v) / pw_unit (s, j));
+  for (int j = 0; j < r->s->coords; j++) {
+    double dq = fabs (q[j] - r->q_at[j]), dv = r->w->scale.time * fabs (v[j] - r->v_at[j]);
+    most = pw_larger_or_nan (most, pw_larger_or_nan (dq, dv) / pw_unit (r->s, j));
   }
   return most;
 }
 
-int pw_rk_fail (pw_run *r, int status, double t, double h, int divided, pw_error *error) {
+/* Reports why no step from the state at t succeeds; h: the size reported; status: result of the last attempt; divided:
+ * 1 if it was divided near a singular configuration. */
+static int rk_fail (pw_run *r, int status, double t, double h, int divided, pw_error *error) {
   int finite = pw_is_finite_state (r, r->data->q, r->data->v) && pw_is_finite_state (r, r->q, r->v);
   int has_projector = r->data->projects || r->data->nullspace_projects;
   int contradictory = has_projector && finite ? r->data->projector.contradictory_row : -1;
@@ -135,7 +343,7 @@ int pw_rk_fail (pw_run *r, int status, double t, double h, int divided, pw_error
                                             : "a stage of it lands in a singular configuration");
 }
 
-/* Runge-Kutta methods: fixed steps, and samples inside the last step.
+/* ---- Fixed steps, and samples inside the last step ----
  *
  * Fixed steps end at multiples of the step size, at t_end and at breakpoints.  A sample is a step from the beginning of
  * the last step, as accurate as the method.  If a stage of a step or sample lands near a singular configuration, its
@@ -150,9 +358,9 @@ static int fixed_step_from (pw_run *r, const pw_step_start *from, double t, int 
   double added_energy = 0;
   const size_t n = (size_t)r->s->coords + 3;
   r->t = from->t, r->q = from->q, r->v = from->q + n, r->a = from->q + 2 * n, r->rate = from->rate;
-  int status = pw_rk_step (r, h, t, project, with_energy ? &added_energy : NULL);
+  int status = rk_step (r, h, t, project, with_energy ? &added_energy : NULL);
   r->t = t_reached, r->q = q, r->v = v, r->a = a, r->rate = rate;
-  pw_rk_ledger (r, r->ledger_at, from->ledger, h);
+  rk_ledger (r, r->ledger_at, from->ledger, h);
   r->projected_at = from->projected + added_energy;
   return status;
 }
@@ -192,7 +400,7 @@ static int fixed_divide (pw_run *r, const pw_step_start *from, int status, doubl
     r->statistics.rejected++;
     if (status < 0) return status;
     if (status != PW_OK) continue;
-    double difference = pw_rk_distance (r);
+    double difference = pw_rk_distance (r, d->q, d->v);
     if (is_step) difference = fmax (difference, fabs (r->projected_at - from->projected) / energy);
     if (has_result && difference < least) least = difference, *between = t;
     memcpy (r->q_at, d->q, bytes);
@@ -223,7 +431,7 @@ int pw_rk_at (pw_run *r, double t, pw_error *error) {
   memcpy (r->q_at, d->q, pw_state_length (r->s) * sizeof *d->q);
   r->statistics = statistics, r->refused_sine = refused_sine, r->near_singular = near_singular;
   if (status < 0) return pw_fail_signal (t, error);
-  return status == PW_OK ? PW_OK : pw_rk_fail (r, status, from->t, t - from->t, divided, error);
+  return status == PW_OK ? PW_OK : rk_fail (r, status, from->t, t - from->t, divided, error);
 }
 
 /* Replaces a step to t1 near a singular configuration, which returned `status`, by the first part of a divided step,
@@ -241,25 +449,25 @@ static int fixed_step_around (pw_run *r, int status, int singular, double t1, do
   for (size_t i = 0; i < sizeof beyond / sizeof *beyond && status == PW_RETRY && t1 < stop; i++)
     status = fixed_divide (r, &from, status, fmin (t1 + beyond[i] * r->settings.step, stop), project, t1, t);
   if (singular && status == PW_RETRY) status = fixed_divide (r, &from, status, t1, project, r->t, t);
-  if (status == PW_OK) status = pw_rk_step (r, *t - r->t, *t, project, &added_energy);
-  if (status == PW_OK) pw_rk_accept (r, *t - r->t, *t, r->settings.ledger ? added_energy : 0);
+  if (status == PW_OK) status = rk_step (r, *t - r->t, *t, project, &added_energy);
+  if (status == PW_OK) rk_accept (r, *t - r->t, *t, r->settings.ledger ? added_energy : 0);
   return status;
 }
 
-int pw_rk_advance_fixed (pw_run *r, double t_end, pw_error *error) {
+static int rk_advance_fixed (pw_run *r, double t_end, pw_error *error) {
   pw_method_data *d = r->data;
-  int whole, project = pw_rk_projects_next (r);
+  int whole, project = rk_projects_next (r);
   const int was_off_grid = d->off_grid;
   double added_energy = 0, t1 = pw_step_end (r, &d->counter, t_end, &whole);
   double h = whole && !was_off_grid ? r->settings.step : t1 - r->t;
-  int status = pw_rk_step (r, h, t1, project, r->settings.ledger ? &added_energy : NULL);
+  int status = rk_step (r, h, t1, project, r->settings.ledger ? &added_energy : NULL);
   int ends_singular =
       r->near_singular && r->watchdog.evaluated_sine < r->thresholds.ends_singular * r->watchdog.checked_sine;
   d->off_grid = r->near_singular && !was_off_grid;
   double stop = whole ? fmin (t_end, r->breakpoint) : t1, t = t1;
   if (d->off_grid) status = fixed_step_around (r, status, ends_singular, t1, stop, project, &t);
   if (status != PW_OK) {
-    if (status != PW_STOPPED) status = pw_rk_fail (r, status, r->t, r->settings.step, d->off_grid, error);
+    if (status != PW_STOPPED) status = rk_fail (r, status, r->t, r->settings.step, d->off_grid, error);
     d->off_grid = was_off_grid;
     return status;
   }
@@ -268,12 +476,12 @@ int pw_rk_advance_fixed (pw_run *r, double t_end, pw_error *error) {
     if (t > t1) d->counter.count = (long)floor ((t - d->counter.base) / r->settings.step);
     return PW_OK;
   }
-  pw_rk_accept (r, h, t1, added_energy);
+  rk_accept (r, h, t1, added_energy);
   pw_count_step (&d->counter, whole, t1);
   return PW_OK;
 }
 
-/* Runge-Kutta methods with step-size control.
+/* ---- Step-size control ----
  *
  *   h_new = 0.9 h err^(3 m / 4 - k) err_last^m,  limited to h/5 ... 5 h; after a rejection to 0.9 h
  *
@@ -303,7 +511,8 @@ int pw_rk_advance_fixed (pw_run *r, double t_end, pw_error *error) {
 #define ADAPT_REDUCTION 0.2    /* its lower bound */
 #define ADAPT_LEAST_ERROR 1e-4 /* least err_last: smaller errors are accidental and would predict too small a step */
 
-void pw_rk_reset_step_size (pw_run *r) {
+/* Sets the size of the first step, and of the first one after a discontinuity. */
+static void rk_reset_step_size (pw_run *r) {
   pw_method_data *d = r->data;
   d->h = 0.1 * r->w->scale.time * pow (r->settings.rtol, d->tableau->exponent);
   d->last_error = ADAPT_LEAST_ERROR;
@@ -326,16 +535,15 @@ static void adapt_weigh (const pw_run *r) {
   }
 }
 
-/* Mean square of the errors of positions and velocities in units of the tolerances. */
-static double adapt_mean_square (const pw_run *r, const double *eq, const double *ev) {
+/* Mean square of the errors r->q_at and r->v_at of positions and velocities in units of the tolerances. */
+static double adapt_mean_square (const pw_run *r) {
   const double *w = r->data->weight;
-  int coords = r->s->coords;
   double sum = 0;
-  for (int j = 0; j < coords; j++, w += 2) {
-    double q = eq[j] * w[0], v = ev[j] * w[1];
+  for (int j = 0; j < r->s->coords; j++, w += 2) {
+    double q = r->q_at[j] * w[0], v = r->v_at[j] * w[1];
     sum += q * q + v * v;
   }
-  return sum / (2 * coords);
+  return sum / (2 * r->s->coords);
 }
 
 /* Mean square of an estimate before a projection, divided by h^2; stores its errors in r->q_at and r->v_at. */
@@ -343,7 +551,7 @@ static double adapt_whole (pw_run *r, const pw_rk_row *e) {
   pw_method_data *d = r->data;
   adapt_estimate (e, d->stage_v, r->s->coords, r->q_at);
   adapt_estimate (e, d->stage_a, r->s->coords, r->v_at);
-  return adapt_mean_square (r, r->q_at, r->v_at);
+  return adapt_mean_square (r);
 }
 
 /* Mean square of what a projection leaves of the errors in r->q_at and r->v_at, plus a small part of that before the
@@ -353,7 +561,7 @@ static double adapt_remaining (pw_run *r, double whole, int projected) {
   if (!projected && !d->uses_nullspace) return whole;
   if (projected || d->nullspace_projects) pw_project_error (r, r->saddle, r->q_at, r->s->holonomic);
   pw_project_error (r, r->saddle, r->v_at, r->s->rows);
-  return adapt_mean_square (r, r->q_at, r->v_at) + sqrt (r->settings.rtol) * whole;
+  return adapt_mean_square (r) + sqrt (r->settings.rtol) * whole;
 }
 
 /* The two errors of which the larger one counts (see the top of this file), from the squares of e3, e5, e6. */
@@ -429,7 +637,7 @@ static int adapt_step (pw_run *r, double h, double t1, int project, double *adde
   pw_method_data *d = r->data;
   double before = pw_before_breakpoint (r, t1);
   r->near_singular = 0;
-  int status = pw_rk_step (r, h, t1, project, added_energy);
+  int status = rk_step (r, h, t1, project, added_energy);
   if (status == PW_OK && before < t1) status = pw_run_accelerate (r, before, d->q, d->v, d->a, d->lambda);
   *err = status == PW_OK ? h * adapt_state (r, project) : INFINITY;
   if (r->entries > 0 && *err <= 1) *err = fmax (*err, h * adapt_ledger (r, h)); /* else it is rejected anyway */
@@ -445,24 +653,24 @@ static void adapt_accept (pw_run *r, double h, double t1, double added_energy, d
                           int shortened) {
   pw_method_data *d = r->data;
   double next = h * fmin (most_growth, adapt_factor (d, err));
-  pw_rk_accept (r, h, t1, added_energy);
+  rk_accept (r, h, t1, added_energy);
   pw_bound_tolerances (r);
   d->h = shortened ? fmax (next, d->h) : next;
   if (!shortened || h > 0.5 * d->h) d->last_error = fmax (err, ADAPT_LEAST_ERROR);
   r->statistics.steps++;
 }
 
-int pw_rk_advance_adaptive (pw_run *r, double t_end, pw_error *error) {
+static int rk_advance_adaptive (pw_run *r, double t_end, pw_error *error) {
   pw_method_data *d = r->data;
   double stop = fmin (t_end, r->breakpoint), most_growth = ADAPT_GROWTH;
-  int status = PW_OK, project = pw_rk_projects_next (r);
+  int status = PW_OK, project = rk_projects_next (r);
   for (;;) {
     double t1 = r->t + d->h, added_energy = 0, err;
     int shortened = t1 > stop - 0.01 * d->h; /* or lengthened by up to 1 %, so that no tiny step remains */
     if (shortened) t1 = stop;
     double h = t1 - r->t;
     if (!shortened && !(h > pw_least_step (r))) {
-      if (status != PW_OK) return pw_rk_fail (r, status, r->t, h, 0, error);
+      if (status != PW_OK) return rk_fail (r, status, r->t, h, 0, error);
       return pw_fail (error, PW_METHOD, "t = %.6g s: the tolerances require a step below %.3g s", r->t, h);
     }
     if (most_growth < ADAPT_GROWTH && (status = pw_run_check_limits (r, error)) != PW_OK) return status;
@@ -478,8 +686,7 @@ int pw_rk_advance_adaptive (pw_run *r, double t_end, pw_error *error) {
   }
 }
 
-/* Explicit Runge-Kutta methods: options, opening and closing, choice between fixed steps (rk.c) and step-size
- * control (rk.c). */
+/* ---- Options, opening and closing ---- */
 
 static const char *const rk_steps[] = { "adaptive", "fixed", NULL };
 static const char *const rk_positions[] = { "projected", "drift", NULL };
@@ -562,13 +769,13 @@ int pw_rk_open (pw_run *r, const pw_tableau *tableau, pw_error *error) {
   d->every = (int)pw_run_option (r, "every");
   if (rk_allocate (d, r) != PW_OK) return pw_fail_memory (r->s, error);
   int status = d->projects || d->nullspace_projects ? pw_projector_open_by_options (&d->projector, r, error) : PW_OK;
-  if (status == PW_OK && d->uses_nullspace) status = pw_nullspace_open (&d->nullspace, r, error);
+  if (status == PW_OK && d->uses_nullspace) status = nullspace_open (&d->nullspace, r, error);
   return status == PW_OK ? pw_rk_restart (r, error) : status;
 }
 
 void pw_rk_close (pw_run *r) {
   pw_projector_close (&r->data->projector);
-  pw_nullspace_close (&r->data->nullspace);
+  nullspace_close (&r->data->nullspace);
   free (r->data->memory);
   free (r->data);
 }
@@ -578,7 +785,7 @@ int pw_rk_restart (pw_run *r, pw_error *error) {
   (void)error;
   d->counter = (pw_step_counter){ .base = r->t };
   d->off_grid = 0;
-  if (!r->fixed_steps) pw_rk_reset_step_size (r);
+  if (!r->fixed_steps) rk_reset_step_size (r);
   pw_store_start (&d->last, r);
   return PW_OK;
 }
@@ -592,12 +799,12 @@ void pw_rk_serialise (pw_run *r, pw_archive *a) {
 }
 
 int pw_rk_advance (pw_run *r, double t_end, pw_error *error) {
-  return r->fixed_steps ? pw_rk_advance_fixed (r, t_end, error) : pw_rk_advance_adaptive (r, t_end, error);
+  return r->fixed_steps ? rk_advance_fixed (r, t_end, error) : rk_advance_adaptive (r, t_end, error);
 }
 
-/* Several steps of fixed size in one call of specialised code.
+/* ---- Several steps of fixed size in one call of specialised code ----
  *
- * Results are bit-identical to those of single steps.  What a run does less often than every step (run.c, run.c)
+ * Results are bit-identical to those of single steps.  What a run does less often than every step (run.c)
  * is done after the last of them, so there are never more than PW_CHECK_INTERVAL. */
 
 /* 1 if the specialised function `steps` does everything that a step of this run needs.  The ledger records the first
@@ -711,8 +918,6 @@ int pw_run_advance_towards (pw_run *r, double t, double t_end, pw_error *error) 
   return status == PW_OK && x.done == 0 ? pw_run_advance (r, t_end, error) : status;
 }
 
-/* ---- Several runs ---- */
-
 /* Runs whose next steps can be taken together: those with the step size, method and stabilisation of the first. */
 typedef struct {
   pw_run *const *run;
@@ -729,17 +934,6 @@ static void several_add (several_lanes *x, int i, double t_end) {
   if (several_plan (x->run[i], t_end, t_end, &x->steps[x->used]) > 0) x->index[x->used++] = i;
 }
 
-/* Takes the steps of all lanes; empty lanes repeat those of the first lane. */
-static void several_take (several_lanes *x, const pw_specialised_lanes *code, void *memory) {
-  pw_scene_steps *steps[PW_LANES_MOST];
-  pw_scene *scene[PW_LANES_MOST];
-  for (int k = 0; k < code->lanes; k++) {
-    if (k >= x->used) x->steps[k] = x->steps[0], x->index[k] = x->index[0];
-    steps[k] = &x->steps[k], scene[k] = x->run[x->index[k]]->scene;
-  }
-  code->steps (scene, steps, memory);
-}
-
 void pw_runs_advance (pw_run *const *runs, int count, double t_end, const pw_specialised_lanes *code, void *memory,
                       int *status, pw_error *error) {
   several_lanes x = { .run = runs };
@@ -753,7 +947,13 @@ void pw_runs_advance (pw_run *const *runs, int count, double t_end, const pw_spe
       several_add (&x, i, t_end);
   }
   if (x.used > 0 && 2 * x.used > code->lanes) { /* with half of them empty, one run after the other is faster */
-    several_take (&x, code, memory);
+    pw_scene_steps *steps[PW_LANES_MOST];
+    pw_scene *scene[PW_LANES_MOST];
+    for (int k = 0; k < code->lanes; k++) { /* empty lanes repeat the steps of the first one */
+      if (k >= x.used) x.steps[k] = x.steps[0], x.index[k] = x.index[0];
+      steps[k] = &x.steps[k], scene[k] = runs[x.index[k]]->scene;
+    }
+    code->steps (scene, steps, memory);
     for (int k = 0; k < x.used; k++) {
       int i = x.index[k];
       status[i] = several_finish (runs[i], &x.steps[k], error ? &error[i] : NULL);

@@ -57,12 +57,6 @@ static int ida_matrix (realtype t, realtype c, N_Vector vy, N_Vector vyp, N_Vect
   return 0;
 }
 
-static int ida_open_matrix (pw_method_data *d) {
-  const double *y = N_VGetArrayPointer (d->sun.y), *yp = N_VGetArrayPointer (d->yp);
-  if (pw_dae_lay_out (&d->dae, y + d->dae.n, yp + d->dae.n, ida_lambda (d, y, yp)) != PW_OK) return PW_RESOURCE;
-  return pw_sun_open_solver (&d->sun, d->dae.size, &d->dae.tangent.scatter, d, NULL);
-}
-
 /* ---- Error weights ---- */
 
 /* The coefficient c in the matrix dF/dy + c dF/dy' of the current step, 1 / h before the first; at least 1 / T. */
@@ -176,13 +170,13 @@ static int ida_work (pw_method_data *d, int factorised) {
   }
   pw_ledger_rates (r, lambda, r->rate);
   IDAGetLastOrder (d->ida, &order);
-  return pw_quadrature_step (&d->sun.quadrature, r, order);
+  return pw_sun_integrate_ledger (&d->sun, order);
 }
 
 /* ---- Opening ---- */
 
 static int ida_open_vectors (pw_method_data *d, pw_run *r) {
-  if (pw_sun_open (&d->sun, r, d->dae.size) != PW_OK) return PW_RESOURCE;
+  if (pw_sun_open (&d->sun, r, d->dae.size, ida_power) != PW_OK) return PW_RESOURCE;
   d->yp = pw_sun_vector (d->dae.size, d->sun.context);
   d->id = pw_sun_vector (d->dae.size, d->sun.context);
   d->unit = calloc ((size_t)d->dae.rows + 1, sizeof *d->unit);
@@ -212,8 +206,11 @@ static int ida_open_integrator (pw_method_data *d) {
 static int ida_open (pw_run *r, pw_error *error) {
   pw_method_data *d = r->data = calloc (1, sizeof *d);
   if (d == NULL) return pw_sun_no_memory (r, error);
-  if (pw_dae_open (&d->dae, r) != PW_OK || ida_open_vectors (d, r) != PW_OK || ida_open_matrix (d) != PW_OK ||
-      ida_open_integrator (d) != PW_OK || pw_quadrature_open (&d->sun.quadrature, r, ida_power) != PW_OK)
+  if (pw_dae_open (&d->dae, r) != PW_OK || ida_open_vectors (d, r) != PW_OK) return pw_sun_no_memory (r, error);
+  const double *y = N_VGetArrayPointer (d->sun.y), *yp = N_VGetArrayPointer (d->yp);
+  if (pw_dae_lay_out (&d->dae, y + d->dae.n, yp + d->dae.n, ida_lambda (d, y, yp)) != PW_OK ||
+      pw_sun_open_solver (&d->sun, d->dae.size, &d->dae.tangent.scatter, d, NULL) != PW_OK ||
+      ida_open_integrator (d) != PW_OK)
     return pw_sun_no_memory (r, error);
   if (r->statistics.steps == 0)
     d->sun.before = (pw_statistics){ 0 }; /* without evaluations of the initial conditions */
@@ -257,7 +254,6 @@ static int ida_fail (pw_method_data *d, int flag, pw_error *error) {
 
 static int ida_restart (pw_run *r, pw_error *error) {
   pw_method_data *d = r->data;
-  pw_quadrature_restart (&d->sun.quadrature, r);
   pw_sun_restart (&d->sun);
   ida_fill_vectors (d);
   int flag = IDASetInitStep (d->ida, pw_first_step (r));
@@ -295,7 +291,7 @@ static int ida_advance (pw_run *r, double t_end, pw_error *error) {
 
 static int ida_at (pw_run *r, double t, pw_error *error) {
   pw_method_data *d = r->data;
-  if (t <= r->t && r->entries > 0) pw_quadrature_at (&d->sun.quadrature, r, t);
+  if (t <= r->t && r->entries > 0) pw_sun_ledger_at (&d->sun, t);
   int flag = ida_interpolate (d, t);
   if (flag == IDA_BAD_T) return pw_fail_outside (r, NAN, t, error);
   if (flag == IDA_RES_FAIL) return pw_fail_signal (t, error);

@@ -6,8 +6,8 @@
  *
  * adams: Adams-Moulton formulas of orders 1 to 12, for non-stiff scenes.  The fixed-point iteration needs no matrix
  * and converges only if the step resolves every motion.  bdf: backward differentiation formulas of orders 1 to 5, for
- * stiff scenes (Curtiss & Hirschfelder 1952; Gear 1971).  It uses Newton's iteration with an exact matrix
- * (multistep.c); steps and their errors may be projected (Eich 1993).  (Hindmarsh et al. 2005, SUNDIALS: Suite of
+ * stiff scenes (Curtiss & Hirschfelder 1952; Gear 1971).  It uses Newton's iteration with an exact matrix;
+ * steps and their errors may be projected (Eich 1993).  (Hindmarsh et al. 2005, SUNDIALS: Suite of
  * nonlinear and differential/algebraic equation solvers.) */
 #include <cvodes/cvodes.h>
 #include <math.h>
@@ -19,15 +19,13 @@
 #include "dense_output.h"
 #include "util.h"
 
-/* The data of adams and bdf (multistep.c), and Newton's iteration of bdf (multistep.c). */
-
-/* Named as at the top of multistep.c. */
+/* Newton's iteration of bdf; see below. */
 typedef struct {
   pw_tangent tangent;     /* the matrix in tangent.scatter is T */
   double gamma;           /* that of the matrix last set up */
   pw_scatter_map scatter; /* from the entries of T, in order, to the matrix */
   double *right;          /* coords and rows: right-hand side, then da, dlambda */
-} pw_bdf_newton;
+} bdf_newton;
 
 struct pw_method_data {
   pw_sun sun; /* first */
@@ -35,26 +33,139 @@ struct pw_method_data {
   int n;        /* coordinates */
   int projects; /* 1: coordinate projection, by `projector` */
   pw_projector projector;
-  pw_bdf_newton newton; /* only of bdf */
-  double *q, *v;        /* coords + 3: scratch */
-  double *a, *lambda;   /* coords + 3, rows: of the last evaluation */
-  double *error;        /* 2 coords: scratch */
-  int evaluated;        /* 1: r->a, r->lambda are those of the state reached, not of the last iterate */
+  bdf_newton newton;  /* only of bdf */
+  double *q, *v;      /* coords + 3: scratch */
+  double *a, *lambda; /* coords + 3, rows: of the last evaluation */
+  double *error;      /* 2 coords: scratch */
+  int evaluated;      /* 1: r->a, r->lambda are those of the state reached, not of the last iterate */
   char *memory;
 };
-
-/* Stores accelerations and multipliers at y in d->a and d->lambda.  Returns what CVODES expects: 0; > 0: a smaller step
- * may succeed; < 0: a signal failed. */
-int pw_multistep_accelerate (pw_method_data *d, double t, const double *y);
-
-/* Opens the Newton matrix and attaches it to CVODES.  PW_OK or PW_RESOURCE. */
-int pw_bdf_open_newton (pw_method_data *d);
-void pw_bdf_close_newton (pw_method_data *d);
 
 /* The error that may remain after the iteration, over the tolerance of the error test, if only the projected error is
  * tested or forces saturate: less than CVODES' default of 0.1, since with stiff damping that error changes the
  * energy. */
 #define MULTISTEP_CONVERGENCE 0.01
+
+/* Stores accelerations and multipliers at y in d->a and d->lambda.  Returns what CVODES expects: 0; > 0: a smaller step
+ * may succeed; < 0: a signal failed. */
+static int multistep_accelerate (pw_method_data *d, double t, const double *y) {
+  pw_run *r = d->sun.run;
+  int status = pw_run_accelerate (r, pw_before_breakpoint (r, t), y, y + d->n, d->a, d->lambda);
+  return status == PW_OK ? 0 : status > 0 ? 1 : -1;
+}
+
+/* ---- Newton's iteration for BDF: (I - gamma df/dy) x = b without forming the dense df/dy ----
+ *
+ * y = (q, v), y' = (v, a), and gamma is CVODES' coefficient of the step.  With T = (T_q, T_v, T_a, T_lambda), the
+ * sparse derivatives of the equations of motion (tangent.c), a change of the state changes a and lambda so that T (dq,
+ * dv, da, dlambda) = 0.  With
+ *
+ *   x_q = b_q + gamma x_v,   x_v = b_v + gamma da
+ *
+ * only da and dlambda are unknown, with a matrix like that of the accelerations:
+ *
+ *   (T_a + gamma T_v + gamma^2 T_q) da + T_lambda dlambda = - T_q (b_q + gamma b_v) - T_v b_v
+ *
+ * T is evaluated when CVODES asks for a new Jacobian; gamma changes more often. */
+
+/* Adds all entries of T, in the columns q, v, a, lambda. */
+static void newton_fill_T (pw_method_data *d) {
+  int n = d->n;
+  const pw_tangent_layout to = {
+    .momentum = 0, .constraint = n, .q = 0, .v = n, .a = 2 * n, .lambda = 3 * n, .a_factor = 1, .lambda_factor = 1
+  };
+  pw_tangent_add_momentum (&d->newton.tangent, &to, d->lambda);
+  pw_tangent_add_accelerations (&d->newton.tangent, &to, d->v, d->a);
+}
+
+/* Adds all entries of the matrix (T_a + gamma T_v + gamma^2 T_q, T_lambda) from those of T. */
+static void newton_fill_matrix (bdf_newton *w, int n) {
+  const pw_scatter_map *T = &w->tangent.scatter;
+  const double power[] = { w->gamma * w->gamma, w->gamma, 1 };
+  for (int c = 0; c < 3 * n + w->tangent.rows; c++) {
+    int part = c < 2 * n ? c / n : 2, column = c < 2 * n ? c % n : c - 2 * n; /* parts: q; v; a and lambda */
+    for (int64_t i = T->colptr[c]; i < T->colptr[c + 1]; i++)
+      pw_scatter_add (&w->scatter, (int)T->rowind[i], column, w->scatter.recording ? 0 : power[part] * T->value[i]);
+  }
+}
+
+/* Called by CVODES: evaluates T, unless CVODES proposes to `reuse` the last one and that is still valid, then forms the
+ * matrix with gamma.  *evaluated: 1 if T was evaluated. */
+static int newton_set_up (realtype t, N_Vector y, N_Vector derivative, SUNMatrix matrix, booleantype reuse,
+                          booleantype *evaluated, realtype gamma, void *data, N_Vector tmp1, N_Vector tmp2,
+                          N_Vector tmp3) {
+  pw_method_data *d = data;
+  bdf_newton *w = &d->newton;
+  (void)derivative, (void)matrix, (void)tmp1, (void)tmp2, (void)tmp3;
+  *evaluated = !reuse || d->sun.run->matrix_outdated;
+  if (*evaluated) {
+    int status = multistep_accelerate (d, t, N_VGetArrayPointer (y));
+    if (status != 0) return status;
+    memcpy (d->v, N_VGetArrayPointer (y) + d->n, (size_t)d->n * sizeof *d->v);
+    pw_scatter_begin_fill (&w->tangent.scatter, w->tangent.scatter.value);
+    newton_fill_T (d);
+    pw_matrix_evaluated (d->sun.run, N_VGetArrayPointer (y), d->v);
+    d->sun.run->statistics.jacobians++;
+  }
+  w->gamma = gamma;
+  pw_scatter_begin_fill (&w->scatter, w->scatter.value);
+  newton_fill_matrix (w, d->n);
+  d->sun.run->statistics.factorisations++; /* CVODES factorises next */
+  return 0;
+}
+
+/* right = - T_q (b_q + gamma b_v) - T_v b_v */
+static void newton_right_side (const pw_method_data *d, const double *b, double *right) {
+  const bdf_newton *w = &d->newton;
+  const pw_scatter_map *T = &w->tangent.scatter;
+  int n = d->n;
+  memset (right, 0, (size_t)(n + w->tangent.rows) * sizeof *right);
+  for (int c = 0; c < 2 * n; c++) {
+    double factor = c < n ? b[c] + w->gamma * b[n + c] : b[c];
+    for (int64_t i = T->colptr[c]; i < T->colptr[c + 1]; i++) right[T->rowind[i]] -= T->value[i] * factor;
+  }
+}
+
+static int newton_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector vx, N_Vector vb, realtype tolerance) {
+  pw_method_data *d = solver->content;
+  bdf_newton *w = &d->newton;
+  const double *b = N_VGetArrayPointer (vb), *da = w->right;
+  double *x = N_VGetArrayPointer (vx);
+  int n = d->n;
+  (void)matrix, (void)tolerance;
+  if (d->sun.run->matrix_outdated) return SUNLS_PACKAGE_FAIL_REC; /* CVODES then requests a new matrix */
+  newton_right_side (d, b, w->right);
+  if (pw_sparse_solve (&d->sun.sparse, w->right) != PW_OK) return SUNLS_PACKAGE_FAIL_UNREC;
+  for (int j = 0; j < n; j++) {
+    x[n + j] = b[n + j] + w->gamma * da[j];
+    x[j] = b[j] + w->gamma * x[n + j];
+  }
+  return SUNLS_SUCCESS;
+}
+
+/* Records the patterns of T and of the matrix; there are no values yet. */
+static int newton_lay_out (pw_method_data *d) {
+  bdf_newton *w = &d->newton;
+  pw_tangent *x = &w->tangent;
+  int columns = 3 * d->n + x->rows, size = d->n + x->rows;
+  pw_scatter_begin_record (&x->scatter);
+  newton_fill_T (d);
+  if (pw_scatter_lay_out (&x->scatter, columns) != PW_OK) return PW_RESOURCE;
+  pw_scatter_begin_record (&w->scatter);
+  newton_fill_matrix (w, d->n);
+  return pw_scatter_lay_out (&w->scatter, size);
+}
+
+/* Opens the Newton matrix and attaches it to CVODES. */
+static int newton_open (pw_method_data *d) {
+  bdf_newton *w = &d->newton;
+  pw_sun *x = &d->sun;
+  if (pw_tangent_open (&w->tangent, x->run) != PW_OK || newton_lay_out (d) != PW_OK ||
+      pw_sun_open_solver (x, d->n + w->tangent.rows, &w->scatter, d, newton_solve) != PW_OK)
+    return PW_RESOURCE;
+  int failed = CVodeSetLinearSolver (d->cvode, x->solver, x->matrix) || CVodeSetLinSysFn (d->cvode, newton_set_up);
+  return failed ? PW_RESOURCE : PW_OK;
+}
 
 /* ---- Functions that CVODES calls ---- */
 
@@ -64,7 +175,7 @@ static int multistep_derivative (realtype t, N_Vector vy, N_Vector derivative, v
   double *out = N_VGetArrayPointer (derivative);
   size_t bytes = (size_t)d->n * sizeof *out;
   if (pw_run_stop_requested (d->sun.run)) return -1;
-  int flag = pw_multistep_accelerate (d, t, y);
+  int flag = multistep_accelerate (d, t, y);
   memcpy (out, y + d->n, bytes);
   memcpy (out + d->n, d->a, bytes);
   return flag;
@@ -154,21 +265,10 @@ static int multistep_power (pw_run *r, double t, double *rate) {
 
 /* ---- Opening ---- */
 
-static int multistep_open_arrays (pw_method_data *d, pw_run *r) {
-  size_t n = (size_t)d->n + 3, rows = (size_t)r->s->rows;
-  const pw_array array[] = { { &d->q, n },         { &d->v, n },         { &d->a, n },
-                             { &d->error, 2 * n }, { &d->lambda, rows }, { &d->newton.right, n + rows } };
-  if (pw_sun_open (&d->sun, r, 2 * d->n) != PW_OK) return PW_RESOURCE;
-  d->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
-  if (d->memory == NULL) return PW_RESOURCE;
-  d->evaluated = 1;
-  return PW_OK;
-}
-
 static int multistep_open_iteration (pw_method_data *d, int formula) {
   pw_sun *x = &d->sun;
   int newton = formula == CV_BDF;
-  if (newton && pw_bdf_open_newton (d) != PW_OK) return PW_RESOURCE;
+  if (newton && newton_open (d) != PW_OK) return PW_RESOURCE;
   if (newton && !x->run->s->saturates) return PW_OK;
   x->iteration = newton ? SUNNonlinSol_Newton (x->y, x->context) : SUNNonlinSol_FixedPoint (x->y, 0, x->context);
   if (x->iteration == NULL || CVodeSetNonlinearSolver (d->cvode, x->iteration)) return PW_RESOURCE;
@@ -197,16 +297,22 @@ static int multistep_open (pw_run *r, int formula, pw_error *error) {
   d->projects = pw_stabilised_by (r, PW_PROJECTION);
   int status = d->projects ? pw_projector_open_by_options (&d->projector, r, error) : PW_OK;
   if (status != PW_OK) return status;
-  if (multistep_open_arrays (d, r) == PW_OK && multistep_open_solver (d, formula) == PW_OK &&
-      pw_quadrature_open (&d->sun.quadrature, r, multistep_power) == PW_OK)
-    return PW_OK;
-  return pw_sun_no_memory (r, error);
+  size_t n = (size_t)d->n + 3, rows = (size_t)r->s->rows;
+  const pw_array array[] = { { &d->q, n },         { &d->v, n },         { &d->a, n },
+                             { &d->error, 2 * n }, { &d->lambda, rows }, { &d->newton.right, n + rows } };
+  d->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
+  d->evaluated = 1;
+  if (d->memory == NULL || pw_sun_open (&d->sun, r, 2 * d->n, multistep_power) != PW_OK ||
+      multistep_open_solver (d, formula) != PW_OK)
+    return pw_sun_no_memory (r, error);
+  return PW_OK;
 }
 
 static void multistep_close (pw_run *r) {
   pw_method_data *d = r->data;
   if (d->cvode) CVodeFree (&d->cvode);
-  pw_bdf_close_newton (d);
+  pw_scatter_close (&d->newton.scatter);
+  pw_tangent_close (&d->newton.tangent);
   pw_sun_close (&d->sun);
   if (d->projects) pw_projector_close (&d->projector);
   free (d->memory);
@@ -253,14 +359,14 @@ static int multistep_evaluate (pw_method_data *d) {
 }
 
 /* Work and losses up to the state reached.  Multipliers of the last Newton iterate, which may be the prediction, are
- * not accurate enough.  Returns as pw_quadrature_step. */
+ * not accurate enough.  Returns as pw_sun_integrate_ledger. */
 static int multistep_work (pw_method_data *d) {
   pw_run *r = d->sun.run;
   int order = 1;
   if (d->sun.solver && pw_ledger_uses_multipliers (r)) (void)multistep_evaluate (d);
   pw_ledger_rates (r, r->lambda, r->rate);
   CVodeGetLastOrder (d->cvode, &order);
-  return pw_quadrature_step (&d->sun.quadrature, r, order);
+  return pw_sun_integrate_ledger (&d->sun, order);
 }
 
 /* Makes y the state reached at t and updates the ledger.  Accelerations and multipliers remain those of the last
@@ -299,7 +405,7 @@ static int multistep_at (pw_run *r, double t, pw_error *error) {
     status = multistep_evaluate (d);
     if (status == PW_OK) pw_sample_reached (r);
   } else {
-    if (t < r->t && r->entries > 0) pw_quadrature_at (&d->sun.quadrature, r, t);
+    if (t < r->t && r->entries > 0) pw_sun_ledger_at (&d->sun, t);
     int flag = multistep_interpolate (d, t);
     if (flag == CV_BAD_T) return pw_fail_outside (r, NAN, t, error);
     if (flag != CV_SUCCESS) return multistep_fail (d, flag, error);
@@ -315,11 +421,8 @@ static int multistep_restart (pw_run *r, pw_error *error) {
   d->evaluated = 1;
   int flag = CVodeReInit (d->cvode, r->t, d->sun.y);
   if (flag == CV_SUCCESS) flag = CVodeSetInitStep (d->cvode, pw_first_step (r));
-  pw_quadrature_restart (&d->sun.quadrature, r);
   return flag == CV_SUCCESS ? PW_OK : pw_sun_fail_restart (&d->sun, flag, error);
 }
-
-/* ---- Methods ---- */
 
 static int adams_open (pw_run *r, pw_error *error) {
   return multistep_open (r, CV_ADAMS, error);
@@ -328,14 +431,6 @@ static int adams_open (pw_run *r, pw_error *error) {
 static int bdf_open (pw_run *r, pw_error *error) {
   return multistep_open (r, CV_BDF, error);
 }
-
-static const pw_stabilisation bdf_stabilisations[] = {
-  PW_ACCELERATION_STABILISATIONS,
-  { "projection", "projection onto the constraints after each step (Lubich 1991, Eich 1993)", PW_PROJECTION },
-  { .name = NULL },
-};
-
-static const pw_stabilisation adams_stabilisations[] = { PW_ACCELERATION_STABILISATIONS, { .name = NULL } };
 
 /* Measured on the EzyRoller at rtol 1e-6: with a restart after each projection there are 100 times as many steps.
  * Projections only within evaluations do not stop the drift of y, and made errors 7 times larger on a pendulum. */
@@ -346,8 +441,11 @@ static const pw_stabilisation adams_refused[] = {
   { .name = NULL },
 };
 
-static const pw_option adams_options[] = { PW_BAUMGARTE_OPTIONS, { .name = NULL } };
-static const pw_option bdf_options[] = { PW_BAUMGARTE_OPTIONS, PW_PROJECTION_OPTIONS, { .name = NULL } };
+static const pw_stabilisation bdf_stabilisations[] = {
+  PW_ACCELERATION_STABILISATIONS,
+  { "projection", "projection onto the constraints after each step (Lubich 1991, Eich 1993)", PW_PROJECTION },
+  { .name = NULL },
+};
 
 #define MULTISTEP_FUNCTIONS                                                                      \
   .adaptive = 1, .advance = multistep_advance, .at = multistep_at, .restart = multistep_restart, \
@@ -356,8 +454,8 @@ static const pw_option bdf_options[] = { PW_BAUMGARTE_OPTIONS, PW_PROJECTION_OPT
 const pw_method pw_method_adams = {
   .name = "adams",
   .about = "variable-order Adams on the accelerations, where nothing is stiff, SUNDIALS CVODES (Hindmarsh et al. 2005)",
-  .stabilisations = adams_stabilisations,
-  .options = adams_options,
+  .stabilisations = (const pw_stabilisation[]){ PW_ACCELERATION_STABILISATIONS, { .name = NULL } },
+  .options = (const pw_option[]){ PW_BAUMGARTE_OPTIONS, { .name = NULL } },
   .refused = adams_refused,
   .open = adams_open,
   MULTISTEP_FUNCTIONS,
@@ -368,134 +466,7 @@ const pw_method pw_method_bdf = {
   .about =
       "variable-order BDF on the accelerations, for stiff scenes, SUNDIALS CVODES with KLU (Hindmarsh et al. 2005)",
   .stabilisations = bdf_stabilisations,
-  .options = bdf_options,
+  .options = (const pw_option[]){ PW_BAUMGARTE_OPTIONS, PW_PROJECTION_OPTIONS, { .name = NULL } },
   .open = bdf_open,
   MULTISTEP_FUNCTIONS,
 };
-
-/* Newton's iteration for BDF: (I - gamma df/dy) x = b without forming the dense df/dy.
- *
- * y = (q, v), y' = (v, a), and gamma is CVODES' coefficient of the step.  With T = (T_q, T_v, T_a, T_lambda), the
- * sparse derivatives of the equations of motion (tangent.c), a change of the state changes a and lambda so that T (dq,
- * dv, da, dlambda) = 0.  With
- *
- *   x_q = b_q + gamma x_v,   x_v = b_v + gamma da
- *
- * only da and dlambda are unknown, with a matrix like that of the accelerations:
- *
- *   (T_a + gamma T_v + gamma^2 T_q) da + T_lambda dlambda = - T_q (b_q + gamma b_v) - T_v b_v
- *
- * T is evaluated when CVODES asks for a new Jacobian; gamma changes more often. */
-
-int pw_multistep_accelerate (pw_method_data *d, double t, const double *y) {
-  pw_run *r = d->sun.run;
-  int status = pw_run_accelerate (r, pw_before_breakpoint (r, t), y, y + d->n, d->a, d->lambda);
-  return status == PW_OK ? 0 : status > 0 ? 1 : -1;
-}
-
-/* Adds all entries of T, in the columns q, v, a, lambda. */
-static void newton_fill_T (pw_method_data *d) {
-  int n = d->n;
-  const pw_tangent_layout to = {
-    .momentum = 0, .constraint = n, .q = 0, .v = n, .a = 2 * n, .lambda = 3 * n, .a_factor = 1, .lambda_factor = 1
-  };
-  pw_tangent_add_momentum (&d->newton.tangent, &to, d->lambda);
-  pw_tangent_add_accelerations (&d->newton.tangent, &to, d->v, d->a);
-}
-
-/* Adds all entries of the matrix (T_a + gamma T_v + gamma^2 T_q, T_lambda) from those of T. */
-static void newton_fill_matrix (pw_bdf_newton *w, int n) {
-  const pw_scatter_map *T = &w->tangent.scatter;
-  const double power[] = { w->gamma * w->gamma, w->gamma, 1 };
-  for (int c = 0; c < 3 * n + w->tangent.rows; c++) {
-    int part = c < 2 * n ? c / n : 2, column = c < 2 * n ? c % n : c - 2 * n; /* parts: q; v; a and lambda */
-    for (int64_t i = T->colptr[c]; i < T->colptr[c + 1]; i++)
-      pw_scatter_add (&w->scatter, (int)T->rowind[i], column, w->scatter.recording ? 0 : power[part] * T->value[i]);
-  }
-}
-
-/* Called by CVODES: evaluates T, unless CVODES proposes to `reuse` the last one and that is still valid, then forms the
- * matrix with gamma.  *evaluated: 1 if T was evaluated. */
-static int newton_set_up (realtype t, N_Vector y, N_Vector derivative, SUNMatrix matrix, booleantype reuse,
-                          booleantype *evaluated, realtype gamma, void *data, N_Vector tmp1, N_Vector tmp2,
-                          N_Vector tmp3) {
-  pw_method_data *d = data;
-  pw_bdf_newton *w = &d->newton;
-  (void)derivative, (void)matrix, (void)tmp1, (void)tmp2, (void)tmp3;
-  *evaluated = !reuse || d->sun.run->matrix_outdated;
-  if (*evaluated) {
-    int status = pw_multistep_accelerate (d, t, N_VGetArrayPointer (y));
-    if (status != 0) return status;
-    memcpy (d->v, N_VGetArrayPointer (y) + d->n, (size_t)d->n * sizeof *d->v);
-    pw_scatter_begin_fill (&w->tangent.scatter, w->tangent.scatter.value);
-    newton_fill_T (d);
-    pw_matrix_evaluated (d->sun.run, N_VGetArrayPointer (y), d->v);
-    d->sun.run->statistics.jacobians++;
-  }
-  w->gamma = gamma;
-  pw_scatter_begin_fill (&w->scatter, w->scatter.value);
-  newton_fill_matrix (w, d->n);
-  d->sun.run->statistics.factorisations++; /* CVODES factorises next */
-  return 0;
-}
-
-/* ---- Solving for x ---- */
-
-/* right = - T_q (b_q + gamma b_v) - T_v b_v */
-static void newton_right_side (const pw_method_data *d, const double *b, double *right) {
-  const pw_bdf_newton *w = &d->newton;
-  const pw_scatter_map *T = &w->tangent.scatter;
-  int n = d->n;
-  memset (right, 0, (size_t)(n + w->tangent.rows) * sizeof *right);
-  for (int c = 0; c < 2 * n; c++) {
-    double factor = c < n ? b[c] + w->gamma * b[n + c] : b[c];
-    for (int64_t i = T->colptr[c]; i < T->colptr[c + 1]; i++) right[T->rowind[i]] -= T->value[i] * factor;
-  }
-}
-
-static int newton_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector vx, N_Vector vb, realtype tolerance) {
-  pw_method_data *d = solver->content;
-  pw_bdf_newton *w = &d->newton;
-  const double *b = N_VGetArrayPointer (vb), *da = w->right;
-  double *x = N_VGetArrayPointer (vx);
-  int n = d->n;
-  (void)matrix, (void)tolerance;
-  if (d->sun.run->matrix_outdated) return SUNLS_PACKAGE_FAIL_REC; /* CVODES then requests a new matrix */
-  newton_right_side (d, b, w->right);
-  if (pw_sparse_solve (&d->sun.sparse, w->right) != PW_OK) return SUNLS_PACKAGE_FAIL_UNREC;
-  for (int j = 0; j < n; j++) {
-    x[n + j] = b[n + j] + w->gamma * da[j];
-    x[j] = b[j] + w->gamma * x[n + j];
-  }
-  return SUNLS_SUCCESS;
-}
-
-/* ---- Opening ---- */
-
-/* Records the patterns of T and of the matrix; there are no values yet. */
-static int newton_lay_out (pw_method_data *d) {
-  pw_bdf_newton *w = &d->newton;
-  pw_tangent *x = &w->tangent;
-  int columns = 3 * d->n + x->rows, size = d->n + x->rows;
-  pw_scatter_begin_record (&x->scatter);
-  newton_fill_T (d);
-  if (pw_scatter_lay_out (&x->scatter, columns) != PW_OK) return PW_RESOURCE;
-  pw_scatter_begin_record (&w->scatter);
-  newton_fill_matrix (w, d->n);
-  return pw_scatter_lay_out (&w->scatter, size);
-}
-
-int pw_bdf_open_newton (pw_method_data *d) {
-  pw_bdf_newton *w = &d->newton;
-  pw_sun *x = &d->sun;
-  if (pw_tangent_open (&w->tangent, x->run) != PW_OK || newton_lay_out (d) != PW_OK ||
-      pw_sun_open_solver (x, d->n + w->tangent.rows, &w->scatter, d, newton_solve) != PW_OK)
-    return PW_RESOURCE;
-  int failed = CVodeSetLinearSolver (d->cvode, x->solver, x->matrix) || CVodeSetLinSysFn (d->cvode, newton_set_up);
-  return failed ? PW_RESOURCE : PW_OK;
-}
-
-void pw_bdf_close_newton (pw_method_data *d) {
-  pw_scatter_close (&d->newton.scatter);
-  pw_tangent_close (&d->newton.tangent);
-}

@@ -17,13 +17,106 @@ static_assert (CV_ERR_FAILURE == IDA_ERR_FAIL && CV_CONV_FAILURE == IDA_CONV_FAI
                    CV_LSETUP_FAIL == IDA_LSETUP_FAIL && CV_TOO_MUCH_ACC == IDA_TOO_MUCH_ACC,
                "CVODES and IDAS have the same flags");
 
+/* ---- Vectors ----
+ *
+ * Serial vectors with faster operations than those of SUNDIALS.  A step of high order adds dozens of
+ * vectors of a dozen entries, in libraries that distributions may build without optimisation.  These operations are
+ * plain loops, including the fused operations on several vectors.  They round like those of SUNDIALS, except that
+ * SUNDIALS computes a x + a y as a (x + y) and a x - a y as a (x - y). */
+
+static void vectors_linear_sum (realtype a, N_Vector vx, realtype b, N_Vector vy, N_Vector vz) {
+  const double *x = NV_DATA_S (vx), *y = NV_DATA_S (vy);
+  double *z = NV_DATA_S (vz);
+  for (sunindextype i = 0, n = NV_LENGTH_S (vz); i < n; i++) z[i] = a * x[i] + b * y[i];
+}
+
+static void vectors_scale (realtype c, N_Vector vx, N_Vector vz) {
+  const double *x = NV_DATA_S (vx);
+  double *z = NV_DATA_S (vz);
+  for (sunindextype i = 0, n = NV_LENGTH_S (vz); i < n; i++) z[i] = c * x[i];
+}
+
+/* z = sum_k c_k x_k */
+static int vectors_combine (int count, realtype *c, N_Vector *x, N_Vector z) {
+  vectors_scale (c[0], x[0], z);
+  for (int k = 1; k < count; k++) vectors_linear_sum (c[k], x[k], 1, z, z);
+  return 0;
+}
+
+/* z_k = a_k x + y_k */
+static int vectors_add_to (int count, realtype *a, N_Vector x, N_Vector *y, N_Vector *z) {
+  for (int k = 0; k < count; k++) vectors_linear_sum (a[k], x, 1, y[k], z[k]);
+  return 0;
+}
+
+static int vectors_scale_each (int count, realtype *c, N_Vector *x, N_Vector *z) {
+  for (int k = 0; k < count; k++) vectors_scale (c[k], x[k], z[k]);
+  return 0;
+}
+
+/* sqrt (sum (x_i w_i)^2 / n), with the n of all entries; unless id is NULL, the sum is over id_i > 0 only. */
+static double vectors_root_mean_square (N_Vector vx, N_Vector vw, const double *id) {
+  const sunindextype n = NV_LENGTH_S (vx);
+  const double *x = NV_DATA_S (vx), *w = NV_DATA_S (vw);
+  double sum = 0;
+  for (sunindextype i = 0; i < n; i++)
+    if (id == NULL || id[i] > 0) sum += x[i] * w[i] * (x[i] * w[i]);
+  return sqrt (sum / (double)n);
+}
+
+static realtype vectors_norm (N_Vector x, N_Vector w) {
+  return vectors_root_mean_square (x, w, NULL);
+}
+
+static realtype vectors_norm_masked (N_Vector x, N_Vector w, N_Vector id) {
+  return vectors_root_mean_square (x, w, NV_DATA_S (id));
+}
+
+N_Vector pw_sun_vector (sunindextype length, SUNContext context) {
+  N_Vector v = N_VNew_Serial (length, context);
+  if (v == NULL) return NULL;
+  v->ops->nvlinearsum = vectors_linear_sum;
+  v->ops->nvscale = vectors_scale;
+  v->ops->nvlinearcombination = vectors_combine;
+  v->ops->nvscaleaddmulti = vectors_add_to;
+  v->ops->nvscalevectorarray = vectors_scale_each;
+  v->ops->nvwrmsnorm = vectors_norm;
+  v->ops->nvwrmsnormmask = vectors_norm_masked;
+  return v;
+}
+
+/* ---- Opening ---- */
+
+static void quadrature_store_rates (pw_sun *x) {
+  x->t[0] = x->run->t;
+  memcpy (x->rate[0], x->run->rate, (size_t)x->run->entries * sizeof (double));
+}
+
+void pw_sun_restart (pw_sun *x) {
+  const pw_run *r = x->run;
+  double *y = N_VGetArrayPointer (x->y);
+  memcpy (y, r->q, (size_t)r->s->coords * sizeof *y);
+  memcpy (y + r->s->coords, r->v, (size_t)r->s->coords * sizeof *y);
+  x->t0 = r->t;
+  x->before = r->statistics;
+  x->points = 1;
+  x->energy = pw_energy (r, r->v);
+  quadrature_store_rates (x);
+}
+
 /* SUNDIALS 6.4 dereferences vectors and loggers whose allocation failed, so it is tested first whether there is enough
  * memory: for at most 60 vectors (13 of a Nordsieck array of order 12, a dozen more, as many for quadratures, and those
  * of a restart), each with a table of operations, and for the rest. */
-int pw_sun_open (pw_sun *x, pw_run *r, int unknowns) {
+int pw_sun_open (pw_sun *x, pw_run *r, int unknowns, pw_rates_at *rates) {
   enum { VECTORS = 60, TABLE = 1024, REST = 1 << 17 };
-  x->run = r;
-  if (pw_check_memory (VECTORS * (TABLE + (size_t)unknowns * sizeof (double)) + REST) != PW_OK ||
+  const size_t entries = (size_t)r->entries;
+  pw_array array[PW_SUN_POINTS + 4] = {
+    { &x->ledger0, entries }, { &x->integral, entries }, { &x->finer, entries }, { &x->node, entries }
+  };
+  for (int i = 0; i < PW_SUN_POINTS; i++) array[4 + i] = (pw_array){ &x->rate[i], entries };
+  x->run = r, x->rates = rates;
+  x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
+  if (x->memory == NULL || pw_check_memory (VECTORS * (TABLE + (size_t)unknowns * sizeof (double)) + REST) != PW_OK ||
       SUNContext_Create (NULL, &x->context) != 0)
     return PW_RESOURCE;
   x->y = pw_sun_vector (unknowns, x->context);
@@ -38,16 +131,7 @@ void pw_sun_close (pw_sun *x) {
   pw_sparse_close (&x->sparse);
   if (x->y) N_VDestroy (x->y);
   if (x->context) SUNContext_Free (&x->context);
-  pw_quadrature_close (&x->quadrature);
-}
-
-void pw_sun_restart (pw_sun *x) {
-  const pw_run *r = x->run;
-  double *y = N_VGetArrayPointer (x->y);
-  memcpy (y, r->q, (size_t)r->s->coords * sizeof *y);
-  memcpy (y + r->s->coords, r->v, (size_t)r->s->coords * sizeof *y);
-  x->t0 = r->t;
-  x->before = r->statistics;
+  free (x->memory);
 }
 
 /* ---- Linear solver ---- */
@@ -172,114 +256,21 @@ char *pw_library_versions (char *buffer, size_t size) {
   return buffer;
 }
 
-/* Serial vectors for SUNDIALS with faster operations, for adams, bdf and ida.  A step of high order adds dozens of
- * vectors of a dozen entries, in libraries that distributions may build without optimisation.  These operations are
- * plain loops, including the fused operations on several vectors.  They round like those of SUNDIALS, except that
- * SUNDIALS computes a x + a y as a (x + y) and a x - a y as a (x - y). */
-
-static void vectors_linear_sum (realtype a, N_Vector vx, realtype b, N_Vector vy, N_Vector vz) {
-  const double *x = NV_DATA_S (vx), *y = NV_DATA_S (vy);
-  double *z = NV_DATA_S (vz);
-  for (sunindextype i = 0, n = NV_LENGTH_S (vz); i < n; i++) z[i] = a * x[i] + b * y[i];
-}
-
-static void vectors_scale (realtype c, N_Vector vx, N_Vector vz) {
-  const double *x = NV_DATA_S (vx);
-  double *z = NV_DATA_S (vz);
-  for (sunindextype i = 0, n = NV_LENGTH_S (vz); i < n; i++) z[i] = c * x[i];
-}
-
-/* z = sum_k c_k x_k */
-static int vectors_combine (int count, realtype *c, N_Vector *x, N_Vector z) {
-  vectors_scale (c[0], x[0], z);
-  for (int k = 1; k < count; k++) vectors_linear_sum (c[k], x[k], 1, z, z);
-  return 0;
-}
-
-/* z_k = a_k x + y_k */
-static int vectors_add_to (int count, realtype *a, N_Vector x, N_Vector *y, N_Vector *z) {
-  for (int k = 0; k < count; k++) vectors_linear_sum (a[k], x, 1, y[k], z[k]);
-  return 0;
-}
-
-static int vectors_scale_each (int count, realtype *c, N_Vector *x, N_Vector *z) {
-  for (int k = 0; k < count; k++) vectors_scale (c[k], x[k], z[k]);
-  return 0;
-}
-
-/* sqrt (sum (x_i w_i)^2 / n), with the n of all entries; unless id is NULL, the sum is over id_i > 0 only. */
-static double vectors_root_mean_square (N_Vector vx, N_Vector vw, const double *id) {
-  const sunindextype n = NV_LENGTH_S (vx);
-  const double *x = NV_DATA_S (vx), *w = NV_DATA_S (vw);
-  double sum = 0;
-  for (sunindextype i = 0; i < n; i++)
-    if (id == NULL || id[i] > 0) sum += x[i] * w[i] * (x[i] * w[i]);
-  return sqrt (sum / (double)n);
-}
-
-static realtype vectors_norm (N_Vector x, N_Vector w) {
-  return vectors_root_mean_square (x, w, NULL);
-}
-
-static realtype vectors_norm_masked (N_Vector x, N_Vector w, N_Vector id) {
-  return vectors_root_mean_square (x, w, NV_DATA_S (id));
-}
-
-N_Vector pw_sun_vector (sunindextype length, SUNContext context) {
-  N_Vector v = N_VNew_Serial (length, context);
-  if (v == NULL) return NULL;
-  v->ops->nvlinearsum = vectors_linear_sum;
-  v->ops->nvscale = vectors_scale;
-  v->ops->nvlinearcombination = vectors_combine;
-  v->ops->nvscaleaddmulti = vectors_add_to;
-  v->ops->nvscalevectorarray = vectors_scale_each;
-  v->ops->nvwrmsnorm = vectors_norm;
-  v->ops->nvwrmsnormmask = vectors_norm_masked;
-  return v;
-}
-
-/* Work and losses along the steps of a multistep method: the integral of a polynomial through the rates at the
- * states reached, of a degree one above the order of the step if enough are stored, at negligible cost; where that is
- * not accurate enough, of the rates that the method interpolates at nodes inside the step.
+/* ---- Work and losses along the steps ----
+ *
+ * The integral of a polynomial through the rates at the states reached, of a degree one above the order of the step
+ * if enough are stored, at negligible cost; where that is not accurate enough, of the rates that the method
+ * interpolates at nodes inside the step.
  *
  * The difference from the polynomial of the next lower degree estimates the error.  Powers may vanish at the ends of
  * all steps but not between them, so the work and losses of a step are also compared with the change of energy. */
-
-int pw_quadrature_open (pw_quadrature *x, pw_run *r, pw_rates_at *rates) {
-  size_t entries = (size_t)r->entries;
-  pw_array array[PW_QUADRATURE_POINTS + 4] = {
-    { &x->ledger0, entries }, { &x->integral, entries }, { &x->finer, entries }, { &x->node, entries }
-  };
-  for (int i = 0; i < PW_QUADRATURE_POINTS; i++) array[4 + i] = (pw_array){ &x->rate[i], entries };
-  x->rates = rates;
-  x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
-  if (x->memory == NULL) return PW_RESOURCE;
-  pw_quadrature_restart (x, r);
-  return PW_OK;
-}
-
-void pw_quadrature_close (pw_quadrature *x) {
-  free (x->memory);
-}
-
-static void quadrature_store_rates (pw_quadrature *x, const pw_run *r) {
-  x->t[0] = r->t;
-  memcpy (x->rate[0], r->rate, (size_t)r->entries * sizeof (double));
-}
-
-void pw_quadrature_restart (pw_quadrature *x, pw_run *r) {
-  x->points = 1;
-  x->energy = pw_energy (r, r->v);
-  quadrature_store_rates (x, r);
-}
-
-/* ---- Integrals ---- */
 
 enum { QUADRATURE_BY_METHOD = -1 }; /* in place of a degree */
 
 /* The rates at t: of the polynomial of this degree through those at the newest states (Lagrange's formula), or
  * QUADRATURE_BY_METHOD. */
-static int quadrature_rates (const pw_quadrature *x, pw_run *r, int degree, double t, double *rate) {
+static int quadrature_rates (const pw_sun *x, int degree, double t, double *rate) {
+  pw_run *r = x->run;
   if (degree == QUADRATURE_BY_METHOD) return x->rates (r, t, rate);
   memset (rate, 0, (size_t)r->entries * sizeof *rate);
   for (int i = 0; i <= degree; i++) {
@@ -292,15 +283,15 @@ static int quadrature_rates (const pw_quadrature *x, pw_run *r, int degree, doub
 }
 
 /* The integrals between two times by Gauss quadrature with four nodes, exact up to degree 7, in each of equal parts. */
-static int quadrature_gauss (const pw_quadrature *x, pw_run *r, int degree, double from, double to, int parts,
-                             double *integral) {
+static int quadrature_gauss (const pw_sun *x, int degree, double from, double to, int parts, double *integral) {
+  pw_run *r = x->run;
   static const double node[] = { 0.8611363115940526, 0.3399810435848563 },
                       weight[] = { 0.3478548451374538, 0.6521451548625461 };
   double half = (to - from) / parts / 2;
   memset (integral, 0, (size_t)r->entries * sizeof *integral);
   for (int i = 0; i < 4 * parts; i++) {
     double middle = from + (2 * (i / 4) + 1) * half, side = i % 4 < 2 ? -1 : 1;
-    int status = quadrature_rates (x, r, degree, middle + side * node[i % 2] * half, x->node);
+    int status = quadrature_rates (x, degree, middle + side * node[i % 2] * half, x->node);
     if (status != PW_OK) return status;
     pw_add_scaled (integral, x->node, half * weight[i % 2], r->entries);
   }
@@ -308,37 +299,38 @@ static int quadrature_gauss (const pw_quadrature *x, pw_run *r, int degree, doub
 }
 
 /* The difference between x->finer and x->integral in a step of size h, in tolerances; in the scratch x->node. */
-static double quadrature_change (const pw_quadrature *x, const pw_run *r, double h) {
+static double quadrature_change (const pw_sun *x, double h) {
+  pw_run *r = x->run;
   for (int e = 0; e < r->entries; e++) x->node[e] = x->finer[e] - x->integral[e];
   return pw_ledger_norm (r, h, x->node);
 }
 
 /* Halves the parts until the integrals, in x->integral, converge; stops if powers cannot be evaluated. */
-static void quadrature_refine (pw_quadrature *x, pw_run *r, double from, double to) {
+static void quadrature_refine (pw_sun *x, double from, double to) {
+  pw_run *r = x->run;
   const int most = 64; /* 256 nodes */
   double change = INFINITY;
   for (int parts = 1; parts <= most && change > 1; parts *= 2) {
-    if (quadrature_gauss (x, r, QUADRATURE_BY_METHOD, from, to, parts, x->finer) != PW_OK) return;
-    change = quadrature_change (x, r, x->t[0] - x->t[1]);
+    if (quadrature_gauss (x, QUADRATURE_BY_METHOD, from, to, parts, x->finer) != PW_OK) return;
+    change = quadrature_change (x, x->t[0] - x->t[1]);
     memcpy (x->integral, x->finer, (size_t)r->entries * sizeof *x->integral);
   }
 }
 
-/* ---- Steps ---- */
-
-static int quadrature_degree (const pw_quadrature *x, int order) {
+static int quadrature_degree (const pw_sun *x, int order) {
   return order + 1 < x->points ? order + 1 : x->points - 1;
 }
 
 /* 1 if the step is much longer than the previous ones whose rates are stored, together: its polynomial then depends
  * almost only on its ends. */
-static int quadrature_is_long (const pw_quadrature *x) {
+static int quadrature_is_long (const pw_sun *x) {
   const double ratio = 10;
   return x->points > 2 && x->t[0] - x->t[1] > ratio * (x->t[1] - x->t[x->points - 1]);
 }
 
 /* Energy defect of a step: change of energy, less work, plus losses.  Stores the energy for the next step. */
-static double quadrature_defect (pw_quadrature *x, pw_run *r) {
+static double quadrature_defect (pw_sun *x) {
+  pw_run *r = x->run;
   double before = x->energy;
   x->energy = pw_energy (r, r->v);
   double defect = x->energy - before;
@@ -346,35 +338,37 @@ static double quadrature_defect (pw_quadrature *x, pw_run *r) {
   return fabs (defect);
 }
 
-int pw_quadrature_step (pw_quadrature *x, pw_run *r, int order) {
+int pw_sun_integrate_ledger (pw_sun *x, int order) {
+  pw_run *r = x->run;
   const double method_defect = 100; /* energy defect that the method itself may cause in a step, in tolerances */
-  int entries = r->entries, last = PW_QUADRATURE_POINTS - 1;
+  int entries = r->entries, last = PW_SUN_POINTS - 1;
   double *oldest = x->rate[last], h = r->t - x->t[0];
   memcpy (x->ledger0, r->ledger, (size_t)entries * sizeof (double));
   if (!(h > 0)) return PW_OK;
   memmove (x->t + 1, x->t, (size_t)last * sizeof *x->t);
   memmove (x->rate + 1, x->rate, (size_t)last * sizeof *x->rate);
   x->rate[0] = oldest;
-  quadrature_store_rates (x, r);
+  quadrature_store_rates (x);
   if (x->points <= last) x->points++;
   x->order = order;
   const int degree = quadrature_degree (x, order);
-  (void)quadrature_gauss (x, r, degree, x->t[1], x->t[0], 1, x->integral);
-  (void)quadrature_gauss (x, r, degree - 1, x->t[1], x->t[0], 1, x->finer);
-  const double error = quadrature_change (x, r, h), defect = quadrature_defect (x, r);
+  (void)quadrature_gauss (x, degree, x->t[1], x->t[0], 1, x->integral);
+  (void)quadrature_gauss (x, degree - 1, x->t[1], x->t[0], 1, x->finer);
+  const double error = quadrature_change (x, h), defect = quadrature_defect (x);
   x->refined = defect > method_defect * pw_ledger_tolerance (r, h) || error > 1 || quadrature_is_long (x);
-  if (x->refined) quadrature_refine (x, r, x->t[1], x->t[0]);
+  if (x->refined) quadrature_refine (x, x->t[1], x->t[0]);
   for (int e = 0; e < entries; e++) r->ledger[e] += x->integral[e];
   return x->refined ? pw_evaluate_J_at (r->w, pw_before_breakpoint (r, r->t), r->q, r->v) : PW_OK;
 }
 
-void pw_quadrature_at (pw_quadrature *x, pw_run *r, double t) {
+void pw_sun_ledger_at (pw_sun *x, double t) {
+  pw_run *r = x->run;
   int entries = r->entries;
   if (t == x->t[0] || x->points < 2) {
     memcpy (r->ledger_at, r->ledger, (size_t)entries * sizeof (double));
     return;
   }
-  (void)quadrature_gauss (x, r, quadrature_degree (x, x->order), x->t[1], t, 1, x->integral);
-  if (x->refined) quadrature_refine (x, r, x->t[1], t);
+  (void)quadrature_gauss (x, quadrature_degree (x, x->order), x->t[1], t, 1, x->integral);
+  if (x->refined) quadrature_refine (x, x->t[1], t);
   for (int e = 0; e < entries; e++) r->ledger_at[e] = x->ledger0[e] + x->integral[e];
 }

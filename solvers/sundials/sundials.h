@@ -1,4 +1,4 @@
-/* Work and losses along the steps of a multistep method, from their rates at the states it has reached. */
+/* What adams, bdf and ida share: they use integrators of SUNDIALS, version 6 (tested with 6.4). */
 #ifndef PW_SUNDIALS_H_
 #define PW_SUNDIALS_H_
 #include "method.h"
@@ -11,42 +11,11 @@
 #include "tangent.h"
 #include "sparse.h"
 
-enum { PW_QUADRATURE_POINTS = 7 }; /* at most: a polynomial through more would cost more than nodes inside the step */
+enum { PW_SUN_POINTS = 7 }; /* at most: a polynomial through more would cost more than nodes inside the step */
 
 /* The rates of the ledger's entries at a time inside the last step, by the method's interpolation; changes the run's
  * sample arrays, the kinematics, J and the saddle's factors.  PW_OK, or another status if they cannot be evaluated. */
 typedef int pw_rates_at (pw_run *r, double t, double *rate);
-
-typedef struct {
-  pw_rates_at *rates;
-  int points;                         /* states whose rates are known: at most those since the last restart */
-  int order;                          /* of the last step */
-  int refined;                        /* 1: the last step was integrated by nodes inside it */
-  double t[PW_QUADRATURE_POINTS];     /* times of these states, newest first */
-  double *rate[PW_QUADRATURE_POINTS]; /* entries: rates there */
-  double *ledger0;                    /* entries: at the beginning of the last step */
-  double *integral;                   /* entries: over the last step, or a part of it */
-  double *finer, *node; /* entries: scratch: the same with more nodes or of a lower degree; rates at a node */
-  double energy;        /* kinetic + potential energy of the state reached [J] */
-  char *memory;
-} pw_quadrature;
-
-/* At the state reached, as pw_quadrature_restart.  PW_OK or PW_RESOURCE. */
-int pw_quadrature_open (pw_quadrature *x, pw_run *r, pw_rates_at *rates);
-void pw_quadrature_close (pw_quadrature *x);
-
-/* Restarts at the state reached; kinematics and r->rate must be up to date. */
-void pw_quadrature_restart (pw_quadrature *x, pw_run *r);
-
-/* Integrates the ledger over the step, of this order, to the state reached, where kinematics, J and r->rate must be up
- * to date, and stay so.  Returns as pw_update_kinematics. */
-int pw_quadrature_step (pw_quadrature *x, pw_run *r, int order);
-
-/* Stores the ledger at a time inside the last step in r->ledger_at; call it before the interpolation of the sample,
- * since pw_rates_at may overwrite the other sample arrays and the kinematics. */
-void pw_quadrature_at (pw_quadrature *x, pw_run *r, double t);
-
-/* What adams, bdf and ida share: they use integrators of SUNDIALS, version 6 (tested with 6.4). */
 
 /* Attempts at a step, each about a quarter of the one before, if the iteration does not converge or the error is too
  * large: from 1 s down to the round-off of the time.  SUNDIALS' defaults of 7 and 10, down to a millionth of the
@@ -64,19 +33,39 @@ typedef struct {
   SUNLinearSolver solver;
   SUNNonlinearSolver iteration; /* NULL: the default of the integrator */
   double correction;            /* size of the last Newton correction, for pw_sun_test_newton */
-  pw_quadrature quadrature;     /* of work and losses */
   double t0;                    /* of the initial state or the last restart */
   pw_statistics before;         /* counts at t0, where those of the integrator begin */
   char message[256];            /* the last message of the integrator */
+  /* work and losses along the steps, from their rates at the states reached */
+  pw_rates_at *rates;
+  int points;                  /* states whose rates are known: at most those since the last restart */
+  int order;                   /* of the last step */
+  int refined;                 /* 1: the last step was integrated by nodes inside it */
+  double t[PW_SUN_POINTS];     /* times of these states, newest first */
+  double *rate[PW_SUN_POINTS]; /* entries: rates there */
+  double *ledger0;             /* entries: at the beginning of the last step */
+  double *integral;            /* entries: over the last step, or a part of it */
+  double *finer, *node;        /* entries: scratch: the same with more nodes or of a lower degree; rates at a node */
+  double energy;               /* kinetic + potential energy of the state reached [J] */
+  char *memory;
 } pw_sun;
 
-/* Opens the context and the unknowns, of which q and v are those of the state reached.  Returns PW_OK or PW_RESOURCE,
- * as all functions here that open. */
-int pw_sun_open (pw_sun *x, pw_run *r, int unknowns);
+/* Opens the context, the unknowns, of which q and v are those of the state reached, and the quadrature of work and
+ * losses.  Returns PW_OK or PW_RESOURCE, as all functions here that open. */
+int pw_sun_open (pw_sun *x, pw_run *r, int unknowns, pw_rates_at *rates);
 void pw_sun_close (pw_sun *x);
 
-/* Stores the state reached in y, t0 and `before`; the method then restarts its integrator. */
+/* Stores the state reached, where kinematics and r->rate must be up to date, in y, t0 and `before`, and restarts the
+ * quadrature; the method then restarts its integrator. */
 void pw_sun_restart (pw_sun *x);
+
+/* Integrates the ledger over the step, of this order, to the state reached, where kinematics, J and r->rate must be up
+ * to date, and stay so.  Returns as pw_update_kinematics. */
+int pw_sun_integrate_ledger (pw_sun *x, int order);
+
+/* Stores the ledger at a time inside the last step in r->ledger_at; call it before the interpolation of the sample,
+ * since pw_rates_at may overwrite the other sample arrays and the kinematics. */
+void pw_sun_ledger_at (pw_sun *x, double t);
 
 /* A vector with the operations of sundials.c, as have its clones; NULL: out of memory. */
 N_Vector pw_sun_vector (sunindextype length, SUNContext context);

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdio.h>
 #include "check.h"
-#include "condense.h"
+#include "block_ldl.h"
 #include "method.h"
 #include "runs.h"
 #include "scene.h"

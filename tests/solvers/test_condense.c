@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "check.h"
-#include "condense.h"
+#include "block_ldl.h"
 #include "saddle.h"
 #include "scene.h"
 

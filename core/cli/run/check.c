@@ -423,7 +423,7 @@ static void report_mobility (pw_json *j, const pw_check *check) {
 
 static void report_mass (pw_json *j, const pw_check *check) {
   static const char *const lack[] = { NULL, "no mass", "no inertia", "neither mass nor inertia" };
-  /* the error of solvers/matrices/massless.c; after other errors it is not known if the matrix is singular */
+  /* the error of solvers/matrices/saddle.c; after other errors it is not known if the matrix is singular */
   int is_singular = strstr (check->run_error.text, "no constraint determines how it moves") != NULL;
   const char *condition = is_singular                         ? "singular"
                           : check->run == NULL                ? NULL
