@@ -53,19 +53,9 @@ static const double FLOW_SETTLE_RTOL = 1e-9, /* of the run that settles */
 
 /* The period of a signal [s]; 0: none, or not known. */
 static double signal_period (const pw_signal *s) {
-  switch (s->type) {
-  case PW_HARMONIC:
-    return s->harmonic.amplitude != 0 && s->harmonic.omega != 0 ? 2 * PW_PI / fabs (s->harmonic.omega) : 0;
-  case PW_PULSE:
-    return s->pulse.height != 0 ? s->pulse.period : 0;
-  case PW_CONSTANT:
-  case PW_FUNCTION:
-  case PW_RAMP:
-  case PW_SMOOTH_STEP:
-  case PW_TABLE:
-    break;
-  }
-  return 0;
+  if (s->type == PW_PULSE) return s->pulse.height != 0 ? s->pulse.period : 0;
+  if (s->type != PW_HARMONIC || s->harmonic.amplitude == 0 || s->harmonic.omega == 0) return 0;
+  return 2 * PW_PI / fabs (s->harmonic.omega);
 }
 
 /* The least common multiple of two periods, where 0 stands for none; NaN if it is not found. */
@@ -103,8 +93,9 @@ static double periodic_difference (const pw_periodic *x, int j, double a, double
  * that signals repeat after it.  If the period is free, sets it to a time during which signals are constant. */
 static int flow_signals (pw_periodic *x, pw_run *r) {
   double own_period = pw_system_period (r->s), period = x->settings.period;
-  int changed, status;
-  if (x->settings.free) period = fmax (period, FLOW_TIMES * x->T);
+  const int is_free = x->settings.free;
+  int changed;
+  if (is_free) period = fmax (period, FLOW_TIMES * x->T);
   if (period <= 0) period = own_period == 0 ? x->last_period : x->settings.periods * own_period;
   if (!(period > 0))
     return pw_fail (&x->why, PW_INPUT,
@@ -112,12 +103,12 @@ static int flow_signals (pw_periodic *x, pw_run *r) {
                         ? "model %s: the periods of its signals have no common multiple: a period is needed"
                         : "model %s: no signal has a known period: a period is needed",
                     x->s->model);
-  status = x->settings.free ? pw_signals_change (r, x->settings.t, 0, period, &changed, &x->why)
-                            : pw_signals_change (r, x->settings.t, period, FLOW_PERIODS * period, &changed, &x->why);
+  int status = pw_signals_change (r, x->settings.t, is_free ? 0 : period, (is_free ? 1 : FLOW_PERIODS) * period,
+                                  &changed, &x->why);
   if (status != PW_OK) return status;
   if (changed < 0) return x->period = period, PW_OK;
   const char *name = PW_NAME (pw_system_signal_name, r->s, changed);
-  if (x->settings.free)
+  if (is_free)
     return pw_fail (&x->why, PW_INPUT, "model %s: signal %s changes with time, so the period cannot be free",
                     x->s->model, name);
   return pw_fail (&x->why, PW_INPUT, "model %s: signal %s does not repeat after %.12g s%s", x->s->model, name, period,
