@@ -74,13 +74,6 @@ int pw_watchdog_near (struct pw_run *r);
  * at the state reached (watchdog.c).  PW_METHOD; PW_RESOURCE. */
 int pw_change_point_check (struct pw_run *r, double sine, pw_error *error);
 
-/* Checks that a step of fixed size resolves a change point that the motion has passed at a small distance; last_sine:
- * that one state earlier, NaN if it was not computed.  Adaptive methods have error control instead. */
-int pw_change_point_resolve (struct pw_run *r, double last_sine, pw_error *error);
-
-/* PW_METHOD if the last step has passed a dead point, from which prescribed motions cannot go on (watchdog.c). */
-int pw_dead_point_passed (struct pw_run *r, pw_error *error);
-
 /* After a step that has failed with PW_METHOD: if a dead point follows the state last checked, `error` says so.
  * Returns PW_METHOD. */
 int pw_dead_point_explain (struct pw_run *r, pw_error *error);
@@ -108,7 +101,7 @@ struct pw_run {
   int redundant_drive;         /* 1: one of them has an eta, so that work depends on its multiplier */
   int *redundant_row;          /* redundant: their indices */
   unsigned char *active_array; /* rows: what `active` points to */
-  double *coefficient;         /* 5 x rows: a redundant row as a combination of active rows; scratch of independent.c */
+  double *coefficient;         /* 5 x rows: a redundant row as a combination of active rows; scratch of rank.c */
   double *row_force;           /* coords + 3: right-hand side for the coefficients of a redundant row; 0 between uses */
   double *least_norm;          /* rows: least-norm multipliers for the ledger */
   double independence;         /* of the active rows at the state reached (rank.h) */
