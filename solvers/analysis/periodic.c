@@ -18,7 +18,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "periodic_parts.h"
+#include "search.h"
 #include "util.h"
 
 enum {

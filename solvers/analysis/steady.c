@@ -20,7 +20,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include "steady_parts.h"
+#include "search.h"
 #include "util.h"
 #include "rank.h"
 

@@ -761,8 +761,7 @@ static int initial_velocities (initial_search *x) {
 static int initial_contradiction (initial_search *x, char *text, size_t size) {
   const pw_system *s = x->s;
   double *eta = x->r->scratch, *Jv = eta + s->rows, most = 0;
-  char element[PW_NAME_BYTES], previous[PW_NAME_BYTES] = "";
-  *text = 0;
+  unsigned char *violated = (unsigned char *)eta;
   memset (x->importance, INITIAL_FREE, (size_t)s->coords);
   initial_stage_weights (x, &initial_least_change);
   initial_units (x);
@@ -775,11 +774,8 @@ static int initial_contradiction (initial_search *x, char *text, size_t size) {
     x->residual[i] = fabs (x->residual[i] + Jv[i]) / x->unit[i];
     most = fmax (most, x->residual[i]);
   }
-  for (int i = 0; i < s->rows && strlen (text) < 200; i++) {
-    const size_t length = strlen (text);
-    if (x->residual[i] > 1e-3 * most && strcmp (pw_system_row_name (s, i, element, sizeof element), previous) != 0)
-      snprintf (text + length, size - length, "%s%s", length ? ", " : "", strcpy (previous, element));
-  }
+  for (int i = 0; i < s->rows; i++) violated[i] = x->residual[i] > 1e-3 * most;
+  pw_list_elements (s, violated, 1, text, size);
   return *text != 0;
 }
 
@@ -880,9 +876,9 @@ int pw_initial_given (const pw_initial_report *report, int state) {
 static int initial_locked (pw_run *r, const unsigned char *origin, pw_error *error) {
   const pw_system *s = r->s;
   double given = 0, left = 0, speed = 0, *Jv = r->scratch, *eta = Jv + s->rows;
-  char element[PW_NAME_BYTES], previous[PW_NAME_BYTES] = "", elements[300] = "";
-  const char *advice = "";
-  int rest = 0, motion = 0;
+  unsigned char *violated = (unsigned char *)(eta + s->rows);
+  char elements[300];
+  int rest = 0, motion = 0, last = 0;
   for (int j = 0; j < s->coords; j++) {
     if (origin[s->coords + j] & PW_GIVEN) *(r->v_given[j] == 0 ? &rest : &motion) = 1;
     given += s->metric[j] * r->v_given[j] * r->v_given[j];
@@ -892,17 +888,15 @@ static int initial_locked (pw_run *r, const unsigned char *origin, pw_error *err
   if (s->rows == s->holonomic || given == 0 || left > 1e-20 * given || rest > motion) return PW_OK;
   pw_mul_J (r->w, r->v_given, Jv);
   pw_evaluate_eta (r->w, eta);
-  for (int i = s->holonomic; i < s->rows && strlen (elements) < 150; i++) {
-    size_t length = strlen (elements);
-    if (fabs (Jv[i] - eta[i]) <= 1e-10 * speed) continue;
-    if (strcmp (pw_system_row_name (s, i, element, sizeof element), previous) == 0) continue;
-    if (length) advice = pw_advice_on_wheel (s, i);
-    snprintf (elements + length, sizeof elements - length, "%s%s", length ? ", " : "", strcpy (previous, element));
+  for (int i = 0; i < s->rows; i++) {
+    violated[i] = i >= s->holonomic && !(fabs (Jv[i] - eta[i]) <= 1e-10 * speed);
+    if (violated[i]) last = i;
   }
+  pw_list_elements (s, violated, 1, elements, sizeof elements);
   if (*elements == 0) return PW_OK;
   return pw_fail (error, PW_INITIAL,
                   "model %s: the given velocities would have to be removed entirely: %s allow no such motion%s",
-                  s->model, elements, advice);
+                  s->model, elements, strchr (elements, ',') ? pw_advice_on_wheel (s, last) : "");
 }
 
 int pw_run_make_consistent (pw_run *r, const unsigned char *origin, pw_error *error) {

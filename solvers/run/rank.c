@@ -20,6 +20,23 @@ void pw_length_weights (const pw_system *s, double *weight) {
   for (int j = 0; j < s->coords; j++) weight[j] = pw_length_factor (s, j) * pw_length_factor (s, j);
 }
 
+void pw_list_elements (const pw_system *s, const unsigned char *which, int wanted, char *list, size_t size) {
+  char element[PW_NAME_BYTES], previous[PW_NAME_BYTES] = "";
+  int named = 0, more = 0;
+  *list = 0;
+  for (int i = 0; i < s->rows; i++) {
+    size_t length = strlen (list);
+    if (which[i] != wanted || strcmp (pw_system_row_name (s, i, element, sizeof element), previous) == 0) continue;
+    strcpy (previous, element);
+    if (named < 4 && length + strlen (element) + 16 < size)
+      named++, snprintf (list + length, size - length, "%s%s", length ? ", " : "", element);
+    else
+      more++;
+  }
+  size_t length = strlen (list);
+  if (more > 0) snprintf (list + length, size - length, "%s%d more", length ? " and " : "", more);
+}
+
 void pw_rank_rows (const pw_workspace *w, double *rows, double *norm) {
   const pw_system *s = w->s;
   int n = s->coords;

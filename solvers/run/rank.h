@@ -26,6 +26,9 @@ static inline double pw_irregular (double phase, int n) {
   return pw_sin (phase + 2.39996 * n);
 }
 
+/* Names the elements of the rows with which[i] = wanted, the first four and the number of the others. */
+void pw_list_elements (const pw_system *s, const unsigned char *which, int wanted, char *list, size_t size);
+
 /* Selects r->active, a maximal set of independent rows, for the run at its consistent initial state.  The saddle must
  * be open, and opened again afterwards.  r->active stays NULL if all rows are independent: then pw_rank_reselect,
  * _independence and _least_norm must not be called.  Errors: PW_RESOURCE; PW_INITIAL if the rank is higher nearby: the

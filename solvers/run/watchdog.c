@@ -601,24 +601,6 @@ static double dead_find (dead_walk *walk, double t_end) {
   return t <= t_end ? t : INFINITY;
 }
 
-/* Names the elements of the rows with which[i] = wanted. */
-static void dead_list (const pw_system *s, const unsigned char *which, int wanted, char *list, size_t size) {
-  char element[PW_NAME_BYTES], previous[PW_NAME_BYTES] = "";
-  int named = 0, more = 0;
-  *list = 0;
-  for (int i = 0; i < s->rows; i++) {
-    size_t length = strlen (list);
-    if (which[i] != wanted || strcmp (pw_system_row_name (s, i, element, sizeof element), previous) == 0) continue;
-    strcpy (previous, element);
-    if (named < 4 && length + strlen (element) + 16 < size)
-      named++, snprintf (list + length, size - length, "%s%s", length ? ", " : "", element);
-    else
-      more++;
-  }
-  size_t length = strlen (list);
-  if (more > 0) snprintf (list + length, size - length, "%s%d more", length ? " and " : "", more);
-}
-
 static int dead_fail (dead_walk *walk, double t, pw_error *error) {
   const pw_system *s = walk->r->s;
   char drives[180], elements[180];
@@ -634,8 +616,8 @@ static int dead_fail (dead_walk *walk, double t, pw_error *error) {
     if (drives_it && i >= s->holonomic) digits = 4;
     which[i] = drives_it ? 1 : fabs (walk->mu[i]) * walk->row_length[i] > DEAD_SHARE * force ? 2 : 0;
   }
-  dead_list (s, which, 1, drives, sizeof drives);
-  dead_list (s, which, 2, elements, sizeof elements);
+  pw_list_elements (s, which, 1, drives, sizeof drives);
+  pw_list_elements (s, which, 2, elements, sizeof elements);
   if (error) *error = (pw_error){ 0 };
   return pw_fail (error, PW_METHOD,
                   "t = %.*g s: dead point: %s cannot go on: at the limit of %s, it requires unbounded velocities",
