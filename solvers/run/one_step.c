@@ -1,5 +1,5 @@
-/* The functions of pinwheel-method.h for methods of users, in particular one-step methods (pw_run_accelerate:
- * dynamics.c); dense output. */
+/* The functions of pinwheel-method.h for one-step methods of users, and dense output; pw_run_option, pw_run_accelerate:
+ * dynamics.c. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -21,12 +21,6 @@ struct pw_method_data {
 
 pw_state pw_run_state (const pw_run *r) {
   return (pw_state){ r->s, &r->settings, r->t, r->breakpoint, r->q, r->v, r->a, r->lambda };
-}
-
-double pw_run_option (const pw_run *r, const char *name) {
-  int i = 0;
-  while (r->method->options[i].name && strcmp (r->method->options[i].name, name) != 0) i++;
-  return r->method->options[i].name ? r->option[i] : 0;
 }
 
 double pw_stage_time (const pw_run *r, double t) {

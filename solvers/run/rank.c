@@ -1,5 +1,5 @@
-/* The rank of J, and sets of independent rows, by Gram-Schmidt; the independent constraint equations that a run enforces
- * by them, and the redundant ones, which are only monitored, as combinations of these.
+/* The rank of J, and sets of independent rows, by Gram-Schmidt; the independent constraint equations that a run
+ * enforces by them, and the redundant ones, which are only monitored, as combinations of these.
  *
  * The rank is computed at the initial configuration and at up to three a short motion away.  During the motion the set
  * may become ill-conditioned while another one is not; then that is selected.  (Garcia de Jalon & Gutierrez-Lopez 2013,
@@ -11,14 +11,6 @@
 #include "method.h"
 #include "rank.h"
 #include "util.h"
-
-double pw_length_factor (const pw_system *s, int j) {
-  return pw_is_angle (s, j) ? s->scale.length : 1;
-}
-
-void pw_length_weights (const pw_system *s, double *weight) {
-  for (int j = 0; j < s->coords; j++) weight[j] = pw_length_factor (s, j) * pw_length_factor (s, j);
-}
 
 void pw_list_elements (const pw_system *s, const unsigned char *which, int wanted, char *list, size_t size) {
   char element[PW_NAME_BYTES], previous[PW_NAME_BYTES] = "";

@@ -11,14 +11,18 @@ struct pw_run;
 #define PW_RANK_MAX_ENTRIES 4e7
 
 /* The factor by which coordinate j becomes a length: 1, or L for an angle. */
-double pw_length_factor (const pw_system *s, int j);
+static inline double pw_length_factor (const pw_system *s, int j) {
+  return pw_is_angle (s, j) ? s->scale.length : 1;
+}
 
 /* All rows of the J last evaluated, dense (rows x coords), as derivatives with respect to these lengths, normalised to
  * length 1; `norm` (rows, or NULL): their former lengths; empty rows stay 0. */
 void pw_rank_rows (const pw_workspace *w, double *rows, double *norm);
 
 /* Weights of a metric of lengths: the squares of these factors. */
-void pw_length_weights (const pw_system *s, double *weight);
+static inline void pw_length_weights (const pw_system *s, double *weight) {
+  for (int j = 0; j < s->coords; j++) weight[j] = pw_length_factor (s, j) * pw_length_factor (s, j);
+}
 
 /* The n-th of a sequence of irregular numbers in [-1, 1], without symmetries that a scene could share: sines of
  * multiples of the golden angle.  Another phase, an arbitrary number, gives another sequence. */
