@@ -74,13 +74,6 @@ int pw_watchdog_near (struct pw_run *r);
  * at the state reached (watchdog.c).  PW_METHOD; PW_RESOURCE. */
 int pw_change_point_check (struct pw_run *r, double sine, pw_error *error);
 
-/* Checks that a step of fixed size resolves a change point that the motion has passed at a small distance; last_sine:
- * that one state earlier, NaN if it was not computed.  Adaptive methods have error control instead. */
-int pw_change_point_resolve (struct pw_run *r, double last_sine, pw_error *error);
-
-/* PW_METHOD if the last step has passed a dead point, from which prescribed motions cannot go on (watchdog.c). */
-int pw_dead_point_passed (struct pw_run *r, pw_error *error);
-
 /* After a step that has failed with PW_METHOD: if a dead point follows the state last checked, `error` says so.
  * Returns PW_METHOD. */
 int pw_dead_point_explain (struct pw_run *r, pw_error *error);
@@ -108,7 +101,7 @@ struct pw_run {
   int redundant_drive;         /* 1: one of them has an eta, so that work depends on its multiplier */
   int *redundant_row;          /* redundant: their indices */
   unsigned char *active_array; /* rows: what `active` points to */
-  double *coefficient;         /* 5 x rows: a redundant row as a combination of active rows; scratch of independent.c */
+  double *coefficient;         /* 5 x rows: a redundant row as a combination of active rows; scratch of rank.c */
   double *row_force;           /* coords + 3: right-hand side for the coefficients of a redundant row; 0 between uses */
   double *least_norm;          /* rows: least-norm multipliers for the ledger */
   double independence;         /* of the active rows at the state reached (rank.h) */
@@ -163,7 +156,7 @@ struct pw_run {
   double *given_before;                /* 2 (coords + 3): those before a restart, which may be refused */
   unsigned char *origin;               /* 2 coords: of initial values, as in pw_system */
   pw_initial_report initial;
-  unsigned long long identity; /* pw_run_identity */
+  unsigned long long identity; /* checkpoint_identity (run_open.c) */
   pw_statistics statistics;
   pw_method_data *data; /* private to the integrator */
   char *memory;         /* of the state, samples and scratch */
@@ -292,10 +285,6 @@ int pw_run_look_ahead (pw_run *r, pw_error *error);
 
 /* Makes the norm of the accelerations at the state reached the reference level for later ones. */
 void pw_run_set_reference_level (pw_run *r);
-
-/* A check sum, at the initial state, of what a saved state must share with the run that loads it: method, options,
- * settings, masses, names, numbers of signals, initial state and accelerations. */
-unsigned long long pw_run_identity (const pw_run *r);
 
 /* Opens the saddle and the method anew at the state reached, where J is evaluated. */
 int pw_run_renew (pw_run *r, pw_error *error);
@@ -489,16 +478,12 @@ int pw_specialised_open (pw_run *r, pw_error *error);
 /* Uses it if it has the run's independent equations. */
 void pw_specialised_select (pw_run *r);
 
-/* As pw_run_accelerate and pw_project_state, if specialised code can do it: 1; 0 if not. */
-int pw_specialised_evaluate (pw_run *r, double t, const double *q, const double *v, double *a, double *lambda);
+/* As pw_project_state, if specialised code can do it: 1; 0 if not. */
 int pw_specialised_project (const pw_projector *p, pw_run *r, double t, double *q, double *v, double *a,
                             double *lambda);
 /* The stages of a step, if specialised code can evaluate all of them: 1; 0 if not.  Kinematics and J are not
  * updated. */
 int pw_specialised_stages (pw_run *r, const struct pw_scene_step *x);
-/* Both residuals of the state reached, unless one is known or the general engine has to evaluate them. */
-void pw_specialised_residuals (pw_run *r);
-
 /* 1 if specialised code may be called for the run's next evaluation; it can still refuse the state. */
 int pw_specialised_suits (const pw_run *r);
 /* Adds to the statistics: evaluations, and iterations of projections, of specialised code. */

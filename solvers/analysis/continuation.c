@@ -1,4 +1,5 @@
-/* Pseudo-arclength steps along a branch, and the location of events. */
+/* Newton's method by least squares, pseudo-arclength steps along a branch, and the location of events; see
+ * continuation.h. */
 #include <lapacke.h>
 #include <math.h>
 #include <stdlib.h>
@@ -6,9 +7,158 @@
 #include "continuation.h"
 #include "util.h"
 
+enum {
+  NEWTON_MOST = 60,     /* iterations of a solution */
+  NEWTON_BRANCH = 8,    /* of a point of a branch: a shorter step is the better remedy */
+  NEWTON_HALVINGS = 10, /* of a correction */
+  NEWTON_SLOW = 4       /* an iteration that divides |F| by less has reached round-off, below the tolerance */
+};
+static const double NEWTON_EXACT = 1e-4, /* |F| relative to the tolerance that needs no further iteration */
+    NEWTON_DAMPING = 0.1,                /* factor of |F| in the square of the damping */
+    /* Of p.  The error is 2e-11 of the third derivative, and that of F divided by this: 1e-11 for round-off. */
+    NEWTON_DIFFERENCE = 1e-5;
+
+/* The largest |F_i|; NaN if one is NaN. */
+static double newton_residual (const pw_branch *b) {
+  double most = 0;
+  for (int i = 0; i < b->problem.equations; i++)
+    if (fabs (b->F[i]) > most || isnan (b->F[i])) most = fabs (b->F[i]);
+  return most;
+}
+
+static double newton_norm (int n, const double *x) {
+  double sum = 0;
+  for (int i = 0; i < n; i++) sum += x[i] * x[i];
+  return sqrt (sum);
+}
+
+/* Evaluates F and, unless J is NULL, its derivatives with respect to x. */
+static int newton_evaluate (pw_branch *b, const double *u, double *J, pw_error *error) {
+  size_t m = (size_t)b->problem.equations;
+  memset (b->F, 0, m * sizeof *b->F);
+  if (J) memset (J, 0, m * (size_t)b->problem.unknowns * sizeof *J);
+  return b->problem.evaluate (b->problem.context, u, b->F, J, error);
+}
+
+/* Evaluates F and all derivatives: those by p by central differences, at the end of its domain by one-sided
+ * ones.  The evaluation at u is the last one. */
+static int newton_linearise (pw_branch *b, const double *u, pw_error *error) {
+  int m = b->problem.equations, p = b->problem.unknowns, sum = 0, count = 0;
+  double *by_p = b->J + m * p;
+  memset (by_p, 0, (size_t)m * sizeof *by_p);
+  memcpy (b->trial, u, b->bytes);
+  for (int side = -1; side <= 1; side += 2) {
+    b->trial[p] = u[p] + side * NEWTON_DIFFERENCE;
+    int status = newton_evaluate (b, b->trial, NULL, error);
+    if (status != PW_OK && status != PW_RETRY) return status;
+    if (status != PW_OK) continue;
+    for (int i = 0; i < m; i++) by_p[i] += side * b->F[i];
+    sum += side, count++;
+  }
+  if (count == 0) return PW_RETRY;
+  int status = newton_evaluate (b, u, b->J, error);
+  for (int i = 0; i < m; i++) by_p[i] = (by_p[i] - sum * b->F[i]) / (count * NEWTON_DIFFERENCE);
+  return status;
+}
+
+/* Adds `extra` rows to the n columns of J: the row c, or if c is NULL rows with `diagonal` on their diagonal. */
+static void newton_extend (pw_branch *b, int n, int extra, const double *c, double diagonal) {
+  size_t m = (size_t)b->problem.equations, rows = m + (size_t)extra;
+  for (size_t j = (size_t)n; j-- > 0;) {
+    double *column = b->J + j * rows;
+    memmove (column, b->J + j * m, m * sizeof *column);
+    memset (column + m, 0, (size_t)extra * sizeof *column);
+    column[m + (c ? 0 : j)] = c ? c[j] : diagonal;
+  }
+}
+
+/* du = the shortest least-squares solution of J du = right and c . du = value.  If c is NULL, p is constant, and
+ * damping^2 |du|^2 is added to the sum of squares.  J is destroyed. */
+static int newton_least_squares (pw_branch *b, const double *right, const double *c, double value, double damping) {
+  int m = b->problem.equations, n = b->problem.unknowns + (c != NULL), extra = c ? 1 : damping > 0 ? n : 0;
+  int rows = m + extra, large = rows > n ? rows : n, rank;
+  if (extra) newton_extend (b, n, extra, c, damping);
+  for (int i = 0; i < large; i++) b->du[i] = i < m ? right[i] : 0;
+  if (c) b->du[m] = value;
+  for (int i = 0; i < rows * n; i++)
+    if (!isfinite (b->J[i])) return PW_RETRY;
+  memset (b->pivot, 0, (size_t)n * sizeof *b->pivot);
+  if (LAPACKE_dgelsy_work (LAPACK_COL_MAJOR, rows, n, 1, b->J, rows, b->du, large, b->pivot, b->problem.rank_tolerance,
+                           &rank, b->work, b->work_size))
+    return PW_RETRY;
+  if (!c) b->du[n] = 0;
+  return PW_OK;
+}
+
+/* Moves u along du by the largest of the factors 1, 1/2, ... with which |F| decreases by at least a tenth of what the
+ * linear equations predict. */
+static int newton_descend (pw_branch *b, double *u, pw_error *error) {
+  int n = b->problem.unknowns + 1;
+  double before = newton_norm (b->problem.equations, b->F), factor = 1;
+  for (int i = 0; i < NEWTON_HALVINGS; i++, factor /= 2) {
+    for (int j = 0; j < n; j++) b->trial[j] = u[j] + factor * b->du[j];
+    int status = newton_evaluate (b, b->trial, NULL, error);
+    if (status != PW_OK && status != PW_RETRY) return status;
+    if (status != PW_OK || !(newton_norm (b->problem.equations, b->F) < before * (1 - factor / 10))) continue;
+    memcpy (u, b->trial, b->bytes);
+    return PW_OK;
+  }
+  return PW_RETRY;
+}
+
+/* Newton's method at constant c . u, or if c is NULL at constant p, then with the Levenberg-Marquardt parameter
+ * damping min (|F|, 1), which leads to the nearest of solutions that are not isolated (Yamashita & Fukushima 2001). */
+static int newton_iterate (pw_branch *b, double *u, const double *c, double damping, pw_error *error) {
+  int n = b->problem.unknowns + 1, status;
+  double before = b->residual = INFINITY;
+  for (b->iterations = 0;; b->iterations++) {
+    status = c ? newton_linearise (b, u, error) : newton_evaluate (b, u, b->J, error);
+    if (status != PW_OK) return status;
+    b->residual = newton_residual (b);
+    int slow = b->residual > before / NEWTON_SLOW;
+    if (b->residual <= b->problem.tolerance && (slow || b->residual <= b->problem.tolerance * NEWTON_EXACT))
+      return PW_OK;
+    if (b->iterations >= (c ? NEWTON_BRANCH : NEWTON_MOST) || !isfinite (b->residual)) return PW_RETRY;
+    before = b->residual;
+    for (int i = 0; i < b->problem.equations; i++) b->F[i] = -b->F[i];
+    status = newton_least_squares (b, b->F, c, 0, sqrt (damping * fmin (b->residual, 1)));
+    if (status != PW_OK) return status;
+    if (!c && b->residual > b->problem.tolerance)
+      status = newton_descend (b, u, error);
+    else
+      for (int j = 0; j < n; j++) u[j] += b->du[j];
+    if (status != PW_OK) return status;
+  }
+}
+
+int pw_branch_solve (pw_branch *b, double *u, pw_error *error) {
+  memcpy (b->next.u, u, b->bytes);
+  int status = newton_iterate (b, u, NULL, NEWTON_DAMPING, error);
+  if (status != PW_RETRY) return status;
+  memcpy (u, b->next.u, b->bytes);
+  return newton_iterate (b, u, NULL, 0, error);
+}
+
+/* The unit tangent t at u with c . t > 0.  PW_RETRY if c is orthogonal to the branch. */
+static int newton_tangent (pw_branch *b, const double *u, const double *c, double *tangent, pw_error *error) {
+  int n = b->problem.unknowns + 1;
+  double dot = 0;
+  int status = newton_linearise (b, u, error);
+  if (status != PW_OK) return status;
+  b->residual = newton_residual (b);
+  memset (b->F, 0, (size_t)b->problem.equations * sizeof *b->F);
+  status = newton_least_squares (b, b->F, c, 1, 0);
+  if (status != PW_OK) return status;
+  double norm = newton_norm (n, b->du);
+  for (int j = 0; j < n; j++) tangent[j] = b->du[j] / norm, dot += b->du[j] * c[j];
+  return isfinite (norm) && norm > 0 && fabs (dot - 1) < 1e-3 ? PW_OK : PW_RETRY;
+}
+
+/* ---- Points and steps ---- */
+
 enum { LOCATE_MOST = 60 };               /* iterations that locate an event */
 static const double BRANCH_STEEP = 1e-3, /* smallest slope of p along a branch that limits steps by max_change */
-    BRANCH_GROW = 1.5,                   /* factor of the next step, if half of PW_BRANCH_MOST iterations were enough */
+    BRANCH_GROW = 1.5,                   /* factor of the next step, if half of NEWTON_BRANCH iterations were enough */
     BRANCH_TURN = 0.96,   /* cosine of the largest angle between the tangents of successive points, 16 degrees */
     BRANCH_APART = 0.3,   /* largest correction of a predictor, relative to the step */
     BRANCH_ASIDE = 0.002, /* largest correction of an interpolated point, relative to the distance of the two points */
@@ -45,8 +195,6 @@ void pw_branch_close (pw_branch *b) {
   free (b->pivot);
 }
 
-/* ---- Branches ---- */
-
 static void branch_copy (const pw_branch *b, const pw_branch_point *from, pw_branch_point *to) {
   memcpy (to->u, from->u, b->bytes);
   memcpy (to->tangent, from->tangent, b->bytes);
@@ -76,7 +224,7 @@ int pw_branch_start (pw_branch *b, const double *u, double direction, pw_error *
   b->condition[n - 1] = direction > 0 ? 1 : -1;
   pw_branch_end (b);
   memmove (b->reached.u, u, b->bytes);
-  int status = pw_branch_tangent (b, b->reached.u, b->condition, b->reached.tangent, error);
+  int status = newton_tangent (b, b->reached.u, b->condition, b->reached.tangent, error);
   if (status != PW_OK) return status;
   b->reached.residual = b->residual, b->reached.interpolated = 0;
   b->ended = b->reached.tangent[n - 1] > 0 ? u[n - 1] >= 1 : u[n - 1] <= 0;
@@ -96,19 +244,19 @@ static double branch_distance (const pw_branch *b, const double *x, const double
 static int branch_correct (pw_branch *b, const double *tangent, double farthest, pw_branch_point *to, pw_error *error) {
   memcpy (b->condition, tangent ? tangent : b->reached.tangent, b->bytes);
   memcpy (b->predicted, to->u, b->bytes);
-  int status = pw_branch_iterate (b, to->u, tangent ? b->condition : NULL, 0, error);
+  int status = newton_iterate (b, to->u, tangent ? b->condition : NULL, 0, error);
   if (status != PW_OK) return status;
   if (branch_distance (b, to->u, b->predicted) > farthest) return PW_RETRY;
   to->residual = b->residual, to->interpolated = 0;
-  return pw_branch_tangent (b, to->u, b->condition, to->tangent, error);
+  return newton_tangent (b, to->u, b->condition, to->tangent, error);
 }
 
 /* Whether p changes around a fold as its slopes at two points predict, by their mean: p of solutions that scatter at a
- * cusp does not.  A solution is accurate to about PW_BRANCH_EXACT times the tolerance. */
+ * cusp does not.  A solution is accurate to about NEWTON_EXACT times the tolerance. */
 static int branch_parabolic (const pw_branch *b, const pw_branch_point *from, const pw_branch_point *to, double chord) {
   int p = b->problem.unknowns;
   double slope = from->tangent[p], end = to->tangent[p], change = (to->u[p] - from->u[p]) / chord;
-  double error = BRANCH_BENT * (fabs (slope) + fabs (end)) / 2 + PW_BRANCH_EXACT * b->problem.tolerance / chord;
+  double error = BRANCH_BENT * (fabs (slope) + fabs (end)) / 2 + NEWTON_EXACT * b->problem.tolerance / chord;
   return slope * end >= 0 || fabs (change - (slope + end) / 2) <= error;
 }
 
@@ -183,7 +331,7 @@ int pw_branch_step (pw_branch *b, pw_error *error) {
   for (int status; (status = branch_try (b, error)) != PW_OK; b->step /= 2)
     if (status != PW_RETRY || b->step < 2 * b->min_step) return status;
   branch_accept (b);
-  if (b->iterations <= PW_BRANCH_MOST / 2) b->step *= BRANCH_GROW;
+  if (b->iterations <= NEWTON_BRANCH / 2) b->step *= BRANCH_GROW;
   return PW_OK;
 }
 
@@ -200,7 +348,9 @@ static int branch_between (pw_branch *b, const pw_branch_point *from, const pw_b
   memcpy (point->u, b->predicted, b->bytes);
   memcpy (point->tangent, from->tangent, b->bytes);
   point->interpolated = 1;
-  return pw_branch_residual (b, point->u, &point->residual, error);
+  status = newton_evaluate (b, point->u, NULL, error);
+  point->residual = newton_residual (b);
+  return status;
 }
 
 /* The Illinois variant of regula falsi (Dowell & Jarratt 1971), every fourth step a bisection.  The bracket s[0], s[1]
@@ -326,154 +476,4 @@ int pw_branch_next (pw_branch *b, pw_branch_find_events *find_events, pw_error *
   else if (b->steps > 0 && branch_closed (b))
     pw_fail (why, PW_METHOD, "it has returned to its first point"); /* unless an error has ended it before */
   return PW_OK;
-}
-
-/* Newton's method by least squares, and tangents of branches; see continuation.h. */
-
-enum {
-  NEWTON_MOST = 60,     /* iterations of a solution */
-  NEWTON_HALVINGS = 10, /* of a correction */
-  NEWTON_SLOW = 4       /* an iteration that divides |F| by less has reached round-off, below the tolerance */
-};
-static const double NEWTON_DAMPING = 0.1, /* factor of |F| in the square of the damping */
-    /* Of p.  The error is 2e-11 of the third derivative, and that of F divided by this: 1e-11 for round-off. */
-    NEWTON_DIFFERENCE = 1e-5;
-
-/* The largest |F_i|; NaN if one is NaN. */
-static double newton_residual (const pw_branch *b) {
-  double most = 0;
-  for (int i = 0; i < b->problem.equations; i++)
-    if (fabs (b->F[i]) > most || isnan (b->F[i])) most = fabs (b->F[i]);
-  return most;
-}
-
-static double newton_norm (int n, const double *x) {
-  double sum = 0;
-  for (int i = 0; i < n; i++) sum += x[i] * x[i];
-  return sqrt (sum);
-}
-
-/* Evaluates F and, unless J is NULL, its derivatives with respect to x. */
-static int newton_evaluate (pw_branch *b, const double *u, double *J, pw_error *error) {
-  size_t m = (size_t)b->problem.equations;
-  memset (b->F, 0, m * sizeof *b->F);
-  if (J) memset (J, 0, m * (size_t)b->problem.unknowns * sizeof *J);
-  return b->problem.evaluate (b->problem.context, u, b->F, J, error);
-}
-
-/* Evaluates F and all derivatives: those by p by central differences, at the end of its domain by one-sided
- * ones.  The evaluation at u is the last one. */
-static int newton_linearise (pw_branch *b, const double *u, pw_error *error) {
-  int m = b->problem.equations, p = b->problem.unknowns, sum = 0, count = 0;
-  double *by_p = b->J + m * p;
-  memset (by_p, 0, (size_t)m * sizeof *by_p);
-  memcpy (b->trial, u, b->bytes);
-  for (int side = -1; side <= 1; side += 2) {
-    b->trial[p] = u[p] + side * NEWTON_DIFFERENCE;
-    int status = newton_evaluate (b, b->trial, NULL, error);
-    if (status != PW_OK && status != PW_RETRY) return status;
-    if (status != PW_OK) continue;
-    for (int i = 0; i < m; i++) by_p[i] += side * b->F[i];
-    sum += side, count++;
-  }
-  if (count == 0) return PW_RETRY;
-  int status = newton_evaluate (b, u, b->J, error);
-  for (int i = 0; i < m; i++) by_p[i] = (by_p[i] - sum * b->F[i]) / (count * NEWTON_DIFFERENCE);
-  return status;
-}
-
-/* Adds `extra` rows to the n columns of J: the row c, or if c is NULL rows with `diagonal` on their diagonal. */
-static void newton_extend (pw_branch *b, int n, int extra, const double *c, double diagonal) {
-  size_t m = (size_t)b->problem.equations, rows = m + (size_t)extra;
-  for (size_t j = (size_t)n; j-- > 0;) {
-    double *column = b->J + j * rows;
-    memmove (column, b->J + j * m, m * sizeof *column);
-    memset (column + m, 0, (size_t)extra * sizeof *column);
-    column[m + (c ? 0 : j)] = c ? c[j] : diagonal;
-  }
-}
-
-/* du = the shortest least-squares solution of J du = right and c . du = value.  If c is NULL, p is constant, and
- * damping^2 |du|^2 is added to the sum of squares.  J is destroyed. */
-static int newton_least_squares (pw_branch *b, const double *right, const double *c, double value, double damping) {
-  int m = b->problem.equations, n = b->problem.unknowns + (c != NULL), extra = c ? 1 : damping > 0 ? n : 0;
-  int rows = m + extra, large = rows > n ? rows : n, rank;
-  if (extra) newton_extend (b, n, extra, c, damping);
-  for (int i = 0; i < large; i++) b->du[i] = i < m ? right[i] : 0;
-  if (c) b->du[m] = value;
-  for (int i = 0; i < rows * n; i++)
-    if (!isfinite (b->J[i])) return PW_RETRY;
-  memset (b->pivot, 0, (size_t)n * sizeof *b->pivot);
-  if (LAPACKE_dgelsy_work (LAPACK_COL_MAJOR, rows, n, 1, b->J, rows, b->du, large, b->pivot, b->problem.rank_tolerance,
-                           &rank, b->work, b->work_size))
-    return PW_RETRY;
-  if (!c) b->du[n] = 0;
-  return PW_OK;
-}
-
-/* Moves u along du by the largest of the factors 1, 1/2, ... with which |F| decreases by at least a tenth of what the
- * linear equations predict. */
-static int newton_descend (pw_branch *b, double *u, pw_error *error) {
-  int n = b->problem.unknowns + 1;
-  double before = newton_norm (b->problem.equations, b->F), factor = 1;
-  for (int i = 0; i < NEWTON_HALVINGS; i++, factor /= 2) {
-    for (int j = 0; j < n; j++) b->trial[j] = u[j] + factor * b->du[j];
-    int status = newton_evaluate (b, b->trial, NULL, error);
-    if (status != PW_OK && status != PW_RETRY) return status;
-    if (status != PW_OK || !(newton_norm (b->problem.equations, b->F) < before * (1 - factor / 10))) continue;
-    memcpy (u, b->trial, b->bytes);
-    return PW_OK;
-  }
-  return PW_RETRY;
-}
-
-int pw_branch_iterate (pw_branch *b, double *u, const double *c, double damping, pw_error *error) {
-  int n = b->problem.unknowns + 1, status;
-  double before = b->residual = INFINITY;
-  for (b->iterations = 0;; b->iterations++) {
-    status = c ? newton_linearise (b, u, error) : newton_evaluate (b, u, b->J, error);
-    if (status != PW_OK) return status;
-    b->residual = newton_residual (b);
-    int slow = b->residual > before / NEWTON_SLOW;
-    if (b->residual <= b->problem.tolerance && (slow || b->residual <= b->problem.tolerance * PW_BRANCH_EXACT))
-      return PW_OK;
-    if (b->iterations >= (c ? PW_BRANCH_MOST : NEWTON_MOST) || !isfinite (b->residual)) return PW_RETRY;
-    before = b->residual;
-    for (int i = 0; i < b->problem.equations; i++) b->F[i] = -b->F[i];
-    status = newton_least_squares (b, b->F, c, 0, sqrt (damping * fmin (b->residual, 1)));
-    if (status != PW_OK) return status;
-    if (!c && b->residual > b->problem.tolerance)
-      status = newton_descend (b, u, error);
-    else
-      for (int j = 0; j < n; j++) u[j] += b->du[j];
-    if (status != PW_OK) return status;
-  }
-}
-
-int pw_branch_residual (pw_branch *b, const double *u, double *residual, pw_error *error) {
-  int status = newton_evaluate (b, u, NULL, error);
-  *residual = newton_residual (b);
-  return status;
-}
-
-int pw_branch_solve (pw_branch *b, double *u, pw_error *error) {
-  memcpy (b->next.u, u, b->bytes);
-  int status = pw_branch_iterate (b, u, NULL, NEWTON_DAMPING, error);
-  if (status != PW_RETRY) return status;
-  memcpy (u, b->next.u, b->bytes);
-  return pw_branch_iterate (b, u, NULL, 0, error);
-}
-
-int pw_branch_tangent (pw_branch *b, const double *u, const double *c, double *tangent, pw_error *error) {
-  int n = b->problem.unknowns + 1;
-  double dot = 0;
-  int status = newton_linearise (b, u, error);
-  if (status != PW_OK) return status;
-  b->residual = newton_residual (b);
-  memset (b->F, 0, (size_t)b->problem.equations * sizeof *b->F);
-  status = newton_least_squares (b, b->F, c, 1, 0);
-  if (status != PW_OK) return status;
-  double norm = newton_norm (n, b->du);
-  for (int j = 0; j < n; j++) tangent[j] = b->du[j] / norm, dot += b->du[j] * c[j];
-  return isfinite (norm) && norm > 0 && fabs (dot - 1) < 1e-3 ? PW_OK : PW_RETRY;
 }

@@ -118,17 +118,4 @@ int pw_branch_locate (pw_branch *b, pw_branch_test *test, void *context, pw_erro
  * which a real mode changes its stability is one event.  `locate` is called with problem.context. */
 int pw_branch_find_changes (pw_branch *b, int before, int now, pw_branch_locate_mode *locate, pw_error *error);
 
-/* ---- continuation.c, for continuation.c only ---- */
-
-enum { PW_BRANCH_MOST = 8 };                /* iterations of a point of a branch: a shorter step is the better remedy */
-static const double PW_BRANCH_EXACT = 1e-4; /* |F| relative to the tolerance that needs no further iteration */
-
-/* Newton's method at constant c . u, or if c is NULL at constant p, then with the Levenberg-Marquardt parameter
- * damping min (|F|, 1), which leads to the nearest of solutions that are not isolated (Yamashita & Fukushima 2001). */
-int pw_branch_iterate (pw_branch *b, double *u, const double *c, double damping, pw_error *error);
-/* The unit tangent t at u with c . t > 0.  PW_RETRY if c is orthogonal to the branch. */
-int pw_branch_tangent (pw_branch *b, const double *u, const double *c, double *tangent, pw_error *error);
-/* The largest |F_i| at u.  A status. */
-int pw_branch_residual (pw_branch *b, const double *u, double *residual, pw_error *error);
-
 #endif

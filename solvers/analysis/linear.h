@@ -1,4 +1,4 @@
-/* A linearisation in progress, for linear*.c and for analyses that need its parts.  The system has n coordinates and m
+/* A linearisation in progress, for linear.c and for analyses that need its parts.  The system has n coordinates and m
  * constraint equations; a variation of the state is dx = (dq, dv), and has `size` minimal coordinates: first those of
  * positions, then those of velocities.  The equations are in linear.c. */
 #ifndef PW_LINEAR_H
@@ -8,7 +8,7 @@
 #include "pinwheel-analysis.h"
 #include "tangent.h"
 
-/* The co-moving frame (linear.c). */
+/* The co-moving frame. */
 typedef struct {
   double origin[2];    /* of the frame [m] */
   double twist[3];     /* velocity of the origin, angular velocity [m/s, rad/s] */
@@ -36,7 +36,7 @@ typedef struct {
   double *da;                    /* n + 3: the resulting variation of accelerations */
   double *scratch, *row_scratch; /* n + 3 m + 3, m */
   double *residual;              /* 3 x (2 m + n): asymmetries of rigid displacements; then scratch for dgesvd */
-  double *probe, *probe_da;      /* 2 n, n: a variation at the current state, and its da (linear.c) */
+  double *probe, *probe_da;      /* 2 n, n: a variation at the current state, and its da */
   double *probe_a;               /* n: accelerations at the current state */
   double *later;                 /* 2 n: a later state */
   char *memory;
@@ -52,27 +52,18 @@ enum { PW_LINEAR_SVD_WORK = 15 };
 /* Round-off of derivatives of moderate size, relative to them. */
 #define PW_LINEAR_SYMMETRIC 1e-9
 
-/* ---- linear.c ---- */
-
-/* What is computed, each with those before: numbers; derivatives; bases and A, dense matrices; B, basis, shapes. */
-typedef enum { PW_LINEAR_COUNTS, PW_LINEAR_DERIVATIVES, PW_LINEAR_BASES, PW_LINEAR_MODES } pw_linear_extent;
+/* What is computed: numbers; derivatives, bases and A, dense matrices; also B, basis, shapes. */
+typedef enum { PW_LINEAR_COUNTS, PW_LINEAR_BASES, PW_LINEAR_MODES } pw_linear_extent;
 
 /* Opens a linearisation of the run's system.  PW_OK or PW_RESOURCE; close it in every case. */
 int pw_linear_open (pw_linearisation *x, pw_run *r, pw_linear_extent extent);
 void pw_linear_close (pw_linearisation *x);
 
-/* ---- linear.c ---- */
-
-/* Records the scatter map of the derivatives.  PW_OK or PW_RESOURCE. */
-int pw_linear_derivatives (pw_linearisation *x);
-/* The smallest singular value of the independent rows of J, as from pw_rank_rows; NaN: no rows, or LAPACK failed. */
-double pw_linear_least (pw_linearisation *x);
-/* J^T = Q R of the same rows, at the state evaluated. */
-void pw_linear_bases (pw_linearisation *x);
 /* Evaluates accelerations and derivatives at a state; kinematics are left there.  Returns as pw_run_accelerate. */
 int pw_linear_evaluate (pw_linearisation *x, double t, const double *q, const double *v);
-/* Compute `product` from the variation dx; both `product` and da. */
-void pw_linear_multiply (pw_linearisation *x);
+/* J^T = Q R of the independent rows of J, as from pw_rank_rows, at the state evaluated. */
+void pw_linear_bases (pw_linearisation *x);
+/* Computes `product` and da from the variation dx. */
 void pw_linear_vary (pw_linearisation *x);
 /* Sets dx to the variation along minimal coordinate c. */
 void pw_linear_tangent (pw_linearisation *x, int c);
@@ -82,32 +73,8 @@ void pw_linear_coordinates (const pw_linearisation *x, const double *dq, const d
 void pw_linear_turn (const pw_linearisation *x, double w, const double *in, double *out);
 /* out = in with (x, y) of each body rotated by an angle. */
 void pw_linear_rotate (const pw_linearisation *x, double angle, const double *in, double *out);
-
-/* ---- linear.c ---- */
-
-/* Fills re, im and rigid, sorted, and with modes the shapes.  Rigid displacements of the whole are split off, an
- * invariant subspace with known eigenvalues (in a rotating frame a displaced motion rotates at -w), so that they do not
- * cause defective zeros; if that fails, l->symmetries becomes 0.  Errors: PW_METHOD, PW_RESOURCE. */
-int pw_linear_eigenvalues (pw_linearisation *x, pw_linear *l, pw_error *error);
-
-/* ---- linear.c ---- */
-
-/* Allocates B, basis and shape, and fills B and basis.  PW_OK or PW_RESOURCE, as the next one. */
-int pw_linear_matrices (pw_linearisation *x, pw_linear *l);
-/* Fills the shapes after k rigid displacements have been split off; eigenvalues are not yet sorted. */
-int pw_linear_shapes (pw_linearisation *x, int k, pw_linear *l);
-
-/* ---- linear.c ---- */
-
-/* Chooses a frame with small accelerations of the evaluated state; one that rotates only if it halves them. */
-void pw_linear_choose_frame (pw_linearisation *x);
 /* What the variation dx changes, in units of the scene, 0 for a symmetry: `holonomic` + `rank` residuals, then n
  * accelerations; turn: by what angle dx rotates the whole, with which accelerations rotate [rad]. */
 void pw_linear_asymmetry (pw_linearisation *x, double turn, double *out);
-/* Number of rigid displacements of the whole (x, y, phi) under which the equations are invariant to first order; stores
- * their directions in `symmetry`.  Needs A, for the tolerance. */
-int pw_linear_symmetries (pw_linearisation *x);
-/* Determines whether A is constant along the motion; see pw_linear.  Leaves the workspace at the current state. */
-pw_steadiness pw_linear_steady (pw_linearisation *x);
 
 #endif

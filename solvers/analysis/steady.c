@@ -1,17 +1,34 @@
-/* The search for steady motions; equations in steady.c. */
+/* The search for steady motions, and their branches.
+ *
+ * The system has symmetries: displacements of the whole, and of angles on which nothing depends.  S_k (q) is the
+ * velocity of a displacement along the k-th one at unit rate.  A steady motion has the velocities v = xi_1 S_1 (q) +
+ * xi_2 S_2 (q) + ... with constant xi.  In the frame that moves with it its velocities are constant: with the angular
+ * velocity w of the whole and W (x, y, phi) = w (-y, x, 0) for each body,
+ *
+ *     g (q, t) = 0,   J v = eta,   a (q, v) = W v,   A - value B = 0 for what is held (steady_symmetries.c).
+ *
+ * The unknowns are u = (q, xi), both scaled by units of the scene, and on a branch the parameter.  There are more
+ * equations than unknowns, and they depend on each other, since symmetries and conservation laws make steady motions
+ * families; continuation.h solves them by least squares.  Their exact derivatives are those of the linearisation
+ * (linear.c) for the variations dq, dv = W dq + dxi_k S_k.  On a branch, corrections are orthogonal to the
+ * symmetries that leave what is held unchanged.
+ *
+ * (Relative equilibria: Marsden & Ratiu 1999, Introduction to Mechanics and Symmetry.) */
 #include <lapacke.h>
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include "steady_parts.h"
+#include "search.h"
 #include "util.h"
 #include "rank.h"
 
 enum {
-  STEADY_POINTS = 50,       /* of a branch, by default */
-  STEADY_BREAKPOINTS = 1000 /* that are followed to find the last one */
+  STEADY_WORK = 40,             /* numbers of work space of LAPACK's dgelsy per unknown */
+  STEADY_MAX_COORDINATES = 400, /* since the cost is cubic */
+  STEADY_POINTS = 50,           /* of a branch, by default */
+  STEADY_BREAKPOINTS = 1000     /* that are followed to find the last one */
 };
 static const double STEADY_EXACT = 1e-9, /* largest residual of a solution, in units of the scene */
     STEADY_SLOW = 1e-4,     /* rates that may be round-off at a double root: more than the root of STEADY_EXACT */
@@ -19,6 +36,400 @@ static const double STEADY_EXACT = 1e-9, /* largest residual of a solution, in u
     STEADY_REGULAR = 1e-13, /* Newton's method ends at smaller residuals unless the root is of higher order */
     SUGGEST_CHANGE = 1e-8,  /* a quantity is worth holding if the square of its change along the family, without the */
     SUGGEST_LEFT = 1e-6;    /* part that is held already, exceeds SUGGEST_CHANGE, and SUGGEST_LEFT x the whole square */
+
+/* ---- Whether signals change with time, or repeat after a period ---- */
+
+enum { SIGNAL_TIMES = 16 };             /* times at which signals are compared, and as many between breakpoints */
+static const double SIGNAL_SAME = 1e-8; /* largest difference of equal signals, relative to their largest value */
+
+typedef struct {
+  pw_run *r;
+  double *state;                /* 2 n: q, v */
+  double *values;               /* count: at the first of two times */
+  double *largest, *difference; /* count: largest magnitude and difference so far */
+  int count;                    /* value and two derivatives of each signal */
+} signal_comparison;
+
+/* Compares signals at two times, in the run's state (number 0) or one up to a unit of the scene away (number 1), since
+ * a signal may be multiplied by a state that is 0.  A status; in the second state signals may fail. */
+static int signals_compare (signal_comparison *x, int number, double t0, double t1) {
+  pw_run *r = x->r;
+  pw_workspace *w = r->w;
+  double *q = x->state, *v = q + r->s->coords;
+  pw_irregular_state (r, number, number, q, v);
+  int status = pw_update_kinematics (w, t0, q, v);
+  if (status == PW_OK && x->count) memcpy (x->values, w->u, (size_t)x->count * sizeof *w->u);
+  if (status == PW_OK) status = pw_update_kinematics (w, t1, q, v);
+  for (int i = 0; status == PW_OK && i < x->count; i++) {
+    if (i % 3 > 0 && r->s->source[i / 3].of_force) continue; /* these derivatives are meaningless */
+    x->difference[i] = pw_larger_or_nan (x->difference[i], fabs (w->u[i] - x->values[i]));
+    x->largest[i] = fmax (x->largest[i], fmax (fabs (x->values[i]), fabs (w->u[i])));
+  }
+  return number > 0 ? PW_OK : status;
+}
+
+/* The middle between the first two breakpoints after *t, or the first one and t1; INFINITY without one before t1.
+ * Moves *t to the first one. */
+static double signals_next_interval (pw_workspace *w, double *t, double t1) {
+  *t = pw_next_breakpoint (w, 1, *t);
+  return *t < t1 ? *t + (fmin (pw_next_breakpoint (w, 1, *t), t1) - *t) / 2 : INFINITY;
+}
+
+int pw_signals_change (pw_run *r, double t, double period, double span, int *changed, pw_error *error) {
+  signal_comparison x = { .r = r, .count = 3 * r->s->sources };
+  size_t count = (size_t)x.count;
+  double at = t, breakpoint = t;
+  int status = PW_OK;
+  x.values = calloc (3 * count + 2 * (size_t)r->s->coords + 1, sizeof *x.values);
+  if (x.values == NULL) return pw_fail_memory (r->s, error);
+  x.largest = x.values + count, x.difference = x.largest + count, x.state = x.difference + count;
+  for (int k = 1; status == PW_OK && k <= 2 * SIGNAL_TIMES && isfinite (at); k++) {
+    double part = k / (double)SIGNAL_TIMES;
+    at = k > SIGNAL_TIMES ? signals_next_interval (r->w, &breakpoint, t + span)
+         : period > 0     ? t + span * fmod (0.618034 * k, 1) /* golden ratio: equidistributed */
+                          : t + span * part * part;               /* denser at first */
+    for (int number = 0; number < 2 && status == PW_OK && isfinite (at); number++)
+      status = signals_compare (&x, number, period > 0 ? at : t, period > 0 ? at + period : at);
+  }
+  *changed = -1;
+  for (int i = x.count; i-- > 0;)
+    if (!(x.difference[i] <= SIGNAL_SAME * x.largest[i])) *changed = i / 3;
+  free (x.values);
+  return status == PW_OK ? PW_OK : pw_run_annotate_error (r, pw_fail_signal (at, error), error);
+}
+
+/* ---- The system and its run at a value of the parameter ---- */
+
+const pw_system *pw_parametric_at (pw_parametric *x, double value, pw_error *why) {
+  const pw_system *s = x->described;
+  if (x->compile == NULL) return s;
+  if (x->own == NULL || x->value != value) {
+    pw_system_free (x->own);
+    *why = (pw_error){ 0 };
+    x->value = value;
+    x->own = x->compile (x->context, value, why);
+    if (x->own == NULL || why->status != PW_OK) {
+      pw_fail (why, PW_INPUT, "there is no system at %.9g", value);
+      pw_system_free (x->own);
+      return x->own = NULL;
+    }
+  }
+  const pw_system *own = x->own;
+  if (own->coords == s->coords && own->rows == s->rows && own->holonomic == s->holonomic && own->bodies == s->bodies)
+    return own;
+  pw_fail (why, PW_INPUT, "model %s: the parameter changes the number of bodies or constraint equations", own->model);
+  return NULL;
+}
+
+static void steady_close_system (pw_steady *x) {
+  pw_linear_close (&x->system.linearisation);
+  if (x->system.run) pw_run_close (x->system.run);
+  pw_system_free (x->parametric.own);
+  x->parametric.own = NULL;
+  memset (&x->system, 0, sizeof x->system);
+}
+
+/* Opens a run at the last solution, or if that cannot be made consistent, at rest in its configuration. */
+static int steady_open_run (pw_steady *x, const pw_system *s) {
+  const pw_settings settings = {
+    .t = x->settings.t, .span = x->settings.span, .initial = x->solution, .initials = x->solved ? 2 * x->n : 0
+  };
+  x->system.run = pw_run_open (s, "rk4+projection", &settings, &x->why);
+  if (x->system.run == NULL && x->why.status == PW_INITIAL && x->solved) {
+    for (int j = x->n; j < 2 * x->n; j++) x->solution[j].value = 0;
+    x->why = (pw_error){ 0 };
+    x->system.run = pw_run_open (s, "rk4+projection", &settings, &x->why);
+  }
+  if (x->system.run == NULL) return x->why.status;
+  int status = pw_linear_open (&x->system.linearisation, x->system.run, PW_LINEAR_BASES);
+  return status == PW_OK ? PW_OK : pw_fail_memory (s, &x->why);
+}
+
+/* Opens x->system for a value of the parameter, unless it is open for it.  A status, with x->why if it fails;
+ * PW_INPUT: its sizes differ; PW_RETRY: none at this value (x->why has the status of the error). */
+static int steady_open_system (pw_steady *x, double value) {
+  if (x->system.run && (x->parametric.compile == NULL || x->parametric.value == value)) return PW_OK;
+  steady_close_system (x);
+  x->why = (pw_error){ 0 };
+  const pw_system *s = pw_parametric_at (&x->parametric, value, &x->why);
+  const int refused = s == NULL && x->parametric.own;
+  const int status = s ? steady_open_run (x, s) : x->why.status;
+  if (status != PW_OK) steady_close_system (x);
+  return status == PW_OK || status == PW_RESOURCE || refused ? status : PW_RETRY;
+}
+
+/* ---- Unknowns ---- */
+
+/* Numbers of unknowns, without the parameter, and of equations. */
+static int steady_unknowns (const pw_steady *x) {
+  return x->n + x->symmetries;
+}
+static int steady_equations (const pw_steady *x) {
+  return x->holonomic + x->m + x->n + x->settings.holds + x->symmetries;
+}
+
+static double steady_parameter (const pw_steady *x, const double *u) {
+  return x->settings.first + (x->settings.last - x->settings.first) * u[x->n + x->symmetries];
+}
+
+/* Sets x->q, x->v and x->rates to those of the unknowns u, and in x->hold the value that varies. */
+static void steady_state (pw_steady *x, const double *u) {
+  for (int j = 0; j < x->n; j++) x->q[j] = u[j] * pw_unit (x->s, j);
+  pw_steady_combine (x, u + x->n, x->T, x->rates);
+  pw_steady_velocities (x, x->rates, x->q, x->v);
+  if (x->settings.vary >= 0) x->hold[x->settings.vary].value = steady_parameter (x, u);
+}
+
+/* pw_branch_problem.same */
+static int steady_same_motion (void *steady, const double *u, const double *other) {
+  pw_steady *x = steady;
+  size_t n = (size_t)x->n;
+  double *q = x->null_space, *v = q + n;
+  steady_state (x, u);
+  memcpy (q, x->q, n * sizeof *q), memcpy (v, x->v, n * sizeof *v);
+  steady_state (x, other);
+  return pw_steady_distance (x, q, v, x->q, x->v) <= PW_BRANCH_SAME;
+}
+
+/* Sets u, except the parameter, to the motion along symmetries at q with velocities nearest to v, by least squares.
+ * PW_METHOD if LAPACK fails. */
+static int steady_nearest (pw_steady *x, const double *q, const double *v, double *u, pw_error *error) {
+  int n = x->n, columns = x->symmetries, rank;
+  double *S = x->F, *right = S + n * columns, *work = right + n + columns;
+  memset (x->branch.pivot, 0, (size_t)columns * sizeof *x->branch.pivot);
+  for (int j = 0; j < n; j++) u[j] = q[j] / pw_unit (x->s, j), right[j] = v[j] / pw_unit (x->s, j) * x->T;
+  for (int k = 0; k < columns; k++) {
+    pw_steady_velocities (x, x->symmetry + k * pw_steady_rate_count (x->s), q, S + k * n);
+    for (int j = 0; j < n; j++) S[k * n + j] /= pw_unit (x->s, j);
+  }
+  if (columns && LAPACKE_dgelsy_work (LAPACK_COL_MAJOR, n, columns, 1, S, n, right, n > columns ? n : columns,
+                                      x->branch.pivot, PW_STEADY_RANK, &rank, work, STEADY_WORK * (n + columns)))
+    return pw_fail (error, PW_METHOD, "the symmetries cannot be separated");
+  memcpy (u + n, right, (size_t)columns * sizeof *u);
+  return PW_OK;
+}
+
+/* ---- Residuals ---- */
+
+/* The residuals g, J v - eta, a - W v of x->system in the state x->q, x->v, at which its accelerations have been
+ * evaluated. */
+static void steady_residual (pw_steady *x, double *F) {
+  pw_linearisation *l = &x->system.linearisation;
+  pw_workspace *w = x->system.run->w;
+  double acceleration = x->T * x->T / x->L;
+  pw_evaluate_g (w, F);
+  for (int i = 0; i < x->holonomic; i++) F[i] /= x->norm[i] * x->L;
+  F += x->holonomic;
+  pw_mul_J (w, x->v, F);
+  if (x->s->rheonomic) pw_evaluate_eta (w, l->row_scratch);
+  for (int i = 0; i < x->m; i++) F[i] = (F[i] - (x->s->rheonomic ? l->row_scratch[i] : 0)) * x->T / (x->norm[i] * x->L);
+  F += x->m;
+  memcpy (F, l->a, (size_t)x->n * sizeof *F);
+  pw_linear_turn (l, -x->rates[PW_RATE_TURN], x->v, F);
+  for (int j = 0; j < x->n; j++) F[j] *= pw_length_factor (x->s, j) * acceleration;
+}
+
+/* The change of the residuals by the variation (dq, dv) in l->dx and the change dw of the angular velocity w. */
+static void steady_change (pw_steady *x, double dw, double *F) {
+  pw_linearisation *l = &x->system.linearisation;
+  int n = x->n;
+  double *dq = l->dx, *dv = l->dx + n;
+  pw_mul_J (x->system.run->w, dq, l->row_scratch);
+  for (int i = 0; i < x->holonomic; i++) *F++ = l->row_scratch[i] / (x->norm[i] * x->L);
+  pw_linear_vary (l);
+  pw_mul_J (x->system.run->w, dv, l->row_scratch);
+  for (int i = 0; i < x->m; i++) *F++ = (l->row_scratch[i] + l->product[n + x->m + i]) * x->T / (x->norm[i] * x->L);
+  pw_linear_turn (l, -x->rates[PW_RATE_TURN], dv, l->da);
+  pw_linear_turn (l, -dw, x->v, l->da);
+  for (int j = 0; j < n; j++) *F++ = l->da[j] * pw_length_factor (x->s, j) * x->T * x->T / x->L;
+  for (int i = 0; i < x->settings.holds; i++) *F++ = pw_hold_residual (x, x->hold + i, dq, dv);
+}
+
+/* The conditions that dq is orthogonal to the free symmetries. */
+static void steady_conditions (pw_steady *x, double *dF) {
+  int equations = steady_equations (x);
+  dF += equations - x->symmetries;
+  for (int i = 0; i < x->free_symmetries; i++) {
+    double square = 0;
+    pw_steady_combine (x, x->free_symmetry + i * x->symmetries, 1, x->combined);
+    pw_steady_velocities (x, x->combined, x->q, x->dq);
+    for (int j = 0; j < x->n; j++) x->dq[j] /= pw_unit (x->s, j), square += x->dq[j] * x->dq[j];
+    for (int j = 0; j < x->n; j++) dF[j * equations + i] = x->dq[j] / sqrt (square);
+  }
+}
+
+/* Derivatives with respect to the unknowns q and xi. */
+static void steady_columns (pw_steady *x, double *dF) {
+  pw_linearisation *l = &x->system.linearisation;
+  int n = x->n, equations = steady_equations (x);
+  for (int c = 0; c < steady_unknowns (x); c++, dF += equations) {
+    const double *symmetry = x->symmetry + (c < n ? 0 : c - n) * pw_steady_rate_count (x->s); /* only for c >= n */
+    memset (l->dx, 0, 2 * (size_t)n * sizeof *l->dx);
+    if (c < n) {
+      l->dx[c] = pw_unit (x->s, c);
+      pw_linear_turn (l, x->rates[PW_RATE_TURN], l->dx, l->dx + n);
+    } else {
+      pw_steady_velocities (x, symmetry, x->q, l->dx + n);
+      for (int j = n; j < 2 * n; j++) l->dx[j] /= x->T;
+    }
+    steady_change (x, c < n ? 0 : symmetry[PW_RATE_TURN] / x->T, dF);
+  }
+}
+
+/* pw_branch_problem.evaluate */
+static int steady_evaluate (void *steady, const double *u, double *F, double *dF, pw_error *error) {
+  pw_steady *x = steady;
+  int first_held = steady_equations (x) - x->symmetries - x->settings.holds;
+  int status = steady_open_system (x, steady_parameter (x, u));
+  if (status < 0) pw_fail (error, status, "%s", x->why.text);
+  if (status != PW_OK) return status;
+  pw_linearisation *l = &x->system.linearisation;
+  steady_state (x, u);
+  status = dF ? pw_linear_evaluate (l, x->settings.t, x->q, x->v)
+              : pw_run_accelerate (x->system.run, x->settings.t, x->q, x->v, l->a, l->lambda);
+  if (status != PW_OK) {
+    x->why = (pw_error){ 0 };
+    if (status > 0) pw_fail_singular (x->system.run, x->settings.t, &x->why);
+    return PW_RETRY;
+  }
+  steady_residual (x, F);
+  for (int i = 0; i < x->settings.holds; i++) F[first_held + i] = pw_hold_residual (x, x->hold + i, NULL, NULL);
+  if (dF == NULL) return PW_OK;
+  steady_columns (x, dF);
+  steady_conditions (x, dF);
+  return PW_OK;
+}
+
+/* ---- Singular constraints ---- */
+
+/* Evaluates the rows of J at u, of length 1 (m x n); active (m, or NULL): 1 for independent ones. */
+static int steady_rows (pw_steady *x, const double *u, double *rows, unsigned char *active, pw_error *error) {
+  int status = steady_open_system (x, steady_parameter (x, u));
+  if (status < 0) pw_fail (error, status, "%s", x->why.text);
+  if (status != PW_OK) return status;
+  pw_run *r = x->system.run;
+  steady_state (x, u);
+  if (pw_evaluate_J_at (r->w, x->settings.t, x->q, x->v) != PW_OK) return PW_RETRY;
+  pw_rank_rows (r->w, rows, NULL);
+  for (int i = 0; active && i < x->m; i++) active[i] = r->active == NULL || r->active[i];
+  return PW_OK;
+}
+
+/* 1 if det (A B^T) < 0 for the active rows of A and B (m x n): between them, J has lost rank.  G: m x m, scratch. */
+static int steady_loses_rank (const pw_steady *x, const unsigned char *active, const double *A, const double *B,
+                              double *G, int *pivot) {
+  int rank = 0, negative = 0;
+  for (int i = 0; i < x->m; i++) rank += active[i];
+  for (int i = 0, row = 0; i < x->m; i++) {
+    for (int k = 0, column = 0; active[i] && k < x->m; k++) {
+      double sum = 0;
+      for (int j = 0; active[k] && j < x->n; j++) sum += A[i * x->n + j] * B[k * x->n + j];
+      if (active[k]) G[row * rank + column++] = sum;
+    }
+    row += active[i];
+  }
+  if (rank == 0 || LAPACKE_dgetrf (LAPACK_ROW_MAJOR, rank, rank, G, rank, pivot) != 0) return rank > 0;
+  for (int i = 0; i < rank; i++) negative ^= (G[i * rank + i] < 0) ^ (pivot[i] != i + 1);
+  return negative;
+}
+
+/* pw_branch_problem.check_step: no step passes a value of the parameter at which constraint equations become dependent;
+ * x->why names one.  Eigenvalues may be infinite there. */
+static int steady_check_step (void *steady, const double *from, const double *to, pw_error *error) {
+  pw_steady *x = steady;
+  const size_t m = (size_t)x->m, entries = m * (size_t)x->n;
+  double *A = malloc ((2 * entries + m * m + 1) * sizeof *A + m * (1 + sizeof (int)));
+  if (A == NULL) return pw_fail_memory (x->s, error);
+  double *B = A + entries, *G = B + entries;
+  int *pivot = (int *)(G + m * m), row = -1;
+  unsigned char *active = (unsigned char *)(pivot + m);
+  int status = steady_rows (x, from, A, active, error), redundant = status == PW_OK ? x->system.run->redundant : 0;
+  if (status == PW_OK) status = steady_rows (x, to, B, NULL, error);
+  pw_run *r = x->system.run;
+  if (status == PW_OK && (r->redundant > redundant || steady_loses_rank (x, active, A, B, G, pivot))) {
+    status = PW_RETRY;
+    if (r->redundant > redundant)
+      row = r->redundant_row[0];
+    else
+      pw_watchdog_sine (r, &row);
+    x->why = (pw_error){ 0 };
+    pw_fail (&x->why, PW_METHOD, "the constraints become singular: %s depends on other constraints",
+             row >= 0 ? PW_NAME (pw_system_row_name, x->s, row) : "one of them");
+  }
+  free (A);
+  return status;
+}
+
+/* ---- Where the search begins: the initial state, states that forces lead to, random states ---- */
+
+enum { START_STEPS = 300 };               /* of a relaxation, at most */
+static const double START_FAR = 0.2,      /* longest of its steps, in units of the scene */
+    START_GROW = 1.1, START_SHRINK = 0.4; /* factors of the next step */
+
+/* A random number between -1 and 1. */
+static double start_random (uint64_t *state) {
+  return (double)(int64_t)pw_random_bits (state) * 0x1p-63;
+}
+
+/* Makes the positions x->q consistent, if possible. */
+static int start_assemble (pw_steady *x, pw_projector *p) {
+  double *q = x->scratch[0];
+  memcpy (q, x->q, (size_t)x->n * sizeof *q);
+  int status = pw_project_positions (p, x->system.run, x->settings.t, q, x->v);
+  if (status == PW_OK) memcpy (x->q, q, (size_t)x->n * sizeof *q);
+  return status;
+}
+
+/* The accelerations in the moving frame at x->q, x->rates; returns the largest, divided by the unit of its coordinate
+ * [1/s^2], or NaN if they are not determined. */
+static double start_accelerate (pw_steady *x, double *a) {
+  pw_linearisation *l = &x->system.linearisation;
+  double most = 0;
+  pw_steady_velocities (x, x->rates, x->q, x->v);
+  if (pw_run_accelerate (x->system.run, x->settings.t, x->q, x->v, l->a, l->lambda) != PW_OK) return NAN;
+  memcpy (a, l->a, (size_t)x->n * sizeof *a);
+  pw_linear_turn (l, -x->rates[PW_RATE_TURN], x->v, a);
+  for (int j = 0; j < x->n; j++) most = pw_larger_or_nan (most, fabs (a[j]) / pw_unit (x->s, j));
+  return most;
+}
+
+/* Moves positions along the accelerations, at constant rates: towards a minimum of the potential, if forces have one.
+ * Steps become longer while the direction of the accelerations changes by less than 90 degrees, otherwise shorter. */
+static void start_relax (pw_steady *x, pw_projector *p) {
+  double *a = x->scratch[1], *before = x->scratch[2], most = start_accelerate (x, a), step = START_FAR / most;
+  for (int i = 0; i < START_STEPS && most > 0 && isfinite (step); i++) {
+    double dot = 0;
+    for (int j = 0; j < x->n; j++) x->q[j] += fmin (step, START_FAR / most) * a[j];
+    if (start_assemble (x, p) != PW_OK) return;
+    memcpy (before, a, (size_t)x->n * sizeof *a);
+    most = start_accelerate (x, a);
+    for (int j = 0; j < x->n; j++) dot += a[j] * before[j] / (pw_unit (x->s, j) * pw_unit (x->s, j));
+    step *= dot > 0 ? START_GROW : START_SHRINK;
+  }
+}
+
+/* The unknowns, except the parameter, with which an attempt begins; x->system is open.  Attempt 0: the initial
+ * state; 1: a state to which forces lead from there; then random states, even attempts near the initial one, odd ones
+ * anywhere.  Of these, by attempt modulo 4: 0 and 1 need not be consistent; 2: a state to which forces lead as in
+ * attempt 1; 3: consistent. */
+static int steady_start (pw_steady *x, int attempt, double *u, pw_error *error) {
+  int status = steady_nearest (x, x->start, x->start + x->n, u, error);
+  uint64_t state = (uint64_t)attempt * 0xd1342543de82ef95; /* of the random numbers; far apart between attempts */
+  double wide = attempt % 2 ? 1 : 0.2;                     /* of lengths L, angles pi, rates 2 / T */
+  const int relaxed = attempt == 1 || attempt % 4 == 2, consistent = relaxed || attempt % 4 == 3;
+  pw_projector p;
+  for (int j = 0; attempt > 1 && j < steady_unknowns (x); j++)
+    u[j] += wide * start_random (&state) * (j >= x->n ? 2 : pw_is_angle (x->s, j) ? PW_PI : 1);
+  if (status != PW_OK || !consistent) return status;
+  steady_state (x, u);
+  if (pw_evaluate_J_at (x->system.run->w, x->settings.t, x->q, x->v) != PW_OK) return PW_OK; /* as it is */
+  if (pw_projector_open (&p, x->system.run, x->s->metric, x->s->metric, &x->why) != PW_OK)
+    return pw_fail_memory (x->s, error);
+  if (start_assemble (x, &p) == PW_OK && relaxed) start_relax (x, &p);
+  pw_projector_close (&p);
+  for (int j = 0; j < x->n; j++) u[j] = x->q[j] / pw_unit (x->s, j);
+  return PW_OK;
+}
 
 /* ---- Opening ---- */
 
@@ -42,7 +453,7 @@ static int steady_arrays (pw_steady *x) {
     { &x->rates, rates },
     { &x->combined, rates },
     { &x->u, unknowns + 1 },
-    { &x->F, n * rates + (1 + PW_STEADY_WORK) * unknowns },
+    { &x->F, n * rates + (1 + STEADY_WORK) * unknowns },
     { &x->scratch[0], n },
     { &x->scratch[1], n },
     { &x->scratch[2], n },
@@ -91,12 +502,9 @@ static int steady_constant (pw_steady *x, pw_error *error) {
       x->s->model, name);
 }
 
-/* Whether signals may change with time. */
-typedef enum { SIGNALS_CONSTANT, SIGNALS_MAY_CHANGE } signal_rule;
-
 /* Stores the initial state and scales at the first value of the parameter. */
 static int steady_begin (pw_steady *x, pw_error *error) {
-  if (pw_steady_open_system (x, x->settings.first) != PW_OK) return pw_fail (error, x->why.status, "%s", x->why.text);
+  if (steady_open_system (x, x->settings.first) != PW_OK) return pw_fail (error, x->why.status, "%s", x->why.text);
   const pw_run *r = x->system.run;
   x->L = x->s->scale.length;
   x->T = r->w->scale.time;
@@ -108,18 +516,18 @@ static int steady_begin (pw_steady *x, pw_error *error) {
 
 /* Checks the signals and sets the symmetries and x->norm, all within the range: at its ends, for instance without
  * gravity, there may be more symmetries.  Leaves the system open at the first value. */
-static int steady_symmetries (pw_steady *x, signal_rule signals, pw_error *error) {
+static int steady_symmetries (pw_steady *x, int may_change, pw_error *error) {
   const double first = x->settings.first;
-  int status = pw_steady_open_system (x, pw_value_within (first, x->settings.last));
-  if (status != PW_OK) status = pw_steady_open_system (x, first);
+  int status = steady_open_system (x, pw_value_within (first, x->settings.last));
+  if (status != PW_OK) status = steady_open_system (x, first);
   if (status != PW_OK) return pw_fail (error, x->why.status, "%s", x->why.text);
-  if (signals == SIGNALS_CONSTANT) status = steady_constant (x, error);
+  if (!may_change) status = steady_constant (x, error);
   if (status != PW_OK) return status;
   status = pw_steady_find_symmetries (x);
   if (status == PW_RESOURCE) return pw_fail_memory (x->s, error);
   if (status != PW_OK) return pw_fail_singular (x->system.run, x->settings.t, error);
   for (int i = 0; i < x->m; i++) x->norm[i] = x->system.linearisation.norm[i] > 0 ? x->system.linearisation.norm[i] : 1;
-  status = pw_steady_open_system (x, first);
+  status = steady_open_system (x, first);
   return status == PW_OK ? PW_OK : pw_fail (error, x->why.status, "%s", x->why.text);
 }
 
@@ -133,31 +541,33 @@ static void steady_hold_unturned (pw_steady *x) {
 }
 
 static int steady_open_branch (pw_steady *x, pw_error *error) {
-  const pw_branch_problem problem = { .unknowns = pw_steady_unknowns (x),
-                                      .equations = pw_steady_equations (x),
+  const pw_branch_problem problem = { .unknowns = steady_unknowns (x),
+                                      .equations = steady_equations (x),
                                       .tolerance = STEADY_EXACT,
-                                      .evaluate = pw_steady_evaluate,
-                                      .same = pw_steady_same_motion,
-                                      .check_step = pw_steady_check_step,
+                                      .evaluate = steady_evaluate,
+                                      .same = steady_same_motion,
+                                      .check_step = steady_check_step,
                                       .context = x };
   return pw_branch_open (&x->branch, &problem, error);
 }
 
-static pw_steady *steady_open (const pw_system *s, const pw_steady_settings *settings, signal_rule signals,
+/* may_change: 1: signals may change with time. */
+static pw_steady *steady_open (const pw_system *s, const pw_steady_settings *settings, int may_change,
                                pw_error *error) {
   pw_steady *x = calloc (1, sizeof *x);
   if (x == NULL) return pw_fail_memory (s, error), NULL;
   x->s = s, x->settings = *settings;
+  x->parametric = (pw_parametric){ .described = s, .compile = settings->compile, .context = settings->context };
   x->n = s->coords, x->m = s->rows, x->holonomic = s->holonomic;
   if (x->settings.points == 0) x->settings.points = STEADY_POINTS;
   int status = PW_OK;
-  if (x->n > PW_STEADY_MAX_COORDINATES)
+  if (x->n > STEADY_MAX_COORDINATES)
     status = pw_fail (error, PW_INPUT, "model %s has %d coordinates; steady motions are sought with at most %d",
-                      s->model, x->n, PW_STEADY_MAX_COORDINATES);
+                      s->model, x->n, STEADY_MAX_COORDINATES);
   if (status == PW_OK && steady_arrays (x) != PW_OK) status = pw_fail_memory (s, error);
   if (status == PW_OK) status = steady_begin (x, error);
-  if (status == PW_OK && signals == SIGNALS_CONSTANT) steady_hold_unturned (x);
-  if (status == PW_OK) status = steady_symmetries (x, signals, error);
+  if (status == PW_OK && !may_change) steady_hold_unturned (x);
+  if (status == PW_OK) status = steady_symmetries (x, may_change, error);
   if (status == PW_OK) status = steady_open_branch (x, error);
   if (status == PW_OK) return x;
   pw_steady_close (x);
@@ -178,24 +588,24 @@ static int steady_check_settings (const pw_system *s, const pw_steady_settings *
                   set->holds);
 }
 
-pw_steady *pw_steady_open (const pw_system *s, const pw_steady_settings *settings, pw_error *error) {
-  if (pw_require (s, "a system", error) != PW_OK || pw_require (settings, "settings", error) != PW_OK) return NULL;
-  if (steady_check_settings (s, settings, error) != PW_OK) return NULL;
-  return steady_open (s, settings, SIGNALS_CONSTANT, error);
-}
-
-pw_steady *pw_steady_open_symmetries (const pw_system *s, const pw_steady_settings *settings, pw_error *error) {
-  return steady_open (s, settings, SIGNALS_MAY_CHANGE, error);
-}
-
 void pw_steady_close (pw_steady *x) {
   if (x == NULL) return;
-  pw_steady_close_system (x);
+  steady_close_system (x);
   pw_branch_close (&x->branch);
   pw_linear_free (&x->linear);
   pw_arena_free (&x->arena);
   free (x->memory);
   free (x);
+}
+
+pw_steady *pw_steady_open (const pw_system *s, const pw_steady_settings *settings, pw_error *error) {
+  if (pw_require (s, "a system", error) != PW_OK || pw_require (settings, "settings", error) != PW_OK) return NULL;
+  if (steady_check_settings (s, settings, error) != PW_OK) return NULL;
+  return steady_open (s, settings, 0, error);
+}
+
+pw_steady *pw_steady_open_symmetries (const pw_system *s, const pw_steady_settings *settings, pw_error *error) {
+  return steady_open (s, settings, 1, error);
 }
 
 const char *pw_steady_reason (const pw_steady *x) {
@@ -208,19 +618,20 @@ int pw_steady_symmetries (const pw_steady *x) {
 
 /* ---- Solutions ---- */
 
-int pw_steady_motion_at (pw_steady *x, const double *u, pw_steady_motion *out, pw_error *error) {
-  int status = pw_steady_open_system (x, pw_steady_parameter (x, u));
+/* The motion of the unknowns u, which become x->solution, with its linearisation; sets x->neutral.  A status. */
+static int steady_motion_at (pw_steady *x, const double *u, pw_steady_motion *out, pw_error *error) {
+  int status = steady_open_system (x, steady_parameter (x, u));
   if (status != PW_OK) return pw_fail (error, x->why.status, "%s", x->why.text);
   pw_run *r = x->system.run;
-  pw_steady_state (x, u);
+  steady_state (x, u);
   x->solved = 1;
   for (int j = 0; j < x->n; j++) x->solution[j].value = x->q[j], x->solution[x->n + j].value = x->v[j];
   memcpy (r->q, x->q, (size_t)x->n * sizeof *r->q);
   memcpy (r->v, x->v, (size_t)x->n * sizeof *r->v);
   pw_linear_free (&x->linear);
-  status = pw_run_linearise (r, PW_STEADY_MAX_COORDINATES, &x->linear, error);
+  status = pw_run_linearise (r, STEADY_MAX_COORDINATES, &x->linear, error);
   if (status != PW_OK) return status;
-  out->parameter = pw_steady_parameter (x, u);
+  out->parameter = steady_parameter (x, u);
   out->q = x->q, out->v = x->v;
   out->linear = &x->linear;
   out->unstable = x->neutral = 0;
@@ -234,22 +645,22 @@ int pw_steady_motion_at (pw_steady *x, const double *u, pw_steady_motion *out, p
 /* Sets x->null_space to the directions in which solutions form a family, without those of free symmetries.  Returns
  * their number, or a status < 0. */
 static int steady_family (pw_steady *x) {
-  int unknowns = pw_steady_unknowns (x), equations = pw_steady_equations (x);
+  int unknowns = steady_unknowns (x), equations = steady_equations (x);
   pw_error none = { 0 };
   int status = pw_steady_find_free_symmetries (x);
   if (status != PW_OK) return status;
   memset (x->branch.J, 0, (size_t)equations * ((size_t)unknowns + 1) * sizeof *x->branch.J);
-  status = pw_steady_evaluate (x, x->u, x->branch.F, x->branch.J, &none);
+  status = steady_evaluate (x, x->u, x->branch.F, x->branch.J, &none);
   if (status != PW_OK) return status == PW_RESOURCE ? status : PW_METHOD;
   return pw_null_space (equations, unknowns, x->branch.J, PW_STEADY_RANK, x->null_space);
 }
 
 /* Replaces rates below the accuracy of a multiple root by rest, if that is a solution, too: then 1. */
 static int steady_rest (pw_steady *x) {
-  size_t bytes = ((size_t)pw_steady_unknowns (x) + 1) * sizeof *x->u;
+  size_t bytes = ((size_t)steady_unknowns (x) + 1) * sizeof *x->u;
   pw_error none = { 0 };
   double most = 0;
-  for (int k = x->n; k < pw_steady_unknowns (x); k++) most = fmax (most, fabs (x->u[k]));
+  for (int k = x->n; k < steady_unknowns (x); k++) most = fmax (most, fabs (x->u[k]));
   if (most == 0 || most > (x->branch.residual > STEADY_REGULAR ? STEADY_CRAWL : STEADY_SLOW)) return 0;
   memcpy (x->null_space, x->u, bytes);
   memset (x->u + x->n, 0, (size_t)x->symmetries * sizeof *x->u);
@@ -262,15 +673,15 @@ static int steady_rest (pw_steady *x) {
 static int steady_converge (pw_steady *x, int attempt, double parameter, pw_steady_motion *out, pw_error *error) {
   const double range = x->settings.last - x->settings.first;
   x->free_symmetries = 0;
-  int status = pw_steady_start (x, attempt, x->u, error);
+  int status = steady_start (x, attempt, x->u, error);
   if (status != PW_OK) return status;
-  x->u[pw_steady_unknowns (x)] = range != 0 ? (parameter - x->settings.first) / range : 0;
+  x->u[steady_unknowns (x)] = range != 0 ? (parameter - x->settings.first) / range : 0;
   status = pw_branch_solve (&x->branch, x->u, error);
   out->iterations = x->branch.iterations;
   out->residual = x->branch.residual;
   if ((status == PW_OK || status == PW_RETRY) && steady_rest (x))
     status = PW_OK, out->iterations = x->branch.iterations, out->residual = x->branch.residual;
-  pw_steady_state (x, x->u);
+  steady_state (x, x->u);
   return status;
 }
 
@@ -292,7 +703,7 @@ int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_moti
   if (pw_require (x, "a search", error) != PW_OK) return PW_INPUT;
   if (attempt < 0) return pw_fail (error, PW_INPUT, "attempt = %d: expected a number >= 0", attempt);
   if (pw_check_parameter (parameter, error) != PW_OK) return PW_INPUT;
-  if (pw_steady_open_system (x, parameter) != PW_OK) return pw_fail (error, x->why.status, "%s", x->why.text);
+  if (steady_open_system (x, parameter) != PW_OK) return pw_fail (error, x->why.status, "%s", x->why.text);
   int status, known;
   do {
     status = steady_converge (x, attempt, parameter, out, error);
@@ -305,8 +716,8 @@ int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_moti
   if (out->family == PW_RESOURCE) return pw_fail_memory (x->s, error);
   if (out->family < 0) return pw_fail (error, PW_METHOD, "the family of the steady motion cannot be determined");
   pw_steady_move_to_start (x, x->q, x->v);
-  status = pw_steady_nearest (x, x->q, x->v, x->u, error);
-  return status == PW_OK ? pw_steady_motion_at (x, x->u, out, error) : status;
+  status = steady_nearest (x, x->q, x->v, x->u, error);
+  return status == PW_OK ? steady_motion_at (x, x->u, out, error) : status;
 }
 
 /* ---- Suggestions ---- */
@@ -314,7 +725,7 @@ int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_moti
 /* The change of a quantity along direction i of the family, in units of the scene; if `relative` is 1, the
  * change of an angle less that of the angle of the first body. */
 static double suggest_change (pw_steady *x, const pw_initial_value *hold, int relative, int i) {
-  const double *z = x->null_space + (size_t)i * (size_t)pw_steady_unknowns (x);
+  const double *z = x->null_space + (size_t)i * (size_t)steady_unknowns (x);
   double *dq = x->dq, *dv = x->dv;
   pw_steady_combine (x, z + x->n, x->T, x->combined);
   pw_steady_velocities (x, x->combined, x->q, dv);
@@ -378,7 +789,7 @@ int pw_steady_suggest (pw_steady *x, pw_initial_value *hold, int most) {
   return count;
 }
 
-/* Branches of steady motions: points, folds and changes of stability. */
+/* ---- Branches ---- */
 
 static const double BRANCH_MIN_STEP = 1e-7, /* in scaled unknowns; the range of the parameter is 1 */
     BRANCH_ACCURACY = 1e-9;                 /* of events, relative to the step */
@@ -396,10 +807,10 @@ int pw_steady_follow (pw_steady *x, const double *q, const double *v, double par
     return PW_INPUT;
   pw_steady_motion motion;
   x->free_symmetries = 0;
-  int status = pw_steady_nearest (x, q, v, x->u, error);
-  x->u[pw_steady_unknowns (x)] = (parameter - first) / (last - first);
+  int status = steady_nearest (x, q, v, x->u, error);
+  x->u[steady_unknowns (x)] = (parameter - first) / (last - first);
   if (status == PW_OK) status = pw_branch_solve (&x->branch, x->u, error);
-  if (status == PW_OK) status = pw_steady_motion_at (x, x->u, &motion, error);
+  if (status == PW_OK) status = steady_motion_at (x, x->u, &motion, error);
   if (status == PW_OK) status = pw_steady_find_free_symmetries (x);
   if (status == PW_OK) status = pw_branch_start (&x->branch, x->u, direction, error);
   if (status == PW_RESOURCE) return pw_fail_memory (x->s, error);
@@ -411,8 +822,6 @@ int pw_steady_follow (pw_steady *x, const double *q, const double *v, double par
   x->branch.max_points = BRANCH_MAX_POINTS * x->settings.points;
   return PW_OK;
 }
-
-/* ---- Events ---- */
 
 /* The real part of eigenvalue number `sought` of those whose real part is not 0, without rigid displacements, and its
  * imaginary part; -1 if there are fewer. */
@@ -431,7 +840,7 @@ static int branch_test (void *steady, const pw_branch_point *point, double *valu
   pw_steady *x = steady;
   pw_steady_motion motion;
   double im;
-  int status = pw_steady_motion_at (x, point->u, &motion, error);
+  int status = steady_motion_at (x, point->u, &motion, error);
   if (status != PW_OK) return status;
   *value = motion.unstable > x->sought ? 1 : -1;
   if (x->neutral_at_ends == x->neutral) *value = branch_eigenvalue (x, x->sought, &im);
@@ -462,7 +871,7 @@ static int branch_locate (void *steady, int mode, int change, int *event, int *m
 static int branch_events (void *steady, pw_error *error) {
   pw_steady *x = steady;
   pw_steady_motion motion;
-  int before = x->unstable, neutral = x->neutral, status = pw_steady_motion_at (x, x->branch.reached.u, &motion, error);
+  int before = x->unstable, neutral = x->neutral, status = steady_motion_at (x, x->branch.reached.u, &motion, error);
   if (status != PW_OK) return status;
   x->unstable = motion.unstable;
   x->neutral_at_ends = neutral == x->neutral ? neutral : -1;
@@ -483,395 +892,8 @@ int pw_steady_next (pw_steady *x, pw_steady_motion *out, pw_error *error) {
   out->event = (pw_steady_event)next->event;
   out->iterations = x->branch.iterations;
   out->residual = next->point.residual;
-  status = pw_steady_motion_at (x, next->point.u, out, error);
+  status = steady_motion_at (x, next->point.u, out, error);
   if (next->event != PW_BRANCH_POINT) out->unstable = next->unstable;
   x->neutral = neutral;
   return status;
-}
-
-/* The equations of steady motions.
- *
- * The system has symmetries: displacements of the whole, and of angles on which nothing depends.  S_k (q) is the
- * velocity of a displacement along the k-th one at unit rate.  A steady motion has the velocities v = xi_1 S_1 (q) +
- * xi_2 S_2 (q) + ... with constant xi.  In the frame that moves with it its velocities are constant: with the angular
- * velocity w of the whole and W (x, y, phi) = w (-y, x, 0) for each body,
- *
- *     g (q, t) = 0,   J v = eta,   a (q, v) = W v,   A - value B = 0 for what is held (steady_symmetries.c).
- *
- * The unknowns are u = (q, xi), both scaled by units of the scene, and on a branch the parameter.  There are more
- * equations than unknowns, and they depend on each other, since symmetries and conservation laws make steady motions
- * families; continuation.h solves them by least squares.  Their exact derivatives are those of the linearisation
- * (linear.c) for the variations dq, dv = W dq + dxi_k S_k.  On a branch, corrections are orthogonal to the
- * symmetries that leave what is held unchanged.
- *
- * (Relative equilibria: Marsden & Ratiu 1999, Introduction to Mechanics and Symmetry.) */
-
-double pw_steady_parameter (const pw_steady *x, const double *u) {
-  return x->settings.first + (x->settings.last - x->settings.first) * u[x->n + x->symmetries];
-}
-
-void pw_steady_state (pw_steady *x, const double *u) {
-  for (int j = 0; j < x->n; j++) x->q[j] = u[j] * pw_unit (x->s, j);
-  pw_steady_combine (x, u + x->n, x->T, x->rates);
-  pw_steady_velocities (x, x->rates, x->q, x->v);
-  if (x->settings.vary >= 0) x->hold[x->settings.vary].value = pw_steady_parameter (x, u);
-}
-
-int pw_steady_same_motion (void *steady, const double *u, const double *other) {
-  pw_steady *x = steady;
-  size_t n = (size_t)x->n;
-  double *q = x->null_space, *v = q + n;
-  pw_steady_state (x, u);
-  memcpy (q, x->q, n * sizeof *q), memcpy (v, x->v, n * sizeof *v);
-  pw_steady_state (x, other);
-  return pw_steady_distance (x, q, v, x->q, x->v) <= PW_BRANCH_SAME;
-}
-
-int pw_steady_nearest (pw_steady *x, const double *q, const double *v, double *u, pw_error *error) {
-  int n = x->n, columns = x->symmetries, rank;
-  double *S = x->F, *right = S + n * columns, *work = right + n + columns;
-  memset (x->branch.pivot, 0, (size_t)columns * sizeof *x->branch.pivot);
-  for (int j = 0; j < n; j++) u[j] = q[j] / pw_unit (x->s, j), right[j] = v[j] / pw_unit (x->s, j) * x->T;
-  for (int k = 0; k < columns; k++) {
-    pw_steady_velocities (x, x->symmetry + k * pw_steady_rate_count (x->s), q, S + k * n);
-    for (int j = 0; j < n; j++) S[k * n + j] /= pw_unit (x->s, j);
-  }
-  if (columns && LAPACKE_dgelsy_work (LAPACK_COL_MAJOR, n, columns, 1, S, n, right, n > columns ? n : columns,
-                                      x->branch.pivot, PW_STEADY_RANK, &rank, work, PW_STEADY_WORK * (n + columns)))
-    return pw_fail (error, PW_METHOD, "the symmetries cannot be separated");
-  memcpy (u + n, right, (size_t)columns * sizeof *u);
-  return PW_OK;
-}
-
-/* ---- Residuals ---- */
-
-/* The residuals g, J v - eta, a - W v of x->system in the state x->q, x->v, at which its accelerations have been
- * evaluated. */
-static void steady_residual (pw_steady *x, double *F) {
-  pw_linearisation *l = &x->system.linearisation;
-  pw_workspace *w = x->system.run->w;
-  double acceleration = x->T * x->T / x->L;
-  pw_evaluate_g (w, F);
-  for (int i = 0; i < x->holonomic; i++) F[i] /= x->norm[i] * x->L;
-  F += x->holonomic;
-  pw_mul_J (w, x->v, F);
-  if (x->s->rheonomic) pw_evaluate_eta (w, l->row_scratch);
-  for (int i = 0; i < x->m; i++) F[i] = (F[i] - (x->s->rheonomic ? l->row_scratch[i] : 0)) * x->T / (x->norm[i] * x->L);
-  F += x->m;
-  memcpy (F, l->a, (size_t)x->n * sizeof *F);
-  pw_linear_turn (l, -x->rates[PW_RATE_TURN], x->v, F);
-  for (int j = 0; j < x->n; j++) F[j] *= pw_length_factor (x->s, j) * acceleration;
-}
-
-/* ---- Derivatives ---- */
-
-/* The change of the residuals by the variation (dq, dv) in l->dx and the change dw of the angular velocity w. */
-static void steady_change (pw_steady *x, double dw, double *F) {
-  pw_linearisation *l = &x->system.linearisation;
-  int n = x->n;
-  double *dq = l->dx, *dv = l->dx + n;
-  pw_mul_J (x->system.run->w, dq, l->row_scratch);
-  for (int i = 0; i < x->holonomic; i++) *F++ = l->row_scratch[i] / (x->norm[i] * x->L);
-  pw_linear_vary (l);
-  pw_mul_J (x->system.run->w, dv, l->row_scratch);
-  for (int i = 0; i < x->m; i++) *F++ = (l->row_scratch[i] + l->product[n + x->m + i]) * x->T / (x->norm[i] * x->L);
-  pw_linear_turn (l, -x->rates[PW_RATE_TURN], dv, l->da);
-  pw_linear_turn (l, -dw, x->v, l->da);
-  for (int j = 0; j < n; j++) *F++ = l->da[j] * pw_length_factor (x->s, j) * x->T * x->T / x->L;
-  for (int i = 0; i < x->settings.holds; i++) *F++ = pw_hold_residual (x, x->hold + i, dq, dv);
-}
-
-/* The conditions that dq is orthogonal to the free symmetries. */
-static void steady_conditions (pw_steady *x, double *dF) {
-  int equations = pw_steady_equations (x);
-  dF += equations - x->symmetries;
-  for (int i = 0; i < x->free_symmetries; i++) {
-    double square = 0;
-    pw_steady_combine (x, x->free_symmetry + i * x->symmetries, 1, x->combined);
-    pw_steady_velocities (x, x->combined, x->q, x->dq);
-    for (int j = 0; j < x->n; j++) x->dq[j] /= pw_unit (x->s, j), square += x->dq[j] * x->dq[j];
-    for (int j = 0; j < x->n; j++) dF[j * equations + i] = x->dq[j] / sqrt (square);
-  }
-}
-
-/* Derivatives with respect to the unknowns q and xi. */
-static void steady_columns (pw_steady *x, double *dF) {
-  pw_linearisation *l = &x->system.linearisation;
-  int n = x->n, equations = pw_steady_equations (x);
-  for (int c = 0; c < pw_steady_unknowns (x); c++, dF += equations) {
-    const double *symmetry = x->symmetry + (c < n ? 0 : c - n) * pw_steady_rate_count (x->s); /* only for c >= n */
-    memset (l->dx, 0, 2 * (size_t)n * sizeof *l->dx);
-    if (c < n) {
-      l->dx[c] = pw_unit (x->s, c);
-      pw_linear_turn (l, x->rates[PW_RATE_TURN], l->dx, l->dx + n);
-    } else {
-      pw_steady_velocities (x, symmetry, x->q, l->dx + n);
-      for (int j = n; j < 2 * n; j++) l->dx[j] /= x->T;
-    }
-    steady_change (x, c < n ? 0 : symmetry[PW_RATE_TURN] / x->T, dF);
-  }
-}
-
-int pw_steady_evaluate (void *steady, const double *u, double *F, double *dF, pw_error *error) {
-  pw_steady *x = steady;
-  int first_held = pw_steady_equations (x) - x->symmetries - x->settings.holds;
-  int status = pw_steady_open_system (x, pw_steady_parameter (x, u));
-  if (status < 0) pw_fail (error, status, "%s", x->why.text);
-  if (status != PW_OK) return status;
-  pw_linearisation *l = &x->system.linearisation;
-  pw_steady_state (x, u);
-  status = dF ? pw_linear_evaluate (l, x->settings.t, x->q, x->v)
-              : pw_run_accelerate (x->system.run, x->settings.t, x->q, x->v, l->a, l->lambda);
-  if (status != PW_OK) {
-    x->why = (pw_error){ 0 };
-    if (status > 0) pw_fail_singular (x->system.run, x->settings.t, &x->why);
-    return PW_RETRY;
-  }
-  steady_residual (x, F);
-  for (int i = 0; i < x->settings.holds; i++) F[first_held + i] = pw_hold_residual (x, x->hold + i, NULL, NULL);
-  if (dF == NULL) return PW_OK;
-  steady_columns (x, dF);
-  steady_conditions (x, dF);
-  return PW_OK;
-}
-
-/* ---- Singular constraints ---- */
-
-/* Evaluates the rows of J at u, of length 1 (m x n); active (m, or NULL): 1 for independent ones. */
-static int steady_rows (pw_steady *x, const double *u, double *rows, unsigned char *active, pw_error *error) {
-  int status = pw_steady_open_system (x, pw_steady_parameter (x, u));
-  if (status < 0) pw_fail (error, status, "%s", x->why.text);
-  if (status != PW_OK) return status;
-  pw_run *r = x->system.run;
-  pw_steady_state (x, u);
-  if (pw_evaluate_J_at (r->w, x->settings.t, x->q, x->v) != PW_OK) return PW_RETRY;
-  pw_rank_rows (r->w, rows, NULL);
-  for (int i = 0; active && i < x->m; i++) active[i] = r->active == NULL || r->active[i];
-  return PW_OK;
-}
-
-/* 1 if det (A B^T) < 0 for the active rows of A and B (m x n): between them, J has lost rank.  G: m x m, scratch. */
-static int steady_loses_rank (const pw_steady *x, const unsigned char *active, const double *A, const double *B,
-                              double *G, int *pivot) {
-  int rank = 0, negative = 0;
-  for (int i = 0; i < x->m; i++) rank += active[i];
-  for (int i = 0, row = 0; i < x->m; i++) {
-    for (int k = 0, column = 0; active[i] && k < x->m; k++) {
-      double sum = 0;
-      for (int j = 0; active[k] && j < x->n; j++) sum += A[i * x->n + j] * B[k * x->n + j];
-      if (active[k]) G[row * rank + column++] = sum;
-    }
-    row += active[i];
-  }
-  if (rank == 0 || LAPACKE_dgetrf (LAPACK_ROW_MAJOR, rank, rank, G, rank, pivot) != 0) return rank > 0;
-  for (int i = 0; i < rank; i++) negative ^= (G[i * rank + i] < 0) ^ (pivot[i] != i + 1);
-  return negative;
-}
-
-int pw_steady_check_step (void *steady, const double *from, const double *to, pw_error *error) {
-  pw_steady *x = steady;
-  const size_t m = (size_t)x->m, entries = m * (size_t)x->n;
-  double *A = malloc ((2 * entries + m * m + 1) * sizeof *A + m * (1 + sizeof (int)));
-  if (A == NULL) return pw_fail_memory (x->s, error);
-  double *B = A + entries, *G = B + entries;
-  int *pivot = (int *)(G + m * m), row = -1;
-  unsigned char *active = (unsigned char *)(pivot + m);
-  int status = steady_rows (x, from, A, active, error), redundant = status == PW_OK ? x->system.run->redundant : 0;
-  if (status == PW_OK) status = steady_rows (x, to, B, NULL, error);
-  pw_run *r = x->system.run;
-  if (status == PW_OK && (r->redundant > redundant || steady_loses_rank (x, active, A, B, G, pivot))) {
-    status = PW_RETRY;
-    if (r->redundant > redundant)
-      row = r->redundant_row[0];
-    else
-      pw_watchdog_sine (r, &row);
-    x->why = (pw_error){ 0 };
-    pw_fail (&x->why, PW_METHOD, "the constraints become singular: %s depends on other constraints",
-             row >= 0 ? PW_NAME (pw_system_row_name, x->s, row) : "one of them");
-  }
-  free (A);
-  return status;
-}
-
-/* Where the search for steady motions begins: the initial state, states that forces lead to, random states. */
-
-enum { START_STEPS = 300 };               /* of a relaxation, at most */
-static const double START_FAR = 0.2,      /* longest of its steps, in units of the scene */
-    START_GROW = 1.1, START_SHRINK = 0.4; /* factors of the next step */
-
-/* A random number between -1 and 1. */
-static double start_random (uint64_t *state) {
-  return (double)(int64_t)pw_random_bits (state) * 0x1p-63;
-}
-
-/* Makes the positions x->q consistent, if possible. */
-static int start_assemble (pw_steady *x, pw_projector *p) {
-  double *q = x->scratch[0];
-  memcpy (q, x->q, (size_t)x->n * sizeof *q);
-  int status = pw_project_positions (p, x->system.run, x->settings.t, q, x->v);
-  if (status == PW_OK) memcpy (x->q, q, (size_t)x->n * sizeof *q);
-  return status;
-}
-
-/* The accelerations in the moving frame at x->q, x->rates; returns the largest, divided by the unit of its coordinate
- * [1/s^2], or NaN if they are not determined. */
-static double start_accelerate (pw_steady *x, double *a) {
-  pw_linearisation *l = &x->system.linearisation;
-  double most = 0;
-  pw_steady_velocities (x, x->rates, x->q, x->v);
-  if (pw_run_accelerate (x->system.run, x->settings.t, x->q, x->v, l->a, l->lambda) != PW_OK) return NAN;
-  memcpy (a, l->a, (size_t)x->n * sizeof *a);
-  pw_linear_turn (l, -x->rates[PW_RATE_TURN], x->v, a);
-  for (int j = 0; j < x->n; j++) most = pw_larger_or_nan (most, fabs (a[j]) / pw_unit (x->s, j));
-  return most;
-}
-
-/* Moves positions along the accelerations, at constant rates: towards a minimum of the potential, if forces have one.
- * Steps become longer while the direction of the accelerations changes by less than 90 degrees, otherwise shorter. */
-static void start_relax (pw_steady *x, pw_projector *p) {
-  double *a = x->scratch[1], *before = x->scratch[2], most = start_accelerate (x, a), step = START_FAR / most;
-  for (int i = 0; i < START_STEPS && most > 0 && isfinite (step); i++) {
-    double dot = 0;
-    for (int j = 0; j < x->n; j++) x->q[j] += fmin (step, START_FAR / most) * a[j];
-    if (start_assemble (x, p) != PW_OK) return;
-    memcpy (before, a, (size_t)x->n * sizeof *a);
-    most = start_accelerate (x, a);
-    for (int j = 0; j < x->n; j++) dot += a[j] * before[j] / (pw_unit (x->s, j) * pw_unit (x->s, j));
-    step *= dot > 0 ? START_GROW : START_SHRINK;
-  }
-}
-
-int pw_steady_start (pw_steady *x, int attempt, double *u, pw_error *error) {
-  int status = pw_steady_nearest (x, x->start, x->start + x->n, u, error);
-  uint64_t state = (uint64_t)attempt * 0xd1342543de82ef95; /* of the random numbers; far apart between attempts */
-  double wide = attempt % 2 ? 1 : 0.2;                     /* of lengths L, angles pi, rates 2 / T */
-  const int relaxed = attempt == 1 || attempt % 4 == 2, consistent = relaxed || attempt % 4 == 3;
-  pw_projector p;
-  for (int j = 0; attempt > 1 && j < pw_steady_unknowns (x); j++)
-    u[j] += wide * start_random (&state) * (j >= x->n ? 2 : pw_is_angle (x->s, j) ? PW_PI : 1);
-  if (status != PW_OK || !consistent) return status;
-  pw_steady_state (x, u);
-  if (pw_evaluate_J_at (x->system.run->w, x->settings.t, x->q, x->v) != PW_OK) return PW_OK; /* as it is */
-  if (pw_projector_open (&p, x->system.run, x->s->metric, x->s->metric, &x->why) != PW_OK)
-    return pw_fail_memory (x->s, error);
-  if (start_assemble (x, &p) == PW_OK && relaxed) start_relax (x, &p);
-  pw_projector_close (&p);
-  for (int j = 0; j < x->n; j++) u[j] = x->q[j] / pw_unit (x->s, j);
-  return PW_OK;
-}
-
-/* The systems and runs of a search for steady motions, at values of the parameter. */
-
-void pw_steady_close_system (pw_steady *x) {
-  pw_linear_close (&x->system.linearisation);
-  if (x->system.run) pw_run_close (x->system.run);
-  pw_system_free (x->system.own);
-  memset (&x->system, 0, sizeof x->system);
-}
-
-int pw_steady_same_sizes (const pw_system *a, const pw_system *b, pw_error *why) {
-  if (b->coords == a->coords && b->rows == a->rows && b->holonomic == a->holonomic && b->bodies == a->bodies)
-    return PW_OK;
-  return pw_fail (why, PW_INPUT, "model %s: the parameter changes the number of bodies or constraint equations",
-                  b->model);
-}
-
-/* Opens a run at the last solution, or if that cannot be made consistent, at rest in its configuration. */
-static int steady_open_run (pw_steady *x, const pw_system *s) {
-  const pw_settings settings = {
-    .t = x->settings.t, .span = x->settings.span, .initial = x->solution, .initials = x->solved ? 2 * x->n : 0
-  };
-  x->system.run = pw_run_open (s, "rk4+projection", &settings, &x->why);
-  if (x->system.run == NULL && x->why.status == PW_INITIAL && x->solved) {
-    for (int j = x->n; j < 2 * x->n; j++) x->solution[j].value = 0;
-    x->why = (pw_error){ 0 };
-    x->system.run = pw_run_open (s, "rk4+projection", &settings, &x->why);
-  }
-  if (x->system.run == NULL) return x->why.status;
-  int status = pw_linear_open (&x->system.linearisation, x->system.run, PW_LINEAR_BASES);
-  return status == PW_OK ? PW_OK : pw_fail_memory (s, &x->why);
-}
-
-pw_system *pw_compile_at (pw_system *(*compile) (void *context, double value, pw_error *error), void *context,
-                          double value, pw_error *why) {
-  *why = (pw_error){ 0 };
-  pw_system *s = compile (context, value, why);
-  if (s && why->status == PW_OK) return s;
-  pw_fail (why, PW_INPUT, "there is no system at %.9g", value);
-  pw_system_free (s);
-  return NULL;
-}
-
-int pw_steady_open_system (pw_steady *x, double value) {
-  const pw_system *s = x->s;
-  if (x->system.run && (x->settings.compile == NULL || x->system.value == value)) return PW_OK;
-  pw_steady_close_system (x);
-  x->why = (pw_error){ 0 };
-  x->system.value = value;
-  if (x->settings.compile) s = x->system.own = pw_compile_at (x->settings.compile, x->settings.context, value, &x->why);
-  int refused = s && pw_steady_same_sizes (x->s, s, &x->why) != PW_OK;
-  int status = s && !refused ? steady_open_run (x, s) : x->why.status;
-  if (status != PW_OK) pw_steady_close_system (x);
-  return status == PW_OK || status == PW_RESOURCE || refused ? status : PW_RETRY;
-}
-
-/* Whether signals change with time, or repeat after a period, for the searches for steady and periodic motions. */
-
-enum { SIGNAL_TIMES = 16 };             /* times at which signals are compared, and as many between breakpoints */
-static const double SIGNAL_SAME = 1e-8; /* largest difference of equal signals, relative to their largest value */
-
-typedef struct {
-  pw_run *r;
-  double *state;                /* 2 n: q, v */
-  double *values;               /* count: at the first of two times */
-  double *largest, *difference; /* count: largest magnitude and difference so far */
-  int count;                    /* value and two derivatives of each signal */
-} signal_comparison;
-
-/* Compares signals at two times, in the run's state (number 0) or one up to a unit of the scene away (number 1), since
- * a signal may be multiplied by a state that is 0.  A status; in the second state signals may fail. */
-static int signals_compare (signal_comparison *x, int number, double t0, double t1) {
-  pw_run *r = x->r;
-  pw_workspace *w = r->w;
-  double *q = x->state, *v = q + r->s->coords;
-  pw_irregular_state (r, number, number, q, v);
-  int status = pw_update_kinematics (w, t0, q, v);
-  if (status == PW_OK && x->count) memcpy (x->values, w->u, (size_t)x->count * sizeof *w->u);
-  if (status == PW_OK) status = pw_update_kinematics (w, t1, q, v);
-  for (int i = 0; status == PW_OK && i < x->count; i++) {
-    if (i % 3 > 0 && r->s->source[i / 3].of_force) continue; /* these derivatives are meaningless */
-    x->difference[i] = pw_larger_or_nan (x->difference[i], fabs (w->u[i] - x->values[i]));
-    x->largest[i] = fmax (x->largest[i], fmax (fabs (x->values[i]), fabs (w->u[i])));
-  }
-  return number > 0 ? PW_OK : status;
-}
-
-/* The middle between the first two breakpoints after *t, or the first one and t1; INFINITY without one before t1.
- * Moves *t to the first one. */
-static double signals_next_interval (pw_workspace *w, double *t, double t1) {
-  *t = pw_next_breakpoint (w, 1, *t);
-  return *t < t1 ? *t + (fmin (pw_next_breakpoint (w, 1, *t), t1) - *t) / 2 : INFINITY;
-}
-
-int pw_signals_change (pw_run *r, double t, double period, double span, int *changed, pw_error *error) {
-  signal_comparison x = { .r = r, .count = 3 * r->s->sources };
-  size_t count = (size_t)x.count;
-  double at = t, breakpoint = t;
-  int status = PW_OK;
-  x.values = calloc (3 * count + 2 * (size_t)r->s->coords + 1, sizeof *x.values);
-  if (x.values == NULL) return pw_fail_memory (r->s, error);
-  x.largest = x.values + count, x.difference = x.largest + count, x.state = x.difference + count;
-  for (int k = 1; status == PW_OK && k <= 2 * SIGNAL_TIMES && isfinite (at); k++) {
-    double part = k / (double)SIGNAL_TIMES;
-    at = k > SIGNAL_TIMES ? signals_next_interval (r->w, &breakpoint, t + span)
-         : period > 0     ? t + span * fmod (0.618034 * k, 1) /* golden ratio: equidistributed */
-                          : t + span * part * part;               /* denser at first */
-    for (int number = 0; number < 2 && status == PW_OK && isfinite (at); number++)
-      status = signals_compare (&x, number, period > 0 ? at : t, period > 0 ? at + period : at);
-  }
-  *changed = -1;
-  for (int i = x.count; i-- > 0;)
-    if (!(x.difference[i] <= SIGNAL_SAME * x.largest[i])) *changed = i / 3;
-  free (x.values);
-  return status == PW_OK ? PW_OK : pw_run_annotate_error (r, pw_fail_signal (at, error), error);
 }

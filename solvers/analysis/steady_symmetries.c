@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "rank.h"
-#include "steady_parts.h"
+#include "search.h"
 #include "util.h"
 
 enum {

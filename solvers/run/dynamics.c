@@ -6,10 +6,235 @@
  *
  * (Baumgarte 1972, Stabilization of constraints and integrals of motion in dynamical systems.) */
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 #include "method.h"
+#include "rank.h"
 #include "specialised.h"
 #include "util.h"
+
+/* ---- Specialised code ----
+ *
+ * It is compiled for one scene and serves in place of the general evaluation and projection.  It refuses states at
+ * which a pivot is small or a value extreme; the general functions evaluate these. */
+
+/* pw_scene.update: evaluates the signals for the compiled code. */
+static int specialised_update (void *workspace, double t, const double *q, const double *v) {
+  return pw_update_signals (workspace, t, q, v);
+}
+
+/* Makes r->scene, the data of the compiled code; PW_OK or PW_RESOURCE. */
+static int specialised_allocate (pw_run *r, int constants) {
+  const pw_system *s = r->s;
+  const void **element = pw_arena_alloc (&r->arena, (size_t)s->batches * sizeof *element);
+  const pw_kind **kind = pw_arena_alloc (&r->arena, (size_t)s->batches * sizeof *kind);
+  const pw_signal **signal = pw_arena_alloc (&r->arena, (size_t)s->sources * sizeof *signal);
+  double *constant = pw_arena_alloc (&r->arena, (size_t)constants * sizeof *constant); /* filled by `prepare` */
+  r->scene = pw_arena_alloc (&r->arena, sizeof *r->scene);
+  if (!element || !kind || !signal || !constant || !r->scene) return PW_RESOURCE;
+  for (int i = 0; i < s->batches; i++) element[i] = s->batch[i].b.element, kind[i] = s->batch[i].kind;
+  for (int i = 0; i < s->sources; i++) signal[i] = &r->w->source[i].signal;
+  *r->scene = (pw_scene){ .element = element,
+                          .kind = kind,
+                          .signal = signal,
+                          .constant = constant,
+                          .mass = s->mass,
+                          .force = s->constant,
+                          .u = r->w->u,
+                          .t_signal = &r->w->t_signal,
+                          .update = specialised_update,
+                          .workspace = r->w };
+  return PW_OK;
+}
+
+void pw_specialised_select (pw_run *r) {
+  const pw_specialised *code = r->settings.specialised;
+  int suits = r->scene != NULL;
+  for (int i = 0; suits && i < r->s->rows; i++) suits = code->independent[i] == (r->active == NULL || r->active[i]);
+  r->specialised = suits ? code : NULL;
+}
+
+int pw_specialised_open (pw_run *r, pw_error *error) {
+  const pw_specialised *code = r->settings.specialised;
+  if (code == NULL || r->settings.integrals > 0) return PW_OK;
+  if (!pw_specialised_fits (code, r->s))
+    return pw_fail (error, PW_INPUT, "model %s: the specialised code belongs to another scene", r->s->model);
+  if (specialised_allocate (r, code->constants) != PW_OK) return pw_fail_memory (r->s, error);
+  r->scene->length = r->w->scale.length, r->scene->speed = r->scene->length / r->w->scale.time;
+  r->scene->redundant_residual = r->thresholds.redundant_residual;
+  r->scene->alpha = r->alpha, r->scene->beta = r->beta;
+  if (code->prepare (r->scene) != 0) r->scene = NULL;
+  pw_specialised_select (r);
+  return PW_OK;
+}
+
+/* 0 also where a singular configuration may be ahead and steps are fixed: the general functions then compute the sine
+ * of every stage.  Adaptive methods need it only below the pivots that the specialised code accepts. */
+int pw_specialised_suits (const pw_run *r) {
+  const pw_watchdog *watch = &r->watchdog;
+  return r->specialised && !r->redundant_drive && !(watch->singular_ahead && watch->saddle && r->fixed_steps) &&
+         !r->near_singular && !r->w->hold;
+}
+
+void pw_specialised_count (pw_run *r, long evaluations, long iterations) {
+  r->statistics.rhs += evaluations;
+  r->statistics.specialised += evaluations;
+  r->statistics.factorisations += evaluations + iterations;
+}
+
+/* After an evaluation at (q, v): makes the workspace and the saddle consistent with it, and counts it. */
+static void specialised_finish (pw_run *r, const double *q, const double *v, long iterations) {
+  if (r->s->coords > 3 * r->s->bodies) pw_point_to_internal (r->w, q, v);
+  pw_saddle_postpone (r->saddle, PW_SCENE_PIVOT);
+  pw_specialised_count (r, 1, iterations);
+}
+
+/* As pw_run_accelerate, if specialised code can do it: 1; 0 if not. */
+static int specialised_evaluate (pw_run *r, double t, const double *q, const double *v, double *a, double *lambda) {
+  if (!pw_specialised_suits (r)) return 0;
+  if (r->specialised->evaluate (r->scene, t, q, v, a, lambda, r->w->configuration, r->w->J)) return 0;
+  specialised_finish (r, q, v, 0);
+  return 1;
+}
+
+/* The first stage of a step is the state reached, which has been evaluated. */
+int pw_specialised_stages (pw_run *r, const pw_scene_step *x) {
+  if (!pw_specialised_suits (r) || r->specialised->stages (r->scene, x)) return 0;
+  pw_specialised_count (r, x->stages - 1, 0);
+  return 1;
+}
+
+static void specialised_copy_residuals (pw_run *r) {
+  const pw_scene *x = r->scene;
+  r->residuals = (pw_residuals){ .position = x->position, .g = x->g, .velocity = x->velocity, .jv = x->jv };
+}
+
+int pw_specialised_project (const pw_projector *p, pw_run *r, double t, double *q, double *v, double *a,
+                            double *lambda) {
+  if (p->owns_velocity || !pw_specialised_suits (r)) return 0;
+  if (r->specialised->project (r->scene, t, q, v, a, lambda, r->w->configuration, r->w->J)) return 0;
+  specialised_finish (r, q, v, r->scene->iterations);
+  if (r->active)
+    pw_forget_residuals (r);
+  else
+    specialised_copy_residuals (r);
+  return 1;
+}
+
+/* Both residuals of the state reached, unless one is known or the general engine has to evaluate them. */
+static void specialised_residuals (pw_run *r) {
+  if (!pw_specialised_suits (r) || r->active || !isnan (r->residuals.position) || !isnan (r->residuals.velocity))
+    return;
+  r->specialised->residuals (r->scene, r->q, r->v, r->w->configuration, r->w->J);
+  specialised_copy_residuals (r);
+}
+
+/* ---- The sine, which measures the distance from singular configurations; see method.h ---- */
+
+/* The index of the n-th body of element e; that of the ground is s->bodies. */
+static int singular_body (const pw_system *s, const pw_element_batch *k, int e, int n) {
+  int j = k->column[e * k->kind->bodies + n];
+  return j < s->coords ? j / 3 : s->bodies;
+}
+
+/* 1 if a holonomic constraint connects bodies that are already connected; -1 if out of memory.  The ground is a body,
+ * to which an element on one body connects it. */
+static int singular_has_loops (const pw_system *s) {
+  int loops = 0, *set = malloc (((size_t)s->bodies + 1) * sizeof *set);
+  if (set == NULL) return -1;
+  for (int b = 0; b <= s->bodies; b++) set[b] = b;
+  for (const pw_element_batch *k = s->batch; k < s->batch + s->constraints && k->row < s->holonomic; k++)
+    for (int e = 0; e < k->b.count; e++) {
+      int first = k->kind->bodies > 1 ? singular_body (s, k, e, 0) : s->bodies;
+      for (int n = k->kind->bodies > 1; n < k->kind->bodies; n++) {
+        int a = pw_root (set, first), b = pw_root (set, singular_body (s, k, e, n));
+        loops |= a == b;
+        set[b] = a;
+      }
+    }
+  free (set);
+  return loops;
+}
+
+/* The holonomic rows of a tree of bodies cannot become dependent, whatever its configuration. */
+int pw_watchdog_open (pw_run *r, pw_error *error) {
+  const pw_system *s = r->s;
+  pw_watchdog *watch = &r->watchdog;
+  watch->loops = singular_has_loops (s);
+  if (watch->loops < 0) return pw_fail_memory (s, error);
+  if (watch->loops == 0 && s->rows == s->holonomic) return PW_OK;
+  pw_saddle_close (watch->saddle);
+  pw_length_weights (s, r->scratch);
+  watch->saddle = pw_saddle_open (r->w, r->scratch, s->rows, r->active, error);
+  return watch->saddle ? PW_OK : PW_RESOURCE;
+}
+
+double pw_watchdog_sine (pw_run *r, int *row) {
+  pw_saddle *saddle = r->watchdog.saddle;
+  if (row) *row = -1;
+  if (saddle == NULL) return 1;
+  int status = pw_saddle_factor (saddle);
+  double sine = pw_saddle_sine (saddle, row);
+  return status == PW_OK ? sine : 0;
+}
+
+int pw_watchdog_near (pw_run *r) {
+  pw_watchdog *watch = &r->watchdog;
+  if (!watch->singular_ahead || watch->saddle == NULL) return 0;
+  if (!r->fixed_steps && !pw_saddle_sine_below (r->saddle, r->thresholds.refine)) return 0;
+  watch->evaluated_sine = pw_watchdog_sine (r, NULL);
+  return watch->evaluated_sine < r->thresholds.near * watch->largest_sine;
+}
+
+int pw_watchdog_near_state (pw_run *r) {
+  if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return 0;
+  pw_saddle_factor (r->saddle);
+  r->watchdog.singular_ahead = 1;
+  return pw_watchdog_near (r);
+}
+
+int pw_fail_singular (pw_run *r, double t, pw_error *error) {
+  int row = -1;
+  double sine = pw_watchdog_sine (r, &row);
+  /* largest_sine is 0 while the run is being opened */
+  if (sine > r->thresholds.rank_refused && sine > r->thresholds.near * r->watchdog.largest_sine)
+    return pw_fail (
+        error, PW_METHOD,
+        "t = %.6g s: values too extreme: masses and inertias differ by so much that the equations of motion "
+        "cannot be solved; the configuration is not singular",
+        t);
+  const char *name = row >= 0 ? PW_NAME (pw_system_row_name, r->s, row) : "a constraint";
+  if (sine <= r->thresholds.rank_lost)
+    return pw_fail (error, PW_METHOD, "t = %.6g s: singular configuration: %s depends on other constraints", t, name);
+  return pw_fail (
+      error, PW_METHOD,
+      "t = %.6g s: near a singular configuration: %s nearly depends on other constraints (sine %.2g); the next "
+      "step cannot be computed",
+      t, name, sine);
+}
+
+int pw_watchdog_check_values (const pw_run *r, pw_error *error) {
+  const pw_system *s = r->s;
+  const double extreme = r->thresholds.extreme;
+  for (int i = 0; i < 2 * s->coords; i++) {
+    double value = i < s->coords ? r->q[i] : r->v[i - s->coords];
+    if (!(fabs (value) < extreme))
+      return pw_fail (error, PW_INPUT,
+                      "model %s: values too extreme: %s is initially %g: expected a magnitude below %g", s->model,
+                      PW_NAME (pw_system_state_name, s, i), value, extreme);
+  }
+  for (int j = 0; s->rows > 0 && j < s->coords; j++) {
+    double unit = pw_length_factor (s, j) * pw_length_factor (s, j), mass = s->mass[j] / unit;
+    if (mass != 0 && !(mass < extreme && mass > 1 / extreme))
+      return pw_fail (
+          error, PW_INPUT,
+          "model %s: values too extreme: the mass or inertia that goes with %s is %g: expected 0, or %g to %g",
+          s->model, PW_NAME (pw_system_state_name, s, j), s->mass[j], unit / extreme, unit * extreme);
+  }
+  return PW_OK;
+}
+
+/* ---- General evaluation ---- */
 
 /* The first coords + 3 + rows numbers of r->scratch stay free for callers. */
 void pw_run_gamma (pw_run *r, const double *v, double *gamma) {
@@ -81,7 +306,7 @@ int pw_run_accelerate_evaluated (pw_run *r, const double *v, double *a, double *
 }
 
 int pw_run_accelerate (pw_run *r, double t, const double *q, const double *v, double *a, double *lambda) {
-  if (pw_specialised_evaluate (r, t, q, v, a, lambda)) return PW_OK;
+  if (specialised_evaluate (r, t, q, v, a, lambda)) return PW_OK;
   int near, status = pw_evaluate_J_at (r->w, t, q, v);
   if (status != PW_OK) return status;
   status = dynamics_solve (r, v, a, lambda, &near);
@@ -99,7 +324,7 @@ void pw_sample_reached (pw_run *r) {
 void pw_record_residuals (pw_run *r) {
   pw_residuals *now = &r->residuals;
   pw_statistics *largest = &r->statistics;
-  pw_specialised_residuals (r);
+  specialised_residuals (r);
   if (isnan (now->position)) pw_evaluate_position_residual (r->w, NULL, now);
   if (isnan (now->velocity)) pw_evaluate_velocity_residual (r->w, NULL, now);
   largest->position = pw_larger (largest->position, now->position);
@@ -108,120 +333,7 @@ void pw_record_residuals (pw_run *r) {
   largest->jv = pw_larger (largest->jv, now->jv);
 }
 
-/* Use of specialised code, compiled for one scene, in place of the general evaluation and projection.  It refuses
- * states at which a pivot is small or a value extreme; the general functions evaluate these. */
-
-/* pw_scene.update: evaluates the signals for the compiled code. */
-static int specialised_update (void *workspace, double t, const double *q, const double *v) {
-  return pw_update_signals (workspace, t, q, v);
-}
-
-/* Makes r->scene, the data of the compiled code; PW_OK or PW_RESOURCE. */
-static int specialised_allocate (pw_run *r, int constants) {
-  const pw_system *s = r->s;
-  const void **element = pw_arena_alloc (&r->arena, (size_t)s->batches * sizeof *element);
-  const pw_kind **kind = pw_arena_alloc (&r->arena, (size_t)s->batches * sizeof *kind);
-  const pw_signal **signal = pw_arena_alloc (&r->arena, (size_t)s->sources * sizeof *signal);
-  double *constant = pw_arena_alloc (&r->arena, (size_t)constants * sizeof *constant); /* filled by `prepare` */
-  r->scene = pw_arena_alloc (&r->arena, sizeof *r->scene);
-  if (!element || !kind || !signal || !constant || !r->scene) return PW_RESOURCE;
-  for (int i = 0; i < s->batches; i++) element[i] = s->batch[i].b.element, kind[i] = s->batch[i].kind;
-  for (int i = 0; i < s->sources; i++) signal[i] = &r->w->source[i].signal;
-  *r->scene = (pw_scene){ .element = element,
-                          .kind = kind,
-                          .signal = signal,
-                          .constant = constant,
-                          .mass = s->mass,
-                          .force = s->constant,
-                          .u = r->w->u,
-                          .t_signal = &r->w->t_signal,
-                          .update = specialised_update,
-                          .workspace = r->w };
-  return PW_OK;
-}
-
-int pw_specialised_open (pw_run *r, pw_error *error) {
-  const pw_specialised *code = r->settings.specialised;
-  if (code == NULL || r->settings.integrals > 0) return PW_OK;
-  if (!pw_specialised_fits (code, r->s))
-    return pw_fail (error, PW_INPUT, "model %s: the specialised code belongs to another scene", r->s->model);
-  if (specialised_allocate (r, code->constants) != PW_OK) return pw_fail_memory (r->s, error);
-  r->scene->length = r->w->scale.length, r->scene->speed = r->scene->length / r->w->scale.time;
-  r->scene->redundant_residual = r->thresholds.redundant_residual;
-  r->scene->alpha = r->alpha, r->scene->beta = r->beta;
-  if (code->prepare (r->scene) != 0) r->scene = NULL;
-  pw_specialised_select (r);
-  return PW_OK;
-}
-
-void pw_specialised_select (pw_run *r) {
-  const pw_specialised *code = r->settings.specialised;
-  int suits = r->scene != NULL;
-  for (int i = 0; suits && i < r->s->rows; i++) suits = code->independent[i] == (r->active == NULL || r->active[i]);
-  r->specialised = suits ? code : NULL;
-}
-
-/* 0 also where a singular configuration may be ahead and steps are fixed: the general functions then compute the sine
- * of every stage.  Adaptive methods need it only below the pivots that the specialised code accepts. */
-int pw_specialised_suits (const pw_run *r) {
-  const pw_watchdog *watch = &r->watchdog;
-  return r->specialised && !r->redundant_drive && !(watch->singular_ahead && watch->saddle && r->fixed_steps) &&
-         !r->near_singular && !r->w->hold;
-}
-
-void pw_specialised_count (pw_run *r, long evaluations, long iterations) {
-  r->statistics.rhs += evaluations;
-  r->statistics.specialised += evaluations;
-  r->statistics.factorisations += evaluations + iterations;
-}
-
-/* After an evaluation at (q, v): makes the workspace and the saddle consistent with it, and counts it. */
-static void specialised_finish (pw_run *r, const double *q, const double *v, long iterations) {
-  if (r->s->coords > 3 * r->s->bodies) pw_point_to_internal (r->w, q, v);
-  pw_saddle_postpone (r->saddle, PW_SCENE_PIVOT);
-  pw_specialised_count (r, 1, iterations);
-}
-
-int pw_specialised_evaluate (pw_run *r, double t, const double *q, const double *v, double *a, double *lambda) {
-  if (!pw_specialised_suits (r)) return 0;
-  if (r->specialised->evaluate (r->scene, t, q, v, a, lambda, r->w->configuration, r->w->J)) return 0;
-  specialised_finish (r, q, v, 0);
-  return 1;
-}
-
-/* The first stage of a step is the state reached, which has been evaluated. */
-int pw_specialised_stages (pw_run *r, const pw_scene_step *x) {
-  if (!pw_specialised_suits (r) || r->specialised->stages (r->scene, x)) return 0;
-  pw_specialised_count (r, x->stages - 1, 0);
-  return 1;
-}
-
-static void specialised_copy_residuals (pw_run *r) {
-  const pw_scene *x = r->scene;
-  r->residuals = (pw_residuals){ .position = x->position, .g = x->g, .velocity = x->velocity, .jv = x->jv };
-}
-
-int pw_specialised_project (const pw_projector *p, pw_run *r, double t, double *q, double *v, double *a,
-                            double *lambda) {
-  if (p->owns_velocity || !pw_specialised_suits (r)) return 0;
-  if (r->specialised->project (r->scene, t, q, v, a, lambda, r->w->configuration, r->w->J)) return 0;
-  specialised_finish (r, q, v, r->scene->iterations);
-  if (r->active)
-    pw_forget_residuals (r);
-  else
-    specialised_copy_residuals (r);
-  return 1;
-}
-
-void pw_specialised_residuals (pw_run *r) {
-  if (!pw_specialised_suits (r) || r->active || !isnan (r->residuals.position) || !isnan (r->residuals.velocity))
-    return;
-  r->specialised->residuals (r->scene, r->q, r->v, r->w->configuration, r->w->J);
-  specialised_copy_residuals (r);
-}
-
-/* The options of a run's method, for the methods themselves; methods.c, which reads options, depends on all methods. */
-
+/* For the methods themselves; methods.c, which reads options, depends on all methods. */
 double pw_run_option (const pw_run *r, const char *name) {
   int i = 0;
   while (r->method->options[i].name && strcmp (r->method->options[i].name, name) != 0) i++;

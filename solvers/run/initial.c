@@ -665,7 +665,7 @@ static int initial_list_round (initial_search *x) {
 
 /* Keeps as many candidates as possible, from the least change of all. */
 static int initial_keep (initial_search *x) {
-  int released = 1, count = 0, mass = 0;
+  int released = 1, status = PW_OK, mass = 0;
   while (released > 0 && x->attempts < x->most_attempts) {
     if (x->level == INITIAL_POSITIONS && pw_evaluate_J_at (x->r->w, x->r->t, x->r->q, x->r->v) != PW_OK)
       return PW_METHOD;
@@ -675,9 +675,9 @@ static int initial_keep (initial_search *x) {
   }
   for (int j = 0; j < x->s->coords; j++)
     if (x->importance[j] == INITIAL_MASS) x->list[mass++] = j;
-  count = mass > 0 ? initial_try (x, 0, mass) : PW_OK;
-  if (count >= 0) count = initial_keep_list (x, initial_list_round (x));
-  return count < 0 ? count : PW_OK;
+  if (mass > 0) status = initial_try (x, 0, mass);
+  if (status >= 0) status = initial_keep_list (x, initial_list_round (x));
+  return status < 0 ? status : PW_OK;
 }
 
 /* ---- The two levels ---- */
@@ -734,21 +734,14 @@ static int initial_open (initial_search *x, pw_run *r, initial_level level, cons
   return pw_sparse_open (&x->matrix, PW_SPARSE_REAL, s->coords + x->rows, x->map.colptr, x->map.rowind);
 }
 
-static void initial_close (initial_search *x) {
-  pw_sparse_close (&x->matrix);
-  pw_scatter_close (&x->map);
-  free (x->memory);
-}
-
-static int initial_positions (initial_search *x) {
-  int status = initial_search_positions (x);
-  if (status == PW_OK && initial_changes (x).candidate > 0) status = initial_keep (x);
-  return status;
-}
-
-/* The least change of all, where not all candidates can be kept. */
-static int initial_velocities (initial_search *x) {
-  int status = initial_prescribe_velocities (x, INITIAL_SPECIFIED);
+/* Finds consistent values, by the least change of all where not all candidates can be kept; keeps what it can. */
+static int initial_find (initial_search *x) {
+  int status;
+  if (x->level == INITIAL_POSITIONS) {
+    status = initial_search_positions (x);
+    return status == PW_OK && initial_changes (x).candidate > 0 ? initial_keep (x) : status;
+  }
+  status = initial_prescribe_velocities (x, INITIAL_SPECIFIED);
   if (status != PW_RETRY) return status;
   initial_stage_weights (x, &initial_least_change);
   status = initial_project_velocities (x);
@@ -761,8 +754,7 @@ static int initial_velocities (initial_search *x) {
 static int initial_contradiction (initial_search *x, char *text, size_t size) {
   const pw_system *s = x->s;
   double *eta = x->r->scratch, *Jv = eta + s->rows, most = 0;
-  char element[PW_NAME_BYTES], previous[PW_NAME_BYTES] = "";
-  *text = 0;
+  unsigned char *violated = (unsigned char *)eta;
   memset (x->importance, INITIAL_FREE, (size_t)s->coords);
   initial_stage_weights (x, &initial_least_change);
   initial_units (x);
@@ -775,12 +767,14 @@ static int initial_contradiction (initial_search *x, char *text, size_t size) {
     x->residual[i] = fabs (x->residual[i] + Jv[i]) / x->unit[i];
     most = fmax (most, x->residual[i]);
   }
-  for (int i = 0; i < s->rows && strlen (text) < 200; i++) {
-    const size_t length = strlen (text);
-    if (x->residual[i] > 1e-3 * most && strcmp (pw_system_row_name (s, i, element, sizeof element), previous) != 0)
-      snprintf (text + length, size - length, "%s%s", length ? ", " : "", strcpy (previous, element));
-  }
+  for (int i = 0; i < s->rows; i++) violated[i] = x->residual[i] > 1e-3 * most;
+  pw_list_elements (s, violated, 1, text, size);
   return *text != 0;
+}
+
+/* The unit of the residual of a position equation. */
+static const char *initial_unit (const pw_system *s, int row) {
+  return strcmp (pw_system_reaction_unit (s, row), "N m") == 0 ? "rad" : "m";
 }
 
 static int initial_fail (initial_search *x, pw_error *error) {
@@ -792,24 +786,24 @@ static int initial_fail (initial_search *x, pw_error *error) {
                     elements, strchr (elements, ',') ? " each other" : "s itself");
   if (x->failed_row < 0)
     return pw_fail (error, PW_INITIAL, "model %s: the initial state cannot be made consistent", s->model);
-  const char *element = PW_NAME (pw_system_row_name, s, x->failed_row);
-  const char *unit = strcmp (pw_system_reaction_unit (s, x->failed_row), "N m") == 0 ? "rad" : "m";
   return pw_fail (
       error, PW_INITIAL,
       "model %s: the initial state cannot be made consistent: %s is open by %.6g %s; if it can close, begin "
       "nearer to where it does",
-      s->model, element, x->failed_by, unit);
+      s->model, PW_NAME (pw_system_row_name, s, x->failed_row), x->failed_by, initial_unit (s, x->failed_row));
 }
 
 /* Makes positions, or velocities at consistent positions, consistent. */
 static int initial_level_consistent (pw_run *r, initial_level level, const unsigned char *origin, pw_error *error) {
   initial_search x;
   int status = initial_open (&x, r, level, origin);
-  if (status == PW_OK) status = level == INITIAL_POSITIONS ? initial_positions (&x) : initial_velocities (&x);
+  if (status == PW_OK) status = initial_find (&x);
   if (status == PW_RETRY && initial_is_stopped (&x)) status = PW_STOPPED;
   if (status == PW_RETRY || x.out_of_memory) status = initial_fail (&x, error);
   if (status == PW_RESOURCE) status = pw_fail_memory (r->s, error);
-  initial_close (&x);
+  pw_sparse_close (&x.matrix);
+  pw_scatter_close (&x.map);
+  free (x.memory);
   return status;
 }
 
@@ -857,10 +851,9 @@ char *pw_run_initial_reason (pw_run *r, int state, char *buffer, size_t size) {
     }
     const int row = is_velocity ? now.row_velocity : now.row_position;
     const double by = row < 0 ? 0 : fabs (Jv[row] - eta[row]);
-    const int is_angle = row >= 0 && strcmp (pw_system_reaction_unit (s, row), "N m") == 0;
     if (by > 0 && (is_velocity ? now.velocity : now.position) > PW_RESIDUAL_ACCEPTED)
       snprintf (buffer, size, "%s would be %s by %.3g %s%s", PW_NAME (pw_system_row_name, s, row),
-                is_velocity ? "violated" : "open", by, is_angle ? "rad" : "m", is_velocity ? "/s" : "");
+                is_velocity ? "violated" : "open", by, initial_unit (s, row), is_velocity ? "/s" : "");
   }
   *value = kept;
   (void)pw_evaluate_J_at (r->w, r->t, r->q, r->v);
@@ -880,9 +873,9 @@ int pw_initial_given (const pw_initial_report *report, int state) {
 static int initial_locked (pw_run *r, const unsigned char *origin, pw_error *error) {
   const pw_system *s = r->s;
   double given = 0, left = 0, speed = 0, *Jv = r->scratch, *eta = Jv + s->rows;
-  char element[PW_NAME_BYTES], previous[PW_NAME_BYTES] = "", elements[300] = "";
-  const char *advice = "";
-  int rest = 0, motion = 0;
+  unsigned char *violated = (unsigned char *)(eta + s->rows);
+  char elements[300];
+  int rest = 0, motion = 0, last = 0;
   for (int j = 0; j < s->coords; j++) {
     if (origin[s->coords + j] & PW_GIVEN) *(r->v_given[j] == 0 ? &rest : &motion) = 1;
     given += s->metric[j] * r->v_given[j] * r->v_given[j];
@@ -892,17 +885,15 @@ static int initial_locked (pw_run *r, const unsigned char *origin, pw_error *err
   if (s->rows == s->holonomic || given == 0 || left > 1e-20 * given || rest > motion) return PW_OK;
   pw_mul_J (r->w, r->v_given, Jv);
   pw_evaluate_eta (r->w, eta);
-  for (int i = s->holonomic; i < s->rows && strlen (elements) < 150; i++) {
-    size_t length = strlen (elements);
-    if (fabs (Jv[i] - eta[i]) <= 1e-10 * speed) continue;
-    if (strcmp (pw_system_row_name (s, i, element, sizeof element), previous) == 0) continue;
-    if (length) advice = pw_advice_on_wheel (s, i);
-    snprintf (elements + length, sizeof elements - length, "%s%s", length ? ", " : "", strcpy (previous, element));
+  for (int i = 0; i < s->rows; i++) {
+    violated[i] = i >= s->holonomic && !(fabs (Jv[i] - eta[i]) <= 1e-10 * speed);
+    if (violated[i]) last = i;
   }
+  pw_list_elements (s, violated, 1, elements, sizeof elements);
   if (*elements == 0) return PW_OK;
   return pw_fail (error, PW_INITIAL,
                   "model %s: the given velocities would have to be removed entirely: %s allow no such motion%s",
-                  s->model, elements, advice);
+                  s->model, elements, strchr (elements, ',') ? pw_advice_on_wheel (s, last) : "");
 }
 
 int pw_run_make_consistent (pw_run *r, const unsigned char *origin, pw_error *error) {

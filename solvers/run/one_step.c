@@ -1,4 +1,4 @@
-/* The functions of pinwheel-method.h for one-step methods of users; pw_run_option: dynamics.c; pw_run_accelerate:
+/* The functions of pinwheel-method.h for one-step methods of users, and dense output; pw_run_option, pw_run_accelerate:
  * dynamics.c. */
 #include <math.h>
 #include <stdlib.h>

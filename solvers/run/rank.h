@@ -1,5 +1,4 @@
-/* Independent constraint equations (rank.c, independent.c), and the redundant ones as combinations of them
- * (independent.c). */
+/* Independent constraint equations, and the redundant ones as combinations of them. */
 #ifndef PW_RANK_H
 #define PW_RANK_H
 
@@ -12,14 +11,18 @@ struct pw_run;
 #define PW_RANK_MAX_ENTRIES 4e7
 
 /* The factor by which coordinate j becomes a length: 1, or L for an angle. */
-double pw_length_factor (const pw_system *s, int j);
+static inline double pw_length_factor (const pw_system *s, int j) {
+  return pw_is_angle (s, j) ? s->scale.length : 1;
+}
 
 /* All rows of the J last evaluated, dense (rows x coords), as derivatives with respect to these lengths, normalised to
  * length 1; `norm` (rows, or NULL): their former lengths; empty rows stay 0. */
 void pw_rank_rows (const pw_workspace *w, double *rows, double *norm);
 
 /* Weights of a metric of lengths: the squares of these factors. */
-void pw_length_weights (const pw_system *s, double *weight);
+static inline void pw_length_weights (const pw_system *s, double *weight) {
+  for (int j = 0; j < s->coords; j++) weight[j] = pw_length_factor (s, j) * pw_length_factor (s, j);
+}
 
 /* The n-th of a sequence of irregular numbers in [-1, 1], without symmetries that a scene could share: sines of
  * multiples of the golden angle.  Another phase, an arbitrary number, gives another sequence. */
@@ -27,30 +30,8 @@ static inline double pw_irregular (double phase, int n) {
   return pw_sin (phase + 2.39996 * n);
 }
 
-/* Independent rows of J.  Those that belong to every maximal independent set are found by their pattern; of the others,
- * an orthonormal basis is kept. */
-typedef struct {
-  struct pw_run *run;    /* whose settings.stop ends the selection (r->stopped), or NULL */
-  unsigned char *active; /* rows: 1 for the independent ones */
-  int rank;              /* number of rows in the basis */
-  int *kept;             /* rank: their indices */
-  double *rows;          /* rows x coords: those kept are the basis, the others scratch */
-  double *norm;          /* rows: scratch */
-  int coords;            /* columns in which the others have entries */
-  int *first, *column;   /* rows + 1: the first entry of each row; column of each entry of J */
-  double *value;         /* of these entries */
-  int *count, *queue;    /* columns: number of remaining rows with an entry; scratch */
-  long *sum;             /* columns: sum of the indices of these rows */
-  char *memory;
-} pw_row_basis;
-int pw_row_basis_open (pw_row_basis *b, const pw_system *s); /* PW_OK or PW_RESOURCE */
-void pw_row_basis_close (pw_row_basis *b);
-
-/* Selects at most `max_holonomic` holonomic equations, and at most `max_rows` in all, by Gram-Schmidt on the J last
- * evaluated, rows of length 1: those of which a part longer than tol is independent of the ones kept before.  Holonomic
- * equations come first, since a nonholonomic one must not replace a holonomic one; of each kind the most independent
- * ones, in order where they are about equal.  Returns the rank. */
-int pw_row_basis_select (pw_row_basis *b, const pw_workspace *w, double tol, int max_holonomic, int max_rows);
+/* Names the elements of the rows with which[i] = wanted, the first four and the number of the others. */
+void pw_list_elements (const pw_system *s, const unsigned char *which, int wanted, char *list, size_t size);
 
 /* Selects r->active, a maximal set of independent rows, for the run at its consistent initial state.  The saddle must
  * be open, and opened again afterwards.  r->active stays NULL if all rows are independent: then pw_rank_reselect,

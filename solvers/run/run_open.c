@@ -1,4 +1,4 @@
-/* Opening a run: settings, consistent initial state, accelerations there, method. */
+/* Opening a run: settings, consistent initial state, accelerations there, method.  Checkpoints. */
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
@@ -152,64 +152,7 @@ int pw_run_check_derivatives (pw_run *r, const char *user, const char *needs, pw
       r->s->model, block, user, needs);
 }
 
-static int run_open (pw_run *r, const char *method, const pw_settings *settings, pw_error *error) {
-  const pw_settings none = { 0 };
-  if (settings == NULL) settings = &none;
-  r->thresholds = pw_watchdog_thresholds;
-  r->refused_sine = r->thresholds.rank_lost;
-  r->settings.integrals = settings->integrals, r->entries = r->s->entries + settings->integrals;
-  if (run_allocate (r) != PW_OK) return pw_fail_memory (r->s, error);
-  int status = run_initial_values (r, settings, error);
-  if (status == PW_OK)
-    status = pw_parse_options (method, settings->methods, &r->method, &r->stabilisation, r->option, error);
-  if (status != PW_OK) return status;
-  r->fixed_steps = !pw_method_adaptive (r->method, method);
-  status = run_settings (&r->settings, settings, r->fixed_steps, error);
-  if (status != PW_OK) return status;
-  r->t = r->settings.t;
-  pw_hold_signals (r->w, 0);
-  r->w->scale.time = r->settings.span; /* until the accelerations are known */
-  status = run_check_stop (r, pw_run_make_consistent (r, r->origin, error));
-  if (status == PW_OK) status = run_first_evaluation (r, error);
-  if (status == PW_OK) status = run_check_finite (r, error);
-  if (status != PW_OK) return status;
-  r->w->scale.time = run_time_scale (r);
-  pw_run_count_moved (r);
-  pw_run_set_reference_level (r);
-  pw_ledger_begin (r);
-  pw_forget_residuals (r);
-  pw_record_residuals (r);
-  status = pw_run_look_ahead (r, error);
-  if (status != PW_OK) return status;
-  if (pw_stabilised_by (r, PW_BAUMGARTE)) r->alpha = pw_run_option (r, "alpha"), r->beta = pw_run_option (r, "beta");
-  r->identity = pw_run_identity (r);
-  status = pw_specialised_open (r, error);
-  if (status == PW_OK) status = run_check_stop (r, r->method->open (r, error));
-  if (status != PW_OK || !r->uses_derivatives) return status;
-  return pw_run_check_derivatives (r, method, "needs", error);
-}
-
-pw_run *pw_run_open (const pw_system *s, const char *method, const pw_settings *settings, pw_error *error) {
-  if (pw_require (s, "a system", error) != PW_OK) return NULL;
-  pw_run *r = calloc (1, sizeof *r);
-  if (r == NULL) {
-    pw_fail_memory (s, error);
-    return NULL;
-  }
-  r->s = s;
-  r->w = pw_workspace_new (s, error);
-  int status = r->w ? pw_run_annotate_error (r, run_open (r, method, settings, error), error) : PW_RESOURCE;
-  if (status == PW_OK) return r;
-  if (status == PW_STOPPED) pw_fail (error, PW_STOPPED, "model %s: stopped before the first step", s->model);
-  pw_run_close (r);
-  return NULL;
-}
-
-/* Checkpoints: the state of a run as bytes.
- *
- * What a method or a factorisation has built up, such as pivot choices and earlier values of a multistep formula, is
- * not saved: the saved run and the loaded one both rebuild it from the state reached, and so continue alike.  A
- * method's `serialise` adds what it cannot rebuild: step size, counts. */
+/* ---- Identity: what a saved state must share with the run that loads it ---- */
 
 static void checkpoint_add_text (unsigned long long *sum, const char *text) {
   *sum = pw_check_sum (*sum, text, strlen (text) + 1);
@@ -240,7 +183,9 @@ static void checkpoint_add_signal (unsigned long long *sum, const pw_signal *x) 
   *sum = pw_check_sum (*sum, x->table.value, (size_t)x->table.count * sizeof (double));
 }
 
-unsigned long long pw_run_identity (const pw_run *r) {
+/* A check sum, at the initial state, of what a saved state must share with the run that loads it: method, options,
+ * settings, masses, names, numbers of signals, initial state and accelerations. */
+static unsigned long long checkpoint_identity (const pw_run *r) {
   const pw_system *s = r->s;
   const pw_settings *set = &r->settings;
   const double number[] = { set->t, set->span, set->step, set->rtol, set->atol, set->ledger, r->fixed_steps };
@@ -260,6 +205,67 @@ unsigned long long pw_run_identity (const pw_run *r) {
   checkpoint_add_state (&sum, r->a, s->coords, s->scale.length);
   return sum;
 }
+
+/* ---- Opening ---- */
+
+static int run_open (pw_run *r, const char *method, const pw_settings *settings, pw_error *error) {
+  const pw_settings none = { 0 };
+  if (settings == NULL) settings = &none;
+  r->thresholds = pw_watchdog_thresholds;
+  r->refused_sine = r->thresholds.rank_lost;
+  r->settings.integrals = settings->integrals, r->entries = r->s->entries + settings->integrals;
+  if (run_allocate (r) != PW_OK) return pw_fail_memory (r->s, error);
+  int status = run_initial_values (r, settings, error);
+  if (status == PW_OK)
+    status = pw_parse_options (method, settings->methods, &r->method, &r->stabilisation, r->option, error);
+  if (status != PW_OK) return status;
+  r->fixed_steps = !pw_method_adaptive (r->method, method);
+  status = run_settings (&r->settings, settings, r->fixed_steps, error);
+  if (status != PW_OK) return status;
+  r->t = r->settings.t;
+  pw_hold_signals (r->w, 0);
+  r->w->scale.time = r->settings.span; /* until the accelerations are known */
+  status = run_check_stop (r, pw_run_make_consistent (r, r->origin, error));
+  if (status == PW_OK) status = run_first_evaluation (r, error);
+  if (status == PW_OK) status = run_check_finite (r, error);
+  if (status != PW_OK) return status;
+  r->w->scale.time = run_time_scale (r);
+  pw_run_count_moved (r);
+  pw_run_set_reference_level (r);
+  pw_ledger_begin (r);
+  pw_forget_residuals (r);
+  pw_record_residuals (r);
+  status = pw_run_look_ahead (r, error);
+  if (status != PW_OK) return status;
+  if (pw_stabilised_by (r, PW_BAUMGARTE)) r->alpha = pw_run_option (r, "alpha"), r->beta = pw_run_option (r, "beta");
+  r->identity = checkpoint_identity (r);
+  status = pw_specialised_open (r, error);
+  if (status == PW_OK) status = run_check_stop (r, r->method->open (r, error));
+  if (status != PW_OK || !r->uses_derivatives) return status;
+  return pw_run_check_derivatives (r, method, "needs", error);
+}
+
+pw_run *pw_run_open (const pw_system *s, const char *method, const pw_settings *settings, pw_error *error) {
+  if (pw_require (s, "a system", error) != PW_OK) return NULL;
+  pw_run *r = calloc (1, sizeof *r);
+  if (r == NULL) {
+    pw_fail_memory (s, error);
+    return NULL;
+  }
+  r->s = s;
+  r->w = pw_workspace_new (s, error);
+  int status = r->w ? pw_run_annotate_error (r, run_open (r, method, settings, error), error) : PW_RESOURCE;
+  if (status == PW_OK) return r;
+  if (status == PW_STOPPED) pw_fail (error, PW_STOPPED, "model %s: stopped before the first step", s->model);
+  pw_run_close (r);
+  return NULL;
+}
+
+/* Checkpoints: the state of a run as bytes.
+ *
+ * What a method or a factorisation has built up, such as pivot choices and earlier values of a multistep formula, is
+ * not saved: the saved run and the loaded one both rebuild it from the state reached, and so continue alike.  A
+ * method's `serialise` adds what it cannot rebuild: step size, counts. */
 
 /* Saves identity and sizes of the run, or reads those of a saved one; 1 if they are the same. */
 static int checkpoint_same (pw_run *r, pw_archive *a) {

@@ -9,6 +9,113 @@
 #include <string.h>
 #include "method.h"
 #include "rank.h"
+#include "util.h"
+
+/* ---- Thresholds ---- */
+
+/* Residuals are scaled; lengths and motions are in units of L and rad; a relative sine is the sine over the largest one
+ * of the run.  s: the sine; d: the residual; eps: the machine precision.  Where branches cross, the constraints are
+ * x y = 0 in suitable coordinates, and s = |(x, y)|; with a residual d, x y = d: each branch turns, most sharply where
+ * s^2 = 2 d. */
+const pw_thresholds pw_watchdog_thresholds = {
+  /* Residuals above which constraints count as lost: a motion with residuals of 1 % is wrong; without stabilisation
+   * some drift is expected. */
+  .lost = 1e-2,
+  .lost_unstabilised = 0.1,
+
+  /* A redundant row follows from the others up to a round-off of some 5e6 eps, or up to their residuals times this
+   * ratio, for a sine as small as 1e-4. */
+  .redundant_residual = 1e-9,
+  .redundant_ratio = 1e4,
+
+  /* Sines below which J has lost rank (rank_lost); the rank is computed (rank_suspect); or, where the scene is too
+   * large for that, the configuration is refused (rank_refused).  Round-off leaves sqrt (eps) = 1.5e-8 of a row that
+   * depends on others; below 1e-6 accelerations, with an error of eps / s after refinement, are wrong by more than
+   * 1e-10.  Round-off leaves up to 1e-5 of a row that depends on rows which are nearly dependent themselves.
+   * rank_suspect: a hundred times rank_refused. */
+  .rank_lost = 1e-6,
+  .rank_suspect = 1e-3,
+  .rank_refused = 1e-5,
+
+  /* Sine above which a row counts as independent: residuals of 1e-16 leave an error of 1e-8; ten times that. */
+  .independent = 1e-7,
+
+  /* Another set of active rows is sought where their independence (rank.h) is below both 0.6 of its initial value and
+   * 0.7, where a coefficient exceeds 1 / 0.7. */
+  .reselect_ratio = 0.6,
+  .reselect_below = 0.7,
+
+  /* near: relative sine below which a configuration is near a singular one.  refine: sine in the metric of a saddle
+   * (saddle.h) below which its solutions are refined.  A stage of a step by an angle h has a residual of about h^2 / 8,
+   * which decides on the branch unless s^2 is much larger: with steps of 1e-3 s at a few rad/s, up to s of 0.02.  A
+   * factorisation has an error of eps / s^2, 5e-13 at 0.02. */
+  .near = 0.02,
+  .refine = 0.02,
+
+  /* Drift: measured on four-bar linkages and slider-cranks, d / s^2 is 0.08 to 0.34 where the turn is sharpest;
+   * accelerations, at least turn_reference L / T^2, have grown by a factor of 3 (turn_growth) when it is 0.02 to 0.07
+   * (drift_turn).  From half of that on (drift_near) they are no reference for later ones.  Where d itself counts as
+   * lost (drift_far), d / s^2 must be below its value in the sharpest turn (drift_any), whatever the accelerations.
+   * Where the relative sine is above `regular`, the configuration is not singular, however large the drift. */
+  .regular = 0.6,
+  .turn_growth = 3,
+  .turn_reference = 0.1,
+  .drift_turn = 0.02,
+  .drift_near = 0.01,
+  .drift_far = 1e-2,
+  .drift_any = 0.1,
+
+  /* Growth of the accelerations in a jump.  Nonholonomic rows: accelerations do not grow when the motion passes a
+   * singular configuration; in a jump at the sine s they reach 1 / s: 100 at half of `near`. */
+  .jump_growth = 100,
+
+  /* Change of the relative sine per unit of motion: the direction of a row of length 1 turns by at most an angle of 1
+   * per rad, and that of the rows before it, too.  No step is taken to be more than twice as long as the last one. */
+  .lipschitz = 2,
+  .step_growth = 2,
+
+  /* Change points (watchdog.c): a sine within a step below an eighth of those at its ends (unresolved) belongs to a
+   * turn that the step cannot resolve; below half of them, or a relative sine below half (low), there may be a change
+   * point.  Strides of 0.3 times the sine stay on a curve whose radius is the sine.  A stride that approaches its
+   * destination by less than a tenth of its length (progress) leads elsewhere. */
+  .unresolved = 0.125,
+  .low = 0.5,
+  .stride = 0.3,
+  .progress = 0.1,
+
+  /* The projection leaves residuals of 1e-14, which leave an error of 1e-7 in the sine: below `floor`, ten times that,
+   * also the shortest stride, it cannot be distinguished from 0 (`crossing`: twice that, since a stride ends within
+   * `floor` of its destination).  Such a point must be left straight on, within 60 degrees of the direction in which it
+   * was entered: the cosine `straight`. */
+  .floor = 1e-6,
+  .crossing = 2e-6,
+  .straight = 0.5,
+
+  /* Length of a step over the distance of branches that it resolves: methods of order 2 have an error of
+   * (0.4)^2 / 12 = 1 % at a turn that takes 1 / 0.4 steps. */
+  .resolved = 0.4,
+
+  /* Differences between results of the same step divided into parts, differently each time: acceptable, and aimed at.
+   * Near a singular configuration most agree to 1e-11; those that differ by more than the error of a good step, 1e-7,
+   * do not agree.  A sample does not affect the next step: an error of 0.01 L or 0.01 rad is acceptable. */
+  .agree = 1e-7,
+  .agree_best = 1e-11,
+  .sample = 1e-2,
+  .sample_best = 1e-9,
+
+  /* Sine at the end of a step over that at its beginning.  If it ends within a tenth of its length from a singular
+   * configuration, the accelerations, whose error is that of the state over the sine, are ten times less accurate than
+   * at its beginning. */
+  .ends_singular = 0.1,
+
+  /* The largest mass, and one over the smallest [kg]; the largest initial value.  Products of three masses must neither
+   * overflow nor underflow. */
+  .extreme = 1e100,
+
+  /* Consecutive steps that do not advance.  Libraries reduce a step by factors of 4 to 10: it is below round-off after
+   * 25 reductions; a thousand steps that do not advance are no search for a step size. */
+  .stalled = 1000,
+};
 
 double pw_run_acceleration_norm (const pw_run *r) {
   const double per_angle = r->w->scale.time * r->w->scale.time, per_length = per_angle / r->s->scale.length;
@@ -24,178 +131,6 @@ static double watchdog_step_length (const pw_run *r) {
   for (int j = 0; j < 3 * r->s->bodies; j++)
     length = pw_larger (fabs (r->q[j] - r->watchdog.previous_q[j]) / pw_unit (r->s, j), length);
   return length;
-}
-
-/* ---- Following the motion ---- */
-
-static void watchdog_record_sine (pw_run *r, double sine) {
-  pw_watchdog *watch = &r->watchdog;
-  watch->checked_sine = sine;
-  watch->moved = 0;
-  watch->largest_sine = fmax (watch->largest_sine, sine);
-}
-
-/* 1 if the sine may be below this value at the state reached or after a motion of this length from there. */
-static int watchdog_reaches (const pw_run *r, double sine, double length) {
-  const pw_watchdog *watch = &r->watchdog;
-  return watch->saddle &&
-         !(watch->checked_sine - r->thresholds.lipschitz * watch->largest_sine * (watch->moved + length) > sine);
-}
-
-/* The typical sine: the largest at a few irregular configurations, which need not satisfy the constraints. */
-static void watchdog_sample_sines (pw_run *r) {
-  const pw_system *s = r->s;
-  pw_watchdog *watch = &r->watchdog;
-  for (int n = 1; n <= 4; n++) {
-    for (int j = 0; j < s->coords; j++)
-      watch->previous_q[j] = r->q[j] + 0.5 * pw_unit (s, j) * pw_irregular (n, (j + 1) * n);
-    if (pw_evaluate_J_at (r->w, r->t, watch->previous_q, r->v) != PW_OK) break;
-    watch->largest_sine = fmax (watch->largest_sine, pw_watchdog_sine (r, NULL));
-  }
-  r->w->failed = NULL;
-  (void)pw_evaluate_J_at (r->w, r->t, r->q, r->v);
-}
-
-void pw_watchdog_begin (pw_run *r) {
-  pw_watchdog *watch = &r->watchdog;
-  if (watch->saddle == NULL) return;
-  if (watch->largest_sine == 0) watchdog_sample_sines (r);
-  watchdog_record_sine (r, pw_watchdog_sine (r, NULL));
-  watch->previous_t = r->t;
-  watch->previous_sine = watch->checked_sine;
-  watch->step_length = watch->sine_slope = 0;
-  watch->sine_before_checked = NAN;
-  watch->may_have_crossed = 0;
-  watch->singular_ahead = 1;
-  memcpy (watch->previous_q, r->q, 2 * ((size_t)r->s->coords + 3) * sizeof *watch->previous_q);
-}
-
-/* Checks the step to the state reached, where J is evaluated.  PW_METHOD if it has left its branch, or passed a change
- * point without resolving it; PW_RESOURCE. */
-static int watchdog_follow (pw_run *r, pw_error *error) {
-  pw_watchdog *watch = &r->watchdog;
-  int status = PW_OK;
-  if (watch->saddle == NULL) return PW_OK;
-  watch->step_length = watchdog_step_length (r);
-  watch->moved += watch->step_length;
-  double near = r->thresholds.near * watch->largest_sine, ahead = r->thresholds.step_growth * watch->step_length;
-  int may_be_near = watchdog_reaches (r, near, ahead);
-  if (may_be_near) {
-    double last = watch->moved == watch->step_length ? watch->checked_sine : NAN;
-    watchdog_record_sine (r, pw_watchdog_sine (r, &watch->dependent_row));
-    status = pw_change_point_check (r, watch->checked_sine, error);
-    if (status == PW_OK) status = pw_change_point_resolve (r, last, error);
-    if (status == PW_OK) status = pw_dead_point_passed (r, error);
-    if (status != PW_OK) return status;
-    watch->sine_before_checked = last;
-  } else
-    watch->sine_before_checked = NAN, watch->sine_slope = 0, watch->may_have_crossed = 0;
-  if (may_be_near && watch->checked_sine < near) r->near_singular = 1;
-  watch->singular_ahead = may_be_near && watchdog_reaches (r, near, ahead);
-  watch->previous_t = r->t;
-  watch->previous_sine = may_be_near ? watch->checked_sine : NAN;
-  memcpy (watch->previous_q, r->q, 2 * ((size_t)r->s->coords + 3) * sizeof *watch->previous_q);
-  return status;
-}
-
-/* ---- Lost constraints ---- */
-
-static int watchdog_fail_lost (pw_run *r, int contradicts, pw_error *error) {
-  pw_residuals now;
-  char cause[60] = "constraint drift";
-  pw_evaluate_residuals (r->w, NULL, &now);
-  int in_position = isnan (now.position) || now.position > now.velocity;
-  int row = in_position ? now.row_position : now.row_velocity;
-  const char *element = row >= 0 ? PW_NAME (pw_system_row_name, r->s, row) : "a constraint", *advice = "";
-  if (contradicts) {
-    snprintf (cause, sizeof cause, "constraints contradict each other");
-    if (row >= 0) advice = pw_advice_on_wheel (r->s, row);
-  } else if (pw_stabilised_by (r, PW_UNSTABILISED))
-    advice = r->fixed_steps ? "; a smaller step or a stabilisation reduces it"
-                            : "; a smaller tolerance or a stabilisation reduces it";
-  else if (r->fixed_steps)
-    snprintf (cause, sizeof cause, "the step of %.6g s is too large", r->settings.step);
-  return pw_fail (error, PW_METHOD, "t = %.6g s: %s: %s is violated by %.3g in %s (scaled)%s", r->t, cause, element,
-                  in_position ? now.position : now.velocity, in_position ? "position" : "velocity", advice);
-}
-
-static int watchdog_exceeds (double position, double velocity, double limit) {
-  return !(position <= limit && velocity <= limit);
-}
-
-/* 1 if a redundant row is violated by more than the residuals of the others explain: it contradicts them. */
-static int watchdog_contradicts (pw_run *r) {
-  pw_residuals all, enforced;
-  pw_evaluate_residuals (r->w, NULL, &all);
-  if (!watchdog_exceeds (all.position, all.velocity, r->thresholds.redundant_residual)) return 0;
-  pw_evaluate_residuals (r->w, r->active, &enforced);
-  double explained =
-      r->thresholds.redundant_residual + r->thresholds.redundant_ratio * fmax (enforced.position, enforced.velocity);
-  return watchdog_exceeds (all.position, all.velocity, explained);
-}
-
-/* ---- Branches ---- */
-
-/* The residual of positions: scaled, or in units of L if that is larger. */
-static double watchdog_residual (const pw_run *r) {
-  return pw_larger (r->residuals.position, r->residuals.g / r->s->scale.length);
-}
-
-/* 1 if a constraint residual d may decide which branch is followed: if the sine s is below its regular value, and s^2
- * below d / ratio.  Drifted constraints, x y = d in place of x y = 0 (watchdog.c), connect branches that cross by a
- * turn, which a method follows however small its steps. */
-static int watchdog_unresolved (pw_run *r, double residual, double ratio) {
-  int row;
-  double bound = fmin (sqrt (residual / ratio), r->thresholds.regular * r->watchdog.largest_sine);
-  return bound > r->thresholds.rank_lost && watchdog_reaches (r, bound, 0) && pw_watchdog_sine (r, &row) < bound &&
-         row < r->s->holonomic;
-}
-
-/* Fails where residuals may decide the branch and accelerations have grown, or residuals are large: the turn is then a
- * corner whose radius grows with the residual, so that its accelerations need not grow. */
-static int watchdog_check_turn (pw_run *r, double norm, pw_error *error) {
-  const pw_thresholds *limit = &r->thresholds;
-  double residual = watchdog_residual (r), before = fmax (r->previous_norm, limit->turn_reference);
-  if (!(norm <= limit->turn_growth * before) && watchdog_unresolved (r, residual, limit->drift_turn))
-    return pw_fail (error, PW_METHOD,
-                    "t = %.6g s: lost at a singular configuration: constraint residuals of %.2g (scaled) may lead to "
-                    "another branch, with accelerations %.3g times those before; methods with projection pass",
-                    r->t, residual, norm / before);
-  if (!(residual <= limit->drift_far) && watchdog_unresolved (r, residual, limit->drift_any))
-    return pw_fail (
-        error, PW_METHOD,
-        "t = %.6g s: lost at a singular configuration: constraint residuals of %.2g (scaled) do not tell one branch "
-        "from another; methods with projection pass",
-        r->t, residual);
-  return PW_OK;
-}
-
-/* Accelerations of the physical motion do not grow at a singular configuration; in a jump to another branch they do, if
- * the dependent row is nonholonomic. */
-static int watchdog_check_jump (pw_run *r, pw_error *error) {
-  int row = -1;
-  double norm = pw_run_acceleration_norm (r);
-  if (r->near_singular) pw_watchdog_sine (r, &row);
-  int may_jump = r->near_singular && (row < 0 || row >= r->s->holonomic || !isfinite (norm));
-  if (may_jump && !(norm <= r->thresholds.jump_growth * r->reference_level))
-    return pw_fail (error, PW_METHOD,
-                    "t = %.6g s: lost at a singular configuration: the accelerations are %.3g times those before", r->t,
-                    norm / r->reference_level);
-  if (r->near_singular || watchdog_unresolved (r, watchdog_residual (r), r->thresholds.drift_near))
-    return watchdog_check_turn (r, norm, error);
-  r->reference_level = pw_larger (norm, r->reference_level);
-  r->previous_norm = norm;
-  return PW_OK;
-}
-
-int pw_run_watchdog (pw_run *r, pw_error *error) {
-  pw_record_residuals (r);
-  double lost = pw_stabilised_by (r, PW_UNSTABILISED) ? r->thresholds.lost_unstabilised : r->thresholds.lost;
-  int contradicts = r->redundant && watchdog_contradicts (r);
-  if (contradicts || watchdog_exceeds (r->residuals.position, r->residuals.velocity, lost))
-    return watchdog_fail_lost (r, contradicts, error);
-  int status = watchdog_follow (r, error);
-  return status == PW_OK ? watchdog_check_jump (r, error) : status;
 }
 
 /* Change points: configurations at which branches of a motion cross, or nearly do.
@@ -330,8 +265,6 @@ static change_verdict change_follow (change_walk *walk) {
   return CHANGE_UNKNOWN;
 }
 
-/* ---- The check ---- */
-
 /* Walks along the last step; the run's residuals and statistics stay as they are. */
 static change_verdict change_walk_step (pw_run *r, change_walk *walk, pw_error *error) {
   const pw_system *s = r->s;
@@ -394,18 +327,6 @@ static int change_fail (pw_run *r, int row, double apart, const char *finding, d
                   r->t, element, finding, apart, length, r->fixed_steps ? "step" : "tolerance");
 }
 
-int pw_change_point_resolve (pw_run *r, double last_sine, pw_error *error) {
-  pw_watchdog *watch = &r->watchdog;
-  if (isnan (last_sine) || watch->step_length == 0) return PW_OK;
-  watch->sine_slope = fmax (watch->sine_slope, fabs (watch->checked_sine - last_sine) / watch->step_length);
-  if (!watch->loops || !r->fixed_steps || watch->may_have_crossed || watch->dependent_row >= r->s->holonomic)
-    return PW_OK;
-  const int is_minimum = last_sine < watch->sine_before_checked && last_sine < watch->checked_sine;
-  if (!is_minimum || watch->step_length * watch->sine_slope <= r->thresholds.resolved * last_sine) return PW_OK;
-  return change_fail (r, watch->dependent_row, last_sine / watch->sine_slope, "the step does not resolve it",
-                      watch->step_length, error);
-}
-
 static int change_report (pw_run *r, const change_walk *walk, change_verdict verdict, double sine, double length,
                           pw_error *error) {
   pw_watchdog *watch = &r->watchdog;
@@ -433,111 +354,19 @@ int pw_change_point_check (pw_run *r, double sine, pw_error *error) {
   return suspect ? change_report (r, &walk, verdict, sine, length, error) : PW_OK;
 }
 
-/* The thresholds of the watchdog and of the run; see method.h. */
-
-/* Residuals are scaled; lengths and motions are in units of L and rad; a relative sine is the sine over the largest one
- * of the run.  s: the sine; d: the residual; eps: the machine precision.  Where branches cross, the constraints are
- * x y = 0 in suitable coordinates, and s = |(x, y)|; with a residual d, x y = d: each branch turns, most sharply where
- * s^2 = 2 d. */
-const pw_thresholds pw_watchdog_thresholds = {
-  /* Residuals above which constraints count as lost: a motion with residuals of 1 % is wrong; without stabilisation
-   * some drift is expected. */
-  .lost = 1e-2,
-  .lost_unstabilised = 0.1,
-
-  /* A redundant row follows from the others up to a round-off of some 5e6 eps, or up to their residuals times this
-   * ratio, for a sine as small as 1e-4. */
-  .redundant_residual = 1e-9,
-  .redundant_ratio = 1e4,
-
-  /* Sines below which J has lost rank (rank_lost); the rank is computed (rank_suspect); or, where the scene is too
-   * large for that, the configuration is refused (rank_refused).  Round-off leaves sqrt (eps) = 1.5e-8 of a row that
-   * depends on others; below 1e-6 accelerations, with an error of eps / s after refinement, are wrong by more than
-   * 1e-10.  Round-off leaves up to 1e-5 of a row that depends on rows which are nearly dependent themselves.
-   * rank_suspect: a hundred times rank_refused. */
-  .rank_lost = 1e-6,
-  .rank_suspect = 1e-3,
-  .rank_refused = 1e-5,
-
-  /* Sine above which a row counts as independent: residuals of 1e-16 leave an error of 1e-8; ten times that. */
-  .independent = 1e-7,
-
-  /* Another set of active rows is sought where their independence (rank.h) is below both 0.6 of its initial value and
-   * 0.7, where a coefficient exceeds 1 / 0.7. */
-  .reselect_ratio = 0.6,
-  .reselect_below = 0.7,
-
-  /* near: relative sine below which a configuration is near a singular one.  refine: sine in the metric of a saddle
-   * (saddle.h) below which its solutions are refined.  A stage of a step by an angle h has a residual of about h^2 / 8,
-   * which decides on the branch unless s^2 is much larger: with steps of 1e-3 s at a few rad/s, up to s of 0.02.  A
-   * factorisation has an error of eps / s^2, 5e-13 at 0.02. */
-  .near = 0.02,
-  .refine = 0.02,
-
-  /* Drift: measured on four-bar linkages and slider-cranks, d / s^2 is 0.08 to 0.34 where the turn is sharpest;
-   * accelerations, at least turn_reference L / T^2, have grown by a factor of 3 (turn_growth) when it is 0.02 to 0.07
-   * (drift_turn).  From half of that on (drift_near) they are no reference for later ones.  Where d itself counts as
-   * lost (drift_far), d / s^2 must be below its value in the sharpest turn (drift_any), whatever the accelerations.
-   * Where the relative sine is above `regular`, the configuration is not singular, however large the drift. */
-  .regular = 0.6,
-  .turn_growth = 3,
-  .turn_reference = 0.1,
-  .drift_turn = 0.02,
-  .drift_near = 0.01,
-  .drift_far = 1e-2,
-  .drift_any = 0.1,
-
-  /* Growth of the accelerations in a jump.  Nonholonomic rows: accelerations do not grow when the motion passes a
-   * singular configuration; in a jump at the sine s they reach 1 / s: 100 at half of `near`. */
-  .jump_growth = 100,
-
-  /* Change of the relative sine per unit of motion: the direction of a row of length 1 turns by at most an angle of 1
-   * per rad, and that of the rows before it, too.  No step is taken to be more than twice as long as the last one. */
-  .lipschitz = 2,
-  .step_growth = 2,
-
-  /* Change points (watchdog.c): a sine within a step below an eighth of those at its ends (unresolved) belongs to a
-   * turn that the step cannot resolve; below half of them, or a relative sine below half (low), there may be a change
-   * point.  Strides of 0.3 times the sine stay on a curve whose radius is the sine.  A stride that approaches its
-   * destination by less than a tenth of its length (progress) leads elsewhere. */
-  .unresolved = 0.125,
-  .low = 0.5,
-  .stride = 0.3,
-  .progress = 0.1,
-
-  /* The projection leaves residuals of 1e-14, which leave an error of 1e-7 in the sine: below `floor`, ten times that,
-   * also the shortest stride, it cannot be distinguished from 0 (`crossing`: twice that, since a stride ends within
-   * `floor` of its destination).  Such a point must be left straight on, within 60 degrees of the direction in which it
-   * was entered: the cosine `straight`. */
-  .floor = 1e-6,
-  .crossing = 2e-6,
-  .straight = 0.5,
-
-  /* Length of a step over the distance of branches that it resolves: methods of order 2 have an error of
-   * (0.4)^2 / 12 = 1 % at a turn that takes 1 / 0.4 steps. */
-  .resolved = 0.4,
-
-  /* Differences between results of the same step divided into parts, differently each time: acceptable, and aimed at.
-   * Near a singular configuration most agree to 1e-11; those that differ by more than the error of a good step, 1e-7,
-   * do not agree.  A sample does not affect the next step: an error of 0.01 L or 0.01 rad is acceptable. */
-  .agree = 1e-7,
-  .agree_best = 1e-11,
-  .sample = 1e-2,
-  .sample_best = 1e-9,
-
-  /* Sine at the end of a step over that at its beginning.  If it ends within a tenth of its length from a singular
-   * configuration, the accelerations, whose error is that of the state over the sine, are ten times less accurate than
-   * at its beginning. */
-  .ends_singular = 0.1,
-
-  /* The largest mass, and one over the smallest [kg]; the largest initial value.  Products of three masses must neither
-   * overflow nor underflow. */
-  .extreme = 1e100,
-
-  /* Consecutive steps that do not advance.  Libraries reduce a step by factors of 4 to 10: it is below round-off after
-   * 25 reductions; a thousand steps that do not advance are no search for a step size. */
-  .stalled = 1000,
-};
+/* Checks that a step of fixed size resolves a change point that the motion has passed at a small distance; last_sine:
+ * that one state earlier, NaN if it was not computed.  Adaptive methods have error control instead. */
+static int change_resolve (pw_run *r, double last_sine, pw_error *error) {
+  pw_watchdog *watch = &r->watchdog;
+  if (isnan (last_sine) || watch->step_length == 0) return PW_OK;
+  watch->sine_slope = fmax (watch->sine_slope, fabs (watch->checked_sine - last_sine) / watch->step_length);
+  if (!watch->loops || !r->fixed_steps || watch->may_have_crossed || watch->dependent_row >= r->s->holonomic)
+    return PW_OK;
+  const int is_minimum = last_sine < watch->sine_before_checked && last_sine < watch->checked_sine;
+  if (!is_minimum || watch->step_length * watch->sine_slope <= r->thresholds.resolved * last_sine) return PW_OK;
+  return change_fail (r, watch->dependent_row, last_sine / watch->sine_slope, "the step does not resolve it",
+                      watch->step_length, error);
+}
 
 /* Dead points: states beyond which prescribed motions cannot go on, whatever the method.
  *
@@ -667,24 +496,6 @@ static double dead_find (dead_walk *walk, double t_end) {
   return t <= t_end ? t : INFINITY;
 }
 
-/* Names the elements of the rows with which[i] = wanted. */
-static void dead_list (const pw_system *s, const unsigned char *which, int wanted, char *list, size_t size) {
-  char element[PW_NAME_BYTES], previous[PW_NAME_BYTES] = "";
-  int named = 0, more = 0;
-  *list = 0;
-  for (int i = 0; i < s->rows; i++) {
-    size_t length = strlen (list);
-    if (which[i] != wanted || strcmp (pw_system_row_name (s, i, element, sizeof element), previous) == 0) continue;
-    strcpy (previous, element);
-    if (named < 4 && length + strlen (element) + 16 < size)
-      named++, snprintf (list + length, size - length, "%s%s", length ? ", " : "", element);
-    else
-      more++;
-  }
-  size_t length = strlen (list);
-  if (more > 0) snprintf (list + length, size - length, "%s%d more", length ? " and " : "", more);
-}
-
 static int dead_fail (dead_walk *walk, double t, pw_error *error) {
   const pw_system *s = walk->r->s;
   char drives[180], elements[180];
@@ -700,8 +511,8 @@ static int dead_fail (dead_walk *walk, double t, pw_error *error) {
     if (drives_it && i >= s->holonomic) digits = 4;
     which[i] = drives_it ? 1 : fabs (walk->mu[i]) * walk->row_length[i] > DEAD_SHARE * force ? 2 : 0;
   }
-  dead_list (s, which, 1, drives, sizeof drives);
-  dead_list (s, which, 2, elements, sizeof elements);
+  pw_list_elements (s, which, 1, drives, sizeof drives);
+  pw_list_elements (s, which, 2, elements, sizeof elements);
   if (error) *error = (pw_error){ 0 };
   return pw_fail (error, PW_METHOD,
                   "t = %.*g s: dead point: %s cannot go on: at the limit of %s, it requires unbounded velocities",
@@ -744,7 +555,8 @@ static int dead_check (pw_run *r, double t_end, pw_error *error) {
   return status;
 }
 
-int pw_dead_point_passed (pw_run *r, pw_error *error) {
+/* PW_METHOD if the last step has passed a dead point. */
+static int dead_passed (pw_run *r, pw_error *error) {
   const pw_watchdog *watch = &r->watchdog;
   if (watch->checked_sine > r->thresholds.lipschitz * watch->largest_sine * watch->step_length) return PW_OK;
   return dead_check (r, r->t, error);
@@ -754,4 +566,176 @@ int pw_dead_point_explain (pw_run *r, pw_error *error) {
   double step = r->fixed_steps ? r->settings.step : r->t - r->watchdog.previous_t;
   (void)dead_check (r, r->watchdog.previous_t + fmax (10 * step, 0.5 * r->w->scale.time), error);
   return PW_METHOD;
+}
+
+/* ---- Following the motion ---- */
+
+static void watchdog_record_sine (pw_run *r, double sine) {
+  pw_watchdog *watch = &r->watchdog;
+  watch->checked_sine = sine;
+  watch->moved = 0;
+  watch->largest_sine = fmax (watch->largest_sine, sine);
+}
+
+/* 1 if the sine may be below this value at the state reached or after a motion of this length from there. */
+static int watchdog_reaches (const pw_run *r, double sine, double length) {
+  const pw_watchdog *watch = &r->watchdog;
+  return watch->saddle &&
+         !(watch->checked_sine - r->thresholds.lipschitz * watch->largest_sine * (watch->moved + length) > sine);
+}
+
+/* The typical sine: the largest at a few irregular configurations, which need not satisfy the constraints. */
+static void watchdog_sample_sines (pw_run *r) {
+  const pw_system *s = r->s;
+  pw_watchdog *watch = &r->watchdog;
+  for (int n = 1; n <= 4; n++) {
+    for (int j = 0; j < s->coords; j++)
+      watch->previous_q[j] = r->q[j] + 0.5 * pw_unit (s, j) * pw_irregular (n, (j + 1) * n);
+    if (pw_evaluate_J_at (r->w, r->t, watch->previous_q, r->v) != PW_OK) break;
+    watch->largest_sine = fmax (watch->largest_sine, pw_watchdog_sine (r, NULL));
+  }
+  r->w->failed = NULL;
+  (void)pw_evaluate_J_at (r->w, r->t, r->q, r->v);
+}
+
+void pw_watchdog_begin (pw_run *r) {
+  pw_watchdog *watch = &r->watchdog;
+  if (watch->saddle == NULL) return;
+  if (watch->largest_sine == 0) watchdog_sample_sines (r);
+  watchdog_record_sine (r, pw_watchdog_sine (r, NULL));
+  watch->previous_t = r->t;
+  watch->previous_sine = watch->checked_sine;
+  watch->step_length = watch->sine_slope = 0;
+  watch->sine_before_checked = NAN;
+  watch->may_have_crossed = 0;
+  watch->singular_ahead = 1;
+  memcpy (watch->previous_q, r->q, 2 * ((size_t)r->s->coords + 3) * sizeof *watch->previous_q);
+}
+
+/* Checks the step to the state reached, where J is evaluated.  PW_METHOD if it has left its branch, or passed a change
+ * point without resolving it; PW_RESOURCE. */
+static int watchdog_follow (pw_run *r, pw_error *error) {
+  pw_watchdog *watch = &r->watchdog;
+  int status = PW_OK;
+  if (watch->saddle == NULL) return PW_OK;
+  watch->step_length = watchdog_step_length (r);
+  watch->moved += watch->step_length;
+  double near = r->thresholds.near * watch->largest_sine, ahead = r->thresholds.step_growth * watch->step_length;
+  int may_be_near = watchdog_reaches (r, near, ahead);
+  if (may_be_near) {
+    double last = watch->moved == watch->step_length ? watch->checked_sine : NAN;
+    watchdog_record_sine (r, pw_watchdog_sine (r, &watch->dependent_row));
+    status = pw_change_point_check (r, watch->checked_sine, error);
+    if (status == PW_OK) status = change_resolve (r, last, error);
+    if (status == PW_OK) status = dead_passed (r, error);
+    if (status != PW_OK) return status;
+    watch->sine_before_checked = last;
+  } else
+    watch->sine_before_checked = NAN, watch->sine_slope = 0, watch->may_have_crossed = 0;
+  if (may_be_near && watch->checked_sine < near) r->near_singular = 1;
+  watch->singular_ahead = may_be_near && watchdog_reaches (r, near, ahead);
+  watch->previous_t = r->t;
+  watch->previous_sine = may_be_near ? watch->checked_sine : NAN;
+  memcpy (watch->previous_q, r->q, 2 * ((size_t)r->s->coords + 3) * sizeof *watch->previous_q);
+  return status;
+}
+
+/* ---- Lost constraints ---- */
+
+static int watchdog_fail_lost (pw_run *r, int contradicts, pw_error *error) {
+  pw_residuals now;
+  char cause[60] = "constraint drift";
+  pw_evaluate_residuals (r->w, NULL, &now);
+  int in_position = isnan (now.position) || now.position > now.velocity;
+  int row = in_position ? now.row_position : now.row_velocity;
+  const char *element = row >= 0 ? PW_NAME (pw_system_row_name, r->s, row) : "a constraint", *advice = "";
+  if (contradicts) {
+    snprintf (cause, sizeof cause, "constraints contradict each other");
+    if (row >= 0) advice = pw_advice_on_wheel (r->s, row);
+  } else if (pw_stabilised_by (r, PW_UNSTABILISED))
+    advice = r->fixed_steps ? "; a smaller step or a stabilisation reduces it"
+                            : "; a smaller tolerance or a stabilisation reduces it";
+  else if (r->fixed_steps)
+    snprintf (cause, sizeof cause, "the step of %.6g s is too large", r->settings.step);
+  return pw_fail (error, PW_METHOD, "t = %.6g s: %s: %s is violated by %.3g in %s (scaled)%s", r->t, cause, element,
+                  in_position ? now.position : now.velocity, in_position ? "position" : "velocity", advice);
+}
+
+static int watchdog_exceeds (double position, double velocity, double limit) {
+  return !(position <= limit && velocity <= limit);
+}
+
+/* 1 if a redundant row is violated by more than the residuals of the others explain: it contradicts them. */
+static int watchdog_contradicts (pw_run *r) {
+  pw_residuals all, enforced;
+  pw_evaluate_residuals (r->w, NULL, &all);
+  if (!watchdog_exceeds (all.position, all.velocity, r->thresholds.redundant_residual)) return 0;
+  pw_evaluate_residuals (r->w, r->active, &enforced);
+  double explained =
+      r->thresholds.redundant_residual + r->thresholds.redundant_ratio * fmax (enforced.position, enforced.velocity);
+  return watchdog_exceeds (all.position, all.velocity, explained);
+}
+
+/* ---- Jumps ---- */
+
+/* The residual of positions: scaled, or in units of L if that is larger. */
+static double watchdog_residual (const pw_run *r) {
+  return pw_larger (r->residuals.position, r->residuals.g / r->s->scale.length);
+}
+
+/* 1 if a constraint residual d may decide which branch is followed: if the sine s is below its regular value, and s^2
+ * below d / ratio.  Drifted constraints, x y = d in place of x y = 0 (watchdog.c), connect branches that cross by a
+ * turn, which a method follows however small its steps. */
+static int watchdog_unresolved (pw_run *r, double residual, double ratio) {
+  int row;
+  double bound = fmin (sqrt (residual / ratio), r->thresholds.regular * r->watchdog.largest_sine);
+  return bound > r->thresholds.rank_lost && watchdog_reaches (r, bound, 0) && pw_watchdog_sine (r, &row) < bound &&
+         row < r->s->holonomic;
+}
+
+/* Fails where residuals may decide the branch and accelerations have grown, or residuals are large: the turn is then a
+ * corner whose radius grows with the residual, so that its accelerations need not grow. */
+static int watchdog_check_turn (pw_run *r, double norm, pw_error *error) {
+  const pw_thresholds *limit = &r->thresholds;
+  double residual = watchdog_residual (r), before = fmax (r->previous_norm, limit->turn_reference);
+  if (!(norm <= limit->turn_growth * before) && watchdog_unresolved (r, residual, limit->drift_turn))
+    return pw_fail (error, PW_METHOD,
+                    "t = %.6g s: lost at a singular configuration: constraint residuals of %.2g (scaled) may lead to "
+                    "another branch, with accelerations %.3g times those before; methods with projection pass",
+                    r->t, residual, norm / before);
+  if (!(residual <= limit->drift_far) && watchdog_unresolved (r, residual, limit->drift_any))
+    return pw_fail (
+        error, PW_METHOD,
+        "t = %.6g s: lost at a singular configuration: constraint residuals of %.2g (scaled) do not tell one branch "
+        "from another; methods with projection pass",
+        r->t, residual);
+  return PW_OK;
+}
+
+/* Accelerations of the physical motion do not grow at a singular configuration; in a jump to another branch they do, if
+ * the dependent row is nonholonomic. */
+static int watchdog_check_jump (pw_run *r, pw_error *error) {
+  int row = -1;
+  double norm = pw_run_acceleration_norm (r);
+  if (r->near_singular) pw_watchdog_sine (r, &row);
+  int may_jump = r->near_singular && (row < 0 || row >= r->s->holonomic || !isfinite (norm));
+  if (may_jump && !(norm <= r->thresholds.jump_growth * r->reference_level))
+    return pw_fail (error, PW_METHOD,
+                    "t = %.6g s: lost at a singular configuration: the accelerations are %.3g times those before", r->t,
+                    norm / r->reference_level);
+  if (r->near_singular || watchdog_unresolved (r, watchdog_residual (r), r->thresholds.drift_near))
+    return watchdog_check_turn (r, norm, error);
+  r->reference_level = pw_larger (norm, r->reference_level);
+  r->previous_norm = norm;
+  return PW_OK;
+}
+
+int pw_run_watchdog (pw_run *r, pw_error *error) {
+  pw_record_residuals (r);
+  double lost = pw_stabilised_by (r, PW_UNSTABILISED) ? r->thresholds.lost_unstabilised : r->thresholds.lost;
+  int contradicts = r->redundant && watchdog_contradicts (r);
+  if (contradicts || watchdog_exceeds (r->residuals.position, r->residuals.velocity, lost))
+    return watchdog_fail_lost (r, contradicts, error);
+  int status = watchdog_follow (r, error);
+  return status == PW_OK ? watchdog_check_jump (r, error) : status;
 }

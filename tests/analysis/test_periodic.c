@@ -4,7 +4,7 @@
 #include "check.h"
 #include "gallery.h"
 #include "periodic_case.h"
-#include "periodic_parts.h"
+#include "search.h"
 #include "runs.h"
 #include "scene.h"
 

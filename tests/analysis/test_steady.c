@@ -6,7 +6,7 @@
 #include "runs.h"
 #include "scene.h"
 #include "steady_case.h"
-#include "steady_parts.h"
+#include "search.h"
 
 static int held (const pw_system *s, const char *name) {
   pw_error error = { 0 };

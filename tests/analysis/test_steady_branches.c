@@ -6,7 +6,7 @@
 #include "runs.h"
 #include "scene.h"
 #include "steady_case.h"
-#include "steady_parts.h"
+#include "search.h"
 
 /* ---- A rod on a turning hub ---- */
 

@@ -1,14 +1,26 @@
-/* The search for steady motions; for steady*.c and the search for periodic ones.
+/* The searches for steady and for periodic motions; for steady.c, steady_symmetries.c and periodic.c.
  *
  * Names: n coordinates, m constraint equations.  "Units of the scene" are L for lengths, 1 rad for angles, T for times
  * (pw_scale); pw_unit is that of a coordinate.  The unknowns u are q in units of the scene, then the coefficients xi of
  * the symmetries times T (steady.c), then the parameter, from 0 to 1 over its range. */
-#ifndef PW_STEADY_H
-#define PW_STEADY_H
+#ifndef PW_SEARCH_H
+#define PW_SEARCH_H
 
 #include <math.h>
 #include "continuation.h"
 #include "linear.h"
+
+/* The system at a value of the parameter. */
+typedef struct {
+  const pw_system *described;
+  pw_system *(*compile) (void *context, double value, pw_error *error); /* NULL: the described one serves */
+  void *context;
+  double value;   /* the last one */
+  pw_system *own; /* compiled for it; NULL: none */
+} pw_parametric;
+/* That system, compiled unless it is the last one.  NULL, and the reason, if there is none or, with `own`, if it has
+ * another number of bodies, coordinates or constraint equations. */
+const pw_system *pw_parametric_at (pw_parametric *x, double value, pw_error *why);
 
 struct pw_steady {
   const pw_system *s; /* as described */
@@ -26,10 +38,9 @@ struct pw_steady {
   int free_symmetries;   /* those that leave what is held unchanged; 0 before a solution is found */
   double *free_symmetry; /* free_symmetries x symmetries: their coefficients in that basis; scratch */
 
+  pw_parametric parametric;
   struct {
-    double value;   /* of the parameter */
-    pw_system *own; /* by settings.compile; NULL: s serves */
-    pw_run *run;    /* NULL: not open */
+    pw_run *run; /* at parametric.value; NULL: not open */
     pw_linearisation linearisation;
   } system;
   pw_initial_value *solution; /* 2 n: the last solution, where runs are opened; or that configuration at rest */
@@ -89,45 +100,7 @@ void pw_steady_canonical (const pw_steady *x, double *q, double *v);
 /* Displaces a state so that the first body is where it was initially, if the whole can be displaced freely. */
 void pw_steady_move_to_start (const pw_steady *x, double *q, double *v);
 
-/* ---- steady.c ---- */
-
-/* Numbers of unknowns, without the parameter, and of equations. */
-static inline int pw_steady_unknowns (const pw_steady *x) {
-  return x->n + x->symmetries;
-}
-static inline int pw_steady_equations (const pw_steady *x) {
-  return x->holonomic + x->m + x->n + x->settings.holds + x->symmetries;
-}
 static const double PW_STEADY_RANK = 1e-9; /* singular values up to it count as 0 */
-enum { PW_STEADY_WORK = 40 };              /* numbers of work space of LAPACK's dgelsy per unknown */
-/* pw_branch_problem.evaluate, .same. */
-int pw_steady_evaluate (void *steady, const double *u, double *F, double *dF, pw_error *error);
-int pw_steady_same_motion (void *steady, const double *u, const double *other);
-/* pw_branch_problem.check_step: no step passes a value of the parameter at which constraint equations
- * become dependent; x->why names one.  Eigenvalues may be infinite there. */
-int pw_steady_check_step (void *steady, const double *from, const double *to, pw_error *error);
-/* Sets x->q, x->v and x->rates to those of the unknowns u, and in x->hold the value that varies. */
-void pw_steady_state (pw_steady *x, const double *u);
-/* Sets u, except the parameter, to the motion along symmetries at q with velocities nearest to v, by least squares.
- * PW_METHOD if LAPACK fails. */
-int pw_steady_nearest (pw_steady *x, const double *q, const double *v, double *u, pw_error *error);
-double pw_steady_parameter (const pw_steady *x, const double *u);
-
-/* ---- steady.c ---- */
-
-enum { PW_STEADY_MAX_COORDINATES = 400 }; /* since the cost is cubic */
-
-/* The system of pw_steady_settings.compile; NULL and the reason if this returns none or records an error. */
-pw_system *pw_compile_at (pw_system *(*compile) (void *context, double value, pw_error *error), void *context,
-                          double value, pw_error *why);
-/* Opens x->system for a value of the parameter, unless it is open for it.  A status, with x->why if it fails;
- * PW_INPUT: its sizes differ; PW_RETRY: none at this value (x->why has the status of the error). */
-int pw_steady_open_system (pw_steady *x, double value);
-void pw_steady_close_system (pw_steady *x);
-/* PW_INPUT and the reason unless both systems have as many bodies, coordinates and constraint equations. */
-int pw_steady_same_sizes (const pw_system *a, const pw_system *b, pw_error *why);
-
-/* ---- steady_symmetries.c ---- */
 
 /* What can be held is numbered: the states, then PW_HOLD_OF_BODY quantities of each body. */
 enum { PW_HOLD_SPEED, PW_HOLD_RADIUS, PW_HOLD_CURVATURE, PW_HOLD_OF_BODY };
@@ -137,20 +110,10 @@ double pw_hold_residual (const pw_steady *x, const pw_initial_value *hold, const
 
 /* ---- steady.c ---- */
 
-/* The unknowns, except the parameter, with which an attempt begins; x->system is open.  Attempt 0: the initial
- * state; 1: a state to which forces lead from there; then random states, even attempts near the initial one, odd ones
- * anywhere.  Of these, by attempt modulo 4: 0 and 1 need not be consistent; 2: a state to which forces lead as in
- * attempt 1; 3: consistent. */
-int pw_steady_start (pw_steady *x, int attempt, double *u, pw_error *error);
-
-/* ---- steady.c ---- */
-
 /* *changed: the first signal that (or a derivative of which) changes within the span after time t, or if period > 0,
  * differs between times in this span and one period later; -1: none.  Signals are compared in the run's state and in
  * one up to a unit of the scene away.  A status. */
 int pw_signals_change (pw_run *r, double t, double period, double span, int *changed, pw_error *error);
-
-/* ---- steady.c ---- */
 
 /* PW_INPUT, with the name, unless these settings of a search for steady or periodic motions are valid. */
 int pw_check_search (double first, double last, int points, pw_error *error);
@@ -168,7 +131,55 @@ static inline int pw_check_branch (int direction, double first, double last, pw_
 /* As pw_steady_open, for searches that need only scales and symmetries: signals may change. */
 pw_steady *pw_steady_open_symmetries (const pw_system *s, const pw_steady_settings *settings, pw_error *error);
 
-/* The motion of the unknowns u, which become x->solution, with its linearisation; sets x->neutral.  A status. */
-int pw_steady_motion_at (pw_steady *x, const double *u, pw_steady_motion *out, pw_error *error);
+/* ---- Periodic motions (periodic.c and its tests) ---- */
+
+/* What pw_periodic_flow computes: the motion; or its derivatives only, accurate enough for Newton's method, or for
+ * multipliers. */
+typedef enum { PW_FLOW, PW_FLOW_DERIVATIVES, PW_FLOW_MULTIPLIERS } pw_flow_accuracy;
+
+struct pw_periodic {
+  const pw_system *s; /* as described */
+  pw_periodic_settings settings;
+  pw_steady *steady; /* of pw_steady_open_symmetries */
+  int n, symmetries; /* number of coordinates; of symmetries */
+  double L, T;       /* scales [m, s] */
+  pw_parametric parametric;
+  double period; /* of the system at that value, verified; free: during which signals are constant [s]; 0: not yet */
+  pw_branch branch;
+  double *u;           /* scaled: 2 n of the state, displacement along symmetries in a period, free period; parameter */
+  double last_period;  /* the period of the last motion, or a guess of a free one [s] */
+  double begin_period; /* the period of the motion that pw_periodic_solve has found, at x->u [s]; 0: none */
+  /* Of the last flow: state at its beginning and end, with accelerations there. */
+  double *y0, *y1, *a0, *a1; /* 2 n, 2 n, n, n */
+  double *state, *change;    /* 2 n: a state that a run begins with, a change of a state; scratch */
+  int size;                  /* number of minimal coordinates of changes of the initial state */
+  double *basis, *Phi; /* 2 n x size, by columns: changes of the initial state, of the state after a period, by each */
+  double *dual;        /* size x 2 n, by columns: minimal coordinates of a change of each entry by its unit */
+  long steps;          /* of the run at the last iterate of Newton's method; 0: not yet known */
+  double *monodromy;   /* size x size, by columns: the monodromy matrix; then scratch */
+  double *re, *im;     /* size: its eigenvalues, the multipliers */
+  double *work;        /* scratch: rates, unknowns */
+  pw_error why;        /* the last reason why a motion could not be computed, or why a branch ended */
+  int unstable;        /* multipliers outside the unit circle at the last point; -1: not known */
+  int sought;          /* index of the multiplier whose crossing of the unit circle is located */
+  int on_circle;       /* 1: this multiplier moves on the unit circle until it leaves it */
+  char *memory;
+};
+
+/* The number of unknowns, without the parameter. */
+static inline int pw_periodic_unknowns (const pw_periodic *x) {
+  return 2 * x->n + x->symmetries + x->settings.free;
+}
+/* The unit of entry j of a state. */
+static inline double pw_periodic_unit (const pw_periodic *x, int j) {
+  return j < x->n ? pw_unit (x->s, j) : pw_unit (x->s, j - x->n) / x->T;
+}
+static inline double pw_periodic_parameter (const pw_periodic *x, const double *u) {
+  return x->settings.first + u[pw_periodic_unknowns (x)] * (x->settings.last - x->settings.first);
+}
+
+/* Integrates one period from the state of u: sets y0, a0, and then y1, a1, or with derivatives instead of these size,
+ * basis, dual, Phi.  A status; PW_RETRY: there is no such motion, perhaps with x->why, or the search was stopped. */
+int pw_periodic_flow (pw_periodic *x, const double *u, pw_flow_accuracy accuracy, pw_error *error);
 
 #endif
