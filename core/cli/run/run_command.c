@@ -105,11 +105,8 @@ static int run_choose_engine (pw_run_cli *command, pw_error *error) {
   int status = pw_cli_read_specialise (command->line.specialise, &when, error);
   if (status == PW_OK) status = pw_checkpoints_open (command, &when, error);
   if (status != PW_OK) return status;
-  /* the stages of --profile are those of the general engine */
-  int general = command->profile && when == PW_SPECIALISE_AUTO;
-  pw_cli_engine_open (&command->engine, command->compiled.system, general ? PW_SPECIALISE_NEVER : when,
+  pw_cli_engine_open (&command->engine, command->compiled.system, when,
                       pw_method_steps (command->method, &command->settings, defaults.step, command->t_end));
-  if (general) strcpy (command->engine.reason, "--profile");
   command->settings.specialised = pw_scene_code_table (command->engine.code);
   return PW_OK;
 }
@@ -308,7 +305,6 @@ static int run_finish (pw_run_cli *command, pw_error *error) {
   static const char *const output_name[PW_RUN_OUTPUTS] = { "the table so far", "the page", "the summary" };
   char reason[PW_RUN_REASON] = "";
   int interrupted = error->status == PW_OK && pw_stop;
-  int prints_file = run_is_stdout (command->table_path) || run_is_stdout (command->summary_path);
   pw_sample sample, *last = NULL;
   if (run && pw_run_sample (run, pw_run_time (run), &sample, NULL) == PW_OK) last = &sample;
   run_close_table (command, error->status == PW_OK && !interrupted, error);
@@ -320,8 +316,6 @@ static int run_finish (pw_run_cli *command, pw_error *error) {
   if (undrawn && error->status == PW_OK) summary.status = "interrupted", summary.reason = "gnuplot was interrupted";
   run_write_json (command, &summary, last, error);
   run_name_files (command, error);
-  if (command->profile && last && error->status == PW_OK && !interrupted)
-    pw_print_profile (system, run, command->cpu, prints_file ? stderr : stdout, error);
   if (interrupted) pw_cli_say ("pinwheel: %s\n", reason);
   int status = pw_cli_report_error (error);
   error->status = PW_OK;
@@ -368,7 +362,6 @@ static const struct poptOption run_options[] = {
   PW_TEXT_OPTION (pw_run_cli, reference_path, "reference", 0, "FILE.csv",
                   "Measure errors against this table, with columns as in -o, instead of the model's exact solution"),
   PW_ALIAS_OPTION (pw_run_cli, reference_path, "truth"),
-  PW_FLAG_OPTION (pw_run_cli, profile, "profile", "Measure the cost of each element type and each stage after the run"),
   PW_OPTION_GROUP ("Checkpoints"),
   PW_TEXT_OPTION (pw_run_cli, checkpoints.path, "checkpoint", 0, "FILE",
                   "Save the state regularly, so that the run can be resumed"),

@@ -27,7 +27,7 @@ typedef struct {
   pw_cli_line line;
   const char *row_interval_text; /* --every */
   const char *table_path, *summary_path, *plots_path, *page_path, *reference_path, *colour;
-  int with_energies, profile; /* 1: --energy, --profile */
+  int with_energies; /* 1: --energy */
   pw_checkpoints checkpoints;
   /* as understood */
   pw_cli_model compiled;
