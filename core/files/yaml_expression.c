@@ -408,7 +408,7 @@ static int table_file (pw_reader *r, const char *label, const pw_node *node, con
   if (f == NULL && pw_open_input_status () == PW_RESOURCE)
     return pw_fail (r->error, PW_RESOURCE, "%s: cannot read %s: %s", r->y->path, name, reason);
   if (f == NULL) return pw_yaml_fail (r, node->at, "%s: cannot read \"%.60s\": %s", label, name, reason);
-  double *t = pw_columns_from_stream (f, name, column, unit, 2, PW_GAPS_REFUSED, &s->table.count, &cause);
+  double *t = pw_columns_from_stream (f, name, column, unit, 2, PW_GAPS_REFUSED, NULL, &s->table.count, &cause);
   fclose (f);
   if (cause.status == PW_INPUT) return pw_yaml_fail (r, node->at, "%s: %s", label, cause.text);
   if (t == NULL || pw_model_keep (r->model, t, free) != PW_OK) return pw_yaml_no_memory (r);
