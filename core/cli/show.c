@@ -150,12 +150,6 @@ static void yaml_body (const pw_body *b) {
   putchar ('\n');
 }
 
-static void yaml_element (const pw_element *e) {
-  printf ("  - {%s: ", e->kind->name), yaml_name (pw_element_name (e));
-  yaml_fields (e->kind->fields, e->definition, ", ", YAML_DIGITS);
-  puts ("}");
-}
-
 /* PW_INPUT if the model has contents that a text model cannot express. */
 static int yaml_check (const pw_model *m, pw_error *error) {
   int elements;
@@ -194,37 +188,32 @@ static void yaml_run (const pw_run_defaults *run) {
   if (*separator == ',') puts ("}");
 }
 
-/* Expressions contain names, whose values are written under `let`. */
-static void yaml_names (const pw_reference_text *ref) {
-  if (ref->names) puts ("let:");
-  for (int i = 0; i < ref->names; i++) printf ("  %s: %s\n", ref->name[i], YAML_NUMBER (ref->value[i]));
-}
-
-static void yaml_reference (const pw_model *m) {
-  const pw_reference_text *ref = pw_model_reference_text (m);
-  if (pw_model_table (m)->reference)
-    puts ("# The reference solution of the model is a function in C, which cannot be written as text.");
-  if (ref->states) puts ("truth:");
-  for (int i = 0; i < ref->states; i++) printf ("  %s: ", ref->state[i]), yaml_text (ref->text[i]), putchar ('\n');
-}
-
 /* Writes a built model to standard output, without a reference solution in C. */
 static int yaml_model (const pw_cli_model *opened, pw_error *error) {
   const pw_model *m = opened->model;
   if (yaml_check (m, error) != PW_OK) return error->status;
   puts ("pinwheel: 1");
   const pw_plugin_table *table = pw_model_table (m);
+  const pw_reference_text *ref = pw_model_reference_text (m);
   int bodies, elements;
   const pw_body *b = pw_model_bodies (m, &bodies);
   const pw_element *e = pw_model_elements (m, &elements);
   if (table->about && *table->about) printf ("about: "), yaml_text (table->about), putchar ('\n');
   yaml_run (&table->run);
-  yaml_names (pw_model_reference_text (m));
+  if (ref->names) puts ("let:"); /* of the names in expressions */
+  for (int i = 0; i < ref->names; i++) printf ("  %s: %s\n", ref->name[i], YAML_NUMBER (ref->value[i]));
   if (bodies) puts ("bodies:");
   for (int i = 0; i < bodies; i++) yaml_body (&b[i]);
   if (elements) puts ("elements:");
-  for (int i = 0; i < elements; i++) yaml_element (&e[i]);
-  yaml_reference (m);
+  for (const pw_element *end = e + elements; e < end; e++) {
+    printf ("  - {%s: ", e->kind->name), yaml_name (pw_element_name (e));
+    yaml_fields (e->kind->fields, e->definition, ", ", YAML_DIGITS);
+    puts ("}");
+  }
+  if (table->reference)
+    puts ("# The reference solution of the model is a function in C, which cannot be written as text.");
+  if (ref->states) puts ("truth:");
+  for (int i = 0; i < ref->states; i++) printf ("  %s: ", ref->state[i]), yaml_text (ref->text[i]), putchar ('\n');
   return PW_OK;
 }
 
@@ -259,13 +248,6 @@ static void show_element (const pw_element *e) {
   putchar ('\n');
 }
 
-/* Derivative blocks that element types do not provide. */
-static void show_differences (const pw_system *s) {
-  int count = pw_system_differences (s);
-  if (count) puts ("\nDerivatives by differences, for implicit methods and linearisation");
-  for (int i = 0; i < count; i++) printf ("  %s\n", PW_NAME (pw_system_difference_name, s, i));
-}
-
 static void show_parameters (const pw_model *m) {
   const pw_parameter *parameters = pw_model_table (m)->parameters;
   if (parameters == NULL || parameters->name == NULL) return;
@@ -283,21 +265,6 @@ static void show_parameters (const pw_model *m) {
     }
 }
 
-static void show_defaults (const pw_plugin_table *table) {
-  pw_run_defaults defaults = pw_cli_defaults (table);
-  printf ("\nRuns by default for %s s with %s, --step %s", PW_DIGITS (defaults.t_end, SHOW_DIGITS), defaults.method,
-          PW_DIGITS (defaults.step, SHOW_DIGITS));
-  if (defaults.rtol != 0) printf (", --rtol %s", PW_DIGITS (defaults.rtol, SHOW_DIGITS));
-  putchar ('\n');
-}
-
-static void show_sizes (const pw_system *s) {
-  int bodies = pw_system_bodies (s), rows = pw_system_rows (s), holonomic = pw_system_holonomic (s);
-  printf ("\nSizes: %d %s, %d coordinates, %d constraint equation%s (%d on positions, %d on velocities)\n", bodies,
-          bodies == 1 ? "body" : "bodies", pw_system_coordinates (s), rows, rows == 1 ? "" : "s", holonomic,
-          rows - holonomic);
-}
-
 /* The states given by the reference solution of the model. */
 static void show_reference (const pw_cli_model *m) {
   enum { LISTED = 12 }; /* states, at most */
@@ -313,19 +280,28 @@ static void show_reference (const pw_cli_model *m) {
 }
 
 static void show_model (const pw_cli_model *m) {
-  int elements;
+  const pw_system *s = m->system;
   const pw_plugin_table *table = pw_model_table (m->model);
+  pw_run_defaults defaults = pw_cli_defaults (table);
+  int elements, differences = pw_system_differences (s), bodies = pw_system_bodies (s), rows = pw_system_rows (s),
+                holonomic = pw_system_holonomic (s);
   const pw_element *e = pw_model_elements (m->model, &elements);
   pw_cli_print (stdout, "%s: %s\n%s\n", pw_model_name (m->model), table->about ? table->about : "",
                 pw_cli_short_path (pw_file_path (m->file)));
-  show_bodies (m->system);
+  show_bodies (s);
   if (elements) puts ("\nElements");
   for (int i = 0; i < elements; i++) show_element (&e[i]);
-  show_differences (m->system);
+  if (differences) puts ("\nDerivatives by differences, for implicit methods and linearisation");
+  for (int i = 0; i < differences; i++) printf ("  %s\n", PW_NAME (pw_system_difference_name, s, i));
   show_parameters (m->model);
-  show_defaults (table);
+  printf ("\nRuns by default for %s s with %s, --step %s", PW_DIGITS (defaults.t_end, SHOW_DIGITS), defaults.method,
+          PW_DIGITS (defaults.step, SHOW_DIGITS));
+  if (defaults.rtol != 0) printf (", --rtol %s", PW_DIGITS (defaults.rtol, SHOW_DIGITS));
+  putchar ('\n');
   show_reference (m);
-  show_sizes (m->system);
+  printf ("\nSizes: %d %s, %d coordinates, %s (%d on positions, %d on velocities)\n", bodies,
+          bodies == 1 ? "body" : "bodies", pw_system_coordinates (s), PW_COUNTED (rows, "constraint equation"),
+          holonomic, rows - holonomic);
 }
 
 /* ---- The equations of motion in numbers ----

@@ -168,12 +168,6 @@ static int check_kind (pw_check *check, pw_checked_kind *k, pw_error *error) {
   return status;
 }
 
-static int check_kinds (pw_check *check, pw_error *error) {
-  int status = check_list_kinds (check, error);
-  for (int i = 0; status == PW_OK && i < check->kinds; i++) status = check_kind (check, &check->kind[i], error);
-  return status;
-}
-
 /* ---- Wheels ---- */
 
 /* Wheels roll in the plane of the model.  Seen from above, no gravity acts in it, and on a slope of angle a that of
@@ -615,22 +609,11 @@ static int check_model (pw_check *check, pw_error *error) {
     if (status == PW_OK) status = check_linear (check, error);
   }
   if (status == PW_OK) check_wheels (check);
-  if (status == PW_OK) status = check_kinds (check, error);
+  if (status == PW_OK) status = check_list_kinds (check, error);
+  for (int i = 0; status == PW_OK && i < check->kinds; i++) status = check_kind (check, &check->kind[i], error);
   int out_of_memory = check->problem.out_of_memory || check->finding.out_of_memory;
   return status == PW_OK && out_of_memory ? pw_fail (error, PW_RESOURCE, "out of memory") : status;
 }
-
-static void check_close (pw_check *check) {
-  pw_linear_free (&check->linear);
-  pw_run_close (check->run);
-  free (check->redundant);
-  free (check->kind);
-  free (check->problem.text);
-  free (check->finding.text);
-  pw_cli_close_model (&check->model);
-}
-
-enum { CHECK_JSON = 1 }; /* index in the list of files of check_command */
 
 static int check_command (void *options, pw_error *error) {
   pw_check *check = options;
@@ -640,7 +623,7 @@ static int check_command (void *options, pw_error *error) {
   if (status == PW_OK) status = pw_files_open (&files, &check->line, &check->model, use, 2, error);
   if (status == PW_OK) status = check_model (check, error);
   if (status == PW_OK) {
-    FILE *json = pw_files_stream (&files, CHECK_JSON);
+    FILE *json = pw_files_stream (&files, 1);
     if (json != stdout) report_write (check, NULL);
     if (json) report_write (check, &(pw_json){ .f = json });
     pw_files_finish (&files, error);
@@ -649,7 +632,13 @@ static int check_command (void *options, pw_error *error) {
                check->problem.count > 1 ? "; and more, see above" : "");
   }
   pw_files_close (&files);
-  check_close (check);
+  pw_linear_free (&check->linear);
+  pw_run_close (check->run);
+  free (check->redundant);
+  free (check->kind);
+  free (check->problem.text);
+  free (check->finding.text);
+  pw_cli_close_model (&check->model);
   return error->status;
 }
 

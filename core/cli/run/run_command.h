@@ -1,10 +1,9 @@
-/* The command `pinwheel run`: its options, what it has open, and its checkpoints (run_command.c). */
+/* The command `pinwheel run`: its options, what it has open, its checkpoints. */
 #ifndef PW_RUN_COMMAND_H
 #define PW_RUN_COMMAND_H
 
 #include "motion.h"
 #include "plot.h"
-#include "cli.h"
 
 typedef struct {
   /* as given, or NULL; without --checkpoint, `path` is that of --resume */
@@ -54,18 +53,6 @@ typedef struct {
   int write_failed;                     /* 1: the table or the summary could not be written */
   char kept_path[PW_RUN_OUTPUTS][4200]; /* of incomplete files that are kept, PATH_MAX and an ending, or "" */
 } pw_run_cli;
-
-/* Reads the options and the checkpoint that is resumed, whose engine is used if *specialise is
- * PW_SPECIALISE_AUTO. */
-int pw_checkpoints_open (pw_run_cli *command, pw_specialise *specialise, pw_error *error);
-/* Before anything is written: locks the checkpoint file, verifies that a resumed checkpoint belongs to this run and
- * opens its table; without --resume, refuses a table that could not be continued. */
-int pw_checkpoints_prepare (pw_run_cli *command, pw_error *error);
-/* After everything is open: loads the state of the checkpoint that is resumed, if any; schedules the next one. */
-int pw_checkpoints_resume (pw_run_cli *command, pw_error *error);
-/* Saves a checkpoint that is due; near a singular configuration it is postponed. */
-int pw_checkpoints_save (pw_run_cli *command, pw_error *error);
-void pw_checkpoints_close (pw_checkpoints *checkpoints);
 
 /* ---- The summary and the report (report.c) ---- */
 

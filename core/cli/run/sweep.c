@@ -335,18 +335,6 @@ static int worker_thread (void *context, int i, pw_error *error) {
   return PW_OK;
 }
 
-static void rows_close (sweep_rows *sweep) {
-  for (row_code *entry = sweep->codes, *next; entry; entry = next) {
-    next = entry->next;
-    pw_scene_code_close (entry->code);
-    free (entry->text);
-    free (entry);
-  }
-  system_release (sweep->latest);
-  pthread_cond_destroy (&sweep->compiled);
-  pthread_mutex_destroy (&sweep->lock);
-}
-
 /* Computes the missing rows in `jobs` threads, until all are there or pw_stop is set.  PW_RESOURCE. */
 static int rows_compute (const pw_plan *plan, pw_journal *journal, int jobs, pw_error *error) {
   const long left = journal->rows - journal->done;
@@ -364,7 +352,15 @@ static int rows_compute (const pw_plan *plan, pw_journal *journal, int jobs, pw_
     pw_cli_say (
         "pinwheel: in %ld of %ld runs given initial values were changed to satisfy the constraints, at worst %s\n",
         sweep.changed_runs, sweep.opened_runs, sweep.largest_change_text);
-  rows_close (&sweep);
+  for (row_code *entry = sweep.codes, *next; entry; entry = next) {
+    next = entry->next;
+    pw_scene_code_close (entry->code);
+    free (entry->text);
+    free (entry);
+  }
+  system_release (sweep.latest);
+  pthread_cond_destroy (&sweep.compiled);
+  pthread_mutex_destroy (&sweep.lock);
   return error->status;
 }
 
@@ -505,12 +501,6 @@ static int sweep_finish (pw_sweep *sweep, pw_error *error) {
   return PW_OK;
 }
 
-static void sweep_close (pw_sweep *sweep) {
-  pw_journal_close (&sweep->journal);
-  pw_plan_close (&sweep->plan);
-  pw_file_close (sweep->plan.file);
-}
-
 static int sweep_command (void *options, pw_error *error) {
   pw_sweep *sweep = options;
   sweep->journal.descriptor = -1;
@@ -522,7 +512,9 @@ static int sweep_command (void *options, pw_error *error) {
     if (status == PW_OK) status = rows_compute (&sweep->plan, &sweep->journal, sweep->jobs, error);
     if (status == PW_OK) status = sweep_finish (sweep, error);
   }
-  sweep_close (sweep);
+  pw_journal_close (&sweep->journal);
+  pw_plan_close (&sweep->plan);
+  pw_file_close (sweep->plan.file);
   return status;
 }
 

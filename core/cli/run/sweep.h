@@ -36,8 +36,6 @@ typedef struct {
 int pw_axis_read (pw_axis *axis, const char *text, pw_arena *arena, pw_error *error);
 double pw_axis_value (const pw_axis *axis, long i); /* i from 0 */
 
-/* Reads a NULL-terminated list of "NAME=RANGE", likewise.  PW_INPUT also if there are too many rows. */
-int pw_grid_read (pw_grid *grid, const char *const *ranges, pw_arena *arena, pw_error *error);
 double pw_grid_value (const pw_grid *grid, int i, long row); /* of axis i */
 
 /* The row that is computed k-th, from 0: rows with the same parameters follow each other and share a compiled model. */

@@ -141,7 +141,8 @@ static int grid_count_rows (pw_grid *grid, pw_error *error) {
   return PW_OK;
 }
 
-int pw_grid_read (pw_grid *grid, const char *const *ranges, pw_arena *arena, pw_error *error) {
+/* Reads a NULL-terminated list of "NAME=RANGE".  PW_INPUT also if there are too many rows. */
+static int grid_read (pw_grid *grid, const char *const *ranges, pw_arena *arena, pw_error *error) {
   int n = 0, status = PW_OK;
   while (ranges && ranges[n]) n++;
   *grid = (pw_grid){ .axis = pw_arena_alloc (arena, ((size_t)n + 1) * sizeof *grid->axis) };
@@ -330,16 +331,6 @@ void pw_plan_cells (const pw_plan *plan, const pw_plan_row *row, pw_text *text) 
 
 /* ---- The fingerprint ---- */
 
-/* The values of parameters that are not varied: the model's or those of --set. */
-static void plan_fingerprint_parameters (pw_plan *plan, const pw_model *model) {
-  for (const pw_parameter *parameter = pw_model_table (model)->parameters; parameter && parameter->name; parameter++) {
-    int is_varied = 0;
-    for (int i = 0; i < plan->grid.axes; i++) is_varied |= plan->grid.axis[i].parameter == parameter;
-    if (!is_varied)
-      pw_fingerprint_number (&plan->fingerprint, "parameter", parameter->name, pw_model_parameter (model, parameter));
-  }
-}
-
 static void plan_fingerprint_grid (pw_plan *plan) {
   pw_text *text = &plan->fingerprint;
   pw_fingerprint_initial (text, plan->line->starts);
@@ -362,7 +353,11 @@ static int plan_fingerprint (pw_plan *plan, const pw_model *model, pw_error *err
     pw_fingerprint_number (text, "max-steps", NULL, (double)plan->settings.max_steps);
   if (isfinite (plan->limit.seconds)) pw_fingerprint_number (text, "limit", NULL, plan->limit.seconds);
   if (plan->engine.code) pw_fingerprint_line (text, "engine", NULL, "specialised");
-  plan_fingerprint_parameters (plan, model);
+  for (const pw_parameter *parameter = pw_model_table (model)->parameters; parameter && parameter->name; parameter++) {
+    int is_varied = 0; /* else its value is the model's or that of --set */
+    for (int i = 0; i < plan->grid.axes; i++) is_varied |= plan->grid.axis[i].parameter == parameter;
+    if (!is_varied) pw_fingerprint_number (text, "parameter", parameter->name, pw_model_parameter (model, parameter));
+  }
   plan_fingerprint_grid (plan);
   pw_fingerprint_number (text, "rows", NULL, (double)plan->grid.rows);
   pw_fingerprint_line (text, "columns", NULL, plan->heading.chars ? plan->heading.chars : "");
@@ -377,7 +372,7 @@ static int plan_fingerprint (pw_plan *plan, const pw_model *model, pw_error *err
 int pw_plan_open (pw_plan *plan, const char **ranges, pw_error *error) {
   const pw_method *method;
   int stabilisation, status = pw_method_parse (plan->method, &method, &stabilisation, error);
-  if (status == PW_OK) status = pw_grid_read (&plan->grid, (const char *const *)ranges, &plan->arena, error);
+  if (status == PW_OK) status = grid_read (&plan->grid, (const char *const *)ranges, &plan->arena, error);
   if (status != PW_OK) return status;
   pw_model *model = pw_file_model (plan->file, error);
   if (model == NULL) return error->status;
@@ -439,14 +434,6 @@ static uint32_t journal_line_checksum (long row, int status, const char *text, s
   h = (h ^ (uint32_t)status) * 16777619u;
   for (size_t i = 0; i < size; i++) h = (h ^ (unsigned char)text[i]) * 16777619u;
   return h;
-}
-
-static void journal_line_format (pw_text *line, long row, int status, const char *text) {
-  size_t size = strlen (text);
-  pw_text_add (line, PW_PRINTED (60, "%ld %d %08lx ", row, status,
-                                 (unsigned long)journal_line_checksum (row, status, text, size)));
-  pw_text_add_bytes (line, text, size);
-  pw_text_add (line, "\n");
 }
 
 /* Reads the line that begins here; 0 if it is incomplete or damaged. */
@@ -563,9 +550,12 @@ int pw_journal_open (pw_journal *journal, const pw_plan *plan, const char *path,
 }
 
 int pw_journal_add (pw_journal *journal, const pw_plan *plan, long row, int status, const char *text, pw_error *error) {
-  off_t at = journal->size;
+  const off_t at = journal->size;
+  const uint32_t checksum = journal_line_checksum (row, status, text, strlen (text));
   pw_text_clear (&journal->line);
-  journal_line_format (&journal->line, row, status, text);
+  pw_text_add (&journal->line, PW_PRINTED (60, "%ld %d %08lx ", row, status, (unsigned long)checksum));
+  pw_text_add (&journal->line, text);
+  pw_text_add (&journal->line, "\n");
   if (journal->line.failed) return pw_fail (error, PW_RESOURCE, "out of memory");
   if (journal_write (journal, journal->line.chars, journal->line.length, error) != PW_OK) return error->status;
   journal->offset[row / plan->parts] = at;
