@@ -219,7 +219,7 @@ TEST (bad_tables) {
       " has no build function: PW_MODEL (...) at its end must set .build" },
   };
   for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
-    cli_write ("signal.c", check_text ("%s%s", bad[i].defines, model));
+    cli_write ("table.c", check_text ("%s%s", bad[i].defines, model));
     assert_int_equal (cli_run ("pinwheel run @/table.c"), 2);
     if (strstr (cli_err, bad[i].message) == NULL) print_error ("%s", cli_err);
     assert_non_null (strstr (cli_err, bad[i].message));

@@ -11,10 +11,6 @@
 #include "report.h"
 #include "run_command.h"
 
-#define RUN_SHORT 0.01     /* processor time of a batch [s] below which the next one is longer */
-#define RUN_LONG 0.04      /* above which it is shorter: the progress bar waits for its end */
-enum { RUN_BATCH = 4096 }; /* calls of pw_run_advance_towards in a batch, at most */
-
 /* ---- Checkpoints: their contents, when they are due, and how a run continues from one ----
  *
  * A checkpoint is saved after the step that reaches a multiple of the interval, once that step's rows have been
@@ -362,8 +358,7 @@ static int run_batch (pw_run_cli *command, pw_error *error) {
   } while (status == PW_OK && ++steps < command->batch && pw_run_time (command->run) < due && !pw_stop);
   double cpu = pw_seconds (CLOCK_PROCESS_CPUTIME_ID) - start;
   command->cpu += cpu;
-  if (cpu < RUN_SHORT && steps == command->batch && command->batch < RUN_BATCH) command->batch *= 2;
-  if (cpu > RUN_LONG && command->batch > 1) command->batch /= 2;
+  pw_batch_adapt (&command->batch, steps, cpu);
   return status;
 }
 

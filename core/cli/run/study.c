@@ -5,12 +5,6 @@
 #include "report.h"
 #include "study.h"
 
-/* The thread's clock is read after a batch of calls of pw_run_advance_towards.  If the batch has taken less processor
- * time than STUDY_SHORT, the next one is twice as long; if more than STUDY_LONG, half as long [s]. */
-#define STUDY_SHORT 0.005
-#define STUDY_LONG 0.02
-enum { STUDY_FIRST_BATCH = 8, STUDY_LONGEST_BATCH = 65536 }; /* calls of pw_run_advance_towards */
-
 /* ---- Methods ---- */
 
 static int methods_add (pw_study *study, const char *name, pw_error *error) {
@@ -98,7 +92,7 @@ void pw_study_progress (pw_study *study, pw_row *row, double part) {
 static int study_advance (pw_study *study, pw_row *row, pw_run *run, const pw_limit *limit, pw_visitor *visitor,
                           pw_error *error) {
   int status = PW_OK;
-  long batch = STUDY_FIRST_BATCH;
+  long batch = 8; /* calls of pw_run_advance_towards between readings of the clock, at first */
   while (status == PW_OK && pw_run_time (run) < study->t_end) {
     double start = pw_seconds (CLOCK_THREAD_CPUTIME_ID);
     long n = 0;
@@ -109,8 +103,7 @@ static int study_advance (pw_study *study, pw_row *row, pw_run *run, const pw_li
     } while (status == PW_OK && ++n < batch && pw_run_time (run) < study->t_end);
     double used = pw_seconds (CLOCK_THREAD_CPUTIME_ID) - start;
     row->cpu += used;
-    if (used < STUDY_SHORT && n == batch && batch < STUDY_LONGEST_BATCH) batch *= 2;
-    if (used > STUDY_LONG && batch > 1) batch /= 2;
+    pw_batch_adapt (&batch, n, used);
     pw_study_progress (study, row, study->run_share * (row->runs + pw_run_time (run) / study->t_end));
     int stopped = status == PW_STOPPED;
     if (stopped && (pw_stop || isinf (study->cpu_limit))) return pw_limit_status (limit, pw_run_time (run), error);
