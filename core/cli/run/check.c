@@ -4,7 +4,6 @@
 #include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
-#include "cli.h"
 #include "pinwheel-analysis.h"
 #include "pinwheel-selftest.h"
 #include "report.h"
@@ -107,15 +106,6 @@ static int check_reference (pw_check *check, pw_error *error) {
   }
   free (reference);
   return status;
-}
-
-/* Tables that do not cover the model's run, and rows of their files that are left out. */
-static void check_tables (pw_check *check) {
-  const pw_system *s = check->model.system;
-  const double t_end = pw_cli_defaults (pw_file_table (check->model.file)).t_end;
-  char notice[PW_NOTICE_BYTES];
-  for (int i = 0; i < pw_system_signals (s); i++)
-    if (*pw_system_table_notice (s, i, t_end, notice, sizeof notice)) check_add (&check->finding, "%s", notice);
 }
 
 /* ---- Element types ---- */
@@ -597,11 +587,15 @@ static void report_write (const pw_check *check, pw_json *j) {
 /* ---- The command ---- */
 
 static int check_model (pw_check *check, pw_error *error) {
+  const pw_system *s = check->model.system;
+  const double t_end = pw_cli_defaults (pw_file_table (check->model.file)).t_end;
+  char notice[PW_NOTICE_BYTES];
   int status = PW_OK;
   check->rk4_limit = check->doubling_time = INFINITY;
   check->fastest = -1;
   pw_report_model (&check->model);
-  check_tables (check);
+  for (int i = 0; i < pw_system_signals (s); i++) /* tables that do not cover the run, rows that are left out */
+    if (*pw_system_table_notice (s, i, t_end, notice, sizeof notice)) check_add (&check->finding, "%s", notice);
   check_open_run (check);
   if (check->run) {
     check_given_values (check);

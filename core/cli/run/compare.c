@@ -268,14 +268,6 @@ static int reference_compute (pw_reference *reference, pw_study *study, double s
   return status;
 }
 
-/* Makes all velocities unknown if any is, so that no error is that of a part of them. */
-static void reference_complete_velocities (const pw_system *system, pw_motion *motion) {
-  int n = pw_system_coordinates (system), complete = 1;
-  for (int j = n; j < 2 * n; j++) complete &= pw_motion_known (motion, j) == motion->times;
-  for (int k = 0; !complete && k < motion->times; k++)
-    for (int j = n; j < 2 * n; j++) pw_motion_at (motion, k)[j] = NAN;
-}
-
 /* Finds the reference.  step: the smallest step size of the comparison [s].  Sets the study's t_end to the end of a
  * table unless --t-end is given.  Close the motion of the reference in every case. */
 static int reference_find (pw_reference *reference, pw_study *study, double step, pw_error *error) {
@@ -291,8 +283,12 @@ static int reference_find (pw_reference *reference, pw_study *study, double step
     pw_motion_close (&reference->motion);
     return reference_compute (reference, study, step, error);
   }
-  if (path == NULL) reference_complete_velocities (study->compiled.system, &reference->motion);
-  double last = reference->motion.t[reference->motion.times - 1];
+  pw_motion *motion = &reference->motion;
+  int n = pw_system_coordinates (study->compiled.system), complete = 1;
+  for (int j = n; j < 2 * n && path == NULL; j++) complete &= pw_motion_known (motion, j) == motion->times;
+  for (int k = 0; !complete && k < motion->times; k++) /* so that no error is that of a part of the velocities */
+    for (int j = n; j < 2 * n; j++) pw_motion_at (motion, k)[j] = NAN;
+  double last = motion->t[motion->times - 1];
   if (last < t_end)
     return pw_fail (error, PW_INPUT,
                     "--reference %s: no row at the final time, t = %s s; the last one before it is at %s s", path,

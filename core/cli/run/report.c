@@ -2,7 +2,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "cli.h"
 #include "report.h"
 #include "run_command.h"
 
@@ -23,16 +22,6 @@ static void report_more (FILE *f, int more, const char *hint) {
 
 /* ---- Settings ---- */
 
-/* A fixed step longer than the time in which the initial motion changes. */
-static void report_step (const pw_run *run, double step) {
-  double time_scale = pw_run_scale (run)->time;
-  if (step > time_scale)
-    pw_cli_say (
-        "pinwheel: a step of %s s is long for a motion that changes within %s s, and nothing controls its error: "
-        "compare with shorter ones\n",
-        PW_DIGITS (step, 3), PW_DIGITS (time_scale, 2));
-}
-
 /* An absolute tolerance within which a force saturates. */
 static void report_atol (pw_run *run, const pw_system *system, double atol) {
   char element[PW_NAME_BYTES];
@@ -46,12 +35,16 @@ static void report_atol (pw_run *run, const pw_system *system, double atol) {
 
 void pw_report_settings (pw_run *run, const pw_system *system, const char *method, const pw_cli_line *line,
                          const pw_settings *settings) {
+  double step = fmin (settings->step, settings->span), time_scale = pw_run_scale (run)->time;
   pw_cli_report_unused (method, line);
   pw_cli_report_tables (system, settings->span);
   if (pw_cli_adaptive (method) == 1)
     report_atol (run, system, settings->atol);
-  else
-    report_step (run, fmin (settings->step, settings->span));
+  else if (step > time_scale)
+    pw_cli_say (
+        "pinwheel: a step of %s s is long for a motion that changes within %s s, and nothing controls its error: "
+        "compare with shorter ones\n",
+        PW_DIGITS (step, 3), PW_DIGITS (time_scale, 2));
 }
 
 /* ---- The model ---- */

@@ -184,18 +184,6 @@ static int table_open (pw_study *study, pw_error *error) {
   return pw_text_line (&line, pw_output_stream (study->csv), study->folder, error);
 }
 
-static int table_write_csv (const pw_study *study, const pw_row *row, pw_error *error) {
-  const pw_study_column *column = study->type->column;
-  pw_text line = { .chars = NULL };
-  for (int i = 0; i < study->type->columns; i++)
-    if (column[i].text)
-      pw_text_cell (&line, column[i].text (row));
-    else if (column[i].name)
-      pw_text_number (&line, row->value[i]);
-  pw_text_quoted (&line, row->reason);
-  return pw_text_line (&line, pw_output_stream (study->csv), study->folder, error);
-}
-
 /* The width of the first column, which contains the methods. */
 static int table_width (const pw_study *study) {
   size_t width = strlen ("method");
@@ -246,9 +234,18 @@ static void table_print (const pw_study *study, const pw_row *row) {
 
 /* Prints a row unless the study is quiet, and writes it into the CSV file. */
 static int table_write_row (pw_study *study, const pw_row *row, pw_error *error) {
+  const pw_study_column *column = study->type->column;
+  pw_text line = { .chars = NULL };
   if (!study->quiet && study->headed != row->group + 1) table_heading (study, row->group);
   if (!study->quiet) table_print (study, row);
-  return study->csv ? table_write_csv (study, row, error) : PW_OK;
+  if (study->csv == NULL) return PW_OK;
+  for (int i = 0; i < study->type->columns; i++)
+    if (column[i].text)
+      pw_text_cell (&line, column[i].text (row));
+    else if (column[i].name)
+      pw_text_number (&line, row->value[i]);
+  pw_text_quoted (&line, row->reason);
+  return pw_text_line (&line, pw_output_stream (study->csv), study->folder, error);
 }
 
 /* ---- Figures ---- */
