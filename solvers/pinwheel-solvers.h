@@ -187,36 +187,6 @@ int pw_initial_specified (const pw_initial_report *report, int state);
 /* 1 if the user gives it: pw_model_set_initial, pw_settings.initial. */
 int pw_initial_given (const pw_initial_report *report, int state);
 
-/* ---- Cost of an evaluation of the accelerations (timing.c) ---- */
-
-/* Processor times [ns] of all elements of a type.  0: not applicable. */
-typedef struct {
-  const pw_kind *kind;
-  int elements;
-  double signals, constraints /* J, gamma */, force, positions /* g */;
-} pw_profile_kind;
-
-/* Processor times [ns] of an evaluation and of its stages; medians. */
-typedef struct {
-  int kinds;
-  pw_profile_kind *kind;
-  double configurations; /* of the bodies */
-  double kinematics;     /* the configurations and all signals */
-  double equations;      /* J, gamma, f */
-  double stabilisation;  /* Baumgarte's terms */
-  double factorisation, solution;
-  double evaluation;  /* all stages in one call, or by specialised code */
-  double evaluations; /* per step, without those that projections contain; 0: not applicable to this method */
-  double projection;  /* with the evaluation after it */
-  double projections; /* per step */
-  double iterations;  /* position iterations in each */
-} pw_profile;
-
-/* Measures at the state reached, for a few seconds.  Afterwards the run can only be closed.  PW_RETRY in a singular
- * configuration: nothing is measured.  Errors: PW_RESOURCE.  Free the profile in every case. */
-int pw_run_profile (pw_run *r, pw_profile *p, pw_error *error);
-void pw_profile_free (pw_profile *p);
-
 /* ---- For programs in other languages (bindings.c) ---- */
 
 /* Advances to t_end and stores samples in rows of pw_run_record_width numbers, at most `count`: at the given times,

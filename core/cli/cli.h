@@ -1,50 +1,20 @@
-/* The progress of a long run and the remaining time on standard error: a bar on a terminal, else a line a minute. */
-#ifndef PW_CLI_H_
-#define PW_CLI_H_
-#include <time.h>
-#include <popt.h>
-#include <signal.h>
-#include <stdatomic.h>
-#include "pinwheel-files.h"
-#include "pinwheel-solvers.h"
-#include "util.h"
-#include <stdint.h>
-#include <stdio.h>
-
-/* Zero-initialised, it shows nothing. */
-typedef struct {
-  const char *title; /* printed before the bar */
-  const char *unit;  /* "s" for time; else what is counted; "": a fraction of 1 */
-  double first;      /* initial time or count; not 0 if a run or sweep is resumed */
-  double last;       /* final time [s] or count */
-  double start;      /* clock when the work started [s] */
-  double next;       /* clock before which nothing is drawn or written [s] */
-  double reached;    /* time or count of the last call, */
-  double changed;    /* and the clock when it was reached [s] */
-  double remaining;  /* the remaining time last shown, which does not rise [s]; INFINITY: none yet */
-  int drawn;         /* 1: there is a bar to erase */
-  int no_bar;        /* 1: no bar on a terminal, as the results are printed there; set after the start */
-  int lines;         /* 1: no terminal: lines in place of the bar */
-  char note[60];     /* printed at the end of the line; "" at first */
-} pw_progress;
-
-/* The time of a clock [s]. */
-double pw_seconds (clockid_t id);
-
-/* Starts the progress of a run from time `first` to `last`, with the unit "s"; or of work that is counted in `unit`
- * ("runs"): `first` of `last` are done already. */
-void pw_progress_start (pw_progress *p, const char *title, const char *unit, double first, double last);
-/* Draws the bar for the time or count reached, at most ten times a second, or writes a line.  A count may exceed the
- * final one if that was an estimate. */
-void pw_progress_at (pw_progress *p, double reached);
-/* Erases the bar. */
-void pw_progress_end (pw_progress *p);
-
 /* The program's commands and their common functions.
  *
  * A command is a table pw_cli_NAME in a file of its own; PW_COMMANDS lists them.  Its function returns PW_OK, a
  * negative status with the error set, or a positive exit status if it has reported everything.  Exit statuses are
  * 0 success, 1 resource error, 2 input, 3 initial conditions, 4 method, 130 interrupted, 141 closed pipe. */
+#ifndef PW_CLI_H
+#define PW_CLI_H
+
+#include <popt.h>
+#include <signal.h>
+#include <stdatomic.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <time.h>
+#include "pinwheel-files.h"
+#include "pinwheel-solvers.h"
+#include "util.h"
 
 /* Exit statuses after SIGINT or SIGTERM, and after SIGPIPE: 128 + SIGINT and 128 + SIGPIPE, as shells report them. */
 enum { PW_INTERRUPTED = 130, PW_CLOSED_PIPE = 141 };
@@ -79,6 +49,41 @@ int pw_limit_status (const pw_limit *limit, double t, pw_error *error);
 /* Opens a run whose settings.stop is pw_limit_over; the clock must have been started.  If the run is stopped then, the
  * error is that of pw_limit_status, without a text if that is PW_RETRY. */
 pw_run *pw_limit_open (const pw_system *s, const char *method, const pw_settings *settings, pw_error *error);
+
+/* The time of a clock [s]. */
+double pw_seconds (clockid_t id);
+/* The number of steps between two readings of the clock: after a batch of `steps` steps that took `cpu` seconds, it is
+ * doubled if that was short and the batch complete, or halved if it was long. */
+void pw_batch_adapt (long *batch, long steps, double cpu);
+
+/* ---- The progress of long work and the remaining time on standard error: a bar on a terminal, else a line a
+ * minute ---- */
+
+/* Zero-initialised, it shows nothing. */
+typedef struct {
+  const char *title; /* printed before the bar */
+  const char *unit;  /* "s" for time; else what is counted; "": a fraction of 1 */
+  double first;      /* initial time or count; not 0 if a run or sweep is resumed */
+  double last;       /* final time [s] or count */
+  double start;      /* clock when the work started [s] */
+  double next;       /* clock before which nothing is drawn or written [s] */
+  double reached;    /* time or count of the last call, */
+  double changed;    /* and the clock when it was reached [s] */
+  double remaining;  /* the remaining time last shown, which does not rise [s]; INFINITY: none yet */
+  int drawn;         /* 1: there is a bar to erase */
+  int no_bar;        /* 1: no bar on a terminal, as the results are printed there; set after the start */
+  int lines;         /* 1: no terminal: lines in place of the bar */
+  char note[60];     /* printed at the end of the line; "" at first */
+} pw_progress;
+
+/* Starts the progress of a run from time `first` to `last`, with the unit "s"; or of work that is counted in `unit`
+ * ("runs"): `first` of `last` are done already. */
+void pw_progress_start (pw_progress *p, const char *title, const char *unit, double first, double last);
+/* Draws the bar for the time or count reached, at most ten times a second, or writes a line.  A count may exceed the
+ * final one if that was an estimate. */
+void pw_progress_at (pw_progress *p, double reached);
+/* Erases the bar. */
+void pw_progress_end (pw_progress *p);
 
 /* ---- Commands ---- */
 
@@ -355,7 +360,7 @@ const char *pw_cli_status_word (int status);
  * file and line; returns the exit status.  A closed pipe on standard output is not reported: PW_CLOSED_PIPE. */
 int pw_cli_report_error (const pw_error *error);
 
-/* Strings of variable length, and the cells of a line of a CSV table. */
+/* ---- Strings of variable length, and the cells of a line of a CSV table ---- */
 
 /* A string; zero-initialised, it is empty. */
 typedef struct {
@@ -385,10 +390,10 @@ void pw_cli_abandon_table (pw_output *o, long rows, char *part, size_t size);
 /* Closes a table that was written with this status: with PW_OK as NAME, else as NAME.part, and says so.  A status. */
 int pw_cli_close_table (pw_output *o, int status, pw_error *error);
 
-/* Fingerprints of checkpoints and journals of sweeps: a first line that names the format (`magic`, with its "\n"),
- * lines "KEY = VALUE" with everything that determines the results of a run or a sweep, and a line "end". */
-
-/* ---- Writing ---- */
+/* ---- Fingerprints of checkpoints and journals of sweeps ----
+ *
+ * A first line that names the format (`magic`, with its "\n"), lines "KEY = VALUE" with everything that determines the
+ * results of a run or a sweep, and a line "end": so results of different runs are never mixed. */
 
 /* Adds the line "KEY NAME = VALUE", where the key is that of a list of values; or, if `name` is NULL, "KEY = VALUE". */
 void pw_fingerprint_line (pw_text *t, const char *key, const char *name, const char *value);
@@ -404,8 +409,6 @@ uint64_t pw_fingerprint_tables (uint64_t sum, const pw_model *m);
 /* Adds a line for each state of a list of "STATE=VALUE", its last value; the list ends with NULL, or is NULL. */
 void pw_fingerprint_initial (pw_text *t, const char **starts);
 
-/* ---- Reading ---- */
-
 /* The end of the fingerprint at the beginning of a text; NULL if it is incomplete or its first line is not `magic`. */
 const char *pw_fingerprint_end (const char *magic, const char *at, const char *end);
 /* The value of a key, of *size bytes and not zero-terminated; NULL if there is none. */
@@ -420,7 +423,7 @@ typedef struct {
  * 0.001 there and 0.002 here". */
 int pw_fingerprint_differ (pw_fingerprint a, pw_fingerprint b, const char *ignored, char *text, size_t size);
 
-/* Independent tasks in several threads, for sweeps, studies and searches. */
+/* ---- Independent tasks in several threads ---- */
 
 /* The number of concurrent tasks: the value of --jobs, else OMP_NUM_THREADS, else that of available processors. */
 int pw_parallel_jobs (const char *text, int *jobs, pw_error *error);
@@ -436,9 +439,9 @@ int pw_parallel (int jobs, int count, pw_task *task, void *context, pw_error *er
  * cores.  If the cores are unknown, the tasks are called one after the other. */
 int pw_parallel_timed (int jobs, int count, pw_task *task, void *context, pw_error *error);
 
-/* Printed tables: columns as wide as their widest cell. */
-
-/* Write the rows in a loop, which is passed twice, first to measure the columns:
+/* ---- Printed tables: columns as wide as their widest cell ----
+ *
+ * Write the rows in a loop, which is passed twice, first to measure the columns:
  *
  *     for (pw_table t = { 0 }; pw_table_pass (&t);)
  *       for (...) { pw_cell (&t, -8, name); pw_cell_number (&t, 13, value, 8); pw_row_end (&t); } */

@@ -164,10 +164,7 @@ void pw_files_close (pw_files *files) {
   pw_folder_close (&files->folder);
 }
 
-/* Fingerprints: lines "KEY = VALUE" with everything that determines the results of a run or a sweep.  Checkpoints and
- * journals of sweeps begin with one, so that results of different runs are never mixed. */
-
-/* ---- Writing ---- */
+/* ---- Fingerprints ---- */
 
 void pw_fingerprint_line (pw_text *t, const char *key, const char *name, const char *value) {
   pw_text_add (t, key);
@@ -235,8 +232,6 @@ void pw_fingerprint_initial (pw_text *t, const char **starts) {
     pw_fingerprint_line (t, "start", PW_PRINTED (200, "%.*s", (int)n, *starts), *starts + n + 1);
   }
 }
-
-/* ---- Reading ---- */
 
 const char *pw_fingerprint_end (const char *magic, const char *at, const char *end) {
   static const char last[] = "\nend\n";

@@ -310,12 +310,6 @@ static int new_name (const char *path, char *name, size_t size, const char **end
   return PW_OK;
 }
 
-/* Writes a template with the model's name in place of each %. */
-static void new_print (FILE *f, const char *name, const char *const *line) {
-  for (; *line; line++)
-    for (const char *c = *line; *c; c++) *c == '%' ? fputs (name, f) : fputc (*c, f);
-}
-
 static int new_command (void *options, pw_error *error) {
   const char *ending, *path = ((const pw_cli_line *)options)->argument[0];
   char name[100];
@@ -323,8 +317,9 @@ static int new_command (void *options, pw_error *error) {
   FILE *f = fopen (path, "wx"); /* never overwrites a file */
   if (f == NULL && errno == EEXIST) return pw_fail (error, PW_INPUT, "%s exists already and was not changed", path);
   if (f == NULL) return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", path, strerror (errno));
-  new_print (f, name, ending[1] == 'y' ? new_model_yaml : new_model_c);
-  int failed = fflush (f) != 0 ? errno : 0; /* an errno value */
+  for (const char *const *line = ending[1] == 'y' ? new_model_yaml : new_model_c; *line; line++)
+    for (const char *c = *line; *c; c++) *c == '%' ? fputs (name, f) : fputc (*c, f); /* %: the model's name */
+  int failed = fflush (f) != 0 ? errno : 0;                                           /* an errno value */
   if (fclose (f) != 0 && failed == 0) failed = errno;
   if (failed) {
     remove (path);

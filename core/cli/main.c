@@ -25,15 +25,6 @@ static int main_usage (void) {
   return 0;
 }
 
-static int main_version (void) {
-  char libraries[200];
-  int v[3];
-  nlopt_version (v, v + 1, v + 2);
-  printf ("pinwheel %s (plug-in ABI %d)\n%s, GSL %s, NLopt %d.%d.%d\n", PW_VERSION, PW_ABI,
-          pw_library_versions (libraries, sizeof libraries), gsl_version, v[0], v[1], v[2]);
-  return 0;
-}
-
 static int main_unknown (const char *word) {
   pw_error error = { 0 };
   pw_nearest near = { .sought = word };
@@ -63,7 +54,12 @@ static int main_dispatch (int argc, const char **argv) {
   if (is_help && argc > 2) return main_command (2, (const char *[]){ argv[2], "--help", NULL });
   if (is_help) return main_usage ();
   if (strcmp (word, "--version") != 0) return main_command (argc - 1, argv + 1);
-  return main_version ();
+  char libraries[200];
+  int v[3];
+  nlopt_version (v, v + 1, v + 2);
+  printf ("pinwheel %s (plug-in ABI %d)\n%s, GSL %s, NLopt %d.%d.%d\n", PW_VERSION, PW_ABI,
+          pw_library_versions (libraries, sizeof libraries), gsl_version, v[0], v[1], v[2]);
+  return 0;
 }
 
 int main (int argc, char **argv) {

@@ -1,4 +1,4 @@
-/* Messages and other text that contains names, and the error with which a command ends. */
+/* Messages and printed tables, the progress of long work, strings, requests to stop and limits of processor time. */
 #define _DEFAULT_SOURCE /* CLOCK_MONOTONIC_COARSE */
 #include <errno.h>
 #include <math.h>
@@ -81,7 +81,7 @@ int pw_cli_report_error (const pw_error *error) {
   return -error->status;
 }
 
-/* The progress bar of commands, or lines of text without a terminal. */
+/* ---- Progress ---- */
 
 #define PROGRESS_DELAY 0.5        /* time before the bar appears [s], so that short runs show none */
 #define PROGRESS_BAR_INTERVAL 0.1 /* between drawings of the bar [s] */
@@ -94,6 +94,15 @@ double pw_seconds (clockid_t id) {
   struct timespec now;
   clock_gettime (id, &now);
   return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+#define BATCH_SHORT 0.01          /* processor time of a batch [s] below which the next one is longer */
+#define BATCH_LONG 0.04           /* above which it is shorter: the progress bar waits for its end */
+enum { BATCH_LONGEST = 1 << 16 }; /* steps */
+
+void pw_batch_adapt (long *batch, long steps, double cpu) {
+  if (cpu < BATCH_SHORT && steps == *batch && *batch < BATCH_LONGEST) *batch *= 2;
+  if (cpu > BATCH_LONG && *batch > 1) *batch /= 2;
 }
 
 void pw_progress_start (pw_progress *p, const char *title, const char *unit, double first, double last) {
@@ -172,7 +181,7 @@ void pw_progress_end (pw_progress *p) {
   p->drawn = 0;
 }
 
-/* Strings of variable length, and the cells of a line of a CSV table. */
+/* ---- Strings and cells ---- */
 
 void pw_text_clear (pw_text *t) {
   t->length = 0;
@@ -250,7 +259,7 @@ int pw_cli_close_table (pw_output *o, int status, pw_error *error) {
   return status;
 }
 
-/* Requests to stop: pw_stop, set by signals or after an error in a thread, and limits of processor time. */
+/* ---- Requests to stop ---- */
 
 _Static_assert(ATOMIC_INT_LOCK_FREE == 2, "a handler of signals may change only atomic objects without a lock");
 atomic_int pw_stop;

@@ -11,7 +11,7 @@
 #include <string.h>
 #include "files.h"
 
-enum { COLUMNS_MAX_BYTES = 64 << 20, COLUMNS_MAX_LINES = 1000000, COLUMNS_CELL = 1000 };
+enum { COLUMNS_MAX_BYTES = 256 << 20, COLUMNS_MAX_LINES = 4000000, COLUMNS_CELL = 1000 };
 
 typedef struct {
   int index;     /* of its cell in each line, from 0 */
@@ -23,11 +23,13 @@ typedef struct {
   char *rest;             /* text not yet read */
   int line;               /* number of the last line read */
   int cells;              /* per line */
+  const char **cell;      /* where those of the last line split begin */
   columns_source *source; /* of each column to read; the first one is the time */
   int columns;
   pw_gaps gaps;
-  const char *separator; /* one of columns_separators */
-  int comma, point;      /* numbers of the last lines with a decimal comma or point, or 0 */
+  unsigned char *missing; /* receives 1 for a column that the file does not have; NULL: it must have all */
+  const char *separator;  /* one of columns_separators */
+  int comma, point;       /* numbers of the last lines with a decimal comma or point, or 0 */
   pw_error *error;
 } columns;
 
@@ -137,18 +139,22 @@ static char *columns_line (columns *c) {
   return line;
 }
 
-/* Copies cell i (from 0) of a line. */
-static void columns_cell_at (const columns *c, const char *line, int i, char *buffer, size_t size) {
-  while (i-- > 0) line = columns_cell_end (line, c->separator) + 1;
-  columns_cell (c->separator, line, buffer, size);
+/* Finds where the cells of a line begin; returns their number, which may exceed that of the first line. */
+static int columns_split (columns *c, const char *line) {
+  for (int n = 0;; line++) {
+    if (n < c->cells) c->cell[n] = line;
+    line = columns_cell_end (line, c->separator), n++;
+    if (*line == 0 || *line == '\n') return n;
+  }
 }
 
 /* ---- Selection of columns ---- */
 
 /* Finds a column from its number, or its name, with or without unit, if the first line names the columns (named: 1). */
-static int columns_find (const columns *c, const char *first, int named, const char *name, int *index) {
+static int columns_find (const columns *c, int named, const char *name, int *index) {
   char cell[COLUMNS_CELL], unit[100], *end;
   pw_nearest near = { .sought = name };
+  const size_t length = strlen (name);
   long number = strtol (name, &end, 10);
   if (*end == 0 && number >= 1 && number <= c->cells) return *index = (int)number - 1, PW_OK;
   if (*end == 0)
@@ -157,7 +163,9 @@ static int columns_find (const columns *c, const char *first, int named, const c
                          c->cells == 1 ? "; separate cells by commas, semicolons, tabs or blanks" : "");
   *index = -1;
   for (int i = 0; named && i < c->cells; i++) {
-    columns_cell_at (c, first, i, cell, sizeof cell);
+    const char *begin = c->cell[i] + strspn (c->cell[i], " \t\"");
+    if (c->missing && strncmp (begin, name, length) != 0) continue; /* the number of names may be large */
+    columns_cell (c->separator, c->cell[i], cell, sizeof cell);
     int matches = strcmp (cell, name) == 0;
     cell[pw_unit_split (cell, unit, sizeof unit)] = 0;
     matches |= strcmp (cell, name) == 0;
@@ -166,17 +174,18 @@ static int columns_find (const columns *c, const char *first, int named, const c
       return columns_fail (c, "columns %d and %d are both named \"%.60s\"", *index + 1, i + 1, name);
     if (matches) *index = i;
   }
-  if (*index >= 0) return PW_OK;
+  if (*index >= 0 || c->missing) return PW_OK;
   if (!named) return columns_fail (c, "there are no names of columns before the numbers, so no \"%.60s\"", name);
   return columns_fail (c, "there is no column \"%.60s\"%s", name, pw_nearest_text (&near));
 }
 
-static int columns_open (const columns *c, const char *first, int named, const char *name, const char *unit,
-                         columns_source *source) {
+/* Its index is -1 if the column may be missing and is. */
+static int columns_open (const columns *c, int named, const char *name, const char *unit, columns_source *source) {
   char cell[COLUMNS_CELL], reason[260];
   source->factor = 1;
-  if (columns_find (c, first, named, name, &source->index) != PW_OK) return PW_INPUT;
-  columns_cell_at (c, first, source->index, cell, sizeof cell);
+  if (columns_find (c, named, name, &source->index) != PW_OK) return PW_INPUT;
+  if (source->index < 0) return PW_OK;
+  columns_cell (c->separator, c->cell[source->index], cell, sizeof cell);
   if (strlen (cell) == sizeof cell - 1) return columns_fail (c, "the name of column %d is too long", source->index + 1);
   if (!named || pw_unit_check (cell, unit, &source->factor, reason, sizeof reason) == PW_OK) return PW_OK;
   return columns_fail (c, "%s", reason);
@@ -194,9 +203,9 @@ static int columns_check_decimals (columns *c, const char *cell, int is_comma, c
 }
 
 /* A number in SI units; NaN for an empty cell or, if it may be a gap, for nan. */
-static int columns_number (columns *c, const char *line, columns_source source, pw_gaps gaps, double *value) {
+static int columns_number (columns *c, columns_source source, pw_gaps gaps, double *value) {
   char cell[COLUMNS_CELL];
-  columns_cell_at (c, line, source.index, cell, sizeof cell);
+  columns_cell (c->separator, c->cell[source.index], cell, sizeof cell);
   const char *comma = strchr (cell, ',');
   int number = strlen (cell) < sizeof cell - 1 && columns_read (c->separator, cell, value) == PW_OK; /* not cut */
   if (*cell == 0 || (gaps == PW_GAPS_ALLOWED && number && isnan (*value))) return *value = NAN, PW_OK;
@@ -215,14 +224,14 @@ static int columns_number (columns *c, const char *line, columns_source source, 
 static int columns_rows (columns *c, char *line, double *value, size_t room, int *rows) {
   double last = -INFINITY; /* time */
   for (int n = 0; line; line = columns_line (c), *rows = ++n) {
-    int cells = columns_count (c->separator, line);
+    int cells = columns_split (c, line);
     if (cells != c->cells)
       return columns_fail (c, "expected %d cells as in the first line, found %d%s", c->cells, cells,
                            cells > c->cells && *c->separator == ','
                                ? "; with decimal commas, separate cells by semicolons or tabs"
                                : "");
     for (int k = 0; k < c->columns; k++)
-      if (columns_number (c, line, c->source[k], k ? c->gaps : PW_GAPS_REFUSED, &value[(size_t)k * room + (size_t)n]) !=
+      if (columns_number (c, c->source[k], k ? c->gaps : PW_GAPS_REFUSED, &value[(size_t)k * room + (size_t)n]) !=
           PW_OK)
         return PW_INPUT;
     if (value[n] <= last) return columns_fail (c, "%.9g comes after %.9g: expected increasing times", value[n], last);
@@ -239,11 +248,17 @@ static int columns_select (columns *c, char *line, int named, const char *const 
                          "without names, %d cells of whole numbers: with decimal commas, separate cells by semicolons "
                          "or tabs; otherwise write columns: [1, 2]",
                          c->cells);
+  unsigned char *missing = c->missing;
+  int found = 0;
   for (int k = 0; k < c->columns; k++) {
     const char *other = k && c->source[0].index == 1 ? "1" : "2";
-    if (columns_open (c, line, named, column[k] ? column[k] : k ? other : "1", unit[k], &c->source[k]) != PW_OK)
+    c->missing = k ? missing : NULL;
+    if (columns_open (c, named, column[k] ? column[k] : k ? other : "1", unit[k], &c->source[found]) != PW_OK)
       return PW_INPUT;
+    if (missing) missing[k] = c->source[found].index < 0;
+    found += c->source[found].index >= 0;
   }
+  c->columns = found;
   return PW_OK;
 }
 
@@ -257,6 +272,9 @@ static int columns_all (columns *c, const char *const *column, const char *const
   if (lines > COLUMNS_MAX_LINES) return columns_fail (c, "more than %d lines", COLUMNS_MAX_LINES);
   c->cells = columns_count (c->separator, line);
   int named = columns_numbers (c->separator, line) < 0.5;
+  c->cell = malloc ((size_t)c->cells * sizeof *c->cell);
+  if (c->cell == NULL) return pw_fail (c->error, PW_RESOURCE, "%s: out of memory", c->shown);
+  columns_split (c, line);
   if (columns_select (c, line, named, column, unit) != PW_OK) return PW_INPUT;
   *value = malloc ((size_t)c->columns * lines * sizeof **value);
   if (*value == NULL) return pw_fail (c->error, PW_RESOURCE, "%s: out of memory", c->shown);
@@ -267,14 +285,14 @@ static int columns_all (columns *c, const char *const *column, const char *const
 }
 
 double *pw_columns_from_stream (FILE *f, const char *shown, const char *const *column, const char *const *unit,
-                                int width, pw_gaps gaps, int *rows, pw_error *error) {
+                                int width, pw_gaps gaps, unsigned char *missing, int *rows, pw_error *error) {
   static const char byte_order_mark[] = "\xEF\xBB\xBF"; /* which some programs write */
   char *text;
   size_t size;
   double *value = NULL;
   *rows = 0;
   int status = pw_read_rest (f, COLUMNS_MAX_BYTES, shown, "the limit for a table", &text, &size, error);
-  columns c = { .shown = shown, .rest = text, .columns = width, .gaps = gaps, .error = error };
+  columns c = { .shown = shown, .rest = text, .columns = width, .gaps = gaps, .missing = missing, .error = error };
   c.source = calloc ((size_t)width, sizeof *c.source);
   if (status == PW_OK && c.source == NULL) status = pw_fail (error, PW_RESOURCE, "%s: out of memory", shown);
   if (status == PW_OK && strlen (text) != size)
@@ -282,14 +300,15 @@ double *pw_columns_from_stream (FILE *f, const char *shown, const char *const *c
   if (status == PW_OK && strncmp (text, byte_order_mark, 3) == 0) c.rest += 3;
   if (status == PW_OK) status = columns_all (&c, column, unit, &value, rows);
   free (text);
+  free (c.cell);
   free (c.source);
   if (status == PW_OK) return value;
   free (value);
   return NULL;
 }
 
-double *pw_read_columns (const char *path, const char *const *column, const char *const *unit, int width, int *rows,
-                         pw_error *error) {
+double *pw_read_columns (const char *path, const char *const *column, const char *const *unit, int width,
+                         unsigned char *missing, int *rows, pw_error *error) {
   const char *why;
   if (pw_require (path, "the name of a table", error) != PW_OK) return NULL;
   FILE *f = pw_open_input (path, &why);
@@ -297,7 +316,7 @@ double *pw_read_columns (const char *path, const char *const *column, const char
     pw_fail (error, pw_open_input_status (), "%s: cannot be read: %s", path, why);
     return NULL;
   }
-  double *value = pw_columns_from_stream (f, path, column, unit, width, PW_GAPS_ALLOWED, rows, error);
+  double *value = pw_columns_from_stream (f, path, column, unit, width, PW_GAPS_ALLOWED, missing, rows, error);
   fclose (f);
   return value;
 }

@@ -20,7 +20,7 @@ typedef enum { PW_GAPS_REFUSED, PW_GAPS_ALLOWED } pw_gaps;
 /* As pw_read_columns, from a stream, which stays open; `shown` is its path in messages, "SHOWN:LINE: REASON".  NULL in
  * place of a column: the first one, or the second one, which is not the time. */
 double *pw_columns_from_stream (FILE *f, const char *shown, const char *const *column, const char *const *unit,
-                                int width, pw_gaps gaps, int *rows, pw_error *error);
+                                int width, pw_gaps gaps, unsigned char *missing, int *rows, pw_error *error);
 
 /* ---- Units (columns.c) ---- */
 

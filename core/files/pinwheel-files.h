@@ -127,10 +127,11 @@ int pw_unit_check (const char *cell, const char *wanted, double *factor, char *w
 
 /* Reads columns of a table by their names or numbers ("1", ...), in SI units: `unit` of each, or NULL for any.  The
  * first one is the time, which increases.  Empty cells are gaps, NaN, in the time too; so is nan in the others.
- * Returns `width` arrays of *rows numbers (0 if the table has only names), one after the other; free it.  NULL and
- * PW_INPUT with file, line and nearest name, or PW_RESOURCE. */
-double *pw_read_columns (const char *path, const char *const *column, const char *const *unit, int width, int *rows,
-                         pw_error *error);
+ * Returns `width` arrays of *rows numbers (0 if the table has only names), one after the other; free it.  Columns after
+ * the first one may be missing if `missing` is not NULL: it receives 1 for each of those, which have no array, else 0.
+ * NULL and PW_INPUT with file, line and nearest name, or PW_RESOURCE. */
+double *pw_read_columns (const char *path, const char *const *column, const char *const *unit, int width,
+                         unsigned char *missing, int *rows, pw_error *error);
 
 /* ---- Reading ---- */
 

@@ -507,7 +507,7 @@ static double *table_file (reader *r, const pw_node *node, const pw_node *column
   if (f == NULL && pw_open_input_status () == PW_RESOURCE)
     return pw_fail (r->error, PW_RESOURCE, "%s: cannot read %s: %s", r->y->path, name, reason), NULL;
   if (f == NULL) return read_fail (r, node->at, "%s: cannot read \"%.60s\": %s", r->label, name, reason), NULL;
-  double *t = pw_columns_from_stream (f, name, column, unit, 2, PW_GAPS_REFUSED, &rows, &cause);
+  double *t = pw_columns_from_stream (f, name, column, unit, 2, PW_GAPS_REFUSED, NULL, &rows, &cause);
   fclose (f);
   if (cause.status == PW_INPUT) return read_fail (r, node->at, "%s: %s", r->label, cause.text), NULL;
   if (t == NULL || pw_model_keep (r->model, t, free) != PW_OK) return read_no_memory (r), NULL;

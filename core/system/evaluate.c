@@ -183,7 +183,7 @@ void pw_point_to_internal (pw_workspace *w, const double *q, const double *v) {
 }
 
 /* Two bodies at a time; singly the last of an odd number, and all from a pair with an angle beyond the limit on. */
-void pw_update_configurations (pw_workspace *w, const double *q, const double *v) {
+static void update_configurations (pw_workspace *w, const double *q, const double *v) {
   if (w->s->coords > 3 * w->s->bodies) pw_point_to_internal (w, q, v);
   pw_configuration *p = w->configuration, *end = p + w->s->bodies;
   _Static_assert(PW_SINE_LANES == 2, "bodies are evaluated in pairs");
@@ -229,7 +229,7 @@ int pw_update_signals (pw_workspace *w, double t, const double *q, const double 
 }
 
 int pw_update_kinematics (pw_workspace *w, double t, const double *q, const double *v) {
-  pw_update_configurations (w, q, v);
+  update_configurations (w, q, v);
   return pw_update_signals (w, t, q, v);
 }
 

@@ -159,7 +159,6 @@ void pw_table_spline (const pw_signal *s, double *spline);
 
 /* The workspace refers to the internal coordinates in q and v from now on.  Returns PW_METHOD if a signal fails. */
 int pw_update_kinematics (pw_workspace *w, double t, const double *q, const double *v);
-void pw_update_configurations (pw_workspace *w, const double *q, const double *v); /* the part without signals */
 /* Updates velocities, and signals that read them, at unchanged time and positions.  Returns as pw_update_kinematics. */
 int pw_update_velocities (pw_workspace *w, const double *v);
 

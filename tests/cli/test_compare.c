@@ -344,23 +344,24 @@ TEST (bad) {
     { "ezyroller --step-ladder 0:1", "--step-ladder 0: expected a number > 0" },
     { "ezyroller --step-ladder 1:1e-40", "--step-ladder 1:1e-40: too long a ladder" },
     { "ezyroller --set m=1", "model ezyroller has no parameter \"m\"; did you mean \"m1\"?" },
-    { "ezyroller --reference @/none.csv", "--reference @/none.csv: cannot be read: No such file or directory" },
-    { "ezyroller --reference @/empty.csv", "--reference @/empty.csv: the file is empty" },
-    { "ezyroller --reference @/x.csv", "--reference @/x.csv: the first column is \"x\", expected \"t [s]\"" },
-    { "ezyroller --reference @/y.csv", "--reference @/y.csv: no column is a state of this model, such as \"frame.x\"" },
-    { "ezyroller --reference @/z.csv", "--reference @/z.csv: line 2: \"one\" is not a number" },
-    { "ezyroller --reference @/twice.csv", "--reference @/twice.csv: columns 2 and 4 are both named \"frame.x\"" },
-    { "ezyroller --reference @/back.csv", "--reference @/back.csv: line 3: times must be finite and increase" },
-    { "ezyroller --reference @/inf.csv", "--reference @/inf.csv: line 3: times must be finite and increase" },
-    { "ezyroller --reference @/far.csv", "--reference @/far.csv: line 3: \"-inf\" is not finite" },
-    { "ezyroller --reference @/nan.csv", "--reference @/nan.csv: every value is nan" },
-    { "ezyroller --reference @/comma.csv", "--reference @/comma.csv: line 2 has more cells than the first line" },
+    { "ezyroller --reference @/none.csv", "@/none.csv: cannot be read: No such file or directory" },
+    { "ezyroller --reference @/empty.csv", "@/empty.csv:0: the file is empty" },
+    { "ezyroller --reference @/x.csv", "@/x.csv:1: there is no column \"t\"; valid are x, s" },
+    { "ezyroller --reference @/y.csv", "@/y.csv:1: there is no column \"frame.x\"; did you mean \"fram.x\"?" },
+    { "ezyroller --reference @/z.csv", "@/z.csv:2: column 2: expected a finite number, found \"one\"" },
+    { "ezyroller --reference @/twice.csv", "@/twice.csv:1: columns 2 and 4 are both named \"frame.x\"" },
+    { "ezyroller --reference @/back.csv", "@/back.csv:3: 0.5 comes after 1: expected increasing times" },
+    { "ezyroller --reference @/inf.csv", "@/inf.csv:3: column 1: expected a finite number, found \"inf\"" },
+    { "ezyroller --reference @/far.csv", "@/far.csv:3: column 2: expected a finite number, found \"-inf\"" },
+    { "ezyroller --reference @/nan.csv", "@/nan.csv: every value is nan" },
+    { "ezyroller --reference @/comma.csv", "@/comma.csv:2: expected 2 cells as in the first line, found 4; with "
+                                           "decimal commas, separate cells by semicolons or tabs" },
     { "ezyroller --reference @/short.csv --t-end 2",
       "--reference @/short.csv: no row at the final time, t = 2 s; the last one before it is at 1 s" },
   };
   cli_write ("empty.csv", "");
-  cli_write ("x.csv", "x,t\n0,0\n");
-  cli_write ("y.csv", "t,y\n0,0\n");
+  cli_write ("x.csv", "x,s\n0,0\n");
+  cli_write ("y.csv", "t,fram.x\n0,0\n");
   cli_write ("z.csv", "t,frame.x\n1,one\n");
   cli_write ("twice.csv", "t,frame.x [m],a,frame.x [mm]\n1,0,0,0\n");
   cli_write ("back.csv", "t,frame.x\n1,0\n0.5,0\n");

@@ -136,7 +136,7 @@ TEST (missing) {
   assert_null (pw_formula_open ("1", NULL, &e[4]));
   assert_int_equal (pw_selftest (NULL, 1, &report, &e[5]), PW_INPUT);
   assert_int_equal (pw_plugin_check (NULL, "it", &e[6]), PW_INPUT);
-  assert_null (pw_read_columns (NULL, NULL, NULL, 0, &rows, &e[7]));
+  assert_null (pw_read_columns (NULL, NULL, NULL, 0, NULL, &rows, &e[7]));
   assert_int_equal (pw_model_check_body (NULL, NULL, &e[8]), PW_INPUT);
   assert_int_equal (pw_model_check_element (NULL, NULL, &e[9]), PW_INPUT);
   assert_int_equal (pw_json_write (NULL, NULL, NULL, 0, NULL, NULL, &e[10]), PW_INPUT);

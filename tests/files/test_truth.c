@@ -180,20 +180,20 @@ TEST (table) {
   check_close ("largest", truth_error ("largest", "length"), 0.125, 1e-14, "round-off");
   cli_write ("unit.csv", "t [s],one.x [deg]\n1,0\n");
   cli_bad ("pinwheel run @/particles.c --reference @/unit.csv", 2,
-           "--reference @/unit.csv: column \"one.x [deg]\": the unit \"deg\" does not measure what m does, which is "
+           "@/unit.csv:1: column \"one.x [deg]\": the unit \"deg\" does not measure what m does, which is "
            "expected");
   cli_write ("unit.csv", "t [s],one.x [cubit]\n1,0\n");
   cli_bad ("pinwheel compare @/particles.c --methods rk4 --reference @/unit.csv", 2,
-           "--reference @/unit.csv: column \"one.x [cubit]\": the unit \"cubit\" is not known; expected m, or one that "
+           "@/unit.csv:1: column \"one.x [cubit]\": the unit \"cubit\" is not known; expected m, or one that "
            "converts to it");
   cli_write ("unit.csv", "t [m],one.x\n1,0\n");
   cli_bad ("pinwheel run @/particles.c --reference @/unit.csv", 2,
-           "--reference @/unit.csv: column \"t [m]\": the unit \"m\" does not measure what s does, which is expected");
+           "@/unit.csv:1: column \"t [m]\": the unit \"m\" does not measure what s does, which is expected");
   cli_write ("late.csv", "t,one.x\n3,6\n");
   cli_bad ("pinwheel run @/particles.c --reference @/late.csv", 2,
-           "--reference @/late.csv: no row between 0 and the final time, t = 1 s");
+           "@/late.csv: no row between 0 and the final time, t = 1 s");
   cli_bad ("pinwheel run @/particles.c --reference @/none.csv", 2,
-           "--reference @/none.csv: cannot be read: No such file or directory");
+           "@/none.csv: cannot be read: No such file or directory");
 }
 
 /* Models of the gallery, with parameters of their own as well: what they know is what they do, to the method's

@@ -394,13 +394,13 @@ TEST (places) {
 TEST (limits) {
   char message[200];
   cli_write ("model/large.csv", "0,1\n");
-  assert_int_equal (truncate (cli_path ("model/large.csv"), (64L << 20) + 1), 0);
-  table_bad ("{file: large.csv}", "large.csv: the file has more than 64 MB, the limit for a table");
+  assert_int_equal (truncate (cli_path ("model/large.csv"), (256L << 20) + 1), 0);
+  table_bad ("{file: large.csv}", "large.csv: the file has more than 256 MB, the limit for a table");
   FILE *f = fopen (cli_path ("model/long.csv"), "w");
   assert_non_null (f);
-  for (int i = 0; i < 1000001; i++) fputs ("1\n", f);
+  for (int i = 0; i < 4000001; i++) fputs ("1\n", f);
   assert_int_equal (fflush (f), 0);
-  snprintf (message, sizeof message, "long.csv:1: more than %d lines", 1000000);
+  snprintf (message, sizeof message, "long.csv:1: more than %d lines", 4000000);
   table_bad ("{file: long.csv}", message);
   assert_int_equal (ftruncate (fileno (f), 2000000), 0);
   assert_int_equal (fclose (f), 0);

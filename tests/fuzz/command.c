@@ -148,8 +148,7 @@ static fuzz_grammar command_rules[] = {
   "k:--json=-\n`--json=j.json\n`",
   "v:--vary\n$p=lin:$n:$n:2\n`-v$p=$n,$n\n`--vary=$p=log:$n:$n:3\n",
   "f:m.yaml`x.c`x`m.yaml.yaml",
-  "o:--set\n$p=$n\n`--start\n$p=$n\n`--energy\n`-o\n$u\n`--json=$u\n`--plots=p\n`--animate=a.html\n`--reference=$u\n`--"
-  "profile\n"
+  "o:--set\n$p=$n\n`--start\n$p=$n\n`--energy\n`-o\n$u\n`--json=$u\n`--plots=p\n`--animate=a.html\n`--reference=$u\n"
   "`--checkpoint=$u\n`--checkpoint-every=$n\n`--resume=$u\n`--max-file=$n\n`--cpu\n`--part=1:2\n`--part=2/2\n`--merge\n"
   "`--only-methods\n`--help\n`-?\n`--version\n`--rtol-ladder=1e-3:1e-4\n`--step-ladder=$n:$n\n`$z\n`$s`$h`$k`$r`$t`$"
   "u\n",

@@ -14,7 +14,8 @@ int LLVMFuzzerTestOneInput (const uint8_t *data, size_t size) {
   if (size < 2) return 0;
   FILE *f = fmemopen ((void *)(size_t)(data + 1), size - 1, "rb");
   if (f == NULL) return 0;
-  double *t = pw_columns_from_stream (f, "data.csv", column[data[0] % 3], unit, 2, PW_GAPS_REFUSED, &count, &error);
+  double *t =
+      pw_columns_from_stream (f, "data.csv", column[data[0] % 3], unit, 2, PW_GAPS_REFUSED, NULL, &count, &error);
   for (int i = 0; t && i < count; i++) {
     if (isinf (t[i]) || isinf (t[count + i])) abort (); /* NaN: an empty cell */
     if (t[i] <= last) abort ();

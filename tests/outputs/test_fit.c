@@ -302,7 +302,7 @@ TEST (undetermined_at_a_bound) {
 
 /* The run with a smaller k fails; then Ctrl-C stops that with a larger one. */
 TEST (interrupted_after_a_failure) {
-  cli_write ("terminal.c",
+  cli_write ("stop.c",
              "#include <signal.h>\n#include \"pinwheel.h\"\n"
              "typedef struct { double k; } numbers;\n"
              "static const pw_parameter list[] = { { PW_AT (numbers, k), 3 }, { .name = NULL } };\n"

@@ -287,7 +287,7 @@ TEST (long_names) {
  * complete. */
 static void sensitivity_interrupt (const char *reads) {
   int status = 130, interrupted = 0, calls = 4000;
-  cli_write ("terminal.c",
+  cli_write ("stop.c",
              "#include <signal.h>\n#include <stdlib.h>\n#include \"pinwheel.h\"\n"
              "typedef struct { double k; } numbers;\n"
              "static const pw_parameter list[] = { { PW_AT (numbers, k), 1 }, { .name = NULL } };\n"

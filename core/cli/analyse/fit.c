@@ -219,7 +219,7 @@ static int data_read_table (pw_fit *fit, const fit_sigma *given, pw_error *error
   for (int i = 0; i < fit->columns; i++) column[count] = fit->column_name[i], unit[count++] = fit->column_unit[i];
   for (int i = 0; i < fit->columns; i++)
     if (isnan (given[i].number)) column[count] = given[i].text, unit[count++] = fit->column_unit[i];
-  double *table = pw_read_columns (fit->data_path, column, unit, count, &fit->rows, error);
+  double *table = pw_read_columns (fit->data_path, column, unit, count, NULL, &fit->rows, error);
   int status = table ? data_keep_rows (fit, table, count, error) : error->status;
   free (table);
   return status;

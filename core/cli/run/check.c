@@ -4,16 +4,14 @@
 #include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
-#include "cli.h"
 #include "pinwheel-analysis.h"
 #include "pinwheel-selftest.h"
 #include "report.h"
 
-/* The results of `pinwheel check`, and their report. */
-
 enum {
   CHECK_COORDINATES = 400, /* above this number computations of cubic cost are omitted */
-  CHECK_DIGITS = 5
+  CHECK_DIGITS = 5,
+  CHECK_SEEDS = 5 /* random scenes of each element type */
 };
 
 /* The self-test of an element type in use. */
@@ -50,11 +48,6 @@ typedef struct {
   double doubling_time; /* of the fastest growing perturbation [s]; INFINITY: none grows, or the motion is not steady */
   pw_check_list problem, finding;
 } pw_check;
-
-/* Writes the report: as JSON to j, or as text to standard output if j is NULL. */
-void pw_check_report (const pw_check *check, pw_json *j);
-
-enum { CHECK_SEEDS = 5 /* random scenes of each element type */ };
 
 PW_PRINTF (2, 3) static void check_add (pw_check_list *list, const char *format, ...) {
   va_list arguments;
@@ -115,15 +108,6 @@ static int check_reference (pw_check *check, pw_error *error) {
   return status;
 }
 
-/* Tables that do not cover the model's run, and rows of their files that are left out. */
-static void check_tables (pw_check *check) {
-  const pw_system *s = check->model.system;
-  const double t_end = pw_cli_defaults (pw_file_table (check->model.file)).t_end;
-  char notice[PW_NOTICE_BYTES];
-  for (int i = 0; i < pw_system_signals (s); i++)
-    if (*pw_system_table_notice (s, i, t_end, notice, sizeof notice)) check_add (&check->finding, "%s", notice);
-}
-
 /* ---- Element types ---- */
 
 /* Tests an element type in random scenes; records the reason if none can be generated. */
@@ -171,12 +155,6 @@ static int check_kind (pw_check *check, pw_checked_kind *k, pw_error *error) {
   if (fault)
     check_add (&check->problem, "element type %s fails its self-test: %s (%s)", k->kind->name, fault->about,
                fault->where);
-  return status;
-}
-
-static int check_kinds (pw_check *check, pw_error *error) {
-  int status = check_list_kinds (check, error);
-  for (int i = 0; status == PW_OK && i < check->kinds; i++) status = check_kind (check, &check->kind[i], error);
   return status;
 }
 
@@ -246,83 +224,11 @@ static int check_linear (pw_check *check, pw_error *error) {
   return PW_OK;
 }
 
-/* ---- The command ---- */
-
-static int check_model (pw_check *check, pw_error *error) {
-  int status = PW_OK;
-  check->rk4_limit = check->doubling_time = INFINITY;
-  check->fastest = -1;
-  pw_report_model (&check->model);
-  check_tables (check);
-  check_open_run (check);
-  if (check->run) {
-    check_given_values (check);
-    status = check_reference (check, error);
-    if (status == PW_OK) status = check_linear (check, error);
-  }
-  if (status == PW_OK) check_wheels (check);
-  if (status == PW_OK) status = check_kinds (check, error);
-  int out_of_memory = check->problem.out_of_memory || check->finding.out_of_memory;
-  return status == PW_OK && out_of_memory ? pw_fail (error, PW_RESOURCE, "out of memory") : status;
-}
-
-static void check_close (pw_check *check) {
-  pw_linear_free (&check->linear);
-  pw_run_close (check->run);
-  free (check->redundant);
-  free (check->kind);
-  free (check->problem.text);
-  free (check->finding.text);
-  pw_cli_close_model (&check->model);
-}
-
-enum { CHECK_JSON = 1 }; /* index in the list of files of check_command */
-
-static int check_command (void *options, pw_error *error) {
-  pw_check *check = options;
-  pw_files files = { .folder = { .made = 0 } };
-  pw_use use[] = { PW_CLI_MODEL_USE, { "--json", check->json_path, PW_WRITES, pw_cli_json } };
-  int status = pw_cli_open (&check->model, &check->line, error);
-  if (status == PW_OK) status = pw_files_open (&files, &check->line, &check->model, use, 2, error);
-  if (status == PW_OK) status = check_model (check, error);
-  if (status == PW_OK) {
-    FILE *json = pw_files_stream (&files, CHECK_JSON);
-    if (json != stdout) pw_check_report (check, NULL);
-    if (json) pw_check_report (check, &(pw_json){ .f = json });
-    pw_files_finish (&files, error);
-    if (check->problem.count) /* the exit status is that of a failed initialisation, otherwise that of bad input */
-      pw_fail (error, check->run_error.status ? check->run_error.status : PW_INPUT, "%s%s", check->problem.text[0],
-               check->problem.count > 1 ? "; and more, see above" : "");
-  }
-  pw_files_close (&files);
-  check_close (check);
-  return error->status;
-}
-
-static const struct poptOption check_options[] = {
-  PW_OPTION_GROUP ("Output"),
-  PW_TEXT_OPTION (pw_check, json_path, "json", 0, "FILE", "Write the report as JSON; - prints it instead of the text"),
-  PW_MODEL_OPTIONS, POPT_TABLEEND
-};
-
-const pw_command pw_cli_check = {
-  .name = "check",
-  .synopsis = "MODEL [OPTION...]",
-  .summary = "check mobility, redundancy, initial conditions, derivatives and stability of a model",
-  .help =
-      "Check a model before running it: degrees of freedom, redundant constraint equations, massless bodies, "
-      "consistency of the initial conditions, derivatives of every element type in use (against differences), and the "
-      "eigenvalues of the linearised equations of motion. The exit status is non-zero if there is a problem.",
-  .options_size = sizeof (pw_check),
-  .function = check_command,
-  .options = check_options,
-};
-
-/* The report of `pinwheel check`: a sequence of entries, each with a key in JSON, a label and words in text. */
+/* ---- The report: entries, each with a key in JSON, a label and words in text ---- */
 
 enum { REPORT_LISTED = 8, REPORT_EIGENVALUES = 60 }; /* items of a list; lines of eigenvalues: in the text, at most */
 
-/* ---- Entries: in JSON, or in the text if j is NULL; pw_json_* do nothing then ---- */
+/* They are written as JSON, or as text if j is NULL; pw_json_* do nothing then. */
 
 /* Begins a line of JSON for the next item. */
 static void report_line (pw_json *j) {
@@ -639,8 +545,6 @@ static void report_linear (pw_json *j, const pw_check *check) {
   pw_json_close (j, '}');
 }
 
-/* ---- The report ---- */
-
 static void report_list (pw_json *j, const char *key, const char *one, const pw_check_list *list) {
   if (list->count > 0) report_print (j, "\n%d %s\n", list->count, list->count == 1 ? one : key);
   report_section (j, key, '[', NULL);
@@ -657,7 +561,8 @@ static void report_lists (pw_json *j, const pw_check *check) {
   report_list (j, "findings", "finding", &check->finding);
 }
 
-void pw_check_report (const pw_check *check, pw_json *j) {
+/* Writes the report: as JSON to j, or as text to standard output if j is NULL. */
+static void report_write (const pw_check *check, pw_json *j) {
   const char *about = pw_file_table (check->model.file)->about;
   pw_json_open (j, NULL, '{');
   pw_json_number (j, "schema", 1);
@@ -678,3 +583,74 @@ void pw_check_report (const pw_check *check, pw_json *j) {
   if (check->problem.count + check->finding.count == 0) report_print (j, "\nNo problems found\n");
   if (j == NULL) report_lists (j, check);
 }
+
+/* ---- The command ---- */
+
+static int check_model (pw_check *check, pw_error *error) {
+  const pw_system *s = check->model.system;
+  const double t_end = pw_cli_defaults (pw_file_table (check->model.file)).t_end;
+  char notice[PW_NOTICE_BYTES];
+  int status = PW_OK;
+  check->rk4_limit = check->doubling_time = INFINITY;
+  check->fastest = -1;
+  pw_report_model (&check->model);
+  for (int i = 0; i < pw_system_signals (s); i++) /* tables that do not cover the run, rows that are left out */
+    if (*pw_system_table_notice (s, i, t_end, notice, sizeof notice)) check_add (&check->finding, "%s", notice);
+  check_open_run (check);
+  if (check->run) {
+    check_given_values (check);
+    status = check_reference (check, error);
+    if (status == PW_OK) status = check_linear (check, error);
+  }
+  if (status == PW_OK) check_wheels (check);
+  if (status == PW_OK) status = check_list_kinds (check, error);
+  for (int i = 0; status == PW_OK && i < check->kinds; i++) status = check_kind (check, &check->kind[i], error);
+  int out_of_memory = check->problem.out_of_memory || check->finding.out_of_memory;
+  return status == PW_OK && out_of_memory ? pw_fail (error, PW_RESOURCE, "out of memory") : status;
+}
+
+static int check_command (void *options, pw_error *error) {
+  pw_check *check = options;
+  pw_files files = { .folder = { .made = 0 } };
+  pw_use use[] = { PW_CLI_MODEL_USE, { "--json", check->json_path, PW_WRITES, pw_cli_json } };
+  int status = pw_cli_open (&check->model, &check->line, error);
+  if (status == PW_OK) status = pw_files_open (&files, &check->line, &check->model, use, 2, error);
+  if (status == PW_OK) status = check_model (check, error);
+  if (status == PW_OK) {
+    FILE *json = pw_files_stream (&files, 1);
+    if (json != stdout) report_write (check, NULL);
+    if (json) report_write (check, &(pw_json){ .f = json });
+    pw_files_finish (&files, error);
+    if (check->problem.count) /* the exit status is that of a failed initialisation, otherwise that of bad input */
+      pw_fail (error, check->run_error.status ? check->run_error.status : PW_INPUT, "%s%s", check->problem.text[0],
+               check->problem.count > 1 ? "; and more, see above" : "");
+  }
+  pw_files_close (&files);
+  pw_linear_free (&check->linear);
+  pw_run_close (check->run);
+  free (check->redundant);
+  free (check->kind);
+  free (check->problem.text);
+  free (check->finding.text);
+  pw_cli_close_model (&check->model);
+  return error->status;
+}
+
+static const struct poptOption check_options[] = {
+  PW_OPTION_GROUP ("Output"),
+  PW_TEXT_OPTION (pw_check, json_path, "json", 0, "FILE", "Write the report as JSON; - prints it instead of the text"),
+  PW_MODEL_OPTIONS, POPT_TABLEEND
+};
+
+const pw_command pw_cli_check = {
+  .name = "check",
+  .synopsis = "MODEL [OPTION...]",
+  .summary = "check mobility, redundancy, initial conditions, derivatives and stability of a model",
+  .help =
+      "Check a model before running it: degrees of freedom, redundant constraint equations, massless bodies, "
+      "consistency of the initial conditions, derivatives of every element type in use (against differences), and the "
+      "eigenvalues of the linearised equations of motion. The exit status is non-zero if there is a problem.",
+  .options_size = sizeof (pw_check),
+  .function = check_command,
+  .options = check_options,
+};

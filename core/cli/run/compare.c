@@ -8,11 +8,6 @@
 #include "motion.h"
 #include "study.h"
 
-/* The reference solution of a comparison: a table, the exact solution of the model, or else a motion computed with a
- * tight tolerance.  The solution of the model is used if it contains all coordinates, its velocities if it contains
- * all of them.  Several methods compute one; of the two that agree best, the first is the reference, and their
- * distance is its uncertainty. */
-
 enum { REFERENCE_CANDIDATES = 4 };
 
 typedef struct {
@@ -31,38 +26,6 @@ typedef struct {
   } partner[REFERENCE_CANDIDATES - 1];
 } pw_reference;
 
-/* One run of a row at its level, as pw_study_run.  Stores the samples of a motion and the largest energy balance;
- * motion NULL: without samples, for the measurement of times. */
-int pw_motion_run (pw_study *study, pw_row *row, pw_motion *motion, pw_error *error);
-
-/* Finds the reference.  step: the smallest step size of the comparison [s].  Sets the study's t_end to the end of a
- * table unless --t-end is given.  Close the motion of the reference in every case. */
-int pw_reference_find (pw_reference *reference, pw_study *study, double step, pw_error *error);
-
-/* Prints the reference, its uncertainty and its distances from the first `partners` other solutions. */
-void pw_reference_print (const pw_reference *reference, int partners);
-/* Writes FOLDER/truth.csv: the uncertainty of the reference, and its distances from all other solutions, under the
- * names and units of error_columns[0 to MOTION_ERRORS - 1]. */
-int pw_reference_write (const pw_reference *reference, const char *folder, const pw_study_column *error_columns,
-                        pw_error *error);
-
-/* ---- The conclusion of a comparison (compare.c) ---- */
-
-/* Prints the processor time of each method for numbers of digits that agree with a known reference, and failures.
- * error_column: index of the largest error of lengths in the values of a row; that of angles follows. */
-void pw_conclusion_print (const pw_study *study, const pw_reference *reference, int error_column);
-
-enum { COMPARE_REPEATS = 99 }; /* the largest value of --repeats */
-#define COMPARE_FEW 3          /* timed runs of a row, at least, unless --repeats is less or they exceed the limit */
-#define COMPARE_ENOUGH 0.5     /* total processor time [s] of a row after which no further run is timed */
-#define COMPARE_CLEAR 10   /* error over uncertainty of the reference, so that orders are accurate to log2 1.1 = 0.14 */
-#define COMPARE_AGREE 0.1  /* largest relative difference of the last two orders in the asymptotic range */
-#define COMPARE_DECADE 1.6 /* factor of the cost if a tolerance is divided by ten, of a method of order 5: 10^(1/5) */
-
-/* Explicit and implicit, one-step and multistep methods, each with the stabilisation that suits it. */
-static const char compare_default_methods[] = "rk4+projection,erk5+projection,erk8+projection,bdf+projection,"
-                                              "ida+baumgarte,ida+ggl,radau+ggl,galpha+index3";
-
 typedef struct {
   pw_study study;
   int table;     /* 1: --table */
@@ -72,8 +35,6 @@ typedef struct {
   double repeats;     /* timed runs of a row, at most */
   pw_reference reference;
 } pw_compare;
-
-/* ---- Columns ---- */
 
 /* Indices in compare_columns.  The counts that pw_study_record_run fills begin with the steps. */
 enum {
@@ -132,6 +93,471 @@ static const pw_study_column compare_columns[] = {
 
 /* Coordinates of a row's point in the figures; the last two are errors. */
 enum { POINT_LEVEL, POINT_CPU, POINT_RHS, POINT_LENGTH, POINT_ANGLE, POINT_COORDINATES };
+
+/* ---- The reference solution: a table, the exact solution of the model, or else a motion computed with a tight
+ * tolerance ----
+ *
+ * The solution of the model is used if it contains all coordinates, its velocities if it contains all of them.  Several
+ * methods compute one; of the two that agree best, the first is the reference, and their distance is its uncertainty. */
+
+#define REFERENCE_LOOSEST 1e-9 /* the largest tolerance, after failures with smaller ones */
+#define REFERENCE_STEPS 1e5    /* the fewest steps of fixed size at first, */
+#define REFERENCE_FEWEST 1000  /* and after failures with more steps */
+#define REFERENCE_ROUND_OFF 8  /* the smallest uncertainty, in units of round-off of the largest coordinate */
+
+typedef struct {
+  pw_visitor base;
+  pw_motion *motion;
+} sampler;
+
+/* Stores the samples up to the time reached. */
+static int sampler_visit (pw_visitor *visitor, pw_run *run, pw_error *error) {
+  pw_motion *motion = ((sampler *)visitor)->motion;
+  pw_sample sample;
+  while ((visitor->due = pw_motion_next_time (motion)) <= pw_run_time (run)) {
+    int status = pw_run_sample (run, visitor->due, &sample, error);
+    if (status != PW_OK) return status;
+    pw_motion_add (motion, visitor->study->compiled.system, &sample);
+    visitor->row->balance = fmax (visitor->row->balance, fabs (sample.balance));
+  }
+  return PW_OK;
+}
+
+/* One run of a row at its level, as pw_study_run.  Stores the samples of a motion and the largest energy balance;
+ * motion NULL: without samples, for the measurement of times. */
+static int compare_run (pw_study *study, pw_row *row, pw_motion *motion, pw_error *error) {
+  sampler visitor = { { .visit = sampler_visit, .study = study, .row = row }, motion };
+  pw_settings settings = { .span = study->t_end, .ledger = motion != NULL };
+  *(row->adaptive ? &settings.rtol : &settings.step) = row->level;
+  if (motion) row->balance = motion->taken = 0;
+  return pw_study_run (study, row, &settings, motion ? &visitor.base : NULL, error);
+}
+
+/* The largest |coordinate| and |velocity| of each unit; returns 1 if multipliers are known. */
+static int reference_sizes (const pw_system *system, const pw_motion *motion, double size[MOTION_UNITS]) {
+  int states = 2 * pw_system_coordinates (system), has_multipliers = 0;
+  for (int i = 0; i < MOTION_UNITS; i++) size[i] = 0;
+  for (int k = 0; k < motion->taken; k++)
+    for (int j = 0; j < motion->width; j++) {
+      double value = fabs (pw_motion_at (motion, k)[j]);
+      if (j >= states)
+        has_multipliers |= !isnan (value);
+      else
+        size[pw_motion_unit (system, j)] = fmax (size[pw_motion_unit (system, j)], value);
+    }
+  return has_multipliers;
+}
+
+/* Raises the uncertainties to round-off; that of multipliers is relative. */
+static void reference_raise_uncertainty (const pw_system *system, pw_reference *reference) {
+  double *uncertainty = reference->uncertainty;
+  int has_multipliers =
+      reference_sizes (system, &reference->motion, reference->size) &&
+      uncertainty[MOTION_MULTIPLIERS] < 1; /* else never compared, or as uncertain as they are large */
+  for (int i = 0; i < MOTION_ERRORS; i++) {
+    double size = i < MOTION_MULTIPLIERS ? reference->size[i % MOTION_UNITS] : has_multipliers ? 1 : 0;
+    if (i < MOTION_LARGEST)
+      uncertainty[i] = uncertainty[i + MOTION_LARGEST]; /* agreement at the end may be accidental */
+    uncertainty[i] = fmax (uncertainty[i], REFERENCE_ROUND_OFF * DBL_EPSILON * size);
+  }
+  if (!has_multipliers) uncertainty[MOTION_MULTIPLIERS] = 0;
+}
+
+typedef struct {
+  pw_study *study;
+  pw_row row;   /* method, and its tolerance or step size */
+  int finished; /* 1: the run has reached the end */
+  pw_motion motion;
+} reference_candidate;
+
+/* Runs candidate i, again with ten times the tolerance or step size if it fails.  PW_RETRY: interrupted. */
+static int reference_run (void *context, int i, pw_error *error) {
+  reference_candidate *candidate = (reference_candidate *)context + i;
+  pw_study *study = candidate->study;
+  double loosest = candidate->row.adaptive ? REFERENCE_LOOSEST : study->t_end / REFERENCE_FEWEST;
+  pw_error run_error = { 0 };
+  int status = pw_motion_open (&candidate->motion, study->compiled.system, MOTION_SAMPLES, study->t_end, error);
+  if (status != PW_OK) return status;
+  status = PW_RETRY;
+  while (status != PW_OK && candidate->row.level <= loosest) {
+    run_error = (pw_error){ 0 };
+    status = compare_run (study, &candidate->row, &candidate->motion, &run_error);
+    if (status == PW_OK || pw_stop || candidate->row.state == ROW_STOPPED || status == PW_RESOURCE ||
+        status == PW_INITIAL)
+      break;
+    candidate->row.level *= 10;
+  }
+  candidate->finished = status == PW_OK;
+  pw_study_progress (study, &candidate->row, 1);
+  return candidate->finished ? PW_OK : pw_study_record_run (study, &candidate->row, status, &run_error, error);
+}
+
+/* The distance of two motions, relative to the size of the first; NaN if it is unknown. */
+static double reference_distance (const pw_system *system, const pw_motion *a, const pw_motion *b) {
+  double error[MOTION_ERRORS], size[MOTION_UNITS], largest = 0;
+  reference_sizes (system, a, size);
+  pw_motion_errors (system, a, b, error);
+  for (int i = 0; i < MOTION_UNITS; i++) {
+    double relative = error[MOTION_LARGEST + i] / (size[i] > 0 ? size[i] : 1);
+    if (!isnan (largest) && !(relative <= largest)) largest = relative;
+  }
+  return largest;
+}
+
+static void reference_name (const reference_candidate *candidate, char *text, size_t size) {
+  snprintf (text, size, "%s, %s %s%s", candidate->row.method, candidate->row.adaptive ? "rtol" : "step",
+            PW_DIGITS (candidate->row.level, 4), candidate->row.adaptive ? "" : " s");
+}
+
+/* 1 if two methods have the same integrator. */
+static int reference_same_integrator (const reference_candidate *a, const reference_candidate *b) {
+  size_t n = strcspn (a->row.method, "+");
+  return strncmp (a->row.method, b->row.method, n + 1) == 0;
+}
+
+/* The two candidates with the smallest distance, with different integrators if possible; 0 if there are none. */
+static int reference_pair (const pw_system *system, const reference_candidate *candidates, int *first, int *second) {
+  double least = INFINITY;
+  for (int same = 0; same < 2 && isinf (least); same++)
+    for (int i = 0; i < REFERENCE_CANDIDATES; i++)
+      for (int j = i + 1; j < REFERENCE_CANDIDATES; j++) {
+        const reference_candidate *a = &candidates[i], *b = &candidates[j];
+        if (!a->finished || !b->finished || reference_same_integrator (a, b) != same) continue;
+        double distance = reference_distance (system, &a->motion, &b->motion);
+        if (distance < least) least = distance, *first = i, *second = j;
+      }
+  return isfinite (least);
+}
+
+static void reference_add_partner (pw_reference *reference, const pw_system *system, const reference_candidate *best,
+                                   const reference_candidate *partner) {
+  int i = reference->partners++;
+  reference_name (partner, reference->partner[i].name, sizeof reference->partner[i].name);
+  pw_motion_errors (system, &best->motion, &partner->motion, reference->partner[i].error);
+}
+
+/* Selects the reference: the first of the two candidates that agree best.  The second is its first partner. */
+static void reference_choose (pw_reference *reference, const pw_system *system, reference_candidate *list) {
+  int best = -1, second = -1;
+  if (!reference_pair (system, list, &best, &second)) return;
+  reference->known = 1;
+  reference_name (&list[best], reference->name, sizeof reference->name);
+  reference_add_partner (reference, system, &list[best], &list[second]);
+  memcpy (reference->uncertainty, reference->partner[0].error, sizeof reference->uncertainty);
+  for (int i = 0; i < REFERENCE_CANDIDATES; i++)
+    if (i != best && i != second && list[i].finished) reference_add_partner (reference, system, &list[best], &list[i]);
+  reference->motion = list[best].motion;
+  list[best].motion = (pw_motion){ .times = 0 };
+  reference_raise_uncertainty (system, reference);
+}
+
+static int reference_compute (pw_reference *reference, pw_study *study, double step, pw_error *error) {
+  reference_candidate candidates[REFERENCE_CANDIDATES] = {
+    { study, .row = { .method = "erk8+projection", .adaptive = 1, .level = 3e-14 /* the least is 2.2e-14 */ } },
+    { study, .row = { .method = "rk4+projection", .level = fmin (step, study->t_end / REFERENCE_STEPS) } },
+    { study, .row = { .method = "ida+ggl", .adaptive = 1, .level = 1e-13 } },
+    { study, .row = { .method = "ida+baumgarte", .adaptive = 1, .level = 1e-13 } },
+  };
+  pw_study_begin_progress (study, "reference", "methods", REFERENCE_CANDIDATES);
+  int status = pw_study_parallel (study, REFERENCE_CANDIDATES, reference_run, candidates, error);
+  if (status == PW_OK) reference_choose (reference, study->compiled.system, candidates);
+  for (int i = 0; i < REFERENCE_CANDIDATES; i++) {
+    reference->limited |= candidates[i].row.state == ROW_STOPPED;
+    pw_motion_close (&candidates[i].motion);
+  }
+  return status;
+}
+
+/* Finds the reference.  step: the smallest step size of the comparison [s].  Sets the study's t_end to the end of a
+ * table unless --t-end is given.  Close the motion of the reference in every case. */
+static int reference_find (pw_reference *reference, pw_study *study, double step, pw_error *error) {
+  const char *path = study->reference_path;
+  double t_end = path && study->line.t_end == NULL ? 0 : study->t_end; /* 0: that of the table */
+  /* the model's solution holds only for its own initial values */
+  if (path == NULL && (study->line.starts || !pw_model_has_reference (study->compiled.model)))
+    return reference_compute (reference, study, step, error);
+  int status = pw_motion_open_reference (&reference->motion, &study->compiled, path, &t_end, error);
+  if (status != PW_OK) return status;
+  pw_motion_gaps (study->compiled.system, &reference->motion, path ? 1 : reference->motion.times, reference->gaps);
+  if (path == NULL && *reference->gaps) {
+    pw_motion_close (&reference->motion);
+    return reference_compute (reference, study, step, error);
+  }
+  pw_motion *motion = &reference->motion;
+  int n = pw_system_coordinates (study->compiled.system), complete = 1;
+  for (int j = n; j < 2 * n && path == NULL; j++) complete &= pw_motion_known (motion, j) == motion->times;
+  for (int k = 0; !complete && k < motion->times; k++) /* so that no error is that of a part of the velocities */
+    for (int j = n; j < 2 * n; j++) pw_motion_at (motion, k)[j] = NAN;
+  double last = motion->t[motion->times - 1];
+  if (last < t_end)
+    return pw_fail (error, PW_INPUT,
+                    "--reference %s: no row at the final time, t = %s s; the last one before it is at %s s", path,
+                    PW_DIGITS (t_end, 9), PW_DIGITS (last, 9));
+  snprintf (reference->name, sizeof reference->name, "%s", path ? path : "the exact solution of the model");
+  study->t_end = t_end;
+  reference->known = 1;
+  reference->from_table = path != NULL;
+  reference_raise_uncertainty (study->compiled.system, reference);
+  return PW_OK;
+}
+
+/* Prints the reference, its uncertainty and its distances from the first `partners` other solutions. */
+static void reference_print (const pw_reference *reference, int partners) {
+  const char *gaps = reference->gaps;
+  if (*gaps && !reference->from_table)
+    pw_cli_print (stdout, "the model's own reference solution contains at all times %s: a computed one is used\n",
+                  gaps);
+  if (!reference->known) {
+    printf ("no two methods reach the end%s, so errors are unknown; --reference FILE.csv provides a reference\n\n",
+            reference->limited ? " within --limit" : "");
+    return;
+  }
+  pw_cli_print (stdout, "errors are measured against %s%s\n", reference->name,
+                reference->from_table ? ", as if it were exact" : "");
+  if (*gaps && reference->from_table) pw_cli_print (stdout, "  it contains %s\n", gaps);
+  for (int i = 0; i < partners && i < reference->partners; i++)
+    printf ("  %s agrees with it to %.1e m, %.1e rad%s\n", reference->partner[i].name,
+            reference->partner[i].error[MOTION_LARGEST + MOTION_LENGTH],
+            reference->partner[i].error[MOTION_LARGEST + MOTION_ANGLE],
+            i == 0 ? ": the uncertainty of the reference" : "");
+  putchar ('\n');
+}
+
+/* Writes FOLDER/truth.csv: the uncertainty of the reference, and its distances from all other solutions. */
+static int reference_write (const pw_reference *reference, const char *folder, pw_error *error) {
+  pw_output *output = pw_figure_open_file (folder, "truth.csv", error);
+  if (output == NULL) return error->status;
+  FILE *f = pw_output_stream (output);
+  pw_text line = { .chars = NULL };
+  pw_text_cell (&line, "truth,against");
+  for (const pw_study_column *c = compare_columns + COLUMN_ERROR; c < compare_columns + COLUMN_ERROR + MOTION_ERRORS;
+       c++)
+    pw_text_name (&line, c->name, c->unit);
+  int status = pw_text_line (&line, f, folder, error);
+  for (int i = -1; status == PW_OK && reference->known && i < reference->partners; i++) {
+    pw_text_quoted (&line, reference->name);
+    pw_text_quoted (&line, i < 0 ? "uncertainty" : reference->partner[i].name);
+    for (int k = 0; k < MOTION_ERRORS; k++)
+      pw_text_number (&line, i < 0 ? reference->uncertainty[k] : reference->partner[i].error[k]);
+    status = pw_text_line (&line, f, folder, error);
+  }
+  return pw_cli_close_table (output, status, error);
+}
+
+/* ---- The conclusion: the processor time of each method for the numbers of correct digits in conclusion_required,
+ * interpolated on its work-precision curve and relative to the cheapest method; then the runs that failed or were
+ * stopped ---- */
+
+enum {
+  CONCLUSION_COLUMNS = 3,
+  CONCLUSION_WIDTH = 14, /* of a column, at least */
+  CONCLUSION_REASON = 70 /* characters of the reason of a failure, at most */
+};
+/* Numbers of correct digits, and the largest relative errors that have them. */
+static const struct {
+  int digits;
+  double error;
+} conclusion_required[CONCLUSION_COLUMNS] = { { 3, 1e-3 }, { 6, 1e-6 }, { 9, 1e-9 } };
+
+typedef struct {
+  double cpu;         /* [s]; NaN: no run is as accurate */
+  int is_upper_bound; /* 1: see conclusion_least_cost */
+} conclusion_cost;
+
+typedef struct {
+  const pw_compare *compare;
+  double uncertainty;           /* relative, of the reference: its conclusion_error */
+  int width;                    /* of columns: that of the longest name of a method */
+  int best[CONCLUSION_COLUMNS]; /* the cheapest method; -1: none */
+  conclusion_cost cheapest[CONCLUSION_COLUMNS];
+} pw_conclusion;
+
+/* Errors are relative to the largest coordinate of the same unit, those of angles to 1 rad at most. */
+static double conclusion_scale (const pw_reference *reference, int unit) {
+  double size = reference->size[unit] > 0 ? reference->size[unit] : 1;
+  return unit == MOTION_ANGLE ? fmin (size, 1) : size;
+}
+
+/* The larger of the relative errors of lengths and angles, as far as they are compared; NaN if one of these is unknown.
+ * errors: of lengths [m], of angles [rad]. */
+static double conclusion_error (const pw_reference *reference, const double *errors) {
+  double largest = 0;
+  for (int unit = MOTION_LENGTH; unit <= MOTION_ANGLE; unit++) {
+    double error = errors[unit] / conclusion_scale (reference, unit);
+    if (reference->uncertainty[MOTION_LARGEST + unit] > 0 && !(error <= largest) && !isnan (largest)) largest = error;
+  }
+  return largest;
+}
+
+/* The least processor time of a method for the required relative error, interpolated between neighbouring runs on
+ * logarithmic scales.  It is an upper bound if no run before it was less accurate, if the run just before it failed, so
+ * that its error is unknown, or if it is interpolated to an error that is only known to be below the uncertainty. */
+static conclusion_cost conclusion_least_cost (const pw_conclusion *conclusion, int method, double required) {
+  conclusion_cost least = { NAN, 0 };
+  double previous = NAN;
+  int less_accurate_before = 0;
+  const pw_study *study = &conclusion->compare->study;
+  for (const pw_row *row = study->row; row < study->row + study->rows; row++) {
+    if (row->curve != method) continue;
+    double error = row->state == ROW_DONE
+                       ? conclusion_error (&conclusion->compare->reference, row->value + COLUMN_ERROR + MOTION_LARGEST)
+                       : NAN;
+    conclusion_cost candidate = { error <= required ? row->cpu : NAN, !less_accurate_before || isnan (previous) };
+    if (error <= required && previous > required) {
+      double cpu = row[-1].cpu * pow (row->cpu / row[-1].cpu, log (required / previous) / log (error / previous));
+      candidate = (conclusion_cost){ fmin (cpu, row->cpu), error <= conclusion->uncertainty };
+    }
+    if (candidate.cpu > 0 && !(least.cpu <= candidate.cpu)) least = candidate;
+    less_accurate_before |= error > required;
+    previous = error;
+  }
+  return least;
+}
+
+/* Finds the cheapest method of each column for which the reference is accurate enough. */
+static void conclusion_find_cheapest (pw_conclusion *conclusion) {
+  for (int k = 0; k < CONCLUSION_COLUMNS; k++) {
+    conclusion->best[k] = -1;
+    conclusion->cheapest[k].cpu = NAN;
+    for (int i = 0; i < conclusion->compare->study.methods && conclusion->uncertainty <= conclusion_required[k].error;
+         i++) {
+      conclusion_cost candidate = conclusion_least_cost (conclusion, i, conclusion_required[k].error);
+      if (isnan (candidate.cpu) || conclusion->cheapest[k].cpu <= candidate.cpu) continue;
+      conclusion->cheapest[k] = candidate;
+      conclusion->best[k] = i;
+    }
+  }
+}
+
+static void conclusion_print_heading (const pw_conclusion *conclusion) {
+  static const char *const unit[] = { "m", "rad" }, *const name[] = { "lengths", "angles" };
+  const pw_reference *reference = &conclusion->compare->reference;
+  const char *between = "";
+  printf ("Processor time for ");
+  for (int k = 0; k < CONCLUSION_COLUMNS; k++)
+    printf ("%s%d", k == 0 ? "" : k + 1 < CONCLUSION_COLUMNS ? ", " : " and ", conclusion_required[k].digits);
+  printf (" correct digits, relative to the cheapest method.\n"
+          "Digits: the largest error of a coordinate at %d times up to %s s, relative to\n",
+          reference->motion.taken, PW_DIGITS (conclusion->compare->study.t_end, 6));
+  for (int i = MOTION_LENGTH; i <= MOTION_ANGLE; i++)
+    if (reference->uncertainty[MOTION_LARGEST + i] > 0) {
+      printf ("%s%s %s (%s)", between, PW_DIGITS (conclusion_scale (reference, i), 3), unit[i], name[i]);
+      between = ", ";
+    }
+  const double digits = -log10 (conclusion->uncertainty);
+  printf (". The reference has %s digits%s.\n\n", digits >= 0.05 ? PW_PRINTED (40, "%.1f", digits) : "no correct",
+          conclusion->compare->study.reference_path ? " if its table is exact" : "");
+}
+
+/* "1.5 ms", "<0.2 ms", "-" */
+static char *conclusion_format_time (char text[40], conclusion_cost c) {
+  int ms = c.cpu < 1;
+  snprintf (text, 40, "%s%s %s", c.is_upper_bound ? "<" : "", PW_DIGITS (ms ? 1e3 * c.cpu : c.cpu, 2), ms ? "ms" : "s");
+  return isnan (c.cpu) ? strcpy (text, "-") : text;
+}
+
+/* The time for column k over that of the cheapest method: "2.5", "<30", "uncertain", "not reached" */
+static char *conclusion_format_ratio (char text[40], const pw_conclusion *conclusion, int method, int k) {
+  conclusion_cost c = conclusion_least_cost (conclusion, method, conclusion_required[k].error);
+  double ratio = c.cpu / conclusion->cheapest[k].cpu;
+  snprintf (text, 40, "%s%.*f", c.is_upper_bound ? "<" : "", ratio < 9.95, ratio);
+  if (conclusion->uncertainty > conclusion_required[k].error) return strcpy (text, "uncertain");
+  return isnan (c.cpu) ? strcpy (text, "not reached") : text;
+}
+
+/* The cheapest methods, their times, then a line for each method. */
+static void conclusion_print_table (const pw_conclusion *conclusion) {
+  char text[40];
+  int bounds = 0, any_uncertain = 0;
+  printf ("%-*s", conclusion->width, "");
+  for (int k = 0; k < CONCLUSION_COLUMNS; k++)
+    printf ("  %*d digits", conclusion->width - 7, conclusion_required[k].digits);
+  printf ("\n%-*s", conclusion->width, "cheapest");
+  for (int k = 0; k < CONCLUSION_COLUMNS; k++)
+    printf ("  %*s", conclusion->width,
+            conclusion->best[k] < 0 ? "-" : conclusion->compare->study.method[conclusion->best[k]]);
+  printf ("\n%-*s", conclusion->width, "its time");
+  for (int k = 0; k < CONCLUSION_COLUMNS; k++)
+    printf ("  %*s", conclusion->width, conclusion_format_time (text, conclusion->cheapest[k]));
+  for (int i = 0; i < conclusion->compare->study.methods; i++) {
+    printf ("\n%-*s", conclusion->width, conclusion->compare->study.method[i]);
+    for (int k = 0; k < CONCLUSION_COLUMNS; k++) {
+      printf ("  %*s", conclusion->width, conclusion_format_ratio (text, conclusion, i, k));
+      bounds |= *text == '<';
+      any_uncertain |= *text == 'u';
+    }
+  }
+  puts (bounds ? "\n<: at most: no run has fewer digits, or it is unknown how many the one before or the next one has"
+               : "");
+  if (any_uncertain) puts ("uncertain: the reference is not accurate enough to distinguish methods");
+}
+
+/* Sets of states of runs: bits 1 << pw_row_state. */
+enum {
+  RUNS_ALL = ~0,
+  RUNS_FAILED = 1 << ROW_FAILED | 1 << ROW_REFUSED,
+  RUNS_LIMITED = 1 << ROW_STOPPED | 1 << ROW_SKIPPED
+};
+
+/* The number of runs of a method whose state is in a set, and the first of them or NULL. */
+static int conclusion_count_runs (const pw_study *study, int method, int states, const pw_row **first) {
+  int count = 0;
+  *first = NULL;
+  for (const pw_row *row = study->row; row < study->row + study->rows; row++)
+    if (row->curve == method && states >> row->state & 1 && count++ == 0) *first = row;
+  return count;
+}
+
+static void conclusion_print_failures (const pw_study *study, int method) {
+  const pw_row *first, *any;
+  int failures = conclusion_count_runs (study, method, RUNS_FAILED, &first);
+  if (first == NULL) return;
+  int cut = strlen (first->reason) > CONCLUSION_REASON;
+  pw_cli_print (stdout, "%s: %d of %d runs %s, first at %s %s: %.*s%s\n", first->method, failures,
+                conclusion_count_runs (study, method, RUNS_ALL, &any),
+                first->state == ROW_FAILED ? "fail" : "are refused", first->adaptive ? "rtol" : "step",
+                PW_DIGITS (first->level, 4), CONCLUSION_REASON, first->reason, cut ? "..." : "");
+}
+
+/* One line for all methods with runs that the limit has stopped or prevented. */
+static void conclusion_print_limited (const pw_study *study) {
+  const char *beginning = PW_PRINTED (80, "stopped by the limit of %s s: ", PW_DIGITS (study->cpu_limit, 4));
+  const char *before = beginning;
+  for (int i = 0; i < study->methods; i++) {
+    const pw_row *first;
+    if (conclusion_count_runs (study, i, RUNS_LIMITED, &first) == 0) continue;
+    printf ("%s%s from %s", before, first->method, PW_DIGITS (first->level, 4));
+    before = ", ";
+  }
+  if (before != beginning) putchar ('\n');
+}
+
+static void conclusion_print (const pw_compare *compare) {
+  const pw_study *study = &compare->study;
+  const pw_reference *reference = &compare->reference;
+  pw_conclusion conclusion = { .compare = compare, .width = CONCLUSION_WIDTH };
+  conclusion.uncertainty = conclusion_error (reference, reference->uncertainty + MOTION_LARGEST);
+  for (int i = 0; i < study->methods; i++)
+    if ((int)strlen (study->method[i]) > conclusion.width) conclusion.width = (int)strlen (study->method[i]);
+  conclusion_find_cheapest (&conclusion);
+  conclusion_print_heading (&conclusion);
+  conclusion_print_table (&conclusion);
+  for (int i = 0; i < study->methods; i++) conclusion_print_failures (study, i);
+  conclusion_print_limited (study);
+}
+
+/* ---- The rows ---- */
+
+enum { COMPARE_REPEATS = 99 }; /* the largest value of --repeats */
+#define COMPARE_FEW 3          /* timed runs of a row, at least, unless --repeats is less or they exceed the limit */
+#define COMPARE_ENOUGH 0.5     /* total processor time [s] of a row after which no further run is timed */
+#define COMPARE_CLEAR 10   /* error over uncertainty of the reference, so that orders are accurate to log2 1.1 = 0.14 */
+#define COMPARE_AGREE 0.1  /* largest relative difference of the last two orders in the asymptotic range */
+#define COMPARE_DECADE 1.6 /* factor of the cost if a tolerance is divided by ten, of a method of order 5: 10^(1/5) */
+
+/* Explicit and implicit, one-step and multistep methods, each with the stabilisation that suits it. */
+static const char compare_default_methods[] = "rk4+projection,erk5+projection,erk8+projection,bdf+projection,"
+                                              "ida+baumgarte,ida+ggl,radau+ggl,galpha+index3";
 
 /* ---- Ladders: the tolerances or step sizes of a method ---- */
 
@@ -244,7 +670,7 @@ static int compare_measure_times (pw_compare *compare, pw_row *row, pw_error *er
   double cpu[COMPARE_REPEATS], sum = 0;
   int n = 0;
   while (n < compare->repeats && !(n >= COMPARE_FEW && sum > COMPARE_ENOUGH) && sum <= compare->study.cpu_limit) {
-    int status = pw_motion_run (&compare->study, row, NULL, error);
+    int status = compare_run (&compare->study, row, NULL, error);
     if (status != PW_OK) return status;
     sum += cpu[n++] = row->cpu;
   }
@@ -277,7 +703,7 @@ static int compare_measure_errors (pw_compare *compare, pw_row *row, pw_error *e
                    ? pw_motion_open_at (&motion, study->compiled.system, &compare->reference.motion, error)
                    : pw_motion_open (&motion, study->compiled.system, MOTION_SAMPLES, study->t_end, error);
   if (status != PW_OK) return status;
-  status = pw_motion_run (study, row, &motion, error);
+  status = compare_run (study, row, &motion, error);
   if (status == PW_OK) compare_set_errors (compare, &motion, row);
   pw_motion_close (&motion);
   return status;
@@ -319,22 +745,21 @@ static int compare_measure (pw_study *study, pw_row *row, pw_error *error) {
 
 static int compare_begin (pw_study *study, pw_error *error) {
   pw_compare *compare = (pw_compare *)study;
-  int status = pw_reference_find (&compare->reference, study, compare->finest_step, error);
-  if (status == PW_OK && study->folder)
-    status = pw_reference_write (&compare->reference, study->folder, compare_columns + COLUMN_ERROR, error);
+  int status = reference_find (&compare->reference, study, compare->finest_step, error);
+  if (status == PW_OK && study->folder) status = reference_write (&compare->reference, study->folder, error);
   if (status != PW_OK) return status;
   study->run_share = 1 / (compare->repeats + 1);
   const double *largest = compare->reference.uncertainty + MOTION_LARGEST;
   compare->concludes = compare->reference.known && (largest[MOTION_LENGTH] > 0 || largest[MOTION_ANGLE] > 0);
   study->quiet = compare->concludes && !compare->table;
-  pw_reference_print (&compare->reference, compare->table ? REFERENCE_CANDIDATES : 1);
+  reference_print (&compare->reference, compare->table ? REFERENCE_CANDIDATES : 1);
   return PW_OK;
 }
 
 static void compare_conclude (const pw_study *study) {
   const pw_compare *compare = (const pw_compare *)study;
   if (compare->concludes && compare->table) putchar ('\n');
-  if (compare->concludes) pw_conclusion_print (study, &compare->reference, COLUMN_ERROR + MOTION_LARGEST);
+  if (compare->concludes) conclusion_print (compare);
 }
 
 /* Work-precision diagrams of lengths and of angles, if their errors are known. */
@@ -422,463 +847,3 @@ const pw_command pw_cli_compare = {
   .function = compare_command,
   .options = compare_options,
 };
-
-/* Prints the conclusion of a comparison: the processor time of each method for the numbers of correct digits in
- * conclusion_required, interpolated on its work-precision curve and relative to the cheapest method; then the runs that
- * failed or were stopped. */
-
-enum {
-  CONCLUSION_COLUMNS = 3,
-  CONCLUSION_WIDTH = 14, /* of a column, at least */
-  CONCLUSION_REASON = 70 /* characters of the reason of a failure, at most */
-};
-/* Numbers of correct digits, and the largest relative errors that have them. */
-static const struct {
-  int digits;
-  double error;
-} conclusion_required[CONCLUSION_COLUMNS] = { { 3, 1e-3 }, { 6, 1e-6 }, { 9, 1e-9 } };
-
-typedef struct {
-  double cpu;         /* [s]; NaN: no run is as accurate */
-  int is_upper_bound; /* 1: see conclusion_least_cost */
-} conclusion_cost;
-
-typedef struct {
-  const pw_study *study;
-  const pw_reference *reference;
-  int error_column;             /* in the rows: the largest error of lengths, then of angles */
-  double uncertainty;           /* relative, of the reference: its conclusion_error */
-  int width;                    /* of columns: that of the longest name of a method */
-  int best[CONCLUSION_COLUMNS]; /* the cheapest method; -1: none */
-  conclusion_cost cheapest[CONCLUSION_COLUMNS];
-} pw_conclusion;
-
-/* ---- Errors ---- */
-
-/* Errors are relative to the largest coordinate of the same unit, those of angles to 1 rad at most. */
-static double conclusion_scale (const pw_reference *reference, int unit) {
-  double size = reference->size[unit] > 0 ? reference->size[unit] : 1;
-  return unit == MOTION_ANGLE ? fmin (size, 1) : size;
-}
-
-/* The larger of the relative errors of lengths and angles, as far as they are compared; NaN if one of these is unknown.
- * errors: of lengths [m], of angles [rad]. */
-static double conclusion_error (const pw_reference *reference, const double *errors) {
-  double largest = 0;
-  for (int unit = MOTION_LENGTH; unit <= MOTION_ANGLE; unit++) {
-    double error = errors[unit] / conclusion_scale (reference, unit);
-    if (reference->uncertainty[MOTION_LARGEST + unit] > 0 && !(error <= largest) && !isnan (largest)) largest = error;
-  }
-  return largest;
-}
-
-/* ---- Costs ---- */
-
-/* The least processor time of a method for the required relative error, interpolated between neighbouring runs on
- * logarithmic scales.  It is an upper bound if no run before it was less accurate, if the run just before it failed, so
- * that its error is unknown, or if it is interpolated to an error that is only known to be below the uncertainty. */
-static conclusion_cost conclusion_least_cost (const pw_conclusion *conclusion, int method, double required) {
-  conclusion_cost least = { NAN, 0 };
-  double previous = NAN;
-  int less_accurate_before = 0;
-  const pw_study *study = conclusion->study;
-  for (const pw_row *row = study->row; row < study->row + study->rows; row++) {
-    if (row->curve != method) continue;
-    double error =
-        row->state == ROW_DONE ? conclusion_error (conclusion->reference, row->value + conclusion->error_column) : NAN;
-    conclusion_cost candidate = { error <= required ? row->cpu : NAN, !less_accurate_before || isnan (previous) };
-    if (error <= required && previous > required) {
-      double cpu = row[-1].cpu * pow (row->cpu / row[-1].cpu, log (required / previous) / log (error / previous));
-      candidate = (conclusion_cost){ fmin (cpu, row->cpu), error <= conclusion->uncertainty };
-    }
-    if (candidate.cpu > 0 && !(least.cpu <= candidate.cpu)) least = candidate;
-    less_accurate_before |= error > required;
-    previous = error;
-  }
-  return least;
-}
-
-/* Finds the cheapest method of each column for which the reference is accurate enough. */
-static void conclusion_find_cheapest (pw_conclusion *conclusion) {
-  for (int k = 0; k < CONCLUSION_COLUMNS; k++) {
-    conclusion->best[k] = -1;
-    conclusion->cheapest[k].cpu = NAN;
-    for (int i = 0; i < conclusion->study->methods && conclusion->uncertainty <= conclusion_required[k].error; i++) {
-      conclusion_cost candidate = conclusion_least_cost (conclusion, i, conclusion_required[k].error);
-      if (isnan (candidate.cpu) || conclusion->cheapest[k].cpu <= candidate.cpu) continue;
-      conclusion->cheapest[k] = candidate;
-      conclusion->best[k] = i;
-    }
-  }
-}
-
-/* ---- Table ---- */
-
-static void conclusion_print_heading (const pw_conclusion *conclusion) {
-  static const char *const unit[] = { "m", "rad" }, *const name[] = { "lengths", "angles" };
-  const pw_reference *reference = conclusion->reference;
-  const char *between = "";
-  printf ("Processor time for ");
-  for (int k = 0; k < CONCLUSION_COLUMNS; k++)
-    printf ("%s%d", k == 0 ? "" : k + 1 < CONCLUSION_COLUMNS ? ", " : " and ", conclusion_required[k].digits);
-  printf (" correct digits, relative to the cheapest method.\n"
-          "Digits: the largest error of a coordinate at %d times up to %s s, relative to\n",
-          reference->motion.taken, PW_DIGITS (conclusion->study->t_end, 6));
-  for (int i = MOTION_LENGTH; i <= MOTION_ANGLE; i++)
-    if (reference->uncertainty[MOTION_LARGEST + i] > 0) {
-      printf ("%s%s %s (%s)", between, PW_DIGITS (conclusion_scale (reference, i), 3), unit[i], name[i]);
-      between = ", ";
-    }
-  const double digits = -log10 (conclusion->uncertainty);
-  printf (". The reference has %s digits%s.\n\n", digits >= 0.05 ? PW_PRINTED (40, "%.1f", digits) : "no correct",
-          conclusion->study->reference_path ? " if its table is exact" : "");
-}
-
-/* "1.5 ms", "<0.2 ms", "-" */
-static char *conclusion_format_time (char text[40], conclusion_cost c) {
-  int ms = c.cpu < 1;
-  snprintf (text, 40, "%s%s %s", c.is_upper_bound ? "<" : "", PW_DIGITS (ms ? 1e3 * c.cpu : c.cpu, 2), ms ? "ms" : "s");
-  return isnan (c.cpu) ? strcpy (text, "-") : text;
-}
-
-/* The time for column k over that of the cheapest method: "2.5", "<30", "uncertain", "not reached" */
-static char *conclusion_format_ratio (char text[40], const pw_conclusion *conclusion, int method, int k) {
-  conclusion_cost c = conclusion_least_cost (conclusion, method, conclusion_required[k].error);
-  double ratio = c.cpu / conclusion->cheapest[k].cpu;
-  snprintf (text, 40, "%s%.*f", c.is_upper_bound ? "<" : "", ratio < 9.95, ratio);
-  if (conclusion->uncertainty > conclusion_required[k].error) return strcpy (text, "uncertain");
-  return isnan (c.cpu) ? strcpy (text, "not reached") : text;
-}
-
-/* The cheapest methods, their times, then a line for each method. */
-static void conclusion_print_table (const pw_conclusion *conclusion) {
-  char text[40];
-  int bounds = 0, any_uncertain = 0;
-  printf ("%-*s", conclusion->width, "");
-  for (int k = 0; k < CONCLUSION_COLUMNS; k++)
-    printf ("  %*d digits", conclusion->width - 7, conclusion_required[k].digits);
-  printf ("\n%-*s", conclusion->width, "cheapest");
-  for (int k = 0; k < CONCLUSION_COLUMNS; k++)
-    printf ("  %*s", conclusion->width, conclusion->best[k] < 0 ? "-" : conclusion->study->method[conclusion->best[k]]);
-  printf ("\n%-*s", conclusion->width, "its time");
-  for (int k = 0; k < CONCLUSION_COLUMNS; k++)
-    printf ("  %*s", conclusion->width, conclusion_format_time (text, conclusion->cheapest[k]));
-  for (int i = 0; i < conclusion->study->methods; i++) {
-    printf ("\n%-*s", conclusion->width, conclusion->study->method[i]);
-    for (int k = 0; k < CONCLUSION_COLUMNS; k++) {
-      printf ("  %*s", conclusion->width, conclusion_format_ratio (text, conclusion, i, k));
-      bounds |= *text == '<';
-      any_uncertain |= *text == 'u';
-    }
-  }
-  puts (bounds ? "\n<: at most: no run has fewer digits, or it is unknown how many the one before or the next one has"
-               : "");
-  if (any_uncertain) puts ("uncertain: the reference is not accurate enough to distinguish methods");
-}
-
-/* ---- Runs that do not reach the end ---- */
-
-/* Sets of states of runs: bits 1 << pw_row_state. */
-enum {
-  RUNS_ALL = ~0,
-  RUNS_FAILED = 1 << ROW_FAILED | 1 << ROW_REFUSED,
-  RUNS_LIMITED = 1 << ROW_STOPPED | 1 << ROW_SKIPPED
-};
-
-/* The number of runs of a method whose state is in a set, and the first of them or NULL. */
-static int conclusion_count_runs (const pw_study *study, int method, int states, const pw_row **first) {
-  int count = 0;
-  *first = NULL;
-  for (const pw_row *row = study->row; row < study->row + study->rows; row++)
-    if (row->curve == method && states >> row->state & 1 && count++ == 0) *first = row;
-  return count;
-}
-
-static void conclusion_print_failures (const pw_study *study, int method) {
-  const pw_row *first, *any;
-  int failures = conclusion_count_runs (study, method, RUNS_FAILED, &first);
-  if (first == NULL) return;
-  int cut = strlen (first->reason) > CONCLUSION_REASON;
-  pw_cli_print (stdout, "%s: %d of %d runs %s, first at %s %s: %.*s%s\n", first->method, failures,
-                conclusion_count_runs (study, method, RUNS_ALL, &any),
-                first->state == ROW_FAILED ? "fail" : "are refused", first->adaptive ? "rtol" : "step",
-                PW_DIGITS (first->level, 4), CONCLUSION_REASON, first->reason, cut ? "..." : "");
-}
-
-/* One line for all methods with runs that the limit has stopped or prevented. */
-static void conclusion_print_limited (const pw_study *study) {
-  const char *beginning = PW_PRINTED (80, "stopped by the limit of %s s: ", PW_DIGITS (study->cpu_limit, 4));
-  const char *before = beginning;
-  for (int i = 0; i < study->methods; i++) {
-    const pw_row *first;
-    if (conclusion_count_runs (study, i, RUNS_LIMITED, &first) == 0) continue;
-    printf ("%s%s from %s", before, first->method, PW_DIGITS (first->level, 4));
-    before = ", ";
-  }
-  if (before != beginning) putchar ('\n');
-}
-
-void pw_conclusion_print (const pw_study *study, const pw_reference *reference, int error_column) {
-  pw_conclusion conclusion = {
-    .study = study, .reference = reference, .error_column = error_column, .width = CONCLUSION_WIDTH
-  };
-  conclusion.uncertainty = conclusion_error (reference, reference->uncertainty + MOTION_LARGEST);
-  for (int i = 0; i < study->methods; i++)
-    if ((int)strlen (study->method[i]) > conclusion.width) conclusion.width = (int)strlen (study->method[i]);
-  conclusion_find_cheapest (&conclusion);
-  conclusion_print_heading (&conclusion);
-  conclusion_print_table (&conclusion);
-  for (int i = 0; i < study->methods; i++) conclusion_print_failures (study, i);
-  conclusion_print_limited (study);
-}
-
-/* Finds, prints and writes the reference solution of a comparison. */
-
-#define REFERENCE_LOOSEST 1e-9 /* the largest tolerance, after failures with smaller ones */
-#define REFERENCE_STEPS 1e5    /* the fewest steps of fixed size at first, */
-#define REFERENCE_FEWEST 1000  /* and after failures with more steps */
-#define REFERENCE_ROUND_OFF 8  /* the smallest uncertainty, in units of round-off of the largest coordinate */
-
-/* ---- Runs ---- */
-
-typedef struct {
-  pw_visitor base;
-  pw_motion *motion;
-} sampler;
-
-/* Stores the samples up to the time reached. */
-static int sampler_visit (pw_visitor *visitor, pw_run *run, pw_error *error) {
-  pw_motion *motion = ((sampler *)visitor)->motion;
-  pw_sample sample;
-  while ((visitor->due = pw_motion_next_time (motion)) <= pw_run_time (run)) {
-    int status = pw_run_sample (run, visitor->due, &sample, error);
-    if (status != PW_OK) return status;
-    pw_motion_add (motion, visitor->study->compiled.system, &sample);
-    visitor->row->balance = fmax (visitor->row->balance, fabs (sample.balance));
-  }
-  return PW_OK;
-}
-
-int pw_motion_run (pw_study *study, pw_row *row, pw_motion *motion, pw_error *error) {
-  sampler visitor = { { .visit = sampler_visit, .study = study, .row = row }, motion };
-  pw_settings settings = { .span = study->t_end, .ledger = motion != NULL };
-  *(row->adaptive ? &settings.rtol : &settings.step) = row->level;
-  if (motion) row->balance = motion->taken = 0;
-  return pw_study_run (study, row, &settings, motion ? &visitor.base : NULL, error);
-}
-
-/* ---- Uncertainty ---- */
-
-/* The largest |coordinate| and |velocity| of each unit; returns 1 if multipliers are known. */
-static int reference_sizes (const pw_system *system, const pw_motion *motion, double size[MOTION_UNITS]) {
-  int states = 2 * pw_system_coordinates (system), has_multipliers = 0;
-  for (int i = 0; i < MOTION_UNITS; i++) size[i] = 0;
-  for (int k = 0; k < motion->taken; k++)
-    for (int j = 0; j < motion->width; j++) {
-      double value = fabs (pw_motion_at (motion, k)[j]);
-      if (j >= states)
-        has_multipliers |= !isnan (value);
-      else
-        size[pw_motion_unit (system, j)] = fmax (size[pw_motion_unit (system, j)], value);
-    }
-  return has_multipliers;
-}
-
-/* Raises the uncertainties to round-off; that of multipliers is relative. */
-static void reference_raise_uncertainty (const pw_system *system, pw_reference *reference) {
-  double *uncertainty = reference->uncertainty;
-  int has_multipliers =
-      reference_sizes (system, &reference->motion, reference->size) &&
-      uncertainty[MOTION_MULTIPLIERS] < 1; /* else never compared, or as uncertain as they are large */
-  for (int i = 0; i < MOTION_ERRORS; i++) {
-    double size = i < MOTION_MULTIPLIERS ? reference->size[i % MOTION_UNITS] : has_multipliers ? 1 : 0;
-    if (i < MOTION_LARGEST)
-      uncertainty[i] = uncertainty[i + MOTION_LARGEST]; /* agreement at the end may be accidental */
-    uncertainty[i] = fmax (uncertainty[i], REFERENCE_ROUND_OFF * DBL_EPSILON * size);
-  }
-  if (!has_multipliers) uncertainty[MOTION_MULTIPLIERS] = 0;
-}
-
-/* ---- Candidates ---- */
-
-typedef struct {
-  pw_study *study;
-  pw_row row;   /* method, and its tolerance or step size */
-  int finished; /* 1: the run has reached the end */
-  pw_motion motion;
-} reference_candidate;
-
-/* Runs candidate i, again with ten times the tolerance or step size if it fails.  PW_RETRY: interrupted. */
-static int reference_run (void *context, int i, pw_error *error) {
-  reference_candidate *candidate = (reference_candidate *)context + i;
-  pw_study *study = candidate->study;
-  double loosest = candidate->row.adaptive ? REFERENCE_LOOSEST : study->t_end / REFERENCE_FEWEST;
-  pw_error run_error = { 0 };
-  int status = pw_motion_open (&candidate->motion, study->compiled.system, MOTION_SAMPLES, study->t_end, error);
-  if (status != PW_OK) return status;
-  status = PW_RETRY;
-  while (status != PW_OK && candidate->row.level <= loosest) {
-    run_error = (pw_error){ 0 };
-    status = pw_motion_run (study, &candidate->row, &candidate->motion, &run_error);
-    if (status == PW_OK || pw_stop || candidate->row.state == ROW_STOPPED || status == PW_RESOURCE ||
-        status == PW_INITIAL)
-      break;
-    candidate->row.level *= 10;
-  }
-  candidate->finished = status == PW_OK;
-  pw_study_progress (study, &candidate->row, 1);
-  return candidate->finished ? PW_OK : pw_study_record_run (study, &candidate->row, status, &run_error, error);
-}
-
-/* The distance of two motions, relative to the size of the first; NaN if it is unknown. */
-static double reference_distance (const pw_system *system, const pw_motion *a, const pw_motion *b) {
-  double error[MOTION_ERRORS], size[MOTION_UNITS], largest = 0;
-  reference_sizes (system, a, size);
-  pw_motion_errors (system, a, b, error);
-  for (int i = 0; i < MOTION_UNITS; i++) {
-    double relative = error[MOTION_LARGEST + i] / (size[i] > 0 ? size[i] : 1);
-    if (!isnan (largest) && !(relative <= largest)) largest = relative;
-  }
-  return largest;
-}
-
-static void reference_name (const reference_candidate *candidate, char *text, size_t size) {
-  snprintf (text, size, "%s, %s %s%s", candidate->row.method, candidate->row.adaptive ? "rtol" : "step",
-            PW_DIGITS (candidate->row.level, 4), candidate->row.adaptive ? "" : " s");
-}
-
-/* 1 if two methods have the same integrator. */
-static int reference_same_integrator (const reference_candidate *a, const reference_candidate *b) {
-  size_t n = strcspn (a->row.method, "+");
-  return strncmp (a->row.method, b->row.method, n + 1) == 0;
-}
-
-/* The two candidates with the smallest distance, with different integrators if possible; 0 if there are none. */
-static int reference_pair (const pw_system *system, const reference_candidate *candidates, int *first, int *second) {
-  double least = INFINITY;
-  for (int same = 0; same < 2 && isinf (least); same++)
-    for (int i = 0; i < REFERENCE_CANDIDATES; i++)
-      for (int j = i + 1; j < REFERENCE_CANDIDATES; j++) {
-        const reference_candidate *a = &candidates[i], *b = &candidates[j];
-        if (!a->finished || !b->finished || reference_same_integrator (a, b) != same) continue;
-        double distance = reference_distance (system, &a->motion, &b->motion);
-        if (distance < least) least = distance, *first = i, *second = j;
-      }
-  return isfinite (least);
-}
-
-static void reference_add_partner (pw_reference *reference, const pw_system *system, const reference_candidate *best,
-                                   const reference_candidate *partner) {
-  int i = reference->partners++;
-  reference_name (partner, reference->partner[i].name, sizeof reference->partner[i].name);
-  pw_motion_errors (system, &best->motion, &partner->motion, reference->partner[i].error);
-}
-
-/* Selects the reference: the first of the two candidates that agree best.  The second is its first partner. */
-static void reference_choose (pw_reference *reference, const pw_system *system, reference_candidate *list) {
-  int best = -1, second = -1;
-  if (!reference_pair (system, list, &best, &second)) return;
-  reference->known = 1;
-  reference_name (&list[best], reference->name, sizeof reference->name);
-  reference_add_partner (reference, system, &list[best], &list[second]);
-  memcpy (reference->uncertainty, reference->partner[0].error, sizeof reference->uncertainty);
-  for (int i = 0; i < REFERENCE_CANDIDATES; i++)
-    if (i != best && i != second && list[i].finished) reference_add_partner (reference, system, &list[best], &list[i]);
-  reference->motion = list[best].motion;
-  list[best].motion = (pw_motion){ .times = 0 };
-  reference_raise_uncertainty (system, reference);
-}
-
-static int reference_compute (pw_reference *reference, pw_study *study, double step, pw_error *error) {
-  reference_candidate candidates[REFERENCE_CANDIDATES] = {
-    { study, .row = { .method = "erk8+projection", .adaptive = 1, .level = 3e-14 /* the least is 2.2e-14 */ } },
-    { study, .row = { .method = "rk4+projection", .level = fmin (step, study->t_end / REFERENCE_STEPS) } },
-    { study, .row = { .method = "ida+ggl", .adaptive = 1, .level = 1e-13 } },
-    { study, .row = { .method = "ida+baumgarte", .adaptive = 1, .level = 1e-13 } },
-  };
-  pw_study_begin_progress (study, "reference", "methods", REFERENCE_CANDIDATES);
-  int status = pw_study_parallel (study, REFERENCE_CANDIDATES, reference_run, candidates, error);
-  if (status == PW_OK) reference_choose (reference, study->compiled.system, candidates);
-  for (int i = 0; i < REFERENCE_CANDIDATES; i++) {
-    reference->limited |= candidates[i].row.state == ROW_STOPPED;
-    pw_motion_close (&candidates[i].motion);
-  }
-  return status;
-}
-
-/* Makes all velocities unknown if any is, so that no error is that of a part of them. */
-static void reference_complete_velocities (const pw_system *system, pw_motion *motion) {
-  int n = pw_system_coordinates (system), complete = 1;
-  for (int j = n; j < 2 * n; j++) complete &= pw_motion_known (motion, j) == motion->times;
-  for (int k = 0; !complete && k < motion->times; k++)
-    for (int j = n; j < 2 * n; j++) pw_motion_at (motion, k)[j] = NAN;
-}
-
-int pw_reference_find (pw_reference *reference, pw_study *study, double step, pw_error *error) {
-  const char *path = study->reference_path;
-  double t_end = path && study->line.t_end == NULL ? 0 : study->t_end; /* 0: that of the table */
-  /* the model's solution holds only for its own initial values */
-  if (path == NULL && (study->line.starts || !pw_model_has_reference (study->compiled.model)))
-    return reference_compute (reference, study, step, error);
-  int status = pw_motion_open_reference (&reference->motion, &study->compiled, path, &t_end, error);
-  if (status != PW_OK) return status;
-  pw_motion_gaps (study->compiled.system, &reference->motion, path ? 1 : reference->motion.times, reference->gaps);
-  if (path == NULL && *reference->gaps) {
-    pw_motion_close (&reference->motion);
-    return reference_compute (reference, study, step, error);
-  }
-  if (path == NULL) reference_complete_velocities (study->compiled.system, &reference->motion);
-  double last = reference->motion.t[reference->motion.times - 1];
-  if (last < t_end)
-    return pw_fail (error, PW_INPUT,
-                    "--reference %s: no row at the final time, t = %s s; the last one before it is at %s s", path,
-                    PW_DIGITS (t_end, 9), PW_DIGITS (last, 9));
-  snprintf (reference->name, sizeof reference->name, "%s", path ? path : "the exact solution of the model");
-  study->t_end = t_end;
-  reference->known = 1;
-  reference->from_table = path != NULL;
-  reference_raise_uncertainty (study->compiled.system, reference);
-  return PW_OK;
-}
-
-/* ---- Output ---- */
-
-void pw_reference_print (const pw_reference *reference, int partners) {
-  const char *gaps = reference->gaps;
-  if (*gaps && !reference->from_table)
-    pw_cli_print (stdout, "the model's own reference solution contains at all times %s: a computed one is used\n",
-                  gaps);
-  if (!reference->known) {
-    printf ("no two methods reach the end%s, so errors are unknown; --reference FILE.csv provides a reference\n\n",
-            reference->limited ? " within --limit" : "");
-    return;
-  }
-  pw_cli_print (stdout, "errors are measured against %s%s\n", reference->name,
-                reference->from_table ? ", as if it were exact" : "");
-  if (*gaps && reference->from_table) pw_cli_print (stdout, "  it contains %s\n", gaps);
-  for (int i = 0; i < partners && i < reference->partners; i++)
-    printf ("  %s agrees with it to %.1e m, %.1e rad%s\n", reference->partner[i].name,
-            reference->partner[i].error[MOTION_LARGEST + MOTION_LENGTH],
-            reference->partner[i].error[MOTION_LARGEST + MOTION_ANGLE],
-            i == 0 ? ": the uncertainty of the reference" : "");
-  putchar ('\n');
-}
-
-int pw_reference_write (const pw_reference *reference, const char *folder, const pw_study_column *error_columns,
-                        pw_error *error) {
-  pw_output *output = pw_figure_open_file (folder, "truth.csv", error);
-  if (output == NULL) return error->status;
-  FILE *f = pw_output_stream (output);
-  pw_text line = { .chars = NULL };
-  pw_text_cell (&line, "truth,against");
-  for (int k = 0; k < MOTION_ERRORS; k++) pw_text_name (&line, error_columns[k].name, error_columns[k].unit);
-  int status = pw_text_line (&line, f, folder, error);
-  for (int i = -1; status == PW_OK && reference->known && i < reference->partners; i++) {
-    pw_text_quoted (&line, reference->name);
-    pw_text_quoted (&line, i < 0 ? "uncertainty" : reference->partner[i].name);
-    for (int k = 0; k < MOTION_ERRORS; k++)
-      pw_text_number (&line, i < 0 ? reference->uncertainty[k] : reference->partner[i].error[k]);
-    status = pw_text_line (&line, f, folder, error);
-  }
-  return pw_cli_close_table (output, status, error);
-}

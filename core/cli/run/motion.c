@@ -1,5 +1,4 @@
 /* Motions: their samples, and the errors of one motion relative to another. */
-#include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -107,222 +106,85 @@ void pw_motion_errors (const pw_system *system, const pw_motion *reference, cons
   }
 }
 
-/* Opens references: the solution of the model, or a file with a table like those of `pinwheel run -o`, in which columns
- * may be missing. */
+/* ---- References ---- */
 
-#define FILE_SAME 1e-9 /* relative to the final time: smaller differences of times are ignored */
+#define MOTION_SAME_TIME 1e-9 /* relative to the final time: smaller differences of times are ignored */
 
-enum { FILE_LINE = 16 << 20 }; /* bytes of the longest line */
-
+/* A table like those of `pinwheel run -o`, in which columns may be missing. */
 typedef struct {
-  int index;     /* of its values in a sample of a motion; -1: not read */
-  double factor; /* from the unit of the column to SI units; negative for reactions, which are -lambda */
-} file_column;
+  const char **name, **unit; /* of the time, then of the numbers of a sample */
+  unsigned char *missing;    /* for each of these, 1 if there is no such column */
+  double *value;             /* `rows` times, then as many numbers for each column that is not missing */
+  int rows;
+  pw_arena arena; /* of the names */
+} motion_table;
 
-typedef struct {
-  const char *path;
-  FILE *f;
-  char *line; /* FILE_LINE bytes and the terminating 0 */
-  long line_number;
-  double time_unit; /* of the first column [s] */
-  file_column *column;
-  int columns, states; /* columns after the first; those of them that are states of the model */
-  int known;           /* 1: a value is not nan */
-  pw_names indices;    /* in a sample, of the names of states and reactions */
-  pw_arena arena;      /* of line, column and names */
-} file_reader;
-
-/* ---- Lines ---- */
-
-static int file_unreadable (const file_reader *reader, const char *why, pw_error *error) {
-  return pw_fail (error, PW_INPUT, "--reference %s: cannot be read: %s", reader->path, why);
-}
-
-/* Reads a line, without its end; PW_RETRY at the end of the file. */
-static int file_read_line (file_reader *reader, pw_error *error) {
-  size_t size = 0;
-  int c;
-  errno = 0;
-  while ((c = getc (reader->f)) != EOF && c != '\n') {
-    if (c == 0) return file_unreadable (reader, "a table is text, and this has a byte 0", error);
-    if (size == FILE_LINE)
-      return pw_fail (error, PW_INPUT, "--reference %s: cannot be read: line %ld has more than %d MB", reader->path,
-                      reader->line_number + 1, FILE_LINE >> 20);
-    reader->line[size++] = (char)c;
+/* Lists the time, the states and the reactions, and reads their columns; at least one of a state is needed. */
+static int table_read (motion_table *table, const pw_system *system, const char *path, pw_error *error) {
+  int states = 2 * pw_system_coordinates (system), count = 1 + states + pw_system_rows (system), known = 0;
+  table->name = pw_arena_alloc (&table->arena, 2 * (size_t)count * sizeof *table->name);
+  table->missing = pw_arena_alloc (&table->arena, (size_t)count);
+  if (table->name == NULL || table->missing == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  table->unit = table->name + count;
+  table->name[0] = "t", table->unit[0] = "s";
+  for (int i = 1; i < count; i++) {
+    const int is_state = i <= states, row = i - 1 - states;
+    table->unit[i] = is_state ? pw_system_state_unit (system, i - 1) : pw_system_reaction_unit (system, row);
+    table->name[i] = pw_arena_copy (&table->arena, is_state ? PW_NAME (pw_system_state_name, system, i - 1)
+                                                            : PW_NAME (pw_system_reaction_name, system, row));
+    if (table->name[i] == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   }
-  if (ferror (reader->f)) return file_unreadable (reader, strerror (errno), error);
-  while (size > 0 && reader->line[size - 1] == '\r') size--;
-  reader->line[size] = 0;
-  reader->line_number++;
-  return c == EOF && size == 0 ? PW_RETRY : PW_OK;
+  table->value = pw_read_columns (path, table->name, table->unit, count, table->missing, &table->rows, error);
+  for (int i = 1; table->value && i <= states; i++) known += !table->missing[i];
+  if (table->value == NULL || known > 0) return error->status;
+  free (pw_read_columns (path, table->name, table->unit, 2, NULL, &count, error)); /* names the nearest column */
+  return pw_fail (error, PW_INPUT, "%s: no column is a state of the model", path);
 }
 
-/* The next line that is not empty; PW_RETRY at the end of the file. */
-static int file_next_line (file_reader *reader, pw_error *error) {
-  int status;
-  do status = file_read_line (reader, error);
-  while (status == PW_OK && *reader->line == 0);
-  return status;
+/* The rows to compare: after 0, and up to t_end unless that is 0. */
+static int table_has_row (const motion_table *table, int row, double t_end) {
+  const double t = table->value[row];
+  return t > 0 && !(t_end > 0 && t > t_end * (1 + MOTION_SAME_TIME));
 }
 
-/* Splits off the next cell. */
-static char *file_cell (char **rest) {
-  char *cell = *rest, *comma = strchr (cell, ',');
-  *rest = comma ? comma + 1 : cell + strlen (cell);
-  if (comma) *comma = 0;
-  return cell;
-}
-
-static int file_number (const file_reader *reader, const char *cell, double *value, pw_error *error) {
-  if (pw_read_number (cell, value) == PW_OK) return PW_OK;
-  return pw_fail (error, PW_INPUT, "--reference %s: line %ld: \"%.60s\" is not a number", reader->path,
-                  reader->line_number, cell);
-}
-
-/* ---- Columns ---- */
-
-/* Lists the names of states and reactions in the order of a sample. */
-static int file_list_names (file_reader *reader, const pw_system *system) {
-  int states = 2 * pw_system_coordinates (system), rows = pw_system_rows (system);
-  if (pw_names_open (&reader->indices, (size_t)(states + rows)) != PW_OK) return PW_RESOURCE;
-  for (int i = 0; i < states + rows; i++) {
-    const char *name =
-        i < states ? PW_NAME (pw_system_state_name, system, i) : PW_NAME (pw_system_reaction_name, system, i - states);
-    const char *copy = pw_arena_copy (&reader->arena, name);
-    if (copy == NULL) return PW_RESOURCE;
-    pw_names_add (&reader->indices, copy, i);
-  }
-  return PW_OK;
-}
-
-/* Finds column i, such as "frame.x [m]", in a sample. */
-static int file_find_column (file_reader *reader, int i, const pw_system *system, const char *cell, pw_error *error) {
-  char name[300], text[260]; /* the unit, or why it is refused */
-  file_column *column = reader->column + i;
-  int states = 2 * pw_system_coordinates (system);
-  snprintf (name, sizeof name, "%.*s", (int)pw_unit_split (cell, text, sizeof text), cell);
-  int index = column->index = pw_names_find (&reader->indices, name), is_state = index < states;
-  if (index < 0) return PW_OK;
-  for (int k = 0; k < i; k++)
-    if (reader->column[k].index == index)
-      return pw_fail (error, PW_INPUT, "--reference %s: columns %d and %d are both named \"%.60s\"", reader->path,
-                      k + 2, i + 2, name);
-  const char *unit = is_state ? pw_system_state_unit (system, index) : pw_system_reaction_unit (system, index - states);
-  if (pw_unit_check (cell, unit, &column->factor, text, sizeof text) != PW_OK)
-    return pw_fail (error, PW_INPUT, "--reference %s: %s", reader->path, text);
-  if (!is_state) column->factor = -column->factor;
-  reader->states += is_state;
-  return PW_OK;
-}
-
-static int file_read_columns (file_reader *reader, const pw_system *system, pw_error *error) {
-  char text[260];
-  int status = file_next_line (reader, error);
-  if (status == PW_RETRY) return pw_fail (error, PW_INPUT, "--reference %s: the file is empty", reader->path);
-  if (status != PW_OK) return status;
-  for (const char *c = reader->line; *c; c++) reader->columns += *c == ',';
-  reader->column = pw_arena_alloc (&reader->arena, ((size_t)reader->columns + 1) * sizeof *reader->column);
-  if (reader->column == NULL || file_list_names (reader, system) != PW_OK)
-    return pw_fail (error, PW_RESOURCE, "out of memory");
-  char *rest = reader->line + (strncmp (reader->line, "\xEF\xBB\xBF", 3) ? 0 : 3); /* without a byte order mark */
-  const char *first = file_cell (&rest);
-  if (pw_unit_split (first, text, sizeof text) != 1 || *first != 't')
-    return pw_fail (error, PW_INPUT, "--reference %s: the first column is \"%.60s\", expected \"t [s]\"", reader->path,
-                    first);
-  if (pw_unit_check (first, "s", &reader->time_unit, text, sizeof text) != PW_OK)
-    return pw_fail (error, PW_INPUT, "--reference %s: %s", reader->path, text);
-  for (int i = 0; i < reader->columns; i++)
-    if (file_find_column (reader, i, system, file_cell (&rest), error) != PW_OK) return error->status;
-  if (reader->states) return PW_OK;
-  return pw_fail (error, PW_INPUT, "--reference %s: no column is a state of this model, such as \"%s\"", reader->path,
-                  PW_NAME (pw_system_state_name, system, 0));
-}
-
-/* ---- Rows ---- */
-
-/* Reads the next line, and its time [s] from the first cell; PW_RETRY at the end of the file. */
-static int file_read_time (file_reader *reader, char **rest, double *t, pw_error *error) {
-  int status = file_next_line (reader, error);
-  if (status != PW_OK) return status;
-  *rest = reader->line;
-  status = file_number (reader, file_cell (rest), t, error);
-  if (status == PW_OK) *t *= reader->time_unit;
-  return status;
-}
-
-/* Counts the rows after 0 and up to *t_end, which becomes the time of the last row if it is 0. */
-static int file_count_rows (file_reader *reader, double *t_end, int *rows, pw_error *error) {
-  double t, last = 0, before = -INFINITY;
-  char *rest;
-  int status;
-  for (*rows = 0; (status = file_read_time (reader, &rest, &t, error)) == PW_OK;) {
-    if (!(t > before) || isinf (t))
-      return pw_fail (error, PW_INPUT, "--reference %s: line %ld: times must be finite and increase", reader->path,
-                      reader->line_number);
-    before = t;
-    if (t <= 0 || (*t_end > 0 && t > *t_end * (1 + FILE_SAME))) continue;
-    last = t;
-    ++*rows;
-  }
-  if (status != PW_RETRY) return status;
+/* Selects rows, evenly spaced and including the last one; times within round-off of the end are set to it. */
+static int table_select (const motion_table *table, const pw_system *system, pw_motion *motion, double *t_end,
+                         const char *path, pw_error *error) {
+  const int states = 2 * pw_system_coordinates (system), room = table->rows;
+  int rows = 0, row = 0, known = 0;
+  double last = 0;
+  for (int i = 0; i < room; i++)
+    if (table_has_row (table, i, *t_end)) rows++, last = table->value[i];
   if (*t_end == 0) *t_end = last;
-  if (*rows > 0) return PW_OK;
-  return pw_fail (error, PW_INPUT, "--reference %s: no row between 0 and the final time, t = %s s", reader->path,
-                  PW_DIGITS (*t_end, 9));
-}
-
-/* Reads the cells after the time into a sample of `width` numbers; NaN, unknown, where there is no column
- * or a cell is nan. */
-static int file_read_sample (file_reader *reader, char *rest, double *sample, int width, pw_error *error) {
-  for (int i = 0; i < width; i++) sample[i] = NAN;
-  for (const file_column *column = reader->column; column < reader->column + reader->columns; column++) {
-    const char *cell = file_cell (&rest);
-    double value;
-    if (column->index < 0) continue;
-    if (file_number (reader, cell, &value, error) != PW_OK) return error->status;
-    if (isinf (value))
-      return pw_fail (error, PW_INPUT, "--reference %s: line %ld: \"%.60s\" is not finite", reader->path,
-                      reader->line_number, cell);
-    sample[column->index] = column->factor * value;
-    reader->known |= !isnan (value);
-  }
-  if (*rest == 0) return PW_OK;
-  return pw_fail (error, PW_INPUT, "--reference %s: line %ld has more cells than the first line", reader->path,
-                  reader->line_number);
-}
-
-/* Selects as many of the rows as the motion has times, evenly spaced and including the last one; times within round-off
- * of the end are set to it. */
-static int file_read_samples (file_reader *reader, int rows, double t_end, pw_motion *motion, pw_error *error) {
-  char *rest;
-  double t;
-  for (int row = 0; motion->taken < motion->times;) {
-    int k = motion->taken;
-    int status = file_read_time (reader, &rest, &t, error);
-    if (status != PW_OK) return status;
-    if (t <= 0 || ++row < (int)((long long)rows * (k + 1) / motion->times)) continue;
-    motion->t[k] = fabs (t - t_end) <= FILE_SAME * t_end ? t_end : t;
-    status = file_read_sample (reader, rest, pw_motion_at (motion, k), motion->width, error);
-    if (status != PW_OK) return status;
+  if (rows == 0)
+    return pw_fail (error, PW_INPUT, "%s: no row between 0 and the final time, t = %s s", path, PW_DIGITS (*t_end, 9));
+  if (pw_motion_open (motion, system, rows < MOTION_SAMPLES ? rows : MOTION_SAMPLES, *t_end, error) != PW_OK)
+    return error->status;
+  for (int i = 0; i < room; i++) {
+    const int k = motion->taken;
+    if (!table_has_row (table, i, *t_end) || ++row < (int)((long long)rows * (k + 1) / motion->times)) continue;
+    const double *column = table->value; /* its numbers */
+    motion->t[k] = fabs (column[i] - *t_end) <= MOTION_SAME_TIME * *t_end ? *t_end : column[i];
+    for (int j = 0; j < motion->width; j++) {
+      if (!table->missing[1 + j]) column += room;
+      const double value = table->missing[1 + j] ? NAN : column[i];
+      pw_motion_at (motion, k)[j] = j < states ? value : -value; /* reactions are -lambda */
+      known |= !isnan (value);
+    }
     motion->taken++;
   }
-  return reader->known ? PW_OK : pw_fail (error, PW_INPUT, "--reference %s: every value is nan", reader->path);
+  return known ? PW_OK : pw_fail (error, PW_INPUT, "%s: every value is nan", path);
 }
 
-/* Reads the file twice: rows are selected once their number is known. */
-static int file_read (file_reader *reader, pw_motion *motion, const pw_system *system, double *t_end, pw_error *error) {
-  int rows, status = file_read_columns (reader, system, error);
-  if (status == PW_OK) status = file_count_rows (reader, t_end, &rows, error);
-  if (status != PW_OK) return status;
-  rewind (reader->f);
-  reader->line_number = 0;
-  status = file_next_line (reader, error);
-  if (status == PW_OK)
-    status = pw_motion_open (motion, system, rows < MOTION_SAMPLES ? rows : MOTION_SAMPLES, *t_end, error);
-  return status == PW_OK ? file_read_samples (reader, rows, *t_end, motion, error) : status;
+static int motion_of_table (pw_motion *motion, const pw_system *system, const char *path, double *t_end,
+                            pw_error *error) {
+  motion_table table = { .rows = 0 };
+  int status = table_read (&table, system, path, error);
+  if (status == PW_OK) status = table_select (&table, system, motion, t_end, path, error);
+  free (table.value);
+  pw_arena_free (&table.arena);
+  return status;
 }
-
-/* ---- Opening ---- */
 
 /* The model's own reference solution; multipliers are not known. */
 static int motion_of_model (pw_motion *motion, const pw_cli_model *compiled, double t_end, pw_error *error) {
@@ -338,21 +200,8 @@ static int motion_of_model (pw_motion *motion, const pw_cli_model *compiled, dou
 
 int pw_motion_open_reference (pw_motion *motion, const pw_cli_model *compiled, const char *path, double *t_end,
                               pw_error *error) {
-  if (path == NULL) return motion_of_model (motion, compiled, *t_end, error);
-  const char *why;
-  file_reader reader = { .path = path, .f = pw_open_input (path, &why) };
-  int status = PW_OK;
-  reader.line = pw_arena_alloc (&reader.arena, FILE_LINE + 1);
-  if (reader.f == NULL)
-    status = pw_fail (error, pw_open_input_status (), "--reference %s: cannot be read: %s", path, why);
-  else if (reader.line == NULL)
-    status = pw_fail (error, PW_RESOURCE, "--reference %s: out of memory", path);
-  if (status == PW_OK) status = file_read (&reader, motion, compiled->system, t_end, error);
-  if (status == PW_RETRY) status = file_unreadable (&reader, "another program has changed it", error);
-  if (reader.f) fclose (reader.f);
-  pw_names_close (&reader.indices);
-  pw_arena_free (&reader.arena);
-  return status;
+  return path ? motion_of_table (motion, compiled->system, path, t_end, error)
+              : motion_of_model (motion, compiled, *t_end, error);
 }
 
 /* Compares a run with a reference solution: opens the reference, and computes the errors of the run at its times. */

@@ -31,10 +31,4 @@ void pw_report_warnings (const pw_run *run, const pw_system *system, double defe
  * none or memory is exhausted. */
 const char **pw_report_redundancies (pw_run *run);
 
-/* ---- The tables of --profile (report.c) ---- */
-
-/* Measures a finished run (pw_run_profile) and prints the cost of each element type and of each stage of an evaluation.
- * cpu: processor time of the run [s].  Afterwards the run can only be closed.  Errors: PW_RESOURCE. */
-int pw_print_profile (const pw_system *system, pw_run *run, double cpu, FILE *out, pw_error *error);
-
 #endif

@@ -1,4 +1,4 @@
-/* The command `pinwheel run`: its options, what it has open, and its checkpoints (run_command.c). */
+/* The command `pinwheel run`: its options, what it has open, its checkpoints. */
 #ifndef PW_RUN_COMMAND_H
 #define PW_RUN_COMMAND_H
 
@@ -7,7 +7,6 @@
 #include "motion.h"
 #include "pinwheel-analysis.h"
 #include "plot.h"
-#include "cli.h"
 
 typedef struct {
   /* as given, or NULL; without --checkpoint, `path` is that of --resume */
@@ -51,7 +50,7 @@ typedef struct pw_run_cli {
   pw_cli_line line;
   const char *row_interval_text; /* --every */
   const char *table_path, *summary_path, *plots_path, *page_path, *reference_path, *colour;
-  int with_energies, with_error, profile; /* 1: --energy, --error, --profile */
+  int with_energies, with_error; /* 1: --energy, --error */
   pw_checkpoints checkpoints;
   /* as understood */
   pw_cli_model compiled;
@@ -80,30 +79,18 @@ typedef struct pw_run_cli {
   char kept_path[PW_RUN_OUTPUTS][4200]; /* of incomplete files that are kept, PATH_MAX and an ending, or "" */
 } pw_run_cli;
 
-/* Reads the options and the checkpoint that is resumed, whose engine is used if *specialise is
- * PW_SPECIALISE_AUTO. */
-int pw_checkpoints_open (pw_run_cli *command, pw_specialise *specialise, pw_error *error);
-/* Before anything is written: locks the checkpoint file, verifies that a resumed checkpoint belongs to this run and
- * opens its table; without --resume, refuses a table that could not be continued. */
-int pw_checkpoints_prepare (pw_run_cli *command, pw_error *error);
-/* After everything is open: loads the state of the checkpoint that is resumed, if any; schedules the next one. */
-int pw_checkpoints_resume (pw_run_cli *command, pw_error *error);
-/* Saves a checkpoint that is due; near a singular configuration it is postponed. */
-int pw_checkpoints_save (pw_run_cli *command, pw_error *error);
-void pw_checkpoints_close (pw_checkpoints *checkpoints);
-
 /* ---- The error (run_error.c); without --error these do nothing ---- */
 
 /* Starts the repetition; the run is open. */
-int pw_error_run_start (struct pw_run_cli *command, pw_error *error);
+int pw_error_run_start (pw_run_cli *command, pw_error *error);
 double pw_error_run_next (const pw_error_run *e); /* the time of the next sample; INFINITY: there is none */
 /* Stores the next sample of the run, whose last step contains its time. */
 int pw_error_run_add (pw_error_run *e, pw_run *run, pw_error *error);
 /* Ends the repetition, and states the error if the run is complete.  PW_RESOURCE. */
 int pw_error_run_finish (pw_error_run *e, int complete, pw_error *error);
 void pw_error_run_close (pw_error_run *e);
-/* Prints the stated errors: of the bodies at the end, the largest of the table's other columns; or why they are unknown. */
-void pw_report_stated (const struct pw_run_cli *command, FILE *f);
+/* Prints the stated errors: of the bodies at the end, the largest of the other columns; or why they are unknown. */
+void pw_report_stated (const pw_run_cli *command, FILE *f);
 
 /* ---- The summary and the report (report.c) ---- */
 

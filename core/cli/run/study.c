@@ -1,15 +1,9 @@
-/* The common part of compare and drift: reads --methods, performs the runs, opens and finishes the output. */
+/* The common part of compare and drift: reads --methods, performs the runs, writes tables and figures. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "report.h"
 #include "study.h"
-
-/* The thread's clock is read after a batch of calls of pw_run_advance_towards.  If the batch has taken less processor
- * time than STUDY_SHORT, the next one is twice as long; if more than STUDY_LONG, half as long [s]. */
-#define STUDY_SHORT 0.005
-#define STUDY_LONG 0.02
-enum { STUDY_FIRST_BATCH = 8, STUDY_LONGEST_BATCH = 65536 }; /* calls of pw_run_advance_towards */
 
 /* ---- Methods ---- */
 
@@ -98,7 +92,7 @@ void pw_study_progress (pw_study *study, pw_row *row, double part) {
 static int study_advance (pw_study *study, pw_row *row, pw_run *run, const pw_limit *limit, pw_visitor *visitor,
                           pw_error *error) {
   int status = PW_OK;
-  long batch = STUDY_FIRST_BATCH;
+  long batch = 8; /* calls of pw_run_advance_towards between readings of the clock, at first */
   while (status == PW_OK && pw_run_time (run) < study->t_end) {
     double start = pw_seconds (CLOCK_THREAD_CPUTIME_ID);
     long n = 0;
@@ -109,8 +103,7 @@ static int study_advance (pw_study *study, pw_row *row, pw_run *run, const pw_li
     } while (status == PW_OK && ++n < batch && pw_run_time (run) < study->t_end);
     double used = pw_seconds (CLOCK_THREAD_CPUTIME_ID) - start;
     row->cpu += used;
-    if (used < STUDY_SHORT && n == batch && batch < STUDY_LONGEST_BATCH) batch *= 2;
-    if (used > STUDY_LONG && batch > 1) batch /= 2;
+    pw_batch_adapt (&batch, n, used);
     pw_study_progress (study, row, study->run_share * (row->runs + pw_run_time (run) / study->t_end));
     int stopped = status == PW_STOPPED;
     if (stopped && (pw_stop || isinf (study->cpu_limit))) return pw_limit_status (limit, pw_run_time (run), error);
@@ -167,146 +160,7 @@ int pw_study_record_run (const pw_study *study, pw_row *row, int status, const p
   return PW_OK;
 }
 
-/* ---- The command ---- */
-
-static int study_open_folder (pw_study *study, pw_error *error) {
-  const char *const *tables = study->type->table_names;
-  const char *const names[] = { ".dat", ".gp", ".svg", ".png", ".pdf", tables[0], tables[1], NULL };
-  pw_use use[] = { PW_CLI_MODEL_USE,
-                   { "--reference", study->reference_path, PW_READS, NULL },
-                   { "-o", study->folder, PW_WRITES_INTO, names } };
-  if (study->folder == NULL) return pw_cli_requires ("--width", study->line.width, "-o DIR", 0, error);
-  int status = pw_figures_of (&study->figures, &study->line, &study->compiled, study->folder, error);
-  if (status == PW_OK)
-    status = pw_files_open (&study->files, &study->line, &study->compiled, use, sizeof use / sizeof *use, error);
-  return status == PW_OK ? pw_study_open_table (study, error) : status;
-}
-
-/* Estimated number of steps of all runs. */
-static double study_estimated_steps (const pw_study *study) {
-  pw_run_defaults defaults = pw_cli_defaults (pw_file_table (study->compiled.file));
-  double steps = 0;
-  for (const pw_row *row = study->row; row < study->row + study->rows; row++) {
-    pw_settings settings = study->settings;
-    if (row->level > 0) settings.step = settings.rtol = row->level;
-    steps += study->type->runs_per_row * pw_method_steps (row->method, &settings, defaults.step, study->t_end);
-  }
-  return steps;
-}
-
-static int study_open (pw_study *study, pw_error *error) {
-  pw_specialise when;
-  study->run_share = 1;
-  study->cpu_limit = INFINITY;
-  pthread_mutex_init (&study->mutex, NULL);
-  int status = pw_cli_open (&study->compiled, &study->line, error);
-  if (status == PW_OK) status = pw_parallel_jobs (study->jobs_text, &study->jobs, error);
-  if (status == PW_OK) status = study->type->plan (study, error);
-  if (status == PW_OK) status = pw_cli_read_specialise (study->line.specialise, &when, error);
-  if (status == PW_OK) status = pw_report_initial_state (&study->compiled, study->limit.seconds, error);
-  if (status != PW_OK) return status;
-  pw_cli_report_tables (study->compiled.system, study->t_end);
-  /* one engine for all runs, since `compare` compares their processor times */
-  pw_cli_engine_open (&study->engine, study->compiled.system, when, study_estimated_steps (study));
-  return study_open_folder (study, error);
-}
-
-/* Measures a row, then writes the measured rows before the first one that is not: rows are written in their order. */
-static int study_measure_row (void *context, int i, pw_error *error) {
-  pw_study *study = context;
-  int status = study->type->measure (study, &study->row[i], error);
-  if (status != PW_OK) return status;
-  pw_study_progress (study, &study->row[i], 1);
-  pthread_mutex_lock (&study->mutex);
-  study->row[i].measured = 1;
-  pw_progress_end (&study->progress);
-  for (; status == PW_OK && study->written < study->rows && study->row[study->written].measured; study->written++)
-    status = pw_study_write_row (study, &study->row[study->written], error);
-  pthread_mutex_unlock (&study->mutex);
-  return status;
-}
-
-/* Measures the rows of a method one after the other; if a study is timed, the curves are its methods. */
-static int study_measure_method (void *context, int curve, pw_error *error) {
-  const pw_study *study = context;
-  int status = PW_OK;
-  for (int i = 0; status == PW_OK && i < study->rows; i++)
-    if (study->row[i].curve == curve) status = study_measure_row (context, i, error);
-  return status;
-}
-
-/* Writes the measured rows after one that an interruption has stopped.  PW_RETRY, or the status of a failure. */
-static int study_write_kept (pw_study *study, pw_error *error) {
-  for (const pw_row *row = study->row + study->written; row < study->row + study->rows; row++) {
-    if (row->measured && pw_study_write_row (study, row, error) != PW_OK) return error->status;
-    study->written += row->measured;
-  }
-  return PW_RETRY;
-}
-
-static int study_perform (pw_study *study, pw_error *error) {
-  pw_stop_catch ();
-  int status = study->type->begin (study, error);
-  if (status == PW_OK)
-    printf ("all runs use %s%s\n\n",
-            study->engine.code ? "code specialised for this scene, if their method can use it" : "the general engine: ",
-            study->engine.code ? "" : study->engine.reason);
-  pw_study_begin_progress (study, pw_file_name (study->compiled.file), study->type->row_noun, study->rows);
-  if (status == PW_OK)
-    status = study->type->timed ? pw_study_parallel (study, study->methods, study_measure_method, study, error)
-                                : pw_study_parallel (study, study->rows, study_measure_row, study, error);
-  if (status == PW_RETRY && pw_stop) status = study_write_kept (study, error);
-  if (status == PW_OK && study->type->conclude) study->type->conclude (study);
-  pw_stop_release ();
-  return status;
-}
-
-/* Gives a complete CSV file its final name and draws the figures; an incomplete one remains as NAME.part. */
-static int study_finish (pw_study *study, int status, pw_error *error) {
-  char part_path[FIGURE_PATH + 16] = "";
-  if (study->csv && status == PW_OK)
-    status = pw_output_finish (study->csv, error);
-  else if (study->csv)
-    pw_cli_abandon_table (study->csv, study->written, part_path, sizeof part_path);
-  if (status == PW_RETRY && pw_stop) {
-    pw_cli_say ("pinwheel: interrupted; %d of %d %s are done%s%s\n", study->written, study->rows, study->type->row_noun,
-                *part_path ? ", and kept in " : "", part_path);
-    return PW_INTERRUPTED;
-  }
-  if (*part_path) pw_cli_say ("pinwheel: the %s so far are kept in %s\n", study->type->row_noun, part_path);
-  if (study->csv && status == PW_OK) status = study->type->figures (study, error);
-  return status == PW_OK && study->scripts[0] ? pw_figure_draw (study->folder, study->scripts, error) : status;
-}
-
-/* A study in which no run has reached the end is a failure. */
-static int study_require_success (const pw_study *study, pw_error *error) {
-  const pw_row *failed = NULL;
-  for (const pw_row *row = study->row; row < study->row + study->rows; row++) {
-    if (row->state == ROW_DONE) return PW_OK;
-    if (row->state == ROW_FAILED || row->state == ROW_REFUSED) failed = row;
-  }
-  return failed ? pw_fail (error, PW_METHOD, "no method has reached the end; the last error: %s", failed->reason)
-                : pw_fail (error, PW_METHOD, "no method has reached the end within the limit; see --limit");
-}
-
-int pw_study_command (pw_study *study, const pw_study_type *type, pw_error *error) {
-  study->type = type;
-  int status = study_open (study, error);
-  if (status == PW_OK) status = study_perform (study, error);
-  status = study_finish (study, status, error);
-  if (status == PW_OK) status = study_require_success (study, error);
-  pw_files_close (&study->files);
-  if (type->close) type->close (study);
-  pw_arena_free (&study->arena);
-  free (study->row);
-  free (study->method);
-  pthread_mutex_destroy (&study->mutex);
-  pw_cli_engine_close (&study->engine);
-  pw_cli_close_model (&study->compiled);
-  return status == PW_INTERRUPTED ? status : error->status;
-}
-
-/* Writes the tables and figures of studies: rows on the terminal and in a CSV file, points of figures in data files. */
+/* ---- The table, on the terminal and in a CSV file ---- */
 
 const char *pw_study_method (const pw_row *row) {
   return row->method;
@@ -317,10 +171,9 @@ const char *pw_study_status (const pw_row *row) {
   return status[row->state];
 }
 
-/* ---- CSV ---- */
-
-/* Rows are written as they finish, to NAME.part, which remains if the study is stopped. */
-int pw_study_open_table (pw_study *study, pw_error *error) {
+/* Opens the CSV file with its first line.  Rows are written as they finish, to NAME.part, which remains if the study
+ * is stopped. */
+static int table_open (pw_study *study, pw_error *error) {
   const pw_study_column *column = study->type->column;
   pw_text line = { .chars = NULL };
   study->csv = pw_figure_open_file (study->folder, study->type->table_names[0], error);
@@ -330,20 +183,6 @@ int pw_study_open_table (pw_study *study, pw_error *error) {
   pw_text_cell (&line, "reason");
   return pw_text_line (&line, pw_output_stream (study->csv), study->folder, error);
 }
-
-static int table_write_csv (const pw_study *study, const pw_row *row, pw_error *error) {
-  const pw_study_column *column = study->type->column;
-  pw_text line = { .chars = NULL };
-  for (int i = 0; i < study->type->columns; i++)
-    if (column[i].text)
-      pw_text_cell (&line, column[i].text (row));
-    else if (column[i].name)
-      pw_text_number (&line, row->value[i]);
-  pw_text_quoted (&line, row->reason);
-  return pw_text_line (&line, pw_output_stream (study->csv), study->folder, error);
-}
-
-/* ---- Terminal ---- */
 
 /* The width of the first column, which contains the methods. */
 static int table_width (const pw_study *study) {
@@ -393,10 +232,20 @@ static void table_print (const pw_study *study, const pw_row *row) {
   fflush (stdout);
 }
 
-int pw_study_write_row (pw_study *study, const pw_row *row, pw_error *error) {
+/* Prints a row unless the study is quiet, and writes it into the CSV file. */
+static int table_write_row (pw_study *study, const pw_row *row, pw_error *error) {
+  const pw_study_column *column = study->type->column;
+  pw_text line = { .chars = NULL };
   if (!study->quiet && study->headed != row->group + 1) table_heading (study, row->group);
   if (!study->quiet) table_print (study, row);
-  return study->csv ? table_write_csv (study, row, error) : PW_OK;
+  if (study->csv == NULL) return PW_OK;
+  for (int i = 0; i < study->type->columns; i++)
+    if (column[i].text)
+      pw_text_cell (&line, column[i].text (row));
+    else if (column[i].name)
+      pw_text_number (&line, row->value[i]);
+  pw_text_quoted (&line, row->reason);
+  return pw_text_line (&line, pw_output_stream (study->csv), study->folder, error);
 }
 
 /* ---- Figures ---- */
@@ -464,4 +313,143 @@ int pw_study_write_script (pw_study *study, int group, const char *name, const c
   while (study->scripts[script]) script++;
   study->scripts[script] = name;
   return pw_figure_end (output, template_name, error);
+}
+
+/* ---- The command ---- */
+
+static int study_open_folder (pw_study *study, pw_error *error) {
+  const char *const *tables = study->type->table_names;
+  const char *const names[] = { ".dat", ".gp", ".svg", ".png", ".pdf", tables[0], tables[1], NULL };
+  pw_use use[] = { PW_CLI_MODEL_USE,
+                   { "--reference", study->reference_path, PW_READS, NULL },
+                   { "-o", study->folder, PW_WRITES_INTO, names } };
+  if (study->folder == NULL) return pw_cli_requires ("--width", study->line.width, "-o DIR", 0, error);
+  int status = pw_figures_of (&study->figures, &study->line, &study->compiled, study->folder, error);
+  if (status == PW_OK)
+    status = pw_files_open (&study->files, &study->line, &study->compiled, use, sizeof use / sizeof *use, error);
+  return status == PW_OK ? table_open (study, error) : status;
+}
+
+/* Estimated number of steps of all runs. */
+static double study_estimated_steps (const pw_study *study) {
+  pw_run_defaults defaults = pw_cli_defaults (pw_file_table (study->compiled.file));
+  double steps = 0;
+  for (const pw_row *row = study->row; row < study->row + study->rows; row++) {
+    pw_settings settings = study->settings;
+    if (row->level > 0) settings.step = settings.rtol = row->level;
+    steps += study->type->runs_per_row * pw_method_steps (row->method, &settings, defaults.step, study->t_end);
+  }
+  return steps;
+}
+
+static int study_open (pw_study *study, pw_error *error) {
+  pw_specialise when;
+  study->run_share = 1;
+  study->cpu_limit = INFINITY;
+  pthread_mutex_init (&study->mutex, NULL);
+  int status = pw_cli_open (&study->compiled, &study->line, error);
+  if (status == PW_OK) status = pw_parallel_jobs (study->jobs_text, &study->jobs, error);
+  if (status == PW_OK) status = study->type->plan (study, error);
+  if (status == PW_OK) status = pw_cli_read_specialise (study->line.specialise, &when, error);
+  if (status == PW_OK) status = pw_report_initial_state (&study->compiled, study->limit.seconds, error);
+  if (status != PW_OK) return status;
+  pw_cli_report_tables (study->compiled.system, study->t_end);
+  /* one engine for all runs, since `compare` compares their processor times */
+  pw_cli_engine_open (&study->engine, study->compiled.system, when, study_estimated_steps (study));
+  return study_open_folder (study, error);
+}
+
+/* Measures a row, then writes the measured rows before the first one that is not: rows are written in their order. */
+static int study_measure_row (void *context, int i, pw_error *error) {
+  pw_study *study = context;
+  int status = study->type->measure (study, &study->row[i], error);
+  if (status != PW_OK) return status;
+  pw_study_progress (study, &study->row[i], 1);
+  pthread_mutex_lock (&study->mutex);
+  study->row[i].measured = 1;
+  pw_progress_end (&study->progress);
+  for (; status == PW_OK && study->written < study->rows && study->row[study->written].measured; study->written++)
+    status = table_write_row (study, &study->row[study->written], error);
+  pthread_mutex_unlock (&study->mutex);
+  return status;
+}
+
+/* Measures the rows of a method one after the other; if a study is timed, the curves are its methods. */
+static int study_measure_method (void *context, int curve, pw_error *error) {
+  const pw_study *study = context;
+  int status = PW_OK;
+  for (int i = 0; status == PW_OK && i < study->rows; i++)
+    if (study->row[i].curve == curve) status = study_measure_row (context, i, error);
+  return status;
+}
+
+/* Writes the measured rows after one that an interruption has stopped.  PW_RETRY, or the status of a failure. */
+static int study_write_kept (pw_study *study, pw_error *error) {
+  for (const pw_row *row = study->row + study->written; row < study->row + study->rows; row++) {
+    if (row->measured && table_write_row (study, row, error) != PW_OK) return error->status;
+    study->written += row->measured;
+  }
+  return PW_RETRY;
+}
+
+static int study_perform (pw_study *study, pw_error *error) {
+  pw_stop_catch ();
+  int status = study->type->begin (study, error);
+  if (status == PW_OK)
+    printf ("all runs use %s%s\n\n",
+            study->engine.code ? "code specialised for this scene, if their method can use it" : "the general engine: ",
+            study->engine.code ? "" : study->engine.reason);
+  pw_study_begin_progress (study, pw_file_name (study->compiled.file), study->type->row_noun, study->rows);
+  if (status == PW_OK)
+    status = study->type->timed ? pw_study_parallel (study, study->methods, study_measure_method, study, error)
+                                : pw_study_parallel (study, study->rows, study_measure_row, study, error);
+  if (status == PW_RETRY && pw_stop) status = study_write_kept (study, error);
+  if (status == PW_OK && study->type->conclude) study->type->conclude (study);
+  pw_stop_release ();
+  return status;
+}
+
+/* Gives a complete CSV file its final name and draws the figures; an incomplete one remains as NAME.part. */
+static int study_finish (pw_study *study, int status, pw_error *error) {
+  char part_path[FIGURE_PATH + 16] = "";
+  if (study->csv && status == PW_OK)
+    status = pw_output_finish (study->csv, error);
+  else if (study->csv)
+    pw_cli_abandon_table (study->csv, study->written, part_path, sizeof part_path);
+  if (status == PW_RETRY && pw_stop) {
+    pw_cli_say ("pinwheel: interrupted; %d of %d %s are done%s%s\n", study->written, study->rows, study->type->row_noun,
+                *part_path ? ", and kept in " : "", part_path);
+    return PW_INTERRUPTED;
+  }
+  if (*part_path) pw_cli_say ("pinwheel: the %s so far are kept in %s\n", study->type->row_noun, part_path);
+  if (study->csv && status == PW_OK) status = study->type->figures (study, error);
+  return status == PW_OK && study->scripts[0] ? pw_figure_draw (study->folder, study->scripts, error) : status;
+}
+
+/* A study in which no run has reached the end is a failure. */
+static int study_require_success (const pw_study *study, pw_error *error) {
+  const pw_row *failed = NULL;
+  for (const pw_row *row = study->row; row < study->row + study->rows; row++) {
+    if (row->state == ROW_DONE) return PW_OK;
+    if (row->state == ROW_FAILED || row->state == ROW_REFUSED) failed = row;
+  }
+  return failed ? pw_fail (error, PW_METHOD, "no method has reached the end; the last error: %s", failed->reason)
+                : pw_fail (error, PW_METHOD, "no method has reached the end within the limit; see --limit");
+}
+
+int pw_study_command (pw_study *study, const pw_study_type *type, pw_error *error) {
+  study->type = type;
+  int status = study_open (study, error);
+  if (status == PW_OK) status = study_perform (study, error);
+  status = study_finish (study, status, error);
+  if (status == PW_OK) status = study_require_success (study, error);
+  pw_files_close (&study->files);
+  if (type->close) type->close (study);
+  pw_arena_free (&study->arena);
+  free (study->row);
+  free (study->method);
+  pthread_mutex_destroy (&study->mutex);
+  pw_cli_engine_close (&study->engine);
+  pw_cli_close_model (&study->compiled);
+  return status == PW_INTERRUPTED ? status : error->status;
 }

@@ -7,7 +7,6 @@
 #include <pthread.h>
 #include "figure.h"
 #include "cli.h"
-#include "cli.h"
 
 enum {
   STUDY_NAME = 200,     /* longest name of a method with its options, end included */
@@ -118,7 +117,7 @@ struct pw_study {
   const char *scripts[FIGURE_SCRIPTS + 1]; /* of figures, ended by NULL */
 };
 
-/* ---- The study (study.c) ---- */
+/* ---- The study ---- */
 
 /* Runs a command whose options begin with a pw_study. */
 int pw_study_command (pw_study *study, const pw_study_type *type, pw_error *error);
@@ -154,12 +153,7 @@ void pw_study_progress (pw_study *study, pw_row *row, double part);
  * `run_error` are what that returned.  Returns PW_OK, or the status that ends the study. */
 int pw_study_record_run (const pw_study *study, pw_row *row, int status, const pw_error *run_error, pw_error *error);
 
-/* ---- Tables and figures (study.c) ---- */
-
-/* Opens the CSV file with its first line. */
-int pw_study_open_table (pw_study *study, pw_error *error);
-/* Prints a row unless the study is quiet, and writes it into the CSV file. */
-int pw_study_write_row (pw_study *study, const pw_row *row, pw_error *error);
+/* ---- Figures ---- */
 
 /* 1 if this coordinate of some point of a group is positive. */
 int pw_study_positive (const pw_study *study, int group, int coordinate);

@@ -1,14 +1,49 @@
-/* The plan of a sweep: everything that its runs have in common.
- *
- * A sweep computes all rows of the grid, numbered from 0, or those of one part: part i of n has the rows i - 1,
- * i - 1 + n, i - 1 + 2 n, ... */
-#ifndef PW_SWEEP_H_
-#define PW_SWEEP_H_
+/* The plan of a sweep: everything that its runs have in common; its journal and its table (sweep_plan.c). */
+#ifndef PW_SWEEP_H
+#define PW_SWEEP_H
+
 #include <stdint.h>
-#include "cli.h"
-#include "sweep_grid.h"
-#include "cli.h"
 #include <sys/types.h>
+#include "cli.h"
+
+/* ---- The grid: all combinations of the values of the varied quantities (axes), one per row ----
+ *
+ * Rows are numbered from 0 in the order of the table, in which the last axis varies fastest.  A sweep computes all
+ * rows, or those of one part: part i of n has the rows i - 1, i - 1 + n, i - 1 + 2 n, ... */
+
+#define PW_GRID_MAX_ROWS 1e8 /* larger grids are refused: a journal needs 8 bytes of memory per row */
+
+/* A varied quantity: a parameter of the model or the initial value of a state. */
+typedef struct {
+  char *name;
+  char *range; /* "lin:1:10:100", as written */
+  enum { PW_AXIS_LIST, PW_AXIS_LIN, PW_AXIS_LOG } type;
+  double first, last;            /* of PW_AXIS_LIN and PW_AXIS_LOG */
+  double *value;                 /* of PW_AXIS_LIST */
+  long count;                    /* number of values */
+  long stride;                   /* number of rows from one value to the next */
+  const pw_parameter *parameter; /* NULL: the initial value of a state; set by pw_plan_open, like the unit */
+  const char *unit;
+} pw_axis;
+
+typedef struct {
+  pw_axis *axis;
+  int axes;
+  long rows;
+} pw_grid;
+
+/* Reads "NAME=RANGE"; the arrays of the axis are in the arena.  PW_INPUT with the reason, PW_RESOURCE. */
+int pw_axis_read (pw_axis *axis, const char *text, pw_arena *arena, pw_error *error);
+double pw_axis_value (const pw_axis *axis, long i); /* i from 0 */
+
+double pw_grid_value (const pw_grid *grid, int i, long row); /* of axis i */
+
+/* The row that is computed k-th, from 0: rows with the same parameters follow each other and share a compiled model. */
+long pw_grid_scheduled_row (const pw_grid *grid, long k);
+/* The number, from 0, of a row's combination of parameters, without regard to its initial values. */
+long pw_grid_parameter_index (const pw_grid *grid, long row);
+
+/* ---- The plan ---- */
 
 #define PW_SWEEP_MAGIC "pinwheel sweep 1\n" /* the first line of a fingerprint */
 
@@ -67,7 +102,7 @@ typedef struct {
  * line is added. */
 void pw_plan_cells (const pw_plan *plan, const pw_plan_row *row, pw_text *text);
 
-/* The rows of a sweep and their files: a journal while it runs, then its table or part. */
+/* ---- The journal ---- */
 
 /* The rows done, in the order of completion, in a file next to the table, from which a sweep that was stopped
  * continues. */
@@ -91,11 +126,6 @@ int pw_journal_open (pw_journal *journal, const pw_plan *plan, const char *path,
 int pw_journal_add (pw_journal *journal, const pw_plan *plan, long row, int status, const char *text, pw_error *error);
 /* Closes the journal; removes it if it was begun here and has no rows. */
 void pw_journal_close (pw_journal *journal);
-
-/* ---- Rows (sweep.c) ---- */
-
-/* Computes the missing rows in `jobs` threads, until all are there or pw_stop is set.  PW_RESOURCE. */
-int pw_sweep_rows (const pw_plan *plan, pw_journal *journal, int jobs, pw_error *error);
 
 /* ---- The table ---- */
 

@@ -1,4 +1,5 @@
-/* Makes the plan of a sweep: finds the parameters that are varied, the columns of the table and the fingerprint. */
+/* The plan of a sweep: the grid of its rows, the columns of its table, its fingerprint; the journal of its rows, and
+ * the table made of it. */
 #define _GNU_SOURCE /* asprintf */
 #include <errno.h>
 #include <math.h>
@@ -7,10 +8,154 @@
 #include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
-#include "cli.h"
 #include "sweep.h"
 
 enum { PLAN_TRIES = 1000 }; /* failures to build a model after which no other values are tried */
+
+/* ---- Ranges ---- */
+
+/* Reads the finite number or expression in the first `size` bytes of a text, which it restores. */
+static int axis_read_number (char *text, size_t size, double *value) {
+  const char after = text[size];
+  text[size] = 0;
+  int status = pw_read_expression (text, value);
+  text[size] = after;
+  return status == PW_OK && isfinite (*value) ? PW_OK : PW_INPUT;
+}
+
+static int axis_fail (const pw_axis *axis, const char *why, pw_error *error) {
+  return pw_fail (error, PW_INPUT, "--vary %.100s=%.100s: %s", axis->name, axis->range, why);
+}
+
+/* The length of the first value of a list, which ends at a comma outside parentheses. */
+static size_t axis_value_length (const char *list) {
+  size_t n = 0;
+  for (int depth = 0; list[n] && (list[n] != ',' || depth > 0); n++) depth += (list[n] == '(') - (list[n] == ')');
+  return n;
+}
+
+/* "V1,V2,..." */
+static int axis_read_list (pw_axis *axis, pw_arena *arena, pw_error *error) {
+  axis->count = 1;
+  for (const char *c = axis->range; *(c += axis_value_length (c)); c++) axis->count++;
+  axis->value = pw_arena_alloc (arena, (size_t)axis->count * sizeof *axis->value);
+  if (axis->value == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  char *c = axis->range;
+  for (long i = 0; i < axis->count; i++) {
+    size_t n = axis_value_length (c);
+    const char *why = PW_PRINTED (140, "\"%.*s\" is not a finite number", n < 100 ? (int)n : 100, c);
+    if (axis_read_number (c, n, axis->value + i) != PW_OK) return axis_fail (axis, why, error);
+    c += n + 1;
+  }
+  return PW_OK;
+}
+
+/* "lin:FIRST:LAST:COUNT" or "log:FIRST:LAST:COUNT" */
+static int axis_read_range (pw_axis *axis, pw_error *error) {
+  double number[3];
+  char *c = strchr (axis->range, ':') + 1;
+  const char *why = PW_PRINTED (80, "expected %.3s:FIRST:LAST:COUNT, three numbers", axis->range);
+  for (int i = 0; i < 3; i++) {
+    size_t n = strcspn (c, ":");
+    if (axis_read_number (c, n, number + i) != PW_OK || (c[n] == ':') != (i < 2)) return axis_fail (axis, why, error);
+    c += n + 1;
+  }
+  axis->first = number[0], axis->last = number[1];
+  if (*pw_domain_check (PW_COUNT, number[2]))
+    return axis_fail (axis, "expected a count that is a whole number >= 1", error);
+  if (number[2] > PW_GRID_MAX_ROWS) return axis_fail (axis, "too many values: at most 1e8 rows", error);
+  axis->count = (long)number[2];
+  if (axis->count == 1 && axis->first != axis->last)
+    return axis_fail (axis, "a range with two different ends needs at least 2 values", error);
+  if (axis->type == PW_AXIS_LOG && !(axis->first > 0 && axis->last > 0))
+    return axis_fail (axis, "the ends of a logarithmic range must be > 0", error);
+  return PW_OK;
+}
+
+int pw_axis_read (pw_axis *axis, const char *text, pw_arena *arena, pw_error *error) {
+  *axis = (pw_axis){ .name = pw_arena_copy (arena, text) };
+  if (axis->name == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  char *equals = strchr (axis->name, '=');
+  if (equals == NULL || equals == axis->name || equals[1] == 0)
+    return pw_fail (error, PW_INPUT, "--vary %.200s: expected NAME=lin:FIRST:LAST:COUNT, log:..., or a list v1,v2,...",
+                    text);
+  *equals = 0, axis->range = equals + 1;
+  axis->type = strncmp (axis->range, "lin:", 4) == 0   ? PW_AXIS_LIN
+               : strncmp (axis->range, "log:", 4) == 0 ? PW_AXIS_LOG
+                                                       : PW_AXIS_LIST;
+  if (axis->type != PW_AXIS_LIST) return axis_read_range (axis, error);
+  if (strchr (axis->range, ':')) return axis_fail (axis, "a range begins with lin: or log:", error);
+  return axis_read_list (axis, arena, error);
+}
+
+/* The ends are exact.  Values between them are divided only once, so that they are rounded as little as possible: the
+ * fourth value of lin:0:1:11 is 0.3. */
+double pw_axis_value (const pw_axis *axis, long i) {
+  if (axis->type == PW_AXIS_LIST) return axis->value[i];
+  double last = (double)(axis->count - 1), k = (double)i;
+  if (i == 0 || axis->first == axis->last) return axis->first;
+  if (i == axis->count - 1) return axis->last;
+  if (axis->type == PW_AXIS_LOG) return pow (10, (log10 (axis->first) * (last - k) + log10 (axis->last) * k) / last);
+  double value = (axis->first * (last - k) + axis->last * k) / last;
+  if (isfinite (value)) return value;
+  return axis->first / last * (last - k) + axis->last / last * k; /* the products were too large */
+}
+
+/* ---- The grid ---- */
+
+double pw_grid_value (const pw_grid *grid, int i, long row) {
+  const pw_axis *axis = grid->axis + i;
+  return pw_axis_value (axis, row / axis->stride % axis->count);
+}
+
+/* Initial values vary fastest, then parameters; the order among initial values and among parameters is the table's. */
+long pw_grid_scheduled_row (const pw_grid *grid, long k) {
+  long row = 0;
+  for (int parameters = 0; parameters < 2; parameters++)
+    for (const pw_axis *axis = grid->axis + grid->axes; axis-- > grid->axis;) {
+      if ((axis->parameter != NULL) != parameters) continue;
+      row += k % axis->count * axis->stride;
+      k /= axis->count;
+    }
+  return row;
+}
+
+long pw_grid_parameter_index (const pw_grid *grid, long row) {
+  long index = 0;
+  for (const pw_axis *axis = grid->axis; axis < grid->axis + grid->axes; axis++)
+    if (axis->parameter) index = index * axis->count + row / axis->stride % axis->count;
+  return index;
+}
+
+static int grid_count_rows (pw_grid *grid, pw_error *error) {
+  double rows = 1;
+  for (int i = 0; i < grid->axes; i++) rows *= (double)grid->axis[i].count;
+  if (rows > PW_GRID_MAX_ROWS)
+    return pw_fail (error, PW_INPUT, "the grid has %.15g rows: at most 1e8; use coarser ranges, or several sweeps",
+                    rows);
+  grid->rows = 1;
+  for (int i = grid->axes - 1; i >= 0; i--) {
+    grid->axis[i].stride = grid->rows;
+    grid->rows *= grid->axis[i].count;
+  }
+  return PW_OK;
+}
+
+/* Reads a NULL-terminated list of "NAME=RANGE".  PW_INPUT also if there are too many rows. */
+static int grid_read (pw_grid *grid, const char *const *ranges, pw_arena *arena, pw_error *error) {
+  int n = 0, status = PW_OK;
+  while (ranges && ranges[n]) n++;
+  *grid = (pw_grid){ .axis = pw_arena_alloc (arena, ((size_t)n + 1) * sizeof *grid->axis) };
+  if (grid->axis == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  while (grid->axes < n && status == PW_OK) {
+    pw_axis *axis = grid->axis + grid->axes++;
+    status = pw_axis_read (axis, ranges[axis - grid->axis], arena, error);
+    for (const pw_axis *other = grid->axis; other < axis && status == PW_OK; other++)
+      if (strcmp (other->name, axis->name) == 0)
+        status = pw_fail (error, PW_INPUT, "--vary %.200s is given twice", axis->name);
+  }
+  return status == PW_OK ? grid_count_rows (grid, error) : status;
+}
 
 /* ---- Models ---- */
 
@@ -192,16 +337,6 @@ void pw_plan_cells (const pw_plan *plan, const pw_plan_row *row, pw_text *text) 
 
 /* ---- The fingerprint ---- */
 
-/* The values of parameters that are not varied: the model's or those of --set. */
-static void plan_fingerprint_parameters (pw_plan *plan, const pw_model *model) {
-  for (const pw_parameter *parameter = pw_model_table (model)->parameters; parameter && parameter->name; parameter++) {
-    int is_varied = 0;
-    for (int i = 0; i < plan->grid.axes; i++) is_varied |= plan->grid.axis[i].parameter == parameter;
-    if (!is_varied)
-      pw_fingerprint_number (&plan->fingerprint, "parameter", parameter->name, pw_model_parameter (model, parameter));
-  }
-}
-
 static void plan_fingerprint_grid (pw_plan *plan) {
   pw_text *text = &plan->fingerprint;
   pw_fingerprint_initial (text, plan->line->starts);
@@ -225,7 +360,11 @@ static int plan_fingerprint (pw_plan *plan, const pw_model *model, pw_error *err
   if (plan->with_error) pw_fingerprint_line (text, "error", NULL, "stated");
   if (isfinite (plan->limit.seconds)) pw_fingerprint_number (text, "limit", NULL, plan->limit.seconds);
   if (plan->engine.code) pw_fingerprint_line (text, "engine", NULL, "specialised");
-  plan_fingerprint_parameters (plan, model);
+  for (const pw_parameter *parameter = pw_model_table (model)->parameters; parameter && parameter->name; parameter++) {
+    int is_varied = 0; /* else its value is the model's or that of --set */
+    for (int i = 0; i < plan->grid.axes; i++) is_varied |= plan->grid.axis[i].parameter == parameter;
+    if (!is_varied) pw_fingerprint_number (text, "parameter", parameter->name, pw_model_parameter (model, parameter));
+  }
   plan_fingerprint_grid (plan);
   pw_fingerprint_number (text, "rows", NULL, (double)plan->grid.rows);
   pw_fingerprint_line (text, "columns", NULL, plan->heading.chars ? plan->heading.chars : "");
@@ -240,7 +379,7 @@ static int plan_fingerprint (pw_plan *plan, const pw_model *model, pw_error *err
 int pw_plan_open (pw_plan *plan, const char **ranges, pw_error *error) {
   const pw_method *method;
   int stabilisation, status = pw_method_parse (plan->method, &method, &stabilisation, error);
-  if (status == PW_OK) status = pw_grid_read (&plan->grid, (const char *const *)ranges, &plan->arena, error);
+  if (status == PW_OK) status = grid_read (&plan->grid, (const char *const *)ranges, &plan->arena, error);
   if (status != PW_OK) return status;
   pw_model *model = pw_file_model (plan->file, error);
   if (model == NULL) return error->status;
@@ -302,14 +441,6 @@ static uint32_t journal_line_checksum (long row, int status, const char *text, s
   h = (h ^ (uint32_t)status) * 16777619u;
   for (size_t i = 0; i < size; i++) h = (h ^ (unsigned char)text[i]) * 16777619u;
   return h;
-}
-
-static void journal_line_format (pw_text *line, long row, int status, const char *text) {
-  size_t size = strlen (text);
-  pw_text_add (line, PW_PRINTED (60, "%ld %d %08lx ", row, status,
-                                 (unsigned long)journal_line_checksum (row, status, text, size)));
-  pw_text_add_bytes (line, text, size);
-  pw_text_add (line, "\n");
 }
 
 /* Reads the line that begins here; 0 if it is incomplete or damaged. */
@@ -426,9 +557,12 @@ int pw_journal_open (pw_journal *journal, const pw_plan *plan, const char *path,
 }
 
 int pw_journal_add (pw_journal *journal, const pw_plan *plan, long row, int status, const char *text, pw_error *error) {
-  off_t at = journal->size;
+  const off_t at = journal->size;
+  const uint32_t checksum = journal_line_checksum (row, status, text, strlen (text));
   pw_text_clear (&journal->line);
-  journal_line_format (&journal->line, row, status, text);
+  pw_text_add (&journal->line, PW_PRINTED (60, "%ld %d %08lx ", row, status, (unsigned long)checksum));
+  pw_text_add (&journal->line, text);
+  pw_text_add (&journal->line, "\n");
   if (journal->line.failed) return pw_fail (error, PW_RESOURCE, "out of memory");
   if (journal_write (journal, journal->line.chars, journal->line.length, error) != PW_OK) return error->status;
   journal->offset[row / plan->parts] = at;
