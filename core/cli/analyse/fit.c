@@ -1081,31 +1081,34 @@ int pw_fit_table (const pw_fit *fit, FILE *f, pw_error *error) {
   return status;
 }
 
-/* ---- Figures ---- */
+/* ---- The figure ---- */
 
-static int report_data (const void *context, FILE *f, pw_error *error) {
-  const pw_fit *fit = context;
-  (void)error;
-  fputs ("# t [s], data, standard deviation, model; a block per column\n", f);
-  for (int i = 0; i < fit->columns; i++) {
-    for (int k = 0; k < fit->rows; k++) {
-      int c = i * fit->rows + k;
-      const double value[] = { fit->t[k], fit->data[c], fit->weighted ? fit->sigma[c] : 0, fit->fitted[c] };
-      for (int v = 0; v < 4; v++) fprintf (f, "%s%s", v ? " " : "", PW_DIGITS (value[v], 12));
-      fputc ('\n', f);
-    }
-    fputs ("\n\n", f);
-  }
-  return PW_OK;
-}
-
-static void report_variables (const void *context, FILE *f) {
-  const pw_fit *fit = context;
-  int panels = fit->columns < REPORT_PANELS ? fit->columns : REPORT_PANELS;
-  fprintf (f, "panels = %d\nweighted = %d\narray label[%d]\n", panels, fit->weighted, panels);
-  for (int i = 0; i < panels; i++) pw_figure_label (f, "label", i + 1, fit->column_name[i], fit->column_unit[i]);
-}
-
+/* Data and model of each column, below them the residuals. */
 int pw_fit_draw (const pw_fit *fit, pw_error *error) {
-  return pw_figure_write (&fit->line, &fit->model, fit->plots_path, "fit", fit, report_data, report_variables, error);
+  const int panels = fit->columns < REPORT_PANELS ? fit->columns : REPORT_PANELS, several = panels > 1;
+  const char *style = fit->weighted ? "bars" : "data", *label = fit->weighted ? "data ± σ" : "data";
+  pw_figures figures;
+  pw_curves c;
+  if (pw_figures_of (&figures, &fit->line, &fit->model, fit->plots_path, error) != PW_OK ||
+      pw_curves_open (&c, &figures, "fit", "data and fitted model", error) != PW_OK)
+    return error->status;
+  for (int i = 0; i < panels; i++) {
+    const double *t = fit->t, *data = fit->data + i * fit->rows, *fitted = fit->fitted + i * fit->rows,
+                 *sigma = fit->sigma + i * fit->rows;
+    pw_panel panel = { .x_label = "t [s]",
+                       .y_label = PW_FIGURE_LABEL (fit->column_name[i], fit->column_unit[i]),
+                       .x = { t[0], t[fit->rows - 1] },
+                       .aspect = several ? 0.6 : 0.45,
+                       .type = several ? PW_PANEL_HALF : 0 };
+    pw_curves_panel (&c, &panel);
+    pw_curves_add (&c, style, label);
+    for (int k = 0; k < fit->rows; k++) pw_curves_point (&c, t[k], data[k], sigma[k]);
+    pw_curves_add (&c, "model", "model");
+    for (int k = 0; k < fit->rows; k++) pw_curves_point (&c, t[k], fitted[k], 0);
+    panel.y_label = "residual", panel.type |= PW_PANEL_BELOW, panel.aspect *= 0.6;
+    pw_curves_panel (&c, &panel);
+    pw_curves_add (&c, style, label);
+    for (int k = 0; k < fit->rows; k++) pw_curves_point (&c, t[k], fitted[k] - data[k], sigma[k]);
+  }
+  return pw_curves_draw (&c, PW_OK, error);
 }

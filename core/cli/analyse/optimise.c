@@ -936,40 +936,33 @@ void pw_optimise_yaml (const pw_optimise *problem, FILE *f) {
     }
 }
 
-/* ---- Figures ---- */
+/* ---- The figure ---- */
 
-/* Writes a row per run: number of its search, unknowns, objective, 1 if it satisfies the constraints. */
-static int report_data (const void *context, FILE *f, pw_error *error) {
-  const pw_optimise *problem = context;
-  int n = problem->unknowns.count, width = n + problem->outputs;
-  (void)error;
-  fputs ("# start", f);
-  for (int i = 0; i < n; i++) fprintf (f, ", %s [%s]", problem->unknowns.list[i].name, problem->unknowns.list[i].unit);
-  fprintf (f, ", %s, 1 if the constraints are satisfied\n", problem->output[0]);
-  for (int i = 0; i < problem->starts + problem->refinements; i++)
-    for (long k = 0; k < problem->search[i].runs; k++) {
-      fprintf (f, "%d", i + 1);
-      const double *row = problem->search[i].trials + k * width;
-      for (int c = 0; c <= n; c++) fprintf (f, " %s", PW_DIGITS (row[c], 12));
-      fprintf (f, " %d\n", !isnan (row[n]) && pw_search_feasible (problem, row + n));
-    }
-  return PW_OK;
-}
-
-static void report_variables (const void *context, FILE *f) {
-  const pw_optimise *problem = context;
-  int panels = problem->unknowns.count < REPORT_PANELS ? problem->unknowns.count : REPORT_PANELS;
-  fprintf (f, "panels = %d\nunknowns = %d\narray label[%d]\narray best[%d]\n", panels, problem->unknowns.count, panels,
-           panels);
-  for (int i = 0; i < panels; i++) {
-    pw_figure_label (f, "label", i + 1, problem->unknowns.list[i].name, problem->unknowns.list[i].unit);
-    fprintf (f, "best[%d] = %.12g\n", i + 1, problem->best->to[i]);
-  }
-  pw_figure_label (f, "objective", 0, problem->output[0], problem->unit[0]);
-  fprintf (f, "value = %.12g\n", problem->best->output[0]);
-}
-
+/* The objective of every run against each unknown, the best one marked. */
 int pw_optimise_draw (const pw_optimise *problem, pw_error *error) {
-  return pw_figure_write (&problem->line, &problem->model, problem->plots_path, "optimise", problem, report_data,
-                          report_variables, error);
+  static const char *const style[] = { "infeasible", "feasible" };
+  const int n = problem->unknowns.count, width = n + problem->outputs, panels = n < REPORT_PANELS ? n : REPORT_PANELS;
+  const char *objective = PW_FIGURE_LABEL (problem->output[0], problem->unit[0]);
+  pw_figures figures;
+  pw_curves c;
+  if (pw_figures_of (&figures, &problem->line, &problem->model, problem->plots_path, error) != PW_OK ||
+      pw_curves_open (&c, &figures, "optimise", "runs of the optimisation", error) != PW_OK)
+    return error->status;
+  for (int i = 0; i < panels; i++) {
+    pw_curves_panel (
+        &c, &(pw_panel){ .x_label = PW_FIGURE_LABEL (problem->unknowns.list[i].name, problem->unknowns.list[i].unit),
+                         .y_label = objective,
+                         .aspect = panels > 1 ? 0.7 : 0.5,
+                         .type = panels > 1 ? PW_PANEL_HALF : 0 });
+    for (int feasible = 0; feasible < 2; feasible++) {
+      pw_curves_add (&c, style[feasible], style[feasible]);
+      for (const pw_search *s = problem->search; s < problem->search + problem->starts + problem->refinements; s++)
+        for (const double *run = s->trials; run && run < s->trials + s->runs * width; run += width)
+          if (!isnan (run[n]) && pw_search_feasible (problem, run + n) == feasible)
+            pw_curves_point (&c, run[i], run[n], 0);
+    }
+    pw_curves_add (&c, "best", "best");
+    pw_curves_point (&c, problem->best->to[i], problem->best->output[0], 0);
+  }
+  return pw_curves_draw (&c, PW_OK, error);
 }

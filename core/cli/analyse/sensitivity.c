@@ -197,21 +197,7 @@ static int sensitivity_csv (const void *context, FILE *f, pw_error *error) {
   return status;
 }
 
-/* 1 if an output has a panel of the figure: there are derivatives along the run. */
-static int sensitivity_is_drawn (const pw_sensitivity *sens, int output) {
-  int points = 0;
-  for (int p = 0; p < sens->outputs.unknowns->count; p++)
-    for (int i = 0; i < sens->outputs.rows; i++) points += isfinite (pw_sensitivity_of (sens, output, p, i)->value);
-  return points > 0;
-}
-
-static int sensitivity_panels (const pw_sensitivity *sens) {
-  int panels = 0;
-  for (int i = 0; i < sens->outputs.count; i++) panels += sensitivity_is_drawn (sens, i);
-  return panels;
-}
-
-/* The label of a curve of sensitivity_data. */
+/* The label of a curve in the figure. */
 static void sensitivity_label (const pw_sensitivity *sens, int output, int unknown, char *label, size_t size) {
   char unit[SENSITIVITY_UNIT], buffer[FIGURE_NAME + 4];
   const char *name = pw_figure_name (sens->outputs.unknowns->list[unknown].name, buffer);
@@ -224,44 +210,34 @@ static void sensitivity_label (const pw_sensitivity *sens, int output, int unkno
   }
 }
 
-/* Writes a block for each derivative, times the value of the unknown unless that is 0, so that unknowns can be
+/* Draws the derivatives along the run, times the value of the unknown unless that is 0, so that unknowns can be
  * compared. */
-static int sensitivity_data (const void *context, FILE *f, pw_error *error) {
-  const pw_sensitivity *sens = &((const sensitivity *)context)->sens;
-  const pw_unknowns *u = sens->outputs.unknowns;
-  (void)error;
-  for (int k = 0; k < sens->outputs.count * u->count; k++) {
-    const int o = k / u->count, p = k % u->count;
-    double factor = u->list[p].value != 0 ? u->list[p].value : 1;
-    if (!sensitivity_is_drawn (sens, o)) continue;
-    for (int i = 0; i < sens->outputs.rows; i++)
-      fprintf (f, "%.9g %.9g\n", sens->outputs.t[i], pw_sensitivity_of (sens, o, p, i)->value * factor);
-    fputs ("\n\n", f);
-  }
-  return PW_OK;
-}
-
-static void sensitivity_variables (const void *context, FILE *f) {
-  const pw_sensitivity *sens = &((const sensitivity *)context)->sens;
-  const int panels = sensitivity_panels (sens), unknowns = sens->outputs.unknowns->count;
-  fprintf (f, "unknowns = %d\nt_end = %.10g\n", unknowns, sens->outputs.unknowns->t_end);
-  fprintf (f, "panels = %d\narray output[%d]\narray label[%d]\n", panels, panels, panels * unknowns);
-  for (int i = 0, k = 0; i < sens->outputs.count; i++) {
+static int sensitivity_draw (const sensitivity *cmd, pw_error *error) {
+  const pw_sensitivity *sens = &cmd->sens;
+  const pw_unknowns *u = &cmd->unknowns;
+  pw_figures figures;
+  pw_curves c;
+  if (pw_figures_of (&figures, &cmd->line, &cmd->m, cmd->folder, error) != PW_OK ||
+      pw_curves_open (&c, &figures, "sensitivity", "derivatives along the run", error) != PW_OK)
+    return error->status;
+  for (int o = 0; o < sens->outputs.count; o++) {
     char label[300];
-    if (!sensitivity_is_drawn (sens, i)) continue;
-    pw_figure_element (f, "output", ++k, sens->outputs.of[i]);
-    for (int p = 0; p < unknowns; p++) {
-      sensitivity_label (sens, i, p, label, sizeof label);
-      pw_figure_element (f, "label", (k - 1) * unknowns + p + 1, label);
+    pw_curves_panel (
+        &c, &(pw_panel){ .x_label = "t [s]", .y_label = PW_FIGURE_LABEL (sens->outputs.of[o], ""), .x[1] = u->t_end });
+    for (int p = 0; p < u->count; p++) {
+      const double factor = u->list[p].value != 0 ? u->list[p].value : 1;
+      sensitivity_label (sens, o, p, label, sizeof label);
+      pw_curves_add (&c, "line", label);
+      for (int i = 0; i < sens->outputs.rows; i++)
+        pw_curves_point (&c, sens->outputs.t[i], pw_sensitivity_of (sens, o, p, i)->value * factor, 0);
     }
   }
+  return pw_curves_draw (&c, PW_OK, error);
 }
 
 static int sensitivity_write (const sensitivity *cmd, pw_error *error) {
   int status = pw_figure_write_tables (cmd->folder, "sensitivity", 5, cmd, sensitivity_csv, sensitivity_json, error);
-  if (status != PW_OK || sensitivity_panels (&cmd->sens) == 0 || cmd->sens.outputs.rows < 2) return status;
-  return pw_figure_write (&cmd->line, &cmd->m, cmd->folder, "sensitivity", cmd, sensitivity_data, sensitivity_variables,
-                          error);
+  return status == PW_OK && cmd->sens.outputs.rows > 1 ? sensitivity_draw (cmd, error) : status;
 }
 
 /* ---- The command ---- */
