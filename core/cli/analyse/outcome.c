@@ -61,7 +61,8 @@ int pw_column_find (const pw_system *s, const char *name, const char *origin, pw
   return pw_fail (error, PW_INPUT, "%s: no column \"%.100s\"%s", origin, name, pw_nearest_text (&near));
 }
 
-double pw_column_value (const pw_system *s, pw_column c, const pw_sample *sample) {
+/* The value of a column in a sample; NaN for contact points, and for entries of the ledger without pw_settings.ledger. */
+static double outcome_column_value (const pw_system *s, pw_column c, const pw_sample *sample) {
   int n = pw_system_coordinates (s);
   if (c.type == PW_COLUMN_STATE) return c.index < n ? sample->q[c.index] : sample->v[c.index - n];
   if (c.type == PW_COLUMN_REACTION) return 0 - sample->lambda[c.index]; /* the reaction is -lambda; not -0 */
@@ -296,7 +297,7 @@ static int functional_read (pw_outcomes *set, const pw_sample *s, int at, pw_err
   for (pw_functional *f = set->functional; f < set->functional + set->functionals && status == PW_OK; f++) {
     const pw_column c = f->column;
     f->values[at] =
-        c.type == PW_COLUMN_CONTACT ? set->contact[c.index / 2][c.index % 2] : pw_column_value (set->system, c, s);
+        c.type == PW_COLUMN_CONTACT ? set->contact[c.index / 2][c.index % 2] : outcome_column_value (set->system, c, s);
   }
   return status;
 }

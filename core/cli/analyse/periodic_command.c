@@ -36,11 +36,6 @@ typedef struct {
   int stopped;                           /* 1: by Ctrl-C or --limit */
 } pw_periodic_command;
 
-/* Prints the motion or the branch; there is at least one point. */
-void pw_periodic_print (const pw_periodic_command *cmd);
-/* Writes periodic.json, periodic.csv and the figure into the folder.  A status. */
-int pw_periodic_write (const pw_periodic_command *cmd, pw_error *error);
-
 enum { PERIODIC_PERIODS = 100000 }; /* of the signals in one period of the motion, at most */
 #define PERIODIC_LEAST 1e-100       /* shortest period that is sought [s] */
 
@@ -189,57 +184,6 @@ static int periodic_compute (pw_periodic_command *cmd, pw_error *error) {
   pw_stop_release ();
   return status == PW_RETRY ? PW_OK : status;
 }
-
-/* ---- The command ---- */
-
-static int periodic_command (void *options, pw_error *error) {
-  pw_periodic_command *cmd = options;
-  int status = pw_cli_open (&cmd->m, &cmd->line, error);
-  if (status == PW_OK) status = periodic_read_options (cmd, error);
-  if (status == PW_OK)
-    status = pw_figure_lock_folder (&cmd->line, &cmd->m, cmd->folder, "periodic", &cmd->files, error);
-  if (status == PW_OK) pw_report_model (&cmd->m), pw_cli_report_tables (cmd->m.system, cmd->settings.period);
-  if (status == PW_OK) status = periodic_compute (cmd, error);
-  if (status == PW_OK && cmd->points) pw_periodic_print (cmd);
-  if (status == PW_OK && cmd->points && cmd->folder) status = pw_periodic_write (cmd, error);
-  pw_files_close (&cmd->files);
-  for (int i = 0; i < cmd->points; i++) free (cmd->point[i].state);
-  free (cmd->point);
-  pw_periodic_close (cmd->search);
-  pw_cli_close_model (&cmd->m);
-  return status == PW_OK && cmd->stopped ? pw_cli_incomplete (&cmd->line, error) : status;
-}
-
-static const struct poptOption periodic_options_table[] = {
-  PW_OPTION_GROUP ("Periodic motions"),
-  PW_TEXT_OPTION (pw_periodic_command, period_text, "period", 0, "T|free",
-                  "Period [s] (default that of the signals); free: sought, if no signal changes with time"),
-  PW_TEXT_OPTION (pw_periodic_command, periods_text, "periods", 0, "N",
-                  "Repeat after N periods of the signals (default 1)"),
-  PW_TEXT_OPTION (pw_periodic_command, guess_text, "guess", 0, "T",
-                  "First guess of a free period [s] (default: the time of the first return)"),
-  PW_TEXT_OPTION (pw_periodic_command, vary_text, "vary", 0, "PARAM=FIRST:LAST", "Follow the motion over a parameter"),
-  PW_TEXT_OPTION (pw_periodic_command, folder, "output", 'o', "DIR",
-                  "Write periodic.csv, periodic.json and a figure into a folder"),
-  PW_WIDTH_OPTION,
-  PW_TEXT_OPTION (pw_cli_line, method, "method", 'm', "METHOD", "Adaptive integrator (default erk8+projection)"),
-  PW_TEXT_OPTION (pw_cli_line, rtol, "rtol", 0, "R", "Relative tolerance (default 1e-12)"),
-  PW_LIMIT_OPTION,
-  PW_MODEL_OPTIONS,
-  POPT_TABLEEND
-};
-
-const pw_command pw_cli_periodic = {
-  .name = "periodic",
-  .synopsis = "MODEL [OPTION...]",
-  .summary = "find periodic motions, and follow them over a parameter",
-  .help = "Find a motion that repeats after one period but for a displacement in the plane, such as a gait, with the "
-          "displacement per period and Floquet multipliers, which say how perturbations change in one period; with "
-          "--vary, follow it over a parameter.",
-  .options_size = sizeof (pw_periodic_command),
-  .function = periodic_command,
-  .options = periodic_options_table,
-};
 
 /* The reports of `pinwheel periodic`: text, JSON, table and figure. */
 
@@ -397,7 +341,7 @@ static void periodic_print_branch (const pw_periodic_command *cmd) {
     printf ("\nThe branch ends at %s = %.9g: %s\n", cmd->vary.name, last, pw_periodic_reason (cmd->search));
 }
 
-void pw_periodic_print (const pw_periodic_command *cmd) {
+static void periodic_print (const pw_periodic_command *cmd) {
   if (cmd->vary_text)
     periodic_print_branch (cmd);
   else
@@ -593,7 +537,7 @@ static void periodic_draw_multipliers (const pw_periodic_command *cmd, pw_curves
   }
 }
 
-int pw_periodic_write (const pw_periodic_command *cmd, pw_error *error) {
+static int periodic_write (const pw_periodic_command *cmd, pw_error *error) {
   const double range[] = { fmin (cmd->settings.first, cmd->settings.last),
                            fmax (cmd->settings.first, cmd->settings.last) };
   const char *title = cmd->vary_text ? "periodic motions" : "periodic motion over one period, Floquet multipliers";
@@ -610,3 +554,54 @@ int pw_periodic_write (const pw_periodic_command *cmd, pw_error *error) {
   periodic_draw_multipliers (cmd, &c, range);
   return pw_curves_draw (&c, status, error);
 }
+
+/* ---- The command ---- */
+
+static int periodic_command (void *options, pw_error *error) {
+  pw_periodic_command *cmd = options;
+  int status = pw_cli_open (&cmd->m, &cmd->line, error);
+  if (status == PW_OK) status = periodic_read_options (cmd, error);
+  if (status == PW_OK)
+    status = pw_figure_lock_folder (&cmd->line, &cmd->m, cmd->folder, "periodic", &cmd->files, error);
+  if (status == PW_OK) pw_report_model (&cmd->m), pw_cli_report_tables (cmd->m.system, cmd->settings.period);
+  if (status == PW_OK) status = periodic_compute (cmd, error);
+  if (status == PW_OK && cmd->points) periodic_print (cmd);
+  if (status == PW_OK && cmd->points && cmd->folder) status = periodic_write (cmd, error);
+  pw_files_close (&cmd->files);
+  for (int i = 0; i < cmd->points; i++) free (cmd->point[i].state);
+  free (cmd->point);
+  pw_periodic_close (cmd->search);
+  pw_cli_close_model (&cmd->m);
+  return status == PW_OK && cmd->stopped ? pw_cli_incomplete (&cmd->line, error) : status;
+}
+
+static const struct poptOption periodic_options_table[] = {
+  PW_OPTION_GROUP ("Periodic motions"),
+  PW_TEXT_OPTION (pw_periodic_command, period_text, "period", 0, "T|free",
+                  "Period [s] (default that of the signals); free: sought, if no signal changes with time"),
+  PW_TEXT_OPTION (pw_periodic_command, periods_text, "periods", 0, "N",
+                  "Repeat after N periods of the signals (default 1)"),
+  PW_TEXT_OPTION (pw_periodic_command, guess_text, "guess", 0, "T",
+                  "First guess of a free period [s] (default: the time of the first return)"),
+  PW_TEXT_OPTION (pw_periodic_command, vary_text, "vary", 0, "PARAM=FIRST:LAST", "Follow the motion over a parameter"),
+  PW_TEXT_OPTION (pw_periodic_command, folder, "output", 'o', "DIR",
+                  "Write periodic.csv, periodic.json and a figure into a folder"),
+  PW_WIDTH_OPTION,
+  PW_TEXT_OPTION (pw_cli_line, method, "method", 'm', "METHOD", "Adaptive integrator (default erk8+projection)"),
+  PW_TEXT_OPTION (pw_cli_line, rtol, "rtol", 0, "R", "Relative tolerance (default 1e-12)"),
+  PW_LIMIT_OPTION,
+  PW_MODEL_OPTIONS,
+  POPT_TABLEEND
+};
+
+const pw_command pw_cli_periodic = {
+  .name = "periodic",
+  .synopsis = "MODEL [OPTION...]",
+  .summary = "find periodic motions, and follow them over a parameter",
+  .help = "Find a motion that repeats after one period but for a displacement in the plane, such as a gait, with the "
+          "displacement per period and Floquet multipliers, which say how perturbations change in one period; with "
+          "--vary, follow it over a parameter.",
+  .options_size = sizeof (pw_periodic_command),
+  .function = periodic_command,
+  .options = periodic_options_table,
+};

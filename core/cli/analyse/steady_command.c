@@ -44,11 +44,6 @@ typedef struct {
   int stopped;        /* 1: by Ctrl-C or --limit */
 } pw_steady_command;
 
-/* Prints the motions or the branches; there is at least one point. */
-void pw_steady_print (const pw_steady_command *cmd);
-/* Writes steady.json, steady.csv and, with --vary, the figure into the folder.  A status. */
-int pw_steady_write (const pw_steady_command *cmd, pw_error *error);
-
 #define STEADY_STARTS "30" /* default of --starts */
 
 /* Directions of pw_steady_follow: towards the first or the last value of the range. */
@@ -340,8 +335,6 @@ static int steady_branches (pw_steady_command *cmd, pw_error *error) {
   return status;
 }
 
-/* ---- The command ---- */
-
 static int steady_compute (pw_steady_command *cmd, pw_error *error) {
   cmd->residual[0] = cmd->residual[1] = INFINITY;
   pw_limit_start (&cmd->limit);
@@ -353,53 +346,6 @@ static int steady_compute (pw_steady_command *cmd, pw_error *error) {
   if (status == PW_OK && cmd->points == 0 && !cmd->stopped) status = steady_fail (cmd, error);
   return status;
 }
-
-static int steady_command (void *options, pw_error *error) {
-  pw_steady_command *cmd = options;
-  int status = pw_cli_open (&cmd->m, &cmd->line, error);
-  if (status == PW_OK) status = steady_read_options (cmd, error);
-  if (status == PW_OK) status = pw_figure_lock_folder (&cmd->line, &cmd->m, cmd->folder, "steady", &cmd->files, error);
-  if (status == PW_OK) pw_report_model (&cmd->m);
-  if (status == PW_OK) status = steady_compute (cmd, error);
-  if (status == PW_OK && cmd->points) pw_steady_print (cmd);
-  if (status == PW_OK && cmd->points && cmd->folder) status = pw_steady_write (cmd, error);
-  pw_files_close (&cmd->files);
-  steady_forget (cmd, 0);
-  free (cmd->point);
-  free (cmd->end);
-  pw_steady_close (cmd->search);
-  pw_cli_close_model (&cmd->m);
-  return status == PW_OK && cmd->stopped ? pw_cli_incomplete (&cmd->line, error) : status;
-}
-
-static const struct poptOption steady_options_table[] = {
-  PW_OPTION_GROUP ("Steady motions"),
-  PW_HOLD_OPTION (pw_steady_command, hold_texts),
-  PW_TEXT_OPTION (pw_steady_command, vary_text, "vary", 0, "NAME=FIRST:LAST",
-                  "Follow branches over a parameter of the model, or of a held value such as BODY.speed"),
-  PW_TEXT_OPTION (pw_steady_command, starts_text, "starts", 0, "N",
-                  "Begin at the initial state and at N random ones (default " STEADY_STARTS ")"),
-  PW_TEXT_OPTION (pw_steady_command, at_text, "at", 0, "T", "Evaluate signals at time T [s] (default 0)"),
-  PW_TEXT_OPTION (pw_steady_command, folder, "output", 'o', "DIR",
-                  "Write steady.csv, steady.json and, with --vary, figures into a folder"),
-  PW_WIDTH_OPTION,
-  PW_LIMIT_OPTION,
-  PW_MODEL_OPTIONS,
-  POPT_TABLEEND
-};
-
-const pw_command pw_cli_steady = {
-  .name = "steady",
-  .synopsis = "MODEL [OPTION...]",
-  .summary = "find steady motions, and follow them over a parameter",
-  .help =
-      "Find steady motions, in which every body moves with one frame at constant speed and angular velocity, and "
-      "equilibria; with --vary, follow them over a parameter, through folds, with eigenvalues and the values at which "
-      "stability changes.",
-  .options_size = sizeof (pw_steady_command),
-  .function = steady_command,
-  .options = steady_options_table,
-};
 
 /* The reports of `pinwheel steady`: text, JSON, table and figure. */
 
@@ -488,7 +434,7 @@ static void steady_print_branches (const pw_steady_command *cmd) {
     if (*cmd->end[i]) printf ("Branch %d ends: %s\n", i + 1, cmd->end[i]);
 }
 
-void pw_steady_print (const pw_steady_command *cmd) {
+static void steady_print (const pw_steady_command *cmd) {
   char text[40];
   const char *model = pw_file_name (cmd->m.file),
              *symmetries = pw_states_symmetries (pw_steady_symmetries (cmd->search), text);
@@ -710,7 +656,56 @@ static int steady_draw (const pw_steady_command *cmd, pw_error *error) {
   return pw_curves_draw (&c, PW_OK, error);
 }
 
-int pw_steady_write (const pw_steady_command *cmd, pw_error *error) {
+static int steady_write (const pw_steady_command *cmd, pw_error *error) {
   int status = pw_figure_write_tables (cmd->folder, "steady", 1, cmd, steady_csv, steady_json, error);
   return status == PW_OK && cmd->vary_text ? steady_draw (cmd, error) : status;
 }
+
+/* ---- The command ---- */
+
+static int steady_command (void *options, pw_error *error) {
+  pw_steady_command *cmd = options;
+  int status = pw_cli_open (&cmd->m, &cmd->line, error);
+  if (status == PW_OK) status = steady_read_options (cmd, error);
+  if (status == PW_OK) status = pw_figure_lock_folder (&cmd->line, &cmd->m, cmd->folder, "steady", &cmd->files, error);
+  if (status == PW_OK) pw_report_model (&cmd->m);
+  if (status == PW_OK) status = steady_compute (cmd, error);
+  if (status == PW_OK && cmd->points) steady_print (cmd);
+  if (status == PW_OK && cmd->points && cmd->folder) status = steady_write (cmd, error);
+  pw_files_close (&cmd->files);
+  steady_forget (cmd, 0);
+  free (cmd->point);
+  free (cmd->end);
+  pw_steady_close (cmd->search);
+  pw_cli_close_model (&cmd->m);
+  return status == PW_OK && cmd->stopped ? pw_cli_incomplete (&cmd->line, error) : status;
+}
+
+static const struct poptOption steady_options_table[] = {
+  PW_OPTION_GROUP ("Steady motions"),
+  PW_HOLD_OPTION (pw_steady_command, hold_texts),
+  PW_TEXT_OPTION (pw_steady_command, vary_text, "vary", 0, "NAME=FIRST:LAST",
+                  "Follow branches over a parameter of the model, or of a held value such as BODY.speed"),
+  PW_TEXT_OPTION (pw_steady_command, starts_text, "starts", 0, "N",
+                  "Begin at the initial state and at N random ones (default " STEADY_STARTS ")"),
+  PW_TEXT_OPTION (pw_steady_command, at_text, "at", 0, "T", "Evaluate signals at time T [s] (default 0)"),
+  PW_TEXT_OPTION (pw_steady_command, folder, "output", 'o', "DIR",
+                  "Write steady.csv, steady.json and, with --vary, figures into a folder"),
+  PW_WIDTH_OPTION,
+  PW_LIMIT_OPTION,
+  PW_MODEL_OPTIONS,
+  POPT_TABLEEND
+};
+
+const pw_command pw_cli_steady = {
+  .name = "steady",
+  .synopsis = "MODEL [OPTION...]",
+  .summary = "find steady motions, and follow them over a parameter",
+  .help =
+      "Find steady motions, in which every body moves with one frame at constant speed and angular velocity, and "
+      "equilibria; with --vary, follow them over a parameter, through folds, with eigenvalues and the values at which "
+      "stability changes.",
+  .options_size = sizeof (pw_steady_command),
+  .function = steady_command,
+  .options = steady_options_table,
+};
