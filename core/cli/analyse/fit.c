@@ -437,20 +437,16 @@ static void solve_store (fit_solver *solver, double chi2) {
   memcpy (fit->fitted, solver->values, (size_t)fit->columns * (size_t)fit->rows * sizeof *fit->fitted);
 }
 
-/* The part of a search that is done after i iterations, of which SOLVE_USUAL are usual. */
-static double solve_part (double i) {
-  return i < SOLVE_USUAL ? 0.9 * i / SOLVE_USUAL : 1 - 0.1 * SOLVE_USUAL / i;
-}
-
 /* After iteration i.  `moved`: 1 if the last run is the position reached, the result if Ctrl-C comes before a search is
  * completed. */
 static void solve_progress (fit_solver *solver, int i, int moved, const gsl_multifit_nlinear_workspace *w) {
-  double norm = gsl_blas_dnrm2 (gsl_multifit_nlinear_residual (w));
+  const double norm = gsl_blas_dnrm2 (gsl_multifit_nlinear_residual (w)), usual = SOLVE_USUAL,
+               part = i < usual ? 0.9 * i / usual : 1 - 0.1 * usual / i; /* of the search that is done */
   if (isnan (solver->fit->initial_chi2)) solver->fit->initial_chi2 = norm * norm;
   if (!isfinite (solver->least) && moved) solve_store (solver, norm * norm);
   snprintf (solver->fit->progress.note, sizeof solver->fit->progress.note, "iteration %d, residual %.6g",
             solver->fit->iterations, norm);
-  pw_progress_at (&solver->fit->progress, (solver->searches + solve_part (i)) / solver->fit->starts);
+  pw_progress_at (&solver->fit->progress, (solver->searches + part) / solver->fit->starts);
 }
 
 /* Iterates from u, where the last run was made.  Unlike gsl_multifit_nlinear_driver, it ends when derivatives cannot be
@@ -635,7 +631,7 @@ static int fit_solve (pw_fit *fit, pw_error *error) {
   return solver.status;
 }
 
-/* The reports of `pinwheel fit`. */
+/* ---- Reports ---- */
 
 enum {
   REPORT_DIGITS = 7,
@@ -655,18 +651,13 @@ static double report_correlation (const pw_fit *fit, int i, int j) {
              : NAN;
 }
 
-/* Half the width of confidence intervals in standard errors: from the normal distribution if standard deviations are
- * given, else from Student's. */
-static double report_quantile (const pw_fit *fit) {
-  double tail = (1 - fit->confidence) / 2;
-  return fit->weighted ? gsl_cdf_gaussian_Qinv (tail, 1)
-                       : gsl_cdf_tdist_Qinv (tail, fmax (fit_degrees_of_freedom (fit), 1));
-}
-
-/* The lower (side -1) or upper (side 1) end of the confidence interval of unknown i; NaN if there is none. */
+/* The lower (side -1) or upper (side 1) end of the confidence interval of unknown i, from the normal distribution if
+ * standard deviations are given, else from Student's; NaN if there is none. */
 static double report_interval_end (const pw_fit *fit, int i, int side) {
-  return isfinite (fit->standard_error[i]) ? fit->estimate[i] + side * report_quantile (fit) * fit->standard_error[i]
-                                           : NAN;
+  const double tail = (1 - fit->confidence) / 2,
+               quantile = fit->weighted ? gsl_cdf_gaussian_Qinv (tail, 1)
+                                        : gsl_cdf_tdist_Qinv (tail, fmax (fit_degrees_of_freedom (fit), 1));
+  return isfinite (fit->standard_error[i]) ? fit->estimate[i] + side * quantile * fit->standard_error[i] : NAN;
 }
 
 /* "at its lower bound", "at its upper bound"; "" if the estimate of unknown i is at neither. */
@@ -725,9 +716,7 @@ static void report_columns (const pw_fit *fit) {
   putchar ('\n');
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     pw_cell (&t, -12, "data");
-    pw_cell (&t, 8, "number");
-    pw_cell (&t, 12, "rms residual");
-    pw_row_end (&t);
+    pw_head (&t, 8, 12, (const char *[]){ "number", "rms residual", NULL });
     for (int i = 0; i < fit->columns; i++) {
       int count;
       double rms = report_rms (fit, i, &count);
@@ -929,11 +918,9 @@ static int fit_table (const pw_fit *fit, FILE *f, pw_error *error) {
 static int fit_draw (const pw_fit *fit, pw_error *error) {
   const int panels = fit->columns < REPORT_PANELS ? fit->columns : REPORT_PANELS, several = panels > 1;
   const char *style = fit->weighted ? "bars" : "data", *label = fit->weighted ? "data ± σ" : "data";
-  pw_figures figures;
   pw_curves c;
-  if (pw_figures_of (&figures, &fit->line, &fit->model, fit->plots_path, error) != PW_OK ||
-      pw_curves_open (&c, &figures, "fit", "data and fitted model", error) != PW_OK)
-    return error->status;
+  int status = pw_curves_open (&c, &fit->line, &fit->model, fit->plots_path, "fit", "data and fitted model", error);
+  if (status != PW_OK) return status;
   for (int i = 0; i < panels; i++) {
     const double *t = fit->t, *data = fit->data + i * fit->rows, *fitted = fit->fitted + i * fit->rows,
                  *sigma = fit->sigma + i * fit->rows;

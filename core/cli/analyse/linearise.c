@@ -9,8 +9,6 @@
 #include "report.h"
 #include "states.h"
 
-/* The command `pinwheel linearise`, its result and its reports (linearise.c). */
-
 typedef struct {
   pw_cli_line line;
   const char *t_text;                       /* of --at */
@@ -110,16 +108,6 @@ static int linearise_solve_steady (pw_linearise_command *cmd, pw_steady *steady,
   return PW_OK;
 }
 
-static int linearise_find_steady (pw_linearise_command *cmd, double span, pw_error *error) {
-  pw_initial_value hold[PW_HOLDS];
-  pw_steady_settings set = { .hold = hold, .t = cmd->t, .span = span, .vary = -1 /* none of them */ };
-  if (pw_hold_read (cmd->m.system, cmd->hold_texts, hold, &set.holds, error) != PW_OK) return error->status;
-  pw_steady *steady = pw_steady_open (cmd->m.system, &set, error);
-  int status = linearise_solve_steady (cmd, steady, error);
-  pw_steady_close (steady);
-  return status;
-}
-
 /* Runs the model to the time of --at, and makes the state reached consistent; or opens a run at the steady motion. */
 static int linearise_run (pw_linearise_command *cmd, pw_error *error) {
   pw_run_defaults d = pw_cli_defaults (pw_file_table (cmd->m.file));
@@ -129,7 +117,13 @@ static int linearise_run (pw_linearise_command *cmd, pw_error *error) {
   settings.span = cmd->steady ? t_end /* after --at: signals are constant in it */ : fmax (t_end, cmd->t);
   pw_limit_start (&cmd->limit);
   if (cmd->steady) {
-    if (linearise_find_steady (cmd, settings.span, error) != PW_OK) return error->status;
+    pw_initial_value hold[PW_HOLDS];
+    pw_steady_settings set = { .hold = hold, .t = cmd->t, .span = settings.span, .vary = -1 /* none of them */ };
+    if (pw_hold_read (cmd->m.system, cmd->hold_texts, hold, &set.holds, error) != PW_OK) return error->status;
+    pw_steady *steady = pw_steady_open (cmd->m.system, &set, error);
+    int status = linearise_solve_steady (cmd, steady, error);
+    pw_steady_close (steady);
+    if (status != PW_OK) return status;
     settings.t = cmd->t;
     settings.initial = cmd->initial;
     settings.initials = 2 * pw_system_coordinates (cmd->m.system);
@@ -157,7 +151,7 @@ static int linearise_compute (pw_linearise_command *cmd, pw_error *error) {
   return status;
 }
 
-/* The reports of `pinwheel linearise`: text, matrices in files, and the page of modes. */
+/* ---- Reports: text, matrices in files, and the page of modes ---- */
 
 enum {
   LINEARISE_DIGITS = 5, /* of numbers in the text */

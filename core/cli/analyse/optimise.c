@@ -283,19 +283,17 @@ static void search_constraints (unsigned count, double *violation, unsigned unkn
 
 /* ---- Searches ---- */
 
-/* SLSQP uses derivatives.  Without them BOBYQA is the fastest, but takes neither constraints, as COBYLA does, nor a
- * single unknown, as SBPLX does. */
-static nlopt_algorithm search_algorithm (const local_search *local) {
-  if (local->slope) return NLOPT_LD_SLSQP;
-  if (local->constrained) return NLOPT_LN_COBYLA;
-  return local->problem->unknowns.count == 1 ? NLOPT_LN_SBPLX : NLOPT_LN_BOBYQA;
-}
-
-/* Opens the optimiser with the bounds and these first and last steps of scaled unknowns. */
+/* Opens the optimiser with the bounds and these first and last steps of scaled unknowns.  SLSQP uses derivatives.
+ * Without them BOBYQA is the fastest, but takes neither constraints, as COBYLA does, nor a single unknown, as SBPLX
+ * does. */
 static int search_open (local_search *local, double first, double last) {
   const pw_unknowns *unknowns = &local->problem->unknowns;
   int n = unknowns->count, done = 1;
-  nlopt_opt o = local->optimiser = nlopt_create (search_algorithm (local), (unsigned)n);
+  const nlopt_algorithm algorithm = local->slope         ? NLOPT_LD_SLSQP
+                                    : local->constrained ? NLOPT_LN_COBYLA
+                                    : n == 1             ? NLOPT_LN_SBPLX
+                                                         : NLOPT_LN_BOBYQA;
+  nlopt_opt o = local->optimiser = nlopt_create (algorithm, (unsigned)n);
   if (o == NULL) return PW_RESOURCE;
   nlopt_set_min_objective (o, search_objective, local);
   for (int i = 0; i < n; i++) {
@@ -529,7 +527,7 @@ static int optimise_search (pw_optimise *problem, pw_error *error) {
   return status;
 }
 
-/* The reports of `pinwheel optimise`. */
+/* ---- Reports ---- */
 
 enum {
   REPORT_DIGITS = 9,
@@ -539,11 +537,6 @@ enum {
 /* The objective of the first run, with the initial values; NaN if it failed. */
 static double report_initial (const pw_optimise *problem) {
   return problem->search[0].runs > 0 ? problem->search[0].trials[problem->unknowns.count] : NAN;
-}
-
-/* 1 if no unknown has an effect on the objective. */
-static int report_is_constant (const pw_optimise *problem) {
-  return memchr (problem->objective_same, 0, (size_t)problem->unknowns.count) == NULL;
 }
 
 /* The bound at which the best value of unknown i is: -1 the lower one, 1 the upper one, 0 neither, or no effect.  The
@@ -616,7 +609,8 @@ static void optimise_print (const pw_optimise *problem) {
     pw_cli_print (stdout, "%s failed and %s as infeasible, the first of them: %s\n",
                   PW_COUNTED (problem->failed, "run"), problem->failed == 1 ? "counts" : "count",
                   problem->first_error->text);
-  if (report_is_constant (problem)) pw_cli_say ("pinwheel: no free value has an effect on %s\n", problem->output[0]);
+  if (memchr (problem->objective_same, 0, (size_t)problem->unknowns.count) == NULL)
+    pw_cli_say ("pinwheel: no free value has an effect on %s\n", problem->output[0]);
   if (pw_unknowns_options (&problem->unknowns, problem->best->to, options)) printf ("\n%s\n", options);
 }
 
@@ -684,8 +678,6 @@ static void optimise_json (const pw_optimise *problem, const char *status, FILE 
   pw_json_close (j, '}');
 }
 
-/* ---- YAML ---- */
-
 /* Writes the command that runs the result, as a comment: the given options that affect runs, then the values found. */
 static void report_command (const pw_optimise *problem, const char *values, FILE *f) {
   const pw_cli_line *line = &problem->line;
@@ -706,12 +698,6 @@ static void report_command (const pw_optimise *problem, const char *values, FILE
   fprintf (f, " %s\n", values);
 }
 
-static void report_yaml_text (FILE *f, const char *key, const char *text) {
-  fprintf (f, "%s: ", key);
-  pw_cli_quoted (f, text, "''");
-  fputc ('\n', f);
-}
-
 static void optimise_yaml (const pw_optimise *problem, FILE *f) {
   char values[PW_UNKNOWNS_OPTIONS];
   const pw_search *best = problem->best;
@@ -719,9 +705,11 @@ static void optimise_yaml (const pw_optimise *problem, FILE *f) {
     report_command (problem, values, f);
   if (problem->incomplete)
     fprintf (f, "# perhaps not an optimum: %.*s\n", (int)strcspn (problem->incomplete, "\r\n"), problem->incomplete);
-  report_yaml_text (f, "model", pw_file_name (problem->model.file));
-  report_yaml_text (f, problem->maximise ? "maximise" : "minimise", problem->output[0]);
-  fprintf (f, "value: %.17g\n", best->output[0]);
+  fputs ("model: ", f);
+  pw_cli_quoted (f, pw_file_name (problem->model.file), "''");
+  fputs (problem->maximise ? "\nmaximise: " : "\nminimise: ", f);
+  pw_cli_quoted (f, problem->output[0], "''");
+  fprintf (f, "\nvalue: %.17g\n", best->output[0]);
   for (int initial = 0; initial < 2; initial++)
     for (int i = 0, first = 1; i < problem->unknowns.count; i++) {
       if ((problem->unknowns.list[i].parameter == NULL) != initial) continue;
@@ -738,11 +726,10 @@ static int optimise_draw (const pw_optimise *problem, pw_error *error) {
   static const char *const style[] = { "infeasible", "feasible" };
   const int n = problem->unknowns.count, width = n + problem->outputs, panels = n < REPORT_PANELS ? n : REPORT_PANELS;
   const char *objective = PW_FIGURE_LABEL (problem->output[0], problem->unit[0]);
-  pw_figures figures;
   pw_curves c;
-  if (pw_figures_of (&figures, &problem->line, &problem->model, problem->plots_path, error) != PW_OK ||
-      pw_curves_open (&c, &figures, "optimise", "runs of the optimisation", error) != PW_OK)
-    return error->status;
+  int status = pw_curves_open (&c, &problem->line, &problem->model, problem->plots_path, "optimise",
+                               "runs of the optimisation", error);
+  if (status != PW_OK) return status;
   for (int i = 0; i < panels; i++) {
     pw_curves_panel (
         &c, &(pw_panel){ .x_label = PW_FIGURE_LABEL (problem->unknowns.list[i].name, problem->unknowns.list[i].unit),

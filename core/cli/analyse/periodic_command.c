@@ -8,8 +8,6 @@
 #include "cli.h"
 #include "states.h"
 
-/* The command `pinwheel periodic`, its result and its reports (periodic_command.c). */
-
 /* A periodic motion found, or a point of a branch. */
 typedef struct {
   pw_periodic_orbit orbit; /* its arrays are in `state` */
@@ -185,7 +183,7 @@ static int periodic_compute (pw_periodic_command *cmd, pw_error *error) {
   return status == PW_RETRY ? PW_OK : status;
 }
 
-/* The reports of `pinwheel periodic`: text, JSON, table and figure. */
+/* ---- Reports ---- */
 
 enum {
   PERIODIC_MOST = 12,     /* multipliers in the text, at most */
@@ -339,13 +337,6 @@ static void periodic_print_branch (const pw_periodic_command *cmd) {
   double last = cmd->point[cmd->points - 1].orbit.parameter;
   if (!cmd->stopped && *pw_periodic_reason (cmd->search))
     printf ("\nThe branch ends at %s = %.9g: %s\n", cmd->vary.name, last, pw_periodic_reason (cmd->search));
-}
-
-static void periodic_print (const pw_periodic_command *cmd) {
-  if (cmd->vary_text)
-    periodic_print_branch (cmd);
-  else
-    periodic_print_motion (cmd, &cmd->point->orbit);
 }
 
 /* ---- JSON ---- */
@@ -541,11 +532,9 @@ static int periodic_write (const pw_periodic_command *cmd, pw_error *error) {
   const double range[] = { fmin (cmd->settings.first, cmd->settings.last),
                            fmax (cmd->settings.first, cmd->settings.last) };
   const char *title = cmd->vary_text ? "periodic motions" : "periodic motion over one period, Floquet multipliers";
-  pw_figures figures;
   pw_curves c;
   int status = pw_figure_write_tables (cmd->folder, "periodic", 1, cmd, periodic_csv, periodic_json, error);
-  if (status == PW_OK) status = pw_figures_of (&figures, &cmd->line, &cmd->m, cmd->folder, error);
-  if (status == PW_OK) status = pw_curves_open (&c, &figures, "periodic", title, error);
+  if (status == PW_OK) status = pw_curves_open (&c, &cmd->line, &cmd->m, cmd->folder, "periodic", title, error);
   if (status != PW_OK) return status;
   if (cmd->vary_text)
     periodic_draw_branch (cmd, &c, range);
@@ -565,7 +554,8 @@ static int periodic_command (void *options, pw_error *error) {
     status = pw_figure_lock_folder (&cmd->line, &cmd->m, cmd->folder, "periodic", &cmd->files, error);
   if (status == PW_OK) pw_report_model (&cmd->m), pw_cli_report_tables (cmd->m.system, cmd->settings.period);
   if (status == PW_OK) status = periodic_compute (cmd, error);
-  if (status == PW_OK && cmd->points) periodic_print (cmd);
+  if (status == PW_OK && cmd->points && cmd->vary_text) periodic_print_branch (cmd);
+  if (status == PW_OK && cmd->points && !cmd->vary_text) periodic_print_motion (cmd, &cmd->point->orbit);
   if (status == PW_OK && cmd->points && cmd->folder) status = periodic_write (cmd, error);
   pw_files_close (&cmd->files);
   for (int i = 0; i < cmd->points; i++) free (cmd->point[i].state);

@@ -59,11 +59,6 @@ static int sensitivity_neighbour (const sensitivity *cmd, const double *values, 
   return run->run ? PW_OK : error->status;
 }
 
-static int sensitivity_same_size (const pw_system *a, const pw_system *b) {
-  return pw_system_elements (a) == pw_system_elements (b) && pw_system_coordinates (a) == pw_system_coordinates (b) &&
-         pw_system_rows (a) == pw_system_rows (b);
-}
-
 /* Refuses parameters that change the number of bodies or elements, and initial values that the constraints determine:
  * then making the state of a neighbour consistent changes them back, by much more than 1 % of the step. */
 static int sensitivity_check (const sensitivity *cmd, const double *values, int p, pw_error *error) {
@@ -78,7 +73,10 @@ static int sensitivity_check (const sensitivity *cmd, const double *values, int 
     pw_error own = { 0 };
     int opened = sensitivity_neighbour (cmd, values, p, side * step, &run, &own);
     if (opened == PW_RESOURCE) status = pw_fail (error, opened, "%s", own.text);
-    if (opened == PW_OK && !sensitivity_same_size (s, run.m.system))
+    const pw_system *other = run.m.system;
+    if (opened == PW_OK &&
+        (pw_system_elements (s) != pw_system_elements (other) ||
+         pw_system_coordinates (s) != pw_system_coordinates (other) || pw_system_rows (s) != pw_system_rows (other)))
       status = pw_fail (error, PW_INPUT,
                         "%s changes the number of bodies or elements: derivatives with respect to it do not exist",
                         unknown->name);
@@ -359,11 +357,9 @@ static void sensitivity_label (const sensitivity *cmd, int output, int unknown, 
  * compared. */
 static int sensitivity_draw (const sensitivity *cmd, pw_error *error) {
   const pw_unknowns *u = &cmd->unknowns;
-  pw_figures figures;
   pw_curves c;
-  if (pw_figures_of (&figures, &cmd->line, &cmd->m, cmd->folder, error) != PW_OK ||
-      pw_curves_open (&c, &figures, "sensitivity", "derivatives along the run", error) != PW_OK)
-    return error->status;
+  int status = pw_curves_open (&c, &cmd->line, &cmd->m, cmd->folder, "sensitivity", "derivatives along the run", error);
+  if (status != PW_OK) return status;
   for (int o = 0; o < cmd->outputs.count; o++) {
     char label[300];
     pw_curves_panel (

@@ -8,8 +8,6 @@
 #include "report.h"
 #include "cli.h"
 
-/* The command `pinwheel steady`, its result and its reports (steady_command.c). */
-
 /* A steady motion found, or a point of a branch. */
 typedef struct {
   int branch;              /* number of its branch, from 1; without --vary the number of the motion */
@@ -347,7 +345,7 @@ static int steady_compute (pw_steady_command *cmd, pw_error *error) {
   return status;
 }
 
-/* The reports of `pinwheel steady`: text, JSON, table and figure. */
+/* ---- Reports ---- */
 
 enum {
   STEADY_DIGITS = 6,         /* of numbers in the text */
@@ -591,17 +589,12 @@ static void steady_draw_parts (const pw_steady_command *cmd, pw_curves *c, stead
     }
 }
 
-/* Draws lines at the folds, or at the other events; they are in the legend if there are any. */
+/* Draws lines at the folds, or at the other events. */
 static void steady_draw_events (const pw_steady_command *cmd, pw_curves *c, int folds) {
-  int events = 0;
-  for (int draw = 0; draw < 2; draw++) {
-    if (draw) pw_curves_add (c, folds ? "fold" : "change", !events ? NULL : folds ? "fold" : "stability changes");
-    for (const pw_steady_point *p = cmd->point; p < cmd->point + cmd->points; p++) {
-      if (p->motion.event == PW_STEADY_POINT || (p->motion.event == PW_STEADY_FOLD) != folds) continue;
-      events++;
-      if (draw) pw_curves_point (c, p->motion.parameter, INFINITY, 0);
-    }
-  }
+  pw_curves_add (c, folds ? "fold" : "change", folds ? "fold" : "stability changes");
+  for (const pw_steady_point *p = cmd->point; p < cmd->point + cmd->points; p++)
+    if (p->motion.event != PW_STEADY_POINT && (p->motion.event == PW_STEADY_FOLD) == folds)
+      pw_curves_point (c, p->motion.parameter, INFINITY, 0);
 }
 
 /* The ranges of real and imaginary parts in the figure [1/s].  Modes that decay much faster than others grow or oscillate
@@ -629,11 +622,9 @@ static int steady_draw (const pw_steady_command *cmd, pw_error *error) {
                last = fmax (cmd->settings.first, cmd->settings.last);
   const char *parameter = PW_FIGURE_LABEL (cmd->vary.name, cmd->vary.unit);
   double re[2], im[2];
-  pw_figures figures;
   pw_curves c;
-  if (pw_figures_of (&figures, &cmd->line, &cmd->m, cmd->folder, error) != PW_OK ||
-      pw_curves_open (&c, &figures, "steady", "eigenvalues of steady motions", error) != PW_OK)
-    return error->status;
+  int status = pw_curves_open (&c, &cmd->line, &cmd->m, cmd->folder, "steady", "eigenvalues of steady motions", error);
+  if (status != PW_OK) return status;
   steady_ranges (cmd, re, im);
   for (int part = REAL; part <= IMAGINARY; part++) {
     pw_panel panel = { .x_label = parameter, .x = { first, last }, .type = part == REAL ? 0 : PW_PANEL_BELOW };

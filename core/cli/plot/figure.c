@@ -27,14 +27,6 @@ int pw_figure_width (const char *text, double *width, pw_error *error) {
   return status;
 }
 
-int pw_figures_of (pw_figures *f, const pw_cli_line *line, const pw_cli_model *model, const char *folder,
-                   pw_error *error) {
-  *f = (pw_figures){ .folder = folder,
-                     .model = pw_file_name (model->file),
-                     .about = pw_file_table (model->file)->about };
-  return pw_figure_width (line->width, &f->width, error);
-}
-
 /* ---- The folder ---- */
 
 pw_output *pw_figure_open_file (const char *folder, const char *name, pw_error *error) {
@@ -216,10 +208,15 @@ int pw_figure_status (int drawn, const pw_error *drawing, int status, pw_error *
 
 /* ---- Panels of curves ---- */
 
-int pw_curves_open (pw_curves *c, const pw_figures *figures, const char *name, const char *title, pw_error *error) {
-  *c = (pw_curves){ .folder = figures->folder, .name = name };
-  c->data = pw_figure_open_data (figures, PW_PRINTED (60, "%s.dat", name), error);
-  c->script = c->data ? pw_figure_begin (figures, name, error) : NULL;
+int pw_curves_open (pw_curves *c, const pw_cli_line *line, const pw_cli_model *model, const char *folder,
+                    const char *name, const char *title, pw_error *error) {
+  pw_figures figures = { .folder = folder,
+                         .model = pw_file_name (model->file),
+                         .about = pw_file_table (model->file)->about };
+  *c = (pw_curves){ .folder = folder, .name = name };
+  if (pw_figure_width (line->width, &figures.width, error) != PW_OK) return error->status;
+  c->data = pw_figure_open_data (&figures, PW_PRINTED (60, "%s.dat", name), error);
+  c->script = c->data ? pw_figure_begin (&figures, name, error) : NULL;
   if (c->script) return pw_figure_text (pw_output_stream (c->script), "title", title), PW_OK;
   if (c->data) pw_output_discard (c->data);
   return PW_RESOURCE;

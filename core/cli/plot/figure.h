@@ -29,9 +29,6 @@ extern const char *const pw_figure_endings[];
   PW_TEXT_OPTION (pw_cli_line, width, "width", 0, "WIDTH", \
                   "Width of figures, such as 85mm for one column (default 170mm)")
 int pw_figure_width (const char *text, double *width, pw_error *error);
-/* Figures of the model of a command line in a folder, of the width that it gives.  A status. */
-int pw_figures_of (pw_figures *f, const pw_cli_line *line, const pw_cli_model *model, const char *folder,
-                   pw_error *error);
 
 /* Opens a file of a folder; a data file, with a comment if the run is incomplete.  NULL and PW_RESOURCE. */
 pw_output *pw_figure_open_file (const char *folder, const char *name, pw_error *error);
@@ -98,12 +95,14 @@ typedef struct {
   int bars;                          /* 1: z is a standard deviation */
 } pw_curves;
 
-/* Opens NAME.dat and NAME.gp, then panels and curves are added to them in turn: curves to the last panel, points to the
- * last curve.  A panel without points is omitted, a figure without panels is not written.  PW_OK or PW_RESOURCE. */
-int pw_curves_open (pw_curves *c, const pw_figures *figures, const char *name, const char *title, pw_error *error);
+/* Opens NAME.dat and NAME.gp in the folder, of the width that the command line gives; then panels and curves are added to them in turn: curves to the last panel, points to the
+ * last curve.  A panel without points is omitted, a figure without panels is not written.  PW_OK, PW_INPUT for the width or
+ * PW_RESOURCE. */
+int pw_curves_open (pw_curves *c, const pw_cli_line *line, const pw_cli_model *model, const char *folder,
+                    const char *name, const char *title, pw_error *error);
 void pw_curves_panel (pw_curves *c, const pw_panel *panel);
-/* Styles are those of `look` in panels.gp; `method STABILISATION` with the method as label.  Label NULL or "": not in the
- * legend; that of the first panel is not repeated. */
+/* Styles are those of `look` in panels.gp; `method STABILISATION` with the method as label.  Labels are in a legend,
+ * unless they are NULL or repeat those of an earlier panel, or the curve has no points. */
 void pw_curves_add (pw_curves *c, const char *style, const char *label);
 /* z: on the scale of colours, the number of a colour, or a standard deviation.  A point with a NaN, or without a logarithm,
  * interrupts the curve.  The line of an event has y = INFINITY; a band below y has x = INFINITY. */

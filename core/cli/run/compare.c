@@ -354,7 +354,7 @@ static int compare_figures (pw_study *study, pw_error *error) {
       const double e = row->state == ROW_DONE ? row->point[0][POINT_LENGTH + unit] : NAN;
       if (e > 0 && isfinite (e)) least = fmin (least, e), most = fmax (most, e);
     }
-    status = pw_curves_open (&c, &study->figures, name[unit], title[unit], error);
+    status = pw_curves_open (&c, &study->line, &study->compiled, study->folder, name[unit], title[unit], error);
     for (int k = 0; status == PW_OK && k < 2; k++) {
       pw_curves_panel (&c, &(pw_panel){ .x_label = axis[k],
                                         .y_label = label[unit],

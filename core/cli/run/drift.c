@@ -273,7 +273,7 @@ static int drift_figures (pw_study *study, pw_error *error) {
   int status = drift_write_times (study, error);
   for (int group = 0; status == PW_OK && group < DRIFT_GROUPS; group++) {
     pw_curves c;
-    status = pw_curves_open (&c, &study->figures, name[group], title[group], error);
+    status = pw_curves_open (&c, &study->line, &study->compiled, study->folder, name[group], title[group], error);
     if (status != PW_OK) return status;
     for (int i = 0; i < DRIFT_QUANTITIES; i++) {
       pw_panel panel = { .x_label = axis[group], .y_label = label[i], .type = PW_PANEL_BELOW | PW_PANEL_LOG_Y };

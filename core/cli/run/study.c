@@ -176,7 +176,8 @@ static int study_open_folder (pw_study *study, pw_error *error) {
                    { "--reference", study->reference_path, PW_READS, NULL },
                    { "-o", study->folder, PW_WRITES_INTO, names } };
   if (study->folder == NULL) return pw_cli_requires ("--width", study->line.width, "-o DIR", 0, error);
-  int status = pw_figures_of (&study->figures, &study->line, &study->compiled, study->folder, error);
+  double width;
+  int status = pw_figure_width (study->line.width, &width, error);
   if (status == PW_OK)
     status = pw_files_open (&study->files, &study->line, &study->compiled, use, sizeof use / sizeof *use, error);
   return status == PW_OK ? pw_study_open_table (study, error) : status;

@@ -102,8 +102,7 @@ struct pw_study {
   pw_limit limit;   /* of a run with a visitor, checked in every step */
   double cpu_limit; /* of every run, checked between batches of steps [s]: ROW_STOPPED; INFINITY: the run fails */
   double t_end;     /* [s] */
-  pw_figures figures;
-  pw_arena arena; /* of the points of rows, and of what a command keeps there */
+  pw_arena arena;   /* of the points of rows, and of what a command keeps there */
   /* in progress */
   pw_files files; /* the locked folder */
   int quiet;      /* 1: rows are not printed */

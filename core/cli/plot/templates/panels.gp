@@ -95,7 +95,7 @@ do for [k = 1:panels] {
       plots[k] = plots[k].sprintf(', data index %d every %d::%d with points ls %d notitle', get('block', c), \
         step < 2 ? 1 : step, step < 2 ? 0 : int(step*(i - 1.0)/curves), i)
     }
-    if (strlen(label)) {
+    if (strlen(label) && (get('block', c) >= 0 || s eq 'method')) {
       entries[k] = entries[k] + 1
       longest = max(longest, strlen(label))
       legend[k] = legend[k].label."\n"
