@@ -61,7 +61,8 @@ int pw_column_find (const pw_system *s, const char *name, const char *origin, pw
   return pw_fail (error, PW_INPUT, "%s: no column \"%.100s\"%s", origin, name, pw_nearest_text (&near));
 }
 
-/* The value of a column in a sample; NaN for contact points, and for entries of the ledger without pw_settings.ledger. */
+/* The value of a column in a sample; NaN for contact points, and for entries of the ledger without
+ * pw_settings.ledger. */
 static double outcome_column_value (const pw_system *s, pw_column c, const pw_sample *sample) {
   int n = pw_system_coordinates (s);
   if (c.type == PW_COLUMN_STATE) return c.index < n ? sample->q[c.index] : sample->v[c.index - n];

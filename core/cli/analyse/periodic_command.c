@@ -474,7 +474,8 @@ static double periodic_curve (const pw_periodic_orbit *o, int k) {
 }
 
 /* Draws the parts of the branch whose motions have no growing perturbations (`stable`: 1), or have some (0).  A point
- * where one part ends and the next begins belongs to both.  From an event on, the stability is that of the next point. */
+ * where one part ends and the next begins belongs to both.  From an event on, the stability is that of the next
+ * point. */
 static void periodic_draw_parts (const pw_periodic_command *cmd, pw_curves *c, int k, int stable) {
   int inside = 0; /* 1: the last point began or continued a part */
   pw_curves_add (c, stable ? "stable" : "unstable", stable ? "stable" : "unstable");

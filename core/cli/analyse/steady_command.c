@@ -589,16 +589,18 @@ static void steady_draw_parts (const pw_steady_command *cmd, pw_curves *c, stead
     }
 }
 
-/* Draws lines at the folds, or at the other events. */
+/* Draws lines at the folds, or at the other events, if there are any. */
 static void steady_draw_events (const pw_steady_command *cmd, pw_curves *c, int folds) {
-  pw_curves_add (c, folds ? "fold" : "change", folds ? "fold" : "stability changes");
-  for (const pw_steady_point *p = cmd->point; p < cmd->point + cmd->points; p++)
-    if (p->motion.event != PW_STEADY_POINT && (p->motion.event == PW_STEADY_FOLD) == folds)
-      pw_curves_point (c, p->motion.parameter, INFINITY, 0);
+  int events = 0;
+  for (const pw_steady_point *p = cmd->point; p < cmd->point + cmd->points; p++) {
+    if (p->motion.event == PW_STEADY_POINT || (p->motion.event == PW_STEADY_FOLD) != folds) continue;
+    if (events++ == 0) pw_curves_add (c, folds ? "fold" : "change", folds ? "fold" : "stability changes");
+    pw_curves_point (c, p->motion.parameter, INFINITY, 0);
+  }
 }
 
-/* The ranges of real and imaginary parts in the figure [1/s].  Modes that decay much faster than others grow or oscillate
- * are not shown, unless the others are nearly 0. */
+/* The ranges of real and imaginary parts in the figure [1/s].  Modes that decay much faster than others grow or
+ * oscillate are not shown, unless the others are nearly 0. */
 static void steady_ranges (const pw_steady_command *cmd, double re[2], double im[2]) {
   double low = INFINITY, high = -INFINITY, imaginary = 0;
   for (const pw_steady_point *p = cmd->point; p < cmd->point + cmd->points; p++)

@@ -227,18 +227,18 @@ static void curves_text (const pw_curves *c, const char *variable, int i, const 
   pw_figure_text (pw_output_stream (c->script), PW_PRINTED (40, "%s_%d", variable, i), text);
 }
 
-/* The ends of an axis: those given, if the first one is less; else of the points, with a margin, on a logarithmic axis y
- * to a power of ten. */
-static void curves_range (double range[2], const double given[2], const double points[2], int logarithmic, int power) {
+/* Sets the range of an axis: as given, if its first end is less; else that of the points, with a margin, or if
+ * `decades` to powers of ten. */
+static void curves_range (double range[2], const double given[2], const double points[2], int logarithmic,
+                          int decades) {
   const double low = points[0], high = points[1], largest = fmax (fabs (low), fabs (high)),
-               edge = high - low > 1e-6 * largest ? 0.05 * (high - low)
-                      : largest > 0               ? 0.1 * largest
-                                                  : 1,
-               ratio = pow (high / low, 0.05) * 1.01;
-  range[0] = given[0], range[1] = given[1];
-  if (given[0] < given[1]) return;
-  range[0] = !logarithmic ? low - edge : power ? pow (10, floor (log10 (low) - 0.2)) : low / ratio;
-  range[1] = !logarithmic ? high + edge : power ? pow (10, ceil (log10 (high) + 0.2)) : high * ratio;
+               least = largest > 0 ? 0.1 * largest : 1, extent = high - low,
+               edge = extent > 1e-6 * largest ? 0.05 * extent : least, ratio = 1.01 * pow (high / low, 0.05);
+  const int known = given[0] < given[1];
+  range[0] = known ? given[0] : -1, range[1] = known ? given[1] : 1;
+  if (known || low > high) return;
+  range[0] = !logarithmic ? low - edge : decades ? pow (10, floor (log10 (low) - 0.2)) : low / ratio;
+  range[1] = !logarithmic ? high + edge : decades ? pow (10, ceil (log10 (high) + 0.2)) : high * ratio;
 }
 
 /* Extends the ranges, so that both axes have the same unit in a panel that is `aspect` times as high as wide. */
@@ -253,7 +253,6 @@ static double curves_equal (double range[2][2]) {
   return aspect;
 }
 
-/* Ends a curve. */
 static void curves_end (pw_curves *c) {
   if (c->curves == c->ended) return;
   fprintf (pw_output_stream (c->script), "block_%d = %d\npoints_%d = %d\n", c->curves, c->points ? c->blocks++ : -1,
@@ -261,23 +260,22 @@ static void curves_end (pw_curves *c) {
   c->ended = c->curves;
 }
 
-/* Ends a panel; without points it and its curves are forgotten. */
+/* Ends a panel; without points and axes it and its curves are forgotten. */
 static void curves_end_panel (pw_curves *c) {
   const pw_panel *panel = &c->panel;
   double range[3][2];
   curves_end (c);
   if (c->first == 0) return;
-  if (!(c->range[0][0] <= c->range[0][1] && c->range[1][0] <= c->range[1][1])) {
+  const int empty = c->range[0][0] > c->range[0][1] || c->range[1][0] > c->range[1][1],
+            given = panel->x[0] < panel->x[1] && panel->y[0] < panel->y[1];
+  if (empty && !given) {
     c->curves = c->ended = c->first - 1;
     return;
   }
   c->panels++;
-  for (int k = 0; k < 3; k++)
-    curves_range (range[k], (const double *[]){ panel->x, panel->y, panel->z }[k], c->range[k],
-                  panel->type & (k == 0   ? PW_PANEL_LOG_X
-                                 : k == 1 ? PW_PANEL_LOG_Y
-                                          : 0),
-                  k == 1);
+  curves_range (range[0], panel->x, c->range[0], panel->type & PW_PANEL_LOG_X, 0);
+  curves_range (range[1], panel->y, c->range[1], panel->type & PW_PANEL_LOG_Y, 1);
+  curves_range (range[2], panel->z, c->range[2], 0, 0);
   const double aspect = panel->type & PW_PANEL_EQUAL ? curves_equal (range) : panel->aspect;
   fprintf (pw_output_stream (c->script), "aspect_%d = %g\ncurves_%d = '%d %d'\nrange_%d = '", c->panels, aspect,
            c->panels, c->first, c->curves, c->panels);

@@ -53,7 +53,7 @@ void pw_figure_text (FILE *f, const char *variable, const char *value);
 void pw_figure_element (FILE *f, const char *variable, int i, const char *value);
 /* A name of at most FIGURE_NAME bytes, shortened in the middle if need be. */
 const char *pw_figure_name (const char *name, char buffer[FIGURE_NAME + 4]);
-/* The label of an axis in a temporary buffer: "NAME [UNIT]", or "NAME" if the unit is ""; the name shortened likewise. */
+/* The label of an axis, in a temporary buffer: "NAME [UNIT]", or "NAME" if the unit is "", the name shortened. */
 #define PW_FIGURE_LABEL(name, unit) pw_figure_label (name, unit, (char[FIGURE_TITLE]){ 0 })
 const char *pw_figure_label (const char *name, const char *unit, char buffer[FIGURE_TITLE]);
 /* Runs gnuplot on NAME.gp for each of at most FIGURE_SCRIPTS names, a list ended by NULL; a missing gnuplot is reported
@@ -95,17 +95,17 @@ typedef struct {
   int bars;                          /* 1: z is a standard deviation */
 } pw_curves;
 
-/* Opens NAME.dat and NAME.gp in the folder, of the width that the command line gives; then panels and curves are added to them in turn: curves to the last panel, points to the
- * last curve.  A panel without points is omitted, a figure without panels is not written.  PW_OK, PW_INPUT for the width or
- * PW_RESOURCE. */
+/* Opens NAME.dat and NAME.gp in the folder, of the width that the command line gives.  Then panels and curves are added
+ * in turn, curves to the last panel, points to the last curve.  A panel without points is omitted unless its axes
+ * are given, a figure without panels is not written.  PW_OK, PW_INPUT for the width, or PW_RESOURCE. */
 int pw_curves_open (pw_curves *c, const pw_cli_line *line, const pw_cli_model *model, const char *folder,
                     const char *name, const char *title, pw_error *error);
 void pw_curves_panel (pw_curves *c, const pw_panel *panel);
-/* Styles are those of `look` in panels.gp; `method STABILISATION` with the method as label.  Labels are in a legend,
- * unless they are NULL or repeat those of an earlier panel, or the curve has no points. */
+/* Styles are those of `look` in panels.gp; `method STABILISATION` with the method as label.  Labels are in a legend
+ * above the panel unless they are NULL, or it would repeat an earlier one. */
 void pw_curves_add (pw_curves *c, const char *style, const char *label);
-/* z: on the scale of colours, the number of a colour, or a standard deviation.  A point with a NaN, or without a logarithm,
- * interrupts the curve.  The line of an event has y = INFINITY; a band below y has x = INFINITY. */
+/* z: on the scale of colours, the number of a colour, or a standard deviation.  A point with a NaN, or without a
+ * logarithm, interrupts the curve.  The line of an event has y = INFINITY; a band below y has x = INFINITY. */
 void pw_curves_point (pw_curves *c, double x, double y, double z);
 /* Complete the files, if the status is PW_OK, else discard them; the second one draws the figure.  A status. */
 int pw_curves_close (pw_curves *c, int status, pw_error *error);

@@ -61,7 +61,7 @@ do for [k = 1:panels] {
   used = 0 # colours
   solid = 0 # curves of style `line`
   longest = 8
-  plots[k] = ''
+  plots[k] = 'plot NaN notitle'
   legends[k] = 'plot NaN notitle'
   legend[k] = ''
   entries[k] = 0
@@ -95,7 +95,7 @@ do for [k = 1:panels] {
       plots[k] = plots[k].sprintf(', data index %d every %d::%d with points ls %d notitle', get('block', c), \
         step < 2 ? 1 : step, step < 2 ? 0 : int(step*(i - 1.0)/curves), i)
     }
-    if (strlen(label) && (get('block', c) >= 0 || s eq 'method')) {
+    if (strlen(label)) {
       entries[k] = entries[k] + 1
       longest = max(longest, strlen(label))
       legend[k] = legend[k].label."\n"
@@ -107,7 +107,6 @@ do for [k = 1:panels] {
   if (joined(k)) { entries[k] = 0 }
   do for [j = 1:k - 1] { if (legend[j] eq legend[k]) { entries[k] = 0 } }
   per_row[k] = columns(longest)
-  plots[k] = 'plot '.plots[k][3:*]
 }
 
 # ---- Places ----
