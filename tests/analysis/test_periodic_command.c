@@ -35,8 +35,8 @@ TEST (motion) {
   check_close ("re", cli_number (json, "motions", "multipliers", "re", NULL), 0.265099104796, 2e-8,
                "steps of the derivatives: 1e-9 each");
   assert_non_null (cli_file ("one/periodic.dat"));
-  assert_non_null (strstr (cli_file ("one/periodic.gp"), "branch = 0\n"));
-  assert_non_null (strstr (cli_file ("one/periodic.gp"), "set ylabel 'imaginary part'"));
+  assert_non_null (strstr (cli_file ("one/periodic.gp"), "\ny_1 = 'y [m]'\n"));
+  assert_non_null (strstr (cli_file ("one/periodic.gp"), "\ny_3 = 'imaginary part'\nscale_3 = ''\n"));
 }
 
 /* A vehicle without multipliers but those of symmetries: a figure of its path. */
@@ -171,7 +171,7 @@ TEST (branch) {
     folds += strncmp (strchr (line, ','), ",fold,", 6) == 0;
   assert_true (rows > 20);
   assert_int_equal (folds, 2);
-  assert_non_null (strstr (cli_file ("branch/periodic.gp"), "label_of_x = 'A'"));
+  assert_non_null (strstr (cli_file ("branch/periodic.gp"), "\nx_1 = 'A'\n"));
 }
 
 /* All seven pairs of multipliers of seven oscillators are shown. */

@@ -94,8 +94,8 @@ TEST (branch) {
   assert_true (rows > 50);
   assert_int_equal (events, 1);
   assert_non_null (cli_file ("car/steady.dat"));
-  assert_non_null (strstr (cli_file ("car/steady.gp"), "label_of_x = 'u [m/s]'"));
-  assert_non_null (strstr (cli_file ("car/steady.gp"), "set ylabel 'imaginary part [1/s]'"));
+  assert_non_null (strstr (cli_file ("car/steady.gp"), "\nx_1 = 'u [m/s]'\n"));
+  assert_non_null (strstr (cli_file ("car/steady.gp"), "\ny_3 = 'imaginary part [1/s]'\nscale_3 = 'u [m/s]'\n"));
   assert_true (cli_says (cli_file ("car/steady.json"), "parameter", "u"));
 }
 

@@ -19,20 +19,19 @@ TEST (rows) {
   const char *table = strstr (cli_out, "method,ladder");
   assert_non_null (table);
   assert_string_equal (
-      table,
-      "method,ladder,rung,status\n"
-      "rk4+projection,step,0.10000000000000001,ok\n"
-      "rk4+projection,step,0.050000000000000003,ok\n"
-      "rk4+projection,step,0.025000000000000001,ok\n"
-      "ida+ggl,rtol,1.0000000000000001e-05,ok\n"
-      "ida+ggl,rtol,9.9999999999999995e-07,ok\n"
-      "ida+ggl,rtol,9.9999999999999995e-08,ok\n"
-      "erk5:steps=fixed,step,0.10000000000000001,ok\n"
-      "erk5:steps=fixed,step,0.050000000000000003,ok\n"
-      "erk5:steps=fixed,step,0.025000000000000001,ok\n"
-      "compare.csv\ntruth.csv\nwork-precision-angles.gp\nwork-precision-angles.pdf\nwork-precision-angles.png\n"
-      "work-precision-angles.svg\nwork-precision.dat\nwork-precision.gp\nwork-precision.pdf\nwork-precision.png\n"
-      "work-precision.svg\n");
+      table, "method,ladder,rung,status\n"
+             "rk4+projection,step,0.10000000000000001,ok\n"
+             "rk4+projection,step,0.050000000000000003,ok\n"
+             "rk4+projection,step,0.025000000000000001,ok\n"
+             "ida+ggl,rtol,1.0000000000000001e-05,ok\n"
+             "ida+ggl,rtol,9.9999999999999995e-07,ok\n"
+             "ida+ggl,rtol,9.9999999999999995e-08,ok\n"
+             "erk5:steps=fixed,step,0.10000000000000001,ok\n"
+             "erk5:steps=fixed,step,0.050000000000000003,ok\n"
+             "erk5:steps=fixed,step,0.025000000000000001,ok\n"
+             "compare.csv\ntruth.csv\nwork-precision-angles.dat\nwork-precision-angles.gp\nwork-precision-angles.pdf\n"
+             "work-precision-angles.png\nwork-precision-angles.svg\nwork-precision.dat\nwork-precision.gp\n"
+             "work-precision.pdf\nwork-precision.png\nwork-precision.svg\n");
 }
 
 /* Fixed-step methods converge at their order, against a reference that is better than all of them. */

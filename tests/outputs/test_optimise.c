@@ -145,11 +145,12 @@ TEST (command) {
 TEST (failing) {
   cli_shell ("pinwheel optimise @/point.yaml --maximise 'p.x + 0*sqrt(0.3 - p.x)' --free a=-2:2 --json @/o.json "
              "--plots @/failing");
-  int failed = 0;
-  for (const char *row = cli_file ("failing/optimise.dat"); (row = strstr (row, " nan ")) != NULL; failed++)
-    assert_int_equal (strncmp (row += 5, "0\n", 2), 0);
+  int drawn = 0;
+  for (const char *row = cli_file ("failing/optimise.dat"); row; row = strchr (row, '\n'), row += row != NULL)
+    drawn += *row && strchr ("#\n", *row) == NULL;
   const char *json = cli_file ("o.json");
-  assert_int_equal (failed, cli_number (json, "failed", NULL));
+  const double failed = cli_number (json, "failed", NULL);
+  assert_true (drawn == cli_number (json, "runs", NULL) - failed + 1); /* the best one once more */
   check_close ("a", optimise_value (json, "a"), 0.3, 1e-5, "last steps of 1e-7 of 4, one-sided");
   assert_true (optimise_value (json, "a") <= 0.3 + 1e-12);
   assert_true (failed > 0);

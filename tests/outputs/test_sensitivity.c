@@ -268,7 +268,7 @@ TEST (files) {
   assert_non_null (strstr (json, "\"complete\": true"));
   assert_non_null (cli_file ("sens/sensitivity.svg"));
   cli_good ("pinwheel sensitivity pendulum --of 2*bob.x --by l -t 1 -o @/sens");
-  assert_non_null (strstr (cli_file ("sens/sensitivity.gp"), "label[1] = 'l × ∂/∂l'\n"));
+  assert_non_null (strstr (cli_file ("sens/sensitivity.gp"), "label_1 = 'l × ∂/∂l'\n"));
 }
 
 /* ---- The command ---- */

@@ -8,7 +8,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "sensitivity.h"
+#include "unknowns.h"
 #include "figure.h"
 #include "cli.h"
 
@@ -59,31 +59,14 @@ typedef struct {
 } pw_fit;
 
 /* An unknown nearer to a bound than this, relative to its scale, counts as at the bound; no search begins nearer. */
-#define PW_FIT_MARGIN 1e-3
+#define FIT_MARGIN 1e-3
 
 /* An unknown belongs to a combination that the data do not determine, a singular vector, if its component is larger. */
-#define PW_FIT_COMPONENT 0.01
+#define FIT_COMPONENT 0.01
 
-/* Runs the model with these values of the unknowns; out: columns x rows.  A status; PW_RETRY after Ctrl-C. */
-int pw_fit_run (const pw_fit *fit, const double *unknowns, double *out, pw_error *error);
-
-/* Derivatives of the model's values, `values` at these unknowns, with respect to each unknown: jacobian is unknowns x
- * (columns x rows).  By central differences of concurrent runs.  Sets fit->derivative_error.  A status; PW_RETRY after
- * Ctrl-C. */
-int pw_fit_jacobian (pw_fit *fit, const double *unknowns, const double *values, double *jacobian, pw_error *error);
-
-/* Minimises the sum of squares from all starts and sets the results.  A status; PW_RETRY after Ctrl-C. */
-int pw_fit_solve (pw_fit *fit, pw_error *error);
-
-static inline int pw_fit_degrees_of_freedom (const pw_fit *fit) {
+static int fit_degrees_of_freedom (const pw_fit *fit) {
   return fit->residuals - fit->rank;
 }
-
-/* Reports (fit.c): text, JSON with this status ("ok", ...), the table of data and residuals, figures. */
-void pw_fit_print (const pw_fit *fit);
-void pw_fit_json (const pw_fit *fit, const char *status, FILE *f);
-int pw_fit_table (const pw_fit *fit, FILE *f, pw_error *error);
-int pw_fit_draw (const pw_fit *fit, pw_error *error);
 
 /* ---- The data: columns of a table and their standard deviations ---- */
 
@@ -265,153 +248,12 @@ static int fit_read_data (pw_fit *fit, pw_error *error) {
   return status == PW_OK ? data_check (fit, error) : status;
 }
 
-/* ---- The command ---- */
-
-#define FIT_RUNS 50. /* usual number of runs of a search, to choose the engine */
-
-enum { FIT_TABLE = 2, FIT_SUMMARY }; /* indices in the list of files of fit_open */
-
-static int fit_options (pw_fit *fit, pw_error *error) {
-  double starts = 1;
-  fit->confidence = 0.95;
-  if (fit->data_path == NULL) return pw_fail (error, PW_INPUT, "no data: add --data FILE.csv");
-  if (fit->columns_text == NULL)
-    return pw_fail (error, PW_INPUT, "nothing to compare: add --columns NAME,..., columns of the data such as frame.x");
-  int status = pw_cli_number ("--confidence", fit->confidence_text, PW_POSITIVE, &fit->confidence, error);
-  if (status == PW_OK && !(fit->confidence < 1))
-    status = pw_fail (error, PW_INPUT, "--confidence %s: expected a number between 0 and 1", fit->confidence_text);
-  if (status == PW_OK) status = pw_cli_number ("--starts", fit->starts_text, PW_COUNT, &starts, error);
-  if (status == PW_OK && starts > 1e5) status = pw_fail (error, PW_INPUT, "--starts: at most 100000");
-  fit->starts = (int)starts;
-  if (status == PW_OK) status = pw_cli_check_csv (fit->table_path, error);
-  if (status == PW_OK)
-    status = pw_cli_requires ("--width", fit->line.width, "--plots DIR", fit->plots_path != NULL, error);
-  return status == PW_OK ? pw_parallel_jobs (fit->jobs_text, &fit->jobs, error) : status;
-}
-
-/* Reads the data and the unknowns; runs end at the time of the last row. */
-static int fit_open_data (pw_fit *fit, pw_error *error) {
-  int status = pw_unknowns_open (&fit->unknowns, &fit->line, &fit->model, error);
-  fit->t_end = fit->unknowns.t_end;
-  if (status == PW_OK) status = fit_read_data (fit, error);
-  if (status == PW_OK) status = pw_unknowns_read (&fit->unknowns, fit->free, error);
-  if (status != PW_OK) return status;
-  if (fit->residuals < fit->unknowns.count)
-    return pw_fail (error, PW_INPUT, "--data %s has fewer data (%d) than there are unknowns (%d)", fit->data_path,
-                    fit->residuals, fit->unknowns.count);
-  fit->unknowns.t_end = fit->unknowns.settings.span = fit->t[fit->rows - 1];
-  return pw_unknowns_engine (&fit->unknowns, FIT_RUNS, fit->starts, error);
-}
-
-static int fit_open (pw_fit *fit, pw_error *error) {
-  static const char *const figures[] = { "fit.dat", "fit.gp", "fit.svg", "fit.png", "fit.pdf", NULL };
-  pw_use use[] = { PW_CLI_MODEL_USE,
-                   { "--data", fit->data_path, PW_READS, NULL },
-                   { "-o", fit->table_path, PW_WRITES, pw_cli_csv },
-                   { "--json", fit->json_path, PW_WRITES, pw_cli_json },
-                   { "--plots", fit->plots_path, PW_WRITES_INTO, figures } };
-  int status = fit_options (fit, error);
-  if (status == PW_OK) status = pw_cli_open (&fit->model, &fit->line, error);
-  if (status == PW_OK) status = fit_open_data (fit, error);
-  return status == PW_OK ? pw_files_open (&fit->files, &fit->line, &fit->model, use, sizeof use / sizeof *use, error)
-                         : status;
-}
-
-static int fit_search (pw_fit *fit, pw_error *error) {
-  pw_stop_catch ();
-  pw_progress_start (&fit->progress, pw_file_name (fit->model.file), "", 0, 1);
-  int status = pw_fit_solve (fit, error);
-  pw_progress_end (&fit->progress);
-  pw_stop_release ();
-  fit->interrupted = status == PW_RETRY;
-  if (!fit->interrupted) return status;
-  if (fit->iterations > 0) return PW_OK;
-  pw_cli_say ("pinwheel: interrupted before the first iteration was done\n");
-  return PW_INTERRUPTED;
-}
-
-static int fit_finish (pw_fit *fit, pw_error *error) {
-  FILE *table = pw_files_stream (&fit->files, FIT_TABLE), *summary = pw_files_stream (&fit->files, FIT_SUMMARY);
-  pw_error drawing = { 0 };
-  data_report (fit);
-  pw_fit_print (fit);
-  pw_unknowns_report (&fit->unknowns, fit->estimate);
-  const int drawn = fit->plots_path ? pw_fit_draw (fit, &drawing) : PW_OK;
-  const char *word = pw_cli_status_word (drawn != PW_OK || fit->converged ? drawn : PW_METHOD);
-  int status = table ? pw_fit_table (fit, table, error) : PW_OK;
-  if (summary) pw_fit_json (fit, fit->interrupted ? "interrupted" : word, summary);
-  if (status == PW_OK) status = pw_files_finish (&fit->files, error);
-  status = pw_figure_status (drawn, &drawing, status, error);
-  if (fit->interrupted) pw_cli_say ("pinwheel: interrupted; these are the values so far, without their errors\n");
-  if (status == PW_OK && fit->interrupted) return PW_INTERRUPTED;
-  if (status == PW_OK && !fit->converged)
-    status = pw_fail (error, PW_METHOD, "no minimum was found in %s; begin nearer to it, by --set or --start",
-                      PW_COUNTED (fit->iterations, "iteration"));
-  return status;
-}
-
-static int fit_command (void *options, pw_error *error) {
-  pw_fit *fit = options;
-  int status = fit_open (fit, error);
-  if (status == PW_OK) status = fit_search (fit, error);
-  if (status == PW_OK) status = fit_finish (fit, error);
-  pw_files_close (&fit->files);
-  pw_arena_free (&fit->arena);
-  pw_unknowns_close (&fit->unknowns);
-  pw_cli_close_model (&fit->model);
-  return status;
-}
-
-static const struct poptOption fit_options_table[] = {
-  PW_OPTION_GROUP ("Fit"),
-  PW_TEXT_OPTION (pw_fit, data_path, "data", 0, "FILE.csv",
-                  "Measured data: a table with t and columns named as those of `run`; empty cells are gaps"),
-  PW_TEXT_OPTION (pw_fit, time_name, "time", 0, "NAME", "Column of the times in the data (default t)"),
-  PW_TEXT_OPTION (pw_fit, time_scale_text, "time-scale", 0, "K", "Factor of these times, 1e-3 for ms"),
-  PW_TEXT_OPTION (pw_fit, time_offset_text, "time-offset", 0, "T", "Added to the scaled times [s]"),
-  PW_TEXT_OPTION (pw_fit, columns_text, "columns", 0, "NAME,...", "Columns of the data to compare with the model"),
-  PW_LIST_OPTION (pw_fit, free, "free", 0, "NAME[=LOW:HIGH]",
-                  "Determine a parameter or initial value, such as frame.vx, within bounds if given; repeatable"),
-  PW_LIST_OPTION (pw_fit, sigma_texts, "sigma", 0, "COLUMN=VALUE",
-                  "Standard deviation of a column, a number or the name of a column of the data; repeatable"),
-  PW_TEXT_OPTION (pw_fit, confidence_text, "confidence", 0, "P", "Probability of confidence intervals (default 0.95)"),
-  PW_TEXT_OPTION (pw_fit, starts_text, "starts", 0, "N",
-                  "Search from N points: the initial values, and others between the bounds (default 1)"),
-  PW_TEXT_OPTION (pw_fit, jobs_text, "jobs", 'j', "N", "Number of concurrent runs (default: one per processor)"),
-  PW_TEXT_OPTION (pw_fit, table_path, "output", 'o', "FILE.csv", "Write data, model values and residuals to this file"),
-  PW_TEXT_OPTION (pw_fit, json_path, "json", 0, "FILE.json", "Write a summary"),
-  PW_TEXT_OPTION (pw_fit, plots_path, "plots", 0, "DIR", "Write figures of data, model and residuals into a folder"),
-  PW_WIDTH_OPTION,
-  PW_OPTION_GROUP ("Integration"),
-  PW_TEXT_OPTION (pw_cli_line, method, "method", 'm', "METHOD",
-                  "Integrator and stabilisation, see `pinwheel list methods`"),
-  PW_TEXT_OPTION (pw_cli_line, t_end, "t-end", 't', "T", "Leave out data after this time [s]"),
-  PW_TEXT_OPTION (pw_cli_line, step, "step", 0, "H", "Step size of fixed-step methods [s]"),
-  PW_TEXT_OPTION (pw_cli_line, rtol, "rtol", 0, "R", "Relative tolerance of adaptive methods"),
-  PW_TEXT_OPTION (pw_cli_line, atol, "atol", 0, "A", "Absolute tolerance of every state"),
-  PW_TEXT_OPTION (pw_cli_line, limit, "limit", 0, "SECONDS", "Stop a run after this much processor time"),
-  PW_ENGINE_OPTION,
-  PW_MODEL_OPTIONS,
-  POPT_TABLEEND
-};
-
-const pw_command pw_cli_fit = {
-  .name = "fit",
-  .synopsis = "MODEL --data FILE.csv --columns NAME,... --free NAME[=LOW:HIGH]... [OPTION...]",
-  .summary = "fit parameters and initial values to measured data",
-  .help = "Determine parameters and initial values of a model by least squares, so that it agrees with measured data. "
-          "Prints estimates with standard errors, confidence intervals and correlations, and unknowns that the data do "
-          "not determine.",
-  .options_size = sizeof (pw_fit),
-  .function = fit_command,
-  .options = fit_options_table,
-};
-
-/* Runs of a fit, which give the model's values at the times of the data, and derivatives of these values. */
+/* ---- Runs: the model's values at the times of the data, and derivatives of these values ---- */
 
 #define FIT_RTOL 1e-8 /* largest relative tolerance of runs that are compared */
 
-/* Runs the model with its own settings, or if rtol > 0 with this tolerance. */
+/* Runs the model with these values of the unknowns, with its own settings, or if rtol > 0 with this tolerance; out:
+ * columns x rows.  A status; PW_RETRY after Ctrl-C. */
 static int fit_run (const pw_fit *fit, const double *unknowns, double rtol, double *out, pw_error *error) {
   const pw_run_outputs outputs = { .unknowns = &fit->unknowns,
                                    .method = rtol > 0 ? fit->unknowns.method : NULL,
@@ -424,10 +266,6 @@ static int fit_run (const pw_fit *fit, const double *unknowns, double rtol, doub
   return pw_run_outputs_at (&outputs, unknowns, NULL, out, error);
 }
 
-int pw_fit_run (const pw_fit *fit, const double *unknowns, double *out, pw_error *error) {
-  return fit_run (fit, unknowns, 0, out, error);
-}
-
 static int fit_own (void *fit, const double *x, double rtol, double *value, pw_error *error) {
   (void)rtol;
   return fit_run (fit, x, 0, value, error);
@@ -437,7 +275,10 @@ static int fit_accurate (void *fit, const double *x, double rtol, double *value,
   return fit_run (fit, x, rtol, value, error);
 }
 
-int pw_fit_jacobian (pw_fit *fit, const double *unknowns, const double *values, double *jacobian, pw_error *error) {
+/* Derivatives of the model's values, `values` at these unknowns, with respect to each unknown: jacobian is unknowns x
+ * (columns x rows).  By central differences of concurrent runs.  Sets fit->derivative_error.  A status; PW_RETRY after
+ * Ctrl-C. */
+static int fit_jacobian (pw_fit *fit, const double *unknowns, const double *values, double *jacobian, pw_error *error) {
   const int n = fit->unknowns.count, cells = fit->columns * fit->rows;
   const double own = pw_unknowns_noise (&fit->unknowns), noise = fmin (own, FIT_RTOL);
   pw_derivative *derivative = malloc ((size_t)n * (size_t)cells * sizeof *derivative);
@@ -507,8 +348,8 @@ static double solve_slope (const pw_unknown *unknown, double u) {
 /* u of a value where a search begins, moved away from bounds, at which solve_slope is 0. */
 static double solve_start (const pw_unknown *unknown, double value) {
   double range = isfinite (unknown->high) ? unknown->high - unknown->low : unknown->scale,
-         part = fmax ((value - unknown->low) / range, PW_FIT_MARGIN);
-  if (isfinite (unknown->high)) return asin (2 * fmin (part, 1 - PW_FIT_MARGIN) - 1);
+         part = fmax ((value - unknown->low) / range, FIT_MARGIN);
+  if (isfinite (unknown->high)) return asin (2 * fmin (part, 1 - FIT_MARGIN) - 1);
   return isfinite (unknown->low) ? sqrt ((1 + part) * (1 + part) - 1) : value / unknown->scale;
 }
 
@@ -540,7 +381,7 @@ static int solve_run (fit_solver *solver, const gsl_vector *u) {
     solver->last_value[i] = value;
   }
   if (same) return PW_OK;
-  int status = pw_fit_run (fit, solver->last_value, solver->values, &own);
+  int status = fit_run (fit, solver->last_value, 0, solver->values, &own);
   if (status == PW_OK && !isfinite (solve_sum (fit, solver->values)))
     status = pw_fail (&own, PW_METHOD, "the sum of the squares of the residuals is not finite");
   solver->known = status == PW_OK;
@@ -573,7 +414,7 @@ static int solve_derivatives (const gsl_vector *u, void *context, gsl_matrix *J)
   pw_error own = { 0 };
   if (u && solve_run (solver, u) != PW_OK) return GSL_EBADFUNC;
   const double *value = u ? solver->last_value : fit->estimate, *values = u ? solver->values : fit->fitted;
-  int status = pw_fit_jacobian (fit, value, values, solver->jacobian, &own);
+  int status = fit_jacobian (fit, value, values, solver->jacobian, &own);
   solve_fail (solver, u == NULL || !isfinite (solver->least), &own, status);
   if (status != PW_OK) return GSL_EBADFUNC;
   for (int j = 0; j < fit->unknowns.count; j++) {
@@ -596,20 +437,16 @@ static void solve_store (fit_solver *solver, double chi2) {
   memcpy (fit->fitted, solver->values, (size_t)fit->columns * (size_t)fit->rows * sizeof *fit->fitted);
 }
 
-/* The part of a search that is done after i iterations, of which SOLVE_USUAL are usual. */
-static double solve_part (double i) {
-  return i < SOLVE_USUAL ? 0.9 * i / SOLVE_USUAL : 1 - 0.1 * SOLVE_USUAL / i;
-}
-
 /* After iteration i.  `moved`: 1 if the last run is the position reached, the result if Ctrl-C comes before a search is
  * completed. */
 static void solve_progress (fit_solver *solver, int i, int moved, const gsl_multifit_nlinear_workspace *w) {
-  double norm = gsl_blas_dnrm2 (gsl_multifit_nlinear_residual (w));
+  const double norm = gsl_blas_dnrm2 (gsl_multifit_nlinear_residual (w)), usual = SOLVE_USUAL,
+               part = i < usual ? 0.9 * i / usual : 1 - 0.1 * usual / i; /* of the search that is done */
   if (isnan (solver->fit->initial_chi2)) solver->fit->initial_chi2 = norm * norm;
   if (!isfinite (solver->least) && moved) solve_store (solver, norm * norm);
   snprintf (solver->fit->progress.note, sizeof solver->fit->progress.note, "iteration %d, residual %.6g",
             solver->fit->iterations, norm);
-  pw_progress_at (&solver->fit->progress, (solver->searches + solve_part (i)) / solver->fit->starts);
+  pw_progress_at (&solver->fit->progress, (solver->searches + part) / solver->fit->starts);
 }
 
 /* Iterates from u, where the last run was made.  Unlike gsl_multifit_nlinear_driver, it ends when derivatives cannot be
@@ -709,7 +546,7 @@ static int solve_converged (const pw_fit *fit, const gsl_matrix *J) {
   int orthogonal = 1;
   for (int j = 0; j < fit->unknowns.count; j++) {
     const pw_unknown *unknown = fit->unknowns.list + j;
-    double dot = 0, near = PW_FIT_MARGIN * unknown->scale;
+    double dot = 0, near = FIT_MARGIN * unknown->scale;
     if (fit->estimate[j] - unknown->low < near || unknown->high - fit->estimate[j] < near) continue;
     for (int i = 0, k = 0; i < fit->columns * fit->rows; i++)
       if (!isnan (fit->data[i]))
@@ -730,7 +567,7 @@ static void solve_covariance (pw_fit *fit) {
   for (int j = 0; j < n; j++) error = fmax (error, fit->derivative_error[j]);
   double least = fmax (SOLVE_RANK, 10 /* a margin */ * error) * fit->singular_value[0];
   for (fit->rank = 0; fit->rank < n && fit->singular_value[fit->rank] > least;) fit->rank++;
-  int freedom = pw_fit_degrees_of_freedom (fit);
+  int freedom = fit_degrees_of_freedom (fit);
   double variance = fit->weighted ? 1 : freedom > 0 ? fit->chi2 / freedom : NAN;
   for (int i = 0; i < n; i++)
     for (int j = 0; j < n; j++) {
@@ -743,7 +580,7 @@ static void solve_covariance (pw_fit *fit) {
   for (int i = 0; i < n; i++) {
     fit->standard_error[i] = sqrt (fit->covariance[i * n + i]);
     for (int k = fit->rank; k < n; k++)
-      if (fabs (fit->singular_vector[i * n + k]) > PW_FIT_COMPONENT) fit->standard_error[i] = INFINITY;
+      if (fabs (fit->singular_vector[i * n + k]) > FIT_COMPONENT) fit->standard_error[i] = INFINITY;
   }
 }
 
@@ -784,7 +621,8 @@ static int solve_open (fit_solver *solver) {
   return PW_OK;
 }
 
-int pw_fit_solve (pw_fit *fit, pw_error *error) {
+/* Minimises the sum of squares from all starts and sets the results.  A status; PW_RETRY after Ctrl-C. */
+static int fit_solve (pw_fit *fit, pw_error *error) {
   fit_solver solver = { .fit = fit, .error = error };
   fit->initial_chi2 = NAN;
   solver.status = solve_open (&solver);
@@ -793,7 +631,7 @@ int pw_fit_solve (pw_fit *fit, pw_error *error) {
   return solver.status;
 }
 
-/* The reports of `pinwheel fit`. */
+/* ---- Reports ---- */
 
 enum {
   REPORT_DIGITS = 7,
@@ -813,24 +651,19 @@ static double report_correlation (const pw_fit *fit, int i, int j) {
              : NAN;
 }
 
-/* Half the width of confidence intervals in standard errors: from the normal distribution if standard deviations are
- * given, else from Student's. */
-static double report_quantile (const pw_fit *fit) {
-  double tail = (1 - fit->confidence) / 2;
-  return fit->weighted ? gsl_cdf_gaussian_Qinv (tail, 1)
-                       : gsl_cdf_tdist_Qinv (tail, fmax (pw_fit_degrees_of_freedom (fit), 1));
-}
-
-/* The lower (side -1) or upper (side 1) end of the confidence interval of unknown i; NaN if there is none. */
+/* The lower (side -1) or upper (side 1) end of the confidence interval of unknown i, from the normal distribution if
+ * standard deviations are given, else from Student's; NaN if there is none. */
 static double report_interval_end (const pw_fit *fit, int i, int side) {
-  return isfinite (fit->standard_error[i]) ? fit->estimate[i] + side * report_quantile (fit) * fit->standard_error[i]
-                                           : NAN;
+  const double tail = (1 - fit->confidence) / 2,
+               quantile = fit->weighted ? gsl_cdf_gaussian_Qinv (tail, 1)
+                                        : gsl_cdf_tdist_Qinv (tail, fmax (fit_degrees_of_freedom (fit), 1));
+  return isfinite (fit->standard_error[i]) ? fit->estimate[i] + side * quantile * fit->standard_error[i] : NAN;
 }
 
 /* "at its lower bound", "at its upper bound"; "" if the estimate of unknown i is at neither. */
 static const char *report_bound (const pw_fit *fit, int i) {
   const pw_unknown *unknown = fit->unknowns.list + i;
-  const double value = fit->estimate[i], near = PW_FIT_MARGIN * unknown->scale;
+  const double value = fit->estimate[i], near = FIT_MARGIN * unknown->scale;
   return value - unknown->low < near ? "at its lower bound" : unknown->high - value < near ? "at its upper bound" : "";
 }
 
@@ -883,9 +716,7 @@ static void report_columns (const pw_fit *fit) {
   putchar ('\n');
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     pw_cell (&t, -12, "data");
-    pw_cell (&t, 8, "number");
-    pw_cell (&t, 12, "rms residual");
-    pw_row_end (&t);
+    pw_head (&t, 8, 12, (const char *[]){ "number", "rms residual", NULL });
     for (int i = 0; i < fit->columns; i++) {
       int count;
       double rms = report_rms (fit, i, &count);
@@ -899,7 +730,7 @@ static void report_columns (const pw_fit *fit) {
 
 /* 1 if unknown i belongs to a combination, the singular vector of this number. */
 static int report_contains (const pw_fit *fit, int combination, int i) {
-  return fabs (fit->singular_vector[i * fit->unknowns.count + combination]) > PW_FIT_COMPONENT;
+  return fabs (fit->singular_vector[i * fit->unknowns.count + combination]) > FIT_COMPONENT;
 }
 
 /* Prints the ratio of changes of the unknowns along a singular vector; the change of the first one is its estimate, or
@@ -951,9 +782,9 @@ static void report_ends (const pw_fit *fit) {
   if (fit->starts > 1) putchar ('\n');
 }
 
-void pw_fit_print (const pw_fit *fit) {
+static void fit_print (const pw_fit *fit) {
   char options[PW_UNKNOWNS_OPTIONS];
-  int dof = pw_fit_degrees_of_freedom (fit);
+  int dof = fit_degrees_of_freedom (fit);
   report_unknowns (fit);
   report_columns (fit);
   if (fit->weighted)
@@ -1031,7 +862,7 @@ static void report_json_ends (const pw_fit *fit, pw_json *j) {
   pw_json_close (j, ']');
 }
 
-void pw_fit_json (const pw_fit *fit, const char *status, FILE *f) {
+static void fit_json (const pw_fit *fit, const char *status, FILE *f) {
   pw_json json = { .f = f, .lines = 2 }, *j = &json;
   char options[PW_UNKNOWNS_OPTIONS];
   pw_json_open (j, NULL, '{');
@@ -1042,7 +873,7 @@ void pw_fit_json (const pw_fit *fit, const char *status, FILE *f) {
   pw_json_text (j, "options", pw_unknowns_options (&fit->unknowns, fit->estimate, options));
   pw_json_text (j, "method", fit->unknowns.method);
   pw_json_number (j, "residuals", fit->residuals);
-  pw_json_number (j, "freedom", pw_fit_degrees_of_freedom (fit));
+  pw_json_number (j, "freedom", fit_degrees_of_freedom (fit));
   pw_json_flag (j, "weighted", fit->weighted);
   pw_json_number (j, "chi2", fit->chi2);
   pw_json_number (j, "confidence", fit->confidence);
@@ -1060,7 +891,7 @@ void pw_fit_json (const pw_fit *fit, const char *status, FILE *f) {
   pw_json_close (j, '}');
 }
 
-int pw_fit_table (const pw_fit *fit, FILE *f, pw_error *error) {
+static int fit_table (const pw_fit *fit, FILE *f, pw_error *error) {
   static const char *const part[] = { "", ".model", ".residual", ".sigma" };
   pw_text t = { .chars = NULL };
   pw_text_name (&t, "t", "s");
@@ -1081,31 +912,174 @@ int pw_fit_table (const pw_fit *fit, FILE *f, pw_error *error) {
   return status;
 }
 
-/* ---- Figures ---- */
+/* ---- The figure ---- */
 
-static int report_data (const void *context, FILE *f, pw_error *error) {
-  const pw_fit *fit = context;
-  (void)error;
-  fputs ("# t [s], data, standard deviation, model; a block per column\n", f);
-  for (int i = 0; i < fit->columns; i++) {
-    for (int k = 0; k < fit->rows; k++) {
-      int c = i * fit->rows + k;
-      const double value[] = { fit->t[k], fit->data[c], fit->weighted ? fit->sigma[c] : 0, fit->fitted[c] };
-      for (int v = 0; v < 4; v++) fprintf (f, "%s%s", v ? " " : "", PW_DIGITS (value[v], 12));
-      fputc ('\n', f);
-    }
-    fputs ("\n\n", f);
+/* Data and model of each column, below them the residuals. */
+static int fit_draw (const pw_fit *fit, pw_error *error) {
+  const int panels = fit->columns < REPORT_PANELS ? fit->columns : REPORT_PANELS, several = panels > 1;
+  const char *style = fit->weighted ? "bars" : "data", *label = fit->weighted ? "data ± σ" : "data";
+  pw_curves c;
+  int status = pw_curves_open (&c, &fit->line, &fit->model, fit->plots_path, "fit", "data and fitted model", error);
+  if (status != PW_OK) return status;
+  for (int i = 0; i < panels; i++) {
+    const double *t = fit->t, *data = fit->data + i * fit->rows, *fitted = fit->fitted + i * fit->rows,
+                 *sigma = fit->sigma + i * fit->rows;
+    pw_panel panel = { .x_label = "t [s]",
+                       .y_label = PW_FIGURE_LABEL (fit->column_name[i], fit->column_unit[i]),
+                       .x = { t[0], t[fit->rows - 1] },
+                       .aspect = several ? 0.6 : 0.45,
+                       .type = several ? PW_PANEL_HALF : 0 };
+    pw_curves_panel (&c, &panel);
+    pw_curves_add (&c, style, label);
+    for (int k = 0; k < fit->rows; k++) pw_curves_point (&c, t[k], data[k], sigma[k]);
+    pw_curves_add (&c, "model", "model");
+    for (int k = 0; k < fit->rows; k++) pw_curves_point (&c, t[k], fitted[k], 0);
+    panel.y_label = "residual", panel.type |= PW_PANEL_BELOW, panel.aspect *= 0.6;
+    pw_curves_panel (&c, &panel);
+    pw_curves_add (&c, style, label);
+    for (int k = 0; k < fit->rows; k++) pw_curves_point (&c, t[k], fitted[k] - data[k], sigma[k]);
   }
-  return PW_OK;
+  return pw_curves_draw (&c, PW_OK, error);
 }
 
-static void report_variables (const void *context, FILE *f) {
-  const pw_fit *fit = context;
-  int panels = fit->columns < REPORT_PANELS ? fit->columns : REPORT_PANELS;
-  fprintf (f, "panels = %d\nweighted = %d\narray label[%d]\n", panels, fit->weighted, panels);
-  for (int i = 0; i < panels; i++) pw_figure_label (f, "label", i + 1, fit->column_name[i], fit->column_unit[i]);
+/* ---- The command ---- */
+
+#define FIT_RUNS 50. /* usual number of runs of a search, to choose the engine */
+
+enum { FIT_TABLE = 2, FIT_SUMMARY }; /* indices in the list of files of fit_open */
+
+static int fit_options (pw_fit *fit, pw_error *error) {
+  double starts = 1;
+  fit->confidence = 0.95;
+  if (fit->data_path == NULL) return pw_fail (error, PW_INPUT, "no data: add --data FILE.csv");
+  if (fit->columns_text == NULL)
+    return pw_fail (error, PW_INPUT, "nothing to compare: add --columns NAME,..., columns of the data such as frame.x");
+  int status = pw_cli_number ("--confidence", fit->confidence_text, PW_POSITIVE, &fit->confidence, error);
+  if (status == PW_OK && !(fit->confidence < 1))
+    status = pw_fail (error, PW_INPUT, "--confidence %s: expected a number between 0 and 1", fit->confidence_text);
+  if (status == PW_OK) status = pw_cli_number ("--starts", fit->starts_text, PW_COUNT, &starts, error);
+  if (status == PW_OK && starts > 1e5) status = pw_fail (error, PW_INPUT, "--starts: at most 100000");
+  fit->starts = (int)starts;
+  if (status == PW_OK) status = pw_cli_check_csv (fit->table_path, error);
+  if (status == PW_OK)
+    status = pw_cli_requires ("--width", fit->line.width, "--plots DIR", fit->plots_path != NULL, error);
+  return status == PW_OK ? pw_parallel_jobs (fit->jobs_text, &fit->jobs, error) : status;
 }
 
-int pw_fit_draw (const pw_fit *fit, pw_error *error) {
-  return pw_figure_write (&fit->line, &fit->model, fit->plots_path, "fit", fit, report_data, report_variables, error);
+/* Reads the data and the unknowns; runs end at the time of the last row. */
+static int fit_open_data (pw_fit *fit, pw_error *error) {
+  int status = pw_unknowns_open (&fit->unknowns, &fit->line, &fit->model, error);
+  fit->t_end = fit->unknowns.t_end;
+  if (status == PW_OK) status = fit_read_data (fit, error);
+  if (status == PW_OK) status = pw_unknowns_read (&fit->unknowns, fit->free, error);
+  if (status != PW_OK) return status;
+  if (fit->residuals < fit->unknowns.count)
+    return pw_fail (error, PW_INPUT, "--data %s has fewer data (%d) than there are unknowns (%d)", fit->data_path,
+                    fit->residuals, fit->unknowns.count);
+  fit->unknowns.t_end = fit->unknowns.settings.span = fit->t[fit->rows - 1];
+  return pw_unknowns_engine (&fit->unknowns, FIT_RUNS, fit->starts, error);
 }
+
+static int fit_open (pw_fit *fit, pw_error *error) {
+  static const char *const figures[] = { "fit.dat", "fit.gp", "fit.svg", "fit.png", "fit.pdf", NULL };
+  pw_use use[] = { PW_CLI_MODEL_USE,
+                   { "--data", fit->data_path, PW_READS, NULL },
+                   { "-o", fit->table_path, PW_WRITES, pw_cli_csv },
+                   { "--json", fit->json_path, PW_WRITES, pw_cli_json },
+                   { "--plots", fit->plots_path, PW_WRITES_INTO, figures } };
+  int status = fit_options (fit, error);
+  if (status == PW_OK) status = pw_cli_open (&fit->model, &fit->line, error);
+  if (status == PW_OK) status = fit_open_data (fit, error);
+  return status == PW_OK ? pw_files_open (&fit->files, &fit->line, &fit->model, use, sizeof use / sizeof *use, error)
+                         : status;
+}
+
+static int fit_search (pw_fit *fit, pw_error *error) {
+  pw_stop_catch ();
+  pw_progress_start (&fit->progress, pw_file_name (fit->model.file), "", 0, 1);
+  int status = fit_solve (fit, error);
+  pw_progress_end (&fit->progress);
+  pw_stop_release ();
+  fit->interrupted = status == PW_RETRY;
+  if (!fit->interrupted) return status;
+  if (fit->iterations > 0) return PW_OK;
+  pw_cli_say ("pinwheel: interrupted before the first iteration was done\n");
+  return PW_INTERRUPTED;
+}
+
+static int fit_finish (pw_fit *fit, pw_error *error) {
+  FILE *table = pw_files_stream (&fit->files, FIT_TABLE), *summary = pw_files_stream (&fit->files, FIT_SUMMARY);
+  pw_error drawing = { 0 };
+  data_report (fit);
+  fit_print (fit);
+  pw_unknowns_report (&fit->unknowns, fit->estimate);
+  const int drawn = fit->plots_path ? fit_draw (fit, &drawing) : PW_OK;
+  const char *word = pw_cli_status_word (drawn != PW_OK || fit->converged ? drawn : PW_METHOD);
+  int status = table ? fit_table (fit, table, error) : PW_OK;
+  if (summary) fit_json (fit, fit->interrupted ? "interrupted" : word, summary);
+  if (status == PW_OK) status = pw_files_finish (&fit->files, error);
+  status = pw_figure_status (drawn, &drawing, status, error);
+  if (fit->interrupted) pw_cli_say ("pinwheel: interrupted; these are the values so far, without their errors\n");
+  if (status == PW_OK && fit->interrupted) return PW_INTERRUPTED;
+  if (status == PW_OK && !fit->converged)
+    status = pw_fail (error, PW_METHOD, "no minimum was found in %s; begin nearer to it, by --set or --start",
+                      PW_COUNTED (fit->iterations, "iteration"));
+  return status;
+}
+
+static int fit_command (void *options, pw_error *error) {
+  pw_fit *fit = options;
+  int status = fit_open (fit, error);
+  if (status == PW_OK) status = fit_search (fit, error);
+  if (status == PW_OK) status = fit_finish (fit, error);
+  pw_files_close (&fit->files);
+  pw_arena_free (&fit->arena);
+  pw_unknowns_close (&fit->unknowns);
+  pw_cli_close_model (&fit->model);
+  return status;
+}
+
+static const struct poptOption fit_options_table[] = {
+  PW_OPTION_GROUP ("Fit"),
+  PW_TEXT_OPTION (pw_fit, data_path, "data", 0, "FILE.csv",
+                  "Measured data: a table with t and columns named as those of `run`; empty cells are gaps"),
+  PW_TEXT_OPTION (pw_fit, time_name, "time", 0, "NAME", "Column of the times in the data (default t)"),
+  PW_TEXT_OPTION (pw_fit, time_scale_text, "time-scale", 0, "K", "Factor of these times, 1e-3 for ms"),
+  PW_TEXT_OPTION (pw_fit, time_offset_text, "time-offset", 0, "T", "Added to the scaled times [s]"),
+  PW_TEXT_OPTION (pw_fit, columns_text, "columns", 0, "NAME,...", "Columns of the data to compare with the model"),
+  PW_LIST_OPTION (pw_fit, free, "free", 0, "NAME[=LOW:HIGH]",
+                  "Determine a parameter or initial value, such as frame.vx, within bounds if given; repeatable"),
+  PW_LIST_OPTION (pw_fit, sigma_texts, "sigma", 0, "COLUMN=VALUE",
+                  "Standard deviation of a column, a number or the name of a column of the data; repeatable"),
+  PW_TEXT_OPTION (pw_fit, confidence_text, "confidence", 0, "P", "Probability of confidence intervals (default 0.95)"),
+  PW_TEXT_OPTION (pw_fit, starts_text, "starts", 0, "N",
+                  "Search from N points: the initial values, and others between the bounds (default 1)"),
+  PW_TEXT_OPTION (pw_fit, jobs_text, "jobs", 'j', "N", "Number of concurrent runs (default: one per processor)"),
+  PW_TEXT_OPTION (pw_fit, table_path, "output", 'o', "FILE.csv", "Write data, model values and residuals to this file"),
+  PW_TEXT_OPTION (pw_fit, json_path, "json", 0, "FILE.json", "Write a summary"),
+  PW_TEXT_OPTION (pw_fit, plots_path, "plots", 0, "DIR", "Write figures of data, model and residuals into a folder"),
+  PW_WIDTH_OPTION,
+  PW_OPTION_GROUP ("Integration"),
+  PW_TEXT_OPTION (pw_cli_line, method, "method", 'm', "METHOD",
+                  "Integrator and stabilisation, see `pinwheel list methods`"),
+  PW_TEXT_OPTION (pw_cli_line, t_end, "t-end", 't', "T", "Leave out data after this time [s]"),
+  PW_TEXT_OPTION (pw_cli_line, step, "step", 0, "H", "Step size of fixed-step methods [s]"),
+  PW_TEXT_OPTION (pw_cli_line, rtol, "rtol", 0, "R", "Relative tolerance of adaptive methods"),
+  PW_TEXT_OPTION (pw_cli_line, atol, "atol", 0, "A", "Absolute tolerance of every state"),
+  PW_TEXT_OPTION (pw_cli_line, limit, "limit", 0, "SECONDS", "Stop a run after this much processor time"),
+  PW_ENGINE_OPTION,
+  PW_MODEL_OPTIONS,
+  POPT_TABLEEND
+};
+
+const pw_command pw_cli_fit = {
+  .name = "fit",
+  .synopsis = "MODEL --data FILE.csv --columns NAME,... --free NAME[=LOW:HIGH]... [OPTION...]",
+  .summary = "fit parameters and initial values to measured data",
+  .help = "Determine parameters and initial values of a model by least squares, so that it agrees with measured data. "
+          "Prints estimates with standard errors, confidence intervals and correlations, and unknowns that the data do "
+          "not determine.",
+  .options_size = sizeof (pw_fit),
+  .function = fit_command,
+  .options = fit_options_table,
+};

@@ -9,8 +9,6 @@
 #include "report.h"
 #include "states.h"
 
-/* The command `pinwheel linearise`, its result and its reports (linearise.c). */
-
 typedef struct {
   pw_cli_line line;
   const char *t_text;                       /* of --at */
@@ -28,14 +26,6 @@ typedef struct {
   pw_linear linear;
   int inputs, outputs, *input, *output; /* numbers of the signals u and the states y, and their indices */
 } pw_linearise_command;
-
-/* Prints eigenvalues and mode shapes. */
-void pw_linearise_print (const pw_linearise_command *cmd);
-/* Write the result as JSON, [ A B ; C D ] as a table, a page of modes, matrices and eigenvalues for NumPy; a status. */
-void pw_linearise_json (const pw_linearise_command *cmd, pw_json *j);
-int pw_linearise_csv (const pw_linearise_command *cmd, FILE *f, pw_error *error);
-int pw_linearise_page (const pw_linearise_command *cmd, FILE *f, pw_error *error);
-int pw_linearise_npz (const pw_linearise_command *cmd, FILE *f, pw_error *error);
 
 enum { LINEARISE_COORDINATES = 400 }; /* at most: the cost is cubic */
 
@@ -118,16 +108,6 @@ static int linearise_solve_steady (pw_linearise_command *cmd, pw_steady *steady,
   return PW_OK;
 }
 
-static int linearise_find_steady (pw_linearise_command *cmd, double span, pw_error *error) {
-  pw_initial_value hold[PW_HOLDS];
-  pw_steady_settings set = { .hold = hold, .t = cmd->t, .span = span, .vary = -1 /* none of them */ };
-  if (pw_hold_read (cmd->m.system, cmd->hold_texts, hold, &set.holds, error) != PW_OK) return error->status;
-  pw_steady *steady = pw_steady_open (cmd->m.system, &set, error);
-  int status = linearise_solve_steady (cmd, steady, error);
-  pw_steady_close (steady);
-  return status;
-}
-
 /* Runs the model to the time of --at, and makes the state reached consistent; or opens a run at the steady motion. */
 static int linearise_run (pw_linearise_command *cmd, pw_error *error) {
   pw_run_defaults d = pw_cli_defaults (pw_file_table (cmd->m.file));
@@ -137,7 +117,13 @@ static int linearise_run (pw_linearise_command *cmd, pw_error *error) {
   settings.span = cmd->steady ? t_end /* after --at: signals are constant in it */ : fmax (t_end, cmd->t);
   pw_limit_start (&cmd->limit);
   if (cmd->steady) {
-    if (linearise_find_steady (cmd, settings.span, error) != PW_OK) return error->status;
+    pw_initial_value hold[PW_HOLDS];
+    pw_steady_settings set = { .hold = hold, .t = cmd->t, .span = settings.span, .vary = -1 /* none of them */ };
+    if (pw_hold_read (cmd->m.system, cmd->hold_texts, hold, &set.holds, error) != PW_OK) return error->status;
+    pw_steady *steady = pw_steady_open (cmd->m.system, &set, error);
+    int status = linearise_solve_steady (cmd, steady, error);
+    pw_steady_close (steady);
+    if (status != PW_OK) return status;
     settings.t = cmd->t;
     settings.initial = cmd->initial;
     settings.initials = 2 * pw_system_coordinates (cmd->m.system);
@@ -165,96 +151,7 @@ static int linearise_compute (pw_linearise_command *cmd, pw_error *error) {
   return status;
 }
 
-/* ---- Files ---- */
-
-/* Indices in the list of files of linearise_open_files; 0 is the model. */
-enum { LINEARISE_JSON = 1, LINEARISE_CSV, LINEARISE_NPZ, LINEARISE_PAGE };
-
-/* Opens NAME.json, .csv, .npz, and the page, before anything is computed. */
-static int linearise_open_files (pw_linearise_command *cmd, pw_error *error) {
-  enum { PATH = 4096 };
-  const char *name = cmd->name, *slash = name ? strrchr (name, '/') : NULL, *last = slash ? slash + 1 : name;
-  if (last && (*last == 0 || strcmp (last, ".") == 0 || strcmp (last, "..") == 0 || pw_cli_names_file (last)))
-    return pw_fail (error, PW_INPUT, "-o %s: expected a NAME, for NAME.json, NAME.csv and NAME.npz", name);
-  if (name && strlen (name) + sizeof ".json" > PATH) return pw_fail (error, PW_INPUT, "-o: the name is too long");
-  if (cmd->page_path && pw_animation_check ("--animate", cmd->page_path, error) != PW_OK) return error->status;
-  pw_use use[] = { PW_CLI_MODEL_USE,
-                   { "-o", name ? PW_PRINTED (PATH, "%s.json", name) : NULL, PW_WRITES, NULL },
-                   { "-o", name ? PW_PRINTED (PATH, "%s.csv", name) : NULL, PW_WRITES, NULL },
-                   { "-o", name ? PW_PRINTED (PATH, "%s.npz", name) : NULL, PW_WRITES, NULL },
-                   { "--animate", cmd->page_path, PW_WRITES, NULL } };
-  return pw_files_open (&cmd->files, &cmd->line, &cmd->m, use, sizeof use / sizeof *use, error);
-}
-
-static int linearise_write (pw_linearise_command *cmd, pw_error *error) {
-  int status = PW_OK;
-  if (cmd->name) {
-    pw_linearise_json (cmd, &(pw_json){ .f = pw_files_stream (&cmd->files, LINEARISE_JSON), .lines = 1 });
-    status = pw_linearise_csv (cmd, pw_files_stream (&cmd->files, LINEARISE_CSV), error);
-    if (status == PW_OK) status = pw_linearise_npz (cmd, pw_files_stream (&cmd->files, LINEARISE_NPZ), error);
-  }
-  if (status == PW_OK && cmd->page_path)
-    status = pw_linearise_page (cmd, pw_files_stream (&cmd->files, LINEARISE_PAGE), error);
-  return status == PW_OK ? pw_files_finish (&cmd->files, error) : status;
-}
-
-static int linearise_command (void *options, pw_error *error) {
-  pw_linearise_command *cmd = options;
-  int status = pw_cli_number ("--at", cmd->t_text, PW_NONNEGATIVE, &cmd->t, error);
-  if (status == PW_OK && cmd->hold_texts && !cmd->steady) status = pw_fail (error, PW_INPUT, "--hold needs --steady");
-  if (status == PW_OK)
-    status = pw_cli_requires ("--limit", cmd->line.limit, "--at or --steady", cmd->t_text || cmd->steady, error);
-  if (status == PW_OK) status = pw_cli_open (&cmd->m, &cmd->line, error);
-  if (status == PW_OK) status = linearise_select (cmd, error);
-  if (status == PW_OK) status = linearise_open_files (cmd, error);
-  if (status == PW_OK) pw_report_model (&cmd->m);
-  if (status == PW_OK) status = linearise_compute (cmd, error);
-  if (status == PW_OK) pw_linearise_print (cmd);
-  if (status == PW_OK) status = linearise_write (cmd, error);
-  pw_linear_free (&cmd->linear);
-  pw_files_close (&cmd->files);
-  pw_run_close (cmd->r);
-  free (cmd->initial);
-  free (cmd->input);
-  free (cmd->output);
-  pw_cli_close_model (&cmd->m);
-  if (status == PW_RETRY) pw_cli_say ("pinwheel: interrupted\n");
-  return status == PW_RETRY ? PW_INTERRUPTED : status;
-}
-
-static const struct poptOption linearise_options[] = {
-  PW_OPTION_GROUP ("Linearisation"),
-  PW_TEXT_OPTION (pw_linearise_command, t_text, "at", 0, "T",
-                  "At time T [s] of a run with the model's default method (default 0)"),
-  PW_FLAG_OPTION (pw_linearise_command, steady, "steady",
-                  "At the steady motion that is reached from the initial state; signals are those of --at"),
-  PW_HOLD_OPTION (pw_linearise_command, hold_texts),
-  PW_LIST_OPTION (pw_linearise_command, input_names, "input", 0, "SIGNAL",
-                  "Input u: the signal of a force, ELEMENT or ELEMENT.FIELD; repeatable (default all)"),
-  PW_LIST_OPTION (pw_linearise_command, output_names, "output", 0, "STATE",
-                  "Output y: a state, BODY.x, .y, .phi, .vx, .vy or .omega; repeatable (default all)"),
-  PW_TEXT_OPTION (pw_linearise_command, name, "name", 'o', "NAME",
-                  "Write NAME.json (everything), NAME.csv (the matrix [A B; C D]) and NAME.npz for NumPy"),
-  PW_TEXT_OPTION (pw_linearise_command, page_path, "animate", 0, "FILE.html",
-                  "Write a page in which the modes are animated"),
-  PW_LIMIT_OPTION,
-  PW_MODEL_OPTIONS,
-  POPT_TABLEEND
-};
-
-const pw_command pw_cli_linearise = {
-  .name = "linearise",
-  .synopsis = "MODEL [OPTION...]",
-  .summary = "linearise a model: matrices, eigenvalues and mode shapes",
-  .help = "Linearise the equations of motion in minimal coordinates, which satisfy the constraints, in a frame that "
-          "moves with the motion: x' = A x + B u, y = C x + D u. Prints eigenvalues with frequency, damping and time "
-          "to double or halve, and mode shapes.",
-  .options_size = sizeof (pw_linearise_command),
-  .function = linearise_command,
-  .options = linearise_options,
-};
-
-/* The reports of `pinwheel linearise`: text, matrices in files, and the page of modes. */
+/* ---- Reports: text, matrices in files, and the page of modes ---- */
 
 enum {
   LINEARISE_DIGITS = 5, /* of numbers in the text */
@@ -361,7 +258,7 @@ static void linearise_print_shapes (const pw_linearise_command *cmd) {
   if (shown > LINEARISE_MODES) printf ("\nand %d more modes\n", shown - LINEARISE_MODES);
 }
 
-void pw_linearise_print (const pw_linearise_command *cmd) {
+static void linearise_print (const pw_linearise_command *cmd) {
   const pw_linear *l = &cmd->linear;
   printf ("%s%s at t = %.9g s: %d minimal coordinates, %d of positions and %d of velocities\n",
           pw_file_name (cmd->m.file), cmd->steady ? ", steady motion" : "", cmd->t, l->unknowns, l->positions,
@@ -445,7 +342,7 @@ static void linearise_names_json (const pw_linearise_command *cmd, pw_json *j, c
   pw_json_close (j, ']');
 }
 
-void pw_linearise_json (const pw_linearise_command *cmd, pw_json *j) {
+static void linearise_json (const pw_linearise_command *cmd, pw_json *j) {
   const pw_linear *l = &cmd->linear;
   linearise_block block[4];
   pw_json_open (j, NULL, '{');
@@ -467,7 +364,7 @@ void pw_linearise_json (const pw_linearise_command *cmd, pw_json *j) {
   pw_json_close (j, '}');
 }
 
-int pw_linearise_csv (const pw_linearise_command *cmd, FILE *f, pw_error *error) {
+static int linearise_csv (const pw_linearise_command *cmd, FILE *f, pw_error *error) {
   const pw_system *s = cmd->m.system;
   int n = cmd->linear.unknowns, rows = n + cmd->outputs, columns = n + cmd->inputs;
   pw_text t = { .chars = NULL };
@@ -488,7 +385,7 @@ int pw_linearise_csv (const pw_linearise_command *cmd, FILE *f, pw_error *error)
   return status;
 }
 
-int pw_linearise_npz (const pw_linearise_command *cmd, FILE *f, pw_error *error) {
+static int linearise_npz (const pw_linearise_command *cmd, FILE *f, pw_error *error) {
   enum { REAL = 1, COMPLEX = 2 }; /* parts of a number */
   const pw_linear *l = &cmd->linear;
   int n = l->unknowns;
@@ -577,7 +474,7 @@ static void page_begin (FILE *f, const void *context) {
       f);
 }
 
-int pw_linearise_page (const pw_linearise_command *cmd, FILE *f, pw_error *error) {
+static int linearise_page (const pw_linearise_command *cmd, FILE *f, pw_error *error) {
   static const char *const panel[] = { "<p class=\"bar\"><label>Mode <select id=\"mode\"></select></label></p>\n",
                                        NULL };
   const size_t n = (size_t)cmd->linear.coordinates;
@@ -595,3 +492,92 @@ int pw_linearise_page (const pw_linearise_command *cmd, FILE *f, pw_error *error
   free (state);
   return error->status;
 }
+
+/* ---- Files ---- */
+
+/* Indices in the list of files of linearise_open_files; 0 is the model. */
+enum { LINEARISE_JSON = 1, LINEARISE_CSV, LINEARISE_NPZ, LINEARISE_PAGE };
+
+/* Opens NAME.json, .csv, .npz, and the page, before anything is computed. */
+static int linearise_open_files (pw_linearise_command *cmd, pw_error *error) {
+  enum { PATH = 4096 };
+  const char *name = cmd->name, *slash = name ? strrchr (name, '/') : NULL, *last = slash ? slash + 1 : name;
+  if (last && (*last == 0 || strcmp (last, ".") == 0 || strcmp (last, "..") == 0 || pw_cli_names_file (last)))
+    return pw_fail (error, PW_INPUT, "-o %s: expected a NAME, for NAME.json, NAME.csv and NAME.npz", name);
+  if (name && strlen (name) + sizeof ".json" > PATH) return pw_fail (error, PW_INPUT, "-o: the name is too long");
+  if (cmd->page_path && pw_animation_check ("--animate", cmd->page_path, error) != PW_OK) return error->status;
+  pw_use use[] = { PW_CLI_MODEL_USE,
+                   { "-o", name ? PW_PRINTED (PATH, "%s.json", name) : NULL, PW_WRITES, NULL },
+                   { "-o", name ? PW_PRINTED (PATH, "%s.csv", name) : NULL, PW_WRITES, NULL },
+                   { "-o", name ? PW_PRINTED (PATH, "%s.npz", name) : NULL, PW_WRITES, NULL },
+                   { "--animate", cmd->page_path, PW_WRITES, NULL } };
+  return pw_files_open (&cmd->files, &cmd->line, &cmd->m, use, sizeof use / sizeof *use, error);
+}
+
+static int linearise_write (pw_linearise_command *cmd, pw_error *error) {
+  int status = PW_OK;
+  if (cmd->name) {
+    linearise_json (cmd, &(pw_json){ .f = pw_files_stream (&cmd->files, LINEARISE_JSON), .lines = 1 });
+    status = linearise_csv (cmd, pw_files_stream (&cmd->files, LINEARISE_CSV), error);
+    if (status == PW_OK) status = linearise_npz (cmd, pw_files_stream (&cmd->files, LINEARISE_NPZ), error);
+  }
+  if (status == PW_OK && cmd->page_path)
+    status = linearise_page (cmd, pw_files_stream (&cmd->files, LINEARISE_PAGE), error);
+  return status == PW_OK ? pw_files_finish (&cmd->files, error) : status;
+}
+
+static int linearise_command (void *options, pw_error *error) {
+  pw_linearise_command *cmd = options;
+  int status = pw_cli_number ("--at", cmd->t_text, PW_NONNEGATIVE, &cmd->t, error);
+  if (status == PW_OK && cmd->hold_texts && !cmd->steady) status = pw_fail (error, PW_INPUT, "--hold needs --steady");
+  if (status == PW_OK)
+    status = pw_cli_requires ("--limit", cmd->line.limit, "--at or --steady", cmd->t_text || cmd->steady, error);
+  if (status == PW_OK) status = pw_cli_open (&cmd->m, &cmd->line, error);
+  if (status == PW_OK) status = linearise_select (cmd, error);
+  if (status == PW_OK) status = linearise_open_files (cmd, error);
+  if (status == PW_OK) pw_report_model (&cmd->m);
+  if (status == PW_OK) status = linearise_compute (cmd, error);
+  if (status == PW_OK) linearise_print (cmd);
+  if (status == PW_OK) status = linearise_write (cmd, error);
+  pw_linear_free (&cmd->linear);
+  pw_files_close (&cmd->files);
+  pw_run_close (cmd->r);
+  free (cmd->initial);
+  free (cmd->input);
+  free (cmd->output);
+  pw_cli_close_model (&cmd->m);
+  if (status == PW_RETRY) pw_cli_say ("pinwheel: interrupted\n");
+  return status == PW_RETRY ? PW_INTERRUPTED : status;
+}
+
+static const struct poptOption linearise_options[] = {
+  PW_OPTION_GROUP ("Linearisation"),
+  PW_TEXT_OPTION (pw_linearise_command, t_text, "at", 0, "T",
+                  "At time T [s] of a run with the model's default method (default 0)"),
+  PW_FLAG_OPTION (pw_linearise_command, steady, "steady",
+                  "At the steady motion that is reached from the initial state; signals are those of --at"),
+  PW_HOLD_OPTION (pw_linearise_command, hold_texts),
+  PW_LIST_OPTION (pw_linearise_command, input_names, "input", 0, "SIGNAL",
+                  "Input u: the signal of a force, ELEMENT or ELEMENT.FIELD; repeatable (default all)"),
+  PW_LIST_OPTION (pw_linearise_command, output_names, "output", 0, "STATE",
+                  "Output y: a state, BODY.x, .y, .phi, .vx, .vy or .omega; repeatable (default all)"),
+  PW_TEXT_OPTION (pw_linearise_command, name, "name", 'o', "NAME",
+                  "Write NAME.json (everything), NAME.csv (the matrix [A B; C D]) and NAME.npz for NumPy"),
+  PW_TEXT_OPTION (pw_linearise_command, page_path, "animate", 0, "FILE.html",
+                  "Write a page in which the modes are animated"),
+  PW_LIMIT_OPTION,
+  PW_MODEL_OPTIONS,
+  POPT_TABLEEND
+};
+
+const pw_command pw_cli_linearise = {
+  .name = "linearise",
+  .synopsis = "MODEL [OPTION...]",
+  .summary = "linearise a model: matrices, eigenvalues and mode shapes",
+  .help = "Linearise the equations of motion in minimal coordinates, which satisfy the constraints, in a frame that "
+          "moves with the motion: x' = A x + B u, y = C x + D u. Prints eigenvalues with frequency, damping and time "
+          "to double or halve, and mode shapes.",
+  .options_size = sizeof (pw_linearise_command),
+  .function = linearise_command,
+  .options = linearise_options,
+};

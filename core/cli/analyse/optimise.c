@@ -8,7 +8,7 @@
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
-#include "sensitivity.h"
+#include "unknowns.h"
 #include "figure.h"
 #include "cli.h"
 
@@ -57,318 +57,11 @@ typedef struct {
   double least; /* sign x best objective so far */
 } pw_optimise;
 
-/* ---- Searches (optimise.c) ---- */
-
-#define PW_SEARCH_FINE 1e-7 /* last steps of refinements, relative to the scales of the unknowns */
-
-/* 1 if the outputs of a run satisfy the constraints, up to a pw_search_violation of 1e-6. */
-int pw_search_feasible (const pw_optimise *problem, const double *output);
-/* The largest violation of a constraint by the outputs of a run, relative to its bound if that is not 0; <= 0: there is
- * none.  *constraint: the index in `output` of the constraint with that violation, from 1; not set without
- * constraints. */
-double pw_search_violation (const pw_optimise *problem, const double *output, int *constraint);
-
-/* Tasks of pw_parallel: the search from start i; refinement i.  The context is the pw_optimise. */
-int pw_search_rough (void *context, int i, pw_error *error);
-int pw_search_fine (void *context, int i, pw_error *error);
-/* Sets without_effect[i] and objective_same[i], by two runs; their failure is an effect. */
-int pw_search_effect (void *context, int i, pw_error *error);
-
-/* ---- Results (optimise.c) ---- */
-
-/* 1 if two searches have results, and these are the same optimum: they differ little in all unknowns but those without
- * effect. */
-int pw_optimise_same (const pw_optimise *problem, const pw_search *a, const pw_search *b);
-
-/* Print the result; write it as JSON, with this status ("ok", ...), and as YAML; draw figures of the runs into the
- * folder plots_path.  problem->best is not NULL. */
-void pw_optimise_print (const pw_optimise *problem);
-void pw_optimise_json (const pw_optimise *problem, const char *status, FILE *f);
-void pw_optimise_yaml (const pw_optimise *problem, FILE *f);
-int pw_optimise_draw (const pw_optimise *problem, pw_error *error);
+#define SEARCH_FINE 1e-7 /* last steps of refinements, relative to the scales of the unknowns */
 
 enum { OPTIMISE_REFINED = 3 }; /* results that are refined, at most */
 #define OPTIMISE_RUNS 20.      /* usual number of runs of a search, to choose the engine */
 #define OPTIMISE_DIVERGED 1e6  /* modulus of an unknown without bounds, in units of its scale: the search diverged */
-
-/* ---- Starts ---- */
-
-/* Allocates all searches, and sets the first points of those from the starts. */
-static int optimise_open_searches (pw_optimise *problem, pw_error *error) {
-  const size_t n = (size_t)problem->unknowns.count, width = 2 * n + (size_t)problem->outputs,
-               starts = (size_t)problem->starts, all = starts + OPTIMISE_REFINED;
-  double *start = pw_unknowns_starts (&problem->unknowns, problem->starts, problem->seed),
-         *memory = pw_arena_alloc (&problem->arena, all * width * sizeof *memory);
-  problem->search = pw_arena_alloc (&problem->arena, all * sizeof *problem->search);
-  problem->without_effect = pw_arena_alloc (&problem->arena, 2 * n);
-  int status = start && memory && problem->search && problem->without_effect
-                   ? PW_OK
-                   : pw_fail (error, PW_RESOURCE, "out of memory");
-  if (status == PW_OK) problem->objective_same = problem->without_effect + n;
-  for (size_t i = 0; status == PW_OK && i < all; i++) {
-    pw_search *search = problem->search + i;
-    search->from = memory + i * width, search->to = search->from + n, search->output = search->to + n;
-    if (i < starts) memcpy (search->from, start + i * n, n * sizeof *start);
-  }
-  free (start);
-  return status;
-}
-
-/* The search with the best result among the first `count` searches without those `excluded`, which may be NULL; of
- * equal ones the first that converged, or else the first.  NULL: none has a result. */
-static const pw_search *optimise_best (const pw_optimise *problem, int count, const unsigned char *excluded) {
-  const pw_search *best = NULL;
-  for (int i = 0; i < count; i++) {
-    const pw_search *search = problem->search + i;
-    if (!search->feasible || (excluded && excluded[i])) continue;
-    double gain = best ? problem->sign[0] * (best->output[0] - search->output[0]) : INFINITY;
-    if (gain > 0 || (gain == 0 && search->converged && !best->converged)) best = search;
-  }
-  return best;
-}
-
-/* Refines the best of the distinct results. */
-static int optimise_refine (pw_optimise *problem, pw_error *error) {
-  const pw_search *best;
-  unsigned char *refined = calloc ((size_t)problem->starts, 1); /* 1: its result, or the same optimum, is refined */
-  if (refined == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  while (problem->refinements < OPTIMISE_REFINED && (best = optimise_best (problem, problem->starts, refined))) {
-    pw_search *refinement = problem->search + problem->starts + problem->refinements++;
-    memcpy (refinement->from, best->to, (size_t)problem->unknowns.count * sizeof *best->to);
-    for (int i = 0; i < problem->starts; i++)
-      refined[i] |= (unsigned char)pw_optimise_same (problem, problem->search + i, best);
-  }
-  free (refined);
-  problem->progress.last = problem->starts + problem->refinements;
-  return pw_parallel (problem->jobs, problem->refinements, pw_search_fine, problem, error);
-}
-
-/* PW_METHOD if the search with the best result did not converge, or all its runs but one failed, or it ended at a
- * very large value of an unknown without bounds. */
-static int optimise_converged (const pw_optimise *problem, pw_error *error) {
-  const pw_search *search = problem->best;
-  const pw_unknown *farthest = NULL;
-  double distance = 0; /* in units of its scale */
-  for (int i = 0; i < problem->unknowns.count; i++) {
-    const pw_unknown *unknown = problem->unknowns.list + i;
-    if (unknown->has_bounds || !(fabs (search->to[i]) >= distance * unknown->scale)) continue;
-    farthest = unknown, distance = fabs (search->to[i]) / unknown->scale;
-  }
-  int found = search->converged && distance < OPTIMISE_DIVERGED;
-  if (found && search->failed > 0 && search->runs - search->failed == 1)
-    return pw_fail (error, PW_METHOD, "all other runs of the search failed: %s", search->first_error.text);
-  if (found) return PW_OK;
-  if (farthest == NULL) return pw_fail (error, PW_METHOD, "the search did not converge");
-  return pw_fail (error, PW_METHOD,
-                  "the search %s; perhaps there is no optimum unless bounds are given, as in --free %s=LOW:HIGH",
-                  search->converged ? "diverged" : "did not converge", farthest->name);
-}
-
-static int optimise_search (pw_optimise *problem, pw_error *error) {
-  pw_stop_catch ();
-  pthread_mutex_init (&problem->lock, NULL);
-  pw_progress_start (&problem->progress, pw_file_name (problem->model.file), "searches", 0,
-                     problem->starts + OPTIMISE_REFINED);
-  int status = pw_parallel (problem->jobs, problem->starts, pw_search_rough, problem, error);
-  if (status == PW_OK) status = optimise_refine (problem, error);
-  pw_progress_end (&problem->progress);
-  problem->best = optimise_best (problem, problem->starts + problem->refinements, NULL);
-  if (status == PW_OK && problem->best && !pw_stop && optimise_converged (problem, &(pw_error){ 0 }) == PW_OK)
-    status = pw_parallel (problem->jobs, problem->unknowns.count, pw_search_effect, problem, error);
-  pthread_mutex_destroy (&problem->lock);
-  pw_stop_release ();
-  for (int i = 0; i < problem->starts + problem->refinements; i++) {
-    const pw_search *search = problem->search + i;
-    problem->runs += search->runs, problem->failed += search->failed, problem->derivatives += search->derivatives;
-    if (problem->first_error == NULL && search->failed) problem->first_error = &search->first_error;
-  }
-  return status;
-}
-
-/* ---- Before the search ---- */
-
-/* Adds the constraint "OUTPUT<=VALUE" or "OUTPUT>=VALUE".  text: a copy of `given`, of which OUTPUT is kept. */
-static int optimise_constraint (pw_optimise *problem, char *text, const char *given, pw_error *error) {
-  const int i = problem->outputs;
-  char *symbol = NULL;
-  for (char *c = text; *c; c++)
-    if ((*c == '<' || *c == '>') && c[1] == '=') symbol = c;
-  if (symbol == NULL || pw_read_expression (symbol + 2, &problem->bound[i]) != PW_OK || !isfinite (problem->bound[i]))
-    return pw_fail (error, PW_INPUT, "--subject-to %.200s: expected OUTPUT<=VALUE or OUTPUT>=VALUE", given);
-  problem->sign[i] = *symbol == '<' ? 1 : -1;
-  *symbol = 0;
-  while (symbol > text && symbol[-1] == ' ') *--symbol = 0;
-  problem->output[problem->outputs++] = text;
-  return PW_OK;
-}
-
-static int optimise_read_outputs (pw_optimise *problem, pw_error *error) {
-  size_t count = 1;
-  int status = PW_OK;
-  for (const char **given = problem->subject_to; given && *given; given++) count++;
-  problem->output = pw_arena_alloc (&problem->arena, (count + 1) * sizeof *problem->output); /* ended by NULL */
-  problem->unit = pw_arena_alloc (&problem->arena, count * sizeof *problem->unit);
-  problem->bound = pw_arena_alloc (&problem->arena, 2 * count * sizeof *problem->bound);
-  if (problem->output == NULL || problem->unit == NULL || problem->bound == NULL)
-    return pw_fail (error, PW_RESOURCE, "out of memory");
-  problem->sign = problem->bound + count;
-  problem->output[0] = problem->maximise ? problem->maximise : problem->minimise;
-  problem->sign[0] = problem->maximise ? -1 : 1;
-  problem->outputs = 1;
-  for (const char **given = problem->subject_to; given && *given && status == PW_OK; given++) {
-    char *copy = pw_arena_copy (&problem->arena, *given);
-    status = copy ? optimise_constraint (problem, copy, *given, error) : pw_fail (error, PW_RESOURCE, "out of memory");
-  }
-  return status;
-}
-
-/* Checks the outputs of an option, from number `first` on, and stores their units.  Extrema are not differentiable. */
-static int optimise_open_outputs (pw_optimise *problem, int first, int count, const char *option, pw_error *error) {
-  pw_outcomes set;
-  int status = pw_outcomes_open (&set, problem->model.system, option, problem->output + first, count, error);
-  for (int i = 0; i < set.outcomes; i++) pw_outcome_unit (&set, i, problem->unit[first + i], sizeof *problem->unit);
-  for (int i = 0; i < set.functionals; i++) problem->differentiable &= !pw_is_extremum (set.functional[i].type);
-  pw_outcomes_close (&set);
-  return status;
-}
-
-static int optimise_read (pw_optimise *problem, pw_error *error) {
-  double starts = 10;
-  problem->least = INFINITY, problem->seed = 1;
-  if (!problem->maximise == !problem->minimise)
-    return pw_fail (error, PW_INPUT, "expected one of --maximise OUTPUT and --minimise OUTPUT");
-  int status = pw_cli_number ("--starts", problem->starts_text, PW_COUNT, &starts, error);
-  if (status == PW_OK) status = pw_cli_number ("--seed", problem->seed_text, PW_COUNT, &problem->seed, error);
-  if (status == PW_OK) status = pw_parallel_jobs (problem->jobs_text, &problem->jobs, error);
-  if (status == PW_OK && starts > 1e5) status = pw_fail (error, PW_INPUT, "--starts: at most 100000");
-  if (status == PW_OK)
-    status = pw_cli_requires ("--width", problem->line.width, "--plots DIR", problem->plots_path != NULL, error);
-  problem->starts = (int)starts;
-  return status == PW_OK ? optimise_read_outputs (problem, error) : status;
-}
-
-enum { OPTIMISE_RESULT = 1, OPTIMISE_SUMMARY }; /* indices in the list of files of optimise_open */
-
-static int optimise_open (pw_optimise *problem, pw_error *error) {
-  static const char *const figures[] = { "optimise.dat", "optimise.gp",  "optimise.svg",
-                                         "optimise.png", "optimise.pdf", NULL },
-                           *const texts[] = { ".yaml", ".yml", NULL };
-  pw_use use[] = { PW_CLI_MODEL_USE,
-                   { "-o", problem->path, PW_WRITES, texts },
-                   { "--json", problem->json_path, PW_WRITES, pw_cli_json },
-                   { "--plots", problem->plots_path, PW_WRITES_INTO, figures } };
-  int status = pw_cli_open (&problem->model, &problem->line, error);
-  problem->differentiable = 1;
-  if (status == PW_OK)
-    status = optimise_open_outputs (problem, 0, 1, problem->maximise ? "--maximise" : "--minimise", error);
-  if (status == PW_OK) status = optimise_open_outputs (problem, 1, problem->outputs - 1, "--subject-to", error);
-  if (status == PW_OK) status = pw_unknowns_open (&problem->unknowns, &problem->line, &problem->model, error);
-  if (status == PW_OK) status = pw_unknowns_read (&problem->unknowns, problem->free, error);
-  if (status == PW_OK) status = pw_unknowns_engine (&problem->unknowns, OPTIMISE_RUNS, problem->starts, error);
-  if (status == PW_OK)
-    status = pw_files_open (&problem->files, &problem->line, &problem->model, use, sizeof use / sizeof *use, error);
-  return status == PW_OK ? optimise_open_searches (problem, error) : status;
-}
-
-/* ---- After the search ---- */
-
-/* Outputs of the run whose largest violation is smallest; *constraint: the output that has it.  NULL: all failed. */
-static const double *optimise_nearest (const pw_optimise *problem, int *constraint) {
-  const double *nearest = NULL;
-  double least = INFINITY;
-  int n = problem->unknowns.count, width = n + problem->outputs, i = 0;
-  for (const pw_search *search = problem->search; search < problem->search + problem->starts; search++)
-    for (long k = 0; k < search->runs; k++) {
-      const double *output = search->trials + k * width + n;
-      double violation = isnan (output[0]) ? NAN : pw_search_violation (problem, output, &i);
-      if (violation <= least) least = violation, nearest = output, *constraint = i;
-    }
-  return nearest;
-}
-
-/* The error if no run satisfies the constraints: that of the first run if every run failed. */
-static int optimise_infeasible (const pw_optimise *problem, pw_error *error) {
-  char unit[90] = "";
-  int i = 0;
-  if (problem->failed == problem->runs && problem->first_error)
-    return pw_fail (error, problem->first_error->status, "no run succeeded (%s); the first failed: %s",
-                    PW_COUNTED (problem->runs, "run"), problem->first_error->text);
-  const double *output = optimise_nearest (problem, &i);
-  if (*problem->unit[i]) snprintf (unit, sizeof unit, " %s", problem->unit[i]);
-  return pw_fail (error, PW_METHOD,
-                  "no run from %s satisfies --subject-to; in the nearest one %s is %s%s and must be at %s %s%s",
-                  PW_COUNTED (problem->starts, "start"), problem->output[i], PW_DIGITS (output[i], 9), unit,
-                  problem->sign[i] > 0 ? "most" : "least", PW_DIGITS (problem->bound[i], 9), unit);
-}
-
-static int optimise_finish (pw_optimise *problem, pw_error *error) {
-  FILE *result = pw_files_stream (&problem->files, OPTIMISE_RESULT),
-       *summary = pw_files_stream (&problem->files, OPTIMISE_SUMMARY);
-  int stopped = pw_stop != 0;
-  if (problem->best == NULL && stopped) pw_cli_say ("pinwheel: interrupted before any run satisfied the constraints\n");
-  if (problem->best == NULL) return stopped ? PW_INTERRUPTED : optimise_infeasible (problem, error);
-  pw_error unconverged = { 0 }, drawing = { 0 };
-  int converged = optimise_converged (problem, &unconverged) == PW_OK;
-  problem->incomplete = stopped ? "the search was interrupted" : converged ? NULL : unconverged.text;
-  pw_optimise_print (problem);
-  pw_unknowns_report (&problem->unknowns, problem->best->to);
-  if (result) pw_optimise_yaml (problem, result);
-  const int drawn = problem->plots_path ? pw_optimise_draw (problem, &drawing) : PW_OK;
-  const char *word = pw_cli_status_word (drawn != PW_OK || converged ? drawn : PW_METHOD);
-  if (summary) pw_optimise_json (problem, stopped ? "interrupted" : word, summary);
-  int status = pw_figure_status (drawn, &drawing, pw_files_finish (&problem->files, error), error);
-  if (stopped) pw_cli_say ("pinwheel: interrupted; this is the best result so far\n");
-  if (status == PW_OK && stopped) return PW_INTERRUPTED;
-  return status == PW_OK && !converged ? pw_fail (error, unconverged.status, "%s", unconverged.text) : status;
-}
-
-static int optimise_command (void *options, pw_error *error) {
-  pw_optimise *problem = options;
-  int status = optimise_read (problem, error);
-  if (status == PW_OK) status = optimise_open (problem, error);
-  if (status == PW_OK) status = optimise_search (problem, error);
-  if (status == PW_OK) status = optimise_finish (problem, error);
-  for (int i = 0; problem->search && i < problem->starts + OPTIMISE_REFINED; i++) free (problem->search[i].trials);
-  pw_arena_free (&problem->arena);
-  pw_files_close (&problem->files);
-  pw_unknowns_close (&problem->unknowns);
-  pw_cli_close_model (&problem->model);
-  return status;
-}
-
-static const struct poptOption optimise_options[] = {
-  PW_OPTION_GROUP ("Optimisation"),
-  PW_TEXT_OPTION (
-      pw_optimise, maximise, "maximise", 0, "OUTPUT",
-      "Maximise max:COLUMN, min:, mean:, integral:, rms: or final: (default) of a column of the table of `run`, or an "
-      "expression of these, such as frame.x/work"),
-  PW_TEXT_OPTION (pw_optimise, minimise, "minimise", 0, "OUTPUT", "Minimise such an output"),
-  PW_LIST_OPTION (pw_optimise, free, "free", 0, "NAME[=LOW:HIGH]",
-                  "Vary a parameter or an initial value, such as frame.vx, between bounds; repeatable"),
-  PW_LIST_OPTION (pw_optimise, subject_to, "subject-to", 0, "OUTPUT<=VALUE",
-                  "Constraint, or OUTPUT>=VALUE; repeatable"),
-  PW_TEXT_OPTION (pw_optimise, starts_text, "starts", 0, "N", "Number of searches from different points (default 10)"),
-  PW_TEXT_OPTION (pw_optimise, seed_text, "seed", 0, "N", "Seed of these points (default 1)"),
-  PW_TEXT_OPTION (pw_optimise, jobs_text, "jobs", 'j', "N", "Number of concurrent runs (default: one per processor)"),
-  PW_TEXT_OPTION (pw_optimise, path, "output", 'o', "FILE.yaml", "Write the result to this file"),
-  PW_TEXT_OPTION (pw_optimise, json_path, "json", 0, "FILE.json", "Write a summary"),
-  PW_TEXT_OPTION (pw_optimise, plots_path, "plots", 0, "DIR", "Write figures of all runs into a folder"),
-  PW_WIDTH_OPTION,
-  PW_METHOD_OPTIONS,
-  PW_MODEL_OPTIONS,
-  POPT_TABLEEND
-};
-
-const pw_command pw_cli_optimise = {
-  .name = "optimise",
-  .synopsis = "MODEL --maximise|--minimise OUTPUT --free NAME[=LOW:HIGH]... [OPTION...]",
-  .summary = "find the parameters for which an output is largest or smallest",
-  .help = "Vary parameters and initial values of a model until an output of its runs is largest or smallest, by local "
-          "searches from several starts. Runs that fail count as infeasible.",
-  .options_size = sizeof (pw_optimise),
-  .function = optimise_command,
-  .options = optimise_options,
-};
 
 /* Local searches of `pinwheel optimise`, by NLopt; refinements of SEARCH_SLOPES or more unknowns use derivatives of
  * differentiable outputs.  NLopt varies scaled unknowns (search_unknown). */
@@ -468,16 +161,20 @@ static double search_violation (const pw_optimise *problem, int i, const double 
   return search_factor (problem, i) * (output[i] - problem->bound[i]);
 }
 
-double pw_search_violation (const pw_optimise *problem, const double *output, int *constraint) {
+/* The largest violation of a constraint by the outputs of a run, relative to its bound if that is not 0; <= 0: there is
+ * none.  *constraint: the index in `output` of the constraint with that violation, from 1; not set without
+ * constraints. */
+static double search_worst (const pw_optimise *problem, const double *output, int *constraint) {
   double most = -INFINITY;
   for (int i = 1; i < problem->outputs; i++)
     if (search_violation (problem, i, output) > most) most = search_violation (problem, i, output), *constraint = i;
   return most;
 }
 
-int pw_search_feasible (const pw_optimise *problem, const double *output) {
+/* 1 if the outputs of a run satisfy the constraints. */
+static int search_feasible (const pw_optimise *problem, const double *output) {
   int constraint;
-  return pw_search_violation (problem, output, &constraint) <= SEARCH_ALLOWED;
+  return search_worst (problem, output, &constraint) <= SEARCH_ALLOWED;
 }
 
 /* Appends the last run to those of the search. */
@@ -501,7 +198,7 @@ static void search_keep (local_search *local) {
   local->least = fmin (local->least, objective);
   local->most = fmax (local->most, objective);
   if (search->feasible && !(objective < problem->sign[0] * search->output[0])) return;
-  if (!pw_search_feasible (problem, local->output)) {
+  if (!search_feasible (problem, local->output)) {
     local->repeat |= !local->constrained;
     return;
   }
@@ -586,19 +283,17 @@ static void search_constraints (unsigned count, double *violation, unsigned unkn
 
 /* ---- Searches ---- */
 
-/* SLSQP uses derivatives.  Without them BOBYQA is the fastest, but takes neither constraints, as COBYLA does, nor a
- * single unknown, as SBPLX does. */
-static nlopt_algorithm search_algorithm (const local_search *local) {
-  if (local->slope) return NLOPT_LD_SLSQP;
-  if (local->constrained) return NLOPT_LN_COBYLA;
-  return local->problem->unknowns.count == 1 ? NLOPT_LN_SBPLX : NLOPT_LN_BOBYQA;
-}
-
-/* Opens the optimiser with the bounds and these first and last steps of scaled unknowns. */
+/* Opens the optimiser with the bounds and these first and last steps of scaled unknowns.  SLSQP uses derivatives.
+ * Without them BOBYQA is the fastest, but takes neither constraints, as COBYLA does, nor a single unknown, as SBPLX
+ * does. */
 static int search_open (local_search *local, double first, double last) {
   const pw_unknowns *unknowns = &local->problem->unknowns;
   int n = unknowns->count, done = 1;
-  nlopt_opt o = local->optimiser = nlopt_create (search_algorithm (local), (unsigned)n);
+  const nlopt_algorithm algorithm = local->slope         ? NLOPT_LD_SLSQP
+                                    : local->constrained ? NLOPT_LN_COBYLA
+                                    : n == 1             ? NLOPT_LN_SBPLX
+                                                         : NLOPT_LN_BOBYQA;
+  nlopt_opt o = local->optimiser = nlopt_create (algorithm, (unsigned)n);
   if (o == NULL) return PW_RESOURCE;
   nlopt_set_min_objective (o, search_objective, local);
   for (int i = 0; i < n; i++) {
@@ -678,14 +373,15 @@ static int search_task (pw_optimise *problem, int i, int slopes, double first, d
   return status == PW_OK ? error->status : pw_fail (error, status, "out of memory");
 }
 
-int pw_search_rough (void *context, int i, pw_error *error) {
+/* Tasks of pw_parallel: the search from start i; refinement i. */
+static int search_rough (void *context, int i, pw_error *error) {
   return search_task (context, i, 0, SEARCH_FIRST, SEARCH_ROUGH, error);
 }
 
-int pw_search_fine (void *context, int i, pw_error *error) {
+static int search_fine (void *context, int i, pw_error *error) {
   pw_optimise *problem = context;
   int slopes = problem->differentiable && problem->unknowns.count >= SEARCH_SLOPES;
-  return search_task (problem, problem->starts + i, slopes, SEARCH_ROUGH, PW_SEARCH_FINE, error);
+  return search_task (problem, problem->starts + i, slopes, SEARCH_ROUGH, SEARCH_FINE, error);
 }
 
 /* The largest change of output i without an effect: small compared with its value and with its range over all runs, so
@@ -701,7 +397,8 @@ static double search_noise (const pw_optimise *problem, int i) {
   return fmax (SEARCH_ROUND * size, SEARCH_SAME * fmin (size, most - least));
 }
 
-int pw_search_effect (void *context, int i, pw_error *error) {
+/* Likewise: sets without_effect[i] and objective_same[i], by two runs; their failure is an effect. */
+static int search_effect (void *context, int i, pw_error *error) {
   pw_optimise *problem = context;
   const pw_unknown *unknown = problem->unknowns.list + i;
   size_t n = (size_t)problem->unknowns.count;
@@ -725,30 +422,121 @@ int pw_search_effect (void *context, int i, pw_error *error) {
   return PW_OK;
 }
 
-/* The reports of `pinwheel optimise`. */
+/* ---- All searches ---- */
 
 #define REPORT_SAME 0.01 /* largest distance of results of the same optimum, in scales of the unknowns */
 
-enum {
-  REPORT_DIGITS = 9,
-  REPORT_PANELS = 6 /* of a figure, at most: one for each unknown */
-};
+/* Allocates all searches, and sets the first points of those from the starts. */
+static int optimise_open_searches (pw_optimise *problem, pw_error *error) {
+  const size_t n = (size_t)problem->unknowns.count, width = 2 * n + (size_t)problem->outputs,
+               starts = (size_t)problem->starts, all = starts + OPTIMISE_REFINED;
+  double *start = pw_unknowns_starts (&problem->unknowns, problem->starts, problem->seed),
+         *memory = pw_arena_alloc (&problem->arena, all * width * sizeof *memory);
+  problem->search = pw_arena_alloc (&problem->arena, all * sizeof *problem->search);
+  problem->without_effect = pw_arena_alloc (&problem->arena, 2 * n);
+  int status = start && memory && problem->search && problem->without_effect
+                   ? PW_OK
+                   : pw_fail (error, PW_RESOURCE, "out of memory");
+  if (status == PW_OK) problem->objective_same = problem->without_effect + n;
+  for (size_t i = 0; status == PW_OK && i < all; i++) {
+    pw_search *search = problem->search + i;
+    search->from = memory + i * width, search->to = search->from + n, search->output = search->to + n;
+    if (i < starts) memcpy (search->from, start + i * n, n * sizeof *start);
+  }
+  free (start);
+  return status;
+}
 
-int pw_optimise_same (const pw_optimise *problem, const pw_search *a, const pw_search *b) {
+/* The search with the best result among the first `count` searches without those `excluded`, which may be NULL; of
+ * equal ones the first that converged, or else the first.  NULL: none has a result. */
+static const pw_search *optimise_best (const pw_optimise *problem, int count, const unsigned char *excluded) {
+  const pw_search *best = NULL;
+  for (int i = 0; i < count; i++) {
+    const pw_search *search = problem->search + i;
+    if (!search->feasible || (excluded && excluded[i])) continue;
+    double gain = best ? problem->sign[0] * (best->output[0] - search->output[0]) : INFINITY;
+    if (gain > 0 || (gain == 0 && search->converged && !best->converged)) best = search;
+  }
+  return best;
+}
+
+/* 1 if two searches have results, and these are the same optimum: they differ little in all unknowns but those without
+ * effect. */
+static int optimise_same (const pw_optimise *problem, const pw_search *a, const pw_search *b) {
   int same = a->feasible && b->feasible;
   for (int j = 0; same && j < problem->unknowns.count; j++)
     same = problem->without_effect[j] || fabs (a->to[j] - b->to[j]) <= REPORT_SAME * problem->unknowns.list[j].scale;
   return same;
 }
 
+/* Refines the best of the distinct results. */
+static int optimise_refine (pw_optimise *problem, pw_error *error) {
+  const pw_search *best;
+  unsigned char *refined = calloc ((size_t)problem->starts, 1); /* 1: its result, or the same optimum, is refined */
+  if (refined == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  while (problem->refinements < OPTIMISE_REFINED && (best = optimise_best (problem, problem->starts, refined))) {
+    pw_search *refinement = problem->search + problem->starts + problem->refinements++;
+    memcpy (refinement->from, best->to, (size_t)problem->unknowns.count * sizeof *best->to);
+    for (int i = 0; i < problem->starts; i++)
+      refined[i] |= (unsigned char)optimise_same (problem, problem->search + i, best);
+  }
+  free (refined);
+  problem->progress.last = problem->starts + problem->refinements;
+  return pw_parallel (problem->jobs, problem->refinements, search_fine, problem, error);
+}
+
+/* PW_METHOD if the search with the best result did not converge, or all its runs but one failed, or it ended at a
+ * very large value of an unknown without bounds. */
+static int optimise_converged (const pw_optimise *problem, pw_error *error) {
+  const pw_search *search = problem->best;
+  const pw_unknown *farthest = NULL;
+  double distance = 0; /* in units of its scale */
+  for (int i = 0; i < problem->unknowns.count; i++) {
+    const pw_unknown *unknown = problem->unknowns.list + i;
+    if (unknown->has_bounds || !(fabs (search->to[i]) >= distance * unknown->scale)) continue;
+    farthest = unknown, distance = fabs (search->to[i]) / unknown->scale;
+  }
+  int found = search->converged && distance < OPTIMISE_DIVERGED;
+  if (found && search->failed > 0 && search->runs - search->failed == 1)
+    return pw_fail (error, PW_METHOD, "all other runs of the search failed: %s", search->first_error.text);
+  if (found) return PW_OK;
+  if (farthest == NULL) return pw_fail (error, PW_METHOD, "the search did not converge");
+  return pw_fail (error, PW_METHOD,
+                  "the search %s; perhaps there is no optimum unless bounds are given, as in --free %s=LOW:HIGH",
+                  search->converged ? "diverged" : "did not converge", farthest->name);
+}
+
+static int optimise_search (pw_optimise *problem, pw_error *error) {
+  pw_stop_catch ();
+  pthread_mutex_init (&problem->lock, NULL);
+  pw_progress_start (&problem->progress, pw_file_name (problem->model.file), "searches", 0,
+                     problem->starts + OPTIMISE_REFINED);
+  int status = pw_parallel (problem->jobs, problem->starts, search_rough, problem, error);
+  if (status == PW_OK) status = optimise_refine (problem, error);
+  pw_progress_end (&problem->progress);
+  problem->best = optimise_best (problem, problem->starts + problem->refinements, NULL);
+  if (status == PW_OK && problem->best && !pw_stop && optimise_converged (problem, &(pw_error){ 0 }) == PW_OK)
+    status = pw_parallel (problem->jobs, problem->unknowns.count, search_effect, problem, error);
+  pthread_mutex_destroy (&problem->lock);
+  pw_stop_release ();
+  for (int i = 0; i < problem->starts + problem->refinements; i++) {
+    const pw_search *search = problem->search + i;
+    problem->runs += search->runs, problem->failed += search->failed, problem->derivatives += search->derivatives;
+    if (problem->first_error == NULL && search->failed) problem->first_error = &search->first_error;
+  }
+  return status;
+}
+
+/* ---- Reports ---- */
+
+enum {
+  REPORT_DIGITS = 9,
+  REPORT_PANELS = 6 /* of a figure, at most: one for each unknown */
+};
+
 /* The objective of the first run, with the initial values; NaN if it failed. */
 static double report_initial (const pw_optimise *problem) {
   return problem->search[0].runs > 0 ? problem->search[0].trials[problem->unknowns.count] : NAN;
-}
-
-/* 1 if no unknown has an effect on the objective. */
-static int report_is_constant (const pw_optimise *problem) {
-  return memchr (problem->objective_same, 0, (size_t)problem->unknowns.count) == NULL;
 }
 
 /* The bound at which the best value of unknown i is: -1 the lower one, 1 the upper one, 0 neither, or no effect.  The
@@ -756,7 +544,7 @@ static int report_is_constant (const pw_optimise *problem) {
 static int report_bound (const pw_optimise *problem, int i) {
   const pw_unknown *unknown = problem->unknowns.list + i;
   if (problem->without_effect[i]) return 0;
-  double near = problem->incomplete ? 0 : 10 * PW_SEARCH_FINE * unknown->scale, value = problem->best->to[i];
+  double near = problem->incomplete ? 0 : 10 * SEARCH_FINE * unknown->scale, value = problem->best->to[i];
   return value - unknown->low <= near ? -1 : unknown->high - value <= near;
 }
 
@@ -799,14 +587,14 @@ static void report_outputs (const pw_optimise *problem) {
     }
 }
 
-void pw_optimise_print (const pw_optimise *problem) {
+static void optimise_print (const pw_optimise *problem) {
   char options[PW_UNKNOWNS_OPTIONS];
   /* a search from a start also ends at a result that continues from there */
   const pw_search *best = problem->best, continued = { .feasible = 1, .to = best->from };
   int same = 0;
   for (int i = 0; i < problem->starts; i++)
-    same += pw_optimise_same (problem, problem->search + i, best) ||
-            (best - problem->search >= problem->starts && pw_optimise_same (problem, problem->search + i, &continued));
+    same += optimise_same (problem, problem->search + i, best) ||
+            (best - problem->search >= problem->starts && optimise_same (problem, problem->search + i, &continued));
   report_unknowns (problem);
   report_outputs (problem);
   printf ("\n%s from %s, %d of which %s\n", PW_COUNTED (problem->runs, "run"), PW_COUNTED (problem->starts, "start"),
@@ -821,7 +609,8 @@ void pw_optimise_print (const pw_optimise *problem) {
     pw_cli_print (stdout, "%s failed and %s as infeasible, the first of them: %s\n",
                   PW_COUNTED (problem->failed, "run"), problem->failed == 1 ? "counts" : "count",
                   problem->first_error->text);
-  if (report_is_constant (problem)) pw_cli_say ("pinwheel: no free value has an effect on %s\n", problem->output[0]);
+  if (memchr (problem->objective_same, 0, (size_t)problem->unknowns.count) == NULL)
+    pw_cli_say ("pinwheel: no free value has an effect on %s\n", problem->output[0]);
   if (pw_unknowns_options (&problem->unknowns, problem->best->to, options)) printf ("\n%s\n", options);
 }
 
@@ -859,7 +648,7 @@ static void report_json_constraint (const pw_optimise *problem, pw_json *j, int 
   pw_json_close (j, '}');
 }
 
-void pw_optimise_json (const pw_optimise *problem, const char *status, FILE *f) {
+static void optimise_json (const pw_optimise *problem, const char *status, FILE *f) {
   pw_json json = { .f = f, .lines = 2 }, *j = &json;
   char options[PW_UNKNOWNS_OPTIONS];
   pw_json_open (j, NULL, '{');
@@ -889,8 +678,6 @@ void pw_optimise_json (const pw_optimise *problem, const char *status, FILE *f) 
   pw_json_close (j, '}');
 }
 
-/* ---- YAML ---- */
-
 /* Writes the command that runs the result, as a comment: the given options that affect runs, then the values found. */
 static void report_command (const pw_optimise *problem, const char *values, FILE *f) {
   const pw_cli_line *line = &problem->line;
@@ -911,22 +698,18 @@ static void report_command (const pw_optimise *problem, const char *values, FILE
   fprintf (f, " %s\n", values);
 }
 
-static void report_yaml_text (FILE *f, const char *key, const char *text) {
-  fprintf (f, "%s: ", key);
-  pw_cli_quoted (f, text, "''");
-  fputc ('\n', f);
-}
-
-void pw_optimise_yaml (const pw_optimise *problem, FILE *f) {
+static void optimise_yaml (const pw_optimise *problem, FILE *f) {
   char values[PW_UNKNOWNS_OPTIONS];
   const pw_search *best = problem->best;
   if (pw_unknowns_options (&problem->unknowns, best->to, values) && strpbrk (problem->line.argument[0], "\r\n") == NULL)
     report_command (problem, values, f);
   if (problem->incomplete)
     fprintf (f, "# perhaps not an optimum: %.*s\n", (int)strcspn (problem->incomplete, "\r\n"), problem->incomplete);
-  report_yaml_text (f, "model", pw_file_name (problem->model.file));
-  report_yaml_text (f, problem->maximise ? "maximise" : "minimise", problem->output[0]);
-  fprintf (f, "value: %.17g\n", best->output[0]);
+  fputs ("model: ", f);
+  pw_cli_quoted (f, pw_file_name (problem->model.file), "''");
+  fputs (problem->maximise ? "\nmaximise: " : "\nminimise: ", f);
+  pw_cli_quoted (f, problem->output[0], "''");
+  fprintf (f, "\nvalue: %.17g\n", best->output[0]);
   for (int initial = 0; initial < 2; initial++)
     for (int i = 0, first = 1; i < problem->unknowns.count; i++) {
       if ((problem->unknowns.list[i].parameter == NULL) != initial) continue;
@@ -936,40 +719,217 @@ void pw_optimise_yaml (const pw_optimise *problem, FILE *f) {
     }
 }
 
-/* ---- Figures ---- */
+/* ---- The figure ---- */
 
-/* Writes a row per run: number of its search, unknowns, objective, 1 if it satisfies the constraints. */
-static int report_data (const void *context, FILE *f, pw_error *error) {
-  const pw_optimise *problem = context;
-  int n = problem->unknowns.count, width = n + problem->outputs;
-  (void)error;
-  fputs ("# start", f);
-  for (int i = 0; i < n; i++) fprintf (f, ", %s [%s]", problem->unknowns.list[i].name, problem->unknowns.list[i].unit);
-  fprintf (f, ", %s, 1 if the constraints are satisfied\n", problem->output[0]);
-  for (int i = 0; i < problem->starts + problem->refinements; i++)
-    for (long k = 0; k < problem->search[i].runs; k++) {
-      fprintf (f, "%d", i + 1);
-      const double *row = problem->search[i].trials + k * width;
-      for (int c = 0; c <= n; c++) fprintf (f, " %s", PW_DIGITS (row[c], 12));
-      fprintf (f, " %d\n", !isnan (row[n]) && pw_search_feasible (problem, row + n));
+/* The objective of every run against each unknown, the best one marked. */
+static int optimise_draw (const pw_optimise *problem, pw_error *error) {
+  static const char *const style[] = { "infeasible", "feasible" };
+  const int n = problem->unknowns.count, width = n + problem->outputs, panels = n < REPORT_PANELS ? n : REPORT_PANELS;
+  const char *objective = PW_FIGURE_LABEL (problem->output[0], problem->unit[0]);
+  pw_curves c;
+  int status = pw_curves_open (&c, &problem->line, &problem->model, problem->plots_path, "optimise",
+                               "runs of the optimisation", error);
+  if (status != PW_OK) return status;
+  for (int i = 0; i < panels; i++) {
+    pw_curves_panel (
+        &c, &(pw_panel){ .x_label = PW_FIGURE_LABEL (problem->unknowns.list[i].name, problem->unknowns.list[i].unit),
+                         .y_label = objective,
+                         .aspect = panels > 1 ? 0.7 : 0.5,
+                         .type = panels > 1 ? PW_PANEL_HALF : 0 });
+    for (int feasible = 0; feasible < 2; feasible++) {
+      pw_curves_add (&c, style[feasible], style[feasible]);
+      for (const pw_search *s = problem->search; s < problem->search + problem->starts + problem->refinements; s++)
+        for (const double *run = s->trials; run && run < s->trials + s->runs * width; run += width)
+          if (!isnan (run[n]) && search_feasible (problem, run + n) == feasible)
+            pw_curves_point (&c, run[i], run[n], 0);
     }
+    pw_curves_add (&c, "best", "best");
+    pw_curves_point (&c, problem->best->to[i], problem->best->output[0], 0);
+  }
+  return pw_curves_draw (&c, PW_OK, error);
+}
+
+/* ---- Before the search ---- */
+
+/* Adds the constraint "OUTPUT<=VALUE" or "OUTPUT>=VALUE".  text: a copy of `given`, of which OUTPUT is kept. */
+static int optimise_constraint (pw_optimise *problem, char *text, const char *given, pw_error *error) {
+  const int i = problem->outputs;
+  char *symbol = NULL;
+  for (char *c = text; *c; c++)
+    if ((*c == '<' || *c == '>') && c[1] == '=') symbol = c;
+  if (symbol == NULL || pw_read_expression (symbol + 2, &problem->bound[i]) != PW_OK || !isfinite (problem->bound[i]))
+    return pw_fail (error, PW_INPUT, "--subject-to %.200s: expected OUTPUT<=VALUE or OUTPUT>=VALUE", given);
+  problem->sign[i] = *symbol == '<' ? 1 : -1;
+  *symbol = 0;
+  while (symbol > text && symbol[-1] == ' ') *--symbol = 0;
+  problem->output[problem->outputs++] = text;
   return PW_OK;
 }
 
-static void report_variables (const void *context, FILE *f) {
-  const pw_optimise *problem = context;
-  int panels = problem->unknowns.count < REPORT_PANELS ? problem->unknowns.count : REPORT_PANELS;
-  fprintf (f, "panels = %d\nunknowns = %d\narray label[%d]\narray best[%d]\n", panels, problem->unknowns.count, panels,
-           panels);
-  for (int i = 0; i < panels; i++) {
-    pw_figure_label (f, "label", i + 1, problem->unknowns.list[i].name, problem->unknowns.list[i].unit);
-    fprintf (f, "best[%d] = %.12g\n", i + 1, problem->best->to[i]);
+static int optimise_read_outputs (pw_optimise *problem, pw_error *error) {
+  size_t count = 1;
+  int status = PW_OK;
+  for (const char **given = problem->subject_to; given && *given; given++) count++;
+  problem->output = pw_arena_alloc (&problem->arena, (count + 1) * sizeof *problem->output); /* ended by NULL */
+  problem->unit = pw_arena_alloc (&problem->arena, count * sizeof *problem->unit);
+  problem->bound = pw_arena_alloc (&problem->arena, 2 * count * sizeof *problem->bound);
+  if (problem->output == NULL || problem->unit == NULL || problem->bound == NULL)
+    return pw_fail (error, PW_RESOURCE, "out of memory");
+  problem->sign = problem->bound + count;
+  problem->output[0] = problem->maximise ? problem->maximise : problem->minimise;
+  problem->sign[0] = problem->maximise ? -1 : 1;
+  problem->outputs = 1;
+  for (const char **given = problem->subject_to; given && *given && status == PW_OK; given++) {
+    char *copy = pw_arena_copy (&problem->arena, *given);
+    status = copy ? optimise_constraint (problem, copy, *given, error) : pw_fail (error, PW_RESOURCE, "out of memory");
   }
-  pw_figure_label (f, "objective", 0, problem->output[0], problem->unit[0]);
-  fprintf (f, "value = %.12g\n", problem->best->output[0]);
+  return status;
 }
 
-int pw_optimise_draw (const pw_optimise *problem, pw_error *error) {
-  return pw_figure_write (&problem->line, &problem->model, problem->plots_path, "optimise", problem, report_data,
-                          report_variables, error);
+/* Checks the outputs of an option, from number `first` on, and stores their units.  Extrema are not differentiable. */
+static int optimise_open_outputs (pw_optimise *problem, int first, int count, const char *option, pw_error *error) {
+  pw_outcomes set;
+  int status = pw_outcomes_open (&set, problem->model.system, option, problem->output + first, count, error);
+  for (int i = 0; i < set.outcomes; i++) pw_outcome_unit (&set, i, problem->unit[first + i], sizeof *problem->unit);
+  for (int i = 0; i < set.functionals; i++) problem->differentiable &= !pw_is_extremum (set.functional[i].type);
+  pw_outcomes_close (&set);
+  return status;
 }
+
+static int optimise_read (pw_optimise *problem, pw_error *error) {
+  double starts = 10;
+  problem->least = INFINITY, problem->seed = 1;
+  if (!problem->maximise == !problem->minimise)
+    return pw_fail (error, PW_INPUT, "expected one of --maximise OUTPUT and --minimise OUTPUT");
+  int status = pw_cli_number ("--starts", problem->starts_text, PW_COUNT, &starts, error);
+  if (status == PW_OK) status = pw_cli_number ("--seed", problem->seed_text, PW_COUNT, &problem->seed, error);
+  if (status == PW_OK) status = pw_parallel_jobs (problem->jobs_text, &problem->jobs, error);
+  if (status == PW_OK && starts > 1e5) status = pw_fail (error, PW_INPUT, "--starts: at most 100000");
+  if (status == PW_OK)
+    status = pw_cli_requires ("--width", problem->line.width, "--plots DIR", problem->plots_path != NULL, error);
+  problem->starts = (int)starts;
+  return status == PW_OK ? optimise_read_outputs (problem, error) : status;
+}
+
+enum { OPTIMISE_RESULT = 1, OPTIMISE_SUMMARY }; /* indices in the list of files of optimise_open */
+
+static int optimise_open (pw_optimise *problem, pw_error *error) {
+  static const char *const figures[] = { "optimise.dat", "optimise.gp",  "optimise.svg",
+                                         "optimise.png", "optimise.pdf", NULL },
+                           *const texts[] = { ".yaml", ".yml", NULL };
+  pw_use use[] = { PW_CLI_MODEL_USE,
+                   { "-o", problem->path, PW_WRITES, texts },
+                   { "--json", problem->json_path, PW_WRITES, pw_cli_json },
+                   { "--plots", problem->plots_path, PW_WRITES_INTO, figures } };
+  int status = pw_cli_open (&problem->model, &problem->line, error);
+  problem->differentiable = 1;
+  if (status == PW_OK)
+    status = optimise_open_outputs (problem, 0, 1, problem->maximise ? "--maximise" : "--minimise", error);
+  if (status == PW_OK) status = optimise_open_outputs (problem, 1, problem->outputs - 1, "--subject-to", error);
+  if (status == PW_OK) status = pw_unknowns_open (&problem->unknowns, &problem->line, &problem->model, error);
+  if (status == PW_OK) status = pw_unknowns_read (&problem->unknowns, problem->free, error);
+  if (status == PW_OK) status = pw_unknowns_engine (&problem->unknowns, OPTIMISE_RUNS, problem->starts, error);
+  if (status == PW_OK)
+    status = pw_files_open (&problem->files, &problem->line, &problem->model, use, sizeof use / sizeof *use, error);
+  return status == PW_OK ? optimise_open_searches (problem, error) : status;
+}
+
+/* ---- After the search ---- */
+
+/* Outputs of the run whose largest violation is smallest; *constraint: the output that has it.  NULL: all failed. */
+static const double *optimise_nearest (const pw_optimise *problem, int *constraint) {
+  const double *nearest = NULL;
+  double least = INFINITY;
+  int n = problem->unknowns.count, width = n + problem->outputs, i = 0;
+  for (const pw_search *search = problem->search; search < problem->search + problem->starts; search++)
+    for (long k = 0; k < search->runs; k++) {
+      const double *output = search->trials + k * width + n;
+      double violation = isnan (output[0]) ? NAN : search_worst (problem, output, &i);
+      if (violation <= least) least = violation, nearest = output, *constraint = i;
+    }
+  return nearest;
+}
+
+/* The error if no run satisfies the constraints: that of the first run if every run failed. */
+static int optimise_infeasible (const pw_optimise *problem, pw_error *error) {
+  char unit[90] = "";
+  int i = 0;
+  if (problem->failed == problem->runs && problem->first_error)
+    return pw_fail (error, problem->first_error->status, "no run succeeded (%s); the first failed: %s",
+                    PW_COUNTED (problem->runs, "run"), problem->first_error->text);
+  const double *output = optimise_nearest (problem, &i);
+  if (*problem->unit[i]) snprintf (unit, sizeof unit, " %s", problem->unit[i]);
+  return pw_fail (error, PW_METHOD,
+                  "no run from %s satisfies --subject-to; in the nearest one %s is %s%s and must be at %s %s%s",
+                  PW_COUNTED (problem->starts, "start"), problem->output[i], PW_DIGITS (output[i], 9), unit,
+                  problem->sign[i] > 0 ? "most" : "least", PW_DIGITS (problem->bound[i], 9), unit);
+}
+
+static int optimise_finish (pw_optimise *problem, pw_error *error) {
+  FILE *result = pw_files_stream (&problem->files, OPTIMISE_RESULT),
+       *summary = pw_files_stream (&problem->files, OPTIMISE_SUMMARY);
+  int stopped = pw_stop != 0;
+  if (problem->best == NULL && stopped) pw_cli_say ("pinwheel: interrupted before any run satisfied the constraints\n");
+  if (problem->best == NULL) return stopped ? PW_INTERRUPTED : optimise_infeasible (problem, error);
+  pw_error unconverged = { 0 }, drawing = { 0 };
+  int converged = optimise_converged (problem, &unconverged) == PW_OK;
+  problem->incomplete = stopped ? "the search was interrupted" : converged ? NULL : unconverged.text;
+  optimise_print (problem);
+  pw_unknowns_report (&problem->unknowns, problem->best->to);
+  if (result) optimise_yaml (problem, result);
+  const int drawn = problem->plots_path ? optimise_draw (problem, &drawing) : PW_OK;
+  const char *word = pw_cli_status_word (drawn != PW_OK || converged ? drawn : PW_METHOD);
+  if (summary) optimise_json (problem, stopped ? "interrupted" : word, summary);
+  int status = pw_figure_status (drawn, &drawing, pw_files_finish (&problem->files, error), error);
+  if (stopped) pw_cli_say ("pinwheel: interrupted; this is the best result so far\n");
+  if (status == PW_OK && stopped) return PW_INTERRUPTED;
+  return status == PW_OK && !converged ? pw_fail (error, unconverged.status, "%s", unconverged.text) : status;
+}
+
+static int optimise_command (void *options, pw_error *error) {
+  pw_optimise *problem = options;
+  int status = optimise_read (problem, error);
+  if (status == PW_OK) status = optimise_open (problem, error);
+  if (status == PW_OK) status = optimise_search (problem, error);
+  if (status == PW_OK) status = optimise_finish (problem, error);
+  for (int i = 0; problem->search && i < problem->starts + OPTIMISE_REFINED; i++) free (problem->search[i].trials);
+  pw_arena_free (&problem->arena);
+  pw_files_close (&problem->files);
+  pw_unknowns_close (&problem->unknowns);
+  pw_cli_close_model (&problem->model);
+  return status;
+}
+
+static const struct poptOption optimise_options[] = {
+  PW_OPTION_GROUP ("Optimisation"),
+  PW_TEXT_OPTION (
+      pw_optimise, maximise, "maximise", 0, "OUTPUT",
+      "Maximise max:COLUMN, min:, mean:, integral:, rms: or final: (default) of a column of the table of `run`, or an "
+      "expression of these, such as frame.x/work"),
+  PW_TEXT_OPTION (pw_optimise, minimise, "minimise", 0, "OUTPUT", "Minimise such an output"),
+  PW_LIST_OPTION (pw_optimise, free, "free", 0, "NAME[=LOW:HIGH]",
+                  "Vary a parameter or an initial value, such as frame.vx, between bounds; repeatable"),
+  PW_LIST_OPTION (pw_optimise, subject_to, "subject-to", 0, "OUTPUT<=VALUE",
+                  "Constraint, or OUTPUT>=VALUE; repeatable"),
+  PW_TEXT_OPTION (pw_optimise, starts_text, "starts", 0, "N", "Number of searches from different points (default 10)"),
+  PW_TEXT_OPTION (pw_optimise, seed_text, "seed", 0, "N", "Seed of these points (default 1)"),
+  PW_TEXT_OPTION (pw_optimise, jobs_text, "jobs", 'j', "N", "Number of concurrent runs (default: one per processor)"),
+  PW_TEXT_OPTION (pw_optimise, path, "output", 'o', "FILE.yaml", "Write the result to this file"),
+  PW_TEXT_OPTION (pw_optimise, json_path, "json", 0, "FILE.json", "Write a summary"),
+  PW_TEXT_OPTION (pw_optimise, plots_path, "plots", 0, "DIR", "Write figures of all runs into a folder"),
+  PW_WIDTH_OPTION,
+  PW_METHOD_OPTIONS,
+  PW_MODEL_OPTIONS,
+  POPT_TABLEEND
+};
+
+const pw_command pw_cli_optimise = {
+  .name = "optimise",
+  .synopsis = "MODEL --maximise|--minimise OUTPUT --free NAME[=LOW:HIGH]... [OPTION...]",
+  .summary = "find the parameters for which an output is largest or smallest",
+  .help = "Vary parameters and initial values of a model until an output of its runs is largest or smallest, by local "
+          "searches from several starts. Runs that fail count as infeasible.",
+  .options_size = sizeof (pw_optimise),
+  .function = optimise_command,
+  .options = optimise_options,
+};

@@ -61,7 +61,9 @@ int pw_column_find (const pw_system *s, const char *name, const char *origin, pw
   return pw_fail (error, PW_INPUT, "%s: no column \"%.100s\"%s", origin, name, pw_nearest_text (&near));
 }
 
-double pw_column_value (const pw_system *s, pw_column c, const pw_sample *sample) {
+/* The value of a column in a sample; NaN for contact points, and for entries of the ledger without
+ * pw_settings.ledger. */
+static double outcome_column_value (const pw_system *s, pw_column c, const pw_sample *sample) {
   int n = pw_system_coordinates (s);
   if (c.type == PW_COLUMN_STATE) return c.index < n ? sample->q[c.index] : sample->v[c.index - n];
   if (c.type == PW_COLUMN_REACTION) return 0 - sample->lambda[c.index]; /* the reaction is -lambda; not -0 */
@@ -105,11 +107,6 @@ static const char *outcome_variable (char name[OUTCOME_VARIABLE], int i) {
   return name;
 }
 
-static int outcome_is_diagnostic (pw_column_type type) {
-  return type == PW_COLUMN_POSITION || type == PW_COLUMN_VELOCITY || type == PW_COLUMN_PROJECTION ||
-         type == PW_COLUMN_BALANCE;
-}
-
 /* Adds the functional `name`, [TYPE:]NAME, to an output, unless it is there, and writes the name of its variable.
  * next: the character after it in the text of the output, for the message about an unknown TYPE. */
 static int outcome_add_term (pw_outcomes *set, pw_outcome *o, const char *origin, const char *name, char next,
@@ -122,7 +119,8 @@ static int outcome_add_term (pw_outcomes *set, pw_outcome *o, const char *origin
                ? pw_fail (error, PW_INPUT,
                           "%s: no \"%s:\"; valid are final:, max:, min:, mean:, integral: and rms:", origin, name)
                : pw_fail (error, PW_INPUT, "%s", own.text);
-  if (pw_is_integral (type) && outcome_is_diagnostic (c.type))
+  if (pw_is_integral (type) && (c.type == PW_COLUMN_POSITION || c.type == PW_COLUMN_VELOCITY ||
+                                c.type == PW_COLUMN_PROJECTION || c.type == PW_COLUMN_BALANCE))
     return pw_fail (error, PW_INPUT, "%s: %s describes the integration, not the motion: it has no %s", origin, name,
                     type == PW_INTEGRAL ? "integral" : "mean");
   if (type == PW_RMS && pw_column_is_integrated (c.type))
@@ -162,20 +160,17 @@ static size_t outcome_term_length (const pw_system *s, const char *text) {
   return prefix + longest;
 }
 
-/* Length of what the formula contains unchanged: a function or constant, a number up to the sign of
- * its exponent, or another character. */
-static size_t outcome_copied_length (const char *text) {
-  size_t n = strspn (text, OUTCOME_LETTERS "0123456789.");
-  return n ? n : 1;
-}
-
 /* Makes the formula of an output from its text, with variables in place of columns. */
 static int outcome_read_formula (pw_outcomes *set, pw_outcome *o, const char *origin, pw_error *error) {
   char text[4000], name[300];
   size_t used = 0;
   for (const char *at = o->text; *at;) {
     char variable[OUTCOME_VARIABLE];
-    size_t n = outcome_term_length (set->system, at), size = n ? 0 : outcome_copied_length (at);
+    /* else it contains unchanged: a function or constant, a number up to the sign of its exponent, another character */
+    size_t n = outcome_term_length (set->system, at), word = strspn (at, OUTCOME_LETTERS "0123456789."),
+           size = n      ? 0
+                  : word ? word
+                         : 1;
     if (n >= sizeof name || used + size + sizeof variable > sizeof text)
       return pw_fail (error, PW_INPUT, "%s: the expression is too long", origin);
     snprintf (name, sizeof name, "%.*s", (int)n, at);
@@ -296,7 +291,7 @@ static int functional_read (pw_outcomes *set, const pw_sample *s, int at, pw_err
   for (pw_functional *f = set->functional; f < set->functional + set->functionals && status == PW_OK; f++) {
     const pw_column c = f->column;
     f->values[at] =
-        c.type == PW_COLUMN_CONTACT ? set->contact[c.index / 2][c.index % 2] : pw_column_value (set->system, c, s);
+        c.type == PW_COLUMN_CONTACT ? set->contact[c.index / 2][c.index % 2] : outcome_column_value (set->system, c, s);
   }
   return status;
 }
@@ -430,12 +425,6 @@ static void functional_extrema (functional_step *step) {
 
 /* ---- Along the run ---- */
 
-static void functional_begin (functional_step *step) {
-  functional_sample (step, step->t1, 0);
-  for (pw_functional *f = step->set->functional; f < step->set->functional + step->set->functionals; f++)
-    f->value = f->values[0], f->t = step->t1;
-}
-
 /* Fills a row of the table, at a time in the last step. */
 static void functional_row (functional_step *step, const pw_outcome_table *table, int row) {
   pw_outcomes *set = step->set;
@@ -466,7 +455,9 @@ int pw_outcomes_run (pw_outcomes *set, const char *method, const pw_settings *se
   pw_run *r = pw_limit_open (set->system, method, &own, error);
   if (r == NULL) return error->status;
   functional_step step = { set, r, own.t, own.t, PW_OK, error };
-  functional_begin (&step);
+  functional_sample (&step, own.t, 0);
+  for (pw_functional *f = set->functional; f < set->functional + set->functionals; f++)
+    f->value = f->values[0], f->t = own.t;
   for (int row = 0, rows = table ? table->rows : 0; step.status == PW_OK;) {
     for (; row < rows && table->t[row] <= step.t1 && step.status == PW_OK; row++) functional_row (&step, table, row);
     if (step.status != PW_OK || !(step.t1 < t_end)) break;

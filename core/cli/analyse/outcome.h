@@ -39,8 +39,6 @@ typedef struct {
  * none. */
 int pw_column_find (const pw_system *s, const char *name, const char *origin, pw_column *c, pw_error *error);
 const char *pw_column_unit (const pw_system *s, pw_column c);
-/* Its value in a sample; NaN for contact points, and for entries of the ledger without pw_settings.ledger. */
-double pw_column_value (const pw_system *s, pw_column c, const pw_sample *sample);
 
 /* 1 for work and losses: their rates are known, and they are integrals themselves. */
 static inline int pw_column_is_integrated (pw_column_type type) {

@@ -8,8 +8,6 @@
 #include "cli.h"
 #include "states.h"
 
-/* The command `pinwheel periodic`, its result and its reports (periodic_command.c). */
-
 /* A periodic motion found, or a point of a branch. */
 typedef struct {
   pw_periodic_orbit orbit; /* its arrays are in `state` */
@@ -35,11 +33,6 @@ typedef struct {
   char reason[300];                      /* why the attempt with the least residual failed, or "" */
   int stopped;                           /* 1: by Ctrl-C or --limit */
 } pw_periodic_command;
-
-/* Prints the motion or the branch; there is at least one point. */
-void pw_periodic_print (const pw_periodic_command *cmd);
-/* Writes periodic.json, periodic.csv and the figure into the folder.  A status. */
-int pw_periodic_write (const pw_periodic_command *cmd, pw_error *error);
 
 enum { PERIODIC_PERIODS = 100000 }; /* of the signals in one period of the motion, at most */
 #define PERIODIC_LEAST 1e-100       /* shortest period that is sought [s] */
@@ -190,58 +183,7 @@ static int periodic_compute (pw_periodic_command *cmd, pw_error *error) {
   return status == PW_RETRY ? PW_OK : status;
 }
 
-/* ---- The command ---- */
-
-static int periodic_command (void *options, pw_error *error) {
-  pw_periodic_command *cmd = options;
-  int status = pw_cli_open (&cmd->m, &cmd->line, error);
-  if (status == PW_OK) status = periodic_read_options (cmd, error);
-  if (status == PW_OK)
-    status = pw_figure_lock_folder (&cmd->line, &cmd->m, cmd->folder, "periodic", &cmd->files, error);
-  if (status == PW_OK) pw_report_model (&cmd->m), pw_cli_report_tables (cmd->m.system, cmd->settings.period);
-  if (status == PW_OK) status = periodic_compute (cmd, error);
-  if (status == PW_OK && cmd->points) pw_periodic_print (cmd);
-  if (status == PW_OK && cmd->points && cmd->folder) status = pw_periodic_write (cmd, error);
-  pw_files_close (&cmd->files);
-  for (int i = 0; i < cmd->points; i++) free (cmd->point[i].state);
-  free (cmd->point);
-  pw_periodic_close (cmd->search);
-  pw_cli_close_model (&cmd->m);
-  return status == PW_OK && cmd->stopped ? pw_cli_incomplete (&cmd->line, error) : status;
-}
-
-static const struct poptOption periodic_options_table[] = {
-  PW_OPTION_GROUP ("Periodic motions"),
-  PW_TEXT_OPTION (pw_periodic_command, period_text, "period", 0, "T|free",
-                  "Period [s] (default that of the signals); free: sought, if no signal changes with time"),
-  PW_TEXT_OPTION (pw_periodic_command, periods_text, "periods", 0, "N",
-                  "Repeat after N periods of the signals (default 1)"),
-  PW_TEXT_OPTION (pw_periodic_command, guess_text, "guess", 0, "T",
-                  "First guess of a free period [s] (default: the time of the first return)"),
-  PW_TEXT_OPTION (pw_periodic_command, vary_text, "vary", 0, "PARAM=FIRST:LAST", "Follow the motion over a parameter"),
-  PW_TEXT_OPTION (pw_periodic_command, folder, "output", 'o', "DIR",
-                  "Write periodic.csv, periodic.json and a figure into a folder"),
-  PW_WIDTH_OPTION,
-  PW_TEXT_OPTION (pw_cli_line, method, "method", 'm', "METHOD", "Adaptive integrator (default erk8+projection)"),
-  PW_TEXT_OPTION (pw_cli_line, rtol, "rtol", 0, "R", "Relative tolerance (default 1e-12)"),
-  PW_LIMIT_OPTION,
-  PW_MODEL_OPTIONS,
-  POPT_TABLEEND
-};
-
-const pw_command pw_cli_periodic = {
-  .name = "periodic",
-  .synopsis = "MODEL [OPTION...]",
-  .summary = "find periodic motions, and follow them over a parameter",
-  .help = "Find a motion that repeats after one period but for a displacement in the plane, such as a gait, with the "
-          "displacement per period and Floquet multipliers, which say how perturbations change in one period; with "
-          "--vary, follow it over a parameter.",
-  .options_size = sizeof (pw_periodic_command),
-  .function = periodic_command,
-  .options = periodic_options_table,
-};
-
-/* The reports of `pinwheel periodic`: text, JSON, table and figure. */
+/* ---- Reports ---- */
 
 enum {
   PERIODIC_MOST = 12,     /* multipliers in the text, at most */
@@ -397,13 +339,6 @@ static void periodic_print_branch (const pw_periodic_command *cmd) {
     printf ("\nThe branch ends at %s = %.9g: %s\n", cmd->vary.name, last, pw_periodic_reason (cmd->search));
 }
 
-void pw_periodic_print (const pw_periodic_command *cmd) {
-  if (cmd->vary_text)
-    periodic_print_branch (cmd);
-  else
-    periodic_print_motion (cmd, &cmd->point->orbit);
-}
-
 /* ---- JSON ---- */
 
 static void periodic_point_json (const pw_periodic_command *cmd, const pw_periodic_orbit *o, pw_json *j) {
@@ -483,14 +418,13 @@ static int periodic_csv (const void *context, FILE *f, pw_error *error) {
   return status;
 }
 
-/* ---- The figure: paths and angular velocities, or curves over the parameter; multipliers and the unit circle ----
- * Data sets of gnuplot end with two blank lines; a row of nan keeps each from being empty. */
+/* ---- The figure ---- */
 
-/* Writes t / T, then x, y, phi, omega of the bodies, over one period T. */
-static int periodic_write_motion (const pw_periodic_command *cmd, const pw_periodic_orbit *o, FILE *f,
-                                  pw_error *error) {
+/* Stores x, y, phi, omega of the bodies drawn at PERIODIC_SAMPLES + 1 times of one period, one row for each. */
+static int periodic_sample (const pw_periodic_command *cmd, int bodies, double *row, pw_error *error) {
+  const pw_periodic_orbit *o = &cmd->point->orbit;
   const pw_settings settings = { .span = o->period, .rtol = 1e-9 }; /* finer than lines in a figure */
-  int bodies = pw_system_bodies (cmd->m.system), status;
+  int status;
   pw_run *r = pw_run_open (cmd->m.system, cmd->settings.method, &settings, error);
   if (r == NULL) return error->status;
   status = pw_run_restart (r, o->q, o->v, error);
@@ -499,14 +433,37 @@ static int periodic_write_motion (const pw_periodic_command *cmd, const pw_perio
     pw_sample sample;
     status = pw_run_advance_to (r, t, o->period, error);
     if (status == PW_OK) status = pw_run_sample (r, t, &sample, error);
-    if (status != PW_OK) break;
-    fprintf (f, "%.9g", (double)i / PERIODIC_SAMPLES);
-    for (int b = 0; b < bodies && b < PERIODIC_BODIES; b++)
-      fprintf (f, " %.9g %.9g %.9g %.9g", sample.q[3 * b], sample.q[3 * b + 1], sample.q[3 * b + 2],
-               sample.v[3 * b + 2]);
-    fputs ("\n", f);
+    for (int b = 0; status == PW_OK && b < bodies; b++, row += 4) {
+      memcpy (row, sample.q + 3 * b, 3 * sizeof *row);
+      row[3] = sample.v[3 * b + 2];
+    }
   }
   pw_run_close (r);
+  return status;
+}
+
+/* Paths of the bodies, and their angular velocities over their angles. */
+static int periodic_draw_motion (const pw_periodic_command *cmd, pw_curves *c, pw_error *error) {
+  const int all = pw_system_bodies (cmd->m.system), bodies = all < PERIODIC_BODIES ? all : PERIODIC_BODIES;
+  double *row = malloc ((size_t)(4 * bodies * (PERIODIC_SAMPLES + 1) + 1) * sizeof *row);
+  int status = row ? periodic_sample (cmd, bodies, row, error) : pw_fail (error, PW_RESOURCE, "out of memory");
+  for (int phase = 0; phase < 2 && status == PW_OK; phase++) {
+    pw_curves_panel (
+        c, phase ? &(pw_panel){ .x_label = "φ [rad]", .y_label = "ω [rad/s]", .aspect = 1, .type = PW_PANEL_HALF }
+                 : &(pw_panel){ .x_label = "x [m]", .y_label = "y [m]", .type = PW_PANEL_EQUAL });
+    for (int b = 0; b < bodies; b++) {
+      char name[FIGURE_NAME + 4];
+      pw_curves_add (c, "line", pw_figure_name (pw_system_body_name (cmd->m.system, b), name));
+      for (const double *at = row + 4 * b; at < row + 4 * bodies * (PERIODIC_SAMPLES + 1); at += 4 * bodies)
+        pw_curves_point (c, at[2 * phase], at[2 * phase + 1], 0);
+    }
+    if (phase) continue;
+    pw_curves_add (c, "numbered", NULL); /* the beginning and the end of each path */
+    for (int b = 0; b < bodies; b++)
+      for (int end = 0; end <= PERIODIC_SAMPLES; end += PERIODIC_SAMPLES)
+        pw_curves_point (c, row[4 * (b + bodies * end)], row[4 * (b + bodies * end) + 1], b + 1);
+  }
+  free (row);
   return status;
 }
 
@@ -516,80 +473,126 @@ static double periodic_curve (const pw_periodic_orbit *o, int k) {
   return k == 0 ? periodic_round (d.total) : k == 1 ? periodic_largest (o) : o->period;
 }
 
-/* Writes the parts of the branch whose motions have no growing perturbations (`stable`: 1), or have some (0), each part
- * followed by a blank line.  A point where one part ends and the next begins belongs to both.  From an event on, the
- * stability is that of the next point. */
-static void periodic_write_parts (const pw_periodic_command *cmd, FILE *f, int stable) {
+/* Draws the parts of the branch whose motions have no growing perturbations (`stable`: 1), or have some (0).  A point
+ * where one part ends and the next begins belongs to both.  From an event on, the stability is that of the next
+ * point. */
+static void periodic_draw_parts (const pw_periodic_command *cmd, pw_curves *c, int k, int stable) {
   int inside = 0; /* 1: the last point began or continued a part */
+  pw_curves_add (c, stable ? "stable" : "unstable", stable ? "stable" : "unstable");
   for (const pw_periodic_point *p = cmd->point; p < cmd->point + cmd->points; p++) {
     int last = p + 1 == cmd->point + cmd->points;
     const pw_periodic_point *after = p->orbit.event == PW_PERIODIC_POINT ? p : p + 1;
     int here = !last && (after->orbit.unstable == 0) == stable;
-    if (here || inside) {
-      fprintf (f, "%.10g", p->orbit.parameter);
-      for (int k = 0; k < PERIODIC_CURVES; k++) fprintf (f, " %.9g", periodic_curve (&p->orbit, k));
-      fputs ("\n", f);
-    }
-    if (inside && !here) fputs ("\n", f);
+    if (here || inside) pw_curves_point (c, p->orbit.parameter, periodic_curve (&p->orbit, k), 0);
+    if (!here) pw_curves_point (c, NAN, NAN, 0);
     inside = here;
   }
-  fputs ("nan nan nan nan\n\n\n", f);
 }
 
-/* Writes the multipliers that are trivial, or those that are not, with the parameter. */
-static void periodic_write_multipliers (const pw_periodic_command *cmd, FILE *f, int trivial) {
-  for (const pw_periodic_point *p = cmd->point; p < cmd->point + cmd->points; p++)
-    for (int i = 0; i < p->orbit.multipliers; i++)
-      if ((i >= p->orbit.multipliers - p->orbit.trivial) == trivial)
-        fprintf (f, "%.9g %.9g %.10g\n", p->orbit.re[i], p->orbit.im[i], p->orbit.parameter);
-  fputs ("nan nan nan\n\n\n", f);
-}
-
-static int periodic_data (const void *context, FILE *f, pw_error *error) {
-  const pw_periodic_command *cmd = context;
-  int status = PW_OK;
-  if (cmd->vary_text) {
-    fputs ("# parameter, displacement [m], largest multiplier, period [s]: stable parts; unstable ones; events; "
-           "multipliers; trivial ones\n",
-           f);
-    for (int stable = 1; stable >= 0; stable--) periodic_write_parts (cmd, f, stable);
-    for (const pw_periodic_point *p = cmd->point; p < cmd->point + cmd->points; p++)
-      if (p->orbit.event != PW_PERIODIC_POINT) fprintf (f, "%.10g %d\n", p->orbit.parameter, p->orbit.event);
-    fputs ("nan nan\n\n\n", f);
-  } else {
-    fputs ("# t / T, then x [m], y [m], phi [rad], omega [rad/s] of each body; multipliers; trivial ones\n", f);
-    status = periodic_write_motion (cmd, &cmd->point->orbit, f, error);
-    fputs ("\n\n", f);
-  }
-  for (int trivial = 0; trivial < 2; trivial++) periodic_write_multipliers (cmd, f, trivial);
-  return status;
-}
-
-static void periodic_variables (const void *context, FILE *f) {
-  const pw_periodic_command *cmd = context;
-  int bodies = pw_system_bodies (cmd->m.system);
-  double largest = 0;
-  if (bodies > PERIODIC_BODIES) bodies = PERIODIC_BODIES;
-  pw_figure_label (f, "label_of_x", 0, cmd->vary.name, cmd->vary.unit);
-  fprintf (f, "branch = %d\nfirst = %.10g\nlast = %.10g\nbodies = %d\narray body[%d]\n", cmd->vary_text != NULL,
-           fmin (cmd->settings.first, cmd->settings.last), fmax (cmd->settings.first, cmd->settings.last), bodies,
-           bodies ? bodies : 1);
-  for (int i = 0; i < cmd->points; i++) largest = fmax (largest, periodic_largest (&cmd->point[i].orbit));
-  fprintf (f, "largest = %.9g\narray low[3]\narray high[3]\n", largest);
+/* Curves over the parameter, of what is not constant. */
+static void periodic_draw_branch (const pw_periodic_command *cmd, pw_curves *c, const double range[2]) {
+  static const char *const label[PERIODIC_CURVES] = { "displacement [m]", "largest modulus", "period [s]" };
   for (int k = 0; k < PERIODIC_CURVES; k++) {
     double low = INFINITY, high = -INFINITY;
     for (int i = 0; i < cmd->points; i++) {
       low = fmin (low, periodic_curve (&cmd->point[i].orbit, k));
       high = fmax (high, periodic_curve (&cmd->point[i].orbit, k));
     }
-    fprintf (f, "low[%d] = %.9g\nhigh[%d] = %.9g\n", k + 1, isfinite (low) ? low : 0, k + 1,
-             isfinite (high) ? high : 0);
+    if (!(high - low > 1e-9 * fabs (high))) continue;
+    pw_curves_panel (c, &(pw_panel){ .x_label = PW_FIGURE_LABEL (cmd->vary.name, cmd->vary.unit),
+                                     .y_label = label[k],
+                                     .x = { range[0], range[1] },
+                                     .type = PW_PANEL_BELOW });
+    for (int stable = 1; stable >= 0; stable--) periodic_draw_parts (cmd, c, k, stable);
   }
-  for (int b = 0; b < bodies; b++) pw_figure_element (f, "body", b + 1, pw_system_body_name (cmd->m.system, b));
 }
 
-int pw_periodic_write (const pw_periodic_command *cmd, pw_error *error) {
-  int status = pw_figure_write_tables (cmd->folder, "periodic", 1, cmd, periodic_csv, periodic_json, error);
-  if (status != PW_OK) return status;
-  return pw_figure_write (&cmd->line, &cmd->m, cmd->folder, "periodic", cmd, periodic_data, periodic_variables, error);
+/* The multipliers of all points, the trivial ones as rings, and the unit circle. */
+static void periodic_draw_multipliers (const pw_periodic_command *cmd, pw_curves *c, const double range[2]) {
+  double reach = 1;
+  for (int i = 0; i < cmd->points; i++) reach = fmax (reach, periodic_largest (&cmd->point[i].orbit));
+  pw_panel panel = { .x_label = "real part", .y_label = "imaginary part", .aspect = 1 };
+  if (cmd->vary_text) panel.z_label = PW_FIGURE_LABEL (cmd->vary.name, cmd->vary.unit);
+  panel.type = cmd->vary_text ? 0 : PW_PANEL_HALF;
+  panel.x[1] = panel.y[1] = 1.12 * reach, panel.x[0] = panel.y[0] = -panel.x[1];
+  panel.z[0] = range[0], panel.z[1] = range[1];
+  pw_curves_panel (c, &panel);
+  pw_curves_add (c, "thin", NULL);
+  for (int i = 0; i <= 200; i++) pw_curves_point (c, cos (2 * PW_PI * i / 200), sin (2 * PW_PI * i / 200), 0);
+  for (int trivial = 1; trivial >= 0; trivial--) {
+    pw_curves_add (c, trivial ? "rings" : cmd->vary_text ? "scale" : "dots", NULL);
+    for (int k = 0; k < cmd->points; k++) {
+      const pw_periodic_orbit *o = &cmd->point[k].orbit;
+      for (int i = 0; i < o->multipliers; i++)
+        if ((i >= o->multipliers - o->trivial) == trivial) pw_curves_point (c, o->re[i], o->im[i], o->parameter);
+    }
+  }
 }
+
+static int periodic_write (const pw_periodic_command *cmd, pw_error *error) {
+  const double range[] = { fmin (cmd->settings.first, cmd->settings.last),
+                           fmax (cmd->settings.first, cmd->settings.last) };
+  const char *title = cmd->vary_text ? "periodic motions" : "periodic motion over one period, Floquet multipliers";
+  pw_curves c;
+  int status = pw_figure_write_tables (cmd->folder, "periodic", 1, cmd, periodic_csv, periodic_json, error);
+  if (status == PW_OK) status = pw_curves_open (&c, &cmd->line, &cmd->m, cmd->folder, "periodic", title, error);
+  if (status != PW_OK) return status;
+  if (cmd->vary_text)
+    periodic_draw_branch (cmd, &c, range);
+  else
+    status = periodic_draw_motion (cmd, &c, error);
+  periodic_draw_multipliers (cmd, &c, range);
+  return pw_curves_draw (&c, status, error);
+}
+
+/* ---- The command ---- */
+
+static int periodic_command (void *options, pw_error *error) {
+  pw_periodic_command *cmd = options;
+  int status = pw_cli_open (&cmd->m, &cmd->line, error);
+  if (status == PW_OK) status = periodic_read_options (cmd, error);
+  if (status == PW_OK)
+    status = pw_figure_lock_folder (&cmd->line, &cmd->m, cmd->folder, "periodic", &cmd->files, error);
+  if (status == PW_OK) pw_report_model (&cmd->m), pw_cli_report_tables (cmd->m.system, cmd->settings.period);
+  if (status == PW_OK) status = periodic_compute (cmd, error);
+  if (status == PW_OK && cmd->points && cmd->vary_text) periodic_print_branch (cmd);
+  if (status == PW_OK && cmd->points && !cmd->vary_text) periodic_print_motion (cmd, &cmd->point->orbit);
+  if (status == PW_OK && cmd->points && cmd->folder) status = periodic_write (cmd, error);
+  pw_files_close (&cmd->files);
+  for (int i = 0; i < cmd->points; i++) free (cmd->point[i].state);
+  free (cmd->point);
+  pw_periodic_close (cmd->search);
+  pw_cli_close_model (&cmd->m);
+  return status == PW_OK && cmd->stopped ? pw_cli_incomplete (&cmd->line, error) : status;
+}
+
+static const struct poptOption periodic_options_table[] = {
+  PW_OPTION_GROUP ("Periodic motions"),
+  PW_TEXT_OPTION (pw_periodic_command, period_text, "period", 0, "T|free",
+                  "Period [s] (default that of the signals); free: sought, if no signal changes with time"),
+  PW_TEXT_OPTION (pw_periodic_command, periods_text, "periods", 0, "N",
+                  "Repeat after N periods of the signals (default 1)"),
+  PW_TEXT_OPTION (pw_periodic_command, guess_text, "guess", 0, "T",
+                  "First guess of a free period [s] (default: the time of the first return)"),
+  PW_TEXT_OPTION (pw_periodic_command, vary_text, "vary", 0, "PARAM=FIRST:LAST", "Follow the motion over a parameter"),
+  PW_TEXT_OPTION (pw_periodic_command, folder, "output", 'o', "DIR",
+                  "Write periodic.csv, periodic.json and a figure into a folder"),
+  PW_WIDTH_OPTION,
+  PW_TEXT_OPTION (pw_cli_line, method, "method", 'm', "METHOD", "Adaptive integrator (default erk8+projection)"),
+  PW_TEXT_OPTION (pw_cli_line, rtol, "rtol", 0, "R", "Relative tolerance (default 1e-12)"),
+  PW_LIMIT_OPTION,
+  PW_MODEL_OPTIONS,
+  POPT_TABLEEND
+};
+
+const pw_command pw_cli_periodic = {
+  .name = "periodic",
+  .synopsis = "MODEL [OPTION...]",
+  .summary = "find periodic motions, and follow them over a parameter",
+  .help = "Find a motion that repeats after one period but for a displacement in the plane, such as a gait, with the "
+          "displacement per period and Floquet multipliers, which say how perturbations change in one period; with "
+          "--vary, follow it over a parameter.",
+  .options_size = sizeof (pw_periodic_command),
+  .function = periodic_command,
+  .options = periodic_options_table,
+};

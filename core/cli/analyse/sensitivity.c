@@ -1,6 +1,5 @@
 /* The command `sensitivity`: derivatives of outputs of a run with respect to parameters and initial values. */
 #define _POSIX_C_SOURCE 200809L
-#include <float.h>
 #include <math.h>
 #include <pthread.h>
 #include <stdlib.h>
@@ -8,7 +7,7 @@
 #include "figure.h"
 #include "cli.h"
 #include "report.h"
-#include "sensitivity.h"
+#include "unknowns.h"
 
 enum {
   SENSITIVITY_DIGITS = 9,   /* of numbers in the text */
@@ -25,28 +24,174 @@ typedef struct {
   const char *every, *folder, *jobs_text;
   pw_cli_model m;
   pw_files files;
-  pw_unknowns unknowns;
-  pw_sensitivity sens;
+  pw_unknowns unknowns;   /* P */
+  pw_run_outputs outputs; /* with the method of the runs that are compared */
+  int jobs;               /* threads */
+  pw_progress progress;
+  pthread_mutex_t lock; /* of the number of runs and the progress */
+  int runs;
   double cpu; /* processor time of the computation [s] */
+  /* results; comments on arrays begin with their sizes */
+  pw_arena arena;
+  pw_outcomes outcomes;      /* of the run, for texts and units */
+  double *value;             /* outputs: of the run by the method of the unknowns */
+  double *table;             /* outputs x rows; NaN for outputs that are not in the table */
+  pw_derivative *derivative; /* P x (outputs + outputs x rows): of the outputs, then of the table */
 } sensitivity;
+
+static const double SENSITIVITY_RTOL = 1e-12, /* of the runs that are compared */
+    SENSITIVITY_PROBE = 1e-5;                 /* change that shows what an unknown changes, relative to its size */
+
+/* ---- What can be differentiated ---- */
+
+/* Opens a run with unknown p changed by `by`. */
+static int sensitivity_neighbour (const sensitivity *cmd, const double *values, int p, double by, pw_unknown_run *run,
+                                  pw_error *error) {
+  const pw_unknowns *u = &cmd->unknowns;
+  double *x = malloc ((size_t)u->count * sizeof *x);
+  if (x == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  memcpy (x, values, (size_t)u->count * sizeof *x);
+  x[p] += by;
+  int status = pw_unknown_run_prepare (run, u, x, error);
+  free (x);
+  if (status != PW_OK) return status;
+  run->run = pw_limit_open (run->m.system, u->method, &run->settings, error);
+  return run->run ? PW_OK : error->status;
+}
+
+/* Refuses parameters that change the number of bodies or elements, and initial values that the constraints determine:
+ * then making the state of a neighbour consistent changes them back, by much more than 1 % of the step. */
+static int sensitivity_check (const sensitivity *cmd, const double *values, int p, pw_error *error) {
+  const pw_unknowns *u = &cmd->unknowns;
+  const pw_unknown *unknown = &u->list[p];
+  const pw_system *s = cmd->outcomes.system;
+  const int n = pw_system_coordinates (s);
+  const double step = SENSITIVITY_PROBE * unknown->size;
+  int status = PW_OK;
+  for (int side = -1; side <= 1 && status == PW_OK; side += 2) {
+    pw_unknown_run run = { .run = NULL };
+    pw_error own = { 0 };
+    int opened = sensitivity_neighbour (cmd, values, p, side * step, &run, &own);
+    if (opened == PW_RESOURCE) status = pw_fail (error, opened, "%s", own.text);
+    const pw_system *other = run.m.system;
+    if (opened == PW_OK &&
+        (pw_system_elements (s) != pw_system_elements (other) ||
+         pw_system_coordinates (s) != pw_system_coordinates (other) || pw_system_rows (s) != pw_system_rows (other)))
+      status = pw_fail (error, PW_INPUT,
+                        "%s changes the number of bodies or elements: derivatives with respect to it do not exist",
+                        unknown->name);
+    else if (opened == PW_OK && unknown->state >= 0) {
+      const pw_initial_report *initial = pw_run_initial (run.run);
+      double value = unknown->state < n ? initial->q[unknown->state] : initial->v[unknown->state - n];
+      if (fabs (value - values[p] - side * step) > 0.01 * step)
+        status = pw_fail (error, PW_INPUT,
+                          "--by %s: it cannot change while the other initial values of --by and --start are kept: "
+                          "constraints determine it",
+                          unknown->name);
+    }
+    pw_unknown_run_close (&run);
+  }
+  return status;
+}
+
+/* ---- Derivatives ---- */
+
+/* pw_difference_settings.evaluate. */
+static int sensitivity_evaluate (void *context, const double *x, double rtol, double *value, pw_error *error) {
+  sensitivity *cmd = context;
+  pw_run_outputs outputs = cmd->outputs;
+  outputs.rtol = rtol;
+  int status = pw_run_outputs_at (&outputs, x, value, value + outputs.count, error);
+  pthread_mutex_lock (&cmd->lock);
+  pw_progress_at (&cmd->progress, fmin (++cmd->runs, cmd->progress.last));
+  pthread_mutex_unlock (&cmd->lock);
+  return status;
+}
+
+static int sensitivity_differentiate (sensitivity *cmd, const double *values, pw_error *error) {
+  const pw_unknowns *u = &cmd->unknowns;
+  const int outputs = cmd->outputs.count * (1 + cmd->outputs.rows);
+  cmd->derivative = pw_arena_alloc (&cmd->arena, (size_t)u->count * (size_t)outputs * sizeof *cmd->derivative);
+  if (cmd->derivative == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  const pw_difference_settings d = { .evaluate = sensitivity_evaluate,
+                                     .context = cmd,
+                                     .outputs = outputs,
+                                     .steering = cmd->outputs.count,
+                                     .rtol = SENSITIVITY_RTOL,
+                                     .neighbours = 6,
+                                     .jobs = cmd->jobs };
+  return pw_unknowns_differentiate (u, values, d, cmd->derivative, error);
+}
+
+/* The method of the runs that are compared, and the sizes of the unknowns. */
+static int sensitivity_prepare (sensitivity *cmd, const double *values, pw_error *error) {
+  const pw_unknowns *u = &cmd->unknowns;
+  pw_unknown_run run;
+  pw_run *r = NULL;
+  int status = pw_unknown_run_prepare (&run, u, values, error);
+  if (status == PW_OK) r = run.run = pw_limit_open (run.m.system, u->method, &run.settings, error);
+  if (status == PW_OK && r == NULL) status = error->status;
+  for (int p = 0; p < u->count && status == PW_OK; p++) pw_unknown_measure (&u->list[p], values[p], r);
+  if (status == PW_OK) {
+    cmd->outputs.method = pw_accurate_method (run.m.system, &run.settings, u->t_end, &cmd->outputs.max_steps, error);
+    if (cmd->outputs.method == NULL && error->status == PW_OK)
+      status = pw_limit_status (&run.limit, pw_run_time (r), error);
+    else if (cmd->outputs.method == NULL)
+      status = error->status;
+  }
+  pw_unknown_run_close (&run);
+  return status;
+}
+
+/* Makes the run, and differentiates the outputs at the values of the unknowns.  Errors: those of the run; PW_INPUT if
+ * constraints determine an initial value, or a parameter changes the number of bodies; PW_RETRY after Ctrl-C. */
+static int sensitivity_solve (sensitivity *cmd, pw_error *error) {
+  const pw_unknowns *u = &cmd->unknowns;
+  const size_t count = (size_t)cmd->outputs.count, rows = (size_t)cmd->outputs.rows;
+  double *values = pw_arena_alloc (&cmd->arena, (size_t)u->count * sizeof *values);
+  cmd->value = pw_arena_alloc (&cmd->arena, count * (1 + rows) * sizeof *cmd->value);
+  if (values == NULL || cmd->value == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  cmd->table = cmd->value + count;
+  for (int p = 0; p < u->count; p++) values[p] = u->list[p].value;
+  int status =
+      pw_outcomes_open (&cmd->outcomes, u->m->system, cmd->outputs.option, cmd->outputs.of, cmd->outputs.count, error);
+  if (status == PW_OK) status = pw_run_outputs_at (&cmd->outputs, values, cmd->value, cmd->table, error);
+  if (status == PW_OK) status = sensitivity_prepare (cmd, values, error);
+  for (int p = 0; p < u->count && status == PW_OK; p++) status = sensitivity_check (cmd, values, p, error);
+  for (int i = 0; i < cmd->outputs.count && status == PW_OK; i++)
+    if (!isfinite (cmd->value[i]))
+      status = pw_fail (error, PW_METHOD, "%.300s is not a finite number at the end of the run", cmd->outputs.of[i]);
+  if (status != PW_OK) return status;
+  pthread_mutex_init (&cmd->lock, NULL);
+  status = sensitivity_differentiate (cmd, values, error);
+  pthread_mutex_destroy (&cmd->lock);
+  return status;
+}
+
+/* The derivative of an output, or of its value in a row of the table, with respect to an unknown; row -1: output. */
+static const pw_derivative *sensitivity_of (const sensitivity *cmd, int output, int unknown, int row) {
+  const int count = cmd->outputs.count, rows = cmd->outputs.rows;
+  const pw_derivative *of = cmd->derivative + unknown * count * (1 + rows);
+  return of + (row < 0 ? output : count + output * rows + row);
+}
 
 /* ---- Text ---- */
 
 /* The unit of a derivative, "m per kg"; "" if it has none, or the output is a formula, whose unit is unknown. */
-static const char *sensitivity_unit (const pw_sensitivity *sens, int output, int unknown, char unit[SENSITIVITY_UNIT]) {
+static const char *sensitivity_unit (const sensitivity *cmd, int output, int unknown, char unit[SENSITIVITY_UNIT]) {
   char of[SENSITIVITY_UNIT / 2];
-  const char *by = sens->outputs.unknowns->list[unknown].unit;
-  pw_outcome_unit (&sens->outcomes, output, of, sizeof of);
-  if (sens->outcomes.outcome[output].formula) return strcpy (unit, "");
+  const char *by = cmd->unknowns.list[unknown].unit;
+  pw_outcome_unit (&cmd->outcomes, output, of, sizeof of);
+  if (cmd->outcomes.outcome[output].formula) return strcpy (unit, "");
   snprintf (unit, SENSITIVITY_UNIT, *by ? "%s per %s" : "%s", *of || *by == 0 ? of : "1", by);
   return unit;
 }
 
 /* The relative change of the output per relative change of the unknown; NaN: there is none. */
-static double sensitivity_elasticity (const pw_sensitivity *sens, int output, int unknown) {
+static double sensitivity_elasticity (const sensitivity *cmd, int output, int unknown) {
   const double largest = 1e12, /* elasticities above it are those of an output that is 0 but for round-off */
-      value = sens->outputs.unknowns->list[unknown].value,
-               elasticity = pw_sensitivity_of (sens, output, unknown, -1)->value * value / sens->value[output];
+      value = cmd->unknowns.list[unknown].value,
+               elasticity = sensitivity_of (cmd, output, unknown, -1)->value * value / cmd->value[output];
   return value == 0 || !(fabs (elasticity) < largest) ? NAN : elasticity;
 }
 
@@ -61,39 +206,39 @@ static const char *sensitivity_reason (const pw_unknown *u, const pw_derivative 
   return text;
 }
 
-static void sensitivity_print_row (const pw_sensitivity *sens, pw_table *table, int output, int unknown) {
+static void sensitivity_print_row (const sensitivity *cmd, pw_table *table, int output, int unknown) {
   char unit[SENSITIVITY_UNIT];
-  const pw_unknown *u = &sens->outputs.unknowns->list[unknown];
-  const pw_derivative *d = pw_sensitivity_of (sens, output, unknown, -1);
+  const pw_unknown *u = &cmd->unknowns.list[unknown];
+  const pw_derivative *d = sensitivity_of (cmd, output, unknown, -1);
   pw_cell_unit (table, -14, u->name, u->unit);
   pw_cell_number (table, 12, u->value, SENSITIVITY_DIGITS);
   pw_cell (table, 12,
            d->type == PW_NO_DERIVATIVE ? "none"
            : d->type == PW_UNKNOWN     ? "unknown"
                                        : PW_DIGITS (d->value, SENSITIVITY_DIGITS));
-  pw_cell (table, -8, sensitivity_unit (sens, output, unknown, unit));
+  pw_cell (table, -8, sensitivity_unit (cmd, output, unknown, unit));
   pw_cell_number (table, 12, d->error, 2);
-  pw_cell_number (table, 12, sensitivity_elasticity (sens, output, unknown), 5);
+  pw_cell_number (table, 12, sensitivity_elasticity (cmd, output, unknown), 5);
   pw_row_end (table);
 }
 
-static void sensitivity_print (const pw_sensitivity *sens) {
-  const pw_unknowns *u = sens->outputs.unknowns;
+static void sensitivity_print (const sensitivity *cmd) {
+  const pw_unknowns *u = &cmd->unknowns;
   char unit[SENSITIVITY_UNIT], reason[500];
   printf ("%s by %s to t = %.9g s\n", pw_file_name (u->m->file), u->method, u->t_end);
-  for (int o = 0; o < sens->outputs.count; o++) {
-    pw_outcome_unit (&sens->outcomes, o, unit, sizeof unit);
-    pw_cli_print (stdout, "\n%s = %s %s\n", sens->outputs.of[o], PW_DIGITS (sens->value[o], 12), unit);
+  for (int o = 0; o < cmd->outputs.count; o++) {
+    pw_outcome_unit (&cmd->outcomes, o, unit, sizeof unit);
+    pw_cli_print (stdout, "\n%s = %s %s\n", cmd->outputs.of[o], PW_DIGITS (cmd->value[o], 12), unit);
     for (pw_table table = { 0 }; pw_table_pass (&table);) {
       pw_cell (&table, -14, "by");
       pw_cell (&table, 12, "value");
       pw_cell (&table, 12, "derivative");
       pw_cell (&table, -8, "unit");
       pw_head (&table, 12, 12, (const char *[]){ "error", "elasticity", NULL });
-      for (int p = 0; p < u->count; p++) sensitivity_print_row (sens, &table, o, p);
+      for (int p = 0; p < u->count; p++) sensitivity_print_row (cmd, &table, o, p);
     }
     for (int p = 0; p < u->count; p++) {
-      const pw_derivative *d = pw_sensitivity_of (sens, o, p, -1);
+      const pw_derivative *d = sensitivity_of (cmd, o, p, -1);
       if (d->type != PW_DERIVATIVE)
         pw_cli_print (stdout, "  %s\n", sensitivity_reason (&u->list[p], d, reason, sizeof reason));
     }
@@ -102,60 +247,59 @@ static void sensitivity_print (const pw_sensitivity *sens) {
 
 /* 1 if the error exceeds 1 % of the derivative and, times the size of the unknown, 1 % of the output and 1e-6 in SI
  * units; or nothing is known. */
-static int sensitivity_is_uncertain (const pw_sensitivity *sens, int output, int unknown) {
-  const pw_derivative *d = pw_sensitivity_of (sens, output, unknown, -1);
+static int sensitivity_is_uncertain (const sensitivity *cmd, int output, int unknown) {
+  const pw_derivative *d = sensitivity_of (cmd, output, unknown, -1);
   if (d->type != PW_DERIVATIVE) return d->type == PW_UNKNOWN;
   return d->error > 0.01 * fabs (d->value) &&
-         d->error * sens->outputs.unknowns->list[unknown].size > fmax (0.01 * fabs (sens->value[output]), 1e-6);
+         d->error * cmd->unknowns.list[unknown].size > fmax (0.01 * fabs (cmd->value[output]), 1e-6);
 }
 
-static void sensitivity_warn (const pw_sensitivity *sens) {
+static void sensitivity_warn (const sensitivity *cmd) {
   char list[1000] = "";
   size_t used = 0;
-  for (int o = 0; o < sens->outputs.count; o++)
-    for (int p = 0; p < sens->outputs.unknowns->count && used < sizeof list; p++)
-      if (sensitivity_is_uncertain (sens, o, p))
-        used += (size_t)snprintf (list + used, sizeof list - used, "%s%s by %s", used ? ", " : "", sens->outputs.of[o],
-                                  sens->outputs.unknowns->list[p].name);
+  for (int o = 0; o < cmd->outputs.count; o++)
+    for (int p = 0; p < cmd->unknowns.count && used < sizeof list; p++)
+      if (sensitivity_is_uncertain (cmd, o, p))
+        used += (size_t)snprintf (list + used, sizeof list - used, "%s%s by %s", used ? ", " : "", cmd->outputs.of[o],
+                                  cmd->unknowns.list[p].name);
   if (used) pw_cli_say ("pinwheel: derivatives with errors above 1 %%: %s%s\n", list, used < sizeof list ? "" : " ...");
 }
 
 /* ---- Files ---- */
 
-static void sensitivity_json_derivative (const pw_sensitivity *sens, pw_json *j, int output, int unknown) {
+static void sensitivity_json_derivative (const sensitivity *cmd, pw_json *j, int output, int unknown) {
   char unit[SENSITIVITY_UNIT], reason[500];
-  const pw_unknown *u = &sens->outputs.unknowns->list[unknown];
-  const pw_derivative *d = pw_sensitivity_of (sens, output, unknown, -1);
+  const pw_unknown *u = &cmd->unknowns.list[unknown];
+  const pw_derivative *d = sensitivity_of (cmd, output, unknown, -1);
   pw_json_open (j, NULL, '{');
   pw_json_text (j, "by", u->name);
   pw_json_number (j, "value", u->value);
-  pw_json_text (j, "unit", sensitivity_unit (sens, output, unknown, unit));
+  pw_json_text (j, "unit", sensitivity_unit (cmd, output, unknown, unit));
   pw_json_number (j, "derivative", d->value);
   pw_json_number (j, "error", d->error);
-  pw_json_number (j, "elasticity", sensitivity_elasticity (sens, output, unknown));
+  pw_json_number (j, "elasticity", sensitivity_elasticity (cmd, output, unknown));
   if (d->type != PW_DERIVATIVE) pw_json_text (j, "reason", sensitivity_reason (u, d, reason, sizeof reason));
   pw_json_close (j, '}');
 }
 
 static void sensitivity_json (const void *context, pw_json *j) {
   const sensitivity *cmd = context;
-  const pw_sensitivity *sens = &cmd->sens;
   char unit[SENSITIVITY_UNIT];
   pw_json_open (j, NULL, '{');
   pw_json_text (j, "model", pw_file_name (cmd->unknowns.m->file));
   pw_json_text (j, "method", cmd->unknowns.method);
-  pw_json_text (j, "derivatives_by", sens->outputs.method);
+  pw_json_text (j, "derivatives_by", cmd->outputs.method);
   pw_json_number (j, "t_end", cmd->unknowns.t_end);
   pw_json_flag (j, "complete", 1);
   pw_json_number (j, "cpu_seconds", cmd->cpu);
   pw_json_open (j, "outputs", '[');
-  for (int o = 0; o < sens->outputs.count; o++) {
+  for (int o = 0; o < cmd->outputs.count; o++) {
     pw_json_open (j, NULL, '{');
-    pw_json_text (j, "output", sens->outputs.of[o]);
-    pw_json_text (j, "unit", pw_outcome_unit (&sens->outcomes, o, unit, sizeof unit));
-    pw_json_number (j, "value", sens->value[o]);
+    pw_json_text (j, "output", cmd->outputs.of[o]);
+    pw_json_text (j, "unit", pw_outcome_unit (&cmd->outcomes, o, unit, sizeof unit));
+    pw_json_number (j, "value", cmd->value[o]);
     pw_json_open (j, "derivatives", '[');
-    for (int p = 0; p < cmd->unknowns.count; p++) sensitivity_json_derivative (sens, j, o, p);
+    for (int p = 0; p < cmd->unknowns.count; p++) sensitivity_json_derivative (cmd, j, o, p);
     pw_json_close (j, ']');
     pw_json_close (j, '}');
   }
@@ -172,96 +316,68 @@ static void sensitivity_cell (pw_text *t, const char *name, const char *unit) {
 
 static int sensitivity_csv (const void *context, FILE *f, pw_error *error) {
   const sensitivity *cmd = context;
-  const pw_sensitivity *sens = &cmd->sens;
   char unit[SENSITIVITY_UNIT];
   pw_text t = { 0 };
   pw_text_cell (&t, "t [s]");
-  for (int o = 0; o < sens->outputs.count; o++) {
-    if (!pw_outcome_is_final (&sens->outcomes, o)) continue;
-    sensitivity_cell (&t, sens->outputs.of[o], pw_outcome_unit (&sens->outcomes, o, unit, sizeof unit));
+  for (int o = 0; o < cmd->outputs.count; o++) {
+    if (!pw_outcome_is_final (&cmd->outcomes, o)) continue;
+    sensitivity_cell (&t, cmd->outputs.of[o], pw_outcome_unit (&cmd->outcomes, o, unit, sizeof unit));
     for (int p = 0; p < cmd->unknowns.count; p++)
       sensitivity_cell (&t,
-                        PW_PRINTED (SENSITIVITY_NAME, "d(%s)/d(%s)", sens->outputs.of[o], cmd->unknowns.list[p].name),
-                        sensitivity_unit (sens, o, p, unit));
+                        PW_PRINTED (SENSITIVITY_NAME, "d(%s)/d(%s)", cmd->outputs.of[o], cmd->unknowns.list[p].name),
+                        sensitivity_unit (cmd, o, p, unit));
   }
   int status = pw_text_line (&t, f, cmd->folder, error);
-  for (int i = 0; i < sens->outputs.rows && status == PW_OK; i++) {
-    pw_text_number (&t, sens->outputs.t[i]);
-    for (int o = 0; o < sens->outputs.count; o++) {
-      if (!pw_outcome_is_final (&sens->outcomes, o)) continue;
-      pw_text_number (&t, sens->table[o * sens->outputs.rows + i]);
-      for (int p = 0; p < cmd->unknowns.count; p++) pw_text_number (&t, pw_sensitivity_of (sens, o, p, i)->value);
+  for (int i = 0; i < cmd->outputs.rows && status == PW_OK; i++) {
+    pw_text_number (&t, cmd->outputs.t[i]);
+    for (int o = 0; o < cmd->outputs.count; o++) {
+      if (!pw_outcome_is_final (&cmd->outcomes, o)) continue;
+      pw_text_number (&t, cmd->table[o * cmd->outputs.rows + i]);
+      for (int p = 0; p < cmd->unknowns.count; p++) pw_text_number (&t, sensitivity_of (cmd, o, p, i)->value);
     }
     status = pw_text_line (&t, f, cmd->folder, error);
   }
   return status;
 }
 
-/* 1 if an output has a panel of the figure: there are derivatives along the run. */
-static int sensitivity_is_drawn (const pw_sensitivity *sens, int output) {
-  int points = 0;
-  for (int p = 0; p < sens->outputs.unknowns->count; p++)
-    for (int i = 0; i < sens->outputs.rows; i++) points += isfinite (pw_sensitivity_of (sens, output, p, i)->value);
-  return points > 0;
-}
-
-static int sensitivity_panels (const pw_sensitivity *sens) {
-  int panels = 0;
-  for (int i = 0; i < sens->outputs.count; i++) panels += sensitivity_is_drawn (sens, i);
-  return panels;
-}
-
-/* The label of a curve of sensitivity_data. */
-static void sensitivity_label (const pw_sensitivity *sens, int output, int unknown, char *label, size_t size) {
+/* The label of a curve in the figure. */
+static void sensitivity_label (const sensitivity *cmd, int output, int unknown, char *label, size_t size) {
   char unit[SENSITIVITY_UNIT], buffer[FIGURE_NAME + 4];
-  const char *name = pw_figure_name (sens->outputs.unknowns->list[unknown].name, buffer);
-  if (sens->outputs.unknowns->list[unknown].value != 0) {
-    pw_outcome_unit (&sens->outcomes, output, unit, sizeof unit);
+  const char *name = pw_figure_name (cmd->unknowns.list[unknown].name, buffer);
+  if (cmd->unknowns.list[unknown].value != 0) {
+    pw_outcome_unit (&cmd->outcomes, output, unit, sizeof unit);
     snprintf (label, size, *unit ? "%s × ∂/∂%s [%s]" : "%s × ∂/∂%s", name, name, unit);
   } else {
-    sensitivity_unit (sens, output, unknown, unit);
+    sensitivity_unit (cmd, output, unknown, unit);
     snprintf (label, size, *unit ? "∂/∂%s [%s]" : "∂/∂%s", name, unit);
   }
 }
 
-/* Writes a block for each derivative, times the value of the unknown unless that is 0, so that unknowns can be
+/* Draws the derivatives along the run, times the value of the unknown unless that is 0, so that unknowns can be
  * compared. */
-static int sensitivity_data (const void *context, FILE *f, pw_error *error) {
-  const pw_sensitivity *sens = &((const sensitivity *)context)->sens;
-  const pw_unknowns *u = sens->outputs.unknowns;
-  (void)error;
-  for (int k = 0; k < sens->outputs.count * u->count; k++) {
-    const int o = k / u->count, p = k % u->count;
-    double factor = u->list[p].value != 0 ? u->list[p].value : 1;
-    if (!sensitivity_is_drawn (sens, o)) continue;
-    for (int i = 0; i < sens->outputs.rows; i++)
-      fprintf (f, "%.9g %.9g\n", sens->outputs.t[i], pw_sensitivity_of (sens, o, p, i)->value * factor);
-    fputs ("\n\n", f);
-  }
-  return PW_OK;
-}
-
-static void sensitivity_variables (const void *context, FILE *f) {
-  const pw_sensitivity *sens = &((const sensitivity *)context)->sens;
-  const int panels = sensitivity_panels (sens), unknowns = sens->outputs.unknowns->count;
-  fprintf (f, "unknowns = %d\nt_end = %.10g\n", unknowns, sens->outputs.unknowns->t_end);
-  fprintf (f, "panels = %d\narray output[%d]\narray label[%d]\n", panels, panels, panels * unknowns);
-  for (int i = 0, k = 0; i < sens->outputs.count; i++) {
+static int sensitivity_draw (const sensitivity *cmd, pw_error *error) {
+  const pw_unknowns *u = &cmd->unknowns;
+  pw_curves c;
+  int status = pw_curves_open (&c, &cmd->line, &cmd->m, cmd->folder, "sensitivity", "derivatives along the run", error);
+  if (status != PW_OK) return status;
+  for (int o = 0; o < cmd->outputs.count; o++) {
     char label[300];
-    if (!sensitivity_is_drawn (sens, i)) continue;
-    pw_figure_element (f, "output", ++k, sens->outputs.of[i]);
-    for (int p = 0; p < unknowns; p++) {
-      sensitivity_label (sens, i, p, label, sizeof label);
-      pw_figure_element (f, "label", (k - 1) * unknowns + p + 1, label);
+    pw_curves_panel (
+        &c, &(pw_panel){ .x_label = "t [s]", .y_label = PW_FIGURE_LABEL (cmd->outputs.of[o], ""), .x[1] = u->t_end });
+    for (int p = 0; p < u->count; p++) {
+      const double factor = u->list[p].value != 0 ? u->list[p].value : 1;
+      sensitivity_label (cmd, o, p, label, sizeof label);
+      pw_curves_add (&c, "line", label);
+      for (int i = 0; i < cmd->outputs.rows; i++)
+        pw_curves_point (&c, cmd->outputs.t[i], sensitivity_of (cmd, o, p, i)->value * factor, 0);
     }
   }
+  return pw_curves_draw (&c, PW_OK, error);
 }
 
 static int sensitivity_write (const sensitivity *cmd, pw_error *error) {
   int status = pw_figure_write_tables (cmd->folder, "sensitivity", 5, cmd, sensitivity_csv, sensitivity_json, error);
-  if (status != PW_OK || sensitivity_panels (&cmd->sens) == 0 || cmd->sens.outputs.rows < 2) return status;
-  return pw_figure_write (&cmd->line, &cmd->m, cmd->folder, "sensitivity", cmd, sensitivity_data, sensitivity_variables,
-                          error);
+  return status == PW_OK && cmd->outputs.rows > 1 ? sensitivity_draw (cmd, error) : status;
 }
 
 /* ---- The command ---- */
@@ -270,11 +386,11 @@ static int sensitivity_write (const sensitivity *cmd, pw_error *error) {
 static int sensitivity_set_rows (sensitivity *cmd, double every, pw_error *error) {
   const double t_end = cmd->unknowns.t_end, count = ceil (t_end / every * (1 - 1e-12)); /* no row beside the last one */
   if (count > 1e7) return pw_fail (error, PW_INPUT, "--every %g: expected at most 1e7 rows", every);
-  double *t = pw_arena_alloc (&cmd->sens.arena, ((size_t)count + 2) * sizeof *t);
+  double *t = pw_arena_alloc (&cmd->arena, ((size_t)count + 2) * sizeof *t);
   if (t == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   for (int i = 0; i < (int)count; i++) t[i] = i * every;
   t[(int)count] = t_end;
-  cmd->sens.outputs.t = t, cmd->sens.outputs.rows = (int)count + 1;
+  cmd->outputs.t = t, cmd->outputs.rows = (int)count + 1;
   return PW_OK;
 }
 
@@ -283,7 +399,7 @@ static int sensitivity_open (sensitivity *cmd, pw_error *error) {
   int status = pw_cli_open (&cmd->m, &cmd->line, error);
   if (status == PW_OK) status = pw_unknowns_open (&cmd->unknowns, &cmd->line, &cmd->m, error);
   if (status == PW_OK) status = pw_unknowns_engine (&cmd->unknowns, SENSITIVITY_RUNS, 1, error);
-  if (status == PW_OK) status = pw_parallel_jobs (cmd->jobs_text, &cmd->sens.jobs, error);
+  if (status == PW_OK) status = pw_parallel_jobs (cmd->jobs_text, &cmd->jobs, error);
   if (status == PW_OK) status = pw_cli_requires ("--every", cmd->every, "-o DIR", cmd->folder != NULL, error);
   if (status == PW_OK) status = pw_cli_number ("--every", cmd->every, PW_POSITIVE, &every, error);
   if (status != PW_OK) return status;
@@ -291,20 +407,18 @@ static int sensitivity_open (sensitivity *cmd, pw_error *error) {
   if (cmd->of == NULL) return pw_fail (error, PW_INPUT, "--of is missing: expected an output, such as frame.x");
   if (strstr (cmd->unknowns.method, ":inputs=held"))
     return pw_fail (error, PW_INPUT, "derivatives need inputs=stage: held inputs depend on the steps");
-  cmd->sens.outputs.unknowns = &cmd->unknowns, cmd->sens.outputs.option = "--of", cmd->sens.outputs.of = cmd->of;
-  while (cmd->of[cmd->sens.outputs.count]) cmd->sens.outputs.count++;
+  cmd->outputs.unknowns = &cmd->unknowns, cmd->outputs.option = "--of", cmd->outputs.of = cmd->of;
+  while (cmd->of[cmd->outputs.count]) cmd->outputs.count++;
   if (cmd->folder)
     status = sensitivity_set_rows (cmd, every > 0 ? every : cmd->unknowns.t_end / SENSITIVITY_ROWS, error);
   return status == PW_OK ? pw_unknowns_differentiated (&cmd->unknowns, cmd->by, error) : status;
 }
 
 static int sensitivity_compute (sensitivity *cmd, pw_error *error) {
-  pw_progress progress;
   pw_stop_catch ();
-  pw_progress_start (&progress, pw_file_name (cmd->m.file), "runs", 0, SENSITIVITY_RUNS * cmd->unknowns.count);
-  cmd->sens.progress = &progress;
-  int status = pw_sensitivity_compute (&cmd->sens, error);
-  pw_progress_end (&progress);
+  pw_progress_start (&cmd->progress, pw_file_name (cmd->m.file), "runs", 0, SENSITIVITY_RUNS * cmd->unknowns.count);
+  int status = sensitivity_solve (cmd, error);
+  pw_progress_end (&cmd->progress);
   pw_stop_release ();
   return status;
 }
@@ -319,10 +433,11 @@ static int sensitivity_command (void *options, pw_error *error) {
   const double start = pw_seconds (CLOCK_PROCESS_CPUTIME_ID);
   if (status == PW_OK) status = sensitivity_compute (cmd, error);
   cmd->cpu = pw_seconds (CLOCK_PROCESS_CPUTIME_ID) - start;
-  if (status == PW_OK) sensitivity_print (&cmd->sens), sensitivity_warn (&cmd->sens);
+  if (status == PW_OK) sensitivity_print (cmd), sensitivity_warn (cmd);
   if (status == PW_OK && cmd->folder) status = sensitivity_write (cmd, error);
   pw_files_close (&cmd->files);
-  pw_sensitivity_close (&cmd->sens);
+  pw_outcomes_close (&cmd->outcomes);
+  pw_arena_free (&cmd->arena);
   pw_unknowns_close (&cmd->unknowns);
   pw_cli_close_model (&cmd->m);
   return status == PW_RETRY ? pw_cli_incomplete (&cmd->line, error) : status;
@@ -358,169 +473,3 @@ const pw_command pw_cli_sensitivity = {
   .function = sensitivity_command,
   .options = sensitivity_options,
 };
-
-/* Outputs of runs as functions of unknowns, and their derivatives by differences of runs (pw_differentiate). */
-
-static const double SENSITIVITY_RTOL = 1e-12, /* of the runs that are compared */
-    SENSITIVITY_PROBE = 1e-5;                 /* change that shows what an unknown changes, relative to its size */
-
-/* ---- Outputs of a run ---- */
-
-int pw_run_outputs_at (const pw_run_outputs *outputs, const double *x, double *value, double *table, pw_error *error) {
-  pw_outcomes outcomes = { .system = NULL };
-  pw_unknown_run run;
-  const pw_outcome_table rows = { outputs->t, outputs->rows, table };
-  int status = pw_unknown_run_prepare (&run, outputs->unknowns, x, error);
-  if (status == PW_OK)
-    status = pw_outcomes_open (&outcomes, run.m.system, outputs->option, outputs->of, outputs->count, error);
-  if (outputs->method) run.settings.rtol = outputs->rtol, run.settings.atol = 0;
-  if (outputs->max_steps) run.settings.max_steps = outputs->max_steps;
-  if (status == PW_OK)
-    status = pw_outcomes_run (&outcomes, outputs->method ? outputs->method : outputs->unknowns->method, &run.settings,
-                              outputs->unknowns->t_end, outputs->t ? &rows : NULL, error);
-  for (int i = 0; status == PW_OK && value && i < outputs->count; i++) value[i] = pw_outcome_value (&outcomes, i);
-  pw_outcomes_close (&outcomes);
-  pw_unknown_run_close (&run);
-  return status;
-}
-
-double pw_unknowns_noise (const pw_unknowns *u) {
-  return pw_cli_adaptive (u->method) == 1 ? u->settings.rtol : DBL_EPSILON;
-}
-
-/* ---- What can be differentiated ---- */
-
-/* Opens a run with unknown p changed by `by`. */
-static int sensitivity_neighbour (const pw_sensitivity *sens, const double *values, int p, double by,
-                                  pw_unknown_run *run, pw_error *error) {
-  const pw_unknowns *u = sens->outputs.unknowns;
-  double *x = malloc ((size_t)u->count * sizeof *x);
-  if (x == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  memcpy (x, values, (size_t)u->count * sizeof *x);
-  x[p] += by;
-  int status = pw_unknown_run_prepare (run, u, x, error);
-  free (x);
-  if (status != PW_OK) return status;
-  run->run = pw_limit_open (run->m.system, u->method, &run->settings, error);
-  return run->run ? PW_OK : error->status;
-}
-
-static int sensitivity_same_size (const pw_system *a, const pw_system *b) {
-  return pw_system_elements (a) == pw_system_elements (b) && pw_system_coordinates (a) == pw_system_coordinates (b) &&
-         pw_system_rows (a) == pw_system_rows (b);
-}
-
-/* Refuses parameters that change the number of bodies or elements, and initial values that the constraints determine:
- * then making the state of a neighbour consistent changes them back, by much more than 1 % of the step. */
-static int sensitivity_check (const pw_sensitivity *sens, const double *values, int p, pw_error *error) {
-  const pw_unknowns *u = sens->outputs.unknowns;
-  const pw_unknown *unknown = &u->list[p];
-  const pw_system *s = sens->outcomes.system;
-  const int n = pw_system_coordinates (s);
-  const double step = SENSITIVITY_PROBE * unknown->size;
-  int status = PW_OK;
-  for (int side = -1; side <= 1 && status == PW_OK; side += 2) {
-    pw_unknown_run run = { .run = NULL };
-    pw_error own = { 0 };
-    int opened = sensitivity_neighbour (sens, values, p, side * step, &run, &own);
-    if (opened == PW_RESOURCE) status = pw_fail (error, opened, "%s", own.text);
-    if (opened == PW_OK && !sensitivity_same_size (s, run.m.system))
-      status = pw_fail (error, PW_INPUT,
-                        "%s changes the number of bodies or elements: derivatives with respect to it do not exist",
-                        unknown->name);
-    else if (opened == PW_OK && unknown->state >= 0) {
-      const pw_initial_report *initial = pw_run_initial (run.run);
-      double value = unknown->state < n ? initial->q[unknown->state] : initial->v[unknown->state - n];
-      if (fabs (value - values[p] - side * step) > 0.01 * step)
-        status = pw_fail (error, PW_INPUT,
-                          "--by %s: it cannot change while the other initial values of --by and --start are kept: "
-                          "constraints determine it",
-                          unknown->name);
-    }
-    pw_unknown_run_close (&run);
-  }
-  return status;
-}
-
-/* ---- Derivatives ---- */
-
-/* pw_difference_settings.evaluate. */
-static int sensitivity_evaluate (void *context, const double *x, double rtol, double *value, pw_error *error) {
-  pw_sensitivity *sens = context;
-  pw_run_outputs outputs = sens->outputs;
-  outputs.rtol = rtol;
-  int status = pw_run_outputs_at (&outputs, x, value, value + outputs.count, error);
-  pthread_mutex_lock (&sens->lock);
-  if (sens->progress) pw_progress_at (sens->progress, fmin (++sens->runs, sens->progress->last));
-  pthread_mutex_unlock (&sens->lock);
-  return status;
-}
-
-static int sensitivity_differentiate (pw_sensitivity *sens, const double *values, pw_error *error) {
-  const pw_unknowns *u = sens->outputs.unknowns;
-  const int outputs = sens->outputs.count * (1 + sens->outputs.rows);
-  sens->derivative = pw_arena_alloc (&sens->arena, (size_t)u->count * (size_t)outputs * sizeof *sens->derivative);
-  if (sens->derivative == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  const pw_difference_settings d = { .evaluate = sensitivity_evaluate,
-                                     .context = sens,
-                                     .outputs = outputs,
-                                     .steering = sens->outputs.count,
-                                     .rtol = SENSITIVITY_RTOL,
-                                     .neighbours = 6,
-                                     .jobs = sens->jobs };
-  return pw_unknowns_differentiate (u, values, d, sens->derivative, error);
-}
-
-/* The method of the runs that are compared, and the sizes of the unknowns. */
-static int sensitivity_prepare (pw_sensitivity *sens, const double *values, pw_error *error) {
-  const pw_unknowns *u = sens->outputs.unknowns;
-  pw_unknown_run run;
-  pw_run *r = NULL;
-  int status = pw_unknown_run_prepare (&run, u, values, error);
-  if (status == PW_OK) r = run.run = pw_limit_open (run.m.system, u->method, &run.settings, error);
-  if (status == PW_OK && r == NULL) status = error->status;
-  for (int p = 0; p < u->count && status == PW_OK; p++) pw_unknown_measure (&u->list[p], values[p], r);
-  if (status == PW_OK) {
-    sens->outputs.method = pw_accurate_method (run.m.system, &run.settings, u->t_end, &sens->outputs.max_steps, error);
-    if (sens->outputs.method == NULL && error->status == PW_OK)
-      status = pw_limit_status (&run.limit, pw_run_time (r), error);
-    else if (sens->outputs.method == NULL)
-      status = error->status;
-  }
-  pw_unknown_run_close (&run);
-  return status;
-}
-
-int pw_sensitivity_compute (pw_sensitivity *sens, pw_error *error) {
-  const pw_unknowns *u = sens->outputs.unknowns;
-  const size_t count = (size_t)sens->outputs.count, rows = (size_t)sens->outputs.rows;
-  double *values = pw_arena_alloc (&sens->arena, (size_t)u->count * sizeof *values);
-  sens->value = pw_arena_alloc (&sens->arena, count * (1 + rows) * sizeof *sens->value);
-  if (values == NULL || sens->value == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  sens->table = sens->value + count;
-  for (int p = 0; p < u->count; p++) values[p] = u->list[p].value;
-  int status = pw_outcomes_open (&sens->outcomes, u->m->system, sens->outputs.option, sens->outputs.of,
-                                 sens->outputs.count, error);
-  if (status == PW_OK) status = pw_run_outputs_at (&sens->outputs, values, sens->value, sens->table, error);
-  if (status == PW_OK) status = sensitivity_prepare (sens, values, error);
-  for (int p = 0; p < u->count && status == PW_OK; p++) status = sensitivity_check (sens, values, p, error);
-  for (int i = 0; i < sens->outputs.count && status == PW_OK; i++)
-    if (!isfinite (sens->value[i]))
-      status = pw_fail (error, PW_METHOD, "%.300s is not a finite number at the end of the run", sens->outputs.of[i]);
-  if (status != PW_OK) return status;
-  pthread_mutex_init (&sens->lock, NULL);
-  status = sensitivity_differentiate (sens, values, error);
-  pthread_mutex_destroy (&sens->lock);
-  return status;
-}
-
-const pw_derivative *pw_sensitivity_of (const pw_sensitivity *sens, int output, int unknown, int row) {
-  const int count = sens->outputs.count, rows = sens->outputs.rows;
-  const pw_derivative *of = sens->derivative + unknown * count * (1 + rows);
-  return of + (row < 0 ? output : count + output * rows + row);
-}
-
-void pw_sensitivity_close (pw_sensitivity *sens) {
-  pw_outcomes_close (&sens->outcomes);
-  pw_arena_free (&sens->arena);
-}

@@ -8,8 +8,6 @@
 #include "report.h"
 #include "cli.h"
 
-/* The command `pinwheel steady`, its result and its reports (steady_command.c). */
-
 /* A steady motion found, or a point of a branch. */
 typedef struct {
   int branch;              /* number of its branch, from 1; without --vary the number of the motion */
@@ -43,11 +41,6 @@ typedef struct {
   int families;       /* solutions of which no branch begins, since they are members of families */
   int stopped;        /* 1: by Ctrl-C or --limit */
 } pw_steady_command;
-
-/* Prints the motions or the branches; there is at least one point. */
-void pw_steady_print (const pw_steady_command *cmd);
-/* Writes steady.json, steady.csv and, with --vary, the figure into the folder.  A status. */
-int pw_steady_write (const pw_steady_command *cmd, pw_error *error);
 
 #define STEADY_STARTS "30" /* default of --starts */
 
@@ -340,8 +333,6 @@ static int steady_branches (pw_steady_command *cmd, pw_error *error) {
   return status;
 }
 
-/* ---- The command ---- */
-
 static int steady_compute (pw_steady_command *cmd, pw_error *error) {
   cmd->residual[0] = cmd->residual[1] = INFINITY;
   pw_limit_start (&cmd->limit);
@@ -354,54 +345,7 @@ static int steady_compute (pw_steady_command *cmd, pw_error *error) {
   return status;
 }
 
-static int steady_command (void *options, pw_error *error) {
-  pw_steady_command *cmd = options;
-  int status = pw_cli_open (&cmd->m, &cmd->line, error);
-  if (status == PW_OK) status = steady_read_options (cmd, error);
-  if (status == PW_OK) status = pw_figure_lock_folder (&cmd->line, &cmd->m, cmd->folder, "steady", &cmd->files, error);
-  if (status == PW_OK) pw_report_model (&cmd->m);
-  if (status == PW_OK) status = steady_compute (cmd, error);
-  if (status == PW_OK && cmd->points) pw_steady_print (cmd);
-  if (status == PW_OK && cmd->points && cmd->folder) status = pw_steady_write (cmd, error);
-  pw_files_close (&cmd->files);
-  steady_forget (cmd, 0);
-  free (cmd->point);
-  free (cmd->end);
-  pw_steady_close (cmd->search);
-  pw_cli_close_model (&cmd->m);
-  return status == PW_OK && cmd->stopped ? pw_cli_incomplete (&cmd->line, error) : status;
-}
-
-static const struct poptOption steady_options_table[] = {
-  PW_OPTION_GROUP ("Steady motions"),
-  PW_HOLD_OPTION (pw_steady_command, hold_texts),
-  PW_TEXT_OPTION (pw_steady_command, vary_text, "vary", 0, "NAME=FIRST:LAST",
-                  "Follow branches over a parameter of the model, or of a held value such as BODY.speed"),
-  PW_TEXT_OPTION (pw_steady_command, starts_text, "starts", 0, "N",
-                  "Begin at the initial state and at N random ones (default " STEADY_STARTS ")"),
-  PW_TEXT_OPTION (pw_steady_command, at_text, "at", 0, "T", "Evaluate signals at time T [s] (default 0)"),
-  PW_TEXT_OPTION (pw_steady_command, folder, "output", 'o', "DIR",
-                  "Write steady.csv, steady.json and, with --vary, figures into a folder"),
-  PW_WIDTH_OPTION,
-  PW_LIMIT_OPTION,
-  PW_MODEL_OPTIONS,
-  POPT_TABLEEND
-};
-
-const pw_command pw_cli_steady = {
-  .name = "steady",
-  .synopsis = "MODEL [OPTION...]",
-  .summary = "find steady motions, and follow them over a parameter",
-  .help =
-      "Find steady motions, in which every body moves with one frame at constant speed and angular velocity, and "
-      "equilibria; with --vary, follow them over a parameter, through folds, with eigenvalues and the values at which "
-      "stability changes.",
-  .options_size = sizeof (pw_steady_command),
-  .function = steady_command,
-  .options = steady_options_table,
-};
-
-/* The reports of `pinwheel steady`: text, JSON, table and figure. */
+/* ---- Reports ---- */
 
 enum {
   STEADY_DIGITS = 6,         /* of numbers in the text */
@@ -488,7 +432,7 @@ static void steady_print_branches (const pw_steady_command *cmd) {
     if (*cmd->end[i]) printf ("Branch %d ends: %s\n", i + 1, cmd->end[i]);
 }
 
-void pw_steady_print (const pw_steady_command *cmd) {
+static void steady_print (const pw_steady_command *cmd) {
   char text[40];
   const char *model = pw_file_name (cmd->m.file),
              *symmetries = pw_states_symmetries (pw_steady_symmetries (cmd->search), text);
@@ -604,7 +548,7 @@ static int steady_csv (const void *context, FILE *f, pw_error *error) {
   return status;
 }
 
-/* ---- The figure: data sets of gnuplot end with two blank lines; a row of nan keeps each from being empty ---- */
+/* ---- The figure ---- */
 
 /* Whether the branch is stable from p to the next point.  At an event, where `unstable` does not count the modes that
  * change, the next point decides. */
@@ -629,65 +573,132 @@ static double steady_ranked (const pw_linear *l, steady_part part, int k) {
   return NAN;
 }
 
-/* Writes the k-th real part and frequency on the parts of a branch where no modes grow (stable or neutral), or where
- * some do, with a blank line after each. */
-static void steady_write_parts (FILE *f, const pw_steady_point *first, int count, int k, int stable) {
-  int inside = 0; /* 1: the last point began or continued a part */
-  for (const pw_steady_point *p = first; p < first + count; p++) {
-    int here = p + 1 < first + count && steady_is_stable (p) == stable;
-    if (here || inside)
-      fprintf (f, "%.10g %.10g %.10g\n", p->motion.parameter, steady_ranked (&p->linear, REAL, k),
-               steady_ranked (&p->linear, IMAGINARY, k) / (2 * PW_PI));
-    if (inside && !here) fputs ("\n", f);
-    inside = here;
-  }
-}
-
-static int steady_data (const void *context, FILE *f, pw_error *error) {
-  const pw_steady_command *cmd = context;
-  fprintf (f, "# %s, real part [1/s], frequency [Hz]: stable parts; unstable ones; events; eigenvalues [1/s]\n",
-           cmd->vary.name);
-  for (int stable = 1; stable >= 0; stable--) {
-    for (int i = 0, count; i < cmd->points; i += count) {
-      for (count = 1; i + count < cmd->points && cmd->point[i + count].branch == cmd->point[i].branch;) count++;
-      for (int k = 0; k < steady_most_eigenvalues (cmd); k++) steady_write_parts (f, cmd->point + i, count, k, stable);
+/* Draws the real parts [1/s] or frequencies [Hz] on the parts of branches where no modes grow (stable or neutral), or
+ * where some do. */
+static void steady_draw_parts (const pw_steady_command *cmd, pw_curves *c, steady_part part, int stable) {
+  pw_curves_add (c, stable ? "stable" : "unstable", stable ? "stable" : "unstable");
+  for (int k = 0; k < steady_most_eigenvalues (cmd); k++)
+    for (int i = 0, inside = 0; i < cmd->points; i++) { /* inside: 1: the last point began or continued a part */
+      const pw_steady_point *p = cmd->point + i;
+      const int here = i + 1 < cmd->points && p[1].branch == p->branch && steady_is_stable (p) == stable;
+      const double value = steady_ranked (&p->linear, part, k) / (part == IMAGINARY ? 2 * PW_PI : 1);
+      const int shown = (here || inside) && !(part == IMAGINARY && value <= 1e-12);
+      pw_curves_point (c, p->motion.parameter, shown ? value : NAN, 0);
+      if (!here) pw_curves_point (c, NAN, NAN, 0);
+      inside = here;
     }
-    fputs ("nan nan nan\n\n\n", f);
+}
+
+/* Draws lines at the folds, or at the other events, if there are any. */
+static void steady_draw_events (const pw_steady_command *cmd, pw_curves *c, int folds) {
+  int events = 0;
+  for (const pw_steady_point *p = cmd->point; p < cmd->point + cmd->points; p++) {
+    if (p->motion.event == PW_STEADY_POINT || (p->motion.event == PW_STEADY_FOLD) != folds) continue;
+    if (events++ == 0) pw_curves_add (c, folds ? "fold" : "change", folds ? "fold" : "stability changes");
+    pw_curves_point (c, p->motion.parameter, INFINITY, 0);
   }
-  for (const pw_steady_point *p = cmd->point; p < cmd->point + cmd->points; p++)
-    if (p->motion.event != PW_STEADY_POINT) fprintf (f, "%.10g %d\n", p->motion.parameter, p->motion.event);
-  fputs ("nan nan\n\n\n", f);
-  for (const pw_steady_point *p = cmd->point; p < cmd->point + cmd->points; p++)
-    for (int i = 0; i < p->linear.unknowns; i++)
-      if (!p->linear.rigid[i])
-        fprintf (f, "%.10g %.10g %.10g\n", p->motion.parameter, p->linear.re[i], p->linear.im[i]);
-  fputs ("nan nan nan\n", f);
-  (void)error;
-  return PW_OK;
 }
 
-static void steady_variables (const void *context, FILE *f) {
-  const pw_steady_command *cmd = context;
-  double low[2] = { INFINITY, INFINITY }, high[2] = { -INFINITY, -INFINITY };
+/* The ranges of real and imaginary parts in the figure [1/s].  Modes that decay much faster than others grow or
+ * oscillate are not shown, unless the others are nearly 0. */
+static void steady_ranges (const pw_steady_command *cmd, double re[2], double im[2]) {
+  double low = INFINITY, high = -INFINITY, imaginary = 0;
   for (const pw_steady_point *p = cmd->point; p < cmd->point + cmd->points; p++)
-    for (int i = 0; i < p->linear.unknowns; i++)
-      for (int k = 0; k < 2 && !p->linear.rigid[i]; k++) {
-        double value = k ? p->linear.im[i] : p->linear.re[i];
-        low[k] = fmin (low[k], value), high[k] = fmax (high[k], value);
-      }
-  if (low[0] > high[0]) low[0] = -1, high[0] = 1, low[1] = high[1] = 0; /* no eigenvalues */
-  fprintf (f, "re_min = %.10g\nre_max = %.10g\nim_min = %.10g\nim_max = %.10g\n", low[0], high[0], low[1], high[1]);
-  pw_figure_label (f, "label_of_x", 0, cmd->vary.name, cmd->vary.unit);
-  int folds = 0, changes = 0;
-  for (const pw_steady_point *p = cmd->point; p < cmd->point + cmd->points; p++)
-    folds += p->motion.event == PW_STEADY_FOLD, changes += p->motion.event > PW_STEADY_FOLD;
-  fprintf (f, "folds = %d\nchanges = %d\n", folds, changes);
-  fprintf (f, "first = %.10g\nlast = %.10g\n", fmin (cmd->settings.first, cmd->settings.last),
-           fmax (cmd->settings.first, cmd->settings.last));
+    for (int i = 0; i < p->linear.unknowns; i++) {
+      if (p->linear.rigid[i]) continue;
+      low = fmin (low, p->linear.re[i]), high = fmax (high, p->linear.re[i]);
+      imaginary = fmax (imaginary, fabs (p->linear.im[i]));
+    }
+  if (low > high) low = -1, high = 1; /* no eigenvalues */
+  const double slow = 5 * fmax (high, imaginary);
+  if (slow > -5e-3 * low) low = fmax (low, -slow);
+  const double size = fmax (fabs (low), fabs (high)),
+               margin = fmax (4e-5, high - low < 1e-3 * size ? 0.05 * size : 0.04 * (high - low));
+  re[0] = low - margin, re[1] = high + margin;
+  im[1] = 1.08 * (imaginary > 1e-9 * fmax (1, size) ? imaginary : 2 * PW_PI), im[0] = -im[1];
 }
 
-int pw_steady_write (const pw_steady_command *cmd, pw_error *error) {
+/* Eigenvalues over the parameter, stable parts solid, unstable ones dashed; below them the root locus. */
+static int steady_draw (const pw_steady_command *cmd, pw_error *error) {
+  const double first = fmin (cmd->settings.first, cmd->settings.last),
+               last = fmax (cmd->settings.first, cmd->settings.last);
+  const char *parameter = PW_FIGURE_LABEL (cmd->vary.name, cmd->vary.unit);
+  double re[2], im[2];
+  pw_curves c;
+  int status = pw_curves_open (&c, &cmd->line, &cmd->m, cmd->folder, "steady", "eigenvalues of steady motions", error);
+  if (status != PW_OK) return status;
+  steady_ranges (cmd, re, im);
+  for (int part = REAL; part <= IMAGINARY; part++) {
+    pw_panel panel = { .x_label = parameter, .x = { first, last }, .type = part == REAL ? 0 : PW_PANEL_BELOW };
+    panel.y_label = part == REAL ? "real part [1/s]" : "frequency [Hz]";
+    panel.y[0] = part == REAL ? re[0] : 0, panel.y[1] = part == REAL ? re[1] : im[1] / (2 * PW_PI);
+    pw_curves_panel (&c, &panel);
+    for (int stable = 1; stable >= 0; stable--) steady_draw_parts (cmd, &c, part, stable);
+    for (int folds = 0; folds < 2 && part == REAL; folds++) steady_draw_events (cmd, &c, folds);
+  }
+  pw_curves_panel (&c, &(pw_panel){ .x_label = "real part [1/s]",
+                                    .y_label = "imaginary part [1/s]",
+                                    .z_label = parameter,
+                                    .x = { re[0], re[1] },
+                                    .y = { im[0], im[1] },
+                                    .z = { first, last } });
+  pw_curves_add (&c, "scale", NULL);
+  for (const pw_steady_point *p = cmd->point; p < cmd->point + cmd->points; p++)
+    for (int i = 0; i < p->linear.unknowns; i++)
+      if (!p->linear.rigid[i]) pw_curves_point (&c, p->linear.re[i], p->linear.im[i], p->motion.parameter);
+  return pw_curves_draw (&c, PW_OK, error);
+}
+
+static int steady_write (const pw_steady_command *cmd, pw_error *error) {
   int status = pw_figure_write_tables (cmd->folder, "steady", 1, cmd, steady_csv, steady_json, error);
-  if (status != PW_OK || !cmd->vary_text) return status;
-  return pw_figure_write (&cmd->line, &cmd->m, cmd->folder, "steady", cmd, steady_data, steady_variables, error);
+  return status == PW_OK && cmd->vary_text ? steady_draw (cmd, error) : status;
 }
+
+/* ---- The command ---- */
+
+static int steady_command (void *options, pw_error *error) {
+  pw_steady_command *cmd = options;
+  int status = pw_cli_open (&cmd->m, &cmd->line, error);
+  if (status == PW_OK) status = steady_read_options (cmd, error);
+  if (status == PW_OK) status = pw_figure_lock_folder (&cmd->line, &cmd->m, cmd->folder, "steady", &cmd->files, error);
+  if (status == PW_OK) pw_report_model (&cmd->m);
+  if (status == PW_OK) status = steady_compute (cmd, error);
+  if (status == PW_OK && cmd->points) steady_print (cmd);
+  if (status == PW_OK && cmd->points && cmd->folder) status = steady_write (cmd, error);
+  pw_files_close (&cmd->files);
+  steady_forget (cmd, 0);
+  free (cmd->point);
+  free (cmd->end);
+  pw_steady_close (cmd->search);
+  pw_cli_close_model (&cmd->m);
+  return status == PW_OK && cmd->stopped ? pw_cli_incomplete (&cmd->line, error) : status;
+}
+
+static const struct poptOption steady_options_table[] = {
+  PW_OPTION_GROUP ("Steady motions"),
+  PW_HOLD_OPTION (pw_steady_command, hold_texts),
+  PW_TEXT_OPTION (pw_steady_command, vary_text, "vary", 0, "NAME=FIRST:LAST",
+                  "Follow branches over a parameter of the model, or of a held value such as BODY.speed"),
+  PW_TEXT_OPTION (pw_steady_command, starts_text, "starts", 0, "N",
+                  "Begin at the initial state and at N random ones (default " STEADY_STARTS ")"),
+  PW_TEXT_OPTION (pw_steady_command, at_text, "at", 0, "T", "Evaluate signals at time T [s] (default 0)"),
+  PW_TEXT_OPTION (pw_steady_command, folder, "output", 'o', "DIR",
+                  "Write steady.csv, steady.json and, with --vary, figures into a folder"),
+  PW_WIDTH_OPTION,
+  PW_LIMIT_OPTION,
+  PW_MODEL_OPTIONS,
+  POPT_TABLEEND
+};
+
+const pw_command pw_cli_steady = {
+  .name = "steady",
+  .synopsis = "MODEL [OPTION...]",
+  .summary = "find steady motions, and follow them over a parameter",
+  .help =
+      "Find steady motions, in which every body moves with one frame at constant speed and angular velocity, and "
+      "equilibria; with --vary, follow them over a parameter, through folds, with eigenvalues and the values at which "
+      "stability changes.",
+  .options_size = sizeof (pw_steady_command),
+  .function = steady_command,
+  .options = steady_options_table,
+};

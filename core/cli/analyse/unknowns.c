@@ -1,4 +1,5 @@
 /* Unknowns of analyses: finds and reads them, and compiles models and opens runs with given values of them. */
+#include <float.h>
 #include <gsl/gsl_qrng.h>
 #include <gsl/gsl_rng.h>
 #include <math.h>
@@ -6,7 +7,8 @@
 #include <string.h>
 #include "unknowns.h"
 
-int pw_unknown_find (pw_unknown *u, const pw_cli_model *m, const char *name, pw_error *error) {
+/* Finds the parameter or state of this name in an open model, and its value there. */
+static int unknown_find (pw_unknown *u, const pw_cli_model *m, const char *name, pw_error *error) {
   *u = (pw_unknown){ .parameter = pw_cli_parameter (m->model, name), .state = -1, .high = INFINITY };
   snprintf (u->name, sizeof u->name, "%s", name);
   if (u->parameter) {
@@ -90,7 +92,7 @@ static int unknown_add (pw_unknowns *u, const char *text, pw_error *error) {
   for (int i = 0; i < u->count; i++)
     if (strcmp (u->list[i].name, name) == 0) return pw_fail (error, PW_INPUT, "--free %s is given twice", name);
   u->count++;
-  int status = pw_unknown_find (added, u->m, name, error);
+  int status = unknown_find (added, u->m, name, error);
   if (added->parameter && added->parameter->domain == PW_COUNT)
     status = pw_fail (error, PW_INPUT, "--free %s: it is a count, and only continuous parameters can be free", name);
   if (status == PW_OK && text[size]) status = unknown_read_bounds (added, text + size + 1, error);
@@ -112,7 +114,7 @@ int pw_unknowns_read (pw_unknowns *u, const char **list, pw_error *error) {
 /* ---- Unknowns of --by ---- */
 
 static int unknown_of_run (pw_unknown *u, const pw_cli_model *m, const pw_run *r, const char *name, pw_error *error) {
-  int n = pw_system_coordinates (m->system), status = pw_unknown_find (u, m, name, error);
+  int n = pw_system_coordinates (m->system), status = unknown_find (u, m, name, error);
   if (status == PW_OK && u->state >= 0)
     u->value = u->state < n ? pw_run_initial (r)->q[u->state] : pw_run_initial (r)->v[u->state - n];
   if (status != PW_OK || u->parameter == NULL || u->parameter->domain != PW_COUNT) return status;
@@ -141,7 +143,8 @@ int pw_unknowns_differentiated (pw_unknowns *u, const char **list, pw_error *err
 
 /* ---- Runs ---- */
 
-int pw_unknowns_system (pw_cli_model *m, const pw_unknowns *u, const double *x, pw_error *error) {
+/* The model with these values of the unknowns, compiled.  Close it by pw_cli_close_model in every case. */
+static int unknowns_system (pw_cli_model *m, const pw_unknowns *u, const double *x, pw_error *error) {
   *m = (pw_cli_model){ .model = pw_file_model (u->m->file, error) };
   int status = m->model ? pw_cli_apply (m->model, "--set", u->line->sets, pw_model_set, error) : error->status;
   if (status == PW_OK) status = pw_cli_apply (m->model, "--start", u->line->starts, pw_model_set_initial, error);
@@ -155,7 +158,7 @@ int pw_unknowns_system (pw_cli_model *m, const pw_unknowns *u, const double *x, 
 int pw_unknown_run_prepare (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error) {
   const pw_specialised *code = pw_scene_code_table (u->engine.code);
   *to = (pw_unknown_run){ .settings = u->settings, .limit = { .seconds = u->limit } };
-  if (pw_unknowns_system (&to->m, u, x, error) != PW_OK) return error->status;
+  if (unknowns_system (&to->m, u, x, error) != PW_OK) return error->status;
   to->settings.stop = pw_limit_over;
   to->settings.stop_context = &to->limit;
   to->settings.specialised = code && pw_specialised_fits (code, to->m.system) ? code : NULL;
@@ -202,6 +205,30 @@ int pw_unknowns_differentiate (const pw_unknowns *u, const double *x, pw_differe
   int status = pw_differentiate (&d, out, NULL, error);
   free (size);
   return status;
+}
+
+/* ---- Outputs of a run ---- */
+
+int pw_run_outputs_at (const pw_run_outputs *outputs, const double *x, double *value, double *table, pw_error *error) {
+  pw_outcomes outcomes = { .system = NULL };
+  pw_unknown_run run;
+  const pw_outcome_table rows = { outputs->t, outputs->rows, table };
+  int status = pw_unknown_run_prepare (&run, outputs->unknowns, x, error);
+  if (status == PW_OK)
+    status = pw_outcomes_open (&outcomes, run.m.system, outputs->option, outputs->of, outputs->count, error);
+  if (outputs->method) run.settings.rtol = outputs->rtol, run.settings.atol = 0;
+  if (outputs->max_steps) run.settings.max_steps = outputs->max_steps;
+  if (status == PW_OK)
+    status = pw_outcomes_run (&outcomes, outputs->method ? outputs->method : outputs->unknowns->method, &run.settings,
+                              outputs->unknowns->t_end, outputs->t ? &rows : NULL, error);
+  for (int i = 0; status == PW_OK && value && i < outputs->count; i++) value[i] = pw_outcome_value (&outcomes, i);
+  pw_outcomes_close (&outcomes);
+  pw_unknown_run_close (&run);
+  return status;
+}
+
+double pw_unknowns_noise (const pw_unknowns *u) {
+  return pw_cli_adaptive (u->method) == 1 ? u->settings.rtol : DBL_EPSILON;
 }
 
 /* ---- Starts and results of searches ---- */
@@ -288,7 +315,7 @@ void pw_vary_progress (const pw_vary *v, pw_progress *p, double from, double val
 pw_system *pw_vary_compile (void *vary, double value, pw_error *error) {
   const pw_vary *v = vary;
   pw_cli_model m;
-  pw_unknowns_system (&m, &v->unknowns, &value, error);
+  unknowns_system (&m, &v->unknowns, &value, error);
   pw_model_free (m.model);
   return m.system;
 }

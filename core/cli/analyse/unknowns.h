@@ -3,8 +3,8 @@
 #ifndef PW_UNKNOWNS_H_
 #define PW_UNKNOWNS_H_
 #include "cli.h"
+#include "outcome.h"
 #include "pinwheel-analysis.h"
-#include "cli.h"
 
 typedef struct {
   char name[300];                /* "length", "body.vx" */
@@ -18,10 +18,6 @@ typedef struct {
   double scale;   /* size of typical changes: high - low of --free, else |value|, else 1 */
   int has_bounds; /* 1: the bounds are those of --free, which are finite */
 } pw_unknown;
-
-/* Finds the parameter or state of this name in an open model, and its value there.  PW_INPUT, with the nearest name,
- * if there is none. */
-int pw_unknown_find (pw_unknown *u, const pw_cli_model *m, const char *name, pw_error *error);
 
 /* Unknowns of the model of a command line, and the options of its runs. */
 typedef struct {
@@ -51,10 +47,6 @@ int pw_unknowns_differentiated (pw_unknowns *u, const char **list, pw_error *err
  * unknowns for more than one start. */
 int pw_unknowns_engine (pw_unknowns *u, double runs, int starts, pw_error *error);
 
-/* The model with these values of the unknowns, compiled.  PW_INPUT if it refuses them; PW_RESOURCE.  Close it by
- * pw_cli_close_model in every case.  May be called by several threads at once. */
-int pw_unknowns_system (pw_cli_model *m, const pw_unknowns *u, const double *x, pw_error *error);
-
 /* A run with given values of the unknowns. */
 typedef struct {
   pw_cli_model m;
@@ -75,6 +67,27 @@ void pw_unknown_measure (pw_unknown *u, double value, const pw_run *r);
  * out, errors: as pw_differentiate. */
 int pw_unknowns_differentiate (const pw_unknowns *u, const double *x, pw_difference_settings d, pw_derivative *out,
                                pw_error *error);
+
+/* Outputs of the runs of unknowns. */
+typedef struct {
+  const pw_unknowns *unknowns;
+  const char *option; /* "--of", in messages */
+  const char **of;    /* count: texts */
+  int count;
+  const char *method; /* NULL: that of the unknowns, with their settings */
+  double rtol;        /* with a method */
+  long max_steps;     /* likewise; 0: that of the settings */
+  const double *t;    /* rows: times of a table, see pw_outcome_table; NULL: none */
+  int rows;
+} pw_run_outputs;
+
+/* Runs the model with these values of the unknowns; stores the outputs, unless `value` is NULL, and the table, count x
+ * rows.  Called by several threads at once.  A status; PW_RETRY after Ctrl-C. */
+int pw_run_outputs_at (const pw_run_outputs *outputs, const double *x, double *value, double *table, pw_error *error);
+
+/* Relative noise of outputs as functions of the unknowns: the tolerance of an adaptive method, or round-off with fixed
+ * steps. */
+double pw_unknowns_noise (const pw_unknowns *u);
 
 /* Points where searches begin, `count` x unknowns: the unknowns' values; then points of Sobol's sequence, shifted
  * modulo 1 by random numbers from the seed, between the bounds of --free, else within `scale` of the values.  If count
@@ -100,7 +113,7 @@ typedef struct {
   double first, last;
   /* private */
   pw_unknown unknown;
-  pw_unknowns unknowns; /* this one, for pw_unknowns_system */
+  pw_unknowns unknowns; /* this one, for unknowns_system */
 } pw_vary;
 
 /* Reads the option into *v, which is zero-initialised and must not move later: it points to itself.  PW_INPUT if it is

@@ -2,6 +2,7 @@
 #define _GNU_SOURCE /* posix_spawn_file_actions_addchdir_np */
 #include <errno.h>
 #include <fcntl.h>
+#include <math.h>
 #include <spawn.h>
 #include <stdlib.h>
 #include <string.h>
@@ -24,14 +25,6 @@ int pw_figure_width (const char *text, double *width, pw_error *error) {
   if (status == PW_OK && !(*width >= 50 && *width <= 500))
     return pw_fail (error, PW_INPUT, "--width %s: expected 50mm to 500mm", text);
   return status;
-}
-
-int pw_figures_of (pw_figures *f, const pw_cli_line *line, const pw_cli_model *model, const char *folder,
-                   pw_error *error) {
-  *f = (pw_figures){ .folder = folder,
-                     .model = pw_file_name (model->file),
-                     .about = pw_file_table (model->file)->about };
-  return pw_figure_width (line->width, &f->width, error);
 }
 
 /* ---- The folder ---- */
@@ -125,11 +118,10 @@ void pw_figure_element (FILE *f, const char *variable, int i, const char *value)
   pw_figure_text (f, PW_PRINTED (60, "%s[%d]", variable, i), value);
 }
 
-void pw_figure_label (FILE *f, const char *variable, int i, const char *name, const char *unit) {
+const char *pw_figure_label (const char *name, const char *unit, char buffer[FIGURE_TITLE]) {
   char shown[FIGURE_NAME + 4];
-  const char *label =
-      *unit ? PW_PRINTED (300, "%s [%s]", pw_figure_name (name, shown), unit) : pw_figure_name (name, shown);
-  i ? pw_figure_element (f, variable, i, label) : pw_figure_text (f, variable, label);
+  snprintf (buffer, FIGURE_TITLE, *unit ? "%s [%s]" : "%s", pw_figure_name (name, shown), unit);
+  return buffer;
 }
 
 int pw_figure_end (pw_output *o, const char *template_name, pw_error *error) {
@@ -214,18 +206,141 @@ int pw_figure_status (int drawn, const pw_error *drawing, int status, pw_error *
   return drawn;
 }
 
-int pw_figure_write (const pw_cli_line *line, const pw_cli_model *model, const char *folder, const char *name,
-                     const void *context, int (*data) (const void *context, FILE *f, pw_error *error),
-                     void (*variables) (const void *context, FILE *f), pw_error *error) {
-  pw_figures figures;
-  if (pw_figures_of (&figures, line, model, folder, error) != PW_OK) return error->status;
-  pw_output *o = pw_figure_open_data (&figures, PW_PRINTED (40, "%s.dat", name), error);
-  if (o == NULL) return error->status;
-  int status = data (context, pw_output_stream (o), error);
-  if (status != PW_OK) return pw_output_discard (o), status;
-  if (pw_output_finish (o, error) != PW_OK || (o = pw_figure_begin (&figures, name, error)) == NULL)
-    return error->status;
-  variables (context, pw_output_stream (o));
-  status = pw_figure_end (o, name, error);
-  return status == PW_OK ? pw_figure_draw (folder, (const char *[]){ name, NULL }, error) : status;
+/* ---- Panels of curves ---- */
+
+int pw_curves_open (pw_curves *c, const pw_cli_line *line, const pw_cli_model *model, const char *folder,
+                    const char *name, const char *title, pw_error *error) {
+  pw_figures figures = { .folder = folder,
+                         .model = pw_file_name (model->file),
+                         .about = pw_file_table (model->file)->about };
+  *c = (pw_curves){ .folder = folder, .name = name };
+  if (pw_figure_width (line->width, &figures.width, error) != PW_OK) return error->status;
+  c->data = pw_figure_open_data (&figures, PW_PRINTED (60, "%s.dat", name), error);
+  c->script = c->data ? pw_figure_begin (&figures, name, error) : NULL;
+  if (c->script) return pw_figure_text (pw_output_stream (c->script), "title", title), PW_OK;
+  if (c->data) pw_output_discard (c->data);
+  return PW_RESOURCE;
+}
+
+/* VARIABLE_i = 'TEXT' */
+static void curves_text (const pw_curves *c, const char *variable, int i, const char *text) {
+  pw_figure_text (pw_output_stream (c->script), PW_PRINTED (40, "%s_%d", variable, i), text);
+}
+
+/* Sets the range of an axis: as given, if its first end is less; else that of the points, with a margin, or if
+ * `decades` to powers of ten. */
+static void curves_range (double range[2], const double given[2], const double points[2], int logarithmic,
+                          int decades) {
+  const double low = points[0], high = points[1], largest = fmax (fabs (low), fabs (high)),
+               least = largest > 0 ? 0.1 * largest : 1, extent = high - low,
+               edge = extent > 1e-6 * largest ? 0.05 * extent : least, ratio = 1.01 * pow (high / low, 0.05);
+  const int known = given[0] < given[1];
+  range[0] = known ? given[0] : -1, range[1] = known ? given[1] : 1;
+  if (known || low > high) return;
+  range[0] = !logarithmic ? low - edge : decades ? pow (10, floor (log10 (low) - 0.2)) : low / ratio;
+  range[1] = !logarithmic ? high + edge : decades ? pow (10, ceil (log10 (high) + 0.2)) : high * ratio;
+}
+
+/* Extends the ranges, so that both axes have the same unit in a panel that is `aspect` times as high as wide. */
+static double curves_equal (double range[2][2]) {
+  double extent[2] = { range[0][1] - range[0][0], range[1][1] - range[1][0] };
+  const double aspect = fmin (fmax (extent[1] / extent[0], 0.2), 0.54);
+  for (int k = 0; k < 2; k++) {
+    const double middle = 0.5 * (range[k][0] + range[k][1]),
+                 half = 0.5 * (k ? fmax (extent[1], aspect * extent[0]) : fmax (extent[0], extent[1] / aspect));
+    range[k][0] = middle - half, range[k][1] = middle + half;
+  }
+  return aspect;
+}
+
+static void curves_end (pw_curves *c) {
+  if (c->curves == c->ended) return;
+  fprintf (pw_output_stream (c->script), "block_%d = %d\npoints_%d = %d\n", c->curves, c->points ? c->blocks++ : -1,
+           c->curves, c->points);
+  c->ended = c->curves;
+}
+
+/* Ends a panel; without points and axes it and its curves are forgotten. */
+static void curves_end_panel (pw_curves *c) {
+  const pw_panel *panel = &c->panel;
+  double range[3][2];
+  curves_end (c);
+  if (c->first == 0) return;
+  const int empty = c->range[0][0] > c->range[0][1] || c->range[1][0] > c->range[1][1],
+            given = panel->x[0] < panel->x[1] && panel->y[0] < panel->y[1];
+  if (empty && !given) {
+    c->curves = c->ended = c->first - 1;
+    return;
+  }
+  c->panels++;
+  curves_range (range[0], panel->x, c->range[0], panel->type & PW_PANEL_LOG_X, 0);
+  curves_range (range[1], panel->y, c->range[1], panel->type & PW_PANEL_LOG_Y, 1);
+  curves_range (range[2], panel->z, c->range[2], 0, 0);
+  const double aspect = panel->type & PW_PANEL_EQUAL ? curves_equal (range) : panel->aspect;
+  fprintf (pw_output_stream (c->script), "aspect_%d = %g\ncurves_%d = '%d %d'\nrange_%d = '", c->panels, aspect,
+           c->panels, c->first, c->curves, c->panels);
+  for (int k = 0; k < 6; k++) /* gnuplot takes only a number with a point in it for a real one */
+    fprintf (pw_output_stream (c->script), "%#.15g ", range[k / 2][k % 2]);
+  fputs ("'\n", pw_output_stream (c->script));
+}
+
+void pw_curves_panel (pw_curves *c, const pw_panel *panel) {
+  static const char *const word[] = { "half ", "below ", "logx ", "logy " };
+  char form[40] = "";
+  curves_end_panel (c);
+  c->panel = *panel;
+  c->first = c->curves + 1;
+  for (int k = 0; k < 3; k++) c->range[k][0] = INFINITY, c->range[k][1] = -INFINITY;
+  for (int k = 0; k < 4; k++)
+    if (panel->type & 1 << k) strcat (form, word[k]);
+  curves_text (c, "x", c->panels + 1, panel->x_label);
+  curves_text (c, "y", c->panels + 1, panel->y_label);
+  curves_text (c, "scale", c->panels + 1, panel->z_label ? panel->z_label : "");
+  curves_text (c, "form", c->panels + 1, form);
+}
+
+void pw_curves_add (pw_curves *c, const char *style, const char *label) {
+  curves_end (c);
+  fprintf (pw_output_stream (c->data), "%s# %s: %s\n", c->curves ? "\n\n" : "", style, label ? label : "");
+  c->curves++;
+  c->points = c->interrupted = 0;
+  c->bars = strcmp (style, "bars") == 0;
+  curves_text (c, "style", c->curves, style);
+  curves_text (c, "label", c->curves, label ? label : "");
+}
+
+void pw_curves_point (pw_curves *c, double x, double y, double z) {
+  const double low[] = { x, c->bars ? y - z : y, z }, high[] = { x, c->bars ? y + z : y, z };
+  const int drawn = !(isnan (x) || isnan (y) || (c->panel.type & PW_PANEL_LOG_X && x <= 0) ||
+                      (c->panel.type & PW_PANEL_LOG_Y && y <= 0));
+  if (drawn)
+    fprintf (pw_output_stream (c->data), "%.10g %.10g %.10g\n", x, y, z);
+  else if (c->points && !c->interrupted) /* two blank lines would end the block */
+    fputc ('\n', pw_output_stream (c->data));
+  c->points += drawn;
+  c->interrupted = !drawn;
+  for (int k = 0; k < 3 && drawn; k++) {
+    if (!isfinite (low[k] + high[k])) continue;
+    c->range[k][0] = fmin (c->range[k][0], low[k]);
+    c->range[k][1] = fmax (c->range[k][1], high[k]);
+  }
+}
+
+int pw_curves_close (pw_curves *c, int status, pw_error *error) {
+  curves_end_panel (c);
+  if (status != PW_OK || c->panels == 0) {
+    pw_output_discard (c->data);
+    pw_output_discard (c->script);
+    return status;
+  }
+  fprintf (pw_output_stream (c->script), "panels = %d\n", c->panels);
+  status = pw_output_finish (c->data, error);
+  if (status == PW_OK) return pw_figure_end (c->script, "panels", error);
+  pw_output_discard (c->script);
+  return status;
+}
+
+int pw_curves_draw (pw_curves *c, int status, pw_error *error) {
+  status = pw_curves_close (c, status, error);
+  return status == PW_OK && c->panels ? pw_figure_draw (c->folder, (const char *[]){ c->name, NULL }, error) : status;
 }

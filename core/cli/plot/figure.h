@@ -29,9 +29,6 @@ extern const char *const pw_figure_endings[];
   PW_TEXT_OPTION (pw_cli_line, width, "width", 0, "WIDTH", \
                   "Width of figures, such as 85mm for one column (default 170mm)")
 int pw_figure_width (const char *text, double *width, pw_error *error);
-/* Figures of the model of a command line in a folder, of the width that it gives.  A status. */
-int pw_figures_of (pw_figures *f, const pw_cli_line *line, const pw_cli_model *model, const char *folder,
-                   pw_error *error);
 
 /* Opens a file of a folder; a data file, with a comment if the run is incomplete.  NULL and PW_RESOURCE. */
 pw_output *pw_figure_open_file (const char *folder, const char *name, pw_error *error);
@@ -51,19 +48,14 @@ int pw_figure_write_tables (const char *folder, const char *name, int lines, con
 pw_output *pw_figure_begin (const pw_figures *f, const char *name, pw_error *error);
 /* Adds the template and completes the script.  PW_OK or PW_RESOURCE. */
 int pw_figure_end (pw_output *o, const char *template_name, pw_error *error);
-/* Assign a text to VARIABLE; to VARIABLE[i]; "NAME [UNIT]", or "NAME" if the unit is "", to VARIABLE[i], or to VARIABLE
- * if i = 0. */
+/* Assign a text to VARIABLE; to VARIABLE[i]. */
 void pw_figure_text (FILE *f, const char *variable, const char *value);
 void pw_figure_element (FILE *f, const char *variable, int i, const char *value);
-void pw_figure_label (FILE *f, const char *variable, int i, const char *name, const char *unit);
 /* A name of at most FIGURE_NAME bytes, shortened in the middle if need be. */
 const char *pw_figure_name (const char *name, char buffer[FIGURE_NAME + 4]);
-/* Writes and draws the figure of a command that has one, NAME: `data` writes NAME.dat, `variables` those of the
- * template of this name.  A status. */
-int pw_figure_write (const pw_cli_line *line, const pw_cli_model *model, const char *folder, const char *name,
-                     const void *context, int (*data) (const void *context, FILE *f, pw_error *error),
-                     void (*variables) (const void *context, FILE *f), pw_error *error);
-
+/* The label of an axis, in a temporary buffer: "NAME [UNIT]", or "NAME" if the unit is "", the name shortened. */
+#define PW_FIGURE_LABEL(name, unit) pw_figure_label (name, unit, (char[FIGURE_TITLE]){ 0 })
+const char *pw_figure_label (const char *name, const char *unit, char buffer[FIGURE_TITLE]);
 /* Runs gnuplot on NAME.gp for each of at most FIGURE_SCRIPTS names, a list ended by NULL; a missing gnuplot is reported
  * on standard error.  PW_RESOURCE if gnuplot fails; PW_INTERRUPTED, reported, if a signal ends it. */
 int pw_figure_draw (const char *folder, const char *const *names, pw_error *error);
@@ -71,5 +63,52 @@ int pw_figure_draw (const char *folder, const char *const *names, pw_error *erro
 int pw_figure_undrawn (const char *folder, const char *const *names, const char *why);
 /* The status of a command that has drawn, with this status and error, and then completed its files, with `status`. */
 int pw_figure_status (int drawn, const pw_error *drawing, int status, pw_error *error);
+
+/* ---- Panels of curves (panels.gp) ---- */
+
+enum {
+  PW_PANEL_HALF = 1,  /* beside another panel, if the page is wide enough */
+  PW_PANEL_BELOW = 2, /* below the panel before it, unless it is the first one, with the same x axis */
+  PW_PANEL_LOG_X = 4,
+  PW_PANEL_LOG_Y = 8,
+  PW_PANEL_EQUAL = 16 /* both axes have the same unit */
+};
+
+typedef struct {
+  const char *x_label, *y_label;
+  const char *z_label;     /* of a scale of colours; NULL: none */
+  double x[2], y[2], z[2]; /* ends of the axes; equal: those of the points, with a margin */
+  double aspect;           /* height / width; 0: low and wide */
+  int type;                /* a sum of PW_PANEL_... */
+} pw_panel;
+
+/* A figure in progress.  Private. */
+typedef struct {
+  const char *folder, *name;
+  pw_output *data, *script;
+  pw_panel panel;
+  double range[3][2];                /* of the points of the panel: x, y, z */
+  int panels, curves, blocks, ended; /* numbers of panels and curves, of curves with points, of those that have ended */
+  int first;                         /* curve of the panel; 0: there is no panel yet */
+  int points;                        /* of the curve */
+  int interrupted;                   /* 1: after its last point */
+  int bars;                          /* 1: z is a standard deviation */
+} pw_curves;
+
+/* Opens NAME.dat and NAME.gp in the folder, of the width that the command line gives.  Then panels and curves are added
+ * in turn, curves to the last panel, points to the last curve.  A panel without points is omitted unless its axes
+ * are given, a figure without panels is not written.  PW_OK, PW_INPUT for the width, or PW_RESOURCE. */
+int pw_curves_open (pw_curves *c, const pw_cli_line *line, const pw_cli_model *model, const char *folder,
+                    const char *name, const char *title, pw_error *error);
+void pw_curves_panel (pw_curves *c, const pw_panel *panel);
+/* Styles are those of `look` in panels.gp; `method STABILISATION` with the method as label.  Labels are in a legend
+ * above the panel unless they are NULL, or it would repeat an earlier one. */
+void pw_curves_add (pw_curves *c, const char *style, const char *label);
+/* z: on the scale of colours, the number of a colour, or a standard deviation.  A point with a NaN, or without a
+ * logarithm, interrupts the curve.  The line of an event has y = INFINITY; a band below y has x = INFINITY. */
+void pw_curves_point (pw_curves *c, double x, double y, double z);
+/* Complete the files, if the status is PW_OK, else discard them; the second one draws the figure.  A status. */
+int pw_curves_close (pw_curves *c, int status, pw_error *error);
+int pw_curves_draw (pw_curves *c, int status, pw_error *error);
 
 #endif

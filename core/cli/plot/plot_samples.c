@@ -126,14 +126,6 @@ double pw_plots_next (const pw_plots *plots) {
   return plots->samples + 1 == plots->planned ? plots->t_end : plots->t_end * plots->samples / (plots->planned - 1);
 }
 
-static void plot_contacts (const pw_plots *plots, const pw_sample *sample, double *out) {
-  if (pw_workspace_contact_points (plots->workspace, sample->t, sample->q, sample->v, plots->contact, NULL) != PW_OK)
-    return; /* does not happen: the sample needed the same evaluation */
-  for (int i = 0; i < plots->wheels.drawn; i++, out += 3)
-    memcpy (out, plots->contact[pw_system_element (plots->system, plots->wheels.system_index[i]).contact],
-            3 * sizeof *out);
-}
-
 void pw_plots_add (pw_plots *plots, const pw_sample *sample) {
   if (plots->samples == plots->planned) return;
   int i = plots->samples++;
@@ -145,7 +137,13 @@ void pw_plots_add (pw_plots *plots, const pw_sample *sample) {
     memcpy (motion, sample->q + 3 * plots->bodies.system_index[b], 3 * sizeof *motion);
     memcpy (motion + 3, sample->v + 3 * plots->bodies.system_index[b], 3 * sizeof *motion);
   }
-  if (plots->wheels.drawn > 0) plot_contacts (plots, sample, pw_plot_track (plots, i, &plots->wheels, 0));
+  /* the status is PW_OK: the sample needed the same evaluation */
+  if (plots->wheels.drawn)
+    pw_workspace_contact_points (plots->workspace, sample->t, sample->q, sample->v, plots->contact, NULL);
+  for (int w = 0; w < plots->wheels.drawn; w++)
+    memcpy (pw_plot_track (plots, i, &plots->wheels, w),
+            plots->contact[pw_system_element (plots->system, plots->wheels.system_index[w]).contact],
+            sizeof *plots->contact);
   if (i == 0) pw_plot_measure (plots);
   if (plots->with_forces && plots->links > 0)
     pw_plot_forces (plots, sample, pw_plot_track (plots, i, &plots->wheels, plots->wheels.drawn));

@@ -762,19 +762,37 @@ static void compare_conclude (const pw_study *study) {
   if (compare->concludes) conclusion_print (compare);
 }
 
-/* Work-precision diagrams of lengths and of angles, if their errors are known. */
+/* Work-precision diagrams of lengths and of angles, if their errors are known; errors above the size of the motion mean
+ * nothing. */
 static int compare_figures (pw_study *study, pw_error *error) {
-  static const char *const name[] = { "work-precision", "work-precision-angles" };
+  static const char *const name[] = { "work-precision", "work-precision-angles" },
+                           *const title[] = { "work-precision diagram", "work-precision diagram of angles" },
+                           *const axis[] = { "CPU time [s]", "right-hand side evaluations" },
+                           *const label[] = { "largest error of a coordinate [m]", "largest error of an angle [rad]" };
   const pw_reference *reference = &((pw_compare *)study)->reference;
-  int status = pw_study_write_data (study, COMPARE_GROUP, name[0],
-                                    "tolerance or step, CPU time [s], right-hand side evaluations, largest error of "
-                                    "lengths [m] and angles [rad]",
-                                    POINT_COORDINATES, error);
+  int status = PW_OK;
   for (int unit = 0; status == PW_OK && unit < 2; unit++) {
-    const char *variables = PW_PRINTED (100, "uncertainty = %.9g\nsize_of_motion = %.9g\n",
-                                        reference->uncertainty[MOTION_LARGEST + unit], reference->size[unit]);
-    if (pw_study_positive (study, COMPARE_GROUP, POINT_LENGTH + unit))
-      status = pw_study_write_script (study, COMPARE_GROUP, name[unit], "work-precision", variables, error);
+    const double uncertainty = reference->uncertainty[MOTION_LARGEST + unit];
+    double least = INFINITY, most = 0;
+    pw_curves c;
+    for (const pw_row *row = study->row; row < study->row + study->rows; row++) {
+      const double e = row->state == ROW_DONE ? row->point[0][POINT_LENGTH + unit] : NAN;
+      if (e > 0 && isfinite (e)) least = fmin (least, e), most = fmax (most, e);
+    }
+    status = pw_curves_open (&c, &study->line, &study->compiled, study->folder, name[unit], title[unit], error);
+    for (int k = 0; status == PW_OK && k < 2; k++) {
+      pw_curves_panel (&c, &(pw_panel){ .x_label = axis[k],
+                                        .y_label = label[unit],
+                                        .y = { least / 4, fmin (3 * most, fmax (10 * least, reference->size[unit])) },
+                                        .aspect = 1.05,
+                                        .type = PW_PANEL_HALF | PW_PANEL_LOG_X | PW_PANEL_LOG_Y });
+      if (uncertainty > least / 4) {
+        pw_curves_add (&c, "band", "below the uncertainty of the reference");
+        pw_curves_point (&c, INFINITY, uncertainty, 0);
+      }
+      pw_study_add_curves (study, COMPARE_GROUP, &c, POINT_CPU + k, POINT_LENGTH + unit);
+    }
+    if (status == PW_OK) status = pw_study_close_figure (study, &c, error);
   }
   return status;
 }

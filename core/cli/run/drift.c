@@ -262,21 +262,29 @@ static int drift_write_times (const pw_study *study, pw_error *error) {
   return pw_cli_close_table (output, status, error);
 }
 
-/* A panel for each quantity that is not always zero, against time, alpha > 0, or the interval between projections. */
+/* A panel for each quantity, against time, alpha > 0, or the interval between projections. */
 static int drift_figures (pw_study *study, pw_error *error) {
-  static const char *const name[] = { "drift", "drift-baumgarte", "drift-projection" };
-  static const char *const axis[] = { "t [s]", "alpha [1/s]", "steps per projection (every)" };
+  static const char *const name[] = { "drift", "drift-baumgarte", "drift-projection" },
+                           *const title[] = { "drift of the constraints and the energy",
+                                              "largest drift by Baumgarte's parameters",
+                                              "largest drift by the interval between projections" },
+                           *const axis[] = { "t [s]", "α [1/s]", "steps per projection (every)" },
+                           *const label[] = { "position residual", "velocity residual", "energy defect [J]" };
   int status = drift_write_times (study, error);
   for (int group = 0; status == PW_OK && group < DRIFT_GROUPS; group++) {
-    char variables[40] = "quantities = '";
-    for (int i = 1; i <= DRIFT_QUANTITIES; i++)
-      if (pw_study_positive (study, group, i)) sprintf (strchr (variables, 0), "%d ", i);
-    if (variables[strlen (variables) - 1] == '\'' || !pw_study_positive (study, group, 0)) continue;
-    strcat (variables, "'\n");
-    const char *heading =
-        PW_PRINTED (160, "%s, largest scaled residuals of position and velocity, energy defect [J]", axis[group]);
-    status = pw_study_write_data (study, group, name[group], heading, 1 + DRIFT_QUANTITIES, error);
-    if (status == PW_OK) status = pw_study_write_script (study, group, name[group], "drift", variables, error);
+    pw_curves c;
+    status = pw_curves_open (&c, &study->line, &study->compiled, study->folder, name[group], title[group], error);
+    if (status != PW_OK) return status;
+    for (int i = 0; i < DRIFT_QUANTITIES; i++) {
+      pw_panel panel = { .x_label = axis[group], .y_label = label[i], .type = PW_PANEL_BELOW | PW_PANEL_LOG_Y };
+      if (group == DRIFT_METHODS)
+        panel.x[1] = study->t_end;
+      else
+        panel.type |= PW_PANEL_LOG_X;
+      pw_curves_panel (&c, &panel);
+      pw_study_add_curves (study, group, &c, 0, 1 + i);
+    }
+    status = pw_study_close_figure (study, &c, error);
   }
   return status;
 }

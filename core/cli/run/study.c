@@ -259,60 +259,26 @@ static const double *table_next_point (const pw_study *study, int group, const p
   return NULL;
 }
 
-int pw_study_positive (const pw_study *study, int group, int coordinate) {
-  const pw_row *row = study->row;
-  const double *point;
-  int k = -1;
-  while ((point = table_next_point (study, group, &row, &k)) != NULL)
-    if (point[coordinate] > 0 && isfinite (point[coordinate])) return 1;
-  return 0;
-}
-
-int pw_study_write_data (const pw_study *study, int group, const char *name, const char *heading, int count,
-                         pw_error *error) {
-  pw_output *output = pw_figure_open_file (study->folder, PW_PRINTED (40, "%s.dat", name), error);
-  if (output == NULL) return PW_RESOURCE;
-  FILE *f = pw_output_stream (output);
-  const pw_row *row = study->row;
-  const double *point;
-  fprintf (f, "# %s\n", heading);
-  for (int k = -1, curve = -1; (point = table_next_point (study, group, &row, &k)) != NULL; curve = row->curve) {
-    if (row->curve != curve) fprintf (f, "%s# %s\n", curve < 0 ? "" : "\n\n", row->label);
-    for (int i = 0; i < count; i++) /* only positive numbers have logarithms */
-      fprintf (f, "%s%s", i ? " " : "", point[i] > 0 ? PW_DIGITS (point[i], 9) : "NaN");
-    fputc ('\n', f);
-  }
-  return pw_output_finish (output, error);
-}
-
-/* Writes the labels of the curves that have points, with stabilisations if they are methods, unless f is NULL; returns
- * the number of these curves. */
-static int table_write_labels (const pw_study *study, int group, FILE *f) {
+void pw_study_add_curves (const pw_study *study, int group, pw_curves *c, int x, int y) {
   const pw_row *row = study->row;
   const pw_method *integrator;
-  int stabilisation, curves = 0;
-  for (int k = -1, curve = -1; table_next_point (study, group, &row, &k) != NULL; curve = row->curve) {
-    if (row->curve == curve) continue;
-    curves++;
-    if (f == NULL) continue;
-    int known = pw_method_parse (row->label, &integrator, &stabilisation, NULL) == PW_OK;
-    pw_figure_element (f, "label", curves, row->label);
-    pw_figure_element (f, "stabilisation", curves, known ? integrator->stabilisations[stabilisation].name : "");
+  const double *point;
+  int stabilisation;
+  for (int k = -1, curve = -1; (point = table_next_point (study, group, &row, &k)) != NULL; curve = row->curve) {
+    if (row->curve != curve) {
+      int known = pw_method_parse (row->label, &integrator, &stabilisation, NULL) == PW_OK;
+      const char *name = known ? integrator->stabilisations[stabilisation].name : "";
+      pw_curves_add (c, PW_PRINTED (60, "method %s", name), row->label);
+    }
+    pw_curves_point (c, point[x], point[y], 0);
   }
-  return curves;
 }
 
-int pw_study_write_script (pw_study *study, int group, const char *name, const char *template_name,
-                           const char *variables, pw_error *error) {
-  pw_output *output = pw_figure_begin (&study->figures, name, error);
-  int script = 0, curves = table_write_labels (study, group, NULL);
-  if (output == NULL) return PW_RESOURCE;
-  FILE *f = pw_output_stream (output);
-  fprintf (f, "%smethods = %d\narray label[%d]\narray stabilisation[%d]\n", variables, curves, curves, curves);
-  table_write_labels (study, group, f);
+int pw_study_close_figure (pw_study *study, pw_curves *c, pw_error *error) {
+  int script = 0, status = pw_curves_close (c, PW_OK, error);
   while (study->scripts[script]) script++;
-  study->scripts[script] = name;
-  return pw_figure_end (output, template_name, error);
+  if (c->panels) study->scripts[script] = c->name;
+  return status;
 }
 
 /* ---- The command ---- */
@@ -324,7 +290,8 @@ static int study_open_folder (pw_study *study, pw_error *error) {
                    { "--reference", study->reference_path, PW_READS, NULL },
                    { "-o", study->folder, PW_WRITES_INTO, names } };
   if (study->folder == NULL) return pw_cli_requires ("--width", study->line.width, "-o DIR", 0, error);
-  int status = pw_figures_of (&study->figures, &study->line, &study->compiled, study->folder, error);
+  double width;
+  int status = pw_figure_width (study->line.width, &width, error);
   if (status == PW_OK)
     status = pw_files_open (&study->files, &study->line, &study->compiled, use, sizeof use / sizeof *use, error);
   return status == PW_OK ? table_open (study, error) : status;

@@ -101,8 +101,7 @@ struct pw_study {
   pw_limit limit;   /* of a run with a visitor, checked in every step */
   double cpu_limit; /* of every run, checked between batches of steps [s]: ROW_STOPPED; INFINITY: the run fails */
   double t_end;     /* [s] */
-  pw_figures figures;
-  pw_arena arena; /* of the points of rows, and of what a command keeps there */
+  pw_arena arena;   /* of the points of rows, and of what a command keeps there */
   /* in progress */
   pw_files files; /* the locked folder */
   int quiet;      /* 1: rows are not printed */
@@ -155,15 +154,9 @@ int pw_study_record_run (const pw_study *study, pw_row *row, int status, const p
 
 /* ---- Figures ---- */
 
-/* 1 if this coordinate of some point of a group is positive. */
-int pw_study_positive (const pw_study *study, int group, int coordinate);
-/* Writes NAME.dat: a block for each curve of a group that has points, two empty lines between them; `heading` names the
- * coordinates, `count` of them, which are written as NaN unless they are positive. */
-int pw_study_write_data (const pw_study *study, int group, const char *name, const char *heading, int count,
-                         pw_error *error);
-/* Writes NAME.gp, to be drawn at the end, so NAME must outlive the study: `variables` in gnuplot's language, the labels
- * of the group's curves, the template. */
-int pw_study_write_script (pw_study *study, int group, const char *name, const char *template_name,
-                           const char *variables, pw_error *error);
+/* Adds to a panel the curves of a group that have points: their coordinate y over x. */
+void pw_study_add_curves (const pw_study *study, int group, pw_curves *c, int x, int y);
+/* Completes a figure, to be drawn at the end, so its name must outlive the study. */
+int pw_study_close_figure (pw_study *study, pw_curves *c, pw_error *error);
 
 #endif
