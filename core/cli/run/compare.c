@@ -97,8 +97,9 @@ enum { POINT_LEVEL, POINT_CPU, POINT_RHS, POINT_LENGTH, POINT_ANGLE, POINT_COORD
 /* ---- The reference solution: a table, the exact solution of the model, or else a motion computed with a tight
  * tolerance ----
  *
- * The solution of the model is used if it contains all coordinates, its velocities if it contains all of them.  Several
- * methods compute one; of the two that agree best, the first is the reference, and their distance is its uncertainty. */
+ * The solution of the model is used if it contains all coordinates, its velocities if it contains all of them.
+ * Several methods compute one; of the two that agree best, the first is the reference, and their distance is its
+ * uncertainty. */
 
 #define REFERENCE_LOOSEST 1e-9 /* the largest tolerance, after failures with smaller ones */
 #define REFERENCE_STEPS 1e5    /* the fewest steps of fixed size at first, */
