@@ -556,11 +556,11 @@ static int steady_is_stable (const pw_steady_point *p) {
   return (p->motion.event == PW_STEADY_POINT ? p : p + 1)->motion.unstable == 0;
 }
 
-typedef enum { REAL, IMAGINARY } steady_part;
+enum { REAL, IMAGINARY }; /* parts of an eigenvalue */
 
 /* Number k, from 0, of the real parts, or the absolute values of the imaginary parts, in descending order, of
  * eigenvalues without those of rigid displacements; NaN if there are fewer. */
-static double steady_ranked (const pw_linear *l, steady_part part, int k) {
+static double steady_ranked (const pw_linear *l, int part, int k) {
   for (int i = 0; i < l->unknowns; i++) {
     double value = part == IMAGINARY ? fabs (l->im[i]) : l->re[i];
     int above = 0;
@@ -575,7 +575,7 @@ static double steady_ranked (const pw_linear *l, steady_part part, int k) {
 
 /* Draws the real parts [1/s] or frequencies [Hz] on the parts of branches where no modes grow (stable or neutral), or
  * where some do. */
-static void steady_draw_parts (const pw_steady_command *cmd, pw_curves *c, steady_part part, int stable) {
+static void steady_draw_parts (const pw_steady_command *cmd, pw_curves *c, int part, int stable) {
   pw_curves_add (c, stable ? "stable" : "unstable", stable ? "stable" : "unstable");
   for (int k = 0; k < steady_most_eigenvalues (cmd); k++)
     for (int i = 0, inside = 0; i < cmd->points; i++) { /* inside: 1: the last point began or continued a part */
