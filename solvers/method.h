@@ -412,7 +412,7 @@ int pw_run_accelerate_evaluated (pw_run *r, const double *v, double *a, double *
 void pw_sample_reached (pw_run *r);
 
 /* Reports why the J last evaluated is unusable at time t: rank lost or nearly lost, or values too extreme
- * (rank.c).  PW_METHOD. */
+ * (dynamics.c).  PW_METHOD. */
 int pw_fail_singular (pw_run *r, double t, pw_error *error);
 
 /* Completes r->residuals at the state just evaluated, some of which a projection may have computed, and updates the

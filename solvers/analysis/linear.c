@@ -17,9 +17,9 @@
  *
  *     z' = N_q^T (dv - W dq),   u' = T N_v^T (da - W dv),   W (x, y, phi) = w (-y, x, 0) for each body.
  *
- * Perturbations of a steady motion grow as exp (mu t) with the eigenvalues mu of this matrix A.  (Null-space form: Garcia de Jalon & Bayo 1994, Kinematic and Dynamic
- * Simulation of Multibody Systems.  Relative equilibria: Marsden & Ratiu 1999, Introduction to Mechanics and
- * Symmetry.) */
+ * Perturbations of a steady motion grow as exp (mu t) with the eigenvalues mu of this matrix A.  (Null-space form:
+ * Garcia de Jalon & Bayo 1994, Kinematic and Dynamic Simulation of Multibody Systems.  Relative equilibria: Marsden &
+ * Ratiu 1999, Introduction to Mechanics and Symmetry.) */
 #include <complex.h>
 #include <float.h>
 #include <lapacke.h>

@@ -74,7 +74,7 @@ const pw_thresholds pw_watchdog_thresholds = {
   .lipschitz = 2,
   .step_growth = 2,
 
-  /* Change points (watchdog.c): a sine within a step below an eighth of those at its ends (unresolved) belongs to a
+  /* Change points: a sine within a step below an eighth of those at its ends (unresolved) belongs to a
    * turn that the step cannot resolve; below half of them, or a relative sine below half (low), there may be a change
    * point.  Strides of 0.3 times the sine stay on a curve whose radius is the sine.  A stride that approaches its
    * destination by less than a tenth of its length (progress) leads elsewhere. */
@@ -684,7 +684,7 @@ static double watchdog_residual (const pw_run *r) {
 }
 
 /* 1 if a constraint residual d may decide which branch is followed: if the sine s is below its regular value, and s^2
- * below d / ratio.  Drifted constraints, x y = d in place of x y = 0 (watchdog.c), connect branches that cross by a
+ * below d / ratio.  Drifted constraints, x y = d in place of x y = 0, connect branches that cross by a
  * turn, which a method follows however small its steps. */
 static int watchdog_unresolved (pw_run *r, double residual, double ratio) {
   int row;
