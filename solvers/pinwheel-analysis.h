@@ -118,8 +118,8 @@ int pw_repetition_run (pw_repetition *r, long steps, pw_error *error);
 /* States the errors of the first `count` rows of the run, as pw_run_record stores them at the times of the repetition,
  * which has been made: of each number at the last of these times, and the largest at any; NAN of the time, residuals,
  * energy of projections and balance.  They contain the true ones if the repetition has at most half the error of the
- * run.  PW_METHOD and the reason if no error can be stated: the difference is larger than 1 % of the motion and does not
- * become smaller in a second repetition, made now, with a hundredth of the tolerance or a quarter of the step. */
+ * run.  PW_METHOD and the reason if no error can be stated: the difference is larger than 1 % of the motion and does
+ * not become smaller in a second repetition, made now, with a hundredth of the tolerance or a quarter of the step. */
 int pw_repetition_error (pw_repetition *r, const double *rows, long count, double *end, double *largest,
                          pw_error *error);
 const char *pw_repetition_text (const pw_repetition *r); /* "a tenth of the tolerance", "half the step", ... */

@@ -171,7 +171,8 @@ static pw_initial_value *row_initial (const pw_plan *plan, const sweep_row *row,
   return initial;
 }
 
-/* Makes the whole run and its repetition; stores the stated errors of the states at the end, unless they are unknown. */
+/* Makes the whole run and its repetition; stores the stated errors of the states at the end, unless they are unknown.
+ * */
 static void row_state_error (sweep_row *row, const pw_plan *plan, const pw_settings *settings) {
   enum { TIMES = 100 };
   const int width = pw_run_record_width (row->run), states = 2 * pw_system_coordinates (row->system->model.system);
