@@ -1,9 +1,10 @@
 /* Bead on an elliptic wire, attracted by a focus of the ellipse: a model that defines two element types, a force and a
  * constraint.
  *
- * At the speed v_K of Kepler's motion (factor = 1) the bead moves like a planet and the reaction of the wire is zero.
- * At any other speed v the difference v^2 - v_K^2 is constant and the reaction is m (v^2 - v_K^2) / rho =
- * m (factor^2 - 1) v_K(0)^2 / rho, where rho is the radius of curvature.
+ * At Kepler's speed v_K, that of a planet at the bead's position (factor = 1), the reaction of the wire is zero.  At any
+ * other speed v the difference v^2 - v_K^2 is constant and the reaction, positive towards the inside, is
+ * m (v^2 - v_K^2) / rho = m (factor^2 - 1) v_K(0)^2 / rho, with the initial v_K(0) and the radius of curvature rho.  The
+ * output `orbit.multiplier` is this force times -1 / sqrt ((X/a)^2 + (Y a/b^2)^2).
  * (Bonnet's theorem, 1844; Whittaker 1937, Analytical Dynamics, section 51.) */
 #include <math.h>
 #include "pinwheel.h"
@@ -87,12 +88,13 @@ static const pw_field wire_fields[] = {
   { .name = NULL },
 };
 
-static const pw_quantity wire_reaction[] = { { "multiplier", "N", NULL,
-                                               "times (X/a, Y a/b^2): the force on the body, outwards" } };
+static const pw_quantity wire_reaction[] = {
+  { "multiplier", "N", NULL, "times (X/a, Y a/b^2), outwards: the force on the body; X, Y: from the centre" }
+};
 
-/* Parameters of a wire: centre, a, 1/a and a/b^2. */
+/* Parameters of a wire: centre, a; J = (J_x X, J_y Y, 0) with J_x = 1/a, J_y = a/b^2. */
 typedef struct {
-  double x, y, a, factor_x, factor_y;
+  double x, y, a, J_x, J_y;
 } wire_element;
 
 static int wire_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *internal,
@@ -106,55 +108,55 @@ static int wire_prepare (const void *definition, const pw_body *const *bodies, v
 
 /* A wire in the current state: position of the body relative to the centre, its velocity; parameters. */
 typedef struct {
-  double X, Y, vx, vy, a, factor_x, factor_y;
+  double X, Y, vx, vy, a, J_x, J_y;
 } wire_state;
 
 static wire_state wire_at (const pw_batch *batch, int e) {
   const wire_element *element = (const wire_element *)batch->element + e;
   const pw_configuration *body = &batch->configuration[batch->body[e]];
-  return (wire_state){ body->x - element->x, body->y - element->y, body->vx,         body->vy,
-                       element->a,           element->factor_x,    element->factor_y };
+  return (wire_state){ body->x - element->x, body->y - element->y, body->vx,    body->vy,
+                       element->a,           element->J_x,         element->J_y };
 }
 
 static void wire_g (const pw_batch *batch, double *out) {
   for (int e = 0; e < batch->count; e++) {
     wire_state now = wire_at (batch, e);
-    out[e] = (now.factor_x * now.X * now.X + now.factor_y * now.Y * now.Y - now.a) / 2;
+    out[e] = (now.J_x * now.X * now.X + now.J_y * now.Y * now.Y - now.a) / 2;
   }
 }
 
 static void wire_g_size (const pw_batch *batch, double *out) {
   for (int e = 0; e < batch->count; e++) {
     wire_state now = wire_at (batch, e);
-    out[e] = (now.factor_x * now.X * now.X + now.factor_y * now.Y * now.Y + now.a) / 2;
+    out[e] = (now.J_x * now.X * now.X + now.J_y * now.Y * now.Y + now.a) / 2;
   }
 }
 
 static void wire_J (const pw_batch *batch, double *out) {
   for (int e = 0; e < batch->count; e++, out += 3) {
     wire_state now = wire_at (batch, e);
-    out[0] = now.factor_x * now.X, out[1] = now.factor_y * now.Y, out[2] = 0;
+    out[0] = now.J_x * now.X, out[1] = now.J_y * now.Y, out[2] = 0;
   }
 }
 
 static void wire_gamma (const pw_batch *batch, double *out) {
   for (int e = 0; e < batch->count; e++) {
     wire_state now = wire_at (batch, e);
-    out[e] = -(now.factor_x * now.vx * now.vx + now.factor_y * now.vy * now.vy);
+    out[e] = -(now.J_x * now.vx * now.vx + now.J_y * now.vy * now.vy);
   }
 }
 
 static void wire_jw_q (const pw_batch *batch, double *out) {
   for (int e = 0; e < batch->count; e++, out += 3) {
     wire_state now = wire_at (batch, e);
-    out[0] = now.factor_x * batch->w[3 * e], out[1] = now.factor_y * batch->w[3 * e + 1], out[2] = 0;
+    out[0] = now.J_x * batch->w[3 * e], out[1] = now.J_y * batch->w[3 * e + 1], out[2] = 0;
   }
 }
 
 static void wire_gamma_v (const pw_batch *batch, double *out) {
   for (int e = 0; e < batch->count; e++, out += 3) {
     wire_state now = wire_at (batch, e);
-    out[0] = -2 * now.factor_x * now.vx, out[1] = -2 * now.factor_y * now.vy, out[2] = 0;
+    out[0] = -2 * now.J_x * now.vx, out[1] = -2 * now.J_y * now.vy, out[2] = 0;
   }
 }
 
@@ -192,7 +194,8 @@ static const pw_parameter parameters[] = {
   { .name = NULL },
 };
 
-/* The bead starts at the point nearest to the focus, which is the origin of the ground.  Its inertia has no effect. */
+/* The attracting focus is the origin of the ground; the bead starts at the nearest point of the wire.  Its moment of
+ * inertia has no effect. */
 static void build (pw_model *m, const void *parameter) {
   const model *p = parameter;
   if (p->e >= 1) {

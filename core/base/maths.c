@@ -1,4 +1,5 @@
-/* Sine and cosine of one angle [rad]; from PW_SINE_LIMIT on, and for infinity and NaN, those of the C library. */
+/* Sine and cosine of an angle [rad], the same on every machine; for |x| >= PW_SINE_LIMIT, infinity and NaN those of the C
+ * library.  Elliptic functions. */
 #include <math.h>
 #include "pinwheel.h"
 #include "sine.h"
@@ -34,6 +35,7 @@ double pw_cos (double x) {
  *     K (m) = pi / (2 a_N),   am (u | m) = phi_0,
  *     phi_N = 2^N a_N u,      2 phi_(n-1) = phi_n + asin (c_n sin phi_n / a_n)
  *
+ * with a_n and c_n of elliptic.h; c_by_a[n - 1] is c_n / a_n.
  * (Abramowitz & Stegun 1964, sections 16.4 and 17.6.) */
 
 double pw_elliptic_K (double m) {

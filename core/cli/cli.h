@@ -436,7 +436,8 @@ typedef int pw_task (void *context, int i, pw_error *error);
  * PW_RESOURCE if a thread cannot be started: no task has been called. */
 int pw_parallel (int jobs, int count, pw_task *task, void *context, pw_error *error);
 /* The same for tasks that are timed: each thread has physical cores of its own, so there are no more threads than
- * cores.  If the cores are unknown, the tasks are called one after the other. */
+ * cores.  If the processors are unknown, the tasks are called one after the other; if only their cores are, each
+ * processor counts as a core. */
 int pw_parallel_timed (int jobs, int count, pw_task *task, void *context, pw_error *error);
 
 /* ---- Printed tables: columns as wide as their widest cell ----

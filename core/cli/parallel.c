@@ -32,6 +32,7 @@ int pw_parallel_jobs (const char *text, int *jobs, pw_error *error) {
 
 /* ---- Threads ---- */
 
+/* For timed tasks (below): cores to which threads are bound. */
 typedef struct {
   cpu_set_t all;                /* processors that this process may use */
   int core[CPU_SETSIZE], count; /* one of these processors on each physical core */
@@ -79,8 +80,8 @@ static void *parallel_thread (void *argument) {
 /* Calls the tasks in all threads, of which the caller is one; the lock keeps them waiting until all are started. */
 static int parallel_run (parallel *p) {
   if (p->threads > p->count) p->threads = p->count;
-  pthread_t *thread = calloc ((size_t)p->threads + 1, sizeof *thread);
-  int started = 1, code = thread ? 0 : ENOMEM; /* thread[0], the caller, is unused */
+  pthread_t *thread = calloc ((size_t)p->threads + 1, sizeof *thread); /* + 1: never of no bytes */
+  int started = 1, code = thread ? 0 : ENOMEM;                         /* thread[0], the caller, is unused */
   pthread_mutex_init (&p->lock, NULL);
   pthread_mutex_lock (&p->lock);
   while (code == 0 && started < p->threads && (code = pthread_create (thread + started, NULL, parallel_thread, p)) == 0)

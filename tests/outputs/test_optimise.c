@@ -253,12 +253,14 @@ TEST (jobs) {
 TEST (interrupt) {
   char command[1000];
   const char *program = getenv ("PINWHEEL");
-  snprintf (
-      command, sizeof command,
-      "timeout --preserve-status -s INT 2 '%s' optimise @/point.yaml --minimise 'p.x^2' --free a=-1:1 --starts 100000 "
-      "--json @/o.json",
-      program ? program : "build/pinwheel");
-  assert_int_equal (cli_run (command), 130);
+  for (int seconds = 2; seconds < 200; seconds *= 4) { /* under load the first search may take longer */
+    snprintf (command, sizeof command,
+              "timeout --preserve-status -s INT %d '%s' optimise @/point.yaml --minimise 'p.x^2' --free a=-1:1 "
+              "--starts 100000 --json @/o.json",
+              seconds, program ? program : "build/pinwheel");
+    assert_int_equal (cli_run (command), 130);
+    if (strstr (cli_err, "this is the best result so far")) break;
+  }
   assert_true (cli_says (cli_file ("o.json"), "status", "interrupted"));
   assert_non_null (strstr (cli_err, "this is the best result so far"));
 }

@@ -14,7 +14,7 @@ enum {
   SENSITIVITY_UNIT = 64,    /* longest unit, its end included */
   SENSITIVITY_NAME = 10000, /* likewise the name of a column of the table; longer names are cut off */
   SENSITIVITY_ROWS = 1000,  /* of the table after the first, unless --every is given */
-  SENSITIVITY_RUNS = 14     /* usual number of runs for an unknown, for the progress */
+  SENSITIVITY_RUNS = 14     /* usual number of runs for an unknown: for the progress, and the choice of the engine */
 };
 
 typedef struct {
@@ -24,8 +24,8 @@ typedef struct {
   const char *every, *folder, *jobs_text;
   pw_cli_model m;
   pw_files files;
-  pw_unknowns unknowns;   /* P */
-  pw_run_outputs outputs; /* with the method of the runs that are compared */
+  pw_unknowns unknowns;   /* P of them */
+  pw_run_outputs outputs; /* method NULL: the run itself; set by sensitivity_prepare for the runs that are compared */
   int jobs;               /* threads */
   pw_progress progress;
   pthread_mutex_t lock; /* of the number of runs and the progress */
@@ -33,7 +33,7 @@ typedef struct {
   double cpu; /* processor time of the computation [s] */
   /* results; comments on arrays begin with their sizes */
   pw_arena arena;
-  pw_outcomes outcomes;      /* of the run, for texts and units */
+  pw_outcomes outcomes;      /* types and units of the outputs, not their values */
   double *value;             /* outputs: of the run by the method of the unknowns */
   double *table;             /* outputs x rows; NaN for outputs that are not in the table */
   pw_derivative *derivative; /* P x (outputs + outputs x rows): of the outputs, then of the table */
@@ -59,8 +59,9 @@ static int sensitivity_neighbour (const sensitivity *cmd, const double *values, 
   return run->run ? PW_OK : error->status;
 }
 
-/* Refuses parameters that change the number of bodies or elements, and initial values that the constraints determine:
- * then making the state of a neighbour consistent changes them back, by much more than 1 % of the step. */
+/* Opens the neighbours on both sides.  Refuses a parameter that changes the number of bodies or elements, and an initial
+ * value that the constraints determine: making a neighbour consistent moves it by more than 1 % of the step.  A
+ * neighbour that cannot be opened is no error here: the differences use the other side. */
 static int sensitivity_check (const sensitivity *cmd, const double *values, int p, pw_error *error) {
   const pw_unknowns *u = &cmd->unknowns;
   const pw_unknown *unknown = &u->list[p];
@@ -96,7 +97,7 @@ static int sensitivity_check (const sensitivity *cmd, const double *values, int 
 
 /* ---- Derivatives ---- */
 
-/* pw_difference_settings.evaluate. */
+/* pw_difference_settings.evaluate: the outputs, then the table, as one array. */
 static int sensitivity_evaluate (void *context, const double *x, double rtol, double *value, pw_error *error) {
   sensitivity *cmd = context;
   pw_run_outputs outputs = cmd->outputs;
@@ -123,7 +124,7 @@ static int sensitivity_differentiate (sensitivity *cmd, const double *values, pw
   return pw_unknowns_differentiate (u, values, d, cmd->derivative, error);
 }
 
-/* The method of the runs that are compared, and the sizes of the unknowns. */
+/* Chooses the method of the runs that are compared, and measures the sizes of the unknowns. */
 static int sensitivity_prepare (sensitivity *cmd, const double *values, pw_error *error) {
   const pw_unknowns *u = &cmd->unknowns;
   pw_unknown_run run;
@@ -135,7 +136,12 @@ static int sensitivity_prepare (sensitivity *cmd, const double *values, pw_error
   if (status == PW_OK) {
     cmd->outputs.method = pw_accurate_method (run.m.system, &run.settings, u->t_end, &cmd->outputs.max_steps, error);
     if (cmd->outputs.method == NULL && error->status == PW_OK)
-      status = pw_limit_status (&run.limit, pw_run_time (r), error);
+      status = pw_stop
+                   ? PW_RETRY
+                   : pw_fail (error, PW_METHOD,
+                              "the limit of %s s of processor time is reached while the method of the derivatives is "
+                              "chosen (--limit)",
+                              PW_DIGITS (run.limit.seconds, 6));
     else if (cmd->outputs.method == NULL)
       status = error->status;
   }
@@ -144,7 +150,8 @@ static int sensitivity_prepare (sensitivity *cmd, const double *values, pw_error
 }
 
 /* Makes the run, and differentiates the outputs at the values of the unknowns.  Errors: those of the run; PW_INPUT if
- * constraints determine an initial value, or a parameter changes the number of bodies; PW_RETRY after Ctrl-C. */
+ * constraints determine an initial value, or a parameter changes the number of bodies; PW_METHOD if an output is not
+ * finite at the end; PW_RETRY after Ctrl-C. */
 static int sensitivity_solve (sensitivity *cmd, pw_error *error) {
   const pw_unknowns *u = &cmd->unknowns;
   const size_t count = (size_t)cmd->outputs.count, rows = (size_t)cmd->outputs.rows;
@@ -245,8 +252,8 @@ static void sensitivity_print (const sensitivity *cmd) {
   }
 }
 
-/* 1 if the error exceeds 1 % of the derivative and, times the size of the unknown, 1 % of the output and 1e-6 in SI
- * units; or nothing is known. */
+/* 1 if the derivative is not known; or if its error exceeds 1 % of it and matters: the error times the size of the
+ * unknown exceeds 1 % of the output, and 1e-6 in SI units. */
 static int sensitivity_is_uncertain (const sensitivity *cmd, int output, int unknown) {
   const pw_derivative *d = sensitivity_of (cmd, output, unknown, -1);
   if (d->type != PW_DERIVATIVE) return d->type == PW_UNKNOWN;
@@ -384,7 +391,8 @@ static int sensitivity_write (const sensitivity *cmd, pw_error *error) {
 
 /* Sets the times of the table: from 0 to the end, `every` apart. */
 static int sensitivity_set_rows (sensitivity *cmd, double every, pw_error *error) {
-  const double t_end = cmd->unknowns.t_end, count = ceil (t_end / every * (1 - 1e-12)); /* no row beside the last one */
+  const double t_end = cmd->unknowns.t_end,
+               count = ceil (t_end / every * (1 - 1e-12)); /* the factor: no row a round-off before t_end */
   if (count > 1e7) return pw_fail (error, PW_INPUT, "--every %g: expected at most 1e7 rows", every);
   double *t = pw_arena_alloc (&cmd->arena, ((size_t)count + 2) * sizeof *t);
   if (t == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
@@ -468,7 +476,7 @@ const pw_command pw_cli_sensitivity = {
   .summary = "differentiate outputs of a run with respect to parameters and initial values",
   .help = "Differentiate outputs of a run with respect to parameters and initial values, at the end and along the run, "
           "by differences of accurate runs at neighbouring values, whatever the method of the run, with an error that "
-          "contains the true one.",
+          "the true one should not exceed.",
   .options_size = sizeof (sensitivity),
   .function = sensitivity_command,
   .options = sensitivity_options,
