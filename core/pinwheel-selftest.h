@@ -33,7 +33,7 @@ int pw_selftest (const pw_kind *kind, unsigned seed, pw_selftest_report *report,
 
 /* Tests an element type in a scene that uses it: its derivatives along a random motion near the state q, v at time
  * t, with the scene's elements and signals, in units of its length scale and the time T.  Use a separate report.
- * Errors: PW_RESOURCE; PW_METHOD if a signal fails along this motion, which clears the report. */
+ * Errors, which clear the report: PW_RESOURCE; PW_METHOD if a signal fails along this motion.  PW_INPUT: no system. */
 int pw_selftest_scene (const pw_system *s, double T, const pw_kind *kind, double t, const double *q, const double *v,
                        unsigned seed, pw_selftest_report *report, pw_error *error);
 
@@ -41,8 +41,9 @@ int pw_selftest_scene (const pw_system *s, double T, const pw_kind *kind, double
 
 /* Residuals of one set of equations. */
 typedef struct {
-  double scaled;   /* worst residual over its size: the sum of the absolute values of its terms, plus L/T or L/T^2; of
-                    * positions g_size, at least L; of forces the largest, or mass x L/T^2, of all; inf: not finite */
+  double scaled;   /* worst residual over a size; inf: not finite.  Velocities, accelerations: the sum of the absolute
+                    * values of the terms, plus L/T or L/T^2.  Positions: g_size, at least L.  Forces: one size for all,
+                    * the largest such sum or mass x L/T^2 (moments: times L) */
   double absolute; /* largest residual, in the units of its equation; inf: not finite */
   char name[PW_NAME_BYTES]; /* the equation with the worst scaled residual: "B.Fx", "frame.vx" */
 } pw_worst_residual;

@@ -1,6 +1,7 @@
 /* Pinwheel: planar multibody systems with pin joints and knife-edge wheels.
  *
- * A model file includes only this header.  It declares
+ * A model is a C file that includes only this header, compiled to a plug-in, or a YAML file, a text model
+ * (docs/model-format.md).  This header declares
  *   - the description of a model: bodies, elements, signals and parameters,
  *   - the built-in element types, and what an element type of your own has to provide,
  *   - the compiled system that the solvers integrate.
@@ -51,8 +52,8 @@ PW_BEGIN
 typedef enum {
   PW_OK = 0,        /* success */
   PW_RETRY = 1,     /* step rejected; a smaller one may succeed */
-  PW_STOPPED = 2,   /* pw_settings.stop stopped the run after its last accepted step; it can continue.  As an error:
-                     * before its first step */
+  PW_STOPPED = 2,   /* pw_settings.stop stopped the run after its last accepted step; it can continue.  As the status
+                     * of an error: the run was stopped while it was being opened */
   PW_RESOURCE = -1, /* out of memory, or a file cannot be written */
   PW_INPUT = -2,    /* the description or an option is wrong */
   PW_INITIAL = -3,  /* no consistent initial state found */
@@ -60,9 +61,9 @@ typedef enum {
 } pw_status;
 
 /* An error, owned by the caller and zero-initialised.  It keeps the first failure.  For functions with an argument
- * `error`, NULL in place of a file, model, system, workspace, run or search is an error too, so that the result of a
- * failed call may be passed to the next one; so it may to functions that free or close it.  Functions that only return
- * a property do not check it. */
+ * `error`, NULL in place of a file, model, system, workspace, run or search is a failure, too, so that the result of a
+ * failed call may be passed on unchecked.  Functions that free or close ignore NULL; those that only return a property
+ * do not check it. */
 typedef struct {
   int status; /* a pw_status; 0: no error yet */
   /* One line without a full stop: found value, expected value, nearest valid name.  Text models: preceded by
@@ -89,9 +90,9 @@ typedef struct {
 
 /* A signal computed by the caller.  `eval` stores the value in value[0] and, for a signal of a constraint, its time
  * derivatives in value[1] and value[2].  x contains the states named in `reads`; gradient, unless NULL, receives the
- * derivatives of value[0] with respect to x.  A non-zero return, or no value, stops the run (radau may try shorter
- * steps first).  Equal t and x must give equal values; if the function changes between steps (a controller sets a new
- * torque), call pw_run_restart. */
+ * derivatives of value[0] with respect to x.  A non-zero return, or a value that is not stored or not finite, stops the
+ * run (radau may try shorter steps first).  Equal t and x must give equal values; if the function changes between steps
+ * (a controller sets a new torque), call pw_run_restart. */
 typedef struct {
   int (*eval) (void *context, double t, const double *x, double value[3], double *gradient);
   void *context;            /* passed to eval and breakpoint; must outlive the systems, unless open replaces it */
@@ -248,6 +249,8 @@ int pw_add (pw_model *m, const pw_kind *kind, const void *definition);
 /* For build functions: rejects the parameters with a message ("links: at most 1000").  Returns PW_INPUT. */
 int pw_model_refuse (pw_model *m, const char *format, ...) PW_PRINTF (2, 3);
 
+/* ---- Functions for models: exact solutions; the same results on every machine ---- */
+
 /* Jacobi's amplitude am (u | m) and the complete elliptic integral K (m), m = k^2 <= 1 (NaN above): sn = sin (am).
  * A pendulum released at rest at an angle A from its lowest point is at the angle 2 asin (k sn (K - w t)), where
  * k = sin (A / 2) and w is the angular frequency of small oscillations. */
@@ -338,7 +341,7 @@ typedef struct {
   double radius;      /* [m], > 0 */
   double inertia;     /* about its axle [kg m^2], >= 0; its mass belongs to the body */
   double start, rate; /* initial spin angle [rad] and velocity [rad/s]; rate 0: from rolling at the body's velocity */
-  pw_signal torque;   /* on the wheel about its axle [N m]; its reaction has a horizontal axis */
+  pw_signal torque;   /* on the wheel about its axle [N m]; its reaction on the body has no effect in the plane */
 } pw_rolling_wheel;
 
 /* Steered wheel: a wheel whose heading in the body follows a signal.  One nonholonomic constraint equation. */
@@ -539,8 +542,8 @@ typedef struct {
   const double *q;                       /* count x kind->internal: internal coordinates */
   const double *v;                       /* count x kind->internal: their velocities */
   const double *u;      /* count x kind->signals x 3: value; only of a constraint's signal: two time derivatives */
-  const double *w;      /* count x cols: the vector w, for jw_q only */
-  const double *lambda; /* count x kind->rows: multipliers, for power and loss (the core: also (J^T lambda)_q) */
+  const double *w;      /* count x cols: any vector w, for jw_q = d(J w)/dq only */
+  const double *lambda; /* count x kind->rows: multipliers, for power and loss */
 } pw_batch;
 
 /* Fills one array for all elements of the batch. */
@@ -570,7 +573,7 @@ struct pw_kind {
   int internal;           /* internal coordinates */
   int rows;               /* constraint equations */
   int signals;    /* in the order of the fields; they belong to its force if force_u is set, else to its constraints */
-  int each_body;  /* 1: names no body; acts on every body with mass, which its reactions etc. name: "air.frame.N" */
+  int each_body;  /* 1: names no body, acts on every body with mass; its outputs are "air.frame.N" */
   int constant;   /* 1: its force is constant and evaluated once, when the system is compiled */
   pw_level level; /* of its constraint equations */
   const pw_quantity *reaction;                                 /* rows: meaning of each -lambda */
@@ -583,14 +586,14 @@ struct pw_kind {
   int (*prepare) (const void *definition, const pw_body *const *bodies, void *element, pw_internal *internal,
                   pw_error *error);
 
-  pw_batch_function *g;       /* rows: residual of holonomic constraint equations */
-  pw_batch_function *g_size;  /* rows: sum of the absolute values of the terms of g, its reference size */
-  pw_batch_function *eta;     /* rows: right-hand side of J v = eta; holonomic: -dg/dt */
-  pw_batch_function *J;       /* rows x cols */
-  pw_batch_function *gamma;   /* rows: right-hand side of J a = gamma */
-  pw_batch_function *force;   /* cols: generalised force */
+  pw_batch_function *g;      /* rows: residual of holonomic constraint equations */
+  pw_batch_function *g_size; /* rows: sum of the absolute values of the terms of g, its reference size */
+  pw_batch_function *eta;    /* rows: right-hand side of J v = eta; holonomic: minus the partial derivative of g by t */
+  pw_batch_function *J;      /* rows x cols */
+  pw_batch_function *gamma;  /* rows: right-hand side of J a = gamma */
+  pw_batch_function *force;  /* cols: generalised force */
   pw_batch_function *force_u; /* cols x signals: derivative of the force with respect to the value of each signal */
-  pw_batch_function *jw_q;    /* rows x cols: derivative of J w with respect to q; also gives that of J^T lambda */
+  pw_batch_function *jw_q;    /* rows x cols: derivative of J w by q; with unit vectors w, that of J^T lambda */
   pw_batch_function *eta_q, *gamma_q, *gamma_v; /* rows x cols */
   pw_batch_function *force_q, *force_v;         /* cols x cols */
   pw_batch_function *energy;                    /* 1: potential energy [J] */
@@ -600,7 +603,7 @@ struct pw_kind {
   /* 2 cols, for forces that saturate, such as friction: the smallest change of each coordinate, then of each velocity,
    * that reverses the force or changes it by its own magnitude.  Entries are INFINITY before the call. */
   pw_batch_function *saturation;
-  /* Strokes in figures, separated by ";" (core/cli/plot/plot_symbols.c); NULL: none.  Vertex "a x y": at the fraction a
+  /* Strokes in figures, separated by ";" (core/cli/plot/plot_shapes.c); NULL: none.  Vertex "a x y": at the fraction a
    * of the way from the first body's point to the last body's, plus x along and y to the left of the heading, in units
    * of symbols.  "o a x y r": a circle of radius r.  "g1", "g2": the pitch circles of two gears. */
   const char *symbol;
@@ -800,22 +803,22 @@ int pw_system_jumps (const pw_system *s, double t);
  * none is redundant.  Free the text.  NULL and the error if a system cannot have such code, for example if it is too
  * large. */
 char *pw_system_source (const pw_system *s, const unsigned char *independent, pw_error *error);
+/* PW_OK; PW_INPUT if the system is too large for pw_system_source. */
+int pw_system_check_source (const pw_system *s, pw_error *error);
 
 /* 1 if compiled code has this library's interface to such code and is of a system with the same structure: parameters
  * and initial values may differ. */
 typedef struct pw_specialised pw_specialised;
 int pw_specialised_fits (const pw_specialised *code, const pw_system *s);
 
-/* The same text compiled with PW_LANES defined as the number of runs that it advances at once (pw_runs_advance): 2, 4
- * or PW_LANES_MOST. */
+/* The text of pw_system_source compiled with PW_LANES defined as the number of runs that it advances at once
+ * (pw_runs_advance): 2, 4 or PW_LANES_MOST. */
 enum { PW_LANES_MOST = 8 };
 typedef struct pw_specialised_lanes pw_specialised_lanes;
 int pw_specialised_lanes_fit (const pw_specialised_lanes *code, const pw_system *s);
 int pw_specialised_lanes_count (const pw_specialised_lanes *code);
 /* Memory for the runs of one thread; NULL if out of memory.  Free it. */
 void *pw_specialised_lanes_memory (const pw_specialised_lanes *code);
-/* PW_OK; PW_INPUT if the system is too large for pw_system_source. */
-int pw_system_check_source (const pw_system *s, pw_error *error);
 /* 1 if the code can be compiled for several runs at once: all element types are built-in, signals depend on time alone,
  * and the system is not too large.  The runs must not have redundant equations. */
 int pw_system_has_lanes (const pw_system *s);

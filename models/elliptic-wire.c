@@ -1,11 +1,11 @@
 /* Bead on an elliptic wire, attracted by a focus of the ellipse: a model that defines two element types, a force and a
  * constraint.
  *
- * At Kepler's speed v_K, that of a planet at the bead's position (factor = 1), the reaction of the wire is zero.  At any
- * other speed v the difference v^2 - v_K^2 is constant and the reaction, positive towards the inside, is
- * m (v^2 - v_K^2) / rho = m (factor^2 - 1) v_K(0)^2 / rho, with the initial v_K(0) and the radius of curvature rho.  The
- * output `orbit.multiplier` is this force times -1 / sqrt ((X/a)^2 + (Y a/b^2)^2).
- * (Bonnet's theorem, 1844; Whittaker 1937, Analytical Dynamics, section 51.) */
+ * At Kepler's speed v_K, that of a planet at the bead's position (factor = 1), the reaction of the wire is zero.  At
+ * any other speed v the difference v^2 - v_K^2 is constant and the reaction, positive towards the inside, is m (v^2 -
+ * v_K^2) / rho = m (factor^2 - 1) v_K(0)^2 / rho, with the initial v_K(0) and the radius of curvature rho.  The output
+ * `orbit.multiplier` is this force times -1 / sqrt ((X/a)^2 + (Y a/b^2)^2). (Bonnet's theorem, 1844; Whittaker 1937,
+ * Analytical Dynamics, section 51.) */
 #include <math.h>
 #include "pinwheel.h"
 

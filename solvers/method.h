@@ -1,4 +1,6 @@
-/* The watchdog checks that the states of a run follow the motion of the mechanism: constraints are not lost, and the
+/* The data of a run and the functions that the integrators share; first the watchdog.
+ *
+ * The watchdog checks that the states of a run follow the motion of the mechanism: constraints are not lost, and the
  * motion does not jump to another branch at a singular configuration.
  *
  * Singular configurations are a property of J alone, with rows of length 1 and columns of angles divided by L: neither

@@ -1,5 +1,6 @@
-/* A point of body 1 on a line of body 2: the equation of slot and slider.  In a drive g equals the signal; to
- * sliding-friction g is the position along n.
+/* A point of body 1 on a line of body 2: the equation of slot and slider.  A drive subtracts its signal
+ * from this g.  sliding-friction, which has no constraint, uses g, G and H of the perpendicular line, whose g is the
+ * position along its own line.
  *
  *   g     = n . D - c = 0,  D = r1 + R(phi1) s1 - r2,  c = n . R(phi2) s2           (1 holonomic equation)
  *   G     = [ n  t.a | -n  -t.D ]             t: along the line, n: t turned by +90 degrees, a = R(phi1) s1
@@ -37,7 +38,7 @@ static inline line line_make (const double at[2][2], double heading) {
   return out;
 }
 
-/* A line of element e of a batch of elements with two bodies. */
+/* The line of an element with two bodies that contains a line among other data. */
 static inline line_state line_of (const line *constants, const pw_batch *batch, int e) {
   const pw_configuration *body1 = batch_body (batch, 2 * e), *body2 = batch_body (batch, 2 * e + 1);
   line_state now = { constants, body1, body2, .w = batch_w (batch, e) };
@@ -50,6 +51,7 @@ static inline line_state line_of (const line *constants, const pw_batch *batch, 
   return now;
 }
 
+/* The same of an element that is a line. */
 static inline line_state line_at (const pw_batch *batch, int e) {
   return line_of ((const line *)batch->element + e, batch, e);
 }

@@ -4,8 +4,8 @@
  *
  *   q' = v - D G^T mu,   M v' = f - J^T lambda
  *   ggl       0 = eta - J v,   0 = -g
- *   index2    0 = eta - J v,             mu = 0
- *   index3    0 = -g,   0 = b - S v,     mu = 0
+ *   index2    0 = eta - J v,             no mu
+ *   index3    0 = -g,   0 = b - S v,     no mu
  *
  * with G the holonomic rows of J, S and b the nonholonomic rows of J and eta, D as in tangent.h, B = diag (1, M, 0).
  * The stages y + Z_i at t + c_i h satisfy  B sum_j (A^-1)_ij Z_j = h F (t + c_i h, y + Z_i);  the last one is the new
@@ -18,7 +18,7 @@
  *
  *   err = (gamma/h B - F_y)^-1 (F (t, y) + B sum_i e_i Z_i / h)            of order h^4
  *
- * in units of tolerances of 0.05 rtol^(2/3), which makes the error of the method, of order 5, about proportional to
+ * in units of tolerances of 0.05 rtol^(2/3): h^4 ~ rtol^(2/3), so that the local error, h^6, is about proportional to
  * rtol.  Multipliers are not tested.  The step size follows from the errors of this and the previous step (Gustafsson
  * 1994).
  *
@@ -32,8 +32,7 @@
 #include "dense_output.h"
 #include "util.h"
 
-/* Coefficients of the Radau IIA method of order 5 (Hairer & Wanner 1996, section IV.8); A, gamma,
- * and T with T^-1 A^-1 T = diag (gamma, [ alpha -beta ; beta alpha ]) were computed with 60 digits from the nodes c. */
+/* Coefficients, in the notation above, computed with 60 digits from the nodes c. */
 enum { STAGES = 3 };
 
 static const double radau_c[STAGES] = { 0.15505102572168219018, 0.64494897427831780982, 1 };
@@ -91,10 +90,10 @@ struct pw_method_data {
   double remaining;                     /* remaining error over the last correction */
   int iterations;                       /* of the last step */
   double reduction;                     /* factor of the step size if the iteration does not converge */
-  radau_step now, last;                 /* the step being made; the last one */
+  radau_step now, last;                 /* the one being made: only y, Z, ledger_change until accepted; the last one */
   double *a_end;                        /* coords: accelerations at the end of the last step */
   int near_singular;                    /* 1: the state reached is near a singular configuration */
-  double noise;                         /* at the state reached: of corrections that do not shrink, in round_off */
+  double noise;                         /* corrections up to this, in round_off, are accepted even if they grow */
   pw_step_counter counter;              /* of fixed steps */
   double h;                             /* adaptive: size of the next step */
   double previous_h, previous_error;    /* adaptive: size and error of the last step; 0: there is none */
@@ -230,7 +229,7 @@ static void radau_set_tolerances (pw_run *r, double h) {
 
 /* ---- Newton's iteration ---- */
 
-/* Weights of the values at the nodes c_i in the value at x of the polynomial through them that is 0 at 0. */
+/* The polynomial p of degree 3 with p (0) = 0 and p (c_i) = p_i is p (x) = sum_i weight[i] p_i. */
 static void radau_basis (double x, double *weight) {
   for (int i = 0; i < STAGES; i++) {
     weight[i] = x / radau_c[i];
@@ -335,7 +334,8 @@ static pw_convergence radau_test (pw_run *r, int done, double size, double befor
   return PW_DIVERGED;
 }
 
-/* With F_y at the state reached, corrections up to `noise` are accepted even if they grow.
+/* Newton's iteration for the stages with the present factors.  PW_OK; PW_RETRY if it does not converge; else as
+ * radau_correct.  With F_y at the state reached, corrections up to `noise` are accepted even if they grow.
  *
  * In index3 corrections of velocities stop shrinking at the round-off of positions over h, and steps follow the errors
  * of velocities, which have a lower order: one more correction makes positions 10 to 100 times more accurate. */
@@ -426,15 +426,15 @@ static int radau_work (pw_run *r, double h, double t1, double *error) {
   }
   for (int e = 0; e < entries; e++)
     r->ledger_at[e] = radau_sum (h * r->rate[e], radau_e, d->now.ledger_change, e) / radau_gamma;
-  /* the estimate has order 3, like that of the states */
+  /* this estimate is of order h^4, too: the tolerances of the ledger are widened in the same ratio */
   *error = fmax (*error, pw_ledger_norm (r, h, r->ledger_at) / fmax (1, radau_rtol (r) / r->settings.rtol));
   return PW_OK;
 }
 
 /* ---- Opening ---- */
 
-/* Round-off of the largest coordinate may affect others; at the sine s, solutions magnify it by 1/s^2.  r->saddle must
- * be factorised at the state reached. */
+/* Sets d->noise at the state reached.  Round-off of the largest coordinate may affect others; at the sine s, solutions
+ * magnify it by 1/s^2.  r->saddle must be factorised at the state reached. */
 static void radau_measure_noise (pw_run *r) {
   double sine = pw_saddle_sine (r->saddle, NULL), largest = 1;
   for (int j = 0; j < r->s->coords; j++) largest = fmax (largest, fabs (r->q[j]) / pw_unit (r->s, j));
@@ -606,8 +606,9 @@ static int radau_advance_fixed (pw_run *r, double t_end, pw_error *error) {
   return PW_OK;
 }
 
-/* In index3 the state reached violates g = 0 and J v = eta within the tolerances.  A step of size h corrects positions
- * by velocities of that size over h: no step, however small, has a smaller error, unless the state is projected. */
+/* In index3 the state reached violates g = 0 and J v = eta within the tolerances.  A step of size h removes a
+ * violation d by velocities of about d/h, so that shorter steps do not reduce the error: then the state is projected.
+ * */
 static void radau_project_start (pw_run *r) {
   pw_method_data *d = r->data;
   double *q = d->Y, *v = q + d->dae.n;
