@@ -87,6 +87,11 @@ typedef struct {
   const char *jump; /* an operation in them that may jump within a step, as it reads states: "sign (a.vx)"; or NULL */
 } pw_signal_text;
 
+/* The numbers from lo to hi. */
+typedef struct {
+  double lo, hi;
+} pw_interval;
+
 /* A signal computed by the caller.  `eval` stores the value in value[0] and, for a signal of a constraint, its time
  * derivatives in value[1] and value[2].  x contains the states named in `reads`; gradient, unless NULL, receives the
  * derivatives of value[0] with respect to x.  A non-zero return, or no value, stops the run (radau may try shorter
@@ -102,6 +107,11 @@ typedef struct {
   void *(*open) (void *context);
   void (*close) (void *context); /* frees a context made by open; may be NULL */
   const pw_signal_text *text;    /* NULL unless it comes from a text model */
+  /* Bounds of the signal over an interval of time, so that steps see narrow peaks in it (manual.md, "Narrow signals").
+   * value: the intervals of the time, then of each state that it reads; rate: those of their time derivatives.  Stores
+   * bounds of the value in bound[0] (for a signal of a velocity constraint of its first, of a position constraint of
+   * its second derivative), and of the time derivative of that in bound[1]; infinite: not known.  May be NULL. */
+  void (*enclose) (void *context, const pw_interval *value, const pw_interval *rate, pw_interval bound[2]);
 } pw_function;
 
 /* offset + amplitude cos (omega t + phase) */

@@ -10,6 +10,7 @@
 #include "saddle.h"
 #include <float.h>
 #include <math.h>
+#include "narrow.h"
 #include "pinwheel-method.h"
 #include "system.h"
 #include "util.h"
@@ -165,6 +166,7 @@ struct pw_run {
   pw_initial_report initial;
   unsigned long long identity; /* pw_run_identity */
   pw_statistics statistics;
+  pw_narrow *narrow;    /* signals that steps may not resolve; NULL: there are none */
   pw_method_data *data; /* private to the integrator */
   char *memory;         /* of the state, samples and scratch */
   pw_arena arena;       /* of redundant rows and specialised code */

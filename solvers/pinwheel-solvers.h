@@ -170,6 +170,11 @@ char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size);
  * velocity saturates a force.  adams, bdf, ida and radau keep their tolerances below it, whatever the settings. */
 int pw_run_saturation (pw_run *r, double *least, char *element, size_t size);
 
+/* The number of steps of a fixed size in which a signal differs from what the step sees of it, as pw_statistics has it.
+ * If there are any, *step: the size [s] of steps that would have resolved it, and its name, "motor.value", in the
+ * buffer; with several such signals, that which needs the smallest steps. */
+long pw_run_unresolved (const pw_run *r, double *step, char *signal, size_t size);
+
 /* These belong to the run.  After pw_run_restart, pw_run_initial reports on the state given there. */
 const pw_statistics *pw_run_statistics (const pw_run *r);
 const pw_initial_report *pw_run_initial (const pw_run *r);

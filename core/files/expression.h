@@ -79,6 +79,11 @@ void pw_expression_derivatives (const pw_expression *expression, const double *v
  * variables, and kinks at the end of a function's domain, as of sqrt (t^2). */
 double pw_expression_breakpoint (const pw_expression *expression, double t);
 
+/* Bounds of the value and its first two time derivatives, while each variable and its time derivative are in the
+ * given intervals; infinite: unknown.  lo > hi: no value is a number.  rate of the time: 1 to 1. */
+void pw_expression_enclose (const pw_expression *expression, const pw_interval *value, const pw_interval *rate,
+                            pw_interval u[3]);
+
 /* ---- Words ---- */
 
 /* Whether a text has the form of a name: a letter or _, then letters, digits and _, at most 63 bytes. */

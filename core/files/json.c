@@ -169,6 +169,13 @@ static void json_reference (pw_json *j, const pw_reference_error *e) {
   pw_json_close (j, '}');
 }
 
+static void json_unresolved (pw_json *j, const pw_summary *summary) {
+  if (!json_object (j, "unresolved", summary->unresolved)) return;
+  pw_json_text (j, "signal", summary->unresolved);
+  pw_json_number (j, "resolving_step", summary->resolving_step);
+  pw_json_close (j, '}');
+}
+
 static void json_statistics (pw_json *j, const pw_statistics *n, double cpu) {
   static const char *const residuals[] = { "position", "velocity" };
   json_numbers (j, "residual", residuals, n ? (const double[]){ n->position, n->velocity } : NULL, 2);
@@ -198,6 +205,7 @@ int pw_json_write (const pw_summary *summary, const pw_system *s, const pw_sampl
   pw_json_number (&j, "unbalanced", summary->energy_defect);
   json_lists (&j, summary->redundant, s);
   json_reference (&j, summary->reference);
+  json_unresolved (&j, summary);
   json_statistics (&j, statistics, summary->cpu);
   pw_json_close (&j, '}');
   return pw_output_check (o, error);

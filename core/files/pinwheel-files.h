@@ -302,6 +302,8 @@ typedef struct {
   const pw_reference_error *reference; /* NULL: no reference */
   const char *general;                 /* why the general engine was used; "": it was not; NULL: no run */
   double energy_defect;                /* relative, as pw_run_energy_defect says; NaN: not known */
+  const char *unresolved;              /* a signal that steps did not resolve; NULL: none */
+  double resolving_step;               /* size of steps that would have [s] (pw_run_unresolved) */
 } pw_summary;
 
 /* Writes the JSON summary; unknown values (model, method, s, sample, statistics may be NULL) and non-finite ones become

@@ -330,6 +330,164 @@ static pw_range range_apply (const pw_expression_code *c, const pw_range *x, int
   return r;
 }
 
+/* ---- Time derivatives, of which intervals of the variables and of their time derivatives are given ----
+ *
+ * The first two derivatives of each operation by the chain rule (evaluation.c) with intervals.  range_all: unknown. */
+
+typedef struct {
+  pw_range u[3];
+} range_jet;
+
+static pw_range range_times (pw_range x, pw_range y) {
+  return range_multiply (&x, &y);
+}
+
+static pw_range range_plus (pw_range x, pw_range y) {
+  return range_sum (&x, &y);
+}
+
+static pw_range range_over (pw_range x, pw_range y) {
+  return range_contains (&y, 0) ? range_all : range_divide (&x, &y);
+}
+
+static pw_range range_scaled (double factor, pw_range x) {
+  return range_times (range_constant (factor), x);
+}
+
+static pw_range range_square (pw_range x) {
+  return range_integer_power (&x, 2);
+}
+
+/* f' and f'' of a function f of one argument x, from the ranges of x and f. */
+static void range_partials (const pw_expression_function *f, const pw_range *x, pw_range y, pw_range *first,
+                            pw_range *second) {
+  const pw_range one = range_constant (1), square = range_square (y);
+  *first = *second = range_all;
+  if (f->of_one == pw_sin || f->of_one == pw_cos) {
+    *first = f->of_one == pw_sin ? range_sin (x->lo, x->hi, PW_PI / 2) : range_sin (x->lo, x->hi, PW_PI);
+    *second = range_negative (&y);
+  } else if (f->of_one == exp) {
+    *first = *second = y;
+  } else if (f->of_one == tanh || f->of_one == tan) {
+    double sign = f->of_one == tan ? 1 : -1;
+    *first = range_plus (one, range_scaled (sign, square));
+    if (sign < 0) first->lo = fmax (first->lo, 0);
+    *second = range_scaled (2 * sign, range_times (y, *first));
+  } else if (f->of_one == sqrt) {
+    *first = range_over (range_constant (0.5), y);
+    *second = range_over (range_scaled (-0.5, *first), *x);
+  } else if (f->of_one == log || f->of_one == log10) {
+    *first = range_over (range_constant (f->of_one == log ? 1 : 1 / log (10)), *x);
+    *second = range_over (range_negative (first), *x);
+  } else if (f->of_one == atan) {
+    *first = range_over (one, range_plus (one, range_square (*x)));
+    *second = range_scaled (-2, range_times (*x, range_square (*first)));
+  } else if (f->of_one == sinh || f->of_one == cosh) {
+    *first = f->of_one == sinh ? range_cosh (x) : range_rounded (sinh (x->lo), sinh (x->hi));
+    *second = y;
+  }
+}
+
+/* The chain rule for a function of the first operand alone. */
+static void range_chain (const range_jet *x, pw_range first, pw_range second, range_jet *r) {
+  r->u[1] = range_times (first, x->u[1]);
+  r->u[2] = range_plus (range_times (second, range_square (x->u[1])), range_times (first, x->u[2]));
+}
+
+/* The power of a number to a constant exponent n. */
+static void range_power_jet (const range_jet *x, double n, range_jet *r) {
+  const pw_range less[2] = { range_constant (n - 1), range_constant (n - 2) };
+  pw_range first = range_scaled (n, range_power (&x->u[0], &less[0]));
+  range_chain (x, first, n == 1 ? range_constant (0) : range_scaled (n * (n - 1), range_power (&x->u[0], &less[1])), r);
+}
+
+static void range_product_jet (const range_jet *x, const range_jet *y, range_jet *r) {
+  r->u[1] = range_plus (range_times (x->u[1], y->u[0]), range_times (x->u[0], y->u[1]));
+  r->u[2] = range_plus (range_scaled (2, range_times (x->u[1], y->u[1])),
+                        range_plus (range_times (x->u[2], y->u[0]), range_times (x->u[0], y->u[2])));
+}
+
+static void range_quotient_jet (const range_jet *x, const range_jet *y, range_jet *r) {
+  pw_range fall = range_times (r->u[0], y->u[1]);
+  r->u[1] = range_over (range_plus (x->u[1], range_negative (&fall)), y->u[0]);
+  fall = range_plus (range_scaled (2, range_times (r->u[1], y->u[1])), range_times (r->u[0], y->u[2]));
+  r->u[2] = range_over (range_plus (x->u[2], range_negative (&fall)), y->u[0]);
+}
+
+/* atan2 (x, y): (y x' - x y') / (x^2 + y^2); hypot: (x x' + y y') / hypot. */
+static void range_angle_jet (int op, const range_jet *x, const range_jet *y, range_jet *r) {
+  const pw_range *a = op == PW_OP_ATAN2 ? y->u : x->u, *b = op == PW_OP_ATAN2 ? x->u : y->u;
+  pw_range last = range_times (*b, y->u[1]), sum = range_times (*a, x->u[1]);
+  sum = range_plus (sum, op == PW_OP_ATAN2 ? range_negative (&last) : last);
+  r->u[1] = range_over (sum, op == PW_OP_ATAN2 ? range_plus (range_square (*a), range_square (*b)) : r->u[0]);
+}
+
+/* Derivatives of min, max and a condition: those of the operands that can be the value. */
+static void range_choose_jet (int op, const range_jet *x, range_jet *r) {
+  const range_jet *y = op == PW_OP_SELECT ? ++x + 1 : x + 1;
+  const pw_range *condition = op == PW_OP_SELECT ? x[-1].u : NULL;
+  double sign = op == PW_OP_MAX ? -1 : 1, below = sign * (x->u[0].lo + x->u[0].hi - y->u[0].lo - y->u[0].hi);
+  int decided = condition ? condition->lo > 0 || condition->hi < 1 : x->u[0].hi < y->u[0].lo || y->u[0].hi < x->u[0].lo;
+  int first = condition ? condition->lo > 0 : below < 0;
+  for (int i = 1; i < 3; i++)
+    r->u[i] = decided    ? (first ? x : y)->u[i]
+              : condition ? range_all /* it may jump */
+                          : range_hull (&x->u[i], &y->u[i]);
+}
+
+/* Replaces the operands on the stack by the value and its derivatives. */
+static void range_apply_jet (const pw_expression_code *c, range_jet *x, int operands) {
+  const range_jet *y = x + 1;
+  const pw_range value[3] = { x->u[0], operands > 1 ? y->u[0] : range_nan, operands > 2 ? x[2].u[0] : range_nan };
+  range_jet r = { { range_apply (c, value, operands), range_all, range_all } };
+  const pw_expression_function *f = &pw_expression_functions[c->index];
+  pw_range first = range_constant (1), second = range_constant (0);
+  if (c->op == PW_OP_FUNCTION_OF_ONE || c->op == PW_OP_TAN) {
+    range_partials (f, value, r.u[0], &first, &second);
+    range_chain (x, first, second, &r);
+  } else if (c->op == PW_OP_NEGATE || c->op == PW_OP_ABS) {
+    first = c->op == PW_OP_NEGATE ? range_constant (-1) : range_between (value->lo > 0 ? 1 : -1, value->hi < 0 ? -1 : 1);
+    range_chain (x, first, second, &r);
+  } else if (c->op == PW_OP_ADD || c->op == PW_OP_SUBTRACT) {
+    for (int i = 1; i < 3; i++)
+      r.u[i] = range_plus (x->u[i], c->op == PW_OP_ADD ? y->u[i] : range_negative (&y->u[i]));
+  } else if (c->op == PW_OP_MULTIPLY) {
+    range_product_jet (x, y, &r);
+  } else if (c->op == PW_OP_DIVIDE) {
+    range_quotient_jet (x, y, &r);
+  } else if (c->op == PW_OP_POWER && value[1].lo == value[1].hi) {
+    range_power_jet (x, value[1].lo, &r);
+  } else if (c->op == PW_OP_HYPOT || (c->op == PW_OP_ATAN2 && !r.u[0].breaks)) {
+    range_angle_jet (c->op, x, y, &r);
+  } else if (c->op == PW_OP_MIN || c->op == PW_OP_MAX || c->op == PW_OP_SELECT) {
+    range_choose_jet (c->op, x, &r);
+  } else if (c->op == PW_OP_MOD && value[1].lo == value[1].hi && !r.u[0].breaks) {
+    range_chain (x, first, second, &r);
+  } else if (pw_expression_jumps (c->op) && r.u[0].lo == r.u[0].hi) {
+    r.u[1] = r.u[2] = second; /* constant between jumps */
+  }
+  *x = r;
+}
+
+void pw_expression_enclose (const pw_expression *expression, const pw_interval *value, const pw_interval *rate,
+                            pw_interval u[3]) {
+  range_jet stack[PW_EXPRESSION_STACK], *top = stack;
+  const pw_range zero = range_constant (0);
+  for (const pw_expression_code *c = expression->code, *end = c + expression->codes; c < end; c++) {
+    int operands = pw_expression_operands (c->op), i = c->index;
+    top -= operands;
+    if (operands)
+      range_apply_jet (c, top, operands);
+    else if (c->op == PW_OP_CONSTANT)
+      *top = (range_jet){ { range_constant (c->value), zero, zero } };
+    else /* a state: its second derivative is not given */
+      *top = (range_jet){ { range_between (value[i].lo, value[i].hi), range_between (rate[i].lo, rate[i].hi),
+                            i == PW_EXPRESSION_TIME ? zero : range_all } };
+    top++;
+  }
+  for (int i = 0; i < 3; i++) u[i] = (pw_interval){ top[-1].u[i].lo, top[-1].u[i].hi };
+}
+
 /* Evaluates operations on a stack; returns its top.  noisy may be NULL. */
 static pw_range *range_run (const pw_expression_code *code, int codes, const unsigned char *noisy, double lo, double hi,
                             pw_range *top) {

@@ -138,6 +138,16 @@ static double signal_breakpoint (void *context, double t) {
   return first;
 }
 
+/* pw_function.enclose; derivatives that are not given are computed from the last one that is. */
+static void signal_enclose (void *context, const pw_interval *value, const pw_interval *rate, pw_interval bound[2]) {
+  const signal_function *f = context;
+  int last = f->derivatives;
+  pw_interval u[4] = { [3] = { -INFINITY, INFINITY } };
+  while (last > 0 && f->expression[last] == NULL) last--;
+  pw_expression_enclose (f->expression[last], value, rate, u);
+  memcpy (bound, u + f->derivatives - last, 2 * sizeof *bound);
+}
+
 static void *signal_open (void *context) {
   const signal_function *f = context;
   size_t size = sizeof *f;
@@ -253,6 +263,7 @@ int pw_yaml_time_signal (pw_reader *r, const pw_kind *kind, const char *label, c
   f->name[0] = "t";
   f->derivatives = pw_kind_signals_force (kind) ? 0 : kind->level == PW_HOLONOMIC ? 2 : 1;
   *signal = (pw_signal){ PW_FUNCTION, .function = { .eval = signal_eval, .context = f, .text = &f->text } };
+  signal->function.enclose = signal_enclose;
   signal->function.open = signal_open;
   signal->function.close = free;
   if (signal_read_all (&(reading){ .r = r, .label = label, .f = f }, v) != PW_OK) return r->error->status;

@@ -131,6 +131,60 @@ double pw_signal_breakpoint (const pw_signal *s, int kinks, double t) {
   return INFINITY;
 }
 
+/* ---- Enclosures ---- */
+
+pw_enclosure pw_signal_enclosure (const pw_source *source, int derivative) {
+  const pw_signal *s = &source->signal;
+  switch (s->type) {
+  case PW_HARMONIC:
+    return s->harmonic.amplitude != 0 && s->harmonic.omega != 0 ? PW_PERIODIC : PW_RESOLVED;
+  case PW_FUNCTION:
+    return s->function.enclose ? PW_ENCLOSED : PW_UNENCLOSED;
+  case PW_TABLE:
+    return s->table.interpolation == PW_CUBIC ? PW_ENCLOSED : PW_RESOLVED;
+  case PW_SMOOTH_STEP:
+    return derivative > 0 ? PW_ENCLOSED : PW_RESOLVED;
+  case PW_CONSTANT:
+  case PW_RAMP:
+  case PW_PULSE:
+    break;
+  }
+  return PW_RESOLVED;
+}
+
+/* The extrema of the first three derivatives of 10 x^3 - 15 x^4 + 6 x^5 for x from 0 to 1. */
+static void signal_rise_enclose (const pw_signal *s, int derivative, double from, pw_interval bound[2]) {
+  static const double extreme[][2] = { { 0, 0 }, { 0, 1.875 }, { -5.78, 5.78 }, { -30, 60 } };
+  double rise = s->ramp.to - s->ramp.from, T = s->ramp.duration, factor = rise / pow (T, derivative);
+  if (from < s->ramp.start || from >= s->ramp.start + T) factor = 0;
+  for (int i = 0; i < 2; i++, factor /= T) {
+    const double *x = extreme[derivative + i];
+    bound[i] = (pw_interval){ fmin (factor * x[0], factor * x[1]), fmax (factor * x[0], factor * x[1]) };
+  }
+}
+
+void pw_signal_enclose (const pw_source *source, int derivative, const pw_interval *value, const pw_interval *rate,
+                        pw_interval bound[2]) {
+  const pw_signal *s = &source->signal;
+  for (int i = 0; i < 2; i++) bound[i] = (pw_interval){ INFINITY, -INFINITY };
+  if (s->type == PW_FUNCTION)
+    s->function.enclose (s->function.context, value, rate, bound);
+  else if (s->type == PW_TABLE)
+    for (int i = 0; i < 2; i++)
+      pw_table_enclose (s, source->spline, derivative + i, value->lo, value->hi, &bound[i]);
+  else
+    signal_rise_enclose (s, derivative, value->lo, bound);
+}
+
+double pw_signal_acting (const pw_source *source, int derivative, double t, const double *x) {
+  const pw_signal *s = &source->signal;
+  double u[3] = { NAN, NAN, NAN };
+  if (s->type == PW_FUNCTION) return s->function.eval (s->function.context, t, x, u, NULL) ? NAN : u[derivative];
+  pw_source copy = *source;
+  copy.u = u;
+  return pw_signal_eval (&copy, t) == 0 ? u[derivative] : NAN;
+}
+
 /* Forms of signals: their fields, and checks of signals. */
 
 #define FORM_AT(form, member) .name = #member, .offset = offsetof (pw_signal, form.member)
@@ -380,4 +434,24 @@ double pw_table_breakpoint (const pw_signal *s, int kinks, double t) {
   if (next == n) return INFINITY;
   int in_spline = s->table.interpolation == PW_CUBIC && next > 0;
   return s->table.t[in_spline && !kinks ? n - 1 : next];
+}
+
+/* Of a part of each cubic: the second derivative by its ends; lower ones by their values in the middle and the next
+ * higher derivative. */
+void pw_table_enclose (const pw_signal *s, const double *spline, int d, double from, double to, pw_interval *bound) {
+  const double *t = s->table.t, *M = spline + s->table.count;
+  int n = s->table.count, first = table_passed (s, from) - 1, last = table_passed (s, to) - 1;
+  for (int i = first; i <= last; i++) {
+    if (i < 0 || i >= n - 1) { /* outside the table */
+      double u = d == 0 ? s->table.value[i < 0 ? 0 : n - 1] : 0;
+      *bound = (pw_interval){ fmin (bound->lo, u), fmax (bound->hi, u) };
+      continue;
+    }
+    double begin = fmax (from, t[i]), end = fmin (to, t[i + 1]), x = begin + (end - begin) / 2 - t[i], u[3];
+    double third = (M[i + 1] - M[i]) / (t[i + 1] - t[i]), half = (end - begin) / 2, spread = 0, middle = third;
+    u[2] = M[i] + x * third, u[1] = spline[i] + x * (M[i] + x * (third / 2));
+    u[0] = s->table.value[i] + x * (spline[i] + x * (M[i] / 2 + x * (third / 6)));
+    for (int k = 2; k >= d; k--) spread = half * (fabs (middle) + spread), middle = u[k];
+    *bound = (pw_interval){ fmin (bound->lo, middle - spread), fmax (bound->hi, middle + spread) };
+  }
 }

@@ -25,6 +25,23 @@ int pw_signal_eval (const pw_source *source, double t);
  * kink, at the points of a cubic table.  Of a function signal, what its breakpoint function returns. */
 double pw_signal_breakpoint (const pw_signal *s, int kinks, double t);
 
+/* Enclosures, for steps that must see what is narrow in a signal (narrow.c): of the derivative that acts, 0 for a
+ * force, 1 or 2 for a velocity or position constraint. */
+typedef enum {
+  PW_RESOLVED,  /* nothing to enclose: between breakpoints constant, or monotonic with a bounded curvature */
+  PW_PERIODIC,  /* a harmonic */
+  PW_ENCLOSED,  /* pw_signal_enclose encloses it */
+  PW_UNENCLOSED /* a function without `enclose` */
+} pw_enclosure;
+pw_enclosure pw_signal_enclosure (const pw_source *source, int derivative);
+
+/* As pw_function.enclose, in an interval without a breakpoint. */
+void pw_signal_enclose (const pw_source *source, int derivative, const pw_interval *value, const pw_interval *rate,
+                        pw_interval bound[2]);
+
+/* The derivative that acts, at time t and the states x; NaN if the signal fails there.  Leaves source->u unchanged. */
+double pw_signal_acting (const pw_source *source, int derivative, double t, const double *x);
+
 /* 1 if the value may jump: that of a pulse; that of a function, of which this is not known. */
 static inline int pw_signal_value_may_jump (const pw_signal *s) {
   return s->type == PW_PULSE || s->type == PW_FUNCTION;
@@ -44,5 +61,7 @@ static inline double pw_table_value (const pw_signal *s, int i) {
 void pw_table_spline (const pw_signal *s, double *spline);
 void pw_table_eval (const pw_signal *s, const double *spline, double t, double u[3]);
 double pw_table_breakpoint (const pw_signal *s, int kinks, double t);
+/* Adds the range of derivative d of a table between two times to `bound`; d = 3: the third derivative. */
+void pw_table_enclose (const pw_signal *s, const double *spline, int d, double from, double to, pw_interval *bound);
 
 #endif

@@ -324,6 +324,8 @@ static int radau_advance (pw_run *r, double t_end, pw_error *error) {
   for (int rejected = 0, status = PW_OK;; rejected++) {
     int shortened = r->t + d->h > stop - 0.01 * d->h; /* no tiny step remains */
     double h = shortened ? stop - r->t : d->h, t1 = shortened ? stop : r->t + h;
+    double seen = r->narrow ? pw_narrow_end (r, t1) : t1;
+    if (seen < t1) shortened = 0, t1 = seen, h = t1 - r->t;
     if (!shortened && !(h > pw_least_step (r))) return pw_implicit_fail (r, status, h, error);
     if (rejected > 0 && (status = pw_run_check_limits (r, error)) != PW_OK) return status;
     status = radau_try (r, h, t1, rejected > 0 || d->previous_h == 0, &err);

@@ -460,6 +460,7 @@ int pw_rk_advance_adaptive (pw_run *r, double t_end, pw_error *error) {
     double t1 = r->t + d->h, added_energy = 0, err;
     int shortened = t1 > stop - 0.01 * d->h; /* or lengthened by up to 1 %, so that no tiny step remains */
     if (shortened) t1 = stop;
+    if (r->narrow) t1 = pw_narrow_end (r, t1), shortened &= t1 >= stop;
     double h = t1 - r->t;
     if (!shortened && !(h > pw_least_step (r))) {
       if (status != PW_OK) return pw_rk_fail (r, status, r->t, h, 0, error);
@@ -672,6 +673,7 @@ static void several_record (pw_run *r, const pw_scene_steps *x) {
 static int several_plan (pw_run *r, double t, double t_end, pw_scene_steps *x) {
   pw_method_data *d = r->data;
   int count = several_possible (r) ? several_count (r, t, t_end) : 0;
+  if (count >= 2 && r->narrow) count = pw_narrow_count_several (r, r->settings.step, count);
   if (count < 2) return 0;
   *x = (pw_scene_steps){ .count = count, .project = d->projects, .watch = several_watchdog (r) };
   x->stages = d->tableau->stages, x->row = d->row, x->c = d->tableau->c;

@@ -90,7 +90,7 @@ const pw_member pw_members[] = {
   SIZE (pw_statistics),
   AT4 (pw_statistics, steps, rejected, rhs, jacobians),
   AT4 (pw_statistics, factorisations, specialised, position, velocity),
-  AT2 (pw_statistics, g, jv),
+  AT3 (pw_statistics, g, jv, unresolved),
   SIZE (pw_initial_report),
   AT4 (pw_initial_report, q_given, v_given, q, v),
   SIZE (pw_parameter),

@@ -54,6 +54,7 @@ int pw_run_look_ahead (pw_run *r, pw_error *error) {
   double next = pw_run_next_breakpoint (r, r->t);
   if (!isnan (next)) {
     r->breakpoint = next;
+    pw_narrow_forget (r);
     return PW_OK;
   }
   pw_failed_signal (r->w, signal, sizeof signal);
@@ -177,6 +178,7 @@ int pw_run_advance (pw_run *r, double t_end, pw_error *error) {
     return run_check_progress (r, before, error);
   }
   r->near_singular = 0;
+  if (status == PW_OK && r->narrow) pw_narrow_count (r, fmin (r->t + r->settings.step, stop));
   if (status == PW_OK) status = r->method->advance (r, t_end, error);
   if (status == PW_STOPPED) return status;
   if (status == PW_OK) status = pw_run_watchdog (r, error);

@@ -183,7 +183,8 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   if (status != PW_OK) return status;
   if (pw_stabilised_by (r, PW_BAUMGARTE)) r->alpha = pw_run_option (r, "alpha"), r->beta = pw_run_option (r, "beta");
   r->identity = pw_run_identity (r);
-  status = pw_specialised_open (r, error);
+  status = pw_narrow_open (r, error);
+  if (status == PW_OK) status = pw_specialised_open (r, error);
   if (status == PW_OK) status = run_check_stop (r, r->method->open (r, error));
   if (status != PW_OK || !r->uses_derivatives) return status;
   return pw_run_check_derivatives (r, method, "needs", error);
@@ -306,6 +307,7 @@ static void checkpoint_state (pw_run *r, pw_archive *a) {
   pw_archive_bytes (a, r->ledger, entries);
   checkpoint_statistics (&r->statistics, a);
   pw_rank_serialise (r, a);
+  pw_narrow_serialise (r, a);
 }
 
 /* Continues from the run's state, which was just saved or loaded, and loads the method's own data, if any, from a. */

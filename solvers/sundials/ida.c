@@ -281,9 +281,22 @@ static int ida_reach (pw_method_data *d) {
   return r->entries > 0 ? ida_work (d, status == PW_OK) : PW_OK;
 }
 
+/* Reduces *stop so that the next step resolves all signals. */
+static int ida_resolve (const pw_method_data *d, double *stop, pw_error *error) {
+  long steps = 0;
+  double next = 0, last = 0;
+  IDAGetNumSteps (d->ida, &steps);
+  IDAGetCurrentStep (d->ida, &next);
+  IDAGetLastStep (d->ida, &last);
+  if (steps == 0) next = pw_first_step (d->sun.run), last = 0;
+  return pw_narrow_stop (d->sun.run, next, last, stop, error);
+}
+
 static int ida_advance (pw_run *r, double t_end, pw_error *error) {
   pw_method_data *d = r->data;
   double stop = fmin (t_end, r->breakpoint), t = r->t;
+  int status = r->narrow ? ida_resolve (d, &stop, error) : PW_OK;
+  if (status != PW_OK) return status;
   int flag = IDASetStopTime (d->ida, stop);
   if (flag >= 0) flag = IDASolve (d->ida, stop, &t, d->sun.y, d->yp, IDA_ONE_STEP);
   if (flag < 0) return ida_fail (d, flag, error);

@@ -40,6 +40,7 @@ struct pw_method_data {
   double *a, *lambda;   /* coords + 3, rows: of the last evaluation */
   double *error;        /* 2 coords: scratch */
   int evaluated;        /* 1: r->a, r->lambda are those of the state reached, not of the last iterate */
+  int stopped;          /* 1: the last step ended at a stop time */
   char *memory;
 };
 
@@ -282,12 +283,28 @@ static int multistep_reach (pw_method_data *d, double t, pw_error *error) {
   return PW_OK;
 }
 
+/* Reduces *stop so that the next step resolves all signals.  At a stop time CVODES announces no size, but enlarges the
+ * last one by a factor of at most 10, or 1e4 if it was the first. */
+static int multistep_resolve (const pw_method_data *d, double *stop, pw_error *error) {
+  long steps = 0;
+  double next = 0, last = 0;
+  CVodeGetNumSteps (d->cvode, &steps);
+  CVodeGetCurrentStep (d->cvode, &next);
+  CVodeGetLastStep (d->cvode, &last);
+  if (d->stopped) next = (steps == 1 ? 1e4 : 10) * last;
+  if (steps == 0) next = pw_first_step (d->sun.run), last = 0;
+  return pw_narrow_stop (d->sun.run, next, last, stop, error);
+}
+
 static int multistep_advance (pw_run *r, double t_end, pw_error *error) {
   pw_method_data *d = r->data;
   double stop = fmin (t_end, r->breakpoint), t = r->t;
+  int status = r->narrow ? multistep_resolve (d, &stop, error) : PW_OK;
+  if (status != PW_OK) return status;
   int flag = CVodeSetStopTime (d->cvode, stop);
   if (flag >= 0) flag = CVode (d->cvode, stop, d->sun.y, &t, CV_ONE_STEP);
   if (flag < 0) return multistep_fail (d, flag, error);
+  d->stopped = flag == CV_TSTOP_RETURN;
   multistep_count (d);
   return multistep_reach (d, flag == CV_TSTOP_RETURN ? stop : t, error);
 }

@@ -274,6 +274,8 @@ pw_summary pw_run_summary (pw_run_cli *command, const pw_sample *last, const pw_
                          .general = run ? report_general_reason (command) : NULL,
                          .reference =
                              run ? pw_comparison_errors (&command->comparison, command->compiled.system) : NULL };
+  if (run && pw_run_unresolved (run, &summary.resolving_step, command->unresolved, sizeof command->unresolved) > 0)
+    summary.unresolved = command->unresolved;
   if (error->status == PW_OK && pw_stop) {
     snprintf (reason, PW_RUN_REASON, "interrupted at t = %s s", PW_DIGITS (pw_run_time (run), 6));
     summary.status = "interrupted";
@@ -282,8 +284,21 @@ pw_summary pw_run_summary (pw_run_cli *command, const pw_sample *last, const pw_
   return summary;
 }
 
+/* Signals that steps of the fixed size did not resolve. */
+static void report_unresolved (const pw_run *run) {
+  char signal[PW_NAME_BYTES];
+  double step, steps = (double)pw_run_statistics (run)->steps;
+  long unresolved = pw_run_unresolved (run, &step, signal, sizeof signal);
+  if (unresolved > 0)
+    pw_cli_say ("pinwheel: %ld of %s (%s %%) did not resolve %s, which changes faster than they sample it: steps of "
+                "%s s would, or an adaptive method\n",
+                unresolved, PW_COUNTED (pw_run_statistics (run)->steps, "step"),
+                PW_DIGITS (100 * (double)unresolved / steps, 3), signal, PW_DIGITS (step, 2));
+}
+
 void pw_report_warnings (const pw_run *run, const pw_system *system, double defect) {
   int state;
+  report_unresolved (run);
   double power, growth = pw_run_growth (run, &state, &power);
   if (defect > REPORT_DEFECT)
     pw_cli_say ("pinwheel: the energy does not balance: %s %% of it is unaccounted for; %s\n",

@@ -52,6 +52,7 @@ typedef struct {
   long batch;                           /* calls of pw_run_advance_towards between updates of the progress, at most */
   double cpu;                           /* processor time of the method [s] */
   int write_failed;                     /* 1: the table or the summary could not be written */
+  char unresolved[PW_NAME_BYTES];       /* a signal that steps did not resolve */
   char kept_path[PW_RUN_OUTPUTS][4200]; /* of incomplete files that are kept, PATH_MAX and an ending, or "" */
 } pw_run_cli;
 

@@ -158,7 +158,8 @@ pw_settings = _structure(
     max_steps=c.c_long, initial=c.c_void_p, initials=c.c_int, specialised=c.c_void_p)
 pw_statistics = _structure(
     "pw_statistics", steps=c.c_long, rejected=c.c_long, rhs=c.c_long, jacobians=c.c_long, factorisations=c.c_long,
-    specialised=c.c_long, position=c.c_double, velocity=c.c_double, g=c.c_double, jv=c.c_double)
+    specialised=c.c_long, position=c.c_double, velocity=c.c_double, g=c.c_double, jv=c.c_double,
+    unresolved=c.c_long)
 pw_initial_report = _structure("pw_initial_report", q_given=_double_p, v_given=_double_p, q=_double_p, v=_double_p)
 pw_parameter = _structure("pw_parameter", name=c.c_char_p, value=c.c_double, unit=c.c_char_p, about=c.c_char_p)
 pw_field = _structure(

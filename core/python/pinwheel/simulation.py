@@ -237,7 +237,7 @@ class Simulation:
     def _statistics(run):
         s = lib.core.pw_run_statistics(run).contents
         return {name: getattr(s, name) for name in ("steps", "rejected", "rhs", "jacobians", "factorisations", "specialised",
-                                                    "position", "velocity", "g", "jv")}
+                                                    "position", "velocity", "g", "jv", "unresolved")}
 
     def _columns(self):
         return columns(self._system.pointer, self._settings.ledger)
