@@ -430,7 +430,7 @@ static void range_choose_jet (int op, const range_jet *x, range_jet *r) {
   int decided = condition ? condition->lo > 0 || condition->hi < 1 : x->u[0].hi < y->u[0].lo || y->u[0].hi < x->u[0].lo;
   int first = condition ? condition->lo > 0 : below < 0;
   for (int i = 1; i < 3; i++)
-    r->u[i] = decided    ? (first ? x : y)->u[i]
+    r->u[i] = decided     ? (first ? x : y)->u[i]
               : condition ? range_all /* it may jump */
                           : range_hull (&x->u[i], &y->u[i]);
 }
@@ -446,11 +446,11 @@ static void range_apply_jet (const pw_expression_code *c, range_jet *x, int oper
     range_partials (f, value, r.u[0], &first, &second);
     range_chain (x, first, second, &r);
   } else if (c->op == PW_OP_NEGATE || c->op == PW_OP_ABS) {
-    first = c->op == PW_OP_NEGATE ? range_constant (-1) : range_between (value->lo > 0 ? 1 : -1, value->hi < 0 ? -1 : 1);
+    first =
+        c->op == PW_OP_NEGATE ? range_constant (-1) : range_between (value->lo > 0 ? 1 : -1, value->hi < 0 ? -1 : 1);
     range_chain (x, first, second, &r);
   } else if (c->op == PW_OP_ADD || c->op == PW_OP_SUBTRACT) {
-    for (int i = 1; i < 3; i++)
-      r.u[i] = range_plus (x->u[i], c->op == PW_OP_ADD ? y->u[i] : range_negative (&y->u[i]));
+    for (int i = 1; i < 3; i++) r.u[i] = range_plus (x->u[i], c->op == PW_OP_ADD ? y->u[i] : range_negative (&y->u[i]));
   } else if (c->op == PW_OP_MULTIPLY) {
     range_product_jet (x, y, &r);
   } else if (c->op == PW_OP_DIVIDE) {

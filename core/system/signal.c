@@ -170,8 +170,7 @@ void pw_signal_enclose (const pw_source *source, int derivative, const pw_interv
   if (s->type == PW_FUNCTION)
     s->function.enclose (s->function.context, value, rate, bound);
   else if (s->type == PW_TABLE)
-    for (int i = 0; i < 2; i++)
-      pw_table_enclose (s, source->spline, derivative + i, value->lo, value->hi, &bound[i]);
+    for (int i = 0; i < 2; i++) pw_table_enclose (s, source->spline, derivative + i, value->lo, value->hi, &bound[i]);
   else
     signal_rise_enclose (s, derivative, value->lo, bound);
 }

@@ -19,14 +19,14 @@
 #include "narrow.h"
 #include "method.h"
 
-enum { PIECES = 120 };       /* most pieces of a step */
-enum { ATTEMPTS = 200 };     /* at most, to find the end of a step */
-enum { EVERY = 16 };         /* of so many steps of fixed size, one is compared with a function without enclosures */
-#define WINDOW 8             /* steps that are tested together, where the signal is nearly straight */
-#define RESTART 0.2          /* multistep methods restart for a step shorter than this part of the last one */
-#define UNDECIDED 1e-2       /* excess that enclosures may leave undecided, over the largest |u| */
-#define TINY 1e-100          /* excess without effect */
-#define FIXED_SMALL 1e-4     /* small part of the largest |u|, with steps of fixed size; adaptive: rtol */
+enum { PIECES = 120 };          /* most pieces of a step */
+enum { ATTEMPTS = 200 };        /* at most, to find the end of a step */
+enum { EVERY = 16 };            /* functions without enclosures are compared in one of 16 steps of fixed size */
+#define WINDOW 8                /* steps that are tested together, where the signal is nearly straight */
+#define RESTART 0.2             /* multistep methods restart for a step shorter than this part of the last one */
+#define UNDECIDED 1e-2          /* excess that enclosures may leave undecided, over the largest |u| */
+#define TINY 1e-100             /* excess without effect */
+#define FIXED_SMALL 5e-3        /* small part of the largest |u|, with steps of fixed size; adaptive: rtol */
 #define FIXED_HALF_PERIOD PW_PI /* largest omega h of a harmonic, with steps of fixed size */
 #define ADAPTIVE_PHASE 4        /* the same, adaptive */
 
@@ -52,8 +52,9 @@ struct pw_narrow {
   double half, ratio;    /* shares of the hull's width; least over greatest slope of a nearly straight signal */
   double small;          /* small part of the largest |u| */
   narrow_signal *signal; /* count */
-  narrow_record *record; /* count + 1; of the last one: .clear: time up to which steps are counted; .again: time of the last
-                          * restart */
+  narrow_record
+      *record; /* count + 1; of the last one: .clear: time up to which steps are counted; .again: time of the last
+                          * restart; .size: length of a step that was cut */
   pw_interval *value, *rate; /* of the time and the states that a signal reads */
   double *x;                 /* these states */
 };
@@ -90,7 +91,8 @@ static void path_enclose (const narrow_path *p, double t0, double t1, pw_interva
     int j = p->signal->source->state[i], k = j < n ? j : j - n;
     double q = r->q[k], v = r->v[k], a = r->a[k], v0 = v + from * a, v1 = v + to * a;
     rate[i] = j < n ? path_interval (v0, v1) : path_interval (a, a);
-    value[i] = j < n ? path_interval (q + from * (v + from * a / 2), q + to * (v + to * a / 2)) : path_interval (v0, v1);
+    value[i] =
+        j < n ? path_interval (q + from * (v + from * a / 2), q + to * (v + to * a / 2)) : path_interval (v0, v1);
     if (j < n && v0 * v1 < 0) /* it turns at v = 0 */
       value[i] = (pw_interval){ fmin (value[i].lo, q - v * v / a / 2), fmax (value[i].hi, q - v * v / a / 2) };
   }
@@ -121,7 +123,7 @@ static int view_excludes (const narrow_view *see, double u) {
 
 /* A piece of a step. */
 typedef struct {
-  double t0, t1, excess;
+  double t0, t1, excess, reach; /* reach: bound of |u - u(m)| in it */
 } narrow_piece;
 
 /* Fills the excess of a piece; 1 if the value in the middle proves it. */
@@ -129,7 +131,7 @@ static int piece_measure (const narrow_path *p, const narrow_view *see, narrow_p
   double half = (piece->t1 - piece->t0) / 2, u = path_value (p, piece->t0 + half);
   pw_interval bound[2];
   path_enclose (p, piece->t0, piece->t1, bound);
-  double reach = half * fmax (fabs (bound[1].lo), fabs (bound[1].hi));
+  double reach = piece->reach = half * fmax (fabs (bound[1].lo), fabs (bound[1].hi));
   double lo = reach < INFINITY ? fmax (bound[0].lo, u - reach) : bound[0].lo;
   double hi = reach < INFINITY ? fmin (bound[0].hi, u + reach) : bound[0].hi;
   piece->excess = fmax (see->lo - lo, hi - see->hi);
@@ -146,16 +148,16 @@ static double piece_round_off (const narrow_path *p, const narrow_view *see, con
 }
 
 /* Halves pieces until none has an excess, other than by round-off: 1.  0: the signal leaves the range in the piece
- * *found, or may do so. */
+ * *found, or may do so.  Without bounds of u', an excess that many pieces leave is that of the enclosures. */
 static int path_search (const narrow_path *p, const narrow_view *see, double t0, double t1, narrow_piece *found) {
-  narrow_piece piece[PIECES + 1] = { { t0, t1, 0 } };
+  narrow_piece piece[PIECES + 1] = { { .t0 = t0, .t1 = t1 } };
   const double least = 64 * DBL_EPSILON * fmax (fabs (t0), fabs (t1));
   int count = 1, most = 0;
   if (piece_measure (p, see, piece)) return *found = piece[0], 0;
   while (piece[most].excess > 0 && count < PIECES) {
     narrow_piece *left = &piece[most], *right = &piece[count++];
     double middle = left->t0 + (left->t1 - left->t0) / 2;
-    *right = (narrow_piece){ middle, left->t1, 0 };
+    *right = (narrow_piece){ .t0 = middle, .t1 = left->t1 };
     left->t1 = middle;
     if (piece_measure (p, see, left)) return *found = *left, 0;
     if (piece_measure (p, see, right)) return *found = *right, 0;
@@ -167,7 +169,7 @@ static int path_search (const narrow_path *p, const narrow_view *see, double t0,
     if ((count & (count - 1)) == 0 && piece[most].excess <= piece_round_off (p, see, &piece[most])) return 1;
   }
   *found = piece[most];
-  return !(piece[most].excess > UNDECIDED * p->record->size);
+  return piece[most].reach == INFINITY || !(piece[most].excess > UNDECIDED * p->record->size);
 }
 
 /* 1 if a multistep method, which does not evaluate the middle of a step, can know the signal's value there: from those
@@ -248,9 +250,14 @@ int pw_narrow_open (pw_run *r, pw_error *error) {
     reads = source->reads > reads ? source->reads : reads;
   }
   if (count == 0) return PW_OK;
-  *x = (pw_narrow){ .count = count, .fixed = r->fixed_steps, .multistep = r->method->order == 0, .signal = signal, .half = 0.5, .ratio = 4 };
+  *x = (pw_narrow){ .count = count,
+                    .fixed = r->fixed_steps,
+                    .multistep = r->method->order == 0,
+                    .signal = signal,
+                    .half = 0.5,
+                    .ratio = 4 };
   x->small = r->settings.rtol;
-  if (x->fixed) x->half = 0.2, x->ratio = 1.5, x->small = FIXED_SMALL;
+  if (x->fixed) x->half = 0.25, x->ratio = 1.5, x->small = FIXED_SMALL;
   x->record = pw_arena_alloc (&r->arena, ((size_t)count + 1) * sizeof *x->record);
   x->value = pw_arena_alloc (&r->arena, ((size_t)reads + 1) * sizeof *x->value);
   x->rate = pw_arena_alloc (&r->arena, ((size_t)reads + 1) * sizeof *x->rate);
@@ -272,40 +279,63 @@ void pw_narrow_serialise (pw_run *r, pw_archive *a) {
   if (x) pw_archive_bytes (a, x->record, ((size_t)x->count + 1) * sizeof *x->record);
 }
 
-double pw_narrow_end (pw_run *r, double t1) {
-  const pw_narrow *x = r->narrow;
-  const double least = r->t + 4 * pw_least_step (r);
-  if (x == NULL || x->fixed) return t1;
-  for (double before = INFINITY, peak; t1 < before && t1 > least;) {
-    before = t1;
-    for (int i = 0; i < x->count; i++) {
-      const narrow_path p = { r, &x->signal[i], &x->record[i] };
-      const pw_signal *s = &p.signal->source->signal;
-      if (p.signal->enclosure == PW_PERIODIC)
-        t1 = fmin (t1, r->t + ADAPTIVE_PHASE / fabs (s->harmonic.omega));
-      else
-        for (int k = 0; k < ATTEMPTS && t1 > least && !path_is_clear (&p, r->t, pw_before_breakpoint (r, t1)); k++)
-          if (path_is_resolved (&p, r->t, pw_before_breakpoint (r, t1), &t1, &peak)) break;
-    }
+/* The end of a step that resolves one signal. */
+static double narrow_end (pw_run *r, int i, double t1, double least) {
+  const narrow_path p = { r, &r->narrow->signal[i], &r->narrow->record[i] };
+  double end = t1, peak;
+  if (p.signal->enclosure == PW_PERIODIC)
+    return fmin (t1, r->t + ADAPTIVE_PHASE / fabs (p.signal->source->signal.harmonic.omega));
+  for (int k = 0; k < ATTEMPTS && end > least; k++) {
+    double before = pw_before_breakpoint (r, end);
+    if (path_is_clear (&p, r->t, before) || path_is_resolved (&p, r->t, before, &end, &peak)) break;
   }
-  return fmax (t1, least);
+  double *cut = &r->narrow->record[r->narrow->count].size;
+  if (end < t1 && p.signal->reads) *cut = fmax (*cut, t1 - r->t);
+  return end;
 }
 
-int pw_narrow_stop (pw_run *r, double h, double last, double *stop, pw_error *error) {
+/* Around a narrow force that depends on states Newton matrices are valid on the way of a step only: they are renewed
+ * from the step that was cut to the first that is as long again. */
+double pw_narrow_end (pw_run *r, double t1) {
+  const pw_narrow *x = r->narrow;
+  if (x == NULL || x->fixed) return t1;
+  const double least = r->t + 4 * pw_least_step (r), h = t1 - r->t;
+  double *cut = &x->record[x->count].size;
+  for (double before = INFINITY; t1 < before && t1 > least;) {
+    before = t1;
+    for (int i = 0; i < x->count; i++) t1 = narrow_end (r, i, t1, least);
+  }
+  r->matrix_outdated |= *cut > 0;
+  if (t1 - r->t >= *cut) *cut = 0;
+  return fmin (fmax (t1, least), r->t + h);
+}
+
+int pw_narrow_stop (pw_run *r, double h, double last, double *stop) {
   double t1 = fmin (r->t + h, *stop), end = pw_narrow_end (r, t1);
-  if (end >= t1) return PW_OK;
-  int status = PW_OK;
+  if (end >= t1) return 0;
   if (end - r->t < RESTART * last) {
     r->narrow->record[r->narrow->count].again = r->t;
-    status = pw_run_evaluate (r, error);
-    if (status == PW_OK) status = r->method->restart (r, error);
-    end = pw_narrow_end (r, fmin (r->t + pw_first_step (r), *stop));
+    return 1;
   }
-  *stop = fmin (*stop, end);
-  return status;
+  *stop = end;
+  return 0;
 }
 
 /* ---- Steps of fixed size ---- */
+
+/* A time in the step where the signal differs from its initial value by at least half the largest difference, if
+ * enclosures decide that; *peak: first, a time where it is not resolved. */
+static void narrow_find_peak (const narrow_path *p, double t0, double t1, double *peak) {
+  double u0 = path_value (p, t0), most = fabs (path_value (p, *peak) - u0);
+  narrow_piece found;
+  for (int k = 0; k < ATTEMPTS; k++) {
+    const narrow_view see = { .lo = u0 - 2 * most - TINY, .hi = u0 + 2 * most + TINY };
+    if (path_search (p, &see, t0, t1, &found)) return;
+    double t = found.t0 + (found.t1 - found.t0) / 2, u = fabs (path_value (p, t) - u0);
+    if (!(u > most)) return;
+    *peak = t, most = u;
+  }
+}
 
 /* The size of a step around `peak`, less than h, that resolves the signal: h / 2, h / 4, ... */
 static double narrow_step (const narrow_path *p, double peak, double h) {
@@ -327,7 +357,10 @@ static void narrow_check_step (pw_run *r, int i, double t0, double t1, double we
     if (p.signal->enclosure == PW_ENCLOSED) weight = 1;
     if (weight == 0 || path_is_clear (&p, t0, t1) || path_is_resolved (&p, t0, t1, &end, &peak)) return;
     /* the first times, then at each power of 2 */
-    if (p.record->steps < 2 * EVERY || frexp (p.record->steps + 1, &(int){ 0 }) == 0.5) step = narrow_step (&p, peak, h);
+    if (p.record->steps < 2 * EVERY || frexp (p.record->steps + 1, &(int){ 0 }) == 0.5) {
+      if (p.signal->enclosure == PW_ENCLOSED) narrow_find_peak (&p, t0, t1, &peak);
+      step = narrow_step (&p, peak, h);
+    }
   }
   p.record->steps += weight;
   p.record->step = fmin (p.record->step, step);
@@ -361,7 +394,8 @@ int pw_narrow_count_several (pw_run *r, double h, int count) {
   if (x == NULL) return count;
   narrow_record *all = &x->record[x->count];
   for (int i = 0; i < x->count; i++)
-    if (x->signal[i].reads && !path_is_straight (&(narrow_path){ r, &x->signal[i], &x->record[i] }, r->t, r->t + count * h, h))
+    if (x->signal[i].reads &&
+        !path_is_straight (&(narrow_path){ r, &x->signal[i], &x->record[i] }, r->t, r->t + count * h, h))
       return 0;
   for (int k = 0; k < count; k++) {
     double t0 = r->t + k * h;

@@ -282,14 +282,19 @@ static int ida_reach (pw_method_data *d) {
 }
 
 /* Reduces *stop so that the next step resolves all signals. */
-static int ida_resolve (const pw_method_data *d, double *stop, pw_error *error) {
+static int ida_resolve (pw_method_data *d, double *stop, pw_error *error) {
+  pw_run *r = d->sun.run;
   long steps = 0;
   double next = 0, last = 0;
   IDAGetNumSteps (d->ida, &steps);
   IDAGetCurrentStep (d->ida, &next);
   IDAGetLastStep (d->ida, &last);
-  if (steps == 0) next = pw_first_step (d->sun.run), last = 0;
-  return pw_narrow_stop (d->sun.run, next, last, stop, error);
+  if (steps == 0) next = pw_first_step (r), last = 0;
+  if (!pw_narrow_stop (r, next, last, stop)) return PW_OK;
+  int status = pw_run_evaluate (r, error);
+  if (status == PW_OK) status = ida_restart (r, error);
+  if (status == PW_OK) (void)pw_narrow_stop (r, pw_first_step (r), 0, stop);
+  return status;
 }
 
 static int ida_advance (pw_run *r, double t_end, pw_error *error) {

@@ -283,17 +283,32 @@ static int multistep_reach (pw_method_data *d, double t, pw_error *error) {
   return PW_OK;
 }
 
+static int multistep_restart (pw_run *r, pw_error *error) {
+  pw_method_data *d = r->data;
+  pw_sun_restart (&d->sun);
+  d->evaluated = 1;
+  int flag = CVodeReInit (d->cvode, r->t, d->sun.y);
+  if (flag == CV_SUCCESS) flag = CVodeSetInitStep (d->cvode, pw_first_step (r));
+  pw_quadrature_restart (&d->sun.quadrature, r);
+  return flag == CV_SUCCESS ? PW_OK : pw_sun_fail_restart (&d->sun, flag, error);
+}
+
 /* Reduces *stop so that the next step resolves all signals.  At a stop time CVODES announces no size, but enlarges the
  * last one by a factor of at most 10, or 1e4 if it was the first. */
-static int multistep_resolve (const pw_method_data *d, double *stop, pw_error *error) {
+static int multistep_resolve (pw_method_data *d, double *stop, pw_error *error) {
+  pw_run *r = d->sun.run;
   long steps = 0;
   double next = 0, last = 0;
   CVodeGetNumSteps (d->cvode, &steps);
   CVodeGetCurrentStep (d->cvode, &next);
   CVodeGetLastStep (d->cvode, &last);
   if (d->stopped) next = (steps == 1 ? 1e4 : 10) * last;
-  if (steps == 0) next = pw_first_step (d->sun.run), last = 0;
-  return pw_narrow_stop (d->sun.run, next, last, stop, error);
+  if (steps == 0) next = pw_first_step (r), last = 0;
+  if (!pw_narrow_stop (r, next, last, stop)) return PW_OK;
+  int status = pw_run_evaluate (r, error);
+  if (status == PW_OK) status = multistep_restart (r, error);
+  if (status == PW_OK) (void)pw_narrow_stop (r, pw_first_step (r), 0, stop);
+  return status;
 }
 
 static int multistep_advance (pw_run *r, double t_end, pw_error *error) {
@@ -324,16 +339,6 @@ static int multistep_at (pw_run *r, double t, pw_error *error) {
   }
   if (status > 0) return pw_fail_singular (r, t, error);
   return status == PW_OK ? PW_OK : pw_fail_signal (t, error);
-}
-
-static int multistep_restart (pw_run *r, pw_error *error) {
-  pw_method_data *d = r->data;
-  pw_sun_restart (&d->sun);
-  d->evaluated = 1;
-  int flag = CVodeReInit (d->cvode, r->t, d->sun.y);
-  if (flag == CV_SUCCESS) flag = CVodeSetInitStep (d->cvode, pw_first_step (r));
-  pw_quadrature_restart (&d->sun.quadrature, r);
-  return flag == CV_SUCCESS ? PW_OK : pw_sun_fail_restart (&d->sun, flag, error);
 }
 
 /* ---- Methods ---- */

@@ -119,7 +119,7 @@ static const struct {
 } shape[] = { { "gauss", gauss, gauss_integral, 2 },       { "peak", peak, peak_integral, 2 },
               { "product", product, product_integral, 2 }, { "edges", edges, edges_integral, 4 },
               { "burst", burst, burst_integral, 1 },       { "spike", spike, spike_integral, 0.25 } };
-enum { SHAPES = sizeof shape / sizeof *shape, BURST = 4 };
+enum { SHAPES = sizeof shape / sizeof *shape, BURST = 4, SPIKES = 5 };
 
 /* ---- Adaptive methods ---- */
 
@@ -141,7 +141,6 @@ TEST (momentum) {
         runs_state (x.system, adaptive[k], &(pw_settings){ .rtol = 1e-6, .span = END }, END, q, v, NULL);
         double exact = shape[i].integral (&b);
         snprintf (what, sizeof what, "%s, %s, w = %.2g", shape[i].name, adaptive[k], b.w);
-        if (fabs(v[0]-exact)>2e-4*(1+fabs(exact))) print_error("%s\n", text);
         check_close (what, v[0], exact, 2e-4 * (1 + fabs (exact)), "200 tolerances of 1e-6; measured: 60");
       }
       gallery_close (&x);
@@ -154,12 +153,12 @@ TEST (place) {
   double q[3], v[3];
   srand (2);
   for (int n = 0; n < 30; n++) {
-    double w = pow (10, random_between (-6, -1)), c = random_between (0.7, 4), A = pow (10, random_between (-1, 0.5)) / w;
+    double w = pow (10, random_between (-6, -1)), c = random_between (0.7, 4),
+           A = pow (10, random_between (-1, 0.5)) / w;
     snprintf (text, sizeof text, "\"%.17g*exp (-((b.x - %.17g)/%.17g)^2)\"", A, c, w);
     gallery_scene x = pushed (text, 3);
     for (int k = 0; adaptive[k]; k++) {
       runs_state (x.system, adaptive[k], &(pw_settings){ .rtol = 1e-6, .span = END }, END, q, v, NULL);
-      if (fabs(v[0]-sqrt (9 + 2 * A * w * sqrt (PI)))>1e-3) print_error("%s\n", text);
       snprintf (what, sizeof what, "%s, w = %.2g", adaptive[k], w);
       check_close (what, v[0], sqrt (9 + 2 * A * w * sqrt (PI)), 1e-3, "200 tolerances at 5 m/s");
     }
@@ -216,8 +215,9 @@ TEST (resolved) {
         pw_statistics seen, blind;
         runs_state (x.system, adaptive[k], &set, 10, state, state + 3, &seen);
         runs_state (other, adaptive[k], &set, 10, same, same + 3, &blind);
-        if (seen.steps != blind.steps) print_error ("%s, %s, rtol %g: %ld steps, %ld without\n", smooth[i], adaptive[k],
-                                                    rtol, seen.steps, blind.steps);
+        if (seen.steps != blind.steps)
+          print_error ("%s, %s, rtol %g: %ld steps, %ld without\n", smooth[i], adaptive[k], rtol, seen.steps,
+                       blind.steps);
         assert_int_equal (seen.steps, blind.steps);
         check_bits (smooth[i], state, same, 6);
       }
@@ -257,14 +257,14 @@ TEST (fixed) {
       double step = pow (10, random_between (-2.5, -1.2)), resolving;
       double width = step * (wide ? random_between (2, 6) : pow (10, random_between (-3, log10 (0.25))));
       bump b = { 5, random_between (0.9, 2.1), width / shape[i].width };
-      if (i == BURST && !wide) continue; /* steps end at its breakpoints */
+      if (i == BURST && !wide) continue;       /* steps end at its breakpoints */
+      if (i == SPIKES && b.w > 0.17) continue; /* its points would not be within the run */
       shape[i].text (&b, text, sizeof text);
       gallery_scene x = pushed (text, 0);
       long count = unresolved (&x, method[n / 2 % 4], step, &resolving);
       if ((count == 0) != wide) print_error ("%s, step %g, width %g, c %.17g\n", shape[i].name, step, width, b.c);
       assert_int_equal (count == 0, wide);
       if (!wide) {
-        if (fabs (log (resolving / width)) > 2) print_error ("%s, step %g, width %g, c %.17g: %ld, %g\n", shape[i].name, step, width, b.c, count, resolving);
         check_below ("count", (double)count, 12, "steps around one place");
         check_close ("log4 of the step that resolves it", log (resolving / width) / log (4), 0, 1.5, "halvings");
       }

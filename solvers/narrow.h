@@ -17,9 +17,9 @@ void pw_narrow_serialise (pw_run *r, pw_archive *a);
 double pw_narrow_end (pw_run *r, double t1);
 
 /* The same for a multistep method that announces a next step of size h, after one of size `last` (0: after a restart):
- * reduces *stop to where it must stop.  If the step is much shorter than the last one the method restarts, since its
- * error estimate would rely on what was before.  Errors: PW_METHOD, PW_RESOURCE. */
-int pw_narrow_stop (pw_run *r, double h, double last, double *stop, pw_error *error);
+ * reduces *stop to where it must stop.  1 if the step would be much shorter than the last one: then the method must
+ * restart and ask again, since its error estimate would rely on what was before. */
+int pw_narrow_stop (pw_run *r, double h, double last, double *stop);
 
 /* Steps of fixed size, before they are made: counts the one to t1, or `count` ones of size h, of which it returns how
  * many may be made at once: 0 if a signal that depends on states must be checked before each. */
