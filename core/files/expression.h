@@ -80,9 +80,10 @@ void pw_expression_derivatives (const pw_expression *expression, const double *v
 double pw_expression_breakpoint (const pw_expression *expression, double t);
 
 /* Bounds of the value and its first two time derivatives, while each variable and its time derivative are in the
- * given intervals; infinite: unknown.  lo > hi: no value is a number.  rate of the time: 1 to 1. */
+ * given intervals; infinite: unknown.  lo > hi: no value is a number.  rate of the time: 1 to 1.  order 1: only the
+ * first derivative. */
 void pw_expression_enclose (const pw_expression *expression, const pw_interval *value, const pw_interval *rate,
-                            pw_interval u[3]);
+                            int order, pw_interval u[3]);
 
 /* ---- Words ---- */
 

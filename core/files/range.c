@@ -336,6 +336,7 @@ static pw_range range_apply (const pw_expression_code *c, const pw_range *x, int
 
 typedef struct {
   pw_range u[3];
+  int order; /* of the highest derivative that is needed, 1 or 2; others are not computed */
 } range_jet;
 
 static pw_range range_times (pw_range x, pw_range y) {
@@ -391,6 +392,7 @@ static void range_partials (const pw_expression_function *f, const pw_range *x, 
 /* The chain rule for a function of the first operand alone. */
 static void range_chain (const range_jet *x, pw_range first, pw_range second, range_jet *r) {
   r->u[1] = range_times (first, x->u[1]);
+  if (r->order < 2) return;
   r->u[2] = range_plus (range_times (second, range_square (x->u[1])), range_times (first, x->u[2]));
 }
 
@@ -403,6 +405,7 @@ static void range_power_jet (const range_jet *x, double n, range_jet *r) {
 
 static void range_product_jet (const range_jet *x, const range_jet *y, range_jet *r) {
   r->u[1] = range_plus (range_times (x->u[1], y->u[0]), range_times (x->u[0], y->u[1]));
+  if (r->order < 2) return;
   r->u[2] = range_plus (range_scaled (2, range_times (x->u[1], y->u[1])),
                         range_plus (range_times (x->u[2], y->u[0]), range_times (x->u[0], y->u[2])));
 }
@@ -410,6 +413,7 @@ static void range_product_jet (const range_jet *x, const range_jet *y, range_jet
 static void range_quotient_jet (const range_jet *x, const range_jet *y, range_jet *r) {
   pw_range fall = range_times (r->u[0], y->u[1]);
   r->u[1] = range_over (range_plus (x->u[1], range_negative (&fall)), y->u[0]);
+  if (r->order < 2) return;
   fall = range_plus (range_scaled (2, range_times (r->u[1], y->u[1])), range_times (r->u[0], y->u[2]));
   r->u[2] = range_over (range_plus (x->u[2], range_negative (&fall)), y->u[0]);
 }
@@ -439,7 +443,7 @@ static void range_choose_jet (int op, const range_jet *x, range_jet *r) {
 static void range_apply_jet (const pw_expression_code *c, range_jet *x, int operands) {
   const range_jet *y = x + 1;
   const pw_range value[3] = { x->u[0], operands > 1 ? y->u[0] : range_nan, operands > 2 ? x[2].u[0] : range_nan };
-  range_jet r = { { range_apply (c, value, operands), range_all, range_all } };
+  range_jet r = { { range_apply (c, value, operands), range_all, range_all }, x->order };
   const pw_expression_function *f = &pw_expression_functions[c->index];
   pw_range first = range_constant (1), second = range_constant (0);
   if (c->op == PW_OP_FUNCTION_OF_ONE || c->op == PW_OP_TAN) {
@@ -470,7 +474,7 @@ static void range_apply_jet (const pw_expression_code *c, range_jet *x, int oper
 }
 
 void pw_expression_enclose (const pw_expression *expression, const pw_interval *value, const pw_interval *rate,
-                            pw_interval u[3]) {
+                            int order, pw_interval u[3]) {
   range_jet stack[PW_EXPRESSION_STACK], *top = stack;
   const pw_range zero = range_constant (0);
   for (const pw_expression_code *c = expression->code, *end = c + expression->codes; c < end; c++) {
@@ -479,10 +483,11 @@ void pw_expression_enclose (const pw_expression *expression, const pw_interval *
     if (operands)
       range_apply_jet (c, top, operands);
     else if (c->op == PW_OP_CONSTANT)
-      *top = (range_jet){ { range_constant (c->value), zero, zero } };
+      *top = (range_jet){ { range_constant (c->value), zero, zero }, order };
     else /* a state: its second derivative is not given */
       *top = (range_jet){ { range_between (value[i].lo, value[i].hi), range_between (rate[i].lo, rate[i].hi),
-                            i == PW_EXPRESSION_TIME ? zero : range_all } };
+                            i == PW_EXPRESSION_TIME ? zero : range_all },
+                          order };
     top++;
   }
   for (int i = 0; i < 3; i++) u[i] = (pw_interval){ top[-1].u[i].lo, top[-1].u[i].hi };

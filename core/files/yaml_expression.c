@@ -144,7 +144,7 @@ static void signal_enclose (void *context, const pw_interval *value, const pw_in
   int last = f->derivatives;
   pw_interval u[4] = { [3] = { -INFINITY, INFINITY } };
   while (last > 0 && f->expression[last] == NULL) last--;
-  pw_expression_enclose (f->expression[last], value, rate, u);
+  pw_expression_enclose (f->expression[last], value, rate, f->derivatives > last ? 2 : 1, u);
   memcpy (bound, u + f->derivatives - last, 2 * sizeof *bound);
 }
 
