@@ -340,11 +340,12 @@ int pw_scatter_lay_out (pw_scatter_map *t, int n) {
   t->colptr = malloc (((size_t)n + 1) * sizeof *t->colptr);
   t->rowind = malloc ((t->count + 1) * sizeof *t->rowind);
   if (t->failed || !t->place || !t->colptr || !t->rowind) return PW_RESOURCE;
-  const struct pw_scatter_entry *e = t->entry;
+  size_t entry = 0;
   if (t->count > 0) qsort (t->entry, t->count, sizeof *t->entry, scatter_compare);
   for (int c = 0; c < n; c++) {
     t->colptr[c] = (int64_t)t->nonzeros;
-    for (int last_row = -1; e < t->entry + t->count && e->col == c; e++) {
+    for (int last_row = -1; entry < t->count && t->entry[entry].col == c; entry++) {
+      const struct pw_scatter_entry *e = &t->entry[entry];
       if (e->row != last_row) t->rowind[t->nonzeros++] = last_row = e->row;
       t->place[e->number] = t->nonzeros - 1;
     }
