@@ -39,7 +39,7 @@ sum=$(across 1900 '+t')
 { echo "$body"; echo 'elements:'
   many 300 '  - {torque: t%d, body: [a, ground], value: {table: {file: table.csv, columns: [t, v]}}}'; } |
   refused 'a table read again and again' 'have more than 20000000 points'
-many 1000001 '%d,%d' >table.csv
+many 4000001 '%d,%d' >table.csv
 signal '{table: {file: table.csv}}' | refused 'a large table' 'table.csv'
 
 # ---- What is not the model's ----
