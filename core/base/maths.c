@@ -1,5 +1,5 @@
-/* Sine and cosine of an angle [rad], the same on every machine; for |x| >= PW_SINE_LIMIT, infinity and NaN those of the C
- * library.  Elliptic functions. */
+/* Sine and cosine of an angle [rad], the same on every machine; for |x| >= PW_SINE_LIMIT, infinity and NaN those of the
+ * C library.  Elliptic functions. */
 #include <math.h>
 #include "pinwheel.h"
 #include "sine.h"

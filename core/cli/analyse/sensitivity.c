@@ -59,8 +59,8 @@ static int sensitivity_neighbour (const sensitivity *cmd, const double *values, 
   return run->run ? PW_OK : error->status;
 }
 
-/* Opens the neighbours on both sides.  Refuses a parameter that changes the number of bodies or elements, and an initial
- * value that the constraints determine: making a neighbour consistent moves it by more than 1 % of the step.  A
+/* Opens the neighbours on both sides.  Refuses a parameter that changes the number of bodies or elements, and an
+ * initial value that the constraints determine: making a neighbour consistent moves it by more than 1 % of the step.  A
  * neighbour that cannot be opened is no error here: the differences use the other side. */
 static int sensitivity_check (const sensitivity *cmd, const double *values, int p, pw_error *error) {
   const pw_unknowns *u = &cmd->unknowns;
