@@ -509,10 +509,11 @@ static void periodic_draw_branch (const pw_periodic_command *cmd, pw_curves *c, 
 
 /* The multipliers of all points, the trivial ones as rings, and the unit circle. */
 static void periodic_draw_multipliers (const pw_periodic_command *cmd, pw_curves *c, const double range[2]) {
+  const char *scale = PW_FIGURE_LABEL (cmd->vary.name, cmd->vary.unit); /* lives as long as this block */
   double reach = 1;
   for (int i = 0; i < cmd->points; i++) reach = fmax (reach, periodic_largest (&cmd->point[i].orbit));
   pw_panel panel = { .x_label = "real part", .y_label = "imaginary part", .aspect = 1 };
-  if (cmd->vary_text) panel.z_label = PW_FIGURE_LABEL (cmd->vary.name, cmd->vary.unit);
+  if (cmd->vary_text) panel.z_label = scale;
   panel.type = cmd->vary_text ? 0 : PW_PANEL_HALF;
   panel.x[1] = panel.y[1] = 1.12 * reach, panel.x[0] = panel.y[0] = -panel.x[1];
   panel.z[0] = range[0], panel.z[1] = range[1];
