@@ -1,4 +1,4 @@
-/* The data of a run and the functions that the integrators share; first the watchdog.
+/* The data of a run and the functions that the integrators share, for solvers/ only; first the watchdog.
  *
  * The watchdog checks that the states of a run follow the motion of the mechanism: constraints are not lost, and the
  * motion does not jump to another branch at a singular configuration.
@@ -80,7 +80,7 @@ int pw_change_point_check (struct pw_run *r, double sine, pw_error *error);
  * Returns PW_METHOD. */
 int pw_dead_point_explain (struct pw_run *r, pw_error *error);
 
-/* The data of a run and the functions that the integrators share.  For solvers/ only. */
+/* ---- The data of a run ---- */
 
 enum { PW_MAX_OPTIONS = 12 };
 

@@ -24,7 +24,7 @@ static const char chaotic[] = "pinwheel: 1\n"
                               "  - {pin: A, body: [a, ground], at: [[-0.5, 0], [0, 0]]}\n"
                               "  - {pin: B, body: [a, b], at: [[0.5, 0], [-0.5, 0]]}\n";
 
-/* Every method at a random tolerance: phi (t) = cos (2 t). */
+/* Every method at two tolerances or steps: phi (t) = cos (2 t). */
 TEST (contains) {
   char name[40], command[200];
   int outside = 0, runs = 0;
@@ -46,7 +46,7 @@ TEST (contains) {
     }
   assert_true (runs >= 50);
   printf ("# %d runs, %d errors larger than stated\n", runs, outside);
-  assert_true (outside <= 2);
+  assert_true (outside <= 1); /* 99 % of 112 numbers are promised */
 }
 
 /* Fixed steps far from round-off: the error of rk4 is 16/15 of the difference, so the statement is tight. */

@@ -5,7 +5,6 @@
 #include <math.h>
 #include "cli.h"
 #include "pinwheel-analysis.h"
-#include "cli.h"
 
 enum { PW_HOLDS = 40 }; /* quantities held at given values (pw_system_find_held), at most */
 

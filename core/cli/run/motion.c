@@ -9,7 +9,7 @@ int pw_motion_open (pw_motion *motion, const pw_system *system, int times, doubl
   *motion = (pw_motion){ .t = calloc ((size_t)times * (size_t)(1 + width), sizeof *motion->t) };
   if (motion->t == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   motion->times = times, motion->width = width, motion->value = motion->t + times;
-  for (int k = 0; k < times; k++) motion->t[k] = k + 1 < times ? t_end * (k + 1) / times : t_end;
+  pw_equal_times (t_end, times, motion->t);
   return PW_OK;
 }
 

@@ -31,6 +31,11 @@ static inline double *pw_motion_at (const pw_motion *motion, int k) {
   return motion->value + (size_t)k * (size_t)motion->width;
 }
 
+/* Equally spaced times, t_end / times, ..., t_end. */
+static inline void pw_equal_times (double t_end, int times, double *t) {
+  for (int k = 0; k < times; k++) t[k] = k + 1 < times ? t_end * (k + 1) / times : t_end;
+}
+
 /* Opens a motion of 1 to MOTION_SAMPLES times, t_end / times, ..., t_end, without samples.  Errors: PW_RESOURCE. */
 int pw_motion_open (pw_motion *motion, const pw_system *system, int times, double t_end, pw_error *error);
 /* The same at the times of another motion. */

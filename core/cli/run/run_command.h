@@ -22,11 +22,9 @@ typedef struct {
   pw_output *lock;       /* FILE.part, empty, which locks out other processes during the whole run */
 } pw_checkpoints;
 
-enum { PW_ERROR_TIMES = 100 };
-
 /* `--error` (run_error.c): the repetition of the run, in a thread of its own. */
 typedef struct {
-  double t[PW_ERROR_TIMES]; /* at which the runs are compared [s] */
+  double t[MOTION_SAMPLES]; /* at which the runs are compared [s] */
   int taken;                /* rows of the run stored so far */
   int width;                /* numbers of a row */
   double *rows, *end;       /* those of the run; the errors at the end, and the largest ones, after them */

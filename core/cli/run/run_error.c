@@ -25,25 +25,24 @@ int pw_error_run_start (pw_run_cli *command, pw_error *error) {
   if (command->checkpoints.resume_path)
     return pw_fail (error, PW_INPUT,
                     "--error compares the run from its beginning on: it cannot be combined with --resume");
-  for (int k = 0; k < PW_ERROR_TIMES; k++)
-    e->t[k] = k + 1 < PW_ERROR_TIMES ? command->t_end * (k + 1) / PW_ERROR_TIMES : command->t_end;
+  pw_equal_times (command->t_end, MOTION_SAMPLES, e->t);
   e->settings = command->settings, e->limit = command->limit;
   e->settings.stop = error_stop, e->settings.stop_context = e;
   e->width = pw_run_record_width (command->run);
   e->repetition =
-      pw_repetition_open (command->compiled.system, command->method, &e->settings, e->t, PW_ERROR_TIMES, error);
+      pw_repetition_open (command->compiled.system, command->method, &e->settings, e->t, MOTION_SAMPLES, error);
   if (e->repetition == NULL) return error->status;
-  e->rows = calloc ((PW_ERROR_TIMES + 2) * (size_t)e->width, sizeof *e->rows);
+  e->rows = calloc ((MOTION_SAMPLES + 2) * (size_t)e->width, sizeof *e->rows);
   if (e->rows == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   e->result = (pw_stated_error){ .columns = e->width, .name = pw_system_record_name };
-  e->end = e->rows + PW_ERROR_TIMES * e->width;
+  e->end = e->rows + MOTION_SAMPLES * e->width;
   e->result.end = e->end, e->result.largest = e->end + e->width;
   e->started = pthread_create (&e->thread, NULL, error_repeat, e) == 0;
   return e->started ? PW_OK : pw_fail (error, PW_RESOURCE, "a thread for --error cannot be started");
 }
 
 double pw_error_run_next (const pw_error_run *e) {
-  return e->started && e->taken < PW_ERROR_TIMES ? e->t[e->taken] : INFINITY;
+  return e->started && e->taken < MOTION_SAMPLES ? e->t[e->taken] : INFINITY;
 }
 
 int pw_error_run_add (pw_error_run *e, pw_run *run, pw_error *error) {

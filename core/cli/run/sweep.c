@@ -11,6 +11,7 @@
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
+#include "motion.h"
 #include "pinwheel-analysis.h"
 #include "sweep.h"
 
@@ -171,16 +172,15 @@ static pw_initial_value *row_initial (const pw_plan *plan, const sweep_row *row,
   return initial;
 }
 
-/* Makes the whole run and its repetition; stores the stated errors of the states at the end, unless they are unknown.
- * */
+/* Makes the whole run and its repetition; stores the stated errors of the states at the end if they are known. */
 static void row_state_error (sweep_row *row, const pw_plan *plan, const pw_settings *settings) {
-  enum { TIMES = 100 };
+  enum { TIMES = MOTION_SAMPLES };
   const int width = pw_run_record_width (row->run), states = 2 * pw_system_coordinates (row->system->model.system);
   double t[TIMES], *rows = malloc ((TIMES + 2) * (size_t)width * sizeof *rows),
                    *end = rows ? rows + TIMES * width : NULL;
   long recorded;
   pw_error own = { 0 };
-  for (int k = 0; k < TIMES; k++) t[k] = k + 1 < TIMES ? plan->t_end * (k + 1) / TIMES : plan->t_end;
+  pw_equal_times (plan->t_end, TIMES, t);
   row->state_error = malloc ((size_t)states * sizeof *end);
   if (rows == NULL || row->state_error == NULL)
     row->status = pw_fail (&row->error, PW_RESOURCE, "out of memory");

@@ -207,14 +207,13 @@ _declare(files, _p, ("pw_scene_code_open", _p, _p, _e), ("pw_scene_code_table", 
 _declare(files, None, ("pw_scene_code_close", _p))
 _declare(core, _p, ("pw_system_compile", _p, _e), ("pw_run_open", _p, _s, c.POINTER(pw_settings), _e))
 _declare(core, _i, ("pw_system_coordinates", _p), ("pw_system_rows", _p), ("pw_system_bodies", _p), ("pw_system_signals", _p),
-         ("pw_system_ledger_entries", _p), ("pw_system_find_state", _p, _s, _e))
-_declare(core, _s, ("pw_system_state_name", _p, _i, _s, _z), ("pw_system_reaction_name", _p, _i, _s, _z),
-         ("pw_system_ledger_name", _p, _i, _s, _z), ("pw_system_signal_name", _p, _i, _s, _z),
-         ("pw_system_contact_name", _p, _i, _s, _z),
+         ("pw_system_find_state", _p, _s, _e))
+_declare(core, _s, ("pw_system_state_name", _p, _i, _s, _z), ("pw_system_signal_name", _p, _i, _s, _z),
+         ("pw_system_record_name", _p, _i, _s, _z), ("pw_system_record_unit", _p, _i),
          ("pw_system_table_notice", _p, _i, _d, _s, _z),
-         ("pw_system_state_unit", _p, _i), ("pw_system_reaction_unit", _p, _i), ("pw_system_signal_unit", _p, _i))
+         ("pw_system_state_unit", _p, _i), ("pw_system_signal_unit", _p, _i))
 _declare(core, _i, ("pw_run_advance_to", _p, _d, _d, _e), ("pw_run_restart", _p, _p, _p, _e),
-         ("pw_run_record_width", _p), ("pw_run_linear_modes", _p, _i, c.POINTER(pw_linear), _e),
+         ("pw_run_record_width", _p), ("pw_system_record_width", _p, _i), ("pw_run_linear_modes", _p, _i, c.POINTER(pw_linear), _e),
          ("pw_run_record", _p, _d, _p, c.c_long, c.c_long, _p, c.POINTER(c.c_long), _e))
 _declare(core, _p, ("pw_repetition_open", _p, _s, c.POINTER(pw_settings), _p, c.c_long, _e))
 _declare(core, _i, ("pw_repetition_run", _p, c.c_long, _e), ("pw_repetition_error", _p, _p, c.c_long, _p, _p, _e))

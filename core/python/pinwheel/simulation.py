@@ -16,8 +16,7 @@ from . import _library as lib
 from ._progress import watched
 from .results import Result, _nearest
 
-_FIRST_COLUMNS = {"t": "s", "residual.position": "", "residual.velocity": "", "kinetic": "J", "potential": "J", "work": "J",
-                  "loss": "J", "projection": "J", "balance": "J"}  # of every table, with their units
+_FIRST_COLUMNS = 9  # before the states: PW_RECORD_STATES
 _MEMORY = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")  # of the machine [bytes]
 
 
@@ -113,22 +112,13 @@ def warn_of_unused(method: str, given, stacklevel: int) -> None:
 
 def columns(s, ledger) -> tuple[dict, dict]:
     """Of a compiled system: units of all columns by name, in their order; names of columns by group, as in :class:`Result`."""
-    n, core = lib.core.pw_system_coordinates(s), lib.core
-    units, groups = dict(_FIRST_COLUMNS), {}
-    groups["states"] = [lib.name_of(core.pw_system_state_name, s, i) for i in range(2 * n)]
-    for i, name in enumerate(groups["states"]):
-        units[name] = lib.text(core.pw_system_state_unit(s, i))
-    for i, name in enumerate(groups["states"][n:]):
-        unit = units[name]
-        units[name + "'"] = unit[:-1] + "s^2" if unit.endswith("/s") else unit + "/s"
-    for i in range(2 * core.pw_system_contacts(s)):
-        units[lib.name_of(core.pw_system_contact_name, s, i)] = "m"
-    groups["reactions"] = [lib.name_of(core.pw_system_reaction_name, s, i) for i in range(core.pw_system_rows(s))]
-    for i, name in enumerate(groups["reactions"]):
-        units[name] = lib.text(core.pw_system_reaction_unit(s, i))
-    entries = core.pw_system_ledger_entries(s) if ledger else 0
-    groups["ledger"] = [lib.name_of(core.pw_system_ledger_name, s, i) for i in range(entries)]
-    units.update(dict.fromkeys(groups["ledger"], "J"))
+    core, width = lib.core, lib.core.pw_system_record_width(s, bool(ledger))
+    names = [lib.name_of(core.pw_system_record_name, s, i) for i in range(width)]
+    n = core.pw_system_coordinates(s)
+    reactions = _FIRST_COLUMNS + 3 * n + 2 * core.pw_system_contacts(s)
+    entries = reactions + core.pw_system_rows(s)
+    groups = {"states": names[_FIRST_COLUMNS:_FIRST_COLUMNS + 2 * n], "reactions": names[reactions:entries], "ledger": names[entries:]}
+    units = {name: lib.text(core.pw_system_record_unit(s, i)) for i, name in enumerate(names)}
     return units, groups
 
 
@@ -362,7 +352,7 @@ class Simulation:
         if times is None:
             every = lib.number(every, "every", above=0)
             count = np.floor((t_end - start) / every * (1 + 1e-12))
-            if not count * 8 * len(_FIRST_COLUMNS) < _MEMORY:
+            if not count * 8 * _FIRST_COLUMNS < _MEMORY:
                 raise lib.ResourceError(f"every = {every}: {count:g} samples: out of memory")
             times = start + every * np.arange(count + 1)
             return np.append(times[:-1], t_end) if abs(times[-1] - t_end) < 1e-9 * every else np.append(times, t_end)
