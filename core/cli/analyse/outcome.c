@@ -1,4 +1,4 @@
-/* Outputs of analyses: columns of the table of `run` by name, and texts of outputs; functionals: outcome.c. */
+/* Outputs of analyses: columns of the table of `run` by name, texts of outputs, and functionals of runs. */
 #define _POSIX_C_SOURCE 200809L
 #include <gsl/gsl_errno.h>
 #include <gsl/gsl_min.h>
