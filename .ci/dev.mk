@@ -32,7 +32,7 @@ words:
 layers: all
 	@BUILD=$(BUILD) sh .ci/layers
 
-SOURCES := $(foreach d,core solvers models tests benchmarks docs,$(wildcard $(addprefix $(d)/,*.[ch] */*.[ch] */*/*.[ch])))
+SOURCES := $(foreach d,core solvers models tests benchmarks docs,$(wildcard $(addprefix $(d)/,*.[ch] */*.[ch] */*/*.[ch] */*/*/*.[ch])))
 
 format:
 	clang-format -i $(SOURCES)
