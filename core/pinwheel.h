@@ -456,6 +456,15 @@ typedef struct {
   pw_signal angle, rate;      /* targets of phi1 - phi2 [rad], of omega1 - omega2 [rad/s] */
 } pw_motor;
 
+/* State: a first-order state z of a controller, an actuator, a motor's current: z' = rate.  Signals read it by its name.
+ * It has no mass: energies do not contain it. */
+typedef struct {
+  const char *name;
+  pw_signal rate;   /* of the time, positions, velocities and states, also of z itself [unit/s] */
+  double start;     /* initial value [unit] */
+  const char *unit; /* "rad s"; NULL or "": none */
+} pw_state;
+
 /* Marker: a point of a body that appears in tables, figures and animations.  It has no effect on the motion. */
 typedef struct {
   const char *name, *body;
@@ -487,18 +496,19 @@ typedef struct {
   PW_KIND (force)              \
   PW_KIND (torque)             \
   PW_KIND (motor)              \
+  PW_KIND (state)              \
   PW_KIND (marker)
 
 /* ---- What an element type provides ---- */
 
 /* PW_POINT: fixed in a body; point i of a definition is in the frame of its body i.  PW_VECTOR: any other pair. */
-typedef enum { PW_NUMBER, PW_POINT, PW_VECTOR, PW_BODY, PW_SIGNAL, PW_CHOICE } pw_field_type;
+typedef enum { PW_NUMBER, PW_POINT, PW_VECTOR, PW_BODY, PW_SIGNAL, PW_CHOICE, PW_TEXT } pw_field_type;
 
 /* One field of a definition structure: used by validation, text models, `show`, `list kinds` and the manual. */
 typedef struct pw_field {
   const char *name;           /* as written in a model file */
   size_t offset;              /* in the definition structure */
-  pw_field_type type;         /* double, double[2], double[2], const char *, pw_signal, int */
+  pw_field_type type;         /* double, double[2], double[2], const char *, pw_signal, int, const char * */
   int count;                  /* array length; 0 stands for 1 */
   const char *unit;           /* NULL: no unit */
   int required;               /* 1: required in a text model */
@@ -752,6 +762,10 @@ enum { PW_NAME_BYTES = 160 }; /* size of buffers in which every name of a system
 /* Name and unit of a state ("frame.vx", "m/s").  The name is written to the buffer, which is returned. */
 char *pw_system_state_name (const pw_system *s, int state, char *buffer, size_t size);
 const char *pw_system_state_unit (const pw_system *s, int state);
+
+/* 1 for a coordinate that has no meaning and is in no table: the integral of a first-order state, whose own value is
+ * the velocity with that index. */
+int pw_system_state_hidden (const pw_system *s, int state);
 
 /* Name and unit of the reaction of a constraint equation ("B.Fx", "N"), as pw_system_state_name. */
 char *pw_system_reaction_name (const pw_system *s, int row, char *buffer, size_t size);

@@ -16,7 +16,7 @@ static int kutta3_open (pw_run *r, pw_error *error) {
 /* k2 = f (t + h/2, y + h/2 k1),  k3 = f (t + h, y - h k1 + 2 h k2),  y' = y + h/6 (k1 + 4 k2 + k3)  (Kutta 1901), with
  * y = (q, v) and k = (v, a). */
 static int kutta3_advance (pw_run *r, double t_end, pw_error *error) {
-  const pw_state x = pw_run_state (r);
+  const pw_reached x = pw_run_state (r);
   const int n = pw_system_coordinates (x.system);
   const double h = pw_step_size (r, t_end);
   double *array[ARRAYS];

@@ -150,6 +150,7 @@ struct pw_run {
   double *integrand_state; /* 2 coords: the state at which integrands are evaluated */
   double scene_energy;     /* kinetic energy [J] of moving by L and 1 rad in the span; if massless: see run.c */
   double *scratch;         /* 2 (coords + 3) + 3 rows, for projections and evaluations */
+  double *atol;            /* 2 coords: absolute tolerances (pw_atol) */
   double *tolerance_bound; /* 2 coords, from pw_kind.saturation; INFINITY: unbounded */
   double *matrix_state, *matrix_range; /* 2 coords: state at which the Newton matrix was evaluated, range around it
                                         * in which it is valid (pw_kind.saturation); only if the system `saturates` */
@@ -167,13 +168,15 @@ struct pw_run {
 
 /* ---- Tolerances ---- */
 
-/* Absolute tolerance of a state, numbered as in pw_system_find_state: the user's atol, or rtol in units of the
- * scene. */
+/* The unit of a velocity at a value: that of the scene; of a first-order state the value, but at least 1. */
+static inline double pw_velocity_unit (const pw_run *r, int j, double value) {
+  return j < r->s->mechanical ? pw_unit (r->s, j) / r->w->scale.time : fmax (1, fabs (value));
+}
+
+/* Absolute tolerance of a state, numbered as in pw_system_find_state: the user's atol, or rtol in units of the scene;
+ * rtol of a first-order state, INFINITY of its integral. */
 static inline double pw_atol (const pw_run *r, int state) {
-  const int n = r->s->coords;
-  if (r->settings.atol > 0) return r->settings.atol;
-  double atol = r->settings.rtol * pw_unit (r->s, state < n ? state : state - n);
-  return state < n ? atol : atol / r->w->scale.time;
+  return r->atol[state];
 }
 /* Updates r->tolerance_bound, the bounds of tolerances due to saturating forces, and r->matrix_outdated at the state
  * reached, whose kinematics must be up to date (run.c). */

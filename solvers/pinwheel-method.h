@@ -11,7 +11,7 @@
  *     static int euler_open (pw_run *r, pw_error *error) { return pw_step_open (r, 2, error); }
  *
  *     static int euler_advance (pw_run *r, double t_end, pw_error *error) {
- *       const pw_state x = pw_run_state (r);
+ *       const pw_reached x = pw_run_state (r);
  *       double h = pw_step_size (r, t_end), *q = pw_step_array (r, 0), *v = pw_step_array (r, 1);
  *       for (int j = 0; j < pw_system_coordinates (x.system); j++) q[j] = x.q[j] + h * (v[j] = x.v[j] + h * x.a[j]);
  *       return pw_step_accept (r, PW_OK, h, q, v, error);
@@ -35,8 +35,8 @@ typedef struct {
   const double *q, *v;  /* coordinates and velocities */
   const double *a;      /* accelerations */
   const double *lambda; /* multipliers */
-} pw_state;
-pw_state pw_run_state (const pw_run *r);
+} pw_reached;
+pw_reached pw_run_state (const pw_run *r);
 
 /* The value of an option of the method's table; for a choice, its index; 0 if there is no such option. */
 double pw_run_option (const pw_run *r, const char *name);

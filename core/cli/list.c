@@ -10,9 +10,13 @@ enum { LIST_WIDTH = 110, LIST_NAMES = 100, LIST_HEADING = 14 };
 /* Of each type of field: its name, default (a choice has its first alternative), and value in an example. */
 static const struct {
   const char *name, *zero, *example;
-} list_types[] = { [PW_NUMBER] = { "number", "0", "NUMBER" },      [PW_POINT] = { "point", "[0, 0]", "[X, Y]" },
-                   [PW_VECTOR] = { "vector", "[0, 0]", "[X, Y]" }, [PW_BODY] = { "body", "", "BODY" },
-                   [PW_SIGNAL] = { "signal", "0", "SIGNAL" },      [PW_CHOICE] = { "choice", "", "" } };
+} list_types[] = { [PW_NUMBER] = { "number", "0", "NUMBER" },
+                   [PW_POINT] = { "point", "[0, 0]", "[X, Y]" },
+                   [PW_VECTOR] = { "vector", "[0, 0]", "[X, Y]" },
+                   [PW_BODY] = { "body", "", "BODY" },
+                   [PW_SIGNAL] = { "signal", "0", "SIGNAL" },
+                   [PW_CHOICE] = { "choice", "", "" },
+                   [PW_TEXT] = { "text", "", "TEXT" } };
 
 /* A row such as "radius  number [m]  required  radius of the wheel", the last column wrapped. */
 static void list_row (pw_table *t, const char *name, const char *type, const char *value, const char *about) {

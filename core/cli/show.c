@@ -93,6 +93,7 @@ static void yaml_value (const pw_field *f, const void *at, int digits) {
   if (f->type == PW_BODY) yaml_name (*(const char *const *)at);
   if (f->type == PW_SIGNAL) yaml_signal (at, digits);
   if (f->type == PW_CHOICE) fputs (f->choices[*(const int *)at], stdout);
+  if (f->type == PW_TEXT) yaml_text (*(const char *const *)at);
 }
 
 /* The values of a field as in a text model. */
@@ -204,12 +205,14 @@ static int yaml_model (const pw_cli_model *opened, pw_error *error) {
   for (int i = 0; i < ref->names; i++) printf ("  %s: %s\n", ref->name[i], YAML_NUMBER (ref->value[i]));
   if (bodies) puts ("bodies:");
   for (int i = 0; i < bodies; i++) yaml_body (&b[i]);
-  if (elements) puts ("elements:");
-  for (const pw_element *end = e + elements; e < end; e++) {
-    printf ("  - {%s: ", e->kind->name), yaml_name (pw_element_name (e));
-    yaml_fields (e->kind->fields, e->definition, ", ", YAML_DIGITS);
-    puts ("}");
-  }
+  for (int of_states = 0, written = 0; of_states < 2; of_states++, written = 0)
+    for (const pw_element *x = e; x < e + elements; x++) {
+      if ((x->kind == &pw_kind_state) != of_states) continue;
+      if (written++ == 0) puts (of_states ? "states:" : "elements:");
+      printf ("  - {%s: ", of_states ? "name" : x->kind->name), yaml_name (pw_element_name (x));
+      yaml_fields (x->kind->fields, x->definition, ", ", YAML_DIGITS);
+      puts ("}");
+    }
   if (table->reference)
     puts ("# The reference solution of the model is a function in C, which cannot be written as text.");
   if (ref->states) puts ("truth:");
@@ -318,14 +321,20 @@ static void matrices_row (pw_table *t, const char *name, const char *unit, const
   pw_row_end (t);
 }
 
+/* The coordinate, or the first-order state of which it is the integral. */
+static int matrices_state (const pw_system *s, int j) {
+  return pw_system_state_hidden (s, j) ? j + pw_system_coordinates (s) : j;
+}
+
 static void matrices_coordinates (const pw_system *s, const pw_equations *eq, const pw_sample *sample) {
   static const char *const head[] = { "", "M", "f", "q", "v", "a", NULL };
   puts ("\nM (diagonal), forces and state by coordinate [its unit]; all numbers in SI units");
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     pw_head (&t, -22, 13, head);
     for (int j = 0; j < eq->coordinates; j++) {
-      const double value[] = { eq->mass[j], eq->force[j], sample->q[j], sample->v[j], sample->a[j] };
-      matrices_row (&t, PW_NAME (pw_system_state_name, s, j), pw_system_state_unit (s, j), value, 5);
+      const int state = matrices_state (s, j);
+      const double value[] = { eq->mass[j], eq->force[j], state == j ? sample->q[j] : NAN, sample->v[j], sample->a[j] };
+      matrices_row (&t, PW_NAME (pw_system_state_name, s, state), pw_system_state_unit (s, state), value, 5);
     }
   }
 }
@@ -348,7 +357,8 @@ static void matrices_panel (const pw_system *s, const pw_equations *eq, int firs
   putchar ('\n');
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     pw_cell (&t, -22, "J");
-    for (int c = 0; c < columns; c++) pw_cell (&t, 13, PW_NAME (pw_system_state_name, s, first + c));
+    for (int c = 0; c < columns; c++)
+      pw_cell (&t, 13, PW_NAME (pw_system_state_name, s, matrices_state (s, first + c)));
     pw_row_end (&t);
     for (int i = 0, entry = 0; i < eq->rows; i++) {
       double row[MATRICES_PANEL] = { 0 };

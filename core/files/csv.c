@@ -63,6 +63,7 @@ static void csv_number (pw_csv *c, double value) {
 
 static void csv_state (pw_csv *c, const pw_sample *x, int state) {
   int n = pw_system_coordinates (c->system);
+  if (pw_system_state_hidden (c->system, state)) return;
   CSV_CELL (c, PW_NAME (pw_system_state_name, c->system, state), pw_system_state_unit (c->system, state),
             state < n ? x->q[state] : x->v[state - n]);
 }

@@ -93,9 +93,9 @@ static void json_bodies (pw_json *j, const pw_system *s, const pw_sample *x) {
 static void json_elements (pw_json *j, const pw_system *s, const pw_sample *x) {
   char element[300] = "";
   int n = pw_system_coordinates (s), first = 3 * pw_system_bodies (s);
-  if (n == first) return;
+  if (n == first || pw_system_state_hidden (s, first)) return;
   pw_json_open (j, "elements", '{');
-  for (int i = first; i < n; i++) {
+  for (int i = first; i < n && !pw_system_state_hidden (s, i); i++) {
     char *name = PW_NAME (pw_system_state_name, s, i), *dot = strrchr (name, '.');
     *dot = 0;
     if (strcmp (element, name) != 0) {
@@ -107,6 +107,16 @@ static void json_elements (pw_json *j, const pw_system *s, const pw_sample *x) {
     pw_json_number (j, strrchr (PW_NAME (pw_system_state_name, s, n + i), '.') + 1, x->v[i]);
   }
   pw_json_close (j, '}');
+  pw_json_close (j, '}');
+}
+
+/* First-order states. */
+static void json_states (pw_json *j, const pw_system *s, const pw_sample *x) {
+  int n = pw_system_coordinates (s), first = n;
+  while (pw_system_state_hidden (s, first - 1)) first--;
+  if (first == n) return;
+  pw_json_open (j, "states", '{');
+  for (int i = first; i < n; i++) pw_json_number (j, PW_NAME (pw_system_state_name, s, n + i), x->v[i]);
   pw_json_close (j, '}');
 }
 
@@ -133,6 +143,7 @@ static void json_sample (pw_json *j, const pw_system *s, const pw_sample *x, int
   pw_json_number (j, "t", x->t);
   json_bodies (j, s, x);
   json_elements (j, s, x);
+  json_states (j, s, x);
   pw_json_open (j, "reactions", '{');
   for (int i = 0; i < pw_system_rows (s); i++)
     pw_json_number (j, PW_NAME (pw_system_reaction_name, s, i), 0 - x->lambda[i]);

@@ -30,6 +30,7 @@ typedef struct {
   pw_arena *arena;              /* lives as long as the model */
   pw_reference_text *reference; /* the model's */
   pw_names bodies;              /* names of bodies so far */
+  pw_names states;              /* names of all first-order states */
   pw_names names;               /* of bodies and elements so far, to their offsets in the source */
   pw_names elements;     /* names of all elements, to the index of their types; made when an expression needs it */
   const pw_kind *kind;   /* of the element being read */
@@ -143,11 +144,16 @@ static size_t source_offset (const pw_yaml *y, const pw_node *node, size_t offse
   return at + n <= y->size && strncmp (y->source + at, node->text, n) == 0 ? at + offset : node->at;
 }
 
-/* The first name of the time t or of a state, BODY.phi, in an expression, or NULL. */
-static const char *find_variable (const char *text) {
+/* Whether a name in an expression is that of a state: BODY.phi, or a first-order state. */
+static int is_state (const reader *r, const char *name) {
+  return strchr (name, '.') || (r->states.slot && pw_names_find (&r->states, name) >= 0);
+}
+
+/* The first name of the time t or of a state in an expression, or NULL. */
+static const char *find_variable (const reader *r, const char *text) {
   char name[PW_EXPRESSION_NAME];
   for (const char *rest = text, *p; (p = pw_expression_next_name (&rest, name)) != NULL;)
-    if (strcmp (name, "t") == 0 || strchr (name, '.')) return p;
+    if (strcmp (name, "t") == 0 || is_state (r, name)) return p;
   return NULL;
 }
 
@@ -161,7 +167,7 @@ static int read_number (const reader *r, const pw_node *node, const char *label,
   if (status == PW_RESOURCE) return read_no_memory (r);
   if (status != PW_OK)
     return read_fail (r, source_offset (r->y, node, error.at), "%s: %s", label,
-                      find_variable (node->text) == node->text + error.at
+                      find_variable (r, node->text) == node->text + error.at
                           ? "only the value of a signal may depend on the time t or on states"
                           : error.text);
   const char *expected = pw_domain_check (domain, *value);
@@ -255,10 +261,11 @@ static int state_of_element (reader *r, const pw_node *node, const char *owner, 
                           owner, list, part);
 }
 
-/* Checks that a name with a dot, at an offset of the expression, names a state. */
+/* Checks that a name with a dot, or that of a first-order state, at an offset of the expression, names a state. */
 static int state_check (reader *r, const pw_node *node, const char *name, size_t at) {
   static const char *const part[] = { "x", "y", "phi", "vx", "vy", "omega" };
   size_t n = strcspn (name, ".");
+  if (name[n] == 0 && is_state (r, name)) return PW_OK;
   const char *owner = PW_PRINTED (100, "%.*s", (int)n, name);
   if (pw_names_find (&r->bodies, owner) < 0) return state_of_element (r, node, owner, name + n + 1, at);
   for (int i = 0; i < 6; i++)
@@ -350,7 +357,7 @@ static int signal_expression (reader *r, const pw_node *node, signal_function *f
   const char *source = node->type == PW_YAML_SCALAR ? node->text : "";
   char name[PW_EXPRESSION_NAME];
   for (const char *rest = source, *p; (p = pw_expression_next_name (&rest, name)) != NULL;)
-    if (strchr (name, '.') && signal_add_state (r, node, f, name, (size_t)(p - source)) != PW_OK)
+    if (is_state (r, name) && signal_add_state (r, node, f, name, (size_t)(p - source)) != PW_OK)
       return r->error->status;
   if (read_expression (r, node, f->name, &f->text.part[i], &f->expression[i]) != PW_OK) return r->error->status;
   const pw_expression *expression = f->expression[i];
@@ -613,7 +620,7 @@ static int signal_map (reader *r, const pw_node *node, pw_signal *signal) {
 
 static int read_signal (reader *r, const pw_node *node, pw_signal *signal) {
   if (node->type == PW_YAML_MAP) return signal_map (r, node, signal);
-  if (node->type == PW_YAML_SCALAR && find_variable (node->text))
+  if (node->type == PW_YAML_SCALAR && find_variable (r, node->text))
     return signal_of_time (r, (const pw_node *const[3]){ node, NULL, NULL }, signal);
   return read_number (r, node, r->label, PW_REAL, &signal->constant);
 }
@@ -631,7 +638,7 @@ static int reference_entry (reader *r, const pw_node *n, pw_names *seen) {
   const pw_expression **x = t->context;
   const char *name;
   if (read_text (r, n, "truth", &name) != PW_OK) return r->error->status;
-  if (strchr (name, '.') == NULL)
+  if (!is_state (r, name))
     return read_fail (r, n->at, "truth: expected a state such as BODY.phi, found \"%.60s\"", name);
   r->label = "truth";
   if (state_check (r, n, name, 0) != PW_OK) return r->error->status;
@@ -742,6 +749,8 @@ static int build_value (reader *r, const pw_node *node, void *to) {
     return read_signal (r, node, to);
   case PW_CHOICE:
     return read_choice (r, node, r->label, r->field->choices, to);
+  case PW_TEXT:
+    return read_text (r, node, r->label, to);
   }
   return read_fail (r, node->at, "%s cannot be given in a text model", r->label);
 }
@@ -752,7 +761,8 @@ static int build_field (reader *r, const pw_node *node, const char *element) {
                                         [PW_VECTOR] = "vectors, each [x, y],",
                                         [PW_BODY] = "bodies",
                                         [PW_SIGNAL] = "signals",
-                                        [PW_CHOICE] = "choices" };
+                                        [PW_CHOICE] = "choices",
+                                        [PW_TEXT] = "texts" };
   const pw_field *f = r->field;
   char *to = r->definition + f->offset;
   int count = pw_field_count (f);
@@ -785,6 +795,8 @@ static int build_kind (reader *r, const pw_node *node) {
     return read_fail (r, node->at, "expected an element {TYPE: NAME, ...}, found %s", node_found (node));
   int kind = find_kind (first);
   r->kind = kind < 0 ? NULL : pw_kinds[kind];
+  if (r->kind == &pw_kind_state)
+    return read_fail (r, first->at, "a state is not an element: list it under \"states\", {name: NAME, rate: ..}");
   if (r->kind) return PW_OK;
   for (const pw_node *n = first; n; n = n->next->next) { /* a type that appears later, also as {kind: wheel, ...} */
     kind = find_kind (node_is (n, "kind") || node_is (n, "type") ? n->next : n);
@@ -801,31 +813,73 @@ static int build_kind (reader *r, const pw_node *node) {
                     near.near ? pw_nearest_text (&near) : ": see pinwheel list kinds");
 }
 
-static int build_element (reader *r, const pw_node *node) {
-  const char *name, *key[MAX_KEYS];
+/* Adds an element of the type r->kind with the fields in the pairs from `first` on, to which the keys of a first-order
+ * state add `name`; at: where an error of the whole is reported. */
+static int build_fields (reader *r, const pw_node *at, const pw_node *name, const pw_node *first) {
+  const char *key[MAX_KEYS];
   const pw_node *v[MAX_KEYS];
+  const pw_kind *kind = r->kind;
   pw_error cause = { 0 };
   int n = 0;
-  if (build_kind (r, node) != PW_OK) return r->error->status;
-  const pw_kind *kind = r->kind;
-  const pw_node *first = node->first;
-  if (build_name (r, first->next, kind->name, &name) != PW_OK) return r->error->status;
   memset (r->definition, 0, kind->definition);
-  memcpy (r->definition, &name, sizeof name);
-  for (const pw_field *f = kind->fields; f->name && n < MAX_KEYS - 1; f++) key[n++] = f->name;
-  key[n] = NULL;
-  read_keys_from (r, first->next->next, key, PW_PRINTED (100, "a %s", kind->name), v);
+  memcpy (r->definition, &name->text, sizeof name->text);
+  for (const pw_field *f = kind->fields; f->name && n < MAX_KEYS - 2; f++) key[n++] = f->name;
+  key[n] = kind == &pw_kind_state ? "name" : NULL, key[n + 1] = NULL;
+  read_keys_from (r, first, key, PW_PRINTED (100, "a %s", kind->name), v);
   for (int i = 0; i < n && r->error->status == PW_OK; i++) {
     const pw_field *f = r->field = &kind->fields[i];
     if (v[i])
-      build_field (r, v[i], name);
+      build_field (r, v[i], name->text);
     else if (f->required || f->type == PW_BODY)
-      read_fail (r, first->at, "%s %.60s needs \"%s\": %s", kind->name, name, f->name, f->about ? f->about : "");
+      read_fail (r, at->at, "%s %.60s needs \"%s\": %s", kind->name, name->text, f->name, f->about ? f->about : "");
   }
   if (r->error->status != PW_OK) return r->error->status;
   pw_element e = { kind, r->definition };
-  if (pw_model_check_element (r->model, &e, &cause) != PW_OK) return build_fail (r, first->next, &cause);
+  if (pw_model_check_element (r->model, &e, &cause) != PW_OK) return build_fail (r, name, &cause);
   return pw_add (r->model, kind, r->definition);
+}
+
+static int build_element (reader *r, const pw_node *node) {
+  const char *name;
+  if (build_kind (r, node) != PW_OK) return r->error->status;
+  const pw_node *first = node->first;
+  if (build_name (r, first->next, r->kind->name, &name) != PW_OK) return r->error->status;
+  return build_fields (r, first, first->next, first->next->next);
+}
+
+/* ---- First-order states: a list of {name, rate, start, unit} ---- */
+
+/* The node of a state's name, or NULL after an error. */
+static const pw_node *state_name (const reader *r, const pw_node *node) {
+  if (node->type != PW_YAML_MAP)
+    return read_fail (r, node->at, "expected a state {name: NAME, rate: ..}, found %s", node_found (node)), NULL;
+  for (const pw_node *n = node->first; n; n = n->next->next)
+    if (node_is (n, "name")) return n->next;
+  return read_fail (r, node->at, "a state needs a name"), NULL;
+}
+
+/* Indexes the names of all states, which signals of any element may read; expressions can use them. */
+static int index_states (reader *r) {
+  for (const pw_node *n = r->y->states ? r->y->states->first : NULL; n && r->error->status == PW_OK; n = n->next) {
+    const pw_node *node = state_name (r, n);
+    const char *name;
+    if (node == NULL || build_name (r, node, "state", &name) != PW_OK) return r->error->status;
+    if (!pw_expression_is_name (name))
+      return read_fail (r, node->at, "state \"%.60s\": expected a letter, then letters, digits and _", name);
+    if (strcmp (name, "t") == 0 || pw_expression_is_reserved (name) || pw_names_find (&r->scope->index, name) >= 0)
+      return read_fail (r, node->at, "state \"%s\": this name is that of %s", name,
+                        strcmp (name, "t") == 0            ? "the time"
+                        : pw_expression_is_reserved (name) ? "a function or constant"
+                                                           : "a parameter or number of let");
+    pw_names_add (&r->states, name, 0);
+  }
+  return r->error->status;
+}
+
+static int build_state (reader *r, const pw_node *node) {
+  const pw_node *name = state_name (r, node);
+  r->kind = &pw_kind_state;
+  return build_fields (r, name, name, node->first);
 }
 
 /* ---- The model ---- */
@@ -839,10 +893,13 @@ static int build_all (reader *r, const double *parameter) {
       return r->error->status;
     pw_scope_add (r->scope, n->text, value);
   }
+  if (index_states (r) != PW_OK) return r->error->status;
   for (const pw_node *n = y->bodies ? y->bodies->first : NULL; n; n = n->next)
     if (build_body (r, n) != PW_OK) return r->error->status;
   for (const pw_node *n = y->elements ? y->elements->first : NULL; n; n = n->next)
     if (build_element (r, n) != PW_OK) return r->error->status;
+  for (const pw_node *n = y->states ? y->states->first : NULL; n; n = n->next)
+    if (build_state (r, n) != PW_OK) return r->error->status;
   return read_reference (r);
 }
 
@@ -855,7 +912,8 @@ static void build_free (void *arena) {
 static int build_open (reader *r) {
   const pw_yaml *y = r->y;
   size_t largest = 1, bodies = y->bodies ? (size_t)y->bodies->count : 0, lets = y->let ? (size_t)y->let->count : 0;
-  size_t all = bodies + (y->elements ? (size_t)y->elements->count : 0);
+  size_t states = y->states ? (size_t)y->states->count : 0;
+  size_t all = bodies + states + (y->elements ? (size_t)y->elements->count : 0);
   for (const pw_kind *const *k = pw_kinds; *k; k++)
     if ((*k)->definition > largest) largest = (*k)->definition;
   r->arena = calloc (1, sizeof *r->arena);
@@ -864,7 +922,8 @@ static int build_open (reader *r) {
   pw_model_set_reference (r->model, r->reference);
   r->definition = malloc (largest);
   if (r->reference && r->definition && pw_scope_open (r->scope, y->parameter_count + (int)lets, r->arena) == PW_OK &&
-      pw_names_open (&r->bodies, bodies) == PW_OK && pw_names_open (&r->names, all) == PW_OK)
+      pw_names_open (&r->bodies, bodies) == PW_OK && pw_names_open (&r->states, states) == PW_OK &&
+      pw_names_open (&r->names, all) == PW_OK)
     return PW_OK;
   return read_no_memory (r);
 }
@@ -875,9 +934,11 @@ static void build_model (pw_model *m, const void *parameters) {
   pw_scope scope = { 0 };
   reader r = { .y = table, .model = m, .scope = &scope, .error = pw_model_error (m) };
   read_list (&r, r.y->bodies, "bodies");
+  read_list (&r, r.y->states, "states");
   if (read_list (&r, r.y->elements, "elements") == PW_OK && build_open (&r) == PW_OK) build_all (&r, parameters);
   pw_scope_close (&scope);
   pw_names_close (&r.bodies);
+  pw_names_close (&r.states);
   pw_names_close (&r.names);
   pw_names_close (&r.elements);
   free (r.definition);
@@ -1020,7 +1081,7 @@ static int head_parameters (pw_yaml *y, const reader *r, const pw_node *list, pw
 
 static int read_head (pw_yaml *y, const reader *r) {
   static const char *const key[] = { "pinwheel", "about",    "run",   "parameters", "let",
-                                     "bodies",   "elements", "truth", NULL };
+                                     "bodies",   "elements", "truth", "states",     NULL };
   static const char *const run_key[] = { "t_end", "step", "rtol", "method", NULL };
   const pw_node *v[sizeof key / sizeof *key], *run[sizeof run_key / sizeof *run_key];
   double *number[] = { &y->table.run.t_end, &y->table.run.step, &y->table.run.rtol };
@@ -1036,7 +1097,7 @@ static int read_head (pw_yaml *y, const reader *r) {
   read_text (r, run[3], run_key[3], &y->table.run.method);
   const pw_node *parameters = v[3], *let = v[4];
   /* the key of the reference solution is "truth" */
-  y->let = let, y->bodies = v[5], y->elements = v[6], y->reference = v[7];
+  y->let = let, y->bodies = v[5], y->elements = v[6], y->reference = v[7], y->states = v[8];
   for (int i = 3; key[i]; i++) /* from "parameters" on: lists and maps */
     if (v[i] && v[i]->count > MAX_ITEMS)
       read_fail (r, v[i]->at, "%s: %d entries; a model may have %d", key[i], v[i]->count, MAX_ITEMS);

@@ -110,7 +110,7 @@ static void verify_all (verified_scene *scene, const double *v, const double *a,
                         pw_verification *result) {
   const pw_system *s = scene->s;
   double L = scene->workspace->scale.length, T = scene->workspace->scale.time;
-  for (int j = 0; j < s->coords; j++) verify_add (&scene->force, j, s->M[j] * a[j]);
+  for (int j = 0; j < s->coords; j++) verify_add (&scene->force, j, (pw_is_hidden (s, j) ? 1 : s->M[j]) * a[j]);
   for (int i = 0; i < s->batches; i++) {
     const pw_element_batch *k = &scene->workspace->batch[i];
     if (k->kind->rows > 0) verify_rows (scene, k, v, a, lambda);

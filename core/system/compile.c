@@ -86,20 +86,20 @@ static int compile_list (compilation *job, const pw_element *first, pw_element_b
   return PW_OK;
 }
 
-/* A batch for each type: holonomic ones in order of appearance, then nonholonomic ones, then forces. */
+/* A batch for each type: holonomic ones in order of appearance, then nonholonomic ones, then forces, then states. */
 static int compile_types (compilation *job) {
-  static const pw_level order[] = { PW_HOLONOMIC, PW_NONHOLONOMIC, PW_FORCE };
+  static const pw_level order[] = { PW_HOLONOMIC, PW_NONHOLONOMIC, PW_FORCE, PW_FORCE };
   const pw_model *m = job->m;
   pw_system *s = job->s;
   size_t room = 0;
   if (pw_grow (&s->batch, 0, &room, sizeof *s->batch) != PW_OK)
     return compile_no_memory (job); /* for no element, too */
-  for (int l = 0; l < 3; l++)
+  for (int l = 0; l < 4; l++)
     for (int i = 0; i < m->elements; i++) {
       const pw_kind *kind = m->element[i].kind;
       int k = 0;
       while (k < s->batches && s->batch[k].kind != kind) k++;
-      if (kind->level != order[l] || k < s->batches) continue;
+      if (kind->level != order[l] || k < s->batches || (kind == &pw_kind_state && l < 3)) continue;
       if (pw_grow (&s->batch, (size_t)k, &room, sizeof *s->batch) != PW_OK) return compile_no_memory (job);
       s->batch[s->batches++] = (pw_element_batch){ .kind = kind };
       int status = compile_list (job, &m->element[i], &s->batch[k]);
@@ -114,12 +114,13 @@ static int compile_sizes (const compilation *job) {
   if (m->bodies == 0) return pw_fail (job->error, PW_INPUT, "model %s has no body", m->name);
   if (m->bodies > COMPILE_MOST / 3) return compile_too_large (job);
   s->bodies = m->bodies;
-  s->coords = 3 * m->bodies;
+  s->coords = s->mechanical = 3 * m->bodies;
   for (pw_element_batch *k = s->batch; k < s->batch + s->batches; k++) {
     const pw_kind *kind = k->kind;
     k->b.cols = 3 * kind->bodies + kind->internal;
     k->row = s->rows;
     k->internal = s->coords;
+    if (kind != &pw_kind_state) s->mechanical = s->coords + k->b.count * kind->internal;
     s->coords += k->b.count * kind->internal;
     s->rows += k->b.count * kind->rows;
     if (kind->level == PW_HOLONOMIC) s->holonomic = s->rows; /* these batches come first */
@@ -136,10 +137,12 @@ static int compile_sizes (const compilation *job) {
   size_t coords = (size_t)s->coords, bodies = (size_t)s->bodies;
   s->source = compile_alloc (job, (size_t)s->sources, sizeof *s->source);
   s->body_name = compile_alloc (job, bodies, sizeof *s->body_name);
+  s->state_unit = compile_alloc (job, 2 * (coords - (size_t)s->mechanical), sizeof *s->state_unit);
   s->angle_user = compile_alloc (job, bodies, sizeof *s->angle_user);
   s->M = compile_alloc (job, 6 * coords + 3, sizeof *s->M); /* and those after it */
   s->origin = compile_alloc (job, 2 * coords, 1);
-  if (s->source == NULL || s->body_name == NULL || s->angle_user == NULL || s->M == NULL || s->origin == NULL)
+  if (s->source == NULL || s->body_name == NULL || s->state_unit == NULL || s->angle_user == NULL || s->M == NULL ||
+      s->origin == NULL)
     return PW_RESOURCE;
   s->mass = s->M + coords, s->metric = s->mass + coords, s->q0 = s->metric + coords, s->v0 = s->q0 + coords,
   s->constant = s->v0 + coords;
@@ -223,6 +226,12 @@ static int compile_element (const compilation *job, const pw_element_batch *k, i
     s->v0[j] = internal[n].rate;
     s->origin[j] = internal[n].specified[0] ? PW_SPECIFIED : 0;
     s->origin[s->coords + j] = internal[n].specified[1] ? PW_SPECIFIED : 0;
+    if (!pw_is_hidden (s, j)) continue;
+    const char *unit = ((const pw_state *)definition)->unit, **units = s->state_unit + 2 * (j - s->mechanical);
+    const char *per_second = unit == NULL || *unit == 0 ? "1/s" : strpbrk (unit, " /") ? "(%s)/s" : "%s/s";
+    units[0] = compile_text (job, unit ? unit : "");
+    units[1] = compile_text (job, PW_PRINTED (PW_NAME_BYTES, per_second, unit));
+    if (units[0] == NULL || units[1] == NULL) return PW_RESOURCE;
   }
   return PW_OK;
 }
@@ -376,10 +385,11 @@ static int compile_angle_users (const compilation *job) {
 static void compile_metric (pw_system *s) {
   double sum = 0, L2 = s->scale.length * s->scale.length;
   int massive = 0;
-  for (int j = 0; j < s->coords; j++)
+  for (int j = s->mechanical; j < s->coords; j++) s->mass[j] = s->metric[j] = 1, s->M[j] = 0;
+  for (int j = 0; j < s->mechanical; j++)
     if (s->M[j] > 0) sum += s->M[j] / (pw_is_angle (s, j) ? L2 : 1), massive++;
   double mean = massive ? sum / massive : 1;
-  for (int j = 0; j < s->coords; j++) {
+  for (int j = 0; j < s->mechanical; j++) {
     double unit = pw_is_angle (s, j) ? L2 : 1, small = (massive ? 1e-6 : 1) * mean * unit;
     int is_unturned = j < 3 * s->bodies && j % 3 == 2 && s->M[j] == 0 && s->angle_user[j / 3] < 0;
     s->mass[j] = is_unturned ? mean * unit : s->M[j];

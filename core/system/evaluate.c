@@ -770,7 +770,7 @@ static int elements_evaluate (pw_workspace *w, double t, const double *q, const 
   if (elements_update (w, t, q, v, error) != PW_OK) return PW_METHOD;
   pw_evaluate_J (w);
   elements_jacobian (w, out);
-  memcpy (out->mass, w->s->M, (size_t)w->s->coords * sizeof *out->mass);
+  for (int j = 0; j < w->s->coords; j++) out->mass[j] = pw_is_hidden (w->s, j) ? 1 : w->s->M[j];
   pw_evaluate_force (w, out->force);
   pw_evaluate_g (w, out->g);
   pw_evaluate_eta (w, out->eta);

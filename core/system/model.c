@@ -26,7 +26,8 @@ int pw_kind_is_built_in (const pw_kind *kind) {
 size_t pw_field_bytes (pw_field_type type) {
   static const size_t bytes[] = {
     [PW_NUMBER] = sizeof (double), [PW_POINT] = sizeof (double[2]),  [PW_VECTOR] = sizeof (double[2]),
-    [PW_BODY] = sizeof (char *),   [PW_SIGNAL] = sizeof (pw_signal), [PW_CHOICE] = sizeof (int)
+    [PW_BODY] = sizeof (char *),   [PW_SIGNAL] = sizeof (pw_signal), [PW_CHOICE] = sizeof (int),
+    [PW_TEXT] = sizeof (char *)
   };
   return (size_t)type < sizeof bytes / sizeof *bytes ? bytes[type] : 0;
 }
@@ -243,6 +244,8 @@ static void check_value (const pw_kind *kind, const pw_field *f, const void *at,
     if (*expected) snprintf (text, size, " = %g: expected %s", value, expected);
   }
   if (f->type == PW_SIGNAL) pw_signal_check (at, kind, &point, text, size);
+  if (f->type == PW_TEXT && *(const char *const *)at && is_bad_text (*(const char *const *)at))
+    snprintf (text, size, FAULT_TEXT);
   if (f->type != PW_CHOICE) return;
   while (f->choices[choices]) choices++;
   const int value = *(const int *)at;
@@ -433,12 +436,13 @@ int pw_add (pw_model *m, const pw_kind *kind, const void *definition) {
   if (definition == NULL) return pw_model_refuse (m, "pw_add of element type %s without a definition", kind->name);
   void *copy = model_copy (m, definition, kind->definition);
   if (copy == NULL) return m->error.status;
-  const char **name = copy;
+  const char **name = copy, **text;
   *name = model_copy_text (m, *name);
   for (int i = 0; i < kind->bodies && !kind->each_body; i++) {
     const char **body = pw_field_mutable (kind, copy, PW_BODY, i);
     *body = model_copy_text (m, *body);
   }
+  for (int i = 0; (text = pw_field_mutable (kind, copy, PW_TEXT, i)) != NULL; i++) *text = model_copy_text (m, *text);
   for (int i = 0; i < kind->signals; i++) model_copy_signal (m, pw_field_mutable (kind, copy, PW_SIGNAL, i));
   m->element[m->elements++] = (pw_element){ kind, copy };
   return m->error.status;

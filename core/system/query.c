@@ -66,7 +66,7 @@ static const pw_element_batch *query_find_element (const pw_system *s, size_t me
 char *pw_member_name (const pw_system *s, const pw_element_batch *k, int e, const char *what, char *buffer,
                       size_t size) {
   const char *body = k->kind->each_body ? s->body_name[k->b.body[e]] : "";
-  return pw_print (buffer, size, "%s%s%s.%s", k->name[e], *body ? "." : "", body, what);
+  return pw_print (buffer, size, "%s%s%s%s%s", k->name[e], *body ? "." : "", body, *what ? "." : "", what);
 }
 
 char *pw_system_state_name (const pw_system *s, int state, char *buffer, size_t size) {
@@ -80,6 +80,7 @@ char *pw_system_state_name (const pw_system *s, int state, char *buffer, size_t 
 
 const char *pw_system_state_unit (const pw_system *s, int state) {
   int velocity = state >= s->coords, j = velocity ? state - s->coords : state;
+  if (j >= s->mechanical) return velocity ? s->state_unit[2 * (j - s->mechanical)] : "";
   return query_units[3 * velocity + (j < 3 * s->bodies ? j % 3 : 2)]; /* internal coordinates are angles, like phi */
 }
 
@@ -121,7 +122,14 @@ static int query_find (const pw_system *s, const char *what, int count, query_na
 int pw_system_find_state (const pw_system *s, const char *name, pw_error *error) {
   pw_nearest near = { .sought = name };
   int state = s && name ? query_body_state (s, name, &near) : -1;
-  return state >= 0 ? state : query_find (s, "state", s ? 2 * s->coords : 0, pw_system_state_name, &near, error);
+  if (state < 0) state = query_find (s, "state", s ? 2 * s->coords : 0, pw_system_state_name, &near, error);
+  if (state < 0 || !pw_is_hidden (s, state)) return state;
+  return pw_fail (error, PW_INPUT, "model %s has no state \"%s\": the integral of a state is not computed", s->model,
+                  name);
+}
+
+int pw_system_state_hidden (const pw_system *s, int state) {
+  return pw_is_hidden (s, state);
 }
 
 int pw_system_row_element (const pw_system *s, int row) {

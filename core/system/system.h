@@ -45,6 +45,7 @@ struct pw_system {
   pw_arena arena; /* contains all arrays but `batch` */
   const char *model;
   int bodies, coords, rows, holonomic, batches, entries;
+  int mechanical;          /* coordinates but those of first-order states (state.c), which are the last ones */
   int constraints;         /* batches with constraint equations */
   int forces;              /* batches with a force that is not constant */
   int saturates;           /* 1: some of these have a function `saturation` */
@@ -56,8 +57,9 @@ struct pw_system {
   int rheonomic;           /* batches whose eta may be other than 0 */
   pw_scale scale;          /* with T = 1 s; T of a run is in its workspace */
   const char **body_name;  /* bodies */
-  double *M;               /* coords: diagonal of M */
-  double *mass;            /* coords: the same, but the mean where nothing turns a body (pw_is_unturned) */
+  double *M;               /* coords: diagonal of M; 0 of first-order states, which have no kinetic energy */
+  double *mass;            /* coords: the same, but the mean where nothing turns a body (pw_is_unturned); 1 of states */
+  const char **state_unit; /* 2 (coords - mechanical): of each first-order state and of its rate */
   int *angle_user;         /* bodies: of one without inertia the first element that depends on its angle; -1: none */
   double *constant;        /* coords + 3: sum of the constant forces */
   double *metric;          /* coords: M, and small weights where M is zero */
@@ -110,7 +112,12 @@ static inline int pw_is_angle (const pw_system *s, int j) {
 /* 1 for the angle of a body without inertia that nothing turns: no constraint, force or signal depends on it.  Its
  * acceleration is 0, whatever stands for its inertia in the equations. */
 static inline int pw_is_unturned (const pw_system *s, int j) {
-  return s->M[j] == 0 && s->mass[j] > 0;
+  return s->M[j] == 0 && s->mass[j] > 0 && j < s->mechanical;
+}
+
+/* 1 for the time integral of a first-order state, on which nothing depends (states: as in pw_system_find_state). */
+static inline int pw_is_hidden (const pw_system *s, int state) {
+  return state >= s->mechanical && state < s->coords;
 }
 
 /* The scene's unit of a coordinate: L or 1 rad. */

@@ -198,7 +198,7 @@ int pw_linear_open (pw_linearisation *x, pw_run *r, pw_linear_extent extent) {
   int status = pw_tangent_open (&x->tangent, r);
   x->holonomic = x->tangent.holonomic, x->rank = x->tangent.rows, x->row = x->tangent.row;
   for (int j = 0; j < x->n; j++) x->unturned += pw_is_unturned (r->s, j);
-  x->positions = x->n - x->unturned - x->holonomic;
+  x->positions = r->s->mechanical - x->unturned - x->holonomic;
   x->velocities = x->n - x->unturned - x->rank;
   x->size = x->positions + x->velocities;
   if (status != PW_OK || extent == PW_LINEAR_COUNTS) return status;

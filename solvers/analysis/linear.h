@@ -21,9 +21,10 @@ typedef struct {
   int n, m;
   pw_tangent tangent;  /* independent equations; in tangent.scatter the derivatives: columns q, v; rows as `product` */
   int holonomic, rank; /* independent constraint equations: holonomic ones; all, those first */
-  int positions, velocities, size; /* minimal coordinates: of positions, of velocities, all */
-  int unturned;                    /* angles that nothing turns (pw_is_unturned), which are left out */
-  const int *row;                  /* rank: indices of the independent equations */
+  /* Minimal coordinates: of positions; of velocities and first-order states, which are the last columns of Q; all. */
+  int positions, velocities, size;
+  int unturned;   /* angles that nothing turns (pw_is_unturned), which are left out */
+  const int *row; /* rank: indices of the independent equations */
   pw_linear_frame frame;
   double *a, *lambda;            /* n + 3, m: at the state last evaluated */
   double *norm;                  /* m: lengths of the rows of J, columns of angles divided by L */

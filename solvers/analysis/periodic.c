@@ -511,9 +511,10 @@ static void equations_sort (int count, double *re, double *im) {
 
 /* The shifts in minimal coordinates, by columns of S.  Returns their number. */
 static int equations_shifts (pw_periodic *x, double *S) {
+  const int first = pw_steady_hidden_symmetries (x->steady); /* of the motion */
   int k = 0;
-  for (; k < x->symmetries + x->settings.free && k < x->size; k++) {
-    equations_shift (x, k);
+  for (; first + k < x->symmetries + x->settings.free && k < x->size; k++) {
+    equations_shift (x, first + k);
     equations_coordinates (x, x->change, S + k * x->size);
   }
   return k;
@@ -545,7 +546,8 @@ static int equations_multipliers (pw_periodic *x, const double *u, int *trivial)
     equations_coordinates (x, x->change, x->monodromy + c * size);
   }
   LAPACKE_dgeqrf_work (LAPACK_COL_MAJOR, size, k, S, size, tau, work, lwork);
-  if (x->settings.free && k > x->symmetries && fabs (S[(k - 1) * size + k - 1]) * x->T < EQUATIONS_STEADY * x->L) {
+  if (x->settings.free && k > pw_periodic_symmetries (x) &&
+      fabs (S[(k - 1) * size + k - 1]) * x->T < EQUATIONS_STEADY * x->L) {
     pw_fail (&x->why, PW_METHOD, "Newton's method leads to a steady motion or an equilibrium");
     return PW_RETRY;
   }
@@ -688,7 +690,7 @@ const char *pw_periodic_reason (const pw_periodic *x) {
 }
 
 int pw_periodic_symmetries (const pw_periodic *x) {
-  return x ? x->symmetries : 0;
+  return x ? x->symmetries - pw_steady_hidden_symmetries (x->steady) : 0;
 }
 
 /* ---- Motions ---- */

@@ -141,6 +141,7 @@ static double repetition_relative (const pw_repetition *r, const double *a, cons
   double most = 0;
   *state = 0;
   for (int i = 0; i < 2 * n && !isnan (most); i++) {
+    if (pw_system_state_hidden (r->s, i)) continue;
     const char *unit = pw_system_state_unit (r->s, i);
     const double size = (*unit == 'm' ? r->scale.length : 1) / (i < n ? 1 : r->scale.time);
     double range = STILL * size, d = repetition_difference (a, b, 0, count, r->width, PW_RECORD_STATES + i);

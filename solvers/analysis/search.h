@@ -73,6 +73,11 @@ static inline int pw_steady_rate_count (const pw_system *s) {
 static inline int pw_steady_angle_rate (const pw_system *s, int j) {
   return PW_RATE_ANGLES + (j < 3 * s->bodies ? j / 3 : j - 2 * s->bodies);
 }
+/* The number of symmetries that shift the integral of a first-order state: the first ones of x->symmetry, since each of
+ * these integrals is a pivot.  They are none of the motion. */
+static inline int pw_steady_hidden_symmetries (const pw_steady *x) {
+  return x->symmetries ? x->s->coords - x->s->mechanical : 0;
+}
 /* rates = sum of coefficient[k] / unit times the rates of symmetry k. */
 void pw_steady_combine (const pw_steady *x, const double *coefficient, double unit, double *rates);
 /* The velocities that rates cause at a configuration. */

@@ -613,7 +613,7 @@ const char *pw_steady_reason (const pw_steady *x) {
 }
 
 int pw_steady_symmetries (const pw_steady *x) {
-  return x ? x->symmetries : 0;
+  return x ? x->symmetries - pw_steady_hidden_symmetries (x) : 0;
 }
 
 /* ---- Solutions ---- */

@@ -119,6 +119,7 @@ static int galpha_correct (pw_run *r, double h, double *correction, double *roun
   *correction = 0;
   for (int j = 0; j < n; j++) {
     double larger = pw_larger_or_nan (fabs (d->z[j]), fabs (d->z[n + j]));
+    if (j >= r->s->mechanical) larger = fabs (d->z[n + j]) / pw_velocity_unit (r, j, d->common.v1[j]);
     *correction = pw_larger_or_nan (*correction, larger / pw_unit (r->s, j));
   }
   for (int i = 0; i < size; i++) d->y[i] += d->column_factor[i] * d->z[i];
@@ -127,7 +128,8 @@ static int galpha_correct (pw_run *r, double h, double *correction, double *roun
     d->w1[j] += dv / (h * d->gamma);
     d->a1[j] += galpha_e (d, h) * dv;
     d->common.v1[j] = galpha_velocity (d, h, j);
-    largest = fmax (largest, fmax (fabs (d->common.q1[j]), h * fabs (d->common.v1[j])) / pw_unit (r->s, j));
+    if (j < r->s->mechanical)
+      largest = fmax (largest, fmax (fabs (d->common.q1[j]), h * fabs (d->common.v1[j])) / pw_unit (r->s, j));
   }
   *round_off = 4 * DBL_EPSILON * largest;
   return PW_OK;

@@ -156,7 +156,7 @@ static int drift_correct (pw_run *r, double h, leapfrog_progress *p) {
   p->size = 0, p->largest = 1;
   for (int j = 0; j < n; j++) {
     d->u[j] += d->z[j];
-    leapfrog_measure (p, h * d->z[j], r->q[j], pw_unit (r->s, j));
+    if (j < r->s->mechanical) leapfrog_measure (p, h * d->z[j], r->q[j], pw_unit (r->s, j));
   }
   drift_positions (r, h);
   return PW_OK;
@@ -201,7 +201,7 @@ static int kick_correct (pw_run *r, double h, leapfrog_progress *p) {
   p->size = 0, p->largest = 1;
   for (int j = 0; j < s->coords; j++) {
     d->common.v1[j] += d->dv[j];
-    leapfrog_measure (p, d->dv[j], d->u[j], pw_unit (s, j) / r->w->scale.time);
+    leapfrog_measure (p, d->dv[j], d->u[j], pw_velocity_unit (r, j, d->u[j]));
   }
   return PW_OK;
 }

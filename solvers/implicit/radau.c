@@ -219,7 +219,8 @@ static void radau_set_tolerances (pw_run *r, double h) {
   double largest = 1; /* the largest coordinate in units of the scene: its round-off may affect others */
   for (int j = 0; j < n; j++) largest = fmax (largest, fabs (d->now.y[j]) / d->unit[j]);
   for (int i = 0; i < 2 * n; i++) {
-    double size = fabs (d->now.y[i]), offset = settings->atol > 0 ? settings->atol / settings->rtol : d->unit[i];
+    double size = fabs (d->now.y[i]);
+    double offset = settings->atol > 0 && d->unit[i] < INFINITY ? settings->atol / settings->rtol : d->unit[i];
     double typical = index3 && i >= n ? fmax (d->unit[i], largest * d->unit[i - n] / h) : d->unit[i];
     d->tolerance[i] = fmin (rtol * (size + offset), r->tolerance_bound[i]);
     d->round_off[i] = fmin (8 * DBL_EPSILON * (size + typical), 0.1 * r->tolerance_bound[i]);
@@ -437,7 +438,7 @@ static int radau_work (pw_run *r, double h, double t1, double *error) {
  * magnify it by 1/s^2.  r->saddle must be factorised at the state reached. */
 static void radau_measure_noise (pw_run *r) {
   double sine = pw_saddle_sine (r->saddle, NULL), largest = 1;
-  for (int j = 0; j < r->s->coords; j++) largest = fmax (largest, fabs (r->q[j]) / pw_unit (r->s, j));
+  for (int j = 0; j < r->s->mechanical; j++) largest = fmax (largest, fabs (r->q[j]) / pw_unit (r->s, j));
   r->data->noise = fmin (64 / (sine * sine), 1e7) * largest;
 }
 
@@ -504,7 +505,7 @@ static int radau_open (pw_run *r, pw_error *error) {
   if (status != PW_OK) return pw_fail_memory (r->s, error);
   for (int j = 0, n = d->dae.n; j < n; j++) {
     d->B[j] = 1, d->B[n + j] = r->s->mass[j];
-    d->unit[j] = pw_unit (r->s, j), d->unit[n + j] = d->unit[j] / r->w->scale.time;
+    d->unit[j] = pw_is_hidden (r->s, j) ? INFINITY : pw_unit (r->s, j), d->unit[n + j] = pw_velocity_unit (r, j, 0);
   }
   status = pw_projector_open (&d->projector, r, NULL, NULL, error);
   return status == PW_OK ? radau_restart (r, error) : status;

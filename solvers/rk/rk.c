@@ -316,8 +316,9 @@ static void rk_accept (pw_run *r, double h, double t1, double added_energy) {
 double pw_rk_distance (const pw_run *r, const double *q, const double *v) {
   double most = 0;
   for (int j = 0; j < r->s->coords; j++) {
-    double dq = fabs (q[j] - r->q_at[j]), dv = r->w->scale.time * fabs (v[j] - r->v_at[j]);
-    most = pw_larger_or_nan (most, pw_larger_or_nan (dq, dv) / pw_unit (r->s, j));
+    double dq = j < r->s->mechanical ? fabs (q[j] - r->q_at[j]) / pw_unit (r->s, j) : 0;
+    double dv = fabs (v[j] - r->v_at[j]) / pw_velocity_unit (r, j, v[j]);
+    most = pw_larger_or_nan (most, pw_larger_or_nan (dq, dv));
   }
   return most;
 }
@@ -543,7 +544,7 @@ static double adapt_mean_square (const pw_run *r) {
     double q = r->q_at[j] * w[0], v = r->v_at[j] * w[1];
     sum += q * q + v * v;
   }
-  return sum / (2 * r->s->coords);
+  return sum / (r->s->coords + r->s->mechanical);
 }
 
 /* Mean square of an estimate before a projection, divided by h^2; stores its errors in r->q_at and r->v_at. */

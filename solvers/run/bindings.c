@@ -35,6 +35,7 @@ const char *pw_system_record_unit (const pw_system *s, int i) {
   const int n = s->coords, contacts = 2 * pw_system_contacts (s);
   if (i < PW_RECORD_STATES) return i == 0 ? "s" : i < 3 ? "" : "J";
   if ((i -= PW_RECORD_STATES) < 2 * n) return pw_system_state_unit (s, i);
+  if (i >= 2 * n + s->mechanical && i < 3 * n) return s->state_unit[2 * (i - 2 * n - s->mechanical) + 1];
   if (i < 3 * n) return pw_system_state_unit (s, i - 2 * n)[0] == 'm' ? "m/s^2" : "rad/s^2";
   if ((i -= 3 * n) < contacts) return "m";
   return i - contacts < s->rows ? pw_system_reaction_unit (s, i - contacts) : "J";

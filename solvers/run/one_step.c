@@ -19,8 +19,8 @@ struct pw_method_data {
   char *memory;
 };
 
-pw_state pw_run_state (const pw_run *r) {
-  return (pw_state){ r->s, &r->settings, r->t, r->breakpoint, r->q, r->v, r->a, r->lambda };
+pw_reached pw_run_state (const pw_run *r) {
+  return (pw_reached){ r->s, &r->settings, r->t, r->breakpoint, r->q, r->v, r->a, r->lambda };
 }
 
 double pw_stage_time (const pw_run *r, double t) {

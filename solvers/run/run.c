@@ -352,7 +352,7 @@ static double limits_speed (const pw_run *r, int *state) {
   const pw_system *s = r->s;
   double most = 0;
   *state = s->coords;
-  for (int j = 0; j < s->coords; j++) {
+  for (int j = 0; j < s->mechanical; j++) {
     double speed = fabs (r->v[j]) * r->w->scale.time / pw_unit (s, j);
     if (speed > most) most = speed, *state = s->coords + j;
   }
@@ -402,7 +402,7 @@ int pw_run_check_limits (pw_run *r, pw_error *error) {
 int pw_run_check_resolution (pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
   if (!limits_record_speed (r) && r->statistics.steps % PW_CHECK_INTERVAL != 0) return PW_OK;
-  for (int j = 0; j < s->coords; j++) {
+  for (int j = 0; j < s->mechanical; j++) {
     double round_off = fabs (r->q[j]) * DBL_EPSILON;
     if (!(round_off > LIMITS_RESOLVED * pw_unit (s, j))) continue;
     if (r->fixed_steps && fabs (r->v[j]) * r->settings.step > 0.1 * fabs (r->q[j])) /* within a few steps */
@@ -493,7 +493,7 @@ static void ledger_record_integrands (pw_run *r, const double *value) {
 static void ledger_measure_integrands (pw_run *r) {
   const pw_system *s = r->s;
   double *lambda = r->lambda_at, T = r->w->scale.time, energy = 0;
-  for (int j = 0; j < s->coords; j++) energy += s->mass[j] * pw_unit (s, j) * pw_unit (s, j) / (T * T);
+  for (int j = 0; j < s->mechanical; j++) energy += s->mass[j] * pw_unit (s, j) * pw_unit (s, j) / (T * T);
   for (int i = 0; i < s->rows; i++) lambda[i] = energy / s->scale.length * pw_rank_multiplier_unit (r->w, i);
   if (ledger_displace (r, r->t + T) == PW_OK) {
     pw_evaluate_ledger (r->w, lambda, r->ledger_at);

@@ -51,6 +51,7 @@ static int run_allocate (pw_run *r) {
                              { &r->scratch, scratch },
                              { &r->q_given, 2 * n },
                              { &r->given_before, 2 * n },
+                             { &r->atol, 2 * n },
                              { &r->tolerance_bound, 2 * n },
                              { &r->matrix_state, states },
                              { &r->matrix_range, states },
@@ -90,11 +91,21 @@ static int run_initial_values (pw_run *r, const pw_settings *settings, pw_error 
 static double run_time_scale (const pw_run *r) {
   const pw_system *s = r->s;
   double fastest = 1 / r->settings.span;
-  for (int j = 0; j < s->coords; j++) {
+  for (int j = 0; j < s->mechanical; j++) {
     double unit = pw_unit (s, j);
     fastest = fmax (fastest, fmax (fabs (r->v[j]) / unit, sqrt (fabs (r->a[j]) / unit)));
   }
   return 1 / fastest;
+}
+
+static void run_absolute_tolerances (pw_run *r) {
+  const double rtol = r->settings.rtol, given = r->settings.atol;
+  for (int j = 0, n = r->s->coords; j < n; j++) {
+    const int is_state = j >= r->s->mechanical;
+    const double unit = is_state ? 1 : pw_unit (r->s, j), T = is_state ? 1 : r->w->scale.time;
+    r->atol[j] = is_state ? INFINITY : given > 0 ? given : rtol * unit;
+    r->atol[n + j] = given > 0 ? given : rtol * unit / T;
+  }
 }
 
 /* After a part of the opening: PW_STOPPED if the caller requests it. */
@@ -230,6 +241,7 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   if (status == PW_OK) status = run_check_finite (r, error);
   if (status != PW_OK) return status;
   r->w->scale.time = run_time_scale (r);
+  run_absolute_tolerances (r);
   pw_run_count_moved (r);
   pw_run_set_reference_level (r);
   pw_ledger_begin (r);

@@ -120,7 +120,7 @@ const pw_thresholds pw_watchdog_thresholds = {
 double pw_run_acceleration_norm (const pw_run *r) {
   const double per_angle = r->w->scale.time * r->w->scale.time, per_length = per_angle / r->s->scale.length;
   double norm = 0;
-  for (int j = 0; j < r->s->coords; j++)
+  for (int j = 0; j < r->s->mechanical; j++)
     norm = pw_larger_or_nan (norm, fabs (r->a[j]) * (pw_is_angle (r->s, j) ? per_angle : per_length));
   return norm;
 }
@@ -175,7 +175,7 @@ typedef struct {
 /* Scalar product (a - b) . (c - d), lengths in units of L. */
 static double change_dot (const pw_system *s, const double *a, const double *b, const double *c, const double *d) {
   double sum = 0;
-  for (int j = 0; j < s->coords; j++) {
+  for (int j = 0; j < s->mechanical; j++) {
     double unit = pw_unit (s, j);
     sum += (a[j] - b[j]) / unit * ((c[j] - d[j]) / unit);
   }
@@ -425,7 +425,7 @@ static int dead_move (dead_walk *walk, double t, double most) {
   memcpy (walk->x, q, (size_t)s->coords * sizeof *q);
   if (!pw_is_finite_state (walk->r, q, v)) return PW_RETRY;
   if (pw_project_state (&walk->projector, walk->r, t, q, v, a, a + n, NULL) != PW_OK) return PW_RETRY;
-  for (int j = 0; j < s->coords; j++) moved = fmax (moved, fabs (q[j] - walk->x[j]) / pw_unit (s, j));
+  for (int j = 0; j < s->mechanical; j++) moved = fmax (moved, fabs (q[j] - walk->x[j]) / pw_unit (s, j));
   double ratio = moved <= most ? dead_ratio (walk) : NAN;
   if (!isfinite (ratio)) return PW_RETRY;
   walk->next = walk->state, walk->state = q;
@@ -442,7 +442,7 @@ static int dead_begin (dead_walk *walk, double most, int still) {
   const int coords = r->s->coords;
   const double *q = r->watchdog.previous_q, *v = q + coords + 3;
   double back = 0, speed = 0, t = NAN, least = INFINITY;
-  for (int j = 0; j < coords; j++) speed = fmax (speed, fabs (v[j]) / pw_unit (r->s, j));
+  for (int j = 0; j < r->s->mechanical; j++) speed = fmax (speed, fabs (v[j]) / pw_unit (r->s, j));
   for (int i = 0; i < DEAD_STARTS && !(least <= DEAD_RATIO); i++) {
     double away = speed > 0 ? DEAD_STRIDE * sqrt (back / most) / speed : 0;
     memcpy (walk->next, q, 2 * ((size_t)coords + 3) * sizeof *q);
@@ -470,7 +470,7 @@ static int dead_step (dead_walk *walk, double h, double most) {
   for (int j = 0; j < s->coords; j++) {
     walk->next[j] = q[j] + h * (v[j] + h / 2 * a[j]);
     walk->next[n + (size_t)j] = v[j] + h * a[j];
-    length = fmax (length, fabs (walk->next[j] - q[j]) / pw_unit (s, j));
+    if (j < s->mechanical) length = fmax (length, fabs (walk->next[j] - q[j]) / pw_unit (s, j));
   }
   if (!(length <= most) || dead_move (walk, walk->t + h, length / 2) != PW_OK) return PW_RETRY;
   walk->step = h, walk->last_ahead = walk->ahead;

@@ -12,7 +12,7 @@ static int own_open (pw_run *r, pw_error *error) {
 }
 
 static int own_advance (pw_run *r, double t_end, pw_error *error) {
-  const pw_state x = pw_run_state (r);
+  const pw_reached x = pw_run_state (r);
   double h = pw_step_size (r, t_end), *q = pw_step_array (r, 0), *v = pw_step_array (r, 1);
   for (int j = 0; j < pw_system_coordinates (x.system); j++) q[j] = x.q[j] + h * (v[j] = x.v[j] + h * x.a[j]);
   return pw_step_accept (r, PW_OK, h, q, v, error);

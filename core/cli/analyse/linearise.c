@@ -53,7 +53,8 @@ static int linearise_select (pw_linearise_command *cmd, pw_error *error) {
   if (cmd->input == NULL || cmd->output == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   for (int i = 0; cmd->input_names == NULL && i < signals; i++)
     if (pw_system_signal_of_force (s, i)) cmd->input[cmd->inputs++] = i;
-  for (int i = 0; cmd->output_names == NULL && i < states; i++) cmd->output[cmd->outputs++] = i;
+  for (int i = 0; cmd->output_names == NULL && i < states; i++)
+    if (!pw_system_state_hidden (s, i)) cmd->output[cmd->outputs++] = i;
   int status = PW_OK;
   if (cmd->input_names)
     status = linearise_find_all (s, cmd->input_names, cmd->input, &cmd->inputs, pw_system_find_signal, error);
@@ -238,8 +239,9 @@ static void linearise_print_mode (const pw_linearise_command *cmd, int mode) {
       pw_row_end (&t);
     }
     for (int j = 3 * bodies; j < 3 * bodies + internal && j < 3 * bodies + LINEARISE_ROWS; j++) {
-      pw_cell_unit (&t, -12, PW_NAME (pw_system_state_name, s, j), pw_system_state_unit (s, j));
-      linearise_print_component (&t, &cmd->linear, mode, j);
+      const int shown = pw_system_state_hidden (s, j) ? j + pw_system_coordinates (s) : j;
+      pw_cell_unit (&t, -12, PW_NAME (pw_system_state_name, s, shown), pw_system_state_unit (s, shown));
+      linearise_print_component (&t, &cmd->linear, mode, shown);
       pw_row_end (&t);
     }
   }
@@ -323,7 +325,8 @@ static void linearise_mode_json (const pw_linearise_command *cmd, pw_json *j, in
   pw_json_flag (j, "rigid", l->rigid[i]);
   pw_json_open (j, "shape", '{');
   for (int k = 0; linearise_has_shape (l, i) && k < 2 * l->coordinates; k++)
-    pw_json_numbers (j, PW_NAME (pw_system_state_name, cmd->m.system, k), linearise_shape (l, i, k), 2);
+    if (!pw_system_state_hidden (cmd->m.system, k))
+      pw_json_numbers (j, PW_NAME (pw_system_state_name, cmd->m.system, k), linearise_shape (l, i, k), 2);
   pw_json_close (j, '}');
   pw_json_close (j, '}');
 }

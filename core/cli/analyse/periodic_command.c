@@ -228,7 +228,9 @@ static double periodic_rotation (const pw_system *s, const pw_periodic_orbit *o,
 }
 
 static int periodic_rotations (const pw_system *s) {
-  return pw_system_coordinates (s) - 2 * pw_system_bodies (s);
+  int end = pw_system_coordinates (s);
+  while (pw_system_state_hidden (s, end - 1)) end--;
+  return end - 2 * pw_system_bodies (s);
 }
 
 /* The name of what turns: a body, or a coordinate. */
@@ -411,7 +413,8 @@ static int periodic_csv (const void *context, FILE *f, pw_error *error) {
     pw_text_cell (&t, periodic_events[o->event]);
     const double number[] = { o->period, d.total, o->rotation, o->unstable, o->residual };
     for (int k = 0; k < 5; k++) pw_text_number (&t, number[k]);
-    for (int i = 0; i < states; i++) pw_text_number (&t, p->state[i]);
+    for (int i = 0; i < states; i++)
+      if (!pw_system_state_hidden (s, i)) pw_text_number (&t, p->state[i]);
     pw_complex_cells (&t, o->re, o->im, o->multipliers, multipliers);
     status = pw_text_line (&t, f, cmd->folder, error);
   }

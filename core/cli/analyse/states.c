@@ -42,18 +42,25 @@ void pw_states_print (const pw_system *s, const double *q, const double *v, int 
     }
   }
   if (bodies > STATES_BODIES) printf ("  and %d more bodies\n", bodies - STATES_BODIES);
+  for (int j = 3 * bodies, n = pw_system_coordinates (s); j < n; j++)
+    if (pw_system_state_hidden (s, j))
+      printf ("  %s = %s %s\n", PW_NAME (pw_system_state_name, s, n + j), PW_DIGITS (pw_rounded (v[j], least), digits),
+              pw_system_state_unit (s, n + j));
 }
 
 void pw_states_json (const pw_system *s, const double *q, const double *v, const char *key, pw_json *j) {
   int n = pw_system_coordinates (s);
   pw_json_open (j, key, '{');
-  for (int i = 0; i < 2 * n; i++) pw_json_number (j, PW_NAME (pw_system_state_name, s, i), i < n ? q[i] : v[i - n]);
+  for (int i = 0; i < 2 * n; i++)
+    if (!pw_system_state_hidden (s, i))
+      pw_json_number (j, PW_NAME (pw_system_state_name, s, i), i < n ? q[i] : v[i - n]);
   pw_json_close (j, '}');
 }
 
 void pw_states_header (const pw_system *s, pw_text *t) {
   for (int i = 0; i < 2 * pw_system_coordinates (s); i++)
-    pw_text_name (t, PW_NAME (pw_system_state_name, s, i), pw_system_state_unit (s, i));
+    if (!pw_system_state_hidden (s, i))
+      pw_text_name (t, PW_NAME (pw_system_state_name, s, i), pw_system_state_unit (s, i));
 }
 
 void pw_complex_header (pw_text *t, int most, const char *unit) {

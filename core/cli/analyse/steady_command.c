@@ -541,7 +541,8 @@ static int steady_csv (const void *context, FILE *f, pw_error *error) {
     pw_text_number (&t, p->motion.parameter);
     pw_text_number (&t, p->motion.unstable);
     pw_text_number (&t, p->motion.residual);
-    for (int i = 0; i < states; i++) pw_text_number (&t, p->state[i]);
+    for (int i = 0; i < states; i++)
+      if (!pw_system_state_hidden (s, i)) pw_text_number (&t, p->state[i]);
     pw_complex_cells (&t, p->linear.re, p->linear.im, p->linear.unknowns, most);
     status = pw_text_line (&t, f, cmd->folder, error);
   }

@@ -51,7 +51,8 @@ static void page_states_json (const page *cmd, pw_json *j) {
   pw_json_open (j, "states", '[');
   for (int i = 0; i < 2 * n; i++) {
     pw_json_open (j, NULL, '{');
-    pw_json_text (j, "name", PW_NAME (pw_system_state_name, cmd->compiled.system, i));
+    int hidden = pw_system_state_hidden (cmd->compiled.system, i);
+    pw_json_text (j, "name", hidden ? "" : PW_NAME (pw_system_state_name, cmd->compiled.system, i));
     pw_json_text (j, "unit", pw_system_state_unit (cmd->compiled.system, i));
     int given = pw_initial_given (initial, i);
     const double *q = given ? initial->q_given : initial->q, *v = given ? initial->v_given : initial->v;

@@ -294,7 +294,7 @@ function fillPanel () {
   delete document.documentElement.dataset.narrowed;
   page.parameters.forEach((p, i) => add($("parameters"), p, p.about, settings.parameters[i], p.value, p.domain,
     (s, x) => { s.parameters[i] = x; }));
-  page.states.forEach((state, i) => add($("states"), state, "", settings.initial.get(i) ?? state.value, state.value, "real",
+  page.states.forEach((state, i) => state.name && add($("states"), state, "", settings.initial.get(i) ?? state.value, state.value, "real",
     (s, x) => s.initial.set(i, x)));
   $("parameters").hidden = page.parameters.length === 0;
   fillAccuracy();

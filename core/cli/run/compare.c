@@ -141,6 +141,7 @@ static int reference_sizes (const pw_system *system, const pw_motion *motion, do
   for (int k = 0; k < motion->taken; k++)
     for (int j = 0; j < motion->width; j++) {
       double value = fabs (pw_motion_at (motion, k)[j]);
+      if (pw_system_state_hidden (system, j)) continue;
       if (j >= states)
         has_multipliers |= !isnan (value);
       else

@@ -171,13 +171,13 @@ static void report_bodies (const pw_system *system, const pw_sample *last) {
   report_more (stdout, bodies - shown, ": -o FILE.csv writes them all");
 }
 
-/* Internal coordinates of elements. */
+/* Internal coordinates of elements, and first-order states. */
 static void report_internal (const pw_system *system, const pw_sample *last) {
   int first = 3 * pw_system_bodies (system), n = pw_system_coordinates (system);
   int end = n - first > REPORT_ROWS ? first + REPORT_ROWS : n;
   for (pw_table table = { 0 }; pw_table_pass (&table);)
     for (int j = first; j < end; j++) {
-      for (int state = j; state < 2 * n; state += n)
+      for (int state = pw_system_state_hidden (system, j) ? j + n : j; state < 2 * n; state += n)
         report_value (&table, -1, PW_NAME (pw_system_state_name, system, state), state < n ? last->q[j] : last->v[j],
                       pw_system_state_unit (system, state));
       pw_row_end (&table);

@@ -99,13 +99,14 @@ static void error_bodies (const pw_stated_error *e, const pw_system *s, FILE *f)
 
 /* The largest errors of the other columns of the table: energies, contact points, reactions, ledger. */
 static void error_columns (const pw_stated_error *e, const pw_system *s, int energies, FILE *f) {
-  const int first = PW_RECORD_STATES, end = first + 3 * pw_system_coordinates (s);
+  const int n = pw_system_coordinates (s), first = PW_RECORD_STATES, end = first + 3 * n;
   int shown = 0, all = 0;
   fprintf (f, "  largest error of a column\n");
   for (pw_table table = { .f = f }; pw_table_pass (&table);) {
     shown = all = 0;
     for (int i = 0; i < e->columns; i++) {
-      if (isnan (e->largest[i]) || (first <= i && i < end) || (i < first && !energies)) continue;
+      const int is_state = i >= first + n && pw_system_state_hidden (s, i - first - n);
+      if (isnan (e->largest[i]) || (first <= i && i < end && !is_state) || (i < first && !energies)) continue;
       if (++all > ERROR_COLUMNS) continue;
       shown++;
       pw_cell (&table, -8, PW_NAME (pw_system_record_name, s, i));

@@ -119,6 +119,7 @@ static int system_open (row_system *system, const pw_plan *plan, long row, pw_er
   if (system->state == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   for (int i = 0; i < plan->columns; i++) system->state[i] = -1;
   for (int i = 0; i < 2 * pw_system_coordinates (system->model.system); i++) {
+    if (pw_system_state_hidden (system->model.system, i)) continue;
     int column = pw_names_find (&plan->column_of, pw_system_state_name (system->model.system, i, name, sizeof name));
     if (column < 0)
       return pw_fail (error, PW_INPUT,

@@ -229,6 +229,7 @@ static int plan_add_columns (pw_plan *plan, const pw_system *system, pw_error *e
   for (int i = 0; i < 2 * pw_system_coordinates (system); i++) {
     int state = plan_table_state (system, i);
     const char *name = PW_NAME (pw_system_state_name, system, state);
+    if (pw_system_state_hidden (system, state)) continue;
     if (plan->column_room && pw_names_find (&plan->column_of, name) >= 0) continue;
     const char *copy = pw_arena_copy (&plan->arena, name);
     if (copy == NULL || plan_reserve_column (plan) != PW_OK) return pw_fail (error, PW_RESOURCE, "out of memory");
