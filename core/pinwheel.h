@@ -95,8 +95,10 @@ typedef struct {
  * (a controller sets a new torque), call pw_run_restart. */
 typedef struct {
   int (*eval) (void *context, double t, const double *x, double value[3], double *gradient);
-  void *context;            /* passed to eval and breakpoint; must outlive the systems, unless open replaces it */
-  const char *const *reads; /* NULL-terminated "BODY.phi", "BODY.vx", ...; forces only; may be NULL */
+  void *context; /* passed to eval and breakpoint; must outlive the systems, unless open replaces it */
+  /* NULL-terminated "BODY.phi", "BODY.vx", ...; may be NULL.  Forces may read any state, velocity constraints positions
+   * and first-order states. */
+  const char *const *reads;
   double (*breakpoint) (void *context, double t); /* first discontinuity after t, or INFINITY; may be NULL */
   /* Returns a new context made from this one, for a compiled system, a workspace or a run; NULL if out of memory.
    * Must be thread-safe.  May be NULL: all share `context`, and eval must be thread-safe. */
@@ -456,7 +458,7 @@ typedef struct {
   pw_signal angle, rate;      /* targets of phi1 - phi2 [rad], of omega1 - omega2 [rad/s] */
 } pw_motor;
 
-/* State: a first-order state z of a controller, an actuator, a motor's current: z' = rate.  Signals read it by its name.
+/* State: a first-order state z of a controller, an actuator, a motor's current: z' = rate.  Signals read it by name.
  * It has no mass: energies do not contain it. */
 typedef struct {
   const char *name;
@@ -551,7 +553,8 @@ typedef struct {
   const pw_configuration *configuration; /* of all bodies of the system and the ground */
   const double *q;                       /* count x kind->internal: internal coordinates */
   const double *v;                       /* count x kind->internal: their velocities */
-  const double *u;      /* count x kind->signals x 3: value; only of a constraint's signal: two time derivatives */
+  const double *u;      /* count x kind->signals x 3: value; only of a constraint's signal: two time derivatives, the
+                         * second one only of a position constraint */
   const double *w;      /* count x cols: any vector w, for jw_q = d(J w)/dq only */
   const double *lambda; /* count x kind->rows: multipliers, for power and loss */
 } pw_batch;
@@ -605,11 +608,15 @@ struct pw_kind {
   pw_batch_function *force_u; /* cols x signals: derivative of the force with respect to the value of each signal */
   pw_batch_function *jw_q;    /* rows x cols: derivative of J w by q; with unit vectors w, that of J^T lambda */
   pw_batch_function *eta_q, *gamma_q, *gamma_v; /* rows x cols */
-  pw_batch_function *force_q, *force_v;         /* cols x cols */
-  pw_batch_function *energy;                    /* 1: potential energy [J] */
-  pw_batch_function *power;                     /* 1: power supplied to the system [W]; NULL: -lambda . eta */
-  pw_batch_function *loss;                      /* 1: dissipated power [W], >= 0 */
-  pw_batch_function *contact; /* 3: contact point, or point of a marker [m], and heading [rad]; for output */
+  /* For signals of velocity constraints that depend on states: derivatives with respect to the values of the signals, of
+   * J: rows x cols x signals; of eta and gamma: rows x signals.  The term of the signals' rates in gamma is
+   * (eta_u - J_u v) u'. */
+  pw_batch_function *J_u, *eta_u, *gamma_u;
+  pw_batch_function *force_q, *force_v; /* cols x cols */
+  pw_batch_function *energy;            /* 1: potential energy [J] */
+  pw_batch_function *power;             /* 1: power supplied to the system [W]; NULL: -lambda . eta */
+  pw_batch_function *loss;              /* 1: dissipated power [W], >= 0 */
+  pw_batch_function *contact;           /* 3: contact point, or point of a marker [m], and heading [rad]; for output */
   /* 2 cols, for forces that saturate, such as friction: the smallest change of each coordinate, then of each velocity,
    * that reverses the force or changes it by its own magnitude.  Entries are INFINITY before the call. */
   pw_batch_function *saturation;
@@ -636,6 +643,11 @@ static inline int pw_kind_acts (const pw_kind *kind) {
 /* 1 if its signals belong to a force: they may depend on states and need no time derivatives. */
 static inline int pw_kind_signals_force (const pw_kind *kind) {
   return kind->force_u != NULL;
+}
+
+/* 1 if they belong to a velocity constraint and may depend on positions and first-order states. */
+static inline int pw_kind_signals_feedback (const pw_kind *kind) {
+  return kind->level == PW_NONHOLONOMIC && kind->force_u == NULL && (kind->J_u || kind->eta_u);
 }
 
 /* For each built-in element type k: its table pw_kind_k, and pw_add_k, which is pw_add with that table. */

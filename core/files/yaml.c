@@ -274,6 +274,19 @@ static int state_check (reader *r, const pw_node *node, const char *name, size_t
                           name + n + 1);
 }
 
+/* Whether the name of a state is that of a velocity, not of a coordinate or a first-order state. */
+static int is_velocity (const reader *r, const char *name) {
+  const char *dot = strchr (name, '.'), *part = dot ? dot + 1 : "";
+  const char *owner = PW_PRINTED (100, "%.*s", dot ? (int)(dot - name) : 0, name);
+  if (dot == NULL) return 0;
+  if (pw_names_find (&r->bodies, owner) >= 0)
+    return strcmp (part, "vx") == 0 || strcmp (part, "vy") == 0 || strcmp (part, "omega") == 0;
+  const int kind = pw_names_find (&r->elements, owner);
+  for (int i = 0; kind >= 0 && i < pw_kinds[kind]->internal; i++)
+    if (strcmp (part, pw_kinds[kind]->coordinate[i].rate) == 0) return 1;
+  return 0;
+}
+
 /* ---- Signals that are expressions ----
  *
  * Such a signal is a function, of which each compiled system has a copy (signal_open): it may outlive the model. */
@@ -345,9 +358,15 @@ static void *signal_open (void *context) {
 static int signal_add_state (reader *r, const pw_node *node, signal_function *f, const char *name, size_t at) {
   for (int i = 1; i <= f->states; i++)
     if (strcmp (f->name[i], name) == 0) return PW_OK;
-  if (f->derivatives)
-    return expression_fail (r, node, at, "\"%s\": the signal of a constraint depends on the time t alone", name);
+  if (f->derivatives > 1 || (f->derivatives && !pw_kind_signals_feedback (r->kind)))
+    return expression_fail (r, node, at, "\"%s\": the signal of a position constraint depends on the time t alone",
+                            name);
   if (state_check (r, node, name, at) != PW_OK) return r->error->status;
+  if (f->derivatives && is_velocity (r, name))
+    return expression_fail (r, node, at,
+                            "\"%s\": the signal of a velocity constraint depends on positions and first-order states, "
+                            "not on velocities; use a state that follows it, {name: NAME, rate: (%s - NAME)/TIME}",
+                            name, name);
   if (f->states == MAX_SIGNAL_STATES) return expression_fail (r, node, at, "more than %d states", MAX_SIGNAL_STATES);
   f->name[f->states + 1] = pw_arena_copy (r->arena, name);
   return f->name[++f->states] ? PW_OK : read_no_memory (r);
@@ -385,27 +404,38 @@ static int signal_check_derivative (reader *r, const pw_node *node, const signal
   return PW_OK;
 }
 
+/* The derivatives at a time; states that the signal reads have irregular values. */
+static void signal_derivatives_at (const signal_function *f, double t, double u[3]) {
+  double variable[MAX_SIGNAL_STATES + 1] = { t };
+  for (int i = 1; i <= f->states; i++) variable[i] = 0.1 + fmod (0.618 * i, 1);
+  signal_derivatives (f, variable, u);
+}
+
 /* The largest magnitude of derivative i at t +- 2^-1, 2^-2, ... 2^-20 s and t + 1 s. */
 static double signal_magnitude (const signal_function *f, double t, int i) {
   double size = 0;
   for (int k = -20; k <= 20; k++) {
-    double at = t + (k < 0 ? -1 : 1) * ldexp (1, -abs (k)), u[3];
-    signal_derivatives (f, &at, u);
+    double u[3];
+    signal_derivatives_at (f, t + (k < 0 ? -1 : 1) * ldexp (1, -abs (k)), u);
     if (isfinite (u[i])) size = fmax (size, fabs (u[i]));
   }
   return size;
 }
 
 /* Refuses signals that a constraint cannot follow: a jump of the value or, for positions, of its derivative, at one of
- * the first breakpoints after t = 0, beyond round-off and the change between adjacent times. */
+ * the first breakpoints after t = 0, beyond round-off and the change between adjacent times; a jump as states change,
+ * other than that of an angle by whole turns. */
 static int signal_check_continuity (reader *r, const pw_node *node, signal_function *f) {
   double t = 0, before[3], after[3];
+  if (f->states && f->text.jump && strncmp (f->text.jump, "atan2", 5) != 0)
+    return read_fail (r, node->at, "%s: %.60s jumps as states change, and that of a velocity constraint must not",
+                      r->label, f->text.jump);
   for (int k = 0; k < MAX_CHECKED_BREAKPOINTS; k++) {
     t = signal_breakpoint (f, t);
     if (t == INFINITY) return PW_OK;
     double last = nextafter (t, -INFINITY);
-    signal_derivatives (f, &last, before);
-    signal_derivatives (f, &t, after);
+    signal_derivatives_at (f, last, before);
+    signal_derivatives_at (f, t, after);
     for (int i = 0; i < f->derivatives; i++)
       if (fabs (after[i] - before[i]) >
           1e-9 * signal_magnitude (f, t, i) + 2 * (t - last) * (fabs (after[i + 1]) + fabs (before[i + 1])))
@@ -430,6 +460,8 @@ static int signal_of_time (reader *r, const pw_node *const node[3], pw_signal *s
     if (node[i] == NULL) continue;
     if (signal_expression (r, node[i], f, i) != PW_OK) return r->error->status;
     if (f->expression[i]->breaks) signal->function.breakpoint = signal_breakpoint;
+    if (i > 0 && f->derivatives && f->states)
+      return read_fail (r, node[i]->at, "%s: a %s belongs to an expression of the time alone", r->label, key[i]);
     if (i > 0 && !f->states && signal_check_derivative (r, node[i], f, i, key[i]) != PW_OK) return r->error->status;
   }
   if (f->states) signal->function.reads = f->name + 1;

@@ -110,6 +110,11 @@ static inline void batch_eta_of_signal (const pw_batch *batch, double *out) {
   for (int e = 0; e < batch->count; e++) out[e] = batch->u[3 * e];
 }
 
+/* Its derivative with respect to the signal. */
+static inline void batch_eta_u_of_signal (const pw_batch *batch, double *out) {
+  for (int e = 0; e < batch->count; e++) out[e] = 1;
+}
+
 /* A vector given in a body's frame, in world axes. */
 static inline void to_world (const pw_configuration *body, const double s[2], double out[2]) {
   out[0] = body->cos * s[0] - body->sin * s[1];

@@ -19,6 +19,9 @@ static const struct {
   { "g_size", "g_size >= |g|" },
   { "gamma", "J a - gamma = d(J v - eta)/dt" },
   { "force_u", "force_u = d force/du" },
+  { "J_u", "J_u = d J/du" },
+  { "eta_u", "eta_u = d eta/du" },
+  { "gamma_u", "gamma_u = d gamma/du" },
   { "constant", "a constant force does not change" },
   { "jw_q", "jw_q = d(J w)/dq" },
   { "eta_q", "eta_q = d eta/dq" },
@@ -282,19 +285,29 @@ static void selftest_shift (probe *x, int u, double h) {
   for (int e = 0; e < x->elements; e++) *x->batch->source[e * x->kind->signals + u].u += h;
 }
 
-static void selftest_force_u (probe *x) {
+/* The derivative by_u, called `name`, of f, which has `count` numbers per element, with respect to the signals. */
+static void selftest_by_signals (probe *x, const char *name, pw_batch_function *by_u, probe_function *f, int count) {
   selftest_numbers value, reference, plus, minus;
-  int signals = x->kind->signals, n = x->elements * x->cols;
+  int signals = x->kind->signals, n = x->elements * count;
   for (int u = 0; u < signals; u++) {
     selftest_shift (x, u, SELFTEST_STEP);
-    probe_force (x, plus);
+    f (x, plus);
     selftest_shift (x, u, -2 * SELFTEST_STEP);
-    probe_force (x, minus);
+    f (x, minus);
     selftest_shift (x, u, SELFTEST_STEP);
     for (int i = 0; i < n; i++) reference[i * signals + u] = (plus[i] - minus[i]) / (2 * SELFTEST_STEP);
   }
-  probe_evaluate (x, x->kind->force_u, "force_u", n * signals, value);
-  selftest_compare (x, "force_u", x->cols * signals, 1, selftest_largest (n, plus), value, reference);
+  probe_evaluate (x, by_u, name, n * signals, value);
+  selftest_compare (x, name, count * signals, 1, selftest_largest (n, plus), value, reference);
+}
+
+static void selftest_signals (probe *x) {
+  const pw_kind *kind = x->kind;
+  selftest_by_signals (x, "force_u", kind->force_u, probe_force, x->cols);
+  if (!pw_kind_signals_feedback (kind)) return;
+  selftest_by_signals (x, "J_u", kind->J_u, probe_J, x->rows * x->cols);
+  selftest_by_signals (x, "eta_u", kind->eta_u, probe_eta, x->rows);
+  selftest_by_signals (x, "gamma_u", kind->gamma_u, probe_gamma, x->rows);
 }
 
 static void selftest_constant (probe *x) {
@@ -470,7 +483,7 @@ static void selftest_all (probe *x) {
   probe_update (x, PROBE_TIME, 0);
   if (x->kind->level == PW_HOLONOMIC) selftest_holonomic (x);
   if (x->rows > 0) selftest_gamma (x);
-  if (x->kind->signals > 0) selftest_force_u (x);
+  if (x->kind->signals > 0) selftest_signals (x);
   if (x->kind->constant) selftest_constant (x);
   selftest_blocks (x);
   selftest_at_speed (x, 1e-310, selftest_rest);
@@ -600,18 +613,18 @@ static void scene_all (probe *x) {
   const pw_kind *kind = x->kind;
   probe_update (x, PROBE_Q, 0);
   if (kind->level == PW_HOLONOMIC) scene_holonomic (x);
+  if (kind->rows > 0) scene_acceleration (x);
+  if (x->s->state_dependent) {
+    scene_gradients (x, PROBE_Q);
+    scene_gradients (x, PROBE_V);
+  }
+  pw_hold_signals (x->workspace, 2); /* blocks exclude the dependence of signals on the state */
   if (kind->rows > 0) {
-    scene_acceleration (x);
     scene_block (x, PW_JW_Q, probe_Jw);
     scene_block (x, PW_ETA_Q, probe_eta);
     scene_block (x, PW_GAMMA_Q, probe_gamma);
     scene_block (x, PW_GAMMA_V, probe_gamma);
   }
-  if (kind->force_u && x->s->state_dependent) {
-    scene_gradients (x, PROBE_Q);
-    scene_gradients (x, PROBE_V);
-  }
-  pw_hold_signals (x->workspace, 1); /* force_q and force_v exclude the dependence of signals on the state */
   scene_block (x, PW_FORCE_Q, probe_force);
   scene_block (x, PW_FORCE_V, probe_force);
   pw_hold_signals (x->workspace, 0);
@@ -639,6 +652,9 @@ static int scene_randomise (probe *x, const double *q, const double *v, pw_rando
                     pw_failed_signal (x->workspace, signal, sizeof signal));
   x->tau = fmin (T, next - x->t) / 2;
   x->t += x->tau;
+  for (int i = 0; i < x->s->sources; i++) x->workspace->source[i].gradient = x->workspace->source[i].reads > 0;
+  probe_update (x, PROBE_Q, 0);
+  for (int j = x->s->mechanical; j < x->s->coords; j++) x->a[j] = pw_rate_source (x->workspace, j)->u[0];
   return PW_OK;
 }
 

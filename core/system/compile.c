@@ -291,8 +291,17 @@ static int compile_reads (const compilation *job, pw_source *source, const char 
     if (state[i] < 0)
       return pw_fail (job->error, PW_INPUT, "model %s: element %s reads a state: %s", s->model, element, cause.text);
   }
+  for (int i = 0; i < source->reads && !source->of_force; i++)
+    if (state[i] >= s->coords && state[i] < s->coords + s->mechanical)
+      return pw_fail (job->error, PW_INPUT,
+                      "model %s: element %s: the signal of a velocity constraint depends on positions and first-order "
+                      "states, not on the velocity %s: the constraint would restrict accelerations; use a state that "
+                      "follows it, with the rate (%s - STATE)/TIME",
+                      s->model, element, reads[i], reads[i]);
+  source->feedback = source->gradient = source->reads > 0 && !source->of_force;
   s->reads += source->reads;
   s->state_dependent += source->reads > 0;
+  s->feedback += source->feedback;
   return PW_OK;
 }
 

@@ -213,17 +213,36 @@ static int kinematics_copy_states (const pw_workspace *w, const pw_source *sourc
   return copied;
 }
 
+double pw_read_rate (const pw_workspace *w, int j, const double *v) {
+  return j < w->s->coords ? v[j] : pw_rate_source (w, j - w->s->coords)->u[0];
+}
+
+/* The rates of feedback signals, after all signals have been evaluated. */
+static void kinematics_feedback_rates (pw_workspace *w, const double *v) {
+  for (const pw_source *source = w->source, *end = source + w->s->sources; source < end; source++) {
+    if (!source->feedback) continue;
+    double rate = source->u[2];
+    for (int r = 0; r < source->reads; r++)
+      rate += source->x[source->reads + r] * pw_read_rate (w, source->state[r], v);
+    source->u[1] = rate;
+  }
+}
+
 int pw_update_signals (pw_workspace *w, double t, const double *q, const double *v) {
   int new_time = t != w->t_signal && !isnan (t); /* NaN: pw_update_velocities, after a failure */
   if (!new_time && w->s->state_dependent == 0) return PW_OK;
   if (new_time) w->t_signal = NAN; /* if a signal fails, others have changed already */
   for (pw_source *source = w->source, *end = source + w->s->sources; source < end; source++) {
-    if (w->hold && source->of_force) continue;
+    if (w->hold && (source->of_force || w->hold == 2)) continue;
     if (kinematics_copy_states (w, source, q, v) == 0 && !(new_time && source->reads == 0)) continue;
-    if (pw_signal_eval (source, t) == 0) continue;
+    if (pw_signal_eval (source, t) == 0) {
+      if (source->feedback) source->u[2] = source->u[1];
+      continue;
+    }
     w->failed = source;
     return PW_METHOD;
   }
+  if (w->s->feedback && w->hold < 2) kinematics_feedback_rates (w, v);
   if (new_time) w->t_signal = t;
   return PW_OK;
 }
@@ -356,6 +375,48 @@ static void blocks_value (const pw_kind *kind, pw_block block, blocks_single *on
 static double blocks_unit (const pw_workspace *w, const pw_kind *kind, int c, int velocity) {
   double unit = c < 3 * kind->bodies && c % 3 < 2 ? w->scale.length : 1;
   return velocity ? unit / w->scale.time : unit;
+}
+
+void pw_evaluate_by_signal (const pw_element_batch *k, int e, int u, pw_by_signal *out) {
+  const pw_kind *kind = k->kind;
+  const int signals = kind->signals, numbers = kind->rows * k->b.cols;
+  const struct {
+    pw_batch_function *function;
+    double *to;
+    int count;
+  } part[] = { { kind->J_u, out->J, numbers },
+               { kind->eta_u, out->eta, kind->rows },
+               { kind->gamma_u, out->gamma, kind->rows } };
+  double all[PW_MAX_ROWS * PW_MAX_COLS * PW_MAX_SIGNALS];
+  blocks_single one;
+  blocks_isolate (k, e, &one);
+  for (int p = 0; p < 3; p++) {
+    memset (all, 0, sizeof all);
+    if (part[p].function) part[p].function (&one.b, all);
+    for (int i = 0; i < part[p].count; i++) part[p].to[i] = all[i * signals + u];
+  }
+}
+
+void pw_feedback_rate_gradient (const pw_workspace *w, const pw_source *source, const double *v, double *out) {
+  const int reads = source->reads;
+  double u[3], *x = out + reads, *rate = x + 2 * reads;
+  pw_source at = *source;
+  at.x = x, at.u = u;
+  for (int r = 0; r < reads; r++) rate[r] = pw_read_rate (w, source->state[r], v);
+  for (int r = 0; r < reads; r++) {
+    double side[2] = { 0 }, h = 6e-6 * (fabs (source->x[r]) + 1);
+    for (int k = 0; k < 2; k++) {
+      memcpy (x, source->x, (size_t)reads * sizeof *x);
+      x[r] += k ? h : -h;
+      if (pw_signal_eval (&at, w->t_signal) != 0) { /* at the end of its domain */
+        side[0] = side[1] = 0;
+        break;
+      }
+      side[k] = u[1];
+      for (int i = 0; i < reads; i++) side[k] += x[reads + i] * rate[i];
+    }
+    out[r] = (side[1] - side[0]) / (2 * h);
+  }
 }
 
 /* An exactly representable step h that balances truncation, (h / unit)^2, and round-off, eps x / h, eps = 2.3e-16. */

@@ -83,9 +83,9 @@ static const char *fault_fields (const pw_kind *kind, char *buffer, size_t size)
 }
 
 static const char *fault_functions (const pw_kind *kind) {
-  pw_batch_function *const exact[] = { kind->g,     kind->g_size, kind->eta,     kind->J,
-                                       kind->gamma, kind->force,  kind->force_u, kind->energy,
-                                       kind->power, kind->loss,   kind->contact, kind->saturation };
+  pw_batch_function *const exact[] = { kind->g,       kind->g_size,     kind->eta,    kind->J,     kind->gamma,
+                                       kind->force,   kind->force_u,    kind->energy, kind->power, kind->loss,
+                                       kind->contact, kind->saturation, kind->J_u,    kind->eta_u, kind->gamma_u };
   for (size_t i = 0; i < sizeof exact / sizeof *exact; i++)
     if (exact[i] == PW_BY_DIFFERENCES) return "PW_BY_DIFFERENCES is permitted only for second-order blocks";
   if (kind->constant && (kind->force == NULL || kind->signals > 0))
@@ -93,6 +93,8 @@ static const char *fault_functions (const pw_kind *kind) {
   if (kind->signals > 0 && kind->rows == 0 && kind->force && kind->force_u == NULL)
     return "a force with signals, but no force_u";
   if (kind->force == NULL && kind->force_u) return "force_u, but no force";
+  if ((kind->J_u || kind->eta_u || kind->gamma_u) && (kind->level != PW_NONHOLONOMIC || kind->force_u))
+    return "J_u, eta_u or gamma_u, but its signals belong to no velocity constraint";
   if (kind->rows > 0 && kind->J == NULL) return "constraint equations without J";
   if (kind->level == PW_HOLONOMIC && kind->g == NULL) return "holonomic constraint equations without g";
   if (kind->level != PW_HOLONOMIC && kind->g) return "g, but no holonomic constraint equations";

@@ -159,7 +159,7 @@ static int signal_function (const pw_source *source, double t) {
   const pw_function *f = &source->signal.function;
   double *u = source->u;
   u[0] = NAN;
-  int status = f->eval (f->context, t, source->x, u, source->reads ? source->x + source->reads : NULL);
+  int status = f->eval (f->context, t, source->x, u, source->gradient ? source->x + source->reads : NULL);
   if (status != 0) return status;
   return !isfinite (u[0]) || (!source->of_force && !(isfinite (u[1]) && isfinite (u[2])));
 }
@@ -341,8 +341,9 @@ char *pw_signal_check (const pw_signal *s, const pw_kind *kind, int *point, char
   *point = -1;
   if (s->type == PW_FUNCTION && s->function.eval == NULL)
     snprintf (buffer, size, "a function signal without eval");
-  else if (s->type == PW_FUNCTION && s->function.reads && !pw_kind_signals_force (kind))
-    snprintf (buffer, size, "a constraint's signal may depend on time only");
+  else if (s->type == PW_FUNCTION && s->function.reads && !pw_kind_signals_force (kind) &&
+           !pw_kind_signals_feedback (kind))
+    snprintf (buffer, size, "the signal of this constraint may depend on the time only");
   else if (s->type == PW_CONSTANT && !isfinite (s->constant))
     snprintf (buffer, size, "%g: expected a finite number", s->constant);
   else if (form)

@@ -14,10 +14,12 @@ typedef struct {
   pw_signal signal;
   int reads;        /* number of states a function signal reads */
   const int *state; /* their indices: coordinate j, or coordinates + j for a velocity */
-  double *x;        /* 2 reads: values of these states, then the gradient */
+  double *x;        /* 2 reads: values of these states, then the gradient if it is needed */
   double *spline;   /* of a table: see pw_table_spline */
   double *u;        /* 3: receives value, first and second time derivative; x, u: NULL except in a workspace */
   int of_force;     /* 1: belongs to a force, which needs no derivatives */
+  int gradient;     /* 1: the gradient is needed: of feedback, and where implicit methods or linearisations need it */
+  int feedback;     /* 1: belongs to a velocity constraint and reads states; u[2]: its partial derivative by the time */
 } pw_source;
 
 /* One element type in use: its batch, and the indices of its constraint equations and coordinates.  What a run modifies
@@ -51,6 +53,7 @@ struct pw_system {
   int saturates;           /* 1: some of these have a function `saturation` */
   int sources;             /* signals */
   int state_dependent;     /* signals that depend on states */
+  int feedback;            /* those of them that belong to velocity constraints */
   int reads;               /* number of states that they read, with repetitions */
   size_t jacobian;         /* entries of J of all elements, zeros included */
   size_t block;            /* the largest count x cols of a batch; twice that if its force saturates */
@@ -80,7 +83,7 @@ struct pw_workspace {
   double *scratch;                 /* rows x 3 + coords + 3, for the function in progress */
   double *block;                   /* results of one function of one batch, until the next one is called */
   pw_scale scale;                  /* the run's */
-  int hold;                        /* 1: signals of forces keep their values (pw_hold_signals) */
+  int hold;                        /* 1: signals of forces keep their values, 2: all do (pw_hold_signals) */
   double t_signal;                 /* time of the last evaluation of signals; NaN: evaluate them again */
   const pw_source *failed;         /* the last signal that failed, or NULL */
 };
@@ -175,7 +178,7 @@ int pw_update_signals (pw_workspace *w, double t, const double *q, const double 
 /* Points the batches to the internal coordinates in q, v; q NULL: only to their velocities. */
 void pw_point_to_internal (pw_workspace *w, const double *q, const double *v);
 
-/* 1: the signals of forces keep their values from now on; 0: they follow time and states again.  Call
+/* 1: the signals of forces keep their values from now on, 2: all signals; 0: they follow time and states again.  Call
  * pw_update_kinematics before pw_update_velocities then. */
 void pw_hold_signals (pw_workspace *w, int hold);
 
@@ -250,6 +253,25 @@ int pw_block_rows (const pw_kind *kind, pw_block block);
 /* Fills count x block rows x cols for a batch whose configurations, w and lambda are set; by central differences if
  * the type is PW_BY_DIFFERENCES there.  Returns 0 without changing out if the block is identically zero. */
 int pw_evaluate_block (const pw_workspace *w, const pw_element_batch *k, pw_block block, double *out);
+
+/* Derivatives of an element's constraint equations with respect to its signal u: of J (rows x cols), eta and gamma
+ * (rows). */
+typedef struct {
+  double J[PW_MAX_ROWS * PW_MAX_COLS], eta[PW_MAX_ROWS], gamma[PW_MAX_ROWS];
+} pw_by_signal;
+void pw_evaluate_by_signal (const pw_element_batch *k, int e, int u, pw_by_signal *out);
+
+/* The time derivative of state j that a feedback signal reads, numbered as in pw_system_find_state: a velocity, or the
+ * rate of a first-order state. */
+double pw_read_rate (const pw_workspace *w, int j, const double *v);
+/* The signal that is the rate of the first-order state that is the velocity of coordinate j. */
+static inline const pw_source *pw_rate_source (const pw_workspace *w, int j) {
+  return w->source + w->s->sources - w->s->coords + j; /* the last signals are those of the states */
+}
+
+/* Derivatives of the rate u' of a feedback signal with respect to the states it reads, whose rates are fixed, by central
+ * differences of the gradient.  out: the result (reads numbers), then scratch, 3 reads. */
+void pw_feedback_rate_gradient (const pw_workspace *w, const pw_source *source, const double *v, double *out);
 
 /* 1 if the type gives NULL for a block of element e that differences show not to be zero; needs w and lambda. */
 int pw_block_missing (const pw_workspace *w, const pw_element_batch *k, int e, pw_block block);

@@ -54,6 +54,9 @@ static void linear_put (pw_linearisation *x, const double *v) {
                                            .direction = part[i].w,
                                            .lambda = x->lambda });
   pw_tangent_add_signals (&x->tangent, 0, 0, n);
+  pw_tangent_add_feedback (&x->tangent, &(pw_feedback){ 0, 0, n, 1, 1, .lambda = x->lambda });
+  pw_tangent_add_feedback (&x->tangent, &(pw_feedback){ n, 0, n, -1, 1, .w = v, .a = x->a });
+  pw_tangent_add_feedback (&x->tangent, &(pw_feedback){ of_J, 0, n, 1, 1, .w = v });
 }
 
 int pw_linear_evaluate (pw_linearisation *x, double t, const double *q, const double *v) {
@@ -134,7 +137,7 @@ void pw_linear_tangent (pw_linearisation *x, int c) {
   memset (x->dx, 0, 2 * (size_t)x->n * sizeof *x->dx);
   for (int j = 0; j < x->n; j++)
     x->dx[velocity ? x->n + j : j] = linear_column (x, column)[j] / pw_length_factor (x->r->s, j) / (velocity ? T : 1);
-  if (velocity) return;
+  if (velocity && x->r->s->feedback == 0) return;
   linear_multiply (x);
   linear_follow (x);
 }

@@ -98,6 +98,7 @@ static void drift_put_middle (pw_run *r, double h) {
   pw_tangent_add_equations (x, PW_JW_Q, first, 0, r->data->u, 0, 0.5 * h);
   pw_tangent_add_equations (x, PW_ETA_Q, first, 0, NULL, 0, -0.5 * h);
   pw_tangent_add_J (x, r->s->rows, first, 0, 0, 1);
+  pw_tangent_add_feedback (x, &(pw_feedback){ first, 0, 0, 1, 0.5 * h, x->row_index, .w = r->data->u });
 }
 
 /* Adds the holonomic rows of J; kinematics and J must be those of the end of the step. */

@@ -29,8 +29,11 @@ int pw_tangent_open (pw_tangent *x, pw_run *r) {
     x->D = pw_layout_alloc (&l, (size_t)s->coords, sizeof *x->D);
     x->block = pw_layout_alloc (&l, block, sizeof *x->block);
     x->direction = pw_layout_alloc (&l, direction, sizeof *x->direction);
+    x->gradient = pw_layout_alloc (&l, s->feedback ? 4 * (size_t)s->reads : 0, sizeof *x->gradient);
   }
   if (x->memory == NULL) return PW_RESOURCE;
+  for (int i = 0; i < s->sources; i++) r->w->source[i].gradient = r->w->source[i].reads > 0;
+  if (s->reads > 0) (void)pw_update_kinematics (r->w, r->t, r->q, r->v); /* with gradients from now on */
   for (int j = 0; j < s->coords; j++) x->D[j] = pw_is_angle (s, j) ? 1 / (s->scale.length * s->scale.length) : 1;
   for (int i = 0; i < s->rows; i++) {
     int active = r->active == NULL || r->active[i];
@@ -155,6 +158,70 @@ void pw_tangent_add_signals (pw_tangent *x, int row, int col_q, int col_v) {
   }
 }
 
+/* Adds `coefficient` times the gradient of a signal to a row. */
+static void feedback_add_gradient (pw_tangent *x, const pw_source *source, double coefficient, int row,
+                                   const pw_feedback *put) {
+  const int n = x->run->s->coords;
+  for (int r = 0; r < source->reads; r++) {
+    const int j = source->state[r];
+    const double slope = x->scatter.recording ? 0 : coefficient * source->x[source->reads + r];
+    pw_scatter_add (&x->scatter, row, j < n ? put->q + j : put->v + j - n, slope * (j < n ? put->q_part : 1));
+  }
+}
+
+/* Adds `coefficient` times the derivatives of the rate of a signal to a row. */
+static void feedback_add_rate (pw_tangent *x, const pw_source *source, double coefficient, int row,
+                               const pw_feedback *put) {
+  const int n = x->run->s->coords, recording = x->scatter.recording;
+  for (int r = 0; r < source->reads; r++) {
+    const int j = source->state[r];
+    const double slope = recording ? 0 : coefficient * source->x[source->reads + r];
+    pw_scatter_add (&x->scatter, row, j < n ? put->q + j : put->v + j - n,
+                    recording ? 0 : coefficient * x->gradient[r]);
+    if (j < n)
+      pw_scatter_add (&x->scatter, row, put->v + j, slope);
+    else
+      feedback_add_gradient (x, pw_rate_source (x->run->w, j - n), slope, row, put);
+  }
+}
+
+/* Adds what depends on signal u of element e. */
+static void feedback_add (pw_tangent *x, const pw_element_batch *k, int e, int u, const pw_feedback *put) {
+  const pw_source *source = &k->source[e * k->kind->signals + u];
+  const int n = x->run->s->coords;
+  pw_by_signal by;
+  pw_evaluate_by_signal (k, e, u, &by);
+  if (put->a && !x->scatter.recording) pw_feedback_rate_gradient (x->run->w, source, put->w, x->gradient);
+  for (int c = 0; put->lambda && c < k->b.cols; c++) {
+    double sum = 0;
+    for (int r = 0; r < k->kind->rows; r++)
+      sum += by.J[r * k->b.cols + c] * put->lambda[k->row + e * k->kind->rows + r];
+    const int j = pw_global (k, e, c);
+    if (j < n) feedback_add_gradient (x, source, put->factor * sum, put->row + j, put);
+  }
+  for (int r = 0; !put->lambda && r < k->kind->rows; r++) {
+    double Jw = -by.eta[r], Ja = -by.gamma[r];
+    int i = k->row + e * k->kind->rows + r;
+    if (put->row_index) i = put->row_index[i];
+    for (int c = 0; c < k->b.cols; c++) {
+      const int j = pw_global (k, e, c);
+      if (j >= n) continue;
+      Jw += by.J[r * k->b.cols + c] * put->w[j];
+      if (put->a) Ja += by.J[r * k->b.cols + c] * put->a[j];
+    }
+    if (i < 0) continue;
+    feedback_add_gradient (x, source, put->factor * (put->a ? Ja : Jw), put->row + i, put);
+    if (put->a) feedback_add_rate (x, source, put->factor * Jw, put->row + i, put);
+  }
+}
+
+void pw_tangent_add_feedback (pw_tangent *x, const pw_feedback *put) {
+  const pw_workspace *w = x->run->w;
+  for (const pw_element_batch *k = w->batch; w->s->feedback > 0 && k < w->batch + w->s->constraints; k++)
+    for (int i = 0; i < k->b.count * k->kind->signals; i++)
+      if (k->source[i].feedback) feedback_add (x, k, i / k->kind->signals, i % k->kind->signals, put);
+}
+
 /* ---- Equations ---- */
 
 void pw_tangent_add_equations (pw_tangent *x, pw_block block, int row, int col, const double *w, double holonomic,
@@ -182,6 +249,7 @@ void pw_tangent_add_momentum (pw_tangent *x, const pw_tangent_layout *to, const 
   pw_tangent_add_signals (x, to->momentum, to->q, to->v);
   for (int j = 0; j < s->coords; j++)
     pw_scatter_add (&x->scatter, to->momentum + j, to->a + j, to->a_factor * s->mass[j]);
+  pw_tangent_add_feedback (x, &(pw_feedback){ to->momentum, to->q, to->v, 1, 1, .lambda = lambda });
   put.factor = put.factor_nonholonomic = to->lambda_factor;
   put.col = to->lambda;
   pw_tangent_add_JT (x, &put);
@@ -197,6 +265,8 @@ void pw_tangent_add_accelerations (pw_tangent *x, const pw_tangent_layout *to, c
   pw_tangent_add_equations (x, PW_ETA_Q, row, to->q, NULL, -2 * alpha, -alpha);
   pw_tangent_add_equations (x, PW_GAMMA_Q, row, to->q, NULL, -1, -1);
   pw_tangent_add_equations (x, PW_GAMMA_V, row, to->v, NULL, -1, -1);
+  pw_tangent_add_feedback (x, &(pw_feedback){ row, to->q, to->v, 1, 1, x->row_index, .w = v, .a = a });
+  pw_tangent_add_feedback (x, &(pw_feedback){ row, to->q, to->v, alpha, 1, x->row_index, .w = v });
   pw_tangent_add_J (x, rows, row, to->v, a_in_v + 2 * alpha, a_in_v + alpha);
   pw_tangent_add_J (x, r->s->holonomic, row, to->q, r->beta * r->beta, 0);
   if (to->a != to->v) pw_tangent_add_J (x, rows, row, to->a, to->a_factor, to->a_factor);
@@ -290,6 +360,7 @@ static void dae_add_constraints (pw_dae *x, const double *v) {
   pw_tangent_add_equations (t, PW_JW_Q, 2 * n, 0, v, holonomic_factor, 1);
   pw_tangent_add_equations (t, PW_ETA_Q, 2 * n, 0, NULL, -holonomic_factor, -1);
   pw_tangent_add_J (t, s->rows, 2 * n, n, holonomic_factor, 1);
+  pw_tangent_add_feedback (t, &(pw_feedback){ 2 * n, 0, n, 1, 1, t->row_index, .w = v });
   if (x->enforces_positions) pw_tangent_add_J (t, s->holonomic, g_row, 0, 1, 0);
 }
 

@@ -67,6 +67,7 @@ typedef struct {
   double *D;           /* coords: 1 for lengths, 1/L^2 for angles, as below */
   double *block;       /* scratch: the largest block of a batch, or its force_u */
   double *direction;   /* scratch: the largest count x cols */
+  double *gradient;    /* scratch for pw_feedback_rate_gradient */
   pw_scatter_map scatter;
   char *memory;
 } pw_tangent;
@@ -102,6 +103,18 @@ void pw_tangent_add_JT (pw_tangent *x, const pw_placement *put);
 /* Adds -(derivative of the force with respect to signals) x (derivative of signals with respect to states): rows from
  * `row` on, q in columns from col_q on, v in columns from col_v on. */
 void pw_tangent_add_signals (pw_tangent *x, int row, int col_q, int col_v);
+
+/* What depends on the signals of velocity constraints that depend on states: (J^T lambda)_u, rows from `row` on are
+ * coordinates; or, if lambda is NULL, derivatives of J w - eta or, if a is not NULL, of J a - gamma with w = v; rows are
+ * constraint equations. */
+typedef struct {
+  int row, q, v;         /* first row; first columns of q and v */
+  double factor, q_part; /* factor of all; further factor of derivatives with respect to q */
+  const int *row_index;  /* as in pw_placement */
+  const double *lambda;  /* equations */
+  const double *w, *a;   /* coordinates */
+} pw_feedback;
+void pw_tangent_add_feedback (pw_tangent *x, const pw_feedback *put);
 
 /* Adds a block whose rows are the active constraint equations, from a row and column on, times the factors `holonomic`
  * and `nonholonomic`; w: the vector of the block (J w)_q. */

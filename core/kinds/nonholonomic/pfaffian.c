@@ -95,5 +95,6 @@ const pw_kind pw_kind_pfaffian = {
   REACTION ("F", "N or N m", "F a and F b are force and moment on the two bodies, in the frame of the first"),
   .reaction_unit = pfaffian_unit,
   .eta = batch_eta_of_signal,
+  .eta_u = batch_eta_u_of_signal,
   CONSTRAINT (pfaffian),
 };

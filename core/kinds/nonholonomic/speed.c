@@ -38,6 +38,7 @@ const pw_kind pw_kind_speed = {
   .level = PW_NONHOLONOMIC,
   REACTION ("F", "N", "force on the body along the direction"),
   .eta = batch_eta_of_signal,
+  .eta_u = batch_eta_u_of_signal,
   .J = contact_J,
   .gamma = speed_gamma,
   DERIVATIVES (contact),

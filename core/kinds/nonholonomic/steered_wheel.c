@@ -56,6 +56,18 @@ PER_ELEMENT (steered_gamma_v, steered, 3) {
   out[2] = -contact_speed_phi (&now.contact) - now.steering_rate * now.h;
 }
 
+/* dS/du = [ -c  -s  h ], with c, s = cos, sin (theta) */
+PER_ELEMENT (steered_J_u, steered, 3) {
+  out[0] = -now.contact.dy, out[1] = now.contact.dx, out[2] = now.h;
+}
+
+/* dh/du = -l, d(s_phi)/du = sin(theta) vx - cos(theta) vy */
+PER_ELEMENT (steered_gamma_u, steered, 1) {
+  const pw_configuration *body = now.contact.body;
+  *out = now.heading_rate * (now.contact.dx * body->vx + now.contact.dy * body->vy) +
+         now.steering_rate * now.contact.constants.arm * body->omega;
+}
+
 PER_ELEMENT (steered_contact, steered, 3) {
   contact_place_one (now.contact, out);
 }
@@ -79,5 +91,7 @@ const pw_kind pw_kind_steered_wheel = {
   .level = PW_NONHOLONOMIC,
   REACTION ("N", "N", "lateral force on the body, to the left of the heading"),
   CONSTRAINT (steered),
+  .J_u = steered_J_u,
+  .gamma_u = steered_gamma_u,
   .contact = steered_contact,
 };
