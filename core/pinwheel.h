@@ -608,8 +608,8 @@ struct pw_kind {
   pw_batch_function *force_u; /* cols x signals: derivative of the force with respect to the value of each signal */
   pw_batch_function *jw_q;    /* rows x cols: derivative of J w by q; with unit vectors w, that of J^T lambda */
   pw_batch_function *eta_q, *gamma_q, *gamma_v; /* rows x cols */
-  /* For signals of velocity constraints that depend on states: derivatives with respect to the values of the signals, of
-   * J: rows x cols x signals; of eta and gamma: rows x signals.  The term of the signals' rates in gamma is
+  /* For signals of velocity constraints that depend on states: derivatives with respect to the values of the signals,
+   * of J: rows x cols x signals; of eta and gamma: rows x signals.  The term of the signals' rates in gamma is
    * (eta_u - J_u v) u'. */
   pw_batch_function *J_u, *eta_u, *gamma_u;
   pw_batch_function *force_q, *force_v; /* cols x cols */

@@ -144,7 +144,7 @@ static int list_methods (const char **name, pw_error *error) {
 
 /* The shortest element of the type in a text model. */
 static void list_example (const pw_kind *k) {
-  printf ("    - {%s: NAME", k->name);
+  printf ("    - {%s: NAME", k == &pw_kind_state ? "name" /* in the list of states */ : k->name);
   for (const pw_field *f = k->fields; f->name; f++) {
     int count = pw_field_count (f);
     if (!f->required && f->type != PW_BODY) continue;
@@ -175,7 +175,7 @@ static void list_kind (const void *entry) {
     printf ("    a signal: a number, an expression of t%s, or a form of `pinwheel list signals`\n",
             pw_kind_signals_force (k) ? " and of states such as BODY.phi" : "");
   list_quantities ("reactions", k->reaction, k->rows);
-  list_quantities ("internal coordinates, and their velocities", k->coordinate, k->internal);
+  if (k != &pw_kind_state) list_quantities ("internal coordinates, and their velocities", k->coordinate, k->internal);
 }
 
 static int list_kinds (const char **name, pw_error *error) {

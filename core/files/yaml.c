@@ -103,7 +103,7 @@ static int read_keys_from (const reader *r, const pw_node *first, const char *co
 static int read_keys (const reader *r, const pw_node *map, const char *const *key, const char *owner,
                       const pw_node **value) {
   if (map && map->type != PW_YAML_MAP) {
-    char form[100] = "{";
+    char form[160] = "{";
     for (int i = 0; key[i]; i++) append (form, "%s: ..%s", key[i], key[i + 1] ? ", " : "}");
     read_fail (r, map->at, "expected a map %s for %s, found %s", form, owner, node_found (map));
     map = NULL;

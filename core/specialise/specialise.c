@@ -935,6 +935,9 @@ int pw_system_check_source (const pw_system *s, pw_error *error) {
   } limit[] = { { s->rows, SPECIALISE_ROWS, "constraint equations" },
                 { pw_system_elements (s), SPECIALISE_ELEMENTS, "elements" },
                 { s->bodies, SPECIALISE_BODIES, "bodies" } };
+  if (s->feedback)
+    return pw_fail (error, PW_INPUT, "model %s: specialised code has no constraints whose signals depend on states",
+                    s->model);
   for (size_t i = 0; i < sizeof limit / sizeof *limit; i++)
     if (limit[i].count > limit[i].most)
       return pw_fail (error, PW_INPUT, "model %s: %d %s: specialised code has at most %d", s->model, limit[i].count,

@@ -269,7 +269,7 @@ static inline const pw_source *pw_rate_source (const pw_workspace *w, int j) {
   return w->source + w->s->sources - w->s->coords + j; /* the last signals are those of the states */
 }
 
-/* Derivatives of the rate u' of a feedback signal with respect to the states it reads, whose rates are fixed, by central
+/* Derivatives of the rate u' of a feedback signal with respect to the states it reads, whose rates are fixed: central
  * differences of the gradient.  out: the result (reads numbers), then scratch, 3 reads. */
 void pw_feedback_rate_gradient (const pw_workspace *w, const pw_source *source, const double *v, double *out);
 

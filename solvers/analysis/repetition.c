@@ -191,7 +191,8 @@ int pw_repetition_error (pw_repetition *r, const double *rows, long count, doubl
   for (int i = 0; status == PW_OK && i < r->width; i++) {
     double least = 0;
     end[i] = largest[i] = NAN;
-    if (repetition_is_residual (i)) continue;
+    if (repetition_is_residual (i) || (i >= PW_RECORD_STATES && pw_system_state_hidden (r->s, i - PW_RECORD_STATES)))
+      continue;
     for (long k = 0; k < count; k++) least = fmax (least, ROUND_OFF * fabs (rows[k * r->width + i]));
     end[i] = least + factor * repetition_difference (rows, r->first, count - 1 - count / LAST, count, r->width, i);
     largest[i] = least + factor * repetition_difference (rows, r->first, 0, count, r->width, i);

@@ -229,7 +229,19 @@ static int kick_solve (pw_run *r, double h, double t1) {
 
 /* ---- Opening ---- */
 
+/* The kick has fixed constraints: their signals must not depend on the states that it changes. */
+static int leapfrog_check_feedback (const pw_run *r, pw_error *error) {
+  for (const pw_source *source = r->s->source, *end = source + r->s->sources; source < end; source++)
+    for (int i = 0; source->feedback && i < source->reads; i++)
+      if (source->state[i] >= r->s->coords)
+        return pw_fail (error, PW_INPUT,
+                        "leapfrog: the signal of a constraint depends on the first-order state %s; use galpha or rk4",
+                        PW_NAME (pw_system_state_name, r->s, source->state[i]));
+  return PW_OK;
+}
+
 static int leapfrog_open (pw_run *r, pw_error *error) {
+  if (leapfrog_check_feedback (r, error) != PW_OK) return PW_INPUT;
   pw_method_data *d = r->data = calloc (1, sizeof *d);
   size_t n = (size_t)r->s->coords + 3, rows = (size_t)r->s->rows;
   if (d == NULL) return pw_fail_memory (r->s, error);

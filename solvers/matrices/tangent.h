@@ -104,9 +104,9 @@ void pw_tangent_add_JT (pw_tangent *x, const pw_placement *put);
  * `row` on, q in columns from col_q on, v in columns from col_v on. */
 void pw_tangent_add_signals (pw_tangent *x, int row, int col_q, int col_v);
 
-/* What depends on the signals of velocity constraints that depend on states: (J^T lambda)_u, rows from `row` on are
- * coordinates; or, if lambda is NULL, derivatives of J w - eta or, if a is not NULL, of J a - gamma with w = v; rows are
- * constraint equations. */
+/* What depends on the signals of velocity constraints that read states: (J^T lambda)_u, rows from `row` on are
+ * coordinates; or, if lambda is NULL, derivatives of J w - eta or, if a is not NULL, of J a - gamma with w = v, where
+ * rows are constraint equations. */
 typedef struct {
   int row, q, v;         /* first row; first columns of q and v */
   double factor, q_part; /* factor of all; further factor of derivatives with respect to q */

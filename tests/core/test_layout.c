@@ -27,7 +27,7 @@ LAYOUT (pw_quantity, 32);
 LAYOUT (pw_internal, 32);
 LAYOUT (pw_configuration, 64);
 LAYOUT (pw_batch, 72);
-LAYOUT (pw_kind, 256);
+LAYOUT (pw_kind, 280);
 
 LAYOUT_AT (pw_error, text, 4);
 LAYOUT_AT (pw_signal, constant, 8);
@@ -110,14 +110,17 @@ LAYOUT_AT (pw_kind, jw_q, 160);
 LAYOUT_AT (pw_kind, eta_q, 168);
 LAYOUT_AT (pw_kind, gamma_q, 176);
 LAYOUT_AT (pw_kind, gamma_v, 184);
-LAYOUT_AT (pw_kind, force_q, 192);
-LAYOUT_AT (pw_kind, force_v, 200);
-LAYOUT_AT (pw_kind, energy, 208);
-LAYOUT_AT (pw_kind, power, 216);
-LAYOUT_AT (pw_kind, loss, 224);
-LAYOUT_AT (pw_kind, contact, 232);
-LAYOUT_AT (pw_kind, saturation, 240);
-LAYOUT_AT (pw_kind, symbol, 248);
+LAYOUT_AT (pw_kind, J_u, 192);
+LAYOUT_AT (pw_kind, eta_u, 200);
+LAYOUT_AT (pw_kind, gamma_u, 208);
+LAYOUT_AT (pw_kind, force_q, 216);
+LAYOUT_AT (pw_kind, force_v, 224);
+LAYOUT_AT (pw_kind, energy, 232);
+LAYOUT_AT (pw_kind, power, 240);
+LAYOUT_AT (pw_kind, loss, 248);
+LAYOUT_AT (pw_kind, contact, 256);
+LAYOUT_AT (pw_kind, saturation, 264);
+LAYOUT_AT (pw_kind, symbol, 272);
 
 LAYOUT_VALUE (PW_CONSTANT, 0);
 LAYOUT_VALUE (PW_HARMONIC, 1);
@@ -181,7 +184,8 @@ TEST (definitions) {
     { "friction", 0xebebc50a8771ab1e },      { "sliding-friction", 0x4722a2a44a1119a6 },
     { "drag", 0x79bea784c473bb98 },          { "gravity", 0xed353e1dda5787ff },
     { "force", 0xbc29b0bbfe5b6a71 },         { "torque", 0xc52ae040b1e51021 },
-    { "motor", 0x4b2d8f0773cca89 },          { "marker", 0xa45ad3f1c6e75b4a },
+    { "motor", 0x4b2d8f0773cca89 },          { "state", 0xe72f11bcbef2e275 },
+    { "marker", 0xa45ad3f1c6e75b4a },
   };
   int bad = 0;
   for (const pw_kind *const *k = pw_kinds; *k; k++) {

@@ -111,7 +111,7 @@ static const char *const messages_reads[] = { "stear.phi", NULL };
 TEST (bad_readers) {
   BAD (": element T reads a state: model scene has no state \"stear.phi\"; did you mean \"steer.phi\"?",
        TORQUE (.name = "T", .value = READER));
-  BAD (": drive D: angle: a constraint's signal may depend on time only",
+  BAD (": drive D: angle: the signal of this constraint may depend on the time only",
        pw_add (m, &toy_kind_drive, &(toy_drive){ .name = "D", .body = { "frame", "steer" }, .angle = READER }));
 }
 

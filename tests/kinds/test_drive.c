@@ -192,7 +192,7 @@ TEST (refused) {
   pw_signal follow = { PW_FUNCTION, .function = { .eval = drive_follow, .reads = reads } };
   pw_model *m = scene_model (&drive_shaken_table, NULL);
   check_ok (pw_model_set_signal (m, "shaker", "value", &follow, &error), &error);
-  scene_refused (m, "model scene: drive shaker: value: a constraint's signal may depend on time only");
+  scene_refused (m, "model scene: drive shaker: value: the signal of this constraint may depend on the time only");
 }
 
 TEST (methods) {

@@ -589,3 +589,15 @@ def test_commands():
     report = pw.command("check", pw.Model("n-trailer"))
     assert report["status"] == json.loads(program("check", "n-trailer", "--json", "-").stdout)["status"]
     assert "frame" in pw.command("show", "ezyroller", matrices=True)
+
+
+def test_states():
+    """A first-order state is integrated with the motion, and is a column under its name; its integral is none."""
+    model = pw.describe(bodies=[pw.Body("block", mass=1, inertia=1)],
+                        elements=[pw.Slider("rail", body=["block", "ground"], at=[[0, 0], [0, 0]]),
+                                  pw.Force("F", body="block", at=[0, 0], fx="f"),
+                                  pw.State("f", rate="1 - f", start=0.5, unit="N")])
+    result = model.run(1, method="erk8", rtol=1e-12)
+    assert abs(result["f"][-1] - (1 - 0.5 * math.exp(-1))) < 1e-10
+    assert "f" in result.states and "f.integral" not in result.states
+    assert abs(result["block.vx"][-1] - (1 - 0.5 * (1 - math.exp(-1)))) < 1e-10

@@ -58,7 +58,8 @@ static int steady_read_vary (pw_steady_command *cmd, pw_error *error) {
     cmd->settings.context = &cmd->vary;
     return PW_OK;
   }
-  if (strchr (cmd->vary.name, '.') == NULL) /* no parameter: fails with the nearest name */
+  if (strchr (cmd->vary.name, '.') == NULL &&
+      pw_system_find_state (cmd->m.system, cmd->vary.name, NULL) < 0) /* no parameter: fails with the nearest name */
     return pw_model_set (cmd->m.model, cmd->vary.name, cmd->settings.first, error);
   cmd->settings.vary = cmd->settings.holds;
   int status = pw_hold_add (cmd->m.system, "--vary", cmd->vary_text, cmd->vary.name, cmd->settings.first, cmd->hold,

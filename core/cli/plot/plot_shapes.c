@@ -79,6 +79,7 @@ static int shapes_add_joint (const pw_plots *plots, int first, int second, pw_pl
 
 /* Places an element without points at the joints of its bodies with the last one; 0 if it cannot be drawn there. */
 static int shapes_at_joints (const pw_plots *plots, const pw_element *e, const int *bodies, pw_plot_link *link) {
+  if (e->kind->bodies == 0) return 0;
   int last = plots->body_index[bodies[e->kind->bodies - 1]];
   for (int n = 0; n < e->kind->bodies - 1 && link->ends < 2; n++)
     if (!shapes_add_joint (plots, plots->body_index[bodies[n]], last, link)) return 0;

@@ -189,14 +189,25 @@ static int plan_has_name (const char **list, const char *name) {
   return 0;
 }
 
-/* Finds the parameter of an axis, in whose domain all values must lie.  Other names with a dot are those of states,
- * which exist only in a compiled model. */
+/* Whether the model with its default parameters has a first-order state of this name, which has no dot. */
+static int plan_has_state (const pw_plan *plan, const char *name) {
+  pw_error none = { 0 };
+  pw_model *m = pw_file_model (plan->file, &none);
+  pw_system *s = m && pw_model_build (m, &none) == PW_OK ? pw_system_compile (m, &none) : NULL;
+  const int found = s && pw_system_find_state (s, name, &none) >= 0;
+  pw_system_free (s);
+  pw_model_free (m);
+  return found;
+}
+
+/* Finds the parameter of an axis, in whose domain all values must lie.  Other names are those of states, which exist
+ * only in a compiled model. */
 static int plan_match_axis (const pw_plan *plan, pw_axis *axis, pw_model *model, pw_error *error) {
   const pw_parameter *parameter = axis->parameter = pw_cli_parameter (model, axis->name);
   if (parameter) axis->unit = parameter->unit;
   if (plan_has_name (parameter ? plan->line->sets : plan->line->starts, axis->name))
     return pw_fail (error, PW_INPUT, "%s is given by --vary and by %s", axis->name, parameter ? "--set" : "--start");
-  if (parameter == NULL && strchr (axis->name, '.')) return PW_OK;
+  if (parameter == NULL && (strchr (axis->name, '.') || plan_has_state (plan, axis->name))) return PW_OK;
   for (long i = 0; i < axis->count; i++)
     if (parameter == NULL || *pw_domain_check (parameter->domain, pw_axis_value (axis, i)))
       return pw_model_set (model, axis->name, pw_axis_value (axis, i), error); /* fails with the reason */
@@ -231,14 +242,17 @@ static int plan_add_columns (pw_plan *plan, const pw_system *system, pw_error *e
     const char *name = PW_NAME (pw_system_state_name, system, state);
     if (pw_system_state_hidden (system, state)) continue;
     if (plan->column_room && pw_names_find (&plan->column_of, name) >= 0) continue;
-    const char *copy = pw_arena_copy (&plan->arena, name);
-    if (copy == NULL || plan_reserve_column (plan) != PW_OK) return pw_fail (error, PW_RESOURCE, "out of memory");
-    plan->column[plan->columns] = (struct pw_column){ copy, pw_system_state_unit (system, state) };
+    const char *copy = pw_arena_copy (&plan->arena, name),
+               *unit = pw_arena_copy (&plan->arena, pw_system_state_unit (system, state));
+    if (copy == NULL || unit == NULL || plan_reserve_column (plan) != PW_OK)
+      return pw_fail (error, PW_RESOURCE, "out of memory");
+    plan->column[plan->columns] = (struct pw_column){ copy, unit };
     pw_names_add (&plan->column_of, copy, plan->columns++);
   }
   for (pw_axis *axis = plan->grid.axis; axis < plan->grid.axis + plan->grid.axes; axis++)
     if (axis->parameter == NULL)
-      axis->unit = pw_system_state_unit (system, pw_system_find_state (system, axis->name, error));
+      axis->unit =
+          pw_arena_copy (&plan->arena, pw_system_state_unit (system, pw_system_find_state (system, axis->name, error)));
   return PW_OK;
 }
 

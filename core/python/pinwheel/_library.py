@@ -22,7 +22,7 @@ VERSION = "0.1.0"
 PW_OK, PW_RETRY, PW_STOPPED, PW_RESOURCE, PW_INPUT, PW_INITIAL, PW_METHOD = 0, 1, 2, -1, -2, -3, -4
 PW_FUNCTION, PW_STEADY, PW_SPECIALISE_STEPS = 2, 0, 1000000
 PW_FORCE, PW_HOLONOMIC, PW_NONHOLONOMIC = range(3)
-PW_NUMBER, PW_POINT, PW_VECTOR, PW_BODY, PW_SIGNAL, PW_CHOICE = range(6)
+PW_NUMBER, PW_POINT, PW_VECTOR, PW_BODY, PW_SIGNAL, PW_CHOICE, PW_TEXT = range(7)
 DOMAINS = {"PW_REAL": "", "PW_NONNEGATIVE": ">= 0", "PW_POSITIVE": "> 0", "PW_COUNT": "1, 2, 3, ...",
            "PW_FRACTION": "from 0 to 1"}  # in the order of pw_domain
 
@@ -207,7 +207,7 @@ _declare(files, _p, ("pw_scene_code_open", _p, _p, _e), ("pw_scene_code_table", 
 _declare(files, None, ("pw_scene_code_close", _p))
 _declare(core, _p, ("pw_system_compile", _p, _e), ("pw_run_open", _p, _s, c.POINTER(pw_settings), _e))
 _declare(core, _i, ("pw_system_coordinates", _p), ("pw_system_rows", _p), ("pw_system_bodies", _p), ("pw_system_signals", _p),
-         ("pw_system_find_state", _p, _s, _e))
+         ("pw_system_find_state", _p, _s, _e), ("pw_system_state_hidden", _p, _i))
 _declare(core, _s, ("pw_system_state_name", _p, _i, _s, _z), ("pw_system_signal_name", _p, _i, _s, _z),
          ("pw_system_record_name", _p, _i, _s, _z), ("pw_system_record_unit", _p, _i),
          ("pw_system_table_notice", _p, _i, _d, _s, _z),

@@ -575,7 +575,7 @@ def describe(name: str = "model", *, about: str = "", bodies=(), elements=(), pa
         ``{"name": "sleigh", "mass": 1, "inertia": 0.5}``; see :class:`Body`.  Numbers may be expressions of parameters.
     elements : list of Element or dict
         ``pw.Wheel("edge", body="sleigh", at=[-0.25, 0])`` or ``{"wheel": "edge", "body": "sleigh", "at": [-0.25, 0]}``.
-        A signal may be a Python function of the time.
+        A signal may be a Python function of the time.  First-order states are among them: ``pw.State("z", rate="1 - z")``.
     parameters : list of dict
         ``{"name": "a", "value": 0.25, "unit": "m"}``.
     let, run : dict, optional
@@ -598,14 +598,18 @@ def describe(name: str = "model", *, about: str = "", bodies=(), elements=(), pa
     ...                      elements=[pw.Wheel("edge", body="sleigh", at=[-0.25, 0]),
     ...                                pw.Torque("motor", body=["sleigh", "ground"], value=lambda t: math.sin(t))])
     """
-    signals, plain = _functions(model.pop("signals", None) or {}), []
+    signals, plain, states = _functions(model.pop("signals", None) or {}), [], []
     for element in _entries(elements, "elements"):
         kind = next(iter(element))
         signals.update({f"{element[kind]}.{field}": value for field, value in element.items() if callable(value)})
-        plain.append({field: 0 if callable(value) else value for field, value in element.items()})
+        fields = {field: 0 if callable(value) else value for field, value in element.items()}
+        if kind == "state":
+            states.append({"name": fields.pop("state"), **fields})
+        else:
+            plain.append(fields)
     head = {"about": about, "run": run, "parameters": _entries(parameters, "parameters"), "let": let}
     lines = ["pinwheel: 1"] + [f"{key}: {_json(value)}" for key, value in head.items() if value]
-    for key, entries in (("bodies", _entries(bodies, "bodies")), ("elements", plain)):
+    for key, entries in (("bodies", _entries(bodies, "bodies")), ("elements", plain), ("states", states)):
         lines += [f"{key}:"] + [f"  - {_json(entry)}" for entry in entries] if entries else []
     return Model(_Described(name, "\n".join(lines) + "\n"), signals=signals, **model)
 

@@ -117,7 +117,8 @@ def columns(s, ledger) -> tuple[dict, dict]:
     n = core.pw_system_coordinates(s)
     reactions = _FIRST_COLUMNS + 3 * n + 2 * core.pw_system_contacts(s)
     entries = reactions + core.pw_system_rows(s)
-    groups = {"states": names[_FIRST_COLUMNS:_FIRST_COLUMNS + 2 * n], "reactions": names[reactions:entries], "ledger": names[entries:]}
+    states = [names[_FIRST_COLUMNS + i] for i in range(2 * n) if not core.pw_system_state_hidden(s, i)]
+    groups = {"states": states, "reactions": names[reactions:entries], "ledger": names[entries:]}
     units = {name: lib.text(core.pw_system_record_unit(s, i)) for i, name in enumerate(names)}
     return units, groups
 
