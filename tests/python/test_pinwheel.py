@@ -597,7 +597,7 @@ def test_states():
                         elements=[pw.Slider("rail", body=["block", "ground"], at=[[0, 0], [0, 0]]),
                                   pw.Force("F", body="block", at=[0, 0], fx="f"),
                                   pw.State("f", rate="1 - f", start=0.5, unit="N")])
-    result = model.run(1, method="erk8", rtol=1e-12)
+    result = model.run("erk8", t_end=1, rtol=1e-12)
     assert abs(result["f"][-1] - (1 - 0.5 * math.exp(-1))) < 1e-10
     assert "f" in result.states and "f.integral" not in result.states
     assert abs(result["block.vx"][-1] - (1 - 0.5 * (1 - math.exp(-1)))) < 1e-10
