@@ -194,8 +194,8 @@ int pw_initial_given (const pw_initial_report *report, int state);
  * when t_end is reached, the rows are full, or after `steps` calls of pw_run_advance_towards (times: NULL: of
  * pw_run_advance): call it again, with the rest of the times; otherwise as pw_run_advance.  A row is t, scaled
  * residuals of g = 0 and J v = eta, kinetic and potential energy, work, loss, energy added by projections, balance
- * (PW_RECORD_STATES numbers), then q, v, a, x and y of the contact points, reactions (-lambda) and, with
- * pw_settings.ledger, the ledger's entries. */
+ * (PW_RECORD_STATES numbers), then q, v, a, x and y of the contact points, reactions (-lambda), outputs and,
+ * with pw_settings.ledger, the ledger's entries. */
 enum { PW_RECORD_STATES = 9 }; /* index of the first coordinate in a row */
 int pw_run_record_width (const pw_run *r);
 int pw_system_record_width (const pw_system *s, int ledger); /* of runs with pw_settings.ledger = ledger */

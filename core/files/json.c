@@ -137,6 +137,11 @@ static void json_sample (pw_json *j, const pw_system *s, const pw_sample *x, int
   for (int i = 0; i < pw_system_rows (s); i++)
     pw_json_number (j, PW_NAME (pw_system_reaction_name, s, i), 0 - x->lambda[i]);
   pw_json_close (j, '}');
+  if (pw_system_outputs (s) > 0) {
+    pw_json_open (j, "outputs", '{');
+    for (int i = 0; i < pw_system_outputs (s); i++) pw_json_number (j, pw_system_output_name (s, i), x->output[i]);
+    pw_json_close (j, '}');
+  }
   const double energy[] = { x->kinetic, x->potential, x->work, x->loss, x->projection, x->balance };
   json_numbers (j, "energy", names, ledger ? energy : NULL, 6);
 }

@@ -260,15 +260,40 @@ static int parser_is_call (const parser *p) {
   return after[strspn (after, " \t\r\n")] == '(';
 }
 
+/* Reads an expression in place of the current token, the name of it.  Errors are reported at the name. */
+static parser_part parser_expand (parser *p, const char *name, const char *expanded) {
+  const char *text = p->text;
+  const size_t at = p->at, size = p->size;
+  if (p->variable == NULL)
+    return parser_fail (p, at, "\"%s\" changes during the motion, and this number must not", name);
+  if (!parser_enter (p)) return (parser_part){ 0 };
+  p->text = expanded, p->at = p->size = 0;
+  parser_next (p);
+  parser_part part = parser_choice (p);
+  if (p->status == PW_OK && p->type != 0) parser_unexpected (p, 0, 0);
+  p->depth--;
+  p->text = text, p->at = part.from = at, p->size = size;
+  if (p->status == PW_OK) return parser_next (p), part;
+  if (p->status == PW_INPUT) {
+    p->error->at = at;
+    memcpy (p->error->text, PW_PRINTED (sizeof p->error->text, "in \"%.63s\": %s", name, p->error->text),
+            sizeof p->error->text);
+  }
+  return (parser_part){ 0 };
+}
+
 /* constant: the constant of this name, or NULL; other names have precedence. */
 static parser_part parser_name (parser *p, const char *name, const pw_expression_function *constant) {
   int variable = 0, named = p->scope ? pw_names_find (&p->scope->index, name) : -1;
   while (p->variable && p->variable[variable] && strcmp (p->variable[variable], name) != 0) variable++;
   int is_variable = p->variable && p->variable[variable];
-  if (!is_variable && named < 0 && constant == NULL) return parser_unknown (p, name);
+  const char *expanded =
+      !is_variable && p->scope && p->scope->expand ? p->scope->expand (p->scope->context, name) : NULL;
+  if (!is_variable && named < 0 && constant == NULL && expanded == NULL) return parser_unknown (p, name);
   if (parser_is_call (p))
     return parser_fail (p, p->at, "\"%s\" is a number, not a function; a product is written with *", name);
   if (is_variable) return parser_leaf (p, PW_OP_VARIABLE, variable, 0);
+  if (expanded) return parser_expand (p, name, expanded);
   return parser_leaf (p, PW_OP_CONSTANT, 0, named >= 0 ? p->scope->value[named] : constant->value);
 }
 

@@ -40,32 +40,44 @@ typedef struct {
   enum { PW_WORK, PW_LOSS } type;
 } pw_entry;
 
+/* An output of the model. */
+typedef struct {
+  const char *name, *unit;
+  pw_function function;  /* with a context of the system or workspace */
+  const pw_column *read; /* reads: the columns that it reads, also earlier outputs */
+  int reads;
+  unsigned types; /* of these columns, and of those that these outputs read: 1 << type or'ed */
+} pw_compiled_output;
+
 /* Constant after pw_system_compile: any number of runs and threads may share it. */
 struct pw_system {
   pw_arena arena; /* contains all arrays but `batch` */
   const char *model;
   int bodies, coords, rows, holonomic, batches, entries;
-  int constraints;         /* batches with constraint equations */
-  int forces;              /* batches with a force that is not constant */
-  int saturates;           /* 1: some of these have a function `saturation` */
-  int sources;             /* signals */
-  int state_dependent;     /* signals that depend on states */
-  int reads;               /* number of states that they read, with repetitions */
-  size_t jacobian;         /* entries of J of all elements, zeros included */
-  size_t block;            /* the largest count x cols of a batch; twice that if its force saturates */
-  int rheonomic;           /* batches whose eta may be other than 0 */
-  pw_scale scale;          /* with T = 1 s; T of a run is in its workspace */
-  const char **body_name;  /* bodies */
-  double *M;               /* coords: diagonal of M */
-  double *mass;            /* coords: the same, but the mean where nothing turns a body (pw_is_unturned) */
-  int *angle_user;         /* bodies: of one without inertia the first element that depends on its angle; -1: none */
-  double *constant;        /* coords + 3: sum of the constant forces */
-  double *metric;          /* coords: M, and small weights where M is zero */
-  double *q0, *v0;         /* coords: the described initial state, or values of pw_model_set_initial */
-  unsigned char *origin;   /* 2 coords: origin of initial values: PW_GIVEN | ... */
-  pw_element_batch *batch; /* batches: holonomic types, then nonholonomic ones, then forces */
-  pw_source *source;       /* sources, ordered by batch */
-  pw_entry *entry;         /* entries */
+  int constraints;            /* batches with constraint equations */
+  int forces;                 /* batches with a force that is not constant */
+  int saturates;              /* 1: some of these have a function `saturation` */
+  int sources;                /* signals */
+  int state_dependent;        /* signals that depend on states */
+  int reads;                  /* number of states that they read, with repetitions */
+  size_t jacobian;            /* entries of J of all elements, zeros included */
+  size_t block;               /* the largest count x cols of a batch; twice that if its force saturates */
+  int rheonomic;              /* batches whose eta may be other than 0 */
+  pw_scale scale;             /* with T = 1 s; T of a run is in its workspace */
+  const char **body_name;     /* bodies */
+  double *M;                  /* coords: diagonal of M */
+  double *mass;               /* coords: the same, but the mean where nothing turns a body (pw_is_unturned) */
+  int *angle_user;            /* bodies: of one without inertia the first element that depends on its angle; -1: none */
+  double *constant;           /* coords + 3: sum of the constant forces */
+  double *metric;             /* coords: M, and small weights where M is zero */
+  double *q0, *v0;            /* coords: the described initial state, or values of pw_model_set_initial */
+  unsigned char *origin;      /* 2 coords: origin of initial values: PW_GIVEN | ... */
+  pw_element_batch *batch;    /* batches: holonomic types, then nonholonomic ones, then forces */
+  pw_source *source;          /* sources, ordered by batch */
+  pw_entry *entry;            /* entries */
+  pw_compiled_output *output; /* outputs */
+  int outputs;
+  unsigned output_types; /* of the columns that they read, as pw_compiled_output.types */
 };
 
 /* What a run modifies (pinwheel.h). */
@@ -73,6 +85,9 @@ struct pw_workspace {
   const pw_system *s;
   pw_element_batch *batch;         /* batches: copies of the system's, with arrays of this workspace */
   pw_source *source;               /* sources: copies of the system's, with contexts of this workspace */
+  pw_compiled_output *output;      /* outputs: the same */
+  double *output_value;            /* outputs */
+  double (*contact)[3];            /* contacts: place and heading, as of the last use */
   double *u, *J;                   /* those of all batches: sources x 3; entries of J, element by element */
   pw_configuration *configuration; /* bodies + 1; the last is the ground */
   double *scratch;                 /* rows x 3 + coords + 3, for the function in progress */
@@ -127,6 +142,18 @@ static inline double pw_unit (const pw_system *s, int j) {
 static inline double pw_larger (double a, double b) {
   return a > b ? a : b;
 }
+
+/* ---- Columns and outputs ---- */
+
+/* The offset in pw_sample of a column that is one of its numbers. */
+size_t pw_column_offset (pw_column_type type);
+
+/* Sets w->output_value, the outputs at a sample whose kinematics are evaluated; ledger: its entries, NULL: unknown. */
+void pw_evaluate_outputs (pw_workspace *w, const pw_sample *x, const double *ledger);
+
+/* Opens the contexts of functions; a status.  Closes them. */
+int pw_open_outputs (pw_compiled_output *output, int count);
+void pw_close_outputs (const pw_compiled_output *output, int count);
 
 /* ---- Signals ---- */
 

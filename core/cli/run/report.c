@@ -198,6 +198,17 @@ static void report_reactions (const pw_system *system, const pw_sample *last) {
   report_more (stdout, rows - shown, ": -o FILE.csv writes them all");
 }
 
+static void report_outputs (const pw_system *system, const pw_sample *last) {
+  const int outputs = pw_system_outputs (system), shown = outputs < REPORT_ROWS ? outputs : REPORT_ROWS;
+  if (outputs > 0) printf ("\n  output\n");
+  for (pw_table table = { 0 }; pw_table_pass (&table);)
+    for (int i = 0; i < shown; i++) {
+      report_value (&table, -8, pw_system_output_name (system, i), last->output[i], pw_system_output_unit (system, i));
+      pw_row_end (&table);
+    }
+  report_more (stdout, outputs - shown, ": -o FILE.csv writes them all");
+}
+
 static void report_energy (const pw_sample *last) {
   const struct {
     const char *name;
@@ -296,6 +307,7 @@ void pw_report_end (const pw_run_cli *command, const pw_summary *summary, const 
   report_bodies (system, last);
   report_internal (system, last);
   report_reactions (system, last);
+  report_outputs (system, last);
   if (command->with_energies) report_energy (last);
   report_errors (summary->reference, command->comparison.gaps);
   printf ("\n  worst scaled residuals: position %s, velocity %s\n", PW_DIGITS (stats->position, 2),
