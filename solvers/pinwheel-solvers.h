@@ -121,6 +121,25 @@ double pw_run_time (const pw_run *r);
  * outside the step; PW_METHOD if a signal fails there, or no state satisfies the constraints; PW_RESOURCE. */
 int pw_run_sample (pw_run *r, double t, pw_sample *sample, pw_error *error);
 
+/* A function of the sample of which the first time is sought at which it is positive: a condition becomes true, an event
+ * occurs.  Set value and context, the rest to 0. */
+typedef struct {
+  double (*value) (void *context, const pw_sample *sample); /* NaN counts as not positive */
+  void *context;
+  /* private: the time of the last call, and the value there */
+  int begun;
+  double t, last;
+} pw_crossing;
+
+/* Call it before the first step and after each one (pw_run_advance).  Stores the first time in the last step, its end
+ * included, at which the function is positive, up to round-off: an instant before it is not; NaN if it is not positive.
+ * Once it has been positive, set `begun` to 0 where it may be sought again.
+ *
+ * Changes of sign between the step's ends are always found.  Of a function that becomes positive and returns within a
+ * step, those are found that its values at the ends and the middle suggest: all that last more than half of a step, and
+ * of smooth functions all where a parabola describes it over a sixteenth of the step. Errors: as pw_run_sample. */
+int pw_run_find_crossing (pw_run *r, pw_crossing *x, double *t, pw_error *error);
+
 /* Energy defect of a sample, including energy added by projections, relative to the energy that the run has
  * exchanged: the largest of its kinetic energy, the change of its potential energy, and the kinetic energy of moving
  * by L and 1 rad in the span of the run.  If that is zero, relative to the larger of work and loss. */

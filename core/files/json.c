@@ -212,6 +212,11 @@ int pw_json_write (const pw_summary *summary, const pw_system *s, const pw_sampl
   pw_json_text (&j, "engine", summary->general == NULL ? NULL : *summary->general ? "general" : "specialised");
   pw_json_text (&j, "engine_reason", summary->general);
   json_sample (&j, s, sample, ledger);
+  if (summary->until)
+    pw_json_text (&j, "stopped",
+                  isnan (summary->stop_time) ? NULL
+                                             : PW_PRINTED (400, "%.300s at t = %s s", summary->until,
+                                                           pw_format ((char[32]){ 0 }, summary->stop_time, 17)));
   pw_json_number (&j, "unbalanced", summary->energy_defect);
   json_lists (&j, summary->redundant, s);
   json_reference (&j, summary->reference);

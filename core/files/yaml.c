@@ -106,7 +106,7 @@ static int read_keys_from (const reader *r, const pw_node *first, const char *co
 static int read_keys (const reader *r, const pw_node *map, const char *const *key, const char *owner,
                       const pw_node **value) {
   if (map && map->type != PW_YAML_MAP) {
-    char form[100] = "{";
+    char form[300] = "{";
     for (int i = 0; key[i]; i++) append (form, "%s: ..%s", key[i], key[i + 1] ? ", " : "}");
     read_fail (r, map->at, "expected a map %s for %s, found %s", form, owner, node_found (map));
     map = NULL;
@@ -283,13 +283,13 @@ static int state_check (reader *r, const pw_node *node, const char *name, size_t
  *
  * Such a signal is a function, of which each compiled system has a copy (signal_open): it may outlive the model. */
 
-enum { MAX_SIGNAL_STATES = PW_OUTPUT_READS, MAX_CHECKED_BREAKPOINTS = 100 };
+enum { MAX_SIGNAL_STATES = 16, MAX_CHECKED_BREAKPOINTS = 100 };
 
 typedef struct {
-  const pw_expression *expression[3];      /* value, rate, acceleration; NULL: not given, differentiated instead */
-  int derivatives;                         /* required time derivatives; of a force: 0, nonholonomic: 1, holonomic: 2 */
-  int states;                              /* number of states in it */
-  const char *name[MAX_SIGNAL_STATES + 2]; /* "t", then states, "BODY.phi"; not for evaluation */
+  const pw_expression *expression[3];    /* value, rate, acceleration; NULL: not given, differentiated instead */
+  int derivatives;                       /* required time derivatives; of a force: 0, nonholonomic: 1, holonomic: 2 */
+  int states;                            /* number of states in it */
+  const char *name[PW_OUTPUT_READS + 2]; /* "t", then states, "BODY.phi"; not for evaluation */
   pw_signal_text text;
 } signal_function;
 
@@ -308,7 +308,7 @@ static void signal_derivatives (const signal_function *f, const double *variable
 
 static int signal_eval (void *context, double t, const double *state, double value[3], double *gradient) {
   const signal_function *f = context;
-  double variable[MAX_SIGNAL_STATES + 1] = { t }, derivatives[3];
+  double variable[PW_OUTPUT_READS + 1] = { t }, derivatives[3];
   if (f->states) memcpy (variable + 1, state, (size_t)f->states * sizeof *state);
   if (f->derivatives)
     signal_derivatives (f, variable, value);
@@ -1040,13 +1040,13 @@ static int output_add_column (reader *r, output_function *o, const char *name, s
   return f->name[++f->states] ? PW_OK : read_no_memory (r);
 }
 
-/* Reports outputs that read each other, the last of which reads output `first`. */
+/* Reports that output `last` reads output `first`, of which it is a function. */
 static int output_cycle (const reader *r, const output_function *last, int first, size_t at) {
   char list[300] = "";
-  int i = (int)(last - r->output);
-  for (; i != first; i = r->output[i].reader) append (list, " of %s", r->output[i].output.name);
-  return read_fail (r, source_offset (r->y, last->node, at), "output %s is a function of itself:%s of %s",
-                    r->output[first].output.name, list, r->output[first].output.name);
+  for (int i = (int)(last - r->output); i != first; i = r->output[i].reader)
+    append (list, "%s%s", *list ? ", " : ", through ", r->output[i].output.name);
+  return read_fail (r, source_offset (r->y, last->node, at), "output %s is a function of itself%s",
+                    r->output[first].output.name, list);
 }
 
 /* Reads the expression of an output, after those of outputs in it. */

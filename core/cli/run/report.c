@@ -273,6 +273,8 @@ pw_summary pw_run_summary (pw_run_cli *command, const pw_sample *last, const pw_
                          .status = pw_cli_status_word (error->status),
                          .reason = error->text,
                          .cpu = command->cpu,
+                         .until = command->condition ? command->until : NULL,
+                         .stop_time = command->stop_time,
                          .energy_defect = last ? pw_run_energy_defect (run, last) : NAN,
                          .redundant = command->redundant,
                          .general = run ? report_general_reason (command) : NULL,
@@ -320,5 +322,9 @@ void pw_report_end (const pw_run_cli *command, const pw_summary *summary, const 
   else
     printf ("  code specialised for this scene: %ld evaluations\n", stats->specialised);
   if (stats->restarts > 0) printf ("  restarted at %s\n", PW_COUNTED (stats->restarts, "checkpoint"));
+  if (summary->until && isnan (summary->stop_time))
+    pw_cli_print (stdout, "  %s did not become true\n", summary->until);
+  else if (summary->until)
+    pw_cli_print (stdout, "  stopped: %s at t = %s s\n", summary->until, PW_DIGITS (summary->stop_time, 15));
   if (*summary->reason) printf ("  ended early: %s\n", summary->reason);
 }
