@@ -57,7 +57,7 @@ typedef enum {
 
 typedef struct {
   pw_column_type type;
-  int index; /* of the state, constraint equation, entry of the ledger, output; contact i: 2 i for x, 2 i + 1 for y; or 0 */
+  int index; /* of the state, constraint equation, ledger entry, output; contact i: 2 i for x, 2 i + 1 for y; or 0 */
 } pw_column;
 
 /* The number of columns of a type; name, as pw_system_state_name, and unit of one. */
@@ -68,8 +68,9 @@ const char *pw_system_column_unit (const pw_system *s, pw_column c);
 /* Finds the column of this name.  PW_INPUT, with the nearest name, if there is none. */
 int pw_system_find_column (const pw_system *s, const char *name, pw_column *c, pw_error *error);
 
-/* Finds a column of an element by the part of its name after the element's, "Fx": its type, and its index among those of
- * the element; of an entry of the ledger 0 for "work", 1 for "loss".  1 if there is one, else 0. */
+/* Finds a column of an element by the part of its name after the element's, "Fx": its type, and its index among those
+ * of the element; of an entry of the ledger 0 for "work", 1 for "loss".  kind NULL: a column that is one number of a
+ * sample, "kinetic".  1 if there is one, else 0. */
 int pw_kind_find_column (const pw_kind *kind, const char *name, pw_column *c);
 
 /* The number of outputs; name and unit, "" without one; the types of the columns that it reads, itself or by other

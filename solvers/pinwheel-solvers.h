@@ -121,8 +121,8 @@ double pw_run_time (const pw_run *r);
  * outside the step; PW_METHOD if a signal fails there, or no state satisfies the constraints; PW_RESOURCE. */
 int pw_run_sample (pw_run *r, double t, pw_sample *sample, pw_error *error);
 
-/* A function of the sample of which the first time is sought at which it is positive: a condition becomes true, an event
- * occurs.  Set value and context, the rest to 0. */
+/* A function of the sample of which the first time is sought at which it is positive: a condition becomes true, an
+ * event occurs.  Set value and context, the rest to 0. */
 typedef struct {
   double (*value) (void *context, const pw_sample *sample); /* NaN counts as not positive */
   void *context;

@@ -1,6 +1,6 @@
 /* Tables of samples: CSV with a line per sample, or NumPy archives.  The columns are
  *
- *   t [s] | states of each body, of each internal coordinate | contact points | reactions | outputs | residuals | energies
+ *   t [s] | states of bodies, of internal coordinates | contact points | reactions | outputs | residuals | energies
  *
  * The functions of a group of columns write their names or their values, as pw_csv.names says. */
 #include <errno.h>

@@ -1,5 +1,5 @@
-/* Outputs of models: their values as columns, functionals of them against closed forms, in signals and in C; the time at
- * which a condition becomes true. */
+/* Outputs of models: their values as columns, functionals of them against closed forms, in signals; the time at which a
+ * condition becomes true. */
 #include <math.h>
 #include <string.h>
 #include "check.h"
