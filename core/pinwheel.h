@@ -262,6 +262,49 @@ void pw_sin_cos (double x, double *sine, double *cosine);
 double pw_sin (double x);
 double pw_cos (double x);
 
+/* ---- Paths: curves through points of the plane, for feedback that follows a track ---- */
+
+/* A path: a polyline or a cubic spline through points, open or closed.  Its places are given by the arc length s from
+ * the first point.  Beyond its ends an open path continues straight; a closed one continues by further laps.  A path is
+ * never modified: any number of threads may share it. */
+typedef struct pw_path pw_path;
+
+/* A place on a path and, of a point near it, the offset. */
+typedef struct {
+  double s;            /* arc length [m]; of an open path < 0 before its first point */
+  double x, y;         /* the place [m] */
+  double heading;      /* direction [rad], without jumps of a whole turn along the path */
+  double cos, sin;     /* of the heading */
+  double curvature[3]; /* d heading/ds [1/m], positive to the left, and its first two derivatives by s */
+  double offset;       /* distance of the point, positive to the left of the path [m]; 0 for pw_path_at */
+  int corner; /* 1: the place is a corner of a polyline; the heading is at right angles to the way to the point */
+} pw_path_place;
+
+enum { PW_PATH_POINTS = 1000000 }; /* most points of a path */
+
+/* A path through `count` points, x[i], y[i], that differ from the one before: at least 2; 3 if closed; 4 if cubic.
+ * interpolation: PW_LINEAR, a polyline; PW_CUBIC, a spline in the accumulated distance of the points, with continuous
+ * direction and curvature; "not a knot" at the ends of an open one.  The last point of a closed path may repeat the
+ * first.  NULL and the error: PW_INPUT, also for a spline without direction at a cusp; PW_RESOURCE. */
+pw_path *pw_path_open (const double *x, const double *y, int count, int interpolation, int closed, pw_error *error);
+/* One more owner of a path, each of which closes it; returns the path. */
+pw_path *pw_path_share (pw_path *p);
+void pw_path_close (pw_path *p);
+
+double pw_path_length (const pw_path *p); /* [m]; of a closed path: of one lap */
+
+/* The place at an arc length; at a corner, that just after it. */
+void pw_path_at (const pw_path *p, double s, pw_path_place *place);
+/* The place nearest to a point; of several, that with the least s.  The offset of a point beyond an end of an open path
+ * is that from its tangent there.  With d the offset and k the curvature, the derivatives by x and y are (-sin, cos) of
+ * the offset, (cos, sin) / (1 - k d) of the arc length, and k times the latter of the heading; at a corner (-sin, cos),
+ * (0, 0), and (cos, sin) / -d.  A point that is not finite: all members are NaN. */
+void pw_path_nearest (const pw_path *p, double x, double y, pw_path_place *place);
+/* The place at which the distance has the minimum to which it falls from the place `near` on. */
+void pw_path_nearest_from (const pw_path *p, double x, double y, double near, pw_path_place *place);
+/* The first arc length after s at which the direction or the curvature jumps; INFINITY if there is none. */
+double pw_path_break (const pw_path *p, double s);
+
 /* ---- The element types: position constraints, velocity constraints, forces, markers ---- */
 
 /* Pin: a point of body 1 and a point of body 2 coincide.  Two holonomic constraint equations. */
@@ -680,13 +723,22 @@ static inline const char *pw_element_name (const pw_element *e) {
 }
 int pw_model_initials (const pw_model *m); /* number of values set by pw_model_set_initial */
 
-/* Reference solution of a text model: expressions of time for some states; names used in them and in signals. */
+/* The points of a path of a text model (pw_path_open). */
+typedef struct {
+  const char *name;
+  const double *x, *y; /* count */
+  int count, interpolation, closed;
+} pw_path_text;
+
+/* Reference solution of a text model, expressions of time for some states; names and paths used in expressions. */
 typedef struct {
   int states;                 /* 0: no reference solution */
   const char **state, **text; /* states: name, "bob.phi", and expression */
   int names;
   const char **name;                               /* names */
   double *value;                                   /* names: their values */
+  int paths;                                       /* paths */
+  pw_path_text *path;                              /* paths */
   double (*eval) (void *context, int i, double t); /* value of expression i at time t */
   void *context;
 } pw_reference_text;

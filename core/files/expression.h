@@ -4,9 +4,11 @@
  *   functions   sin cos tan asin acos atan atan2 sinh cosh tanh exp log log10 sqrt abs sign floor ceil round hypot mod
  *               min max jacobi_am (u, m), elliptic_K (m)
  *   constants   pi, e, deg = pi / 180
+ *   paths       PATH.x (s), .y, .heading, .curvature: at an arc length; PATH.offset (x, y), .s, .x, .y, .heading,
+ *               .curvature: at the place nearest to a point, or PATH.s (x, y, near): at that reached from an arc length
  *
- * A scope defines the named numbers.  The first variable is the time, except in formulas.  Expressions are immutable:
- * any number of threads may evaluate them. */
+ * A scope defines the named numbers and the paths.  The first variable is the time, except in formulas.  Expressions
+ * are immutable: any number of threads may evaluate them. */
 #ifndef PW_EXPRESSION_H
 #define PW_EXPRESSION_H
 
@@ -22,26 +24,37 @@ enum { PW_EXPRESSION_TIME = 0 };
 
 /* ---- Reading ---- */
 
-/* Named numbers. */
+/* Named numbers and paths. */
 typedef struct {
   int names;
   const char **name; /* names */
   double *value;     /* names */
   pw_names index;    /* the index of each name */
+  int paths;
+  const char **path_name; /* paths */
+  pw_path **path;         /* paths */
+  pw_names path_index;    /* the index of each path */
 } pw_scope;
 
 /* Opens a scope, which must be { 0 }, with room for `room` names, in an arena.  PW_OK or PW_RESOURCE. */
 int pw_scope_open (pw_scope *s, int room, pw_arena *arena);
-void pw_scope_close (pw_scope *s); /* names and numbers stay in the arena */
+void pw_scope_close (pw_scope *s); /* names, numbers and paths stay in the arena */
 
 /* Adds a name, to which the scope keeps a pointer; there must be room. */
 void pw_scope_add (pw_scope *s, const char *name, double value);
 
+/* The same for paths: makes room for `room` of them, PW_OK or PW_RESOURCE; adds one. */
+int pw_scope_open_paths (pw_scope *s, int room, pw_arena *arena);
+void pw_scope_add_path (pw_scope *s, const char *name, pw_path *path);
+
 /* One operation of an expression; it replaces its operands, the last ones on a stack, by its value. */
 typedef struct {
-  short op;     /* pw_expression_op (expression_parts.h) */
-  short index;  /* of the variable or function */
-  double value; /* of a constant */
+  short op;    /* pw_expression_op (expression_parts.h) */
+  short index; /* of the variable or function */
+  union {
+    double value;  /* of a constant */
+    pw_path *path; /* of a function of a path */
+  };
 } pw_expression_code;
 
 /* An expression: its syntax tree in postfix order. */
@@ -53,8 +66,11 @@ typedef struct {
   pw_expression_code code[];
 } pw_expression;
 
-/* Size of an expression in bytes, by which it may be copied. */
+/* Size of an expression in bytes, by which it may be copied.  The paths of a scope must outlive its expressions and
+ * their copies, unless these share them; a copy that does releases them. */
 size_t pw_expression_size (const pw_expression *expression);
+void pw_expression_share_paths (const pw_expression *expression);
+void pw_expression_release_paths (const pw_expression *expression);
 
 /* Reads an expression of a scope and at most 32 variables, which end with NULL, into an arena; scope and `variable` may
  * be NULL.  PW_INPUT, error; PW_RESOURCE. */
@@ -86,8 +102,8 @@ int pw_expression_is_name (const char *text);
 /* Whether a function or constant has this name. */
 int pw_expression_is_reserved (const char *text);
 
-/* Copies the next name in the text of an expression, also that of a function or constant, to the buffer, cut to its
- * size, and moves *rest after it.  Returns its position, or NULL after the last name. */
+/* Copies the next name in the text of an expression, also that of a function or constant, but not a function of a path,
+ * to the buffer, cut to its size, and moves *rest after it.  Returns its position, or NULL after the last name. */
 enum { PW_EXPRESSION_NAME = 100 };
 const char *pw_expression_next_name (const char **rest, char name[PW_EXPRESSION_NAME]);
 

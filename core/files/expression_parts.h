@@ -19,6 +19,7 @@ typedef enum {
   PW_OP_ROUND,
   PW_OP_TAN,
   PW_OP_FUNCTION_OF_ONE, /* a smooth function of one argument */
+  PW_OP_PATH_AT,         /* a function of the place of a path at an arc length */
   PW_OP_ADD,
   PW_OP_SUBTRACT,
   PW_OP_MULTIPLY,
@@ -35,8 +36,10 @@ typedef enum {
   PW_OP_MAX,
   PW_OP_ATAN2,
   PW_OP_HYPOT,
-  PW_OP_FUNCTION_OF_TWO, /* a smooth function of two arguments */
-  PW_OP_SELECT           /* condition ? x : y; the condition is 1 or 0.  a && b is a ? b : 0, a || b is a ? 1 : b */
+  PW_OP_FUNCTION_OF_TWO,  /* a smooth function of two arguments */
+  PW_OP_PATH_NEAREST,     /* a function of the place of a path nearest to a point */
+  PW_OP_SELECT,           /* condition ? x : y; the condition is 1 or 0.  a && b is a ? b : 0, a || b is a ? 1 : b */
+  PW_OP_PATH_NEAREST_FROM /* the same of the place reached from an arc length, the third argument */
 } pw_expression_op;
 
 static inline int pw_expression_operands (int op) {
@@ -46,7 +49,16 @@ static inline int pw_expression_operands (int op) {
 /* Whether an operation has jumps between finite values. */
 static inline int pw_expression_jumps (int op) {
   return (op >= PW_OP_SIGN && op <= PW_OP_ROUND) || (op >= PW_OP_LESS && op <= PW_OP_UNEQUAL) || op == PW_OP_MOD ||
-         op == PW_OP_ATAN2;
+         op == PW_OP_ATAN2 || op == PW_OP_PATH_AT;
+}
+
+/* Whether the operation jumps at states and times that are not located: where another place of a path is nearest. */
+static inline int pw_expression_searches (int op) {
+  return op == PW_OP_PATH_NEAREST || op == PW_OP_PATH_NEAREST_FROM;
+}
+
+static inline int pw_expression_has_path (int op) {
+  return op == PW_OP_PATH_AT || pw_expression_searches (op);
 }
 
 /* Whether it has jumps, poles or kinks. */
@@ -91,6 +103,10 @@ typedef struct {
 
 extern const pw_expression_function pw_expression_functions[]; /* and constants; ends with a NULL name */
 
+/* A function of a place of a path: pw_expression_code.index. */
+typedef enum { PW_PATH_S, PW_PATH_X, PW_PATH_Y, PW_PATH_HEADING, PW_PATH_CURVATURE, PW_PATH_OFFSET } pw_path_function;
+extern const char *const pw_path_functions[]; /* their names; ends with NULL */
+
 /* The index of a function or constant, or -1. */
 int pw_expression_find_function (const char *name);
 
@@ -99,7 +115,7 @@ int pw_expression_find_function (const char *name);
 /* The value of operations; *may_jump becomes 1 if one of them may jump there: at equal numbers, at poles. */
 double pw_expression_run (const pw_expression_code *code, int codes, const double *variable, int *may_jump);
 
-/* The value of an operation of `right` alone or of `left` and `right`. */
+/* The value of an operation of `right` alone or of `left` and `right`, other than functions of the nearest place. */
 double pw_expression_apply (const pw_expression_code *c, double left, double right);
 
 /* As pw_expression_derivatives.  discrete, unless NULL, receives for each operation a number that differs on the two

@@ -505,7 +505,9 @@ const char *pw_file_path (const pw_file *f) {
 
 int pw_file_tables (const pw_file *f, int (*each) (void *context, const char *path), void *context) {
   /* not in let, where "file" is the name of a number */
-  return f && f->yaml ? pw_yaml_tables (f->yaml, f->yaml->elements, each, context) : 0;
+  const pw_yaml *y = f ? f->yaml : NULL;
+  int stop = y ? pw_yaml_tables (y, y->paths, each, context) : 0;
+  return y && !stop ? pw_yaml_tables (y, y->elements, each, context) : stop;
 }
 
 int pw_file_list (int (*each) (void *context, const char *name, const char *path), void *context, pw_error *error) {

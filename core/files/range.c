@@ -260,6 +260,26 @@ static pw_range range_select (const pw_range *condition, const pw_range *x, cons
   return r;
 }
 
+/* ---- Functions of paths ---- */
+
+/* At an arc length: x and y change at most as fast as it; a bound of the others is known between two corners alone. */
+static pw_range range_path_at (const pw_expression_code *c, const pw_range *s) {
+  pw_range r = { .lo = -DBL_MAX, .hi = DBL_MAX, .breaks = pw_path_break (c->path, s->lo) <= s->hi };
+  if (range_unbounded (s)) return (pw_range){ .lo = -DBL_MAX, .hi = DBL_MAX, .breaks = 1, .nan = 1 };
+  double half = s->hi / 2 - s->lo / 2, middle = pw_expression_apply (c, 0, s->lo + half);
+  if (c->index != PW_PATH_X && c->index != PW_PATH_Y) return r;
+  pw_range bound = range_rounded (middle - half, middle + half);
+  r.lo = bound.lo, r.hi = bound.hi;
+  return r;
+}
+
+/* Of the place nearest to a point, whose jumps are not located. */
+static pw_range range_path_nearest (const pw_range *x, int operands) {
+  pw_range r = { .lo = -DBL_MAX, .hi = DBL_MAX, .of_states = 1 };
+  for (int i = 0; i < operands; i++) r.nan |= x[i].nan || range_unbounded (&x[i]);
+  return r;
+}
+
 /* ---- Operations ---- */
 
 /* Operations of one or two operands but min and max; only sign and comparisons consider NaN (range_result). */
@@ -279,6 +299,8 @@ static pw_range range_operation (const pw_expression_code *c, const pw_range *x)
   case PW_OP_TAN:
   case PW_OP_FUNCTION_OF_ONE:
     return range_one_argument (&pw_expression_functions[c->index], x);
+  case PW_OP_PATH_AT:
+    return range_path_at (c, x);
   case PW_OP_ADD:
     return range_sum (x, y);
   case PW_OP_SUBTRACT:
@@ -321,6 +343,7 @@ static pw_range range_result (const pw_expression_code *c, const pw_range *x, in
 static pw_range range_apply (const pw_expression_code *c, const pw_range *x, int operands) {
   if (c->op == PW_OP_MIN || c->op == PW_OP_MAX) return (c->op == PW_OP_MIN ? range_min : range_max) (x, x + 1);
   if (c->op == PW_OP_SELECT) return range_select (x, x + 1, x + 2);
+  if (pw_expression_searches (c->op)) return range_path_nearest (x, operands);
   pw_range r = range_result (c, x, operands);
   if (r.lo > r.hi) return r;
   int constant = range_is (&r, r.lo) && c->op != PW_OP_MOD && c->op != PW_OP_ATAN2 && pw_expression_jumps (c->op);
@@ -358,7 +381,8 @@ pw_range pw_expression_range (const pw_expression *expression, const unsigned ch
 int pw_expression_may_jump (const pw_expression_code *code, int codes) {
   pw_range stack[PW_EXPRESSION_STACK];
   const pw_expression_code *last = code + codes - 1;
-  int operands = pw_expression_operands (last->op);
+  int operands = pw_expression_operands (last->op), has_kinks = last->index == PW_PATH_X || last->index == PW_PATH_Y;
+  if (pw_expression_searches (last->op) || (last->op == PW_OP_PATH_AT && has_kinks)) return last->op != PW_OP_PATH_AT;
   const pw_range *top = range_run (code, codes - 1, NULL, -DBL_MAX, DBL_MAX, stack);
   return pw_expression_jumps (last->op) && range_result (last, top - operands, operands).breaks;
 }

@@ -1,6 +1,6 @@
-/* Reads text models from the tree of a file: keys and numbers; signals; bodies and elements, through the field tables
- * of their types; the head, parameters and default run settings, which is stored in a plug-in's table, so that text
- * models can be used like compiled ones.
+/* Reads text models from the tree of a file: keys and numbers; signals; paths; bodies and elements, through the field
+ * tables of their types; the head, parameters and default run settings, which is stored in a plug-in's table, so that
+ * text models can be used like compiled ones.
  *
  * After an error, functions with the same reader return its status, and only the first error is recorded: a sequence of
  * calls needs one check.  `label` ("torque T: value") begins their messages.  A NULL node is absent. */
@@ -14,7 +14,7 @@
 #include "yaml.h"
 
 /* Limits of one model, about 1 GB each, so that a small file cannot use all memory: entries of each list, such as
- * bodies, elements, parameters; points of all tables; operations of all expressions. */
+ * bodies, elements, parameters; points of all tables and paths; operations of all expressions. */
 enum { MAX_ITEMS = 1000000, MAX_POINTS = 20000000, MAX_OPERATIONS = 30000000 };
 #define MAX_AHEAD 1e6 /* pw_yaml.max_ahead for the default limit of bytes: each indicator takes 350 bytes */
 
@@ -34,9 +34,9 @@ typedef struct {
   pw_names elements;     /* names of all elements, to the index of their types; made when an expression needs it */
   const pw_kind *kind;   /* of the element being read */
   const pw_field *field; /* of it */
-  const char *label;     /* of that field, for messages */
+  const char *label;     /* of that field or of a path, for messages */
   char *definition;      /* of the element, with all preceding fields */
-  double points;         /* of all tables so far */
+  double points;         /* of all tables and paths so far */
   double operations;     /* of all expressions so far */
 } reader;
 
@@ -102,7 +102,7 @@ static int read_keys_from (const reader *r, const pw_node *first, const char *co
 static int read_keys (const reader *r, const pw_node *map, const char *const *key, const char *owner,
                       const pw_node **value) {
   if (map && map->type != PW_YAML_MAP) {
-    char form[100] = "{";
+    char form[200] = "{";
     for (int i = 0; key[i]; i++) append (form, "%s: ..%s", key[i], key[i + 1] ? ", " : "}");
     read_fail (r, map->at, "expected a map %s for %s, found %s", form, owner, node_found (map));
     map = NULL;
@@ -330,8 +330,18 @@ static void *signal_open (void *context) {
   *copy = *f;
   char *at = (char *)(copy + 1);
   for (int i = 0; i < 3; at += bytes[i++])
-    if (f->expression[i]) copy->expression[i] = memcpy (at, f->expression[i], bytes[i]);
+    if (f->expression[i]) {
+      copy->expression[i] = memcpy (at, f->expression[i], bytes[i]);
+      pw_expression_share_paths (copy->expression[i]);
+    }
   return copy;
+}
+
+static void signal_close (void *context) {
+  const signal_function *f = context;
+  for (int i = 0; i < 3; i++)
+    if (f->expression[i]) pw_expression_release_paths (f->expression[i]);
+  free (context);
 }
 
 /* Adds a state, at an offset of the expression, unless it is known already. */
@@ -418,7 +428,7 @@ static int signal_of_time (reader *r, const pw_node *const node[3], pw_signal *s
   f->derivatives = pw_kind_signals_force (r->kind) ? 0 : r->kind->level == PW_HOLONOMIC ? 2 : 1;
   *signal = (pw_signal){ PW_FUNCTION, .function = { .eval = signal_eval, .context = f, .text = &f->text } };
   signal->function.open = signal_open;
-  signal->function.close = free;
+  signal->function.close = signal_close;
   for (int i = 0; i < 3; i++) {
     if (node[i] == NULL) continue;
     if (signal_expression (r, node[i], f, i) != PW_OK) return r->error->status;
@@ -440,26 +450,29 @@ static int signal_of_time (reader *r, const pw_node *const node[3], pw_signal *s
  *   "M0 * cos (omega * t)"                         an expression of the time t; in forces also of states: BODY.phi
  *   {expression: .., rate: .., acceleration: ..}   the same; in constraints, its time derivatives may be given */
 
-/* Points in the model.  Returns their times, NULL after an error. */
-static double *table_list (reader *r, const pw_node *list, pw_signal *s) {
-  if (read_list (r, list, r->label) != PW_OK) return NULL;
+/* Pairs of numbers (x, y), as points in the model or columns of a file. */
+typedef struct {
+  double *x, *y;
+  int count, skipped; /* pairs; rows of the file left out */
+} pairs;
+
+/* Pairs in the model; form: "[x, y]". */
+static int pairs_list (reader *r, const pw_node *list, const char *form, pairs *p) {
+  if (read_list (r, list, r->label) != PW_OK) return r->error->status;
   size_t bytes = (size_t)list->count * sizeof (double);
-  double *t = pw_arena_alloc (r->arena, bytes), *value = pw_arena_alloc (r->arena, bytes);
-  if (t == NULL || value == NULL) return read_no_memory (r), NULL;
-  s->table.t = t;
-  s->table.value = value;
-  for (const pw_node *n = list->first; n; n = n->next) {
-    double point[2] = { 0 };
-    const char *label = PW_PRINTED (240, "%s: point %d", r->label, s->table.count + 1);
-    if (read_pair (r, n, label, "numbers, [time, value]", point) != PW_OK) return NULL;
-    t[s->table.count] = point[0];
-    value[s->table.count++] = point[1];
+  p->x = pw_arena_alloc (r->arena, bytes), p->y = pw_arena_alloc (r->arena, bytes);
+  if (p->x == NULL || p->y == NULL) return read_no_memory (r);
+  for (const pw_node *n = list->first; n; n = n->next, p->count++) {
+    double pair[2] = { 0 };
+    const char *label = PW_PRINTED (240, "%s: point %d", r->label, p->count + 1);
+    if (read_pair (r, n, label, PW_PRINTED (40, "numbers, %s", form), pair) != PW_OK) return r->error->status;
+    p->x[p->count] = pair[0], p->y[p->count] = pair[1];
   }
-  return t;
+  return PW_OK;
 }
 
 /* A model may only read files in its folder. */
-static FILE *table_open (const pw_yaml *y, const char *name, const char **reason) {
+static FILE *pairs_open (const pw_yaml *y, const char *name, const char **reason) {
   char joined[PW_PATH], path[PW_PATH];
   size_t n = strlen (y->folder); /* 0 for the root */
   *reason = "a table must be in the model's folder: its path is relative and has no \"..\"";
@@ -468,6 +481,40 @@ static FILE *table_open (const pw_yaml *y, const char *name, const char **reason
   *reason = "it is a link that leads out of the model's folder";
   int is_inside = strncmp (path, y->folder, n) == 0 && (path[n] == '/' || path[n] == 0);
   return is_inside ? pw_open_input (path, reason) : NULL;
+}
+
+/* Pairs in two columns of a file, converted to these units; rows without both numbers are left out.  column: names or
+ * numbers; NULL: the first or second one. */
+static int pairs_file (reader *r, const pw_node *node, const char *const column[2], const char *const unit[2],
+                       pairs *p) {
+  const char *name, *reason;
+  pw_error cause = { 0 };
+  int rows;
+  if (read_text (r, node, r->label, &name) != PW_OK) return r->error->status;
+  errno = 0;
+  FILE *f = pairs_open (r->y, name, &reason);
+  if (f == NULL && pw_open_input_status () == PW_RESOURCE)
+    return pw_fail (r->error, PW_RESOURCE, "%s: cannot read %s: %s", r->y->path, name, reason);
+  if (f == NULL) return read_fail (r, node->at, "%s: cannot read \"%.60s\": %s", r->label, name, reason);
+  double *x = pw_columns_from_stream (f, name, column, unit, 2, PW_GAPS_REFUSED, NULL, &rows, &cause);
+  fclose (f);
+  if (cause.status == PW_INPUT) return read_fail (r, node->at, "%s: %s", r->label, cause.text);
+  if (x == NULL || pw_model_keep (r->model, x, free) != PW_OK) return read_no_memory (r);
+  double *y = x + rows;
+  for (int i = 0; i < rows; i++) {
+    if (isnan (x[i]) || isnan (y[i])) continue;
+    x[p->count] = x[i], y[p->count++] = y[i];
+  }
+  p->x = x, p->y = y, p->skipped = rows - p->count;
+  return PW_OK;
+}
+
+/* Limits the pairs of all tables and paths together: many may read the same large file. */
+static int pairs_count (reader *r, const pw_node *node, const pairs *p) {
+  r->points += p->count;
+  if (r->error->status != PW_OK || r->points <= MAX_POINTS) return r->error->status;
+  return read_fail (r, node->at, "%s: the tables up to here have more than %d points, the limit for a model", r->label,
+                    MAX_POINTS);
 }
 
 /* The unit of the current field.  Only a drive has "m or rad"; the choice before this field decides. */
@@ -496,54 +543,30 @@ static int table_columns (reader *r, const pw_node *columns, const pw_node *time
   return read_text (r, time ? NULL : first, label, &column[0]);
 }
 
-/* Points in two columns of a file; rows without a time or value are left out.  Returns the times, or NULL. */
-static double *table_file (reader *r, const pw_node *node, const pw_node *columns, const pw_node *time, pw_signal *s) {
-  const char *name, *reason, *column[2], *const unit[2] = { "s", table_unit (r) };
-  pw_error cause = { 0 };
-  int rows;
-  if (table_columns (r, columns, time, column) != PW_OK || read_text (r, node, r->label, &name) != PW_OK) return NULL;
-  errno = 0;
-  FILE *f = table_open (r->y, name, &reason);
-  if (f == NULL && pw_open_input_status () == PW_RESOURCE)
-    return pw_fail (r->error, PW_RESOURCE, "%s: cannot read %s: %s", r->y->path, name, reason), NULL;
-  if (f == NULL) return read_fail (r, node->at, "%s: cannot read \"%.60s\": %s", r->label, name, reason), NULL;
-  double *t = pw_columns_from_stream (f, name, column, unit, 2, PW_GAPS_REFUSED, NULL, &rows, &cause);
-  fclose (f);
-  if (cause.status == PW_INPUT) return read_fail (r, node->at, "%s: %s", r->label, cause.text), NULL;
-  if (t == NULL || pw_model_keep (r->model, t, free) != PW_OK) return read_no_memory (r), NULL;
-  double *value = t + rows;
-  int count = 0;
-  for (int i = 0; i < rows; i++) {
-    if (isnan (t[i]) || isnan (value[i])) continue;
-    t[count] = t[i];
-    value[count++] = value[i];
-  }
-  s->table.t = t, s->table.value = value, s->table.count = count, s->table.skipped = rows - count;
-  return t;
-}
-
 /* Besides the fields of the form. */
 static const char *const table_keys[] = { "points", "file", "columns", "time", "time_scale", "time_offset" };
 enum { TABLE_KEYS = sizeof table_keys / sizeof *table_keys };
 
 /* Reads points or columns of a file; the times become time_offset + time_scale t, where whole numbers of ms since an
- * epoch stay exact.  Limits the points of all tables together: many may read the same large file. */
+ * epoch stay exact. */
 static int table_points (reader *r, const pw_node *node, const pw_node *const v[TABLE_KEYS], pw_signal *s) {
   const pw_node *points = v[0], *file = v[1], *columns = v[2], *time = v[3]; /* as table_keys */
   double scale = 1, offset = 0;
+  const char *column[2];
+  pairs p = { .count = 0 };
   if ((points != NULL) == (file != NULL))
     return read_fail (r, node->at, "%s: a table has either points or a file", r->label);
   if (points && columns) return read_fail (r, columns->at, "%s: columns belong to a file", r->label);
   if (points && time) return read_fail (r, time->at, "%s: a column of times belongs to a file", r->label);
-  double *t = points ? table_list (r, points, s) : table_file (r, file, columns, time, s);
-  if (t == NULL) return r->error->status;
+  if (points)
+    pairs_list (r, points, "[time, value]", &p);
+  else if (table_columns (r, columns, time, column) == PW_OK)
+    pairs_file (r, file, column, (const char *const[2]){ "s", table_unit (r) }, &p);
   read_number (r, v[4], PW_PRINTED (240, "%s: time_scale", r->label), PW_POSITIVE, &scale);
   read_number (r, v[5], PW_PRINTED (240, "%s: time_offset", r->label), PW_REAL, &offset);
-  for (int i = 0; i < s->table.count; i++) t[i] = scale * (t[i] + offset / scale);
-  r->points += s->table.count;
-  if (r->error->status != PW_OK || r->points <= MAX_POINTS) return r->error->status;
-  return read_fail (r, node->at, "%s: the tables up to here have more than %d points, the limit for a model", r->label,
-                    MAX_POINTS);
+  for (int i = 0; i < p.count && r->error->status == PW_OK; i++) p.x[i] = scale * (p.x[i] + offset / scale);
+  s->table.t = p.x, s->table.value = p.y, s->table.count = p.count, s->table.skipped = p.skipped;
+  return pairs_count (r, node, &p);
 }
 
 /* Reads the fields of a form, except a table's points; value: of each, or NULL. */
@@ -665,12 +688,9 @@ static int read_reference (reader *r) {
   return r->error->status;
 }
 
-/* ---- Bodies ----
- *
- * Bodies and elements are passed to pw_add_body and pw_add, like those of a build function in C.  The core checks them;
- * its messages get a position. */
+/* ---- Paths ---- */
 
-/* Reads the name of a body or element, which must be unique. */
+/* Reads the name of a body, element or path, which must be unique. */
 static int build_name (reader *r, const pw_node *node, const char *label, const char **name) {
   if (read_text (r, node, label, name) != PW_OK) return r->error->status;
   int before = pw_names_add (&r->names, *name, (int)node->at); /* a file has less than INT_MAX bytes */
@@ -678,6 +698,61 @@ static int build_name (reader *r, const pw_node *node, const char *label, const 
   return read_fail (r, node->at, "%s \"%.60s\": line %d already uses this name", label, *name,
                     pw_yaml_line (r->y, (size_t)before));
 }
+
+static void path_free (void *path) {
+  pw_path_close (path);
+}
+
+/* Reads the points of a path, and its columns in a file. */
+static int path_points (reader *r, const pw_node *node, const pw_node *points, const pw_node *file,
+                        const pw_node *columns, pairs *p) {
+  static const char *const unit[2] = { "m", "m" };
+  const char *column[2] = { NULL, NULL };
+  if ((points != NULL) == (file != NULL))
+    return read_fail (r, node->at, "%s: a path has either points or a file", r->label);
+  if (points && columns) return read_fail (r, columns->at, "%s: columns belong to a file", r->label);
+  if (points && pairs_list (r, points, "[x, y]", p) != PW_OK) return r->error->status;
+  if (read_list_of (r, columns, r->label, 2, "columns, [x, y]") != PW_OK) return r->error->status;
+  for (int i = 0; i < 2 && columns; i++) read_text (r, i ? columns->first->next : columns->first, r->label, &column[i]);
+  if (file && r->error->status == PW_OK) pairs_file (r, file, column, unit, p);
+  if (r->error->status == PW_OK && p->skipped > 0)
+    return read_fail (r, file->at, "%s: %d rows have no x or no y; a path has no gaps", r->label, p->skipped);
+  return pairs_count (r, node, p);
+}
+
+static int build_path (reader *r, const pw_node *node) {
+  static const char *const key[] = { "name", "points", "file", "columns", "interpolation", "closed", NULL };
+  static const char *const interpolation[] = { [PW_LINEAR] = "linear", [PW_CUBIC] = "cubic", NULL }, *const closed[] = {
+    "false", "true", NULL
+  };
+  const pw_node *v[sizeof key / sizeof *key];
+  pw_path_text *text = &r->reference->path[r->reference->paths];
+  pairs p = { .count = 0 };
+  pw_error cause = { 0 };
+  if (read_keys (r, node, key, "a path", v) != PW_OK) return r->error->status;
+  if (v[0] == NULL) return read_fail (r, node->at, "a path needs a name");
+  if (build_name (r, v[0], "path", &text->name) != PW_OK) return r->error->status;
+  if (!pw_expression_is_name (text->name))
+    return read_fail (r, v[0]->at, "path \"%.60s\": expected a letter, then letters, digits and _, at most 63 in all",
+                      text->name);
+  const char *label = r->label = PW_PRINTED (100, "path %s", text->name);
+  path_points (r, node, v[1], v[2], v[3], &p);
+  read_choice (r, v[4], PW_PRINTED (140, "%s: interpolation", label), interpolation, &text->interpolation);
+  read_choice (r, v[5], PW_PRINTED (140, "%s: closed", label), closed, &text->closed);
+  if (r->error->status != PW_OK) return r->error->status;
+  text->x = p.x, text->y = p.y, text->count = p.count;
+  pw_path *path = pw_path_open (p.x, p.y, p.count, text->interpolation, text->closed, &cause);
+  if (cause.status == PW_INPUT) return read_fail (r, (v[1] ? v[1] : v[2])->at, "%s: %s", label, cause.text);
+  if (path == NULL || pw_model_keep (r->model, path, path_free) != PW_OK) return read_no_memory (r);
+  pw_scope_add_path (r->scope, text->name, path);
+  r->reference->paths++;
+  return PW_OK;
+}
+
+/* ---- Bodies ----
+ *
+ * Bodies and elements are passed to pw_add_body and pw_add, like those of a build function in C.  The core checks them;
+ * its messages get a position. */
 
 /* Reports an error of the core at a node, without its prefix "model NAME: ". */
 static int build_fail (const reader *r, const pw_node *node, const pw_error *cause) {
@@ -839,6 +914,8 @@ static int build_all (reader *r, const double *parameter) {
       return r->error->status;
     pw_scope_add (r->scope, n->text, value);
   }
+  for (const pw_node *n = y->paths ? y->paths->first : NULL; n; n = n->next)
+    if (build_path (r, n) != PW_OK) return r->error->status;
   for (const pw_node *n = y->bodies ? y->bodies->first : NULL; n; n = n->next)
     if (build_body (r, n) != PW_OK) return r->error->status;
   for (const pw_node *n = y->elements ? y->elements->first : NULL; n; n = n->next)
@@ -855,15 +932,20 @@ static void build_free (void *arena) {
 static int build_open (reader *r) {
   const pw_yaml *y = r->y;
   size_t largest = 1, bodies = y->bodies ? (size_t)y->bodies->count : 0, lets = y->let ? (size_t)y->let->count : 0;
-  size_t all = bodies + (y->elements ? (size_t)y->elements->count : 0);
+  size_t paths = y->paths ? (size_t)y->paths->count : 0;
+  size_t all = bodies + (y->elements ? (size_t)y->elements->count : 0) + paths;
   for (const pw_kind *const *k = pw_kinds; *k; k++)
     if ((*k)->definition > largest) largest = (*k)->definition;
   r->arena = calloc (1, sizeof *r->arena);
   if (r->arena == NULL || pw_model_keep (r->model, r->arena, build_free) != PW_OK) return read_no_memory (r);
   r->reference = pw_arena_alloc (r->arena, sizeof *r->reference);
   pw_model_set_reference (r->model, r->reference);
+  if (r->reference) r->reference->path = pw_arena_alloc (r->arena, (paths + 1) * sizeof *r->reference->path);
+  if (r->reference == NULL || r->reference->path == NULL ||
+      pw_scope_open_paths (r->scope, (int)paths + 1, r->arena) != PW_OK)
+    return read_no_memory (r);
   r->definition = malloc (largest);
-  if (r->reference && r->definition && pw_scope_open (r->scope, y->parameter_count + (int)lets, r->arena) == PW_OK &&
+  if (r->definition && pw_scope_open (r->scope, y->parameter_count + (int)lets, r->arena) == PW_OK &&
       pw_names_open (&r->bodies, bodies) == PW_OK && pw_names_open (&r->names, all) == PW_OK)
     return PW_OK;
   return read_no_memory (r);
@@ -874,6 +956,7 @@ static void build_model (pw_model *m, const void *parameters) {
   const void *table = pw_model_table (m);
   pw_scope scope = { 0 };
   reader r = { .y = table, .model = m, .scope = &scope, .error = pw_model_error (m) };
+  read_list (&r, r.y->paths, "paths");
   read_list (&r, r.y->bodies, "bodies");
   if (read_list (&r, r.y->elements, "elements") == PW_OK && build_open (&r) == PW_OK) build_all (&r, parameters);
   pw_scope_close (&scope);
@@ -1020,7 +1103,7 @@ static int head_parameters (pw_yaml *y, const reader *r, const pw_node *list, pw
 
 static int read_head (pw_yaml *y, const reader *r) {
   static const char *const key[] = { "pinwheel", "about",    "run",   "parameters", "let",
-                                     "bodies",   "elements", "truth", NULL };
+                                     "bodies",   "elements", "truth", "paths",      NULL };
   static const char *const run_key[] = { "t_end", "step", "rtol", "method", NULL };
   const pw_node *v[sizeof key / sizeof *key], *run[sizeof run_key / sizeof *run_key];
   double *number[] = { &y->table.run.t_end, &y->table.run.step, &y->table.run.rtol };
@@ -1036,7 +1119,7 @@ static int read_head (pw_yaml *y, const reader *r) {
   read_text (r, run[3], run_key[3], &y->table.run.method);
   const pw_node *parameters = v[3], *let = v[4];
   /* the key of the reference solution is "truth" */
-  y->let = let, y->bodies = v[5], y->elements = v[6], y->reference = v[7];
+  y->let = let, y->bodies = v[5], y->elements = v[6], y->reference = v[7], y->paths = v[8];
   for (int i = 3; key[i]; i++) /* from "parameters" on: lists and maps */
     if (v[i] && v[i]->count > MAX_ITEMS)
       read_fail (r, v[i]->at, "%s: %d entries; a model may have %d", key[i], v[i]->count, MAX_ITEMS);
