@@ -505,8 +505,9 @@ static place search_fall (search *s, place from) {
   for (int n = 0; n <= p->pieces; n++) {
     double whole[6], before[6], after[6], b[6];
     search_bernstein (s, &p->piece[from.i], whole);
-    search_divide (whole, from.u, before, after);
-    for (int i = 0; i < 6; i++) b[i] = forward ? after[i] : -before[5 - i];
+    if (from.u != !forward) search_divide (whole, from.u, before, after);
+    const double *part = from.u == !forward ? whole : forward ? after : before; /* the part ahead */
+    for (int i = 0; i < 6; i++) b[i] = forward ? part[i] : -part[5 - i];
     if (search_signs (b, &changes) > 0) break; /* it rises */
     if (search_minima (s, from.i, b, from.u, forward, 0)) return (place){ s->best.i, s->best.u, from.lap, 0 };
     int next = from.i + (forward ? 1 : -1);
