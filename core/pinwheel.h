@@ -367,6 +367,15 @@ typedef struct {
   pw_signal value; /* [m] or [rad]; with its first and second time derivative */
 } pw_drive;
 
+/* On-curve: a point of a body stays on a curve of the world, given by functions of a parameter s, an internal
+ * coordinate.  Two holonomic constraint equations. */
+typedef struct {
+  const char *name, *body;
+  double at[2];       /* the point in the body's frame [m] */
+  pw_signal x, y;     /* the curve [m], as signals of s in place of the time; with two derivatives, not both 0 */
+  double start, rate; /* initial s and its velocity; 0: from the body's position and velocity */
+} pw_on_curve;
+
 /* Wheel: a knife edge; the contact point does not move across the heading.  One nonholonomic constraint equation. */
 typedef struct {
   const char *name, *body;
@@ -514,6 +523,7 @@ typedef struct {
   PW_KIND (rod)                \
   PW_KIND (gear)               \
   PW_KIND (drive)              \
+  PW_KIND (on_curve)           \
   PW_KIND (wheel)              \
   PW_KIND (rolling_wheel)      \
   PW_KIND (steered_wheel)      \
@@ -561,8 +571,8 @@ typedef struct {
 /* An internal coordinate of an element, as `prepare` describes it. */
 typedef struct {
   double mass;      /* its entry of M [kg m^2], >= 0; 0 only if the element's constraints determine the coordinate */
-  double start;     /* initial value [rad] */
-  double rate;      /* initial velocity [rad/s] */
+  double start;     /* initial value, in the unit of the coordinate */
+  double rate;      /* initial velocity */
   int specified[2]; /* 1: the definition gives start, rate; 0: derived from other values */
 } pw_internal;
 
@@ -615,12 +625,13 @@ struct pw_kind {
   int bodies;             /* bodies of an element: those that its fields of type PW_BODY name, or 1 if each_body */
   int internal;           /* internal coordinates */
   int rows;               /* constraint equations */
-  int signals;    /* in the order of the fields; they belong to its force if force_u is set, else to its constraints */
-  int each_body;  /* 1: names no body, acts on every body with mass; its outputs are "air.frame.N" */
-  int constant;   /* 1: its force is constant and evaluated once, when the system is compiled */
-  pw_level level; /* of its constraint equations */
+  int signals; /* in the order of the fields; they belong to its force if force_u is set, else to its constraints */
+  int of_coordinate; /* 1: its signals, of constraints, are functions of its first internal coordinate, not of time */
+  int each_body;     /* 1: names no body, acts on every body with mass; its outputs are "air.frame.N" */
+  int constant;      /* 1: its force is constant and evaluated once, when the system is compiled */
+  pw_level level;    /* of its constraint equations */
   const pw_quantity *reaction;                                 /* rows: meaning of each -lambda */
-  const pw_quantity *coordinate;                               /* internal: the internal coordinates, in "rad" */
+  const pw_quantity *coordinate;                               /* internal: the internal coordinates, in "rad" or "" */
   const char *(*reaction_unit) (const void *element, int row); /* if it depends on the element; may be NULL */
 
   /* Converts a checked definition into a prepared element.  bodies: those it names or acts on, in order; the ground

@@ -143,11 +143,11 @@ static size_t source_offset (const pw_yaml *y, const pw_node *node, size_t offse
   return at + n <= y->size && strncmp (y->source + at, node->text, n) == 0 ? at + offset : node->at;
 }
 
-/* The first name of the time t or of a state, BODY.phi, in an expression, or NULL. */
-static const char *find_variable (const char *text) {
+/* The first name of the argument, such as the time t, or of a state, BODY.phi, in an expression, or NULL. */
+static const char *find_variable (const char *text, const char *argument) {
   char name[PW_EXPRESSION_NAME];
   for (const char *rest = text, *p; (p = pw_expression_next_name (&rest, name)) != NULL;)
-    if (strcmp (name, "t") == 0 || strchr (name, '.')) return p;
+    if (strcmp (name, argument) == 0 || strchr (name, '.')) return p;
   return NULL;
 }
 
@@ -161,7 +161,7 @@ static int read_number (const reader *r, const pw_node *node, const char *label,
   if (status == PW_RESOURCE) return read_no_memory (r);
   if (status != PW_OK)
     return read_fail (r, source_offset (r->y, node, error.at), "%s: %s", label,
-                      find_variable (node->text) == node->text + error.at
+                      find_variable (node->text, "t") == node->text + error.at
                           ? "only the value of a signal may depend on the time t or on states"
                           : error.text);
   const char *expected = pw_domain_check (domain, *value);
@@ -277,7 +277,7 @@ typedef struct {
   const pw_expression *expression[3];      /* value, rate, acceleration; NULL: not given, differentiated instead */
   int derivatives;                         /* required time derivatives; of a force: 0, nonholonomic: 1, holonomic: 2 */
   int states;                              /* number of states in it */
-  const char *name[MAX_SIGNAL_STATES + 2]; /* "t", then states, "BODY.phi"; not for evaluation */
+  const char *name[MAX_SIGNAL_STATES + 2]; /* "t" or "s", then states, "BODY.phi"; not for evaluation */
   pw_signal_text text;
 } signal_function;
 
@@ -349,7 +349,9 @@ static int signal_add_state (reader *r, const pw_node *node, signal_function *f,
   for (int i = 1; i <= f->states; i++)
     if (strcmp (f->name[i], name) == 0) return PW_OK;
   if (f->derivatives)
-    return expression_fail (r, node, at, "\"%s\": the signal of a constraint depends on the time t alone", name);
+    return expression_fail (r, node, at, "\"%s\": %s alone", name,
+                            r->kind->of_coordinate ? "a curve depends on its parameter s"
+                                                   : "the signal of a constraint depends on the time t");
   if (state_check (r, node, name, at) != PW_OK) return r->error->status;
   if (f->states == MAX_SIGNAL_STATES) return expression_fail (r, node, at, "more than %d states", MAX_SIGNAL_STATES);
   f->name[f->states + 1] = pw_arena_copy (r->arena, name);
@@ -383,8 +385,8 @@ static int signal_check_derivative (reader *r, const pw_node *node, const signal
   }
   for (int k = 0; k < 3; k++)
     if (isfinite (given[k]) && isfinite (exact[k][n]) && fabs (given[k] - exact[k][n]) > 1e-6 * size)
-      return read_fail (r, node->at, "%s: the %s at t = %g s is %.6g, but the derivative is %.6g", r->label, name,
-                        time[k], given[k], exact[k][n]);
+      return read_fail (r, node->at, "%s: the %s at %s = %g%s is %.6g, but the derivative is %.6g", r->label, name,
+                        f->name[0], time[k], r->kind->of_coordinate ? "" : " s", given[k], exact[k][n]);
   return PW_OK;
 }
 
@@ -400,9 +402,10 @@ static double signal_magnitude (const signal_function *f, double t, int i) {
 }
 
 /* Refuses signals that a constraint cannot follow: a jump of the value or, for positions, of its derivative, at one of
- * the first breakpoints after t = 0, beyond round-off and the change between adjacent times. */
+ * the first breakpoints after t = 0, of a curve after s = -1000, beyond round-off and the change between adjacent times. */
 static int signal_check_continuity (reader *r, const pw_node *node, signal_function *f) {
-  double t = 0, before[3], after[3];
+  const int is_curve = r->kind->of_coordinate;
+  double t = is_curve ? -1000 : 0, before[3], after[3];
   for (int k = 0; k < MAX_CHECKED_BREAKPOINTS; k++) {
     t = signal_breakpoint (f, t);
     if (t == INFINITY) return PW_OK;
@@ -412,19 +415,36 @@ static int signal_check_continuity (reader *r, const pw_node *node, signal_funct
     for (int i = 0; i < f->derivatives; i++)
       if (fabs (after[i] - before[i]) >
           1e-9 * signal_magnitude (f, t, i) + 2 * (t - last) * (fabs (after[i + 1]) + fabs (before[i + 1])))
-        return read_fail (r, node->at, "%s: its %s jumps from %.6g to %.6g at t = %.9g s, and that of %s must not",
-                          r->label, i ? "rate" : "value", before[i], after[i], t,
-                          f->derivatives > 1 ? "a prescribed position" : "a velocity constraint");
+        return read_fail (r, node->at, "%s: its %s jumps from %.6g to %.6g at %s = %.9g%s, and that of %s must not",
+                          r->label,
+                          i == 0     ? "value"
+                          : is_curve ? "derivative"
+                                     : "rate",
+                          before[i], after[i], f->name[0], t, is_curve ? "" : " s",
+                          is_curve             ? "a curve"
+                          : f->derivatives > 1 ? "a prescribed position"
+                                               : "a velocity constraint");
   }
   return PW_OK;
 }
 
+/* The argument of the signals of the element being read: the time, or the parameter of a curve. */
+static const char *signal_argument (const reader *r) {
+  return r->kind->of_coordinate ? "s" : "t";
+}
+
 /* Makes a signal from expressions: value; rate and acceleration, or NULL. */
-static int signal_of_time (reader *r, const pw_node *const node[3], pw_signal *signal) {
+static int signal_of_argument (reader *r, const pw_node *const node[3], pw_signal *signal) {
+  const char *argument = signal_argument (r);
   static const char *const key[] = { "expression", "rate", "acceleration" };
   signal_function *f = pw_arena_alloc (r->arena, sizeof *f);
   if (f == NULL) return read_no_memory (r);
-  f->name[0] = "t";
+  f->name[0] = argument;
+  if (r->kind->of_coordinate && pw_names_find (&r->scope->index, argument) >= 0)
+    return read_fail (r, node[0]->at,
+                      "%s: the model has a number \"%s\", which is also the parameter of the curve: "
+                      "rename it",
+                      r->label, argument);
   f->derivatives = pw_kind_signals_force (r->kind) ? 0 : r->kind->level == PW_HOLONOMIC ? 2 : 1;
   *signal = (pw_signal){ PW_FUNCTION, .function = { .eval = signal_eval, .context = f, .text = &f->text } };
   signal->function.open = signal_open;
@@ -630,14 +650,14 @@ static int signal_map (reader *r, const pw_node *node, pw_signal *signal) {
   if (!v[SIGNAL_EXPRESSION] && (v[SIGNAL_RATE] || v[SIGNAL_ACCELERATION]))
     return read_fail (r, node->at, "%s: a rate or acceleration belongs to an expression", r->label);
   if (v[SIGNAL_CONSTANT]) return read_number (r, v[SIGNAL_CONSTANT], r->label, PW_REAL, &signal->constant);
-  if (v[SIGNAL_EXPRESSION]) return signal_of_time (r, v + SIGNAL_EXPRESSION, signal);
+  if (v[SIGNAL_EXPRESSION]) return signal_of_argument (r, v + SIGNAL_EXPRESSION, signal);
   return signal_form (r, &pw_signal_forms[form - SIGNAL_FORMS], v[form], signal);
 }
 
 static int read_signal (reader *r, const pw_node *node, pw_signal *signal) {
   if (node->type == PW_YAML_MAP) return signal_map (r, node, signal);
-  if (node->type == PW_YAML_SCALAR && find_variable (node->text))
-    return signal_of_time (r, (const pw_node *const[3]){ node, NULL, NULL }, signal);
+  if (node->type == PW_YAML_SCALAR && find_variable (node->text, signal_argument (r)))
+    return signal_of_argument (r, (const pw_node *const[3]){ node, NULL, NULL }, signal);
   return read_number (r, node, r->label, PW_REAL, &signal->constant);
 }
 

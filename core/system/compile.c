@@ -306,6 +306,8 @@ static int compile_signals (const compilation *job) {
     for (int e = 0; e < k->b.count; e++, from++)
       for (int u = 0; u < k->kind->signals; u++, source++) {
         source->of_force = pw_kind_signals_force (k->kind);
+        source->argument = k->kind->of_coordinate ? k->internal + e * k->kind->internal : -1;
+        s->state_dependent += k->kind->of_coordinate;
         const pw_signal *signal = pw_field_at (k->kind, from->element->definition, PW_SIGNAL, u);
         int status = compile_signal (job, source, signal, k->name[e]);
         if (status != PW_OK) return status;

@@ -218,9 +218,10 @@ int pw_update_signals (pw_workspace *w, double t, const double *q, const double 
   if (!new_time && w->s->state_dependent == 0) return PW_OK;
   if (new_time) w->t_signal = NAN; /* if a signal fails, others have changed already */
   for (pw_source *source = w->source, *end = source + w->s->sources; source < end; source++) {
-    if (w->hold && source->of_force) continue;
-    if (kinematics_copy_states (w, source, q, v) == 0 && !(new_time && source->reads == 0)) continue;
-    if (pw_signal_eval (source, t) == 0) continue;
+    const double *argument = source->argument < 0 ? &t : q ? q + source->argument : NULL;
+    if (argument == NULL || (w->hold && source->of_force)) continue;
+    if (kinematics_copy_states (w, source, q, v) == 0 && argument == &t && !(new_time && source->reads == 0)) continue;
+    if (pw_signal_eval (source, *argument) == 0) continue;
     w->failed = source;
     return PW_METHOD;
   }
@@ -249,7 +250,8 @@ void pw_hold_signals (pw_workspace *w, int hold) {
 double pw_next_breakpoint (pw_workspace *w, int kinks, double t) {
   double next = INFINITY;
   for (const pw_source *source = w->source, *end = source + w->s->sources; source < end; source++) {
-    double breakpoint = pw_signal_breakpoint (&source->signal, kinks && !source->of_force, t);
+    double breakpoint =
+        source->argument < 0 ? pw_signal_breakpoint (&source->signal, kinks && !source->of_force, t) : INFINITY;
     if (breakpoint < next) next = breakpoint;
     if (breakpoint > t) continue;
     w->failed = source;
@@ -296,6 +298,8 @@ typedef struct {
   int body[PW_MAX_BODIES];
   pw_configuration configuration[PW_MAX_BODIES];
   double q[PW_MAX_INTERNAL], v[PW_MAX_INTERNAL];
+  double u[3 * PW_MAX_SIGNALS]; /* signals of an internal coordinate */
+  const pw_source *source;
 } blocks_single;
 
 static void blocks_isolate (const pw_element_batch *k, int e, blocks_single *one) {
@@ -316,6 +320,7 @@ static void blocks_isolate (const pw_element_batch *k, int e, blocks_single *one
   one->b.q = one->q;
   one->b.v = one->v;
   one->b.u = k->b.u + 3 * e * kind->signals;
+  one->source = k->source + e * kind->signals;
   if (k->b.w) one->b.w = k->b.w + e * k->b.cols;
   if (k->b.lambda) one->b.lambda = k->b.lambda + e * kind->rows;
 }
@@ -336,6 +341,11 @@ static void blocks_value (const pw_kind *kind, pw_block block, blocks_single *on
   for (int n = 0; n < kind->bodies; n++) {
     pw_configuration *p = &one->configuration[n];
     pw_sin_cos (p->phi, &p->sin, &p->cos);
+  }
+  for (int n = 0; n < kind->signals && kind->of_coordinate; n++) {
+    pw_source moved = one->source[n];
+    moved.u = one->u + 3 * n, one->b.u = one->u;
+    (void)pw_signal_eval (&moved, one->q[0]); /* fails where the signal itself does */
   }
   if (original == NULL) return;
   if (blocks_table[block].product == BLOCKS_NONE) {

@@ -87,6 +87,8 @@ static const char *fault_functions (const pw_kind *kind) {
                                        kind->power, kind->loss,   kind->contact, kind->saturation };
   for (size_t i = 0; i < sizeof exact / sizeof *exact; i++)
     if (exact[i] == PW_BY_DIFFERENCES) return "PW_BY_DIFFERENCES is permitted only for second-order blocks";
+  if (kind->of_coordinate && (kind->internal == 0 || kind->rows == 0 || kind->force_u))
+    return "signals of an internal coordinate, but no internal coordinate, no constraint equations, or force_u";
   if (kind->constant && (kind->force == NULL || kind->signals > 0))
     return "declared constant, but it has no force, or has signals";
   if (kind->signals > 0 && kind->rows == 0 && kind->force && kind->force_u == NULL)
@@ -113,7 +115,7 @@ static const char *fault_names (const pw_kind *kind) {
     if (!q || !q->name || !q->rate || !q->unit) return "internal coordinates without name, rate or unit";
     if (is_bad_text (q->name) || is_bad_text (q->rate) || is_bad_text (q->unit))
       return "name or unit of an internal coordinate" FAULT_TEXT;
-    if (strcmp (q->unit, "rad") != 0) return "an internal coordinate whose unit is not rad";
+    if (strcmp (q->unit, "rad") != 0 && *q->unit) return "an internal coordinate whose unit is neither rad nor none";
     name[names++] = q->name, name[names++] = q->rate;
   }
   for (int i = 0; i < names; i++)

@@ -18,6 +18,7 @@ typedef struct {
   double *spline;   /* of a table: see pw_table_spline */
   double *u;        /* 3: receives value, first and second time derivative; x, u: NULL except in a workspace */
   int of_force;     /* 1: belongs to a force, which needs no derivatives */
+  int argument;     /* -1: a signal of time; else the internal coordinate of which it is a function */
 } pw_source;
 
 /* One element type in use: its batch, and the indices of its constraint equations and coordinates.  What a run modifies
@@ -49,7 +50,7 @@ struct pw_system {
   int forces;              /* batches with a force that is not constant */
   int saturates;           /* 1: some of these have a function `saturation` */
   int sources;             /* signals */
-  int state_dependent;     /* signals that depend on states */
+  int state_dependent;     /* signals that depend on states, or are functions of an internal coordinate */
   int reads;               /* number of states that they read, with repetitions */
   size_t jacobian;         /* entries of J of all elements, zeros included */
   size_t block;            /* the largest count x cols of a batch; twice that if its force saturates */
@@ -102,7 +103,7 @@ char *pw_member_name (const pw_system *s, const pw_element_batch *k, int e, cons
 char *pw_failed_signal (const pw_workspace *w, char *buffer, size_t size);
 int pw_fail_evaluation (const pw_workspace *w, double t, pw_error *error); /* reports it; returns PW_METHOD */
 
-/* 1 for an angle, 0 for a length; internal coordinates are angles. */
+/* 1 for an angle, 0 for a length; internal coordinates count as angles. */
 static inline int pw_is_angle (const pw_system *s, int j) {
   return j >= 3 * s->bodies || j % 3 == 2;
 }
@@ -130,7 +131,7 @@ static inline double pw_larger (double a, double b) {
 
 /* ---- Signals ---- */
 
-/* Stores value, first and second time derivative at time t in source->u; of a force's signal the derivatives are
+/* Stores value, first and second time derivative at time t, or at another argument than the time, in source->u; of a force's signal the derivatives are
  * meaningless.  source->x: the states that a function reads.  Returns non-zero if the user's function does so or
  * computes values that are not finite. */
 int pw_signal_eval (const pw_source *source, double t);
