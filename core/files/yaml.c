@@ -402,7 +402,7 @@ static double signal_magnitude (const signal_function *f, double t, int i) {
 }
 
 /* Refuses signals that a constraint cannot follow: a jump of the value or, for positions, of its derivative, at one of
- * the first breakpoints after t = 0, of a curve after s = -1000, beyond round-off and the change between adjacent times. */
+ * the first breakpoints after t = 0, of a curve after s = -1000, beyond round-off and the change between neighbours. */
 static int signal_check_continuity (reader *r, const pw_node *node, signal_function *f) {
   const int is_curve = r->kind->of_coordinate;
   double t = is_curve ? -1000 : 0, before[3], after[3];

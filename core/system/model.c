@@ -143,11 +143,6 @@ const char *pw_kind_check (const pw_kind *kind, char *buffer, size_t size) {
   return *fault ? fault : fault_functions (kind);
 }
 
-void pw_by_differences (const pw_batch *b, double *out) {
-  (void)b; /* only its address is used */
-  (void)out;
-}
-
 /* ---- Checks of plug-ins, bodies and elements ---- */
 
 /* Names and units are one line, since tables have them in their heads; a description may have several lines. */

@@ -28,6 +28,7 @@ LAYOUT (pw_internal, 32);
 LAYOUT (pw_configuration, 64);
 LAYOUT (pw_batch, 72);
 LAYOUT (pw_kind, 256);
+LAYOUT (pw_path_place, 88);
 
 LAYOUT_AT (pw_error, text, 4);
 LAYOUT_AT (pw_signal, constant, 8);
@@ -95,6 +96,7 @@ LAYOUT_AT (pw_kind, signals, 52);
 LAYOUT_AT (pw_kind, each_body, 56);
 LAYOUT_AT (pw_kind, constant, 60);
 LAYOUT_AT (pw_kind, level, 64);
+LAYOUT_AT (pw_kind, of_coordinate, 68);
 LAYOUT_AT (pw_kind, reaction, 72);
 LAYOUT_AT (pw_kind, coordinate, 80);
 LAYOUT_AT (pw_kind, reaction_unit, 88);
@@ -170,18 +172,31 @@ TEST (definitions) {
     const char *kind;
     unsigned long long layout;
   } known[] = {
-    { "pin", 0x2e992ed58a0ca1ea },           { "weld", 0x96d837462e580df9 },
-    { "slider", 0x72bb16fc630c9167 },        { "slot", 0x3a0f550a70778644 },
-    { "rod", 0xa1a350acfa57b8de },           { "gear", 0xf8074be7c4f42d05 },
-    { "drive", 0x7d987f91b3a3b54e },         { "wheel", 0xdea3eb50a3ca258c },
-    { "rolling-wheel", 0x144a31a69816bde4 }, { "steered-wheel", 0x2c413b6b8f9c87f0 },
-    { "speed", 0xc6449f5523558de9 },         { "pfaffian", 0x4cb2d7f5922ebd32 },
-    { "tyre", 0xa42b832e02a24eda },          { "rolling-resistance", 0x267227c53db66752 },
-    { "spring", 0x80a9821575f7667f },        { "rotational-spring", 0x3c20ed7f38c90acc },
-    { "friction", 0xebebc50a8771ab1e },      { "sliding-friction", 0x4722a2a44a1119a6 },
-    { "drag", 0x79bea784c473bb98 },          { "gravity", 0xed353e1dda5787ff },
-    { "force", 0xbc29b0bbfe5b6a71 },         { "torque", 0xc52ae040b1e51021 },
-    { "motor", 0x4b2d8f0773cca89 },          { "marker", 0xa45ad3f1c6e75b4a },
+    { "pin", 0x2e992ed58a0ca1ea },
+    { "weld", 0x96d837462e580df9 },
+    { "slider", 0x72bb16fc630c9167 },
+    { "slot", 0x3a0f550a70778644 },
+    { "rod", 0xa1a350acfa57b8de },
+    { "gear", 0xf8074be7c4f42d05 },
+    { "drive", 0x7d987f91b3a3b54e },
+    { "wheel", 0xdea3eb50a3ca258c },
+    { "on-curve", 0xfe042b77d6a55c2d },
+    { "rolling-wheel", 0x144a31a69816bde4 },
+    { "steered-wheel", 0x2c413b6b8f9c87f0 },
+    { "speed", 0xc6449f5523558de9 },
+    { "pfaffian", 0x4cb2d7f5922ebd32 },
+    { "tyre", 0xa42b832e02a24eda },
+    { "rolling-resistance", 0x267227c53db66752 },
+    { "spring", 0x80a9821575f7667f },
+    { "rotational-spring", 0x3c20ed7f38c90acc },
+    { "friction", 0xebebc50a8771ab1e },
+    { "sliding-friction", 0x4722a2a44a1119a6 },
+    { "drag", 0x79bea784c473bb98 },
+    { "gravity", 0xed353e1dda5787ff },
+    { "force", 0xbc29b0bbfe5b6a71 },
+    { "torque", 0xc52ae040b1e51021 },
+    { "motor", 0x4b2d8f0773cca89 },
+    { "marker", 0xa45ad3f1c6e75b4a },
   };
   int bad = 0;
   for (const pw_kind *const *k = pw_kinds; *k; k++) {

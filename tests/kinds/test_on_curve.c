@@ -26,8 +26,8 @@ static const pw_parameter curve_list[] = { { PW_AT (curve_parameters, lissajous)
                                            { PW_AT (curve_parameters, arm), 0, "", "", PW_REAL },
                                            { .name = NULL } };
 
-/* The bead is a point mass or a body with an inertia, and its centre or a point beside it on the curve.  On the parabola s follows from
- * the position, on the other curve the position from s. */
+/* The bead is a point mass or a body with an inertia, its centre or a point beside it on the curve.  On the parabola s
+ * follows from the position, on the other curve the position from s. */
 SCENE_WITH (curve_build, curve_list, curve_parameters) {
   pw_body bead = { .name = "bead", .mass = 1, .inertia = p->inertia };
   pw_on_curve wire = { .name = "wire", .body = "bead", .at = { p->arm, 0 } };

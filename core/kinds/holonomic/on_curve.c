@@ -5,9 +5,9 @@
  *           [ 0 1  Px -Y_s ]
  *   gamma = (Px, Py) omega^2 + (X_ss, Y_ss) s'^2
  *
- * s has no mass: its row of G^T lambda = 0 says that the force is normal to the curve.  The curve may cross itself or be
- * closed, since s tells the branch, but must have a direction: (X_s, Y_s) is not 0.  X and Y are signals of s in place
- * of the time, with two derivatives; the third one, of which gamma_q consists, is computed by differences.
+ * s has no mass: its row of G^T lambda = 0 says that the force is normal to the curve.  The curve may cross itself or
+ * be closed, since s tells the branch, but must have a direction: (X_s, Y_s) is not 0.  X and Y are signals of s in
+ * place of the time, with two derivatives; the third one, in gamma_q, is computed by differences.
  *
  * (Haug 1989, Computer Aided Kinematics and Dynamics of Mechanical Systems, section 3.3: point-follower joint.)
  * The force on the body at the point is -lambda. */
