@@ -652,7 +652,7 @@ static void specialise_elements (const generator *gen) {
 /* 1 if all signals are constants or harmonics of time, which generated code evaluates itself. */
 static int specialise_is_simple (const pw_system *s) {
   for (int i = 0; i < s->sources; i++)
-    if (s->source[i].argument >= 0 ||
+    if (s->source[i].of_coordinate ||
         (s->source[i].signal.type != PW_CONSTANT && s->source[i].signal.type != PW_HARMONIC))
       return 0;
   return 1;

@@ -218,10 +218,11 @@ int pw_update_signals (pw_workspace *w, double t, const double *q, const double 
   if (!new_time && w->s->state_dependent == 0) return PW_OK;
   if (new_time) w->t_signal = NAN; /* if a signal fails, others have changed already */
   for (pw_source *source = w->source, *end = source + w->s->sources; source < end; source++) {
-    const double *argument = source->argument < 0 ? &t : q ? q + source->argument : NULL;
-    if (argument == NULL || (w->hold && source->of_force)) continue;
-    if (kinematics_copy_states (w, source, q, v) == 0 && argument == &t && !(new_time && source->reads == 0)) continue;
-    if (pw_signal_eval (source, *argument) == 0) continue;
+    if (w->hold && source->of_force) continue;
+    if (kinematics_copy_states (w, source, q, v) == 0) {
+      if (!(new_time && source->reads == 0) || pw_signal_eval (source, t) == 0) continue;
+    } else if (pw_signal_eval (source, source->of_coordinate ? *source->x : t) == 0)
+      continue;
     w->failed = source;
     return PW_METHOD;
   }
@@ -250,8 +251,8 @@ void pw_hold_signals (pw_workspace *w, int hold) {
 double pw_next_breakpoint (pw_workspace *w, int kinks, double t) {
   double next = INFINITY;
   for (const pw_source *source = w->source, *end = source + w->s->sources; source < end; source++) {
-    double breakpoint =
-        source->argument < 0 ? pw_signal_breakpoint (&source->signal, kinks && !source->of_force, t) : INFINITY;
+    if (source->of_coordinate) continue;
+    double breakpoint = pw_signal_breakpoint (&source->signal, kinks && !source->of_force, t);
     if (breakpoint < next) next = breakpoint;
     if (breakpoint > t) continue;
     w->failed = source;

@@ -37,7 +37,7 @@ int pw_system_jumps (const pw_system *s, double t) {
   const double near = 8 * DBL_EPSILON * fmax (fabs (t), 1); /* round-off of sums of steps, also near 0 */
   /* signals of forces count only if their values may jump: their derivatives are not used */
   for (const pw_source *source = s->source, *end = source + s->sources; source < end; source++)
-    if (source->argument < 0 && (!source->of_force || pw_signal_value_may_jump (&source->signal)))
+    if (!source->of_coordinate && (!source->of_force || pw_signal_value_may_jump (&source->signal)))
       if (pw_signal_breakpoint (&source->signal, 0, t - near) <= t + near) return 1;
   return 0;
 }
@@ -235,7 +235,7 @@ char *pw_system_table_notice (const pw_system *s, int signal, double t_end, char
   const pw_points *table = &s->source[signal].signal.table;
   char coverage[300] = "", skipped[80] = "";
   *buffer = 0;
-  if (s->source[signal].signal.type != PW_TABLE || s->source[signal].argument >= 0 || !(t_end > 0)) return buffer;
+  if (s->source[signal].signal.type != PW_TABLE || s->source[signal].of_coordinate || !(t_end > 0)) return buffer;
   query_coverage (table, t_end, coverage, sizeof coverage);
   if (table->skipped)
     snprintf (skipped, sizeof skipped, "%d row%s with empty cells %s left out of the table", table->skipped,
@@ -260,7 +260,7 @@ int pw_system_may_jump (const pw_system *s) {
   for (int i = 0; i < s->batches; i++)
     if (!pw_kind_is_built_in (s->batch[i].kind)) return 1;
   for (int i = 0; i < s->sources; i++)
-    if (s->source[i].reads > 0) return 1;
+    if (s->source[i].reads > 0 && !s->source[i].of_coordinate) return 1;
   return 0;
 }
 

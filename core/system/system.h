@@ -12,13 +12,13 @@
 /* A signal of one element, and the states it reads. */
 typedef struct {
   pw_signal signal;
-  int reads;        /* number of states a function signal reads */
-  const int *state; /* their indices: coordinate j, or coordinates + j for a velocity */
-  double *x;        /* 2 reads: values of these states, then the gradient */
-  double *spline;   /* of a table: see pw_table_spline */
-  double *u;        /* 3: receives value, first and second time derivative; x, u: NULL except in a workspace */
-  int of_force;     /* 1: belongs to a force, which needs no derivatives */
-  int argument;     /* -1: a signal of time; else the internal coordinate of which it is a function */
+  int reads;         /* number of states a function signal reads */
+  const int *state;  /* their indices: coordinate j, or coordinates + j for a velocity */
+  double *x;         /* 2 reads: values of these states, then the gradient */
+  double *spline;    /* of a table: see pw_table_spline */
+  double *u;         /* 3: receives value, first and second time derivative; x, u: NULL except in a workspace */
+  int of_force;      /* 1: belongs to a force, which needs no derivatives */
+  int of_coordinate; /* 1: a function of the coordinate that it reads, not of time */
 } pw_source;
 
 /* One element type in use: its batch, and the indices of its constraint equations and coordinates.  What a run modifies
