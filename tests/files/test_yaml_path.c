@@ -174,6 +174,30 @@ TEST (follow) {
   check_close ("on the track", hypot (q[0][0], q[0][1]), 5, 1e-2, "settled");
 }
 
+/* A bead on a spline through points of a circle swings like a pendulum. */
+TEST (on_path) {
+  static const char *const method[] = { "erk8", "radau", "ida+ggl" };
+  double q[7], v[7];
+  gallery_close (&(gallery_scene[]){ follower_scene ("0") }[0]); /* writes the file */
+  cli_write ("bead.yaml",
+             "pinwheel: 1\n"
+             "paths: [{name: circle, file: track.csv, columns: [E, N], interpolation: cubic, closed: true}]\n"
+             "bodies: [{name: bead, mass: 1}, {name: bob, mass: 1, start: {x: 5, y: 0}}]\n"
+             "elements:\n"
+             "  - {on-curve: wire, body: bead, x: circle.x (s), y: circle.y (s), start: 1e-12}\n"
+             "  - {rod: R, body: [bob, ground], at: [[0, 0], [0, 0]], length: 5}\n"
+             "  - {gravity: g, acceleration: [0, -9.81]}\n");
+  for (int i = 0; i < 3; i++) {
+    gallery_scene x = gallery_load (cli_path ("bead.yaml"), NULL);
+    runs_state (x.system, method[i], &(pw_settings){ .rtol = 1e-9 }, 3, q, v, NULL);
+    for (int j = 0; j < 2; j++) {
+      check_close (method[i], q[j], q[3 + j], 1e-6, "the methods' errors; h^4");
+      check_close (method[i], v[j], v[3 + j], 1e-6, "the methods' errors; h^3");
+    }
+    gallery_close (&x);
+  }
+}
+
 /* A compiled system has the paths after its model is freed, as have its runs. */
 TEST (lifetime) {
   pw_error error = { 0 };
