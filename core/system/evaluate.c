@@ -213,16 +213,20 @@ static int kinematics_copy_states (const pw_workspace *w, const pw_source *sourc
   return copied;
 }
 
+/* Evaluates a signal that reads states, whose argument may be one of them. */
+static int kinematics_read (const pw_source *source, double t) {
+  return pw_signal_eval (source, source->of_coordinate ? *source->x : t);
+}
+
 int pw_update_signals (pw_workspace *w, double t, const double *q, const double *v) {
   int new_time = t != w->t_signal && !isnan (t); /* NaN: pw_update_velocities, after a failure */
   if (!new_time && w->s->state_dependent == 0) return PW_OK;
   if (new_time) w->t_signal = NAN; /* if a signal fails, others have changed already */
   for (pw_source *source = w->source, *end = source + w->s->sources; source < end; source++) {
     if (w->hold && source->of_force) continue;
-    if (kinematics_copy_states (w, source, q, v) == 0) {
-      if (!(new_time && source->reads == 0) || pw_signal_eval (source, t) == 0) continue;
-    } else if (pw_signal_eval (source, source->of_coordinate ? *source->x : t) == 0)
-      continue;
+    int copied = kinematics_copy_states (w, source, q, v);
+    if (copied == 0 && !(new_time && source->reads == 0)) continue;
+    if ((copied ? kinematics_read (source, t) : pw_signal_eval (source, t)) == 0) continue;
     w->failed = source;
     return PW_METHOD;
   }
