@@ -494,6 +494,18 @@ typedef struct {
 /* PW_POINT: fixed in a body; point i of a definition is in the frame of its body i.  PW_VECTOR: any other pair. */
 typedef enum { PW_NUMBER, PW_POINT, PW_VECTOR, PW_BODY, PW_SIGNAL, PW_CHOICE } pw_field_type;
 
+/* How the value of a field changes if the bodies of an element, but not the ground, are turned by an angle: text models
+ * need it for included files (docs/model-format.md). */
+typedef enum {
+  PW_TURN_NONE,
+  PW_TURN_ANGLE_1,   /* an angle phi1 - phi2 */
+  PW_TURN_ANGLE_2,   /* an angle phi2 - phi1 */
+  PW_TURN_HEADING_2, /* a direction in the frame of body 2 */
+  PW_TURN_AXES_1,    /* numbers along the axes of body 1 */
+  PW_TURN_WORLD,     /* a choice whose value 0 means along the axes of the world */
+  PW_TURN_OFFSET     /* a choice whose other values than 0 mean that angles of bodies are given */
+} pw_turn;
+
 /* One field of a definition structure: used by validation, text models, `show`, `list kinds` and the manual. */
 typedef struct pw_field {
   const char *name;           /* as written in a model file */
@@ -505,6 +517,7 @@ typedef struct pw_field {
   pw_domain domain;           /* of a number */
   const char *const *choices; /* NULL-terminated names of a choice's values 0, 1, ... */
   const char *about;          /* meaning */
+  pw_turn turn;               /* if it changes when the bodies turn relative to the ground */
 } pw_field;
 
 /* Name and unit of the reaction of a constraint equation, or of an internal coordinate. */

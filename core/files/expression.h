@@ -28,6 +28,8 @@ typedef struct {
   const char **name; /* names */
   double *value;     /* names */
   pw_names index;    /* the index of each name */
+  const char *counter; /* a name besides these, of a number that changes; or NULL */
+  double count;        /* its value */
 } pw_scope;
 
 /* Opens a scope, which must be { 0 }, with room for `room` names, in an arena.  PW_OK or PW_RESOURCE. */
@@ -36,6 +38,9 @@ void pw_scope_close (pw_scope *s); /* names and numbers stay in the arena */
 
 /* Adds a name, to which the scope keeps a pointer; there must be room. */
 void pw_scope_add (pw_scope *s, const char *name, double value);
+
+/* Stores the value of a name; 0 if the scope, which may be NULL, does not have it. */
+int pw_scope_find (const pw_scope *s, const char *name, double *value);
 
 /* One operation of an expression; it replaces its operands, the last ones on a stack, by its value. */
 typedef struct {

@@ -504,8 +504,7 @@ const char *pw_file_path (const pw_file *f) {
 }
 
 int pw_file_tables (const pw_file *f, int (*each) (void *context, const char *path), void *context) {
-  /* not in let, where "file" is the name of a number */
-  return f && f->yaml ? pw_yaml_tables (f->yaml, f->yaml->elements, each, context) : 0;
+  return f && f->yaml ? pw_yaml_tables (f->yaml, each, context) : 0;
 }
 
 int pw_file_list (int (*each) (void *context, const char *name, const char *path), void *context, pw_error *error) {

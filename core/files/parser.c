@@ -81,6 +81,14 @@ void pw_scope_add (pw_scope *s, const char *name, double value) {
   pw_names_add (&s->index, name, s->names++);
 }
 
+int pw_scope_find (const pw_scope *s, const char *name, double *value) {
+  if (s == NULL) return 0;
+  if (s->counter && strcmp (s->counter, name) == 0) return *value = s->count, 1;
+  int i = pw_names_find (&s->index, name);
+  if (i >= 0) *value = s->value[i];
+  return i >= 0;
+}
+
 enum { PARSER_MAX_LENGTH = 4000, PARSER_MAX_DEPTH = 200 };
 
 /* What the value of a part depends on; variables other than the time are states. */
@@ -250,6 +258,7 @@ static parser_part parser_unknown (parser *p, const char *name) {
   pw_nearest near = { .sought = name };
   for (const char *const *v = p->variable; v && *v; v++) pw_nearest_try (&near, *v);
   for (int i = 0; p->scope && i < p->scope->names; i++) pw_nearest_try (&near, p->scope->name[i]);
+  if (p->scope && p->scope->counter) pw_nearest_try (&near, p->scope->counter);
   for (const pw_expression_function *f = pw_expression_functions; f->name; f++) pw_nearest_try (&near, f->name);
   if (strcmp (name, "T") == 0) pw_nearest_try (&near, "t"); /* the time, defined in some expressions only */
   return parser_fail (p, p->at, "there is no \"%s\"%s", name, pw_nearest_text (&near));
@@ -262,14 +271,15 @@ static int parser_is_call (const parser *p) {
 
 /* constant: the constant of this name, or NULL; other names have precedence. */
 static parser_part parser_name (parser *p, const char *name, const pw_expression_function *constant) {
-  int variable = 0, named = p->scope ? pw_names_find (&p->scope->index, name) : -1;
+  double value;
+  int variable = 0, named = pw_scope_find (p->scope, name, &value);
   while (p->variable && p->variable[variable] && strcmp (p->variable[variable], name) != 0) variable++;
   int is_variable = p->variable && p->variable[variable];
-  if (!is_variable && named < 0 && constant == NULL) return parser_unknown (p, name);
+  if (!is_variable && !named && constant == NULL) return parser_unknown (p, name);
   if (parser_is_call (p))
     return parser_fail (p, p->at, "\"%s\" is a number, not a function; a product is written with *", name);
   if (is_variable) return parser_leaf (p, PW_OP_VARIABLE, variable, 0);
-  return parser_leaf (p, PW_OP_CONSTANT, 0, named >= 0 ? p->scope->value[named] : constant->value);
+  return parser_leaf (p, PW_OP_CONSTANT, 0, named ? value : constant->value);
 }
 
 /* min and max combine more than two arguments pairwise. */

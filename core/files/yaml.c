@@ -4,21 +4,24 @@
  *
  * After an error, functions with the same reader return its status, and only the first error is recorded: a sequence of
  * calls needs one check.  `label` ("torque T: value") begins their messages.  A NULL node is absent. */
-#define _XOPEN_SOURCE 700 /* realpath */
 #include <ctype.h>
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "expression.h"
 #include "yaml.h"
 
 /* Limits of one model, about 1 GB each, so that a small file cannot use all memory: entries of each list, such as
- * bodies, elements, parameters; points of all tables; operations of all expressions. */
-enum { MAX_ITEMS = 1000000, MAX_POINTS = 20000000, MAX_OPERATIONS = 30000000 };
+ * bodies, elements, parameters; points of all tables; operations of all expressions; bytes of texts in copies. */
+enum { MAX_ITEMS = 1000000, MAX_POINTS = 20000000, MAX_OPERATIONS = 30000000, MAX_COPIED = 1000000000 };
+enum { MAX_COPIES = 100000 /* of one entry */, MAX_FILES = 1000, MAX_DEPTH = 8 /* of included files */ };
 #define MAX_AHEAD 1e6 /* pw_yaml.max_ahead for the default limit of bytes: each indicator takes 350 bytes */
 
 enum { MAX_KEYS = 40 /* known keys of a map, and the end of their list */ };
+
+/* Lists whose entries may be repeated, and the names that included files add. */
+enum { LIST_BODIES, LIST_ELEMENTS, LIST_INCLUDE, LIST_LET, LISTS, LIST_AGAIN = LISTS /* entries counted before */ };
+static const char *const list_names[] = { "bodies", "elements", "include", "let" };
 
 /* What functions share while a file is read or a model is built from it. */
 typedef struct {
@@ -26,21 +29,43 @@ typedef struct {
   pw_error *error;
   pw_scope *scope; /* parameters and what `let` defines so far, or NULL */
   /* for building */
+  pw_copies *copies;  /* of the entry being read, or NULL */
+  const char *prefix; /* of names in an included file, or "" */
+  pw_place place;     /* of the included file in the world */
+  int indexed;        /* 1: `elements` contains those of this file */
   pw_model *model;
   pw_arena *arena;              /* lives as long as the model */
   pw_reference_text *reference; /* the model's */
-  pw_names bodies;              /* names of bodies so far */
-  pw_names names;               /* of bodies and elements so far, to their offsets in the source */
-  pw_names elements;     /* names of all elements, to the index of their types; made when an expression needs it */
+  pw_names bodies;              /* names of bodies so far, to their indices */
+  pw_names names;               /* of bodies and elements so far, to their offsets in all sources (pw_yaml.base) */
+  pw_names elements;     /* of elements with states so far, to the index of their types; see state_elements */
   const pw_kind *kind;   /* of the element being read */
   const pw_field *field; /* of it */
   const char *label;     /* of that field, for messages */
   char *definition;      /* of the element, with all preceding fields */
   double points;         /* of all tables so far */
   double operations;     /* of all expressions so far */
+  double entries[LISTS]; /* of the lists so far, with copies and included files */
+  double copied;         /* bytes of the texts of copies so far */
+  pw_names truth;        /* states in the reference solution */
+  size_t elements_count, reference_room; /* entries of `elements`; room in `reference` */
 } reader;
 
 #define read_fail(r, at, ...) pw_yaml_fail ((r)->y, (r)->error, at, __VA_ARGS__)
+
+/* Joins texts, as far as they fit: a tenth of the time of printing, for labels that are needed in errors alone. */
+enum { LABEL = 240 };
+static const char *join (char to[LABEL], const char *const *part) {
+  size_t size = 0;
+  for (; *part; part++) {
+    size_t n = strnlen (*part, LABEL - 1 - size);
+    memcpy (to + size, *part, n);
+    size += n;
+  }
+  to[size] = 0;
+  return to;
+}
+#define JOINED(...) join ((char[LABEL]){ 0 }, (const char *const[]){ __VA_ARGS__, NULL })
 
 /* Appends to a text in an array, as far as it fits. */
 #define append(text, ...) pw_print (text + strlen (text), sizeof text - strlen (text), __VA_ARGS__)
@@ -116,6 +141,13 @@ static int read_list (const reader *r, const pw_node *node, const char *label) {
   return r->error->status;
 }
 
+/* A name of the file as it is in the model, or NULL if out of memory. */
+static const char *read_prefixed (const reader *r, const char *name) {
+  if (*r->prefix == 0) return name;
+  char *text = pw_arena_alloc (r->arena, strlen (r->prefix) + strlen (name) + 1);
+  return text ? strcat (strcpy (text, r->prefix), name) : NULL;
+}
+
 /* Refuses anything but a list of `count` entries, which are `items` ("bodies"). */
 static int read_list_of (const reader *r, const pw_node *node, const char *label, int count, const char *items) {
   if (node && node->type != PW_YAML_LIST)
@@ -135,6 +167,18 @@ static int read_text (const reader *r, const pw_node *node, const char *label, c
                       node->type == PW_YAML_SCALAR ? "none" : node_found (node));
   *text = node->text;
   return r->error->status;
+}
+
+/* A name that expressions can use. */
+static int read_name (const reader *r, const pw_node *node, const char *label, const char **name) {
+  if (read_text (r, node, label, name) != PW_OK) return r->error->status;
+  if (!pw_expression_is_name (*name))
+    return read_fail (r, node->at, "%s \"%.60s\": expected a letter, then letters, digits and _, at most 63 in all",
+                      label, *name);
+  if (strcmp (*name, "t") == 0 || pw_expression_is_reserved (*name))
+    return read_fail (r, node->at, "%s \"%s\": this name is reserved: %s", label, *name,
+                      strcmp (*name, "t") == 0 ? "it is the time" : "a function or constant");
+  return PW_OK;
 }
 
 /* Converts an offset in a scalar's text to one in the source; that of the node if the source spells it otherwise. */
@@ -157,7 +201,9 @@ static int read_number (const reader *r, const pw_node *node, const char *label,
   if (node == NULL || r->error->status != PW_OK) return r->error->status;
   if (node->type != PW_YAML_SCALAR)
     return read_fail (r, node->at, "%s: expected a number, found %s", label, node_found (node));
-  int status = pw_expression_constant (r->scope, node->text, value, &error);
+  int status = node->count && pw_copies_number (r->copies, node, r->scope->count, value)
+                   ? PW_OK
+                   : pw_expression_constant (r->scope, node->text, value, &error);
   if (status == PW_RESOURCE) return read_no_memory (r);
   if (status != PW_OK)
     return read_fail (r, source_offset (r->y, node, error.at), "%s: %s", label,
@@ -201,6 +247,158 @@ static void suggest_bodies (const reader *r, pw_nearest *near) {
   for (int i = 0; i < bodies; i++) pw_nearest_try (near, body[i].name);
 }
 
+/* ---- Lists of entries, which may be repeated: {repeat: {i: n}, ...} ---- */
+
+typedef int read_entry (reader *r, const pw_node *entry);
+
+/* Counts more entries of a list, and makes room for their names. */
+static int list_count (reader *r, const pw_node *at, int list, double more) {
+  if (list == LIST_AGAIN) return PW_OK;
+  const double count = r->entries[list] += more, bodies = r->entries[LIST_BODIES];
+  if (count > MAX_ITEMS)
+    return read_fail (r, at->at, "%s: %.0f entries; a model may have %d", list_names[list], count, MAX_ITEMS);
+  if (pw_names_reserve (&r->bodies, (size_t)bodies) != PW_OK ||
+      pw_names_reserve (&r->names, (size_t)(bodies + r->entries[LIST_ELEMENTS])) != PW_OK)
+    return read_no_memory (r);
+  return PW_OK;
+}
+
+/* Reads {i: n}: the name of the counter and the number of copies. */
+static int repeat_counter (const reader *r, const pw_node *map, const char **counter, double *copies) {
+  const pw_node *name = map->type == PW_YAML_MAP && map->count == 1 ? map->first : NULL;
+  if (name == NULL)
+    return read_fail (r, map->at, "repeat: expected a map {i: NUMBER} of one name, found %s",
+                      map->type == PW_YAML_MAP ? "another one" : node_found (map));
+  if (read_name (r, name, "repeat", counter) != PW_OK) return r->error->status;
+  if (pw_scope_find (r->scope, *counter, copies))
+    return read_fail (r, name->at, "repeat: \"%s\" is already the name of a number", *counter);
+  const char *label = PW_PRINTED (100, "repeat: %s", *counter);
+  if (read_number (r, name->next, label, PW_REAL, copies) != PW_OK) return r->error->status;
+  if (*copies >= 0 && *copies <= MAX_COPIES && *copies == floor (*copies)) return PW_OK;
+  return read_fail (r, name->next->at, "%s = %g: expected a whole number from 0 to %d", label, *copies, MAX_COPIES);
+}
+
+static int repeat_status (reader *r, const pw_copies *c, int status) {
+  if (status == PW_INPUT) read_fail (r, source_offset (r->y, c->faulty, c->fault.at), "%s", c->fault.text);
+  if (status == PW_RESOURCE) read_no_memory (r);
+  if (c->bytes > MAX_COPIED - r->copied)
+    read_fail (r, c->repeat->at, "the texts of copies up to here have more than %d bytes, the limit for a model",
+               MAX_COPIED);
+  return r->error->status;
+}
+
+/* Calls a function for each copy of an entry. */
+static int read_copies (reader *r, const pw_node *entry, const pw_node *repeat, int list, read_entry *each) {
+  pw_copies c = { .scope = r->scope, .arena = r->arena, .repeat = repeat }, *outer = r->copies;
+  double copies;
+  if (node_is (repeat->next, "") || repeat_counter (r, repeat->next, &c.counter, &copies) != PW_OK ||
+      list_count (r, entry, list, copies - 1) != PW_OK || repeat_status (r, &c, pw_copies_open (&c, entry)) != PW_OK)
+    return r->error->status;
+  for (double i = 1; i <= copies && r->error->status == PW_OK; i++) {
+    if (repeat_status (r, &c, pw_copies_set (&c, i)) == PW_OK) {
+      r->copies = &c, r->scope->counter = c.counter, r->scope->count = i;
+      each (r, c.entry);
+      r->copies = outer, r->scope->counter = NULL;
+    }
+    if (r->error->status != PW_OK) pw_yaml_where (r->error, "for %s = %.0f", c.counter, i);
+  }
+  r->copied += c.bytes;
+  return r->error->status;
+}
+
+/* Calls a function for an entry or, if it is repeated, for each of its copies. */
+static int read_one_entry (reader *r, const pw_node *entry, int list, read_entry *each) {
+  const pw_node *repeat = pw_copies_repeat (entry);
+  return repeat ? read_copies (r, entry, repeat, list, each) : each (r, entry);
+}
+
+/* The same for all entries of a list of the model, which may be NULL. */
+static int read_entries (reader *r, const pw_node *entries, int list, read_entry *each) {
+  if (entries == NULL || list_count (r, entries, list, entries->count) != PW_OK) return r->error->status;
+  for (const pw_node *n = entries->first; n; n = n->next)
+    if (read_one_entry (r, n, list, each) != PW_OK) break;
+  return r->error->status;
+}
+
+/* ---- Names in expressions that outlive a copy or an included file ----
+ *
+ * Such an expression is kept as text, for `show`: a counter, and the names of numbers of an included file, are replaced by
+ * their values, and states by those of the model. */
+
+enum { REPLACED = 8000 /* bytes of a text; one cut to it is too long for an expression */ };
+typedef char replacement[500];
+
+/* Prints what replaces a name; 0: it stays. */
+typedef int replace_name (reader *r, const pw_node *node, const char *name, replacement to);
+
+/* A number with all its digits, in parentheses. */
+static const char *replace_number (double value, replacement to) {
+  char number[32];
+  return pw_print (to, sizeof (replacement), "(%s)", pw_format (number, value, 17));
+}
+
+/* The node of an expression, or one with the names in it replaced. */
+static const pw_node *read_replaced (reader *r, const pw_node *node, replace_name *replace) {
+  char text[REPLACED], name[PW_EXPRESSION_NAME];
+  replacement to;
+  const char *from = node->type == PW_YAML_SCALAR ? node->text : "";
+  *text = 0;
+  for (const char *rest = from, *p; (p = pw_expression_next_name (&rest, name)) != NULL;) {
+    if (!replace (r, node, name, to)) continue;
+    append (text, "%.*s%s", (int)(p - from), from, to);
+    from = rest;
+  }
+  if (*text == 0 || r->error->status != PW_OK) return node;
+  append (text, "%s", from);
+  pw_node *copy = pw_arena_alloc (r->arena, sizeof *copy);
+  if (copy) *copy = *node, copy->count = 0, copy->text = pw_arena_copy (r->arena, text);
+  if (copy && copy->text) return copy;
+  read_no_memory (r);
+  return node;
+}
+
+static int replace_constant (const reader *r, const char *name, replacement to) {
+  double value;
+  const char *counter = r->scope->counter;
+  if (r->y == r->y->model && !(counter && strcmp (counter, name) == 0)) return 0; /* `show` writes its names under let */
+  return pw_scope_find (r->scope, name, &value) && replace_number (value, to);
+}
+
+static const char *const body_states[] = { "x", "y", "phi", "vx", "vy", "omega", NULL };
+
+/* The index of a body's state in body_states; 6 if it has no such state. */
+static int body_state (const char *part) {
+  int i = 0;
+  while (body_states[i] && strcmp (body_states[i], part) != 0) i++;
+  return i;
+}
+
+/* Names in signals.  States in an included file are measured in its place. */
+static int replace_in_signal (reader *r, const pw_node *node, const char *name, replacement to) {
+  (void)node;
+  const char *dot = strchr (name, '.');
+  const pw_place *p = &r->place;
+  const int state = dot ? body_state (dot + 1) : 6, y = state == 1 || state == 4;
+  replacement X, Y, c, s;
+  if (dot == NULL) return replace_constant (r, name, to);
+  if (*r->prefix == 0) return 0;
+  const char *body = PW_PRINTED (200, "%s%.*s", r->prefix, (int)(dot - name), name);
+  replace_number (p->at[0], X), replace_number (p->at[1], Y), replace_number (p->cos, c);
+  replace_number (y ? -p->sin : p->sin, s);
+  if (state == 2 && p->phi != 0)
+    pw_print (to, sizeof (replacement), "(%s.phi - %s)", body, replace_number (p->phi, X));
+  else if (state < 2 && p->phi != 0)
+    pw_print (to, sizeof (replacement), y ? "(%s*(%s.y - %s) + %s*(%s.x - %s))" : "(%s*(%s.x - %s) + %s*(%s.y - %s))", c,
+              body, y ? Y : X, s, body, y ? X : Y);
+  else if (state < 2 && p->at[state] != 0)
+    pw_print (to, sizeof (replacement), "(%s.%s - %s)", body, dot + 1, y ? Y : X);
+  else if ((state == 3 || state == 4) && p->phi != 0)
+    pw_print (to, sizeof (replacement), y ? "(%s*%s.vy + %s*%s.vx)" : "(%s*%s.vx + %s*%s.vy)", c, body, s, body);
+  else
+    pw_print (to, sizeof (replacement), "%s%s", body, dot);
+  return 1;
+}
+
 /* ---- Expressions of time and, in forces, of states: BODY.phi, ELEMENT.spin ---- */
 
 /* Reports an error at an offset of the expression, or name, in a node. */
@@ -220,17 +418,27 @@ static int read_expression (reader *r, const pw_node *node, const char *const *v
                     r->label, MAX_OPERATIONS);
 }
 
-/* Indexes all elements, including those not built yet, whose errors are reported later. */
-static int state_elements (reader *r) {
-  const pw_node *list = r->y->elements;
-  if (r->elements.slot) return PW_OK;
-  if (pw_names_open (&r->elements, list ? (size_t)list->count : 0) != PW_OK) return read_no_memory (r);
-  for (const pw_node *n = list ? list->first : NULL; n; n = n->next) {
-    const pw_node *key = n->type == PW_YAML_MAP ? n->first : NULL;
-    int kind = key && key->next->type == PW_YAML_SCALAR ? find_kind (key) : -1;
-    if (kind >= 0) pw_names_add (&r->elements, key->next->text, kind);
-  }
+/* Indexes an element of this name in its file, whose errors are reported later. */
+static int state_index (reader *r, const pw_node *entry) {
+  const pw_node *key = entry->type == PW_YAML_MAP ? entry->first : NULL;
+  int kind = key && key->next->type == PW_YAML_SCALAR ? find_kind (key) : -1;
+  if (kind < 0) return PW_OK;
+  const char *name = read_prefixed (r, key->next->text);
+  if (name == NULL || pw_names_reserve (&r->elements, ++r->elements_count) != PW_OK) return read_no_memory (r);
+  pw_names_add (&r->elements, name, kind);
   return PW_OK;
+}
+
+/* Indexes all elements of the file, including those not built yet, when an expression needs it. */
+static int state_elements (reader *r) {
+  const char *counter = r->scope->counter;
+  const double count = r->scope->count;
+  if (r->indexed) return PW_OK;
+  r->indexed = 1;
+  r->scope->counter = NULL;
+  read_entries (r, r->y->elements, LIST_AGAIN, state_index);
+  r->scope->counter = counter, r->scope->count = count;
+  return r->error->status;
 }
 
 static int state_of_element (reader *r, const pw_node *node, const char *owner, const char *part, size_t at) {
@@ -257,12 +465,10 @@ static int state_of_element (reader *r, const pw_node *node, const char *owner, 
 
 /* Checks that a name with a dot, at an offset of the expression, names a state. */
 static int state_check (reader *r, const pw_node *node, const char *name, size_t at) {
-  static const char *const part[] = { "x", "y", "phi", "vx", "vy", "omega" };
   size_t n = strcspn (name, ".");
   const char *owner = PW_PRINTED (100, "%.*s", (int)n, name);
   if (pw_names_find (&r->bodies, owner) < 0) return state_of_element (r, node, owner, name + n + 1, at);
-  for (int i = 0; i < 6; i++)
-    if (strcmp (part[i], name + n + 1) == 0) return PW_OK;
+  if (body_state (name + n + 1) < 6) return PW_OK;
   return expression_fail (r, node, at + n + 1, "a body's states are x, y, phi, vx, vy and omega, not \"%.30s\"",
                           name + n + 1);
 }
@@ -421,7 +627,7 @@ static int signal_of_time (reader *r, const pw_node *const node[3], pw_signal *s
   signal->function.close = free;
   for (int i = 0; i < 3; i++) {
     if (node[i] == NULL) continue;
-    if (signal_expression (r, node[i], f, i) != PW_OK) return r->error->status;
+    if (signal_expression (r, read_replaced (r, node[i], replace_in_signal), f, i) != PW_OK) return r->error->status;
     if (f->expression[i]->breaks) signal->function.breakpoint = signal_breakpoint;
     if (i > 0 && !f->states && signal_check_derivative (r, node[i], f, i, key[i]) != PW_OK) return r->error->status;
   }
@@ -458,18 +664,6 @@ static double *table_list (reader *r, const pw_node *list, pw_signal *s) {
   return t;
 }
 
-/* A model may only read files in its folder. */
-static FILE *table_open (const pw_yaml *y, const char *name, const char **reason) {
-  char joined[PW_PATH], path[PW_PATH];
-  size_t n = strlen (y->folder); /* 0 for the root */
-  *reason = "a table must be in the model's folder: its path is relative and has no \"..\"";
-  if (*name == '/' || strstr (PW_PRINTED (PW_PATH + 2, "/%s/", name), "/../")) return NULL;
-  if (realpath (pw_path (joined, "%s/%s", y->folder, name), path) == NULL) return *reason = strerror (errno), NULL;
-  *reason = "it is a link that leads out of the model's folder";
-  int is_inside = strncmp (path, y->folder, n) == 0 && (path[n] == '/' || path[n] == 0);
-  return is_inside ? pw_open_input (path, reason) : NULL;
-}
-
 /* The unit of the current field.  Only a drive has "m or rad"; the choice before this field decides. */
 static const char *table_unit (const reader *r) {
   const pw_field *choice = r->field;
@@ -499,11 +693,12 @@ static int table_columns (reader *r, const pw_node *columns, const pw_node *time
 /* Points in two columns of a file; rows without a time or value are left out.  Returns the times, or NULL. */
 static double *table_file (reader *r, const pw_node *node, const pw_node *columns, const pw_node *time, pw_signal *s) {
   const char *name, *reason, *column[2], *const unit[2] = { "s", table_unit (r) };
+  char path[PW_PATH];
   pw_error cause = { 0 };
   int rows;
   if (table_columns (r, columns, time, column) != PW_OK || read_text (r, node, r->label, &name) != PW_OK) return NULL;
   errno = 0;
-  FILE *f = table_open (r->y, name, &reason);
+  FILE *f = pw_yaml_find (r->y, name, path, &reason) ? pw_open_input (path, &reason) : NULL;
   if (f == NULL && pw_open_input_status () == PW_RESOURCE)
     return pw_fail (r->error, PW_RESOURCE, "%s: cannot read %s: %s", r->y->path, name, reason), NULL;
   if (f == NULL) return read_fail (r, node->at, "%s: cannot read \"%.60s\": %s", r->label, name, reason), NULL;
@@ -618,6 +813,54 @@ static int read_signal (reader *r, const pw_node *node, pw_signal *signal) {
   return read_number (r, node, r->label, PW_REAL, &signal->constant);
 }
 
+/* ---- Initial values of bodies described before, BODY.x, as numbers ---- */
+
+/* A body's initial state in the frame of the file being read, which must be specified. */
+static int initial_value (reader *r, const pw_node *node, const char *name, double *value) {
+  const size_t n = strcspn (name, "."), at = (size_t)(strstr (node->text, name) - node->text);
+  const char *owner = PW_PRINTED (200, "%s%.*s", r->prefix, (int)n, name);
+  int bodies, i = pw_names_find (&r->bodies, owner), state = body_state (name + n + 1);
+  const pw_body *body = pw_model_bodies (r->model, &bodies);
+  if (i < 0) {
+    pw_nearest near = { .sought = owner };
+    suggest_bodies (r, &near);
+    return expression_fail (r, node, at, "there is no body \"%s\" before%s", owner, pw_nearest_text (&near));
+  }
+  if (state == 6)
+    return expression_fail (r, node, at + n + 1, "a body's states are x, y, phi, vx, vy and omega, not \"%.30s\"",
+                            name + n + 1);
+  const unsigned needs = r->place.phi != 0 && state % 3 < 2 ? 3u << (state / 3 * 3) : 1u << state;
+  if ((body[i].specified & needs) != needs)
+    return expression_fail (r, node, at, "the description of body %s does not give %s", owner, name + n + 1);
+  double start[3], rate[3];
+  memcpy (start, body[i].start, sizeof start);
+  memcpy (rate, body[i].rate, sizeof rate);
+  pw_place_back (&r->place, start);
+  pw_place_turn (&r->place, -1, rate);
+  start[2] -= r->place.phi;
+  *value = state < 3 ? start[state] : rate[state - 3];
+  return PW_OK;
+}
+
+static int replace_state (reader *r, const pw_node *node, const char *name, replacement to) {
+  double value;
+  return strchr (name, '.') && initial_value (r, node, name, &value) == PW_OK && replace_number (value, to);
+}
+
+static int replace_in_truth (reader *r, const pw_node *node, const char *name, replacement to) {
+  return strchr (name, '.') ? replace_state (r, node, name, to) : replace_constant (r, name, to);
+}
+
+/* A number that may depend on these. */
+static int read_initial (reader *r, const pw_node *node, const char *label, double *value) {
+  if (node == NULL) return r->error->status;
+  r->label = label;
+  const char *dot = node->type == PW_YAML_SCALAR ? strchr (node->text, '.') : NULL;
+  while (dot && !isalpha ((unsigned char)dot[1])) dot = strchr (dot + 1, '.');
+  if (dot) node = read_replaced (r, node, replace_state);
+  return read_number (r, node, label, PW_REAL, value);
+}
+
 /* ---- Reference solution: `truth`, a map of states to expressions of time ---- */
 
 static double reference_eval (void *context, int i, double t) {
@@ -625,44 +868,59 @@ static double reference_eval (void *context, int i, double t) {
   return pw_expression_value (x[i], &t);
 }
 
-static int reference_entry (reader *r, const pw_node *n, pw_names *seen) {
+/* Makes room for more states. */
+static int reference_grow (reader *r) {
+  pw_reference_text *t = r->reference, old = *t;
+  size_t used = (size_t)t->states, room = 2 * used + 16;
+  if (used < r->reference_room) return PW_OK;
+  t->state = pw_arena_alloc (r->arena, room * sizeof *t->state);
+  t->text = pw_arena_alloc (r->arena, room * sizeof *t->text);
+  t->context = pw_arena_alloc (r->arena, room * sizeof (pw_expression *));
+  if (t->state == NULL || t->text == NULL || t->context == NULL || pw_names_reserve (&r->truth, room) != PW_OK)
+    return read_no_memory (r);
+  if (used == 0) return r->reference_room = room, PW_OK;
+  memcpy (t->state, old.state, used * sizeof *t->state);
+  memcpy (t->text, old.text, used * sizeof *t->text);
+  memcpy (t->context, old.context, used * sizeof (pw_expression *));
+  return r->reference_room = room, PW_OK;
+}
+
+static int reference_state (reader *r, const pw_node *n) {
   static const char *const time[] = { "t", NULL };
   pw_reference_text *t = r->reference;
-  const pw_expression **x = t->context;
   const char *name;
   if (read_text (r, n, "truth", &name) != PW_OK) return r->error->status;
   if (strchr (name, '.') == NULL)
     return read_fail (r, n->at, "truth: expected a state such as BODY.phi, found \"%.60s\"", name);
   r->label = "truth";
-  if (state_check (r, n, name, 0) != PW_OK) return r->error->status;
-  if (pw_names_add (seen, name, 0) >= 0) return read_fail (r, n->at, "truth: a second \"%s\"", name);
+  if (state_check (r, n, name, 0) != PW_OK || reference_grow (r) != PW_OK) return r->error->status;
+  if (pw_names_add (&r->truth, name, 0) >= 0) return read_fail (r, n->at, "truth: a second \"%s\"", name);
   r->label = PW_PRINTED (100, "truth of %.60s", name);
   t->state[t->states] = name;
-  int status = read_expression (r, n->next, time, &t->text[t->states], &x[t->states]);
+  const pw_expression **x = t->context;
+  const pw_node *value = read_replaced (r, n->next, replace_in_truth);
+  int status = read_expression (r, value, time, &t->text[t->states], &x[t->states]);
   t->states += status == PW_OK;
   return status;
 }
 
-/* Reads the reference solution, after bodies and elements. */
-static int read_reference (reader *r) {
-  const pw_node *map = r->y->reference;
-  pw_reference_text *t = r->reference;
-  pw_names seen = { .size = 0 };
-  if (map || r->operations > 0) /* expressions may use names, whose values `show` writes */
-    t->names = r->scope->names, t->name = r->scope->name, t->value = r->scope->value;
-  if (map == NULL) return r->error->status;
+static int reference_entry (reader *r, const pw_node *map) {
   if (map->type != PW_YAML_MAP)
     return read_fail (r, map->at, "truth: expected a map {STATE: EXPRESSION, ...}, found %s", node_found (map));
-  size_t room = (size_t)map->count + 1;
-  t->state = pw_arena_alloc (r->arena, room * sizeof *t->state);
-  t->text = pw_arena_alloc (r->arena, room * sizeof *t->text);
-  t->context = pw_arena_alloc (r->arena, room * sizeof (pw_expression *));
-  t->eval = reference_eval;
-  if (t->state == NULL || t->text == NULL || t->context == NULL || pw_names_open (&seen, room) != PW_OK)
-    return read_no_memory (r);
-  for (const pw_node *n = map->first; n && r->error->status == PW_OK; n = n->next->next) reference_entry (r, n, &seen);
-  pw_names_close (&seen);
+  for (const pw_node *n = map->first; n && r->error->status == PW_OK; n = n->next->next) reference_state (r, n);
   return r->error->status;
+}
+
+/* Reads the reference solution, a map or a list of maps, after bodies and elements. */
+static int read_reference (reader *r) {
+  const pw_node *truth = r->y->reference;
+  pw_reference_text *t = r->reference;
+  if (truth || r->operations > 0) /* expressions may use names, whose values `show` writes */
+    t->names = r->scope->names, t->name = r->scope->name, t->value = r->scope->value;
+  t->eval = reference_eval;
+  if (truth == NULL || truth->type != PW_YAML_LIST)
+    return truth ? read_one_entry (r, truth, LIST_AGAIN, reference_entry) : r->error->status;
+  return read_entries (r, truth, LIST_AGAIN, reference_entry);
 }
 
 /* ---- Bodies ----
@@ -673,10 +931,15 @@ static int read_reference (reader *r) {
 /* Reads the name of a body or element, which must be unique. */
 static int build_name (reader *r, const pw_node *node, const char *label, const char **name) {
   if (read_text (r, node, label, name) != PW_OK) return r->error->status;
-  int before = pw_names_add (&r->names, *name, (int)node->at); /* a file has less than INT_MAX bytes */
+  if ((*name = read_prefixed (r, *name)) == NULL) return read_no_memory (r);
+  int before = pw_names_add (&r->names, *name, (int)(r->y->base + node->at)); /* all have less than INT_MAX bytes */
   if (before < 0) return PW_OK;
-  return read_fail (r, node->at, "%s \"%.60s\": line %d already uses this name", label, *name,
-                    pw_yaml_line (r->y, (size_t)before));
+  const pw_yaml *y = r->y->model; /* the file with the first one */
+  for (const pw_yaml *file = y->next; file; file = file->next)
+    if ((size_t)before >= file->base && (y == r->y->model || file->base > y->base)) y = file;
+  const char *where = y == r->y ? "" : PW_PRINTED (120, " of %.100s", y->path);
+  return read_fail (r, node->at, "%s \"%.60s\": line %d%s already uses this name", label, *name,
+                    pw_yaml_line (y, (size_t)before - y->base), where);
 }
 
 /* Reports an error of the core at a node, without its prefix "model NAME: ". */
@@ -687,46 +950,128 @@ static int build_fail (const reader *r, const pw_node *node, const pw_error *cau
   return read_fail (r, node->at, "%s", text);
 }
 
-static int build_body (reader *r, const pw_node *node) {
-  static const char *const key[] = { "name", "mass", "inertia", "start", "rate", NULL };
+/* Reads start and rate. */
+static int body_initial (reader *r, const pw_node *const node[2], pw_body *body) {
+  static const char *const key[] = { "start", "rate" };
   static const char *const state[][4] = { { "x", "y", "phi", NULL }, { "vx", "vy", "omega", NULL } };
+  for (int i = 0; i < 2; i++) {
+    const char *label = JOINED (key[i], " of body ", body->name);
+    const pw_node *given[4];
+    read_keys (r, node[i], state[i], label, given);
+    for (int k = 0; k < 3; k++) {
+      if (given[k] == NULL) continue;
+      double *value = (i ? body->rate : body->start) + k;
+      read_initial (r, given[k], JOINED (label, ": ", state[i][k]), value);
+      body->specified |= 1u << (3 * i + k);
+    }
+  }
+  return r->error->status;
+}
+
+/* Reads a uniform slender bar, given by its ends: centre of mass, angle, inertia. */
+static int body_bar (reader *r, const pw_node *bar, const pw_node *const end[2], pw_body *body) {
+  static const char *const key[] = { "from", "to" };
+  double at[2][2] = { { 0 } };
+  for (int i = 0; i < 2; i++) {
+    const char *label = PW_PRINTED (160, "bar %.60s: %s", body->name, key[i]);
+    if (end[i] == NULL) return read_fail (r, bar->at, "bar %.60s needs \"%s\": a point [x, y]", body->name, key[i]);
+    if (read_list_of (r, end[i], label, 2, "numbers, [x, y]") != PW_OK) return r->error->status;
+    for (int k = 0; k < 2; k++) read_initial (r, k ? end[i]->first->next : end[i]->first, label, &at[i][k]);
+  }
+  const double x = at[1][0] - at[0][0], y = at[1][1] - at[0][1], length = hypot (x, y);
+  if (r->error->status == PW_OK && !(length > 0))
+    return read_fail (r, end[1]->at, "bar %.60s: both ends are the point (%g, %g)", body->name, at[1][0], at[1][1]);
+  for (int k = 0; k < 2; k++) body->start[k] = (at[0][k] + at[1][k]) / 2;
+  body->start[2] = atan2 (y, x);
+  body->inertia = body->mass * length * length / 12;
+  body->specified |= PW_SPECIFIES_X | PW_SPECIFIES_Y | PW_SPECIFIES_PHI;
+  return r->error->status;
+}
+
+/* Moves a body of an included file to its place. */
+static int body_place (reader *r, const pw_node *node, pw_body *body) {
+  static const char *const pair[][2] = { { "x", "y" }, { "vx", "vy" } };
+  for (int i = 0; *r->prefix && i < 2; i++) {
+    unsigned given = body->specified >> (3 * i) & 3;
+    if (r->place.phi != 0 && (given == 1 || given == 2))
+      return read_fail (r, node->at, "body %.60s has an initial %s but no %s, and the file is included with phi",
+                        body->name, pair[i][given == 2], pair[i][given == 1]);
+  }
+  if (*r->prefix == 0) return PW_OK; /* so that no bit changes, as that of -0 */
+  pw_place_point (&r->place, body->start);
+  pw_place_turn (&r->place, 1, body->rate);
+  body->start[2] += r->place.phi;
+  return PW_OK;
+}
+
+static int build_body (reader *r, const pw_node *node) {
+  static const char *const key[] = { "name", "mass", "inertia", "start", "rate", "bar", "from", "to", NULL };
   const pw_node *v[sizeof key / sizeof *key];
   pw_body body = { .specified = PW_SPECIFIES_NOTHING };
   pw_error cause = { 0 };
+  int bodies;
   if (read_keys (r, node, key, "a body", v) != PW_OK) return r->error->status;
-  const pw_node *name = v[0];
+  const pw_node *bar = v[5], *name = bar ? bar : v[0], *other = bar ? v[3] ? v[3] : v[0] : v[6] ? v[6] : v[7];
   if (name == NULL) return read_fail (r, node->at, "a body needs a name");
-  if (build_name (r, name, "body", &body.name) != PW_OK) return r->error->status;
+  if (build_name (r, name, bar ? "bar" : "body", &body.name) != PW_OK) return r->error->status;
+  if (other && bar)
+    return read_fail (r, other->at, "a bar has no \"%s\": %s", other == v[0] ? "name" : "start",
+                      other == v[0] ? "write {bar: NAME, from: .., to: .., ..}" : "its ends give its initial position");
+  if (other) return read_fail (r, other->at, "the ends of a bar: write {bar: NAME, from: .., to: .., ..}");
   for (int i = 0; i < 2; i++) {
-    const char *label = PW_PRINTED (160, "body %.60s: %s", body.name, key[1 + i]);
+    const char *label = JOINED ("body ", body.name, ": ", key[1 + i]);
+    if (i && bar) body_bar (r, bar, v + 6, &body);
     read_number (r, v[1 + i], label, PW_NONNEGATIVE, i ? &body.inertia : &body.mass);
   }
-  for (int i = 0; i < 2; i++) {
-    const char *label = PW_PRINTED (160, "%s of body %.60s", key[3 + i], body.name);
-    const pw_node *given[4];
-    read_keys (r, v[3 + i], state[i], label, given);
-    for (int k = 0; k < 3; k++) {
-      if (given[k] == NULL) continue;
-      double *value = (i ? body.rate : body.start) + k;
-      read_number (r, given[k], PW_PRINTED (200, "%s: %s", label, state[i][k]), PW_REAL, value);
-      body.specified |= 1u << (3 * i + k);
-    }
-  }
-  if (r->error->status != PW_OK) return r->error->status;
+  if (body_initial (r, v + 3, &body) != PW_OK || body_place (r, name, &body) != PW_OK) return r->error->status;
   if (pw_model_check_body (r->model, &body, &cause) != PW_OK) return build_fail (r, name, &cause);
-  pw_names_add (&r->bodies, body.name, 0);
+  pw_model_bodies (r->model, &bodies);
+  pw_names_add (&r->bodies, body.name, bodies);
   return pw_add_body (r->model, &body);
 }
 
 /* ---- Elements ---- */
 
 static int build_body_name (const reader *r, const pw_node *node, const char **name) {
-  if (read_text (r, node, r->label, name) != PW_OK) return r->error->status;
-  if (strcmp (*name, "ground") == 0 || pw_names_find (&r->bodies, *name) >= 0) return PW_OK;
+  if (read_text (r, node, r->label, name) != PW_OK || strcmp (*name, "ground") == 0) return r->error->status;
+  if ((*name = read_prefixed (r, *name)) == NULL) return read_no_memory (r);
+  if (pw_names_find (&r->bodies, *name) >= 0) return PW_OK;
   pw_nearest near = { .sought = *name };
   suggest_bodies (r, &near);
   pw_nearest_try (&near, "ground");
   return read_fail (r, node->at, "%s: there is no body \"%.60s\"%s", r->label, *name, pw_nearest_text (&near));
+}
+
+/* The number of a point in the definition, which is that of its body. */
+static int point_number (const reader *r, const void *point) {
+  int k = 0;
+  while (pw_field_at (r->kind, r->definition, PW_POINT, k) != point) k++;
+  return k;
+}
+
+/* Body k of the element, an index; -1 for the ground. */
+static int point_body (const reader *r, int k) {
+  return pw_names_find (&r->bodies, *(const char *const *)pw_field_at (r->kind, r->definition, PW_BODY, k));
+}
+
+/* A point given in the world, {world: [x, y]}: that of the body at its initial position.  A point of the ground is
+ * moved with the others, by element_place. */
+static int read_world (reader *r, const pw_node *node, double *point) {
+  static const char *const key[] = { "world", NULL }, *const missing[] = { "x", "y", "phi" };
+  const pw_node *world;
+  int bodies, body = point_body (r, point_number (r, point));
+  if (read_keys (r, node, key, "a point", &world) != PW_OK || world == NULL)
+    return world ? r->error->status : read_fail (r, node->at, "%s: expected {world: [x, y]}", r->label);
+  if (read_pair (r, world, r->label, "numbers, [x, y]", point) != PW_OK || body < 0) return r->error->status;
+  const pw_body *b = pw_model_bodies (r->model, &bodies) + body;
+  for (int i = 0; i < 3; i++)
+    if ((b->specified >> i & 1) == 0)
+      return read_fail (r, node->at, "%s: a point in the world needs the position of body %s, whose start has no %s",
+                        r->label, b->name, missing[i]);
+  const pw_place frame = pw_place_in (NULL, b->start[0], b->start[1], b->start[2]);
+  pw_place_point (&r->place, point);
+  pw_place_back (&frame, point);
+  return PW_OK;
 }
 
 static int build_value (reader *r, const pw_node *node, void *to) {
@@ -734,6 +1079,8 @@ static int build_value (reader *r, const pw_node *node, void *to) {
   case PW_NUMBER:
     return read_number (r, node, r->label, r->field->domain, to);
   case PW_POINT:
+    if (node->type == PW_YAML_MAP) return read_world (r, node, to);
+    return read_pair (r, node, r->label, "numbers, [x, y]", to);
   case PW_VECTOR:
     return read_pair (r, node, r->label, "numbers, [x, y]", to);
   case PW_BODY:
@@ -756,10 +1103,42 @@ static int build_field (reader *r, const pw_node *node, const char *element) {
   const pw_field *f = r->field;
   char *to = r->definition + f->offset;
   int count = pw_field_count (f);
-  r->label = PW_PRINTED (200, "%s %.60s: %s", r->kind->name, element, f->name);
+  r->label = JOINED (r->kind->name, " ", element, ": ", f->name);
   if (count == 1) return build_value (r, node, to);
-  if (read_list_of (r, node, r->label, count, plural[f->type]) != PW_OK) return r->error->status;
+  const int shared = f->type == PW_POINT && node->type == PW_YAML_MAP; /* one point in the world for all */
+  for (int k = 0; shared && k < count; k++, to += pw_field_bytes (f->type)) read_world (r, node, (double *)(void *)to);
+  if (shared || read_list_of (r, node, r->label, count, plural[f->type]) != PW_OK) return r->error->status;
   for (const pw_node *n = node->first; n; n = n->next, to += pw_field_bytes (f->type)) build_value (r, n, to);
+  return r->error->status;
+}
+
+/* Turns the value of a field with the element: by the included file's angle or, of the other body, back. */
+static int field_place (const reader *r, const pw_node *node, const pw_field *f, int ground) {
+  static const int sign[][2] = {
+    [PW_TURN_ANGLE_1] = { -1, 1 }, [PW_TURN_ANGLE_2] = { 1, -1 }, [PW_TURN_HEADING_2] = { 0, 1 }, [PW_TURN_AXES_1] = { 1 }
+  };
+  void *at = r->definition + f->offset;
+  int turns = f->turn == PW_TURN_NONE ? 0 : f->turn == PW_TURN_WORLD ? *(int *)at == 0 : 0;
+  if (f->turn == PW_TURN_OFFSET) turns = ground >= 0 && *(int *)at != 0;
+  if (f->turn < PW_TURN_WORLD && f->turn != PW_TURN_NONE && ground >= 0) turns = sign[f->turn][ground];
+  if (turns == 0) return PW_OK;
+  if (f->type == PW_NUMBER && f->turn != PW_TURN_AXES_1) return *(double *)at += turns * r->place.phi, PW_OK;
+  return read_fail (r, node->at, "%s %.60s: its %s refers to the ground, and cannot turn with a file included with phi",
+                    r->kind->name, *(const char **)(void *)r->definition, f->name);
+}
+
+/* Moves what refers to the ground, in an element of an included file, to its place. */
+static int element_place (const reader *r, const pw_node *node) {
+  int ground = -1;
+  double *point;
+  for (int k = 0; *r->prefix && k < r->kind->bodies && !r->kind->each_body; k++) {
+    if (point_body (r, k) >= 0) continue;
+    ground = k;
+    point = (double *)(void *)(size_t)pw_field_at (r->kind, r->definition, PW_POINT, k);
+    if (point) pw_place_point (&r->place, point);
+  }
+  for (const pw_field *f = r->kind->fields; r->place.phi != 0 && f->name; f++)
+    if (field_place (r, node, f, ground) != PW_OK) break;
   return r->error->status;
 }
 
@@ -814,7 +1193,7 @@ static int build_element (reader *r, const pw_node *node) {
   memcpy (r->definition, &name, sizeof name);
   for (const pw_field *f = kind->fields; f->name && n < MAX_KEYS - 1; f++) key[n++] = f->name;
   key[n] = NULL;
-  read_keys_from (r, first->next->next, key, PW_PRINTED (100, "a %s", kind->name), v);
+  read_keys_from (r, first->next->next, key, JOINED ("a ", kind->name), v);
   for (int i = 0; i < n && r->error->status == PW_OK; i++) {
     const pw_field *f = r->field = &kind->fields[i];
     if (v[i])
@@ -822,15 +1201,77 @@ static int build_element (reader *r, const pw_node *node) {
     else if (f->required || f->type == PW_BODY)
       read_fail (r, first->at, "%s %.60s needs \"%s\": %s", kind->name, name, f->name, f->about ? f->about : "");
   }
-  if (r->error->status != PW_OK) return r->error->status;
+  if (r->error->status != PW_OK || element_place (r, first->next) != PW_OK) return r->error->status;
+  if (kind->internal > 0 && state_index (r, node) != PW_OK) return r->error->status;
   pw_element e = { kind, r->definition };
   if (pw_model_check_element (r->model, &e, &cause) != PW_OK) return build_fail (r, first->next, &cause);
   return pw_add (r->model, kind, r->definition);
 }
 
+/* ---- Included files ---- */
+
+enum { INCLUDE_REPEAT, INCLUDE_FILE, INCLUDE_PREFIX, INCLUDE_SET, INCLUDE_AT, INCLUDE_PHI, INCLUDE_KEYS };
+static const char *const include_key[] = { "repeat", "file", "prefix", "set", "at", "phi", NULL };
+
+static int build_file (reader *r, const double *parameter);
+
+/* Reads the parameters of an included file; the others have their defaults. */
+static int include_parameters (const reader *r, const pw_yaml *y, const pw_node *set, double *value) {
+  const pw_parameter *p = y->table.parameters;
+  for (int i = 0; i < y->parameter_count; i++) value[i] = NAN;
+  if (set && set->type != PW_YAML_MAP)
+    return read_fail (r, set->at, "set: expected a map {PARAMETER: NUMBER, ...}, found %s", node_found (set));
+  for (const pw_node *n = set ? set->first : NULL; n; n = n->next->next) {
+    char hint[PW_HINT];
+    const char *name = "";
+    if (read_text (r, n, "set", &name) != PW_OK) return r->error->status;
+    int i = pw_find_name (p, sizeof *p, name, hint);
+    if (i < 0) return read_fail (r, n->at, "%s has no parameter \"%.60s\"%s", y->path, name, hint);
+    if (!isnan (value[i])) return read_fail (r, n->at, "\"%s\" appears twice", name);
+    if (read_number (r, n->next, PW_PRINTED (100, "set %s", name), p[i].domain, &value[i]) != PW_OK)
+      return r->error->status;
+  }
+  for (int i = 0; i < y->parameter_count; i++)
+    if (isnan (value[i])) value[i] = p[i].value;
+  return PW_OK;
+}
+
+/* Builds the bodies and elements of an included file in its place, their names with the prefix. */
+static int build_include (reader *r, const pw_node *entry) {
+  const pw_node *v[INCLUDE_KEYS + 1];
+  const reader outer = *r;
+  const char *prefix = "";
+  double at[2] = { 0 }, phi = 0;
+  pw_scope scope = { 0 };
+  if (read_keys (r, entry, include_key, "an entry of include", v) != PW_OK) return r->error->status;
+  pw_yaml *y = pw_yaml_included (r->y, v[INCLUDE_FILE]->text);
+  if (y == NULL) return read_fail (r, v[INCLUDE_FILE]->at, "file: the name of a file has no numbers in braces");
+  if (v[INCLUDE_PREFIX] == NULL) return read_fail (r, entry->at, "an entry of include needs a prefix, such as left_");
+  read_name (r, v[INCLUDE_PREFIX], "prefix", &prefix);
+  read_pair (r, v[INCLUDE_AT], "at", "numbers, [x, y]", at);
+  read_number (r, v[INCLUDE_PHI], "phi", PW_REAL, &phi);
+  double *value = pw_arena_alloc (r->arena, (size_t)(y->parameter_count + 1) * sizeof *value);
+  const int lets = y->let ? y->let->count : 0;
+  if (value == NULL || pw_scope_open (&scope, y->parameter_count + lets, r->arena) != PW_OK ||
+      (r->prefix = read_prefixed (r, prefix)) == NULL)
+    read_no_memory (r);
+  else if (r->error->status == PW_OK && include_parameters (r, y, v[INCLUDE_SET], value) == PW_OK &&
+           list_count (r, entry, LIST_LET, y->parameter_count + lets) == PW_OK) {
+    r->y = y, r->scope = &scope, r->indexed = 0;
+    r->place = pw_place_in (&outer.place, at[0], at[1], phi);
+    if (build_file (r, value) != PW_OK)
+      pw_yaml_where (r->error, "included by line %d of %.80s", pw_yaml_line (outer.y, entry->at), outer.y->path);
+  }
+  pw_scope_close (&scope);
+  r->y = outer.y, r->scope = outer.scope, r->indexed = outer.indexed;
+  r->prefix = outer.prefix, r->place = outer.place;
+  return r->error->status;
+}
+
 /* ---- The model ---- */
 
-static int build_all (reader *r, const double *parameter) {
+/* Builds the bodies of a file, the files that it includes, and its elements. */
+static int build_file (reader *r, const double *parameter) {
   const pw_yaml *y = r->y;
   double value;
   for (int i = 0; i < y->parameter_count; i++) pw_scope_add (r->scope, y->table.parameters[i].name, parameter[i]);
@@ -839,11 +1280,11 @@ static int build_all (reader *r, const double *parameter) {
       return r->error->status;
     pw_scope_add (r->scope, n->text, value);
   }
-  for (const pw_node *n = y->bodies ? y->bodies->first : NULL; n; n = n->next)
-    if (build_body (r, n) != PW_OK) return r->error->status;
-  for (const pw_node *n = y->elements ? y->elements->first : NULL; n; n = n->next)
-    if (build_element (r, n) != PW_OK) return r->error->status;
-  return read_reference (r);
+  if (read_list (r, y->bodies, "bodies") == PW_OK && read_list (r, y->elements, "elements") == PW_OK &&
+      read_entries (r, y->bodies, LIST_BODIES, build_body) == PW_OK &&
+      read_entries (r, y->include, LIST_INCLUDE, build_include) == PW_OK)
+    read_entries (r, y->elements, LIST_ELEMENTS, build_element);
+  return r->error->status;
 }
 
 static void build_free (void *arena) {
@@ -854,8 +1295,7 @@ static void build_free (void *arena) {
 /* Allocates the memory for building, and the arena for what lives as long as the model. */
 static int build_open (reader *r) {
   const pw_yaml *y = r->y;
-  size_t largest = 1, bodies = y->bodies ? (size_t)y->bodies->count : 0, lets = y->let ? (size_t)y->let->count : 0;
-  size_t all = bodies + (y->elements ? (size_t)y->elements->count : 0);
+  size_t largest = 1, lets = y->let ? (size_t)y->let->count : 0;
   for (const pw_kind *const *k = pw_kinds; *k; k++)
     if ((*k)->definition > largest) largest = (*k)->definition;
   r->arena = calloc (1, sizeof *r->arena);
@@ -864,7 +1304,8 @@ static int build_open (reader *r) {
   pw_model_set_reference (r->model, r->reference);
   r->definition = malloc (largest);
   if (r->reference && r->definition && pw_scope_open (r->scope, y->parameter_count + (int)lets, r->arena) == PW_OK &&
-      pw_names_open (&r->bodies, bodies) == PW_OK && pw_names_open (&r->names, all) == PW_OK)
+      pw_names_open (&r->bodies, 0) == PW_OK && pw_names_open (&r->names, 0) == PW_OK &&
+      pw_names_open (&r->elements, 0) == PW_OK)
     return PW_OK;
   return read_no_memory (r);
 }
@@ -873,13 +1314,14 @@ static int build_open (reader *r) {
 static void build_model (pw_model *m, const void *parameters) {
   const void *table = pw_model_table (m);
   pw_scope scope = { 0 };
-  reader r = { .y = table, .model = m, .scope = &scope, .error = pw_model_error (m) };
-  read_list (&r, r.y->bodies, "bodies");
-  if (read_list (&r, r.y->elements, "elements") == PW_OK && build_open (&r) == PW_OK) build_all (&r, parameters);
+  reader r = { .y = table, .model = m, .scope = &scope, .error = pw_model_error (m), .prefix = "" };
+  r.place = pw_place_in (NULL, 0, 0, 0);
+  if (build_open (&r) == PW_OK && build_file (&r, parameters) == PW_OK) read_reference (&r);
   pw_scope_close (&scope);
   pw_names_close (&r.bodies);
   pw_names_close (&r.names);
   pw_names_close (&r.elements);
+  pw_names_close (&r.truth);
   free (r.definition);
 }
 
@@ -961,13 +1403,7 @@ static int read_unit (const reader *r, const pw_node *node, const pw_node *value
 /* Reads a unique name that expressions can use. */
 static int head_name (const reader *r, const pw_node *node, const char *label, pw_names *names) {
   const char *name;
-  if (read_text (r, node, label, &name) != PW_OK) return r->error->status;
-  if (!pw_expression_is_name (name))
-    return read_fail (r, node->at, "%s \"%.60s\": expected a letter, then letters, digits and _, at most 63 in all",
-                      label, name);
-  if (strcmp (name, "t") == 0 || pw_expression_is_reserved (name))
-    return read_fail (r, node->at, "%s \"%s\": this name is reserved: %s", label, name,
-                      *name == 't' && name[1] == 0 ? "it is the time" : "a function or constant");
+  if (read_name (r, node, label, &name) != PW_OK) return r->error->status;
   return pw_names_add (names, name, 0) >= 0 ? read_fail (r, node->at, "a second %s \"%s\"", label, name) : PW_OK;
 }
 
@@ -1019,8 +1455,8 @@ static int head_parameters (pw_yaml *y, const reader *r, const pw_node *list, pw
 }
 
 static int read_head (pw_yaml *y, const reader *r) {
-  static const char *const key[] = { "pinwheel", "about",    "run",   "parameters", "let",
-                                     "bodies",   "elements", "truth", NULL };
+  static const char *const key[] = { "pinwheel", "about",   "run",      "parameters", "let",
+                                     "bodies",   "include", "elements", "truth",      NULL };
   static const char *const run_key[] = { "t_end", "step", "rtol", "method", NULL };
   const pw_node *v[sizeof key / sizeof *key], *run[sizeof run_key / sizeof *run_key];
   double *number[] = { &y->table.run.t_end, &y->table.run.step, &y->table.run.rtol };
@@ -1036,7 +1472,7 @@ static int read_head (pw_yaml *y, const reader *r) {
   read_text (r, run[3], run_key[3], &y->table.run.method);
   const pw_node *parameters = v[3], *let = v[4];
   /* the key of the reference solution is "truth" */
-  y->let = let, y->bodies = v[5], y->elements = v[6], y->reference = v[7];
+  y->let = let, y->bodies = v[5], y->include = v[6], y->elements = v[7], y->reference = v[8];
   for (int i = 3; key[i]; i++) /* from "parameters" on: lists and maps */
     if (v[i] && v[i]->count > MAX_ITEMS)
       read_fail (r, v[i]->at, "%s: %d entries; a model may have %d", key[i], v[i]->count, MAX_ITEMS);
@@ -1051,46 +1487,118 @@ static int read_head (pw_yaml *y, const reader *r) {
   return r->error->status;
 }
 
-/* ---- The file ---- */
+/* ---- The file, and those that it includes ---- */
 
-pw_yaml *pw_yaml_open (const char *path, const char *shown, size_t max_bytes, pw_error *error) {
-  const char *slash = strrchr (path, '/');
+/* Opens a file of a model; `model` is NULL for the first one.  path: of `file`, with links resolved. */
+static pw_yaml *file_open (pw_yaml *model, const char *file, const char *path, const char *shown, size_t max_bytes,
+                           int depth, pw_error *error);
+
+/* Opens the file of an entry of `include`, unless it is open. */
+static int file_include (const reader *r, const pw_node *entry, size_t max_bytes, int depth, int *height) {
+  const pw_node *v[INCLUDE_KEYS + 1];
+  const char *name = "", *reason, *slash = strrchr (r->y->path, '/');
+  char path[PW_PATH], file[PW_PATH], shown[PW_PATH];
+  if (read_keys (r, entry, include_key, "an entry of include", v) != PW_OK) return r->error->status;
+  if (v[INCLUDE_FILE] == NULL) return read_fail (r, entry->at, "an entry of include needs a file");
+  if (read_text (r, v[INCLUDE_FILE], "file", &name) != PW_OK) return r->error->status;
+  size_t n = strlen (name);
+  if (n < 6 || strcmp (name + n - 5, ".yaml") != 0)
+    return read_fail (r, v[INCLUDE_FILE]->at, "file \"%.60s\": an included file ends in .yaml", name);
+  pw_yaml *y = pw_yaml_included (r->y, name);
+  if ((y && y->height < 0) || strcmp (pw_yaml_path (r->y, name, file), r->y->model->file) == 0)
+    return read_fail (r, v[INCLUDE_FILE]->at, "file \"%.60s\" includes itself", name);
+  if (depth + (y ? y->height : 0) >= MAX_DEPTH)
+    return read_fail (r, v[INCLUDE_FILE]->at, "files are included in each other more than %d deep", MAX_DEPTH);
+  errno = 0;
+  if (y == NULL && !pw_yaml_find (r->y, name, path, &reason))
+    return errno == ENOMEM ? read_no_memory (r)
+                           : read_fail (r, v[INCLUDE_FILE]->at, "file: cannot read \"%.60s\": %s", name, reason);
+  pw_path (shown, "%.*s%s", slash ? (int)(slash + 1 - r->y->path) : 0, r->y->path, name);
+  if (y == NULL) y = file_open (r->y->model, file, path, shown, max_bytes, depth + 1, r->error);
+  if (y && y->height >= *height) *height = y->height + 1;
+  if (y == NULL) pw_yaml_where (r->error, "included by line %d of %.80s", pw_yaml_line (r->y, entry->at), r->y->path);
+  return r->error->status;
+}
+
+static int file_read (pw_yaml *y, const char *path, size_t max_bytes, int depth, pw_error *error) {
+  const reader r = { .y = y, .error = error, .prefix = "" };
+  int height = 0;
+  if (pw_yaml_read_source (y, path, max_bytes, error) != PW_OK) return error->status;
+  if (y->base + y->size > max_bytes)
+    return pw_fail (error, PW_INPUT, "%s: with the files that it includes, the model has more than %g MB, the limit",
+                    y->model->path, (double)max_bytes / (1 << 20));
+  if (pw_yaml_read_tree (y, error) != PW_OK || read_head (y, &r) != PW_OK ||
+      read_list (&r, y->include, "include") != PW_OK)
+    return error->status;
+  for (const pw_node *n = y->include ? y->include->first : NULL; n; n = n->next)
+    if (file_include (&r, n, max_bytes, depth, &height) != PW_OK) return error->status;
+  y->height = height;
+  return PW_OK;
+}
+
+static pw_yaml *file_open (pw_yaml *model, const char *file, const char *path, const char *shown, size_t max_bytes,
+                           int depth, pw_error *error) {
+  const char *slash = strrchr (file, '/');
   pw_yaml *y = calloc (1, sizeof *y);
   if (y) y->path = pw_arena_copy (&y->arena, shown);
-  if (y) y->folder = pw_arena_copy (&y->arena, slash ? path : ".");
-  if (y && y->folder && slash) y->folder[slash - path] = 0; /* "" for "/model.yaml" */
-  if (y == NULL || y->path == NULL || y->folder == NULL) {
-    pw_fail (error, PW_RESOURCE, "out of memory");
-    pw_yaml_close (y);
-    return NULL;
+  if (y) y->file = pw_arena_copy (&y->arena, file);
+  if (y) y->folder = pw_arena_copy (&y->arena, slash ? file : ".");
+  if (y && y->folder && slash) y->folder[slash - file] = 0; /* "" for "/model.yaml" */
+  if (y == NULL || y->path == NULL || y->file == NULL || y->folder == NULL) {
+    if (y) pw_arena_free (&y->arena);
+    free (y);
+    return pw_fail (error, PW_RESOURCE, "out of memory"), NULL;
   }
   y->max_ahead = MAX_AHEAD * fmax (1, (double)max_bytes / PW_FILE_DEFAULT_BYTES);
   y->table = (pw_plugin_table){ .abi = PW_ABI, .size = sizeof y->table, .build = build_model };
-  if (pw_yaml_read_source (y, path, max_bytes, error) == PW_OK && pw_yaml_read_tree (y, error) == PW_OK &&
-      read_head (y, &(reader){ .y = y, .error = error }) == PW_OK)
-    return y;
-  pw_yaml_close (y);
+  y->model = model ? model : y;
+  y->height = -1;
+  if (model) { /* which frees it */
+    const pw_yaml *last = model->next ? model->next : model;
+    y->base = last->base + last->size + 1;
+    y->next = model->next;
+    model->next = y;
+  }
+  if (file_read (y, path, max_bytes, depth, error) == PW_OK) return y;
+  if (model == NULL) pw_yaml_close (y);
   return NULL;
 }
 
-void pw_yaml_close (pw_yaml *y) {
-  if (y == NULL) return;
-  pw_arena_free (&y->arena);
-  free (y->source);
-  free (y);
+pw_yaml *pw_yaml_open (const char *path, const char *shown, size_t max_bytes, pw_error *error) {
+  return file_open (NULL, path, path, shown, max_bytes, 0, error);
 }
 
-int pw_yaml_tables (const pw_yaml *y, const pw_node *node, int (*each) (void *context, const char *path),
-                    void *context) {
+void pw_yaml_close (pw_yaml *y) {
+  while (y) {
+    pw_yaml *next = y->next;
+    pw_arena_free (&y->arena);
+    free (y->source);
+    free (y);
+    y = next;
+  }
+}
+
+/* The files named below a node, which may be NULL. */
+static int file_tables (const pw_yaml *y, const pw_node *node, int (*each) (void *context, const char *path),
+                        void *context) {
   int stop = 0;
   for (const pw_node *n = node == NULL || node->type == PW_YAML_SCALAR ? NULL : node->first; n && !stop; n = n->next) {
     const pw_node *key = node->type == PW_YAML_MAP ? n : NULL;
     if (key) n = key->next; /* its value */
     if (key && node_is (key, "file") && n->type == PW_YAML_SCALAR) {
       char path[PW_PATH];
-      stop = each (context, pw_path (path, "%s/%s", y->folder, n->text));
+      stop = each (context, pw_yaml_path (y, n->text, path));
     } else
-      stop = pw_yaml_tables (y, n, each, context);
+      stop = file_tables (y, n, each, context);
+  }
+  return stop;
+}
+
+int pw_yaml_tables (const pw_yaml *y, int (*each) (void *context, const char *path), void *context) {
+  int stop = 0;
+  for (; y && !stop; y = y->next) {
+    stop = file_tables (y, y->include, each, context);
+    if (!stop) stop = file_tables (y, y->elements, each, context); /* not in let, where "file" is the name of a number */
   }
   return stop;
 }

@@ -42,6 +42,18 @@ int pw_yaml_fail (const pw_yaml *y, pw_error *error, size_t at, const char *form
                   text, shown, source_characters (from, caret) + 3 * (from > begin), "");
 }
 
+void pw_yaml_where (pw_error *error, const char *format, ...) {
+  char text[150], rest[sizeof error->text];
+  va_list arguments;
+  va_start (arguments, format);
+  vsnprintf (text, sizeof text, format, arguments);
+  va_end (arguments);
+  char *end = error->text + strcspn (error->text, "\n");
+  if (error->status != PW_INPUT) return;
+  snprintf (rest, sizeof rest, "%s", end);
+  snprintf (end, (size_t)(error->text + sizeof error->text - end), " (%s)%s", text, rest);
+}
+
 int pw_yaml_no_memory (const pw_yaml *y, pw_error *error) {
   return pw_fail (error, PW_RESOURCE, "%s: out of memory", y->path);
 }

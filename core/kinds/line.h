@@ -121,7 +121,7 @@ PER_ELEMENT (line_gamma_v, line, 6) {
     .count = 2,       .unit = "m",                                                                                     \
     .required = 1,    .about = "the point in the first body's frame, and a point of the line in the second's" },       \
   {                                                                                                                    \
-    PW_AT (type, heading), PW_NUMBER, .unit = "rad",                                                                   \
+    PW_AT (type, heading), PW_NUMBER, .unit = "rad", .turn = PW_TURN_HEADING_2,                                                                   \
                                       .about = "direction of the line in the second body's frame; 0: along its x axis" \
   }
 

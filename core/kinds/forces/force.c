@@ -68,7 +68,7 @@ static const char *const force_axes[] = { "world", "body", NULL };
 static const pw_field force_fields[] = {
   { PW_AT (pw_force, body), PW_BODY, .required = 1, .about = "the body on which it acts" },
   { PW_AT (pw_force, at), PW_POINT, .unit = "m", .about = "point of application in the body's frame" },
-  { PW_AT (pw_force, axes), PW_CHOICE, .choices = force_axes,
+  { PW_AT (pw_force, axes), PW_CHOICE, .choices = force_axes, .turn = PW_TURN_WORLD,
     .about = "axes of the components; body axes rotate with the body" },
   { PW_AT (pw_force, fx), PW_SIGNAL, .unit = "N", .about = "component along x" },
   { PW_AT (pw_force, fy), PW_SIGNAL, .unit = "N", .about = "component along y" },

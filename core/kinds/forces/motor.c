@@ -75,7 +75,7 @@ static const pw_field motor_fields[] = {
     .about = "torque per angular velocity error" },
   { PW_AT (pw_motor, limit), PW_NUMBER, .unit = "N m", .domain = PW_NONNEGATIVE,
     .about = "largest torque; 0: no limit" },
-  { PW_AT (pw_motor, angle), PW_SIGNAL, .unit = "rad",
+  { PW_AT (pw_motor, angle), PW_SIGNAL, .unit = "rad", .turn = PW_TURN_ANGLE_1,
     .about = "target angle of the first body relative to the second" },
   { PW_AT (pw_motor, rate), PW_SIGNAL, .unit = "rad/s",
     .about = "target angular velocity of the first body relative to the second" },

@@ -55,7 +55,7 @@ static const pw_field twist_fields[] = {
     .about = "torque per angle" },
   { PW_AT (pw_rotational_spring, damping), PW_NUMBER, .unit = "N m s/rad", .domain = PW_NONNEGATIVE,
     .about = "torque per angular velocity" },
-  { PW_AT (pw_rotational_spring, angle), PW_NUMBER, .unit = "rad",
+  { PW_AT (pw_rotational_spring, angle), PW_NUMBER, .unit = "rad", .turn = PW_TURN_ANGLE_1,
     .about = "free value of phi1 - phi2, the angle of the first body relative to the second" },
   { .name = NULL },
 };

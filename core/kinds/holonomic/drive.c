@@ -64,7 +64,7 @@ static const pw_field drive_fields[] = {
     .about = "a point in each body's frame; for an angle it serves figures and the length scale only" },
   { PW_AT (pw_drive, what), PW_CHOICE, .required = 1, .choices = drive_what,
     .about = "the coordinate, from point 2 to point 1 in the frame of body 2, or the relative angle" },
-  { PW_AT (pw_drive, value), PW_SIGNAL, .unit = "m or rad", .required = 1,
+  { PW_AT (pw_drive, value), PW_SIGNAL, .unit = "m or rad", .required = 1, .turn = PW_TURN_ANGLE_1,
     .about = "value as a function of time, with two derivatives" },
   { .name = NULL },
 };

@@ -57,7 +57,7 @@ static const pw_field gear_fields[] = {
   { PW_AT (pw_gear, ratio), PW_NUMBER, .required = 1,
     .about =
         "angular velocity of the first over that of the second, relative to the carrier; negative: opposite rotation" },
-  { PW_AT (pw_gear, from), PW_CHOICE, .choices = gear_from,
+  { PW_AT (pw_gear, from), PW_CHOICE, .choices = gear_from, .turn = PW_TURN_OFFSET,
     .about = "whether the offset follows from the initial angles or is given" },
   { PW_AT (pw_gear, offset), PW_NUMBER, .unit = "rad",
     .about = "with from: offset; angle of the first minus ratio times that of the second, relative to the carrier" },

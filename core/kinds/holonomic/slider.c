@@ -46,7 +46,7 @@ static const pw_field slider_fields[] = {
   { PW_AT (pw_slider, body), PW_BODY, .count = 2, .required = 1,
     .about = "the sliding body and the body with the line; one may be ground" },
   LINE_FIELDS (pw_slider),
-  { PW_AT (pw_slider, angle), PW_NUMBER, .unit = "rad",
+  { PW_AT (pw_slider, angle), PW_NUMBER, .unit = "rad", .turn = PW_TURN_ANGLE_1,
     .about = "phi1 - phi2, of the first body relative to the second" },
   { .name = NULL },
 };

@@ -62,7 +62,7 @@ static const pw_field weld_fields[] = {
   { PW_AT (pw_weld, body), PW_BODY, .count = 2, .required = 1, .about = "the two bodies; one may be ground" },
   { PW_AT (pw_weld, at), PW_POINT, .count = 2, .unit = "m", .required = 1,
     .about = "the common point in each body's frame" },
-  { PW_AT (pw_weld, angle), PW_NUMBER, .unit = "rad",
+  { PW_AT (pw_weld, angle), PW_NUMBER, .unit = "rad", .turn = PW_TURN_ANGLE_2,
     .about = "phi2 - phi1, of the second body relative to the first" },
   { .name = NULL },
 };

@@ -70,7 +70,7 @@ PER_ELEMENT (pfaffian_gamma_v, pfaffian, 6) {
 
 static const pw_field pfaffian_fields[] = {
   { PW_AT (pw_pfaffian, body), PW_BODY, .count = 2, .required = 1, .about = "the two bodies; one may be ground" },
-  { PW_AT (pw_pfaffian, a), PW_NUMBER, .count = 3, .required = 1,
+  { PW_AT (pw_pfaffian, a), PW_NUMBER, .count = 3, .required = 1, .turn = PW_TURN_AXES_1,
     .about = "coefficients of vx, vy and omega of the first body, in its frame" },
   { PW_AT (pw_pfaffian, b), PW_NUMBER, .count = 3,
     .about = "coefficients of vx, vy and omega of the second body, in the frame of the first" },
