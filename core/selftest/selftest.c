@@ -618,7 +618,7 @@ static void scene_all (probe *x) {
     scene_gradients (x, PROBE_Q);
     scene_gradients (x, PROBE_V);
   }
-  pw_hold_signals (x->workspace, 2); /* blocks exclude the dependence of signals on the state */
+  pw_hold_signals (x->workspace, PW_HOLD_ALL); /* blocks exclude the dependence of signals on the state */
   if (kind->rows > 0) {
     scene_block (x, PW_JW_Q, probe_Jw);
     scene_block (x, PW_ETA_Q, probe_eta);
@@ -627,7 +627,7 @@ static void scene_all (probe *x) {
   }
   scene_block (x, PW_FORCE_Q, probe_force);
   scene_block (x, PW_FORCE_V, probe_force);
-  pw_hold_signals (x->workspace, 0);
+  pw_hold_signals (x->workspace, PW_HOLD_NONE);
 }
 
 static int scene_randomise (probe *x, const double *q, const double *v, pw_random *r, pw_error *error) {

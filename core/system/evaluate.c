@@ -220,7 +220,7 @@ double pw_read_rate (const pw_workspace *w, int j, const double *v) {
 /* The rates of feedback signals, after all signals have been evaluated. */
 static void kinematics_feedback_rates (pw_workspace *w, const double *v) {
   for (const pw_source *source = w->source, *end = source + w->s->sources; source < end; source++) {
-    if (!source->feedback) continue;
+    if (!source->feedback || source->held) continue;
     double rate = source->u[2];
     for (int r = 0; r < source->reads; r++)
       rate += source->x[source->reads + r] * pw_read_rate (w, source->state[r], v);
@@ -233,17 +233,14 @@ int pw_update_signals (pw_workspace *w, double t, const double *q, const double 
   if (!new_time && w->s->state_dependent == 0) return PW_OK;
   if (new_time) w->t_signal = NAN; /* if a signal fails, others have changed already */
   for (pw_source *source = w->source, *end = source + w->s->sources; source < end; source++) {
-    if (w->hold && (source->of_force || w->hold == 2)) continue;
+    if (source->held) continue;
     if (kinematics_copy_states (w, source, q, v) == 0 && !(new_time && source->reads == 0)) continue;
-    if (pw_signal_eval (source, t) == 0) {
-      if (source->feedback) source->u[2] = source->u[1];
-      continue;
-    }
+    if (pw_signal_eval (source, t) == 0) continue;
     w->failed = source;
     return PW_METHOD;
   }
-  if (w->s->feedback && w->hold < 2) kinematics_feedback_rates (w, v);
-  if (new_time) w->t_signal = t;
+  if (w->s->feedback) kinematics_feedback_rates (w, v);
+  w->t_signal = t; /* unchanged unless the time is new */
   return PW_OK;
 }
 
@@ -260,7 +257,10 @@ int pw_update_velocities (pw_workspace *w, const double *v) {
   return w->s->state_dependent > 0 ? pw_update_signals (w, w->t_signal, NULL, v) : PW_OK;
 }
 
-void pw_hold_signals (pw_workspace *w, int hold) {
+void pw_hold_signals (pw_workspace *w, pw_hold hold) {
+  const pw_source *rates = pw_rate_source (w, w->s->mechanical);
+  for (pw_source *source = w->source, *end = source + w->s->sources; source < end; source++)
+    source->held = hold >= (source >= rates ? PW_HOLD_FORCES : source->of_force ? PW_HOLD_INPUTS : PW_HOLD_ALL);
   w->hold = hold;
   w->t_signal = NAN;
 }

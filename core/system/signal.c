@@ -161,6 +161,7 @@ static int signal_function (const pw_source *source, double t) {
   u[0] = NAN;
   int status = f->eval (f->context, t, source->x, u, source->gradient ? source->x + source->reads : NULL);
   if (status != 0) return status;
+  if (source->feedback) u[2] = u[1]; /* then u[1] becomes the rate along the motion */
   return !isfinite (u[0]) || (!source->of_force && !(isfinite (u[1]) && isfinite (u[2])));
 }
 

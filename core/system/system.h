@@ -18,6 +18,7 @@ typedef struct {
   double *spline;   /* of a table: see pw_table_spline */
   double *u;        /* 3: receives value, first and second time derivative; x, u: NULL except in a workspace */
   int of_force;     /* 1: belongs to a force, which needs no derivatives */
+  int held;         /* 1: keeps its value (pw_hold_signals) */
   int gradient;     /* 1: the gradient is needed: of feedback, and where implicit methods or linearisations need it */
   int feedback;     /* 1: belongs to a velocity constraint and reads states; u[2]: its partial derivative by the time */
 } pw_source;
@@ -73,6 +74,9 @@ struct pw_system {
   pw_entry *entry;         /* entries */
 };
 
+/* Signals that keep their values: none; those of forces, except rates of first-order states; rates too; all. */
+typedef enum { PW_HOLD_NONE, PW_HOLD_INPUTS, PW_HOLD_FORCES, PW_HOLD_ALL } pw_hold;
+
 /* What a run modifies (pinwheel.h). */
 struct pw_workspace {
   const pw_system *s;
@@ -83,7 +87,7 @@ struct pw_workspace {
   double *scratch;                 /* rows x 3 + coords + 3, for the function in progress */
   double *block;                   /* results of one function of one batch, until the next one is called */
   pw_scale scale;                  /* the run's */
-  int hold;                        /* 1: signals of forces keep their values, 2: all do (pw_hold_signals) */
+  pw_hold hold;                    /* signals that keep their values (pw_hold_signals) */
   double t_signal;                 /* time of the last evaluation of signals; NaN: evaluate them again */
   const pw_source *failed;         /* the last signal that failed, or NULL */
 };
@@ -178,9 +182,9 @@ int pw_update_signals (pw_workspace *w, double t, const double *q, const double 
 /* Points the batches to the internal coordinates in q, v; q NULL: only to their velocities. */
 void pw_point_to_internal (pw_workspace *w, const double *q, const double *v);
 
-/* 1: the signals of forces keep their values from now on, 2: all signals; 0: they follow time and states again.  Call
- * pw_update_kinematics before pw_update_velocities then. */
-void pw_hold_signals (pw_workspace *w, int hold);
+/* These signals keep their values from now on; the others follow time and states again.  Call pw_update_kinematics
+ * before pw_update_velocities then. */
+void pw_hold_signals (pw_workspace *w, pw_hold hold);
 
 /* ---- Evaluations; arrays over constraint equations have `rows` entries, f has `coords` + 3 ---- */
 

@@ -274,14 +274,14 @@ static int rk_stages (pw_run *r, double h) {
   int status = PW_OK;
   if (d->holds_signals) { /* since a sample or a rejected step, the workspace may be at another state */
     status = pw_update_kinematics (r->w, r->t, r->q, r->v);
-    pw_hold_signals (r->w, status == PW_OK);
+    pw_hold_signals (r->w, status == PW_OK ? PW_HOLD_INPUTS : PW_HOLD_NONE);
   }
   for (int i = 1; i < tableau->stages && status == PW_OK; i++) {
     rk_combine (r, d->q, d->stage_v[i], &d->row[i], h);
     double t = pw_before_breakpoint (r, r->t + tableau->c[i] * h);
     status = rk_evaluate_stage (r, t, d->stage_v[i], d->stage_a[i], d->stage_rate[i]);
   }
-  if (d->holds_signals) pw_hold_signals (r->w, 0);
+  if (d->holds_signals) pw_hold_signals (r->w, PW_HOLD_NONE);
   if (status != PW_OK) return status;
   rk_combine (r, d->q, d->v, &d->row[0], h);
   return pw_is_finite_state (r, d->q, d->v) ? PW_OK : PW_RETRY;

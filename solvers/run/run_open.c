@@ -234,7 +234,7 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   status = run_settings (&r->settings, settings, r->fixed_steps, error);
   if (status != PW_OK) return status;
   r->t = r->settings.t;
-  pw_hold_signals (r->w, 0);
+  pw_hold_signals (r->w, PW_HOLD_NONE);
   r->w->scale.time = r->settings.span; /* until the accelerations are known */
   status = run_check_stop (r, pw_run_make_consistent (r, r->origin, error));
   if (status == PW_OK) status = run_first_evaluation (r, error);
