@@ -775,9 +775,10 @@ enum { PW_NAME_BYTES = 160 }; /* size of buffers in which every name of a system
 char *pw_system_state_name (const pw_system *s, int state, char *buffer, size_t size);
 const char *pw_system_state_unit (const pw_system *s, int state);
 
-/* 1 for a coordinate that has no meaning and is in no table: the integral of a first-order state, whose own value is
- * the velocity with that index. */
-int pw_system_state_hidden (const pw_system *s, int state);
+/* The number of first-order states.  Each is the velocity of one of the last coordinates; that coordinate itself, the
+ * integral of the state, is hidden: it has no meaning and is in no table. */
+int pw_system_states (const pw_system *s);
+int pw_system_state_hidden (const pw_system *s, int state); /* 1 for such a coordinate */
 
 /* Name and unit of the reaction of a constraint equation ("B.Fx", "N"), as pw_system_state_name. */
 char *pw_system_reaction_name (const pw_system *s, int row, char *buffer, size_t size);

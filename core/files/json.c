@@ -92,10 +92,10 @@ static void json_bodies (pw_json *j, const pw_system *s, const pw_sample *x) {
 /* Internal coordinates "ELEMENT.NAME" and their velocities, one object per element. */
 static void json_elements (pw_json *j, const pw_system *s, const pw_sample *x) {
   char element[300] = "";
-  int n = pw_system_coordinates (s), first = 3 * pw_system_bodies (s);
-  if (n == first || pw_system_state_hidden (s, first)) return;
+  int n = pw_system_coordinates (s), first = 3 * pw_system_bodies (s), end = n - pw_system_states (s);
+  if (end == first) return;
   pw_json_open (j, "elements", '{');
-  for (int i = first; i < n && !pw_system_state_hidden (s, i); i++) {
+  for (int i = first; i < end; i++) {
     char *name = PW_NAME (pw_system_state_name, s, i), *dot = strrchr (name, '.');
     *dot = 0;
     if (strcmp (element, name) != 0) {
@@ -112,11 +112,10 @@ static void json_elements (pw_json *j, const pw_system *s, const pw_sample *x) {
 
 /* First-order states. */
 static void json_states (pw_json *j, const pw_system *s, const pw_sample *x) {
-  int n = pw_system_coordinates (s), first = n;
-  while (pw_system_state_hidden (s, first - 1)) first--;
-  if (first == n) return;
+  int n = pw_system_coordinates (s), states = pw_system_states (s);
+  if (states == 0) return;
   pw_json_open (j, "states", '{');
-  for (int i = first; i < n; i++) pw_json_number (j, PW_NAME (pw_system_state_name, s, n + i), x->v[i]);
+  for (int i = n - states; i < n; i++) pw_json_number (j, PW_NAME (pw_system_state_name, s, n + i), x->v[i]);
   pw_json_close (j, '}');
 }
 

@@ -157,6 +157,19 @@ static const char *find_variable (const reader *r, const char *text) {
   return NULL;
 }
 
+/* Reads a unique name that expressions can use. */
+static int read_name (const reader *r, const pw_node *node, const char *label, pw_names *names) {
+  const char *name;
+  if (read_text (r, node, label, &name) != PW_OK) return r->error->status;
+  if (!pw_expression_is_name (name))
+    return read_fail (r, node->at, "%s \"%.60s\": expected a letter, then letters, digits and _, at most 63 in all",
+                      label, name);
+  if (strcmp (name, "t") == 0 || pw_expression_is_reserved (name))
+    return read_fail (r, node->at, "%s \"%s\": this name is reserved: %s", label, name,
+                      *name == 't' && name[1] == 0 ? "it is the time" : "a function or constant");
+  return pw_names_add (names, name, 0) >= 0 ? read_fail (r, node->at, "a second %s \"%s\"", label, name) : PW_OK;
+}
+
 /* A number of a domain: an expression of the names in r->scope. */
 static int read_number (const reader *r, const pw_node *node, const char *label, pw_domain domain, double *value) {
   pw_expression_error error;
@@ -261,15 +274,21 @@ static int state_of_element (reader *r, const pw_node *node, const char *owner, 
                           owner, list, part);
 }
 
+/* The number of a body's state, 0 to 5 for x to omega, or -1. */
+static int state_of_body (const char *part) {
+  static const char *const parts[] = { "x", "y", "phi", "vx", "vy", "omega" };
+  int i = 0;
+  while (i < 6 && strcmp (parts[i], part) != 0) i++;
+  return i < 6 ? i : -1;
+}
+
 /* Checks that a name with a dot, or that of a first-order state, at an offset of the expression, names a state. */
 static int state_check (reader *r, const pw_node *node, const char *name, size_t at) {
-  static const char *const part[] = { "x", "y", "phi", "vx", "vy", "omega" };
   size_t n = strcspn (name, ".");
   if (name[n] == 0 && is_state (r, name)) return PW_OK;
   const char *owner = PW_PRINTED (100, "%.*s", (int)n, name);
   if (pw_names_find (&r->bodies, owner) < 0) return state_of_element (r, node, owner, name + n + 1, at);
-  for (int i = 0; i < 6; i++)
-    if (strcmp (part[i], name + n + 1) == 0) return PW_OK;
+  if (state_of_body (name + n + 1) >= 0) return PW_OK;
   return expression_fail (r, node, at + n + 1, "a body's states are x, y, phi, vx, vy and omega, not \"%.30s\"",
                           name + n + 1);
 }
@@ -279,8 +298,7 @@ static int is_velocity (const reader *r, const char *name) {
   const char *dot = strchr (name, '.'), *part = dot ? dot + 1 : "";
   const char *owner = PW_PRINTED (100, "%.*s", dot ? (int)(dot - name) : 0, name);
   if (dot == NULL) return 0;
-  if (pw_names_find (&r->bodies, owner) >= 0)
-    return strcmp (part, "vx") == 0 || strcmp (part, "vy") == 0 || strcmp (part, "omega") == 0;
+  if (pw_names_find (&r->bodies, owner) >= 0) return state_of_body (part) >= 3;
   const int kind = pw_names_find (&r->elements, owner);
   for (int i = 0; kind >= 0 && i < pw_kinds[kind]->internal; i++)
     if (strcmp (part, pw_kinds[kind]->coordinate[i].rate) == 0) return 1;
@@ -896,14 +914,9 @@ static int index_states (reader *r) {
     const pw_node *node = state_name (r, n);
     const char *name;
     if (node == NULL || build_name (r, node, "state", &name) != PW_OK) return r->error->status;
-    if (!pw_expression_is_name (name))
-      return read_fail (r, node->at, "state \"%.60s\": expected a letter, then letters, digits and _", name);
-    if (strcmp (name, "t") == 0 || pw_expression_is_reserved (name) || pw_names_find (&r->scope->index, name) >= 0)
-      return read_fail (r, node->at, "state \"%s\": this name is that of %s", name,
-                        strcmp (name, "t") == 0            ? "the time"
-                        : pw_expression_is_reserved (name) ? "a function or constant"
-                                                           : "a parameter or number of let");
-    pw_names_add (&r->states, name, 0);
+    if (read_name (r, node, "state", &r->states) != PW_OK) return r->error->status;
+    if (pw_names_find (&r->scope->index, name) >= 0)
+      return read_fail (r, node->at, "state \"%s\": a parameter or number of let has this name", name);
   }
   return r->error->status;
 }
@@ -1051,19 +1064,6 @@ static int read_unit (const reader *r, const pw_node *node, const pw_node *value
 
 /* ---- The head ---- */
 
-/* Reads a unique name that expressions can use. */
-static int head_name (const reader *r, const pw_node *node, const char *label, pw_names *names) {
-  const char *name;
-  if (read_text (r, node, label, &name) != PW_OK) return r->error->status;
-  if (!pw_expression_is_name (name))
-    return read_fail (r, node->at, "%s \"%.60s\": expected a letter, then letters, digits and _, at most 63 in all",
-                      label, name);
-  if (strcmp (name, "t") == 0 || pw_expression_is_reserved (name))
-    return read_fail (r, node->at, "%s \"%s\": this name is reserved: %s", label, name,
-                      *name == 't' && name[1] == 0 ? "it is the time" : "a function or constant");
-  return pw_names_add (names, name, 0) >= 0 ? read_fail (r, node->at, "a second %s \"%s\"", label, name) : PW_OK;
-}
-
 /* A default must not depend on other parameters: --set would have to change it, too. */
 static int head_default (const reader *r, const pw_node *node, const char *label, const pw_names *names,
                          pw_parameter *p) {
@@ -1083,7 +1083,7 @@ static int head_parameter (const reader *r, const pw_node *node, pw_names *names
   const pw_node *name = v[0], *value = v[1], *unit = v[2], *about = v[3], *domain = v[4], *min = v[5];
   int chosen = min ? PW_NONNEGATIVE : PW_REAL;
   if (name == NULL) return read_fail (r, node->at, "a parameter needs a name");
-  if (head_name (r, name, "parameter", names) != PW_OK) return r->error->status;
+  if (read_name (r, name, "parameter", names) != PW_OK) return r->error->status;
   p->name = name->text;
   p->unit = p->about = "";
   const char *label = PW_PRINTED (100, "parameter %s", p->name);
@@ -1139,7 +1139,7 @@ static int read_head (pw_yaml *y, const reader *r) {
   if (r->error->status == PW_OK && let && let->type != PW_YAML_MAP)
     read_fail (r, let->at, "let: expected a map {NAME: NUMBER, ...}, found %s", node_found (let));
   for (const pw_node *n = let ? let->first : NULL; n && r->error->status == PW_OK; n = n->next->next)
-    head_name (r, n, "name", &names);
+    read_name (r, n, "name", &names);
   pw_names_close (&names);
   return r->error->status;
 }

@@ -128,6 +128,10 @@ int pw_system_find_state (const pw_system *s, const char *name, pw_error *error)
                   name);
 }
 
+int pw_system_states (const pw_system *s) {
+  return s->coords - s->mechanical;
+}
+
 int pw_system_state_hidden (const pw_system *s, int state) {
   return pw_is_hidden (s, state);
 }

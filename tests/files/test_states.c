@@ -51,26 +51,49 @@ static const char follower[] = "pinwheel: 1\n"
                                "    a: [0, 0, 1]\n"
                                "    value: 4*(atan (cos (car.x)) - atan (car.y - 0.5 - sin (car.x)) - car.phi)\n";
 
-/* ---- Opening ---- */
+/* ---- Scenes ---- */
 
-static char path[64];
+typedef struct {
+  pw_file *file;
+  pw_model *model;
+  pw_system *s;
+  pw_error error;
+} scene;
 
-static void open_model (const char *text, pw_file **file, pw_model **model, pw_system **s, pw_error *error) {
+static scene scene_open (const char *text) {
   const char *build = getenv ("BUILD");
+  char path[64];
+  scene x = { 0 };
   snprintf (path, sizeof path, "%.30s/states_%d.yaml", build ? build : "build", (int)getpid ());
   FILE *f = fopen (path, "w");
   assert_non_null (f);
   fputs (text, f);
   fclose (f);
-  *file = pw_file_open (path, error), *model = *file ? pw_file_model (*file, error) : NULL, *s = NULL;
-  if (*model && pw_model_build (*model, error) == PW_OK) *s = pw_system_compile (*model, error);
+  x.file = pw_file_open (path, &x.error);
+  x.model = x.file ? pw_file_model (x.file, &x.error) : NULL;
+  if (x.model && pw_model_build (x.model, &x.error) == PW_OK) x.s = pw_system_compile (x.model, &x.error);
   remove (path);
+  check_ok (x.error.status, &x.error);
+  return x;
 }
 
-static void close_model (pw_file *file, pw_model *model, pw_system *s) {
-  pw_system_free (s);
-  pw_model_free (model);
-  pw_file_close (file);
+static void scene_close (scene *x) {
+  pw_system_free (x->s);
+  pw_model_free (x->model);
+  pw_file_close (x->file);
+}
+
+static pw_run *scene_run (scene *x, const char *method, const pw_settings *settings) {
+  pw_run *r = pw_run_open (x->s, method, settings, &x->error);
+  check_ok (x->error.status, &x->error);
+  return r;
+}
+
+static pw_sample scene_advance (scene *x, pw_run *r, double t) {
+  pw_sample sample;
+  while (pw_run_time (r) < t) check_ok (pw_run_advance (r, t, &x->error), &x->error);
+  check_ok (pw_run_sample (r, t, &sample, &x->error), &x->error);
+  return sample;
 }
 
 /* ---- Motions ---- */
@@ -81,28 +104,20 @@ typedef struct {
 } expected;
 
 static void compare (const char *text, const char *method, double t, const expected *list) {
-  pw_error error = { 0 };
-  pw_file *file;
-  pw_model *model;
-  pw_system *s;
-  pw_sample x;
-  const pw_settings settings = { .rtol = 1e-11, .span = t };
-  open_model (text, &file, &model, &s, &error);
-  check_ok (error.status, &error);
-  pw_run *r = pw_run_open (s, method, &settings, &error);
-  check_ok (error.status, &error);
-  while (pw_run_time (r) < t) check_ok (pw_run_advance (r, t, &error), &error);
-  check_ok (pw_run_sample (r, t, &x, &error), &error);
-  const int n = pw_system_coordinates (s);
+  scene x = scene_open (text);
+  pw_run *r = scene_run (&x, method, &(pw_settings){ .rtol = 1e-11, .span = t });
+  const pw_sample end = scene_advance (&x, r, t);
+  const int n = pw_system_coordinates (x.s);
   for (const expected *e = list; e->name; e++) {
-    const int state = pw_system_find_state (s, e->name, NULL);
-    const double value = state < 0   ? -x.lambda[pw_system_find_reaction (s, e->name, &error)]
-                         : state < n ? x.q[state]
-                                     : x.v[state - n];
-    check_close (check_text ("%s: %s", method, e->name), value, e->value, 1e-8, "ten times the error seen with bdf");
+    const int state = pw_system_find_state (x.s, e->name, NULL);
+    const double value = state < 0   ? -end.lambda[pw_system_find_reaction (x.s, e->name, &x.error)]
+                         : state < n ? end.q[state]
+                                     : end.v[state - n];
+    check_close (check_text ("%s: %s", method, e->name), value, e->value, 1e-8,
+                 "five times the largest error seen, 2.0e-9 of a reaction with bdf");
   }
   pw_run_close (r);
-  close_model (file, model, s);
+  scene_close (&x);
 }
 
 static const char *const methods[] = { "rk4+projection", "erk8", "bdf+projection", "ida+ggl", "radau", NULL };
@@ -133,90 +148,83 @@ TEST (wall_follower) {
 
 /* A straight drive at the speed V = 1, L = 1: y' = phi, phi' = delta, delta' = (-k y - phi - kr delta - delta)/tau. */
 TEST (linearisation) {
-  pw_error error = { 0 };
-  pw_file *file;
-  pw_model *model;
-  pw_system *s;
+  scene x = scene_open (lagging);
   pw_linear l;
-  open_model (lagging, &file, &model, &s, &error);
-  check_ok (error.status, &error);
   const pw_initial_value straight[] = { { 0, 0.4 }, { 1, 0 }, { 2, 0 } };
-  const pw_settings settings = { .initial = straight, .initials = 3 };
-  pw_run *r = pw_run_open (s, "rk4", &settings, &error);
-  check_ok (error.status, &error);
-  check_ok (pw_run_linearise (r, 100, &l, &error), &error);
-  assert_int_equal (l.unknowns, 4); /* y, phi, x and delta: not the integral of delta */
+  pw_run *r = scene_run (&x, "rk4", &(pw_settings){ .initial = straight, .initials = 3 });
+  check_ok (pw_run_linearise (r, 100, &l, &x.error), &x.error);
+  assert_int_equal (l.unknowns, 4); /* x, y, phi and delta: not the integral of delta */
   /* mu^3 + p mu^2 + q mu + c of the equations above */
   const double tau = 0.2, p = (1 + 0.3) / tau, q = 1 / tau, c = 0.5 / tau;
+  const char *reason = "forty times the error seen, round-off of mu^3 with |mu| = 5.7";
+  int tested = 0;
   for (int i = 0; i < l.unknowns; i++) {
     const double re = l.re[i], im = l.im[i];
-    if (hypot (re, im) < 1e-9) continue;
+    if (hypot (re, im) == 0) continue; /* x */
     const double re2 = re * re - im * im, im2 = 2 * re * im, re3 = re2 * re - im2 * im, im3 = re2 * im + im2 * re;
-    check_close ("real part", re3 + p * re2 + q * re + c, 0, 1e-8, "differences of the signal's gradient");
-    check_close ("imaginary part", im3 + p * im2 + q * im, 0, 1e-8, "differences of the signal's gradient");
+    check_close ("real part", re3 + p * re2 + q * re + c, 0, 1e-11, reason);
+    check_close ("imaginary part", im3 + p * im2 + q * im, 0, 1e-11, reason);
+    tested++;
   }
+  assert_int_equal (tested, 3);
   pw_linear_free (&l);
   pw_run_close (r);
-  close_model (file, model, s);
+  scene_close (&x);
 }
 
-/* ---- What is refused, and names ---- */
+/* ---- Names; held inputs; what is refused; checkpoints ---- */
 
 TEST (names) {
-  pw_error error = { 0 };
-  pw_file *file;
-  pw_model *model;
-  pw_system *s;
+  scene x = scene_open (sleigh);
   char text[PW_NAME_BYTES];
-  open_model (sleigh, &file, &model, &s, &error);
-  check_ok (error.status, &error);
-  const int n = pw_system_coordinates (s), z = pw_system_find_state (s, "z", &error);
+  const int n = pw_system_coordinates (x.s), z = pw_system_find_state (x.s, "z", &x.error);
+  assert_int_equal (pw_system_states (x.s), 1);
   assert_int_equal (z, 2 * n - 1);
-  assert_string_equal (pw_system_state_name (s, z, text, sizeof text), "z");
-  assert_string_equal (pw_system_state_unit (s, z), "rad");
-  assert_true (pw_system_state_hidden (s, n - 1));
-  assert_false (pw_system_state_hidden (s, z));
-  assert_true (pw_system_find_state (s, "z.integral", &error) < 0);
-  check_close ("kinetic energy without the state", pw_system_mass (s)[n - 1], 0, 0, "exact");
-  close_model (file, model, s);
+  assert_string_equal (pw_system_state_name (x.s, z, text, sizeof text), "z");
+  assert_string_equal (pw_system_state_unit (x.s, z), "rad");
+  assert_true (pw_system_state_hidden (x.s, n - 1));
+  assert_false (pw_system_state_hidden (x.s, z));
+  assert_true (pw_system_find_state (x.s, "z.integral", &x.error) < 0);
+  check_close ("kinetic energy without the state", pw_system_mass (x.s)[n - 1], 0, 0, "exact");
+  scene_close (&x);
+}
+
+/* Held inputs: forces keep their values in a step, rates of states do not.  For z' = cos 5t, rk4 is Simpson's rule,
+ * with an error of h^4/2880 times the fourth derivative of the rate, 5^4; held rates give 5e-3. */
+TEST (held_inputs) {
+  scene x = scene_open ("pinwheel: 1\n"
+                        "bodies: [{name: a, mass: 1, inertia: 1}]\n"
+                        "states: [{name: z, rate: cos (5*t)}]\n");
+  pw_run *r = scene_run (&x, "rk4+projection:inputs=held", &(pw_settings){ .step = 1e-2 });
+  const pw_sample end = scene_advance (&x, r, 1);
+  check_close ("z", end.v[pw_system_coordinates (x.s) - 1], sin (5) / 5, 1e-8 / 2880 * 625, "error of Simpson's rule");
+  pw_run_close (r);
+  scene_close (&x);
 }
 
 TEST (leapfrog_refuses) {
-  pw_error error = { 0 };
-  pw_file *file;
-  pw_model *model;
-  pw_system *s;
-  open_model (lagging, &file, &model, &s, &error);
-  assert_null (pw_run_open (s, "leapfrog", NULL, &error));
-  check_error (&error, PW_INPUT,
+  scene x = scene_open (lagging);
+  assert_null (pw_run_open (x.s, "leapfrog", NULL, &x.error));
+  check_error (&x.error, PW_INPUT,
                "leapfrog: the signal of a constraint depends on the first-order state delta; use galpha or rk4");
-  close_model (file, model, s);
+  scene_close (&x);
 }
 
 /* A loaded run continues bit for bit; the state is part of what is saved. */
 TEST (checkpoint) {
-  pw_error error = { 0 };
-  pw_file *file;
-  pw_model *model;
-  pw_system *s;
+  scene x = scene_open (lagging);
   pw_archive a = { 0 };
-  pw_sample x;
-  double end[2] = { 0 };
-  open_model (lagging, &file, &model, &s, &error);
-  pw_run *first = pw_run_open (s, "erk8", NULL, &error), *second = pw_run_open (s, "erk8", NULL, &error);
-  check_ok (error.status, &error);
-  while (pw_run_time (first) < 1) check_ok (pw_run_advance (first, 1, &error), &error);
-  check_ok (pw_run_save (first, &a, &error), &error);
+  double end[2];
+  pw_run *run[] = { scene_run (&x, "erk8", NULL), scene_run (&x, "erk8", NULL) };
+  scene_advance (&x, run[0], 1);
+  check_ok (pw_run_save (run[0], &a, &x.error), &x.error);
   a.size = a.used, a.used = 0, a.loading = 1;
-  check_ok (pw_run_load (second, &a, &error), &error);
+  check_ok (pw_run_load (run[1], &a, &x.error), &x.error);
   for (int i = 0; i < 2; i++) {
-    pw_run *r = i ? second : first;
-    while (pw_run_time (r) < 2) check_ok (pw_run_advance (r, 2, &error), &error);
-    check_ok (pw_run_sample (r, 2, &x, &error), &error);
-    end[i] = x.v[pw_system_coordinates (s) - 1];
-    pw_run_close (r);
+    end[i] = scene_advance (&x, run[i], 2).v[pw_system_coordinates (x.s) - 1];
+    pw_run_close (run[i]);
   }
   check_bits ("delta", &end[0], &end[1], 1);
   pw_archive_free (&a);
-  close_model (file, model, s);
+  scene_close (&x);
 }

@@ -600,4 +600,6 @@ def test_states():
     result = model.run("erk8", t_end=1, rtol=1e-12)
     assert abs(result["f"][-1] - (1 - 0.5 * math.exp(-1))) < 1e-10
     assert "f" in result.states and "f.integral" not in result.states
+    swept = model.sweep({"f": [0.0, 0.5]}, method="erk8", t_end=1, rtol=1e-12)
+    assert np.allclose(swept["block.vx"], [math.exp(-1), 0.5 + 0.5 * math.exp(-1)], rtol=0, atol=1e-10)
     assert abs(result["block.vx"][-1] - (1 - 0.5 * (1 - math.exp(-1)))) < 1e-10

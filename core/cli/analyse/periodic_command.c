@@ -228,9 +228,7 @@ static double periodic_rotation (const pw_system *s, const pw_periodic_orbit *o,
 }
 
 static int periodic_rotations (const pw_system *s) {
-  int end = pw_system_coordinates (s);
-  while (pw_system_state_hidden (s, end - 1)) end--;
-  return end - 2 * pw_system_bodies (s);
+  return pw_system_coordinates (s) - pw_system_states (s) - 2 * pw_system_bodies (s);
 }
 
 /* The name of what turns: a body, or a coordinate. */

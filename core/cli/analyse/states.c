@@ -42,10 +42,9 @@ void pw_states_print (const pw_system *s, const double *q, const double *v, int 
     }
   }
   if (bodies > STATES_BODIES) printf ("  and %d more bodies\n", bodies - STATES_BODIES);
-  for (int j = 3 * bodies, n = pw_system_coordinates (s); j < n; j++)
-    if (pw_system_state_hidden (s, j))
-      printf ("  %s = %s %s\n", PW_NAME (pw_system_state_name, s, n + j), PW_DIGITS (pw_rounded (v[j], least), digits),
-              pw_system_state_unit (s, n + j));
+  for (int n = pw_system_coordinates (s), j = n - pw_system_states (s); j < n; j++)
+    printf ("  %s = %s %s\n", PW_NAME (pw_system_state_name, s, n + j), PW_DIGITS (pw_rounded (v[j], least), digits),
+            pw_system_state_unit (s, n + j));
 }
 
 void pw_states_json (const pw_system *s, const double *q, const double *v, const char *key, pw_json *j) {

@@ -45,8 +45,7 @@ int pw_motion_known (const pw_motion *motion, int j) {
 void pw_motion_gaps (const pw_system *system, const pw_motion *reference, int least, char text[MOTION_GAPS]) {
   enum { LISTED = 3 }; /* coordinates, at most */
   char names[MOTION_GAPS - 80] = "", more[30] = "";
-  int n = pw_system_coordinates (system), known = 0;
-  while (pw_system_state_hidden (system, n - 1)) n--;
+  int n = pw_system_coordinates (system) - pw_system_states (system), known = 0;
   for (int j = 0; j < n; j++) {
     size_t used = strlen (names);
     if (pw_motion_known (reference, j) >= least && ++known <= LISTED)

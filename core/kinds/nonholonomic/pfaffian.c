@@ -74,7 +74,7 @@ static const pw_field pfaffian_fields[] = {
     .about = "coefficients of vx, vy and omega of the first body, in its frame" },
   { PW_AT (pw_pfaffian, b), PW_NUMBER, .count = 3,
     .about = "coefficients of vx, vy and omega of the second body, in the frame of the first" },
-  { PW_AT (pw_pfaffian, value), PW_SIGNAL, .about = "value of the sum as a function of time, with its derivative" },
+  { PW_AT (pw_pfaffian, value), PW_SIGNAL, .about = "value of the sum, a signal with its derivative" },
   { .name = NULL },
 };
 

@@ -23,14 +23,14 @@ static const pw_field speed_fields[] = {
   { PW_AT (pw_speed, at), PW_POINT, .unit = "m", .about = "the point in the body's frame" },
   { PW_AT (pw_speed, heading), PW_NUMBER, .unit = "rad", .about = "the direction in the body's frame; 0: along its x" },
   { PW_AT (pw_speed, value), PW_SIGNAL, .unit = "m/s", .required = 1,
-    .about = "velocity component as a function of time, with its derivative" },
+    .about = "velocity component, a signal with its derivative" },
   { .name = NULL },
 };
 
 const pw_kind pw_kind_speed = {
   .name = "speed",
   .symbol = "0 .6 0 0 2.2 0 0 1.7 .3 0 2.2 0 0 1.7 -.3",
-  .about = "the velocity component of a point along a direction fixed in its body follows a signal of time",
+  .about = "the velocity component of a point along a direction fixed in its body follows a signal",
   TYPE (speed, pw_speed, contact),
   .bodies = 1,
   .rows = 1,

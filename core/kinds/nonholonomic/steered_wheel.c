@@ -1,4 +1,4 @@
-/* steered-wheel: a knife edge whose heading in the body is a signal u of time.
+/* steered-wheel: a knife edge whose heading in the body is a signal u.
  *
  *   n . v_P = 0,  n = (-sin, cos)(phi + u)                        (1 nonholonomic equation)
  *   S     = [ -sin(theta)  cos(theta)  l ]      theta = phi + u;  l, h: arm of P along the heading, to its left
@@ -82,7 +82,7 @@ static const pw_field steered_fields[] = {
 
 const pw_kind pw_kind_steered_wheel = {
   .name = "steered-wheel",
-  .about = "a knife edge whose heading in the body follows a signal of time",
+  .about = "a knife edge whose heading in the body follows a signal",
   .symbol = "0 -1.6 -.2 0 1.6 -.2 0 1.6 .2 0 -1.6 .2 0 -1.6 -.2",
   TYPE (steered, pw_steered_wheel, steered),
   .bodies = 1,

@@ -112,7 +112,9 @@ def sweep(model, vary: dict, *, method: str | None = None, t_end: float | None =
     if not hasattr(pool, "submit"):
         raise lib.InputError(f"executor: expected a concurrent.futures.Executor, found {executor!r:.60}")
     try:
-        starts = {n for n in names if n not in model.parameters and "." in n}
+        system = model._compile()[0].pointer
+        starts = {n for n in names if n not in model.parameters
+                  and ("." in n or lib.core.pw_system_find_state(system, n.encode(), None) >= 0)}
         pending = [pool.submit(_final, model, {n: x for n, x in p.items() if n not in starts},
                                {n: x for n, x in p.items() if n in starts}, method, t_end, settings, error, *watch)
                    for p in points]
