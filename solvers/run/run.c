@@ -643,7 +643,7 @@ int pw_run_saturation (pw_run *r, double *least, char *element, size_t size) {
   double *at_rest = r->scratch;
   for (int j = 0; j < r->s->coords; j++) at_rest[j] = 0;
   (void)pw_update_kinematics (r->w, r->t, r->q, r->v); /* since a sample, the workspace may be at another state */
-  pw_hold_signals (r->w, PW_HOLD_FORCES);                           /* a signal that reads velocities may have no value at rest */
+  pw_hold_signals (r->w, PW_HOLD_FORCES);              /* a signal that reads velocities may have no value at rest */
   (void)pw_update_kinematics (r->w, r->t, r->q, at_rest);
   int state = pw_find_saturation (r->w, least, element, size);
   pw_hold_signals (r->w, PW_HOLD_NONE);
