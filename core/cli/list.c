@@ -174,7 +174,7 @@ static void list_kind (const void *entry) {
   if (k->signals)
     printf ("    a signal: a number, an expression of t%s, or a form of `pinwheel list signals`\n",
             pw_kind_signals_force (k)      ? " and of states such as BODY.phi"
-            : pw_kind_signals_feedback (k) ? ", of positions such as BODY.phi and of first-order states"
+            : pw_kind_signals_feedback (k) ? ", of positions and first-order states"
                                            : "");
   list_quantities ("reactions", k->reaction, k->rows);
   if (k != &pw_kind_state) list_quantities ("internal coordinates, and their velocities", k->coordinate, k->internal);

@@ -170,6 +170,19 @@ static int read_name (const reader *r, const pw_node *node, const char *label, p
   return pw_names_add (names, name, 0) >= 0 ? read_fail (r, node->at, "a second %s \"%s\"", label, name) : PW_OK;
 }
 
+/* Replaces the text of an error at an unknown name by the suggestion of a first-order state, if its name is near and the
+ * parser suggests nothing. */
+static void suggest_state (const reader *r, const char *text, pw_expression_error *error) {
+  char name[PW_EXPRESSION_NAME];
+  const char *rest = text + error->at;
+  if (strncmp (error->text, "there is no \"", 13) != 0 || strstr (error->text, "did you mean")) return;
+  if (pw_expression_next_name (&rest, name) != text + error->at) return;
+  pw_nearest near = { .sought = name };
+  for (const struct pw_name *e = r->states.slot, *end = e + r->states.size; e < end; e++)
+    if (e->name) pw_nearest_try (&near, e->name);
+  if (near.near) snprintf (error->text, sizeof error->text, "there is no \"%.60s\"%s", name, pw_nearest_text (&near));
+}
+
 /* A number of a domain: an expression of the names in r->scope. */
 static int read_number (const reader *r, const pw_node *node, const char *label, pw_domain domain, double *value) {
   pw_expression_error error;
@@ -178,6 +191,7 @@ static int read_number (const reader *r, const pw_node *node, const char *label,
     return read_fail (r, node->at, "%s: expected a number, found %s", label, node_found (node));
   int status = pw_expression_constant (r->scope, node->text, value, &error);
   if (status == PW_RESOURCE) return read_no_memory (r);
+  if (status == PW_INPUT) suggest_state (r, node->text, &error);
   if (status != PW_OK)
     return read_fail (r, source_offset (r->y, node, error.at), "%s: %s", label,
                       find_variable (r, node->text) == node->text + error.at
@@ -232,6 +246,7 @@ static int read_expression (reader *r, const pw_node *node, const char *const *v
   pw_expression_error error;
   if (read_text (r, node, r->label, text) != PW_OK) return r->error->status;
   int status = pw_expression_read (r->scope, variable, *text, r->arena, expression, &error);
+  if (status == PW_INPUT) suggest_state (r, *text, &error);
   if (status == PW_INPUT) return expression_fail (r, node, error.at, "%s", error.text);
   if (status != PW_OK) return read_no_memory (r);
   if ((r->operations += (*expression)->codes) <= MAX_OPERATIONS) return PW_OK;
