@@ -585,10 +585,11 @@ struct pw_kind {
   int bodies;             /* bodies of an element: those that its fields of type PW_BODY name, or 1 if each_body */
   int internal;           /* internal coordinates */
   int rows;               /* constraint equations */
-  int signals;    /* in the order of the fields; they belong to its force if force_u is set, else to its constraints */
-  int each_body;  /* 1: names no body, acts on every body with mass; its outputs are "air.frame.N" */
-  int constant;   /* 1: its force is constant and evaluated once, when the system is compiled */
-  pw_level level; /* of its constraint equations */
+  int signals;     /* in the order of the fields; they belong to its force if force_u is set, else to its constraints */
+  int each_body;   /* 1: names no body, acts on every body with mass; its outputs are "air.frame.N" */
+  int constant;    /* 1: its force is constant and evaluated once, when the system is compiled */
+  pw_level level;  /* of its constraint equations */
+  int first_order; /* 1: the velocities of its internal coordinates are first-order states, which have no energy */
   const pw_quantity *reaction;                                 /* rows: meaning of each -lambda */
   const pw_quantity *coordinate;                               /* internal: the internal coordinates, in "rad" */
   const char *(*reaction_unit) (const void *element, int row); /* if it depends on the element; may be NULL */

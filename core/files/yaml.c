@@ -170,8 +170,8 @@ static int read_name (const reader *r, const pw_node *node, const char *label, p
   return pw_names_add (names, name, 0) >= 0 ? read_fail (r, node->at, "a second %s \"%s\"", label, name) : PW_OK;
 }
 
-/* Replaces the text of an error at an unknown name by the suggestion of a first-order state, if its name is near and the
- * parser suggests nothing. */
+/* Replaces the text of an error at an unknown name by the suggestion of a first-order state, if its name is near and
+ * the parser suggests nothing. */
 static void suggest_state (const reader *r, const char *text, pw_expression_error *error) {
   char name[PW_EXPRESSION_NAME];
   const char *rest = text + error->at;

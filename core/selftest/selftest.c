@@ -488,7 +488,7 @@ static void selftest_all (probe *x) {
   selftest_blocks (x);
   selftest_at_speed (x, 1e-310, selftest_rest);
   if (x->kind->force && !x->kind->constant) selftest_at_speed (x, 0, selftest_saturation);
-  if (x->kind != &pw_kind_state) selftest_power (x); /* a state has no energy */
+  if (!x->kind->first_order) selftest_power (x);
   probe_evaluate (x, x->kind->contact, "contact", 3 * x->elements, out);
 }
 

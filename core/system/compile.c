@@ -99,7 +99,7 @@ static int compile_types (compilation *job) {
       const pw_kind *kind = m->element[i].kind;
       int k = 0;
       while (k < s->batches && s->batch[k].kind != kind) k++;
-      if (kind->level != order[l] || k < s->batches || (kind == &pw_kind_state && l < 3)) continue;
+      if (kind->level != order[l] || k < s->batches || (kind->first_order && l < 3)) continue;
       if (pw_grow (&s->batch, (size_t)k, &room, sizeof *s->batch) != PW_OK) return compile_no_memory (job);
       s->batch[s->batches++] = (pw_element_batch){ .kind = kind };
       int status = compile_list (job, &m->element[i], &s->batch[k]);
@@ -120,7 +120,7 @@ static int compile_sizes (const compilation *job) {
     k->b.cols = 3 * kind->bodies + kind->internal;
     k->row = s->rows;
     k->internal = s->coords;
-    if (kind != &pw_kind_state) s->mechanical = s->coords + k->b.count * kind->internal;
+    if (!kind->first_order) s->mechanical = s->coords + k->b.count * kind->internal;
     s->coords += k->b.count * kind->internal;
     s->rows += k->b.count * kind->rows;
     if (kind->level == PW_HOLONOMIC) s->holonomic = s->rows; /* these batches come first */

@@ -95,6 +95,7 @@ LAYOUT_AT (pw_kind, signals, 52);
 LAYOUT_AT (pw_kind, each_body, 56);
 LAYOUT_AT (pw_kind, constant, 60);
 LAYOUT_AT (pw_kind, level, 64);
+LAYOUT_AT (pw_kind, first_order, 68);
 LAYOUT_AT (pw_kind, reaction, 72);
 LAYOUT_AT (pw_kind, coordinate, 80);
 LAYOUT_AT (pw_kind, reaction_unit, 88);

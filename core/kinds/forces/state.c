@@ -39,6 +39,7 @@ const pw_kind pw_kind_state = {
   .fields = state_fields,
   .prepare = state_prepare,
   .internal = 1,
+  .first_order = 1,
   .signals = 1,
   .coordinate = state_coordinate,
   .force = state_force,
