@@ -22,12 +22,16 @@ enum { PW_EXPRESSION_TIME = 0 };
 
 /* ---- Reading ---- */
 
-/* Named numbers. */
+/* Named numbers, and names that stand for expressions of variables. */
 typedef struct {
   int names;
   const char **name; /* names */
   double *value;     /* names */
   pw_names index;    /* the index of each name */
+  /* The text of the expression that a name stands for, which is read in place of the name, or NULL.  Variables have
+   * precedence.  May be NULL. */
+  const char *(*expand) (void *context, const char *name);
+  void *context;
 } pw_scope;
 
 /* Opens a scope, which must be { 0 }, with room for `room` names, in an arena.  PW_OK or PW_RESOURCE. */

@@ -32,13 +32,17 @@ typedef struct {
   pw_names bodies;              /* names of bodies so far */
   pw_names states;              /* names of all first-order states */
   pw_names names;               /* of bodies and elements so far, to their offsets in the source */
-  pw_names elements;     /* names of all elements, to the index of their types; made when an expression needs it */
-  const pw_kind *kind;   /* of the element being read */
-  const pw_field *field; /* of it */
-  const char *label;     /* of that field, for messages */
-  char *definition;      /* of the element, with all preceding fields */
-  double points;         /* of all tables so far */
-  double operations;     /* of all expressions so far */
+  pw_names elements; /* names of all elements, to the index of their types; made when an expression needs it */
+  pw_names contacts; /* names of wheels and markers so far, to the index of their elements */
+  struct output_function *output; /* the outputs of the model */
+  pw_names outputs;               /* their names, to their indices */
+  int numbers;                    /* names of the scope that stand for numbers; those of outputs follow */
+  const pw_kind *kind;            /* of the element being read */
+  const pw_field *field;          /* of it */
+  const char *label;              /* of that field, for messages */
+  char *definition;               /* of the element, with all preceding fields */
+  double points;                  /* of all tables so far */
+  double operations;              /* of all expressions so far */
 } reader;
 
 #define read_fail(r, at, ...) pw_yaml_fail ((r)->y, (r)->error, at, __VA_ARGS__)
@@ -103,7 +107,7 @@ static int read_keys_from (const reader *r, const pw_node *first, const char *co
 static int read_keys (const reader *r, const pw_node *map, const char *const *key, const char *owner,
                       const pw_node **value) {
   if (map && map->type != PW_YAML_MAP) {
-    char form[160] = "{";
+    char form[300] = "{";
     for (int i = 0; key[i]; i++) append (form, "%s: ..%s", key[i], key[i + 1] ? ", " : "}");
     read_fail (r, map->at, "expected a map %s for %s, found %s", form, owner, node_found (map));
     map = NULL;
@@ -181,6 +185,14 @@ static void suggest_state (const reader *r, const char *text, pw_expression_erro
   for (const struct pw_name *e = r->states.slot, *end = e + r->states.size; e < end; e++)
     if (e->name) pw_nearest_try (&near, e->name);
   if (near.near) snprintf (error->text, sizeof error->text, "there is no \"%.60s\"%s", name, pw_nearest_text (&near));
+}
+
+/* 1 if the value of an expression changes during the motion. */
+static int read_varies (const reader *r, const char *text) {
+  char name[PW_EXPRESSION_NAME];
+  for (const char *rest = text; pw_expression_next_name (&rest, name) != NULL;)
+    if (r->outputs.slot && pw_names_find (&r->outputs, name) >= 0) return 1;
+  return find_variable (r, text) != NULL;
 }
 
 /* A number of a domain: an expression of the names in r->scope. */
@@ -327,10 +339,10 @@ static int is_velocity (const reader *r, const char *name) {
 enum { MAX_SIGNAL_STATES = 16, MAX_CHECKED_BREAKPOINTS = 100 };
 
 typedef struct {
-  const pw_expression *expression[3];      /* value, rate, acceleration; NULL: not given, differentiated instead */
-  int derivatives;                         /* required time derivatives; of a force: 0, nonholonomic: 1, holonomic: 2 */
-  int states;                              /* number of states in it */
-  const char *name[MAX_SIGNAL_STATES + 2]; /* "t", then states, "BODY.phi"; not for evaluation */
+  const pw_expression *expression[3];    /* value, rate, acceleration; NULL: not given, differentiated instead */
+  int derivatives;                       /* required time derivatives; of a force: 0, nonholonomic: 1, holonomic: 2 */
+  int states;                            /* number of states in it */
+  const char *name[PW_OUTPUT_READS + 2]; /* "t", then states, "BODY.phi"; not for evaluation */
   pw_signal_text text;
 } signal_function;
 
@@ -349,7 +361,7 @@ static void signal_derivatives (const signal_function *f, const double *variable
 
 static int signal_eval (void *context, double t, const double *state, double value[3], double *gradient) {
   const signal_function *f = context;
-  double variable[MAX_SIGNAL_STATES + 1] = { t }, derivatives[3];
+  double variable[PW_OUTPUT_READS + 1] = { t }, derivatives[3];
   if (f->states) memcpy (variable + 1, state, (size_t)f->states * sizeof *state);
   if (f->derivatives)
     signal_derivatives (f, variable, value);
@@ -405,12 +417,88 @@ static int signal_add_state (reader *r, const pw_node *node, signal_function *f,
   return f->name[++f->states] ? PW_OK : read_no_memory (r);
 }
 
+/* Finds the column of tables that a name in an expression names, also of an element that follows; its index is not set.
+ * 0: there is none. */
+static int find_column (reader *r, const char *name, pw_column *c) {
+  const char *dot = strchr (name, '.'), *last = strrchr (name, '.');
+  if (dot == NULL && is_state (r, name)) return *c = (pw_column){ PW_COLUMN_STATE, 0 }, 1;
+  if (dot == NULL) return pw_kind_find_column (NULL, name, c);
+  const char *owner = PW_PRINTED (PW_EXPRESSION_NAME, "%.*s", (int)(dot - name), name);
+  const char *body = last == dot ? NULL : PW_PRINTED (PW_EXPRESSION_NAME, "%.*s", (int)(last - dot) - 1, dot + 1);
+  if (body == NULL && pw_names_find (&r->bodies, owner) >= 0 && state_of_body (last + 1) >= 0)
+    return *c = (pw_column){ PW_COLUMN_STATE, 0 }, 1;
+  int kind = state_elements (r) == PW_OK ? pw_names_find (&r->elements, owner) : -1;
+  if (kind < 0 || pw_kinds[kind]->each_body != (body != NULL)) return 0;
+  return (body == NULL || pw_names_find (&r->bodies, body) >= 0) && pw_kind_find_column (pw_kinds[kind], last + 1, c);
+}
+
+/* An output.  In a signal its expression stands for it, so that derivatives and breakpoints are those of the signal. */
+typedef struct output_function {
+  signal_function function; /* its states are columns */
+  const pw_node *node;      /* its value */
+  pw_named_output output;
+  int reader; /* the output that is being read and reads this one, or itself if it is the first; OUTPUT_... */
+} output_function;
+
+enum { OUTPUT_UNREAD = -1, OUTPUT_READ = -2 };
+
+/* The place of a wheel or marker that precedes, "rear.x", as an expression of states; NULL: the name is another one, or
+ * out of memory. */
+static const char *contact_text (reader *r, const char *name) {
+  const char *dot = strchr (name, '.');
+  int elements,
+      found = dot ? pw_names_find (&r->contacts, PW_PRINTED (PW_EXPRESSION_NAME, "%.*s", (int)(dot - name), name)) : -1;
+  if (found < 0 || (strcmp (dot, ".x") != 0 && strcmp (dot, ".y") != 0)) return NULL;
+  const pw_element *e = pw_model_elements (r->model, &elements) + found;
+  const double *at = pw_field_at (e->kind, e->definition, PW_POINT, 0);
+  const char *body = *(const char *const *)pw_field_at (e->kind, e->definition, PW_BODY, 0);
+  if (!pw_expression_is_name (body)) return NULL;
+  const char *format = dot[1] == 'x' ? "(%s.x + (%.17g)*cos (%s.phi) - (%.17g)*sin (%s.phi))"
+                                     : "(%s.y + (%.17g)*sin (%s.phi) + (%.17g)*cos (%s.phi))";
+  return pw_arena_copy (r->arena, PW_PRINTED (400, format, body, at[0], body, at[1], body));
+}
+
+/* pw_scope.expand */
+static const char *expand_name (void *context, const char *name) {
+  reader *r = context;
+  int output = pw_names_find (&r->outputs, name);
+  return output >= 0 ? r->output[output].node->text : contact_text (r, name);
+}
+
+/* Adds the states on which a column depends, at an offset of the expression; output: the one that reads it, or NULL. */
+static int signal_add_column (reader *r, const pw_node *node, signal_function *f, const output_function *output,
+                              const char *name, size_t at) {
+  char state[PW_EXPRESSION_NAME];
+  const char *place = contact_text (r, name), *owner = PW_PRINTED (100, "%.*s", (int)strcspn (name, "."), name);
+  const char *where = output ? PW_PRINTED (100, "output \"%s\" reads %s: ", output->output.name, name) : "";
+  pw_column c;
+  for (const char *rest = place ? place : ""; pw_expression_next_name (&rest, state) != NULL;)
+    if (strchr (state, '.') && signal_add_state (r, node, f, state, at) != PW_OK) return r->error->status;
+  if (place) return PW_OK;
+  const int found = find_column (r, name, &c);
+  if (found && c.type == PW_COLUMN_CONTACT && pw_names_find (&r->contacts, owner) >= 0)
+    return expression_fail (r, node, at, "%sthe name of its body cannot be used in expressions", where);
+  if (found && c.type == PW_COLUMN_CONTACT)
+    return expression_fail (r, node, at, "%sdescribe %s before the signals that read its place", where, owner);
+  if (found && c.type != PW_COLUMN_STATE && output)
+    return expression_fail (r, node, at,
+                            "%sa signal cannot depend on reactions, energies and work, which follow from it", where);
+  if (found || output == NULL) return signal_add_state (r, node, f, name, at);
+  return expression_fail (r, node, at, "%sthere is no such column", where);
+}
+
 static int signal_expression (reader *r, const pw_node *node, signal_function *f, int i) {
   const char *source = node->type == PW_YAML_SCALAR ? node->text : "";
   char name[PW_EXPRESSION_NAME];
-  for (const char *rest = source, *p; (p = pw_expression_next_name (&rest, name)) != NULL;)
-    if (is_state (r, name) && signal_add_state (r, node, f, name, (size_t)(p - source)) != PW_OK)
+  for (const char *rest = source, *p; (p = pw_expression_next_name (&rest, name)) != NULL;) {
+    const int found = pw_names_find (&r->outputs, name);
+    const output_function *output = found < 0 ? NULL : &r->output[found];
+    if (!output && is_state (r, name) && signal_add_column (r, node, f, NULL, name, (size_t)(p - source)) != PW_OK)
       return r->error->status;
+    for (int k = 1; output && k <= output->function.states; k++)
+      if (signal_add_column (r, node, f, output, output->function.name[k], (size_t)(p - source)) != PW_OK)
+        return r->error->status;
+  }
   if (read_expression (r, node, f->name, &f->text.part[i], &f->expression[i]) != PW_OK) return r->error->status;
   const pw_expression *expression = f->expression[i];
   if (expression->jump == NULL || f->text.jump) return PW_OK;
@@ -685,7 +773,7 @@ static int signal_map (reader *r, const pw_node *node, pw_signal *signal) {
 
 static int read_signal (reader *r, const pw_node *node, pw_signal *signal) {
   if (node->type == PW_YAML_MAP) return signal_map (r, node, signal);
-  if (node->type == PW_YAML_SCALAR && find_variable (r, node->text))
+  if (node->type == PW_YAML_SCALAR && read_varies (r, node->text))
     return signal_of_time (r, (const pw_node *const[3]){ node, NULL, NULL }, signal);
   return read_number (r, node, r->label, PW_REAL, &signal->constant);
 }
@@ -721,7 +809,7 @@ static int read_reference (reader *r) {
   pw_reference_text *t = r->reference;
   pw_names seen = { .size = 0 };
   if (map || r->operations > 0) /* expressions may use names, whose values `show` writes */
-    t->names = r->scope->names, t->name = r->scope->name, t->value = r->scope->value;
+    t->names = r->numbers, t->name = r->scope->name, t->value = r->scope->value;
   if (map == NULL) return r->error->status;
   if (map->type != PW_YAML_MAP)
     return read_fail (r, map->at, "truth: expected a map {STATE: EXPRESSION, ...}, found %s", node_found (map));
@@ -885,7 +973,7 @@ static int build_fields (reader *r, const pw_node *at, const pw_node *name, cons
   const pw_node *v[MAX_KEYS];
   const pw_kind *kind = r->kind;
   pw_error cause = { 0 };
-  int n = 0;
+  int n = 0, index;
   memset (r->definition, 0, kind->definition);
   memcpy (r->definition, &name->text, sizeof name->text);
   for (const pw_field *f = kind->fields; f->name && n < MAX_KEYS - 2; f++) key[n++] = f->name;
@@ -901,6 +989,8 @@ static int build_fields (reader *r, const pw_node *at, const pw_node *name, cons
   if (r->error->status != PW_OK) return r->error->status;
   pw_element e = { kind, r->definition };
   if (pw_model_check_element (r->model, &e, &cause) != PW_OK) return build_fail (r, name, &cause);
+  pw_model_elements (r->model, &index);
+  if (kind->contact && !kind->each_body) pw_names_add (&r->contacts, name->text, index);
   return pw_add (r->model, kind, r->definition);
 }
 
@@ -910,98 +1000,6 @@ static int build_element (reader *r, const pw_node *node) {
   const pw_node *first = node->first;
   if (build_name (r, first->next, r->kind->name, &name) != PW_OK) return r->error->status;
   return build_fields (r, first, first->next, first->next->next);
-}
-
-/* ---- First-order states: a list of {name, rate, start, unit} ---- */
-
-/* The node of a state's name, or NULL after an error. */
-static const pw_node *state_name (const reader *r, const pw_node *node) {
-  if (node->type != PW_YAML_MAP)
-    return read_fail (r, node->at, "expected a state {name: NAME, rate: ..}, found %s", node_found (node)), NULL;
-  for (const pw_node *n = node->first; n; n = n->next->next)
-    if (node_is (n, "name")) return n->next;
-  return read_fail (r, node->at, "a state needs a name"), NULL;
-}
-
-/* Indexes the names of all states, which signals of any element may read; expressions can use them. */
-static int index_states (reader *r) {
-  for (const pw_node *n = r->y->states ? r->y->states->first : NULL; n && r->error->status == PW_OK; n = n->next) {
-    const pw_node *node = state_name (r, n);
-    const char *name;
-    if (node == NULL || build_name (r, node, "state", &name) != PW_OK) return r->error->status;
-    if (read_name (r, node, "state", &r->states) != PW_OK) return r->error->status;
-    if (pw_names_find (&r->scope->index, name) >= 0)
-      return read_fail (r, node->at, "state \"%s\": a parameter or number of let has this name", name);
-  }
-  return r->error->status;
-}
-
-static int build_state (reader *r, const pw_node *node) {
-  const pw_node *name = state_name (r, node);
-  r->kind = &pw_kind_state;
-  return build_fields (r, name, name, node->first);
-}
-
-/* ---- The model ---- */
-
-static int build_all (reader *r, const double *parameter) {
-  const pw_yaml *y = r->y;
-  double value;
-  for (int i = 0; i < y->parameter_count; i++) pw_scope_add (r->scope, y->table.parameters[i].name, parameter[i]);
-  for (const pw_node *n = y->let ? y->let->first : NULL; n; n = n->next->next) {
-    if (read_number (r, n->next, PW_PRINTED (100, "let %s", n->text), PW_REAL, &value) != PW_OK)
-      return r->error->status;
-    pw_scope_add (r->scope, n->text, value);
-  }
-  if (index_states (r) != PW_OK) return r->error->status;
-  for (const pw_node *n = y->bodies ? y->bodies->first : NULL; n; n = n->next)
-    if (build_body (r, n) != PW_OK) return r->error->status;
-  for (const pw_node *n = y->elements ? y->elements->first : NULL; n; n = n->next)
-    if (build_element (r, n) != PW_OK) return r->error->status;
-  for (const pw_node *n = y->states ? y->states->first : NULL; n; n = n->next)
-    if (build_state (r, n) != PW_OK) return r->error->status;
-  return read_reference (r);
-}
-
-static void build_free (void *arena) {
-  pw_arena_free (arena);
-  free (arena);
-}
-
-/* Allocates the memory for building, and the arena for what lives as long as the model. */
-static int build_open (reader *r) {
-  const pw_yaml *y = r->y;
-  size_t largest = 1, bodies = y->bodies ? (size_t)y->bodies->count : 0, lets = y->let ? (size_t)y->let->count : 0;
-  size_t states = y->states ? (size_t)y->states->count : 0;
-  size_t all = bodies + states + (y->elements ? (size_t)y->elements->count : 0);
-  for (const pw_kind *const *k = pw_kinds; *k; k++)
-    if ((*k)->definition > largest) largest = (*k)->definition;
-  r->arena = calloc (1, sizeof *r->arena);
-  if (r->arena == NULL || pw_model_keep (r->model, r->arena, build_free) != PW_OK) return read_no_memory (r);
-  r->reference = pw_arena_alloc (r->arena, sizeof *r->reference);
-  pw_model_set_reference (r->model, r->reference);
-  r->definition = malloc (largest);
-  if (r->reference && r->definition && pw_scope_open (r->scope, y->parameter_count + (int)lets, r->arena) == PW_OK &&
-      pw_names_open (&r->bodies, bodies) == PW_OK && pw_names_open (&r->states, states) == PW_OK &&
-      pw_names_open (&r->names, all) == PW_OK)
-    return PW_OK;
-  return read_no_memory (r);
-}
-
-/* The build function; the parameters are numbers in the order of the table. */
-static void build_model (pw_model *m, const void *parameters) {
-  const void *table = pw_model_table (m);
-  pw_scope scope = { 0 };
-  reader r = { .y = table, .model = m, .scope = &scope, .error = pw_model_error (m) };
-  read_list (&r, r.y->bodies, "bodies");
-  read_list (&r, r.y->states, "states");
-  if (read_list (&r, r.y->elements, "elements") == PW_OK && build_open (&r) == PW_OK) build_all (&r, parameters);
-  pw_scope_close (&scope);
-  pw_names_close (&r.bodies);
-  pw_names_close (&r.states);
-  pw_names_close (&r.names);
-  pw_names_close (&r.elements);
-  free (r.definition);
 }
 
 /* ---- Units of parameters, which must be SI units: 40 with the unit deg would mean 40 rad ---- */
@@ -1077,6 +1075,251 @@ static int read_unit (const reader *r, const pw_node *node, const pw_node *value
   return unit_refuse (r, node, value, other, *unit);
 }
 
+/* ---- First-order states: a list of {name, rate, start, unit} ---- */
+
+/* The node of a state's name, or NULL after an error. */
+static const pw_node *state_name (const reader *r, const pw_node *node) {
+  if (node->type != PW_YAML_MAP)
+    return read_fail (r, node->at, "expected a state {name: NAME, rate: ..}, found %s", node_found (node)), NULL;
+  for (const pw_node *n = node->first; n; n = n->next->next)
+    if (node_is (n, "name")) return n->next;
+  return read_fail (r, node->at, "a state needs a name"), NULL;
+}
+
+/* Indexes the names of all states, which signals of any element may read; expressions can use them. */
+static int index_states (reader *r) {
+  for (const pw_node *n = r->y->states ? r->y->states->first : NULL; n && r->error->status == PW_OK; n = n->next) {
+    const pw_node *node = state_name (r, n);
+    const char *name;
+    if (node == NULL || build_name (r, node, "state", &name) != PW_OK) return r->error->status;
+    if (read_name (r, node, "state", &r->states) != PW_OK) return r->error->status;
+    if (pw_names_find (&r->scope->index, name) >= 0)
+      return read_fail (r, node->at, "state \"%s\": a parameter or number of let has this name", name);
+  }
+  return r->error->status;
+}
+
+static int build_state (reader *r, const pw_node *node) {
+  const pw_node *name = state_name (r, node);
+  r->kind = &pw_kind_state;
+  return build_fields (r, name, name, node->first);
+}
+
+/* ---- Outputs ---- */
+
+/* Outputs are displayed in SI units, like all columns. */
+static int output_unit (const reader *r, const pw_node *node, const char **unit) {
+  const char *at;
+  if (read_text (r, node, "unit", unit) != PW_OK || node == NULL) return r->error->status;
+  const pw_unit_name *other = unit_other (*unit, &at);
+  if (other == NULL) return PW_OK;
+  return read_fail (r, node->at, "unit: \"%s\": outputs are in SI units and radians, as all columns", other->name);
+}
+
+/* Reads the name and the texts of an output. */
+static int output_head (reader *r, const pw_node *node, output_function *o) {
+  static const char *const key[] = { "name", "value", "unit", "about", NULL };
+  const pw_node *v[sizeof key / sizeof *key];
+  pw_column column;
+  if (read_keys (r, node, key, "an output", v) != PW_OK) return r->error->status;
+  if (v[0] == NULL) return read_fail (r, node->at, "an output needs a name");
+  if (build_name (r, v[0], "output", &o->output.name) != PW_OK) return r->error->status;
+  const char *name = o->output.name;
+  if (!pw_expression_is_name (name))
+    return read_fail (r, v[0]->at, "output \"%.60s\": expected a letter, then letters, digits and _, at most 63 in all",
+                      name);
+  if (pw_expression_is_reserved (name) || pw_kind_find_column (NULL, name, &column))
+    return read_fail (r, v[0]->at, "output \"%s\": this name is reserved: %s", name,
+                      strcmp (name, "t") == 0            ? "it is the time"
+                      : pw_expression_is_reserved (name) ? "a function or constant"
+                                                         : "a column of tables");
+  if (pw_names_find (&r->scope->index, name) >= 0)
+    return read_fail (r, v[0]->at, "output \"%s\": a parameter or a name of let is called so", name);
+  if (v[1] == NULL) return read_fail (r, node->at, "output %s needs a value", name);
+  if (v[1]->type != PW_YAML_SCALAR)
+    return read_fail (r, v[1]->at, "output %s: expected an expression, found %s", name, node_found (v[1]));
+  o->node = v[1], o->reader = OUTPUT_UNREAD;
+  o->function.name[0] = "t", o->function.text.part[0] = v[1]->text;
+  o->output.value = (pw_function){ signal_eval, o, NULL, NULL, signal_open, free, &o->function.text };
+  if (output_unit (r, v[2], &o->output.unit) != PW_OK) return r->error->status;
+  return read_text (r, v[3], "about", &o->output.about);
+}
+
+static int output_add_column (reader *r, output_function *o, const char *name, size_t at) {
+  signal_function *f = &o->function;
+  for (int i = 1; i <= f->states; i++)
+    if (strcmp (f->name[i], name) == 0) return PW_OK;
+  if (f->states == PW_OUTPUT_READS) return expression_fail (r, o->node, at, "more than %d columns", PW_OUTPUT_READS);
+  f->name[f->states + 1] = pw_arena_copy (r->arena, name);
+  return f->name[++f->states] ? PW_OK : read_no_memory (r);
+}
+
+/* Reports that output `last` reads output `first`, of which it is a function. */
+static int output_cycle (const reader *r, const output_function *last, int first, size_t at) {
+  char list[300] = "";
+  for (int i = (int)(last - r->output); i != first; i = r->output[i].reader)
+    append (list, "%s%s", *list ? ", " : ", through ", r->output[i].output.name);
+  return read_fail (r, source_offset (r->y, last->node, at), "output %s is a function of itself%s",
+                    r->output[first].output.name, list);
+}
+
+/* Reads the expression of an output, after those of outputs in it. */
+static int output_expression (reader *r, int index, int reads) {
+  output_function *o = &r->output[index];
+  char name[PW_EXPRESSION_NAME];
+  pw_column c;
+  o->reader = reads;
+  for (const char *source = o->node->text, *rest = source, *p; (p = pw_expression_next_name (&rest, name)) != NULL;) {
+    const size_t at = (size_t)(p - source);
+    int other = pw_names_find (&r->outputs, name), status = PW_OK;
+    if (other >= 0 && r->output[other].reader >= 0) return output_cycle (r, o, other, at);
+    if (other >= 0 && r->output[other].reader == OUTPUT_UNREAD) status = output_expression (r, other, index);
+    r->label = PW_PRINTED (100, "output %s", o->output.name);
+    for (int i = 1; status == PW_OK && other >= 0 && i <= r->output[other].function.states; i++)
+      status = output_add_column (r, o, r->output[other].function.name[i], at);
+    if (status == PW_OK && other < 0 && strcmp (name, "t") != 0 &&
+        (is_state (r, name) || pw_kind_find_column (NULL, name, &c)))
+      status = output_add_column (r, o, name, at);
+    if (status != PW_OK) return status;
+  }
+  o->reader = OUTPUT_READ;
+  r->label = PW_PRINTED (100, "output %s", o->output.name);
+  return read_expression (r, o->node, o->function.name, &(const char *){ NULL }, &o->function.expression[0]);
+}
+
+/* Reads all outputs.  The columns that they read are checked by outputs_add. */
+static int outputs_read (reader *r) {
+  const pw_node *list = r->y->outputs;
+  const int count = list ? list->count : 0;
+  if (count > PW_MOST_OUTPUTS)
+    return read_fail (r, list->at, "outputs: %d entries; a model may have %d", count, PW_MOST_OUTPUTS);
+  r->output = pw_arena_alloc (r->arena, (size_t)count * sizeof *r->output);
+  if (r->output == NULL || pw_names_open (&r->outputs, (size_t)count) != PW_OK) return read_no_memory (r);
+  int i = 0;
+  for (const pw_node *n = list ? list->first : NULL; n && r->error->status == PW_OK; n = n->next, i++)
+    if (output_head (r, n, &r->output[i]) == PW_OK) pw_names_add (&r->outputs, r->output[i].output.name, i);
+  for (i = 0; i < count && r->error->status == PW_OK; i++) pw_scope_add (r->scope, r->output[i].output.name, NAN);
+  r->scope->expand = expand_name, r->scope->context = r;
+  for (i = 0; i < count && r->error->status == PW_OK; i++)
+    if (r->output[i].reader == OUTPUT_UNREAD) output_expression (r, i, i);
+  return r->error->status;
+}
+
+/* Reports a name that is no column, with the nearest column of its body or element, or the nearest of these. */
+static int output_unknown (reader *r, const pw_node *node, const char *name, size_t at) {
+  static const char *const part[] = { "x", "y", "phi", "vx", "vy", "omega" };
+  const size_t n = strcspn (name, ".");
+  const char *owner = PW_PRINTED (100, "%.*s", (int)n, name);
+  const int is_body = pw_names_find (&r->bodies, owner) >= 0, element = pw_names_find (&r->elements, owner);
+  const pw_kind *kind = element >= 0 ? pw_kinds[element] : NULL;
+  pw_nearest near = { .sought = is_body || kind ? name + n + 1 : owner };
+  for (int i = 0; is_body && i < 6; i++) pw_nearest_try (&near, part[i]);
+  for (int i = 0; kind && i < 2 * kind->internal; i++)
+    pw_nearest_try (&near, i % 2 ? kind->coordinate[i / 2].rate : kind->coordinate[i / 2].name);
+  for (int i = 0; kind && i < kind->rows; i++) pw_nearest_try (&near, kind->reaction[i].name);
+  for (int i = 0; kind && i < 4; i++)
+    if (pw_kind_find_column (kind, ((const char *const[]){ "x", "y", "work", "loss" })[i], &(pw_column){ 0 }))
+      pw_nearest_try (&near, ((const char *const[]){ "x", "y", "work", "loss" })[i]);
+  if (is_body || kind)
+    return expression_fail (r, node, at + n + 1, "%s has no column \"%.60s\"%s", owner, name + n + 1,
+                            pw_nearest_text (&near));
+  suggest_bodies (r, &near);
+  for (const struct pw_name *e = r->elements.slot, *end = e + r->elements.size; e < end; e++)
+    if (e->name) pw_nearest_try (&near, e->name);
+  return expression_fail (r, node, at, "there is no body or element \"%s\"%s", owner, pw_nearest_text (&near));
+}
+
+/* Adds the outputs to the model, after all elements. */
+static int outputs_add (reader *r) {
+  char name[PW_EXPRESSION_NAME];
+  pw_column c;
+  pw_error cause = { 0 };
+  for (output_function *o = r->output, *end = o + (r->y->outputs ? r->y->outputs->count : 0); o < end; o++) {
+    r->label = PW_PRINTED (100, "output %s", o->output.name);
+    for (const char *source = o->node->text, *rest = source, *p; (p = pw_expression_next_name (&rest, name)) != NULL;) {
+      const size_t at = (size_t)(p - source);
+      const int found = find_column (r, name, &c);
+      if (is_state (r, name) && !found) return output_unknown (r, o->node, name, at);
+      if (found && (c.type == PW_COLUMN_PROJECTION || c.type == PW_COLUMN_BALANCE))
+        return expression_fail (r, o->node, at, "%s describes the integration, not the motion", name);
+    }
+    o->output.value.reads = o->function.name + 1;
+    if (pw_model_check_output (r->model, &o->output, &cause) != PW_OK) return build_fail (r, o->node, &cause);
+    if (pw_add_output (r->model, &o->output) != PW_OK) return r->error->status;
+  }
+  return r->error->status;
+}
+
+/* ---- The model ---- */
+
+static int build_all (reader *r, const double *parameter) {
+  const pw_yaml *y = r->y;
+  double value;
+  for (int i = 0; i < y->parameter_count; i++) pw_scope_add (r->scope, y->table.parameters[i].name, parameter[i]);
+  for (const pw_node *n = y->let ? y->let->first : NULL; n; n = n->next->next) {
+    if (read_number (r, n->next, PW_PRINTED (100, "let %s", n->text), PW_REAL, &value) != PW_OK)
+      return r->error->status;
+    pw_scope_add (r->scope, n->text, value);
+  }
+  r->numbers = r->scope->names;
+  if (index_states (r) != PW_OK) return r->error->status;
+  if (outputs_read (r) != PW_OK) return r->error->status;
+  for (const pw_node *n = y->bodies ? y->bodies->first : NULL; n; n = n->next)
+    if (build_body (r, n) != PW_OK) return r->error->status;
+  for (const pw_node *n = y->elements ? y->elements->first : NULL; n; n = n->next)
+    if (build_element (r, n) != PW_OK) return r->error->status;
+  for (const pw_node *n = y->states ? y->states->first : NULL; n; n = n->next)
+    if (build_state (r, n) != PW_OK) return r->error->status;
+  if (outputs_add (r) != PW_OK) return r->error->status;
+  return read_reference (r);
+}
+
+static void build_free (void *arena) {
+  pw_arena_free (arena);
+  free (arena);
+}
+
+/* Allocates the memory for building, and the arena for what lives as long as the model. */
+static int build_open (reader *r) {
+  const pw_yaml *y = r->y;
+  size_t largest = 1, bodies = y->bodies ? (size_t)y->bodies->count : 0, lets = y->let ? (size_t)y->let->count : 0;
+  size_t elements = y->elements ? (size_t)y->elements->count : 0, outputs = y->outputs ? (size_t)y->outputs->count : 0;
+  size_t states = y->states ? (size_t)y->states->count : 0;
+  for (const pw_kind *const *k = pw_kinds; *k; k++)
+    if ((*k)->definition > largest) largest = (*k)->definition;
+  r->arena = calloc (1, sizeof *r->arena);
+  if (r->arena == NULL || pw_model_keep (r->model, r->arena, build_free) != PW_OK) return read_no_memory (r);
+  r->reference = pw_arena_alloc (r->arena, sizeof *r->reference);
+  pw_model_set_reference (r->model, r->reference);
+  r->definition = malloc (largest);
+  if (r->reference && r->definition &&
+      pw_scope_open (r->scope, y->parameter_count + (int)(lets + outputs), r->arena) == PW_OK &&
+      pw_names_open (&r->bodies, bodies) == PW_OK && pw_names_open (&r->contacts, elements) == PW_OK &&
+      pw_names_open (&r->states, states) == PW_OK &&
+      pw_names_open (&r->names, bodies + elements + states + outputs) == PW_OK)
+    return PW_OK;
+  return read_no_memory (r);
+}
+
+/* The build function; the parameters are numbers in the order of the table. */
+static void build_model (pw_model *m, const void *parameters) {
+  const void *table = pw_model_table (m);
+  pw_scope scope = { 0 };
+  reader r = { .y = table, .model = m, .scope = &scope, .error = pw_model_error (m) };
+  read_list (&r, r.y->bodies, "bodies");
+  read_list (&r, r.y->states, "states");
+  read_list (&r, r.y->outputs, "outputs");
+  if (read_list (&r, r.y->elements, "elements") == PW_OK && build_open (&r) == PW_OK) build_all (&r, parameters);
+  pw_scope_close (&scope);
+  pw_names_close (&r.bodies);
+  pw_names_close (&r.states);
+  pw_names_close (&r.names);
+  pw_names_close (&r.elements);
+  pw_names_close (&r.contacts);
+  pw_names_close (&r.outputs);
+  free (r.definition);
+}
+
 /* ---- The head ---- */
 
 /* A default must not depend on other parameters: --set would have to change it, too. */
@@ -1127,8 +1370,8 @@ static int head_parameters (pw_yaml *y, const reader *r, const pw_node *list, pw
 }
 
 static int read_head (pw_yaml *y, const reader *r) {
-  static const char *const key[] = { "pinwheel", "about",    "run",   "parameters", "let",
-                                     "bodies",   "elements", "truth", "states",     NULL };
+  static const char *const key[] = { "pinwheel", "about", "run",    "parameters", "let", "bodies",
+                                     "elements", "truth", "states", "outputs",    NULL };
   static const char *const run_key[] = { "t_end", "step", "rtol", "method", NULL };
   const pw_node *v[sizeof key / sizeof *key], *run[sizeof run_key / sizeof *run_key];
   double *number[] = { &y->table.run.t_end, &y->table.run.step, &y->table.run.rtol };
@@ -1144,7 +1387,7 @@ static int read_head (pw_yaml *y, const reader *r) {
   read_text (r, run[3], run_key[3], &y->table.run.method);
   const pw_node *parameters = v[3], *let = v[4];
   /* the key of the reference solution is "truth" */
-  y->let = let, y->bodies = v[5], y->elements = v[6], y->reference = v[7], y->states = v[8];
+  y->let = let, y->bodies = v[5], y->elements = v[6], y->reference = v[7], y->states = v[8], y->outputs = v[9];
   for (int i = 3; key[i]; i++) /* from "parameters" on: lists and maps */
     if (v[i] && v[i]->count > MAX_ITEMS)
       read_fail (r, v[i]->at, "%s: %d entries; a model may have %d", key[i], v[i]->count, MAX_ITEMS);

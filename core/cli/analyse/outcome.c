@@ -12,64 +12,10 @@
 
 /* ---- Columns ---- */
 
-/* Columns that are one number of a sample. */
-static const struct {
-  const char *name, *unit;
-  size_t offset; /* in pw_sample */
-} outcome_scalars[PW_COLUMN_TYPES] = {
-  [PW_COLUMN_TIME] = { "t", "s", offsetof (pw_sample, t) },
-  [PW_COLUMN_POSITION] = { "residual.position", "", offsetof (pw_sample, position) },
-  [PW_COLUMN_VELOCITY] = { "residual.velocity", "", offsetof (pw_sample, velocity) },
-  [PW_COLUMN_KINETIC] = { "kinetic", "J", offsetof (pw_sample, kinetic) },
-  [PW_COLUMN_POTENTIAL] = { "potential", "J", offsetof (pw_sample, potential) },
-  [PW_COLUMN_PROJECTION] = { "projection", "J", offsetof (pw_sample, projection) },
-  [PW_COLUMN_BALANCE] = { "balance", "J", offsetof (pw_sample, balance) },
-  [PW_COLUMN_WORK] = { "work", "J", offsetof (pw_sample, work) },
-  [PW_COLUMN_LOSS] = { "loss", "J", offsetof (pw_sample, loss) },
-};
-
-static int outcome_count_columns (const pw_system *s, pw_column_type type) {
-  if (type == PW_COLUMN_STATE) return 2 * pw_system_coordinates (s);
-  if (type == PW_COLUMN_CONTACT) return 2 * pw_system_contacts (s);
-  if (type == PW_COLUMN_REACTION) return pw_system_rows (s);
-  return type == PW_COLUMN_LEDGER ? pw_system_ledger_entries (s) : 1;
-}
-
-static const char *outcome_name (const pw_system *s, pw_column c, char *buffer, size_t size) {
-  if (c.type == PW_COLUMN_STATE) return pw_system_state_name (s, c.index, buffer, size);
-  if (c.type == PW_COLUMN_REACTION) return pw_system_reaction_name (s, c.index, buffer, size);
-  if (c.type == PW_COLUMN_LEDGER) return pw_system_ledger_name (s, c.index, buffer, size);
-  if (c.type == PW_COLUMN_CONTACT) return pw_system_contact_name (s, c.index, buffer, size);
-  return outcome_scalars[c.type].name;
-}
-
-const char *pw_column_unit (const pw_system *s, pw_column c) {
-  if (c.type == PW_COLUMN_STATE) return pw_system_state_unit (s, c.index);
-  if (c.type == PW_COLUMN_REACTION) return pw_system_reaction_unit (s, c.index);
-  return c.type == PW_COLUMN_CONTACT ? "m" : c.type == PW_COLUMN_LEDGER ? "J" : outcome_scalars[c.type].unit;
-}
-
 int pw_column_find (const pw_system *s, const char *name, const char *origin, pw_column *c, pw_error *error) {
-  char buffer[300];
-  pw_nearest near = { .sought = name };
-  for (*c = (pw_column){ 0 }; c->type < PW_COLUMN_TYPES; c->type++)
-    for (c->index = 0; c->index < outcome_count_columns (s, c->type); c->index++) {
-      const char *known = outcome_name (s, *c, buffer, sizeof buffer);
-      if (strcmp (known, name) == 0) return PW_OK;
-      pw_nearest_try (&near, known);
-    }
-  return pw_fail (error, PW_INPUT, "%s: no column \"%.100s\"%s", origin, name, pw_nearest_text (&near));
-}
-
-/* The value of a column in a sample; NaN for contact points, and for entries of the ledger without
- * pw_settings.ledger. */
-static double outcome_column_value (const pw_system *s, pw_column c, const pw_sample *sample) {
-  int n = pw_system_coordinates (s);
-  if (c.type == PW_COLUMN_STATE) return c.index < n ? sample->q[c.index] : sample->v[c.index - n];
-  if (c.type == PW_COLUMN_REACTION) return 0 - sample->lambda[c.index]; /* the reaction is -lambda; not -0 */
-  if (c.type == PW_COLUMN_LEDGER) return sample->ledger ? sample->ledger[c.index] : NAN;
-  if (c.type == PW_COLUMN_CONTACT) return NAN;
-  return *(const double *)((const char *)sample + outcome_scalars[c.type].offset);
+  pw_error own = { 0 };
+  const int status = pw_system_find_column (s, name, c, &own);
+  return status == PW_OK ? PW_OK : pw_fail (error, status, "%s: %s", origin, own.text);
 }
 
 /* ---- Texts ---- */
@@ -95,7 +41,7 @@ static int outcome_add_functional (pw_outcomes *set, pw_functional_type type, pw
   if (more == NULL) return -1;
   set->functional = more;
   set->functional[set->functionals] = (pw_functional){ .type = type, .column = c };
-  set->ledger |= c.type > PW_COLUMN_POTENTIAL;
+  set->ledger |= c.type > PW_COLUMN_POTENTIAL && c.type < PW_COLUMN_OUTPUT;
   set->extrema += pw_is_extremum (type), set->integrals += pw_is_integral (type);
   return set->functionals++;
 }
@@ -123,6 +69,11 @@ static int outcome_add_term (pw_outcomes *set, pw_outcome *o, const char *origin
                                 c.type == PW_COLUMN_PROJECTION || c.type == PW_COLUMN_BALANCE))
     return pw_fail (error, PW_INPUT, "%s: %s describes the integration, not the motion: it has no %s", origin, name,
                     type == PW_INTEGRAL ? "integral" : "mean");
+  const unsigned integrated = 1u << PW_COLUMN_LEDGER | 1u << PW_COLUMN_WORK | 1u << PW_COLUMN_LOSS;
+  if (pw_is_integral (type) && c.type == PW_COLUMN_OUTPUT && pw_system_output_reads (set->system, c.index) & integrated)
+    return pw_fail (
+        error, PW_INPUT,
+        "%s: %s reads works or losses, which are integrals themselves; valid are final:, max: and min:", origin, name);
   if (type == PW_RMS && pw_column_is_integrated (c.type))
     return pw_fail (error, PW_INPUT,
                     "%s: no rms: of work and losses; valid are final:, max:, min:, mean: and integral:", origin);
@@ -203,10 +154,8 @@ static int outcome_read (pw_outcomes *set, pw_outcome *o, const char *option, pw
 int pw_outcomes_open (pw_outcomes *set, const pw_system *s, const char *option, const char *const *text, int count,
                       pw_error *error) {
   *set = (pw_outcomes){ .system = s, .outcome = calloc ((size_t)count + 1, sizeof *set->outcome) };
-  set->contact = calloc ((size_t)pw_system_contacts (s) + 1, sizeof *set->contact);
   set->workspace = pw_workspace_new (s, error);
-  if (set->outcome == NULL || set->contact == NULL || set->workspace == NULL)
-    return pw_fail (error, PW_RESOURCE, "out of memory");
+  if (set->outcome == NULL || set->workspace == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   for (; set->outcomes < count; set->outcomes++) {
     set->outcome[set->outcomes].text = text[set->outcomes];
     int status = outcome_read (set, set->outcome + set->outcomes, option, error);
@@ -219,7 +168,6 @@ void pw_outcomes_close (pw_outcomes *set) {
   for (int i = 0; i < set->outcomes; i++) pw_formula_close (set->outcome[i].formula);
   free (set->outcome);
   free (set->functional);
-  free (set->contact);
   pw_workspace_free (set->workspace);
   *set = (pw_outcomes){ .system = NULL };
 }
@@ -243,7 +191,7 @@ int pw_outcome_is_final (const pw_outcomes *set, int outcome) {
 const char *pw_outcome_unit (const pw_outcomes *set, int outcome, char *buffer, size_t size) {
   const pw_outcome *o = set->outcome + outcome;
   const pw_functional *f = set->functional + o->term[0];
-  const char *unit = o->formula ? "" : pw_column_unit (set->system, f->column);
+  const char *unit = o->formula ? "" : pw_system_column_unit (set->system, f->column);
   int is_integral = !o->formula && f->type == PW_INTEGRAL, of_time = strcmp (unit, "s") == 0;
   snprintf (buffer, size, "%s%s", unit, !is_integral ? "" : of_time ? "^2" : *unit ? " s" : "s");
   return buffer;
@@ -285,15 +233,11 @@ typedef struct {
 
 /* Stores the columns in a sample as values[at] of their functionals. */
 static int functional_read (pw_outcomes *set, const pw_sample *s, int at, pw_error *error) {
-  int contacts = 0, status = PW_OK;
-  for (int i = 0; i < set->functionals; i++) contacts |= set->functional[i].column.type == PW_COLUMN_CONTACT;
-  if (contacts) status = pw_workspace_contact_points (set->workspace, s->t, s->q, s->v, set->contact, error);
-  for (pw_functional *f = set->functional; f < set->functional + set->functionals && status == PW_OK; f++) {
-    const pw_column c = f->column;
-    f->values[at] =
-        c.type == PW_COLUMN_CONTACT ? set->contact[c.index / 2][c.index % 2] : outcome_column_value (set->system, c, s);
+  for (pw_functional *f = set->functional; f < set->functional + set->functionals; f++) {
+    const int status = pw_workspace_columns (set->workspace, s, &f->column, 1, &f->values[at], error);
+    if (status != PW_OK) return status;
   }
-  return status;
+  return PW_OK;
 }
 
 /* Stores the columns at t, a time in the step, as values[at], unless that or an earlier sample fails. */

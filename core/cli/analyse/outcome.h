@@ -12,33 +12,9 @@
 #include "pinwheel-files.h"
 #include "pinwheel-solvers.h"
 
-/* Columns of the table of `run`. */
-typedef enum {
-  PW_COLUMN_TIME,
-  PW_COLUMN_STATE,
-  PW_COLUMN_CONTACT,
-  PW_COLUMN_REACTION,
-  PW_COLUMN_POSITION, /* scaled residuals of g = 0 and of J v = eta */
-  PW_COLUMN_VELOCITY,
-  PW_COLUMN_KINETIC, /* energies; columns after PW_COLUMN_POTENTIAL need pw_settings.ledger */
-  PW_COLUMN_POTENTIAL,
-  PW_COLUMN_LEDGER,
-  PW_COLUMN_PROJECTION,
-  PW_COLUMN_BALANCE,
-  PW_COLUMN_WORK, /* pw_sample.work and loss, which the table does not have */
-  PW_COLUMN_LOSS,
-  PW_COLUMN_TYPES
-} pw_column_type;
-
-typedef struct {
-  pw_column_type type;
-  int index; /* of the state, constraint equation or entry of the ledger; contact i: 2 i for x, 2 i + 1 for y; else 0 */
-} pw_column;
-
 /* The column of this name; `origin` begins messages ("--of max:B.Fx").  PW_INPUT, with the nearest name, if there is
  * none. */
 int pw_column_find (const pw_system *s, const char *name, const char *origin, pw_column *c, pw_error *error);
-const char *pw_column_unit (const pw_system *s, pw_column c);
 
 /* 1 for work and losses: their rates are known, and they are integrals themselves. */
 static inline int pw_column_is_integrated (pw_column_type type) {
@@ -86,7 +62,6 @@ typedef struct {
   /* private */
   double begin;            /* initial time of the run [s] */
   pw_workspace *workspace; /* for contact points */
-  double (*contact)[3];
 } pw_outcomes;
 
 /* Reads `count` texts of outputs; `option` ("--of") begins messages.  System and texts must outlive the set.  Close it

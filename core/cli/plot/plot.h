@@ -32,6 +32,11 @@ void pw_plots_serialise (pw_plots *plots, pw_archive *archive);
  * it only prints a notice.  PW_RESOURCE if a file cannot be written or gnuplot fails; PW_INTERRUPTED. */
 int pw_plots_finish (pw_plots *plots, int draw, pw_error *error);
 
+/* Writes the figure "outputs", a panel for each, and draws it as pw_plots_finish does; nothing without outputs.  The
+ * same statuses. */
+int pw_plots_outputs (const pw_plots *plots, const pw_cli_line *line, const pw_cli_model *model, int draw,
+                      pw_error *error);
+
 /* PW_INPUT unless the path of an animation, the value of an option, ends in .html. */
 int pw_animation_check (const char *option, const char *path, pw_error *error);
 /* Writes the page of an animation to an output, which the caller completes; `path` names it in a notice, `reason` says
@@ -60,14 +65,15 @@ enum {
   PLOT_HATCHES = 60,      /* strokes of the hatching of the ground, at most */
   PLOT_STROKES = 80,      /* of a symbol and of the ground at it, at most */
   PLOT_ATTACHMENTS = 24,  /* attachment points drawn of one body, at most */
-  PLOT_CURVES = 60        /* bodies, or wheels, with a curve, at most */
+  PLOT_CURVES = 60,       /* bodies, or wheels, with a curve, at most */
+  PLOT_OUTPUTS = 12       /* outputs with a panel, at most */
 };
 
 /* In place of the index of a body among those drawn: the ground, a body that is not drawn. */
 enum { PLOT_GROUND = -1, PLOT_HIDDEN = -2 };
 
 /* Columns of a sample: these, then x, y, phi, vx, vy, omega of each body drawn, then x, y, heading of each wheel drawn,
- * then, with forces, Fx, Fy of each link. */
+ * then, with forces, Fx, Fy of each link, then outputs. */
 enum { PLOT_T, PLOT_KINETIC, PLOT_POTENTIAL, PLOT_WORK, PLOT_LOSS, PLOT_PROJECTION, PLOT_BALANCE, PLOT_FIRST };
 
 /* The motions of bodies, or of "wheels": all elements with a contact point, which include markers. */
@@ -124,6 +130,7 @@ struct pw_plots {
   double t_end;            /* [s] */
   int samples, planned;    /* stored so far; in all */
   int sample_size;         /* numbers of a sample */
+  int outputs;             /* drawn: the last numbers of a sample */
   double size;             /* diagonal of the box around the initial configuration [m] */
   double symbol_unit;      /* u of symbols [m] */
   pw_tracks bodies, wheels;

@@ -47,6 +47,9 @@ static int plot_allocate (pw_plots *plots, pw_error *error) {
   plot_open_tracks (plots, bodies, pw_system_bodies (plots->system));
   plot_open_tracks (plots, wheels, pw_system_contacts (plots->system));
   plots->sample_size += plots->with_forces ? 2 * plots->links : 0;
+  plots->outputs = pw_system_outputs (plots->system);
+  if (plots->outputs > PLOT_OUTPUTS) plots->outputs = PLOT_OUTPUTS;
+  plots->sample_size += plots->outputs;
   int most = PLOT_NUMBERS / plots->sample_size;
   plots->planned = 1 + (most < PLOT_FEW ? PLOT_FEW : most < PLOT_INTERVALS ? most : PLOT_INTERVALS);
   plots->body_index = plot_array (plots, bodies->count + 1, sizeof *plots->body_index);
@@ -144,6 +147,8 @@ void pw_plots_add (pw_plots *plots, const pw_sample *sample) {
     memcpy (pw_plot_track (plots, i, &plots->wheels, w),
             plots->contact[pw_system_element (plots->system, plots->wheels.system_index[w]).contact],
             sizeof *plots->contact);
+  for (int o = 0; o < plots->outputs; o++)
+    pw_plot_sample (plots, i)[plots->sample_size - plots->outputs + o] = sample->output[o];
   if (i == 0) pw_plot_measure (plots);
   if (plots->with_forces && plots->links > 0)
     pw_plot_forces (plots, sample, pw_plot_track (plots, i, &plots->wheels, plots->wheels.drawn));
@@ -418,4 +423,22 @@ int pw_plots_finish (pw_plots *plots, int draw, pw_error *error) {
     status = figures_write (plots, *name, closeup, error);
   if (status != PW_OK) return status;
   return draw ? pw_figure_draw (folder, names, error) : pw_figure_undrawn (folder, names, "the run was interrupted");
+}
+
+int pw_plots_outputs (const pw_plots *plots, const pw_cli_line *line, const pw_cli_model *model, int draw,
+                      pw_error *error) {
+  pw_curves c;
+  if (plots->figures.folder == NULL || plots->outputs == 0 || plots->samples < 2) return PW_OK;
+  int status = pw_curves_open (&c, line, model, plots->figures.folder, "outputs", "outputs", error);
+  for (int o = 0; status == PW_OK && o < plots->outputs; o++) {
+    const char *name = pw_system_output_name (plots->system, o), *unit = pw_system_output_unit (plots->system, o);
+    pw_curves_panel (
+        &c, &(pw_panel){ .x_label = "t [s]", .y_label = PW_FIGURE_LABEL (name, unit), .type = o ? PW_PANEL_BELOW : 0 });
+    pw_curves_add (&c, "line", NULL);
+    for (int i = 0; i < plots->samples; i++) {
+      const double *sample = pw_plot_sample (plots, i);
+      pw_curves_point (&c, sample[PLOT_T], sample[plots->sample_size - plots->outputs + o], 0);
+    }
+  }
+  return draw ? pw_curves_draw (&c, status, error) : pw_curves_close (&c, status, error);
 }

@@ -220,7 +220,7 @@ _declare(core, _i, ("pw_repetition_run", _p, c.c_long, _e), ("pw_repetition_erro
 _declare(core, None, ("pw_repetition_close", _p))
 _declare(core, _d, ("pw_run_time", _p))
 _declare(core, _i, ("pw_method_parse", _s, c.POINTER(_p), _p, _e), ("pw_method_adaptive", _p, _s),
-         ("pw_system_contacts", _p))
+         ("pw_system_contacts", _p), ("pw_system_outputs", _p))
 _declare(core, c.POINTER(pw_element), ("pw_model_elements", _p, c.POINTER(_i)))
 _declare(core, c.POINTER(pw_initial_report), ("pw_run_initial", _p))
 _declare(core, _i, ("pw_initial_moved", _p, c.POINTER(pw_initial_report), _i), ("pw_initial_given", c.POINTER(pw_initial_report), _i),

@@ -116,9 +116,11 @@ def columns(s, ledger) -> tuple[dict, dict]:
     names = [lib.name_of(core.pw_system_record_name, s, i) for i in range(width)]
     n = core.pw_system_coordinates(s)
     reactions = _FIRST_COLUMNS + 3 * n + 2 * core.pw_system_contacts(s)
-    entries = reactions + core.pw_system_rows(s)
+    outputs = reactions + core.pw_system_rows(s)
+    entries = outputs + core.pw_system_outputs(s)
     states = [names[_FIRST_COLUMNS + i] for i in range(2 * n) if not core.pw_system_state_hidden(s, i)]
-    groups = {"states": states, "reactions": names[reactions:entries], "ledger": names[entries:]}
+    groups = {"states": states, "reactions": names[reactions:outputs], "outputs": names[outputs:entries],
+              "ledger": names[entries:]}
     units = {name: lib.text(core.pw_system_record_unit(s, i)) for i, name in enumerate(names)}
     return units, groups
 
