@@ -1,782 +1,11 @@
-/* Reads text models from the tree of a file: keys and numbers; signals; bodies and elements, through the field tables
- * of their types; the head, parameters and default run settings, which is stored in a plug-in's table, so that text
- * models can be used like compiled ones.
- *
- * After an error, functions with the same reader return its status, and only the first error is recorded: a sequence of
- * calls needs one check.  `label` ("torque T: value") begins their messages.  A NULL node is absent. */
-#define _XOPEN_SOURCE 700 /* realpath */
-#include <ctype.h>
-#include <errno.h>
+/* Reads text models from the tree of a file: bodies and elements, through the field tables of their types; first-order
+ * states; the head, parameters and default run settings, which is stored in a plug-in's table, so that text models can
+ * be used like compiled ones. */
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
-#include "expression.h"
-#include "yaml.h"
+#include "yaml_read.h"
 
-/* Limits of one model, about 1 GB each, so that a small file cannot use all memory: entries of each list, such as
- * bodies, elements, parameters; points of all tables; operations of all expressions. */
-enum { MAX_ITEMS = 1000000, MAX_POINTS = 20000000, MAX_OPERATIONS = 30000000 };
 #define MAX_AHEAD 1e6 /* pw_yaml.max_ahead for the default limit of bytes: each indicator takes 350 bytes */
-
-enum { MAX_KEYS = 40 /* known keys of a map, and the end of their list */ };
-
-/* What functions share while a file is read or a model is built from it. */
-typedef struct {
-  const pw_yaml *y;
-  pw_error *error;
-  pw_scope *scope; /* parameters and what `let` defines so far, or NULL */
-  /* for building */
-  pw_model *model;
-  pw_arena *arena;              /* lives as long as the model */
-  pw_reference_text *reference; /* the model's */
-  pw_names bodies;              /* names of bodies so far */
-  pw_names states;              /* names of all first-order states */
-  pw_names names;               /* of bodies and elements so far, to their offsets in the source */
-  pw_names elements; /* names of all elements, to the index of their types; made when an expression needs it */
-  pw_names contacts; /* names of wheels and markers so far, to the index of their elements */
-  struct output_function *output; /* the outputs of the model */
-  pw_names outputs;               /* their names, to their indices */
-  int numbers;                    /* names of the scope that stand for numbers; those of outputs follow */
-  const pw_kind *kind;            /* of the element being read */
-  const pw_field *field;          /* of it */
-  const char *label;              /* of that field, for messages */
-  char *definition;               /* of the element, with all preceding fields */
-  double points;                  /* of all tables so far */
-  double operations;              /* of all expressions so far */
-} reader;
-
-#define read_fail(r, at, ...) pw_yaml_fail ((r)->y, (r)->error, at, __VA_ARGS__)
-
-/* Appends to a text in an array, as far as it fits. */
-#define append(text, ...) pw_print (text + strlen (text), sizeof text - strlen (text), __VA_ARGS__)
-
-static int read_no_memory (const reader *r) {
-  return pw_yaml_no_memory (r->y, r->error);
-}
-
-/* ---- Keys and lists ---- */
-
-/* What a node is, for messages. */
-static const char *node_found (const pw_node *node) {
-  return node->type == PW_YAML_LIST ? "a list" : node->type == PW_YAML_MAP ? "a map" : "text";
-}
-
-static int node_is (const pw_node *node, const char *text) {
-  return node->type == PW_YAML_SCALAR && strcmp (node->text, text) == 0;
-}
-
-/* A hint for a key that is not a plain name, or "". */
-static const char *read_key_hint (const char *text, const char *const *key) {
-  for (int i = 0; key[i]; i++) {
-    size_t n = strlen (key[i]);
-    if (strncmp (text, key[i], n) == 0 && text[n] == ':') return "; a space goes after the colon";
-    if (strncmp (text, key[i], n) == 0 && text[n] == ' ') return "; a colon goes after the key";
-  }
-  if (*text && strspn (text, "0123456789") == strlen (text)) return "; decimals are written with a point";
-  if (strpbrk (text, "()*/^")) return "; an expression with commas goes between double quotes";
-  return "";
-}
-
-static int read_key (const reader *r, const pw_node *node, const char *const *key, const char *owner,
-                     const pw_node **value) {
-  if (node->type != PW_YAML_SCALAR)
-    return read_fail (r, node->at, "expected a key of %s, found %s", owner, node_found (node));
-  for (int i = 0; key[i]; i++) {
-    if (strcmp (key[i], node->text) != 0) continue;
-    if (value[i]) return read_fail (r, node->at, "\"%s\" appears twice", key[i]);
-    value[i] = node->next;
-    return node_is (node->next, "") && !node->next->quoted ? read_fail (r, node->at, "\"%s\" has no value", key[i])
-                                                           : PW_OK;
-  }
-  pw_nearest near = { .sought = node->text };
-  for (int i = 0; key[i]; i++) pw_nearest_try (&near, key[i]);
-  const char *hint = read_key_hint (node->text, key);
-  return read_fail (r, node->at, "%s has no \"%.60s\"%s", owner, node->text, *hint ? hint : pw_nearest_text (&near));
-}
-
-/* Finds known keys (ending with NULL) in the pairs from a node on: value[i] becomes the value of key[i], or NULL.
- * Other keys, repeated keys and empty values are refused; `owner` ("a body") is for messages. */
-static int read_keys_from (const reader *r, const pw_node *first, const char *const *key, const char *owner,
-                           const pw_node **value) {
-  for (int i = 0; key[i]; i++) value[i] = NULL;
-  for (const pw_node *n = first; n && r->error->status == PW_OK; n = n->next->next) read_key (r, n, key, owner, value);
-  return r->error->status;
-}
-
-/* The same in a map. */
-static int read_keys (const reader *r, const pw_node *map, const char *const *key, const char *owner,
-                      const pw_node **value) {
-  if (map && map->type != PW_YAML_MAP) {
-    char form[300] = "{";
-    for (int i = 0; key[i]; i++) append (form, "%s: ..%s", key[i], key[i + 1] ? ", " : "}");
-    read_fail (r, map->at, "expected a map %s for %s, found %s", form, owner, node_found (map));
-    map = NULL;
-  }
-  return read_keys_from (r, map ? map->first : NULL, key, owner, value);
-}
-
-static int read_list (const reader *r, const pw_node *node, const char *label) {
-  if (node && node->type != PW_YAML_LIST)
-    read_fail (r, node->at, "%s: expected a list, found %s", label, node_found (node));
-  return r->error->status;
-}
-
-/* Refuses anything but a list of `count` entries, which are `items` ("bodies"). */
-static int read_list_of (const reader *r, const pw_node *node, const char *label, int count, const char *items) {
-  if (node && node->type != PW_YAML_LIST)
-    read_fail (r, node->at, "%s: expected a list of %d %s, found %s", label, count, items, node_found (node));
-  else if (node && node->count != count)
-    read_fail (r, node->at, "%s: expected a list of %d %s, found one of %d", label, count, items, node->count);
-  return r->error->status;
-}
-
-/* ---- Texts and numbers ---- */
-
-/* A scalar's text, not empty. */
-static int read_text (const reader *r, const pw_node *node, const char *label, const char **text) {
-  if (node == NULL) return r->error->status;
-  if (node->type != PW_YAML_SCALAR || *node->text == 0)
-    return read_fail (r, node->at, "%s: expected text, found %s", label,
-                      node->type == PW_YAML_SCALAR ? "none" : node_found (node));
-  *text = node->text;
-  return r->error->status;
-}
-
-/* Converts an offset in a scalar's text to one in the source; that of the node if the source spells it otherwise. */
-static size_t source_offset (const pw_yaml *y, const pw_node *node, size_t offset) {
-  size_t at = node->at + (node->quoted != 0), n = strlen (node->text);
-  return at + n <= y->size && strncmp (y->source + at, node->text, n) == 0 ? at + offset : node->at;
-}
-
-/* Whether a name in an expression is that of a state: BODY.phi, or a first-order state. */
-static int is_state (const reader *r, const char *name) {
-  return strchr (name, '.') || (r->states.slot && pw_names_find (&r->states, name) >= 0);
-}
-
-/* The first name of the time t or of a state in an expression, or NULL. */
-static const char *find_variable (const reader *r, const char *text) {
-  char name[PW_EXPRESSION_NAME];
-  for (const char *rest = text, *p; (p = pw_expression_next_name (&rest, name)) != NULL;)
-    if (strcmp (name, "t") == 0 || is_state (r, name)) return p;
-  return NULL;
-}
-
-/* Reads a unique name that expressions can use. */
-static int read_name (const reader *r, const pw_node *node, const char *label, pw_names *names) {
-  const char *name;
-  if (read_text (r, node, label, &name) != PW_OK) return r->error->status;
-  if (!pw_expression_is_name (name))
-    return read_fail (r, node->at, "%s \"%.60s\": expected a letter, then letters, digits and _, at most 63 in all",
-                      label, name);
-  if (strcmp (name, "t") == 0 || pw_expression_is_reserved (name))
-    return read_fail (r, node->at, "%s \"%s\": this name is reserved: %s", label, name,
-                      *name == 't' && name[1] == 0 ? "it is the time" : "a function or constant");
-  return pw_names_add (names, name, 0) >= 0 ? read_fail (r, node->at, "a second %s \"%s\"", label, name) : PW_OK;
-}
-
-/* Replaces the text of an error at an unknown name by the suggestion of a first-order state, if its name is near and
- * the parser suggests nothing. */
-static void suggest_state (const reader *r, const char *text, pw_expression_error *error) {
-  char name[PW_EXPRESSION_NAME];
-  const char *rest = text + error->at;
-  if (strncmp (error->text, "there is no \"", 13) != 0 || strstr (error->text, "did you mean")) return;
-  if (pw_expression_next_name (&rest, name) != text + error->at) return;
-  pw_nearest near = { .sought = name };
-  for (const struct pw_name *e = r->states.slot, *end = e + r->states.size; e < end; e++)
-    if (e->name) pw_nearest_try (&near, e->name);
-  if (near.near) snprintf (error->text, sizeof error->text, "there is no \"%.60s\"%s", name, pw_nearest_text (&near));
-}
-
-/* 1 if the value of an expression changes during the motion. */
-static int read_varies (const reader *r, const char *text) {
-  char name[PW_EXPRESSION_NAME];
-  for (const char *rest = text; pw_expression_next_name (&rest, name) != NULL;)
-    if (r->outputs.slot && pw_names_find (&r->outputs, name) >= 0) return 1;
-  return find_variable (r, text) != NULL;
-}
-
-/* A number of a domain: an expression of the names in r->scope. */
-static int read_number (const reader *r, const pw_node *node, const char *label, pw_domain domain, double *value) {
-  pw_expression_error error;
-  if (node == NULL || r->error->status != PW_OK) return r->error->status;
-  if (node->type != PW_YAML_SCALAR)
-    return read_fail (r, node->at, "%s: expected a number, found %s", label, node_found (node));
-  int status = pw_expression_constant (r->scope, node->text, value, &error);
-  if (status == PW_RESOURCE) return read_no_memory (r);
-  if (status == PW_INPUT) suggest_state (r, node->text, &error);
-  if (status != PW_OK)
-    return read_fail (r, source_offset (r->y, node, error.at), "%s: %s", label,
-                      find_variable (r, node->text) == node->text + error.at
-                          ? "only the value of a signal may depend on the time t or on states"
-                          : error.text);
-  const char *expected = pw_domain_check (domain, *value);
-  return *expected ? read_fail (r, node->at, "%s = %g: expected %s", label, *value, expected) : PW_OK;
-}
-
-/* Two numbers: a list of `items`, "numbers, [x, y]". */
-static int read_pair (const reader *r, const pw_node *node, const char *label, const char *items, double *value) {
-  if (node == NULL || read_list_of (r, node, label, 2, items) != PW_OK) return r->error->status;
-  read_number (r, node->first, label, PW_REAL, value);
-  return read_number (r, node->first->next, label, PW_REAL, value + 1);
-}
-
-/* One of `choices`, which end with NULL, as its index. */
-static int read_choice (const reader *r, const pw_node *node, const char *label, const char *const *choices,
-                        int *value) {
-  char hint[PW_HINT];
-  const char *text = "";
-  if (node == NULL || read_text (r, node, label, &text) != PW_OK) return r->error->status;
-  int i = pw_find_name (choices, sizeof *choices, text, hint);
-  if (i < 0) return read_fail (r, node->at, "%s: there is no choice \"%.60s\"%s", label, text, hint);
-  *value = i;
-  return PW_OK;
-}
-
-/* The index of the element type that a scalar names, or -1. */
-static int find_kind (const pw_node *node) {
-  for (int i = 0; pw_kinds[i]; i++)
-    if (node_is (node, pw_kinds[i]->name)) return i;
-  return -1;
-}
-
-/* Adds the names of all bodies so far to the valid names of a suggestion. */
-static void suggest_bodies (const reader *r, pw_nearest *near) {
-  int bodies;
-  const pw_body *body = pw_model_bodies (r->model, &bodies);
-  for (int i = 0; i < bodies; i++) pw_nearest_try (near, body[i].name);
-}
-
-/* ---- Expressions of time and, in forces, of states: BODY.phi, ELEMENT.spin ---- */
-
-/* Reports an error at an offset of the expression, or name, in a node. */
-#define expression_fail(r, node, at, ...) \
-  read_fail (r, source_offset ((r)->y, node, at), "%s: %s", (r)->label, PW_PRINTED (300, __VA_ARGS__))
-
-/* Reads an expression; `variable`: names, which end with NULL. */
-static int read_expression (reader *r, const pw_node *node, const char *const *variable, const char **text,
-                            const pw_expression **expression) {
-  pw_expression_error error;
-  if (read_text (r, node, r->label, text) != PW_OK) return r->error->status;
-  int status = pw_expression_read (r->scope, variable, *text, r->arena, expression, &error);
-  if (status == PW_INPUT) suggest_state (r, *text, &error);
-  if (status == PW_INPUT) return expression_fail (r, node, error.at, "%s", error.text);
-  if (status != PW_OK) return read_no_memory (r);
-  if ((r->operations += (*expression)->codes) <= MAX_OPERATIONS) return PW_OK;
-  return read_fail (r, node->at, "%s: the expressions up to here have more than %d operations, the limit for a model",
-                    r->label, MAX_OPERATIONS);
-}
-
-/* Indexes all elements, including those not built yet, whose errors are reported later. */
-static int state_elements (reader *r) {
-  const pw_node *list = r->y->elements;
-  if (r->elements.slot) return PW_OK;
-  if (pw_names_open (&r->elements, list ? (size_t)list->count : 0) != PW_OK) return read_no_memory (r);
-  for (const pw_node *n = list ? list->first : NULL; n; n = n->next) {
-    const pw_node *key = n->type == PW_YAML_MAP ? n->first : NULL;
-    int kind = key && key->next->type == PW_YAML_SCALAR ? find_kind (key) : -1;
-    if (kind >= 0) pw_names_add (&r->elements, key->next->text, kind);
-  }
-  return PW_OK;
-}
-
-static int state_of_element (reader *r, const pw_node *node, const char *owner, const char *part, size_t at) {
-  char list[200] = "";
-  if (state_elements (r) != PW_OK) return r->error->status;
-  int found = pw_names_find (&r->elements, owner);
-  if (found < 0) {
-    pw_nearest near = { .sought = owner };
-    suggest_bodies (r, &near);
-    for (const struct pw_name *e = r->elements.slot, *end = e + r->elements.size; e < end; e++)
-      if (e->name && pw_kinds[e->value]->internal > 0) pw_nearest_try (&near, e->name);
-    return expression_fail (r, node, at, "there is no body \"%s\"%s", owner, pw_nearest_text (&near));
-  }
-  const pw_kind *kind = pw_kinds[found];
-  if (kind->internal == 0) return expression_fail (r, node, at, "%s %s has no states", kind->name, owner);
-  for (int i = 0; i < kind->internal; i++) {
-    const pw_quantity *state = &kind->coordinate[i];
-    if (strcmp (part, state->name) == 0 || strcmp (part, state->rate) == 0) return PW_OK;
-    append (list, "%s%s, %s", i ? ", " : "", state->name, state->rate);
-  }
-  return expression_fail (r, node, at + strlen (owner) + 1, "the states of %s %s are %s, not \"%.30s\"", kind->name,
-                          owner, list, part);
-}
-
-/* The number of a body's state, 0 to 5 for x to omega, or -1. */
-static int state_of_body (const char *part) {
-  static const char *const parts[] = { "x", "y", "phi", "vx", "vy", "omega" };
-  int i = 0;
-  while (i < 6 && strcmp (parts[i], part) != 0) i++;
-  return i < 6 ? i : -1;
-}
-
-/* Checks that a name with a dot, or that of a first-order state, at an offset of the expression, names a state. */
-static int state_check (reader *r, const pw_node *node, const char *name, size_t at) {
-  size_t n = strcspn (name, ".");
-  if (name[n] == 0 && is_state (r, name)) return PW_OK;
-  const char *owner = PW_PRINTED (100, "%.*s", (int)n, name);
-  if (pw_names_find (&r->bodies, owner) < 0) return state_of_element (r, node, owner, name + n + 1, at);
-  if (state_of_body (name + n + 1) >= 0) return PW_OK;
-  return expression_fail (r, node, at + n + 1, "a body's states are x, y, phi, vx, vy and omega, not \"%.30s\"",
-                          name + n + 1);
-}
-
-/* Whether the name of a state is that of a velocity, not of a coordinate or a first-order state. */
-static int is_velocity (const reader *r, const char *name) {
-  const char *dot = strchr (name, '.'), *part = dot ? dot + 1 : "";
-  const char *owner = PW_PRINTED (100, "%.*s", dot ? (int)(dot - name) : 0, name);
-  if (dot == NULL) return 0;
-  if (pw_names_find (&r->bodies, owner) >= 0) return state_of_body (part) >= 3;
-  const int kind = pw_names_find (&r->elements, owner);
-  for (int i = 0; kind >= 0 && i < pw_kinds[kind]->internal; i++)
-    if (strcmp (part, pw_kinds[kind]->coordinate[i].rate) == 0) return 1;
-  return 0;
-}
-
-/* ---- Signals that are expressions ----
- *
- * Such a signal is a function, of which each compiled system has a copy (signal_open): it may outlive the model. */
-
-enum { MAX_SIGNAL_STATES = 16, MAX_CHECKED_BREAKPOINTS = 100 };
-
-typedef struct {
-  const pw_expression *expression[3];    /* value, rate, acceleration; NULL: not given, differentiated instead */
-  int derivatives;                       /* required time derivatives; of a force: 0, nonholonomic: 1, holonomic: 2 */
-  int states;                            /* number of states in it */
-  const char *name[PW_OUTPUT_READS + 2]; /* "t", then states, "BODY.phi"; not for evaluation */
-  pw_signal_text text;
-} signal_function;
-
-/* Value and derivatives u; what is not given is computed from the last one given before; u[2] is 0 unless required. */
-static void signal_derivatives (const signal_function *f, const double *variable, double u[3]) {
-  pw_expression_derivatives (f->expression[0], variable, PW_EXPRESSION_TIME, u);
-  for (int i = 1; i <= f->derivatives; i++) {
-    double given[3];
-    if (f->expression[i] == NULL) continue;
-    pw_expression_derivatives (f->expression[i], variable, PW_EXPRESSION_TIME, given);
-    u[i] = given[0];
-    if (i == 1) u[2] = given[1]; /* the derivative of the given rate, unless the acceleration is given, too */
-  }
-  if (f->derivatives < 2) u[2] = 0;
-}
-
-static int signal_eval (void *context, double t, const double *state, double value[3], double *gradient) {
-  const signal_function *f = context;
-  double variable[PW_OUTPUT_READS + 1] = { t }, derivatives[3];
-  if (f->states) memcpy (variable + 1, state, (size_t)f->states * sizeof *state);
-  if (f->derivatives)
-    signal_derivatives (f, variable, value);
-  else
-    value[0] = pw_expression_value (f->expression[0], variable);
-  for (int i = 0; gradient && i < f->states; i++) {
-    pw_expression_derivatives (f->expression[0], variable, 1 + i, derivatives);
-    if (derivatives[0] != value[0]) /* at a jump in time, which only derivatives by t decide: pass it */
-      variable[0] = nextafter (t, INFINITY), pw_expression_derivatives (f->expression[0], variable, 1 + i, derivatives);
-    /* 0 where the derivative is unknown, such as that of sqrt (vx^2 + vy^2) at rest. */
-    gradient[i] = isfinite (derivatives[1]) ? derivatives[1] : 0;
-  }
-  return isfinite (value[0]) && (f->derivatives == 0 || (isfinite (value[1]) && isfinite (value[2]))) ? 0 : -1;
-}
-
-static double signal_breakpoint (void *context, double t) {
-  const signal_function *f = context;
-  double first = INFINITY;
-  for (int i = 0; i < 3; i++)
-    if (f->expression[i]) first = fmin (first, pw_expression_breakpoint (f->expression[i], t));
-  return first;
-}
-
-static void *signal_open (void *context) {
-  const signal_function *f = context;
-  size_t bytes[3] = { 0 };
-  for (int i = 0; i < 3; i++)
-    if (f->expression[i]) bytes[i] = pw_expression_size (f->expression[i]);
-  signal_function *copy = malloc (sizeof *f + bytes[0] + bytes[1] + bytes[2]);
-  if (copy == NULL) return NULL;
-  *copy = *f;
-  char *at = (char *)(copy + 1);
-  for (int i = 0; i < 3; at += bytes[i++])
-    if (f->expression[i]) copy->expression[i] = memcpy (at, f->expression[i], bytes[i]);
-  return copy;
-}
-
-/* Adds a state, at an offset of the expression, unless it is known already. */
-static int signal_add_state (reader *r, const pw_node *node, signal_function *f, const char *name, size_t at) {
-  for (int i = 1; i <= f->states; i++)
-    if (strcmp (f->name[i], name) == 0) return PW_OK;
-  if (f->derivatives > 1 || (f->derivatives && !pw_kind_signals_feedback (r->kind)))
-    return expression_fail (r, node, at, "\"%s\": the signal of a position constraint depends on the time t alone",
-                            name);
-  if (state_check (r, node, name, at) != PW_OK) return r->error->status;
-  if (f->derivatives && is_velocity (r, name))
-    return expression_fail (r, node, at,
-                            "\"%s\": the signal of a velocity constraint depends on positions and first-order states, "
-                            "not on velocities; use a state that follows it, {name: NAME, rate: (%s - NAME)/TIME}",
-                            name, name);
-  if (f->states == MAX_SIGNAL_STATES) return expression_fail (r, node, at, "more than %d states", MAX_SIGNAL_STATES);
-  f->name[f->states + 1] = pw_arena_copy (r->arena, name);
-  return f->name[++f->states] ? PW_OK : read_no_memory (r);
-}
-
-/* Finds the column of tables that a name in an expression names, also of an element that follows; its index is not set.
- * 0: there is none. */
-static int find_column (reader *r, const char *name, pw_column *c) {
-  const char *dot = strchr (name, '.'), *last = strrchr (name, '.');
-  if (dot == NULL && is_state (r, name)) return *c = (pw_column){ PW_COLUMN_STATE, 0 }, 1;
-  if (dot == NULL) return pw_kind_find_column (NULL, name, c);
-  const char *owner = PW_PRINTED (PW_EXPRESSION_NAME, "%.*s", (int)(dot - name), name);
-  const char *body = last == dot ? NULL : PW_PRINTED (PW_EXPRESSION_NAME, "%.*s", (int)(last - dot) - 1, dot + 1);
-  if (body == NULL && pw_names_find (&r->bodies, owner) >= 0 && state_of_body (last + 1) >= 0)
-    return *c = (pw_column){ PW_COLUMN_STATE, 0 }, 1;
-  int kind = state_elements (r) == PW_OK ? pw_names_find (&r->elements, owner) : -1;
-  if (kind < 0 || pw_kinds[kind]->each_body != (body != NULL)) return 0;
-  return (body == NULL || pw_names_find (&r->bodies, body) >= 0) && pw_kind_find_column (pw_kinds[kind], last + 1, c);
-}
-
-/* An output.  In a signal its expression stands for it, so that derivatives and breakpoints are those of the signal. */
-typedef struct output_function {
-  signal_function function; /* its states are columns */
-  const pw_node *node;      /* its value */
-  pw_named_output output;
-  int reader; /* the output that is being read and reads this one, or itself if it is the first; OUTPUT_... */
-} output_function;
-
-enum { OUTPUT_UNREAD = -1, OUTPUT_READ = -2 };
-
-/* The place of a wheel or marker that precedes, "rear.x", as an expression of states; NULL: the name is another one, or
- * out of memory. */
-static const char *contact_text (reader *r, const char *name) {
-  const char *dot = strchr (name, '.');
-  int elements,
-      found = dot ? pw_names_find (&r->contacts, PW_PRINTED (PW_EXPRESSION_NAME, "%.*s", (int)(dot - name), name)) : -1;
-  if (found < 0 || (strcmp (dot, ".x") != 0 && strcmp (dot, ".y") != 0)) return NULL;
-  const pw_element *e = pw_model_elements (r->model, &elements) + found;
-  const double *at = pw_field_at (e->kind, e->definition, PW_POINT, 0);
-  const char *body = *(const char *const *)pw_field_at (e->kind, e->definition, PW_BODY, 0);
-  if (!pw_expression_is_name (body)) return NULL;
-  const char *format = dot[1] == 'x' ? "(%s.x + (%.17g)*cos (%s.phi) - (%.17g)*sin (%s.phi))"
-                                     : "(%s.y + (%.17g)*sin (%s.phi) + (%.17g)*cos (%s.phi))";
-  return pw_arena_copy (r->arena, PW_PRINTED (400, format, body, at[0], body, at[1], body));
-}
-
-/* pw_scope.expand */
-static const char *expand_name (void *context, const char *name) {
-  reader *r = context;
-  int output = pw_names_find (&r->outputs, name);
-  return output >= 0 ? r->output[output].node->text : contact_text (r, name);
-}
-
-/* Adds the states on which a column depends, at an offset of the expression; output: the one that reads it, or NULL. */
-static int signal_add_column (reader *r, const pw_node *node, signal_function *f, const output_function *output,
-                              const char *name, size_t at) {
-  char state[PW_EXPRESSION_NAME];
-  const char *place = contact_text (r, name), *owner = PW_PRINTED (100, "%.*s", (int)strcspn (name, "."), name);
-  const char *where = output ? PW_PRINTED (100, "output \"%s\" reads %s: ", output->output.name, name) : "";
-  pw_column c;
-  for (const char *rest = place ? place : ""; pw_expression_next_name (&rest, state) != NULL;)
-    if (strchr (state, '.') && signal_add_state (r, node, f, state, at) != PW_OK) return r->error->status;
-  if (place) return PW_OK;
-  const int found = find_column (r, name, &c);
-  if (found && c.type == PW_COLUMN_CONTACT && pw_names_find (&r->contacts, owner) >= 0)
-    return expression_fail (r, node, at, "%sthe name of its body cannot be used in expressions", where);
-  if (found && c.type == PW_COLUMN_CONTACT)
-    return expression_fail (r, node, at, "%sdescribe %s before the signals that read its place", where, owner);
-  if (found && c.type != PW_COLUMN_STATE && output)
-    return expression_fail (r, node, at,
-                            "%sa signal cannot depend on reactions, energies and work, which follow from it", where);
-  if (found || output == NULL) return signal_add_state (r, node, f, name, at);
-  return expression_fail (r, node, at, "%sthere is no such column", where);
-}
-
-static int signal_expression (reader *r, const pw_node *node, signal_function *f, int i) {
-  const char *source = node->type == PW_YAML_SCALAR ? node->text : "";
-  char name[PW_EXPRESSION_NAME];
-  for (const char *rest = source, *p; (p = pw_expression_next_name (&rest, name)) != NULL;) {
-    const int found = pw_names_find (&r->outputs, name);
-    const output_function *output = found < 0 ? NULL : &r->output[found];
-    if (!output && is_state (r, name) && signal_add_column (r, node, f, NULL, name, (size_t)(p - source)) != PW_OK)
-      return r->error->status;
-    for (int k = 1; output && k <= output->function.states; k++)
-      if (signal_add_column (r, node, f, output, output->function.name[k], (size_t)(p - source)) != PW_OK)
-        return r->error->status;
-  }
-  if (read_expression (r, node, f->name, &f->text.part[i], &f->expression[i]) != PW_OK) return r->error->status;
-  const pw_expression *expression = f->expression[i];
-  if (expression->jump == NULL || f->text.jump) return PW_OK;
-  char *jump = pw_arena_alloc (r->arena, (size_t)expression->jump_size + 1);
-  f->text.jump = jump ? memcpy (jump, expression->jump, (size_t)expression->jump_size) : NULL;
-  return jump ? PW_OK : read_no_memory (r);
-}
-
-/* Compares derivative i, 1 or 2, which is given, with that computed from the last one given before, at some times. */
-static int signal_check_derivative (reader *r, const pw_node *node, const signal_function *f, int i, const char *name) {
-  static const double time[] = { 0.3, 1.7, 4.1 }; /* [s], arbitrary */
-  int last = f->expression[i - 1] ? i - 1 : 0, n = i - last;
-  double given[3], exact[3][3], size = 0;
-  for (int k = 0; k < 3; k++) {
-    given[k] = pw_expression_value (f->expression[i], &time[k]);
-    pw_expression_derivatives (f->expression[last], &time[k], PW_EXPRESSION_TIME, exact[k]);
-    if (isfinite (given[k]) && isfinite (exact[k][n]))
-      size = fmax (size, fabs (given[k]) + fabs (exact[k][n]) + 1e-6 * fabs (exact[k][0])); /* the last: round-off */
-  }
-  for (int k = 0; k < 3; k++)
-    if (isfinite (given[k]) && isfinite (exact[k][n]) && fabs (given[k] - exact[k][n]) > 1e-6 * size)
-      return read_fail (r, node->at, "%s: the %s at t = %g s is %.6g, but the derivative is %.6g", r->label, name,
-                        time[k], given[k], exact[k][n]);
-  return PW_OK;
-}
-
-/* The derivatives at a time; states that the signal reads have irregular values. */
-static void signal_derivatives_at (const signal_function *f, double t, double u[3]) {
-  double variable[MAX_SIGNAL_STATES + 1] = { t };
-  for (int i = 1; i <= f->states; i++) variable[i] = 0.1 + fmod (0.618 * i, 1);
-  signal_derivatives (f, variable, u);
-}
-
-/* The largest magnitude of derivative i at t +- 2^-1, 2^-2, ... 2^-20 s and t + 1 s. */
-static double signal_magnitude (const signal_function *f, double t, int i) {
-  double size = 0;
-  for (int k = -20; k <= 20; k++) {
-    double u[3];
-    signal_derivatives_at (f, t + (k < 0 ? -1 : 1) * ldexp (1, -abs (k)), u);
-    if (isfinite (u[i])) size = fmax (size, fabs (u[i]));
-  }
-  return size;
-}
-
-/* Refuses signals that a constraint cannot follow: a jump of the value or, for positions, of its derivative, at one of
- * the first breakpoints after t = 0, beyond round-off and the change between adjacent times; a jump as states change,
- * other than that of an angle by whole turns. */
-static int signal_check_continuity (reader *r, const pw_node *node, signal_function *f) {
-  double t = 0, before[3], after[3];
-  if (f->states && f->text.jump && strncmp (f->text.jump, "atan2", 5) != 0)
-    return read_fail (r, node->at, "%s: %.60s jumps as states change, and that of a velocity constraint must not",
-                      r->label, f->text.jump);
-  for (int k = 0; k < MAX_CHECKED_BREAKPOINTS; k++) {
-    t = signal_breakpoint (f, t);
-    if (t == INFINITY) return PW_OK;
-    double last = nextafter (t, -INFINITY);
-    signal_derivatives_at (f, last, before);
-    signal_derivatives_at (f, t, after);
-    for (int i = 0; i < f->derivatives; i++)
-      if (fabs (after[i] - before[i]) >
-          1e-9 * signal_magnitude (f, t, i) + 2 * (t - last) * (fabs (after[i + 1]) + fabs (before[i + 1])))
-        return read_fail (r, node->at, "%s: its %s jumps from %.6g to %.6g at t = %.9g s, and that of %s must not",
-                          r->label, i ? "rate" : "value", before[i], after[i], t,
-                          f->derivatives > 1 ? "a prescribed position" : "a velocity constraint");
-  }
-  return PW_OK;
-}
-
-/* Makes a signal from expressions: value; rate and acceleration, or NULL. */
-static int signal_of_time (reader *r, const pw_node *const node[3], pw_signal *signal) {
-  static const char *const key[] = { "expression", "rate", "acceleration" };
-  signal_function *f = pw_arena_alloc (r->arena, sizeof *f);
-  if (f == NULL) return read_no_memory (r);
-  f->name[0] = "t";
-  f->derivatives = pw_kind_signals_force (r->kind) ? 0 : r->kind->level == PW_HOLONOMIC ? 2 : 1;
-  *signal = (pw_signal){ PW_FUNCTION, .function = { .eval = signal_eval, .context = f, .text = &f->text } };
-  signal->function.open = signal_open;
-  signal->function.close = free;
-  for (int i = 0; i < 3; i++) {
-    if (node[i] == NULL) continue;
-    if (signal_expression (r, node[i], f, i) != PW_OK) return r->error->status;
-    if (f->expression[i]->breaks) signal->function.breakpoint = signal_breakpoint;
-    if (i > 0 && f->derivatives && f->states)
-      return read_fail (r, node[i]->at, "%s: a %s belongs to an expression of the time alone", r->label, key[i]);
-    if (i > 0 && !f->states && signal_check_derivative (r, node[i], f, i, key[i]) != PW_OK) return r->error->status;
-  }
-  if (f->states) signal->function.reads = f->name + 1;
-  return f->derivatives ? signal_check_continuity (r, node[0], f) : PW_OK;
-}
-
-/* ---- Signals ----
- *
- *   3, "2 * M0"                                    a constant
- *   {constant: 3}                                  the same
- *   {harmonic: {amplitude: 3, omega: 2}}           and ramp, smooth-step, pulse: their fields are in signal.c
- *   {table: {points: [[0, 1], [2, 3]]}}            points
- *   {table: {file: M.csv, columns: [t, M]}}        points of a file, by default in columns 1 and 2
- *   {table: {file: M.csv, time: t, columns: [M]}}  the same
- *   "M0 * cos (omega * t)"                         an expression of the time t; in forces also of states: BODY.phi
- *   {expression: .., rate: .., acceleration: ..}   the same; in constraints, its time derivatives may be given */
-
-/* Points in the model.  Returns their times, NULL after an error. */
-static double *table_list (reader *r, const pw_node *list, pw_signal *s) {
-  if (read_list (r, list, r->label) != PW_OK) return NULL;
-  size_t bytes = (size_t)list->count * sizeof (double);
-  double *t = pw_arena_alloc (r->arena, bytes), *value = pw_arena_alloc (r->arena, bytes);
-  if (t == NULL || value == NULL) return read_no_memory (r), NULL;
-  s->table.t = t;
-  s->table.value = value;
-  for (const pw_node *n = list->first; n; n = n->next) {
-    double point[2] = { 0 };
-    const char *label = PW_PRINTED (240, "%s: point %d", r->label, s->table.count + 1);
-    if (read_pair (r, n, label, "numbers, [time, value]", point) != PW_OK) return NULL;
-    t[s->table.count] = point[0];
-    value[s->table.count++] = point[1];
-  }
-  return t;
-}
-
-/* A model may only read files in its folder. */
-static FILE *table_open (const pw_yaml *y, const char *name, const char **reason) {
-  char joined[PW_PATH], path[PW_PATH];
-  size_t n = strlen (y->folder); /* 0 for the root */
-  *reason = "a table must be in the model's folder: its path is relative and has no \"..\"";
-  if (*name == '/' || strstr (PW_PRINTED (PW_PATH + 2, "/%s/", name), "/../")) return NULL;
-  if (realpath (pw_path (joined, "%s/%s", y->folder, name), path) == NULL) return *reason = strerror (errno), NULL;
-  *reason = "it is a link that leads out of the model's folder";
-  int is_inside = strncmp (path, y->folder, n) == 0 && (path[n] == '/' || path[n] == 0);
-  return is_inside ? pw_open_input (path, reason) : NULL;
-}
-
-/* The unit of the current field.  Only a drive has "m or rad"; the choice before this field decides. */
-static const char *table_unit (const reader *r) {
-  const pw_field *choice = r->field;
-  if (choice->unit == NULL || strcmp (choice->unit, "m or rad") != 0) return choice->unit;
-  while (choice->type != PW_CHOICE) choice--;
-  int chosen = *(const int *)(const void *)(r->definition + choice->offset);
-  return strcmp (choice->choices[chosen], "angle") == 0 ? "rad" : "m";
-}
-
-/* The columns of times and values: `columns` has both or, if `time` is given, perhaps that of the values alone; NULL by
- * default. */
-static int table_columns (reader *r, const pw_node *columns, const pw_node *time, const char *column[2]) {
-  const char *label = PW_PRINTED (240, "%s: columns", r->label);
-  const int count = time && columns && columns->count != 2 ? 1 : 2;
-  column[0] = column[1] = NULL;
-  if (read_list_of (r, columns, label, count, count == 1 ? "column, [value]" : "columns, [time, value]") != PW_OK)
-    return r->error->status;
-  const pw_node *first = columns ? columns->first : NULL;
-  read_text (r, time, PW_PRINTED (240, "%s: time", r->label), &column[0]);
-  read_text (r, count == 2 && first ? first->next : first, label, &column[1]);
-  if (count == 1 || r->error->status != PW_OK) return r->error->status;
-  if (time && first && first->type == PW_YAML_SCALAR && strcmp (first->text, column[0]) != 0)
-    return read_fail (r, first->at, "%s: the first one is that of the times, but time is \"%.60s\"", label, column[0]);
-  return read_text (r, time ? NULL : first, label, &column[0]);
-}
-
-/* Points in two columns of a file; rows without a time or value are left out.  Returns the times, or NULL. */
-static double *table_file (reader *r, const pw_node *node, const pw_node *columns, const pw_node *time, pw_signal *s) {
-  const char *name, *reason, *column[2], *const unit[2] = { "s", table_unit (r) };
-  pw_error cause = { 0 };
-  int rows;
-  if (table_columns (r, columns, time, column) != PW_OK || read_text (r, node, r->label, &name) != PW_OK) return NULL;
-  errno = 0;
-  FILE *f = table_open (r->y, name, &reason);
-  if (f == NULL && pw_open_input_status () == PW_RESOURCE)
-    return pw_fail (r->error, PW_RESOURCE, "%s: cannot read %s: %s", r->y->path, name, reason), NULL;
-  if (f == NULL) return read_fail (r, node->at, "%s: cannot read \"%.60s\": %s", r->label, name, reason), NULL;
-  double *t = pw_columns_from_stream (f, name, column, unit, 2, PW_GAPS_REFUSED, NULL, &rows, &cause);
-  fclose (f);
-  if (cause.status == PW_INPUT) return read_fail (r, node->at, "%s: %s", r->label, cause.text), NULL;
-  if (t == NULL || pw_model_keep (r->model, t, free) != PW_OK) return read_no_memory (r), NULL;
-  double *value = t + rows;
-  int count = 0;
-  for (int i = 0; i < rows; i++) {
-    if (isnan (t[i]) || isnan (value[i])) continue;
-    t[count] = t[i];
-    value[count++] = value[i];
-  }
-  s->table.t = t, s->table.value = value, s->table.count = count, s->table.skipped = rows - count;
-  return t;
-}
-
-/* Besides the fields of the form. */
-static const char *const table_keys[] = { "points", "file", "columns", "time", "time_scale", "time_offset" };
-enum { TABLE_KEYS = sizeof table_keys / sizeof *table_keys };
-
-/* Reads points or columns of a file; the times become time_offset + time_scale t, where whole numbers of ms since an
- * epoch stay exact.  Limits the points of all tables together: many may read the same large file. */
-static int table_points (reader *r, const pw_node *node, const pw_node *const v[TABLE_KEYS], pw_signal *s) {
-  const pw_node *points = v[0], *file = v[1], *columns = v[2], *time = v[3]; /* as table_keys */
-  double scale = 1, offset = 0;
-  if ((points != NULL) == (file != NULL))
-    return read_fail (r, node->at, "%s: a table has either points or a file", r->label);
-  if (points && columns) return read_fail (r, columns->at, "%s: columns belong to a file", r->label);
-  if (points && time) return read_fail (r, time->at, "%s: a column of times belongs to a file", r->label);
-  double *t = points ? table_list (r, points, s) : table_file (r, file, columns, time, s);
-  if (t == NULL) return r->error->status;
-  read_number (r, v[4], PW_PRINTED (240, "%s: time_scale", r->label), PW_POSITIVE, &scale);
-  read_number (r, v[5], PW_PRINTED (240, "%s: time_offset", r->label), PW_REAL, &offset);
-  for (int i = 0; i < s->table.count; i++) t[i] = scale * (t[i] + offset / scale);
-  r->points += s->table.count;
-  if (r->error->status != PW_OK || r->points <= MAX_POINTS) return r->error->status;
-  return read_fail (r, node->at, "%s: the tables up to here have more than %d points, the limit for a model", r->label,
-                    MAX_POINTS);
-}
-
-/* Reads the fields of a form, except a table's points; value: of each, or NULL. */
-static int signal_fields (reader *r, const pw_signal_form *form, const pw_node *node, const pw_node *const *value,
-                          pw_signal *signal) {
-  for (int i = 0; form->fields[i].name; i++) {
-    const pw_field *f = &form->fields[i];
-    void *at = (char *)signal + f->offset;
-    const char *label = PW_PRINTED (240, "%s: %s", r->label, f->name);
-    if (value[i] == NULL && f->required) read_fail (r, node->at, "%s is missing", label);
-    if (f->type == PW_NUMBER) read_number (r, value[i], label, f->domain, at);
-    if (f->type == PW_CHOICE) read_choice (r, value[i], label, f->choices, at);
-    /* 0 in the structure stands for a scale that is not given, which is 1 */
-    if (value[i] && form->type == PW_TABLE && strcmp (f->name, "scale") == 0 && signal->table.scale == 0)
-      read_fail (r, value[i]->at, "%s: 0 is not permitted", label);
-  }
-  return r->error->status;
-}
-
-/* Reads a signal of one form; a table has more keys than fields.  An error of the whole is reported at the faulty point
- * of a table, or at the signal. */
-static int signal_form (reader *r, const pw_signal_form *form, const pw_node *node, pw_signal *signal) {
-  const char *key[MAX_KEYS];
-  const pw_node *v[MAX_KEYS];
-  char fault[300];
-  int fields = 0, n, point, is_table = form->type == PW_TABLE;
-  *signal = (pw_signal){ .type = form->type };
-  for (const pw_field *f = form->fields; f->name; f++) key[fields++] = f->name;
-  for (n = fields; is_table && n < fields + TABLE_KEYS; n++) key[n] = table_keys[n - fields];
-  key[n] = NULL;
-  if (read_keys (r, node, key, PW_PRINTED (100, "a %s", form->name), v) != PW_OK ||
-      signal_fields (r, form, node, v, signal) != PW_OK ||
-      (is_table && table_points (r, node, v + fields, signal) != PW_OK))
-    return r->error->status;
-  if (*pw_signal_check (signal, r->kind, &point, fault, sizeof fault) == 0) return PW_OK;
-  const pw_node *faulty = is_table && v[fields] && point >= 0 ? v[fields]->first : NULL;
-  for (int i = 0; faulty && i < point; i++) faulty = faulty->next;
-  return read_fail (r, (faulty ? faulty : node)->at, "%s: %s", r->label, fault);
-}
-
-/* Keys of a signal in braces, such as {harmonic: {...}}; those from SIGNAL_FORMS on are the names of the forms. */
-enum { SIGNAL_CONSTANT, SIGNAL_EXPRESSION, SIGNAL_RATE, SIGNAL_ACCELERATION, SIGNAL_FORMS };
-
-static int signal_map (reader *r, const pw_node *node, pw_signal *signal) {
-  const char *key[MAX_KEYS] = { "constant", "expression", "rate", "acceleration" };
-  const pw_node *v[MAX_KEYS];
-  char list[100] = "constant, expression";
-  int n = SIGNAL_FORMS, given = 0, form = 0;
-  for (const pw_signal_form *f = pw_signal_forms; f->name; f++) {
-    append (list, ", %s", f->name);
-    key[n++] = f->name;
-  }
-  key[n] = NULL;
-  if (read_keys (r, node, key, "a signal", v) != PW_OK) return r->error->status;
-  for (int i = 0; i < n; i++) {
-    given += v[i] != NULL && i != SIGNAL_RATE && i != SIGNAL_ACCELERATION;
-    if (v[i] && i >= SIGNAL_FORMS) form = i;
-  }
-  if (given != 1)
-    return read_fail (r, node->at, "%s: expected one of %s; found %s", r->label, list, given ? "several" : "none");
-  if (!v[SIGNAL_EXPRESSION] && (v[SIGNAL_RATE] || v[SIGNAL_ACCELERATION]))
-    return read_fail (r, node->at, "%s: a rate or acceleration belongs to an expression", r->label);
-  if (v[SIGNAL_CONSTANT]) return read_number (r, v[SIGNAL_CONSTANT], r->label, PW_REAL, &signal->constant);
-  if (v[SIGNAL_EXPRESSION]) return signal_of_time (r, v + SIGNAL_EXPRESSION, signal);
-  return signal_form (r, &pw_signal_forms[form - SIGNAL_FORMS], v[form], signal);
-}
-
-static int read_signal (reader *r, const pw_node *node, pw_signal *signal) {
-  if (node->type == PW_YAML_MAP) return signal_map (r, node, signal);
-  if (node->type == PW_YAML_SCALAR && read_varies (r, node->text))
-    return signal_of_time (r, (const pw_node *const[3]){ node, NULL, NULL }, signal);
-  return read_number (r, node, r->label, PW_REAL, &signal->constant);
-}
 
 /* ---- Reference solution: `truth`, a map of states to expressions of time ---- */
 
@@ -785,26 +14,26 @@ static double reference_eval (void *context, int i, double t) {
   return pw_expression_value (x[i], &t);
 }
 
-static int reference_entry (reader *r, const pw_node *n, pw_names *seen) {
+static int reference_entry (pw_reader *r, const pw_node *n, pw_names *seen) {
   static const char *const time[] = { "t", NULL };
   pw_reference_text *t = r->reference;
   const pw_expression **x = t->context;
   const char *name;
-  if (read_text (r, n, "truth", &name) != PW_OK) return r->error->status;
-  if (!is_state (r, name))
+  if (pw_yaml_text (r, n, "truth", &name) != PW_OK) return r->error->status;
+  if (!pw_is_state_name (r, name))
     return read_fail (r, n->at, "truth: expected a state such as BODY.phi, found \"%.60s\"", name);
   r->label = "truth";
-  if (state_check (r, n, name, 0) != PW_OK) return r->error->status;
+  if (pw_check_state_name (r, n, name, 0) != PW_OK) return r->error->status;
   if (pw_names_add (seen, name, 0) >= 0) return read_fail (r, n->at, "truth: a second \"%s\"", name);
   r->label = PW_PRINTED (100, "truth of %.60s", name);
   t->state[t->states] = name;
-  int status = read_expression (r, n->next, time, &t->text[t->states], &x[t->states]);
+  int status = pw_yaml_expression (r, n->next, time, &t->text[t->states], &x[t->states]);
   t->states += status == PW_OK;
   return status;
 }
 
 /* Reads the reference solution, after bodies and elements. */
-static int read_reference (reader *r) {
+static int read_reference (pw_reader *r) {
   const pw_node *map = r->y->reference;
   pw_reference_text *t = r->reference;
   pw_names seen = { .size = 0 };
@@ -812,7 +41,7 @@ static int read_reference (reader *r) {
     t->names = r->numbers, t->name = r->scope->name, t->value = r->scope->value;
   if (map == NULL) return r->error->status;
   if (map->type != PW_YAML_MAP)
-    return read_fail (r, map->at, "truth: expected a map {STATE: EXPRESSION, ...}, found %s", node_found (map));
+    return read_fail (r, map->at, "truth: expected a map {STATE: EXPRESSION, ...}, found %s", pw_node_found (map));
   size_t room = (size_t)map->count + 1;
   t->state = pw_arena_alloc (r->arena, room * sizeof *t->state);
   t->text = pw_arena_alloc (r->arena, room * sizeof *t->text);
@@ -830,85 +59,68 @@ static int read_reference (reader *r) {
  * Bodies and elements are passed to pw_add_body and pw_add, like those of a build function in C.  The core checks them;
  * its messages get a position. */
 
-/* Reads the name of a body or element, which must be unique. */
-static int build_name (reader *r, const pw_node *node, const char *label, const char **name) {
-  if (read_text (r, node, label, name) != PW_OK) return r->error->status;
-  int before = pw_names_add (&r->names, *name, (int)node->at); /* a file has less than INT_MAX bytes */
-  if (before < 0) return PW_OK;
-  return read_fail (r, node->at, "%s \"%.60s\": line %d already uses this name", label, *name,
-                    pw_yaml_line (r->y, (size_t)before));
-}
-
-/* Reports an error of the core at a node, without its prefix "model NAME: ". */
-static int build_fail (const reader *r, const pw_node *node, const pw_error *cause) {
-  const char *prefix = PW_PRINTED (200, "model %s: ", pw_model_name (r->model)), *text = cause->text;
-  if (cause->status == PW_RESOURCE) return pw_fail (r->error, cause->status, "%s", text);
-  if (strncmp (text, prefix, strlen (prefix)) == 0) text += strlen (prefix);
-  return read_fail (r, node->at, "%s", text);
-}
-
-static int build_body (reader *r, const pw_node *node) {
+static int build_body (pw_reader *r, const pw_node *node) {
   static const char *const key[] = { "name", "mass", "inertia", "start", "rate", NULL };
   static const char *const state[][4] = { { "x", "y", "phi", NULL }, { "vx", "vy", "omega", NULL } };
   const pw_node *v[sizeof key / sizeof *key];
   pw_body body = { .specified = PW_SPECIFIES_NOTHING };
   pw_error cause = { 0 };
-  if (read_keys (r, node, key, "a body", v) != PW_OK) return r->error->status;
+  if (pw_yaml_keys (r, node, key, "a body", v) != PW_OK) return r->error->status;
   const pw_node *name = v[0];
   if (name == NULL) return read_fail (r, node->at, "a body needs a name");
-  if (build_name (r, name, "body", &body.name) != PW_OK) return r->error->status;
+  if (pw_build_name (r, name, "body", &body.name) != PW_OK) return r->error->status;
   for (int i = 0; i < 2; i++) {
     const char *label = PW_PRINTED (160, "body %.60s: %s", body.name, key[1 + i]);
-    read_number (r, v[1 + i], label, PW_NONNEGATIVE, i ? &body.inertia : &body.mass);
+    pw_yaml_number (r, v[1 + i], label, PW_NONNEGATIVE, i ? &body.inertia : &body.mass);
   }
   for (int i = 0; i < 2; i++) {
     const char *label = PW_PRINTED (160, "%s of body %.60s", key[3 + i], body.name);
     const pw_node *given[4];
-    read_keys (r, v[3 + i], state[i], label, given);
+    pw_yaml_keys (r, v[3 + i], state[i], label, given);
     for (int k = 0; k < 3; k++) {
       if (given[k] == NULL) continue;
       double *value = (i ? body.rate : body.start) + k;
-      read_number (r, given[k], PW_PRINTED (200, "%s: %s", label, state[i][k]), PW_REAL, value);
+      pw_yaml_number (r, given[k], PW_PRINTED (200, "%s: %s", label, state[i][k]), PW_REAL, value);
       body.specified |= 1u << (3 * i + k);
     }
   }
   if (r->error->status != PW_OK) return r->error->status;
-  if (pw_model_check_body (r->model, &body, &cause) != PW_OK) return build_fail (r, name, &cause);
+  if (pw_model_check_body (r->model, &body, &cause) != PW_OK) return pw_build_fail (r, name, &cause);
   pw_names_add (&r->bodies, body.name, 0);
   return pw_add_body (r->model, &body);
 }
 
 /* ---- Elements ---- */
 
-static int build_body_name (const reader *r, const pw_node *node, const char **name) {
-  if (read_text (r, node, r->label, name) != PW_OK) return r->error->status;
+static int build_body_name (const pw_reader *r, const pw_node *node, const char **name) {
+  if (pw_yaml_text (r, node, r->label, name) != PW_OK) return r->error->status;
   if (strcmp (*name, "ground") == 0 || pw_names_find (&r->bodies, *name) >= 0) return PW_OK;
   pw_nearest near = { .sought = *name };
-  suggest_bodies (r, &near);
+  pw_suggest_bodies (r, &near);
   pw_nearest_try (&near, "ground");
   return read_fail (r, node->at, "%s: there is no body \"%.60s\"%s", r->label, *name, pw_nearest_text (&near));
 }
 
-static int build_value (reader *r, const pw_node *node, void *to) {
+static int build_value (pw_reader *r, const pw_node *node, void *to) {
   switch (r->field->type) {
   case PW_NUMBER:
-    return read_number (r, node, r->label, r->field->domain, to);
+    return pw_yaml_number (r, node, r->label, r->field->domain, to);
   case PW_POINT:
   case PW_VECTOR:
-    return read_pair (r, node, r->label, "numbers, [x, y]", to);
+    return pw_yaml_pair (r, node, r->label, "numbers, [x, y]", to);
   case PW_BODY:
     return build_body_name (r, node, to);
   case PW_SIGNAL:
-    return read_signal (r, node, to);
+    return pw_yaml_signal (r, node, to);
   case PW_CHOICE:
-    return read_choice (r, node, r->label, r->field->choices, to);
+    return pw_yaml_choice (r, node, r->label, r->field->choices, to);
   case PW_TEXT:
-    return read_text (r, node, r->label, to);
+    return pw_yaml_text (r, node, r->label, to);
   }
   return read_fail (r, node->at, "%s cannot be given in a text model", r->label);
 }
 
-static int build_field (reader *r, const pw_node *node, const char *element) {
+static int build_field (pw_reader *r, const pw_node *node, const char *element) {
   static const char *const plural[] = { [PW_NUMBER] = "numbers",
                                         [PW_POINT] = "points, each [x, y],",
                                         [PW_VECTOR] = "vectors, each [x, y],",
@@ -921,7 +133,7 @@ static int build_field (reader *r, const pw_node *node, const char *element) {
   int count = pw_field_count (f);
   r->label = PW_PRINTED (200, "%s %.60s: %s", r->kind->name, element, f->name);
   if (count == 1) return build_value (r, node, to);
-  if (read_list_of (r, node, r->label, count, plural[f->type]) != PW_OK) return r->error->status;
+  if (pw_yaml_list_of (r, node, r->label, count, plural[f->type]) != PW_OK) return r->error->status;
   for (const pw_node *n = node->first; n; n = n->next, to += pw_field_bytes (f->type)) build_value (r, n, to);
   return r->error->status;
 }
@@ -942,17 +154,17 @@ static int build_is_field (const char *name) {
 }
 
 /* Finds the element type, the first key. */
-static int build_kind (reader *r, const pw_node *node) {
+static int build_kind (pw_reader *r, const pw_node *node) {
   const pw_node *first = node->type == PW_YAML_MAP ? node->first : NULL;
   if (first == NULL || first->type != PW_YAML_SCALAR)
-    return read_fail (r, node->at, "expected an element {TYPE: NAME, ...}, found %s", node_found (node));
-  int kind = find_kind (first);
+    return read_fail (r, node->at, "expected an element {TYPE: NAME, ...}, found %s", pw_node_found (node));
+  int kind = pw_find_kind_key (first);
   r->kind = kind < 0 ? NULL : pw_kinds[kind];
   if (r->kind == &pw_kind_state)
     return read_fail (r, first->at, "a state is not an element: list it under \"states\", {name: NAME, rate: ..}");
   if (r->kind) return PW_OK;
   for (const pw_node *n = first; n; n = n->next->next) { /* a type that appears later, also as {kind: wheel, ...} */
-    kind = find_kind (node_is (n, "kind") || node_is (n, "type") ? n->next : n);
+    kind = pw_find_kind_key (pw_node_is (n, "kind") || pw_node_is (n, "type") ? n->next : n);
     if (kind >= 0)
       return read_fail (r, first->at, "an element begins with its type: write {%s: NAME, ...}", pw_kinds[kind]->name);
   }
@@ -968,17 +180,17 @@ static int build_kind (reader *r, const pw_node *node) {
 
 /* Adds an element of the type r->kind with the fields in the pairs from `first` on, to which the keys of a first-order
  * state add `name`; at: where an error of the whole is reported. */
-static int build_fields (reader *r, const pw_node *at, const pw_node *name, const pw_node *first) {
-  const char *key[MAX_KEYS];
-  const pw_node *v[MAX_KEYS];
+static int build_fields (pw_reader *r, const pw_node *at, const pw_node *name, const pw_node *first) {
+  const char *key[PW_MAX_KEYS];
+  const pw_node *v[PW_MAX_KEYS];
   const pw_kind *kind = r->kind;
   pw_error cause = { 0 };
   int n = 0, index;
   memset (r->definition, 0, kind->definition);
   memcpy (r->definition, &name->text, sizeof name->text);
-  for (const pw_field *f = kind->fields; f->name && n < MAX_KEYS - 2; f++) key[n++] = f->name;
+  for (const pw_field *f = kind->fields; f->name && n < PW_MAX_KEYS - 2; f++) key[n++] = f->name;
   key[n] = kind == &pw_kind_state ? "name" : NULL, key[n + 1] = NULL;
-  read_keys_from (r, first, key, PW_PRINTED (100, "a %s", kind->name), v);
+  pw_yaml_keys_from (r, first, key, PW_PRINTED (100, "a %s", kind->name), v);
   for (int i = 0; i < n && r->error->status == PW_OK; i++) {
     const pw_field *f = r->field = &kind->fields[i];
     if (v[i])
@@ -988,289 +200,71 @@ static int build_fields (reader *r, const pw_node *at, const pw_node *name, cons
   }
   if (r->error->status != PW_OK) return r->error->status;
   pw_element e = { kind, r->definition };
-  if (pw_model_check_element (r->model, &e, &cause) != PW_OK) return build_fail (r, name, &cause);
+  if (pw_model_check_element (r->model, &e, &cause) != PW_OK) return pw_build_fail (r, name, &cause);
   pw_model_elements (r->model, &index);
   if (kind->contact && !kind->each_body) pw_names_add (&r->contacts, name->text, index);
   return pw_add (r->model, kind, r->definition);
 }
 
-static int build_element (reader *r, const pw_node *node) {
+static int build_element (pw_reader *r, const pw_node *node) {
   const char *name;
   if (build_kind (r, node) != PW_OK) return r->error->status;
   const pw_node *first = node->first;
-  if (build_name (r, first->next, r->kind->name, &name) != PW_OK) return r->error->status;
+  if (pw_build_name (r, first->next, r->kind->name, &name) != PW_OK) return r->error->status;
   return build_fields (r, first, first->next, first->next->next);
-}
-
-/* ---- Units of parameters, which must be SI units: 40 with the unit deg would mean 40 rad ---- */
-
-enum { UNIT_BYTES = 400 /* of a unit of up to 60 characters with SI units in place of others, and its end */ };
-
-/* Whether a UTF-8 character is a letter, not a sign like those of multiplication (·, U+22C5) or a raised digit. */
-static int unit_is_letter (const char *character) {
-  const unsigned char first = (unsigned char)*character;
-  if (first < 0xC3 || strncmp (character, "×", 2) == 0) return isalpha (first) || strncmp (character, "µ", 2) == 0;
-  return first != 0xE2; /* U+2000 to U+2FFF */
-}
-
-/* The first place where a name is a word of its own in a text, or NULL. */
-static const char *unit_find_word (const char *text, const char *name) {
-  for (const char *at = strstr (text, name), *before; at; at = strstr (at + 1, name)) {
-    for (before = at; before > text && ((unsigned char)*--before & 0xC0) == 0x80;) continue;
-    if ((at == text || !unit_is_letter (before)) && !unit_is_letter (at + strlen (name))) return at;
-  }
-  return NULL;
-}
-
-/* The first of pw_unit_names that is not an SI unit and occurs in a text, and its place; NULL: there is none. */
-static const pw_unit_name *unit_other (const char *unit, const char **at) {
-  for (const pw_unit_name *other = pw_unit_names; other->name; other++) {
-    if (strcmp (other->factor, "1") == 0 || (strchr (other->name, '/') && strcmp (other->name, unit) != 0)) continue;
-    if ((*at = unit_find_word (unit, other->name)) != NULL) return other;
-  }
-  return NULL;
-}
-
-/* Replaces the other unit, at a place in the unit, by SI units.  conversion: of a value, "*deg" or "/1e-3^2". */
-static void unit_replace (char unit[UNIT_BYTES], const pw_unit_name *other, const char *at, char conversion[40]) {
-  const char *before = at, *after = at + strlen (other->name);
-  int power;
-  pw_unit_power (after, &power);
-  while (before > unit && before[-1] == ' ') before--;
-  const int divides = before > unit && before[-1] == '/';
-  const int product = strpbrk (other->si, " /") && (divides || power != 1);
-  const char *text = PW_PRINTED (UNIT_BYTES, "%.*s%s%s%s%s", (int)(at - unit), unit, product ? "(" : "", other->si,
-                                 product ? ")" : "", after);
-  memcpy (unit, text, UNIT_BYTES);
-  snprintf (conversion, 40, power == 1 ? "%c%s" : "%c%s^%d", divides ? '/' : '*', other->factor, power);
-}
-
-/* Refuses a unit that contains this other unit than an SI unit, and says how to convert the value. */
-static int unit_refuse (const reader *r, const pw_node *node, const pw_node *value, const pw_unit_name *other,
-                        const char *unit) {
-  static const char why[] = "unit: numbers are in SI units, angles in radians, and no unit converts a value";
-  char si[UNIT_BYTES], conversion[40];
-  const char *at;
-  double factor;
-  int replaced = 0, number = value->type == PW_YAML_SCALAR && strlen (value->text) <= 30 &&
-                             pw_expression_number (value->text, &(double){ 0 });
-  if (strlen (unit) > 60 || pw_unit_factor (unit, NULL, &factor) != PW_OK) { /* not understood as a whole */
-    pw_unit_factor (other->name, other->si, &factor);
-    return read_fail (r, node->at, "%s; convert it with 1 %s = %.15g %s, and write %s instead", why, other->name,
-                      factor, other->si, other->si);
-  }
-  snprintf (si, sizeof si, "%s", unit);
-  for (; (other = unit_other (si, &at)) != NULL; replaced++) unit_replace (si, other, at, conversion);
-  if (replaced > 1) snprintf (conversion, sizeof conversion, "*%.15g", factor);
-  return read_fail (r, node->at, "%s; write \"value: %s%s, unit: %s\"", why, number ? value->text : "(..)", conversion,
-                    si);
-}
-
-static int read_unit (const reader *r, const pw_node *node, const pw_node *value, const char **unit) {
-  const char *at;
-  if (node == NULL || read_text (r, node, "unit", unit) != PW_OK) return r->error->status;
-  const char *in = strstr (*unit, " in "); /* "persons in lane": no inches, unless it is a product of units */
-  const pw_unit_name *other = unit_other (*unit, &at);
-  if (other == NULL || (in && at == in + 1 && pw_unit_factor (*unit, NULL, &(double){ 0 }) != PW_OK)) return PW_OK;
-  return unit_refuse (r, node, value, other, *unit);
 }
 
 /* ---- First-order states: a list of {name, rate, start, unit} ---- */
 
 /* The node of a state's name, or NULL after an error. */
-static const pw_node *state_name (const reader *r, const pw_node *node) {
+static const pw_node *state_name (const pw_reader *r, const pw_node *node) {
   if (node->type != PW_YAML_MAP)
-    return read_fail (r, node->at, "expected a state {name: NAME, rate: ..}, found %s", node_found (node)), NULL;
+    return read_fail (r, node->at, "expected a state {name: NAME, rate: ..}, found %s", pw_node_found (node)), NULL;
   for (const pw_node *n = node->first; n; n = n->next->next)
-    if (node_is (n, "name")) return n->next;
+    if (pw_node_is (n, "name")) return n->next;
   return read_fail (r, node->at, "a state needs a name"), NULL;
 }
 
 /* Indexes the names of all states, which signals of any element may read; expressions can use them. */
-static int index_states (reader *r) {
+static int index_states (pw_reader *r) {
   for (const pw_node *n = r->y->states ? r->y->states->first : NULL; n && r->error->status == PW_OK; n = n->next) {
     const pw_node *node = state_name (r, n);
     const char *name;
-    if (node == NULL || build_name (r, node, "state", &name) != PW_OK) return r->error->status;
-    if (read_name (r, node, "state", &r->states) != PW_OK) return r->error->status;
+    if (node == NULL || pw_build_name (r, node, "state", &name) != PW_OK) return r->error->status;
+    if (pw_yaml_name (r, node, "state", &r->states) != PW_OK) return r->error->status;
     if (pw_names_find (&r->scope->index, name) >= 0)
       return read_fail (r, node->at, "state \"%s\": a parameter or number of let has this name", name);
   }
   return r->error->status;
 }
 
-static int build_state (reader *r, const pw_node *node) {
+static int build_state (pw_reader *r, const pw_node *node) {
   const pw_node *name = state_name (r, node);
   r->kind = &pw_kind_state;
   return build_fields (r, name, name, node->first);
 }
 
-/* ---- Outputs ---- */
-
-/* Outputs are displayed in SI units, like all columns. */
-static int output_unit (const reader *r, const pw_node *node, const char **unit) {
-  const char *at;
-  if (read_text (r, node, "unit", unit) != PW_OK || node == NULL) return r->error->status;
-  const pw_unit_name *other = unit_other (*unit, &at);
-  if (other == NULL) return PW_OK;
-  return read_fail (r, node->at, "unit: \"%s\": outputs are in SI units and radians, as all columns", other->name);
-}
-
-/* Reads the name and the texts of an output. */
-static int output_head (reader *r, const pw_node *node, output_function *o) {
-  static const char *const key[] = { "name", "value", "unit", "about", NULL };
-  const pw_node *v[sizeof key / sizeof *key];
-  pw_column column;
-  if (read_keys (r, node, key, "an output", v) != PW_OK) return r->error->status;
-  if (v[0] == NULL) return read_fail (r, node->at, "an output needs a name");
-  if (build_name (r, v[0], "output", &o->output.name) != PW_OK) return r->error->status;
-  const char *name = o->output.name;
-  if (!pw_expression_is_name (name))
-    return read_fail (r, v[0]->at, "output \"%.60s\": expected a letter, then letters, digits and _, at most 63 in all",
-                      name);
-  if (pw_expression_is_reserved (name) || pw_kind_find_column (NULL, name, &column))
-    return read_fail (r, v[0]->at, "output \"%s\": this name is reserved: %s", name,
-                      strcmp (name, "t") == 0            ? "it is the time"
-                      : pw_expression_is_reserved (name) ? "a function or constant"
-                                                         : "a column of tables");
-  if (pw_names_find (&r->scope->index, name) >= 0)
-    return read_fail (r, v[0]->at, "output \"%s\": a parameter or a name of let is called so", name);
-  if (v[1] == NULL) return read_fail (r, node->at, "output %s needs a value", name);
-  if (v[1]->type != PW_YAML_SCALAR)
-    return read_fail (r, v[1]->at, "output %s: expected an expression, found %s", name, node_found (v[1]));
-  o->node = v[1], o->reader = OUTPUT_UNREAD;
-  o->function.name[0] = "t", o->function.text.part[0] = v[1]->text;
-  o->output.value = (pw_function){ signal_eval, o, NULL, NULL, signal_open, free, &o->function.text };
-  if (output_unit (r, v[2], &o->output.unit) != PW_OK) return r->error->status;
-  return read_text (r, v[3], "about", &o->output.about);
-}
-
-static int output_add_column (reader *r, output_function *o, const char *name, size_t at) {
-  signal_function *f = &o->function;
-  for (int i = 1; i <= f->states; i++)
-    if (strcmp (f->name[i], name) == 0) return PW_OK;
-  if (f->states == PW_OUTPUT_READS) return expression_fail (r, o->node, at, "more than %d columns", PW_OUTPUT_READS);
-  f->name[f->states + 1] = pw_arena_copy (r->arena, name);
-  return f->name[++f->states] ? PW_OK : read_no_memory (r);
-}
-
-/* Reports that output `last` reads output `first`, of which it is a function. */
-static int output_cycle (const reader *r, const output_function *last, int first, size_t at) {
-  char list[300] = "";
-  for (int i = (int)(last - r->output); i != first; i = r->output[i].reader)
-    append (list, "%s%s", *list ? ", " : ", through ", r->output[i].output.name);
-  return read_fail (r, source_offset (r->y, last->node, at), "output %s is a function of itself%s",
-                    r->output[first].output.name, list);
-}
-
-/* Reads the expression of an output, after those of outputs in it. */
-static int output_expression (reader *r, int index, int reads) {
-  output_function *o = &r->output[index];
-  char name[PW_EXPRESSION_NAME];
-  pw_column c;
-  o->reader = reads;
-  for (const char *source = o->node->text, *rest = source, *p; (p = pw_expression_next_name (&rest, name)) != NULL;) {
-    const size_t at = (size_t)(p - source);
-    int other = pw_names_find (&r->outputs, name), status = PW_OK;
-    if (other >= 0 && r->output[other].reader >= 0) return output_cycle (r, o, other, at);
-    if (other >= 0 && r->output[other].reader == OUTPUT_UNREAD) status = output_expression (r, other, index);
-    r->label = PW_PRINTED (100, "output %s", o->output.name);
-    for (int i = 1; status == PW_OK && other >= 0 && i <= r->output[other].function.states; i++)
-      status = output_add_column (r, o, r->output[other].function.name[i], at);
-    if (status == PW_OK && other < 0 && strcmp (name, "t") != 0 &&
-        (is_state (r, name) || pw_kind_find_column (NULL, name, &c)))
-      status = output_add_column (r, o, name, at);
-    if (status != PW_OK) return status;
-  }
-  o->reader = OUTPUT_READ;
-  r->label = PW_PRINTED (100, "output %s", o->output.name);
-  return read_expression (r, o->node, o->function.name, &(const char *){ NULL }, &o->function.expression[0]);
-}
-
-/* Reads all outputs.  The columns that they read are checked by outputs_add. */
-static int outputs_read (reader *r) {
-  const pw_node *list = r->y->outputs;
-  const int count = list ? list->count : 0;
-  if (count > PW_MOST_OUTPUTS)
-    return read_fail (r, list->at, "outputs: %d entries; a model may have %d", count, PW_MOST_OUTPUTS);
-  r->output = pw_arena_alloc (r->arena, (size_t)count * sizeof *r->output);
-  if (r->output == NULL || pw_names_open (&r->outputs, (size_t)count) != PW_OK) return read_no_memory (r);
-  int i = 0;
-  for (const pw_node *n = list ? list->first : NULL; n && r->error->status == PW_OK; n = n->next, i++)
-    if (output_head (r, n, &r->output[i]) == PW_OK) pw_names_add (&r->outputs, r->output[i].output.name, i);
-  for (i = 0; i < count && r->error->status == PW_OK; i++) pw_scope_add (r->scope, r->output[i].output.name, NAN);
-  r->scope->expand = expand_name, r->scope->context = r;
-  for (i = 0; i < count && r->error->status == PW_OK; i++)
-    if (r->output[i].reader == OUTPUT_UNREAD) output_expression (r, i, i);
-  return r->error->status;
-}
-
-/* Reports a name that is no column, with the nearest column of its body or element, or the nearest of these. */
-static int output_unknown (reader *r, const pw_node *node, const char *name, size_t at) {
-  static const char *const part[] = { "x", "y", "phi", "vx", "vy", "omega" };
-  const size_t n = strcspn (name, ".");
-  const char *owner = PW_PRINTED (100, "%.*s", (int)n, name);
-  const int is_body = pw_names_find (&r->bodies, owner) >= 0, element = pw_names_find (&r->elements, owner);
-  const pw_kind *kind = element >= 0 ? pw_kinds[element] : NULL;
-  pw_nearest near = { .sought = is_body || kind ? name + n + 1 : owner };
-  for (int i = 0; is_body && i < 6; i++) pw_nearest_try (&near, part[i]);
-  for (int i = 0; kind && i < 2 * kind->internal; i++)
-    pw_nearest_try (&near, i % 2 ? kind->coordinate[i / 2].rate : kind->coordinate[i / 2].name);
-  for (int i = 0; kind && i < kind->rows; i++) pw_nearest_try (&near, kind->reaction[i].name);
-  for (int i = 0; kind && i < 4; i++)
-    if (pw_kind_find_column (kind, ((const char *const[]){ "x", "y", "work", "loss" })[i], &(pw_column){ 0 }))
-      pw_nearest_try (&near, ((const char *const[]){ "x", "y", "work", "loss" })[i]);
-  if (is_body || kind)
-    return expression_fail (r, node, at + n + 1, "%s has no column \"%.60s\"%s", owner, name + n + 1,
-                            pw_nearest_text (&near));
-  suggest_bodies (r, &near);
-  for (const struct pw_name *e = r->elements.slot, *end = e + r->elements.size; e < end; e++)
-    if (e->name) pw_nearest_try (&near, e->name);
-  return expression_fail (r, node, at, "there is no body or element \"%s\"%s", owner, pw_nearest_text (&near));
-}
-
-/* Adds the outputs to the model, after all elements. */
-static int outputs_add (reader *r) {
-  char name[PW_EXPRESSION_NAME];
-  pw_column c;
-  pw_error cause = { 0 };
-  for (output_function *o = r->output, *end = o + (r->y->outputs ? r->y->outputs->count : 0); o < end; o++) {
-    r->label = PW_PRINTED (100, "output %s", o->output.name);
-    for (const char *source = o->node->text, *rest = source, *p; (p = pw_expression_next_name (&rest, name)) != NULL;) {
-      const size_t at = (size_t)(p - source);
-      const int found = find_column (r, name, &c);
-      if (is_state (r, name) && !found) return output_unknown (r, o->node, name, at);
-      if (found && (c.type == PW_COLUMN_PROJECTION || c.type == PW_COLUMN_BALANCE))
-        return expression_fail (r, o->node, at, "%s describes the integration, not the motion", name);
-    }
-    o->output.value.reads = o->function.name + 1;
-    if (pw_model_check_output (r->model, &o->output, &cause) != PW_OK) return build_fail (r, o->node, &cause);
-    if (pw_add_output (r->model, &o->output) != PW_OK) return r->error->status;
-  }
-  return r->error->status;
-}
-
 /* ---- The model ---- */
 
-static int build_all (reader *r, const double *parameter) {
+static int build_all (pw_reader *r, const double *parameter) {
   const pw_yaml *y = r->y;
   double value;
   for (int i = 0; i < y->parameter_count; i++) pw_scope_add (r->scope, y->table.parameters[i].name, parameter[i]);
   for (const pw_node *n = y->let ? y->let->first : NULL; n; n = n->next->next) {
-    if (read_number (r, n->next, PW_PRINTED (100, "let %s", n->text), PW_REAL, &value) != PW_OK)
+    if (pw_yaml_number (r, n->next, PW_PRINTED (100, "let %s", n->text), PW_REAL, &value) != PW_OK)
       return r->error->status;
     pw_scope_add (r->scope, n->text, value);
   }
   r->numbers = r->scope->names;
   if (index_states (r) != PW_OK) return r->error->status;
-  if (outputs_read (r) != PW_OK) return r->error->status;
+  if (pw_yaml_outputs (r) != PW_OK) return r->error->status;
   for (const pw_node *n = y->bodies ? y->bodies->first : NULL; n; n = n->next)
     if (build_body (r, n) != PW_OK) return r->error->status;
   for (const pw_node *n = y->elements ? y->elements->first : NULL; n; n = n->next)
     if (build_element (r, n) != PW_OK) return r->error->status;
   for (const pw_node *n = y->states ? y->states->first : NULL; n; n = n->next)
     if (build_state (r, n) != PW_OK) return r->error->status;
-  if (outputs_add (r) != PW_OK) return r->error->status;
+  if (pw_add_outputs (r) != PW_OK) return r->error->status;
   return read_reference (r);
 }
 
@@ -1280,7 +274,7 @@ static void build_free (void *arena) {
 }
 
 /* Allocates the memory for building, and the arena for what lives as long as the model. */
-static int build_open (reader *r) {
+static int build_open (pw_reader *r) {
   const pw_yaml *y = r->y;
   size_t largest = 1, bodies = y->bodies ? (size_t)y->bodies->count : 0, lets = y->let ? (size_t)y->let->count : 0;
   size_t elements = y->elements ? (size_t)y->elements->count : 0, outputs = y->outputs ? (size_t)y->outputs->count : 0;
@@ -1305,11 +299,11 @@ static int build_open (reader *r) {
 static void build_model (pw_model *m, const void *parameters) {
   const void *table = pw_model_table (m);
   pw_scope scope = { 0 };
-  reader r = { .y = table, .model = m, .scope = &scope, .error = pw_model_error (m) };
-  read_list (&r, r.y->bodies, "bodies");
-  read_list (&r, r.y->states, "states");
-  read_list (&r, r.y->outputs, "outputs");
-  if (read_list (&r, r.y->elements, "elements") == PW_OK && build_open (&r) == PW_OK) build_all (&r, parameters);
+  pw_reader r = { .y = table, .model = m, .scope = &scope, .error = pw_model_error (m) };
+  pw_yaml_list (&r, r.y->bodies, "bodies");
+  pw_yaml_list (&r, r.y->states, "states");
+  pw_yaml_list (&r, r.y->outputs, "outputs");
+  if (pw_yaml_list (&r, r.y->elements, "elements") == PW_OK && build_open (&r) == PW_OK) build_all (&r, parameters);
   pw_scope_close (&scope);
   pw_names_close (&r.bodies);
   pw_names_close (&r.states);
@@ -1323,40 +317,40 @@ static void build_model (pw_model *m, const void *parameters) {
 /* ---- The head ---- */
 
 /* A default must not depend on other parameters: --set would have to change it, too. */
-static int head_default (const reader *r, const pw_node *node, const char *label, const pw_names *names,
+static int head_default (const pw_reader *r, const pw_node *node, const char *label, const pw_names *names,
                          pw_parameter *p) {
   const char *text = node->type == PW_YAML_SCALAR ? node->text : "";
   char name[PW_EXPRESSION_NAME];
   for (const char *rest = text, *at; (at = pw_expression_next_name (&rest, name)) != NULL;)
     if (pw_names_find (names, name) >= 0)
-      return read_fail (r, source_offset (r->y, node, (size_t)(at - text)),
+      return read_fail (r, pw_source_offset (r->y, node, (size_t)(at - text)),
                         "%s: a default is made of numbers; what follows from parameters belongs in let", label);
-  return read_number (r, node, label, p->domain, &p->value);
+  return pw_yaml_number (r, node, label, p->domain, &p->value);
 }
 
-static int head_parameter (const reader *r, const pw_node *node, pw_names *names, pw_parameter *p) {
+static int head_parameter (const pw_reader *r, const pw_node *node, pw_names *names, pw_parameter *p) {
   static const char *const key[] = { "name", "value", "unit", "about", "domain", "min", NULL };
   const pw_node *v[sizeof key / sizeof *key];
-  if (read_keys (r, node, key, "a parameter", v) != PW_OK) return r->error->status;
+  if (pw_yaml_keys (r, node, key, "a parameter", v) != PW_OK) return r->error->status;
   const pw_node *name = v[0], *value = v[1], *unit = v[2], *about = v[3], *domain = v[4], *min = v[5];
   int chosen = min ? PW_NONNEGATIVE : PW_REAL;
   if (name == NULL) return read_fail (r, node->at, "a parameter needs a name");
-  if (read_name (r, name, "parameter", names) != PW_OK) return r->error->status;
+  if (pw_yaml_name (r, name, "parameter", names) != PW_OK) return r->error->status;
   p->name = name->text;
   p->unit = p->about = "";
   const char *label = PW_PRINTED (100, "parameter %s", p->name);
   if (value == NULL) return read_fail (r, node->at, "%s needs a value, its default", label);
-  if (min && (!node_is (min, "0") || domain))
+  if (min && (!pw_node_is (min, "0") || domain))
     return read_fail (r, min->at, "min: only 0 can be written, without a domain; \"domain: positive\" means > 0");
-  read_choice (r, domain, "domain", pw_domain_names, &chosen);
+  pw_yaml_choice (r, domain, "domain", pw_domain_names, &chosen);
   p->domain = (pw_domain)chosen;
-  read_unit (r, unit, value, &p->unit);
-  read_text (r, about, "about", &p->about);
+  pw_yaml_unit (r, unit, value, &p->unit);
+  pw_yaml_text (r, about, "about", &p->about);
   return head_default (r, value, label, names, p);
 }
 
-static int head_parameters (pw_yaml *y, const reader *r, const pw_node *list, pw_names *names) {
-  if (read_list (r, list, "parameters") != PW_OK) return r->error->status;
+static int head_parameters (pw_yaml *y, const pw_reader *r, const pw_node *list, pw_names *names) {
+  if (pw_yaml_list (r, list, "parameters") != PW_OK) return r->error->status;
   size_t count = list ? (size_t)list->count : 0;
   pw_parameter *p = pw_arena_alloc (&y->arena, (count + 1) * sizeof *p);
   if (p == NULL) return read_no_memory (r);
@@ -1369,7 +363,7 @@ static int head_parameters (pw_yaml *y, const reader *r, const pw_node *list, pw
   return PW_OK;
 }
 
-static int read_head (pw_yaml *y, const reader *r) {
+static int read_head (pw_yaml *y, const pw_reader *r) {
   static const char *const key[] = { "pinwheel", "about", "run",    "parameters", "let", "bodies",
                                      "elements", "truth", "states", "outputs",    NULL };
   static const char *const run_key[] = { "t_end", "step", "rtol", "method", NULL };
@@ -1377,27 +371,27 @@ static int read_head (pw_yaml *y, const reader *r) {
   double *number[] = { &y->table.run.t_end, &y->table.run.step, &y->table.run.rtol };
   pw_names names = { .size = 0 };
   if (y->root == NULL) return read_fail (r, 0, "the file is empty; a model begins with \"pinwheel: 1\"");
-  if (read_keys (r, y->root, key, "a model", v) != PW_OK) return r->error->status;
+  if (pw_yaml_keys (r, y->root, key, "a model", v) != PW_OK) return r->error->status;
   if (v[0] == NULL) return read_fail (r, y->root->at, "\"pinwheel: 1\" is missing, the version of the format");
-  if (!node_is (v[0], "1"))
+  if (!pw_node_is (v[0], "1"))
     return read_fail (r, v[0]->at, "pinwheel: expected 1, the version of the format that this Pinwheel reads");
-  read_text (r, v[1], "about", &y->table.about);
-  read_keys (r, v[2], run_key, "run", run);
-  for (int i = 0; i < 3; i++) read_number (r, run[i], run_key[i], PW_POSITIVE, number[i]);
-  read_text (r, run[3], run_key[3], &y->table.run.method);
+  pw_yaml_text (r, v[1], "about", &y->table.about);
+  pw_yaml_keys (r, v[2], run_key, "run", run);
+  for (int i = 0; i < 3; i++) pw_yaml_number (r, run[i], run_key[i], PW_POSITIVE, number[i]);
+  pw_yaml_text (r, run[3], run_key[3], &y->table.run.method);
   const pw_node *parameters = v[3], *let = v[4];
   /* the key of the reference solution is "truth" */
   y->let = let, y->bodies = v[5], y->elements = v[6], y->reference = v[7], y->states = v[8], y->outputs = v[9];
   for (int i = 3; key[i]; i++) /* from "parameters" on: lists and maps */
-    if (v[i] && v[i]->count > MAX_ITEMS)
-      read_fail (r, v[i]->at, "%s: %d entries; a model may have %d", key[i], v[i]->count, MAX_ITEMS);
+    if (v[i] && v[i]->count > PW_MAX_ITEMS)
+      read_fail (r, v[i]->at, "%s: %d entries; a model may have %d", key[i], v[i]->count, PW_MAX_ITEMS);
   size_t count = (size_t)(parameters ? parameters->count : 0) + (size_t)(let ? let->count : 0);
   if (r->error->status == PW_OK && pw_names_open (&names, count) != PW_OK) read_no_memory (r);
   if (r->error->status == PW_OK) head_parameters (y, r, parameters, &names);
   if (r->error->status == PW_OK && let && let->type != PW_YAML_MAP)
-    read_fail (r, let->at, "let: expected a map {NAME: NUMBER, ...}, found %s", node_found (let));
+    read_fail (r, let->at, "let: expected a map {NAME: NUMBER, ...}, found %s", pw_node_found (let));
   for (const pw_node *n = let ? let->first : NULL; n && r->error->status == PW_OK; n = n->next->next)
-    read_name (r, n, "name", &names);
+    pw_yaml_name (r, n, "name", &names);
   pw_names_close (&names);
   return r->error->status;
 }
@@ -1418,7 +412,7 @@ pw_yaml *pw_yaml_open (const char *path, const char *shown, size_t max_bytes, pw
   y->max_ahead = MAX_AHEAD * fmax (1, (double)max_bytes / PW_FILE_DEFAULT_BYTES);
   y->table = (pw_plugin_table){ .abi = PW_ABI, .size = sizeof y->table, .build = build_model };
   if (pw_yaml_read_source (y, path, max_bytes, error) == PW_OK && pw_yaml_read_tree (y, error) == PW_OK &&
-      read_head (y, &(reader){ .y = y, .error = error }) == PW_OK)
+      read_head (y, &(pw_reader){ .y = y, .error = error }) == PW_OK)
     return y;
   pw_yaml_close (y);
   return NULL;
@@ -1437,7 +431,7 @@ int pw_yaml_tables (const pw_yaml *y, const pw_node *node, int (*each) (void *co
   for (const pw_node *n = node == NULL || node->type == PW_YAML_SCALAR ? NULL : node->first; n && !stop; n = n->next) {
     const pw_node *key = node->type == PW_YAML_MAP ? n : NULL;
     if (key) n = key->next; /* its value */
-    if (key && node_is (key, "file") && n->type == PW_YAML_SCALAR) {
+    if (key && pw_node_is (key, "file") && n->type == PW_YAML_SCALAR) {
       char path[PW_PATH];
       stop = each (context, pw_path (path, "%s/%s", y->folder, n->text));
     } else

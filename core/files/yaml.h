@@ -2,7 +2,7 @@
  *
  *   yaml_text.c  reads and checks the text; messages with line, column and caret; the tree as bytes
  *   yaml_tree.c  builds a tree of scalars, lists and maps from libfyaml's events
- *   yaml.c       reads a model from the tree */
+ *   yaml.c       reads a model from the tree (yaml_read.h) */
 #ifndef PW_YAML_H
 #define PW_YAML_H
 
