@@ -1,6 +1,8 @@
 /* Outputs of models: their values as columns, functionals of them against closed forms, in signals; the time at which a
  * condition becomes true. */
 #include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include "check.h"
 #include "cli.h"
@@ -42,10 +44,10 @@ static void outputs_near (double value, double expected, double bound) {
   if (!(fabs (value - expected) <= bound)) fail_msg ("%.17g, expected %.17g", value, expected);
 }
 
-static double outputs_value (const char *text, const char *method, double t_end) {
+static double outputs_value (const char *text, const char *until, const char *method, double t_end) {
   pw_outcomes x;
   pw_error error = { 0 };
-  check_ok (pw_outcomes_open (&x, scene.system, "--of", &text, 1, &error), &error);
+  check_ok (pw_outcomes_open (&x, scene.system, "--of", &text, 1, until, &error), &error);
   pw_settings settings = { .step = 1e-3, .rtol = 1e-10, .span = t_end, .ledger = x.ledger };
   check_ok (pw_outcomes_run (&x, method, &settings, t_end, NULL, &error), &error);
   double value = pw_outcome_value (&x, 0);
@@ -66,17 +68,19 @@ TEST (values) {
                    { "mean:twice", 2 * (5 * 2.25 - 5 * 3.375 / 3) / 1.5 },
                    { "rms:pull", 4 * sqrt ((1.5 / 2 + sin (6) / 8) / 1.5) },
                    { "normal", 10 },
-                   { "max:energy - min:energy", 0 } };
+                   { "max:energy - min:energy", 0 },
+                   { "at 0.5:height - at 1.25:height", 3.75 - 4.6875 },
+                   { "at 0:height + at 1.5:height", 3.75 } };
   for (size_t i = 0; i < sizeof expected / sizeof *expected; i++)
     for (int m = 0; m < 5; m++)
-      outputs_near (outputs_value (expected[i].text, methods[m], 1.5), expected[i].value, 1e-6);
+      outputs_near (outputs_value (expected[i].text, NULL, methods[m], 1.5), expected[i].value, 1e-6);
 }
 
 TEST (integrals_of_works_are_refused) {
   pw_outcomes x;
   pw_error error = { 0 };
   const char *text = "mean:energy";
-  assert_int_equal (pw_outcomes_open (&x, scene.system, "--of", &text, 1, &error), PW_INPUT);
+  assert_int_equal (pw_outcomes_open (&x, scene.system, "--of", &text, 1, NULL, &error), PW_INPUT);
   assert_non_null (strstr (error.text, "energy reads works or losses"));
   pw_outcomes_close (&x);
 }
@@ -138,6 +142,122 @@ TEST (bad_conditions) {
     assert_null (pw_condition_open (scene.system, bad[i][0], &error));
     assert_int_equal (error.status, PW_INPUT);
     assert_non_null (strstr (error.text, bad[i][1]));
+  }
+}
+
+/* Outputs of runs that end within a step: at the time 1.25 s, or 0.5 s on the way up. */
+TEST (until) {
+  static const char *const methods[] = { "rk4", "erk8", "bdf", "ida", "radau" };
+  const struct {
+    const char *text, *until;
+    double value;
+  } expected[] = { { "t", "ball.x > 1.25", 1.25 },
+                   { "integral:height", "ball.x > 1.25", 5 * 1.5625 - 5 * 1.953125 / 3 },
+                   { "mean:height", "ball.x > 1.25", (5 * 1.5625 - 5 * 1.953125 / 3) / 1.25 },
+                   { "max:height", "ball.x > 1.25", 5 },
+                   { "max:height", "height > 3.75", 3.75 },
+                   { "min:pull", "height > 3.75", -4 },
+                   { "max:pull", "height > 3.75", -4 * cos (1) },
+                   { "at 0.25:height", "height > 3.75", 2.1875 } };
+  for (size_t i = 0; i < sizeof expected / sizeof *expected; i++)
+    for (int m = 0; m < 5; m++)
+      outputs_near (outputs_value (expected[i].text, expected[i].until, methods[m], 1.5), expected[i].value, 1e-6);
+}
+
+TEST (sweep_columns) {
+  cli_good (
+      "pinwheel sweep @/outputs.yaml -t 3 --vary ball.vx=1,2,4 --of max:height --of 'at 0.5:height' --of 2*height "
+      "--until 'ball.x > 1' --rtol 1e-10 -m erk8 -o @/s.csv");
+  double t[3], height[3], at[3];
+  char word[3][20];
+  const char *line = cli_file ("s.csv");
+  assert_non_null (strstr (line, ",max:height [m],at 0.5:height [m],2*height,"));
+  for (int i = 0; i < 3; i++) {
+    line = strchr (line, '\n') + 1;
+    double twice;
+    const char *end = strstr (line, ",ok,") + 4;
+    assert_int_equal (sscanf (end, "%lf", &t[i]), 1);
+    for (int k = 0; k < 13; k++) end = strchr (end, ',') + 1; /* t and twelve states */
+    assert_int_equal (sscanf (end, "%lf,%19[^,],%lf", &height[i], word[i], &twice), 3);
+    outputs_near (twice, 2 * (10 * t[i] - 5 * t[i] * t[i]), 1e-8);
+    at[i] = strtod (word[i], NULL);
+  }
+  const double end[] = { 1, 0.5, 0.25 }, most[] = { 5, 3.75, 2.1875 };
+  for (int i = 0; i < 3; i++) outputs_near (t[i], end[i], 1e-9), outputs_near (height[i], most[i], 1e-8);
+  outputs_near (at[0], 3.75, 1e-8);
+  assert_string_equal (word[2], "nan"); /* the run ends before */
+  cli_bad_each (
+      "sweep",
+      (const cli_wrong[]){
+          { "@/outputs.yaml --vary ball.vx=1,2 --of hight -o @/x.csv", "--of hight: no column \"hight\"; did you "
+                                                                       "mean \"height\"?" },
+          { "@/outputs.yaml --vary ball.vx=1,2 --of ball.x -o @/x.csv", "--of ball.x: the table has this column" },
+          { "@/outputs.yaml --vary ball.vx=1,2 --until 'hight > 1' -o @/x.csv",
+            "--until hight > 1: no column \"hight\"; did you mean \"height\"?" },
+          { "@/outputs.yaml --vary ball.vx=1,2 --of height --error -o @/x.csv",
+            "--error compares complete runs: it cannot be given together with --of" } },
+      4);
+}
+
+/* The time t = 1.25 m/vx at which the ball passes a point, and its height there. */
+TEST (derivatives_of_an_arrival) {
+  const double expected[] = { -1.25, 0, -1.25 * (10 - 12.5), 1.25 };
+  double value[CLI_MOST], error[CLI_MOST];
+  cli_good ("pinwheel sensitivity @/outputs.yaml -t 3 --of t --of height --by ball.vx --by ball.vy "
+            "--until 'ball.x > 1.25' -o @/sens");
+  cli_shows ("t = 1.25 s");
+  cli_bad ("pinwheel sensitivity @/outputs.yaml -t 1 --of t --by ball.vx --until 'ball.x > 1.25'", 4,
+           "--until ball.x > 1.25: not true before the end of the run at t = 1 s");
+  assert_int_equal (cli_sensitivity ("derivative", value), 4);
+  assert_int_equal (cli_sensitivity ("error", error), 4);
+  for (int i = 0; i < 4; i++) {
+    outputs_near (value[i], expected[i], error[i] + 1e-14);
+    outputs_near (error[i], 0, 1e-7);
+  }
+  assert_null (cli_file ("sens/sensitivity.csv"));
+}
+
+/* ---- Outputs in C ---- */
+
+/* The square of the distance of the ball from the block, and twice that. */
+static int outputs_distance (void *context, double t, const double *x, double value[3], double *gradient) {
+  (void)t, (void)gradient;
+  value[0] = *(const double *)context * (x[0] * x[0] + x[1] * x[1]);
+  return 0;
+}
+
+TEST (interface) {
+  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table };
+  static double one = 1, two = 2;
+  static const char *const places[] = { "ball.x", "ball.y", NULL }, *const none[] = { "ball.z", NULL };
+  pw_error error = { 0 };
+  for (int bad = 0; bad < 4; bad++) {
+    pw_model *m = pw_model_new ("own", &table, &error);
+    pw_add_body (m, &(pw_body){ .name = "ball", .mass = 1, .inertia = 1, .start = { 3, 4, 0 } });
+    pw_named_output o = { .name = "square", .unit = "m^2", .value = { .eval = outputs_distance, .context = &one } };
+    o.value.reads = places;
+    pw_add_output (m, &o);
+    o.name = bad == 1 ? "square" : bad == 2 ? "a b" : "other", o.value.context = &two;
+    if (bad == 3) o.value.reads = none;
+    pw_add_output (m, &o);
+    pw_system *s = pw_system_compile (m, &error);
+    static const char *const message[] = { "", "output \"square\": a body, an element, another output or a column",
+                                           "output \"a b\": expected a letter",
+                                           "output other: no column \"ball.z\"; did you mean \"ball." };
+    if (bad) assert_non_null (strstr (error.text, message[bad]));
+    if (!bad) {
+      pw_run *r = pw_run_open (s, "rk4", &(pw_settings){ .step = 0.1 }, &error);
+      pw_sample sample;
+      check_ok (pw_run_sample (r, 0, &sample, &error), &error);
+      assert_int_equal (pw_system_outputs (s), 2);
+      assert_string_equal (pw_system_output_unit (s, 0), "m^2");
+      outputs_near (sample.output[0], 25, 0), outputs_near (sample.output[1], 50, 0);
+      pw_run_close (r);
+    }
+    assert_true (bad ? s == NULL : s != NULL);
+    pw_system_free (s);
+    pw_model_free (m);
+    error = (pw_error){ 0 };
   }
 }
 

@@ -21,26 +21,35 @@ int pw_column_find (const pw_system *s, const char *name, const char *origin, pw
 /* ---- Texts ---- */
 
 static const char *const outcome_prefix[] = { "final:", "max:", "min:", "mean:", "integral:", "rms:" };
+#define OUTCOME_PREFIXES "final:, max:, min:, mean:, integral:, rms: and at TIME:"
 
-/* Reads the prefix of a functional at the beginning of a text, final: without one; *text is moved to the column. */
-static pw_functional_type outcome_type (const char **text) {
+/* Reads the prefix of a functional at the beginning of a text, final: without one; *text is moved to the column; *t: the
+ * time of "at TIME:". */
+static pw_functional_type outcome_type (const char **text, double *t) {
   for (int i = 0; i <= PW_RMS; i++) {
     size_t n = strlen (outcome_prefix[i]);
     if (strncmp (*text, outcome_prefix[i], n) == 0) return *text += n, (pw_functional_type)i;
   }
-  return PW_FINAL;
+  if (strncmp (*text, "at ", 3) != 0) return PW_FINAL;
+  char number[40];
+  const char *colon = strchr (*text, ':');
+  if (colon == NULL) return PW_FINAL;
+  snprintf (number, sizeof number, "%.*s", (int)fmin (sizeof number - 1, (double)(colon - *text - 3)), *text + 3);
+  if (pw_read_number (number, t) != PW_OK) return PW_FINAL;
+  return *text = colon + 1, PW_AT_TIME;
 }
 
 /* The index of a functional, which is added unless it is there; -1 if out of memory. */
-static int outcome_add_functional (pw_outcomes *set, pw_functional_type type, pw_column c) {
+static int outcome_add_functional (pw_outcomes *set, pw_functional_type type, pw_column c, double t) {
   for (int i = 0; i < set->functionals; i++) {
     const pw_functional *f = set->functional + i;
-    if (f->type == type && f->column.type == c.type && f->column.index == c.index) return i;
+    if (f->type == type && f->column.type == c.type && f->column.index == c.index && (type != PW_AT_TIME || f->t == t))
+      return i;
   }
   pw_functional *more = realloc (set->functional, ((size_t)set->functionals + 1) * sizeof *more);
   if (more == NULL) return -1;
   set->functional = more;
-  set->functional[set->functionals] = (pw_functional){ .type = type, .column = c };
+  set->functional[set->functionals] = (pw_functional){ .type = type, .column = c, .t = t };
   set->ledger |= c.type > PW_COLUMN_POTENTIAL && c.type < PW_COLUMN_OUTPUT;
   set->extrema += pw_is_extremum (type), set->integrals += pw_is_integral (type);
   return set->functionals++;
@@ -58,13 +67,12 @@ static const char *outcome_variable (char name[OUTCOME_VARIABLE], int i) {
 static int outcome_add_term (pw_outcomes *set, pw_outcome *o, const char *origin, const char *name, char next,
                              char variable[OUTCOME_VARIABLE], pw_error *error) {
   pw_column c;
-  pw_functional_type type = outcome_type (&name);
+  double t = 0;
+  pw_functional_type type = outcome_type (&name, &t);
   pw_error own = { 0 };
   if (pw_column_find (set->system, name, origin, &c, &own) != PW_OK)
-    return next == ':'
-               ? pw_fail (error, PW_INPUT,
-                          "%s: no \"%s:\"; valid are final:, max:, min:, mean:, integral: and rms:", origin, name)
-               : pw_fail (error, PW_INPUT, "%s", own.text);
+    return next == ':' ? pw_fail (error, PW_INPUT, "%s: no \"%s:\"; valid are " OUTCOME_PREFIXES, origin, name)
+                       : pw_fail (error, PW_INPUT, "%s", own.text);
   if (pw_is_integral (type) && (c.type == PW_COLUMN_POSITION || c.type == PW_COLUMN_VELOCITY ||
                                 c.type == PW_COLUMN_PROJECTION || c.type == PW_COLUMN_BALANCE))
     return pw_fail (error, PW_INPUT, "%s: %s describes the integration, not the motion: it has no %s", origin, name,
@@ -77,7 +85,7 @@ static int outcome_add_term (pw_outcomes *set, pw_outcome *o, const char *origin
   if (type == PW_RMS && pw_column_is_integrated (c.type))
     return pw_fail (error, PW_INPUT,
                     "%s: no rms: of work and losses; valid are final:, max:, min:, mean: and integral:", origin);
-  int f = outcome_add_functional (set, type, c), i = 0;
+  int f = outcome_add_functional (set, type, c, t), i = 0;
   if (f < 0) return pw_fail (error, PW_RESOURCE, "out of memory");
   while (i < o->terms && o->term[i] != f) i++;
   if (i == PW_FORMULA_NAMES) return pw_fail (error, PW_INPUT, "%s: more than %d columns", origin, PW_FORMULA_NAMES);
@@ -97,7 +105,7 @@ static size_t outcome_term_length (const pw_system *s, const char *text) {
   char name[300];
   pw_column c;
   if (strspn (text, OUTCOME_LETTERS) == 0) return 0;
-  outcome_type (&at);
+  outcome_type (&at, &(double){ 0 });
   size_t prefix = (size_t)(at - text), word = strspn (at, OUTCOME_LETTERS "0123456789."),
          longest = strspn (at, OUTCOME_LETTERS "0123456789.-");
   for (int i = 0; i < 3 && prefix == 0; i++)
@@ -152,10 +160,14 @@ static int outcome_read (pw_outcomes *set, pw_outcome *o, const char *option, pw
 }
 
 int pw_outcomes_open (pw_outcomes *set, const pw_system *s, const char *option, const char *const *text, int count,
-                      pw_error *error) {
-  *set = (pw_outcomes){ .system = s, .outcome = calloc ((size_t)count + 1, sizeof *set->outcome) };
+                      const char *until, pw_error *error) {
+  pw_error own = { 0 };
+  *set = (pw_outcomes){ .system = s, .outcome = calloc ((size_t)count + 1, sizeof *set->outcome), .until = until };
   set->workspace = pw_workspace_new (s, error);
   if (set->outcome == NULL || set->workspace == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  if (until && (set->condition = pw_condition_open (s, until, &own)) == NULL)
+    return pw_fail (error, own.status, "--until %.200s: %s", until, own.text);
+  set->ledger = until && pw_condition_needs_ledger (set->condition);
   for (; set->outcomes < count; set->outcomes++) {
     set->outcome[set->outcomes].text = text[set->outcomes];
     int status = outcome_read (set, set->outcome + set->outcomes, option, error);
@@ -168,6 +180,7 @@ void pw_outcomes_close (pw_outcomes *set) {
   for (int i = 0; i < set->outcomes; i++) pw_formula_close (set->outcome[i].formula);
   free (set->outcome);
   free (set->functional);
+  pw_condition_close (set->condition);
   pw_workspace_free (set->workspace);
   *set = (pw_outcomes){ .system = NULL };
 }
@@ -379,39 +392,91 @@ static void functional_row (functional_step *step, const pw_outcome_table *table
     table->value[o * table->rows + row] = pw_outcome_is_final (set, o) ? pw_outcome_value (set, o) : NAN;
 }
 
-static void functional_end (functional_step *step) {
-  pw_outcomes *set = step->set;
-  pw_sample s = { .t = step->t1 };
-  if (step->status == PW_OK) step->status = pw_run_sample (step->run, step->t1, &s, step->error);
-  if (step->status == PW_OK) step->status = functional_read (set, &s, FUNCTIONAL_END, step->error);
-  for (pw_functional *f = set->functional; f < set->functional + set->functionals && step->status == PW_OK; f++) {
-    if (pw_is_integral (f->type)) f->value = functional_of_integral (f, *s.integral++, step->t1 - set->begin);
+void pw_outcomes_settings (pw_outcomes *set, pw_settings *settings) {
+  settings->ledger |= set->ledger;
+  settings->integrals = set->integrals, settings->integrand = functional_integrands;
+  settings->integrand_context = set;
+}
+
+/* The first time after t, up to `most`, at which a value is to be sampled. */
+static double functional_next (const pw_outcomes *set, double t, double most) {
+  for (const pw_functional *f = set->functional; f < set->functional + set->functionals; f++)
+    if (f->type == PW_AT_TIME && f->t > t && f->t < most) most = f->t;
+  return most;
+}
+
+/* Samples values at given times up to the end of the step that are not known yet. */
+static void functional_values_at_times (functional_step *step) {
+  for (pw_functional *f = step->set->functional; f < step->set->functional + step->set->functionals; f++)
+    if (f->type == PW_AT_TIME && isnan (f->value) && f->t <= step->t1) f->value = functional_at (step, f, f->t);
+}
+
+/* Searches the condition in the step, which ends where it becomes true. */
+static void functional_check_condition (functional_step *step) {
+  double t = NAN;
+  if (step->set->condition && step->status == PW_OK)
+    step->status = pw_run_find_crossing (step->run, &step->set->crossing, &t, step->error);
+  if (!isnan (t)) step->t1 = t, step->set->ended = 1;
+}
+
+int pw_outcomes_begin (pw_outcomes *set, pw_run *r, double t_end, pw_error *error) {
+  const double t = pw_run_time (r);
+  functional_step step = { set, r, t, t, PW_OK, error };
+  set->begin = set->t = t, set->ended = 0;
+  set->crossing = (pw_crossing){ .value = pw_condition_value, .context = set->condition };
+  functional_sample (&step, t, 0);
+  for (pw_functional *f = set->functional; f < set->functional + set->functionals; f++) {
+    if (f->type == PW_AT_TIME && !(f->t >= t && f->t <= t_end))
+      return pw_fail (error, PW_INPUT, "at %.15g: the run is from %.15g s to %.15g s", f->t, t, t_end);
+    f->value = f->type == PW_AT_TIME ? NAN : f->values[0];
+    if (f->type != PW_AT_TIME) f->t = t;
+  }
+  functional_values_at_times (&step);
+  functional_check_condition (&step);
+  return step.status;
+}
+
+int pw_outcomes_advance (pw_outcomes *set, pw_run *r, double t, double t_end, pw_error *error) {
+  functional_step step = { set, r, set->t, set->t, PW_OK, error };
+  step.status = set->extrema || set->condition ? pw_run_advance (r, t_end, error)
+                                               : pw_run_advance_to (r, functional_next (set, set->t, t), t_end, error);
+  step.t1 = pw_run_time (r);
+  functional_check_condition (&step);
+  if (step.status == PW_OK && set->extrema) functional_extrema (&step);
+  functional_values_at_times (&step);
+  set->t = step.t1;
+  return step.status;
+}
+
+int pw_outcomes_end (pw_outcomes *set, pw_run *r, pw_error *error) {
+  pw_sample s;
+  if (!set->ended) set->t = pw_run_time (r);
+  if (pw_run_sample (r, set->t, &s, error) != PW_OK || functional_read (set, &s, FUNCTIONAL_END, error) != PW_OK)
+    return error->status;
+  for (pw_functional *f = set->functional; f < set->functional + set->functionals; f++) {
+    if (pw_is_integral (f->type)) f->value = functional_of_integral (f, *s.integral++, set->t - set->begin);
     if (f->type == PW_FINAL) f->value = f->values[FUNCTIONAL_END];
   }
+  return PW_OK;
 }
 
 int pw_outcomes_run (pw_outcomes *set, const char *method, const pw_settings *settings, double t_end,
                      const pw_outcome_table *table, pw_error *error) {
   pw_settings own = *settings;
-  own.ledger |= set->ledger;
-  own.integrals = set->integrals, own.integrand = functional_integrands, own.integrand_context = set;
-  set->begin = own.t;
+  pw_outcomes_settings (set, &own);
   pw_run *r = pw_limit_open (set->system, method, &own, error);
   if (r == NULL) return error->status;
-  functional_step step = { set, r, own.t, own.t, PW_OK, error };
-  functional_sample (&step, own.t, 0);
-  for (pw_functional *f = set->functional; f < set->functional + set->functionals; f++)
-    f->value = f->values[0], f->t = own.t;
+  functional_step step = { set, r, own.t, own.t, pw_outcomes_begin (set, r, t_end, error), error };
   for (int row = 0, rows = table ? table->rows : 0; step.status == PW_OK;) {
-    for (; row < rows && table->t[row] <= step.t1 && step.status == PW_OK; row++) functional_row (&step, table, row);
-    if (step.status != PW_OK || !(step.t1 < t_end)) break;
-    step.status = set->extrema ? pw_run_advance (r, t_end, error)
-                               : pw_run_advance_to (r, row < rows ? table->t[row] : t_end, t_end, error);
-    step.t0 = step.t1, step.t1 = pw_run_time (r);
-    if (step.status == PW_OK && set->extrema) functional_extrema (&step);
+    for (; row < rows && table->t[row] <= set->t && step.status == PW_OK; row++) functional_row (&step, table, row);
+    if (step.status != PW_OK || set->ended || !(set->t < t_end)) break;
+    step.status = pw_outcomes_advance (set, r, row < rows ? table->t[row] : t_end, t_end, error);
   }
-  functional_end (&step);
-  if (step.status == PW_STOPPED) step.status = pw_limit_status (settings->stop_context, step.t1, error);
+  if (step.status == PW_OK) step.status = pw_outcomes_end (set, r, error);
+  if (step.status == PW_STOPPED) step.status = pw_limit_status (settings->stop_context, set->t, error);
+  if (step.status == PW_OK && set->condition && !set->ended)
+    step.status = pw_fail (error, PW_METHOD, "--until %.200s: not true before the end of the run at t = %.15g s",
+                           set->until, set->t);
   pw_run_close (r);
   return step.status;
 }

@@ -273,7 +273,7 @@ pw_summary pw_run_summary (pw_run_cli *command, const pw_sample *last, const pw_
                          .status = pw_cli_status_word (error->status),
                          .reason = error->text,
                          .cpu = command->cpu,
-                         .until = command->condition ? command->until : NULL,
+                         .until = command->condition ? command->line.until : NULL,
                          .stop_time = command->stop_time,
                          .energy_defect = last ? pw_run_energy_defect (run, last) : NAN,
                          .redundant = command->redundant,

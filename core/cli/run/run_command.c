@@ -281,8 +281,9 @@ static int run_open_condition (pw_run_cli *command, pw_error *error) {
   if (command->with_error)
     return pw_fail (error, PW_INPUT, "--error compares complete runs: it cannot be given together with --until");
   if (command->checkpoints.path) return pw_fail (error, PW_INPUT, "--checkpoint cannot be given together with --until");
-  command->condition = pw_condition_open (command->compiled.system, command->until, &own);
-  if (command->condition == NULL) return pw_fail (error, own.status, "--until %.200s: %s", command->until, own.text);
+  command->condition = pw_condition_open (command->compiled.system, command->line.until, &own);
+  if (command->condition == NULL)
+    return pw_fail (error, own.status, "--until %.200s: %s", command->line.until, own.text);
   command->settings.ledger |= pw_condition_needs_ledger (command->condition);
   command->crossing = (pw_crossing){ .value = pw_condition_value, .context = command->condition };
   command->stop_time = NAN;
@@ -306,7 +307,7 @@ static int run_open (pw_run_cli *command, pw_error *error) {
   status = pw_comparison_open (&command->comparison, &command->compiled, command->reference_path,
                                command->line.starts != NULL, command->t_end, error);
   if (status != PW_OK) return status;
-  if (command->until && run_open_condition (command, error) != PW_OK) return error->status;
+  if (command->line.until && run_open_condition (command, error) != PW_OK) return error->status;
   pw_limit_start (&command->limit);
   command->run = pw_limit_open (system, command->method, &command->settings, error);
   if (command->run == NULL) return error->status;
@@ -572,8 +573,7 @@ static const struct poptOption run_options[] = {
                   "What the colours of snapshots show: body (default) or time"),
   PW_TEXT_OPTION (pw_run_cli, page_path, "animate", 0, "FILE.html", "Write an animation as a page for web browsers"),
   PW_FLAG_OPTION (pw_run_cli, with_energies, "energy", "Show energies, work and losses"),
-  PW_TEXT_OPTION (pw_run_cli, until, "until", 0, "CONDITION",
-                  "End the run when a condition on columns becomes true, such as \"car.x > 10\""),
+  PW_UNTIL_OPTION,
   PW_FLAG_OPTION (pw_run_cli, with_error, "error",
                   "State the error, from a repetition with a tenth of the tolerance or half the step"),
   PW_TEXT_OPTION (pw_run_cli, reference_path, "reference", 0, "FILE.csv",

@@ -48,7 +48,6 @@ typedef struct pw_run_cli {
   pw_cli_line line;
   const char *row_interval_text; /* --every */
   const char *table_path, *summary_path, *plots_path, *page_path, *reference_path, *colour;
-  const char *until;             /* --until: the condition */
   int with_energies, with_error; /* 1: --energy, --error */
   pw_checkpoints checkpoints;
   /* as understood */
