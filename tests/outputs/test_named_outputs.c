@@ -8,6 +8,7 @@
 #include "cli.h"
 #include "gallery.h"
 #include "outcome.h"
+#include "scene.h"
 
 /* A point thrown upwards: y = 10 t - 5 t^2; a block driven by a signal that is an output, x = cos (2 t). */
 static const char model[] = "pinwheel: 1\n"
@@ -219,46 +220,57 @@ TEST (derivatives_of_an_arrival) {
 
 /* ---- Outputs in C ---- */
 
-/* The square of the distance of the ball from the block, and twice that. */
+/* The square of the distance from the origin, a number of times. */
 static int outputs_distance (void *context, double t, const double *x, double value[3], double *gradient) {
   (void)t, (void)gradient;
   value[0] = *(const double *)context * (x[0] * x[0] + x[1] * x[1]);
   return 0;
 }
 
+SCENE (point) {
+  pw_add_body (m, &(pw_body){ .name = "ball", .mass = 1, .inertia = 1, .start = { 3, 4, 0 } });
+}
+
+/* Adds an output that depends on these columns; factor: how often. */
+static void interface_add (pw_model *m, const char *name, const char *const *reads, double *factor) {
+  pw_add_output (
+      m, &(pw_named_output){ name, "m^2", NULL, { .eval = outputs_distance, .context = factor, .reads = reads } });
+}
+
 TEST (interface) {
-  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table };
   static double one = 1, two = 2;
   static const char *const places[] = { "ball.x", "ball.y", NULL }, *const none[] = { "ball.z", NULL };
+  static const struct {
+    const char *name, *const *reads, *message;
+  } bad[] = {
+    { "square", places,
+      "model scene: output \"square\": a body, an element, another output or a column of tables has this name" },
+    { "a b", places, "model scene: output \"a b\": expected a letter, then letters, digits and _, at most 63 in all" },
+    { "t", places,
+      "model scene: output \"t\": a body, an element, another output or a column of tables has this name" },
+    { "other", none, "model scene: output other: no column \"ball.z\"; did you mean \"ball.x\"?" },
+  };
+  pw_sample sample;
   pw_error error = { 0 };
-  for (int bad = 0; bad < 4; bad++) {
-    pw_model *m = pw_model_new ("own", &table, &error);
-    pw_add_body (m, &(pw_body){ .name = "ball", .mass = 1, .inertia = 1, .start = { 3, 4, 0 } });
-    pw_named_output o = { .name = "square", .unit = "m^2", .value = { .eval = outputs_distance, .context = &one } };
-    o.value.reads = places;
-    pw_add_output (m, &o);
-    o.name = bad == 1 ? "square" : bad == 2 ? "a b" : "other", o.value.context = &two;
-    if (bad == 3) o.value.reads = none;
-    pw_add_output (m, &o);
-    pw_system *s = pw_system_compile (m, &error);
-    static const char *const message[] = { "", "output \"square\": a body, an element, another output or a column",
-                                           "output \"a b\": expected a letter",
-                                           "output other: no column \"ball.z\"; did you mean \"ball." };
-    if (bad) assert_non_null (strstr (error.text, message[bad]));
-    if (!bad) {
-      pw_run *r = pw_run_open (s, "rk4", &(pw_settings){ .step = 0.1 }, &error);
-      pw_sample sample;
-      check_ok (pw_run_sample (r, 0, &sample, &error), &error);
-      assert_int_equal (pw_system_outputs (s), 2);
-      assert_string_equal (pw_system_output_unit (s, 0), "m^2");
-      outputs_near (sample.output[0], 25, 0), outputs_near (sample.output[1], 50, 0);
-      pw_run_close (r);
-    }
-    assert_true (bad ? s == NULL : s != NULL);
-    pw_system_free (s);
-    pw_model_free (m);
-    error = (pw_error){ 0 };
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+    pw_model *m = scene_model (&point_table, NULL);
+    interface_add (m, "square", places, &one);
+    interface_add (m, bad[i].name, bad[i].reads, &two);
+    scene_refused (m, bad[i].message);
   }
+  pw_model *m = scene_model (&point_table, NULL);
+  interface_add (m, "square", places, &one);
+  interface_add (m, "twice", places, &two);
+  pw_system *s = scene_compile (m);
+  pw_run *r = pw_run_open (s, "rk4", &(pw_settings){ .step = 0.1 }, &error);
+  check_ok (pw_run_sample (r, 0, &sample, &error), &error);
+  assert_int_equal (pw_system_outputs (s), 2);
+  assert_string_equal (pw_system_output_name (s, 1), "twice");
+  assert_string_equal (pw_system_output_unit (s, 0), "m^2");
+  outputs_near (sample.output[0], 25, 0);
+  outputs_near (sample.output[1], 50, 0);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 const check_fixture fixture = { outputs_setup, outputs_teardown };

@@ -23,8 +23,8 @@ int pw_column_find (const pw_system *s, const char *name, const char *origin, pw
 static const char *const outcome_prefix[] = { "final:", "max:", "min:", "mean:", "integral:", "rms:" };
 #define OUTCOME_PREFIXES "final:, max:, min:, mean:, integral:, rms: and at TIME:"
 
-/* Reads the prefix of a functional at the beginning of a text, final: without one; *text is moved to the column; *t: the
- * time of "at TIME:". */
+/* Reads the prefix of a functional at the beginning of a text, final: without one; *text is moved to the column; *t:
+ * the time of "at TIME:". */
 static pw_functional_type outcome_type (const char **text, double *t) {
   for (int i = 0; i <= PW_RMS; i++) {
     size_t n = strlen (outcome_prefix[i]);

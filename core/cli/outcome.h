@@ -4,8 +4,9 @@
  *   OUTPUT   an expression of [final:|max:|min:|mean:|integral:|rms:|at T:]COLUMN, such as "frame.x / rider.work"
  *   COLUMN   a column of the table of `run`, or the total work or loss
  *
- * Values at the end or at a time, extrema, means and integrals of columns are functionals of the run.  They are as accurate as the run:
- * integrals are entries of its ledger (pw_settings.integrals), and extrema are located by its dense output. */
+ * Values at the end or at a time, extrema, means and integrals of columns are functionals of the run.  They are as
+ * accurate as the run: integrals are entries of its ledger (pw_settings.integrals), and extrema are located by its
+ * dense output. */
 #ifndef PW_OUTCOME_H
 #define PW_OUTCOME_H
 
