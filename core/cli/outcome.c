@@ -218,15 +218,20 @@ const char *pw_outcome_unit (const pw_outcomes *set, int outcome, char *buffer, 
  * For extrema each step is sampled at its middle and end.  With its beginning, a column has the values x0, xm and x1;
  * where its bend |x0 - 2 xm + x1| is below |x1 - x0| / 5, the parabola through them is monotonic: the extremum is at an
  * end.  Otherwise, if it may be beyond the extremum so far, the step is sampled at 5 times between and beside its ends:
- * values jump at breakpoints, where steps end, so that a step before a jump is always sampled so.  The largest or least
- * value is refined by Brent's method between its neighbours. */
+ * values jump at breakpoints, where steps end, so that a step before a jump is always sampled so, and so are long steps,
+ * in which three values say little.  Where these values are
+ * far from the parabola, as those of a reaction that oscillates in a long step of a motionless scene, the step is halved.
+ * The largest or least value is refined by Brent's method between its neighbours. */
 
-#define FUNCTIONAL_LINEAR 0.2 /* largest bend of a column that counts as monotonic, relative to |x1 - x0| */
-#define FUNCTIONAL_INSET 1e-6 /* distance from the ends of a step of the times beside them, relative to its size */
+#define FUNCTIONAL_LINEAR 0.2  /* largest bend of a column that counts as monotonic, relative to |x1 - x0| */
+#define FUNCTIONAL_CURVED 0.25 /* distance from the parabola from which on a step is halved, relative to the range */
+#define FUNCTIONAL_LONG 0.02   /* steps longer than this part of the run are few, and always sampled at all times */
+#define FUNCTIONAL_INSET 1e-6  /* distance from the ends of a step of the times beside them, relative to its size */
 /* Brent's method ends when its interval has shrunk by this factor: nearer to the extremum, the column changes by less
  * than round-off. */
 #define FUNCTIONAL_WIDTH 1e-8
 enum {
+  FUNCTIONAL_HALVINGS = 8,                  /* of a step, at most */
   FUNCTIONAL_MIDDLE = 4,                    /* index of the time in the middle of a step, see functional_times */
   FUNCTIONAL_END = PW_FUNCTIONAL_TIMES - 1, /* and at its end */
   FUNCTIONAL_OTHER = PW_FUNCTIONAL_TIMES,   /* index of any other time */
@@ -345,12 +350,21 @@ static void functional_extremum (functional_step *step, pw_functional *f, const 
   if (inside && may_lead) functional_refine (step, f, t + best - 1, y + best - 1);
 }
 
-/* Times in a step: its beginning, just after it, five times between, just before the end, the end. */
-static void functional_times (const functional_step *step, double t[PW_FUNCTIONAL_TIMES]) {
-  static const double part[PW_FUNCTIONAL_TIMES] = { 0,     FUNCTIONAL_INSET,     0.047, 0.231, 0.5, 0.769,
-                                                    0.953, 1 - FUNCTIONAL_INSET, 1 };
-  for (int i = 0; i < FUNCTIONAL_END; i++) t[i] = step->t0 + part[i] * (step->t1 - step->t0);
-  t[FUNCTIONAL_END] = step->t1;
+/* Times in a step, as parts of it: its beginning, just after it, five times between, just before the end, the end. */
+static const double functional_part[PW_FUNCTIONAL_TIMES] = { 0,     FUNCTIONAL_INSET,     0.047, 0.231, 0.5, 0.769,
+                                                             0.953, 1 - FUNCTIONAL_INSET, 1 };
+
+/* 1 if the values at all times are near the parabola through those at the ends and in the middle. */
+static int functional_is_smooth (const pw_functional *f) {
+  const double *y = f->values, x0 = y[0], slope = 4 * y[FUNCTIONAL_MIDDLE] - 3 * x0 - y[FUNCTIONAL_END],
+               bend = 2 * (x0 - 2 * y[FUNCTIONAL_MIDDLE] + y[FUNCTIONAL_END]);
+  double most = x0, least = x0, distance = 0;
+  for (int i = 2; i < FUNCTIONAL_END - 1; i++) { /* without those beside the ends, where values may jump */
+    const double part = functional_part[i];
+    most = fmax (most, y[i]), least = fmin (least, y[i]);
+    distance = fmax (distance, fabs (y[i] - (x0 + part * (slope + part * bend))));
+  }
+  return !(distance > FUNCTIONAL_CURVED * (most - least));
 }
 
 /* 1 if the values at the ends and in the middle do not suffice: the column is not nearly linear, and in the step may be
@@ -362,17 +376,29 @@ static int functional_needs_nodes (const pw_functional *f) {
   return pw_is_extremum (f->type) && bend > FUNCTIONAL_LINEAR * fabs (x1 - x0) && lead + bend + fabs (x1 - x0) > 0;
 }
 
-/* Updates the extrema after a step. */
-static void functional_extrema (functional_step *step) {
+/* Updates the extrema after a step, or a part of one that may be halved so often. */
+static void functional_extrema (functional_step *step, int halvings) {
   double t[PW_FUNCTIONAL_TIMES];
-  int nodes = pw_system_jumps (step->set->system, step->t1);
+  int nodes = step->t1 - step->t0 > FUNCTIONAL_LONG * step->set->span || pw_system_jumps (step->set->system, step->t1),
+      smooth = 1;
   pw_functional *const begin = step->set->functional, *const end = begin + step->set->functionals;
-  functional_times (step, t);
+  for (int i = 0; i < FUNCTIONAL_END; i++) t[i] = step->t0 + functional_part[i] * (step->t1 - step->t0);
+  t[FUNCTIONAL_END] = step->t1;
   functional_sample (step, t[FUNCTIONAL_MIDDLE], FUNCTIONAL_MIDDLE);
   functional_sample (step, step->t1, FUNCTIONAL_END);
   for (const pw_functional *f = begin; f < end; f++) nodes |= functional_needs_nodes (f);
   for (int i = 1; nodes && i < FUNCTIONAL_END; i++)
     if (i != FUNCTIONAL_MIDDLE) functional_sample (step, t[i], i);
+  for (const pw_functional *f = begin; f < end && nodes; f++)
+    smooth &= !pw_is_extremum (f->type) || functional_is_smooth (f);
+  if (!smooth && halvings > 0) {
+    const double last = step->t1;
+    step->t1 = t[FUNCTIONAL_MIDDLE];
+    functional_extrema (step, halvings - 1);
+    step->t0 = step->t1, step->t1 = last;
+    functional_extrema (step, halvings - 1);
+    return;
+  }
   for (pw_functional *f = begin; f < end && step->status == PW_OK; f++) {
     if (pw_is_extremum (f->type) && nodes) functional_extremum (step, f, t, f->values);
     if (pw_is_extremum (f->type) && !nodes) functional_update_extremum (f, step->t1, f->values[FUNCTIONAL_END]);
@@ -422,7 +448,7 @@ static void functional_check_condition (functional_step *step) {
 int pw_outcomes_begin (pw_outcomes *set, pw_run *r, double t_end, pw_error *error) {
   const double t = pw_run_time (r);
   functional_step step = { set, r, t, t, PW_OK, error };
-  set->begin = set->t = t, set->ended = 0;
+  set->begin = set->t = t, set->span = t_end - t, set->ended = 0;
   set->crossing = (pw_crossing){ .value = pw_condition_value, .context = set->condition };
   functional_sample (&step, t, 0);
   for (pw_functional *f = set->functional; f < set->functional + set->functionals; f++) {
@@ -442,7 +468,7 @@ int pw_outcomes_advance (pw_outcomes *set, pw_run *r, double t, double t_end, pw
                                                : pw_run_advance_to (r, functional_next (set, set->t, t), t_end, error);
   step.t1 = pw_run_time (r);
   functional_check_condition (&step);
-  if (step.status == PW_OK && set->extrema) functional_extrema (&step);
+  if (step.status == PW_OK && set->extrema) functional_extrema (&step, FUNCTIONAL_HALVINGS);
   functional_values_at_times (&step);
   set->t = step.t1;
   return step.status;

@@ -66,7 +66,7 @@ typedef struct {
   const char *until; /* text of the condition; NULL: there is none */
   pw_condition *condition;
   pw_crossing crossing;
-  double begin;            /* initial time of the run [s] */
+  double begin, span;      /* initial time of the run, and how long it may be [s] */
   pw_workspace *workspace; /* for contact points */
 } pw_outcomes;
 

@@ -151,7 +151,8 @@ TEST (bad) {
     { "wheel.phy", "--of wheel.phy: no column \"wheel.phy\"; did you mean \"wheel.phi\"?" },
     { "max:motor-2.work", "--of max:motor-2.work: no column \"motor-2.work\"; did you mean \"motor-1.work\"?" },
     { "wheel.phi/works", "--of wheel.phi/works: no column \"works\"; did you mean \"work\"?" },
-    { "maxi:wheel.phi", "--of maxi:wheel.phi: no \"maxi:\"; valid are final:, max:, min:, mean:, integral: and rms:" },
+    { "maxi:wheel.phi",
+      "--of maxi:wheel.phi: no \"maxi:\"; valid are final:, max:, min:, mean:, integral:, rms: and at TIME:" },
     { "mean:balance", "--of mean:balance: balance describes the integration, not the motion: it has no mean" },
     { "rms:motor-1.work", "--of rms:motor-1.work: no rms: of work and losses; valid are final:, max:, min:, mean: and "
                           "integral:" },
