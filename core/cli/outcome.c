@@ -218,10 +218,10 @@ const char *pw_outcome_unit (const pw_outcomes *set, int outcome, char *buffer, 
  * For extrema each step is sampled at its middle and end.  With its beginning, a column has the values x0, xm and x1;
  * where its bend |x0 - 2 xm + x1| is below |x1 - x0| / 5, the parabola through them is monotonic: the extremum is at an
  * end.  Otherwise, if it may be beyond the extremum so far, the step is sampled at 5 times between and beside its ends:
- * values jump at breakpoints, where steps end, so that a step before a jump is always sampled so, and so are long steps,
- * in which three values say little.  Where these values are
- * far from the parabola, as those of a reaction that oscillates in a long step of a motionless scene, the step is halved.
- * The largest or least value is refined by Brent's method between its neighbours. */
+ * values jump at breakpoints, where steps end, so that a step before a jump is always sampled so, and so are long
+ * steps, in which three values say little.  Where these values are far from the parabola, as those of a reaction that
+ * oscillates in a long step of a motionless scene, the step is halved.  The largest or least value is refined by
+ * Brent's method between its neighbours. */
 
 #define FUNCTIONAL_LINEAR 0.2  /* largest bend of a column that counts as monotonic, relative to |x1 - x0| */
 #define FUNCTIONAL_CURVED 0.25 /* distance from the parabola from which on a step is halved, relative to the range */
