@@ -24,6 +24,8 @@ int pw_plots_style (pw_plots *plots, const char *width, const char *colour, pw_e
 double pw_plots_next (const pw_plots *plots);
 /* Stores a sample, if there is room; its energies are complete only with pw_settings.ledger. */
 void pw_plots_add (pw_plots *plots, const pw_sample *sample);
+/* Stores the last sample of a run that ends before t_end as it should. */
+void pw_plots_last (pw_plots *plots, const pw_sample *sample);
 /* Saves or loads the samples stored so far. */
 void pw_plots_serialise (pw_plots *plots, pw_archive *archive);
 

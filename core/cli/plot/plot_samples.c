@@ -154,6 +154,12 @@ void pw_plots_add (pw_plots *plots, const pw_sample *sample) {
     pw_plot_forces (plots, sample, pw_plot_track (plots, i, &plots->wheels, plots->wheels.drawn));
 }
 
+void pw_plots_last (pw_plots *plots, const pw_sample *sample) {
+  if (plots->samples == 0 || pw_plot_sample (plots, plots->samples - 1)[PLOT_T] < sample->t)
+    pw_plots_add (plots, sample);
+  plots->planned = plots->samples;
+}
+
 void pw_plots_serialise (pw_plots *plots, pw_archive *archive) {
   int samples = plots->samples;
   pw_archive_bytes (archive, &samples, sizeof samples);
