@@ -28,10 +28,11 @@ typedef struct {
   const char **name; /* names */
   double *value;     /* names */
   pw_names index;    /* the index of each name */
+  int room;          /* names for which there is memory */
 } pw_scope;
 
-/* Opens a scope, which must be { 0 }, with room for `room` names, in an arena.  PW_OK or PW_RESOURCE. */
-int pw_scope_open (pw_scope *s, int room, pw_arena *arena);
+/* Makes room for `room` names in an arena; the scope must be { 0 } at first.  PW_OK or PW_RESOURCE. */
+int pw_scope_reserve (pw_scope *s, int room, pw_arena *arena);
 void pw_scope_close (pw_scope *s); /* names and numbers stay in the arena */
 
 /* Adds a name, to which the scope keeps a pointer; there must be room. */

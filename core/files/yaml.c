@@ -14,8 +14,10 @@
 #include "yaml.h"
 
 /* Limits of one model, about 1 GB each, so that a small file cannot use all memory: entries of each list, such as
- * bodies, elements, parameters; points of all tables; operations of all expressions. */
-enum { MAX_ITEMS = 1000000, MAX_POINTS = 20000000, MAX_OPERATIONS = 30000000 };
+ * bodies, elements, parameters, and of all copies; points of all tables; operations of all expressions; copies of an
+ * entry; bytes of texts in copies. */
+enum { MAX_ITEMS = 1000000, MAX_POINTS = 20000000, MAX_OPERATIONS = 30000000, MAX_COPIES = 100000 };
+#define MAX_COPIED 4e8
 #define MAX_AHEAD 1e6 /* pw_yaml.max_ahead for the default limit of bytes: each indicator takes 350 bytes */
 
 enum { MAX_KEYS = 40 /* known keys of a map, and the end of their list */ };
@@ -24,7 +26,8 @@ enum { MAX_KEYS = 40 /* known keys of a map, and the end of their list */ };
 typedef struct {
   const pw_yaml *y;
   pw_error *error;
-  pw_scope *scope; /* parameters and what `let` defines so far, or NULL */
+  pw_scope *scope;   /* parameters and what `let` defines so far, or NULL */
+  pw_copies *copies; /* of the entry being read, or NULL */
   /* for building */
   pw_model *model;
   pw_arena *arena;              /* lives as long as the model */
@@ -32,6 +35,7 @@ typedef struct {
   pw_names bodies;              /* names of bodies so far */
   pw_names states;              /* names of all first-order states */
   pw_names names;               /* of bodies and elements so far, to their offsets in the source */
+  pw_names truth;               /* states in the reference solution so far */
   pw_names elements;     /* names of all elements, to the index of their types; made when an expression needs it */
   const pw_kind *kind;   /* of the element being read */
   const pw_field *field; /* of it */
@@ -39,6 +43,8 @@ typedef struct {
   char *definition;      /* of the element, with all preceding fields */
   double points;         /* of all tables so far */
   double operations;     /* of all expressions so far */
+  double entries;        /* of all lists so far, and copies of them */
+  double copied;         /* bytes of texts in copies before r->copies */
 } reader;
 
 #define read_fail(r, at, ...) pw_yaml_fail ((r)->y, (r)->error, at, __VA_ARGS__)
@@ -157,17 +163,16 @@ static const char *find_variable (const reader *r, const char *text) {
   return NULL;
 }
 
-/* Reads a unique name that expressions can use. */
-static int read_name (const reader *r, const pw_node *node, const char *label, pw_names *names) {
-  const char *name;
-  if (read_text (r, node, label, &name) != PW_OK) return r->error->status;
-  if (!pw_expression_is_name (name))
+/* Reads a name that expressions can use. */
+static int read_name (const reader *r, const pw_node *node, const char *label, const char **name) {
+  if (read_text (r, node, label, name) != PW_OK) return r->error->status;
+  if (!pw_expression_is_name (*name))
     return read_fail (r, node->at, "%s \"%.60s\": expected a letter, then letters, digits and _, at most 63 in all",
-                      label, name);
-  if (strcmp (name, "t") == 0 || pw_expression_is_reserved (name))
-    return read_fail (r, node->at, "%s \"%s\": this name is reserved: %s", label, name,
-                      *name == 't' && name[1] == 0 ? "it is the time" : "a function or constant");
-  return pw_names_add (names, name, 0) >= 0 ? read_fail (r, node->at, "a second %s \"%s\"", label, name) : PW_OK;
+                      label, *name);
+  if (strcmp (*name, "t") == 0 || pw_expression_is_reserved (*name))
+    return read_fail (r, node->at, "%s \"%s\": this name is reserved: %s", label, *name,
+                      strcmp (*name, "t") == 0 ? "it is the time" : "a function or constant");
+  return PW_OK;
 }
 
 /* Replaces the text of an error at an unknown name by the suggestion of a first-order state, if its name is near and
@@ -189,7 +194,8 @@ static int read_number (const reader *r, const pw_node *node, const char *label,
   if (node == NULL || r->error->status != PW_OK) return r->error->status;
   if (node->type != PW_YAML_SCALAR)
     return read_fail (r, node->at, "%s: expected a number, found %s", label, node_found (node));
-  int status = pw_expression_constant (r->scope, node->text, value, &error);
+  int status = r->copies ? pw_copies_number (r->copies, node, value, &error)
+                         : pw_expression_constant (r->scope, node->text, value, &error);
   if (status == PW_RESOURCE) return read_no_memory (r);
   if (status == PW_INPUT) suggest_state (r, node->text, &error);
   if (status != PW_OK)
@@ -234,6 +240,76 @@ static void suggest_bodies (const reader *r, pw_nearest *near) {
   for (int i = 0; i < bodies; i++) pw_nearest_try (near, body[i].name);
 }
 
+/* ---- Entries of lists, and their copies ---- */
+
+/* Counts entries, for which the tables of names get room. */
+static int count_entries (reader *r, const pw_node *node, double more) {
+  const size_t room = (size_t)(r->entries + more);
+  if ((r->entries += more) > MAX_ITEMS)
+    return read_fail (r, node->at, "the lists up to here have more than %d entries, the limit for a model", MAX_ITEMS);
+  if (r->copied + (r->copies ? r->copies->bytes : 0) > MAX_COPIED)
+    return read_fail (r, node->at, "the copies up to here have texts of more than %g MB, the limit for a model",
+                      MAX_COPIED / 1e6);
+  return pw_names_reserve (&r->bodies, room) == PW_OK && pw_names_reserve (&r->names, room) == PW_OK &&
+                 pw_names_reserve (&r->states, room) == PW_OK
+             ? PW_OK
+             : read_no_memory (r);
+}
+
+/* Reads `repeat`, {COUNTER: NUMBER}. */
+static int read_repeat (reader *r, const pw_node *repeat, const char **counter, int *count) {
+  const pw_node *map = repeat->next;
+  double number = 0;
+  if (map->type != PW_YAML_MAP || map->count != 1)
+    return read_fail (r, map->at, "repeat: expected a map {COUNTER: NUMBER}, such as {i: 3}, found %s",
+                      map->type == PW_YAML_MAP ? "one with another number of entries" : node_found (map));
+  if (read_name (r, map->first, "repeat", counter) != PW_OK) return r->error->status;
+  if (pw_names_find (&r->scope->index, *counter) >= 0 || is_state (r, *counter))
+    return read_fail (r, map->first->at, "repeat: a parameter, number of let or state has the name \"%s\"", *counter);
+  const char *label = PW_PRINTED (100, "repeat: %s", *counter);
+  if (read_number (r, map->first->next, label, PW_NONNEGATIVE, &number) != PW_OK) return r->error->status;
+  if (number > MAX_COPIES || number != floor (number))
+    return read_fail (r, map->first->next->at, "%s = %.15g: expected a whole number from 0 to %d", label, number,
+                      MAX_COPIES);
+  *count = (int)number;
+  return PW_OK;
+}
+
+typedef int read_entry (reader *r, const pw_node *entry);
+
+/* Calls `each` with the copies of an entry. */
+static int read_copies (reader *r, const pw_node *entry, const pw_node *repeat, read_entry *each) {
+  pw_copies c = { .scope = r->scope, .arena = r->arena, .repeat = repeat }, *outer = r->copies;
+  int count = 0, status;
+  r->copies = NULL; /* also where an entry of another list is being read */
+  if (read_repeat (r, repeat, &c.counter, &count) != PW_OK) return r->error->status;
+  status = count ? pw_copies_open (&c, entry) : PW_OK;
+  for (int i = 1; i <= count && status == PW_OK && r->error->status == PW_OK; i++) {
+    if ((status = pw_copies_set (&c, i)) != PW_OK) break;
+    r->copies = &c;
+    if (count_entries (r, entry, 1) == PW_OK) each (r, c.entry);
+    r->copies = NULL;
+  }
+  if (status == PW_INPUT) read_fail (r, source_offset (r->y, c.faulty, c.fault.at), "%s", c.fault.text);
+  if (status == PW_RESOURCE) read_no_memory (r);
+  r->copied += c.bytes;
+  r->copies = outer;
+  return r->error->status;
+}
+
+/* Calls `each` with the entries of a list, or a map in its place, until an error. */
+static int read_entries (reader *r, const pw_node *list, read_entry *each) {
+  const pw_node *first = list && list->type == PW_YAML_LIST ? list->first : list;
+  for (const pw_node *n = first; n && r->error->status == PW_OK; n = n == list ? NULL : n->next) {
+    const pw_node *repeat = pw_yaml_repeat (n);
+    if (repeat)
+      read_copies (r, n, repeat, each);
+    else if (count_entries (r, n, 1) == PW_OK)
+      each (r, n);
+  }
+  return r->error->status;
+}
+
 /* ---- Expressions of time and, in forces, of states: BODY.phi, ELEMENT.spin ---- */
 
 /* Reports an error at an offset of the expression, or name, in a node. */
@@ -245,26 +321,29 @@ static int read_expression (reader *r, const pw_node *node, const char *const *v
                             const pw_expression **expression) {
   pw_expression_error error;
   if (read_text (r, node, r->label, text) != PW_OK) return r->error->status;
+  if (r->copies && (*text = pw_copies_expression (r->copies, *text, r->arena)) == NULL) return read_no_memory (r);
   int status = pw_expression_read (r->scope, variable, *text, r->arena, expression, &error);
   if (status == PW_INPUT) suggest_state (r, *text, &error);
-  if (status == PW_INPUT) return expression_fail (r, node, error.at, "%s", error.text);
+  if (status == PW_INPUT) return expression_fail (r, node, *text == node->text ? error.at : 0, "%s", error.text);
   if (status != PW_OK) return read_no_memory (r);
   if ((r->operations += (*expression)->codes) <= MAX_OPERATIONS) return PW_OK;
   return read_fail (r, node->at, "%s: the expressions up to here have more than %d operations, the limit for a model",
                     r->label, MAX_OPERATIONS);
 }
 
+static int index_element (reader *r, const pw_node *n) {
+  const pw_node *key = n->type == PW_YAML_MAP ? n->first : NULL;
+  int kind = key && key->next->type == PW_YAML_SCALAR ? find_kind (key) : -1;
+  if (pw_names_reserve (&r->elements, (size_t)r->entries) != PW_OK) return read_no_memory (r);
+  if (kind >= 0) pw_names_add (&r->elements, key->next->text, kind);
+  return r->error->status;
+}
+
 /* Indexes all elements, including those not built yet, whose errors are reported later. */
 static int state_elements (reader *r) {
-  const pw_node *list = r->y->elements;
   if (r->elements.slot) return PW_OK;
-  if (pw_names_open (&r->elements, list ? (size_t)list->count : 0) != PW_OK) return read_no_memory (r);
-  for (const pw_node *n = list ? list->first : NULL; n; n = n->next) {
-    const pw_node *key = n->type == PW_YAML_MAP ? n->first : NULL;
-    int kind = key && key->next->type == PW_YAML_SCALAR ? find_kind (key) : -1;
-    if (kind >= 0) pw_names_add (&r->elements, key->next->text, kind);
-  }
-  return PW_OK;
+  if (pw_names_open (&r->elements, 0) != PW_OK) return read_no_memory (r);
+  return read_entries (r, r->y->elements, index_element);
 }
 
 static int state_of_element (reader *r, const pw_node *node, const char *owner, const char *part, size_t at) {
@@ -690,24 +769,41 @@ static int read_signal (reader *r, const pw_node *node, pw_signal *signal) {
   return read_number (r, node, r->label, PW_REAL, &signal->constant);
 }
 
-/* ---- Reference solution: `truth`, a map of states to expressions of time ---- */
+/* ---- Reference solution: `truth`, a map of states to expressions of time, or a list of such maps ---- */
 
 static double reference_eval (void *context, int i, double t) {
   const pw_expression *const *x = context;
   return pw_expression_value (x[i], &t);
 }
 
-static int reference_entry (reader *r, const pw_node *n, pw_names *seen) {
+/* Makes room for one more state. */
+static int reference_reserve (reader *r) {
+  pw_reference_text *t = r->reference, more = *t;
+  if (pw_names_reserve (&r->truth, (size_t)t->states + 1) != PW_OK) return read_no_memory (r);
+  if (t->context && (t->states & (t->states + 1)) != 0) return PW_OK; /* room is for a power of 2 less 1 */
+  const size_t n = (size_t)t->states, room = 2 * n + 1;
+  more.state = pw_arena_alloc (r->arena, room * sizeof *t->state);
+  more.text = pw_arena_alloc (r->arena, room * sizeof *t->text);
+  more.context = pw_arena_alloc (r->arena, room * sizeof (pw_expression *));
+  if (more.state == NULL || more.text == NULL || more.context == NULL) return read_no_memory (r);
+  if (n) memcpy (more.state, t->state, n * sizeof *t->state);
+  if (n) memcpy (more.text, t->text, n * sizeof *t->text);
+  if (n) memcpy (more.context, t->context, n * sizeof (pw_expression *));
+  *t = more;
+  return PW_OK;
+}
+
+static int reference_state (reader *r, const pw_node *n) {
   static const char *const time[] = { "t", NULL };
   pw_reference_text *t = r->reference;
-  const pw_expression **x = t->context;
   const char *name;
-  if (read_text (r, n, "truth", &name) != PW_OK) return r->error->status;
+  if (read_text (r, n, "truth", &name) != PW_OK || reference_reserve (r) != PW_OK) return r->error->status;
+  const pw_expression **x = t->context;
   if (!is_state (r, name))
     return read_fail (r, n->at, "truth: expected a state such as BODY.phi, found \"%.60s\"", name);
   r->label = "truth";
   if (state_check (r, n, name, 0) != PW_OK) return r->error->status;
-  if (pw_names_add (seen, name, 0) >= 0) return read_fail (r, n->at, "truth: a second \"%s\"", name);
+  if (pw_names_add (&r->truth, name, 0) >= 0) return read_fail (r, n->at, "truth: a second \"%s\"", name);
   r->label = PW_PRINTED (100, "truth of %.60s", name);
   t->state[t->states] = name;
   int status = read_expression (r, n->next, time, &t->text[t->states], &x[t->states]);
@@ -715,26 +811,21 @@ static int reference_entry (reader *r, const pw_node *n, pw_names *seen) {
   return status;
 }
 
-/* Reads the reference solution, after bodies and elements. */
-static int read_reference (reader *r) {
-  const pw_node *map = r->y->reference;
-  pw_reference_text *t = r->reference;
-  pw_names seen = { .size = 0 };
-  if (map || r->operations > 0) /* expressions may use names, whose values `show` writes */
-    t->names = r->scope->names, t->name = r->scope->name, t->value = r->scope->value;
-  if (map == NULL) return r->error->status;
+static int reference_entry (reader *r, const pw_node *map) {
   if (map->type != PW_YAML_MAP)
     return read_fail (r, map->at, "truth: expected a map {STATE: EXPRESSION, ...}, found %s", node_found (map));
-  size_t room = (size_t)map->count + 1;
-  t->state = pw_arena_alloc (r->arena, room * sizeof *t->state);
-  t->text = pw_arena_alloc (r->arena, room * sizeof *t->text);
-  t->context = pw_arena_alloc (r->arena, room * sizeof (pw_expression *));
-  t->eval = reference_eval;
-  if (t->state == NULL || t->text == NULL || t->context == NULL || pw_names_open (&seen, room) != PW_OK)
-    return read_no_memory (r);
-  for (const pw_node *n = map->first; n && r->error->status == PW_OK; n = n->next->next) reference_entry (r, n, &seen);
-  pw_names_close (&seen);
+  for (const pw_node *n = map->first; n && r->error->status == PW_OK; n = n->next->next)
+    if (count_entries (r, n, 1) == PW_OK) reference_state (r, n);
   return r->error->status;
+}
+
+/* Reads the reference solution, after bodies and elements. */
+static int read_reference (reader *r) {
+  pw_reference_text *t = r->reference;
+  t->eval = reference_eval;
+  if (r->y->reference || r->operations > 0) /* expressions may use names, whose values `show` writes */
+    t->names = r->scope->names, t->name = r->scope->name, t->value = r->scope->value;
+  return read_entries (r, r->y->reference, reference_entry);
 }
 
 /* ---- Bodies ----
@@ -923,17 +1014,16 @@ static const pw_node *state_name (const reader *r, const pw_node *node) {
   return read_fail (r, node->at, "a state needs a name"), NULL;
 }
 
-/* Indexes the names of all states, which signals of any element may read; expressions can use them. */
-static int index_states (reader *r) {
-  for (const pw_node *n = r->y->states ? r->y->states->first : NULL; n && r->error->status == PW_OK; n = n->next) {
-    const pw_node *node = state_name (r, n);
-    const char *name;
-    if (node == NULL || build_name (r, node, "state", &name) != PW_OK) return r->error->status;
-    if (read_name (r, node, "state", &r->states) != PW_OK) return r->error->status;
-    if (pw_names_find (&r->scope->index, name) >= 0)
-      return read_fail (r, node->at, "state \"%s\": a parameter or number of let has this name", name);
-  }
-  return r->error->status;
+/* Indexes the name of a state, which signals of any element may read; expressions can use it. */
+static int index_state (reader *r, const pw_node *n) {
+  const pw_node *node = state_name (r, n);
+  const char *name;
+  if (node == NULL || build_name (r, node, "state", &name) != PW_OK) return r->error->status;
+  if (read_name (r, node, "state", &name) != PW_OK) return r->error->status;
+  pw_names_add (&r->states, name, 0);
+  if (pw_names_find (&r->scope->index, name) >= 0)
+    return read_fail (r, node->at, "state \"%s\": a parameter or number of let has this name", name);
+  return PW_OK;
 }
 
 static int build_state (reader *r, const pw_node *node) {
@@ -944,23 +1034,31 @@ static int build_state (reader *r, const pw_node *node) {
 
 /* ---- The model ---- */
 
+/* Adds the numbers of a map {NAME: NUMBER, ...} to the scope. */
+static int build_let (reader *r, const pw_node *map) {
+  const char *name;
+  double value;
+  if (map->type != PW_YAML_MAP)
+    return read_fail (r, map->at, "let: expected a map {NAME: NUMBER, ...}, found %s", node_found (map));
+  for (const pw_node *n = map->first; n; n = n->next->next) {
+    if (count_entries (r, n, 1) != PW_OK || read_name (r, n, "name", &name) != PW_OK) return r->error->status;
+    if (pw_names_find (&r->scope->index, name) >= 0) return read_fail (r, n->at, "a second name \"%s\"", name);
+    if (read_number (r, n->next, PW_PRINTED (100, "let %s", name), PW_REAL, &value) != PW_OK) return r->error->status;
+    if (pw_scope_reserve (r->scope, r->scope->names + 1, r->arena) != PW_OK) return read_no_memory (r);
+    pw_scope_add (r->scope, name, value);
+  }
+  return PW_OK;
+}
+
 static int build_all (reader *r, const double *parameter) {
   const pw_yaml *y = r->y;
-  double value;
   for (int i = 0; i < y->parameter_count; i++) pw_scope_add (r->scope, y->table.parameters[i].name, parameter[i]);
-  for (const pw_node *n = y->let ? y->let->first : NULL; n; n = n->next->next) {
-    if (read_number (r, n->next, PW_PRINTED (100, "let %s", n->text), PW_REAL, &value) != PW_OK)
-      return r->error->status;
-    pw_scope_add (r->scope, n->text, value);
-  }
-  if (index_states (r) != PW_OK) return r->error->status;
-  for (const pw_node *n = y->bodies ? y->bodies->first : NULL; n; n = n->next)
-    if (build_body (r, n) != PW_OK) return r->error->status;
-  for (const pw_node *n = y->elements ? y->elements->first : NULL; n; n = n->next)
-    if (build_element (r, n) != PW_OK) return r->error->status;
-  for (const pw_node *n = y->states ? y->states->first : NULL; n; n = n->next)
-    if (build_state (r, n) != PW_OK) return r->error->status;
-  return read_reference (r);
+  read_entries (r, y->let, build_let);
+  read_entries (r, y->states, index_state);
+  read_entries (r, y->bodies, build_body);
+  read_entries (r, y->elements, build_element);
+  read_entries (r, y->states, build_state);
+  return r->error->status == PW_OK ? read_reference (r) : r->error->status;
 }
 
 static void build_free (void *arena) {
@@ -971,9 +1069,7 @@ static void build_free (void *arena) {
 /* Allocates the memory for building, and the arena for what lives as long as the model. */
 static int build_open (reader *r) {
   const pw_yaml *y = r->y;
-  size_t largest = 1, bodies = y->bodies ? (size_t)y->bodies->count : 0, lets = y->let ? (size_t)y->let->count : 0;
-  size_t states = y->states ? (size_t)y->states->count : 0;
-  size_t all = bodies + states + (y->elements ? (size_t)y->elements->count : 0);
+  size_t largest = 1;
   for (const pw_kind *const *k = pw_kinds; *k; k++)
     if ((*k)->definition > largest) largest = (*k)->definition;
   r->arena = calloc (1, sizeof *r->arena);
@@ -981,10 +1077,8 @@ static int build_open (reader *r) {
   r->reference = pw_arena_alloc (r->arena, sizeof *r->reference);
   pw_model_set_reference (r->model, r->reference);
   r->definition = malloc (largest);
-  if (r->reference && r->definition && pw_scope_open (r->scope, y->parameter_count + (int)lets, r->arena) == PW_OK &&
-      pw_names_open (&r->bodies, bodies) == PW_OK && pw_names_open (&r->states, states) == PW_OK &&
-      pw_names_open (&r->names, all) == PW_OK)
-    return PW_OK;
+  if (r->reference && r->definition && pw_scope_reserve (r->scope, y->parameter_count, r->arena) == PW_OK)
+    return count_entries (r, y->root, 0); /* opens the tables of names */
   return read_no_memory (r);
 }
 
@@ -999,6 +1093,7 @@ static void build_model (pw_model *m, const void *parameters) {
   pw_scope_close (&scope);
   pw_names_close (&r.bodies);
   pw_names_close (&r.states);
+  pw_names_close (&r.truth);
   pw_names_close (&r.names);
   pw_names_close (&r.elements);
   free (r.definition);
@@ -1098,8 +1193,8 @@ static int head_parameter (const reader *r, const pw_node *node, pw_names *names
   const pw_node *name = v[0], *value = v[1], *unit = v[2], *about = v[3], *domain = v[4], *min = v[5];
   int chosen = min ? PW_NONNEGATIVE : PW_REAL;
   if (name == NULL) return read_fail (r, node->at, "a parameter needs a name");
-  if (read_name (r, name, "parameter", names) != PW_OK) return r->error->status;
-  p->name = name->text;
+  if (read_name (r, name, "parameter", &p->name) != PW_OK) return r->error->status;
+  if (pw_names_add (names, p->name, 0) >= 0) return read_fail (r, name->at, "a second parameter \"%s\"", p->name);
   p->unit = p->about = "";
   const char *label = PW_PRINTED (100, "parameter %s", p->name);
   if (value == NULL) return read_fail (r, node->at, "%s needs a value, its default", label);
@@ -1142,19 +1237,15 @@ static int read_head (pw_yaml *y, const reader *r) {
   read_keys (r, v[2], run_key, "run", run);
   for (int i = 0; i < 3; i++) read_number (r, run[i], run_key[i], PW_POSITIVE, number[i]);
   read_text (r, run[3], run_key[3], &y->table.run.method);
-  const pw_node *parameters = v[3], *let = v[4];
+  const pw_node *parameters = v[3];
   /* the key of the reference solution is "truth" */
-  y->let = let, y->bodies = v[5], y->elements = v[6], y->reference = v[7], y->states = v[8];
+  y->let = v[4], y->bodies = v[5], y->elements = v[6], y->reference = v[7], y->states = v[8];
   for (int i = 3; key[i]; i++) /* from "parameters" on: lists and maps */
     if (v[i] && v[i]->count > MAX_ITEMS)
       read_fail (r, v[i]->at, "%s: %d entries; a model may have %d", key[i], v[i]->count, MAX_ITEMS);
-  size_t count = (size_t)(parameters ? parameters->count : 0) + (size_t)(let ? let->count : 0);
+  size_t count = parameters ? (size_t)parameters->count : 0;
   if (r->error->status == PW_OK && pw_names_open (&names, count) != PW_OK) read_no_memory (r);
   if (r->error->status == PW_OK) head_parameters (y, r, parameters, &names);
-  if (r->error->status == PW_OK && let && let->type != PW_YAML_MAP)
-    read_fail (r, let->at, "let: expected a map {NAME: NUMBER, ...}, found %s", node_found (let));
-  for (const pw_node *n = let ? let->first : NULL; n && r->error->status == PW_OK; n = n->next->next)
-    read_name (r, n, "name", &names);
   pw_names_close (&names);
   return r->error->status;
 }
