@@ -3,6 +3,7 @@
  *   yaml_text.c    reads and checks the text; messages with line, column and caret; the tree as bytes
  *   yaml_tree.c    builds a tree of scalars, lists and maps from libfyaml's events
  *   yaml_expand.c  copies of repeated entries
+ *   yaml_unit.c    units of parameters
  *   yaml.c         reads a model from the tree */
 #ifndef PW_YAML_H
 #define PW_YAML_H
@@ -80,6 +81,10 @@ int pw_copies_number (pw_copies *c, const pw_node *node, double *value, pw_expre
 
 /* The text of an expression with the counter replaced by its value in parentheses; NULL if out of memory. */
 const char *pw_copies_expression (const pw_copies *c, const char *text, pw_arena *arena);
+
+/* Refuses the unit of a parameter, a scalar, if it contains another unit than an SI unit, and says how to convert the
+ * value. */
+int pw_yaml_check_unit (const pw_yaml *y, const pw_node *unit, const pw_node *value, pw_error *error);
 
 /* ---- yaml_text.c and yaml_tree.c ---- */
 

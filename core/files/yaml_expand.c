@@ -27,8 +27,9 @@ struct pw_copy_text {
 };
 
 /* Records an error at an offset of a text. */
-#define copy_fail(c, node, offset, ...) \
-  ((c)->faulty = node, (c)->fault.at = offset, pw_print ((c)->fault.text, sizeof (c)->fault.text, __VA_ARGS__), PW_INPUT)
+#define copy_fail(c, node, offset, ...)                                                                         \
+  ((c)->faulty = node, (c)->fault.at = offset, pw_print ((c)->fault.text, sizeof (c)->fault.text, __VA_ARGS__), \
+   PW_INPUT)
 
 /* Reads an expression of the counter, which is not its first variable: that is the time. */
 static int copy_expression (pw_copies *c, const char *text, const pw_expression **x, pw_expression_error *error) {
@@ -49,8 +50,7 @@ static int copy_part_read (pw_copies *c, const pw_node *source, const char **res
   const size_t at = (size_t)(open - source->text) + 1, size = strcspn (open + 1, "}");
   if (open[1 + size] == 0) return copy_fail (c, source, at - 1, "there is no \"}\" for this \"{\"");
   *rest = open + size + 2;
-  int status =
-      copy_expression (c, PW_PRINTED (COPY_TEXT + 1, "%.*s", (int)size, open + 1), &part->number, &c->fault);
+  int status = copy_expression (c, PW_PRINTED (COPY_TEXT + 1, "%.*s", (int)size, open + 1), &part->number, &c->fault);
   c->faulty = source;
   c->fault.at += at;
   return status;
