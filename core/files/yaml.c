@@ -4,7 +4,6 @@
  *
  * After an error, functions with the same reader return its status, and only the first error is recorded: a sequence of
  * calls needs one check.  `label` ("torque T: value") begins their messages.  A NULL node is absent. */
-#define _XOPEN_SOURCE 700 /* realpath */
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
@@ -13,9 +12,10 @@
 #include "yaml.h"
 
 /* Limits of one model, about 1 GB each, so that a small file cannot use all memory: entries of each list, such as
- * bodies, elements, parameters, and of all copies; points of all tables; operations of all expressions; copies of an
- * entry; bytes of texts in copies. */
-enum { MAX_ITEMS = 1000000, MAX_POINTS = 20000000, MAX_OPERATIONS = 30000000, MAX_COPIES = 100000 };
+ * bodies, elements, parameters; points of all tables; operations of all expressions; copies of an entry; all entries,
+ * with copies and included files; bytes of texts in copies. */
+enum { MAX_ITEMS = 1000000, MAX_POINTS = 20000000, MAX_OPERATIONS = 30000000 };
+enum { MAX_COPIES = 100000, MAX_ENTRIES = 2000000 };
 #define MAX_COPIED 4e8
 #define MAX_AHEAD 1e6 /* pw_yaml.max_ahead for the default limit of bytes: each indicator takes 350 bytes */
 
@@ -25,24 +25,28 @@ enum { MAX_KEYS = 40 /* known keys of a map, and the end of their list */ };
 typedef struct {
   const pw_yaml *y;
   pw_error *error;
-  pw_scope *scope;   /* parameters and what `let` defines so far, or NULL */
-  pw_copies *copies; /* of the entry being read, or NULL */
+  pw_scope *scope;       /* parameters and what `let` defines so far, or NULL */
+  pw_copies *copies;     /* of the entry being read, or NULL */
+  const char *prefix;    /* of names in an included file, or "" */
+  const pw_place *place; /* of the included file, or NULL */
   /* for building */
   pw_model *model;
   pw_arena *arena;              /* lives as long as the model */
   pw_reference_text *reference; /* the model's */
-  pw_names bodies;              /* names of bodies so far */
+  pw_names bodies;              /* names of bodies so far, to their indices */
   pw_names states;              /* names of all first-order states */
   pw_names names;               /* of bodies and elements so far, to their offsets in the source */
   pw_names truth;               /* states in the reference solution so far */
-  pw_names elements;     /* names of all elements, to the index of their types; made when an expression needs it */
+  pw_names elements;     /* of elements with states so far, or more (state_elements), to the index of their types */
   const pw_kind *kind;   /* of the element being read */
   const pw_field *field; /* of it */
   const char *label;     /* of that field, for messages */
   char *definition;      /* of the element, with all preceding fields */
   double points;         /* of all tables so far */
   double operations;     /* of all expressions so far */
-  double entries;        /* of all lists so far, and copies of them */
+  int entries;           /* of all lists so far, and copies of them */
+  int has_index;         /* 1: `elements` has those of this file */
+  int indexed;           /* elements that were indexed, with copies */
   double copied;         /* bytes of texts in copies before r->copies */
 } reader;
 
@@ -66,18 +70,6 @@ static int node_is (const pw_node *node, const char *text) {
   return node->type == PW_YAML_SCALAR && strcmp (node->text, text) == 0;
 }
 
-/* A hint for a key that is not a plain name, or "". */
-static const char *read_key_hint (const char *text, const char *const *key) {
-  for (int i = 0; key[i]; i++) {
-    size_t n = strlen (key[i]);
-    if (strncmp (text, key[i], n) == 0 && text[n] == ':') return "; a space goes after the colon";
-    if (strncmp (text, key[i], n) == 0 && text[n] == ' ') return "; a colon goes after the key";
-  }
-  if (*text && strspn (text, "0123456789") == strlen (text)) return "; decimals are written with a point";
-  if (strpbrk (text, "()*/^")) return "; an expression with commas goes between double quotes";
-  return "";
-}
-
 static int read_key (const reader *r, const pw_node *node, const char *const *key, const char *owner,
                      const pw_node **value) {
   if (node->type != PW_YAML_SCALAR)
@@ -91,7 +83,7 @@ static int read_key (const reader *r, const pw_node *node, const char *const *ke
   }
   pw_nearest near = { .sought = node->text };
   for (int i = 0; key[i]; i++) pw_nearest_try (&near, key[i]);
-  const char *hint = read_key_hint (node->text, key);
+  const char *hint = pw_yaml_key_hint (node->text, key);
   return read_fail (r, node->at, "%s has no \"%.60s\"%s", owner, node->text, *hint ? hint : pw_nearest_text (&near));
 }
 
@@ -133,6 +125,12 @@ static int read_list_of (const reader *r, const pw_node *node, const char *label
 
 /* ---- Texts and numbers ---- */
 
+/* A name of the file as it is in the model, or NULL if out of memory. */
+static const char *read_prefixed (const reader *r, const char *name) {
+  char *text = *r->prefix ? pw_arena_alloc (r->arena, strlen (r->prefix) + strlen (name) + 1) : NULL;
+  return *r->prefix == 0 ? name : text ? strcat (strcpy (text, r->prefix), name) : NULL;
+}
+
 /* A scalar's text, not empty. */
 static int read_text (const reader *r, const pw_node *node, const char *label, const char **text) {
   if (node == NULL) return r->error->status;
@@ -149,7 +147,7 @@ static size_t source_offset (const pw_yaml *y, const pw_node *node, size_t offse
   return at + n <= y->size && strncmp (y->source + at, node->text, n) == 0 ? at + offset : node->at;
 }
 
-/* Whether a name in an expression is that of a state: BODY.phi, or a first-order state. */
+/* Whether a name in the model is that of a state: BODY.phi, or a first-order state. */
 static int is_state (const reader *r, const char *name) {
   return strchr (name, '.') || (r->states.slot && pw_names_find (&r->states, name) >= 0);
 }
@@ -158,7 +156,7 @@ static int is_state (const reader *r, const char *name) {
 static const char *find_variable (const reader *r, const char *text) {
   char name[PW_EXPRESSION_NAME];
   for (const char *rest = text, *p; (p = pw_expression_next_name (&rest, name)) != NULL;)
-    if (strcmp (name, "t") == 0 || is_state (r, name)) return p;
+    if (strcmp (name, "t") == 0 || is_state (r, PW_PRINTED (200, "%s%s", r->prefix ? r->prefix : "", name))) return p;
   return NULL;
 }
 
@@ -241,16 +239,14 @@ static void suggest_bodies (const reader *r, pw_nearest *near) {
 
 /* ---- Entries of lists, and their copies ---- */
 
-/* Counts entries, for which the tables of names get room. */
-static int count_entries (reader *r, const pw_node *node, double more) {
-  const size_t room = (size_t)(r->entries + more);
-  if ((r->entries += more) > MAX_ITEMS)
-    return read_fail (r, node->at, "the lists up to here have more than %d entries, the limit for a model", MAX_ITEMS);
-  if (r->copied + (r->copies ? r->copies->bytes : 0) > MAX_COPIED)
-    return read_fail (r, node->at, "the copies up to here have texts of more than %g MB, the limit for a model",
-                      MAX_COPIED / 1e6);
+/* Counts an entry, for which the tables of names get room. */
+static int count_entry (reader *r, const pw_node *node) {
+  const size_t room = (size_t)++r->entries;
+  if (r->entries > MAX_ENTRIES)
+    return read_fail (r, node->at, "the lists and copies up to here have more than %d entries, the limit for a model",
+                      MAX_ENTRIES);
   return pw_names_reserve (&r->bodies, room) == PW_OK && pw_names_reserve (&r->names, room) == PW_OK &&
-                 pw_names_reserve (&r->states, room) == PW_OK
+                 pw_names_reserve (&r->states, room) == PW_OK && pw_names_reserve (&r->elements, room) == PW_OK
              ? PW_OK
              : read_no_memory (r);
 }
@@ -276,6 +272,20 @@ static int read_repeat (reader *r, const pw_node *repeat, const char **counter, 
 
 typedef int read_entry (reader *r, const pw_node *entry);
 
+/* Calls `each` with an entry or, if that is {list: [..]}, with those of the list. */
+static int read_copy (reader *r, const pw_node *entry, read_entry *each) {
+  const pw_node *list = entry->first && node_is (entry->first, "list") ? entry->first->next : NULL;
+  if (list == NULL) return each (r, entry);
+  if (read_list (r, list, "list") != PW_OK) return r->error->status;
+  if (list->next) return read_fail (r, list->next->at, "a repeated list has no other keys");
+  for (const pw_node *n = list->first; n && r->error->status == PW_OK; n = n->next)
+    if (pw_yaml_repeat (n))
+      read_fail (r, n->at, "repeat: inside another repeat");
+    else
+      each (r, n);
+  return r->error->status;
+}
+
 /* Calls `each` with the copies of an entry. */
 static int read_copies (reader *r, const pw_node *entry, const pw_node *repeat, read_entry *each) {
   pw_copies c = { .scope = r->scope, .arena = r->arena, .repeat = repeat }, *outer = r->copies;
@@ -286,7 +296,11 @@ static int read_copies (reader *r, const pw_node *entry, const pw_node *repeat, 
   for (int i = 1; i <= count && status == PW_OK && r->error->status == PW_OK; i++) {
     if ((status = pw_copies_set (&c, i)) != PW_OK) break;
     r->copies = &c;
-    if (count_entries (r, entry, 1) == PW_OK) each (r, c.entry);
+    if (r->copied + c.bytes > MAX_COPIED)
+      read_fail (r, entry->at, "the copies up to here have texts of more than %g MB, the limit for a model",
+                 MAX_COPIED / 1e6);
+    else
+      read_copy (r, c.entry, each);
     r->copies = NULL;
   }
   if (status == PW_INPUT) read_fail (r, source_offset (r->y, c.faulty, c.fault.at), "%s", c.fault.text);
@@ -303,7 +317,7 @@ static int read_entries (reader *r, const pw_node *list, read_entry *each) {
     const pw_node *repeat = pw_yaml_repeat (n);
     if (repeat)
       read_copies (r, n, repeat, each);
-    else if (count_entries (r, n, 1) == PW_OK)
+    else
       each (r, n);
   }
   return r->error->status;
@@ -315,15 +329,24 @@ static int read_entries (reader *r, const pw_node *list, read_entry *each) {
 #define expression_fail(r, node, at, ...) \
   read_fail (r, source_offset ((r)->y, node, at), "%s: %s", (r)->label, PW_PRINTED (300, __VA_ARGS__))
 
+/* The node of an expression with the names as they are in the model. */
+static int read_renamed (reader *r, const pw_node *node, pw_node *renamed) {
+  const pw_renames names = { r->copies, r->prefix, &r->states, r->scope };
+  const char *text = "";
+  if (read_text (r, node, r->label, &text) != PW_OK) return r->error->status;
+  *renamed = *node;
+  renamed->text = pw_yaml_renamed (&names, text, r->arena);
+  return renamed->text ? PW_OK : read_no_memory (r);
+}
+
 /* Reads an expression; `variable`: names, which end with NULL. */
 static int read_expression (reader *r, const pw_node *node, const char *const *variable, const char **text,
                             const pw_expression **expression) {
   pw_expression_error error;
   if (read_text (r, node, r->label, text) != PW_OK) return r->error->status;
-  if (r->copies && (*text = pw_copies_expression (r->copies, *text, r->arena)) == NULL) return read_no_memory (r);
   int status = pw_expression_read (r->scope, variable, *text, r->arena, expression, &error);
   if (status == PW_INPUT) suggest_state (r, *text, &error);
-  if (status == PW_INPUT) return expression_fail (r, node, *text == node->text ? error.at : 0, "%s", error.text);
+  if (status == PW_INPUT) return expression_fail (r, node, error.at, "%s", error.text);
   if (status != PW_OK) return read_no_memory (r);
   if ((r->operations += (*expression)->codes) <= MAX_OPERATIONS) return PW_OK;
   return read_fail (r, node->at, "%s: the expressions up to here have more than %d operations, the limit for a model",
@@ -333,15 +356,19 @@ static int read_expression (reader *r, const pw_node *node, const char *const *v
 static int index_element (reader *r, const pw_node *n) {
   const pw_node *key = n->type == PW_YAML_MAP ? n->first : NULL;
   int kind = key && key->next->type == PW_YAML_SCALAR ? find_kind (key) : -1;
-  if (pw_names_reserve (&r->elements, (size_t)r->entries) != PW_OK) return read_no_memory (r);
-  if (kind >= 0) pw_names_add (&r->elements, key->next->text, kind);
-  return r->error->status;
+  const char *name = kind < 0 ? NULL : read_prefixed (r, key->next->text);
+  if (++r->indexed > MAX_ENTRIES) return read_fail (r, n->at, "more than %d elements", MAX_ENTRIES);
+  if (kind < 0) return PW_OK; /* an error that is reported later */
+  if (name == NULL || pw_names_reserve (&r->elements, (size_t)(r->entries + r->indexed)) != PW_OK)
+    return read_no_memory (r);
+  pw_names_add (&r->elements, name, kind);
+  return PW_OK;
 }
 
-/* Indexes all elements, including those not built yet, whose errors are reported later. */
+/* Indexes all elements of the file, including those not built yet, besides those of files built before. */
 static int state_elements (reader *r) {
-  if (r->elements.slot) return PW_OK;
-  if (pw_names_open (&r->elements, 0) != PW_OK) return read_no_memory (r);
+  if (r->has_index) return PW_OK;
+  r->has_index = 1;
   return read_entries (r, r->y->elements, index_element);
 }
 
@@ -398,75 +425,10 @@ static int is_velocity (const reader *r, const char *name) {
   return 0;
 }
 
-/* ---- Signals that are expressions ----
- *
- * Such a signal is a function, of which each compiled system has a copy (signal_open): it may outlive the model. */
-
-enum { MAX_SIGNAL_STATES = 16, MAX_CHECKED_BREAKPOINTS = 100 };
-
-typedef struct {
-  const pw_expression *expression[3];      /* value, rate, acceleration; NULL: not given, differentiated instead */
-  int derivatives;                         /* required time derivatives; of a force: 0, nonholonomic: 1, holonomic: 2 */
-  int states;                              /* number of states in it */
-  const char *name[MAX_SIGNAL_STATES + 2]; /* "t", then states, "BODY.phi"; not for evaluation */
-  pw_signal_text text;
-} signal_function;
-
-/* Value and derivatives u; what is not given is computed from the last one given before; u[2] is 0 unless required. */
-static void signal_derivatives (const signal_function *f, const double *variable, double u[3]) {
-  pw_expression_derivatives (f->expression[0], variable, PW_EXPRESSION_TIME, u);
-  for (int i = 1; i <= f->derivatives; i++) {
-    double given[3];
-    if (f->expression[i] == NULL) continue;
-    pw_expression_derivatives (f->expression[i], variable, PW_EXPRESSION_TIME, given);
-    u[i] = given[0];
-    if (i == 1) u[2] = given[1]; /* the derivative of the given rate, unless the acceleration is given, too */
-  }
-  if (f->derivatives < 2) u[2] = 0;
-}
-
-static int signal_eval (void *context, double t, const double *state, double value[3], double *gradient) {
-  const signal_function *f = context;
-  double variable[MAX_SIGNAL_STATES + 1] = { t }, derivatives[3];
-  if (f->states) memcpy (variable + 1, state, (size_t)f->states * sizeof *state);
-  if (f->derivatives)
-    signal_derivatives (f, variable, value);
-  else
-    value[0] = pw_expression_value (f->expression[0], variable);
-  for (int i = 0; gradient && i < f->states; i++) {
-    pw_expression_derivatives (f->expression[0], variable, 1 + i, derivatives);
-    if (derivatives[0] != value[0]) /* at a jump in time, which only derivatives by t decide: pass it */
-      variable[0] = nextafter (t, INFINITY), pw_expression_derivatives (f->expression[0], variable, 1 + i, derivatives);
-    /* 0 where the derivative is unknown, such as that of sqrt (vx^2 + vy^2) at rest. */
-    gradient[i] = isfinite (derivatives[1]) ? derivatives[1] : 0;
-  }
-  return isfinite (value[0]) && (f->derivatives == 0 || (isfinite (value[1]) && isfinite (value[2]))) ? 0 : -1;
-}
-
-static double signal_breakpoint (void *context, double t) {
-  const signal_function *f = context;
-  double first = INFINITY;
-  for (int i = 0; i < 3; i++)
-    if (f->expression[i]) first = fmin (first, pw_expression_breakpoint (f->expression[i], t));
-  return first;
-}
-
-static void *signal_open (void *context) {
-  const signal_function *f = context;
-  size_t bytes[3] = { 0 };
-  for (int i = 0; i < 3; i++)
-    if (f->expression[i]) bytes[i] = pw_expression_size (f->expression[i]);
-  signal_function *copy = malloc (sizeof *f + bytes[0] + bytes[1] + bytes[2]);
-  if (copy == NULL) return NULL;
-  *copy = *f;
-  char *at = (char *)(copy + 1);
-  for (int i = 0; i < 3; at += bytes[i++])
-    if (f->expression[i]) copy->expression[i] = memcpy (at, f->expression[i], bytes[i]);
-  return copy;
-}
+/* ---- Signals that are expressions ---- */
 
 /* Adds a state, at an offset of the expression, unless it is known already. */
-static int signal_add_state (reader *r, const pw_node *node, signal_function *f, const char *name, size_t at) {
+static int signal_add_state (reader *r, const pw_node *node, pw_signal_function *f, const char *name, size_t at) {
   for (int i = 1; i <= f->states; i++)
     if (strcmp (f->name[i], name) == 0) return PW_OK;
   if (f->derivatives > 1 || (f->derivatives && !pw_kind_signals_feedback (r->kind)))
@@ -478,14 +440,17 @@ static int signal_add_state (reader *r, const pw_node *node, signal_function *f,
                             "\"%s\": the signal of a velocity constraint depends on positions and first-order states, "
                             "not on velocities; use a state that follows it, {name: NAME, rate: (%s - NAME)/TIME}",
                             name, name);
-  if (f->states == MAX_SIGNAL_STATES) return expression_fail (r, node, at, "more than %d states", MAX_SIGNAL_STATES);
+  if (f->states == PW_SIGNAL_STATES) return expression_fail (r, node, at, "more than %d states", PW_SIGNAL_STATES);
   f->name[f->states + 1] = pw_arena_copy (r->arena, name);
   return f->name[++f->states] ? PW_OK : read_no_memory (r);
 }
 
-static int signal_expression (reader *r, const pw_node *node, signal_function *f, int i) {
-  const char *source = node->type == PW_YAML_SCALAR ? node->text : "";
+static int signal_expression (reader *r, const pw_node *written, pw_signal_function *f, int i) {
+  pw_node copy;
+  const pw_node *node = &copy;
   char name[PW_EXPRESSION_NAME];
+  if (read_renamed (r, written, &copy) != PW_OK) return r->error->status;
+  const char *source = node->text;
   for (const char *rest = source, *p; (p = pw_expression_next_name (&rest, name)) != NULL;)
     if (is_state (r, name) && signal_add_state (r, node, f, name, (size_t)(p - source)) != PW_OK)
       return r->error->status;
@@ -497,86 +462,30 @@ static int signal_expression (reader *r, const pw_node *node, signal_function *f
   return jump ? PW_OK : read_no_memory (r);
 }
 
-/* Compares derivative i, 1 or 2, which is given, with that computed from the last one given before, at some times. */
-static int signal_check_derivative (reader *r, const pw_node *node, const signal_function *f, int i, const char *name) {
-  static const double time[] = { 0.3, 1.7, 4.1 }; /* [s], arbitrary */
-  int last = f->expression[i - 1] ? i - 1 : 0, n = i - last;
-  double given[3], exact[3][3], size = 0;
-  for (int k = 0; k < 3; k++) {
-    given[k] = pw_expression_value (f->expression[i], &time[k]);
-    pw_expression_derivatives (f->expression[last], &time[k], PW_EXPRESSION_TIME, exact[k]);
-    if (isfinite (given[k]) && isfinite (exact[k][n]))
-      size = fmax (size, fabs (given[k]) + fabs (exact[k][n]) + 1e-6 * fabs (exact[k][0])); /* the last: round-off */
-  }
-  for (int k = 0; k < 3; k++)
-    if (isfinite (given[k]) && isfinite (exact[k][n]) && fabs (given[k] - exact[k][n]) > 1e-6 * size)
-      return read_fail (r, node->at, "%s: the %s at t = %g s is %.6g, but the derivative is %.6g", r->label, name,
-                        time[k], given[k], exact[k][n]);
-  return PW_OK;
-}
-
-/* The derivatives at a time; states that the signal reads have irregular values. */
-static void signal_derivatives_at (const signal_function *f, double t, double u[3]) {
-  double variable[MAX_SIGNAL_STATES + 1] = { t };
-  for (int i = 1; i <= f->states; i++) variable[i] = 0.1 + fmod (0.618 * i, 1);
-  signal_derivatives (f, variable, u);
-}
-
-/* The largest magnitude of derivative i at t +- 2^-1, 2^-2, ... 2^-20 s and t + 1 s. */
-static double signal_magnitude (const signal_function *f, double t, int i) {
-  double size = 0;
-  for (int k = -20; k <= 20; k++) {
-    double u[3];
-    signal_derivatives_at (f, t + (k < 0 ? -1 : 1) * ldexp (1, -abs (k)), u);
-    if (isfinite (u[i])) size = fmax (size, fabs (u[i]));
-  }
-  return size;
-}
-
-/* Refuses signals that a constraint cannot follow: a jump of the value or, for positions, of its derivative, at one of
- * the first breakpoints after t = 0, beyond round-off and the change between adjacent times; a jump as states change,
- * other than that of an angle by whole turns. */
-static int signal_check_continuity (reader *r, const pw_node *node, signal_function *f) {
-  double t = 0, before[3], after[3];
-  if (f->states && f->text.jump && strncmp (f->text.jump, "atan2", 5) != 0)
-    return read_fail (r, node->at, "%s: %.60s jumps as states change, and that of a velocity constraint must not",
-                      r->label, f->text.jump);
-  for (int k = 0; k < MAX_CHECKED_BREAKPOINTS; k++) {
-    t = signal_breakpoint (f, t);
-    if (t == INFINITY) return PW_OK;
-    double last = nextafter (t, -INFINITY);
-    signal_derivatives_at (f, last, before);
-    signal_derivatives_at (f, t, after);
-    for (int i = 0; i < f->derivatives; i++)
-      if (fabs (after[i] - before[i]) >
-          1e-9 * signal_magnitude (f, t, i) + 2 * (t - last) * (fabs (after[i + 1]) + fabs (before[i + 1])))
-        return read_fail (r, node->at, "%s: its %s jumps from %.6g to %.6g at t = %.9g s, and that of %s must not",
-                          r->label, i ? "rate" : "value", before[i], after[i], t,
-                          f->derivatives > 1 ? "a prescribed position" : "a velocity constraint");
-  }
-  return PW_OK;
-}
-
 /* Makes a signal from expressions: value; rate and acceleration, or NULL. */
 static int signal_of_time (reader *r, const pw_node *const node[3], pw_signal *signal) {
   static const char *const key[] = { "expression", "rate", "acceleration" };
-  signal_function *f = pw_arena_alloc (r->arena, sizeof *f);
+  char fault[PW_SIGNAL_FAULT] = "";
+  pw_signal_function *f = pw_arena_alloc (r->arena, sizeof *f);
   if (f == NULL) return read_no_memory (r);
   f->name[0] = "t";
   f->derivatives = pw_kind_signals_force (r->kind) ? 0 : r->kind->level == PW_HOLONOMIC ? 2 : 1;
-  *signal = (pw_signal){ PW_FUNCTION, .function = { .eval = signal_eval, .context = f, .text = &f->text } };
-  signal->function.open = signal_open;
+  *signal = (pw_signal){ PW_FUNCTION, .function = { .eval = pw_yaml_signal_eval, .context = f, .text = &f->text } };
+  signal->function.open = pw_yaml_signal_open;
   signal->function.close = free;
   for (int i = 0; i < 3; i++) {
     if (node[i] == NULL) continue;
     if (signal_expression (r, node[i], f, i) != PW_OK) return r->error->status;
-    if (f->expression[i]->breaks) signal->function.breakpoint = signal_breakpoint;
+    if (f->expression[i]->breaks) signal->function.breakpoint = pw_yaml_signal_breakpoint;
     if (i > 0 && f->derivatives && f->states)
       return read_fail (r, node[i]->at, "%s: a %s belongs to an expression of the time alone", r->label, key[i]);
-    if (i > 0 && !f->states && signal_check_derivative (r, node[i], f, i, key[i]) != PW_OK) return r->error->status;
+    if (i > 0 && !f->states && *pw_yaml_signal_check_derivative (f, i, key[i], fault))
+      return read_fail (r, node[i]->at, "%s: %s", r->label, fault);
   }
   if (f->states) signal->function.reads = f->name + 1;
-  return f->derivatives ? signal_check_continuity (r, node[0], f) : PW_OK;
+  if (f->derivatives && *pw_yaml_signal_check_continuity (f, fault))
+    return read_fail (r, node[0]->at, "%s: %s", r->label, fault);
+  return PW_OK;
 }
 
 /* ---- Signals ----
@@ -608,18 +517,6 @@ static double *table_list (reader *r, const pw_node *list, pw_signal *s) {
   return t;
 }
 
-/* A model may only read files in its folder. */
-static FILE *table_open (const pw_yaml *y, const char *name, const char **reason) {
-  char joined[PW_PATH], path[PW_PATH];
-  size_t n = strlen (y->folder); /* 0 for the root */
-  *reason = "a table must be in the model's folder: its path is relative and has no \"..\"";
-  if (*name == '/' || strstr (PW_PRINTED (PW_PATH + 2, "/%s/", name), "/../")) return NULL;
-  if (realpath (pw_path (joined, "%s/%s", y->folder, name), path) == NULL) return *reason = strerror (errno), NULL;
-  *reason = "it is a link that leads out of the model's folder";
-  int is_inside = strncmp (path, y->folder, n) == 0 && (path[n] == '/' || path[n] == 0);
-  return is_inside ? pw_open_input (path, reason) : NULL;
-}
-
 /* The unit of the current field.  Only a drive has "m or rad"; the choice before this field decides. */
 static const char *table_unit (const reader *r) {
   const pw_field *choice = r->field;
@@ -648,12 +545,13 @@ static int table_columns (reader *r, const pw_node *columns, const pw_node *time
 
 /* Points in two columns of a file; rows without a time or value are left out.  Returns the times, or NULL. */
 static double *table_file (reader *r, const pw_node *node, const pw_node *columns, const pw_node *time, pw_signal *s) {
+  char path[PW_PATH], from_model[PW_PATH];
   const char *name, *reason, *column[2], *const unit[2] = { "s", table_unit (r) };
   pw_error cause = { 0 };
   int rows;
   if (table_columns (r, columns, time, column) != PW_OK || read_text (r, node, r->label, &name) != PW_OK) return NULL;
   errno = 0;
-  FILE *f = table_open (r->y, name, &reason);
+  FILE *f = pw_yaml_find (r->y, node->at, name, path, from_model, &reason) ? pw_open_input (path, &reason) : NULL;
   if (f == NULL && pw_open_input_status () == PW_RESOURCE)
     return pw_fail (r->error, PW_RESOURCE, "%s: cannot read %s: %s", r->y->path, name, reason), NULL;
   if (f == NULL) return read_fail (r, node->at, "%s: cannot read \"%.60s\": %s", r->label, name, reason), NULL;
@@ -775,28 +673,12 @@ static double reference_eval (void *context, int i, double t) {
   return pw_expression_value (x[i], &t);
 }
 
-/* Makes room for one more state. */
-static int reference_reserve (reader *r) {
-  pw_reference_text *t = r->reference, more = *t;
-  if (pw_names_reserve (&r->truth, (size_t)t->states + 1) != PW_OK) return read_no_memory (r);
-  if (t->context && (t->states & (t->states + 1)) != 0) return PW_OK; /* room is for a power of 2 less 1 */
-  const size_t n = (size_t)t->states, room = 2 * n + 1;
-  more.state = pw_arena_alloc (r->arena, room * sizeof *t->state);
-  more.text = pw_arena_alloc (r->arena, room * sizeof *t->text);
-  more.context = pw_arena_alloc (r->arena, room * sizeof (pw_expression *));
-  if (more.state == NULL || more.text == NULL || more.context == NULL) return read_no_memory (r);
-  if (n) memcpy (more.state, t->state, n * sizeof *t->state);
-  if (n) memcpy (more.text, t->text, n * sizeof *t->text);
-  if (n) memcpy (more.context, t->context, n * sizeof (pw_expression *));
-  *t = more;
-  return PW_OK;
-}
-
 static int reference_state (reader *r, const pw_node *n) {
   static const char *const time[] = { "t", NULL };
   pw_reference_text *t = r->reference;
+  pw_node text;
   const char *name;
-  if (read_text (r, n, "truth", &name) != PW_OK || reference_reserve (r) != PW_OK) return r->error->status;
+  if (read_text (r, n, "truth", &name) != PW_OK) return r->error->status;
   const pw_expression **x = t->context;
   if (!is_state (r, name))
     return read_fail (r, n->at, "truth: expected a state such as BODY.phi, found \"%.60s\"", name);
@@ -805,7 +687,8 @@ static int reference_state (reader *r, const pw_node *n) {
   if (pw_names_add (&r->truth, name, 0) >= 0) return read_fail (r, n->at, "truth: a second \"%s\"", name);
   r->label = PW_PRINTED (100, "truth of %.60s", name);
   t->state[t->states] = name;
-  int status = read_expression (r, n->next, time, &t->text[t->states], &x[t->states]);
+  if (read_renamed (r, n->next, &text) != PW_OK) return r->error->status;
+  int status = read_expression (r, &text, time, &t->text[t->states], &x[t->states]);
   t->states += status == PW_OK;
   return status;
 }
@@ -814,16 +697,27 @@ static int reference_entry (reader *r, const pw_node *map) {
   if (map->type != PW_YAML_MAP)
     return read_fail (r, map->at, "truth: expected a map {STATE: EXPRESSION, ...}, found %s", node_found (map));
   for (const pw_node *n = map->first; n && r->error->status == PW_OK; n = n->next->next)
-    if (count_entries (r, n, 1) == PW_OK) reference_state (r, n);
+    if (count_entry (r, n) == PW_OK) reference_state (r, n);
   return r->error->status;
 }
 
 /* Reads the reference solution, after bodies and elements. */
 static int read_reference (reader *r) {
   pw_reference_text *t = r->reference;
+  int bodies, elements;
+  pw_model_bodies (r->model, &bodies);
+  const pw_element *e = pw_model_elements (r->model, &elements);
+  size_t room = 6 * (size_t)bodies + 1; /* all states */
+  for (int i = 0; i < elements; i++) room += 2 * (size_t)e[i].kind->internal;
   t->eval = reference_eval;
   if (r->y->reference || r->operations > 0) /* expressions may use names, whose values `show` writes */
     t->names = r->scope->names, t->name = r->scope->name, t->value = r->scope->value;
+  if (r->y->reference == NULL) return PW_OK;
+  t->state = pw_arena_alloc (r->arena, room * sizeof *t->state);
+  t->text = pw_arena_alloc (r->arena, room * sizeof *t->text);
+  t->context = pw_arena_alloc (r->arena, room * sizeof (pw_expression *));
+  if (t->state == NULL || t->text == NULL || t->context == NULL || pw_names_open (&r->truth, room) != PW_OK)
+    return read_no_memory (r);
   return read_entries (r, r->y->reference, reference_entry);
 }
 
@@ -834,11 +728,14 @@ static int read_reference (reader *r) {
 
 /* Reads the name of a body or element, which must be unique. */
 static int build_name (reader *r, const pw_node *node, const char *label, const char **name) {
-  if (read_text (r, node, label, name) != PW_OK) return r->error->status;
-  int before = pw_names_add (&r->names, *name, (int)node->at); /* a file has less than INT_MAX bytes */
+  char part[PW_PATH];
+  if (count_entry (r, node) != PW_OK || read_text (r, node, label, name) != PW_OK) return r->error->status;
+  if ((*name = read_prefixed (r, *name)) == NULL) return read_no_memory (r);
+  int before = pw_names_add (&r->names, *name, (int)node->at); /* files have less than INT_MAX bytes */
   if (before < 0) return PW_OK;
-  return read_fail (r, node->at, "%s \"%.60s\": line %d already uses this name", label, *name,
-                    pw_yaml_line (r->y, (size_t)before));
+  pw_yaml_part (r->y, (size_t)before, part);
+  return read_fail (r, node->at, "%s \"%.60s\": line %d%s%.60s already uses this name", label, *name,
+                    pw_yaml_line (r->y, (size_t)before), *part ? " of " : "", part);
 }
 
 /* Reports an error of the core at a node, without its prefix "model NAME: ". */
@@ -849,21 +746,38 @@ static int build_fail (const reader *r, const pw_node *node, const pw_error *cau
   return read_fail (r, node->at, "%s", text);
 }
 
+/* A uniform bar between two points: {bar: NAME, from: [x, y], to: [x, y], mass: M}. */
+static int build_bar (reader *r, const pw_node *name, const pw_node *from, const pw_node *to, pw_body *body) {
+  double a[2], b[2];
+  const char *label = PW_PRINTED (160, "bar %.60s", body->name);
+  if (from == NULL || to == NULL) return read_fail (r, name->at, "%s needs two points, \"from\" and \"to\"", label);
+  if (read_pair (r, from, label, "numbers, [x, y]", a) != PW_OK ||
+      read_pair (r, to, label, "numbers, [x, y]", b) != PW_OK)
+    return r->error->status;
+  if (a[0] == b[0] && a[1] == b[1]) return read_fail (r, to->at, "%s: its two points are the same", label);
+  pw_place_bar (body, a, b);
+  return PW_OK;
+}
+
 static int build_body (reader *r, const pw_node *node) {
-  static const char *const key[] = { "name", "mass", "inertia", "start", "rate", NULL };
+  static const char *const keys[] = { "name", "mass", "inertia", "start", "rate", NULL };
+  static const char *const bar_keys[] = { "bar", "mass", "from", "to", "rate", NULL };
   static const char *const state[][4] = { { "x", "y", "phi", NULL }, { "vx", "vy", "omega", NULL } };
-  const pw_node *v[sizeof key / sizeof *key];
+  const pw_node *v[sizeof keys / sizeof *keys];
   pw_body body = { .specified = PW_SPECIFIES_NOTHING };
   pw_error cause = { 0 };
-  if (read_keys (r, node, key, "a body", v) != PW_OK) return r->error->status;
+  int bodies, is_bar = node->type == PW_YAML_MAP && node->first && node_is (node->first, "bar");
+  const char *const *key = is_bar ? bar_keys : keys;
+  if (read_keys (r, node, key, is_bar ? "a bar" : "a body", v) != PW_OK) return r->error->status;
   const pw_node *name = v[0];
   if (name == NULL) return read_fail (r, node->at, "a body needs a name");
   if (build_name (r, name, "body", &body.name) != PW_OK) return r->error->status;
-  for (int i = 0; i < 2; i++) {
+  for (int i = 0; i < (is_bar ? 1 : 2); i++) {
     const char *label = PW_PRINTED (160, "body %.60s: %s", body.name, key[1 + i]);
     read_number (r, v[1 + i], label, PW_NONNEGATIVE, i ? &body.inertia : &body.mass);
   }
-  for (int i = 0; i < 2; i++) {
+  if (is_bar && build_bar (r, name, v[2], v[3], &body) != PW_OK) return r->error->status;
+  for (int i = is_bar; i < 2; i++) {
     const char *label = PW_PRINTED (160, "%s of body %.60s", key[3 + i], body.name);
     const pw_node *given[4];
     read_keys (r, v[3 + i], state[i], label, given);
@@ -875,8 +789,13 @@ static int build_body (reader *r, const pw_node *node) {
     }
   }
   if (r->error->status != PW_OK) return r->error->status;
+  const char *alone = pw_place_body (r->place, &body);
+  if (*alone)
+    return read_fail (r, name->at, "body %.60s: in a file placed at an angle, %s are given both or neither", body.name,
+                      alone);
   if (pw_model_check_body (r->model, &body, &cause) != PW_OK) return build_fail (r, name, &cause);
-  pw_names_add (&r->bodies, body.name, 0);
+  pw_model_bodies (r->model, &bodies);
+  pw_names_add (&r->bodies, body.name, bodies);
   return pw_add_body (r->model, &body);
 }
 
@@ -884,18 +803,41 @@ static int build_body (reader *r, const pw_node *node) {
 
 static int build_body_name (const reader *r, const pw_node *node, const char **name) {
   if (read_text (r, node, r->label, name) != PW_OK) return r->error->status;
-  if (strcmp (*name, "ground") == 0 || pw_names_find (&r->bodies, *name) >= 0) return PW_OK;
+  if (strcmp (*name, "ground") == 0) return PW_OK;
+  if ((*name = read_prefixed (r, *name)) == NULL) return read_no_memory (r);
+  if (pw_names_find (&r->bodies, *name) >= 0) return PW_OK;
   pw_nearest near = { .sought = *name };
   suggest_bodies (r, &near);
   pw_nearest_try (&near, "ground");
   return read_fail (r, node->at, "%s: there is no body \"%.60s\"%s", r->label, *name, pw_nearest_text (&near));
 }
 
-static int build_value (reader *r, const pw_node *node, void *to) {
+/* A point of body i: [x, y] in its frame, or {world: [x, y]} where it is at the start. */
+static int build_point (reader *r, const pw_node *node, int i, double to[2]) {
+  static const char *const key[] = { "world", NULL };
+  const pw_node *world = NULL;
+  const char *name = pw_place_body_of (r->kind, r->definition, i);
+  if (node->type == PW_YAML_MAP && read_keys (r, node, key, "a point", &world) != PW_OK) return r->error->status;
+  if (read_pair (r, world ? world : node, r->label, "numbers, [x, y]", to) != PW_OK || name == NULL)
+    return r->error->status;
+  if (r->place && (world || strcmp (name, "ground") == 0)) pw_place_point (r->place, to);
+  if (world == NULL || strcmp (name, "ground") == 0) return PW_OK;
+  int bodies;
+  const pw_body *body = pw_model_bodies (r->model, &bodies) + pw_names_find (&r->bodies, name);
+  if ((body->specified & 7) != 7)
+    return read_fail (r, node->at, "%s: a point of the world needs x, y and phi in the start of body %s", r->label,
+                      name);
+  const pw_place place = pw_place_in (NULL, body->start, body->start[2]);
+  pw_place_back (&place, to);
+  return PW_OK;
+}
+
+static int build_value (reader *r, const pw_node *node, int i, void *to) {
   switch (r->field->type) {
   case PW_NUMBER:
     return read_number (r, node, r->label, r->field->domain, to);
   case PW_POINT:
+    return build_point (r, node, i, to);
   case PW_VECTOR:
     return read_pair (r, node, r->label, "numbers, [x, y]", to);
   case PW_BODY:
@@ -922,25 +864,12 @@ static int build_field (reader *r, const pw_node *node, const char *element) {
   char *to = r->definition + f->offset;
   int count = pw_field_count (f);
   r->label = PW_PRINTED (200, "%s %.60s: %s", r->kind->name, element, f->name);
-  if (count == 1) return build_value (r, node, to);
-  if (read_list_of (r, node, r->label, count, plural[f->type]) != PW_OK) return r->error->status;
-  for (const pw_node *n = node->first; n; n = n->next, to += pw_field_bytes (f->type)) build_value (r, n, to);
+  if (count == 1) return build_value (r, node, 0, to);
+  const int world = f->type == PW_POINT && node->type == PW_YAML_MAP; /* one point of all bodies */
+  if (!world && read_list_of (r, node, r->label, count, plural[f->type]) != PW_OK) return r->error->status;
+  const pw_node *n = world ? node : node->first;
+  for (int i = 0; i < count; i++, to += pw_field_bytes (f->type), n = world ? n : n->next) build_value (r, n, i, to);
   return r->error->status;
-}
-
-/* Whether a word of a text begins with this prefix of at least 3 bytes. */
-static int build_has_word (const char *text, const char *prefix) {
-  for (const char *at = text; strlen (prefix) >= 3 && (at = strstr (at, prefix)) != NULL; at++)
-    if (at == text || strchr (" (", at[-1])) return 1;
-  return 0;
-}
-
-/* 1 if an element type has a field of this name. */
-static int build_is_field (const char *name) {
-  for (const pw_kind *const *k = pw_kinds; *k; k++)
-    for (const pw_field *f = (*k)->fields; f->name; f++)
-      if (strcmp (f->name, name) == 0) return 1;
-  return 0;
 }
 
 /* Finds the element type, the first key. */
@@ -958,39 +887,41 @@ static int build_kind (reader *r, const pw_node *node) {
     if (kind >= 0)
       return read_fail (r, first->at, "an element begins with its type: write {%s: NAME, ...}", pw_kinds[kind]->name);
   }
-  pw_nearest near = { .sought = first->text };
-  for (const pw_kind *const *k = pw_kinds; *k; k++) pw_nearest_try (&near, (*k)->name);
-  /* Words of descriptions suggest a type: "hinge" pin, "damper" spring; names of fields, as "angle", do not. */
-  for (const pw_kind *const *k = pw_kinds; *k && !near.near && !build_is_field (first->text); k++)
-    if (build_has_word ((*k)->about, first->text))
-      snprintf (near.best, sizeof near.best, "%s", (*k)->name), near.near = 1;
+  pw_nearest near = pw_yaml_nearest_kind (first->text);
   return read_fail (r, first->at, "an element begins with its type, and there is no type \"%.60s\"%s", first->text,
                     near.near ? pw_nearest_text (&near) : ": see pinwheel list kinds");
 }
 
 /* Adds an element of the type r->kind with the fields in the pairs from `first` on, to which the keys of a first-order
  * state add `name`; at: where an error of the whole is reported. */
-static int build_fields (reader *r, const pw_node *at, const pw_node *name, const pw_node *first) {
+static int build_fields (reader *r, const pw_node *at, const pw_node *node, const char *name, const pw_node *first) {
   const char *key[MAX_KEYS];
   const pw_node *v[MAX_KEYS];
   const pw_kind *kind = r->kind;
   pw_error cause = { 0 };
   int n = 0;
   memset (r->definition, 0, kind->definition);
-  memcpy (r->definition, &name->text, sizeof name->text);
+  memcpy (r->definition, &name, sizeof name);
   for (const pw_field *f = kind->fields; f->name && n < MAX_KEYS - 2; f++) key[n++] = f->name;
   key[n] = kind == &pw_kind_state ? "name" : NULL, key[n + 1] = NULL;
   read_keys_from (r, first, key, PW_PRINTED (100, "a %s", kind->name), v);
   for (int i = 0; i < n && r->error->status == PW_OK; i++) {
     const pw_field *f = r->field = &kind->fields[i];
     if (v[i])
-      build_field (r, v[i], name->text);
+      build_field (r, v[i], name);
     else if (f->required || f->type == PW_BODY)
-      read_fail (r, at->at, "%s %.60s needs \"%s\": %s", kind->name, name->text, f->name, f->about ? f->about : "");
+      read_fail (r, at->at, "%s %.60s needs \"%s\": %s", kind->name, name, f->name, f->about ? f->about : "");
   }
   if (r->error->status != PW_OK) return r->error->status;
+  const char *direction = pw_place_direction (r->place, kind, r->definition);
+  if (direction)
+    return read_fail (r, node->at,
+                      "%s %.60s: its \"%s\" refers to the ground, which does not turn with a file placed at an angle",
+                      kind->name, name, direction);
   pw_element e = { kind, r->definition };
-  if (pw_model_check_element (r->model, &e, &cause) != PW_OK) return build_fail (r, name, &cause);
+  if (pw_model_check_element (r->model, &e, &cause) != PW_OK) return build_fail (r, node, &cause);
+  for (int i = 0; kind->internal > 0 && kind != &pw_kind_state && pw_kinds[i]; i++)
+    if (pw_kinds[i] == kind) pw_names_add (&r->elements, name, i);
   return pw_add (r->model, kind, r->definition);
 }
 
@@ -999,7 +930,7 @@ static int build_element (reader *r, const pw_node *node) {
   if (build_kind (r, node) != PW_OK) return r->error->status;
   const pw_node *first = node->first;
   if (build_name (r, first->next, r->kind->name, &name) != PW_OK) return r->error->status;
-  return build_fields (r, first, first->next, first->next->next);
+  return build_fields (r, first, first->next, name, first->next->next);
 }
 
 /* ---- First-order states: a list of {name, rate, start, unit} ---- */
@@ -1016,86 +947,20 @@ static const pw_node *state_name (const reader *r, const pw_node *node) {
 /* Indexes the name of a state, which signals of any element may read; expressions can use it. */
 static int index_state (reader *r, const pw_node *n) {
   const pw_node *node = state_name (r, n);
-  const char *name;
+  const char *name, *own;
   if (node == NULL || build_name (r, node, "state", &name) != PW_OK) return r->error->status;
-  if (read_name (r, node, "state", &name) != PW_OK) return r->error->status;
+  if (read_name (r, node, "state", &own) != PW_OK) return r->error->status;
   pw_names_add (&r->states, name, 0);
-  if (pw_names_find (&r->scope->index, name) >= 0)
+  if (pw_names_find (&r->scope->index, own) >= 0)
     return read_fail (r, node->at, "state \"%s\": a parameter or number of let has this name", name);
   return PW_OK;
 }
 
 static int build_state (reader *r, const pw_node *node) {
   const pw_node *name = state_name (r, node);
+  const char *text = read_prefixed (r, name->text);
   r->kind = &pw_kind_state;
-  return build_fields (r, name, name, node->first);
-}
-
-/* ---- The model ---- */
-
-/* Adds the numbers of a map {NAME: NUMBER, ...} to the scope. */
-static int build_let (reader *r, const pw_node *map) {
-  const char *name;
-  double value;
-  if (map->type != PW_YAML_MAP)
-    return read_fail (r, map->at, "let: expected a map {NAME: NUMBER, ...}, found %s", node_found (map));
-  for (const pw_node *n = map->first; n; n = n->next->next) {
-    if (count_entries (r, n, 1) != PW_OK || read_name (r, n, "name", &name) != PW_OK) return r->error->status;
-    if (pw_names_find (&r->scope->index, name) >= 0) return read_fail (r, n->at, "a second name \"%s\"", name);
-    if (read_number (r, n->next, PW_PRINTED (100, "let %s", name), PW_REAL, &value) != PW_OK) return r->error->status;
-    if (pw_scope_reserve (r->scope, r->scope->names + 1, r->arena) != PW_OK) return read_no_memory (r);
-    pw_scope_add (r->scope, name, value);
-  }
-  return PW_OK;
-}
-
-static int build_all (reader *r, const double *parameter) {
-  const pw_yaml *y = r->y;
-  for (int i = 0; i < y->parameter_count; i++) pw_scope_add (r->scope, y->table.parameters[i].name, parameter[i]);
-  read_entries (r, y->let, build_let);
-  read_entries (r, y->states, index_state);
-  read_entries (r, y->bodies, build_body);
-  read_entries (r, y->elements, build_element);
-  read_entries (r, y->states, build_state);
-  return r->error->status == PW_OK ? read_reference (r) : r->error->status;
-}
-
-static void build_free (void *arena) {
-  pw_arena_free (arena);
-  free (arena);
-}
-
-/* Allocates the memory for building, and the arena for what lives as long as the model. */
-static int build_open (reader *r) {
-  const pw_yaml *y = r->y;
-  size_t largest = 1;
-  for (const pw_kind *const *k = pw_kinds; *k; k++)
-    if ((*k)->definition > largest) largest = (*k)->definition;
-  r->arena = calloc (1, sizeof *r->arena);
-  if (r->arena == NULL || pw_model_keep (r->model, r->arena, build_free) != PW_OK) return read_no_memory (r);
-  r->reference = pw_arena_alloc (r->arena, sizeof *r->reference);
-  pw_model_set_reference (r->model, r->reference);
-  r->definition = malloc (largest);
-  if (r->reference && r->definition && pw_scope_reserve (r->scope, y->parameter_count, r->arena) == PW_OK)
-    return count_entries (r, y->root, 0); /* opens the tables of names */
-  return read_no_memory (r);
-}
-
-/* The build function; the parameters are numbers in the order of the table. */
-static void build_model (pw_model *m, const void *parameters) {
-  const void *table = pw_model_table (m);
-  pw_scope scope = { 0 };
-  reader r = { .y = table, .model = m, .scope = &scope, .error = pw_model_error (m) };
-  read_list (&r, r.y->bodies, "bodies");
-  read_list (&r, r.y->states, "states");
-  if (read_list (&r, r.y->elements, "elements") == PW_OK && build_open (&r) == PW_OK) build_all (&r, parameters);
-  pw_scope_close (&scope);
-  pw_names_close (&r.bodies);
-  pw_names_close (&r.states);
-  pw_names_close (&r.truth);
-  pw_names_close (&r.names);
-  pw_names_close (&r.elements);
-  free (r.definition);
+  return text ? build_fields (r, name, name, text, node->first) : read_no_memory (r);
 }
 
 /* ---- The head ---- */
@@ -1148,8 +1013,8 @@ static int head_parameters (pw_yaml *y, const reader *r, const pw_node *list, pw
 }
 
 static int read_head (pw_yaml *y, const reader *r) {
-  static const char *const key[] = { "pinwheel", "about",    "run",   "parameters", "let",
-                                     "bodies",   "elements", "truth", "states",     NULL };
+  static const char *const key[] = { "pinwheel", "about", "run",    "parameters", "let", "bodies",
+                                     "elements", "truth", "states", "include",    NULL };
   static const char *const run_key[] = { "t_end", "step", "rtol", "method", NULL };
   const pw_node *v[sizeof key / sizeof *key], *run[sizeof run_key / sizeof *run_key];
   double *number[] = { &y->table.run.t_end, &y->table.run.step, &y->table.run.rtol };
@@ -1166,6 +1031,9 @@ static int read_head (pw_yaml *y, const reader *r) {
   const pw_node *parameters = v[3];
   /* the key of the reference solution is "truth" */
   y->let = v[4], y->bodies = v[5], y->elements = v[6], y->reference = v[7], y->states = v[8];
+  y->include = v[9];
+  for (int i = 5; key[i]; i++)
+    if (i != 7) read_list (r, v[i], key[i]);
   for (int i = 3; key[i]; i++) /* from "parameters" on: lists and maps */
     if (v[i] && v[i]->count > MAX_ITEMS)
       read_fail (r, v[i]->at, "%s: %d entries; a model may have %d", key[i], v[i]->count, MAX_ITEMS);
@@ -1176,46 +1044,151 @@ static int read_head (pw_yaml *y, const reader *r) {
   return r->error->status;
 }
 
+/* ---- The model ---- */
+
+/* Adds the numbers of a map {NAME: NUMBER, ...} to the scope. */
+static int build_let (reader *r, const pw_node *map) {
+  const char *name;
+  double value;
+  if (map->type != PW_YAML_MAP)
+    return read_fail (r, map->at, "let: expected a map {NAME: NUMBER, ...}, found %s", node_found (map));
+  for (const pw_node *n = map->first; n; n = n->next->next) {
+    if (count_entry (r, n) != PW_OK || read_name (r, n, "name", &name) != PW_OK) return r->error->status;
+    if (pw_names_find (&r->scope->index, name) >= 0) return read_fail (r, n->at, "a second name \"%s\"", name);
+    if (read_number (r, n->next, PW_PRINTED (100, "let %s", name), PW_REAL, &value) != PW_OK) return r->error->status;
+    if (pw_scope_reserve (r->scope, r->scope->names + 1, r->arena) != PW_OK) return read_no_memory (r);
+    pw_scope_add (r->scope, name, value);
+  }
+  return PW_OK;
+}
+
+static read_entry build_include; /* it builds a model in this one */
+
+/* Builds all lists of a file; included files come first, so that elements can connect their bodies. */
+static int build_lists (reader *r, const double *parameter) {
+  const pw_yaml *y = r->y;
+  for (int i = 0; i < y->parameter_count; i++) pw_scope_add (r->scope, y->table.parameters[i].name, parameter[i]);
+  read_entries (r, y->let, build_let);
+  read_entries (r, y->states, index_state);
+  read_entries (r, y->include, build_include);
+  for (int i = 0; y->include && i < r->scope->names && r->error->status == PW_OK; i++)
+    if (pw_names_find (&r->states, r->scope->name[i]) >= 0)
+      read_fail (r, y->include->at, "include: a state of a file has the name \"%s\" of a parameter or number of let",
+                 r->scope->name[i]);
+  read_entries (r, y->bodies, build_body);
+  read_entries (r, y->elements, build_element);
+  return read_entries (r, y->states, build_state);
+}
+
+/* Stores the parameters of an included file: their defaults, or numbers in `set`. */
+static int include_parameters (reader *r, const pw_yaml *file, const pw_node *set, double *value) {
+  const pw_parameter *p = file->table.parameters;
+  for (int i = 0; i < file->parameter_count; i++) value[i] = p[i].value;
+  if (set && set->type != PW_YAML_MAP)
+    return read_fail (r, set->at, "set: expected a map {PARAMETER: NUMBER, ...}, found %s", node_found (set));
+  for (const pw_node *n = set ? set->first : NULL; n && r->error->status == PW_OK; n = n->next->next) {
+    const char *name = "";
+    pw_nearest near = { .sought = "" };
+    int i = 0;
+    if (read_text (r, n, "set", &name) != PW_OK) return r->error->status;
+    for (near.sought = name; i < file->parameter_count && strcmp (p[i].name, name) != 0; i++)
+      pw_nearest_try (&near, p[i].name);
+    if (i == file->parameter_count)
+      return read_fail (r, n->at, "set: the file has no parameter \"%.60s\"%s", name, pw_nearest_text (&near));
+    read_number (r, n->next, PW_PRINTED (100, "set: %s", name), p[i].domain, &value[i]);
+  }
+  return r->error->status;
+}
+
+/* Builds the lists of an included file in the model. */
+static int include_build (reader *r, pw_yaml *file, const pw_node *set, const char *prefix, const pw_place *place) {
+  const reader outer = *r;
+  pw_scope scope = { 0 };
+  r->copies = NULL, r->scope = NULL;
+  if (read_head (file, r) != PW_OK) return r->error->status;
+  r->copies = outer.copies, r->scope = outer.scope;
+  double *value = pw_arena_alloc (r->arena, ((size_t)file->parameter_count + 1) * sizeof *value);
+  if (value == NULL || pw_scope_reserve (&scope, file->parameter_count, r->arena) != PW_OK) return read_no_memory (r);
+  if (include_parameters (r, file, set, value) == PW_OK) {
+    r->y = file, r->copies = NULL, r->scope = &scope, r->prefix = prefix, r->place = place, r->has_index = 0;
+    build_lists (r, value);
+  }
+  pw_scope_close (&scope);
+  r->y = outer.y, r->copies = outer.copies, r->scope = outer.scope, r->prefix = outer.prefix, r->place = outer.place;
+  r->has_index = outer.has_index;
+  return r->error->status;
+}
+
+/* An included file: {file: NAME, prefix: TEXT, set: {PARAMETER: NUMBER, ...}, at: [x, y], phi: ANGLE}. */
+static int build_include (reader *r, const pw_node *node) {
+  static const char *const key[] = { "file", "prefix", "set", "at", "phi", NULL };
+  const pw_node *v[sizeof key / sizeof *key];
+  const char *prefix = "";
+  double at[2] = { 0 }, phi = 0;
+  if (read_keys (r, node, key, "an included file", v) != PW_OK) return r->error->status;
+  if (v[0] == NULL) return read_fail (r, node->at, "an included file needs \"file\", its path");
+  if (!v[0]->is_file) return read_fail (r, v[0]->at, "file: expected the path of a file, found %s", node_found (v[0]));
+  read_text (r, v[1], "prefix", &prefix);
+  read_pair (r, v[3], "at", "numbers, [x, y]", at);
+  if (read_number (r, v[4], "phi", PW_REAL, &phi) != PW_OK || count_entry (r, node) != PW_OK) return r->error->status;
+  if (*prefix && !pw_expression_is_name (prefix))
+    return read_fail (r, v[1]->at, "prefix \"%.60s\": expected a letter, then letters, digits and _", prefix);
+  const pw_place place = pw_place_in (r->place, at, phi);
+  pw_yaml file = *r->y; /* the same source, with other lists */
+  file.arena = (pw_arena){ 0 };
+  file.root = v[0], file.parameter_count = 0;
+  prefix = read_prefixed (r, prefix);
+  int status = prefix ? include_build (r, &file, v[2], prefix, &place) : read_no_memory (r);
+  pw_arena_free (&file.arena);
+  return status;
+}
+
+static void build_free (void *arena) {
+  pw_arena_free (arena);
+  free (arena);
+}
+
+/* Allocates the memory for building, and the arena for what lives as long as the model. */
+static int build_open (reader *r) {
+  const pw_yaml *y = r->y;
+  size_t largest = 1;
+  for (const pw_kind *const *k = pw_kinds; *k; k++)
+    if ((*k)->definition > largest) largest = (*k)->definition;
+  r->arena = calloc (1, sizeof *r->arena);
+  if (r->arena == NULL || pw_model_keep (r->model, r->arena, build_free) != PW_OK) return read_no_memory (r);
+  r->reference = pw_arena_alloc (r->arena, sizeof *r->reference);
+  pw_model_set_reference (r->model, r->reference);
+  r->definition = malloc (largest);
+  if (r->reference && r->definition && pw_scope_reserve (r->scope, y->parameter_count, r->arena) == PW_OK)
+    return count_entry (r, y->root); /* opens the tables of names */
+  return read_no_memory (r);
+}
+
+/* The build function; the parameters are numbers in the order of the table. */
+static void build_model (pw_model *m, const void *parameters) {
+  const void *table = pw_model_table (m);
+  pw_scope scope = { 0 };
+  reader r = { .y = table, .model = m, .scope = &scope, .prefix = "", .error = pw_model_error (m) };
+  if (build_open (&r) == PW_OK && build_lists (&r, parameters) == PW_OK) read_reference (&r);
+  pw_scope_close (&scope);
+  pw_names_close (&r.bodies);
+  pw_names_close (&r.states);
+  pw_names_close (&r.truth);
+  pw_names_close (&r.names);
+  pw_names_close (&r.elements);
+  free (r.definition);
+}
+
 /* ---- The file ---- */
 
 pw_yaml *pw_yaml_open (const char *path, const char *shown, size_t max_bytes, pw_error *error) {
-  const char *slash = strrchr (path, '/');
   pw_yaml *y = calloc (1, sizeof *y);
-  if (y) y->path = pw_arena_copy (&y->arena, shown);
-  if (y) y->folder = pw_arena_copy (&y->arena, slash ? path : ".");
-  if (y && y->folder && slash) y->folder[slash - path] = 0; /* "" for "/model.yaml" */
-  if (y == NULL || y->path == NULL || y->folder == NULL) {
-    pw_fail (error, PW_RESOURCE, "out of memory");
-    pw_yaml_close (y);
-    return NULL;
-  }
+  if (y == NULL) return pw_fail (error, PW_RESOURCE, "out of memory"), NULL;
   y->max_ahead = MAX_AHEAD * fmax (1, (double)max_bytes / PW_FILE_DEFAULT_BYTES);
   y->table = (pw_plugin_table){ .abi = PW_ABI, .size = sizeof y->table, .build = build_model };
-  if (pw_yaml_read_source (y, path, max_bytes, error) == PW_OK && pw_yaml_read_tree (y, error) == PW_OK &&
+  if (pw_yaml_read_files (y, path, shown, max_bytes, error) == PW_OK &&
       read_head (y, &(reader){ .y = y, .error = error }) == PW_OK)
     return y;
   pw_yaml_close (y);
   return NULL;
-}
-
-void pw_yaml_close (pw_yaml *y) {
-  if (y == NULL) return;
-  pw_arena_free (&y->arena);
-  free (y->source);
-  free (y);
-}
-
-int pw_yaml_tables (const pw_yaml *y, const pw_node *node, int (*each) (void *context, const char *path),
-                    void *context) {
-  int stop = 0;
-  for (const pw_node *n = node == NULL || node->type == PW_YAML_SCALAR ? NULL : node->first; n && !stop; n = n->next) {
-    const pw_node *key = node->type == PW_YAML_MAP ? n : NULL;
-    if (key) n = key->next; /* its value */
-    if (key && node_is (key, "file") && n->type == PW_YAML_SCALAR) {
-      char path[PW_PATH];
-      stop = each (context, pw_path (path, "%s/%s", y->folder, n->text));
-    } else
-      stop = pw_yaml_tables (y, n, each, context);
-  }
-  return stop;
 }

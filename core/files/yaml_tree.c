@@ -208,7 +208,8 @@ int pw_yaml_read_tree (pw_yaml *y, pw_error *error) {
   pw_error cause = { 0 };
   struct fy_diag_cfg quiet;
   struct fy_event *e;
-  tree x = { .y = y, .error = &cause };
+  tree x = { .y = y, .error = &cause, .fed = y->begin, .offset = y->begin, .at = (unsigned)y->begin };
+  y->root = NULL;
   fy_diag_cfg_default (&quiet);
   quiet.fp = NULL;
   errno = 0;
