@@ -278,11 +278,7 @@ static int read_copy (reader *r, const pw_node *entry, read_entry *each) {
   if (list == NULL) return each (r, entry);
   if (read_list (r, list, "list") != PW_OK) return r->error->status;
   if (list->next) return read_fail (r, list->next->at, "a repeated list has no other keys");
-  for (const pw_node *n = list->first; n && r->error->status == PW_OK; n = n->next)
-    if (pw_yaml_repeat (n))
-      read_fail (r, n->at, "repeat: inside another repeat");
-    else
-      each (r, n);
+  for (const pw_node *n = list->first; n && r->error->status == PW_OK; n = n->next) each (r, n);
   return r->error->status;
 }
 
@@ -730,12 +726,18 @@ static int read_reference (reader *r) {
 static int build_name (reader *r, const pw_node *node, const char *label, const char **name) {
   char part[PW_PATH];
   if (count_entry (r, node) != PW_OK || read_text (r, node, label, name) != PW_OK) return r->error->status;
+  if (strchr (*name, '{'))
+    return read_fail (r, node->at, "%s \"%.60s\": braces belong to an entry with the key repeat", label, *name);
   if ((*name = read_prefixed (r, *name)) == NULL) return read_no_memory (r);
   int before = pw_names_add (&r->names, *name, (int)node->at); /* files have less than INT_MAX bytes */
   if (before < 0) return PW_OK;
+  if ((size_t)before == node->at && r->copies)
+    return read_fail (r, node->at, "%s \"%.60s\": copies have the same name: write \"%.60s{%s}\"", label, *name,
+                      node->text, r->copies->counter);
   pw_yaml_part (r->y, (size_t)before, part);
-  return read_fail (r, node->at, "%s \"%.60s\": line %d%s%.60s already uses this name", label, *name,
-                    pw_yaml_line (r->y, (size_t)before), *part ? " of " : "", part);
+  return read_fail (r, node->at, "%s \"%.60s\": line %d%s%.60s already uses this name%s", label, *name,
+                    pw_yaml_line (r->y, (size_t)before), *part ? " of " : "", part,
+                    *part ? "; include it with another prefix" : "");
 }
 
 /* Reports an error of the core at a node, without its prefix "model NAME: ". */
@@ -766,7 +768,9 @@ static int build_body (reader *r, const pw_node *node) {
   const pw_node *v[sizeof keys / sizeof *keys];
   pw_body body = { .specified = PW_SPECIFIES_NOTHING };
   pw_error cause = { 0 };
-  int bodies, is_bar = node->type == PW_YAML_MAP && node->first && node_is (node->first, "bar");
+  int bodies, is_bar = 0;
+  for (const pw_node *n = node->type == PW_YAML_MAP ? node->first : NULL; n; n = n->next->next)
+    is_bar |= node_is (n, "bar");
   const char *const *key = is_bar ? bar_keys : keys;
   if (read_keys (r, node, key, is_bar ? "a bar" : "a body", v) != PW_OK) return r->error->status;
   const pw_node *name = v[0];

@@ -84,6 +84,7 @@ static int copy_nodes (pw_copies *c, const pw_node *from, pw_node **to) {
       n = n->next;
       continue;
     }
+    if (pw_yaml_repeat (n)) return copy_fail (c, pw_yaml_repeat (n), 0, "repeat: inside another repeat");
     if ((*to = pw_arena_alloc (c->arena, sizeof **to)) == NULL) return PW_RESOURCE;
     **to = *n;
     (*to)->next = NULL;
@@ -191,7 +192,7 @@ int pw_yaml_find (const pw_yaml *y, size_t at, const char *name, char path[PW_PA
   size_t n = strlen (y->folder); /* 0 for the root */
   pw_yaml_part (y, at, part);
   char *slash = strrchr (part, '/');
-  *reason = "it must be in the model's folder: its path is relative and has no \"..\"";
+  *reason = "a file must be in the model's folder: its path is relative and has no \"..\"";
   if (*name == '/' || strstr (PW_PRINTED (PW_PATH + 2, "/%s/", name), "/../")) return 0;
   pw_path (from_model, "%.*s%s", slash ? (int)(slash - part) + 1 : 0, part, name);
   if (realpath (pw_path (joined, "%s/%s", y->folder, from_model), path) == NULL) return *reason = strerror (errno), 0;

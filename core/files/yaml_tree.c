@@ -181,6 +181,8 @@ static const char *tree_hint (const pw_yaml *y, size_t at, const char *message) 
   if (slashes && slashes < line + size) return "; a comment begins with #";
   if (strstr (message, "missing comma") && memchr (line, '?', size))
     return "; an expression with ? : goes between double quotes";
+  for (size_t i = 1; strstr (message, "missing comma") && i < size; i++)
+    if (line[i] == '{' && strchr (" {[", line[i - 1]) == NULL) return "; a text with braces goes between double quotes";
   for (size_t i = 0; i < sizeof known / sizeof *known; i++)
     if (strstr (message, known[i].message)) return known[i].hint;
   return "";
