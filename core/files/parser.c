@@ -18,15 +18,22 @@
 /* ---- Names and numbers in a text ---- */
 
 #define DIGITS "0123456789"
-#define LETTERS "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ_"
+
+static int is_digit (char c) {
+  return c >= '0' && c <= '9';
+}
 
 /* The length of the name at p, which may contain dots (frame.phi); 0 if there is none. */
 static size_t name_size (const char *p) {
-  return strspn (p, LETTERS) ? strspn (p, LETTERS DIGITS ".") : 0;
+  size_t n = 0;
+  for (char c = *p; (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_' || (n && (is_digit (c) || c == '.'));)
+    c = p[++n];
+  return n;
 }
 
 /* The length of the number at p: digits, perhaps with a decimal point and an exponent; 0 if there is none. */
 static size_t number_size (const char *p) {
+  if (!is_digit (*p) && *p != '.') return 0;
   size_t whole = strspn (p, DIGITS), decimals = p[whole] == '.' ? strspn (p + whole + 1, DIGITS) : 0;
   if (whole + decimals == 0) return 0;
   const char *end = p + whole + (p[whole] == '.' ? 1 + decimals : 0); /* of the mantissa */
