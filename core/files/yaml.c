@@ -1108,18 +1108,19 @@ static int include_parameters (reader *r, const pw_yaml *file, const pw_node *se
 static int include_build (reader *r, pw_yaml *file, const pw_node *set, const char *prefix, const pw_place *place) {
   const reader outer = *r;
   pw_scope scope = { 0 };
+  double *value = NULL;
   r->copies = NULL, r->scope = NULL;
-  if (read_head (file, r) != PW_OK) return r->error->status;
+  read_head (file, r);
   r->copies = outer.copies, r->scope = outer.scope;
-  double *value = pw_arena_alloc (r->arena, ((size_t)file->parameter_count + 1) * sizeof *value);
-  if (value == NULL || pw_scope_reserve (&scope, file->parameter_count, r->arena) != PW_OK) return read_no_memory (r);
-  if (include_parameters (r, file, set, value) == PW_OK) {
+  if (r->error->status == PW_OK) value = pw_arena_alloc (r->arena, ((size_t)file->parameter_count + 1) * sizeof *value);
+  if (value == NULL || pw_scope_reserve (&scope, file->parameter_count, r->arena) != PW_OK) read_no_memory (r);
+  if (r->error->status == PW_OK && include_parameters (r, file, set, value) == PW_OK) {
     r->y = file, r->copies = NULL, r->scope = &scope, r->prefix = prefix, r->place = place, r->has_index = 0;
     build_lists (r, value);
+    r->y = outer.y, r->copies = outer.copies, r->scope = outer.scope, r->prefix = outer.prefix, r->place = outer.place;
+    r->has_index = outer.has_index;
   }
   pw_scope_close (&scope);
-  r->y = outer.y, r->copies = outer.copies, r->scope = outer.scope, r->prefix = outer.prefix, r->place = outer.place;
-  r->has_index = outer.has_index;
   return r->error->status;
 }
 

@@ -115,8 +115,8 @@ void pw_place_turn (const pw_place *p, int sign, double v[2]);
 void pw_place_point (const pw_place *p, double v[2]);
 void pw_place_back (const pw_place *p, double v[2]);
 
-/* Moves the initial state of a body from a frame, or NULL, to the world; returns "", or the pair of which only one value
- * is specified, so that it cannot be turned. */
+/* Moves the initial state of a body from a frame, or NULL, to the world.  Returns "", or the pair of which only one
+ * value is specified, so that it cannot be turned. */
 const char *pw_place_body (const pw_place *p, pw_body *body);
 /* Makes a body a uniform bar between two points. */
 void pw_place_bar (pw_body *body, const double from[2], const double to[2]);

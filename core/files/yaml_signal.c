@@ -1,6 +1,6 @@
 /* Signals of text models that are expressions: their values and derivatives, and what constraints demand of them.
  *
- * Such a signal is a function, of which each compiled system has a copy (pw_yaml_signal_open): it may outlive the model. */
+ * Such a signal is a function.  Each compiled system has a copy (pw_yaml_signal_open): it may outlive the model. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

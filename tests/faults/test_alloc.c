@@ -232,10 +232,12 @@ TEST (links) {
 TEST (texts) {
   alloc_each (alloc_text, "tests/models/ezyroller.yaml");
   alloc_each (alloc_text, "tests/models/arm.yaml");
+  alloc_each (alloc_text, "tests/models/arms.yaml");
 }
 
 TEST (tree) {
-  static const char path[] = "tests/models/arm.yaml";
+  char path[PATH_MAX];
+  assert_non_null (realpath ("tests/models/arms.yaml", path));
   pw_error error = { 0 };
   pw_yaml *y = pw_yaml_open (path, path, PW_FILE_DEFAULT_BYTES, &error);
   assert_non_null (y);

@@ -1,4 +1,4 @@
-/* Repeated entries, included files, points of the world and bars of text models, against the same models written out. */
+/* Repeated entries, included files, points of the world and bars of text models, against models written out. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -21,7 +21,7 @@ static void repeat_bad (const char *command, const char *text) {
     fail_msg ("%s ends with %d: %s; expected: %s", command, status, cli_err, text);
 }
 
-/* Braces in names and texts, the counter in numbers and signals, at whole numbers where conditions change, in all lists. */
+/* Braces in names and texts, the counter in numbers and signals, also where conditions change, in all lists. */
 TEST (copies) {
   static const char model[] =
       "pinwheel: 1\n"
