@@ -158,7 +158,7 @@ const char *pw_yaml_key_hint (const char *text, const char *const *key);
 /* The element type whose name is near, or in whose description a word begins with the text. */
 pw_nearest pw_yaml_nearest_kind (const char *text);
 
-/* Reads a file of at most `max_bytes` bytes into y->source and y->size, and checks its characters. */
+/* Reads a file of at most `max_bytes` bytes into y->source and y->size. */
 int pw_yaml_read_source (pw_yaml *y, const char *path, size_t max_bytes, pw_error *error);
 
 /* Fails with "PATH:LINE:COLUMN: error: TEXT", the line of the source at an offset, and a caret below. */
@@ -171,7 +171,10 @@ const char *pw_yaml_part (const pw_yaml *y, size_t at, char path[PW_PATH]);
 /* The line of an offset, from 1. */
 int pw_yaml_line (const pw_yaml *y, size_t at);
 
-/* Stores the tree of the source. */
+/* Checks the characters of the source from y->begin on. */
+int pw_yaml_check_source (const pw_yaml *y, pw_error *error);
+
+/* Checks the source from y->begin on, and stores its tree. */
 int pw_yaml_read_tree (pw_yaml *y, pw_error *error);
 
 /* Writes the tree as bytes, for programs without libfyaml; loads it.  PW_INPUT if it is incomplete; PW_RESOURCE. */

@@ -96,8 +96,8 @@ pw_nearest pw_yaml_nearest_kind (const char *text) {
   return near;
 }
 
-static int source_check (const pw_yaml *y, pw_error *error) {
-  const char *begin = y->source, *p = begin, *end = begin + y->size;
+int pw_yaml_check_source (const pw_yaml *y, pw_error *error) {
+  const char *begin = y->source, *p = begin + y->begin, *end = begin + y->size;
   while (p < end) {
     size_t at = (size_t)(p - begin);
     int n = pw_utf8_size (p);
@@ -124,7 +124,7 @@ int pw_yaml_read_source (pw_yaml *y, const char *path, size_t max_bytes, pw_erro
     y->size -= 3;
     memmove (y->source, y->source + 3, y->size + 1);
   }
-  return status == PW_OK ? source_check (y, error) : status;
+  return status;
 }
 
 /* Trees of text models as bytes, for programs without libfyaml: interactive pages.  A node is its type, whether it is

@@ -208,6 +208,7 @@ enum { TREE_RESERVE = 1 << 16 };
 
 int pw_yaml_read_tree (pw_yaml *y, pw_error *error) {
   pw_error cause = { 0 };
+  if (pw_yaml_check_source (y, error) != PW_OK) return error->status;
   struct fy_diag_cfg quiet;
   struct fy_event *e;
   tree x = { .y = y, .error = &cause, .fed = y->begin, .offset = y->begin, .at = (unsigned)y->begin };

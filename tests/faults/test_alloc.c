@@ -1,6 +1,8 @@
 /* Every allocation is made to fail in turn: each is an error that says so, and nothing is left behind.
  *
  * What the libraries below Pinwheel allocate does not fail here; they are asked to clean up all the same. */
+#define _XOPEN_SOURCE 700 /* realpath */
+#include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

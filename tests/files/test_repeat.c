@@ -195,9 +195,12 @@ TEST (files) {
   cli_write ("parts/part.yaml", "pinwheel: 1\ninclude: [{file: ./other.yaml}]\n");
   cli_write ("parts/other.yaml", "pinwheel: 1\ninclude: [{file: part.yaml}]\n");
   repeat_bad ("pinwheel show @/model.yaml", "other.yaml:2:18: error: file: \"part.yaml\" includes itself");
+  cli_write ("state.yaml", "pinwheel: 1\nstates: [{name: z, rate: 1}]\n");
+  cli_good ("mkdir -p @/in @/in2 && cp @/state.yaml @/in2 && ln -s ../in2/state.yaml @/in/state.yaml");
+  cli_write ("in/model.yaml", "pinwheel: 1\ninclude: [{file: state.yaml}]\n");
+  repeat_bad ("pinwheel show @/in/model.yaml", "it is a link that leads out of the model's folder");
   cli_write ("model.yaml",
              "pinwheel: 1\nparameters: [{name: x_z, value: 1}]\ninclude: [{file: state.yaml, prefix: x_}]\n");
-  cli_write ("state.yaml", "pinwheel: 1\nstates: [{name: z, rate: 1}]\n");
   repeat_bad ("pinwheel show @/model.yaml", "include: a state of a file has the name \"x_z\" of a parameter");
 }
 
