@@ -1115,10 +1115,10 @@ static int include_build (reader *r, pw_yaml *file, const pw_node *set, const ch
   if (r->error->status == PW_OK) value = pw_arena_alloc (r->arena, ((size_t)file->parameter_count + 1) * sizeof *value);
   if (value == NULL || pw_scope_reserve (&scope, file->parameter_count, r->arena) != PW_OK) read_no_memory (r);
   if (r->error->status == PW_OK && include_parameters (r, file, set, value) == PW_OK) {
-    r->y = file, r->copies = NULL, r->scope = &scope, r->prefix = prefix, r->place = place, r->has_index = 0;
+    r->y = file, r->copies = NULL, r->scope = &scope, r->prefix = prefix, r->place = place;
     build_lists (r, value);
     r->y = outer.y, r->copies = outer.copies, r->scope = outer.scope, r->prefix = outer.prefix, r->place = outer.place;
-    r->has_index = outer.has_index;
+    r->has_index = 0; /* elements of the outer file come later */
   }
   pw_scope_close (&scope);
   return r->error->status;

@@ -97,7 +97,9 @@ TEST (include) {
       "  - {repeat: {i: 2}, file: arm.yaml, prefix: \"a{i}_\", set: {m: m*i}, at: [2*i, -1]}\n"
       "bodies: [{name: car, mass: 1, inertia: 1}]\n"
       "elements:\n"
-      "  - {torque: T, body: [car, a2_arm], value: \"k*a1_lag + a2_W.spin\"}\n",
+      "  - {torque: T, body: [car, a2_arm], value: \"k*a1_lag + a2_W.spin\"}\n"
+      "  - {torque: U, body: [car, ground], value: R.spin}\n"
+      "  - {rolling-wheel: R, body: car, at: [0, 0], radius: 1, inertia: 1}\n",
       "pinwheel: 1\n"
       "bodies:\n"
       "  - {name: a1_arm, mass: 3, inertia: 0.3, start: {x: 2.5, y: -1, phi: 0}, rate: {vx: 0, vy: 0, omega: 0}}\n"
@@ -111,6 +113,8 @@ TEST (include) {
       "  - {rolling-wheel: a2_W, body: a2_arm, at: [0.2, 0], radius: 0.1, inertia: 0.01}\n"
       "  - {torque: a2_T, body: [a2_arm, ground], value: \"-2*(a2_arm.omega + 0.1*a2_W.spin_rate) + a2_lag\"}\n"
       "  - {torque: T, body: [car, a2_arm], value: \"7*a1_lag + a2_W.spin\"}\n"
+      "  - {torque: U, body: [car, ground], value: R.spin}\n"
+      "  - {rolling-wheel: R, body: car, at: [0, 0], radius: 1, inertia: 1}\n"
       "states:\n"
       "  - {name: a1_lag, rate: \"(sin (4*t) - a1_lag)/0.2\", start: 3}\n"
       "  - {name: a2_lag, rate: \"(sin (4*t) - a2_lag)/0.2\", start: 6}\n");
@@ -196,6 +200,9 @@ TEST (files) {
   cli_write ("parts/other.yaml", "pinwheel: 1\ninclude: [{file: part.yaml}]\n");
   repeat_bad ("pinwheel show @/model.yaml", "other.yaml:2:18: error: file: \"part.yaml\" includes itself");
   cli_write ("state.yaml", "pinwheel: 1\nstates: [{name: z, rate: 1}]\n");
+  cli_write ("default.yaml", "pinwheel: 1\nparameters: [{name: p, value: k}]\n");
+  cli_write ("model.yaml", "pinwheel: 1\nlet: {k: 1}\ninclude: [{file: default.yaml}]\n");
+  repeat_bad ("pinwheel show @/model.yaml", "default.yaml:2:31: error: parameter p: there is no \"k\"");
   cli_good ("mkdir -p @/in @/in2 && cp @/state.yaml @/in2 && ln -s ../in2/state.yaml @/in/state.yaml");
   cli_write ("in/model.yaml", "pinwheel: 1\ninclude: [{file: state.yaml}]\n");
   repeat_bad ("pinwheel show @/in/model.yaml", "it is a link that leads out of the model's folder");
