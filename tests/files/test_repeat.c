@@ -65,6 +65,7 @@ TEST (copies) {
 TEST (counts) {
   cli_good ("pinwheel sweep n-trailer --vary n=1,2,3,4,5 --set R=4 -t 0.1 -o @/counts.csv >/dev/null 2>&1 && "
             "test $(grep -c '^[1-5],.*ok' @/counts.csv) = 5");
+  cli_good ("pinwheel show tests/models/arms.yaml --set n=3 | grep -q 'state z3: rate .*; start 0; unit \"\"'");
   cli_good ("pinwheel show chain --set n=1 | grep -q '3 coordinates' && "
             "pinwheel show chain --set n=12 | grep -q '36 coordinates'");
 }
