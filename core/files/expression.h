@@ -28,14 +28,15 @@ typedef struct {
   const char **name; /* names */
   double *value;     /* names */
   pw_names index;    /* the index of each name */
+  int room;          /* names for which there is memory */
   /* The text of the expression that a name stands for, which is read in place of the name, or NULL.  Variables have
    * precedence.  May be NULL. */
   const char *(*expand) (void *context, const char *name);
   void *context;
 } pw_scope;
 
-/* Opens a scope, which must be { 0 }, with room for `room` names, in an arena.  PW_OK or PW_RESOURCE. */
-int pw_scope_open (pw_scope *s, int room, pw_arena *arena);
+/* Makes room for `room` names in an arena; the scope must be { 0 } at first.  PW_OK or PW_RESOURCE. */
+int pw_scope_reserve (pw_scope *s, int room, pw_arena *arena);
 void pw_scope_close (pw_scope *s); /* names and numbers stay in the arena */
 
 /* Adds a name, to which the scope keeps a pointer; there must be room. */
