@@ -34,8 +34,8 @@ void pw_plots_serialise (pw_plots *plots, pw_archive *archive);
  * it only prints a notice.  PW_RESOURCE if a file cannot be written or gnuplot fails; PW_INTERRUPTED. */
 int pw_plots_finish (pw_plots *plots, int draw, pw_error *error);
 
-/* Writes the figure "outputs", a panel for each first-order state and output, and draws it as pw_plots_finish does; nothing without outputs.  The
- * same statuses. */
+/* Writes the figure "outputs", a panel for each first-order state and output, and draws it as pw_plots_finish does;
+ * nothing without outputs.  The same statuses. */
 int pw_plots_outputs (const pw_plots *plots, const pw_cli_line *line, const pw_cli_model *model, int draw,
                       pw_error *error);
 
