@@ -168,8 +168,8 @@ TEST (until) {
 }
 
 /* A car that follows the path y = A sin (kap x): root mean square and extremum of its tracking error, the time at which
- * it passes x = 20 m.  Digits: reduced equations integrated by extrapolation with 30 digits, and redundant coordinates by
- * another code; both agree to 3e-14. */
+ * it passes x = 20 m.  Digits: reduced equations integrated by extrapolation with 30 digits, and the same by another
+ * code in redundant coordinates; both agree to 3e-14. */
 TEST (path_tracking) {
   static const char *const methods[] = { "rk4", "erk8", "bdf", "ida+ggl", "radau" };
   const struct {
