@@ -72,7 +72,7 @@ CLI_OBJ   := $(call obj,$(CLI))
 # Interactive pages need the sources of plug-ins, next to them.
 PLUGINS   := $(MODELS:%.c=$(BUILD)/%.so) $(patsubst %,$(BUILD)/%,$(MODELS) $(wildcard models/*.yaml))
 # The longest programs come first, so that no processor waits for them at the end.
-LONGEST   := $(addprefix $(BUILD)/tests/test_,lanes jumps periodic_command)
+LONGEST   := $(addprefix $(BUILD)/tests/test_,lanes specialise plots jumps memory specialised)
 TESTS     := $(LONGEST) $(filter-out $(LONGEST),$(patsubst %.c,$(BUILD)/tests/%,$(notdir $(QUICK))))
 SLOWS     := $(patsubst %.c,$(BUILD)/tests/%,$(notdir $(SLOW)))
 PROGRAMS  := $(BENCH:%.c=$(BUILD)/%) $(EMBED:%.c=$(BUILD)/%)
