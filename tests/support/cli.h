@@ -9,7 +9,7 @@
 extern char cli_folder[];                    /* temporary folder for the files of a test program */
 extern char cli_out[200000], cli_err[20000]; /* standard output and error of the last command */
 
-/* Makes and removes the folder.  cli_setup_undrawn: for tests of numbers, without figures, which take most of the time. */
+/* Makes and removes the folder.  cli_setup_undrawn: without figures, for tests of numbers. */
 int cli_setup (void);
 int cli_setup_undrawn (void);
 int cli_teardown (void);
