@@ -54,7 +54,9 @@ SOLVERS := $(wildcard solvers/*/*.c)
 MODELS  := $(wildcard models/*.c)
 QUICK   := $(wildcard tests/*/test_*.c)
 SLOW    := $(wildcard tests/*/slow_*.c)
-SHELLS  := $(filter-out tests/support/%,$(wildcard tests/*/*.sh))
+# The longest come first, so that no processor waits for them at the end.
+LONGEST := tests/reference/reference.sh $(addprefix tests/methods/,determinism.sh hard.sh effects.sh) $(addprefix tests/scripts/,checkpoint.sh sweep.sh)
+SHELLS  := $(LONGEST) $(filter-out $(LONGEST) tests/support/%,$(wildcard tests/*/*.sh))
 SHARE   := $(filter-out $(QUICK) $(SLOW) $(wildcard $(addprefix tests/,fuzz/*.c models/*.c scenes/*.c)),$(wildcard tests/*/*.c)) # linked to every test
 BENCH   := $(wildcard benchmarks/*.c)
 EMBED   := $(wildcard docs/*.c)
@@ -71,14 +73,13 @@ FILES_OBJ := $(call obj,$(FILES))
 CLI_OBJ   := $(call obj,$(CLI))
 # Interactive pages need the sources of plug-ins, next to them.
 PLUGINS   := $(MODELS:%.c=$(BUILD)/%.so) $(patsubst %,$(BUILD)/%,$(MODELS) $(wildcard models/*.yaml))
-# The longest programs come first, so that no processor waits for them at the end.
 LONGEST   := $(addprefix $(BUILD)/tests/test_,lanes specialise plots jumps memory specialised)
 TESTS     := $(LONGEST) $(filter-out $(LONGEST),$(patsubst %.c,$(BUILD)/tests/%,$(notdir $(QUICK))))
 SLOWS     := $(patsubst %.c,$(BUILD)/tests/%,$(notdir $(SLOW)))
 PROGRAMS  := $(BENCH:%.c=$(BUILD)/%) $(EMBED:%.c=$(BUILD)/%)
 PROGRAM   := $(BUILD)/pinwheel
 
-.PHONY: all everything demo test test-all deps install uninstall clean help
+.PHONY: all everything demo test test-slow test-all deps install uninstall clean help
 .DELETE_ON_ERROR:
 .SECONDARY:
 
@@ -91,7 +92,7 @@ help::
 	@echo 'make deps             installs the libraries that are missing'
 	@echo 'make demo             the EzyRoller by three methods: a table, figures in $(BUILD)/demo/'
 	@echo 'make gallery          pages that simulate the models in a browser, in $(BUILD)/site/'
-	@echo 'make test             runs the tests; test-all: also the slow ones and scripts'
+	@echo 'make test             runs the tests; test-slow: the slow ones and scripts; test-all: both'
 	@echo 'make install          installs below DESTDIR in PREFIX (/usr/local); uninstall: removes that'
 	@echo 'make clean            removes $(BUILD)/'
 	@echo
@@ -100,7 +101,7 @@ help::
 
 # ---- Dependencies: targets that run something install missing libraries first ----
 
-ifneq ($(filter demo test test-all layers bench bench-quick bench-engine bench-effects hard san cov fuzz mutants,$(MAKECMDGOALS)),)
+ifneq ($(filter demo test test-slow test-all layers bench bench-quick bench-engine bench-effects hard san cov fuzz mutants,$(MAKECMDGOALS)),)
 ifndef NO_DEPS
 FIRST := deps
 endif
@@ -265,6 +266,9 @@ RUN_TESTS = PINWHEEL=$(PROGRAM) BUILD=$(BUILD) sh .ci/run-tests
 
 test: all $(TESTS) $(PROGRAMS)
 	@$(RUN_TESTS) $(TESTS)
+
+test-slow: everything
+	@$(RUN_TESTS) $(SHELLS) $(SLOWS)
 
 test-all: everything
 	@$(RUN_TESTS) $(SHELLS) $(SLOWS) $(TESTS)
