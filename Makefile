@@ -54,9 +54,7 @@ SOLVERS := $(wildcard solvers/*/*.c)
 MODELS  := $(wildcard models/*.c)
 QUICK   := $(wildcard tests/*/test_*.c)
 SLOW    := $(wildcard tests/*/slow_*.c)
-# The longest come first, so that no processor waits for them at the end.
-LONGEST := tests/reference/reference.sh $(addprefix tests/methods/,determinism.sh hard.sh effects.sh) $(addprefix tests/scripts/,checkpoint.sh sweep.sh)
-SHELLS  := $(LONGEST) $(filter-out $(LONGEST) tests/support/%,$(wildcard tests/*/*.sh))
+SHELLS  := $(filter-out tests/support/%,$(wildcard tests/*/*.sh))
 SHARE   := $(filter-out $(QUICK) $(SLOW) $(wildcard $(addprefix tests/,fuzz/*.c models/*.c scenes/*.c)),$(wildcard tests/*/*.c)) # linked to every test
 BENCH   := $(wildcard benchmarks/*.c)
 EMBED   := $(wildcard docs/*.c)
@@ -73,9 +71,12 @@ FILES_OBJ := $(call obj,$(FILES))
 CLI_OBJ   := $(call obj,$(CLI))
 # Interactive pages need the sources of plug-ins, next to them.
 PLUGINS   := $(MODELS:%.c=$(BUILD)/%.so) $(patsubst %,$(BUILD)/%,$(MODELS) $(wildcard models/*.yaml))
+# The longest files come first, so that no processor waits for them at the end.
 LONGEST   := $(addprefix $(BUILD)/tests/test_,lanes specialise plots jumps memory specialised)
 TESTS     := $(LONGEST) $(filter-out $(LONGEST),$(patsubst %.c,$(BUILD)/tests/%,$(notdir $(QUICK))))
 SLOWS     := $(patsubst %.c,$(BUILD)/tests/%,$(notdir $(SLOW)))
+LONG_SHELLS := tests/reference/reference.sh $(addprefix tests/methods/,determinism.sh hard.sh effects.sh) tests/scripts/checkpoint.sh
+SLOW_TESTS := $(LONG_SHELLS) $(SLOWS) $(filter-out $(LONG_SHELLS),$(SHELLS))
 PROGRAMS  := $(BENCH:%.c=$(BUILD)/%) $(EMBED:%.c=$(BUILD)/%)
 PROGRAM   := $(BUILD)/pinwheel
 
@@ -268,10 +269,10 @@ test: all $(TESTS) $(PROGRAMS)
 	@$(RUN_TESTS) $(TESTS)
 
 test-slow: everything
-	@$(RUN_TESTS) $(SHELLS) $(SLOWS)
+	@$(RUN_TESTS) $(SLOW_TESTS)
 
 test-all: everything
-	@$(RUN_TESTS) $(SHELLS) $(SLOWS) $(TESTS)
+	@$(RUN_TESTS) $(SLOW_TESTS) $(TESTS)
 
 demo: all $(BUILD)/benchmarks/demo
 	@$(BUILD)/benchmarks/demo
