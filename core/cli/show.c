@@ -93,8 +93,7 @@ static void yaml_value (const pw_field *f, const void *at, int digits) {
   if (f->type == PW_BODY) yaml_name (*(const char *const *)at);
   if (f->type == PW_SIGNAL) yaml_signal (at, digits);
   if (f->type == PW_CHOICE) fputs (f->choices[*(const int *)at], stdout);
-  const char *text = f->type == PW_TEXT ? *(const char *const *)at : NULL;
-  if (f->type == PW_TEXT) yaml_text (text ? text : "");
+  if (f->type == PW_TEXT) yaml_text (*(const char *const *)at);
 }
 
 /* The values of a field as in a text model. */
