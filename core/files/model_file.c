@@ -505,8 +505,11 @@ const char *pw_file_path (const pw_file *f) {
 
 int pw_file_tables (const pw_file *f, int (*each) (void *context, const char *path), void *context) {
   /* not in let, where "file" is the name of a number */
-  int stop = f && f->yaml ? pw_yaml_tables (f->yaml, f->yaml->elements, each, context) : 0;
-  return stop == 0 && f && f->yaml ? pw_yaml_tables (f->yaml, f->yaml->states, each, context) : stop;
+  const pw_node *const list[] = { f && f->yaml ? f->yaml->paths : NULL, f && f->yaml ? f->yaml->elements : NULL,
+                                  f && f->yaml ? f->yaml->states : NULL };
+  int stop = 0;
+  for (int i = 0; i < 3 && stop == 0; i++) stop = list[i] ? pw_yaml_tables (f->yaml, list[i], each, context) : 0;
+  return stop;
 }
 
 int pw_file_list (int (*each) (void *context, const char *name, const char *path), void *context, pw_error *error) {

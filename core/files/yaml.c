@@ -256,6 +256,8 @@ static int build_all (pw_reader *r, const double *parameter) {
     pw_scope_add (r->scope, n->text, value);
   }
   r->numbers = r->scope->names;
+  for (const pw_node *n = y->paths ? y->paths->first : NULL; n; n = n->next)
+    if (pw_yaml_path (r, n) != PW_OK) return r->error->status;
   if (index_states (r) != PW_OK) return r->error->status;
   if (pw_yaml_outputs (r) != PW_OK) return r->error->status;
   for (const pw_node *n = y->bodies ? y->bodies->first : NULL; n; n = n->next)
@@ -278,7 +280,7 @@ static int build_open (pw_reader *r) {
   const pw_yaml *y = r->y;
   size_t largest = 1, bodies = y->bodies ? (size_t)y->bodies->count : 0, lets = y->let ? (size_t)y->let->count : 0;
   size_t elements = y->elements ? (size_t)y->elements->count : 0, outputs = y->outputs ? (size_t)y->outputs->count : 0;
-  size_t states = y->states ? (size_t)y->states->count : 0;
+  size_t states = y->states ? (size_t)y->states->count : 0, paths = y->paths ? (size_t)y->paths->count : 0;
   for (const pw_kind *const *k = pw_kinds; *k; k++)
     if ((*k)->definition > largest) largest = (*k)->definition;
   r->arena = calloc (1, sizeof *r->arena);
@@ -286,11 +288,12 @@ static int build_open (pw_reader *r) {
   r->reference = pw_arena_alloc (r->arena, sizeof *r->reference);
   pw_model_set_reference (r->model, r->reference);
   r->definition = malloc (largest);
-  if (r->reference && r->definition &&
-      pw_scope_open (r->scope, y->parameter_count + (int)(lets + outputs), r->arena) == PW_OK &&
+  if (r->reference) r->reference->path = pw_arena_alloc (r->arena, (paths + 1) * sizeof *r->reference->path);
+  if (r->reference && r->reference->path && r->definition &&
+      pw_scope_open (r->scope, y->parameter_count + (int)(lets + paths + outputs), r->arena) == PW_OK &&
       pw_names_open (&r->bodies, bodies) == PW_OK && pw_names_open (&r->contacts, elements) == PW_OK &&
       pw_names_open (&r->states, states) == PW_OK &&
-      pw_names_open (&r->names, bodies + elements + states + outputs) == PW_OK)
+      pw_names_open (&r->names, bodies + elements + states + paths + outputs) == PW_OK)
     return PW_OK;
   return read_no_memory (r);
 }
@@ -300,6 +303,7 @@ static void build_model (pw_model *m, const void *parameters) {
   const void *table = pw_model_table (m);
   pw_scope scope = { 0 };
   pw_reader r = { .y = table, .model = m, .scope = &scope, .error = pw_model_error (m) };
+  pw_yaml_list (&r, r.y->paths, "paths");
   pw_yaml_list (&r, r.y->bodies, "bodies");
   pw_yaml_list (&r, r.y->states, "states");
   pw_yaml_list (&r, r.y->outputs, "outputs");
@@ -364,8 +368,8 @@ static int head_parameters (pw_yaml *y, const pw_reader *r, const pw_node *list,
 }
 
 static int read_head (pw_yaml *y, const pw_reader *r) {
-  static const char *const key[] = { "pinwheel", "about", "run",    "parameters", "let", "bodies",
-                                     "elements", "truth", "states", "outputs",    NULL };
+  static const char *const key[] = { "pinwheel", "about", "run",    "parameters", "let",   "bodies",
+                                     "elements", "truth", "states", "outputs",    "paths", NULL };
   static const char *const run_key[] = { "t_end", "step", "rtol", "method", NULL };
   const pw_node *v[sizeof key / sizeof *key], *run[sizeof run_key / sizeof *run_key];
   double *number[] = { &y->table.run.t_end, &y->table.run.step, &y->table.run.rtol };
@@ -382,6 +386,7 @@ static int read_head (pw_yaml *y, const pw_reader *r) {
   const pw_node *parameters = v[3], *let = v[4];
   /* the key of the reference solution is "truth" */
   y->let = let, y->bodies = v[5], y->elements = v[6], y->reference = v[7], y->states = v[8], y->outputs = v[9];
+  y->paths = v[10];
   for (int i = 3; key[i]; i++) /* from "parameters" on: lists and maps */
     if (v[i] && v[i]->count > PW_MAX_ITEMS)
       read_fail (r, v[i]->at, "%s: %d entries; a model may have %d", key[i], v[i]->count, PW_MAX_ITEMS);

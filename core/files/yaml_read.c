@@ -94,11 +94,15 @@ int pw_is_state_name (const pw_reader *r, const char *name) {
   return strchr (name, '.') || (r->states.slot && pw_names_find (&r->states, name) >= 0);
 }
 
-/* The first name of the time t or of a state in an expression, or NULL. */
+const char *pw_signal_argument (const pw_reader *r) {
+  return r->kind && r->kind->of_coordinate ? "s" : "t";
+}
+
+/* The first name of the time t, or another argument of a signal, or of a state in an expression, or NULL. */
 static const char *find_variable (const pw_reader *r, const char *text) {
   char name[PW_EXPRESSION_NAME];
   for (const char *rest = text, *p; (p = pw_expression_next_name (&rest, name)) != NULL;)
-    if (strcmp (name, "t") == 0 || pw_is_state_name (r, name)) return p;
+    if (strcmp (name, pw_signal_argument (r)) == 0 || pw_is_state_name (r, name)) return p;
   return NULL;
 }
 
@@ -111,7 +115,8 @@ int pw_yaml_name (const pw_reader *r, const pw_node *node, const char *label, pw
   if (strcmp (name, "t") == 0 || pw_expression_is_reserved (name))
     return read_fail (r, node->at, "%s \"%s\": this name is reserved: %s", label, name,
                       *name == 't' && name[1] == 0 ? "it is the time" : "a function or constant");
-  return pw_names_add (names, name, 0) >= 0 ? read_fail (r, node->at, "a second %s \"%s\"", label, name) : PW_OK;
+  return names && pw_names_add (names, name, 0) >= 0 ? read_fail (r, node->at, "a second %s \"%s\"", label, name)
+                                                     : PW_OK;
 }
 
 /* Replaces the text of an error at an unknown name by the suggestion of a first-order state, if its name is near and

@@ -1,7 +1,7 @@
 /* Text models: what the files that read a model from its tree share.
  *
  *   yaml_read.c    keys, lists, texts, numbers, names, units
- *   yaml_signal.c  signals and outputs
+ *   yaml_signal.c  signals, paths and outputs
  *   yaml.c         bodies, elements, states; the head, parameters and default run settings
  *
  * After an error, functions with the same reader return its status, and only the first error is recorded: a sequence of
@@ -14,7 +14,7 @@
 #include "yaml.h"
 
 /* Limits of one model, about 1 GB each, so that a small file cannot use all memory: entries of each list, such as
- * bodies, elements, parameters; points of all tables; operations of all expressions. */
+ * bodies, elements, parameters; points of all tables and paths; operations of all expressions. */
 enum { PW_MAX_ITEMS = 1000000, PW_MAX_POINTS = 20000000, PW_MAX_OPERATIONS = 30000000 };
 enum { PW_MAX_KEYS = 40 /* known keys of a map, and the end of their list */ };
 
@@ -39,7 +39,7 @@ typedef struct {
   const pw_field *field;          /* of it */
   const char *label;              /* of that field, for messages */
   char *definition;               /* of the element, with all preceding fields */
-  double points;                  /* of all tables so far */
+  double points;                  /* of all tables and paths so far */
   double operations;              /* of all expressions so far */
 } pw_reader;
 
@@ -78,10 +78,13 @@ int pw_yaml_text (const pw_reader *r, const pw_node *node, const char *label, co
 /* Converts an offset in a scalar's text to one in the source; that of the node if the source spells it otherwise. */
 size_t pw_source_offset (const pw_yaml *y, const pw_node *node, size_t offset);
 
+/* The name of a signal's argument: "t", the time, or "s", the parameter of a curve. */
+const char *pw_signal_argument (const pw_reader *r);
+
 /* Whether a name in an expression is that of a state: BODY.phi, or a first-order state. */
 int pw_is_state_name (const pw_reader *r, const char *name);
 
-/* Reads a unique name that expressions can use. */
+/* Reads a name that expressions can use; it is added to the names, unless these are NULL, in which it must be new. */
 int pw_yaml_name (const pw_reader *r, const pw_node *node, const char *label, pw_names *names);
 
 /* 1 if the value of an expression changes during the motion. */
@@ -131,6 +134,9 @@ int pw_yaml_unit (const pw_reader *r, const pw_node *node, const pw_node *value,
 /* ---- yaml_signal.c ---- */
 
 int pw_yaml_signal (pw_reader *r, const pw_node *node, pw_signal *signal);
+
+/* Reads a path, of which the following expressions can use functions. */
+int pw_yaml_path (pw_reader *r, const pw_node *node);
 
 /* Reads all outputs.  The columns that they read are checked by pw_add_outputs. */
 int pw_yaml_outputs (pw_reader *r);
