@@ -326,6 +326,7 @@ void pw_path_nearest (const pw_path *p, double x, double y, double near, pw_path
 /* The first arc length after s at which the direction or the curvature jumps; INFINITY if there is none. */
 double pw_path_break (const pw_path *p, double s);
 int pw_path_is_smooth (const pw_path *p); /* 1: a spline; 0: a polyline */
+double pw_path_length (const pw_path *p); /* [m]; of a closed path: of one lap */
 
 /* ---- The element types: position constraints, velocity constraints, forces, markers ---- */
 
@@ -990,7 +991,7 @@ int pw_system_equations (const pw_system *s, double t, const double *q, const do
                          pw_error *error);
 void pw_equations_free (pw_equations *e); /* required even after an error */
 
-/* Number of blocks given as PW_BY_DIFFERENCES; name of one, as pw_system_state_name: "force_q of element type drag". */
+/* Number of blocks of a plug-in's types given as PW_BY_DIFFERENCES; name of one, as pw_system_state_name: "force_q of element type drag". */
 int pw_system_differences (const pw_system *s);
 char *pw_system_difference_name (const pw_system *s, int i, char *buffer, size_t size);
 

@@ -267,7 +267,8 @@ static int signal_of_time (pw_reader *r, const pw_node *const node[3], pw_signal
   if (f == NULL) return read_no_memory (r);
   f->name[0] = pw_signal_argument (r);
   if (r->kind->of_coordinate && pw_names_find (&r->scope->index, "s") >= 0)
-    return read_fail (r, node[0]->at, "%s: the model has a number \"s\", which is also the parameter of the curve: rename it",
+    return read_fail (r, node[0]->at,
+                      "%s: the model has a number \"s\", which is also the parameter of the curve: rename it",
                       r->label);
   f->derivatives = pw_kind_signals_force (r->kind) ? 0 : r->kind->level == PW_HOLONOMIC ? 2 : 1;
   *signal = (pw_signal){ PW_FUNCTION, .function = { .eval = signal_eval, .context = f, .text = &f->text } };

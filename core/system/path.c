@@ -248,6 +248,10 @@ void pw_path_close (pw_path *p) {
   free (p);
 }
 
+double pw_path_length (const pw_path *p) {
+  return p->length;
+}
+
 int pw_path_is_smooth (const pw_path *p) {
   return !p->is_linear;
 }

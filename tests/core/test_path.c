@@ -29,19 +29,19 @@ TEST (circle) {
   check_close ("length", pw_path_length (p), 4 * PW_PI, 2e-9, why);
   for (int k = 0; k < 60; k++) {
     double angle = 0.05 + 0.1 * k, r = 0.5 + 0.05 * k, x = r * cos (angle), y = r * sin (angle);
-    pw_path_nearest (p, x, y, &a);
+    pw_path_nearest (p, x, y, INFINITY, &a);
     check_close ("offset", a.offset, 2 - r, 1e-9, why);
     check_close ("s", a.s, 2 * angle, 1e-6, why);
     check_close ("heading", a.heading, angle + PW_PI / 2, 1e-6, why);
     check_close ("curvature", a.curvature[0], 0.5, 2e-5, "h^2");
-    pw_path_nearest_from (p, x, y, 2 * angle + 1 - 40 * PW_PI, &a); /* ten laps before */
+    pw_path_nearest (p, x, y, 2 * angle + 1 - 40 * PW_PI, &a); /* ten laps before */
     check_close ("offset", a.offset, 2 - r, 1e-9, why);
     check_close ("s ten laps before", a.s, 2 * angle - 40 * PW_PI, 1e-6, why);
     check_close ("heading ten laps before", a.heading, angle + PW_PI / 2 - 20 * PW_PI, 1e-6, why);
   }
-  pw_path_nearest_from (p, 1, 0.1, 2 * PW_PI - 0.3, &a);
+  pw_path_nearest (p, 1, 0.1, 2 * PW_PI - 0.3, &a);
   check_close ("the other side, from a quarter before it", a.s, 2 * atan2 (0.1, 1), 1e-6, "falls beyond the middle");
-  pw_path_nearest (p, NAN, 0, &a);
+  pw_path_nearest (p, NAN, 0, INFINITY, &a);
   assert_true (isnan (a.offset) && isnan (a.curvature[2]));
   pw_path_close (p);
 }
@@ -67,7 +67,7 @@ TEST (nearest) {
   for (int k = 0; k < 200; k++) {
     double x = 4 * sin (7.0 * k), y = 3 * cos (11.0 * k + 1), least = INFINITY;
     for (int i = 0; i < MANY; i++) least = fmin (least, hypot (x - dense[i][0], y - dense[i][1]));
-    pw_path_nearest (p, x, y, &a);
+    pw_path_nearest (p, x, y, INFINITY, &a);
     check_close ("distance", fabs (a.offset), least, 1e-5, "half a distance of dense points, squared");
     assert_true (fabs (a.offset) <= least * (1 + 1e-14));
     check_close ("offset", hypot (x - a.x, y - a.y), fabs (a.offset), 1e-12, "round-off");
@@ -78,7 +78,7 @@ TEST (nearest) {
   for (int k = 0; k <= 1000; k++) { /* twice around, through the crossing, 0.05 to the left */
     double s = 2 * length * k / 1000;
     pw_path_at (p, s, &a);
-    pw_path_nearest_from (p, a.x - 0.05 * a.sin, a.y + 0.05 * a.cos, s + 0.1, &b);
+    pw_path_nearest (p, a.x - 0.05 * a.sin, a.y + 0.05 * a.cos, s + 0.1, &b);
     check_close ("s", b.s, s, 1e-11, "round-off");
     check_close ("heading", b.heading, a.heading, 1e-11, "round-off");
     check_close ("offset", b.offset, 0.05, 1e-12, "round-off");
@@ -103,9 +103,9 @@ TEST (derivatives) {
     check_close ("its derivative", (plus.curvature[0] - minus.curvature[0]) / (2 * h), a.curvature[1], 1e-5, why);
     check_close ("its second one", (plus.curvature[1] - minus.curvature[1]) / (2 * h), a.curvature[2], 1e-3, why);
     double x = a.x - offset * a.sin, y = a.y + offset * a.cos;
-    pw_path_nearest_from (p, x, y, s, &a);
-    pw_path_nearest_from (p, x + h, y, s, &plus);
-    pw_path_nearest_from (p, x - h, y, s, &minus);
+    pw_path_nearest (p, x, y, s, &a);
+    pw_path_nearest (p, x + h, y, s, &plus);
+    pw_path_nearest (p, x - h, y, s, &minus);
     check_close ("offset by x", (plus.offset - minus.offset) / (2 * h), -a.sin, 1e-8, why);
     check_close ("s by x", (plus.s - minus.s) / (2 * h), a.cos / (1 - a.curvature[0] * a.offset), 1e-7, why);
   }
@@ -122,7 +122,7 @@ TEST (corners) {
     { 1, 0.5, 1, 0.5, 0, 0 },                                /* inside */
     { 1, -0.5, 1, -0.5, 0, 0 },                              /* outside */
     { 2.3, -0.4, 2, -0.5, PW_PI / 2 - atan2 (0.4, 0.3), 1 }, /* outside of the corner, */
-    { 2, -1, 2, -1, 0, 1 },                                  /* from where its sector begins */
+    { 2, -1, 2, -1, 0, 0 },                                  /* from where its sector begins */
     { 3, 0, 2, -1, PW_PI / 2, 1 },                           /* to its end */
     { 2, 0, 2, 0, PW_PI / 2, 0 },                            /* the corner itself */
     { 2.5, 3.5, 5, -sqrt (0.5), 3 * PW_PI / 4, 1 },
@@ -131,8 +131,8 @@ TEST (corners) {
   };
   for (size_t i = 0; i < sizeof expected / sizeof *expected; i++) {
     pw_path_place a[2];
-    pw_path_nearest (p, expected[i].x, expected[i].y, &a[0]);
-    pw_path_nearest_from (p, expected[i].x, expected[i].y, expected[i].s + 0.3, &a[1]);
+    pw_path_nearest (p, expected[i].x, expected[i].y, INFINITY, &a[0]);
+    pw_path_nearest (p, expected[i].x, expected[i].y, expected[i].s + 0.3, &a[1]);
     for (int k = 0; k < 2; k++) {
       check_close ("s", a[k].s, expected[i].s, 1e-14, "round-off");
       check_close ("offset", a[k].offset, expected[i].offset, 1e-14, "round-off");
@@ -146,10 +146,10 @@ TEST (corners) {
   pw_path_close (p);
   p = path_of ((double[][2]){ { 0, 0 }, { 1, 0 }, { 1, 1 }, { 0, 1 } }, 4, PW_LINEAR, 1);
   pw_path_place a;
-  pw_path_nearest (p, -0.3, -0.4, &a); /* the corner between the last side and the first */
+  pw_path_nearest (p, -0.3, -0.4, INFINITY, &a); /* the corner between the last side and the first */
   check_close ("offset", a.offset, -0.5, 1e-15, "round-off");
   check_close ("heading", a.heading, -atan2 (0.3, 0.4), 1e-15, "round-off");
-  pw_path_nearest_from (p, -0.3, -0.4, 7.9, &a);
+  pw_path_nearest (p, -0.3, -0.4, 7.9, &a);
   check_close ("s after a lap", a.s, 8, 1e-15, "round-off");
   check_close ("heading after two laps", a.heading, 4 * PW_PI - atan2 (0.3, 0.4), 1e-14, "round-off");
   check_close ("corner", pw_path_break (p, 7.5), 8, 0, "exact");
@@ -166,13 +166,13 @@ TEST (ends) {
   check_close ("length of the parabola", length, slope * sqrt (1 + slope * slope) / 4 + asinh (slope) / 4, 1e-5,
                "the spline is one in the distance of points");
   pw_path_at (p, length, &end);
-  pw_path_nearest (p, end.x + 2 * end.cos - 0.5 * end.sin, end.y + 2 * end.sin + 0.5 * end.cos, &a);
+  pw_path_nearest (p, end.x + 2 * end.cos - 0.5 * end.sin, end.y + 2 * end.sin + 0.5 * end.cos, INFINITY, &a);
   check_close ("s", a.s, length + 2, 1e-14, "round-off");
   check_close ("offset", a.offset, 0.5, 1e-14, "round-off");
   assert_true (a.curvature[0] == 0 && end.curvature[0] > 0.01);
-  pw_path_nearest_from (p, -1, 1, length + 5, &a);
+  pw_path_nearest (p, -1, 1, length + 5, &a);
   check_close ("from beyond the end", a.s, 0, 1.5, "a minimum at the beginning");
-  pw_path_nearest_from (p, -3, -1, length / 2, &a);
+  pw_path_nearest (p, -3, -1, length / 2, &a);
   check_close ("before the beginning", a.s, -3, 0.1, "its tangent is almost horizontal");
   check_close ("breaks", pw_path_break (p, -2), 0, 0, "the beginning");
   check_close ("breaks", pw_path_break (p, 0), length, 0, "the end");

@@ -30,7 +30,7 @@ static const pw_expression *read (const char *text) {
     path[2] = pw_path_open ((double[]){ 0, 0.5, 1, 2 }, (double[]){ 0, 0, 0, 0 }, 4, PW_CUBIC, 0, &error);
     check_ok (error.status, &error);
   }
-  assert_int_equal (pw_scope_open (&s, 1, &arena) | pw_scope_open_paths (&s, 3, &arena), PW_OK);
+  assert_int_equal (pw_scope_open (&s, 3, &arena), PW_OK);
   pw_scope_add_path (&s, "eight", path[0]);
   pw_scope_add_path (&s, "zig", path[1]);
   pw_scope_add_path (&s, "arc", path[2]);
@@ -98,6 +98,9 @@ TEST (breaks) {
     { "eight.x (t) > 3 - 1e-3 ? 1 : 0", 0, "" },
     { "eight.offset (a.x, a.y)", INFINITY, "eight.offset (a.x, a.y)" },
     { "2*eight.s (t, 0, 3)", INFINITY, "eight.s (t, 0, 3)" },
+    { "eight.s (t, 0, a.x)", INFINITY, "" },
+    { "eight.s (a.x, a.y) + sign (a.y)", INFINITY, "sign (a.y)" },
+    { "zig.offset (a.x, a.y, t)", INFINITY, "zig.offset (a.x, a.y, t)" },
     { "zig.heading (a.x)", INFINITY, "zig.heading (a.x)" },
     { "zig.x (a.x)", INFINITY, "" },
     { "eight.heading (a.x)", INFINITY, "" },
