@@ -124,7 +124,7 @@ TEST (corners) {
     { 2.3, -0.4, 2, -0.5, PW_PI / 2 - atan2 (0.4, 0.3), 1 }, /* outside of the corner, */
     { 2, -1, 2, -1, 0, 0 },                                  /* from where its sector begins */
     { 3, 0, 2, -1, PW_PI / 2, 1 },                           /* to its end */
-    { 2, 0, 2, 0, PW_PI / 2, 0 },                            /* the corner itself */
+    { 2, 0, 2, 0, 0, 0 },                                    /* the corner itself */
     { 2.5, 3.5, 5, -sqrt (0.5), 3 * PW_PI / 4, 1 },
     { -3, -4, -3, -4, 0, 0 },    /* before the beginning: from its tangent */
     { -3, 4, 10, -1, PW_PI, 0 }, /* after the end */
