@@ -355,12 +355,13 @@ static int pairs_file (pw_reader *r, const pw_node *node, const char *const colu
   return PW_OK;
 }
 
-/* Limits the pairs of all tables and paths together: many may read the same large file. */
-static int pairs_count (pw_reader *r, const pw_node *node, const pairs *p) {
-  r->points += p->count;
+/* Limits the pairs of all tables and paths together: many may read the same large file.  A point of a path, with its
+ * cubics, needs the memory of `weight` points of a table. */
+static int pairs_count (pw_reader *r, const pw_node *node, const pairs *p, int weight) {
+  r->points += (double)weight * p->count;
   if (r->error->status != PW_OK || r->points <= PW_MAX_POINTS) return r->error->status;
-  return read_fail (r, node->at, "%s: the tables up to here have more than %d points, the limit for a model", r->label,
-                    PW_MAX_POINTS);
+  return read_fail (r, node->at, "%s: the tables up to here have more than %d points, the limit for a model%s",
+                    r->label, PW_MAX_POINTS, weight > 1 ? "; one of a path counts as 8" : "");
 }
 
 /* The unit of the current field.  Only a drive has "m or rad"; the choice before this field decides. */
@@ -412,7 +413,7 @@ static int table_points (pw_reader *r, const pw_node *node, const pw_node *const
   pw_yaml_number (r, v[5], PW_PRINTED (240, "%s: time_offset", r->label), PW_REAL, &offset);
   for (int i = 0; i < p.count && r->error->status == PW_OK; i++) p.x[i] = scale * (p.x[i] + offset / scale);
   s->table.t = p.x, s->table.value = p.y, s->table.count = p.count, s->table.skipped = p.skipped;
-  return pairs_count (r, node, &p);
+  return pairs_count (r, node, &p, 1);
 }
 
 /* Reads the fields of a form, except a table's points; value: of each, or NULL. */
@@ -507,7 +508,7 @@ static int path_points (pw_reader *r, const pw_node *node, const pw_node *points
   if (file && r->error->status == PW_OK) pairs_file (r, file, column, (const char *const[2]){ "m", "m" }, p);
   if (r->error->status == PW_OK && p->skipped > 0)
     return read_fail (r, file->at, "%s: %d rows have no x or no y; a path has no gaps", r->label, p->skipped);
-  return pairs_count (r, node, p);
+  return pairs_count (r, node, p, 8);
 }
 
 int pw_yaml_path (pw_reader *r, const pw_node *node) {
