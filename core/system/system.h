@@ -172,9 +172,9 @@ void pw_close_outputs (const pw_compiled_output *output, int count);
 
 /* ---- Signals ---- */
 
-/* Stores value, first and second derivative at time t, or another argument, in source->u; of a force's signal the derivatives are
- * meaningless.  source->x: the states that a function reads.  Returns non-zero if the user's function does so or
- * computes values that are not finite. */
+/* Stores value, first and second derivative at time t, or another argument, in source->u; of a force's signal the
+ * derivatives are meaningless.  source->x: the states that a function reads.  Returns non-zero if the user's function
+ * does so or computes values that are not finite. */
 int pw_signal_eval (const pw_source *source, double t);
 
 /* The first time after t at which the signal, its first or its second derivative jumps, or a smooth-step starts or
