@@ -991,7 +991,8 @@ int pw_system_equations (const pw_system *s, double t, const double *q, const do
                          pw_error *error);
 void pw_equations_free (pw_equations *e); /* required even after an error */
 
-/* Number of blocks of a plug-in's types given as PW_BY_DIFFERENCES; name of one, as pw_system_state_name: "force_q of element type drag". */
+/* Number of blocks of a plug-in's types given as PW_BY_DIFFERENCES; name of one, as pw_system_state_name: "force_q of
+ * element type drag". */
 int pw_system_differences (const pw_system *s);
 char *pw_system_difference_name (const pw_system *s, int i, char *buffer, size_t size);
 

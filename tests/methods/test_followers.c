@@ -1,5 +1,5 @@
 /* Vehicles of the gallery that follow a path or a wall: signals of velocity constraints that read positions, a
- * first-order state and functions of paths.  Digits of tests/reference/followers.py: other equations, another spline. */
+ * first-order state and functions of paths.  Digits of tests/reference/followers.py: other equations and splines. */
 #include <math.h>
 #include "check.h"
 #include "gallery.h"
