@@ -535,9 +535,10 @@ typedef struct {
  * It has no mass: energies do not contain it. */
 typedef struct {
   const char *name;
-  pw_signal rate;   /* of the time, positions, velocities and states, also of z itself [unit/s] */
-  double start;     /* initial value [unit] */
-  const char *unit; /* "rad s"; NULL or "": none */
+  pw_signal rate;    /* of the time, positions, velocities and states, also of z itself [unit/s] */
+  double start;      /* initial value [unit] */
+  const char *unit;  /* "rad s"; NULL or "": none */
+  const char *about; /* what it means, in a few words; NULL: not said */
 } pw_state;
 
 /* Marker: a point of a body that appears in tables, figures and animations.  It has no effect on the motion. */

@@ -273,6 +273,7 @@ static void show_bodies (const pw_system *s) {
 static void show_element (const pw_element *e) {
   printf ("  %s %s: ", e->kind->name, pw_element_name (e));
   for (const pw_field *f = e->kind->fields; f->name; f++) {
+    if (f->type == PW_TEXT && yaml_is_default (f, (const char *)e->definition + f->offset)) continue;
     printf ("%s%s ", f == e->kind->fields ? "" : "; ", f->name);
     yaml_field (f, (const char *)e->definition + f->offset, SHOW_DIGITS);
     if (f->unit) printf (" %s", f->unit);

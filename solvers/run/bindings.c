@@ -126,6 +126,8 @@ const pw_member pw_members[] = {
   AT4 (pw_statistics, steps, rejected, rhs, jacobians),
   AT4 (pw_statistics, factorisations, specialised, position, velocity),
   AT2 (pw_statistics, g, jv),
+  SIZE (pw_crossing),
+  AT2 (pw_crossing, value, context),
   SIZE (pw_initial_report),
   AT4 (pw_initial_report, q_given, v_given, q, v),
   SIZE (pw_parameter),

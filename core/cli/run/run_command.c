@@ -369,6 +369,10 @@ static int run_store_samples (pw_run_cli *command, pw_error *error) {
     status = pw_run_sample (run, pw_plots_next (command->plots), &sample, error);
     if (status == PW_OK) pw_plots_add (command->plots, &sample);
   }
+  if (status == PW_OK && command->plots && run_is_stopped (command)) {
+    status = pw_run_sample (run, now, &sample, error);
+    if (status == PW_OK) pw_plots_last (command->plots, &sample);
+  }
   while (status == PW_OK && pw_motion_next_time (motion) <= now) {
     status = pw_run_sample (run, pw_motion_next_time (motion), &sample, error);
     if (status == PW_OK) pw_motion_add (motion, command->compiled.system, &sample);

@@ -368,7 +368,7 @@ class Model:
 
     def run(self, method: str | None = None, *, t_end: float | None = None, every: float | None = None, times=None,
             start: dict | None = None, progress: Callable[[float], object] | bool | None = None, error: bool = False,
-            **settings) -> Result:
+            until: str | None = None, **settings) -> Result:
         """Integrates and returns the samples.
 
         Parameters
@@ -387,6 +387,8 @@ class Model:
             Called now and then with the fraction done; True: a progress bar, False: none; default: a bar in notebooks.
         error : bool
             Repeat the run with a tenth of the tolerance or half the step, and state its errors: ``result.error``.
+        until : str, optional
+            A condition on columns, "car.x > 10", at whose instant the run ends: the last sample.
         **settings
             step, rtol, atol, max_steps, energy, inputs, specialise: see :meth:`open`.
 
@@ -401,10 +403,12 @@ class Model:
             What functions in Python and handlers of signals raise, with the samples in its attribute ``result``: see
             :meth:`Simulation.record`.
         """
+        if until is not None and error:
+            raise lib.InputError("error compares complete runs: it cannot be given together with until")
         model = self.replace(start=start) if start else self
         end = self.defaults["t_end"] if t_end is None else lib.number(t_end, "t_end")
         with model.open(method, t_end=end or None, **settings) as simulation:
-            result = simulation.record(end, every, times, progress)
+            result = simulation.record(end, every, times, progress, until)
             if error and result.status == "ok":
                 simulation._state_error(result)
             return result

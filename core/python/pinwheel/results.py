@@ -32,6 +32,8 @@ class Result:
         Stated errors by column, at the end and the largest of the run, if :meth:`Model.run` was asked for them.
     error_unknown : str
         Why no errors can be stated, or "".
+    stopped : float or None
+        The time at which the condition ``until`` became true [s].
     model : Model or None
         None in copies, and in other processes, if the model has functions in Python.
     settings : dict
@@ -54,6 +56,7 @@ class Result:
         self.changed: dict[str, tuple[float, float]] = {}
         self.error: dict[str, tuple[float, float]] | None = None
         self.error_unknown = ""
+        self.stopped: float | None = None
         self._column = {name: i for i, name in enumerate(units)}
         self.t = rows[:, 0]
 
