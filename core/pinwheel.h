@@ -283,6 +283,51 @@ void pw_sin_cos (double x, double *sine, double *cosine);
 double pw_sin (double x);
 double pw_cos (double x);
 
+/* ---- Paths: curves through points of the plane, for feedback that follows a track ---- */
+
+/* A path: a polyline or a cubic spline through points, open or closed.  Its places are given by the arc length s from
+ * the first point.  Beyond its ends an open path continues straight; a closed one continues by further laps.  A path is
+ * never modified: any number of threads may share it. */
+typedef struct pw_path pw_path;
+
+/* A place on a path and, of a point near it, the offset. */
+typedef struct {
+  double s;            /* arc length [m]; of an open path < 0 before its first point */
+  double x, y;         /* the place [m] */
+  double heading;      /* direction [rad], without jumps of a whole turn along the path */
+  double cos, sin;     /* of the heading */
+  double curvature[3]; /* d heading/ds [1/m], positive to the left, and its first two derivatives by s */
+  double offset;       /* distance of the point, positive to the left of the path [m]; 0 for pw_path_at */
+  int corner; /* 1: the place is a corner of a polyline; the heading is at right angles to the way to the point */
+} pw_path_place;
+
+enum { PW_PATH_POINTS = 1000000 }; /* most points of a path */
+
+/* A path through `count` points, x[i], y[i], that differ from the one before: at least 2; 3 if closed; 4 if cubic.
+ * interpolation: PW_LINEAR, a polyline; PW_CUBIC, a spline in the accumulated distance of the points, with continuous
+ * direction and curvature; "not a knot" at the ends of an open one.  The last point of a closed path may repeat the
+ * first.  NULL and the error: PW_INPUT, also for a spline without direction at a cusp; PW_RESOURCE. */
+pw_path *pw_path_open (const double *x, const double *y, int count, int interpolation, int closed, pw_error *error);
+pw_path *pw_path_share (pw_path *p); /* one more owner, each of which closes it; returns the path */
+void pw_path_close (pw_path *p);
+
+/* The place at an arc length; at a corner, that just after it. */
+void pw_path_at (const pw_path *p, double s, pw_path_place *place);
+
+/* The place nearest to a point: near = INFINITY, of all places, and of several that with the least s; else the arc
+ * length to which the place is next among those at which the distance has a minimum.  The offset of a point beyond an
+ * end of an open path is that from its tangent there.  A point that is not finite: all members are NaN.
+ *
+ * With d the offset and k the curvature, the derivatives by x and y are (-sin, cos) of the offset, (cos, sin) /
+ * (1 - k d) of the arc length, and k times the latter of the heading; at a corner (-sin, cos), (0, 0), and
+ * (cos, sin) / -d. */
+void pw_path_nearest (const pw_path *p, double x, double y, double near, pw_path_place *place);
+
+/* The first arc length after s at which the direction or the curvature jumps; INFINITY if there is none. */
+double pw_path_break (const pw_path *p, double s);
+int pw_path_is_smooth (const pw_path *p); /* 1: a spline; 0: a polyline */
+double pw_path_length (const pw_path *p); /* [m]; of a closed path: of one lap */
+
 /* ---- The element types: position constraints, velocity constraints, forces, markers ---- */
 
 /* Pin: a point of body 1 and a point of body 2 coincide.  Two holonomic constraint equations. */
@@ -344,6 +389,15 @@ typedef struct {
   int what;        /* PW_DRIVE_X, PW_DRIVE_Y: from point 2 to point 1 in body 2's frame; PW_DRIVE_ANGLE: phi1 - phi2 */
   pw_signal value; /* [m] or [rad]; with its first and second time derivative */
 } pw_drive;
+
+/* On-curve: a point of a body stays on a curve of the world, given by functions of a parameter s, an internal
+ * coordinate.  Two holonomic constraint equations. */
+typedef struct {
+  const char *name, *body;
+  double at[2];       /* the point in the body's frame [m] */
+  pw_signal x, y;     /* the curve [m], as signals of s in place of the time; with two derivatives, not both 0 */
+  double start, rate; /* initial s and its velocity; 0: from the body's position and velocity */
+} pw_on_curve;
 
 /* Wheel: a knife edge; the contact point does not move across the heading.  One nonholonomic constraint equation. */
 typedef struct {
@@ -502,6 +556,7 @@ typedef struct {
   PW_KIND (rod)                \
   PW_KIND (gear)               \
   PW_KIND (drive)              \
+  PW_KIND (on_curve)           \
   PW_KIND (wheel)              \
   PW_KIND (rolling_wheel)      \
   PW_KIND (steered_wheel)      \
@@ -550,8 +605,8 @@ typedef struct {
 /* An internal coordinate of an element, as `prepare` describes it. */
 typedef struct {
   double mass;      /* its entry of M [kg m^2], >= 0; 0 only if the element's constraints determine the coordinate */
-  double start;     /* initial value [rad] */
-  double rate;      /* initial velocity [rad/s] */
+  double start;     /* initial value, in the unit of the coordinate */
+  double rate;      /* initial velocity */
   int specified[2]; /* 1: the definition gives start, rate; 0: derived from other values */
 } pw_internal;
 
@@ -610,8 +665,9 @@ struct pw_kind {
   int constant;    /* 1: its force is constant and evaluated once, when the system is compiled */
   pw_level level;  /* of its constraint equations */
   int first_order; /* 1: the velocities of its internal coordinates are first-order states, which have no energy */
+  int of_coordinate; /* 1: its signals, of constraints, are functions of its first internal coordinate, not of time */
   const pw_quantity *reaction;                                 /* rows: meaning of each -lambda */
-  const pw_quantity *coordinate;                               /* internal: the internal coordinates, in "rad" */
+  const pw_quantity *coordinate;                               /* internal: the internal coordinates, in "rad" or "" */
   const char *(*reaction_unit) (const void *element, int row); /* if it depends on the element; may be NULL */
 
   /* Converts a checked definition into a prepared element.  bodies: those it names or acts on, in order; the ground
@@ -724,13 +780,22 @@ static inline const char *pw_element_name (const pw_element *e) {
 const pw_named_output *pw_model_outputs (const pw_model *m, int *count);
 int pw_model_initials (const pw_model *m); /* number of values set by pw_model_set_initial */
 
-/* Reference solution of a text model: expressions of time for some states; names used in them and in signals. */
+/* The points of a path of a text model (pw_path_open). */
+typedef struct {
+  const char *name;
+  const double *x, *y; /* count */
+  int count, interpolation, closed;
+} pw_path_text;
+
+/* Reference solution of a text model, expressions of time for some states; names and paths used in expressions. */
 typedef struct {
   int states;                 /* 0: no reference solution */
   const char **state, **text; /* states: name, "bob.phi", and expression */
   int names;
   const char **name;                               /* names */
   double *value;                                   /* names: their values */
+  int paths;                                       /* paths */
+  pw_path_text *path;                              /* paths */
   double (*eval) (void *context, int i, double t); /* value of expression i at time t */
   void *context;
 } pw_reference_text;
@@ -927,7 +992,8 @@ int pw_system_equations (const pw_system *s, double t, const double *q, const do
                          pw_error *error);
 void pw_equations_free (pw_equations *e); /* required even after an error */
 
-/* Number of blocks given as PW_BY_DIFFERENCES; name of one, as pw_system_state_name: "force_q of element type drag". */
+/* Number of blocks of a plug-in's types given as PW_BY_DIFFERENCES; name of one, as pw_system_state_name: "force_q of
+ * element type drag". */
 int pw_system_differences (const pw_system *s);
 char *pw_system_difference_name (const pw_system *s, int i, char *buffer, size_t size);
 

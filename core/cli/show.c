@@ -45,6 +45,11 @@ static void yaml_function (const pw_signal *s) {
   if (text == NULL) putchar (')');
 }
 
+static void yaml_pairs (const double *x, const double *y, int count) {
+  for (int i = 0; i < count; i++) printf ("%s[%s, %s]", i ? ", " : "[", YAML_NUMBER (x[i]), YAML_NUMBER (y[i]));
+  putchar (']');
+}
+
 /* The points of a table; with fewer digits than YAML_DIGITS only their number and their first and last times. */
 static void yaml_points (const pw_signal *s, int digits) {
   const double *t = s->table.t;
@@ -53,9 +58,7 @@ static void yaml_points (const pw_signal *s, int digits) {
     printf ("%d from %s to %s s", count, PW_DIGITS (t[0], digits), PW_DIGITS (t[count - 1], digits));
     return;
   }
-  for (int i = 0; i < count; i++)
-    printf ("%s[%s, %s]", i ? ", " : "[", YAML_NUMBER (t[i]), YAML_NUMBER (s->table.value[i]));
-  putchar (']');
+  yaml_pairs (t, s->table.value, count);
 }
 
 /* 1 if an optional field has its default, zero in all bytes. */
@@ -183,6 +186,13 @@ static int yaml_check (const pw_model *m, pw_error *error) {
   return PW_OK;
 }
 
+static void yaml_path (const pw_path_text *p) {
+  printf ("  - {name: %s, %s%spoints: ", p->name, p->interpolation == PW_CUBIC ? "interpolation: cubic, " : "",
+          p->closed ? "closed: true, " : "");
+  yaml_pairs (p->x, p->y, p->count);
+  puts ("}");
+}
+
 static void yaml_run (const pw_run_defaults *run) {
   const char *const key[] = { "t_end", "step", "rtol" };
   const double value[] = { run->t_end, run->step, run->rtol };
@@ -219,6 +229,8 @@ static int yaml_model (const pw_cli_model *opened, pw_error *error) {
   yaml_run (&table->run);
   if (ref->names) puts ("let:"); /* of the names in expressions */
   for (int i = 0; i < ref->names; i++) printf ("  %s: %s\n", ref->name[i], YAML_NUMBER (ref->value[i]));
+  if (ref->paths) puts ("paths:");
+  for (int i = 0; i < ref->paths; i++) yaml_path (&ref->path[i]);
   if (bodies) puts ("bodies:");
   for (int i = 0; i < bodies; i++) yaml_body (&b[i]);
   for (int of_states = 0, written = 0; of_states < 2; of_states++, written = 0)

@@ -24,7 +24,8 @@ typedef struct {
   int line;               /* number of the last line read */
   int cells;              /* per line */
   const char **cell;      /* where those of the last line split begin */
-  columns_source *source; /* of each column to read; the first one is the time */
+  columns_source *source; /* of each column to read */
+  int increases;          /* 1: the first one is the time, which increases */
   int columns;
   pw_gaps gaps;
   unsigned char *missing; /* receives 1 for a column that the file does not have; NULL: it must have all */
@@ -234,7 +235,8 @@ static int columns_rows (columns *c, char *line, double *value, size_t room, int
       if (columns_number (c, c->source[k], k ? c->gaps : PW_GAPS_REFUSED, &value[(size_t)k * room + (size_t)n]) !=
           PW_OK)
         return PW_INPUT;
-    if (value[n] <= last) return columns_fail (c, "%.9g comes after %.9g: expected increasing times", value[n], last);
+    if (c->increases && value[n] <= last)
+      return columns_fail (c, "%.9g comes after %.9g: expected increasing times", value[n], last);
     if (!isnan (value[n])) last = value[n];
   }
   return PW_OK;
@@ -294,6 +296,7 @@ double *pw_columns_from_stream (FILE *f, const char *shown, const char *const *c
   int status = pw_read_rest (f, COLUMNS_MAX_BYTES, shown, "the limit for a table", &text, &size, error);
   columns c = { .shown = shown, .rest = text, .columns = width, .gaps = gaps, .missing = missing, .error = error };
   c.source = calloc ((size_t)width, sizeof *c.source);
+  c.increases = unit[0] && strcmp (unit[0], "s") == 0;
   if (status == PW_OK && c.source == NULL) status = pw_fail (error, PW_RESOURCE, "%s: out of memory", shown);
   if (status == PW_OK && strlen (text) != size)
     status = pw_fail (error, PW_INPUT, "%.80s: a table is text, and this has a byte 0", shown);

@@ -185,6 +185,48 @@ int pw_expression_find_function (const char *name) {
   return pw_expression_functions[i].name ? i : -1;
 }
 
+/* ---- Functions of paths ---- */
+
+const char *const pw_path_functions[] = { [PW_PATH_S] = "s",
+                                          [PW_PATH_X] = "x",
+                                          [PW_PATH_Y] = "y",
+                                          [PW_PATH_HEADING] = "heading",
+                                          [PW_PATH_CURVATURE] = "curvature",
+                                          [PW_PATH_OFFSET] = "offset",
+                                          NULL };
+
+/* A function of a place: value, first and second derivative by the arc length, which the offset does not have. */
+static void path_values (int function, const pw_path_place *p, double out[3]) {
+  const double *k = p->curvature;
+  const double value[][3] = { [PW_PATH_S] = { p->s, 1, 0 },
+                              [PW_PATH_X] = { p->x, p->cos, -k[0] * p->sin },
+                              [PW_PATH_Y] = { p->y, p->sin, k[0] * p->cos },
+                              [PW_PATH_HEADING] = { p->heading, k[0], k[1] },
+                              [PW_PATH_CURVATURE] = { k[0], k[1], k[2] },
+                              [PW_PATH_OFFSET] = { p->offset, 0, 0 } };
+  memcpy (out, value[function], sizeof value[function]);
+}
+
+/* Derivatives by (x, y) from those of the offset d and the arc length s: with t the direction, n to its left, k the
+ * curvature and h = 1 - k d,
+ *
+ *   grad d = n,  Hess d = -k/h t t,   grad s = t/h,  Hess s = k/h^2 (n t + t n) + k' d/h^3 t t
+ *
+ * At a corner k is infinite: grad s = 0, -k/h = 1/d, and heading and offset are polar coordinates. */
+static pw_partials path_partials (int function, const pw_path_place *p, const double value[3]) {
+  double d = p->offset, k = p->curvature[0], h = 1 - k * d, tt, nt = 0, t = 0, n = 0; /* coefficients of t t, ... */
+  if (function == PW_PATH_OFFSET)
+    n = 1, tt = p->corner ? 1 / d : -k / h;
+  else if (p->corner)
+    t = function == PW_PATH_HEADING ? -1 / d : 0, nt = function == PW_PATH_HEADING ? 1 / (d * d) : 0, tt = 0;
+  else
+    t = value[1] / h, nt = value[1] * k / (h * h),
+    tt = value[1] * p->curvature[1] * d / (h * h * h) + value[2] / (h * h);
+  double C = p->cos, S = p->sin;
+  return (pw_partials){ t * C - n * S, t * S + n * C, tt * C * C - 2 * nt * S * C, tt * S * C + nt * (C * C - S * S),
+                        tt * S * S + 2 * nt * S * C };
+}
+
 /* ---- Values ---- */
 
 static inline pw_order value_order (double a, double b) {
@@ -201,6 +243,23 @@ static inline double value_step (int op, double x, int *may_jump) {
   return y;
 }
 
+static double value_path_at (const pw_expression_code *c, double s, int *may_jump) {
+  double value[3];
+  pw_path_place place;
+  pw_path_at (c->path, s, &place);
+  if (pw_path_break (c->path, nextafter (s, -INFINITY)) == s) *may_jump = 1;
+  path_values (c->index, &place, value);
+  return *value;
+}
+
+static double value_path_nearest (const pw_expression_code *c, double x, double y, double near) {
+  double value[3];
+  pw_path_place place;
+  pw_path_nearest (c->path, x, y, near, &place);
+  path_values (c->index, &place, value);
+  return *value;
+}
+
 /* The value of an operation of `right` alone or of `left` and `right`; *may_jump: 1 where it may jump. */
 static inline double value_of (const pw_expression_code *c, double left, double right, int *may_jump) {
   switch (c->op) {
@@ -211,6 +270,8 @@ static inline double value_of (const pw_expression_code *c, double left, double 
   case PW_OP_TAN:
   case PW_OP_FUNCTION_OF_ONE:
     return pw_expression_functions[c->index].of_one (right);
+  case PW_OP_PATH_AT:
+    return value_path_at (c, right, may_jump);
   case PW_OP_ADD:
     return left + right;
   case PW_OP_SUBTRACT:
@@ -258,6 +319,9 @@ double pw_expression_run (const pw_expression_code *code, int codes, const doubl
     } else if (c->op == PW_OP_SELECT) {
       top -= 2;
       last = top[0] != 0 ? top[1] : last;
+    } else if (c->op == PW_OP_PATH_NEAREST) {
+      top -= 2;
+      last = value_path_nearest (c, top[0], top[1], last);
     } else {
       double left = c->op >= PW_OP_ADD ? *--top : 0;
       last = value_of (c, left, last, may_jump);
@@ -325,8 +389,33 @@ static jet jet_mod (const jet *x, const jet *y, double *q) {
   return m;
 }
 
+/* Just before a break of the path if the arc length falls. */
+static jet jet_path_at (const pw_expression_code *c, const jet *s, double *discrete) {
+  double value[3], at = s->v;
+  pw_path_place place;
+  if (jet_sign (&(jet){ 0, s->d, s->dd, 1 }) < 0) {
+    double before = nextafter (at, -INFINITY);
+    if (pw_path_break (c->path, before) == at) at = before;
+  }
+  pw_path_at (c->path, at, &place);
+  *discrete = pw_path_break (c->path, at);
+  path_values (c->index, &place, value);
+  return jet_chain (*value, &(pw_partials){ .x = value[1], .xx = value[2] }, s, &(jet){ 0 });
+}
+
+/* On `near` a minimum does not depend. */
+static jet jet_path_nearest (const pw_expression_code *c, const jet *x, const jet *y, const jet *near) {
+  double value[3];
+  pw_path_place place;
+  pw_path_nearest (c->path, x->v, y->v, near->v, &place);
+  path_values (c->index, &place, value);
+  pw_partials s = path_partials (c->index, &place, value);
+  return jet_chain (*value, &s, x, y);
+}
+
 static jet jet_unary (const pw_expression_code *c, const jet *x, double *discrete) {
   if (c->op == PW_OP_NEGATE) return (jet){ -x->v, -x->d, -x->dd, x->varies };
+  if (c->op == PW_OP_PATH_AT) return jet_path_at (c, x, discrete);
   if (c->op == PW_OP_FUNCTION_OF_ONE || c->op == PW_OP_TAN) {
     if (c->op == PW_OP_TAN) *discrete = floor (x->v / PW_PI + 0.5);
     const pw_expression_function *f = &pw_expression_functions[c->index];
@@ -426,7 +515,9 @@ void pw_expression_run_jet (const pw_expression *expression, const double *varia
       *top = c->op == PW_OP_CONSTANT ? (jet){ .v = c->value }
                                      : (jet){ variable[c->index], c->index == by, 0, c->index == by };
     else if (operands == 3)
-      *top = top[0].v != 0 ? top[1] : top[2];
+      *top = c->op == PW_OP_PATH_NEAREST ? jet_path_nearest (c, top, top + 1, top + 2)
+             : top[0].v != 0             ? top[1]
+                                         : top[2];
     else if (!top[0].varies && !top[operands - 1].varies)
       *top = (jet){ .v = pw_expression_apply (c, top[0].v, top[operands - 1].v) };
     else

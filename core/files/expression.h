@@ -4,6 +4,8 @@
  *   functions   sin cos tan asin acos atan atan2 sinh cosh tanh exp log log10 sqrt abs sign floor ceil round hypot mod
  *               min max jacobi_am (u, m), elliptic_K (m)
  *   constants   pi, e, deg = pi / 180
+ *   paths       PATH.x (s), .y, .heading, .curvature: at an arc length; PATH.offset (x, y), .s, .x, .y, .heading,
+ *               .curvature: at the place nearest to a point, of all or, PATH.s (x, y, near), next to an arc length
  *
  * A scope defines the named numbers.  The first variable is the time, except in formulas.  Expressions are immutable:
  * any number of threads may evaluate them. */
@@ -22,11 +24,12 @@ enum { PW_EXPRESSION_TIME = 0 };
 
 /* ---- Reading ---- */
 
-/* Named numbers, and names that stand for expressions of variables. */
+/* Named numbers and paths, and names that stand for expressions of variables. */
 typedef struct {
   int names;
   const char **name; /* names */
   double *value;     /* names */
+  pw_path **path;    /* names: NULL for a number */
   pw_names index;    /* the index of each name */
   int room;          /* names for which there is memory */
   /* The text of the expression that a name stands for, which is read in place of the name, or NULL.  Variables have
@@ -41,25 +44,36 @@ void pw_scope_close (pw_scope *s); /* names and numbers stay in the arena */
 
 /* Adds a name, to which the scope keeps a pointer; there must be room. */
 void pw_scope_add (pw_scope *s, const char *name, double value);
+void pw_scope_add_path (pw_scope *s, const char *name, pw_path *path);
 
 /* One operation of an expression; it replaces its operands, the last ones on a stack, by its value. */
 typedef struct {
-  short op;     /* pw_expression_op (expression_parts.h) */
-  short index;  /* of the variable or function */
-  double value; /* of a constant */
+  short op;    /* pw_expression_op (expression_parts.h) */
+  short index; /* of the variable or function */
+  union {
+    double value;  /* of a constant */
+    pw_path *path; /* of a function of a path */
+  };
 } pw_expression_code;
+
+/* Jumps as states change: NEVER; RARELY: where an angle turns or another place of a smooth path becomes the nearest. */
+typedef enum { PW_JUMPS_NEVER, PW_JUMPS_RARELY, PW_JUMPS } pw_jumps;
 
 /* An expression: its syntax tree in postfix order. */
 typedef struct {
-  int codes;        /* operations */
-  int breaks;       /* 1: may have jumps or kinks in time */
+  int codes;  /* operations */
+  int breaks; /* 1: may have jumps or kinks in time */
+  pw_jumps jumps;
   const char *jump; /* part, of jump_size bytes, of the caller's text that may jump as states change; or NULL */
   int jump_size;
   pw_expression_code code[];
 } pw_expression;
 
-/* Size of an expression in bytes, by which it may be copied. */
+/* Size of an expression in bytes, by which it may be copied.  The paths of a scope must outlive its expressions and
+ * their copies, unless these share them; a copy that does releases them. */
 size_t pw_expression_size (const pw_expression *expression);
+void pw_expression_share_paths (const pw_expression *expression);
+void pw_expression_release_paths (const pw_expression *expression);
 
 /* Reads an expression of a scope and at most 32 variables, which end with NULL, into an arena; scope and `variable` may
  * be NULL.  PW_INPUT, error; PW_RESOURCE. */
@@ -91,10 +105,12 @@ int pw_expression_is_name (const char *text);
 /* Whether a function or constant has this name. */
 int pw_expression_is_reserved (const char *text);
 
-/* Copies the next name in the text of an expression, also that of a function or constant, to the buffer, cut to its
- * size, and moves *rest after it.  Returns its position, or NULL after the last name. */
+/* Copies the next name in the text of an expression, also that of a function or constant, but not PATH.FUNCTION, to the
+ * buffer, cut to its size, and moves *rest after it.  Returns its position, or NULL after the last name. */
 enum { PW_EXPRESSION_NAME = 100 };
 const char *pw_expression_next_name (const char **rest, char name[PW_EXPRESSION_NAME]);
+/* The same, also of PATH.FUNCTION. */
+const char *pw_expression_next_word (const char **rest, char name[PW_EXPRESSION_NAME]);
 
 /* Whether a text is a single number; its value may overflow to infinity. */
 int pw_expression_number (const char *text, double *value);

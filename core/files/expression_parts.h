@@ -19,6 +19,7 @@ typedef enum {
   PW_OP_ROUND,
   PW_OP_TAN,
   PW_OP_FUNCTION_OF_ONE, /* a smooth function of one argument */
+  PW_OP_PATH_AT,         /* a function of the place of a path at an arc length */
   PW_OP_ADD,
   PW_OP_SUBTRACT,
   PW_OP_MULTIPLY,
@@ -36,7 +37,8 @@ typedef enum {
   PW_OP_ATAN2,
   PW_OP_HYPOT,
   PW_OP_FUNCTION_OF_TWO, /* a smooth function of two arguments */
-  PW_OP_SELECT           /* condition ? x : y; the condition is 1 or 0.  a && b is a ? b : 0, a || b is a ? 1 : b */
+  PW_OP_SELECT,          /* condition ? x : y; the condition is 1 or 0.  a && b is a ? b : 0, a || b is a ? 1 : b */
+  PW_OP_PATH_NEAREST     /* a function of the place of a path nearest to a point; the third operand: pw_path_nearest */
 } pw_expression_op;
 
 static inline int pw_expression_operands (int op) {
@@ -46,7 +48,11 @@ static inline int pw_expression_operands (int op) {
 /* Whether an operation has jumps between finite values. */
 static inline int pw_expression_jumps (int op) {
   return (op >= PW_OP_SIGN && op <= PW_OP_ROUND) || (op >= PW_OP_LESS && op <= PW_OP_UNEQUAL) || op == PW_OP_MOD ||
-         op == PW_OP_ATAN2;
+         op == PW_OP_ATAN2 || op == PW_OP_PATH_AT;
+}
+
+static inline int pw_expression_has_path (int op) {
+  return op == PW_OP_PATH_AT || op == PW_OP_PATH_NEAREST;
 }
 
 /* Whether it has jumps, poles or kinks. */
@@ -91,6 +97,10 @@ typedef struct {
 
 extern const pw_expression_function pw_expression_functions[]; /* and constants; ends with a NULL name */
 
+/* A function of a place of a path: pw_expression_code.index. */
+typedef enum { PW_PATH_S, PW_PATH_X, PW_PATH_Y, PW_PATH_HEADING, PW_PATH_CURVATURE, PW_PATH_OFFSET } pw_path_function;
+extern const char *const pw_path_functions[]; /* their names; ends with NULL */
+
 /* The index of a function or constant, or -1. */
 int pw_expression_find_function (const char *name);
 
@@ -99,7 +109,7 @@ int pw_expression_find_function (const char *name);
 /* The value of operations; *may_jump becomes 1 if one of them may jump there: at equal numbers, at poles. */
 double pw_expression_run (const pw_expression_code *code, int codes, const double *variable, int *may_jump);
 
-/* The value of an operation of `right` alone or of `left` and `right`. */
+/* The value of an operation of `right` alone or of `left` and `right`, other than functions of the nearest place. */
 double pw_expression_apply (const pw_expression_code *c, double left, double right);
 
 /* As pw_expression_derivatives.  discrete, unless NULL, receives for each operation a number that differs on the two
@@ -122,6 +132,6 @@ pw_range pw_expression_range (const pw_expression *expression, const unsigned ch
 
 /* Whether the last of these operations, a part of an expression, may jump at some time in some state: atan2 (x, 1) and
  * sign (x^2 + 1) do not. */
-int pw_expression_may_jump (const pw_expression_code *code, int codes);
+pw_jumps pw_expression_may_jump (const pw_expression_code *code, int codes);
 
 #endif

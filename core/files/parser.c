@@ -4,7 +4,7 @@
  *   choice   = binary [? choice : choice]
  *   binary   = unary {operator unary}           by precedence, left-associative
  *   unary    = + unary | - unary | operand [^ unary]
- *   operand  = number | name | function (choice, ...) | (choice)
+ *   operand  = number | name | function (choice, ...) | path.function (choice, ...) | (choice)
  *
  * Parts without variables are evaluated immediately.  Errors are reported at their position. */
 #include <float.h>
@@ -45,6 +45,11 @@ static size_t number_size (const char *p) {
   return (size_t)(digits ? exponent + digits - p : end - p);
 }
 
+/* Whether an opening parenthesis follows. */
+static int is_call (const char *after) {
+  return after[strspn (after, " \t\r\n")] == '(';
+}
+
 int pw_expression_number (const char *text, double *value) {
   size_t sign = *text == '+' || *text == '-', n = number_size (text + sign);
   return n && text[sign + n] == 0 && pw_read_number (text, value) == PW_OK;
@@ -59,7 +64,7 @@ int pw_expression_is_name (const char *text) {
   return n && text[n] == 0 && n < 64 && strchr (text, '.') == NULL;
 }
 
-const char *pw_expression_next_name (const char **rest, char name[PW_EXPRESSION_NAME]) {
+const char *pw_expression_next_word (const char **rest, char name[PW_EXPRESSION_NAME]) {
   while (**rest) {
     const char *p = *rest;
     size_t n = name_size (p), number = n ? 0 : number_size (p);
@@ -71,6 +76,12 @@ const char *pw_expression_next_name (const char **rest, char name[PW_EXPRESSION_
   return NULL;
 }
 
+const char *pw_expression_next_name (const char **rest, char name[PW_EXPRESSION_NAME]) {
+  const char *p = pw_expression_next_word (rest, name);
+  while (p && strchr (name, '.') && is_call (*rest)) p = pw_expression_next_word (rest, name);
+  return p;
+}
+
 /* ---- Named numbers ---- */
 
 int pw_scope_reserve (pw_scope *s, int room, pw_arena *arena) {
@@ -78,10 +89,12 @@ int pw_scope_reserve (pw_scope *s, int room, pw_arena *arena) {
   size_t n = room > 2 * s->room ? (size_t)room + 1 : 2 * (size_t)s->room; /* never an empty allocation */
   const char **name = pw_arena_alloc (arena, n * sizeof *name);
   double *value = pw_arena_alloc (arena, n * sizeof *value);
-  if (name == NULL || value == NULL || pw_names_reserve (&s->index, n) != PW_OK) return PW_RESOURCE;
+  pw_path **path = pw_arena_alloc (arena, n * sizeof *path);
+  if (name == NULL || value == NULL || path == NULL || pw_names_reserve (&s->index, n) != PW_OK) return PW_RESOURCE;
   if (s->names) memcpy (name, s->name, (size_t)s->names * sizeof *name);
   if (s->names) memcpy (value, s->value, (size_t)s->names * sizeof *value);
-  s->name = name, s->value = value, s->room = (int)n;
+  if (s->names) memcpy (path, s->path, (size_t)s->names * sizeof *path);
+  s->name = name, s->value = value, s->path = path, s->room = (int)n;
   return PW_OK;
 }
 
@@ -93,6 +106,11 @@ void pw_scope_add (pw_scope *s, const char *name, double value) {
   s->name[s->names] = name;
   s->value[s->names] = value;
   pw_names_add (&s->index, name, s->names++);
+}
+
+void pw_scope_add_path (pw_scope *s, const char *name, pw_path *path) {
+  s->path[s->names] = path;
+  pw_scope_add (s, name, NAN);
 }
 
 enum { PARSER_MAX_LENGTH = 4000, PARSER_MAX_DEPTH = 200 };
@@ -125,10 +143,12 @@ typedef struct {
   char type;                     /* 'n' name, '0' number, 'o' operator, 0 the end; or ( ) , ? : itself */
   const parser_operator *symbol; /* of a token of type 'o'; else NULL */
   int depth, stacked;            /* of the recursion; operands on the stack during evaluation */
+  pw_path *path;                 /* of the function of a path that is pushed next */
   int status;                    /* PW_OK until the first error */
   pw_expression_error *error;
   /* of the pw_expression being made */
   int breaks;
+  pw_jumps jumps;
   const char *jump;
   int jump_size;
   int codes;
@@ -187,7 +207,8 @@ static void parser_push (parser *p, int op, int index, double value) {
   if (p->stacked > PW_EXPRESSION_STACK || p->codes == PW_EXPRESSION_CODES)
     parser_fail (p, p->at, "the nesting is too deep here");
   else
-    p->code[p->codes++] = (pw_expression_code){ (short)op, (short)index, value };
+    p->code[p->codes++] = (pw_expression_code){ (short)op, (short)index, { value } };
+  if (p->status == PW_OK && pw_expression_has_path (op)) p->code[p->codes - 1].path = p->path;
 }
 
 /* A constant or variable, the current token. */
@@ -208,12 +229,14 @@ static parser_part parser_operation (parser *p, parser_part part, int depends, i
   if (part.depends == 0) {
     double value = pw_expression_run (p->code + part.first, p->codes - part.first, NULL, &(int){ 0 });
     p->codes = part.first + 1;
-    p->code[part.first] = (pw_expression_code){ PW_OP_CONSTANT, 0, value };
+    p->code[part.first] = (pw_expression_code){ PW_OP_CONSTANT, 0, { value } };
   }
   if (pw_expression_breaks (op) && part.depends & DEPENDS_ON_TIME) p->breaks = 1;
   int at_one_point = op == PW_OP_EQUAL || op == PW_OP_UNEQUAL; /* jumps, and back at once */
-  if (!at_one_point && part.depends & DEPENDS_ON_STATES && p->jump == NULL &&
-      pw_expression_may_jump (p->code + part.first, p->codes - part.first)) {
+  if (at_one_point || !(part.depends & DEPENDS_ON_STATES)) return part;
+  const pw_jumps jumps = pw_expression_may_jump (p->code + part.first, p->codes - part.first);
+  if (jumps > p->jumps) {
+    p->jumps = jumps;
     p->jump = p->text + part.from;
     p->jump_size = (int)(p->previous_end - part.from);
   }
@@ -270,8 +293,7 @@ static parser_part parser_unknown (parser *p, const char *name) {
 }
 
 static int parser_is_call (const parser *p) {
-  const char *after = p->text + p->at + p->size;
-  return after[strspn (after, " \t\r\n")] == '(';
+  return is_call (p->text + p->at + p->size);
 }
 
 /* Reads an expression in place of the current token, the name of it.  Errors are reported at the name. */
@@ -304,6 +326,8 @@ static parser_part parser_name (parser *p, const char *name, const pw_expression
   const char *expanded =
       !is_variable && p->scope && p->scope->expand ? p->scope->expand (p->scope->context, name) : NULL;
   if (!is_variable && named < 0 && constant == NULL && expanded == NULL) return parser_unknown (p, name);
+  if (named >= 0 && p->scope->path[named])
+    return parser_fail (p, p->at, "\"%s\" is a path: write %s.offset (x, y) or another function of it", name, name);
   if (parser_is_call (p))
     return parser_fail (p, p->at, "\"%s\" is a number, not a function; a product is written with *", name);
   if (is_variable) return parser_leaf (p, PW_OP_VARIABLE, variable, 0);
@@ -311,9 +335,11 @@ static parser_part parser_name (parser *p, const char *name, const pw_expression
   return parser_leaf (p, PW_OP_CONSTANT, 0, named >= 0 ? p->scope->value[named] : constant->value);
 }
 
-/* min and max combine more than two arguments pairwise. */
-static parser_part parser_call (parser *p, int index) {
-  const pw_expression_function *f = &pw_expression_functions[index];
+/* A function; min and max combine more than two arguments pairwise.  path: NULL, or that of which it is a function. */
+static parser_part parser_call (parser *p, int index, pw_path *path) {
+  const int needs_point = path && (index == PW_PATH_S || index == PW_PATH_OFFSET);
+  const pw_expression_function *f = &pw_expression_functions[path ? 0 : index];
+  const int least = path ? 1 + needs_point : f->least, most = path ? 3 : f->most;
   parser_part part = { .from = p->at, .first = p->codes };
   int arguments = 0;
   parser_next (p);
@@ -324,15 +350,40 @@ static parser_part parser_call (parser *p, int index) {
     if (p->type == ')' && arguments == 0) break;
     int depends = parser_choice (p).depends;
     p->depth--;
-    if (f->most == 0 && arguments) part = parser_operation (p, part, depends, f->op, index);
+    if (most == 0 && arguments) part = parser_operation (p, part, depends, f->op, index);
     part.depends |= depends, arguments++;
   } while (p->type == ',' && p->status == PW_OK);
   if (p->status != PW_OK) return part;
   if (p->type != ')') return parser_unexpected (p, '(', open);
-  if (arguments < f->least) return parser_fail (p, p->at, "too few arguments");
-  if (f->most && arguments > f->most) return parser_fail (p, p->at, "too many arguments");
+  if (arguments < least)
+    return parser_fail (p, p->at, "too few arguments%s",
+                        needs_point ? "; the place nearest to a point needs x, y" : "");
+  if (most && arguments > most) return parser_fail (p, p->at, "too many arguments");
   parser_next (p);
-  return f->most ? parser_operation (p, part, part.depends, f->op, index) : part;
+  if (path == NULL) return most ? parser_operation (p, part, part.depends, f->op, index) : part;
+  p->path = path;
+  if (arguments == 1) return parser_operation (p, part, part.depends, PW_OP_PATH_AT, index);
+  if (arguments == 2) parser_push (p, PW_OP_CONSTANT, 0, INFINITY); /* pw_path_nearest: of all places */
+  if (part.depends) part.depends |= DEPENDS_ON_STATES;              /* its jumps are not located */
+  return parser_operation (p, part, part.depends, PW_OP_PATH_NEAREST, index);
+}
+
+/* A function of a path, PATH.FUNCTION. */
+static parser_part parser_path (parser *p, const char *name) {
+  const pw_scope *s = p->scope;
+  const size_t n = strcspn (name, ".");
+  const char *owner = PW_PRINTED (PW_EXPRESSION_NAME, "%.*s", (int)n, name);
+  char hint[PW_HINT];
+  const int named = s ? pw_names_find (&s->index, owner) : -1;
+  if (named < 0 || s->path[named] == NULL) {
+    pw_nearest near = { .sought = owner };
+    for (int i = 0; s && i < s->names; i++)
+      if (s->path[i]) pw_nearest_try (&near, s->name[i]);
+    return parser_fail (p, p->at, "there is no path \"%s\"%s", owner, pw_nearest_text (&near));
+  }
+  int function = pw_find_name (pw_path_functions, sizeof *pw_path_functions, name + n + 1, hint);
+  if (function >= 0) return parser_call (p, function, s->path[named]);
+  return parser_fail (p, p->at + n + 1, "a path has no function \"%s\"%s", name + n + 1, hint);
 }
 
 static parser_part parser_group (parser *p) {
@@ -362,10 +413,11 @@ static parser_part parser_operand (parser *p) {
   if (p->type == '(') return parser_group (p);
   if (p->type != 'n') return parser_missing (p);
   const char *name = PW_PRINTED (PW_EXPRESSION_NAME, "%.*s", (int)p->size, p->text + p->at);
+  if (strchr (name, '.') && parser_is_call (p)) return parser_path (p, name);
   int index = pw_expression_find_function (name);
   const pw_expression_function *f = index < 0 ? NULL : &pw_expression_functions[index];
   if (f == NULL || f->op == PW_OP_CONSTANT) return parser_name (p, name, f);
-  if (parser_is_call (p)) return parser_call (p, index);
+  if (parser_is_call (p)) return parser_call (p, index, NULL);
   return parser_fail (p, p->at, "\"%s\" is a function: write its argument in parentheses", name);
 }
 
@@ -435,11 +487,21 @@ size_t pw_expression_size (const pw_expression *x) {
   return sizeof *x + (size_t)x->codes * sizeof *x->code;
 }
 
+void pw_expression_share_paths (const pw_expression *x) {
+  for (int i = 0; i < x->codes; i++)
+    if (pw_expression_has_path (x->code[i].op)) pw_path_share (x->code[i].path);
+}
+
+void pw_expression_release_paths (const pw_expression *x) {
+  for (int i = 0; i < x->codes; i++)
+    if (pw_expression_has_path (x->code[i].op)) pw_path_close (x->code[i].path);
+}
+
 int pw_expression_read (const pw_scope *s, const char *const *variable, const char *text, pw_arena *arena,
                         const pw_expression **x, pw_expression_error *error) {
   parser p;
   if (parser_read (&p, s, variable, text, error) != PW_OK) return p.status;
-  pw_expression head = { p.codes, p.breaks, p.jump, p.jump_size },
+  pw_expression head = { p.codes, p.breaks, p.jumps, p.jump, p.jump_size },
                 *copy = pw_arena_alloc (arena, pw_expression_size (&head));
   if (copy == NULL) return PW_RESOURCE;
   *copy = head;

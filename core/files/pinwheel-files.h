@@ -40,8 +40,8 @@ const char *pw_file_path (const pw_file *f);
 /* The path of the file that a model's name or path refers to, malloced; NULL and an error as from pw_file_open. */
 char *pw_file_find (const char *model, pw_error *error);
 
-/* Calls `each` with the path of each table of a text model, once for each signal that reads it, and of each included
- * file, until it returns non-zero; returns that, or 0. */
+/* Calls `each` with the path of each table of a text model, once for each path and each signal that reads it, and of each
+ * included file, until it returns non-zero; returns that, or 0. */
 int pw_file_tables (const pw_file *f, int (*each) (void *context, const char *path), void *context);
 
 /* Calls `each` with the name and path of every model on the search path, sorted by name, until it returns non-zero.
@@ -139,7 +139,7 @@ size_t pw_unit_split (const char *cell, char *unit, size_t size);
 int pw_unit_check (const char *cell, const char *wanted, double *factor, char *why, size_t size);
 
 /* Reads columns of a table by their names or numbers ("1", ...), in SI units: `unit` of each, or NULL for any.  The
- * first one is the time, which increases.  Empty cells are gaps, NaN, in the time too; so is nan in the others.
+ * first one increases if it is the time, in "s".  Empty cells are gaps, NaN, in the time too; so is nan in the others.
  * Returns `width` arrays of *rows numbers (0 if the table has only names), one after the other; free it.  Columns after
  * the first one may be missing if `missing` is not NULL: it receives 1 for each of those, which have no array, else 0.
  * NULL and PW_INPUT with file, line and nearest name, or PW_RESOURCE. */

@@ -260,6 +260,19 @@ static pw_range range_select (const pw_range *condition, const pw_range *x, cons
   return r;
 }
 
+/* ---- Functions of paths ---- */
+
+/* At an arc length: x and y change at most as fast as it; a bound of the others is known between two corners alone. */
+static pw_range range_path_at (const pw_expression_code *c, const pw_range *s) {
+  pw_range r = { .lo = -DBL_MAX, .hi = DBL_MAX, .breaks = pw_path_break (c->path, s->lo) <= s->hi };
+  if (range_unbounded (s)) return (pw_range){ .lo = -DBL_MAX, .hi = DBL_MAX, .breaks = 1, .nan = 1 };
+  if (c->index != PW_PATH_X && c->index != PW_PATH_Y) return r;
+  double half = s->hi / 2 - s->lo / 2, middle = pw_expression_apply (c, 0, s->lo + half);
+  pw_range bound = range_rounded (middle - half, middle + half);
+  r.lo = bound.lo, r.hi = bound.hi;
+  return r;
+}
+
 /* ---- Operations ---- */
 
 /* Operations of one or two operands but min and max; only sign and comparisons consider NaN (range_result). */
@@ -279,6 +292,8 @@ static pw_range range_operation (const pw_expression_code *c, const pw_range *x)
   case PW_OP_TAN:
   case PW_OP_FUNCTION_OF_ONE:
     return range_one_argument (&pw_expression_functions[c->index], x);
+  case PW_OP_PATH_AT:
+    return range_path_at (c, x);
   case PW_OP_ADD:
     return range_sum (x, y);
   case PW_OP_SUBTRACT:
@@ -321,6 +336,7 @@ static pw_range range_result (const pw_expression_code *c, const pw_range *x, in
 static pw_range range_apply (const pw_expression_code *c, const pw_range *x, int operands) {
   if (c->op == PW_OP_MIN || c->op == PW_OP_MAX) return (c->op == PW_OP_MIN ? range_min : range_max) (x, x + 1);
   if (c->op == PW_OP_SELECT) return range_select (x, x + 1, x + 2);
+  if (c->op == PW_OP_PATH_NEAREST) return (pw_range){ -DBL_MAX, DBL_MAX, .of_states = 1, .nan = 1 };
   pw_range r = range_result (c, x, operands);
   if (r.lo > r.hi) return r;
   int constant = range_is (&r, r.lo) && c->op != PW_OP_MOD && c->op != PW_OP_ATAN2 && pw_expression_jumps (c->op);
@@ -355,12 +371,19 @@ pw_range pw_expression_range (const pw_expression *expression, const unsigned ch
   return range_run (expression->code, expression->codes, noisy, lo, hi, stack)[-1];
 }
 
-int pw_expression_may_jump (const pw_expression_code *code, int codes) {
+pw_jumps pw_expression_may_jump (const pw_expression_code *code, int codes) {
   pw_range stack[PW_EXPRESSION_STACK];
   const pw_expression_code *last = code + codes - 1;
   int operands = pw_expression_operands (last->op);
+  if (last->op == PW_OP_PATH_NEAREST)
+    return !pw_path_is_smooth (last->path) ? PW_JUMPS
+           : last[-1].op == PW_OP_CONSTANT ? PW_JUMPS_RARELY
+                                           : PW_JUMPS_NEVER;
+  if (last->op == PW_OP_PATH_AT && (last->index < PW_PATH_HEADING || pw_path_is_smooth (last->path)))
+    return last->index == PW_PATH_CURVATURE ? PW_JUMPS_RARELY : PW_JUMPS_NEVER; /* at the ends of an open path */
   const pw_range *top = range_run (code, codes - 1, NULL, -DBL_MAX, DBL_MAX, stack);
-  return pw_expression_jumps (last->op) && range_result (last, top - operands, operands).breaks;
+  if (!pw_expression_jumps (last->op) || !range_result (last, top - operands, operands).breaks) return PW_JUMPS_NEVER;
+  return last->op == PW_OP_ATAN2 ? PW_JUMPS_RARELY : PW_JUMPS;
 }
 
 /* Breakpoints: times at which an expression jumps or has a kink.

@@ -52,7 +52,7 @@ static int read_reference (pw_reader *r) {
   for (int i = 0; i < elements; i++) room += 2 * (size_t)e[i].kind->internal;
   t->eval = reference_eval;
   if (r->y->reference || r->operations > 0) /* expressions may use names, whose values `show` writes */
-    t->names = r->scope->names, t->name = r->scope->name, t->value = r->scope->value;
+    t->names = r->numbers, t->name = r->scope->name, t->value = r->scope->value;
   if (r->y->reference == NULL) return PW_OK;
   t->state = pw_arena_alloc (r->arena, room * sizeof *t->state);
   t->text = pw_arena_alloc (r->arena, room * sizeof *t->text);
@@ -338,8 +338,8 @@ static int head_parameters (pw_yaml *y, const pw_reader *r, const pw_node *list,
 }
 
 static int read_head (pw_yaml *y, const pw_reader *r) {
-  static const char *const key[] = { "pinwheel", "about", "run",    "parameters", "let",     "bodies",
-                                     "elements", "truth", "states", "include",    "outputs", NULL };
+  static const char *const key[] = { "pinwheel", "about",  "run",     "parameters", "let",   "bodies", "elements",
+                                     "truth",    "states", "include", "outputs",    "paths", NULL };
   static const char *const run_key[] = { "t_end", "step", "rtol", "method", NULL };
   const pw_node *v[sizeof key / sizeof *key], *run[sizeof run_key / sizeof *run_key];
   double *number[] = { &y->table.run.t_end, &y->table.run.step, &y->table.run.rtol };
@@ -356,7 +356,7 @@ static int read_head (pw_yaml *y, const pw_reader *r) {
   const pw_node *parameters = v[3];
   /* the key of the reference solution is "truth" */
   y->let = v[4], y->bodies = v[5], y->elements = v[6], y->reference = v[7], y->states = v[8];
-  y->include = v[9], y->outputs = v[10];
+  y->include = v[9], y->outputs = v[10], y->paths = v[11];
   for (int i = 5; key[i]; i++)
     if (i != 7) pw_yaml_list (r, v[i], key[i]);
   for (int i = 3; key[i]; i++) /* from "parameters" on: lists and maps */
@@ -395,6 +395,8 @@ static int build_lists (pw_reader *r, const double *parameter) {
   const pw_yaml *y = r->y;
   for (int i = 0; i < y->parameter_count; i++) pw_scope_add (r->scope, y->table.parameters[i].name, parameter[i]);
   pw_yaml_entries (r, y->let, build_let);
+  r->numbers = r->scope->names;
+  pw_yaml_entries (r, y->paths, pw_yaml_path);
   pw_yaml_entries (r, y->states, index_state);
   pw_yaml_entries (r, y->include, build_include);
   for (int i = 0; y->include && i < r->scope->names && r->error->status == PW_OK; i++)
@@ -427,6 +429,13 @@ static int include_parameters (pw_reader *r, const pw_yaml *file, const pw_node 
   return r->error->status;
 }
 
+/* Adds a path of an included file to the names of the file that includes it. */
+static int include_path (pw_reader *r, pw_scope *outer, const char *name, pw_path *path) {
+  if (pw_scope_reserve (outer, outer->names + 1, r->arena) != PW_OK) return read_no_memory (r);
+  pw_scope_add_path (outer, name, path);
+  return PW_OK;
+}
+
 /* Builds the lists of an included file in the model. */
 static int include_build (pw_reader *r, pw_yaml *file, const pw_node *set, const char *prefix, const pw_place *place) {
   const pw_reader outer = *r;
@@ -440,7 +449,10 @@ static int include_build (pw_reader *r, pw_yaml *file, const pw_node *set, const
   if (r->error->status == PW_OK && include_parameters (r, file, set, value) == PW_OK) {
     r->y = file, r->copies = NULL, r->scope = &scope, r->prefix = prefix, r->place = place;
     build_lists (r, value);
-    r->y = outer.y, r->copies = outer.copies, r->scope = outer.scope, r->prefix = outer.prefix, r->place = outer.place;
+    for (int i = 0; i < scope.names && r->error->status == PW_OK; i++) /* expressions of the outer file may use them */
+      if (scope.path[i]) include_path (r, outer.scope, scope.name[i], scope.path[i]);
+    r->y = outer.y, r->copies = outer.copies, r->scope = outer.scope, r->prefix = outer.prefix, r->place = outer.place,
+    r->numbers = outer.numbers;
     r->has_index = 0; /* elements of the outer file come later */
   }
   pw_scope_close (&scope);

@@ -39,8 +39,8 @@ typedef struct {
   double max_ahead; /* indicators ([ ] { } , :) that libfyaml may read ahead of an event (yaml_tree.c) */
   pw_arena arena;   /* nodes and texts */
   const pw_node *root;
-  const pw_node *bodies, *elements, *states, *let, *reference, *include, *outputs; /* or NULL */
-  int parameter_count;                                                             /* of table.parameters */
+  const pw_node *bodies, *elements, *states, *let, *reference, *include, *outputs, *paths; /* or NULL */
+  int parameter_count;                                                                     /* of table.parameters */
 } pw_yaml;
 
 enum { PW_YAML_DEPTH = 30 /* most lists and maps inside each other */, PW_YAML_FILES = 8 /* most files */ };

@@ -163,12 +163,12 @@ const char *pw_yaml_renamed (const pw_renames *names, const char *text, pw_arena
   char name[PW_EXPRESSION_NAME], to[200];
   size_t size = strlen (text) + 1;
   int changes = 0;
-  for (const char *rest = text; pw_expression_next_name (&rest, name) != NULL;)
+  for (const char *rest = text; pw_expression_next_word (&rest, name) != NULL;)
     if (rename_of (names, name, to)) size += strlen (to), changes++;
   if (changes == 0) return text;
   char *copy = pw_arena_alloc (arena, size), *end = copy;
   const char *from = text;
-  for (const char *rest = text, *p; copy && (p = pw_expression_next_name (&rest, name)) != NULL;) {
+  for (const char *rest = text, *p; copy && (p = pw_expression_next_word (&rest, name)) != NULL;) {
     if (rename_of (names, name, to) == NULL) continue;
     end += sprintf (end, "%.*s%s", (int)(p - from), from, to);
     from = rest;

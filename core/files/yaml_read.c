@@ -87,11 +87,16 @@ int pw_is_state_name (const pw_reader *r, const char *name) {
   return strchr (name, '.') || (r->states.slot && pw_names_find (&r->states, name) >= 0);
 }
 
-/* The first name of the time t or of a state in an expression, or NULL. */
+const char *pw_signal_argument (const pw_reader *r) {
+  return r->kind && r->kind->of_coordinate ? "s" : "t";
+}
+
+/* The first name of the time t, or another argument of a signal, or of a state in an expression, or NULL. */
 static const char *find_variable (const pw_reader *r, const char *text) {
   char name[PW_EXPRESSION_NAME];
   for (const char *rest = text, *p; (p = pw_expression_next_name (&rest, name)) != NULL;)
-    if (strcmp (name, "t") == 0 || pw_is_state_name (r, PW_PRINTED (200, "%s%s", r->prefix ? r->prefix : "", name)))
+    if (strcmp (name, pw_signal_argument (r)) == 0 ||
+        pw_is_state_name (r, PW_PRINTED (200, "%s%s", r->prefix ? r->prefix : "", name)))
       return p;
   return NULL;
 }

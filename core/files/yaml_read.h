@@ -1,7 +1,7 @@
 /* Text models: what the files that read a model from its tree share.
  *
  *   yaml_read.c    keys, lists with their copies, texts, numbers, names
- *   yaml_signal.c  signals and outputs
+ *   yaml_signal.c  signals, paths and outputs
  *   yaml.c         bodies, elements, states; the head; included files
  *
  * After an error, functions with the same reader return its status, and only the first error is recorded: a sequence of
@@ -14,7 +14,7 @@
 #include "yaml.h"
 
 /* Limits of one model, about 1 GB each, so that a small file cannot use all memory: entries of each list, such as
- * bodies, elements, parameters; points of all tables; operations of all expressions; copies of an entry; all entries,
+ * bodies, elements, parameters; points of all tables and paths; operations of all expressions; copies of an entry; all entries,
  * with copies and included files; bytes of texts in copies. */
 enum { PW_MAX_ITEMS = 1000000, PW_MAX_POINTS = 20000000, PW_MAX_OPERATIONS = 30000000 };
 enum { MAX_COPIES = 100000, PW_MAX_ENTRIES = 2000000 };
@@ -23,10 +23,11 @@ enum { PW_MAX_KEYS = 40 /* known keys of a map, and the end of their list */ };
 
 /* A signal or output that is an expression. */
 typedef struct {
-  const pw_expression *expression[3];    /* value, rate, acceleration; NULL: not given, differentiated instead */
-  int derivatives;                       /* required time derivatives; of a force: 0, nonholonomic: 1, holonomic: 2 */
-  int states;                            /* number of states in it */
-  const char *name[PW_OUTPUT_READS + 2]; /* "t", then states, "BODY.phi"; not for evaluation */
+  const pw_expression *expression[3]; /* value, rate, acceleration; NULL: not given, differentiated instead */
+  int derivatives;                    /* required time derivatives; of a force: 0, nonholonomic: 1, holonomic: 2 */
+  int states;                         /* number of states in it */
+  pw_jumps jumps;
+  const char *name[PW_OUTPUT_READS + 2]; /* "t" or "s", then states, "BODY.phi"; not for evaluation */
   pw_signal_text text;
 } pw_signal_function;
 
@@ -61,12 +62,13 @@ typedef struct {
   struct pw_output_function **output; /* outputs so far */
   pw_names outputs;                   /* their names, to their indices */
   int output_count;
+  int numbers; /* names of the scope that are numbers; those of paths follow */
   size_t output_room;
   const pw_kind *kind;   /* of the element being read */
   const pw_field *field; /* of it */
   const char *label;     /* of that field, for messages */
   char *definition;      /* of the element, with all preceding fields */
-  double points;         /* of all tables so far */
+  double points;         /* of all tables and paths so far */
   double operations;     /* of all expressions so far */
   int entries;           /* of all lists so far, and copies of them */
   int has_index;         /* 1: `elements` has those of this file */
@@ -114,6 +116,9 @@ int pw_yaml_text (const pw_reader *r, const pw_node *node, const char *label, co
 
 /* Converts an offset in a scalar's text to one in the source; that of the node if the source spells it otherwise. */
 size_t pw_source_offset (const pw_yaml *y, const pw_node *node, size_t offset);
+
+/* The name of a signal's argument: "t", the time, or "s", the parameter of a curve. */
+const char *pw_signal_argument (const pw_reader *r);
 
 /* Whether a name in the model is that of a state: BODY.phi, or a first-order state. */
 int pw_is_state_name (const pw_reader *r, const char *name);
@@ -173,7 +178,10 @@ int pw_build_fail (const pw_reader *r, const pw_node *node, const pw_error *caus
 /* ---- yaml_signal.c ---- */
 
 int pw_yaml_signal (pw_reader *r, const pw_node *node, pw_signal *signal);
-/* Reads the outputs of the file.  The columns that they read are checked by outputs_add. */
+/* Reads a path, of which the following expressions can use functions. */
+int pw_yaml_path (pw_reader *r, const pw_node *node);
+
+/* Reads the outputs of the file.  The columns that they read are checked by pw_add_outputs. */
 int pw_yaml_outputs (pw_reader *r);
 
 /* Adds the outputs to the model, after all elements. */

@@ -1,4 +1,4 @@
-/* Reads signals and outputs of text models. */
+/* Reads signals, paths and outputs of text models. */
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
@@ -59,8 +59,18 @@ static void *signal_open (void *context) {
   *copy = *f;
   char *at = (char *)(copy + 1);
   for (int i = 0; i < 3; at += bytes[i++])
-    if (f->expression[i]) copy->expression[i] = memcpy (at, f->expression[i], bytes[i]);
+    if (f->expression[i]) {
+      copy->expression[i] = memcpy (at, f->expression[i], bytes[i]);
+      pw_expression_share_paths (copy->expression[i]);
+    }
   return copy;
+}
+
+static void signal_close (void *context) {
+  const pw_signal_function *f = context;
+  for (int i = 0; i < 3; i++)
+    if (f->expression[i]) pw_expression_release_paths (f->expression[i]);
+  free (context);
 }
 
 /* Adds a state, at an offset of the expression, unless it is known already. */
@@ -68,8 +78,9 @@ static int signal_add_state (pw_reader *r, const pw_node *node, pw_signal_functi
   for (int i = 1; i <= f->states; i++)
     if (strcmp (f->name[i], name) == 0) return PW_OK;
   if (f->derivatives > 1 || (f->derivatives && !pw_kind_signals_feedback (r->kind)))
-    return expression_fail (r, node, at, "\"%s\": the signal of a position constraint depends on the time t alone",
-                            name);
+    return expression_fail (r, node, at, "\"%s\": %s alone", name,
+                            r->kind->of_coordinate ? "a curve depends on its parameter s"
+                                                   : "the signal of a position constraint depends on the time t");
   if (pw_check_state_name (r, node, name, at) != PW_OK) return r->error->status;
   if (f->derivatives && pw_is_velocity_name (r, name))
     return expression_fail (r, node, at,
@@ -149,6 +160,7 @@ static int signal_expression (pw_reader *r, const pw_node *written, pw_signal_fu
   const char *source = node->text;
   for (const char *rest = source, *p; (p = pw_expression_next_name (&rest, name)) != NULL;) {
     const int found = pw_names_find (&r->outputs, name);
+    if (strcmp (name, f->name[0]) == 0) continue;
     const pw_output_function *output = found < 0 ? NULL : r->output[found];
     if (!output && pw_is_state_name (r, name) &&
         signal_add_column (r, node, f, NULL, name, (size_t)(p - source)) != PW_OK)
@@ -159,17 +171,16 @@ static int signal_expression (pw_reader *r, const pw_node *written, pw_signal_fu
   }
   if (pw_yaml_expression (r, node, f->name, &f->text.part[i], &f->expression[i]) != PW_OK) return r->error->status;
   const pw_expression *expression = f->expression[i];
+  f->jumps = f->jumps > expression->jumps ? f->jumps : expression->jumps;
   if (expression->jump == NULL || f->text.jump) return PW_OK;
   char *jump = pw_arena_alloc (r->arena, (size_t)expression->jump_size + 1);
   f->text.jump = jump ? memcpy (jump, expression->jump, (size_t)expression->jump_size) : NULL;
   return jump ? PW_OK : read_no_memory (r);
 }
 
-enum { SIGNAL_FAULT = 300 };
-
 /* Compares derivative i, 1 or 2, which is given, with that computed from the last one given before, at some times. */
-static const char *signal_check_derivative (const pw_signal_function *f, int i, const char *name,
-                                            char fault[SIGNAL_FAULT]) {
+static int signal_check_derivative (pw_reader *r, const pw_node *node, const pw_signal_function *f, int i,
+                                    const char *name) {
   static const double time[] = { 0.3, 1.7, 4.1 }; /* [s], arbitrary */
   int last = f->expression[i - 1] ? i - 1 : 0, n = i - last;
   double given[3], exact[3][3], size = 0;
@@ -181,9 +192,9 @@ static const char *signal_check_derivative (const pw_signal_function *f, int i, 
   }
   for (int k = 0; k < 3; k++)
     if (isfinite (given[k]) && isfinite (exact[k][n]) && fabs (given[k] - exact[k][n]) > 1e-6 * size)
-      return pw_print (fault, SIGNAL_FAULT, "the %s at t = %g s is %.6g, but the derivative is %.6g", name, time[k],
-                       given[k], exact[k][n]);
-  return fault;
+      return read_fail (r, node->at, "%s: the %s at %s = %g%s is %.6g, but the derivative is %.6g", r->label, name,
+                        f->name[0], time[k], r->kind->of_coordinate ? "" : " s", given[k], exact[k][n]);
+  return PW_OK;
 }
 
 /* The derivatives at a time; states that the signal reads have irregular values. */
@@ -205,53 +216,57 @@ static double signal_magnitude (const pw_signal_function *f, double t, int i) {
 }
 
 /* Refuses signals that a constraint cannot follow: a jump of the value or, for positions, of its derivative, at one of
- * the first breakpoints after t = 0, beyond round-off and the change between adjacent times; a jump as states change,
- * other than that of an angle by whole turns. */
-static const char *signal_check_continuity (pw_signal_function *f, char fault[SIGNAL_FAULT]) {
-  double t = 0, before[3], after[3];
-  if (f->states && f->text.jump && strncmp (f->text.jump, "atan2", 5) != 0)
-    return pw_print (fault, SIGNAL_FAULT, "%.60s jumps as states change, and that of a velocity constraint must not",
-                     f->text.jump);
+ * the first breakpoints after t = 0, of a curve after s = -1000, beyond round-off and the change between neighbours; a
+ * jump as states change. */
+static int signal_check_continuity (pw_reader *r, const pw_node *node, pw_signal_function *f) {
+  const int is_curve = r->kind->of_coordinate;
+  double t = is_curve ? -1000 : 0, before[3], after[3];
+  if (f->states && f->jumps == PW_JUMPS)
+    return read_fail (r, node->at, "%s: %.60s jumps as states change, and that of a velocity constraint must not",
+                      r->label, f->text.jump);
   for (int k = 0; k < MAX_CHECKED_BREAKPOINTS; k++) {
     t = signal_breakpoint (f, t);
-    if (t == INFINITY) return fault;
+    if (t == INFINITY) return PW_OK;
     double last = nextafter (t, -INFINITY);
     signal_derivatives_at (f, last, before);
     signal_derivatives_at (f, t, after);
     for (int i = 0; i < f->derivatives; i++)
       if (fabs (after[i] - before[i]) >
           1e-9 * signal_magnitude (f, t, i) + 2 * (t - last) * (fabs (after[i + 1]) + fabs (before[i + 1])))
-        return pw_print (fault, SIGNAL_FAULT, "its %s jumps from %.6g to %.6g at t = %.9g s, and that of %s must not",
-                         i ? "rate" : "value", before[i], after[i], t,
-                         f->derivatives > 1 ? "a prescribed position" : "a velocity constraint");
+        return read_fail (r, node->at, "%s: its %s jumps from %.6g to %.6g at %s = %.9g%s, and that of %s must not",
+                          r->label, i ? is_curve ? "derivative" : "rate" : "value", before[i], after[i], f->name[0], t,
+                          is_curve ? "" : " s",
+                          is_curve             ? "a curve"
+                          : f->derivatives > 1 ? "a prescribed position"
+                                               : "a velocity constraint");
   }
-  return fault;
+  return PW_OK;
 }
 
 /* Makes a signal from expressions: value; rate and acceleration, or NULL. */
 static int signal_of_time (pw_reader *r, const pw_node *const node[3], pw_signal *signal) {
   static const char *const key[] = { "expression", "rate", "acceleration" };
-  char fault[SIGNAL_FAULT] = "";
   pw_signal_function *f = pw_arena_alloc (r->arena, sizeof *f);
   if (f == NULL) return read_no_memory (r);
-  f->name[0] = "t";
+  f->name[0] = pw_signal_argument (r);
+  if (r->kind->of_coordinate && pw_names_find (&r->scope->index, "s") >= 0)
+    return read_fail (r, node[0]->at,
+                      "%s: the model has a number \"s\", which is also the parameter of the curve: rename it",
+                      r->label);
   f->derivatives = pw_kind_signals_force (r->kind) ? 0 : r->kind->level == PW_HOLONOMIC ? 2 : 1;
   *signal = (pw_signal){ PW_FUNCTION, .function = { .eval = signal_eval, .context = f, .text = &f->text } };
   signal->function.open = signal_open;
-  signal->function.close = free;
+  signal->function.close = signal_close;
   for (int i = 0; i < 3; i++) {
     if (node[i] == NULL) continue;
     if (signal_expression (r, node[i], f, i) != PW_OK) return r->error->status;
     if (f->expression[i]->breaks) signal->function.breakpoint = signal_breakpoint;
     if (i > 0 && f->derivatives && f->states)
       return read_fail (r, node[i]->at, "%s: a %s belongs to an expression of the time alone", r->label, key[i]);
-    if (i > 0 && !f->states && *signal_check_derivative (f, i, key[i], fault))
-      return read_fail (r, node[i]->at, "%s: %s", r->label, fault);
+    if (i > 0 && !f->states && signal_check_derivative (r, node[i], f, i, key[i]) != PW_OK) return r->error->status;
   }
   if (f->states) signal->function.reads = f->name + 1;
-  if (f->derivatives && *signal_check_continuity (f, fault))
-    return read_fail (r, node[0]->at, "%s: %s", r->label, fault);
-  return PW_OK;
+  return f->derivatives ? signal_check_continuity (r, node[0], f) : PW_OK;
 }
 
 /* ---- Signals ----
@@ -262,25 +277,63 @@ static int signal_of_time (pw_reader *r, const pw_node *const node[3], pw_signal
  *   {table: {points: [[0, 1], [2, 3]]}}            points
  *   {table: {file: M.csv, columns: [t, M]}}        points of a file, by default in columns 1 and 2
  *   {table: {file: M.csv, time: t, columns: [M]}}  the same
- *   "M0 * cos (omega * t)"                         an expression of the time t; in forces also of states: BODY.phi
+ *   "M0 * cos (omega * t)"                         an expression of the time t; in forces also of states: BODY.phi; of
+ *                                                  a curve, of its parameter s
  *   {expression: .., rate: .., acceleration: ..}   the same; in constraints, its time derivatives may be given */
 
-/* Points in the model.  Returns their times, NULL after an error. */
-static double *table_list (pw_reader *r, const pw_node *list, pw_signal *s) {
-  if (pw_yaml_list (r, list, r->label) != PW_OK) return NULL;
+/* Pairs of numbers: the points of a table or a path. */
+typedef struct {
+  double *x, *y;
+  int count, skipped; /* pairs; rows of the file without both numbers */
+} pairs;
+
+static int pairs_list (pw_reader *r, const pw_node *list, const char *form, pairs *p) {
+  if (pw_yaml_list (r, list, r->label) != PW_OK) return r->error->status;
   size_t bytes = (size_t)list->count * sizeof (double);
-  double *t = pw_arena_alloc (r->arena, bytes), *value = pw_arena_alloc (r->arena, bytes);
-  if (t == NULL || value == NULL) return read_no_memory (r), NULL;
-  s->table.t = t;
-  s->table.value = value;
-  for (const pw_node *n = list->first; n; n = n->next) {
-    double point[2] = { 0 };
-    const char *label = PW_PRINTED (240, "%s: point %d", r->label, s->table.count + 1);
-    if (pw_yaml_pair (r, n, label, "numbers, [time, value]", point) != PW_OK) return NULL;
-    t[s->table.count] = point[0];
-    value[s->table.count++] = point[1];
+  p->x = pw_arena_alloc (r->arena, bytes), p->y = pw_arena_alloc (r->arena, bytes);
+  if (p->x == NULL || p->y == NULL) return read_no_memory (r);
+  for (const pw_node *n = list->first; n; n = n->next, p->count++) {
+    double pair[2] = { 0 };
+    const char *label = PW_PRINTED (240, "%s: point %d", r->label, p->count + 1);
+    if (pw_yaml_pair (r, n, label, form, pair) != PW_OK) return r->error->status;
+    p->x[p->count] = pair[0], p->y[p->count] = pair[1];
   }
-  return t;
+  return PW_OK;
+}
+
+/* Pairs in two columns of a file, NULL: the first and the second one, converted to these units. */
+static int pairs_file (pw_reader *r, const pw_node *node, const char *const column[2], const char *const unit[2],
+                       pairs *p) {
+  char path[PW_PATH], from_model[PW_PATH];
+  const char *name, *reason;
+  pw_error cause = { 0 };
+  int rows;
+  if (pw_yaml_text (r, node, r->label, &name) != PW_OK) return r->error->status;
+  errno = 0;
+  FILE *f = pw_yaml_find (r->y, node->at, name, path, from_model, &reason) ? pw_open_input (path, &reason) : NULL;
+  if (f == NULL && pw_open_input_status () == PW_RESOURCE)
+    return pw_fail (r->error, PW_RESOURCE, "%s: cannot read %s: %s", r->y->path, name, reason);
+  if (f == NULL) return read_fail (r, node->at, "%s: cannot read \"%.60s\": %s", r->label, name, reason);
+  double *x = pw_columns_from_stream (f, name, column, unit, 2, PW_GAPS_REFUSED, NULL, &rows, &cause);
+  fclose (f);
+  if (cause.status == PW_INPUT) return read_fail (r, node->at, "%s: %s", r->label, cause.text);
+  if (x == NULL || pw_model_keep (r->model, x, free) != PW_OK) return read_no_memory (r);
+  *p = (pairs){ x, x + rows, 0, 0 };
+  for (int i = 0; i < rows; i++) {
+    if (isnan (x[i]) || isnan (p->y[i])) continue;
+    x[p->count] = x[i], p->y[p->count++] = p->y[i];
+  }
+  p->skipped = rows - p->count;
+  return PW_OK;
+}
+
+/* Limits the pairs of all tables and paths together: many may read the same large file.  A point of a path, with its
+ * cubics, needs the memory of `weight` points of a table. */
+static int pairs_count (pw_reader *r, const pw_node *node, const pairs *p, int weight) {
+  r->points += (double)weight * p->count;
+  if (r->error->status != PW_OK || r->points <= PW_MAX_POINTS) return r->error->status;
+  return read_fail (r, node->at, "%s: the tables up to here have more than %d points, the limit for a model%s",
+                    r->label, PW_MAX_POINTS, weight > 1 ? "; one of a path counts as 8" : "");
 }
 
 /* The unit of the current field.  Only a drive has "m or rad"; the choice before this field decides. */
@@ -309,57 +362,30 @@ static int table_columns (pw_reader *r, const pw_node *columns, const pw_node *t
   return pw_yaml_text (r, time ? NULL : first, label, &column[0]);
 }
 
-/* Points in two columns of a file; rows without a time or value are left out.  Returns the times, or NULL. */
-static double *table_file (pw_reader *r, const pw_node *node, const pw_node *columns, const pw_node *time,
-                           pw_signal *s) {
-  char path[PW_PATH], from_model[PW_PATH];
-  const char *name, *reason, *column[2], *const unit[2] = { "s", table_unit (r) };
-  pw_error cause = { 0 };
-  int rows;
-  if (table_columns (r, columns, time, column) != PW_OK || pw_yaml_text (r, node, r->label, &name) != PW_OK)
-    return NULL;
-  errno = 0;
-  FILE *f = pw_yaml_find (r->y, node->at, name, path, from_model, &reason) ? pw_open_input (path, &reason) : NULL;
-  if (f == NULL && pw_open_input_status () == PW_RESOURCE)
-    return pw_fail (r->error, PW_RESOURCE, "%s: cannot read %s: %s", r->y->path, name, reason), NULL;
-  if (f == NULL) return read_fail (r, node->at, "%s: cannot read \"%.60s\": %s", r->label, name, reason), NULL;
-  double *t = pw_columns_from_stream (f, name, column, unit, 2, PW_GAPS_REFUSED, NULL, &rows, &cause);
-  fclose (f);
-  if (cause.status == PW_INPUT) return read_fail (r, node->at, "%s: %s", r->label, cause.text), NULL;
-  if (t == NULL || pw_model_keep (r->model, t, free) != PW_OK) return read_no_memory (r), NULL;
-  double *value = t + rows;
-  int count = 0;
-  for (int i = 0; i < rows; i++) {
-    if (isnan (t[i]) || isnan (value[i])) continue;
-    t[count] = t[i];
-    value[count++] = value[i];
-  }
-  s->table.t = t, s->table.value = value, s->table.count = count, s->table.skipped = rows - count;
-  return t;
-}
-
 /* Besides the fields of the form. */
 static const char *const table_keys[] = { "points", "file", "columns", "time", "time_scale", "time_offset" };
 enum { TABLE_KEYS = sizeof table_keys / sizeof *table_keys };
 
 /* Reads points or columns of a file; the times become time_offset + time_scale t, where whole numbers of ms since an
- * epoch stay exact.  Limits the points of all tables together: many may read the same large file. */
+ * epoch stay exact. */
 static int table_points (pw_reader *r, const pw_node *node, const pw_node *const v[TABLE_KEYS], pw_signal *s) {
   const pw_node *points = v[0], *file = v[1], *columns = v[2], *time = v[3]; /* as table_keys */
   double scale = 1, offset = 0;
+  const char *column[2];
+  pairs p = { .count = 0 };
   if ((points != NULL) == (file != NULL))
     return read_fail (r, node->at, "%s: a table has either points or a file", r->label);
   if (points && columns) return read_fail (r, columns->at, "%s: columns belong to a file", r->label);
   if (points && time) return read_fail (r, time->at, "%s: a column of times belongs to a file", r->label);
-  double *t = points ? table_list (r, points, s) : table_file (r, file, columns, time, s);
-  if (t == NULL) return r->error->status;
+  if (points)
+    pairs_list (r, points, "numbers, [time, value]", &p);
+  else if (table_columns (r, columns, time, column) == PW_OK)
+    pairs_file (r, file, column, (const char *const[2]){ "s", table_unit (r) }, &p);
   pw_yaml_number (r, v[4], PW_PRINTED (240, "%s: time_scale", r->label), PW_POSITIVE, &scale);
   pw_yaml_number (r, v[5], PW_PRINTED (240, "%s: time_offset", r->label), PW_REAL, &offset);
-  for (int i = 0; i < s->table.count; i++) t[i] = scale * (t[i] + offset / scale);
-  r->points += s->table.count;
-  if (r->error->status != PW_OK || r->points <= PW_MAX_POINTS) return r->error->status;
-  return read_fail (r, node->at, "%s: the tables up to here have more than %d points, the limit for a model", r->label,
-                    PW_MAX_POINTS);
+  for (int i = 0; i < p.count && r->error->status == PW_OK; i++) p.x[i] = scale * (p.x[i] + offset / scale);
+  s->table.t = p.x, s->table.value = p.y, s->table.count = p.count, s->table.skipped = p.skipped;
+  return pairs_count (r, node, &p, 1);
 }
 
 /* Reads the fields of a form, except a table's points; value: of each, or NULL. */
@@ -434,6 +460,71 @@ int pw_yaml_signal (pw_reader *r, const pw_node *node, pw_signal *signal) {
   return pw_yaml_number (r, node, r->label, PW_REAL, &signal->constant);
 }
 
+/* ---- Paths ---- */
+
+static void path_free (void *path) {
+  pw_path_close (path);
+}
+
+/* Reads the points of a path, and its columns in a file. */
+static int path_points (pw_reader *r, const pw_node *node, const pw_node *points, const pw_node *file,
+                        const pw_node *columns, pairs *p) {
+  const char *column[2] = { NULL, NULL };
+  if ((points != NULL) == (file != NULL))
+    return read_fail (r, node->at, "%s: a path has either points or a file", r->label);
+  if (points && columns) return read_fail (r, columns->at, "%s: columns belong to a file", r->label);
+  if (points && pairs_list (r, points, "numbers, [x, y]", p) != PW_OK) return r->error->status;
+  if (pw_yaml_list_of (r, columns, r->label, 2, "columns, [x, y]") != PW_OK) return r->error->status;
+  pw_yaml_text (r, columns ? columns->first : NULL, r->label, &column[0]);
+  pw_yaml_text (r, columns ? columns->first->next : NULL, r->label, &column[1]);
+  if (file && r->error->status == PW_OK) pairs_file (r, file, column, (const char *const[2]){ "m", "m" }, p);
+  if (r->error->status == PW_OK && p->skipped > 0)
+    return read_fail (r, file->at, "%s: %d rows have no x or no y; a path has no gaps", r->label, p->skipped);
+  return pairs_count (r, node, p, 8);
+}
+
+/* Room for another path in the texts of the model, or NULL. */
+static pw_path_text *path_add (pw_reader *r) {
+  pw_reference_text *t = r->reference;
+  if ((t->paths & (t->paths - 1)) == 0) { /* a power of two fills the array */
+    pw_path_text *more = pw_arena_alloc (r->arena, 2 * ((size_t)t->paths + 1) * sizeof *more);
+    if (more && t->paths) memcpy (more, t->path, (size_t)t->paths * sizeof *more);
+    t->path = more;
+  }
+  return t->path ? &t->path[t->paths] : NULL;
+}
+
+int pw_yaml_path (pw_reader *r, const pw_node *node) {
+  static const char *const key[] = { "name", "points", "file", "columns", "interpolation", "closed", NULL };
+  static const char *const interpolation[] = { [PW_LINEAR] = "linear", [PW_CUBIC] = "cubic", NULL };
+  static const char *const closed[] = { "false", "true", NULL };
+  const pw_node *v[sizeof key / sizeof *key];
+  const char *own;
+  pw_path_text *text = path_add (r);
+  pairs p = { .count = 0 };
+  pw_error cause = { 0 };
+  if (pw_yaml_keys (r, node, key, "a path", v) != PW_OK) return r->error->status;
+  if (v[0] == NULL) return read_fail (r, node->at, "a path needs a name");
+  if (text == NULL) return read_no_memory (r);
+  if (pw_build_name (r, v[0], "path", &text->name) != PW_OK || pw_yaml_name (r, v[0], "path", &own) != PW_OK)
+    return r->error->status;
+  if (pw_names_find (&r->scope->index, own) >= 0)
+    return read_fail (r, v[0]->at, "path \"%s\": a parameter or number of let has this name", own);
+  const char *label = r->label = PW_PRINTED (100, "path %s", text->name);
+  path_points (r, node, v[1], v[2], v[3], &p);
+  pw_yaml_choice (r, v[4], PW_PRINTED (140, "%s: interpolation", label), interpolation, &text->interpolation);
+  pw_yaml_choice (r, v[5], PW_PRINTED (140, "%s: closed", label), closed, &text->closed);
+  if (r->error->status != PW_OK) return r->error->status;
+  text->x = p.x, text->y = p.y, text->count = p.count;
+  pw_path *path = pw_path_open (p.x, p.y, p.count, text->interpolation, text->closed, &cause);
+  if (cause.status == PW_INPUT) return read_fail (r, (v[1] ? v[1] : v[2])->at, "%s: %s", label, cause.text);
+  if (path == NULL || pw_model_keep (r->model, path, path_free) != PW_OK) return read_no_memory (r);
+  if (pw_scope_reserve (r->scope, r->scope->names + 1, r->arena) != PW_OK) return read_no_memory (r);
+  pw_scope_add_path (r->scope, text->name, path);
+  r->reference->paths++;
+  return PW_OK;
+}
+
 /* ---- Outputs ---- */
 
 /* Outputs are displayed in SI units, like all columns. */
@@ -471,7 +562,7 @@ static int output_head (pw_reader *r, const pw_node *node) {
   if ((o->node.text = pw_yaml_renamed (&counter, v[1]->text, r->arena)) == NULL) return read_no_memory (r);
   o->reader = PW_OUTPUT_UNREAD;
   o->function.name[0] = "t";
-  o->output.value = (pw_function){ signal_eval, o, NULL, NULL, signal_open, free, &o->function.text };
+  o->output.value = (pw_function){ signal_eval, o, NULL, NULL, signal_open, signal_close, &o->function.text };
   pw_names_add (&r->outputs, o->output.name, r->output_count);
   r->output[r->output_count++] = o;
   if (output_unit (r, v[2], &o->output.unit) != PW_OK) return r->error->status;

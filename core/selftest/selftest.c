@@ -685,10 +685,10 @@ static char *differences_name (const pw_kind *kind, int block, char *buffer, siz
   return pw_print (buffer, size, "%s of element type %s", selftest_block_name[block], kind->name);
 }
 
-/* "" after the last one.  PW_JTL_Q is not counted: a type gives it by jw_q. */
+/* "" after the last one.  PW_JTL_Q is not counted, a type gives it by jw_q; nor are those of built-in types. */
 char *pw_system_difference_name (const pw_system *s, int i, char *buffer, size_t size) {
   for (const pw_element_batch *k = s->batch; k < s->batch + s->batches; k++)
-    for (int block = 0; block < PW_BLOCKS; block++)
+    for (int block = 0; block < PW_BLOCKS && !pw_kind_is_built_in (k->kind); block++)
       if (block != PW_JTL_Q && pw_block_function (k->kind, (pw_block)block) == pw_by_differences && i-- == 0)
         return differences_name (k->kind, block, buffer, size);
   return pw_print (buffer, size, "%s", "");

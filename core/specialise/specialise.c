@@ -649,10 +649,12 @@ static void specialise_elements (const generator *gen) {
 
 /* ---- Signals, data of a run ---- */
 
-/* 1 if all signals are constant or harmonic, which generated code evaluates itself. */
+/* 1 if all signals are constants or harmonics of time, which generated code evaluates itself. */
 static int specialise_is_simple (const pw_system *s) {
   for (int i = 0; i < s->sources; i++)
-    if (s->source[i].signal.type != PW_CONSTANT && s->source[i].signal.type != PW_HARMONIC) return 0;
+    if (s->source[i].of_coordinate ||
+        (s->source[i].signal.type != PW_CONSTANT && s->source[i].signal.type != PW_HARMONIC))
+      return 0;
   return 1;
 }
 

@@ -228,14 +228,23 @@ static void kinematics_feedback_rates (pw_workspace *w, const double *v) {
   }
 }
 
+/* Evaluates a function of the coordinate that it reads. */
+static int kinematics_of_coordinate (const pw_source *source) {
+  int status = pw_signal_eval (source, source->x[0]);
+  source->x[1] = source->u[1];
+  return status;
+}
+
 int pw_update_signals (pw_workspace *w, double t, const double *q, const double *v) {
   int new_time = t != w->t_signal && !isnan (t); /* NaN: pw_update_velocities, after a failure */
   if (!new_time && w->s->state_dependent == 0) return PW_OK;
   if (new_time) w->t_signal = NAN; /* if a signal fails, others have changed already */
   for (pw_source *source = w->source, *end = source + w->s->sources; source < end; source++) {
     if (source->held) continue;
-    if (kinematics_copy_states (w, source, q, v) == 0 && !(new_time && source->reads == 0)) continue;
-    if (pw_signal_eval (source, t) == 0) continue;
+    const int copied = kinematics_copy_states (w, source, q, v);
+    if (copied == 0 && !(new_time && source->reads == 0)) continue;
+    if ((copied && source->of_coordinate ? kinematics_of_coordinate (source) : pw_signal_eval (source, t)) == 0)
+      continue;
     w->failed = source;
     return PW_METHOD;
   }
@@ -260,7 +269,9 @@ int pw_update_velocities (pw_workspace *w, const double *v) {
 void pw_hold_signals (pw_workspace *w, pw_hold hold) {
   const pw_source *rates = pw_rate_source (w, w->s->mechanical);
   for (pw_source *source = w->source, *end = source + w->s->sources; source < end; source++)
-    source->held = hold >= (source >= rates ? PW_HOLD_FORCES : source->of_force ? PW_HOLD_INPUTS : PW_HOLD_ALL);
+    source->held = !source->of_coordinate && hold >= (source >= rates    ? PW_HOLD_FORCES
+                                                      : source->of_force ? PW_HOLD_INPUTS
+                                                                         : PW_HOLD_ALL);
   w->hold = hold;
   w->t_signal = NAN;
 }
@@ -268,6 +279,7 @@ void pw_hold_signals (pw_workspace *w, pw_hold hold) {
 double pw_next_breakpoint (pw_workspace *w, int kinks, double t) {
   double next = INFINITY;
   for (const pw_source *source = w->source, *end = source + w->s->sources; source < end; source++) {
+    if (source->of_coordinate) continue;
     double breakpoint = pw_signal_breakpoint (&source->signal, kinks && !source->of_force, t);
     if (breakpoint < next) next = breakpoint;
     if (breakpoint > t) continue;
@@ -315,6 +327,8 @@ typedef struct {
   int body[PW_MAX_BODIES];
   pw_configuration configuration[PW_MAX_BODIES];
   double q[PW_MAX_INTERNAL], v[PW_MAX_INTERNAL];
+  const pw_source *source;      /* of its signals */
+  double u[3 * PW_MAX_SIGNALS]; /* those of an internal coordinate */
 } blocks_single;
 
 static void blocks_isolate (const pw_element_batch *k, int e, blocks_single *one) {
@@ -335,6 +349,7 @@ static void blocks_isolate (const pw_element_batch *k, int e, blocks_single *one
   one->b.q = one->q;
   one->b.v = one->v;
   one->b.u = k->b.u + 3 * e * kind->signals;
+  one->source = k->source + e * kind->signals;
   if (k->b.w) one->b.w = k->b.w + e * k->b.cols;
   if (k->b.lambda) one->b.lambda = k->b.lambda + e * kind->rows;
 }
@@ -355,6 +370,11 @@ static void blocks_value (const pw_kind *kind, pw_block block, blocks_single *on
   for (int n = 0; n < kind->bodies; n++) {
     pw_configuration *p = &one->configuration[n];
     pw_sin_cos (p->phi, &p->sin, &p->cos);
+  }
+  for (int n = 0; kind->of_coordinate && n < kind->signals; n++) {
+    pw_source moved = one->source[n];
+    moved.u = one->u + 3 * n, one->b.u = one->u;
+    (void)pw_signal_eval (&moved, one->q[0]); /* fails where the signal itself does */
   }
   if (original == NULL) return;
   if (blocks_table[block].product == BLOCKS_NONE) {

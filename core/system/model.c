@@ -88,6 +88,8 @@ static const char *fault_functions (const pw_kind *kind) {
                                        kind->contact, kind->saturation, kind->J_u,    kind->eta_u, kind->gamma_u };
   for (size_t i = 0; i < sizeof exact / sizeof *exact; i++)
     if (exact[i] == PW_BY_DIFFERENCES) return "PW_BY_DIFFERENCES is permitted only for second-order blocks";
+  if (kind->of_coordinate && (kind->internal == 0 || kind->rows == 0 || kind->force_u))
+    return "signals of an internal coordinate, but no internal coordinate, no constraint equations, or force_u";
   if (kind->constant && (kind->force == NULL || kind->signals > 0))
     return "declared constant, but it has no force, or has signals";
   if (kind->signals > 0 && kind->rows == 0 && kind->force && kind->force_u == NULL)
@@ -116,7 +118,7 @@ static const char *fault_names (const pw_kind *kind) {
     if (!q || !q->name || !q->rate || !q->unit) return "internal coordinates without name, rate or unit";
     if (is_bad_text (q->name) || is_bad_text (q->rate) || is_bad_text (q->unit))
       return "name or unit of an internal coordinate" FAULT_TEXT;
-    if (strcmp (q->unit, "rad") != 0) return "an internal coordinate whose unit is not rad";
+    if (strcmp (q->unit, "rad") != 0 && *q->unit) return "an internal coordinate whose unit is neither rad nor none";
     name[names++] = q->name, name[names++] = q->rate;
   }
   for (int i = 0; i < names; i++)
@@ -142,11 +144,6 @@ const char *pw_kind_check (const pw_kind *kind, char *buffer, size_t size) {
   const char *fault = fault_names (kind);
   if (*fault == 0) fault = fault_fields (kind, buffer, size);
   return *fault ? fault : fault_functions (kind);
-}
-
-void pw_by_differences (const pw_batch *b, double *out) {
-  (void)b; /* only its address is used */
-  (void)out;
 }
 
 /* ---- Checks of plug-ins, bodies and elements ---- */

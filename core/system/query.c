@@ -38,7 +38,7 @@ int pw_system_jumps (const pw_system *s, double t) {
   const double near = 8 * DBL_EPSILON * fmax (fabs (t), 1); /* round-off of sums of steps, also near 0 */
   /* signals of forces count only if their values may jump: their derivatives are not used */
   for (const pw_source *source = s->source, *end = source + s->sources; source < end; source++)
-    if (!source->of_force || pw_signal_value_may_jump (&source->signal))
+    if (!source->of_coordinate && (!source->of_force || pw_signal_value_may_jump (&source->signal)))
       if (pw_signal_breakpoint (&source->signal, 0, t - near) <= t + near) return 1;
   return 0;
 }
@@ -80,9 +80,12 @@ char *pw_system_state_name (const pw_system *s, int state, char *buffer, size_t 
 }
 
 const char *pw_system_state_unit (const pw_system *s, int state) {
-  int velocity = state >= s->coords, j = velocity ? state - s->coords : state;
+  int velocity = state >= s->coords, j = velocity ? state - s->coords : state, e, n;
   if (j >= s->mechanical) return velocity ? s->state_unit[2 * (j - s->mechanical)] : "";
-  return query_units[3 * velocity + (j < 3 * s->bodies ? j % 3 : 2)]; /* internal coordinates are angles, like phi */
+  if (j < 3 * s->bodies) return query_units[3 * velocity + j % 3];
+  const pw_element_batch *k = query_find_element (s, offsetof (pw_kind, internal), j - 3 * s->bodies, &e, &n);
+  const char *unit = k->kind->coordinate[n].unit;
+  return !velocity ? unit : *unit ? "rad/s" : "1/s";
 }
 
 /* Index of a state named like "BODY.x", or -1; if only the body exists, near->best becomes its nearest state.  The
@@ -401,7 +404,7 @@ char *pw_system_table_notice (const pw_system *s, int signal, double t_end, char
   const pw_points *table = &s->source[signal].signal.table;
   char coverage[300] = "", skipped[80] = "";
   *buffer = 0;
-  if (s->source[signal].signal.type != PW_TABLE || !(t_end > 0)) return buffer;
+  if (s->source[signal].signal.type != PW_TABLE || s->source[signal].of_coordinate || !(t_end > 0)) return buffer;
   query_coverage (table, t_end, coverage, sizeof coverage);
   if (table->skipped)
     snprintf (skipped, sizeof skipped, "%d row%s with empty cells %s left out of the table", table->skipped,
@@ -425,7 +428,9 @@ int pw_fail_evaluation (const pw_workspace *w, double t, pw_error *error) {
 int pw_system_may_jump (const pw_system *s) {
   for (int i = 0; i < s->batches; i++)
     if (!pw_kind_is_built_in (s->batch[i].kind)) return 1;
-  return s->state_dependent > 0;
+  for (int i = 0; i < s->sources; i++)
+    if (s->source[i].reads > 0 && !s->source[i].of_coordinate) return 1;
+  return 0;
 }
 
 /* ---- Reference solution ---- */

@@ -328,9 +328,8 @@ static void form_check_continuity (const pw_signal *s, const pw_kind *kind, char
   if (form == NULL || pw_kind_signals_force (kind)) return;
   if (kind->level == PW_HOLONOMIC)
     snprintf (text, size,
-              "%s has %s, and a prescribed position must not: use a smooth-step, a cubic table with ends at rest, a "
-              "harmonic",
-              form, jumps ? "jumps" : "kinks");
+              "%s has %s, and a %s must not: use a smooth-step, a cubic table with ends at rest, a harmonic", form,
+              jumps ? "jumps" : "kinks", kind->of_coordinate ? "curve" : "prescribed position");
   else if (jumps)
     snprintf (text, size, "%s jumps, and the signal of a velocity constraint must not: use a ramp or smooth-step",
               form);

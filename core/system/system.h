@@ -12,15 +12,16 @@
 /* A signal of one element, and the states it reads. */
 typedef struct {
   pw_signal signal;
-  int reads;        /* number of states a function signal reads */
-  const int *state; /* their indices: coordinate j, or coordinates + j for a velocity */
-  double *x;        /* 2 reads: values of these states, then the gradient if it is needed */
-  double *spline;   /* of a table: see pw_table_spline */
-  double *u;        /* 3: receives value, first and second time derivative; x, u: NULL except in a workspace */
-  int of_force;     /* 1: belongs to a force, which needs no derivatives */
-  int held;         /* 1: keeps its value (pw_hold_signals) */
-  int gradient;     /* 1: the gradient is needed: of feedback, and where implicit methods or linearisations need it */
-  int feedback;     /* 1: belongs to a velocity constraint and reads states; u[2]: its partial derivative by the time */
+  int reads;         /* number of states a function signal reads */
+  const int *state;  /* their indices: coordinate j, or coordinates + j for a velocity */
+  double *x;         /* 2 reads: values of these states, then the gradient if it is needed */
+  double *spline;    /* of a table: see pw_table_spline */
+  double *u;         /* 3: receives value, first and second time derivative; x, u: NULL except in a workspace */
+  int of_force;      /* 1: belongs to a force, which needs no derivatives */
+  int of_coordinate; /* 1: a function of the coordinate that it reads, not of the time */
+  int held;          /* 1: keeps its value (pw_hold_signals) */
+  int gradient;      /* 1: the gradient is needed: of feedback, and where implicit methods or linearisations need it */
+  int feedback; /* 1: belongs to a velocity constraint and reads states; u[2]: its partial derivative by the time */
 } pw_source;
 
 /* One element type in use: its batch, and the indices of its constraint equations and coordinates.  What a run modifies
@@ -62,7 +63,7 @@ struct pw_system {
   int forces;              /* batches with a force that is not constant */
   int saturates;           /* 1: some of these have a function `saturation` */
   int sources;             /* signals */
-  int state_dependent;     /* signals that depend on states */
+  int state_dependent;     /* signals that depend on states or on an internal coordinate */
   int feedback;            /* those of them that belong to velocity constraints */
   int reads;               /* number of states that they read, with repetitions */
   size_t jacobian;         /* entries of J of all elements, zeros included */
@@ -171,9 +172,9 @@ void pw_close_outputs (const pw_compiled_output *output, int count);
 
 /* ---- Signals ---- */
 
-/* Stores value, first and second time derivative at time t in source->u; of a force's signal the derivatives are
- * meaningless.  source->x: the states that a function reads.  Returns non-zero if the user's function does so or
- * computes values that are not finite. */
+/* Stores value, first and second derivative at time t, or another argument, in source->u; of a force's signal the
+ * derivatives are meaningless.  source->x: the states that a function reads.  Returns non-zero if the user's function
+ * does so or computes values that are not finite. */
 int pw_signal_eval (const pw_source *source, double t);
 
 /* The first time after t at which the signal, its first or its second derivative jumps, or a smooth-step starts or

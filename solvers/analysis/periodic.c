@@ -69,7 +69,7 @@ static double common_period (double a, double b) {
 double pw_system_period (const pw_system *s) {
   double period = 0;
   for (int k = 0; k < s->batches; k++)
-    for (int i = 0; i < s->batch[k].b.count * s->batch[k].kind->signals; i++)
+    for (int i = 0; !s->batch[k].kind->of_coordinate && i < s->batch[k].b.count * s->batch[k].kind->signals; i++)
       period = common_period (period, signal_period (&s->batch[k].source[i].signal));
   return period;
 }

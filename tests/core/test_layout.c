@@ -27,7 +27,8 @@ LAYOUT (pw_quantity, 32);
 LAYOUT (pw_internal, 32);
 LAYOUT (pw_configuration, 64);
 LAYOUT (pw_batch, 72);
-LAYOUT (pw_kind, 280);
+LAYOUT (pw_kind, 288);
+LAYOUT (pw_path_place, 88);
 
 LAYOUT_AT (pw_error, text, 4);
 LAYOUT_AT (pw_signal, constant, 8);
@@ -96,32 +97,33 @@ LAYOUT_AT (pw_kind, each_body, 56);
 LAYOUT_AT (pw_kind, constant, 60);
 LAYOUT_AT (pw_kind, level, 64);
 LAYOUT_AT (pw_kind, first_order, 68);
-LAYOUT_AT (pw_kind, reaction, 72);
-LAYOUT_AT (pw_kind, coordinate, 80);
-LAYOUT_AT (pw_kind, reaction_unit, 88);
-LAYOUT_AT (pw_kind, prepare, 96);
-LAYOUT_AT (pw_kind, g, 104);
-LAYOUT_AT (pw_kind, g_size, 112);
-LAYOUT_AT (pw_kind, eta, 120);
-LAYOUT_AT (pw_kind, J, 128);
-LAYOUT_AT (pw_kind, gamma, 136);
-LAYOUT_AT (pw_kind, force, 144);
-LAYOUT_AT (pw_kind, force_u, 152);
-LAYOUT_AT (pw_kind, jw_q, 160);
-LAYOUT_AT (pw_kind, eta_q, 168);
-LAYOUT_AT (pw_kind, gamma_q, 176);
-LAYOUT_AT (pw_kind, gamma_v, 184);
-LAYOUT_AT (pw_kind, J_u, 192);
-LAYOUT_AT (pw_kind, eta_u, 200);
-LAYOUT_AT (pw_kind, gamma_u, 208);
-LAYOUT_AT (pw_kind, force_q, 216);
-LAYOUT_AT (pw_kind, force_v, 224);
-LAYOUT_AT (pw_kind, energy, 232);
-LAYOUT_AT (pw_kind, power, 240);
-LAYOUT_AT (pw_kind, loss, 248);
-LAYOUT_AT (pw_kind, contact, 256);
-LAYOUT_AT (pw_kind, saturation, 264);
-LAYOUT_AT (pw_kind, symbol, 272);
+LAYOUT_AT (pw_kind, of_coordinate, 72);
+LAYOUT_AT (pw_kind, reaction, 80);
+LAYOUT_AT (pw_kind, coordinate, 88);
+LAYOUT_AT (pw_kind, reaction_unit, 96);
+LAYOUT_AT (pw_kind, prepare, 104);
+LAYOUT_AT (pw_kind, g, 112);
+LAYOUT_AT (pw_kind, g_size, 120);
+LAYOUT_AT (pw_kind, eta, 128);
+LAYOUT_AT (pw_kind, J, 136);
+LAYOUT_AT (pw_kind, gamma, 144);
+LAYOUT_AT (pw_kind, force, 152);
+LAYOUT_AT (pw_kind, force_u, 160);
+LAYOUT_AT (pw_kind, jw_q, 168);
+LAYOUT_AT (pw_kind, eta_q, 176);
+LAYOUT_AT (pw_kind, gamma_q, 184);
+LAYOUT_AT (pw_kind, gamma_v, 192);
+LAYOUT_AT (pw_kind, J_u, 200);
+LAYOUT_AT (pw_kind, eta_u, 208);
+LAYOUT_AT (pw_kind, gamma_u, 216);
+LAYOUT_AT (pw_kind, force_q, 224);
+LAYOUT_AT (pw_kind, force_v, 232);
+LAYOUT_AT (pw_kind, energy, 240);
+LAYOUT_AT (pw_kind, power, 248);
+LAYOUT_AT (pw_kind, loss, 256);
+LAYOUT_AT (pw_kind, contact, 264);
+LAYOUT_AT (pw_kind, saturation, 272);
+LAYOUT_AT (pw_kind, symbol, 280);
 
 LAYOUT_VALUE (PW_CONSTANT, 0);
 LAYOUT_VALUE (PW_HARMONIC, 1);
@@ -184,9 +186,9 @@ TEST (definitions) {
     { "spring", 0x80a9821575f7667f },        { "rotational-spring", 0x3c20ed7f38c90acc },
     { "friction", 0xebebc50a8771ab1e },      { "sliding-friction", 0x4722a2a44a1119a6 },
     { "drag", 0x79bea784c473bb98 },          { "gravity", 0xed353e1dda5787ff },
-    { "force", 0xbc29b0bbfe5b6a71 },         { "torque", 0xc52ae040b1e51021 },
-    { "motor", 0x4b2d8f0773cca89 },          { "state", 0x10002b44038fb8b8 },
-    { "marker", 0xa45ad3f1c6e75b4a },
+    { "force", 0xbc29b0bbfe5b6a71 },         { "on-curve", 0xfe042b77d6a55c2d },
+    { "torque", 0xc52ae040b1e51021 },        { "motor", 0x4b2d8f0773cca89 },
+    { "state", 0x10002b44038fb8b8 },         { "marker", 0xa45ad3f1c6e75b4a },
   };
   int bad = 0;
   for (const pw_kind *const *k = pw_kinds; *k; k++) {

@@ -212,7 +212,7 @@ TEST (bad_internal) {
   BAD (": flywheel f: inertia of turn = nan: expected a finite number",
        pw_add (m, &kind, &(messages_chooser){ "f", "frame", 2 }));
   kind.coordinate = length;
-  BAD (": element type flywheel: an internal coordinate whose unit is not rad",
+  BAD (": element type flywheel: an internal coordinate whose unit is neither rad nor none",
        pw_add (m, &kind, &(messages_chooser){ "f", "frame", 0 }));
   kind.coordinate = angle;
   pw_error error = { 0 };

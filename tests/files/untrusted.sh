@@ -39,6 +39,10 @@ sum=$(across 1900 '+t')
 { echo "$body"; echo 'elements:'
   many 300 '  - {torque: t%d, body: [a, ground], value: {table: {file: table.csv, columns: [t, v]}}}'; } |
   refused 'a table read again and again' 'have more than 20000000 points'
+{ echo 'paths:'; many 300 '  - {name: p%d, file: table.csv}'; } | refused 'a path read again and again' \
+  'have more than 20000000 points'
+many 1000001 '%d,%d' >table.csv
+echo 'paths: [{name: p, file: table.csv}]' | refused 'a path of a million points' '1000001 points; a path may have 1000000'
 many 4000001 '%d,%d' >table.csv
 signal '{table: {file: table.csv}}' | refused 'a large table' 'table.csv'
 
@@ -89,6 +93,7 @@ mkfifo pipe.csv
 ln -s .. up
 for name in ../secret.csv "$work/secret.csv" link.csv zero.csv pipe.csv up/secret.csv ./up/../../secret.csv /etc/passwd; do
   signal "{table: {file: \"$name\"}}" | refused "a table in $name" 'cannot read'
+  echo "paths: [{name: p, file: \"$name\"}]" | refused "a path in $name" 'cannot read'
 done
 printf 'pinwheel: 1\nbodies: [{name: secret}]\n' >../secret.yaml
 ln -s ../secret.yaml link.yaml

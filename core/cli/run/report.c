@@ -104,7 +104,8 @@ static void report_initial (pw_run *run, const pw_system *system) {
       const pw_state_change c = pw_cli_state_change (system, initial, state);
       const char *origin = pw_initial_given (initial, state) ? "given" : "specified";
       if (specified) pw_run_initial_reason (run, state, reason, sizeof reason);
-      pw_cli_say ("  %s from %s to %s %s", c.name, PW_DIGITS (c.given, 10), PW_DIGITS (c.consistent, 10), c.unit);
+      pw_cli_say ("  %s from %s to %s%s%s", c.name, PW_DIGITS (c.given, 10), PW_DIGITS (c.consistent, 10),
+                  *c.unit ? " " : "", c.unit);
       if (specified) pw_cli_say (" (%s%s%s)", origin, *reason ? "; otherwise " : "", reason);
       pw_cli_say ("\n");
       listed++;
