@@ -609,6 +609,25 @@ def test_until():
         model.run("rk4", t_end=1, until="way > 2", error=True)
 
 
+def test_paths():
+    """A bead on a circle, a spline through an array of points, swings like a pendulum of its radius."""
+    angle = np.linspace(0, 2 * np.pi, 400, endpoint=False)
+    model = pw.describe(paths=[{"name": "wire", "interpolation": "cubic", "closed": True,
+                                "points": 2 * np.stack([np.cos(angle), np.sin(angle)], 1)}],
+                        bodies=[pw.Body("bead", mass=1)],
+                        elements=[pw.OnCurve("track", body="bead", x="wire.x (s)", y="wire.y (s)", start=1e-9),
+                                  pw.Gravity("g", acceleration=[0, -9.81])],
+                        outputs=[{"name": "off", "value": "wire.offset (bead.x, bead.y)"},
+                                 {"name": "outside", "value": "2 - hypot (bead.x, bead.y)"}])
+    result = model.run("erk8+projection", t_end=3, rtol=1e-10)
+    assert abs(result["off"]).max() < 1e-12 and abs(result["outside"]).max() < 1e-8
+    energy = (result["bead.vx"]**2 + result["bead.vy"]**2) / 2 + 9.81 * result["bead.y"]
+    assert abs(energy).max() < 1e-6
+    with pytest.raises(pw.InputError, match="there is no path \"wires\"; did you mean \"wire\""):
+        pw.describe(paths={"name": "wire", "points": [[0, 0], [1, 0]]}, bodies=pw.Body("a", mass=1, inertia=1),
+                    outputs={"name": "x", "value": "wires.s (a.x, a.y)"}).run("rk4", t_end=1)
+
+
 def test_states():
     """A first-order state is integrated with the motion, and is a column under its name; its integral is none."""
     model = pw.describe(bodies=[pw.Body("block", mass=1, inertia=1)],

@@ -566,7 +566,7 @@ def _numbers_of(result, name):
 
 
 def describe(name: str = "model", *, about: str = "", bodies=(), elements=(), parameters=(), let: dict | None = None,
-             run: dict | None = None, outputs=(), **model) -> Model:
+             run: dict | None = None, outputs=(), paths=(), **model) -> Model:
     """A model described in Python, with the keywords of text models.
 
     Parameters
@@ -586,6 +586,8 @@ def describe(name: str = "model", *, about: str = "", bodies=(), elements=(), pa
         Definitions and default run settings, as in a text model.
     outputs : list of dict
         Named functions of columns: ``{"name": "offset", "value": "car.y - sin (car.x)", "unit": "m"}``.
+    paths : list of dict
+        Curves whose functions expressions use: ``{"name": "road", "points": [[0, 0], [9, 0]]}``; points may be an array.
     **model
         Parameters and keywords of :class:`Model`.
 
@@ -615,7 +617,7 @@ def describe(name: str = "model", *, about: str = "", bodies=(), elements=(), pa
             plain.append(fields)
     head = {"about": about, "run": run, "parameters": _entries(parameters, "parameters"), "let": let}
     lines = ["pinwheel: 1"] + [f"{key}: {_json(value)}" for key, value in head.items() if value]
-    for key, entries in (("bodies", _entries(bodies, "bodies")), ("elements", plain), ("states", states),
+    for key, entries in (("paths", _entries(paths, "paths")), ("bodies", _entries(bodies, "bodies")), ("elements", plain), ("states", states),
                          ("outputs", _entries(outputs, "outputs"))):
         lines += [f"{key}:"] + [f"  - {_json(entry)}" for entry in entries] if entries else []
     return Model(_Described(name, "\n".join(lines) + "\n"), signals=signals, **model)
