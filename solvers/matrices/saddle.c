@@ -941,6 +941,35 @@ static int condense_chains (saddle_plan *plan, pw_block_ldl *l) {
   return PW_OK;
 }
 
+/* The dense matrix of a scene with few equations. */
+static int condense_dense (const saddle_plan *plan) {
+  const pw_system *s = plan->saddle->s;
+  int first[PW_DENSE]; /* row of each node */
+  pw_block_ldl *l = plan->saddle->block = calloc (1, sizeof *l);
+  if (l) l->dense = calloc (1, sizeof *l->dense + (size_t)plan->groups * sizeof *l->dense->group);
+  if (l == NULL || l->dense == NULL) return PW_RESOURCE;
+  l->inverse_weight = plan->saddle->inverse_weight;
+  l->dense->groups = plan->groups;
+  for (int n = 0; n < plan->nodes; n++) {
+    first[n] = l->dense->n;
+    for (int i = 0; i < plan->node[n].size; i++) l->dense->unknown[l->dense->n++] = plan->node[n].unknown + i;
+  }
+  l->dense->padded = l->dense->n > 2 && l->dense->n % 2;
+  if (l->dense->padded) l->dense->unknown[l->dense->n++] = l->dense->unknown[0];
+  for (int g = 0; g < plan->groups; g++) {
+    pw_dense_group *group = &l->dense->group[g];
+    group->j = group_first (s, g), group->width = group_width (s, group->j);
+    for (const int *x = plan->list + plan->start[g]; x < plan->list + plan->start[g + 1]; x++) {
+      const plan_contribution *a = &plan->contribution[*x];
+      for (int i = 0; i < plan->node[a->node].size; i++) {
+        group->row[group->rows].J = a->J + i * a->row_stride;
+        group->row[group->rows++].i = first[a->node] + i;
+      }
+    }
+  }
+  return PW_OK;
+}
+
 static int condense_block (saddle_plan *plan) {
   condense_pairs (plan);
   if (plan->failed || plan->pairs >= INT_MAX / 2) return PW_RESOURCE;
@@ -982,6 +1011,9 @@ static int saddle_plan_all (saddle_plan *plan, pw_error *error) {
   status = condense_sort (plan);
   if (status == PW_OK) status = condense_find_dependent (plan, &saddle->dependent_row);
   if (status != PW_OK || saddle->dependent_row >= 0) return status;
+  int equations = 0;
+  for (int n = 0; n < plan->nodes; n++) equations += plan->node[n].size;
+  if (equations <= PW_DENSE) return condense_dense (plan);
   status = condense_uncondensed (plan);
   return status == PW_OK ? condense_block (plan) : status;
 }
@@ -1017,7 +1049,7 @@ int pw_saddle_factor (pw_saddle *saddle) {
   if (saddle->block == NULL) return saddle->pivot = 0, PW_RETRY;
   saddle->pivot = saddle->components ? massless_factor (saddle) : INFINITY;
   if (!(saddle->pivot > SADDLE_ROUND_OFF)) return PW_RETRY;
-  pw_block_factor (saddle->block);
+  saddle->block->dense ? pw_dense_factor (saddle->block) : pw_block_factor (saddle->block);
   if (!(saddle->block->least_pivot >= saddle->pivot)) {
     const int row = saddle->block->least_unknown;
     saddle->pivot = saddle->block->least_pivot;
@@ -1042,6 +1074,10 @@ void pw_saddle_solve (pw_saddle *saddle, const double *f, const double *gamma, d
   const size_t bytes = (size_t)saddle->rows * sizeof *lambda;
   double *y = saddle->extra ? saddle->y : lambda;
   if (saddle->postponed > 0) pw_saddle_factor (saddle);
+  if (saddle->block->dense && saddle->components + saddle->inactive_count == 0) {
+    pw_dense_solve (saddle->block, f, gamma, lambda, a);
+    return;
+  }
   if (y != gamma) memcpy (y, gamma, bytes);
   for (int i = 0; i < saddle->extra; i++) y[saddle->s->rows + i] = 0;
   if (saddle->components) {
@@ -1049,7 +1085,7 @@ void pw_saddle_solve (pw_saddle *saddle, const double *f, const double *gamma, d
     f = saddle->force;
     massless_forward (saddle, y);
   }
-  pw_block_solve (saddle->block, f, y, a);
+  saddle->block->dense ? pw_dense_solve (saddle->block, f, y, y, a) : pw_block_solve (saddle->block, f, y, a);
   if (y != lambda) memcpy (lambda, y, bytes);
   for (int i = 0; i < saddle->inactive_count; i++) lambda[saddle->inactive[i]] = 0;
   if (saddle->components) massless_backward (saddle, a, lambda);
