@@ -41,18 +41,18 @@ void pw_evaluate_gamma (pw_workspace *w, double *gamma) {
 
 void pw_add_forces (const pw_workspace *w, int constant, double *f) {
   PW_EACH_BATCH (k, w) {
-    if (k->kind->force == NULL || (k->kind->constant != 0) != constant) continue;
+    const pw_kind *kind = k->kind;
+    if (kind->force == NULL || (kind->constant != 0) != constant) continue;
     const double *block = k->block;
-    const int *column = k->column;
+    const int *column = k->column, bodies = kind->bodies, internals = kind->internal;
     double *internal = f + k->internal;
-    k->kind->force (&k->b, k->block);
-    for (int e = 0; e < k->b.count; e++) {
-      for (int n = 0; n < k->kind->bodies; n++, column++, block += 3) {
-        f[*column] += block[0];
-        f[*column + 1] += block[1];
-        f[*column + 2] += block[2];
+    kind->force (&k->b, k->block);
+    for (int e = k->b.count; e > 0; e--) {
+      for (int n = bodies; n > 0; n--, block += 3) {
+        double *to = f + *column++;
+        to[0] += block[0], to[1] += block[1], to[2] += block[2];
       }
-      for (int n = 0; n < k->kind->internal; n++) *internal++ += *block++;
+      for (int n = internals; n > 0; n--) *internal++ += *block++;
     }
   }
 }

@@ -347,7 +347,8 @@ static int massless_reduce (pw_component *c) {
 PW_SELDOM double massless_factor (pw_saddle *saddle) {
   double least = INFINITY;
   for (pw_component *c = saddle->component, *end = c + saddle->components; c < end; c++) {
-    if (!massless_reduce (c) && (massless_match (c) < c->pivots || !massless_reduce (c))) return 0;
+    for (int matched = 0; !massless_reduce (c); matched = 1)
+      if (matched || massless_match (c) < c->pivots) return 0;
     if (!(c->least_pivot >= least)) least = c->least_pivot;
   }
   return least > 1 ? 1 : least * least;
@@ -1154,8 +1155,8 @@ void pw_saddle_solve (pw_saddle *saddle, const double *f, const double *gamma, d
   if (y != gamma) memcpy (y, gamma, bytes);
   for (int i = 0; i < saddle->extra; i++) y[saddle->s->rows + i] = 0;
   if (saddle->components) {
-    for (int j = 0; j < saddle->s->coords; j++) saddle->force[j] = f ? f[j] : 0;
-    f = saddle->force;
+    const size_t forces = (size_t)saddle->s->coords * sizeof *f;
+    f = f ? memcpy (saddle->force, f, forces) : memset (saddle->force, 0, forces);
     massless_forward (saddle, y);
   }
   saddle->block->dense ? pw_dense_solve (saddle->block, f, y, y, a) : pw_block_solve (saddle->block, f, y, a);

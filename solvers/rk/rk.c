@@ -216,16 +216,20 @@ static int rk_projects_next (const pw_run *r) {
   return r->data->projects && (r->statistics.steps + 1) % r->data->every == 0;
 }
 
+/* to = from + h sum_j weight_j slope_j, two numbers at a time. */
+static inline void rk_sum (double *restrict to, const double *restrict from, double *const *slope, const pw_rk_row *row,
+                           double h, int n) {
+  const double *restrict first = slope[row->stage[0]], factor = h * row->weight[0];
+  int i = 0;
+  for (; i + 1 < n; i += 2) to[i] = from[i] + factor * first[i], to[i + 1] = from[i + 1] + factor * first[i + 1];
+  if (i < n) to[i] = from[i] + factor * first[i];
+  for (int j = 1; j < row->count; j++) pw_add_scaled (to, slope[row->stage[j]], h * row->weight[j], n);
+}
+
 /* (q, v) = the state reached + h sum_j weight_j (v_j, a_j), with the weights of a row of the tableau. */
 static void rk_combine (const pw_run *r, double *q, double *v, const pw_rk_row *row, double h) {
-  const pw_method_data *d = r->data;
-  const int n = r->s->coords;
-  memcpy (q, r->q, (size_t)n * sizeof *q);
-  memcpy (v, r->v, (size_t)n * sizeof *v);
-  for (int j = 0; j < row->count; j++) {
-    pw_add_scaled (q, d->stage_v[row->stage[j]], h * row->weight[j], n);
-    pw_add_scaled (v, d->stage_a[row->stage[j]], h * row->weight[j], n);
-  }
+  rk_sum (q, r->q, r->data->stage_v, row, h, r->s->coords);
+  rk_sum (v, r->v, r->data->stage_a, row, h, r->s->coords);
 }
 
 /* The ledger at the end of a step, from that at its beginning: end = beginning + h sum_j b_j rate_j. */
