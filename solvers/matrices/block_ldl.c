@@ -635,23 +635,23 @@ void pw_block_solve (const pw_block_ldl *l, const double *f, double *y, double *
  * (Golub & Van Loan 2013, Matrix Computations, algorithm 4.1.2), with n, the number of rows, constant where these
  * functions are inlined, so that all loops over rows are unrolled. */
 
-/* S += J W^-1 J^T for a group. */
-PW_INLINE void dense_assemble (int width, const pw_dense_group *p, const double *w, double *S, int n) {
+/* S += J W^-1 J^T and y += J W^-1 f for a group; neither if it is NULL. */
+PW_INLINE void dense_assemble (int width, const pw_dense_group *p, const double *w, const double *f, double *S,
+                               double *y, int n) {
   for (int r = 0; r < p->rows; r++) {
     const block_row R = block_weigh (width, p->row[r].J, w + p->j);
+    if (f) y[p->row[r].i] += block_product (width, R, f + p->j);
     double *row = S + p->row[r].i * n;
-    for (int q = 0; q <= r; q++) row[p->row[q].i] += block_product (width, R, p->row[q].J);
+    for (int q = 0; S && q <= r; q++) row[p->row[q].i] += block_product (width, R, p->row[q].J);
   }
 }
 
-PW_INLINE void dense_factor (int n, pw_block_ldl *l) {
+/* L and D of S */
+PW_INLINE void dense_factor (int n, pw_block_ldl *l, const double *S) {
   pw_dense *d = l->dense;
-  double S[PW_DENSE * PW_DENSE], L[PW_DENSE * PW_DENSE], c[PW_DENSE];
-  PW_UNROLL for (int i = 0; i < n; i++)
-    PW_UNROLL for (int j = 0; j <= i; j++) S[i * n + j] = 0;
-  for (const pw_dense_group *p = d->group; p < d->group + d->groups; p++)
-    BLOCK_WIDTH (p->width, dense_assemble, p, l->inverse_weight, S, n);
-  if (d->padded) S[n * n - 1] = 1;
+  double L[PW_DENSE * PW_DENSE], c[PW_DENSE];
+  l->least_pivot = INFINITY;
+  l->least_unknown = -1;
   PW_UNROLL for (int i = 0; i < n; i++) {
     double pivot = S[i * n + i];
     PW_UNROLL for (int j = 0; j < i; j++) {
@@ -667,12 +667,6 @@ PW_INLINE void dense_factor (int n, pw_block_ldl *l) {
   }
 }
 
-/* y += J W^-1 f for a group. */
-PW_INLINE void dense_right_side (int width, const pw_dense_group *p, const double *w, const double *f, double *y) {
-  const block_row z = block_weigh (width, f + p->j, w + p->j);
-  for (int r = 0; r < p->rows; r++) y[p->row[r].i] += block_product (width, z, p->row[r].J);
-}
-
 /* a = W^-1 (f - J^T y) for a group. */
 PW_INLINE void dense_accelerate (int width, const pw_dense_group *p, const double *w, const double *f, const double *y,
                                  double *a) {
@@ -683,14 +677,20 @@ PW_INLINE void dense_accelerate (int width, const pw_dense_group *p, const doubl
   PW_UNROLL for (int k = 0; k < width; k++) a[p->j + k] = w[p->j + k] * z[k];
 }
 
-PW_INLINE void dense_solve (int n, const pw_block_ldl *l, const double *f, const double *gamma, double *lambda,
-                            double *a) {
+PW_INLINE void dense_run (int n, pw_block_ldl *l, int factors, const double *f, double *lambda, double *a) {
   const pw_dense *d = l->dense;
-  const pw_dense_group *end = d->group + d->groups;
-  double y[PW_DENSE];
-  PW_UNROLL for (int i = 0; i < n; i++) y[i] = -gamma[d->unknown[i]];
-  for (const pw_dense_group *p = d->group; f && p < end; p++)
-    BLOCK_WIDTH (p->width, dense_right_side, p, l->inverse_weight, f, y);
+  double S[PW_DENSE * PW_DENSE], y[PW_DENSE];
+  if (lambda)
+    PW_UNROLL for (int i = 0; i < n; i++) y[i] = -lambda[d->unknown[i]];
+  if (factors)
+    PW_UNROLL for (int i = 0; i < n; i++)
+      PW_UNROLL for (int j = 0; j <= i; j++) S[i * n + j] = 0;
+  if (factors || f)
+    for (const pw_dense_group *p = d->group; p < d->group + d->coupled; p++)
+      BLOCK_WIDTH (p->width, dense_assemble, p, l->inverse_weight, f, factors ? S : NULL, y, n);
+  if (factors && n > 2 && d->padded) S[n * n - 1] = 1;
+  if (factors) dense_factor (n, l, S);
+  if (lambda == NULL) return;
   PW_UNROLL for (int i = 1; i < n; i++)
     PW_UNROLL for (int j = 0; j < i; j++) y[i] -= d->L[i * n + j] * y[j];
   PW_UNROLL for (int i = 0; i < n; i++) y[i] *= d->L[i * n + i];
@@ -698,30 +698,19 @@ PW_INLINE void dense_solve (int n, const pw_block_ldl *l, const double *f, const
     lambda[d->unknown[i]] = y[i];
     PW_UNROLL for (int j = 0; j < i; j++) y[j] -= d->L[i * n + j] * y[i];
   }
-  for (const pw_dense_group *p = d->group; p < end; p++)
+  for (const pw_dense_group *p = d->group; p < d->group + d->groups; p++)
     BLOCK_WIDTH (p->width, dense_accelerate, p, l->inverse_weight, f, y, a);
 }
 
-/* Calls f with a constant in place of the number of rows. */
-#define DENSE_CASE(n, f, ...) \
-  case n:                     \
-    f (n, __VA_ARGS__);       \
+#define DENSE_CASE(n) \
+  case n:             \
+    dense_run (n, l, factors, f, y, a); \
     break;
-#define DENSE_ROWS(n, f, ...)                                                                     \
-  switch (n) {                                                                                    \
-    DENSE_CASE (0, f, __VA_ARGS__) DENSE_CASE (1, f, __VA_ARGS__) DENSE_CASE (2, f, __VA_ARGS__)  \
-    DENSE_CASE (4, f, __VA_ARGS__) DENSE_CASE (6, f, __VA_ARGS__) DENSE_CASE (8, f, __VA_ARGS__)  \
-    DENSE_CASE (10, f, __VA_ARGS__)                                                               \
+
+void pw_dense_run (pw_block_ldl *l, int factors, const double *f, double *y, double *a) {
+  switch (l->dense->n) {
+    DENSE_CASE (0) DENSE_CASE (1) DENSE_CASE (2) DENSE_CASE (4) DENSE_CASE (6) DENSE_CASE (8) DENSE_CASE (10)
   }
-
-void pw_dense_factor (pw_block_ldl *l) {
-  l->least_pivot = INFINITY;
-  l->least_unknown = -1;
-  DENSE_ROWS (l->dense->n, dense_factor, l)
-}
-
-void pw_dense_solve (const pw_block_ldl *l, const double *f, const double *gamma, double *lambda, double *a) {
-  DENSE_ROWS (l->dense->n, dense_solve, l, f, gamma, lambda, a)
 }
 
 /* ---- Elimination order ---- */

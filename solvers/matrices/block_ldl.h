@@ -106,7 +106,8 @@ typedef struct {
 /* S of a scene of few equations.  A matrix of an odd number of rows, 3 or more, has one more, that of the unit matrix,
  * with the unknown of the first row, which is stored after it. */
 typedef struct {
-  int n, groups, padded; /* rows; groups; 1: the last row is that of the unit matrix */
+  int n, padded;         /* rows; 1: the last one is that of the unit matrix */
+  int groups, coupled;   /* all; those that have rows, which come first */
   int unknown[PW_DENSE]; /* of each row: index in y */
   double L[PW_DENSE * PW_DENSE]; /* n x n: L below the diagonal, D^-1 on it */
   pw_dense_group group[];
@@ -168,13 +169,10 @@ static inline int pw_block_diagonal_values (int size) {
 
 /* Assembles S with the J last evaluated and factorises it; stops where least_pivot is not positive. */
 void pw_block_factor (pw_block_ldl *l);
-/* The same for a dense matrix, whatever least_pivot is. */
-void pw_dense_factor (pw_block_ldl *l);
-
 /* y, which holds gamma, then 0 for each -a_k, becomes lambda and -a_k; a = W^-1 (f - J^T lambda).  f and a may be the
  * same; f NULL: zero. */
 void pw_block_solve (const pw_block_ldl *l, const double *f, double *y, double *a);
-/* The same for a dense matrix; gamma and lambda may be the same. */
-void pw_dense_solve (const pw_block_ldl *l, const double *f, const double *gamma, double *lambda, double *a);
+/* The same for a dense matrix: factorises it, if `factors`, whatever least_pivot is, and solves unless y is NULL. */
+void pw_dense_run (pw_block_ldl *l, int factors, const double *f, double *y, double *a);
 
 #endif

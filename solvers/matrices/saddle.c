@@ -338,20 +338,8 @@ PW_INLINE int massless_eliminate (int n, pw_component *c) {
   return 1;
 }
 
-static int massless_reduce (pw_component *c) {
+PW_INLINE int massless_reduce (pw_component *c) {
   return MASSLESS_PIVOTS (massless_eliminate, c);
-}
-
-/* Eliminates with the J last evaluated, and matches again if a pivot has become much smaller than when it was matched.
- * Returns the square of the least of all `least_pivot`, at most 1; 0 if singular. */
-PW_SELDOM double massless_factor (pw_saddle *saddle) {
-  double least = INFINITY;
-  for (pw_component *c = saddle->component, *end = c + saddle->components; c < end; c++) {
-    for (int matched = 0; !massless_reduce (c); matched = 1)
-      if (matched || massless_match (c) < c->pivots) return 0;
-    if (!(c->least_pivot >= least)) least = c->least_pivot;
-  }
-  return least > 1 ? 1 : least * least;
 }
 
 /* gamma~, mu, f~ */
@@ -374,11 +362,20 @@ PW_INLINE void massless_forward_component (int n, pw_component *c, double *f, do
   PW_UNROLL for (int p = 0; p < n; p++) row[p].lambda = mu[p];
 }
 
-/* First half of a solution: saddle->force becomes f~ at the massive coordinates, gamma becomes gamma~ at `unknown` of
- * unmatched rows. */
-PW_SELDOM void massless_forward (pw_saddle *saddle, double *gamma) {
-  for (pw_component *c = saddle->component, *end = c + saddle->components; c < end; c++)
-    MASSLESS_PIVOTS (massless_forward_component, c, saddle->force, gamma);
+/* First, if `factors`, eliminates with the J last evaluated, and matches again if a pivot has become much smaller than
+ * when it was matched.  Then, unless gamma is NULL, the first half of a solution: saddle->force becomes f~ at the massive
+ * coordinates, gamma becomes gamma~ at `unknown` of unmatched rows.  Returns the square of the least of all `least_pivot`,
+ * at most 1; 0 if singular. */
+PW_SELDOM double massless_forward (pw_saddle *saddle, int factors, double *gamma) {
+  double least = 1;
+  pw_component *c = saddle->component;
+  for (int count = saddle->components; count > 0; count--, c++) {
+    for (int matched = 0; factors && !massless_reduce (c); matched = 1)
+      if (matched || massless_match (c) < c->pivots) return 0;
+    if (!(c->least_pivot >= least)) least = c->least_pivot;
+    if (gamma) MASSLESS_PIVOTS (massless_forward_component, c, saddle->force, gamma);
+  }
+  return least * least;
 }
 
 /* gamma_p - H a, a_P, lambda_p.  a is 0 at massless coordinates. */
@@ -403,7 +400,8 @@ PW_INLINE void massless_backward_component (int n, pw_component *c, double *a, d
 /* Second half: from a of the massive coordinates and lambda at `unknown` of unmatched rows, a of the massless
  * coordinates and lambda of all rows. */
 PW_SELDOM void massless_backward (pw_saddle *saddle, double *a, double *lambda) {
-  for (pw_component *c = saddle->component, *end = c + saddle->components; c < end; c++)
+  pw_component *c = saddle->component;
+  for (int count = saddle->components; count > 0; count--, c++)
     MASSLESS_PIVOTS (massless_backward_component, c, a, lambda);
 }
 
@@ -1030,8 +1028,9 @@ static int condense_dense (const saddle_plan *plan) {
   }
   l->dense->padded = l->dense->n > 2 && l->dense->n % 2;
   if (l->dense->padded) l->dense->unknown[l->dense->n++] = l->dense->unknown[0];
-  for (int g = 0; g < plan->groups; g++) {
-    pw_dense_group *group = &l->dense->group[g];
+  for (int g = 0, without = plan->groups; g < plan->groups; g++) {
+    int has_rows = plan->start[g + 1] > plan->start[g];
+    pw_dense_group *group = &l->dense->group[has_rows ? l->dense->coupled++ : --without];
     group->j = group_first (s, g), group->width = group_width (s, group->j);
     for (const int *x = plan->list + plan->start[g]; x < plan->list + plan->start[g + 1]; x++) {
       const plan_contribution *a = &plan->contribution[*x];
@@ -1117,19 +1116,59 @@ void pw_saddle_postpone (pw_saddle *saddle, double pivot) {
   saddle->postponed = pivot;
 }
 
-int pw_saddle_factor (pw_saddle *saddle) {
-  saddle->postponed = 0;
-  saddle->pivot_row = saddle->dependent_row;
-  if (saddle->block == NULL) return saddle->pivot = 0, PW_RETRY;
-  saddle->pivot = saddle->components ? massless_factor (saddle) : INFINITY;
-  if (!(saddle->pivot > SADDLE_ROUND_OFF)) return PW_RETRY;
-  saddle->block->dense ? pw_dense_factor (saddle->block) : pw_block_factor (saddle->block);
+/* Takes the least pivot of the block into account. */
+static inline int saddle_judge (pw_saddle *saddle) {
   if (!(saddle->block->least_pivot >= saddle->pivot)) {
     const int row = saddle->block->least_unknown;
     saddle->pivot = saddle->block->least_pivot;
     saddle->pivot_row = row >= 0 && row < saddle->s->rows && saddle->component_of_row[row] < 0 ? row : -1;
   }
   return saddle->pivot > SADDLE_ROUND_OFF ? PW_OK : PW_RETRY;
+}
+
+/* Factorises, if `factors`, and solves, unless lambda is NULL. */
+PW_INLINE int saddle_run (pw_saddle *saddle, int factors, const double *f, const double *gamma, double *a,
+                          double *lambda) {
+  pw_block_ldl *l = saddle->block;
+  double *y = lambda && saddle->extra ? saddle->y : lambda;
+  if (factors) {
+    saddle->postponed = 0;
+    saddle->pivot = l ? INFINITY : 0, saddle->pivot_row = saddle->dependent_row;
+    if (l == NULL) return PW_RETRY;
+  }
+  if (y != gamma) memcpy (y, gamma, (size_t)saddle->rows * sizeof *y);
+  for (int i = 0; y && i < saddle->extra; i++) y[saddle->s->rows + i] = 0;
+  if (saddle->components) {
+    const size_t bytes = (size_t)saddle->s->coords * sizeof *f;
+    if (y) f = f ? memcpy (saddle->force, f, bytes) : memset (saddle->force, 0, bytes);
+    double pivot = massless_forward (saddle, factors, y);
+    if (factors) saddle->pivot = pivot;
+    if (factors && !(pivot > SADDLE_ROUND_OFF)) return PW_RETRY;
+  }
+  if (l->dense)
+    pw_dense_run (l, factors, f, y, a);
+  else if (factors)
+    pw_block_factor (l);
+  if (factors && saddle_judge (saddle) != PW_OK) return PW_RETRY;
+  if (y == NULL) return PW_OK;
+  if (!l->dense) pw_block_solve (l, f, y, a);
+  if (y != lambda) memcpy (lambda, y, (size_t)saddle->rows * sizeof *y);
+  for (int i = 0; i < saddle->inactive_count; i++) lambda[saddle->inactive[i]] = 0;
+  if (saddle->components) massless_backward (saddle, a, lambda);
+  return PW_OK;
+}
+
+int pw_saddle_factor (pw_saddle *saddle) {
+  return saddle_run (saddle, 1, NULL, NULL, NULL, NULL);
+}
+
+void pw_saddle_solve (pw_saddle *saddle, const double *f, const double *gamma, double *a, double *lambda) {
+  if (saddle->postponed > 0) pw_saddle_factor (saddle);
+  (void)saddle_run (saddle, 0, f, gamma, a, lambda);
+}
+
+int pw_saddle_factor_solve (pw_saddle *saddle, const double *f, const double *gamma, double *a, double *lambda) {
+  return saddle_run (saddle, 1, f, gamma, a, lambda);
 }
 
 int pw_saddle_sine_below (pw_saddle *saddle, double sine) {
@@ -1142,25 +1181,4 @@ double pw_saddle_sine (pw_saddle *saddle, int *row) {
   if (saddle->postponed > 0) pw_saddle_factor (saddle);
   if (row) *row = saddle->pivot_row;
   return saddle->pivot > 0 ? sqrt (fmin (saddle->pivot, 1)) : 0;
-}
-
-void pw_saddle_solve (pw_saddle *saddle, const double *f, const double *gamma, double *a, double *lambda) {
-  const size_t bytes = (size_t)saddle->rows * sizeof *lambda;
-  double *y = saddle->extra ? saddle->y : lambda;
-  if (saddle->postponed > 0) pw_saddle_factor (saddle);
-  if (saddle->block->dense && saddle->components + saddle->inactive_count == 0) {
-    pw_dense_solve (saddle->block, f, gamma, lambda, a);
-    return;
-  }
-  if (y != gamma) memcpy (y, gamma, bytes);
-  for (int i = 0; i < saddle->extra; i++) y[saddle->s->rows + i] = 0;
-  if (saddle->components) {
-    const size_t forces = (size_t)saddle->s->coords * sizeof *f;
-    f = f ? memcpy (saddle->force, f, forces) : memset (saddle->force, 0, forces);
-    massless_forward (saddle, y);
-  }
-  saddle->block->dense ? pw_dense_solve (saddle->block, f, y, y, a) : pw_block_solve (saddle->block, f, y, a);
-  if (y != lambda) memcpy (lambda, y, bytes);
-  for (int i = 0; i < saddle->inactive_count; i++) lambda[saddle->inactive[i]] = 0;
-  if (saddle->components) massless_backward (saddle, a, lambda);
 }

@@ -292,8 +292,7 @@ static inline int dynamics_solve (pw_run *r, const double *v, double *a, double 
   const double *f = dynamics_right_side (r, v, r->scratch, lambda);
   r->statistics.rhs++;
   r->statistics.factorisations++;
-  int status = pw_saddle_factor (r->saddle);
-  if (status == PW_OK) pw_saddle_solve (r->saddle, f, lambda, a, lambda);
+  int status = pw_saddle_factor_solve (r->saddle, f, lambda, a, lambda);
   *near = pw_watchdog_near (r);
   if (*near && r->watchdog.evaluated_sine <= r->refused_sine) return PW_RETRY;
   if (status == PW_OK && pw_saddle_sine_below (r->saddle, r->thresholds.refine)) dynamics_refine (r, v, a, lambda);
