@@ -264,9 +264,9 @@ static int massless_match (pw_component *c) {
 
 enum { MASSLESS_LOCAL = 3 };
 
-/* Calls f for the component c, with a constant in place of the number of its pivots if that is 2 or 3. */
+/* Calls f (n, c, ...), with the constant 2 or 3, or f_any (c, ...), a function that is not inlined. */
 #define MASSLESS_PIVOTS(f, ...) \
-  (c->pivots == 3 ? f (3, __VA_ARGS__) : c->pivots == 2 ? f (2, __VA_ARGS__) : f (c->pivots, __VA_ARGS__))
+  (c->pivots == 3 ? f (3, __VA_ARGS__) : c->pivots == 2 ? f (2, __VA_ARGS__) : f##_any (__VA_ARGS__))
 
 /* P = L U.  Returns 0 if a pivot has become much smaller than when it was matched. */
 PW_INLINE int massless_factor_P (int n, pw_component *c, double *P) {
@@ -338,6 +338,10 @@ PW_INLINE int massless_eliminate (int n, pw_component *c) {
   return 1;
 }
 
+PW_SELDOM int massless_eliminate_any (pw_component *c) {
+  return massless_eliminate (c->pivots, c);
+}
+
 PW_INLINE int massless_reduce (pw_component *c) {
   return MASSLESS_PIVOTS (massless_eliminate, c);
 }
@@ -360,6 +364,10 @@ PW_INLINE void massless_forward_component (int n, pw_component *c, double *f, do
     if (b->width == 3) F[1] -= b->J[1] * x, F[2] -= b->J[2] * x;
   }
   PW_UNROLL for (int p = 0; p < n; p++) row[p].lambda = mu[p];
+}
+
+PW_SELDOM void massless_forward_component_any (pw_component *c, double *f, double *gamma) {
+  massless_forward_component (c->pivots, c, f, gamma);
 }
 
 /* First, if `factors`, eliminates with the J last evaluated, and matches again if a pivot has become much smaller than
@@ -395,6 +403,10 @@ PW_INLINE void massless_backward_component (int n, pw_component *c, double *a, d
     PW_UNROLL for (int p = 0; p < n; p++) row[p].lambda -= c->P[i * n + p] * row[i].lambda;
   }
   PW_UNROLL for (int p = 0; p < n; p++) a[row[p].j] = x[p], lambda[row[p].equation] = row[p].lambda;
+}
+
+PW_SELDOM void massless_backward_component_any (pw_component *c, double *a, double *lambda) {
+  massless_backward_component (c->pivots, c, a, lambda);
 }
 
 /* Second half: from a of the massive coordinates and lambda at `unknown` of unmatched rows, a of the massless

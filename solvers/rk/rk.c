@@ -216,13 +216,9 @@ static int rk_projects_next (const pw_run *r) {
   return r->data->projects && (r->statistics.steps + 1) % r->data->every == 0;
 }
 
-/* to = from + h sum_j weight_j slope_j, two numbers at a time. */
-static inline void rk_sum (double *restrict to, const double *restrict from, double *const *slope, const pw_rk_row *row,
-                           double h, int n) {
-  const double *restrict first = slope[row->stage[0]], factor = h * row->weight[0];
-  int i = 0;
-  for (; i + 1 < n; i += 2) to[i] = from[i] + factor * first[i], to[i + 1] = from[i + 1] + factor * first[i + 1];
-  if (i < n) to[i] = from[i] + factor * first[i];
+/* to = from + h sum_j weight_j slope_j */
+static inline void rk_sum (double *to, const double *from, double *const *slope, const pw_rk_row *row, double h, int n) {
+  pw_sum_scaled (to, from, slope[row->stage[0]], h * row->weight[0], n);
   for (int j = 1; j < row->count; j++) pw_add_scaled (to, slope[row->stage[j]], h * row->weight[j], n);
 }
 
