@@ -324,19 +324,15 @@ static inline int pw_evaluate_J_at (pw_workspace *w, double t, const double *q, 
   return status;
 }
 
-/* Two numbers at once (GNU C). */
+/* Two numbers at once (GNU C), at any address of a double. */
 typedef double pw_pair __attribute__ ((vector_size (16), aligned (8), may_alias));
+#define PW_PAIR(x, i) (*(const pw_pair *)((x) + (i)))
 
-/* to = from + factor * x, n numbers; to and from may be the same. */
-static inline void pw_sum_scaled (double *to, const double *from, const double *x, double factor, int n) {
-  const double *last = x + n - 1;
-  for (; x < last; to += 2, from += 2, x += 2)
-    *(pw_pair *)to = *(const pw_pair *)from + factor * *(const pw_pair *)x;
-  if (x == last) *to = *from + factor * *x;
-}
-
-static inline void pw_add_scaled (double *to, const double *x, double factor, int n) {
-  pw_sum_scaled (to, to, x, factor, n);
+/* to += factor * from, two numbers at a time */
+static inline void pw_add_scaled (double *restrict to, const double *restrict from, double factor, int n) {
+  int i = 0;
+  for (; i + 1 < n; i += 2) *(pw_pair *)(to + i) = PW_PAIR (to, i) + factor * PW_PAIR (from, i);
+  if (i < n) to[i] += factor * from[i];
 }
 
 /* The larger of two values; NaN if either is NaN, unlike pw_larger. */

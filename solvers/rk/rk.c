@@ -216,16 +216,20 @@ static int rk_projects_next (const pw_run *r) {
   return r->data->projects && (r->statistics.steps + 1) % r->data->every == 0;
 }
 
-/* to = from + h sum_j weight_j slope_j */
-static inline void rk_sum (double *to, const double *from, double *const *slope, const pw_rk_row *row, double h, int n) {
-  pw_sum_scaled (to, from, slope[row->stage[0]], h * row->weight[0], n);
-  for (int j = 1; j < row->count; j++) pw_add_scaled (to, slope[row->stage[j]], h * row->weight[j], n);
-}
-
 /* (q, v) = the state reached + h sum_j weight_j (v_j, a_j), with the weights of a row of the tableau. */
 static void rk_combine (const pw_run *r, double *q, double *v, const pw_rk_row *row, double h) {
-  rk_sum (q, r->q, r->data->stage_v, row, h, r->s->coords);
-  rk_sum (v, r->v, r->data->stage_a, row, h, r->s->coords);
+  const pw_method_data *d = r->data;
+  const double *q0 = r->q, *v0 = r->v;
+  const int n = r->s->coords;
+  for (int j = 0; j < row->count; j++, q0 = q, v0 = v) {
+    const double *dq = d->stage_v[row->stage[j]], *dv = d->stage_a[row->stage[j]], factor = h * row->weight[j];
+    int i = 0;
+    for (; i + 1 < n; i += 2) { /* two numbers at a time */
+      *(pw_pair *)(q + i) = PW_PAIR (q0, i) + factor * PW_PAIR (dq, i);
+      *(pw_pair *)(v + i) = PW_PAIR (v0, i) + factor * PW_PAIR (dv, i);
+    }
+    if (i < n) q[i] = q0[i] + factor * dq[i], v[i] = v0[i] + factor * dv[i];
+  }
 }
 
 /* The ledger at the end of a step, from that at its beginning: end = beginning + h sum_j b_j rate_j. */

@@ -237,7 +237,7 @@ int pw_watchdog_check_values (const pw_run *r, pw_error *error) {
 /* ---- General evaluation ---- */
 
 /* Adds Baumgarte's terms to gamma. */
-static void dynamics_stabilise (pw_run *r, const double *v, double *gamma) {
+__attribute__ ((noinline)) static void dynamics_stabilise (pw_run *r, const double *v, double *gamma) {
   const pw_system *s = r->s;
   double *Jv = r->scratch + s->coords + 3 + s->rows, *eta = Jv + s->rows, *g = eta;
   pw_mul_J (r->w, v, Jv);
