@@ -374,7 +374,7 @@ PW_SELDOM void massless_forward_component_any (pw_component *c, double *f, doubl
  * when it was matched.  Then, unless gamma is NULL, the first half of a solution: saddle->force becomes f~ at the massive
  * coordinates, gamma becomes gamma~ at `unknown` of unmatched rows.  Returns the square of the least of all `least_pivot`,
  * at most 1; 0 if singular. */
-PW_SELDOM double massless_forward (pw_saddle *saddle, int factors, double *gamma) {
+PW_INLINE double massless_forward (pw_saddle *saddle, int factors, double *gamma) {
   double least = 1;
   pw_component *c = saddle->component;
   for (int count = saddle->components; count > 0; count--, c++) {
@@ -411,7 +411,7 @@ PW_SELDOM void massless_backward_component_any (pw_component *c, double *a, doub
 
 /* Second half: from a of the massive coordinates and lambda at `unknown` of unmatched rows, a of the massless
  * coordinates and lambda of all rows. */
-PW_SELDOM void massless_backward (pw_saddle *saddle, double *a, double *lambda) {
+PW_INLINE void massless_backward (pw_saddle *saddle, double *a, double *lambda) {
   pw_component *c = saddle->component;
   for (int count = saddle->components; count > 0; count--, c++)
     MASSLESS_PIVOTS (massless_backward_component, c, a, lambda);
@@ -1138,19 +1138,21 @@ static inline int saddle_judge (pw_saddle *saddle) {
   return saddle->pivot > SADDLE_ROUND_OFF ? PW_OK : PW_RETRY;
 }
 
-/* Factorises, if `factors`, and solves, unless lambda is NULL. */
-PW_INLINE int saddle_run (pw_saddle *saddle, int factors, const double *f, const double *gamma, double *a,
+/* Factorises, if `factors`, and solves, unless lambda is NULL.  massless: 1 if there are components. */
+PW_INLINE int saddle_run (pw_saddle *saddle, int massless, int factors, const double *f, const double *gamma, double *a,
                           double *lambda) {
   pw_block_ldl *l = saddle->block;
-  double *y = lambda && saddle->extra ? saddle->y : lambda;
-  if (factors) {
-    saddle->postponed = 0;
-    saddle->pivot = l ? INFINITY : 0, saddle->pivot_row = saddle->dependent_row;
-    if (l == NULL) return PW_RETRY;
+  double *y = lambda;
+  if (lambda && saddle->extra) { /* none if l is dense */
+    y = saddle->y;
+    for (int i = 0; i < saddle->extra; i++) y[saddle->s->rows + i] = 0;
   }
   if (y != gamma) memcpy (y, gamma, (size_t)saddle->rows * sizeof *y);
-  for (int i = 0; y && i < saddle->extra; i++) y[saddle->s->rows + i] = 0;
-  if (saddle->components) {
+  if (factors) {
+    saddle->postponed = 0, saddle->pivot = l ? INFINITY : 0, saddle->pivot_row = saddle->dependent_row;
+    if (l == NULL) return PW_RETRY;
+  }
+  if (massless) {
     const size_t bytes = (size_t)saddle->s->coords * sizeof *f;
     if (y) f = f ? memcpy (saddle->force, f, bytes) : memset (saddle->force, 0, bytes);
     double pivot = massless_forward (saddle, factors, y);
@@ -1166,21 +1168,31 @@ PW_INLINE int saddle_run (pw_saddle *saddle, int factors, const double *f, const
   if (!l->dense) pw_block_solve (l, f, y, a);
   if (y != lambda) memcpy (lambda, y, (size_t)saddle->rows * sizeof *y);
   for (int i = 0; i < saddle->inactive_count; i++) lambda[saddle->inactive[i]] = 0;
-  if (saddle->components) massless_backward (saddle, a, lambda);
+  if (massless) massless_backward (saddle, a, lambda);
   return PW_OK;
 }
 
+/* Few scenes have massless coordinates: inlined, their code would add to the cost of the others. */
+PW_SELDOM int saddle_run_massless (pw_saddle *saddle, int factors, const double *f, const double *gamma, double *a,
+                                   double *lambda) {
+  return saddle_run (saddle, 1, factors, f, gamma, a, lambda);
+}
+
+int pw_saddle_factor_solve (pw_saddle *saddle, const double *f, const double *gamma, double *a, double *lambda) {
+  if (saddle->components) return saddle_run_massless (saddle, 1, f, gamma, a, lambda);
+  return saddle_run (saddle, 0, 1, f, gamma, a, lambda);
+}
+
 int pw_saddle_factor (pw_saddle *saddle) {
-  return saddle_run (saddle, 1, NULL, NULL, NULL, NULL);
+  return pw_saddle_factor_solve (saddle, NULL, NULL, NULL, NULL);
 }
 
 void pw_saddle_solve (pw_saddle *saddle, const double *f, const double *gamma, double *a, double *lambda) {
   if (saddle->postponed > 0) pw_saddle_factor (saddle);
-  (void)saddle_run (saddle, 0, f, gamma, a, lambda);
-}
-
-int pw_saddle_factor_solve (pw_saddle *saddle, const double *f, const double *gamma, double *a, double *lambda) {
-  return saddle_run (saddle, 1, f, gamma, a, lambda);
+  if (saddle->components)
+    (void)saddle_run_massless (saddle, 0, f, gamma, a, lambda);
+  else
+    (void)saddle_run (saddle, 0, 0, f, gamma, a, lambda);
 }
 
 int pw_saddle_sine_below (pw_saddle *saddle, double sine) {
