@@ -41,7 +41,8 @@ void pw_evaluate_gamma (pw_workspace *w, double *gamma) {
 }
 
 void pw_add_forces (const pw_workspace *w, int constant, double *f) {
-  PW_EACH_BATCH (k, w) {
+  const pw_element_batch *k = w->batch + (constant ? 0 : w->s->first_force), *end = w->batch + w->s->batches;
+  for (; k < end; k++) {
     const pw_kind *kind = k->kind;
     if (kind->force == NULL || (kind->constant != 0) != constant) continue;
     const double *block = k->block;

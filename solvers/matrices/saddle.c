@@ -1025,33 +1025,42 @@ static int condense_chains (saddle_plan *plan, pw_block_ldl *l) {
   return PW_OK;
 }
 
-/* The dense matrix of a scene with few equations. */
-static int condense_dense (const saddle_plan *plan) {
-  const pw_system *s = plan->saddle->s;
-  int first[PW_DENSE]; /* row of each node */
-  pw_block_ldl *l = plan->saddle->block = calloc (1, sizeof *l);
-  if (l) l->dense = calloc (1, sizeof *l->dense + (size_t)plan->groups * sizeof *l->dense->group);
-  if (l == NULL || l->dense == NULL) return PW_RESOURCE;
-  l->inverse_weight = plan->saddle->inverse_weight;
-  l->dense->groups = plan->groups;
-  for (int n = 0; n < plan->nodes; n++) {
-    first[n] = l->dense->n;
-    for (int i = 0; i < plan->node[n].size; i++) l->dense->unknown[l->dense->n++] = plan->node[n].unknown + i;
-  }
-  l->dense->padded = l->dense->n > 2 && l->dense->n % 2;
-  if (l->dense->padded) l->dense->unknown[l->dense->n++] = l->dense->unknown[0];
-  for (int g = 0, without = plan->groups; g < plan->groups; g++) {
-    int has_rows = plan->start[g + 1] > plan->start[g];
-    pw_dense_group *group = &l->dense->group[has_rows ? l->dense->coupled++ : --without];
-    group->j = group_first (s, g), group->width = group_width (s, group->j);
-    for (const int *x = plan->list + plan->start[g]; x < plan->list + plan->start[g + 1]; x++) {
-      const plan_contribution *a = &plan->contribution[*x];
-      for (int i = 0; i < plan->node[a->node].size; i++) {
-        group->row[group->rows].J = a->J + i * a->row_stride;
-        group->row[group->rows++].i = first[a->node] + i;
-      }
+/* Appends group g to a dense matrix, unless it is massless; first: row of each node. */
+static void condense_dense_group (const saddle_plan *plan, pw_dense *d, int g, const int *first) {
+  const int j = group_first (plan->saddle->s, g), width = group_width (plan->saddle->s, j);
+  int has_weight = 0;
+  for (int i = 0; i < width; i++) has_weight |= plan->weight[j + i] != 0;
+  if (!has_weight) return;
+  pw_dense_group *group = &d->group[d->groups++];
+  group->j = j, group->width = width;
+  for (int x = plan->start[g]; x < plan->start[g + 1]; x++) {
+    const plan_contribution *a = &plan->contribution[plan->list[x]];
+    for (int i = 0; i < plan->node[a->node].size; i++) {
+      group->row[group->rows].J = a->J + i * a->row_stride;
+      group->row[group->rows++].i = first[a->node] + i;
     }
   }
+}
+
+/* The dense matrix of a scene with few equations. */
+static int condense_dense (const saddle_plan *plan) {
+  int first[PW_DENSE];
+  pw_block_ldl *l = plan->saddle->block = calloc (1, sizeof *l);
+  pw_dense *d = calloc (1, sizeof *d + (size_t)plan->groups * sizeof *d->group);
+  if (l == NULL || d == NULL) return free (d), PW_RESOURCE;
+  l->dense = d;
+  l->inverse_weight = plan->saddle->inverse_weight;
+  for (int n = 0; n < plan->nodes; n++) {
+    first[n] = d->n;
+    for (int i = 0; i < plan->node[n].size; i++) d->unknown[d->n++] = plan->node[n].unknown + i;
+  }
+  d->padded = d->n > 2 && d->n % 2;
+  if (d->padded) d->unknown[d->n++] = d->unknown[0];
+  for (int g = 0; g < plan->groups; g++)
+    if (plan->start[g + 1] > plan->start[g]) condense_dense_group (plan, d, g, first);
+  d->coupled = d->groups;
+  for (int g = 0; g < plan->groups; g++)
+    if (plan->start[g + 1] == plan->start[g]) condense_dense_group (plan, d, g, first);
   return PW_OK;
 }
 
