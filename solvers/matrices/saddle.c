@@ -1181,15 +1181,19 @@ PW_INLINE int saddle_run (pw_saddle *saddle, int massless, int factors, const do
   return PW_OK;
 }
 
-/* Few scenes have massless coordinates: inlined, their code would add to the cost of the others. */
 PW_SELDOM int saddle_run_massless (pw_saddle *saddle, int factors, const double *f, const double *gamma, double *a,
                                    double *lambda) {
   return saddle_run (saddle, 1, factors, f, gamma, a, lambda);
 }
 
+/* Few scenes have massless coordinates: in one function, their code would add to the cost of the others. */
+PW_SELDOM int saddle_run_massive (pw_saddle *saddle, int factors, const double *f, const double *gamma, double *a,
+                                  double *lambda) {
+  return saddle_run (saddle, 0, factors, f, gamma, a, lambda);
+}
+
 int pw_saddle_factor_solve (pw_saddle *saddle, const double *f, const double *gamma, double *a, double *lambda) {
-  if (saddle->components) return saddle_run_massless (saddle, 1, f, gamma, a, lambda);
-  return saddle_run (saddle, 0, 1, f, gamma, a, lambda);
+  return (saddle->components ? saddle_run_massless : saddle_run_massive) (saddle, 1, f, gamma, a, lambda);
 }
 
 int pw_saddle_factor (pw_saddle *saddle) {
@@ -1198,10 +1202,7 @@ int pw_saddle_factor (pw_saddle *saddle) {
 
 void pw_saddle_solve (pw_saddle *saddle, const double *f, const double *gamma, double *a, double *lambda) {
   if (saddle->postponed > 0) pw_saddle_factor (saddle);
-  if (saddle->components)
-    (void)saddle_run_massless (saddle, 0, f, gamma, a, lambda);
-  else
-    (void)saddle_run (saddle, 0, 0, f, gamma, a, lambda);
+  (void)(saddle->components ? saddle_run_massless : saddle_run_massive) (saddle, 0, f, gamma, a, lambda);
 }
 
 int pw_saddle_sine_below (pw_saddle *saddle, double sine) {
