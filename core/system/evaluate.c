@@ -186,7 +186,8 @@ void pw_point_to_internal (pw_workspace *w, const double *q, const double *v) {
 }
 
 /* Two bodies at a time; singly the last of an odd number, and all from a pair with an angle beyond the limit on. */
-__attribute__ ((always_inline)) static inline void update_configurations (pw_workspace *w, const double *q, const double *v) {
+__attribute__ ((always_inline)) static inline void update_configurations (pw_workspace *w, const double *q,
+                                                                          const double *v) {
   if (w->s->coords > 3 * w->s->bodies) pw_point_to_internal (w, q, v);
   pw_configuration *p = w->configuration, *end = p + w->s->bodies;
   _Static_assert(PW_SINE_LANES == 2, "bodies are evaluated in pairs");

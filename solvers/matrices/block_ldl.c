@@ -672,27 +672,22 @@ PW_INLINE void dense_accelerate (int width, const pw_dense_group *p, const doubl
                                  double *a) {
   double z[3] = { 0 };
   PW_UNROLL for (int k = 0; k < width && f; k++) z[k] = f[p->j + k];
-  for (int r = 0; r < p->rows; r++)
-    PW_UNROLL for (int k = 0; k < width; k++) z[k] -= p->row[r].J[k] * y[p->row[r].i];
+  for (int r = 0; r < p->rows; r++) PW_UNROLL for (int k = 0; k < width; k++) z[k] -= p->row[r].J[k] * y[p->row[r].i];
   PW_UNROLL for (int k = 0; k < width; k++) a[p->j + k] = w[p->j + k] * z[k];
 }
 
 PW_INLINE void dense_run (int n, pw_block_ldl *l, int factors, const double *f, double *lambda, double *a) {
   const pw_dense *d = l->dense;
   double S[PW_DENSE * PW_DENSE], y[PW_DENSE];
-  if (lambda)
-    PW_UNROLL for (int i = 0; i < n; i++) y[i] = -lambda[d->unknown[i]];
-  if (factors)
-    PW_UNROLL for (int i = 0; i < n; i++)
-      PW_UNROLL for (int j = 0; j <= i; j++) S[i * n + j] = 0;
+  if (lambda) PW_UNROLL for (int i = 0; i < n; i++) y[i] = -lambda[d->unknown[i]];
+  if (factors) PW_UNROLL for (int i = 0; i < n; i++) PW_UNROLL for (int j = 0; j <= i; j++) S[i * n + j] = 0;
   if (factors || f)
     for (const pw_dense_group *p = d->group; p < d->group + d->coupled; p++)
       BLOCK_WIDTH (p->width, dense_assemble, p, l->inverse_weight, f, factors ? S : NULL, y, n);
   if (factors && n > 2 && d->padded) S[n * n - 1] = 1;
   if (factors) dense_factor (n, l, S);
   if (lambda == NULL) return;
-  PW_UNROLL for (int i = 1; i < n; i++)
-    PW_UNROLL for (int j = 0; j < i; j++) y[i] -= d->L[i * n + j] * y[j];
+  PW_UNROLL for (int i = 1; i < n; i++) PW_UNROLL for (int j = 0; j < i; j++) y[i] -= d->L[i * n + j] * y[j];
   PW_UNROLL for (int i = 0; i < n; i++) y[i] *= d->L[i * n + i];
   PW_UNROLL for (int i = n - 1; i >= 0; i--) {
     lambda[d->unknown[i]] = y[i];
@@ -702,8 +697,8 @@ PW_INLINE void dense_run (int n, pw_block_ldl *l, int factors, const double *f, 
     BLOCK_WIDTH (p->width, dense_accelerate, p, l->inverse_weight, f, y, a);
 }
 
-#define DENSE_CASE(n) \
-  case n:             \
+#define DENSE_CASE(n)                   \
+  case n:                               \
     dense_run (n, l, factors, f, y, a); \
     break;
 

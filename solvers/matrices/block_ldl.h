@@ -45,7 +45,7 @@
 #endif
 
 enum {
-  PW_DENSE = 10,       /* up to so many equations, S is a dense matrix */
+  PW_DENSE = 10,       /* most equations of a dense S */
   PW_BLOCK_NODE = 2,   /* most unknowns in a node */
   PW_BLOCK_RANKS = 3,  /* ranks of nodes: nodes of a lower rank are eliminated first */
   PW_BLOCK_LISTED = 64 /* most rows below the diagonal of a column whose targets are stored: n (n - 1) / 2 for n rows */
@@ -93,7 +93,7 @@ typedef struct {
   int includes_last; /* 1: the last pin is eliminated with the chain; 0: it only receives the update by the others */
 } pw_chain;
 
-/* The equations with entries in the columns of a group: these entries, and their rows of the dense matrix, ascending. */
+/* The equations with entries in the columns of a group: these entries, and rows of the dense matrix, ascending. */
 typedef struct {
   int j, width; /* first coordinate; columns */
   int rows;
@@ -106,9 +106,9 @@ typedef struct {
 /* S of a scene of few equations.  A matrix of an odd number of rows, 3 or more, has one more, that of the unit matrix,
  * with the unknown of the first row, which is stored after it. */
 typedef struct {
-  int n, padded;         /* rows; 1: the last one is that of the unit matrix */
-  int groups, coupled;   /* all; those that have rows, which come first */
-  int unknown[PW_DENSE]; /* of each row: index in y */
+  int n, padded;                 /* rows; 1: the last one is that of the unit matrix */
+  int groups, coupled;           /* all; those that have rows, which come first */
+  int unknown[PW_DENSE];         /* of each row: index in y */
   double L[PW_DENSE * PW_DENSE]; /* n x n: L below the diagonal, D^-1 on it */
   pw_dense_group group[];
 } pw_dense;

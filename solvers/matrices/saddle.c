@@ -14,8 +14,8 @@
  * matched to a constraint row and substituted out of the other rows.
  *
  * The rows and coordinates concerned form independent components, such as a massless body and its joints.  In each, the
- * matched rows p are P in the massless columns, a square matrix, and H in the massive ones, and the unmatched rows i are
- * K and Z.  With  P = L U,  Y = K P^-1,
+ * matched rows p are P in the massless columns, a square matrix, and H in the massive ones; the unmatched rows i are K
+ * and Z.  With  P = L U,  Y = K P^-1,
  *
  *     mu = P^-T f_P,     f~ = f - H^T mu,     Z' = Z - Y H,     gamma~ = gamma_i - Y gamma_p
  *
@@ -107,10 +107,10 @@ typedef struct pw_component {
                  * -1: its multiplier is 0 */
   const double **entry;  /* rows x pivots: the entries of P and K in the batches */
   massless_block *block; /* blocks */
-  double *P;             /* rows x pivots: L below the diagonal, U above it, the inverse of U's diagonal on it; then Y */
-  double *x;             /* rows: scratch */
-  double *A;             /* rows x cols: of unmatched rows Z', arbitrary in massless columns; scratch while matching */
-  double least_pivot;    /* the smallest pivot relative to its row, or norm of a row of Z' relative to its terms */
+  double *P;          /* rows x pivots: L below the diagonal, U above it, the inverse of U's diagonal on it; then Y */
+  double *x;          /* rows: scratch */
+  double *A;          /* rows x cols: of unmatched rows Z', arbitrary in massless columns; scratch while matching */
+  double least_pivot; /* the smallest pivot relative to its row, or norm of a row of Z' relative to its terms */
 } pw_component;
 
 /* The contribution of a node to a group. */
@@ -259,8 +259,7 @@ static int massless_match (pw_component *c) {
 
 /* ---- Massless coordinates: elimination ----
  *
- * n is c->pivots: an argument, since it is the constant 2 or 3 in most calls, so that loops are unrolled and small arrays
- * are in registers. */
+ * n is c->pivots: an argument, since it is the constant 2 or 3 in most calls, so that loops are unrolled. */
 
 enum { MASSLESS_LOCAL = 3 };
 
@@ -289,8 +288,7 @@ PW_INLINE int massless_factor_P (int n, pw_component *c, double *P) {
 
 /* x = P^-1 x */
 PW_INLINE void massless_solve_P (int n, const double *P, double *x) {
-  PW_UNROLL for (int i = 1; i < n; i++)
-    PW_UNROLL for (int j = 0; j < i; j++) x[i] -= P[i * n + j] * x[j];
+  PW_UNROLL for (int i = 1; i < n; i++) PW_UNROLL for (int j = 0; j < i; j++) x[i] -= P[i * n + j] * x[j];
   PW_UNROLL for (int i = n - 1; i >= 0; i--) {
     PW_UNROLL for (int j = i + 1; j < n; j++) x[i] -= P[i * n + j] * x[j];
     x[i] *= P[i * n + i];
@@ -303,12 +301,11 @@ PW_INLINE void massless_solve_PT (int n, const double *P, double *x) {
     PW_UNROLL for (int j = 0; j < i; j++) x[i] -= P[j * n + i] * x[j];
     x[i] *= P[i * n + i];
   }
-  PW_UNROLL for (int i = n - 2; i >= 0; i--)
-    PW_UNROLL for (int j = i + 1; j < n; j++) x[i] -= P[j * n + i] * x[j];
+  PW_UNROLL for (int i = n - 2; i >= 0; i--) PW_UNROLL for (int j = i + 1; j < n; j++) x[i] -= P[j * n + i] * x[j];
 }
 
-/* Y and Z' of the unmatched rows.  Round-off leaves of a dependent row something of any direction: only its size, relative
- * to the terms, shows that. */
+/* Y and Z' of the unmatched rows.  What round-off leaves of a dependent row has any direction: only its size, relative
+ * to the terms, reveals it. */
 static void massless_unmatched (pw_component *c) {
   for (int i = c->pivots; i < c->rows; i++) {
     double *Y = c->P + i * c->pivots, *Z = c->A + i * c->cols, terms;
@@ -332,8 +329,7 @@ static void massless_unmatched (pw_component *c) {
 PW_INLINE int massless_eliminate (int n, pw_component *c) {
   double local[MASSLESS_LOCAL * MASSLESS_LOCAL];
   if (!massless_factor_P (n, c, n <= MASSLESS_LOCAL ? local : c->P)) return 0;
-  if (n <= MASSLESS_LOCAL)
-    PW_UNROLL for (int i = 0; i < n * n; i++) c->P[i] = local[i];
+  if (n <= MASSLESS_LOCAL) PW_UNROLL for (int i = 0; i < n * n; i++) c->P[i] = local[i];
   if (c->rows > n) massless_unmatched (c);
   return 1;
 }
@@ -370,10 +366,10 @@ PW_SELDOM void massless_forward_component_any (pw_component *c, double *f, doubl
   massless_forward_component (c->pivots, c, f, gamma);
 }
 
-/* First, if `factors`, eliminates with the J last evaluated, and matches again if a pivot has become much smaller than
- * when it was matched.  Then, unless gamma is NULL, the first half of a solution: saddle->force becomes f~ at the massive
- * coordinates, gamma becomes gamma~ at `unknown` of unmatched rows.  Returns the square of the least of all `least_pivot`,
- * at most 1; 0 if singular. */
+/* If `factors`, eliminates with the J last evaluated, and matches again if a pivot has become much smaller than when it
+ * was matched.  Then, unless gamma is NULL, does the first half of a solution: saddle->force becomes f~ at the massive
+ * coordinates, gamma becomes gamma~ at `unknown` of unmatched rows.  Returns the square of the least `least_pivot`, at
+ * most 1; 0 if singular. */
 PW_INLINE double massless_forward (pw_saddle *saddle, int factors, double *gamma) {
   double least = 1;
   pw_component *c = saddle->component;
