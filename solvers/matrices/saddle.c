@@ -162,9 +162,12 @@ static inline void massless_copy (pw_component *c, int i) {
 
 /* The weighted sum of the squares of the entries of row i. */
 static double massless_square (const pw_component *c, int i, const double *weight) {
-  const double *A = c->A + i * c->cols;
   double sum = 0;
-  for (int n = 0; n < c->cols; n++) sum += weight[n] * A[n] * A[n];
+  for (const massless_group *g = c->group, *end = g + c->groups; g < end; g++) {
+    const double *A = c->A + i * c->cols + g->column, *w = weight + g->column;
+    sum += w[0] * A[0] * A[0];
+    if (g->width == 3) sum += w[1] * A[1] * A[1] + w[2] * A[2] * A[2];
+  }
   return sum;
 }
 
@@ -259,13 +262,16 @@ static int massless_match (pw_component *c) {
 
 /* ---- Massless coordinates: elimination ----
  *
- * n is c->pivots: an argument, since it is the constant 2 or 3 in most calls, so that loops are unrolled. */
+ * n is c->pivots: an argument, since it is the constant 1, 2 or 3 in most calls, so that loops are unrolled. */
 
 enum { MASSLESS_LOCAL = 3 };
 
-/* Calls f (n, c, ...), with the constant 2 or 3, or f_any (c, ...), a function that is not inlined. */
-#define MASSLESS_PIVOTS(f, ...) \
-  (c->pivots == 3 ? f (3, __VA_ARGS__) : c->pivots == 2 ? f (2, __VA_ARGS__) : f##_any (__VA_ARGS__))
+/* Calls f (n, c, ...), with the constant 1, 2 or 3, or f_any (c, ...), a function that is not inlined. */
+#define MASSLESS_PIVOTS(f, ...)              \
+  (c->pivots == 3   ? f (3, __VA_ARGS__)     \
+   : c->pivots == 2 ? f (2, __VA_ARGS__)     \
+   : c->pivots == 1 ? f (1, __VA_ARGS__)     \
+                    : f##_any (__VA_ARGS__))
 
 /* P = L U.  Returns 0 if a pivot has become much smaller than when it was matched. */
 PW_INLINE int massless_factor_P (int n, pw_component *c, double *P) {
@@ -306,18 +312,18 @@ PW_INLINE void massless_solve_PT (int n, const double *P, double *x) {
 
 /* Y and Z' of the unmatched rows.  What round-off leaves of a dependent row has any direction: only its size, relative
  * to the terms, reveals it. */
-static void massless_unmatched (pw_component *c) {
-  for (int i = c->pivots; i < c->rows; i++) {
-    double *Y = c->P + i * c->pivots, *Z = c->A + i * c->cols, terms;
+PW_SELDOM void massless_unmatched (int n, pw_component *c) {
+  for (int i = n; i < c->rows; i++) {
+    double *Y = c->P + i * n, *Z = c->A + i * c->cols, terms;
     massless_copy (c, i);
     terms = massless_square (c, i, c->squared_scale);
-    for (int p = 0; p < c->pivots; p++) Y[p] = *c->entry[i * c->pivots + p];
-    massless_solve_PT (c->pivots, c->P, Y);
+    for (int p = 0; p < n; p++) Y[p] = *c->entry[i * n + p];
+    massless_solve_PT (n, c->P, Y);
     for (const massless_block *b = c->block; b < c->block + c->blocks; b++)
-      for (int n = 0; n < b->width; n++) {
-        double term = Y[b->p] * b->J[n];
-        Z[b->column + n] -= term;
-        terms += c->massive_squared_scale[b->column + n] * term * term;
+      for (int k = 0; k < b->width; k++) {
+        double term = Y[b->p] * b->J[k];
+        Z[b->column + k] -= term;
+        terms += c->massive_squared_scale[b->column + k] * term * term;
       }
     double remainder = terms > 0 ? sqrt (massless_square (c, i, c->massive_squared_scale) / terms) : 0;
     if (!(remainder >= c->least_pivot)) c->least_pivot = remainder;
@@ -330,7 +336,7 @@ PW_INLINE int massless_eliminate (int n, pw_component *c) {
   double local[MASSLESS_LOCAL * MASSLESS_LOCAL];
   if (!massless_factor_P (n, c, n <= MASSLESS_LOCAL ? local : c->P)) return 0;
   if (n <= MASSLESS_LOCAL) PW_UNROLL for (int i = 0; i < n * n; i++) c->P[i] = local[i];
-  if (c->rows > n) massless_unmatched (c);
+  if (c->rows > n) massless_unmatched (n, c);
   return 1;
 }
 
