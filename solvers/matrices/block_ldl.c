@@ -635,14 +635,16 @@ void pw_block_solve (const pw_block_ldl *l, const double *f, double *y, double *
  * (Golub & Van Loan 2013, Matrix Computations, algorithm 4.1.2), with n, the number of rows, constant where these
  * functions are inlined, so that all loops over rows are unrolled. */
 
-/* S += J W^-1 J^T and y += J W^-1 f for a group; neither if it is NULL. */
+/* S += J W^-1 J^T and y += J W^-1 f for a group; neither if it is NULL.  With n = 1 a group has one row. */
 PW_INLINE void dense_assemble (int width, const pw_dense_group *p, const double *w, const double *f, double *S,
                                double *y, int n) {
-  for (int r = 0; r < p->rows; r++) {
+  const int rows = n == 1 ? 1 : p->rows;
+  for (int r = 0; r < rows; r++) {
     const block_row R = block_weigh (width, p->row[r].J, w + p->j);
-    if (f) y[p->row[r].i] += block_product (width, R, f + p->j);
-    double *row = S + p->row[r].i * n;
-    for (int q = 0; S && q <= r; q++) row[p->row[q].i] += block_product (width, R, p->row[q].J);
+    const int i = n == 1 ? 0 : p->row[r].i;
+    if (f) y[i] += block_product (width, R, f + p->j);
+    double *row = S + i * n;
+    for (int q = 0; S && q <= r; q++) row[n == 1 ? 0 : p->row[q].i] += block_product (width, R, p->row[q].J);
   }
 }
 
