@@ -267,10 +267,10 @@ static int massless_match (pw_component *c) {
 enum { MASSLESS_LOCAL = 3 };
 
 /* Calls f (n, c, ...), with the constant 1, 2 or 3, or f_any (c, ...), a function that is not inlined. */
-#define MASSLESS_PIVOTS(f, ...)              \
-  (c->pivots == 3   ? f (3, __VA_ARGS__)     \
-   : c->pivots == 2 ? f (2, __VA_ARGS__)     \
-   : c->pivots == 1 ? f (1, __VA_ARGS__)     \
+#define MASSLESS_PIVOTS(f, ...)          \
+  (c->pivots == 3   ? f (3, __VA_ARGS__) \
+   : c->pivots == 2 ? f (2, __VA_ARGS__) \
+   : c->pivots == 1 ? f (1, __VA_ARGS__) \
                     : f##_any (__VA_ARGS__))
 
 /* P = L U.  Returns 0 if a pivot has become much smaller than when it was matched. */
