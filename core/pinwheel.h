@@ -248,6 +248,25 @@ int pw_add_body (pw_model *m, const pw_body *body);
  * including names.  Returns as pw_add_body. */
 int pw_add (pw_model *m, const pw_kind *kind, const void *definition);
 
+/* An output: a number with a name, such as a tracking error, computed where a sample of a run is taken.  Tables have it
+ * as a column, and analyses find it by its name.  It has no effect on the motion. */
+typedef struct {
+  const char
+      *name; /* a letter or _, then letters, digits and _, at most 63; differs from all other names and columns */
+  const char *unit;  /* an SI unit, "m", for display; NULL: none */
+  const char *about; /* what it means, in a few words; NULL: not said */
+  /* `eval` stores value[0], for which x contains the columns that `reads` names: states ("car.y"), places of wheels and
+   * markers ("pencil.x"), reactions ("B.Fx"), kinetic, potential, work, loss, works and losses of elements, outputs
+   * added before.  gradient is NULL, value[1] and value[2] are ignored, breakpoint is not called.  If it returns
+   * non-zero, the output is NaN there. */
+  pw_function value;
+} pw_named_output;
+
+enum { PW_MOST_OUTPUTS = 1000, PW_OUTPUT_READS = 31 }; /* outputs of a model; columns that one reads */
+
+/* Adds an output.  The model keeps a copy, including texts.  Returns as pw_add_body. */
+int pw_add_output (pw_model *m, const pw_named_output *output);
+
 /* For build functions: rejects the parameters with a message ("links: at most 1000").  Returns PW_INPUT. */
 int pw_model_refuse (pw_model *m, const char *format, ...) PW_PRINTF (2, 3);
 
@@ -462,9 +481,10 @@ typedef struct {
  * It has no mass: energies do not contain it. */
 typedef struct {
   const char *name;
-  pw_signal rate;   /* of the time, positions, velocities and states, also of z itself [unit/s] */
-  double start;     /* initial value [unit] */
-  const char *unit; /* "rad s"; NULL or "": none */
+  pw_signal rate;    /* of the time, positions, velocities and states, also of z itself [unit/s] */
+  double start;      /* initial value [unit] */
+  const char *unit;  /* "rad s"; NULL or "": none */
+  const char *about; /* what it means, in a few words; NULL: not said */
 } pw_state;
 
 /* Marker: a point of a body that appears in tables, figures and animations.  It has no effect on the motion. */
@@ -701,6 +721,7 @@ const pw_element *pw_model_elements (const pw_model *m, int *count);
 static inline const char *pw_element_name (const pw_element *e) {
   return *(const char *const *)e->definition;
 }
+const pw_named_output *pw_model_outputs (const pw_model *m, int *count);
 int pw_model_initials (const pw_model *m); /* number of values set by pw_model_set_initial */
 
 /* Reference solution of a text model: expressions of time for some states; names used in them and in signals. */
@@ -724,10 +745,12 @@ int pw_model_keep (pw_model *m, void *object, void (*free_object) (void *object)
 /* The first error of a model; a build function may set it. */
 pw_error *pw_model_error (pw_model *m);
 
-/* Check a body and an element as pw_system_compile does, except whether names are unique, whether the bodies of the
- * element exist, and what `prepare` checks.  Errors: PW_INPUT, beginning with "model NAME: ". */
+/* Check a body, an element and an output as pw_system_compile does, except whether names are unique, whether bodies of
+ * the element and columns of the output exist, and what `prepare` checks.  Errors: PW_INPUT, beginning with
+ * "model NAME: ". */
 int pw_model_check_body (const pw_model *m, const pw_body *body, pw_error *error);
 int pw_model_check_element (const pw_model *m, const pw_element *element, pw_error *error);
+int pw_model_check_output (const pw_model *m, const pw_named_output *output, pw_error *error);
 
 /* Writes the fault of a signal used by an element type, or "", to the buffer, which is returned.  *point: the faulty
  * point of a table, or -1. */

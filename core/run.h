@@ -32,7 +32,58 @@ typedef struct {
   double projection;    /* energy added by projections after steps [J]; 0 without pw_settings.ledger, and with bdf */
   double balance;       /* change of (kinetic + potential) - work + loss - projection [J] */
   const double *integral; /* pw_settings.integrals: integrals of the functions since the initial time */
+  const double *output;   /* outputs of the model, pw_system_outputs */
 } pw_sample;
+
+/* ---- Columns: the numbers of a sample by name ---- */
+
+typedef enum {
+  PW_COLUMN_TIME,
+  PW_COLUMN_STATE,
+  PW_COLUMN_CONTACT, /* places of wheels and markers */
+  PW_COLUMN_REACTION,
+  PW_COLUMN_POSITION, /* scaled residuals of g = 0 and of J v = eta */
+  PW_COLUMN_VELOCITY,
+  PW_COLUMN_KINETIC, /* energies; columns from PW_COLUMN_LEDGER on, but not outputs, need pw_settings.ledger */
+  PW_COLUMN_POTENTIAL,
+  PW_COLUMN_LEDGER, /* works and losses of elements */
+  PW_COLUMN_PROJECTION,
+  PW_COLUMN_BALANCE,
+  PW_COLUMN_WORK, /* pw_sample.work and loss, which tables do not have */
+  PW_COLUMN_LOSS,
+  PW_COLUMN_OUTPUT,
+  PW_COLUMN_TYPES
+} pw_column_type;
+
+typedef struct {
+  pw_column_type type;
+  int index; /* of the state, constraint equation, ledger entry, output; contact i: 2 i for x, 2 i + 1 for y; or 0 */
+} pw_column;
+
+/* The number of columns of a type; name, as pw_system_state_name, and unit of one. */
+int pw_system_columns (const pw_system *s, pw_column_type type);
+char *pw_system_column_name (const pw_system *s, pw_column c, char *buffer, size_t size);
+const char *pw_system_column_unit (const pw_system *s, pw_column c);
+
+/* Finds the column of this name.  PW_INPUT, with the nearest name, if there is none. */
+int pw_system_find_column (const pw_system *s, const char *name, pw_column *c, pw_error *error);
+
+/* Finds a column of an element by the part of its name after the element's, "Fx": its type, and its index among those
+ * of the element; of an entry of the ledger 0 for "work", 1 for "loss".  kind NULL: a column that is one number of a
+ * sample, "kinetic".  1 if there is one, else 0. */
+int pw_kind_find_column (const pw_kind *kind, const char *name, pw_column *c);
+
+/* The number of outputs; name and unit, "" without one; the types of the columns that it reads, itself or by other
+ * outputs: 1 << type or'ed. */
+int pw_system_outputs (const pw_system *s);
+const char *pw_system_output_name (const pw_system *s, int output);
+const char *pw_system_output_unit (const pw_system *s, int output);
+unsigned pw_system_output_reads (const pw_system *s, int output);
+
+/* Stores the values of columns in a sample.  NaN: works and losses of elements without pw_settings.ledger, outputs that
+ * have no value there.  Errors: PW_METHOD if a signal fails, PW_RESOURCE. */
+int pw_workspace_columns (pw_workspace *w, const pw_sample *x, const pw_column *c, int count, double *value,
+                          pw_error *error);
 
 /* How to integrate; zeros select the defaults. */
 typedef struct {
@@ -47,8 +98,8 @@ typedef struct {
 
   /* Integrals over the run, from its initial time on, of `integrals` functions of its state, by the method's stages and
    * in its error control, like work and losses.  `integrand` stores the functions at a state, a sample of which only t,
-   * q, v, lambda, kinetic, potential and, in place of ledger, work and loss, their rates [W] are set.  Runs with
-   * integrals do not use specialised code. */
+   * q, v, lambda, kinetic, potential, output and, in place of ledger, work and loss, their rates [W] are set; outputs
+   * that read works or losses are NaN.  Runs with integrals do not use specialised code. */
   int integrals;
   void (*integrand) (void *context, const pw_sample *state, double *value);
   void *integrand_context;

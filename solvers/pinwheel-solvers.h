@@ -121,6 +121,25 @@ double pw_run_time (const pw_run *r);
  * outside the step; PW_METHOD if a signal fails there, or no state satisfies the constraints; PW_RESOURCE. */
 int pw_run_sample (pw_run *r, double t, pw_sample *sample, pw_error *error);
 
+/* A function of the sample of which the first time is sought at which it is positive: a condition becomes true, an
+ * event occurs.  Set value and context, the rest to 0. */
+typedef struct {
+  double (*value) (void *context, const pw_sample *sample); /* NaN counts as not positive */
+  void *context;
+  /* private: the time of the last call, and the value there */
+  int begun;
+  double t, last;
+} pw_crossing;
+
+/* Call it before the first step and after each one (pw_run_advance).  Stores the first time in the last step, its end
+ * included, at which the function is positive, up to round-off: an instant before it is not; NaN if it is not positive.
+ * Once it has been positive, set `begun` to 0 where it may be sought again.
+ *
+ * Changes of sign between the step's ends are always found.  Of a function that becomes positive and returns within a
+ * step, those are found that its values at the ends and the middle suggest: all that last more than half of a step, and
+ * of smooth functions all where a parabola describes it over a sixteenth of the step. Errors: as pw_run_sample. */
+int pw_run_find_crossing (pw_run *r, pw_crossing *x, double *t, pw_error *error);
+
 /* Energy defect of a sample, including energy added by projections, relative to the energy that the run has
  * exchanged: the largest of its kinetic energy, the change of its potential energy, and the kinetic energy of moving
  * by L and 1 rad in the span of the run.  If that is zero, relative to the larger of work and loss. */
@@ -194,8 +213,8 @@ int pw_initial_given (const pw_initial_report *report, int state);
  * when t_end is reached, the rows are full, or after `steps` calls of pw_run_advance_towards (times: NULL: of
  * pw_run_advance): call it again, with the rest of the times; otherwise as pw_run_advance.  A row is t, scaled
  * residuals of g = 0 and J v = eta, kinetic and potential energy, work, loss, energy added by projections, balance
- * (PW_RECORD_STATES numbers), then q, v, a, x and y of the contact points, reactions (-lambda) and, with
- * pw_settings.ledger, the ledger's entries. */
+ * (PW_RECORD_STATES numbers), then q, v, a, x and y of the contact points, reactions (-lambda), outputs and,
+ * with pw_settings.ledger, the ledger's entries. */
 enum { PW_RECORD_STATES = 9 }; /* index of the first coordinate in a row */
 int pw_run_record_width (const pw_run *r);
 int pw_system_record_width (const pw_system *s, int ledger); /* of runs with pw_settings.ledger = ledger */

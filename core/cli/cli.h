@@ -106,7 +106,7 @@ typedef struct {
   int arguments;
   const char **sets, **starts; /* "NAME=VALUE" of each --set and --start; ended by NULL */
   const char *max_file;
-  const char *method, *t_end, *step, *rtol, *atol, *max_steps, *limit, *specialise, *width;
+  const char *method, *t_end, *step, *rtol, *atol, *max_steps, *limit, *specialise, *width, *until;
   /* private */
   poptContext popt;
   struct poptOption *table; /* a copy of the command's options, bound to its structure */
@@ -160,6 +160,9 @@ PW_COMMANDS (PW_COMMAND)
       PW_TEXT_OPTION (pw_cli_line, limit, "limit", 0, "SECONDS",                                    \
                       "Stop a run after this much processor time (default unlimited)"),             \
       PW_ENGINE_OPTION
+#define PW_UNTIL_OPTION                                        \
+  PW_TEXT_OPTION (pw_cli_line, until, "until", 0, "CONDITION", \
+                  "End the run when a condition on columns becomes true, such as \"car.x > 10\"")
 #define PW_LIMIT_OPTION \
   PW_TEXT_OPTION (pw_cli_line, limit, "limit", 0, "SECONDS", "Stop after this much processor time (default unlimited)")
 #define PW_ENGINE_OPTION                                                                                    \

@@ -93,8 +93,7 @@ static void yaml_value (const pw_field *f, const void *at, int digits) {
   if (f->type == PW_BODY) yaml_name (*(const char *const *)at);
   if (f->type == PW_SIGNAL) yaml_signal (at, digits);
   if (f->type == PW_CHOICE) fputs (f->choices[*(const int *)at], stdout);
-  const char *text = f->type == PW_TEXT ? *(const char *const *)at : NULL;
-  if (f->type == PW_TEXT) yaml_text (text ? text : "");
+  if (f->type == PW_TEXT) yaml_text (*(const char *const *)at);
 }
 
 /* The values of a field as in a text model. */
@@ -174,6 +173,10 @@ static int yaml_check (const pw_model *m, pw_error *error) {
                           f->name, kind, name);
     }
   }
+  int outputs;
+  for (const pw_named_output *o = pw_model_outputs (m, &outputs), *end = o + outputs; o < end; o++)
+    if (o->value.text == NULL)
+      return pw_fail (error, PW_INPUT, "model %s cannot be written as text: output %s is a function", model, o->name);
   if (pw_model_initials (m))
     return pw_fail (error, PW_INPUT,
                     "--yaml: initial values of --start have no place in a text model; give them to run");
@@ -188,6 +191,18 @@ static void yaml_run (const pw_run_defaults *run) {
     if (value[i] != 0) printf ("%s%s: %s", separator, key[i], YAML_NUMBER (value[i])), separator = ", ";
   if (run->method) printf ("%smethod: ", separator), yaml_text (run->method), separator = ", ";
   if (*separator == ',') puts ("}");
+}
+
+static void yaml_outputs (const pw_model *m) {
+  int count;
+  const pw_named_output *o = pw_model_outputs (m, &count);
+  if (count) puts ("outputs:");
+  for (const pw_named_output *end = o + count; o < end; o++) {
+    printf ("  - {name: %s, value: ", o->name), yaml_text (o->value.text->part[0]);
+    if (o->unit) printf (", unit: "), yaml_text (o->unit);
+    if (o->about) printf (", about: "), yaml_text (o->about);
+    puts ("}");
+  }
 }
 
 /* Writes a built model to standard output, without a reference solution in C. */
@@ -214,6 +229,7 @@ static int yaml_model (const pw_cli_model *opened, pw_error *error) {
       yaml_fields (x->kind->fields, x->definition, ", ", YAML_DIGITS);
       puts ("}");
     }
+  yaml_outputs (m);
   if (table->reference)
     puts ("# The reference solution of the model is a function in C, which cannot be written as text.");
   if (ref->states) puts ("truth:");
@@ -245,11 +261,26 @@ static void show_bodies (const pw_system *s) {
 static void show_element (const pw_element *e) {
   printf ("  %s %s: ", e->kind->name, pw_element_name (e));
   for (const pw_field *f = e->kind->fields; f->name; f++) {
+    if (f->type == PW_TEXT && yaml_is_default (f, (const char *)e->definition + f->offset)) continue;
     printf ("%s%s ", f == e->kind->fields ? "" : "; ", f->name);
     yaml_field (f, (const char *)e->definition + f->offset, SHOW_DIGITS);
     if (f->unit) printf (" %s", f->unit);
   }
   putchar ('\n');
+}
+
+static void show_outputs (const pw_model *m) {
+  int count;
+  const pw_named_output *outputs = pw_model_outputs (m, &count);
+  if (count > 0) puts ("\nOutputs");
+  for (pw_table t = { 0 }; pw_table_pass (&t);)
+    for (const pw_named_output *o = outputs; o < outputs + count; o++) {
+      pw_cell (&t, -1, o->name);
+      pw_cell (&t, -1, o->unit ? o->unit : "");
+      pw_cell (&t, -1, o->value.text ? o->value.text->part[0] : "a function");
+      pw_cell (&t, -1, o->about ? o->about : "");
+      pw_row_end (&t);
+    }
 }
 
 static void show_parameters (const pw_model *m) {
@@ -295,6 +326,7 @@ static void show_model (const pw_cli_model *m) {
   show_bodies (s);
   if (elements) puts ("\nElements");
   for (int i = 0; i < elements; i++) show_element (&e[i]);
+  show_outputs (m->model);
   if (differences) puts ("\nDerivatives by differences, for implicit methods and linearisation");
   for (int i = 0; i < differences; i++) printf ("  %s\n", PW_NAME (pw_system_difference_name, s, i));
   show_parameters (m->model);

@@ -1,6 +1,6 @@
 /* Tables of samples: CSV with a line per sample, or NumPy archives.  The columns are
  *
- *   t [s] | states of each body, of each internal coordinate | contact points | reactions | residuals | energies
+ *   t [s] | states of bodies, of internal coordinates | contact points | reactions | outputs | residuals | energies
  *
  * The functions of a group of columns write their names or their values, as pw_csv.names says. */
 #include <errno.h>
@@ -84,6 +84,8 @@ static int csv_line (pw_csv *c, int names, const pw_sample *x, pw_error *error) 
   for (int i = 0; i < pw_system_rows (s); i++)
     CSV_CELL (c, PW_NAME (pw_system_reaction_name, s, i), pw_system_reaction_unit (s, i),
               0 - x->lambda[i]); /* avoids -0 */
+  for (int i = 0; i < pw_system_outputs (s); i++)
+    CSV_CELL (c, pw_system_output_name (s, i), pw_system_output_unit (s, i), x->output[i]);
   CSV_CELL (c, "residual.position", NULL, x->position);
   CSV_CELL (c, "residual.velocity", NULL, x->velocity);
   if (c->ledger) {

@@ -22,13 +22,17 @@ enum { PW_EXPRESSION_TIME = 0 };
 
 /* ---- Reading ---- */
 
-/* Named numbers. */
+/* Named numbers, and names that stand for expressions of variables. */
 typedef struct {
   int names;
   const char **name; /* names */
   double *value;     /* names */
   pw_names index;    /* the index of each name */
   int room;          /* names for which there is memory */
+  /* The text of the expression that a name stands for, which is read in place of the name, or NULL.  Variables have
+   * precedence.  May be NULL. */
+  const char *(*expand) (void *context, const char *name);
+  void *context;
 } pw_scope;
 
 /* Makes room for `room` names in an arena; the scope must be { 0 } at first.  PW_OK or PW_RESOURCE. */

@@ -147,6 +147,11 @@ static void json_sample (pw_json *j, const pw_system *s, const pw_sample *x, int
   for (int i = 0; i < pw_system_rows (s); i++)
     pw_json_number (j, PW_NAME (pw_system_reaction_name, s, i), 0 - x->lambda[i]);
   pw_json_close (j, '}');
+  if (pw_system_outputs (s) > 0) {
+    pw_json_open (j, "outputs", '{');
+    for (int i = 0; i < pw_system_outputs (s); i++) pw_json_number (j, pw_system_output_name (s, i), x->output[i]);
+    pw_json_close (j, '}');
+  }
   const double energy[] = { x->kinetic, x->potential, x->work, x->loss, x->projection, x->balance };
   json_numbers (j, "energy", names, ledger ? energy : NULL, 6);
 }
@@ -217,6 +222,11 @@ int pw_json_write (const pw_summary *summary, const pw_system *s, const pw_sampl
   pw_json_text (&j, "engine", summary->general == NULL ? NULL : *summary->general ? "general" : "specialised");
   pw_json_text (&j, "engine_reason", summary->general);
   json_sample (&j, s, sample, ledger);
+  if (summary->until)
+    pw_json_text (&j, "stopped",
+                  isnan (summary->stop_time) ? NULL
+                                             : PW_PRINTED (400, "%.300s at t = %s s", summary->until,
+                                                           pw_format ((char[32]){ 0 }, summary->stop_time, 17)));
   pw_json_number (&j, "unbalanced", summary->energy_defect);
   json_lists (&j, summary->redundant, s);
   json_reference (&j, summary->reference);

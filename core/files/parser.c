@@ -7,6 +7,8 @@
  *   operand  = number | name | function (choice, ...) | (choice)
  *
  * Parts without variables are evaluated immediately.  Errors are reported at their position. */
+#include <float.h>
+#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -272,15 +274,40 @@ static int parser_is_call (const parser *p) {
   return after[strspn (after, " \t\r\n")] == '(';
 }
 
+/* Reads an expression in place of the current token, the name of it.  Errors are reported at the name. */
+static parser_part parser_expand (parser *p, const char *name, const char *expanded) {
+  const char *text = p->text;
+  const size_t at = p->at, size = p->size;
+  if (p->variable == NULL)
+    return parser_fail (p, at, "\"%s\" changes during the motion, and this number must not", name);
+  if (!parser_enter (p)) return (parser_part){ 0 };
+  p->text = expanded, p->at = p->size = 0;
+  parser_next (p);
+  parser_part part = parser_choice (p);
+  if (p->status == PW_OK && p->type != 0) parser_unexpected (p, 0, 0);
+  p->depth--;
+  p->text = text, p->at = part.from = at, p->size = size;
+  if (p->status == PW_OK) return parser_next (p), part;
+  if (p->status == PW_INPUT) {
+    p->error->at = at;
+    memcpy (p->error->text, PW_PRINTED (sizeof p->error->text, "in \"%.63s\": %s", name, p->error->text),
+            sizeof p->error->text);
+  }
+  return (parser_part){ 0 };
+}
+
 /* constant: the constant of this name, or NULL; other names have precedence. */
 static parser_part parser_name (parser *p, const char *name, const pw_expression_function *constant) {
   int variable = 0, named = p->scope ? pw_names_find (&p->scope->index, name) : -1;
   while (p->variable && p->variable[variable] && strcmp (p->variable[variable], name) != 0) variable++;
   int is_variable = p->variable && p->variable[variable];
-  if (!is_variable && named < 0 && constant == NULL) return parser_unknown (p, name);
+  const char *expanded =
+      !is_variable && p->scope && p->scope->expand ? p->scope->expand (p->scope->context, name) : NULL;
+  if (!is_variable && named < 0 && constant == NULL && expanded == NULL) return parser_unknown (p, name);
   if (parser_is_call (p))
     return parser_fail (p, p->at, "\"%s\" is a number, not a function; a product is written with *", name);
   if (is_variable) return parser_leaf (p, PW_OP_VARIABLE, variable, 0);
+  if (expanded) return parser_expand (p, name, expanded);
   return parser_leaf (p, PW_OP_CONSTANT, 0, named >= 0 ? p->scope->value[named] : constant->value);
 }
 
@@ -467,4 +494,109 @@ double pw_formula_value (const pw_formula *f, const double *value) {
 void pw_formula_close (pw_formula *f) {
   if (f) pw_arena_free (&f->arena);
   free (f);
+}
+
+/* ---- Conditions ---- */
+
+struct pw_condition {
+  pw_arena arena;
+  const pw_expression *expression;
+  pw_workspace *workspace;
+  pw_column column[PW_FORMULA_NAMES]; /* names of the expression */
+  int columns, needs_ledger;
+};
+
+/* How far an operation's result is from changing its truth, > 0 if it is true; left, right: values of its operands. */
+static double condition_margin (int op, double value, double left, double right) {
+  const double difference = left - right;
+  switch (op) {
+  case PW_OP_LESS:
+    return -difference;
+  case PW_OP_GREATER:
+    return difference;
+  case PW_OP_LESS_EQUAL:
+    return difference <= 0 ? fmax (-difference, DBL_MIN) : -difference;
+  case PW_OP_GREATER_EQUAL:
+    return difference >= 0 ? fmax (difference, DBL_MIN) : difference;
+  default:
+    return value != 0 ? DBL_MAX : -DBL_MAX; /* a number, which is true unless it is 0 */
+  }
+}
+
+double pw_condition_value (void *condition, const pw_sample *x) {
+  const pw_condition *c = condition;
+  double variable[PW_FORMULA_NAMES], value[PW_EXPRESSION_STACK], margin[PW_EXPRESSION_STACK];
+  int n = 0;
+  if (pw_workspace_columns (c->workspace, x, c->column, c->columns, variable, NULL) != PW_OK) return NAN;
+  for (const pw_expression_code *o = c->expression->code, *end = o + c->expression->codes; o < end; o++) {
+    const int operands = pw_expression_operands (o->op);
+    n -= operands;
+    if (o->op == PW_OP_SELECT) {
+      margin[n] = margin[n + 1] == DBL_MAX ? fmax (margin[n], margin[n + 2]) /* a || b */
+                                           : fmax (fmin (margin[n], margin[n + 1]), fmin (-margin[n], margin[n + 2]));
+      value[n] = value[n] != 0 ? value[n + 1] : value[n + 2];
+    } else {
+      const double left = operands > 0 ? value[n] : 0, right = operands > 1 ? value[n + 1] : left;
+      value[n] = o->op == PW_OP_CONSTANT   ? o->value
+                 : o->op == PW_OP_VARIABLE ? variable[o->index]
+                                           : pw_expression_apply (o, left, right);
+      margin[n] = condition_margin (o->op, value[n], left, right);
+    }
+    n++;
+  }
+  return margin[0];
+}
+
+/* Finds the columns that the names of the text name, except functions and constants. */
+static int condition_columns (pw_condition *c, const pw_system *s, const char *text, const char **names,
+                              pw_error *error) {
+  char name[PW_EXPRESSION_NAME];
+  for (const char *rest = text; pw_expression_next_name (&rest, name) != NULL;) {
+    int i = 0;
+    if (pw_expression_is_reserved (name)) continue;
+    while (i < c->columns && strcmp (names[i], name) != 0) i++;
+    if (i < c->columns) continue;
+    if (i == PW_FORMULA_NAMES) return pw_fail (error, PW_INPUT, "more than %d columns", PW_FORMULA_NAMES);
+    if (pw_system_find_column (s, name, &c->column[i], error) != PW_OK) return PW_INPUT;
+    const pw_column_type type = c->column[i].type;
+    c->needs_ledger |= type > PW_COLUMN_POTENTIAL && type < PW_COLUMN_OUTPUT;
+    if ((names[i] = pw_arena_copy (&c->arena, name)) == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+    c->columns++;
+  }
+  return PW_OK;
+}
+
+static int condition_read (pw_condition *c, const pw_system *s, const char *text, pw_error *error) {
+  const char *names[PW_FORMULA_NAMES + 1] = { NULL };
+  pw_expression_error why;
+  if (condition_columns (c, s, text, names, error) != PW_OK) return error->status;
+  int status = pw_expression_read (NULL, names, text, &c->arena, &c->expression, &why);
+  if (status != PW_OK) return pw_fail (error, status, "%s", status == PW_INPUT ? why.text : "out of memory");
+  const int last = c->expression->code[c->expression->codes - 1].op;
+  for (int i = 0; i < c->expression->codes; i++)
+    if (c->expression->code[i].op == PW_OP_EQUAL)
+      return pw_fail (error, PW_INPUT, "== holds at an instant only, which no step meets; use <= or >=");
+  if (last == PW_OP_SELECT || (last >= PW_OP_LESS && last <= PW_OP_GREATER_EQUAL)) return PW_OK;
+  return pw_fail (error, PW_INPUT, "expected a condition, such as \"car.x > 10\"");
+}
+
+pw_condition *pw_condition_open (const pw_system *s, const char *text, pw_error *error) {
+  pw_error own = { 0 };
+  if (pw_require (s, "a system", error) != PW_OK || pw_require (text, "a condition", error) != PW_OK) return NULL;
+  pw_condition *c = calloc (1, sizeof *c);
+  if (c) c->workspace = pw_workspace_new (s, &own);
+  if (c && c->workspace && condition_read (c, s, text, &own) == PW_OK) return c;
+  pw_condition_close (c);
+  return pw_fail (error, own.status ? own.status : PW_RESOURCE, "%s", own.status ? own.text : "out of memory"), NULL;
+}
+
+int pw_condition_needs_ledger (const pw_condition *c) {
+  return c->needs_ledger;
+}
+
+void pw_condition_close (pw_condition *c) {
+  if (c == NULL) return;
+  pw_workspace_free (c->workspace);
+  pw_arena_free (&c->arena);
+  free (c);
 }

@@ -112,6 +112,19 @@ pw_formula *pw_formula_open (const char *text, const char *const *names, pw_erro
 double pw_formula_value (const pw_formula *f, const double *value);
 void pw_formula_close (pw_formula *f);
 
+/* ---- Conditions: formulas of the columns of a run, "car.x > 10 && car.vy < 0" (parser.c) ---- */
+
+typedef struct pw_condition pw_condition;
+
+/* PW_INPUT if it is not a condition, or for an unknown column, with the nearest name; PW_RESOURCE.  The system must
+ * outlive it. */
+pw_condition *pw_condition_open (const pw_system *s, const char *text, pw_error *error);
+int pw_condition_needs_ledger (const pw_condition *c); /* 1: it reads columns that need pw_settings.ledger */
+/* > 0 where the condition is true at a sample: of a comparison, the difference of its sides; of && and ||, the smaller
+ * and the larger one.  NaN if a signal fails.  For pw_crossing.value. */
+double pw_condition_value (void *condition, const pw_sample *x);
+void pw_condition_close (pw_condition *c);
+
 /* ---- Tables of numbers, and units in their headers, "NAME [UNIT]" (columns.c) ---- */
 
 /* Finds the factor from a unit to SI units.  PW_INPUT if it is unknown, PW_RETRY if its dimension is not that of
@@ -313,6 +326,8 @@ typedef struct {
   const pw_reference_error *reference; /* NULL: no reference */
   const pw_stated_error *stated;       /* NULL: not asked for */
   const char *general;                 /* why the general engine was used; "": it was not; NULL: no run */
+  const char *until;                   /* the condition of --until; NULL: none */
+  double stop_time;                    /* at which it has ended the run [s]; NaN: it has not become true */
   double energy_defect;                /* relative, as pw_run_energy_defect says; NaN: not known */
 } pw_summary;
 

@@ -1,11 +1,9 @@
 /* Text models: interface between the files that read them.
  *
- *   yaml_text.c    reads and checks the text; messages with line, column and caret; hints; the tree as bytes
+ *   yaml_text.c    reads and checks the text; messages with line, column and caret; the tree as bytes
  *   yaml_tree.c    builds a tree of scalars, lists and maps from libfyaml's events
- *   yaml_expand.c  copies of repeated entries; included files
- *   yaml_unit.c    units of parameters
- *   yaml_signal.c  values of signals that are expressions
- *   yaml.c         reads a model from the tree */
+ *   yaml_expand.c  copies of repeated entries; included files and their places
+ *   yaml.c         reads a model from the tree (yaml_read.h) */
 #ifndef PW_YAML_H
 #define PW_YAML_H
 
@@ -40,8 +38,8 @@ typedef struct {
   double max_ahead; /* indicators ([ ] { } , :) that libfyaml may read ahead of an event (yaml_tree.c) */
   pw_arena arena;   /* nodes and texts */
   const pw_node *root;
-  const pw_node *bodies, *elements, *states, *let, *reference, *include; /* or NULL */
-  int parameter_count;                                                   /* of table.parameters */
+  const pw_node *bodies, *elements, *states, *let, *reference, *outputs, *include; /* or NULL */
+  int parameter_count;                                                             /* of table.parameters */
 } pw_yaml;
 
 enum { PW_YAML_DEPTH = 30 /* most lists and maps inside each other */, PW_YAML_FILES = 8 /* most files */ };
@@ -81,7 +79,8 @@ int pw_copies_number (pw_copies *c, const pw_node *node, double *value, pw_expre
 /* What changes in expressions that are kept as text. */
 typedef struct {
   const pw_copies *copies; /* or NULL; its counter becomes a number */
-  const char *prefix;      /* of the states of an included file, or ""; its other names become numbers */
+  const char *prefix;      /* of states */
+  int is_included;         /* 1: the other names become numbers */
   const pw_names *states;  /* all first-order states */
   const pw_scope *scope;   /* the other names */
 } pw_renames;
@@ -125,38 +124,7 @@ const char *pw_place_body_of (const pw_kind *kind, const char *definition, int i
 /* A field that may be a direction in the ground, which a frame, or NULL, turns; or NULL. */
 const char *pw_place_direction (const pw_place *p, const pw_kind *kind, const char *definition);
 
-/* Refuses the unit of a parameter, a scalar, if it contains another unit than an SI unit, and says how to convert the
- * value. */
-int pw_yaml_check_unit (const pw_yaml *y, const pw_node *unit, const pw_node *value, pw_error *error);
-
-/* ---- yaml_signal.c ---- */
-
-enum { PW_SIGNAL_STATES = 16 /* at most */, PW_SIGNAL_FAULT = 300 };
-
-typedef struct {
-  const pw_expression *expression[3];     /* value, rate, acceleration; NULL: not given, differentiated instead */
-  int derivatives;                        /* required time derivatives; of a force: 0, nonholonomic: 1, holonomic: 2 */
-  int states;                             /* number of states in it */
-  const char *name[PW_SIGNAL_STATES + 2]; /* "t", then states, "BODY.phi"; not for evaluation */
-  pw_signal_text text;
-} pw_signal_function;
-
-/* The functions of a pw_function, whose context is a pw_signal_function. */
-int pw_yaml_signal_eval (void *context, double t, const double *state, double value[3], double *gradient);
-double pw_yaml_signal_breakpoint (void *context, double t);
-void *pw_yaml_signal_open (void *context);
-
-/* Check a given derivative, i = 1 or 2, of this name, and the whole; return the fault, "" if there is none. */
-const char *pw_yaml_signal_check_derivative (const pw_signal_function *f, int i, const char *name,
-                                             char fault[PW_SIGNAL_FAULT]);
-const char *pw_yaml_signal_check_continuity (pw_signal_function *f, char fault[PW_SIGNAL_FAULT]);
-
 /* ---- yaml_text.c and yaml_tree.c ---- */
-
-/* A hint for a key, which is none of these, that end with NULL, nor like one; or "". */
-const char *pw_yaml_key_hint (const char *text, const char *const *key);
-/* The element type whose name is near, or in whose description a word begins with the text. */
-pw_nearest pw_yaml_nearest_kind (const char *text);
 
 /* Reads a file of at most `max_bytes` bytes into y->source and y->size. */
 int pw_yaml_read_source (pw_yaml *y, const char *path, size_t max_bytes, pw_error *error);

@@ -151,7 +151,7 @@ int pw_copies_number (pw_copies *c, const pw_node *node, double *value, pw_expre
 static const char *rename_of (const pw_renames *names, const char *name, char to[200]) {
   const pw_copies *c = names->copies;
   if (c && strcmp (name, c->counter) == 0) return pw_print (to, 200, "(%d)", c->i);
-  if (*names->prefix == 0) return NULL;
+  if (!names->is_included) return NULL;
   pw_print (to, 200, "%s%s", names->prefix, name);
   if (strchr (name, '.') || pw_names_find (names->states, to) >= 0) return to;
   int i = pw_names_find (&names->scope->index, name);

@@ -1,15 +1,25 @@
-/* Signals of text models that are expressions: their values and derivatives, and what constraints demand of them.
- *
- * Such a signal is a function.  Each compiled system has a copy (pw_yaml_signal_open): it may outlive the model. */
+/* Reads signals and outputs of text models. */
+#include <errno.h>
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
-#include "yaml.h"
+#include "yaml_read.h"
 
-enum { MAX_CHECKED_BREAKPOINTS = 100 };
+/* ---- Signals that are expressions ----
+ *
+ * Such a signal is a function, of which each compiled system has a copy (signal_open): it may outlive the model. */
+
+enum { MAX_SIGNAL_STATES = 16, MAX_CHECKED_BREAKPOINTS = 100 };
+
+typedef struct {
+  const pw_expression *expression[3];    /* value, rate, acceleration; NULL: not given, differentiated instead */
+  int derivatives;                       /* required time derivatives; of a force: 0, nonholonomic: 1, holonomic: 2 */
+  int states;                            /* number of states in it */
+  const char *name[PW_OUTPUT_READS + 2]; /* "t", then states, "BODY.phi"; not for evaluation */
+  pw_signal_text text;
+} signal_function;
 
 /* Value and derivatives u; what is not given is computed from the last one given before; u[2] is 0 unless required. */
-static void signal_derivatives (const pw_signal_function *f, const double *variable, double u[3]) {
+static void signal_derivatives (const signal_function *f, const double *variable, double u[3]) {
   pw_expression_derivatives (f->expression[0], variable, PW_EXPRESSION_TIME, u);
   for (int i = 1; i <= f->derivatives; i++) {
     double given[3];
@@ -21,9 +31,9 @@ static void signal_derivatives (const pw_signal_function *f, const double *varia
   if (f->derivatives < 2) u[2] = 0;
 }
 
-int pw_yaml_signal_eval (void *context, double t, const double *state, double value[3], double *gradient) {
-  const pw_signal_function *f = context;
-  double variable[PW_SIGNAL_STATES + 1] = { t }, derivatives[3];
+static int signal_eval (void *context, double t, const double *state, double value[3], double *gradient) {
+  const signal_function *f = context;
+  double variable[PW_OUTPUT_READS + 1] = { t }, derivatives[3];
   if (f->states) memcpy (variable + 1, state, (size_t)f->states * sizeof *state);
   if (f->derivatives)
     signal_derivatives (f, variable, value);
@@ -39,20 +49,20 @@ int pw_yaml_signal_eval (void *context, double t, const double *state, double va
   return isfinite (value[0]) && (f->derivatives == 0 || (isfinite (value[1]) && isfinite (value[2]))) ? 0 : -1;
 }
 
-double pw_yaml_signal_breakpoint (void *context, double t) {
-  const pw_signal_function *f = context;
+static double signal_breakpoint (void *context, double t) {
+  const signal_function *f = context;
   double first = INFINITY;
   for (int i = 0; i < 3; i++)
     if (f->expression[i]) first = fmin (first, pw_expression_breakpoint (f->expression[i], t));
   return first;
 }
 
-void *pw_yaml_signal_open (void *context) {
-  const pw_signal_function *f = context;
+static void *signal_open (void *context) {
+  const signal_function *f = context;
   size_t bytes[3] = { 0 };
   for (int i = 0; i < 3; i++)
     if (f->expression[i]) bytes[i] = pw_expression_size (f->expression[i]);
-  pw_signal_function *copy = malloc (sizeof *f + bytes[0] + bytes[1] + bytes[2]);
+  signal_function *copy = malloc (sizeof *f + bytes[0] + bytes[1] + bytes[2]);
   if (copy == NULL) return NULL;
   *copy = *f;
   char *at = (char *)(copy + 1);
@@ -61,9 +71,121 @@ void *pw_yaml_signal_open (void *context) {
   return copy;
 }
 
+/* Adds a state, at an offset of the expression, unless it is known already. */
+static int signal_add_state (pw_reader *r, const pw_node *node, signal_function *f, const char *name, size_t at) {
+  for (int i = 1; i <= f->states; i++)
+    if (strcmp (f->name[i], name) == 0) return PW_OK;
+  if (f->derivatives > 1 || (f->derivatives && !pw_kind_signals_feedback (r->kind)))
+    return expression_fail (r, node, at, "\"%s\": the signal of a position constraint depends on the time t alone",
+                            name);
+  if (pw_check_state_name (r, node, name, at) != PW_OK) return r->error->status;
+  if (f->derivatives && pw_is_velocity_name (r, name))
+    return expression_fail (r, node, at,
+                            "\"%s\": the signal of a velocity constraint depends on positions and first-order states, "
+                            "not on velocities; use a state that follows it, {name: NAME, rate: (%s - NAME)/TIME}",
+                            name, name);
+  if (f->states == MAX_SIGNAL_STATES) return expression_fail (r, node, at, "more than %d states", MAX_SIGNAL_STATES);
+  f->name[f->states + 1] = pw_arena_copy (r->arena, name);
+  return f->name[++f->states] ? PW_OK : read_no_memory (r);
+}
+
+/* Finds the column of tables that a name in an expression names, also of an element that follows; its index is not set.
+ * 0: there is none. */
+static int find_column (pw_reader *r, const char *name, pw_column *c) {
+  const char *dot = strchr (name, '.'), *last = strrchr (name, '.');
+  if (dot == NULL && pw_is_state_name (r, name)) return *c = (pw_column){ PW_COLUMN_STATE, 0 }, 1;
+  if (dot == NULL) return pw_kind_find_column (NULL, name, c);
+  const char *owner = PW_PRINTED (PW_EXPRESSION_NAME, "%.*s", (int)(dot - name), name);
+  const char *body = last == dot ? NULL : PW_PRINTED (PW_EXPRESSION_NAME, "%.*s", (int)(last - dot) - 1, dot + 1);
+  if (body == NULL && pw_names_find (&r->bodies, owner) >= 0 && pw_body_state (last + 1) >= 0)
+    return *c = (pw_column){ PW_COLUMN_STATE, 0 }, 1;
+  int kind = pw_index_elements (r) == PW_OK ? pw_names_find (&r->elements, owner) : -1;
+  if (kind < 0 || pw_kinds[kind]->each_body != (body != NULL)) return 0;
+  return (body == NULL || pw_names_find (&r->bodies, body) >= 0) && pw_kind_find_column (pw_kinds[kind], last + 1, c);
+}
+
+/* An output.  In a signal its expression stands for it, so that derivatives and breakpoints are those of the signal. */
+typedef struct output_function {
+  signal_function function; /* its states are columns */
+  const pw_node *node;      /* its value */
+  pw_named_output output;
+  int reader; /* the output that is being read and reads this one, or itself if it is the first; OUTPUT_... */
+} output_function;
+
+enum { OUTPUT_UNREAD = -1, OUTPUT_READ = -2 };
+
+/* The place of a wheel or marker that precedes, "rear.x", as an expression of states; NULL: the name is another one, or
+ * out of memory. */
+static const char *contact_text (pw_reader *r, const char *name) {
+  const char *dot = strchr (name, '.');
+  int elements,
+      found = dot ? pw_names_find (&r->contacts, PW_PRINTED (PW_EXPRESSION_NAME, "%.*s", (int)(dot - name), name)) : -1;
+  if (found < 0 || (strcmp (dot, ".x") != 0 && strcmp (dot, ".y") != 0)) return NULL;
+  const pw_element *e = pw_model_elements (r->model, &elements) + found;
+  const double *at = pw_field_at (e->kind, e->definition, PW_POINT, 0);
+  const char *body = *(const char *const *)pw_field_at (e->kind, e->definition, PW_BODY, 0);
+  if (!pw_expression_is_name (body)) return NULL;
+  const char *format = dot[1] == 'x' ? "(%s.x + (%.17g)*cos (%s.phi) - (%.17g)*sin (%s.phi))"
+                                     : "(%s.y + (%.17g)*sin (%s.phi) + (%.17g)*cos (%s.phi))";
+  return pw_arena_copy (r->arena, PW_PRINTED (400, format, body, at[0], body, at[1], body));
+}
+
+/* pw_scope.expand */
+static const char *expand_name (void *context, const char *name) {
+  pw_reader *r = context;
+  int output = pw_find_output (r, name);
+  return output >= 0 ? r->output[output].node->text : contact_text (r, name);
+}
+
+/* Adds the states on which a column depends, at an offset of the expression; output: the one that reads it, or NULL. */
+static int signal_add_column (pw_reader *r, const pw_node *node, signal_function *f, const output_function *output,
+                              const char *name, size_t at) {
+  char state[PW_EXPRESSION_NAME];
+  const char *place = contact_text (r, name), *owner = PW_PRINTED (100, "%.*s", (int)strcspn (name, "."), name);
+  const char *where = output ? PW_PRINTED (100, "output \"%s\" reads %s: ", output->output.name, name) : "";
+  pw_column c;
+  for (const char *rest = place ? place : ""; pw_expression_next_name (&rest, state) != NULL;)
+    if (strchr (state, '.') && signal_add_state (r, node, f, state, at) != PW_OK) return r->error->status;
+  if (place) return PW_OK;
+  const int found = find_column (r, name, &c);
+  if (found && c.type == PW_COLUMN_CONTACT && pw_names_find (&r->contacts, owner) >= 0)
+    return expression_fail (r, node, at, "%sthe name of its body cannot be used in expressions", where);
+  if (found && c.type == PW_COLUMN_CONTACT)
+    return expression_fail (r, node, at, "%sdescribe %s before the signals that read its place", where, owner);
+  if (found && c.type != PW_COLUMN_STATE && output)
+    return expression_fail (r, node, at,
+                            "%sa signal cannot depend on reactions, energies and work, which follow from it", where);
+  if (found || output == NULL) return signal_add_state (r, node, f, name, at);
+  return expression_fail (r, node, at, "%sthere is no such column", where);
+}
+
+static int signal_expression (pw_reader *r, const pw_node *written, signal_function *f, int i) {
+  pw_node copy;
+  const pw_node *node = &copy;
+  char name[PW_EXPRESSION_NAME];
+  if (pw_yaml_rename (r, written, &copy) != PW_OK) return r->error->status;
+  const char *source = node->text;
+  for (const char *rest = source, *p; (p = pw_expression_next_name (&rest, name)) != NULL;) {
+    const int found = pw_find_output (r, name);
+    const output_function *output = found < 0 ? NULL : &r->output[found];
+    if (!output && pw_is_state_name (r, name) &&
+        signal_add_column (r, node, f, NULL, name, (size_t)(p - source)) != PW_OK)
+      return r->error->status;
+    for (int k = 1; output && k <= output->function.states; k++)
+      if (signal_add_column (r, node, f, output, output->function.name[k], (size_t)(p - source)) != PW_OK)
+        return r->error->status;
+  }
+  if (pw_yaml_expression (r, node, f->name, &f->text.part[i], &f->expression[i]) != PW_OK) return r->error->status;
+  const pw_expression *expression = f->expression[i];
+  if (expression->jump == NULL || f->text.jump) return PW_OK;
+  char *jump = pw_arena_alloc (r->arena, (size_t)expression->jump_size + 1);
+  f->text.jump = jump ? memcpy (jump, expression->jump, (size_t)expression->jump_size) : NULL;
+  return jump ? PW_OK : read_no_memory (r);
+}
+
 /* Compares derivative i, 1 or 2, which is given, with that computed from the last one given before, at some times. */
-const char *pw_yaml_signal_check_derivative (const pw_signal_function *f, int i, const char *name,
-                                             char fault[PW_SIGNAL_FAULT]) {
+static int signal_check_derivative (pw_reader *r, const pw_node *node, const signal_function *f, int i,
+                                    const char *name) {
   static const double time[] = { 0.3, 1.7, 4.1 }; /* [s], arbitrary */
   int last = f->expression[i - 1] ? i - 1 : 0, n = i - last;
   double given[3], exact[3][3], size = 0;
@@ -75,20 +197,20 @@ const char *pw_yaml_signal_check_derivative (const pw_signal_function *f, int i,
   }
   for (int k = 0; k < 3; k++)
     if (isfinite (given[k]) && isfinite (exact[k][n]) && fabs (given[k] - exact[k][n]) > 1e-6 * size)
-      return pw_print (fault, PW_SIGNAL_FAULT, "the %s at t = %g s is %.6g, but the derivative is %.6g", name, time[k],
-                       given[k], exact[k][n]);
-  return fault;
+      return read_fail (r, node->at, "%s: the %s at t = %g s is %.6g, but the derivative is %.6g", r->label, name,
+                        time[k], given[k], exact[k][n]);
+  return PW_OK;
 }
 
 /* The derivatives at a time; states that the signal reads have irregular values. */
-static void signal_derivatives_at (const pw_signal_function *f, double t, double u[3]) {
-  double variable[PW_SIGNAL_STATES + 1] = { t };
+static void signal_derivatives_at (const signal_function *f, double t, double u[3]) {
+  double variable[MAX_SIGNAL_STATES + 1] = { t };
   for (int i = 1; i <= f->states; i++) variable[i] = 0.1 + fmod (0.618 * i, 1);
   signal_derivatives (f, variable, u);
 }
 
 /* The largest magnitude of derivative i at t +- 2^-1, 2^-2, ... 2^-20 s and t + 1 s. */
-static double signal_magnitude (const pw_signal_function *f, double t, int i) {
+static double signal_magnitude (const signal_function *f, double t, int i) {
   double size = 0;
   for (int k = -20; k <= 20; k++) {
     double u[3];
@@ -101,24 +223,373 @@ static double signal_magnitude (const pw_signal_function *f, double t, int i) {
 /* Refuses signals that a constraint cannot follow: a jump of the value or, for positions, of its derivative, at one of
  * the first breakpoints after t = 0, beyond round-off and the change between adjacent times; a jump as states change,
  * other than that of an angle by whole turns. */
-const char *pw_yaml_signal_check_continuity (pw_signal_function *f, char fault[PW_SIGNAL_FAULT]) {
+static int signal_check_continuity (pw_reader *r, const pw_node *node, signal_function *f) {
   double t = 0, before[3], after[3];
   if (f->states && f->text.jump && strncmp (f->text.jump, "atan2", 5) != 0)
-    return pw_print (fault, PW_SIGNAL_FAULT, "%.60s jumps as states change, and that of a velocity constraint must not",
-                     f->text.jump);
+    return read_fail (r, node->at, "%s: %.60s jumps as states change, and that of a velocity constraint must not",
+                      r->label, f->text.jump);
   for (int k = 0; k < MAX_CHECKED_BREAKPOINTS; k++) {
-    t = pw_yaml_signal_breakpoint (f, t);
-    if (t == INFINITY) return fault;
+    t = signal_breakpoint (f, t);
+    if (t == INFINITY) return PW_OK;
     double last = nextafter (t, -INFINITY);
     signal_derivatives_at (f, last, before);
     signal_derivatives_at (f, t, after);
     for (int i = 0; i < f->derivatives; i++)
       if (fabs (after[i] - before[i]) >
           1e-9 * signal_magnitude (f, t, i) + 2 * (t - last) * (fabs (after[i + 1]) + fabs (before[i + 1])))
-        return pw_print (fault, PW_SIGNAL_FAULT,
-                         "its %s jumps from %.6g to %.6g at t = %.9g s, and that of %s must not", i ? "rate" : "value",
-                         before[i], after[i], t,
-                         f->derivatives > 1 ? "a prescribed position" : "a velocity constraint");
+        return read_fail (r, node->at, "%s: its %s jumps from %.6g to %.6g at t = %.9g s, and that of %s must not",
+                          r->label, i ? "rate" : "value", before[i], after[i], t,
+                          f->derivatives > 1 ? "a prescribed position" : "a velocity constraint");
   }
-  return fault;
+  return PW_OK;
+}
+
+/* Makes a signal from expressions: value; rate and acceleration, or NULL. */
+static int signal_of_time (pw_reader *r, const pw_node *const node[3], pw_signal *signal) {
+  static const char *const key[] = { "expression", "rate", "acceleration" };
+  signal_function *f = pw_arena_alloc (r->arena, sizeof *f);
+  if (f == NULL) return read_no_memory (r);
+  f->name[0] = "t";
+  f->derivatives = pw_kind_signals_force (r->kind) ? 0 : r->kind->level == PW_HOLONOMIC ? 2 : 1;
+  *signal = (pw_signal){ PW_FUNCTION, .function = { .eval = signal_eval, .context = f, .text = &f->text } };
+  signal->function.open = signal_open;
+  signal->function.close = free;
+  for (int i = 0; i < 3; i++) {
+    if (node[i] == NULL) continue;
+    if (signal_expression (r, node[i], f, i) != PW_OK) return r->error->status;
+    if (f->expression[i]->breaks) signal->function.breakpoint = signal_breakpoint;
+    if (i > 0 && f->derivatives && f->states)
+      return read_fail (r, node[i]->at, "%s: a %s belongs to an expression of the time alone", r->label, key[i]);
+    if (i > 0 && !f->states && signal_check_derivative (r, node[i], f, i, key[i]) != PW_OK) return r->error->status;
+  }
+  if (f->states) signal->function.reads = f->name + 1;
+  return f->derivatives ? signal_check_continuity (r, node[0], f) : PW_OK;
+}
+
+/* ---- Signals ----
+ *
+ *   3, "2 * M0"                                    a constant
+ *   {constant: 3}                                  the same
+ *   {harmonic: {amplitude: 3, omega: 2}}           and ramp, smooth-step, pulse: their fields are in signal.c
+ *   {table: {points: [[0, 1], [2, 3]]}}            points
+ *   {table: {file: M.csv, columns: [t, M]}}        points of a file, by default in columns 1 and 2
+ *   {table: {file: M.csv, time: t, columns: [M]}}  the same
+ *   "M0 * cos (omega * t)"                         an expression of the time t; in forces also of states: BODY.phi
+ *   {expression: .., rate: .., acceleration: ..}   the same; in constraints, its time derivatives may be given */
+
+/* Points in the model.  Returns their times, NULL after an error. */
+static double *table_list (pw_reader *r, const pw_node *list, pw_signal *s) {
+  if (pw_yaml_list (r, list, r->label) != PW_OK) return NULL;
+  size_t bytes = (size_t)list->count * sizeof (double);
+  double *t = pw_arena_alloc (r->arena, bytes), *value = pw_arena_alloc (r->arena, bytes);
+  if (t == NULL || value == NULL) return read_no_memory (r), NULL;
+  s->table.t = t;
+  s->table.value = value;
+  for (const pw_node *n = list->first; n; n = n->next) {
+    double point[2] = { 0 };
+    const char *label = PW_PRINTED (240, "%s: point %d", r->label, s->table.count + 1);
+    if (pw_yaml_pair (r, n, label, "numbers, [time, value]", point) != PW_OK) return NULL;
+    t[s->table.count] = point[0];
+    value[s->table.count++] = point[1];
+  }
+  return t;
+}
+
+/* The unit of the current field.  Only a drive has "m or rad"; the choice before this field decides. */
+static const char *table_unit (const pw_reader *r) {
+  const pw_field *choice = r->field;
+  if (choice->unit == NULL || strcmp (choice->unit, "m or rad") != 0) return choice->unit;
+  while (choice->type != PW_CHOICE) choice--;
+  int chosen = *(const int *)(const void *)(r->definition + choice->offset);
+  return strcmp (choice->choices[chosen], "angle") == 0 ? "rad" : "m";
+}
+
+/* The columns of times and values: `columns` has both or, if `time` is given, perhaps that of the values alone; NULL by
+ * default. */
+static int table_columns (pw_reader *r, const pw_node *columns, const pw_node *time, const char *column[2]) {
+  const char *label = PW_PRINTED (240, "%s: columns", r->label);
+  const int count = time && columns && columns->count != 2 ? 1 : 2;
+  column[0] = column[1] = NULL;
+  if (pw_yaml_list_of (r, columns, label, count, count == 1 ? "column, [value]" : "columns, [time, value]") != PW_OK)
+    return r->error->status;
+  const pw_node *first = columns ? columns->first : NULL;
+  pw_yaml_text (r, time, PW_PRINTED (240, "%s: time", r->label), &column[0]);
+  pw_yaml_text (r, count == 2 && first ? first->next : first, label, &column[1]);
+  if (count == 1 || r->error->status != PW_OK) return r->error->status;
+  if (time && first && first->type == PW_YAML_SCALAR && strcmp (first->text, column[0]) != 0)
+    return read_fail (r, first->at, "%s: the first one is that of the times, but time is \"%.60s\"", label, column[0]);
+  return pw_yaml_text (r, time ? NULL : first, label, &column[0]);
+}
+
+/* Points in two columns of a file; rows without a time or value are left out.  Returns the times, or NULL. */
+static double *table_file (pw_reader *r, const pw_node *node, const pw_node *columns, const pw_node *time,
+                           pw_signal *s) {
+  char path[PW_PATH], from_model[PW_PATH];
+  const char *name, *reason, *column[2], *const unit[2] = { "s", table_unit (r) };
+  pw_error cause = { 0 };
+  int rows;
+  if (table_columns (r, columns, time, column) != PW_OK || pw_yaml_text (r, node, r->label, &name) != PW_OK)
+    return NULL;
+  errno = 0;
+  FILE *f = pw_yaml_find (r->y, node->at, name, path, from_model, &reason) ? pw_open_input (path, &reason) : NULL;
+  if (f == NULL && pw_open_input_status () == PW_RESOURCE)
+    return pw_fail (r->error, PW_RESOURCE, "%s: cannot read %s: %s", r->y->path, name, reason), NULL;
+  if (f == NULL) return read_fail (r, node->at, "%s: cannot read \"%.60s\": %s", r->label, name, reason), NULL;
+  double *t = pw_columns_from_stream (f, name, column, unit, 2, PW_GAPS_REFUSED, NULL, &rows, &cause);
+  fclose (f);
+  if (cause.status == PW_INPUT) return read_fail (r, node->at, "%s: %s", r->label, cause.text), NULL;
+  if (t == NULL || pw_model_keep (r->model, t, free) != PW_OK) return read_no_memory (r), NULL;
+  double *value = t + rows;
+  int count = 0;
+  for (int i = 0; i < rows; i++) {
+    if (isnan (t[i]) || isnan (value[i])) continue;
+    t[count] = t[i];
+    value[count++] = value[i];
+  }
+  s->table.t = t, s->table.value = value, s->table.count = count, s->table.skipped = rows - count;
+  return t;
+}
+
+/* Besides the fields of the form. */
+static const char *const table_keys[] = { "points", "file", "columns", "time", "time_scale", "time_offset" };
+enum { TABLE_KEYS = sizeof table_keys / sizeof *table_keys };
+
+/* Reads points or columns of a file; the times become time_offset + time_scale t, where whole numbers of ms since an
+ * epoch stay exact.  Limits the points of all tables together: many may read the same large file. */
+static int table_points (pw_reader *r, const pw_node *node, const pw_node *const v[TABLE_KEYS], pw_signal *s) {
+  const pw_node *points = v[0], *file = v[1], *columns = v[2], *time = v[3]; /* as table_keys */
+  double scale = 1, offset = 0;
+  if ((points != NULL) == (file != NULL))
+    return read_fail (r, node->at, "%s: a table has either points or a file", r->label);
+  if (points && columns) return read_fail (r, columns->at, "%s: columns belong to a file", r->label);
+  if (points && time) return read_fail (r, time->at, "%s: a column of times belongs to a file", r->label);
+  double *t = points ? table_list (r, points, s) : table_file (r, file, columns, time, s);
+  if (t == NULL) return r->error->status;
+  pw_yaml_number (r, v[4], PW_PRINTED (240, "%s: time_scale", r->label), PW_POSITIVE, &scale);
+  pw_yaml_number (r, v[5], PW_PRINTED (240, "%s: time_offset", r->label), PW_REAL, &offset);
+  for (int i = 0; i < s->table.count; i++) t[i] = scale * (t[i] + offset / scale);
+  r->points += s->table.count;
+  if (r->error->status != PW_OK || r->points <= PW_MAX_POINTS) return r->error->status;
+  return read_fail (r, node->at, "%s: the tables up to here have more than %d points, the limit for a model", r->label,
+                    PW_MAX_POINTS);
+}
+
+/* Reads the fields of a form, except a table's points; value: of each, or NULL. */
+static int signal_fields (pw_reader *r, const pw_signal_form *form, const pw_node *node, const pw_node *const *value,
+                          pw_signal *signal) {
+  for (int i = 0; form->fields[i].name; i++) {
+    const pw_field *f = &form->fields[i];
+    void *at = (char *)signal + f->offset;
+    const char *label = PW_PRINTED (240, "%s: %s", r->label, f->name);
+    if (value[i] == NULL && f->required) read_fail (r, node->at, "%s is missing", label);
+    if (f->type == PW_NUMBER) pw_yaml_number (r, value[i], label, f->domain, at);
+    if (f->type == PW_CHOICE) pw_yaml_choice (r, value[i], label, f->choices, at);
+    /* 0 in the structure stands for a scale that is not given, which is 1 */
+    if (value[i] && form->type == PW_TABLE && strcmp (f->name, "scale") == 0 && signal->table.scale == 0)
+      read_fail (r, value[i]->at, "%s: 0 is not permitted", label);
+  }
+  return r->error->status;
+}
+
+/* Reads a signal of one form; a table has more keys than fields.  An error of the whole is reported at the faulty point
+ * of a table, or at the signal. */
+static int signal_form (pw_reader *r, const pw_signal_form *form, const pw_node *node, pw_signal *signal) {
+  const char *key[PW_MAX_KEYS];
+  const pw_node *v[PW_MAX_KEYS];
+  char fault[300];
+  int fields = 0, n, point, is_table = form->type == PW_TABLE;
+  *signal = (pw_signal){ .type = form->type };
+  for (const pw_field *f = form->fields; f->name; f++) key[fields++] = f->name;
+  for (n = fields; is_table && n < fields + TABLE_KEYS; n++) key[n] = table_keys[n - fields];
+  key[n] = NULL;
+  if (pw_yaml_keys (r, node, key, PW_PRINTED (100, "a %s", form->name), v) != PW_OK ||
+      signal_fields (r, form, node, v, signal) != PW_OK ||
+      (is_table && table_points (r, node, v + fields, signal) != PW_OK))
+    return r->error->status;
+  if (*pw_signal_check (signal, r->kind, &point, fault, sizeof fault) == 0) return PW_OK;
+  const pw_node *faulty = is_table && v[fields] && point >= 0 ? v[fields]->first : NULL;
+  for (int i = 0; faulty && i < point; i++) faulty = faulty->next;
+  return read_fail (r, (faulty ? faulty : node)->at, "%s: %s", r->label, fault);
+}
+
+/* Keys of a signal in braces, such as {harmonic: {...}}; those from SIGNAL_FORMS on are the names of the forms. */
+enum { SIGNAL_CONSTANT, SIGNAL_EXPRESSION, SIGNAL_RATE, SIGNAL_ACCELERATION, SIGNAL_FORMS };
+
+static int signal_map (pw_reader *r, const pw_node *node, pw_signal *signal) {
+  const char *key[PW_MAX_KEYS] = { "constant", "expression", "rate", "acceleration" };
+  const pw_node *v[PW_MAX_KEYS];
+  char list[100] = "constant, expression";
+  int n = SIGNAL_FORMS, given = 0, form = 0;
+  for (const pw_signal_form *f = pw_signal_forms; f->name; f++) {
+    append (list, ", %s", f->name);
+    key[n++] = f->name;
+  }
+  key[n] = NULL;
+  if (pw_yaml_keys (r, node, key, "a signal", v) != PW_OK) return r->error->status;
+  for (int i = 0; i < n; i++) {
+    given += v[i] != NULL && i != SIGNAL_RATE && i != SIGNAL_ACCELERATION;
+    if (v[i] && i >= SIGNAL_FORMS) form = i;
+  }
+  if (given != 1)
+    return read_fail (r, node->at, "%s: expected one of %s; found %s", r->label, list, given ? "several" : "none");
+  if (!v[SIGNAL_EXPRESSION] && (v[SIGNAL_RATE] || v[SIGNAL_ACCELERATION]))
+    return read_fail (r, node->at, "%s: a rate or acceleration belongs to an expression", r->label);
+  if (v[SIGNAL_CONSTANT]) return pw_yaml_number (r, v[SIGNAL_CONSTANT], r->label, PW_REAL, &signal->constant);
+  if (v[SIGNAL_EXPRESSION]) return signal_of_time (r, v + SIGNAL_EXPRESSION, signal);
+  return signal_form (r, &pw_signal_forms[form - SIGNAL_FORMS], v[form], signal);
+}
+
+int pw_yaml_signal (pw_reader *r, const pw_node *node, pw_signal *signal) {
+  if (node->type == PW_YAML_MAP) return signal_map (r, node, signal);
+  if (node->type == PW_YAML_SCALAR && pw_yaml_varies (r, node->text))
+    return signal_of_time (r, (const pw_node *const[3]){ node, NULL, NULL }, signal);
+  return pw_yaml_number (r, node, r->label, PW_REAL, &signal->constant);
+}
+
+/* ---- Outputs ---- */
+
+/* Outputs are displayed in SI units, like all columns. */
+static int output_unit (const pw_reader *r, const pw_node *node, const char **unit) {
+  const char *at;
+  if (pw_yaml_text (r, node, "unit", unit) != PW_OK || node == NULL) return r->error->status;
+  const pw_unit_name *other = pw_find_other_unit (*unit, &at);
+  if (other == NULL) return PW_OK;
+  return read_fail (r, node->at, "unit: \"%s\": outputs are in SI units and radians, as all columns", other->name);
+}
+
+/* Reads the name and the texts of an output. */
+static int output_head (pw_reader *r, const pw_node *node, output_function *o) {
+  static const char *const key[] = { "name", "value", "unit", "about", NULL };
+  const pw_node *v[sizeof key / sizeof *key];
+  pw_column column;
+  if (pw_yaml_keys (r, node, key, "an output", v) != PW_OK) return r->error->status;
+  if (v[0] == NULL) return read_fail (r, node->at, "an output needs a name");
+  if (pw_build_name (r, v[0], "output", &o->output.name) != PW_OK) return r->error->status;
+  const char *name = o->output.name;
+  if (!pw_expression_is_name (name))
+    return read_fail (r, v[0]->at, "output \"%.60s\": expected a letter, then letters, digits and _, at most 63 in all",
+                      name);
+  if (pw_expression_is_reserved (name) || pw_kind_find_column (NULL, name, &column))
+    return read_fail (r, v[0]->at, "output \"%s\": this name is reserved: %s", name,
+                      strcmp (name, "t") == 0            ? "it is the time"
+                      : pw_expression_is_reserved (name) ? "a function or constant"
+                                                         : "a column of tables");
+  if (pw_names_find (&r->scope->index, name) >= 0)
+    return read_fail (r, v[0]->at, "output \"%s\": a parameter or a name of let is called so", name);
+  if (v[1] == NULL) return read_fail (r, node->at, "output %s needs a value", name);
+  if (v[1]->type != PW_YAML_SCALAR)
+    return read_fail (r, v[1]->at, "output %s: expected an expression, found %s", name, pw_node_found (v[1]));
+  o->node = v[1], o->reader = OUTPUT_UNREAD;
+  o->function.name[0] = "t", o->function.text.part[0] = v[1]->text;
+  o->output.value = (pw_function){ signal_eval, o, NULL, NULL, signal_open, free, &o->function.text };
+  if (output_unit (r, v[2], &o->output.unit) != PW_OK) return r->error->status;
+  return pw_yaml_text (r, v[3], "about", &o->output.about);
+}
+
+static int output_add_column (pw_reader *r, output_function *o, const char *name, size_t at) {
+  signal_function *f = &o->function;
+  for (int i = 1; i <= f->states; i++)
+    if (strcmp (f->name[i], name) == 0) return PW_OK;
+  if (f->states == PW_OUTPUT_READS) return expression_fail (r, o->node, at, "more than %d columns", PW_OUTPUT_READS);
+  f->name[f->states + 1] = pw_arena_copy (r->arena, name);
+  return f->name[++f->states] ? PW_OK : read_no_memory (r);
+}
+
+/* Reports that output `last` reads output `first`, of which it is a function. */
+static int output_cycle (const pw_reader *r, const output_function *last, int first, size_t at) {
+  char list[300] = "";
+  for (int i = (int)(last - r->output); i != first; i = r->output[i].reader)
+    append (list, "%s%s", *list ? ", " : ", through ", r->output[i].output.name);
+  return read_fail (r, pw_source_offset (r->y, last->node, at), "output %s is a function of itself%s",
+                    r->output[first].output.name, list);
+}
+
+/* Reads the expression of an output, after those of outputs in it. */
+static int output_expression (pw_reader *r, int index, int reads) {
+  output_function *o = &r->output[index];
+  char name[PW_EXPRESSION_NAME];
+  pw_column c;
+  o->reader = reads;
+  for (const char *source = o->node->text, *rest = source, *p; (p = pw_expression_next_name (&rest, name)) != NULL;) {
+    const size_t at = (size_t)(p - source);
+    int other = pw_names_find (&r->outputs, name), status = PW_OK;
+    if (other >= 0 && r->output[other].reader >= 0) return output_cycle (r, o, other, at);
+    if (other >= 0 && r->output[other].reader == OUTPUT_UNREAD) status = output_expression (r, other, index);
+    r->label = PW_PRINTED (100, "output %s", o->output.name);
+    for (int i = 1; status == PW_OK && other >= 0 && i <= r->output[other].function.states; i++)
+      status = output_add_column (r, o, r->output[other].function.name[i], at);
+    if (status == PW_OK && other < 0 && strcmp (name, "t") != 0 &&
+        (pw_is_state_name (r, name) || pw_kind_find_column (NULL, name, &c)))
+      status = output_add_column (r, o, name, at);
+    if (status != PW_OK) return status;
+  }
+  o->reader = OUTPUT_READ;
+  r->label = PW_PRINTED (100, "output %s", o->output.name);
+  return pw_yaml_expression (r, o->node, o->function.name, &(const char *){ NULL }, &o->function.expression[0]);
+}
+
+void pw_yaml_expand_names (pw_reader *r) {
+  r->scope->expand = expand_name, r->scope->context = r;
+}
+
+int pw_yaml_outputs (pw_reader *r) {
+  const pw_node *list = r->y->outputs;
+  const int count = list ? list->count : 0;
+  if (count > PW_MOST_OUTPUTS)
+    return read_fail (r, list->at, "outputs: %d entries; a model may have %d", count, PW_MOST_OUTPUTS);
+  r->output = pw_arena_alloc (r->arena, (size_t)count * sizeof *r->output);
+  if (r->output == NULL || pw_names_open (&r->outputs, (size_t)count) != PW_OK ||
+      pw_scope_reserve (r->scope, r->scope->names + count, r->arena) != PW_OK)
+    return read_no_memory (r);
+  int i = 0;
+  for (const pw_node *n = list ? list->first : NULL; n && r->error->status == PW_OK; n = n->next, i++)
+    if (output_head (r, n, &r->output[i]) == PW_OK) pw_names_add (&r->outputs, r->output[i].output.name, i);
+  for (i = 0; i < count && r->error->status == PW_OK; i++) pw_scope_add (r->scope, r->output[i].output.name, NAN);
+  for (i = 0; i < count && r->error->status == PW_OK; i++)
+    if (r->output[i].reader == OUTPUT_UNREAD) output_expression (r, i, i);
+  return r->error->status;
+}
+
+/* Reports a name that is no column, with the nearest column of its body or element, or the nearest of these. */
+static int output_unknown (pw_reader *r, const pw_node *node, const char *name, size_t at) {
+  static const char *const part[] = { "x", "y", "phi", "vx", "vy", "omega" };
+  const size_t n = strcspn (name, ".");
+  const char *owner = PW_PRINTED (100, "%.*s", (int)n, name);
+  const int is_body = pw_names_find (&r->bodies, owner) >= 0, element = pw_names_find (&r->elements, owner);
+  const pw_kind *kind = element >= 0 ? pw_kinds[element] : NULL;
+  pw_nearest near = { .sought = is_body || kind ? name + n + 1 : owner };
+  for (int i = 0; is_body && i < 6; i++) pw_nearest_try (&near, part[i]);
+  for (int i = 0; kind && i < 2 * kind->internal; i++)
+    pw_nearest_try (&near, i % 2 ? kind->coordinate[i / 2].rate : kind->coordinate[i / 2].name);
+  for (int i = 0; kind && i < kind->rows; i++) pw_nearest_try (&near, kind->reaction[i].name);
+  for (int i = 0; kind && i < 4; i++)
+    if (pw_kind_find_column (kind, ((const char *const[]){ "x", "y", "work", "loss" })[i], &(pw_column){ 0 }))
+      pw_nearest_try (&near, ((const char *const[]){ "x", "y", "work", "loss" })[i]);
+  if (is_body || kind)
+    return expression_fail (r, node, at + n + 1, "%s has no column \"%.60s\"%s", owner, name + n + 1,
+                            pw_nearest_text (&near));
+  pw_suggest_bodies (r, &near);
+  for (const struct pw_name *e = r->elements.slot, *end = e + r->elements.size; e < end; e++)
+    if (e->name) pw_nearest_try (&near, e->name);
+  return expression_fail (r, node, at, "there is no body or element \"%s\"%s", owner, pw_nearest_text (&near));
+}
+
+int pw_add_outputs (pw_reader *r) {
+  char name[PW_EXPRESSION_NAME];
+  pw_column c;
+  pw_error cause = { 0 };
+  for (output_function *o = r->output, *end = o + (r->y->outputs ? r->y->outputs->count : 0); o < end; o++) {
+    r->label = PW_PRINTED (100, "output %s", o->output.name);
+    for (const char *source = o->node->text, *rest = source, *p; (p = pw_expression_next_name (&rest, name)) != NULL;) {
+      const size_t at = (size_t)(p - source);
+      const int found = find_column (r, name, &c);
+      if (pw_is_state_name (r, name) && !found) return output_unknown (r, o->node, name, at);
+      if (found && (c.type == PW_COLUMN_PROJECTION || c.type == PW_COLUMN_BALANCE))
+        return expression_fail (r, o->node, at, "%s describes the integration, not the motion", name);
+    }
+    o->output.value.reads = o->function.name + 1;
+    if (pw_model_check_output (r->model, &o->output, &cause) != PW_OK) return pw_build_fail (r, o->node, &cause);
+    if (pw_add_output (r->model, &o->output) != PW_OK) return r->error->status;
+  }
+  return r->error->status;
 }

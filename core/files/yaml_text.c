@@ -1,4 +1,4 @@
-/* The text of a model file, messages that point into it, hints in them, and its tree as bytes.
+/* The text of a model file, messages that point into it, and its tree as bytes.
  *
  * The text is checked first: UTF-8, no control characters, no lines that begin with %: some hang libfyaml 0.7.12. */
 #include <stdarg.h>
@@ -59,41 +59,6 @@ int pw_yaml_fail (const pw_yaml *y, pw_error *error, size_t at, const char *form
 
 int pw_yaml_no_memory (const pw_yaml *y, pw_error *error) {
   return pw_fail (error, PW_RESOURCE, "%s: out of memory", y->path);
-}
-
-const char *pw_yaml_key_hint (const char *text, const char *const *key) {
-  for (int i = 0; key[i]; i++) {
-    size_t n = strlen (key[i]);
-    if (strncmp (text, key[i], n) == 0 && text[n] == ':') return "; a space goes after the colon";
-    if (strncmp (text, key[i], n) == 0 && text[n] == ' ') return "; a colon goes after the key";
-  }
-  if (*text && strspn (text, "0123456789") == strlen (text)) return "; decimals are written with a point";
-  if (strpbrk (text, "()*/^")) return "; an expression with commas goes between double quotes";
-  return "";
-}
-
-/* Whether a word of a text begins with this prefix of at least 3 bytes. */
-static int source_has_word (const char *text, const char *prefix) {
-  for (const char *at = text; strlen (prefix) >= 3 && (at = strstr (at, prefix)) != NULL; at++)
-    if (at == text || strchr (" (", at[-1])) return 1;
-  return 0;
-}
-
-/* 1 if an element type has a field of this name. */
-static int source_is_field (const char *name) {
-  for (const pw_kind *const *k = pw_kinds; *k; k++)
-    for (const pw_field *f = (*k)->fields; f->name; f++)
-      if (strcmp (f->name, name) == 0) return 1;
-  return 0;
-}
-
-pw_nearest pw_yaml_nearest_kind (const char *text) {
-  pw_nearest near = { .sought = text };
-  for (const pw_kind *const *k = pw_kinds; *k; k++) pw_nearest_try (&near, (*k)->name);
-  /* "hinge" pin, "damper" spring; names of fields, as "angle", do not suggest a type */
-  for (const pw_kind *const *k = pw_kinds; *k && !near.near && !source_is_field (text); k++)
-    if (source_has_word ((*k)->about, text)) snprintf (near.best, sizeof near.best, "%s", (*k)->name), near.near = 1;
-  return near;
 }
 
 int pw_yaml_check_source (const pw_yaml *y, pw_error *error) {

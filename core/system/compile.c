@@ -53,7 +53,8 @@ static const char *compile_text (const compilation *job, const char *text) {
 
 static int compile_names (compilation *job) {
   const pw_model *m = job->m;
-  if (pw_names_open (&job->name, (size_t)m->bodies + (size_t)m->elements) != PW_OK) return compile_no_memory (job);
+  const size_t names = (size_t)m->bodies + (size_t)m->elements + (size_t)m->outputs;
+  if (pw_names_open (&job->name, names) != PW_OK) return compile_no_memory (job);
   for (int i = 0; i < m->bodies; i++)
     if (m->body[i].name && pw_names_add (&job->name, m->body[i].name, i) >= 0)
       return pw_fail (job->error, PW_INPUT, "model %s: two bodies are named \"%s\"", m->name, m->body[i].name);
@@ -433,6 +434,54 @@ static int compile_ledger (const compilation *job) {
   return PW_OK;
 }
 
+/* ---- Outputs ---- */
+
+/* Finds the columns that an output reads: those of the motion, and outputs added before. */
+static int compile_output_reads (const compilation *job, pw_compiled_output *o) {
+  static const unsigned refused =
+      1u << PW_COLUMN_POSITION | 1u << PW_COLUMN_VELOCITY | 1u << PW_COLUMN_PROJECTION | 1u << PW_COLUMN_BALANCE;
+  const char *const *reads = o->function.reads;
+  pw_error cause = { 0 };
+  while (reads && reads[o->reads]) o->reads++;
+  pw_column *read = compile_alloc (job, (size_t)o->reads, sizeof *read);
+  if ((o->read = read) == NULL) return PW_RESOURCE;
+  for (int i = 0; i < o->reads; i++) {
+    if (pw_system_find_column (job->s, reads[i], read + i, &cause) != PW_OK)
+      return pw_fail (job->error, PW_INPUT, "model %s: output %s: %s", job->m->name, o->name, cause.text);
+    if (refused >> read[i].type & 1)
+      return pw_fail (job->error, PW_INPUT,
+                      "model %s: output %s reads %s, which describes the integration, not the motion", job->m->name,
+                      o->name, reads[i]);
+    o->types |= 1u << read[i].type;
+    if (read[i].type == PW_COLUMN_OUTPUT) o->types |= job->s->output[read[i].index].types;
+  }
+  job->s->output_types |= o->types;
+  return PW_OK;
+}
+
+static int compile_outputs (compilation *job) {
+  pw_system *s = job->s;
+  s->output = compile_alloc (job, (size_t)job->m->outputs, sizeof *s->output);
+  if (s->output == NULL) return PW_RESOURCE;
+  for (const pw_named_output *from = job->m->output; from < job->m->output + job->m->outputs; from++) {
+    pw_compiled_output o = { .name = compile_text (job, from->name),
+                             .unit = compile_text (job, from->unit ? from->unit : ""),
+                             .function = from->value };
+    pw_column same;
+    int status;
+    if (o.name == NULL || o.unit == NULL) return PW_RESOURCE;
+    if (pw_names_add (&job->name, o.name, 0) >= 0 || pw_kind_find_column (NULL, o.name, &same))
+      return pw_fail (job->error, PW_INPUT,
+                      "model %s: output \"%s\": a body, an element, another output or a column of tables has this name",
+                      job->m->name, o.name);
+    if ((status = compile_output_reads (job, &o)) != PW_OK) return status;
+    s->output[s->outputs++] = o;
+    if (pw_open_outputs (&s->output[s->outputs - 1], 1) != PW_OK) return compile_no_memory (job);
+    s->output[s->outputs - 1].function.reads = NULL;
+  }
+  return PW_OK;
+}
+
 static int compile_constant_forces (const compilation *job) {
   pw_system *s = job->s;
   int constant = 0;
@@ -459,6 +508,7 @@ static int compile_all (compilation *job) {
   status = compile_angle_users (job);
   if (status == PW_OK) compile_metric (job->s);
   if (status == PW_OK) status = compile_ledger (job);
+  if (status == PW_OK) status = compile_outputs (job);
   return status == PW_OK ? compile_constant_forces (job) : status;
 }
 
@@ -482,6 +532,7 @@ pw_system *pw_system_compile (const pw_model *m, pw_error *error) {
 void pw_system_free (pw_system *s) {
   if (s == NULL) return;
   pw_close_signals (s->source, s->source ? s->sources : 0);
+  pw_close_outputs (s->output, s->outputs);
   pw_arena_free (&s->arena);
   free (s->batch);
   free (s);

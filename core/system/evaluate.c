@@ -605,12 +605,6 @@ int pw_find_nonfinite (pw_workspace *w, char *buffer, size_t size) {
 
 /* ---- The ledger ---- */
 
-char *pw_system_ledger_name (const pw_system *s, int entry, char *buffer, size_t size) {
-  const pw_entry *listed = &s->entry[entry];
-  return pw_member_name (s, &s->batch[listed->batch], listed->element, listed->type == PW_WORK ? "work" : "loss",
-                         buffer, size);
-}
-
 void pw_evaluate_ledger (pw_workspace *w, const double *lambda, double *rate) {
   const pw_entry *last = NULL;
   double *eta = w->scratch;
@@ -652,6 +646,7 @@ static void workspace_fill (pw_workspace *w, double *x) {
     w->source[i].x = x;
     x += 2 * s->source[i].reads; /* values, gradient */
   }
+  for (int i = 0; i < s->outputs; i++) w->output[i] = s->output[i];
   w->configuration[s->bodies].cos = 1;
 }
 
@@ -676,6 +671,24 @@ void pw_close_signals (const pw_source *source, int count) {
   }
 }
 
+int pw_open_outputs (pw_compiled_output *output, int count) {
+  int status = PW_OK;
+  for (int i = 0; i < count; i++) {
+    pw_function *f = &output[i].function;
+    if (f->open == NULL) continue;
+    f->context = status == PW_OK ? f->open (f->context) : NULL;
+    if (f->context) continue;
+    status = PW_RESOURCE;
+    f->close = NULL; /* pw_close_outputs must skip it */
+  }
+  return status;
+}
+
+void pw_close_outputs (const pw_compiled_output *output, int count) {
+  for (int i = 0; i < count; i++)
+    if (output[i].function.open && output[i].function.close) output[i].function.close (output[i].function.context);
+}
+
 pw_workspace *pw_workspace_new (const pw_system *s, pw_error *error) {
   if (pw_require (s, "a system", error) != PW_OK) return NULL;
   pw_workspace all = { .s = s, .scale = s->scale, .t_signal = NAN }, *w = NULL;
@@ -690,12 +703,17 @@ pw_workspace *pw_workspace_new (const pw_system *s, pw_error *error) {
     all.u = pw_layout_alloc (&l, 3 * (size_t)s->sources, sizeof *all.u);
     all.J = pw_layout_alloc (&l, s->jacobian, sizeof *all.J);
     all.block = pw_layout_alloc (&l, s->block, sizeof *all.block);
+    all.contact = pw_layout_alloc (&l, (size_t)pw_system_contacts (s), sizeof *all.contact);
+    all.output = pw_layout_alloc (&l, (size_t)s->outputs, sizeof *all.output);
+    all.output_value = pw_layout_alloc (&l, (size_t)s->outputs, sizeof *all.output_value);
     x = pw_layout_alloc (&l, 2 * (size_t)s->reads, sizeof *x);
   }
   if (w) {
     *w = all;
     workspace_fill (w, x);
-    if (workspace_open_signals (w) == PW_OK) return w;
+    int status = workspace_open_signals (w);
+    if (status == PW_OK) status = pw_open_outputs (w->output, s->outputs);
+    if (status == PW_OK) return w;
   }
   pw_workspace_free (w);
   pw_fail_memory (s, error);
@@ -704,6 +722,7 @@ pw_workspace *pw_workspace_new (const pw_system *s, pw_error *error) {
 
 void pw_workspace_free (pw_workspace *w) {
   if (w) pw_close_signals (w->source, w->s->sources);
+  if (w) pw_close_outputs (w->output, w->s->outputs);
   free (w);
 }
 
@@ -737,29 +756,61 @@ static int elements_update (pw_workspace *w, double t, const double *q, const do
   return pw_update_kinematics (w, t, q, v) == PW_OK ? PW_OK : pw_fail_evaluation (w, t, error);
 }
 
-int pw_system_contacts (const pw_system *s) {
-  int count = 0;
-  for (int i = 0; i < s->batches; i++) count += s->batch[i].kind->contact ? s->batch[i].b.count : 0;
-  return count;
-}
-
-char *pw_system_contact_name (const pw_system *s, int i, char *buffer, size_t size) {
-  const pw_element_batch *k = s->batch;
-  int contact = i / 2;
-  for (; k->kind->contact == NULL || contact >= k->b.count; k++) contact -= k->kind->contact ? k->b.count : 0;
-  return pw_member_name (s, k, contact, i % 2 ? "y" : "x", buffer, size);
-}
-
-int pw_workspace_contact_points (pw_workspace *w, double t, const double *q, const double *v, double (*out)[3],
-                                 pw_error *error) {
-  int status = elements_update (w, t, q, v, error);
-  if (status != PW_OK) return status;
+static void elements_contacts (const pw_workspace *w, double (*out)[3]) {
   PW_EACH_BATCH (k, w) {
     if (k->kind->contact == NULL) continue;
     k->kind->contact (&k->b, out[0]);
     out += k->b.count;
   }
+}
+
+int pw_workspace_contact_points (pw_workspace *w, double t, const double *q, const double *v, double (*out)[3],
+                                 pw_error *error) {
+  int status = elements_update (w, t, q, v, error);
+  if (status == PW_OK) elements_contacts (w, out);
+  return status;
+}
+
+/* The value of a column; output, ledger: values of those, NULL: unknown.  Contact points are in w->contact. */
+static double elements_column (const pw_workspace *w, const pw_sample *x, const double *output, const double *ledger,
+                               pw_column c) {
+  const int n = w->s->coords;
+  switch (c.type) {
+  case PW_COLUMN_STATE:
+    return c.index < n ? x->q[c.index] : x->v[c.index - n];
+  case PW_COLUMN_CONTACT:
+    return w->contact[c.index / 2][c.index % 2];
+  case PW_COLUMN_REACTION:
+    return 0 - x->lambda[c.index]; /* the reaction is -lambda; not -0 */
+  case PW_COLUMN_LEDGER:
+    return ledger ? ledger[c.index] : NAN;
+  case PW_COLUMN_OUTPUT:
+    return output ? output[c.index] : NAN;
+  default:
+    return *(const double *)(const void *)((const char *)x + pw_column_offset (c.type));
+  }
+}
+
+int pw_workspace_columns (pw_workspace *w, const pw_sample *x, const pw_column *c, int count, double *value,
+                          pw_error *error) {
+  int contacts = 0;
+  for (int i = 0; i < count; i++) contacts |= c[i].type == PW_COLUMN_CONTACT;
+  int status = contacts ? elements_update (w, x->t, x->q, x->v, error) : pw_require (w, "a workspace", error);
+  if (status != PW_OK) return status;
+  if (contacts) elements_contacts (w, w->contact);
+  for (int i = 0; i < count; i++) value[i] = elements_column (w, x, x->output, x->ledger, c[i]);
   return PW_OK;
+}
+
+void pw_evaluate_outputs (pw_workspace *w, const pw_sample *x, const double *ledger) {
+  if (w->s->output_types >> PW_COLUMN_CONTACT & 1) elements_contacts (w, w->contact);
+  for (int i = 0; i < w->s->outputs; i++) {
+    const pw_compiled_output *o = &w->output[i];
+    double read[PW_OUTPUT_READS + 1], value[3] = { NAN };
+    for (int k = 0; k < o->reads; k++) read[k] = elements_column (w, x, w->output_value, ledger, o->read[k]);
+    const int status = o->function.eval (o->function.context, x->t, read, value, NULL);
+    w->output_value[i] = status == 0 ? value[0] : NAN;
+  }
 }
 
 /* F -= J^T lambda of each element, only the columns of bodies. */

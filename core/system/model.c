@@ -291,12 +291,35 @@ int pw_model_check_element (const pw_model *m, const pw_element *e, pw_error *er
   return check_element (m, e, NULL, error);
 }
 
+int pw_model_check_output (const pw_model *m, const pw_named_output *o, pw_error *error) {
+  static const char letters[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ_";
+  int reads = 0;
+  if (pw_require (m, "a model", error) != PW_OK || pw_require (o, "an output", error) != PW_OK) return PW_INPUT;
+  const char *name = o->name ? o->name : "";
+  size_t first = strspn (name, letters), n = first;
+  while (n > 0 && name[n] && (strchr (letters, name[n]) || (name[n] >= '0' && name[n] <= '9'))) n++;
+  if (first == 0 || name[n] || n > 63)
+    return pw_fail (error, PW_INPUT,
+                    "model %s: output \"%.60s\": expected a letter, then letters, digits and _, at most 63 in all",
+                    m->name, name);
+  if ((o->unit && is_bad_text (o->unit)) || (o->about && !pw_is_text (o->about)))
+    return pw_fail (error, PW_INPUT, "model %s: output %s: unit or meaning" FAULT_TEXT, m->name, name);
+  if (o->value.eval == NULL) return pw_fail (error, PW_INPUT, "model %s: output %s: no eval", m->name, name);
+  while (o->value.reads && o->value.reads[reads]) reads++;
+  if (reads <= PW_OUTPUT_READS) return PW_OK;
+  return pw_fail (error, PW_INPUT, "model %s: output %s reads more than %d columns", m->name, name, PW_OUTPUT_READS);
+}
+
 int pw_check_model (const pw_model *m, const pw_names *names, pw_error *error) {
   for (int i = 0; i < m->bodies; i++)
     if (pw_model_check_body (m, &m->body[i], error) != PW_OK) return PW_INPUT;
   for (int i = 0; i < m->elements; i++)
     if (check_element (m, &m->element[i], names, error) != PW_OK) return PW_INPUT;
-  return PW_OK;
+  for (int i = 0; i < m->outputs; i++)
+    if (pw_model_check_output (m, &m->output[i], error) != PW_OK) return PW_INPUT;
+  if (m->outputs <= PW_MOST_OUTPUTS) return PW_OK;
+  return pw_fail (error, PW_INPUT, "model %s: %d outputs; a model has at most %d", m->name, m->outputs,
+                  PW_MOST_OUTPUTS);
 }
 
 /* ---- Models ---- */
@@ -344,6 +367,7 @@ void pw_model_free (pw_model *m) {
   pw_arena_free (&m->arena);
   free (m->body);
   free (m->element);
+  free (m->output);
   free (m->initial);
   free (m);
 }
@@ -450,6 +474,19 @@ int pw_add (pw_model *m, const pw_kind *kind, const void *definition) {
   return m->error.status;
 }
 
+int pw_add_output (pw_model *m, const pw_named_output *output) {
+  if (m == NULL || output == NULL) return m ? pw_model_refuse (m, "pw_add_output without an output") : PW_INPUT;
+  if (m->error.status != PW_OK) return m->error.status;
+  if (pw_grow (&m->output, (size_t)m->outputs, &m->output_room, sizeof *m->output) != PW_OK) return model_no_memory (m);
+  pw_named_output *o = &m->output[m->outputs++];
+  *o = *output;
+  o->name = model_copy_text (m, output->name);
+  o->unit = model_copy_text (m, output->unit);
+  o->about = model_copy_text (m, output->about);
+  if (o->value.reads) o->value.reads = model_copy_names (m, o->value.reads);
+  return m->error.status;
+}
+
 #define MEMBER(type, function, member) \
   type function (const pw_model *m) {  \
     return m->member;                  \
@@ -472,6 +509,11 @@ const pw_body *pw_model_bodies (const pw_model *m, int *count) {
 const pw_element *pw_model_elements (const pw_model *m, int *count) {
   *count = m->elements;
   return m->element;
+}
+
+const pw_named_output *pw_model_outputs (const pw_model *m, int *count) {
+  *count = m->outputs;
+  return m->output;
 }
 
 const pw_reference_text *pw_model_reference_text (const pw_model *m) {

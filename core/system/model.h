@@ -28,9 +28,11 @@ struct pw_model {
   int bodies;
   pw_element *element;
   int elements;
+  pw_named_output *output;
+  int outputs;
   pw_initial_setting *initial;
   int initials;
-  size_t body_room, element_room, initial_room; /* entries allocated */
+  size_t body_room, element_room, output_room, initial_room; /* entries allocated */
   const pw_reference_text *reference;
   struct pw_kept *kept; /* objects of pw_model_keep */
   int built;            /* 1: pw_model_build has been called */
@@ -40,8 +42,8 @@ struct pw_model {
 enum { PW_NAME_MAX = 50 }; /* bytes of the longest name of a body, element, field, ... */
 _Static_assert(PW_NAME_BYTES >= 3 * PW_NAME_MAX + 10, "room for \"KIND ELEMENT: FIELD[3]\"");
 
-/* Checks every body and element: names, numbers, signals, and whether the table has the bodies of elements: numbers
- * below m->bodies. */
+/* Checks every body, element and output: names, numbers, signals, and whether the table has the bodies of elements:
+ * numbers below m->bodies. */
 int pw_check_model (const pw_model *m, const pw_names *names, pw_error *error);
 
 /* Returns what is wrong with an element type's table (in the buffer, or a constant), or "".  No other function may be

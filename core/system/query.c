@@ -19,6 +19,7 @@ MEMBER (int, pw_system_rows, rows)
 MEMBER (int, pw_system_holonomic, holonomic)
 MEMBER (int, pw_system_signals, sources)
 MEMBER (int, pw_system_ledger_entries, entries)
+MEMBER (int, pw_system_outputs, outputs)
 MEMBER (const char *, pw_system_name, model)
 MEMBER (const double *, pw_system_mass, M)
 MEMBER (double, pw_system_length, scale.length)
@@ -207,6 +208,157 @@ int pw_system_find_signal (const pw_system *s, const char *name, pw_error *error
       if (strcmp (k->name[e], name) == 0) return (int)(k->source - s->source) + e;
   }
   return query_find (s, "signal", s ? s->sources : 0, pw_system_signal_name, &(pw_nearest){ .sought = name }, error);
+}
+
+/* ---- Columns ---- */
+
+int pw_system_contacts (const pw_system *s) {
+  int count = 0;
+  for (int i = 0; i < s->batches; i++) count += s->batch[i].kind->contact ? s->batch[i].b.count : 0;
+  return count;
+}
+
+char *pw_system_contact_name (const pw_system *s, int i, char *buffer, size_t size) {
+  const pw_element_batch *k = s->batch;
+  int contact = i / 2;
+  for (; k->kind->contact == NULL || contact >= k->b.count; k++) contact -= k->kind->contact ? k->b.count : 0;
+  return pw_member_name (s, k, contact, i % 2 ? "y" : "x", buffer, size);
+}
+
+char *pw_system_ledger_name (const pw_system *s, int entry, char *buffer, size_t size) {
+  const pw_entry *listed = &s->entry[entry];
+  return pw_member_name (s, &s->batch[listed->batch], listed->element, listed->type == PW_WORK ? "work" : "loss",
+                         buffer, size);
+}
+
+/* Columns that are one number of a sample. */
+static const struct {
+  const char *name, *unit;
+  size_t offset; /* in pw_sample */
+} query_scalars[PW_COLUMN_TYPES] = {
+  [PW_COLUMN_TIME] = { "t", "s", offsetof (pw_sample, t) },
+  [PW_COLUMN_POSITION] = { "residual.position", "", offsetof (pw_sample, position) },
+  [PW_COLUMN_VELOCITY] = { "residual.velocity", "", offsetof (pw_sample, velocity) },
+  [PW_COLUMN_KINETIC] = { "kinetic", "J", offsetof (pw_sample, kinetic) },
+  [PW_COLUMN_POTENTIAL] = { "potential", "J", offsetof (pw_sample, potential) },
+  [PW_COLUMN_PROJECTION] = { "projection", "J", offsetof (pw_sample, projection) },
+  [PW_COLUMN_BALANCE] = { "balance", "J", offsetof (pw_sample, balance) },
+  [PW_COLUMN_WORK] = { "work", "J", offsetof (pw_sample, work) },
+  [PW_COLUMN_LOSS] = { "loss", "J", offsetof (pw_sample, loss) },
+};
+
+size_t pw_column_offset (pw_column_type type) {
+  return query_scalars[type].offset;
+}
+
+int pw_system_columns (const pw_system *s, pw_column_type type) {
+  if (type == PW_COLUMN_STATE) return 2 * s->coords;
+  if (type == PW_COLUMN_CONTACT) return 2 * pw_system_contacts (s);
+  if (type == PW_COLUMN_REACTION) return s->rows;
+  if (type == PW_COLUMN_LEDGER) return s->entries;
+  return type == PW_COLUMN_OUTPUT ? s->outputs : 1;
+}
+
+char *pw_system_column_name (const pw_system *s, pw_column c, char *buffer, size_t size) {
+  if (c.type == PW_COLUMN_STATE) return pw_system_state_name (s, c.index, buffer, size);
+  if (c.type == PW_COLUMN_CONTACT) return pw_system_contact_name (s, c.index, buffer, size);
+  if (c.type == PW_COLUMN_REACTION) return pw_system_reaction_name (s, c.index, buffer, size);
+  if (c.type == PW_COLUMN_LEDGER) return pw_system_ledger_name (s, c.index, buffer, size);
+  return pw_print (buffer, size, "%s",
+                   c.type == PW_COLUMN_OUTPUT ? s->output[c.index].name : query_scalars[c.type].name);
+}
+
+const char *pw_system_column_unit (const pw_system *s, pw_column c) {
+  if (c.type == PW_COLUMN_STATE) return pw_system_state_unit (s, c.index);
+  if (c.type == PW_COLUMN_REACTION) return pw_system_reaction_unit (s, c.index);
+  if (c.type == PW_COLUMN_OUTPUT) return s->output[c.index].unit;
+  return c.type == PW_COLUMN_CONTACT ? "m" : c.type == PW_COLUMN_LEDGER ? "J" : query_scalars[c.type].unit;
+}
+
+const char *pw_system_output_name (const pw_system *s, int output) {
+  return s->output[output].name;
+}
+
+const char *pw_system_output_unit (const pw_system *s, int output) {
+  return s->output[output].unit;
+}
+
+unsigned pw_system_output_reads (const pw_system *s, int output) {
+  return s->output[output].types;
+}
+
+int pw_kind_find_column (const pw_kind *kind, const char *name, pw_column *c) {
+  for (int type = 0; kind == NULL && type < PW_COLUMN_TYPES; type++)
+    if (query_scalars[type].name && strcmp (name, query_scalars[type].name) == 0)
+      return *c = (pw_column){ (pw_column_type)type, 0 }, 1;
+  if (kind == NULL) return 0;
+  for (int i = 0; i < kind->internal; i++) {
+    if (strcmp (name, kind->coordinate[i].name) == 0) return *c = (pw_column){ PW_COLUMN_STATE, i }, 1;
+    if (strcmp (name, kind->coordinate[i].rate) == 0) return *c = (pw_column){ PW_COLUMN_STATE, kind->internal + i }, 1;
+  }
+  for (int i = 0; i < kind->rows; i++)
+    if (strcmp (name, kind->reaction[i].name) == 0) return *c = (pw_column){ PW_COLUMN_REACTION, i }, 1;
+  for (int i = 0; i < 2 && kind->contact; i++)
+    if (strcmp (name, i ? "y" : "x") == 0) return *c = (pw_column){ PW_COLUMN_CONTACT, i }, 1;
+  const int works = kind->power || (kind->rows > 0 && kind->eta), is_loss = strcmp (name, "loss") == 0;
+  if (is_loss ? kind->loss == NULL : !works || strcmp (name, "work") != 0) return 0;
+  return *c = (pw_column){ PW_COLUMN_LEDGER, is_loss }, 1;
+}
+
+/* Finds column NAME of element e of a batch; contacts: the number of contact points before the batch. */
+static int query_element_column (const pw_system *s, const pw_element_batch *k, int e, int contacts, const char *name,
+                                 pw_column *c) {
+  const int n = k->kind->internal;
+  if (!pw_kind_find_column (k->kind, name, c)) return 0;
+  if (c->type == PW_COLUMN_STATE) c->index = (c->index < n ? 0 : s->coords) + k->internal + e * n + c->index % n;
+  if (c->type == PW_COLUMN_REACTION) c->index += k->row + e * k->kind->rows;
+  if (c->type == PW_COLUMN_CONTACT) c->index += 2 * (contacts + e);
+  if (c->type != PW_COLUMN_LEDGER) return 1;
+  const int is_loss = c->index;
+  for (c->index = 0; c->index < s->entries; c->index++) {
+    const pw_entry *x = &s->entry[c->index];
+    if (x->batch == k - s->batch && x->element == e && (x->type == PW_LOSS) == is_loss) return 1;
+  }
+  return 0;
+}
+
+/* Finds a column of a body, an element or a first-order state; all names before the last dot are compared first. */
+static int query_member_column (const pw_system *s, const char *name, pw_column *c) {
+  const int state = query_body_state (s, name, 0, &(pw_nearest){ .sought = name });
+  if (state >= 0) return *c = (pw_column){ PW_COLUMN_STATE, state }, 1;
+  int contacts = 0;
+  for (const pw_element_batch *k = s->batch; k < s->batch + s->batches; k++) {
+    for (int e = 0; e < k->b.count; e++) {
+      const char *body = k->kind->each_body ? s->body_name[k->b.body[e]] : "", *what = name;
+      size_t n = strlen (k->name[e]), m = strlen (body);
+      if (strncmp (what, k->name[e], n) != 0 || (what[n] != '.' && what[n] != 0)) continue;
+      what += n + (what[n] == '.'); /* nothing follows the name of a first-order state */
+      if (m > 0 && (strncmp (what, body, m) != 0 || what[m] != '.')) continue;
+      if (m > 0) what += m + 1;
+      if (query_element_column (s, k, e, contacts, what, c))
+        return c->type != PW_COLUMN_STATE || !pw_is_hidden (s, c->index);
+    }
+    if (k->kind->contact) contacts += k->b.count;
+  }
+  return 0;
+}
+
+int pw_system_find_column (const pw_system *s, const char *name, pw_column *c, pw_error *error) {
+  char buffer[PW_NAME_BYTES];
+  pw_nearest near = { .sought = name };
+  if (pw_require (s, "a system", error) != PW_OK || pw_require (name, "the name of a column", error) != PW_OK)
+    return PW_INPUT;
+  if (query_member_column (s, name, c) || pw_kind_find_column (NULL, name, c)) return PW_OK;
+  for (*c = (pw_column){ PW_COLUMN_OUTPUT, 0 }; c->index < s->outputs; c->index++)
+    if (strcmp (s->output[c->index].name, name) == 0) return PW_OK;
+  for (*c = (pw_column){ 0 }; c->type < PW_COLUMN_TYPES; c->type++)
+    for (c->index = 0; c->index < pw_system_columns (s, c->type); c->index++) {
+      if (c->type == PW_COLUMN_STATE && pw_is_hidden (s, c->index)) continue;
+      const char *known = pw_system_column_name (s, *c, buffer, sizeof buffer);
+      if (strcmp (known, name) == 0) return PW_OK;
+      pw_nearest_try (&near, known);
+    }
+  return pw_fail (error, PW_INPUT, "no column \"%.100s\"%s", name, pw_nearest_text (&near));
 }
 
 /* "torque T: value" */

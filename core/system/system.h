@@ -43,6 +43,15 @@ typedef struct {
   enum { PW_WORK, PW_LOSS } type;
 } pw_entry;
 
+/* An output of the model. */
+typedef struct {
+  const char *name, *unit;
+  pw_function function;  /* with a context of the system or workspace */
+  const pw_column *read; /* reads: the columns that it reads, also earlier outputs */
+  int reads;
+  unsigned types; /* of these columns, and of those that these outputs read: 1 << type or'ed */
+} pw_compiled_output;
+
 /* Constant after pw_system_compile: any number of runs and threads may share it. */
 struct pw_system {
   pw_arena arena; /* contains all arrays but `batch` */
@@ -72,6 +81,9 @@ struct pw_system {
   pw_element_batch *batch; /* batches: holonomic types, then nonholonomic ones, then forces */
   pw_source *source;       /* sources, ordered by batch */
   pw_entry *entry;         /* entries */
+  pw_compiled_output *output; /* outputs */
+  int outputs;
+  unsigned output_types; /* of the columns that they read, as pw_compiled_output.types */
 };
 
 /* Signals that keep their values: none; those of forces, except rates of first-order states; rates too; all. */
@@ -82,6 +94,9 @@ struct pw_workspace {
   const pw_system *s;
   pw_element_batch *batch;         /* batches: copies of the system's, with arrays of this workspace */
   pw_source *source;               /* sources: copies of the system's, with contexts of this workspace */
+  pw_compiled_output *output;      /* outputs: the same */
+  double *output_value;            /* outputs */
+  double (*contact)[3];            /* contacts: place and heading, as of the last use */
   double *u, *J;                   /* those of all batches: sources x 3; entries of J, element by element */
   pw_configuration *configuration; /* bodies + 1; the last is the ground */
   double *scratch;                 /* rows x 3 + coords + 3, for the function in progress */
@@ -141,6 +156,18 @@ static inline double pw_unit (const pw_system *s, int j) {
 static inline double pw_larger (double a, double b) {
   return a > b ? a : b;
 }
+
+/* ---- Columns and outputs ---- */
+
+/* The offset in pw_sample of a column that is one of its numbers. */
+size_t pw_column_offset (pw_column_type type);
+
+/* Sets w->output_value, the outputs at a sample whose kinematics are evaluated; ledger: its entries, NULL: unknown. */
+void pw_evaluate_outputs (pw_workspace *w, const pw_sample *x, const double *ledger);
+
+/* Opens the contexts of functions; a status.  Closes them. */
+int pw_open_outputs (pw_compiled_output *output, int count);
+void pw_close_outputs (const pw_compiled_output *output, int count);
 
 /* ---- Signals ---- */
 

@@ -8,7 +8,8 @@
 /* ---- Rows of samples (r->s->rows: the number of constraint equations) ---- */
 
 int pw_system_record_width (const pw_system *s, int ledger) {
-  return PW_RECORD_STATES + 3 * s->coords + 2 * pw_system_contacts (s) + s->rows + (ledger ? s->entries : 0);
+  return PW_RECORD_STATES + 3 * s->coords + 2 * pw_system_contacts (s) + s->rows + s->outputs +
+         (ledger ? s->entries : 0);
 }
 
 int pw_run_record_width (const pw_run *r) {
@@ -28,7 +29,8 @@ char *pw_system_record_name (const pw_system *s, int i, char *buffer, size_t siz
   }
   if ((i -= 3 * n) < contacts) return pw_system_contact_name (s, i, buffer, size);
   if ((i -= contacts) < s->rows) return pw_system_reaction_name (s, i, buffer, size);
-  return pw_system_ledger_name (s, i - s->rows, buffer, size);
+  if ((i -= s->rows) < s->outputs) return pw_print (buffer, size, "%s", s->output[i].name);
+  return pw_system_ledger_name (s, i - s->outputs, buffer, size);
 }
 
 const char *pw_system_record_unit (const pw_system *s, int i) {
@@ -38,7 +40,8 @@ const char *pw_system_record_unit (const pw_system *s, int i) {
   if (i >= 2 * n + s->mechanical && i < 3 * n) return s->state_unit[2 * (i - 2 * n - s->mechanical) + 1];
   if (i < 3 * n) return pw_system_state_unit (s, i - 2 * n)[0] == 'm' ? "m/s^2" : "rad/s^2";
   if ((i -= 3 * n) < contacts) return "m";
-  return i - contacts < s->rows ? pw_system_reaction_unit (s, i - contacts) : "J";
+  if ((i -= contacts) < s->rows) return pw_system_reaction_unit (s, i);
+  return i - s->rows < s->outputs ? s->output[i - s->rows].unit : "J";
 }
 
 /* Stores x and y of all contact points at the sample, where kinematics are evaluated, and returns the end. */
@@ -67,7 +70,9 @@ static int record_sample (pw_run *r, double t, double *rows, long *recorded, pw_
   memcpy (row + 2 * n, x.a, n * sizeof *row);
   row = record_contacts (r, row + 3 * n);
   for (int i = 0; i < r->s->rows; i++) row[i] = 0 - x.lambda[i]; /* reactions; no negative zeros */
-  if (x.ledger) memcpy (row + r->s->rows, x.ledger, (size_t)r->s->entries * sizeof *row);
+  row += r->s->rows;
+  if (r->s->outputs) memcpy (row, x.output, (size_t)r->s->outputs * sizeof *row);
+  if (x.ledger) memcpy (row + r->s->outputs, x.ledger, (size_t)r->s->entries * sizeof *row);
   return PW_OK;
 }
 
@@ -121,6 +126,8 @@ const pw_member pw_members[] = {
   AT4 (pw_statistics, steps, rejected, rhs, jacobians),
   AT4 (pw_statistics, factorisations, specialised, position, velocity),
   AT2 (pw_statistics, g, jv),
+  SIZE (pw_crossing),
+  AT2 (pw_crossing, value, context),
   SIZE (pw_initial_report),
   AT4 (pw_initial_report, q_given, v_given, q, v),
   SIZE (pw_parameter),

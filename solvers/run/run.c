@@ -193,7 +193,7 @@ double pw_run_time (const pw_run *r) {
   return r->t;
 }
 
-/* Energies and ledger of the sample, at which kinematics must be evaluated. */
+/* Energies, ledger and outputs of the sample, at which kinematics must be evaluated. */
 static void run_fill_energies (pw_run *r, pw_sample *sample) {
   const pw_system *s = r->s;
   sample->kinetic = pw_kinetic (s, r->v_at);
@@ -203,6 +203,8 @@ static void run_fill_energies (pw_run *r, pw_sample *sample) {
   if (r->settings.ledger) sample->ledger = r->ledger_at, sample->projection = r->projected_at;
   if (r->settings.integrals) sample->integral = r->ledger_at + s->entries;
   sample->balance = sample->kinetic + sample->potential - r->energy0 - sample->work + sample->loss - sample->projection;
+  if (s->outputs > 0) pw_evaluate_outputs (r->w, sample, r->ledger_at);
+  sample->output = r->w->output_value;
 }
 
 int pw_run_sample (pw_run *r, double t, pw_sample *sample, pw_error *error) {
@@ -479,6 +481,11 @@ static void ledger_integrands (pw_run *r, const double *lambda, const double *po
                       .kinetic = pw_kinetic (s, v),
                       .potential = pw_potential (r->w),
                       .ledger = power };
+  if (s->outputs > 0) { /* works and losses are not known there, only their rates */
+    state.work = state.loss = NAN;
+    pw_evaluate_outputs (r->w, &state, NULL);
+    state.work = state.loss = 0, state.output = r->w->output_value;
+  }
   for (int i = 0; i < s->entries; i++) *(s->entry[i].type == PW_WORK ? &state.work : &state.loss) += power[i];
   r->settings.integrand (r->settings.integrand_context, &state, value);
 }

@@ -34,9 +34,14 @@ TEST (every_command) {
   assert_non_null (strstr (cli_file ("a.csv"), ",f [N],"));
   assert_null (strstr (cli_file ("a.csv"), "integral"));
   assert_null (strstr (cli_file ("a.json"), "f.integral"));
+  assert_non_null (strstr (strstr (cli_file ("a.html"), "\"outputs\": ["), "\"name\": \"f\""));
+  assert_non_null (strstr (strstr (cli_file ("a.html"), "\"output\": ["), "\n    0.2")); /* its initial value */
+  assert_non_null (cli_file ("plots/outputs.svg"));
   cli_shell ("pinwheel run @/c.yaml -t 2 -o @/c.npz --plots @/plots2 --animate @/c.html");
   cli_shell ("pinwheel check @/a.yaml && pinwheel check @/c.yaml");
   cli_good ("pinwheel show @/a.yaml && pinwheel show --matrices @/a.yaml");
+  cli_write ("bare.yaml", "pinwheel: 1\nbodies: [{name: a, mass: 1, inertia: 1}]\nstates: [{name: z, rate: 1}]\n");
+  cli_good ("pinwheel show @/bare.yaml");
   cli_shell ("pinwheel linearise @/c.yaml -o @/l");
   cli_good ("pinwheel run @/a.yaml -t 1 --start f=1");
   cli_good ("pinwheel sweep @/a.yaml -t 1 --vary f=lin:0:1:3 -o @/s.csv");

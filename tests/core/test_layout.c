@@ -185,7 +185,7 @@ TEST (definitions) {
     { "friction", 0xebebc50a8771ab1e },      { "sliding-friction", 0x4722a2a44a1119a6 },
     { "drag", 0x79bea784c473bb98 },          { "gravity", 0xed353e1dda5787ff },
     { "force", 0xbc29b0bbfe5b6a71 },         { "torque", 0xc52ae040b1e51021 },
-    { "motor", 0x4b2d8f0773cca89 },          { "state", 0xe72f11bcbef2e275 },
+    { "motor", 0x4b2d8f0773cca89 },          { "state", 0x10002b44038fb8b8 },
     { "marker", 0xa45ad3f1c6e75b4a },
   };
   int bad = 0;

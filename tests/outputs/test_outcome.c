@@ -42,7 +42,7 @@ static int outcome_teardown (void) {
 static double outcome_run (const char *text, const char *method, double step, double rtol, double t_end) {
   pw_outcomes x;
   pw_error error = { 0 };
-  check_ok (pw_outcomes_open (&x, s, "--of", &text, 1, &error), &error);
+  check_ok (pw_outcomes_open (&x, s, "--of", &text, 1, NULL, &error), &error);
   pw_settings settings = { .step = step, .rtol = rtol, .span = t_end, .ledger = x.ledger };
   check_ok (pw_outcomes_run (&x, method, &settings, t_end, NULL, &error), &error);
   double value = pw_outcome_value (&x, 0);
@@ -126,7 +126,7 @@ TEST (units) {
   char buffer[40];
   pw_outcomes x;
   pw_error error = { 0 };
-  check_ok (pw_outcomes_open (&x, s, "--of", text, 5, &error), &error);
+  check_ok (pw_outcomes_open (&x, s, "--of", text, 5, NULL, &error), &error);
   for (int i = 0; i < 5; i++) assert_string_equal (pw_outcome_unit (&x, i, buffer, sizeof buffer), unit[i]);
   pw_outcomes_close (&x);
 }
@@ -135,7 +135,7 @@ TEST (extremum) {
   const char *text = "max:wheel.phi";
   pw_outcomes x;
   pw_error error = { 0 };
-  check_ok (pw_outcomes_open (&x, s, "--of", &text, 1, &error), &error);
+  check_ok (pw_outcomes_open (&x, s, "--of", &text, 1, NULL, &error), &error);
   check_ok (pw_outcomes_run (&x, "erk8", &(pw_settings){ .rtol = 1e-10, .span = 2 }, 2, NULL, &error), &error);
   check_close ("time of the maximum", x.functional[0].t, PW_PI / 3, 1e-7, "sqrt (eps) and the error of the run");
   pw_outcomes_close (&x);
@@ -151,7 +151,8 @@ TEST (bad) {
     { "wheel.phy", "--of wheel.phy: no column \"wheel.phy\"; did you mean \"wheel.phi\"?" },
     { "max:motor-2.work", "--of max:motor-2.work: no column \"motor-2.work\"; did you mean \"motor-1.work\"?" },
     { "wheel.phi/works", "--of wheel.phi/works: no column \"works\"; did you mean \"work\"?" },
-    { "maxi:wheel.phi", "--of maxi:wheel.phi: no \"maxi:\"; valid are final:, max:, min:, mean:, integral: and rms:" },
+    { "maxi:wheel.phi",
+      "--of maxi:wheel.phi: no \"maxi:\"; valid are final:, max:, min:, mean:, integral:, rms: and at TIME:" },
     { "mean:balance", "--of mean:balance: balance describes the integration, not the motion: it has no mean" },
     { "rms:motor-1.work", "--of rms:motor-1.work: no rms: of work and losses; valid are final:, max:, min:, mean: and "
                           "integral:" },
@@ -160,7 +161,7 @@ TEST (bad) {
   for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
     pw_outcomes x;
     pw_error error = { 0 };
-    assert_int_equal (pw_outcomes_open (&x, s, "--of", &bad[i].text, 1, &error), PW_INPUT);
+    assert_int_equal (pw_outcomes_open (&x, s, "--of", &bad[i].text, 1, NULL, &error), PW_INPUT);
     check_error (&error, PW_INPUT, bad[i].message);
     pw_outcomes_close (&x);
   }

@@ -591,6 +591,24 @@ def test_commands():
     assert "frame" in pw.command("show", "ezyroller", matrices=True)
 
 
+def test_until():
+    """A run ends at the instant at which a condition becomes true: x = t^2/2 passes 2 m at t = 2 s."""
+    model = pw.describe(bodies=[pw.Body("block", mass=1, inertia=1)],
+                        elements=[pw.Force("F", body="block", at=[0, 0], fx=1)],
+                        outputs=[{"name": "way", "value": "block.x", "unit": "m"}])
+    for method, every in (("erk8", None), ("rk4", None), ("rk4", 0.3), ("bdf", 0.3)):
+        result = model.run(method, t_end=5, step=0.13, rtol=1e-10, every=every, until="way > 2")
+        assert abs(result.stopped - 2) < 1e-8 and result.t[-1] == result.stopped and (np.diff(result.t) > 0).all()
+        assert result["way"][-1] > 2 > result["way"][-2] and result.status == "ok"
+        assert every is None or np.allclose(result.t[:-1], 0.3 * np.arange(7))
+    assert model.run("rk4", t_end=1, until="way > 2").stopped is None
+    for until, message in (("ways > 2", "did you mean \"way\""), ("way", "expected a condition"), ("work > 1", "add energy=True")):
+        with pytest.raises(pw.InputError, match=message):
+            model.run("rk4", t_end=1, until=until)
+    with pytest.raises(pw.InputError, match="complete runs"):
+        model.run("rk4", t_end=1, until="way > 2", error=True)
+
+
 def test_states():
     """A first-order state is integrated with the motion, and is a column under its name; its integral is none."""
     model = pw.describe(bodies=[pw.Body("block", mass=1, inertia=1)],

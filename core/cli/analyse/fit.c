@@ -94,7 +94,7 @@ static int data_read_columns (pw_fit *fit, pw_error *error) {
     for (int i = 0; i < fit->columns; i++)
       if (strcmp (fit->column_name[i], name) == 0)
         return pw_fail (error, PW_INPUT, "--columns: %s is given twice", name);
-    fit->column_unit[fit->columns] = pw_column_unit (fit->model.system, column);
+    fit->column_unit[fit->columns] = pw_system_column_unit (fit->model.system, column);
     fit->column_name[fit->columns++] = name;
     name = comma ? comma + 1 : NULL;
   }

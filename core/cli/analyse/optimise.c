@@ -683,12 +683,15 @@ static void report_command (const pw_optimise *problem, const char *values, FILE
   const pw_cli_line *line = &problem->line;
   const struct {
     const char *option, *value;
-  } given[] = {
-    { "--max-file", line->max_file },   { "--method", line->method },
-    { "--t-end", line->t_end },         { "--step", line->step },
-    { "--rtol", line->rtol },           { "--atol", line->atol },
-    { "--max-steps", line->max_steps }, { "--specialise", problem->unknowns.engine.code ? "always" : line->specialise }
-  };
+  } given[] = { { "--max-file", line->max_file },
+                { "--method", line->method },
+                { "--t-end", line->t_end },
+                { "--step", line->step },
+                { "--rtol", line->rtol },
+                { "--atol", line->atol },
+                { "--max-steps", line->max_steps },
+                { "--until", line->until },
+                { "--specialise", problem->unknowns.engine.code ? "always" : line->specialise } };
   fputs ("# pinwheel run ", f);
   pw_cli_word (f, line->argument[0]);
   for (const char **set = line->sets; set && *set; set++) fputs (" --set ", f), pw_cli_word (f, *set);
@@ -789,7 +792,8 @@ static int optimise_read_outputs (pw_optimise *problem, pw_error *error) {
 /* Checks the outputs of an option, from number `first` on, and stores their units.  Extrema are not differentiable. */
 static int optimise_open_outputs (pw_optimise *problem, int first, int count, const char *option, pw_error *error) {
   pw_outcomes set;
-  int status = pw_outcomes_open (&set, problem->model.system, option, problem->output + first, count, error);
+  int status = pw_outcomes_open (&set, problem->model.system, option, problem->output + first, count,
+                                 problem->line.until, error);
   for (int i = 0; i < set.outcomes; i++) pw_outcome_unit (&set, i, problem->unit[first + i], sizeof *problem->unit);
   for (int i = 0; i < set.functionals; i++) problem->differentiable &= !pw_is_extremum (set.functional[i].type);
   pw_outcomes_close (&set);
@@ -919,6 +923,7 @@ static const struct poptOption optimise_options[] = {
   PW_TEXT_OPTION (pw_optimise, plots_path, "plots", 0, "DIR", "Write figures of all runs into a folder"),
   PW_WIDTH_OPTION,
   PW_METHOD_OPTIONS,
+  PW_UNTIL_OPTION,
   PW_MODEL_OPTIONS,
   POPT_TABLEEND
 };

@@ -160,8 +160,8 @@ static int sensitivity_solve (sensitivity *cmd, pw_error *error) {
   if (values == NULL || cmd->value == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   cmd->table = cmd->value + count;
   for (int p = 0; p < u->count; p++) values[p] = u->list[p].value;
-  int status =
-      pw_outcomes_open (&cmd->outcomes, u->m->system, cmd->outputs.option, cmd->outputs.of, cmd->outputs.count, error);
+  int status = pw_outcomes_open (&cmd->outcomes, u->m->system, cmd->outputs.option, cmd->outputs.of, cmd->outputs.count,
+                                 cmd->line.until, error);
   if (status == PW_OK) status = pw_run_outputs_at (&cmd->outputs, values, cmd->value, cmd->table, error);
   if (status == PW_OK) status = sensitivity_prepare (cmd, values, error);
   for (int p = 0; p < u->count && status == PW_OK; p++) status = sensitivity_check (cmd, values, p, error);
@@ -383,7 +383,8 @@ static int sensitivity_draw (const sensitivity *cmd, pw_error *error) {
 }
 
 static int sensitivity_write (const sensitivity *cmd, pw_error *error) {
-  int status = pw_figure_write_tables (cmd->folder, "sensitivity", 5, cmd, sensitivity_csv, sensitivity_json, error);
+  int status = pw_figure_write_tables (cmd->folder, "sensitivity", 5, cmd, cmd->line.until ? NULL : sensitivity_csv,
+                                       sensitivity_json, error);
   return status == PW_OK && cmd->outputs.rows > 1 ? sensitivity_draw (cmd, error) : status;
 }
 
@@ -417,7 +418,9 @@ static int sensitivity_open (sensitivity *cmd, pw_error *error) {
     return pw_fail (error, PW_INPUT, "derivatives need inputs=stage: held inputs depend on the steps");
   cmd->outputs.unknowns = &cmd->unknowns, cmd->outputs.option = "--of", cmd->outputs.of = cmd->of;
   while (cmd->of[cmd->outputs.count]) cmd->outputs.count++;
-  if (cmd->folder)
+  if (cmd->line.until && cmd->every)
+    return pw_fail (error, PW_INPUT, "--every cannot be given together with --until: there is no table");
+  if (cmd->folder && !cmd->line.until) /* the times of rows must not vary */
     status = sensitivity_set_rows (cmd, every > 0 ? every : cmd->unknowns.t_end / SENSITIVITY_ROWS, error);
   return status == PW_OK ? pw_unknowns_differentiated (&cmd->unknowns, cmd->by, error) : status;
 }
@@ -453,19 +456,21 @@ static int sensitivity_command (void *options, pw_error *error) {
 
 static const struct poptOption sensitivity_options[] = {
   PW_OPTION_GROUP ("Sensitivity"),
-  PW_LIST_OPTION (sensitivity, of, "of", 0, "OUTPUT",
-                  "A column of the table of `run` at the end, or its max:, min:, mean:, integral: or rms:, such as "
-                  "max:B.Fx; or an expression of these; repeatable"),
+  PW_LIST_OPTION (
+      sensitivity, of, "of", 0, "OUTPUT",
+      "A column of the table of `run` at the end, or its max:, min:, mean:, integral:, rms: or at TIME:, such "
+      "as max:B.Fx; or an expression of these; repeatable"),
   PW_LIST_OPTION (sensitivity, by, "by", 0, "NAME",
                   "A parameter, or the initial value of a state, such as body.vx; repeatable"),
   PW_TEXT_OPTION (sensitivity, every, "every", 0, "DT",
                   "Time between rows of the table [s] (default a thousandth of the final time)"),
   PW_TEXT_OPTION (sensitivity, folder, "output", 'o', "DIR",
                   "Write sensitivity.csv (outputs and derivatives along the run), sensitivity.json and a figure into a "
-                  "folder"),
+                  "folder; with --until sensitivity.json alone"),
   PW_TEXT_OPTION (sensitivity, jobs_text, "jobs", 'j', "N", "Number of concurrent runs (default: one per processor)"),
   PW_WIDTH_OPTION,
   PW_METHOD_OPTIONS,
+  PW_UNTIL_OPTION,
   PW_MODEL_OPTIONS,
   POPT_TABLEEND
 };

@@ -215,7 +215,8 @@ int pw_run_outputs_at (const pw_run_outputs *outputs, const double *x, double *v
   const pw_outcome_table rows = { outputs->t, outputs->rows, table };
   int status = pw_unknown_run_prepare (&run, outputs->unknowns, x, error);
   if (status == PW_OK)
-    status = pw_outcomes_open (&outcomes, run.m.system, outputs->option, outputs->of, outputs->count, error);
+    status = pw_outcomes_open (&outcomes, run.m.system, outputs->option, outputs->of, outputs->count,
+                               outputs->unknowns->line->until, error);
   if (outputs->method) run.settings.rtol = outputs->rtol, run.settings.atol = 0;
   if (outputs->max_steps) run.settings.max_steps = outputs->max_steps;
   if (status == PW_OK)

@@ -91,7 +91,8 @@ class Engine {
     return scene;
   }
 
-  /* The columns of the samples: t, 6 energies; x, y, phi and velocities of bodies; contacts of wheels; forces of links. */
+  /* The columns of the samples: t, 6 energies; x, y, phi and velocities of bodies; contacts of wheels; forces of links;
+   * at the end first-order states and outputs. */
   arrays (scene) {
     const { samples, width } = scene, data = this.numbers(this.wasm.data(), samples * width);
     let from = 7; /* after t and energies */
@@ -102,7 +103,8 @@ class Engine {
     };
     const next = count => { from += count; return columns(from - count, count); };
     return { t: columns(0, 1), energy: columns(1, 6), motion: next(6 * scene.bodies.length),
-      contact: next(3 * scene.wheels.length), force: next(2 * scene.links.length) };
+      contact: next(3 * scene.wheels.length), force: next(2 * scene.links.length),
+      output: columns(width - scene.outputs.length, scene.outputs.length) };
   }
 
   /* Calls a function of this class; if it fails, the next one has a new instance. */
@@ -532,8 +534,10 @@ function use (text) {
 
 function csv () {
   const names = run.bodies.flatMap(body => ["x [m]", "y [m]", "phi [rad]", "vx [m/s]", "vy [m/s]", "omega [rad/s]"].map(n => body.name + "." + n));
-  const lines = [["t [s]", ...names].join(",")];
-  for (let i = 0; i < count; i++) lines.push([run.t[i], ...run.motion.subarray(6 * i * bodies, 6 * (i + 1) * bodies)].join(","));
+  const more = run.outputs.map(({ name, unit }) => name + (unit && " [" + unit + "]")), n = more.length;
+  const lines = [["t [s]", ...names, ...more].join(",")];
+  for (let i = 0; i < count; i++)
+    lines.push([run.t[i], ...run.motion.subarray(6 * i * bodies, 6 * (i + 1) * bodies), ...run.output.subarray(i * n, (i + 1) * n)].join(","));
   return lines.join("\n") + "\n";
 }
 

@@ -84,6 +84,19 @@ static void page_links (pw_json *j, const pw_plots *plots) {
   pw_json_close (j, ']');
 }
 
+static void page_outputs (pw_json *j, const pw_plots *plots) {
+  char buffer[PW_NAME_BYTES];
+  const char *unit;
+  pw_json_open (j, "outputs", '[');
+  for (int o = 0; o < plots->outputs; o++) {
+    pw_json_open (j, NULL, '{');
+    pw_json_text (j, "name", pw_plot_output (plots, o, buffer, &unit));
+    pw_json_text (j, "unit", unit);
+    pw_json_close (j, '}');
+  }
+  pw_json_close (j, ']');
+}
+
 void pw_animation_scene (pw_json *j, const pw_plots *plots) {
   j->digits = 9;
   pw_json_number (j, "size", plots->size);
@@ -91,6 +104,7 @@ void pw_animation_scene (pw_json *j, const pw_plots *plots) {
   page_bodies (j, plots);
   page_wheels (j, plots);
   page_links (j, plots);
+  page_outputs (j, plots);
 }
 
 /* ---- The run ---- */
@@ -136,6 +150,7 @@ void pw_animation_run (FILE *f, const pw_plots *plots, const char *method, const
   page_samples (&j, plots, "motion", plots->bodies.offset, 6 * plots->bodies.drawn, 9);
   page_samples (&j, plots, "contact", plots->wheels.offset, 3 * wheels, 9);
   if (plots->with_forces) page_samples (&j, plots, "force", force_offset, 2 * plots->links, 6);
+  page_samples (&j, plots, "output", plots->sample_size - plots->outputs, plots->outputs, 7);
   if (plots->with_forces) page_samples (&j, plots, "energy", PLOT_KINETIC, PLOT_FIRST - PLOT_KINETIC, 7);
   pw_json_close (&j, '}');
 }

@@ -55,12 +55,13 @@ int pw_figure_write_tables (const char *folder, const char *name, int lines, con
                             int (*csv) (const void *context, FILE *f, pw_error *error),
                             void (*json) (const void *context, pw_json *j), pw_error *error) {
   pw_output *file[2] = { NULL };
-  file[0] = pw_figure_open_file (folder, PW_PRINTED (60, "%s.csv", name), error);
-  if (file[0]) file[1] = pw_figure_open_file (folder, PW_PRINTED (60, "%s.json", name), error);
-  int status = file[1] ? csv (context, pw_output_stream (file[0]), error) : PW_RESOURCE;
+  file[0] = pw_figure_open_file (folder, PW_PRINTED (60, "%s.json", name), error);
+  if (file[0] && csv) file[1] = pw_figure_open_file (folder, PW_PRINTED (60, "%s.csv", name), error);
+  int status = file[0] && (file[1] || csv == NULL) ? PW_OK : PW_RESOURCE;
+  if (status == PW_OK && csv) status = csv (context, pw_output_stream (file[1]), error);
   if (status == PW_OK) {
-    json (context, &(pw_json){ .f = pw_output_stream (file[1]), .lines = lines });
-    return pw_output_finish_all (file, 2, error);
+    json (context, &(pw_json){ .f = pw_output_stream (file[0]), .lines = lines });
+    return pw_output_finish_all (file, csv ? 2 : 1, error);
   }
   for (int i = 0; i < 2; i++)
     if (file[i]) pw_output_discard (file[i]);

@@ -38,7 +38,7 @@ pw_output *pw_figure_open_data (const pw_figures *f, const char *name, pw_error 
  * which the caller closes.  Without a folder (NULL) it only refuses --width.  A status. */
 int pw_figure_lock_folder (const pw_cli_line *line, const pw_cli_model *model, const char *folder, const char *name,
                            pw_files *files, pw_error *error);
-/* Writes NAME.csv and NAME.json, with this value of pw_json.lines, into the folder.  A status. */
+/* Writes NAME.json, with this value of pw_json.lines, and, unless csv is NULL, NAME.csv into the folder.  A status. */
 int pw_figure_write_tables (const char *folder, const char *name, int lines, const void *context,
                             int (*csv) (const void *context, FILE *f, pw_error *error),
                             void (*json) (const void *context, pw_json *j), pw_error *error);

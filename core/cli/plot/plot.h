@@ -24,6 +24,8 @@ int pw_plots_style (pw_plots *plots, const char *width, const char *colour, pw_e
 double pw_plots_next (const pw_plots *plots);
 /* Stores a sample, if there is room; its energies are complete only with pw_settings.ledger. */
 void pw_plots_add (pw_plots *plots, const pw_sample *sample);
+/* Stores the last sample of a run that ends before t_end as it should. */
+void pw_plots_last (pw_plots *plots, const pw_sample *sample);
 /* Saves or loads the samples stored so far. */
 void pw_plots_serialise (pw_plots *plots, pw_archive *archive);
 
@@ -31,6 +33,11 @@ void pw_plots_serialise (pw_plots *plots, pw_archive *archive);
  * not installed, a notice says how to draw the figures.  Without a folder it does nothing, with fewer than two samples
  * it only prints a notice.  PW_RESOURCE if a file cannot be written or gnuplot fails; PW_INTERRUPTED. */
 int pw_plots_finish (pw_plots *plots, int draw, pw_error *error);
+
+/* Writes the figure "outputs", a panel for each first-order state and output, and draws it as pw_plots_finish does;
+ * nothing without outputs.  The same statuses. */
+int pw_plots_outputs (const pw_plots *plots, const pw_cli_line *line, const pw_cli_model *model, int draw,
+                      pw_error *error);
 
 /* PW_INPUT unless the path of an animation, the value of an option, ends in .html. */
 int pw_animation_check (const char *option, const char *path, pw_error *error);
@@ -60,14 +67,15 @@ enum {
   PLOT_HATCHES = 60,      /* strokes of the hatching of the ground, at most */
   PLOT_STROKES = 80,      /* of a symbol and of the ground at it, at most */
   PLOT_ATTACHMENTS = 24,  /* attachment points drawn of one body, at most */
-  PLOT_CURVES = 60        /* bodies, or wheels, with a curve, at most */
+  PLOT_CURVES = 60,       /* bodies, or wheels, with a curve, at most */
+  PLOT_OUTPUTS = 12       /* first-order states and outputs with a panel, at most */
 };
 
 /* In place of the index of a body among those drawn: the ground, a body that is not drawn. */
 enum { PLOT_GROUND = -1, PLOT_HIDDEN = -2 };
 
 /* Columns of a sample: these, then x, y, phi, vx, vy, omega of each body drawn, then x, y, heading of each wheel drawn,
- * then, with forces, Fx, Fy of each link. */
+ * then, with forces, Fx, Fy of each link, then first-order states and outputs. */
 enum { PLOT_T, PLOT_KINETIC, PLOT_POTENTIAL, PLOT_WORK, PLOT_LOSS, PLOT_PROJECTION, PLOT_BALANCE, PLOT_FIRST };
 
 /* The motions of bodies, or of "wheels": all elements with a contact point, which include markers. */
@@ -124,6 +132,7 @@ struct pw_plots {
   double t_end;            /* [s] */
   int samples, planned;    /* stored so far; in all */
   int sample_size;         /* numbers of a sample */
+  int outputs;             /* first-order states and outputs drawn: the last numbers of a sample */
   double size;             /* diagonal of the box around the initial configuration [m] */
   double symbol_unit;      /* u of symbols [m] */
   pw_tracks bodies, wheels;
@@ -177,6 +186,9 @@ void pw_plot_measure (pw_plots *plots);
 void pw_plot_point (const double *placement, const double *at, double out[2]);
 /* End n of a link at sample i, in the inertial frame [m]. */
 void pw_plot_end (const pw_plots *plots, int i, const pw_plot_link *link, int n, double out[2]);
+
+/* The name of a first-order state or output that is drawn, and its unit, "" if it has none. */
+const char *pw_plot_output (const pw_plots *plots, int o, char buffer[PW_NAME_BYTES], const char **unit);
 
 /* Fills in the strokes of a link's symbol, if it has one, and of the ground at it; returns their number.  Rails are as
  * long as the travel during the first `samples` samples. */

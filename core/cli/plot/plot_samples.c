@@ -47,6 +47,9 @@ static int plot_allocate (pw_plots *plots, pw_error *error) {
   plot_open_tracks (plots, bodies, pw_system_bodies (plots->system));
   plot_open_tracks (plots, wheels, pw_system_contacts (plots->system));
   plots->sample_size += plots->with_forces ? 2 * plots->links : 0;
+  plots->outputs = pw_system_states (plots->system) + pw_system_outputs (plots->system);
+  if (plots->outputs > PLOT_OUTPUTS) plots->outputs = PLOT_OUTPUTS;
+  plots->sample_size += plots->outputs;
   int most = PLOT_NUMBERS / plots->sample_size;
   plots->planned = 1 + (most < PLOT_FEW ? PLOT_FEW : most < PLOT_INTERVALS ? most : PLOT_INTERVALS);
   plots->body_index = plot_array (plots, bodies->count + 1, sizeof *plots->body_index);
@@ -144,9 +147,20 @@ void pw_plots_add (pw_plots *plots, const pw_sample *sample) {
     memcpy (pw_plot_track (plots, i, &plots->wheels, w),
             plots->contact[pw_system_element (plots->system, plots->wheels.system_index[w]).contact],
             sizeof *plots->contact);
+  const int states = pw_system_states (plots->system);
+  const double *state = sample->v + pw_system_coordinates (plots->system) - states;
+  for (int o = 0; o < plots->outputs; o++)
+    pw_plot_sample (plots, i)[plots->sample_size - plots->outputs + o] =
+        o < states ? state[o] : sample->output[o - states];
   if (i == 0) pw_plot_measure (plots);
   if (plots->with_forces && plots->links > 0)
     pw_plot_forces (plots, sample, pw_plot_track (plots, i, &plots->wheels, plots->wheels.drawn));
+}
+
+void pw_plots_last (pw_plots *plots, const pw_sample *sample) {
+  if (plots->samples == 0 || pw_plot_sample (plots, plots->samples - 1)[PLOT_T] < sample->t)
+    pw_plots_add (plots, sample);
+  plots->planned = plots->samples;
 }
 
 void pw_plots_serialise (pw_plots *plots, pw_archive *archive) {
@@ -418,4 +432,30 @@ int pw_plots_finish (pw_plots *plots, int draw, pw_error *error) {
     status = figures_write (plots, *name, closeup, error);
   if (status != PW_OK) return status;
   return draw ? pw_figure_draw (folder, names, error) : pw_figure_undrawn (folder, names, "the run was interrupted");
+}
+
+const char *pw_plot_output (const pw_plots *plots, int o, char buffer[PW_NAME_BYTES], const char **unit) {
+  const pw_system *s = plots->system;
+  const int states = pw_system_states (s), state = 2 * pw_system_coordinates (s) - states + o;
+  *unit = o < states ? pw_system_state_unit (s, state) : pw_system_output_unit (s, o - states);
+  return o < states ? pw_system_state_name (s, state, buffer, PW_NAME_BYTES) : pw_system_output_name (s, o - states);
+}
+
+int pw_plots_outputs (const pw_plots *plots, const pw_cli_line *line, const pw_cli_model *model, int draw,
+                      pw_error *error) {
+  pw_curves c;
+  if (plots->figures.folder == NULL || plots->outputs == 0 || plots->samples < 2) return PW_OK;
+  int status = pw_curves_open (&c, line, model, plots->figures.folder, "outputs", "outputs", error);
+  for (int o = 0; status == PW_OK && o < plots->outputs; o++) {
+    char buffer[PW_NAME_BYTES];
+    const char *unit, *name = pw_plot_output (plots, o, buffer, &unit);
+    pw_curves_panel (
+        &c, &(pw_panel){ .x_label = "t [s]", .y_label = PW_FIGURE_LABEL (name, unit), .type = o ? PW_PANEL_BELOW : 0 });
+    pw_curves_add (&c, "line", NULL);
+    for (int i = 0; i < plots->samples; i++) {
+      const double *sample = pw_plot_sample (plots, i);
+      pw_curves_point (&c, sample[PLOT_T], sample[plots->sample_size - plots->outputs + o], 0);
+    }
+  }
+  return draw ? pw_curves_draw (&c, status, error) : pw_curves_close (&c, status, error);
 }

@@ -400,6 +400,19 @@ static void report_initial (pw_json *j, const pw_check *check) {
                   PW_COUNTED (check->reference_states, "state"));
 }
 
+/* The outputs at the initial state. */
+static void report_outputs (pw_json *j, const pw_check *check) {
+  const pw_system *s = check->model.system;
+  pw_sample sample;
+  if (check->run == NULL || pw_system_outputs (s) == 0) return;
+  if (pw_run_sample (check->run, pw_run_time (check->run), &sample, NULL) != PW_OK) return;
+  report_section (j, "outputs", '{', "Outputs at the initial state");
+  for (int i = 0; i < pw_system_outputs (s); i++)
+    report_entry (j, pw_system_output_name (s, i), sample.output[i], pw_system_output_name (s, i), "%s %s",
+                  PW_DIGITS (sample.output[i], CHECK_DIGITS), pw_system_output_unit (s, i));
+  pw_json_close (j, '}');
+}
+
 /* ---- Element types ---- */
 
 /* The checks that failed, in `scenes`: "random scenes" or "this model". */
@@ -573,6 +586,7 @@ static void report_write (const pw_check *check, pw_json *j) {
   report_mobility (j, check);
   report_mass (j, check);
   report_initial (j, check);
+  report_outputs (j, check);
   report_section (j, "kinds", '[',
                   "Self-test of the element types in use: each function against differences of other functions");
   for (const pw_checked_kind *k = check->kind; k < check->kind + check->kinds; k++) report_kind (j, k);

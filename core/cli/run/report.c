@@ -198,6 +198,17 @@ static void report_reactions (const pw_system *system, const pw_sample *last) {
   report_more (stdout, rows - shown, ": -o FILE.csv writes them all");
 }
 
+static void report_outputs (const pw_system *system, const pw_sample *last) {
+  const int outputs = pw_system_outputs (system), shown = outputs < REPORT_ROWS ? outputs : REPORT_ROWS;
+  if (outputs > 0) printf ("\n  output\n");
+  for (pw_table table = { 0 }; pw_table_pass (&table);)
+    for (int i = 0; i < shown; i++) {
+      report_value (&table, -8, pw_system_output_name (system, i), last->output[i], pw_system_output_unit (system, i));
+      pw_row_end (&table);
+    }
+  report_more (stdout, outputs - shown, ": -o FILE.csv writes them all");
+}
+
 static void report_energy (const pw_sample *last) {
   const struct {
     const char *name;
@@ -262,6 +273,8 @@ pw_summary pw_run_summary (pw_run_cli *command, const pw_sample *last, const pw_
                          .status = pw_cli_status_word (error->status),
                          .reason = error->text,
                          .cpu = command->cpu,
+                         .until = command->condition ? command->line.until : NULL,
+                         .stop_time = command->stop_time,
                          .energy_defect = last ? pw_run_energy_defect (run, last) : NAN,
                          .redundant = command->redundant,
                          .general = run ? report_general_reason (command) : NULL,
@@ -296,6 +309,7 @@ void pw_report_end (const pw_run_cli *command, const pw_summary *summary, const 
   report_bodies (system, last);
   report_internal (system, last);
   report_reactions (system, last);
+  report_outputs (system, last);
   if (command->with_energies) report_energy (last);
   report_errors (summary->reference, command->comparison.gaps);
   printf ("\n  worst scaled residuals: position %s, velocity %s\n", PW_DIGITS (stats->position, 2),
@@ -308,5 +322,9 @@ void pw_report_end (const pw_run_cli *command, const pw_summary *summary, const 
   else
     printf ("  code specialised for this scene: %ld evaluations\n", stats->specialised);
   if (stats->restarts > 0) printf ("  restarted at %s\n", PW_COUNTED (stats->restarts, "checkpoint"));
+  if (summary->until && isnan (summary->stop_time))
+    pw_cli_print (stdout, "  %s did not become true\n", summary->until);
+  else if (summary->until)
+    pw_cli_print (stdout, "  stopped: %s at t = %s s\n", summary->until, PW_DIGITS (summary->stop_time, 15));
   if (*summary->reason) printf ("  ended early: %s\n", summary->reason);
 }

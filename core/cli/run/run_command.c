@@ -276,6 +276,20 @@ static int run_choose_engine (pw_run_cli *command, pw_error *error) {
   return PW_OK;
 }
 
+static int run_open_condition (pw_run_cli *command, pw_error *error) {
+  pw_error own = { 0 };
+  if (command->with_error)
+    return pw_fail (error, PW_INPUT, "--error compares complete runs: it cannot be given together with --until");
+  if (command->checkpoints.path) return pw_fail (error, PW_INPUT, "--checkpoint cannot be given together with --until");
+  command->condition = pw_condition_open (command->compiled.system, command->line.until, &own);
+  if (command->condition == NULL)
+    return pw_fail (error, own.status, "--until %.200s: %s", command->line.until, own.text);
+  command->settings.ledger |= pw_condition_needs_ledger (command->condition);
+  command->crossing = (pw_crossing){ .value = pw_condition_value, .context = command->condition };
+  command->stop_time = NAN;
+  return PW_OK;
+}
+
 static int run_open (pw_run_cli *command, pw_error *error) {
   int status = run_open_outputs (command, error);
   if (status == PW_OK) status = run_open_model (command, error);
@@ -293,6 +307,7 @@ static int run_open (pw_run_cli *command, pw_error *error) {
   status = pw_comparison_open (&command->comparison, &command->compiled, command->reference_path,
                                command->line.starts != NULL, command->t_end, error);
   if (status != PW_OK) return status;
+  if (command->line.until && run_open_condition (command, error) != PW_OK) return error->status;
   pw_limit_start (&command->limit);
   command->run = pw_limit_open (system, command->method, &command->settings, error);
   if (command->run == NULL) return error->status;
@@ -319,11 +334,21 @@ static double run_next_row_time (const pw_run_cli *command) {
   return t > 0 && fabs (t - command->t_end) <= round_off ? command->t_end : t;
 }
 
-/* Writes rows and stores samples up to the time reached. */
+/* Searches the condition of --until in the last step. */
+static int run_check_condition (pw_run_cli *command, pw_error *error) {
+  if (command->condition == NULL) return PW_OK;
+  return pw_run_find_crossing (command->run, &command->crossing, &command->stop_time, error);
+}
+
+static int run_is_stopped (const pw_run_cli *command) {
+  return command->condition && !isnan (command->stop_time);
+}
+
+/* Writes rows and stores samples up to the time reached, or that at which --until ends the run, which has a row. */
 static int run_store_samples (pw_run_cli *command, pw_error *error) {
   pw_motion *motion = &command->comparison.motion;
   pw_run *run = command->run;
-  double now = pw_run_time (run);
+  double now = pw_run_end_time (command);
   pw_sample sample;
   int status = PW_OK;
   while (status == PW_OK && run_next_row_time (command) <= now) {
@@ -334,9 +359,19 @@ static int run_store_samples (pw_run_cli *command, pw_error *error) {
     pw_progress_at (&command->progress, sample.t);
     if (command->row_interval == 0) break;
   }
+  if (status == PW_OK && command->table && command->row_interval > 0 && run_is_stopped (command) &&
+      (double)(command->rows - 1) * command->row_interval < now) { /* the last row is not a multiple of the interval */
+    status = pw_run_sample (run, now, &sample, error);
+    if (status == PW_OK) status = pw_csv_write (command->table, command->compiled.system, &sample, error);
+    command->rows++;
+  }
   while (status == PW_OK && command->plots && pw_plots_next (command->plots) <= now) {
     status = pw_run_sample (run, pw_plots_next (command->plots), &sample, error);
     if (status == PW_OK) pw_plots_add (command->plots, &sample);
+  }
+  if (status == PW_OK && command->plots && run_is_stopped (command)) {
+    status = pw_run_sample (run, now, &sample, error);
+    if (status == PW_OK) pw_plots_last (command->plots, &sample);
   }
   while (status == PW_OK && pw_motion_next_time (motion) <= now) {
     status = pw_run_sample (run, pw_motion_next_time (motion), &sample, error);
@@ -358,7 +393,10 @@ static int run_batch (pw_run_cli *command, pw_error *error) {
   int status;
   long steps = 0;
   do {
-    status = pw_run_advance_towards (command->run, due, command->t_end, error);
+    status = command->condition ? pw_run_advance (command->run, command->t_end, error)
+                                : pw_run_advance_towards (command->run, due, command->t_end, error);
+    if (status == PW_OK) status = run_check_condition (command, error);
+    if (run_is_stopped (command)) break;
   } while (status == PW_OK && ++steps < command->batch && pw_run_time (command->run) < due && !pw_stop);
   double cpu = pw_seconds (CLOCK_THREAD_CPUTIME_ID) - start;
   command->cpu += cpu;
@@ -368,8 +406,9 @@ static int run_batch (pw_run_cli *command, pw_error *error) {
 
 static int run_steps (pw_run_cli *command, pw_error *error) {
   /* a checkpoint has the samples up to its time */
-  int status = command->checkpoints.resume_path ? PW_OK : run_store_samples (command, error);
-  while (status == PW_OK && pw_run_time (command->run) < command->t_end && !pw_stop) {
+  int status = run_check_condition (command, error);
+  if (status == PW_OK && !command->checkpoints.resume_path) status = run_store_samples (command, error);
+  while (status == PW_OK && !run_is_stopped (command) && pw_run_time (command->run) < command->t_end && !pw_stop) {
     status = run_batch (command, error);
     if (status == PW_OK) status = run_store_samples (command, error);
     if (status == PW_OK && pw_run_time (command->run) >= command->checkpoints.next_time)
@@ -391,7 +430,7 @@ static int run_integrate (pw_run_cli *command, pw_error *error) {
   command->progress.no_bar = run_is_stdout (command->table_path);
   int status = run_steps (command, error);
   pw_progress_end (&command->progress);
-  int complete = status == PW_OK && pw_run_time (command->run) >= command->t_end;
+  int complete = status == PW_OK && (run_is_stopped (command) || pw_run_time (command->run) >= command->t_end);
   int stated = pw_error_run_finish (&command->stated, complete, error);
   pw_stop_release ();
   if (complete) {
@@ -463,6 +502,8 @@ static int run_finish_figures (pw_run_cli *command, const char *reason, pw_error
   pw_error draw_error = { 0 };
   int status = PW_OK, animated = 0;
   if (command->plots && command->run) status = pw_plots_finish (command->plots, !pw_stop, &draw_error);
+  if (command->plots && command->run && status == PW_OK)
+    status = pw_plots_outputs (command->plots, &command->line, &command->compiled, !pw_stop, &draw_error);
   if (command->plots && command->run && command->output[PW_RUN_PAGE])
     animated = pw_animate (command->plots, command->page_path, command->output[PW_RUN_PAGE], command->method, reason);
   if (!animated) run_discard (command, PW_RUN_PAGE);
@@ -479,7 +520,7 @@ static int run_finish (pw_run_cli *command, pw_error *error) {
   char reason[PW_RUN_REASON] = "";
   int interrupted = error->status == PW_OK && pw_stop;
   pw_sample sample, *last = NULL;
-  if (run && pw_run_sample (run, pw_run_time (run), &sample, NULL) == PW_OK) last = &sample;
+  if (run && pw_run_sample (run, pw_run_end_time (command), &sample, NULL) == PW_OK) last = &sample;
   run_close_table (command, error->status == PW_OK && !interrupted, error);
   pw_summary summary = pw_run_summary (command, last, error, reason);
   if (last && command->table_path == NULL && command->summary_path == NULL) pw_report_end (command, &summary, last);
@@ -515,6 +556,7 @@ static int run_command (void *options, pw_error *error) {
   pw_comparison_close (&command->comparison);
   pw_error_run_close (&command->stated);
   pw_run_close (command->run);
+  pw_condition_close (command->condition);
   free (command->redundant);
   pw_cli_engine_close (&command->engine);
   pw_cli_close_model (&command->compiled);
@@ -535,6 +577,7 @@ static const struct poptOption run_options[] = {
                   "What the colours of snapshots show: body (default) or time"),
   PW_TEXT_OPTION (pw_run_cli, page_path, "animate", 0, "FILE.html", "Write an animation as a page for web browsers"),
   PW_FLAG_OPTION (pw_run_cli, with_energies, "energy", "Show energies, work and losses"),
+  PW_UNTIL_OPTION,
   PW_FLAG_OPTION (pw_run_cli, with_error, "error",
                   "State the error, from a repetition with a tenth of the tolerance or half the step"),
   PW_TEXT_OPTION (pw_run_cli, reference_path, "reference", 0, "FILE.csv",

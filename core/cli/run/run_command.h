@@ -64,10 +64,13 @@ typedef struct pw_run_cli {
   pw_plots *plots;
   pw_comparison comparison;
   pw_error_run stated;
+  pw_condition *condition; /* of --until, or NULL */
+  pw_crossing crossing;
   pw_run *run;
   const char **redundant; /* a description of each redundant constraint equation; NULL: there are none */
   pw_progress progress;
   /* in progress */
+  double stop_time;                     /* at which the condition has become true [s]; NaN: it has not */
   long rows;                            /* written to the table */
   int limited;                          /* 1: --limit, --max-steps or a signal during a step has stopped the run */
   int loaded;                           /* 1: the state of the checkpoint has been loaded */
@@ -76,6 +79,11 @@ typedef struct pw_run_cli {
   int write_failed;                     /* 1: the table or the summary could not be written */
   char kept_path[PW_RUN_OUTPUTS][4200]; /* of incomplete files that are kept, PATH_MAX and an ending, or "" */
 } pw_run_cli;
+
+/* The time at which the results end: that of --until, or that reached. */
+static inline double pw_run_end_time (const pw_run_cli *command) {
+  return command->condition && !isnan (command->stop_time) ? command->stop_time : pw_run_time (command->run);
+}
 
 /* ---- The error (run_error.c); without --error these do nothing ---- */
 

@@ -59,6 +59,7 @@ typedef struct {
   row_system *system;  /* NULL: no row */
   pw_run *run;         /* NULL: it could not be opened */
   double *state_error; /* of each state at the end; NULL: not known */
+  pw_outcomes of;      /* outputs and condition; in use if plan->of or --until is given */
   pw_limit limit;
   int status; /* other than PW_OK: the run has ended */
   pw_error error;
@@ -200,6 +201,10 @@ static void row_state_error (sweep_row *row, const pw_plan *plan, const pw_setti
   free (rows);
 }
 
+static int row_has_outcomes (const pw_plan *plan) {
+  return plan->of || plan->line->until;
+}
+
 static void row_open (sweep_row *row, const pw_plan *plan) {
   row->run = NULL, row->state_error = NULL;
   row->error = row->system->error;
@@ -212,17 +217,22 @@ static void row_open (sweep_row *row, const pw_plan *plan) {
   pw_initial_value *initial = row_initial (plan, row, &settings.initials);
   settings.initial = initial;
   pw_limit_start (&row->limit);
-  if (initial)
+  if (initial == NULL) pw_fail (&row->error, PW_RESOURCE, "out of memory");
+  if (initial && row_has_outcomes (plan) &&
+      pw_outcomes_open (&row->of, row->system->model.system, "--of", plan->of, plan->outputs, plan->line->until,
+                        &row->error) == PW_OK)
+    pw_outcomes_settings (&row->of, &settings);
+  if (row->error.status == PW_OK)
     row->run = pw_limit_open (row->system->model.system, plan->method, &settings, &row->error);
-  else
-    pw_fail (&row->error, PW_RESOURCE, "out of memory");
   row->status = row->error.status;
+  if (row->run && row_has_outcomes (plan))
+    row->status = pw_outcomes_begin (&row->of, row->run, plan->t_end, &row->error);
   if (row->run && plan->with_error) row_state_error (row, plan, &settings);
   free (initial);
 }
 
 static int row_ended (const sweep_row *row, const pw_plan *plan) {
-  return row->status != PW_OK || !(pw_run_time (row->run) < plan->t_end);
+  return row->status != PW_OK || row->of.ended || !(pw_run_time (row->run) < plan->t_end);
 }
 
 /* Closes the run and appends the cells of its row, without the end of the line, even if the run failed; returns its
@@ -231,17 +241,22 @@ static int row_close (sweep_row *row, const pw_plan *plan, pw_text *text) {
   pw_sample sample, *last = NULL;
   pw_error sample_error = { 0 };
   if (row->status == PW_STOPPED) row->status = pw_limit_status (&row->limit, pw_run_time (row->run), &row->error);
-  if (row->run && pw_run_sample (row->run, pw_run_time (row->run), &sample, &sample_error) == PW_OK) last = &sample;
+  const double end = row->run && row->of.ended ? row->of.t : row->run ? pw_run_time (row->run) : 0;
+  if (row->run && row->status == PW_OK && row_has_outcomes (plan))
+    row->status = pw_outcomes_end (&row->of, row->run, &row->error);
+  const int has_outputs = row->status == PW_OK && plan->outputs > 0;
+  if (row->run && pw_run_sample (row->run, end, &sample, &sample_error) == PW_OK) last = &sample;
   if (row->status == PW_OK && last == NULL) row->status = sample_error.status, row->error = sample_error;
   /* PW_RETRY, from a method, without a request to stop */
   if (row->status > 0 && pw_stop == 0) row->status = pw_fail (&row->error, PW_METHOD, "the method gave up");
   if (row->status != PW_RETRY && row->status != PW_RESOURCE) {
     pw_plan_row shown = { row->number, row->status, row->error.text, row->run, .last = last };
     if (plan->with_cpu && row->run) shown.cpu = pw_seconds (CLOCK_THREAD_CPUTIME_ID) - row->limit.start;
-    shown.error = row->state_error;
+    shown.error = row->state_error, shown.of = has_outputs ? &row->of : NULL;
     if (last) shown.coordinates = pw_system_coordinates (row->system->model.system), shown.state = row->system->state;
     pw_plan_cells (plan, &shown, text);
   }
+  pw_outcomes_close (&row->of);
   pw_run_close (row->run);
   free (row->state_error);
   if (!text->failed) return row->status;
@@ -337,6 +352,10 @@ static void worker_advance (sweep_worker *worker) {
     same_code &= row->system->code == pw_scene_code_table (plan->engine.code);
     running[n] = row, error[n] = (pw_error){ 0 }, run[n++] = row->run;
   }
+  if (plan->by_steps) /* one run */
+    while (!row_ended (running[0], plan))
+      running[0]->status = pw_outcomes_advance (&running[0]->of, run[0], plan->t_end, plan->t_end, &running[0]->error);
+  if (plan->by_steps) return;
   while (!ended) {
     pw_runs_advance (run, n, plan->t_end, same_code ? worker->lanes_code : NULL, worker->lanes_memory, status, error);
     for (int i = 0; i < n; i++) ended |= status[i] != PW_OK || !(pw_run_time (run[i]) < plan->t_end);
@@ -466,6 +485,9 @@ static int sweep_read_settings (pw_sweep *sweep, pw_error *error) {
   pw_run_defaults defaults = pw_cli_defaults (pw_file_table (plan->file));
   plan->line = &sweep->line;
   plan->method = sweep->line.method ? sweep->line.method : defaults.method;
+  if (plan->with_error && row_has_outcomes (plan))
+    return pw_fail (error, PW_INPUT, "--error compares complete runs: it cannot be given together with --%s",
+                    plan->of ? "of" : "until");
   int status = pw_cli_settings (&sweep->line, &defaults, &plan->t_end, &plan->settings, &plan->limit, error);
   if (status == PW_OK) pw_cli_report_unused (plan->method, &sweep->line);
   if (status == PW_OK) status = pw_cli_read_specialise (sweep->line.specialise, &plan->specialise, error);
@@ -558,6 +580,9 @@ static const struct poptOption sweep_options[] = {
   PW_LIST_OPTION (pw_sweep, ranges, "vary", 'v', "NAME=RANGE",
                   "Vary a parameter or an initial value such as frame.vx; repeatable, the last one varies fastest. "
                   "RANGE: lin:FIRST:LAST:COUNT, log:FIRST:LAST:COUNT, or a list V1,V2,..."),
+  PW_LIST_OPTION (pw_sweep, plan.of, "of", 0, "OUTPUT",
+                  "Add a column: a column of the table of `run` at the end, or its max:, min:, mean:, integral:, rms: "
+                  "or at TIME:, such as max:B.Fx; or an expression of these; repeatable"),
   PW_TEXT_OPTION (pw_sweep, path, "output", 'o', "FILE.csv", "Write the table to this file"),
   PW_TEXT_OPTION (pw_sweep, jobs_text, "jobs", 'j', "N", "Number of threads (default: one per processor)"),
   PW_TEXT_OPTION (pw_sweep, lanes_text, "lanes", 0, "N",
@@ -571,6 +596,7 @@ static const struct poptOption sweep_options[] = {
   PW_FLAG_OPTION (pw_sweep, plan.with_cpu, "cpu",
                   "Add a column with the processor time of each run, which is never reproducible"),
   PW_METHOD_OPTIONS,
+  PW_UNTIL_OPTION,
   PW_MODEL_OPTIONS,
   POPT_TABLEEND,
 };

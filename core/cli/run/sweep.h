@@ -5,6 +5,7 @@
 #include <stdint.h>
 #include <sys/types.h>
 #include "cli.h"
+#include "outcome.h"
 
 /* ---- The grid: all combinations of the values of the varied quantities (axes), one per row ----
  *
@@ -57,6 +58,8 @@ typedef struct {
   pw_limit limit;  /* of each run */
   int with_cpu;    /* 1: a column with each run's processor time */
   int with_error;  /* 1: columns with the stated errors of states */
+  const char **of; /* --of: outputs, ended by NULL; NULL: none */
+  int outputs;     /* their number */
   int part, parts; /* --part; 1, 1 if it is not given */
   pw_specialise specialise;
   int lanes; /* --lanes, runs that a thread advances at once by vector instructions; 0: not given */
@@ -68,12 +71,14 @@ typedef struct {
     const char *name, *unit;
   } * column; /* of the states of all bodies and elements */
   int columns;
-  size_t column_room;  /* entries of `column` that are allocated */
-  pw_names column_of;  /* from a state's name to the index of its column */
-  pw_arena arena;      /* of the grid and of names */
-  uint64_t tables_sum; /* a checksum of the points of all tables of models built so far; 0: there are none */
-  pw_text heading;     /* the table's first line, without its end */
-  pw_text fingerprint; /* the first lines of a journal or part: everything that determines the rows */
+  struct pw_column *output; /* outputs: of each */
+  int by_steps;             /* 1: outputs or the condition of --until need each step */
+  size_t column_room;       /* entries of `column` that are allocated */
+  pw_names column_of;       /* from a state's name to the index of its column */
+  pw_arena arena;           /* of the grid and of names */
+  uint64_t tables_sum;      /* a checksum of the points of all tables of models built so far; 0: there are none */
+  pw_text heading;          /* the table's first line, without its end */
+  pw_text fingerprint;      /* the first lines of a journal or part: everything that determines the rows */
 } pw_plan;
 
 /* Matches the ranges ("NAME=RANGE") to the model, whose file is open in plan->file and stays the caller's, and finds
@@ -95,6 +100,7 @@ typedef struct {
   int coordinates;       /* of its system */
   const int *state;      /* index of the state in each column; -1: the system does not have it; unused without `last` */
   const double *error;   /* stated errors of its states at the end; NULL: not known */
+  const pw_outcomes *of; /* its outputs; NULL: not known */
   double cpu;            /* [s] */
 } pw_plan_row;
 

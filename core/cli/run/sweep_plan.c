@@ -273,10 +273,33 @@ static void plan_open_engines (pw_plan *plan, const pw_system *system) {
   pw_cli_engine_open (&plan->engine, system, plan->specialise, steps);
   const char *reason = plan->with_cpu                   ? "--cpu measures each run"
                        : plan->with_error               ? "--error repeats each run"
+                       : plan->by_steps                 ? "outputs and conditions follow each step"
                        : isfinite (plan->limit.seconds) ? "--limit stops each run by itself"
                                                         : NULL;
   if (reason == NULL) plan->lanes_code = pw_cli_engine_lanes (&plan->engine, system, plan->method, plan->lanes, steps);
   if (reason && plan->lanes > 1) pw_cli_say ("pinwheel: one run after the other: %s\n", reason);
+}
+
+/* Checks outputs and the condition of --until; stores names and units of outputs. */
+static int plan_open_outputs (pw_plan *plan, const pw_system *system, pw_error *error) {
+  pw_outcomes set;
+  char unit[60];
+  while (plan->of && plan->of[plan->outputs]) plan->outputs++;
+  plan->output = pw_arena_alloc (&plan->arena, (size_t)plan->outputs * sizeof *plan->output);
+  if (plan->output == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  int status = pw_outcomes_open (&set, system, "--of", plan->of, plan->outputs, plan->line->until, error);
+  for (int i = 0; i < plan->outputs && status == PW_OK; i++) {
+    if (pw_names_find (&plan->column_of, plan->of[i]) >= 0 || strcmp (plan->of[i], "t") == 0 ||
+        strcmp (plan->of[i], "kinetic") == 0)
+      status = pw_fail (error, PW_INPUT, "--of %s: the table has this column", plan->of[i]);
+    plan->output[i].name = plan->of[i];
+    plan->output[i].unit = pw_arena_copy (&plan->arena, pw_outcome_unit (&set, i, unit, sizeof unit));
+    if (plan->output[i].unit == NULL) status = pw_fail (error, PW_RESOURCE, "out of memory");
+  }
+  plan->by_steps = set.extrema || set.integrals || plan->line->until;
+  for (int i = 0; i < set.functionals; i++) plan->by_steps |= set.functional[i].type == PW_AT_TIME;
+  pw_outcomes_close (&set);
+  return status;
 }
 
 static int plan_scan_row (pw_plan *plan, long row, plan_scan *scan, pw_error *error) {
@@ -285,6 +308,9 @@ static int plan_scan_row (pw_plan *plan, long row, plan_scan *scan, pw_error *er
   int status = pw_plan_compile (plan, row, &compiled, &row_error);
   if (status == PW_OK) plan->tables_sum = pw_fingerprint_tables (plan->tables_sum, compiled.model);
   if (status == PW_OK) status = plan_add_columns (plan, compiled.system, &row_error);
+  if (status == PW_OK && !scan->complete && (plan->of || plan->line->until) &&
+      plan_open_outputs (plan, compiled.system, error) != PW_OK)
+    status = PW_RESOURCE, row_error = *error;
   if (status == PW_OK && !scan->complete) plan_open_engines (plan, compiled.system);
   scan->built |= compiled.system != NULL;
   pw_cli_close_model (&compiled);
@@ -328,7 +354,7 @@ void pw_plan_cells (const pw_plan *plan, const pw_plan_row *row, pw_text *text) 
     plan_cell (row, text, name, axis->unit, row ? pw_grid_value (&plan->grid, i, row->number) : 0);
   }
   pw_text_cell (text, row ? pw_cli_status_word (row->status) : "status");
-  plan_cell (row, text, "t", "s", run ? pw_run_time (run) : NAN);
+  plan_cell (row, text, "t", "s", last ? last->t : run ? pw_run_time (run) : NAN);
   for (int i = 0; i < plan->columns; i++) {
     int state = last ? row->state[i] : -1, n = last ? row->coordinates : 0;
     plan_cell (row, text, plan->column[i].name, plan->column[i].unit,
@@ -341,6 +367,9 @@ void pw_plan_cells (const pw_plan *plan, const pw_plan_row *row, pw_text *text) 
     int known = row && row->error && row->state[i] >= 0;
     plan_cell (row, text, name, plan->column[i].unit, known ? row->error[row->state[i]] : NAN);
   }
+  for (int i = 0; i < plan->outputs; i++)
+    plan_cell (row, text, plan->output[i].name, plan->output[i].unit,
+               row && row->of ? pw_outcome_value (row->of, i) : NAN);
   plan_cell (row, text, "kinetic", "J", last ? last->kinetic : NAN);
   plan_cell (row, text, "residual.position", NULL, run ? statistics->position : NAN);
   plan_cell (row, text, "residual.velocity", NULL, run ? statistics->velocity : NAN);
@@ -373,6 +402,7 @@ static int plan_fingerprint (pw_plan *plan, const pw_model *model, pw_error *err
   if (plan->settings.max_steps != PW_MAX_STEPS)
     pw_fingerprint_number (text, "max-steps", NULL, (double)plan->settings.max_steps);
   if (plan->with_error) pw_fingerprint_line (text, "error", NULL, "stated");
+  if (plan->line->until) pw_fingerprint_line (text, "until", NULL, plan->line->until);
   if (isfinite (plan->limit.seconds)) pw_fingerprint_number (text, "limit", NULL, plan->limit.seconds);
   if (plan->engine.code) pw_fingerprint_line (text, "engine", NULL, "specialised");
   for (const pw_parameter *parameter = pw_model_table (model)->parameters; parameter && parameter->name; parameter++) {

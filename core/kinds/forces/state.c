@@ -25,6 +25,7 @@ static const pw_field state_fields[] = {
   { PW_AT (pw_state, rate), PW_SIGNAL, .required = 1, .about = "time derivative of the state, in its unit per second" },
   { PW_AT (pw_state, start), PW_NUMBER, .about = "initial value, in its unit" },
   { PW_AT (pw_state, unit), PW_TEXT, .about = "unit of the state, for tables" },
+  { PW_AT (pw_state, about), PW_TEXT, .about = "what it means, in a few words" },
   { .name = NULL },
 };
 

@@ -159,6 +159,7 @@ pw_settings = _structure(
 pw_statistics = _structure(
     "pw_statistics", steps=c.c_long, rejected=c.c_long, rhs=c.c_long, jacobians=c.c_long, factorisations=c.c_long,
     specialised=c.c_long, position=c.c_double, velocity=c.c_double, g=c.c_double, jv=c.c_double)
+pw_crossing = _structure("pw_crossing", value=c.c_void_p, context=c.c_void_p)
 pw_initial_report = _structure("pw_initial_report", q_given=_double_p, v_given=_double_p, q=_double_p, v=_double_p)
 pw_parameter = _structure("pw_parameter", name=c.c_char_p, value=c.c_double, unit=c.c_char_p, about=c.c_char_p)
 pw_field = _structure(
@@ -219,8 +220,12 @@ _declare(core, _p, ("pw_repetition_open", _p, _s, c.POINTER(pw_settings), _p, c.
 _declare(core, _i, ("pw_repetition_run", _p, c.c_long, _e), ("pw_repetition_error", _p, _p, c.c_long, _p, _p, _e))
 _declare(core, None, ("pw_repetition_close", _p))
 _declare(core, _d, ("pw_run_time", _p))
+_declare(core, _i, ("pw_run_find_crossing", _p, c.POINTER(pw_crossing), _double_p, _e))
+_declare(files, _p, ("pw_condition_open", _p, _s, _e))
+_declare(files, _i, ("pw_condition_needs_ledger", _p))
+_declare(files, None, ("pw_condition_close", _p))
 _declare(core, _i, ("pw_method_parse", _s, c.POINTER(_p), _p, _e), ("pw_method_adaptive", _p, _s),
-         ("pw_system_contacts", _p))
+         ("pw_system_contacts", _p), ("pw_system_outputs", _p))
 _declare(core, c.POINTER(pw_element), ("pw_model_elements", _p, c.POINTER(_i)))
 _declare(core, c.POINTER(pw_initial_report), ("pw_run_initial", _p))
 _declare(core, _i, ("pw_initial_moved", _p, c.POINTER(pw_initial_report), _i), ("pw_initial_given", c.POINTER(pw_initial_report), _i),

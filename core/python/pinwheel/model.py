@@ -368,7 +368,7 @@ class Model:
 
     def run(self, method: str | None = None, *, t_end: float | None = None, every: float | None = None, times=None,
             start: dict | None = None, progress: Callable[[float], object] | bool | None = None, error: bool = False,
-            **settings) -> Result:
+            until: str | None = None, **settings) -> Result:
         """Integrates and returns the samples.
 
         Parameters
@@ -387,6 +387,8 @@ class Model:
             Called now and then with the fraction done; True: a progress bar, False: none; default: a bar in notebooks.
         error : bool
             Repeat the run with a tenth of the tolerance or half the step, and state its errors: ``result.error``.
+        until : str, optional
+            A condition on columns, "car.x > 10", at whose instant the run ends: the last sample.
         **settings
             step, rtol, atol, max_steps, energy, inputs, specialise: see :meth:`open`.
 
@@ -401,10 +403,12 @@ class Model:
             What functions in Python and handlers of signals raise, with the samples in its attribute ``result``: see
             :meth:`Simulation.record`.
         """
+        if until is not None and error:
+            raise lib.InputError("error compares complete runs: it cannot be given together with until")
         model = self.replace(start=start) if start else self
         end = self.defaults["t_end"] if t_end is None else lib.number(t_end, "t_end")
         with model.open(method, t_end=end or None, **settings) as simulation:
-            result = simulation.record(end, every, times, progress)
+            result = simulation.record(end, every, times, progress, until)
             if error and result.status == "ok":
                 simulation._state_error(result)
             return result
@@ -562,7 +566,7 @@ def _numbers_of(result, name):
 
 
 def describe(name: str = "model", *, about: str = "", bodies=(), elements=(), parameters=(), let: dict | None = None,
-             run: dict | None = None, **model) -> Model:
+             run: dict | None = None, outputs=(), **model) -> Model:
     """A model described in Python, with the keywords of text models.
 
     Parameters
@@ -580,6 +584,8 @@ def describe(name: str = "model", *, about: str = "", bodies=(), elements=(), pa
         ``{"name": "a", "value": 0.25, "unit": "m"}``.
     let, run : dict, optional
         Definitions and default run settings, as in a text model.
+    outputs : list of dict
+        Named functions of columns: ``{"name": "offset", "value": "car.y - sin (car.x)", "unit": "m"}``.
     **model
         Parameters and keywords of :class:`Model`.
 
@@ -609,7 +615,8 @@ def describe(name: str = "model", *, about: str = "", bodies=(), elements=(), pa
             plain.append(fields)
     head = {"about": about, "run": run, "parameters": _entries(parameters, "parameters"), "let": let}
     lines = ["pinwheel: 1"] + [f"{key}: {_json(value)}" for key, value in head.items() if value]
-    for key, entries in (("bodies", _entries(bodies, "bodies")), ("elements", plain), ("states", states)):
+    for key, entries in (("bodies", _entries(bodies, "bodies")), ("elements", plain), ("states", states),
+                         ("outputs", _entries(outputs, "outputs"))):
         lines += [f"{key}:"] + [f"  - {_json(entry)}" for entry in entries] if entries else []
     return Model(_Described(name, "\n".join(lines) + "\n"), signals=signals, **model)
 

@@ -18,8 +18,8 @@ class Result:
         All samples; ``result[name]`` is a view of one column.
     units : dict of str
         Unit of each column.
-    states, reactions, ledger : list of str
-        Names of columns: coordinates and velocities; reactions; work and losses by element.
+    states, reactions, outputs, ledger : list of str
+        Names of columns: coordinates and velocities; reactions; outputs of the model; work and losses by element.
     status : {"ok", "stopped", "failed"}
         "stopped" by an exception of a handler of signals (Ctrl-C) or of ``progress``.
     reason : str
@@ -32,6 +32,8 @@ class Result:
         Stated errors by column, at the end and the largest of the run, if :meth:`Model.run` was asked for them.
     error_unknown : str
         Why no errors can be stated, or "".
+    stopped : float or None
+        The time at which the condition ``until`` became true [s].
     model : Model or None
         None in copies, and in other processes, if the model has functions in Python.
     settings : dict
@@ -41,7 +43,7 @@ class Result:
     -----
     The columns are those of ``pinwheel run -o``, and more: the time, residuals of the constraints, energies, then
     coordinates and velocities (``states``), accelerations (the velocity's name and '), positions of wheels and markers,
-    reactions and, with ``energy``, the ledger.
+    reactions, outputs of the model and, with ``energy``, the ledger.
     """
 
     def __init__(self, rows, groups, units, status="ok", reason="", statistics=None, model=None, settings=None):
@@ -50,9 +52,11 @@ class Result:
         self.status, self.reason, self.statistics = status, reason, statistics or {}
         self.model, self.settings = model, settings or {}
         self.states, self.reactions, self.ledger = groups["states"], groups["reactions"], groups["ledger"]
+        self.outputs = groups.get("outputs", [])
         self.changed: dict[str, tuple[float, float]] = {}
         self.error: dict[str, tuple[float, float]] | None = None
         self.error_unknown = ""
+        self.stopped: float | None = None
         self._column = {name: i for i, name in enumerate(units)}
         self.t = rows[:, 0]
 

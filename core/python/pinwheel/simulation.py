@@ -116,11 +116,34 @@ def columns(s, ledger) -> tuple[dict, dict]:
     names = [lib.name_of(core.pw_system_record_name, s, i) for i in range(width)]
     n = core.pw_system_coordinates(s)
     reactions = _FIRST_COLUMNS + 3 * n + 2 * core.pw_system_contacts(s)
-    entries = reactions + core.pw_system_rows(s)
+    outputs = reactions + core.pw_system_rows(s)
+    entries = outputs + core.pw_system_outputs(s)
     states = [names[_FIRST_COLUMNS + i] for i in range(2 * n) if not core.pw_system_state_hidden(s, i)]
-    groups = {"states": states, "reactions": names[reactions:entries], "ledger": names[entries:]}
+    groups = {"states": states, "reactions": names[reactions:outputs], "outputs": names[outputs:entries],
+              "ledger": names[entries:]}
     units = {name: lib.text(core.pw_system_record_unit(s, i)) for i, name in enumerate(names)}
     return units, groups
+
+
+class _Condition:
+    """The instant at which a condition becomes true, sought in the last step of a run."""
+
+    def __init__(self, system, text, ledger):
+        self._system, self.time = system, None
+        try:
+            pointer = system.call(lib.files.pw_condition_open, system.pointer, lib.encode(text, "until"))
+        except lib.InputError as why:
+            raise lib.InputError(f"until = {text!r:.60}: {why}") from None
+        self._handle = lib.Handle(pointer, lib.files.pw_condition_close, system)
+        if lib.files.pw_condition_needs_ledger(pointer) and not ledger:
+            raise lib.InputError(f"until = {text!r:.60} reads work or losses: add energy=True")
+        self._crossing = lib.pw_crossing(value=c.cast(lib.files.pw_condition_value, c.c_void_p).value, context=pointer)
+
+    def check(self, run):
+        t = c.c_double()
+        self._system.call(lib.core.pw_run_find_crossing, run, c.byref(self._crossing), c.byref(t))
+        self.time = None if t.value != t.value else t.value
+        return self.time
 
 
 class Simulation:
@@ -267,7 +290,7 @@ class Simulation:
     # ---- Tables ----
 
     def record(self, t_end: float, every: float | None = None, times=None,
-               progress: Callable[[float], object] | bool | None = None) -> Result:
+               progress: Callable[[float], object] | bool | None = None, until: str | None = None) -> Result:
         """Advances to t_end, or to the last of ``times``, and returns the samples.
 
         Parameters
@@ -280,11 +303,15 @@ class Simulation:
             Increasing times of samples [s], in place of ``every``.
         progress : callable or bool, optional
             Called now and then with the fraction done; True: a progress bar, False: none; default: a bar in notebooks.
+        until : str, optional
+            A condition on columns, "car.x > 10": the last sample is at the instant at which it becomes true.  The
+            simulation itself is at the end of that step.
 
         Returns
         -------
         Result
-            A method that fails ends it early: see ``status`` and ``reason``.
+            A method that fails ends it early: see ``status`` and ``reason``.  ``stopped``: the time at which the
+            condition became true, or None.
 
         Raises
         ------
@@ -298,9 +325,10 @@ class Simulation:
             t_end = self._later(run, t_end, "t_end")
             times = self._times(lib.core.pw_run_time(run), t_end, every, times)
             rows = _Rows(lib.core.pw_run_record_width(run), 4096 if times is None else len(times))
+            condition = None if until is None else self._condition(until)
             try:
                 call = lib.Call()
-                call.passing(self._record, run, times, t_end, rows, progress, call)
+                call.passing(self._record, run, times, t_end, rows, progress, call, condition)
             except BaseException as failure:
                 in_function = lib.raised_by_function(failure)
                 if in_function:
@@ -314,7 +342,12 @@ class Simulation:
                     result = self._result(run, rows, t_end, "stopped", f"{what} at t = {lib.core.pw_run_time(run):.6g} s")
                 lib.set_attribute(failure, "result", result)
                 raise
-            return self._result(run, rows, t_end, "ok", "")
+            result = self._result(run, rows, t_end, "ok", "")
+            result.stopped = condition.time if condition else None
+            return result
+
+    def _condition(self, text):
+        return _Condition(self._system, text, self._settings.ledger)
 
     def _result(self, run, rows, t_end, status, reason):
         """The rows as a Result."""
@@ -366,10 +399,11 @@ class Simulation:
                                  f"found shape {times.shape}")
         return times
 
-    def _record(self, run, times, t_end, rows=None, progress=False, call=None):
+    def _record(self, run, times, t_end, rows=None, progress=False, call=None, condition=None):
         """Advances and adds the samples at these times, or after every step (None), to the rows, which are returned.
 
         call: the lib.Call that keeps what handlers of signals raise; None: they may raise in finalizers without effect.
+        condition: a _Condition that ends the run.
         """
         rows = rows or _Rows(lib.core.pw_run_record_width(run), len(times))
         start, now = lib.core.pw_run_time(run), lib.core.pw_run_time
@@ -378,10 +412,19 @@ class Simulation:
             self._restart = False
         if times is None:
             self._call(run, np.array([start]), start, rows, 1.0)
+        if condition:
+            self._steps_per_call = 1
+            condition.check(run)
         with watched(progress) as report:
-            while (rows.count < len(times)) if times is not None else now(run) < t_end:
+            while not (condition and condition.time is not None) and (
+                    rows.count < len(times) if times is not None else now(run) < t_end):
                 done = (now(run) - start) / (t_end - start) if t_end > start else 1.0
                 self._call(run, None if times is None else times[rows.count:], t_end, rows, done)
+                if condition:
+                    self._steps_per_call = 1
+                if condition and condition.check(run) is not None:
+                    rows.count = int(np.searchsorted(rows.used[:, 0], condition.time))
+                    self._call(run, np.array([condition.time]), now(run), rows, 1.0)
                 report(min(1.0, done))
                 if self._cancelled():
                     raise KeyboardInterrupt

@@ -12,90 +12,45 @@
 
 /* ---- Columns ---- */
 
-/* Columns that are one number of a sample. */
-static const struct {
-  const char *name, *unit;
-  size_t offset; /* in pw_sample */
-} outcome_scalars[PW_COLUMN_TYPES] = {
-  [PW_COLUMN_TIME] = { "t", "s", offsetof (pw_sample, t) },
-  [PW_COLUMN_POSITION] = { "residual.position", "", offsetof (pw_sample, position) },
-  [PW_COLUMN_VELOCITY] = { "residual.velocity", "", offsetof (pw_sample, velocity) },
-  [PW_COLUMN_KINETIC] = { "kinetic", "J", offsetof (pw_sample, kinetic) },
-  [PW_COLUMN_POTENTIAL] = { "potential", "J", offsetof (pw_sample, potential) },
-  [PW_COLUMN_PROJECTION] = { "projection", "J", offsetof (pw_sample, projection) },
-  [PW_COLUMN_BALANCE] = { "balance", "J", offsetof (pw_sample, balance) },
-  [PW_COLUMN_WORK] = { "work", "J", offsetof (pw_sample, work) },
-  [PW_COLUMN_LOSS] = { "loss", "J", offsetof (pw_sample, loss) },
-};
-
-static int outcome_count_columns (const pw_system *s, pw_column_type type) {
-  if (type == PW_COLUMN_STATE) return 2 * pw_system_coordinates (s);
-  if (type == PW_COLUMN_CONTACT) return 2 * pw_system_contacts (s);
-  if (type == PW_COLUMN_REACTION) return pw_system_rows (s);
-  return type == PW_COLUMN_LEDGER ? pw_system_ledger_entries (s) : 1;
-}
-
-static const char *outcome_name (const pw_system *s, pw_column c, char *buffer, size_t size) {
-  if (c.type == PW_COLUMN_STATE) return pw_system_state_name (s, c.index, buffer, size);
-  if (c.type == PW_COLUMN_REACTION) return pw_system_reaction_name (s, c.index, buffer, size);
-  if (c.type == PW_COLUMN_LEDGER) return pw_system_ledger_name (s, c.index, buffer, size);
-  if (c.type == PW_COLUMN_CONTACT) return pw_system_contact_name (s, c.index, buffer, size);
-  return outcome_scalars[c.type].name;
-}
-
-const char *pw_column_unit (const pw_system *s, pw_column c) {
-  if (c.type == PW_COLUMN_STATE) return pw_system_state_unit (s, c.index);
-  if (c.type == PW_COLUMN_REACTION) return pw_system_reaction_unit (s, c.index);
-  return c.type == PW_COLUMN_CONTACT ? "m" : c.type == PW_COLUMN_LEDGER ? "J" : outcome_scalars[c.type].unit;
-}
-
 int pw_column_find (const pw_system *s, const char *name, const char *origin, pw_column *c, pw_error *error) {
-  char buffer[300];
-  pw_nearest near = { .sought = name };
-  for (*c = (pw_column){ 0 }; c->type < PW_COLUMN_TYPES; c->type++)
-    for (c->index = 0; c->index < outcome_count_columns (s, c->type); c->index++) {
-      const char *known = outcome_name (s, *c, buffer, sizeof buffer);
-      if (strcmp (known, name) == 0) return PW_OK;
-      pw_nearest_try (&near, known);
-    }
-  return pw_fail (error, PW_INPUT, "%s: no column \"%.100s\"%s", origin, name, pw_nearest_text (&near));
-}
-
-/* The value of a column in a sample; NaN for contact points, and for entries of the ledger without
- * pw_settings.ledger. */
-static double outcome_column_value (const pw_system *s, pw_column c, const pw_sample *sample) {
-  int n = pw_system_coordinates (s);
-  if (c.type == PW_COLUMN_STATE) return c.index < n ? sample->q[c.index] : sample->v[c.index - n];
-  if (c.type == PW_COLUMN_REACTION) return 0 - sample->lambda[c.index]; /* the reaction is -lambda; not -0 */
-  if (c.type == PW_COLUMN_LEDGER) return sample->ledger ? sample->ledger[c.index] : NAN;
-  if (c.type == PW_COLUMN_CONTACT) return NAN;
-  return *(const double *)((const char *)sample + outcome_scalars[c.type].offset);
+  pw_error own = { 0 };
+  const int status = pw_system_find_column (s, name, c, &own);
+  return status == PW_OK ? PW_OK : pw_fail (error, status, "%s: %s", origin, own.text);
 }
 
 /* ---- Texts ---- */
 
 static const char *const outcome_prefix[] = { "final:", "max:", "min:", "mean:", "integral:", "rms:" };
+#define OUTCOME_PREFIXES "final:, max:, min:, mean:, integral:, rms: and at TIME:"
 
-/* Reads the prefix of a functional at the beginning of a text, final: without one; *text is moved to the column. */
-static pw_functional_type outcome_type (const char **text) {
+/* Reads the prefix of a functional at the beginning of a text, final: without one; *text is moved to the column; *t:
+ * the time of "at TIME:". */
+static pw_functional_type outcome_type (const char **text, double *t) {
   for (int i = 0; i <= PW_RMS; i++) {
     size_t n = strlen (outcome_prefix[i]);
     if (strncmp (*text, outcome_prefix[i], n) == 0) return *text += n, (pw_functional_type)i;
   }
-  return PW_FINAL;
+  if (strncmp (*text, "at ", 3) != 0) return PW_FINAL;
+  char number[40];
+  const char *colon = strchr (*text, ':');
+  if (colon == NULL) return PW_FINAL;
+  snprintf (number, sizeof number, "%.*s", (int)fmin (sizeof number - 1, (double)(colon - *text - 3)), *text + 3);
+  if (pw_read_number (number, t) != PW_OK) return PW_FINAL;
+  return *text = colon + 1, PW_AT_TIME;
 }
 
 /* The index of a functional, which is added unless it is there; -1 if out of memory. */
-static int outcome_add_functional (pw_outcomes *set, pw_functional_type type, pw_column c) {
+static int outcome_add_functional (pw_outcomes *set, pw_functional_type type, pw_column c, double t) {
   for (int i = 0; i < set->functionals; i++) {
     const pw_functional *f = set->functional + i;
-    if (f->type == type && f->column.type == c.type && f->column.index == c.index) return i;
+    if (f->type == type && f->column.type == c.type && f->column.index == c.index && (type != PW_AT_TIME || f->t == t))
+      return i;
   }
   pw_functional *more = realloc (set->functional, ((size_t)set->functionals + 1) * sizeof *more);
   if (more == NULL) return -1;
   set->functional = more;
-  set->functional[set->functionals] = (pw_functional){ .type = type, .column = c };
-  set->ledger |= c.type > PW_COLUMN_POTENTIAL;
+  set->functional[set->functionals] = (pw_functional){ .type = type, .column = c, .t = t };
+  set->ledger |= c.type > PW_COLUMN_POTENTIAL && c.type < PW_COLUMN_OUTPUT;
   set->extrema += pw_is_extremum (type), set->integrals += pw_is_integral (type);
   return set->functionals++;
 }
@@ -112,21 +67,25 @@ static const char *outcome_variable (char name[OUTCOME_VARIABLE], int i) {
 static int outcome_add_term (pw_outcomes *set, pw_outcome *o, const char *origin, const char *name, char next,
                              char variable[OUTCOME_VARIABLE], pw_error *error) {
   pw_column c;
-  pw_functional_type type = outcome_type (&name);
+  double t = 0;
+  pw_functional_type type = outcome_type (&name, &t);
   pw_error own = { 0 };
   if (pw_column_find (set->system, name, origin, &c, &own) != PW_OK)
-    return next == ':'
-               ? pw_fail (error, PW_INPUT,
-                          "%s: no \"%s:\"; valid are final:, max:, min:, mean:, integral: and rms:", origin, name)
-               : pw_fail (error, PW_INPUT, "%s", own.text);
+    return next == ':' ? pw_fail (error, PW_INPUT, "%s: no \"%s:\"; valid are " OUTCOME_PREFIXES, origin, name)
+                       : pw_fail (error, PW_INPUT, "%s", own.text);
   if (pw_is_integral (type) && (c.type == PW_COLUMN_POSITION || c.type == PW_COLUMN_VELOCITY ||
                                 c.type == PW_COLUMN_PROJECTION || c.type == PW_COLUMN_BALANCE))
     return pw_fail (error, PW_INPUT, "%s: %s describes the integration, not the motion: it has no %s", origin, name,
                     type == PW_INTEGRAL ? "integral" : "mean");
+  const unsigned integrated = 1u << PW_COLUMN_LEDGER | 1u << PW_COLUMN_WORK | 1u << PW_COLUMN_LOSS;
+  if (pw_is_integral (type) && c.type == PW_COLUMN_OUTPUT && pw_system_output_reads (set->system, c.index) & integrated)
+    return pw_fail (
+        error, PW_INPUT,
+        "%s: %s reads works or losses, which are integrals themselves; valid are final:, max: and min:", origin, name);
   if (type == PW_RMS && pw_column_is_integrated (c.type))
     return pw_fail (error, PW_INPUT,
                     "%s: no rms: of work and losses; valid are final:, max:, min:, mean: and integral:", origin);
-  int f = outcome_add_functional (set, type, c), i = 0;
+  int f = outcome_add_functional (set, type, c, t), i = 0;
   if (f < 0) return pw_fail (error, PW_RESOURCE, "out of memory");
   while (i < o->terms && o->term[i] != f) i++;
   if (i == PW_FORMULA_NAMES) return pw_fail (error, PW_INPUT, "%s: more than %d columns", origin, PW_FORMULA_NAMES);
@@ -146,7 +105,7 @@ static size_t outcome_term_length (const pw_system *s, const char *text) {
   char name[300];
   pw_column c;
   if (strspn (text, OUTCOME_LETTERS) == 0) return 0;
-  outcome_type (&at);
+  outcome_type (&at, &(double){ 0 });
   size_t prefix = (size_t)(at - text), word = strspn (at, OUTCOME_LETTERS "0123456789."),
          longest = strspn (at, OUTCOME_LETTERS "0123456789.-");
   for (int i = 0; i < 3 && prefix == 0; i++)
@@ -201,12 +160,14 @@ static int outcome_read (pw_outcomes *set, pw_outcome *o, const char *option, pw
 }
 
 int pw_outcomes_open (pw_outcomes *set, const pw_system *s, const char *option, const char *const *text, int count,
-                      pw_error *error) {
-  *set = (pw_outcomes){ .system = s, .outcome = calloc ((size_t)count + 1, sizeof *set->outcome) };
-  set->contact = calloc ((size_t)pw_system_contacts (s) + 1, sizeof *set->contact);
+                      const char *until, pw_error *error) {
+  pw_error own = { 0 };
+  *set = (pw_outcomes){ .system = s, .outcome = calloc ((size_t)count + 1, sizeof *set->outcome), .until = until };
   set->workspace = pw_workspace_new (s, error);
-  if (set->outcome == NULL || set->contact == NULL || set->workspace == NULL)
-    return pw_fail (error, PW_RESOURCE, "out of memory");
+  if (set->outcome == NULL || set->workspace == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  if (until && (set->condition = pw_condition_open (s, until, &own)) == NULL)
+    return pw_fail (error, own.status, "--until %.200s: %s", until, own.text);
+  set->ledger = until && pw_condition_needs_ledger (set->condition);
   for (; set->outcomes < count; set->outcomes++) {
     set->outcome[set->outcomes].text = text[set->outcomes];
     int status = outcome_read (set, set->outcome + set->outcomes, option, error);
@@ -219,7 +180,7 @@ void pw_outcomes_close (pw_outcomes *set) {
   for (int i = 0; i < set->outcomes; i++) pw_formula_close (set->outcome[i].formula);
   free (set->outcome);
   free (set->functional);
-  free (set->contact);
+  pw_condition_close (set->condition);
   pw_workspace_free (set->workspace);
   *set = (pw_outcomes){ .system = NULL };
 }
@@ -243,7 +204,7 @@ int pw_outcome_is_final (const pw_outcomes *set, int outcome) {
 const char *pw_outcome_unit (const pw_outcomes *set, int outcome, char *buffer, size_t size) {
   const pw_outcome *o = set->outcome + outcome;
   const pw_functional *f = set->functional + o->term[0];
-  const char *unit = o->formula ? "" : pw_column_unit (set->system, f->column);
+  const char *unit = o->formula ? "" : pw_system_column_unit (set->system, f->column);
   int is_integral = !o->formula && f->type == PW_INTEGRAL, of_time = strcmp (unit, "s") == 0;
   snprintf (buffer, size, "%s%s", unit, !is_integral ? "" : of_time ? "^2" : *unit ? " s" : "s");
   return buffer;
@@ -257,15 +218,20 @@ const char *pw_outcome_unit (const pw_outcomes *set, int outcome, char *buffer, 
  * For extrema each step is sampled at its middle and end.  With its beginning, a column has the values x0, xm and x1;
  * where its bend |x0 - 2 xm + x1| is below |x1 - x0| / 5, the parabola through them is monotonic: the extremum is at an
  * end.  Otherwise, if it may be beyond the extremum so far, the step is sampled at 5 times between and beside its ends:
- * values jump at breakpoints, where steps end, so that a step before a jump is always sampled so.  The largest or least
- * value is refined by Brent's method between its neighbours. */
+ * values jump at breakpoints, where steps end, so that a step before a jump is always sampled so, and so are long
+ * steps, in which three values say little.  Where these values are far from the parabola, as those of a reaction that
+ * oscillates in a long step of a motionless scene, the step is halved.  The largest or least value is refined by
+ * Brent's method between its neighbours. */
 
-#define FUNCTIONAL_LINEAR 0.2 /* largest bend of a column that counts as monotonic, relative to |x1 - x0| */
-#define FUNCTIONAL_INSET 1e-6 /* distance from the ends of a step of the times beside them, relative to its size */
+#define FUNCTIONAL_LINEAR 0.2  /* largest bend of a column that counts as monotonic, relative to |x1 - x0| */
+#define FUNCTIONAL_CURVED 0.25 /* distance from the parabola from which on a step is halved, relative to the range */
+#define FUNCTIONAL_LONG 0.02   /* steps longer than this part of the run are few, and always sampled at all times */
+#define FUNCTIONAL_INSET 1e-6  /* distance from the ends of a step of the times beside them, relative to its size */
 /* Brent's method ends when its interval has shrunk by this factor: nearer to the extremum, the column changes by less
  * than round-off. */
 #define FUNCTIONAL_WIDTH 1e-8
 enum {
+  FUNCTIONAL_HALVINGS = 8,                  /* of a step, at most */
   FUNCTIONAL_MIDDLE = 4,                    /* index of the time in the middle of a step, see functional_times */
   FUNCTIONAL_END = PW_FUNCTIONAL_TIMES - 1, /* and at its end */
   FUNCTIONAL_OTHER = PW_FUNCTIONAL_TIMES,   /* index of any other time */
@@ -285,15 +251,11 @@ typedef struct {
 
 /* Stores the columns in a sample as values[at] of their functionals. */
 static int functional_read (pw_outcomes *set, const pw_sample *s, int at, pw_error *error) {
-  int contacts = 0, status = PW_OK;
-  for (int i = 0; i < set->functionals; i++) contacts |= set->functional[i].column.type == PW_COLUMN_CONTACT;
-  if (contacts) status = pw_workspace_contact_points (set->workspace, s->t, s->q, s->v, set->contact, error);
-  for (pw_functional *f = set->functional; f < set->functional + set->functionals && status == PW_OK; f++) {
-    const pw_column c = f->column;
-    f->values[at] =
-        c.type == PW_COLUMN_CONTACT ? set->contact[c.index / 2][c.index % 2] : outcome_column_value (set->system, c, s);
+  for (pw_functional *f = set->functional; f < set->functional + set->functionals; f++) {
+    const int status = pw_workspace_columns (set->workspace, s, &f->column, 1, &f->values[at], error);
+    if (status != PW_OK) return status;
   }
-  return status;
+  return PW_OK;
 }
 
 /* Stores the columns at t, a time in the step, as values[at], unless that or an earlier sample fails. */
@@ -388,12 +350,21 @@ static void functional_extremum (functional_step *step, pw_functional *f, const 
   if (inside && may_lead) functional_refine (step, f, t + best - 1, y + best - 1);
 }
 
-/* Times in a step: its beginning, just after it, five times between, just before the end, the end. */
-static void functional_times (const functional_step *step, double t[PW_FUNCTIONAL_TIMES]) {
-  static const double part[PW_FUNCTIONAL_TIMES] = { 0,     FUNCTIONAL_INSET,     0.047, 0.231, 0.5, 0.769,
-                                                    0.953, 1 - FUNCTIONAL_INSET, 1 };
-  for (int i = 0; i < FUNCTIONAL_END; i++) t[i] = step->t0 + part[i] * (step->t1 - step->t0);
-  t[FUNCTIONAL_END] = step->t1;
+/* Times in a step, as parts of it: its beginning, just after it, five times between, just before the end, the end. */
+static const double functional_part[PW_FUNCTIONAL_TIMES] = { 0,     FUNCTIONAL_INSET,     0.047, 0.231, 0.5, 0.769,
+                                                             0.953, 1 - FUNCTIONAL_INSET, 1 };
+
+/* 1 if the values at all times are near the parabola through those at the ends and in the middle. */
+static int functional_is_smooth (const pw_functional *f) {
+  const double *y = f->values, x0 = y[0], slope = 4 * y[FUNCTIONAL_MIDDLE] - 3 * x0 - y[FUNCTIONAL_END],
+               bend = 2 * (x0 - 2 * y[FUNCTIONAL_MIDDLE] + y[FUNCTIONAL_END]);
+  double most = x0, least = x0, distance = 0;
+  for (int i = 2; i < FUNCTIONAL_END - 1; i++) { /* without those beside the ends, where values may jump */
+    const double part = functional_part[i];
+    most = fmax (most, y[i]), least = fmin (least, y[i]);
+    distance = fmax (distance, fabs (y[i] - (x0 + part * (slope + part * bend))));
+  }
+  return !(distance > FUNCTIONAL_CURVED * (most - least));
 }
 
 /* 1 if the values at the ends and in the middle do not suffice: the column is not nearly linear, and in the step may be
@@ -405,17 +376,29 @@ static int functional_needs_nodes (const pw_functional *f) {
   return pw_is_extremum (f->type) && bend > FUNCTIONAL_LINEAR * fabs (x1 - x0) && lead + bend + fabs (x1 - x0) > 0;
 }
 
-/* Updates the extrema after a step. */
-static void functional_extrema (functional_step *step) {
+/* Updates the extrema after a step, or a part of one that may be halved so often. */
+static void functional_extrema (functional_step *step, int halvings) {
   double t[PW_FUNCTIONAL_TIMES];
-  int nodes = pw_system_jumps (step->set->system, step->t1);
+  int nodes = step->t1 - step->t0 > FUNCTIONAL_LONG * step->set->span || pw_system_jumps (step->set->system, step->t1),
+      smooth = 1;
   pw_functional *const begin = step->set->functional, *const end = begin + step->set->functionals;
-  functional_times (step, t);
+  for (int i = 0; i < FUNCTIONAL_END; i++) t[i] = step->t0 + functional_part[i] * (step->t1 - step->t0);
+  t[FUNCTIONAL_END] = step->t1;
   functional_sample (step, t[FUNCTIONAL_MIDDLE], FUNCTIONAL_MIDDLE);
   functional_sample (step, step->t1, FUNCTIONAL_END);
   for (const pw_functional *f = begin; f < end; f++) nodes |= functional_needs_nodes (f);
   for (int i = 1; nodes && i < FUNCTIONAL_END; i++)
     if (i != FUNCTIONAL_MIDDLE) functional_sample (step, t[i], i);
+  for (const pw_functional *f = begin; f < end && nodes; f++)
+    smooth &= !pw_is_extremum (f->type) || functional_is_smooth (f);
+  if (!smooth && halvings > 0) {
+    const double last = step->t1;
+    step->t1 = t[FUNCTIONAL_MIDDLE];
+    functional_extrema (step, halvings - 1);
+    step->t0 = step->t1, step->t1 = last;
+    functional_extrema (step, halvings - 1);
+    return;
+  }
   for (pw_functional *f = begin; f < end && step->status == PW_OK; f++) {
     if (pw_is_extremum (f->type) && nodes) functional_extremum (step, f, t, f->values);
     if (pw_is_extremum (f->type) && !nodes) functional_update_extremum (f, step->t1, f->values[FUNCTIONAL_END]);
@@ -435,39 +418,91 @@ static void functional_row (functional_step *step, const pw_outcome_table *table
     table->value[o * table->rows + row] = pw_outcome_is_final (set, o) ? pw_outcome_value (set, o) : NAN;
 }
 
-static void functional_end (functional_step *step) {
-  pw_outcomes *set = step->set;
-  pw_sample s = { .t = step->t1 };
-  if (step->status == PW_OK) step->status = pw_run_sample (step->run, step->t1, &s, step->error);
-  if (step->status == PW_OK) step->status = functional_read (set, &s, FUNCTIONAL_END, step->error);
-  for (pw_functional *f = set->functional; f < set->functional + set->functionals && step->status == PW_OK; f++) {
-    if (pw_is_integral (f->type)) f->value = functional_of_integral (f, *s.integral++, step->t1 - set->begin);
+void pw_outcomes_settings (pw_outcomes *set, pw_settings *settings) {
+  settings->ledger |= set->ledger;
+  settings->integrals = set->integrals, settings->integrand = functional_integrands;
+  settings->integrand_context = set;
+}
+
+/* The first time after t, up to `most`, at which a value is to be sampled. */
+static double functional_next (const pw_outcomes *set, double t, double most) {
+  for (const pw_functional *f = set->functional; f < set->functional + set->functionals; f++)
+    if (f->type == PW_AT_TIME && f->t > t && f->t < most) most = f->t;
+  return most;
+}
+
+/* Samples values at given times up to the end of the step that are not known yet. */
+static void functional_values_at_times (functional_step *step) {
+  for (pw_functional *f = step->set->functional; f < step->set->functional + step->set->functionals; f++)
+    if (f->type == PW_AT_TIME && isnan (f->value) && f->t <= step->t1) f->value = functional_at (step, f, f->t);
+}
+
+/* Searches the condition in the step, which ends where it becomes true. */
+static void functional_check_condition (functional_step *step) {
+  double t = NAN;
+  if (step->set->condition && step->status == PW_OK)
+    step->status = pw_run_find_crossing (step->run, &step->set->crossing, &t, step->error);
+  if (!isnan (t)) step->t1 = t, step->set->ended = 1;
+}
+
+int pw_outcomes_begin (pw_outcomes *set, pw_run *r, double t_end, pw_error *error) {
+  const double t = pw_run_time (r);
+  functional_step step = { set, r, t, t, PW_OK, error };
+  set->begin = set->t = t, set->span = t_end - t, set->ended = 0;
+  set->crossing = (pw_crossing){ .value = pw_condition_value, .context = set->condition };
+  functional_sample (&step, t, 0);
+  for (pw_functional *f = set->functional; f < set->functional + set->functionals; f++) {
+    if (f->type == PW_AT_TIME && !(f->t >= t && f->t <= t_end))
+      return pw_fail (error, PW_INPUT, "at %.15g: the run is from %.15g s to %.15g s", f->t, t, t_end);
+    f->value = f->type == PW_AT_TIME ? NAN : f->values[0];
+    if (f->type != PW_AT_TIME) f->t = t;
+  }
+  functional_values_at_times (&step);
+  functional_check_condition (&step);
+  return step.status;
+}
+
+int pw_outcomes_advance (pw_outcomes *set, pw_run *r, double t, double t_end, pw_error *error) {
+  functional_step step = { set, r, set->t, set->t, PW_OK, error };
+  step.status = set->extrema || set->condition ? pw_run_advance (r, t_end, error)
+                                               : pw_run_advance_to (r, functional_next (set, set->t, t), t_end, error);
+  step.t1 = pw_run_time (r);
+  functional_check_condition (&step);
+  if (step.status == PW_OK && set->extrema) functional_extrema (&step, FUNCTIONAL_HALVINGS);
+  functional_values_at_times (&step);
+  set->t = step.t1;
+  return step.status;
+}
+
+int pw_outcomes_end (pw_outcomes *set, pw_run *r, pw_error *error) {
+  pw_sample s;
+  if (!set->ended) set->t = pw_run_time (r);
+  if (pw_run_sample (r, set->t, &s, error) != PW_OK || functional_read (set, &s, FUNCTIONAL_END, error) != PW_OK)
+    return error->status;
+  for (pw_functional *f = set->functional; f < set->functional + set->functionals; f++) {
+    if (pw_is_integral (f->type)) f->value = functional_of_integral (f, *s.integral++, set->t - set->begin);
     if (f->type == PW_FINAL) f->value = f->values[FUNCTIONAL_END];
   }
+  return PW_OK;
 }
 
 int pw_outcomes_run (pw_outcomes *set, const char *method, const pw_settings *settings, double t_end,
                      const pw_outcome_table *table, pw_error *error) {
   pw_settings own = *settings;
-  own.ledger |= set->ledger;
-  own.integrals = set->integrals, own.integrand = functional_integrands, own.integrand_context = set;
-  set->begin = own.t;
+  pw_outcomes_settings (set, &own);
   pw_run *r = pw_limit_open (set->system, method, &own, error);
   if (r == NULL) return error->status;
-  functional_step step = { set, r, own.t, own.t, PW_OK, error };
-  functional_sample (&step, own.t, 0);
-  for (pw_functional *f = set->functional; f < set->functional + set->functionals; f++)
-    f->value = f->values[0], f->t = own.t;
+  functional_step step = { set, r, own.t, own.t, pw_outcomes_begin (set, r, t_end, error), error };
   for (int row = 0, rows = table ? table->rows : 0; step.status == PW_OK;) {
-    for (; row < rows && table->t[row] <= step.t1 && step.status == PW_OK; row++) functional_row (&step, table, row);
-    if (step.status != PW_OK || !(step.t1 < t_end)) break;
-    step.status = set->extrema ? pw_run_advance (r, t_end, error)
-                               : pw_run_advance_to (r, row < rows ? table->t[row] : t_end, t_end, error);
-    step.t0 = step.t1, step.t1 = pw_run_time (r);
-    if (step.status == PW_OK && set->extrema) functional_extrema (&step);
+    for (; row < rows && table->t[row] <= set->t && step.status == PW_OK; row++) functional_row (&step, table, row);
+    if (step.status != PW_OK || set->ended || !(set->t < t_end)) break;
+    step.status = pw_outcomes_advance (set, r, row < rows ? table->t[row] : t_end, t_end, error);
   }
-  functional_end (&step);
-  if (step.status == PW_STOPPED) step.status = pw_limit_status (settings->stop_context, step.t1, error);
+  if (step.status == PW_OK) step.status = pw_outcomes_end (set, r, error);
+  if (step.status == PW_STOPPED) step.status = pw_limit_status (settings->stop_context, set->t, error);
+  if (step.status == PW_OK && set->condition && !set->ended)
+    step.status = pw_fail (error, PW_METHOD, "--until %.200s: not true before the end of the run at t = %.15g s",
+                           set->until, set->t);
   pw_run_close (r);
   return step.status;
 }

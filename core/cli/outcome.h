@@ -1,51 +1,28 @@
 /* The OUTPUT of analyses, here called an outcome to distinguish it from files that are written: a number that a run
  * yields.
  *
- *   OUTPUT   an expression of [final:|max:|min:|mean:|integral:|rms:]COLUMN, such as "frame.x / rider.work"
+ *   OUTPUT   an expression of [final:|max:|min:|mean:|integral:|rms:|at T:]COLUMN, such as "frame.x / rider.work"
  *   COLUMN   a column of the table of `run`, or the total work or loss
  *
- * Final values, extrema, means and integrals of columns are functionals of the run.  They are as accurate as the run:
- * integrals are entries of its ledger (pw_settings.integrals), and extrema are located by its dense output. */
+ * Values at the end or at a time, extrema, means and integrals of columns are functionals of the run.  They are as
+ * accurate as the run: integrals are entries of its ledger (pw_settings.integrals), and extrema are located by its
+ * dense output. */
 #ifndef PW_OUTCOME_H
 #define PW_OUTCOME_H
 
 #include "pinwheel-files.h"
 #include "pinwheel-solvers.h"
 
-/* Columns of the table of `run`. */
-typedef enum {
-  PW_COLUMN_TIME,
-  PW_COLUMN_STATE,
-  PW_COLUMN_CONTACT,
-  PW_COLUMN_REACTION,
-  PW_COLUMN_POSITION, /* scaled residuals of g = 0 and of J v = eta */
-  PW_COLUMN_VELOCITY,
-  PW_COLUMN_KINETIC, /* energies; columns after PW_COLUMN_POTENTIAL need pw_settings.ledger */
-  PW_COLUMN_POTENTIAL,
-  PW_COLUMN_LEDGER,
-  PW_COLUMN_PROJECTION,
-  PW_COLUMN_BALANCE,
-  PW_COLUMN_WORK, /* pw_sample.work and loss, which the table does not have */
-  PW_COLUMN_LOSS,
-  PW_COLUMN_TYPES
-} pw_column_type;
-
-typedef struct {
-  pw_column_type type;
-  int index; /* of the state, constraint equation or entry of the ledger; contact i: 2 i for x, 2 i + 1 for y; else 0 */
-} pw_column;
-
 /* The column of this name; `origin` begins messages ("--of max:B.Fx").  PW_INPUT, with the nearest name, if there is
  * none. */
 int pw_column_find (const pw_system *s, const char *name, const char *origin, pw_column *c, pw_error *error);
-const char *pw_column_unit (const pw_system *s, pw_column c);
 
 /* 1 for work and losses: their rates are known, and they are integrals themselves. */
 static inline int pw_column_is_integrated (pw_column_type type) {
   return type == PW_COLUMN_LEDGER || type == PW_COLUMN_WORK || type == PW_COLUMN_LOSS;
 }
 
-typedef enum { PW_FINAL, PW_MAX, PW_MIN, PW_MEAN, PW_INTEGRAL, PW_RMS } pw_functional_type;
+typedef enum { PW_FINAL, PW_MAX, PW_MIN, PW_MEAN, PW_INTEGRAL, PW_RMS, PW_AT_TIME } pw_functional_type;
 
 enum { PW_FUNCTIONAL_TIMES = 9 }; /* at which a step of the run is sampled before refinements (outcome.c) */
 
@@ -62,7 +39,7 @@ typedef struct {
   pw_functional_type type;
   pw_column column;
   double value;                           /* set by pw_outcomes_run */
-  double t;                               /* time of the extremum so far [s] */
+  double t;                               /* time of the extremum so far, or that of PW_AT_TIME [s] */
   double values[PW_FUNCTIONAL_TIMES + 1]; /* of the column: set by pw_outcomes_read */
 } pw_functional;
 
@@ -83,16 +60,21 @@ typedef struct {
   int ledger;    /* 1: runs need pw_settings.ledger */
   int extrema;   /* their number; every step of the run is sampled for them */
   int integrals; /* number of integrals, means and root mean squares */
+  double t;      /* time reached [s], that at which the condition has become true once `ended` is 1 */
+  int ended;     /* 1: the condition has become true */
   /* private */
-  double begin;            /* initial time of the run [s] */
+  const char *until; /* text of the condition; NULL: there is none */
+  pw_condition *condition;
+  pw_crossing crossing;
+  double begin, span;      /* initial time of the run, and how long it may be [s] */
   pw_workspace *workspace; /* for contact points */
-  double (*contact)[3];
 } pw_outcomes;
 
-/* Reads `count` texts of outputs; `option` ("--of") begins messages.  System and texts must outlive the set.  Close it
- * in every case.  PW_INPUT for an unknown column, with the nearest name, or an invalid expression; PW_RESOURCE. */
+/* Reads `count` texts of outputs; `option` ("--of") begins messages.  until: a condition that ends the run, or NULL.
+ * System and texts must outlive the set.  Close it in every case.  PW_INPUT for an unknown column, with the nearest
+ * name, or an invalid expression; PW_RESOURCE. */
 int pw_outcomes_open (pw_outcomes *set, const pw_system *s, const char *option, const char *const *text, int count,
-                      pw_error *error);
+                      const char *until, pw_error *error);
 void pw_outcomes_close (pw_outcomes *set);
 
 /* Values of outputs along a run, all of whose terms are final values. */
@@ -104,8 +86,15 @@ typedef struct {
 
 /* 1 if all terms of an output are final values. */
 int pw_outcome_is_final (const pw_outcomes *set, int outcome);
+
+/* A run along which outputs are computed: settings that they need, before it is opened; its beginning; a step, or steps
+ * up to time t <= t_end if no functional needs each; its end, where values are set.  Statuses. */
+void pw_outcomes_settings (pw_outcomes *set, pw_settings *settings);
+int pw_outcomes_begin (pw_outcomes *set, pw_run *r, double t_end, pw_error *error);
+int pw_outcomes_advance (pw_outcomes *set, pw_run *r, double t, double t_end, pw_error *error);
+int pw_outcomes_end (pw_outcomes *set, pw_run *r, pw_error *error);
 /* Evaluates the functionals along a run to t_end, and a table unless that is NULL; settings.stop_context is a pw_limit.
- * A status: that of pw_limit_status if the run is stopped. */
+ * A status: that of pw_limit_status if the run is stopped; PW_METHOD if the condition does not become true. */
 int pw_outcomes_run (pw_outcomes *set, const char *method, const pw_settings *settings, double t_end,
                      const pw_outcome_table *table, pw_error *error);
 
