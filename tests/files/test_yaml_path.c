@@ -165,7 +165,7 @@ TEST (follow) {
   for (size_t m = 0; m < sizeof method / sizeof *method; m++) {
     for (int k = 0; k < 3; k++) {
       gallery_scene x = follower_scene (law[k]);
-      runs_state (x.system, method[m], &(pw_settings){ .step = 5e-3, .rtol = 1e-9 }, 40, q[k], v[k], NULL);
+      runs_state (x.system, method[m], &(pw_settings){ .step = 5e-3, .rtol = 1e-9 }, 20, q[k], v[k], NULL);
       gallery_close (&x);
     }
     for (int k = 1; k < 3; k++)
