@@ -231,6 +231,20 @@ TEST (round_trip) {
   check_bits ("velocities", v[0], v[1], 3);
 }
 
+/* A run is not resumed after a point of its path, far ahead, has changed. */
+TEST (resume) {
+  static const char track[] = "x,y\n0,0\n9,0\n900,0\n";
+  cli_write ("ahead.csv", track);
+  cli_write ("ahead.yaml", "pinwheel: 1\npaths: [{name: track, file: ahead.csv}]\n"
+                           "bodies: [{name: car, mass: 1, inertia: 1, rate: {vx: 1}}]\n"
+                           "elements: [{torque: T, body: [car, ground], value: \"track.offset (car.x, car.y)\"}]\n");
+  cli_good ("pinwheel run @/ahead.yaml --checkpoint @/ahead.save");
+  cli_good ("pinwheel run @/ahead.yaml --resume @/ahead.save");
+  cli_write ("ahead.csv", "x,y\n0,0\n9,0\n900,1\n");
+  assert_int_equal (cli_run ("pinwheel run @/ahead.yaml --resume @/ahead.save"), 2);
+  assert_non_null (strstr (cli_err, "tables is contents "));
+}
+
 static int teardown (void) {
   pw_arena_free (&arena);
   for (int i = 0; i < 3; i++) pw_path_close (path[i]);
