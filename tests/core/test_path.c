@@ -111,10 +111,31 @@ static void path_check_derivatives (pw_path *p) {
   pw_path_close (p);
 }
 
+/* A spline through few points at irregular distances. */
+static pw_path *path_coarse (void) {
+  return path_of ((double[][2]){ { 0, 0 }, { 3, 0.5 }, { 4, 3 }, { 9, 3 }, { 10, 9 }, { 22, 4 } }, 6, PW_CUBIC, 0);
+}
+
 TEST (derivatives) {
   path_check_derivatives (path_eight ());
-  path_check_derivatives (
-      path_of ((double[][2]){ { 0, 0 }, { 3, 0.5 }, { 4, 3 }, { 9, 3 }, { 10, 9 }, { 22, 4 } }, 6, PW_CUBIC, 0));
+  path_check_derivatives (path_coarse ());
+}
+
+/* The arc length is that of many chords, extrapolated. */
+TEST (length) {
+  pw_path *p = path_coarse ();
+  double length = pw_path_length (p), sum[2] = { 0 };
+  for (int k = 0; k < 2; k++) {
+    const int many = 20000 << k;
+    pw_path_place a, b;
+    pw_path_at (p, 0, &a);
+    for (int i = 1; i <= many; i++, a = b) {
+      pw_path_at (p, length * i / many, &b);
+      sum[k] += hypot (b.x - a.x, b.y - a.y);
+    }
+  }
+  check_close ("length", length, (4 * sum[1] - sum[0]) / 3, 1e-12 * length, "h^4 and round-off");
+  pw_path_close (p);
 }
 
 /* A polyline: at a corner, seen from outside, the direction turns with the point. */

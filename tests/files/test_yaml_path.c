@@ -117,6 +117,9 @@ TEST (breaks) {
       check_close (expected[i].text, first, expected[i].first, CHECK_EPS, "1.5 - t is rounded");
     if (expected[i].first == 0) check_close ("x falls below", first, 0.1033, 5e-4, "3 cos (u), ds = 4 du");
   }
+  assert_int_equal (read ("arc.curvature (a.x)")->jumps, PW_JUMPS_RARELY);
+  assert_int_equal (read ("eight.offset (a.x, a.y)")->jumps, PW_JUMPS_RARELY);
+  assert_int_equal (read ("zig.heading (a.x)")->jumps, PW_JUMPS);
   double turn[] = { 0.5 }, before[] = { nextafter (0.5, 0) };
   check_close ("just after", pw_expression_value (read ("zig.heading (2*t)"), turn), PW_PI / 2, 0, "exact");
   check_close ("just before", pw_expression_value (read ("zig.heading (2*t)"), before), 0, 0, "exact");
