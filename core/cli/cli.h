@@ -407,7 +407,7 @@ int pw_fingerprint_file (pw_text *t, const char *key, const char *name, const ch
  * (pw_fingerprint_tables) unless it is 0, method, span, step and tolerances.  Errors as of pw_fingerprint_file. */
 int pw_fingerprint_run (pw_text *t, const char *magic, const pw_file *file, uint64_t table_sum, const char *method,
                         const pw_settings *settings, pw_error *error);
-/* Continues a checksum, 0 at first, with the tables in the signals of a model. */
+/* Continues a checksum, 0 at first, with the tables in the signals of a model, and the points of its paths. */
 uint64_t pw_fingerprint_tables (uint64_t sum, const pw_model *m);
 /* Adds a line for each state of a list of "STATE=VALUE", its last value; the list ends with NULL, or is NULL. */
 void pw_fingerprint_initial (pw_text *t, const char **starts);

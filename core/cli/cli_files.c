@@ -220,6 +220,11 @@ uint64_t pw_fingerprint_tables (uint64_t sum, const pw_model *m) {
       const double map[2] = { s->table.scale, s->table.offset };
       if (map[0] != 0 || map[1] != 0) sum = pw_check_sum (sum, map, sizeof map);
     }
+  const pw_reference_text *text = pw_model_reference_text (m);
+  for (const pw_path_text *p = text->path, *end = p + text->paths; p < end; p++) {
+    size_t bytes = (size_t)p->count * sizeof (double);
+    sum = pw_check_sum (pw_check_sum (sum ? sum : PW_CHECK, p->x, bytes), p->y, bytes);
+  }
   return sum;
 }
 

@@ -601,7 +601,7 @@ static void scene_gradients (probe *x, probe_move move) {
     for (int k = 0; k < source->reads; k++) {
       int j = source->state[k], velocity = j >= coords;
       if (velocity != (move == PROBE_V)) continue;
-      double gradient = source->x[source->reads + k];
+      double gradient = source->of_coordinate ? source->u[1] : source->x[source->reads + k];
       double term = gradient * (velocity ? x->dv[j - coords] : x->dq[j]);
       x->value[i] += term, x->terms[i] += fabs (term);
     }

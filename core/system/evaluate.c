@@ -232,13 +232,6 @@ static void kinematics_feedback_rates (pw_workspace *w, const double *v) {
   }
 }
 
-/* Evaluates a function of the coordinate that it reads. */
-static int kinematics_of_coordinate (const pw_source *source) {
-  int status = pw_signal_eval (source, source->x[0]);
-  source->x[1] = source->u[1];
-  return status;
-}
-
 int pw_update_signals (pw_workspace *w, double t, const double *q, const double *v) {
   int new_time = t != w->t_signal && !isnan (t); /* NaN: pw_update_velocities, after a failure */
   if (!new_time && w->s->state_dependent == 0) return PW_OK;
@@ -247,8 +240,7 @@ int pw_update_signals (pw_workspace *w, double t, const double *q, const double 
     if (source->held) continue;
     const int copied = kinematics_copy_states (w, source, q, v);
     if (copied == 0 && !(new_time && source->reads == 0)) continue;
-    if ((copied && source->of_coordinate ? kinematics_of_coordinate (source) : pw_signal_eval (source, t)) == 0)
-      continue;
+    if (pw_signal_eval (source, copied && source->of_coordinate ? *source->x : t) == 0) continue;
     w->failed = source;
     return PW_METHOD;
   }

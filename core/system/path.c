@@ -15,7 +15,7 @@
 #include "system.h"
 
 typedef struct {
-  double x[4], y[4];       /* coefficients of u^0 ... u^3 [m] */
+  double x[2][4];          /* coefficients of u^0 ... u^3 of x and y [m] */
   double s, heading, size; /* arc length and direction at its beginning; its own arc length */
 } piece;
 
@@ -28,12 +28,15 @@ struct pw_path {
 
 /* ---- Pieces ---- */
 
-/* Value and first three derivatives by u of one component. */
-static inline void piece_component (const double a[4], double u, double out[4]) {
-  out[0] = a[0] + u * (a[1] + u * (a[2] + u * a[3]));
-  out[1] = a[1] + u * (2 * a[2] + 3 * u * a[3]);
-  out[2] = 2 * a[2] + 6 * u * a[3];
-  out[3] = 6 * a[3];
+/* Value and first three derivatives by u of x and y. */
+static inline void piece_point (const piece *c, double u, double out[2][4]) {
+  for (int k = 0; k < 2; k++) {
+    const double *a = c->x[k];
+    out[k][0] = a[0] + u * (a[1] + u * (a[2] + u * a[3]));
+    out[k][1] = a[1] + u * (2 * a[2] + 3 * u * a[3]);
+    out[k][2] = 2 * a[2] + 6 * u * a[3];
+    out[k][3] = 6 * a[3];
+  }
 }
 
 /* The arc length from u = 0 to u, by Gauss's rule of 8 points (Abramowitz & Stegun 1964, table 25.4). */
@@ -43,8 +46,9 @@ static double piece_length (const piece *c, double u) {
   double sum = 0;
   for (int i = 0; i < 8; i++) {
     double at = u / 2 * (1 + (i < 4 ? node[i] : -node[i - 4]));
-    double x = c->x[1] + at * (2 * c->x[2] + 3 * at * c->x[3]), y = c->y[1] + at * (2 * c->y[2] + 3 * at * c->y[3]);
-    sum += weight[i % 4] * sqrt (x * x + y * y);
+    double point[2][4];
+    piece_point (c, at, point);
+    sum += weight[i % 4] * sqrt (point[0][1] * point[0][1] + point[1][1] * point[1][1]);
   }
   return u / 2 * sum;
 }
@@ -53,20 +57,20 @@ static double piece_length (const piece *c, double u) {
 static double piece_parameter (const piece *c, double s) {
   double u = s / c->size;
   for (int i = 0; i < 20 && u > 0 && u < 1; i++) {
-    double x[4], y[4], last = u;
-    piece_component (c->x, u, x);
-    piece_component (c->y, u, y);
-    u = fmin (1, fmax (0, u - (piece_length (c, u) - s) / hypot (x[1], y[1])));
+    double x[2][4], last = u;
+    piece_point (c, u, x);
+    u = fmin (1, fmax (0, u - (piece_length (c, u) - s) / hypot (x[0][1], x[1][1])));
     if (fabs (u - last) <= 1e-15) break;
   }
   return fmin (1, fmax (0, u));
 }
 
-/* The two halves of one component. */
-static void piece_halve (const double a[4], double first[4], double second[4]) {
-  double d[4];
-  piece_component (a, 0.5, d);
-  for (int i = 0; i < 4; i++) first[i] = ldexp (a[i], -i), second[i] = ldexp (d[i], -i) / (i == 3 ? 6 : i == 2 ? 2 : 1);
+static void piece_halve (const piece *c, piece half[2]) {
+  double d[2][4];
+  piece_point (c, 0.5, d);
+  for (int k = 0; k < 2; k++)
+    for (int i = 0; i < 4; i++)
+      half[0].x[k][i] = ldexp (c->x[k][i], -i), half[1].x[k][i] = ldexp (d[k][i], -i) / (i == 3 ? 6 : i == 2 ? 2 : 1);
 }
 
 /* Bezier's control points of the derivative of a component. */
@@ -75,125 +79,100 @@ static inline void piece_hodograph (const double a[4], double d[3]) {
 }
 
 /* 1 if all directions are within 37 degrees of that of the chord, and halves have the same arc length to round-off. */
-static int piece_is_good (const piece *c) {
+static int piece_is_good (const piece *c, const piece half[2]) {
   double x[3], y[3];
-  piece first = { .s = 0 }, second = first;
-  piece_hodograph (c->x, x);
-  piece_hodograph (c->y, y);
+  piece_hodograph (c->x[0], x);
+  piece_hodograph (c->x[1], y);
   double cx = (x[0] + x[1] + x[2]) / 3, cy = (y[0] + y[1] + y[2]) / 3, chord = hypot (cx, cy);
   for (int i = 0; i < 3; i++) {
     double along = x[i] * cx + y[i] * cy;
     if (!(along > 0.8 * chord * hypot (x[i], y[i]) && along > 0.25 * chord * chord)) return 0;
   }
-  piece_halve (c->x, first.x, second.x);
-  piece_halve (c->y, first.y, second.y);
   double whole = piece_length (c, 1);
-  return fabs (piece_length (&first, 1) + piece_length (&second, 1) - whole) <= 1e-14 * whole;
+  return fabs (piece_length (&half[0], 1) + piece_length (&half[1], 1) - whole) <= 1e-14 * whole;
 }
 
 /* ---- Making a path ---- */
 
 enum { PATH_HALVINGS = 40 /* most of a cubic: closer to a cusp there is no direction */ };
 
-/* What functions share while a path is made. */
-typedef struct {
-  pw_path *p;
-  size_t room; /* pieces allocated */
-  int point;   /* at which the current cubic begins, from 1 */
-  pw_error *error;
-} maker;
-
-static int make_fail_memory (const maker *m) {
-  return pw_fail (m->error, PW_RESOURCE, "out of memory");
+static int make_fail_memory (pw_error *error) {
+  return pw_fail (error, PW_RESOURCE, "out of memory");
 }
 
-/* Appends a piece, or its halves. */
-static int make_pieces (maker *m, const piece *c, int halvings) {
-  pw_path *p = m->p;
-  if (p->is_linear || piece_is_good (c)) {
-    if (pw_grow (&p->piece, (size_t)p->pieces, &m->room, sizeof *p->piece) != PW_OK) return make_fail_memory (m);
+/* Appends a piece, or its halves; point: at which its cubic begins, from 1; room: pieces allocated. */
+static int make_pieces (pw_path *p, const piece *c, int point, int halvings, size_t *room, pw_error *error) {
+  piece half[2] = { { .s = 0 } };
+  if (!p->is_linear) piece_halve (c, half);
+  if (p->is_linear || piece_is_good (c, half)) {
+    if (pw_grow (&p->piece, (size_t)p->pieces, room, sizeof *p->piece) != PW_OK) return make_fail_memory (error);
     p->piece[p->pieces++] = *c;
     return PW_OK;
   }
   if (halvings == PATH_HALVINGS)
-    return pw_fail (m->error, PW_INPUT, "the spline has a cusp, without a direction, after point %d", m->point);
-  piece first = *c, second = *c;
-  piece_halve (c->x, first.x, second.x);
-  piece_halve (c->y, first.y, second.y);
-  int status = make_pieces (m, &first, halvings + 1);
-  return status == PW_OK ? make_pieces (m, &second, halvings + 1) : status;
-}
-
-/* The cubics of one component of n points at the distances t; spline: 2 n numbers. */
-static void make_component (const double *t, const double *value, int n, double *spline) {
-  pw_signal table = { PW_TABLE, .table = { .t = t, .value = value, .count = n, .interpolation = PW_CUBIC } };
-  pw_table_spline (&table, spline);
-}
-
-static void make_coefficients (const double *value, const double *spline, int n, int i, double h, double a[4]) {
-  double M = spline[n + i];
-  a[0] = value[i], a[1] = h * spline[i], a[2] = h * h * M / 2, a[3] = h * h * (spline[n + i + 1] - M) / 6;
+    return pw_fail (error, PW_INPUT, "the spline has a cusp, without a direction, after point %d", point);
+  int status = make_pieces (p, &half[0], point, halvings + 1, room, error);
+  return status == PW_OK ? make_pieces (p, &half[1], point, halvings + 1, room, error) : status;
 }
 
 /* The points of a closed spline are repeated on both sides: the effect of the ends of a spline falls to less than half
  * from point to point, thus to less than round-off. */
 enum { PATH_REPEATED = 64 };
 
-static int make_cubics (maker *m, const double *x, const double *y, int count) {
-  const int before = m->p->closed ? PATH_REPEATED : 0, n = m->p->closed ? count + 1 + 2 * before : count;
-  double *t, *px, *py, *spline_x, *spline_y;
-  const pw_array array[] = { { &t, (size_t)n },
-                             { &px, (size_t)n },
-                             { &py, (size_t)n },
-                             { &spline_x, 2 * (size_t)n },
-                             { &spline_y, 2 * (size_t)n } };
+static int make_all_pieces (pw_path *p, const double *x, const double *y, int count, pw_error *error) {
+  const int before = p->closed && !p->is_linear ? PATH_REPEATED : 0, n = count + p->closed + 2 * before;
+  double *t, *point[2], *spline; /* of n points: distances, x and y; 2 n: of one of these (pw_table_spline) */
+  const pw_array array[] = {
+    { &t, (size_t)n }, { &point[0], (size_t)n }, { &point[1], (size_t)n }, { &spline, 4 * (size_t)n }
+  };
   char *memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
-  int status = memory ? PW_OK : make_fail_memory (m), first = (count - before % count) % count;
-  for (int i = 0; memory && i < n; i++) {
-    px[i] = x[(first + i) % count], py[i] = y[(first + i) % count];
-    t[i] = i > 0 ? t[i - 1] + hypot (px[i] - px[i - 1], py[i] - py[i - 1]) : 0;
+  size_t room = 0;
+  if (memory == NULL) return make_fail_memory (error);
+  for (int i = 0; i < n; i++) {
+    const int from = (i + count - before % count) % count;
+    point[0][i] = x[from], point[1][i] = y[from];
+    t[i] = i > 0 ? t[i - 1] + hypot (point[0][i] - point[0][i - 1], point[1][i] - point[1][i - 1]) : 0;
   }
-  if (memory) make_component (t, px, n, spline_x), make_component (t, py, n, spline_y);
+  for (int k = 0; k < 2 && !p->is_linear; k++)
+    pw_table_spline (&(pw_signal){ PW_TABLE, .table = { t, point[k], n, .interpolation = PW_CUBIC } },
+                     spline + 2 * n * k);
+  int status = PW_OK;
   for (int i = before; status == PW_OK && i < n - 1 - before; i++) {
     piece c = { .s = 0 };
-    make_coefficients (px, spline_x, n, i, t[i + 1] - t[i], c.x);
-    make_coefficients (py, spline_y, n, i, t[i + 1] - t[i], c.y);
-    m->point = i - before + 1;
-    status = make_pieces (m, &c, 0);
+    for (int k = 0; k < 2; k++) {
+      const double h = t[i + 1] - t[i], *slope = spline + 2 * n * k, *second = slope + n;
+      double *a = c.x[k];
+      a[0] = point[k][i], a[1] = point[k][i + 1] - a[0];
+      if (!p->is_linear)
+        a[1] = h * slope[i], a[2] = h * h * second[i] / 2, a[3] = h * h * (second[i + 1] - second[i]) / 6;
+    }
+    status = make_pieces (p, &c, i - before + 1, 0, &room, error);
   }
   free (memory);
   return status;
 }
 
-static int make_lines (maker *m, const double *x, const double *y, int count) {
-  int status = PW_OK, lines = m->p->closed ? count : count - 1;
-  for (int i = 0, n = 1; status == PW_OK && i < lines; i++, n = (n + 1) % count)
-    status = make_pieces (m, &(piece){ .x = { x[i], x[n] - x[i] }, .y = { y[i], y[n] - y[i] } }, 0);
-  return status;
-}
-
-/* The angle from the direction of (x, y) at the end or beginning of one piece to that of another. */
+/* The angle from the direction at the end or beginning of one piece to that of another. */
 static double make_turn (const piece *from, int end, const piece *to, int to_end) {
-  double fx[4], fy[4], tx[4], ty[4];
-  piece_component (from->x, end, fx), piece_component (from->y, end, fy);
-  piece_component (to->x, to_end, tx), piece_component (to->y, to_end, ty);
-  return atan2 (fx[1] * ty[1] - fy[1] * tx[1], fx[1] * tx[1] + fy[1] * ty[1]);
+  double f[2][4], t[2][4];
+  piece_point (from, end, f);
+  piece_point (to, to_end, t);
+  return atan2 (f[0][1] * t[1][1] - f[1][1] * t[0][1], f[0][1] * t[0][1] + f[1][1] * t[1][1]);
 }
 
 /* Arc lengths and directions of the pieces. */
-static int make_index (maker *m) {
-  pw_path *p = m->p;
+static int make_index (pw_path *p, pw_error *error) {
   piece *last = p->piece + p->pieces - 1;
-  double s = 0, heading = atan2 (p->piece->y[1], p->piece->x[1]);
+  double s = 0, heading = atan2 (p->piece->x[1][1], p->piece->x[0][1]);
   for (piece *c = p->piece; c <= last; c++) {
-    c->s = s, c->heading = heading, c->size = p->is_linear ? hypot (c->x[1], c->y[1]) : piece_length (c, 1);
+    c->s = s, c->heading = heading, c->size = p->is_linear ? hypot (c->x[0][1], c->x[1][1]) : piece_length (c, 1);
     s += c->size;
     heading += make_turn (c, 0, c, 1) + (c < last ? make_turn (c, 1, c + 1, 0) : 0);
   }
   p->length = s;
-  p->turn =
-      p->closed ? 2 * PW_PI * rint ((heading + make_turn (last, 1, p->piece, 0) - p->piece->heading) / (2 * PW_PI)) : 0;
-  return isfinite (s) ? PW_OK : pw_fail (m->error, PW_INPUT, "the length of the path is not finite");
+  if (p->closed)
+    p->turn = 2 * PW_PI * rint ((heading + make_turn (last, 1, p->piece, 0) - p->piece->heading) / (2 * PW_PI));
+  return isfinite (s) ? PW_OK : pw_fail (error, PW_INPUT, "the length of the path is not finite");
 }
 
 static int make_check (const double *x, const double *y, int count, int interpolation, int closed, pw_error *error) {
@@ -219,20 +198,15 @@ static int make_check (const double *x, const double *y, int count, int interpol
 #define PATH_EQUAL 1e-6
 
 pw_path *pw_path_open (const double *x, const double *y, int count, int interpolation, int closed, pw_error *error) {
-  maker m = { .error = error };
   if (x && y && closed && count > 2 &&
       hypot (x[count - 1] - x[0], y[count - 1] - y[0]) <= PATH_EQUAL * hypot (x[1] - x[0], y[1] - y[0]))
     count--;
   if (make_check (x, y, count, interpolation, closed, error) != PW_OK) return NULL;
-  pw_path *p = m.p = calloc (1, sizeof *p);
-  if (p == NULL) {
-    make_fail_memory (&m);
-    return NULL;
-  }
+  pw_path *p = calloc (1, sizeof *p);
+  if (p == NULL) return make_fail_memory (error), NULL;
   atomic_init (&p->users, 1);
   p->closed = closed != 0, p->is_linear = interpolation == PW_LINEAR;
-  int status = p->is_linear ? make_lines (&m, x, y, count) : make_cubics (&m, x, y, count);
-  if (status == PW_OK && make_index (&m) == PW_OK) return p;
+  if (make_all_pieces (p, x, y, count, error) == PW_OK && make_index (p, error) == PW_OK) return p;
   pw_path_close (p);
   return NULL;
 }
@@ -305,10 +279,11 @@ static double place_arc_length (const pw_path *p, const place *at) {
 
 static void place_describe (const pw_path *p, const place *at, pw_path_place *out) {
   const piece *c = &p->piece[at->i];
-  double x[4], y[4];
-  piece_component (c->x, at->u, x);
-  piece_component (c->y, at->u, y);
-  double v = hypot (x[1], y[1]), turned = atan2 (c->x[1] * y[1] - c->y[1] * x[1], c->x[1] * x[1] + c->y[1] * y[1]);
+  double point[2][4];
+  const double *x = point[0], *y = point[1], *from[] = { c->x[0], c->x[1] };
+  piece_point (c, at->u, point);
+  double v = hypot (x[1], y[1]),
+         turned = atan2 (from[0][1] * y[1] - from[1][1] * x[1], from[0][1] * x[1] + from[1][1] * y[1]);
   *out = (pw_path_place){ .s = place_arc_length (p, at),
                           .x = x[0] + at->beyond * (x[1] / v),
                           .y = y[0] + at->beyond * (y[1] / v),
@@ -347,9 +322,8 @@ typedef struct {
 
 /* The distance from u of a piece; slope: (p - P) . p', its derivative by u, |p'|. */
 static double search_distance (const search *s, const piece *c, double u, double slope[3]) {
-  double x[4], y[4];
-  piece_component (c->x, u, x);
-  piece_component (c->y, u, y);
+  double point[2][4], *x = point[0], *y = point[1];
+  piece_point (c, u, point);
   x[0] -= s->x, y[0] -= s->y;
   slope[0] = x[0] * x[1] + y[0] * y[1];
   slope[1] = x[1] * x[1] + y[1] * y[1] + x[0] * x[2] + y[0] * y[2];
@@ -387,10 +361,10 @@ static void search_try (search *s, int i, double u) {
 static void search_bernstein (const search *s, const piece *c, double b[6]) {
   static const double product[4][3] = { { 1, 2, 1 }, { 3, 6, 3 }, { 3, 6, 3 }, { 1, 2, 1 } },
                       sum[] = { 1, 5, 10, 10, 5, 1 };
-  const double *const component[] = { c->x, c->y }, point[] = { s->x, s->y };
+  const double point[] = { s->x, s->y };
   memset (b, 0, 6 * sizeof *b);
   for (int k = 0; k < 2; k++) {
-    const double *a = component[k], a0 = a[0] - point[k];
+    const double *a = c->x[k], a0 = a[0] - point[k];
     const double e[] = { a0, a0 + a[1] / 3, a0 + (2 * a[1] + a[2]) / 3, a0 + a[1] + a[2] + a[3] };
     double d[3];
     piece_hodograph (a, d);
@@ -473,13 +447,13 @@ static void search_corner (const search *s, pw_path_place *out) {
   if (!p->is_linear || at->u != 0 || at->beyond != 0 || d == 0 || (at->i == 0 && !p->closed)) return;
   const piece *after = &p->piece[at->i], *before = at->i > 0 ? after - 1 : &p->piece[p->pieces - 1];
   const int left =
-      before->x[1] * after->y[1] - before->y[1] * after->x[1] > 0; /* the turn; the point is on its right */
+      before->x[0][1] * after->x[1][1] - before->x[1][1] * after->x[0][1] > 0; /* the turn; the point is on its right */
   out->corner = 1;
   out->offset = left ? -d : d;
   out->cos = (left ? -y : y) / d, out->sin = (left ? x : -x) / d;
-  out->heading =
-      before->heading - (at->i > 0 ? 0 : p->turn) + at->lap * p->turn +
-      atan2 (before->x[1] * out->sin - before->y[1] * out->cos, before->x[1] * out->cos + before->y[1] * out->sin);
+  out->heading = before->heading - (at->i > 0 ? 0 : p->turn) + at->lap * p->turn +
+                 atan2 (before->x[0][1] * out->sin - before->x[1][1] * out->cos,
+                        before->x[0][1] * out->cos + before->x[1][1] * out->sin);
 }
 
 void pw_path_nearest (const pw_path *p, double x, double y, double near, pw_path_place *out) {

@@ -117,6 +117,9 @@ TEST (breaks) {
       check_close (expected[i].text, first, expected[i].first, CHECK_EPS, "1.5 - t is rounded");
     if (expected[i].first == 0) check_close ("x falls below", first, 0.1033, 5e-4, "3 cos (u), ds = 4 du");
   }
+  assert_int_equal (read ("arc.curvature (a.x)")->jumps, PW_JUMPS_RARELY);
+  assert_int_equal (read ("eight.offset (a.x, a.y)")->jumps, PW_JUMPS_RARELY);
+  assert_int_equal (read ("zig.heading (a.x)")->jumps, PW_JUMPS);
   double turn[] = { 0.5 }, before[] = { nextafter (0.5, 0) };
   check_close ("just after", pw_expression_value (read ("zig.heading (2*t)"), turn), PW_PI / 2, 0, "exact");
   check_close ("just before", pw_expression_value (read ("zig.heading (2*t)"), before), 0, 0, "exact");
@@ -165,7 +168,7 @@ TEST (follow) {
   for (size_t m = 0; m < sizeof method / sizeof *method; m++) {
     for (int k = 0; k < 3; k++) {
       gallery_scene x = follower_scene (law[k]);
-      runs_state (x.system, method[m], &(pw_settings){ .step = 5e-3, .rtol = 1e-9 }, 40, q[k], v[k], NULL);
+      runs_state (x.system, method[m], &(pw_settings){ .step = 5e-3, .rtol = 1e-9 }, 20, q[k], v[k], NULL);
       gallery_close (&x);
     }
     for (int k = 1; k < 3; k++)
@@ -229,6 +232,20 @@ TEST (round_trip) {
   gallery_close (&x);
   check_bits ("positions", q[0], q[1], 3);
   check_bits ("velocities", v[0], v[1], 3);
+}
+
+/* A run is not resumed after a point of its path, far ahead, has changed. */
+TEST (resume) {
+  static const char track[] = "x,y\n0,0\n9,0\n900,0\n";
+  cli_write ("ahead.csv", track);
+  cli_write ("ahead.yaml", "pinwheel: 1\npaths: [{name: track, file: ahead.csv}]\n"
+                           "bodies: [{name: car, mass: 1, inertia: 1, rate: {vx: 1}}]\n"
+                           "elements: [{torque: T, body: [car, ground], value: \"track.offset (car.x, car.y)\"}]\n");
+  cli_shell ("pinwheel run @/ahead.yaml --checkpoint @/ahead.save");
+  cli_shell ("pinwheel run @/ahead.yaml --resume @/ahead.save");
+  cli_write ("ahead.csv", "x,y\n0,0\n9,0\n900,1\n");
+  assert_int_equal (cli_run ("pinwheel run @/ahead.yaml --resume @/ahead.save"), 2);
+  assert_non_null (strstr (cli_err, "tables is contents "));
 }
 
 static int teardown (void) {

@@ -95,6 +95,7 @@ TEST (arm) {
   for (int k = 0; k < 2; k++) {
     pw_system *s = scene_system (&curve_build_table, "lissajous", 1., "inertia", 0.2, "arm", 0.3, NULL);
     runs_state (s, k ? "radau+index3" : "erk8", &(pw_settings){ .rtol = 1e-11 }, 2, q[k], v[k], NULL);
+    pw_system_free (s);
   }
   for (int j = 0; j < 4; j++) {
     check_close ("position", q[1][j], q[0][j], 1e-7, "the methods' errors");

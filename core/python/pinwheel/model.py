@@ -617,8 +617,8 @@ def describe(name: str = "model", *, about: str = "", bodies=(), elements=(), pa
             plain.append(fields)
     head = {"about": about, "run": run, "parameters": _entries(parameters, "parameters"), "let": let}
     lines = ["pinwheel: 1"] + [f"{key}: {_json(value)}" for key, value in head.items() if value]
-    for key, entries in (("paths", _entries(paths, "paths")), ("bodies", _entries(bodies, "bodies")), ("elements", plain), ("states", states),
-                         ("outputs", _entries(outputs, "outputs"))):
+    for key, entries in (("paths", _entries(paths, "paths")), ("bodies", _entries(bodies, "bodies")), ("elements", plain),
+                         ("states", states), ("outputs", _entries(outputs, "outputs"))):
         lines += [f"{key}:"] + [f"  - {_json(entry)}" for entry in entries] if entries else []
     return Model(_Described(name, "\n".join(lines) + "\n"), signals=signals, **model)
 
