@@ -14,8 +14,8 @@
 #include "yaml.h"
 
 /* Limits of one model, about 1 GB each, so that a small file cannot use all memory: entries of each list, such as
- * bodies, elements, parameters; points of all tables and paths; operations of all expressions; copies of an entry; all entries,
- * with copies and included files; bytes of texts in copies. */
+ * bodies, elements, parameters; points of all tables and paths; operations of all expressions; copies of an entry; all
+ * entries, with copies and included files; bytes of texts in copies. */
 enum { PW_MAX_ITEMS = 1000000, PW_MAX_POINTS = 20000000, PW_MAX_OPERATIONS = 30000000 };
 enum { MAX_COPIES = 100000, PW_MAX_ENTRIES = 2000000 };
 #define MAX_COPIED 4e8
