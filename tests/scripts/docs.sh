@@ -31,6 +31,7 @@ missing () {
       return d <= 0.01 * a || (a < 1e-6 && b < 1e-6) }
     function like(a, b, n, i, x, y, free) {
       free = a ~ /cpu_s|processor time|[0-9] %|lost at a singular configuration|\[ns\]|took/
+      gsub (/=/, " = ", a); gsub (/=/, " = ", b) # --set omega=2.5
       n = split (a, x); if (split (b, y) != n) return 0
       for (i = 1; i <= n; i++) {
         x[i] = bare(x[i]); y[i] = bare(y[i])
