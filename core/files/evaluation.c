@@ -308,13 +308,10 @@ double pw_expression_run (const pw_expression_code *code, int codes, const doubl
     if (c->op <= PW_OP_VARIABLE) {
       *top++ = last;
       last = c->op == PW_OP_CONSTANT ? c->value : variable[c->index];
-    } else if (c->op == PW_OP_SELECT) {
+    } else if (c->op >= PW_OP_SELECT) {
+      double value[3] = { top[-2] != 0 ? top[-1] : last };
       top -= 2;
-      last = top[0] != 0 ? top[1] : last;
-    } else if (c->op == PW_OP_PATH_NEAREST) {
-      double value[3];
-      top -= 2;
-      path_nearest (c, top[0], top[1], last, value);
+      if (c->op == PW_OP_PATH_NEAREST) path_nearest (c, top[0], top[1], last, value);
       last = *value;
     } else {
       double left = c->op >= PW_OP_ADD ? *--top : 0;
@@ -405,7 +402,6 @@ static jet jet_path_nearest (const pw_expression_code *c, const jet *x, const je
 
 static jet jet_unary (const pw_expression_code *c, const jet *x, double *discrete) {
   if (c->op == PW_OP_NEGATE) return (jet){ -x->v, -x->d, -x->dd, x->varies };
-  if (c->op == PW_OP_PATH_AT) return jet_path_at (c, x, discrete);
   if (c->op == PW_OP_FUNCTION_OF_ONE || c->op == PW_OP_TAN) {
     if (c->op == PW_OP_TAN) *discrete = floor (x->v / PW_PI + 0.5);
     const pw_expression_function *f = &pw_expression_functions[c->index];
@@ -413,7 +409,7 @@ static jet jet_unary (const pw_expression_code *c, const jet *x, double *discret
     pw_partials s = f->partials (x->v, 0, value);
     return jet_chain (value, &s, x, &(jet){ 0 });
   }
-  return jet_piecewise (c->op, x, discrete);
+  return c->op == PW_OP_PATH_AT ? jet_path_at (c, x, discrete) : jet_piecewise (c->op, x, discrete);
 }
 
 static jet jet_product (const jet *x, const jet *y) {
