@@ -71,14 +71,16 @@ FILES_OBJ := $(call obj,$(FILES))
 CLI_OBJ   := $(call obj,$(CLI))
 # Interactive pages need the sources of plug-ins, next to them.
 PLUGINS   := $(MODELS:%.c=$(BUILD)/%.so) $(patsubst %,$(BUILD)/%,$(MODELS) $(wildcard models/*.yaml))
-# The longest programs come first, so that no processor waits for them at the end.
-LONGEST   := $(addprefix $(BUILD)/tests/test_,lanes jumps periodic_command)
+# The longest files come first, so that no processor waits for them at the end.
+LONGEST   := $(addprefix $(BUILD)/tests/test_,lanes specialise plots jumps memory specialised)
 TESTS     := $(LONGEST) $(filter-out $(LONGEST),$(patsubst %.c,$(BUILD)/tests/%,$(notdir $(QUICK))))
 SLOWS     := $(patsubst %.c,$(BUILD)/tests/%,$(notdir $(SLOW)))
+LONG_SHELLS := tests/reference/reference.sh $(addprefix tests/methods/,determinism.sh hard.sh effects.sh) tests/scripts/checkpoint.sh
+SLOW_TESTS := $(LONG_SHELLS) $(SLOWS) $(filter-out $(LONG_SHELLS),$(SHELLS))
 PROGRAMS  := $(BENCH:%.c=$(BUILD)/%) $(EMBED:%.c=$(BUILD)/%)
 PROGRAM   := $(BUILD)/pinwheel
 
-.PHONY: all everything demo test test-all deps install uninstall clean help
+.PHONY: all everything demo test test-slow test-all deps install uninstall clean help
 .DELETE_ON_ERROR:
 .SECONDARY:
 
@@ -91,7 +93,7 @@ help::
 	@echo 'make deps             installs the libraries that are missing'
 	@echo 'make demo             the EzyRoller by three methods: a table, figures in $(BUILD)/demo/'
 	@echo 'make gallery          pages that simulate the models in a browser, in $(BUILD)/site/'
-	@echo 'make test             runs the tests; test-all: also the slow ones and scripts'
+	@echo 'make test             runs the tests; test-slow: the slow ones and scripts; test-all: both'
 	@echo 'make install          installs below DESTDIR in PREFIX (/usr/local); uninstall: removes that'
 	@echo 'make clean            removes $(BUILD)/'
 	@echo
@@ -100,7 +102,7 @@ help::
 
 # ---- Dependencies: targets that run something install missing libraries first ----
 
-ifneq ($(filter demo test test-all layers bench bench-quick bench-engine bench-effects hard san cov fuzz mutants,$(MAKECMDGOALS)),)
+ifneq ($(filter demo test test-slow test-all layers bench bench-quick bench-engine bench-effects hard san cov fuzz mutants,$(MAKECMDGOALS)),)
 ifndef NO_DEPS
 FIRST := deps
 endif
@@ -266,8 +268,11 @@ RUN_TESTS = PINWHEEL=$(PROGRAM) BUILD=$(BUILD) sh .ci/run-tests
 test: all $(TESTS) $(PROGRAMS)
 	@$(RUN_TESTS) $(TESTS)
 
+test-slow: everything
+	@$(RUN_TESTS) $(SLOW_TESTS)
+
 test-all: everything
-	@$(RUN_TESTS) $(SHELLS) $(SLOWS) $(TESTS)
+	@$(RUN_TESTS) $(SLOW_TESTS) $(TESTS)
 
 demo: all $(BUILD)/benchmarks/demo
 	@$(BUILD)/benchmarks/demo

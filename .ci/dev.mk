@@ -38,12 +38,12 @@ format:
 	clang-format -i $(SOURCES)
 
 format-check:
-	@bad=0; for f in $(SOURCES); do \
-	  clang-format "$$f" | cmp -s - "$$f" || { echo "not formatted: $$f"; bad=1; }; \
-	  LC_ALL=C.UTF-8 grep -HnE '^.{121,}' "$$f" && bad=1; done; exit $$bad
+	@bad=0; clang-format --dry-run -Werror $(SOURCES) || bad=1; \
+	  ! LC_ALL=C.UTF-8 grep -HnE '^.{121,}' $(SOURCES) || bad=1; exit $$bad
 
+# Without optimisation, which clang's warnings do not depend on, in half the time.
 clang:
-	@$(MAKE) --no-print-directory CC=clang WERROR=1 BUILD=$(VARIANT)/clang everything
+	@$(MAKE) --no-print-directory CC=clang CFLAGS=-O0 WERROR=1 BUILD=$(VARIANT)/clang everything
 
 gcc:
 	@$(MAKE) --no-print-directory CC=gcc WERROR=1 BUILD=$(VARIANT)/gcc everything

@@ -324,10 +324,14 @@ static inline int pw_evaluate_J_at (pw_workspace *w, double t, const double *q, 
   return status;
 }
 
+/* Two numbers at once (GNU C), at any address of a double. */
+typedef double pw_pair __attribute__ ((vector_size (16), aligned (8), may_alias));
+#define PW_PAIR(x, i) (*(const pw_pair *)((x) + (i)))
+
 /* to += factor * from, two numbers at a time */
 static inline void pw_add_scaled (double *restrict to, const double *restrict from, double factor, int n) {
   int i = 0;
-  for (; i + 1 < n; i += 2) to[i] += factor * from[i], to[i + 1] += factor * from[i + 1];
+  for (; i + 1 < n; i += 2) *(pw_pair *)(to + i) = PW_PAIR (to, i) + factor * PW_PAIR (from, i);
   if (i < n) to[i] += factor * from[i];
 }
 

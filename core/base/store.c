@@ -28,15 +28,26 @@ int pw_names_open (pw_names *n, size_t most) {
   return n->slot ? PW_OK : PW_RESOURCE;
 }
 
-void pw_names_close (pw_names *n) {
-  free (n->slot);
-  n->slot = NULL;
-}
-
 static struct pw_name *store_slot (const pw_names *n, const char *name) {
   size_t i = (size_t)pw_check_sum (PW_CHECK, name, strlen (name)) & (n->size - 1);
   while (n->slot[i].name && strcmp (n->slot[i].name, name) != 0) i = (i + 1) & (n->size - 1);
   return &n->slot[i];
+}
+
+int pw_names_reserve (pw_names *n, size_t most) {
+  pw_names more;
+  if (n->slot && 2 * most <= n->size) return PW_OK;
+  if (pw_names_open (&more, most) != PW_OK) return PW_RESOURCE;
+  for (struct pw_name *s = n->slot, *end = s ? s + n->size : s; s < end; s++)
+    if (s->name) *store_slot (&more, s->name) = *s;
+  pw_names_close (n);
+  *n = more;
+  return PW_OK;
+}
+
+void pw_names_close (pw_names *n) {
+  free (n->slot);
+  n->slot = NULL;
 }
 
 int pw_names_add (pw_names *n, const char *name, int value) {

@@ -106,7 +106,8 @@ typedef struct {
     int value;
   } * slot;
 } pw_names;
-int pw_names_open (pw_names *n, size_t most); /* with room for `most` names; PW_OK or PW_RESOURCE */
+int pw_names_open (pw_names *n, size_t most);    /* with room for `most` names; PW_OK or PW_RESOURCE */
+int pw_names_reserve (pw_names *n, size_t most); /* the same later, or as the first call; the names so far stay */
 void pw_names_close (pw_names *n);
 /* Adds a new name and returns -1; if the name exists, returns its value, which does not change. */
 int pw_names_add (pw_names *n, const char *name, int value);

@@ -23,7 +23,7 @@ typedef struct {
 
 static int files_check_table (void *context, const char *path) {
   files_check *check = context;
-  check->use[0].what = "a table of the model";
+  check->use[0].what = "a file of the model";
   check->use[0].path = path;
   return pw_check_paths (check->use, check->count, check->error);
 }

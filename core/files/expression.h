@@ -31,14 +31,15 @@ typedef struct {
   double *value;     /* names */
   pw_path **path;    /* names: NULL for a number */
   pw_names index;    /* the index of each name */
+  int room;          /* names for which there is memory */
   /* The text of the expression that a name stands for, which is read in place of the name, or NULL.  Variables have
    * precedence.  May be NULL. */
   const char *(*expand) (void *context, const char *name);
   void *context;
 } pw_scope;
 
-/* Opens a scope, which must be { 0 }, with room for `room` names, in an arena.  PW_OK or PW_RESOURCE. */
-int pw_scope_open (pw_scope *s, int room, pw_arena *arena);
+/* Makes room for `room` names in an arena; the scope must be { 0 } at first.  PW_OK or PW_RESOURCE. */
+int pw_scope_reserve (pw_scope *s, int room, pw_arena *arena);
 void pw_scope_close (pw_scope *s); /* names and numbers stay in the arena */
 
 /* Adds a name, to which the scope keeps a pointer; there must be room. */
@@ -108,6 +109,8 @@ int pw_expression_is_reserved (const char *text);
  * buffer, cut to its size, and moves *rest after it.  Returns its position, or NULL after the last name. */
 enum { PW_EXPRESSION_NAME = 100 };
 const char *pw_expression_next_name (const char **rest, char name[PW_EXPRESSION_NAME]);
+/* The same, also of PATH.FUNCTION. */
+const char *pw_expression_next_word (const char **rest, char name[PW_EXPRESSION_NAME]);
 
 /* Whether a text is a single number; its value may overflow to infinity. */
 int pw_expression_number (const char *text, double *value);

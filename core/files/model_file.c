@@ -504,12 +504,7 @@ const char *pw_file_path (const pw_file *f) {
 }
 
 int pw_file_tables (const pw_file *f, int (*each) (void *context, const char *path), void *context) {
-  /* not in let, where "file" is the name of a number */
-  const pw_node *const list[] = { f && f->yaml ? f->yaml->paths : NULL, f && f->yaml ? f->yaml->elements : NULL,
-                                  f && f->yaml ? f->yaml->states : NULL };
-  int stop = 0;
-  for (int i = 0; i < 3 && stop == 0; i++) stop = list[i] ? pw_yaml_tables (f->yaml, list[i], each, context) : 0;
-  return stop;
+  return f && f->yaml ? pw_yaml_tables (f->yaml, 1, each, context) : 0;
 }
 
 int pw_file_list (int (*each) (void *context, const char *name, const char *path), void *context, pw_error *error) {
@@ -600,7 +595,7 @@ static int page_text (pw_page *p, const pw_file *f, pw_error *error) {
   if (to) pw_yaml_write_tree (y, to);
   pw_stream_close (to, &tree);
   if (page_add (p, "tree", tree.text, tree.size, error) != PW_OK || status != PW_OK) return PW_RESOURCE;
-  status = pw_file_tables (f, page_table, &x);
+  status = pw_yaml_tables (y, 0, page_table, &x);
   return status == PW_OK ? PW_OK : pw_fail (error, status, "out of memory"); /* unless the reason is recorded */
 }
 

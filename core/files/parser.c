@@ -20,15 +20,22 @@
 /* ---- Names and numbers in a text ---- */
 
 #define DIGITS "0123456789"
-#define LETTERS "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ_"
+
+static int is_digit (char c) {
+  return c >= '0' && c <= '9';
+}
 
 /* The length of the name at p, which may contain dots (frame.phi); 0 if there is none. */
 static size_t name_size (const char *p) {
-  return strspn (p, LETTERS) ? strspn (p, LETTERS DIGITS ".") : 0;
+  size_t n = 0;
+  for (char c = *p; (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_' || (n && (is_digit (c) || c == '.'));)
+    c = p[++n];
+  return n;
 }
 
 /* The length of the number at p: digits, perhaps with a decimal point and an exponent; 0 if there is none. */
 static size_t number_size (const char *p) {
+  if (!is_digit (*p) && *p != '.') return 0;
   size_t whole = strspn (p, DIGITS), decimals = p[whole] == '.' ? strspn (p + whole + 1, DIGITS) : 0;
   if (whole + decimals == 0) return 0;
   const char *end = p + whole + (p[whole] == '.' ? 1 + decimals : 0); /* of the mantissa */
@@ -57,26 +64,38 @@ int pw_expression_is_name (const char *text) {
   return n && text[n] == 0 && n < 64 && strchr (text, '.') == NULL;
 }
 
-const char *pw_expression_next_name (const char **rest, char name[PW_EXPRESSION_NAME]) {
+const char *pw_expression_next_word (const char **rest, char name[PW_EXPRESSION_NAME]) {
   while (**rest) {
     const char *p = *rest;
     size_t n = name_size (p), number = n ? 0 : number_size (p);
     *rest += n ? n : number ? number : 1;
     if (n == 0) continue;
     snprintf (name, PW_EXPRESSION_NAME, "%.*s", (int)n, p);
-    if (strchr (name, '.') == NULL || !is_call (p + n)) return p;
+    return p;
   }
   return NULL;
 }
 
+const char *pw_expression_next_name (const char **rest, char name[PW_EXPRESSION_NAME]) {
+  const char *p = pw_expression_next_word (rest, name);
+  while (p && strchr (name, '.') && is_call (*rest)) p = pw_expression_next_word (rest, name);
+  return p;
+}
+
 /* ---- Named numbers ---- */
 
-int pw_scope_open (pw_scope *s, int room, pw_arena *arena) {
-  size_t n = (size_t)room + 1; /* never an empty allocation */
-  s->name = pw_arena_alloc (arena, n * sizeof *s->name);
-  s->value = pw_arena_alloc (arena, n * sizeof *s->value);
-  s->path = pw_arena_alloc (arena, n * sizeof *s->path);
-  return s->name && s->value && s->path ? pw_names_open (&s->index, (size_t)room) : PW_RESOURCE;
+int pw_scope_reserve (pw_scope *s, int room, pw_arena *arena) {
+  if (s->index.slot && room <= s->room) return PW_OK;
+  size_t n = room > 2 * s->room ? (size_t)room + 1 : 2 * (size_t)s->room; /* never an empty allocation */
+  const char **name = pw_arena_alloc (arena, n * sizeof *name);
+  double *value = pw_arena_alloc (arena, n * sizeof *value);
+  pw_path **path = pw_arena_alloc (arena, n * sizeof *path);
+  if (name == NULL || value == NULL || path == NULL || pw_names_reserve (&s->index, n) != PW_OK) return PW_RESOURCE;
+  if (s->names) memcpy (name, s->name, (size_t)s->names * sizeof *name);
+  if (s->names) memcpy (value, s->value, (size_t)s->names * sizeof *value);
+  if (s->names) memcpy (path, s->path, (size_t)s->names * sizeof *path);
+  s->name = name, s->value = value, s->path = path, s->room = (int)n;
+  return PW_OK;
 }
 
 void pw_scope_close (pw_scope *s) {

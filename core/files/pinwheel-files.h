@@ -40,8 +40,8 @@ const char *pw_file_path (const pw_file *f);
 /* The path of the file that a model's name or path refers to, malloced; NULL and an error as from pw_file_open. */
 char *pw_file_find (const char *model, pw_error *error);
 
-/* Calls `each` with the path of each table of a text model, once for each path and each signal that reads it, until it
- * returns non-zero; returns that, or 0. */
+/* Calls `each` with the path of each table of a text model, once for each path and each signal that reads it, and of
+ * each included file, until it returns non-zero; returns that, or 0. */
 int pw_file_tables (const pw_file *f, int (*each) (void *context, const char *path), void *context);
 
 /* Calls `each` with the name and path of every model on the search path, sorted by name, until it returns non-zero.

@@ -1,57 +1,65 @@
 /* Reads text models from the tree of a file: bodies and elements, through the field tables of their types; first-order
  * states; the head, parameters and default run settings, which is stored in a plug-in's table, so that text models can
- * be used like compiled ones. */
+ * be used like compiled ones; included files. */
 #include <math.h>
 #include <stdlib.h>
 #include "yaml_read.h"
 
 #define MAX_AHEAD 1e6 /* pw_yaml.max_ahead for the default limit of bytes: each indicator takes 350 bytes */
 
-/* ---- Reference solution: `truth`, a map of states to expressions of time ---- */
+/* ---- Reference solution: `truth`, a map of states to expressions of time, or a list of such maps ---- */
 
 static double reference_eval (void *context, int i, double t) {
   const pw_expression *const *x = context;
   return pw_expression_value (x[i], &t);
 }
 
-static int reference_entry (pw_reader *r, const pw_node *n, pw_names *seen) {
+static int reference_state (pw_reader *r, const pw_node *n) {
   static const char *const time[] = { "t", NULL };
   pw_reference_text *t = r->reference;
-  const pw_expression **x = t->context;
+  pw_node text;
   const char *name;
   if (pw_yaml_text (r, n, "truth", &name) != PW_OK) return r->error->status;
+  const pw_expression **x = t->context;
   if (!pw_is_state_name (r, name))
     return read_fail (r, n->at, "truth: expected a state such as BODY.phi, found \"%.60s\"", name);
   r->label = "truth";
   if (pw_check_state_name (r, n, name, 0) != PW_OK) return r->error->status;
-  if (pw_names_add (seen, name, 0) >= 0) return read_fail (r, n->at, "truth: a second \"%s\"", name);
+  if (pw_names_add (&r->truth, name, 0) >= 0) return read_fail (r, n->at, "truth: a second \"%s\"", name);
   r->label = PW_PRINTED (100, "truth of %.60s", name);
   t->state[t->states] = name;
-  int status = pw_yaml_expression (r, n->next, time, &t->text[t->states], &x[t->states]);
+  if (pw_yaml_rename (r, n->next, &text) != PW_OK) return r->error->status;
+  int status = pw_yaml_expression (r, &text, time, &t->text[t->states], &x[t->states]);
   t->states += status == PW_OK;
   return status;
 }
 
-/* Reads the reference solution, after bodies and elements. */
-static int read_reference (pw_reader *r) {
-  const pw_node *map = r->y->reference;
-  pw_reference_text *t = r->reference;
-  pw_names seen = { .size = 0 };
-  if (map || r->operations > 0) /* expressions may use names, whose values `show` writes */
-    t->names = r->numbers, t->name = r->scope->name, t->value = r->scope->value;
-  if (map == NULL) return r->error->status;
+static int reference_entry (pw_reader *r, const pw_node *map) {
   if (map->type != PW_YAML_MAP)
     return read_fail (r, map->at, "truth: expected a map {STATE: EXPRESSION, ...}, found %s", pw_node_found (map));
-  size_t room = (size_t)map->count + 1;
+  for (const pw_node *n = map->first; n && r->error->status == PW_OK; n = n->next->next)
+    if (pw_count_entry (r, n) == PW_OK) reference_state (r, n);
+  return r->error->status;
+}
+
+/* Reads the reference solution, after bodies and elements. */
+static int read_reference (pw_reader *r) {
+  pw_reference_text *t = r->reference;
+  int bodies, elements;
+  pw_model_bodies (r->model, &bodies);
+  const pw_element *e = pw_model_elements (r->model, &elements);
+  size_t room = 6 * (size_t)bodies + 1; /* all states */
+  for (int i = 0; i < elements; i++) room += 2 * (size_t)e[i].kind->internal;
+  t->eval = reference_eval;
+  if (r->y->reference || r->operations > 0) /* expressions may use names, whose values `show` writes */
+    t->names = r->numbers, t->name = r->scope->name, t->value = r->scope->value;
+  if (r->y->reference == NULL) return PW_OK;
   t->state = pw_arena_alloc (r->arena, room * sizeof *t->state);
   t->text = pw_arena_alloc (r->arena, room * sizeof *t->text);
   t->context = pw_arena_alloc (r->arena, room * sizeof (pw_expression *));
-  t->eval = reference_eval;
-  if (t->state == NULL || t->text == NULL || t->context == NULL || pw_names_open (&seen, room) != PW_OK)
+  if (t->state == NULL || t->text == NULL || t->context == NULL || pw_names_open (&r->truth, room) != PW_OK)
     return read_no_memory (r);
-  for (const pw_node *n = map->first; n && r->error->status == PW_OK; n = n->next->next) reference_entry (r, n, &seen);
-  pw_names_close (&seen);
-  return r->error->status;
+  return pw_yaml_entries (r, r->y->reference, reference_entry);
 }
 
 /* ---- Bodies ----
@@ -59,21 +67,40 @@ static int read_reference (pw_reader *r) {
  * Bodies and elements are passed to pw_add_body and pw_add, like those of a build function in C.  The core checks them;
  * its messages get a position. */
 
+/* A uniform bar between two points: {bar: NAME, from: [x, y], to: [x, y], mass: M}. */
+static int build_bar (pw_reader *r, const pw_node *name, const pw_node *from, const pw_node *to, pw_body *body) {
+  double a[2], b[2];
+  const char *label = PW_PRINTED (160, "bar %.60s", body->name);
+  if (from == NULL || to == NULL) return read_fail (r, name->at, "%s needs two points, \"from\" and \"to\"", label);
+  if (pw_yaml_pair (r, from, label, "numbers, [x, y]", a) != PW_OK ||
+      pw_yaml_pair (r, to, label, "numbers, [x, y]", b) != PW_OK)
+    return r->error->status;
+  if (a[0] == b[0] && a[1] == b[1]) return read_fail (r, to->at, "%s: its two points are the same", label);
+  pw_place_bar (body, a, b);
+  return PW_OK;
+}
+
 static int build_body (pw_reader *r, const pw_node *node) {
-  static const char *const key[] = { "name", "mass", "inertia", "start", "rate", NULL };
+  static const char *const keys[] = { "name", "mass", "inertia", "start", "rate", NULL };
+  static const char *const bar_keys[] = { "bar", "mass", "from", "to", "rate", NULL };
   static const char *const state[][4] = { { "x", "y", "phi", NULL }, { "vx", "vy", "omega", NULL } };
-  const pw_node *v[sizeof key / sizeof *key];
+  const pw_node *v[sizeof keys / sizeof *keys];
   pw_body body = { .specified = PW_SPECIFIES_NOTHING };
   pw_error cause = { 0 };
-  if (pw_yaml_keys (r, node, key, "a body", v) != PW_OK) return r->error->status;
+  int bodies, is_bar = 0;
+  for (const pw_node *n = node->type == PW_YAML_MAP ? node->first : NULL; n; n = n->next->next)
+    is_bar |= pw_node_is (n, "bar");
+  const char *const *key = is_bar ? bar_keys : keys;
+  if (pw_yaml_keys (r, node, key, is_bar ? "a bar" : "a body", v) != PW_OK) return r->error->status;
   const pw_node *name = v[0];
   if (name == NULL) return read_fail (r, node->at, "a body needs a name");
   if (pw_build_name (r, name, "body", &body.name) != PW_OK) return r->error->status;
-  for (int i = 0; i < 2; i++) {
+  for (int i = 0; i < (is_bar ? 1 : 2); i++) {
     const char *label = PW_PRINTED (160, "body %.60s: %s", body.name, key[1 + i]);
     pw_yaml_number (r, v[1 + i], label, PW_NONNEGATIVE, i ? &body.inertia : &body.mass);
   }
-  for (int i = 0; i < 2; i++) {
+  if (is_bar && build_bar (r, name, v[2], v[3], &body) != PW_OK) return r->error->status;
+  for (int i = is_bar; i < 2; i++) {
     const char *label = PW_PRINTED (160, "%s of body %.60s", key[3 + i], body.name);
     const pw_node *given[4];
     pw_yaml_keys (r, v[3 + i], state[i], label, given);
@@ -85,8 +112,13 @@ static int build_body (pw_reader *r, const pw_node *node) {
     }
   }
   if (r->error->status != PW_OK) return r->error->status;
+  const char *alone = pw_place_body (r->place, &body);
+  if (*alone)
+    return read_fail (r, name->at, "body %.60s: in a file placed at an angle, %s are given both or neither", body.name,
+                      alone);
   if (pw_model_check_body (r->model, &body, &cause) != PW_OK) return pw_build_fail (r, name, &cause);
-  pw_names_add (&r->bodies, body.name, 0);
+  pw_model_bodies (r->model, &bodies);
+  pw_names_add (&r->bodies, body.name, bodies);
   return pw_add_body (r->model, &body);
 }
 
@@ -94,18 +126,41 @@ static int build_body (pw_reader *r, const pw_node *node) {
 
 static int build_body_name (const pw_reader *r, const pw_node *node, const char **name) {
   if (pw_yaml_text (r, node, r->label, name) != PW_OK) return r->error->status;
-  if (strcmp (*name, "ground") == 0 || pw_names_find (&r->bodies, *name) >= 0) return PW_OK;
+  if (strcmp (*name, "ground") == 0) return PW_OK;
+  if ((*name = pw_yaml_prefixed (r, *name)) == NULL) return read_no_memory (r);
+  if (pw_names_find (&r->bodies, *name) >= 0) return PW_OK;
   pw_nearest near = { .sought = *name };
   pw_suggest_bodies (r, &near);
   pw_nearest_try (&near, "ground");
   return read_fail (r, node->at, "%s: there is no body \"%.60s\"%s", r->label, *name, pw_nearest_text (&near));
 }
 
-static int build_value (pw_reader *r, const pw_node *node, void *to) {
+/* A point of body i: [x, y] in its frame, or {world: [x, y]} where it is at the start. */
+static int build_point (pw_reader *r, const pw_node *node, int i, double to[2]) {
+  static const char *const key[] = { "world", NULL };
+  const pw_node *world = NULL;
+  const char *name = pw_place_body_of (r->kind, r->definition, i);
+  if (node->type == PW_YAML_MAP && pw_yaml_keys (r, node, key, "a point", &world) != PW_OK) return r->error->status;
+  if (pw_yaml_pair (r, world ? world : node, r->label, "numbers, [x, y]", to) != PW_OK || name == NULL)
+    return r->error->status;
+  if (r->place && (world || strcmp (name, "ground") == 0)) pw_place_point (r->place, to);
+  if (world == NULL || strcmp (name, "ground") == 0) return PW_OK;
+  int bodies;
+  const pw_body *body = pw_model_bodies (r->model, &bodies) + pw_names_find (&r->bodies, name);
+  if ((body->specified & 7) != 7)
+    return read_fail (r, node->at, "%s: a point of the world needs x, y and phi in the start of body %s", r->label,
+                      name);
+  const pw_place place = pw_place_in (NULL, body->start, body->start[2]);
+  pw_place_back (&place, to);
+  return PW_OK;
+}
+
+static int build_value (pw_reader *r, const pw_node *node, int i, void *to) {
   switch (r->field->type) {
   case PW_NUMBER:
     return pw_yaml_number (r, node, r->label, r->field->domain, to);
   case PW_POINT:
+    return build_point (r, node, i, to);
   case PW_VECTOR:
     return pw_yaml_pair (r, node, r->label, "numbers, [x, y]", to);
   case PW_BODY:
@@ -132,25 +187,12 @@ static int build_field (pw_reader *r, const pw_node *node, const char *element) 
   char *to = r->definition + f->offset;
   int count = pw_field_count (f);
   r->label = PW_PRINTED (200, "%s %.60s: %s", r->kind->name, element, f->name);
-  if (count == 1) return build_value (r, node, to);
-  if (pw_yaml_list_of (r, node, r->label, count, plural[f->type]) != PW_OK) return r->error->status;
-  for (const pw_node *n = node->first; n; n = n->next, to += pw_field_bytes (f->type)) build_value (r, n, to);
+  if (count == 1) return build_value (r, node, 0, to);
+  const int world = f->type == PW_POINT && node->type == PW_YAML_MAP; /* one point of all bodies */
+  if (!world && pw_yaml_list_of (r, node, r->label, count, plural[f->type]) != PW_OK) return r->error->status;
+  const pw_node *n = world ? node : node->first;
+  for (int i = 0; i < count; i++, to += pw_field_bytes (f->type), n = world ? n : n->next) build_value (r, n, i, to);
   return r->error->status;
-}
-
-/* Whether a word of a text begins with this prefix of at least 3 bytes. */
-static int build_has_word (const char *text, const char *prefix) {
-  for (const char *at = text; strlen (prefix) >= 3 && (at = strstr (at, prefix)) != NULL; at++)
-    if (at == text || strchr (" (", at[-1])) return 1;
-  return 0;
-}
-
-/* 1 if an element type has a field of this name. */
-static int build_is_field (const char *name) {
-  for (const pw_kind *const *k = pw_kinds; *k; k++)
-    for (const pw_field *f = (*k)->fields; f->name; f++)
-      if (strcmp (f->name, name) == 0) return 1;
-  return 0;
 }
 
 /* Finds the element type, the first key. */
@@ -168,41 +210,43 @@ static int build_kind (pw_reader *r, const pw_node *node) {
     if (kind >= 0)
       return read_fail (r, first->at, "an element begins with its type: write {%s: NAME, ...}", pw_kinds[kind]->name);
   }
-  pw_nearest near = { .sought = first->text };
-  for (const pw_kind *const *k = pw_kinds; *k; k++) pw_nearest_try (&near, (*k)->name);
-  /* Words of descriptions suggest a type: "hinge" pin, "damper" spring; names of fields, as "angle", do not. */
-  for (const pw_kind *const *k = pw_kinds; *k && !near.near && !build_is_field (first->text); k++)
-    if (build_has_word ((*k)->about, first->text))
-      snprintf (near.best, sizeof near.best, "%s", (*k)->name), near.near = 1;
+  pw_nearest near = pw_yaml_nearest_kind (first->text);
   return read_fail (r, first->at, "an element begins with its type, and there is no type \"%.60s\"%s", first->text,
                     near.near ? pw_nearest_text (&near) : ": see pinwheel list kinds");
 }
 
 /* Adds an element of the type r->kind with the fields in the pairs from `first` on, to which the keys of a first-order
  * state add `name`; at: where an error of the whole is reported. */
-static int build_fields (pw_reader *r, const pw_node *at, const pw_node *name, const pw_node *first) {
+static int build_fields (pw_reader *r, const pw_node *at, const pw_node *node, const char *name, const pw_node *first) {
   const char *key[PW_MAX_KEYS];
   const pw_node *v[PW_MAX_KEYS];
   const pw_kind *kind = r->kind;
   pw_error cause = { 0 };
   int n = 0, index;
   memset (r->definition, 0, kind->definition);
-  memcpy (r->definition, &name->text, sizeof name->text);
+  memcpy (r->definition, &name, sizeof name);
   for (const pw_field *f = kind->fields; f->name && n < PW_MAX_KEYS - 2; f++) key[n++] = f->name;
   key[n] = kind == &pw_kind_state ? "name" : NULL, key[n + 1] = NULL;
   pw_yaml_keys_from (r, first, key, PW_PRINTED (100, "a %s", kind->name), v);
   for (int i = 0; i < n && r->error->status == PW_OK; i++) {
     const pw_field *f = r->field = &kind->fields[i];
     if (v[i])
-      build_field (r, v[i], name->text);
+      build_field (r, v[i], name);
     else if (f->required || f->type == PW_BODY)
-      read_fail (r, at->at, "%s %.60s needs \"%s\": %s", kind->name, name->text, f->name, f->about ? f->about : "");
+      read_fail (r, at->at, "%s %.60s needs \"%s\": %s", kind->name, name, f->name, f->about ? f->about : "");
   }
   if (r->error->status != PW_OK) return r->error->status;
+  const char *direction = pw_place_direction (r->place, kind, r->definition);
+  if (direction)
+    return read_fail (r, node->at,
+                      "%s %.60s: its \"%s\" refers to the ground, which does not turn with a file placed at an angle",
+                      kind->name, name, direction);
   pw_element e = { kind, r->definition };
-  if (pw_model_check_element (r->model, &e, &cause) != PW_OK) return pw_build_fail (r, name, &cause);
+  if (pw_model_check_element (r->model, &e, &cause) != PW_OK) return pw_build_fail (r, node, &cause);
   pw_model_elements (r->model, &index);
-  if (kind->contact && !kind->each_body) pw_names_add (&r->contacts, name->text, index);
+  if (kind->contact && !kind->each_body) pw_names_add (&r->contacts, name, index);
+  for (int i = 0; kind != &pw_kind_state && pw_kinds[i]; i++)
+    if (pw_kinds[i] == kind) pw_names_add (&r->elements, name, i);
   return pw_add (r->model, kind, r->definition);
 }
 
@@ -211,7 +255,7 @@ static int build_element (pw_reader *r, const pw_node *node) {
   if (build_kind (r, node) != PW_OK) return r->error->status;
   const pw_node *first = node->first;
   if (pw_build_name (r, first->next, r->kind->name, &name) != PW_OK) return r->error->status;
-  return build_fields (r, first, first->next, first->next->next);
+  return build_fields (r, first, first->next, name, first->next->next);
 }
 
 /* ---- First-order states: a list of {name, rate, start, unit} ---- */
@@ -225,97 +269,23 @@ static const pw_node *state_name (const pw_reader *r, const pw_node *node) {
   return read_fail (r, node->at, "a state needs a name"), NULL;
 }
 
-/* Indexes the names of all states, which signals of any element may read; expressions can use them. */
-static int index_states (pw_reader *r) {
-  for (const pw_node *n = r->y->states ? r->y->states->first : NULL; n && r->error->status == PW_OK; n = n->next) {
-    const pw_node *node = state_name (r, n);
-    const char *name;
-    if (node == NULL || pw_build_name (r, node, "state", &name) != PW_OK) return r->error->status;
-    if (pw_yaml_name (r, node, "state", &r->states) != PW_OK) return r->error->status;
-    if (pw_names_find (&r->scope->index, name) >= 0)
-      return read_fail (r, node->at, "state \"%s\": a parameter or number of let has this name", name);
-  }
-  return r->error->status;
+/* Indexes the name of a state, which signals of any element may read; expressions can use it. */
+static int index_state (pw_reader *r, const pw_node *n) {
+  const pw_node *node = state_name (r, n);
+  const char *name, *own;
+  if (node == NULL || pw_build_name (r, node, "state", &name) != PW_OK) return r->error->status;
+  if (pw_yaml_name (r, node, "state", &own) != PW_OK) return r->error->status;
+  pw_names_add (&r->states, name, 0);
+  if (pw_names_find (&r->scope->index, own) >= 0)
+    return read_fail (r, node->at, "state \"%s\": a parameter or number of let has this name", name);
+  return PW_OK;
 }
 
 static int build_state (pw_reader *r, const pw_node *node) {
   const pw_node *name = state_name (r, node);
+  const char *text = pw_yaml_prefixed (r, name->text);
   r->kind = &pw_kind_state;
-  return build_fields (r, name, name, node->first);
-}
-
-/* ---- The model ---- */
-
-static int build_all (pw_reader *r, const double *parameter) {
-  const pw_yaml *y = r->y;
-  double value;
-  for (int i = 0; i < y->parameter_count; i++) pw_scope_add (r->scope, y->table.parameters[i].name, parameter[i]);
-  for (const pw_node *n = y->let ? y->let->first : NULL; n; n = n->next->next) {
-    if (pw_yaml_number (r, n->next, PW_PRINTED (100, "let %s", n->text), PW_REAL, &value) != PW_OK)
-      return r->error->status;
-    pw_scope_add (r->scope, n->text, value);
-  }
-  r->numbers = r->scope->names;
-  for (const pw_node *n = y->paths ? y->paths->first : NULL; n; n = n->next)
-    if (pw_yaml_path (r, n) != PW_OK) return r->error->status;
-  if (index_states (r) != PW_OK) return r->error->status;
-  if (pw_yaml_outputs (r) != PW_OK) return r->error->status;
-  for (const pw_node *n = y->bodies ? y->bodies->first : NULL; n; n = n->next)
-    if (build_body (r, n) != PW_OK) return r->error->status;
-  for (const pw_node *n = y->elements ? y->elements->first : NULL; n; n = n->next)
-    if (build_element (r, n) != PW_OK) return r->error->status;
-  for (const pw_node *n = y->states ? y->states->first : NULL; n; n = n->next)
-    if (build_state (r, n) != PW_OK) return r->error->status;
-  if (pw_add_outputs (r) != PW_OK) return r->error->status;
-  return read_reference (r);
-}
-
-static void build_free (void *arena) {
-  pw_arena_free (arena);
-  free (arena);
-}
-
-/* Allocates the memory for building, and the arena for what lives as long as the model. */
-static int build_open (pw_reader *r) {
-  const pw_yaml *y = r->y;
-  size_t largest = 1, bodies = y->bodies ? (size_t)y->bodies->count : 0, lets = y->let ? (size_t)y->let->count : 0;
-  size_t elements = y->elements ? (size_t)y->elements->count : 0, outputs = y->outputs ? (size_t)y->outputs->count : 0;
-  size_t states = y->states ? (size_t)y->states->count : 0, paths = y->paths ? (size_t)y->paths->count : 0;
-  for (const pw_kind *const *k = pw_kinds; *k; k++)
-    if ((*k)->definition > largest) largest = (*k)->definition;
-  r->arena = calloc (1, sizeof *r->arena);
-  if (r->arena == NULL || pw_model_keep (r->model, r->arena, build_free) != PW_OK) return read_no_memory (r);
-  r->reference = pw_arena_alloc (r->arena, sizeof *r->reference);
-  pw_model_set_reference (r->model, r->reference);
-  r->definition = malloc (largest);
-  if (r->reference) r->reference->path = pw_arena_alloc (r->arena, (paths + 1) * sizeof *r->reference->path);
-  if (r->reference && r->reference->path && r->definition &&
-      pw_scope_open (r->scope, y->parameter_count + (int)(lets + paths + outputs), r->arena) == PW_OK &&
-      pw_names_open (&r->bodies, bodies) == PW_OK && pw_names_open (&r->contacts, elements) == PW_OK &&
-      pw_names_open (&r->states, states) == PW_OK &&
-      pw_names_open (&r->names, bodies + elements + states + paths + outputs) == PW_OK)
-    return PW_OK;
-  return read_no_memory (r);
-}
-
-/* The build function; the parameters are numbers in the order of the table. */
-static void build_model (pw_model *m, const void *parameters) {
-  const void *table = pw_model_table (m);
-  pw_scope scope = { 0 };
-  pw_reader r = { .y = table, .model = m, .scope = &scope, .error = pw_model_error (m) };
-  pw_yaml_list (&r, r.y->paths, "paths");
-  pw_yaml_list (&r, r.y->bodies, "bodies");
-  pw_yaml_list (&r, r.y->states, "states");
-  pw_yaml_list (&r, r.y->outputs, "outputs");
-  if (pw_yaml_list (&r, r.y->elements, "elements") == PW_OK && build_open (&r) == PW_OK) build_all (&r, parameters);
-  pw_scope_close (&scope);
-  pw_names_close (&r.bodies);
-  pw_names_close (&r.states);
-  pw_names_close (&r.names);
-  pw_names_close (&r.elements);
-  pw_names_close (&r.contacts);
-  pw_names_close (&r.outputs);
-  free (r.definition);
+  return text ? build_fields (r, name, name, text, node->first) : read_no_memory (r);
 }
 
 /* ---- The head ---- */
@@ -339,8 +309,8 @@ static int head_parameter (const pw_reader *r, const pw_node *node, pw_names *na
   const pw_node *name = v[0], *value = v[1], *unit = v[2], *about = v[3], *domain = v[4], *min = v[5];
   int chosen = min ? PW_NONNEGATIVE : PW_REAL;
   if (name == NULL) return read_fail (r, node->at, "a parameter needs a name");
-  if (pw_yaml_name (r, name, "parameter", names) != PW_OK) return r->error->status;
-  p->name = name->text;
+  if (pw_yaml_name (r, name, "parameter", &p->name) != PW_OK) return r->error->status;
+  if (pw_names_add (names, p->name, 0) >= 0) return read_fail (r, name->at, "a second parameter \"%s\"", p->name);
   p->unit = p->about = "";
   const char *label = PW_PRINTED (100, "parameter %s", p->name);
   if (value == NULL) return read_fail (r, node->at, "%s needs a value, its default", label);
@@ -348,7 +318,7 @@ static int head_parameter (const pw_reader *r, const pw_node *node, pw_names *na
     return read_fail (r, min->at, "min: only 0 can be written, without a domain; \"domain: positive\" means > 0");
   pw_yaml_choice (r, domain, "domain", pw_domain_names, &chosen);
   p->domain = (pw_domain)chosen;
-  pw_yaml_unit (r, unit, value, &p->unit);
+  if (unit && pw_yaml_text (r, unit, "unit", &p->unit) == PW_OK) pw_yaml_check_unit (r->y, unit, value, r->error);
   pw_yaml_text (r, about, "about", &p->about);
   return head_default (r, value, label, names, p);
 }
@@ -368,8 +338,8 @@ static int head_parameters (pw_yaml *y, const pw_reader *r, const pw_node *list,
 }
 
 static int read_head (pw_yaml *y, const pw_reader *r) {
-  static const char *const key[] = { "pinwheel", "about", "run",    "parameters", "let",   "bodies",
-                                     "elements", "truth", "states", "outputs",    "paths", NULL };
+  static const char *const key[] = { "pinwheel", "about",  "run",     "parameters", "let",   "bodies", "elements",
+                                     "truth",    "states", "include", "outputs",    "paths", NULL };
   static const char *const run_key[] = { "t_end", "step", "rtol", "method", NULL };
   const pw_node *v[sizeof key / sizeof *key], *run[sizeof run_key / sizeof *run_key];
   double *number[] = { &y->table.run.t_end, &y->table.run.step, &y->table.run.rtol };
@@ -383,64 +353,188 @@ static int read_head (pw_yaml *y, const pw_reader *r) {
   pw_yaml_keys (r, v[2], run_key, "run", run);
   for (int i = 0; i < 3; i++) pw_yaml_number (r, run[i], run_key[i], PW_POSITIVE, number[i]);
   pw_yaml_text (r, run[3], run_key[3], &y->table.run.method);
-  const pw_node *parameters = v[3], *let = v[4];
+  const pw_node *parameters = v[3];
   /* the key of the reference solution is "truth" */
-  y->let = let, y->bodies = v[5], y->elements = v[6], y->reference = v[7], y->states = v[8], y->outputs = v[9];
-  y->paths = v[10];
+  y->let = v[4], y->bodies = v[5], y->elements = v[6], y->reference = v[7], y->states = v[8];
+  y->include = v[9], y->outputs = v[10], y->paths = v[11];
+  for (int i = 5; key[i]; i++)
+    if (i != 7) pw_yaml_list (r, v[i], key[i]);
   for (int i = 3; key[i]; i++) /* from "parameters" on: lists and maps */
     if (v[i] && v[i]->count > PW_MAX_ITEMS)
       read_fail (r, v[i]->at, "%s: %d entries; a model may have %d", key[i], v[i]->count, PW_MAX_ITEMS);
-  size_t count = (size_t)(parameters ? parameters->count : 0) + (size_t)(let ? let->count : 0);
+  size_t count = parameters ? (size_t)parameters->count : 0;
   if (r->error->status == PW_OK && pw_names_open (&names, count) != PW_OK) read_no_memory (r);
   if (r->error->status == PW_OK) head_parameters (y, r, parameters, &names);
-  if (r->error->status == PW_OK && let && let->type != PW_YAML_MAP)
-    read_fail (r, let->at, "let: expected a map {NAME: NUMBER, ...}, found %s", pw_node_found (let));
-  for (const pw_node *n = let ? let->first : NULL; n && r->error->status == PW_OK; n = n->next->next)
-    pw_yaml_name (r, n, "name", &names);
   pw_names_close (&names);
   return r->error->status;
+}
+
+/* ---- The model ---- */
+
+/* Adds the numbers of a map {NAME: NUMBER, ...} to the scope. */
+static int build_let (pw_reader *r, const pw_node *map) {
+  const char *name;
+  double value;
+  if (map->type != PW_YAML_MAP)
+    return read_fail (r, map->at, "let: expected a map {NAME: NUMBER, ...}, found %s", pw_node_found (map));
+  for (const pw_node *n = map->first; n; n = n->next->next) {
+    if (pw_count_entry (r, n) != PW_OK || pw_yaml_name (r, n, "name", &name) != PW_OK) return r->error->status;
+    if (pw_names_find (&r->scope->index, name) >= 0) return read_fail (r, n->at, "a second name \"%s\"", name);
+    if (pw_yaml_number (r, n->next, PW_PRINTED (100, "let %s", name), PW_REAL, &value) != PW_OK)
+      return r->error->status;
+    if (pw_scope_reserve (r->scope, r->scope->names + 1, r->arena) != PW_OK) return read_no_memory (r);
+    pw_scope_add (r->scope, name, value);
+  }
+  return PW_OK;
+}
+
+static read_entry build_include; /* it builds a model in this one */
+
+/* Builds all lists of a file; included files come first, so that elements can connect their bodies. */
+static int build_lists (pw_reader *r, const double *parameter) {
+  const pw_yaml *y = r->y;
+  for (int i = 0; i < y->parameter_count; i++) pw_scope_add (r->scope, y->table.parameters[i].name, parameter[i]);
+  pw_yaml_entries (r, y->let, build_let);
+  r->numbers = r->scope->names;
+  pw_yaml_entries (r, y->paths, pw_yaml_path);
+  pw_yaml_entries (r, y->states, index_state);
+  pw_yaml_entries (r, y->include, build_include);
+  for (int i = 0; y->include && i < r->scope->names && r->error->status == PW_OK; i++)
+    if (pw_names_find (&r->states, r->scope->name[i]) >= 0)
+      read_fail (r, y->include->at, "include: a state of a file has the name \"%s\" of a parameter or number of let",
+                 r->scope->name[i]);
+  if (r->error->status == PW_OK) pw_yaml_outputs (r);
+  pw_yaml_entries (r, y->bodies, build_body);
+  pw_yaml_entries (r, y->elements, build_element);
+  return pw_yaml_entries (r, y->states, build_state);
+}
+
+/* Stores the parameters of an included file: their defaults, or numbers in `set`. */
+static int include_parameters (pw_reader *r, const pw_yaml *file, const pw_node *set, double *value) {
+  const pw_parameter *p = file->table.parameters;
+  for (int i = 0; i < file->parameter_count; i++) value[i] = p[i].value;
+  if (set && set->type != PW_YAML_MAP)
+    return read_fail (r, set->at, "set: expected a map {PARAMETER: NUMBER, ...}, found %s", pw_node_found (set));
+  for (const pw_node *n = set ? set->first : NULL; n && r->error->status == PW_OK; n = n->next->next) {
+    const char *name = "";
+    pw_nearest near = { .sought = "" };
+    int i = 0;
+    if (pw_yaml_text (r, n, "set", &name) != PW_OK) return r->error->status;
+    for (near.sought = name; i < file->parameter_count && strcmp (p[i].name, name) != 0; i++)
+      pw_nearest_try (&near, p[i].name);
+    if (i == file->parameter_count)
+      return read_fail (r, n->at, "set: the file has no parameter \"%.60s\"%s", name, pw_nearest_text (&near));
+    pw_yaml_number (r, n->next, PW_PRINTED (100, "set: %s", name), p[i].domain, &value[i]);
+  }
+  return r->error->status;
+}
+
+/* Adds a path of an included file to the names of the file that includes it. */
+static int include_path (pw_reader *r, pw_scope *outer, const char *name, pw_path *path) {
+  if (pw_scope_reserve (outer, outer->names + 1, r->arena) != PW_OK) return read_no_memory (r);
+  pw_scope_add_path (outer, name, path);
+  return PW_OK;
+}
+
+/* Builds the lists of an included file in the model. */
+static int include_build (pw_reader *r, pw_yaml *file, const pw_node *set, const char *prefix, const pw_place *place) {
+  const pw_reader outer = *r;
+  pw_scope scope = { 0 };
+  double *value = NULL;
+  r->copies = NULL, r->scope = NULL;
+  read_head (file, r);
+  r->copies = outer.copies, r->scope = outer.scope;
+  if (r->error->status == PW_OK) value = pw_arena_alloc (r->arena, ((size_t)file->parameter_count + 1) * sizeof *value);
+  if (value == NULL || pw_scope_reserve (&scope, file->parameter_count, r->arena) != PW_OK) read_no_memory (r);
+  if (r->error->status == PW_OK && include_parameters (r, file, set, value) == PW_OK) {
+    r->y = file, r->copies = NULL, r->scope = &scope, r->prefix = prefix, r->place = place;
+    build_lists (r, value);
+    for (int i = 0; i < scope.names && r->error->status == PW_OK; i++) /* expressions of the outer file may use them */
+      if (scope.path[i]) include_path (r, outer.scope, scope.name[i], scope.path[i]);
+    r->y = outer.y, r->copies = outer.copies, r->scope = outer.scope, r->prefix = outer.prefix, r->place = outer.place,
+    r->numbers = outer.numbers;
+    r->has_index = 0; /* elements of the outer file come later */
+  }
+  pw_scope_close (&scope);
+  return r->error->status;
+}
+
+/* An included file: {file: NAME, prefix: TEXT, set: {PARAMETER: NUMBER, ...}, at: [x, y], phi: ANGLE}. */
+static int build_include (pw_reader *r, const pw_node *node) {
+  static const char *const key[] = { "file", "prefix", "set", "at", "phi", NULL };
+  const pw_node *v[sizeof key / sizeof *key];
+  const char *prefix = "";
+  double at[2] = { 0 }, phi = 0;
+  if (pw_yaml_keys (r, node, key, "an included file", v) != PW_OK) return r->error->status;
+  if (v[0] == NULL) return read_fail (r, node->at, "an included file needs \"file\", its path");
+  if (!v[0]->is_file)
+    return read_fail (r, v[0]->at, "file: expected the path of a file, found %s", pw_node_found (v[0]));
+  pw_yaml_text (r, v[1], "prefix", &prefix);
+  pw_yaml_pair (r, v[3], "at", "numbers, [x, y]", at);
+  if (pw_yaml_number (r, v[4], "phi", PW_REAL, &phi) != PW_OK || pw_count_entry (r, node) != PW_OK)
+    return r->error->status;
+  if (*prefix && !pw_expression_is_name (prefix))
+    return read_fail (r, v[1]->at, "prefix \"%.60s\": expected a letter, then letters, digits and _", prefix);
+  const pw_place place = pw_place_in (r->place, at, phi);
+  pw_yaml file = *r->y; /* the same source, with other lists */
+  file.arena = (pw_arena){ 0 };
+  file.root = v[0], file.parameter_count = 0;
+  prefix = pw_yaml_prefixed (r, prefix);
+  int status = prefix ? include_build (r, &file, v[2], prefix, &place) : read_no_memory (r);
+  pw_arena_free (&file.arena);
+  return status;
+}
+
+static void build_free (void *arena) {
+  pw_arena_free (arena);
+  free (arena);
+}
+
+/* Allocates the memory for building, and the arena for what lives as long as the model. */
+static int build_open (pw_reader *r) {
+  const pw_yaml *y = r->y;
+  size_t largest = 1;
+  for (const pw_kind *const *k = pw_kinds; *k; k++)
+    if ((*k)->definition > largest) largest = (*k)->definition;
+  r->arena = calloc (1, sizeof *r->arena);
+  if (r->arena == NULL || pw_model_keep (r->model, r->arena, build_free) != PW_OK) return read_no_memory (r);
+  r->reference = pw_arena_alloc (r->arena, sizeof *r->reference);
+  pw_model_set_reference (r->model, r->reference);
+  r->definition = malloc (largest);
+  if (r->reference && r->definition && pw_scope_reserve (r->scope, y->parameter_count, r->arena) == PW_OK)
+    return pw_count_entry (r, y->root); /* opens the tables of names */
+  return read_no_memory (r);
+}
+
+/* The build function; the parameters are numbers in the order of the table. */
+static void build_model (pw_model *m, const void *parameters) {
+  const void *table = pw_model_table (m);
+  pw_scope scope = { 0 };
+  pw_reader r = { .y = table, .model = m, .scope = &scope, .prefix = "", .error = pw_model_error (m) };
+  if (build_open (&r) == PW_OK && build_lists (&r, parameters) == PW_OK && pw_add_outputs (&r) == PW_OK)
+    read_reference (&r);
+  pw_scope_close (&scope);
+  pw_names_close (&r.bodies);
+  pw_names_close (&r.states);
+  pw_names_close (&r.truth);
+  pw_names_close (&r.names);
+  pw_names_close (&r.elements);
+  pw_names_close (&r.contacts);
+  pw_names_close (&r.outputs);
+  free (r.output);
+  free (r.definition);
 }
 
 /* ---- The file ---- */
 
 pw_yaml *pw_yaml_open (const char *path, const char *shown, size_t max_bytes, pw_error *error) {
-  const char *slash = strrchr (path, '/');
   pw_yaml *y = calloc (1, sizeof *y);
-  if (y) y->path = pw_arena_copy (&y->arena, shown);
-  if (y) y->folder = pw_arena_copy (&y->arena, slash ? path : ".");
-  if (y && y->folder && slash) y->folder[slash - path] = 0; /* "" for "/model.yaml" */
-  if (y == NULL || y->path == NULL || y->folder == NULL) {
-    pw_fail (error, PW_RESOURCE, "out of memory");
-    pw_yaml_close (y);
-    return NULL;
-  }
+  if (y == NULL) return pw_fail (error, PW_RESOURCE, "out of memory"), NULL;
   y->max_ahead = MAX_AHEAD * fmax (1, (double)max_bytes / PW_FILE_DEFAULT_BYTES);
   y->table = (pw_plugin_table){ .abi = PW_ABI, .size = sizeof y->table, .build = build_model };
-  if (pw_yaml_read_source (y, path, max_bytes, error) == PW_OK && pw_yaml_read_tree (y, error) == PW_OK &&
+  if (pw_yaml_read_files (y, path, shown, max_bytes, error) == PW_OK &&
       read_head (y, &(pw_reader){ .y = y, .error = error }) == PW_OK)
     return y;
   pw_yaml_close (y);
   return NULL;
-}
-
-void pw_yaml_close (pw_yaml *y) {
-  if (y == NULL) return;
-  pw_arena_free (&y->arena);
-  free (y->source);
-  free (y);
-}
-
-int pw_yaml_tables (const pw_yaml *y, const pw_node *node, int (*each) (void *context, const char *path),
-                    void *context) {
-  int stop = 0;
-  for (const pw_node *n = node == NULL || node->type == PW_YAML_SCALAR ? NULL : node->first; n && !stop; n = n->next) {
-    const pw_node *key = node->type == PW_YAML_MAP ? n : NULL;
-    if (key) n = key->next; /* its value */
-    if (key && pw_node_is (key, "file") && n->type == PW_YAML_SCALAR) {
-      char path[PW_PATH];
-      stop = each (context, pw_path (path, "%s/%s", y->folder, n->text));
-    } else
-      stop = pw_yaml_tables (y, n, each, context);
-  }
-  return stop;
 }

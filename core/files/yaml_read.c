@@ -1,5 +1,5 @@
-/* Reads keys, lists, texts, numbers, names and units of text models. */
-#include <ctype.h>
+/* Reads keys, lists with their copies, texts, numbers and names of text models. */
+#include <math.h>
 #include <stdlib.h>
 #include "yaml_read.h"
 
@@ -11,18 +11,6 @@ const char *pw_node_found (const pw_node *node) {
 
 int pw_node_is (const pw_node *node, const char *text) {
   return node->type == PW_YAML_SCALAR && strcmp (node->text, text) == 0;
-}
-
-/* A hint for a key that is not a plain name, or "". */
-static const char *read_key_hint (const char *text, const char *const *key) {
-  for (int i = 0; key[i]; i++) {
-    size_t n = strlen (key[i]);
-    if (strncmp (text, key[i], n) == 0 && text[n] == ':') return "; a space goes after the colon";
-    if (strncmp (text, key[i], n) == 0 && text[n] == ' ') return "; a colon goes after the key";
-  }
-  if (*text && strspn (text, "0123456789") == strlen (text)) return "; decimals are written with a point";
-  if (strpbrk (text, "()*/^")) return "; an expression with commas goes between double quotes";
-  return "";
 }
 
 static int read_key (const pw_reader *r, const pw_node *node, const char *const *key, const char *owner,
@@ -38,7 +26,7 @@ static int read_key (const pw_reader *r, const pw_node *node, const char *const 
   }
   pw_nearest near = { .sought = node->text };
   for (int i = 0; key[i]; i++) pw_nearest_try (&near, key[i]);
-  const char *hint = read_key_hint (node->text, key);
+  const char *hint = pw_yaml_key_hint (node->text, key);
   return read_fail (r, node->at, "%s has no \"%.60s\"%s", owner, node->text, *hint ? hint : pw_nearest_text (&near));
 }
 
@@ -76,6 +64,11 @@ int pw_yaml_list_of (const pw_reader *r, const pw_node *node, const char *label,
 
 /* ---- Texts and numbers ---- */
 
+const char *pw_yaml_prefixed (const pw_reader *r, const char *name) {
+  char *text = *r->prefix ? pw_arena_alloc (r->arena, strlen (r->prefix) + strlen (name) + 1) : NULL;
+  return *r->prefix == 0 ? name : text ? strcat (strcpy (text, r->prefix), name) : NULL;
+}
+
 int pw_yaml_text (const pw_reader *r, const pw_node *node, const char *label, const char **text) {
   if (node == NULL) return r->error->status;
   if (node->type != PW_YAML_SCALAR || *node->text == 0)
@@ -102,25 +95,25 @@ const char *pw_signal_argument (const pw_reader *r) {
 static const char *find_variable (const pw_reader *r, const char *text) {
   char name[PW_EXPRESSION_NAME];
   for (const char *rest = text, *p; (p = pw_expression_next_name (&rest, name)) != NULL;)
-    if (strcmp (name, pw_signal_argument (r)) == 0 || pw_is_state_name (r, name)) return p;
+    if (strcmp (name, pw_signal_argument (r)) == 0 ||
+        pw_is_state_name (r, PW_PRINTED (200, "%s%s", r->prefix ? r->prefix : "", name)))
+      return p;
   return NULL;
 }
 
-int pw_yaml_name (const pw_reader *r, const pw_node *node, const char *label, pw_names *names) {
-  const char *name;
-  if (pw_yaml_text (r, node, label, &name) != PW_OK) return r->error->status;
-  if (!pw_expression_is_name (name))
+int pw_yaml_name (const pw_reader *r, const pw_node *node, const char *label, const char **name) {
+  if (pw_yaml_text (r, node, label, name) != PW_OK) return r->error->status;
+  if (!pw_expression_is_name (*name))
     return read_fail (r, node->at, "%s \"%.60s\": expected a letter, then letters, digits and _, at most 63 in all",
-                      label, name);
-  if (strcmp (name, "t") == 0 || pw_expression_is_reserved (name))
-    return read_fail (r, node->at, "%s \"%s\": this name is reserved: %s", label, name,
-                      *name == 't' && name[1] == 0 ? "it is the time" : "a function or constant");
-  return names && pw_names_add (names, name, 0) >= 0 ? read_fail (r, node->at, "a second %s \"%s\"", label, name)
-                                                     : PW_OK;
+                      label, *name);
+  if (strcmp (*name, "t") == 0 || pw_expression_is_reserved (*name))
+    return read_fail (r, node->at, "%s \"%s\": this name is reserved: %s", label, *name,
+                      strcmp (*name, "t") == 0 ? "it is the time" : "a function or constant");
+  return PW_OK;
 }
 
-/* Replaces the text of an error at an unknown name by the suggestion of a first-order state, if its name is near and
- * the parser suggests nothing. */
+/* Replaces the text of an error at an unknown name by the suggestion of a first-order state or output, if its name is
+ * near and the parser suggests nothing. */
 static void suggest_state (const pw_reader *r, const char *text, pw_expression_error *error) {
   char name[PW_EXPRESSION_NAME];
   const char *rest = text + error->at;
@@ -129,13 +122,14 @@ static void suggest_state (const pw_reader *r, const char *text, pw_expression_e
   pw_nearest near = { .sought = name };
   for (const struct pw_name *e = r->states.slot, *end = e + r->states.size; e < end; e++)
     if (e->name) pw_nearest_try (&near, e->name);
+  for (int i = 0; i < r->output_count; i++) pw_nearest_try (&near, r->output[i]->output.name);
   if (near.near) snprintf (error->text, sizeof error->text, "there is no \"%.60s\"%s", name, pw_nearest_text (&near));
 }
 
 int pw_yaml_varies (const pw_reader *r, const char *text) {
   char name[PW_EXPRESSION_NAME];
   for (const char *rest = text; pw_expression_next_name (&rest, name) != NULL;)
-    if (r->outputs.slot && pw_names_find (&r->outputs, name) >= 0) return 1;
+    if (r->outputs.slot && pw_names_find (&r->outputs, PW_PRINTED (200, "%s%s", r->prefix, name)) >= 0) return 1;
   return find_variable (r, text) != NULL;
 }
 
@@ -144,7 +138,8 @@ int pw_yaml_number (const pw_reader *r, const pw_node *node, const char *label, 
   if (node == NULL || r->error->status != PW_OK) return r->error->status;
   if (node->type != PW_YAML_SCALAR)
     return read_fail (r, node->at, "%s: expected a number, found %s", label, pw_node_found (node));
-  int status = pw_expression_constant (r->scope, node->text, value, &error);
+  int status = r->copies ? pw_copies_number (r->copies, node, value, &error)
+                         : pw_expression_constant (r->scope, node->text, value, &error);
   if (status == PW_RESOURCE) return read_no_memory (r);
   if (status == PW_INPUT) suggest_state (r, node->text, &error);
   if (status != PW_OK)
@@ -185,7 +180,95 @@ void pw_suggest_bodies (const pw_reader *r, pw_nearest *near) {
   for (int i = 0; i < bodies; i++) pw_nearest_try (near, body[i].name);
 }
 
+/* ---- Entries of lists, and their copies ---- */
+
+int pw_count_entry (pw_reader *r, const pw_node *node) {
+  const size_t room = (size_t)++r->entries;
+  if (r->entries > PW_MAX_ENTRIES)
+    return read_fail (r, node->at, "the lists and copies up to here have more than %d entries, the limit for a model",
+                      PW_MAX_ENTRIES);
+  return pw_names_reserve (&r->bodies, room) == PW_OK && pw_names_reserve (&r->names, room) == PW_OK &&
+                 pw_names_reserve (&r->states, room) == PW_OK && pw_names_reserve (&r->elements, room) == PW_OK &&
+                 pw_names_reserve (&r->contacts, room) == PW_OK && pw_names_reserve (&r->outputs, room) == PW_OK
+             ? PW_OK
+             : read_no_memory (r);
+}
+
+/* Reads `repeat`, {COUNTER: NUMBER}. */
+static int read_repeat (pw_reader *r, const pw_node *repeat, const char **counter, int *count) {
+  const pw_node *map = repeat->next;
+  double number = 0;
+  if (map->type != PW_YAML_MAP || map->count != 1)
+    return read_fail (r, map->at, "repeat: expected a map {COUNTER: NUMBER}, such as {i: 3}, found %s",
+                      map->type == PW_YAML_MAP ? "one with another number of entries" : pw_node_found (map));
+  if (pw_yaml_name (r, map->first, "repeat", counter) != PW_OK) return r->error->status;
+  if (pw_names_find (&r->scope->index, *counter) >= 0 || pw_is_state_name (r, *counter))
+    return read_fail (r, map->first->at, "repeat: a parameter, number of let or state has the name \"%s\"", *counter);
+  const char *label = PW_PRINTED (100, "repeat: %s", *counter);
+  if (pw_yaml_number (r, map->first->next, label, PW_NONNEGATIVE, &number) != PW_OK) return r->error->status;
+  if (number > MAX_COPIES || number != floor (number))
+    return read_fail (r, map->first->next->at, "%s = %.15g: expected a whole number from 0 to %d", label, number,
+                      MAX_COPIES);
+  *count = (int)number;
+  return PW_OK;
+}
+
+/* Calls `each` with an entry or, if that is {list: [..]}, with those of the list. */
+static int read_copy (pw_reader *r, const pw_node *entry, read_entry *each) {
+  const pw_node *list = entry->first && pw_node_is (entry->first, "list") ? entry->first->next : NULL;
+  if (list == NULL) return each (r, entry);
+  if (pw_yaml_list (r, list, "list") != PW_OK) return r->error->status;
+  if (list->next) return read_fail (r, list->next->at, "a repeated list has no other keys");
+  for (const pw_node *n = list->first; n && r->error->status == PW_OK; n = n->next) each (r, n);
+  return r->error->status;
+}
+
+/* Calls `each` with the copies of an entry. */
+static int read_copies (pw_reader *r, const pw_node *entry, const pw_node *repeat, read_entry *each) {
+  pw_copies c = { .scope = r->scope, .arena = r->arena, .repeat = repeat }, *outer = r->copies;
+  int count = 0, status;
+  r->copies = NULL; /* also where an entry of another list is being read */
+  if (read_repeat (r, repeat, &c.counter, &count) != PW_OK) return r->error->status;
+  status = count ? pw_copies_open (&c, entry) : PW_OK;
+  for (int i = 1; i <= count && status == PW_OK && r->error->status == PW_OK; i++) {
+    if ((status = pw_copies_set (&c, i)) != PW_OK) break;
+    r->copies = &c;
+    if (r->copied + c.bytes > MAX_COPIED)
+      read_fail (r, entry->at, "the copies up to here have texts of more than %g MB, the limit for a model",
+                 MAX_COPIED / 1e6);
+    else
+      read_copy (r, c.entry, each);
+    r->copies = NULL;
+  }
+  if (status == PW_INPUT) read_fail (r, pw_source_offset (r->y, c.faulty, c.fault.at), "%s", c.fault.text);
+  if (status == PW_RESOURCE) read_no_memory (r);
+  r->copied += c.bytes;
+  r->copies = outer;
+  return r->error->status;
+}
+
+int pw_yaml_entries (pw_reader *r, const pw_node *list, read_entry *each) {
+  const pw_node *first = list && list->type == PW_YAML_LIST ? list->first : list;
+  for (const pw_node *n = first; n && r->error->status == PW_OK; n = n == list ? NULL : n->next) {
+    const pw_node *repeat = pw_yaml_repeat (n);
+    if (repeat)
+      read_copies (r, n, repeat, each);
+    else
+      each (r, n);
+  }
+  return r->error->status;
+}
+
 /* ---- Expressions of time and, in forces, of states: BODY.phi, ELEMENT.spin ---- */
+
+int pw_yaml_rename (pw_reader *r, const pw_node *node, pw_node *renamed) {
+  const pw_renames names = { r->copies, r->prefix, &r->states, &r->outputs, r->scope };
+  const char *text = "";
+  if (pw_yaml_text (r, node, r->label, &text) != PW_OK) return r->error->status;
+  *renamed = *node;
+  renamed->text = pw_yaml_renamed (&names, text, r->arena);
+  return renamed->text ? PW_OK : read_no_memory (r);
+}
 
 int pw_yaml_expression (pw_reader *r, const pw_node *node, const char *const *variable, const char **text,
                         const pw_expression **expression) {
@@ -200,16 +283,22 @@ int pw_yaml_expression (pw_reader *r, const pw_node *node, const char *const *va
                     r->label, PW_MAX_OPERATIONS);
 }
 
-int pw_index_elements (pw_reader *r) {
-  const pw_node *list = r->y->elements;
-  if (r->elements.slot) return PW_OK;
-  if (pw_names_open (&r->elements, list ? (size_t)list->count : 0) != PW_OK) return read_no_memory (r);
-  for (const pw_node *n = list ? list->first : NULL; n; n = n->next) {
-    const pw_node *key = n->type == PW_YAML_MAP ? n->first : NULL;
-    int kind = key && key->next->type == PW_YAML_SCALAR ? pw_find_kind_key (key) : -1;
-    if (kind >= 0) pw_names_add (&r->elements, key->next->text, kind);
-  }
+static int index_element (pw_reader *r, const pw_node *n) {
+  const pw_node *key = n->type == PW_YAML_MAP ? n->first : NULL;
+  int kind = key && key->next->type == PW_YAML_SCALAR ? pw_find_kind_key (key) : -1;
+  const char *name = kind < 0 ? NULL : pw_yaml_prefixed (r, key->next->text);
+  if (++r->indexed > PW_MAX_ENTRIES) return read_fail (r, n->at, "more than %d elements", PW_MAX_ENTRIES);
+  if (kind < 0) return PW_OK; /* an error that is reported later */
+  if (name == NULL || pw_names_reserve (&r->elements, (size_t)(r->entries + r->indexed)) != PW_OK)
+    return read_no_memory (r);
+  pw_names_add (&r->elements, name, kind);
   return PW_OK;
+}
+
+int pw_index_elements (pw_reader *r) {
+  if (r->has_index) return PW_OK;
+  r->has_index = 1;
+  return pw_yaml_entries (r, r->y->elements, index_element);
 }
 
 static int state_of_element (pw_reader *r, const pw_node *node, const char *owner, const char *part, size_t at) {
@@ -263,11 +352,20 @@ int pw_is_velocity_name (const pw_reader *r, const char *name) {
 }
 
 int pw_build_name (pw_reader *r, const pw_node *node, const char *label, const char **name) {
-  if (pw_yaml_text (r, node, label, name) != PW_OK) return r->error->status;
-  int before = pw_names_add (&r->names, *name, (int)node->at); /* a file has less than INT_MAX bytes */
+  char part[PW_PATH];
+  if (pw_count_entry (r, node) != PW_OK || pw_yaml_text (r, node, label, name) != PW_OK) return r->error->status;
+  if (strchr (*name, '{'))
+    return read_fail (r, node->at, "%s \"%.60s\": braces belong to an entry with the key repeat", label, *name);
+  if ((*name = pw_yaml_prefixed (r, *name)) == NULL) return read_no_memory (r);
+  int before = pw_names_add (&r->names, *name, (int)node->at); /* files have less than INT_MAX bytes */
   if (before < 0) return PW_OK;
-  return read_fail (r, node->at, "%s \"%.60s\": line %d already uses this name", label, *name,
-                    pw_yaml_line (r->y, (size_t)before));
+  if ((size_t)before == node->at && r->copies)
+    return read_fail (r, node->at, "%s \"%.60s\": copies have the same name: write \"%.60s{%s}\"", label, *name,
+                      node->text, r->copies->counter);
+  pw_yaml_part (r->y, (size_t)before, part);
+  return read_fail (r, node->at, "%s \"%.60s\": line %d%s%.60s already uses this name%s", label, *name,
+                    pw_yaml_line (r->y, (size_t)before), *part ? " of " : "", part,
+                    *part ? "; include it with another prefix" : "");
 }
 
 int pw_build_fail (const pw_reader *r, const pw_node *node, const pw_error *cause) {
@@ -275,76 +373,4 @@ int pw_build_fail (const pw_reader *r, const pw_node *node, const pw_error *caus
   if (cause->status == PW_RESOURCE) return pw_fail (r->error, cause->status, "%s", text);
   if (strncmp (text, prefix, strlen (prefix)) == 0) text += strlen (prefix);
   return read_fail (r, node->at, "%s", text);
-}
-
-/* ---- Units of parameters, which must be SI units: 40 with the unit deg would mean 40 rad ---- */
-
-enum { UNIT_BYTES = 400 /* of a unit of up to 60 characters with SI units in place of others, and its end */ };
-
-/* Whether a UTF-8 character is a letter, not a sign like those of multiplication (·, U+22C5) or a raised digit. */
-static int unit_is_letter (const char *character) {
-  const unsigned char first = (unsigned char)*character;
-  if (first < 0xC3 || strncmp (character, "×", 2) == 0) return isalpha (first) || strncmp (character, "µ", 2) == 0;
-  return first != 0xE2; /* U+2000 to U+2FFF */
-}
-
-/* The first place where a name is a word of its own in a text, or NULL. */
-static const char *unit_find_word (const char *text, const char *name) {
-  for (const char *at = strstr (text, name), *before; at; at = strstr (at + 1, name)) {
-    for (before = at; before > text && ((unsigned char)*--before & 0xC0) == 0x80;) continue;
-    if ((at == text || !unit_is_letter (before)) && !unit_is_letter (at + strlen (name))) return at;
-  }
-  return NULL;
-}
-
-const pw_unit_name *pw_find_other_unit (const char *unit, const char **at) {
-  for (const pw_unit_name *other = pw_unit_names; other->name; other++) {
-    if (strcmp (other->factor, "1") == 0 || (strchr (other->name, '/') && strcmp (other->name, unit) != 0)) continue;
-    if ((*at = unit_find_word (unit, other->name)) != NULL) return other;
-  }
-  return NULL;
-}
-
-/* Replaces the other unit, at a place in the unit, by SI units.  conversion: of a value, "*deg" or "/1e-3^2". */
-static void unit_replace (char unit[UNIT_BYTES], const pw_unit_name *other, const char *at, char conversion[40]) {
-  const char *before = at, *after = at + strlen (other->name);
-  int power;
-  pw_unit_power (after, &power);
-  while (before > unit && before[-1] == ' ') before--;
-  const int divides = before > unit && before[-1] == '/';
-  const int product = strpbrk (other->si, " /") && (divides || power != 1);
-  const char *text = PW_PRINTED (UNIT_BYTES, "%.*s%s%s%s%s", (int)(at - unit), unit, product ? "(" : "", other->si,
-                                 product ? ")" : "", after);
-  memcpy (unit, text, UNIT_BYTES);
-  snprintf (conversion, 40, power == 1 ? "%c%s" : "%c%s^%d", divides ? '/' : '*', other->factor, power);
-}
-
-/* Refuses a unit that contains this other unit than an SI unit, and says how to convert the value. */
-static int unit_refuse (const pw_reader *r, const pw_node *node, const pw_node *value, const pw_unit_name *other,
-                        const char *unit) {
-  static const char why[] = "unit: numbers are in SI units, angles in radians, and no unit converts a value";
-  char si[UNIT_BYTES], conversion[40];
-  const char *at;
-  double factor;
-  int replaced = 0, number = value->type == PW_YAML_SCALAR && strlen (value->text) <= 30 &&
-                             pw_expression_number (value->text, &(double){ 0 });
-  if (strlen (unit) > 60 || pw_unit_factor (unit, NULL, &factor) != PW_OK) { /* not understood as a whole */
-    pw_unit_factor (other->name, other->si, &factor);
-    return read_fail (r, node->at, "%s; convert it with 1 %s = %.15g %s, and write %s instead", why, other->name,
-                      factor, other->si, other->si);
-  }
-  snprintf (si, sizeof si, "%s", unit);
-  for (; (other = pw_find_other_unit (si, &at)) != NULL; replaced++) unit_replace (si, other, at, conversion);
-  if (replaced > 1) snprintf (conversion, sizeof conversion, "*%.15g", factor);
-  return read_fail (r, node->at, "%s; write \"value: %s%s, unit: %s\"", why, number ? value->text : "(..)", conversion,
-                    si);
-}
-
-int pw_yaml_unit (const pw_reader *r, const pw_node *node, const pw_node *value, const char **unit) {
-  const char *at;
-  if (node == NULL || pw_yaml_text (r, node, "unit", unit) != PW_OK) return r->error->status;
-  const char *in = strstr (*unit, " in "); /* "persons in lane": no inches, unless it is a product of units */
-  const pw_unit_name *other = pw_find_other_unit (*unit, &at);
-  if (other == NULL || (in && at == in + 1 && pw_unit_factor (*unit, NULL, &(double){ 0 }) != PW_OK)) return PW_OK;
-  return unit_refuse (r, node, value, other, *unit);
 }

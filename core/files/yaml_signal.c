@@ -1,5 +1,4 @@
 /* Reads signals, paths and outputs of text models. */
-#define _XOPEN_SOURCE 700 /* realpath */
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
@@ -11,17 +10,8 @@
 
 enum { MAX_SIGNAL_STATES = 16, MAX_CHECKED_BREAKPOINTS = 100 };
 
-typedef struct {
-  const pw_expression *expression[3]; /* value, rate, acceleration; NULL: not given, differentiated instead */
-  int derivatives;                    /* required time derivatives; of a force: 0, nonholonomic: 1, holonomic: 2 */
-  int states;                         /* number of states in it */
-  pw_jumps jumps;
-  const char *name[PW_OUTPUT_READS + 2]; /* "t" or "s", then states, "BODY.phi"; not for evaluation */
-  pw_signal_text text;
-} signal_function;
-
 /* Value and derivatives u; what is not given is computed from the last one given before; u[2] is 0 unless required. */
-static void signal_derivatives (const signal_function *f, const double *variable, double u[3]) {
+static void signal_derivatives (const pw_signal_function *f, const double *variable, double u[3]) {
   pw_expression_derivatives (f->expression[0], variable, PW_EXPRESSION_TIME, u);
   for (int i = 1; i <= f->derivatives; i++) {
     double given[3];
@@ -34,7 +24,7 @@ static void signal_derivatives (const signal_function *f, const double *variable
 }
 
 static int signal_eval (void *context, double t, const double *state, double value[3], double *gradient) {
-  const signal_function *f = context;
+  const pw_signal_function *f = context;
   double variable[PW_OUTPUT_READS + 1] = { t }, derivatives[3];
   if (f->states) memcpy (variable + 1, state, (size_t)f->states * sizeof *state);
   if (f->derivatives)
@@ -52,7 +42,7 @@ static int signal_eval (void *context, double t, const double *state, double val
 }
 
 static double signal_breakpoint (void *context, double t) {
-  const signal_function *f = context;
+  const pw_signal_function *f = context;
   double first = INFINITY;
   for (int i = 0; i < 3; i++)
     if (f->expression[i]) first = fmin (first, pw_expression_breakpoint (f->expression[i], t));
@@ -60,11 +50,11 @@ static double signal_breakpoint (void *context, double t) {
 }
 
 static void *signal_open (void *context) {
-  const signal_function *f = context;
+  const pw_signal_function *f = context;
   size_t bytes[3] = { 0 };
   for (int i = 0; i < 3; i++)
     if (f->expression[i]) bytes[i] = pw_expression_size (f->expression[i]);
-  signal_function *copy = malloc (sizeof *f + bytes[0] + bytes[1] + bytes[2]);
+  pw_signal_function *copy = malloc (sizeof *f + bytes[0] + bytes[1] + bytes[2]);
   if (copy == NULL) return NULL;
   *copy = *f;
   char *at = (char *)(copy + 1);
@@ -77,14 +67,14 @@ static void *signal_open (void *context) {
 }
 
 static void signal_close (void *context) {
-  const signal_function *f = context;
+  const pw_signal_function *f = context;
   for (int i = 0; i < 3; i++)
     if (f->expression[i]) pw_expression_release_paths (f->expression[i]);
   free (context);
 }
 
 /* Adds a state, at an offset of the expression, unless it is known already. */
-static int signal_add_state (pw_reader *r, const pw_node *node, signal_function *f, const char *name, size_t at) {
+static int signal_add_state (pw_reader *r, const pw_node *node, pw_signal_function *f, const char *name, size_t at) {
   for (int i = 1; i <= f->states; i++)
     if (strcmp (f->name[i], name) == 0) return PW_OK;
   if (f->derivatives > 1 || (f->derivatives && !pw_kind_signals_feedback (r->kind)))
@@ -117,16 +107,6 @@ static int find_column (pw_reader *r, const char *name, pw_column *c) {
   return (body == NULL || pw_names_find (&r->bodies, body) >= 0) && pw_kind_find_column (pw_kinds[kind], last + 1, c);
 }
 
-/* An output.  In a signal its expression stands for it, so that derivatives and breakpoints are those of the signal. */
-typedef struct output_function {
-  signal_function function; /* its states are columns */
-  const pw_node *node;      /* its value */
-  pw_named_output output;
-  int reader; /* the output that is being read and reads this one, or itself if it is the first; OUTPUT_... */
-} output_function;
-
-enum { OUTPUT_UNREAD = -1, OUTPUT_READ = -2 };
-
 /* The place of a wheel or marker that precedes, "rear.x", as an expression of states; NULL: the name is another one, or
  * out of memory. */
 static const char *contact_text (pw_reader *r, const char *name) {
@@ -147,12 +127,12 @@ static const char *contact_text (pw_reader *r, const char *name) {
 static const char *expand_name (void *context, const char *name) {
   pw_reader *r = context;
   int output = pw_names_find (&r->outputs, name);
-  return output >= 0 ? r->output[output].node->text : contact_text (r, name);
+  return output >= 0 ? r->output[output]->node.text : contact_text (r, name);
 }
 
 /* Adds the states on which a column depends, at an offset of the expression; output: the one that reads it, or NULL. */
-static int signal_add_column (pw_reader *r, const pw_node *node, signal_function *f, const output_function *output,
-                              const char *name, size_t at) {
+static int signal_add_column (pw_reader *r, const pw_node *node, pw_signal_function *f,
+                              const pw_output_function *output, const char *name, size_t at) {
   char state[PW_EXPRESSION_NAME];
   const char *place = contact_text (r, name), *owner = PW_PRINTED (100, "%.*s", (int)strcspn (name, "."), name);
   const char *where = output ? PW_PRINTED (100, "output \"%s\" reads %s: ", output->output.name, name) : "";
@@ -172,13 +152,16 @@ static int signal_add_column (pw_reader *r, const pw_node *node, signal_function
   return expression_fail (r, node, at, "%sthere is no such column", where);
 }
 
-static int signal_expression (pw_reader *r, const pw_node *node, signal_function *f, int i) {
-  const char *source = node->type == PW_YAML_SCALAR ? node->text : "";
+static int signal_expression (pw_reader *r, const pw_node *written, pw_signal_function *f, int i) {
+  pw_node copy;
+  const pw_node *node = &copy;
   char name[PW_EXPRESSION_NAME];
+  if (pw_yaml_rename (r, written, &copy) != PW_OK) return r->error->status;
+  const char *source = node->text;
   for (const char *rest = source, *p; (p = pw_expression_next_name (&rest, name)) != NULL;) {
     const int found = pw_names_find (&r->outputs, name);
     if (strcmp (name, f->name[0]) == 0) continue;
-    const output_function *output = found < 0 ? NULL : &r->output[found];
+    const pw_output_function *output = found < 0 ? NULL : r->output[found];
     if (!output && pw_is_state_name (r, name) &&
         signal_add_column (r, node, f, NULL, name, (size_t)(p - source)) != PW_OK)
       return r->error->status;
@@ -196,7 +179,7 @@ static int signal_expression (pw_reader *r, const pw_node *node, signal_function
 }
 
 /* Compares derivative i, 1 or 2, which is given, with that computed from the last one given before, at some times. */
-static int signal_check_derivative (pw_reader *r, const pw_node *node, const signal_function *f, int i,
+static int signal_check_derivative (pw_reader *r, const pw_node *node, const pw_signal_function *f, int i,
                                     const char *name) {
   static const double time[] = { 0.3, 1.7, 4.1 }; /* [s], arbitrary */
   int last = f->expression[i - 1] ? i - 1 : 0, n = i - last;
@@ -215,14 +198,14 @@ static int signal_check_derivative (pw_reader *r, const pw_node *node, const sig
 }
 
 /* The derivatives at a time; states that the signal reads have irregular values. */
-static void signal_derivatives_at (const signal_function *f, double t, double u[3]) {
-  double variable[MAX_SIGNAL_STATES + 1] = { t };
+static void signal_derivatives_at (const pw_signal_function *f, double t, double u[3]) {
+  double variable[PW_OUTPUT_READS + 1] = { t };
   for (int i = 1; i <= f->states; i++) variable[i] = 0.1 + fmod (0.618 * i, 1);
   signal_derivatives (f, variable, u);
 }
 
 /* The largest magnitude of derivative i at t +- 2^-1, 2^-2, ... 2^-20 s and t + 1 s. */
-static double signal_magnitude (const signal_function *f, double t, int i) {
+static double signal_magnitude (const pw_signal_function *f, double t, int i) {
   double size = 0;
   for (int k = -20; k <= 20; k++) {
     double u[3];
@@ -235,7 +218,7 @@ static double signal_magnitude (const signal_function *f, double t, int i) {
 /* Refuses signals that a constraint cannot follow: a jump of the value or, for positions, of its derivative, at one of
  * the first breakpoints after t = 0, of a curve after s = -1000, beyond round-off and the change between neighbours; a
  * jump as states change. */
-static int signal_check_continuity (pw_reader *r, const pw_node *node, signal_function *f) {
+static int signal_check_continuity (pw_reader *r, const pw_node *node, pw_signal_function *f) {
   const int is_curve = r->kind->of_coordinate;
   double t = is_curve ? -1000 : 0, before[3], after[3];
   if (f->states && f->jumps == PW_JUMPS)
@@ -263,7 +246,7 @@ static int signal_check_continuity (pw_reader *r, const pw_node *node, signal_fu
 /* Makes a signal from expressions: value; rate and acceleration, or NULL. */
 static int signal_of_time (pw_reader *r, const pw_node *const node[3], pw_signal *signal) {
   static const char *const key[] = { "expression", "rate", "acceleration" };
-  signal_function *f = pw_arena_alloc (r->arena, sizeof *f);
+  pw_signal_function *f = pw_arena_alloc (r->arena, sizeof *f);
   if (f == NULL) return read_no_memory (r);
   f->name[0] = pw_signal_argument (r);
   if (r->kind->of_coordinate && pw_names_find (&r->scope->index, "s") >= 0)
@@ -318,27 +301,16 @@ static int pairs_list (pw_reader *r, const pw_node *list, const char *form, pair
   return PW_OK;
 }
 
-/* A model may only read files in its folder. */
-static FILE *pairs_open (const pw_yaml *y, const char *name, const char **reason) {
-  char joined[PW_PATH], path[PW_PATH];
-  size_t n = strlen (y->folder); /* 0 for the root */
-  *reason = "a table must be in the model's folder: its path is relative and has no \"..\"";
-  if (*name == '/' || strstr (PW_PRINTED (PW_PATH + 2, "/%s/", name), "/../")) return NULL;
-  if (realpath (pw_path (joined, "%s/%s", y->folder, name), path) == NULL) return *reason = strerror (errno), NULL;
-  *reason = "it is a link that leads out of the model's folder";
-  int is_inside = strncmp (path, y->folder, n) == 0 && (path[n] == '/' || path[n] == 0);
-  return is_inside ? pw_open_input (path, reason) : NULL;
-}
-
 /* Pairs in two columns of a file, NULL: the first and the second one, converted to these units. */
 static int pairs_file (pw_reader *r, const pw_node *node, const char *const column[2], const char *const unit[2],
                        pairs *p) {
+  char path[PW_PATH], from_model[PW_PATH];
   const char *name, *reason;
   pw_error cause = { 0 };
   int rows;
   if (pw_yaml_text (r, node, r->label, &name) != PW_OK) return r->error->status;
   errno = 0;
-  FILE *f = pairs_open (r->y, name, &reason);
+  FILE *f = pw_yaml_find (r->y, node->at, name, path, from_model, &reason) ? pw_open_input (path, &reason) : NULL;
   if (f == NULL && pw_open_input_status () == PW_RESOURCE)
     return pw_fail (r->error, PW_RESOURCE, "%s: cannot read %s: %s", r->y->path, name, reason);
   if (f == NULL) return read_fail (r, node->at, "%s: cannot read \"%.60s\": %s", r->label, name, reason);
@@ -511,20 +483,33 @@ static int path_points (pw_reader *r, const pw_node *node, const pw_node *points
   return pairs_count (r, node, p, 8);
 }
 
+/* Room for another path in the texts of the model, or NULL. */
+static pw_path_text *path_add (pw_reader *r) {
+  pw_reference_text *t = r->reference;
+  if ((t->paths & (t->paths - 1)) == 0) { /* a power of two fills the array */
+    pw_path_text *more = pw_arena_alloc (r->arena, 2 * ((size_t)t->paths + 1) * sizeof *more);
+    if (more && t->paths) memcpy (more, t->path, (size_t)t->paths * sizeof *more);
+    t->path = more;
+  }
+  return t->path ? &t->path[t->paths] : NULL;
+}
+
 int pw_yaml_path (pw_reader *r, const pw_node *node) {
   static const char *const key[] = { "name", "points", "file", "columns", "interpolation", "closed", NULL };
   static const char *const interpolation[] = { [PW_LINEAR] = "linear", [PW_CUBIC] = "cubic", NULL };
   static const char *const closed[] = { "false", "true", NULL };
   const pw_node *v[sizeof key / sizeof *key];
-  pw_path_text *text = &r->reference->path[r->reference->paths];
+  const char *own;
+  pw_path_text *text = path_add (r);
   pairs p = { .count = 0 };
   pw_error cause = { 0 };
   if (pw_yaml_keys (r, node, key, "a path", v) != PW_OK) return r->error->status;
   if (v[0] == NULL) return read_fail (r, node->at, "a path needs a name");
-  if (pw_build_name (r, v[0], "path", &text->name) != PW_OK) return r->error->status;
-  if (pw_names_find (&r->scope->index, text->name) >= 0)
-    return read_fail (r, v[0]->at, "path \"%s\": a parameter or number of let has this name", text->name);
-  if (pw_yaml_name (r, v[0], "path", NULL) != PW_OK) return r->error->status;
+  if (text == NULL) return read_no_memory (r);
+  if (pw_build_name (r, v[0], "path", &text->name) != PW_OK || pw_yaml_name (r, v[0], "path", &own) != PW_OK)
+    return r->error->status;
+  if (pw_names_find (&r->scope->index, own) >= 0)
+    return read_fail (r, v[0]->at, "path \"%s\": a parameter or number of let has this name", own);
   const char *label = r->label = PW_PRINTED (100, "path %s", text->name);
   path_points (r, node, v[1], v[2], v[3], &p);
   pw_yaml_choice (r, v[4], PW_PRINTED (140, "%s: interpolation", label), interpolation, &text->interpolation);
@@ -534,6 +519,7 @@ int pw_yaml_path (pw_reader *r, const pw_node *node) {
   pw_path *path = pw_path_open (p.x, p.y, p.count, text->interpolation, text->closed, &cause);
   if (cause.status == PW_INPUT) return read_fail (r, (v[1] ? v[1] : v[2])->at, "%s: %s", label, cause.text);
   if (path == NULL || pw_model_keep (r->model, path, path_free) != PW_OK) return read_no_memory (r);
+  if (pw_scope_reserve (r->scope, r->scope->names + 1, r->arena) != PW_OK) return read_no_memory (r);
   pw_scope_add_path (r->scope, text->name, path);
   r->reference->paths++;
   return PW_OK;
@@ -545,96 +531,94 @@ int pw_yaml_path (pw_reader *r, const pw_node *node) {
 static int output_unit (const pw_reader *r, const pw_node *node, const char **unit) {
   const char *at;
   if (pw_yaml_text (r, node, "unit", unit) != PW_OK || node == NULL) return r->error->status;
-  const pw_unit_name *other = pw_find_other_unit (*unit, &at);
+  const pw_unit_name *other = pw_yaml_other_unit (*unit, &at);
   if (other == NULL) return PW_OK;
   return read_fail (r, node->at, "unit: \"%s\": outputs are in SI units and radians, as all columns", other->name);
 }
 
-/* Reads the name and the texts of an output. */
-static int output_head (pw_reader *r, const pw_node *node, output_function *o) {
+/* Reads an output but for the expression of its value. */
+static int output_head (pw_reader *r, const pw_node *node) {
   static const char *const key[] = { "name", "value", "unit", "about", NULL };
+  const pw_renames counter = { r->copies, "", &r->states, &r->outputs, r->scope };
   const pw_node *v[sizeof key / sizeof *key];
-  pw_column column;
+  const char *own;
   if (pw_yaml_keys (r, node, key, "an output", v) != PW_OK) return r->error->status;
   if (v[0] == NULL) return read_fail (r, node->at, "an output needs a name");
-  if (pw_build_name (r, v[0], "output", &o->output.name) != PW_OK) return r->error->status;
-  const char *name = o->output.name;
-  if (!pw_expression_is_name (name))
-    return read_fail (r, v[0]->at, "output \"%.60s\": expected a letter, then letters, digits and _, at most 63 in all",
-                      name);
-  if (pw_expression_is_reserved (name) || pw_kind_find_column (NULL, name, &column))
-    return read_fail (r, v[0]->at, "output \"%s\": this name is reserved: %s", name,
-                      strcmp (name, "t") == 0            ? "it is the time"
-                      : pw_expression_is_reserved (name) ? "a function or constant"
-                                                         : "a column of tables");
-  if (pw_names_find (&r->scope->index, name) >= 0)
-    return read_fail (r, v[0]->at, "output \"%s\": a parameter or a name of let is called so", name);
-  if (v[1] == NULL) return read_fail (r, node->at, "output %s needs a value", name);
+  pw_output_function *o = pw_arena_alloc (r->arena, sizeof *o);
+  if (o == NULL || pw_grow (&r->output, (size_t)r->output_count, &r->output_room, sizeof (void *)) != PW_OK)
+    return read_no_memory (r);
+  if (pw_build_name (r, v[0], "output", &o->output.name) != PW_OK || pw_yaml_name (r, v[0], "output", &own) != PW_OK)
+    return r->error->status;
+  if (pw_kind_find_column (NULL, own, &(pw_column){ 0 }))
+    return read_fail (r, v[0]->at, "output \"%s\": this name is reserved: a column of tables", own);
+  if (pw_names_find (&r->scope->index, own) >= 0)
+    return read_fail (r, v[0]->at, "output \"%s\": a parameter or a name of let is called so", own);
+  if (v[1] == NULL) return read_fail (r, node->at, "output %s needs a value", own);
   if (v[1]->type != PW_YAML_SCALAR)
-    return read_fail (r, v[1]->at, "output %s: expected an expression, found %s", name, pw_node_found (v[1]));
-  o->node = v[1], o->reader = OUTPUT_UNREAD;
-  o->function.name[0] = "t", o->function.text.part[0] = v[1]->text;
+    return read_fail (r, v[1]->at, "output %s: expected an expression, found %s", own, pw_node_found (v[1]));
+  if (r->output_count == PW_MOST_OUTPUTS)
+    return read_fail (r, node->at, "outputs: a model may have %d", PW_MOST_OUTPUTS);
+  o->node = *v[1];
+  if ((o->node.text = pw_yaml_renamed (&counter, v[1]->text, r->arena)) == NULL) return read_no_memory (r);
+  o->reader = PW_OUTPUT_UNREAD;
+  o->function.name[0] = "t";
   o->output.value = (pw_function){ signal_eval, o, NULL, NULL, signal_open, signal_close, &o->function.text };
+  pw_names_add (&r->outputs, o->output.name, r->output_count);
+  r->output[r->output_count++] = o;
   if (output_unit (r, v[2], &o->output.unit) != PW_OK) return r->error->status;
   return pw_yaml_text (r, v[3], "about", &o->output.about);
 }
 
-static int output_add_column (pw_reader *r, output_function *o, const char *name, size_t at) {
-  signal_function *f = &o->function;
+static int output_add_column (pw_reader *r, pw_output_function *o, const char *name, size_t at) {
+  pw_signal_function *f = &o->function;
   for (int i = 1; i <= f->states; i++)
     if (strcmp (f->name[i], name) == 0) return PW_OK;
-  if (f->states == PW_OUTPUT_READS) return expression_fail (r, o->node, at, "more than %d columns", PW_OUTPUT_READS);
+  if (f->states == PW_OUTPUT_READS) return expression_fail (r, &o->node, at, "more than %d columns", PW_OUTPUT_READS);
   f->name[f->states + 1] = pw_arena_copy (r->arena, name);
   return f->name[++f->states] ? PW_OK : read_no_memory (r);
 }
 
 /* Reports that output `last` reads output `first`, of which it is a function. */
-static int output_cycle (const pw_reader *r, const output_function *last, int first, size_t at) {
+static int output_cycle (const pw_reader *r, int last, int first, size_t at) {
   char list[300] = "";
-  for (int i = (int)(last - r->output); i != first; i = r->output[i].reader)
-    append (list, "%s%s", *list ? ", " : ", through ", r->output[i].output.name);
-  return read_fail (r, pw_source_offset (r->y, last->node, at), "output %s is a function of itself%s",
-                    r->output[first].output.name, list);
+  for (int i = last; i != first; i = r->output[i]->reader)
+    append (list, "%s%s", *list ? ", " : ", through ", r->output[i]->output.name);
+  return read_fail (r, pw_source_offset (r->y, &r->output[last]->node, at), "output %s is a function of itself%s",
+                    r->output[first]->output.name, list);
 }
 
 /* Reads the expression of an output, after those of outputs in it. */
 static int output_expression (pw_reader *r, int index, int reads) {
-  output_function *o = &r->output[index];
+  pw_output_function *o = r->output[index];
+  const pw_renames names = { NULL, r->prefix, &r->states, &r->outputs, r->scope };
   char name[PW_EXPRESSION_NAME];
   pw_column c;
   o->reader = reads;
-  for (const char *source = o->node->text, *rest = source, *p; (p = pw_expression_next_name (&rest, name)) != NULL;) {
+  if ((o->node.text = pw_yaml_renamed (&names, o->node.text, r->arena)) == NULL) return read_no_memory (r);
+  for (const char *source = o->node.text, *rest = source, *p; (p = pw_expression_next_name (&rest, name)) != NULL;) {
     const size_t at = (size_t)(p - source);
     int other = pw_names_find (&r->outputs, name), status = PW_OK;
-    if (other >= 0 && r->output[other].reader >= 0) return output_cycle (r, o, other, at);
-    if (other >= 0 && r->output[other].reader == OUTPUT_UNREAD) status = output_expression (r, other, index);
+    if (other >= 0 && r->output[other]->reader >= 0) return output_cycle (r, index, other, at);
+    if (other >= 0 && r->output[other]->reader == PW_OUTPUT_UNREAD) status = output_expression (r, other, index);
     r->label = PW_PRINTED (100, "output %s", o->output.name);
-    for (int i = 1; status == PW_OK && other >= 0 && i <= r->output[other].function.states; i++)
-      status = output_add_column (r, o, r->output[other].function.name[i], at);
+    for (int i = 1; status == PW_OK && other >= 0 && i <= r->output[other]->function.states; i++)
+      status = output_add_column (r, o, r->output[other]->function.name[i], at);
     if (status == PW_OK && other < 0 && strcmp (name, "t") != 0 &&
         (pw_is_state_name (r, name) || pw_kind_find_column (NULL, name, &c)))
       status = output_add_column (r, o, name, at);
     if (status != PW_OK) return status;
   }
-  o->reader = OUTPUT_READ;
+  o->reader = PW_OUTPUT_READ;
   r->label = PW_PRINTED (100, "output %s", o->output.name);
-  return pw_yaml_expression (r, o->node, o->function.name, &(const char *){ NULL }, &o->function.expression[0]);
+  return pw_yaml_expression (r, &o->node, o->function.name, &o->function.text.part[0], &o->function.expression[0]);
 }
 
 int pw_yaml_outputs (pw_reader *r) {
-  const pw_node *list = r->y->outputs;
-  const int count = list ? list->count : 0;
-  if (count > PW_MOST_OUTPUTS)
-    return read_fail (r, list->at, "outputs: %d entries; a model may have %d", count, PW_MOST_OUTPUTS);
-  r->output = pw_arena_alloc (r->arena, (size_t)count * sizeof *r->output);
-  if (r->output == NULL || pw_names_open (&r->outputs, (size_t)count) != PW_OK) return read_no_memory (r);
-  int i = 0;
-  for (const pw_node *n = list ? list->first : NULL; n && r->error->status == PW_OK; n = n->next, i++)
-    if (output_head (r, n, &r->output[i]) == PW_OK) pw_names_add (&r->outputs, r->output[i].output.name, i);
-  for (i = 0; i < count && r->error->status == PW_OK; i++) pw_scope_add (r->scope, r->output[i].output.name, NAN);
+  const int first = r->output_count;
   r->scope->expand = expand_name, r->scope->context = r;
-  for (i = 0; i < count && r->error->status == PW_OK; i++)
-    if (r->output[i].reader == OUTPUT_UNREAD) output_expression (r, i, i);
+  pw_yaml_entries (r, r->y->outputs, output_head);
+  for (int i = first; i < r->output_count && r->error->status == PW_OK; i++)
+    if (r->output[i]->reader == PW_OUTPUT_UNREAD) output_expression (r, i, i);
   return r->error->status;
 }
 
@@ -666,17 +650,18 @@ int pw_add_outputs (pw_reader *r) {
   char name[PW_EXPRESSION_NAME];
   pw_column c;
   pw_error cause = { 0 };
-  for (output_function *o = r->output, *end = o + (r->y->outputs ? r->y->outputs->count : 0); o < end; o++) {
+  for (int i = 0; i < r->output_count; i++) {
+    pw_output_function *o = r->output[i];
     r->label = PW_PRINTED (100, "output %s", o->output.name);
-    for (const char *source = o->node->text, *rest = source, *p; (p = pw_expression_next_name (&rest, name)) != NULL;) {
+    for (const char *source = o->node.text, *rest = source, *p; (p = pw_expression_next_name (&rest, name)) != NULL;) {
       const size_t at = (size_t)(p - source);
       const int found = find_column (r, name, &c);
-      if (pw_is_state_name (r, name) && !found) return output_unknown (r, o->node, name, at);
+      if (pw_is_state_name (r, name) && !found) return output_unknown (r, &o->node, name, at);
       if (found && (c.type == PW_COLUMN_PROJECTION || c.type == PW_COLUMN_BALANCE))
-        return expression_fail (r, o->node, at, "%s describes the integration, not the motion", name);
+        return expression_fail (r, &o->node, at, "%s describes the integration, not the motion", name);
     }
     o->output.value.reads = o->function.name + 1;
-    if (pw_model_check_output (r->model, &o->output, &cause) != PW_OK) return pw_build_fail (r, o->node, &cause);
+    if (pw_model_check_output (r->model, &o->output, &cause) != PW_OK) return pw_build_fail (r, &o->node, &cause);
     if (pw_add_output (r->model, &o->output) != PW_OK) return r->error->status;
   }
   return r->error->status;

@@ -181,6 +181,8 @@ static const char *tree_hint (const pw_yaml *y, size_t at, const char *message) 
   if (slashes && slashes < line + size) return "; a comment begins with #";
   if (strstr (message, "missing comma") && memchr (line, '?', size))
     return "; an expression with ? : goes between double quotes";
+  for (size_t i = 1; strstr (message, "missing comma") && i < size; i++)
+    if (line[i] == '{' && strchr (" {[", line[i - 1]) == NULL) return "; a text with braces goes between double quotes";
   for (size_t i = 0; i < sizeof known / sizeof *known; i++)
     if (strstr (message, known[i].message)) return known[i].hint;
   return "";
@@ -206,9 +208,11 @@ enum { TREE_RESERVE = 1 << 16 };
 
 int pw_yaml_read_tree (pw_yaml *y, pw_error *error) {
   pw_error cause = { 0 };
+  if (pw_yaml_check_source (y, error) != PW_OK) return error->status;
   struct fy_diag_cfg quiet;
   struct fy_event *e;
-  tree x = { .y = y, .error = &cause };
+  tree x = { .y = y, .error = &cause, .fed = y->begin, .offset = y->begin, .at = (unsigned)y->begin };
+  y->root = NULL;
   fy_diag_cfg_default (&quiet);
   quiet.fp = NULL;
   errno = 0;

@@ -131,7 +131,7 @@ static int compile_sizes (const compilation *job) {
     if (s->block < block) s->block = block;
     s->constraints += kind->rows > 0;
     s->rheonomic += kind->eta != NULL;
-    s->forces += kind->force && !kind->constant;
+    if (kind->force && !kind->constant && s->forces++ == 0) s->first_force = (int)(k - s->batch);
     s->saturates |= kind->saturation != NULL;
   }
   if (s->coords > COMPILE_MOST || s->rows > COMPILE_MOST) return compile_too_large (job);

@@ -11,7 +11,8 @@ void pw_evaluate_J (pw_workspace *w) {
 }
 
 /* Fills an array over constraint equations by the function at this offset of each type's table; NULL gives zeros. */
-static void evaluate_rows (pw_workspace *w, size_t function, int rows, double *out) {
+__attribute__ ((always_inline)) static inline void evaluate_rows (pw_workspace *w, size_t function, int rows,
+                                                                  double *out) {
   PW_EACH_CONSTRAINT (k, w) {
     if (k->row >= rows) break;
     pw_batch_function *f = pw_kind_function (k->kind, function);
@@ -40,19 +41,20 @@ void pw_evaluate_gamma (pw_workspace *w, double *gamma) {
 }
 
 void pw_add_forces (const pw_workspace *w, int constant, double *f) {
-  PW_EACH_BATCH (k, w) {
-    if (k->kind->force == NULL || (k->kind->constant != 0) != constant) continue;
+  const pw_element_batch *k = w->batch + (constant ? 0 : w->s->first_force), *end = w->batch + w->s->batches;
+  for (; k < end; k++) {
+    const pw_kind *kind = k->kind;
+    if (kind->force == NULL || (kind->constant != 0) != constant) continue;
     const double *block = k->block;
-    const int *column = k->column;
+    const int *column = k->column, bodies = kind->bodies, internals = kind->internal;
     double *internal = f + k->internal;
-    k->kind->force (&k->b, k->block);
-    for (int e = 0; e < k->b.count; e++) {
-      for (int n = 0; n < k->kind->bodies; n++, column++, block += 3) {
-        f[*column] += block[0];
-        f[*column + 1] += block[1];
-        f[*column + 2] += block[2];
+    kind->force (&k->b, k->block);
+    for (int e = k->b.count; e > 0; e--) {
+      for (int n = bodies; n > 0; n--, block += 3) {
+        double *to = f + *column++;
+        to[0] += block[0], to[1] += block[1], to[2] += block[2];
       }
-      for (int n = 0; n < k->kind->internal; n++) *internal++ += *block++;
+      for (int n = internals; n > 0; n--) *internal++ += *block++;
     }
   }
 }
@@ -129,16 +131,16 @@ void pw_worst_position (const pw_system *s, const double *g, const double *size,
 }
 
 /* Updates the worst residual J v - eta with a batch; eta NULL: zero; unit: L / T of a run. */
-static void evaluate_worst_velocity (const pw_element_batch *k, const double *eta, const unsigned char *enforced,
-                                     double unit, pw_residuals *worst) {
+static inline void evaluate_worst_velocity (const pw_element_batch *k, const double *eta, const unsigned char *enforced,
+                                            double unit, pw_residuals *worst) {
   const double *J = k->J, *rate = k->b.v;
-  const int bodies = k->kind->bodies, internal = k->kind->internal, *body = k->b.body;
-  int i = k->row;
-  for (int e = 0; e < k->b.count; e++, body += bodies, rate += internal)
-    for (int r = 0; r < k->kind->rows; r++, i++) {
-      double sum = 0, size = 0;
+  const pw_configuration *configuration = k->b.configuration;
+  const int rows = k->kind->rows, bodies = k->kind->bodies, internal = k->kind->internal, *body = k->b.body;
+  for (int e = 0, i = k->row; e < k->b.count; e++, body += bodies, rate += internal)
+    for (const int end = i + rows; i < end; i++) {
+      double sum = 0, size = unit;
       for (int n = 0; n < bodies; n++, J += 3) {
-        const pw_configuration *p = &k->b.configuration[body[n]];
+        const pw_configuration *p = configuration + body[n];
         double x = J[0] * p->vx, y = J[1] * p->vy, phi = J[2] * p->omega; /* terms of J v */
         sum += x + y + phi;
         size += fabs (x) + fabs (y) + fabs (phi);
@@ -150,15 +152,16 @@ static void evaluate_worst_velocity (const pw_element_batch *k, const double *et
       }
       if (eta) sum -= eta[i], size += fabs (eta[i]);
       if (enforced == NULL || enforced[i])
-        evaluate_update_worst (i, sum, size + unit, &worst->velocity, &worst->jv, &worst->row_velocity);
+        evaluate_update_worst (i, sum, size, &worst->velocity, &worst->jv, &worst->row_velocity);
     }
 }
 
 void pw_evaluate_velocity_residual (pw_workspace *w, const unsigned char *enforced, pw_residuals *r) {
   double *eta = w->s->rheonomic ? w->scratch : NULL, unit = w->scale.length / w->scale.time;
-  r->velocity = r->jv = 0, r->row_velocity = -1;
+  pw_residuals worst = { .row_velocity = -1 };
   if (eta) pw_evaluate_eta (w, eta);
-  PW_EACH_CONSTRAINT (k, w) evaluate_worst_velocity (k, eta, enforced, unit, r);
+  PW_EACH_CONSTRAINT (k, w) evaluate_worst_velocity (k, eta, enforced, unit, &worst);
+  r->velocity = worst.velocity, r->jv = worst.jv, r->row_velocity = worst.row_velocity;
 }
 
 void pw_evaluate_position_residual (pw_workspace *w, const unsigned char *enforced, pw_residuals *r) {
@@ -183,7 +186,8 @@ void pw_point_to_internal (pw_workspace *w, const double *q, const double *v) {
 }
 
 /* Two bodies at a time; singly the last of an odd number, and all from a pair with an angle beyond the limit on. */
-static void update_configurations (pw_workspace *w, const double *q, const double *v) {
+__attribute__ ((always_inline)) static inline void update_configurations (pw_workspace *w, const double *q,
+                                                                          const double *v) {
   if (w->s->coords > 3 * w->s->bodies) pw_point_to_internal (w, q, v);
   pw_configuration *p = w->configuration, *end = p + w->s->bodies;
   _Static_assert(PW_SINE_LANES == 2, "bodies are evaluated in pairs");

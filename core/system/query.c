@@ -88,14 +88,15 @@ const char *pw_system_state_unit (const pw_system *s, int state) {
   return !velocity ? unit : *unit ? "rad/s" : "1/s";
 }
 
-/* Index of a state named like "BODY.x", or -1; if only the body exists, near->best becomes its nearest state. */
-static int query_body_state (const pw_system *s, const char *name, pw_nearest *near) {
+/* Index of a state named like "BODY.x", or -1; if only the body exists, near->best becomes its nearest state.  The
+ * search for the body begins at body `first`. */
+static int query_body_state (const pw_system *s, const char *name, int first, pw_nearest *near) {
   const char *dot = strrchr (name, '.');
-  if (dot == NULL) return -1;
-  int b = 0;
-  while (b < s->bodies && (strncmp (s->body_name[b], name, (size_t)(dot - name)) != 0 || s->body_name[b][dot - name]))
-    b++;
-  if (b == s->bodies) return -1;
+  const size_t n = dot ? (size_t)(dot - name) : 0;
+  if (dot == NULL || s->bodies == 0) return -1;
+  int b = first;
+  while (strncmp (s->body_name[b], name, n) != 0 || s->body_name[b][n])
+    if ((b = b + 1 < s->bodies ? b + 1 : 0) == first) return -1;
   pw_nearest nearest = { .sought = dot + 1 };
   for (int i = 0; i < 6; i++) {
     if (strcmp (dot + 1, query_states[i]) == 0) return i < 3 ? 3 * b + i : s->coords + 3 * b + i - 3;
@@ -123,13 +124,17 @@ static int query_find (const pw_system *s, const char *what, int count, query_na
   return pw_fail (error, PW_INPUT, "model %s has no %s \"%s\"%s", s->model, what, near->sought, pw_nearest_text (near));
 }
 
-int pw_system_find_state (const pw_system *s, const char *name, pw_error *error) {
+static int query_find_state (const pw_system *s, const char *name, int first, pw_error *error) {
   pw_nearest near = { .sought = name };
-  int state = s && name ? query_body_state (s, name, &near) : -1;
+  int state = s && name ? query_body_state (s, name, first, &near) : -1;
   if (state < 0) state = query_find (s, "state", s ? 2 * s->coords : 0, pw_system_state_name, &near, error);
   if (state < 0 || !pw_is_hidden (s, state)) return state;
   return pw_fail (error, PW_INPUT, "model %s has no state \"%s\": the integral of a state is not computed", s->model,
                   name);
+}
+
+int pw_system_find_state (const pw_system *s, const char *name, pw_error *error) {
+  return query_find_state (s, name, 0, error);
 }
 
 int pw_system_states (const pw_system *s) {
@@ -322,7 +327,7 @@ static int query_element_column (const pw_system *s, const pw_element_batch *k, 
 
 /* Finds a column of a body, an element or a first-order state; all names before the last dot are compared first. */
 static int query_member_column (const pw_system *s, const char *name, pw_column *c) {
-  const int state = query_body_state (s, name, &(pw_nearest){ .sought = name });
+  const int state = query_body_state (s, name, 0, &(pw_nearest){ .sought = name });
   if (state >= 0) return *c = (pw_column){ PW_COLUMN_STATE, state }, 1;
   int contacts = 0;
   for (const pw_element_batch *k = s->batch; k < s->batch + s->batches; k++) {
@@ -436,9 +441,10 @@ int pw_system_reference (const pw_model *m, const pw_system *s, double t, double
   for (int j = 0; j < n; j++) q[j] = v[j] = NAN;
   if (m->table->reference) m->table->reference (m->parameters, t, q, v);
   const pw_reference_text *text = pw_model_reference_text (m);
-  for (int i = 0; i < text->states; i++) {
-    int state = pw_system_find_state (s, text->state[i], error);
+  for (int i = 0, body = 0; i < text->states; i++) {
+    int state = query_find_state (s, text->state[i], body, error);
     if (state < 0) return state;
+    body = state % n < 3 * s->bodies ? state % n / 3 : 0; /* the next one is probably near */
     double *entry = state < n ? &q[state] : &v[state - n];
     *entry = text->eval (text->context, i, t);
   }

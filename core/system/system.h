@@ -60,7 +60,7 @@ struct pw_system {
   int bodies, coords, rows, holonomic, batches, entries;
   int mechanical;          /* coordinates but those of first-order states (state.c), which are the last ones */
   int constraints;         /* batches with constraint equations */
-  int forces;              /* batches with a force that is not constant */
+  int forces, first_force; /* batches with a force that is not constant; the first one */
   int saturates;           /* 1: some of these have a function `saturation` */
   int sources;             /* signals */
   int state_dependent;     /* signals that depend on states or on an internal coordinate */

@@ -364,7 +364,8 @@ static int steady_check_step (void *steady, const double *from, const double *to
 
 enum { START_STEPS = 300 };               /* of a relaxation, at most */
 static const double START_FAR = 0.2,      /* longest of its steps, in units of the scene */
-    START_GROW = 1.1, START_SHRINK = 0.4; /* factors of the next step */
+    START_GROW = 1.1, START_SHRINK = 0.4, /* factors of the next step */
+    START_STILL = 1e-10;                  /* accelerations that count as round-off, in units of the scene */
 
 /* A random number between -1 and 1. */
 static double start_random (uint64_t *state) {
@@ -396,8 +397,9 @@ static double start_accelerate (pw_steady *x, double *a) {
 /* Moves positions along the accelerations, at constant rates: towards a minimum of the potential, if forces have one.
  * Steps become longer while the direction of the accelerations changes by less than 90 degrees, otherwise shorter. */
 static void start_relax (pw_steady *x, pw_projector *p) {
+  const double time = pw_run_scale (x->system.run)->time, still = START_STILL / (time * time);
   double *a = x->scratch[1], *before = x->scratch[2], most = start_accelerate (x, a), step = START_FAR / most;
-  for (int i = 0; i < START_STEPS && most > 0 && isfinite (step); i++) {
+  for (int i = 0; i < START_STEPS && most > still && isfinite (step); i++) {
     double dot = 0;
     for (int j = 0; j < x->n; j++) x->q[j] += fmin (step, START_FAR / most) * a[j];
     if (start_assemble (x, p) != PW_OK) return;

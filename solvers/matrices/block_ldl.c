@@ -628,6 +628,88 @@ void pw_block_solve (const pw_block_ldl *l, const double *f, double *y, double *
   block_accelerations (l, f, y, a);
 }
 
+/* ---- Dense matrices ----
+ *
+ *   c_j = S_ij - sum_{k < j} c_k L_jk,   L_ij = c_j / d_j,   d_i = S_ii - sum_{k < i} c_k L_ik
+ *
+ * (Golub & Van Loan 2013, Matrix Computations, algorithm 4.1.2), with n, the number of rows, constant where these
+ * functions are inlined, so that all loops over rows are unrolled. */
+
+/* S += J W^-1 J^T and y += J W^-1 f for a group; neither if it is NULL.  With n = 1 a group has one row. */
+PW_INLINE void dense_assemble (int width, const pw_dense_group *p, const double *w, const double *f, double *S,
+                               double *y, int n) {
+  const int rows = n == 1 ? 1 : p->rows;
+  for (int r = 0; r < rows; r++) {
+    const block_row R = block_weigh (width, p->row[r].J, w + p->j);
+    const int i = n == 1 ? 0 : p->row[r].i;
+    if (f) y[i] += block_product (width, R, f + p->j);
+    double *row = S + i * n;
+    for (int q = 0; S && q <= r; q++) row[n == 1 ? 0 : p->row[q].i] += block_product (width, R, p->row[q].J);
+  }
+}
+
+/* L and D of S */
+PW_INLINE void dense_factor (int n, pw_block_ldl *l, const double *S) {
+  pw_dense *d = l->dense;
+  double L[PW_DENSE * PW_DENSE], c[PW_DENSE];
+  l->least_pivot = INFINITY;
+  l->least_unknown = -1;
+  PW_UNROLL for (int i = 0; i < n; i++) {
+    double pivot = S[i * n + i];
+    PW_UNROLL for (int j = 0; j < i; j++) {
+      c[j] = S[i * n + j];
+      PW_UNROLL for (int k = 0; k < j; k++) c[j] -= c[k] * L[j * n + k];
+    }
+    PW_UNROLL for (int j = 0; j < i; j++) {
+      d->L[i * n + j] = L[i * n + j] = c[j] * L[j * n + j];
+      pivot -= c[j] * L[i * n + j];
+    }
+    block_track_pivot (l, pivot, S[i * n + i], d->unknown[i]);
+    d->L[i * n + i] = L[i * n + i] = 1 / pivot;
+  }
+}
+
+/* a = W^-1 (f - J^T y) for a group. */
+PW_INLINE void dense_accelerate (int width, const pw_dense_group *p, const double *w, const double *f, const double *y,
+                                 double *a) {
+  double z[3] = { 0 };
+  PW_UNROLL for (int k = 0; k < width && f; k++) z[k] = f[p->j + k];
+  for (int r = 0; r < p->rows; r++) PW_UNROLL for (int k = 0; k < width; k++) z[k] -= p->row[r].J[k] * y[p->row[r].i];
+  PW_UNROLL for (int k = 0; k < width; k++) a[p->j + k] = w[p->j + k] * z[k];
+}
+
+PW_INLINE void dense_run (int n, pw_block_ldl *l, int factors, const double *f, double *lambda, double *a) {
+  const pw_dense *d = l->dense;
+  double S[PW_DENSE * PW_DENSE], y[PW_DENSE];
+  if (lambda) PW_UNROLL for (int i = 0; i < n; i++) y[i] = -lambda[d->unknown[i]];
+  if (factors) PW_UNROLL for (int i = 0; i < n; i++) PW_UNROLL for (int j = 0; j <= i; j++) S[i * n + j] = 0;
+  if (factors || f)
+    for (const pw_dense_group *p = d->group; p < d->group + d->coupled; p++)
+      BLOCK_WIDTH (p->width, dense_assemble, p, l->inverse_weight, f, factors ? S : NULL, y, n);
+  if (factors && n > 2 && d->padded) S[n * n - 1] = 1;
+  if (factors) dense_factor (n, l, S);
+  if (lambda == NULL) return;
+  PW_UNROLL for (int i = 1; i < n; i++) PW_UNROLL for (int j = 0; j < i; j++) y[i] -= d->L[i * n + j] * y[j];
+  PW_UNROLL for (int i = 0; i < n; i++) y[i] *= d->L[i * n + i];
+  PW_UNROLL for (int i = n - 1; i >= 0; i--) {
+    lambda[d->unknown[i]] = y[i];
+    PW_UNROLL for (int j = 0; j < i; j++) y[j] -= d->L[i * n + j] * y[i];
+  }
+  for (const pw_dense_group *p = d->group; p < d->group + d->groups; p++)
+    BLOCK_WIDTH (p->width, dense_accelerate, p, l->inverse_weight, f, y, a);
+}
+
+#define DENSE_CASE(n)                   \
+  case n:                               \
+    dense_run (n, l, factors, f, y, a); \
+    break;
+
+void pw_dense_run (pw_block_ldl *l, int factors, const double *f, double *y, double *a) {
+  switch (l->dense->n) {
+    DENSE_CASE (0) DENSE_CASE (1) DENSE_CASE (2) DENSE_CASE (4) DENSE_CASE (6) DENSE_CASE (8) DENSE_CASE (10)
+  }
+}
+
 /* ---- Elimination order ---- */
 
 typedef struct {
@@ -690,6 +772,7 @@ static int order_pass (const order_search *x, int most, int *below) {
 
 void pw_block_close (pw_block_ldl *l) {
   if (l == NULL) return;
+  free (l->dense);
   free (l->cursor);
   free (l->target);
   free (l->value);

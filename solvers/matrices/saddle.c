@@ -13,16 +13,16 @@
  * Coordinates without weight, called massless, are eliminated first; the others are massive.  Each massless one is
  * matched to a constraint row and substituted out of the other rows.
  *
- * The rows and coordinates concerned form independent components, such as a massless body and its joints.  In each,
- * Gaussian elimination of the massless columns, with the matched rows p as pivot rows, leaves
+ * The rows and coordinates concerned form independent components, such as a massless body and its joints.  In each, the
+ * matched rows p are P in the massless columns, a square matrix, and H in the massive ones; the unmatched rows i are K
+ * and Z.  With  P = L U,  Y = K P^-1,
  *
- *     [ P H ]   [ L 0 ] [ U H' ]       P, H: matched rows in the massless and in the massive columns
- *     [ K Z ] = [ R 1 ] [ 0 Z' ]       K, Z: unmatched rows i
+ *     mu = P^-T f_P,     f~ = f - H^T mu,     Z' = Z - Y H,     gamma~ = gamma_i - Y gamma_p
  *
- * With  f_P  the forces at the massless coordinates,  w = U^-T f_P,  f~ = f - H'^T w,  gamma~ = [ L 0 ; R 1 ]^-1 gamma,
- * the rows Z' and the massive coordinates form a system without the massless ones.  Its solution yields
+ * where f_P are the forces at the massless coordinates, the rows Z' and the massive coordinates form a system without
+ * the massless ones.  Its solution yields
  *
- *     a_P = U^-1 (gamma~_p - H' a),       lambda_p = L^-T (w - R^T lambda_i). */
+ *     a_P = P^-1 (gamma_p - H a),       lambda_p = mu - Y^T lambda_i. */
 #include <float.h>
 #include <limits.h>
 #include <math.h>
@@ -74,32 +74,42 @@ typedef struct {
 /* A row of a component.  Entries in columns of angles are multiplied by 1 / L before they are compared with others. */
 typedef struct {
   int equation;          /* its constraint equation */
-  int pivot_column;      /* matched rows: the local column of the coordinate */
+  int j;                 /* matched rows: the coordinate */
+  int pivot_column;      /* its local column */
   double largest;        /* largest entry when last matched */
   double pivot_scale;    /* matched rows: factor that makes the pivot relative to `largest` */
   double rematch_below;  /* matched rows: the relative pivot below which the component is matched again */
-  double squared_terms;  /* unmatched rows: sum of squares: entries, and what is subtracted from the massive ones */
-  double gamma;          /* gamma~ */
-  double lambda;         /* the multiplier; of matched rows w before that */
-  const double **source; /* groups: its entries in the batch, or zeros */
+  double squared_terms;  /* unmatched rows: sum of squares of what Z' is the difference of, and of K */
+  double gamma;          /* of unmatched rows gamma~ */
+  double lambda;         /* the multiplier; of matched rows mu before that */
+  const double **source; /* groups: its entries in the batch, or massless_zeros */
 } massless_row;
+
+/* The part of H in the columns of one group and in one row. */
+typedef struct {
+  const double *J;
+  int p, j, width, column; /* the row; the group's first coordinate, width and first local column */
+} massless_block;
 
 typedef struct pw_component {
   int rows, cols, groups;
   int pivots;   /* matched rows */
+  int blocks;   /* of H, without those of zeros */
   int grounded; /* 1: one of its elements is (is_grounded) */
   massless_group *group;
   int *global;                   /* cols: global coordinate */
   unsigned char *is_massless;    /* cols: 1 for a coordinate without weight */
-  int *massive, massives;        /* local columns of the others */
+  int massives;                  /* columns of the others */
   double *squared_scale;         /* cols: 1, or for an angle 1 / L^2 */
   double *massive_squared_scale; /* cols: the same, 0 for a massless coordinate */
   massless_row *row;             /* the matched ones first, in the order of elimination */
   int *unknown; /* rows: index in gamma and lambda for the unmatched row i, whichever row that is after matching again;
                  * -1: its multiplier is 0 */
-  double *A;    /* rows x stride: U, with inverses on its diagonal, and H', or 0 and Z'; then L, or R */
-  int first_L_column; /* of L and R in A: cols rounded up to an even number */
-  int stride;         /* from row to row of A */
+  const double **entry;  /* rows x pivots: the entries of P and K in the batches */
+  massless_block *block; /* blocks */
+  double *P;          /* rows x pivots: L below the diagonal, U above it, the inverse of U's diagonal on it; then Y */
+  double *x;          /* rows: scratch */
+  double *A;          /* rows x cols: of unmatched rows Z', arbitrary in massless columns; scratch while matching */
   double least_pivot; /* the smallest pivot relative to its row, or norm of a row of Z' relative to its terms */
 } pw_component;
 
@@ -135,30 +145,29 @@ typedef struct {
   pw_arena arena;           /* contains the arrays whose length is known beforehand */
 } saddle_plan;
 
-/* ---- Massless coordinates: elimination ----
- *
- * `pivots` is c->pivots: an argument, since it is the constant 3 in most calls, so that loops are unrolled. */
+/* ---- Massless coordinates: matching ---- */
 
-/* Copies J to A. */
-PW_INLINE void massless_copy (pw_component *c) {
-  const massless_group *end = c->group + c->groups;
-  double *row = c->A;
-  for (const massless_row *r = c->row; r < c->row + c->rows; r++, row += c->stride) {
-    const double **from = r->source;
-    for (const massless_group *g = c->group; g < end; g++) {
-      const double *J = *from++;
-      double *A = row + g->column;
-      A[0] = J[0];
-      if (g->width == 3) A[1] = J[1], A[2] = J[2];
-    }
+static const double massless_zeros[3] = { 0 };
+
+/* Copies J of row i to A. */
+static inline void massless_copy (pw_component *c, int i) {
+  const double **from = c->row[i].source;
+  for (const massless_group *g = c->group; g < c->group + c->groups; g++) {
+    const double *J = *from++;
+    double *A = c->A + i * c->cols + g->column;
+    A[0] = J[0];
+    if (g->width == 3) A[1] = J[1], A[2] = J[2];
   }
 }
 
 /* The weighted sum of the squares of the entries of row i. */
 static double massless_square (const pw_component *c, int i, const double *weight) {
-  const double *A = c->A + i * c->stride;
   double sum = 0;
-  for (int n = 0; n < c->cols; n++) sum += weight[n] * A[n] * A[n];
+  for (const massless_group *g = c->group, *end = g + c->groups; g < end; g++) {
+    const double *A = c->A + i * c->cols + g->column, *w = weight + g->column;
+    sum += w[0] * A[0] * A[0];
+    if (g->width == 3) sum += w[1] * A[1] * A[1] + w[2] * A[2] * A[2];
+  }
   return sum;
 }
 
@@ -168,10 +177,10 @@ static void massless_swap (pw_component *c, int a, int b) {
   massless_row row = c->row[a];
   c->row[a] = c->row[b];
   c->row[b] = row;
-  for (int n = 0; n < c->stride; n++) {
-    double x = c->A[a * c->stride + n];
-    c->A[a * c->stride + n] = c->A[b * c->stride + n];
-    c->A[b * c->stride + n] = x;
+  for (int n = 0; n < c->cols; n++) {
+    double x = c->A[a * c->cols + n];
+    c->A[a * c->cols + n] = c->A[b * c->cols + n];
+    c->A[b * c->cols + n] = x;
   }
 }
 
@@ -180,7 +189,7 @@ static void massless_swap (pw_component *c, int a, int b) {
 
 /* 1 if an entry of row i of Z' is larger than what round-off leaves of its terms; column: local. */
 static int massless_is_entry (const pw_component *c, int i, int column) {
-  return fabs (c->A[i * c->stride + column]) * sqrt (c->squared_scale[column]) >
+  return fabs (c->A[i * c->cols + column]) * sqrt (c->squared_scale[column]) >
          MASSLESS_ROUND_OFF * sqrt (c->row[i].squared_terms);
 }
 
@@ -194,7 +203,7 @@ static int massless_select_pivot (pw_component *c, int p) {
   for (int i = p; i < c->rows; i++)
     for (int n = 0; n < c->cols; n++) {
       if (!c->is_massless[n]) continue;
-      double scaled = sqrt (c->squared_scale[n]) * fabs (c->A[i * c->stride + n]) / c->row[i].largest;
+      double scaled = sqrt (c->squared_scale[n]) * fabs (c->A[i * c->cols + n]) / c->row[i].largest;
       if (scaled > best) best = scaled, row = i, column = n;
     }
   if (row < 0) {
@@ -202,136 +211,212 @@ static int massless_select_pivot (pw_component *c, int p) {
     return 0;
   }
   massless_swap (c, p, row);
-  c->row[p].pivot_column = column;
+  c->row[p].pivot_column = column, c->row[p].j = c->global[column];
   c->row[p].pivot_scale = sqrt (c->squared_scale[column]) / c->row[p].largest;
   c->row[p].rematch_below = guard * best;
   return 1;
 }
 
-/* Subtracts multiples of row p from the rows after it, two columns at a time. */
-PW_INLINE void massless_eliminate (pw_component *c, int p, int pivots) {
-  const int pivot = c->row[p].pivot_column, cols = c->cols;
-  double *P = c->A + p * c->stride, inverse = 1 / P[pivot];
-  double square = c->rows > pivots ? massless_square (c, p, c->massive_squared_scale) : 0;
-  for (int i = p + 1; i < c->rows; i++) {
-    double *A = c->A + i * c->stride, l = A[pivot] * inverse;
-    A[c->first_L_column + p] = l;
-    if (l == 0) continue;
-    for (int k = 0; k < cols; k += 2) {
-      double even = A[k] - l * P[k], odd = A[k + 1] - l * P[k + 1];
-      A[k] = even, A[k + 1] = odd;
+/* Lists the entries of P and K, and the blocks of H. */
+static void massless_list (pw_component *c) {
+  const double **entry = c->entry;
+  c->blocks = 0;
+  for (const massless_row *r = c->row; r < c->row + c->rows; r++) {
+    for (int p = 0; p < c->pivots; p++) {
+      int g = 0, column = c->row[p].pivot_column;
+      while (column >= c->group[g].column + c->group[g].width) g++;
+      *entry++ = r->source[g] == massless_zeros ? massless_zeros : r->source[g] + column - c->group[g].column;
     }
-    A[pivot] = 0;
-    c->row[i].squared_terms += l * l * square;
+    for (int g = 0; r < c->row + c->pivots && g < c->groups; g++) {
+      const massless_group *group = &c->group[g];
+      int massive = 0;
+      for (int n = 0; n < group->width; n++) massive |= !c->is_massless[group->column + n];
+      if (massive && r->source[g] != massless_zeros)
+        c->block[c->blocks++] =
+            (massless_block){ r->source[g], (int)(r - c->row), group->j, group->width, group->column };
+    }
   }
-  P[pivot] = inverse;
 }
 
-/* Eliminates with the J last evaluated and the pivots matched before or, if `matches` is 1, matches the massless
- * coordinates to rows, with complete pivoting over their columns.  Returns the number of pivots that are large
- * enough. */
-PW_INLINE int massless_reduce (pw_component *c, int matches, int pivots) {
-  massless_copy (c);
-  c->least_pivot = INFINITY;
-  for (int i = matches ? 0 : pivots; i < c->rows; i++)
-    c->row[i].squared_terms = massless_square (c, i, c->squared_scale);
-  for (int i = 0; matches && i < c->rows; i++) {
+/* Matches the massless coordinates to rows at the J last evaluated, by Gaussian elimination with complete pivoting over
+ * their columns.  Returns the number of rows matched. */
+static int massless_match (pw_component *c) {
+  for (int i = 0; i < c->rows; i++) {
+    massless_copy (c, i);
     c->row[i].largest = 0;
     for (int k = 0; k < c->cols; k++)
-      c->row[i].largest = fmax (c->row[i].largest, sqrt (c->squared_scale[k]) * fabs (c->A[i * c->stride + k]));
+      c->row[i].largest = fmax (c->row[i].largest, sqrt (c->squared_scale[k]) * fabs (c->A[i * c->cols + k]));
   }
-  PW_UNROLL for (int p = 0; p < pivots; p++) {
-    if (matches && !massless_select_pivot (c, p)) return p;
-    const massless_row *row = &c->row[p];
-    double pivot = fabs (c->A[p * c->stride + row->pivot_column]) * row->pivot_scale;
-    if (!(pivot >= c->least_pivot)) c->least_pivot = pivot;
-    if (!matches && !(pivot >= row->rematch_below)) return p;
-    massless_eliminate (c, p, pivots);
-  }
-  return pivots;
-}
-
-static int massless_match (pw_component *c) {
-  return massless_reduce (c, 1, c->pivots);
-}
-
-/* Eliminates with the J last evaluated, and matches again if a pivot has become much smaller than when it was matched.
- * Returns the square of the least of all `least_pivot`, at most 1; 0 if singular. */
-PW_SELDOM double massless_factor (pw_saddle *saddle) {
-  double least = INFINITY;
-  for (pw_component *c = saddle->component, *end = c + saddle->components; c < end; c++) {
-    int found = c->pivots == 3 ? massless_reduce (c, 0, 3) : massless_reduce (c, 0, c->pivots);
-    if (found < c->pivots && massless_match (c) < c->pivots) return 0;
-    for (int i = c->pivots; i < c->rows; i++) {
-      double terms = c->row[i].squared_terms, square = massless_square (c, i, c->massive_squared_scale);
-      double remainder = terms > 0 ? sqrt (square / terms) : 0;
-      if (!(remainder >= c->least_pivot)) c->least_pivot = remainder;
+  for (int p = 0; p < c->pivots; p++) {
+    if (!massless_select_pivot (c, p)) return p;
+    const double *pivot_row = c->A + p * c->cols;
+    for (int i = p + 1; i < c->rows; i++) {
+      double *row = c->A + i * c->cols, l = row[c->row[p].pivot_column] / pivot_row[c->row[p].pivot_column];
+      for (int k = 0; k < c->cols; k++) row[k] -= l * pivot_row[k];
+      row[c->row[p].pivot_column] = 0;
     }
-    if (!(c->least_pivot >= least)) least = c->least_pivot;
   }
-  return least > 1 ? 1 : least * least;
+  massless_list (c);
+  return c->pivots;
 }
 
-/* gamma~, then w in place of lambda, then f~. */
-PW_INLINE void massless_forward_component (pw_component *c, double *f, double *gamma, int pivots) {
+/* ---- Massless coordinates: elimination ----
+ *
+ * n is c->pivots: an argument, since it is the constant 1, 2 or 3 in most calls, so that loops are unrolled. */
+
+enum { MASSLESS_LOCAL = 3 };
+
+/* Calls f (n, c, ...), with the constant 1, 2 or 3, or f_any (c, ...), a function that is not inlined. */
+#define MASSLESS_PIVOTS(f, ...)          \
+  (c->pivots == 3   ? f (3, __VA_ARGS__) \
+   : c->pivots == 2 ? f (2, __VA_ARGS__) \
+   : c->pivots == 1 ? f (1, __VA_ARGS__) \
+                    : f##_any (__VA_ARGS__))
+
+/* P = L U.  Returns 0 if a pivot has become much smaller than when it was matched. */
+PW_INLINE int massless_factor_P (int n, pw_component *c, double *P) {
+  double least = INFINITY;
+  PW_UNROLL for (int i = 0; i < n * n; i++) P[i] = *c->entry[i];
+  PW_UNROLL for (int p = 0; p < n; p++) {
+    double pivot = fabs (P[p * n + p]) * c->row[p].pivot_scale, inverse = 1 / P[p * n + p];
+    if (!(pivot >= least)) least = pivot;
+    if (!(pivot >= c->row[p].rematch_below)) return 0;
+    P[p * n + p] = inverse;
+    PW_UNROLL for (int i = p + 1; i < n; i++) {
+      double l = P[i * n + p] * inverse;
+      P[i * n + p] = l;
+      PW_UNROLL for (int j = p + 1; j < n; j++) P[i * n + j] -= l * P[p * n + j];
+    }
+  }
+  c->least_pivot = least;
+  return 1;
+}
+
+/* x = P^-1 x */
+PW_INLINE void massless_solve_P (int n, const double *P, double *x) {
+  PW_UNROLL for (int i = 1; i < n; i++) PW_UNROLL for (int j = 0; j < i; j++) x[i] -= P[i * n + j] * x[j];
+  PW_UNROLL for (int i = n - 1; i >= 0; i--) {
+    PW_UNROLL for (int j = i + 1; j < n; j++) x[i] -= P[i * n + j] * x[j];
+    x[i] *= P[i * n + i];
+  }
+}
+
+/* x = P^-T x */
+PW_INLINE void massless_solve_PT (int n, const double *P, double *x) {
+  PW_UNROLL for (int i = 0; i < n; i++) {
+    PW_UNROLL for (int j = 0; j < i; j++) x[i] -= P[j * n + i] * x[j];
+    x[i] *= P[i * n + i];
+  }
+  PW_UNROLL for (int i = n - 2; i >= 0; i--) PW_UNROLL for (int j = i + 1; j < n; j++) x[i] -= P[j * n + i] * x[j];
+}
+
+/* Y and Z' of the unmatched rows.  What round-off leaves of a dependent row has any direction: only its size, relative
+ * to the terms, reveals it. */
+PW_SELDOM void massless_unmatched (int n, pw_component *c) {
+  for (int i = n; i < c->rows; i++) {
+    double *Y = c->P + i * n, *Z = c->A + i * c->cols, terms;
+    massless_copy (c, i);
+    terms = massless_square (c, i, c->squared_scale);
+    for (int p = 0; p < n; p++) Y[p] = *c->entry[i * n + p];
+    massless_solve_PT (n, c->P, Y);
+    for (const massless_block *b = c->block; b < c->block + c->blocks; b++)
+      for (int k = 0; k < b->width; k++) {
+        double term = Y[b->p] * b->J[k];
+        Z[b->column + k] -= term;
+        terms += c->massive_squared_scale[b->column + k] * term * term;
+      }
+    double remainder = terms > 0 ? sqrt (massless_square (c, i, c->massive_squared_scale) / terms) : 0;
+    if (!(remainder >= c->least_pivot)) c->least_pivot = remainder;
+    c->row[i].squared_terms = terms;
+  }
+}
+
+/* Eliminates with the J last evaluated and the pivots matched before.  Returns as massless_factor_P. */
+PW_INLINE int massless_eliminate (int n, pw_component *c) {
+  double local[MASSLESS_LOCAL * MASSLESS_LOCAL];
+  if (!massless_factor_P (n, c, n <= MASSLESS_LOCAL ? local : c->P)) return 0;
+  if (n <= MASSLESS_LOCAL) PW_UNROLL for (int i = 0; i < n * n; i++) c->P[i] = local[i];
+  if (c->rows > n) massless_unmatched (n, c);
+  return 1;
+}
+
+PW_SELDOM int massless_eliminate_any (pw_component *c) {
+  return massless_eliminate (c->pivots, c);
+}
+
+PW_INLINE int massless_reduce (pw_component *c) {
+  return MASSLESS_PIVOTS (massless_eliminate, c);
+}
+
+/* gamma~, mu, f~ */
+PW_INLINE void massless_forward_component (int n, pw_component *c, double *f, double *gamma) {
   massless_row *row = c->row;
-  for (int i = 0; i < c->rows; i++) {
-    const double *L = c->A + i * c->stride + c->first_L_column;
+  double local[MASSLESS_LOCAL], *mu = n <= MASSLESS_LOCAL ? local : c->x;
+  PW_UNROLL for (int p = 0; p < n; p++) row[p].gamma = gamma[row[p].equation], mu[p] = f[row[p].j];
+  for (int i = n; i < c->rows; i++) {
     row[i].gamma = gamma[row[i].equation];
-    PW_UNROLL for (int p = 0; p < pivots; p++) row[i].gamma -= p < i ? L[p] * row[p].gamma : 0;
+    PW_UNROLL for (int p = 0; p < n; p++) row[i].gamma -= c->P[i * n + p] * row[p].gamma;
   }
-  for (int i = pivots; i < c->rows; i++)
+  for (int i = n; i < c->rows; i++)
     if (c->unknown[i] >= 0) gamma[c->unknown[i]] = row[i].gamma;
-  PW_UNROLL for (int p = 0; p < pivots; p++) {
-    double w = f[c->global[row[p].pivot_column]];
-    PW_UNROLL for (int q = 0; q < p; q++) w -= c->A[q * c->stride + row[p].pivot_column] * row[q].lambda;
-    row[p].lambda = w * c->A[p * c->stride + row[p].pivot_column];
+  massless_solve_PT (n, c->P, mu);
+  for (const massless_block *b = c->block, *end = b + c->blocks; b < end; b++) {
+    double *F = f + b->j, x = mu[b->p];
+    F[0] -= b->J[0] * x;
+    if (b->width == 3) F[1] -= b->J[1] * x, F[2] -= b->J[2] * x;
   }
-  for (const int *column = c->massive; column < c->massive + c->massives; column++) {
-    double change = 0;
-    PW_UNROLL for (int p = 0; p < pivots; p++) change += c->A[p * c->stride + *column] * row[p].lambda;
-    f[c->global[*column]] -= change;
-  }
+  PW_UNROLL for (int p = 0; p < n; p++) row[p].lambda = mu[p];
 }
 
-/* First half of a solution: saddle->force becomes f~ at the massive coordinates, gamma becomes gamma~ at `unknown` of
- * unmatched rows. */
-PW_SELDOM void massless_forward (pw_saddle *saddle, double *gamma) {
-  for (pw_component *c = saddle->component, *end = c + saddle->components; c < end; c++)
-    if (c->pivots == 3)
-      massless_forward_component (c, saddle->force, gamma, 3);
-    else
-      massless_forward_component (c, saddle->force, gamma, c->pivots);
+PW_SELDOM void massless_forward_component_any (pw_component *c, double *f, double *gamma) {
+  massless_forward_component (c->pivots, c, f, gamma);
 }
 
-/* gamma~ - H' a, then a_P and lambda_p from the last pivot to the first. */
-PW_INLINE void massless_backward_component (pw_component *c, double *a, double *lambda, int pivots) {
+/* If `factors`, eliminates with the J last evaluated, and matches again if a pivot has become much smaller than when it
+ * was matched.  Then, unless gamma is NULL, does the first half of a solution: saddle->force becomes f~ at the massive
+ * coordinates, gamma becomes gamma~ at `unknown` of unmatched rows.  Returns the square of the least `least_pivot`, at
+ * most 1; 0 if singular. */
+PW_INLINE double massless_forward (pw_saddle *saddle, int factors, double *gamma) {
+  double least = 1;
+  pw_component *c = saddle->component;
+  for (int count = saddle->components; count > 0; count--, c++) {
+    for (int matched = 0; factors && !massless_reduce (c); matched = 1)
+      if (matched || massless_match (c) < c->pivots) return 0;
+    if (!(c->least_pivot >= least)) least = c->least_pivot;
+    if (gamma) MASSLESS_PIVOTS (massless_forward_component, c, saddle->force, gamma);
+  }
+  return least * least;
+}
+
+/* gamma_p - H a, a_P, lambda_p.  a is 0 at massless coordinates. */
+PW_INLINE void massless_backward_component (int n, pw_component *c, double *a, double *lambda) {
   massless_row *row = c->row;
-  for (const int *column = c->massive; column < c->massive + c->massives; column++) {
-    double x = a[c->global[*column]];
-    PW_UNROLL for (int p = 0; p < pivots; p++) row[p].gamma -= c->A[p * c->stride + *column] * x;
+  double local[MASSLESS_LOCAL], *x = n <= MASSLESS_LOCAL ? local : c->x;
+  PW_UNROLL for (int p = 0; p < n; p++) x[p] = row[p].gamma;
+  for (const massless_block *b = c->block, *end = b + c->blocks; b < end; b++) {
+    const double *A = a + b->j;
+    x[b->p] -= b->width == 3 ? b->J[0] * A[0] + b->J[1] * A[1] + b->J[2] * A[2] : b->J[0] * A[0];
   }
+  massless_solve_P (n, c->P, x);
   /* reads all before storing any: one row's index may be the `unknown` of another */
-  for (int i = pivots; i < c->rows; i++) row[i].lambda = c->unknown[i] < 0 ? 0 : lambda[c->unknown[i]];
-  for (int i = pivots; i < c->rows; i++) lambda[row[i].equation] = row[i].lambda;
-  PW_UNROLL for (int p = pivots - 1; p >= 0; p--) {
-    const double *A = c->A + p * c->stride;
-    double x = row[p].gamma;
-    PW_UNROLL for (int q = p + 1; q < pivots; q++) x -= A[row[q].pivot_column] * a[c->global[row[q].pivot_column]];
-    a[c->global[row[p].pivot_column]] = x * A[row[p].pivot_column];
-    for (int i = p + 1; i < c->rows; i++) row[p].lambda -= c->A[i * c->stride + c->first_L_column + p] * row[i].lambda;
-    lambda[row[p].equation] = row[p].lambda;
+  for (int i = n; i < c->rows; i++) row[i].lambda = c->unknown[i] < 0 ? 0 : lambda[c->unknown[i]];
+  for (int i = n; i < c->rows; i++) {
+    lambda[row[i].equation] = row[i].lambda;
+    PW_UNROLL for (int p = 0; p < n; p++) row[p].lambda -= c->P[i * n + p] * row[i].lambda;
   }
+  PW_UNROLL for (int p = 0; p < n; p++) a[row[p].j] = x[p], lambda[row[p].equation] = row[p].lambda;
+}
+
+PW_SELDOM void massless_backward_component_any (pw_component *c, double *a, double *lambda) {
+  massless_backward_component (c->pivots, c, a, lambda);
 }
 
 /* Second half: from a of the massive coordinates and lambda at `unknown` of unmatched rows, a of the massless
  * coordinates and lambda of all rows. */
-PW_SELDOM void massless_backward (pw_saddle *saddle, double *a, double *lambda) {
-  for (pw_component *c = saddle->component, *end = c + saddle->components; c < end; c++)
-    if (c->pivots == 3)
-      massless_backward_component (c, a, lambda, 3);
-    else
-      massless_backward_component (c, a, lambda, c->pivots);
+PW_INLINE void massless_backward (pw_saddle *saddle, double *a, double *lambda) {
+  pw_component *c = saddle->component;
+  for (int count = saddle->components; count > 0; count--, c++)
+    MASSLESS_PIVOTS (massless_backward_component, c, a, lambda);
 }
 
 /* ---- Components, by union-find over the groups that contain massless coordinates, here called massless groups ---- */
@@ -416,7 +501,6 @@ static void massless_add_rows (saddle_plan *p) {
 /* Allocates the components' arrays.  A component has at most as many groups as were counted with repetition, at most
  * those of the scene, and at most as many pivots as rows. */
 static int massless_lay_out (const saddle_plan *p) {
-  static const double zero[3] = { 0 };
   pw_saddle *saddle = p->saddle;
   for (pw_layout l = { 0 }; pw_layout_pass (&l, &saddle->component_memory);)
     for (pw_component *c = saddle->component; c < saddle->component + saddle->components; c++) {
@@ -425,16 +509,19 @@ static int massless_lay_out (const saddle_plan *p) {
       c->group = pw_layout_alloc (&l, groups, sizeof *c->group);
       c->global = pw_layout_alloc (&l, cols, sizeof *c->global);
       c->is_massless = pw_layout_alloc (&l, cols, 1);
-      c->massive = pw_layout_alloc (&l, cols, sizeof *c->massive);
       c->squared_scale = pw_layout_alloc (&l, cols, sizeof *c->squared_scale);
       c->massive_squared_scale = pw_layout_alloc (&l, cols, sizeof *c->massive_squared_scale);
       c->row = pw_layout_alloc (&l, rows, sizeof *c->row);
       c->unknown = pw_layout_alloc (&l, rows, sizeof *c->unknown);
-      c->A = pw_layout_alloc (&l, rows * (cols + rows + 1), sizeof *c->A);
+      c->entry = pw_layout_alloc (&l, rows * rows, sizeof *c->entry);
+      c->block = pw_layout_alloc (&l, (size_t)c->groups, sizeof *c->block);
+      c->P = pw_layout_alloc (&l, rows * rows, sizeof *c->P);
+      c->A = pw_layout_alloc (&l, rows * cols, sizeof *c->A);
+      c->x = pw_layout_alloc (&l, rows, sizeof *c->x);
       const double **from = pw_layout_alloc (&l, rows * groups, sizeof *from);
       if (l.base == NULL) continue;
       for (size_t i = 0; i < rows; i++) c->row[i].source = from + i * groups;
-      for (size_t i = 0; i < rows * groups; i++) from[i] = zero;
+      for (size_t i = 0; i < rows * groups; i++) from[i] = massless_zeros;
       c->rows = c->groups = 0;
     }
   return saddle->component_memory ? PW_OK : PW_RESOURCE;
@@ -462,18 +549,17 @@ static int massless_check (const saddle_plan *p, pw_component *c, pw_error *erro
     c->squared_scale[n] = pw_is_angle (s, j) ? 1 / (s->scale.length * s->scale.length) : 1;
     c->is_massless[n] = p->weight[j] == 0;
     c->massive_squared_scale[n] = c->is_massless[n] ? 0 : c->squared_scale[n];
-    if (!c->is_massless[n]) c->massive[c->massives++] = n;
+    c->massives += !c->is_massless[n];
     massless += c->is_massless[n];
   }
   c->pivots = massless < c->rows ? massless : c->rows;
-  c->first_L_column = c->cols + c->cols % 2;
-  c->stride = c->first_L_column + c->pivots;
   found = massless_match (c);
   for (int n = 0; found < massless && n < c->cols; n++) {
     int used = 0;
     for (int q = 0; q < found; q++) used |= c->row[q].pivot_column == n;
     if (c->is_massless[n] && !used) return massless_undetermined (s, c->global[n], error);
   }
+  massless_reduce (c);
   return PW_OK;
 }
 
@@ -607,7 +693,7 @@ static void condense_components (saddle_plan *plan) {
       if (p->unknown[i] < 0) continue;
       condense_add_node (plan, (pw_plan_node){ .size = 1, .unknown = p->unknown[i], .grounded = p->grounded });
       for (int g = 0; g < p->groups; g++)
-        condense_contribute (plan, p->A + i * p->stride + p->group[g].column, p->stride, p->group[g].j, 0);
+        condense_contribute (plan, p->A + i * p->cols + p->group[g].column, p->cols, p->group[g].j, 0);
     }
 }
 
@@ -941,6 +1027,45 @@ static int condense_chains (saddle_plan *plan, pw_block_ldl *l) {
   return PW_OK;
 }
 
+/* Appends group g to a dense matrix, unless it is massless; first: row of each node. */
+static void condense_dense_group (const saddle_plan *plan, pw_dense *d, int g, const int *first) {
+  const int j = group_first (plan->saddle->s, g), width = group_width (plan->saddle->s, j);
+  int has_weight = 0;
+  for (int i = 0; i < width; i++) has_weight |= plan->weight[j + i] != 0;
+  if (!has_weight) return;
+  pw_dense_group *group = &d->group[d->groups++];
+  group->j = j, group->width = width;
+  for (int x = plan->start[g]; x < plan->start[g + 1]; x++) {
+    const plan_contribution *a = &plan->contribution[plan->list[x]];
+    for (int i = 0; i < plan->node[a->node].size; i++) {
+      group->row[group->rows].J = a->J + i * a->row_stride;
+      group->row[group->rows++].i = first[a->node] + i;
+    }
+  }
+}
+
+/* The dense matrix of a scene with few equations. */
+static int condense_dense (const saddle_plan *plan) {
+  int first[PW_DENSE];
+  pw_block_ldl *l = plan->saddle->block = calloc (1, sizeof *l);
+  pw_dense *d = calloc (1, sizeof *d + (size_t)plan->groups * sizeof *d->group);
+  if (l == NULL || d == NULL) return free (d), PW_RESOURCE;
+  l->dense = d;
+  l->inverse_weight = plan->saddle->inverse_weight;
+  for (int n = 0; n < plan->nodes; n++) {
+    first[n] = d->n;
+    for (int i = 0; i < plan->node[n].size; i++) d->unknown[d->n++] = plan->node[n].unknown + i;
+  }
+  d->padded = d->n > 2 && d->n % 2;
+  if (d->padded) d->unknown[d->n++] = d->unknown[0];
+  for (int g = 0; g < plan->groups; g++)
+    if (plan->start[g + 1] > plan->start[g]) condense_dense_group (plan, d, g, first);
+  d->coupled = d->groups;
+  for (int g = 0; g < plan->groups; g++)
+    if (plan->start[g + 1] == plan->start[g]) condense_dense_group (plan, d, g, first);
+  return PW_OK;
+}
+
 static int condense_block (saddle_plan *plan) {
   condense_pairs (plan);
   if (plan->failed || plan->pairs >= INT_MAX / 2) return PW_RESOURCE;
@@ -982,6 +1107,9 @@ static int saddle_plan_all (saddle_plan *plan, pw_error *error) {
   status = condense_sort (plan);
   if (status == PW_OK) status = condense_find_dependent (plan, &saddle->dependent_row);
   if (status != PW_OK || saddle->dependent_row >= 0) return status;
+  int equations = 0;
+  for (int i = 0; i < plan->nodes; i++) equations += plan->node[i].size;
+  if (equations <= PW_DENSE) return condense_dense (plan);
   status = condense_uncondensed (plan);
   return status == PW_OK ? condense_block (plan) : status;
 }
@@ -1011,19 +1139,72 @@ void pw_saddle_postpone (pw_saddle *saddle, double pivot) {
   saddle->postponed = pivot;
 }
 
-int pw_saddle_factor (pw_saddle *saddle) {
-  saddle->postponed = 0;
-  saddle->pivot_row = saddle->dependent_row;
-  if (saddle->block == NULL) return saddle->pivot = 0, PW_RETRY;
-  saddle->pivot = saddle->components ? massless_factor (saddle) : INFINITY;
-  if (!(saddle->pivot > SADDLE_ROUND_OFF)) return PW_RETRY;
-  pw_block_factor (saddle->block);
+/* Takes the least pivot of the block into account. */
+static inline int saddle_judge (pw_saddle *saddle) {
   if (!(saddle->block->least_pivot >= saddle->pivot)) {
     const int row = saddle->block->least_unknown;
     saddle->pivot = saddle->block->least_pivot;
     saddle->pivot_row = row >= 0 && row < saddle->s->rows && saddle->component_of_row[row] < 0 ? row : -1;
   }
   return saddle->pivot > SADDLE_ROUND_OFF ? PW_OK : PW_RETRY;
+}
+
+/* Factorises, if `factors`, and solves, unless lambda is NULL.  massless: 1 if there are components. */
+PW_INLINE int saddle_run (pw_saddle *saddle, int massless, int factors, const double *f, const double *gamma, double *a,
+                          double *lambda) {
+  pw_block_ldl *l = saddle->block;
+  double *y = lambda;
+  if (lambda && saddle->extra) { /* none if l is dense */
+    y = saddle->y;
+    for (int i = 0; i < saddle->extra; i++) y[saddle->s->rows + i] = 0;
+  }
+  if (y != gamma) memcpy (y, gamma, (size_t)saddle->rows * sizeof *y);
+  if (factors) {
+    saddle->postponed = 0, saddle->pivot = l ? INFINITY : 0, saddle->pivot_row = saddle->dependent_row;
+    if (l == NULL) return PW_RETRY;
+  }
+  if (massless) {
+    const size_t bytes = (size_t)saddle->s->coords * sizeof *f;
+    if (y) f = f ? memcpy (saddle->force, f, bytes) : memset (saddle->force, 0, bytes);
+    double pivot = massless_forward (saddle, factors, y);
+    if (factors) saddle->pivot = pivot;
+    if (factors && !(pivot > SADDLE_ROUND_OFF)) return PW_RETRY;
+  }
+  if (l->dense)
+    pw_dense_run (l, factors, f, y, a);
+  else if (factors)
+    pw_block_factor (l);
+  if (factors && saddle_judge (saddle) != PW_OK) return PW_RETRY;
+  if (y == NULL) return PW_OK;
+  if (!l->dense) pw_block_solve (l, f, y, a);
+  if (y != lambda) memcpy (lambda, y, (size_t)saddle->rows * sizeof *y);
+  for (int i = 0; i < saddle->inactive_count; i++) lambda[saddle->inactive[i]] = 0;
+  if (massless) massless_backward (saddle, a, lambda);
+  return PW_OK;
+}
+
+PW_SELDOM int saddle_run_massless (pw_saddle *saddle, int factors, const double *f, const double *gamma, double *a,
+                                   double *lambda) {
+  return saddle_run (saddle, 1, factors, f, gamma, a, lambda);
+}
+
+/* Few scenes have massless coordinates: in one function, their code would add to the cost of the others. */
+PW_SELDOM int saddle_run_massive (pw_saddle *saddle, int factors, const double *f, const double *gamma, double *a,
+                                  double *lambda) {
+  return saddle_run (saddle, 0, factors, f, gamma, a, lambda);
+}
+
+int pw_saddle_factor_solve (pw_saddle *saddle, const double *f, const double *gamma, double *a, double *lambda) {
+  return (saddle->components ? saddle_run_massless : saddle_run_massive) (saddle, 1, f, gamma, a, lambda);
+}
+
+int pw_saddle_factor (pw_saddle *saddle) {
+  return pw_saddle_factor_solve (saddle, NULL, NULL, NULL, NULL);
+}
+
+void pw_saddle_solve (pw_saddle *saddle, const double *f, const double *gamma, double *a, double *lambda) {
+  if (saddle->postponed > 0) pw_saddle_factor (saddle);
+  (void)(saddle->components ? saddle_run_massless : saddle_run_massive) (saddle, 0, f, gamma, a, lambda);
 }
 
 int pw_saddle_sine_below (pw_saddle *saddle, double sine) {
@@ -1036,21 +1217,4 @@ double pw_saddle_sine (pw_saddle *saddle, int *row) {
   if (saddle->postponed > 0) pw_saddle_factor (saddle);
   if (row) *row = saddle->pivot_row;
   return saddle->pivot > 0 ? sqrt (fmin (saddle->pivot, 1)) : 0;
-}
-
-void pw_saddle_solve (pw_saddle *saddle, const double *f, const double *gamma, double *a, double *lambda) {
-  const size_t bytes = (size_t)saddle->rows * sizeof *lambda;
-  double *y = saddle->extra ? saddle->y : lambda;
-  if (saddle->postponed > 0) pw_saddle_factor (saddle);
-  if (y != gamma) memcpy (y, gamma, bytes);
-  for (int i = 0; i < saddle->extra; i++) y[saddle->s->rows + i] = 0;
-  if (saddle->components) {
-    for (int j = 0; j < saddle->s->coords; j++) saddle->force[j] = f ? f[j] : 0;
-    f = saddle->force;
-    massless_forward (saddle, y);
-  }
-  pw_block_solve (saddle->block, f, y, a);
-  if (y != lambda) memcpy (lambda, y, bytes);
-  for (int i = 0; i < saddle->inactive_count; i++) lambda[saddle->inactive[i]] = 0;
-  if (saddle->components) massless_backward (saddle, a, lambda);
 }

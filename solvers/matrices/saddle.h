@@ -28,7 +28,7 @@ typedef struct {
   int *inactive;              /* rows outside massless components whose multiplier is 0 */
   int inactive_count;
   double pivot;  /* smallest when last factorised: of `block`, the squared sine of the angle between a row and those
-                  * before it; of massless coordinates, see massless_factor */
+                  * before it; of massless coordinates, see massless_forward */
   int pivot_row; /* that row; -1: none, or one of a massless component */
   char *memory, *component_memory;
 } pw_saddle;
@@ -53,6 +53,9 @@ void pw_saddle_postpone (pw_saddle *saddle, double pivot);
 /* Solves for a (coords) and lambda (rows; 0 for inactive ones).  f may be NULL: zero.  a and f may be the same array,
  * and so may lambda and gamma. */
 void pw_saddle_solve (pw_saddle *saddle, const double *f, const double *gamma, double *a, double *lambda);
+
+/* Factorises, and then solves unless it returns PW_RETRY; a and lambda are arbitrary in that case. */
+int pw_saddle_factor_solve (pw_saddle *saddle, const double *f, const double *gamma, double *a, double *lambda);
 
 /* 1 if pw_saddle_sine is below this sine. */
 int pw_saddle_sine_below (pw_saddle *saddle, double sine);

@@ -219,12 +219,16 @@ static int rk_projects_next (const pw_run *r) {
 /* (q, v) = the state reached + h sum_j weight_j (v_j, a_j), with the weights of a row of the tableau. */
 static void rk_combine (const pw_run *r, double *q, double *v, const pw_rk_row *row, double h) {
   const pw_method_data *d = r->data;
+  const double *q0 = r->q, *v0 = r->v;
   const int n = r->s->coords;
-  memcpy (q, r->q, (size_t)n * sizeof *q);
-  memcpy (v, r->v, (size_t)n * sizeof *v);
-  for (int j = 0; j < row->count; j++) {
-    pw_add_scaled (q, d->stage_v[row->stage[j]], h * row->weight[j], n);
-    pw_add_scaled (v, d->stage_a[row->stage[j]], h * row->weight[j], n);
+  for (int j = 0; j < row->count; j++, q0 = q, v0 = v) {
+    const double *dq = d->stage_v[row->stage[j]], *dv = d->stage_a[row->stage[j]], factor = h * row->weight[j];
+    int i = 0;
+    for (; i + 1 < n; i += 2) { /* two numbers at a time */
+      *(pw_pair *)(q + i) = PW_PAIR (q0, i) + factor * PW_PAIR (dq, i);
+      *(pw_pair *)(v + i) = PW_PAIR (v0, i) + factor * PW_PAIR (dv, i);
+    }
+    if (i < n) q[i] = q0[i] + factor * dq[i], v[i] = v0[i] + factor * dv[i];
   }
 }
 

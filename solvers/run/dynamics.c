@@ -236,17 +236,21 @@ int pw_watchdog_check_values (const pw_run *r, pw_error *error) {
 
 /* ---- General evaluation ---- */
 
-/* The first coords + 3 + rows numbers of r->scratch stay free for callers. */
-void pw_run_gamma (pw_run *r, const double *v, double *gamma) {
+/* Adds Baumgarte's terms to gamma. */
+__attribute__ ((noinline)) static void dynamics_stabilise (pw_run *r, const double *v, double *gamma) {
   const pw_system *s = r->s;
   double *Jv = r->scratch + s->coords + 3 + s->rows, *eta = Jv + s->rows, *g = eta;
-  pw_evaluate_gamma (r->w, gamma);
-  if (r->alpha + r->beta == 0) return;
   pw_mul_J (r->w, v, Jv);
   pw_evaluate_eta (r->w, eta);
   for (int i = 0; i < s->rows; i++) gamma[i] -= (i < s->holonomic ? 2 : 1) * r->alpha * (Jv[i] - eta[i]);
   pw_evaluate_g (r->w, g);
   for (int i = 0; i < s->holonomic; i++) gamma[i] -= r->beta * r->beta * g[i];
+}
+
+/* The first coords + 3 + rows numbers of r->scratch stay free for callers. */
+void pw_run_gamma (pw_run *r, const double *v, double *gamma) {
+  pw_evaluate_gamma (r->w, gamma);
+  if (r->alpha + r->beta != 0) dynamics_stabilise (r, v, gamma);
 }
 
 /* Computes gamma and returns the forces at the current configuration: those computed into f, or the system's array of
@@ -292,8 +296,7 @@ static inline int dynamics_solve (pw_run *r, const double *v, double *a, double 
   const double *f = dynamics_right_side (r, v, r->scratch, lambda);
   r->statistics.rhs++;
   r->statistics.factorisations++;
-  int status = pw_saddle_factor (r->saddle);
-  if (status == PW_OK) pw_saddle_solve (r->saddle, f, lambda, a, lambda);
+  int status = pw_saddle_factor_solve (r->saddle, f, lambda, a, lambda);
   *near = pw_watchdog_near (r);
   if (*near && r->watchdog.evaluated_sine <= r->refused_sine) return PW_RETRY;
   if (status == PW_OK && pw_saddle_sine_below (r->saddle, r->thresholds.refine)) dynamics_refine (r, v, a, lambda);

@@ -118,19 +118,27 @@ const pw_thresholds pw_watchdog_thresholds = {
 };
 
 double pw_run_acceleration_norm (const pw_run *r) {
-  const double per_angle = r->w->scale.time * r->w->scale.time, per_length = per_angle / r->s->scale.length;
+  const double per_angle = r->w->scale.time * r->w->scale.time, per_length = per_angle / r->s->scale.length, *a = r->a;
+  const int bodies = 3 * r->s->bodies;
   double norm = 0;
-  for (int j = 0; j < r->s->mechanical; j++)
-    norm = pw_larger_or_nan (norm, fabs (r->a[j]) * (pw_is_angle (r->s, j) ? per_angle : per_length));
+  for (int j = 0; j < bodies; j += 3) {
+    norm = pw_larger_or_nan (norm, fabs (a[j]) * per_length);
+    norm = pw_larger_or_nan (norm, fabs (a[j + 1]) * per_length);
+    norm = pw_larger_or_nan (norm, fabs (a[j + 2]) * per_angle);
+  }
+  for (int j = bodies; j < r->s->mechanical; j++) norm = pw_larger_or_nan (norm, fabs (a[j]) * per_angle);
   return norm;
 }
 
 /* The largest change of a body's coordinate in the last step, in units of the scene. */
 static double watchdog_step_length (const pw_run *r) {
-  double length = 0;
-  for (int j = 0; j < 3 * r->s->bodies; j++)
-    length = pw_larger (fabs (r->q[j] - r->watchdog.previous_q[j]) / pw_unit (r->s, j), length);
-  return length;
+  const double *q = r->q, *before = r->watchdog.previous_q;
+  double length = 0, angle = 0;
+  for (int n = r->s->bodies; n > 0; n--, q += 3, before += 3) {
+    length = pw_larger (fabs (q[0] - before[0]), pw_larger (fabs (q[1] - before[1]), length));
+    angle = pw_larger (fabs (q[2] - before[2]), angle);
+  }
+  return pw_larger (length / r->s->scale.length, angle);
 }
 
 /* Change points: configurations at which branches of a motion cross, or nearly do.

@@ -14,10 +14,6 @@
 #include "runs.h"
 #include "scene.h"
 
-#define pw_plugin faults_chain
-#include "../../models/chain.c"
-#undef pw_plugin
-
 static struct {
   long count;       /* calls so far */
   long fail;        /* the one that fails; 0: none */
@@ -182,7 +178,7 @@ TEST (faults) {
 
 /* A scene large enough for its rows to be ordered. */
 TEST (ordering) {
-  pw_system *s = scene_system (&faults_chain, "n", 20.0, NULL);
+  pw_system *s = scene_named ("chain", "n", 20);
   fault_each (s, "rk4+projection");
   assert_true (fault.name && strcmp (fault.name, "amd_order") == 0);
   pw_system_free (s);

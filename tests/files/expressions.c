@@ -7,7 +7,7 @@ static pw_arena expression_arena;
 
 int expression_read (const char *text, const pw_expression **x, pw_expression_error *trouble) {
   pw_scope s = { 0 };
-  assert_int_equal (pw_scope_open (&s, 1, &expression_arena), PW_OK);
+  assert_int_equal (pw_scope_reserve (&s, 1, &expression_arena), PW_OK);
   pw_scope_add (&s, "a", 3);
   int status = pw_expression_read (&s, expression_names, text, &expression_arena, x, trouble);
   pw_scope_close (&s);

@@ -30,7 +30,7 @@ static const pw_expression *read (const char *text) {
     path[2] = pw_path_open ((double[]){ 0, 0.5, 1, 2 }, (double[]){ 0, 0, 0, 0 }, 4, PW_CUBIC, 0, &error);
     check_ok (error.status, &error);
   }
-  assert_int_equal (pw_scope_open (&s, 3, &arena), PW_OK);
+  assert_int_equal (pw_scope_reserve (&s, 3, &arena), PW_OK);
   pw_scope_add_path (&s, "eight", path[0]);
   pw_scope_add_path (&s, "zig", path[1]);
   pw_scope_add_path (&s, "arc", path[2]);

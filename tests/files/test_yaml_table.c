@@ -366,7 +366,7 @@ TEST (places) {
   char outside[200];
   cli_write ("data.csv", "0,1\n1,2\n");
   snprintf (outside, sizeof outside, "{file: %s/data.csv}", cli_folder);
-#define OWN "a table must be in the model's folder: its path is relative and has no \"..\""
+#define OWN "a file must be in the model's folder: its path is relative and has no \"..\""
 #define LINK "it is a link that leads out of the model's folder"
   table_bad (outside, OWN);
   table_bad ("{file: ../data.csv}", OWN);

@@ -358,14 +358,15 @@ TEST (stops) {
   }
 }
 
-/* Tolerances that accept everything: the run ends at t_end, or with an error. */
+/* Tolerances that accept everything: the run ends at t_end, or with an error; one motion grows without bound. */
 TEST (useless_tolerances) {
   static const double atol[] = { 0, 1e6 };
   for (int i = 0; i < ADAPT_METHODS; i++)
     for (int k = 0; k < 2; k++) {
       pw_error error = { 0 };
       pw_system *s = scene_system (&scene_ezyroller, NULL);
-      pw_run *r = runs_open (s, adaptive_methods[i], &(pw_settings){ .rtol = 0.5, .atol = atol[k], .span = 10 });
+      pw_run *r = runs_open (s, adaptive_methods[i],
+                             &(pw_settings){ .rtol = 0.5, .atol = atol[k], .span = 10, .max_steps = 1000 });
       int status = pw_run_advance_to (r, 10, 10, &error);
       assert_true ((status == PW_OK && pw_run_time (r) == 10) || (status == PW_METHOD && pw_run_time (r) < 10));
       if (status == PW_METHOD) assert_memory_equal (error.text, "t = ", 4);

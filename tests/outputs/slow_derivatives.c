@@ -491,4 +491,4 @@ TEST (scenes) {
   check_below ("unknown", counts.unknown, 0.02 * counts.all, "2 %");
 }
 
-const check_fixture fixture = { cli_setup, cli_teardown };
+const check_fixture fixture = { cli_setup_undrawn, cli_teardown };

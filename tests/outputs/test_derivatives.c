@@ -146,4 +146,4 @@ TEST (sliding_neighbours) {
   derivatives_check ("--of b.x --of rms:b.vx --by b -t 1.4", 2, expected, 0);
 }
 
-const check_fixture fixture = { cli_setup, cli_teardown };
+const check_fixture fixture = { cli_setup_undrawn, cli_teardown };

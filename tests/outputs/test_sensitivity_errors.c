@@ -189,4 +189,4 @@ TEST (chaos) {
   assert_non_null (strstr (cli_out, "unknown"));
 }
 
-const check_fixture fixture = { cli_setup, cli_teardown };
+const check_fixture fixture = { cli_setup_undrawn, cli_teardown };

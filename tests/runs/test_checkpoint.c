@@ -16,7 +16,7 @@ static const struct {
 } saved_scenes[] = {
   { "models/ezyroller.c", NULL, 0, 1 },          { "models/ezyroller.c", "omega", 20, 1 },
   { "tests/scenes/zoo.c", NULL, 0, 0.3 },        { "models/redundant-parallelogram.c", NULL, 0, 0.4 },
-  { "models/n-four-bar.c", NULL, 0, 0.4 },       { "tests/scenes/chain.c", "links", 30, 0.05 },
+  { "models/n-four-bar.yaml", NULL, 0, 0.4 },    { "tests/scenes/chain.c", "links", 30, 0.05 },
   { "tests/models/ezyroller.yaml", NULL, 0, 1 },
 };
 

@@ -79,6 +79,7 @@ forbidden='worker-src blob:;' try 'without Workers' models/ezyroller.c a 0.7 10
 try 'sliders whose ends are moved' models/slider-crank.c l1 1.2 1
 try 'redundant constraints' models/redundant-parallelogram.c l 1.25 3
 try 'initial values of --start' pendulum m 2 1 --start bob.vy=2
+try 'copies and included files' tests/models/arms.yaml n 3 1
 
 cat >"$work/table.yaml" <<'Y'
 pinwheel: 1

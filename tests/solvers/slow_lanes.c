@@ -1,10 +1,12 @@
-/* Random mechanisms in lanes: runs end with the state, the statistics and the error of single runs, to the bit. */
+/* Random mechanisms and large models in lanes: runs end with the state, the statistics and the error of single runs, to
+ * the bit. */
 #include <stdlib.h>
 #include <string.h>
 #include "check.h"
 #include "mechanism.h"
 #include "method.h"
 #include "pinwheel-files.h"
+#include "scene.h"
 #include "specialised.h"
 
 enum { MOST = 8, SCENES = 40 };
@@ -63,12 +65,9 @@ static void compare (const several *alone, const several *together) {
   }
 }
 
-/* Returns the number of runs that failed, -1 if the scene has no lanes. */
-static int try_mechanism (unsigned seed, const pw_system *s) {
-  static const char *const method[] = { "rk4+projection", "rk4+none", "erk8+projection:steps=fixed",
-                                        "erk5+projection:steps=fixed" };
-  const double step = seed % 5 == 0 ? 0.02 : 0.002, t = 100.3 * step;
-  const int n = 2 << seed % 3;
+/* Compares n runs.  Returns the number of those that failed, -1 if the scene has no lanes. */
+static int try_system (const pw_system *s, int n, const char *method, double step) {
+  const double t = 100.3 * step;
   int failed = 0;
   pw_error error = { 0 };
   several alone, together;
@@ -80,8 +79,8 @@ static int try_mechanism (unsigned seed, const pw_system *s) {
   if (code) {
     void *memory = pw_specialised_lanes_memory (code);
     assert_non_null (memory);
-    several_open (&alone, s, n, method[seed % 4], step, pw_scene_code_table (one));
-    several_open (&together, s, n, method[seed % 4], step, pw_scene_code_table (one));
+    several_open (&alone, s, n, method, step, pw_scene_code_table (one));
+    several_open (&together, s, n, method, step, pw_scene_code_table (one));
     for (int k = 0; k < n; k++) {
       alone.status[k] = pw_run_advance_to (alone.run[k], t, t, &alone.error[k]);
       failed += alone.status[k] != PW_OK;
@@ -99,6 +98,8 @@ static int try_mechanism (unsigned seed, const pw_system *s) {
 }
 
 TEST (random) {
+  static const char *const method[] = { "rk4+projection", "rk4+none", "erk8+projection:steps=fixed",
+                                        "erk5+projection:steps=fixed" };
   static const mechanism_view unchanged = { .mirror = 0 };
   int tried = 0, failed = 0;
   for (unsigned seed = 1; seed <= SCENES; seed++) {
@@ -107,10 +108,23 @@ TEST (random) {
     mechanism_make (seed, &m);
     pw_system *s = mechanism_compile (&m, &unchanged, &error);
     check_ok (error.status, &error);
-    int n = pw_system_has_lanes (s) ? try_mechanism (seed, s) : -1;
+    int n =
+        pw_system_has_lanes (s) ? try_system (s, 2 << seed % 3, method[seed % 4], seed % 5 == 0 ? 0.02 : 0.002) : -1;
     tried += n >= 0, failed += n > 0 ? n : 0;
     pw_system_free (s);
   }
   assert_true (tried == 0 || tried == SCENES); /* 0: a compiler that does not vectorise loops over runs */
   print_message ("%d of %d mechanisms in lanes, %d runs failed\n", tried, SCENES, failed);
+}
+
+TEST (models) {
+  static const char *const model[] = { "theo-jansen", "andrews-squeezer", "wheeled-snake", "chain" };
+  for (size_t i = 0; i < sizeof model / sizeof *model; i++)
+    for (int n = 2; n <= 8; n *= 4) {
+      pw_system *s = scene_named (model[i], NULL, 0);
+      assert_true (pw_system_has_lanes (s));
+      int failed = try_system (s, n, "rk4+projection", strcmp (model[i], "andrews-squeezer") == 0 ? 1e-6 : 1e-3);
+      assert_true (failed <= 0); /* below: a compiler that does not vectorise loops over runs */
+      pw_system_free (s);
+    }
 }

@@ -9,8 +9,9 @@
 extern char cli_folder[];                    /* temporary folder for the files of a test program */
 extern char cli_out[200000], cli_err[20000]; /* standard output and error of the last command */
 
-/* Makes and removes the folder. */
+/* Makes and removes the folder.  cli_setup_undrawn: without figures, for tests of numbers. */
 int cli_setup (void);
+int cli_setup_undrawn (void);
 int cli_teardown (void);
 
 /* Runs a shell command in which `pinwheel` is the program and @ the folder; returns its exit status. */
