@@ -187,24 +187,30 @@ int pw_expression_find_function (const char *name) {
 
 /* ---- Functions of paths ---- */
 
-const char *const pw_path_functions[] = { [PW_PATH_S] = "s",
-                                          [PW_PATH_X] = "x",
-                                          [PW_PATH_Y] = "y",
-                                          [PW_PATH_HEADING] = "heading",
-                                          [PW_PATH_CURVATURE] = "curvature",
-                                          [PW_PATH_OFFSET] = "offset",
-                                          NULL };
+const char *const pw_path_functions[] = { "s", "x", "y", "heading", "curvature", "offset", NULL };
 
 /* A function of a place: value, first and second derivative by the arc length, which the offset does not have. */
 static void path_values (int function, const pw_path_place *p, double out[3]) {
-  const double *k = p->curvature;
-  const double value[][3] = { [PW_PATH_S] = { p->s, 1, 0 },
-                              [PW_PATH_X] = { p->x, p->cos, -k[0] * p->sin },
-                              [PW_PATH_Y] = { p->y, p->sin, k[0] * p->cos },
-                              [PW_PATH_HEADING] = { p->heading, k[0], k[1] },
-                              [PW_PATH_CURVATURE] = { k[0], k[1], k[2] },
-                              [PW_PATH_OFFSET] = { p->offset, 0, 0 } };
+  const double *k = p->curvature, value[][3] = { [PW_PATH_S] = { p->s, 1, 0 },
+                                                 [PW_PATH_X] = { p->x, p->cos, -k[0] * p->sin },
+                                                 [PW_PATH_Y] = { p->y, p->sin, k[0] * p->cos },
+                                                 [PW_PATH_HEADING] = { p->heading, k[0], k[1] },
+                                                 [PW_PATH_CURVATURE] = { k[0], k[1], k[2] },
+                                                 [PW_PATH_OFFSET] = { p->offset, 0, 0 } };
   memcpy (out, value[function], sizeof value[function]);
+}
+
+static void path_at (const pw_expression_code *c, double s, double value[3]) {
+  pw_path_place place;
+  pw_path_at (c->path, s, &place);
+  path_values (c->index, &place, value);
+}
+
+static pw_path_place path_nearest (const pw_expression_code *c, double x, double y, double near, double value[3]) {
+  pw_path_place place;
+  pw_path_nearest (c->path, x, y, near, &place);
+  path_values (c->index, &place, value);
+  return place;
 }
 
 /* Derivatives by (x, y) from those of the offset d and the arc length s: with t the direction, n to its left, k the
@@ -243,25 +249,9 @@ static inline double value_step (int op, double x, int *may_jump) {
   return y;
 }
 
-static double value_path_at (const pw_expression_code *c, double s, int *may_jump) {
-  double value[3];
-  pw_path_place place;
-  pw_path_at (c->path, s, &place);
-  if (pw_path_break (c->path, nextafter (s, -INFINITY)) == s) *may_jump = 1;
-  path_values (c->index, &place, value);
-  return *value;
-}
-
-static double value_path_nearest (const pw_expression_code *c, double x, double y, double near) {
-  double value[3];
-  pw_path_place place;
-  pw_path_nearest (c->path, x, y, near, &place);
-  path_values (c->index, &place, value);
-  return *value;
-}
-
 /* The value of an operation of `right` alone or of `left` and `right`; *may_jump: 1 where it may jump. */
 static inline double value_of (const pw_expression_code *c, double left, double right, int *may_jump) {
+  double path[3];
   switch (c->op) {
   case PW_OP_NEGATE:
     return -right;
@@ -271,7 +261,9 @@ static inline double value_of (const pw_expression_code *c, double left, double 
   case PW_OP_FUNCTION_OF_ONE:
     return pw_expression_functions[c->index].of_one (right);
   case PW_OP_PATH_AT:
-    return value_path_at (c, right, may_jump);
+    if (pw_path_break (c->path, nextafter (right, -INFINITY)) == right) *may_jump = 1;
+    path_at (c, right, path);
+    return *path;
   case PW_OP_ADD:
     return left + right;
   case PW_OP_SUBTRACT:
@@ -316,12 +308,11 @@ double pw_expression_run (const pw_expression_code *code, int codes, const doubl
     if (c->op <= PW_OP_VARIABLE) {
       *top++ = last;
       last = c->op == PW_OP_CONSTANT ? c->value : variable[c->index];
-    } else if (c->op == PW_OP_SELECT) {
+    } else if (c->op >= PW_OP_SELECT) {
+      double value[3] = { top[-2] != 0 ? top[-1] : last };
       top -= 2;
-      last = top[0] != 0 ? top[1] : last;
-    } else if (c->op == PW_OP_PATH_NEAREST) {
-      top -= 2;
-      last = value_path_nearest (c, top[0], top[1], last);
+      if (c->op == PW_OP_PATH_NEAREST) path_nearest (c, top[0], top[1], last, value);
+      last = *value;
     } else {
       double left = c->op >= PW_OP_ADD ? *--top : 0;
       last = value_of (c, left, last, may_jump);
@@ -392,30 +383,25 @@ static jet jet_mod (const jet *x, const jet *y, double *q) {
 /* Just before a break of the path if the arc length falls. */
 static jet jet_path_at (const pw_expression_code *c, const jet *s, double *discrete) {
   double value[3], at = s->v;
-  pw_path_place place;
   if (jet_sign (&(jet){ 0, s->d, s->dd, 1 }) < 0) {
     double before = nextafter (at, -INFINITY);
     if (pw_path_break (c->path, before) == at) at = before;
   }
-  pw_path_at (c->path, at, &place);
+  path_at (c, at, value);
   *discrete = pw_path_break (c->path, at);
-  path_values (c->index, &place, value);
   return jet_chain (*value, &(pw_partials){ .x = value[1], .xx = value[2] }, s, &(jet){ 0 });
 }
 
 /* On `near` a minimum does not depend. */
 static jet jet_path_nearest (const pw_expression_code *c, const jet *x, const jet *y, const jet *near) {
   double value[3];
-  pw_path_place place;
-  pw_path_nearest (c->path, x->v, y->v, near->v, &place);
-  path_values (c->index, &place, value);
+  const pw_path_place place = path_nearest (c, x->v, y->v, near->v, value);
   pw_partials s = path_partials (c->index, &place, value);
   return jet_chain (*value, &s, x, y);
 }
 
 static jet jet_unary (const pw_expression_code *c, const jet *x, double *discrete) {
   if (c->op == PW_OP_NEGATE) return (jet){ -x->v, -x->d, -x->dd, x->varies };
-  if (c->op == PW_OP_PATH_AT) return jet_path_at (c, x, discrete);
   if (c->op == PW_OP_FUNCTION_OF_ONE || c->op == PW_OP_TAN) {
     if (c->op == PW_OP_TAN) *discrete = floor (x->v / PW_PI + 0.5);
     const pw_expression_function *f = &pw_expression_functions[c->index];
@@ -423,7 +409,7 @@ static jet jet_unary (const pw_expression_code *c, const jet *x, double *discret
     pw_partials s = f->partials (x->v, 0, value);
     return jet_chain (value, &s, x, &(jet){ 0 });
   }
-  return jet_piecewise (c->op, x, discrete);
+  return c->op == PW_OP_PATH_AT ? jet_path_at (c, x, discrete) : jet_piecewise (c->op, x, discrete);
 }
 
 static jet jet_product (const jet *x, const jet *y) {

@@ -99,7 +99,7 @@ extern const pw_expression_function pw_expression_functions[]; /* and constants;
 
 /* A function of a place of a path: pw_expression_code.index. */
 typedef enum { PW_PATH_S, PW_PATH_X, PW_PATH_Y, PW_PATH_HEADING, PW_PATH_CURVATURE, PW_PATH_OFFSET } pw_path_function;
-extern const char *const pw_path_functions[]; /* their names; ends with NULL */
+extern const char *const pw_path_functions[]; /* their names, in this order; ends with NULL */
 
 /* The index of a function or constant, or -1. */
 int pw_expression_find_function (const char *name);

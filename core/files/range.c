@@ -264,12 +264,11 @@ static pw_range range_select (const pw_range *condition, const pw_range *x, cons
 
 /* At an arc length: x and y change at most as fast as it; a bound of the others is known between two corners alone. */
 static pw_range range_path_at (const pw_expression_code *c, const pw_range *s) {
-  pw_range r = { .lo = -DBL_MAX, .hi = DBL_MAX, .breaks = pw_path_break (c->path, s->lo) <= s->hi };
-  if (range_unbounded (s)) return (pw_range){ .lo = -DBL_MAX, .hi = DBL_MAX, .breaks = 1, .nan = 1 };
-  if (c->index != PW_PATH_X && c->index != PW_PATH_Y) return r;
+  const int unbounded = range_unbounded (s);
   double half = s->hi / 2 - s->lo / 2, middle = pw_expression_apply (c, 0, s->lo + half);
-  pw_range bound = range_rounded (middle - half, middle + half);
-  r.lo = bound.lo, r.hi = bound.hi;
+  pw_range r = range_rounded (middle - half, middle + half);
+  if (unbounded || c->index >= PW_PATH_HEADING) r.lo = -DBL_MAX, r.hi = DBL_MAX;
+  r.breaks = unbounded || pw_path_break (c->path, s->lo) <= s->hi, r.nan = unbounded;
   return r;
 }
 
