@@ -80,7 +80,7 @@ SLOW_TESTS := $(LONG_SHELLS) $(SLOWS) $(filter-out $(LONG_SHELLS),$(SHELLS))
 PROGRAMS  := $(BENCH:%.c=$(BUILD)/%) $(EMBED:%.c=$(BUILD)/%)
 PROGRAM   := $(BUILD)/pinwheel
 
-.PHONY: all everything demo test test-slow test-all deps install uninstall clean help
+.PHONY: all everything demo test test-all deps install uninstall clean help
 .DELETE_ON_ERROR:
 .SECONDARY:
 
@@ -93,7 +93,7 @@ help::
 	@echo 'make deps             installs the libraries that are missing'
 	@echo 'make demo             the EzyRoller by three methods: a table, figures in $(BUILD)/demo/'
 	@echo 'make gallery          pages that simulate the models in a browser, in $(BUILD)/site/'
-	@echo 'make test             runs the tests; test-slow: the slow ones and scripts; test-all: both'
+	@echo 'make test             runs the tests; test-all: also the slow ones and scripts (TESTED=1: only these)'
 	@echo 'make install          installs below DESTDIR in PREFIX (/usr/local); uninstall: removes that'
 	@echo 'make clean            removes $(BUILD)/'
 	@echo
@@ -102,7 +102,7 @@ help::
 
 # ---- Dependencies: targets that run something install missing libraries first ----
 
-ifneq ($(filter demo test test-slow test-all layers bench bench-quick bench-engine bench-effects hard san cov fuzz mutants,$(MAKECMDGOALS)),)
+ifneq ($(filter demo test test-all layers bench bench-quick bench-engine bench-effects hard san cov fuzz mutants,$(MAKECMDGOALS)),)
 ifndef NO_DEPS
 FIRST := deps
 endif
@@ -268,11 +268,8 @@ RUN_TESTS = PINWHEEL=$(PROGRAM) BUILD=$(BUILD) sh .ci/run-tests
 test: all $(TESTS) $(PROGRAMS)
 	@$(RUN_TESTS) $(TESTS)
 
-test-slow: everything
-	@$(RUN_TESTS) $(SLOW_TESTS)
-
 test-all: everything
-	@$(RUN_TESTS) $(SLOW_TESTS) $(TESTS)
+	@$(RUN_TESTS) $(SLOW_TESTS) $(if $(TESTED),,$(TESTS))
 
 demo: all $(BUILD)/benchmarks/demo
 	@$(BUILD)/benchmarks/demo
