@@ -119,6 +119,22 @@ static size_t outcome_term_length (const pw_system *s, const char *text) {
   return prefix + longest;
 }
 
+/* Refuses a functional of an expression, "max:abs (A.N)", and one that is written as a function, "rms (A.N)". */
+static int outcome_refuse_call (const char *text, const char *origin, pw_error *error) {
+  const char *column = text;
+  outcome_type (&column, &(double){ 0 });
+  if (column != text)
+    return pw_fail (error, PW_INPUT, "%s: %.*s takes a column; for an expression, define an output of the model",
+                    origin, (int)(column - text), text);
+  for (int i = 0; i <= PW_RMS; i++) {
+    const size_t n = strlen (outcome_prefix[i]) - 1;
+    if (strncmp (text, outcome_prefix[i], n) == 0 && text[n + strspn (text + n, " ")] == '(' && i != PW_MAX &&
+        i != PW_MIN)
+      return pw_fail (error, PW_INPUT, "%s: write %s and the column", origin, outcome_prefix[i]);
+  }
+  return PW_OK;
+}
+
 /* Makes the formula of an output from its text, with variables in place of columns. */
 static int outcome_read_formula (pw_outcomes *set, pw_outcome *o, const char *origin, pw_error *error) {
   char text[4000], name[300];
@@ -130,6 +146,7 @@ static int outcome_read_formula (pw_outcomes *set, pw_outcome *o, const char *or
            size = n      ? 0
                   : word ? word
                          : 1;
+    if (n == 0 && outcome_refuse_call (at, origin, error) != PW_OK) return error->status;
     if (n >= sizeof name || used + size + sizeof variable > sizeof text)
       return pw_fail (error, PW_INPUT, "%s: the expression is too long", origin);
     snprintf (name, sizeof name, "%.*s", (int)n, at);

@@ -174,8 +174,8 @@ const pw_expression_function pw_expression_functions[] = {
   FUNCTION_OF_TWO (jacobi_am, PW_OP_FUNCTION_OF_TWO, pw_jacobi_am),
   FUNCTION_OF_ONE (elliptic_K, pw_elliptic_K, PW_INCREASING, -INFINITY, 1),
   FUNCTION_WITHOUT_PARTIALS (mod, PW_OP_MOD, 2, 2),
-  FUNCTION_WITHOUT_PARTIALS (min, PW_OP_MIN, 1, 0),
-  FUNCTION_WITHOUT_PARTIALS (max, PW_OP_MAX, 1, 0),
+  FUNCTION_WITHOUT_PARTIALS (min, PW_OP_MIN, 2, 0),
+  FUNCTION_WITHOUT_PARTIALS (max, PW_OP_MAX, 2, 0),
   { .name = NULL },
 };
 

@@ -630,14 +630,16 @@ static int condition_columns (pw_condition *c, const pw_system *s, const char *t
 
 static int condition_read (pw_condition *c, const pw_system *s, const char *text, pw_error *error) {
   const char *names[PW_FORMULA_NAMES + 1] = { NULL };
+  static const char equal[] = "an equality holds at an instant only, which no step meets; use <= or >=";
   pw_expression_error why;
+  for (const char *p = text; (p = strchr (p, '=')) != NULL; p++)
+    if (p[1] != '=' && (p == text || strchr ("<>!=", p[-1]) == NULL)) return pw_fail (error, PW_INPUT, equal);
   if (condition_columns (c, s, text, names, error) != PW_OK) return error->status;
   int status = pw_expression_read (NULL, names, text, &c->arena, &c->expression, &why);
   if (status != PW_OK) return pw_fail (error, status, "%s", status == PW_INPUT ? why.text : "out of memory");
   const int last = c->expression->code[c->expression->codes - 1].op;
   for (int i = 0; i < c->expression->codes; i++)
-    if (c->expression->code[i].op == PW_OP_EQUAL)
-      return pw_fail (error, PW_INPUT, "== holds at an instant only, which no step meets; use <= or >=");
+    if (c->expression->code[i].op == PW_OP_EQUAL) return pw_fail (error, PW_INPUT, equal);
   if (last == PW_OP_SELECT || (last >= PW_OP_LESS && last <= PW_OP_GREATER_EQUAL)) return PW_OK;
   return pw_fail (error, PW_INPUT, "expected a condition, such as \"car.x > 10\"");
 }

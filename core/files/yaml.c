@@ -191,6 +191,8 @@ static int build_field (pw_reader *r, const pw_node *node, const char *element) 
   const int world = f->type == PW_POINT && node->type == PW_YAML_MAP; /* one point of all bodies */
   if (!world && pw_yaml_list_of (r, node, r->label, count, plural[f->type]) != PW_OK) return r->error->status;
   const pw_node *n = world ? node : node->first;
+  if (!world && (f->type == PW_POINT || f->type == PW_VECTOR) && n->type == PW_YAML_SCALAR)
+    return read_fail (r, node->at, "%s: expected %d %s found numbers", r->label, count, plural[f->type]);
   for (int i = 0; i < count; i++, to += pw_field_bytes (f->type), n = world ? n : n->next) build_value (r, n, i, to);
   return r->error->status;
 }
@@ -283,7 +285,9 @@ static int index_state (pw_reader *r, const pw_node *n) {
 
 static int build_state (pw_reader *r, const pw_node *node) {
   const pw_node *name = state_name (r, node);
-  const char *text = pw_yaml_prefixed (r, name->text);
+  const char *text = pw_yaml_prefixed (r, name->text), *unit;
+  for (const pw_node *n = node->first; n; n = n->next->next)
+    if (pw_node_is (n, "unit") && pw_yaml_si_unit (r, n->next, &unit) != PW_OK) return r->error->status;
   r->kind = &pw_kind_state;
   return text ? build_fields (r, name, name, text, node->first) : read_no_memory (r);
 }

@@ -124,10 +124,10 @@ int pw_copies_set (pw_copies *c, int i) {
       memcpy (end, p->bytes, p->size);
       end += p->size;
       if (p->number == NULL) continue;
-      double value = copy_value (c, p->number) + 0; /* not -0 */
-      if (!(fabs (value) <= COPY_NUMBER && value == floor (value)))
+      double value = copy_value (c, p->number) + 0;                        /* not -0 */
+      if (!(value >= 0 && value <= COPY_NUMBER && value == floor (value))) /* -1 would be a difference: "z-1" */
         return copy_fail (c, t->source, (size_t)(p->bytes - t->source->text) + p->size,
-                          "the value in braces is %g for %s = %d: expected a whole number", value, c->counter, i);
+                          "the value in braces is %g for %s = %d: expected a whole number >= 0", value, c->counter, i);
       end += snprintf (end, 20, "%ld", (long)value);
     }
     *end = 0;

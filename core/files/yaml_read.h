@@ -181,6 +181,9 @@ int pw_yaml_signal (pw_reader *r, const pw_node *node, pw_signal *signal);
 /* Reads a path, of which the following expressions can use functions. */
 int pw_yaml_path (pw_reader *r, const pw_node *node);
 
+/* Reads the unit of a state or output, which are displayed in SI units, like all columns. */
+int pw_yaml_si_unit (const pw_reader *r, const pw_node *node, const char **unit);
+
 /* Reads the outputs of the file.  The columns that they read are checked by pw_add_outputs. */
 int pw_yaml_outputs (pw_reader *r);
 

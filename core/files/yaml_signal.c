@@ -130,6 +130,30 @@ static const char *expand_name (void *context, const char *name) {
   return output >= 0 ? r->output[output]->node.text : contact_text (r, name);
 }
 
+/* Reports a name that is no column, with the nearest column of its body or element, or the nearest of these. */
+static int output_unknown (pw_reader *r, const pw_node *node, const char *name, size_t at) {
+  static const char *const part[] = { "x", "y", "phi", "vx", "vy", "omega" };
+  const size_t n = strcspn (name, ".");
+  const char *owner = PW_PRINTED (100, "%.*s", (int)n, name);
+  const int is_body = pw_names_find (&r->bodies, owner) >= 0, element = pw_names_find (&r->elements, owner);
+  const pw_kind *kind = element >= 0 ? pw_kinds[element] : NULL;
+  pw_nearest near = { .sought = is_body || kind ? name + n + 1 : owner };
+  for (int i = 0; is_body && i < 6; i++) pw_nearest_try (&near, part[i]);
+  for (int i = 0; kind && i < 2 * kind->internal; i++)
+    pw_nearest_try (&near, i % 2 ? kind->coordinate[i / 2].rate : kind->coordinate[i / 2].name);
+  for (int i = 0; kind && i < kind->rows; i++) pw_nearest_try (&near, kind->reaction[i].name);
+  for (int i = 0; kind && i < 4; i++)
+    if (pw_kind_find_column (kind, ((const char *const[]){ "x", "y", "work", "loss" })[i], &(pw_column){ 0 }))
+      pw_nearest_try (&near, ((const char *const[]){ "x", "y", "work", "loss" })[i]);
+  if (is_body || kind)
+    return expression_fail (r, node, at + n + 1, "%s has no column \"%.60s\"%s", owner, name + n + 1,
+                            pw_nearest_text (&near));
+  pw_suggest_bodies (r, &near);
+  for (const struct pw_name *e = r->elements.slot, *end = e + r->elements.size; e < end; e++)
+    if (e->name) pw_nearest_try (&near, e->name);
+  return expression_fail (r, node, at, "there is no body or element \"%s\"%s", owner, pw_nearest_text (&near));
+}
+
 /* Adds the states on which a column depends, at an offset of the expression; output: the one that reads it, or NULL. */
 static int signal_add_column (pw_reader *r, const pw_node *node, pw_signal_function *f,
                               const pw_output_function *output, const char *name, size_t at) {
@@ -149,6 +173,12 @@ static int signal_add_column (pw_reader *r, const pw_node *node, pw_signal_funct
     return expression_fail (r, node, at,
                             "%sa signal cannot depend on reactions, energies and work, which follow from it", where);
   if (found || output == NULL) return signal_add_state (r, node, f, name, at);
+  for (int i = 0; i < r->output_count; i++) /* it is an error of an output that contains the name */
+    for (const char *text = r->output[i]->node.text, *rest = text, *p; (p = pw_expression_next_name (&rest, state));)
+      if (strcmp (state, name) == 0) {
+        r->label = PW_PRINTED (100, "output %s", r->output[i]->output.name);
+        return output_unknown (r, &r->output[i]->node, name, (size_t)(p - text));
+      }
   return expression_fail (r, node, at, "%sthere is no such column", where);
 }
 
@@ -527,13 +557,13 @@ int pw_yaml_path (pw_reader *r, const pw_node *node) {
 
 /* ---- Outputs ---- */
 
-/* Outputs are displayed in SI units, like all columns. */
-static int output_unit (const pw_reader *r, const pw_node *node, const char **unit) {
+int pw_yaml_si_unit (const pw_reader *r, const pw_node *node, const char **unit) {
   const char *at;
   if (pw_yaml_text (r, node, "unit", unit) != PW_OK || node == NULL) return r->error->status;
   const pw_unit_name *other = pw_yaml_other_unit (*unit, &at);
   if (other == NULL) return PW_OK;
-  return read_fail (r, node->at, "unit: \"%s\": outputs are in SI units and radians, as all columns", other->name);
+  return read_fail (r, node->at, "unit: \"%s\": states and outputs are in SI units and radians, as all columns",
+                    other->name);
 }
 
 /* Reads an output but for the expression of its value. */
@@ -565,7 +595,7 @@ static int output_head (pw_reader *r, const pw_node *node) {
   o->output.value = (pw_function){ signal_eval, o, NULL, NULL, signal_open, signal_close, &o->function.text };
   pw_names_add (&r->outputs, o->output.name, r->output_count);
   r->output[r->output_count++] = o;
-  if (output_unit (r, v[2], &o->output.unit) != PW_OK) return r->error->status;
+  if (pw_yaml_si_unit (r, v[2], &o->output.unit) != PW_OK) return r->error->status;
   return pw_yaml_text (r, v[3], "about", &o->output.about);
 }
 
@@ -620,30 +650,6 @@ int pw_yaml_outputs (pw_reader *r) {
   for (int i = first; i < r->output_count && r->error->status == PW_OK; i++)
     if (r->output[i]->reader == PW_OUTPUT_UNREAD) output_expression (r, i, i);
   return r->error->status;
-}
-
-/* Reports a name that is no column, with the nearest column of its body or element, or the nearest of these. */
-static int output_unknown (pw_reader *r, const pw_node *node, const char *name, size_t at) {
-  static const char *const part[] = { "x", "y", "phi", "vx", "vy", "omega" };
-  const size_t n = strcspn (name, ".");
-  const char *owner = PW_PRINTED (100, "%.*s", (int)n, name);
-  const int is_body = pw_names_find (&r->bodies, owner) >= 0, element = pw_names_find (&r->elements, owner);
-  const pw_kind *kind = element >= 0 ? pw_kinds[element] : NULL;
-  pw_nearest near = { .sought = is_body || kind ? name + n + 1 : owner };
-  for (int i = 0; is_body && i < 6; i++) pw_nearest_try (&near, part[i]);
-  for (int i = 0; kind && i < 2 * kind->internal; i++)
-    pw_nearest_try (&near, i % 2 ? kind->coordinate[i / 2].rate : kind->coordinate[i / 2].name);
-  for (int i = 0; kind && i < kind->rows; i++) pw_nearest_try (&near, kind->reaction[i].name);
-  for (int i = 0; kind && i < 4; i++)
-    if (pw_kind_find_column (kind, ((const char *const[]){ "x", "y", "work", "loss" })[i], &(pw_column){ 0 }))
-      pw_nearest_try (&near, ((const char *const[]){ "x", "y", "work", "loss" })[i]);
-  if (is_body || kind)
-    return expression_fail (r, node, at + n + 1, "%s has no column \"%.60s\"%s", owner, name + n + 1,
-                            pw_nearest_text (&near));
-  pw_suggest_bodies (r, &near);
-  for (const struct pw_name *e = r->elements.slot, *end = e + r->elements.size; e < end; e++)
-    if (e->name) pw_nearest_try (&near, e->name);
-  return expression_fail (r, node, at, "there is no body or element \"%s\"%s", owner, pw_nearest_text (&near));
 }
 
 int pw_add_outputs (pw_reader *r) {

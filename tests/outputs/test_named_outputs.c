@@ -136,10 +136,11 @@ TEST (conditions) {
 
 TEST (bad_conditions) {
   static const char *const bad[][2] = { { "hight > 1", "did you mean \"height\"?" },
-                                        { "ball.x == 1", "==" },
+                                        { "ball.x == 1", "use <= or >=" },
+                                        { "ball.x = 1", "use <= or >=" },
                                         { "ball.x", "expected a condition" },
                                         { "ball.x >", "something is missing" } };
-  for (int i = 0; i < 4; i++) {
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
     pw_error error = { 0 };
     assert_null (pw_condition_open (scene.system, bad[i][0], &error));
     assert_int_equal (error.status, PW_INPUT);
@@ -223,17 +224,17 @@ TEST (sweep_columns) {
   for (int i = 0; i < 3; i++) outputs_near (t[i], end[i], 1e-9), outputs_near (height[i], most[i], 1e-8);
   outputs_near (at[0], 3.75, 1e-8);
   assert_string_equal (word[2], "nan"); /* the run ends before */
-  cli_bad_each (
-      "sweep",
-      (const cli_wrong[]){
-          { "@/outputs.yaml --vary ball.vx=1,2 --of hight -o @/x.csv", "--of hight: no column \"hight\"; did you "
-                                                                       "mean \"height\"?" },
-          { "@/outputs.yaml --vary ball.vx=1,2 --of ball.x -o @/x.csv", "--of ball.x: the table has this column" },
-          { "@/outputs.yaml --vary ball.vx=1,2 --until 'hight > 1' -o @/x.csv",
-            "--until hight > 1: no column \"hight\"; did you mean \"height\"?" },
-          { "@/outputs.yaml --vary ball.vx=1,2 --of height --error -o @/x.csv",
-            "--error compares complete runs: it cannot be given together with --of" } },
-      4);
+  cli_bad_each ("sweep",
+                (const cli_wrong[]){ { "@/outputs.yaml --vary ball.vx=1,2 --of hight -o @/x.csv",
+                                       "--of hight: no column \"hight\"; did you "
+                                       "mean \"height\"?" },
+                                     { "@/outputs.yaml --vary ball.vx=1,2 --of ball.x -o @/x.csv",
+                                       "--of ball.x: the table has this column; leave it out" },
+                                     { "@/outputs.yaml --vary ball.vx=1,2 --until 'hight > 1' -o @/x.csv",
+                                       "--until hight > 1: no column \"hight\"; did you mean \"height\"?" },
+                                     { "@/outputs.yaml --vary ball.vx=1,2 --of height --error -o @/x.csv",
+                                       "--error compares complete runs: it cannot be given together with --of" } },
+                4);
 }
 
 /* The time t = 1.25 m/vx at which the ball passes a point, and its height there. */

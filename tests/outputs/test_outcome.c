@@ -156,6 +156,10 @@ TEST (bad) {
     { "mean:balance", "--of mean:balance: balance describes the integration, not the motion: it has no mean" },
     { "rms:motor-1.work", "--of rms:motor-1.work: no rms: of work and losses; valid are final:, max:, min:, mean: and "
                           "integral:" },
+    { "max:abs (wheel.phi)",
+      "--of max:abs (wheel.phi): max: takes a column; for an expression, define an output of the model" },
+    { "2*rms (wheel.phi)", "--of 2*rms (wheel.phi): write rms: and the column" },
+    { "max (wheel.phi)", "--of max (wheel.phi): too few arguments" },
     { "wheel.phi +", "--of wheel.phi +: something is missing after \"+\"" },
   };
   for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {

@@ -234,10 +234,11 @@ static void report_error (pw_table *table, const char *name, double end, double 
   pw_row_end (table);
 }
 
-/* The errors of a run, NULL without a reference, and what this does not contain (pw_motion_gaps). */
-static void report_errors (const pw_reference_error *errors, const char *gaps) {
-  static const char *const name[] = { "length", "angle", "speed", "rate" };
-  static const char *const unit[] = { "m", "rad", "m/s", "rad/s" };
+/* The errors of a run, NULL without a reference, and what this does not contain (pw_motion_gaps); states: number of
+ * first-order states, whose errors count as those of speeds. */
+static void report_errors (const pw_reference_error *errors, const char *gaps, int states) {
+  const char *const name[] = { "length", "angle", states ? "speed, state" : "speed", "rate" };
+  const char *const unit[] = { "m", "rad", states ? "" : "m/s", "rad/s" };
   if (errors == NULL) return;
   int known = !isnan (errors->reactions);
   for (int i = 0; i < 4; i++) known |= !isnan (errors->most[i]);
@@ -312,7 +313,7 @@ void pw_report_end (const pw_run_cli *command, const pw_summary *summary, const 
   report_reactions (system, last);
   report_outputs (system, last);
   if (command->with_energies) report_energy (last);
-  report_errors (summary->reference, command->comparison.gaps);
+  report_errors (summary->reference, command->comparison.gaps, pw_system_states (command->compiled.system));
   printf ("\n  worst scaled residuals: position %s, velocity %s\n", PW_DIGITS (stats->position, 2),
           PW_DIGITS (stats->velocity, 2));
   printf ("  %s, %ld rejected, %s, %s, %s, %s s of processor time\n", PW_COUNTED (stats->steps, "step"),

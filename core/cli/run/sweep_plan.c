@@ -291,7 +291,7 @@ static int plan_open_outputs (pw_plan *plan, const pw_system *system, pw_error *
   for (int i = 0; i < plan->outputs && status == PW_OK; i++) {
     if (pw_names_find (&plan->column_of, plan->of[i]) >= 0 || strcmp (plan->of[i], "t") == 0 ||
         strcmp (plan->of[i], "kinetic") == 0)
-      status = pw_fail (error, PW_INPUT, "--of %s: the table has this column", plan->of[i]);
+      status = pw_fail (error, PW_INPUT, "--of %s: the table has this column; leave it out", plan->of[i]);
     plan->output[i].name = plan->of[i];
     plan->output[i].unit = pw_arena_copy (&plan->arena, pw_outcome_unit (&set, i, unit, sizeof unit));
     if (plan->output[i].unit == NULL) status = pw_fail (error, PW_RESOURCE, "out of memory");
