@@ -382,7 +382,7 @@ static void scene_run (const scene_trial *x, int which, double by, double *out) 
   if (which >= 0) value[which] += by;
   gallery_scene scene = gallery_load (x->file, x->parameter[0], value[0], x->parameter[1], value[1], NULL);
   for (int i = 0; i < SCENE_OUTPUTS; i++) of[i] = x->output[i];
-  check_ok (pw_outcomes_open (&set, scene.system, "--of", of, SCENE_OUTPUTS, &error), &error);
+  check_ok (pw_outcomes_open (&set, scene.system, "--of", of, SCENE_OUTPUTS, NULL, &error), &error);
   const pw_settings settings = { .rtol = 3e-14, .span = x->t_end, .max_steps = 100000000 };
   check_ok (pw_outcomes_run (&set, "erk8+projection", &settings, x->t_end, NULL, &error), &error);
   for (int i = 0; i < SCENE_OUTPUTS; i++) out[i] = pw_outcome_value (&set, i);
