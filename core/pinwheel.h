@@ -345,11 +345,14 @@ typedef struct {
   pw_signal value; /* [m] or [rad]; with its first and second time derivative */
 } pw_drive;
 
-/* Wheel: a knife edge; the contact point does not move across the heading.  One nonholonomic constraint equation. */
+/* Wheel: a knife edge; the contact point does not move across the heading.  One nonholonomic constraint equation.  With
+ * a grip, it slides against the force grip_sliding once holding would take more than the grip. */
 typedef struct {
   const char *name, *body;
-  double at[2];   /* contact point in the body's frame [m] */
-  double heading; /* rolling direction in the body's frame [rad] */
+  double at[2];        /* contact point in the body's frame [m] */
+  double heading;      /* rolling direction in the body's frame [rad] */
+  double grip;         /* largest lateral force [N]; 0: no limit */
+  double grip_sliding; /* lateral force while sliding [N], at most the grip; 0: the grip */
 } pw_wheel;
 
 /* Rolling wheel: the contact point moves neither across the heading nor, except by rolling, along it.  Two
@@ -368,8 +371,9 @@ typedef struct {
 /* Steered wheel: a wheel whose heading in the body follows a signal.  One nonholonomic constraint equation. */
 typedef struct {
   const char *name, *body;
-  double at[2];      /* contact point in the body's frame [m] */
-  pw_signal heading; /* rolling direction in the body's frame [rad]; with its first time derivative */
+  double at[2];              /* contact point in the body's frame [m] */
+  pw_signal heading;         /* rolling direction in the body's frame [rad]; with its first time derivative */
+  double grip, grip_sliding; /* as of a wheel [N] */
 } pw_steered_wheel;
 
 /* Speed: a point's speed along a direction of its body follows a signal.  One nonholonomic constraint equation. */
@@ -426,7 +430,8 @@ typedef struct {
 typedef struct {
   const char *name, *body[2]; /* the two bodies, or "ground" for one of them */
   double viscous, limit;      /* [N m s/rad]; Coulomb torque [N m]; >= 0 */
-  double speed;               /* below about this velocity the Coulomb torque is smoothed [rad/s]; > 0 if limit > 0 */
+  double speed;         /* below about this velocity the Coulomb torque is smoothed [rad/s]; 0: it is exact, and holds */
+  double limit_sliding; /* exact Coulomb torque while sliding [N m], at most the limit; 0: the limit */
 } pw_friction;
 
 /* Sliding friction: a viscous and a Coulomb force that oppose the motion of a point of body 1 along a line of body 2,
@@ -436,7 +441,8 @@ typedef struct {
   double at[2][2];       /* the point, and a point of the line, in each body's frame [m]; on the ground: in the world */
   double heading;        /* direction of the line in body 2's frame [rad] */
   double viscous, limit; /* [N s/m]; Coulomb force [N]; >= 0 */
-  double speed;          /* below about this speed the Coulomb force is smoothed [m/s]; > 0 if limit > 0 */
+  double speed;          /* below about this speed the Coulomb force is smoothed [m/s]; 0: it is exact, and holds */
+  double limit_sliding;  /* exact Coulomb force while sliding [N], at most the limit; 0: the limit */
 } pw_sliding_friction;
 
 /* Drag: still air opposes the velocity of a body's centre of mass and its rotation. */
@@ -592,6 +598,15 @@ typedef enum {
   PW_NONHOLONOMIC /* S (q, t) v = eta (t, q) */
 } pw_level;
 
+/* Limits of the multiplier of a constraint equation, constants.  Between them the equation holds.  At one of them it is
+ * not enforced: its multiplier is given, and J v - eta, of a holonomic equation g, stays >= 0 at the largest multiplier,
+ * <= 0 at the smallest one. */
+typedef struct {
+  double least, most;       /* multipliers with which the equation holds; both 0: it never does */
+  double sliding[2];        /* those given at the smallest and at the largest one; their magnitudes are not larger */
+  double restitution;       /* of an infinite limit: velocity J v - eta after an impact over that before it, 0 to 1 */
+} pw_bounds;
+
 /* An element type: one const table.  A NULL function is zero (the self-test verifies this); J of constraint equations
  * and g of holonomic ones are required.  Sizes are per element; at most 4 bodies, 4 internal coordinates, 6 constraint
  * equations, 4 signals. */
@@ -612,6 +627,11 @@ struct pw_kind {
   const pw_quantity *reaction;                                 /* rows: meaning of each -lambda */
   const pw_quantity *coordinate;                               /* internal: the internal coordinates, in "rad" */
   const char *(*reaction_unit) (const void *element, int row); /* if it depends on the element; may be NULL */
+  /* Sets the limits of an element's multipliers, -INFINITY to INFINITY before the call; NULL: they stay so. */
+  void (*limits) (const void *element, pw_bounds *limit);
+  /* The type that stands for this one where is_exact (definition) is not 0; with the same definition and fields. */
+  const struct pw_kind *exact;
+  int (*is_exact) (const void *definition);
 
   /* Converts a checked definition into a prepared element.  bodies: those it names or acts on, in order; the ground
    * is a body without mass.  internal: receives mass and initial values of each internal coordinate; zero before.
@@ -635,7 +655,7 @@ struct pw_kind {
   pw_batch_function *force_q, *force_v; /* cols x cols */
   pw_batch_function *energy;            /* 1: potential energy [J] */
   pw_batch_function *power;             /* 1: power supplied to the system [W]; NULL: -lambda . eta */
-  pw_batch_function *loss;              /* 1: dissipated power [W], >= 0 */
+  pw_batch_function *loss;              /* 1: dissipated power [W], >= 0 but for round-off where multipliers have limits */
   pw_batch_function *contact;           /* 3: contact point, or point of a marker [m], and heading [rad]; for output */
   /* 2 cols, for forces that saturate, such as friction: the smallest change of each coordinate, then of each velocity,
    * that reverses the force or changes it by its own magnitude.  Entries are INFINITY before the call. */
@@ -678,6 +698,9 @@ static inline int pw_kind_signals_feedback (const pw_kind *kind) {
   }
 PW_KINDS
 #undef PW_KIND
+
+/* What stands for these types where Coulomb friction is exact (pw_kind.exact). */
+extern PW_EXPORT const pw_kind pw_kind_dry_friction, pw_kind_dry_sliding_friction;
 
 /* The built-in element types; ends with NULL. */
 extern const pw_kind *const pw_kinds[];

@@ -6,6 +6,7 @@
 #ifndef PW_SYSTEM_H
 #define PW_SYSTEM_H
 
+#include <math.h>
 #include "run.h"
 #include "model.h"
 
@@ -68,6 +69,8 @@ struct pw_system {
   size_t jacobian;         /* entries of J of all elements, zeros included */
   size_t block;            /* the largest count x cols of a batch; twice that if its force saturates */
   int rheonomic;           /* batches whose eta may be other than 0 */
+  int limited;             /* constraint equations whose multipliers have limits */
+  pw_bounds *limit;         /* rows, if there are any; else NULL */
   pw_scale scale;          /* with T = 1 s; T of a run is in its workspace */
   const char **body_name;  /* bodies */
   double *M;               /* coords: diagonal of M; 0 of first-order states, which have no kinetic energy */
@@ -155,6 +158,12 @@ static inline double pw_unit (const pw_system *s, int j) {
 /* The larger of two numbers by one comparison; b if one is NaN. */
 static inline double pw_larger (double a, double b) {
   return a > b ? a : b;
+}
+
+/* 1 if the multiplier of a constraint equation has a finite limit. */
+static inline int pw_is_limited (const pw_system *s, int row) {
+  const pw_bounds *x = s->limit ? &s->limit[row] : NULL;
+  return x && (x->least > -INFINITY || x->most < INFINITY);
 }
 
 /* ---- Columns and outputs ---- */
