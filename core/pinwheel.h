@@ -430,7 +430,7 @@ typedef struct {
 typedef struct {
   const char *name, *body[2]; /* the two bodies, or "ground" for one of them */
   double viscous, limit;      /* [N m s/rad]; Coulomb torque [N m]; >= 0 */
-  double speed;         /* below about this velocity the Coulomb torque is smoothed [rad/s]; 0: it is exact, and holds */
+  double speed; /* below about this velocity the Coulomb torque is smoothed [rad/s]; 0: it is exact, and holds */
   double limit_sliding; /* exact Coulomb torque while sliding [N m], at most the limit; 0: the limit */
 } pw_friction;
 
@@ -602,9 +602,9 @@ typedef enum {
  * not enforced: its multiplier is given, and J v - eta, of a holonomic equation g, stays >= 0 at the largest multiplier,
  * <= 0 at the smallest one. */
 typedef struct {
-  double least, most;       /* multipliers with which the equation holds; both 0: it never does */
-  double sliding[2];        /* those given at the smallest and at the largest one; their magnitudes are not larger */
-  double restitution;       /* of an infinite limit: velocity J v - eta after an impact over that before it, 0 to 1 */
+  double least, most; /* multipliers with which the equation holds; both 0: it never does */
+  double sliding[2];  /* those given at the smallest and at the largest one; their magnitudes are not larger */
+  double restitution; /* of an infinite limit: velocity J v - eta after an impact over that before it, 0 to 1 */
 } pw_bounds;
 
 /* An element type: one const table.  A NULL function is zero (the self-test verifies this); J of constraint equations
@@ -655,8 +655,8 @@ struct pw_kind {
   pw_batch_function *force_q, *force_v; /* cols x cols */
   pw_batch_function *energy;            /* 1: potential energy [J] */
   pw_batch_function *power;             /* 1: power supplied to the system [W]; NULL: -lambda . eta */
-  pw_batch_function *loss;              /* 1: dissipated power [W], >= 0 but for round-off where multipliers have limits */
-  pw_batch_function *contact;           /* 3: contact point, or point of a marker [m], and heading [rad]; for output */
+  pw_batch_function *loss;    /* 1: dissipated power [W], >= 0 but for round-off where multipliers have limits */
+  pw_batch_function *contact; /* 3: contact point, or point of a marker [m], and heading [rad]; for output */
   /* 2 cols, for forces that saturate, such as friction: the smallest change of each coordinate, then of each velocity,
    * that reverses the force or changes it by its own magnitude.  Entries are INFINITY before the call. */
   pw_batch_function *saturation;

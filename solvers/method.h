@@ -83,6 +83,7 @@ int pw_dead_point_explain (struct pw_run *r, pw_error *error);
 /* ---- The data of a run ---- */
 
 enum { PW_MAX_OPTIONS = 12 };
+enum { PW_FORCES_AT_LIMITS = 2 }; /* pw_run.forces: of equations that are not enforced, too */
 
 struct pw_scene_step;
 
@@ -95,19 +96,22 @@ struct pw_run {
   int stabilisation;             /* index in method->stabilisations */
   double option[PW_MAX_OPTIONS]; /* one per method->options */
   pw_settings settings;
-  int fixed_steps;             /* 1: fixed step size */
-  int entries;                 /* of the ledger: s->entries, then settings.integrals */
-  pw_saddle *saddle;           /* matrix of M and all active rows: for accelerations, impulses */
-  const unsigned char *active; /* rows: 0 for redundant ones; NULL: none is redundant */
-  int redundant;               /* number of redundant rows; what follows, to reselect_below, only if there are any */
-  int redundant_drive;         /* 1: one of them has an eta, so that work depends on its multiplier */
-  int *redundant_row;          /* redundant: their indices */
-  unsigned char *active_array; /* rows: what `active` points to */
-  double *coefficient;         /* 5 x rows: a redundant row as a combination of active rows; scratch of rank.c */
-  double *row_force;           /* coords + 3: right-hand side for the coefficients of a redundant row; 0 between uses */
-  double *least_norm;          /* rows: least-norm multipliers for the ledger */
-  double independence;         /* of the active rows at the state reached (rank.h) */
-  double reselect_below;       /* independence below which other active rows are tried */
+  int fixed_steps;               /* 1: fixed step size */
+  int entries;                   /* of the ledger: s->entries, then settings.integrals */
+  pw_saddle *saddle;             /* matrix of M and all active rows: for accelerations, impulses */
+  const unsigned char *active;   /* rows: 0 for redundant ones and those not enforced; NULL: there are none */
+  int redundant;                 /* number of redundant rows; what follows, to reselect_below, only if there are any */
+  struct pw_events *events;      /* of equations whose multipliers have limits (events.h); NULL: there are none */
+  const unsigned char *enforced; /* rows: 0 for those whose multipliers are at a limit; NULL: none is */
+  int forces;                    /* 0: constant ones alone; 1: others, too; PW_FORCES_AT_LIMITS */
+  int redundant_drive;           /* 1: one of them has an eta, so that work depends on its multiplier */
+  int *redundant_row;            /* redundant: their indices */
+  unsigned char *active_array;   /* rows: what `active` points to */
+  double *coefficient;           /* 5 x rows: a redundant row as a combination of active rows; scratch of rank.c */
+  double *row_force;     /* coords + 3: right-hand side for the coefficients of a redundant row; 0 between uses */
+  double *least_norm;    /* rows: least-norm multipliers for the ledger */
+  double independence;   /* of the active rows at the state reached (rank.h) */
+  double reselect_below; /* independence below which other active rows are tried */
   const struct pw_specialised *specialised; /* compiled code of the scene in use, or NULL */
   struct pw_scene *scene;                   /* its data; NULL: none, or a constant pivot is too small */
   pw_thresholds thresholds;                 /* of the watchdog */
@@ -426,6 +430,10 @@ void pw_record_residuals (pw_run *r);
 static inline void pw_forget_residuals (pw_run *r) {
   r->residuals.position = r->residuals.velocity = NAN;
 }
+
+/* Equations that are not enforced (events.c): adds their forces to f (coords + 3); sets their multipliers. */
+void pw_events_add_forces (const pw_run *r, double *f);
+void pw_events_fill (const pw_run *r, double *lambda);
 
 /* ---- Projection ---- */
 

@@ -12,10 +12,10 @@
 #include "batch.h"
 
 typedef struct {
-  double a, b;    /* the direction in the body's frame */
-  double arm;     /* l [m] */
-  double at[2];   /* P in the body's frame [m] */
-  double heading; /* of the wheel in the body's frame [rad] */
+  double a, b;               /* the direction in the body's frame */
+  double arm;                /* l [m] */
+  double at[2];              /* P in the body's frame [m] */
+  double heading;            /* of the wheel in the body's frame [rad] */
   double grip, grip_sliding; /* limits of the force along d [N]; grip 0: none */
 } contact;
 
@@ -90,12 +90,11 @@ PER_ELEMENT (contact_place, contact, 3) {
 }
 
 /* Fields of the definition of a wheel that may slide. */
-#define GRIP_FIELDS(type)                                                                                   \
-  { PW_AT (type, grip), PW_NUMBER,                                                                          \
-    .unit = "N",        .domain = PW_NONNEGATIVE,                                                           \
-    .about = "largest lateral force, beyond which the wheel slides; 0: no limit" },                         \
-  {                                                                                                         \
-    PW_AT (type, grip_sliding), PW_NUMBER, .unit = "N", .domain = PW_NONNEGATIVE,                           \
+#define GRIP_FIELDS(type)                                                                                    \
+  { PW_AT (type, grip), PW_NUMBER, .unit = "N", .domain = PW_NONNEGATIVE,                                    \
+    .about = "largest lateral force, beyond which the wheel slides; 0: no limit" },                          \
+  {                                                                                                          \
+    PW_AT (type, grip_sliding), PW_NUMBER, .unit = "N", .domain = PW_NONNEGATIVE,                            \
                                            .about = "lateral force while it slides; 0: as large as the grip" \
   }
 

@@ -15,8 +15,8 @@
 #include "batch.h"
 
 typedef struct {
-  double viscous, limit; /* c, L */
-  double inverse;        /* 1 / v0; 0 without a limit */
+  double viscous, limit;   /* c, L */
+  double inverse;          /* 1 / v0; 0 without a limit */
   double holding, sliding; /* limits of exact friction; limit is 0 then */
 } coulomb;
 
@@ -52,23 +52,23 @@ static inline double coulomb_saturation (const coulomb *law, double v, double de
 
 /* EXACT_COULOMB (friction) defines the functions of a constraint equation with an element and a state as below, whose
  * definition is a pw_friction: friction_is_exact, friction_limits, friction_exact_J, friction_exact_loss. */
-#define EXACT_COULOMB(type, element_type, law_of)                             \
-  static int type##_is_exact (const void *definition) {                       \
-    const pw_##element_type *x = definition;                                  \
-    return x->limit > 0 && x->speed == 0;                                     \
-  }                                                                           \
-  static void type##_limits (const void *element, pw_bounds *limit) {          \
-    const coulomb *law = law_of;                                              \
-    limit_both_sides (law->holding, law->sliding, limit);                     \
-  }                                                                           \
-  PER_ELEMENT (type##_exact_J, type, 6) {                                     \
-    for (int i = 0; i < 6; i++) out[i] = now.S[i];                            \
-  }                                                                           \
-  static void type##_exact_loss (const pw_batch *batch, double *out) {        \
-    for (int e = 0; e < batch->count; e++) {                                  \
-      type##_state now = type##_at (batch, e);                                \
-      out[e] = (coulomb_force (now.law, now.v) + batch->lambda[e]) * now.v;   \
-    }                                                                         \
+#define EXACT_COULOMB(type, element_type, law_of)                           \
+  static int type##_is_exact (const void *definition) {                     \
+    const pw_##element_type *x = definition;                                \
+    return x->limit > 0 && x->speed == 0;                                   \
+  }                                                                         \
+  static void type##_limits (const void *element, pw_bounds *limit) {       \
+    const coulomb *law = law_of;                                            \
+    limit_both_sides (law->holding, law->sliding, limit);                   \
+  }                                                                         \
+  PER_ELEMENT (type##_exact_J, type, 6) {                                   \
+    for (int i = 0; i < 6; i++) out[i] = now.S[i];                          \
+  }                                                                         \
+  static void type##_exact_loss (const pw_batch *batch, double *out) {      \
+    for (int e = 0; e < batch->count; e++) {                                \
+      type##_state now = type##_at (batch, e);                              \
+      out[e] = (coulomb_force (now.law, now.v) + batch->lambda[e]) * now.v; \
+    }                                                                       \
   }
 
 /* COULOMB (friction, 6) defines friction_force, friction_force_v, friction_saturation and friction_loss for elements

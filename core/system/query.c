@@ -356,6 +356,16 @@ int pw_system_find_column (const pw_system *s, const char *name, pw_column *c, p
   return pw_fail (error, PW_INPUT, "no column \"%.100s\"%s", name, pw_nearest_text (&near));
 }
 
+int pw_system_limited (const pw_system *s) {
+  return s->limited;
+}
+
+const char *pw_system_mode_name (const pw_system *s, int row, int mode) {
+  const pw_bounds *limit = s->limit ? &s->limit[row] : NULL;
+  if (mode == 0) return "holds";
+  return limit && (isinf (limit->least) || isinf (limit->most)) ? "free" : mode > 0 ? "slides+" : "slides-";
+}
+
 /* "torque T: value" */
 static char *query_signal_label (const pw_system *s, int signal, char *buffer, size_t size) {
   int e, n;

@@ -70,7 +70,7 @@ struct pw_system {
   size_t block;            /* the largest count x cols of a batch; twice that if its force saturates */
   int rheonomic;           /* batches whose eta may be other than 0 */
   int limited;             /* constraint equations whose multipliers have limits */
-  pw_bounds *limit;         /* rows, if there are any; else NULL */
+  pw_bounds *limit;        /* rows, if there are any; else NULL */
   pw_scale scale;          /* with T = 1 s; T of a run is in its workspace */
   const char **body_name;  /* bodies */
   double *M;               /* coords: diagonal of M; 0 of first-order states, which have no kinetic energy */

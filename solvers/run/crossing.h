@@ -6,7 +6,7 @@
 enum { PW_CROSSING_DEPTH = 4 }; /* halvings of a step; parts of 1/16 */
 
 typedef struct {
-  int count; /* functions */
+  int count;                                                           /* functions */
   int (*at) (void *context, double t, double *value, pw_error *error); /* stores their values: a status; NaN: unknown */
   void *context;
   double *memory; /* (PW_CROSSING_DEPTH + 2) x count */

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "rank.h"
+#include "events.h"
 #include "method.h"
 #include "util.h"
 
@@ -82,6 +83,7 @@ void pw_run_close (pw_run *r) {
   pw_saddle_close (r->saddle);
   pw_saddle_close (r->watchdog.saddle);
   pw_workspace_free (r->w);
+  pw_events_close (r);
   free (r->memory);
   free (r->origin);
   pw_arena_free (&r->arena);
@@ -98,6 +100,7 @@ static int run_restart_method (pw_run *r, pw_error *error) {
 int pw_run_renew (pw_run *r, pw_error *error) {
   int status = pw_run_open_saddle (r, error);
   r->watchdog.singular_ahead = 1;
+  if (status == PW_OK && r->events) status = pw_events_project (r, error);
   if (status == PW_OK) status = pw_run_evaluate (r, error);
   if (status == PW_OK) pw_watchdog_begin (r);
   run_close_method (r); /* it may use the previous saddle */
@@ -168,6 +171,7 @@ int pw_run_advance (pw_run *r, double t_end, pw_error *error) {
   if (r->stalled == 0) r->w->failed = NULL; /* otherwise it is the signal that stops the run */
   r->interrupted |= r->t >= r->breakpoint;
   if (r->interrupted) status = run_restart_method (r, error);
+  if (status == PW_OK && r->events) status = pw_events_prepare (r, error);
   if (status == PW_OK) r->interrupted = 0;
   if (status == PW_OK) status = run_reselect (r, error);
   const double stop = fmin (t_end, r->breakpoint);
@@ -179,6 +183,7 @@ int pw_run_advance (pw_run *r, double t_end, pw_error *error) {
   r->near_singular = 0;
   if (status == PW_OK) status = r->method->advance (r, t_end, error);
   if (status == PW_STOPPED) return status;
+  if (status == PW_OK && r->events) status = pw_events_follow (r, before, error);
   if (status == PW_OK) status = pw_run_watchdog (r, error);
   if (status == PW_OK) status = pw_run_check_resolution (r, error);
   if (status == PW_OK) pw_ledger_record (r);
@@ -222,8 +227,9 @@ int pw_run_sample (pw_run *r, double t, pw_sample *sample, pw_error *error) {
   if (status != PW_OK) return status;
   *sample = (pw_sample){ .t = t, .q = r->q_at, .v = r->v_at, .a = r->a_at, .lambda = r->lambda_at };
   if (r->redundant && pw_saddle_factor (r->saddle) == PW_OK) pw_rank_least_norm (r, r->lambda_at);
+  if (r->enforced) pw_events_fill (r, r->lambda_at);
   run_fill_energies (r, sample);
-  pw_evaluate_residuals (r->w, NULL, &now);
+  pw_evaluate_residuals (r->w, r->enforced, &now);
   sample->position = now.position;
   sample->velocity = now.velocity;
   return PW_OK;
@@ -287,6 +293,8 @@ int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error
   if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
   double before = 0, after = 0;
   if (run_has_no_method (r, error)) return PW_RESOURCE;
+  if (r->events)
+    return pw_fail (error, PW_INPUT, "model %s: no restart: reactions have limits, as by a grip", r->s->model);
   if (run_check_given (r, q, 0, error) != PW_OK || run_check_given (r, v, r->s->coords, error) != PW_OK)
     return PW_INPUT;
   r->w->failed = NULL;
@@ -538,6 +546,11 @@ void pw_ledger_rates (pw_run *r, const double *lambda, double *rate) {
     memcpy (r->least_norm, lambda, (size_t)r->s->rows * sizeof *lambda);
     pw_rank_least_norm (r, r->least_norm);
     lambda = r->least_norm;
+  }
+  if (r->enforced && !unique) { /* multipliers of the others are 0 in the solver */
+    memcpy (r->scratch, lambda, (size_t)r->s->rows * sizeof *lambda);
+    pw_events_fill (r, r->scratch);
+    lambda = r->scratch;
   }
   pw_evaluate_ledger (r->w, lambda, rate);
   if (integrals) ledger_integrands (r, lambda, rate, rate + r->s->entries);
