@@ -45,7 +45,6 @@ typedef struct pw_events {
   double start_t, previous_t;           /* NaN: not known */
   double *memory;                       /* of pw_first_crossing */
   double *u, *u_before, *impulse;
-  int decided; /* 1: modes have just been decided */
   int pending; /* 1: modes must be decided at the state reached */
   int fell;    /* 1: u has changed its sign without having left its root: too short a motion to be resolved */
 
@@ -485,11 +484,9 @@ static int events_decide (pw_run *r, int jumps, int *changes, pw_error *error) {
   return events_log (r) == PW_OK ? PW_OK : pw_fail_memory (r->s, error);
 }
 
-/* Samples do not satisfy the constraints exactly in all methods. */
-int pw_events_project (pw_run *r, pw_error *error) {
+/* Projects the state reached onto the equations that hold so far: not all samples satisfy them exactly. */
+static int events_project (pw_run *r, pw_error *error) {
   pw_projector p;
-  if (!r->events->decided) return PW_OK;
-  r->events->decided = 0;
   int status = pw_projector_open (&p, r, NULL, NULL, error);
   if (status != PW_OK) return status;
   const double before = pw_energy (r, r->v);
@@ -514,8 +511,9 @@ int pw_events_prepare (pw_run *r, pw_error *error) {
     if (x->pending) {
       x->previous_t = NAN;
       memset (x->armed, 0, (size_t)x->count);
-      status = events_decide (r, 0, &changes, error);
-      x->decided = 1, r->watchdog.largest_sine = 0;
+      status = events_project (r, error);
+      if (status == PW_OK) status = events_decide (r, 0, &changes, error);
+      r->watchdog.largest_sine = 0;
       if (status == PW_OK) status = pw_run_renew (r, error);
       if (status == PW_OK) pw_run_set_reference_level (r);
     }

@@ -19,9 +19,6 @@ int pw_events_prepare (pw_run *r, pw_error *error);
 /* After a step from t0: if there is an event in it, the state there becomes the state reached. */
 int pw_events_follow (pw_run *r, double t0, pw_error *error);
 
-/* After a change of modes, with the saddle opened anew: projects the state reached onto the equations that hold. */
-int pw_events_project (pw_run *r, pw_error *error);
-
 /* Saves or loads the modes and the events so far. */
 void pw_events_serialise (pw_run *r, pw_archive *a);
 void pw_events_close (pw_run *r);

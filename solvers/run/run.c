@@ -100,7 +100,6 @@ static int run_restart_method (pw_run *r, pw_error *error) {
 int pw_run_renew (pw_run *r, pw_error *error) {
   int status = pw_run_open_saddle (r, error);
   r->watchdog.singular_ahead = 1;
-  if (status == PW_OK && r->events) status = pw_events_project (r, error);
   if (status == PW_OK) status = pw_run_evaluate (r, error);
   if (status == PW_OK) pw_watchdog_begin (r);
   run_close_method (r); /* it may use the previous saddle */
