@@ -345,6 +345,31 @@ typedef struct {
   pw_signal value; /* [m] or [rad]; with its first and second time derivative */
 } pw_drive;
 
+/* Stop: a coordinate of a point of body 1, or the angle phi1 - phi2, as of a drive, stays within limits.  Two holonomic
+ * constraint equations. */
+enum { PW_STOP_BOTH, PW_STOP_LOW, PW_STOP_HIGH };
+typedef struct {
+  const char *name, *body[2]; /* the stopped body and the reference body, or "ground" for one of them */
+  double at[2][2];            /* a point in each body's frame [m]; on the ground: in the world */
+  int what;                   /* PW_DRIVE_... */
+  double low, high;           /* limits [m] or [rad] */
+  int sides;                  /* PW_STOP_...: which of them exist; the other one is 0 here */
+  double restitution;         /* velocity after an impact over that before it, 0 to 1 */
+} pw_end_stop;
+
+/* Rope: a rod that may be slack. */
+typedef struct {
+  const char *name, *body[2]; /* the two bodies, or "ground" for one of them */
+  double at[2][2];            /* the end points in the bodies' frames [m]; on the ground: in the world */
+  double length;              /* largest distance between them [m] */
+  double restitution;         /* velocity after the rope has become taut over that before it, 0 to 1 */
+} pw_rope;
+
+/* Freewheel: body 1 does not turn more slowly than body 2.  One nonholonomic constraint equation. */
+typedef struct {
+  const char *name, *body[2]; /* the two bodies, or "ground" for one of them */
+} pw_freewheel;
+
 /* Wheel: a knife edge; the contact point does not move across the heading.  One nonholonomic constraint equation.  With
  * a grip, it slides against the force grip_sliding once holding would take more than the grip. */
 typedef struct {
@@ -507,9 +532,12 @@ typedef struct {
   PW_KIND (rod)                \
   PW_KIND (gear)               \
   PW_KIND (drive)              \
+  PW_KIND (end_stop)           \
+  PW_KIND (rope)               \
   PW_KIND (wheel)              \
   PW_KIND (rolling_wheel)      \
   PW_KIND (steered_wheel)      \
+  PW_KIND (freewheel)          \
   PW_KIND (speed)              \
   PW_KIND (pfaffian)           \
   PW_KIND (tyre)               \
@@ -655,7 +683,9 @@ struct pw_kind {
   pw_batch_function *force_q, *force_v; /* cols x cols */
   pw_batch_function *energy;            /* 1: potential energy [J] */
   pw_batch_function *power;             /* 1: power supplied to the system [W]; NULL: -lambda . eta */
-  pw_batch_function *loss;    /* 1: dissipated power [W], >= 0 but for round-off where multipliers have limits */
+  /* 1: dissipated power [W], >= 0; with limits of multipliers, round-off while their equations hold; NULL: impacts alone
+   * dissipate energy, if there are limits. */
+  pw_batch_function *loss;
   pw_batch_function *contact; /* 3: contact point, or point of a marker [m], and heading [rad]; for output */
   /* 2 cols, for forces that saturate, such as friction: the smallest change of each coordinate, then of each velocity,
    * that reverses the force or changes it by its own magnitude.  Entries are INFINITY before the call. */

@@ -440,9 +440,10 @@ static int compile_limits (const compilation *job) {
 
 /* 1 if an element may dissipate energy: of constraints, if a multiplier has a limit. */
 static int compile_has_loss (const pw_system *s, const pw_element_batch *k, int element) {
-  int limited = k->kind->limits == NULL;
-  for (int i = 0; i < k->kind->rows && !limited; i++) limited = pw_is_limited (s, k->row + element * k->kind->rows + i);
-  return k->kind->loss && limited;
+  if (k->kind->limits == NULL) return k->kind->loss != NULL;
+  for (int i = 0; i < k->kind->rows; i++)
+    if (pw_is_limited (s, k->row + element * k->kind->rows + i)) return 1;
+  return 0;
 }
 
 /* Lists the entries of the ledger, at most two for each element. */

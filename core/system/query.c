@@ -296,7 +296,7 @@ int pw_kind_find_column (const pw_kind *kind, const char *name, pw_column *c) {
   for (int i = 0; i < 2 && kind->contact; i++)
     if (strcmp (name, i ? "y" : "x") == 0) return *c = (pw_column){ PW_COLUMN_CONTACT, i }, 1;
   const int works = kind->power || (kind->rows > 0 && kind->eta), is_loss = strcmp (name, "loss") == 0;
-  if (is_loss ? kind->loss == NULL : !works || strcmp (name, "work") != 0) return 0;
+  if (is_loss ? kind->loss == NULL && kind->limits == NULL : !works || strcmp (name, "work") != 0) return 0;
   return *c = (pw_column){ PW_COLUMN_LEDGER, is_loss }, 1;
 }
 

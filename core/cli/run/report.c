@@ -264,8 +264,8 @@ static void report_events (const pw_system *system, const pw_summary *summary) {
   if (pw_system_limited (system) == 0) return;
   pw_cli_print (stdout, "  %s%s\n", PW_COUNTED (summary->events, "event"), first > 0 ? "; the last ones:" : "");
   for (const pw_event *e = summary->event + first; e < summary->event + summary->events; e++)
-    pw_cli_print (stdout, "    t = %s s: %s %s%s\n", PW_DIGITS (e->t, 15),
-                  PW_NAME (pw_system_row_name, system, e->row), pw_system_mode_name (system, e->row, e->to),
+    pw_cli_print (stdout, "    t = %s s: %s %s%s\n", PW_DIGITS (e->t, 15), PW_NAME (pw_system_row_name, system, e->row),
+                  pw_system_mode_name (system, e->row, e->to),
                   e->impact ? PW_PRINTED (60, ", impulse %s", PW_DIGITS (e->impulse, 8)) : "");
 }
 
