@@ -457,6 +457,7 @@ static void selftest_power_of (probe *x, int e) {
 /* 1 if equations of the element may be violated while their multipliers dissipate energy. */
 static int selftest_slides (const probe *x, int e) {
   const pw_bounds *limit = x->s->limit ? x->s->limit + x->batch->row + e * x->rows : NULL;
+  if (x->kind->limits && x->kind->loss) return 1;
   for (int r = 0; limit && r < x->rows; r++)
     if (isfinite (limit[r].sliding[0]) && limit[r].sliding[0] != 0) return 1;
   return 0;

@@ -45,6 +45,7 @@ typedef struct pw_events {
   double start_t, previous_t;           /* NaN: not known */
   double *memory;                       /* of pw_first_crossing */
   double *u, *u_before, *impulse;
+  double *offset; /* by which u [units] was on the wrong side of its root when it began to leave it: drift */
   int pending; /* 1: modes must be decided at the state reached */
   int fell;    /* 1: u has changed its sign without having left its root: too short a motion to be resolved */
 
@@ -93,6 +94,7 @@ static int events_allocate (pw_run *r) {
                  { &x->u, n },
                  { &x->u_before, n },
                  { &x->impulse, n },
+                 { &x->offset, n },
                  { &x->A, n * n },
                  { &x->b, n },
                  { &x->x, n },
@@ -189,7 +191,7 @@ static void events_values (pw_run *r, const double *v, const double *lambda, dou
     value[2 * i] = isinf (limit->most) ? -1 : (y - limit->most) / x->force_unit[i] - EVENTS_ROUND_OFF;
     value[2 * i + 1] = isinf (limit->least) ? -1 : (limit->least - y) / x->force_unit[i] - EVENTS_ROUND_OFF;
     if (x->mode[i] == 0) continue;
-    value[2 * i] = -x->mode[i] * x->u[i] / x->unit[i] - (x->armed[i] ? EVENTS_ROUND_OFF : tolerance);
+    value[2 * i] = -x->mode[i] * x->u[i] / x->unit[i] - (x->armed[i] ? EVENTS_ROUND_OFF : tolerance + x->offset[i]);
     value[2 * i + 1] = -1;
   }
 }
@@ -214,7 +216,7 @@ static int events_at (void *context, double t, double *value, pw_error *error) {
 /* Marks functions of u that have left their root. */
 static void events_arm (pw_run *r, const double *value) {
   pw_events *x = r->events;
-  for (int i = 0; i < x->count; i++) x->armed[i] |= x->mode[i] && value[2 * i] < -2 * events_tolerance (r);
+  for (int i = 0; i < x->count; i++) x->armed[i] |= x->mode[i] && value[2 * i] < -2 * events_tolerance (r) - x->offset[i];
 }
 
 /* Marks the equations at their roots; 1 if there are any. */
@@ -500,6 +502,22 @@ static int events_project (pw_run *r, pw_error *error) {
 
 /* ---- In a run ---- */
 
+/* After a decision.  g of an equation that holds from now on becomes 0; u of one that does not is 0 or leaves it, but g
+ * may have drifted. */
+static int events_leave (pw_run *r, pw_error *error) {
+  pw_events *x = r->events;
+  int closes = 0, status = PW_OK;
+  for (int i = 0; i < x->count; i++) closes |= events_holonomic (r, i) && x->mode[i] == 0 && x->before[i] != 0;
+  if (closes) status = events_project (r, error);
+  if (status == PW_OK && closes) status = pw_run_evaluate (r, error);
+  if (status == PW_OK && closes) status = r->method->restart (r, error);
+  if (status != PW_OK) return status;
+  if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
+  events_u (r, r->v, 1, x->u);
+  for (int i = 0; i < x->count; i++) x->offset[i] = fmax (0, -x->mode[i] * x->u[i] / x->unit[i]);
+  return PW_OK;
+}
+
 int pw_events_prepare (pw_run *r, pw_error *error) {
   pw_events *x = r->events;
   int status = PW_OK, changes = 0;
@@ -516,6 +534,7 @@ int pw_events_prepare (pw_run *r, pw_error *error) {
       r->watchdog.largest_sine = 0;
       if (status == PW_OK) status = pw_run_renew (r, error);
       if (status == PW_OK) pw_run_set_reference_level (r);
+      if (status == PW_OK) status = events_leave (r, error);
     }
     if (status == PW_OK) status = events_at (r, r->t, x->start, error);
     x->start_t = r->t;

@@ -2,7 +2,8 @@
  *
  *   v = omega1 - omega2 >= 0,  S = [ 0 0 1 | 0 0 -1 ],  gamma = 0      (1 nonholonomic equation, which holds while engaged)
  *
- * The torque on body 1 is T = -lambda >= 0; body 2 receives the opposite. */
+ * The torque on body 1 is T = -lambda >= 0; body 2 receives the opposite.  lambda v is 0 but for round-off; its sign
+ * lets the self-test verify that of S. */
 #include "batch.h"
 
 typedef struct {
@@ -17,6 +18,11 @@ static inline freewheel_state freewheel_at (const pw_batch *batch, int e) {
 PER_ELEMENT (freewheel_J, freewheel, 6) {
   (void)now;
   opposite_moments (1, out);
+}
+
+static void freewheel_loss (const pw_batch *batch, double *out) {
+  for (int e = 0; e < batch->count; e++)
+    out[e] = batch->lambda[e] * (batch_body (batch, 2 * e)->omega - batch_body (batch, 2 * e + 1)->omega);
 }
 
 static void freewheel_limits (const void *element, pw_bounds *limit) {
@@ -41,4 +47,5 @@ const pw_kind pw_kind_freewheel = {
   REACTION ("T", "N m", "torque on the first body"),
   .J = freewheel_J,
   .limits = freewheel_limits,
+  .loss = freewheel_loss,
 };
