@@ -655,8 +655,8 @@ struct pw_kind {
   const pw_quantity *reaction;                                 /* rows: meaning of each -lambda */
   const pw_quantity *coordinate;                               /* internal: the internal coordinates, in "rad" */
   const char *(*reaction_unit) (const void *element, int row); /* if it depends on the element; may be NULL */
-  /* Sets the limits of an element's multipliers, -INFINITY to INFINITY before the call; NULL: they stay so. */
-  void (*limits) (const void *element, pw_bounds *limit);
+  /* Sets the limits of an element's multipliers (rows), -INFINITY to INFINITY before the call; NULL: they stay so. */
+  void (*limits) (const void *definition, pw_bounds *limit);
   /* The type that stands for this one where is_exact (definition) is not 0; with the same definition and fields. */
   const struct pw_kind *exact;
   int (*is_exact) (const void *definition);

@@ -103,15 +103,16 @@ struct pw_run {
   int redundant;                 /* number of redundant rows; what follows, to reselect_below, only if there are any */
   struct pw_events *events;      /* of equations whose multipliers have limits (events.h); NULL: there are none */
   const unsigned char *enforced; /* rows: 0 for those whose multipliers are at a limit; NULL: none is */
-  int forces;                    /* 0: constant ones alone; 1: others, too; PW_FORCES_AT_LIMITS */
-  int redundant_drive;           /* 1: one of them has an eta, so that work depends on its multiplier */
-  int *redundant_row;            /* redundant: their indices */
-  unsigned char *active_array;   /* rows: what `active` points to */
-  double *coefficient;           /* 5 x rows: a redundant row as a combination of active rows; scratch of rank.c */
-  double *row_force;     /* coords + 3: right-hand side for the coefficients of a redundant row; 0 between uses */
-  double *least_norm;    /* rows: least-norm multipliers for the ledger */
-  double independence;   /* of the active rows at the state reached (rank.h) */
-  double reselect_below; /* independence below which other active rows are tried */
+  int (*advance) (struct pw_run *r, double t_end, pw_error *error); /* the method's, or with events */
+  int forces;                  /* 0: constant ones alone; 1: others, too; PW_FORCES_AT_LIMITS */
+  int redundant_drive;         /* 1: one of them has an eta, or some are not enforced: work depends on multipliers */
+  int *redundant_row;          /* redundant: their indices */
+  unsigned char *active_array; /* rows: what `active` points to */
+  double *coefficient;         /* 5 x rows: a redundant row as a combination of active rows; scratch of rank.c */
+  double *row_force;           /* coords + 3: right-hand side for the coefficients of a redundant row; 0 between uses */
+  double *least_norm;          /* rows: least-norm multipliers for the ledger */
+  double independence;         /* of the active rows at the state reached (rank.h) */
+  double reselect_below;       /* independence below which other active rows are tried */
   const struct pw_specialised *specialised; /* compiled code of the scene in use, or NULL */
   struct pw_scene *scene;                   /* its data; NULL: none, or a constant pivot is too small */
   pw_thresholds thresholds;                 /* of the watchdog */

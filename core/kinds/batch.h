@@ -95,10 +95,9 @@ LIBM (libm_hypot (libm_lanes x, libm_lanes y)) {
     name, unit, NULL, about          \
   }
 
-/* Checks the limit of a multiplier while its equation holds, and that at which it does not hold (0: the same), and
- * stores the latter in *kept.  field: the name of the former. */
-static inline int limit_check (const char *field, double most, double sliding, double *kept, pw_error *error) {
-  *kept = sliding > 0 ? sliding : most;
+/* Checks the limit of a multiplier while its equation holds, and that at which it does not (0: the same).  field: the name
+ * of the former. */
+static inline int limit_check (const char *field, double most, double sliding, pw_error *error) {
   if (sliding <= most) return PW_OK;
   return pw_fail (error, PW_INPUT, "%s_sliding = %g: expected at most the %s, %g", field, sliding, field, most);
 }
@@ -106,7 +105,8 @@ static inline int limit_check (const char *field, double most, double sliding, d
 /* pw_kind.limits of a multiplier between -most and most; 0: without limits. */
 static inline void limit_both_sides (double most, double sliding, pw_bounds *limit) {
   if (most == 0) return;
-  limit->least = -most, limit->most = most, limit->sliding[0] = -sliding, limit->sliding[1] = sliding;
+  if (sliding == 0) sliding = most;
+  *limit = (pw_bounds){ -most, most, { -sliding, sliding }, 0 };
 }
 
 /* The vector w of an element; NULL where the batch has none. */

@@ -12,11 +12,10 @@
 #include "batch.h"
 
 typedef struct {
-  double a, b;               /* the direction in the body's frame */
-  double arm;                /* l [m] */
-  double at[2];              /* P in the body's frame [m] */
-  double heading;            /* of the wheel in the body's frame [rad] */
-  double grip, grip_sliding; /* limits of the force along d [N]; grip 0: none */
+  double a, b;    /* the direction in the body's frame */
+  double arm;     /* l [m] */
+  double at[2];   /* P in the body's frame [m] */
+  double heading; /* of the wheel in the body's frame [rad] */
 } contact;
 
 /* A contact in the current state. */

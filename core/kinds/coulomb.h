@@ -15,9 +15,8 @@
 #include "batch.h"
 
 typedef struct {
-  double viscous, limit;   /* c, L */
-  double inverse;          /* 1 / v0; 0 without a limit */
-  double holding, sliding; /* limits of exact friction; limit is 0 then */
+  double viscous, limit; /* c, L */
+  double inverse;        /* 1 / v0; 0 without a limit */
 } coulomb;
 
 static inline int coulomb_make (double viscous, double limit, double speed, coulomb *law, pw_error *error) {
@@ -30,8 +29,8 @@ static inline int coulomb_make (double viscous, double limit, double speed, coul
 }
 
 static inline int coulomb_make_exact (double viscous, double limit, double sliding, coulomb *law, pw_error *error) {
-  *law = (coulomb){ .viscous = viscous, .holding = limit };
-  return limit_check ("limit", limit, sliding, &law->sliding, error);
+  *law = (coulomb){ .viscous = viscous };
+  return limit_check ("limit", limit, sliding, error);
 }
 
 static inline double coulomb_force (const coulomb *law, double v) {
@@ -50,16 +49,16 @@ static inline double coulomb_saturation (const coulomb *law, double v, double de
   return derivative != 0 && law->inverse > 0 ? (1 / law->inverse + fabs (v)) / fabs (derivative) : INFINITY;
 }
 
-/* EXACT_COULOMB (friction) defines the functions of a constraint equation with an element and a state as below, whose
- * definition is a pw_friction: friction_is_exact, friction_limits, friction_exact_J, friction_exact_loss. */
-#define EXACT_COULOMB(type, element_type, law_of)                           \
+/* EXACT_COULOMB (friction, pw_friction) defines the functions of a constraint equation with an element and a state as below:
+ * friction_is_exact, friction_limits, friction_exact_J, friction_exact_loss. */
+#define EXACT_COULOMB(type, definition_type)                                \
   static int type##_is_exact (const void *definition) {                     \
-    const pw_##element_type *x = definition;                                \
+    const definition_type *x = definition;                                  \
     return x->limit > 0 && x->speed == 0;                                   \
   }                                                                         \
-  static void type##_limits (const void *element, pw_bounds *limit) {       \
-    const coulomb *law = law_of;                                            \
-    limit_both_sides (law->holding, law->sliding, limit);                   \
+  static void type##_limits (const void *definition, pw_bounds *limit) {    \
+    const definition_type *x = definition;                                  \
+    limit_both_sides (x->limit, x->limit_sliding, limit);                   \
   }                                                                         \
   PER_ELEMENT (type##_exact_J, type, 6) {                                   \
     for (int i = 0; i < 6; i++) out[i] = now.S[i];                          \

@@ -454,13 +454,11 @@ static void selftest_power_of (probe *x, int e) {
     selftest_record (x->report, "loss", fmax (-loss[e], 0), 0, "exact", where);
 }
 
-/* 1 if equations of the element may be violated while their multipliers dissipate energy. */
+/* 1 if the velocity constraints of the element need not hold: their multipliers then have power. */
 static int selftest_slides (const probe *x, int e) {
-  const pw_bounds *limit = x->s->limit ? x->s->limit + x->batch->row + e * x->rows : NULL;
-  if (x->kind->limits && x->kind->loss) return 1;
-  for (int r = 0; limit && r < x->rows; r++)
-    if (isfinite (limit[r].sliding[0]) && limit[r].sliding[0] != 0) return 1;
-  return 0;
+  int limited = 0;
+  for (int r = 0; r < x->rows; r++) limited |= pw_is_limited (x->s, x->batch->row + e * x->rows + r);
+  return limited && x->kind->level == PW_NONHOLONOMIC;
 }
 
 static void selftest_power (probe *x) {

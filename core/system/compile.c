@@ -422,12 +422,13 @@ static int compile_has_work (const pw_element_batch *k, int element) {
 /* The limits of all multipliers, if there are any. */
 static int compile_limits (const compilation *job) {
   pw_system *s = job->s;
+  const compiled *from = job->list;
   pw_bounds *limit = compile_alloc (job, (size_t)s->rows, sizeof *limit);
   if (limit == NULL) return PW_RESOURCE;
   for (int i = 0; i < s->rows; i++) limit[i] = (pw_bounds){ -INFINITY, INFINITY, { NAN, NAN }, 0 };
   for (const pw_element_batch *k = s->batch; k < s->batch + s->constraints; k++)
-    for (int e = 0; k->kind->limits && e < k->b.count; e++)
-      k->kind->limits ((const char *)k->b.element + (size_t)e * k->kind->element, limit + k->row + e * k->kind->rows);
+    for (int e = 0; e < k->b.count; e++, from++)
+      if (k->kind->limits) k->kind->limits (from->element->definition, limit + k->row + e * k->kind->rows);
   s->limit = limit;
   for (int i = 0; i < s->rows; i++) {
     s->limited += pw_is_limited (s, i);

@@ -614,11 +614,14 @@ void pw_evaluate_ledger (pw_workspace *w, const double *lambda, double *rate) {
     pw_batch_function *power = entry->type == PW_WORK ? k->kind->power : k->kind->loss; /* NULL: by eta */
     if (last == NULL || entry->batch != last->batch || entry->type != last->type) {
       k->b.lambda = lambda + k->row;
-      if (power || entry->type == PW_WORK) (power ? power : k->kind->eta) (&k->b, power ? k->block : eta);
+      if (power)
+        power (&k->b, k->block);
+      else if (k->kind->eta)
+        k->kind->eta (&k->b, eta);
     }
     last = entry;
     rate[i] = power ? k->block[entry->element] : 0;
-    if (power || entry->type == PW_LOSS) continue;
+    if (power || k->kind->eta == NULL) continue;
     for (int r = 0, n = k->kind->rows; r < n; r++) /* the constraint force -J^T lambda has the power -lambda . J v */
       rate[i] -= k->b.lambda[entry->element * n + r] * eta[entry->element * n + r];
   }

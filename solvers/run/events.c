@@ -46,8 +46,8 @@ typedef struct pw_events {
   double *memory;                       /* of pw_first_crossing */
   double *u, *u_before, *impulse;
   double *offset; /* by which u [units] was on the wrong side of its root when it began to leave it: drift */
-  int pending; /* 1: modes must be decided at the state reached */
-  int fell;    /* 1: u has changed its sign without having left its root: too short a motion to be resolved */
+  int pending;    /* 1: modes must be decided at the state reached */
+  int fell;       /* 1: u has changed its sign without having left its root: too short a motion to be resolved */
 
   /* Of a decision: the equations D, by their number among those with limits. */
   int n, *list;
@@ -145,6 +145,7 @@ static void events_apply (pw_run *r) {
     off = 1;
   }
   r->active = r->enforced = off ? x->enforced : NULL;
+  r->redundant_drive = off;
   r->forces = off ? PW_FORCES_AT_LIMITS : r->s->forces > 0;
 }
 
@@ -216,7 +217,8 @@ static int events_at (void *context, double t, double *value, pw_error *error) {
 /* Marks functions of u that have left their root. */
 static void events_arm (pw_run *r, const double *value) {
   pw_events *x = r->events;
-  for (int i = 0; i < x->count; i++) x->armed[i] |= x->mode[i] && value[2 * i] < -2 * events_tolerance (r) - x->offset[i];
+  for (int i = 0; i < x->count; i++)
+    x->armed[i] |= x->mode[i] && value[2 * i] < -2 * events_tolerance (r) - x->offset[i];
 }
 
 /* Marks the equations at their roots; 1 if there are any. */
@@ -518,10 +520,13 @@ static int events_leave (pw_run *r, pw_error *error) {
   return PW_OK;
 }
 
-int pw_events_prepare (pw_run *r, pw_error *error) {
+void pw_events_jump (pw_run *r) {
+  if (r->events) r->events->start_t = NAN;
+}
+
+static int events_prepare (pw_run *r, pw_error *error) {
   pw_events *x = r->events;
   int status = PW_OK, changes = 0;
-  if (r->interrupted) x->start_t = NAN;
   for (int pass = 0; status == PW_OK && (x->pending || x->start_t != r->t); pass++) {
     if (pass == EVENTS_PASSES)
       return pw_fail (error, PW_METHOD, "t = %.6g s: modes change endlessly: %s", r->t,
@@ -596,7 +601,7 @@ static int events_stop_at (pw_run *r, double t, pw_error *error) {
   return PW_OK;
 }
 
-int pw_events_follow (pw_run *r, double t0, pw_error *error) {
+static int events_follow (pw_run *r, double t0, pw_error *error) {
   pw_events *x = r->events;
   const size_t bytes = 2 * (size_t)x->count * sizeof *x->start;
   pw_crossing_search search = { .count = 2 * x->count,
@@ -624,6 +629,13 @@ int pw_events_follow (pw_run *r, double t0, pw_error *error) {
   if (status == PW_OK && pw_evaluate_J_at (r->w, pw_before_breakpoint (r, r->t), r->q, r->v) != PW_OK)
     return pw_fail_signal (r->t, error);
   return status;
+}
+
+int pw_events_advance (pw_run *r, double t_end, pw_error *error) {
+  int status = events_prepare (r, error);
+  const double t0 = r->t;
+  if (status == PW_OK) status = r->method->advance (r, t_end, error);
+  return status == PW_OK ? events_follow (r, t0, error) : status;
 }
 
 /* ---- Opening ---- */

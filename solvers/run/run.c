@@ -93,6 +93,7 @@ void pw_run_close (pw_run *r) {
 /* Restarts the method after a discontinuity, where accelerations change, or a step that was interrupted. */
 static int run_restart_method (pw_run *r, pw_error *error) {
   int status = pw_run_look_ahead (r, error);
+  pw_events_jump (r);
   if (status == PW_OK) status = pw_run_evaluate (r, error);
   return status == PW_OK ? r->method->restart (r, error) : status;
 }
@@ -170,7 +171,6 @@ int pw_run_advance (pw_run *r, double t_end, pw_error *error) {
   if (r->stalled == 0) r->w->failed = NULL; /* otherwise it is the signal that stops the run */
   r->interrupted |= r->t >= r->breakpoint;
   if (r->interrupted) status = run_restart_method (r, error);
-  if (status == PW_OK && r->events) status = pw_events_prepare (r, error);
   if (status == PW_OK) r->interrupted = 0;
   if (status == PW_OK) status = run_reselect (r, error);
   const double stop = fmin (t_end, r->breakpoint);
@@ -180,9 +180,8 @@ int pw_run_advance (pw_run *r, double t_end, pw_error *error) {
     return run_check_progress (r, before, error);
   }
   r->near_singular = 0;
-  if (status == PW_OK) status = r->method->advance (r, t_end, error);
+  if (status == PW_OK) status = r->advance (r, t_end, error);
   if (status == PW_STOPPED) return status;
-  if (status == PW_OK && r->events) status = pw_events_follow (r, before, error);
   if (status == PW_OK) status = pw_run_watchdog (r, error);
   if (status == PW_OK) status = pw_run_check_resolution (r, error);
   if (status == PW_OK) pw_ledger_record (r);
@@ -539,18 +538,18 @@ void pw_ledger_record (pw_run *r) {
   if (power > r->power && isfinite (power)) r->power = power;
 }
 
+/* Multipliers of all equations from those of the active ones. */
+static const double *ledger_multipliers (pw_run *r, const double *lambda) {
+  double *all = r->enforced ? r->scratch : r->least_norm;
+  if (r->enforced == NULL && pw_saddle_factor (r->saddle) != PW_OK) return lambda;
+  memcpy (all, lambda, (size_t)r->s->rows * sizeof *lambda);
+  r->enforced ? pw_events_fill (r, all) : pw_rank_least_norm (r, all);
+  return all;
+}
+
 void pw_ledger_rates (pw_run *r, const double *lambda, double *rate) {
   const int integrals = r->settings.integrals, unique = r->redundant_drive || (integrals && r->redundant);
-  if (unique && pw_saddle_factor (r->saddle) == PW_OK) {
-    memcpy (r->least_norm, lambda, (size_t)r->s->rows * sizeof *lambda);
-    pw_rank_least_norm (r, r->least_norm);
-    lambda = r->least_norm;
-  }
-  if (r->enforced && !unique) { /* multipliers of the others are 0 in the solver */
-    memcpy (r->scratch, lambda, (size_t)r->s->rows * sizeof *lambda);
-    pw_events_fill (r, r->scratch);
-    lambda = r->scratch;
-  }
+  if (unique) lambda = ledger_multipliers (r, lambda);
   pw_evaluate_ledger (r->w, lambda, rate);
   if (integrals) ledger_integrands (r, lambda, rate, rate + r->s->entries);
 }

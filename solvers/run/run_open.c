@@ -248,6 +248,7 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   if (status != PW_OK) return status;
   r->w->scale.time = run_time_scale (r);
   status = pw_events_begin (r, error);
+  r->advance = r->events ? pw_events_advance : r->method->advance;
   if (status != PW_OK) return status;
   run_absolute_tolerances (r);
   pw_run_count_moved (r);

@@ -30,7 +30,7 @@ PREPARE (friction_prepare_exact, pw_friction, coulomb) {
 }
 
 COULOMB (friction, 6)
-EXACT_COULOMB (friction, friction, element)
+EXACT_COULOMB (friction, pw_friction)
 
 static const pw_field friction_fields[] = {
   { PW_AT (pw_friction, body), PW_BODY, .count = 2, .required = 1, .about = "the two bodies; one may be ground" },

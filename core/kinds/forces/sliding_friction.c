@@ -52,7 +52,7 @@ PER_ELEMENT (sliding_force_q, sliding, 36) {
 }
 
 COULOMB (sliding, 6)
-EXACT_COULOMB (sliding, sliding_friction, &((const sliding *)element)->law)
+EXACT_COULOMB (sliding, pw_sliding_friction)
 
 PER_ELEMENT (sliding_exact_gamma, sliding, 1) {
   line_gamma_one (now.across, out);

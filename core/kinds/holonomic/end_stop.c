@@ -8,7 +8,7 @@
 
 typedef struct {
   line line;
-  double limit[2], used[2], restitution; /* low, high; 0 for one that does not exist */
+  double limit[2]; /* low, high; 0 for one that does not exist */
 } stop;
 
 typedef struct {
@@ -24,14 +24,17 @@ static inline stop_state stop_at (const pw_batch *batch, int e) {
 static const char *const stop_what[] = { "x", "y", "angle", NULL }, *const stop_sides[] = { "both", "low", "high",
                                                                                             NULL };
 
+/* 1 if there is a limit: low (0), high (1). */
+static int stop_has (const pw_end_stop *definition, int limit) {
+  return definition->sides != (limit ? PW_STOP_LOW : PW_STOP_HIGH);
+}
+
 PREPARE (stop_prepare, pw_end_stop, stop) {
   const int angle = definition->what == PW_DRIVE_ANGLE;
   *element = (stop){ .line = { .s1 = { definition->at[0][0], definition->at[0][1] }, .prescribes_angle = angle },
-                     .limit = { definition->low, definition->high },
-                     .used = { definition->sides != PW_STOP_HIGH, definition->sides != PW_STOP_LOW },
-                     .restitution = definition->restitution };
+                     .limit = { definition->low, definition->high } };
   for (int i = 0; i < 2; i++)
-    if (element->used[i] == 0 && element->limit[i] != 0)
+    if (!stop_has (definition, i) && element->limit[i] != 0)
       return pw_fail (error, PW_INPUT, "%s = %g with sides: %s: expected no such limit", i ? "high" : "low",
                       element->limit[i], stop_sides[definition->sides]);
   if (definition->sides == PW_STOP_BOTH && !(definition->low < definition->high))
@@ -74,12 +77,11 @@ PER_ELEMENT (stop_gamma, stop, 2) {
   }
 EACH_DERIVATIVE (STOP_DERIVATIVE)
 
-static void stop_limits (const void *element, pw_bounds *limit) {
-  const stop *x = element;
+static void stop_limits (const void *definition, pw_bounds *limit) {
   limit[0].most = limit[1].least = 0;
-  if (x->used[0] == 0) limit[0].least = 0;
-  if (x->used[1] == 0) limit[1].most = 0;
-  limit[0].restitution = limit[1].restitution = x->restitution;
+  if (!stop_has (definition, 0)) limit[0].least = 0;
+  if (!stop_has (definition, 1)) limit[1].most = 0;
+  limit[0].restitution = limit[1].restitution = ((const pw_end_stop *)definition)->restitution;
 }
 
 static const pw_field stop_fields[] = {

@@ -11,8 +11,7 @@
 
 typedef struct {
   points points;
-  double length;      /* [m] */
-  double restitution; /* of a rope */
+  double length; /* [m] */
 } rod;
 
 /* A rod in the current state. */
@@ -41,7 +40,7 @@ static inline void rod_multiply_D (const rod_state *now, const double y[2], doub
 }
 
 PREPARE (rod_prepare, pw_rod, rod) {
-  *element = (rod){ points_make (definition->at), definition->length, 0 };
+  *element = (rod){ points_make (definition->at), definition->length };
   return PW_OK;
 }
 
@@ -96,13 +95,13 @@ PER_ELEMENT (rod_gamma_v, rod, 6) {
 }
 
 PREPARE (rope_prepare, pw_rope, rod) {
-  *element = (rod){ points_make (definition->at), definition->length, definition->restitution };
+  *element = (rod){ points_make (definition->at), definition->length };
   return PW_OK;
 }
 
-static void rope_limits (const void *element, pw_bounds *limit) {
+static void rope_limits (const void *definition, pw_bounds *limit) {
   limit->least = 0;
-  limit->restitution = ((const rod *)element)->restitution;
+  limit->restitution = ((const pw_rope *)definition)->restitution;
 }
 
 static const pw_field rope_fields[] = {

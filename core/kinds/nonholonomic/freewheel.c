@@ -25,8 +25,8 @@ static void freewheel_loss (const pw_batch *batch, double *out) {
     out[e] = batch->lambda[e] * (batch_body (batch, 2 * e)->omega - batch_body (batch, 2 * e + 1)->omega);
 }
 
-static void freewheel_limits (const void *element, pw_bounds *limit) {
-  (void)element;
+static void freewheel_limits (const void *definition, pw_bounds *limit) {
+  (void)definition;
   limit->most = 0;
 }
 

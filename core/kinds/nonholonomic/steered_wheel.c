@@ -11,8 +11,7 @@
 #include "contact.h"
 
 typedef struct {
-  double at[2];              /* contact point in the body's frame [m] */
-  double grip, grip_sliding; /* limits of the lateral force [N]; grip 0: none */
+  double at[2]; /* contact point in the body's frame [m] */
 } steered;
 
 /* A wheel in the current state. */
@@ -31,12 +30,12 @@ static inline steered_state steered_at (const pw_batch *batch, int e) {
 }
 
 PREPARE (steered_prepare, pw_steered_wheel, steered) {
-  *element = (steered){ { definition->at[0], definition->at[1] }, .grip = definition->grip };
-  return limit_check ("grip", definition->grip, definition->grip_sliding, &element->grip_sliding, error);
+  *element = (steered){ { definition->at[0], definition->at[1] } };
+  return limit_check ("grip", definition->grip, definition->grip_sliding, error);
 }
 
-static void steered_limits (const void *element, pw_bounds *limit) {
-  const steered *wheel = element;
+static void steered_limits (const void *definition, pw_bounds *limit) {
+  const pw_steered_wheel *wheel = definition;
   limit_both_sides (wheel->grip, wheel->grip_sliding, limit);
 }
 
