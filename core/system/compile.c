@@ -452,12 +452,15 @@ static int compile_ledger (const compilation *job) {
   pw_system *s = job->s;
   s->entry = compile_alloc (job, 2 * (size_t)job->listed, sizeof *s->entry);
   if (s->entry == NULL) return PW_RESOURCE;
-  for (int i = 0; i < s->batches; i++) {
-    const pw_element_batch *k = &s->batch[i];
-    for (int loss = 0; loss < 2; loss++)
-      for (int e = 0; e < k->b.count; e++)
-        if (loss ? compile_has_loss (s, k, e) : compile_has_work (k, e))
-          s->entry[s->entries++] = (pw_entry){ i, e, loss ? PW_LOSS : PW_WORK };
+  for (int impact = 0; impact < 2; impact++) {
+    for (int i = 0; i < s->batches; i++) {
+      const pw_element_batch *k = &s->batch[i];
+      for (int loss = 0; loss < 2; loss++)
+        for (int e = 0; e < k->b.count; e++)
+          if (impact == (loss && !k->kind->loss) && (loss ? compile_has_loss (s, k, e) : compile_has_work (k, e)))
+            s->entry[s->entries++] = (pw_entry){ i, e, loss ? PW_LOSS : PW_WORK };
+    }
+    if (!impact) s->powers = s->entries;
   }
   return PW_OK;
 }

@@ -608,20 +608,17 @@ int pw_find_nonfinite (pw_workspace *w, char *buffer, size_t size) {
 void pw_evaluate_ledger (pw_workspace *w, const double *lambda, double *rate) {
   const pw_entry *last = NULL;
   double *eta = w->scratch;
-  for (int i = 0; i < w->s->entries; i++) {
+  for (int i = 0; i < w->s->powers; i++) {
     const pw_entry *entry = &w->s->entry[i];
     pw_element_batch *k = &w->batch[entry->batch];
     pw_batch_function *power = entry->type == PW_WORK ? k->kind->power : k->kind->loss; /* NULL: by eta */
     if (last == NULL || entry->batch != last->batch || entry->type != last->type) {
       k->b.lambda = lambda + k->row;
-      if (power)
-        power (&k->b, k->block);
-      else if (k->kind->eta)
-        k->kind->eta (&k->b, eta);
+      (power ? power : k->kind->eta) (&k->b, power ? k->block : eta);
     }
     last = entry;
     rate[i] = power ? k->block[entry->element] : 0;
-    if (power || k->kind->eta == NULL) continue;
+    if (power) continue;
     for (int r = 0, n = k->kind->rows; r < n; r++) /* the constraint force -J^T lambda has the power -lambda . J v */
       rate[i] -= k->b.lambda[entry->element * n + r] * eta[entry->element * n + r];
   }
