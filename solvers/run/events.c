@@ -46,6 +46,8 @@ typedef struct pw_events {
   double *memory;                       /* of pw_first_crossing */
   double *u, *u_before, *impulse;
   double *offset; /* by which u [units] was on the wrong side of its root when it began to leave it: drift */
+  int at_end;     /* 1: the state reached, its multipliers and its J are known */
+  int samples;    /* 1: J has been evaluated elsewhere since */
   int pending;    /* 1: modes must be decided at the state reached */
   int fell;       /* 1: u has changed its sign without having left its root: too short a motion to be resolved */
 
@@ -197,13 +199,23 @@ static void events_values (pw_run *r, const double *v, const double *lambda, dou
   }
 }
 
-/* pw_crossing_search.at.  Multipliers are computed from the state: those of some methods are interpolated, or contain
- * Baumgarte's terms, and modes are decided with these. */
+/* 1 if the method leaves the multipliers of the state reached in r->lambda, without Baumgarte's terms. */
+static int events_knows_multipliers (const pw_run *r) {
+  static const pw_stabilisation_kind kinds[] = { PW_UNSTABILISED, PW_PROJECTION, PW_NULLSPACE };
+  for (size_t i = 0; i < sizeof kinds / sizeof *kinds && r->method->order > 0; i++) /* not of multistep methods */
+    if (pw_stabilised_by (r, kinds[i])) return 1;
+  return 0;
+}
+
+/* pw_crossing_search.at.  Otherwise multipliers are computed from the state: those of some methods are interpolated, and
+ * modes are decided with these. */
 static int events_at (void *context, double t, double *value, pw_error *error) {
   pw_run *r = context;
   const pw_statistics statistics = r->statistics;
   const double alpha = r->alpha, beta = r->beta;
   const int near_singular = r->near_singular;
+  if (t == r->t && r->events->at_end) return events_values (r, r->v, r->lambda, value), PW_OK;
+  r->events->samples = 1;
   int status = r->method->at (r, t, error);
   r->alpha = r->beta = 0;
   if (status == PW_OK && pw_saddle_factor (r->saddle) == PW_OK)
@@ -610,7 +622,9 @@ static int events_follow (pw_run *r, double t0, pw_error *error) {
                                 .memory = x->memory,
                                 .width = 4 * DBL_EPSILON * fmax (fabs (r->t), r->w->scale.time),
                                 .error = error };
+  x->at_end = r->t < r->breakpoint && events_knows_multipliers (r), x->samples = 0;
   int status = events_at (r, r->t, x->end, error);
+  x->at_end = 0;
   double root = NAN;
   if (status == PW_OK && (events_trigger (r, x->end) || !events_far (r, t0)))
     root = pw_first_crossing (&search, t0, x->start, r->t, x->end);
@@ -625,6 +639,7 @@ static int events_follow (pw_run *r, double t0, pw_error *error) {
     memcpy (x->start, x->end, bytes);
     x->previous_t = t0, x->start_t = r->t;
   }
+  if (x->samples == 0) return status;
   pw_forget_residuals (r);
   if (status == PW_OK && pw_evaluate_J_at (r->w, pw_before_breakpoint (r, r->t), r->q, r->v) != PW_OK)
     return pw_fail_signal (r->t, error);

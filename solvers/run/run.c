@@ -292,7 +292,8 @@ int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error
   double before = 0, after = 0;
   if (run_has_no_method (r, error)) return PW_RESOURCE;
   if (r->events)
-    return pw_fail (error, PW_INPUT, "model %s: no restart: reactions have limits, as by a grip", r->s->model);
+    return pw_fail (error, PW_INPUT, "model %s: a run whose reactions have limits, as by a grip, cannot be restarted",
+                    r->s->model);
   if (run_check_given (r, q, 0, error) != PW_OK || run_check_given (r, v, r->s->coords, error) != PW_OK)
     return PW_INPUT;
   r->w->failed = NULL;
