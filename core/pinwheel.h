@@ -655,11 +655,6 @@ struct pw_kind {
   const pw_quantity *reaction;                                 /* rows: meaning of each -lambda */
   const pw_quantity *coordinate;                               /* internal: the internal coordinates, in "rad" */
   const char *(*reaction_unit) (const void *element, int row); /* if it depends on the element; may be NULL */
-  /* Sets the limits of an element's multipliers (rows), -INFINITY to INFINITY before the call; NULL: they stay so. */
-  void (*limits) (const void *definition, pw_bounds *limit);
-  /* The type that stands for this one where is_exact (definition) is not 0; with the same definition and fields. */
-  const struct pw_kind *exact;
-  int (*is_exact) (const void *definition);
 
   /* Converts a checked definition into a prepared element.  bodies: those it names or acts on, in order; the ground
    * is a body without mass.  internal: receives mass and initial values of each internal coordinate; zero before.
@@ -694,6 +689,11 @@ struct pw_kind {
    * of the way from the first body's point to the last body's, plus x along and y to the left of the heading, in units
    * of symbols.  "o a x y r": a circle of radius r.  "g1", "g2": the pitch circles of two gears. */
   const char *symbol;
+  /* Sets the limits of an element's multipliers (rows), -INFINITY to INFINITY before the call; NULL: they stay so. */
+  void (*limits) (const void *definition, pw_bounds *limit);
+  /* The type that stands for this one where is_exact (definition) is not 0; with the same definition and fields. */
+  const struct pw_kind *exact;
+  int (*is_exact) (const void *definition);
 };
 
 /* The number of values of a field, and the bytes of one value; 0 bytes: invalid type. */

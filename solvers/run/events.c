@@ -39,6 +39,7 @@ typedef struct pw_events {
   unsigned char *triggered;             /* 1: at the root that is the state reached */
   unsigned char *rests;                 /* 1: u is 0 after an impact */
   unsigned char *enforced;              /* rows: what r->enforced points to */
+  unsigned char *blocked;               /* n: 1 for equations of a decision that depend on those that hold */
   unsigned char *other;                 /* rows: active equations of the saddle of a decision */
   double *reaction;                     /* rows: minus the given multipliers, else 0 */
   double *start, *end, *previous, *now; /* 2 count: event functions at the ends of the last step, before it, anywhere */
@@ -81,8 +82,8 @@ static int events_allocate (pw_run *r) {
   x->limit = events_alloc (r, n, sizeof *x->limit, &failed);
   signed char **const modes[] = { &x->mode, &x->before, &x->trial };
   for (size_t i = 0; i < sizeof modes / sizeof *modes; i++) *modes[i] = events_alloc (r, n, 1, &failed);
-  unsigned char **const flags[] = { &x->armed, &x->triggered, &x->rests, &x->enforced, &x->other };
-  for (size_t i = 0; i < sizeof flags / sizeof *flags; i++) *flags[i] = events_alloc (r, i < 3 ? n : rows, 1, &failed);
+  unsigned char **const flags[] = { &x->armed, &x->triggered, &x->rests, &x->blocked, &x->enforced, &x->other };
+  for (size_t i = 0; i < sizeof flags / sizeof *flags; i++) *flags[i] = events_alloc (r, i < 4 ? n : rows, 1, &failed);
   const struct {
     double **array;
     size_t length;
@@ -294,54 +295,82 @@ static int decision_push (pw_run *r, pw_saddle *saddle) {
   return pw_update_velocities (r->w, r->v);
 }
 
-/* Solves z = 0 for those of D whose trial mode is 0, with x of the others given (Cholesky).  PW_RETRY if they depend on
- * each other. */
-static int decision_solve (pw_events *x) {
+/* Solves z = 0 for those of D whose trial mode is 0, with x of the others given (Cholesky).  Of equations that depend on
+ * each other the later ones are left out if `skips` is 1; otherwise PW_RETRY. */
+static int decision_solve (pw_events *x, int skips) {
   const int n = x->n;
   double *L = x->factor, *y = L + n * n;
   int m = 0, *held = x->held;
-  for (int k = 0; k < n; k++)
-    if (x->trial[k] == 0) held[m++] = k;
-  for (int i = 0; i < m; i++) {
-    const double *row = x->A + held[i] * n;
-    y[i] = x->b[held[i]];
-    for (int k = 0; k < n; k++)
-      if (x->trial[k]) y[i] -= row[k] * x->x[k];
-    for (int j = 0; j <= i; j++) {
-      double sum = 0.5 * (row[held[j]] + x->A[held[j] * n + held[i]]);
-      for (int k = 0; k < j; k++) sum -= L[i * m + k] * L[j * m + k];
-      if (i == j && !(sum > 1e-13 * row[held[i]])) return PW_RETRY;
-      L[i * m + j] = i == j ? sqrt (sum) : sum / L[j * m + j];
+  for (int k = 0; k < n; k++) {
+    if (x->trial[k]) continue;
+    const double *row = x->A + k * n;
+    double *Lm = L + m * n;
+    held[m] = k;
+    y[m] = x->b[k];
+    for (int i = 0; i < n; i++)
+      if (x->trial[i]) y[m] -= row[i] * x->x[i];
+    for (int j = 0; j <= m; j++) {
+      Lm[j] = 0.5 * (row[held[j]] + x->A[held[j] * n + k]);
+      for (int i = 0; i < j; i++) Lm[j] -= Lm[i] * L[j * n + i];
+      if (j < m) Lm[j] /= L[j * n + j];
     }
-    for (int k = 0; k < i; k++) y[i] -= L[i * m + k] * y[k];
-    y[i] /= L[i * m + i];
+    x->x[k] = 0;
+    if (!(Lm[m] > 1e-13 * row[k])) {
+      if (!skips) return PW_RETRY;
+      continue;
+    }
+    Lm[m] = sqrt (Lm[m]);
+    for (int i = 0; i < m; i++) y[m] -= Lm[i] * y[i];
+    y[m] /= Lm[m];
+    m++;
   }
   for (int i = m - 1; i >= 0; i--) {
-    for (int k = i + 1; k < m; k++) y[i] -= L[k * m + i] * y[k];
-    x->x[held[i]] = y[i] /= L[i * m + i];
+    for (int k = i + 1; k < m; k++) y[i] -= L[k * n + i] * y[k];
+    x->x[held[i]] = y[i] /= L[i * n + i];
   }
   return PW_OK;
 }
 
-/* Finds x and trial modes between lo and hi: the largest violation changes its mode; after many changes, which may
- * cycle, the first one (Murty).  PW_RETRY if that fails. */
+/* By how much equation k of D violates its conditions; *to: the mode that would satisfy them.  size: of z that are
+ * round-off. */
+static double decision_violation (const pw_events *x, int k, double size, int *to) {
+  const double unit = sqrt (x->A[k * x->n + k]);
+  double z = x->b[k];
+  *to = x->x[k] > x->hi[k] ? 1 : -1;
+  if (x->trial[k] == 0) return unit * fmax (x->x[k] - x->hi[k], x->lo[k] - x->x[k]);
+  for (int i = 0; i < x->n; i++) z -= x->A[k * x->n + i] * x->x[i];
+  *to = 0;
+  return -x->trial[k] * z / unit - 1e-12 * size;
+}
+
+/* Finds x and trial modes between lo and hi, from the present trial modes on: the largest violation changes its mode;
+ * after many changes, which may cycle, the first one (Murty).  An equation that depends on those that hold stays at its
+ * limit, where it is satisfied, too.  PW_RETRY if that fails. */
 static int decision_pivot (pw_events *x) {
   const int n = x->n;
+  int changed = -1, before = 0;
+  memset (x->blocked, 0, (size_t)n);
   for (int pass = 0; pass < 50 * (n + 1); pass++) {
-    int worst = -1, to = 0;
-    double most = 0;
+    int worst = -1, to = 0, next = 0;
+    double most = 0, size = 0;
     for (int k = 0; k < n; k++)
       if (x->trial[k]) x->x[k] = x->trial[k] > 0 ? x->hi[k] : x->lo[k];
-    if (decision_solve (x) != PW_OK) return PW_RETRY;
+    if (decision_solve (x, 0) != PW_OK) {
+      if (changed < 0 || before == 0) return PW_RETRY;
+      x->trial[changed] = (signed char)before, x->blocked[changed] = 1;
+      continue;
+    }
+    for (int k = 0; k < n; k++) {
+      const double unit = sqrt (x->A[k * n + k]);
+      size = fmax (size, fmax (fabs (x->b[k]) / unit, fabs (x->x[k]) * unit));
+    }
     for (int k = 0; k < n && (worst < 0 || pass < 10 * n); k++) {
-      const double size = sqrt (x->A[k * n + k]);
-      double violation = size * fmax (x->x[k] - x->hi[k], x->lo[k] - x->x[k]), z = x->b[k];
-      int next = x->x[k] > x->hi[k] ? 1 : -1;
-      for (int i = 0; i < n && x->trial[k]; i++) z -= x->A[k * n + i] * x->x[i];
-      if (x->trial[k]) violation = -x->trial[k] * z / size, next = 0;
+      const double violation = x->blocked[k] ? 0 : decision_violation (x, k, size, &next);
       if (violation > most) most = violation, worst = k, to = next;
     }
     if (worst < 0) return PW_OK;
+    if (to != 0) memset (x->blocked, 0, (size_t)n);
+    changed = worst, before = x->trial[worst];
     x->trial[worst] = (signed char)to;
   }
   return PW_RETRY;
@@ -399,7 +428,7 @@ static int decide_impacts (pw_run *r, const double *g, int *any, pw_error *error
     x->impulse[i] = 0, x->rests[i] = 0;
     if (!one_sided || events_open (r, i, g[i]) || (x->mode[i] && x->mode[i] * u > EVENTS_SMALL)) continue;
     *any |= hits;
-    x->trial[x->n] = 0;
+    x->trial[x->n] = events_off (x, i, 0);
     x->lo[x->n] = isinf (x->limit[i].least) ? -INFINITY : 0, x->hi[x->n] = isinf (x->limit[i].most) ? INFINITY : 0;
     x->list[x->n++] = i;
   }
@@ -441,7 +470,7 @@ static void decide_list (pw_run *r, const double *g, int jumps) {
     if (open || (x->mode[i] && !rolls && fabs (u) > EVENTS_SMALL)) continue;
     const double tighter = x->mode[i] == 0 && x->triggered[i] ? EVENTS_TIGHTER * x->force_unit[i] : 0;
     x->lo[x->n] = x->limit[i].least + tighter, x->hi[x->n] = x->limit[i].most - tighter;
-    x->trial[x->n] = 0;
+    x->trial[x->n] = x->mode[i];
     x->list[x->n++] = i;
   }
 }
@@ -466,7 +495,8 @@ static int decide_modes (pw_run *r, pw_error *error) {
     x->trial[k] = 0, x->b[k] = x->u[x->list[k]];
   }
   if (x->n > 0 && status == PW_OK)
-    status = decision_solve (x) == PW_OK && decision_push (r, saddle) == PW_OK ? PW_OK : pw_fail_signal (r->t, error);
+    status =
+        decision_solve (x, 1) == PW_OK && decision_push (r, saddle) == PW_OK ? PW_OK : pw_fail_signal (r->t, error);
   pw_saddle_close (saddle);
   return status;
 }
