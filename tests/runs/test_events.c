@@ -168,7 +168,8 @@ static double events_random (unsigned *state) {
   return (double)(*state >> 8) / (1 << 24);
 }
 
-/* A vehicle of two segments with random masses, places, grips of both wheels, friction in the hinge, and a stop. */
+/* A vehicle of two segments with random masses, places, grips of both wheels, friction in the hinge, and stops
+ * without restitution: how many bounces accumulate, each with new events of the wheels, depends on the tolerance. */
 SCENE (events_vehicle) {
   static unsigned seed = 1;
   unsigned *x = &seed;
@@ -191,8 +192,7 @@ SCENE (events_vehicle) {
                                       .body = { "a", "b" },
                                       .what = PW_DRIVE_ANGLE,
                                       .low = -0.2 - events_random (x),
-                                      .high = 0.2 + events_random (x),
-                                      .restitution = 0.8 * events_random (x) });
+                                      .high = 0.2 + events_random (x) });
   pw_add_torque (m, &(pw_torque){ .name = "T",
                                   .body = { "a", "b" },
                                   .value = { PW_HARMONIC, .harmonic = { .amplitude = 0.1 + 0.2 * events_random (x),
@@ -205,13 +205,9 @@ static int events_of (pw_system *s, const char *method, double step, double t, d
   (void)runs_to (r, t);
   int count;
   const pw_event *event = pw_run_events (r, &count);
-  int kept = 0;
-  for (int i = 0; i < count && kept < 400; i++) {
-    if (event[i].impact && fabs (event[i].impulse) < 1e-4) continue; /* how many accumulate depends on the tolerance */
-    time[kept] = event[i].t, row[kept++] = 8 * event[i].row + event[i].to;
-  }
+  for (int i = 0; i < count && i < 400; i++) time[i] = event[i].t, row[i] = 8 * event[i].row + event[i].to;
   pw_run_close (r);
-  return kept;
+  return count;
 }
 
 TEST (none_missed) {
