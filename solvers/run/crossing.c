@@ -66,7 +66,8 @@ static double crossing_locate (pw_crossing_search *x, crossing_point a, crossing
 static double crossing_peak (pw_crossing_search *x, int i, crossing_point a, crossing_point m, crossing_point b) {
   const double bend = a.value - 2 * m.value + b.value, vertex = -(b.value - a.value) / (2 * bend);
   if (!(bend < 0 && fabs (vertex) < 1) || m.value > 0) return NAN;
-  const crossing_point before = a, p = vertex == 0 ? m : crossing_at (x, i, m.t + vertex * (b.t - m.t));
+  const double t = fmin (fmax (m.t + vertex * (b.t - m.t), a.t), b.t); /* a vertex near an end is rounded */
+  const crossing_point before = a, p = vertex == 0 ? m : crossing_at (x, i, t);
   if (p.value > 0) return crossing_locate (x, p.t < m.t ? before : m, p);
   if (p.value > m.value) {
     *(p.t < m.t ? &b : &a) = m;
@@ -74,8 +75,8 @@ static double crossing_peak (pw_crossing_search *x, int i, crossing_point a, cro
   }
   for (int n = 0; n < CROSSING_SEARCH && x->status == PW_OK && m.value > a.value && m.value > b.value; n++) {
     const int left = m.t - a.t > b.t - m.t;
-    const double t = left ? m.t - CROSSING_GOLDEN * (m.t - a.t) : m.t + CROSSING_GOLDEN * (b.t - m.t);
-    const crossing_point next = crossing_at (x, i, t);
+    const double next_t = left ? m.t - CROSSING_GOLDEN * (m.t - a.t) : m.t + CROSSING_GOLDEN * (b.t - m.t);
+    const crossing_point next = crossing_at (x, i, next_t);
     if (next.value > 0) return crossing_locate (x, next.t < m.t ? a : m, next);
     if (next.value > m.value) {
       *(left ? &b : &a) = m;
