@@ -473,6 +473,7 @@ static void decide_list (pw_run *r, const double *g, int jumps) {
     x->trial[x->n] = x->mode[i];
     x->list[x->n++] = i;
   }
+  events_apply (r); /* forces of those outside D */
 }
 
 /* Decides the modes of D.  Their u becomes 0 exactly. */
