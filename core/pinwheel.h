@@ -627,8 +627,8 @@ typedef enum {
 } pw_level;
 
 /* Limits of the multiplier of a constraint equation, constants.  Between them the equation holds.  At one of them it is
- * not enforced: its multiplier is given, and J v - eta, of a holonomic equation g, stays >= 0 at the largest multiplier,
- * <= 0 at the smallest one. */
+ * not enforced: its multiplier is given, and u = J v - eta, of a holonomic equation u = g, stays >= 0 at the largest
+ * multiplier, <= 0 at the smallest one. */
 typedef struct {
   double least, most; /* multipliers with which the equation holds; both 0: it never does */
   double sliding[2];  /* those given at the smallest and at the largest one; their magnitudes are not larger */
@@ -678,8 +678,8 @@ struct pw_kind {
   pw_batch_function *force_q, *force_v; /* cols x cols */
   pw_batch_function *energy;            /* 1: potential energy [J] */
   pw_batch_function *power;             /* 1: power supplied to the system [W]; NULL: -lambda . eta */
-  /* 1: dissipated power [W], >= 0; with limits of multipliers, round-off while their equations hold; NULL: impacts alone
-   * dissipate energy, if there are limits. */
+  /* 1: dissipated power [W], >= 0; with limits of multipliers, round-off while their equations hold; NULL: impacts
+   * alone dissipate energy, if there are limits. */
   pw_batch_function *loss;
   pw_batch_function *contact; /* 3: contact point, or point of a marker [m], and heading [rad]; for output */
   /* 2 cols, for forces that saturate, such as friction: the smallest change of each coordinate, then of each velocity,
@@ -730,7 +730,8 @@ PW_KINDS
 #undef PW_KIND
 
 /* What stands for these types where Coulomb friction is exact (pw_kind.exact). */
-extern PW_EXPORT const pw_kind pw_kind_dry_friction, pw_kind_dry_sliding_friction;
+extern const pw_kind pw_kind_dry_friction;
+extern const pw_kind pw_kind_dry_sliding_friction;
 
 /* The built-in element types; ends with NULL. */
 extern const pw_kind *const pw_kinds[];

@@ -158,8 +158,7 @@ typedef struct {
 
 /* The number of constraint equations whose multipliers have limits. */
 int pw_system_limited (const pw_system *s);
-/* "holds"; "slides+", "slides-" in the direction in which J v - eta is positive, negative; "free" of an equation with one
- * limit. */
+/* "holds"; "slides+", "slides-" where J v - eta is positive, negative; "free" of an equation with one limit. */
 const char *pw_system_mode_name (const pw_system *s, int row, int mode);
 
 /* Entries of the energy ledger: work or loss of an element.  Their names are like "rider.work", "damper.loss";

@@ -103,6 +103,11 @@ struct pw_run {
   int redundant;                 /* number of redundant rows; what follows, to reselect_below, only if there are any */
   struct pw_events *events;      /* of equations whose multipliers have limits (events.h); NULL: there are none */
   const unsigned char *enforced; /* rows: 0 for those whose multipliers are at a limit; NULL: none is */
+  double *reaction;              /* rows: minus the multipliers of those, else 0; NULL without events */
+  pw_event *event;               /* events so far: `event_count` of them */
+  long event_count;
+  size_t event_room;
+  int jumped; /* 1: multipliers may have jumped at a discontinuity since the last step */
   int (*advance) (struct pw_run *r, double t_end, pw_error *error); /* the method's, or with events */
   int forces;                  /* 0: constant ones alone; 1: others, too; PW_FORCES_AT_LIMITS */
   int redundant_drive;         /* 1: one of them has an eta, or some are not enforced: work depends on multipliers */
@@ -170,6 +175,19 @@ struct pw_run {
   char *memory;         /* of the state, samples and scratch */
   pw_arena arena;       /* of redundant rows and specialised code */
 };
+
+/* ---- Equations that are not enforced (events.h): they have given multipliers ---- */
+
+/* f (coords + 3) += their forces, with the J last evaluated. */
+static inline void pw_add_given_forces (const pw_run *r, double *f) {
+  pw_add_JT (r->w, r->reaction, f);
+}
+
+/* Sets their multipliers. */
+static inline void pw_fill_given (const pw_run *r, double *lambda) {
+  for (int i = 0; i < r->s->rows; i++)
+    if (!r->enforced[i]) lambda[i] = -r->reaction[i];
+}
 
 /* ---- Tolerances ---- */
 
@@ -431,10 +449,6 @@ void pw_record_residuals (pw_run *r);
 static inline void pw_forget_residuals (pw_run *r) {
   r->residuals.position = r->residuals.velocity = NAN;
 }
-
-/* Equations that are not enforced (events.c): adds their forces to f (coords + 3); sets their multipliers. */
-void pw_events_add_forces (const pw_run *r, double *f);
-void pw_events_fill (const pw_run *r, double *lambda);
 
 /* ---- Projection ---- */
 

@@ -95,8 +95,8 @@ LIBM (libm_hypot (libm_lanes x, libm_lanes y)) {
     name, unit, NULL, about          \
   }
 
-/* Checks the limit of a multiplier while its equation holds, and that at which it does not (0: the same).  field: the name
- * of the former. */
+/* Checks the limit of a multiplier while its equation holds, and that at which it does not (0: the same).  field: the
+ * name of the former. */
 static inline int limit_check (const char *field, double most, double sliding, pw_error *error) {
   if (sliding <= most) return PW_OK;
   return pw_fail (error, PW_INPUT, "%s_sliding = %g: expected at most the %s, %g", field, sliding, field, most);

@@ -49,8 +49,8 @@ static inline double coulomb_saturation (const coulomb *law, double v, double de
   return derivative != 0 && law->inverse > 0 ? (1 / law->inverse + fabs (v)) / fabs (derivative) : INFINITY;
 }
 
-/* EXACT_COULOMB (friction, pw_friction) defines the functions of a constraint equation with an element and a state as below:
- * friction_is_exact, friction_limits, friction_exact_J, friction_exact_loss. */
+/* EXACT_COULOMB (friction, pw_friction) defines the functions of a constraint equation with an element and a state as
+ * below: friction_is_exact, friction_limits, friction_exact_J, friction_exact_loss. */
 #define EXACT_COULOMB(type, definition_type)                                \
   static int type##_is_exact (const void *definition) {                     \
     const definition_type *x = definition;                                  \

@@ -240,7 +240,7 @@ void pw_tangent_add_momentum (pw_tangent *x, const pw_tangent_layout *to, const 
   const pw_system *s = x->run->s;
   if (x->run->forces == PW_FORCES_AT_LIMITS) {
     if (lambda != x->lambda) memcpy (x->lambda, lambda, (size_t)s->rows * sizeof *lambda);
-    pw_events_fill (x->run, x->lambda);
+    pw_fill_given (x->run, x->lambda);
     lambda = x->lambda;
   }
   pw_placement put = {
@@ -332,7 +332,7 @@ void pw_dae_residual (pw_dae *x, const double *v, const double *a, const double 
   for (int j = 0; j < n; j++) F[j] = x->tangent.D[j] * x->reaction[j];
   dae_multiply_JT (&x->tangent, lambda, x->rows, x->reaction);
   pw_evaluate_force (r->w, x->force);
-  if (r->forces == PW_FORCES_AT_LIMITS) pw_events_add_forces (r, x->force);
+  if (r->forces == PW_FORCES_AT_LIMITS) pw_add_given_forces (r, x->force);
   for (int j = 0; j < n; j++) F[n + j] = (a ? r->s->mass[j] * a[j] : 0) + x->reaction[j] - x->force[j];
   dae_constraints (x, v, a, F + 2 * n);
 }

@@ -61,8 +61,8 @@ static double crossing_locate (pw_crossing_search *x, crossing_point a, crossing
   return b.t;
 }
 
-/* Searches a maximum of function i between a and b, first at the vertex of the parabola through a, m and b, then by golden sections
- * around the largest value, until a value is positive; NaN: there is none. */
+/* Searches a maximum of function i between a and b, first at the vertex of the parabola through a, m and b, then by
+ * golden sections around the largest value, until a value is positive; NaN: there is none. */
 static double crossing_peak (pw_crossing_search *x, int i, crossing_point a, crossing_point m, crossing_point b) {
   const double bend = a.value - 2 * m.value + b.value, vertex = -(b.value - a.value) / (2 * bend);
   if (!(bend < 0 && fabs (vertex) < 1) || m.value > 0) return NAN;

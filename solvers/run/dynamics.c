@@ -9,7 +9,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include "method.h"
-#include "events.h"
 #include "rank.h"
 #include "specialised.h"
 #include "util.h"
@@ -256,7 +255,7 @@ static inline const double *dynamics_right_side (pw_run *r, const double *v, dou
   pw_run_gamma (r, v, gamma);
   if (r->forces == 0) return r->s->constant;
   pw_evaluate_force (r->w, f);
-  if (r->forces == PW_FORCES_AT_LIMITS) pw_events_add_forces (r, f);
+  if (r->forces == PW_FORCES_AT_LIMITS) pw_add_given_forces (r, f);
   return f;
 }
 

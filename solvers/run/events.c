@@ -41,7 +41,6 @@ typedef struct pw_events {
   unsigned char *enforced;              /* rows: what r->enforced points to */
   unsigned char *blocked;               /* n: 1 for equations of a decision that depend on those that hold */
   unsigned char *other;                 /* rows: active equations of the saddle of a decision */
-  double *reaction;                     /* rows: minus the given multipliers, else 0 */
   double *start, *end, *previous, *now; /* 2 count: event functions at the ends of the last step, before it, anywhere */
   double start_t, previous_t;           /* NaN: not known */
   double *memory;                       /* of pw_first_crossing */
@@ -59,9 +58,6 @@ typedef struct pw_events {
   signed char *trial;                   /* n: modes */
   double *f, *a, *gamma, *lambda;       /* coords + 3; the same; rows; rows */
 
-  pw_event *log;
-  long logged;
-  size_t room;
 } pw_events;
 
 static void *events_alloc (pw_run *r, size_t count, size_t size, int *failed) {
@@ -89,7 +85,7 @@ static int events_allocate (pw_run *r) {
     size_t length;
   } number[] = { { &x->force_unit, n },
                  { &x->unit, n },
-                 { &x->reaction, rows },
+                 { &r->reaction, rows },
                  { &x->start, 2 * n },
                  { &x->end, 2 * n },
                  { &x->now, 2 * n },
@@ -114,10 +110,6 @@ static int events_allocate (pw_run *r) {
   return failed ? PW_RESOURCE : PW_OK;
 }
 
-void pw_events_close (pw_run *r) {
-  if (r->events) free (r->events->log);
-}
-
 /* ---- Modes of the run ---- */
 
 /* The multiplier of an equation at a limit. */
@@ -138,27 +130,18 @@ static void events_apply (pw_run *r) {
   for (int i = 0; i < r->s->rows; i++) {
     const pw_bounds *limit = &r->s->limit[i];
     x->enforced[i] = limit->least < 0 || limit->most > 0;
-    x->reaction[i] = 0;
+    r->reaction[i] = 0;
     off |= !x->enforced[i];
   }
   for (int i = 0; i < x->count; i++) {
     if (x->mode[i] == 0) continue;
     x->enforced[x->row[i]] = 0;
-    x->reaction[x->row[i]] = -events_given (x, i);
+    r->reaction[x->row[i]] = -events_given (x, i);
     off = 1;
   }
   r->active = r->enforced = off ? x->enforced : NULL;
   r->redundant_drive = off;
   r->forces = off ? PW_FORCES_AT_LIMITS : r->s->forces > 0;
-}
-
-void pw_events_add_forces (const pw_run *r, double *f) {
-  pw_add_JT (r->w, r->events->reaction, f);
-}
-
-void pw_events_fill (const pw_run *r, double *lambda) {
-  for (int i = 0; i < r->s->rows; i++)
-    if (!r->enforced[i]) lambda[i] = -r->events->reaction[i];
 }
 
 /* u of the equations with limits at velocities v, where J is evaluated; of holonomic equations their rate, unless g is
@@ -208,8 +191,8 @@ static int events_knows_multipliers (const pw_run *r) {
   return 0;
 }
 
-/* pw_crossing_search.at.  Otherwise multipliers are computed from the state: those of some methods are interpolated, and
- * modes are decided with these. */
+/* pw_crossing_search.at.  Otherwise multipliers are computed from the state: those of some methods are interpolated,
+ * and modes are decided with these. */
 static int events_at (void *context, double t, double *value, pw_error *error) {
   pw_run *r = context;
   const pw_statistics statistics = r->statistics;
@@ -259,8 +242,8 @@ static pw_saddle *decision_open (pw_run *r, int impact, pw_error *error) {
     pw_evaluate_eta (r->w, x->gamma);
   } else {
     pw_evaluate_force (r->w, x->f);
-    for (int k = 0; k < x->n; k++) x->reaction[x->row[x->list[k]]] = 0; /* the unknowns */
-    pw_events_add_forces (r, x->f);
+    for (int k = 0; k < x->n; k++) r->reaction[x->row[x->list[k]]] = 0; /* the unknowns */
+    pw_add_given_forces (r, x->f);
     pw_evaluate_gamma (r->w, x->gamma);
     memcpy (x->lambda, x->gamma, (size_t)s->rows * sizeof *x->lambda);
     pw_saddle_solve (saddle, x->f, x->lambda, x->a, x->lambda);
@@ -295,8 +278,8 @@ static int decision_push (pw_run *r, pw_saddle *saddle) {
   return pw_update_velocities (r->w, r->v);
 }
 
-/* Solves z = 0 for those of D whose trial mode is 0, with x of the others given (Cholesky).  Of equations that depend on
- * each other the later ones are left out if `skips` is 1; otherwise PW_RETRY. */
+/* Solves z = 0 for those of D whose trial mode is 0, with x of the others given (Cholesky).  Of equations that depend
+ * on each other the later ones are left out if `skips` is 1; otherwise PW_RETRY. */
 static int decision_solve (pw_events *x, int skips) {
   const int n = x->n;
   double *L = x->factor, *y = L + n * n;
@@ -506,8 +489,9 @@ static int events_log (pw_run *r) {
   pw_events *x = r->events;
   for (int i = 0; i < x->count; i++) {
     if (x->mode[i] == x->before[i] && x->impulse[i] == 0) continue;
-    if (pw_grow (&x->log, (size_t)x->logged, &x->room, sizeof *x->log) != PW_OK) return PW_RESOURCE;
-    x->log[x->logged++] = (pw_event){ r->t, x->impulse[i], x->row[i], x->before[i], x->mode[i], x->impulse[i] != 0 };
+    if (pw_grow (&r->event, (size_t)r->event_count, &r->event_room, sizeof *r->event) != PW_OK) return PW_RESOURCE;
+    r->event[r->event_count++] =
+        (pw_event){ r->t, x->impulse[i], x->row[i], x->before[i], x->mode[i], x->impulse[i] != 0 };
   }
   return PW_OK;
 }
@@ -563,13 +547,11 @@ static int events_leave (pw_run *r, pw_error *error) {
   return PW_OK;
 }
 
-void pw_events_jump (pw_run *r) {
-  if (r->events) r->events->start_t = NAN;
-}
-
 static int events_prepare (pw_run *r, pw_error *error) {
   pw_events *x = r->events;
   int status = PW_OK, changes = 0;
+  if (r->jumped) x->start_t = NAN;
+  r->jumped = 0;
   for (int pass = 0; status == PW_OK && (x->pending || x->start_t != r->t); pass++) {
     if (pass == EVENTS_PASSES)
       return pw_fail (error, PW_METHOD, "t = %.6g s: modes change endlessly: %s", r->t,
@@ -780,11 +762,6 @@ int pw_events_begin (pw_run *r, pw_error *error) {
   return status;
 }
 
-const pw_event *pw_run_events (const pw_run *r, int *count) {
-  *count = r && r->events ? (int)r->events->logged : 0;
-  return *count > 0 ? r->events->log : NULL;
-}
-
 void pw_events_serialise (pw_run *r, pw_archive *a) {
   pw_events *x = r->events;
   if (x == NULL) return;
@@ -792,17 +769,17 @@ void pw_events_serialise (pw_run *r, pw_archive *a) {
   pw_archive_bytes (a, x->triggered, (size_t)x->count);
   pw_archive_bytes (a, &x->pending, sizeof x->pending);
   pw_archive_bytes (a, &x->fell, sizeof x->fell);
-  pw_archive_count (a, &x->logged);
-  for (long i = 0; i < x->logged && !a->failed; i++) {
-    a->failed |= a->loading && pw_grow (&x->log, (size_t)i, &x->room, sizeof *x->log) != PW_OK;
-    pw_archive_bytes (a, x->log + i, sizeof *x->log);
+  pw_archive_count (a, &r->event_count);
+  for (long i = 0; i < r->event_count && !a->failed; i++) {
+    a->failed |= a->loading && pw_grow (&r->event, (size_t)i, &r->event_room, sizeof *r->event) != PW_OK;
+    pw_archive_bytes (a, r->event + i, sizeof *r->event);
   }
   for (int i = 0; i < x->count; i++) {
     const signed char mode = x->mode[i];
     const double given = mode ? events_given (x, i) : 0;
     a->failed |= mode < -1 || mode > 1 || !isfinite (given);
   }
-  if (a->failed) x->logged = 0;
+  if (a->failed) r->event_count = 0;
   memset (x->armed, 0, (size_t)x->count);
   x->start_t = x->previous_t = NAN;
   if (!a->failed) events_apply (r);

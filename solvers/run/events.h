@@ -12,16 +12,12 @@ int pw_events_open (pw_run *r, pw_error *error);
  * opened.  Errors: as pw_run_evaluate. */
 int pw_events_begin (pw_run *r, pw_error *error);
 
-/* pw_run.advance: decides the modes at an event that has been located, or if multipliers have jumped beyond their limits
- * at a discontinuity, restarts the method, and makes a step; if there is an event in it, the state there becomes the
- * state reached. */
+/* pw_run.advance: decides the modes at an event that has been located, or if multipliers have jumped beyond their
+ * limits at a discontinuity, restarts the method, and makes a step; if there is an event in it, the state there becomes
+ * the state reached. */
 int pw_events_advance (pw_run *r, double t_end, pw_error *error);
-
-/* Multipliers at the state reached may have jumped. */
-void pw_events_jump (pw_run *r);
 
 /* Saves or loads the modes and the events so far. */
 void pw_events_serialise (pw_run *r, pw_archive *a);
-void pw_events_close (pw_run *r);
 
 #endif

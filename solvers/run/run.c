@@ -5,7 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include "rank.h"
-#include "events.h"
 #include "method.h"
 #include "util.h"
 
@@ -83,7 +82,7 @@ void pw_run_close (pw_run *r) {
   pw_saddle_close (r->saddle);
   pw_saddle_close (r->watchdog.saddle);
   pw_workspace_free (r->w);
-  pw_events_close (r);
+  free (r->event);
   free (r->memory);
   free (r->origin);
   pw_arena_free (&r->arena);
@@ -93,7 +92,7 @@ void pw_run_close (pw_run *r) {
 /* Restarts the method after a discontinuity, where accelerations change, or a step that was interrupted. */
 static int run_restart_method (pw_run *r, pw_error *error) {
   int status = pw_run_look_ahead (r, error);
-  pw_events_jump (r);
+  r->jumped = 1;
   if (status == PW_OK) status = pw_run_evaluate (r, error);
   return status == PW_OK ? r->method->restart (r, error) : status;
 }
@@ -225,7 +224,7 @@ int pw_run_sample (pw_run *r, double t, pw_sample *sample, pw_error *error) {
   if (status != PW_OK) return status;
   *sample = (pw_sample){ .t = t, .q = r->q_at, .v = r->v_at, .a = r->a_at, .lambda = r->lambda_at };
   if (r->redundant && pw_saddle_factor (r->saddle) == PW_OK) pw_rank_least_norm (r, r->lambda_at);
-  if (r->enforced) pw_events_fill (r, r->lambda_at);
+  if (r->enforced) pw_fill_given (r, r->lambda_at);
   run_fill_energies (r, sample);
   pw_evaluate_residuals (r->w, r->enforced, &now);
   sample->position = now.position;
@@ -326,6 +325,11 @@ int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error
 
 int pw_run_redundant (const pw_run *r) {
   return r->redundant;
+}
+
+const pw_event *pw_run_events (const pw_run *r, int *count) {
+  *count = r ? (int)r->event_count : 0;
+  return *count > 0 ? r->event : NULL;
 }
 
 const pw_statistics *pw_run_statistics (const pw_run *r) {
@@ -544,7 +548,7 @@ static const double *ledger_multipliers (pw_run *r, const double *lambda) {
   double *all = r->enforced ? r->scratch : r->least_norm;
   if (r->enforced == NULL && pw_saddle_factor (r->saddle) != PW_OK) return lambda;
   memcpy (all, lambda, (size_t)r->s->rows * sizeof *lambda);
-  r->enforced ? pw_events_fill (r, all) : pw_rank_least_norm (r, all);
+  r->enforced ? pw_fill_given (r, all) : pw_rank_least_norm (r, all);
   return all;
 }
 

@@ -1,4 +1,5 @@
-/* Events of equations whose multipliers have limits: wheels that slide, friction that sticks, stops, ropes, freewheels. */
+/* Events of equations whose multipliers have limits: wheels that slide, friction that sticks, stops, ropes,
+ * freewheels. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

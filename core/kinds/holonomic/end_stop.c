@@ -2,8 +2,8 @@
  *
  *   g1 = x - low >= 0,  g2 = x - high <= 0      (2 holonomic equations, each of which holds while its limit is reached)
  *
- * x, G and gamma: those of a drive (drive.c) whose signal is 0.  A limit acts on body 1 with -lambda, on body 2 with the
- * opposite: along the coordinate at its point, or as a moment; at low it is >= 0, at high <= 0. */
+ * x, G and gamma: those of a drive (drive.c) whose signal is 0.  A limit acts on body 1 with -lambda, on body 2 with
+ * the opposite: along the coordinate at its point, or as a moment; at low it is >= 0, at high <= 0. */
 #include "line.h"
 
 typedef struct {
