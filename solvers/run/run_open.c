@@ -247,13 +247,13 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   if (status == PW_OK) status = run_check_finite (r, error);
   if (status != PW_OK) return status;
   r->w->scale.time = run_time_scale (r);
-  status = pw_events_begin (r, error);
+  pw_ledger_begin (r);
+  status = pw_events_begin (r, error); /* velocities may jump */
   r->advance = r->events ? pw_events_advance : r->method->advance;
   if (status != PW_OK) return status;
   run_absolute_tolerances (r);
   pw_run_count_moved (r);
   pw_run_set_reference_level (r);
-  pw_ledger_begin (r);
   pw_forget_residuals (r);
   pw_record_residuals (r);
   status = pw_run_look_ahead (r, error);

@@ -1,6 +1,6 @@
 /* freewheel: body 1 does not turn more slowly than body 2, as in a ratchet or one-way clutch.
  *
- *   v = omega1 - omega2 >= 0,  S = [ 0 0 1 | 0 0 -1 ],  gamma = 0   (1 nonholonomic equation, which holds while engaged)
+ *   v = omega1 - omega2 >= 0,  S = [ 0 0 1 | 0 0 -1 ],  gamma = 0    (1 nonholonomic equation; it holds while engaged)
  *
  * The torque on body 1 is T = -lambda >= 0; body 2 receives the opposite.  lambda v is 0 but for round-off; its sign
  * lets the self-test verify that of S. */
