@@ -104,6 +104,7 @@ struct pw_run {
   struct pw_events *events;      /* of equations whose multipliers have limits (events.h); NULL: there are none */
   const unsigned char *enforced; /* rows: 0 for those whose multipliers are at a limit; NULL: none is */
   double *reaction;              /* rows: minus the multipliers of those, else 0; NULL without events */
+  char *events_memory;           /* of r->events */
   pw_event *event;               /* events so far: `event_count` of them */
   long event_count;
   size_t event_room;

@@ -56,58 +56,40 @@ typedef struct pw_events {
   double *A, *b, *x, *lo, *hi, *factor; /* n x n; n; factor: n (n + 1) */
   int *held;                            /* n: those that hold */
   signed char *trial;                   /* n: modes */
-  double *f, *a, *gamma, *lambda;       /* coords + 3; the same; rows; rows */
-
+  double *f, *a, *gamma, *lambda;       /* coords + 3; the same; rows; 2 rows */
 } pw_events;
-
-static void *events_alloc (pw_run *r, size_t count, size_t size, int *failed) {
-  void *p = pw_arena_alloc (&r->arena, count * size);
-  *failed |= p == NULL;
-  return p;
-}
 
 static int events_allocate (pw_run *r) {
   const pw_system *s = r->s;
   const size_t n = (size_t)s->limited, rows = (size_t)s->rows, coords = (size_t)s->coords + 3;
-  int failed = 0;
   pw_events *x = r->events = pw_arena_alloc (&r->arena, sizeof *x);
   if (x == NULL) return PW_RESOURCE;
-  x->row = events_alloc (r, n, sizeof *x->row, &failed);
-  x->list = events_alloc (r, n, sizeof *x->list, &failed);
-  x->held = events_alloc (r, n, sizeof *x->held, &failed);
-  x->limit = events_alloc (r, n, sizeof *x->limit, &failed);
-  signed char **const modes[] = { &x->mode, &x->before, &x->trial };
-  for (size_t i = 0; i < sizeof modes / sizeof *modes; i++) *modes[i] = events_alloc (r, n, 1, &failed);
-  unsigned char **const flags[] = { &x->armed, &x->triggered, &x->rests, &x->blocked, &x->enforced, &x->other };
-  for (size_t i = 0; i < sizeof flags / sizeof *flags; i++) *flags[i] = events_alloc (r, i < 4 ? n : rows, 1, &failed);
-  const struct {
-    double **array;
-    size_t length;
-  } number[] = { { &x->force_unit, n },
-                 { &x->unit, n },
-                 { &r->reaction, rows },
-                 { &x->start, 2 * n },
-                 { &x->end, 2 * n },
-                 { &x->now, 2 * n },
-                 { &x->previous, 2 * n },
-                 { &x->u, n },
-                 { &x->u_before, n },
-                 { &x->impulse, n },
-                 { &x->offset, n },
-                 { &x->A, n * n },
-                 { &x->b, n },
-                 { &x->x, n },
-                 { &x->lo, n },
-                 { &x->hi, n },
-                 { &x->factor, n * (n + 1) },
-                 { &x->f, coords },
-                 { &x->a, coords },
-                 { &x->gamma, rows },
-                 { &x->lambda, 2 * rows },
-                 { &x->memory, 2 * n * (PW_CROSSING_DEPTH + 2) } };
-  for (size_t i = 0; i < sizeof number / sizeof *number; i++)
-    *number[i].array = events_alloc (r, number[i].length, sizeof (double), &failed);
-  return failed ? PW_RESOURCE : PW_OK;
+  double **const number[] = { &x->force_unit, &x->unit, &x->u, &x->u_before, &x->impulse,
+                              &x->offset,     &x->b,    &x->x, &x->lo,       &x->hi };
+  double **const function[] = { &x->start, &x->end, &x->now, &x->previous };
+  signed char **const mode[] = { &x->mode, &x->before, &x->trial };
+  unsigned char **const flag[] = { &x->armed, &x->triggered, &x->rests, &x->blocked };
+  for (pw_layout l = { 0 }; pw_layout_pass (&l, &r->events_memory);) {
+    x->row = pw_layout_alloc (&l, n, sizeof *x->row);
+    x->list = pw_layout_alloc (&l, n, sizeof *x->list);
+    x->held = pw_layout_alloc (&l, n, sizeof *x->held);
+    x->limit = pw_layout_alloc (&l, n, sizeof *x->limit);
+    for (size_t i = 0; i < sizeof number / sizeof *number; i++) *number[i] = pw_layout_alloc (&l, n, sizeof (double));
+    for (int i = 0; i < 4; i++) *function[i] = pw_layout_alloc (&l, 2 * n, sizeof (double));
+    for (int i = 0; i < 3; i++) *mode[i] = pw_layout_alloc (&l, n, 1);
+    for (int i = 0; i < 4; i++) *flag[i] = pw_layout_alloc (&l, n, 1);
+    x->enforced = pw_layout_alloc (&l, rows, 1);
+    x->other = pw_layout_alloc (&l, rows, 1);
+    x->A = pw_layout_alloc (&l, n * n, sizeof *x->A);
+    x->factor = pw_layout_alloc (&l, n * (n + 1), sizeof *x->factor);
+    x->f = pw_layout_alloc (&l, coords, sizeof *x->f);
+    x->a = pw_layout_alloc (&l, coords, sizeof *x->a);
+    x->gamma = pw_layout_alloc (&l, rows, sizeof *x->gamma);
+    x->lambda = pw_layout_alloc (&l, 2 * rows, sizeof *x->lambda);
+    x->memory = pw_layout_alloc (&l, 2 * n * (PW_CROSSING_DEPTH + 2), sizeof *x->memory);
+    r->reaction = pw_layout_alloc (&l, rows, sizeof *r->reaction);
+  }
+  return r->events_memory ? PW_OK : PW_RESOURCE;
 }
 
 /* ---- Modes of the run ---- */

@@ -83,6 +83,7 @@ void pw_run_close (pw_run *r) {
   pw_saddle_close (r->watchdog.saddle);
   pw_workspace_free (r->w);
   free (r->event);
+  free (r->events_memory);
   free (r->memory);
   free (r->origin);
   pw_arena_free (&r->arena);
