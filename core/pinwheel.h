@@ -399,11 +399,39 @@ typedef struct {
   double start, rate; /* initial s and its velocity; 0: from the body's position and velocity */
 } pw_on_curve;
 
-/* Wheel: a knife edge; the contact point does not move across the heading.  One nonholonomic constraint equation. */
+/* Stop: a coordinate of a point of body 1, or the angle phi1 - phi2, as of a drive, stays within limits.  Two holonomic
+ * constraint equations. */
+enum { PW_STOP_BOTH, PW_STOP_LOW, PW_STOP_HIGH };
+typedef struct {
+  const char *name, *body[2]; /* the stopped body and the reference body, or "ground" for one of them */
+  double at[2][2];            /* a point in each body's frame [m]; on the ground: in the world */
+  int what;                   /* PW_DRIVE_... */
+  double low, high;           /* limits [m] or [rad] */
+  int sides;                  /* PW_STOP_...: which of them exist; the other one is 0 here */
+  double restitution;         /* velocity after an impact over that before it, 0 to 1 */
+} pw_end_stop;
+
+/* Rope: a rod that may be slack. */
+typedef struct {
+  const char *name, *body[2]; /* the two bodies, or "ground" for one of them */
+  double at[2][2];            /* the end points in the bodies' frames [m]; on the ground: in the world */
+  double length;              /* largest distance between them [m] */
+  double restitution;         /* velocity after the rope has become taut over that before it, 0 to 1 */
+} pw_rope;
+
+/* Freewheel: body 1 does not turn more slowly than body 2.  One nonholonomic constraint equation. */
+typedef struct {
+  const char *name, *body[2]; /* the two bodies, or "ground" for one of them */
+} pw_freewheel;
+
+/* Wheel: a knife edge; the contact point does not move across the heading.  One nonholonomic constraint equation.  With
+ * a grip, it slides against the force grip_sliding once holding would take more than the grip. */
 typedef struct {
   const char *name, *body;
-  double at[2];   /* contact point in the body's frame [m] */
-  double heading; /* rolling direction in the body's frame [rad] */
+  double at[2];        /* contact point in the body's frame [m] */
+  double heading;      /* rolling direction in the body's frame [rad] */
+  double grip;         /* largest lateral force [N]; 0: no limit */
+  double grip_sliding; /* lateral force while sliding [N], at most the grip; 0: the grip */
 } pw_wheel;
 
 /* Rolling wheel: the contact point moves neither across the heading nor, except by rolling, along it.  Two
@@ -422,8 +450,9 @@ typedef struct {
 /* Steered wheel: a wheel whose heading in the body follows a signal.  One nonholonomic constraint equation. */
 typedef struct {
   const char *name, *body;
-  double at[2];      /* contact point in the body's frame [m] */
-  pw_signal heading; /* rolling direction in the body's frame [rad]; with its first time derivative */
+  double at[2];              /* contact point in the body's frame [m] */
+  pw_signal heading;         /* rolling direction in the body's frame [rad]; with its first time derivative */
+  double grip, grip_sliding; /* as of a wheel [N] */
 } pw_steered_wheel;
 
 /* Speed: a point's speed along a direction of its body follows a signal.  One nonholonomic constraint equation. */
@@ -480,7 +509,8 @@ typedef struct {
 typedef struct {
   const char *name, *body[2]; /* the two bodies, or "ground" for one of them */
   double viscous, limit;      /* [N m s/rad]; Coulomb torque [N m]; >= 0 */
-  double speed;               /* below about this velocity the Coulomb torque is smoothed [rad/s]; > 0 if limit > 0 */
+  double speed; /* below about this velocity the Coulomb torque is smoothed [rad/s]; 0: it is exact, and holds */
+  double limit_sliding; /* exact Coulomb torque while sliding [N m], at most the limit; 0: the limit */
 } pw_friction;
 
 /* Sliding friction: a viscous and a Coulomb force that oppose the motion of a point of body 1 along a line of body 2,
@@ -490,7 +520,8 @@ typedef struct {
   double at[2][2];       /* the point, and a point of the line, in each body's frame [m]; on the ground: in the world */
   double heading;        /* direction of the line in body 2's frame [rad] */
   double viscous, limit; /* [N s/m]; Coulomb force [N]; >= 0 */
-  double speed;          /* below about this speed the Coulomb force is smoothed [m/s]; > 0 if limit > 0 */
+  double speed;          /* below about this speed the Coulomb force is smoothed [m/s]; 0: it is exact, and holds */
+  double limit_sliding;  /* exact Coulomb force while sliding [N], at most the limit; 0: the limit */
 } pw_sliding_friction;
 
 /* Drag: still air opposes the velocity of a body's centre of mass and its rotation. */
@@ -557,9 +588,12 @@ typedef struct {
   PW_KIND (gear)               \
   PW_KIND (drive)              \
   PW_KIND (on_curve)           \
+  PW_KIND (end_stop)           \
+  PW_KIND (rope)               \
   PW_KIND (wheel)              \
   PW_KIND (rolling_wheel)      \
   PW_KIND (steered_wheel)      \
+  PW_KIND (freewheel)          \
   PW_KIND (speed)              \
   PW_KIND (pfaffian)           \
   PW_KIND (tyre)               \
@@ -648,6 +682,15 @@ typedef enum {
   PW_NONHOLONOMIC /* S (q, t) v = eta (t, q) */
 } pw_level;
 
+/* Limits of the multiplier of a constraint equation, constants.  Between them the equation holds.  At one of them it is
+ * not enforced: its multiplier is given, and u = J v - eta, of a holonomic equation u = g, stays >= 0 at the largest
+ * multiplier, <= 0 at the smallest one. */
+typedef struct {
+  double least, most; /* multipliers with which the equation holds; both 0: it never does */
+  double sliding[2];  /* those given at the smallest and at the largest one; their magnitudes are not larger */
+  double restitution; /* of an infinite limit: velocity J v - eta after an impact over that before it, 0 to 1 */
+} pw_bounds;
+
 /* An element type: one const table.  A NULL function is zero (the self-test verifies this); J of constraint equations
  * and g of holonomic ones are required.  Sizes are per element; at most 4 bodies, 4 internal coordinates, 6 constraint
  * equations, 4 signals. */
@@ -692,8 +735,10 @@ struct pw_kind {
   pw_batch_function *force_q, *force_v; /* cols x cols */
   pw_batch_function *energy;            /* 1: potential energy [J] */
   pw_batch_function *power;             /* 1: power supplied to the system [W]; NULL: -lambda . eta */
-  pw_batch_function *loss;              /* 1: dissipated power [W], >= 0 */
-  pw_batch_function *contact;           /* 3: contact point, or point of a marker [m], and heading [rad]; for output */
+  /* 1: dissipated power [W], >= 0; with limits of multipliers, round-off while their equations hold; NULL: impacts
+   * alone dissipate energy, if there are limits. */
+  pw_batch_function *loss;
+  pw_batch_function *contact; /* 3: contact point, or point of a marker [m], and heading [rad]; for output */
   /* 2 cols, for forces that saturate, such as friction: the smallest change of each coordinate, then of each velocity,
    * that reverses the force or changes it by its own magnitude.  Entries are INFINITY before the call. */
   pw_batch_function *saturation;
@@ -701,6 +746,11 @@ struct pw_kind {
    * of the way from the first body's point to the last body's, plus x along and y to the left of the heading, in units
    * of symbols.  "o a x y r": a circle of radius r.  "g1", "g2": the pitch circles of two gears. */
   const char *symbol;
+  /* Sets the limits of an element's multipliers (rows), -INFINITY to INFINITY before the call; NULL: they stay so. */
+  void (*limits) (const void *definition, pw_bounds *limit);
+  /* The type that stands for this one where is_exact (definition) is not 0; with the same definition and fields. */
+  const struct pw_kind *exact;
+  int (*is_exact) (const void *definition);
 };
 
 /* The number of values of a field, and the bytes of one value; 0 bytes: invalid type. */
@@ -735,6 +785,10 @@ static inline int pw_kind_signals_feedback (const pw_kind *kind) {
   }
 PW_KINDS
 #undef PW_KIND
+
+/* What stands for these types where Coulomb friction is exact (pw_kind.exact). */
+extern const pw_kind pw_kind_dry_friction;
+extern const pw_kind pw_kind_dry_sliding_friction;
 
 /* The built-in element types; ends with NULL. */
 extern const pw_kind *const pw_kinds[];

@@ -146,6 +146,21 @@ typedef struct {
   double jv;           /* worst |J v - eta| [m/s] or [rad/s] */
 } pw_statistics;
 
+/* A change of a constraint equation whose multiplier has limits (pw_bounds).  Mode 0: it holds; 1, -1: its multiplier
+ * is at its largest or smallest value. */
+typedef struct {
+  double t;
+  double impulse; /* of an impact: the integral of the reaction [N s], [N m s] */
+  int row;        /* the equation */
+  int from, to;   /* modes */
+  int impact;     /* 1: velocities have jumped */
+} pw_event;
+
+/* The number of constraint equations whose multipliers have limits. */
+int pw_system_limited (const pw_system *s);
+/* "holds"; "slides+", "slides-" where J v - eta is positive, negative; "free" of an equation with one limit. */
+const char *pw_system_mode_name (const pw_system *s, int row, int mode);
+
 /* Entries of the energy ledger: work or loss of an element.  Their names are like "rider.work", "damper.loss";
  * "drag.frame.loss" for an element that acts on every body. */
 int pw_system_ledger_entries (const pw_system *s);

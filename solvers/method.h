@@ -83,6 +83,7 @@ int pw_dead_point_explain (struct pw_run *r, pw_error *error);
 /* ---- The data of a run ---- */
 
 enum { PW_MAX_OPTIONS = 12 };
+enum { PW_FORCES_AT_LIMITS = 2 }; /* pw_run.forces: of equations that are not enforced, too */
 
 struct pw_scene_step;
 
@@ -95,12 +96,22 @@ struct pw_run {
   int stabilisation;             /* index in method->stabilisations */
   double option[PW_MAX_OPTIONS]; /* one per method->options */
   pw_settings settings;
-  int fixed_steps;             /* 1: fixed step size */
-  int entries;                 /* of the ledger: s->entries, then settings.integrals */
-  pw_saddle *saddle;           /* matrix of M and all active rows: for accelerations, impulses */
-  const unsigned char *active; /* rows: 0 for redundant ones; NULL: none is redundant */
-  int redundant;               /* number of redundant rows; what follows, to reselect_below, only if there are any */
-  int redundant_drive;         /* 1: one of them has an eta, so that work depends on its multiplier */
+  int fixed_steps;               /* 1: fixed step size */
+  int entries;                   /* of the ledger: s->entries, then settings.integrals */
+  pw_saddle *saddle;             /* matrix of M and all active rows: for accelerations, impulses */
+  const unsigned char *active;   /* rows: 0 for redundant ones and those not enforced; NULL: there are none */
+  int redundant;                 /* number of redundant rows; what follows, to reselect_below, only if there are any */
+  struct pw_events *events;      /* of equations whose multipliers have limits (events.h); NULL: there are none */
+  const unsigned char *enforced; /* rows: 0 for those whose multipliers are at a limit; NULL: none is */
+  double *reaction;              /* rows: minus the multipliers of those, else 0; NULL without events */
+  char *events_memory;           /* of r->events */
+  pw_event *event;               /* events so far: `event_count` of them */
+  long event_count;
+  size_t event_room;
+  int jumped; /* 1: multipliers may have jumped at a discontinuity since the last step */
+  int (*advance) (struct pw_run *r, double t_end, pw_error *error); /* the method's, or with events */
+  int forces;                  /* 0: constant ones alone; 1: others, too; PW_FORCES_AT_LIMITS */
+  int redundant_drive;         /* 1: one of them has an eta, or some are not enforced: work depends on multipliers */
   int *redundant_row;          /* redundant: their indices */
   unsigned char *active_array; /* rows: what `active` points to */
   double *coefficient;         /* 5 x rows: a redundant row as a combination of active rows; scratch of rank.c */
@@ -165,6 +176,19 @@ struct pw_run {
   char *memory;         /* of the state, samples and scratch */
   pw_arena arena;       /* of redundant rows and specialised code */
 };
+
+/* ---- Equations that are not enforced (events.h): they have given multipliers ---- */
+
+/* f (coords + 3) += their forces, with the J last evaluated. */
+static inline void pw_add_given_forces (const pw_run *r, double *f) {
+  pw_add_JT (r->w, r->reaction, f);
+}
+
+/* Sets their multipliers. */
+static inline void pw_fill_given (const pw_run *r, double *lambda) {
+  for (int i = 0; i < r->s->rows; i++)
+    if (!r->enforced[i]) lambda[i] = -r->reaction[i];
+}
 
 /* ---- Tolerances ---- */
 

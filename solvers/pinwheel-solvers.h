@@ -189,6 +189,9 @@ char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size);
  * velocity saturates a force.  adams, bdf, ida and radau keep their tolerances below it, whatever the settings. */
 int pw_run_saturation (pw_run *r, double *least, char *element, size_t size);
 
+/* The events since the run was opened, in the order of time; valid until it advances. */
+const pw_event *pw_run_events (const pw_run *r, int *count);
+
 /* These belong to the run.  After pw_run_restart, pw_run_initial reports on the state given there. */
 const pw_statistics *pw_run_statistics (const pw_run *r);
 const pw_initial_report *pw_run_initial (const pw_run *r);

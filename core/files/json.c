@@ -168,6 +168,20 @@ static void json_lists (pw_json *j, const char *const *redundant, const pw_syste
   pw_json_close (j, ']');
 }
 
+static void json_events (pw_json *j, const pw_summary *summary, const pw_system *s) {
+  pw_json_open (j, "events", '[');
+  for (const pw_event *e = summary->event; e < summary->event + summary->events; e++) {
+    pw_json_open (j, NULL, '{');
+    pw_json_number (j, "t", e->t);
+    pw_json_text (j, "reaction", PW_NAME (pw_system_reaction_name, s, e->row));
+    pw_json_text (j, "from", pw_system_mode_name (s, e->row, e->from));
+    pw_json_text (j, "to", pw_system_mode_name (s, e->row, e->to));
+    if (e->impact) pw_json_number (j, "impulse", e->impulse);
+    pw_json_close (j, '}');
+  }
+  pw_json_close (j, ']');
+}
+
 static void json_reference (pw_json *j, const pw_reference_error *e) {
   static const char *const names[] = { "length", "angle", "speed", "rate" };
   if (!json_object (j, "truth", e)) return;
@@ -229,6 +243,7 @@ int pw_json_write (const pw_summary *summary, const pw_system *s, const pw_sampl
                                                            pw_format ((char[32]){ 0 }, summary->stop_time, 17)));
   pw_json_number (&j, "unbalanced", summary->energy_defect);
   json_lists (&j, summary->redundant, s);
+  if (s && pw_system_limited (s)) json_events (&j, summary, s);
   json_reference (&j, summary->reference);
   json_stated (&j, s, summary->stated);
   json_statistics (&j, statistics, summary->cpu);

@@ -321,8 +321,10 @@ typedef struct {
   const char *model, *method;
   const char *status; /* "ok", "input", "start", "method", "machine", "interrupted" */
   const char *reason;
-  double cpu;                          /* [s], integration alone */
-  const char *const *redundant;        /* a message per redundant constraint equation, ended by NULL; may be NULL */
+  double cpu;                   /* [s], integration alone */
+  const char *const *redundant; /* a message per redundant constraint equation, ended by NULL; may be NULL */
+  const pw_event *event;        /* events: of constraint equations with limits */
+  int events;
   const pw_reference_error *reference; /* NULL: no reference */
   const pw_stated_error *stated;       /* NULL: not asked for */
   const char *general;                 /* why the general engine was used; "": it was not; NULL: no run */

@@ -103,8 +103,10 @@ static int find_column (pw_reader *r, const char *name, pw_column *c) {
   if (body == NULL && pw_names_find (&r->bodies, owner) >= 0 && pw_body_state (last + 1) >= 0)
     return *c = (pw_column){ PW_COLUMN_STATE, 0 }, 1;
   int kind = pw_index_elements (r) == PW_OK ? pw_names_find (&r->elements, owner) : -1;
-  if (kind < 0 || pw_kinds[kind]->each_body != (body != NULL)) return 0;
-  return (body == NULL || pw_names_find (&r->bodies, body) >= 0) && pw_kind_find_column (pw_kinds[kind], last + 1, c);
+  const pw_kind *type = kind < 0 ? NULL : pw_kinds[kind];
+  if (type == NULL || type->each_body != (body != NULL)) return 0;
+  if (body && pw_names_find (&r->bodies, body) < 0) return 0;
+  return pw_kind_find_column (type, last + 1, c) || (type->exact && pw_kind_find_column (type->exact, last + 1, c));
 }
 
 /* The place of a wheel or marker that precedes, "rear.x", as an expression of states; NULL: the name is another one, or

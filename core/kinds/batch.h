@@ -95,6 +95,20 @@ LIBM (libm_hypot (libm_lanes x, libm_lanes y)) {
     name, unit, NULL, about          \
   }
 
+/* Checks the limit of a multiplier while its equation holds, and that at which it does not (0: the same).  field: the
+ * name of the former. */
+static inline int limit_check (const char *field, double most, double sliding, pw_error *error) {
+  if (sliding <= most) return PW_OK;
+  return pw_fail (error, PW_INPUT, "%s_sliding = %g: expected at most the %s, %g", field, sliding, field, most);
+}
+
+/* pw_kind.limits of a multiplier between -most and most; 0: without limits. */
+static inline void limit_both_sides (double most, double sliding, pw_bounds *limit) {
+  if (most == 0) return;
+  if (sliding == 0) sliding = most;
+  *limit = (pw_bounds){ -most, most, { -sliding, sliding }, 0 };
+}
+
 /* The vector w of an element; NULL where the batch has none. */
 static inline const double *batch_w (const pw_batch *batch, int e) {
   return batch->w ? batch->w + e * batch->cols : NULL;

@@ -27,7 +27,7 @@ typedef struct {
 } contact_state;
 
 static inline contact contact_make (const double at[2], double heading, double a, double b) {
-  return (contact){ a, b, at[0] * b - at[1] * a, { at[0], at[1] }, heading };
+  return (contact){ .a = a, .b = b, .arm = at[0] * b - at[1] * a, .at = { at[0], at[1] }, .heading = heading };
 }
 
 /* Contacts whose direction d is along the heading, and to its left. */
@@ -87,6 +87,15 @@ PER_ELEMENT (contact_place, contact, 3) {
   out[1] = now.body->y + now.body->sin * now.constants.at[0] + now.body->cos * now.constants.at[1];
   out[2] = now.body->phi + now.constants.heading;
 }
+
+/* Fields of the definition of a wheel that may slide. */
+#define GRIP_FIELDS(type)                                                                                    \
+  { PW_AT (type, grip), PW_NUMBER, .unit = "N", .domain = PW_NONNEGATIVE,                                    \
+    .about = "largest lateral force, beyond which the wheel slides; 0: no limit" },                          \
+  {                                                                                                          \
+    PW_AT (type, grip_sliding), PW_NUMBER, .unit = "N", .domain = PW_NONNEGATIVE,                            \
+                                           .about = "lateral force while it slides; 0: as large as the grip" \
+  }
 
 /* Fields of the definition of a wheel: its contact point and its heading. */
 #define CONTACT_FIELDS(type)                                                                                          \

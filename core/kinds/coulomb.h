@@ -1,11 +1,14 @@
-/* Viscous friction and regularised Coulomb friction, which oppose a relative velocity v.  If v is an angular velocity,
- * F is a torque.
+/* Viscous friction and Coulomb friction, which oppose a relative velocity v.  If v is an angular velocity, F is a
+ * torque.  Coulomb friction is exact, or smoothed below a velocity v0:
  *
  *   F = c v + L tanh (v / v0),  dF/dv = c + (L / v0) (1 - tanh^2 (v / v0)),  loss = F v >= 0
  *
  * (Andersson, Soderberg & Bjorklund 2007, Tribology International 40, 580-587, for the smoothing by tanh.)
  * The limit L (friction coefficient times normal load) is constant, since forces cannot depend on multipliers.  The
- * regularised law cannot stick: under an applied force or torque P < L it creeps, for c = 0 at v0 atanh (P / L). */
+ * smoothed law cannot stick: under an applied force or torque P < L it creeps, for c = 0 at v0 atanh (P / L).
+ *
+ * Exact friction is the constraint equation v = 0, whose multiplier lambda is between -L and L.  Beyond them it slides:
+ * lambda is the sliding limit with the sign of v, and the loss c v^2 + lambda v.  L above is 0 then. */
 #ifndef PW_COULOMB_H
 #define PW_COULOMB_H
 
@@ -17,12 +20,17 @@ typedef struct {
 } coulomb;
 
 static inline int coulomb_make (double viscous, double limit, double speed, coulomb *law, pw_error *error) {
-  *law = (coulomb){ viscous, limit, limit > 0 ? 1 / speed : 0 };
+  *law = (coulomb){ viscous, limit, .inverse = limit > 0 ? 1 / speed : 0 };
   if (limit > 0 && !(speed > 0 && isfinite (limit * law->inverse)))
     return pw_fail (error, PW_INPUT,
                     "speed = %g: expected > 0, and limit / speed finite, since the limit is smoothed below this speed",
                     speed);
   return PW_OK;
+}
+
+static inline int coulomb_make_exact (double viscous, double limit, double sliding, coulomb *law, pw_error *error) {
+  *law = (coulomb){ .viscous = viscous };
+  return limit_check ("limit", limit, sliding, error);
 }
 
 static inline double coulomb_force (const coulomb *law, double v) {
@@ -40,6 +48,27 @@ static inline double coulomb_slope (const coulomb *law, double v) {
 static inline double coulomb_saturation (const coulomb *law, double v, double derivative) {
   return derivative != 0 && law->inverse > 0 ? (1 / law->inverse + fabs (v)) / fabs (derivative) : INFINITY;
 }
+
+/* EXACT_COULOMB (friction, pw_friction) defines the functions of a constraint equation with an element and a state as
+ * below: friction_is_exact, friction_limits, friction_exact_J, friction_exact_loss. */
+#define EXACT_COULOMB(type, definition_type)                                \
+  static int type##_is_exact (const void *definition) {                     \
+    const definition_type *x = definition;                                  \
+    return x->limit > 0 && x->speed == 0;                                   \
+  }                                                                         \
+  static void type##_limits (const void *definition, pw_bounds *limit) {    \
+    const definition_type *x = definition;                                  \
+    limit_both_sides (x->limit, x->limit_sliding, limit);                   \
+  }                                                                         \
+  PER_ELEMENT (type##_exact_J, type, 6) {                                   \
+    for (int i = 0; i < 6; i++) out[i] = now.S[i];                          \
+  }                                                                         \
+  static void type##_exact_loss (const pw_batch *batch, double *out) {      \
+    for (int e = 0; e < batch->count; e++) {                                \
+      type##_state now = type##_at (batch, e);                              \
+      out[e] = (coulomb_force (now.law, now.v) + batch->lambda[e]) * now.v; \
+    }                                                                       \
+  }
 
 /* COULOMB (friction, 6) defines friction_force, friction_force_v, friction_saturation and friction_loss for elements
  * with 6 local coordinates q and f = -F S, v = S q'.  friction_state has the members law, v, S[6], v_q[6] = dv/dq. */

@@ -65,9 +65,11 @@ static void scene_element (pw_model *m, const random_scene *x, int e) {
     return;
   }
   *(const char **)(void *)definition = name[e];
-  for (const pw_field *f = x->kind->fields; f->name; f++)
-    for (int i = 0; i < pw_field_count (f); i++)
-      scene_value (x->random, f, definition + f->offset + (size_t)i * pw_field_bytes (f->type));
+  do
+    for (const pw_field *f = x->kind->fields; f->name; f++)
+      for (int i = 0; i < pw_field_count (f); i++)
+        scene_value (x->random, f, definition + f->offset + (size_t)i * pw_field_bytes (f->type));
+  while (x->kind->exact && x->kind->is_exact (definition));
   for (int n = 0; n < x->kind->bodies && !x->kind->each_body; n++)
     *(const char **)pw_field_mutable (x->kind, definition, PW_BODY, n) = scene_body (x, e, n);
   pw_add (m, x->kind, definition);
@@ -96,7 +98,7 @@ static pw_system *scene_try (const pw_kind *kind, pw_random *random, pw_error *e
 }
 
 pw_system *pw_random_scene (const pw_kind *kind, pw_random *random, pw_error *error) {
-  for (int i = 0; i < 200; i++) { /* the type may reject inconsistent numbers */
+  for (int i = 0; i < 2000; i++) { /* the type may reject inconsistent numbers */
     *error = (pw_error){ 0 };
     pw_system *s = scene_try (kind, random, error);
     if (s || error->status != PW_INPUT) return s;

@@ -450,15 +450,23 @@ static void selftest_power_of (probe *x, int e) {
   char where[120];
   snprintf (where, sizeof where, "%s: %.9g, expected %.9g", x->batch->name[e], sum, power[e] - loss[e] - derivative[e]);
   selftest_record (x->report, "power", error, SELFTEST_BOUND, selftest_reason, where);
-  if (x->kind->loss) selftest_record (x->report, "loss", fmax (-loss[e], 0), 0, "exact", where);
+  if (x->kind->loss && x->kind->limits == NULL)
+    selftest_record (x->report, "loss", fmax (-loss[e], 0), 0, "exact", where);
+}
+
+/* 1 if the velocity constraints of the element need not hold: their multipliers then have power. */
+static int selftest_slides (const probe *x, int e) {
+  int limited = 0;
+  for (int r = 0; r < x->rows; r++) limited |= pw_is_limited (x->s, x->batch->row + e * x->rows + r);
+  return limited && x->kind->level == PW_NONHOLONOMIC;
 }
 
 static void selftest_power (probe *x) {
   double v[PW_SCENE_COORDS];
-  if (!x->kind->force && !x->kind->energy && !x->kind->power && !x->kind->loss) return;
+  if (!x->kind->force && !x->kind->energy && !x->kind->power && !x->kind->loss && !x->kind->limits) return;
   for (int e = 0; e < x->elements; e++) {
     memcpy (v, x->v, (size_t)x->s->coords * sizeof *v);
-    if (x->rows == 0 || selftest_satisfy (x, e)) selftest_power_of (x, e);
+    if (x->rows == 0 || selftest_slides (x, e) || selftest_satisfy (x, e)) selftest_power_of (x, e);
     memcpy (x->v, v, (size_t)x->s->coords * sizeof *v);
   }
 }

@@ -21,7 +21,7 @@ double pw_random_between (pw_random *r, double low, double high);
 
 /* Compiles a scene of bodies b0 to b3 and elements e0 to e2, which form its only batch, with random definitions within
  * the domains of the type's fields.  If e2 has several bodies, one is the ground.  A type that acts on every body has
- * one element only.  NULL and the error if the type rejects 200 such definitions, or if out of memory.  error: not
+ * one element only.  NULL and the error if the type rejects 2000 such definitions, or if out of memory.  error: not
  * NULL; cleared first. */
 pw_system *pw_random_scene (const pw_kind *kind, pw_random *random, pw_error *error);
 

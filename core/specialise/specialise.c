@@ -937,6 +937,8 @@ int pw_system_check_source (const pw_system *s, pw_error *error) {
   } limit[] = { { s->rows, SPECIALISE_ROWS, "constraint equations" },
                 { pw_system_elements (s), SPECIALISE_ELEMENTS, "elements" },
                 { s->bodies, SPECIALISE_BODIES, "bodies" } };
+  if (s->limited)
+    return pw_fail (error, PW_INPUT, "model %s: specialised code has no limits of reactions, as by a grip", s->model);
   if (s->feedback)
     return pw_fail (error, PW_INPUT, "model %s: specialised code has no constraints whose signals depend on states",
                     s->model);

@@ -432,17 +432,48 @@ static int compile_has_work (const pw_element_batch *k, int element) {
   return kind->level != PW_HOLONOMIC || constants < kind->signals;
 }
 
+/* The limits of all multipliers, if there are any. */
+static int compile_limits (const compilation *job) {
+  pw_system *s = job->s;
+  const compiled *from = job->list;
+  pw_bounds *limit = compile_alloc (job, (size_t)s->rows, sizeof *limit);
+  if (limit == NULL) return PW_RESOURCE;
+  for (int i = 0; i < s->rows; i++) limit[i] = (pw_bounds){ -INFINITY, INFINITY, { NAN, NAN }, 0 };
+  for (const pw_element_batch *k = s->batch; k < s->batch + s->constraints; k++)
+    for (int e = 0; e < k->b.count; e++, from++)
+      if (k->kind->limits) k->kind->limits (from->element->definition, limit + k->row + e * k->kind->rows);
+  s->limit = limit;
+  for (int i = 0; i < s->rows; i++) {
+    s->limited += pw_is_limited (s, i);
+    if (isnan (limit[i].sliding[0])) limit[i].sliding[0] = limit[i].least;
+    if (isnan (limit[i].sliding[1])) limit[i].sliding[1] = limit[i].most;
+  }
+  if (s->limited == 0) s->limit = NULL;
+  return PW_OK;
+}
+
+/* 1 if an element may dissipate energy: of constraints, if a multiplier has a limit. */
+static int compile_has_loss (const pw_system *s, const pw_element_batch *k, int element) {
+  if (k->kind->limits == NULL) return k->kind->loss != NULL;
+  for (int i = 0; i < k->kind->rows; i++)
+    if (pw_is_limited (s, k->row + element * k->kind->rows + i)) return 1;
+  return 0;
+}
+
 /* Lists the entries of the ledger, at most two for each element. */
 static int compile_ledger (const compilation *job) {
   pw_system *s = job->s;
   s->entry = compile_alloc (job, 2 * (size_t)job->listed, sizeof *s->entry);
   if (s->entry == NULL) return PW_RESOURCE;
-  for (int i = 0; i < s->batches; i++) {
-    const pw_element_batch *k = &s->batch[i];
-    for (int loss = 0; loss < 2; loss++)
-      for (int e = 0; e < k->b.count; e++)
-        if (loss ? k->kind->loss != NULL : compile_has_work (k, e))
-          s->entry[s->entries++] = (pw_entry){ i, e, loss ? PW_LOSS : PW_WORK };
+  for (int impact = 0; impact < 2; impact++) {
+    for (int i = 0; i < s->batches; i++) {
+      const pw_element_batch *k = &s->batch[i];
+      for (int loss = 0; loss < 2; loss++)
+        for (int e = 0; e < k->b.count; e++)
+          if (impact == (loss && !k->kind->loss) && (loss ? compile_has_loss (s, k, e) : compile_has_work (k, e)))
+            s->entry[s->entries++] = (pw_entry){ i, e, loss ? PW_LOSS : PW_WORK };
+    }
+    if (!impact) s->powers = s->entries;
   }
   return PW_OK;
 }
@@ -520,6 +551,7 @@ static int compile_all (compilation *job) {
   job->s->scale = (pw_scale){ compile_length (job), 1 };
   status = compile_angle_users (job);
   if (status == PW_OK) compile_metric (job->s);
+  if (status == PW_OK) status = compile_limits (job);
   if (status == PW_OK) status = compile_ledger (job);
   if (status == PW_OK) status = compile_outputs (job);
   return status == PW_OK ? compile_constant_forces (job) : status;

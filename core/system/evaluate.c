@@ -624,7 +624,7 @@ int pw_find_nonfinite (pw_workspace *w, char *buffer, size_t size) {
 void pw_evaluate_ledger (pw_workspace *w, const double *lambda, double *rate) {
   const pw_entry *last = NULL;
   double *eta = w->scratch;
-  for (int i = 0; i < w->s->entries; i++) {
+  for (int i = 0; i < w->s->powers; i++) {
     const pw_entry *entry = &w->s->entry[i];
     pw_element_batch *k = &w->batch[entry->batch];
     pw_batch_function *power = entry->type == PW_WORK ? k->kind->power : k->kind->loss; /* NULL: by eta */

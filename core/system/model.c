@@ -19,7 +19,7 @@ const pw_kind *const pw_kinds[] = {
 
 int pw_kind_is_built_in (const pw_kind *kind) {
   for (const pw_kind *const *k = pw_kinds; *k; k++)
-    if (*k == kind) return 1;
+    if (*k == kind || (*k)->exact == kind) return 1;
   return 0;
 }
 
@@ -100,6 +100,9 @@ static const char *fault_functions (const pw_kind *kind) {
   if (kind->rows > 0 && kind->J == NULL) return "constraint equations without J";
   if (kind->level == PW_HOLONOMIC && kind->g == NULL) return "holonomic constraint equations without g";
   if (kind->level != PW_HOLONOMIC && kind->g) return "g, but no holonomic constraint equations";
+  if (kind->limits && kind->rows == 0) return "limits, but no constraint equations";
+  if (kind->exact && (kind->is_exact == NULL || kind->exact->definition != kind->definition))
+    return "an exact type, but no is_exact, or definitions of different sizes";
   return "";
 }
 
@@ -454,6 +457,8 @@ static int model_check_kind (pw_model *m, const pw_kind *kind) {
 int pw_add (pw_model *m, const pw_kind *kind, const void *definition) {
   if (m == NULL) return PW_INPUT;
   if (m->error.status != PW_OK || model_check_kind (m, kind) != PW_OK) return m->error.status;
+  if (definition && kind->exact && kind->is_exact (definition)) kind = kind->exact;
+  if (model_check_kind (m, kind) != PW_OK) return m->error.status;
   if (pw_grow (&m->element, (size_t)m->elements, &m->element_room, sizeof *m->element) != PW_OK)
     return model_no_memory (m);
   if (definition == NULL) return pw_model_refuse (m, "pw_add of element type %s without a definition", kind->name);

@@ -304,7 +304,7 @@ int pw_kind_find_column (const pw_kind *kind, const char *name, pw_column *c) {
   for (int i = 0; i < 2 && kind->contact; i++)
     if (strcmp (name, i ? "y" : "x") == 0) return *c = (pw_column){ PW_COLUMN_CONTACT, i }, 1;
   const int works = kind->power || (kind->rows > 0 && kind->eta), is_loss = strcmp (name, "loss") == 0;
-  if (is_loss ? kind->loss == NULL : !works || strcmp (name, "work") != 0) return 0;
+  if (is_loss ? kind->loss == NULL && kind->limits == NULL : !works || strcmp (name, "work") != 0) return 0;
   return *c = (pw_column){ PW_COLUMN_LEDGER, is_loss }, 1;
 }
 
@@ -362,6 +362,16 @@ int pw_system_find_column (const pw_system *s, const char *name, pw_column *c, p
       pw_nearest_try (&near, known);
     }
   return pw_fail (error, PW_INPUT, "no column \"%.100s\"%s", name, pw_nearest_text (&near));
+}
+
+int pw_system_limited (const pw_system *s) {
+  return s->limited;
+}
+
+const char *pw_system_mode_name (const pw_system *s, int row, int mode) {
+  const pw_bounds *limit = s->limit ? &s->limit[row] : NULL;
+  if (mode == 0) return "holds";
+  return limit && (isinf (limit->least) || isinf (limit->most)) ? "free" : mode > 0 ? "slides+" : "slides-";
 }
 
 /* "torque T: value" */

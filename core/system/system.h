@@ -6,6 +6,7 @@
 #ifndef PW_SYSTEM_H
 #define PW_SYSTEM_H
 
+#include <math.h>
 #include "run.h"
 #include "model.h"
 
@@ -68,7 +69,10 @@ struct pw_system {
   int reads;               /* number of states that they read, with repetitions */
   size_t jacobian;         /* entries of J of all elements, zeros included */
   size_t block;            /* the largest count x cols of a batch; twice that if its force saturates */
+  int powers;              /* entries of the ledger but those of impacts */
   int rheonomic;           /* batches whose eta may be other than 0 */
+  int limited;             /* constraint equations whose multipliers have limits */
+  pw_bounds *limit;        /* rows, if there are any; else NULL */
   pw_scale scale;          /* with T = 1 s; T of a run is in its workspace */
   const char **body_name;  /* bodies */
   double *M;               /* coords: diagonal of M; 0 of first-order states, which have no kinetic energy */
@@ -81,7 +85,7 @@ struct pw_system {
   unsigned char *origin;   /* 2 coords: origin of initial values: PW_GIVEN | ... */
   pw_element_batch *batch; /* batches: holonomic types, then nonholonomic ones, then forces */
   pw_source *source;       /* sources, ordered by batch */
-  pw_entry *entry;         /* entries */
+  pw_entry *entry;         /* entries; losses by impacts alone are the last ones */
   pw_compiled_output *output; /* outputs */
   int outputs;
   unsigned output_types; /* of the columns that they read, as pw_compiled_output.types */
@@ -158,6 +162,12 @@ static inline double pw_larger (double a, double b) {
   return a > b ? a : b;
 }
 
+/* 1 if the multiplier of a constraint equation has a finite limit. */
+static inline int pw_is_limited (const pw_system *s, int row) {
+  const pw_bounds *x = s->limit ? &s->limit[row] : NULL;
+  return x && (x->least > -INFINITY || x->most < INFINITY);
+}
+
 /* ---- Columns and outputs ---- */
 
 /* The offset in pw_sample of a column that is one of its numbers. */
@@ -231,7 +241,7 @@ void pw_evaluate_saturation (pw_workspace *w, double *least);
 int pw_find_saturation (pw_workspace *w, double *least, char *element, size_t size);
 double pw_potential (pw_workspace *w);
 double pw_kinetic (const pw_system *s, const double *v);
-/* Power of each entry of the ledger [W]; does not need J. */
+/* Power of each entry of the ledger that has one [W]; does not need J. */
 void pw_evaluate_ledger (pw_workspace *w, const double *lambda, double *rate);
 
 /* out = J x; out += J^T lambda; with J as evaluated last. */

@@ -843,6 +843,9 @@ static int linear_run (pw_run *r, int most, pw_linear_extent extent, pw_linear *
   pw_linearisation x;
   *l = (pw_linear){ .least = NAN };
   if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
+  if (r->enforced)
+    return pw_fail (error, PW_INPUT,
+                    "model %s: no linearisation: a reaction, as of a wheel with a grip, is at its limit", r->s->model);
   if (r->s->coords > most) extent = PW_LINEAR_COUNTS;
   pw_statistics before = r->statistics;
   int near_singular = r->near_singular, status = pw_linear_open (&x, r, extent);

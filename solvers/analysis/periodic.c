@@ -662,7 +662,7 @@ pw_periodic *pw_periodic_open (const pw_system *s, const pw_periodic_settings *s
   pw_error ignored = { 0 };
   if (error == NULL) error = &ignored;
   if (pw_require (s, "a system", error) != PW_OK || pw_require (settings, "settings", error) != PW_OK) return NULL;
-  if (periodic_check_settings (settings, error) != PW_OK) return NULL;
+  if (pw_check_limits (s, error) != PW_OK || periodic_check_settings (settings, error) != PW_OK) return NULL;
   pw_periodic *x = calloc (1, sizeof *x);
   if (x == NULL) return pw_fail_memory (s, error), NULL;
   x->s = s, x->settings = *settings, x->n = s->coords;

@@ -116,7 +116,7 @@ const pw_system *pw_parametric_at (pw_parametric *x, double value, pw_error *why
   }
   const pw_system *own = x->own;
   if (own->coords == s->coords && own->rows == s->rows && own->holonomic == s->holonomic && own->bodies == s->bodies)
-    return own;
+    return pw_check_limits (own, why) == PW_OK ? own : NULL;
   pw_fail (why, PW_INPUT, "model %s: the parameter changes the number of bodies or constraint equations", own->model);
   return NULL;
 }
@@ -442,6 +442,13 @@ int pw_check_search (double first, double last, int points, pw_error *error) {
   return PW_OK;
 }
 
+int pw_check_limits (const pw_system *s, pw_error *error) {
+  if (s->limited == 0) return PW_OK;
+  return pw_fail (error, PW_INPUT,
+                  "model %s: neither steady nor periodic motions are sought where reactions have limits, as by a grip",
+                  s->model);
+}
+
 static int steady_arrays (pw_steady *x) {
   size_t n = (size_t)x->n, m = (size_t)x->m, rates = (size_t)pw_steady_rate_count (x->s), unknowns = n + rates;
   size_t holds = (size_t)x->settings.holds;
@@ -578,7 +585,8 @@ static pw_steady *steady_open (const pw_system *s, const pw_steady_settings *set
 
 static int steady_check_settings (const pw_system *s, const pw_steady_settings *set, pw_error *error) {
   const int most = 2 * s->coords + PW_HOLD_OF_BODY * s->bodies - 1;
-  if (pw_check_search (set->first, set->last, set->points, error) != PW_OK) return PW_INPUT;
+  if (pw_check_limits (s, error) != PW_OK || pw_check_search (set->first, set->last, set->points, error) != PW_OK)
+    return PW_INPUT;
   if (set->holds < 0 || (set->holds > 0 && set->hold == NULL))
     return pw_fail (error, PW_INPUT, "setting holds = %d: expected the number of entries of `hold`", set->holds);
   for (const pw_initial_value *x = set->hold, *end = x + set->holds; x < end; x++)

@@ -190,6 +190,7 @@ static int kick_correct (pw_run *r, double h, leapfrog_progress *p) {
   int status = pw_update_velocities (r->w, d->common.v1);
   if (status != PW_OK) return status;
   pw_evaluate_force (r->w, d->middle);
+  if (r->forces == PW_FORCES_AT_LIMITS) pw_add_given_forces (r, d->middle);
   for (int j = 0; j < s->coords; j++) {
     double f = d->middle[j];
     d->middle[j] = 0.5 * h * (f - d->f[j]);

@@ -660,7 +660,8 @@ static void radau_quintic (const pw_run *r, double x, double *q, double *v) {
   double h = d->last.h;
   for (int j = 0; j < d->dae.n; j++) {
     double q0 = d->last.y[j], v0 = h * d->last.y[d->dae.n + j], a0 = 0.5 * h * h * d->last.a[j];
-    double dq = r->q[j] - q0 - v0 - a0, dv = h * r->v[j] - v0 - 2 * a0, da = 0.5 * h * h * (d->a_end[j] - d->last.a[j]);
+    double dq = d->now.y[j] - q0 - v0 - a0, dv = h * d->now.y[d->dae.n + j] - v0 - 2 * a0; /* not r->q: see events.h */
+    double da = 0.5 * h * h * (d->a_end[j] - d->last.a[j]);
     double c3 = 10 * dq - 4 * dv + da, c4 = -15 * dq + 7 * dv - 2 * da, c5 = 6 * dq - 3 * dv + da;
     q[j] = q0 + x * (v0 + x * (a0 + x * (c3 + x * (c4 + x * c5))));
     v[j] = (v0 + x * (2 * a0 + x * (3 * c3 + x * (4 * c4 + x * 5 * c5)))) / h;

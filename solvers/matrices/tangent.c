@@ -238,6 +238,11 @@ void pw_tangent_add_J (pw_tangent *x, int rows, int row, int col, double holonom
 /* (J^T lambda)_q - f_q; -f_v; M; J^T: the derivatives with respect to q, v, a, lambda */
 void pw_tangent_add_momentum (pw_tangent *x, const pw_tangent_layout *to, const double *lambda) {
   const pw_system *s = x->run->s;
+  if (x->run->forces == PW_FORCES_AT_LIMITS) {
+    if (lambda != x->lambda) memcpy (x->lambda, lambda, (size_t)s->rows * sizeof *lambda);
+    pw_fill_given (x->run, x->lambda);
+    lambda = x->lambda;
+  }
   pw_placement put = {
     .row = to->momentum, .col = to->q, .rows = s->rows, .factor = 1, .row_index = x->row_index, .lambda = lambda
   };
@@ -327,6 +332,7 @@ void pw_dae_residual (pw_dae *x, const double *v, const double *a, const double 
   for (int j = 0; j < n; j++) F[j] = x->tangent.D[j] * x->reaction[j];
   dae_multiply_JT (&x->tangent, lambda, x->rows, x->reaction);
   pw_evaluate_force (r->w, x->force);
+  if (r->forces == PW_FORCES_AT_LIMITS) pw_add_given_forces (r, x->force);
   for (int j = 0; j < n; j++) F[n + j] = (a ? r->s->mass[j] * a[j] : 0) + x->reaction[j] - x->force[j];
   dae_constraints (x, v, a, F + 2 * n);
 }

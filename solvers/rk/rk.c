@@ -73,7 +73,8 @@ struct pw_method_data {
 /* Errors: PW_INPUT if the scene has more than NULLSPACE_MOST independent constraint equations; PW_RESOURCE. */
 static int nullspace_open (rk_nullspace *b, pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
-  *b = (rk_nullspace){ .rows = s->rows - r->redundant };
+  *b = (rk_nullspace){ .rows = 0 };
+  for (int i = 0; i < s->rows; i++) b->rows += r->active == NULL || r->active[i];
   if (b->rows > NULLSPACE_MOST)
     return pw_fail (error, PW_INPUT,
                     "model %s: stabilisation nullspace works with dense matrices, for up to %d constraint rows, and "

@@ -56,7 +56,7 @@ void pw_specialised_select (pw_run *r) {
 
 int pw_specialised_open (pw_run *r, pw_error *error) {
   const pw_specialised *code = r->settings.specialised;
-  if (code == NULL || r->settings.integrals > 0) return PW_OK;
+  if (code == NULL || r->settings.integrals > 0 || r->events) return PW_OK;
   if (!pw_specialised_fits (code, r->s))
     return pw_fail (error, PW_INPUT, "model %s: the specialised code belongs to another scene", r->s->model);
   if (specialised_allocate (r, code->constants) != PW_OK) return pw_fail_memory (r->s, error);
@@ -257,8 +257,9 @@ void pw_run_gamma (pw_run *r, const double *v, double *gamma) {
  * constant forces if there are no others. */
 static inline const double *dynamics_right_side (pw_run *r, const double *v, double *f, double *gamma) {
   pw_run_gamma (r, v, gamma);
-  if (r->s->forces == 0) return r->s->constant;
+  if (r->forces == 0) return r->s->constant;
   pw_evaluate_force (r->w, f);
+  if (r->forces == PW_FORCES_AT_LIMITS) pw_add_given_forces (r, f);
   return f;
 }
 
@@ -328,8 +329,8 @@ void pw_record_residuals (pw_run *r) {
   pw_residuals *now = &r->residuals;
   pw_statistics *largest = &r->statistics;
   specialised_residuals (r);
-  if (isnan (now->position)) pw_evaluate_position_residual (r->w, NULL, now);
-  if (isnan (now->velocity)) pw_evaluate_velocity_residual (r->w, NULL, now);
+  if (isnan (now->position)) pw_evaluate_position_residual (r->w, r->enforced, now);
+  if (isnan (now->velocity)) pw_evaluate_velocity_residual (r->w, r->enforced, now);
   largest->position = pw_larger (largest->position, now->position);
   largest->velocity = pw_larger (largest->velocity, now->velocity);
   largest->g = pw_larger (largest->g, now->g);

@@ -117,6 +117,17 @@ typedef struct {
   char *memory;
 } initial_search;
 
+/* 1 if an equation is not enforced, its multiplier being at a limit. */
+static int initial_is_free (const initial_search *x, int row) {
+  return x->r->enforced && !x->r->enforced[row];
+}
+
+/* Residuals of such equations count as 0. */
+static void initial_release (initial_search *x) {
+  for (int i = 0; i < x->rows; i++)
+    if (initial_is_free (x, i)) x->residual[i] = 0;
+}
+
 /* ---- Linear systems ---- */
 
 /* The matrix, or its pattern while the map is recorded; columns of prescribed values are those of the identity.
@@ -132,7 +143,7 @@ static void initial_fill (initial_search *x, double damping) {
       for (int c = 0; c < k->b.cols; c++) {
         const int j = pw_global (k, i / k->kind->rows, c);
         if (j >= n) continue;
-        const double J = isinf (x->weight[j]) ? 0 : k->J[i * k->b.cols + c];
+        const double J = isinf (x->weight[j]) || initial_is_free (x, k->row + i) ? 0 : k->J[i * k->b.cols + c];
         pw_scatter_add (map, n + k->row + i, j, J);
         pw_scatter_add (map, j, n + k->row + i, J);
       }
@@ -172,7 +183,7 @@ static void initial_units (initial_search *x) {
       int length = 0;
       for (int c = 0; c < k->b.cols; c++) {
         const int j = pw_global (k, i / k->kind->rows, c);
-        const double J = k->J[i * k->b.cols + c];
+        const double J = initial_is_free (x, k->row + i) ? 0 : k->J[i * k->b.cols + c];
         if (c < 3 * k->kind->bodies && c % 3 < 2) length |= J != 0;
         if (j < s->coords && x->weight[j] > 0) sum += J * J / x->weight[j];
       }
@@ -260,6 +271,7 @@ static double initial_objective (initial_search *x, pw_residuals *now) {
   double sum = 0, *size = r->scratch;
   if (pw_update_kinematics (r->w, r->t, r->q, r->v) != PW_OK) return INFINITY;
   pw_evaluate_g (r->w, x->residual);
+  initial_release (x);
   pw_evaluate_g_size (r->w, size);
   for (int i = 0; i < x->rows; i++) sum += x->residual[i] / x->unit[i] * (x->residual[i] / x->unit[i]);
   pw_worst_position (x->s, x->residual, size, NULL, now);
@@ -458,10 +470,11 @@ static int initial_project_velocities (initial_search *x) {
   initial_units (x);
   for (;;) {
     if (pw_update_velocities (r->w, x->value) != PW_OK) return PW_METHOD;
-    pw_evaluate_residuals (r->w, NULL, &now);
+    pw_evaluate_residuals (r->w, r->enforced, &now);
     pw_mul_J (r->w, x->value, x->residual);
     pw_evaluate_eta (r->w, eta);
     for (int i = 0; i < x->rows; i++) x->residual[i] -= eta[i];
+    initial_release (x);
     if (now.velocity <= PW_RESIDUAL_CONVERGED) return PW_OK;
     if (!(now.velocity <= previous / 4) || initial_solve (x, 0, NULL) != PW_OK) break;
     previous = now.velocity;
@@ -761,10 +774,11 @@ static int initial_contradiction (initial_search *x, char *text, size_t size) {
   pw_mul_J (x->r->w, x->given, x->residual);
   pw_evaluate_eta (x->r->w, eta);
   for (int i = 0; i < s->rows; i++) x->residual[i] -= eta[i];
+  initial_release (x);
   if (initial_solve (x, INITIAL_LEAST_SQUARES, NULL) != PW_OK) return 0;
   pw_mul_J (x->r->w, x->step, Jv);
   for (int i = 0; i < s->rows; i++) {
-    x->residual[i] = fabs (x->residual[i] + Jv[i]) / x->unit[i];
+    x->residual[i] = initial_is_free (x, i) ? 0 : fabs (x->residual[i] + Jv[i]) / x->unit[i];
     most = fmax (most, x->residual[i]);
   }
   for (int i = 0; i < s->rows; i++) violated[i] = x->residual[i] > 1e-3 * most;
@@ -841,7 +855,7 @@ char *pw_run_initial_reason (pw_run *r, int state, char *buffer, size_t size) {
   *buffer = 0;
   *value = is_velocity ? r->v_given[j] : r->q_given[j];
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) == PW_OK) {
-    pw_evaluate_residuals (r->w, NULL, &now);
+    pw_evaluate_residuals (r->w, r->enforced, &now);
     if (is_velocity) {
       pw_mul_J (r->w, r->v, Jv);
       pw_evaluate_eta (r->w, eta);
@@ -886,7 +900,7 @@ static int initial_locked (pw_run *r, const unsigned char *origin, pw_error *err
   pw_mul_J (r->w, r->v_given, Jv);
   pw_evaluate_eta (r->w, eta);
   for (int i = 0; i < s->rows; i++) {
-    violated[i] = i >= s->holonomic && !(fabs (Jv[i] - eta[i]) <= 1e-10 * speed);
+    violated[i] = i >= s->holonomic && !(r->enforced && !r->enforced[i]) && !(fabs (Jv[i] - eta[i]) <= 1e-10 * speed);
     if (violated[i]) last = i;
   }
   pw_list_elements (s, violated, 1, elements, sizeof elements);
@@ -904,12 +918,12 @@ int pw_run_make_consistent (pw_run *r, const unsigned char *origin, pw_error *er
   memcpy (r->v_given, r->v, bytes);
   int status = pw_evaluate_J_at (r->w, r->t, r->q, r->v);
   if (status != PW_OK) return pw_fail_signal (r->t, error);
-  pw_evaluate_residuals (r->w, NULL, &before);
+  pw_evaluate_residuals (r->w, r->enforced, &before);
   if (!(before.position <= 2 * PW_RESIDUAL_CONVERGED)) {
     status = initial_level_consistent (r, INITIAL_POSITIONS, origin, error);
     if (status == PW_OK) status = pw_evaluate_J_at (r->w, r->t, r->q, r->v);
   }
-  pw_evaluate_residuals (r->w, NULL, &now);
+  pw_evaluate_residuals (r->w, r->enforced, &now);
   if (status == PW_OK && !(now.velocity <= 2 * PW_RESIDUAL_CONVERGED))
     status = initial_level_consistent (r, INITIAL_VELOCITIES, origin, error);
   r->initial = (pw_initial_report){ .q_given = r->q_given,

@@ -60,7 +60,7 @@ static int project_check_redundant (pw_projector *p, const pw_run *r, const doub
   double largest = r->thresholds.redundant_residual;
   if (p->active == NULL || p->ignores_inactive) return PW_OK;
   for (int i = 0; i < r->s->holonomic; i++) {
-    double residual = p->active[i] ? 0 : fabs (g[i]) / size[i];
+    double residual = p->active[i] || (r->enforced && !r->enforced[i]) ? 0 : fabs (g[i]) / size[i];
     if (residual > largest || isnan (residual)) largest = residual, p->contradictory_row = i;
   }
   if (p->contradictory_row < 0) return PW_OK;

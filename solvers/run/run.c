@@ -82,6 +82,8 @@ void pw_run_close (pw_run *r) {
   pw_saddle_close (r->saddle);
   pw_saddle_close (r->watchdog.saddle);
   pw_workspace_free (r->w);
+  free (r->event);
+  free (r->events_memory);
   free (r->memory);
   free (r->origin);
   pw_arena_free (&r->arena);
@@ -91,6 +93,7 @@ void pw_run_close (pw_run *r) {
 /* Restarts the method after a discontinuity, where accelerations change, or a step that was interrupted. */
 static int run_restart_method (pw_run *r, pw_error *error) {
   int status = pw_run_look_ahead (r, error);
+  r->jumped = 1;
   if (status == PW_OK) status = pw_run_evaluate (r, error);
   return status == PW_OK ? r->method->restart (r, error) : status;
 }
@@ -177,7 +180,7 @@ int pw_run_advance (pw_run *r, double t_end, pw_error *error) {
     return run_check_progress (r, before, error);
   }
   r->near_singular = 0;
-  if (status == PW_OK) status = r->method->advance (r, t_end, error);
+  if (status == PW_OK) status = r->advance (r, t_end, error);
   if (status == PW_STOPPED) return status;
   if (status == PW_OK) status = pw_run_watchdog (r, error);
   if (status == PW_OK) status = pw_run_check_resolution (r, error);
@@ -222,8 +225,9 @@ int pw_run_sample (pw_run *r, double t, pw_sample *sample, pw_error *error) {
   if (status != PW_OK) return status;
   *sample = (pw_sample){ .t = t, .q = r->q_at, .v = r->v_at, .a = r->a_at, .lambda = r->lambda_at };
   if (r->redundant && pw_saddle_factor (r->saddle) == PW_OK) pw_rank_least_norm (r, r->lambda_at);
+  if (r->enforced) pw_fill_given (r, r->lambda_at);
   run_fill_energies (r, sample);
-  pw_evaluate_residuals (r->w, NULL, &now);
+  pw_evaluate_residuals (r->w, r->enforced, &now);
   sample->position = now.position;
   sample->velocity = now.velocity;
   return PW_OK;
@@ -287,6 +291,9 @@ int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error
   if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
   double before = 0, after = 0;
   if (run_has_no_method (r, error)) return PW_RESOURCE;
+  if (r->events)
+    return pw_fail (error, PW_INPUT, "model %s: a run whose reactions have limits, as by a grip, cannot be restarted",
+                    r->s->model);
   if (run_check_given (r, q, 0, error) != PW_OK || run_check_given (r, v, r->s->coords, error) != PW_OK)
     return PW_INPUT;
   r->w->failed = NULL;
@@ -319,6 +326,11 @@ int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error
 
 int pw_run_redundant (const pw_run *r) {
   return r->redundant;
+}
+
+const pw_event *pw_run_events (const pw_run *r, int *count) {
+  *count = r ? (int)r->event_count : 0;
+  return *count > 0 ? r->event : NULL;
 }
 
 const pw_statistics *pw_run_statistics (const pw_run *r) {
@@ -532,13 +544,18 @@ void pw_ledger_record (pw_run *r) {
   if (power > r->power && isfinite (power)) r->power = power;
 }
 
+/* Multipliers of all equations from those of the active ones. */
+static const double *ledger_multipliers (pw_run *r, const double *lambda) {
+  double *all = r->enforced ? r->scratch : r->least_norm;
+  if (r->enforced == NULL && pw_saddle_factor (r->saddle) != PW_OK) return lambda;
+  memcpy (all, lambda, (size_t)r->s->rows * sizeof *lambda);
+  r->enforced ? pw_fill_given (r, all) : pw_rank_least_norm (r, all);
+  return all;
+}
+
 void pw_ledger_rates (pw_run *r, const double *lambda, double *rate) {
   const int integrals = r->settings.integrals, unique = r->redundant_drive || (integrals && r->redundant);
-  if (unique && pw_saddle_factor (r->saddle) == PW_OK) {
-    memcpy (r->least_norm, lambda, (size_t)r->s->rows * sizeof *lambda);
-    pw_rank_least_norm (r, r->least_norm);
-    lambda = r->least_norm;
-  }
+  if (unique) lambda = ledger_multipliers (r, lambda);
   pw_evaluate_ledger (r->w, lambda, rate);
   if (integrals) ledger_integrands (r, lambda, rate, rate + r->s->entries);
 }

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "events.h"
 #include "methods.h"
 #include "rank.h"
 #include "method.h"
@@ -122,6 +123,11 @@ static int run_first_evaluation (pw_run *r, pw_error *error) {
   int large = (double)r->s->rows * r->s->coords > PW_RANK_MAX_ENTRIES;
   if (sine < (large ? r->thresholds.rank_refused : r->thresholds.rank_suspect)) {
     if (large) return pw_fail_singular (r, r->t, error);
+    if (r->events)
+      return pw_fail (error, PW_INPUT,
+                      "model %s: limits of reactions, as by a grip, with constraints that depend on each other: leave "
+                      "out redundant ones",
+                      r->s->model);
     status = run_check_stop (r, pw_rank_open (r, error));
     if (status == PW_OK && r->redundant) status = run_check_stop (r, pw_run_open_saddle (r, error));
     if (status != PW_OK) return status;
@@ -236,15 +242,18 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   r->t = r->settings.t;
   pw_hold_signals (r->w, PW_HOLD_NONE);
   r->w->scale.time = r->settings.span; /* until the accelerations are known */
-  status = run_check_stop (r, pw_run_make_consistent (r, r->origin, error));
+  status = run_check_stop (r, pw_events_open (r, error));
   if (status == PW_OK) status = run_first_evaluation (r, error);
   if (status == PW_OK) status = run_check_finite (r, error);
   if (status != PW_OK) return status;
   r->w->scale.time = run_time_scale (r);
+  pw_ledger_begin (r);
+  status = pw_events_begin (r, error); /* velocities may jump */
+  r->advance = r->events ? pw_events_advance : r->method->advance;
+  if (status != PW_OK) return status;
   run_absolute_tolerances (r);
   pw_run_count_moved (r);
   pw_run_set_reference_level (r);
-  pw_ledger_begin (r);
   pw_forget_residuals (r);
   pw_record_residuals (r);
   status = pw_run_look_ahead (r, error);
@@ -324,6 +333,7 @@ static void checkpoint_state (pw_run *r, pw_archive *a) {
   pw_archive_bytes (a, r->ledger, entries);
   checkpoint_statistics (&r->statistics, a);
   pw_rank_serialise (r, a);
+  pw_events_serialise (r, a);
 }
 
 /* Continues from the run's state, which was just saved or loaded, and loads the method's own data, if any, from a. */

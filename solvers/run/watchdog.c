@@ -653,7 +653,7 @@ static int watchdog_follow (pw_run *r, pw_error *error) {
 static int watchdog_fail_lost (pw_run *r, int contradicts, pw_error *error) {
   pw_residuals now;
   char cause[60] = "constraint drift";
-  pw_evaluate_residuals (r->w, NULL, &now);
+  pw_evaluate_residuals (r->w, r->enforced, &now);
   int in_position = isnan (now.position) || now.position > now.velocity;
   int row = in_position ? now.row_position : now.row_velocity;
   const char *element = row >= 0 ? PW_NAME (pw_system_row_name, r->s, row) : "a constraint", *advice = "";
@@ -676,7 +676,7 @@ static int watchdog_exceeds (double position, double velocity, double limit) {
 /* 1 if a redundant row is violated by more than the residuals of the others explain: it contradicts them. */
 static int watchdog_contradicts (pw_run *r) {
   pw_residuals all, enforced;
-  pw_evaluate_residuals (r->w, NULL, &all);
+  pw_evaluate_residuals (r->w, r->enforced, &all);
   if (!watchdog_exceeds (all.position, all.velocity, r->thresholds.redundant_residual)) return 0;
   pw_evaluate_residuals (r->w, r->active, &enforced);
   double explained =

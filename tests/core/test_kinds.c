@@ -12,7 +12,7 @@
 #include "scene.h"
 #include "toys.h"
 
-enum { KINDS_SEEDS = 100, KINDS_FEW = 3 }; /* random scenes for a good element type, for a faulty one */
+enum { KINDS_SEEDS = 100, KINDS_FEW = 6 }; /* random scenes for a good element type, for a faulty one */
 
 static void kinds_run (const pw_kind *kind, int seeds, pw_selftest_report *report) {
   pw_error error = { 0 };
@@ -34,6 +34,13 @@ static void kinds_pass (const pw_kind *const *kinds) {
 
 TEST (built_in) {
   kinds_pass (pw_kinds);
+}
+
+/* The types that stand for others. */
+static const pw_kind *const kinds_exact[] = { &pw_kind_dry_friction, &pw_kind_dry_sliding_friction, NULL };
+
+TEST (exact) {
+  kinds_pass (kinds_exact);
 }
 
 TEST (plug_in) {
@@ -124,6 +131,7 @@ static void kinds_break (const pw_kind *kind) {
 TEST (broken) {
   for (const pw_kind *const *k = pw_kinds; *k; k++) kinds_break (*k);
   for (const pw_kind *const *k = toy_kinds; *k; k++) kinds_break (*k);
+  for (const pw_kind *const *k = kinds_exact; *k; k++) kinds_break (*k);
 }
 
 /* All elements as the first one: random scenes must have several. */

@@ -27,8 +27,9 @@ LAYOUT (pw_quantity, 32);
 LAYOUT (pw_internal, 32);
 LAYOUT (pw_configuration, 64);
 LAYOUT (pw_batch, 72);
-LAYOUT (pw_kind, 288);
+LAYOUT (pw_kind, 312);
 LAYOUT (pw_path_place, 88);
+LAYOUT (pw_bounds, 40);
 
 LAYOUT_AT (pw_error, text, 4);
 LAYOUT_AT (pw_signal, constant, 8);
@@ -124,6 +125,13 @@ LAYOUT_AT (pw_kind, loss, 256);
 LAYOUT_AT (pw_kind, contact, 264);
 LAYOUT_AT (pw_kind, saturation, 272);
 LAYOUT_AT (pw_kind, symbol, 280);
+LAYOUT_AT (pw_kind, limits, 288);
+LAYOUT_AT (pw_kind, exact, 296);
+LAYOUT_AT (pw_kind, is_exact, 304);
+LAYOUT_AT (pw_bounds, least, 0);
+LAYOUT_AT (pw_bounds, most, 8);
+LAYOUT_AT (pw_bounds, sliding, 16);
+LAYOUT_AT (pw_bounds, restitution, 32);
 
 LAYOUT_VALUE (PW_CONSTANT, 0);
 LAYOUT_VALUE (PW_HARMONIC, 1);
@@ -176,19 +184,35 @@ TEST (definitions) {
     const char *kind;
     unsigned long long layout;
   } known[] = {
-    { "pin", 0x2e992ed58a0ca1ea },           { "weld", 0x96d837462e580df9 },
-    { "slider", 0x72bb16fc630c9167 },        { "slot", 0x3a0f550a70778644 },
-    { "rod", 0xa1a350acfa57b8de },           { "gear", 0xf8074be7c4f42d05 },
-    { "drive", 0x7d987f91b3a3b54e },         { "wheel", 0xdea3eb50a3ca258c },
-    { "rolling-wheel", 0x144a31a69816bde4 }, { "steered-wheel", 0x2c413b6b8f9c87f0 },
-    { "speed", 0xc6449f5523558de9 },         { "pfaffian", 0x4cb2d7f5922ebd32 },
-    { "tyre", 0xa42b832e02a24eda },          { "rolling-resistance", 0x267227c53db66752 },
-    { "spring", 0x80a9821575f7667f },        { "rotational-spring", 0x3c20ed7f38c90acc },
-    { "friction", 0xebebc50a8771ab1e },      { "sliding-friction", 0x4722a2a44a1119a6 },
-    { "drag", 0x79bea784c473bb98 },          { "gravity", 0xed353e1dda5787ff },
-    { "force", 0xbc29b0bbfe5b6a71 },         { "on-curve", 0xfe042b77d6a55c2d },
-    { "torque", 0xc52ae040b1e51021 },        { "motor", 0x4b2d8f0773cca89 },
-    { "state", 0x10002b44038fb8b8 },         { "marker", 0xa45ad3f1c6e75b4a },
+    { "pin", 0x2e992ed58a0ca1ea },
+    { "weld", 0x96d837462e580df9 },
+    { "slider", 0x72bb16fc630c9167 },
+    { "slot", 0x3a0f550a70778644 },
+    { "rod", 0xa1a350acfa57b8de },
+    { "gear", 0xf8074be7c4f42d05 },
+    { "stop", 0xf1ebca61e446368d },
+    { "rope", 0x63fe52bab6421076 },
+    { "freewheel", 0x1b30733283cdb584 },
+    { "drive", 0x7d987f91b3a3b54e },
+    { "wheel", 0xdd5a544c9423325 },
+    { "rolling-wheel", 0x144a31a69816bde4 },
+    { "steered-wheel", 0xb99994e5ef7cd001 },
+    { "speed", 0xc6449f5523558de9 },
+    { "pfaffian", 0x4cb2d7f5922ebd32 },
+    { "tyre", 0xa42b832e02a24eda },
+    { "rolling-resistance", 0x267227c53db66752 },
+    { "spring", 0x80a9821575f7667f },
+    { "rotational-spring", 0x3c20ed7f38c90acc },
+    { "friction", 0x823e8ce22a694f04 },
+    { "sliding-friction", 0x35363bbad0a93614 },
+    { "drag", 0x79bea784c473bb98 },
+    { "gravity", 0xed353e1dda5787ff },
+    { "force", 0xbc29b0bbfe5b6a71 },
+    { "on-curve", 0xfe042b77d6a55c2d },
+    { "torque", 0xc52ae040b1e51021 },
+    { "motor", 0x4b2d8f0773cca89 },
+    { "state", 0x10002b44038fb8b8 },
+    { "marker", 0xa45ad3f1c6e75b4a },
   };
   int bad = 0;
   for (const pw_kind *const *k = pw_kinds; *k; k++) {

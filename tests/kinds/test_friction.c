@@ -117,7 +117,6 @@ static void friction_refused (double speed, const char *number) {
 }
 
 TEST (refused) {
-  friction_refused (0, "0");
   friction_refused (1e-309, "1e-309");
 }
 

@@ -9,6 +9,7 @@ enum {
   REPORT_MESSAGES = 8, /* messages of one kind, or changed states, that are printed at most */
   REPORT_BODIES = 20,  /* bodies that are printed at most */
   REPORT_ROWS = 24,    /* reactions, or internal coordinates, that are printed at most */
+  REPORT_EVENTS = 10,  /* listed */
   REPORT_TEXT = 400,   /* longest description of a redundant equation, end included */
   REPORT_WIDTH = 13,   /* of a column of numbers */
   REPORT_DIGITS = 8
@@ -259,6 +260,17 @@ static void report_errors (const pw_reference_error *errors, const char *gaps, i
   if (*gaps) pw_cli_print (stdout, "  the reference solution contains %s\n", gaps);
 }
 
+/* The last events; of a scene without limits nothing. */
+static void report_events (const pw_system *system, const pw_summary *summary) {
+  const int first = summary->events > REPORT_EVENTS ? summary->events - REPORT_EVENTS : 0;
+  if (pw_system_limited (system) == 0) return;
+  pw_cli_print (stdout, "  %s%s\n", PW_COUNTED (summary->events, "event"), first > 0 ? "; the last ones:" : "");
+  for (const pw_event *e = summary->event + first; e < summary->event + summary->events; e++)
+    pw_cli_print (stdout, "    t = %s s: %s %s%s\n", PW_DIGITS (e->t, 15), PW_NAME (pw_system_row_name, system, e->row),
+                  pw_system_mode_name (system, e->row, e->to),
+                  e->impact ? PW_PRINTED (60, ", impulse %s", PW_DIGITS (e->impulse, 8)) : "");
+}
+
 /* Why the general engine was used; "": it was not. */
 static const char *report_general_reason (const pw_run_cli *command) {
   if (command->engine.code == NULL) return command->engine.reason;
@@ -283,6 +295,7 @@ pw_summary pw_run_summary (pw_run_cli *command, const pw_sample *last, const pw_
                          .reference =
                              run ? pw_comparison_errors (&command->comparison, command->compiled.system) : NULL,
                          .stated = command->stated.known ? &command->stated.result : NULL };
+  if (run) summary.event = pw_run_events (run, &summary.events);
   if (error->status == PW_OK && pw_stop) {
     snprintf (reason, PW_RUN_REASON, "interrupted at t = %s s", PW_DIGITS (pw_run_time (run), 6));
     summary.status = "interrupted";
@@ -323,6 +336,7 @@ void pw_report_end (const pw_run_cli *command, const pw_summary *summary, const 
     pw_cli_print (stdout, "  general engine: %s\n", summary->general);
   else
     printf ("  code specialised for this scene: %ld evaluations\n", stats->specialised);
+  report_events (system, summary);
   if (stats->restarts > 0) printf ("  restarted at %s\n", PW_COUNTED (stats->restarts, "checkpoint"));
   if (summary->until && isnan (summary->stop_time))
     pw_cli_print (stdout, "  %s did not become true\n", summary->until);

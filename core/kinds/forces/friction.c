@@ -2,7 +2,8 @@
  *
  *   f = (0, 0, -T | 0, 0, T) = -T S,  S = [ 0 0 1 | 0 0 -1 ],  loss = T v >= 0       v = omega1 - omega2, T = F(v)
  *
- * F(v) as in coulomb.h; its limit is the friction coefficient times radius times load. */
+ * F(v) as in coulomb.h; its limit is the friction coefficient times radius times load.  Exact friction is the
+ * nonholonomic equation S q' = 0 and the viscous torque. */
 #include "coulomb.h"
 
 /* Friction in the current state; dv/dq = 0. */
@@ -18,10 +19,18 @@ static inline friction_state friction_at (const pw_batch *batch, int e) {
 }
 
 PREPARE (friction_prepare, pw_friction, coulomb) {
+  if (definition->limit_sliding > 0)
+    return pw_fail (error, PW_INPUT, "limit_sliding = %g: expected 0, unless friction is exact: a limit, no speed",
+                    definition->limit_sliding);
   return coulomb_make (definition->viscous, definition->limit, definition->speed, element, error);
 }
 
+PREPARE (friction_prepare_exact, pw_friction, coulomb) {
+  return coulomb_make_exact (definition->viscous, definition->limit, definition->limit_sliding, element, error);
+}
+
 COULOMB (friction, 6)
+EXACT_COULOMB (friction, pw_friction)
 
 static const pw_field friction_fields[] = {
   { PW_AT (pw_friction, body), PW_BODY, .count = 2, .required = 1, .about = "the two bodies; one may be ground" },
@@ -29,7 +38,9 @@ static const pw_field friction_fields[] = {
     .about = "torque per angular velocity" },
   { PW_AT (pw_friction, limit), PW_NUMBER, .unit = "N m", .domain = PW_NONNEGATIVE, .about = "Coulomb torque" },
   { PW_AT (pw_friction, speed), PW_NUMBER, .unit = "rad/s", .domain = PW_NONNEGATIVE,
-    .about = "below about this angular velocity the Coulomb torque is smoothed; required with a limit" },
+    .about = "below about this angular velocity the Coulomb torque is smoothed; left out: it is exact, and holds" },
+  { PW_AT (pw_friction, limit_sliding), PW_NUMBER, .unit = "N m", .domain = PW_NONNEGATIVE,
+    .about = "exact Coulomb torque while sliding, at most the limit; 0: the limit" },
   { .name = NULL },
 };
 
@@ -42,4 +53,24 @@ const pw_kind pw_kind_friction = {
   .force_v = friction_force_v,
   .saturation = friction_saturation,
   .loss = friction_loss,
+  .exact = &pw_kind_dry_friction,
+  .is_exact = friction_is_exact,
+};
+
+const pw_kind pw_kind_dry_friction = {
+  .name = "friction",
+  .about = "a viscous torque, and a Coulomb torque that holds two bodies together up to a limit",
+  .definition = sizeof (pw_friction),
+  .fields = friction_fields,
+  .element = sizeof (coulomb),
+  .prepare = friction_prepare_exact,
+  .bodies = 2,
+  .rows = 1,
+  .level = PW_NONHOLONOMIC,
+  REACTION ("T", "N m", "Coulomb torque on the first body"),
+  .J = friction_exact_J,
+  .limits = friction_limits,
+  .force = friction_force,
+  .force_v = friction_force_v,
+  .loss = friction_exact_loss,
 };

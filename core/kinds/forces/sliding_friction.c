@@ -4,7 +4,8 @@
  *   f = -F S,  loss = F v >= 0                                          F(v) as in coulomb.h
  *   df/dq = -dF/dv S (H q')^T - F H,  df/dq' = -dF/dv S S^T,  H = d2g/dq2
  *
- * g is the position along the line: that of line.h for the perpendicular line with normal e; S and H: G and H there. */
+ * g is the position along the line: that of line.h for the perpendicular line with normal e; S and H: G and H there.
+ * Exact friction is the nonholonomic equation S q' = 0 and the viscous force. */
 #include "coulomb.h"
 #include "line.h"
 
@@ -32,8 +33,16 @@ static inline sliding_state sliding_at (const pw_batch *batch, int e) {
 }
 
 PREPARE (sliding_prepare, pw_sliding_friction, sliding) {
+  if (definition->limit_sliding > 0)
+    return pw_fail (error, PW_INPUT, "limit_sliding = %g: expected 0, unless friction is exact: a limit, no speed",
+                    definition->limit_sliding);
   element->across = line_make (definition->at, definition->heading - PW_PI / 2);
   return coulomb_make (definition->viscous, definition->limit, definition->speed, &element->law, error);
+}
+
+PREPARE (sliding_prepare_exact, pw_sliding_friction, sliding) {
+  element->across = line_make (definition->at, definition->heading - PW_PI / 2);
+  return coulomb_make_exact (definition->viscous, definition->limit, definition->limit_sliding, &element->law, error);
 }
 
 PER_ELEMENT (sliding_force_q, sliding, 36) {
@@ -43,6 +52,23 @@ PER_ELEMENT (sliding_force_q, sliding, 36) {
 }
 
 COULOMB (sliding, 6)
+EXACT_COULOMB (sliding, pw_sliding_friction)
+
+PER_ELEMENT (sliding_exact_gamma, sliding, 1) {
+  line_gamma_one (now.across, out);
+}
+
+PER_ELEMENT (sliding_exact_jw_q, sliding, 6) {
+  line_jw_q_one (now.across, out);
+}
+
+PER_ELEMENT (sliding_exact_gamma_q, sliding, 6) {
+  line_gamma_q_one (now.across, out);
+}
+
+PER_ELEMENT (sliding_exact_gamma_v, sliding, 6) {
+  line_gamma_v_one (now.across, out);
+}
 
 static const pw_field sliding_fields[] = {
   { PW_AT (pw_sliding_friction, body), PW_BODY, .count = 2, .required = 1,
@@ -52,7 +78,9 @@ static const pw_field sliding_fields[] = {
     .about = "force per speed" },
   { PW_AT (pw_sliding_friction, limit), PW_NUMBER, .unit = "N", .domain = PW_NONNEGATIVE, .about = "Coulomb force" },
   { PW_AT (pw_sliding_friction, speed), PW_NUMBER, .unit = "m/s", .domain = PW_NONNEGATIVE,
-    .about = "below about this speed the Coulomb force is smoothed; required with a limit" },
+    .about = "below about this speed the Coulomb force is smoothed; left out: it is exact, and holds" },
+  { PW_AT (pw_sliding_friction, limit_sliding), PW_NUMBER, .unit = "N", .domain = PW_NONNEGATIVE,
+    .about = "exact Coulomb force while sliding, at most the limit; 0: the limit" },
   { .name = NULL },
 };
 
@@ -64,4 +92,27 @@ const pw_kind pw_kind_sliding_friction = {
   FORCE (sliding),
   .saturation = sliding_saturation,
   .loss = sliding_loss,
+  .exact = &pw_kind_dry_sliding_friction,
+  .is_exact = sliding_is_exact,
+};
+
+const pw_kind pw_kind_dry_sliding_friction = {
+  .name = "sliding-friction",
+  .about = "a viscous force, and a Coulomb force that holds a point on a line of another body up to a limit",
+  .definition = sizeof (pw_sliding_friction),
+  .fields = sliding_fields,
+  .element = sizeof (sliding),
+  .prepare = sliding_prepare_exact,
+  .bodies = 2,
+  .rows = 1,
+  .level = PW_NONHOLONOMIC,
+  REACTION ("F", "N", "Coulomb force on the first body, along the line"),
+  .J = sliding_exact_J,
+  .gamma = sliding_exact_gamma,
+  .jw_q = sliding_exact_jw_q,
+  .gamma_q = sliding_exact_gamma_q,
+  .gamma_v = sliding_exact_gamma_v,
+  .limits = sliding_limits,
+  FORCE (sliding),
+  .loss = sliding_exact_loss,
 };

@@ -1,4 +1,4 @@
-/* rod: a massless bar keeps a point of body 1 and a point of body 2 at the distance L.
+/* rod: a massless bar keeps a point of body 1 and a point of body 2 at the distance L.  rope: at most at L.
  *
  *   g     = (d.d - L^2) / (2 L) = 0                               (1 holonomic equation); d, D: points.h
  *   G     = d^T D / L
@@ -94,6 +94,27 @@ PER_ELEMENT (rod_gamma_v, rod, 6) {
   out[5] -= 2 * now.omega2 * rod_dot (now.ends.d, now.ends.S2) / now.L;
 }
 
+PREPARE (rope_prepare, pw_rope, rod) {
+  *element = (rod){ points_make (definition->at), definition->length };
+  return PW_OK;
+}
+
+static void rope_limits (const void *definition, pw_bounds *limit) {
+  limit->least = 0;
+  limit->restitution = ((const pw_rope *)definition)->restitution;
+}
+
+static const pw_field rope_fields[] = {
+  { PW_AT (pw_rope, body), PW_BODY, .count = 2, .required = 1, .about = "the two bodies; one may be ground" },
+  { PW_AT (pw_rope, at), PW_POINT, .count = 2, .unit = "m", .required = 1,
+    .about = "the end points in the bodies' frames" },
+  { PW_AT (pw_rope, length), PW_NUMBER, .unit = "m", .required = 1, .domain = PW_POSITIVE,
+    .about = "largest distance between the end points" },
+  { PW_AT (pw_rope, restitution), PW_NUMBER, .domain = PW_FRACTION,
+    .about = "velocity after the rope has become taut over that before it" },
+  { .name = NULL },
+};
+
 static const pw_field rod_fields[] = {
   { PW_AT (pw_rod, body), PW_BODY, .count = 2, .required = 1, .about = "the two bodies; one may be ground" },
   { PW_AT (pw_rod, at), PW_POINT, .count = 2, .unit = "m", .required = 1,
@@ -114,4 +135,18 @@ const pw_kind pw_kind_rod = {
   REACTION ("F", "N", "force on the first body, away from the second; negative: tension"),
   POSITION (rod),
   CONSTRAINT (rod),
+};
+
+const pw_kind pw_kind_rope = {
+  .name = "rope",
+  .about = "a massless rope: a point of one body is at most at a given distance from a point of another",
+  .symbol = "0 0 0 1 0 0",
+  TYPE (rope, pw_rope, rod),
+  .bodies = 2,
+  .rows = 1,
+  .level = PW_HOLONOMIC,
+  REACTION ("F", "N", "force on the first body, away from the second: minus the tension"),
+  POSITION (rod),
+  CONSTRAINT (rod),
+  .limits = rope_limits,
 };

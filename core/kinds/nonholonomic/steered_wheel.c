@@ -7,7 +7,7 @@
  *
  * S, s_phi and jw_q are those of contact.h for the direction n at the present u; gamma and its derivatives are not,
  * since n turns in the body.  The lateral force on the body, along n, is N = -lambda.  It acts at P, about which the
- * wheel is steered, so steering needs no moment and does no work. */
+ * wheel is steered, so steering needs no moment and does no work.  With a grip, it slides as a wheel does. */
 #include "contact.h"
 
 typedef struct {
@@ -31,7 +31,19 @@ static inline steered_state steered_at (const pw_batch *batch, int e) {
 
 PREPARE (steered_prepare, pw_steered_wheel, steered) {
   *element = (steered){ { definition->at[0], definition->at[1] } };
-  return PW_OK;
+  return limit_check ("grip", definition->grip, definition->grip_sliding, error);
+}
+
+static void steered_limits (const void *definition, pw_bounds *limit) {
+  const pw_steered_wheel *wheel = definition;
+  limit_both_sides (wheel->grip, wheel->grip_sliding, limit);
+}
+
+static void steered_loss (const pw_batch *batch, double *out) {
+  for (int e = 0; e < batch->count; e++) {
+    steered_state now = steered_at (batch, e);
+    out[e] = batch->lambda[e] * contact_speed (&now.contact);
+  }
 }
 
 PER_ELEMENT (steered_J, steered, 3) {
@@ -77,6 +89,7 @@ static const pw_field steered_fields[] = {
   { PW_AT (pw_steered_wheel, at), PW_POINT, .unit = "m", .required = 1, .about = "contact point in the body's frame" },
   { PW_AT (pw_steered_wheel, heading), PW_SIGNAL, .unit = "rad", .required = 1,
     .about = "rolling direction in the body's frame, a signal with its derivative; 0: along the frame's x axis" },
+  GRIP_FIELDS (pw_steered_wheel),
   { .name = NULL },
 };
 
@@ -91,6 +104,8 @@ const pw_kind pw_kind_steered_wheel = {
   .level = PW_NONHOLONOMIC,
   REACTION ("N", "N", "lateral force on the body, to the left of the heading"),
   CONSTRAINT (steered),
+  .limits = steered_limits,
+  .loss = steered_loss,
   .J_u = steered_J_u,
   .gamma_u = steered_gamma_u,
   .contact = steered_contact,

@@ -4,17 +4,31 @@
  *   S     = [ -sin(theta)  cos(theta)  l ]      theta = phi + psi; l: arm of P along the heading
  *   gamma = omega (cos(theta) vx + sin(theta) vy)                 so that S v' = gamma
  *
- * The lateral force on the body, along n, is N = -lambda. */
+ * The lateral force on the body, along n, is N = -lambda.  With a grip, |lambda| is at most the grip; beyond it the
+ * wheel slides and loses lambda n . v_P. */
 #include "contact.h"
 
 PREPARE (wheel_prepare, pw_wheel, contact) {
   *element = contact_across (definition->at, definition->heading);
-  return PW_OK;
+  return limit_check ("grip", definition->grip, definition->grip_sliding, error);
+}
+
+static void wheel_limits (const void *definition, pw_bounds *limit) {
+  const pw_wheel *wheel = definition;
+  limit_both_sides (wheel->grip, wheel->grip_sliding, limit);
+}
+
+static void wheel_loss (const pw_batch *batch, double *out) {
+  for (int e = 0; e < batch->count; e++) {
+    contact_state now = contact_at (batch, e);
+    out[e] = batch->lambda[e] * contact_speed (&now);
+  }
 }
 
 static const pw_field wheel_fields[] = {
   { PW_AT (pw_wheel, body), PW_BODY, .required = 1, .about = "the body with the wheel" },
   CONTACT_FIELDS (pw_wheel),
+  GRIP_FIELDS (pw_wheel),
   { .name = NULL },
 };
 
@@ -28,5 +42,7 @@ const pw_kind pw_kind_wheel = {
   .level = PW_NONHOLONOMIC,
   REACTION ("N", "N", "lateral force on the body, to the left of the heading"),
   CONSTRAINT (contact),
+  .limits = wheel_limits,
+  .loss = wheel_loss,
   .contact = contact_place,
 };

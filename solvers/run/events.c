@@ -1,0 +1,768 @@
+/* Modes of the constraint equations whose multipliers have limits, and the events at which they change.
+ *
+ * Mode 0: the equation holds.  Mode 1: its multiplier lambda is given, at its largest value, and u >= 0; mode -1: at
+ * its smallest value, and u <= 0.  u is J v - eta or, of a holonomic equation, g.  An event is a root of lambda less a
+ * limit, or of u.  After each step it is sought in the dense output; the state there becomes the state reached.  Before
+ * the next step the modes are decided and the method begins anew.
+ *
+ * Decision.  The equations D that may hold have multipliers x in [lo, hi] and relative accelerations
+ *
+ *   z = J_D a - gamma_D = b - A x,   A = J_D H J_D^T,   H: of the saddle of the other equations that hold
+ *   lo < x < hi: z = 0;   x = hi: z >= 0;   x = lo: z <= 0
+ *
+ * the conditions of a minimum of x^T A x / 2 - b^T x.  A is positive definite: accelerations are unique.  Principal
+ * pivoting finds it (Murty 1974, Note on a Bard-type scheme for solving the complementarity problem; Judice & Pires
+ * 1994, Computers & Operations Research 21, 587-596).  In an impact the same holds for impulses and u + e u before it,
+ * e: restitution; finite multipliers transmit no impulse (Moreau 1988, Unilateral contact and dry friction in finite
+ * freedom dynamics). */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "crossing.h"
+#include "events.h"
+#include "rank.h"
+#include "util.h"
+
+#define EVENTS_SMALL 1e-11     /* velocities [units] that count as 0 where modes are decided */
+#define EVENTS_TIGHTER 1e-10   /* by which a limit that is reached is narrowed: round-off must not undo the event */
+#define EVENTS_ROUND_OFF 1e-14 /* of an event function that has been farther from its root */
+#define EVENTS_SLOW 1e-6       /* impacts below this velocity [units] do not bounce: they would accumulate */
+enum { EVENTS_PASSES = 10 };   /* most decisions at one instant */
+
+typedef struct pw_events {
+  int count;                            /* equations with limits; arrays of this length, unless said otherwise */
+  int *row;                             /* their indices */
+  pw_bounds *limit;                     /* their limits */
+  double *force_unit, *unit;            /* of the multiplier; of u */
+  signed char *mode, *before;           /* before: those before a decision */
+  unsigned char *armed;                 /* 1: u has left its root, so that it may return there */
+  unsigned char *triggered;             /* 1: at the root that is the state reached */
+  unsigned char *rests;                 /* 1: u is 0 after an impact */
+  unsigned char *enforced;              /* rows: what r->enforced points to */
+  unsigned char *blocked;               /* n: 1 for equations of a decision that depend on those that hold */
+  unsigned char *other;                 /* rows: active equations of the saddle of a decision */
+  double *start, *end, *previous, *now; /* 2 count: event functions at the ends of the last step, before it, anywhere */
+  double start_t, previous_t;           /* NaN: not known */
+  double *memory;                       /* of pw_first_crossing */
+  double *u, *u_before, *impulse;
+  double *offset; /* by which u [units] was on the wrong side of its root when it began to leave it: drift */
+  int at_end;     /* 1: the state reached, its multipliers and its J are known */
+  int samples;    /* 1: J has been evaluated elsewhere since */
+  int pending;    /* 1: modes must be decided at the state reached */
+  int fell;       /* 1: u has changed its sign without having left its root: too short a motion to be resolved */
+
+  /* Of a decision: the equations D, by their number among those with limits. */
+  int n, *list;
+  double *A, *b, *x, *lo, *hi, *factor; /* n x n; n; factor: n (n + 1) */
+  int *held;                            /* n: those that hold */
+  signed char *trial;                   /* n: modes */
+  double *f, *a, *gamma, *lambda;       /* coords + 3; the same; rows; 2 rows */
+} pw_events;
+
+static int events_allocate (pw_run *r) {
+  const pw_system *s = r->s;
+  const size_t n = (size_t)s->limited, rows = (size_t)s->rows, coords = (size_t)s->coords + 3;
+  pw_events *x = r->events = pw_arena_alloc (&r->arena, sizeof *x);
+  if (x == NULL) return PW_RESOURCE;
+  double **const number[] = { &x->force_unit, &x->unit, &x->u, &x->u_before, &x->impulse,
+                              &x->offset,     &x->b,    &x->x, &x->lo,       &x->hi };
+  double **const function[] = { &x->start, &x->end, &x->now, &x->previous };
+  signed char **const mode[] = { &x->mode, &x->before, &x->trial };
+  unsigned char **const flag[] = { &x->armed, &x->triggered, &x->rests, &x->blocked };
+  for (pw_layout l = { 0 }; pw_layout_pass (&l, &r->events_memory);) {
+    x->row = pw_layout_alloc (&l, n, sizeof *x->row);
+    x->list = pw_layout_alloc (&l, n, sizeof *x->list);
+    x->held = pw_layout_alloc (&l, n, sizeof *x->held);
+    x->limit = pw_layout_alloc (&l, n, sizeof *x->limit);
+    for (size_t i = 0; i < sizeof number / sizeof *number; i++) *number[i] = pw_layout_alloc (&l, n, sizeof (double));
+    for (int i = 0; i < 4; i++) *function[i] = pw_layout_alloc (&l, 2 * n, sizeof (double));
+    for (int i = 0; i < 3; i++) *mode[i] = pw_layout_alloc (&l, n, 1);
+    for (int i = 0; i < 4; i++) *flag[i] = pw_layout_alloc (&l, n, 1);
+    x->enforced = pw_layout_alloc (&l, rows, 1);
+    x->other = pw_layout_alloc (&l, rows, 1);
+    x->A = pw_layout_alloc (&l, n * n, sizeof *x->A);
+    x->factor = pw_layout_alloc (&l, n * (n + 1), sizeof *x->factor);
+    x->f = pw_layout_alloc (&l, coords, sizeof *x->f);
+    x->a = pw_layout_alloc (&l, coords, sizeof *x->a);
+    x->gamma = pw_layout_alloc (&l, rows, sizeof *x->gamma);
+    x->lambda = pw_layout_alloc (&l, 2 * rows, sizeof *x->lambda);
+    x->memory = pw_layout_alloc (&l, 2 * n * (PW_CROSSING_DEPTH + 2), sizeof *x->memory);
+    r->reaction = pw_layout_alloc (&l, rows, sizeof *r->reaction);
+  }
+  return r->events_memory ? PW_OK : PW_RESOURCE;
+}
+
+/* ---- Modes of the run ---- */
+
+/* The multiplier of an equation at a limit. */
+static double events_given (const pw_events *x, int i) {
+  return x->limit[i].sliding[x->mode[i] > 0];
+}
+
+/* The mode of an equation that does not hold: of one with two finite limits by the sign of u. */
+static signed char events_off (const pw_events *x, int i, double u) {
+  if (isinf (x->limit[i].least)) return 1;
+  return isinf (x->limit[i].most) || u < 0 ? -1 : 1;
+}
+
+/* Makes the modes those of the run. */
+static void events_apply (pw_run *r) {
+  pw_events *x = r->events;
+  int off = 0;
+  for (int i = 0; i < r->s->rows; i++) {
+    const pw_bounds *limit = &r->s->limit[i];
+    x->enforced[i] = limit->least < 0 || limit->most > 0;
+    r->reaction[i] = 0;
+    off |= !x->enforced[i];
+  }
+  for (int i = 0; i < x->count; i++) {
+    if (x->mode[i] == 0) continue;
+    x->enforced[x->row[i]] = 0;
+    r->reaction[x->row[i]] = -events_given (x, i);
+    off = 1;
+  }
+  r->active = r->enforced = off ? x->enforced : NULL;
+  r->redundant_drive = off;
+  r->forces = off ? PW_FORCES_AT_LIMITS : r->s->forces > 0;
+}
+
+/* u of the equations with limits at velocities v, where J is evaluated; of holonomic equations their rate, unless g is
+ * 1. */
+static void events_u (pw_run *r, const double *v, int g, double *u) {
+  pw_events *x = r->events;
+  double *Jv = x->lambda, *eta = Jv + r->s->rows;
+  pw_mul_J (r->w, v, Jv);
+  pw_evaluate_eta (r->w, eta);
+  for (int i = 0; i < r->s->rows; i++) Jv[i] -= eta[i];
+  if (g) pw_evaluate_g (r->w, Jv);
+  for (int i = 0; i < x->count; i++) u[i] = Jv[x->row[i]];
+}
+
+static int events_holonomic (const pw_run *r, int i) {
+  return r->events->row[i] < r->s->holonomic;
+}
+
+/* ---- Event functions, positive beyond an event: two for each equation ---- */
+
+/* Below this u [units] is 0 after its root: the error of the method. */
+static double events_tolerance (const pw_run *r) {
+  return r->fixed_steps ? 1e-13 : fmax (1e-13, 10 * r->settings.rtol);
+}
+
+/* Event functions where J is evaluated, from the multipliers and velocities. */
+static void events_values (pw_run *r, const double *v, const double *lambda, double *value) {
+  pw_events *x = r->events;
+  const double tolerance = events_tolerance (r);
+  events_u (r, v, 1, x->u);
+  for (int i = 0; i < x->count; i++) {
+    const pw_bounds *limit = &x->limit[i];
+    double y = lambda[x->row[i]];
+    value[2 * i] = isinf (limit->most) ? -1 : (y - limit->most) / x->force_unit[i] - EVENTS_ROUND_OFF;
+    value[2 * i + 1] = isinf (limit->least) ? -1 : (limit->least - y) / x->force_unit[i] - EVENTS_ROUND_OFF;
+    if (x->mode[i] == 0) continue;
+    value[2 * i] = -x->mode[i] * x->u[i] / x->unit[i] - (x->armed[i] ? EVENTS_ROUND_OFF : tolerance + x->offset[i]);
+    value[2 * i + 1] = -1;
+  }
+}
+
+/* 1 if the method leaves the multipliers of the state reached in r->lambda, without Baumgarte's terms. */
+static int events_knows_multipliers (const pw_run *r) {
+  static const pw_stabilisation_kind kinds[] = { PW_UNSTABILISED, PW_PROJECTION, PW_NULLSPACE };
+  for (size_t i = 0; i < sizeof kinds / sizeof *kinds && r->method->order > 0; i++) /* not of multistep methods */
+    if (pw_stabilised_by (r, kinds[i])) return 1;
+  return 0;
+}
+
+/* pw_crossing_search.at.  Otherwise multipliers are computed from the state: those of some methods are interpolated,
+ * and modes are decided with these. */
+static int events_at (void *context, double t, double *value, pw_error *error) {
+  pw_run *r = context;
+  const pw_statistics statistics = r->statistics;
+  const double alpha = r->alpha, beta = r->beta;
+  const int near_singular = r->near_singular;
+  if (t == r->t && r->events->at_end) return events_values (r, r->v, r->lambda, value), PW_OK;
+  r->events->samples = 1;
+  int status = r->method->at (r, t, error);
+  r->alpha = r->beta = 0;
+  if (status == PW_OK && pw_saddle_factor (r->saddle) == PW_OK)
+    pw_run_accelerate_updated (r, r->v_at, r->a_at, r->lambda_at);
+  r->alpha = alpha, r->beta = beta;
+  r->statistics = statistics, r->near_singular = near_singular;
+  if (status == PW_OK) events_values (r, r->v_at, r->lambda_at, value);
+  return status;
+}
+
+/* Marks functions of u that have left their root. */
+static void events_arm (pw_run *r, const double *value) {
+  pw_events *x = r->events;
+  for (int i = 0; i < x->count; i++)
+    x->armed[i] |= x->mode[i] && value[2 * i] < -2 * events_tolerance (r) - x->offset[i];
+}
+
+/* Marks the equations at their roots; 1 if there are any. */
+static int events_trigger (pw_run *r, const double *value) {
+  pw_events *x = r->events;
+  int any = 0;
+  for (int i = 0; i < x->count; i++) any |= x->triggered[i] = value[2 * i] > 0 || value[2 * i + 1] > 0;
+  return any;
+}
+
+/* ---- Decisions ---- */
+
+/* The saddle without the equations D (impact: without all that have limits), A, and b: of accelerations; of velocities
+ * in an impact.  NULL on errors. */
+static pw_saddle *decision_open (pw_run *r, int impact, pw_error *error) {
+  pw_events *x = r->events;
+  const pw_system *s = r->s;
+  memcpy (x->other, x->enforced, (size_t)s->rows);
+  for (int i = 0; i < x->count && impact; i++) x->other[x->row[i]] = 0;
+  for (int k = 0; k < x->n; k++) x->other[x->row[x->list[k]]] = 0;
+  pw_saddle *saddle = pw_saddle_open (r->w, s->mass, s->rows, x->other, error);
+  if (saddle == NULL || pw_saddle_factor (saddle) != PW_OK) return pw_saddle_close (saddle), NULL;
+  if (impact) {
+    memcpy (x->a, r->v, (size_t)s->coords * sizeof *x->a);
+    pw_evaluate_eta (r->w, x->gamma);
+  } else {
+    pw_evaluate_force (r->w, x->f);
+    for (int k = 0; k < x->n; k++) r->reaction[x->row[x->list[k]]] = 0; /* the unknowns */
+    pw_add_given_forces (r, x->f);
+    pw_evaluate_gamma (r->w, x->gamma);
+    memcpy (x->lambda, x->gamma, (size_t)s->rows * sizeof *x->lambda);
+    pw_saddle_solve (saddle, x->f, x->lambda, x->a, x->lambda);
+  }
+  double *Ja = x->lambda + s->rows;
+  pw_mul_J (r->w, x->a, Ja);
+  for (int k = 0; k < x->n; k++) x->b[k] = Ja[x->row[x->list[k]]] - x->gamma[x->row[x->list[k]]];
+  for (int k = 0; k < x->n; k++) {
+    memset (x->gamma, 0, (size_t)s->rows * sizeof *x->gamma);
+    memset (x->f, 0, ((size_t)s->coords + 3) * sizeof *x->f);
+    x->gamma[x->row[x->list[k]]] = 1;
+    pw_add_JT (r->w, x->gamma, x->f);
+    memset (x->lambda, 0, (size_t)s->rows * sizeof *x->lambda);
+    pw_saddle_solve (saddle, x->f, x->lambda, x->a, x->lambda);
+    pw_mul_J (r->w, x->a, Ja);
+    for (int i = 0; i < x->n; i++) x->A[i * x->n + k] = Ja[x->row[x->list[i]]];
+  }
+  return saddle;
+}
+
+/* Adds to the velocities those of the impulses -x on D; impulses of the other equations in x->lambda. */
+static int decision_push (pw_run *r, pw_saddle *saddle) {
+  pw_events *x = r->events;
+  const pw_system *s = r->s;
+  memset (x->gamma, 0, (size_t)s->rows * sizeof *x->gamma);
+  memset (x->f, 0, ((size_t)s->coords + 3) * sizeof *x->f);
+  for (int k = 0; k < x->n; k++) x->gamma[x->row[x->list[k]]] = -x->x[k];
+  pw_add_JT (r->w, x->gamma, x->f);
+  memset (x->lambda, 0, (size_t)s->rows * sizeof *x->lambda);
+  pw_saddle_solve (saddle, x->f, x->lambda, x->a, x->lambda);
+  for (int j = 0; j < s->coords; j++) r->v[j] += x->a[j];
+  return pw_update_velocities (r->w, r->v);
+}
+
+/* Solves z = 0 for those of D whose trial mode is 0, with x of the others given (Cholesky).  Of equations that depend
+ * on each other the later ones are left out if `skips` is 1; otherwise PW_RETRY. */
+static int decision_solve (pw_events *x, int skips) {
+  const int n = x->n;
+  double *L = x->factor, *y = L + n * n;
+  int m = 0, *held = x->held;
+  for (int k = 0; k < n; k++) {
+    if (x->trial[k]) continue;
+    const double *row = x->A + k * n;
+    double *Lm = L + m * n;
+    held[m] = k;
+    y[m] = x->b[k];
+    for (int i = 0; i < n; i++)
+      if (x->trial[i]) y[m] -= row[i] * x->x[i];
+    for (int j = 0; j <= m; j++) {
+      Lm[j] = 0.5 * (row[held[j]] + x->A[held[j] * n + k]);
+      for (int i = 0; i < j; i++) Lm[j] -= Lm[i] * L[j * n + i];
+      if (j < m) Lm[j] /= L[j * n + j];
+    }
+    x->x[k] = 0;
+    if (!(Lm[m] > 1e-13 * row[k])) {
+      if (!skips) return PW_RETRY;
+      continue;
+    }
+    Lm[m] = sqrt (Lm[m]);
+    for (int i = 0; i < m; i++) y[m] -= Lm[i] * y[i];
+    y[m] /= Lm[m];
+    m++;
+  }
+  for (int i = m - 1; i >= 0; i--) {
+    for (int k = i + 1; k < m; k++) y[i] -= L[k * n + i] * y[k];
+    x->x[held[i]] = y[i] /= L[i * n + i];
+  }
+  return PW_OK;
+}
+
+/* By how much equation k of D violates its conditions; *to: the mode that would satisfy them.  size: of z that are
+ * round-off. */
+static double decision_violation (const pw_events *x, int k, double size, int *to) {
+  const double unit = sqrt (x->A[k * x->n + k]);
+  double z = x->b[k];
+  *to = x->x[k] > x->hi[k] ? 1 : -1;
+  if (x->trial[k] == 0) return unit * fmax (x->x[k] - x->hi[k], x->lo[k] - x->x[k]);
+  for (int i = 0; i < x->n; i++) z -= x->A[k * x->n + i] * x->x[i];
+  *to = 0;
+  return -x->trial[k] * z / unit - 1e-12 * size;
+}
+
+/* Finds x and trial modes between lo and hi, from the present trial modes on: the largest violation changes its mode;
+ * after many changes, which may cycle, the first one (Murty).  An equation that depends on those that hold stays at its
+ * limit, where it is satisfied, too.  PW_RETRY if that fails. */
+static int decision_pivot (pw_events *x) {
+  const int n = x->n;
+  int changed = -1, before = 0;
+  memset (x->blocked, 0, (size_t)n);
+  for (int pass = 0; pass < 50 * (n + 1); pass++) {
+    int worst = -1, to = 0, next = 0;
+    double most = 0, size = 0;
+    for (int k = 0; k < n; k++)
+      if (x->trial[k]) x->x[k] = x->trial[k] > 0 ? x->hi[k] : x->lo[k];
+    if (decision_solve (x, 0) != PW_OK) {
+      if (changed < 0 || before == 0) return PW_RETRY;
+      x->trial[changed] = (signed char)before, x->blocked[changed] = 1;
+      continue;
+    }
+    for (int k = 0; k < n; k++) {
+      const double unit = sqrt (x->A[k * n + k]);
+      size = fmax (size, fmax (fabs (x->b[k]) / unit, fabs (x->x[k]) * unit));
+    }
+    for (int k = 0; k < n && (worst < 0 || pass < 10 * n); k++) {
+      const double violation = x->blocked[k] ? 0 : decision_violation (x, k, size, &next);
+      if (violation > most) most = violation, worst = k, to = next;
+    }
+    if (worst < 0) return PW_OK;
+    if (to != 0) memset (x->blocked, 0, (size_t)n);
+    changed = worst, before = x->trial[worst];
+    x->trial[worst] = (signed char)to;
+  }
+  return PW_RETRY;
+}
+
+static int decision_fail (pw_run *r, pw_saddle *saddle, pw_error *error) {
+  pw_events *x = r->events;
+  char elements[300];
+  memset (x->other, 0, (size_t)r->s->rows);
+  for (int k = 0; k < x->n; k++) x->other[x->row[x->list[k]]] = 1;
+  pw_list_elements (r->s, x->other, 1, elements, sizeof elements);
+  if (saddle == NULL && error && error->status == PW_RESOURCE) return PW_RESOURCE;
+  return pw_fail (error, PW_METHOD, "t = %.6g s: whether %s hold%s cannot be decided: %s", r->t, elements,
+                  strchr (elements, ',') ? "" : "s",
+                  saddle ? "their equations depend on each other or on other constraints"
+                         : "without them the accelerations are not determined");
+}
+
+/* Adds to the ledger what an impact dissipates and what constraints supply in it: impulses -x of D, x->lambda of the
+ * others. */
+static void impact_ledger (pw_run *r) {
+  pw_events *x = r->events;
+  const pw_system *s = r->s;
+  double *eta = x->lambda + s->rows;
+  pw_evaluate_eta (r->w, eta);
+  for (int k = 0; k < x->n; k++) x->lambda[x->row[x->list[k]]] = x->x[k];
+  for (int i = 0; i < s->entries; i++) {
+    const pw_element_batch *k = &s->batch[s->entry[i].batch];
+    const int first = k->row + s->entry[i].element * k->kind->rows;
+    for (int row = first; row < first + k->kind->rows && s->entry[i].type == PW_WORK && !k->kind->power; row++)
+      r->ledger[i] -= x->lambda[row] * eta[row];
+    for (int n = 0; n < x->n && s->entry[i].type == PW_LOSS; n++) {
+      const int e = x->list[n];
+      if (x->row[e] >= first && x->row[e] < first + k->kind->rows)
+        r->ledger[i] += 0.5 * x->x[n] * (x->u_before[e] + x->u[e]);
+    }
+  }
+}
+
+/* 1 if a holonomic equation does not hold because g has left 0. */
+static int events_open (const pw_run *r, int i, double g) {
+  const pw_events *x = r->events;
+  return events_holonomic (r, i) && !x->triggered[i] && x->mode[i] * g > EVENTS_SMALL * x->unit[i];
+}
+
+/* Impacts: equations that do not hold, and whose u would leave its side.  *any: 1 if there are. */
+static int decide_impacts (pw_run *r, const double *g, int *any, pw_error *error) {
+  pw_events *x = r->events;
+  *any = x->n = 0;
+  events_u (r, r->v, 0, x->u_before);
+  for (int i = 0; i < x->count; i++) {
+    const double u = x->u_before[i] / x->unit[i];
+    const int one_sided = isinf (x->limit[i].least) || isinf (x->limit[i].most);
+    const int hits = x->mode[i] && x->mode[i] * u < -EVENTS_SMALL;
+    x->impulse[i] = 0, x->rests[i] = 0;
+    if (!one_sided || events_open (r, i, g[i]) || (x->mode[i] && x->mode[i] * u > EVENTS_SMALL)) continue;
+    *any |= hits;
+    x->trial[x->n] = events_off (x, i, 0);
+    x->lo[x->n] = isinf (x->limit[i].least) ? -INFINITY : 0, x->hi[x->n] = isinf (x->limit[i].most) ? INFINITY : 0;
+    x->list[x->n++] = i;
+  }
+  if (!*any) return PW_OK;
+  pw_saddle *saddle = decision_open (r, 1, error);
+  for (int k = 0; saddle && k < x->n; k++) {
+    const int i = x->list[k], slow = x->fell || fabs (x->u_before[i]) < EVENTS_SLOW * x->unit[i];
+    x->b[k] *= 1 + (x->mode[i] && !slow ? x->limit[i].restitution : 0);
+  }
+  if (saddle == NULL || decision_pivot (x) != PW_OK) {
+    const int status = decision_fail (r, saddle, error);
+    pw_saddle_close (saddle);
+    return status;
+  }
+  const int status = decision_push (r, saddle);
+  pw_saddle_close (saddle);
+  if (status != PW_OK) return pw_fail_signal (r->t, error);
+  memcpy (x->gamma, x->lambda, (size_t)r->s->rows * sizeof *x->gamma);
+  events_u (r, r->v, 0, x->u);
+  memcpy (x->lambda, x->gamma, (size_t)r->s->rows * sizeof *x->gamma);
+  impact_ledger (r);
+  for (int k = 0; k < x->n; k++) {
+    x->impulse[x->list[k]] = -x->x[k];
+    x->rests[x->list[k]] = fabs (x->u[x->list[k]]) <= EVENTS_SMALL * x->unit[x->list[k]];
+  }
+  return PW_OK;
+}
+
+/* Lists D: equations that hold, and those whose u is 0.  jumps: 1 if velocities have jumped, or are initial ones. */
+static void decide_list (pw_run *r, const double *g, int jumps) {
+  pw_events *x = r->events;
+  x->n = 0;
+  events_u (r, r->v, 0, x->u);
+  for (int i = 0; i < x->count; i++) {
+    const double u = x->u[i] / x->unit[i];
+    const int open = !x->rests[i] && events_open (r, i, g[i]);
+    if (jumps && fabs (u) > EVENTS_SMALL && !open) x->mode[i] = events_off (x, i, u);
+    const int rolls = x->mode[i] && !events_holonomic (r, i) && x->triggered[i] && !jumps;
+    if (open || (x->mode[i] && !rolls && fabs (u) > EVENTS_SMALL)) continue;
+    const double tighter = x->mode[i] == 0 && x->triggered[i] ? EVENTS_TIGHTER * x->force_unit[i] : 0;
+    x->lo[x->n] = x->limit[i].least + tighter, x->hi[x->n] = x->limit[i].most - tighter;
+    x->trial[x->n] = x->mode[i];
+    x->list[x->n++] = i;
+  }
+  events_apply (r); /* forces of those outside D */
+}
+
+/* Decides the modes of D.  Their u becomes 0 exactly. */
+static int decide_modes (pw_run *r, pw_error *error) {
+  pw_events *x = r->events;
+  pw_saddle *saddle = x->n > 0 ? decision_open (r, 0, error) : NULL;
+  int status = PW_OK, again = saddle != NULL;
+  while (again && status == PW_OK) { /* one that slides may have a smaller multiplier than one that holds */
+    status = decision_pivot (x);
+    again = 0;
+    for (int k = 0; k < x->n && status == PW_OK; k++) {
+      const double *sliding = x->limit[x->list[k]].sliding;
+      if (x->trial[k] > 0 && x->hi[k] > sliding[1]) x->hi[k] = sliding[1], again = 1;
+      if (x->trial[k] < 0 && x->lo[k] < sliding[0]) x->lo[k] = sliding[0], again = 1;
+    }
+  }
+  if (x->n > 0 && (saddle == NULL || status != PW_OK)) status = decision_fail (r, saddle, error);
+  for (int k = 0; k < x->n && status == PW_OK; k++) {
+    x->mode[x->list[k]] = x->trial[k];
+    x->trial[k] = 0, x->b[k] = x->u[x->list[k]];
+  }
+  if (x->n > 0 && status == PW_OK)
+    status =
+        decision_solve (x, 1) == PW_OK && decision_push (r, saddle) == PW_OK ? PW_OK : pw_fail_signal (r->t, error);
+  pw_saddle_close (saddle);
+  return status;
+}
+
+static int events_log (pw_run *r) {
+  pw_events *x = r->events;
+  for (int i = 0; i < x->count; i++) {
+    if (x->mode[i] == x->before[i] && x->impulse[i] == 0) continue;
+    if (pw_grow (&r->event, (size_t)r->event_count, &r->event_room, sizeof *r->event) != PW_OK) return PW_RESOURCE;
+    r->event[r->event_count++] =
+        (pw_event){ r->t, x->impulse[i], x->row[i], x->before[i], x->mode[i], x->impulse[i] != 0 };
+  }
+  return PW_OK;
+}
+
+/* Decides the modes at the state reached.  jumps: 1 for initial velocities.  *changes: 1 if anything changes. */
+static int events_decide (pw_run *r, int jumps, int *changes, pw_error *error) {
+  pw_events *x = r->events;
+  int impacts;
+  if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
+  memcpy (x->before, x->mode, (size_t)x->count);
+  events_u (r, r->v, 1, x->now);
+  int status = decide_impacts (r, x->now, &impacts, error);
+  if (status != PW_OK) return status;
+  decide_list (r, x->now, jumps || impacts);
+  status = decide_modes (r, error);
+  if (status != PW_OK) return status;
+  *changes = impacts || memcmp (x->before, x->mode, (size_t)x->count) != 0;
+  x->pending = x->fell = 0;
+  memset (x->triggered, 0, (size_t)x->count);
+  events_apply (r);
+  return events_log (r) == PW_OK ? PW_OK : pw_fail_memory (r->s, error);
+}
+
+/* Projects the state reached onto the equations that hold so far: not all samples satisfy them exactly. */
+static int events_project (pw_run *r, pw_error *error) {
+  pw_projector p;
+  int status = pw_projector_open (&p, r, NULL, NULL, error);
+  if (status != PW_OK) return status;
+  const double before = pw_energy (r, r->v);
+  status = pw_project_positions (&p, r, r->t, r->q, r->v);
+  if (status == PW_OK) status = pw_project_velocities (&p, r, r->v);
+  pw_projector_close (&p);
+  if (status != PW_OK) return pw_fail_singular (r, r->t, error);
+  if (r->settings.ledger) r->projected += pw_energy (r, r->v) - before;
+  return PW_OK;
+}
+
+/* ---- In a run ---- */
+
+/* After a decision.  g of an equation that holds from now on becomes 0; u of one that does not is 0 or leaves it, but g
+ * may have drifted. */
+static int events_leave (pw_run *r, pw_error *error) {
+  pw_events *x = r->events;
+  int closes = 0, status = PW_OK;
+  for (int i = 0; i < x->count; i++) closes |= events_holonomic (r, i) && x->mode[i] == 0 && x->before[i] != 0;
+  if (closes) status = events_project (r, error);
+  if (status == PW_OK && closes) status = pw_run_evaluate (r, error);
+  if (status == PW_OK && closes) status = r->method->restart (r, error);
+  if (status != PW_OK) return status;
+  if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
+  events_u (r, r->v, 1, x->u);
+  for (int i = 0; i < x->count; i++) x->offset[i] = fmax (0, -x->mode[i] * x->u[i] / x->unit[i]);
+  return PW_OK;
+}
+
+static int events_prepare (pw_run *r, pw_error *error) {
+  pw_events *x = r->events;
+  int status = PW_OK, changes = 0;
+  if (r->jumped) x->start_t = NAN;
+  r->jumped = 0;
+  for (int pass = 0; status == PW_OK && (x->pending || x->start_t != r->t); pass++) {
+    if (pass == EVENTS_PASSES)
+      return pw_fail (error, PW_METHOD, "t = %.6g s: modes change endlessly: %s", r->t,
+                      PW_NAME (pw_system_row_name, r->s, x->row[0]));
+    if (x->pending) {
+      x->previous_t = NAN;
+      memset (x->armed, 0, (size_t)x->count);
+      status = events_project (r, error);
+      if (status == PW_OK) status = events_decide (r, 0, &changes, error);
+      r->watchdog.largest_sine = 0;
+      if (status == PW_OK) status = pw_run_renew (r, error);
+      if (status == PW_OK) pw_run_set_reference_level (r);
+      if (status == PW_OK) status = events_leave (r, error);
+    }
+    if (status == PW_OK) status = events_at (r, r->t, x->start, error);
+    x->start_t = r->t;
+    events_arm (r, x->start);
+    x->pending = status == PW_OK && events_trigger (r, x->start);
+  }
+  return status == PW_OK && pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK ? pw_fail_signal (r->t, error) : status;
+}
+
+/* 1 if no function comes near its root between t0 and the state reached, by its values there and one step earlier. */
+static int events_far (const pw_run *r, double t0) {
+  const pw_events *x = r->events;
+  const double h = r->t - t0, before = t0 - x->previous_t;
+  for (int i = 0; i < 2 * x->count; i++) {
+    const double slope = (x->end[i] - x->start[i]) / h, earlier = (x->start[i] - x->previous[i]) / before;
+    const double bend = fabs (slope - earlier) / (h + before) * h * h;
+    if (!(fmax (x->start[i], x->end[i]) + 2 * bend < 0)) return 0;
+  }
+  return 1;
+}
+
+/* The root of functions of u that have not left their root at t0, but do so before `root`, where they return to it. */
+static int events_refine (pw_run *r, pw_crossing_search *search, double t0, double *root) {
+  static const double part[] = { 0.5, 0.75, 0.25, 0.875, 0.125, 0.97, 0.03 };
+  pw_events *x = r->events;
+  int unarmed = 0;
+  for (int i = 0; i < x->count; i++) unarmed |= x->triggered[i] && x->mode[i] && !x->armed[i];
+  x->fell = unarmed;
+  for (size_t p = 0; p < sizeof part / sizeof *part && x->fell; p++) {
+    const double t = t0 + part[p] * (*root - t0);
+    const int status = events_at (r, t, x->now, search->error);
+    if (status != PW_OK) return status;
+    events_arm (r, x->now);
+    for (int i = 0; i < x->count; i++)
+      if (x->triggered[i] && x->mode[i] && x->armed[i]) x->fell = 0;
+    if (x->fell) continue;
+    memcpy (x->start, x->now, 2 * (size_t)x->count * sizeof *x->start);
+    int status_of_root = events_at (r, *root, x->now, search->error);
+    const double first = status_of_root == PW_OK ? pw_first_crossing (search, t, x->start, *root, x->now) : NAN;
+    if (!isnan (first)) *root = first;
+    return search->status;
+  }
+  return PW_OK;
+}
+
+/* Makes the sample at t the state reached. */
+static int events_stop_at (pw_run *r, double t, pw_error *error) {
+  pw_events *x = r->events;
+  int status = events_at (r, t, x->now, error);
+  if (status != PW_OK) return status;
+  events_trigger (r, x->now);
+  x->pending = 1, x->start_t = NAN;
+  if (t == r->t) return PW_OK;
+  memcpy (r->q, r->q_at, pw_state_length (r->s) * sizeof *r->q);
+  memcpy (r->ledger, r->ledger_at, (size_t)r->entries * sizeof *r->ledger);
+  r->projected = r->projected_at;
+  r->t = t;
+  pw_ledger_rates (r, r->lambda, r->rate);
+  return PW_OK;
+}
+
+static int events_follow (pw_run *r, double t0, pw_error *error) {
+  pw_events *x = r->events;
+  const size_t bytes = 2 * (size_t)x->count * sizeof *x->start;
+  pw_crossing_search search = { .count = 2 * x->count,
+                                .at = events_at,
+                                .context = r,
+                                .memory = x->memory,
+                                .width = 4 * DBL_EPSILON * fmax (fabs (r->t), r->w->scale.time),
+                                .error = error };
+  x->at_end = r->t < r->breakpoint && events_knows_multipliers (r), x->samples = 0;
+  int status = events_at (r, r->t, x->end, error);
+  x->at_end = 0;
+  double root = NAN;
+  if (status == PW_OK && (events_trigger (r, x->end) || !events_far (r, t0)))
+    root = pw_first_crossing (&search, t0, x->start, r->t, x->end);
+  if (status == PW_OK) status = search.status;
+  if (status == PW_OK && !isnan (root)) {
+    status = events_at (r, root, x->now, error);
+    if (status == PW_OK && events_trigger (r, x->now)) status = events_refine (r, &search, t0, &root);
+    if (status == PW_OK) status = events_stop_at (r, root, error);
+  } else {
+    events_arm (r, x->end);
+    memcpy (x->previous, x->start, bytes);
+    memcpy (x->start, x->end, bytes);
+    x->previous_t = t0, x->start_t = r->t;
+  }
+  if (x->samples == 0) return status;
+  pw_forget_residuals (r);
+  if (status == PW_OK && pw_evaluate_J_at (r->w, pw_before_breakpoint (r, r->t), r->q, r->v) != PW_OK)
+    return pw_fail_signal (r->t, error);
+  return status;
+}
+
+int pw_events_advance (pw_run *r, double t_end, pw_error *error) {
+  int status = events_prepare (r, error);
+  const double t0 = r->t;
+  if (status == PW_OK) status = r->method->advance (r, t_end, error);
+  return status == PW_OK ? events_follow (r, t0, error) : status;
+}
+
+/* ---- Opening ---- */
+
+/* Units of multipliers and of u; needs the scales. */
+static void events_units (pw_run *r) {
+  pw_events *x = r->events;
+  const double T = r->w->scale.time, L = r->s->scale.length;
+  double force = 0;
+  for (int j = 0; j < r->s->mechanical; j++)
+    force = fmax (force, r->s->mass[j] * pw_unit (r->s, j) * pw_unit (r->s, j) / (L * T * T));
+  for (int i = 0; i < x->count; i++) {
+    const double arm = pw_rank_multiplier_unit (r->w, x->row[i]), least = x->limit[i].least, most = x->limit[i].most;
+    const double largest = fmax (isinf (least) ? 0 : -least, isinf (most) ? 0 : most);
+    x->force_unit[i] = largest > 0 ? largest : force > 0 ? force * arm : 1;
+    x->unit[i] = L / arm / (events_holonomic (r, i) ? 1 : T);
+  }
+}
+
+/* Modes for the search of consistent positions and velocities: equations that may be free on one side are, unless that
+ * side is left. */
+static void events_initial (pw_run *r) {
+  pw_events *x = r->events;
+  events_units (r);
+  events_u (r, r->v, 1, x->u);
+  for (int i = 0; i < x->count; i++) {
+    const int one_sided = isinf (x->limit[i].least) || isinf (x->limit[i].most);
+    const signed char off = events_off (x, i, 0);
+    x->mode[i] = one_sided && (!events_holonomic (r, i) || off * x->u[i] >= -EVENTS_SMALL * x->unit[i]) ? off : 0;
+  }
+  events_apply (r);
+}
+
+/* 1 if a velocity that the model specifies or the user gives was not kept. */
+static int events_moved (const pw_run *r) {
+  for (int state = r->s->coords; state < 2 * r->s->coords; state++)
+    if (pw_initial_specified (&r->initial, state) && pw_initial_moved (r->s, &r->initial, state)) return 1;
+  return 0;
+}
+
+/* Makes the described state (in r->q_at, r->v_at) consistent with the present modes. */
+static int events_consistent (pw_run *r, pw_error *error) {
+  events_apply (r);
+  memcpy (r->q, r->q_at, 2 * ((size_t)r->s->coords + 3) * sizeof *r->q);
+  return pw_run_make_consistent (r, r->origin, error);
+}
+
+/* Velocities of which some are not kept if all equations with two limits hold: as many hold as keep them. */
+static int events_initial_sliding (pw_run *r, pw_error *error) {
+  pw_events *x = r->events;
+  for (int i = 0; i < x->count; i++)
+    if (x->mode[i] == 0 && !events_holonomic (r, i)) x->mode[i] = 1;
+  int status = events_consistent (r, error);
+  if (status != PW_OK) return status;
+  if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
+  events_u (r, r->v, 0, x->u_before);
+  for (int i = 0; i < x->count; i++) {
+    pw_error own = { 0 };
+    if (isinf (x->limit[i].least) || isinf (x->limit[i].most)) continue;
+    x->mode[i] = 0;
+    status = fabs (x->u_before[i]) > 1e-9 * x->unit[i] ? events_consistent (r, &own) : PW_OK;
+    if (status == PW_STOPPED || status == PW_RESOURCE) return pw_fail (error, status, "%s", own.text);
+    if (status != PW_OK || events_moved (r)) x->mode[i] = events_off (x, i, x->u_before[i]);
+  }
+  return events_consistent (r, error);
+}
+
+int pw_events_open (pw_run *r, pw_error *error) {
+  const pw_system *s = r->s;
+  pw_error own = { 0 };
+  r->forces = s->forces > 0;
+  if (s->limit == NULL) return pw_run_make_consistent (r, r->origin, error);
+  if (events_allocate (r) != PW_OK) return pw_fail_memory (s, error);
+  pw_events *x = r->events;
+  for (int i = 0; i < s->rows; i++)
+    if (pw_is_limited (s, i) && (s->limit[i].least < 0 || s->limit[i].most > 0))
+      x->row[x->count] = i, x->limit[x->count++] = s->limit[i];
+  x->start_t = x->previous_t = NAN;
+  if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
+  events_initial (r);
+  memcpy (r->q_at, r->q, 2 * ((size_t)s->coords + 3) * sizeof *r->q);
+  const int status = events_consistent (r, &own);
+  if (status == PW_OK && !events_moved (r)) return PW_OK;
+  if (status == PW_STOPPED || status == PW_RESOURCE) return pw_fail (error, status, "%s", own.text);
+  return events_initial_sliding (r, error);
+}
+
+int pw_events_begin (pw_run *r, pw_error *error) {
+  int changes;
+  if (r->events == NULL) return PW_OK;
+  events_units (r);
+  int status = events_decide (r, 1, &changes, error);
+  if (status == PW_OK) status = pw_run_open_saddle (r, error);
+  if (status == PW_OK) status = pw_run_evaluate (r, error);
+  if (status == PW_OK) pw_run_set_references (r);
+  return status;
+}
+
+void pw_events_serialise (pw_run *r, pw_archive *a) {
+  pw_events *x = r->events;
+  if (x == NULL) return;
+  pw_archive_bytes (a, x->mode, (size_t)x->count);
+  pw_archive_bytes (a, x->triggered, (size_t)x->count);
+  pw_archive_bytes (a, &x->pending, sizeof x->pending);
+  pw_archive_bytes (a, &x->fell, sizeof x->fell);
+  pw_archive_count (a, &r->event_count);
+  for (long i = 0; i < r->event_count && !a->failed; i++) {
+    a->failed |= a->loading && pw_grow (&r->event, (size_t)i, &r->event_room, sizeof *r->event) != PW_OK;
+    pw_archive_bytes (a, r->event + i, sizeof *r->event);
+  }
+  for (int i = 0; i < x->count; i++) {
+    const signed char mode = x->mode[i];
+    const double given = mode ? events_given (x, i) : 0;
+    a->failed |= mode < -1 || mode > 1 || !isfinite (given);
+  }
+  if (a->failed) r->event_count = 0;
+  memset (x->armed, 0, (size_t)x->count);
+  x->start_t = x->previous_t = NAN;
+  if (!a->failed) events_apply (r);
+}

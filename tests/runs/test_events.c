@@ -1,0 +1,374 @@
+/* Events of equations whose multipliers have limits: wheels that slide, friction that sticks, stops, ropes,
+ * freewheels. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "check.h"
+#include "pinwheel-files.h"
+#include "runs.h"
+#include "scene.h"
+
+enum { EVENTS_MOST = 64, EVENTS_STATES = 10 };
+
+/* A problem of tests/runs/events.txt. */
+typedef struct {
+  char scene[40], sets[80];
+  double t_end, time[EVENTS_MOST], value[EVENTS_STATES], loss; /* loss: NaN if not given */
+  int events, states;
+  char state[EVENTS_STATES][30];
+} events_problem;
+
+static events_problem events_problems[24];
+static int events_count;
+
+static int events_read (void) {
+  char line[200];
+  FILE *f = fopen ("tests/runs/events.txt", "r");
+  assert_non_null (f);
+  while (fgets (line, sizeof line, f)) {
+    events_problem *p = &events_problems[events_count > 0 ? events_count - 1 : 0];
+    if (line[0] == '#') continue;
+    if (strncmp (line, "problem", 7) == 0) {
+      p = &events_problems[events_count++];
+      p->loss = NAN;
+      assert_true (sscanf (line, "problem %39s %lf %79[^\n]", p->scene, &p->t_end, p->sets) >= 2);
+    } else if (strncmp (line, "state", 5) == 0) {
+      assert_int_equal (sscanf (line, "state %29s %lf", p->state[p->states], &p->value[p->states]), 2);
+      p->states++;
+    } else if (sscanf (line, "event %lf", &p->time[p->events]) == 1)
+      p->events++;
+    else
+      assert_int_equal (sscanf (line, "loss %lf", &p->loss), 1);
+  }
+  fclose (f);
+  assert_int_equal (events_count, 21);
+  return 0;
+}
+
+/* A scene of tests/models with parameters "NAME=VALUE NAME=VALUE". */
+static pw_system *events_system (const char *scene, const char *sets) {
+  pw_error error = { 0 };
+  char path[100], name[20];
+  double value;
+  int used;
+  snprintf (path, sizeof path, "tests/models/events-%s.yaml", scene);
+  pw_file *f = pw_file_open (path, &error);
+  pw_model *m = f ? pw_file_model (f, &error) : NULL;
+  check_ok (error.status, &error);
+  for (; sscanf (sets, " %19[^=]=%lf%n", name, &value, &used) == 2; sets += used)
+    check_ok (pw_model_set (m, name, value, &error), &error);
+  check_ok (pw_model_build (m, &error), &error);
+  pw_system *s = pw_system_compile (m, &error);
+  check_ok (error.status, &error);
+  pw_model_free (m);
+  pw_file_close (f);
+  return s;
+}
+
+/* Impacts of the balls accumulate; only the first ones are compared. */
+static int events_compared (const events_problem *p, const pw_event *event, int count) {
+  while (strcmp (p->scene, "ball") == 0 && count > 0 && event[count - 1].t > p->time[p->events - 1] + 1e-3) count--;
+  return count;
+}
+
+/* Runs a problem; returns the largest error of the times of its events, and checks the rest. */
+static double events_run (const events_problem *p, const char *method, const pw_settings *settings, double bound,
+                          const char *reason) {
+  pw_system *s = events_system (p->scene, p->sets);
+  pw_settings set = *settings;
+  set.span = p->t_end, set.ledger = 1;
+  pw_run *r = runs_open (s, method, &set);
+  pw_sample x = runs_to (r, p->t_end);
+  int count;
+  double most = 0;
+  const pw_event *event = pw_run_events (r, &count);
+  count = events_compared (p, event, count);
+  char what[150];
+  snprintf (what, sizeof what, "%s, %s %s", method, p->scene, p->sets);
+  if (count != p->events) print_error ("%s: %d events\n", what, count);
+  assert_int_equal (count, p->events);
+  for (int i = 0; i < count; i++) {
+    check_close (check_text ("%s, event %d", what, i), event[i].t, p->time[i], bound, reason);
+    most = fmax (most, fabs (event[i].t - p->time[i]));
+  }
+  for (int i = 0; i < p->states; i++) {
+    pw_column c;
+    double value;
+    pw_error error = { 0 };
+    pw_workspace *w = pw_workspace_new (s, &error);
+    check_ok (pw_system_find_column (s, p->state[i], &c, &error), &error);
+    check_ok (pw_workspace_columns (w, &x, &c, 1, &value, &error), &error);
+    check_close (check_text ("%s, %s", what, p->state[i]), value, p->value[i], 50 * bound, "velocities between events");
+    pw_workspace_free (w);
+  }
+  if (!isnan (p->loss)) check_close (check_text ("%s, loss", what), x.loss, p->loss, 50 * bound, "as states");
+  check_close (check_text ("%s, balance", what), x.balance, 0, 200 * bound,
+               "losses by sliding and impacts are counted");
+  runs_close (r, s);
+  return most;
+}
+
+static void events_all (const char *method, double step, double rtol, double bound, const char *reason) {
+  for (int i = 0; i < events_count; i++) {
+    /* the block only touches the speed of the belt, repeatedly: round-off decides whether it sticks for a moment */
+    if (strncmp (method, "radau", 5) == 0 && strcmp (events_problems[i].sets, "vb=0.5 Fs=1 Fk=1") == 0) continue;
+    events_run (&events_problems[i], method, &(pw_settings){ .step = step, .rtol = rtol }, bound, reason);
+  }
+}
+
+TEST (fixed_steps) {
+  events_all ("rk4+projection", 1e-3, 0, 1e-9, "(h k)^4 at h = 1e-3 and k up to 6/s");
+  events_all ("radau+ggl:steps=fixed", 1e-3, 0, 1e-9, "h^5");
+}
+
+TEST (to_round_off) {
+  events_all ("erk8+projection", 0, 1e-12, 5e-12, "5 rtol");
+}
+
+/* The first of each scene. */
+TEST (all_methods) {
+  char method[40];
+  for (int i = 0; runs_method (i, method); i++) {
+    const pw_method *m = runs_method (i, method);
+    const int fixed = !pw_method_adaptive (m, method), second = m->order == 2;
+    const double bound = second ? 1e-4 : fixed ? 5e-8 : m->order > 0 ? 1e-7 : 2e-6;
+    for (int k = 0; k < events_count; k++) {
+      const events_problem *p = &events_problems[k];
+      if (k > 0 && strcmp (p->scene, p[-1].scene) == 0) continue;
+      events_run (p, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-10 }, bound,
+                  second ? "(h k)^2, more where it drifts" : "errors of the method, 1e4 rtol of multistep ones");
+    }
+  }
+}
+
+/* Errors of the times at three step sizes have the order of the method. */
+TEST (orders) {
+  static const struct {
+    const char *method;
+    double step;
+    int order;
+  } of[] = { { "rk4+projection", 0.02, 4 }, { "rk4+nullspace", 0.02, 4 }, { "radau+ggl:steps=fixed", 0.1, 5 },
+             { "galpha+ggl", 4e-3, 2 },     { "galpha+index3", 4e-3, 2 }, { "leapfrog+rattle", 4e-3, 2 } };
+  for (size_t i = 0; i < sizeof of / sizeof *of; i++)
+    for (int k = 0; k < events_count; k++) {
+      const events_problem *p = &events_problems[k];
+      if (strcmp (p->sets, "gA=0.03") != 0) continue;
+      double error[2];
+      for (int n = 0; n < 2; n++)
+        error[n] = events_run (p, of[i].method, &(pw_settings){ .step = of[i].step / (n ? 4 : 1) }, 1e-4, "no bound");
+      check_close (check_text ("order of %s", of[i].method), log (error[0] / error[1]) / log (4), of[i].order, 0.5,
+                   "at these steps");
+    }
+}
+
+/* ---- Events are neither missed nor invented ---- */
+
+static double events_random (unsigned *state) {
+  *state = *state * 1664525u + 1013904223u;
+  return (double)(*state >> 8) / (1 << 24);
+}
+
+/* A vehicle of two segments with random masses, places, grips of both wheels, friction in the hinge, and stops
+ * without restitution: how many bounces accumulate, each with new events of the wheels, depends on the tolerance. */
+SCENE (events_vehicle) {
+  static unsigned seed = 1;
+  unsigned *x = &seed;
+  const double d = 0.1 + 0.3 * events_random (x);
+  pw_add_body (m,
+               &(pw_body){ .name = "a", .mass = 0.5 + events_random (x), .inertia = 0.05 + 0.2 * events_random (x) });
+  pw_add_body (m, &(pw_body){ .name = "b",
+                              .mass = 0.1 + 0.4 * events_random (x),
+                              .inertia = 0.01 + 0.05 * events_random (x),
+                              .start = { 0.5 + d, 0, 0 } });
+  pw_add_pin (m, &(pw_pin){ .name = "B", .body = { "a", "b" }, .at = { { 0.5 }, { -d } } });
+  pw_add_wheel (m, &(pw_wheel){ .name = "A", .body = "a", .at = { -0.5 }, .grip = 0.02 + 0.2 * events_random (x) });
+  pw_add_wheel (m,
+                &(pw_wheel){ .name = "C", .body = "b", .at = { 0.2, 0.02 }, .grip = 0.05 + 0.4 * events_random (x) });
+  pw_add_friction (m, &(pw_friction){ .name = "F",
+                                      .body = { "a", "b" },
+                                      .limit = 0.01 + 0.05 * events_random (x),
+                                      .limit_sliding = events_random (x) < 0.5 ? 0 : 0.005 });
+  pw_add_end_stop (m, &(pw_end_stop){ .name = "S",
+                                      .body = { "a", "b" },
+                                      .what = PW_DRIVE_ANGLE,
+                                      .low = -0.2 - events_random (x),
+                                      .high = 0.2 + events_random (x) });
+  pw_add_torque (m, &(pw_torque){ .name = "T",
+                                  .body = { "a", "b" },
+                                  .value = { PW_HARMONIC, .harmonic = { .amplitude = 0.1 + 0.2 * events_random (x),
+                                                                        .omega = 1 + 4 * events_random (x),
+                                                                        .phase = 6 * events_random (x) } } });
+}
+
+static int events_of (pw_system *s, const char *method, double step, double t, double *time, int *row) {
+  pw_run *r = runs_open (s, method, &(pw_settings){ .step = step, .rtol = 1e-11, .span = t });
+  (void)runs_to (r, t);
+  int count;
+  const pw_event *event = pw_run_events (r, &count);
+  for (int i = 0; i < count && i < 400; i++) time[i] = event[i].t, row[i] = 8 * event[i].row + event[i].to;
+  pw_run_close (r);
+  return count;
+}
+
+TEST (none_missed) {
+  static double time[3][400];
+  static int row[3][400];
+  int total = 0;
+  for (int i = 0; i < 40; i++) {
+    pw_system *s = scene_system (&events_vehicle_table, NULL);
+    int fine = events_of (s, "rk4+projection", 1e-4, 3, time[0], row[0]);
+    int coarse = events_of (s, "rk4+projection", 1e-2, 3, time[1], row[1]);
+    int adaptive = events_of (s, "erk8+projection", 0, 3, time[2], row[2]);
+    if (fine != coarse || fine != adaptive)
+      print_error ("scene %d: %d events with a hundredth of the step, %d, %d\n", i, fine, coarse, adaptive);
+    assert_int_equal (fine, coarse);
+    assert_int_equal (fine, adaptive);
+    for (int k = 0; k < fine; k++) {
+      assert_int_equal (row[0][k], row[1][k]);
+      check_close (check_text ("scene %d, event %d", i, k), time[1][k], time[0][k], 1e-4, "errors of coarse steps");
+    }
+    total += fine;
+    pw_system_free (s);
+  }
+  assert_true (total > 300);
+}
+
+/* ---- Checkpoints ---- */
+
+/* Loaded runs continue like saved ones, bit for bit, whatever the modes at that time. */
+TEST (checkpoints) {
+  static const char *const method[] = { "rk4+projection", "erk8+projection", "ida+ggl", "radau+ggl", "galpha+ggl" };
+  for (size_t i = 0; i < sizeof method / sizeof *method; i++)
+    for (double t = 0.2; t < 1.5; t += 0.31) {
+      pw_error error = { 0 };
+      pw_system *s = events_system ("ride-on", "gA=0.008 gC=0.2");
+      const pw_settings set = { .step = 1e-3, .rtol = 1e-8, .span = 2 };
+      pw_run *saved = runs_open (s, method[i], &set), *loaded = runs_open (s, method[i], &set);
+      (void)runs_to (saved, t);
+      pw_archive archive = { .at = NULL };
+      check_ok (pw_run_save (saved, &archive, &error), &error);
+      pw_archive from = { .at = archive.at, .size = archive.used, .loading = 1 };
+      check_ok (pw_run_load (loaded, &from, &error), &error);
+      pw_sample a = runs_to (saved, 2), b = runs_to (loaded, 2);
+      check_bits ("q", a.q, b.q, pw_system_coordinates (s));
+      check_bits ("v", a.v, b.v, pw_system_coordinates (s));
+      int events[2];
+      const pw_event *e = pw_run_events (saved, &events[0]), *f = pw_run_events (loaded, &events[1]);
+      assert_int_equal (events[0], events[1]);
+      assert_true (events[0] > 3);
+      for (int k = 0; k < events[0]; k++) assert_true (e[k].t == f[k].t && e[k].to == f[k].to);
+      pw_archive_free (&archive);
+      pw_run_close (loaded);
+      runs_close (saved, s);
+    }
+}
+
+/* ---- Limits that are not reached; samples in a step with an event ---- */
+
+TEST (not_reached) {
+  double q[2][6], v[2][6];
+  for (int i = 0; i < 2; i++) {
+    pw_system *s = events_system ("ride-on", i ? "gA=1e6 gC=1e6" : "");
+    runs_state (s, "rk4+projection", &(pw_settings){ .step = 1e-3 }, 5, q[i], v[i], NULL);
+    pw_system_free (s);
+  }
+  check_bits ("q", q[0], q[1], 6);
+  check_bits ("v", v[0], v[1], 6);
+}
+
+/* Samples on both sides of a bounce: those of the fall, then those of the rise. */
+TEST (samples) {
+  static const char *const method[] = { "rk4+projection", "ida+ggl", "bdf+projection", "radau", "galpha", "leapfrog" };
+  const double t1 = sqrt (2 / 9.81);
+  for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
+    pw_system *s = events_system ("ball", "");
+    pw_run *r = runs_open (s, method[i], &(pw_settings){ .step = 0.01, .rtol = 1e-9, .span = 1 });
+    for (int k = -20; k <= 20; k++) {
+      const double t = t1 + 4e-4 * (k + 0.5), rise = t - t1;
+      pw_sample x = runs_to (r, t);
+      double y = rise < 0 ? 1 - 9.81 / 2 * t * t : rise * (0.8 * 9.81 * t1 - 9.81 / 2 * rise);
+      check_close (check_text ("%s, height at %g", method[i], t), x.q[1], y, 1e-6, "1e3 rtol");
+    }
+    runs_close (r, s);
+  }
+}
+
+/* ---- Refused ---- */
+
+static const char *events_wrong; /* the element of the next scene */
+
+SCENE (events_bad) {
+  const char *const both[2] = { "a", "b" };
+  pw_add_body (m, &(pw_body){ .name = "a", .mass = 1, .inertia = 1, .rate = { 1 } });
+  pw_add_body (m, &(pw_body){ .name = "b", .mass = 1, .inertia = 1, .start = { 1 } });
+  pw_wheel wheel = { .name = "W", .body = "a", .grip = 2, .grip_sliding = strcmp (events_wrong, "grip") == 0 ? 3 : 0 };
+  pw_add_wheel (m, &wheel);
+  if (strcmp (events_wrong, "axle") == 0) {
+    wheel.name = "V", wheel.at[1] = 1;
+    pw_add_wheel (m, &wheel);
+  }
+  pw_friction friction = { .name = "F", .body = { both[0], both[1] }, .limit = 1, .limit_sliding = 2 };
+  if (strcmp (events_wrong, "smooth") == 0) friction.speed = 0.1;
+  if (strcmp (events_wrong, "smooth") == 0 || strcmp (events_wrong, "friction") == 0) pw_add_friction (m, &friction);
+  pw_end_stop stop = { .name = "S", .body = { both[0], both[1] }, .what = PW_DRIVE_ANGLE, .low = 1, .high = 1 };
+  if (strcmp (events_wrong, "side") == 0) stop.sides = PW_STOP_LOW;
+  if (strcmp (events_wrong, "side") == 0 || strcmp (events_wrong, "stop") == 0) pw_add_end_stop (m, &stop);
+}
+
+TEST (bad_elements) {
+  static const struct {
+    const char *wrong, *message;
+  } of[] = {
+    { "grip", "model scene: wheel W: grip_sliding = 3: expected at most the grip, 2" },
+    { "friction", "model scene: friction F: limit_sliding = 2: expected at most the limit, 1" },
+    { "smooth", "model scene: friction F: limit_sliding = 2: expected 0, unless friction is exact: a limit, no speed" },
+    { "stop", "model scene: stop S: low = 1, high = 1: expected low < high, or sides: low or high" },
+    { "side", "model scene: stop S: high = 1 with sides: low: expected no such limit" },
+  };
+  for (size_t i = 0; i < sizeof of / sizeof *of; i++) {
+    events_wrong = of[i].wrong;
+    scene_refused (scene_model (&events_bad_table, NULL), of[i].message);
+  }
+}
+
+/* Which of two wheels on an axle slides first is not determined. */
+TEST (dependent) {
+  pw_error error = { 0 };
+  events_wrong = "axle";
+  pw_system *s = scene_system (&events_bad_table, NULL);
+  assert_null (pw_run_open (s, "rk4+projection", NULL, &error));
+  check_error (&error, PW_INPUT,
+               "model scene: limits of reactions, as by a grip, with constraints that depend on each other: leave out "
+               "redundant ones");
+  pw_system_free (s);
+}
+
+TEST (analyses) {
+  pw_error error = { 0 };
+  pw_linear l;
+  pw_system *s = events_system ("sleigh", "");
+  pw_run *r = runs_open (s, "rk4+projection", NULL);
+  assert_int_equal (pw_run_restart (r, NULL, NULL, &error), PW_INPUT);
+  check_error (&error, PW_INPUT,
+               "model events-sleigh: a run whose reactions have limits, as by a grip, cannot be restarted");
+  error = (pw_error){ 0 };
+  assert_int_equal (pw_run_linearise (r, 100, &l, &error), PW_INPUT); /* it slides from the beginning */
+  check_error (&error, PW_INPUT,
+               "model events-sleigh: no linearisation: a reaction, as of a wheel with a grip, is at its limit");
+  static const char *const message = "model events-sleigh: neither steady nor periodic motions are sought where "
+                                     "reactions have limits, as by a grip";
+  error = (pw_error){ 0 };
+  assert_null (pw_steady_open (s, &(pw_steady_settings){ .vary = -1 }, &error));
+  check_error (&error, PW_INPUT, message);
+  error = (pw_error){ 0 };
+  assert_null (pw_periodic_open (s, &(pw_periodic_settings){ .period = 1 }, &error));
+  check_error (&error, PW_INPUT, message);
+  error = (pw_error){ 0 };
+  char *text = pw_system_source (s, NULL, &error);
+  assert_null (text);
+  check_error (&error, PW_INPUT, "model events-sleigh: specialised code has no limits of reactions, as by a grip");
+  runs_close (r, s);
+}
+
+const check_fixture fixture = { events_read, NULL };
