@@ -316,8 +316,9 @@ static void report_mobility (pw_json *j, const pw_check *check) {
   } count[] = { { "configuration", "degrees of freedom, configuration", linear->positions },
                 { "velocity", "degrees of freedom, velocity", linear->velocities },
                 { "rank", "rank of J", linear->rank } };
+  const int known = check->run && linear->rank + linear->positions > 0; /* all are 0 without a linearisation */
   for (int i = 0; i < 3; i++)
-    report_entry (j, count[i].key, check->run ? (double)count[i].value : NAN, check->run ? count[i].label : NULL, "%d",
+    report_entry (j, count[i].key, known ? (double)count[i].value : NAN, known ? count[i].label : NULL, "%d",
                   count[i].value);
   report_singular_value (j, check);
   pw_json_close (j, '}');
