@@ -187,6 +187,7 @@ static int build_field (pw_reader *r, const pw_node *node, const char *element) 
   char *to = r->definition + f->offset;
   int count = pw_field_count (f);
   r->label = PW_PRINTED (200, "%s %.60s: %s", r->kind->name, element, f->name);
+  if (f->given) *(int *)(void *)(r->definition + f->given) = 1;
   if (count == 1) return build_value (r, node, 0, to);
   const int world = f->type == PW_POINT && node->type == PW_YAML_MAP; /* one point of all bodies */
   if (!world && pw_yaml_list_of (r, node, r->label, count, plural[f->type]) != PW_OK) return r->error->status;

@@ -61,6 +61,8 @@ static const char *fault_field (const pw_kind *kind, const pw_field *f) {
   if ((size_t)f->domain > PW_FRACTION) return "its domain does not exist";
   if (f->offset < sizeof (char *) || bytes > kind->definition || f->offset > kind->definition - bytes)
     return "outside the definition, whose first member is its name and whose sizeof is .definition";
+  if (f->given && (f->type != PW_NUMBER || f->given < sizeof (char *) || f->given > kind->definition - sizeof (int)))
+    return "given: not a number, or outside the definition";
   if (f->type == PW_CHOICE && (f->choices == NULL || f->choices[0] == NULL)) return "a choice without choices";
   return "";
 }

@@ -22,7 +22,7 @@ LAYOUT (pw_body, 80);
 LAYOUT (pw_parameter, 48);
 LAYOUT (pw_run_defaults, 32);
 LAYOUT (pw_plugin_table, 88);
-LAYOUT (pw_field, 56);
+LAYOUT (pw_field, 64);
 LAYOUT (pw_quantity, 32);
 LAYOUT (pw_internal, 32);
 LAYOUT (pw_configuration, 64);
@@ -66,6 +66,7 @@ LAYOUT_AT (pw_field, required, 32);
 LAYOUT_AT (pw_field, domain, 36);
 LAYOUT_AT (pw_field, choices, 40);
 LAYOUT_AT (pw_field, about, 48);
+LAYOUT_AT (pw_field, given, 56);
 LAYOUT_AT (pw_quantity, unit, 8);
 LAYOUT_AT (pw_quantity, rate, 16);
 LAYOUT_AT (pw_quantity, about, 24);
@@ -180,13 +181,13 @@ TEST (definitions) {
     { "slider", 0x72bb16fc630c9167 },        { "slot", 0x3a0f550a70778644 },
     { "rod", 0xa1a350acfa57b8de },           { "gear", 0xf8074be7c4f42d05 },
     { "drive", 0x7d987f91b3a3b54e },         { "wheel", 0xdea3eb50a3ca258c },
-    { "rolling-wheel", 0x144a31a69816bde4 }, { "steered-wheel", 0x2c413b6b8f9c87f0 },
+    { "rolling-wheel", 0xbf6164e6564e8f84 }, { "steered-wheel", 0x2c413b6b8f9c87f0 },
     { "speed", 0xc6449f5523558de9 },         { "pfaffian", 0x4cb2d7f5922ebd32 },
     { "tyre", 0xa42b832e02a24eda },          { "rolling-resistance", 0x267227c53db66752 },
     { "spring", 0x80a9821575f7667f },        { "rotational-spring", 0x3c20ed7f38c90acc },
     { "friction", 0xebebc50a8771ab1e },      { "sliding-friction", 0x4722a2a44a1119a6 },
     { "drag", 0x79bea784c473bb98 },          { "gravity", 0xed353e1dda5787ff },
-    { "force", 0xbc29b0bbfe5b6a71 },         { "on-curve", 0xfe042b77d6a55c2d },
+    { "force", 0xbc29b0bbfe5b6a71 },         { "on-curve", 0xc37960e01b745245 },
     { "torque", 0xc52ae040b1e51021 },        { "motor", 0x4b2d8f0773cca89 },
     { "state", 0x10002b44038fb8b8 },         { "marker", 0xa45ad3f1c6e75b4a },
   };
