@@ -228,7 +228,7 @@ static int build_fields (pw_reader *r, const pw_node *at, const pw_node *node, c
   memcpy (r->definition, &name, sizeof name);
   for (const pw_field *f = kind->fields; f->name && n < PW_MAX_KEYS - 2; f++) key[n++] = f->name;
   key[n] = kind == &pw_kind_state ? "name" : NULL, key[n + 1] = NULL;
-  pw_yaml_keys_from (r, first, key, PW_PRINTED (100, "a %s", kind->name), v);
+  pw_yaml_keys_from (r, first, key, PW_PRINTED (100, "%s %s", *kind->name == 'o' ? "an" : "a", kind->name), v);
   for (int i = 0; i < n && r->error->status == PW_OK; i++) {
     const pw_field *f = r->field = &kind->fields[i];
     if (v[i])

@@ -80,10 +80,10 @@ LIBM (libm_hypot (libm_lanes x, libm_lanes y)) {
                                     type *element, MAYBE_UNUSED pw_internal *internal, MAYBE_UNUSED pw_error *error)
 
 /* pw_internal.specified, of a definition with `start`, `rate` and `specified`. */
-#define INITIAL_SPECIFIED(definition)                            \
-  {                                                              \
-    (definition)->specified[0] != 0 || (definition)->start != 0, \
-    (definition)->specified[1] != 0 || (definition)->rate != 0   \
+#define INITIAL_SPECIFIED(definition)                              \
+  {                                                                \
+    (definition)->specified[0] != 0 || (definition)->start != 0,   \
+        (definition)->specified[1] != 0 || (definition)->rate != 0 \
   }
 
 /* Groups of members of a type's table: TYPE (weld, ...) sets .fields = weld_fields, .prepare = weld_prepare, ... */

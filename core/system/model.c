@@ -269,9 +269,16 @@ static int check_field (const pw_model *m, const pw_element *e, const pw_field *
 }
 
 static int check_element (const pw_model *m, const pw_element *e, const pw_names *names, pw_error *error) {
+  int moves = !e->kind->of_coordinate;
   if (check_name (m, e->kind->name, pw_element_name (e), error) != PW_OK) return PW_INPUT;
-  for (const pw_field *f = e->kind->fields; f->name; f++)
+  for (const pw_field *f = e->kind->fields; f->name; f++) {
     if (check_field (m, e, f, names, error) != PW_OK) return PW_INPUT;
+    const pw_signal *signal = (const void *)((const char *)e->definition + f->offset);
+    moves |= f->type == PW_SIGNAL && signal->type != PW_CONSTANT;
+  }
+  if (!moves)
+    return pw_fail (error, PW_INPUT, "model %s: %s %s: the curve has no direction: no signal depends on %s", m->name,
+                    e->kind->name, pw_element_name (e), e->kind->coordinate->name);
   for (int i = 0; i < e->kind->bodies && !e->kind->each_body; i++) {
     const char *body = *(const char *const *)pw_field_at (e->kind, e->definition, PW_BODY, i);
     for (int n = 0; n < i; n++)

@@ -134,7 +134,8 @@ TEST (circles) {
       pw_system *s = scene_system (&circle_build_table, "radius", R, "unit", k < 4 ? 1 : R, "rate", 3., NULL);
       pw_run *r = runs_open (s, method[k % 4], &(pw_settings){ .step = 0.02, .rtol = 1e-9 });
       pw_sample x = runs_to (r, 300);
-      check_close (method[k % 4], hypot (x.q[0], x.q[1]), R, 1e-9 * R, "the projection, or the null space, which drifts");
+      check_close (method[k % 4], hypot (x.q[0], x.q[1]), R, 1e-9 * R,
+                   "the projection, or the null space, which drifts");
       check_close (method[k % 4], hypot (x.v[0], x.v[1]), 3 * R, 1e-3 * R, "the method's error");
       runs_close (r, s);
     }
