@@ -180,8 +180,7 @@ TEST (follow) {
   check_close ("on the track", hypot (q[0][0], q[0][1]), 5, 1e-2, "settled");
 }
 
-/* By default x and y are read from the columns of these names, if there are both, else from the first two; every row has
- * both numbers. */
+/* By default the columns named x and y are read, if there are both, else the first two; no number may be missing. */
 TEST (columns) {
   static const struct {
     const char *table, *expected;
