@@ -396,7 +396,8 @@ typedef struct {
   const char *name, *body;
   double at[2];       /* the point in the body's frame [m] */
   pw_signal x, y;     /* the curve [m], as signals of s in place of the time; with two derivatives, not both 0 */
-  double start, rate; /* initial s and its velocity; 0: from the body's position and velocity */
+  double start, rate; /* initial s and its velocity; 0 and not specified: from the body's position and velocity */
+  int specified[2];   /* 1: start, rate are specified even if 0 */
 } pw_on_curve;
 
 /* Stop: a coordinate of a point of body 1, or the angle phi1 - phi2, as of a drive, stays within limits.  Two holonomic
@@ -443,7 +444,9 @@ typedef struct {
   double heading;     /* rolling direction in the body's frame [rad] */
   double radius;      /* [m], > 0 */
   double inertia;     /* about its axle [kg m^2], >= 0; its mass belongs to the body */
-  double start, rate; /* initial spin angle [rad] and velocity [rad/s]; rate 0: from rolling at the body's velocity */
+  double start, rate; /* initial spin angle [rad] and velocity [rad/s]; rate 0 and not specified: of rolling at the
+                       * body's velocity */
+  int specified[2];   /* 1: start, rate are specified even if 0 */
   pw_signal torque;   /* on the wheel about its axle [N m]; its reaction on the body has no effect in the plane */
 } pw_rolling_wheel;
 
@@ -626,6 +629,7 @@ typedef struct pw_field {
   pw_domain domain;           /* of a number */
   const char *const *choices; /* NULL-terminated names of a choice's values 0, 1, ... */
   const char *about;          /* meaning */
+  size_t given; /* of an optional number: where an int of the definition is 1 if a text model gives it; 0: nowhere */
 } pw_field;
 
 /* Name and unit of the reaction of a constraint equation, or of an internal coordinate. */

@@ -61,9 +61,10 @@ static void yaml_points (const pw_signal *s, int digits) {
   yaml_pairs (t, s->table.value, count);
 }
 
-/* 1 if an optional field has its default, zero in all bytes. */
-static int yaml_is_default (const pw_field *f, const void *at) {
+/* 1 if an optional field has its default, zero in all bytes, and is not specified nevertheless. */
+static int yaml_is_default (const pw_field *f, const void *structure, const void *at) {
   if (f->required || f->type == PW_BODY) return 0;
+  if (f->given && *(const int *)(const void *)((const char *)structure + f->given)) return 0;
   size_t size = pw_field_bytes (f->type) * (size_t)pw_field_count (f);
   for (size_t i = 0; i < size; i++)
     if (((const char *)at)[i]) return 0;
@@ -113,7 +114,7 @@ static void yaml_field (const pw_field *f, const void *at, int digits) {
 static const char *yaml_fields (const pw_field *f, const void *structure, const char *separator, int digits) {
   for (; f->name; f++) {
     const void *at = (const char *)structure + f->offset;
-    if (yaml_is_default (f, at)) continue;
+    if (yaml_is_default (f, structure, at)) continue;
     printf ("%s%s: ", separator, f->name), separator = ", ";
     yaml_field (f, at, digits);
   }
@@ -273,7 +274,7 @@ static void show_bodies (const pw_system *s) {
 static void show_element (const pw_element *e) {
   printf ("  %s %s: ", e->kind->name, pw_element_name (e));
   for (const pw_field *f = e->kind->fields; f->name; f++) {
-    if (f->type == PW_TEXT && yaml_is_default (f, (const char *)e->definition + f->offset)) continue;
+    if (f->type == PW_TEXT && yaml_is_default (f, e->definition, (const char *)e->definition + f->offset)) continue;
     printf ("%s%s ", f == e->kind->fields ? "" : "; ", f->name);
     yaml_field (f, (const char *)e->definition + f->offset, SHOW_DIGITS);
     if (f->unit) printf (" %s", f->unit);

@@ -209,6 +209,7 @@ static int columns_number (columns *c, columns_source source, pw_gaps gaps, doub
   columns_cell (c->separator, c->cell[source.index], cell, sizeof cell);
   const char *comma = strchr (cell, ',');
   int number = strlen (cell) < sizeof cell - 1 && columns_read (c->separator, cell, value) == PW_OK; /* not cut */
+  if (*cell == 0 && gaps == PW_GAPLESS) return columns_fail (c, "column %d has no number", source.index + 1);
   if (*cell == 0 || (gaps == PW_GAPS_ALLOWED && number && isnan (*value))) return *value = NAN, PW_OK;
   if (!number || !isfinite (*value))
     return columns_fail (c, "column %d: expected a finite number, found \"%.40s\"%s", source.index + 1, cell,
@@ -232,14 +233,27 @@ static int columns_rows (columns *c, char *line, double *value, size_t room, int
                                ? "; with decimal commas, separate cells by semicolons or tabs"
                                : "");
     for (int k = 0; k < c->columns; k++)
-      if (columns_number (c, c->source[k], k ? c->gaps : PW_GAPS_REFUSED, &value[(size_t)k * room + (size_t)n]) !=
-          PW_OK)
+      if (columns_number (c, c->source[k], k || c->gaps == PW_GAPLESS ? c->gaps : PW_GAPS_REFUSED,
+                          &value[(size_t)k * room + (size_t)n]) != PW_OK)
         return PW_INPUT;
     if (c->increases && value[n] <= last)
       return columns_fail (c, "%.9g comes after %.9g: expected increasing times", value[n], last);
     if (!isnan (value[n])) last = value[n];
   }
   return PW_OK;
+}
+
+/* The names x and y for the columns to read, if the file has both. */
+static int columns_xy (columns *c, const char *const **column) {
+  static const char *const xy[] = { "x", "y" };
+  unsigned char *const missing = c->missing;
+  int index[2] = { -1, -1 };
+  c->missing = &(unsigned char){ 0 };
+  int status = columns_find (c, 1, xy[0], &index[0]);
+  if (status == PW_OK) status = columns_find (c, 1, xy[1], &index[1]);
+  c->missing = missing;
+  if (index[0] >= 0 && index[1] >= 0) *column = xy;
+  return status;
 }
 
 /* Which column to read: the one that is given, else the first two, of which the second is not the time. */
@@ -250,6 +264,7 @@ static int columns_select (columns *c, char *line, int named, const char *const 
                          "without names, %d cells of whole numbers: with decimal commas, separate cells by semicolons "
                          "or tabs; otherwise write columns: [1, 2]",
                          c->cells);
+  if (named && c->gaps == PW_GAPLESS && !column[0] && columns_xy (c, &column) != PW_OK) return PW_INPUT;
   unsigned char *missing = c->missing;
   int found = 0;
   for (int k = 0; k < c->columns; k++) {

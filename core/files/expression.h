@@ -45,6 +45,8 @@ void pw_scope_close (pw_scope *s); /* names and numbers stay in the arena */
 /* Adds a name, to which the scope keeps a pointer; there must be room. */
 void pw_scope_add (pw_scope *s, const char *name, double value);
 void pw_scope_add_path (pw_scope *s, const char *name, pw_path *path);
+/* The path whose name precedes the dot, or NULL. */
+pw_path *pw_scope_path (const pw_scope *s, const char *name);
 
 /* One operation of an expression; it replaces its operands, the last ones on a stack, by its value. */
 typedef struct {

@@ -14,11 +14,13 @@ enum { PW_PATH = PATH_MAX + 1 };
 
 /* ---- Tables of numbers (columns.c) ---- */
 
-/* Whether nan in a column other than the time is an error, or a gap like an empty cell. */
-typedef enum { PW_GAPS_REFUSED, PW_GAPS_ALLOWED } pw_gaps;
+/* Whether nan in a column other than the time is an error, or a gap like an empty cell; or empty cells are errors, too,
+ * as in a path, of which the first column is not the time. */
+typedef enum { PW_GAPS_REFUSED, PW_GAPS_ALLOWED, PW_GAPLESS } pw_gaps;
 
 /* As pw_read_columns, from a stream, which stays open; `shown` is its path in messages, "SHOWN:LINE: REASON".  NULL in
- * place of a column: the first one, or the second one, which is not the time. */
+ * place of a column: the first one, or the second one, which is not the time; without gaps: x and y by name, if there
+ * are both. */
 double *pw_columns_from_stream (FILE *f, const char *shown, const char *const *column, const char *const *unit,
                                 int width, pw_gaps gaps, unsigned char *missing, int *rows, pw_error *error);
 

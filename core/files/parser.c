@@ -113,6 +113,13 @@ void pw_scope_add_path (pw_scope *s, const char *name, pw_path *path) {
   pw_scope_add (s, name, NAN);
 }
 
+pw_path *pw_scope_path (const pw_scope *s, const char *name) {
+  const size_t n = strcspn (name, ".");
+  if (s == NULL || name[n] == 0) return NULL;
+  const int found = pw_names_find (&s->index, PW_PRINTED (PW_EXPRESSION_NAME, "%.*s", (int)n, name));
+  return found < 0 ? NULL : s->path[found];
+}
+
 enum { PARSER_MAX_LENGTH = 4000, PARSER_MAX_DEPTH = 200 };
 
 /* What the value of a part depends on; variables other than the time are states. */
@@ -374,16 +381,20 @@ static parser_part parser_path (parser *p, const char *name) {
   const size_t n = strcspn (name, ".");
   const char *owner = PW_PRINTED (PW_EXPRESSION_NAME, "%.*s", (int)n, name);
   char hint[PW_HINT];
-  const int named = s ? pw_names_find (&s->index, owner) : -1;
-  if (named < 0 || s->path[named] == NULL) {
+  pw_path *path = pw_scope_path (s, name);
+  if (pw_expression_find_function (name + n + 1) >= 0)
+    return parser_fail (p, p->at, "functions are written without a module: %s", name + n + 1);
+  if (path == NULL) {
     pw_nearest near = { .sought = owner };
     for (int i = 0; s && i < s->names; i++)
       if (s->path[i]) pw_nearest_try (&near, s->name[i]);
     return parser_fail (p, p->at, "there is no path \"%s\"%s", owner, pw_nearest_text (&near));
   }
-  int function = pw_find_name (pw_path_functions, sizeof *pw_path_functions, name + n + 1, hint);
-  if (function >= 0) return parser_call (p, function, s->path[named]);
-  return parser_fail (p, p->at + n + 1, "a path has no function \"%s\"%s", name + n + 1, hint);
+  const int function = pw_find_name (pw_path_functions, sizeof *pw_path_functions, name + n + 1, hint);
+  if (function < 0) return parser_fail (p, p->at + n + 1, "a path has no function \"%s\"%s", name + n + 1, hint);
+  if (parser_is_call (p)) return parser_call (p, function, path);
+  return parser_fail (p, p->at, "%s is a function: write its arguments in parentheses, such as (%s)", name,
+                      function == PW_PATH_S || function == PW_PATH_OFFSET ? "x, y" : "s");
 }
 
 static parser_part parser_group (parser *p) {
@@ -413,7 +424,7 @@ static parser_part parser_operand (parser *p) {
   if (p->type == '(') return parser_group (p);
   if (p->type != 'n') return parser_missing (p);
   const char *name = PW_PRINTED (PW_EXPRESSION_NAME, "%.*s", (int)p->size, p->text + p->at);
-  if (strchr (name, '.') && parser_is_call (p)) return parser_path (p, name);
+  if (strchr (name, '.') && (parser_is_call (p) || pw_scope_path (p->scope, name))) return parser_path (p, name);
   int index = pw_expression_find_function (name);
   const pw_expression_function *f = index < 0 ? NULL : &pw_expression_functions[index];
   if (f == NULL || f->op == PW_OP_CONSTANT) return parser_name (p, name, f);

@@ -187,6 +187,7 @@ static int build_field (pw_reader *r, const pw_node *node, const char *element) 
   char *to = r->definition + f->offset;
   int count = pw_field_count (f);
   r->label = PW_PRINTED (200, "%s %.60s: %s", r->kind->name, element, f->name);
+  if (f->given) *(int *)(void *)(r->definition + f->given) = 1;
   if (count == 1) return build_value (r, node, 0, to);
   const int world = f->type == PW_POINT && node->type == PW_YAML_MAP; /* one point of all bodies */
   if (!world && pw_yaml_list_of (r, node, r->label, count, plural[f->type]) != PW_OK) return r->error->status;
@@ -229,7 +230,7 @@ static int build_fields (pw_reader *r, const pw_node *at, const pw_node *node, c
   memcpy (r->definition, &name, sizeof name);
   for (const pw_field *f = kind->fields; f->name && n < PW_MAX_KEYS - 2; f++) key[n++] = f->name;
   key[n] = kind == &pw_kind_state ? "name" : NULL, key[n + 1] = NULL;
-  pw_yaml_keys_from (r, first, key, PW_PRINTED (100, "a %s", kind->name), v);
+  pw_yaml_keys_from (r, first, key, PW_PRINTED (100, "%s %s", *kind->name == 'o' ? "an" : "a", kind->name), v);
   for (int i = 0; i < n && r->error->status == PW_OK; i++) {
     const pw_field *f = r->field = &kind->fields[i];
     if (v[i])

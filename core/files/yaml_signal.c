@@ -193,8 +193,10 @@ static int signal_expression (pw_reader *r, const pw_node *written, pw_signal_fu
   for (const char *rest = source, *p; (p = pw_expression_next_name (&rest, name)) != NULL;) {
     const int found = pw_names_find (&r->outputs, name);
     if (strcmp (name, f->name[0]) == 0) continue;
+    if (r->kind->of_coordinate && strcmp (name, "t") == 0)
+      return expression_fail (r, node, (size_t)(p - source), "the parameter of a curve is s, not t");
     const pw_output_function *output = found < 0 ? NULL : r->output[found];
-    if (!output && pw_is_state_name (r, name) &&
+    if (!output && pw_is_state_name (r, name) && !pw_scope_path (r->scope, name) &&
         signal_add_column (r, node, f, NULL, name, (size_t)(p - source)) != PW_OK)
       return r->error->status;
     for (int k = 1; output && k <= output->function.states; k++)
@@ -333,9 +335,9 @@ static int pairs_list (pw_reader *r, const pw_node *list, const char *form, pair
   return PW_OK;
 }
 
-/* Pairs in two columns of a file, NULL: the first and the second one, converted to these units. */
+/* Pairs in two columns of a file, NULL: by default, converted to these units. */
 static int pairs_file (pw_reader *r, const pw_node *node, const char *const column[2], const char *const unit[2],
-                       pairs *p) {
+                       pw_gaps gaps, pairs *p) {
   char path[PW_PATH], from_model[PW_PATH];
   const char *name, *reason;
   pw_error cause = { 0 };
@@ -346,7 +348,7 @@ static int pairs_file (pw_reader *r, const pw_node *node, const char *const colu
   if (f == NULL && pw_open_input_status () == PW_RESOURCE)
     return pw_fail (r->error, PW_RESOURCE, "%s: cannot read %s: %s", r->y->path, name, reason);
   if (f == NULL) return read_fail (r, node->at, "%s: cannot read \"%.60s\": %s", r->label, name, reason);
-  double *x = pw_columns_from_stream (f, name, column, unit, 2, PW_GAPS_REFUSED, NULL, &rows, &cause);
+  double *x = pw_columns_from_stream (f, name, column, unit, 2, gaps, NULL, &rows, &cause);
   fclose (f);
   if (cause.status == PW_INPUT) return read_fail (r, node->at, "%s: %s", r->label, cause.text);
   if (x == NULL || pw_model_keep (r->model, x, free) != PW_OK) return read_no_memory (r);
@@ -406,13 +408,14 @@ static int table_points (pw_reader *r, const pw_node *node, const pw_node *const
   const char *column[2];
   pairs p = { .count = 0 };
   if ((points != NULL) == (file != NULL))
-    return read_fail (r, node->at, "%s: a table has either points or a file", r->label);
+    return read_fail (r, node->at, "%s: %s", r->label,
+                      points ? "a table has either points or a file" : "a table needs points or a file");
   if (points && columns) return read_fail (r, columns->at, "%s: columns belong to a file", r->label);
   if (points && time) return read_fail (r, time->at, "%s: a column of times belongs to a file", r->label);
   if (points)
     pairs_list (r, points, "numbers, [time, value]", &p);
   else if (table_columns (r, columns, time, column) == PW_OK)
-    pairs_file (r, file, column, (const char *const[2]){ "s", table_unit (r) }, &p);
+    pairs_file (r, file, column, (const char *const[2]){ "s", table_unit (r) }, PW_GAPS_REFUSED, &p);
   pw_yaml_number (r, v[4], PW_PRINTED (240, "%s: time_scale", r->label), PW_POSITIVE, &scale);
   pw_yaml_number (r, v[5], PW_PRINTED (240, "%s: time_offset", r->label), PW_REAL, &offset);
   for (int i = 0; i < p.count && r->error->status == PW_OK; i++) p.x[i] = scale * (p.x[i] + offset / scale);
@@ -503,15 +506,15 @@ static int path_points (pw_reader *r, const pw_node *node, const pw_node *points
                         const pw_node *columns, pairs *p) {
   const char *column[2] = { NULL, NULL };
   if ((points != NULL) == (file != NULL))
-    return read_fail (r, node->at, "%s: a path has either points or a file", r->label);
+    return read_fail (r, node->at, "%s: %s", r->label,
+                      points ? "a path has either points or a file" : "a path needs points or a file");
   if (points && columns) return read_fail (r, columns->at, "%s: columns belong to a file", r->label);
   if (points && pairs_list (r, points, "numbers, [x, y]", p) != PW_OK) return r->error->status;
   if (pw_yaml_list_of (r, columns, r->label, 2, "columns, [x, y]") != PW_OK) return r->error->status;
   pw_yaml_text (r, columns ? columns->first : NULL, r->label, &column[0]);
   pw_yaml_text (r, columns ? columns->first->next : NULL, r->label, &column[1]);
-  if (file && r->error->status == PW_OK) pairs_file (r, file, column, (const char *const[2]){ "m", "m" }, p);
-  if (r->error->status == PW_OK && p->skipped > 0)
-    return read_fail (r, file->at, "%s: %d rows have no x or no y; a path has no gaps", r->label, p->skipped);
+  if (file && r->error->status == PW_OK)
+    pairs_file (r, file, column, (const char *const[2]){ "m", "m" }, PW_GAPLESS, p);
   return pairs_count (r, node, p, 8);
 }
 
@@ -636,7 +639,7 @@ static int output_expression (pw_reader *r, int index, int reads) {
     for (int i = 1; status == PW_OK && other >= 0 && i <= r->output[other]->function.states; i++)
       status = output_add_column (r, o, r->output[other]->function.name[i], at);
     if (status == PW_OK && other < 0 && strcmp (name, "t") != 0 &&
-        (pw_is_state_name (r, name) || pw_kind_find_column (NULL, name, &c)))
+        (pw_is_state_name (r, name) || pw_kind_find_column (NULL, name, &c)) && !pw_scope_path (r->scope, name))
       status = output_add_column (r, o, name, at);
     if (status != PW_OK) return status;
   }

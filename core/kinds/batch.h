@@ -79,6 +79,13 @@ LIBM (libm_hypot (libm_lanes x, libm_lanes y)) {
   static inline int function##_one (const definition_type *definition, MAYBE_UNUSED const pw_body *const *bodies,   \
                                     type *element, MAYBE_UNUSED pw_internal *internal, MAYBE_UNUSED pw_error *error)
 
+/* pw_internal.specified, of a definition with `start`, `rate` and `specified`. */
+#define INITIAL_SPECIFIED(definition)                              \
+  {                                                                \
+    (definition)->specified[0] != 0 || (definition)->start != 0,   \
+        (definition)->specified[1] != 0 || (definition)->rate != 0 \
+  }
+
 /* Groups of members of a type's table: TYPE (weld, ...) sets .fields = weld_fields, .prepare = weld_prepare, ... */
 #define TYPE(type, definition_type, element_type)                                                    \
   .definition = sizeof (definition_type), .fields = type##_fields, .element = sizeof (element_type), \

@@ -642,7 +642,7 @@ static int scene_randomise (probe *x, const double *q, const double *v, pw_rando
   double T = x->workspace->scale.time, *w = x->v_now; /* w of jw_q; not used before the update */
   for (int j = 0; j < x->s->coords; j++) {
     double unit = pw_unit (x->s, j);
-    x->q[j] = q[j];
+    x->q[j] = q[j] + ldexp (unit, -10) * pw_random_between (r, -1, 1); /* beside kinks and jumps of signals at q */
     x->v[j] = v[j] + unit / T * pw_random_between (r, -1, 1);
     x->a[j] = unit / T / T * pw_random_between (r, -1, 1);
     x->dq[j] = unit * pw_random_between (r, -1, 1);

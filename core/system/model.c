@@ -61,6 +61,8 @@ static const char *fault_field (const pw_kind *kind, const pw_field *f) {
   if ((size_t)f->domain > PW_FRACTION) return "its domain does not exist";
   if (f->offset < sizeof (char *) || bytes > kind->definition || f->offset > kind->definition - bytes)
     return "outside the definition, whose first member is its name and whose sizeof is .definition";
+  if (f->given && (f->type != PW_NUMBER || f->given < sizeof (char *) || f->given > kind->definition - sizeof (int)))
+    return "given: not a number, or outside the definition";
   if (f->type == PW_CHOICE && (f->choices == NULL || f->choices[0] == NULL)) return "a choice without choices";
   return "";
 }
@@ -270,9 +272,16 @@ static int check_field (const pw_model *m, const pw_element *e, const pw_field *
 }
 
 static int check_element (const pw_model *m, const pw_element *e, const pw_names *names, pw_error *error) {
+  int moves = !e->kind->of_coordinate;
   if (check_name (m, e->kind->name, pw_element_name (e), error) != PW_OK) return PW_INPUT;
-  for (const pw_field *f = e->kind->fields; f->name; f++)
+  for (const pw_field *f = e->kind->fields; f->name; f++) {
     if (check_field (m, e, f, names, error) != PW_OK) return PW_INPUT;
+    const pw_signal *signal = (const void *)((const char *)e->definition + f->offset);
+    moves |= f->type == PW_SIGNAL && signal->type != PW_CONSTANT;
+  }
+  if (!moves)
+    return pw_fail (error, PW_INPUT, "model %s: %s %s: the curve has no direction: no signal depends on %s", m->name,
+                    e->kind->name, pw_element_name (e), e->kind->coordinate->name);
   for (int i = 0; i < e->kind->bodies && !e->kind->each_body; i++) {
     const char *body = *(const char *const *)pw_field_at (e->kind, e->definition, PW_BODY, i);
     for (int n = 0; n < i; n++)

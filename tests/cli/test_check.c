@@ -104,6 +104,25 @@ TEST (gravity) {
   }
 }
 
+/* At a kink of a signal, such as a knot of a path or an end of abs, the element type has no fault. */
+TEST (kinks) {
+  static const char *const element[] = {
+    "force: F, body: a, at: [0, 0], fx: \"-abs (a.x)\", fy: \"max (0, a.y) - 2*max (0, -a.x)\"",
+    "steered-wheel: F, body: a, at: [1, 0], heading: \"atan (road.curvature (a.x, a.y)) + road.heading (a.x, a.y) - "
+    "a.phi\"",
+    "steered-wheel: F, body: a, at: [1, 0], heading: abs (a.x) + abs (a.y)",
+    "on-curve: F, body: a, at: [0, 0], x: road.x (s), y: road.y (s), start: 0"
+  };
+  for (size_t i = 0; i < sizeof element / sizeof *element; i++) {
+    cli_write ("kink.yaml", check_text ("pinwheel: 1\nbodies: [{name: a, mass: 1, inertia: 1, rate: {vx: 1}}]\n"
+                                        "paths: [{name: road, points: [[0, 0], [3, 1], [4, 5], [-4, 3]], closed: true, "
+                                        "interpolation: cubic}]\nelements:\n  - {%s}\n",
+                                        element[i]));
+    cli_shell ("pinwheel check @/kink.yaml");
+    assert_null (strstr (cli_out, "FAILED"));
+  }
+}
+
 /* Wheels steered in parallel allow no motion, unlike those of Ackermann's steering and a driven car. */
 TEST (locked_wheels) {
   static const char *const rest[] = { "heading: 0.3}\n", "heading: atan(1)}\n",

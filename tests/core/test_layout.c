@@ -22,7 +22,7 @@ LAYOUT (pw_body, 80);
 LAYOUT (pw_parameter, 48);
 LAYOUT (pw_run_defaults, 32);
 LAYOUT (pw_plugin_table, 88);
-LAYOUT (pw_field, 56);
+LAYOUT (pw_field, 64);
 LAYOUT (pw_quantity, 32);
 LAYOUT (pw_internal, 32);
 LAYOUT (pw_configuration, 64);
@@ -67,6 +67,7 @@ LAYOUT_AT (pw_field, required, 32);
 LAYOUT_AT (pw_field, domain, 36);
 LAYOUT_AT (pw_field, choices, 40);
 LAYOUT_AT (pw_field, about, 48);
+LAYOUT_AT (pw_field, given, 56);
 LAYOUT_AT (pw_quantity, unit, 8);
 LAYOUT_AT (pw_quantity, rate, 16);
 LAYOUT_AT (pw_quantity, about, 24);
@@ -195,7 +196,7 @@ TEST (definitions) {
     { "freewheel", 0x1b30733283cdb584 },
     { "drive", 0x7d987f91b3a3b54e },
     { "wheel", 0xdd5a544c9423325 },
-    { "rolling-wheel", 0x144a31a69816bde4 },
+    { "rolling-wheel", 0xbf6164e6564e8f84 },
     { "steered-wheel", 0xb99994e5ef7cd001 },
     { "speed", 0xc6449f5523558de9 },
     { "pfaffian", 0x4cb2d7f5922ebd32 },
@@ -208,7 +209,7 @@ TEST (definitions) {
     { "drag", 0x79bea784c473bb98 },
     { "gravity", 0xed353e1dda5787ff },
     { "force", 0xbc29b0bbfe5b6a71 },
-    { "on-curve", 0xfe042b77d6a55c2d },
+    { "on-curve", 0xc37960e01b745245 },
     { "torque", 0xc52ae040b1e51021 },
     { "motor", 0x4b2d8f0773cca89 },
     { "state", 0x10002b44038fb8b8 },

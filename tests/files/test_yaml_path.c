@@ -180,6 +180,50 @@ TEST (follow) {
   check_close ("on the track", hypot (q[0][0], q[0][1]), 5, 1e-2, "settled");
 }
 
+/* By default the columns named x and y are read, if there are both, else the first two; no number may be missing. */
+TEST (columns) {
+  static const struct {
+    const char *table, *expected;
+  } file[] = { { "t,x [mm],y [m]\n0,5000,2\n1,6000,3\n", "points: [[5, 2], [6, 3]]" },
+               { "y,x\n0,5\n1,6\n", "points: [[5, 0], [6, 1]]" },
+               { "x,N\n0,5\n1,6\n", "points: [[0, 5], [1, 6]]" },
+               { "E,N,y\n0,5,1\n1,6,1\n", "points: [[0, 5], [1, 6]]" },
+               { "0;5\n1;6\n", "points: [[0, 5], [1, 6]]" },
+               { "x,y\n0,5\n,\n1,6\n", "p.csv:3: column 1 has no number" },
+               { "E,N\n0,5\n1,\n1,6\n", "p.csv:3: column 2 has no number" },
+               { "E,N\n0,5\n1,nan\n1,6\n", "p.csv:3: column 2: expected a finite number, found \"nan\"" },
+               { "x,y,x\n0,5,1\n1,6,1\n", "p.csv:1: columns 1 and 3 are both named \"x\"" } };
+  cli_write ("p.yaml", "pinwheel: 1\npaths: [{name: p, file: p.csv}]\nbodies: [{name: a, mass: 1}]\n");
+  for (size_t i = 0; i < sizeof file / sizeof *file; i++) {
+    cli_write ("p.csv", file[i].table);
+    assert_int_equal (cli_run ("pinwheel show --yaml @/p.yaml"), i > 4 ? 2 : 0);
+    if (!strstr (i > 4 ? cli_err : cli_out, file[i].expected)) fail_msg ("%s: %s%s", file[i].table, cli_out, cli_err);
+  }
+}
+
+/* An initial s that is 0, also by a parameter, is given, and written again. */
+TEST (start) {
+  static const char *const value[] = { "-0.1", "0", "0.1" };
+  cli_write ("start.yaml", "pinwheel: 1\nparameters: [{name: s0, value: 1}]\nbodies: [{name: bead, mass: 1}]\n"
+                           "elements: [{on-curve: wire, body: bead, x: 1 + cos (s), y: 3 + sin (2*s), start: s0, "
+                           "rate: 0*s0}]\n");
+  for (int i = 0; i < 3; i++) {
+    cli_shell (check_text ("pinwheel show --yaml @/start.yaml --set s0=%s >@/again.yaml", value[i]));
+    for (int again = 0; again < 2; again++) {
+      pw_error error = { 0 };
+      gallery_scene x = again ? gallery_load (cli_path ("again.yaml"), NULL)
+                              : gallery_load (cli_path ("start.yaml"), "s0", atof (value[i]), NULL);
+      pw_run *r = pw_run_open (x.system, "erk8", NULL, &error);
+      check_ok (error.status, &error);
+      pw_sample now = runs_to (r, 0);
+      check_close ("s", now.q[3], atof (value[i]), 1e-12, "given");
+      check_close ("its rate", now.v[3], 0, 1e-12, "given");
+      pw_run_close (r);
+      gallery_close (&x);
+    }
+  }
+}
+
 /* A bead on a spline through points of a circle swings like a pendulum. */
 TEST (on_path) {
   static const char *const method[] = { "erk8", "radau", "ida+ggl" };
@@ -190,7 +234,7 @@ TEST (on_path) {
              "paths: [{name: circle, file: track.csv, columns: [E, N], interpolation: cubic, closed: true}]\n"
              "bodies: [{name: bead, mass: 1}, {name: bob, mass: 1, start: {x: 5, y: 0}}]\n"
              "elements:\n"
-             "  - {on-curve: wire, body: bead, x: circle.x (s), y: circle.y (s), start: 1e-12}\n"
+             "  - {on-curve: wire, body: bead, x: circle.x (s), y: circle.y (s), start: 0}\n"
              "  - {rod: R, body: [bob, ground], at: [[0, 0], [0, 0]], length: 5}\n"
              "  - {gravity: g, acceleration: [0, -9.81]}\n");
   for (int i = 0; i < 3; i++) {

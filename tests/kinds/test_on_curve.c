@@ -1,6 +1,7 @@
 /* A bead on a curve under gravity: on the parabola y = x^2, whose functions are in C, and on x = cos s, y = sin 2s,
  * through the point where this curve crosses itself; reference digits by a reduced equation in s with 30 digits. */
 #include <math.h>
+#include <string.h>
 #include "check.h"
 #include "runs.h"
 #include "scene.h"
@@ -18,12 +19,13 @@ static int parabola_y (void *context, double s, const double *x, double value[3]
 }
 
 typedef struct {
-  double lissajous, inertia, arm;
+  double lissajous, inertia, arm, laps;
 } curve_parameters;
 
 static const pw_parameter curve_list[] = { { PW_AT (curve_parameters, lissajous), 0, "", "", PW_REAL },
                                            { PW_AT (curve_parameters, inertia), 0, "", "", PW_NONNEGATIVE },
                                            { PW_AT (curve_parameters, arm), 0, "", "", PW_REAL },
+                                           { PW_AT (curve_parameters, laps), 0, "", "", PW_REAL },
                                            { .name = NULL } };
 
 /* The bead is a point mass or a body with an inertia, its centre or a point beside it on the curve.  On the parabola s
@@ -34,7 +36,7 @@ SCENE_WITH (curve_build, curve_list, curve_parameters) {
   if (p->lissajous != 0) {
     wire.x = (pw_signal){ PW_HARMONIC, .harmonic = { .amplitude = 1, .omega = 1 } };
     wire.y = (pw_signal){ PW_HARMONIC, .harmonic = { .amplitude = 1, .omega = 2, .phase = -PW_PI / 2 } };
-    wire.start = 0.2;
+    wire.start = 0.2 + 2 * PW_PI * p->laps;
     bead.specified = PW_SPECIFIES_NOTHING; /* not that the bead is at the origin */
   } else {
     wire.x = (pw_signal){ PW_FUNCTION, .function = { .eval = parabola_x } };
@@ -56,8 +58,8 @@ static const double curve_reference[2][3][7] = {
     { 3, 0.38115934005, -0.704770755371, -2.52943908431, 3.88200051716, 12.1362535619, 7.90775631295 } },
 };
 
-static void curve_run (const char *method, int lissajous, const pw_settings *settings, double bound) {
-  pw_system *s = scene_system (&curve_build_table, "lissajous", (double)lissajous, NULL);
+static void curve_run (const char *method, int lissajous, double laps, const pw_settings *settings, double bound) {
+  pw_system *s = scene_system (&curve_build_table, "lissajous", (double)lissajous, "laps", laps, NULL);
   pw_run *r = runs_open (s, method, settings);
   for (int i = 0; i < 3; i++) {
     const double *expected = curve_reference[lissajous][i];
@@ -78,7 +80,7 @@ TEST (digits) {
               { "bdf+projection", 1, 1e-13 },   { "ida+ggl", 1, 1e-12 }, { "radau", 1, 1e-12 } };
   for (size_t i = 0; i < sizeof run / sizeof *run; i++)
     for (int lissajous = 0; lissajous < 2; lissajous++)
-      curve_run (run[i].method, lissajous, &(pw_settings){ .step = run[i].step, .rtol = run[i].rtol }, 1e-8);
+      curve_run (run[i].method, lissajous, 0, &(pw_settings){ .step = run[i].step, .rtol = run[i].rtol }, 1e-8);
 }
 
 /* Every method and stabilisation. */
@@ -86,7 +88,71 @@ TEST (methods) {
   char method[40];
   for (int i = 0; runs_method (i, method); i++)
     for (int lissajous = 0; lissajous < 2; lissajous++)
-      curve_run (method, lissajous, &(pw_settings){ .step = 2e-4, .rtol = 1e-9 }, 1e-3);
+      curve_run (method, lissajous, 0, &(pw_settings){ .step = 2e-4, .rtol = 1e-9 }, 1e-3);
+}
+
+/* After many laps the round-off of s, and thus of the place, is much larger than that of the coordinates: after 1e6,
+ * 1e-9, about the tolerance of the implicit methods. */
+TEST (laps) {
+  static const double laps[] = { 1e3, -1e3, 1e6 };
+  char method[40];
+  for (int i = 0; runs_method (i, method); i++)
+    for (int k = 0; k < (strstr (method, "projection") || strstr (method, "nullspace") ? 3 : 2); k++)
+      curve_run (method, 1, laps[k], &(pw_settings){ .step = 2e-4, .rtol = 1e-9 }, 1e-3);
+}
+
+typedef struct {
+  double radius, unit, rate, specified; /* unit: of s per radian */
+} circle_parameters;
+
+static const pw_parameter circle_list[] = { { PW_AT (circle_parameters, radius), 1, "m", "", PW_POSITIVE },
+                                            { PW_AT (circle_parameters, unit), 1, "", "", PW_POSITIVE },
+                                            { PW_AT (circle_parameters, rate), 0, "", "", PW_REAL },
+                                            { PW_AT (circle_parameters, specified), 0, "", "", PW_REAL },
+                                            { .name = NULL } };
+
+/* A bead at (0.5, 0.8) R with the velocity (-3, 2) R, unless the wire says where it is. */
+SCENE_WITH (circle_build, circle_list, circle_parameters) {
+  const double R = p->radius;
+  pw_on_curve wire = { .name = "wire", .body = "bead", .rate = p->rate * p->unit };
+  wire.x = (pw_signal){ PW_HARMONIC, .harmonic = { .amplitude = R, .omega = 1 / p->unit } };
+  wire.y = (pw_signal){ PW_HARMONIC, .harmonic = { .amplitude = R, .omega = 1 / p->unit, .phase = -PW_PI / 2 } };
+  wire.specified[0] = wire.specified[1] = p->specified != 0;
+  pw_body bead = { .name = "bead", .mass = 1, .start = { 0.5 * R, 0.8 * R }, .rate = { -3 * R, 2 * R } };
+  bead.specified = PW_SPECIFIES_NOTHING;
+  pw_add_body (m, &bead);
+  pw_add_on_curve (m, &wire);
+}
+
+/* A bead goes round circles of several sizes, whose parameter is an angle or a length, 140 times. */
+TEST (circles) {
+  static const double radius[] = { 0.01, 1, 1000 };
+  static const char *const method[] = { "rk4+projection", "erk8+projection", "bdf+projection", "rk4+nullspace" };
+  for (int i = 0; i < 3; i++)
+    for (int k = 0; k < 8; k++) {
+      const double R = radius[i];
+      pw_system *s = scene_system (&circle_build_table, "radius", R, "unit", k < 4 ? 1 : R, "rate", 3., NULL);
+      pw_run *r = runs_open (s, method[k % 4], &(pw_settings){ .step = 0.02, .rtol = 1e-9 });
+      pw_sample x = runs_to (r, 300);
+      check_close (method[k % 4], hypot (x.q[0], x.q[1]), R, 1e-9 * R,
+                   "the projection, or the null space, which drifts");
+      check_close (method[k % 4], hypot (x.v[0], x.v[1]), 3 * R, 1e-3 * R, "the method's error");
+      runs_close (r, s);
+    }
+}
+
+/* An initial s and velocity of 0 that are specified are kept; otherwise they follow from the bead. */
+TEST (specified) {
+  for (int specified = 0; specified < 2; specified++) {
+    pw_system *s = scene_system (&circle_build_table, "specified", (double)specified, NULL);
+    pw_run *r = runs_open (s, "erk8", NULL);
+    pw_sample x = runs_to (r, 0);
+    assert_int_equal (fabs (x.q[3]) < 1e-12, specified);
+    assert_int_equal (fabs (x.v[3]) < 1e-12, specified);
+    check_close ("x", x.q[0], cos (x.q[3]), 1e-12, "round-off");
+    check_close ("vy", x.v[1], cos (x.q[3]) * x.v[3], 1e-12, "round-off");
+    runs_close (r, s);
+  }
 }
 
 /* A point beside the centre of mass of a body that turns. */

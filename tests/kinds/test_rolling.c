@@ -198,6 +198,42 @@ TEST (start) {
   runs_close (r, s);
 }
 
+/* A spin rate of 0 that is specified is kept, as any other: the body stops along the heading. */
+TEST (specified) {
+  for (int i = 0; i < 2; i++) {
+    pw_model *m = scene_model (&rolling_unicycle_table, NULL);
+    pw_body cart = { .name = "cart", .mass = 1, .inertia = 1, .rate = { 2 }, .specified = PW_SPECIFIES_NOTHING };
+    pw_add_body (m, &cart);
+    pw_add_rolling_wheel (
+        m, &(pw_rolling_wheel){ .name = "roll", .body = "cart", .radius = 0.5, .inertia = 1, .specified = { 0, i } });
+    pw_system *s = scene_compile (m);
+    pw_run *r = runs_open (s, "rk4+projection", NULL);
+    pw_sample x = runs_to (r, 0);
+    const double spin = trial_state (s, &x, "roll.spin_rate"), along = trial_state (s, &x, "cart.vx");
+    check_close ("rolling", along, 0.5 * spin, 1e-12, "round-off");
+    check_close ("spin rate", spin, i ? 0 : 4, 1e-12, "round-off");
+    runs_close (r, s);
+  }
+}
+
+/* A large spin angle changes no motion, by any method. */
+TEST (large_spin) {
+  double q[2][4], v[2][4];
+  char method[40];
+  for (int i = 0; runs_method (i, method); i++) {
+    for (int k = 0; k < 2; k++) {
+      pw_error error = { 0 };
+      pw_model *m = scene_model (&rolling_unicycle_table, NULL);
+      check_ok (pw_model_set_initial (m, "wheel.spin", k ? 1e6 : 0.5, &error), &error);
+      pw_system *s = scene_compile (m);
+      runs_state (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-8 }, 2, q[k], v[k], NULL);
+      pw_system_free (s);
+    }
+    for (int j = 0; j < 3; j++) check_close (method, q[1][j], q[0][j], 1e-3, "the method's error");
+    check_close (method, q[1][3] - 1e6, q[0][3] - 0.5, 1e-2, "the method's error");
+  }
+}
+
 /* A spin rate set by pw_model_set_initial is kept; the velocity of the body changes. */
 TEST (given) {
   pw_error error = { 0 };

@@ -22,22 +22,21 @@ typedef struct {
   const pw_configuration *body;
   double arm[2];
   const double *X, *Y; /* value, first and second derivative by s */
-  double rate;         /* s' */
+  double s, rate;      /* s, s' */
   const double *w;
 } curve_state;
 
 static inline curve_state curve_at (const pw_batch *batch, int e) {
   const curve *element = (const curve *)batch->element + e;
   const double *u = batch->u + 6 * e;
-  curve_state now = { batch_body (batch, e), { 0 }, u, u + 3, batch->v[e], batch_w (batch, e) };
+  curve_state now = { batch_body (batch, e), { 0 }, u, u + 3, batch->q[e], batch->v[e], batch_w (batch, e) };
   to_world (now.body, element->at, now.arm);
   return now;
 }
 
 PREPARE (curve_prepare, pw_on_curve, curve) {
   *element = (curve){ { definition->at[0], definition->at[1] } };
-  internal[0] =
-      (pw_internal){ 0, definition->start, definition->rate, { definition->start != 0, definition->rate != 0 } };
+  internal[0] = (pw_internal){ 0, definition->start, definition->rate, INITIAL_SPECIFIED (definition) };
   return PW_OK;
 }
 
@@ -46,9 +45,10 @@ PER_ELEMENT (curve_g, curve, 2) {
   out[1] = now.body->y + now.arm[1] - now.Y[0];
 }
 
+/* s X_s: the round-off of s changes X by eps s X_s, after many laps more than eps X. */
 PER_ELEMENT (curve_g_size, curve, 2) {
-  out[0] = fabs (now.body->x) + fabs (now.arm[0]) + fabs (now.X[0]);
-  out[1] = fabs (now.body->y) + fabs (now.arm[1]) + fabs (now.Y[0]);
+  out[0] = fabs (now.body->x) + fabs (now.arm[0]) + fabs (now.X[0]) + fabs (now.s * now.X[1]);
+  out[1] = fabs (now.body->y) + fabs (now.arm[1]) + fabs (now.Y[0]) + fabs (now.s * now.Y[1]);
 }
 
 PER_ELEMENT (curve_J, curve, 8) {
@@ -82,10 +82,11 @@ static const pw_field curve_fields[] = {
   { PW_AT (pw_on_curve, at), PW_POINT, .unit = "m", .about = "the point in the body's frame" },
   { PW_AT (pw_on_curve, x), PW_SIGNAL, .unit = "m", .required = 1,
     .about = "x of the curve in the world, as a function of its parameter s, with two derivatives" },
-  { PW_AT (pw_on_curve, y), PW_SIGNAL, .unit = "m", .required = 1, .about = "y, likewise" },
-  { PW_AT (pw_on_curve, start), PW_NUMBER, .about = "initial s; 0, even if written: from the body's position" },
-  { PW_AT (pw_on_curve, rate), PW_NUMBER, .unit = "1/s",
-    .about = "initial velocity of s; 0, even if written: from the body's velocity" },
+  { PW_AT (pw_on_curve, y), PW_SIGNAL, .unit = "m", .required = 1, .about = "y of the curve, a function of s" },
+  { PW_AT (pw_on_curve, start), PW_NUMBER, .given = offsetof (pw_on_curve, specified[0]),
+    .about = "initial s; omitted: from the body's position" },
+  { PW_AT (pw_on_curve, rate), PW_NUMBER, .unit = "1/s", .given = offsetof (pw_on_curve, specified[1]),
+    .about = "initial velocity of s; omitted: from the body's velocity" },
   { .name = NULL },
 };
 

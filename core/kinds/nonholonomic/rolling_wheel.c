@@ -37,10 +37,9 @@ static double rolling_spin_rate (const rolling *element, const pw_body *body) {
 PREPARE (rolling_prepare, pw_rolling_wheel, rolling) {
   *element = (rolling){ contact_across (definition->at, definition->heading),
                         contact_along (definition->at, definition->heading), definition->radius };
-  internal[0] = (pw_internal){ definition->inertia,
-                               definition->start,
-                               definition->rate != 0 ? definition->rate : rolling_spin_rate (element, bodies[0]),
-                               { definition->start != 0, definition->rate != 0 } };
+  internal[0] =
+      (pw_internal){ definition->inertia, definition->start, definition->rate, INITIAL_SPECIFIED (definition) };
+  if (!internal->specified[1]) internal->rate = rolling_spin_rate (element, bodies[0]);
   return PW_OK;
 }
 
@@ -87,9 +86,10 @@ static const pw_field rolling_fields[] = {
     .about = "radius of the wheel" },
   { PW_AT (pw_rolling_wheel, inertia), PW_NUMBER, .unit = "kg m^2", .domain = PW_NONNEGATIVE,
     .about = "moment of inertia about the axle; the wheel's mass belongs to the body" },
-  { PW_AT (pw_rolling_wheel, start), PW_NUMBER, .unit = "rad", .about = "initial spin angle" },
-  { PW_AT (pw_rolling_wheel, rate), PW_NUMBER, .unit = "rad/s",
-    .about = "initial spin velocity; 0, even if written: from rolling at the body's initial velocity" },
+  { PW_AT (pw_rolling_wheel, start), PW_NUMBER, .unit = "rad", .given = offsetof (pw_rolling_wheel, specified[0]),
+    .about = "initial spin angle" },
+  { PW_AT (pw_rolling_wheel, rate), PW_NUMBER, .unit = "rad/s", .given = offsetof (pw_rolling_wheel, specified[1]),
+    .about = "initial spin velocity; omitted: from rolling at the body's initial velocity" },
   { PW_AT (pw_rolling_wheel, torque), PW_SIGNAL, .unit = "N m",
     .about = "torque on the wheel about its axle; positive: drives along the heading" },
   { .name = NULL },
