@@ -283,7 +283,8 @@ static void dynamics_refine (pw_run *r, const double *v, double *a, double *lamb
   for (int j = 0; j < s->coords; j++) da[j] = a[j];
   for (int i = 0; i < s->rows; i++) dlambda[i] = lambda[i];
   double size = INFINITY;
-  for (int pass = 0; pass < 3 && !(size < 1e-8); pass++) { /* the first solution is the correction of a = 0, lambda = 0 */
+  for (int pass = 0; pass < 3 && !(size < 1e-8);
+       pass++) { /* the first solution is the correction of a = 0, lambda = 0 */
     for (int j = 0; j < s->coords; j++) f[j] -= s->mass[j] * da[j];
     for (int i = 0; i < s->rows; i++) dlambda[i] = -dlambda[i];
     pw_add_JT (r->w, dlambda, f);
