@@ -905,12 +905,12 @@ int pw_run_make_consistent (pw_run *r, const unsigned char *origin, pw_error *er
   int status = pw_evaluate_J_at (r->w, r->t, r->q, r->v);
   if (status != PW_OK) return pw_fail_signal (r->t, error);
   pw_evaluate_residuals (r->w, NULL, &before);
-  if (!(before.position <= 2 * PW_RESIDUAL_CONVERGED)) {
+  if (!r->inconsistent && !(before.position <= 2 * PW_RESIDUAL_CONVERGED)) {
     status = initial_level_consistent (r, INITIAL_POSITIONS, origin, error);
     if (status == PW_OK) status = pw_evaluate_J_at (r->w, r->t, r->q, r->v);
   }
   pw_evaluate_residuals (r->w, NULL, &now);
-  if (status == PW_OK && !(now.velocity <= 2 * PW_RESIDUAL_CONVERGED))
+  if (status == PW_OK && !r->inconsistent && !(now.velocity <= 2 * PW_RESIDUAL_CONVERGED))
     status = initial_level_consistent (r, INITIAL_VELOCITIES, origin, error);
   r->initial = (pw_initial_report){ .q_given = r->q_given,
                                     .v_given = r->v_given,
@@ -922,7 +922,7 @@ int pw_run_make_consistent (pw_run *r, const unsigned char *origin, pw_error *er
                                     .time = r->w->scale.time };
   for (int j = 0; j < 2 * s->coords && origin && status == PW_OK; j++)
     r->initial.released |= origin[j] & PW_GIVEN && pw_initial_moved (s, &r->initial, j);
-  if (status == PW_OK && origin)
+  if (status == PW_OK && origin && !r->inconsistent)
     status = initial_locked (r, origin, error); /* wheels may absorb the impulse of a restart */
   return status == PW_METHOD ? pw_fail_signal (r->t, error) : status;
 }
