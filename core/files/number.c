@@ -24,7 +24,9 @@ static void number_point (char *text) {
   memmove (text + begin + 1, text + begin + length, strlen (text + begin + length) + 1);
 }
 
-/* ---- The shortest text that reads back as the same number (Giulietti 2020, The Schubfach way to render doubles) ---- */
+/* ---- The shortest text that reads back as the same number ----
+ *
+ * (Giulietti 2020, The Schubfach way to render doubles.) */
 
 __extension__ typedef unsigned __int128 number_wide;
 

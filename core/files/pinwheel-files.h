@@ -91,7 +91,7 @@ void pw_scene_code_close (pw_scene_code *c);
 
 /* ---- Numbers, the same in every locale ---- */
 
-/* "%.9g" and the like with a decimal point; with 17 digits, the shortest number that reads back as the same one; nan, inf,
+/* "%.9g" and the like with a decimal point; with 17 digits, only as many as read back as the same number; nan, inf or
  * -inf.  Returns the buffer. */
 char *pw_format (char buffer[32], double value, int digits);
 
@@ -277,9 +277,9 @@ int pw_csv_close (pw_csv *c, pw_error *error); /* the output stays open; c may b
 
 /* ---- JSON ---- */
 
-/* Writes JSON to a stream: numbers by pw_format, with 17 digits unless `digits` is set, null for what is not finite; text
- * contains no "<", so that it may be part of a script in HTML.  Begin with { .f = stream } and open one container.  A
- * key is NULL in lists and for the outermost container.  A NULL pw_json writes nothing. */
+/* Writes JSON to a stream: numbers by pw_format, with 17 digits unless `digits` is set, null for what is not finite;
+ * text contains no "<", so that it may be part of a script in HTML.  Begin with { .f = stream } and open one container.
+ * A key is NULL in lists and for the outermost container.  A NULL pw_json writes nothing. */
 typedef struct {
   FILE *f;
   int lines;        /* outermost levels whose items have separate lines */

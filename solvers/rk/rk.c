@@ -444,7 +444,8 @@ static int fixed_divide (pw_run *r, const pw_step_start *from, int status, doubl
 enum { DENSE_FIRST = 5, DENSE_NODES = RK_NODES + 2 };
 #define DENSE_AGREE 0.1 /* largest difference from a step, in units of the scene, over the relative tolerance */
 
-/* The weights at x of node k, with nodes at 0, 1/4, 1/2, 3/4, 1: of its value and two derivatives, of its value and one. */
+/* The weights at x of node k, with nodes at 0, 1/4, 1/2, 3/4, 1: of its value and two derivatives; of its value and
+ * one. */
 static void dense_weights (int k, double x, double second[3], double first[2]) {
   double L = 1, sum = 0, squares = 0;
   const double part = 1. / (DENSE_NODES - 1), s = x - k * part;
