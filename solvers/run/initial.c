@@ -796,6 +796,7 @@ static int initial_fail (initial_search *x, pw_error *error) {
 /* Makes positions, or velocities at consistent positions, consistent. */
 static int initial_level_consistent (pw_run *r, initial_level level, const unsigned char *origin, pw_error *error) {
   initial_search x;
+  if (r->inconsistent) return PW_OK;
   int status = initial_open (&x, r, level, origin);
   if (status == PW_OK) status = initial_find (&x);
   if (status == PW_RETRY && initial_is_stopped (&x)) status = PW_STOPPED;
@@ -905,12 +906,12 @@ int pw_run_make_consistent (pw_run *r, const unsigned char *origin, pw_error *er
   int status = pw_evaluate_J_at (r->w, r->t, r->q, r->v);
   if (status != PW_OK) return pw_fail_signal (r->t, error);
   pw_evaluate_residuals (r->w, NULL, &before);
-  if (!r->inconsistent && !(before.position <= 2 * PW_RESIDUAL_CONVERGED)) {
+  if (!(before.position <= 2 * PW_RESIDUAL_CONVERGED)) {
     status = initial_level_consistent (r, INITIAL_POSITIONS, origin, error);
     if (status == PW_OK) status = pw_evaluate_J_at (r->w, r->t, r->q, r->v);
   }
   pw_evaluate_residuals (r->w, NULL, &now);
-  if (status == PW_OK && !r->inconsistent && !(now.velocity <= 2 * PW_RESIDUAL_CONVERGED))
+  if (status == PW_OK && !(now.velocity <= 2 * PW_RESIDUAL_CONVERGED))
     status = initial_level_consistent (r, INITIAL_VELOCITIES, origin, error);
   r->initial = (pw_initial_report){ .q_given = r->q_given,
                                     .v_given = r->v_given,
@@ -922,7 +923,7 @@ int pw_run_make_consistent (pw_run *r, const unsigned char *origin, pw_error *er
                                     .time = r->w->scale.time };
   for (int j = 0; j < 2 * s->coords && origin && status == PW_OK; j++)
     r->initial.released |= origin[j] & PW_GIVEN && pw_initial_moved (s, &r->initial, j);
-  if (status == PW_OK && origin && !r->inconsistent)
+  if (status == PW_OK && origin)
     status = initial_locked (r, origin, error); /* wheels may absorb the impulse of a restart */
   return status == PW_METHOD ? pw_fail_signal (r->t, error) : status;
 }
