@@ -169,6 +169,7 @@ struct pw_run {
   double *q_given, *v_given;           /* coords + 3: the values last given (opening, restart), not yet consistent */
   double *given_before;                /* 2 (coords + 3): those before a restart, which may be refused */
   unsigned char *origin;               /* 2 coords: of initial values, as in pw_system */
+  int inconsistent;                    /* 1: these are left as they are given */
   pw_initial_report initial;
   unsigned long long identity; /* checkpoint_identity (run_open.c) */
   pw_statistics statistics;
@@ -524,6 +525,8 @@ void pw_specialised_count (pw_run *r, long evaluations, long iterations);
 
 /* ---- Initial conditions ---- */
 
+/* As pw_run_open, with the initial state as it is given, for evaluations at other ones. */
+pw_run *pw_run_open_inconsistent (const pw_system *s, const char *method, const pw_settings *settings, pw_error *error);
 /* Makes r->q, r->v consistent at r->t and fills the report; origin (or NULL): origins of states, of which those given
  * or specified are kept if possible.  Errors: PW_INITIAL, PW_RESOURCE; PW_METHOD if a signal failed. */
 int pw_run_make_consistent (pw_run *r, const unsigned char *origin, pw_error *error);

@@ -64,7 +64,8 @@ int pw_names_find (const pw_names *n, const char *name) {
 }
 
 #define STORE_ALIGN 16    /* bytes: alignment of any object */
-#define STORE_CHUNK 65536 /* bytes of a chunk, unless an allocation needs more */
+#define STORE_FIRST 2048  /* bytes of the first chunk; each has twice the size of the one before, */
+#define STORE_CHUNK 65536 /* up to this, unless an allocation needs more */
 
 struct pw_chunk {
   struct pw_chunk *next;
@@ -80,7 +81,8 @@ static void *store_alloc (pw_arena *a, size_t bytes, size_t align) {
   size_t used = a->chunk ? store_round (a->chunk->used, align) : 0;
   if (bytes > PTRDIFF_MAX) return NULL; /* sizes below would overflow */
   if (a->chunk == NULL || a->chunk->size < used || a->chunk->size - used < bytes) {
-    size_t size = bytes > STORE_CHUNK ? bytes : STORE_CHUNK;
+    size_t size = a->chunk == NULL ? STORE_FIRST : a->chunk->size < STORE_CHUNK ? 2 * a->chunk->size : STORE_CHUNK;
+    if (size < bytes) size = bytes;
     struct pw_chunk *c = calloc (1, sizeof *c + size);
     if (c == NULL) return NULL;
     c->next = a->chunk;

@@ -377,7 +377,7 @@ void pw_text_clear (pw_text *t);
 void pw_text_free (pw_text *t);
 void pw_text_add (pw_text *t, const char *text);
 void pw_text_add_bytes (pw_text *t, const char *bytes, size_t count);
-/* Add a cell, after a comma unless it is the first of its line: a number with 17 digits, nan if not finite; or text. */
+/* Add a cell, after a comma unless it is the first of its line: a number by pw_format, nan if not finite; or text. */
 void pw_text_number (pw_text *t, double value);
 void pw_text_cell (pw_text *t, const char *text);
 /* Adds the cell "NAME [UNIT]"; no unit if it is NULL or "". */

@@ -7,7 +7,7 @@
 
 /* ---- --yaml: a model as text with a bit-identical trajectory, if its initial values are consistent ----
  *
- * Numbers are written with 17 digits, and omitted if they are the default, 0. */
+ * Numbers that are the default, 0, are omitted. */
 
 enum { YAML_DIGITS = 17 };
 

@@ -4,6 +4,7 @@
 #include <errno.h>
 #include <locale.h>
 #include <math.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -23,12 +24,110 @@ static void number_point (char *text) {
   memmove (text + begin + 1, text + begin + length, strlen (text + begin + length) + 1);
 }
 
+/* ---- The shortest text that reads back as the same number ----
+ *
+ * (Giulietti 2020, The Schubfach way to render doubles.) */
+
+__extension__ typedef unsigned __int128 number_wide;
+
+enum { POWER_LEAST = -292, POWER_MOST = 324, POWER_WORDS = 28 };
+
+/* The first 128 bits of 10^k, rounded up, as { low, high }: those of 5^k 2^128, or of 2^864 / 5^-k. */
+static const uint64_t *number_power (int k) {
+  static _Thread_local uint64_t known[POWER_MOST - POWER_LEAST + 1][2];
+  uint64_t *power = known[k - POWER_LEAST];
+  if (power[1]) return power;
+  uint32_t x[POWER_WORDS] = { 0 };
+  x[k < 0 ? POWER_WORDS - 1 : 4] = 1;
+  for (int n = abs (k); n > 0; n--) {
+    uint64_t carry = 0;
+    for (int i = 0; k > 0 && i < POWER_WORDS; i++, carry >>= 32) x[i] = (uint32_t)(carry += 5 * (uint64_t)x[i]);
+    for (int i = POWER_WORDS - 1; k < 0 && i >= 0; i--, carry %= 5)
+      carry = carry << 32 | x[i], x[i] = (uint32_t)(carry / 5);
+  }
+  int top = POWER_WORDS - 1, shift = 0;
+  while (x[top] == 0) top--;
+  while (x[top] << shift >> 31 == 0) shift++;
+  const uint64_t middle = (uint64_t)x[top - 2] << shift, last = (uint64_t)x[top - 4] << shift;
+  power[1] = ((uint64_t)x[top] << 32 | x[top - 1]) << shift | middle >> 32;
+  power[0] = middle << 32 | (uint64_t)x[top - 3] << shift | last >> 32;
+  int exact = k >= 0 && (uint32_t)last == 0;
+  for (int i = 0; i < top - 4; i++) exact &= x[i] == 0;
+  power[0] += !exact;
+  power[1] += power[0] == 0 && !exact;
+  return power;
+}
+
+/* The upper 64 bits of power x, and 1 in the last one if more than round-off follows. */
+static uint64_t number_product (const uint64_t *power, uint64_t x) {
+  number_wide low = (number_wide)power[0] * x, high = (number_wide)power[1] * x + (low >> 64);
+  return (uint64_t)(high >> 64) | ((uint64_t)high > 1);
+}
+
+/* floor (log10 (2^q)), or of 3/4 2^q; floor (log2 (10^k)).  Exact for exponents of doubles. */
+static int number_log10 (int q, int three_quarters) {
+  return (q * 1262611 - (three_quarters ? 524031 : 0)) >> 22;
+}
+static int number_log2 (int k) {
+  return (k * 1741647) >> 19;
+}
+
+/* The shortest decimal m 10^*e, of these the nearest one, that is nearer to `value` than to any other double; m may end
+ * with zeros.  value: positive and finite. */
+static uint64_t number_decimal (double value, int *e) {
+  uint64_t bits;
+  memcpy (&bits, &value, sizeof bits);
+  const uint64_t fraction = bits & (UINT64_MAX >> 12);
+  const int exponent = (int)(bits >> 52), closer_below = fraction == 0 && exponent > 1;
+  const int q = (exponent ? exponent : 1) - 1075;
+  const uint64_t c = exponent ? fraction | 1ULL << 52 : fraction, odd = c & 1;
+  *e = 0;
+  if (q <= 0 && q > -53 && (c & ((1ULL << -q) - 1)) == 0) return c >> -q; /* an integer */
+  *e = number_log10 (q, closer_below);
+  const int shift = q + number_log2 (-*e) + 1;
+  const uint64_t *power = number_power (-*e);
+  /* four times the value and the ends of the interval that rounds to it, in units of 10^*e; odd: without its ends */
+  const uint64_t middle = number_product (power, 4 * c << shift);
+  const uint64_t least = number_product (power, (4 * c - 2 + (uint64_t)closer_below) << shift) + odd;
+  const uint64_t most = number_product (power, (4 * c + 2) << shift) - odd;
+  const uint64_t m = middle / 4, tens = m / 10;
+  const int tens_below = least <= 40 * tens, tens_above = 40 * tens + 40 <= most;
+  if (m >= 10 && tens_below != tens_above) return ++*e, tens + (uint64_t)tens_above;
+  const int below = least <= 4 * m, above = 4 * m + 4 <= most;
+  if (below != above) return m + (uint64_t)above;
+  return m + (middle > 4 * m + 2 || (middle == 4 * m + 2 && (m & 1)));
+}
+
+/* As by "%.17g", except for digits beyond the shortest ones.  value: finite. */
+static void number_shortest (char *to, double value) {
+  char reversed[20];
+  int e = 0, count = 0, zeros;
+  if (signbit (value)) *to++ = '-';
+  uint64_t m = value != 0 ? number_decimal (fabs (value), &e) : 0;
+  for (; m > 0 && m % 10 == 0; m /= 10) e++;
+  do reversed[count++] = (char)('0' + m % 10);
+  while ((m /= 10) > 0);
+  int power = e + count - 1; /* of ten, of the first digit */
+  const int scientific = power < -4 || power >= 17, before = scientific ? 1 : power + 1;
+  if (before <= 0) *to++ = '0', *to++ = '.';
+  for (zeros = before; zeros < 0; zeros++) *to++ = '0';
+  for (int i = 0; i < count; i++) {
+    if (i == before && i > 0) *to++ = '.';
+    *to++ = reversed[count - 1 - i];
+  }
+  for (zeros = before - count; zeros > 0; zeros--) *to++ = '0';
+  if (scientific)
+    sprintf (to, "e%+03d", power);
+  else
+    *to = 0;
+}
+
 char *pw_format (char buffer[32], double value, int digits) {
-  int precision = digits < 1 ? 1 : digits > 17 ? 17 : digits;
-  const char format[] = { '%', '.', (char)('0' + precision / 10), (char)('0' + precision % 10), 'g', 0 }; /* "%.17g" */
+  const char format[] = { '%', '.', (char)('0' + digits / 10), (char)('0' + digits % 10), 'g', 0 }; /* "%.09g" */
   if (isnan (value)) return strcpy (buffer, "nan");
   if (isinf (value)) return strcpy (buffer, value > 0 ? "inf" : "-inf");
-  strfromd (buffer, 32, format, value);
+  if (digits >= 17) return number_shortest (buffer, value), buffer;
+  strfromd (buffer, 32, digits < 1 ? "%.1g" : format, value);
   number_point (buffer);
   return buffer;
 }

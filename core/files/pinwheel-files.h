@@ -91,7 +91,8 @@ void pw_scene_code_close (pw_scene_code *c);
 
 /* ---- Numbers, the same in every locale ---- */
 
-/* "%.17g" (or fewer digits) with a decimal point; non-finite as nan, inf, -inf.  Returns the buffer. */
+/* "%.9g" and the like with a decimal point; with 17 digits, only as many as read back as the same number; nan, inf or
+ * -inf.  Returns the buffer. */
 char *pw_format (char buffer[32], double value, int digits);
 
 /* Reads a number that fills the whole text, nan and inf included; else PW_INPUT or PW_RESOURCE, and *value stays. */
@@ -266,7 +267,7 @@ int pw_npz_end (pw_npz *z, pw_error *error);
 /* ---- Tables ---- */
 
 /* A table of samples: states, contact points, reactions (-lambda), scaled residuals, and energies if the run keeps a
- * ledger.  As CSV it has a header line "t [s],frame.x [m],...", then a line per sample with 17 digits; non-finite is
+ * ledger.  As CSV it has a header line "t [s],frame.x [m],...", then a line per sample; non-finite is
  * nan.  If the output is named .npz, it is a NumPy archive with a vector per column, named without unit, which is
  * written when the table is closed; it cannot continue a file (PW_INPUT).  PW_RESOURCE; PW_METHOD if a signal fails. */
 typedef struct pw_csv pw_csv;
@@ -276,9 +277,9 @@ int pw_csv_close (pw_csv *c, pw_error *error); /* the output stays open; c may b
 
 /* ---- JSON ---- */
 
-/* Writes JSON to a stream: numbers with 17 digits unless `digits` is set, null for what is not finite; text contains
- * no "<", so that it may be part of a script in HTML.  Begin with { .f = stream } and open one container.  A key is
- * NULL in lists and for the outermost container.  A NULL pw_json writes nothing. */
+/* Writes JSON to a stream: numbers by pw_format, with 17 digits unless `digits` is set, null for what is not finite;
+ * text contains no "<", so that it may be part of a script in HTML.  Begin with { .f = stream } and open one container.
+ * A key is NULL in lists and for the outermost container.  A NULL pw_json writes nothing. */
 typedef struct {
   FILE *f;
   int lines;        /* outermost levels whose items have separate lines */

@@ -22,6 +22,17 @@ typedef struct {
  * another number of bodies, coordinates or constraint equations. */
 const pw_system *pw_parametric_at (pw_parametric *x, double value, pw_error *why);
 
+/* Systems that stay open: a derivative by the parameter needs one on each side, a check of a step that at its start. */
+enum { PW_STEADY_RECENT = 3 };
+
+/* A system open at a value of the parameter. */
+typedef struct {
+  double value;
+  pw_system *own; /* compiled for it; NULL: the described one serves */
+  pw_run *run;    /* NULL: not open */
+  pw_linearisation linearisation;
+} pw_steady_system;
+
 struct pw_steady {
   const pw_system *s; /* as described */
   pw_steady_settings settings;
@@ -39,10 +50,7 @@ struct pw_steady {
   double *free_symmetry; /* free_symmetries x symmetries: their coefficients in that basis; scratch */
 
   pw_parametric parametric;
-  struct {
-    pw_run *run; /* at parametric.value; NULL: not open */
-    pw_linearisation linearisation;
-  } system;
+  pw_steady_system system, recent[PW_STEADY_RECENT]; /* the one in use; those before it, the last one first */
   pw_initial_value *solution; /* 2 n: the last solution, where runs are opened; or that configuration at rest */
   int solved;                 /* 1: there is one */
 

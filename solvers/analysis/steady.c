@@ -121,20 +121,30 @@ const pw_system *pw_parametric_at (pw_parametric *x, double value, pw_error *why
   return NULL;
 }
 
-static void steady_close_system (pw_steady *x) {
-  pw_linear_close (&x->system.linearisation);
-  if (x->system.run) pw_run_close (x->system.run);
-  pw_system_free (x->parametric.own);
-  x->parametric.own = NULL;
-  memset (&x->system, 0, sizeof x->system);
+static void steady_close_system (pw_steady_system *x) {
+  pw_linear_close (&x->linearisation);
+  if (x->run) pw_run_close (x->run);
+  pw_system_free (x->own);
+  memset (x, 0, sizeof *x);
 }
 
-/* Opens a run at the last solution, or if that cannot be made consistent, at rest in its configuration. */
+/* Makes the system that is open for a value of the parameter x->system; if there is none, the oldest one. */
+static void steady_find_system (pw_steady *x, double value) {
+  int i = 0;
+  while (i < PW_STEADY_RECENT - 1 && !(x->recent[i].run && x->recent[i].value == value)) i++;
+  const pw_steady_system found = x->recent[i];
+  memmove (x->recent + 1, x->recent, (size_t)i * sizeof found);
+  x->recent[0] = x->system, x->system = found;
+}
+
+/* Opens a run at the last solution, which is not made consistent for other values of the parameter; or if there is none
+ * or that fails, consistent, or at rest in its configuration. */
 static int steady_open_run (pw_steady *x, const pw_system *s) {
   const pw_settings settings = {
     .t = x->settings.t, .span = x->settings.span, .initial = x->solution, .initials = x->solved ? 2 * x->n : 0
   };
-  x->system.run = pw_run_open (s, "rk4+projection", &settings, &x->why);
+  if (x->solved) x->system.run = pw_run_open_inconsistent (s, "rk4+none", &settings, &(pw_error){ 0 });
+  if (x->system.run == NULL) x->system.run = pw_run_open (s, "rk4+projection", &settings, &x->why);
   if (x->system.run == NULL && x->why.status == PW_INITIAL && x->solved) {
     for (int j = x->n; j < 2 * x->n; j++) x->solution[j].value = 0;
     x->why = (pw_error){ 0 };
@@ -148,13 +158,16 @@ static int steady_open_run (pw_steady *x, const pw_system *s) {
 /* Opens x->system for a value of the parameter, unless it is open for it.  A status, with x->why if it fails;
  * PW_INPUT: its sizes differ; PW_RETRY: none at this value (x->why has the status of the error). */
 static int steady_open_system (pw_steady *x, double value) {
-  if (x->system.run && (x->parametric.compile == NULL || x->parametric.value == value)) return PW_OK;
-  steady_close_system (x);
+  if (x->system.run && (x->parametric.compile == NULL || x->system.value == value)) return PW_OK;
+  steady_find_system (x, value);
+  if (x->system.run && x->system.value == value) return PW_OK;
+  steady_close_system (&x->system);
   x->why = (pw_error){ 0 };
   const pw_system *s = pw_parametric_at (&x->parametric, value, &x->why);
   const int refused = s == NULL && x->parametric.own;
   const int status = s ? steady_open_run (x, s) : x->why.status;
-  if (status != PW_OK) steady_close_system (x);
+  x->system.value = value, x->system.own = x->parametric.own, x->parametric.own = NULL;
+  if (status != PW_OK) steady_close_system (&x->system);
   return status == PW_OK || status == PW_RESOURCE || refused ? status : PW_RETRY;
 }
 
@@ -600,7 +613,8 @@ static int steady_check_settings (const pw_system *s, const pw_steady_settings *
 
 void pw_steady_close (pw_steady *x) {
   if (x == NULL) return;
-  steady_close_system (x);
+  steady_close_system (&x->system);
+  for (int i = 0; i < PW_STEADY_RECENT; i++) steady_close_system (&x->recent[i]);
   pw_branch_close (&x->branch);
   pw_linear_free (&x->linear);
   pw_arena_free (&x->arena);

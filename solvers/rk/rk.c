@@ -15,6 +15,7 @@
 #include "util.h"
 
 enum { NULLSPACE_MOST = 256 }; /* constraint equations: their matrix is dense */
+enum { RK_NODES = 3 };         /* states inside a step between which samples are interpolated */
 
 /* Null-space velocities; see below. */
 typedef struct {
@@ -46,6 +47,11 @@ struct pw_method_data {
   double h, last_error;       /* adaptive: size of the next step, error of the last one */
   double *weight;             /* adaptive: reciprocal tolerances: [2 j] of q_j, [2 j + 1] of v_j */
   pw_step_start last, second; /* of the last step, for samples inside it; of the second part of a divided step */
+  /* adaptive: states inside the last step for interpolation (rk_interpolate); their state: 0: not evaluated, 1: valid,
+   * -1: invalid; the time of the last sample inside the step, and the number of samples at increasing times up to it */
+  pw_step_start node[RK_NODES];
+  int nodes, samples;
+  double sampled;
   char *memory;
 };
 
@@ -307,10 +313,16 @@ static int rk_step (pw_run *r, double h, double t1, int project, double *added_e
   return status == PW_OK ? nullspace_accelerate (r, d->v, d->a, d->lambda) : status;
 }
 
+/* Stores the state reached as the beginning of a step. */
+static void rk_begin_step (pw_run *r) {
+  r->data->nodes = r->data->samples = 0;
+  pw_store_start (&r->data->last, r);
+}
+
 /* Makes the new state the state reached. */
 static void rk_accept (pw_run *r, double h, double t1, double added_energy) {
   pw_method_data *d = r->data;
-  pw_store_start (&d->last, r);
+  rk_begin_step (r);
   memcpy (r->q, d->q, pw_state_length (r->s) * sizeof *r->q);
   r->t = t1;
   rk_ledger (r, r->ledger, d->last.ledger, h);
@@ -371,16 +383,23 @@ static int fixed_step_from (pw_run *r, const pw_step_start *from, double t, int 
   return status;
 }
 
-/* The same in two parts, with the energy, the first one up to the time `between`. */
-static int fixed_two_parts (pw_run *r, const pw_step_start *from, double between, double t, int project) {
+/* The same with the energy, and stores the new state in `to`. */
+static int fixed_step_between (pw_run *r, const pw_step_start *from, double t, int project, pw_step_start *to) {
   pw_method_data *d = r->data;
-  int status = fixed_step_from (r, from, between, project, 1);
+  int status = fixed_step_from (r, from, t, project, 1);
   if (status != PW_OK) return status;
-  d->second.t = between, d->second.projected = r->projected_at;
-  memcpy (d->second.q, d->q, pw_state_length (r->s) * sizeof *d->q);
-  memcpy (d->second.ledger, r->ledger_at, (size_t)r->entries * sizeof (double));
-  pw_ledger_rates (r, d->lambda, d->second.rate);
-  return fixed_step_from (r, &d->second, t, project, 1);
+  to->t = t, to->projected = r->projected_at;
+  memcpy (to->q, d->q, pw_state_length (r->s) * sizeof *d->q);
+  memcpy (to->ledger, r->ledger_at, (size_t)r->entries * sizeof (double));
+  pw_ledger_rates (r, d->lambda, to->rate);
+  return PW_OK;
+}
+
+/* The same in two parts, the first one up to the time `between`. */
+static int fixed_two_parts (pw_run *r, const pw_step_start *from, double between, double t, int project) {
+  pw_step_start *second = &r->data->second;
+  int status = fixed_step_between (r, from, between, project, second);
+  return status == PW_OK ? fixed_step_from (r, second, t, project, 1) : status;
 }
 
 /* Divides the step to t1 at several times after `earliest`, until two successive results differ by at most `best`;
@@ -415,6 +434,112 @@ static int fixed_divide (pw_run *r, const pw_step_start *from, int status, doubl
   return least <= acceptable ? PW_OK : PW_RETRY;
 }
 
+/* ---- Many samples inside the last step of an adaptive method ----
+ *
+ * From the fifth one at increasing times on, positions are those of the polynomial that has the positions, velocities
+ * and accelerations at the ends of the step and of steps to quarters of it; velocities, and the ledger, those of the
+ * polynomial with their values and rates there (Hermite interpolation; Stoer & Bulirsch 2002, Introduction to Numerical
+ * Analysis, section 2.1.5).  The state is then projected like that of a step.  In the first and in the last quarter the
+ * polynomials must agree with steps: forces may jump inside the last step. */
+
+enum { DENSE_FIRST = 5, DENSE_NODES = RK_NODES + 2 };
+#define DENSE_AGREE 0.1 /* largest difference from a step, in units of the scene, over the relative tolerance */
+
+/* The weights at x of node k, with nodes at 0, 1/4, 1/2, 3/4, 1: of its value and two derivatives; of its value and
+ * one. */
+static void dense_weights (int k, double x, double second[3], double first[2]) {
+  double L = 1, sum = 0, squares = 0;
+  const double part = 1. / (DENSE_NODES - 1), s = x - k * part;
+  for (int j = 0; j < DENSE_NODES; j++) {
+    if (j == k) continue;
+    const double inverse = 1 / ((k - j) * part); /* L = prod (x - z_j) / (z_k - z_j); sum = L' (z_k) */
+    L *= (x - j * part) * inverse, sum += inverse, squares += inverse * inverse;
+  }
+  const double bend = 12 * sum * sum - 3 * (sum * sum - squares); /* (L^-3)'' at z_k */
+  second[0] = L * L * L * (1 + s * (bend / 2 * s - 3 * sum));
+  second[1] = L * L * L * s * (1 - 3 * sum * s);
+  second[2] = L * L * L * s * s / 2;
+  first[0] = L * L * (1 - 2 * sum * s);
+  first[1] = L * L * s;
+}
+
+/* The sample at t by interpolation, not projected, without accelerations. */
+static void dense_interpolate (pw_run *r, double t) {
+  const pw_method_data *d = r->data;
+  const pw_step_start end = { .t = r->t, .projected = r->projected, .q = r->q, .ledger = r->ledger, .rate = r->rate };
+  const size_t n = (size_t)r->s->coords, room = n + 3, entries = (size_t)r->entries;
+  const double h = r->t - d->last.t, x = (t - d->last.t) / h;
+  memset (r->q_at, 0, n * sizeof (double));
+  memset (r->v_at, 0, n * sizeof (double));
+  memset (r->ledger_at, 0, entries * sizeof (double));
+  for (int k = 0; k < DENSE_NODES; k++) {
+    double w[3], u[2];
+    const pw_step_start *node = k == 0 ? &d->last : k <= RK_NODES ? &d->node[k - 1] : &end;
+    const double *q = node->q, *v = q + room, *a = v + room, *ledger = node->ledger, *rate = node->rate;
+    dense_weights (k, x, w, u);
+    for (size_t j = 0; j < n; j++) {
+      r->q_at[j] += w[0] * q[j] + h * (w[1] * v[j] + h * w[2] * a[j]);
+      r->v_at[j] += u[0] * v[j] + h * u[1] * a[j];
+    }
+    for (size_t i = 0; i < entries; i++) r->ledger_at[i] += u[0] * ledger[i] + h * u[1] * rate[i];
+  }
+  r->projected_at = d->last.projected + x * (r->projected - d->last.projected);
+}
+
+/* 1 if the polynomials agree with a step to t. */
+static int dense_agrees (pw_run *r, double t) {
+  pw_method_data *d = r->data;
+  dense_interpolate (r, t);
+  int status = fixed_step_from (r, &d->last, t, d->projects, 0);
+  return status == PW_OK && !r->near_singular && pw_rk_distance (r, d->q, d->v) < DENSE_AGREE * r->settings.rtol;
+}
+
+/* Evaluates the nodes.  1 if samples may be interpolated between them. */
+static int dense_open (pw_run *r) {
+  pw_method_data *d = r->data;
+  const pw_step_start *from = &d->last;
+  const double part = (r->t - from->t) / (DENSE_NODES - 1);
+  if (d->uses_nullspace || d->holds_signals || pw_before_breakpoint (r, r->t) < r->t) return 0;
+  for (int k = 0; k < RK_NODES; k++) {
+    int status = fixed_step_between (r, from, from->t + (k + 1) * part, d->projects, &d->node[k]);
+    if (status != PW_OK || r->near_singular) return 0;
+  }
+  return dense_agrees (r, from->t + part / 2) && dense_agrees (r, r->t - part / 2);
+}
+
+/* The sample at t by interpolation.  1 if it is one of many and this succeeds. */
+static int dense_sample (pw_run *r, double t) {
+  pw_method_data *d = r->data;
+  pw_projector *p = d->projects ? &d->projector : NULL;
+  d->samples = t > d->sampled ? d->samples + 1 : 1;
+  d->sampled = t;
+  if (r->fixed_steps || d->samples < DENSE_FIRST) return 0;
+  if (d->nodes == 0) d->nodes = dense_open (r) ? 1 : -1;
+  int status = PW_RETRY;
+  if (d->nodes > 0) {
+    dense_interpolate (r, t);
+    status = p ? pw_project_state (p, r, t, r->q_at, r->v_at, r->a_at, r->lambda_at, NULL)
+               : pw_run_accelerate (r, t, r->q_at, r->v_at, r->a_at, r->lambda_at);
+  }
+  const int succeeds = status == PW_OK && !r->near_singular;
+  r->near_singular = 0;
+  return succeeds;
+}
+
+/* A sample inside the last step as a step from its beginning; *divided: 1 near a singular configuration. */
+static int fixed_sample (pw_run *r, double t, int *divided) {
+  pw_method_data *d = r->data;
+  const pw_step_start *from = &d->last;
+  double between;
+  int status = fixed_step_from (r, from, t, d->projects, r->settings.ledger);
+  *divided = r->near_singular && status >= 0;
+  if (*divided) {
+    status = fixed_divide (r, from, status, t, d->projects, from->t, &between);
+    if (status == PW_OK) status = fixed_two_parts (r, from, between, t, d->projects);
+  }
+  return status;
+}
+
 int pw_rk_at (pw_run *r, double t, pw_error *error) {
   pw_method_data *d = r->data;
   const pw_step_start *from = &d->last;
@@ -426,15 +551,13 @@ int pw_rk_at (pw_run *r, double t, pw_error *error) {
   const pw_statistics statistics = r->statistics;
   const double refused_sine = r->refused_sine;
   const int near_singular = r->near_singular;
-  double between;
+  int status = PW_OK, divided = 0;
   r->near_singular = 0;
   r->refused_sine = 0; /* a sample is divided, not refused, near a singular configuration */
-  int status = fixed_step_from (r, from, t, d->projects, r->settings.ledger), divided = r->near_singular && status >= 0;
-  if (divided) {
-    status = fixed_divide (r, from, status, t, d->projects, from->t, &between);
-    if (status == PW_OK) status = fixed_two_parts (r, from, between, t, d->projects);
+  if (!dense_sample (r, t)) {
+    status = fixed_sample (r, t, &divided);
+    memcpy (r->q_at, d->q, pw_state_length (r->s) * sizeof *d->q);
   }
-  memcpy (r->q_at, d->q, pw_state_length (r->s) * sizeof *d->q);
   r->statistics = statistics, r->refused_sine = refused_sine, r->near_singular = near_singular;
   if (status < 0) return pw_fail_signal (t, error);
   return status == PW_OK ? PW_OK : rk_fail (r, status, from->t, t - from->t, divided, error);
@@ -744,10 +867,10 @@ static void rk_list_weights (pw_method_data *d) {
 }
 
 static int rk_allocate (pw_method_data *d, const pw_run *r) {
-  enum { ONCE = 8 }; /* arrays that exist once, not for each stage */
+  enum { ONCE = 8, MOST = ONCE + 3 * PW_RK_STAGES + 3 * RK_NODES }; /* arrays that exist once, not for each stage */
   size_t n = (size_t)r->s->coords + 3, state = pw_state_length (r->s), entries = (size_t)r->entries, count = ONCE;
   int stages = d->tableau->stages;
-  pw_array array[ONCE + 3 * PW_RK_STAGES] = {
+  pw_array array[MOST] = {
     { &d->q, state },           { &d->weight, 2 * n },   { &d->last.q, state },          { &d->last.ledger, entries },
     { &d->last.rate, entries }, { &d->second.q, state }, { &d->second.ledger, entries }, { &d->second.rate, entries }
   };
@@ -756,6 +879,11 @@ static int rk_allocate (pw_method_data *d, const pw_run *r) {
     if (i == stages) break; /* velocities and accelerations of the new state are in d->v, d->a */
     array[count++] = (pw_array){ &d->stage_v[i], n };
     array[count++] = (pw_array){ &d->stage_a[i], n };
+  }
+  for (pw_step_start *x = d->node; x < d->node + RK_NODES && !r->fixed_steps; x++) {
+    array[count++] = (pw_array){ &x->q, state };
+    array[count++] = (pw_array){ &x->ledger, entries };
+    array[count++] = (pw_array){ &x->rate, entries };
   }
   d->memory = pw_alloc_arrays (array, count);
   if (d->memory == NULL) return PW_RESOURCE;
@@ -792,7 +920,7 @@ int pw_rk_restart (pw_run *r, pw_error *error) {
   d->counter = (pw_step_counter){ .base = r->t };
   d->off_grid = 0;
   if (!r->fixed_steps) rk_reset_step_size (r);
-  pw_store_start (&d->last, r);
+  rk_begin_step (r);
   return PW_OK;
 }
 

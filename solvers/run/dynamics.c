@@ -263,8 +263,19 @@ static inline const double *dynamics_right_side (pw_run *r, const double *v, dou
   return f;
 }
 
+/* Adds the correction dx to x.  Returns the largest correction over the largest value; NaN for 0 / 0. */
+static double dynamics_correct (double *x, const double *dx, int n) {
+  double value = 0, correction = 0;
+  for (int i = 0; i < n; i++) {
+    x[i] += dx[i];
+    value = pw_larger (value, fabs (x[i])), correction = pw_larger (correction, fabs (dx[i]));
+  }
+  return correction / value;
+}
+
 /* Iterative refinement (Wilkinson 1963): near a singular configuration the factorisation has an error of eps / sine^2
- * (watchdog.c); refinement reduces it to eps / sine. */
+ * (watchdog.c); refinement reduces it to eps / sine.  Each correction is smaller than the one before by the factor of
+ * the first one: the one after 1e-8 is round-off. */
 static void dynamics_refine (pw_run *r, const double *v, double *a, double *lambda) {
   const pw_system *s = r->s;
   double *f = r->scratch, *gamma = f + s->coords + 3;                                  /* residuals */
@@ -272,15 +283,16 @@ static void dynamics_refine (pw_run *r, const double *v, double *a, double *lamb
   if (dynamics_right_side (r, v, f, gamma) != f) pw_evaluate_force (r->w, f);
   for (int j = 0; j < s->coords; j++) da[j] = a[j];
   for (int i = 0; i < s->rows; i++) dlambda[i] = lambda[i];
-  for (int pass = 0; pass < 3; pass++) { /* the first solution is the correction of a = 0, lambda = 0 */
+  double size = INFINITY;
+  for (int pass = 0; pass < 3 && !(size < 1e-8);
+       pass++) { /* the first solution is the correction of a = 0, lambda = 0 */
     for (int j = 0; j < s->coords; j++) f[j] -= s->mass[j] * da[j];
     for (int i = 0; i < s->rows; i++) dlambda[i] = -dlambda[i];
     pw_add_JT (r->w, dlambda, f);
     pw_mul_J (r->w, da, Jda);
     for (int i = 0; i < s->rows; i++) gamma[i] -= Jda[i];
     pw_saddle_solve (r->saddle, f, gamma, da, dlambda);
-    for (int j = 0; j < s->coords; j++) a[j] += da[j];
-    for (int i = 0; i < s->rows; i++) lambda[i] += dlambda[i];
+    size = pw_larger_or_nan (dynamics_correct (a, da, s->coords), dynamics_correct (lambda, dlambda, s->rows));
   }
 }
 

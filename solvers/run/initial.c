@@ -810,6 +810,7 @@ static int initial_fail (initial_search *x, pw_error *error) {
 /* Makes positions, or velocities at consistent positions, consistent. */
 static int initial_level_consistent (pw_run *r, initial_level level, const unsigned char *origin, pw_error *error) {
   initial_search x;
+  if (r->inconsistent) return PW_OK;
   int status = initial_open (&x, r, level, origin);
   if (status == PW_OK) status = initial_find (&x);
   if (status == PW_RETRY && initial_is_stopped (&x)) status = PW_STOPPED;

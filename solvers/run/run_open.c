@@ -266,7 +266,8 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   return pw_run_check_derivatives (r, method, "needs", error);
 }
 
-pw_run *pw_run_open (const pw_system *s, const char *method, const pw_settings *settings, pw_error *error) {
+static pw_run *run_new (const pw_system *s, const char *method, const pw_settings *settings, int inconsistent,
+                        pw_error *error) {
   if (pw_require (s, "a system", error) != PW_OK) return NULL;
   pw_run *r = calloc (1, sizeof *r);
   if (r == NULL) {
@@ -274,12 +275,22 @@ pw_run *pw_run_open (const pw_system *s, const char *method, const pw_settings *
     return NULL;
   }
   r->s = s;
+  r->inconsistent = inconsistent;
   r->w = pw_workspace_new (s, error);
   int status = r->w ? pw_run_annotate_error (r, run_open (r, method, settings, error), error) : PW_RESOURCE;
   if (status == PW_OK) return r;
   if (status == PW_STOPPED) pw_fail (error, PW_STOPPED, "model %s: stopped before the first step", s->model);
   pw_run_close (r);
   return NULL;
+}
+
+pw_run *pw_run_open (const pw_system *s, const char *method, const pw_settings *settings, pw_error *error) {
+  return run_new (s, method, settings, 0, error);
+}
+
+pw_run *pw_run_open_inconsistent (const pw_system *s, const char *method, const pw_settings *settings,
+                                  pw_error *error) {
+  return run_new (s, method, settings, 1, error);
 }
 
 /* Checkpoints: the state of a run as bytes.

@@ -13,11 +13,11 @@
 TEST (order) {
   cli_good ("pinwheel sweep ezyroller " GRID " -o @/order.csv && cut -d, -f1-4 @/order.csv | sed -n '1,5p;13p'");
   assert_string_equal (cli_out, "omega [rad/s],M0 [N m],status,t [s]\n"
-                                "1,0.050000000000000003,ok,0.050000000000000003\n"
-                                "1,0.10000000000000001,ok,0.050000000000000003\n"
-                                "1,0.20000000000000001,ok,0.050000000000000003\n"
-                                "2,0.050000000000000003,ok,0.050000000000000003\n"
-                                "4,0.20000000000000001,ok,0.050000000000000003\n");
+                                "1,0.05,ok,0.05\n"
+                                "1,0.1,ok,0.05\n"
+                                "1,0.2,ok,0.05\n"
+                                "2,0.05,ok,0.05\n"
+                                "4,0.2,ok,0.05\n");
   cli_good ("ls @ | grep -c '^order'; wc -l <@/order.csv");
   assert_string_equal (cli_out, "1\n13\n");
 }
@@ -25,9 +25,9 @@ TEST (order) {
 /* The fourth value of lin:0:1:11 is 0.3, ends are exact, and decades of a logarithmic range are; large numbers do not
  * overflow. */
 TEST (ranges) {
-  cli_good (
-      "pinwheel sweep ezyroller --vary M0=lin:0:1:11 --t-end 0.001 -o @/lin.csv && sed -n 5p @/lin.csv | cut -c1-24");
-  assert_string_equal (cli_out, "0.29999999999999999,ok,0\n");
+  cli_good ("pinwheel sweep ezyroller --vary M0=lin:0:1:11 --t-end 0.001 -o @/lin.csv && sed -n 5p @/lin.csv | cut -d, "
+            "-f1,2");
+  assert_string_equal (cli_out, "0.3,ok\n");
   cli_good ("pinwheel sweep ezyroller --vary M0=log:1e-3:10:5 --t-end 0.001 -o @/log.csv && cut -d, -f1 @/log.csv");
   const double expected[5] = { 1e-3, 1e-2, 0.1, 1, 10 };
   const char *at = strchr (cli_out, '\n') + 1;

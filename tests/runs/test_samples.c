@@ -99,9 +99,9 @@ static double samples_breakpoint (void *context, double t) {
   return t < 1. / 3 ? 1. / 3 : INFINITY;
 }
 
-static pw_system *samples_switched_scene (void) {
+static pw_system *samples_switched_scene (double (*breakpoint) (void *context, double t)) {
   pw_error error = { 0 };
-  pw_signal torque = { PW_FUNCTION, .function = { .eval = samples_switched, .breakpoint = samples_breakpoint } };
+  pw_signal torque = { PW_FUNCTION, .function = { .eval = samples_switched, .breakpoint = breakpoint } };
   pw_model *m = scene_model (&scene_ezyroller, NULL);
   check_ok (pw_model_set_signal (m, "rider", "value", &torque, &error), &error);
   return scene_compile (m);
@@ -114,7 +114,7 @@ TEST (breakpoint) {
     pw_error error = { 0 };
     double q[6], v[6];
     int before = 0, there = 0;
-    pw_system *s = samples_switched_scene (), *S = samples_switched_scene ();
+    pw_system *s = samples_switched_scene (samples_breakpoint), *S = samples_switched_scene (samples_breakpoint);
     runs_state (S, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 1 }, 1, q, v, NULL);
     pw_run *r = runs_open (s, samples_methods[i], &(pw_settings){ .rtol = rtol, .span = 1, .ledger = 1 });
     while (pw_run_time (r) < 1) {
@@ -145,7 +145,7 @@ TEST (across) {
     pw_error error = { 0 };
     pw_sample now;
     const double rtol = 1e-8;
-    pw_system *s = samples_switched_scene (), *S = samples_switched_scene ();
+    pw_system *s = samples_switched_scene (samples_breakpoint), *S = samples_switched_scene (samples_breakpoint);
     pw_settings settings = { .rtol = rtol, .step = 0.005, .span = 1 };
     pw_run *r = runs_open (s, method[i], &settings), *exact = runs_open (S, "rk4+projection", &(pw_settings){ 0 });
     for (int k = 1; k <= 24; k++) {
@@ -201,4 +201,59 @@ TEST (record) {
   assert_int_equal (recorded, 0);
   error = (pw_error){ 0 };
   runs_close (r, s);
+}
+
+/* ---- Many samples in a step ---- */
+
+/* 20 samples in each step of a run; of another one, some of them, which are steps.  Returns the number of coordinates
+ * that differ; the largest difference over rtol is added to *worst. */
+static int samples_many (pw_system *s, const char *method, double rtol, double *worst) {
+  const double t_end = 1;
+  pw_error error = { 0 };
+  const pw_settings settings = { .rtol = rtol, .span = t_end, .ledger = 1 };
+  pw_run *r = runs_open (s, method, &settings), *other = runs_open (s, method, &settings);
+  pw_sample now, there;
+  int differ = 0;
+  for (double t0 = 0; pw_run_time (r) < t_end; t0 = pw_run_time (r)) {
+    check_ok (pw_run_advance (r, t_end, &error), &error);
+    check_ok (pw_run_advance (other, t_end, &error), &error);
+    for (int j = 1; j <= 20; j++) {
+      const double t = t0 + j * (pw_run_time (r) - t0) / 20.5;
+      check_ok (pw_run_sample (r, t, &now, &error), &error);
+      if (j % 5 != 4) continue;
+      check_ok (pw_run_sample (other, t, &there, &error), &error);
+      for (int n = 0; n < 6; n++) {
+        differ += now.q[n] != there.q[n];
+        *worst = fmax (*worst, fabs (now.q[n] - there.q[n]) / rtol);
+        *worst = fmax (*worst, fabs (now.v[n] - there.v[n]) / rtol);
+      }
+      for (int n = 0; n < pw_system_ledger_entries (s); n++)
+        *worst = fmax (*worst, fabs (now.ledger[n] - there.ledger[n]) / rtol);
+      if (strstr (method, "projection"))
+        check_below ("sample's residuals", now.position + now.velocity, 32 * CHECK_EPS, "round-off");
+    }
+  }
+  now = runs_to (r, t_end), there = runs_to (other, t_end);
+  check_bits ("positions with other samples", now.q, there.q, 6);
+  check_bits ("work with other samples", now.ledger, there.ledger, pw_system_ledger_entries (s));
+  pw_run_close (r);
+  pw_run_close (other);
+  return differ;
+}
+
+/* The later ones are interpolated and agree with steps, also where a force jumps inside a step; the run does not depend
+ * on them. */
+TEST (many) {
+  for (int i = 0; i < SAMPLES_METHODS; i++)
+    for (int k = 5; k <= 11; k += 3) {
+      const double rtol = pow (10, -k);
+      double worst = 0, worst_jump = 0;
+      pw_system *s = scene_system (&scene_ezyroller, "m2", 0.1, "I2", 0.01, NULL), *S = samples_switched_scene (NULL);
+      assert_true (samples_many (s, samples_methods[i], rtol, &worst) > 0);
+      check_below (samples_methods[i], worst, 0.3, "a part of rtol");
+      samples_many (S, samples_methods[i], rtol, &worst_jump);
+      check_below (samples_methods[i], worst_jump, 5, "rtol, of which the errors of steps have up to 100");
+      pw_system_free (s);
+      pw_system_free (S);
+    }
 }

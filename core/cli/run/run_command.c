@@ -389,7 +389,7 @@ static int run_batch (pw_run_cli *command, pw_error *error) {
   due = fmin (due, pw_motion_next_time (&command->comparison.motion));
   due = fmin (due, pw_error_run_next (&command->stated));
   if (command->plots) due = fmin (due, pw_plots_next (command->plots));
-  double start = pw_seconds (CLOCK_THREAD_CPUTIME_ID);
+  double start = pw_seconds (CLOCK_MONOTONIC); /* read without a system call, unlike processor time */
   int status;
   long steps = 0;
   do {
@@ -398,13 +398,28 @@ static int run_batch (pw_run_cli *command, pw_error *error) {
     if (status == PW_OK) status = run_check_condition (command, error);
     if (run_is_stopped (command)) break;
   } while (status == PW_OK && ++steps < command->batch && pw_run_time (command->run) < due && !pw_stop);
-  double cpu = pw_seconds (CLOCK_THREAD_CPUTIME_ID) - start;
-  command->cpu += cpu;
-  pw_batch_adapt (&command->batch, steps, cpu);
+  double seconds = pw_seconds (CLOCK_MONOTONIC) - start;
+  command->stepping += seconds;
+  pw_batch_adapt (&command->batch, steps, seconds);
+  return status;
+}
+
+/* Adds the share of steps in the processor time since the last call. */
+static void run_count_cpu (pw_run_cli *command) {
+  double *before = command->counted, now = pw_seconds (CLOCK_MONOTONIC), cpu = pw_seconds (CLOCK_THREAD_CPUTIME_ID);
+  if (command->stepping > 0) command->cpu += command->stepping * fmin (1, (cpu - before[1]) / (now - before[0]));
+  command->stepping = 0, before[0] = now, before[1] = cpu;
+}
+
+static int run_save_checkpoint (pw_run_cli *command, pw_error *error) {
+  run_count_cpu (command);
+  int status = checkpoints_save (command, error);
+  run_count_cpu (command); /* without the time of writing */
   return status;
 }
 
 static int run_steps (pw_run_cli *command, pw_error *error) {
+  run_count_cpu (command);
   /* a checkpoint has the samples up to its time */
   int status = run_check_condition (command, error);
   if (status == PW_OK && !command->checkpoints.resume_path) status = run_store_samples (command, error);
@@ -412,9 +427,10 @@ static int run_steps (pw_run_cli *command, pw_error *error) {
     status = run_batch (command, error);
     if (status == PW_OK) status = run_store_samples (command, error);
     if (status == PW_OK && pw_run_time (command->run) >= command->checkpoints.next_time)
-      status = checkpoints_save (command, error);
+      status = run_save_checkpoint (command, error);
     pw_progress_at (&command->progress, pw_run_time (command->run));
   }
+  run_count_cpu (command);
   return status;
 }
 

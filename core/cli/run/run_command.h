@@ -70,13 +70,14 @@ typedef struct pw_run_cli {
   const char **redundant; /* a description of each redundant constraint equation; NULL: there are none */
   pw_progress progress;
   /* in progress */
-  double stop_time;                     /* at which the condition has become true [s]; NaN: it has not */
-  long rows;                            /* written to the table */
-  int limited;                          /* 1: --limit, --max-steps or a signal during a step has stopped the run */
-  int loaded;                           /* 1: the state of the checkpoint has been loaded */
-  long batch;                           /* calls of pw_run_advance_towards between updates of the progress, at most */
-  double cpu;                           /* processor time of the method [s] */
-  int write_failed;                     /* 1: the table or the summary could not be written */
+  double stop_time;            /* at which the condition has become true [s]; NaN: it has not */
+  long rows;                   /* written to the table */
+  int limited;                 /* 1: --limit, --max-steps or a signal during a step has stopped the run */
+  int loaded;                  /* 1: the state of the checkpoint has been loaded */
+  long batch;                  /* calls of pw_run_advance_towards between updates of the progress, at most */
+  double cpu;                  /* processor time of the method [s] */
+  double stepping, counted[2]; /* time in steps since, and real and processor time when `cpu` was counted [s] */
+  int write_failed;            /* 1: the table or the summary could not be written */
   char kept_path[PW_RUN_OUTPUTS][4200]; /* of incomplete files that are kept, PATH_MAX and an ending, or "" */
 } pw_run_cli;
 
