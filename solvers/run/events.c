@@ -414,9 +414,10 @@ static int decide_impacts (pw_run *r, const double *g, int *any, pw_error *error
   const int status = decision_push (r, saddle);
   pw_saddle_close (saddle);
   if (status != PW_OK) return pw_fail_signal (r->t, error);
-  memcpy (x->gamma, x->lambda, (size_t)r->s->rows * sizeof *x->gamma);
-  events_u (r, r->v, 0, x->u);
-  memcpy (x->lambda, x->gamma, (size_t)r->s->rows * sizeof *x->gamma);
+  const size_t bytes = (size_t)r->s->rows * sizeof *x->gamma;
+  memcpy (x->gamma, x->lambda, bytes);
+  events_u (r, r->v, 0, x->u); /* uses x->lambda */
+  memcpy (x->lambda, x->gamma, bytes);
   impact_ledger (r);
   for (int k = 0; k < x->n; k++) {
     x->impulse[x->list[k]] = -x->x[k];
@@ -575,8 +576,8 @@ static int events_far (const pw_run *r, double t0) {
   return 1;
 }
 
-/* The longest next adaptive step: multipliers that signals of time change must be resolved even where nothing moves, and
- * an error estimate would permit any step.  Multistep methods grow by up to 10, and lose their order if they are
+/* The longest next adaptive step: multipliers that signals of time change must be resolved even where nothing moves,
+ * and an error estimate would permit any step.  Multistep methods grow by up to 10, and lose their order if they are
  * interrupted more often. */
 static double events_longest (pw_run *r, double t0) {
   pw_events *x = r->events;
@@ -608,8 +609,8 @@ static int events_refine (pw_run *r, pw_crossing_search *search, double t0, doub
       if (x->triggered[i] && x->mode[i] && x->armed[i]) x->fell = 0;
     if (x->fell) continue;
     memcpy (x->start, x->now, 2 * (size_t)x->count * sizeof *x->start);
-    int status_of_root = events_at (r, *root, x->now, search->error);
-    const double first = status_of_root == PW_OK ? pw_first_crossing (search, t, x->start, *root, x->now) : NAN;
+    search->status = events_at (r, *root, x->now, search->error);
+    const double first = search->status == PW_OK ? pw_first_crossing (search, t, x->start, *root, x->now) : NAN;
     if (!isnan (first)) *root = first;
     return search->status;
   }
