@@ -27,6 +27,8 @@
 #define EVENTS_TIGHTER 1e-10   /* by which a limit that is reached is narrowed: round-off must not undo the event */
 #define EVENTS_ROUND_OFF 1e-14 /* of an event function that has been farther from its root */
 #define EVENTS_SLOW 1e-6       /* impacts below this velocity [units] do not bounce: they would accumulate */
+#define EVENTS_FIRST 1e-3      /* longest first step after an event [T] */
+#define EVENTS_BEND 0.1        /* of multipliers in a step [limits], see events_longest */
 enum { EVENTS_PASSES = 10 };   /* most decisions at one instant */
 
 typedef struct pw_events {
@@ -43,7 +45,8 @@ typedef struct pw_events {
   unsigned char *other;                 /* rows: active equations of the saddle of a decision */
   double *start, *end, *previous, *now; /* 2 count: event functions at the ends of the last step, before it, anywhere */
   double start_t, previous_t;           /* NaN: not known */
-  double *memory;                       /* of pw_first_crossing */
+  double longest, roughness; /* next adaptive step [s]; the bend of multipliers in the last one over EVENTS_BEND */
+  double *memory;            /* of pw_first_crossing */
   double *u, *u_before, *impulse;
   double *offset; /* by which u [units] was on the wrong side of its root when it began to leave it: drift */
   int at_end;     /* 1: the state reached, its multipliers and its J are known */
@@ -411,9 +414,10 @@ static int decide_impacts (pw_run *r, const double *g, int *any, pw_error *error
   const int status = decision_push (r, saddle);
   pw_saddle_close (saddle);
   if (status != PW_OK) return pw_fail_signal (r->t, error);
-  memcpy (x->gamma, x->lambda, (size_t)r->s->rows * sizeof *x->gamma);
-  events_u (r, r->v, 0, x->u);
-  memcpy (x->lambda, x->gamma, (size_t)r->s->rows * sizeof *x->gamma);
+  const size_t bytes = (size_t)r->s->rows * sizeof *x->gamma;
+  memcpy (x->gamma, x->lambda, bytes);
+  events_u (r, r->v, 0, x->u); /* uses x->lambda */
+  memcpy (x->lambda, x->gamma, bytes);
   impact_ledger (r);
   for (int k = 0; k < x->n; k++) {
     x->impulse[x->list[k]] = -x->x[k];
@@ -539,7 +543,7 @@ static int events_prepare (pw_run *r, pw_error *error) {
       return pw_fail (error, PW_METHOD, "t = %.6g s: modes change endlessly: %s", r->t,
                       PW_NAME (pw_system_row_name, r->s, x->row[0]));
     if (x->pending) {
-      x->previous_t = NAN;
+      x->previous_t = NAN, x->longest = EVENTS_FIRST * r->w->scale.time, x->roughness = 0;
       memset (x->armed, 0, (size_t)x->count);
       status = events_project (r, error);
       if (status == PW_OK) status = events_decide (r, 0, &changes, error);
@@ -556,16 +560,37 @@ static int events_prepare (pw_run *r, pw_error *error) {
   return status == PW_OK && pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK ? pw_fail_signal (r->t, error) : status;
 }
 
-/* 1 if no function comes near its root between t0 and the state reached, by its values there and one step earlier. */
-static int events_far (const pw_run *r, double t0) {
+/* Twice the distance of a function from its chord in the middle of the last step, from t0, by its values at the ends and
+ * one step earlier; NaN: that one is not known. */
+static double events_bend (const pw_run *r, double t0, int i) {
   const pw_events *x = r->events;
   const double h = r->t - t0, before = t0 - x->previous_t;
-  for (int i = 0; i < 2 * x->count; i++) {
-    const double slope = (x->end[i] - x->start[i]) / h, earlier = (x->start[i] - x->previous[i]) / before;
-    const double bend = fabs (slope - earlier) / (h + before) * h * h;
-    if (!(fmax (x->start[i], x->end[i]) + 2 * bend < 0)) return 0;
-  }
+  return fabs ((x->end[i] - x->start[i]) / h - (x->start[i] - x->previous[i]) / before) / (h + before) * h * h / 2;
+}
+
+/* 1 if no function comes near its root in the last step, from t0. */
+static int events_far (const pw_run *r, double t0) {
+  const pw_events *x = r->events;
+  for (int i = 0; i < 2 * x->count; i++)
+    if (!(fmax (x->start[i], x->end[i]) + 4 * events_bend (r, t0, i) < 0)) return 0;
   return 1;
+}
+
+/* The longest next adaptive step: multipliers that signals of time change must be resolved even where nothing moves,
+ * and an error estimate would permit any step.  Multistep methods grow by up to 10, and lose their order if they are
+ * interrupted more often. */
+static double events_longest (pw_run *r, double t0) {
+  pw_events *x = r->events;
+  const double growth = r->method->order > 0 ? 2 : 10;
+  double most = 0, last = x->roughness;
+  int held = 0;
+  for (int i = 0; i < 2 * x->count; i++) {
+    if (x->mode[i / 2]) continue;
+    held = 1;
+    if (!isnan (x->previous_t)) most = fmax (most, events_bend (r, t0, i) / (EVENTS_BEND * (1 + fabs (x->end[i]))));
+  }
+  x->roughness = most;
+  return held ? (r->t - t0) * fmin (growth, fmax (0.2, 1 / sqrt (fmax (most, last)))) : INFINITY;
 }
 
 /* The root of functions of u that have not left their root at t0, but do so before `root`, where they return to it. */
@@ -584,8 +609,8 @@ static int events_refine (pw_run *r, pw_crossing_search *search, double t0, doub
       if (x->triggered[i] && x->mode[i] && x->armed[i]) x->fell = 0;
     if (x->fell) continue;
     memcpy (x->start, x->now, 2 * (size_t)x->count * sizeof *x->start);
-    int status_of_root = events_at (r, *root, x->now, search->error);
-    const double first = status_of_root == PW_OK ? pw_first_crossing (search, t, x->start, *root, x->now) : NAN;
+    search->status = events_at (r, *root, x->now, search->error);
+    const double first = search->status == PW_OK ? pw_first_crossing (search, t, x->start, *root, x->now) : NAN;
     if (!isnan (first)) *root = first;
     return search->status;
   }
@@ -630,6 +655,7 @@ static int events_follow (pw_run *r, double t0, pw_error *error) {
     if (status == PW_OK) status = events_stop_at (r, root, error);
   } else {
     events_arm (r, x->end);
+    x->longest = events_longest (r, t0);
     memcpy (x->previous, x->start, bytes);
     memcpy (x->start, x->end, bytes);
     x->previous_t = t0, x->start_t = r->t;
@@ -643,8 +669,8 @@ static int events_follow (pw_run *r, double t0, pw_error *error) {
 
 int pw_events_advance (pw_run *r, double t_end, pw_error *error) {
   int status = events_prepare (r, error);
-  const double t0 = r->t;
-  if (status == PW_OK) status = r->method->advance (r, t_end, error);
+  const double t0 = r->t, longest = r->fixed_steps ? INFINITY : r->events->longest;
+  if (status == PW_OK) status = r->method->advance (r, fmin (t_end, t0 + longest), error);
   return status == PW_OK ? events_follow (r, t0, error) : status;
 }
 
@@ -737,6 +763,7 @@ int pw_events_begin (pw_run *r, pw_error *error) {
   int changes;
   if (r->events == NULL) return PW_OK;
   events_units (r);
+  r->events->longest = EVENTS_FIRST * r->w->scale.time;
   int status = events_decide (r, 1, &changes, error);
   if (status == PW_OK) status = pw_run_open_saddle (r, error);
   if (status == PW_OK) status = pw_run_evaluate (r, error);
@@ -763,6 +790,6 @@ void pw_events_serialise (pw_run *r, pw_archive *a) {
   }
   if (a->failed) r->event_count = 0;
   memset (x->armed, 0, (size_t)x->count);
-  x->start_t = x->previous_t = NAN;
+  x->start_t = x->previous_t = NAN, x->longest = EVENTS_FIRST * r->w->scale.time, x->roughness = 0;
   if (!a->failed) events_apply (r);
 }

@@ -249,6 +249,7 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   r->w->scale.time = run_time_scale (r);
   pw_ledger_begin (r);
   status = pw_events_begin (r, error); /* velocities may jump */
+  if (r->events && status == PW_OK) r->w->scale.time = run_time_scale (r);
   r->advance = r->events ? pw_events_advance : r->method->advance;
   if (status != PW_OK) return status;
   run_absolute_tolerances (r);

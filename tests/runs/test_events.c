@@ -234,6 +234,25 @@ TEST (none_missed) {
   assert_true (total > 300);
 }
 
+/* A block that holds most of the time does not move: only the multiplier requires short steps. */
+TEST (nothing_moves) {
+  static const char *const method[] = { "erk5+projection", "erk8+projection", "radau+ggl", "ida+ggl",
+                                        "bdf+projection",  "adams+none",      "rk4+none" };
+  for (size_t i = 0; i < sizeof method / sizeof *method; i++)
+    for (double rtol = 1e-12; rtol < 1e-3; rtol *= 100) {
+      pw_system *s = events_system ("block", "k=0 x0=0 F=1.05 w=200 lim=1");
+      pw_run *r = runs_open (s, method[i], &(pw_settings){ .step = 1e-3, .rtol = rtol, .span = 100 });
+      int count;
+      (void)runs_to (r, 2);
+      const pw_event *event = pw_run_events (r, &count);
+      if (count != 256) print_error ("%s, rtol %g: %d events\n", method[i], rtol, count);
+      assert_int_equal (count, 256); /* two in each half of a period, the first one at t = 0 */
+      for (int k = 2; k < count; k++)
+        check_close ("half a period", event[k].t - event[k - 2].t, PW_PI / 200, k < 6 ? 1e-2 : 1e-3, "it settles");
+      runs_close (r, s);
+    }
+}
+
 /* ---- Checkpoints ---- */
 
 /* Loaded runs continue like saved ones, bit for bit, whatever the modes at that time. */

@@ -54,21 +54,14 @@ PER_ELEMENT (sliding_force_q, sliding, 36) {
 COULOMB (sliding, 6)
 EXACT_COULOMB (sliding, pw_sliding_friction)
 
-PER_ELEMENT (sliding_exact_gamma, sliding, 1) {
-  line_gamma_one (now.across, out);
-}
-
-PER_ELEMENT (sliding_exact_jw_q, sliding, 6) {
-  line_jw_q_one (now.across, out);
-}
-
-PER_ELEMENT (sliding_exact_gamma_q, sliding, 6) {
-  line_gamma_q_one (now.across, out);
-}
-
-PER_ELEMENT (sliding_exact_gamma_v, sliding, 6) {
-  line_gamma_v_one (now.across, out);
-}
+#define SLIDING_EXACT(function, size)                     \
+  PER_ELEMENT (sliding_exact_##function, sliding, size) { \
+    line_##function##_one (now.across, out);              \
+  }
+SLIDING_EXACT (gamma, 1)
+SLIDING_EXACT (jw_q, 6)
+SLIDING_EXACT (gamma_q, 6)
+SLIDING_EXACT (gamma_v, 6)
 
 static const pw_field sliding_fields[] = {
   { PW_AT (pw_sliding_friction, body), PW_BODY, .count = 2, .required = 1,
