@@ -150,8 +150,9 @@ void pw_plots_add (pw_plots *plots, const pw_sample *sample) {
   const int states = pw_system_states (plots->system);
   const double *state = sample->v + pw_system_coordinates (plots->system) - states;
   for (int o = 0; o < plots->outputs; o++)
-    pw_plot_sample (plots, i)[plots->sample_size - plots->outputs + o] =
-        o < states ? state[o] : sample->output[o - states];
+    pw_plot_sample (plots, i)[plots->sample_size - plots->outputs + o] = o < states       ? state[o]
+                                                                         : sample->output ? sample->output[o - states]
+                                                                                          : NAN;
   if (i == 0) pw_plot_measure (plots);
   if (plots->with_forces && plots->links > 0)
     pw_plot_forces (plots, sample, pw_plot_track (plots, i, &plots->wheels, plots->wheels.drawn));
