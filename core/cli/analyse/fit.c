@@ -805,20 +805,14 @@ static void fit_print (const pw_fit *fit) {
 
 static void report_json_unknown (const pw_fit *fit, pw_json *j, int i) {
   const pw_unknown *u = fit->unknowns.list + i;
-  pw_json_open (j, NULL, '{');
-  pw_json_text (j, "name", u->name);
-  pw_json_text (j, "unit", u->unit);
-  pw_json_number (j, "initial", u->value);
-  pw_json_number (j, "value", fit->estimate[i]);
-  pw_json_number (j, "standard_error", fit->standard_error[i]);
-  pw_json_number (j, "from", report_interval_end (fit, i, -1));
-  pw_json_number (j, "to", report_interval_end (fit, i, 1));
+  pw_json_print (j, "{name: %s, unit: %s, initial: %g, value: %g, standard_error: %g, from: %g, to: %g", u->name,
+                 u->unit, u->value, fit->estimate[i], fit->standard_error[i], report_interval_end (fit, i, -1),
+                 report_interval_end (fit, i, 1));
   if (fit->interrupted)
     pw_json_text (j, "determined", NULL);
   else
     pw_json_flag (j, "determined", !isinf (fit->standard_error[i]));
-  pw_json_flag (j, "bound", *report_bound (fit, i) != 0);
-  pw_json_close (j, '}');
+  pw_json_print (j, "bound: %i}", *report_bound (fit, i) != 0);
 }
 
 static void report_json_columns (const pw_fit *fit, pw_json *j) {
@@ -826,12 +820,7 @@ static void report_json_columns (const pw_fit *fit, pw_json *j) {
   for (int i = 0; i < fit->columns; i++) {
     int count;
     double rms = report_rms (fit, i, &count);
-    pw_json_open (j, NULL, '{');
-    pw_json_text (j, "name", fit->column_name[i]);
-    pw_json_text (j, "unit", fit->column_unit[i]);
-    pw_json_number (j, "data", count);
-    pw_json_number (j, "rms", rms);
-    pw_json_close (j, '}');
+    pw_json_print (j, "{name: %s, unit: %s, data: %d, rms: %g}", fit->column_name[i], fit->column_unit[i], count, rms);
   }
   pw_json_close (j, ']');
 }
@@ -854,8 +843,7 @@ static void report_json_ends (const pw_fit *fit, pw_json *j) {
   int n = fit->unknowns.count;
   pw_json_open (j, "searches", '[');
   for (const double *end = fit->ends; end < fit->ends + fit->starts * (1 + n); end += 1 + n) {
-    pw_json_open (j, NULL, '{');
-    pw_json_number (j, "chi2", *end);
+    pw_json_print (j, "{chi2: %g", *end);
     pw_json_numbers (j, "values", end + 1, n);
     pw_json_close (j, '}');
   }
@@ -865,23 +853,13 @@ static void report_json_ends (const pw_fit *fit, pw_json *j) {
 static void fit_json (const pw_fit *fit, const char *status, FILE *f) {
   pw_json json = { .f = f, .lines = 2 }, *j = &json;
   char options[PW_UNKNOWNS_OPTIONS];
-  pw_json_open (j, NULL, '{');
-  pw_json_number (j, "schema", 1);
-  pw_json_text (j, "model", pw_file_name (fit->model.file));
-  pw_json_text (j, "status", status);
-  pw_json_text (j, "data", fit->data_path);
-  pw_json_text (j, "options", pw_unknowns_options (&fit->unknowns, fit->estimate, options));
-  pw_json_text (j, "method", fit->unknowns.method);
-  pw_json_number (j, "residuals", fit->residuals);
-  pw_json_number (j, "freedom", fit_degrees_of_freedom (fit));
-  pw_json_flag (j, "weighted", fit->weighted);
-  pw_json_number (j, "chi2", fit->chi2);
-  pw_json_number (j, "confidence", fit->confidence);
-  pw_json_number (j, "rank", fit->rank);
-  pw_json_number (j, "runs", (double)fit->runs);
-  pw_json_text (j, "derivatives", "differences");
-  pw_json_number (j, "iterations", fit->iterations);
-  pw_json_open (j, "unknowns", '[');
+  pw_json_print (j, "{schema: %d, model: %s, status: %s, data: %s, options: %s, method: %s", 1,
+                 pw_file_name (fit->model.file), status, fit->data_path,
+                 pw_unknowns_options (&fit->unknowns, fit->estimate, options), fit->unknowns.method);
+  pw_json_print (j, "residuals: %d, freedom: %d, weighted: %i, chi2: %g, confidence: %g, rank: %d, runs: %ld",
+                 fit->residuals, fit_degrees_of_freedom (fit), fit->weighted, fit->chi2, fit->confidence, fit->rank,
+                 fit->runs);
+  pw_json_print (j, "derivatives: %s, iterations: %d, unknowns: [", "differences", fit->iterations);
   for (int i = 0; i < fit->unknowns.count; i++) report_json_unknown (fit, j, i);
   pw_json_close (j, ']');
   report_json_columns (fit, j);

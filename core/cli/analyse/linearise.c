@@ -314,21 +314,14 @@ static void linearise_block_json (const pw_linearise_command *cmd, pw_json *j, c
 
 static void linearise_mode_json (const pw_linearise_command *cmd, pw_json *j, int i) {
   const pw_linear *l = &cmd->linear;
-  j->line = 1;
-  pw_json_open (j, NULL, '{');
-  pw_json_number (j, "re", l->re[i]);
-  pw_json_number (j, "im", l->im[i]);
-  pw_json_number (j, "frequency_hz", fabs (l->im[i]) / (2 * PW_PI));
-  pw_json_number (j, "damping", linearise_damping (l, i));
-  pw_json_number (j, "doubling_time", linearise_doubling_time (l->re[i]));
-  pw_json_number (j, "halving_time", linearise_doubling_time (-l->re[i]));
-  pw_json_flag (j, "rigid", l->rigid[i]);
-  pw_json_open (j, "shape", '{');
+  pw_json_print (
+      j, "\n{re: %g, im: %g, frequency_hz: %g, damping: %g, doubling_time: %g, halving_time: %g, rigid: %i, shape: {",
+      l->re[i], l->im[i], fabs (l->im[i]) / (2 * PW_PI), linearise_damping (l, i), linearise_doubling_time (l->re[i]),
+      linearise_doubling_time (-l->re[i]), l->rigid[i]);
   for (int k = 0; linearise_has_shape (l, i) && k < 2 * l->coordinates; k++)
     if (!pw_system_state_hidden (cmd->m.system, k))
       pw_json_numbers (j, PW_NAME (pw_system_state_name, cmd->m.system, k), linearise_shape (l, i, k), 2);
-  pw_json_close (j, '}');
-  pw_json_close (j, '}');
+  pw_json_print (j, "}}");
 }
 
 /* Writes names and units of the inputs or outputs with the indices of a list. */
@@ -336,26 +329,18 @@ static void linearise_names_json (const pw_linearise_command *cmd, pw_json *j, c
                                   int count, char *(*name_of) (const pw_system *s, int i, char *buffer, size_t size),
                                   const char *(*unit_of) (const pw_system *s, int i)) {
   pw_json_open (j, key, '[');
-  for (int i = 0; i < count; i++) {
-    pw_json_open (j, NULL, '{');
-    pw_json_text (j, "name", PW_NAME (name_of, cmd->m.system, list[i]));
-    pw_json_text (j, "unit", unit_of (cmd->m.system, list[i]));
-    pw_json_close (j, '}');
-  }
+  for (int i = 0; i < count; i++)
+    pw_json_print (j, "{name: %s, unit: %s}", PW_NAME (name_of, cmd->m.system, list[i]),
+                   unit_of (cmd->m.system, list[i]));
   pw_json_close (j, ']');
 }
 
 static void linearise_json (const pw_linearise_command *cmd, pw_json *j) {
   const pw_linear *l = &cmd->linear;
   linearise_block block[4];
-  pw_json_open (j, NULL, '{');
-  pw_json_number (j, "schema", 1);
-  pw_json_text (j, "model", pw_file_name (cmd->m.file));
-  pw_json_number (j, "t", cmd->t);
-  pw_json_text (j, "motion", linearise_motions[l->steady]);
-  pw_json_number (j, "positions", l->positions);
-  pw_json_number (j, "velocities", l->velocities);
-  pw_json_number (j, "symmetries", l->symmetries);
+  pw_json_print (j, "{schema: %d, model: %s, t: %g, motion: %s, positions: %d, velocities: %d, symmetries: %d", 1,
+                 pw_file_name (cmd->m.file), cmd->t, linearise_motions[l->steady], l->positions, l->velocities,
+                 l->symmetries);
   pw_json_numbers (j, "twist", l->twist, 3);
   linearise_names_json (cmd, j, "inputs", cmd->input, cmd->inputs, pw_system_signal_name, pw_system_signal_unit);
   linearise_names_json (cmd, j, "outputs", cmd->output, cmd->outputs, pw_system_state_name, pw_system_state_unit);
@@ -363,8 +348,7 @@ static void linearise_json (const pw_linearise_command *cmd, pw_json *j) {
   for (int i = 0; i < 4; i++) linearise_block_json (cmd, j, &block[i]);
   pw_json_open (j, "eigenvalues", '[');
   for (int i = 0; i < l->unknowns; i++) linearise_mode_json (cmd, j, i);
-  pw_json_close (j, ']');
-  pw_json_close (j, '}');
+  pw_json_print (j, "]}");
 }
 
 static int linearise_csv (const pw_linearise_command *cmd, FILE *f, pw_error *error) {

@@ -618,64 +618,40 @@ static void optimise_print (const pw_optimise *problem) {
 
 static void report_json_unknown (const pw_optimise *problem, pw_json *j, int i) {
   const pw_unknown *u = problem->unknowns.list + i;
-  pw_json_open (j, NULL, '{');
-  pw_json_text (j, "name", u->name);
-  pw_json_text (j, "unit", u->unit);
-  pw_json_number (j, "initial", u->value);
-  pw_json_number (j, "value", problem->best->to[i]);
-  pw_json_number (j, "low", u->low);
-  pw_json_number (j, "high", u->high);
-  pw_json_text (j, "bound", (const char *[]){ "low", NULL, "high" }[1 + report_bound (problem, i)]);
-  pw_json_close (j, '}');
+  pw_json_print (j, "{name: %s, unit: %s, initial: %g, value: %g, low: %g, high: %g, bound: %s}", u->name, u->unit,
+                 u->value, problem->best->to[i], u->low, u->high,
+                 (const char *[]){ "low", NULL, "high" }[1 + report_bound (problem, i)]);
 }
 
 static void report_json_search (const pw_optimise *problem, pw_json *j, const pw_search *search) {
-  pw_json_open (j, NULL, '{');
-  pw_json_number (j, "value", search->feasible ? search->output[0] : NAN);
-  pw_json_number (j, "runs", (double)search->runs);
-  pw_json_number (j, "failed", (double)search->failed);
+  pw_json_print (j, "{value: %g, runs: %ld, failed: %ld", search->feasible ? search->output[0] : NAN, search->runs,
+                 search->failed);
   pw_json_numbers (j, "from", search->from, problem->unknowns.count);
   pw_json_numbers (j, "to", search->to, search->feasible ? problem->unknowns.count : 0);
   pw_json_close (j, '}');
 }
 
 static void report_json_constraint (const pw_optimise *problem, pw_json *j, int i) {
-  pw_json_open (j, NULL, '{');
-  pw_json_text (j, "output", problem->output[i]);
-  pw_json_text (j, "type", problem->sign[i] > 0 ? "<=" : ">=");
-  pw_json_number (j, "bound", problem->bound[i]);
-  pw_json_number (j, "value", problem->best->output[i]);
-  pw_json_close (j, '}');
+  pw_json_print (j, "{output: %s, type: %s, bound: %g, value: %g}", problem->output[i],
+                 problem->sign[i] > 0 ? "<=" : ">=", problem->bound[i], problem->best->output[i]);
 }
 
 static void optimise_json (const pw_optimise *problem, const char *status, FILE *f) {
   pw_json json = { .f = f, .lines = 2 }, *j = &json;
   char options[PW_UNKNOWNS_OPTIONS];
-  pw_json_open (j, NULL, '{');
-  pw_json_number (j, "schema", 1);
-  pw_json_text (j, "model", pw_file_name (problem->model.file));
-  pw_json_text (j, "status", status);
+  pw_json_print (j, "{schema: %d, model: %s, status: %s", 1, pw_file_name (problem->model.file), status);
   pw_json_text (j, problem->maximise ? "maximise" : "minimise", problem->output[0]);
-  pw_json_number (j, "value", problem->best->output[0]);
-  pw_json_number (j, "initial", report_initial (problem));
-  pw_json_text (j, "options", pw_unknowns_options (&problem->unknowns, problem->best->to, options));
-  pw_json_text (j, "method", problem->unknowns.method);
-  pw_json_number (j, "t_end", problem->unknowns.t_end);
-  pw_json_number (j, "seed", problem->seed);
-  pw_json_number (j, "runs", (double)problem->runs);
-  pw_json_number (j, "failed", (double)problem->failed);
-  pw_json_number (j, "derivatives", (double)problem->derivatives);
-  pw_json_text (j, "reason", problem->first_error ? problem->first_error->text : "");
-  pw_json_open (j, "unknowns", '[');
+  pw_json_print (j, "value: %g, initial: %g, options: %s, method: %s, t_end: %g, seed: %g", problem->best->output[0],
+                 report_initial (problem), pw_unknowns_options (&problem->unknowns, problem->best->to, options),
+                 problem->unknowns.method, problem->unknowns.t_end, problem->seed);
+  pw_json_print (j, "runs: %ld, failed: %ld, derivatives: %ld, reason: %s, unknowns: [", problem->runs, problem->failed,
+                 problem->derivatives, problem->first_error ? problem->first_error->text : "");
   for (int i = 0; i < problem->unknowns.count; i++) report_json_unknown (problem, j, i);
-  pw_json_close (j, ']');
-  pw_json_open (j, "constraints", '[');
+  pw_json_print (j, "], constraints: [");
   for (int i = 1; i < problem->outputs; i++) report_json_constraint (problem, j, i);
-  pw_json_close (j, ']');
-  pw_json_open (j, "starts", '[');
+  pw_json_print (j, "], starts: [");
   for (int i = 0; i < problem->starts + problem->refinements; i++) report_json_search (problem, j, problem->search + i);
-  pw_json_close (j, ']');
-  pw_json_close (j, '}');
+  pw_json_print (j, "]}");
 }
 
 /* Writes the command that runs the result, as a comment: the given options that affect runs, then the values found. */

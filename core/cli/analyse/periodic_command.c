@@ -349,47 +349,28 @@ static void periodic_point_json (const pw_periodic_command *cmd, const pw_period
   pw_json_open (j, NULL, '{');
   if (cmd->vary_text) pw_json_number (j, "parameter", o->parameter);
   if (cmd->vary_text) pw_json_text (j, "event", periodic_events[o->event]);
-  pw_json_number (j, "period", o->period);
-  pw_json_number (j, "displacement", d.total);
-  pw_json_number (j, "along", d.along);
-  pw_json_number (j, "left", d.left);
-  pw_json_number (j, "rotation", o->rotation);
-  pw_json_open (j, "rotations", '{');
+  pw_json_print (j, "period: %g, displacement: %g, along: %g, left: %g, rotation: %g, rotations: {", o->period, d.total,
+                 d.along, d.left, o->rotation);
   for (int i = 0; i < periodic_rotations (cmd->m.system); i++)
     pw_json_number (j, periodic_rotation_name (cmd->m.system, i, text, sizeof text),
                     periodic_rotation (cmd->m.system, o, i));
-  pw_json_close (j, '}');
-  pw_json_number (j, "residual", o->residual);
-  pw_json_number (j, "iterations", o->iterations);
-  pw_json_number (j, "growing", o->unstable);
+  pw_json_print (j, "}, residual: %g, iterations: %d, growing: %d", o->residual, o->iterations, o->unstable);
   pw_states_json (cmd->m.system, o->q, o->v, "start", j);
   pw_states_json (cmd->m.system, o->end, o->end + n, "end", j);
   pw_json_open (j, "multipliers", '[');
-  for (int i = 0; i < o->multipliers; i++) {
-    pw_json_open (j, NULL, '{');
-    pw_json_number (j, "re", o->re[i]);
-    pw_json_number (j, "im", o->im[i]);
-    pw_json_flag (j, "trivial", i >= o->multipliers - o->trivial);
-    pw_json_close (j, '}');
-  }
-  pw_json_close (j, ']');
-  pw_json_close (j, '}');
+  for (int i = 0; i < o->multipliers; i++)
+    pw_json_print (j, "{re: %g, im: %g, trivial: %i}", o->re[i], o->im[i], i >= o->multipliers - o->trivial);
+  pw_json_print (j, "]}");
 }
 
 static void periodic_json (const void *context, pw_json *j) {
   const pw_periodic_command *cmd = context;
-  pw_json_open (j, NULL, '{');
-  pw_json_number (j, "schema", 1);
-  pw_json_text (j, "model", pw_file_name (cmd->m.file));
-  pw_json_text (j, "parameter", cmd->vary_text ? cmd->vary.name : NULL);
-  pw_json_text (j, "unit", cmd->vary.unit);
-  pw_json_text (j, "method", cmd->settings.method);
-  pw_json_number (j, "symmetries", pw_periodic_symmetries (cmd->search));
-  pw_json_flag (j, "complete", !cmd->stopped);
-  pw_json_open (j, "motions", '[');
+  pw_json_print (
+      j, "{schema: %d, model: %s, parameter: %s, unit: %s, method: %s, symmetries: %d, complete: %i, motions: [", 1,
+      pw_file_name (cmd->m.file), cmd->vary_text ? cmd->vary.name : NULL, cmd->vary.unit, cmd->settings.method,
+      pw_periodic_symmetries (cmd->search), !cmd->stopped);
   for (int i = 0; i < cmd->points; i++) periodic_point_json (cmd, &cmd->point[i].orbit, j);
-  pw_json_close (j, ']');
-  pw_json_close (j, '}');
+  pw_json_print (j, "]}");
 }
 
 /* ---- The table ---- */

@@ -278,13 +278,9 @@ static void sensitivity_json_derivative (const sensitivity *cmd, pw_json *j, int
   char unit[SENSITIVITY_UNIT], reason[500];
   const pw_unknown *u = &cmd->unknowns.list[unknown];
   const pw_derivative *d = sensitivity_of (cmd, output, unknown, -1);
-  pw_json_open (j, NULL, '{');
-  pw_json_text (j, "by", u->name);
-  pw_json_number (j, "value", u->value);
-  pw_json_text (j, "unit", sensitivity_unit (cmd, output, unknown, unit));
-  pw_json_number (j, "derivative", d->value);
-  pw_json_number (j, "error", d->error);
-  pw_json_number (j, "elasticity", sensitivity_elasticity (cmd, output, unknown));
+  pw_json_print (j, "{by: %s, value: %g, unit: %s, derivative: %g, error: %g, elasticity: %g", u->name, u->value,
+                 sensitivity_unit (cmd, output, unknown, unit), d->value, d->error,
+                 sensitivity_elasticity (cmd, output, unknown));
   if (d->type != PW_DERIVATIVE) pw_json_text (j, "reason", sensitivity_reason (u, d, reason, sizeof reason));
   pw_json_close (j, '}');
 }
@@ -292,26 +288,16 @@ static void sensitivity_json_derivative (const sensitivity *cmd, pw_json *j, int
 static void sensitivity_json (const void *context, pw_json *j) {
   const sensitivity *cmd = context;
   char unit[SENSITIVITY_UNIT];
-  pw_json_open (j, NULL, '{');
-  pw_json_text (j, "model", pw_file_name (cmd->unknowns.m->file));
-  pw_json_text (j, "method", cmd->unknowns.method);
-  pw_json_text (j, "derivatives_by", cmd->outputs.method);
-  pw_json_number (j, "t_end", cmd->unknowns.t_end);
-  pw_json_flag (j, "complete", 1);
-  pw_json_number (j, "cpu_seconds", cmd->cpu);
-  pw_json_open (j, "outputs", '[');
+  pw_json_print (j, "{model: %s, method: %s, derivatives_by: %s, t_end: %g, complete: %i, cpu_seconds: %g, outputs: [",
+                 pw_file_name (cmd->unknowns.m->file), cmd->unknowns.method, cmd->outputs.method, cmd->unknowns.t_end,
+                 1, cmd->cpu);
   for (int o = 0; o < cmd->outputs.count; o++) {
-    pw_json_open (j, NULL, '{');
-    pw_json_text (j, "output", cmd->outputs.of[o]);
-    pw_json_text (j, "unit", pw_outcome_unit (&cmd->outcomes, o, unit, sizeof unit));
-    pw_json_number (j, "value", cmd->value[o]);
-    pw_json_open (j, "derivatives", '[');
+    pw_json_print (j, "{output: %s, unit: %s, value: %g, derivatives: [", cmd->outputs.of[o],
+                   pw_outcome_unit (&cmd->outcomes, o, unit, sizeof unit), cmd->value[o]);
     for (int p = 0; p < cmd->unknowns.count; p++) sensitivity_json_derivative (cmd, j, o, p);
-    pw_json_close (j, ']');
-    pw_json_close (j, '}');
+    pw_json_print (j, "]}");
   }
-  pw_json_close (j, ']');
-  pw_json_close (j, '}');
+  pw_json_print (j, "]}");
 }
 
 /* Adds a cell "NAME [UNIT]", in quotes if the name contains a comma. */

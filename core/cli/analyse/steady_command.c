@@ -463,26 +463,18 @@ static void steady_print (const pw_steady_command *cmd) {
 
 static void steady_eigenvalues_json (const pw_linear *l, pw_json *j) {
   pw_json_open (j, "eigenvalues", '[');
-  for (int i = 0; i < l->unknowns; i++) {
-    pw_json_open (j, NULL, '{');
-    pw_json_number (j, "re", l->re[i]);
-    pw_json_number (j, "im", l->im[i]);
-    pw_json_number (j, "frequency_hz", fabs (l->im[i]) / (2 * PW_PI));
-    pw_json_flag (j, "rigid", l->rigid[i]);
-    pw_json_close (j, '}');
-  }
+  for (int i = 0; i < l->unknowns; i++)
+    pw_json_print (j, "{re: %g, im: %g, frequency_hz: %g, rigid: %i}", l->re[i], l->im[i],
+                   fabs (l->im[i]) / (2 * PW_PI), l->rigid[i]);
   pw_json_close (j, ']');
 }
 
 static void steady_point_json (const pw_steady_command *cmd, const pw_steady_point *p, pw_json *j) {
   const pw_system *s = cmd->m.system;
-  j->line = 1;
-  pw_json_open (j, NULL, '{');
-  pw_json_number (j, "branch", p->branch);
+  pw_json_print (j, "\n{branch: %d", p->branch);
   if (cmd->vary_text) pw_json_text (j, "event", steady_events[p->motion.event]);
   if (cmd->vary_text) pw_json_number (j, "parameter", p->motion.parameter);
-  pw_json_number (j, "attempt", p->attempt);
-  pw_json_number (j, "residual", p->motion.residual);
+  pw_json_print (j, "attempt: %d, residual: %g", p->attempt, p->motion.residual);
   if (!cmd->vary_text) pw_json_number (j, "family", p->motion.family);
   pw_json_number (j, "growing", p->motion.unstable);
   pw_json_numbers (j, "twist", p->linear.twist, 3);
@@ -493,26 +485,17 @@ static void steady_point_json (const pw_steady_command *cmd, const pw_steady_poi
 
 static void steady_json (const void *context, pw_json *j) {
   const pw_steady_command *cmd = context;
-  pw_json_open (j, NULL, '{');
-  pw_json_number (j, "schema", 1);
-  pw_json_text (j, "model", pw_file_name (cmd->m.file));
-  pw_json_text (j, "parameter", cmd->vary_text ? cmd->vary.name : NULL);
-  pw_json_text (j, "unit", cmd->vary.unit);
-  pw_json_open (j, "held", '{');
+  pw_json_print (j, "{schema: %d, model: %s, parameter: %s, unit: %s, held: {", 1, pw_file_name (cmd->m.file),
+                 cmd->vary_text ? cmd->vary.name : NULL, cmd->vary.unit);
   for (int i = 0; i < cmd->settings.holds; i++)
     if (i != cmd->settings.vary)
       pw_json_number (j, PW_NAME (pw_system_held_name, cmd->m.system, cmd->hold[i].state), cmd->hold[i].value);
-  pw_json_close (j, '}');
-  pw_json_number (j, "symmetries", pw_steady_symmetries (cmd->search));
-  pw_json_number (j, "attempts", PW_STEADY_NOT_RANDOM + cmd->random_attempts);
-  pw_json_flag (j, "complete", !cmd->stopped);
-  pw_json_open (j, "ends", '[');
+  pw_json_print (j, "}, symmetries: %d, attempts: %d, complete: %i, ends: [", pw_steady_symmetries (cmd->search),
+                 PW_STEADY_NOT_RANDOM + cmd->random_attempts, !cmd->stopped);
   for (int i = 0; cmd->vary_text && i < cmd->branches; i++) pw_json_text (j, NULL, cmd->end[i]);
-  pw_json_close (j, ']');
-  pw_json_open (j, "motions", '[');
+  pw_json_print (j, "], motions: [");
   for (int i = 0; i < cmd->points; i++) steady_point_json (cmd, cmd->point + i, j);
-  pw_json_close (j, ']');
-  pw_json_close (j, '}');
+  pw_json_print (j, "]}");
 }
 
 /* ---- The table ---- */

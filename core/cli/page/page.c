@@ -52,13 +52,11 @@ static void page_states_json (const page *cmd, pw_json *j) {
   for (int i = 0; i < 2 * n; i++) {
     pw_json_open (j, NULL, '{');
     int hidden = pw_system_state_hidden (cmd->compiled.system, i);
-    pw_json_text (j, "name", hidden ? "" : PW_NAME (pw_system_state_name, cmd->compiled.system, i));
-    pw_json_text (j, "unit", pw_system_state_unit (cmd->compiled.system, i));
+    pw_json_print (j, "name: %s, unit: %s", hidden ? "" : PW_NAME (pw_system_state_name, cmd->compiled.system, i),
+                   pw_system_state_unit (cmd->compiled.system, i));
     int given = pw_initial_given (initial, i);
     const double *q = given ? initial->q_given : initial->q, *v = given ? initial->v_given : initial->v;
-    pw_json_number (j, "value", i < n ? q[i] : v[i - n]);
-    pw_json_flag (j, "given", given);
-    pw_json_close (j, '}');
+    pw_json_print (j, "value: %g, given: %i}", i < n ? q[i] : v[i - n], given);
   }
   pw_json_close (j, ']');
 }
@@ -71,32 +69,23 @@ static int page_has_method (const pw_method *m) {
 static void page_methods_json (pw_json *j) {
   pw_json_open (j, "methods", '[');
   for (const pw_method *const *m = pw_methods; *m; m++)
-    for (int i = 0; page_has_method (*m) && (*m)->stabilisations[i].name; i++) {
-      pw_json_open (j, NULL, '{');
-      pw_json_text (j, "name", PW_PRINTED (100, "%s+%s", (*m)->name, (*m)->stabilisations[i].name));
-      pw_json_flag (j, "adaptive", (*m)->adaptive);
-      pw_json_close (j, '}');
-    }
+    for (int i = 0; page_has_method (*m) && (*m)->stabilisations[i].name; i++)
+      pw_json_print (j, "{name: %s, adaptive: %i}", PW_PRINTED (100, "%s+%s", (*m)->name, (*m)->stabilisations[i].name),
+                     (*m)->adaptive);
   pw_json_close (j, ']');
 }
 
 static void page_data_json (const page *cmd, FILE *f) {
   pw_json j = { .f = f, .lines = 1 };
-  pw_json_open (&j, NULL, '{');
-  pw_json_text (&j, "name", pw_system_name (cmd->compiled.system));
-  pw_json_text (&j, "about", pw_model_table (cmd->compiled.model)->about);
-  pw_json_text (&j, "version", PW_VERSION);
-  pw_json_text (&j, "method", cmd->method);
-  pw_json_number (&j, "t_end", cmd->t_end);
-  pw_json_number (&j, "step", cmd->settings.step);
-  pw_json_number (&j, "rtol", cmd->settings.rtol > 0 ? cmd->settings.rtol : PW_RTOL);
+  pw_json_print (&j, "{name: %s, about: %s, version: %s, method: %s, t_end: %g, step: %g, rtol: %g",
+                 pw_system_name (cmd->compiled.system), pw_model_table (cmd->compiled.model)->about, PW_VERSION,
+                 cmd->method, cmd->t_end, cmd->settings.step, cmd->settings.rtol > 0 ? cmd->settings.rtol : PW_RTOL);
   page_methods_json (&j);
   pw_animation_parameters (&j, cmd->compiled.model);
   page_states_json (cmd, &j);
   pw_json_open (&j, "files", '{');
   for (int i = 0; i < cmd->content.files; i++) page_file_json (&j, &cmd->content.file[i], cmd->base64);
-  pw_json_close (&j, '}');
-  pw_json_close (&j, '}');
+  pw_json_print (&j, "}}");
 }
 
 /* Writes the script, and the call that passes the data to it. */

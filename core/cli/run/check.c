@@ -362,11 +362,7 @@ static void report_mass (pw_json *j, const pw_check *check) {
 
 static void report_change (pw_json *j, const pw_check *check, int i, int *listed) {
   const pw_state_change c = pw_cli_state_change (check->model.system, pw_run_initial (check->run), i);
-  pw_json_open (j, NULL, '{');
-  pw_json_text (j, "state", c.name);
-  pw_json_number (j, "from", c.given);
-  pw_json_number (j, "to", c.consistent);
-  pw_json_close (j, '}');
+  pw_json_print (j, "{state: %s, from: %g, to: %g}", c.name, c.given, c.consistent);
   report_item (j, listed, NULL,
                PW_PRINTED (500, "%-20s from %s to %s, by %s %s", c.name, PW_DIGITS (c.given, 10),
                            PW_DIGITS (c.consistent, 10), PW_DIGITS (c.consistent - c.given, 3), c.unit));
@@ -383,9 +379,7 @@ static void report_initial (pw_json *j, const pw_check *check) {
   }
   const pw_initial_report *initial = pw_run_initial (check->run);
   report_section (j, "start", '{', title);
-  pw_json_number (j, "moved", initial->moved);
-  pw_json_flag (j, "freed", initial->released);
-  pw_json_open (j, "changes", '[');
+  pw_json_print (j, "moved: %d, freed: %i, changes: [", initial->moved, initial->released);
   if (initial->moved == 0)
     report_print (j, "  consistent as described\n");
   else
@@ -421,32 +415,21 @@ static void report_failures (pw_json *j, const pw_selftest_report *report, const
     if (!c->failed) continue;
     report_print (j, "    in %s: %s does not hold: off by %s, the bound is %s\n      %s\n", scenes, c->about,
                   PW_DIGITS (c->error, 2), PW_DIGITS (c->bound, 2), c->where);
-    pw_json_open (j, NULL, '{');
-    pw_json_text (j, "check", c->name);
-    pw_json_text (j, "in", scenes);
-    pw_json_text (j, "expected", c->about);
-    pw_json_number (j, "error", c->error);
-    pw_json_number (j, "bound", c->bound);
-    pw_json_text (j, "where", c->where);
-    pw_json_close (j, '}');
+    pw_json_print (j, "{check: %s, in: %s, expected: %s, error: %g, bound: %g, where: %s}", c->name, scenes, c->about,
+                   c->error, c->bound, c->where);
   }
 }
 
 static void report_kind (pw_json *j, const pw_checked_kind *k) {
-  report_line (j);
-  pw_json_open (j, NULL, '{');
-  pw_json_text (j, "kind", k->kind->name);
-  pw_json_number (j, "elements", k->count);
-  pw_json_number (j, "checks", k->random.checks + k->in_model.checks);
-  pw_json_open (j, "failed", '[');
+  pw_json_print (j, "\n{kind: %s, elements: %d, checks: %d, failed: [", k->kind->name, k->count,
+                 k->random.checks + k->in_model.checks);
   report_text (j, PW_PRINTED (100, "%s (%s)", k->kind->name, PW_COUNTED (k->count, "element")),
                "%s: %d checks in random scenes, %d in this model",
                k->random.failed + k->in_model.failed ? "FAILED" : "good", k->random.checks, k->in_model.checks);
   if (*k->untested) report_print (j, "    not tested in random scenes: %s\n", k->untested);
   report_failures (j, &k->random, "random scenes");
   report_failures (j, &k->in_model, "this model");
-  pw_json_close (j, ']');
-  pw_json_close (j, '}');
+  pw_json_print (j, "]}");
 }
 
 /* ---- Linearisation ---- */
@@ -554,8 +537,7 @@ static void report_linear (pw_json *j, const pw_check *check) {
   report_section (j, "eigenvalues", '[', NULL);
   for (int i = 0; i < linear->unknowns; i++)
     pw_json_numbers (j, NULL, (const double[]){ linear->re[i], linear->im[i] }, 2);
-  pw_json_close (j, ']');
-  pw_json_close (j, '}');
+  pw_json_print (j, "]}");
 }
 
 static void report_list (pw_json *j, const char *key, const char *one, const pw_check_list *list) {
@@ -577,10 +559,8 @@ static void report_lists (pw_json *j, const pw_check *check) {
 /* Writes the report: as JSON to j, or as text to standard output if j is NULL. */
 static void report_write (const pw_check *check, pw_json *j) {
   const char *about = pw_file_table (check->model.file)->about;
-  pw_json_open (j, NULL, '{');
-  pw_json_number (j, "schema", 1);
-  pw_json_text (j, "model", pw_file_name (check->model.file));
-  pw_json_text (j, "status", check->problem.count ? "failed" : "ok");
+  pw_json_print (j, "{schema: %d, model: %s, status: %s", 1, pw_file_name (check->model.file),
+                 check->problem.count ? "failed" : "ok");
   if (j) report_lists (j, check);
   report_print (j, "%s: %s\n", pw_file_name (check->model.file), about ? about : "");
   report_mobility (j, check);
