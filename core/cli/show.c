@@ -329,7 +329,7 @@ static void show_reference (const pw_cli_model *m) {
 static void show_model (const pw_cli_model *m) {
   const pw_system *s = m->system;
   const pw_plugin_table *table = pw_model_table (m->model);
-  pw_run_defaults defaults = pw_cli_defaults (table);
+  const pw_run_defaults *defaults = &m->defaults;
   int elements, differences = pw_system_differences (s), bodies = pw_system_bodies (s), rows = pw_system_rows (s),
                 holonomic = pw_system_holonomic (s);
   const pw_element *e = pw_model_elements (m->model, &elements);
@@ -342,9 +342,9 @@ static void show_model (const pw_cli_model *m) {
   if (differences) puts ("\nDerivatives by differences, for implicit methods and linearisation");
   for (int i = 0; i < differences; i++) printf ("  %s\n", PW_NAME (pw_system_difference_name, s, i));
   show_parameters (m->model);
-  printf ("\nRuns by default for %s s with %s, --step %s", PW_DIGITS (defaults.t_end, SHOW_DIGITS), defaults.method,
-          PW_DIGITS (defaults.step, SHOW_DIGITS));
-  if (defaults.rtol != 0) printf (", --rtol %s", PW_DIGITS (defaults.rtol, SHOW_DIGITS));
+  printf ("\nRuns by default for %s s with %s, --step %s", PW_DIGITS (defaults->t_end, SHOW_DIGITS), defaults->method,
+          PW_DIGITS (defaults->step, SHOW_DIGITS));
+  if (defaults->rtol != 0) printf (", --rtol %s", PW_DIGITS (defaults->rtol, SHOW_DIGITS));
   putchar ('\n');
   show_reference (m);
   printf ("\nSizes: %d %s, %d coordinates, %s (%d on positions, %d on velocities)\n", bodies,
@@ -431,12 +431,13 @@ static void matrices_print (const pw_cli_model *m, const pw_equations *eq, const
   for (int j = 0; eq->rows > 0 && j < eq->coordinates; j += MATRICES_PANEL) matrices_panel (s, eq, j);
 }
 
-static int show_matrices (const pw_cli_line *line, const pw_cli_model *m, double t, pw_error *error) {
-  pw_run_defaults defaults = pw_cli_defaults (pw_file_table (m->file));
+static int show_matrices (const pw_cli_line *line, double t, pw_error *error) {
+  const pw_cli_model *m = &line->m;
+  pw_run_defaults defaults = m->defaults;
   pw_settings settings;
   pw_limit limit;
   if (t > 0) defaults.t_end = t;
-  if (pw_cli_settings (line, &defaults, &(double){ 0 }, &settings, &limit, error) != PW_OK) return error->status;
+  if (pw_cli_settings (line, &defaults, &settings, &limit, error) != PW_OK) return error->status;
   pw_limit_start (&limit);
   pw_run *run = pw_limit_open (m->system, defaults.method, &settings, error);
   if (run == NULL) return error->status;
@@ -461,26 +462,25 @@ typedef struct {
 } show_line;
 
 static int show_command (void *options, pw_error *error) {
-  const show_line *given = options;
-  pw_cli_model m = { .file = NULL };
+  show_line *given = options;
+  const pw_cli_model *m = &given->line.m;
   double t = 0;
   int matrices = given->matrices || given->at, status = pw_cli_number ("--at", given->at, PW_NONNEGATIVE, &t, error);
   if (status == PW_OK && matrices + given->yaml + given->code > 1)
     status = pw_fail (error, PW_INPUT, "expected one of --%s, --yaml and --c", given->at ? "at T" : "matrices");
   if (status == PW_OK) status = pw_cli_requires ("--limit", given->line.limit, "--at", given->at != NULL, error);
-  if (status == PW_OK) status = pw_cli_open (&m, &given->line, error);
+  if (status == PW_OK) status = pw_cli_open (&given->line, error);
   if (status == PW_OK && given->code) {
-    char *text = pw_cli_source (m.system, error);
+    char *text = pw_cli_source (m->system, error);
     if (text) fputs (text, stdout);
     free (text);
     status = error->status;
   } else if (status == PW_OK && given->yaml)
-    status = yaml_model (&m, error);
+    status = yaml_model (m, error);
   else if (status == PW_OK && matrices)
-    status = show_matrices (&given->line, &m, t, error);
+    status = show_matrices (&given->line, t, error);
   else if (status == PW_OK)
-    show_model (&m);
-  pw_cli_close_model (&m);
+    show_model (m);
   return status;
 }
 

@@ -32,10 +32,7 @@ typedef struct {
   pw_cli_line line;
   const char *maximise, *minimise, *path, *json_path, *plots_path, *starts_text, *seed_text, *jobs_text;
   const char **free, **subject_to;
-  pw_cli_model model;
-  pw_files files;
   pw_unknowns unknowns;
-  pw_arena arena;      /* of the arrays below and those of the searches, except their `trials` */
   const char **output; /* outputs, as text: the objective, then the left sides of the constraints */
   char (*unit)[80];    /* outputs */
   double *sign;        /* outputs: 1 or -1; of the objective: sign x objective is minimised */
@@ -431,9 +428,9 @@ static int optimise_open_searches (pw_optimise *problem, pw_error *error) {
   const size_t n = (size_t)problem->unknowns.count, width = 2 * n + (size_t)problem->outputs,
                starts = (size_t)problem->starts, all = starts + OPTIMISE_REFINED;
   double *start = pw_unknowns_starts (&problem->unknowns, problem->starts, problem->seed),
-         *memory = pw_arena_alloc (&problem->arena, all * width * sizeof *memory);
-  problem->search = pw_arena_alloc (&problem->arena, all * sizeof *problem->search);
-  problem->without_effect = pw_arena_alloc (&problem->arena, 2 * n);
+         *memory = pw_arena_alloc (&problem->line.arena, all * width * sizeof *memory);
+  problem->search = pw_arena_alloc (&problem->line.arena, all * sizeof *problem->search);
+  problem->without_effect = pw_arena_alloc (&problem->line.arena, 2 * n);
   int status = start && memory && problem->search && problem->without_effect
                    ? PW_OK
                    : pw_fail (error, PW_RESOURCE, "out of memory");
@@ -509,7 +506,7 @@ static int optimise_converged (const pw_optimise *problem, pw_error *error) {
 static int optimise_search (pw_optimise *problem, pw_error *error) {
   pw_stop_catch ();
   pthread_mutex_init (&problem->lock, NULL);
-  pw_progress_start (&problem->progress, pw_file_name (problem->model.file), "searches", 0,
+  pw_progress_start (&problem->progress, pw_file_name (problem->line.m.file), "searches", 0,
                      problem->starts + OPTIMISE_REFINED);
   int status = pw_parallel (problem->jobs, problem->starts, search_rough, problem, error);
   if (status == PW_OK) status = optimise_refine (problem, error);
@@ -639,11 +636,11 @@ static void report_json_constraint (const pw_optimise *problem, pw_json *j, int 
 static void optimise_json (const pw_optimise *problem, const char *status, FILE *f) {
   pw_json json = { .f = f, .lines = 2 }, *j = &json;
   char options[PW_UNKNOWNS_OPTIONS];
-  pw_json_print (j, "{schema: %d, model: %s, status: %s", 1, pw_file_name (problem->model.file), status);
+  pw_json_print (j, "{schema: %d, model: %s, status: %s", 1, pw_file_name (problem->line.m.file), status);
   pw_json_text (j, problem->maximise ? "maximise" : "minimise", problem->output[0]);
   pw_json_print (j, "value: %g, initial: %g, options: %s, method: %s, t_end: %g, seed: %g", problem->best->output[0],
                  report_initial (problem), pw_unknowns_options (&problem->unknowns, problem->best->to, options),
-                 problem->unknowns.method, problem->unknowns.t_end, problem->seed);
+                 problem->unknowns.method, problem->unknowns.settings.span, problem->seed);
   pw_json_print (j, "runs: %ld, failed: %ld, derivatives: %ld, reason: %s, unknowns: [", problem->runs, problem->failed,
                  problem->derivatives, problem->first_error ? problem->first_error->text : "");
   for (int i = 0; i < problem->unknowns.count; i++) report_json_unknown (problem, j, i);
@@ -685,7 +682,7 @@ static void optimise_yaml (const pw_optimise *problem, FILE *f) {
   if (problem->incomplete)
     fprintf (f, "# perhaps not an optimum: %.*s\n", (int)strcspn (problem->incomplete, "\r\n"), problem->incomplete);
   fputs ("model: ", f);
-  pw_cli_quoted (f, pw_file_name (problem->model.file), "''");
+  pw_cli_quoted (f, pw_file_name (problem->line.m.file), "''");
   fputs (problem->maximise ? "\nmaximise: " : "\nminimise: ", f);
   pw_cli_quoted (f, problem->output[0], "''");
   fprintf (f, "\nvalue: %.17g\n", best->output[0]);
@@ -706,8 +703,7 @@ static int optimise_draw (const pw_optimise *problem, pw_error *error) {
   const int n = problem->unknowns.count, width = n + problem->outputs, panels = n < REPORT_PANELS ? n : REPORT_PANELS;
   const char *objective = PW_FIGURE_LABEL (problem->output[0], problem->unit[0]);
   pw_curves c;
-  int status = pw_curves_open (&c, &problem->line, &problem->model, problem->plots_path, "optimise",
-                               "runs of the optimisation", error);
+  int status = pw_curves_open (&c, &problem->line, problem->plots_path, "optimise", "runs of the optimisation", error);
   if (status != PW_OK) return status;
   for (int i = 0; i < panels; i++) {
     pw_curves_panel (
@@ -749,9 +745,9 @@ static int optimise_read_outputs (pw_optimise *problem, pw_error *error) {
   size_t count = 1;
   int status = PW_OK;
   for (const char **given = problem->subject_to; given && *given; given++) count++;
-  problem->output = pw_arena_alloc (&problem->arena, (count + 1) * sizeof *problem->output); /* ended by NULL */
-  problem->unit = pw_arena_alloc (&problem->arena, count * sizeof *problem->unit);
-  problem->bound = pw_arena_alloc (&problem->arena, 2 * count * sizeof *problem->bound);
+  problem->output = pw_arena_alloc (&problem->line.arena, (count + 1) * sizeof *problem->output); /* ended by NULL */
+  problem->unit = pw_arena_alloc (&problem->line.arena, count * sizeof *problem->unit);
+  problem->bound = pw_arena_alloc (&problem->line.arena, 2 * count * sizeof *problem->bound);
   if (problem->output == NULL || problem->unit == NULL || problem->bound == NULL)
     return pw_fail (error, PW_RESOURCE, "out of memory");
   problem->sign = problem->bound + count;
@@ -759,7 +755,7 @@ static int optimise_read_outputs (pw_optimise *problem, pw_error *error) {
   problem->sign[0] = problem->maximise ? -1 : 1;
   problem->outputs = 1;
   for (const char **given = problem->subject_to; given && *given && status == PW_OK; given++) {
-    char *copy = pw_arena_copy (&problem->arena, *given);
+    char *copy = pw_arena_copy (&problem->line.arena, *given);
     status = copy ? optimise_constraint (problem, copy, *given, error) : pw_fail (error, PW_RESOURCE, "out of memory");
   }
   return status;
@@ -768,7 +764,7 @@ static int optimise_read_outputs (pw_optimise *problem, pw_error *error) {
 /* Checks the outputs of an option, from number `first` on, and stores their units.  Extrema are not differentiable. */
 static int optimise_open_outputs (pw_optimise *problem, int first, int count, const char *option, pw_error *error) {
   pw_outcomes set;
-  int status = pw_outcomes_open (&set, problem->model.system, option, problem->output + first, count,
+  int status = pw_outcomes_open (&set, problem->line.m.system, option, problem->output + first, count,
                                  problem->line.until, error);
   for (int i = 0; i < set.outcomes; i++) pw_outcome_unit (&set, i, problem->unit[first + i], sizeof *problem->unit);
   for (int i = 0; i < set.functionals; i++) problem->differentiable &= !pw_is_extremum (set.functional[i].type);
@@ -801,16 +797,15 @@ static int optimise_open (pw_optimise *problem, pw_error *error) {
                    { "-o", problem->path, PW_WRITES, texts },
                    { "--json", problem->json_path, PW_WRITES, pw_cli_json },
                    { "--plots", problem->plots_path, PW_WRITES_INTO, figures } };
-  int status = pw_cli_open (&problem->model, &problem->line, error);
+  int status = pw_cli_open (&problem->line, error);
   problem->differentiable = 1;
   if (status == PW_OK)
     status = optimise_open_outputs (problem, 0, 1, problem->maximise ? "--maximise" : "--minimise", error);
   if (status == PW_OK) status = optimise_open_outputs (problem, 1, problem->outputs - 1, "--subject-to", error);
-  if (status == PW_OK) status = pw_unknowns_open (&problem->unknowns, &problem->line, &problem->model, error);
+  if (status == PW_OK) status = pw_unknowns_open (&problem->unknowns, &problem->line, error);
   if (status == PW_OK) status = pw_unknowns_read (&problem->unknowns, problem->free, error);
   if (status == PW_OK) status = pw_unknowns_engine (&problem->unknowns, OPTIMISE_RUNS, problem->starts, error);
-  if (status == PW_OK)
-    status = pw_files_open (&problem->files, &problem->line, &problem->model, use, sizeof use / sizeof *use, error);
+  if (status == PW_OK) status = pw_files_open (&problem->line, use, sizeof use / sizeof *use, error);
   return status == PW_OK ? optimise_open_searches (problem, error) : status;
 }
 
@@ -846,8 +841,8 @@ static int optimise_infeasible (const pw_optimise *problem, pw_error *error) {
 }
 
 static int optimise_finish (pw_optimise *problem, pw_error *error) {
-  FILE *result = pw_files_stream (&problem->files, OPTIMISE_RESULT),
-       *summary = pw_files_stream (&problem->files, OPTIMISE_SUMMARY);
+  FILE *result = pw_files_stream (&problem->line, OPTIMISE_RESULT),
+       *summary = pw_files_stream (&problem->line, OPTIMISE_SUMMARY);
   int stopped = pw_stop != 0;
   if (problem->best == NULL && stopped) pw_cli_say ("pinwheel: interrupted before any run satisfied the constraints\n");
   if (problem->best == NULL) return stopped ? PW_INTERRUPTED : optimise_infeasible (problem, error);
@@ -860,7 +855,7 @@ static int optimise_finish (pw_optimise *problem, pw_error *error) {
   const int drawn = problem->plots_path ? optimise_draw (problem, &drawing) : PW_OK;
   const char *word = pw_cli_status_word (drawn != PW_OK || converged ? drawn : PW_METHOD);
   if (summary) optimise_json (problem, stopped ? "interrupted" : word, summary);
-  int status = pw_figure_status (drawn, &drawing, pw_files_finish (&problem->files, error), error);
+  int status = pw_figure_status (drawn, &drawing, pw_files_finish (&problem->line, error), error);
   if (stopped) pw_cli_say ("pinwheel: interrupted; this is the best result so far\n");
   if (status == PW_OK && stopped) return PW_INTERRUPTED;
   return status == PW_OK && !converged ? pw_fail (error, unconverged.status, "%s", unconverged.text) : status;
@@ -873,10 +868,7 @@ static int optimise_command (void *options, pw_error *error) {
   if (status == PW_OK) status = optimise_search (problem, error);
   if (status == PW_OK) status = optimise_finish (problem, error);
   for (int i = 0; problem->search && i < problem->starts + OPTIMISE_REFINED; i++) free (problem->search[i].trials);
-  pw_arena_free (&problem->arena);
-  pw_files_close (&problem->files);
   pw_unknowns_close (&problem->unknowns);
-  pw_cli_close_model (&problem->model);
   return status;
 }
 

@@ -22,8 +22,6 @@ typedef struct {
   const char **by; /* of --by, ended by NULL */
   const char **of; /* of --of, ended by NULL */
   const char *every, *folder, *jobs_text;
-  pw_cli_model m;
-  pw_files files;
   pw_unknowns unknowns;   /* P of them */
   pw_run_outputs outputs; /* method NULL: the run itself; set by sensitivity_prepare for the runs that are compared */
   int jobs;               /* threads */
@@ -32,7 +30,6 @@ typedef struct {
   int runs;
   double cpu; /* processor time of the computation [s] */
   /* results; comments on arrays begin with their sizes */
-  pw_arena arena;
   pw_outcomes outcomes;      /* types and units of the outputs, not their values */
   double *value;             /* outputs: of the run by the method of the unknowns */
   double *table;             /* outputs x rows; NaN for outputs that are not in the table */
@@ -112,7 +109,7 @@ static int sensitivity_evaluate (void *context, const double *x, double rtol, do
 static int sensitivity_differentiate (sensitivity *cmd, const double *values, pw_error *error) {
   const pw_unknowns *u = &cmd->unknowns;
   const int outputs = cmd->outputs.count * (1 + cmd->outputs.rows);
-  cmd->derivative = pw_arena_alloc (&cmd->arena, (size_t)u->count * (size_t)outputs * sizeof *cmd->derivative);
+  cmd->derivative = pw_arena_alloc (&cmd->line.arena, (size_t)u->count * (size_t)outputs * sizeof *cmd->derivative);
   if (cmd->derivative == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   const pw_difference_settings d = { .evaluate = sensitivity_evaluate,
                                      .context = cmd,
@@ -134,7 +131,8 @@ static int sensitivity_prepare (sensitivity *cmd, const double *values, pw_error
   if (status == PW_OK && r == NULL) status = error->status;
   for (int p = 0; p < u->count && status == PW_OK; p++) pw_unknown_measure (&u->list[p], values[p], r);
   if (status == PW_OK) {
-    cmd->outputs.method = pw_accurate_method (run.m.system, &run.settings, u->t_end, &cmd->outputs.max_steps, error);
+    cmd->outputs.method =
+        pw_accurate_method (run.m.system, &run.settings, u->settings.span, &cmd->outputs.max_steps, error);
     if (cmd->outputs.method == NULL && error->status == PW_OK)
       status = pw_stop
                    ? PW_RETRY
@@ -155,13 +153,13 @@ static int sensitivity_prepare (sensitivity *cmd, const double *values, pw_error
 static int sensitivity_solve (sensitivity *cmd, pw_error *error) {
   const pw_unknowns *u = &cmd->unknowns;
   const size_t count = (size_t)cmd->outputs.count, rows = (size_t)cmd->outputs.rows;
-  double *values = pw_arena_alloc (&cmd->arena, (size_t)u->count * sizeof *values);
-  cmd->value = pw_arena_alloc (&cmd->arena, count * (1 + rows) * sizeof *cmd->value);
+  double *values = pw_arena_alloc (&cmd->line.arena, (size_t)u->count * sizeof *values);
+  cmd->value = pw_arena_alloc (&cmd->line.arena, count * (1 + rows) * sizeof *cmd->value);
   if (values == NULL || cmd->value == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   cmd->table = cmd->value + count;
   for (int p = 0; p < u->count; p++) values[p] = u->list[p].value;
-  int status = pw_outcomes_open (&cmd->outcomes, u->m->system, cmd->outputs.option, cmd->outputs.of, cmd->outputs.count,
-                                 cmd->line.until, error);
+  int status = pw_outcomes_open (&cmd->outcomes, cmd->line.m.system, cmd->outputs.option, cmd->outputs.of,
+                                 cmd->outputs.count, cmd->line.until, error);
   if (status == PW_OK) status = pw_run_outputs_at (&cmd->outputs, values, cmd->value, cmd->table, error);
   if (status == PW_OK) status = sensitivity_prepare (cmd, values, error);
   for (int p = 0; p < u->count && status == PW_OK; p++) status = sensitivity_check (cmd, values, p, error);
@@ -232,7 +230,7 @@ static void sensitivity_print_row (const sensitivity *cmd, pw_table *table, int 
 static void sensitivity_print (const sensitivity *cmd) {
   const pw_unknowns *u = &cmd->unknowns;
   char unit[SENSITIVITY_UNIT], reason[500];
-  printf ("%s by %s to t = %.9g s\n", pw_file_name (u->m->file), u->method, u->t_end);
+  printf ("%s by %s to t = %.9g s\n", pw_file_name (cmd->line.m.file), u->method, u->settings.span);
   for (int o = 0; o < cmd->outputs.count; o++) {
     pw_outcome_unit (&cmd->outcomes, o, unit, sizeof unit);
     pw_cli_print (stdout, "\n%s = %s %s\n", cmd->outputs.of[o], PW_DIGITS (cmd->value[o], 12), unit);
@@ -289,8 +287,8 @@ static void sensitivity_json (const void *context, pw_json *j) {
   const sensitivity *cmd = context;
   char unit[SENSITIVITY_UNIT];
   pw_json_print (j, "{model: %s, method: %s, derivatives_by: %s, t_end: %g, complete: %i, cpu_seconds: %g, outputs: [",
-                 pw_file_name (cmd->unknowns.m->file), cmd->unknowns.method, cmd->outputs.method, cmd->unknowns.t_end,
-                 1, cmd->cpu);
+                 pw_file_name (cmd->line.m.file), cmd->unknowns.method, cmd->outputs.method,
+                 cmd->unknowns.settings.span, 1, cmd->cpu);
   for (int o = 0; o < cmd->outputs.count; o++) {
     pw_json_print (j, "{output: %s, unit: %s, value: %g, derivatives: [", cmd->outputs.of[o],
                    pw_outcome_unit (&cmd->outcomes, o, unit, sizeof unit), cmd->value[o]);
@@ -351,12 +349,13 @@ static void sensitivity_label (const sensitivity *cmd, int output, int unknown, 
 static int sensitivity_draw (const sensitivity *cmd, pw_error *error) {
   const pw_unknowns *u = &cmd->unknowns;
   pw_curves c;
-  int status = pw_curves_open (&c, &cmd->line, &cmd->m, cmd->folder, "sensitivity", "derivatives along the run", error);
+  int status = pw_curves_open (&c, &cmd->line, cmd->folder, "sensitivity", "derivatives along the run", error);
   if (status != PW_OK) return status;
   for (int o = 0; o < cmd->outputs.count; o++) {
     char label[300];
-    pw_curves_panel (
-        &c, &(pw_panel){ .x_label = "t [s]", .y_label = PW_FIGURE_LABEL (cmd->outputs.of[o], ""), .x[1] = u->t_end });
+    pw_curves_panel (&c, &(pw_panel){ .x_label = "t [s]",
+                                      .y_label = PW_FIGURE_LABEL (cmd->outputs.of[o], ""),
+                                      .x[1] = u->settings.span });
     for (int p = 0; p < u->count; p++) {
       const double factor = u->list[p].value != 0 ? u->list[p].value : 1;
       sensitivity_label (cmd, o, p, label, sizeof label);
@@ -378,10 +377,10 @@ static int sensitivity_write (const sensitivity *cmd, pw_error *error) {
 
 /* Sets the times of the table: from 0 to the end, `every` apart. */
 static int sensitivity_set_rows (sensitivity *cmd, double every, pw_error *error) {
-  const double t_end = cmd->unknowns.t_end,
+  const double t_end = cmd->unknowns.settings.span,
                count = ceil (t_end / every * (1 - 1e-12)); /* the factor: no row a round-off before t_end */
   if (count > 1e7) return pw_fail (error, PW_INPUT, "--every %g: expected at most 1e7 rows", every);
-  double *t = pw_arena_alloc (&cmd->arena, ((size_t)count + 2) * sizeof *t);
+  double *t = pw_arena_alloc (&cmd->line.arena, ((size_t)count + 2) * sizeof *t);
   if (t == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   for (int i = 0; i < (int)count; i++) t[i] = i * every;
   t[(int)count] = t_end;
@@ -391,8 +390,8 @@ static int sensitivity_set_rows (sensitivity *cmd, double every, pw_error *error
 
 static int sensitivity_open (sensitivity *cmd, pw_error *error) {
   double every = 0;
-  int status = pw_cli_open (&cmd->m, &cmd->line, error);
-  if (status == PW_OK) status = pw_unknowns_open (&cmd->unknowns, &cmd->line, &cmd->m, error);
+  int status = pw_cli_open (&cmd->line, error);
+  if (status == PW_OK) status = pw_unknowns_open (&cmd->unknowns, &cmd->line, error);
   if (status == PW_OK) status = pw_unknowns_engine (&cmd->unknowns, SENSITIVITY_RUNS, 1, error);
   if (status == PW_OK) status = pw_parallel_jobs (cmd->jobs_text, &cmd->jobs, error);
   if (status == PW_OK) status = pw_cli_requires ("--every", cmd->every, "-o DIR", cmd->folder != NULL, error);
@@ -407,13 +406,14 @@ static int sensitivity_open (sensitivity *cmd, pw_error *error) {
   if (cmd->line.until && cmd->every)
     return pw_fail (error, PW_INPUT, "--every cannot be given together with --until: there is no table");
   if (cmd->folder && !cmd->line.until) /* the times of rows must not vary */
-    status = sensitivity_set_rows (cmd, every > 0 ? every : cmd->unknowns.t_end / SENSITIVITY_ROWS, error);
+    status = sensitivity_set_rows (cmd, every > 0 ? every : cmd->unknowns.settings.span / SENSITIVITY_ROWS, error);
   return status == PW_OK ? pw_unknowns_differentiated (&cmd->unknowns, cmd->by, error) : status;
 }
 
 static int sensitivity_compute (sensitivity *cmd, pw_error *error) {
   pw_stop_catch ();
-  pw_progress_start (&cmd->progress, pw_file_name (cmd->m.file), "runs", 0, SENSITIVITY_RUNS * cmd->unknowns.count);
+  pw_progress_start (&cmd->progress, pw_file_name (cmd->line.m.file), "runs", 0,
+                     SENSITIVITY_RUNS * cmd->unknowns.count);
   int status = sensitivity_solve (cmd, error);
   pw_progress_end (&cmd->progress);
   pw_stop_release ();
@@ -423,20 +423,16 @@ static int sensitivity_compute (sensitivity *cmd, pw_error *error) {
 static int sensitivity_command (void *options, pw_error *error) {
   sensitivity *cmd = options;
   int status = sensitivity_open (cmd, error);
+  if (status == PW_OK) status = pw_figure_lock_folder (&cmd->line, cmd->folder, "sensitivity", error);
   if (status == PW_OK)
-    status = pw_figure_lock_folder (&cmd->line, &cmd->m, cmd->folder, "sensitivity", &cmd->files, error);
-  if (status == PW_OK)
-    pw_report_model (&cmd->m), status = pw_report_initial_state (&cmd->m, cmd->unknowns.limit, error);
+    pw_report_model (&cmd->line.m), status = pw_report_initial_state (&cmd->line.m, cmd->unknowns.limit, error);
   const double start = pw_seconds (CLOCK_PROCESS_CPUTIME_ID);
   if (status == PW_OK) status = sensitivity_compute (cmd, error);
   cmd->cpu = pw_seconds (CLOCK_PROCESS_CPUTIME_ID) - start;
   if (status == PW_OK) sensitivity_print (cmd), sensitivity_warn (cmd);
   if (status == PW_OK && cmd->folder) status = sensitivity_write (cmd, error);
-  pw_files_close (&cmd->files);
   pw_outcomes_close (&cmd->outcomes);
-  pw_arena_free (&cmd->arena);
   pw_unknowns_close (&cmd->unknowns);
-  pw_cli_close_model (&cmd->m);
   return status == PW_RETRY ? pw_cli_incomplete (&cmd->line, error) : status;
 }
 

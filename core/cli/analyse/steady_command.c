@@ -23,8 +23,6 @@ enum { PW_STEADY_REASON = 200 }; /* longest reason, its end included */
 typedef struct {
   pw_cli_line line;
   const char **hold_texts, *vary_text, *starts_text, *at_text, *folder;
-  pw_cli_model m;
-  pw_files files;
   pw_limit limit;
   pw_steady_settings settings;
   pw_initial_value hold[PW_HOLDS]; /* settings.holds values */
@@ -51,20 +49,20 @@ enum { TO_FIRST = -1, TO_LAST = 1 };
 
 /* Reads --vary NAME=FIRST:LAST: NAME is a parameter of the model, or a quantity that is held at the varied value. */
 static int steady_read_vary (pw_steady_command *cmd, pw_error *error) {
-  if (pw_vary_read (&cmd->vary, &cmd->line, &cmd->m, cmd->vary_text, error) != PW_OK) return PW_INPUT;
+  if (pw_vary_read (&cmd->vary, &cmd->line, cmd->vary_text, error) != PW_OK) return PW_INPUT;
   cmd->settings.first = cmd->vary.first, cmd->settings.last = cmd->vary.last;
   if (cmd->vary.parameter) {
     cmd->settings.compile = pw_vary_compile;
     cmd->settings.context = &cmd->vary;
     return PW_OK;
   }
-  if (strchr (cmd->vary.name, '.') == NULL &&
-      pw_system_find_state (cmd->m.system, cmd->vary.name, NULL) < 0) /* no parameter: fails with the nearest name */
-    return pw_model_set (cmd->m.model, cmd->vary.name, cmd->settings.first, error);
+  if (strchr (cmd->vary.name, '.') == NULL && pw_system_find_state (cmd->line.m.system, cmd->vary.name, NULL) <
+                                                  0) /* no parameter: fails with the nearest name */
+    return pw_model_set (cmd->line.m.model, cmd->vary.name, cmd->settings.first, error);
   cmd->settings.vary = cmd->settings.holds;
-  int status = pw_hold_add (cmd->m.system, "--vary", cmd->vary_text, cmd->vary.name, cmd->settings.first, cmd->hold,
-                            &cmd->settings.holds, error);
-  if (status == PW_OK) cmd->vary.unit = pw_system_held_unit (cmd->m.system, cmd->hold[cmd->settings.vary].state);
+  int status = pw_hold_add (cmd->line.m.system, "--vary", cmd->vary_text, cmd->vary.name, cmd->settings.first,
+                            cmd->hold, &cmd->settings.holds, error);
+  if (status == PW_OK) cmd->vary.unit = pw_system_held_unit (cmd->line.m.system, cmd->hold[cmd->settings.vary].state);
   return status;
 }
 
@@ -72,7 +70,7 @@ static int steady_read_options (pw_steady_command *cmd, pw_error *error) {
   double starts = 0;
   int status = pw_cli_number ("--at", cmd->at_text, PW_NONNEGATIVE, &cmd->settings.t, error);
   cmd->limit.seconds = INFINITY;
-  cmd->settings.span = pw_cli_defaults (pw_file_table (cmd->m.file)).t_end;
+  cmd->settings.span = cmd->line.m.defaults.t_end;
   cmd->settings.vary = -1; /* none of the values held */
   cmd->settings.hold = cmd->hold;
   if (status == PW_OK) status = pw_cli_number ("--limit", cmd->line.limit, PW_POSITIVE, &cmd->limit.seconds, error);
@@ -80,7 +78,8 @@ static int steady_read_options (pw_steady_command *cmd, pw_error *error) {
   if (status == PW_OK) status = pw_cli_number ("--starts", cmd->starts_text, PW_REAL, &starts, error);
   if (status == PW_OK && !(starts >= 0 && starts <= 1e9 && starts == floor (starts)))
     status = pw_fail (error, PW_INPUT, "--starts %s: expected a whole number >= 0", cmd->starts_text);
-  if (status == PW_OK) status = pw_hold_read (cmd->m.system, cmd->hold_texts, cmd->hold, &cmd->settings.holds, error);
+  if (status == PW_OK)
+    status = pw_hold_read (cmd->line.m.system, cmd->hold_texts, cmd->hold, &cmd->settings.holds, error);
   if (status == PW_OK && cmd->vary_text) status = steady_read_vary (cmd, error);
   cmd->random_attempts = (int)starts;
   return status;
@@ -89,7 +88,7 @@ static int steady_read_options (pw_steady_command *cmd, pw_error *error) {
 /* ---- Points ---- */
 
 static pw_steady_point *steady_add (pw_steady_command *cmd, const pw_steady_motion *m, int attempt, pw_error *error) {
-  size_t coordinates = (size_t)pw_system_coordinates (cmd->m.system), n = (size_t)m->linear->unknowns;
+  size_t coordinates = (size_t)pw_system_coordinates (cmd->line.m.system), n = (size_t)m->linear->unknowns;
   int status = pw_grow (&cmd->point, (size_t)cmd->points, &cmd->room, sizeof *cmd->point);
   double *a = status == PW_OK ? malloc ((2 * coordinates + 2 * n) * sizeof *a + n) : NULL;
   if (a == NULL) return pw_fail (error, PW_RESOURCE, "out of memory"), NULL;
@@ -108,7 +107,7 @@ static pw_steady_point *steady_add (pw_steady_command *cmd, const pw_steady_moti
 
 /* The error of this status after pw_steady_suggest. */
 static int steady_unadvised (const pw_steady_command *cmd, int status, pw_error *error) {
-  return pw_fail (error, status, "%s: %s", pw_file_name (cmd->m.file),
+  return pw_fail (error, status, "%s: %s", pw_file_name (cmd->line.m.file),
                   status == PW_RESOURCE ? "out of memory" : "the family of the steady motion cannot be determined");
 }
 
@@ -119,7 +118,7 @@ static int steady_advise (pw_steady_command *cmd, pw_steady_point *p, pw_error *
   int count = p->motion.family > 0 ? pw_steady_suggest (cmd->search, hold, PW_HOLDS) : 0;
   for (int i = 0; i < count && used < sizeof p->advice; i++)
     used += (size_t)snprintf (p->advice + used, sizeof p->advice - used, " --hold %s=%.9g",
-                              PW_NAME (pw_system_held_name, cmd->m.system, hold[i].state), hold[i].value);
+                              PW_NAME (pw_system_held_name, cmd->line.m.system, hold[i].state), hold[i].value);
   if (used >= sizeof p->advice) *p->advice = 0;
   return count < 0 ? steady_unadvised (cmd, count, error) : PW_OK;
 }
@@ -163,7 +162,7 @@ static int steady_search (pw_steady_command *cmd, double parameter, pw_error *er
   int status = PW_OK, symmetries = pw_steady_symmetries (cmd->search);
   const int attempts = PW_STEADY_NOT_RANDOM + cmd->random_attempts, before = cmd->points, changing = cmd->changing;
   const double residual[2] = { cmd->residual[0], cmd->residual[1] };
-  pw_progress_start (&progress, pw_file_name (cmd->m.file), "starts", 0, attempts);
+  pw_progress_start (&progress, pw_file_name (cmd->line.m.file), "starts", 0, attempts);
   for (int k = 0; status == PW_OK && k < attempts && !steady_is_stopped (cmd); k++) {
     status = pw_steady_solve (cmd->search, k, parameter, &m, error);
     const int lost = symmetries - pw_steady_symmetries (cmd->search);
@@ -191,7 +190,7 @@ static int steady_fail (pw_steady_command *cmd, pw_error *error) {
     return pw_fail (
         error, PW_METHOD,
         "%s: all steady motions found are members of families, in which no branch begins; hold more (--hold)",
-        pw_file_name (cmd->m.file));
+        pw_file_name (cmd->line.m.file));
   const char *initial = PW_PRINTED (60, "from the initial state the residual ends at %.2g", cmd->residual[0]);
   if (cmd->random_attempts)
     snprintf (random, sizeof random, ", from %s at %.2g at best", PW_COUNTED (cmd->random_attempts, "random state"),
@@ -204,7 +203,7 @@ static int steady_fail (pw_steady_command *cmd, pw_error *error) {
   return pw_fail (error, PW_METHOD,
                   "%s: no steady motion found: %s%s, in units of the scene (L, L/T, L/T^2)%s; change what is held, or "
                   "begin nearer to one (--start)",
-                  pw_file_name (cmd->m.file), initial, random, reason);
+                  pw_file_name (cmd->line.m.file), initial, random, reason);
 }
 
 /* ---- Branches ---- */
@@ -284,8 +283,8 @@ static int steady_branches_from (pw_steady_command *cmd, double parameter, int d
 
 /* The value of the parameter in the model, or in its initial state. */
 static double steady_model_value (const pw_steady_command *cmd) {
-  const pw_system *s = cmd->m.system;
-  if (cmd->settings.vary < 0) return pw_model_parameter (cmd->m.model, cmd->vary.parameter);
+  const pw_system *s = cmd->line.m.system;
+  if (cmd->settings.vary < 0) return pw_model_parameter (cmd->line.m.model, cmd->vary.parameter);
   return pw_system_held_value (s, cmd->hold[cmd->settings.vary].state, pw_system_initial_q (s),
                                pw_system_initial_v (s));
 }
@@ -305,7 +304,7 @@ static int steady_nearest_motion (pw_steady_command *cmd, pw_steady_motion *m, p
 /* If the quantities held leave a family of motions, holds further ones, at their values in the motion nearest to the
  * initial state. */
 static int steady_hold_more (pw_steady_command *cmd, pw_error *error) {
-  const pw_system *s = cmd->m.system;
+  const pw_system *s = cmd->line.m.system;
   pw_steady_motion m;
   int status = steady_nearest_motion (cmd, &m, error);
   if (status == PW_RETRY || (status == PW_OK && m.family == 0)) return PW_OK;
@@ -317,7 +316,7 @@ static int steady_hold_more (pw_steady_command *cmd, pw_error *error) {
                 PW_NAME (pw_system_held_name, s, cmd->hold[i].state), cmd->hold[i].value);
   cmd->settings.holds += more;
   pw_steady_close (cmd->search);
-  cmd->search = pw_steady_open (cmd->m.system, &cmd->settings, error);
+  cmd->search = pw_steady_open (cmd->line.m.system, &cmd->settings, error);
   return cmd->search ? PW_OK : error->status;
 }
 
@@ -337,7 +336,7 @@ static int steady_branches (pw_steady_command *cmd, pw_error *error) {
 static int steady_compute (pw_steady_command *cmd, pw_error *error) {
   cmd->residual[0] = cmd->residual[1] = INFINITY;
   pw_limit_start (&cmd->limit);
-  cmd->search = pw_steady_open (cmd->m.system, &cmd->settings, error);
+  cmd->search = pw_steady_open (cmd->line.m.system, &cmd->settings, error);
   if (cmd->search == NULL) return error->status;
   pw_stop_catch ();
   int status = cmd->vary_text ? steady_branches (cmd, error) : steady_search (cmd, 0, error);
@@ -382,7 +381,7 @@ static void steady_cells_rightmost (pw_table *t, const pw_steady_point *p) {
 }
 
 static void steady_print_motions (const pw_steady_command *cmd) {
-  const pw_system *s = cmd->m.system;
+  const pw_system *s = cmd->line.m.system;
   const int n = pw_system_coordinates (s), held[] = { 2 * n, n + 2 }; /* (pw_system_find_held) speed, omega of body 0 */
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     pw_cell (&t, 6, "motion");
@@ -435,7 +434,7 @@ static void steady_print_branches (const pw_steady_command *cmd) {
 
 static void steady_print (const pw_steady_command *cmd) {
   char text[40];
-  const char *model = pw_file_name (cmd->m.file),
+  const char *model = pw_file_name (cmd->line.m.file),
              *symmetries = pw_states_symmetries (pw_steady_symmetries (cmd->search), text);
   if (cmd->vary_text) {
     printf ("%s: %d %s of steady motions%s, %s from %.9g to %.9g\n\n", model, cmd->branches,
@@ -451,7 +450,7 @@ static void steady_print (const pw_steady_command *cmd) {
     const pw_steady_motion *m = &cmd->point[i].motion;
     printf ("\nMotion %d, found from %s\n", i + 1,
             cmd->point[i].attempt >= PW_STEADY_NOT_RANDOM ? "a random state" : "the initial state");
-    pw_states_print (cmd->m.system, m->q, m->v, STEADY_DIGITS, STEADY_SMALL);
+    pw_states_print (cmd->line.m.system, m->q, m->v, STEADY_DIGITS, STEADY_SMALL);
   }
   for (int i = 0; i < cmd->points && i < STEADY_SHOWN; i++)
     if (*cmd->point[i].advice)
@@ -470,7 +469,7 @@ static void steady_eigenvalues_json (const pw_linear *l, pw_json *j) {
 }
 
 static void steady_point_json (const pw_steady_command *cmd, const pw_steady_point *p, pw_json *j) {
-  const pw_system *s = cmd->m.system;
+  const pw_system *s = cmd->line.m.system;
   pw_json_print (j, "\n{branch: %d", p->branch);
   if (cmd->vary_text) pw_json_text (j, "event", steady_events[p->motion.event]);
   if (cmd->vary_text) pw_json_number (j, "parameter", p->motion.parameter);
@@ -485,11 +484,11 @@ static void steady_point_json (const pw_steady_command *cmd, const pw_steady_poi
 
 static void steady_json (const void *context, pw_json *j) {
   const pw_steady_command *cmd = context;
-  pw_json_print (j, "{schema: %d, model: %s, parameter: %s, unit: %s, held: {", 1, pw_file_name (cmd->m.file),
+  pw_json_print (j, "{schema: %d, model: %s, parameter: %s, unit: %s, held: {", 1, pw_file_name (cmd->line.m.file),
                  cmd->vary_text ? cmd->vary.name : NULL, cmd->vary.unit);
   for (int i = 0; i < cmd->settings.holds; i++)
     if (i != cmd->settings.vary)
-      pw_json_number (j, PW_NAME (pw_system_held_name, cmd->m.system, cmd->hold[i].state), cmd->hold[i].value);
+      pw_json_number (j, PW_NAME (pw_system_held_name, cmd->line.m.system, cmd->hold[i].state), cmd->hold[i].value);
   pw_json_print (j, "}, symmetries: %d, attempts: %d, complete: %i, ends: [", pw_steady_symmetries (cmd->search),
                  PW_STEADY_NOT_RANDOM + cmd->random_attempts, !cmd->stopped);
   for (int i = 0; cmd->vary_text && i < cmd->branches; i++) pw_json_text (j, NULL, cmd->end[i]);
@@ -510,7 +509,7 @@ static int steady_most_eigenvalues (const pw_steady_command *cmd) {
 
 static int steady_csv (const void *context, FILE *f, pw_error *error) {
   const pw_steady_command *cmd = context;
-  const pw_system *s = cmd->m.system;
+  const pw_system *s = cmd->line.m.system;
   int states = 2 * pw_system_coordinates (s), most = steady_most_eigenvalues (cmd);
   pw_text t = { .chars = NULL };
   pw_text_cell (&t, "branch,event");
@@ -610,7 +609,7 @@ static int steady_draw (const pw_steady_command *cmd, pw_error *error) {
   const char *parameter = PW_FIGURE_LABEL (cmd->vary.name, cmd->vary.unit);
   double re[2], im[2];
   pw_curves c;
-  int status = pw_curves_open (&c, &cmd->line, &cmd->m, cmd->folder, "steady", "eigenvalues of steady motions", error);
+  int status = pw_curves_open (&c, &cmd->line, cmd->folder, "steady", "eigenvalues of steady motions", error);
   if (status != PW_OK) return status;
   steady_ranges (cmd, re, im);
   for (int part = REAL; part <= IMAGINARY; part++) {
@@ -643,19 +642,17 @@ static int steady_write (const pw_steady_command *cmd, pw_error *error) {
 
 static int steady_command (void *options, pw_error *error) {
   pw_steady_command *cmd = options;
-  int status = pw_cli_open (&cmd->m, &cmd->line, error);
+  int status = pw_cli_open (&cmd->line, error);
   if (status == PW_OK) status = steady_read_options (cmd, error);
-  if (status == PW_OK) status = pw_figure_lock_folder (&cmd->line, &cmd->m, cmd->folder, "steady", &cmd->files, error);
-  if (status == PW_OK) pw_report_model (&cmd->m);
+  if (status == PW_OK) status = pw_figure_lock_folder (&cmd->line, cmd->folder, "steady", error);
+  if (status == PW_OK) pw_report_model (&cmd->line.m);
   if (status == PW_OK) status = steady_compute (cmd, error);
   if (status == PW_OK && cmd->points) steady_print (cmd);
   if (status == PW_OK && cmd->points && cmd->folder) status = steady_write (cmd, error);
-  pw_files_close (&cmd->files);
   steady_forget (cmd, 0);
   free (cmd->point);
   free (cmd->end);
   pw_steady_close (cmd->search);
-  pw_cli_close_model (&cmd->m);
   return status == PW_OK && cmd->stopped ? pw_cli_incomplete (&cmd->line, error) : status;
 }
 

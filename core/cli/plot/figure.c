@@ -39,8 +39,7 @@ pw_output *pw_figure_open_data (const pw_figures *f, const char *name, pw_error 
   return o;
 }
 
-int pw_figure_lock_folder (const pw_cli_line *line, const pw_cli_model *model, const char *folder, const char *name,
-                           pw_files *files, pw_error *error) {
+int pw_figure_lock_folder (pw_cli_line *line, const char *folder, const char *name, pw_error *error) {
   static const char *const ending[] = { ".csv", ".json", ".dat", ".gp", ".svg", ".png", ".pdf" };
   enum { ENDINGS = sizeof ending / sizeof *ending };
   char text[ENDINGS][40];
@@ -48,7 +47,7 @@ int pw_figure_lock_folder (const pw_cli_line *line, const pw_cli_model *model, c
   for (int i = 0; i < ENDINGS; i++) snprintf (text[i], sizeof text[i], "%s%s", name, ending[i]), names[i] = text[i];
   pw_use use[] = { PW_CLI_MODEL_USE, { "-o", folder, PW_WRITES_INTO, names } };
   if (folder == NULL) return pw_cli_requires ("--width", line->width, "-o DIR", 0, error);
-  return pw_files_open (files, line, model, use, 2, error);
+  return pw_files_open (line, use, 2, error);
 }
 
 int pw_figure_write_tables (const char *folder, const char *name, int lines, const void *context,
@@ -209,11 +208,11 @@ int pw_figure_status (int drawn, const pw_error *drawing, int status, pw_error *
 
 /* ---- Panels of curves ---- */
 
-int pw_curves_open (pw_curves *c, const pw_cli_line *line, const pw_cli_model *model, const char *folder,
-                    const char *name, const char *title, pw_error *error) {
+int pw_curves_open (pw_curves *c, const pw_cli_line *line, const char *folder, const char *name, const char *title,
+                    pw_error *error) {
   pw_figures figures = { .folder = folder,
-                         .model = pw_file_name (model->file),
-                         .about = pw_file_table (model->file)->about };
+                         .model = pw_file_name (line->m.file),
+                         .about = pw_file_table (line->m.file)->about };
   *c = (pw_curves){ .folder = folder, .name = name };
   if (pw_figure_width (line->width, &figures.width, error) != PW_OK) return error->status;
   c->data = pw_figure_open_data (&figures, PW_PRINTED (60, "%s.dat", name), error);

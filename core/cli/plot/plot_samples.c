@@ -442,11 +442,10 @@ const char *pw_plot_output (const pw_plots *plots, int o, char buffer[PW_NAME_BY
   return o < states ? pw_system_state_name (s, state, buffer, PW_NAME_BYTES) : pw_system_output_name (s, o - states);
 }
 
-int pw_plots_outputs (const pw_plots *plots, const pw_cli_line *line, const pw_cli_model *model, int draw,
-                      pw_error *error) {
+int pw_plots_outputs (const pw_plots *plots, const pw_cli_line *line, int draw, pw_error *error) {
   pw_curves c;
   if (plots->figures.folder == NULL || plots->outputs == 0 || plots->samples < 2) return PW_OK;
-  int status = pw_curves_open (&c, line, model, plots->figures.folder, "outputs", "outputs", error);
+  int status = pw_curves_open (&c, line, plots->figures.folder, "outputs", "outputs", error);
   for (int o = 0; status == PW_OK && o < plots->outputs; o++) {
     char buffer[PW_NAME_BYTES];
     const char *unit, *name = pw_plot_output (plots, o, buffer, &unit);

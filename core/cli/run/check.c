@@ -33,8 +33,7 @@ typedef struct {
 typedef struct {
   pw_cli_line line;
   const char *json_path; /* NULL: not given */
-  pw_cli_model model;
-  pw_run *run; /* NULL: initialisation failed with `run_error` */
+  pw_run *run;           /* NULL: initialisation failed with `run_error` */
   pw_error run_error;
   pw_linear linear;       /* at the initial state; A is NULL if it was not computed */
   const char **redundant; /* a description of each redundant constraint equation, ended by NULL; or NULL */
@@ -62,11 +61,11 @@ PW_PRINTF (2, 3) static void check_add (pw_check_list *list, const char *format,
 
 /* Opens a run by rk4+projection, whatever method the model selects. */
 static void check_open_run (pw_check *check) {
-  pw_run_defaults defaults = pw_cli_defaults (pw_file_table (check->model.file));
-  pw_settings settings = { .span = defaults.t_end, .step = defaults.step };
-  check->step = defaults.step;
-  check->uses_rk4 = strncmp (defaults.method, "rk4", 3) == 0;
-  check->run = pw_run_open (check->model.system, "rk4+projection", &settings, &check->run_error);
+  const pw_run_defaults *defaults = &check->line.m.defaults;
+  pw_settings settings = { .span = defaults->t_end, .step = defaults->step };
+  check->step = defaults->step;
+  check->uses_rk4 = strncmp (defaults->method, "rk4", 3) == 0;
+  check->run = pw_run_open (check->line.m.system, "rk4+projection", &settings, &check->run_error);
   if (check->run == NULL)
     check_add (&check->problem, "%s", check->run_error.text);
   else
@@ -75,7 +74,7 @@ static void check_open_run (pw_check *check) {
 
 /* Initial values specified by the model or given by the user that were changed by more than rounding. */
 static void check_given_values (pw_check *check) {
-  const pw_system *s = check->model.system;
+  const pw_system *s = check->line.m.system;
   const pw_initial_report *initial = pw_run_initial (check->run);
   for (int i = 0; i < 2 * pw_system_coordinates (s); i++) {
     char reason[300];
@@ -91,15 +90,15 @@ static void check_given_values (pw_check *check) {
 
 /* The model's reference solution must hold initially, up to round-off, unless the user gives initial values. */
 static int check_reference (pw_check *check, pw_error *error) {
-  int n = pw_system_coordinates (check->model.system);
-  if (check->line.starts || !pw_model_has_reference (check->model.model)) return PW_OK;
+  int n = pw_system_coordinates (check->line.m.system);
+  if (check->line.starts || !pw_model_has_reference (check->line.m.model)) return PW_OK;
   double *reference = malloc (2 * (size_t)n * sizeof *reference);
   if (reference == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  int status = pw_system_reference (check->model.model, check->model.system, 0, reference, reference + n, error);
+  int status = pw_system_reference (check->line.m.model, check->line.m.system, 0, reference, reference + n, error);
   for (int i = 0; i < 2 * n && status == PW_OK; i++) {
     if (isnan (reference[i])) continue;
     check->reference_states++;
-    const pw_state_change c = pw_cli_state_change (check->model.system, pw_run_initial (check->run), i);
+    const pw_state_change c = pw_cli_state_change (check->line.m.system, pw_run_initial (check->run), i);
     if (!(fabs (reference[i] - c.consistent) <= 1e-9 * (1 + fabs (c.consistent))))
       check_add (&check->problem, "the model's reference solution does not hold initially: %s is %s, not %s", c.name,
                  PW_DIGITS (c.consistent, 9), PW_DIGITS (reference[i], 9));
@@ -130,7 +129,7 @@ static const pw_selftest_check *check_fault (const pw_selftest_report *report) {
 
 /* Elements of one type are consecutive in a system. */
 static int check_list_kinds (pw_check *check, pw_error *error) {
-  const pw_system *s = check->model.system;
+  const pw_system *s = check->line.m.system;
   check->kind = calloc ((size_t)pw_system_elements (s) + 1, sizeof *check->kind);
   if (check->kind == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   for (int i = 0; i < pw_system_elements (s); i++) {
@@ -143,7 +142,7 @@ static int check_list_kinds (pw_check *check, pw_error *error) {
 
 /* Tests an element type in use; in the model only if the table of the type is consistent. */
 static int check_kind (pw_check *check, pw_checked_kind *k, pw_error *error) {
-  const pw_system *s = check->model.system;
+  const pw_system *s = check->line.m.system;
   const pw_initial_report *initial = check->run ? pw_run_initial (check->run) : NULL;
   const double *q = initial ? initial->q : pw_system_initial_q (s), *v = initial ? initial->v : pw_system_initial_v (s);
   int status = check_random (k, error);
@@ -176,7 +175,7 @@ static void check_gravity (pw_check *check, const pw_element *gravity, const pw_
 static void check_wheels (pw_check *check) {
   int count, prescribed = 0;
   const pw_linear *linear = &check->linear;
-  const pw_element *element = pw_model_elements (check->model.model, &count), *wheel = NULL;
+  const pw_element *element = pw_model_elements (check->line.m.model, &count), *wheel = NULL;
   for (const pw_element *e = element; e < element + count; e++) {
     if (wheel == NULL && e->kind->contact && (e->kind->rows || e->kind->force)) wheel = e;
     prescribed |= e->kind->eta != NULL;
@@ -301,7 +300,7 @@ static void report_singular_value (pw_json *j, const pw_check *check) {
 }
 
 static void report_mobility (pw_json *j, const pw_check *check) {
-  const pw_system *s = check->model.system;
+  const pw_system *s = check->line.m.system;
   const pw_linear *linear = &check->linear;
   int coords = pw_system_coordinates (s), rows = pw_system_rows (s), holonomic = pw_system_holonomic (s), listed = 0;
   report_section (j, "mobility", '{', "Mobility");
@@ -335,7 +334,7 @@ static void report_mass (pw_json *j, const pw_check *check) {
                           : check->run == NULL                ? NULL
                           : pw_run_redundant (check->run) > 0 ? "regular without the redundant constraint equations"
                                                               : "regular";
-  const pw_system *s = check->model.system;
+  const pw_system *s = check->line.m.system;
   const double *M = pw_system_mass (s);
   int lacking = 0, listed = 0;
   for (int b = 0; b < pw_system_bodies (s); b++) lacking += M[3 * b] == 0 || M[3 * b + 2] == 0;
@@ -361,7 +360,7 @@ static void report_mass (pw_json *j, const pw_check *check) {
 /* ---- Initial conditions ---- */
 
 static void report_change (pw_json *j, const pw_check *check, int i, int *listed) {
-  const pw_state_change c = pw_cli_state_change (check->model.system, pw_run_initial (check->run), i);
+  const pw_state_change c = pw_cli_state_change (check->line.m.system, pw_run_initial (check->run), i);
   pw_json_print (j, "{state: %s, from: %g, to: %g}", c.name, c.given, c.consistent);
   report_item (j, listed, NULL,
                PW_PRINTED (500, "%-20s from %s to %s, by %s %s", c.name, PW_DIGITS (c.given, 10),
@@ -370,7 +369,7 @@ static void report_change (pw_json *j, const pw_check *check, int i, int *listed
 
 static void report_initial (pw_json *j, const pw_check *check) {
   static const char title[] = "Initial conditions";
-  int listed = 0, n = pw_system_coordinates (check->model.system);
+  int listed = 0, n = pw_system_coordinates (check->line.m.system);
   if (check->run == NULL) {
     report_line (j);
     pw_json_text (j, "start", NULL);
@@ -386,7 +385,7 @@ static void report_initial (pw_json *j, const pw_check *check) {
     report_print (j, "  %d value%s changed%s\n", initial->moved, initial->moved == 1 ? " was" : "s were",
                   initial->released ? ", including given ones" : "");
   for (int i = 0; i < 2 * n; i++)
-    if (pw_initial_moved (check->model.system, initial, i)) report_change (j, check, i, &listed);
+    if (pw_initial_moved (check->line.m.system, initial, i)) report_change (j, check, i, &listed);
   report_end_list (j, listed);
   pw_json_close (j, '}');
   if (check->reference_states)
@@ -396,7 +395,7 @@ static void report_initial (pw_json *j, const pw_check *check) {
 
 /* The outputs at the initial state. */
 static void report_outputs (pw_json *j, const pw_check *check) {
-  const pw_system *s = check->model.system;
+  const pw_system *s = check->line.m.system;
   pw_sample sample;
   if (check->run == NULL || pw_system_outputs (s) == 0) return;
   if (pw_run_sample (check->run, pw_run_time (check->run), &sample, NULL) != PW_OK) return;
@@ -558,11 +557,11 @@ static void report_lists (pw_json *j, const pw_check *check) {
 
 /* Writes the report: as JSON to j, or as text to standard output if j is NULL. */
 static void report_write (const pw_check *check, pw_json *j) {
-  const char *about = pw_file_table (check->model.file)->about;
-  pw_json_print (j, "{schema: %d, model: %s, status: %s", 1, pw_file_name (check->model.file),
+  const char *about = pw_file_table (check->line.m.file)->about;
+  pw_json_print (j, "{schema: %d, model: %s, status: %s", 1, pw_file_name (check->line.m.file),
                  check->problem.count ? "failed" : "ok");
   if (j) report_lists (j, check);
-  report_print (j, "%s: %s\n", pw_file_name (check->model.file), about ? about : "");
+  report_print (j, "%s: %s\n", pw_file_name (check->line.m.file), about ? about : "");
   report_mobility (j, check);
   report_mass (j, check);
   report_initial (j, check);
@@ -581,13 +580,13 @@ static void report_write (const pw_check *check, pw_json *j) {
 /* ---- The command ---- */
 
 static int check_model (pw_check *check, pw_error *error) {
-  const pw_system *s = check->model.system;
-  const double t_end = pw_cli_defaults (pw_file_table (check->model.file)).t_end;
+  const pw_system *s = check->line.m.system;
+  const double t_end = check->line.m.defaults.t_end;
   char notice[PW_NOTICE_BYTES];
   int status = PW_OK;
   check->rk4_limit = check->doubling_time = INFINITY;
   check->fastest = -1;
-  pw_report_model (&check->model);
+  pw_report_model (&check->line.m);
   for (int i = 0; i < pw_system_signals (s); i++) /* tables that do not cover the run, rows that are left out */
     if (*pw_system_table_notice (s, i, t_end, notice, sizeof notice)) check_add (&check->finding, "%s", notice);
   check_open_run (check);
@@ -605,28 +604,25 @@ static int check_model (pw_check *check, pw_error *error) {
 
 static int check_command (void *options, pw_error *error) {
   pw_check *check = options;
-  pw_files files = { .folder = { .made = 0 } };
   pw_use use[] = { PW_CLI_MODEL_USE, { "--json", check->json_path, PW_WRITES, pw_cli_json } };
-  int status = pw_cli_open (&check->model, &check->line, error);
-  if (status == PW_OK) status = pw_files_open (&files, &check->line, &check->model, use, 2, error);
+  int status = pw_cli_open (&check->line, error);
+  if (status == PW_OK) status = pw_files_open (&check->line, use, 2, error);
   if (status == PW_OK) status = check_model (check, error);
   if (status == PW_OK) {
-    FILE *json = pw_files_stream (&files, 1);
+    FILE *json = pw_files_stream (&check->line, 1);
     if (json != stdout) report_write (check, NULL);
     if (json) report_write (check, &(pw_json){ .f = json });
-    pw_files_finish (&files, error);
+    pw_files_finish (&check->line, error);
     if (check->problem.count) /* the exit status is that of a failed initialisation, otherwise that of bad input */
       pw_fail (error, check->run_error.status ? check->run_error.status : PW_INPUT, "%s%s", check->problem.text[0],
                check->problem.count > 1 ? "; and more, see above" : "");
   }
-  pw_files_close (&files);
   pw_linear_free (&check->linear);
   pw_run_close (check->run);
   free (check->redundant);
   free (check->kind);
   free (check->problem.text);
   free (check->finding.text);
-  pw_cli_close_model (&check->model);
   return error->status;
 }
 

@@ -118,7 +118,7 @@ static int sampler_visit (pw_visitor *visitor, pw_run *run, pw_error *error) {
   while ((visitor->due = pw_motion_next_time (motion)) <= pw_run_time (run)) {
     int status = pw_run_sample (run, visitor->due, &sample, error);
     if (status != PW_OK) return status;
-    pw_motion_add (motion, visitor->study->compiled.system, &sample);
+    pw_motion_add (motion, visitor->study->line.m.system, &sample);
     visitor->row->balance = fmax (visitor->row->balance, fabs (sample.balance));
   }
   return PW_OK;
@@ -128,7 +128,7 @@ static int sampler_visit (pw_visitor *visitor, pw_run *run, pw_error *error) {
  * motion NULL: without samples, for the measurement of times. */
 static int compare_run (pw_study *study, pw_row *row, pw_motion *motion, pw_error *error) {
   sampler visitor = { { .visit = sampler_visit, .study = study, .row = row }, motion };
-  pw_settings settings = { .span = study->t_end, .ledger = motion != NULL };
+  pw_settings settings = { .span = study->settings.span, .ledger = motion != NULL };
   *(row->adaptive ? &settings.rtol : &settings.step) = row->level;
   if (motion) row->balance = motion->taken = 0;
   return pw_study_run (study, row, &settings, motion ? &visitor.base : NULL, error);
@@ -176,9 +176,9 @@ typedef struct {
 static int reference_run (void *context, int i, pw_error *error) {
   reference_candidate *candidate = (reference_candidate *)context + i;
   pw_study *study = candidate->study;
-  double loosest = candidate->row.adaptive ? REFERENCE_LOOSEST : study->t_end / REFERENCE_FEWEST;
+  double loosest = candidate->row.adaptive ? REFERENCE_LOOSEST : study->settings.span / REFERENCE_FEWEST;
   pw_error run_error = { 0 };
-  int status = pw_motion_open (&candidate->motion, study->compiled.system, MOTION_SAMPLES, study->t_end, error);
+  int status = pw_motion_open (&candidate->motion, study->line.m.system, MOTION_SAMPLES, study->settings.span, error);
   if (status != PW_OK) return status;
   status = PW_RETRY;
   while (status != PW_OK && candidate->row.level <= loosest) {
@@ -256,13 +256,13 @@ static void reference_choose (pw_reference *reference, const pw_system *system, 
 static int reference_compute (pw_reference *reference, pw_study *study, double step, pw_error *error) {
   reference_candidate candidates[REFERENCE_CANDIDATES] = {
     { study, .row = { .method = "erk8+projection", .adaptive = 1, .level = 3e-14 /* the least is 2.2e-14 */ } },
-    { study, .row = { .method = "rk4+projection", .level = fmin (step, study->t_end / REFERENCE_STEPS) } },
+    { study, .row = { .method = "rk4+projection", .level = fmin (step, study->settings.span / REFERENCE_STEPS) } },
     { study, .row = { .method = "ida+ggl", .adaptive = 1, .level = 1e-13 } },
     { study, .row = { .method = "ida+baumgarte", .adaptive = 1, .level = 1e-13 } },
   };
   pw_study_begin_progress (study, "reference", "methods", REFERENCE_CANDIDATES);
   int status = pw_study_parallel (study, REFERENCE_CANDIDATES, reference_run, candidates, error);
-  if (status == PW_OK) reference_choose (reference, study->compiled.system, candidates);
+  if (status == PW_OK) reference_choose (reference, study->line.m.system, candidates);
   for (int i = 0; i < REFERENCE_CANDIDATES; i++) {
     reference->limited |= candidates[i].row.state == ROW_STOPPED;
     pw_motion_close (&candidates[i].motion);
@@ -270,23 +270,23 @@ static int reference_compute (pw_reference *reference, pw_study *study, double s
   return status;
 }
 
-/* Finds the reference.  step: the smallest step size of the comparison [s].  Sets the study's t_end to the end of a
+/* Finds the reference.  step: the smallest step size of the comparison [s].  Sets the study's span to the end of a
  * table unless --t-end is given.  Close the motion of the reference in every case. */
 static int reference_find (pw_reference *reference, pw_study *study, double step, pw_error *error) {
   const char *path = study->reference_path;
-  double t_end = path && study->line.t_end == NULL ? 0 : study->t_end; /* 0: that of the table */
+  double t_end = path && study->line.t_end == NULL ? 0 : study->settings.span; /* 0: that of the table */
   /* the model's solution holds only for its own initial values */
-  if (path == NULL && (study->line.starts || !pw_model_has_reference (study->compiled.model)))
+  if (path == NULL && (study->line.starts || !pw_model_has_reference (study->line.m.model)))
     return reference_compute (reference, study, step, error);
-  int status = pw_motion_open_reference (&reference->motion, &study->compiled, path, &t_end, error);
+  int status = pw_motion_open_reference (&reference->motion, &study->line.m, path, &t_end, error);
   if (status != PW_OK) return status;
-  pw_motion_gaps (study->compiled.system, &reference->motion, path ? 1 : reference->motion.times, reference->gaps);
+  pw_motion_gaps (study->line.m.system, &reference->motion, path ? 1 : reference->motion.times, reference->gaps);
   if (path == NULL && *reference->gaps) {
     pw_motion_close (&reference->motion);
     return reference_compute (reference, study, step, error);
   }
   pw_motion *motion = &reference->motion;
-  int n = pw_system_coordinates (study->compiled.system), complete = 1;
+  int n = pw_system_coordinates (study->line.m.system), complete = 1;
   for (int j = n; j < 2 * n && path == NULL; j++) complete &= pw_motion_known (motion, j) == motion->times;
   for (int k = 0; !complete && k < motion->times; k++) /* so that no error is that of a part of the velocities */
     for (int j = n; j < 2 * n; j++) pw_motion_at (motion, k)[j] = NAN;
@@ -296,10 +296,10 @@ static int reference_find (pw_reference *reference, pw_study *study, double step
                     "--reference %s: no row at the final time, t = %s s; the last one before it is at %s s", path,
                     PW_DIGITS (t_end, 9), PW_DIGITS (last, 9));
   snprintf (reference->name, sizeof reference->name, "%s", path ? path : "the exact solution of the model");
-  study->t_end = t_end;
+  study->settings.span = t_end;
   reference->known = 1;
   reference->from_table = path != NULL;
-  reference_raise_uncertainty (study->compiled.system, reference);
+  reference_raise_uncertainty (study->line.m.system, reference);
   return PW_OK;
 }
 
@@ -440,7 +440,7 @@ static void conclusion_print_heading (const pw_conclusion *conclusion) {
     printf ("%s%d", k == 0 ? "" : k + 1 < CONCLUSION_COLUMNS ? ", " : " and ", conclusion_required[k].digits);
   printf (" correct digits, relative to the cheapest method.\n"
           "Digits: the largest error of a coordinate at %d times up to %s s, relative to\n",
-          reference->motion.taken, PW_DIGITS (conclusion->compare->study.t_end, 6));
+          reference->motion.taken, PW_DIGITS (conclusion->compare->study.settings.span, 6));
   for (int i = MOTION_LENGTH; i <= MOTION_ANGLE; i++)
     if (reference->uncertainty[MOTION_LARGEST + i] > 0) {
       printf ("%s%s %s (%s)", between, PW_DIGITS (conclusion_scale (reference, i), 3), unit[i], name[i]);
@@ -614,10 +614,10 @@ static int compare_plan_rows (pw_study *study, const compare_ladder ladders[2], 
 static int compare_plan (pw_study *study, pw_error *error) {
   pw_compare *compare = (pw_compare *)study;
   compare_ladder ladders[2] = { { 0.1, 1e-4 }, { 1e-3, 1e-12 } }; /* steps, tolerances */
-  study->t_end = pw_cli_defaults (pw_file_table (study->compiled.file)).t_end;
+  study->settings.span = study->line.m.defaults.t_end;
   study->cpu_limit = 10;
   compare->repeats = 9;
-  int status = pw_cli_number ("--t-end", study->line.t_end, PW_POSITIVE, &study->t_end, error);
+  int status = pw_cli_number ("--t-end", study->line.t_end, PW_POSITIVE, &study->settings.span, error);
   if (status == PW_OK) status = pw_cli_number ("--limit", study->line.limit, PW_POSITIVE, &study->cpu_limit, error);
   if (status == PW_OK) status = pw_cli_number ("--repeats", compare->repeats_text, PW_COUNT, &compare->repeats, error);
   if (status == PW_OK && compare->repeats > COMPARE_REPEATS)
@@ -637,7 +637,7 @@ static void compare_set_errors (const pw_compare *compare, const pw_motion *moti
   const pw_reference *reference = &compare->reference;
   double *error = &row->value[COLUMN_ERROR];
   if (!reference->known) return;
-  pw_motion_errors (compare->study.compiled.system, &reference->motion, motion, error);
+  pw_motion_errors (compare->study.line.m.system, &reference->motion, motion, error);
   for (int i = 0; i < MOTION_ERRORS; i++) {
     if (reference->uncertainty[i] == 0) error[i] = NAN;
     if (!(error[i] <= reference->uncertainty[i])) continue;
@@ -702,8 +702,8 @@ static int compare_measure_errors (pw_compare *compare, pw_row *row, pw_error *e
   pw_study *study = &compare->study;
   pw_motion motion;
   int status = compare->reference.known
-                   ? pw_motion_open_at (&motion, study->compiled.system, &compare->reference.motion, error)
-                   : pw_motion_open (&motion, study->compiled.system, MOTION_SAMPLES, study->t_end, error);
+                   ? pw_motion_open_at (&motion, study->line.m.system, &compare->reference.motion, error)
+                   : pw_motion_open (&motion, study->line.m.system, MOTION_SAMPLES, study->settings.span, error);
   if (status != PW_OK) return status;
   status = compare_run (study, row, &motion, error);
   if (status == PW_OK) compare_set_errors (compare, &motion, row);
@@ -781,7 +781,7 @@ static int compare_figures (pw_study *study, pw_error *error) {
       const double e = row->state == ROW_DONE ? row->point[0][POINT_LENGTH + unit] : NAN;
       if (e > 0 && isfinite (e)) least = fmin (least, e), most = fmax (most, e);
     }
-    status = pw_curves_open (&c, &study->line, &study->compiled, study->folder, name[unit], title[unit], error);
+    status = pw_curves_open (&c, &study->line, study->folder, name[unit], title[unit], error);
     for (int k = 0; status == PW_OK && k < 2; k++) {
       pw_curves_panel (&c, &(pw_panel){ .x_label = axis[k],
                                         .y_label = label[unit],

@@ -72,7 +72,7 @@ static int drift_read_values (pw_drift *drift, const char *text, pw_error *error
   int option = pw_find_name (drift_option, sizeof *drift_option, name, hint);
   if (option < 0) return pw_fail (error, PW_INPUT, "--vary %.100s: alpha, beta and every can be varied%s", text, hint);
   pw_axis *axis = &drift->axis[option];
-  int status = pw_axis_read (axis, text, &drift->study.arena, error);
+  int status = pw_axis_read (axis, text, &drift->study.line.arena, error);
   for (long i = 0; status == PW_OK && i < axis->count; i++) {
     const char *expected = pw_domain_check (option == DRIFT_EVERY ? PW_COUNT : PW_NONNEGATIVE, pw_axis_value (axis, i));
     if (*expected)
@@ -153,7 +153,7 @@ static int drift_plan_rows (pw_drift *drift, pw_error *error) {
   for (int i = 0; i < study->methods; i++) {
     pw_row *row = pw_study_add (study, DRIFT_METHODS, i, study->method[i], DRIFT_PARTS, error);
     if (row == NULL) return PW_RESOURCE;
-    for (int k = 0; k < DRIFT_PARTS; k++) row->point[k][0] = study->t_end * (k + 1) / DRIFT_PARTS;
+    for (int k = 0; k < DRIFT_PARTS; k++) row->point[k][0] = study->settings.span * (k + 1) / DRIFT_PARTS;
   }
   if (drift->only_methods) return PW_OK;
   int status = drift_plan_baumgarte (drift, error);
@@ -162,9 +162,9 @@ static int drift_plan_rows (pw_drift *drift, pw_error *error) {
 
 static int drift_plan (pw_study *study, pw_error *error) {
   pw_drift *drift = (pw_drift *)study;
-  pw_run_defaults defaults = pw_cli_defaults (pw_file_table (study->compiled.file));
+  pw_run_defaults defaults = study->line.m.defaults;
   if (defaults.rtol == 0) defaults.rtol = PW_RTOL;
-  int status = pw_cli_settings (&study->line, &defaults, &study->t_end, &study->settings, &study->limit, error);
+  int status = pw_cli_settings (&study->line, &defaults, &study->settings, &study->limit, error);
   study->settings.ledger = 1;
   if (status == PW_OK) status = pw_study_read_methods (study, "rk4+all,ida+all,galpha+all", error);
   for (int i = 0; status == PW_OK && i < DRIFT_OPTIONS; i++)
@@ -190,7 +190,7 @@ static void drift_raise_largest (double *largest, double value) {
 /* The part of the run that contains a time; a time on the border of two parts, up to round-off, belongs to the earlier
  * one. */
 static int drift_part (const pw_study *study, double t) {
-  int k = (int)ceil (t / study->t_end * DRIFT_PARTS - 1e-9) - 1;
+  int k = (int)ceil (t / study->settings.span * DRIFT_PARTS - 1e-9) - 1;
   return k < 0 ? 0 : k < DRIFT_PARTS ? k : DRIFT_PARTS - 1;
 }
 
@@ -240,7 +240,7 @@ static int drift_begin (pw_study *study, pw_error *error) {
   (void)error;
   printf (
       "%s, %s s, steps of %s s or rtol %s: the largest value of all steps and of the last %g %%, and its growth\n\n",
-      pw_file_name (study->compiled.file), PW_DIGITS (study->t_end, 6), PW_DIGITS (study->settings.step, 6),
+      pw_file_name (study->line.m.file), PW_DIGITS (study->settings.span, 6), PW_DIGITS (study->settings.step, 6),
       PW_DIGITS (study->settings.rtol, 6), 100.0 / DRIFT_PARTS);
   return PW_OK;
 }
@@ -273,12 +273,12 @@ static int drift_figures (pw_study *study, pw_error *error) {
   int status = drift_write_times (study, error);
   for (int group = 0; status == PW_OK && group < DRIFT_GROUPS; group++) {
     pw_curves c;
-    status = pw_curves_open (&c, &study->line, &study->compiled, study->folder, name[group], title[group], error);
+    status = pw_curves_open (&c, &study->line, study->folder, name[group], title[group], error);
     if (status != PW_OK) return status;
     for (int i = 0; i < DRIFT_QUANTITIES; i++) {
       pw_panel panel = { .x_label = axis[group], .y_label = label[i], .type = PW_PANEL_BELOW | PW_PANEL_LOG_Y };
       if (group == DRIFT_METHODS)
-        panel.x[1] = study->t_end;
+        panel.x[1] = study->settings.span;
       else
         panel.type |= PW_PANEL_LOG_X;
       pw_curves_panel (&c, &panel);

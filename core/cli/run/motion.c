@@ -217,20 +217,20 @@ int pw_motion_open_reference (pw_motion *motion, const pw_cli_model *compiled, c
 
 /* Compares a run with a reference solution: opens the reference, and computes the errors of the run at its times. */
 
-int pw_comparison_open (pw_comparison *comparison, const pw_cli_model *compiled, const char *path, int started,
-                        double t_end, pw_error *error) {
+int pw_comparison_open (pw_comparison *comparison, const pw_cli_line *line, const char *path, double t_end,
+                        pw_error *error) {
   *comparison = (pw_comparison){ .errors = { .source = path ? path : "the model" } };
-  if (path == NULL && !pw_model_has_reference (compiled->model)) return PW_OK;
-  if (path == NULL && started) {
+  if (path == NULL && !pw_model_has_reference (line->m.model)) return PW_OK;
+  if (path == NULL && line->starts) {
     pw_cli_say (
         "pinwheel: the model's reference solution holds for its own initial values: with --start errors are not "
         "computed\n");
     return PW_OK;
   }
-  int status = pw_motion_open_reference (&comparison->reference, compiled, path, &t_end, error);
+  int status = pw_motion_open_reference (&comparison->reference, &line->m, path, &t_end, error);
   if (status != PW_OK) return status;
-  pw_motion_gaps (compiled->system, &comparison->reference, 1, comparison->gaps);
-  return pw_motion_open_at (&comparison->motion, compiled->system, &comparison->reference, error);
+  pw_motion_gaps (line->m.system, &comparison->reference, 1, comparison->gaps);
+  return pw_motion_open_at (&comparison->motion, line->m.system, &comparison->reference, error);
 }
 
 void pw_comparison_close (pw_comparison *comparison) {

@@ -267,7 +267,7 @@ static const char *report_general_reason (const pw_run_cli *command) {
 
 pw_summary pw_run_summary (pw_run_cli *command, const pw_sample *last, const pw_error *error,
                            char reason[PW_RUN_REASON]) {
-  const pw_file *file = command->compiled.file;
+  const pw_file *file = command->line.m.file;
   const pw_run *run = command->run;
   pw_summary summary = { .model = file ? pw_file_name (file) : command->line.argument[0],
                          .method = command->method,
@@ -279,8 +279,7 @@ pw_summary pw_run_summary (pw_run_cli *command, const pw_sample *last, const pw_
                          .energy_defect = last ? pw_run_energy_defect (run, last) : NAN,
                          .redundant = command->redundant,
                          .general = run ? report_general_reason (command) : NULL,
-                         .reference =
-                             run ? pw_comparison_errors (&command->comparison, command->compiled.system) : NULL,
+                         .reference = run ? pw_comparison_errors (&command->comparison, command->line.m.system) : NULL,
                          .stated = command->stated.known ? &command->stated.result : NULL };
   if (error->status == PW_OK && pw_stop) {
     snprintf (reason, PW_RUN_REASON, "interrupted at t = %s s", PW_DIGITS (pw_run_time (run), 6));
@@ -304,7 +303,7 @@ void pw_report_warnings (const pw_run *run, const pw_system *system, double defe
 }
 
 void pw_report_end (const pw_run_cli *command, const pw_summary *summary, const pw_sample *last) {
-  const pw_system *system = command->compiled.system;
+  const pw_system *system = command->line.m.system;
   const pw_statistics *stats = pw_run_statistics (command->run);
   printf ("%s, %s, at t = %s s\n\n", summary->model, summary->method, PW_DIGITS (last->t, 8));
   report_bodies (system, last);

@@ -62,7 +62,7 @@ int pw_study_read_methods (pw_study *study, const char *otherwise, pw_error *err
 
 pw_row *pw_study_add (pw_study *study, int group, int curve, const char *method, int points, pw_error *error) {
   pw_row *row = realloc (study->row, (size_t)(study->rows + 1) * sizeof *row);
-  double (*point)[STUDY_COORDINATES] = pw_arena_alloc (&study->arena, (size_t)points * sizeof *point);
+  double (*point)[STUDY_COORDINATES] = pw_arena_alloc (&study->line.arena, (size_t)points * sizeof *point);
   if (row) study->row = row;
   if (row == NULL || point == NULL) return pw_fail (error, PW_RESOURCE, "out of memory"), NULL;
   row += study->rows++;
@@ -93,21 +93,21 @@ static int study_advance (pw_study *study, pw_row *row, pw_run *run, const pw_li
                           pw_error *error) {
   int status = PW_OK;
   long batch = 8; /* calls of pw_run_advance_towards between readings of the clock, at first */
-  while (status == PW_OK && pw_run_time (run) < study->t_end) {
+  while (status == PW_OK && pw_run_time (run) < study->settings.span) {
     double start = pw_seconds (CLOCK_THREAD_CPUTIME_ID);
     long n = 0;
     do {
-      status = pw_run_advance_towards (run, visitor ? visitor->due : study->t_end, study->t_end, error);
+      status = pw_run_advance_towards (run, visitor ? visitor->due : study->settings.span, study->settings.span, error);
       if (status == PW_OK && visitor && pw_run_time (run) >= visitor->due)
         status = visitor->visit (visitor, run, error);
-    } while (status == PW_OK && ++n < batch && pw_run_time (run) < study->t_end);
+    } while (status == PW_OK && ++n < batch && pw_run_time (run) < study->settings.span);
     double used = pw_seconds (CLOCK_THREAD_CPUTIME_ID) - start;
     row->cpu += used;
     pw_batch_adapt (&batch, n, used);
-    pw_study_progress (study, row, study->run_share * (row->runs + pw_run_time (run) / study->t_end));
+    pw_study_progress (study, row, study->run_share * (row->runs + pw_run_time (run) / study->settings.span));
     int stopped = status == PW_STOPPED;
     if (stopped && (pw_stop || isinf (study->cpu_limit))) return pw_limit_status (limit, pw_run_time (run), error);
-    if (stopped || (status == PW_OK && row->cpu > study->cpu_limit && pw_run_time (run) < study->t_end)) {
+    if (stopped || (status == PW_OK && row->cpu > study->cpu_limit && pw_run_time (run) < study->settings.span)) {
       row->state = ROW_STOPPED;
       return PW_RETRY;
     }
@@ -124,7 +124,7 @@ int pw_study_run (pw_study *study, pw_row *row, const pw_settings *settings, pw_
   run_settings.stop = pw_limit_over;
   run_settings.stop_context = &limit;
   run_settings.specialised = pw_scene_code_table (study->engine.code);
-  pw_run *run = pw_run_open (study->compiled.system, row->method, &run_settings, error);
+  pw_run *run = pw_run_open (study->line.m.system, row->method, &run_settings, error);
   if (run == NULL && error->status == PW_STOPPED) {
     *error = (pw_error){ 0 };
     if (pw_stop || isinf (study->cpu_limit)) return pw_limit_status (&limit, settings->t, error);
@@ -292,19 +292,18 @@ static int study_open_folder (pw_study *study, pw_error *error) {
   if (study->folder == NULL) return pw_cli_requires ("--width", study->line.width, "-o DIR", 0, error);
   double width;
   int status = pw_figure_width (study->line.width, &width, error);
-  if (status == PW_OK)
-    status = pw_files_open (&study->files, &study->line, &study->compiled, use, sizeof use / sizeof *use, error);
+  if (status == PW_OK) status = pw_files_open (&study->line, use, sizeof use / sizeof *use, error);
   return status == PW_OK ? table_open (study, error) : status;
 }
 
 /* Estimated number of steps of all runs. */
 static double study_estimated_steps (const pw_study *study) {
-  pw_run_defaults defaults = pw_cli_defaults (pw_file_table (study->compiled.file));
   double steps = 0;
   for (const pw_row *row = study->row; row < study->row + study->rows; row++) {
     pw_settings settings = study->settings;
     if (row->level > 0) settings.step = settings.rtol = row->level;
-    steps += study->type->runs_per_row * pw_method_steps (row->method, &settings, defaults.step, study->t_end);
+    steps += study->type->runs_per_row *
+             pw_method_steps (row->method, &settings, study->line.m.defaults.step, study->settings.span);
   }
   return steps;
 }
@@ -314,15 +313,15 @@ static int study_open (pw_study *study, pw_error *error) {
   study->run_share = 1;
   study->cpu_limit = INFINITY;
   pthread_mutex_init (&study->mutex, NULL);
-  int status = pw_cli_open (&study->compiled, &study->line, error);
+  int status = pw_cli_open (&study->line, error);
   if (status == PW_OK) status = pw_parallel_jobs (study->jobs_text, &study->jobs, error);
   if (status == PW_OK) status = study->type->plan (study, error);
   if (status == PW_OK) status = pw_cli_read_specialise (study->line.specialise, &when, error);
-  if (status == PW_OK) status = pw_report_initial_state (&study->compiled, study->limit.seconds, error);
+  if (status == PW_OK) status = pw_report_initial_state (&study->line.m, study->limit.seconds, error);
   if (status != PW_OK) return status;
-  pw_cli_report_tables (study->compiled.system, study->t_end);
+  pw_cli_report_tables (study->line.m.system, study->settings.span);
   /* one engine for all runs, since `compare` compares their processor times */
-  pw_cli_engine_open (&study->engine, study->compiled.system, when, study_estimated_steps (study));
+  pw_cli_engine_open (&study->engine, study->line.m.system, when, study_estimated_steps (study));
   return study_open_folder (study, error);
 }
 
@@ -366,7 +365,7 @@ static int study_perform (pw_study *study, pw_error *error) {
     printf ("all runs use %s%s\n\n",
             study->engine.code ? "code specialised for this scene, if their method can use it" : "the general engine: ",
             study->engine.code ? "" : study->engine.reason);
-  pw_study_begin_progress (study, pw_file_name (study->compiled.file), study->type->row_noun, study->rows);
+  pw_study_begin_progress (study, pw_file_name (study->line.m.file), study->type->row_noun, study->rows);
   if (status == PW_OK)
     status = study->type->timed ? pw_study_parallel (study, study->methods, study_measure_method, study, error)
                                 : pw_study_parallel (study, study->rows, study_measure_row, study, error);
@@ -410,13 +409,10 @@ int pw_study_command (pw_study *study, const pw_study_type *type, pw_error *erro
   if (status == PW_OK) status = study_perform (study, error);
   status = study_finish (study, status, error);
   if (status == PW_OK) status = study_require_success (study, error);
-  pw_files_close (&study->files);
   if (type->close) type->close (study);
-  pw_arena_free (&study->arena);
   free (study->row);
   free (study->method);
   pthread_mutex_destroy (&study->mutex);
   pw_cli_engine_close (&study->engine);
-  pw_cli_close_model (&study->compiled);
   return status == PW_INTERRUPTED ? status : error->status;
 }

@@ -182,12 +182,12 @@ static void row_state_error (sweep_row *row, const pw_plan *plan, const pw_setti
                    *end = rows ? rows + TIMES * width : NULL;
   long recorded;
   pw_error own = { 0 };
-  pw_equal_times (plan->t_end, TIMES, t);
+  pw_equal_times (plan->settings.span, TIMES, t);
   row->state_error = malloc ((size_t)states * sizeof *end);
   if (rows == NULL || row->state_error == NULL)
     row->status = pw_fail (&row->error, PW_RESOURCE, "out of memory");
   else
-    row->status = pw_run_record (row->run, plan->t_end, t, TIMES, LONG_MAX, rows, &recorded, &row->error);
+    row->status = pw_run_record (row->run, plan->settings.span, t, TIMES, LONG_MAX, rows, &recorded, &row->error);
   int known = row->status == PW_OK;
   pw_repetition *r =
       !known ? NULL : pw_repetition_open (row->system->model.system, plan->method, settings, t, TIMES, &own);
@@ -226,13 +226,13 @@ static void row_open (sweep_row *row, const pw_plan *plan) {
     row->run = pw_limit_open (row->system->model.system, plan->method, &settings, &row->error);
   row->status = row->error.status;
   if (row->run && row_has_outcomes (plan))
-    row->status = pw_outcomes_begin (&row->of, row->run, plan->t_end, &row->error);
+    row->status = pw_outcomes_begin (&row->of, row->run, plan->settings.span, &row->error);
   if (row->run && plan->with_error) row_state_error (row, plan, &settings);
   free (initial);
 }
 
 static int row_ended (const sweep_row *row, const pw_plan *plan) {
-  return row->status != PW_OK || row->of.ended || !(pw_run_time (row->run) < plan->t_end);
+  return row->status != PW_OK || row->of.ended || !(pw_run_time (row->run) < plan->settings.span);
 }
 
 /* Closes the run and appends the cells of its row, without the end of the line, even if the run failed; returns its
@@ -354,11 +354,13 @@ static void worker_advance (sweep_worker *worker) {
   }
   if (plan->by_steps) /* one run */
     while (!row_ended (running[0], plan))
-      running[0]->status = pw_outcomes_advance (&running[0]->of, run[0], plan->t_end, plan->t_end, &running[0]->error);
+      running[0]->status =
+          pw_outcomes_advance (&running[0]->of, run[0], plan->settings.span, plan->settings.span, &running[0]->error);
   if (plan->by_steps) return;
   while (!ended) {
-    pw_runs_advance (run, n, plan->t_end, same_code ? worker->lanes_code : NULL, worker->lanes_memory, status, error);
-    for (int i = 0; i < n; i++) ended |= status[i] != PW_OK || !(pw_run_time (run[i]) < plan->t_end);
+    pw_runs_advance (run, n, plan->settings.span, same_code ? worker->lanes_code : NULL, worker->lanes_memory, status,
+                     error);
+    for (int i = 0; i < n; i++) ended |= status[i] != PW_OK || !(pw_run_time (run[i]) < plan->settings.span);
   }
   for (int i = 0; i < n; i++) running[i]->status = status[i], running[i]->error = error[i];
 }
@@ -398,7 +400,8 @@ static int rows_compute (const pw_plan *plan, pw_journal *journal, int jobs, pw_
   pthread_mutex_init (&sweep.lock, NULL);
   pthread_cond_init (&sweep.compiled, NULL);
   pw_stop_catch ();
-  pw_progress_start (&sweep.progress, pw_file_name (plan->file), "runs", (double)journal->done, (double)journal->rows);
+  pw_progress_start (&sweep.progress, pw_file_name (plan->line->m.file), "runs", (double)journal->done,
+                     (double)journal->rows);
   pw_parallel (sweep.jobs, sweep.jobs, worker_thread, &sweep, error);
   pw_progress_end (&sweep.progress);
   pw_stop_release (); /* the rest can be interrupted and repeated */
@@ -482,13 +485,13 @@ static int sweep_read_lanes (pw_sweep *sweep, pw_error *error) {
 
 static int sweep_read_settings (pw_sweep *sweep, pw_error *error) {
   pw_plan *plan = &sweep->plan;
-  pw_run_defaults defaults = pw_cli_defaults (pw_file_table (plan->file));
+  const pw_run_defaults *defaults = &sweep->line.m.defaults;
   plan->line = &sweep->line;
-  plan->method = sweep->line.method ? sweep->line.method : defaults.method;
+  plan->method = sweep->line.method ? sweep->line.method : defaults->method;
   if (plan->with_error && row_has_outcomes (plan))
     return pw_fail (error, PW_INPUT, "--error compares complete runs: it cannot be given together with --%s",
                     plan->of ? "of" : "until");
-  int status = pw_cli_settings (&sweep->line, &defaults, &plan->t_end, &plan->settings, &plan->limit, error);
+  int status = pw_cli_settings (&sweep->line, defaults, &plan->settings, &plan->limit, error);
   if (status == PW_OK) pw_cli_report_unused (plan->method, &sweep->line);
   if (status == PW_OK) status = pw_cli_read_specialise (sweep->line.specialise, &plan->specialise, error);
   if (status == PW_OK) status = sweep_read_lanes (sweep, error);
@@ -498,11 +501,9 @@ static int sweep_read_settings (pw_sweep *sweep, pw_error *error) {
 
 static int sweep_open (pw_sweep *sweep, pw_error *error) {
   pw_use use[] = { PW_CLI_MODEL_USE, { "-o", sweep->path, PW_WRITES, pw_cli_csv } };
-  sweep->plan.file = pw_cli_file (&sweep->line, error);
-  if (sweep->plan.file == NULL) return error->status;
-  int status = sweep_read_settings (sweep, error);
-  if (status == PW_OK)
-    status = pw_cli_check_uses (&sweep->line, sweep->plan.file, use, sizeof use / sizeof *use, error);
+  int status = pw_cli_file (&sweep->line, error);
+  if (status == PW_OK) status = sweep_read_settings (sweep, error);
+  if (status == PW_OK) status = pw_cli_check_uses (&sweep->line, use, sizeof use / sizeof *use, error);
   if (status == PW_OK) status = pw_plan_open (&sweep->plan, sweep->ranges, error);
   if (status == PW_OK && sweep->plan.parts > sweep->plan.grid.rows)
     status = pw_fail (error, PW_INPUT, "--part %s: more parts than the %ld rows of the grid", sweep->part_text,
@@ -571,7 +572,6 @@ static int sweep_command (void *options, pw_error *error) {
   }
   pw_journal_close (&sweep->journal);
   pw_plan_close (&sweep->plan);
-  pw_file_close (sweep->plan.file);
   return status;
 }
 

@@ -170,7 +170,7 @@ static int plan_build (const pw_plan *plan, long row, pw_model *model, pw_error 
 }
 
 int pw_plan_compile (const pw_plan *plan, long row, pw_cli_model *compiled, pw_error *error) {
-  *compiled = (pw_cli_model){ .model = pw_file_model (plan->file, error) };
+  *compiled = (pw_cli_model){ .model = pw_file_model (plan->line->m.file, error) };
   if (compiled->model && plan_build (plan, row, compiled->model, error) == PW_OK)
     compiled->system = pw_system_compile (compiled->model, error);
   if (compiled->system == NULL) return error->status;
@@ -192,7 +192,7 @@ static int plan_has_name (const char **list, const char *name) {
 /* Whether the model with its default parameters has a first-order state of this name, which has no dot. */
 static int plan_has_state (const pw_plan *plan, const char *name) {
   pw_error none = { 0 };
-  pw_model *m = pw_file_model (plan->file, &none);
+  pw_model *m = pw_file_model (plan->line->m.file, &none);
   pw_system *s = m && pw_model_build (m, &none) == PW_OK ? pw_system_compile (m, &none) : NULL;
   const int found = s && pw_system_find_state (s, name, &none) >= 0;
   pw_system_free (s);
@@ -267,9 +267,9 @@ typedef struct {
 /* Chooses what evaluates the equations, of one run and of several at once: the same in all parts of a sweep, since
  * results of different codes differ by round-off. */
 static void plan_open_engines (pw_plan *plan, const pw_system *system) {
-  pw_run_defaults defaults = pw_cli_defaults (pw_file_table (plan->file));
-  double steps = (double)plan->grid.rows * pw_method_steps (plan->method, &plan->settings, defaults.step, plan->t_end);
-  pw_cli_report_tables (system, plan->t_end);
+  double steps = (double)plan->grid.rows *
+                 pw_method_steps (plan->method, &plan->settings, plan->line->m.defaults.step, plan->settings.span);
+  pw_cli_report_tables (system, plan->settings.span);
   pw_cli_engine_open (&plan->engine, system, plan->specialise, steps);
   const char *reason = plan->with_cpu                   ? "--cpu measures each run"
                        : plan->with_error               ? "--error repeats each run"
@@ -396,8 +396,8 @@ static void plan_fingerprint_grid (pw_plan *plan) {
 
 static int plan_fingerprint (pw_plan *plan, const pw_model *model, pw_error *error) {
   pw_text *text = &plan->fingerprint;
-  if (pw_fingerprint_run (text, PW_SWEEP_MAGIC, plan->file, plan->tables_sum, plan->method, &plan->settings, error) !=
-      PW_OK)
+  if (pw_fingerprint_run (text, PW_SWEEP_MAGIC, plan->line->m.file, plan->tables_sum, plan->method, &plan->settings,
+                          error) != PW_OK)
     return error->status;
   if (plan->settings.max_steps != PW_MAX_STEPS)
     pw_fingerprint_number (text, "max-steps", NULL, (double)plan->settings.max_steps);
@@ -426,7 +426,7 @@ int pw_plan_open (pw_plan *plan, const char **ranges, pw_error *error) {
   int stabilisation, status = pw_method_parse (plan->method, &method, &stabilisation, error);
   if (status == PW_OK) status = grid_read (&plan->grid, (const char *const *)ranges, &plan->arena, error);
   if (status != PW_OK) return status;
-  pw_model *model = pw_file_model (plan->file, error);
+  pw_model *model = pw_file_model (plan->line->m.file, error);
   if (model == NULL) return error->status;
   status = pw_cli_apply (model, "--set", plan->line->sets, pw_model_set, error);
   for (int i = 0; i < plan->grid.axes && status == PW_OK; i++)
