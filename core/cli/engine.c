@@ -12,19 +12,6 @@ int pw_cli_read_specialise (const char *text, pw_specialise *when, pw_error *err
   return PW_OK;
 }
 
-/* Stores in a few words why the general engine is used: the error without the model's name or, if the C text was
- * generated (`has_text`), the meaning of its status. */
-static void engine_keep_reason (pw_cli_engine *e, const pw_system *s, int has_text, const pw_error *error) {
-  char model[300];
-  size_t n = (size_t)snprintf (model, sizeof model, "model %s: ", pw_system_name (s));
-  const char *reason = error->text + (strncmp (error->text, model, n) == 0 ? n : 0);
-  if (has_text)
-    reason = error->status == PW_INPUT    ? "no C compiler or no pinwheel.h"
-             : error->status == PW_METHOD ? "the generated code does not compile"
-                                          : "the generated code cannot be compiled or loaded";
-  snprintf (e->reason, sizeof e->reason, "%.190s", reason);
-}
-
 char *pw_cli_source (const pw_system *s, pw_error *error) {
   if (pw_system_check_source (s, error) != PW_OK) return NULL;
   pw_run *r = pw_run_open (s, "rk4+none", NULL, NULL); /* makes no step: any method will do */
@@ -43,7 +30,15 @@ static void engine_open_code (pw_cli_engine *e, const pw_system *s, pw_specialis
   free (text);
   if (e->code && *pw_scene_code_notice (e->code)) pw_cli_say ("pinwheel: %s\n", pw_scene_code_notice (e->code));
   if (e->code) return;
-  engine_keep_reason (e, s, has_text, &own);
+  /* in a few words why: the error without the model's name or, with a C text, the meaning of its status */
+  char model[300];
+  size_t n = (size_t)snprintf (model, sizeof model, "model %s: ", pw_system_name (s));
+  const char *reason = own.text + (strncmp (own.text, model, n) == 0 ? n : 0);
+  if (has_text)
+    reason = own.status == PW_INPUT    ? "no C compiler or no pinwheel.h"
+             : own.status == PW_METHOD ? "the generated code does not compile"
+                                       : "the generated code cannot be compiled or loaded";
+  snprintf (e->reason, sizeof e->reason, "%.190s", reason);
   if (has_text || when == PW_SPECIALISE_ALWAYS) pw_cli_say ("pinwheel: general engine: %s\n", own.text);
 }
 

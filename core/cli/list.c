@@ -109,15 +109,6 @@ static int list_models (const char **name, pw_error *error) {
 
 /* ---- Methods ---- */
 
-static void list_option (const pw_option *o) {
-  printf ("    :%s=", o->name);
-  for (int i = 0; o->choices && o->choices[i]; i++) printf ("%s%s", i ? "|" : "", o->choices[i]);
-  if (o->choices == NULL) printf ("NUMBER%s%s", o->unit && *o->unit ? " " : "", o->unit ? o->unit : "");
-  printf ("  (default %s", o->choices ? o->choices[(int)o->value] : PW_DIGITS (o->value, 6));
-  if (o->with) printf ("; with %s", o->with);
-  printf (")\n        %s\n", o->about);
-}
-
 static void list_method (const pw_method *m) {
   printf ("  %s  (%s)\n      %s\n", m->name, m->adaptive ? "adaptive steps; --rtol, --atol" : "fixed steps; --step",
           m->about);
@@ -129,7 +120,14 @@ static void list_method (const pw_method *m) {
 static void list_method_options (const void *entry) {
   const pw_method *m = entry;
   list_method (m);
-  for (const pw_option *o = m->options; o && o->name; o++) list_option (o);
+  for (const pw_option *o = m->options; o && o->name; o++) {
+    printf ("    :%s=", o->name);
+    for (int i = 0; o->choices && o->choices[i]; i++) printf ("%s%s", i ? "|" : "", o->choices[i]);
+    if (o->choices == NULL) printf ("NUMBER%s%s", o->unit && *o->unit ? " " : "", o->unit ? o->unit : "");
+    printf ("  (default %s", o->choices ? o->choices[(int)o->value] : PW_DIGITS (o->value, 6));
+    if (o->with) printf ("; with %s", o->with);
+    printf (")\n        %s\n", o->about);
+  }
 }
 
 static int list_methods (const char **name, pw_error *error) {
@@ -203,25 +201,23 @@ static int list_kinds (const char **name, pw_error *error) {
 
 /* ---- Signals ---- */
 
-/* The fields of a form of signals, and those that the form `table` has in text models alone. */
-static void list_signal (pw_table *t, const pw_signal_form *s) {
-  list_fields (t, s->fields);
-  if (s->type != PW_TABLE) return;
-  list_row (t, "points", "list", "", "[[TIME, VALUE], ...]; only in a text model");
-  list_row (t, "file", "text", "", "CSV file in the model's folder, in place of `points`; only in a text model");
-  list_row (t, "columns", "2 x text", "[1, 2]",
-            "names or numbers of its columns of times and values; only in a text model");
-  list_row (t, "time", "text", "1", "its column of times; if given, `columns` may have that of values alone");
-  list_row (t, "time_scale", "number", "1 (> 0)", "factor of the times, such as 1e-3 for ms; only in a text model");
-  list_row (t, "time_offset", "number [s]", "0", "added to the scaled times; only in a text model");
-}
-
 static int list_signals (const char **name, pw_error *error) {
   (void)name, (void)error;
   puts ("Signals: a number, an expression of time (in C a function), or one of");
   for (const pw_signal_form *s = pw_signal_forms; s->name; s++) {
     printf ("  %s: %s\n", s->name, s->about);
-    for (pw_table t = { 0 }; pw_table_pass (&t);) list_signal (&t, s);
+    for (pw_table t = { 0 }; pw_table_pass (&t);) {
+      list_fields (&t, s->fields);
+      if (s->type != PW_TABLE) continue; /* the rest is in text models alone */
+      list_row (&t, "points", "list", "", "[[TIME, VALUE], ...]; only in a text model");
+      list_row (&t, "file", "text", "", "CSV file in the model's folder, in place of `points`; only in a text model");
+      list_row (&t, "columns", "2 x text", "[1, 2]",
+                "names or numbers of its columns of times and values; only in a text model");
+      list_row (&t, "time", "text", "1", "its column of times; if given, `columns` may have that of values alone");
+      list_row (&t, "time_scale", "number", "1 (> 0)",
+                "factor of the times, such as 1e-3 for ms; only in a text model");
+      list_row (&t, "time_offset", "number [s]", "0", "added to the scaled times; only in a text model");
+    }
   }
   return PW_OK;
 }

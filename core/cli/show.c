@@ -131,17 +131,6 @@ static void yaml_triple (const char *key, const char *const name[3], const doubl
   if (written) putchar ('}');
 }
 
-/* A comment on values that are written although the model does not specify them: reading the text will specify them. */
-static void yaml_unspecified (const pw_body *b, const char *const name[6]) {
-  const char *separator = "  # the model does not specify ";
-  for (int i = 0; i < 6; i++) {
-    double value = i < 3 ? b->start[i] : b->rate[i - 3];
-    unsigned specified = b->specified ? b->specified >> i & 1 : value != 0; /* so -0 is written, but not specified */
-    if (yaml_is_zero (value) || specified) continue;
-    printf ("%s%s", separator, name[i]), separator = ", ";
-  }
-}
-
 static void yaml_body (const pw_body *b) {
   static const char *const state[] = { "x", "y", "phi", "vx", "vy", "omega" };
   printf ("  - {name: "), yaml_name (b->name);
@@ -150,7 +139,14 @@ static void yaml_body (const pw_body *b) {
   yaml_triple ("start", state, b->start, b->specified);
   yaml_triple ("rate", state + 3, b->rate, b->specified >> 3);
   putchar ('}');
-  yaml_unspecified (b, state);
+  /* a comment on values that are written although the model does not specify them, as reading the text will */
+  const char *separator = "  # the model does not specify ";
+  for (int i = 0; i < 6; i++) {
+    double value = i < 3 ? b->start[i] : b->rate[i - 3];
+    unsigned specified = b->specified ? b->specified >> i & 1 : value != 0; /* so -0 is written, but not specified */
+    if (yaml_is_zero (value) || specified) continue;
+    printf ("%s%s", separator, state[i]), separator = ", ";
+  }
   putchar ('\n');
 }
 
@@ -184,13 +180,6 @@ static int yaml_check (const pw_model *m, pw_error *error) {
     return pw_fail (error, PW_INPUT,
                     "--yaml: initial values of --start have no place in a text model; give them to run");
   return PW_OK;
-}
-
-static void yaml_path (const pw_path_text *p) {
-  printf ("  - {name: %s, %s%spoints: ", p->name, p->interpolation == PW_CUBIC ? "interpolation: cubic, " : "",
-          p->closed ? "closed: true, " : "");
-  yaml_pairs (p->x, p->y, p->count);
-  puts ("}");
 }
 
 static void yaml_run (const pw_run_defaults *run) {
@@ -230,7 +219,12 @@ static int yaml_model (const pw_cli_model *opened, pw_error *error) {
   if (ref->names) puts ("let:"); /* of the names in expressions */
   for (int i = 0; i < ref->names; i++) printf ("  %s: %s\n", ref->name[i], YAML_NUMBER (ref->value[i]));
   if (ref->paths) puts ("paths:");
-  for (int i = 0; i < ref->paths; i++) yaml_path (&ref->path[i]);
+  for (const pw_path_text *p = ref->path; p < ref->path + ref->paths; p++) {
+    printf ("  - {name: %s, %s%spoints: ", p->name, p->interpolation == PW_CUBIC ? "interpolation: cubic, " : "",
+            p->closed ? "closed: true, " : "");
+    yaml_pairs (p->x, p->y, p->count);
+    puts ("}");
+  }
   if (bodies) puts ("bodies:");
   for (int i = 0; i < bodies; i++) yaml_body (&b[i]);
   for (int of_states = 0, written = 0; of_states < 2; of_states++, written = 0)
@@ -270,17 +264,6 @@ static void show_bodies (const pw_system *s) {
   }
 }
 
-static void show_element (const pw_element *e) {
-  printf ("  %s %s: ", e->kind->name, pw_element_name (e));
-  for (const pw_field *f = e->kind->fields; f->name; f++) {
-    if (f->type == PW_TEXT && yaml_is_default (f, (const char *)e->definition + f->offset)) continue;
-    printf ("%s%s ", f == e->kind->fields ? "" : "; ", f->name);
-    yaml_field (f, (const char *)e->definition + f->offset, SHOW_DIGITS);
-    if (f->unit) printf (" %s", f->unit);
-  }
-  putchar ('\n');
-}
-
 static void show_outputs (const pw_model *m) {
   int count;
   const pw_named_output *outputs = pw_model_outputs (m, &count);
@@ -312,20 +295,6 @@ static void show_parameters (const pw_model *m) {
     }
 }
 
-/* The states given by the reference solution of the model. */
-static void show_reference (const pw_cli_model *m) {
-  enum { LISTED = 12 }; /* states, at most */
-  int n = pw_system_coordinates (m->system), known = 0;
-  double *x = pw_model_has_reference (m->model) ? malloc (2 * (size_t)n * sizeof *x) : NULL;
-  if (x && pw_system_reference (m->model, m->system, 0, x, x + n, NULL) == PW_OK)
-    for (int i = 0; i < 2 * n; i++)
-      if (!isnan (x[i]) && ++known <= LISTED)
-        printf ("%s%s", known > 1 ? ", " : "\nReference solution: ", PW_NAME (pw_system_state_name, m->system, i));
-  if (known > LISTED) printf (", and %d more", known - LISTED);
-  if (known) putchar ('\n');
-  free (x);
-}
-
 static void show_model (const pw_cli_model *m) {
   const pw_system *s = m->system;
   const pw_plugin_table *table = pw_model_table (m->model);
@@ -337,7 +306,16 @@ static void show_model (const pw_cli_model *m) {
                 pw_cli_short_path (pw_file_path (m->file)));
   show_bodies (s);
   if (elements) puts ("\nElements");
-  for (int i = 0; i < elements; i++) show_element (&e[i]);
+  for (const pw_element *end = e + elements; e < end; e++) {
+    printf ("  %s %s: ", e->kind->name, pw_element_name (e));
+    for (const pw_field *f = e->kind->fields; f->name; f++) {
+      if (f->type == PW_TEXT && yaml_is_default (f, (const char *)e->definition + f->offset)) continue;
+      printf ("%s%s ", f == e->kind->fields ? "" : "; ", f->name);
+      yaml_field (f, (const char *)e->definition + f->offset, SHOW_DIGITS);
+      if (f->unit) printf (" %s", f->unit);
+    }
+    putchar ('\n');
+  }
   show_outputs (m->model);
   if (differences) puts ("\nDerivatives by differences, for implicit methods and linearisation");
   for (int i = 0; i < differences; i++) printf ("  %s\n", PW_NAME (pw_system_difference_name, s, i));
@@ -346,7 +324,16 @@ static void show_model (const pw_cli_model *m) {
           PW_DIGITS (defaults->step, SHOW_DIGITS));
   if (defaults->rtol != 0) printf (", --rtol %s", PW_DIGITS (defaults->rtol, SHOW_DIGITS));
   putchar ('\n');
-  show_reference (m);
+  enum { LISTED = 12 }; /* states of the reference solution, at most */
+  int n = pw_system_coordinates (m->system), known = 0;
+  double *x = pw_model_has_reference (m->model) ? malloc (2 * (size_t)n * sizeof *x) : NULL;
+  if (x && pw_system_reference (m->model, m->system, 0, x, x + n, NULL) == PW_OK)
+    for (int i = 0; i < 2 * n; i++)
+      if (!isnan (x[i]) && ++known <= LISTED)
+        printf ("%s%s", known > 1 ? ", " : "\nReference solution: ", PW_NAME (pw_system_state_name, m->system, i));
+  if (known > LISTED) printf (", and %d more", known - LISTED);
+  if (known) putchar ('\n');
+  free (x);
   printf ("\nSizes: %d %s, %d coordinates, %s (%d on positions, %d on velocities)\n", bodies,
           bodies == 1 ? "body" : "bodies", pw_system_coordinates (s), PW_COUNTED (rows, "constraint equation"),
           holonomic, rows - holonomic);
@@ -369,31 +356,6 @@ static void matrices_row (pw_table *t, const char *name, const char *unit, const
 /* The coordinate, or the first-order state of which it is the integral. */
 static int matrices_state (const pw_system *s, int j) {
   return pw_system_state_hidden (s, j) ? j + pw_system_coordinates (s) : j;
-}
-
-static void matrices_coordinates (const pw_system *s, const pw_equations *eq, const pw_sample *sample) {
-  static const char *const head[] = { "", "M", "f", "q", "v", "a", NULL };
-  puts ("\nM (diagonal), forces and state by coordinate [its unit]; all numbers in SI units");
-  for (pw_table t = { 0 }; pw_table_pass (&t);) {
-    pw_head (&t, -22, 13, head);
-    for (int j = 0; j < eq->coordinates; j++) {
-      const int state = matrices_state (s, j);
-      const double value[] = { eq->mass[j], eq->force[j], state == j ? sample->q[j] : NAN, sample->v[j], sample->a[j] };
-      matrices_row (&t, PW_NAME (pw_system_state_name, s, state), pw_system_state_unit (s, state), value, 5);
-    }
-  }
-}
-
-static void matrices_constraints (const pw_system *s, const pw_equations *eq, const pw_sample *sample) {
-  static const char *const head[] = { "", "gamma", "eta", "g", "lambda", NULL };
-  puts ("\ngamma, eta, g and lambda by constraint equation, named after its reaction -lambda [its unit]");
-  for (pw_table t = { 0 }; pw_table_pass (&t);) {
-    pw_head (&t, -22, 13, head);
-    for (int i = 0; i < eq->rows; i++) {
-      const double g = i < eq->holonomic ? eq->g[i] : NAN, value[] = { eq->gamma[i], eq->eta[i], g, sample->lambda[i] };
-      matrices_row (&t, PW_NAME (pw_system_reaction_name, s, i), pw_system_reaction_unit (s, i), value, 4);
-    }
-  }
 }
 
 /* Columns of J from `first` on; in a large scene only the rows that are not zero there.  Entries are sorted by rows. */
@@ -423,9 +385,29 @@ static void matrices_panel (const pw_system *s, const pw_equations *eq, int firs
 static void matrices_print (const pw_cli_model *m, const pw_equations *eq, const pw_sample *sample) {
   const pw_system *s = m->system;
   printf ("%s at t = %s s\n", pw_file_name (m->file), PW_DIGITS (sample->t, MATRICES_DIGITS));
-  matrices_coordinates (s, eq, sample);
+  static const char *const head[] = { "", "M", "f", "q", "v", "a", NULL }, *const rows[] = { "",  "gamma",  "eta",
+                                                                                             "g", "lambda", NULL };
+  puts ("\nM (diagonal), forces and state by coordinate [its unit]; all numbers in SI units");
+  for (pw_table t = { 0 }; pw_table_pass (&t);) {
+    pw_head (&t, -22, 13, head);
+    for (int j = 0; j < eq->coordinates; j++) {
+      const int state = matrices_state (s, j);
+      const double value[] = { eq->mass[j], eq->force[j], state == j ? sample->q[j] : NAN, sample->v[j], sample->a[j] };
+      matrices_row (&t, PW_NAME (pw_system_state_name, s, state), pw_system_state_unit (s, state), value, 5);
+    }
+  }
   if (eq->rows == 0) puts ("\nThe model has no constraints: no J, no gamma");
-  if (eq->rows > 0) matrices_constraints (s, eq, sample);
+  if (eq->rows > 0) {
+    puts ("\ngamma, eta, g and lambda by constraint equation, named after its reaction -lambda [its unit]");
+    for (pw_table t = { 0 }; pw_table_pass (&t);) {
+      pw_head (&t, -22, 13, rows);
+      for (int i = 0; i < eq->rows; i++) {
+        const double g = i < eq->holonomic ? eq->g[i] : NAN,
+                     value[] = { eq->gamma[i], eq->eta[i], g, sample->lambda[i] };
+        matrices_row (&t, PW_NAME (pw_system_reaction_name, s, i), pw_system_reaction_unit (s, i), value, 4);
+      }
+    }
+  }
   if (eq->rows > 0 && eq->coordinates > 2 * MATRICES_PANEL)
     puts ("\nRows of J that are zero in the columns shown are left out");
   for (int j = 0; eq->rows > 0 && j < eq->coordinates; j += MATRICES_PANEL) matrices_panel (s, eq, j);

@@ -730,20 +730,6 @@ static int report_contains (const pw_fit *fit, int combination, int i) {
   return fabs (fit->singular_vector[i * fit->unknowns.count + combination]) > FIT_COMPONENT;
 }
 
-/* Prints the ratio of changes of the unknowns along a singular vector; the change of the first one is its estimate, or
- * 1 if this is 0. */
-static void report_ratio (const pw_fit *fit, int combination) {
-  double scale = 0;
-  for (int i = 0; i < fit->unknowns.count; i++) {
-    double change = fit->singular_vector[i * fit->unknowns.count + combination] / fit->column_length[i];
-    if (!report_contains (fit, combination, i)) continue;
-    printf (scale != 0 ? " : " : ": changes in the ratio ");
-    if (scale == 0) scale = (fit->estimate[i] != 0 ? fit->estimate[i] : 1) / change;
-    printf ("%.3g", change * scale);
-  }
-  puts (" have no effect");
-}
-
 /* Prints combinations of unknowns that change no model value: singular vectors with the singular value 0. */
 static void report_undetermined (const pw_fit *fit) {
   for (int k = fit->rank; k < fit->unknowns.count; k++) {
@@ -751,10 +737,20 @@ static void report_undetermined (const pw_fit *fit) {
     for (int i = 0; i < fit->unknowns.count; i++)
       if (report_contains (fit, k, i))
         pw_cli_print (stdout, "%s%s", count++ ? ", " : "\nThe data do not determine ", fit->unknowns.list[i].name);
-    if (count == 1)
+    if (count == 1) {
       puts (", which has no effect");
-    else
-      report_ratio (fit, k);
+      continue;
+    }
+    /* the ratio of the changes along the vector; the change of the first one is its estimate, or 1 if this is 0 */
+    double scale = 0;
+    for (int i = 0; i < fit->unknowns.count; i++) {
+      double change = fit->singular_vector[i * fit->unknowns.count + k] / fit->column_length[i];
+      if (!report_contains (fit, k, i)) continue;
+      printf (scale != 0 ? " : " : ": changes in the ratio ");
+      if (scale == 0) scale = (fit->estimate[i] != 0 ? fit->estimate[i] : 1) / change;
+      printf ("%.3g", change * scale);
+    }
+    puts (" have no effect");
   }
 }
 
@@ -800,28 +796,6 @@ static void fit_print (const pw_fit *fit) {
 
 /* ---- Files ---- */
 
-static void report_json_unknown (const pw_fit *fit, pw_json *j, int i) {
-  const pw_unknown *u = fit->unknowns.list + i;
-  pw_json_print (j, "{name: %s, unit: %s, initial: %g, value: %g, standard_error: %g, from: %g, to: %g", u->name,
-                 u->unit, u->value, fit->estimate[i], fit->standard_error[i], report_interval_end (fit, i, -1),
-                 report_interval_end (fit, i, 1));
-  if (fit->interrupted)
-    pw_json_text (j, "determined", NULL);
-  else
-    pw_json_flag (j, "determined", !isinf (fit->standard_error[i]));
-  pw_json_print (j, "bound: %i}", *report_bound (fit, i) != 0);
-}
-
-static void report_json_columns (const pw_fit *fit, pw_json *j) {
-  pw_json_open (j, "columns", '[');
-  for (int i = 0; i < fit->columns; i++) {
-    int count;
-    double rms = report_rms (fit, i, &count);
-    pw_json_print (j, "{name: %s, unit: %s, data: %d, rms: %g}", fit->column_name[i], fit->column_unit[i], count, rms);
-  }
-  pw_json_close (j, ']');
-}
-
 /* Writes a matrix, unknowns x unknowns, with these entries. */
 static void report_json_matrix (const pw_fit *fit, pw_json *j, const char *key,
                                 double (*entry) (const pw_fit *fit, int i, int j)) {
@@ -831,18 +805,6 @@ static void report_json_matrix (const pw_fit *fit, pw_json *j, const char *key,
     pw_json_open (j, NULL, '[');
     for (int k = 0; k < n; k++) pw_json_number (j, NULL, entry (fit, i, k));
     pw_json_close (j, ']');
-  }
-  pw_json_close (j, ']');
-}
-
-/* Writes pw_fit.ends. */
-static void report_json_ends (const pw_fit *fit, pw_json *j) {
-  int n = fit->unknowns.count;
-  pw_json_open (j, "searches", '[');
-  for (const double *end = fit->ends; end < fit->ends + fit->starts * (1 + n); end += 1 + n) {
-    pw_json_print (j, "{chi2: %g", *end);
-    pw_json_numbers (j, "values", end + 1, n);
-    pw_json_close (j, '}');
   }
   pw_json_close (j, ']');
 }
@@ -857,13 +819,34 @@ static void fit_json (const pw_fit *fit, const char *status, FILE *f) {
                  fit->residuals, fit_degrees_of_freedom (fit), fit->weighted, fit->chi2, fit->confidence, fit->rank,
                  fit->runs);
   pw_json_print (j, "derivatives: %s, iterations: %d, unknowns: [", "differences", fit->iterations);
-  for (int i = 0; i < fit->unknowns.count; i++) report_json_unknown (fit, j, i);
+  for (int i = 0; i < fit->unknowns.count; i++) {
+    const pw_unknown *u = fit->unknowns.list + i;
+    pw_json_print (j, "{name: %s, unit: %s, initial: %g, value: %g, standard_error: %g, from: %g, to: %g", u->name,
+                   u->unit, u->value, fit->estimate[i], fit->standard_error[i], report_interval_end (fit, i, -1),
+                   report_interval_end (fit, i, 1));
+    if (fit->interrupted)
+      pw_json_text (j, "determined", NULL);
+    else
+      pw_json_flag (j, "determined", !isinf (fit->standard_error[i]));
+    pw_json_print (j, "bound: %i}", *report_bound (fit, i) != 0);
+  }
+  pw_json_print (j, "], columns: [");
+  for (int i = 0; i < fit->columns; i++) {
+    int count;
+    double rms = report_rms (fit, i, &count);
+    pw_json_print (j, "{name: %s, unit: %s, data: %d, rms: %g}", fit->column_name[i], fit->column_unit[i], count, rms);
+  }
   pw_json_close (j, ']');
-  report_json_columns (fit, j);
   report_json_matrix (fit, j, "covariance", report_covariance);
   report_json_matrix (fit, j, "correlation", report_correlation);
-  report_json_ends (fit, j);
-  pw_json_close (j, '}');
+  const int n = fit->unknowns.count;
+  pw_json_open (j, "searches", '[');
+  for (const double *end = fit->ends; end < fit->ends + fit->starts * (1 + n); end += 1 + n) {
+    pw_json_print (j, "{chi2: %g", *end);
+    pw_json_numbers (j, "values", end + 1, n);
+    pw_json_close (j, '}');
+  }
+  pw_json_print (j, "]}");
 }
 
 static int fit_table (const pw_fit *fit, FILE *f, pw_error *error) {

@@ -246,17 +246,6 @@ static void linearise_print_mode (const pw_linearise_command *cmd, int mode) {
   if (internal > LINEARISE_ROWS) printf ("  and %d more internal coordinates\n", internal - LINEARISE_ROWS);
 }
 
-static void linearise_print_shapes (const pw_linearise_command *cmd) {
-  const pw_linear *l = &cmd->linear;
-  int shown = 0;
-  for (int i = 0; i < l->unknowns; i++) {
-    if (!linearise_is_shown (l, i)) continue;
-    if (shown == 0) puts ("\nMode shapes: displacements in the axes of the frame, the largest 1 m (angles times L)");
-    if (shown++ < LINEARISE_MODES) linearise_print_mode (cmd, i);
-  }
-  if (shown > LINEARISE_MODES) printf ("\nand %d more modes\n", shown - LINEARISE_MODES);
-}
-
 static void linearise_print (const pw_linearise_command *cmd) {
   const pw_linear *l = &cmd->linear;
   printf ("%s%s at t = %.9g s: %d minimal coordinates, %d of positions and %d of velocities\n",
@@ -269,7 +258,13 @@ static void linearise_print (const pw_linearise_command *cmd) {
     printf ("Not steady: the equations change with time or along the motion");
   puts (l->steady == PW_STEADY ? "The motion is steady" : "; the eigenvalues are not stability exponents");
   linearise_print_eigenvalues (l);
-  linearise_print_shapes (cmd);
+  int shown = 0;
+  for (int i = 0; i < l->unknowns; i++) {
+    if (!linearise_is_shown (l, i)) continue;
+    if (shown == 0) puts ("\nMode shapes: displacements in the axes of the frame, the largest 1 m (angles times L)");
+    if (shown++ < LINEARISE_MODES) linearise_print_mode (cmd, i);
+  }
+  if (shown > LINEARISE_MODES) printf ("\nand %d more modes\n", shown - LINEARISE_MODES);
 }
 
 /* ---- Matrices ---- */
@@ -298,29 +293,6 @@ static void linearise_blocks (const pw_linearise_command *cmd, linearise_block b
   block[3] = (linearise_block){ "D", n, cmd->outputs, n, cmd->inputs };
 }
 
-static void linearise_block_json (const pw_linearise_command *cmd, pw_json *j, const linearise_block *b) {
-  pw_json_open (j, b->name, '[');
-  for (int i = 0; i < b->rows; i++) {
-    j->line = 1;
-    pw_json_open (j, NULL, '[');
-    for (int c = 0; c < b->columns; c++) pw_json_number (j, NULL, linearise_entry (cmd, b->row + i, b->column + c));
-    pw_json_close (j, ']');
-  }
-  pw_json_close (j, ']');
-}
-
-static void linearise_mode_json (const pw_linearise_command *cmd, pw_json *j, int i) {
-  const pw_linear *l = &cmd->linear;
-  pw_json_print (
-      j, "\n{re: %g, im: %g, frequency_hz: %g, damping: %g, doubling_time: %g, halving_time: %g, rigid: %i, shape: {",
-      l->re[i], l->im[i], fabs (l->im[i]) / (2 * PW_PI), linearise_damping (l, i), linearise_doubling_time (l->re[i]),
-      linearise_doubling_time (-l->re[i]), l->rigid[i]);
-  for (int k = 0; linearise_has_shape (l, i) && k < 2 * l->coordinates; k++)
-    if (!pw_system_state_hidden (cmd->line.m.system, k))
-      pw_json_numbers (j, PW_NAME (pw_system_state_name, cmd->line.m.system, k), linearise_shape (l, i, k), 2);
-  pw_json_print (j, "}}");
-}
-
 /* Writes names and units of the inputs or outputs with the indices of a list. */
 static void linearise_names_json (const pw_linearise_command *cmd, pw_json *j, const char *key, const int *list,
                                   int count, char *(*name_of) (const pw_system *s, int i, char *buffer, size_t size),
@@ -342,9 +314,26 @@ static void linearise_json (const pw_linearise_command *cmd, pw_json *j) {
   linearise_names_json (cmd, j, "inputs", cmd->input, cmd->inputs, pw_system_signal_name, pw_system_signal_unit);
   linearise_names_json (cmd, j, "outputs", cmd->output, cmd->outputs, pw_system_state_name, pw_system_state_unit);
   linearise_blocks (cmd, block);
-  for (int i = 0; i < 4; i++) linearise_block_json (cmd, j, &block[i]);
+  for (const linearise_block *b = block; b < block + 4; b++) {
+    pw_json_open (j, b->name, '[');
+    for (int i = 0; i < b->rows; i++) {
+      pw_json_print (j, "\n[");
+      for (int c = 0; c < b->columns; c++) pw_json_number (j, NULL, linearise_entry (cmd, b->row + i, b->column + c));
+      pw_json_close (j, ']');
+    }
+    pw_json_close (j, ']');
+  }
   pw_json_open (j, "eigenvalues", '[');
-  for (int i = 0; i < l->unknowns; i++) linearise_mode_json (cmd, j, i);
+  for (int i = 0; i < l->unknowns; i++) {
+    pw_json_print (
+        j, "\n{re: %g, im: %g, frequency_hz: %g, damping: %g, doubling_time: %g, halving_time: %g, rigid: %i, shape: {",
+        l->re[i], l->im[i], fabs (l->im[i]) / (2 * PW_PI), linearise_damping (l, i), linearise_doubling_time (l->re[i]),
+        linearise_doubling_time (-l->re[i]), l->rigid[i]);
+    for (int k = 0; linearise_has_shape (l, i) && k < 2 * l->coordinates; k++)
+      if (!pw_system_state_hidden (cmd->line.m.system, k))
+        pw_json_numbers (j, PW_NAME (pw_system_state_name, cmd->line.m.system, k), linearise_shape (l, i, k), 2);
+    pw_json_print (j, "}}");
+  }
   pw_json_print (j, "]}");
 }
 
@@ -409,20 +398,6 @@ typedef struct {
   pw_error *error;
 } page;
 
-/* Sets the state at time t of a mode that is shown until `end` [s]. */
-static void page_state (const page *p, int mode, double t, double end) {
-  const pw_linear *l = &p->cmd->linear;
-  const double re = l->re[mode], im = l->im[mode];
-  const double complex exponent = im == 0 ? re : im * I,
-                       factor = p->size * cexp (exponent * t - (im == 0 ? fmax (0, re * end) : 0));
-  for (int j = 0; j < l->coordinates; j++) {
-    const double *shape = linearise_shape (l, mode, j);
-    const double complex displacement = factor * (shape[0] + shape[1] * I);
-    p->state[j] = p->q[j] + creal (displacement);
-    p->state[l->coordinates + j] = creal (exponent * displacement);
-  }
-}
-
 static void page_mode (const page *p, FILE *f, int mode) {
   const pw_linear *l = &p->cmd->linear;
   const double re = l->re[mode], im = l->im[mode],
@@ -432,7 +407,14 @@ static void page_mode (const page *p, FILE *f, int mode) {
   if (plots == NULL) return;
   for (int k = 0; k <= PAGE_SAMPLES; k++) {
     const double t = end * k / PAGE_SAMPLES;
-    page_state (p, mode, t, end);
+    const double complex exponent = im == 0 ? re : im * I,
+                         factor = p->size * cexp (exponent * t - (im == 0 ? fmax (0, re * end) : 0));
+    for (int j = 0; j < l->coordinates; j++) {
+      const double *shape = linearise_shape (l, mode, j);
+      const double complex displacement = factor * (shape[0] + shape[1] * I);
+      p->state[j] = p->q[j] + creal (displacement);
+      p->state[l->coordinates + j] = creal (exponent * displacement);
+    }
     pw_plots_add (plots, &(pw_sample){ .t = t, .q = p->state, .v = p->state + l->coordinates });
   }
   int n = snprintf (title, sizeof title, "mode %d: %.5g 1/s", mode + 1, re);

@@ -613,26 +613,6 @@ static void optimise_print (const pw_optimise *problem) {
 
 /* ---- JSON ---- */
 
-static void report_json_unknown (const pw_optimise *problem, pw_json *j, int i) {
-  const pw_unknown *u = problem->unknowns.list + i;
-  pw_json_print (j, "{name: %s, unit: %s, initial: %g, value: %g, low: %g, high: %g, bound: %s}", u->name, u->unit,
-                 u->value, problem->best->to[i], u->low, u->high,
-                 (const char *[]){ "low", NULL, "high" }[1 + report_bound (problem, i)]);
-}
-
-static void report_json_search (const pw_optimise *problem, pw_json *j, const pw_search *search) {
-  pw_json_print (j, "{value: %g, runs: %ld, failed: %ld", search->feasible ? search->output[0] : NAN, search->runs,
-                 search->failed);
-  pw_json_numbers (j, "from", search->from, problem->unknowns.count);
-  pw_json_numbers (j, "to", search->to, search->feasible ? problem->unknowns.count : 0);
-  pw_json_close (j, '}');
-}
-
-static void report_json_constraint (const pw_optimise *problem, pw_json *j, int i) {
-  pw_json_print (j, "{output: %s, type: %s, bound: %g, value: %g}", problem->output[i],
-                 problem->sign[i] > 0 ? "<=" : ">=", problem->bound[i], problem->best->output[i]);
-}
-
 static void optimise_json (const pw_optimise *problem, const char *status, FILE *f) {
   pw_json json = { .f = f, .lines = 2 }, *j = &json;
   char options[PW_UNKNOWNS_OPTIONS];
@@ -643,11 +623,23 @@ static void optimise_json (const pw_optimise *problem, const char *status, FILE 
                  problem->unknowns.method, problem->unknowns.settings.span, problem->seed);
   pw_json_print (j, "runs: %ld, failed: %ld, derivatives: %ld, reason: %s, unknowns: [", problem->runs, problem->failed,
                  problem->derivatives, problem->first_error ? problem->first_error->text : "");
-  for (int i = 0; i < problem->unknowns.count; i++) report_json_unknown (problem, j, i);
+  for (int i = 0; i < problem->unknowns.count; i++) {
+    const pw_unknown *u = problem->unknowns.list + i;
+    pw_json_print (j, "{name: %s, unit: %s, initial: %g, value: %g, low: %g, high: %g, bound: %s}", u->name, u->unit,
+                   u->value, problem->best->to[i], u->low, u->high,
+                   (const char *[]){ "low", NULL, "high" }[1 + report_bound (problem, i)]);
+  }
   pw_json_print (j, "], constraints: [");
-  for (int i = 1; i < problem->outputs; i++) report_json_constraint (problem, j, i);
+  for (int i = 1; i < problem->outputs; i++)
+    pw_json_print (j, "{output: %s, type: %s, bound: %g, value: %g}", problem->output[i],
+                   problem->sign[i] > 0 ? "<=" : ">=", problem->bound[i], problem->best->output[i]);
   pw_json_print (j, "], starts: [");
-  for (int i = 0; i < problem->starts + problem->refinements; i++) report_json_search (problem, j, problem->search + i);
+  for (const pw_search *s = problem->search; s < problem->search + problem->starts + problem->refinements; s++) {
+    pw_json_print (j, "{value: %g, runs: %ld, failed: %ld", s->feasible ? s->output[0] : NAN, s->runs, s->failed);
+    pw_json_numbers (j, "from", s->from, problem->unknowns.count);
+    pw_json_numbers (j, "to", s->to, s->feasible ? problem->unknowns.count : 0);
+    pw_json_close (j, '}');
+  }
   pw_json_print (j, "]}");
 }
 

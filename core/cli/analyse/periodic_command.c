@@ -338,35 +338,31 @@ static void periodic_print_branch (const pw_periodic_command *cmd) {
 
 /* ---- JSON ---- */
 
-static void periodic_point_json (const pw_periodic_command *cmd, const pw_periodic_orbit *o, pw_json *j) {
-  char text[PW_NAME_BYTES];
-  int n = pw_system_coordinates (cmd->line.m.system);
-  const periodic_displacement d = periodic_displace (o);
-  j->line = 1;
-  pw_json_open (j, NULL, '{');
-  if (cmd->vary_text) pw_json_number (j, "parameter", o->parameter);
-  if (cmd->vary_text) pw_json_text (j, "event", periodic_events[o->event]);
-  pw_json_print (j, "period: %g, displacement: %g, along: %g, left: %g, rotation: %g, rotations: {", o->period, d.total,
-                 d.along, d.left, o->rotation);
-  for (int i = 0; i < periodic_rotations (cmd->line.m.system); i++)
-    pw_json_number (j, periodic_rotation_name (cmd->line.m.system, i, text, sizeof text),
-                    periodic_rotation (cmd->line.m.system, o, i));
-  pw_json_print (j, "}, residual: %g, iterations: %d, growing: %d", o->residual, o->iterations, o->unstable);
-  pw_states_json (cmd->line.m.system, o->q, o->v, "start", j);
-  pw_states_json (cmd->line.m.system, o->end, o->end + n, "end", j);
-  pw_json_open (j, "multipliers", '[');
-  for (int i = 0; i < o->multipliers; i++)
-    pw_json_print (j, "{re: %g, im: %g, trivial: %i}", o->re[i], o->im[i], i >= o->multipliers - o->trivial);
-  pw_json_print (j, "]}");
-}
-
 static void periodic_json (const void *context, pw_json *j) {
   const pw_periodic_command *cmd = context;
+  const pw_system *s = cmd->line.m.system;
+  char text[PW_NAME_BYTES];
   pw_json_print (
       j, "{schema: %d, model: %s, parameter: %s, unit: %s, method: %s, symmetries: %d, complete: %i, motions: [", 1,
       pw_file_name (cmd->line.m.file), cmd->vary_text ? cmd->vary.name : NULL, cmd->vary.unit, cmd->settings.method,
       pw_periodic_symmetries (cmd->search), !cmd->stopped);
-  for (int i = 0; i < cmd->points; i++) periodic_point_json (cmd, &cmd->point[i].orbit, j);
+  for (const pw_periodic_point *p = cmd->point; p < cmd->point + cmd->points; p++) {
+    const pw_periodic_orbit *o = &p->orbit;
+    const periodic_displacement d = periodic_displace (o);
+    pw_json_print (j, "\n{");
+    if (cmd->vary_text) pw_json_print (j, "parameter: %g, event: %s", o->parameter, periodic_events[o->event]);
+    pw_json_print (j, "period: %g, displacement: %g, along: %g, left: %g, rotation: %g, rotations: {", o->period,
+                   d.total, d.along, d.left, o->rotation);
+    for (int i = 0; i < periodic_rotations (s); i++)
+      pw_json_number (j, periodic_rotation_name (s, i, text, sizeof text), periodic_rotation (s, o, i));
+    pw_json_print (j, "}, residual: %g, iterations: %d, growing: %d", o->residual, o->iterations, o->unstable);
+    pw_states_json (s, o->q, o->v, "start", j);
+    pw_states_json (s, o->end, o->end + pw_system_coordinates (s), "end", j);
+    pw_json_open (j, "multipliers", '[');
+    for (int i = 0; i < o->multipliers; i++)
+      pw_json_print (j, "{re: %g, im: %g, trivial: %i}", o->re[i], o->im[i], i >= o->multipliers - o->trivial);
+    pw_json_print (j, "]}");
+  }
   pw_json_print (j, "]}");
 }
 

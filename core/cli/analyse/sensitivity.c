@@ -272,27 +272,23 @@ static void sensitivity_warn (const sensitivity *cmd) {
 
 /* ---- Files ---- */
 
-static void sensitivity_json_derivative (const sensitivity *cmd, pw_json *j, int output, int unknown) {
-  char unit[SENSITIVITY_UNIT], reason[500];
-  const pw_unknown *u = &cmd->unknowns.list[unknown];
-  const pw_derivative *d = sensitivity_of (cmd, output, unknown, -1);
-  pw_json_print (j, "{by: %s, value: %g, unit: %s, derivative: %g, error: %g, elasticity: %g", u->name, u->value,
-                 sensitivity_unit (cmd, output, unknown, unit), d->value, d->error,
-                 sensitivity_elasticity (cmd, output, unknown));
-  if (d->type != PW_DERIVATIVE) pw_json_text (j, "reason", sensitivity_reason (u, d, reason, sizeof reason));
-  pw_json_close (j, '}');
-}
-
 static void sensitivity_json (const void *context, pw_json *j) {
   const sensitivity *cmd = context;
-  char unit[SENSITIVITY_UNIT];
+  char unit[SENSITIVITY_UNIT], reason[500];
   pw_json_print (j, "{model: %s, method: %s, derivatives_by: %s, t_end: %g, complete: %i, cpu_seconds: %g, outputs: [",
                  pw_file_name (cmd->line.m.file), cmd->unknowns.method, cmd->outputs.method,
                  cmd->unknowns.settings.span, 1, cmd->cpu);
   for (int o = 0; o < cmd->outputs.count; o++) {
     pw_json_print (j, "{output: %s, unit: %s, value: %g, derivatives: [", cmd->outputs.of[o],
                    pw_outcome_unit (&cmd->outcomes, o, unit, sizeof unit), cmd->value[o]);
-    for (int p = 0; p < cmd->unknowns.count; p++) sensitivity_json_derivative (cmd, j, o, p);
+    for (int p = 0; p < cmd->unknowns.count; p++) {
+      const pw_unknown *u = &cmd->unknowns.list[p];
+      const pw_derivative *d = sensitivity_of (cmd, o, p, -1);
+      pw_json_print (j, "{by: %s, value: %g, unit: %s, derivative: %g, error: %g, elasticity: %g", u->name, u->value,
+                     sensitivity_unit (cmd, o, p, unit), d->value, d->error, sensitivity_elasticity (cmd, o, p));
+      if (d->type != PW_DERIVATIVE) pw_json_text (j, "reason", sensitivity_reason (u, d, reason, sizeof reason));
+      pw_json_close (j, '}');
+    }
     pw_json_print (j, "]}");
   }
   pw_json_print (j, "]}");

@@ -460,28 +460,6 @@ static void steady_print (const pw_steady_command *cmd) {
 
 /* ---- JSON ---- */
 
-static void steady_eigenvalues_json (const pw_linear *l, pw_json *j) {
-  pw_json_open (j, "eigenvalues", '[');
-  for (int i = 0; i < l->unknowns; i++)
-    pw_json_print (j, "{re: %g, im: %g, frequency_hz: %g, rigid: %i}", l->re[i], l->im[i],
-                   fabs (l->im[i]) / (2 * PW_PI), l->rigid[i]);
-  pw_json_close (j, ']');
-}
-
-static void steady_point_json (const pw_steady_command *cmd, const pw_steady_point *p, pw_json *j) {
-  const pw_system *s = cmd->line.m.system;
-  pw_json_print (j, "\n{branch: %d", p->branch);
-  if (cmd->vary_text) pw_json_text (j, "event", steady_events[p->motion.event]);
-  if (cmd->vary_text) pw_json_number (j, "parameter", p->motion.parameter);
-  pw_json_print (j, "attempt: %d, residual: %g", p->attempt, p->motion.residual);
-  if (!cmd->vary_text) pw_json_number (j, "family", p->motion.family);
-  pw_json_number (j, "growing", p->motion.unstable);
-  pw_json_numbers (j, "twist", p->linear.twist, 3);
-  pw_states_json (s, p->motion.q, p->motion.v, "state", j);
-  steady_eigenvalues_json (&p->linear, j);
-  pw_json_close (j, '}');
-}
-
 static void steady_json (const void *context, pw_json *j) {
   const pw_steady_command *cmd = context;
   pw_json_print (j, "{schema: %d, model: %s, parameter: %s, unit: %s, held: {", 1, pw_file_name (cmd->line.m.file),
@@ -493,7 +471,22 @@ static void steady_json (const void *context, pw_json *j) {
                  PW_STEADY_NOT_RANDOM + cmd->random_attempts, !cmd->stopped);
   for (int i = 0; cmd->vary_text && i < cmd->branches; i++) pw_json_text (j, NULL, cmd->end[i]);
   pw_json_print (j, "], motions: [");
-  for (int i = 0; i < cmd->points; i++) steady_point_json (cmd, cmd->point + i, j);
+  for (const pw_steady_point *p = cmd->point; p < cmd->point + cmd->points; p++) {
+    const pw_linear *l = &p->linear;
+    pw_json_print (j, "\n{branch: %d", p->branch);
+    if (cmd->vary_text)
+      pw_json_print (j, "event: %s, parameter: %g", steady_events[p->motion.event], p->motion.parameter);
+    pw_json_print (j, "attempt: %d, residual: %g", p->attempt, p->motion.residual);
+    if (!cmd->vary_text) pw_json_number (j, "family", p->motion.family);
+    pw_json_number (j, "growing", p->motion.unstable);
+    pw_json_numbers (j, "twist", l->twist, 3);
+    pw_states_json (cmd->line.m.system, p->motion.q, p->motion.v, "state", j);
+    pw_json_open (j, "eigenvalues", '[');
+    for (int i = 0; i < l->unknowns; i++)
+      pw_json_print (j, "{re: %g, im: %g, frequency_hz: %g, rigid: %i}", l->re[i], l->im[i],
+                     fabs (l->im[i]) / (2 * PW_PI), l->rigid[i]);
+    pw_json_print (j, "]}");
+  }
   pw_json_print (j, "]}");
 }
 
@@ -557,32 +550,6 @@ static double steady_ranked (const pw_linear *l, int part, int k) {
   return NAN;
 }
 
-/* Draws the real parts [1/s] or frequencies [Hz] on the parts of branches where no modes grow (stable or neutral), or
- * where some do. */
-static void steady_draw_parts (const pw_steady_command *cmd, pw_curves *c, int part, int stable) {
-  pw_curves_add (c, stable ? "stable" : "unstable", stable ? "stable" : "unstable");
-  for (int k = 0; k < steady_most_eigenvalues (cmd); k++)
-    for (int i = 0, inside = 0; i < cmd->points; i++) { /* inside: 1: the last point began or continued a part */
-      const pw_steady_point *p = cmd->point + i;
-      const int here = i + 1 < cmd->points && p[1].branch == p->branch && steady_is_stable (p) == stable;
-      const double value = steady_ranked (&p->linear, part, k) / (part == IMAGINARY ? 2 * PW_PI : 1);
-      const int shown = (here || inside) && !(part == IMAGINARY && value <= 1e-12);
-      pw_curves_point (c, p->motion.parameter, shown ? value : NAN, 0);
-      if (!here) pw_curves_point (c, NAN, NAN, 0);
-      inside = here;
-    }
-}
-
-/* Draws lines at the folds, or at the other events, if there are any. */
-static void steady_draw_events (const pw_steady_command *cmd, pw_curves *c, int folds) {
-  int events = 0;
-  for (const pw_steady_point *p = cmd->point; p < cmd->point + cmd->points; p++) {
-    if (p->motion.event == PW_STEADY_POINT || (p->motion.event == PW_STEADY_FOLD) != folds) continue;
-    if (events++ == 0) pw_curves_add (c, folds ? "fold" : "change", folds ? "fold" : "stability changes");
-    pw_curves_point (c, p->motion.parameter, INFINITY, 0);
-  }
-}
-
 /* The ranges of real and imaginary parts in the figure [1/s].  Modes that decay much faster than others grow or
  * oscillate are not shown, unless the others are nearly 0. */
 static void steady_ranges (const pw_steady_command *cmd, double re[2], double im[2]) {
@@ -617,8 +584,29 @@ static int steady_draw (const pw_steady_command *cmd, pw_error *error) {
     panel.y_label = part == REAL ? "real part [1/s]" : "frequency [Hz]";
     panel.y[0] = part == REAL ? re[0] : 0, panel.y[1] = part == REAL ? re[1] : im[1] / (2 * PW_PI);
     pw_curves_panel (&c, &panel);
-    for (int stable = 1; stable >= 0; stable--) steady_draw_parts (cmd, &c, part, stable);
-    for (int folds = 0; folds < 2 && part == REAL; folds++) steady_draw_events (cmd, &c, folds);
+    /* on the parts of branches where no modes grow (stable or neutral), then where some do */
+    for (int stable = 1; stable >= 0; stable--) {
+      pw_curves_add (&c, stable ? "stable" : "unstable", stable ? "stable" : "unstable");
+      for (int k = 0; k < steady_most_eigenvalues (cmd); k++)
+        for (int i = 0, inside = 0; i < cmd->points; i++) { /* inside: 1: the last point began or continued a part */
+          const pw_steady_point *p = cmd->point + i;
+          const int here = i + 1 < cmd->points && p[1].branch == p->branch && steady_is_stable (p) == stable;
+          const double value = steady_ranked (&p->linear, part, k) / (part == IMAGINARY ? 2 * PW_PI : 1);
+          const int shown = (here || inside) && !(part == IMAGINARY && value <= 1e-12);
+          pw_curves_point (&c, p->motion.parameter, shown ? value : NAN, 0);
+          if (!here) pw_curves_point (&c, NAN, NAN, 0);
+          inside = here;
+        }
+    }
+    /* lines at the folds, and at the other events, if there are any */
+    for (int folds = 0; folds < 2 && part == REAL; folds++) {
+      int events = 0;
+      for (const pw_steady_point *p = cmd->point; p < cmd->point + cmd->points; p++) {
+        if (p->motion.event == PW_STEADY_POINT || (p->motion.event == PW_STEADY_FOLD) != folds) continue;
+        if (events++ == 0) pw_curves_add (&c, folds ? "fold" : "change", folds ? "fold" : "stability changes");
+        pw_curves_point (&c, p->motion.parameter, INFINITY, 0);
+      }
+    }
   }
   pw_curves_panel (&c, &(pw_panel){ .x_label = "real part [1/s]",
                                     .y_label = "imaginary part [1/s]",

@@ -42,56 +42,40 @@ static void page_file_json (pw_json *j, const pw_page_file *file, char *base64) 
   pw_json_text (j, file->name, base64);
 }
 
-/* Writes the consistent initial state, but values of --start as given, with a mark. */
-static void page_states_json (const page *cmd, pw_json *j) {
-  const pw_initial_report *initial = pw_run_initial (cmd->run);
-  int n = pw_system_coordinates (cmd->line.m.system);
-  pw_json_open (j, "states", '[');
-  for (int i = 0; i < 2 * n; i++) {
-    pw_json_open (j, NULL, '{');
-    int hidden = pw_system_state_hidden (cmd->line.m.system, i);
-    pw_json_print (j, "name: %s, unit: %s", hidden ? "" : PW_NAME (pw_system_state_name, cmd->line.m.system, i),
-                   pw_system_state_unit (cmd->line.m.system, i));
-    int given = pw_initial_given (initial, i);
-    const double *q = given ? initial->q_given : initial->q, *v = given ? initial->v_given : initial->v;
-    pw_json_print (j, "value: %g, given: %i}", i < n ? q[i] : v[i - n], given);
-  }
-  pw_json_close (j, ']');
-}
-
 static int page_has_method (const pw_method *m) {
   char hint[PW_HINT];
   return pw_find_name (page_integrators, sizeof *page_integrators, m->name, hint) >= 0;
 }
 
-static void page_methods_json (pw_json *j) {
-  pw_json_open (j, "methods", '[');
+/* Writes the script, and the call that passes the data to it. */
+static void page_script (FILE *f, const void *context) {
+  const page *cmd = context;
+  const pw_system *s = cmd->line.m.system;
+  const pw_initial_report *initial = pw_run_initial (cmd->run);
+  pw_json json = { .f = f, .lines = 1 }, *j = &json;
+  int n = pw_system_coordinates (s);
+  for (const char *const *line = page_js; *line; line++) fputs (*line, f);
+  fputs ("start_page(", f);
+  pw_json_print (j, "{name: %s, about: %s, version: %s, method: %s, t_end: %g, step: %g, rtol: %g, methods: [",
+                 pw_system_name (s), pw_model_table (cmd->line.m.model)->about, PW_VERSION, cmd->method,
+                 cmd->settings.span, cmd->settings.step, cmd->settings.rtol > 0 ? cmd->settings.rtol : PW_RTOL);
   for (const pw_method *const *m = pw_methods; *m; m++)
     for (int i = 0; page_has_method (*m) && (*m)->stabilisations[i].name; i++)
       pw_json_print (j, "{name: %s, adaptive: %i}", PW_PRINTED (100, "%s+%s", (*m)->name, (*m)->stabilisations[i].name),
                      (*m)->adaptive);
   pw_json_close (j, ']');
-}
-
-static void page_data_json (const page *cmd, FILE *f) {
-  pw_json j = { .f = f, .lines = 1 };
-  pw_json_print (&j, "{name: %s, about: %s, version: %s, method: %s, t_end: %g, step: %g, rtol: %g",
-                 pw_system_name (cmd->line.m.system), pw_model_table (cmd->line.m.model)->about, PW_VERSION,
-                 cmd->method, cmd->settings.span, cmd->settings.step,
-                 cmd->settings.rtol > 0 ? cmd->settings.rtol : PW_RTOL);
-  page_methods_json (&j);
-  pw_animation_parameters (&j, cmd->line.m.model);
-  page_states_json (cmd, &j);
-  pw_json_open (&j, "files", '{');
-  for (int i = 0; i < cmd->content.files; i++) page_file_json (&j, &cmd->content.file[i], cmd->base64);
-  pw_json_print (&j, "}}");
-}
-
-/* Writes the script, and the call that passes the data to it. */
-static void page_script (FILE *f, const void *context) {
-  for (const char *const *line = page_js; *line; line++) fputs (*line, f);
-  fputs ("start_page(", f);
-  page_data_json (context, f);
+  pw_animation_parameters (j, cmd->line.m.model);
+  pw_json_open (j, "states", '['); /* the consistent initial state, but values of --start as given, with a mark */
+  for (int i = 0; i < 2 * n; i++) {
+    int given = pw_initial_given (initial, i);
+    const double *q = given ? initial->q_given : initial->q, *v = given ? initial->v_given : initial->v;
+    pw_json_print (j, "{name: %s, unit: %s, value: %g, given: %i}",
+                   pw_system_state_hidden (s, i) ? "" : PW_NAME (pw_system_state_name, s, i),
+                   pw_system_state_unit (s, i), i < n ? q[i] : v[i - n], given);
+  }
+  pw_json_print (j, "], files: {");
+  for (int i = 0; i < cmd->content.files; i++) page_file_json (j, &cmd->content.file[i], cmd->base64);
+  pw_json_print (j, "}}");
   fputs (");\n", f);
 }
 

@@ -17,9 +17,9 @@ static void page_points (pw_json *j, const char *key, const double *at, int coun
   pw_json_close (j, ']');
 }
 
-/* ---- Shapes ---- */
-
-static void page_bodies (pw_json *j, const pw_plots *plots) {
+void pw_animation_scene (pw_json *j, const pw_plots *plots) {
+  j->digits = 9;
+  pw_json_print (j, "size: %g, symbol: %g", plots->size, plots->symbol_unit);
   pw_json_open (j, "bodies", '[');
   for (int b = 0; b < plots->bodies.drawn; b++) {
     const pw_plot_body *shape = &plots->shape[b];
@@ -31,32 +31,12 @@ static void page_bodies (pw_json *j, const pw_plots *plots) {
   }
   pw_json_close (j, ']');
   page_points (j, "ground", *plots->ground, plots->grounds, NULL);
-}
-
-static void page_wheels (pw_json *j, const pw_plots *plots) {
   pw_json_open (j, "wheels", '[');
   for (int w = 0; w < plots->wheels.drawn; w++)
     pw_json_print (j, "{name: %s, body: %d, rolls: %i}", pw_plot_name (plots, &plots->wheels, w),
                    plots->body_index[pw_system_element (plots->system, plots->wheels.system_index[w]).body[0]],
                    pw_plot_rolls (plots, w));
-  pw_json_close (j, ']');
-}
-
-/* Each stroke of a symbol: 1 if it is closed + 2 if it is upright, then its vertices. */
-static void page_strokes (pw_json *j, const pw_plots *plots, const pw_plot_link *link) {
-  pw_plot_stroke stroke[PLOT_STROKES];
-  int strokes = pw_plot_strokes (plots, link, plots->samples, stroke);
-  pw_json_open (j, "strokes", '[');
-  for (const pw_plot_stroke *s = stroke; s < stroke + strokes; s++) {
-    pw_json_print (j, "[%d", s->closed + 2 * s->upright);
-    for (int k = 0; k < s->vertices; k++) pw_json_numbers (j, NULL, s->vertex[k], 4);
-    pw_json_close (j, ']');
-  }
-  pw_json_close (j, ']');
-}
-
-static void page_links (pw_json *j, const pw_plots *plots) {
-  pw_json_open (j, "links", '[');
+  pw_json_print (j, "], links: [");
   for (const pw_plot_link *link = plots->link; link < plots->link + plots->links; link++) {
     pw_json_print (j, "{name: %s, force_end: %d, ends: [", pw_system_element (plots->system, link->element).name,
                    link->force_end);
@@ -65,31 +45,25 @@ static void page_links (pw_json *j, const pw_plots *plots) {
       pw_json_numbers (j, "at", link->end[n].at, 2);
       pw_json_close (j, '}');
     }
-    pw_json_print (j, "], wheel: %d, line: %i, heading: %g", link->wheel, link->rail, pw_plot_heading (link));
-    page_strokes (j, plots, link);
-    pw_json_close (j, '}');
+    pw_json_print (j, "], wheel: %d, line: %i, heading: %g, strokes: [", link->wheel, link->rail,
+                   pw_plot_heading (link));
+    /* each stroke of the symbol: 1 if it is closed + 2 if it is upright, then its vertices */
+    pw_plot_stroke stroke[PLOT_STROKES];
+    int strokes = pw_plot_strokes (plots, link, plots->samples, stroke);
+    for (const pw_plot_stroke *s = stroke; s < stroke + strokes; s++) {
+      pw_json_print (j, "[%d", s->closed + 2 * s->upright);
+      for (int k = 0; k < s->vertices; k++) pw_json_numbers (j, NULL, s->vertex[k], 4);
+      pw_json_close (j, ']');
+    }
+    pw_json_print (j, "]}");
   }
-  pw_json_close (j, ']');
-}
-
-static void page_outputs (pw_json *j, const pw_plots *plots) {
-  char buffer[PW_NAME_BYTES];
-  const char *unit;
-  pw_json_open (j, "outputs", '[');
+  pw_json_print (j, "], outputs: [");
   for (int o = 0; o < plots->outputs; o++) {
-    const char *name = pw_plot_output (plots, o, buffer, &unit);
+    char buffer[PW_NAME_BYTES];
+    const char *unit, *name = pw_plot_output (plots, o, buffer, &unit);
     pw_json_print (j, "{name: %s, unit: %s}", name, unit);
   }
   pw_json_close (j, ']');
-}
-
-void pw_animation_scene (pw_json *j, const pw_plots *plots) {
-  j->digits = 9;
-  pw_json_print (j, "size: %g, symbol: %g", plots->size, plots->symbol_unit);
-  page_bodies (j, plots);
-  page_wheels (j, plots);
-  page_links (j, plots);
-  page_outputs (j, plots);
 }
 
 /* ---- The run ---- */

@@ -59,19 +59,6 @@ PW_PRINTF (2, 3) static void check_add (pw_check_list *list, const char *format,
 
 /* ---- Initial conditions ---- */
 
-/* Opens a run by rk4+projection, whatever method the model selects. */
-static void check_open_run (pw_check *check) {
-  const pw_run_defaults *defaults = &check->line.m.defaults;
-  pw_settings settings = { .span = defaults->t_end, .step = defaults->step };
-  check->step = defaults->step;
-  check->uses_rk4 = strncmp (defaults->method, "rk4", 3) == 0;
-  check->run = pw_run_open (check->line.m.system, "rk4+projection", &settings, &check->run_error);
-  if (check->run == NULL)
-    check_add (&check->problem, "%s", check->run_error.text);
-  else
-    check->redundant = pw_report_redundancies (check->run);
-}
-
 /* Initial values specified by the model or given by the user that were changed by more than rounding. */
 static void check_given_values (pw_check *check) {
   const pw_system *s = check->line.m.system;
@@ -163,15 +150,6 @@ static int check_kind (pw_check *check, pw_checked_kind *k, pw_error *error) {
  * g sin (a), which is below CHECK_SLOPE up to 45 degrees. */
 static const double CHECK_SLOPE = 7; /* m/s^2 */
 
-static void check_gravity (pw_check *check, const pw_element *gravity, const pw_element *wheel) {
-  const double *a = ((const pw_gravity *)gravity->definition)->acceleration, most = hypot (a[0], a[1]);
-  if (most > CHECK_SLOPE)
-    check_add (&check->finding,
-               "gravity %s acts with %s m/s^2 in the plane in which %s %s rolls: seen from above, gravity is "
-               "perpendicular to that plane and left out; on a slope of angle a it is 9.81 sin (a)",
-               pw_element_name (gravity), PW_DIGITS (most, 4), wheel->kind->name, pw_element_name (wheel));
-}
-
 static void check_wheels (pw_check *check) {
   int count, prescribed = 0;
   const pw_linear *linear = &check->linear;
@@ -182,25 +160,19 @@ static void check_wheels (pw_check *check) {
   }
   if (wheel == NULL) return;
   for (const pw_element *e = element; e < element + count; e++)
-    if (strcmp (e->kind->name, "gravity") == 0) check_gravity (check, e, wheel);
+    if (strcmp (e->kind->name, "gravity") == 0) {
+      const double *a = ((const pw_gravity *)e->definition)->acceleration, most = hypot (a[0], a[1]);
+      if (most > CHECK_SLOPE)
+        check_add (&check->finding,
+                   "gravity %s acts with %s m/s^2 in the plane in which %s %s rolls: seen from above, gravity is "
+                   "perpendicular to that plane and left out; on a slope of angle a it is 9.81 sin (a)",
+                   pw_element_name (e), PW_DIGITS (most, 4), wheel->kind->name, pw_element_name (wheel));
+    }
   if (check->run && linear->positions > 0 && linear->velocities == 0 && !prescribed)
     check_add (&check->finding, "the wheels allow no motion; wheels that slip sideways are of type tyre");
 }
 
 /* ---- Linearisation ---- */
-
-/* The fastest eigenvalue, and the largest step of RK4 that is stable for all; both without rigid displacements. */
-static void check_fastest (pw_check *check) {
-  const pw_linear *linear = &check->linear;
-  double most = 0;
-  for (int i = 0; i < linear->unknowns; i++) {
-    if (linear->rigid[i]) continue;
-    check->rk4_limit = fmin (check->rk4_limit, pw_rk4_limit (linear->re[i], linear->im[i]));
-    if (hypot (linear->re[i], linear->im[i]) <= most * (1 + 1e-12)) continue; /* not larger, up to round-off */
-    most = hypot (linear->re[i], linear->im[i]);
-    check->fastest = i;
-  }
-}
 
 static int check_linear (pw_check *check, pw_error *error) {
   pw_error own = { 0 };
@@ -211,11 +183,19 @@ static int check_linear (pw_check *check, pw_error *error) {
   }
   if (status != PW_OK) *error = own;
   if (status != PW_OK || check->linear.A == NULL) return status;
-  check_fastest (check);
+  /* the fastest eigenvalue, and the largest step of RK4 that is stable for all; both without rigid displacements */
+  const pw_linear *linear = &check->linear;
+  double most = 0;
+  for (int i = 0; i < linear->unknowns; i++) {
+    if (linear->rigid[i]) continue;
+    check->rk4_limit = fmin (check->rk4_limit, pw_rk4_limit (linear->re[i], linear->im[i]));
+    if (hypot (linear->re[i], linear->im[i]) <= most * (1 + 1e-12)) continue; /* not larger, up to round-off */
+    most = hypot (linear->re[i], linear->im[i]);
+    check->fastest = i;
+  }
   if (check->uses_rk4 && check->step > check->rk4_limit)
     check_add (&check->problem, "the model's step of %s s is too large for rk4, which is stable up to %s s",
                PW_DIGITS (check->step, 6), PW_DIGITS (check->rk4_limit, 3));
-  const pw_linear *linear = &check->linear;
   if (linear->steady != PW_STEADY || linear->unknowns == 0 || !(linear->re[0] > 0)) return PW_OK;
   check->doubling_time = log (2) / linear->re[0];
   check_add (&check->finding, "the motion is unstable: a perturbation doubles in %s s",
@@ -286,19 +266,6 @@ static const char *report_why_not_computed (const pw_linear *linear) {
   return linear->coordinates > CHECK_COORDINATES ? text : "the linearisation fails, see the findings";
 }
 
-static void report_singular_value (pw_json *j, const pw_check *check) {
-  const pw_linear *linear = &check->linear;
-  double length = check->run ? pw_run_scale (check->run)->length : NAN;
-  const char *label = linear->rank > 0 ? "smallest singular value of J" : NULL;
-  if (isnan (linear->least))
-    report_entry (j, "least_singular_value", NAN, label, "not computed: %s", report_why_not_computed (linear));
-  else
-    report_entry (j, "least_singular_value", check->run ? linear->least : NAN, label,
-                  "%s, rows scaled to length 1, angles multiplied by L = %s m", PW_DIGITS (linear->least, CHECK_DIGITS),
-                  PW_DIGITS (length, CHECK_DIGITS));
-  pw_json_number (j, "length_scale", length);
-}
-
 static void report_mobility (pw_json *j, const pw_check *check) {
   const pw_system *s = check->line.m.system;
   const pw_linear *linear = &check->linear;
@@ -318,7 +285,15 @@ static void report_mobility (pw_json *j, const pw_check *check) {
   for (int i = 0; i < 3; i++)
     report_entry (j, count[i].key, check->run ? (double)count[i].value : NAN, check->run ? count[i].label : NULL, "%d",
                   count[i].value);
-  report_singular_value (j, check);
+  double length = check->run ? pw_run_scale (check->run)->length : NAN;
+  const char *label = linear->rank > 0 ? "smallest singular value of J" : NULL;
+  if (isnan (linear->least))
+    report_entry (j, "least_singular_value", NAN, label, "not computed: %s", report_why_not_computed (linear));
+  else
+    report_entry (j, "least_singular_value", check->run ? linear->least : NAN, label,
+                  "%s, rows scaled to length 1, angles multiplied by L = %s m", PW_DIGITS (linear->least, CHECK_DIGITS),
+                  PW_DIGITS (length, CHECK_DIGITS));
+  pw_json_number (j, "length_scale", length);
   pw_json_close (j, '}');
   report_section (j, "redundant", '[', NULL);
   if (check->run) report_text (j, "redundant constraint equations", "%d", pw_run_redundant (check->run));
@@ -359,14 +334,6 @@ static void report_mass (pw_json *j, const pw_check *check) {
 
 /* ---- Initial conditions ---- */
 
-static void report_change (pw_json *j, const pw_check *check, int i, int *listed) {
-  const pw_state_change c = pw_cli_state_change (check->line.m.system, pw_run_initial (check->run), i);
-  pw_json_print (j, "{state: %s, from: %g, to: %g}", c.name, c.given, c.consistent);
-  report_item (j, listed, NULL,
-               PW_PRINTED (500, "%-20s from %s to %s, by %s %s", c.name, PW_DIGITS (c.given, 10),
-                           PW_DIGITS (c.consistent, 10), PW_DIGITS (c.consistent - c.given, 3), c.unit));
-}
-
 static void report_initial (pw_json *j, const pw_check *check) {
   static const char title[] = "Initial conditions";
   int listed = 0, n = pw_system_coordinates (check->line.m.system);
@@ -385,7 +352,13 @@ static void report_initial (pw_json *j, const pw_check *check) {
     report_print (j, "  %d value%s changed%s\n", initial->moved, initial->moved == 1 ? " was" : "s were",
                   initial->released ? ", including given ones" : "");
   for (int i = 0; i < 2 * n; i++)
-    if (pw_initial_moved (check->line.m.system, initial, i)) report_change (j, check, i, &listed);
+    if (pw_initial_moved (check->line.m.system, initial, i)) {
+      const pw_state_change c = pw_cli_state_change (check->line.m.system, pw_run_initial (check->run), i);
+      pw_json_print (j, "{state: %s, from: %g, to: %g}", c.name, c.given, c.consistent);
+      report_item (j, &listed, NULL,
+                   PW_PRINTED (500, "%-20s from %s to %s, by %s %s", c.name, PW_DIGITS (c.given, 10),
+                               PW_DIGITS (c.consistent, 10), PW_DIGITS (c.consistent - c.given, 3), c.unit));
+    }
   report_end_list (j, listed);
   pw_json_close (j, '}');
   if (check->reference_states)
@@ -417,18 +390,6 @@ static void report_failures (pw_json *j, const pw_selftest_report *report, const
     pw_json_print (j, "{check: %s, in: %s, expected: %s, error: %g, bound: %g, where: %s}", c->name, scenes, c->about,
                    c->error, c->bound, c->where);
   }
-}
-
-static void report_kind (pw_json *j, const pw_checked_kind *k) {
-  pw_json_print (j, "\n{kind: %s, elements: %d, checks: %d, failed: [", k->kind->name, k->count,
-                 k->random.checks + k->in_model.checks);
-  report_text (j, PW_PRINTED (100, "%s (%s)", k->kind->name, PW_COUNTED (k->count, "element")),
-               "%s: %d checks in random scenes, %d in this model",
-               k->random.failed + k->in_model.failed ? "FAILED" : "good", k->random.checks, k->in_model.checks);
-  if (*k->untested) report_print (j, "    not tested in random scenes: %s\n", k->untested);
-  report_failures (j, &k->random, "random scenes");
-  report_failures (j, &k->in_model, "this model");
-  pw_json_print (j, "]}");
 }
 
 /* ---- Linearisation ---- */
@@ -568,7 +529,17 @@ static void report_write (const pw_check *check, pw_json *j) {
   report_outputs (j, check);
   report_section (j, "kinds", '[',
                   "Self-test of the element types in use: each function against differences of other functions");
-  for (const pw_checked_kind *k = check->kind; k < check->kind + check->kinds; k++) report_kind (j, k);
+  for (const pw_checked_kind *k = check->kind; k < check->kind + check->kinds; k++) {
+    pw_json_print (j, "\n{kind: %s, elements: %d, checks: %d, failed: [", k->kind->name, k->count,
+                   k->random.checks + k->in_model.checks);
+    report_text (j, PW_PRINTED (100, "%s (%s)", k->kind->name, PW_COUNTED (k->count, "element")),
+                 "%s: %d checks in random scenes, %d in this model",
+                 k->random.failed + k->in_model.failed ? "FAILED" : "good", k->random.checks, k->in_model.checks);
+    if (*k->untested) report_print (j, "    not tested in random scenes: %s\n", k->untested);
+    report_failures (j, &k->random, "random scenes");
+    report_failures (j, &k->in_model, "this model");
+    pw_json_print (j, "]}");
+  }
   pw_json_close (j, ']');
   report_linear (j, check);
   report_line (j);
@@ -581,16 +552,23 @@ static void report_write (const pw_check *check, pw_json *j) {
 
 static int check_model (pw_check *check, pw_error *error) {
   const pw_system *s = check->line.m.system;
-  const double t_end = check->line.m.defaults.t_end;
+  const pw_run_defaults *defaults = &check->line.m.defaults;
+  const pw_settings settings = { .span = defaults->t_end, .step = defaults->step };
   char notice[PW_NOTICE_BYTES];
   int status = PW_OK;
   check->rk4_limit = check->doubling_time = INFINITY;
   check->fastest = -1;
   pw_report_model (&check->line.m);
   for (int i = 0; i < pw_system_signals (s); i++) /* tables that do not cover the run, rows that are left out */
-    if (*pw_system_table_notice (s, i, t_end, notice, sizeof notice)) check_add (&check->finding, "%s", notice);
-  check_open_run (check);
+    if (*pw_system_table_notice (s, i, defaults->t_end, notice, sizeof notice))
+      check_add (&check->finding, "%s", notice);
+  check->step = defaults->step;
+  check->uses_rk4 = strncmp (defaults->method, "rk4", 3) == 0;
+  /* whatever method the model selects */
+  check->run = pw_run_open (s, "rk4+projection", &settings, &check->run_error);
+  if (check->run == NULL) check_add (&check->problem, "%s", check->run_error.text);
   if (check->run) {
+    check->redundant = pw_report_redundancies (check->run);
     check_given_values (check);
     status = check_reference (check, error);
     if (status == PW_OK) status = check_linear (check, error);

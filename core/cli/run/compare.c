@@ -416,21 +416,6 @@ static conclusion_cost conclusion_least_cost (const pw_conclusion *conclusion, i
   return least;
 }
 
-/* Finds the cheapest method of each column for which the reference is accurate enough. */
-static void conclusion_find_cheapest (pw_conclusion *conclusion) {
-  for (int k = 0; k < CONCLUSION_COLUMNS; k++) {
-    conclusion->best[k] = -1;
-    conclusion->cheapest[k].cpu = NAN;
-    for (int i = 0; i < conclusion->compare->study.methods && conclusion->uncertainty <= conclusion_required[k].error;
-         i++) {
-      conclusion_cost candidate = conclusion_least_cost (conclusion, i, conclusion_required[k].error);
-      if (isnan (candidate.cpu) || conclusion->cheapest[k].cpu <= candidate.cpu) continue;
-      conclusion->cheapest[k] = candidate;
-      conclusion->best[k] = i;
-    }
-  }
-}
-
 static void conclusion_print_heading (const pw_conclusion *conclusion) {
   static const char *const unit[] = { "m", "rad" }, *const name[] = { "lengths", "angles" };
   const pw_reference *reference = &conclusion->compare->reference;
@@ -510,19 +495,37 @@ static int conclusion_count_runs (const pw_study *study, int method, int states,
   return count;
 }
 
-static void conclusion_print_failures (const pw_study *study, int method) {
-  const pw_row *first, *any;
-  int failures = conclusion_count_runs (study, method, RUNS_FAILED, &first);
-  if (first == NULL) return;
-  int cut = strlen (first->reason) > CONCLUSION_REASON;
-  pw_cli_print (stdout, "%s: %d of %d runs %s, first at %s %s: %.*s%s\n", first->method, failures,
-                conclusion_count_runs (study, method, RUNS_ALL, &any),
-                first->state == ROW_FAILED ? "fail" : "are refused", first->adaptive ? "rtol" : "step",
-                PW_DIGITS (first->level, 4), CONCLUSION_REASON, first->reason, cut ? "..." : "");
-}
-
-/* One line for all methods with runs that the limit has stopped or prevented. */
-static void conclusion_print_limited (const pw_study *study) {
+static void conclusion_print (const pw_compare *compare) {
+  const pw_study *study = &compare->study;
+  const pw_reference *reference = &compare->reference;
+  pw_conclusion conclusion = { .compare = compare, .width = CONCLUSION_WIDTH };
+  conclusion.uncertainty = conclusion_error (reference, reference->uncertainty + MOTION_LARGEST);
+  for (int i = 0; i < study->methods; i++)
+    if ((int)strlen (study->method[i]) > conclusion.width) conclusion.width = (int)strlen (study->method[i]);
+  /* the cheapest method of each column for which the reference is accurate enough */
+  for (int k = 0; k < CONCLUSION_COLUMNS; k++) {
+    conclusion.best[k] = -1;
+    conclusion.cheapest[k].cpu = NAN;
+    for (int i = 0; i < study->methods && conclusion.uncertainty <= conclusion_required[k].error; i++) {
+      conclusion_cost candidate = conclusion_least_cost (&conclusion, i, conclusion_required[k].error);
+      if (isnan (candidate.cpu) || conclusion.cheapest[k].cpu <= candidate.cpu) continue;
+      conclusion.cheapest[k] = candidate;
+      conclusion.best[k] = i;
+    }
+  }
+  conclusion_print_heading (&conclusion);
+  conclusion_print_table (&conclusion);
+  for (int i = 0; i < study->methods; i++) {
+    const pw_row *first, *any;
+    int failures = conclusion_count_runs (study, i, RUNS_FAILED, &first);
+    if (first == NULL) continue;
+    int cut = strlen (first->reason) > CONCLUSION_REASON;
+    pw_cli_print (stdout, "%s: %d of %d runs %s, first at %s %s: %.*s%s\n", first->method, failures,
+                  conclusion_count_runs (study, i, RUNS_ALL, &any), first->state == ROW_FAILED ? "fail" : "are refused",
+                  first->adaptive ? "rtol" : "step", PW_DIGITS (first->level, 4), CONCLUSION_REASON, first->reason,
+                  cut ? "..." : "");
+  }
+  /* one line for all methods with runs that the limit has stopped or prevented */
   const char *beginning = PW_PRINTED (80, "stopped by the limit of %s s: ", PW_DIGITS (study->cpu_limit, 4));
   const char *before = beginning;
   for (int i = 0; i < study->methods; i++) {
@@ -532,20 +535,6 @@ static void conclusion_print_limited (const pw_study *study) {
     before = ", ";
   }
   if (before != beginning) putchar ('\n');
-}
-
-static void conclusion_print (const pw_compare *compare) {
-  const pw_study *study = &compare->study;
-  const pw_reference *reference = &compare->reference;
-  pw_conclusion conclusion = { .compare = compare, .width = CONCLUSION_WIDTH };
-  conclusion.uncertainty = conclusion_error (reference, reference->uncertainty + MOTION_LARGEST);
-  for (int i = 0; i < study->methods; i++)
-    if ((int)strlen (study->method[i]) > conclusion.width) conclusion.width = (int)strlen (study->method[i]);
-  conclusion_find_cheapest (&conclusion);
-  conclusion_print_heading (&conclusion);
-  conclusion_print_table (&conclusion);
-  for (int i = 0; i < study->methods; i++) conclusion_print_failures (study, i);
-  conclusion_print_limited (study);
 }
 
 /* ---- The rows ---- */

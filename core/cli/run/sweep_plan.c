@@ -264,22 +264,6 @@ typedef struct {
   pw_error first_error; /* why the first of these failed */
 } plan_scan;
 
-/* Chooses what evaluates the equations, of one run and of several at once: the same in all parts of a sweep, since
- * results of different codes differ by round-off. */
-static void plan_open_engines (pw_plan *plan, const pw_system *system) {
-  double steps = (double)plan->grid.rows *
-                 pw_method_steps (plan->method, &plan->settings, plan->line->m.defaults.step, plan->settings.span);
-  pw_cli_report_tables (system, plan->settings.span);
-  pw_cli_engine_open (&plan->engine, system, plan->specialise, steps);
-  const char *reason = plan->with_cpu                   ? "--cpu measures each run"
-                       : plan->with_error               ? "--error repeats each run"
-                       : plan->by_steps                 ? "outputs and conditions follow each step"
-                       : isfinite (plan->limit.seconds) ? "--limit stops each run by itself"
-                                                        : NULL;
-  if (reason == NULL) plan->lanes_code = pw_cli_engine_lanes (&plan->engine, system, plan->method, plan->lanes, steps);
-  if (reason && plan->lanes > 1) pw_cli_say ("pinwheel: one run after the other: %s\n", reason);
-}
-
 /* Checks outputs and the condition of --until; stores names and units of outputs. */
 static int plan_open_outputs (pw_plan *plan, const pw_system *system, pw_error *error) {
   pw_outcomes set;
@@ -311,7 +295,22 @@ static int plan_scan_row (pw_plan *plan, long row, plan_scan *scan, pw_error *er
   if (status == PW_OK && !scan->complete && (plan->of || plan->line->until) &&
       plan_open_outputs (plan, compiled.system, error) != PW_OK)
     status = PW_RESOURCE, row_error = *error;
-  if (status == PW_OK && !scan->complete) plan_open_engines (plan, compiled.system);
+  /* what evaluates the equations, of one run and of several at once: the same in all parts of a sweep, since results
+   * of different codes differ by round-off */
+  if (status == PW_OK && !scan->complete) {
+    double steps = (double)plan->grid.rows *
+                   pw_method_steps (plan->method, &plan->settings, plan->line->m.defaults.step, plan->settings.span);
+    pw_cli_report_tables (compiled.system, plan->settings.span);
+    pw_cli_engine_open (&plan->engine, compiled.system, plan->specialise, steps);
+    const char *reason = plan->with_cpu                   ? "--cpu measures each run"
+                         : plan->with_error               ? "--error repeats each run"
+                         : plan->by_steps                 ? "outputs and conditions follow each step"
+                         : isfinite (plan->limit.seconds) ? "--limit stops each run by itself"
+                                                          : NULL;
+    if (reason == NULL)
+      plan->lanes_code = pw_cli_engine_lanes (&plan->engine, compiled.system, plan->method, plan->lanes, steps);
+    if (reason && plan->lanes > 1) pw_cli_say ("pinwheel: one run after the other: %s\n", reason);
+  }
   scan->built |= compiled.system != NULL;
   pw_cli_close_model (&compiled);
   if (status == PW_RESOURCE) return pw_fail (error, status, "%s", row_error.text);
@@ -381,19 +380,6 @@ void pw_plan_cells (const pw_plan *plan, const pw_plan_row *row, pw_text *text) 
 
 /* ---- The fingerprint ---- */
 
-static void plan_fingerprint_grid (pw_plan *plan) {
-  pw_text *text = &plan->fingerprint;
-  pw_fingerprint_initial (text, plan->line->starts);
-  pw_text order = { .chars = NULL }; /* of the axes, which determines the order of the rows */
-  for (int i = 0; i < plan->grid.axes; i++) {
-    pw_fingerprint_line (text, "vary", plan->grid.axis[i].name, plan->grid.axis[i].range);
-    pw_text_cell (&order, plan->grid.axis[i].name);
-  }
-  text->failed |= order.failed;
-  pw_fingerprint_line (text, "order", NULL, order.chars ? order.chars : "");
-  pw_text_free (&order);
-}
-
 static int plan_fingerprint (pw_plan *plan, const pw_model *model, pw_error *error) {
   pw_text *text = &plan->fingerprint;
   if (pw_fingerprint_run (text, PW_SWEEP_MAGIC, plan->line->m.file, plan->tables_sum, plan->method, &plan->settings,
@@ -410,7 +396,15 @@ static int plan_fingerprint (pw_plan *plan, const pw_model *model, pw_error *err
     for (int i = 0; i < plan->grid.axes; i++) is_varied |= plan->grid.axis[i].parameter == parameter;
     if (!is_varied) pw_fingerprint_number (text, "parameter", parameter->name, pw_model_parameter (model, parameter));
   }
-  plan_fingerprint_grid (plan);
+  pw_fingerprint_initial (text, plan->line->starts);
+  pw_text order = { .chars = NULL }; /* of the axes, which determines the order of the rows */
+  for (int i = 0; i < plan->grid.axes; i++) {
+    pw_fingerprint_line (text, "vary", plan->grid.axis[i].name, plan->grid.axis[i].range);
+    pw_text_cell (&order, plan->grid.axis[i].name);
+  }
+  text->failed |= order.failed;
+  pw_fingerprint_line (text, "order", NULL, order.chars ? order.chars : "");
+  pw_text_free (&order);
   pw_fingerprint_number (text, "rows", NULL, (double)plan->grid.rows);
   pw_fingerprint_line (text, "columns", NULL, plan->heading.chars ? plan->heading.chars : "");
   pw_fingerprint_line (text, "part", NULL, PW_PRINTED (60, "%d/%d", plan->part, plan->parts));
