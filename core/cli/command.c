@@ -82,8 +82,12 @@ static void command_help (const pw_command *command) {
 
 /* ---- Reading ---- */
 
-static int command_unknown (const pw_command *command, const pw_cli_line *line, const char *option, pw_error *error) {
-  const char *name = option + strspn (option, "-");
+/* Reports the option that popt has refused with this error code. */
+static int command_refuse (const pw_command *command, const pw_cli_line *line, int code, pw_error *error) {
+  const char *option = poptBadOption (line->popt, POPT_BADOPTION_NOALIAS), *name = option + strspn (option, "-");
+  if (code == POPT_ERROR_NOARG) return pw_fail (error, PW_INPUT, "%s: option %s needs a value", command->name, option);
+  if (code != POPT_ERROR_BADOPT)
+    return pw_fail (error, PW_INPUT, "%s: option %s: %s", command->name, option, poptStrerror (code));
   pw_nearest near = { .sought = PW_PRINTED (100, "%.*s", (int)strcspn (name, "="), name) };
   for (const struct poptOption *o = line->table; o->longName; o++)
     if (o->descrip) pw_nearest_try (&near, o->longName);
@@ -91,14 +95,6 @@ static int command_unknown (const pw_command *command, const pw_cli_line *line, 
                                : PW_PRINTED (140, "see pinwheel %s --help", command->name);
   return pw_fail (error, PW_INPUT, "%s has no option \"%.*s\"; %s", command->name, (int)strcspn (option, "="), option,
                   hint);
-}
-
-/* Reports the option that popt has refused with this error code. */
-static int command_refuse (const pw_command *command, const pw_cli_line *line, int code, pw_error *error) {
-  const char *option = poptBadOption (line->popt, POPT_BADOPTION_NOALIAS);
-  if (code == POPT_ERROR_BADOPT) return command_unknown (command, line, option, error);
-  if (code == POPT_ERROR_NOARG) return pw_fail (error, PW_INPUT, "%s: option %s needs a value", command->name, option);
-  return pw_fail (error, PW_INPUT, "%s: option %s: %s", command->name, option, poptStrerror (code));
 }
 
 int pw_cli_at_most_one (const pw_command *command, const pw_cli_line *line, pw_error *error) {

@@ -12,19 +12,13 @@
 
 enum { PARALLEL_JOBS = 10000 }; /* at most; more threads than any machine runs at once */
 
-/* OMP_NUM_THREADS, or the number of processors that this process may use. */
-static long parallel_processors (void) {
-  const char *text = getenv ("OMP_NUM_THREADS");
-  long wanted = text ? strtol (text, NULL, 10) : 0;
-  if (wanted > 0) return wanted;
-  cpu_set_t set;
-  if (sched_getaffinity (0, sizeof set, &set) == 0) return CPU_COUNT (&set);
-  long n = sysconf (_SC_NPROCESSORS_ONLN);
-  return n > 0 ? n : 1;
-}
-
 int pw_parallel_jobs (const char *text, int *jobs, pw_error *error) {
-  double count = (double)parallel_processors ();
+  const char *threads = getenv ("OMP_NUM_THREADS");
+  long wanted = threads ? strtol (threads, NULL, 10) : 0;
+  cpu_set_t set; /* the processors that this process may use */
+  if (wanted <= 0 && sched_getaffinity (0, sizeof set, &set) == 0) wanted = CPU_COUNT (&set);
+  if (wanted <= 0) wanted = sysconf (_SC_NPROCESSORS_ONLN);
+  double count = wanted > 0 ? (double)wanted : 1;
   int status = pw_cli_number ("--jobs", text, PW_COUNT, &count, error);
   *jobs = (int)fmin (count, PARALLEL_JOBS);
   return status;

@@ -135,24 +135,18 @@ int pw_figure_end (pw_output *o, const char *template_name, pw_error *error) {
 
 extern char **environ;
 
-/* Starts gnuplot in a folder, without input, with its output on standard error, in a locale with all characters of the
+/* Runs gnuplot in a folder, without input, with its output on standard error, in a locale with all characters of the
  * scripts; LC_ALL has no effect on this program, which never calls setlocale.  Returns 0 or an errno value. */
-static int gnuplot_start (const char *folder, char *const *argv, pid_t *child) {
+static int gnuplot_run (const char *folder, char *const *argv, int *wait_status) {
   posix_spawn_file_actions_t actions;
+  pid_t child;
   int failed = setenv ("LC_ALL", "C.UTF-8", 1) == 0 ? posix_spawn_file_actions_init (&actions) : ENOMEM;
   if (failed) return failed;
   failed = posix_spawn_file_actions_addchdir_np (&actions, folder);
   if (!failed) failed = posix_spawn_file_actions_addopen (&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
   if (!failed) failed = posix_spawn_file_actions_adddup2 (&actions, STDERR_FILENO, STDOUT_FILENO);
-  if (!failed) failed = posix_spawnp (child, argv[0], &actions, NULL, argv, environ);
+  if (!failed) failed = posix_spawnp (&child, argv[0], &actions, NULL, argv, environ);
   posix_spawn_file_actions_destroy (&actions);
-  return failed;
-}
-
-/* Runs gnuplot, likewise.  Returns 0 or an errno value. */
-static int gnuplot_run (const char *folder, char *const *argv, int *wait_status) {
-  pid_t child;
-  int failed = gnuplot_start (folder, argv, &child);
   while (!failed && waitpid (child, wait_status, 0) < 0)
     if (errno != EINTR) failed = errno;
   return failed;

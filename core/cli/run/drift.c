@@ -116,35 +116,8 @@ static int drift_add (pw_drift *drift, int group, int curve, const char *stabili
   return PW_OK;
 }
 
-/* Pairs of alpha and beta; the figure has a curve for each beta. */
-static int drift_plan_baumgarte (pw_drift *drift, pw_error *error) {
-  const pw_axis *alphas = &drift->axis[DRIFT_ALPHA], *betas = &drift->axis[DRIFT_BETA];
-  int status = PW_OK;
-  for (long j = 0; j < betas->count; j++)
-    for (long i = 0; i < alphas->count && status == PW_OK; i++) {
-      double alpha = pw_axis_value (alphas, i), beta = pw_axis_value (betas, j);
-      const char *label = PW_PRINTED (60, "beta = %s /s", PW_DIGITS (beta, 6));
-      const char *stabilisation =
-          PW_PRINTED (80, "baumgarte:alpha=%s:beta=%s", PW_DIGITS (alpha, 9), PW_DIGITS (beta, 9));
-      status = drift_add (drift, DRIFT_BAUMGARTE, (int)j, stabilisation, label, DRIFT_ALPHA, alpha, error);
-    }
-  return status;
-}
-
-/* Intervals between projections; the figure has a curve for each metric. */
-static int drift_plan_projection (pw_drift *drift, pw_error *error) {
-  static const char *const metric[] = { "metric=mass", "metric=identity" };
-  int status = PW_OK;
-  for (int j = 0; j < 2; j++)
-    for (long i = 0; i < drift->axis[DRIFT_EVERY].count && status == PW_OK; i++) {
-      double every = pw_axis_value (&drift->axis[DRIFT_EVERY], i);
-      const char *stabilisation = PW_PRINTED (80, "projection:%s:every=%.0f", metric[j], every);
-      status = drift_add (drift, DRIFT_PROJECTION, j, stabilisation, metric[j], DRIFT_EVERY, every, error);
-    }
-  return status;
-}
-
 static int drift_plan_rows (pw_drift *drift, pw_error *error) {
+  static const char *const metric[] = { "metric=mass", "metric=identity" };
   pw_study *study = &drift->study;
   const pw_axis *axis = drift->axis;
   double runs = study->methods + (double)axis[DRIFT_ALPHA].count * (double)axis[DRIFT_BETA].count +
@@ -155,9 +128,24 @@ static int drift_plan_rows (pw_drift *drift, pw_error *error) {
     if (row == NULL) return PW_RESOURCE;
     for (int k = 0; k < DRIFT_PARTS; k++) row->point[k][0] = study->settings.span * (k + 1) / DRIFT_PARTS;
   }
-  if (drift->only_methods) return PW_OK;
-  int status = drift_plan_baumgarte (drift, error);
-  return status == PW_OK ? drift_plan_projection (drift, error) : status;
+  int status = PW_OK;
+  /* pairs of alpha and beta; the figure has a curve for each beta */
+  for (int j = 0; !drift->only_methods && j < axis[DRIFT_BETA].count; j++)
+    for (long i = 0; i < axis[DRIFT_ALPHA].count && status == PW_OK; i++) {
+      double alpha = pw_axis_value (&axis[DRIFT_ALPHA], i), beta = pw_axis_value (&axis[DRIFT_BETA], j);
+      const char *label = PW_PRINTED (60, "beta = %s /s", PW_DIGITS (beta, 6));
+      const char *stabilisation =
+          PW_PRINTED (80, "baumgarte:alpha=%s:beta=%s", PW_DIGITS (alpha, 9), PW_DIGITS (beta, 9));
+      status = drift_add (drift, DRIFT_BAUMGARTE, j, stabilisation, label, DRIFT_ALPHA, alpha, error);
+    }
+  /* intervals between projections; the figure has a curve for each metric */
+  for (int j = 0; !drift->only_methods && j < 2; j++)
+    for (long i = 0; i < axis[DRIFT_EVERY].count && status == PW_OK; i++) {
+      double every = pw_axis_value (&axis[DRIFT_EVERY], i);
+      const char *stabilisation = PW_PRINTED (80, "projection:%s:every=%.0f", metric[j], every);
+      status = drift_add (drift, DRIFT_PROJECTION, j, stabilisation, metric[j], DRIFT_EVERY, every, error);
+    }
+  return status;
 }
 
 static int drift_plan (pw_study *study, pw_error *error) {

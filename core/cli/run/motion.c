@@ -187,32 +187,25 @@ static int table_select (const motion_table *table, const pw_system *system, pw_
   return known ? PW_OK : pw_fail (error, PW_INPUT, "%s: every value is nan", path);
 }
 
-static int motion_of_table (pw_motion *motion, const pw_system *system, const char *path, double *t_end,
-                            pw_error *error) {
-  motion_table table = { .rows = 0 };
-  int status = table_read (&table, system, path, error);
-  if (status == PW_OK) status = table_select (&table, system, motion, t_end, path, error);
-  free (table.value);
-  pw_arena_free (&table.arena);
-  return status;
-}
-
-/* The model's own reference solution; multipliers are not known. */
-static int motion_of_model (pw_motion *motion, const pw_cli_model *compiled, double t_end, pw_error *error) {
+int pw_motion_open_reference (pw_motion *motion, const pw_cli_model *compiled, const char *path, double *t_end,
+                              pw_error *error) {
   const pw_system *system = compiled->system;
-  int n = pw_system_coordinates (system), status = pw_motion_open (motion, system, MOTION_SAMPLES, t_end, error);
+  motion_table table = { .rows = 0 };
+  int n = pw_system_coordinates (system), status = PW_OK;
+  if (path) {
+    status = table_read (&table, system, path, error);
+    if (status == PW_OK) status = table_select (&table, system, motion, t_end, path, error);
+    free (table.value);
+    pw_arena_free (&table.arena);
+    return status;
+  }
+  status = pw_motion_open (motion, system, MOTION_SAMPLES, *t_end, error);
   for (; motion->taken < motion->times && status == PW_OK; motion->taken++) {
     double *state = pw_motion_at (motion, motion->taken);
-    for (int j = 2 * n; j < motion->width; j++) state[j] = NAN;
+    for (int j = 2 * n; j < motion->width; j++) state[j] = NAN; /* multipliers are not known */
     status = pw_system_reference (compiled->model, system, motion->t[motion->taken], state, state + n, error);
   }
   return status;
-}
-
-int pw_motion_open_reference (pw_motion *motion, const pw_cli_model *compiled, const char *path, double *t_end,
-                              pw_error *error) {
-  return path ? motion_of_table (motion, compiled->system, path, t_end, error)
-              : motion_of_model (motion, compiled, *t_end, error);
 }
 
 /* Compares a run with a reference solution: opens the reference, and computes the errors of the run at its times. */

@@ -460,32 +460,14 @@ static const char *sweep_not_for_merge (const pw_sweep *sweep) {
   return NULL;
 }
 
-/* --part I/N; without it the sweep is its only part. */
-static int sweep_read_part (pw_sweep *sweep, pw_error *error) {
-  pw_plan *plan = &sweep->plan;
-  char rest;
-  plan->part = plan->parts = 1;
-  if (sweep->part_text == NULL || (sscanf (sweep->part_text, "%7d/%7d%c", &plan->part, &plan->parts, &rest) == 2 &&
-                                   1 <= plan->part && plan->part <= plan->parts && plan->parts <= 1000000))
-    return PW_OK;
-  return pw_fail (error, PW_INPUT, "--part %.60s: expected I/N, whole numbers with 1 <= I <= N <= 1000000",
-                  sweep->part_text);
-}
-
 #define SWEEP_LANES "1, 2, 4 or 8" /* the powers of 2 up to PW_LANES_MOST */
 _Static_assert(PW_LANES_MOST == 8, "SWEEP_LANES, and numbers of one digit");
-
-static int sweep_read_lanes (pw_sweep *sweep, pw_error *error) {
-  const char *text = sweep->lanes_text;
-  int lanes = sweep->plan.lanes = text ? *text - '0' : 0;
-  if (text && (lanes < 1 || lanes > PW_LANES_MOST || (lanes & (lanes - 1)) != 0 || text[1]))
-    return pw_fail (error, PW_INPUT, "--lanes %.60s: expected " SWEEP_LANES, text);
-  return PW_OK;
-}
 
 static int sweep_read_settings (pw_sweep *sweep, pw_error *error) {
   pw_plan *plan = &sweep->plan;
   const pw_run_defaults *defaults = &sweep->line.m.defaults;
+  const char *lanes = sweep->lanes_text;
+  char rest;
   plan->line = &sweep->line;
   plan->method = sweep->line.method ? sweep->line.method : defaults->method;
   if (plan->with_error && row_has_outcomes (plan))
@@ -494,9 +476,17 @@ static int sweep_read_settings (pw_sweep *sweep, pw_error *error) {
   int status = pw_cli_settings (&sweep->line, defaults, &plan->settings, &plan->limit, error);
   if (status == PW_OK) pw_cli_report_unused (plan->method, &sweep->line);
   if (status == PW_OK) status = pw_cli_read_specialise (sweep->line.specialise, &plan->specialise, error);
-  if (status == PW_OK) status = sweep_read_lanes (sweep, error);
-  if (status == PW_OK) status = pw_parallel_jobs (sweep->jobs_text, &sweep->jobs, error);
-  return status == PW_OK ? sweep_read_part (sweep, error) : status;
+  if (status != PW_OK) return status;
+  plan->lanes = lanes ? *lanes - '0' : 0;
+  if (lanes && (plan->lanes < 1 || plan->lanes > PW_LANES_MOST || (plan->lanes & (plan->lanes - 1)) != 0 || lanes[1]))
+    return pw_fail (error, PW_INPUT, "--lanes %.60s: expected " SWEEP_LANES, lanes);
+  if (pw_parallel_jobs (sweep->jobs_text, &sweep->jobs, error) != PW_OK) return error->status;
+  plan->part = plan->parts = 1; /* without --part the sweep is its only part */
+  if (sweep->part_text == NULL || (sscanf (sweep->part_text, "%7d/%7d%c", &plan->part, &plan->parts, &rest) == 2 &&
+                                   1 <= plan->part && plan->part <= plan->parts && plan->parts <= 1000000))
+    return PW_OK;
+  return pw_fail (error, PW_INPUT, "--part %.60s: expected I/N, whole numbers with 1 <= I <= N <= 1000000",
+                  sweep->part_text);
 }
 
 static int sweep_open (pw_sweep *sweep, pw_error *error) {
@@ -532,15 +522,6 @@ static int sweep_conclude (const pw_tally *tally, pw_error *error) {
   return PW_OK;
 }
 
-static int sweep_merge (pw_sweep *sweep, pw_error *error) {
-  pw_tally tally;
-  const char *option = sweep_not_for_merge (sweep);
-  if (option)
-    return pw_fail (error, PW_INPUT, "--%s cannot be combined with --merge: the parts define the sweep", option);
-  int status = pw_sweep_merge (sweep->line.argument, sweep->line.arguments, sweep->path, &tally, error);
-  return status == PW_OK ? sweep_conclude (&tally, error) : status;
-}
-
 static int sweep_finish (pw_sweep *sweep, pw_error *error) {
   pw_tally tally;
   if (sweep->journal.done == 0) {
@@ -561,15 +542,19 @@ static int sweep_finish (pw_sweep *sweep, pw_error *error) {
 
 static int sweep_command (void *options, pw_error *error) {
   pw_sweep *sweep = options;
+  pw_tally tally;
   sweep->journal.descriptor = -1;
   int status = sweep_check_options (sweep, error);
-  if (status == PW_OK && sweep->merge)
-    status = sweep_merge (sweep, error);
-  else if (status == PW_OK) {
-    status = sweep_open (sweep, error);
-    if (status == PW_OK) status = rows_compute (&sweep->plan, &sweep->journal, sweep->jobs, error);
-    if (status == PW_OK) status = sweep_finish (sweep, error);
+  const char *other = status == PW_OK && sweep->merge ? sweep_not_for_merge (sweep) : NULL;
+  if (other)
+    status = pw_fail (error, PW_INPUT, "--%s cannot be combined with --merge: the parts define the sweep", other);
+  if (status == PW_OK && sweep->merge) {
+    status = pw_sweep_merge (sweep->line.argument, sweep->line.arguments, sweep->path, &tally, error);
+    return status == PW_OK ? sweep_conclude (&tally, error) : status;
   }
+  if (status == PW_OK) status = sweep_open (sweep, error);
+  if (status == PW_OK) status = rows_compute (&sweep->plan, &sweep->journal, sweep->jobs, error);
+  if (status == PW_OK) status = sweep_finish (sweep, error);
   pw_journal_close (&sweep->journal);
   pw_plan_close (&sweep->plan);
   return status;

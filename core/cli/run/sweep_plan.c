@@ -127,20 +127,6 @@ long pw_grid_parameter_index (const pw_grid *grid, long row) {
   return index;
 }
 
-static int grid_count_rows (pw_grid *grid, pw_error *error) {
-  double rows = 1;
-  for (int i = 0; i < grid->axes; i++) rows *= (double)grid->axis[i].count;
-  if (rows > PW_GRID_MAX_ROWS)
-    return pw_fail (error, PW_INPUT, "the grid has %.15g rows: at most 1e8; use coarser ranges, or several sweeps",
-                    rows);
-  grid->rows = 1;
-  for (int i = grid->axes - 1; i >= 0; i--) {
-    grid->axis[i].stride = grid->rows;
-    grid->rows *= grid->axis[i].count;
-  }
-  return PW_OK;
-}
-
 /* Reads a NULL-terminated list of "NAME=RANGE".  PW_INPUT also if there are too many rows. */
 static int grid_read (pw_grid *grid, const char *const *ranges, pw_arena *arena, pw_error *error) {
   int n = 0, status = PW_OK;
@@ -154,25 +140,31 @@ static int grid_read (pw_grid *grid, const char *const *ranges, pw_arena *arena,
       if (strcmp (other->name, axis->name) == 0)
         status = pw_fail (error, PW_INPUT, "--vary %.200s is given twice", axis->name);
   }
-  return status == PW_OK ? grid_count_rows (grid, error) : status;
+  double rows = 1;
+  for (int i = 0; i < grid->axes; i++) rows *= (double)grid->axis[i].count;
+  if (status == PW_OK && rows > PW_GRID_MAX_ROWS)
+    status =
+        pw_fail (error, PW_INPUT, "the grid has %.15g rows: at most 1e8; use coarser ranges, or several sweeps", rows);
+  grid->rows = 1;
+  for (int i = grid->axes - 1; i >= 0 && status == PW_OK; i--) {
+    grid->axis[i].stride = grid->rows;
+    grid->rows *= grid->axis[i].count;
+  }
+  return status;
 }
 
 /* ---- Models ---- */
 
-/* Builds the model of a row: --set, varied parameters, --start.  Varied initial values are set when its run begins. */
-static int plan_build (const pw_plan *plan, long row, pw_model *model, pw_error *error) {
-  int status = pw_cli_apply (model, "--set", plan->line->sets, pw_model_set, error);
-  for (int i = 0; i < plan->grid.axes && status == PW_OK; i++)
+int pw_plan_compile (const pw_plan *plan, long row, pw_cli_model *compiled, pw_error *error) {
+  pw_model *model = pw_file_model (plan->line->m.file, error);
+  *compiled = (pw_cli_model){ .model = model };
+  int status = model ? pw_cli_apply (model, "--set", plan->line->sets, pw_model_set, error) : error->status;
+  for (int i = 0; i < plan->grid.axes && status == PW_OK; i++) /* varied initial values are set when the run begins */
     if (plan->grid.axis[i].parameter)
       status = pw_model_set (model, plan->grid.axis[i].name, pw_grid_value (&plan->grid, i, row), error);
   if (status == PW_OK) status = pw_cli_apply (model, "--start", plan->line->starts, pw_model_set_initial, error);
-  return status == PW_OK ? pw_model_build (model, error) : status;
-}
-
-int pw_plan_compile (const pw_plan *plan, long row, pw_cli_model *compiled, pw_error *error) {
-  *compiled = (pw_cli_model){ .model = pw_file_model (plan->line->m.file, error) };
-  if (compiled->model && plan_build (plan, row, compiled->model, error) == PW_OK)
-    compiled->system = pw_system_compile (compiled->model, error);
+  if (status == PW_OK) status = pw_model_build (model, error);
+  if (status == PW_OK) compiled->system = pw_system_compile (model, error);
   if (compiled->system == NULL) return error->status;
   for (const pw_axis *axis = plan->grid.axis; axis < plan->grid.axis + plan->grid.axes; axis++)
     if (axis->parameter == NULL && pw_system_find_state (compiled->system, axis->name, error) < 0) return PW_INPUT;
