@@ -68,20 +68,6 @@ static int linearise_select (pw_linearise_command *cmd, pw_error *error) {
 
 /* ---- The run ---- */
 
-static int linearise_advance (pw_linearise_command *cmd, pw_error *error) {
-  pw_progress progress;
-  int status = PW_OK;
-  pw_stop_catch ();
-  pw_progress_start (&progress, pw_file_name (cmd->line.m.file), "s", 0, cmd->t);
-  while (status == PW_OK && pw_run_time (cmd->r) < cmd->t) {
-    status = pw_run_advance (cmd->r, cmd->t, error);
-    pw_progress_at (&progress, pw_run_time (cmd->r));
-  }
-  pw_progress_end (&progress);
-  pw_stop_release ();
-  return status == PW_STOPPED ? pw_limit_status (&cmd->limit, pw_run_time (cmd->r), error) : status;
-}
-
 /* Newton's method from the initial state, then from one to which forces lead; the quantities of --hold are held. */
 static int linearise_solve_steady (pw_linearise_command *cmd, pw_steady *steady, pw_error *error) {
   int n = pw_system_coordinates (cmd->line.m.system);
@@ -132,21 +118,17 @@ static int linearise_run (pw_linearise_command *cmd, pw_error *error) {
   int status = pw_report_initial_state (&cmd->line.m, cmd->limit.seconds, error);
   if (cmd->t == 0 || status != PW_OK) return status;
   pw_cli_report_tables (cmd->line.m.system, cmd->t);
-  status = linearise_advance (cmd, error);
+  pw_progress progress;
+  pw_stop_catch ();
+  pw_progress_start (&progress, pw_file_name (cmd->line.m.file), "s", 0, cmd->t);
+  while (status == PW_OK && pw_run_time (cmd->r) < cmd->t) {
+    status = pw_run_advance (cmd->r, cmd->t, error);
+    pw_progress_at (&progress, pw_run_time (cmd->r));
+  }
+  pw_progress_end (&progress);
+  pw_stop_release ();
+  if (status == PW_STOPPED) status = pw_limit_status (&cmd->limit, pw_run_time (cmd->r), error);
   return status == PW_OK ? pw_run_restart (cmd->r, NULL, NULL, error) : status;
-}
-
-static int linearise_compute (pw_linearise_command *cmd, pw_error *error) {
-  const char *model = pw_file_name (cmd->line.m.file);
-  int coordinates = pw_system_coordinates (cmd->line.m.system);
-  if (coordinates > LINEARISE_COORDINATES)
-    return pw_fail (error, PW_INPUT, "%s has %d coordinates; linearise takes at most %d", model, coordinates,
-                    LINEARISE_COORDINATES);
-  int status = linearise_run (cmd, error);
-  if (status == PW_OK) status = pw_run_linear_modes (cmd->r, LINEARISE_COORDINATES, &cmd->linear, error);
-  if (status == PW_OK && cmd->linear.unknowns == 0)
-    return pw_fail (error, PW_INPUT, "%s has no degrees of freedom: there is nothing to linearise", model);
-  return status;
 }
 
 /* ---- Reports: text, matrices in files, and the page of modes ---- */
@@ -480,18 +462,6 @@ static int linearise_open_files (pw_linearise_command *cmd, pw_error *error) {
   return pw_files_open (&cmd->line, use, sizeof use / sizeof *use, error);
 }
 
-static int linearise_write (pw_linearise_command *cmd, pw_error *error) {
-  int status = PW_OK;
-  if (cmd->name) {
-    linearise_json (cmd, &(pw_json){ .f = pw_files_stream (&cmd->line, LINEARISE_JSON), .lines = 1 });
-    status = linearise_csv (cmd, pw_files_stream (&cmd->line, LINEARISE_CSV), error);
-    if (status == PW_OK) status = linearise_npz (cmd, pw_files_stream (&cmd->line, LINEARISE_NPZ), error);
-  }
-  if (status == PW_OK && cmd->page_path)
-    status = linearise_page (cmd, pw_files_stream (&cmd->line, LINEARISE_PAGE), error);
-  return status == PW_OK ? pw_files_finish (&cmd->line, error) : status;
-}
-
 static int linearise_command (void *options, pw_error *error) {
   pw_linearise_command *cmd = options;
   int status = pw_cli_number ("--at", cmd->t_text, PW_NONNEGATIVE, &cmd->t, error);
@@ -502,9 +472,24 @@ static int linearise_command (void *options, pw_error *error) {
   if (status == PW_OK) status = linearise_select (cmd, error);
   if (status == PW_OK) status = linearise_open_files (cmd, error);
   if (status == PW_OK) pw_report_model (&cmd->line.m);
-  if (status == PW_OK) status = linearise_compute (cmd, error);
+  const char *model = status == PW_OK ? pw_file_name (cmd->line.m.file) : NULL;
+  const int coordinates = status == PW_OK ? pw_system_coordinates (cmd->line.m.system) : 0;
+  if (coordinates > LINEARISE_COORDINATES)
+    status = pw_fail (error, PW_INPUT, "%s has %d coordinates; linearise takes at most %d", model, coordinates,
+                      LINEARISE_COORDINATES);
+  if (status == PW_OK) status = linearise_run (cmd, error);
+  if (status == PW_OK) status = pw_run_linear_modes (cmd->r, LINEARISE_COORDINATES, &cmd->linear, error);
+  if (status == PW_OK && cmd->linear.unknowns == 0)
+    status = pw_fail (error, PW_INPUT, "%s has no degrees of freedom: there is nothing to linearise", model);
   if (status == PW_OK) linearise_print (cmd);
-  if (status == PW_OK) status = linearise_write (cmd, error);
+  if (status == PW_OK && cmd->name) {
+    linearise_json (cmd, &(pw_json){ .f = pw_files_stream (&cmd->line, LINEARISE_JSON), .lines = 1 });
+    status = linearise_csv (cmd, pw_files_stream (&cmd->line, LINEARISE_CSV), error);
+    if (status == PW_OK) status = linearise_npz (cmd, pw_files_stream (&cmd->line, LINEARISE_NPZ), error);
+  }
+  if (status == PW_OK && cmd->page_path)
+    status = linearise_page (cmd, pw_files_stream (&cmd->line, LINEARISE_PAGE), error);
+  if (status == PW_OK) status = pw_files_finish (&cmd->line, error);
   pw_linear_free (&cmd->linear);
   pw_run_close (cmd->r);
   free (cmd->initial);

@@ -363,26 +363,7 @@ static int sensitivity_draw (const sensitivity *cmd, pw_error *error) {
   return pw_curves_draw (&c, PW_OK, error);
 }
 
-static int sensitivity_write (const sensitivity *cmd, pw_error *error) {
-  int status = pw_figure_write_tables (cmd->folder, "sensitivity", 5, cmd, cmd->line.until ? NULL : sensitivity_csv,
-                                       sensitivity_json, error);
-  return status == PW_OK && cmd->outputs.rows > 1 ? sensitivity_draw (cmd, error) : status;
-}
-
 /* ---- The command ---- */
-
-/* Sets the times of the table: from 0 to the end, `every` apart. */
-static int sensitivity_set_rows (sensitivity *cmd, double every, pw_error *error) {
-  const double t_end = cmd->unknowns.settings.span,
-               count = ceil (t_end / every * (1 - 1e-12)); /* the factor: no row a round-off before t_end */
-  if (count > 1e7) return pw_fail (error, PW_INPUT, "--every %g: expected at most 1e7 rows", every);
-  double *t = pw_arena_alloc (&cmd->line.arena, ((size_t)count + 2) * sizeof *t);
-  if (t == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  for (int i = 0; i < (int)count; i++) t[i] = i * every;
-  t[(int)count] = t_end;
-  cmd->outputs.t = t, cmd->outputs.rows = (int)count + 1;
-  return PW_OK;
-}
 
 static int sensitivity_open (sensitivity *cmd, pw_error *error) {
   double every = 0;
@@ -401,32 +382,42 @@ static int sensitivity_open (sensitivity *cmd, pw_error *error) {
   while (cmd->of[cmd->outputs.count]) cmd->outputs.count++;
   if (cmd->line.until && cmd->every)
     return pw_fail (error, PW_INPUT, "--every cannot be given together with --until: there is no table");
-  if (cmd->folder && !cmd->line.until) /* the times of rows must not vary */
-    status = sensitivity_set_rows (cmd, every > 0 ? every : cmd->unknowns.settings.span / SENSITIVITY_ROWS, error);
-  return status == PW_OK ? pw_unknowns_differentiated (&cmd->unknowns, cmd->by, error) : status;
-}
-
-static int sensitivity_compute (sensitivity *cmd, pw_error *error) {
-  pw_stop_catch ();
-  pw_progress_start (&cmd->progress, pw_file_name (cmd->line.m.file), "runs", 0,
-                     SENSITIVITY_RUNS * cmd->unknowns.count);
-  int status = sensitivity_solve (cmd, error);
-  pw_progress_end (&cmd->progress);
-  pw_stop_release ();
-  return status;
+  if (cmd->folder && !cmd->line.until) { /* the table has rows from 0 to the end, whose times must not vary */
+    const double t_end = cmd->unknowns.settings.span;
+    if (every == 0) every = t_end / SENSITIVITY_ROWS;
+    const double count = ceil (t_end / every * (1 - 1e-12)); /* the factor: no row a round-off before t_end */
+    if (count > 1e7) return pw_fail (error, PW_INPUT, "--every %g: expected at most 1e7 rows", every);
+    double *t = pw_arena_alloc (&cmd->line.arena, ((size_t)count + 2) * sizeof *t);
+    if (t == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+    for (int i = 0; i < (int)count; i++) t[i] = i * every;
+    t[(int)count] = t_end;
+    cmd->outputs.t = t, cmd->outputs.rows = (int)count + 1;
+  }
+  return pw_unknowns_differentiated (&cmd->unknowns, cmd->by, error);
 }
 
 static int sensitivity_command (void *options, pw_error *error) {
   sensitivity *cmd = options;
+  const char *folder = cmd->folder;
   int status = sensitivity_open (cmd, error);
-  if (status == PW_OK) status = pw_figure_lock_folder (&cmd->line, cmd->folder, "sensitivity", error);
-  if (status == PW_OK)
-    pw_report_model (&cmd->line.m), status = pw_report_initial_state (&cmd->line.m, cmd->unknowns.limit, error);
-  const double start = pw_seconds (CLOCK_PROCESS_CPUTIME_ID);
-  if (status == PW_OK) status = sensitivity_compute (cmd, error);
-  cmd->cpu = pw_seconds (CLOCK_PROCESS_CPUTIME_ID) - start;
+  if (status == PW_OK) status = pw_figure_lock_folder (&cmd->line, folder, "sensitivity", error);
+  if (status == PW_OK) pw_report_model (&cmd->line.m);
+  if (status == PW_OK) status = pw_report_initial_state (&cmd->line.m, cmd->unknowns.limit, error);
+  if (status == PW_OK) {
+    const double start = pw_seconds (CLOCK_PROCESS_CPUTIME_ID);
+    pw_stop_catch ();
+    pw_progress_start (&cmd->progress, pw_file_name (cmd->line.m.file), "runs", 0,
+                       SENSITIVITY_RUNS * cmd->unknowns.count);
+    status = sensitivity_solve (cmd, error);
+    pw_progress_end (&cmd->progress);
+    pw_stop_release ();
+    cmd->cpu = pw_seconds (CLOCK_PROCESS_CPUTIME_ID) - start;
+  }
   if (status == PW_OK) sensitivity_print (cmd), sensitivity_warn (cmd);
-  if (status == PW_OK && cmd->folder) status = sensitivity_write (cmd, error);
+  if (status == PW_OK && folder)
+    status = pw_figure_write_tables (folder, "sensitivity", 5, cmd, cmd->line.until ? NULL : sensitivity_csv,
+                                     sensitivity_json, error);
+  if (status == PW_OK && folder && cmd->outputs.rows > 1) status = sensitivity_draw (cmd, error);
   pw_outcomes_close (&cmd->outcomes);
   pw_unknowns_close (&cmd->unknowns);
   return status == PW_RETRY ? pw_cli_incomplete (&cmd->line, error) : status;

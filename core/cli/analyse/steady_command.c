@@ -320,31 +320,6 @@ static int steady_hold_more (pw_steady_command *cmd, pw_error *error) {
   return cmd->search ? PW_OK : error->status;
 }
 
-/* Finds branches that begin at the ends of the range or, if there are none, at the value of the model or within the
- * range. */
-static int steady_branches (pw_steady_command *cmd, pw_error *error) {
-  const double first = cmd->settings.first, last = cmd->settings.last;
-  int status = steady_hold_more (cmd, error);
-  double own = steady_model_value (cmd), fraction = (own - first) / (last - first);
-  if (!(fraction > 0 && fraction < 1)) own = pw_value_within (first, last);
-  if (status == PW_OK) status = steady_branches_from (cmd, first, TO_LAST, error);
-  if (status == PW_OK && !cmd->stopped) status = steady_branches_from (cmd, last, TO_FIRST, error);
-  if (status == PW_OK && !cmd->stopped && cmd->points == 0) status = steady_branches_from (cmd, own, TO_LAST, error);
-  return status;
-}
-
-static int steady_compute (pw_steady_command *cmd, pw_error *error) {
-  cmd->residual[0] = cmd->residual[1] = INFINITY;
-  pw_limit_start (&cmd->limit);
-  cmd->search = pw_steady_open (cmd->line.m.system, &cmd->settings, error);
-  if (cmd->search == NULL) return error->status;
-  pw_stop_catch ();
-  int status = cmd->vary_text ? steady_branches (cmd, error) : steady_search (cmd, 0, error);
-  pw_stop_release ();
-  if (status == PW_OK && cmd->points == 0 && !cmd->stopped) status = steady_fail (cmd, error);
-  return status;
-}
-
 /* ---- Reports ---- */
 
 enum {
@@ -621,12 +596,29 @@ static int steady_draw (const pw_steady_command *cmd, pw_error *error) {
   return pw_curves_draw (&c, PW_OK, error);
 }
 
-static int steady_write (const pw_steady_command *cmd, pw_error *error) {
-  int status = pw_figure_write_tables (cmd->folder, "steady", 1, cmd, steady_csv, steady_json, error);
-  return status == PW_OK && cmd->vary_text ? steady_draw (cmd, error) : status;
-}
-
 /* ---- The command ---- */
+
+/* Finds steady motions of the model; with --vary branches that begin at the ends of the range or, if there are none,
+ * at the value of the model or within the range. */
+static int steady_compute (pw_steady_command *cmd, pw_error *error) {
+  const double first = cmd->settings.first, last = cmd->settings.last;
+  cmd->residual[0] = cmd->residual[1] = INFINITY;
+  pw_limit_start (&cmd->limit);
+  cmd->search = pw_steady_open (cmd->line.m.system, &cmd->settings, error);
+  if (cmd->search == NULL) return error->status;
+  pw_stop_catch ();
+  int status = cmd->vary_text ? steady_hold_more (cmd, error) : steady_search (cmd, 0, error);
+  if (cmd->vary_text) {
+    double own = steady_model_value (cmd), fraction = (own - first) / (last - first);
+    if (!(fraction > 0 && fraction < 1)) own = pw_value_within (first, last);
+    if (status == PW_OK) status = steady_branches_from (cmd, first, TO_LAST, error);
+    if (status == PW_OK && !cmd->stopped) status = steady_branches_from (cmd, last, TO_FIRST, error);
+    if (status == PW_OK && !cmd->stopped && cmd->points == 0) status = steady_branches_from (cmd, own, TO_LAST, error);
+  }
+  pw_stop_release ();
+  if (status == PW_OK && cmd->points == 0 && !cmd->stopped) status = steady_fail (cmd, error);
+  return status;
+}
 
 static int steady_command (void *options, pw_error *error) {
   pw_steady_command *cmd = options;
@@ -635,8 +627,11 @@ static int steady_command (void *options, pw_error *error) {
   if (status == PW_OK) status = pw_figure_lock_folder (&cmd->line, cmd->folder, "steady", error);
   if (status == PW_OK) pw_report_model (&cmd->line.m);
   if (status == PW_OK) status = steady_compute (cmd, error);
-  if (status == PW_OK && cmd->points) steady_print (cmd);
-  if (status == PW_OK && cmd->points && cmd->folder) status = steady_write (cmd, error);
+  if (status == PW_OK && cmd->points) {
+    steady_print (cmd);
+    if (cmd->folder) status = pw_figure_write_tables (cmd->folder, "steady", 1, cmd, steady_csv, steady_json, error);
+    if (status == PW_OK && cmd->folder && cmd->vary_text) status = steady_draw (cmd, error);
+  }
   steady_forget (cmd, 0);
   free (cmd->point);
   free (cmd->end);

@@ -238,21 +238,6 @@ static void reference_add_partner (pw_reference *reference, const pw_system *sys
   pw_motion_errors (system, &best->motion, &partner->motion, reference->partner[i].error);
 }
 
-/* Selects the reference: the first of the two candidates that agree best.  The second is its first partner. */
-static void reference_choose (pw_reference *reference, const pw_system *system, reference_candidate *list) {
-  int best = -1, second = -1;
-  if (!reference_pair (system, list, &best, &second)) return;
-  reference->known = 1;
-  reference_name (&list[best], reference->name, sizeof reference->name);
-  reference_add_partner (reference, system, &list[best], &list[second]);
-  memcpy (reference->uncertainty, reference->partner[0].error, sizeof reference->uncertainty);
-  for (int i = 0; i < REFERENCE_CANDIDATES; i++)
-    if (i != best && i != second && list[i].finished) reference_add_partner (reference, system, &list[best], &list[i]);
-  reference->motion = list[best].motion;
-  list[best].motion = (pw_motion){ .times = 0 };
-  reference_raise_uncertainty (system, reference);
-}
-
 static int reference_compute (pw_reference *reference, pw_study *study, double step, pw_error *error) {
   reference_candidate candidates[REFERENCE_CANDIDATES] = {
     { study, .row = { .method = "erk8+projection", .adaptive = 1, .level = 3e-14 /* the least is 2.2e-14 */ } },
@@ -260,9 +245,22 @@ static int reference_compute (pw_reference *reference, pw_study *study, double s
     { study, .row = { .method = "ida+ggl", .adaptive = 1, .level = 1e-13 } },
     { study, .row = { .method = "ida+baumgarte", .adaptive = 1, .level = 1e-13 } },
   };
+  const pw_system *system = study->line.m.system;
   pw_study_begin_progress (study, "reference", "methods", REFERENCE_CANDIDATES);
   int status = pw_study_parallel (study, REFERENCE_CANDIDATES, reference_run, candidates, error);
-  if (status == PW_OK) reference_choose (reference, study->line.m.system, candidates);
+  int best = -1, second = -1;
+  if (status == PW_OK && reference_pair (system, candidates, &best, &second)) {
+    reference->known = 1; /* the first of the two that agree best; the second is its first partner */
+    reference_name (&candidates[best], reference->name, sizeof reference->name);
+    reference_add_partner (reference, system, &candidates[best], &candidates[second]);
+    memcpy (reference->uncertainty, reference->partner[0].error, sizeof reference->uncertainty);
+    for (int i = 0; i < REFERENCE_CANDIDATES; i++)
+      if (i != best && i != second && candidates[i].finished)
+        reference_add_partner (reference, system, &candidates[best], &candidates[i]);
+    reference->motion = candidates[best].motion;
+    candidates[best].motion = (pw_motion){ .times = 0 };
+    reference_raise_uncertainty (system, reference);
+  }
   for (int i = 0; i < REFERENCE_CANDIDATES; i++) {
     reference->limited |= candidates[i].row.state == ROW_STOPPED;
     pw_motion_close (&candidates[i].motion);

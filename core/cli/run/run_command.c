@@ -76,18 +76,6 @@ static int checkpoints_fingerprint (pw_run_cli *command, pw_error *error) {
   return text->failed ? pw_fail (error, PW_RESOURCE, "out of memory") : PW_OK;
 }
 
-/* Refuses a checkpoint of another run. */
-static int checkpoints_check_fingerprint (const pw_checkpoints *checkpoints, pw_error *error) {
-  const pw_text *own = &checkpoints->fingerprint;
-  const pw_fingerprint there = { checkpoints->resumed.text, checkpoints->resumed.head_end, "there" };
-  const pw_fingerprint here = { own->chars, own->chars + own->length, "here" };
-  char difference[300];
-  if (checkpoints->resume_path && pw_fingerprint_differ (there, here, NULL, difference, sizeof difference))
-    return pw_fail (error, PW_INPUT, "the checkpoint %.100s belongs to another run: %.300s", checkpoints->resume_path,
-                    difference);
-  return PW_OK;
-}
-
 /* Before anything is written: locks the checkpoint file, verifies that a resumed checkpoint belongs to this run and
  * opens its table; without --resume, refuses a table that could not be continued. */
 static int checkpoints_prepare (pw_run_cli *command, pw_error *error) {
@@ -101,9 +89,15 @@ static int checkpoints_prepare (pw_run_cli *command, pw_error *error) {
   if (!pw_output_is_file (checkpoints->lock))
     return pw_fail (error, PW_INPUT, "%s: a checkpoint needs a regular file, which can be read again and replaced",
                     checkpoints->path);
-  int status = checkpoints_fingerprint (command, error);
-  if (status == PW_OK) status = checkpoints_check_fingerprint (checkpoints, error);
-  if (status != PW_OK || command->table_path == NULL) return status;
+  if (checkpoints_fingerprint (command, error) != PW_OK) return error->status;
+  const pw_text *own = &checkpoints->fingerprint;
+  const pw_fingerprint there = { checkpoints->resumed.text, checkpoints->resumed.head_end, "there" };
+  const pw_fingerprint here = { own->chars, own->chars + own->length, "here" };
+  char difference[300];
+  if (checkpoints->resume_path && pw_fingerprint_differ (there, here, NULL, difference, sizeof difference))
+    return pw_fail (error, PW_INPUT, "the checkpoint %.100s belongs to another run: %.300s", checkpoints->resume_path,
+                    difference);
+  if (command->table_path == NULL) return PW_OK;
   pw_output **table = &command->output[PW_RUN_TABLE];
   pw_mark mark = { 0 };
   if (checkpoints->resume_path == NULL)
@@ -232,45 +226,27 @@ static void run_discard (pw_run_cli *command, int which) {
   command->output[which] = NULL;
 }
 
-/* A summary is written of every run, but not over a table that the model reads. */
-static int run_open_model (pw_run_cli *command, pw_error *error) {
-  int status = pw_cli_open (&command->line, error);
-  if (command->line.m.file == NULL || run_check_paths (command, status == PW_OK ? error : &(pw_error){ 0 }) == PW_OK)
-    return status;
-  run_discard (command, PW_RUN_SUMMARY);
-  return error->status;
-}
-
-/* Checks the method that the model selects; the error names the model. */
-static int run_check_model_method (const pw_run_cli *command, pw_error *error) {
-  const pw_method *method;
-  int stabilisation;
-  pw_error reason = { 0 };
-  int status = pw_method_parse (command->method, &method, &stabilisation, &reason);
-  if (status == PW_OK) return PW_OK;
-  return pw_fail (error, status, "model %s: its default method: %s", pw_file_name (command->line.m.file), reason.text);
-}
-
+/* Reads the settings, of which the engine is a part: a resumed run uses the same one. */
 static int run_read_settings (pw_run_cli *command, pw_error *error) {
   const pw_run_defaults *defaults = &command->line.m.defaults;
+  const pw_method *method;
+  int stabilisation;
+  pw_specialise when;
+  pw_error reason = { 0 };
   int status = pw_cli_settings (&command->line, defaults, &command->settings, &command->limit, error);
   if (status == PW_OK)
     status = pw_cli_number ("--every", command->row_interval_text, PW_POSITIVE, &command->row_interval, error);
   command->method = command->line.method ? command->line.method : defaults->method;
-  if (status == PW_OK && command->line.method == NULL) status = run_check_model_method (command, error);
+  if (status == PW_OK && command->line.method == NULL &&
+      pw_method_parse (command->method, &method, &stabilisation, &reason) != PW_OK)
+    return pw_fail (error, reason.status, "model %s: its default method: %s", pw_file_name (command->line.m.file),
+                    reason.text);
   command->settings.ledger = command->with_energies || command->plots_path || command->page_path;
-  return status;
-}
-
-/* The engine is part of the settings: a resumed run uses the same one. */
-static int run_choose_engine (pw_run_cli *command, pw_error *error) {
-  pw_specialise when;
-  int status = pw_cli_read_specialise (command->line.specialise, &when, error);
+  if (status == PW_OK) status = pw_cli_read_specialise (command->line.specialise, &when, error);
   if (status == PW_OK) status = checkpoints_open (command, &when, error);
   if (status != PW_OK) return status;
-  pw_cli_engine_open (
-      &command->engine, command->line.m.system, when,
-      pw_method_steps (command->method, &command->settings, command->line.m.defaults.step, command->settings.span));
+  pw_cli_engine_open (&command->engine, command->line.m.system, when,
+                      pw_method_steps (command->method, &command->settings, defaults->step, command->settings.span));
   command->settings.specialised = pw_scene_code_table (command->engine.code);
   return PW_OK;
 }
@@ -291,9 +267,13 @@ static int run_open_condition (pw_run_cli *command, pw_error *error) {
 
 static int run_open (pw_run_cli *command, pw_error *error) {
   int status = run_open_outputs (command, error);
-  if (status == PW_OK) status = run_open_model (command, error);
+  if (status == PW_OK) {
+    status = pw_cli_open (&command->line, error);
+    /* a summary is written of every run, but not over a table that the model reads */
+    if (command->line.m.file && run_check_paths (command, status == PW_OK ? error : &(pw_error){ 0 }) != PW_OK)
+      run_discard (command, PW_RUN_SUMMARY), status = error->status;
+  }
   if (status == PW_OK) status = run_read_settings (command, error);
-  if (status == PW_OK) status = run_choose_engine (command, error);
   if (status == PW_OK) status = checkpoints_prepare (command, error);
   if (status != PW_OK) return status;
   const pw_system *system = command->line.m.system;

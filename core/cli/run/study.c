@@ -171,19 +171,6 @@ const char *pw_study_status (const pw_row *row) {
   return status[row->state];
 }
 
-/* Opens the CSV file with its first line.  Rows are written as they finish, to NAME.part, which remains if the study
- * is stopped. */
-static int table_open (pw_study *study, pw_error *error) {
-  const pw_study_column *column = study->type->column;
-  pw_text line = { .chars = NULL };
-  study->csv = pw_figure_open_file (study->folder, study->type->table_names[0], error);
-  if (study->csv == NULL) return error->status;
-  for (int i = 0; i < study->type->columns; i++)
-    if (column[i].name) pw_text_name (&line, column[i].name, column[i].unit);
-  pw_text_cell (&line, "reason");
-  return pw_text_line (&line, pw_output_stream (study->csv), study->folder, error);
-}
-
 /* The width of the first column, which contains the methods. */
 static int table_width (const pw_study *study) {
   size_t width = strlen ("method");
@@ -293,19 +280,14 @@ static int study_open_folder (pw_study *study, pw_error *error) {
   double width;
   int status = pw_figure_width (study->line.width, &width, error);
   if (status == PW_OK) status = pw_files_open (&study->line, use, sizeof use / sizeof *use, error);
-  return status == PW_OK ? table_open (study, error) : status;
-}
-
-/* Estimated number of steps of all runs. */
-static double study_estimated_steps (const pw_study *study) {
-  double steps = 0;
-  for (const pw_row *row = study->row; row < study->row + study->rows; row++) {
-    pw_settings settings = study->settings;
-    if (row->level > 0) settings.step = settings.rtol = row->level;
-    steps += study->type->runs_per_row *
-             pw_method_steps (row->method, &settings, study->line.m.defaults.step, study->settings.span);
-  }
-  return steps;
+  if (status != PW_OK || (study->csv = pw_figure_open_file (study->folder, tables[0], error)) == NULL)
+    return error->status;
+  pw_text heading = { .chars =
+                          NULL }; /* rows follow as they finish, in NAME.part, which remains if the study is stopped */
+  for (const pw_study_column *c = study->type->column; c < study->type->column + study->type->columns; c++)
+    if (c->name) pw_text_name (&heading, c->name, c->unit);
+  pw_text_cell (&heading, "reason");
+  return pw_text_line (&heading, pw_output_stream (study->csv), study->folder, error);
 }
 
 static int study_open (pw_study *study, pw_error *error) {
@@ -320,8 +302,15 @@ static int study_open (pw_study *study, pw_error *error) {
   if (status == PW_OK) status = pw_report_initial_state (&study->line.m, study->limit.seconds, error);
   if (status != PW_OK) return status;
   pw_cli_report_tables (study->line.m.system, study->settings.span);
+  double steps = 0; /* of all runs, estimated */
+  for (const pw_row *row = study->row; row < study->row + study->rows; row++) {
+    pw_settings settings = study->settings;
+    if (row->level > 0) settings.step = settings.rtol = row->level;
+    steps += study->type->runs_per_row *
+             pw_method_steps (row->method, &settings, study->line.m.defaults.step, study->settings.span);
+  }
   /* one engine for all runs, since `compare` compares their processor times */
-  pw_cli_engine_open (&study->engine, study->line.m.system, when, study_estimated_steps (study));
+  pw_cli_engine_open (&study->engine, study->line.m.system, when, steps);
   return study_open_folder (study, error);
 }
 
@@ -349,15 +338,6 @@ static int study_measure_method (void *context, int curve, pw_error *error) {
   return status;
 }
 
-/* Writes the measured rows after one that an interruption has stopped.  PW_RETRY, or the status of a failure. */
-static int study_write_kept (pw_study *study, pw_error *error) {
-  for (const pw_row *row = study->row + study->written; row < study->row + study->rows; row++) {
-    if (row->measured && table_write_row (study, row, error) != PW_OK) return error->status;
-    study->written += row->measured;
-  }
-  return PW_RETRY;
-}
-
 static int study_perform (pw_study *study, pw_error *error) {
   pw_stop_catch ();
   int status = study->type->begin (study, error);
@@ -369,7 +349,12 @@ static int study_perform (pw_study *study, pw_error *error) {
   if (status == PW_OK)
     status = study->type->timed ? pw_study_parallel (study, study->methods, study_measure_method, study, error)
                                 : pw_study_parallel (study, study->rows, study_measure_row, study, error);
-  if (status == PW_RETRY && pw_stop) status = study_write_kept (study, error);
+  /* those measured after the row that an interruption has stopped */
+  for (const pw_row *row = study->row + study->written, *end = study->row + study->rows;
+       status == PW_RETRY && pw_stop && row < end; row++) {
+    if (row->measured && table_write_row (study, row, error) != PW_OK) status = error->status;
+    study->written += row->measured && status == PW_RETRY;
+  }
   if (status == PW_OK && study->type->conclude) study->type->conclude (study);
   pw_stop_release ();
   return status;
@@ -392,23 +377,20 @@ static int study_finish (pw_study *study, int status, pw_error *error) {
   return status == PW_OK && study->scripts[0] ? pw_figure_draw (study->folder, study->scripts, error) : status;
 }
 
-/* A study in which no run has reached the end is a failure. */
-static int study_require_success (const pw_study *study, pw_error *error) {
-  const pw_row *failed = NULL;
-  for (const pw_row *row = study->row; row < study->row + study->rows; row++) {
-    if (row->state == ROW_DONE) return PW_OK;
-    if (row->state == ROW_FAILED || row->state == ROW_REFUSED) failed = row;
-  }
-  return failed ? pw_fail (error, PW_METHOD, "no method has reached the end; the last error: %s", failed->reason)
-                : pw_fail (error, PW_METHOD, "no method has reached the end within the limit; see --limit");
-}
-
 int pw_study_command (pw_study *study, const pw_study_type *type, pw_error *error) {
   study->type = type;
   int status = study_open (study, error);
   if (status == PW_OK) status = study_perform (study, error);
   status = study_finish (study, status, error);
-  if (status == PW_OK) status = study_require_success (study, error);
+  const pw_row *failed = NULL, *done = NULL;
+  for (const pw_row *row = study->row; row < study->row + study->rows; row++) {
+    if (row->state == ROW_DONE) done = row;
+    if (row->state == ROW_FAILED || row->state == ROW_REFUSED) failed = row;
+  }
+  if (status == PW_OK && done == NULL && failed)
+    status = pw_fail (error, PW_METHOD, "no method has reached the end; the last error: %s", failed->reason);
+  else if (status == PW_OK && done == NULL)
+    status = pw_fail (error, PW_METHOD, "no method has reached the end within the limit; see --limit");
   if (type->close) type->close (study);
   free (study->row);
   free (study->method);
