@@ -297,26 +297,19 @@ const pw_command pw_cli_list = {
 
 #define NEW_LETTERS "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-"
 
-/* "folder/my_car.c" gives "my_car" and ".c".  PW_INPUT for a name that is too long, that a shell would split or change,
- * that a program would take for an option, or that ends in neither .c nor .yaml. */
-static int new_name (const char *path, char *name, size_t size, const char **ending, pw_error *error) {
-  const char *slash = strrchr (path, '/'), *base = slash ? slash + 1 : path;
-  size_t length = strspn (base, NEW_LETTERS);
-  *ending = base + length;
-  if (length == 0 || length >= size || base[0] == '-' ||
-      (strcmp (*ending, ".c") != 0 && strcmp (*ending, ".yaml") != 0))
-    return pw_fail (error, PW_INPUT,
-                    "\"%s\": a model file's name has at most %zu letters, digits, _ and -, does not begin with -, and "
-                    "ends in .c or .yaml",
-                    path, size - 1);
-  snprintf (name, size, "%.*s", (int)length, base);
-  return PW_OK;
-}
-
+/* The model "my_car" for "folder/my_car.c".  Refuses a name that is too long, that a shell would split or change, that
+ * a program would take for an option, or that ends in neither .c nor .yaml. */
 static int new_command (void *options, pw_error *error) {
-  const char *ending, *path = ((const pw_cli_line *)options)->argument[0];
-  char name[100];
-  if (new_name (path, name, sizeof name, &ending, error) != PW_OK) return PW_INPUT;
+  const char *path = ((const pw_cli_line *)options)->argument[0], *slash = strrchr (path, '/'),
+             *base = slash ? slash + 1 : path, *ending = base + strspn (base, NEW_LETTERS);
+  enum { LONGEST = 99 };
+  if (ending == base || ending - base > LONGEST || base[0] == '-' ||
+      (strcmp (ending, ".c") != 0 && strcmp (ending, ".yaml") != 0))
+    return pw_fail (error, PW_INPUT,
+                    "\"%s\": a model file's name has at most %d letters, digits, _ and -, does not begin with -, and "
+                    "ends in .c or .yaml",
+                    path, LONGEST);
+  const char *name = PW_PRINTED (LONGEST + 1, "%.*s", (int)(ending - base), base);
   FILE *f = fopen (path, "wx"); /* never overwrites a file */
   if (f == NULL && errno == EEXIST) return pw_fail (error, PW_INPUT, "%s exists already and was not changed", path);
   if (f == NULL) return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", path, strerror (errno));

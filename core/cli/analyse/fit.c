@@ -205,35 +205,7 @@ static int data_read_table (pw_fit *fit, const fit_sigma *given, pw_error *error
   return status;
 }
 
-/* Reads the data, and sets the standard deviation of each datum. */
-static int data_read (pw_fit *fit, const fit_sigma *given, pw_error *error) {
-  if (data_read_table (fit, given, error) != PW_OK) return error->status;
-  size_t rows = (size_t)fit->rows, cells = (size_t)fit->columns * rows;
-  fit->t = fit->table, fit->data = fit->table + rows;
-  fit->sigma = pw_arena_alloc (&fit->line.arena, cells * sizeof *fit->sigma);
-  if (fit->sigma == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  const double *next = fit->data + cells;
-  for (int i = 0; i < fit->columns; i++) {
-    const double *column = isnan (given[i].number) ? next : NULL, all = given[i].text ? given[i].number : 1;
-    for (size_t k = 0; k < rows; k++) fit->sigma[(size_t)i * rows + k] = column ? column[k] : all;
-    if (column) next += rows;
-  }
-  return PW_OK;
-}
-
-/* Counts the data, each of which needs a positive standard deviation. */
-static int data_check (pw_fit *fit, pw_error *error) {
-  for (int i = 0; i < fit->columns * fit->rows; i++) {
-    if (isnan (fit->data[i])) continue;
-    fit->residuals++;
-    if (!(fit->sigma[i] > 0))
-      return pw_fail (error, PW_INPUT,
-                      "--data %s: the standard deviation of %s at t = %g s is %g; expected a number > 0",
-                      fit->data_path, fit->column_name[i / fit->rows], fit->t[i % fit->rows], fit->sigma[i]);
-  }
-  return PW_OK;
-}
-
+/* Reads the data, sets the standard deviation of each datum, which must be positive, and counts the data. */
 static int fit_read_data (pw_fit *fit, pw_error *error) {
   if (data_read_columns (fit, error) != PW_OK) return error->status;
   fit_sigma *given = pw_arena_alloc (&fit->line.arena, (size_t)fit->columns * sizeof *given);
@@ -241,8 +213,24 @@ static int fit_read_data (pw_fit *fit, pw_error *error) {
   for (const char **text = fit->sigma_texts; status == PW_OK && text && *text; text++)
     status = data_read_sigma (fit, *text, given, error);
   if (status == PW_OK) status = data_check_sigma (fit, given, error);
-  if (status == PW_OK) status = data_read (fit, given, error);
-  return status == PW_OK ? data_check (fit, error) : status;
+  if (status == PW_OK) status = data_read_table (fit, given, error);
+  if (status != PW_OK) return status;
+  const int rows = fit->rows, cells = fit->columns * rows;
+  fit->t = fit->table, fit->data = fit->table + rows;
+  fit->sigma = pw_arena_alloc (&fit->line.arena, (size_t)cells * sizeof *fit->sigma);
+  if (fit->sigma == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  const double *next = fit->data + cells; /* columns of standard deviations */
+  for (int i = 0; i < cells; i++) {
+    const fit_sigma *of = given + i / rows;
+    fit->sigma[i] = isnan (of->number) ? *next++ : of->text ? of->number : 1;
+    if (isnan (fit->data[i])) continue;
+    fit->residuals++;
+    if (!(fit->sigma[i] > 0))
+      return pw_fail (error, PW_INPUT,
+                      "--data %s: the standard deviation of %s at t = %g s is %g; expected a number > 0",
+                      fit->data_path, fit->column_name[i / rows], fit->t[i % rows], fit->sigma[i]);
+  }
+  return PW_OK;
 }
 
 /* ---- Runs: the model's values at the times of the data, and derivatives of these values ---- */
@@ -622,9 +610,13 @@ static int solve_open (fit_solver *solver) {
 static int fit_solve (pw_fit *fit, pw_error *error) {
   fit_solver solver = { .fit = fit, .error = error };
   fit->initial_chi2 = NAN;
+  pw_stop_catch ();
+  pw_progress_start (&fit->progress, pw_file_name (fit->line.m.file), "", 0, 1);
   solver.status = solve_open (&solver);
   if (solver.status == PW_OK) solve_searches (&solver);
   if (solver.status == PW_OK) solve_errors (&solver);
+  pw_progress_end (&fit->progress);
+  pw_stop_release ();
   return solver.status;
 }
 
@@ -924,20 +916,6 @@ static int fit_options (pw_fit *fit, pw_error *error) {
   return status == PW_OK ? pw_parallel_jobs (fit->jobs_text, &fit->jobs, error) : status;
 }
 
-/* Reads the data and the unknowns; runs end at the time of the last row. */
-static int fit_open_data (pw_fit *fit, pw_error *error) {
-  int status = pw_unknowns_open (&fit->unknowns, &fit->line, error);
-  fit->t_end = fit->unknowns.settings.span;
-  if (status == PW_OK) status = fit_read_data (fit, error);
-  if (status == PW_OK) status = pw_unknowns_read (&fit->unknowns, fit->free, error);
-  if (status != PW_OK) return status;
-  if (fit->residuals < fit->unknowns.count)
-    return pw_fail (error, PW_INPUT, "--data %s has fewer data (%d) than there are unknowns (%d)", fit->data_path,
-                    fit->residuals, fit->unknowns.count);
-  fit->unknowns.settings.span = fit->t[fit->rows - 1];
-  return pw_unknowns_engine (&fit->unknowns, FIT_RUNS, fit->starts, error);
-}
-
 static int fit_open (pw_fit *fit, pw_error *error) {
   static const char *const figures[] = { "fit.dat", "fit.gp", "fit.svg", "fit.png", "fit.pdf", NULL };
   pw_use use[] = { PW_CLI_MODEL_USE,
@@ -947,21 +925,17 @@ static int fit_open (pw_fit *fit, pw_error *error) {
                    { "--plots", fit->plots_path, PW_WRITES_INTO, figures } };
   int status = fit_options (fit, error);
   if (status == PW_OK) status = pw_cli_open (&fit->line, error);
-  if (status == PW_OK) status = fit_open_data (fit, error);
+  if (status == PW_OK) status = pw_unknowns_open (&fit->unknowns, &fit->line, error);
+  fit->t_end = fit->unknowns.settings.span;
+  if (status == PW_OK) status = fit_read_data (fit, error);
+  if (status == PW_OK) status = pw_unknowns_read (&fit->unknowns, fit->free, error);
+  if (status != PW_OK) return status;
+  if (fit->residuals < fit->unknowns.count)
+    return pw_fail (error, PW_INPUT, "--data %s has fewer data (%d) than there are unknowns (%d)", fit->data_path,
+                    fit->residuals, fit->unknowns.count);
+  fit->unknowns.settings.span = fit->t[fit->rows - 1]; /* runs end at the time of the last row */
+  status = pw_unknowns_engine (&fit->unknowns, FIT_RUNS, fit->starts, error);
   return status == PW_OK ? pw_files_open (&fit->line, use, sizeof use / sizeof *use, error) : status;
-}
-
-static int fit_search (pw_fit *fit, pw_error *error) {
-  pw_stop_catch ();
-  pw_progress_start (&fit->progress, pw_file_name (fit->line.m.file), "", 0, 1);
-  int status = fit_solve (fit, error);
-  pw_progress_end (&fit->progress);
-  pw_stop_release ();
-  fit->interrupted = status == PW_RETRY;
-  if (!fit->interrupted) return status;
-  if (fit->iterations > 0) return PW_OK;
-  pw_cli_say ("pinwheel: interrupted before the first iteration was done\n");
-  return PW_INTERRUPTED;
 }
 
 static int fit_finish (pw_fit *fit, pw_error *error) {
@@ -987,7 +961,10 @@ static int fit_finish (pw_fit *fit, pw_error *error) {
 static int fit_command (void *options, pw_error *error) {
   pw_fit *fit = options;
   int status = fit_open (fit, error);
-  if (status == PW_OK) status = fit_search (fit, error);
+  if (status == PW_OK) status = fit_solve (fit, error);
+  fit->interrupted = status == PW_RETRY;
+  if (fit->interrupted) status = fit->iterations > 0 ? PW_OK : PW_INTERRUPTED;
+  if (status == PW_INTERRUPTED) pw_cli_say ("pinwheel: interrupted before the first iteration was done\n");
   if (status == PW_OK) status = fit_finish (fit, error);
   pw_unknowns_close (&fit->unknowns);
   return status;

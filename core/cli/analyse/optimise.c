@@ -211,17 +211,6 @@ static void search_keep (local_search *local) {
   pthread_mutex_unlock (&problem->lock);
 }
 
-/* Makes a run, with derivatives if `slopes`.  If only the derivatives fail, the search ends. */
-static int search_try (local_search *local, int slopes, pw_error *error) {
-  pw_error own = { 0 };
-  int status = search_run (local->problem, local->unknown, local->output, error);
-  if (status != PW_OK || !slopes) return status;
-  status = search_differentiate (local, &own);
-  if (status == PW_RETRY || status == PW_RESOURCE) return *error = own, status;
-  local->repeat |= status != PW_OK;
-  return PW_OK;
-}
-
 /* Makes the run with these scaled unknowns the last one unless it already is, with derivatives if `slopes`. */
 static void search_evaluate (local_search *local, const double *scaled, int slopes) {
   const pw_unknowns *unknowns = &local->problem->unknowns;
@@ -230,7 +219,15 @@ static void search_evaluate (local_search *local, const double *scaled, int slop
   if (local->known > slopes && memcmp (local->scaled, scaled, size) == 0) return;
   memcpy (local->scaled, scaled, size);
   for (int i = 0; i < unknowns->count; i++) local->unknown[i] = search_unknown (unknowns->list + i, scaled[i]);
-  int status = search_try (local, slopes, &error);
+  int status = search_run (local->problem, local->unknown, local->output, &error);
+  if (status == PW_OK && slopes) { /* if only the derivatives fail, the search ends */
+    pw_error own = { 0 };
+    status = search_differentiate (local, &own);
+    if (status == PW_RETRY || status == PW_RESOURCE)
+      error = own;
+    else
+      local->repeat |= status != PW_OK, status = PW_OK;
+  }
   if (status == PW_RETRY || pw_stop) {
     nlopt_force_stop (local->optimiser);
     return;

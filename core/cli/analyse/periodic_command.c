@@ -166,20 +166,6 @@ static int periodic_follow (pw_periodic_command *cmd, pw_error *error) {
   return PW_OK;
 }
 
-static int periodic_compute (pw_periodic_command *cmd, pw_error *error) {
-  pw_periodic_orbit o;
-  pw_limit_start (&cmd->limit);
-  cmd->search = pw_periodic_open (cmd->line.m.system, &cmd->settings, error);
-  if (cmd->search == NULL && error->status == PW_METHOD && periodic_set_stopped (cmd)) *error = (pw_error){ 0 };
-  if (cmd->search == NULL) return error->status;
-  pw_stop_catch ();
-  int status = periodic_find (cmd, &o, error);
-  if (status == PW_RETRY && !periodic_set_stopped (cmd)) status = periodic_fail (cmd, error);
-  if (status == PW_OK) status = cmd->vary_text ? periodic_follow (cmd, error) : periodic_add (cmd, &o, error);
-  pw_stop_release ();
-  return status == PW_RETRY ? PW_OK : status;
-}
-
 /* ---- Reports ---- */
 
 enum {
@@ -529,7 +515,19 @@ static int periodic_command (void *options, pw_error *error) {
   if (status == PW_OK) status = periodic_read_options (cmd, error);
   if (status == PW_OK) status = pw_figure_lock_folder (&cmd->line, cmd->folder, "periodic", error);
   if (status == PW_OK) pw_report_model (&cmd->line.m), pw_cli_report_tables (cmd->line.m.system, cmd->settings.period);
-  if (status == PW_OK) status = periodic_compute (cmd, error);
+  if (status == PW_OK) {
+    pw_periodic_orbit o;
+    pw_limit_start (&cmd->limit);
+    cmd->search = pw_periodic_open (cmd->line.m.system, &cmd->settings, error);
+    if (cmd->search == NULL && error->status == PW_METHOD && periodic_set_stopped (cmd)) *error = (pw_error){ 0 };
+    pw_stop_catch ();
+    status = cmd->search ? periodic_find (cmd, &o, error) : error->status;
+    if (status == PW_RETRY && !periodic_set_stopped (cmd)) status = periodic_fail (cmd, error);
+    if (status == PW_OK && cmd->search)
+      status = cmd->vary_text ? periodic_follow (cmd, error) : periodic_add (cmd, &o, error);
+    pw_stop_release ();
+    if (status == PW_RETRY) status = PW_OK;
+  }
   if (status == PW_OK && cmd->points && cmd->vary_text) periodic_print_branch (cmd);
   if (status == PW_OK && cmd->points && !cmd->vary_text) periodic_print_motion (cmd, &cmd->point->orbit);
   if (status == PW_OK && cmd->points && cmd->folder) status = periodic_write (cmd, error);

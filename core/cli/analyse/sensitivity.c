@@ -41,21 +41,6 @@ static const double SENSITIVITY_RTOL = 1e-12, /* of the runs that are compared *
 
 /* ---- What can be differentiated ---- */
 
-/* Opens a run with unknown p changed by `by`. */
-static int sensitivity_neighbour (const sensitivity *cmd, const double *values, int p, double by, pw_unknown_run *run,
-                                  pw_error *error) {
-  const pw_unknowns *u = &cmd->unknowns;
-  double *x = malloc ((size_t)u->count * sizeof *x);
-  if (x == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  memcpy (x, values, (size_t)u->count * sizeof *x);
-  x[p] += by;
-  int status = pw_unknown_run_prepare (run, u, x, error);
-  free (x);
-  if (status != PW_OK) return status;
-  run->run = pw_limit_open (run->m.system, u->method, &run->settings, error);
-  return run->run ? PW_OK : error->status;
-}
-
 /* Opens the neighbours on both sides.  Refuses a parameter that changes the number of bodies or elements, and an
  * initial value that the constraints determine: making a neighbour consistent moves it by more than 1 % of the step.  A
  * neighbour that cannot be opened is no error here: the differences use the other side. */
@@ -66,10 +51,16 @@ static int sensitivity_check (const sensitivity *cmd, const double *values, int 
   const int n = pw_system_coordinates (s);
   const double step = SENSITIVITY_PROBE * unknown->size;
   int status = PW_OK;
+  double *x = malloc ((size_t)u->count * sizeof *x);
+  if (x == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  memcpy (x, values, (size_t)u->count * sizeof *x);
   for (int side = -1; side <= 1 && status == PW_OK; side += 2) {
     pw_unknown_run run = { .run = NULL };
     pw_error own = { 0 };
-    int opened = sensitivity_neighbour (cmd, values, p, side * step, &run, &own);
+    x[p] = values[p] + side * step;
+    int opened = pw_unknown_run_prepare (&run, u, x, &own);
+    if (opened == PW_OK && (run.run = pw_limit_open (run.m.system, u->method, &run.settings, &own)) == NULL)
+      opened = own.status;
     if (opened == PW_RESOURCE) status = pw_fail (error, opened, "%s", own.text);
     const pw_system *other = run.m.system;
     if (opened == PW_OK &&
@@ -89,6 +80,7 @@ static int sensitivity_check (const sensitivity *cmd, const double *values, int 
     }
     pw_unknown_run_close (&run);
   }
+  free (x);
   return status;
 }
 
@@ -327,19 +319,6 @@ static int sensitivity_csv (const void *context, FILE *f, pw_error *error) {
   return status;
 }
 
-/* The label of a curve in the figure. */
-static void sensitivity_label (const sensitivity *cmd, int output, int unknown, char *label, size_t size) {
-  char unit[SENSITIVITY_UNIT], buffer[FIGURE_NAME + 4];
-  const char *name = pw_figure_name (cmd->unknowns.list[unknown].name, buffer);
-  if (cmd->unknowns.list[unknown].value != 0) {
-    pw_outcome_unit (&cmd->outcomes, output, unit, sizeof unit);
-    snprintf (label, size, *unit ? "%s × ∂/∂%s [%s]" : "%s × ∂/∂%s", name, name, unit);
-  } else {
-    sensitivity_unit (cmd, output, unknown, unit);
-    snprintf (label, size, *unit ? "∂/∂%s [%s]" : "∂/∂%s", name, unit);
-  }
-}
-
 /* Draws the derivatives along the run, times the value of the unknown unless that is 0, so that unknowns can be
  * compared. */
 static int sensitivity_draw (const sensitivity *cmd, pw_error *error) {
@@ -348,13 +327,15 @@ static int sensitivity_draw (const sensitivity *cmd, pw_error *error) {
   int status = pw_curves_open (&c, &cmd->line, cmd->folder, "sensitivity", "derivatives along the run", error);
   if (status != PW_OK) return status;
   for (int o = 0; o < cmd->outputs.count; o++) {
-    char label[300];
+    char label[300], unit[SENSITIVITY_UNIT], buffer[FIGURE_NAME + 4];
     pw_curves_panel (&c, &(pw_panel){ .x_label = "t [s]",
                                       .y_label = PW_FIGURE_LABEL (cmd->outputs.of[o], ""),
                                       .x[1] = u->settings.span });
     for (int p = 0; p < u->count; p++) {
-      const double factor = u->list[p].value != 0 ? u->list[p].value : 1;
-      sensitivity_label (cmd, o, p, label, sizeof label);
+      const double value = u->list[p].value, factor = value != 0 ? value : 1;
+      const char *name = pw_figure_name (u->list[p].name, buffer), *times = value != 0 ? name : "";
+      value != 0 ? pw_outcome_unit (&cmd->outcomes, o, unit, sizeof unit) : sensitivity_unit (cmd, o, p, unit);
+      snprintf (label, sizeof label, *unit ? "%s%s∂/∂%s [%s]" : "%s%s∂/∂%s", times, *times ? " × " : "", name, unit);
       pw_curves_add (&c, "line", label);
       for (int i = 0; i < cmd->outputs.rows; i++)
         pw_curves_point (&c, cmd->outputs.t[i], sensitivity_of (cmd, o, p, i)->value * factor, 0);

@@ -276,22 +276,6 @@ const char *pw_unknowns_options (const pw_unknowns *u, const double *x, char tex
 
 /* The option --vary of `steady` and `periodic`. */
 
-/* Refuses a parameter that is a count or also given by --set, and a range outside its domain. */
-static int vary_check (const pw_vary *v, const char *text, pw_error *error) {
-  const pw_parameter *p = v->parameter;
-  const double ends[] = { v->first, v->last };
-  if (p->domain == PW_COUNT)
-    return pw_fail (error, PW_INPUT,
-                    "--vary %s: %s counts something and cannot vary continuously; use `pinwheel sweep`", text, p->name);
-  for (int i = 0; i < 2; i++)
-    if (*pw_domain_check (p->domain, ends[i]))
-      return pw_fail (error, PW_INPUT, "--vary %s: expected %s", text, pw_domain_check (p->domain, ends[i]));
-  for (const char **set = v->unknowns.line->sets; set && *set; set++)
-    if (strncmp (*set, p->name, strlen (p->name)) == 0 && (*set)[strlen (p->name)] == '=')
-      return pw_fail (error, PW_INPUT, "%s is given by --vary and by --set", p->name);
-  return PW_OK;
-}
-
 int pw_vary_read (pw_vary *v, const pw_cli_line *line, const char *text, pw_error *error) {
   const size_t size = strcspn (text, "=");
   if (size == 0 || size >= sizeof v->unknown.name || strchr (text + size, ':') == NULL)
@@ -302,8 +286,19 @@ int pw_vary_read (pw_vary *v, const pw_cli_line *line, const char *text, pw_erro
   v->parameter = v->unknown.parameter = pw_cli_parameter (line->m.model, v->name);
   v->unknowns = (pw_unknowns){ .line = line, .list = &v->unknown, .count = 1 };
   if (v->parameter == NULL) return PW_OK;
-  v->unit = v->parameter->unit ? v->parameter->unit : "";
-  return vary_check (v, text, error);
+  const pw_parameter *p = v->parameter;
+  v->unit = p->unit ? p->unit : "";
+  if (p->domain == PW_COUNT)
+    return pw_fail (error, PW_INPUT,
+                    "--vary %s: %s counts something and cannot vary continuously; use `pinwheel sweep`", text, p->name);
+  for (int i = 0; i < 2; i++)
+    if (*pw_domain_check (p->domain, i ? v->last : v->first))
+      return pw_fail (error, PW_INPUT, "--vary %s: expected %s", text,
+                      pw_domain_check (p->domain, i ? v->last : v->first));
+  for (const char **set = line->sets; set && *set; set++)
+    if (strncmp (*set, p->name, strlen (p->name)) == 0 && (*set)[strlen (p->name)] == '=')
+      return pw_fail (error, PW_INPUT, "%s is given by --vary and by --set", p->name);
+  return PW_OK;
 }
 
 void pw_vary_progress (const pw_vary *v, pw_progress *p, double from, double value, double to) {

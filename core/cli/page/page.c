@@ -103,43 +103,34 @@ static int page_choose_method (page *cmd, pw_error *error) {
   return PW_OK;
 }
 
-static int page_open_files (page *cmd, pw_error *error) {
-  size_t longest = 0;
-  if (pw_page_open (&cmd->content, cmd->line.m.file, error) != PW_OK) return error->status;
-  for (int i = 0; i < cmd->content.files; i++)
-    if (longest < cmd->content.file[i].size) longest = cmd->content.file[i].size;
-  cmd->base64 = malloc (longest * 4 / 3 + 5); /* 4 characters for every 3 bytes, rounded up, and 0 */
-  return cmd->base64 ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
-}
-
 static int page_is_plugin (const char *path) {
   const char *ending = strrchr (path, '.');
   return ending && strcmp (ending, ".so") == 0;
 }
 
-/* Replaces the name of a plug-in, unless it is a path, by the source next to it: browsers need another compilation. */
-static int page_find_source (page *cmd, pw_error *error) {
-  const char *model = *cmd->line.argument;
-  if (strchr (model, '/') || page_is_plugin (model)) return PW_OK;
-  char *path = cmd->source = pw_file_find (model, error);
-  if (path && page_is_plugin (path)) {
-    strcpy (strrchr (path, '.'), ".c");
-    if (access (path, R_OK) == 0) *(cmd->line.argument = cmd->argument) = path;
-  }
-  return error->status;
-}
-
 static int page_open (page *cmd, pw_error *error) {
   pw_use use[] = { PW_CLI_MODEL_USE, { "-o", cmd->path, PW_WRITES, NULL } };
+  const char *model = *cmd->line.argument;
   if (cmd->path == NULL) return pw_fail (error, PW_INPUT, "-o FILE.html is missing: the page to write");
-  int status = pw_animation_check ("-o", cmd->path, error);
-  if (status == PW_OK) status = page_find_source (cmd, error);
-  if (status == PW_OK) status = pw_cli_open (&cmd->line, error);
+  if (pw_animation_check ("-o", cmd->path, error) != PW_OK) return error->status;
+  /* in place of the name of a plug-in, unless it is a path, the source next to it: browsers need another compilation */
+  if (strchr (model, '/') == NULL && !page_is_plugin (model) && (cmd->source = pw_file_find (model, error)) == NULL)
+    return error->status;
+  if (cmd->source && page_is_plugin (cmd->source)) {
+    strcpy (strrchr (cmd->source, '.'), ".c");
+    if (access (cmd->source, R_OK) == 0) *(cmd->line.argument = cmd->argument) = cmd->source;
+  }
+  int status = pw_cli_open (&cmd->line, error);
   if (status == PW_OK) status = pw_cli_check_uses (&cmd->line, use, 2, error);
-  if (status != PW_OK) return status;
-  status = pw_cli_settings (&cmd->line, &cmd->line.m.defaults, &cmd->settings, &cmd->limit, error);
+  if (status == PW_OK) status = pw_cli_settings (&cmd->line, &cmd->line.m.defaults, &cmd->settings, &cmd->limit, error);
   if (status == PW_OK) status = page_choose_method (cmd, error);
-  return status == PW_OK ? page_open_files (cmd, error) : status;
+  if (status == PW_OK) status = pw_page_open (&cmd->content, cmd->line.m.file, error);
+  if (status != PW_OK) return status;
+  size_t longest = 0;
+  for (int i = 0; i < cmd->content.files; i++)
+    if (longest < cmd->content.file[i].size) longest = cmd->content.file[i].size;
+  cmd->base64 = malloc (longest * 4 / 3 + 5); /* 4 characters for every 3 bytes, rounded up, and 0 */
+  return cmd->base64 ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
 }
 
 static int page_command (void *options, pw_error *error) {

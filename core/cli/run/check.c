@@ -96,17 +96,6 @@ static int check_reference (pw_check *check, pw_error *error) {
 
 /* ---- Element types ---- */
 
-/* Tests an element type in random scenes; records the reason if none can be generated. */
-static int check_random (pw_checked_kind *k, pw_error *error) {
-  for (unsigned seed = 1; seed <= CHECK_SEEDS && !*k->untested; seed++) {
-    pw_error own = { 0 };
-    int status = pw_selftest (k->kind, seed, &k->random, &own);
-    if (status == PW_RESOURCE) return pw_fail (error, status, "%s", own.text);
-    if (status != PW_OK) snprintf (k->untested, sizeof k->untested, "%s", own.text);
-  }
-  return PW_OK;
-}
-
 /* The first check that fails, or NULL. */
 static const pw_selftest_check *check_fault (const pw_selftest_report *report) {
   for (int i = 0; i < report->checks; i++)
@@ -114,25 +103,18 @@ static const pw_selftest_check *check_fault (const pw_selftest_report *report) {
   return NULL;
 }
 
-/* Elements of one type are consecutive in a system. */
-static int check_list_kinds (pw_check *check, pw_error *error) {
-  const pw_system *s = check->line.m.system;
-  check->kind = calloc ((size_t)pw_system_elements (s) + 1, sizeof *check->kind);
-  if (check->kind == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  for (int i = 0; i < pw_system_elements (s); i++) {
-    const pw_kind *kind = pw_system_element (s, i).kind;
-    if (check->kinds == 0 || check->kind[check->kinds - 1].kind != kind) check->kind[check->kinds++].kind = kind;
-    check->kind[check->kinds - 1].count++;
-  }
-  return PW_OK;
-}
-
 /* Tests an element type in use; in the model only if the table of the type is consistent. */
 static int check_kind (pw_check *check, pw_checked_kind *k, pw_error *error) {
   const pw_system *s = check->line.m.system;
   const pw_initial_report *initial = check->run ? pw_run_initial (check->run) : NULL;
   const double *q = initial ? initial->q : pw_system_initial_q (s), *v = initial ? initial->v : pw_system_initial_v (s);
-  int status = check_random (k, error);
+  int status = PW_OK;
+  for (unsigned seed = 1; seed <= CHECK_SEEDS && !*k->untested; seed++) { /* unless no scene can be generated */
+    pw_error own = { 0 };
+    status = pw_selftest (k->kind, seed, &k->random, &own);
+    if (status == PW_RESOURCE) return pw_fail (error, status, "%s", own.text);
+    if (status != PW_OK) snprintf (k->untested, sizeof k->untested, "%s", own.text), status = PW_OK;
+  }
   const pw_selftest_check *fault = check_fault (&k->random);
   if (status == PW_OK && (fault == NULL || strcmp (fault->name, "table") != 0))
     status = pw_selftest_scene (s, check->run ? pw_run_scale (check->run)->time : 1, k->kind, 0, q, v, 1, &k->in_model,
@@ -401,15 +383,6 @@ static char *report_eigenvalue (const pw_linear *linear, int i, char buffer[100]
   return buffer;
 }
 
-/* Number of equal eigenvalues from i on, those of conjugate pairs included. */
-static int report_equal (const pw_linear *linear, int i) {
-  int k = i;
-  while (k < linear->unknowns && linear->re[k] == linear->re[i] && fabs (linear->im[k]) == fabs (linear->im[i]) &&
-         linear->rigid[k] == linear->rigid[i])
-    k++;
-  return k - i;
-}
-
 static void report_eigenvalues (const pw_linear *linear) {
   char text[100];
   for (int i = 0, lines = 0, same; i < linear->unknowns; i += same, lines++) {
@@ -417,7 +390,9 @@ static void report_eigenvalues (const pw_linear *linear) {
       printf ("    and %d more\n", linear->unknowns - i);
       return;
     }
-    same = report_equal (linear, i);
+    for (same = 1; i + same < linear->unknowns && linear->re[i + same] == linear->re[i] &&
+                   fabs (linear->im[i + same]) == fabs (linear->im[i]) && linear->rigid[i + same] == linear->rigid[i];)
+      same++; /* equal eigenvalues, those of conjugate pairs included */
     int multiplicity = linear->im[i] != 0 ? same / 2 : same;
     const char *times = multiplicity > 1 ? PW_PRINTED (30, ", %d times", multiplicity) : "";
     report_text (NULL, i == 0 ? "eigenvalues, rightmost first" : "", "%s%s%s", report_eigenvalue (linear, i, text),
@@ -574,7 +549,13 @@ static int check_model (pw_check *check, pw_error *error) {
     if (status == PW_OK) status = check_linear (check, error);
   }
   if (status == PW_OK) check_wheels (check);
-  if (status == PW_OK) status = check_list_kinds (check, error);
+  check->kind = calloc ((size_t)pw_system_elements (s) + 1, sizeof *check->kind);
+  if (status == PW_OK && check->kind == NULL) status = pw_fail (error, PW_RESOURCE, "out of memory");
+  for (int i = 0; check->kind && i < pw_system_elements (s); i++) { /* those of a type are consecutive */
+    const pw_kind *kind = pw_system_element (s, i).kind;
+    if (check->kinds == 0 || check->kind[check->kinds - 1].kind != kind) check->kind[check->kinds++].kind = kind;
+    check->kind[check->kinds - 1].count++;
+  }
   for (int i = 0; status == PW_OK && i < check->kinds; i++) status = check_kind (check, &check->kind[i], error);
   int out_of_memory = check->problem.out_of_memory || check->finding.out_of_memory;
   return status == PW_OK && out_of_memory ? pw_fail (error, PW_RESOURCE, "out of memory") : status;

@@ -211,12 +211,6 @@ static void reference_name (const reference_candidate *candidate, char *text, si
             PW_DIGITS (candidate->row.level, 4), candidate->row.adaptive ? "" : " s");
 }
 
-/* 1 if two methods have the same integrator. */
-static int reference_same_integrator (const reference_candidate *a, const reference_candidate *b) {
-  size_t n = strcspn (a->row.method, "+");
-  return strncmp (a->row.method, b->row.method, n + 1) == 0;
-}
-
 /* The two candidates with the smallest distance, with different integrators if possible; 0 if there are none. */
 static int reference_pair (const pw_system *system, const reference_candidate *candidates, int *first, int *second) {
   double least = INFINITY;
@@ -224,7 +218,8 @@ static int reference_pair (const pw_system *system, const reference_candidate *c
     for (int i = 0; i < REFERENCE_CANDIDATES; i++)
       for (int j = i + 1; j < REFERENCE_CANDIDATES; j++) {
         const reference_candidate *a = &candidates[i], *b = &candidates[j];
-        if (!a->finished || !b->finished || reference_same_integrator (a, b) != same) continue;
+        int same_integrator = strncmp (a->row.method, b->row.method, strcspn (a->row.method, "+") + 1) == 0;
+        if (!a->finished || !b->finished || same_integrator != same) continue;
         double distance = reference_distance (system, &a->motion, &b->motion);
         if (distance < least) least = distance, *first = i, *second = j;
       }

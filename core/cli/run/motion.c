@@ -74,15 +74,6 @@ static double motion_largest_multiplier (const pw_system *system, const pw_motio
   return largest > 0 ? largest : 1;
 }
 
-/* What the error of a state is relative to: 1, but of a first-order state its largest value in the first samples, if
- * that is above 1. */
-static double motion_state_size (const pw_system *system, const pw_motion *reference, int samples, int state) {
-  double largest = 1;
-  if (!pw_system_state_hidden (system, state - pw_system_coordinates (system))) return 1;
-  for (int k = 0; k < samples; k++) largest = fmax (largest, fabs (pw_motion_at (reference, k)[state]));
-  return largest;
-}
-
 /* Increases *error, NaN at first, to a larger difference; one that is NaN, not known, makes it NaN for good. */
 static void motion_include (double *error, int *compared, double difference) {
   if (!*compared || difference > *error || isnan (difference)) *error = difference;
@@ -101,7 +92,9 @@ void pw_motion_errors (const pw_system *system, const pw_motion *reference, cons
     int is_state = j < states, state_unit = is_state ? pw_motion_unit (system, j) : 0, end = MOTION_END + state_unit;
     int largest = is_state ? MOTION_LARGEST + state_unit : MOTION_MULTIPLIERS;
     if (is_state && pw_system_state_hidden (system, j)) continue;
-    if (is_state) scale = motion_state_size (system, reference, motion->taken, j);
+    if (is_state) scale = 1;
+    for (int k = 0; is_state && pw_system_state_hidden (system, j - states / 2) && k <= last; k++)
+      scale = fmax (scale, fabs (pw_motion_at (reference, k)[j])); /* a first-order state may be larger than 1 */
     if (!is_state && (unit == NULL || strcmp (unit, pw_system_reaction_unit (system, j - states)) != 0)) {
       unit = pw_system_reaction_unit (system, j - states);
       scale = motion_largest_multiplier (system, reference, motion->taken, j - states);
