@@ -34,31 +34,9 @@ static void yaml_text (const char *text) {
   putchar ('"');
 }
 
-/* {expression: "t^2", rate: "2*t"}, or f (t, a.phi) for a function of a C model */
-static void yaml_function (const pw_signal *s) {
-  static const char *const key[] = { "{expression: ", ", rate: ", ", acceleration: " };
-  const pw_signal_text *text = s->function.text;
-  for (int i = 0; text && i < 3; i++)
-    if (text->part[i]) fputs (key[i], stdout), yaml_text (text->part[i]);
-  printf (text ? "}" : "f (t");
-  for (const char *const *state = s->function.reads; text == NULL && state && *state; state++) printf (", %s", *state);
-  if (text == NULL) putchar (')');
-}
-
 static void yaml_pairs (const double *x, const double *y, int count) {
   for (int i = 0; i < count; i++) printf ("%s[%s, %s]", i ? ", " : "[", YAML_NUMBER (x[i]), YAML_NUMBER (y[i]));
   putchar (']');
-}
-
-/* The points of a table; with fewer digits than YAML_DIGITS only their number and their first and last times. */
-static void yaml_points (const pw_signal *s, int digits) {
-  const double *t = s->table.t;
-  int count = s->table.count;
-  if (digits < YAML_DIGITS) {
-    printf ("%d from %s to %s s", count, PW_DIGITS (t[0], digits), PW_DIGITS (t[count - 1], digits));
-    return;
-  }
-  yaml_pairs (t, s->table.value, count);
 }
 
 /* 1 if an optional field has its default, zero in all bytes. */
@@ -73,17 +51,32 @@ static int yaml_is_default (const pw_field *f, const void *at) {
 /* Writes those fields of a structure that are not the default; returns the separator before what follows. */
 static const char *yaml_fields (const pw_field *f, const void *structure, const char *separator, int digits);
 
-/* {ramp: {to: 1, duration: 2}} */
+/* {ramp: {to: 1, duration: 2}}; {expression: "t^2", rate: "2*t"}, or f (t, a.phi) for a function of a C model.  With
+ * fewer digits than YAML_DIGITS, of the points of a table only their number and their first and last times. */
 static void yaml_signal (const pw_signal *s, int digits) {
+  static const char *const key[] = { "{expression: ", ", rate: ", ", acceleration: " };
   const pw_signal_form *form = pw_signal_form_of (s);
-  if (s->type == PW_FUNCTION)
-    yaml_function (s);
-  else if (form == NULL)
+  const pw_signal_text *text = s->type == PW_FUNCTION ? s->function.text : NULL;
+  if (text) {
+    for (int i = 0; i < 3; i++)
+      if (text->part[i]) fputs (key[i], stdout), yaml_text (text->part[i]);
+    putchar ('}');
+  } else if (s->type == PW_FUNCTION) {
+    printf ("f (t");
+    for (const char *const *state = s->function.reads; state && *state; state++) printf (", %s", *state);
+    putchar (')');
+  } else if (form == NULL)
     fputs (PW_DIGITS (s->constant, digits), stdout);
   else {
     printf ("{%s: {", form->name);
     const char *separator = yaml_fields (form->fields, s, "", digits);
-    if (s->type == PW_TABLE) printf ("%spoints: ", separator), yaml_points (s, digits);
+    const double *t = s->table.t;
+    const int count = s->type == PW_TABLE ? s->table.count : 0;
+    if (count > 0) printf ("%spoints: ", separator);
+    if (count > 0 && digits < YAML_DIGITS)
+      printf ("%d from %s to %s s", count, PW_DIGITS (t[0], digits), PW_DIGITS (t[count - 1], digits));
+    else if (count > 0)
+      yaml_pairs (t, s->table.value, count);
     printf ("}}");
   }
 }

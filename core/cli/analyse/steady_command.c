@@ -289,31 +289,25 @@ static double steady_model_value (const pw_steady_command *cmd) {
                                pw_system_initial_v (s));
 }
 
-/* The motion nearest to the initial state: at the initial value of the held quantity that varies, if that is finite,
- * else where the range begins, as for a parameter; at a value within the range if the family is smaller there. */
-static int steady_nearest_motion (pw_steady_command *cmd, pw_steady_motion *m, pw_error *error) {
+/* If the quantities held leave a family of motions, holds further ones, at their values in the motion nearest to the
+ * initial state: at the initial value of the held quantity that varies, if that is finite, else where the range begins,
+ * as for a parameter; at a value within the range if the family is smaller there. */
+static int steady_hold_more (pw_steady_command *cmd, pw_error *error) {
   const double first = cmd->settings.first, held = cmd->settings.vary < 0 ? NAN : steady_model_value (cmd),
                begin = isfinite (held) ? held : first, within = pw_value_within (first, cmd->settings.last);
   pw_error none = { 0 };
-  int status = pw_steady_solve (cmd->search, 0, begin, m, error), family = m->family;
-  if (status != PW_OK || family == 0) return status;
-  if (pw_steady_solve (cmd->search, 0, within, m, &none) == PW_OK && m->family < family) return PW_OK;
-  return pw_steady_solve (cmd->search, 0, begin, m, error);
-}
-
-/* If the quantities held leave a family of motions, holds further ones, at their values in the motion nearest to the
- * initial state. */
-static int steady_hold_more (pw_steady_command *cmd, pw_error *error) {
-  const pw_system *s = cmd->line.m.system;
   pw_steady_motion m;
-  int status = steady_nearest_motion (cmd, &m, error);
+  int status = pw_steady_solve (cmd->search, 0, begin, &m, error), family = m.family;
+  if (status == PW_OK && family > 0 &&
+      !(pw_steady_solve (cmd->search, 0, within, &m, &none) == PW_OK && m.family < family))
+    status = pw_steady_solve (cmd->search, 0, begin, &m, error);
   if (status == PW_RETRY || (status == PW_OK && m.family == 0)) return PW_OK;
   if (status != PW_OK) return status;
   int more = pw_steady_suggest (cmd->search, cmd->hold + cmd->settings.holds, PW_HOLDS - cmd->settings.holds);
   if (more < 0) return steady_unadvised (cmd, more, error);
   for (int i = cmd->settings.holds; i < cmd->settings.holds + more; i++)
     pw_cli_say ("pinwheel: holding %s=%.9g, as in the motion nearest to the initial state\n",
-                PW_NAME (pw_system_held_name, s, cmd->hold[i].state), cmd->hold[i].value);
+                PW_NAME (pw_system_held_name, cmd->line.m.system, cmd->hold[i].state), cmd->hold[i].value);
   cmd->settings.holds += more;
   pw_steady_close (cmd->search);
   cmd->search = pw_steady_open (cmd->line.m.system, &cmd->settings, error);

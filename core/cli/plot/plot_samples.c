@@ -63,28 +63,6 @@ static int plot_allocate (pw_plots *plots, pw_error *error) {
   return plots->out_of_memory ? pw_fail (error, PW_RESOURCE, "plots: out of memory") : PW_OK;
 }
 
-/* Chooses the bodies, and the elements with a contact point, that are drawn, evenly from all. */
-static void plot_choose (pw_plots *plots) {
-  for (int b = 0; b < plots->bodies.count; b++) plots->body_index[b] = PLOT_HIDDEN;
-  plots->body_index[plots->bodies.count] = PLOT_GROUND;
-  for (int i = 0; i < plots->bodies.drawn; i++) {
-    plots->bodies.system_index[i] = pw_plot_pick (i, plots->bodies.drawn, plots->bodies.count);
-    plots->body_index[plots->bodies.system_index[i]] = i;
-  }
-  for (int e = 0, contacts = 0, i = 0; i < plots->wheels.drawn; e++)
-    if (pw_system_element (plots->system, e).contact >= 0 &&
-        contacts++ == pw_plot_pick (i, plots->wheels.drawn, plots->wheels.count))
-      plots->wheels.system_index[i++] = e;
-}
-
-/* Locks the folder; an error before the run if it cannot be written. */
-static int plot_try_folder (pw_plots *plots, pw_error *error) {
-  if (pw_folder_open (&plots->folder, plots->figures.folder, error) != PW_OK) return error->status;
-  pw_output *probe = pw_figure_open_data (&plots->figures, "motion.dat", error);
-  if (probe) pw_output_discard (probe);
-  return probe ? PW_OK : error->status;
-}
-
 pw_plots *pw_plots_open (const char *folder, int forces, const pw_model *model, const pw_system *system, double t_end,
                          pw_error *error) {
   pw_plots *plots = malloc (sizeof *plots);
@@ -96,15 +74,24 @@ pw_plots *pw_plots_open (const char *folder, int forces, const pw_model *model, 
     .t_end = t_end,
     .with_forces = forces
   };
-  if ((folder == NULL || plot_try_folder (plots, error) == PW_OK) && plot_allocate (plots, error) == PW_OK)
+  pw_tracks *bodies = &plots->bodies, *wheels = &plots->wheels;
+  pw_output *probe = NULL; /* an error before the run if the folder cannot be written */
+  if (folder && pw_folder_open (&plots->folder, folder, error) == PW_OK)
+    probe = pw_figure_open_data (&plots->figures, "motion.dat", error);
+  if (probe) pw_output_discard (probe);
+  if ((folder == NULL || probe) && plot_allocate (plots, error) == PW_OK)
     plots->workspace = pw_workspace_new (system, error);
-  if (plots->workspace) {
-    plot_choose (plots);
-    pw_plot_find_shapes (plots);
-    return plots;
-  }
-  pw_plots_close (plots);
-  return NULL;
+  if (plots->workspace == NULL) return pw_plots_close (plots), NULL;
+  /* the bodies, and the elements with a contact point, that are drawn, evenly from all */
+  for (int b = 0; b < bodies->count; b++) plots->body_index[b] = PLOT_HIDDEN;
+  plots->body_index[bodies->count] = PLOT_GROUND;
+  for (int i = 0; i < bodies->drawn; i++)
+    plots->body_index[bodies->system_index[i] = pw_plot_pick (i, bodies->drawn, bodies->count)] = i;
+  for (int e = 0, contacts = 0, i = 0; i < wheels->drawn; e++)
+    if (pw_system_element (system, e).contact >= 0 && contacts++ == pw_plot_pick (i, wheels->drawn, wheels->count))
+      wheels->system_index[i++] = e;
+  pw_plot_find_shapes (plots);
+  return plots;
 }
 
 int pw_plots_style (pw_plots *plots, const char *width, const char *colour, pw_error *error) {
@@ -193,20 +180,14 @@ static void data_row (FILE *f, const double *value, int count, const char *end) 
   fputs (end, f);
 }
 
-/* 1 if a body has attachment points, or there is a wheel or marker. */
-static int data_extended (const pw_plots *plots) {
-  int b = 0;
-  while (b < plots->bodies.drawn && plots->shape[b].attachments == 0) b++;
-  return b < plots->bodies.drawn || plots->wheels.drawn > 0;
-}
-
 /* Number of initial samples in a close-up, a separate panel for a mechanism that travels so far that it is small in a
  * figure of the whole run; 0: none.  A single point has no size. */
 static int data_closeup (const pw_plots *plots) {
   pw_plot_box all = pw_plot_ground (plots), first = PLOT_EMPTY;
   double diagonal = 0;
-  int n = 0;
-  if (!data_extended (plots)) return 0;
+  int n = 0, extended = plots->wheels.drawn > 0;
+  for (int b = 0; b < plots->bodies.drawn; b++) extended |= plots->shape[b].attachments > 0;
+  if (!extended) return 0;
   for (int i = 0; i < plots->samples; i++) diagonal = pw_plot_extend (&all, plots, i);
   if (diagonal < FIGURES_FAR * plots->size) return 0;
   while (n < plots->samples && pw_plot_extend (&first, plots, n) <= FIGURES_NEAR * plots->size) n++;

@@ -251,20 +251,6 @@ static int run_read_settings (pw_run_cli *command, pw_error *error) {
   return PW_OK;
 }
 
-static int run_open_condition (pw_run_cli *command, pw_error *error) {
-  pw_error own = { 0 };
-  if (command->with_error)
-    return pw_fail (error, PW_INPUT, "--error compares complete runs: it cannot be given together with --until");
-  if (command->checkpoints.path) return pw_fail (error, PW_INPUT, "--checkpoint cannot be given together with --until");
-  command->condition = pw_condition_open (command->line.m.system, command->line.until, &own);
-  if (command->condition == NULL)
-    return pw_fail (error, own.status, "--until %.200s: %s", command->line.until, own.text);
-  command->settings.ledger |= pw_condition_needs_ledger (command->condition);
-  command->crossing = (pw_crossing){ .value = pw_condition_value, .context = command->condition };
-  command->stop_time = NAN;
-  return PW_OK;
-}
-
 static int run_open (pw_run_cli *command, pw_error *error) {
   int status = run_open_outputs (command, error);
   if (status == PW_OK) {
@@ -286,7 +272,17 @@ static int run_open (pw_run_cli *command, pw_error *error) {
   status =
       pw_comparison_open (&command->comparison, &command->line, command->reference_path, command->settings.span, error);
   if (status != PW_OK) return status;
-  if (command->line.until && run_open_condition (command, error) != PW_OK) return error->status;
+  const char *until = command->line.until;
+  pw_error own = { 0 };
+  command->stop_time = NAN;
+  if (until && command->with_error)
+    return pw_fail (error, PW_INPUT, "--error compares complete runs: it cannot be given together with --until");
+  if (until && command->checkpoints.path)
+    return pw_fail (error, PW_INPUT, "--checkpoint cannot be given together with --until");
+  if (until && (command->condition = pw_condition_open (system, until, &own)) == NULL)
+    return pw_fail (error, own.status, "--until %.200s: %s", until, own.text);
+  if (until) command->settings.ledger |= pw_condition_needs_ledger (command->condition);
+  command->crossing = (pw_crossing){ .value = pw_condition_value, .context = command->condition };
   pw_limit_start (&command->limit);
   command->run = pw_limit_open (system, command->method, &command->settings, error);
   if (command->run == NULL) return error->status;

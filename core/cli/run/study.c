@@ -179,34 +179,16 @@ static int table_width (const pw_study *study) {
   return (int)width;
 }
 
-static void table_heading (pw_study *study, int group) {
-  const pw_study_column *column = study->type->column;
-  int width = table_width (study);
-  printf ("%s%-*s%s\n%-*s", study->headed ? "\n" : "", width, study->type->group[group], study->type->heading_above,
-          width, "method");
-  for (int i = 0; i < study->type->columns; i++)
-    if (column[i].head) printf ("%*s", column[i].width, column[i].head);
-  putchar ('\n');
-  study->headed = group + 1;
-}
-
-/* Prints a value, "-" if it is unknown, "<1e-9" if it is an upper bound. */
-static void table_number (const pw_row *row, const pw_study_column *column, int value_index) {
-  char text[32] = "<", *number = text + (row->upper_bounds >> value_index & 1);
-  if (isnan (row->value[value_index]))
-    strcpy (number, "-");
-  else
-    snprintf (number, sizeof text - 1, column->format, row->value[value_index]);
-  printf ("%*s", column->width, text);
-}
-
 /* Prints a row: columns after the status only if its runs have reached the end, else the reason. */
 static void table_print (const pw_study *study, const pw_row *row) {
   const pw_study_column *column = study->type->column;
   int shown = 1;
   printf ("%-*s", table_width (study), row->method);
   for (int i = 0; shown && i < study->type->columns; i++) {
-    if (column[i].head) table_number (row, &column[i], i);
+    char text[32] = "<", *number = text + (row->upper_bounds >> i & 1); /* "-": unknown, "<1e-9": an upper bound */
+    snprintf (number, sizeof text - 1, isnan (row->value[i]) || column[i].format == NULL ? "-" : column[i].format,
+              row->value[i]);
+    if (column[i].head) printf ("%*s", column[i].width, text);
     if (column[i].text == pw_study_status) shown = row->state == ROW_DONE;
   }
   if (row->state != ROW_DONE) {
@@ -223,7 +205,15 @@ static void table_print (const pw_study *study, const pw_row *row) {
 static int table_write_row (pw_study *study, const pw_row *row, pw_error *error) {
   const pw_study_column *column = study->type->column;
   pw_text line = { .chars = NULL };
-  if (!study->quiet && study->headed != row->group + 1) table_heading (study, row->group);
+  if (!study->quiet && study->headed != row->group + 1) {
+    const int width = table_width (study);
+    printf ("%s%-*s%s\n%-*s", study->headed ? "\n" : "", width, study->type->group[row->group],
+            study->type->heading_above, width, "method");
+    for (int i = 0; i < study->type->columns; i++)
+      if (column[i].head) printf ("%*s", column[i].width, column[i].head);
+    putchar ('\n');
+    study->headed = row->group + 1;
+  }
   if (!study->quiet) table_print (study, row);
   if (study->csv == NULL) return PW_OK;
   for (int i = 0; i < study->type->columns; i++)

@@ -162,18 +162,6 @@ static row_system *system_of (sweep_rows *sweep, long row) {
 
 /* ---- One run ---- */
 
-/* The initial values that the grid varies, malloced, and their number. */
-static pw_initial_value *row_initial (const pw_plan *plan, const sweep_row *row, int *count) {
-  pw_initial_value *initial = malloc (((size_t)plan->grid.axes + 1) * sizeof *initial);
-  *count = 0;
-  for (int i = 0; initial && i < plan->grid.axes; i++)
-    if (plan->grid.axis[i].parameter == NULL)
-      initial[(*count)++] =
-          (pw_initial_value){ pw_system_find_state (row->system->model.system, plan->grid.axis[i].name, NULL),
-                              pw_grid_value (&plan->grid, i, row->number) };
-  return initial;
-}
-
 /* Makes the whole run and its repetition; stores the stated errors of the states at the end if they are known. */
 static void row_state_error (sweep_row *row, const pw_plan *plan, const pw_settings *settings) {
   enum { TIMES = MOTION_SAMPLES };
@@ -214,7 +202,12 @@ static void row_open (sweep_row *row, const pw_plan *plan) {
   pw_settings settings = plan->settings;
   settings.stop_context = &row->limit;
   settings.specialised = row->system->code;
-  pw_initial_value *initial = row_initial (plan, row, &settings.initials);
+  pw_initial_value *initial = malloc (((size_t)plan->grid.axes + 1) * sizeof *initial); /* those that the grid varies */
+  for (int i = 0; initial && i < plan->grid.axes; i++)
+    if (plan->grid.axis[i].parameter == NULL)
+      initial[settings.initials++] =
+          (pw_initial_value){ pw_system_find_state (row->system->model.system, plan->grid.axis[i].name, NULL),
+                              pw_grid_value (&plan->grid, i, row->number) };
   settings.initial = initial;
   pw_limit_start (&row->limit);
   if (initial == NULL) pw_fail (&row->error, PW_RESOURCE, "out of memory");
@@ -276,25 +269,6 @@ static void rows_store (sweep_rows *sweep, const sweep_row *row, int status, con
   if (sweep->error->status != PW_OK) pw_stop = 1;
 }
 
-/* The next missing row of the part; -1 if there is none, or after a request to stop. */
-static long rows_next (sweep_rows *sweep) {
-  const pw_plan *plan = sweep->plan;
-  while (pw_stop == 0 && sweep->next < plan->grid.rows) {
-    long number = pw_grid_scheduled_row (&plan->grid, sweep->next++);
-    if (number % plan->parts == plan->part - 1 && sweep->journal->offset[number / plan->parts] == 0) return number;
-  }
-  return -1;
-}
-
-/* Counts a run that was opened; keeps the largest change of given initial values by the constraints. */
-static void rows_count_change (sweep_rows *sweep, double change, const char *text) {
-  sweep->opened_runs++;
-  sweep->changed_runs += change > 0;
-  if (!(change > sweep->largest_change)) return;
-  sweep->largest_change = change;
-  memcpy (sweep->largest_change_text, text, sizeof sweep->largest_change_text);
-}
-
 /* ---- Threads ---- */
 
 /* A thread and the rows that it computes at once.  With more than one there are neither --cpu nor --limit: both refer
@@ -310,8 +284,13 @@ typedef struct {
 
 /* Opens the run of the next row; 0 if there is none.  The caller holds the lock, which is released meanwhile. */
 static int worker_begin (sweep_rows *sweep, sweep_row *row) {
+  const pw_plan *plan = sweep->plan;
   char text[PW_CHANGE_TEXT];
-  long number = rows_next (sweep);
+  long number = -1; /* of the next missing row of the part; none after a request to stop */
+  while (number < 0 && pw_stop == 0 && sweep->next < plan->grid.rows) {
+    long next = pw_grid_scheduled_row (&plan->grid, sweep->next++);
+    if (next % plan->parts == plan->part - 1 && sweep->journal->offset[next / plan->parts] == 0) number = next;
+  }
   if (number < 0) return 0;
   *row = (sweep_row){ .number = number, .system = system_of (sweep, number) };
   if (row->system == NULL) {
@@ -319,10 +298,15 @@ static int worker_begin (sweep_rows *sweep, sweep_row *row) {
     return 0;
   }
   pthread_mutex_unlock (&sweep->lock);
-  row_open (row, sweep->plan);
+  row_open (row, plan);
   double change = row->run ? pw_cli_largest_change (row->run, row->system->model.system, text) : 0;
   pthread_mutex_lock (&sweep->lock);
-  if (row->run) rows_count_change (sweep, change, text);
+  sweep->opened_runs += row->run != NULL;
+  sweep->changed_runs += change > 0;
+  if (change > sweep->largest_change) {
+    sweep->largest_change = change;
+    memcpy (sweep->largest_change_text, text, sizeof text);
+  }
   return 1;
 }
 

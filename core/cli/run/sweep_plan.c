@@ -173,33 +173,24 @@ int pw_plan_compile (const pw_plan *plan, long row, pw_cli_model *compiled, pw_e
 
 /* ---- Axes ---- */
 
-/* 1 if a list of "NAME=VALUE", which ends with NULL or is NULL, has this name. */
-static int plan_has_name (const char **list, const char *name) {
-  size_t n = strlen (name);
-  for (; list && *list; list++)
-    if (strncmp (*list, name, n) == 0 && (*list)[n] == '=') return 1;
-  return 0;
-}
-
-/* Whether the model with its default parameters has a first-order state of this name, which has no dot. */
-static int plan_has_state (const pw_plan *plan, const char *name) {
-  pw_error none = { 0 };
-  pw_model *m = pw_file_model (plan->line->m.file, &none);
-  pw_system *s = m && pw_model_build (m, &none) == PW_OK ? pw_system_compile (m, &none) : NULL;
-  const int found = s && pw_system_find_state (s, name, &none) >= 0;
-  pw_system_free (s);
-  pw_model_free (m);
-  return found;
-}
-
 /* Finds the parameter of an axis, in whose domain all values must lie.  Other names are those of states, which exist
  * only in a compiled model. */
 static int plan_match_axis (const pw_plan *plan, pw_axis *axis, pw_model *model, pw_error *error) {
   const pw_parameter *parameter = axis->parameter = pw_cli_parameter (model, axis->name);
+  const size_t n = strlen (axis->name);
   if (parameter) axis->unit = parameter->unit;
-  if (plan_has_name (parameter ? plan->line->sets : plan->line->starts, axis->name))
-    return pw_fail (error, PW_INPUT, "%s is given by --vary and by %s", axis->name, parameter ? "--set" : "--start");
-  if (parameter == NULL && (strchr (axis->name, '.') || plan_has_state (plan, axis->name))) return PW_OK;
+  for (const char **given = parameter ? plan->line->sets : plan->line->starts; given && *given; given++)
+    if (strncmp (*given, axis->name, n) == 0 && (*given)[n] == '=')
+      return pw_fail (error, PW_INPUT, "%s is given by --vary and by %s", axis->name, parameter ? "--set" : "--start");
+  if (parameter == NULL) { /* a first-order state, whose name has no dot, may be in the model with its defaults */
+    pw_error none = { 0 };
+    pw_model *m = strchr (axis->name, '.') ? NULL : pw_file_model (plan->line->m.file, &none);
+    pw_system *s = m && pw_model_build (m, &none) == PW_OK ? pw_system_compile (m, &none) : NULL;
+    const int found = strchr (axis->name, '.') || (s && pw_system_find_state (s, axis->name, &none) >= 0);
+    pw_system_free (s);
+    pw_model_free (m);
+    if (found) return PW_OK;
+  }
   for (long i = 0; i < axis->count; i++)
     if (parameter == NULL || *pw_domain_check (parameter->domain, pw_axis_value (axis, i)))
       return pw_model_set (model, axis->name, pw_axis_value (axis, i), error); /* fails with the reason */
@@ -613,25 +604,21 @@ void pw_journal_close (pw_journal *journal) {
 
 /* ---- The table of a journal ---- */
 
-/* The reason is the last cell and the only one in quotes, which are doubled inside. */
-static void table_reason (const journal_line *line, char *reason, size_t size) {
-  const char *c = line->text, *end = line->text + line->text_size - 2;
-  while (c < end && !(c[0] == ',' && c[1] == '"')) c++;
-  size_t n = 0;
-  for (c += 2; c < end && n + 1 < size; c++) {
-    reason[n++] = *c;
-    if (*c == '"') c++;
-  }
-  reason[n] = 0;
-}
-
 /* Reads the line of a row, and counts how its run ended; 0 if it is another line. */
 static int table_read_row (const char *at, const char *end, long row, journal_line *line, pw_tally *tally) {
   if (!journal_line_read (at, end, line) || line->row != row) return 0;
   tally->rows++;
   if (line->status == 0 || tally->failed++ > 0) return 1;
   tally->status = line->status;
-  table_reason (line, tally->reason, sizeof tally->reason);
+  /* the reason is the last cell and the only one in quotes, which are doubled inside */
+  const char *c = line->text, *last = line->text + line->text_size - 2;
+  while (c < last && !(c[0] == ',' && c[1] == '"')) c++;
+  size_t n = 0;
+  for (c += 2; c < last && n + 1 < sizeof tally->reason; c++) {
+    tally->reason[n++] = *c;
+    if (*c == '"') c++;
+  }
+  tally->reason[n] = 0;
   return 1;
 }
 
@@ -642,21 +629,6 @@ static int table_close (pw_output *output, pw_error *error) {
   return error->status;
 }
 
-static int table_write (const pw_journal *journal, const pw_plan *plan, const journal_map *map, FILE *stream,
-                        pw_tally *tally, pw_error *error) {
-  int is_part = plan->parts > 1;
-  fputs (is_part ? plan->fingerprint.chars : plan->heading.chars, stream);
-  if (!is_part) putc ('\n', stream);
-  for (long k = 0; k < journal->rows; k++) {
-    const char *at = map->begin + journal->offset[k];
-    journal_line line;
-    if (!table_read_row (at, map->end, plan->part - 1 + k * plan->parts, &line, tally))
-      return pw_fail (error, PW_RESOURCE, "%s was changed by another program", journal->path);
-    fwrite (is_part ? at : line.text, 1, is_part ? line.line_size : line.text_size, stream);
-  }
-  return PW_OK;
-}
-
 int pw_sweep_finish (pw_journal *journal, const pw_plan *plan, pw_tally *tally, pw_error *error) {
   journal_map map;
   pw_error failure = { 0 };
@@ -664,7 +636,17 @@ int pw_sweep_finish (pw_journal *journal, const pw_plan *plan, pw_tally *tally, 
   if (journal_map_open (&map, journal->descriptor) != PW_OK)
     return pw_fail (error, PW_RESOURCE, "cannot read %s: %s", journal->path, strerror (errno));
   pw_output *output = pw_output_open_as (journal->table_path, ".sorted", &failure);
-  if (output) table_write (journal, plan, &map, pw_output_stream (output), tally, &failure);
+  FILE *stream = output ? pw_output_stream (output) : NULL;
+  const int is_part = plan->parts > 1;
+  if (output) fprintf (stream, is_part ? "%s" : "%s\n", is_part ? plan->fingerprint.chars : plan->heading.chars);
+  for (long k = 0; k < journal->rows && failure.status == PW_OK; k++) {
+    const char *at = map.begin + journal->offset[k];
+    journal_line line;
+    if (!table_read_row (at, map.end, plan->part - 1 + k * plan->parts, &line, tally))
+      pw_fail (&failure, PW_RESOURCE, "%s was changed by another program", journal->path);
+    else
+      fwrite (is_part ? at : line.text, 1, is_part ? line.line_size : line.text_size, stream);
+  }
   if (output) table_close (output, &failure);
   journal_map_close (&map);
   if (failure.status != PW_OK)
