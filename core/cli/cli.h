@@ -474,4 +474,9 @@ void pw_row_end (pw_table *table);
 /* A row of headings, or the rest of one, ended by NULL: the first in a cell of width `first`, others of `width`. */
 void pw_head (pw_table *table, int first, int width, const char *const *heading);
 
+enum { PW_BODIES_PRINTED = 20 }; /* at most */
+/* Prints x, y, phi and their rates of the bodies, with 0 for numbers below `least`; first, width: of the columns. */
+void pw_print_bodies (const pw_system *s, const double *q, const double *v, const char *heading, int first, int width,
+                      int digits, double least);
+
 #endif

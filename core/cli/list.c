@@ -28,25 +28,20 @@ static void list_row (pw_table *t, const char *name, const char *type, const cha
   t->column = t->pad = 0; /* in place of pw_row_end: the wrapped text ends with a newline */
 }
 
-/* "required" or the default; the domain of a number; the alternatives of a choice. */
-static void list_default (const pw_field *f, char *text, size_t size) {
-  const char *domain = f->type == PW_NUMBER ? pw_domain_text (f->domain) : "";
-  snprintf (text, size, *domain ? "%s (%s)" : "%s",
-            f->required || f->type == PW_BODY ? "required" : list_types[f->type].zero, domain);
-  for (int i = 0; f->type == PW_CHOICE && f->choices[i]; i++) {
-    size_t used = strlen (text);
-    const char *mark = i || f->required ? "" : " (default)";
-    snprintf (text + used, size - used, "%s%s%s", i ? " | " : f->required ? ": " : "", f->choices[i], mark);
-  }
-}
-
 static void list_fields (pw_table *t, const pw_field *fields) {
   for (const pw_field *f = fields; f->name; f++) {
     char value[80];
     const char *times = pw_field_count (f) > 1 ? PW_PRINTED (16, "%d x ", f->count) : "",
                *unit = f->unit ? PW_PRINTED (40, " [%s]", f->unit) : "",
                *type = PW_PRINTED (60, "%s%s%s", times, list_types[f->type].name, unit);
-    list_default (f, value, sizeof value);
+    const char *domain = f->type == PW_NUMBER ? pw_domain_text (f->domain) : "";
+    snprintf (value, sizeof value, *domain ? "%s (%s)" : "%s",
+              f->required || f->type == PW_BODY ? "required" : list_types[f->type].zero, domain);
+    for (int i = 0; f->type == PW_CHOICE && f->choices[i]; i++) { /* the alternatives */
+      size_t used = strlen (value);
+      const char *mark = i || f->required ? "" : " (default)";
+      snprintf (value + used, sizeof value - used, "%s%s%s", i ? " | " : f->required ? ": " : "", f->choices[i], mark);
+    }
     list_row (t, f->name, type, value, f->about ? f->about : "");
   }
 }

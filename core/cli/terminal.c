@@ -394,3 +394,19 @@ void pw_head (pw_table *table, int first, int width, const char *const *heading)
   while (*++heading) pw_cell (table, width, *heading);
   pw_row_end (table);
 }
+
+void pw_print_bodies (const pw_system *s, const double *q, const double *v, const char *heading, int first, int width,
+                      int digits, double least) {
+  const char *const head[] = { heading, "x [m]", "y [m]", "phi [rad]", "vx [m/s]", "vy [m/s]", "omega [rad/s]", NULL };
+  for (pw_table t = { 0 }; pw_table_pass (&t);) {
+    pw_head (&t, first, width, head);
+    for (int b = 0; b < pw_system_bodies (s) && b < PW_BODIES_PRINTED; b++) {
+      pw_cell (&t, first, pw_system_body_name (s, b));
+      for (int k = 0; k < 6; k++) {
+        const double value = (k < 3 ? q : v)[3 * b + k % 3];
+        pw_cell_number (&t, width, fabs (value) < least ? 0 : value, digits);
+      }
+      pw_row_end (&t);
+    }
+  }
+}

@@ -715,24 +715,20 @@ static int optimise_draw (const pw_optimise *problem, pw_error *error) {
 
 /* ---- Before the search ---- */
 
-/* Adds the constraint "OUTPUT<=VALUE" or "OUTPUT>=VALUE".  text: a copy of `given`, of which OUTPUT is kept. */
-static int optimise_constraint (pw_optimise *problem, char *text, const char *given, pw_error *error) {
-  const int i = problem->outputs;
-  char *symbol = NULL;
-  for (char *c = text; *c; c++)
-    if ((*c == '<' || *c == '>') && c[1] == '=') symbol = c;
-  if (symbol == NULL || pw_read_expression (symbol + 2, &problem->bound[i]) != PW_OK || !isfinite (problem->bound[i]))
-    return pw_fail (error, PW_INPUT, "--subject-to %.200s: expected OUTPUT<=VALUE or OUTPUT>=VALUE", given);
-  problem->sign[i] = *symbol == '<' ? 1 : -1;
-  *symbol = 0;
-  while (symbol > text && symbol[-1] == ' ') *--symbol = 0;
-  problem->output[problem->outputs++] = text;
-  return PW_OK;
-}
-
-static int optimise_read_outputs (pw_optimise *problem, pw_error *error) {
+static int optimise_read (pw_optimise *problem, pw_error *error) {
   size_t count = 1;
-  int status = PW_OK;
+  double starts = 10;
+  problem->least = INFINITY, problem->seed = 1;
+  if (!problem->maximise == !problem->minimise)
+    return pw_fail (error, PW_INPUT, "expected one of --maximise OUTPUT and --minimise OUTPUT");
+  int status = pw_cli_number ("--starts", problem->starts_text, PW_COUNT, &starts, error);
+  if (status == PW_OK) status = pw_cli_number ("--seed", problem->seed_text, PW_COUNT, &problem->seed, error);
+  if (status == PW_OK) status = pw_parallel_jobs (problem->jobs_text, &problem->jobs, error);
+  if (status == PW_OK && starts > 1e5) status = pw_fail (error, PW_INPUT, "--starts: at most 100000");
+  if (status == PW_OK)
+    status = pw_cli_requires ("--width", problem->line.width, "--plots DIR", problem->plots_path != NULL, error);
+  if (status != PW_OK) return status;
+  problem->starts = (int)starts;
   for (const char **given = problem->subject_to; given && *given; given++) count++;
   problem->output = pw_arena_alloc (&problem->line.arena, (count + 1) * sizeof *problem->output); /* ended by NULL */
   problem->unit = pw_arena_alloc (&problem->line.arena, count * sizeof *problem->unit);
@@ -743,11 +739,20 @@ static int optimise_read_outputs (pw_optimise *problem, pw_error *error) {
   problem->output[0] = problem->maximise ? problem->maximise : problem->minimise;
   problem->sign[0] = problem->maximise ? -1 : 1;
   problem->outputs = 1;
-  for (const char **given = problem->subject_to; given && *given && status == PW_OK; given++) {
-    char *copy = pw_arena_copy (&problem->line.arena, *given);
-    status = copy ? optimise_constraint (problem, copy, *given, error) : pw_fail (error, PW_RESOURCE, "out of memory");
+  for (const char **given = problem->subject_to; given && *given; given++) {
+    const int i = problem->outputs++;
+    char *text = pw_arena_copy (&problem->line.arena, *given), *symbol = NULL; /* "OUTPUT<=VALUE" or "OUTPUT>=VALUE" */
+    if (text == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+    for (char *c = text; *c; c++)
+      if ((*c == '<' || *c == '>') && c[1] == '=') symbol = c;
+    if (symbol == NULL || pw_read_expression (symbol + 2, &problem->bound[i]) != PW_OK || !isfinite (problem->bound[i]))
+      return pw_fail (error, PW_INPUT, "--subject-to %.200s: expected OUTPUT<=VALUE or OUTPUT>=VALUE", *given);
+    problem->sign[i] = *symbol == '<' ? 1 : -1;
+    *symbol = 0;
+    while (symbol > text && symbol[-1] == ' ') *--symbol = 0;
+    problem->output[i] = text; /* OUTPUT is kept */
   }
-  return status;
+  return PW_OK;
 }
 
 /* Checks the outputs of an option, from number `first` on, and stores their units.  Extrema are not differentiable. */
@@ -759,21 +764,6 @@ static int optimise_open_outputs (pw_optimise *problem, int first, int count, co
   for (int i = 0; i < set.functionals; i++) problem->differentiable &= !pw_is_extremum (set.functional[i].type);
   pw_outcomes_close (&set);
   return status;
-}
-
-static int optimise_read (pw_optimise *problem, pw_error *error) {
-  double starts = 10;
-  problem->least = INFINITY, problem->seed = 1;
-  if (!problem->maximise == !problem->minimise)
-    return pw_fail (error, PW_INPUT, "expected one of --maximise OUTPUT and --minimise OUTPUT");
-  int status = pw_cli_number ("--starts", problem->starts_text, PW_COUNT, &starts, error);
-  if (status == PW_OK) status = pw_cli_number ("--seed", problem->seed_text, PW_COUNT, &problem->seed, error);
-  if (status == PW_OK) status = pw_parallel_jobs (problem->jobs_text, &problem->jobs, error);
-  if (status == PW_OK && starts > 1e5) status = pw_fail (error, PW_INPUT, "--starts: at most 100000");
-  if (status == PW_OK)
-    status = pw_cli_requires ("--width", problem->line.width, "--plots DIR", problem->plots_path != NULL, error);
-  problem->starts = (int)starts;
-  return status == PW_OK ? optimise_read_outputs (problem, error) : status;
 }
 
 enum { OPTIMISE_RESULT = 1, OPTIMISE_SUMMARY }; /* indices in the list of files of optimise_open */

@@ -342,39 +342,30 @@ static int data_mechanism (const pw_plots *plots, const char *name, int n, pw_er
   return pw_output_finish (o, error);
 }
 
-static int data_write (const pw_plots *plots, int closeup, pw_error *error) {
-  static const char energy[] = "t [s], kinetic [J], potential [J], work [J], loss [J], projection [J], balance [J]";
-  int status = data_tracks (plots, &plots->bodies, error);
-  if (status == PW_OK) status = data_tracks (plots, &plots->wheels, error);
-  if (status == PW_OK)
-    status =
-        data_table (plots, "energy.dat", energy, plots->data, plots->sample_size, PLOT_FIRST, plots->samples, error);
-  if (status == PW_OK)
-    status = data_table (plots, "ground.dat", "points of the ground: x [m], y [m]", *plots->ground, 2, 2,
-                         plots->grounds, error);
-  if (status == PW_OK) status = data_mechanism (plots, "mechanism.dat", plots->samples, error);
-  if (status == PW_OK && closeup > 0) status = data_mechanism (plots, "mechanism-closeup.dat", closeup, error);
-  return status;
-}
+/* ---- Scripts ---- */
 
-/* ---- Scripts: values of the templates' variables ---- */
-
-/* Curves, with a label each unless there are too many; which of them, from 0, are paths of markers. */
-static void figures_curves (FILE *f, const pw_plots *plots, const pw_tracks *tracks) {
+/* Writes the script of a figure: values of the template's variables. */
+static int figures_write (const pw_plots *plots, const char *name, int closeup, pw_error *error) {
+  int mechanism = strcmp (name, "mechanism") == 0, paths = mechanism || strcmp (name, "paths") == 0;
+  pw_output *o = pw_figure_begin (&plots->figures, name, error);
+  if (o == NULL) return PW_RESOURCE;
+  FILE *f = pw_output_stream (o);
+  fprintf (f, "t_end = %.9g\nt_closeup = %.9g\n", pw_plot_sample (plots, plots->samples - 1)[PLOT_T],
+           closeup > 0 ? pw_plot_sample (plots, closeup - 1)[PLOT_T] : 0);
+  const pw_tracks *tracks = paths && plots->wheels.drawn ? &plots->wheels : &plots->bodies;
   pw_figure_text (f, "data", tracks->file);
   pw_figure_text (f, "what", tracks->noun);
   fprintf (f, "curves = %d\nnumbers = %d\nnumber_column = %d\narray label[%d]\n", tracks->curves, tracks->count,
            tracks->numbers + 2, tracks->curves);
-  for (int i = 0; i < tracks->curves && tracks->curves <= FIGURES_NAMED; i++)
+  for (int i = 0; i < tracks->curves && tracks->curves <= FIGURES_NAMED; i++) /* labels unless there are too many */
     pw_figure_element (f, "label", i + 1, pw_plot_name (plots, tracks, i));
-  fputs ("markers = '", f);
+  fputs ("markers = '", f); /* which of the curves, from 0, are paths of markers */
   for (int i = 0; i < tracks->curves && tracks == &plots->wheels; i++)
     if (!pw_plot_rolls (plots, pw_plot_pick (i, tracks->curves, tracks->drawn))) fprintf (f, "%d ", i);
   fputs ("'\n", f);
-}
-
-/* The names of bodies unless there are too many, and the colours of those with an area. */
-static void figures_bodies (FILE *f, const pw_plots *plots) {
+  fprintf (f, "ground = %d\nby_time = %d\n", plots->grounds > 0, plots->by_time);
+  if (!mechanism) return pw_figure_end (o, name, error);
+  /* the names of bodies unless there are too many, and the colours of those with an area */
   int bodies = plots->bodies.drawn, named = bodies <= FIGURES_NAMED ? bodies : 0, area[FIGURES_COLOURS] = { 0 };
   fprintf (f, "bodies = %d\narray body[%d]\n", named, bodies);
   for (int b = 0; b < bodies; b++) area[b % FIGURES_COLOURS] |= plots->shape[b].corners > 0;
@@ -383,23 +374,12 @@ static void figures_bodies (FILE *f, const pw_plots *plots) {
     if (area[c]) fprintf (f, "%d ", c + 1);
   fputs ("'\n", f);
   for (int b = 0; b < named; b++) pw_figure_element (f, "body", b + 1, pw_plot_name (plots, &plots->bodies, b));
-}
-
-static int figures_write (const pw_plots *plots, const char *name, int closeup, pw_error *error) {
-  int mechanism = strcmp (name, "mechanism") == 0, paths = mechanism || strcmp (name, "paths") == 0;
-  pw_output *o = pw_figure_begin (&plots->figures, name, error);
-  if (o == NULL) return PW_RESOURCE;
-  FILE *f = pw_output_stream (o);
-  fprintf (f, "t_end = %.9g\nt_closeup = %.9g\n", pw_plot_sample (plots, plots->samples - 1)[PLOT_T],
-           closeup > 0 ? pw_plot_sample (plots, closeup - 1)[PLOT_T] : 0);
-  figures_curves (f, plots, paths && plots->wheels.drawn ? &plots->wheels : &plots->bodies);
-  fprintf (f, "ground = %d\nby_time = %d\n", plots->grounds > 0, plots->by_time);
-  if (mechanism) figures_bodies (f, plots);
   return pw_figure_end (o, name, error);
 }
 
 int pw_plots_finish (pw_plots *plots, int draw, pw_error *error) {
   static const char *const names[] = { "paths", "velocities", "angular", "energy", "mechanism", NULL };
+  static const char energy[] = "t [s], kinetic [J], potential [J], work [J], loss [J], projection [J], balance [J]";
   const char *folder = plots->figures.folder;
   if (folder == NULL) return PW_OK;
   if (plots->samples < 2) {
@@ -409,7 +389,16 @@ int pw_plots_finish (pw_plots *plots, int draw, pw_error *error) {
   if (plots->samples < plots->planned)
     snprintf (plots->figures.incomplete, sizeof plots->figures.incomplete, ", incomplete: up to t = %s s of %s s",
               PW_DIGITS (pw_plot_sample (plots, plots->samples - 1)[PLOT_T], 4), PW_DIGITS (plots->t_end, 4));
-  int closeup = data_closeup (plots), status = data_write (plots, closeup, error);
+  int closeup = data_closeup (plots), status = data_tracks (plots, &plots->bodies, error);
+  if (status == PW_OK) status = data_tracks (plots, &plots->wheels, error);
+  if (status == PW_OK)
+    status =
+        data_table (plots, "energy.dat", energy, plots->data, plots->sample_size, PLOT_FIRST, plots->samples, error);
+  if (status == PW_OK)
+    status = data_table (plots, "ground.dat", "points of the ground: x [m], y [m]", *plots->ground, 2, 2,
+                         plots->grounds, error);
+  if (status == PW_OK) status = data_mechanism (plots, "mechanism.dat", plots->samples, error);
+  if (status == PW_OK && closeup > 0) status = data_mechanism (plots, "mechanism-closeup.dat", closeup, error);
   for (const char *const *name = names; status == PW_OK && *name; name++)
     status = figures_write (plots, *name, closeup, error);
   if (status != PW_OK) return status;

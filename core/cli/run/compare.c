@@ -679,20 +679,6 @@ static double compare_predicted_time (const pw_row *row) {
   return fmax (coarser->cpu / coarser[-1].cpu, 1) * coarser->cpu;
 }
 
-/* A run with samples at the times of the reference, and its errors. */
-static int compare_measure_errors (pw_compare *compare, pw_row *row, pw_error *error) {
-  pw_study *study = &compare->study;
-  pw_motion motion;
-  int status = compare->reference.known
-                   ? pw_motion_open_at (&motion, study->line.m.system, &compare->reference.motion, error)
-                   : pw_motion_open (&motion, study->line.m.system, MOTION_SAMPLES, study->settings.span, error);
-  if (status != PW_OK) return status;
-  status = compare_run (study, row, &motion, error);
-  if (status == PW_OK) compare_set_errors (compare, &motion, row);
-  pw_motion_close (&motion);
-  return status;
-}
-
 static int compare_measure (pw_study *study, pw_row *row, pw_error *error) {
   pw_compare *compare = (pw_compare *)study;
   pw_error run_error = { 0 };
@@ -705,7 +691,13 @@ static int compare_measure (pw_study *study, pw_row *row, pw_error *error) {
     return PW_OK;
   }
   row->balance = NAN;
-  int status = compare_measure_errors (compare, row, &run_error);
+  pw_motion motion; /* at the times of the reference */
+  int status = compare->reference.known
+                   ? pw_motion_open_at (&motion, study->line.m.system, &compare->reference.motion, &run_error)
+                   : pw_motion_open (&motion, study->line.m.system, MOTION_SAMPLES, study->settings.span, &run_error);
+  if (status == PW_OK) status = compare_run (study, row, &motion, &run_error);
+  if (status == PW_OK) compare_set_errors (compare, &motion, row);
+  pw_motion_close (&motion);
   if (status == PW_OK) status = compare_measure_times (compare, row, &run_error);
   if (row->state == ROW_STOPPED)
     snprintf (row->reason, sizeof row->reason, "too slow: the limit of %s s was reached at t = %s s", limit,

@@ -7,7 +7,6 @@
 
 enum {
   REPORT_MESSAGES = 8, /* messages of one kind, or changed states, that are printed at most */
-  REPORT_BODIES = 20,  /* bodies that are printed at most */
   REPORT_ROWS = 24,    /* reactions, or internal coordinates, that are printed at most */
   REPORT_TEXT = 400,   /* longest description of a redundant equation, end included */
   REPORT_WIDTH = 13,   /* of a column of numbers */
@@ -149,22 +148,6 @@ static void report_value (pw_table *table, int width, const char *name, double v
   pw_cell (table, -1, unit);
 }
 
-static void report_bodies (const pw_system *system, const pw_sample *last) {
-  static const char *const head[] = { "body",     "x [m]",    "y [m]",         "phi [rad]",
-                                      "vx [m/s]", "vy [m/s]", "omega [rad/s]", NULL };
-  int bodies = pw_system_bodies (system), shown = bodies < REPORT_BODIES ? bodies : REPORT_BODIES;
-  for (pw_table table = { 0 }; pw_table_pass (&table);) {
-    pw_head (&table, -5, REPORT_WIDTH, head);
-    for (int b = 0; b < shown; b++) {
-      pw_cell (&table, -5, pw_system_body_name (system, b));
-      for (int i = 0; i < 6; i++)
-        pw_cell_number (&table, REPORT_WIDTH, i < 3 ? last->q[3 * b + i] : last->v[3 * b + i - 3], REPORT_DIGITS);
-      pw_row_end (&table);
-    }
-  }
-  report_more (stdout, bodies - shown, ": -o FILE.csv writes them all");
-}
-
 /* Internal coordinates of elements, and first-order states. */
 static void report_internal (const pw_system *system, const pw_sample *last) {
   int first = 3 * pw_system_bodies (system), n = pw_system_coordinates (system);
@@ -289,7 +272,8 @@ void pw_report_end (const pw_run_cli *command, const pw_summary *summary, const 
   const pw_system *system = command->line.m.system;
   const pw_statistics *stats = pw_run_statistics (command->run);
   printf ("%s, %s, at t = %s s\n\n", summary->model, summary->method, PW_DIGITS (last->t, 8));
-  report_bodies (system, last);
+  pw_print_bodies (system, last->q, last->v, "body", -5, REPORT_WIDTH, REPORT_DIGITS, 0);
+  report_more (stdout, pw_system_bodies (system) - PW_BODIES_PRINTED, ": -o FILE.csv writes them all");
   report_internal (system, last);
   for (int outputs = 0; outputs < 2; outputs++) report_list (system, last, outputs);
   if (command->with_energies) report_energy (last);
