@@ -231,18 +231,6 @@ void pw_cli_report_unused (const char *method, const pw_cli_line *line) {
 
 /* The model of a command line: opens it with --set and --start; its parameters, changed initial values and defaults. */
 
-/* Refuses a parameter in --start, and a state in --set: names of states have a dot, those of parameters have none. */
-static int model_check_name (const pw_model *m, const char *option, const char *text, const char *name,
-                             pw_error *error) {
-  int is_parameter = pw_cli_parameter (m, name) != NULL;
-  if (is_parameter && strcmp (option, "--start") == 0)
-    return pw_fail (error, PW_INPUT, "--start %s: %s is a parameter, expected a state; use --set", text, name);
-  if (!is_parameter && strcmp (option, "--set") == 0 && strchr (name, '.'))
-    return pw_fail (error, PW_INPUT, "--set %s: expected a parameter; initial values of states are given by --start",
-                    text);
-  return PW_OK;
-}
-
 int pw_cli_assignment (const char *option, const char *text, const char *form, char name[PW_ASSIGNED_NAME],
                        double *value, pw_error *error) {
   const char *equals = strchr (text, '=');
@@ -260,9 +248,15 @@ int pw_cli_apply (pw_model *m, const char *option, const char **list,
     char name[PW_ASSIGNED_NAME];
     double value;
     int status = pw_cli_assignment (option, *list, "NAME=VALUE", name, &value, error);
-    if (status == PW_OK) status = model_check_name (m, option, *list, name, error);
-    if (status == PW_OK) status = set (m, name, value, error);
     if (status != PW_OK) return status;
+    /* names of states have a dot, those of parameters have none */
+    int is_parameter = pw_cli_parameter (m, name) != NULL;
+    if (is_parameter && strcmp (option, "--start") == 0)
+      return pw_fail (error, PW_INPUT, "--start %s: %s is a parameter, expected a state; use --set", *list, name);
+    if (!is_parameter && strcmp (option, "--set") == 0 && strchr (name, '.'))
+      return pw_fail (error, PW_INPUT, "--set %s: expected a parameter; initial values of states are given by --start",
+                      *list);
+    if (set (m, name, value, error) != PW_OK) return error->status;
   }
   return PW_OK;
 }

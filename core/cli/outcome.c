@@ -405,16 +405,6 @@ static void functional_extrema (functional_step *step, int halvings) {
 
 /* ---- Along the run ---- */
 
-/* Fills a row of the table, at a time in the last step. */
-static void functional_row (functional_step *step, const pw_outcome_table *table, int row) {
-  pw_outcomes *set = step->set;
-  functional_sample (step, table->t[row], FUNCTIONAL_OTHER);
-  for (pw_functional *f = set->functional; f < set->functional + set->functionals; f++)
-    if (f->type == PW_FINAL) f->value = f->values[FUNCTIONAL_OTHER];
-  for (int o = 0; o < set->outcomes; o++)
-    table->value[o * table->rows + row] = pw_outcome_is_final (set, o) ? pw_outcome_value (set, o) : NAN;
-}
-
 void pw_outcomes_settings (pw_outcomes *set, pw_settings *settings) {
   settings->ledger |= set->ledger;
   settings->integrals = set->integrals, settings->integrand = functional_integrands;
@@ -486,7 +476,13 @@ int pw_outcomes_run (pw_outcomes *set, const char *method, const pw_settings *se
   if (r == NULL) return error->status;
   functional_step step = { set, r, own.t, own.t, pw_outcomes_begin (set, r, t_end, error), error };
   for (int row = 0, rows = table ? table->rows : 0; step.status == PW_OK;) {
-    for (; row < rows && table->t[row] <= set->t && step.status == PW_OK; row++) functional_row (&step, table, row);
+    for (; row < rows && table->t[row] <= set->t && step.status == PW_OK; row++) { /* at a time in the last step */
+      functional_sample (&step, table->t[row], FUNCTIONAL_OTHER);
+      for (pw_functional *f = set->functional; f < set->functional + set->functionals; f++)
+        if (f->type == PW_FINAL) f->value = f->values[FUNCTIONAL_OTHER];
+      for (int o = 0; o < set->outcomes; o++)
+        table->value[o * rows + row] = pw_outcome_is_final (set, o) ? pw_outcome_value (set, o) : NAN;
+    }
     if (step.status != PW_OK || set->ended || !(set->t < t_end)) break;
     step.status = pw_outcomes_advance (set, r, row < rows ? table->t[row] : t_end, t_end, error);
   }

@@ -81,24 +81,21 @@ static void yaml_signal (const pw_signal *s, int digits) {
   }
 }
 
-static void yaml_value (const pw_field *f, const void *at, int digits) {
-  const double *number = at;
-  if (f->type == PW_NUMBER) fputs (PW_DIGITS (*number, digits), stdout);
-  if (f->type == PW_POINT || f->type == PW_VECTOR)
-    printf ("[%s, %s]", PW_DIGITS (number[0], digits), PW_DIGITS (number[1], digits));
-  if (f->type == PW_BODY) yaml_name (*(const char *const *)at);
-  if (f->type == PW_SIGNAL) yaml_signal (at, digits);
-  if (f->type == PW_CHOICE) fputs (f->choices[*(const int *)at], stdout);
-  if (f->type == PW_TEXT) yaml_text (*(const char *const *)at);
-}
-
 /* The values of a field as in a text model. */
-static void yaml_field (const pw_field *f, const void *at, int digits) {
+static void yaml_field (const pw_field *f, const void *structure_field, int digits) {
   int count = pw_field_count (f);
   if (count > 1) putchar ('[');
   for (int i = 0; i < count; i++) {
+    const void *at = (const char *)structure_field + (size_t)i * pw_field_bytes (f->type);
+    const double *number = at;
     if (i) printf (", ");
-    yaml_value (f, (const char *)at + (size_t)i * pw_field_bytes (f->type), digits);
+    if (f->type == PW_NUMBER) fputs (PW_DIGITS (*number, digits), stdout);
+    if (f->type == PW_POINT || f->type == PW_VECTOR)
+      printf ("[%s, %s]", PW_DIGITS (number[0], digits), PW_DIGITS (number[1], digits));
+    if (f->type == PW_BODY) yaml_name (*(const char *const *)at);
+    if (f->type == PW_SIGNAL) yaml_signal (at, digits);
+    if (f->type == PW_CHOICE) fputs (f->choices[*(const int *)at], stdout);
+    if (f->type == PW_TEXT) yaml_text (*(const char *const *)at);
   }
   if (count > 1) putchar (']');
 }
@@ -175,16 +172,6 @@ static int yaml_check (const pw_model *m, pw_error *error) {
   return PW_OK;
 }
 
-static void yaml_run (const pw_run_defaults *run) {
-  const char *const key[] = { "t_end", "step", "rtol" };
-  const double value[] = { run->t_end, run->step, run->rtol };
-  const char *separator = "run: {";
-  for (int i = 0; i < 3; i++)
-    if (value[i] != 0) printf ("%s%s: %s", separator, key[i], YAML_NUMBER (value[i])), separator = ", ";
-  if (run->method) printf ("%smethod: ", separator), yaml_text (run->method), separator = ", ";
-  if (*separator == ',') puts ("}");
-}
-
 static void yaml_outputs (const pw_model *m) {
   int count;
   const pw_named_output *o = pw_model_outputs (m, &count);
@@ -208,7 +195,13 @@ static int yaml_model (const pw_cli_model *opened, pw_error *error) {
   const pw_body *b = pw_model_bodies (m, &bodies);
   const pw_element *e = pw_model_elements (m, &elements);
   if (table->about && *table->about) printf ("about: "), yaml_text (table->about), putchar ('\n');
-  yaml_run (&table->run);
+  const char *const key[] = { "t_end", "step", "rtol" };
+  const double value[] = { table->run.t_end, table->run.step, table->run.rtol };
+  const char *separator = "run: {";
+  for (int i = 0; i < 3; i++)
+    if (value[i] != 0) printf ("%s%s: %s", separator, key[i], YAML_NUMBER (value[i])), separator = ", ";
+  if (table->run.method) printf ("%smethod: ", separator), yaml_text (table->run.method), separator = ", ";
+  if (*separator == ',') puts ("}");
   if (ref->names) puts ("let:"); /* of the names in expressions */
   for (int i = 0; i < ref->names; i++) printf ("  %s: %s\n", ref->name[i], YAML_NUMBER (ref->value[i]));
   if (ref->paths) puts ("paths:");

@@ -174,19 +174,6 @@ static int search_feasible (const pw_optimise *problem, const double *output) {
   return search_worst (problem, output, &constraint) <= SEARCH_ALLOWED;
 }
 
-/* Appends the last run to those of the search. */
-static int search_store (local_search *local) {
-  pw_search *search = local->search;
-  int unknowns = local->problem->unknowns.count, outputs = local->problem->outputs, width = unknowns + outputs;
-  int status =
-      pw_grow (&search->trials, (size_t)search->runs, &search->allocated, (size_t)width * sizeof *search->trials);
-  if (status != PW_OK) return status;
-  double *row = search->trials + search->runs++ * width;
-  memcpy (row, local->unknown, (size_t)unknowns * sizeof *row);
-  for (int i = 0; i < outputs; i++) row[unknowns + i] = local->failed ? NAN : local->output[i];
-  return PW_OK;
-}
-
 /* Makes the last run the result of the search if it is the best one. */
 static void search_keep (local_search *local) {
   pw_optimise *problem = local->problem;
@@ -235,7 +222,14 @@ static void search_evaluate (local_search *local, const double *scaled, int slop
   local->known = 1 + slopes;
   local->failed = status != PW_OK;
   if (local->failed && local->search->failed++ == 0) local->search->first_error = error;
-  if (search_store (local) != PW_OK) status = pw_fail (&error, PW_RESOURCE, "out of memory");
+  pw_search *search = local->search;
+  const size_t n = (size_t)unknowns->count, width = n + (size_t)local->problem->outputs;
+  if (pw_grow (&search->trials, (size_t)search->runs, &search->allocated, width * sizeof *search->trials) == PW_OK) {
+    double *row = search->trials + (size_t)search->runs++ * width;
+    memcpy (row, local->unknown, size);
+    for (size_t i = n; i < width; i++) row[i] = local->failed ? NAN : local->output[i - n];
+  } else
+    status = pw_fail (&error, PW_RESOURCE, "out of memory");
   if (!local->failed) search_keep (local);
   if (status == PW_RESOURCE) {
     *local->error = error;
@@ -790,20 +784,6 @@ static int optimise_open (pw_optimise *problem, pw_error *error) {
 
 /* ---- After the search ---- */
 
-/* Outputs of the run whose largest violation is smallest; *constraint: the output that has it.  NULL: all failed. */
-static const double *optimise_nearest (const pw_optimise *problem, int *constraint) {
-  const double *nearest = NULL;
-  double least = INFINITY;
-  int n = problem->unknowns.count, width = n + problem->outputs, i = 0;
-  for (const pw_search *search = problem->search; search < problem->search + problem->starts; search++)
-    for (long k = 0; k < search->runs; k++) {
-      const double *output = search->trials + k * width + n;
-      double violation = isnan (output[0]) ? NAN : search_worst (problem, output, &i);
-      if (violation <= least) least = violation, nearest = output, *constraint = i;
-    }
-  return nearest;
-}
-
 /* The error if no run satisfies the constraints: that of the first run if every run failed. */
 static int optimise_infeasible (const pw_optimise *problem, pw_error *error) {
   char unit[90] = "";
@@ -811,7 +791,15 @@ static int optimise_infeasible (const pw_optimise *problem, pw_error *error) {
   if (problem->failed == problem->runs && problem->first_error)
     return pw_fail (error, problem->first_error->status, "no run succeeded (%s); the first failed: %s",
                     PW_COUNTED (problem->runs, "run"), problem->first_error->text);
-  const double *output = optimise_nearest (problem, &i);
+  const double *output = NULL; /* of the run whose largest violation is smallest */
+  double least = INFINITY;
+  int n = problem->unknowns.count, width = n + problem->outputs, constraint = 0;
+  for (const pw_search *search = problem->search; search < problem->search + problem->starts; search++)
+    for (long k = 0; k < search->runs; k++) {
+      const double *run = search->trials + k * width + n;
+      double violation = isnan (run[0]) ? NAN : search_worst (problem, run, &constraint);
+      if (violation <= least) least = violation, output = run, i = constraint;
+    }
   if (*problem->unit[i]) snprintf (unit, sizeof unit, " %s", problem->unit[i]);
   return pw_fail (error, PW_METHOD,
                   "no run from %s satisfies --subject-to; in the nearest one %s is %s%s and must be at %s %s%s",

@@ -111,18 +111,6 @@ static int steady_unadvised (const pw_steady_command *cmd, int status, pw_error 
                   status == PW_RESOURCE ? "out of memory" : "the family of the steady motion cannot be determined");
 }
 
-/* Stores the options --hold which, besides those given, select the motion last found within its family. */
-static int steady_advise (pw_steady_command *cmd, pw_steady_point *p, pw_error *error) {
-  pw_initial_value hold[PW_HOLDS];
-  size_t used = 0;
-  int count = p->motion.family > 0 ? pw_steady_suggest (cmd->search, hold, PW_HOLDS) : 0;
-  for (int i = 0; i < count && used < sizeof p->advice; i++)
-    used += (size_t)snprintf (p->advice + used, sizeof p->advice - used, " --hold %s=%.9g",
-                              PW_NAME (pw_system_held_name, cmd->line.m.system, hold[i].state), hold[i].value);
-  if (used >= sizeof p->advice) *p->advice = 0;
-  return count < 0 ? steady_unadvised (cmd, count, error) : PW_OK;
-}
-
 /* Removes all points but the first `kept`. */
 static void steady_forget (pw_steady_command *cmd, int kept) {
   if (!cmd->vary_text) cmd->branches -= cmd->points - kept;
@@ -140,8 +128,8 @@ static int steady_is_stopped (pw_steady_command *cmd) {
 
 /* ---- The search ---- */
 
-/* Adds a solution unless it is known or not steady; only one of those in families of the same dimension and
- * stability. */
+/* Adds a solution unless it is known or not steady; only one of those in families of the same dimension and stability.
+ * Its advice: the options --hold which, besides those given, select it within its family. */
 static int steady_found (pw_steady_command *cmd, const pw_steady_motion *m, int attempt, pw_error *error) {
   if (m->linear->steady == PW_CHANGING) return cmd->changing++, PW_OK;
   for (int i = 0; i < cmd->points; i++) {
@@ -151,7 +139,15 @@ static int steady_found (pw_steady_command *cmd, const pw_steady_motion *m, int 
   }
   if (!cmd->vary_text) cmd->branches++;
   pw_steady_point *p = steady_add (cmd, m, attempt, error);
-  return p ? steady_advise (cmd, p, error) : PW_RESOURCE;
+  if (p == NULL) return PW_RESOURCE;
+  pw_initial_value hold[PW_HOLDS];
+  size_t used = 0;
+  int count = p->motion.family > 0 ? pw_steady_suggest (cmd->search, hold, PW_HOLDS) : 0;
+  for (int i = 0; i < count && used < sizeof p->advice; i++)
+    used += (size_t)snprintf (p->advice + used, sizeof p->advice - used, " --hold %s=%.9g",
+                              PW_NAME (pw_system_held_name, cmd->line.m.system, hold[i].state), hold[i].value);
+  if (used >= sizeof p->advice) *p->advice = 0;
+  return count < 0 ? steady_unadvised (cmd, count, error) : PW_OK;
 }
 
 /* Adds the solutions at a value of the parameter, first the one found from the initial state; later attempts may fail
@@ -496,12 +492,6 @@ static int steady_csv (const void *context, FILE *f, pw_error *error) {
 
 /* ---- The figure ---- */
 
-/* Whether the branch is stable from p to the next point.  At an event, where `unstable` does not count the modes that
- * change, the next point decides. */
-static int steady_is_stable (const pw_steady_point *p) {
-  return (p->motion.event == PW_STEADY_POINT ? p : p + 1)->motion.unstable == 0;
-}
-
 enum { REAL, IMAGINARY }; /* parts of an eigenvalue */
 
 /* Number k, from 0, of the real parts, or the absolute values of the imaginary parts, in descending order, of
@@ -559,7 +549,9 @@ static int steady_draw (const pw_steady_command *cmd, pw_error *error) {
       for (int k = 0; k < steady_most_eigenvalues (cmd); k++)
         for (int i = 0, inside = 0; i < cmd->points; i++) { /* inside: 1: the last point began or continued a part */
           const pw_steady_point *p = cmd->point + i;
-          const int here = i + 1 < cmd->points && p[1].branch == p->branch && steady_is_stable (p) == stable;
+          /* at an event, where `unstable` does not count the modes that change, the next point decides */
+          const pw_steady_point *decides = p->motion.event == PW_STEADY_POINT ? p : p + 1;
+          const int here = i + 1 < cmd->points && p[1].branch == p->branch && (decides->motion.unstable == 0) == stable;
           const double value = steady_ranked (&p->linear, part, k) / (part == IMAGINARY ? 2 * PW_PI : 1);
           const int shown = (here || inside) && !(part == IMAGINARY && value <= 1e-12);
           pw_curves_point (&c, p->motion.parameter, shown ? value : NAN, 0);

@@ -233,12 +233,6 @@ double pw_unknowns_noise (const pw_unknowns *u) {
 
 /* ---- Starts and results of searches ---- */
 
-/* The value at a fraction, from 0 to 1, of the range in which searches begin. */
-static double unknowns_between (const pw_unknown *u, double fraction) {
-  double value = u->has_bounds ? u->low + fraction * u->scale : u->value + (2 * fraction - 1) * u->scale;
-  return fmin (fmax (value, u->low), u->high);
-}
-
 /* Stores the points after the first one; a status. */
 static int unknowns_sobol (const pw_unknowns *u, int count, double seed, double *out) {
   double point[PW_UNKNOWNS_SOBOL_MOST], shift[PW_UNKNOWNS_SOBOL_MOST];
@@ -248,7 +242,12 @@ static int unknowns_sobol (const pw_unknowns *u, int count, double seed, double 
   for (int j = 0; random && j < u->count; j++) shift[j] = gsl_rng_uniform (random);
   for (int i = 1; random && sobol && i < count; i++) {
     gsl_qrng_get (sobol, point);
-    for (int j = 0; j < u->count; j++) *out++ = unknowns_between (u->list + j, fmod (point[j] + shift[j], 1));
+    for (int j = 0; j < u->count; j++) { /* a fraction, from 0 to 1, of the range in which searches begin */
+      const pw_unknown *x = u->list + j;
+      double part = fmod (point[j] + shift[j], 1),
+             value = x->has_bounds ? x->low + part * x->scale : x->value + (2 * part - 1) * x->scale;
+      *out++ = fmin (fmax (value, x->low), x->high);
+    }
   }
   int status = random && sobol ? PW_OK : PW_RESOURCE;
   if (random) gsl_rng_free (random);

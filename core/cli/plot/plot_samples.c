@@ -285,19 +285,6 @@ static void data_rods (FILE *f, const pw_plots *plots, int i) {
   }
 }
 
-/* The open or the closed strokes of a symbol at the last of n samples. */
-static void data_symbol (FILE *f, const pw_plots *plots, const pw_plot_link *link, int n, int closed) {
-  pw_plot_stroke stroke[PLOT_STROKES];
-  double point[PLOT_VERTICES][2];
-  int strokes = pw_plot_strokes (plots, link, n, stroke);
-  for (const pw_plot_stroke *s = stroke; s < stroke + strokes; s++) {
-    if (s->closed != closed) continue;
-    pw_plot_place (plots, n - 1, link, s, point);
-    for (int k = 0; k < s->vertices; k++)
-      data_vertex (f, point[k], pw_plot_sample (plots, n - 1)[PLOT_T], -1, k < s->vertices - 1 ? "\n" : "\n\n");
-  }
-}
-
 /* The number of samples from one snapshot to the next, of the first n: the body with the longest path moves by about a
  * third of the size of the mechanism. */
 static int data_stride (const pw_plots *plots, int n) {
@@ -337,7 +324,17 @@ static int data_mechanism (const pw_plots *plots, const char *name, int n, pw_er
     }
   for (int closed = 0; closed < 2; closed++) {
     fprintf (f, "\n\n# symbols, %s\n%s", closed ? "closed" : "open", first);
-    for (int i = 0; i < plots->links; i++) data_symbol (f, plots, &plots->link[i], n, closed);
+    for (const pw_plot_link *link = plots->link; link < plots->link + plots->links; link++) {
+      pw_plot_stroke stroke[PLOT_STROKES];
+      double point[PLOT_VERTICES][2];
+      int strokes = pw_plot_strokes (plots, link, n, stroke);
+      for (const pw_plot_stroke *s = stroke; s < stroke + strokes; s++) {
+        if (s->closed != closed) continue;
+        pw_plot_place (plots, n - 1, link, s, point);
+        for (int k = 0; k < s->vertices; k++)
+          data_vertex (f, point[k], pw_plot_sample (plots, n - 1)[PLOT_T], -1, k < s->vertices - 1 ? "\n" : "\n\n");
+      }
+    }
   }
   return pw_output_finish (o, error);
 }

@@ -175,20 +175,15 @@ static void drift_raise_largest (double *largest, double value) {
   if (!isnan (*largest) && !(value <= *largest)) *largest = value;
 }
 
-/* The part of the run that contains a time; a time on the border of two parts, up to round-off, belongs to the earlier
- * one. */
-static int drift_part (const pw_study *study, double t) {
-  int k = (int)ceil (t / study->settings.span * DRIFT_PARTS - 1e-9) - 1;
-  return k < 0 ? 0 : k < DRIFT_PARTS ? k : DRIFT_PARTS - 1;
-}
-
 /* Called after every accepted step: samples inside a step of a method with projection show no drift.  Last values and
  * points are NaN until a step ends in their part; fmax ignores that NaN. */
 static int drift_visit (pw_visitor *visitor, pw_run *run, pw_error *error) {
   pw_row *row = visitor->row;
   pw_sample sample;
   int status = pw_run_sample (run, pw_run_time (run), &sample, error);
-  int part = drift_part (visitor->study, pw_run_time (run));
+  /* the part of the run; a time on the border of two parts, up to round-off, belongs to the earlier one */
+  int part = (int)ceil (pw_run_time (run) / visitor->study->settings.span * DRIFT_PARTS - 1e-9) - 1;
+  part = part < 0 ? 0 : part < DRIFT_PARTS ? part : DRIFT_PARTS - 1;
   if (status != PW_OK) return status;
   const double now[DRIFT_QUANTITIES] = { sample.position, sample.velocity, fabs (sample.balance) };
   for (int i = 0; i < DRIFT_QUANTITIES; i++) {

@@ -199,36 +199,28 @@ static int plan_match_axis (const pw_plan *plan, pw_axis *axis, pw_model *model,
 
 /* ---- Columns ---- */
 
-/* The index of the i-th state in the order of the table: positions and velocities of each body, then each internal
- * coordinate and its velocity.  In a system all coordinates come before all velocities. */
-static int plan_table_state (const pw_system *system, int i) {
-  int n = pw_system_coordinates (system), bodies = pw_system_bodies (system), internal = i - 6 * bodies;
-  if (internal >= 0) return 3 * bodies + internal / 2 + (internal % 2 ? n : 0);
-  return 3 * (i / 6) + i % 3 + (i % 6 < 3 ? 0 : n);
-}
-
-/* Makes room for a column; a larger hash table of names is filled anew. */
-static int plan_reserve_column (pw_plan *plan) {
-  if ((size_t)plan->columns < plan->column_room) return PW_OK;
-  if (pw_grow (&plan->column, (size_t)plan->columns, &plan->column_room, sizeof *plan->column) != PW_OK)
-    return PW_RESOURCE;
-  pw_names_close (&plan->column_of);
-  if (pw_names_open (&plan->column_of, plan->column_room) != PW_OK) return PW_RESOURCE;
-  for (int i = 0; i < plan->columns; i++) pw_names_add (&plan->column_of, plan->column[i].name, i);
-  return PW_OK;
-}
-
 /* Adds the new states of a system, and the units of varied initial values. */
 static int plan_add_columns (pw_plan *plan, const pw_system *system, pw_error *error) {
-  for (int i = 0; i < 2 * pw_system_coordinates (system); i++) {
-    int state = plan_table_state (system, i);
+  const int n = pw_system_coordinates (system), bodies = pw_system_bodies (system);
+  for (int i = 0; i < 2 * n; i++) {
+    /* the order of the table: positions and velocities of each body, then each internal coordinate and its velocity; in
+     * a system all coordinates come before all velocities */
+    int internal = i - 6 * bodies, state = internal >= 0 ? 3 * bodies + internal / 2 + (internal % 2 ? n : 0)
+                                                         : 3 * (i / 6) + i % 3 + (i % 6 < 3 ? 0 : n);
     const char *name = PW_NAME (pw_system_state_name, system, state);
     if (pw_system_state_hidden (system, state)) continue;
     if (plan->column_room && pw_names_find (&plan->column_of, name) >= 0) continue;
     const char *copy = pw_arena_copy (&plan->arena, name),
                *unit = pw_arena_copy (&plan->arena, pw_system_state_unit (system, state));
-    if (copy == NULL || unit == NULL || plan_reserve_column (plan) != PW_OK)
-      return pw_fail (error, PW_RESOURCE, "out of memory");
+    int status = copy && unit ? PW_OK : PW_RESOURCE;
+    if (status == PW_OK && (size_t)plan->columns == plan->column_room) { /* a larger hash table is filled anew */
+      status = pw_grow (&plan->column, (size_t)plan->columns, &plan->column_room, sizeof *plan->column);
+      pw_names_close (&plan->column_of);
+      if (status == PW_OK) status = pw_names_open (&plan->column_of, plan->column_room);
+      for (int k = 0; status == PW_OK && k < plan->columns; k++)
+        pw_names_add (&plan->column_of, plan->column[k].name, k);
+    }
+    if (status != PW_OK) return pw_fail (error, PW_RESOURCE, "out of memory");
     plan->column[plan->columns] = (struct pw_column){ copy, unit };
     pw_names_add (&plan->column_of, copy, plan->columns++);
   }
