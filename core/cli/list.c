@@ -135,20 +135,6 @@ static int list_methods (const char **name, pw_error *error) {
 
 /* ---- Element types ---- */
 
-/* The shortest element of the type in a text model. */
-static void list_example (const pw_kind *k) {
-  printf ("    - {%s: NAME", k == &pw_kind_state ? "name" /* in the list of states */ : k->name);
-  for (const pw_field *f = k->fields; f->name; f++) {
-    int count = pw_field_count (f);
-    if (!f->required && f->type != PW_BODY) continue;
-    printf (", %s: %s", f->name, count > 1 ? "[" : "");
-    for (int i = 0; i < count; i++)
-      printf ("%s%s", i ? ", " : "", f->type == PW_CHOICE ? f->choices[0] : list_types[f->type].example);
-    if (count > 1) putchar (']');
-  }
-  puts ("}");
-}
-
 static void list_quantities (const char *title, const pw_quantity *q, int count) {
   if (count > 0) printf ("    %s\n", title);
   for (pw_table t = { 0 }; pw_table_pass (&t);)
@@ -161,7 +147,17 @@ static void list_kind (const void *entry) {
   printf ("%s: %s\n    %s", k->name, k->about, pw_kind_acts (k) ? level[k->level] : "without effect");
   if (k->rows) printf (", %s per element", PW_COUNTED (k->rows, "constraint equation"));
   puts (k->each_body ? ", acts on every body that has mass" : "");
-  list_example (k);
+  /* the shortest element of the type in a text model */
+  printf ("    - {%s: NAME", k == &pw_kind_state ? "name" /* in the list of states */ : k->name);
+  for (const pw_field *f = k->fields; f->name; f++) {
+    int count = pw_field_count (f);
+    if (!f->required && f->type != PW_BODY) continue;
+    printf (", %s: %s", f->name, count > 1 ? "[" : "");
+    for (int i = 0; i < count; i++)
+      printf ("%s%s", i ? ", " : "", f->type == PW_CHOICE ? f->choices[0] : list_types[f->type].example);
+    if (count > 1) putchar (']');
+  }
+  puts ("}");
   puts ("    fields");
   for (pw_table t = { 0 }; pw_table_pass (&t);) list_fields (&t, k->fields);
   if (k->signals)

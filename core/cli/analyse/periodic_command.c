@@ -434,22 +434,6 @@ static double periodic_curve (const pw_periodic_orbit *o, int k) {
   return k == 0 ? periodic_round (d.total) : k == 1 ? periodic_largest (o) : o->period;
 }
 
-/* Draws the parts of the branch whose motions have no growing perturbations (`stable`: 1), or have some (0).  A point
- * where one part ends and the next begins belongs to both.  From an event on, the stability is that of the next
- * point. */
-static void periodic_draw_parts (const pw_periodic_command *cmd, pw_curves *c, int k, int stable) {
-  int inside = 0; /* 1: the last point began or continued a part */
-  pw_curves_add (c, stable ? "stable" : "unstable", stable ? "stable" : "unstable");
-  for (const pw_periodic_point *p = cmd->point; p < cmd->point + cmd->points; p++) {
-    int last = p + 1 == cmd->point + cmd->points;
-    const pw_periodic_point *after = p->orbit.event == PW_PERIODIC_POINT ? p : p + 1;
-    int here = !last && (after->orbit.unstable == 0) == stable;
-    if (here || inside) pw_curves_point (c, p->orbit.parameter, periodic_curve (&p->orbit, k), 0);
-    if (!here) pw_curves_point (c, NAN, NAN, 0);
-    inside = here;
-  }
-}
-
 /* Curves over the parameter, of what is not constant. */
 static void periodic_draw_branch (const pw_periodic_command *cmd, pw_curves *c, const double range[2]) {
   static const char *const label[PERIODIC_CURVES] = { "displacement [m]", "largest modulus", "period [s]" };
@@ -464,7 +448,20 @@ static void periodic_draw_branch (const pw_periodic_command *cmd, pw_curves *c, 
                                      .y_label = label[k],
                                      .x = { range[0], range[1] },
                                      .type = PW_PANEL_BELOW });
-    for (int stable = 1; stable >= 0; stable--) periodic_draw_parts (cmd, c, k, stable);
+    /* the parts whose motions have no growing perturbations, then those whose motions have some; a point where one part
+     * ends and the next begins belongs to both; from an event on, the stability is that of the next point */
+    for (int stable = 1; stable >= 0; stable--) {
+      int inside = 0; /* 1: the last point began or continued a part */
+      pw_curves_add (c, stable ? "stable" : "unstable", stable ? "stable" : "unstable");
+      for (const pw_periodic_point *p = cmd->point; p < cmd->point + cmd->points; p++) {
+        int last = p + 1 == cmd->point + cmd->points;
+        const pw_periodic_point *after = p->orbit.event == PW_PERIODIC_POINT ? p : p + 1;
+        int here = !last && (after->orbit.unstable == 0) == stable;
+        if (here || inside) pw_curves_point (c, p->orbit.parameter, periodic_curve (&p->orbit, k), 0);
+        if (!here) pw_curves_point (c, NAN, NAN, 0);
+        inside = here;
+      }
+    }
   }
 }
 

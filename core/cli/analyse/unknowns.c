@@ -112,19 +112,11 @@ int pw_unknowns_read (pw_unknowns *u, const char **list, pw_error *error) {
 
 /* ---- Unknowns of --by ---- */
 
-static int unknown_of_run (pw_unknown *u, const pw_cli_model *m, const pw_run *r, const char *name, pw_error *error) {
-  int n = pw_system_coordinates (m->system), status = unknown_find (u, m, name, error);
-  if (status == PW_OK && u->state >= 0)
-    u->value = u->state < n ? pw_run_initial (r)->q[u->state] : pw_run_initial (r)->v[u->state - n];
-  if (status != PW_OK || u->parameter == NULL || u->parameter->domain != PW_COUNT) return status;
-  return pw_fail (error, PW_INPUT, "%s is a count (%g): derivatives need a number that varies continuously", name,
-                  u->value);
-}
-
 int pw_unknowns_differentiated (pw_unknowns *u, const char **list, pw_error *error) {
   while (list[u->count]) u->count++;
   u->list = calloc ((size_t)u->count, sizeof *u->list);
   if (u->list == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  const int n = pw_system_coordinates (u->line->m.system);
   pw_limit limit = { .seconds = u->limit };
   pw_settings settings = u->settings;
   settings.stop = pw_limit_over, settings.stop_context = &limit;
@@ -132,7 +124,13 @@ int pw_unknowns_differentiated (pw_unknowns *u, const char **list, pw_error *err
   pw_run *r = pw_limit_open (u->line->m.system, u->method, &settings, error);
   int status = r ? PW_OK : error->status;
   for (int i = 0; i < u->count && status == PW_OK; i++) {
-    status = unknown_of_run (&u->list[i], &u->line->m, r, list[i], error);
+    pw_unknown *x = &u->list[i];
+    status = unknown_find (x, &u->line->m, list[i], error);
+    if (status == PW_OK && x->state >= 0)
+      x->value = x->state < n ? pw_run_initial (r)->q[x->state] : pw_run_initial (r)->v[x->state - n];
+    if (status == PW_OK && x->parameter && x->parameter->domain == PW_COUNT)
+      status = pw_fail (error, PW_INPUT, "%s is a count (%g): derivatives need a number that varies continuously",
+                        list[i], x->value);
     for (int k = 0; k < i && status == PW_OK; k++)
       if (strcmp (list[k], list[i]) == 0) status = pw_fail (error, PW_INPUT, "--by %s is given twice", list[i]);
   }

@@ -310,18 +310,6 @@ static int worker_begin (sweep_rows *sweep, sweep_row *row) {
   return 1;
 }
 
-/* Stores a row whose run has ended.  The caller holds the lock, which is released meanwhile. */
-static void worker_end (sweep_worker *worker, sweep_row *row) {
-  sweep_rows *sweep = worker->sweep;
-  pthread_mutex_unlock (&sweep->lock);
-  pw_text_clear (&worker->text);
-  int status = row_close (row, sweep->plan, &worker->text);
-  pthread_mutex_lock (&sweep->lock);
-  rows_store (sweep, row, status, &worker->text);
-  system_release (row->system);
-  row->system = NULL;
-}
-
 /* Advances the runs until one of them ends: in lanes if all use the code of the plan's engine, else one after the
  * other. */
 static void worker_advance (sweep_worker *worker) {
@@ -366,8 +354,16 @@ static int worker_thread (void *context, int i, pw_error *error) {
     pthread_mutex_unlock (&sweep->lock);
     if (rows) worker_advance (&worker);
     pthread_mutex_lock (&sweep->lock);
-    for (int k = 0; k < worker.width; k++)
-      if (worker.row[k].system && row_ended (&worker.row[k], sweep->plan)) worker_end (&worker, &worker.row[k]);
+    for (sweep_row *row = worker.row; row < worker.row + worker.width; row++) { /* stores those that have ended */
+      if (row->system == NULL || !row_ended (row, sweep->plan)) continue;
+      pthread_mutex_unlock (&sweep->lock);
+      pw_text_clear (&worker.text);
+      int status = row_close (row, sweep->plan, &worker.text);
+      pthread_mutex_lock (&sweep->lock);
+      rows_store (sweep, row, status, &worker.text);
+      system_release (row->system);
+      row->system = NULL;
+    }
   } while (rows > 0);
   pthread_mutex_unlock (&sweep->lock);
   pw_text_free (&worker.text);

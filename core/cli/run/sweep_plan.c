@@ -34,44 +34,7 @@ static size_t axis_value_length (const char *list) {
   return n;
 }
 
-/* "V1,V2,..." */
-static int axis_read_list (pw_axis *axis, pw_arena *arena, pw_error *error) {
-  axis->count = 1;
-  for (const char *c = axis->range; *(c += axis_value_length (c)); c++) axis->count++;
-  axis->value = pw_arena_alloc (arena, (size_t)axis->count * sizeof *axis->value);
-  if (axis->value == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  char *c = axis->range;
-  for (long i = 0; i < axis->count; i++) {
-    size_t n = axis_value_length (c);
-    const char *why = PW_PRINTED (140, "\"%.*s\" is not a finite number", n < 100 ? (int)n : 100, c);
-    if (axis_read_number (c, n, axis->value + i) != PW_OK) return axis_fail (axis, why, error);
-    c += n + 1;
-  }
-  return PW_OK;
-}
-
-/* "lin:FIRST:LAST:COUNT" or "log:FIRST:LAST:COUNT" */
-static int axis_read_range (pw_axis *axis, pw_error *error) {
-  double number[3];
-  char *c = strchr (axis->range, ':') + 1;
-  const char *why = PW_PRINTED (80, "expected %.3s:FIRST:LAST:COUNT, three numbers", axis->range);
-  for (int i = 0; i < 3; i++) {
-    size_t n = strcspn (c, ":");
-    if (axis_read_number (c, n, number + i) != PW_OK || (c[n] == ':') != (i < 2)) return axis_fail (axis, why, error);
-    c += n + 1;
-  }
-  axis->first = number[0], axis->last = number[1];
-  if (*pw_domain_check (PW_COUNT, number[2]))
-    return axis_fail (axis, "expected a count that is a whole number >= 1", error);
-  if (number[2] > PW_GRID_MAX_ROWS) return axis_fail (axis, "too many values: at most 1e8 rows", error);
-  axis->count = (long)number[2];
-  if (axis->count == 1 && axis->first != axis->last)
-    return axis_fail (axis, "a range with two different ends needs at least 2 values", error);
-  if (axis->type == PW_AXIS_LOG && !(axis->first > 0 && axis->last > 0))
-    return axis_fail (axis, "the ends of a logarithmic range must be > 0", error);
-  return PW_OK;
-}
-
+/* "NAME=V1,V2,...", "NAME=lin:FIRST:LAST:COUNT" or "NAME=log:FIRST:LAST:COUNT" */
 int pw_axis_read (pw_axis *axis, const char *text, pw_arena *arena, pw_error *error) {
   *axis = (pw_axis){ .name = pw_arena_copy (arena, text) };
   if (axis->name == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
@@ -83,9 +46,33 @@ int pw_axis_read (pw_axis *axis, const char *text, pw_arena *arena, pw_error *er
   axis->type = strncmp (axis->range, "lin:", 4) == 0   ? PW_AXIS_LIN
                : strncmp (axis->range, "log:", 4) == 0 ? PW_AXIS_LOG
                                                        : PW_AXIS_LIST;
-  if (axis->type != PW_AXIS_LIST) return axis_read_range (axis, error);
-  if (strchr (axis->range, ':')) return axis_fail (axis, "a range begins with lin: or log:", error);
-  return axis_read_list (axis, arena, error);
+  const int is_list = axis->type == PW_AXIS_LIST;
+  double number[3], *value = number;
+  char *c = is_list ? axis->range : strchr (axis->range, ':') + 1;
+  axis->count = is_list ? 1 : 3; /* numbers that are read */
+  if (is_list && strchr (c, ':')) return axis_fail (axis, "a range begins with lin: or log:", error);
+  for (const char *d = c; is_list && *(d += axis_value_length (d)); d++) axis->count++;
+  if (is_list) value = axis->value = pw_arena_alloc (arena, (size_t)axis->count * sizeof *axis->value);
+  if (value == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  for (long i = 0; i < axis->count; i++) {
+    size_t n = is_list ? axis_value_length (c) : strcspn (c, ":");
+    const char *why = is_list ? PW_PRINTED (140, "\"%.*s\" is not a finite number", n < 100 ? (int)n : 100, c)
+                              : PW_PRINTED (80, "expected %.3s:FIRST:LAST:COUNT, three numbers", axis->range);
+    if (axis_read_number (c, n, value + i) != PW_OK || (!is_list && (c[n] == ':') != (i < 2)))
+      return axis_fail (axis, why, error);
+    c += n + 1;
+  }
+  if (is_list) return PW_OK;
+  axis->first = number[0], axis->last = number[1];
+  if (*pw_domain_check (PW_COUNT, number[2]))
+    return axis_fail (axis, "expected a count that is a whole number >= 1", error);
+  if (number[2] > PW_GRID_MAX_ROWS) return axis_fail (axis, "too many values: at most 1e8 rows", error);
+  axis->count = (long)number[2];
+  if (axis->count == 1 && axis->first != axis->last)
+    return axis_fail (axis, "a range with two different ends needs at least 2 values", error);
+  if (axis->type == PW_AXIS_LOG && !(axis->first > 0 && axis->last > 0))
+    return axis_fail (axis, "the ends of a logarithmic range must be > 0", error);
+  return PW_OK;
 }
 
 /* The ends are exact.  Values between them are divided only once, so that they are rounded as little as possible: the
