@@ -254,7 +254,7 @@ $(BUILD)/tests/test_alloc: WRAP := $(addprefix -Wl$(comma)--wrap=,$(ALLOC_WRAP))
 $(BUILD)/tests/test_cli_faults: WRAP = -pthread $(addprefix -Wl$(comma)--wrap=,$(ALLOC_WRAP) $(FILES_WRAP))
 $(BUILD)/tests/test_memory $(BUILD)/tests/slow_memory: WRAP = -pthread $(addprefix -Wl$(comma)--wrap=,$(ALLOC_WRAP))
 $(BUILD)/tests/test_cli_faults $(BUILD)/tests/test_memory $(BUILD)/tests/slow_memory: $(filter-out %/main.o,$(CLI_OBJ))
-$(BUILD)/tests/test_cli_limits: $(call obj,$(addprefix core/cli/,terminal.c parallel.c command.c))
+$(BUILD)/tests/test_cli_limits: $(call obj,$(addprefix core/cli/,terminal.c parallel.c command.c cli_files.c))
 $(BUILD)/tests/test_outcome $(BUILD)/tests/test_named_outputs $(BUILD)/tests/slow_derivatives: $(call obj,core/cli/outcome.c core/cli/terminal.c)
 # It wraps every call of other libraries that it lists.
 $(BUILD)/tests/test_faults: WRAP = $(shell sed -n 's/^FAULT_[A-Z]* .[^,]*, \([A-Za-z_]*\),.*/-Wl,--wrap=\1/p' tests/faults/test_faults.c)

@@ -99,14 +99,39 @@ void pw_progress_end (pw_progress *p);
   X (sensitivity)      \
   X (sweep) X (fit) X (optimise) X (compare) X (drift) X (page) X (new)
 
-/* A command line: its arguments and the options shared by several commands, NULL if not given.  The structure of
- * options of every command begins with one. */
+/* A model opened, built and compiled. */
+typedef struct {
+  pw_file *file;
+  pw_run_defaults defaults; /* of runs; where the model has none, 10 s, rk4+projection, 1e-3 s; rtol may be 0 */
+  pw_model *model;
+  pw_system *system;
+} pw_cli_model;
+
+/* A folder that a command writes into; zero-initialised, none. */
+typedef struct {
+  const char *path;
+  size_t made;      /* length of the part of the path that is the outermost folder made; 0: none was */
+  int locked, lock; /* 1: the folder is locked; the descriptor of the lock */
+} pw_folder;
+
+/* The files that a command writes, and the folder that it writes into. */
+enum { PW_FILES = 6 };
+typedef struct {
+  pw_output *output[PW_FILES]; /* NULL: not requested */
+  pw_folder folder;
+} pw_files;
+
+/* A command line: its arguments and the options shared by several commands, NULL if not given; and what most commands
+ * use, released after the command.  The structure of options of every command begins with one. */
 typedef struct {
   const char **argument; /* ended by NULL; NULL if there are none */
   int arguments;
   const char **sets, **starts; /* "NAME=VALUE" of each --set and --start; ended by NULL */
   const char *max_file;
   const char *method, *t_end, *step, *rtol, *atol, *max_steps, *limit, *specialise, *width, *until;
+  pw_cli_model m; /* opened by pw_cli_open */
+  pw_files files; /* opened by pw_files_open */
+  pw_arena arena;
   /* private */
   poptContext popt;
   struct poptOption *table; /* a copy of the command's options, bound to its structure */
@@ -194,10 +219,10 @@ int pw_cli_number (const char *option, const char *text, pw_domain domain, doubl
 /* Reads a range "FIRST:LAST".  PW_INPUT, without an error, if it is not two finite numbers. */
 int pw_cli_range (const char *text, double *first, double *last);
 
-/* Final time, settings except `ledger` and `specialised`, and limit of a run, from options and defaults.  The limit
- * must outlive the run. */
-int pw_cli_settings (const pw_cli_line *line, const pw_run_defaults *defaults, double *t_end, pw_settings *settings,
-                     pw_limit *limit, pw_error *error);
+/* Settings except `ledger` and `specialised`, whose span is the final time, and limit of a run, from options and
+ * defaults.  The limit must outlive the run. */
+int pw_cli_settings (const pw_cli_line *line, const pw_run_defaults *defaults, pw_settings *settings, pw_limit *limit,
+                     pw_error *error);
 
 /* The status of a command that was stopped: PW_INTERRUPTED after a signal, with a message that results are incomplete;
  * else PW_METHOD with an error that names --limit. */
@@ -211,19 +236,11 @@ void pw_cli_report_unused (const char *method, const pw_cli_line *line);
 
 /* ---- Models ---- */
 
-/* A model opened, built and compiled. */
-typedef struct {
-  pw_file *file;
-  pw_model *model;
-  pw_system *system;
-} pw_cli_model;
+/* Opens the model file of a command line, whose first argument is its name or path.  A status. */
+int pw_cli_file (pw_cli_line *line, pw_error *error);
 
-/* Opens the model file of a command line, whose first argument is its name or path.  NULL and the error. */
-pw_file *pw_cli_file (const pw_cli_line *line, pw_error *error);
-
-/* Opens, builds and compiles the model of a command line with its --set and --start.  Returns a status; close the model
- * in every case. */
-int pw_cli_open (pw_cli_model *m, const pw_cli_line *line, pw_error *error);
+/* Opens, builds and compiles the model of a command line with its --set and --start.  A status. */
+int pw_cli_open (pw_cli_line *line, pw_error *error);
 void pw_cli_close_model (pw_cli_model *m);
 
 /* Prints notices of tables that do not cover a run from 0 to t_end, and of rows of their files that are left out. */
@@ -256,9 +273,6 @@ double pw_cli_largest_change (const pw_run *r, const pw_system *s, char text[PW_
 
 /* The part of a path that is relative to the current directory, or all of it if it does not lie there. */
 const char *pw_cli_short_path (const char *path);
-
-/* The default run settings of a model; where it has none, 10 s, rk4+projection and a step of 1e-3 s.  rtol may be 0. */
-pw_run_defaults pw_cli_defaults (const pw_plugin_table *table);
 
 /* ---- The engine of runs (engine.c): what evaluates the equations of motion ---- */
 
@@ -293,35 +307,20 @@ pw_scene_code *pw_cli_engine_lanes (const pw_cli_engine *e, const pw_system *s, 
   { "the model", NULL, PW_READS, NULL }
 
 /* Refuses files that a command would both read and write, or write twice.  The first entry, PW_CLI_MODEL_USE, stands
- * for the model of the command line and, if its file is open (`file` is not NULL), for the tables that it reads. */
-int pw_cli_check_uses (const pw_cli_line *line, const pw_file *file, pw_use *use, int count, pw_error *error);
-
-/* A folder that a command writes into; zero-initialised, none. */
-typedef struct {
-  const char *path;
-  size_t made;      /* length of the part of the path that is the outermost folder made; 0: none was */
-  int locked, lock; /* 1: the folder is locked; the descriptor of the lock */
-} pw_folder;
+ * for the model of the command line and, if its file is open, for the tables that it reads. */
+int pw_cli_check_uses (const pw_cli_line *line, pw_use *use, int count, pw_error *error);
 
 /* Makes a folder and those above it, and locks it.  The path must outlive it; close it in every case. */
 int pw_folder_open (pw_folder *folder, const char *path, pw_error *error);
 /* Unlocks a folder; removes what was made, as far as it is empty. */
 void pw_folder_close (pw_folder *folder);
 
-/* The files that a command writes, and the folder that it writes into; zero-initialised. */
-enum { PW_FILES = 6 };
-typedef struct {
-  pw_output *output[PW_FILES]; /* NULL: not requested */
-  pw_folder folder;
-} pw_files;
-
 /* Checks a list of at most PW_FILES uses (pw_cli_check_uses), then opens each file that is written, use[i] as
- * output[i], and makes and locks the folder that is written into.  Close them in every case. */
-int pw_files_open (pw_files *files, const pw_cli_line *line, const pw_cli_model *m, pw_use *use, int count,
-                   pw_error *error);
-FILE *pw_files_stream (const pw_files *files, int i); /* NULL: not requested */
+ * output[i], and makes and locks the folder that is written into. */
+int pw_files_open (pw_cli_line *line, pw_use *use, int count, pw_error *error);
+FILE *pw_files_stream (const pw_cli_line *line, int i); /* NULL: not requested */
 /* Completes all of them (pw_output_finish_all). */
-int pw_files_finish (pw_files *files, pw_error *error);
+int pw_files_finish (pw_cli_line *line, pw_error *error);
 /* Removes files that have not been completed, and closes the folder. */
 void pw_files_close (pw_files *files);
 
@@ -333,6 +332,12 @@ int pw_cli_names_file (const char *path);
 int pw_cli_check_format (const pw_use *use, pw_error *error);
 /* Endings of formats, for pw_use. */
 extern const char *const pw_cli_csv[], *const pw_cli_json[];
+
+/* ---- JSON ---- */
+
+/* Writes items by a template such as "{name: %s, value: %g, list: [": %s a text or null, %g, %d and %ld a number, %i a
+ * flag; a line end begins a line with the next item.  What is opened may be closed by another call. */
+void pw_json_print (pw_json *j, const char *format, ...) PW_PRINTF (2, 3);
 
 /* ---- Messages ---- */
 
@@ -468,5 +473,10 @@ int pw_cell_unit (pw_table *table, int width, const char *name, const char *unit
 void pw_row_end (pw_table *table);
 /* A row of headings, or the rest of one, ended by NULL: the first in a cell of width `first`, others of `width`. */
 void pw_head (pw_table *table, int first, int width, const char *const *heading);
+
+enum { PW_BODIES_PRINTED = 20 }; /* at most */
+/* Prints x, y, phi and their rates of the bodies, with 0 for numbers below `least`; first, width: of the columns. */
+void pw_print_bodies (const pw_system *s, const double *q, const double *v, const char *heading, int first, int width,
+                      int digits, double least);
 
 #endif

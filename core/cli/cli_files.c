@@ -72,7 +72,8 @@ int pw_cli_check_format (const pw_use *use, pw_error *error) {
                   use->what, use->path, ending, list);
 }
 
-int pw_cli_check_uses (const pw_cli_line *line, const pw_file *file, pw_use *use, int count, pw_error *error) {
+int pw_cli_check_uses (const pw_cli_line *line, pw_use *use, int count, pw_error *error) {
+  const pw_file *file = line->m.file;
   files_check check = { use, count, error };
   pw_error own = { 0 };
   char *path = file ? NULL : pw_file_find (line->argument[0], &own);
@@ -135,26 +136,25 @@ void pw_folder_close (pw_folder *folder) {
 
 /* ---- The files that a command writes ---- */
 
-int pw_files_open (pw_files *files, const pw_cli_line *line, const pw_cli_model *m, pw_use *use, int count,
-                   pw_error *error) {
-  int status = pw_cli_check_uses (line, m->file, use, count, error);
+int pw_files_open (pw_cli_line *line, pw_use *use, int count, pw_error *error) {
+  int status = pw_cli_check_uses (line, use, count, error);
   for (int i = 1; i < count && status == PW_OK; i++) { /* use[0] is the model */
     if (use[i].path == NULL || use[i].how == PW_READS) continue;
     if (use[i].how == PW_WRITES)
-      status = (files->output[i] = pw_output_open (use[i].path, error)) ? PW_OK : error->status;
+      status = (line->files.output[i] = pw_output_open (use[i].path, error)) ? PW_OK : error->status;
     else
-      status = pw_folder_open (&files->folder, use[i].path, error);
+      status = pw_folder_open (&line->files.folder, use[i].path, error);
   }
   return status;
 }
 
-FILE *pw_files_stream (const pw_files *files, int i) {
-  return files->output[i] ? pw_output_stream (files->output[i]) : NULL;
+FILE *pw_files_stream (const pw_cli_line *line, int i) {
+  return line->files.output[i] ? pw_output_stream (line->files.output[i]) : NULL;
 }
 
-int pw_files_finish (pw_files *files, pw_error *error) {
-  int status = pw_output_finish_all (files->output, PW_FILES, error);
-  memset (files->output, 0, sizeof files->output);
+int pw_files_finish (pw_cli_line *line, pw_error *error) {
+  int status = pw_output_finish_all (line->files.output, PW_FILES, error);
+  memset (line->files.output, 0, sizeof line->files.output);
   return status;
 }
 

@@ -82,8 +82,12 @@ static void command_help (const pw_command *command) {
 
 /* ---- Reading ---- */
 
-static int command_unknown (const pw_command *command, const pw_cli_line *line, const char *option, pw_error *error) {
-  const char *name = option + strspn (option, "-");
+/* Reports the option that popt has refused with this error code. */
+static int command_refuse (const pw_command *command, const pw_cli_line *line, int code, pw_error *error) {
+  const char *option = poptBadOption (line->popt, POPT_BADOPTION_NOALIAS), *name = option + strspn (option, "-");
+  if (code == POPT_ERROR_NOARG) return pw_fail (error, PW_INPUT, "%s: option %s needs a value", command->name, option);
+  if (code != POPT_ERROR_BADOPT)
+    return pw_fail (error, PW_INPUT, "%s: option %s: %s", command->name, option, poptStrerror (code));
   pw_nearest near = { .sought = PW_PRINTED (100, "%.*s", (int)strcspn (name, "="), name) };
   for (const struct poptOption *o = line->table; o->longName; o++)
     if (o->descrip) pw_nearest_try (&near, o->longName);
@@ -91,14 +95,6 @@ static int command_unknown (const pw_command *command, const pw_cli_line *line, 
                                : PW_PRINTED (140, "see pinwheel %s --help", command->name);
   return pw_fail (error, PW_INPUT, "%s has no option \"%.*s\"; %s", command->name, (int)strcspn (option, "="), option,
                   hint);
-}
-
-/* Reports the option that popt has refused with this error code. */
-static int command_refuse (const pw_command *command, const pw_cli_line *line, int code, pw_error *error) {
-  const char *option = poptBadOption (line->popt, POPT_BADOPTION_NOALIAS);
-  if (code == POPT_ERROR_BADOPT) return command_unknown (command, line, option, error);
-  if (code == POPT_ERROR_NOARG) return pw_fail (error, PW_INPUT, "%s: option %s needs a value", command->name, option);
-  return pw_fail (error, PW_INPUT, "%s: option %s: %s", command->name, option, poptStrerror (code));
 }
 
 int pw_cli_at_most_one (const pw_command *command, const pw_cli_line *line, pw_error *error) {
@@ -131,6 +127,9 @@ static int command_read (const pw_command *command, pw_cli_line *line, int argc,
 }
 
 static void command_close (pw_cli_line *line) {
+  pw_files_close (&line->files);
+  pw_arena_free (&line->arena);
+  pw_cli_close_model (&line->m);
   for (size_t i = 0; line->table && line->text && line->table[i].longName; i++) {
     char **list = (line->table[i].argInfo & POPT_ARG_MASK) == POPT_ARG_ARGV ? line->text[i] : NULL;
     for (; list && *list; list++) free (*list);
@@ -182,17 +181,19 @@ int pw_cli_range (const char *text, double *first, double *last) {
   return isfinite (*last - *first) ? PW_OK : PW_INPUT;
 }
 
-int pw_cli_settings (const pw_cli_line *line, const pw_run_defaults *defaults, double *t_end, pw_settings *settings,
-                     pw_limit *limit, pw_error *error) {
+int pw_cli_settings (const pw_cli_line *line, const pw_run_defaults *defaults, pw_settings *settings, pw_limit *limit,
+                     pw_error *error) {
   double max_steps = PW_MAX_STEPS;
-  *t_end = defaults->t_end;
   *limit = (pw_limit){ .seconds = INFINITY };
-  *settings =
-      (pw_settings){ .step = defaults->step, .rtol = defaults->rtol, .stop = pw_limit_over, .stop_context = limit };
+  *settings = (pw_settings){ .span = defaults->t_end,
+                             .step = defaults->step,
+                             .rtol = defaults->rtol,
+                             .stop = pw_limit_over,
+                             .stop_context = limit };
   const struct {
     const char *option, *text;
     double *value;
-  } options[] = { { "--t-end", line->t_end, t_end },
+  } options[] = { { "--t-end", line->t_end, &settings->span },
                   { "--step", line->step, &settings->step },
                   { "--rtol", line->rtol, &settings->rtol },
                   { "--atol", line->atol, &settings->atol },
@@ -202,7 +203,6 @@ int pw_cli_settings (const pw_cli_line *line, const pw_run_defaults *defaults, d
       return PW_INPUT;
   int status = pw_cli_number ("--max-steps", line->max_steps, PW_COUNT, &max_steps, error);
   settings->max_steps = (long)max_steps; /* PW_COUNT: at most 1e9 */
-  settings->span = *t_end;
   return status;
 }
 
@@ -231,18 +231,6 @@ void pw_cli_report_unused (const char *method, const pw_cli_line *line) {
 
 /* The model of a command line: opens it with --set and --start; its parameters, changed initial values and defaults. */
 
-/* Refuses a parameter in --start, and a state in --set: names of states have a dot, those of parameters have none. */
-static int model_check_name (const pw_model *m, const char *option, const char *text, const char *name,
-                             pw_error *error) {
-  int is_parameter = pw_cli_parameter (m, name) != NULL;
-  if (is_parameter && strcmp (option, "--start") == 0)
-    return pw_fail (error, PW_INPUT, "--start %s: %s is a parameter, expected a state; use --set", text, name);
-  if (!is_parameter && strcmp (option, "--set") == 0 && strchr (name, '.'))
-    return pw_fail (error, PW_INPUT, "--set %s: expected a parameter; initial values of states are given by --start",
-                    text);
-  return PW_OK;
-}
-
 int pw_cli_assignment (const char *option, const char *text, const char *form, char name[PW_ASSIGNED_NAME],
                        double *value, pw_error *error) {
   const char *equals = strchr (text, '=');
@@ -260,9 +248,15 @@ int pw_cli_apply (pw_model *m, const char *option, const char **list,
     char name[PW_ASSIGNED_NAME];
     double value;
     int status = pw_cli_assignment (option, *list, "NAME=VALUE", name, &value, error);
-    if (status == PW_OK) status = model_check_name (m, option, *list, name, error);
-    if (status == PW_OK) status = set (m, name, value, error);
     if (status != PW_OK) return status;
+    /* names of states have a dot, those of parameters have none */
+    int is_parameter = pw_cli_parameter (m, name) != NULL;
+    if (is_parameter && strcmp (option, "--start") == 0)
+      return pw_fail (error, PW_INPUT, "--start %s: %s is a parameter, expected a state; use --set", *list, name);
+    if (!is_parameter && strcmp (option, "--set") == 0 && strchr (name, '.'))
+      return pw_fail (error, PW_INPUT, "--set %s: expected a parameter; initial values of states are given by --start",
+                      *list);
+    if (set (m, name, value, error) != PW_OK) return error->status;
   }
   return PW_OK;
 }
@@ -273,19 +267,26 @@ const pw_parameter *pw_cli_parameter (const pw_model *m, const char *name) {
   return p && p->name ? p : NULL;
 }
 
-pw_file *pw_cli_file (const pw_cli_line *line, pw_error *error) {
+int pw_cli_file (pw_cli_line *line, pw_error *error) {
   const double largest = PW_FILE_MAX_BYTES >> 20; /* [MB] */
   double size = PW_FILE_DEFAULT_BYTES >> 20;
-  if (pw_cli_number ("--max-file", line->max_file, PW_POSITIVE, &size, error) != PW_OK) return NULL;
-  if (size < 1e-3) return pw_fail (error, PW_INPUT, "--max-file %s: expected at least 0.001 MB", line->max_file), NULL;
-  if (size <= largest) return pw_file_open_limited (line->argument[0], (size_t)(size * (1 << 20)), error);
-  pw_fail (error, PW_INPUT, "--max-file %s: expected at most %g MB", line->max_file, largest);
-  return NULL;
+  if (pw_cli_number ("--max-file", line->max_file, PW_POSITIVE, &size, error) != PW_OK) return error->status;
+  if (size < 1e-3) return pw_fail (error, PW_INPUT, "--max-file %s: expected at least 0.001 MB", line->max_file);
+  if (size > largest)
+    return pw_fail (error, PW_INPUT, "--max-file %s: expected at most %g MB", line->max_file, largest);
+  line->m.file = pw_file_open_limited (line->argument[0], (size_t)(size * (1 << 20)), error);
+  if (line->m.file == NULL) return error->status;
+  pw_run_defaults *d = &line->m.defaults;
+  *d = pw_file_table (line->m.file)->run;
+  if (d->t_end == 0) d->t_end = 10;
+  if (d->step == 0) d->step = 1e-3;
+  if (d->method == NULL) d->method = "rk4+projection";
+  return PW_OK;
 }
 
-int pw_cli_open (pw_cli_model *m, const pw_cli_line *line, pw_error *error) {
-  *m = (pw_cli_model){ .file = pw_cli_file (line, error) };
-  if (m->file) m->model = pw_file_model (m->file, error);
+int pw_cli_open (pw_cli_line *line, pw_error *error) {
+  pw_cli_model *m = &line->m;
+  if (pw_cli_file (line, error) == PW_OK) m->model = pw_file_model (m->file, error);
   if (m->model && pw_cli_apply (m->model, "--set", line->sets, pw_model_set, error) == PW_OK &&
       pw_cli_apply (m->model, "--start", line->starts, pw_model_set_initial, error) == PW_OK &&
       pw_model_build (m->model, error) == PW_OK)
@@ -333,12 +334,4 @@ const char *pw_cli_short_path (const char *path) {
   char folder[4096];
   size_t n = getcwd (folder, sizeof folder) ? strlen (folder) : 0;
   return n > 1 && strncmp (path, folder, n) == 0 && path[n] == '/' ? path + n + 1 : path;
-}
-
-pw_run_defaults pw_cli_defaults (const pw_plugin_table *table) {
-  pw_run_defaults d = table->run;
-  if (d.t_end == 0) d.t_end = 10;
-  if (d.step == 0) d.step = 1e-3;
-  if (d.method == NULL) d.method = "rk4+projection";
-  return d;
 }

@@ -12,19 +12,6 @@ int pw_cli_read_specialise (const char *text, pw_specialise *when, pw_error *err
   return PW_OK;
 }
 
-/* Stores in a few words why the general engine is used: the error without the model's name or, if the C text was
- * generated (`has_text`), the meaning of its status. */
-static void engine_keep_reason (pw_cli_engine *e, const pw_system *s, int has_text, const pw_error *error) {
-  char model[300];
-  size_t n = (size_t)snprintf (model, sizeof model, "model %s: ", pw_system_name (s));
-  const char *reason = error->text + (strncmp (error->text, model, n) == 0 ? n : 0);
-  if (has_text)
-    reason = error->status == PW_INPUT    ? "no C compiler or no pinwheel.h"
-             : error->status == PW_METHOD ? "the generated code does not compile"
-                                          : "the generated code cannot be compiled or loaded";
-  snprintf (e->reason, sizeof e->reason, "%.190s", reason);
-}
-
 char *pw_cli_source (const pw_system *s, pw_error *error) {
   if (pw_system_check_source (s, error) != PW_OK) return NULL;
   pw_run *r = pw_run_open (s, "rk4+none", NULL, NULL); /* makes no step: any method will do */
@@ -33,28 +20,33 @@ char *pw_cli_source (const pw_system *s, pw_error *error) {
   return text;
 }
 
-/* Loads or compiles code for the system.  If there is none, stores the reason; prints the error if it is one of a
- * generated C text, or with PW_SPECIALISE_ALWAYS. */
-static void engine_open_code (pw_cli_engine *e, const pw_system *s, pw_specialise when) {
+void pw_cli_engine_open (pw_cli_engine *e, const pw_system *s, pw_specialise when, double steps) {
   pw_error own = { 0 };
+  *e = (pw_cli_engine){ .code = NULL };
+  /* a short run uses it even if the cache has the code: results of the engines differ by round-off */
+  const char *unwanted = when == PW_SPECIALISE_NEVER                                     ? "--specialise never"
+                         : when == PW_SPECIALISE_AUTO && !(steps >= PW_SPECIALISE_STEPS) ? "short run"
+                                                                                         : NULL;
+  if (unwanted) {
+    strcpy (e->reason, unwanted);
+    return;
+  }
   char *text = pw_cli_source (s, &own);
   int has_text = text != NULL;
   if (text) e->code = pw_scene_code_open (text, s, &own);
   free (text);
   if (e->code && *pw_scene_code_notice (e->code)) pw_cli_say ("pinwheel: %s\n", pw_scene_code_notice (e->code));
   if (e->code) return;
-  engine_keep_reason (e, s, has_text, &own);
+  /* in a few words why: the error without the model's name or, with a C text, the meaning of its status */
+  const char *model = PW_PRINTED (300, "model %s: ", pw_system_name (s)), *reason = own.text;
+  if (strncmp (reason, model, strlen (model)) == 0) reason += strlen (model);
+  if (has_text)
+    reason = own.status == PW_INPUT    ? "no C compiler or no pinwheel.h"
+             : own.status == PW_METHOD ? "the generated code does not compile"
+                                       : "the generated code cannot be compiled or loaded";
+  snprintf (e->reason, sizeof e->reason, "%.190s", reason);
+  /* errors of a generated text, or those of --specialise always */
   if (has_text || when == PW_SPECIALISE_ALWAYS) pw_cli_say ("pinwheel: general engine: %s\n", own.text);
-}
-
-void pw_cli_engine_open (pw_cli_engine *e, const pw_system *s, pw_specialise when, double steps) {
-  *e = (pw_cli_engine){ .code = NULL };
-  if (when == PW_SPECIALISE_NEVER)
-    strcpy (e->reason, "--specialise never");
-  else if (when == PW_SPECIALISE_AUTO && !(steps >= PW_SPECIALISE_STEPS))
-    strcpy (e->reason, "short run"); /* even if the cache has the code: results of the engines differ by round-off */
-  else
-    engine_open_code (e, s, when);
 }
 
 /* Why runs cannot be in lanes; NULL if they can.  r: a run at the initial state; NULL if that was refused. */

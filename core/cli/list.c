@@ -28,25 +28,20 @@ static void list_row (pw_table *t, const char *name, const char *type, const cha
   t->column = t->pad = 0; /* in place of pw_row_end: the wrapped text ends with a newline */
 }
 
-/* "required" or the default; the domain of a number; the alternatives of a choice. */
-static void list_default (const pw_field *f, char *text, size_t size) {
-  const char *domain = f->type == PW_NUMBER ? pw_domain_text (f->domain) : "";
-  snprintf (text, size, *domain ? "%s (%s)" : "%s",
-            f->required || f->type == PW_BODY ? "required" : list_types[f->type].zero, domain);
-  for (int i = 0; f->type == PW_CHOICE && f->choices[i]; i++) {
-    size_t used = strlen (text);
-    const char *mark = i || f->required ? "" : " (default)";
-    snprintf (text + used, size - used, "%s%s%s", i ? " | " : f->required ? ": " : "", f->choices[i], mark);
-  }
-}
-
 static void list_fields (pw_table *t, const pw_field *fields) {
   for (const pw_field *f = fields; f->name; f++) {
     char value[80];
     const char *times = pw_field_count (f) > 1 ? PW_PRINTED (16, "%d x ", f->count) : "",
                *unit = f->unit ? PW_PRINTED (40, " [%s]", f->unit) : "",
                *type = PW_PRINTED (60, "%s%s%s", times, list_types[f->type].name, unit);
-    list_default (f, value, sizeof value);
+    const char *domain = f->type == PW_NUMBER ? pw_domain_text (f->domain) : "";
+    snprintf (value, sizeof value, *domain ? "%s (%s)" : "%s",
+              f->required || f->type == PW_BODY ? "required" : list_types[f->type].zero, domain);
+    for (int i = 0; f->type == PW_CHOICE && f->choices[i]; i++) { /* the alternatives */
+      size_t used = strlen (value);
+      const char *mark = i || f->required ? "" : " (default)";
+      snprintf (value + used, sizeof value - used, "%s%s%s", i ? " | " : f->required ? ": " : "", f->choices[i], mark);
+    }
     list_row (t, f->name, type, value, f->about ? f->about : "");
   }
 }
@@ -109,15 +104,6 @@ static int list_models (const char **name, pw_error *error) {
 
 /* ---- Methods ---- */
 
-static void list_option (const pw_option *o) {
-  printf ("    :%s=", o->name);
-  for (int i = 0; o->choices && o->choices[i]; i++) printf ("%s%s", i ? "|" : "", o->choices[i]);
-  if (o->choices == NULL) printf ("NUMBER%s%s", o->unit && *o->unit ? " " : "", o->unit ? o->unit : "");
-  printf ("  (default %s", o->choices ? o->choices[(int)o->value] : PW_DIGITS (o->value, 6));
-  if (o->with) printf ("; with %s", o->with);
-  printf (")\n        %s\n", o->about);
-}
-
 static void list_method (const pw_method *m) {
   printf ("  %s  (%s)\n      %s\n", m->name, m->adaptive ? "adaptive steps; --rtol, --atol" : "fixed steps; --step",
           m->about);
@@ -129,7 +115,14 @@ static void list_method (const pw_method *m) {
 static void list_method_options (const void *entry) {
   const pw_method *m = entry;
   list_method (m);
-  for (const pw_option *o = m->options; o && o->name; o++) list_option (o);
+  for (const pw_option *o = m->options; o && o->name; o++) {
+    printf ("    :%s=", o->name);
+    for (int i = 0; o->choices && o->choices[i]; i++) printf ("%s%s", i ? "|" : "", o->choices[i]);
+    if (o->choices == NULL) printf ("NUMBER%s%s", o->unit && *o->unit ? " " : "", o->unit ? o->unit : "");
+    printf ("  (default %s", o->choices ? o->choices[(int)o->value] : PW_DIGITS (o->value, 6));
+    if (o->with) printf ("; with %s", o->with);
+    printf (")\n        %s\n", o->about);
+  }
 }
 
 static int list_methods (const char **name, pw_error *error) {
@@ -141,20 +134,6 @@ static int list_methods (const char **name, pw_error *error) {
 }
 
 /* ---- Element types ---- */
-
-/* The shortest element of the type in a text model. */
-static void list_example (const pw_kind *k) {
-  printf ("    - {%s: NAME", k == &pw_kind_state ? "name" /* in the list of states */ : k->name);
-  for (const pw_field *f = k->fields; f->name; f++) {
-    int count = pw_field_count (f);
-    if (!f->required && f->type != PW_BODY) continue;
-    printf (", %s: %s", f->name, count > 1 ? "[" : "");
-    for (int i = 0; i < count; i++)
-      printf ("%s%s", i ? ", " : "", f->type == PW_CHOICE ? f->choices[0] : list_types[f->type].example);
-    if (count > 1) putchar (']');
-  }
-  puts ("}");
-}
 
 static void list_quantities (const char *title, const pw_quantity *q, int count) {
   if (count > 0) printf ("    %s\n", title);
@@ -168,7 +147,17 @@ static void list_kind (const void *entry) {
   printf ("%s: %s\n    %s", k->name, k->about, pw_kind_acts (k) ? level[k->level] : "without effect");
   if (k->rows) printf (", %s per element", PW_COUNTED (k->rows, "constraint equation"));
   puts (k->each_body ? ", acts on every body that has mass" : "");
-  list_example (k);
+  /* the shortest element of the type in a text model */
+  printf ("    - {%s: NAME", k == &pw_kind_state ? "name" /* in the list of states */ : k->name);
+  for (const pw_field *f = k->fields; f->name; f++) {
+    int count = pw_field_count (f);
+    if (!f->required && f->type != PW_BODY) continue;
+    printf (", %s: %s", f->name, count > 1 ? "[" : "");
+    for (int i = 0; i < count; i++)
+      printf ("%s%s", i ? ", " : "", f->type == PW_CHOICE ? f->choices[0] : list_types[f->type].example);
+    if (count > 1) putchar (']');
+  }
+  puts ("}");
   puts ("    fields");
   for (pw_table t = { 0 }; pw_table_pass (&t);) list_fields (&t, k->fields);
   if (k->signals)
@@ -203,25 +192,23 @@ static int list_kinds (const char **name, pw_error *error) {
 
 /* ---- Signals ---- */
 
-/* The fields of a form of signals, and those that the form `table` has in text models alone. */
-static void list_signal (pw_table *t, const pw_signal_form *s) {
-  list_fields (t, s->fields);
-  if (s->type != PW_TABLE) return;
-  list_row (t, "points", "list", "", "[[TIME, VALUE], ...]; only in a text model");
-  list_row (t, "file", "text", "", "CSV file in the model's folder, in place of `points`; only in a text model");
-  list_row (t, "columns", "2 x text", "[1, 2]",
-            "names or numbers of its columns of times and values; only in a text model");
-  list_row (t, "time", "text", "1", "its column of times; if given, `columns` may have that of values alone");
-  list_row (t, "time_scale", "number", "1 (> 0)", "factor of the times, such as 1e-3 for ms; only in a text model");
-  list_row (t, "time_offset", "number [s]", "0", "added to the scaled times; only in a text model");
-}
-
 static int list_signals (const char **name, pw_error *error) {
   (void)name, (void)error;
   puts ("Signals: a number, an expression of time (in C a function), or one of");
   for (const pw_signal_form *s = pw_signal_forms; s->name; s++) {
     printf ("  %s: %s\n", s->name, s->about);
-    for (pw_table t = { 0 }; pw_table_pass (&t);) list_signal (&t, s);
+    for (pw_table t = { 0 }; pw_table_pass (&t);) {
+      list_fields (&t, s->fields);
+      if (s->type != PW_TABLE) continue; /* the rest is in text models alone */
+      list_row (&t, "points", "list", "", "[[TIME, VALUE], ...]; only in a text model");
+      list_row (&t, "file", "text", "", "CSV file in the model's folder, in place of `points`; only in a text model");
+      list_row (&t, "columns", "2 x text", "[1, 2]",
+                "names or numbers of its columns of times and values; only in a text model");
+      list_row (&t, "time", "text", "1", "its column of times; if given, `columns` may have that of values alone");
+      list_row (&t, "time_scale", "number", "1 (> 0)",
+                "factor of the times, such as 1e-3 for ms; only in a text model");
+      list_row (&t, "time_offset", "number [s]", "0", "added to the scaled times; only in a text model");
+    }
   }
   return PW_OK;
 }
@@ -301,26 +288,19 @@ const pw_command pw_cli_list = {
 
 #define NEW_LETTERS "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-"
 
-/* "folder/my_car.c" gives "my_car" and ".c".  PW_INPUT for a name that is too long, that a shell would split or change,
- * that a program would take for an option, or that ends in neither .c nor .yaml. */
-static int new_name (const char *path, char *name, size_t size, const char **ending, pw_error *error) {
-  const char *slash = strrchr (path, '/'), *base = slash ? slash + 1 : path;
-  size_t length = strspn (base, NEW_LETTERS);
-  *ending = base + length;
-  if (length == 0 || length >= size || base[0] == '-' ||
-      (strcmp (*ending, ".c") != 0 && strcmp (*ending, ".yaml") != 0))
-    return pw_fail (error, PW_INPUT,
-                    "\"%s\": a model file's name has at most %zu letters, digits, _ and -, does not begin with -, and "
-                    "ends in .c or .yaml",
-                    path, size - 1);
-  snprintf (name, size, "%.*s", (int)length, base);
-  return PW_OK;
-}
-
+/* The model "my_car" for "folder/my_car.c".  Refuses a name that is too long, that a shell would split or change, that
+ * a program would take for an option, or that ends in neither .c nor .yaml. */
 static int new_command (void *options, pw_error *error) {
-  const char *ending, *path = ((const pw_cli_line *)options)->argument[0];
-  char name[100];
-  if (new_name (path, name, sizeof name, &ending, error) != PW_OK) return PW_INPUT;
+  const char *path = ((const pw_cli_line *)options)->argument[0], *slash = strrchr (path, '/'),
+             *base = slash ? slash + 1 : path, *ending = base + strspn (base, NEW_LETTERS);
+  enum { LONGEST = 99 };
+  if (ending == base || ending - base > LONGEST || base[0] == '-' ||
+      (strcmp (ending, ".c") != 0 && strcmp (ending, ".yaml") != 0))
+    return pw_fail (error, PW_INPUT,
+                    "\"%s\": a model file's name has at most %d letters, digits, _ and -, does not begin with -, and "
+                    "ends in .c or .yaml",
+                    path, LONGEST);
+  const char *name = PW_PRINTED (LONGEST + 1, "%.*s", (int)(ending - base), base);
   FILE *f = fopen (path, "wx"); /* never overwrites a file */
   if (f == NULL && errno == EEXIST) return pw_fail (error, PW_INPUT, "%s exists already and was not changed", path);
   if (f == NULL) return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", path, strerror (errno));

@@ -25,10 +25,15 @@ static int main_usage (void) {
   return 0;
 }
 
-static int main_unknown (const char *word) {
+/* Runs a command; argv begins with its name. */
+static int main_command (int argc, const char **argv) {
+  const char *word = argv[0];
   pw_error error = { 0 };
   pw_nearest near = { .sought = word };
-  for (const pw_command *const *c = main_commands; *c; c++) pw_nearest_try (&near, (*c)->name);
+  for (const pw_command *const *c = main_commands; *c; c++) {
+    if (strcmp ((*c)->name, word) == 0) return pw_cli_main (*c, argc, argv);
+    pw_nearest_try (&near, (*c)->name);
+  }
   for (const char *const *o = (const char *const[]){ "help", "--help", "--version", NULL }; *o; o++)
     pw_nearest_try (&near, *o);
   size_t n = strlen (word);
@@ -40,20 +45,7 @@ static int main_unknown (const char *word) {
   return pw_cli_report_error (&error);
 }
 
-/* Runs a command; argv begins with its name. */
-static int main_command (int argc, const char **argv) {
-  for (const pw_command *const *c = main_commands; *c; c++)
-    if (strcmp ((*c)->name, argv[0]) == 0) return pw_cli_main (*c, argc, argv);
-  return main_unknown (argv[0]);
-}
-
-static int main_dispatch (int argc, const char **argv) {
-  const char *word = argc > 1 ? argv[1] : "help";
-  int is_help = strcmp (word, "help") == 0 || strcmp (word, "--help") == 0 || strcmp (word, "-?") == 0 ||
-                strcmp (word, "-h") == 0;
-  if (is_help && argc > 2) return main_command (2, (const char *[]){ argv[2], "--help", NULL });
-  if (is_help) return main_usage ();
-  if (strcmp (word, "--version") != 0) return main_command (argc - 1, argv + 1);
+static int main_version (void) {
   char libraries[200];
   int v[3];
   nlopt_version (v, v + 1, v + 2);
@@ -68,7 +60,13 @@ int main (int argc, char **argv) {
   signal (SIGXFSZ, SIG_IGN);
   signal (SIGCHLD, SIG_DFL);    /* if it is ignored, the exit status of gnuplot is not known */
   unsetenv ("POSIXLY_CORRECT"); /* with this variable popt does not accept options after the model */
-  int status = main_dispatch (argc, (const char **)(void *)argv);
+  const char **words = (const char **)(void *)argv, *word = argc > 1 ? words[1] : "help";
+  int is_help = strcmp (word, "help") == 0 || strcmp (word, "--help") == 0 || strcmp (word, "-?") == 0 ||
+                strcmp (word, "-h") == 0;
+  int status = is_help && argc > 2               ? main_command (2, (const char *[]){ words[2], "--help", NULL })
+               : is_help                         ? main_usage ()
+               : strcmp (word, "--version") == 0 ? main_version ()
+                                                 : main_command (argc - 1, words + 1);
   pw_error error = { 0 };
   if ((fflush (stdout) != 0 || ferror (stdout)) && status == 0)
     pw_fail (&error, PW_RESOURCE, "cannot write to standard output: %s", strerror (errno));

@@ -165,17 +165,6 @@ static int outcome_read_formula (pw_outcomes *set, pw_outcome *o, const char *or
   return o->formula ? PW_OK : pw_fail (error, own.status, "%s: %s", origin, own.text);
 }
 
-/* Reads an output.  A single column, which may have any name, is no formula. */
-static int outcome_read (pw_outcomes *set, pw_outcome *o, const char *option, pw_error *error) {
-  char variable[OUTCOME_VARIABLE];
-  const char *origin = PW_PRINTED (300, "%s %.200s", option, o->text);
-  if (*o->text == 0) return pw_fail (error, PW_INPUT, "%s is empty: expected a column, such as frame.x", option);
-  pw_error own = { 0 };
-  int status = outcome_add_term (set, o, origin, o->text, 0, variable, &own);
-  if (status == PW_RESOURCE) return pw_fail (error, status, "%s", own.text);
-  return status == PW_OK ? PW_OK : outcome_read_formula (set, o, origin, error);
-}
-
 int pw_outcomes_open (pw_outcomes *set, const pw_system *s, const char *option, const char *const *text, int count,
                       const char *until, pw_error *error) {
   pw_error own = { 0 };
@@ -186,8 +175,16 @@ int pw_outcomes_open (pw_outcomes *set, const pw_system *s, const char *option, 
     return pw_fail (error, own.status, "--until %.200s: %s", until, own.text);
   set->ledger = until && pw_condition_needs_ledger (set->condition);
   for (; set->outcomes < count; set->outcomes++) {
-    set->outcome[set->outcomes].text = text[set->outcomes];
-    int status = outcome_read (set, set->outcome + set->outcomes, option, error);
+    pw_outcome *o = set->outcome + set->outcomes;
+    char variable[OUTCOME_VARIABLE];
+    pw_error single = { 0 };
+    o->text = text[set->outcomes];
+    if (*o->text == 0) return pw_fail (error, PW_INPUT, "%s is empty: expected a column, such as frame.x", option);
+    const char *origin = PW_PRINTED (300, "%s %.200s", option, o->text);
+    /* a single column, which may have any name, is no formula */
+    int status = outcome_add_term (set, o, origin, o->text, 0, variable, &single);
+    if (status == PW_RESOURCE) return pw_fail (error, status, "%s", single.text);
+    if (status != PW_OK) status = outcome_read_formula (set, o, origin, error);
     if (status != PW_OK) return status;
   }
   return PW_OK;
@@ -425,27 +422,10 @@ static void functional_extrema (functional_step *step, int halvings) {
 
 /* ---- Along the run ---- */
 
-/* Fills a row of the table, at a time in the last step. */
-static void functional_row (functional_step *step, const pw_outcome_table *table, int row) {
-  pw_outcomes *set = step->set;
-  functional_sample (step, table->t[row], FUNCTIONAL_OTHER);
-  for (pw_functional *f = set->functional; f < set->functional + set->functionals; f++)
-    if (f->type == PW_FINAL) f->value = f->values[FUNCTIONAL_OTHER];
-  for (int o = 0; o < set->outcomes; o++)
-    table->value[o * table->rows + row] = pw_outcome_is_final (set, o) ? pw_outcome_value (set, o) : NAN;
-}
-
 void pw_outcomes_settings (pw_outcomes *set, pw_settings *settings) {
   settings->ledger |= set->ledger;
   settings->integrals = set->integrals, settings->integrand = functional_integrands;
   settings->integrand_context = set;
-}
-
-/* The first time after t, up to `most`, at which a value is to be sampled. */
-static double functional_next (const pw_outcomes *set, double t, double most) {
-  for (const pw_functional *f = set->functional; f < set->functional + set->functionals; f++)
-    if (f->type == PW_AT_TIME && f->t > t && f->t < most) most = f->t;
-  return most;
 }
 
 /* Samples values at given times up to the end of the step that are not known yet. */
@@ -481,8 +461,10 @@ int pw_outcomes_begin (pw_outcomes *set, pw_run *r, double t_end, pw_error *erro
 
 int pw_outcomes_advance (pw_outcomes *set, pw_run *r, double t, double t_end, pw_error *error) {
   functional_step step = { set, r, set->t, set->t, PW_OK, error };
-  step.status = set->extrema || set->condition ? pw_run_advance (r, t_end, error)
-                                               : pw_run_advance_to (r, functional_next (set, set->t, t), t_end, error);
+  for (const pw_functional *f = set->functional; f < set->functional + set->functionals; f++)
+    if (f->type == PW_AT_TIME && f->t > set->t && f->t < t) t = f->t; /* the first time at which a value is sampled */
+  step.status =
+      set->extrema || set->condition ? pw_run_advance (r, t_end, error) : pw_run_advance_to (r, t, t_end, error);
   step.t1 = pw_run_time (r);
   functional_check_condition (&step);
   if (step.status == PW_OK && set->extrema) functional_extrema (&step, FUNCTIONAL_HALVINGS);
@@ -511,7 +493,13 @@ int pw_outcomes_run (pw_outcomes *set, const char *method, const pw_settings *se
   if (r == NULL) return error->status;
   functional_step step = { set, r, own.t, own.t, pw_outcomes_begin (set, r, t_end, error), error };
   for (int row = 0, rows = table ? table->rows : 0; step.status == PW_OK;) {
-    for (; row < rows && table->t[row] <= set->t && step.status == PW_OK; row++) functional_row (&step, table, row);
+    for (; row < rows && table->t[row] <= set->t && step.status == PW_OK; row++) { /* at a time in the last step */
+      functional_sample (&step, table->t[row], FUNCTIONAL_OTHER);
+      for (pw_functional *f = set->functional; f < set->functional + set->functionals; f++)
+        if (f->type == PW_FINAL) f->value = f->values[FUNCTIONAL_OTHER];
+      for (int o = 0; o < set->outcomes; o++)
+        table->value[o * rows + row] = pw_outcome_is_final (set, o) ? pw_outcome_value (set, o) : NAN;
+    }
     if (step.status != PW_OK || set->ended || !(set->t < t_end)) break;
     step.status = pw_outcomes_advance (set, r, row < rows ? table->t[row] : t_end, t_end, error);
   }

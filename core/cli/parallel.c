@@ -12,19 +12,13 @@
 
 enum { PARALLEL_JOBS = 10000 }; /* at most; more threads than any machine runs at once */
 
-/* OMP_NUM_THREADS, or the number of processors that this process may use. */
-static long parallel_processors (void) {
-  const char *text = getenv ("OMP_NUM_THREADS");
-  long wanted = text ? strtol (text, NULL, 10) : 0;
-  if (wanted > 0) return wanted;
-  cpu_set_t set;
-  if (sched_getaffinity (0, sizeof set, &set) == 0) return CPU_COUNT (&set);
-  long n = sysconf (_SC_NPROCESSORS_ONLN);
-  return n > 0 ? n : 1;
-}
-
 int pw_parallel_jobs (const char *text, int *jobs, pw_error *error) {
-  double count = (double)parallel_processors ();
+  const char *threads = getenv ("OMP_NUM_THREADS");
+  long wanted = threads ? strtol (threads, NULL, 10) : 0;
+  cpu_set_t set; /* the processors that this process may use */
+  if (wanted <= 0 && sched_getaffinity (0, sizeof set, &set) == 0) wanted = CPU_COUNT (&set);
+  if (wanted <= 0) wanted = sysconf (_SC_NPROCESSORS_ONLN);
+  double count = wanted > 0 ? (double)wanted : 1;
   int status = pw_cli_number ("--jobs", text, PW_COUNT, &count, error);
   *jobs = (int)fmin (count, PARALLEL_JOBS);
   return status;
@@ -116,18 +110,12 @@ static int parallel_first_sibling (int processor) {
   return first;
 }
 
-/* Finds the cores; none if the processors are unknown. */
-static void parallel_find_cores (parallel_cores *c) {
-  unsigned char found[CPU_SETSIZE] = { 0 };
-  c->count = 0;
-  if (sched_getaffinity (0, sizeof c->all, &c->all) != 0) return;
-  for (int i = 0; i < CPU_SETSIZE; i++)
-    if (CPU_ISSET ((size_t)i, &c->all) && !found[parallel_first_sibling (i)]++) c->core[c->count++] = i;
-}
-
 int pw_parallel_timed (int jobs, int count, pw_task *task, void *context, pw_error *error) {
-  parallel_cores cores;
-  parallel_find_cores (&cores);
+  parallel_cores cores = { .count = 0 }; /* none if the processors are unknown */
+  unsigned char found[CPU_SETSIZE] = { 0 };
+  int known = sched_getaffinity (0, sizeof cores.all, &cores.all) == 0;
+  for (int i = 0; known && i < CPU_SETSIZE; i++)
+    if (CPU_ISSET ((size_t)i, &cores.all) && !found[parallel_first_sibling (i)]++) cores.core[cores.count++] = i;
   parallel p = { .count = count, .task = task, .context = context, .error = error, .threads = jobs, .cores = &cores };
   if (jobs > cores.count) p.threads = cores.count;
   if (p.threads < 2 || count < 2) return pw_parallel (1, count, task, context, error);

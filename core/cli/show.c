@@ -34,31 +34,9 @@ static void yaml_text (const char *text) {
   putchar ('"');
 }
 
-/* {expression: "t^2", rate: "2*t"}, or f (t, a.phi) for a function of a C model */
-static void yaml_function (const pw_signal *s) {
-  static const char *const key[] = { "{expression: ", ", rate: ", ", acceleration: " };
-  const pw_signal_text *text = s->function.text;
-  for (int i = 0; text && i < 3; i++)
-    if (text->part[i]) fputs (key[i], stdout), yaml_text (text->part[i]);
-  printf (text ? "}" : "f (t");
-  for (const char *const *state = s->function.reads; text == NULL && state && *state; state++) printf (", %s", *state);
-  if (text == NULL) putchar (')');
-}
-
 static void yaml_pairs (const double *x, const double *y, int count) {
   for (int i = 0; i < count; i++) printf ("%s[%s, %s]", i ? ", " : "[", YAML_NUMBER (x[i]), YAML_NUMBER (y[i]));
   putchar (']');
-}
-
-/* The points of a table; with fewer digits than YAML_DIGITS only their number and their first and last times. */
-static void yaml_points (const pw_signal *s, int digits) {
-  const double *t = s->table.t;
-  int count = s->table.count;
-  if (digits < YAML_DIGITS) {
-    printf ("%d from %s to %s s", count, PW_DIGITS (t[0], digits), PW_DIGITS (t[count - 1], digits));
-    return;
-  }
-  yaml_pairs (t, s->table.value, count);
 }
 
 /* 1 if an optional field has its default, zero in all bytes, and is not specified nevertheless. */
@@ -74,39 +52,51 @@ static int yaml_is_default (const pw_field *f, const void *structure, const void
 /* Writes those fields of a structure that are not the default; returns the separator before what follows. */
 static const char *yaml_fields (const pw_field *f, const void *structure, const char *separator, int digits);
 
-/* {ramp: {to: 1, duration: 2}} */
+/* {ramp: {to: 1, duration: 2}}; {expression: "t^2", rate: "2*t"}, or f (t, a.phi) for a function of a C model.  With
+ * fewer digits than YAML_DIGITS, of the points of a table only their number and their first and last times. */
 static void yaml_signal (const pw_signal *s, int digits) {
+  static const char *const key[] = { "{expression: ", ", rate: ", ", acceleration: " };
   const pw_signal_form *form = pw_signal_form_of (s);
-  if (s->type == PW_FUNCTION)
-    yaml_function (s);
-  else if (form == NULL)
+  const pw_signal_text *text = s->type == PW_FUNCTION ? s->function.text : NULL;
+  if (text) {
+    for (int i = 0; i < 3; i++)
+      if (text->part[i]) fputs (key[i], stdout), yaml_text (text->part[i]);
+    putchar ('}');
+  } else if (s->type == PW_FUNCTION) {
+    printf ("f (t");
+    for (const char *const *state = s->function.reads; state && *state; state++) printf (", %s", *state);
+    putchar (')');
+  } else if (form == NULL)
     fputs (PW_DIGITS (s->constant, digits), stdout);
   else {
     printf ("{%s: {", form->name);
     const char *separator = yaml_fields (form->fields, s, "", digits);
-    if (s->type == PW_TABLE) printf ("%spoints: ", separator), yaml_points (s, digits);
+    const double *t = s->table.t;
+    const int count = s->type == PW_TABLE ? s->table.count : 0;
+    if (count > 0) printf ("%spoints: ", separator);
+    if (count > 0 && digits < YAML_DIGITS)
+      printf ("%d from %s to %s s", count, PW_DIGITS (t[0], digits), PW_DIGITS (t[count - 1], digits));
+    else if (count > 0)
+      yaml_pairs (t, s->table.value, count);
     printf ("}}");
   }
 }
 
-static void yaml_value (const pw_field *f, const void *at, int digits) {
-  const double *number = at;
-  if (f->type == PW_NUMBER) fputs (PW_DIGITS (*number, digits), stdout);
-  if (f->type == PW_POINT || f->type == PW_VECTOR)
-    printf ("[%s, %s]", PW_DIGITS (number[0], digits), PW_DIGITS (number[1], digits));
-  if (f->type == PW_BODY) yaml_name (*(const char *const *)at);
-  if (f->type == PW_SIGNAL) yaml_signal (at, digits);
-  if (f->type == PW_CHOICE) fputs (f->choices[*(const int *)at], stdout);
-  if (f->type == PW_TEXT) yaml_text (*(const char *const *)at);
-}
-
 /* The values of a field as in a text model. */
-static void yaml_field (const pw_field *f, const void *at, int digits) {
+static void yaml_field (const pw_field *f, const void *structure_field, int digits) {
   int count = pw_field_count (f);
   if (count > 1) putchar ('[');
   for (int i = 0; i < count; i++) {
+    const void *at = (const char *)structure_field + (size_t)i * pw_field_bytes (f->type);
+    const double *number = at;
     if (i) printf (", ");
-    yaml_value (f, (const char *)at + (size_t)i * pw_field_bytes (f->type), digits);
+    if (f->type == PW_NUMBER) fputs (PW_DIGITS (*number, digits), stdout);
+    if (f->type == PW_POINT || f->type == PW_VECTOR)
+      printf ("[%s, %s]", PW_DIGITS (number[0], digits), PW_DIGITS (number[1], digits));
+    if (f->type == PW_BODY) yaml_name (*(const char *const *)at);
+    if (f->type == PW_SIGNAL) yaml_signal (at, digits);
+    if (f->type == PW_CHOICE) fputs (f->choices[*(const int *)at], stdout);
+    if (f->type == PW_TEXT) yaml_text (*(const char *const *)at);
   }
   if (count > 1) putchar (']');
 }
@@ -132,17 +122,6 @@ static void yaml_triple (const char *key, const char *const name[3], const doubl
   if (written) putchar ('}');
 }
 
-/* A comment on values that are written although the model does not specify them: reading the text will specify them. */
-static void yaml_unspecified (const pw_body *b, const char *const name[6]) {
-  const char *separator = "  # the model does not specify ";
-  for (int i = 0; i < 6; i++) {
-    double value = i < 3 ? b->start[i] : b->rate[i - 3];
-    unsigned specified = b->specified ? b->specified >> i & 1 : value != 0; /* so -0 is written, but not specified */
-    if (yaml_is_zero (value) || specified) continue;
-    printf ("%s%s", separator, name[i]), separator = ", ";
-  }
-}
-
 static void yaml_body (const pw_body *b) {
   static const char *const state[] = { "x", "y", "phi", "vx", "vy", "omega" };
   printf ("  - {name: "), yaml_name (b->name);
@@ -151,7 +130,14 @@ static void yaml_body (const pw_body *b) {
   yaml_triple ("start", state, b->start, b->specified);
   yaml_triple ("rate", state + 3, b->rate, b->specified >> 3);
   putchar ('}');
-  yaml_unspecified (b, state);
+  /* a comment on values that are written although the model does not specify them, as reading the text will */
+  const char *separator = "  # the model does not specify ";
+  for (int i = 0; i < 6; i++) {
+    double value = i < 3 ? b->start[i] : b->rate[i - 3];
+    unsigned specified = b->specified ? b->specified >> i & 1 : value != 0; /* so -0 is written, but not specified */
+    if (yaml_is_zero (value) || specified) continue;
+    printf ("%s%s", separator, state[i]), separator = ", ";
+  }
   putchar ('\n');
 }
 
@@ -187,23 +173,6 @@ static int yaml_check (const pw_model *m, pw_error *error) {
   return PW_OK;
 }
 
-static void yaml_path (const pw_path_text *p) {
-  printf ("  - {name: %s, %s%spoints: ", p->name, p->interpolation == PW_CUBIC ? "interpolation: cubic, " : "",
-          p->closed ? "closed: true, " : "");
-  yaml_pairs (p->x, p->y, p->count);
-  puts ("}");
-}
-
-static void yaml_run (const pw_run_defaults *run) {
-  const char *const key[] = { "t_end", "step", "rtol" };
-  const double value[] = { run->t_end, run->step, run->rtol };
-  const char *separator = "run: {";
-  for (int i = 0; i < 3; i++)
-    if (value[i] != 0) printf ("%s%s: %s", separator, key[i], YAML_NUMBER (value[i])), separator = ", ";
-  if (run->method) printf ("%smethod: ", separator), yaml_text (run->method), separator = ", ";
-  if (*separator == ',') puts ("}");
-}
-
 static void yaml_outputs (const pw_model *m) {
   int count;
   const pw_named_output *o = pw_model_outputs (m, &count);
@@ -227,11 +196,22 @@ static int yaml_model (const pw_cli_model *opened, pw_error *error) {
   const pw_body *b = pw_model_bodies (m, &bodies);
   const pw_element *e = pw_model_elements (m, &elements);
   if (table->about && *table->about) printf ("about: "), yaml_text (table->about), putchar ('\n');
-  yaml_run (&table->run);
+  const char *const key[] = { "t_end", "step", "rtol" };
+  const double value[] = { table->run.t_end, table->run.step, table->run.rtol };
+  const char *separator = "run: {";
+  for (int i = 0; i < 3; i++)
+    if (value[i] != 0) printf ("%s%s: %s", separator, key[i], YAML_NUMBER (value[i])), separator = ", ";
+  if (table->run.method) printf ("%smethod: ", separator), yaml_text (table->run.method), separator = ", ";
+  if (*separator == ',') puts ("}");
   if (ref->names) puts ("let:"); /* of the names in expressions */
   for (int i = 0; i < ref->names; i++) printf ("  %s: %s\n", ref->name[i], YAML_NUMBER (ref->value[i]));
   if (ref->paths) puts ("paths:");
-  for (int i = 0; i < ref->paths; i++) yaml_path (&ref->path[i]);
+  for (const pw_path_text *p = ref->path; p < ref->path + ref->paths; p++) {
+    printf ("  - {name: %s, %s%spoints: ", p->name, p->interpolation == PW_CUBIC ? "interpolation: cubic, " : "",
+            p->closed ? "closed: true, " : "");
+    yaml_pairs (p->x, p->y, p->count);
+    puts ("}");
+  }
   if (bodies) puts ("bodies:");
   for (int i = 0; i < bodies; i++) yaml_body (&b[i]);
   for (int of_states = 0, written = 0; of_states < 2; of_states++, written = 0)
@@ -271,17 +251,6 @@ static void show_bodies (const pw_system *s) {
   }
 }
 
-static void show_element (const pw_element *e) {
-  printf ("  %s %s: ", e->kind->name, pw_element_name (e));
-  for (const pw_field *f = e->kind->fields; f->name; f++) {
-    if (f->type == PW_TEXT && yaml_is_default (f, e->definition, (const char *)e->definition + f->offset)) continue;
-    printf ("%s%s ", f == e->kind->fields ? "" : "; ", f->name);
-    yaml_field (f, (const char *)e->definition + f->offset, SHOW_DIGITS);
-    if (f->unit) printf (" %s", f->unit);
-  }
-  putchar ('\n');
-}
-
 static void show_outputs (const pw_model *m) {
   int count;
   const pw_named_output *outputs = pw_model_outputs (m, &count);
@@ -313,9 +282,36 @@ static void show_parameters (const pw_model *m) {
     }
 }
 
-/* The states given by the reference solution of the model. */
-static void show_reference (const pw_cli_model *m) {
-  enum { LISTED = 12 }; /* states, at most */
+static void show_model (const pw_cli_model *m) {
+  const pw_system *s = m->system;
+  const pw_plugin_table *table = pw_model_table (m->model);
+  const pw_run_defaults *defaults = &m->defaults;
+  int elements, differences = pw_system_differences (s), bodies = pw_system_bodies (s), rows = pw_system_rows (s),
+                holonomic = pw_system_holonomic (s);
+  const pw_element *e = pw_model_elements (m->model, &elements);
+  pw_cli_print (stdout, "%s: %s\n%s\n", pw_model_name (m->model), table->about ? table->about : "",
+                pw_cli_short_path (pw_file_path (m->file)));
+  show_bodies (s);
+  if (elements) puts ("\nElements");
+  for (const pw_element *end = e + elements; e < end; e++) {
+    printf ("  %s %s: ", e->kind->name, pw_element_name (e));
+    for (const pw_field *f = e->kind->fields; f->name; f++) {
+      if (f->type == PW_TEXT && yaml_is_default (f, e->definition, (const char *)e->definition + f->offset)) continue;
+      printf ("%s%s ", f == e->kind->fields ? "" : "; ", f->name);
+      yaml_field (f, (const char *)e->definition + f->offset, SHOW_DIGITS);
+      if (f->unit) printf (" %s", f->unit);
+    }
+    putchar ('\n');
+  }
+  show_outputs (m->model);
+  if (differences) puts ("\nDerivatives by differences, for implicit methods and linearisation");
+  for (int i = 0; i < differences; i++) printf ("  %s\n", PW_NAME (pw_system_difference_name, s, i));
+  show_parameters (m->model);
+  printf ("\nRuns by default for %s s with %s, --step %s", PW_DIGITS (defaults->t_end, SHOW_DIGITS), defaults->method,
+          PW_DIGITS (defaults->step, SHOW_DIGITS));
+  if (defaults->rtol != 0) printf (", --rtol %s", PW_DIGITS (defaults->rtol, SHOW_DIGITS));
+  putchar ('\n');
+  enum { LISTED = 12 }; /* states of the reference solution, at most */
   int n = pw_system_coordinates (m->system), known = 0;
   double *x = pw_model_has_reference (m->model) ? malloc (2 * (size_t)n * sizeof *x) : NULL;
   if (x && pw_system_reference (m->model, m->system, 0, x, x + n, NULL) == PW_OK)
@@ -325,29 +321,6 @@ static void show_reference (const pw_cli_model *m) {
   if (known > LISTED) printf (", and %d more", known - LISTED);
   if (known) putchar ('\n');
   free (x);
-}
-
-static void show_model (const pw_cli_model *m) {
-  const pw_system *s = m->system;
-  const pw_plugin_table *table = pw_model_table (m->model);
-  pw_run_defaults defaults = pw_cli_defaults (table);
-  int elements, differences = pw_system_differences (s), bodies = pw_system_bodies (s), rows = pw_system_rows (s),
-                holonomic = pw_system_holonomic (s);
-  const pw_element *e = pw_model_elements (m->model, &elements);
-  pw_cli_print (stdout, "%s: %s\n%s\n", pw_model_name (m->model), table->about ? table->about : "",
-                pw_cli_short_path (pw_file_path (m->file)));
-  show_bodies (s);
-  if (elements) puts ("\nElements");
-  for (int i = 0; i < elements; i++) show_element (&e[i]);
-  show_outputs (m->model);
-  if (differences) puts ("\nDerivatives by differences, for implicit methods and linearisation");
-  for (int i = 0; i < differences; i++) printf ("  %s\n", PW_NAME (pw_system_difference_name, s, i));
-  show_parameters (m->model);
-  printf ("\nRuns by default for %s s with %s, --step %s", PW_DIGITS (defaults.t_end, SHOW_DIGITS), defaults.method,
-          PW_DIGITS (defaults.step, SHOW_DIGITS));
-  if (defaults.rtol != 0) printf (", --rtol %s", PW_DIGITS (defaults.rtol, SHOW_DIGITS));
-  putchar ('\n');
-  show_reference (m);
   printf ("\nSizes: %d %s, %d coordinates, %s (%d on positions, %d on velocities)\n", bodies,
           bodies == 1 ? "body" : "bodies", pw_system_coordinates (s), PW_COUNTED (rows, "constraint equation"),
           holonomic, rows - holonomic);
@@ -370,31 +343,6 @@ static void matrices_row (pw_table *t, const char *name, const char *unit, const
 /* The coordinate, or the first-order state of which it is the integral. */
 static int matrices_state (const pw_system *s, int j) {
   return pw_system_state_hidden (s, j) ? j + pw_system_coordinates (s) : j;
-}
-
-static void matrices_coordinates (const pw_system *s, const pw_equations *eq, const pw_sample *sample) {
-  static const char *const head[] = { "", "M", "f", "q", "v", "a", NULL };
-  puts ("\nM (diagonal), forces and state by coordinate [its unit]; all numbers in SI units");
-  for (pw_table t = { 0 }; pw_table_pass (&t);) {
-    pw_head (&t, -22, 13, head);
-    for (int j = 0; j < eq->coordinates; j++) {
-      const int state = matrices_state (s, j);
-      const double value[] = { eq->mass[j], eq->force[j], state == j ? sample->q[j] : NAN, sample->v[j], sample->a[j] };
-      matrices_row (&t, PW_NAME (pw_system_state_name, s, state), pw_system_state_unit (s, state), value, 5);
-    }
-  }
-}
-
-static void matrices_constraints (const pw_system *s, const pw_equations *eq, const pw_sample *sample) {
-  static const char *const head[] = { "", "gamma", "eta", "g", "lambda", NULL };
-  puts ("\ngamma, eta, g and lambda by constraint equation, named after its reaction -lambda [its unit]");
-  for (pw_table t = { 0 }; pw_table_pass (&t);) {
-    pw_head (&t, -22, 13, head);
-    for (int i = 0; i < eq->rows; i++) {
-      const double g = i < eq->holonomic ? eq->g[i] : NAN, value[] = { eq->gamma[i], eq->eta[i], g, sample->lambda[i] };
-      matrices_row (&t, PW_NAME (pw_system_reaction_name, s, i), pw_system_reaction_unit (s, i), value, 4);
-    }
-  }
 }
 
 /* Columns of J from `first` on; in a large scene only the rows that are not zero there.  Entries are sorted by rows. */
@@ -424,20 +372,41 @@ static void matrices_panel (const pw_system *s, const pw_equations *eq, int firs
 static void matrices_print (const pw_cli_model *m, const pw_equations *eq, const pw_sample *sample) {
   const pw_system *s = m->system;
   printf ("%s at t = %s s\n", pw_file_name (m->file), PW_DIGITS (sample->t, MATRICES_DIGITS));
-  matrices_coordinates (s, eq, sample);
+  static const char *const head[] = { "", "M", "f", "q", "v", "a", NULL }, *const rows[] = { "",  "gamma",  "eta",
+                                                                                             "g", "lambda", NULL };
+  puts ("\nM (diagonal), forces and state by coordinate [its unit]; all numbers in SI units");
+  for (pw_table t = { 0 }; pw_table_pass (&t);) {
+    pw_head (&t, -22, 13, head);
+    for (int j = 0; j < eq->coordinates; j++) {
+      const int state = matrices_state (s, j);
+      const double value[] = { eq->mass[j], eq->force[j], state == j ? sample->q[j] : NAN, sample->v[j], sample->a[j] };
+      matrices_row (&t, PW_NAME (pw_system_state_name, s, state), pw_system_state_unit (s, state), value, 5);
+    }
+  }
   if (eq->rows == 0) puts ("\nThe model has no constraints: no J, no gamma");
-  if (eq->rows > 0) matrices_constraints (s, eq, sample);
+  if (eq->rows > 0) {
+    puts ("\ngamma, eta, g and lambda by constraint equation, named after its reaction -lambda [its unit]");
+    for (pw_table t = { 0 }; pw_table_pass (&t);) {
+      pw_head (&t, -22, 13, rows);
+      for (int i = 0; i < eq->rows; i++) {
+        const double g = i < eq->holonomic ? eq->g[i] : NAN,
+                     value[] = { eq->gamma[i], eq->eta[i], g, sample->lambda[i] };
+        matrices_row (&t, PW_NAME (pw_system_reaction_name, s, i), pw_system_reaction_unit (s, i), value, 4);
+      }
+    }
+  }
   if (eq->rows > 0 && eq->coordinates > 2 * MATRICES_PANEL)
     puts ("\nRows of J that are zero in the columns shown are left out");
   for (int j = 0; eq->rows > 0 && j < eq->coordinates; j += MATRICES_PANEL) matrices_panel (s, eq, j);
 }
 
-static int show_matrices (const pw_cli_line *line, const pw_cli_model *m, double t, pw_error *error) {
-  pw_run_defaults defaults = pw_cli_defaults (pw_file_table (m->file));
+static int show_matrices (const pw_cli_line *line, double t, pw_error *error) {
+  const pw_cli_model *m = &line->m;
+  pw_run_defaults defaults = m->defaults;
   pw_settings settings;
   pw_limit limit;
   if (t > 0) defaults.t_end = t;
-  if (pw_cli_settings (line, &defaults, &(double){ 0 }, &settings, &limit, error) != PW_OK) return error->status;
+  if (pw_cli_settings (line, &defaults, &settings, &limit, error) != PW_OK) return error->status;
   pw_limit_start (&limit);
   pw_run *run = pw_limit_open (m->system, defaults.method, &settings, error);
   if (run == NULL) return error->status;
@@ -462,26 +431,25 @@ typedef struct {
 } show_line;
 
 static int show_command (void *options, pw_error *error) {
-  const show_line *given = options;
-  pw_cli_model m = { .file = NULL };
+  show_line *given = options;
+  const pw_cli_model *m = &given->line.m;
   double t = 0;
   int matrices = given->matrices || given->at, status = pw_cli_number ("--at", given->at, PW_NONNEGATIVE, &t, error);
   if (status == PW_OK && matrices + given->yaml + given->code > 1)
     status = pw_fail (error, PW_INPUT, "expected one of --%s, --yaml and --c", given->at ? "at T" : "matrices");
   if (status == PW_OK) status = pw_cli_requires ("--limit", given->line.limit, "--at", given->at != NULL, error);
-  if (status == PW_OK) status = pw_cli_open (&m, &given->line, error);
+  if (status == PW_OK) status = pw_cli_open (&given->line, error);
   if (status == PW_OK && given->code) {
-    char *text = pw_cli_source (m.system, error);
+    char *text = pw_cli_source (m->system, error);
     if (text) fputs (text, stdout);
     free (text);
     status = error->status;
   } else if (status == PW_OK && given->yaml)
-    status = yaml_model (&m, error);
+    status = yaml_model (m, error);
   else if (status == PW_OK && matrices)
-    status = show_matrices (&given->line, &m, t, error);
+    status = show_matrices (&given->line, t, error);
   else if (status == PW_OK)
-    show_model (&m);
-  pw_cli_close_model (&m);
+    show_model (m);
   return status;
 }
 

@@ -113,19 +113,6 @@ void pw_progress_start (pw_progress *p, const char *title, const char *unit, dou
   p->next = now + (lines ? PROGRESS_LINE_INTERVAL : PROGRESS_DELAY);
 }
 
-/* "0:07", "12:30", "3:05:00"; "-" if it is unknown or 1000 hours or more. */
-static void progress_duration (double seconds, char *text, size_t size) {
-  if (!(seconds < 3600.0 * 1000)) {
-    snprintf (text, size, "-");
-    return;
-  }
-  int s = (int)(seconds + 0.5), hours = s / 3600;
-  if (hours > 0)
-    snprintf (text, size, "%d:%02d:%02d", hours, s / 60 % 60, s % 60);
-  else
-    snprintf (text, size, "%d:%02d", s / 60, s % 60);
-}
-
 /* Draws the title, a bar that leaves room for `text` in the line, and `text`. */
 static void progress_draw (const pw_progress *p, double fraction, const char *text) {
   struct winsize size = { .ws_col = 0 };
@@ -140,15 +127,24 @@ static void progress_draw (const pw_progress *p, double fraction, const char *te
   fprintf (stderr, "\r%.*s [%s] %s\033[K", shown, p->title, bar, text);
 }
 
-/* The remaining time: estimated from the rate so far when something was done last, and falling since then.  It is not
- * known, NaN, if it is over, or if twice as much remains as was shown before. */
-static double progress_remaining (pw_progress *p, double now) {
+/* The remaining time, "0:07", "12:30", "3:05:00": estimated from the rate so far when something was done last, and
+ * falling since then.  It is not known, "-", if it is over, if twice as much remains as was shown before, or if it is
+ * 1000 hours or more. */
+static void progress_remaining (pw_progress *p, double now, char *text, size_t size) {
   const double rate = (p->reached - p->first) / (p->changed - p->start),
                estimate = (p->last - p->reached) / rate - (now - p->changed), before = p->remaining;
-  if (p->reached >= p->last) return 0;
-  if (!(rate > 0 && estimate > 0)) return NAN;
-  p->remaining = fmin (estimate, before);
-  return estimate < 2 * before + 5 ? p->remaining : NAN;
+  const int done = p->reached >= p->last, known = rate > 0 && estimate > 0;
+  if (known && !done) p->remaining = fmin (estimate, before);
+  const double seconds = done ? 0 : p->remaining;
+  if (!done && !(known && estimate < 2 * before + 5 && seconds < 3600.0 * 1000)) {
+    snprintf (text, size, "-");
+    return;
+  }
+  int s = (int)(seconds + 0.5), hours = s / 3600;
+  if (hours > 0)
+    snprintf (text, size, "%d:%02d:%02d", hours, s / 60 % 60, s % 60);
+  else
+    snprintf (text, size, "%d:%02d", s / 60, s % 60);
 }
 
 void pw_progress_at (pw_progress *p, double reached) {
@@ -159,7 +155,7 @@ void pw_progress_at (pw_progress *p, double reached) {
   p->next = now + (p->lines ? PROGRESS_LINE_INTERVAL : PROGRESS_BAR_INTERVAL);
   double fraction = fmin (fmax (reached / p->last, 0), 1);
   char remaining[24], done[80] = "", text[200];
-  progress_duration (progress_remaining (p, now), remaining, sizeof remaining);
+  progress_remaining (p, now, remaining, sizeof remaining);
   if (strcmp (p->unit, "s") == 0)
     snprintf (done, sizeof done, "t = %.4g of %.4g s  ", fmin (reached, p->last), p->last);
   else if (*p->unit && reached > p->last)
@@ -397,4 +393,20 @@ void pw_head (pw_table *table, int first, int width, const char *const *heading)
   pw_cell (table, first, *heading);
   while (*++heading) pw_cell (table, width, *heading);
   pw_row_end (table);
+}
+
+void pw_print_bodies (const pw_system *s, const double *q, const double *v, const char *heading, int first, int width,
+                      int digits, double least) {
+  const char *const head[] = { heading, "x [m]", "y [m]", "phi [rad]", "vx [m/s]", "vy [m/s]", "omega [rad/s]", NULL };
+  for (pw_table t = { 0 }; pw_table_pass (&t);) {
+    pw_head (&t, first, width, head);
+    for (int b = 0; b < pw_system_bodies (s) && b < PW_BODIES_PRINTED; b++) {
+      pw_cell (&t, first, pw_system_body_name (s, b));
+      for (int k = 0; k < 6; k++) {
+        const double value = (k < 3 ? q : v)[3 * b + k % 3];
+        pw_cell_number (&t, width, fabs (value) < least ? 0 : value, digits);
+      }
+      pw_row_end (&t);
+    }
+  }
 }

@@ -184,6 +184,8 @@ TEST (page) {
   assert_true (size > 0.01 && size < 0.1);
   check_close ("next x", second[0], 0.8 + size * cos (step), 1e-8, "9 digits");
   check_close ("next vx", second[3], -size * rate * sin (step), 1e-8, "9 digits");
+  cli_good ("pinwheel linearise stanley --animate @/outputs.html"); /* outputs have no values in modes */
+  assert_non_null (strstr (cli_file ("outputs.html"), "\"output\": [\n    null, null,"));
   cli_bad ("pinwheel linearise car --animate @/none.html", 2, "--animate @/none.html: there is no mode with a shape");
   assert_null (cli_file ("none.html"));
   cli_bad ("pinwheel linearise @/block.yaml --animate @/none.gif", 2,

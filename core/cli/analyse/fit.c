@@ -20,13 +20,10 @@ typedef struct {
   const char *data_path, *columns_text, *table_path, *json_path, *plots_path, *confidence_text, *starts_text,
       *jobs_text, *time_name, *time_scale_text, *time_offset_text;
   const char **free, **sigma_texts;
-  pw_cli_model model;
-  pw_files files;
   pw_unknowns unknowns;
   double confidence; /* probability of confidence intervals */
   int jobs, starts;
   /* data */
-  pw_arena arena;                          /* of all arrays but the table */
   const char **column_name, **column_unit; /* columns, ended by NULL */
   double *table;                           /* times, data, columns of standard deviations */
   int columns, rows;                       /* of the data */
@@ -82,19 +79,19 @@ typedef struct {
 static int data_read_columns (pw_fit *fit, pw_error *error) {
   size_t count = 2; /* one name more than commas, and NULL at the end */
   for (const char *text = fit->columns_text; *text; text++) count += *text == ',';
-  char *name = pw_arena_copy (&fit->arena, fit->columns_text);
-  fit->column_name = pw_arena_alloc (&fit->arena, 2 * count * sizeof *fit->column_name);
+  char *name = pw_arena_copy (&fit->line.arena, fit->columns_text);
+  fit->column_name = pw_arena_alloc (&fit->line.arena, 2 * count * sizeof *fit->column_name);
   if (name == NULL || fit->column_name == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   fit->column_unit = fit->column_name + count;
   while (name) {
     char *comma = strchr (name, ',');
     pw_column column;
     if (comma) *comma = 0;
-    if (pw_column_find (fit->model.system, name, "--columns", &column, error) != PW_OK) return error->status;
+    if (pw_column_find (fit->line.m.system, name, "--columns", &column, error) != PW_OK) return error->status;
     for (int i = 0; i < fit->columns; i++)
       if (strcmp (fit->column_name[i], name) == 0)
         return pw_fail (error, PW_INPUT, "--columns: %s is given twice", name);
-    fit->column_unit[fit->columns] = pw_system_column_unit (fit->model.system, column);
+    fit->column_unit[fit->columns] = pw_system_column_unit (fit->line.m.system, column);
     fit->column_name[fit->columns++] = name;
     name = comma ? comma + 1 : NULL;
   }
@@ -170,7 +167,7 @@ static int data_keep_rows (pw_fit *fit, double *table, int columns, pw_error *er
   const double t_end = fit->line.t_end ? fit->t_end * (1 + 1e-9) : INFINITY;
   double scale = 1, offset = 0;
   int rows = fit->rows, kept = 0, timed = 0;
-  fit->table = pw_arena_alloc (&fit->arena, (size_t)columns * (size_t)rows * sizeof *table);
+  fit->table = pw_arena_alloc (&fit->line.arena, (size_t)columns * (size_t)rows * sizeof *table);
   if (fit->table == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   if (pw_cli_number ("--time-scale", fit->time_scale_text, PW_POSITIVE, &scale, error) != PW_OK ||
       pw_cli_number ("--time-offset", fit->time_offset_text, PW_REAL, &offset, error) != PW_OK)
@@ -194,7 +191,7 @@ static int data_keep_rows (pw_fit *fit, double *table, int columns, pw_error *er
 /* Reads times, data, and columns of standard deviations. */
 static int data_read_table (pw_fit *fit, const fit_sigma *given, pw_error *error) {
   const size_t most = 1 + 2 * (size_t)fit->columns;
-  const char **column = pw_arena_alloc (&fit->arena, 2 * most * sizeof *column);
+  const char **column = pw_arena_alloc (&fit->line.arena, 2 * most * sizeof *column);
   int count = 1;
   if (column == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   const char **unit = column + most;
@@ -208,44 +205,32 @@ static int data_read_table (pw_fit *fit, const fit_sigma *given, pw_error *error
   return status;
 }
 
-/* Reads the data, and sets the standard deviation of each datum. */
-static int data_read (pw_fit *fit, const fit_sigma *given, pw_error *error) {
-  if (data_read_table (fit, given, error) != PW_OK) return error->status;
-  size_t rows = (size_t)fit->rows, cells = (size_t)fit->columns * rows;
+/* Reads the data, sets the standard deviation of each datum, which must be positive, and counts the data. */
+static int fit_read_data (pw_fit *fit, pw_error *error) {
+  if (data_read_columns (fit, error) != PW_OK) return error->status;
+  fit_sigma *given = pw_arena_alloc (&fit->line.arena, (size_t)fit->columns * sizeof *given);
+  int status = given ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+  for (const char **text = fit->sigma_texts; status == PW_OK && text && *text; text++)
+    status = data_read_sigma (fit, *text, given, error);
+  if (status == PW_OK) status = data_check_sigma (fit, given, error);
+  if (status == PW_OK) status = data_read_table (fit, given, error);
+  if (status != PW_OK) return status;
+  const int rows = fit->rows, cells = fit->columns * rows;
   fit->t = fit->table, fit->data = fit->table + rows;
-  fit->sigma = pw_arena_alloc (&fit->arena, cells * sizeof *fit->sigma);
+  fit->sigma = pw_arena_alloc (&fit->line.arena, (size_t)cells * sizeof *fit->sigma);
   if (fit->sigma == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  const double *next = fit->data + cells;
-  for (int i = 0; i < fit->columns; i++) {
-    const double *column = isnan (given[i].number) ? next : NULL, all = given[i].text ? given[i].number : 1;
-    for (size_t k = 0; k < rows; k++) fit->sigma[(size_t)i * rows + k] = column ? column[k] : all;
-    if (column) next += rows;
-  }
-  return PW_OK;
-}
-
-/* Counts the data, each of which needs a positive standard deviation. */
-static int data_check (pw_fit *fit, pw_error *error) {
-  for (int i = 0; i < fit->columns * fit->rows; i++) {
+  const double *next = fit->data + cells; /* columns of standard deviations */
+  for (int i = 0; i < cells; i++) {
+    const fit_sigma *of = given + i / rows;
+    fit->sigma[i] = isnan (of->number) ? *next++ : of->text ? of->number : 1;
     if (isnan (fit->data[i])) continue;
     fit->residuals++;
     if (!(fit->sigma[i] > 0))
       return pw_fail (error, PW_INPUT,
                       "--data %s: the standard deviation of %s at t = %g s is %g; expected a number > 0",
-                      fit->data_path, fit->column_name[i / fit->rows], fit->t[i % fit->rows], fit->sigma[i]);
+                      fit->data_path, fit->column_name[i / rows], fit->t[i % rows], fit->sigma[i]);
   }
   return PW_OK;
-}
-
-static int fit_read_data (pw_fit *fit, pw_error *error) {
-  if (data_read_columns (fit, error) != PW_OK) return error->status;
-  fit_sigma *given = pw_arena_alloc (&fit->arena, (size_t)fit->columns * sizeof *given);
-  int status = given ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
-  for (const char **text = fit->sigma_texts; status == PW_OK && text && *text; text++)
-    status = data_read_sigma (fit, *text, given, error);
-  if (status == PW_OK) status = data_check_sigma (fit, given, error);
-  if (status == PW_OK) status = data_read (fit, given, error);
-  return status == PW_OK ? data_check (fit, error) : status;
 }
 
 /* ---- Runs: the model's values at the times of the data, and derivatives of these values ---- */
@@ -504,7 +489,7 @@ static void solve_searches (fit_solver *solver) {
   gsl_multifit_nlinear_workspace *w =
       gsl_multifit_nlinear_alloc (gsl_multifit_nlinear_trust, &parameters, (size_t)fit->residuals, n);
   double *start = pw_unknowns_starts (&fit->unknowns, fit->starts, 1);
-  fit->ends = pw_arena_alloc (&fit->arena, starts * (1 + n) * sizeof *fit->ends);
+  fit->ends = pw_arena_alloc (&fit->line.arena, starts * (1 + n) * sizeof *fit->ends);
   if (w == NULL || start == NULL || fit->ends == NULL)
     solver->status = pw_fail (solver->error, PW_RESOURCE, "out of memory");
   solver->least = INFINITY;
@@ -606,8 +591,8 @@ static void solve_errors (fit_solver *solver) {
 static int solve_open (fit_solver *solver) {
   pw_fit *fit = solver->fit;
   size_t n = (size_t)fit->unknowns.count, cells = (size_t)fit->columns * (size_t)fit->rows;
-  solver->last_value = pw_arena_alloc (&fit->arena, (2 * n + (1 + n) * cells) * sizeof *solver->last_value);
-  fit->estimate = pw_arena_alloc (&fit->arena, (5 * n + 2 * n * n + cells) * sizeof *fit->estimate);
+  solver->last_value = pw_arena_alloc (&fit->line.arena, (2 * n + (1 + n) * cells) * sizeof *solver->last_value);
+  fit->estimate = pw_arena_alloc (&fit->line.arena, (5 * n + 2 * n * n + cells) * sizeof *fit->estimate);
   if (solver->last_value == NULL || fit->estimate == NULL) return pw_fail (solver->error, PW_RESOURCE, "out of memory");
   solver->u = solver->last_value + n, solver->values = solver->u + n, solver->jacobian = solver->values + cells;
   fit->standard_error = fit->estimate + n, fit->singular_value = fit->standard_error + n,
@@ -625,9 +610,13 @@ static int solve_open (fit_solver *solver) {
 static int fit_solve (pw_fit *fit, pw_error *error) {
   fit_solver solver = { .fit = fit, .error = error };
   fit->initial_chi2 = NAN;
+  pw_stop_catch ();
+  pw_progress_start (&fit->progress, pw_file_name (fit->line.m.file), "", 0, 1);
   solver.status = solve_open (&solver);
   if (solver.status == PW_OK) solve_searches (&solver);
   if (solver.status == PW_OK) solve_errors (&solver);
+  pw_progress_end (&fit->progress);
+  pw_stop_release ();
   return solver.status;
 }
 
@@ -733,20 +722,6 @@ static int report_contains (const pw_fit *fit, int combination, int i) {
   return fabs (fit->singular_vector[i * fit->unknowns.count + combination]) > FIT_COMPONENT;
 }
 
-/* Prints the ratio of changes of the unknowns along a singular vector; the change of the first one is its estimate, or
- * 1 if this is 0. */
-static void report_ratio (const pw_fit *fit, int combination) {
-  double scale = 0;
-  for (int i = 0; i < fit->unknowns.count; i++) {
-    double change = fit->singular_vector[i * fit->unknowns.count + combination] / fit->column_length[i];
-    if (!report_contains (fit, combination, i)) continue;
-    printf (scale != 0 ? " : " : ": changes in the ratio ");
-    if (scale == 0) scale = (fit->estimate[i] != 0 ? fit->estimate[i] : 1) / change;
-    printf ("%.3g", change * scale);
-  }
-  puts (" have no effect");
-}
-
 /* Prints combinations of unknowns that change no model value: singular vectors with the singular value 0. */
 static void report_undetermined (const pw_fit *fit) {
   for (int k = fit->rank; k < fit->unknowns.count; k++) {
@@ -754,10 +729,20 @@ static void report_undetermined (const pw_fit *fit) {
     for (int i = 0; i < fit->unknowns.count; i++)
       if (report_contains (fit, k, i))
         pw_cli_print (stdout, "%s%s", count++ ? ", " : "\nThe data do not determine ", fit->unknowns.list[i].name);
-    if (count == 1)
+    if (count == 1) {
       puts (", which has no effect");
-    else
-      report_ratio (fit, k);
+      continue;
+    }
+    /* the ratio of the changes along the vector; the change of the first one is its estimate, or 1 if this is 0 */
+    double scale = 0;
+    for (int i = 0; i < fit->unknowns.count; i++) {
+      double change = fit->singular_vector[i * fit->unknowns.count + k] / fit->column_length[i];
+      if (!report_contains (fit, k, i)) continue;
+      printf (scale != 0 ? " : " : ": changes in the ratio ");
+      if (scale == 0) scale = (fit->estimate[i] != 0 ? fit->estimate[i] : 1) / change;
+      printf ("%.3g", change * scale);
+    }
+    puts (" have no effect");
   }
 }
 
@@ -803,39 +788,6 @@ static void fit_print (const pw_fit *fit) {
 
 /* ---- Files ---- */
 
-static void report_json_unknown (const pw_fit *fit, pw_json *j, int i) {
-  const pw_unknown *u = fit->unknowns.list + i;
-  pw_json_open (j, NULL, '{');
-  pw_json_text (j, "name", u->name);
-  pw_json_text (j, "unit", u->unit);
-  pw_json_number (j, "initial", u->value);
-  pw_json_number (j, "value", fit->estimate[i]);
-  pw_json_number (j, "standard_error", fit->standard_error[i]);
-  pw_json_number (j, "from", report_interval_end (fit, i, -1));
-  pw_json_number (j, "to", report_interval_end (fit, i, 1));
-  if (fit->interrupted)
-    pw_json_text (j, "determined", NULL);
-  else
-    pw_json_flag (j, "determined", !isinf (fit->standard_error[i]));
-  pw_json_flag (j, "bound", *report_bound (fit, i) != 0);
-  pw_json_close (j, '}');
-}
-
-static void report_json_columns (const pw_fit *fit, pw_json *j) {
-  pw_json_open (j, "columns", '[');
-  for (int i = 0; i < fit->columns; i++) {
-    int count;
-    double rms = report_rms (fit, i, &count);
-    pw_json_open (j, NULL, '{');
-    pw_json_text (j, "name", fit->column_name[i]);
-    pw_json_text (j, "unit", fit->column_unit[i]);
-    pw_json_number (j, "data", count);
-    pw_json_number (j, "rms", rms);
-    pw_json_close (j, '}');
-  }
-  pw_json_close (j, ']');
-}
-
 /* Writes a matrix, unknowns x unknowns, with these entries. */
 static void report_json_matrix (const pw_fit *fit, pw_json *j, const char *key,
                                 double (*entry) (const pw_fit *fit, int i, int j)) {
@@ -849,46 +801,44 @@ static void report_json_matrix (const pw_fit *fit, pw_json *j, const char *key,
   pw_json_close (j, ']');
 }
 
-/* Writes pw_fit.ends. */
-static void report_json_ends (const pw_fit *fit, pw_json *j) {
-  int n = fit->unknowns.count;
-  pw_json_open (j, "searches", '[');
-  for (const double *end = fit->ends; end < fit->ends + fit->starts * (1 + n); end += 1 + n) {
-    pw_json_open (j, NULL, '{');
-    pw_json_number (j, "chi2", *end);
-    pw_json_numbers (j, "values", end + 1, n);
-    pw_json_close (j, '}');
-  }
-  pw_json_close (j, ']');
-}
-
 static void fit_json (const pw_fit *fit, const char *status, FILE *f) {
   pw_json json = { .f = f, .lines = 2 }, *j = &json;
   char options[PW_UNKNOWNS_OPTIONS];
-  pw_json_open (j, NULL, '{');
-  pw_json_number (j, "schema", 1);
-  pw_json_text (j, "model", pw_file_name (fit->model.file));
-  pw_json_text (j, "status", status);
-  pw_json_text (j, "data", fit->data_path);
-  pw_json_text (j, "options", pw_unknowns_options (&fit->unknowns, fit->estimate, options));
-  pw_json_text (j, "method", fit->unknowns.method);
-  pw_json_number (j, "residuals", fit->residuals);
-  pw_json_number (j, "freedom", fit_degrees_of_freedom (fit));
-  pw_json_flag (j, "weighted", fit->weighted);
-  pw_json_number (j, "chi2", fit->chi2);
-  pw_json_number (j, "confidence", fit->confidence);
-  pw_json_number (j, "rank", fit->rank);
-  pw_json_number (j, "runs", (double)fit->runs);
-  pw_json_text (j, "derivatives", "differences");
-  pw_json_number (j, "iterations", fit->iterations);
-  pw_json_open (j, "unknowns", '[');
-  for (int i = 0; i < fit->unknowns.count; i++) report_json_unknown (fit, j, i);
+  pw_json_print (j, "{schema: %d, model: %s, status: %s, data: %s, options: %s, method: %s", 1,
+                 pw_file_name (fit->line.m.file), status, fit->data_path,
+                 pw_unknowns_options (&fit->unknowns, fit->estimate, options), fit->unknowns.method);
+  pw_json_print (j, "residuals: %d, freedom: %d, weighted: %i, chi2: %g, confidence: %g, rank: %d, runs: %ld",
+                 fit->residuals, fit_degrees_of_freedom (fit), fit->weighted, fit->chi2, fit->confidence, fit->rank,
+                 fit->runs);
+  pw_json_print (j, "derivatives: %s, iterations: %d, unknowns: [", "differences", fit->iterations);
+  for (int i = 0; i < fit->unknowns.count; i++) {
+    const pw_unknown *u = fit->unknowns.list + i;
+    pw_json_print (j, "{name: %s, unit: %s, initial: %g, value: %g, standard_error: %g, from: %g, to: %g", u->name,
+                   u->unit, u->value, fit->estimate[i], fit->standard_error[i], report_interval_end (fit, i, -1),
+                   report_interval_end (fit, i, 1));
+    if (fit->interrupted)
+      pw_json_text (j, "determined", NULL);
+    else
+      pw_json_flag (j, "determined", !isinf (fit->standard_error[i]));
+    pw_json_print (j, "bound: %i}", *report_bound (fit, i) != 0);
+  }
+  pw_json_print (j, "], columns: [");
+  for (int i = 0; i < fit->columns; i++) {
+    int count;
+    double rms = report_rms (fit, i, &count);
+    pw_json_print (j, "{name: %s, unit: %s, data: %d, rms: %g}", fit->column_name[i], fit->column_unit[i], count, rms);
+  }
   pw_json_close (j, ']');
-  report_json_columns (fit, j);
   report_json_matrix (fit, j, "covariance", report_covariance);
   report_json_matrix (fit, j, "correlation", report_correlation);
-  report_json_ends (fit, j);
-  pw_json_close (j, '}');
+  const int n = fit->unknowns.count;
+  pw_json_open (j, "searches", '[');
+  for (const double *end = fit->ends; end < fit->ends + fit->starts * (1 + n); end += 1 + n) {
+    pw_json_print (j, "{chi2: %g", *end);
+    pw_json_numbers (j, "values", end + 1, n);
+    pw_json_close (j, '}');
+  }
+  pw_json_print (j, "]}");
 }
 
 static int fit_table (const pw_fit *fit, FILE *f, pw_error *error) {
@@ -919,7 +869,7 @@ static int fit_draw (const pw_fit *fit, pw_error *error) {
   const int panels = fit->columns < REPORT_PANELS ? fit->columns : REPORT_PANELS, several = panels > 1;
   const char *style = fit->weighted ? "bars" : "data", *label = fit->weighted ? "data ± σ" : "data";
   pw_curves c;
-  int status = pw_curves_open (&c, &fit->line, &fit->model, fit->plots_path, "fit", "data and fitted model", error);
+  int status = pw_curves_open (&c, &fit->line, fit->plots_path, "fit", "data and fitted model", error);
   if (status != PW_OK) return status;
   for (int i = 0; i < panels; i++) {
     const double *t = fit->t, *data = fit->data + i * fit->rows, *fitted = fit->fitted + i * fit->rows,
@@ -966,20 +916,6 @@ static int fit_options (pw_fit *fit, pw_error *error) {
   return status == PW_OK ? pw_parallel_jobs (fit->jobs_text, &fit->jobs, error) : status;
 }
 
-/* Reads the data and the unknowns; runs end at the time of the last row. */
-static int fit_open_data (pw_fit *fit, pw_error *error) {
-  int status = pw_unknowns_open (&fit->unknowns, &fit->line, &fit->model, error);
-  fit->t_end = fit->unknowns.t_end;
-  if (status == PW_OK) status = fit_read_data (fit, error);
-  if (status == PW_OK) status = pw_unknowns_read (&fit->unknowns, fit->free, error);
-  if (status != PW_OK) return status;
-  if (fit->residuals < fit->unknowns.count)
-    return pw_fail (error, PW_INPUT, "--data %s has fewer data (%d) than there are unknowns (%d)", fit->data_path,
-                    fit->residuals, fit->unknowns.count);
-  fit->unknowns.t_end = fit->unknowns.settings.span = fit->t[fit->rows - 1];
-  return pw_unknowns_engine (&fit->unknowns, FIT_RUNS, fit->starts, error);
-}
-
 static int fit_open (pw_fit *fit, pw_error *error) {
   static const char *const figures[] = { "fit.dat", "fit.gp", "fit.svg", "fit.png", "fit.pdf", NULL };
   pw_use use[] = { PW_CLI_MODEL_USE,
@@ -988,27 +924,22 @@ static int fit_open (pw_fit *fit, pw_error *error) {
                    { "--json", fit->json_path, PW_WRITES, pw_cli_json },
                    { "--plots", fit->plots_path, PW_WRITES_INTO, figures } };
   int status = fit_options (fit, error);
-  if (status == PW_OK) status = pw_cli_open (&fit->model, &fit->line, error);
-  if (status == PW_OK) status = fit_open_data (fit, error);
-  return status == PW_OK ? pw_files_open (&fit->files, &fit->line, &fit->model, use, sizeof use / sizeof *use, error)
-                         : status;
-}
-
-static int fit_search (pw_fit *fit, pw_error *error) {
-  pw_stop_catch ();
-  pw_progress_start (&fit->progress, pw_file_name (fit->model.file), "", 0, 1);
-  int status = fit_solve (fit, error);
-  pw_progress_end (&fit->progress);
-  pw_stop_release ();
-  fit->interrupted = status == PW_RETRY;
-  if (!fit->interrupted) return status;
-  if (fit->iterations > 0) return PW_OK;
-  pw_cli_say ("pinwheel: interrupted before the first iteration was done\n");
-  return PW_INTERRUPTED;
+  if (status == PW_OK) status = pw_cli_open (&fit->line, error);
+  if (status == PW_OK) status = pw_unknowns_open (&fit->unknowns, &fit->line, error);
+  fit->t_end = fit->unknowns.settings.span;
+  if (status == PW_OK) status = fit_read_data (fit, error);
+  if (status == PW_OK) status = pw_unknowns_read (&fit->unknowns, fit->free, error);
+  if (status != PW_OK) return status;
+  if (fit->residuals < fit->unknowns.count)
+    return pw_fail (error, PW_INPUT, "--data %s has fewer data (%d) than there are unknowns (%d)", fit->data_path,
+                    fit->residuals, fit->unknowns.count);
+  fit->unknowns.settings.span = fit->t[fit->rows - 1]; /* runs end at the time of the last row */
+  status = pw_unknowns_engine (&fit->unknowns, FIT_RUNS, fit->starts, error);
+  return status == PW_OK ? pw_files_open (&fit->line, use, sizeof use / sizeof *use, error) : status;
 }
 
 static int fit_finish (pw_fit *fit, pw_error *error) {
-  FILE *table = pw_files_stream (&fit->files, FIT_TABLE), *summary = pw_files_stream (&fit->files, FIT_SUMMARY);
+  FILE *table = pw_files_stream (&fit->line, FIT_TABLE), *summary = pw_files_stream (&fit->line, FIT_SUMMARY);
   pw_error drawing = { 0 };
   data_report (fit);
   fit_print (fit);
@@ -1017,7 +948,7 @@ static int fit_finish (pw_fit *fit, pw_error *error) {
   const char *word = pw_cli_status_word (drawn != PW_OK || fit->converged ? drawn : PW_METHOD);
   int status = table ? fit_table (fit, table, error) : PW_OK;
   if (summary) fit_json (fit, fit->interrupted ? "interrupted" : word, summary);
-  if (status == PW_OK) status = pw_files_finish (&fit->files, error);
+  if (status == PW_OK) status = pw_files_finish (&fit->line, error);
   status = pw_figure_status (drawn, &drawing, status, error);
   if (fit->interrupted) pw_cli_say ("pinwheel: interrupted; these are the values so far, without their errors\n");
   if (status == PW_OK && fit->interrupted) return PW_INTERRUPTED;
@@ -1030,12 +961,12 @@ static int fit_finish (pw_fit *fit, pw_error *error) {
 static int fit_command (void *options, pw_error *error) {
   pw_fit *fit = options;
   int status = fit_open (fit, error);
-  if (status == PW_OK) status = fit_search (fit, error);
+  if (status == PW_OK) status = fit_solve (fit, error);
+  fit->interrupted = status == PW_RETRY;
+  if (fit->interrupted) status = fit->iterations > 0 ? PW_OK : PW_INTERRUPTED;
+  if (status == PW_INTERRUPTED) pw_cli_say ("pinwheel: interrupted before the first iteration was done\n");
   if (status == PW_OK) status = fit_finish (fit, error);
-  pw_files_close (&fit->files);
-  pw_arena_free (&fit->arena);
   pw_unknowns_close (&fit->unknowns);
-  pw_cli_close_model (&fit->model);
   return status;
 }
 

@@ -17,8 +17,6 @@ typedef struct {
   const char **hold_texts;                  /* of --hold */
   int steady;                               /* 1: --steady */
   const char **input_names, **output_names; /* ended by NULL; or NULL: all signals of forces, all states */
-  pw_cli_model m;
-  pw_files files;
   pw_run *r;
   double t;                  /* of the state that is linearised [s] */
   pw_initial_value *initial; /* 2 x coordinates: the steady motion; NULL: the model's initial state */
@@ -46,7 +44,7 @@ static int linearise_find_all (const pw_system *s, const char **name, int *list,
 /* Selects inputs and outputs: those named; by default all signals of forces, and all states.  Signals of constraints
  * are refused: their first and second time derivatives would be inputs as well. */
 static int linearise_select (pw_linearise_command *cmd, pw_error *error) {
-  const pw_system *s = cmd->m.system;
+  const pw_system *s = cmd->line.m.system;
   int states = 2 * pw_system_coordinates (s), signals = pw_system_signals (s);
   cmd->input = malloc (((size_t)signals + 1) * sizeof *cmd->input);
   cmd->output = malloc (((size_t)states + 1) * sizeof *cmd->output);
@@ -70,23 +68,9 @@ static int linearise_select (pw_linearise_command *cmd, pw_error *error) {
 
 /* ---- The run ---- */
 
-static int linearise_advance (pw_linearise_command *cmd, pw_error *error) {
-  pw_progress progress;
-  int status = PW_OK;
-  pw_stop_catch ();
-  pw_progress_start (&progress, pw_file_name (cmd->m.file), "s", 0, cmd->t);
-  while (status == PW_OK && pw_run_time (cmd->r) < cmd->t) {
-    status = pw_run_advance (cmd->r, cmd->t, error);
-    pw_progress_at (&progress, pw_run_time (cmd->r));
-  }
-  pw_progress_end (&progress);
-  pw_stop_release ();
-  return status == PW_STOPPED ? pw_limit_status (&cmd->limit, pw_run_time (cmd->r), error) : status;
-}
-
 /* Newton's method from the initial state, then from one to which forces lead; the quantities of --hold are held. */
 static int linearise_solve_steady (pw_linearise_command *cmd, pw_steady *steady, pw_error *error) {
-  int n = pw_system_coordinates (cmd->m.system);
+  int n = pw_system_coordinates (cmd->line.m.system);
   pw_steady_motion motion;
   int status = steady ? PW_RETRY : error->status, changes = 0;
   for (int attempt = 0; status == PW_RETRY && attempt < PW_STEADY_NOT_RANDOM && !pw_limit_over (&cmd->limit);
@@ -99,7 +83,7 @@ static int linearise_solve_steady (pw_linearise_command *cmd, pw_steady *steady,
     return pw_fail (
         error, PW_METHOD,
         "%s: no steady motion is reached from the initial state: %s; `pinwheel steady` also begins at random states",
-        pw_file_name (cmd->m.file),
+        pw_file_name (cmd->line.m.file),
         changes ? "the solutions found are not steady, as the equations change with time or along the motion"
                 : PW_PRINTED (70, "the last residual is %.2g, in units of the scene", motion.residual));
   if (status != PW_OK) return status;
@@ -111,45 +95,40 @@ static int linearise_solve_steady (pw_linearise_command *cmd, pw_steady *steady,
 
 /* Runs the model to the time of --at, and makes the state reached consistent; or opens a run at the steady motion. */
 static int linearise_run (pw_linearise_command *cmd, pw_error *error) {
-  pw_run_defaults d = pw_cli_defaults (pw_file_table (cmd->m.file));
+  const pw_run_defaults *d = &cmd->line.m.defaults;
   pw_settings settings;
-  double t_end;
-  if (pw_cli_settings (&cmd->line, &d, &t_end, &settings, &cmd->limit, error) != PW_OK) return error->status;
-  settings.span = cmd->steady ? t_end /* after --at: signals are constant in it */ : fmax (t_end, cmd->t);
+  if (pw_cli_settings (&cmd->line, d, &settings, &cmd->limit, error) != PW_OK) return error->status;
+  if (!cmd->steady) settings.span = fmax (settings.span, cmd->t); /* else after --at: signals are constant in it */
   pw_limit_start (&cmd->limit);
   if (cmd->steady) {
     pw_initial_value hold[PW_HOLDS];
     pw_steady_settings set = { .hold = hold, .t = cmd->t, .span = settings.span, .vary = -1 /* none of them */ };
-    if (pw_hold_read (cmd->m.system, cmd->hold_texts, hold, &set.holds, error) != PW_OK) return error->status;
-    pw_steady *steady = pw_steady_open (cmd->m.system, &set, error);
+    if (pw_hold_read (cmd->line.m.system, cmd->hold_texts, hold, &set.holds, error) != PW_OK) return error->status;
+    pw_steady *steady = pw_steady_open (cmd->line.m.system, &set, error);
     int status = linearise_solve_steady (cmd, steady, error);
     pw_steady_close (steady);
     if (status != PW_OK) return status;
     settings.t = cmd->t;
     settings.initial = cmd->initial;
-    settings.initials = 2 * pw_system_coordinates (cmd->m.system);
+    settings.initials = 2 * pw_system_coordinates (cmd->line.m.system);
   }
-  cmd->r = pw_limit_open (cmd->m.system, d.method, &settings, error);
+  cmd->r = pw_limit_open (cmd->line.m.system, d->method, &settings, error);
   if (cmd->r == NULL) return error->status;
   if (cmd->steady) return PW_OK;
-  int status = pw_report_initial_state (&cmd->m, cmd->limit.seconds, error);
+  int status = pw_report_initial_state (&cmd->line.m, cmd->limit.seconds, error);
   if (cmd->t == 0 || status != PW_OK) return status;
-  pw_cli_report_tables (cmd->m.system, cmd->t);
-  status = linearise_advance (cmd, error);
+  pw_cli_report_tables (cmd->line.m.system, cmd->t);
+  pw_progress progress;
+  pw_stop_catch ();
+  pw_progress_start (&progress, pw_file_name (cmd->line.m.file), "s", 0, cmd->t);
+  while (status == PW_OK && pw_run_time (cmd->r) < cmd->t) {
+    status = pw_run_advance (cmd->r, cmd->t, error);
+    pw_progress_at (&progress, pw_run_time (cmd->r));
+  }
+  pw_progress_end (&progress);
+  pw_stop_release ();
+  if (status == PW_STOPPED) status = pw_limit_status (&cmd->limit, pw_run_time (cmd->r), error);
   return status == PW_OK ? pw_run_restart (cmd->r, NULL, NULL, error) : status;
-}
-
-static int linearise_compute (pw_linearise_command *cmd, pw_error *error) {
-  const char *model = pw_file_name (cmd->m.file);
-  int coordinates = pw_system_coordinates (cmd->m.system);
-  if (coordinates > LINEARISE_COORDINATES)
-    return pw_fail (error, PW_INPUT, "%s has %d coordinates; linearise takes at most %d", model, coordinates,
-                    LINEARISE_COORDINATES);
-  int status = linearise_run (cmd, error);
-  if (status == PW_OK) status = pw_run_linear_modes (cmd->r, LINEARISE_COORDINATES, &cmd->linear, error);
-  if (status == PW_OK && cmd->linear.unknowns == 0)
-    return pw_fail (error, PW_INPUT, "%s has no degrees of freedom: there is nothing to linearise", model);
-  return status;
 }
 
 /* ---- Reports: text, matrices in files, and the page of modes ---- */
@@ -227,7 +206,7 @@ static void linearise_print_component (pw_table *t, const pw_linear *l, int mode
 }
 
 static void linearise_print_mode (const pw_linearise_command *cmd, int mode) {
-  const pw_system *s = cmd->m.system;
+  const pw_system *s = cmd->line.m.system;
   int bodies = pw_system_bodies (s), internal = pw_system_coordinates (s) - 3 * bodies;
   printf ("\nMode %d\n", mode + 1);
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
@@ -249,21 +228,10 @@ static void linearise_print_mode (const pw_linearise_command *cmd, int mode) {
   if (internal > LINEARISE_ROWS) printf ("  and %d more internal coordinates\n", internal - LINEARISE_ROWS);
 }
 
-static void linearise_print_shapes (const pw_linearise_command *cmd) {
-  const pw_linear *l = &cmd->linear;
-  int shown = 0;
-  for (int i = 0; i < l->unknowns; i++) {
-    if (!linearise_is_shown (l, i)) continue;
-    if (shown == 0) puts ("\nMode shapes: displacements in the axes of the frame, the largest 1 m (angles times L)");
-    if (shown++ < LINEARISE_MODES) linearise_print_mode (cmd, i);
-  }
-  if (shown > LINEARISE_MODES) printf ("\nand %d more modes\n", shown - LINEARISE_MODES);
-}
-
 static void linearise_print (const pw_linearise_command *cmd) {
   const pw_linear *l = &cmd->linear;
   printf ("%s%s at t = %.9g s: %d minimal coordinates, %d of positions and %d of velocities\n",
-          pw_file_name (cmd->m.file), cmd->steady ? ", steady motion" : "", cmd->t, l->unknowns, l->positions,
+          pw_file_name (cmd->line.m.file), cmd->steady ? ", steady motion" : "", cmd->t, l->unknowns, l->positions,
           l->velocities);
   if (l->twist[2] != 0) printf ("The frame turns at %.5g rad/s\n", l->twist[2]);
   if (l->steady == PW_ACCELERATED)
@@ -272,7 +240,13 @@ static void linearise_print (const pw_linearise_command *cmd) {
     printf ("Not steady: the equations change with time or along the motion");
   puts (l->steady == PW_STEADY ? "The motion is steady" : "; the eigenvalues are not stability exponents");
   linearise_print_eigenvalues (l);
-  linearise_print_shapes (cmd);
+  int shown = 0;
+  for (int i = 0; i < l->unknowns; i++) {
+    if (!linearise_is_shown (l, i)) continue;
+    if (shown == 0) puts ("\nMode shapes: displacements in the axes of the frame, the largest 1 m (angles times L)");
+    if (shown++ < LINEARISE_MODES) linearise_print_mode (cmd, i);
+  }
+  if (shown > LINEARISE_MODES) printf ("\nand %d more modes\n", shown - LINEARISE_MODES);
 }
 
 /* ---- Matrices ---- */
@@ -283,7 +257,7 @@ static double linearise_entry (const pw_linearise_command *cmd, int row, int col
   const pw_linear *l = &cmd->linear;
   int n = l->unknowns;
   if (row < n && column < n) return l->A[row * n + column];
-  if (row < n) return l->B[row * pw_system_signals (cmd->m.system) + cmd->input[column - n]];
+  if (row < n) return l->B[row * pw_system_signals (cmd->line.m.system) + cmd->input[column - n]];
   return column < n ? l->basis[cmd->output[row - n] * n + column] : 0;
 }
 
@@ -301,74 +275,52 @@ static void linearise_blocks (const pw_linearise_command *cmd, linearise_block b
   block[3] = (linearise_block){ "D", n, cmd->outputs, n, cmd->inputs };
 }
 
-static void linearise_block_json (const pw_linearise_command *cmd, pw_json *j, const linearise_block *b) {
-  pw_json_open (j, b->name, '[');
-  for (int i = 0; i < b->rows; i++) {
-    j->line = 1;
-    pw_json_open (j, NULL, '[');
-    for (int c = 0; c < b->columns; c++) pw_json_number (j, NULL, linearise_entry (cmd, b->row + i, b->column + c));
-    pw_json_close (j, ']');
-  }
-  pw_json_close (j, ']');
-}
-
-static void linearise_mode_json (const pw_linearise_command *cmd, pw_json *j, int i) {
-  const pw_linear *l = &cmd->linear;
-  j->line = 1;
-  pw_json_open (j, NULL, '{');
-  pw_json_number (j, "re", l->re[i]);
-  pw_json_number (j, "im", l->im[i]);
-  pw_json_number (j, "frequency_hz", fabs (l->im[i]) / (2 * PW_PI));
-  pw_json_number (j, "damping", linearise_damping (l, i));
-  pw_json_number (j, "doubling_time", linearise_doubling_time (l->re[i]));
-  pw_json_number (j, "halving_time", linearise_doubling_time (-l->re[i]));
-  pw_json_flag (j, "rigid", l->rigid[i]);
-  pw_json_open (j, "shape", '{');
-  for (int k = 0; linearise_has_shape (l, i) && k < 2 * l->coordinates; k++)
-    if (!pw_system_state_hidden (cmd->m.system, k))
-      pw_json_numbers (j, PW_NAME (pw_system_state_name, cmd->m.system, k), linearise_shape (l, i, k), 2);
-  pw_json_close (j, '}');
-  pw_json_close (j, '}');
-}
-
 /* Writes names and units of the inputs or outputs with the indices of a list. */
 static void linearise_names_json (const pw_linearise_command *cmd, pw_json *j, const char *key, const int *list,
                                   int count, char *(*name_of) (const pw_system *s, int i, char *buffer, size_t size),
                                   const char *(*unit_of) (const pw_system *s, int i)) {
   pw_json_open (j, key, '[');
-  for (int i = 0; i < count; i++) {
-    pw_json_open (j, NULL, '{');
-    pw_json_text (j, "name", PW_NAME (name_of, cmd->m.system, list[i]));
-    pw_json_text (j, "unit", unit_of (cmd->m.system, list[i]));
-    pw_json_close (j, '}');
-  }
+  for (int i = 0; i < count; i++)
+    pw_json_print (j, "{name: %s, unit: %s}", PW_NAME (name_of, cmd->line.m.system, list[i]),
+                   unit_of (cmd->line.m.system, list[i]));
   pw_json_close (j, ']');
 }
 
 static void linearise_json (const pw_linearise_command *cmd, pw_json *j) {
   const pw_linear *l = &cmd->linear;
   linearise_block block[4];
-  pw_json_open (j, NULL, '{');
-  pw_json_number (j, "schema", 1);
-  pw_json_text (j, "model", pw_file_name (cmd->m.file));
-  pw_json_number (j, "t", cmd->t);
-  pw_json_text (j, "motion", linearise_motions[l->steady]);
-  pw_json_number (j, "positions", l->positions);
-  pw_json_number (j, "velocities", l->velocities);
-  pw_json_number (j, "symmetries", l->symmetries);
+  pw_json_print (j, "{schema: %d, model: %s, t: %g, motion: %s, positions: %d, velocities: %d, symmetries: %d", 1,
+                 pw_file_name (cmd->line.m.file), cmd->t, linearise_motions[l->steady], l->positions, l->velocities,
+                 l->symmetries);
   pw_json_numbers (j, "twist", l->twist, 3);
   linearise_names_json (cmd, j, "inputs", cmd->input, cmd->inputs, pw_system_signal_name, pw_system_signal_unit);
   linearise_names_json (cmd, j, "outputs", cmd->output, cmd->outputs, pw_system_state_name, pw_system_state_unit);
   linearise_blocks (cmd, block);
-  for (int i = 0; i < 4; i++) linearise_block_json (cmd, j, &block[i]);
+  for (const linearise_block *b = block; b < block + 4; b++) {
+    pw_json_open (j, b->name, '[');
+    for (int i = 0; i < b->rows; i++) {
+      pw_json_print (j, "\n[");
+      for (int c = 0; c < b->columns; c++) pw_json_number (j, NULL, linearise_entry (cmd, b->row + i, b->column + c));
+      pw_json_close (j, ']');
+    }
+    pw_json_close (j, ']');
+  }
   pw_json_open (j, "eigenvalues", '[');
-  for (int i = 0; i < l->unknowns; i++) linearise_mode_json (cmd, j, i);
-  pw_json_close (j, ']');
-  pw_json_close (j, '}');
+  for (int i = 0; i < l->unknowns; i++) {
+    pw_json_print (
+        j, "\n{re: %g, im: %g, frequency_hz: %g, damping: %g, doubling_time: %g, halving_time: %g, rigid: %i, shape: {",
+        l->re[i], l->im[i], fabs (l->im[i]) / (2 * PW_PI), linearise_damping (l, i), linearise_doubling_time (l->re[i]),
+        linearise_doubling_time (-l->re[i]), l->rigid[i]);
+    for (int k = 0; linearise_has_shape (l, i) && k < 2 * l->coordinates; k++)
+      if (!pw_system_state_hidden (cmd->line.m.system, k))
+        pw_json_numbers (j, PW_NAME (pw_system_state_name, cmd->line.m.system, k), linearise_shape (l, i, k), 2);
+    pw_json_print (j, "}}");
+  }
+  pw_json_print (j, "]}");
 }
 
 static int linearise_csv (const pw_linearise_command *cmd, FILE *f, pw_error *error) {
-  const pw_system *s = cmd->m.system;
+  const pw_system *s = cmd->line.m.system;
   int n = cmd->linear.unknowns, rows = n + cmd->outputs, columns = n + cmd->inputs;
   pw_text t = { .chars = NULL };
   pw_text_cell (&t, "row");
@@ -428,30 +380,23 @@ typedef struct {
   pw_error *error;
 } page;
 
-/* Sets the state at time t of a mode that is shown until `end` [s]. */
-static void page_state (const page *p, int mode, double t, double end) {
-  const pw_linear *l = &p->cmd->linear;
-  const double re = l->re[mode], im = l->im[mode];
-  const double complex exponent = im == 0 ? re : im * I,
-                       factor = p->size * cexp (exponent * t - (im == 0 ? fmax (0, re * end) : 0));
-  for (int j = 0; j < l->coordinates; j++) {
-    const double *shape = linearise_shape (l, mode, j);
-    const double complex displacement = factor * (shape[0] + shape[1] * I);
-    p->state[j] = p->q[j] + creal (displacement);
-    p->state[l->coordinates + j] = creal (exponent * displacement);
-  }
-}
-
 static void page_mode (const page *p, FILE *f, int mode) {
   const pw_linear *l = &p->cmd->linear;
   const double re = l->re[mode], im = l->im[mode],
                end = im == 0 ? PAGE_TIME_CONSTANTS / fabs (re) : 2 * PW_PI * PAGE_PERIODS / im;
   char title[200];
-  pw_plots *plots = pw_plots_open (NULL, 0, p->cmd->m.model, p->cmd->m.system, end, p->error);
+  pw_plots *plots = pw_plots_open (NULL, 0, p->cmd->line.m.model, p->cmd->line.m.system, end, p->error);
   if (plots == NULL) return;
   for (int k = 0; k <= PAGE_SAMPLES; k++) {
     const double t = end * k / PAGE_SAMPLES;
-    page_state (p, mode, t, end);
+    const double complex exponent = im == 0 ? re : im * I,
+                         factor = p->size * cexp (exponent * t - (im == 0 ? fmax (0, re * end) : 0));
+    for (int j = 0; j < l->coordinates; j++) {
+      const double *shape = linearise_shape (l, mode, j);
+      const double complex displacement = factor * (shape[0] + shape[1] * I);
+      p->state[j] = p->q[j] + creal (displacement);
+      p->state[l->coordinates + j] = creal (exponent * displacement);
+    }
     pw_plots_add (plots, &(pw_sample){ .t = t, .q = p->state, .v = p->state + l->coordinates });
   }
   int n = snprintf (title, sizeof title, "mode %d: %.5g 1/s", mode + 1, re);
@@ -514,19 +459,7 @@ static int linearise_open_files (pw_linearise_command *cmd, pw_error *error) {
                    { "-o", name ? PW_PRINTED (PATH, "%s.csv", name) : NULL, PW_WRITES, NULL },
                    { "-o", name ? PW_PRINTED (PATH, "%s.npz", name) : NULL, PW_WRITES, NULL },
                    { "--animate", cmd->page_path, PW_WRITES, NULL } };
-  return pw_files_open (&cmd->files, &cmd->line, &cmd->m, use, sizeof use / sizeof *use, error);
-}
-
-static int linearise_write (pw_linearise_command *cmd, pw_error *error) {
-  int status = PW_OK;
-  if (cmd->name) {
-    linearise_json (cmd, &(pw_json){ .f = pw_files_stream (&cmd->files, LINEARISE_JSON), .lines = 1 });
-    status = linearise_csv (cmd, pw_files_stream (&cmd->files, LINEARISE_CSV), error);
-    if (status == PW_OK) status = linearise_npz (cmd, pw_files_stream (&cmd->files, LINEARISE_NPZ), error);
-  }
-  if (status == PW_OK && cmd->page_path)
-    status = linearise_page (cmd, pw_files_stream (&cmd->files, LINEARISE_PAGE), error);
-  return status == PW_OK ? pw_files_finish (&cmd->files, error) : status;
+  return pw_files_open (&cmd->line, use, sizeof use / sizeof *use, error);
 }
 
 static int linearise_command (void *options, pw_error *error) {
@@ -535,20 +468,33 @@ static int linearise_command (void *options, pw_error *error) {
   if (status == PW_OK && cmd->hold_texts && !cmd->steady) status = pw_fail (error, PW_INPUT, "--hold needs --steady");
   if (status == PW_OK)
     status = pw_cli_requires ("--limit", cmd->line.limit, "--at or --steady", cmd->t_text || cmd->steady, error);
-  if (status == PW_OK) status = pw_cli_open (&cmd->m, &cmd->line, error);
+  if (status == PW_OK) status = pw_cli_open (&cmd->line, error);
   if (status == PW_OK) status = linearise_select (cmd, error);
   if (status == PW_OK) status = linearise_open_files (cmd, error);
-  if (status == PW_OK) pw_report_model (&cmd->m);
-  if (status == PW_OK) status = linearise_compute (cmd, error);
+  if (status == PW_OK) pw_report_model (&cmd->line.m);
+  const char *model = status == PW_OK ? pw_file_name (cmd->line.m.file) : NULL;
+  const int coordinates = status == PW_OK ? pw_system_coordinates (cmd->line.m.system) : 0;
+  if (coordinates > LINEARISE_COORDINATES)
+    status = pw_fail (error, PW_INPUT, "%s has %d coordinates; linearise takes at most %d", model, coordinates,
+                      LINEARISE_COORDINATES);
+  if (status == PW_OK) status = linearise_run (cmd, error);
+  if (status == PW_OK) status = pw_run_linear_modes (cmd->r, LINEARISE_COORDINATES, &cmd->linear, error);
+  if (status == PW_OK && cmd->linear.unknowns == 0)
+    status = pw_fail (error, PW_INPUT, "%s has no degrees of freedom: there is nothing to linearise", model);
   if (status == PW_OK) linearise_print (cmd);
-  if (status == PW_OK) status = linearise_write (cmd, error);
+  if (status == PW_OK && cmd->name) {
+    linearise_json (cmd, &(pw_json){ .f = pw_files_stream (&cmd->line, LINEARISE_JSON), .lines = 1 });
+    status = linearise_csv (cmd, pw_files_stream (&cmd->line, LINEARISE_CSV), error);
+    if (status == PW_OK) status = linearise_npz (cmd, pw_files_stream (&cmd->line, LINEARISE_NPZ), error);
+  }
+  if (status == PW_OK && cmd->page_path)
+    status = linearise_page (cmd, pw_files_stream (&cmd->line, LINEARISE_PAGE), error);
+  if (status == PW_OK) status = pw_files_finish (&cmd->line, error);
   pw_linear_free (&cmd->linear);
-  pw_files_close (&cmd->files);
   pw_run_close (cmd->r);
   free (cmd->initial);
   free (cmd->input);
   free (cmd->output);
-  pw_cli_close_model (&cmd->m);
   if (status == PW_RETRY) pw_cli_say ("pinwheel: interrupted\n");
   return status == PW_RETRY ? PW_INTERRUPTED : status;
 }

@@ -32,10 +32,7 @@ typedef struct {
   pw_cli_line line;
   const char *maximise, *minimise, *path, *json_path, *plots_path, *starts_text, *seed_text, *jobs_text;
   const char **free, **subject_to;
-  pw_cli_model model;
-  pw_files files;
   pw_unknowns unknowns;
-  pw_arena arena;      /* of the arrays below and those of the searches, except their `trials` */
   const char **output; /* outputs, as text: the objective, then the left sides of the constraints */
   char (*unit)[80];    /* outputs */
   double *sign;        /* outputs: 1 or -1; of the objective: sign x objective is minimised */
@@ -177,19 +174,6 @@ static int search_feasible (const pw_optimise *problem, const double *output) {
   return search_worst (problem, output, &constraint) <= SEARCH_ALLOWED;
 }
 
-/* Appends the last run to those of the search. */
-static int search_store (local_search *local) {
-  pw_search *search = local->search;
-  int unknowns = local->problem->unknowns.count, outputs = local->problem->outputs, width = unknowns + outputs;
-  int status =
-      pw_grow (&search->trials, (size_t)search->runs, &search->allocated, (size_t)width * sizeof *search->trials);
-  if (status != PW_OK) return status;
-  double *row = search->trials + search->runs++ * width;
-  memcpy (row, local->unknown, (size_t)unknowns * sizeof *row);
-  for (int i = 0; i < outputs; i++) row[unknowns + i] = local->failed ? NAN : local->output[i];
-  return PW_OK;
-}
-
 /* Makes the last run the result of the search if it is the best one. */
 static void search_keep (local_search *local) {
   pw_optimise *problem = local->problem;
@@ -214,17 +198,6 @@ static void search_keep (local_search *local) {
   pthread_mutex_unlock (&problem->lock);
 }
 
-/* Makes a run, with derivatives if `slopes`.  If only the derivatives fail, the search ends. */
-static int search_try (local_search *local, int slopes, pw_error *error) {
-  pw_error own = { 0 };
-  int status = search_run (local->problem, local->unknown, local->output, error);
-  if (status != PW_OK || !slopes) return status;
-  status = search_differentiate (local, &own);
-  if (status == PW_RETRY || status == PW_RESOURCE) return *error = own, status;
-  local->repeat |= status != PW_OK;
-  return PW_OK;
-}
-
 /* Makes the run with these scaled unknowns the last one unless it already is, with derivatives if `slopes`. */
 static void search_evaluate (local_search *local, const double *scaled, int slopes) {
   const pw_unknowns *unknowns = &local->problem->unknowns;
@@ -233,7 +206,15 @@ static void search_evaluate (local_search *local, const double *scaled, int slop
   if (local->known > slopes && memcmp (local->scaled, scaled, size) == 0) return;
   memcpy (local->scaled, scaled, size);
   for (int i = 0; i < unknowns->count; i++) local->unknown[i] = search_unknown (unknowns->list + i, scaled[i]);
-  int status = search_try (local, slopes, &error);
+  int status = search_run (local->problem, local->unknown, local->output, &error);
+  if (status == PW_OK && slopes) { /* if only the derivatives fail, the search ends */
+    pw_error own = { 0 };
+    status = search_differentiate (local, &own);
+    if (status == PW_RETRY || status == PW_RESOURCE)
+      error = own;
+    else
+      local->repeat |= status != PW_OK, status = PW_OK;
+  }
   if (status == PW_RETRY || pw_stop) {
     nlopt_force_stop (local->optimiser);
     return;
@@ -241,7 +222,14 @@ static void search_evaluate (local_search *local, const double *scaled, int slop
   local->known = 1 + slopes;
   local->failed = status != PW_OK;
   if (local->failed && local->search->failed++ == 0) local->search->first_error = error;
-  if (search_store (local) != PW_OK) status = pw_fail (&error, PW_RESOURCE, "out of memory");
+  pw_search *search = local->search;
+  const size_t n = (size_t)unknowns->count, width = n + (size_t)local->problem->outputs;
+  if (pw_grow (&search->trials, (size_t)search->runs, &search->allocated, width * sizeof *search->trials) == PW_OK) {
+    double *row = search->trials + (size_t)search->runs++ * width;
+    memcpy (row, local->unknown, size);
+    for (size_t i = n; i < width; i++) row[i] = local->failed ? NAN : local->output[i - n];
+  } else
+    status = pw_fail (&error, PW_RESOURCE, "out of memory");
   if (!local->failed) search_keep (local);
   if (status == PW_RESOURCE) {
     *local->error = error;
@@ -431,9 +419,9 @@ static int optimise_open_searches (pw_optimise *problem, pw_error *error) {
   const size_t n = (size_t)problem->unknowns.count, width = 2 * n + (size_t)problem->outputs,
                starts = (size_t)problem->starts, all = starts + OPTIMISE_REFINED;
   double *start = pw_unknowns_starts (&problem->unknowns, problem->starts, problem->seed),
-         *memory = pw_arena_alloc (&problem->arena, all * width * sizeof *memory);
-  problem->search = pw_arena_alloc (&problem->arena, all * sizeof *problem->search);
-  problem->without_effect = pw_arena_alloc (&problem->arena, 2 * n);
+         *memory = pw_arena_alloc (&problem->line.arena, all * width * sizeof *memory);
+  problem->search = pw_arena_alloc (&problem->line.arena, all * sizeof *problem->search);
+  problem->without_effect = pw_arena_alloc (&problem->line.arena, 2 * n);
   int status = start && memory && problem->search && problem->without_effect
                    ? PW_OK
                    : pw_fail (error, PW_RESOURCE, "out of memory");
@@ -509,7 +497,7 @@ static int optimise_converged (const pw_optimise *problem, pw_error *error) {
 static int optimise_search (pw_optimise *problem, pw_error *error) {
   pw_stop_catch ();
   pthread_mutex_init (&problem->lock, NULL);
-  pw_progress_start (&problem->progress, pw_file_name (problem->model.file), "searches", 0,
+  pw_progress_start (&problem->progress, pw_file_name (problem->line.m.file), "searches", 0,
                      problem->starts + OPTIMISE_REFINED);
   int status = pw_parallel (problem->jobs, problem->starts, search_rough, problem, error);
   if (status == PW_OK) status = optimise_refine (problem, error);
@@ -616,66 +604,34 @@ static void optimise_print (const pw_optimise *problem) {
 
 /* ---- JSON ---- */
 
-static void report_json_unknown (const pw_optimise *problem, pw_json *j, int i) {
-  const pw_unknown *u = problem->unknowns.list + i;
-  pw_json_open (j, NULL, '{');
-  pw_json_text (j, "name", u->name);
-  pw_json_text (j, "unit", u->unit);
-  pw_json_number (j, "initial", u->value);
-  pw_json_number (j, "value", problem->best->to[i]);
-  pw_json_number (j, "low", u->low);
-  pw_json_number (j, "high", u->high);
-  pw_json_text (j, "bound", (const char *[]){ "low", NULL, "high" }[1 + report_bound (problem, i)]);
-  pw_json_close (j, '}');
-}
-
-static void report_json_search (const pw_optimise *problem, pw_json *j, const pw_search *search) {
-  pw_json_open (j, NULL, '{');
-  pw_json_number (j, "value", search->feasible ? search->output[0] : NAN);
-  pw_json_number (j, "runs", (double)search->runs);
-  pw_json_number (j, "failed", (double)search->failed);
-  pw_json_numbers (j, "from", search->from, problem->unknowns.count);
-  pw_json_numbers (j, "to", search->to, search->feasible ? problem->unknowns.count : 0);
-  pw_json_close (j, '}');
-}
-
-static void report_json_constraint (const pw_optimise *problem, pw_json *j, int i) {
-  pw_json_open (j, NULL, '{');
-  pw_json_text (j, "output", problem->output[i]);
-  pw_json_text (j, "type", problem->sign[i] > 0 ? "<=" : ">=");
-  pw_json_number (j, "bound", problem->bound[i]);
-  pw_json_number (j, "value", problem->best->output[i]);
-  pw_json_close (j, '}');
-}
-
 static void optimise_json (const pw_optimise *problem, const char *status, FILE *f) {
   pw_json json = { .f = f, .lines = 2 }, *j = &json;
   char options[PW_UNKNOWNS_OPTIONS];
-  pw_json_open (j, NULL, '{');
-  pw_json_number (j, "schema", 1);
-  pw_json_text (j, "model", pw_file_name (problem->model.file));
-  pw_json_text (j, "status", status);
+  pw_json_print (j, "{schema: %d, model: %s, status: %s", 1, pw_file_name (problem->line.m.file), status);
   pw_json_text (j, problem->maximise ? "maximise" : "minimise", problem->output[0]);
-  pw_json_number (j, "value", problem->best->output[0]);
-  pw_json_number (j, "initial", report_initial (problem));
-  pw_json_text (j, "options", pw_unknowns_options (&problem->unknowns, problem->best->to, options));
-  pw_json_text (j, "method", problem->unknowns.method);
-  pw_json_number (j, "t_end", problem->unknowns.t_end);
-  pw_json_number (j, "seed", problem->seed);
-  pw_json_number (j, "runs", (double)problem->runs);
-  pw_json_number (j, "failed", (double)problem->failed);
-  pw_json_number (j, "derivatives", (double)problem->derivatives);
-  pw_json_text (j, "reason", problem->first_error ? problem->first_error->text : "");
-  pw_json_open (j, "unknowns", '[');
-  for (int i = 0; i < problem->unknowns.count; i++) report_json_unknown (problem, j, i);
-  pw_json_close (j, ']');
-  pw_json_open (j, "constraints", '[');
-  for (int i = 1; i < problem->outputs; i++) report_json_constraint (problem, j, i);
-  pw_json_close (j, ']');
-  pw_json_open (j, "starts", '[');
-  for (int i = 0; i < problem->starts + problem->refinements; i++) report_json_search (problem, j, problem->search + i);
-  pw_json_close (j, ']');
-  pw_json_close (j, '}');
+  pw_json_print (j, "value: %g, initial: %g, options: %s, method: %s, t_end: %g, seed: %g", problem->best->output[0],
+                 report_initial (problem), pw_unknowns_options (&problem->unknowns, problem->best->to, options),
+                 problem->unknowns.method, problem->unknowns.settings.span, problem->seed);
+  pw_json_print (j, "runs: %ld, failed: %ld, derivatives: %ld, reason: %s, unknowns: [", problem->runs, problem->failed,
+                 problem->derivatives, problem->first_error ? problem->first_error->text : "");
+  for (int i = 0; i < problem->unknowns.count; i++) {
+    const pw_unknown *u = problem->unknowns.list + i;
+    pw_json_print (j, "{name: %s, unit: %s, initial: %g, value: %g, low: %g, high: %g, bound: %s}", u->name, u->unit,
+                   u->value, problem->best->to[i], u->low, u->high,
+                   (const char *[]){ "low", NULL, "high" }[1 + report_bound (problem, i)]);
+  }
+  pw_json_print (j, "], constraints: [");
+  for (int i = 1; i < problem->outputs; i++)
+    pw_json_print (j, "{output: %s, type: %s, bound: %g, value: %g}", problem->output[i],
+                   problem->sign[i] > 0 ? "<=" : ">=", problem->bound[i], problem->best->output[i]);
+  pw_json_print (j, "], starts: [");
+  for (const pw_search *s = problem->search; s < problem->search + problem->starts + problem->refinements; s++) {
+    pw_json_print (j, "{value: %g, runs: %ld, failed: %ld", s->feasible ? s->output[0] : NAN, s->runs, s->failed);
+    pw_json_numbers (j, "from", s->from, problem->unknowns.count);
+    pw_json_numbers (j, "to", s->to, s->feasible ? problem->unknowns.count : 0);
+    pw_json_close (j, '}');
+  }
+  pw_json_print (j, "]}");
 }
 
 /* Writes the command that runs the result, as a comment: the given options that affect runs, then the values found. */
@@ -709,7 +665,7 @@ static void optimise_yaml (const pw_optimise *problem, FILE *f) {
   if (problem->incomplete)
     fprintf (f, "# perhaps not an optimum: %.*s\n", (int)strcspn (problem->incomplete, "\r\n"), problem->incomplete);
   fputs ("model: ", f);
-  pw_cli_quoted (f, pw_file_name (problem->model.file), "''");
+  pw_cli_quoted (f, pw_file_name (problem->line.m.file), "''");
   fputs (problem->maximise ? "\nmaximise: " : "\nminimise: ", f);
   pw_cli_quoted (f, problem->output[0], "''");
   fprintf (f, "\nvalue: %.17g\n", best->output[0]);
@@ -730,8 +686,7 @@ static int optimise_draw (const pw_optimise *problem, pw_error *error) {
   const int n = problem->unknowns.count, width = n + problem->outputs, panels = n < REPORT_PANELS ? n : REPORT_PANELS;
   const char *objective = PW_FIGURE_LABEL (problem->output[0], problem->unit[0]);
   pw_curves c;
-  int status = pw_curves_open (&c, &problem->line, &problem->model, problem->plots_path, "optimise",
-                               "runs of the optimisation", error);
+  int status = pw_curves_open (&c, &problem->line, problem->plots_path, "optimise", "runs of the optimisation", error);
   if (status != PW_OK) return status;
   for (int i = 0; i < panels; i++) {
     pw_curves_panel (
@@ -754,53 +709,8 @@ static int optimise_draw (const pw_optimise *problem, pw_error *error) {
 
 /* ---- Before the search ---- */
 
-/* Adds the constraint "OUTPUT<=VALUE" or "OUTPUT>=VALUE".  text: a copy of `given`, of which OUTPUT is kept. */
-static int optimise_constraint (pw_optimise *problem, char *text, const char *given, pw_error *error) {
-  const int i = problem->outputs;
-  char *symbol = NULL;
-  for (char *c = text; *c; c++)
-    if ((*c == '<' || *c == '>') && c[1] == '=') symbol = c;
-  if (symbol == NULL || pw_read_expression (symbol + 2, &problem->bound[i]) != PW_OK || !isfinite (problem->bound[i]))
-    return pw_fail (error, PW_INPUT, "--subject-to %.200s: expected OUTPUT<=VALUE or OUTPUT>=VALUE", given);
-  problem->sign[i] = *symbol == '<' ? 1 : -1;
-  *symbol = 0;
-  while (symbol > text && symbol[-1] == ' ') *--symbol = 0;
-  problem->output[problem->outputs++] = text;
-  return PW_OK;
-}
-
-static int optimise_read_outputs (pw_optimise *problem, pw_error *error) {
-  size_t count = 1;
-  int status = PW_OK;
-  for (const char **given = problem->subject_to; given && *given; given++) count++;
-  problem->output = pw_arena_alloc (&problem->arena, (count + 1) * sizeof *problem->output); /* ended by NULL */
-  problem->unit = pw_arena_alloc (&problem->arena, count * sizeof *problem->unit);
-  problem->bound = pw_arena_alloc (&problem->arena, 2 * count * sizeof *problem->bound);
-  if (problem->output == NULL || problem->unit == NULL || problem->bound == NULL)
-    return pw_fail (error, PW_RESOURCE, "out of memory");
-  problem->sign = problem->bound + count;
-  problem->output[0] = problem->maximise ? problem->maximise : problem->minimise;
-  problem->sign[0] = problem->maximise ? -1 : 1;
-  problem->outputs = 1;
-  for (const char **given = problem->subject_to; given && *given && status == PW_OK; given++) {
-    char *copy = pw_arena_copy (&problem->arena, *given);
-    status = copy ? optimise_constraint (problem, copy, *given, error) : pw_fail (error, PW_RESOURCE, "out of memory");
-  }
-  return status;
-}
-
-/* Checks the outputs of an option, from number `first` on, and stores their units.  Extrema are not differentiable. */
-static int optimise_open_outputs (pw_optimise *problem, int first, int count, const char *option, pw_error *error) {
-  pw_outcomes set;
-  int status = pw_outcomes_open (&set, problem->model.system, option, problem->output + first, count,
-                                 problem->line.until, error);
-  for (int i = 0; i < set.outcomes; i++) pw_outcome_unit (&set, i, problem->unit[first + i], sizeof *problem->unit);
-  for (int i = 0; i < set.functionals; i++) problem->differentiable &= !pw_is_extremum (set.functional[i].type);
-  pw_outcomes_close (&set);
-  return status;
-}
-
 static int optimise_read (pw_optimise *problem, pw_error *error) {
+  size_t count = 1;
   double starts = 10;
   problem->least = INFINITY, problem->seed = 1;
   if (!problem->maximise == !problem->minimise)
@@ -811,8 +721,43 @@ static int optimise_read (pw_optimise *problem, pw_error *error) {
   if (status == PW_OK && starts > 1e5) status = pw_fail (error, PW_INPUT, "--starts: at most 100000");
   if (status == PW_OK)
     status = pw_cli_requires ("--width", problem->line.width, "--plots DIR", problem->plots_path != NULL, error);
+  if (status != PW_OK) return status;
   problem->starts = (int)starts;
-  return status == PW_OK ? optimise_read_outputs (problem, error) : status;
+  for (const char **given = problem->subject_to; given && *given; given++) count++;
+  problem->output = pw_arena_alloc (&problem->line.arena, (count + 1) * sizeof *problem->output); /* ended by NULL */
+  problem->unit = pw_arena_alloc (&problem->line.arena, count * sizeof *problem->unit);
+  problem->bound = pw_arena_alloc (&problem->line.arena, 2 * count * sizeof *problem->bound);
+  if (problem->output == NULL || problem->unit == NULL || problem->bound == NULL)
+    return pw_fail (error, PW_RESOURCE, "out of memory");
+  problem->sign = problem->bound + count;
+  problem->output[0] = problem->maximise ? problem->maximise : problem->minimise;
+  problem->sign[0] = problem->maximise ? -1 : 1;
+  problem->outputs = 1;
+  for (const char **given = problem->subject_to; given && *given; given++) {
+    const int i = problem->outputs++;
+    char *text = pw_arena_copy (&problem->line.arena, *given), *symbol = NULL; /* "OUTPUT<=VALUE" or "OUTPUT>=VALUE" */
+    if (text == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+    for (char *c = text; *c; c++)
+      if ((*c == '<' || *c == '>') && c[1] == '=') symbol = c;
+    if (symbol == NULL || pw_read_expression (symbol + 2, &problem->bound[i]) != PW_OK || !isfinite (problem->bound[i]))
+      return pw_fail (error, PW_INPUT, "--subject-to %.200s: expected OUTPUT<=VALUE or OUTPUT>=VALUE", *given);
+    problem->sign[i] = *symbol == '<' ? 1 : -1;
+    *symbol = 0;
+    while (symbol > text && symbol[-1] == ' ') *--symbol = 0;
+    problem->output[i] = text; /* OUTPUT is kept */
+  }
+  return PW_OK;
+}
+
+/* Checks the outputs of an option, from number `first` on, and stores their units.  Extrema are not differentiable. */
+static int optimise_open_outputs (pw_optimise *problem, int first, int count, const char *option, pw_error *error) {
+  pw_outcomes set;
+  int status = pw_outcomes_open (&set, problem->line.m.system, option, problem->output + first, count,
+                                 problem->line.until, error);
+  for (int i = 0; i < set.outcomes; i++) pw_outcome_unit (&set, i, problem->unit[first + i], sizeof *problem->unit);
+  for (int i = 0; i < set.functionals; i++) problem->differentiable &= !pw_is_extremum (set.functional[i].type);
+  pw_outcomes_close (&set);
+  return status;
 }
 
 enum { OPTIMISE_RESULT = 1, OPTIMISE_SUMMARY }; /* indices in the list of files of optimise_open */
@@ -825,34 +770,19 @@ static int optimise_open (pw_optimise *problem, pw_error *error) {
                    { "-o", problem->path, PW_WRITES, texts },
                    { "--json", problem->json_path, PW_WRITES, pw_cli_json },
                    { "--plots", problem->plots_path, PW_WRITES_INTO, figures } };
-  int status = pw_cli_open (&problem->model, &problem->line, error);
+  int status = pw_cli_open (&problem->line, error);
   problem->differentiable = 1;
   if (status == PW_OK)
     status = optimise_open_outputs (problem, 0, 1, problem->maximise ? "--maximise" : "--minimise", error);
   if (status == PW_OK) status = optimise_open_outputs (problem, 1, problem->outputs - 1, "--subject-to", error);
-  if (status == PW_OK) status = pw_unknowns_open (&problem->unknowns, &problem->line, &problem->model, error);
+  if (status == PW_OK) status = pw_unknowns_open (&problem->unknowns, &problem->line, error);
   if (status == PW_OK) status = pw_unknowns_read (&problem->unknowns, problem->free, error);
   if (status == PW_OK) status = pw_unknowns_engine (&problem->unknowns, OPTIMISE_RUNS, problem->starts, error);
-  if (status == PW_OK)
-    status = pw_files_open (&problem->files, &problem->line, &problem->model, use, sizeof use / sizeof *use, error);
+  if (status == PW_OK) status = pw_files_open (&problem->line, use, sizeof use / sizeof *use, error);
   return status == PW_OK ? optimise_open_searches (problem, error) : status;
 }
 
 /* ---- After the search ---- */
-
-/* Outputs of the run whose largest violation is smallest; *constraint: the output that has it.  NULL: all failed. */
-static const double *optimise_nearest (const pw_optimise *problem, int *constraint) {
-  const double *nearest = NULL;
-  double least = INFINITY;
-  int n = problem->unknowns.count, width = n + problem->outputs, i = 0;
-  for (const pw_search *search = problem->search; search < problem->search + problem->starts; search++)
-    for (long k = 0; k < search->runs; k++) {
-      const double *output = search->trials + k * width + n;
-      double violation = isnan (output[0]) ? NAN : search_worst (problem, output, &i);
-      if (violation <= least) least = violation, nearest = output, *constraint = i;
-    }
-  return nearest;
-}
 
 /* The error if no run satisfies the constraints: that of the first run if every run failed. */
 static int optimise_infeasible (const pw_optimise *problem, pw_error *error) {
@@ -861,7 +791,15 @@ static int optimise_infeasible (const pw_optimise *problem, pw_error *error) {
   if (problem->failed == problem->runs && problem->first_error)
     return pw_fail (error, problem->first_error->status, "no run succeeded (%s); the first failed: %s",
                     PW_COUNTED (problem->runs, "run"), problem->first_error->text);
-  const double *output = optimise_nearest (problem, &i);
+  const double *output = NULL; /* of the run whose largest violation is smallest */
+  double least = INFINITY;
+  int n = problem->unknowns.count, width = n + problem->outputs, constraint = 0;
+  for (const pw_search *search = problem->search; search < problem->search + problem->starts; search++)
+    for (long k = 0; k < search->runs; k++) {
+      const double *run = search->trials + k * width + n;
+      double violation = isnan (run[0]) ? NAN : search_worst (problem, run, &constraint);
+      if (violation <= least) least = violation, output = run, i = constraint;
+    }
   if (*problem->unit[i]) snprintf (unit, sizeof unit, " %s", problem->unit[i]);
   return pw_fail (error, PW_METHOD,
                   "no run from %s satisfies --subject-to; in the nearest one %s is %s%s and must be at %s %s%s",
@@ -870,8 +808,8 @@ static int optimise_infeasible (const pw_optimise *problem, pw_error *error) {
 }
 
 static int optimise_finish (pw_optimise *problem, pw_error *error) {
-  FILE *result = pw_files_stream (&problem->files, OPTIMISE_RESULT),
-       *summary = pw_files_stream (&problem->files, OPTIMISE_SUMMARY);
+  FILE *result = pw_files_stream (&problem->line, OPTIMISE_RESULT),
+       *summary = pw_files_stream (&problem->line, OPTIMISE_SUMMARY);
   int stopped = pw_stop != 0;
   if (problem->best == NULL && stopped) pw_cli_say ("pinwheel: interrupted before any run satisfied the constraints\n");
   if (problem->best == NULL) return stopped ? PW_INTERRUPTED : optimise_infeasible (problem, error);
@@ -884,7 +822,7 @@ static int optimise_finish (pw_optimise *problem, pw_error *error) {
   const int drawn = problem->plots_path ? optimise_draw (problem, &drawing) : PW_OK;
   const char *word = pw_cli_status_word (drawn != PW_OK || converged ? drawn : PW_METHOD);
   if (summary) optimise_json (problem, stopped ? "interrupted" : word, summary);
-  int status = pw_figure_status (drawn, &drawing, pw_files_finish (&problem->files, error), error);
+  int status = pw_figure_status (drawn, &drawing, pw_files_finish (&problem->line, error), error);
   if (stopped) pw_cli_say ("pinwheel: interrupted; this is the best result so far\n");
   if (status == PW_OK && stopped) return PW_INTERRUPTED;
   return status == PW_OK && !converged ? pw_fail (error, unconverged.status, "%s", unconverged.text) : status;
@@ -897,10 +835,7 @@ static int optimise_command (void *options, pw_error *error) {
   if (status == PW_OK) status = optimise_search (problem, error);
   if (status == PW_OK) status = optimise_finish (problem, error);
   for (int i = 0; problem->search && i < problem->starts + OPTIMISE_REFINED; i++) free (problem->search[i].trials);
-  pw_arena_free (&problem->arena);
-  pw_files_close (&problem->files);
   pw_unknowns_close (&problem->unknowns);
-  pw_cli_close_model (&problem->model);
   return status;
 }
 

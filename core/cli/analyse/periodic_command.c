@@ -19,8 +19,6 @@ enum { PW_PERIODIC_ATTEMPTS = 3 }; /* of Newton's method, each from the state af
 typedef struct {
   pw_cli_line line;
   const char *period_text, *periods_text, *guess_text, *vary_text, *folder;
-  pw_cli_model m;
-  pw_files files;
   pw_limit limit;
   pw_periodic_settings settings;
   const char *source; /* of the period: "of the signals", "--period", "found" */
@@ -62,9 +60,9 @@ static int periodic_read_period (pw_periodic_command *cmd, pw_error *error) {
     status = pw_fail (error, PW_INPUT, "--periods %s: expected at most %d", cmd->periods_text, PERIODIC_PERIODS);
   if (status != PW_OK) return status;
   cmd->settings.periods = (int)periods;
-  double period = pw_system_period (cmd->m.system);
+  double period = pw_system_period (cmd->line.m.system);
   if (cmd->period_text || cmd->vary_text || period > 0) return PW_OK;
-  return pw_fail (error, PW_INPUT, "%s: %s", pw_file_name (cmd->m.file),
+  return pw_fail (error, PW_INPUT, "%s: %s", pw_file_name (cmd->line.m.file),
                   isnan (period) ? "the periods of its signals have no common multiple: give --period T"
                                  : "no signal has a known period (those of expressions and tables are not known): "
                                    "give --period T, or --period free if no signal changes with time");
@@ -72,21 +70,20 @@ static int periodic_read_period (pw_periodic_command *cmd, pw_error *error) {
 
 static int periodic_read_options (pw_periodic_command *cmd, pw_error *error) {
   pw_settings settings = { .rtol = 0 };
-  pw_run_defaults d = pw_cli_defaults (pw_file_table (cmd->m.file));
+  pw_run_defaults d = cmd->line.m.defaults;
   d.rtol = 1e-12;
-  double t_end;
-  int status = pw_cli_settings (&cmd->line, &d, &t_end, &settings, &cmd->limit, error);
+  int status = pw_cli_settings (&cmd->line, &d, &settings, &cmd->limit, error);
   cmd->settings.method = cmd->line.method ? cmd->line.method : "erk8+projection";
   cmd->settings.rtol = settings.rtol;
   cmd->vary.name = cmd->vary.unit = "";
   cmd->settings.stop = pw_limit_over, cmd->settings.stop_context = &cmd->limit;
   if (status == PW_OK) status = periodic_read_period (cmd, error);
   if (status != PW_OK || cmd->vary_text == NULL) return status;
-  if (pw_vary_read (&cmd->vary, &cmd->line, &cmd->m, cmd->vary_text, error) != PW_OK) return PW_INPUT;
+  if (pw_vary_read (&cmd->vary, &cmd->line, cmd->vary_text, error) != PW_OK) return PW_INPUT;
   cmd->settings.first = cmd->vary.first, cmd->settings.last = cmd->vary.last;
   cmd->settings.compile = pw_vary_compile, cmd->settings.context = &cmd->vary;
   if (cmd->vary.parameter == NULL) /* fails with the nearest name */
-    return pw_model_set (cmd->m.model, cmd->vary.name, cmd->settings.first, error);
+    return pw_model_set (cmd->line.m.model, cmd->vary.name, cmd->settings.first, error);
   return PW_OK;
 }
 
@@ -97,7 +94,7 @@ static int periodic_set_stopped (pw_periodic_command *cmd) {
 }
 
 static int periodic_add (pw_periodic_command *cmd, const pw_periodic_orbit *o, pw_error *error) {
-  const size_t n = (size_t)pw_system_coordinates (cmd->m.system), multipliers = (size_t)o->multipliers;
+  const size_t n = (size_t)pw_system_coordinates (cmd->line.m.system), multipliers = (size_t)o->multipliers;
   int status = pw_grow (&cmd->point, (size_t)cmd->points, &cmd->room, sizeof *cmd->point);
   double *at = status == PW_OK ? malloc ((4 * n + 2 * multipliers + 1) * sizeof *at) : NULL;
   if (at == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
@@ -116,7 +113,7 @@ static int periodic_find (pw_periodic_command *cmd, pw_periodic_orbit *o, pw_err
   pw_progress progress;
   double best = INFINITY;
   int status = PW_RETRY;
-  pw_progress_start (&progress, pw_file_name (cmd->m.file), "attempts", 0, PW_PERIODIC_ATTEMPTS);
+  pw_progress_start (&progress, pw_file_name (cmd->line.m.file), "attempts", 0, PW_PERIODIC_ATTEMPTS);
   for (int k = 0; status == PW_RETRY && k < PW_PERIODIC_ATTEMPTS && !periodic_set_stopped (cmd); k++) {
     status = pw_periodic_solve (cmd->search, periodic_settling[k], cmd->settings.first, o, error);
     cmd->residual[k] = o->residual;
@@ -133,7 +130,7 @@ static int periodic_fail (pw_periodic_command *cmd, pw_error *error) {
   char period[60] = "a free period", tried[200] = "";
   pw_error ignored = { 0 };
   pw_system *first = cmd->vary_text ? pw_vary_compile (&cmd->vary, cmd->settings.first, &ignored) : NULL;
-  double signals = pw_system_period (first ? first : cmd->m.system);
+  double signals = pw_system_period (first ? first : cmd->line.m.system);
   double T = cmd->settings.period > 0 ? cmd->settings.period : cmd->settings.periods * signals;
   pw_system_free (first);
   if (!cmd->settings.free) snprintf (period, sizeof period, "period %.9g s", T);
@@ -146,7 +143,7 @@ static int periodic_fail (pw_periodic_command *cmd, pw_error *error) {
       error, PW_METHOD,
       "%s: no periodic motion with %s found: Newton's method, begun after this many periods of a run, ends at this "
       "residual (in units of the scene, L and L/T): %s%s%s; begin nearer to one (--start)%s",
-      pw_file_name (cmd->m.file), period, tried, *cmd->reason ? "; " : "", cmd->reason,
+      pw_file_name (cmd->line.m.file), period, tried, *cmd->reason ? "; " : "", cmd->reason,
       cmd->settings.free ? ", or give --guess"
                          : ", or add losses if the motion grows in every period, as that of a vehicle without any");
 }
@@ -167,20 +164,6 @@ static int periodic_follow (pw_periodic_command *cmd, pw_error *error) {
   if (!periodic_set_stopped (cmd) || status != PW_METHOD) return status;
   *error = (pw_error){ .status = PW_OK }; /* the limit or Ctrl-C prevented the first step */
   return PW_OK;
-}
-
-static int periodic_compute (pw_periodic_command *cmd, pw_error *error) {
-  pw_periodic_orbit o;
-  pw_limit_start (&cmd->limit);
-  cmd->search = pw_periodic_open (cmd->m.system, &cmd->settings, error);
-  if (cmd->search == NULL && error->status == PW_METHOD && periodic_set_stopped (cmd)) *error = (pw_error){ 0 };
-  if (cmd->search == NULL) return error->status;
-  pw_stop_catch ();
-  int status = periodic_find (cmd, &o, error);
-  if (status == PW_RETRY && !periodic_set_stopped (cmd)) status = periodic_fail (cmd, error);
-  if (status == PW_OK) status = cmd->vary_text ? periodic_follow (cmd, error) : periodic_add (cmd, &o, error);
-  pw_stop_release ();
-  return status == PW_RETRY ? PW_OK : status;
 }
 
 /* ---- Reports ---- */
@@ -286,20 +269,20 @@ static const char *periodic_stability (const pw_periodic_orbit *o, char *text, s
 static void periodic_print_motion (const pw_periodic_command *cmd, const pw_periodic_orbit *o) {
   const periodic_displacement d = periodic_displace (o);
   char text[200];
-  printf ("%s: a periodic motion%s\n\n", pw_file_name (cmd->m.file),
+  printf ("%s: a periodic motion%s\n\n", pw_file_name (cmd->line.m.file),
           pw_states_symmetries (pw_periodic_symmetries (cmd->search), text));
   printf ("  period                       %.9g s, %s\n", o->period, cmd->source);
   printf ("  displacement per period      %.6g m", periodic_round (d.total));
   printf (periodic_round (d.total) > 0 ? ": %.6g m along %s, %.6g m to its left\n" : "\n", periodic_round (d.along),
-          pw_system_body_name (cmd->m.system, 0), periodic_round (d.left));
+          pw_system_body_name (cmd->line.m.system, 0), periodic_round (d.left));
   printf ("  rotation per period          %.6g rad\n", periodic_round (o->rotation));
-  periodic_print_rotations (cmd->m.system, o);
+  periodic_print_rotations (cmd->line.m.system, o);
   printf ("  mean speed                   %.6g m/s\n", periodic_round (d.total / o->period));
   periodic_print_multipliers (o, pw_periodic_symmetries (cmd->search));
   printf ("  stability                    %s\n", periodic_stability (o, text, sizeof text));
   printf ("  residual                     %.1e after %s\n", o->residual, PW_COUNTED (o->iterations, "iteration"));
   puts ("\nInitial state");
-  pw_states_print (cmd->m.system, o->q, o->v, 8, PERIODIC_SMALL);
+  pw_states_print (cmd->line.m.system, o->q, o->v, 8, PERIODIC_SMALL);
 }
 
 /* Prints a row for each event and about PERIODIC_POINTS other points. */
@@ -307,7 +290,7 @@ static void periodic_print_branch (const pw_periodic_command *cmd) {
   static const char *const head[] = { "period [s]", "displacement [m]",   "rotation [rad]",
                                       "growing",    "largest multiplier", NULL };
   char text[40];
-  printf ("%s: a branch of periodic motions%s, %s from %.9g to %.9g, %s\n\n", pw_file_name (cmd->m.file),
+  printf ("%s: a branch of periodic motions%s, %s from %.9g to %.9g, %s\n\n", pw_file_name (cmd->line.m.file),
           pw_states_symmetries (pw_periodic_symmetries (cmd->search), text), cmd->vary.name, cmd->settings.first,
           cmd->settings.last, PW_COUNTED (cmd->points, "point"));
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
@@ -341,62 +324,39 @@ static void periodic_print_branch (const pw_periodic_command *cmd) {
 
 /* ---- JSON ---- */
 
-static void periodic_point_json (const pw_periodic_command *cmd, const pw_periodic_orbit *o, pw_json *j) {
-  char text[PW_NAME_BYTES];
-  int n = pw_system_coordinates (cmd->m.system);
-  const periodic_displacement d = periodic_displace (o);
-  j->line = 1;
-  pw_json_open (j, NULL, '{');
-  if (cmd->vary_text) pw_json_number (j, "parameter", o->parameter);
-  if (cmd->vary_text) pw_json_text (j, "event", periodic_events[o->event]);
-  pw_json_number (j, "period", o->period);
-  pw_json_number (j, "displacement", d.total);
-  pw_json_number (j, "along", d.along);
-  pw_json_number (j, "left", d.left);
-  pw_json_number (j, "rotation", o->rotation);
-  pw_json_open (j, "rotations", '{');
-  for (int i = 0; i < periodic_rotations (cmd->m.system); i++)
-    pw_json_number (j, periodic_rotation_name (cmd->m.system, i, text, sizeof text),
-                    periodic_rotation (cmd->m.system, o, i));
-  pw_json_close (j, '}');
-  pw_json_number (j, "residual", o->residual);
-  pw_json_number (j, "iterations", o->iterations);
-  pw_json_number (j, "growing", o->unstable);
-  pw_states_json (cmd->m.system, o->q, o->v, "start", j);
-  pw_states_json (cmd->m.system, o->end, o->end + n, "end", j);
-  pw_json_open (j, "multipliers", '[');
-  for (int i = 0; i < o->multipliers; i++) {
-    pw_json_open (j, NULL, '{');
-    pw_json_number (j, "re", o->re[i]);
-    pw_json_number (j, "im", o->im[i]);
-    pw_json_flag (j, "trivial", i >= o->multipliers - o->trivial);
-    pw_json_close (j, '}');
-  }
-  pw_json_close (j, ']');
-  pw_json_close (j, '}');
-}
-
 static void periodic_json (const void *context, pw_json *j) {
   const pw_periodic_command *cmd = context;
-  pw_json_open (j, NULL, '{');
-  pw_json_number (j, "schema", 1);
-  pw_json_text (j, "model", pw_file_name (cmd->m.file));
-  pw_json_text (j, "parameter", cmd->vary_text ? cmd->vary.name : NULL);
-  pw_json_text (j, "unit", cmd->vary.unit);
-  pw_json_text (j, "method", cmd->settings.method);
-  pw_json_number (j, "symmetries", pw_periodic_symmetries (cmd->search));
-  pw_json_flag (j, "complete", !cmd->stopped);
-  pw_json_open (j, "motions", '[');
-  for (int i = 0; i < cmd->points; i++) periodic_point_json (cmd, &cmd->point[i].orbit, j);
-  pw_json_close (j, ']');
-  pw_json_close (j, '}');
+  const pw_system *s = cmd->line.m.system;
+  char text[PW_NAME_BYTES];
+  pw_json_print (
+      j, "{schema: %d, model: %s, parameter: %s, unit: %s, method: %s, symmetries: %d, complete: %i, motions: [", 1,
+      pw_file_name (cmd->line.m.file), cmd->vary_text ? cmd->vary.name : NULL, cmd->vary.unit, cmd->settings.method,
+      pw_periodic_symmetries (cmd->search), !cmd->stopped);
+  for (const pw_periodic_point *p = cmd->point; p < cmd->point + cmd->points; p++) {
+    const pw_periodic_orbit *o = &p->orbit;
+    const periodic_displacement d = periodic_displace (o);
+    pw_json_print (j, "\n{");
+    if (cmd->vary_text) pw_json_print (j, "parameter: %g, event: %s", o->parameter, periodic_events[o->event]);
+    pw_json_print (j, "period: %g, displacement: %g, along: %g, left: %g, rotation: %g, rotations: {", o->period,
+                   d.total, d.along, d.left, o->rotation);
+    for (int i = 0; i < periodic_rotations (s); i++)
+      pw_json_number (j, periodic_rotation_name (s, i, text, sizeof text), periodic_rotation (s, o, i));
+    pw_json_print (j, "}, residual: %g, iterations: %d, growing: %d", o->residual, o->iterations, o->unstable);
+    pw_states_json (s, o->q, o->v, "start", j);
+    pw_states_json (s, o->end, o->end + pw_system_coordinates (s), "end", j);
+    pw_json_open (j, "multipliers", '[');
+    for (int i = 0; i < o->multipliers; i++)
+      pw_json_print (j, "{re: %g, im: %g, trivial: %i}", o->re[i], o->im[i], i >= o->multipliers - o->trivial);
+    pw_json_print (j, "]}");
+  }
+  pw_json_print (j, "]}");
 }
 
 /* ---- The table ---- */
 
 static int periodic_csv (const void *context, FILE *f, pw_error *error) {
   const pw_periodic_command *cmd = context;
-  const pw_system *s = cmd->m.system;
+  const pw_system *s = cmd->line.m.system;
   int states = 2 * pw_system_coordinates (s), multipliers = cmd->point->orbit.multipliers; /* of every point */
   pw_text t = { .chars = NULL };
   pw_text_name (&t, cmd->vary_text ? cmd->vary.name : "parameter", cmd->vary.unit);
@@ -426,7 +386,7 @@ static int periodic_sample (const pw_periodic_command *cmd, int bodies, double *
   const pw_periodic_orbit *o = &cmd->point->orbit;
   const pw_settings settings = { .span = o->period, .rtol = 1e-9 }; /* finer than lines in a figure */
   int status;
-  pw_run *r = pw_run_open (cmd->m.system, cmd->settings.method, &settings, error);
+  pw_run *r = pw_run_open (cmd->line.m.system, cmd->settings.method, &settings, error);
   if (r == NULL) return error->status;
   status = pw_run_restart (r, o->q, o->v, error);
   for (int i = 0; i <= PERIODIC_SAMPLES && status == PW_OK; i++) {
@@ -445,7 +405,7 @@ static int periodic_sample (const pw_periodic_command *cmd, int bodies, double *
 
 /* Paths of the bodies, and their angular velocities over their angles. */
 static int periodic_draw_motion (const pw_periodic_command *cmd, pw_curves *c, pw_error *error) {
-  const int all = pw_system_bodies (cmd->m.system), bodies = all < PERIODIC_BODIES ? all : PERIODIC_BODIES;
+  const int all = pw_system_bodies (cmd->line.m.system), bodies = all < PERIODIC_BODIES ? all : PERIODIC_BODIES;
   double *row = malloc ((size_t)(4 * bodies * (PERIODIC_SAMPLES + 1) + 1) * sizeof *row);
   int status = row ? periodic_sample (cmd, bodies, row, error) : pw_fail (error, PW_RESOURCE, "out of memory");
   for (int phase = 0; phase < 2 && status == PW_OK; phase++) {
@@ -454,7 +414,7 @@ static int periodic_draw_motion (const pw_periodic_command *cmd, pw_curves *c, p
                  : &(pw_panel){ .x_label = "x [m]", .y_label = "y [m]", .type = PW_PANEL_EQUAL });
     for (int b = 0; b < bodies; b++) {
       char name[FIGURE_NAME + 4];
-      pw_curves_add (c, "line", pw_figure_name (pw_system_body_name (cmd->m.system, b), name));
+      pw_curves_add (c, "line", pw_figure_name (pw_system_body_name (cmd->line.m.system, b), name));
       for (const double *at = row + 4 * b; at < row + 4 * bodies * (PERIODIC_SAMPLES + 1); at += 4 * bodies)
         pw_curves_point (c, at[2 * phase], at[2 * phase + 1], 0);
     }
@@ -474,22 +434,6 @@ static double periodic_curve (const pw_periodic_orbit *o, int k) {
   return k == 0 ? periodic_round (d.total) : k == 1 ? periodic_largest (o) : o->period;
 }
 
-/* Draws the parts of the branch whose motions have no growing perturbations (`stable`: 1), or have some (0).  A point
- * where one part ends and the next begins belongs to both.  From an event on, the stability is that of the next
- * point. */
-static void periodic_draw_parts (const pw_periodic_command *cmd, pw_curves *c, int k, int stable) {
-  int inside = 0; /* 1: the last point began or continued a part */
-  pw_curves_add (c, stable ? "stable" : "unstable", stable ? "stable" : "unstable");
-  for (const pw_periodic_point *p = cmd->point; p < cmd->point + cmd->points; p++) {
-    int last = p + 1 == cmd->point + cmd->points;
-    const pw_periodic_point *after = p->orbit.event == PW_PERIODIC_POINT ? p : p + 1;
-    int here = !last && (after->orbit.unstable == 0) == stable;
-    if (here || inside) pw_curves_point (c, p->orbit.parameter, periodic_curve (&p->orbit, k), 0);
-    if (!here) pw_curves_point (c, NAN, NAN, 0);
-    inside = here;
-  }
-}
-
 /* Curves over the parameter, of what is not constant. */
 static void periodic_draw_branch (const pw_periodic_command *cmd, pw_curves *c, const double range[2]) {
   static const char *const label[PERIODIC_CURVES] = { "displacement [m]", "largest modulus", "period [s]" };
@@ -504,7 +448,20 @@ static void periodic_draw_branch (const pw_periodic_command *cmd, pw_curves *c, 
                                      .y_label = label[k],
                                      .x = { range[0], range[1] },
                                      .type = PW_PANEL_BELOW });
-    for (int stable = 1; stable >= 0; stable--) periodic_draw_parts (cmd, c, k, stable);
+    /* the parts whose motions have no growing perturbations, then those whose motions have some; a point where one part
+     * ends and the next begins belongs to both; from an event on, the stability is that of the next point */
+    for (int stable = 1; stable >= 0; stable--) {
+      int inside = 0; /* 1: the last point began or continued a part */
+      pw_curves_add (c, stable ? "stable" : "unstable", stable ? "stable" : "unstable");
+      for (const pw_periodic_point *p = cmd->point; p < cmd->point + cmd->points; p++) {
+        int last = p + 1 == cmd->point + cmd->points;
+        const pw_periodic_point *after = p->orbit.event == PW_PERIODIC_POINT ? p : p + 1;
+        int here = !last && (after->orbit.unstable == 0) == stable;
+        if (here || inside) pw_curves_point (c, p->orbit.parameter, periodic_curve (&p->orbit, k), 0);
+        if (!here) pw_curves_point (c, NAN, NAN, 0);
+        inside = here;
+      }
+    }
   }
 }
 
@@ -537,7 +494,7 @@ static int periodic_write (const pw_periodic_command *cmd, pw_error *error) {
   const char *title = cmd->vary_text ? "periodic motions" : "periodic motion over one period, Floquet multipliers";
   pw_curves c;
   int status = pw_figure_write_tables (cmd->folder, "periodic", 1, cmd, periodic_csv, periodic_json, error);
-  if (status == PW_OK) status = pw_curves_open (&c, &cmd->line, &cmd->m, cmd->folder, "periodic", title, error);
+  if (status == PW_OK) status = pw_curves_open (&c, &cmd->line, cmd->folder, "periodic", title, error);
   if (status != PW_OK) return status;
   if (cmd->vary_text)
     periodic_draw_branch (cmd, &c, range);
@@ -551,20 +508,29 @@ static int periodic_write (const pw_periodic_command *cmd, pw_error *error) {
 
 static int periodic_command (void *options, pw_error *error) {
   pw_periodic_command *cmd = options;
-  int status = pw_cli_open (&cmd->m, &cmd->line, error);
+  int status = pw_cli_open (&cmd->line, error);
   if (status == PW_OK) status = periodic_read_options (cmd, error);
-  if (status == PW_OK)
-    status = pw_figure_lock_folder (&cmd->line, &cmd->m, cmd->folder, "periodic", &cmd->files, error);
-  if (status == PW_OK) pw_report_model (&cmd->m), pw_cli_report_tables (cmd->m.system, cmd->settings.period);
-  if (status == PW_OK) status = periodic_compute (cmd, error);
+  if (status == PW_OK) status = pw_figure_lock_folder (&cmd->line, cmd->folder, "periodic", error);
+  if (status == PW_OK) pw_report_model (&cmd->line.m), pw_cli_report_tables (cmd->line.m.system, cmd->settings.period);
+  if (status == PW_OK) {
+    pw_periodic_orbit o;
+    pw_limit_start (&cmd->limit);
+    cmd->search = pw_periodic_open (cmd->line.m.system, &cmd->settings, error);
+    if (cmd->search == NULL && error->status == PW_METHOD && periodic_set_stopped (cmd)) *error = (pw_error){ 0 };
+    pw_stop_catch ();
+    status = cmd->search ? periodic_find (cmd, &o, error) : error->status;
+    if (status == PW_RETRY && !periodic_set_stopped (cmd)) status = periodic_fail (cmd, error);
+    if (status == PW_OK && cmd->search)
+      status = cmd->vary_text ? periodic_follow (cmd, error) : periodic_add (cmd, &o, error);
+    pw_stop_release ();
+    if (status == PW_RETRY) status = PW_OK;
+  }
   if (status == PW_OK && cmd->points && cmd->vary_text) periodic_print_branch (cmd);
   if (status == PW_OK && cmd->points && !cmd->vary_text) periodic_print_motion (cmd, &cmd->point->orbit);
   if (status == PW_OK && cmd->points && cmd->folder) status = periodic_write (cmd, error);
-  pw_files_close (&cmd->files);
   for (int i = 0; i < cmd->points; i++) free (cmd->point[i].state);
   free (cmd->point);
   pw_periodic_close (cmd->search);
-  pw_cli_close_model (&cmd->m);
   return status == PW_OK && cmd->stopped ? pw_cli_incomplete (&cmd->line, error) : status;
 }
 

@@ -22,8 +22,6 @@ typedef struct {
   const char **by; /* of --by, ended by NULL */
   const char **of; /* of --of, ended by NULL */
   const char *every, *folder, *jobs_text;
-  pw_cli_model m;
-  pw_files files;
   pw_unknowns unknowns;   /* P of them */
   pw_run_outputs outputs; /* method NULL: the run itself; set by sensitivity_prepare for the runs that are compared */
   int jobs;               /* threads */
@@ -32,7 +30,6 @@ typedef struct {
   int runs;
   double cpu; /* processor time of the computation [s] */
   /* results; comments on arrays begin with their sizes */
-  pw_arena arena;
   pw_outcomes outcomes;      /* types and units of the outputs, not their values */
   double *value;             /* outputs: of the run by the method of the unknowns */
   double *table;             /* outputs x rows; NaN for outputs that are not in the table */
@@ -44,21 +41,6 @@ static const double SENSITIVITY_RTOL = 1e-12, /* of the runs that are compared *
 
 /* ---- What can be differentiated ---- */
 
-/* Opens a run with unknown p changed by `by`. */
-static int sensitivity_neighbour (const sensitivity *cmd, const double *values, int p, double by, pw_unknown_run *run,
-                                  pw_error *error) {
-  const pw_unknowns *u = &cmd->unknowns;
-  double *x = malloc ((size_t)u->count * sizeof *x);
-  if (x == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  memcpy (x, values, (size_t)u->count * sizeof *x);
-  x[p] += by;
-  int status = pw_unknown_run_prepare (run, u, x, error);
-  free (x);
-  if (status != PW_OK) return status;
-  run->run = pw_limit_open (run->m.system, u->method, &run->settings, error);
-  return run->run ? PW_OK : error->status;
-}
-
 /* Opens the neighbours on both sides.  Refuses a parameter that changes the number of bodies or elements, and an
  * initial value that the constraints determine: making a neighbour consistent moves it by more than 1 % of the step.  A
  * neighbour that cannot be opened is no error here: the differences use the other side. */
@@ -69,10 +51,16 @@ static int sensitivity_check (const sensitivity *cmd, const double *values, int 
   const int n = pw_system_coordinates (s);
   const double step = SENSITIVITY_PROBE * unknown->size;
   int status = PW_OK;
+  double *x = malloc ((size_t)u->count * sizeof *x);
+  if (x == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  memcpy (x, values, (size_t)u->count * sizeof *x);
   for (int side = -1; side <= 1 && status == PW_OK; side += 2) {
     pw_unknown_run run = { .run = NULL };
     pw_error own = { 0 };
-    int opened = sensitivity_neighbour (cmd, values, p, side * step, &run, &own);
+    x[p] = values[p] + side * step;
+    int opened = pw_unknown_run_prepare (&run, u, x, &own);
+    if (opened == PW_OK && (run.run = pw_limit_open (run.m.system, u->method, &run.settings, &own)) == NULL)
+      opened = own.status;
     if (opened == PW_RESOURCE) status = pw_fail (error, opened, "%s", own.text);
     const pw_system *other = run.m.system;
     if (opened == PW_OK &&
@@ -92,6 +80,7 @@ static int sensitivity_check (const sensitivity *cmd, const double *values, int 
     }
     pw_unknown_run_close (&run);
   }
+  free (x);
   return status;
 }
 
@@ -112,7 +101,7 @@ static int sensitivity_evaluate (void *context, const double *x, double rtol, do
 static int sensitivity_differentiate (sensitivity *cmd, const double *values, pw_error *error) {
   const pw_unknowns *u = &cmd->unknowns;
   const int outputs = cmd->outputs.count * (1 + cmd->outputs.rows);
-  cmd->derivative = pw_arena_alloc (&cmd->arena, (size_t)u->count * (size_t)outputs * sizeof *cmd->derivative);
+  cmd->derivative = pw_arena_alloc (&cmd->line.arena, (size_t)u->count * (size_t)outputs * sizeof *cmd->derivative);
   if (cmd->derivative == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   const pw_difference_settings d = { .evaluate = sensitivity_evaluate,
                                      .context = cmd,
@@ -134,7 +123,8 @@ static int sensitivity_prepare (sensitivity *cmd, const double *values, pw_error
   if (status == PW_OK && r == NULL) status = error->status;
   for (int p = 0; p < u->count && status == PW_OK; p++) pw_unknown_measure (&u->list[p], values[p], r);
   if (status == PW_OK) {
-    cmd->outputs.method = pw_accurate_method (run.m.system, &run.settings, u->t_end, &cmd->outputs.max_steps, error);
+    cmd->outputs.method =
+        pw_accurate_method (run.m.system, &run.settings, u->settings.span, &cmd->outputs.max_steps, error);
     if (cmd->outputs.method == NULL && error->status == PW_OK)
       status = pw_stop
                    ? PW_RETRY
@@ -155,13 +145,13 @@ static int sensitivity_prepare (sensitivity *cmd, const double *values, pw_error
 static int sensitivity_solve (sensitivity *cmd, pw_error *error) {
   const pw_unknowns *u = &cmd->unknowns;
   const size_t count = (size_t)cmd->outputs.count, rows = (size_t)cmd->outputs.rows;
-  double *values = pw_arena_alloc (&cmd->arena, (size_t)u->count * sizeof *values);
-  cmd->value = pw_arena_alloc (&cmd->arena, count * (1 + rows) * sizeof *cmd->value);
+  double *values = pw_arena_alloc (&cmd->line.arena, (size_t)u->count * sizeof *values);
+  cmd->value = pw_arena_alloc (&cmd->line.arena, count * (1 + rows) * sizeof *cmd->value);
   if (values == NULL || cmd->value == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   cmd->table = cmd->value + count;
   for (int p = 0; p < u->count; p++) values[p] = u->list[p].value;
-  int status = pw_outcomes_open (&cmd->outcomes, u->m->system, cmd->outputs.option, cmd->outputs.of, cmd->outputs.count,
-                                 cmd->line.until, error);
+  int status = pw_outcomes_open (&cmd->outcomes, cmd->line.m.system, cmd->outputs.option, cmd->outputs.of,
+                                 cmd->outputs.count, cmd->line.until, error);
   if (status == PW_OK) status = pw_run_outputs_at (&cmd->outputs, values, cmd->value, cmd->table, error);
   if (status == PW_OK) status = sensitivity_prepare (cmd, values, error);
   for (int p = 0; p < u->count && status == PW_OK; p++) status = sensitivity_check (cmd, values, p, error);
@@ -232,7 +222,7 @@ static void sensitivity_print_row (const sensitivity *cmd, pw_table *table, int 
 static void sensitivity_print (const sensitivity *cmd) {
   const pw_unknowns *u = &cmd->unknowns;
   char unit[SENSITIVITY_UNIT], reason[500];
-  printf ("%s by %s to t = %.9g s\n", pw_file_name (u->m->file), u->method, u->t_end);
+  printf ("%s by %s to t = %.9g s\n", pw_file_name (cmd->line.m.file), u->method, u->settings.span);
   for (int o = 0; o < cmd->outputs.count; o++) {
     pw_outcome_unit (&cmd->outcomes, o, unit, sizeof unit);
     pw_cli_print (stdout, "\n%s = %s %s\n", cmd->outputs.of[o], PW_DIGITS (cmd->value[o], 12), unit);
@@ -274,44 +264,26 @@ static void sensitivity_warn (const sensitivity *cmd) {
 
 /* ---- Files ---- */
 
-static void sensitivity_json_derivative (const sensitivity *cmd, pw_json *j, int output, int unknown) {
-  char unit[SENSITIVITY_UNIT], reason[500];
-  const pw_unknown *u = &cmd->unknowns.list[unknown];
-  const pw_derivative *d = sensitivity_of (cmd, output, unknown, -1);
-  pw_json_open (j, NULL, '{');
-  pw_json_text (j, "by", u->name);
-  pw_json_number (j, "value", u->value);
-  pw_json_text (j, "unit", sensitivity_unit (cmd, output, unknown, unit));
-  pw_json_number (j, "derivative", d->value);
-  pw_json_number (j, "error", d->error);
-  pw_json_number (j, "elasticity", sensitivity_elasticity (cmd, output, unknown));
-  if (d->type != PW_DERIVATIVE) pw_json_text (j, "reason", sensitivity_reason (u, d, reason, sizeof reason));
-  pw_json_close (j, '}');
-}
-
 static void sensitivity_json (const void *context, pw_json *j) {
   const sensitivity *cmd = context;
-  char unit[SENSITIVITY_UNIT];
-  pw_json_open (j, NULL, '{');
-  pw_json_text (j, "model", pw_file_name (cmd->unknowns.m->file));
-  pw_json_text (j, "method", cmd->unknowns.method);
-  pw_json_text (j, "derivatives_by", cmd->outputs.method);
-  pw_json_number (j, "t_end", cmd->unknowns.t_end);
-  pw_json_flag (j, "complete", 1);
-  pw_json_number (j, "cpu_seconds", cmd->cpu);
-  pw_json_open (j, "outputs", '[');
+  char unit[SENSITIVITY_UNIT], reason[500];
+  pw_json_print (j, "{model: %s, method: %s, derivatives_by: %s, t_end: %g, complete: %i, cpu_seconds: %g, outputs: [",
+                 pw_file_name (cmd->line.m.file), cmd->unknowns.method, cmd->outputs.method,
+                 cmd->unknowns.settings.span, 1, cmd->cpu);
   for (int o = 0; o < cmd->outputs.count; o++) {
-    pw_json_open (j, NULL, '{');
-    pw_json_text (j, "output", cmd->outputs.of[o]);
-    pw_json_text (j, "unit", pw_outcome_unit (&cmd->outcomes, o, unit, sizeof unit));
-    pw_json_number (j, "value", cmd->value[o]);
-    pw_json_open (j, "derivatives", '[');
-    for (int p = 0; p < cmd->unknowns.count; p++) sensitivity_json_derivative (cmd, j, o, p);
-    pw_json_close (j, ']');
-    pw_json_close (j, '}');
+    pw_json_print (j, "{output: %s, unit: %s, value: %g, derivatives: [", cmd->outputs.of[o],
+                   pw_outcome_unit (&cmd->outcomes, o, unit, sizeof unit), cmd->value[o]);
+    for (int p = 0; p < cmd->unknowns.count; p++) {
+      const pw_unknown *u = &cmd->unknowns.list[p];
+      const pw_derivative *d = sensitivity_of (cmd, o, p, -1);
+      pw_json_print (j, "{by: %s, value: %g, unit: %s, derivative: %g, error: %g, elasticity: %g", u->name, u->value,
+                     sensitivity_unit (cmd, o, p, unit), d->value, d->error, sensitivity_elasticity (cmd, o, p));
+      if (d->type != PW_DERIVATIVE) pw_json_text (j, "reason", sensitivity_reason (u, d, reason, sizeof reason));
+      pw_json_close (j, '}');
+    }
+    pw_json_print (j, "]}");
   }
-  pw_json_close (j, ']');
-  pw_json_close (j, '}');
+  pw_json_print (j, "]}");
 }
 
 /* Adds a cell "NAME [UNIT]", in quotes if the name contains a comma. */
@@ -347,33 +319,23 @@ static int sensitivity_csv (const void *context, FILE *f, pw_error *error) {
   return status;
 }
 
-/* The label of a curve in the figure. */
-static void sensitivity_label (const sensitivity *cmd, int output, int unknown, char *label, size_t size) {
-  char unit[SENSITIVITY_UNIT], buffer[FIGURE_NAME + 4];
-  const char *name = pw_figure_name (cmd->unknowns.list[unknown].name, buffer);
-  if (cmd->unknowns.list[unknown].value != 0) {
-    pw_outcome_unit (&cmd->outcomes, output, unit, sizeof unit);
-    snprintf (label, size, *unit ? "%s × ∂/∂%s [%s]" : "%s × ∂/∂%s", name, name, unit);
-  } else {
-    sensitivity_unit (cmd, output, unknown, unit);
-    snprintf (label, size, *unit ? "∂/∂%s [%s]" : "∂/∂%s", name, unit);
-  }
-}
-
 /* Draws the derivatives along the run, times the value of the unknown unless that is 0, so that unknowns can be
  * compared. */
 static int sensitivity_draw (const sensitivity *cmd, pw_error *error) {
   const pw_unknowns *u = &cmd->unknowns;
   pw_curves c;
-  int status = pw_curves_open (&c, &cmd->line, &cmd->m, cmd->folder, "sensitivity", "derivatives along the run", error);
+  int status = pw_curves_open (&c, &cmd->line, cmd->folder, "sensitivity", "derivatives along the run", error);
   if (status != PW_OK) return status;
   for (int o = 0; o < cmd->outputs.count; o++) {
-    char label[300];
-    pw_curves_panel (
-        &c, &(pw_panel){ .x_label = "t [s]", .y_label = PW_FIGURE_LABEL (cmd->outputs.of[o], ""), .x[1] = u->t_end });
+    char label[300], unit[SENSITIVITY_UNIT], buffer[FIGURE_NAME + 4];
+    pw_curves_panel (&c, &(pw_panel){ .x_label = "t [s]",
+                                      .y_label = PW_FIGURE_LABEL (cmd->outputs.of[o], ""),
+                                      .x[1] = u->settings.span });
     for (int p = 0; p < u->count; p++) {
-      const double factor = u->list[p].value != 0 ? u->list[p].value : 1;
-      sensitivity_label (cmd, o, p, label, sizeof label);
+      const double value = u->list[p].value, factor = value != 0 ? value : 1;
+      const char *name = pw_figure_name (u->list[p].name, buffer), *times = value != 0 ? name : "";
+      value != 0 ? pw_outcome_unit (&cmd->outcomes, o, unit, sizeof unit) : sensitivity_unit (cmd, o, p, unit);
+      snprintf (label, sizeof label, *unit ? "%s%s∂/∂%s [%s]" : "%s%s∂/∂%s", times, *times ? " × " : "", name, unit);
       pw_curves_add (&c, "line", label);
       for (int i = 0; i < cmd->outputs.rows; i++)
         pw_curves_point (&c, cmd->outputs.t[i], sensitivity_of (cmd, o, p, i)->value * factor, 0);
@@ -382,31 +344,12 @@ static int sensitivity_draw (const sensitivity *cmd, pw_error *error) {
   return pw_curves_draw (&c, PW_OK, error);
 }
 
-static int sensitivity_write (const sensitivity *cmd, pw_error *error) {
-  int status = pw_figure_write_tables (cmd->folder, "sensitivity", 5, cmd, cmd->line.until ? NULL : sensitivity_csv,
-                                       sensitivity_json, error);
-  return status == PW_OK && cmd->outputs.rows > 1 ? sensitivity_draw (cmd, error) : status;
-}
-
 /* ---- The command ---- */
-
-/* Sets the times of the table: from 0 to the end, `every` apart. */
-static int sensitivity_set_rows (sensitivity *cmd, double every, pw_error *error) {
-  const double t_end = cmd->unknowns.t_end,
-               count = ceil (t_end / every * (1 - 1e-12)); /* the factor: no row a round-off before t_end */
-  if (count > 1e7) return pw_fail (error, PW_INPUT, "--every %g: expected at most 1e7 rows", every);
-  double *t = pw_arena_alloc (&cmd->arena, ((size_t)count + 2) * sizeof *t);
-  if (t == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  for (int i = 0; i < (int)count; i++) t[i] = i * every;
-  t[(int)count] = t_end;
-  cmd->outputs.t = t, cmd->outputs.rows = (int)count + 1;
-  return PW_OK;
-}
 
 static int sensitivity_open (sensitivity *cmd, pw_error *error) {
   double every = 0;
-  int status = pw_cli_open (&cmd->m, &cmd->line, error);
-  if (status == PW_OK) status = pw_unknowns_open (&cmd->unknowns, &cmd->line, &cmd->m, error);
+  int status = pw_cli_open (&cmd->line, error);
+  if (status == PW_OK) status = pw_unknowns_open (&cmd->unknowns, &cmd->line, error);
   if (status == PW_OK) status = pw_unknowns_engine (&cmd->unknowns, SENSITIVITY_RUNS, 1, error);
   if (status == PW_OK) status = pw_parallel_jobs (cmd->jobs_text, &cmd->jobs, error);
   if (status == PW_OK) status = pw_cli_requires ("--every", cmd->every, "-o DIR", cmd->folder != NULL, error);
@@ -420,37 +363,44 @@ static int sensitivity_open (sensitivity *cmd, pw_error *error) {
   while (cmd->of[cmd->outputs.count]) cmd->outputs.count++;
   if (cmd->line.until && cmd->every)
     return pw_fail (error, PW_INPUT, "--every cannot be given together with --until: there is no table");
-  if (cmd->folder && !cmd->line.until) /* the times of rows must not vary */
-    status = sensitivity_set_rows (cmd, every > 0 ? every : cmd->unknowns.t_end / SENSITIVITY_ROWS, error);
-  return status == PW_OK ? pw_unknowns_differentiated (&cmd->unknowns, cmd->by, error) : status;
-}
-
-static int sensitivity_compute (sensitivity *cmd, pw_error *error) {
-  pw_stop_catch ();
-  pw_progress_start (&cmd->progress, pw_file_name (cmd->m.file), "runs", 0, SENSITIVITY_RUNS * cmd->unknowns.count);
-  int status = sensitivity_solve (cmd, error);
-  pw_progress_end (&cmd->progress);
-  pw_stop_release ();
-  return status;
+  if (cmd->folder && !cmd->line.until) { /* the table has rows from 0 to the end, whose times must not vary */
+    const double t_end = cmd->unknowns.settings.span;
+    if (every == 0) every = t_end / SENSITIVITY_ROWS;
+    const double count = ceil (t_end / every * (1 - 1e-12)); /* the factor: no row a round-off before t_end */
+    if (count > 1e7) return pw_fail (error, PW_INPUT, "--every %g: expected at most 1e7 rows", every);
+    double *t = pw_arena_alloc (&cmd->line.arena, ((size_t)count + 2) * sizeof *t);
+    if (t == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+    for (int i = 0; i < (int)count; i++) t[i] = i * every;
+    t[(int)count] = t_end;
+    cmd->outputs.t = t, cmd->outputs.rows = (int)count + 1;
+  }
+  return pw_unknowns_differentiated (&cmd->unknowns, cmd->by, error);
 }
 
 static int sensitivity_command (void *options, pw_error *error) {
   sensitivity *cmd = options;
+  const char *folder = cmd->folder;
   int status = sensitivity_open (cmd, error);
-  if (status == PW_OK)
-    status = pw_figure_lock_folder (&cmd->line, &cmd->m, cmd->folder, "sensitivity", &cmd->files, error);
-  if (status == PW_OK)
-    pw_report_model (&cmd->m), status = pw_report_initial_state (&cmd->m, cmd->unknowns.limit, error);
-  const double start = pw_seconds (CLOCK_PROCESS_CPUTIME_ID);
-  if (status == PW_OK) status = sensitivity_compute (cmd, error);
-  cmd->cpu = pw_seconds (CLOCK_PROCESS_CPUTIME_ID) - start;
+  if (status == PW_OK) status = pw_figure_lock_folder (&cmd->line, folder, "sensitivity", error);
+  if (status == PW_OK) pw_report_model (&cmd->line.m);
+  if (status == PW_OK) status = pw_report_initial_state (&cmd->line.m, cmd->unknowns.limit, error);
+  if (status == PW_OK) {
+    const double start = pw_seconds (CLOCK_PROCESS_CPUTIME_ID);
+    pw_stop_catch ();
+    pw_progress_start (&cmd->progress, pw_file_name (cmd->line.m.file), "runs", 0,
+                       SENSITIVITY_RUNS * cmd->unknowns.count);
+    status = sensitivity_solve (cmd, error);
+    pw_progress_end (&cmd->progress);
+    pw_stop_release ();
+    cmd->cpu = pw_seconds (CLOCK_PROCESS_CPUTIME_ID) - start;
+  }
   if (status == PW_OK) sensitivity_print (cmd), sensitivity_warn (cmd);
-  if (status == PW_OK && cmd->folder) status = sensitivity_write (cmd, error);
-  pw_files_close (&cmd->files);
+  if (status == PW_OK && folder)
+    status = pw_figure_write_tables (folder, "sensitivity", 5, cmd, cmd->line.until ? NULL : sensitivity_csv,
+                                     sensitivity_json, error);
+  if (status == PW_OK && folder && cmd->outputs.rows > 1) status = sensitivity_draw (cmd, error);
   pw_outcomes_close (&cmd->outcomes);
-  pw_arena_free (&cmd->arena);
   pw_unknowns_close (&cmd->unknowns);
-  pw_cli_close_model (&cmd->m);
   return status == PW_RETRY ? pw_cli_incomplete (&cmd->line, error) : status;
 }
 

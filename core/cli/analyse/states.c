@@ -2,8 +2,6 @@
 #include "states.h"
 #include "cli.h"
 
-enum { STATES_BODIES = 20 }; /* printed, at most */
-
 int pw_hold_add (const pw_system *s, const char *option, const char *text, const char *name, double value,
                  pw_initial_value *hold, int *holds, pw_error *error) {
   if (*holds == PW_HOLDS) return pw_fail (error, PW_INPUT, "%s: more than %d values are held", option, PW_HOLDS);
@@ -29,19 +27,9 @@ int pw_hold_read (const pw_system *s, const char **texts, pw_initial_value *hold
 }
 
 void pw_states_print (const pw_system *s, const double *q, const double *v, int digits, double least) {
-  static const char *const head[] = {
-    "", "x [m]", "y [m]", "phi [rad]", "vx [m/s]", "vy [m/s]", "omega [rad/s]", NULL
-  };
   int bodies = pw_system_bodies (s);
-  for (pw_table t = { 0 }; pw_table_pass (&t);) {
-    pw_head (&t, -12, 12, head);
-    for (int b = 0; b < bodies && b < STATES_BODIES; b++) {
-      pw_cell (&t, -12, pw_system_body_name (s, b));
-      for (int k = 0; k < 6; k++) pw_cell_number (&t, 12, pw_rounded ((k < 3 ? q : v)[3 * b + k % 3], least), digits);
-      pw_row_end (&t);
-    }
-  }
-  if (bodies > STATES_BODIES) printf ("  and %d more bodies\n", bodies - STATES_BODIES);
+  pw_print_bodies (s, q, v, "", -12, 12, digits, least);
+  if (bodies > PW_BODIES_PRINTED) printf ("  and %d more bodies\n", bodies - PW_BODIES_PRINTED);
   for (int n = pw_system_coordinates (s), j = n - pw_system_states (s); j < n; j++)
     printf ("  %s = %s %s\n", PW_NAME (pw_system_state_name, s, n + j), PW_DIGITS (pw_rounded (v[j], least), digits),
             pw_system_state_unit (s, n + j));

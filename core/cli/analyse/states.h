@@ -25,7 +25,7 @@ int pw_hold_read (const pw_system *s, const char **texts, pw_initial_value *hold
 static inline double pw_rounded (double value, double least) {
   return fabs (value) < least ? 0 : value;
 }
-/* Prints x, y, phi and their rates of the bodies, at most 20, with 0 for numbers below `least`. */
+/* Prints the states of the bodies by pw_print_bodies, and the first-order states. */
 void pw_states_print (const pw_system *s, const double *q, const double *v, int digits, double least);
 /* Writes an object with the names and values of all states. */
 void pw_states_json (const pw_system *s, const double *q, const double *v, const char *key, pw_json *j);

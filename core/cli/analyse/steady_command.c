@@ -23,8 +23,6 @@ enum { PW_STEADY_REASON = 200 }; /* longest reason, its end included */
 typedef struct {
   pw_cli_line line;
   const char **hold_texts, *vary_text, *starts_text, *at_text, *folder;
-  pw_cli_model m;
-  pw_files files;
   pw_limit limit;
   pw_steady_settings settings;
   pw_initial_value hold[PW_HOLDS]; /* settings.holds values */
@@ -51,20 +49,20 @@ enum { TO_FIRST = -1, TO_LAST = 1 };
 
 /* Reads --vary NAME=FIRST:LAST: NAME is a parameter of the model, or a quantity that is held at the varied value. */
 static int steady_read_vary (pw_steady_command *cmd, pw_error *error) {
-  if (pw_vary_read (&cmd->vary, &cmd->line, &cmd->m, cmd->vary_text, error) != PW_OK) return PW_INPUT;
+  if (pw_vary_read (&cmd->vary, &cmd->line, cmd->vary_text, error) != PW_OK) return PW_INPUT;
   cmd->settings.first = cmd->vary.first, cmd->settings.last = cmd->vary.last;
   if (cmd->vary.parameter) {
     cmd->settings.compile = pw_vary_compile;
     cmd->settings.context = &cmd->vary;
     return PW_OK;
   }
-  if (strchr (cmd->vary.name, '.') == NULL &&
-      pw_system_find_state (cmd->m.system, cmd->vary.name, NULL) < 0) /* no parameter: fails with the nearest name */
-    return pw_model_set (cmd->m.model, cmd->vary.name, cmd->settings.first, error);
+  if (strchr (cmd->vary.name, '.') == NULL && pw_system_find_state (cmd->line.m.system, cmd->vary.name, NULL) <
+                                                  0) /* no parameter: fails with the nearest name */
+    return pw_model_set (cmd->line.m.model, cmd->vary.name, cmd->settings.first, error);
   cmd->settings.vary = cmd->settings.holds;
-  int status = pw_hold_add (cmd->m.system, "--vary", cmd->vary_text, cmd->vary.name, cmd->settings.first, cmd->hold,
-                            &cmd->settings.holds, error);
-  if (status == PW_OK) cmd->vary.unit = pw_system_held_unit (cmd->m.system, cmd->hold[cmd->settings.vary].state);
+  int status = pw_hold_add (cmd->line.m.system, "--vary", cmd->vary_text, cmd->vary.name, cmd->settings.first,
+                            cmd->hold, &cmd->settings.holds, error);
+  if (status == PW_OK) cmd->vary.unit = pw_system_held_unit (cmd->line.m.system, cmd->hold[cmd->settings.vary].state);
   return status;
 }
 
@@ -72,7 +70,7 @@ static int steady_read_options (pw_steady_command *cmd, pw_error *error) {
   double starts = 0;
   int status = pw_cli_number ("--at", cmd->at_text, PW_NONNEGATIVE, &cmd->settings.t, error);
   cmd->limit.seconds = INFINITY;
-  cmd->settings.span = pw_cli_defaults (pw_file_table (cmd->m.file)).t_end;
+  cmd->settings.span = cmd->line.m.defaults.t_end;
   cmd->settings.vary = -1; /* none of the values held */
   cmd->settings.hold = cmd->hold;
   if (status == PW_OK) status = pw_cli_number ("--limit", cmd->line.limit, PW_POSITIVE, &cmd->limit.seconds, error);
@@ -80,7 +78,8 @@ static int steady_read_options (pw_steady_command *cmd, pw_error *error) {
   if (status == PW_OK) status = pw_cli_number ("--starts", cmd->starts_text, PW_REAL, &starts, error);
   if (status == PW_OK && !(starts >= 0 && starts <= 1e9 && starts == floor (starts)))
     status = pw_fail (error, PW_INPUT, "--starts %s: expected a whole number >= 0", cmd->starts_text);
-  if (status == PW_OK) status = pw_hold_read (cmd->m.system, cmd->hold_texts, cmd->hold, &cmd->settings.holds, error);
+  if (status == PW_OK)
+    status = pw_hold_read (cmd->line.m.system, cmd->hold_texts, cmd->hold, &cmd->settings.holds, error);
   if (status == PW_OK && cmd->vary_text) status = steady_read_vary (cmd, error);
   cmd->random_attempts = (int)starts;
   return status;
@@ -89,7 +88,7 @@ static int steady_read_options (pw_steady_command *cmd, pw_error *error) {
 /* ---- Points ---- */
 
 static pw_steady_point *steady_add (pw_steady_command *cmd, const pw_steady_motion *m, int attempt, pw_error *error) {
-  size_t coordinates = (size_t)pw_system_coordinates (cmd->m.system), n = (size_t)m->linear->unknowns;
+  size_t coordinates = (size_t)pw_system_coordinates (cmd->line.m.system), n = (size_t)m->linear->unknowns;
   int status = pw_grow (&cmd->point, (size_t)cmd->points, &cmd->room, sizeof *cmd->point);
   double *a = status == PW_OK ? malloc ((2 * coordinates + 2 * n) * sizeof *a + n) : NULL;
   if (a == NULL) return pw_fail (error, PW_RESOURCE, "out of memory"), NULL;
@@ -108,20 +107,8 @@ static pw_steady_point *steady_add (pw_steady_command *cmd, const pw_steady_moti
 
 /* The error of this status after pw_steady_suggest. */
 static int steady_unadvised (const pw_steady_command *cmd, int status, pw_error *error) {
-  return pw_fail (error, status, "%s: %s", pw_file_name (cmd->m.file),
+  return pw_fail (error, status, "%s: %s", pw_file_name (cmd->line.m.file),
                   status == PW_RESOURCE ? "out of memory" : "the family of the steady motion cannot be determined");
-}
-
-/* Stores the options --hold which, besides those given, select the motion last found within its family. */
-static int steady_advise (pw_steady_command *cmd, pw_steady_point *p, pw_error *error) {
-  pw_initial_value hold[PW_HOLDS];
-  size_t used = 0;
-  int count = p->motion.family > 0 ? pw_steady_suggest (cmd->search, hold, PW_HOLDS) : 0;
-  for (int i = 0; i < count && used < sizeof p->advice; i++)
-    used += (size_t)snprintf (p->advice + used, sizeof p->advice - used, " --hold %s=%.9g",
-                              PW_NAME (pw_system_held_name, cmd->m.system, hold[i].state), hold[i].value);
-  if (used >= sizeof p->advice) *p->advice = 0;
-  return count < 0 ? steady_unadvised (cmd, count, error) : PW_OK;
 }
 
 /* Removes all points but the first `kept`. */
@@ -141,8 +128,8 @@ static int steady_is_stopped (pw_steady_command *cmd) {
 
 /* ---- The search ---- */
 
-/* Adds a solution unless it is known or not steady; only one of those in families of the same dimension and
- * stability. */
+/* Adds a solution unless it is known or not steady; only one of those in families of the same dimension and stability.
+ * Its advice: the options --hold which, besides those given, select it within its family. */
 static int steady_found (pw_steady_command *cmd, const pw_steady_motion *m, int attempt, pw_error *error) {
   if (m->linear->steady == PW_CHANGING) return cmd->changing++, PW_OK;
   for (int i = 0; i < cmd->points; i++) {
@@ -152,7 +139,15 @@ static int steady_found (pw_steady_command *cmd, const pw_steady_motion *m, int 
   }
   if (!cmd->vary_text) cmd->branches++;
   pw_steady_point *p = steady_add (cmd, m, attempt, error);
-  return p ? steady_advise (cmd, p, error) : PW_RESOURCE;
+  if (p == NULL) return PW_RESOURCE;
+  pw_initial_value hold[PW_HOLDS];
+  size_t used = 0;
+  int count = p->motion.family > 0 ? pw_steady_suggest (cmd->search, hold, PW_HOLDS) : 0;
+  for (int i = 0; i < count && used < sizeof p->advice; i++)
+    used += (size_t)snprintf (p->advice + used, sizeof p->advice - used, " --hold %s=%.9g",
+                              PW_NAME (pw_system_held_name, cmd->line.m.system, hold[i].state), hold[i].value);
+  if (used >= sizeof p->advice) *p->advice = 0;
+  return count < 0 ? steady_unadvised (cmd, count, error) : PW_OK;
 }
 
 /* Adds the solutions at a value of the parameter, first the one found from the initial state; later attempts may fail
@@ -163,7 +158,7 @@ static int steady_search (pw_steady_command *cmd, double parameter, pw_error *er
   int status = PW_OK, symmetries = pw_steady_symmetries (cmd->search);
   const int attempts = PW_STEADY_NOT_RANDOM + cmd->random_attempts, before = cmd->points, changing = cmd->changing;
   const double residual[2] = { cmd->residual[0], cmd->residual[1] };
-  pw_progress_start (&progress, pw_file_name (cmd->m.file), "starts", 0, attempts);
+  pw_progress_start (&progress, pw_file_name (cmd->line.m.file), "starts", 0, attempts);
   for (int k = 0; status == PW_OK && k < attempts && !steady_is_stopped (cmd); k++) {
     status = pw_steady_solve (cmd->search, k, parameter, &m, error);
     const int lost = symmetries - pw_steady_symmetries (cmd->search);
@@ -191,7 +186,7 @@ static int steady_fail (pw_steady_command *cmd, pw_error *error) {
     return pw_fail (
         error, PW_METHOD,
         "%s: all steady motions found are members of families, in which no branch begins; hold more (--hold)",
-        pw_file_name (cmd->m.file));
+        pw_file_name (cmd->line.m.file));
   const char *initial = PW_PRINTED (60, "from the initial state the residual ends at %.2g", cmd->residual[0]);
   if (cmd->random_attempts)
     snprintf (random, sizeof random, ", from %s at %.2g at best", PW_COUNTED (cmd->random_attempts, "random state"),
@@ -204,7 +199,7 @@ static int steady_fail (pw_steady_command *cmd, pw_error *error) {
   return pw_fail (error, PW_METHOD,
                   "%s: no steady motion found: %s%s, in units of the scene (L, L/T, L/T^2)%s; change what is held, or "
                   "begin nearer to one (--start)",
-                  pw_file_name (cmd->m.file), initial, random, reason);
+                  pw_file_name (cmd->line.m.file), initial, random, reason);
 }
 
 /* ---- Branches ---- */
@@ -284,66 +279,35 @@ static int steady_branches_from (pw_steady_command *cmd, double parameter, int d
 
 /* The value of the parameter in the model, or in its initial state. */
 static double steady_model_value (const pw_steady_command *cmd) {
-  const pw_system *s = cmd->m.system;
-  if (cmd->settings.vary < 0) return pw_model_parameter (cmd->m.model, cmd->vary.parameter);
+  const pw_system *s = cmd->line.m.system;
+  if (cmd->settings.vary < 0) return pw_model_parameter (cmd->line.m.model, cmd->vary.parameter);
   return pw_system_held_value (s, cmd->hold[cmd->settings.vary].state, pw_system_initial_q (s),
                                pw_system_initial_v (s));
 }
 
-/* The motion nearest to the initial state: at the initial value of the held quantity that varies, if that is finite,
- * else where the range begins, as for a parameter; at a value within the range if the family is smaller there. */
-static int steady_nearest_motion (pw_steady_command *cmd, pw_steady_motion *m, pw_error *error) {
+/* If the quantities held leave a family of motions, holds further ones, at their values in the motion nearest to the
+ * initial state: at the initial value of the held quantity that varies, if that is finite, else where the range begins,
+ * as for a parameter; at a value within the range if the family is smaller there. */
+static int steady_hold_more (pw_steady_command *cmd, pw_error *error) {
   const double first = cmd->settings.first, held = cmd->settings.vary < 0 ? NAN : steady_model_value (cmd),
                begin = isfinite (held) ? held : first, within = pw_value_within (first, cmd->settings.last);
   pw_error none = { 0 };
-  int status = pw_steady_solve (cmd->search, 0, begin, m, error), family = m->family;
-  if (status != PW_OK || family == 0) return status;
-  if (pw_steady_solve (cmd->search, 0, within, m, &none) == PW_OK && m->family < family) return PW_OK;
-  return pw_steady_solve (cmd->search, 0, begin, m, error);
-}
-
-/* If the quantities held leave a family of motions, holds further ones, at their values in the motion nearest to the
- * initial state. */
-static int steady_hold_more (pw_steady_command *cmd, pw_error *error) {
-  const pw_system *s = cmd->m.system;
   pw_steady_motion m;
-  int status = steady_nearest_motion (cmd, &m, error);
+  int status = pw_steady_solve (cmd->search, 0, begin, &m, error), family = m.family;
+  if (status == PW_OK && family > 0 &&
+      !(pw_steady_solve (cmd->search, 0, within, &m, &none) == PW_OK && m.family < family))
+    status = pw_steady_solve (cmd->search, 0, begin, &m, error);
   if (status == PW_RETRY || (status == PW_OK && m.family == 0)) return PW_OK;
   if (status != PW_OK) return status;
   int more = pw_steady_suggest (cmd->search, cmd->hold + cmd->settings.holds, PW_HOLDS - cmd->settings.holds);
   if (more < 0) return steady_unadvised (cmd, more, error);
   for (int i = cmd->settings.holds; i < cmd->settings.holds + more; i++)
     pw_cli_say ("pinwheel: holding %s=%.9g, as in the motion nearest to the initial state\n",
-                PW_NAME (pw_system_held_name, s, cmd->hold[i].state), cmd->hold[i].value);
+                PW_NAME (pw_system_held_name, cmd->line.m.system, cmd->hold[i].state), cmd->hold[i].value);
   cmd->settings.holds += more;
   pw_steady_close (cmd->search);
-  cmd->search = pw_steady_open (cmd->m.system, &cmd->settings, error);
+  cmd->search = pw_steady_open (cmd->line.m.system, &cmd->settings, error);
   return cmd->search ? PW_OK : error->status;
-}
-
-/* Finds branches that begin at the ends of the range or, if there are none, at the value of the model or within the
- * range. */
-static int steady_branches (pw_steady_command *cmd, pw_error *error) {
-  const double first = cmd->settings.first, last = cmd->settings.last;
-  int status = steady_hold_more (cmd, error);
-  double own = steady_model_value (cmd), fraction = (own - first) / (last - first);
-  if (!(fraction > 0 && fraction < 1)) own = pw_value_within (first, last);
-  if (status == PW_OK) status = steady_branches_from (cmd, first, TO_LAST, error);
-  if (status == PW_OK && !cmd->stopped) status = steady_branches_from (cmd, last, TO_FIRST, error);
-  if (status == PW_OK && !cmd->stopped && cmd->points == 0) status = steady_branches_from (cmd, own, TO_LAST, error);
-  return status;
-}
-
-static int steady_compute (pw_steady_command *cmd, pw_error *error) {
-  cmd->residual[0] = cmd->residual[1] = INFINITY;
-  pw_limit_start (&cmd->limit);
-  cmd->search = pw_steady_open (cmd->m.system, &cmd->settings, error);
-  if (cmd->search == NULL) return error->status;
-  pw_stop_catch ();
-  int status = cmd->vary_text ? steady_branches (cmd, error) : steady_search (cmd, 0, error);
-  pw_stop_release ();
-  if (status == PW_OK && cmd->points == 0 && !cmd->stopped) status = steady_fail (cmd, error);
-  return status;
 }
 
 /* ---- Reports ---- */
@@ -382,7 +346,7 @@ static void steady_cells_rightmost (pw_table *t, const pw_steady_point *p) {
 }
 
 static void steady_print_motions (const pw_steady_command *cmd) {
-  const pw_system *s = cmd->m.system;
+  const pw_system *s = cmd->line.m.system;
   const int n = pw_system_coordinates (s), held[] = { 2 * n, n + 2 }; /* (pw_system_find_held) speed, omega of body 0 */
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     pw_cell (&t, 6, "motion");
@@ -435,7 +399,7 @@ static void steady_print_branches (const pw_steady_command *cmd) {
 
 static void steady_print (const pw_steady_command *cmd) {
   char text[40];
-  const char *model = pw_file_name (cmd->m.file),
+  const char *model = pw_file_name (cmd->line.m.file),
              *symmetries = pw_states_symmetries (pw_steady_symmetries (cmd->search), text);
   if (cmd->vary_text) {
     printf ("%s: %d %s of steady motions%s, %s from %.9g to %.9g\n\n", model, cmd->branches,
@@ -451,7 +415,7 @@ static void steady_print (const pw_steady_command *cmd) {
     const pw_steady_motion *m = &cmd->point[i].motion;
     printf ("\nMotion %d, found from %s\n", i + 1,
             cmd->point[i].attempt >= PW_STEADY_NOT_RANDOM ? "a random state" : "the initial state");
-    pw_states_print (cmd->m.system, m->q, m->v, STEADY_DIGITS, STEADY_SMALL);
+    pw_states_print (cmd->line.m.system, m->q, m->v, STEADY_DIGITS, STEADY_SMALL);
   }
   for (int i = 0; i < cmd->points && i < STEADY_SHOWN; i++)
     if (*cmd->point[i].advice)
@@ -461,58 +425,34 @@ static void steady_print (const pw_steady_command *cmd) {
 
 /* ---- JSON ---- */
 
-static void steady_eigenvalues_json (const pw_linear *l, pw_json *j) {
-  pw_json_open (j, "eigenvalues", '[');
-  for (int i = 0; i < l->unknowns; i++) {
-    pw_json_open (j, NULL, '{');
-    pw_json_number (j, "re", l->re[i]);
-    pw_json_number (j, "im", l->im[i]);
-    pw_json_number (j, "frequency_hz", fabs (l->im[i]) / (2 * PW_PI));
-    pw_json_flag (j, "rigid", l->rigid[i]);
-    pw_json_close (j, '}');
-  }
-  pw_json_close (j, ']');
-}
-
-static void steady_point_json (const pw_steady_command *cmd, const pw_steady_point *p, pw_json *j) {
-  const pw_system *s = cmd->m.system;
-  j->line = 1;
-  pw_json_open (j, NULL, '{');
-  pw_json_number (j, "branch", p->branch);
-  if (cmd->vary_text) pw_json_text (j, "event", steady_events[p->motion.event]);
-  if (cmd->vary_text) pw_json_number (j, "parameter", p->motion.parameter);
-  pw_json_number (j, "attempt", p->attempt);
-  pw_json_number (j, "residual", p->motion.residual);
-  if (!cmd->vary_text) pw_json_number (j, "family", p->motion.family);
-  pw_json_number (j, "growing", p->motion.unstable);
-  pw_json_numbers (j, "twist", p->linear.twist, 3);
-  pw_states_json (s, p->motion.q, p->motion.v, "state", j);
-  steady_eigenvalues_json (&p->linear, j);
-  pw_json_close (j, '}');
-}
-
 static void steady_json (const void *context, pw_json *j) {
   const pw_steady_command *cmd = context;
-  pw_json_open (j, NULL, '{');
-  pw_json_number (j, "schema", 1);
-  pw_json_text (j, "model", pw_file_name (cmd->m.file));
-  pw_json_text (j, "parameter", cmd->vary_text ? cmd->vary.name : NULL);
-  pw_json_text (j, "unit", cmd->vary.unit);
-  pw_json_open (j, "held", '{');
+  pw_json_print (j, "{schema: %d, model: %s, parameter: %s, unit: %s, held: {", 1, pw_file_name (cmd->line.m.file),
+                 cmd->vary_text ? cmd->vary.name : NULL, cmd->vary.unit);
   for (int i = 0; i < cmd->settings.holds; i++)
     if (i != cmd->settings.vary)
-      pw_json_number (j, PW_NAME (pw_system_held_name, cmd->m.system, cmd->hold[i].state), cmd->hold[i].value);
-  pw_json_close (j, '}');
-  pw_json_number (j, "symmetries", pw_steady_symmetries (cmd->search));
-  pw_json_number (j, "attempts", PW_STEADY_NOT_RANDOM + cmd->random_attempts);
-  pw_json_flag (j, "complete", !cmd->stopped);
-  pw_json_open (j, "ends", '[');
+      pw_json_number (j, PW_NAME (pw_system_held_name, cmd->line.m.system, cmd->hold[i].state), cmd->hold[i].value);
+  pw_json_print (j, "}, symmetries: %d, attempts: %d, complete: %i, ends: [", pw_steady_symmetries (cmd->search),
+                 PW_STEADY_NOT_RANDOM + cmd->random_attempts, !cmd->stopped);
   for (int i = 0; cmd->vary_text && i < cmd->branches; i++) pw_json_text (j, NULL, cmd->end[i]);
-  pw_json_close (j, ']');
-  pw_json_open (j, "motions", '[');
-  for (int i = 0; i < cmd->points; i++) steady_point_json (cmd, cmd->point + i, j);
-  pw_json_close (j, ']');
-  pw_json_close (j, '}');
+  pw_json_print (j, "], motions: [");
+  for (const pw_steady_point *p = cmd->point; p < cmd->point + cmd->points; p++) {
+    const pw_linear *l = &p->linear;
+    pw_json_print (j, "\n{branch: %d", p->branch);
+    if (cmd->vary_text)
+      pw_json_print (j, "event: %s, parameter: %g", steady_events[p->motion.event], p->motion.parameter);
+    pw_json_print (j, "attempt: %d, residual: %g", p->attempt, p->motion.residual);
+    if (!cmd->vary_text) pw_json_number (j, "family", p->motion.family);
+    pw_json_number (j, "growing", p->motion.unstable);
+    pw_json_numbers (j, "twist", l->twist, 3);
+    pw_states_json (cmd->line.m.system, p->motion.q, p->motion.v, "state", j);
+    pw_json_open (j, "eigenvalues", '[');
+    for (int i = 0; i < l->unknowns; i++)
+      pw_json_print (j, "{re: %g, im: %g, frequency_hz: %g, rigid: %i}", l->re[i], l->im[i],
+                     fabs (l->im[i]) / (2 * PW_PI), l->rigid[i]);
+    pw_json_print (j, "]}");
+  }
+  pw_json_print (j, "]}");
 }
 
 /* ---- The table ---- */
@@ -527,7 +467,7 @@ static int steady_most_eigenvalues (const pw_steady_command *cmd) {
 
 static int steady_csv (const void *context, FILE *f, pw_error *error) {
   const pw_steady_command *cmd = context;
-  const pw_system *s = cmd->m.system;
+  const pw_system *s = cmd->line.m.system;
   int states = 2 * pw_system_coordinates (s), most = steady_most_eigenvalues (cmd);
   pw_text t = { .chars = NULL };
   pw_text_cell (&t, "branch,event");
@@ -552,12 +492,6 @@ static int steady_csv (const void *context, FILE *f, pw_error *error) {
 
 /* ---- The figure ---- */
 
-/* Whether the branch is stable from p to the next point.  At an event, where `unstable` does not count the modes that
- * change, the next point decides. */
-static int steady_is_stable (const pw_steady_point *p) {
-  return (p->motion.event == PW_STEADY_POINT ? p : p + 1)->motion.unstable == 0;
-}
-
 enum { REAL, IMAGINARY }; /* parts of an eigenvalue */
 
 /* Number k, from 0, of the real parts, or the absolute values of the imaginary parts, in descending order, of
@@ -573,32 +507,6 @@ static double steady_ranked (const pw_linear *l, int part, int k) {
     if (!l->rigid[i] && above == k) return value;
   }
   return NAN;
-}
-
-/* Draws the real parts [1/s] or frequencies [Hz] on the parts of branches where no modes grow (stable or neutral), or
- * where some do. */
-static void steady_draw_parts (const pw_steady_command *cmd, pw_curves *c, int part, int stable) {
-  pw_curves_add (c, stable ? "stable" : "unstable", stable ? "stable" : "unstable");
-  for (int k = 0; k < steady_most_eigenvalues (cmd); k++)
-    for (int i = 0, inside = 0; i < cmd->points; i++) { /* inside: 1: the last point began or continued a part */
-      const pw_steady_point *p = cmd->point + i;
-      const int here = i + 1 < cmd->points && p[1].branch == p->branch && steady_is_stable (p) == stable;
-      const double value = steady_ranked (&p->linear, part, k) / (part == IMAGINARY ? 2 * PW_PI : 1);
-      const int shown = (here || inside) && !(part == IMAGINARY && value <= 1e-12);
-      pw_curves_point (c, p->motion.parameter, shown ? value : NAN, 0);
-      if (!here) pw_curves_point (c, NAN, NAN, 0);
-      inside = here;
-    }
-}
-
-/* Draws lines at the folds, or at the other events, if there are any. */
-static void steady_draw_events (const pw_steady_command *cmd, pw_curves *c, int folds) {
-  int events = 0;
-  for (const pw_steady_point *p = cmd->point; p < cmd->point + cmd->points; p++) {
-    if (p->motion.event == PW_STEADY_POINT || (p->motion.event == PW_STEADY_FOLD) != folds) continue;
-    if (events++ == 0) pw_curves_add (c, folds ? "fold" : "change", folds ? "fold" : "stability changes");
-    pw_curves_point (c, p->motion.parameter, INFINITY, 0);
-  }
 }
 
 /* The ranges of real and imaginary parts in the figure [1/s].  Modes that decay much faster than others grow or
@@ -627,7 +535,7 @@ static int steady_draw (const pw_steady_command *cmd, pw_error *error) {
   const char *parameter = PW_FIGURE_LABEL (cmd->vary.name, cmd->vary.unit);
   double re[2], im[2];
   pw_curves c;
-  int status = pw_curves_open (&c, &cmd->line, &cmd->m, cmd->folder, "steady", "eigenvalues of steady motions", error);
+  int status = pw_curves_open (&c, &cmd->line, cmd->folder, "steady", "eigenvalues of steady motions", error);
   if (status != PW_OK) return status;
   steady_ranges (cmd, re, im);
   for (int part = REAL; part <= IMAGINARY; part++) {
@@ -635,8 +543,31 @@ static int steady_draw (const pw_steady_command *cmd, pw_error *error) {
     panel.y_label = part == REAL ? "real part [1/s]" : "frequency [Hz]";
     panel.y[0] = part == REAL ? re[0] : 0, panel.y[1] = part == REAL ? re[1] : im[1] / (2 * PW_PI);
     pw_curves_panel (&c, &panel);
-    for (int stable = 1; stable >= 0; stable--) steady_draw_parts (cmd, &c, part, stable);
-    for (int folds = 0; folds < 2 && part == REAL; folds++) steady_draw_events (cmd, &c, folds);
+    /* on the parts of branches where no modes grow (stable or neutral), then where some do */
+    for (int stable = 1; stable >= 0; stable--) {
+      pw_curves_add (&c, stable ? "stable" : "unstable", stable ? "stable" : "unstable");
+      for (int k = 0; k < steady_most_eigenvalues (cmd); k++)
+        for (int i = 0, inside = 0; i < cmd->points; i++) { /* inside: 1: the last point began or continued a part */
+          const pw_steady_point *p = cmd->point + i;
+          /* at an event, where `unstable` does not count the modes that change, the next point decides */
+          const pw_steady_point *decides = p->motion.event == PW_STEADY_POINT ? p : p + 1;
+          const int here = i + 1 < cmd->points && p[1].branch == p->branch && (decides->motion.unstable == 0) == stable;
+          const double value = steady_ranked (&p->linear, part, k) / (part == IMAGINARY ? 2 * PW_PI : 1);
+          const int shown = (here || inside) && !(part == IMAGINARY && value <= 1e-12);
+          pw_curves_point (&c, p->motion.parameter, shown ? value : NAN, 0);
+          if (!here) pw_curves_point (&c, NAN, NAN, 0);
+          inside = here;
+        }
+    }
+    /* lines at the folds, and at the other events, if there are any */
+    for (int folds = 0; folds < 2 && part == REAL; folds++) {
+      int events = 0;
+      for (const pw_steady_point *p = cmd->point; p < cmd->point + cmd->points; p++) {
+        if (p->motion.event == PW_STEADY_POINT || (p->motion.event == PW_STEADY_FOLD) != folds) continue;
+        if (events++ == 0) pw_curves_add (&c, folds ? "fold" : "change", folds ? "fold" : "stability changes");
+        pw_curves_point (&c, p->motion.parameter, INFINITY, 0);
+      }
+    }
   }
   pw_curves_panel (&c, &(pw_panel){ .x_label = "real part [1/s]",
                                     .y_label = "imaginary part [1/s]",
@@ -651,28 +582,46 @@ static int steady_draw (const pw_steady_command *cmd, pw_error *error) {
   return pw_curves_draw (&c, PW_OK, error);
 }
 
-static int steady_write (const pw_steady_command *cmd, pw_error *error) {
-  int status = pw_figure_write_tables (cmd->folder, "steady", 1, cmd, steady_csv, steady_json, error);
-  return status == PW_OK && cmd->vary_text ? steady_draw (cmd, error) : status;
-}
-
 /* ---- The command ---- */
+
+/* Finds steady motions of the model; with --vary branches that begin at the ends of the range or, if there are none,
+ * at the value of the model or within the range. */
+static int steady_compute (pw_steady_command *cmd, pw_error *error) {
+  const double first = cmd->settings.first, last = cmd->settings.last;
+  cmd->residual[0] = cmd->residual[1] = INFINITY;
+  pw_limit_start (&cmd->limit);
+  cmd->search = pw_steady_open (cmd->line.m.system, &cmd->settings, error);
+  if (cmd->search == NULL) return error->status;
+  pw_stop_catch ();
+  int status = cmd->vary_text ? steady_hold_more (cmd, error) : steady_search (cmd, 0, error);
+  if (cmd->vary_text) {
+    double own = steady_model_value (cmd), fraction = (own - first) / (last - first);
+    if (!(fraction > 0 && fraction < 1)) own = pw_value_within (first, last);
+    if (status == PW_OK) status = steady_branches_from (cmd, first, TO_LAST, error);
+    if (status == PW_OK && !cmd->stopped) status = steady_branches_from (cmd, last, TO_FIRST, error);
+    if (status == PW_OK && !cmd->stopped && cmd->points == 0) status = steady_branches_from (cmd, own, TO_LAST, error);
+  }
+  pw_stop_release ();
+  if (status == PW_OK && cmd->points == 0 && !cmd->stopped) status = steady_fail (cmd, error);
+  return status;
+}
 
 static int steady_command (void *options, pw_error *error) {
   pw_steady_command *cmd = options;
-  int status = pw_cli_open (&cmd->m, &cmd->line, error);
+  int status = pw_cli_open (&cmd->line, error);
   if (status == PW_OK) status = steady_read_options (cmd, error);
-  if (status == PW_OK) status = pw_figure_lock_folder (&cmd->line, &cmd->m, cmd->folder, "steady", &cmd->files, error);
-  if (status == PW_OK) pw_report_model (&cmd->m);
+  if (status == PW_OK) status = pw_figure_lock_folder (&cmd->line, cmd->folder, "steady", error);
+  if (status == PW_OK) pw_report_model (&cmd->line.m);
   if (status == PW_OK) status = steady_compute (cmd, error);
-  if (status == PW_OK && cmd->points) steady_print (cmd);
-  if (status == PW_OK && cmd->points && cmd->folder) status = steady_write (cmd, error);
-  pw_files_close (&cmd->files);
+  if (status == PW_OK && cmd->points) {
+    steady_print (cmd);
+    if (cmd->folder) status = pw_figure_write_tables (cmd->folder, "steady", 1, cmd, steady_csv, steady_json, error);
+    if (status == PW_OK && cmd->folder && cmd->vary_text) status = steady_draw (cmd, error);
+  }
   steady_forget (cmd, 0);
   free (cmd->point);
   free (cmd->end);
   pw_steady_close (cmd->search);
-  pw_cli_close_model (&cmd->m);
   return status == PW_OK && cmd->stopped ? pw_cli_incomplete (&cmd->line, error) : status;
 }
 

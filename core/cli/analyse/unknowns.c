@@ -30,14 +30,13 @@ static int unknown_find (pw_unknown *u, const pw_cli_model *m, const char *name,
 
 /* ---- Options ---- */
 
-int pw_unknowns_open (pw_unknowns *u, const pw_cli_line *line, const pw_cli_model *m, pw_error *error) {
-  pw_run_defaults d = pw_cli_defaults (pw_file_table (m->file));
+int pw_unknowns_open (pw_unknowns *u, const pw_cli_line *line, pw_error *error) {
   const pw_method *method;
   int stabilisation;
   pw_limit limit;
-  *u = (pw_unknowns){ .line = line, .m = m, .method = line->method ? line->method : d.method };
+  *u = (pw_unknowns){ .line = line, .method = line->method ? line->method : line->m.defaults.method };
   int status = pw_method_parse (u->method, &method, &stabilisation, error);
-  if (status == PW_OK) status = pw_cli_settings (line, &d, &u->t_end, &u->settings, &limit, error);
+  if (status == PW_OK) status = pw_cli_settings (line, &line->m.defaults, &u->settings, &limit, error);
   if (status == PW_OK) status = pw_cli_read_specialise (line->specialise, &u->when, error);
   if (status != PW_OK) return status;
   u->settings.stop = NULL;
@@ -48,13 +47,13 @@ int pw_unknowns_open (pw_unknowns *u, const pw_cli_line *line, const pw_cli_mode
 }
 
 int pw_unknowns_engine (pw_unknowns *u, double runs, int starts, pw_error *error) {
-  pw_run_defaults d = pw_cli_defaults (pw_file_table (u->m->file));
   if (starts > 1 && u->count > PW_UNKNOWNS_SOBOL_MOST)
     return pw_fail (error, PW_INPUT, "at most %d unknowns with more than one start; give --starts 1",
                     PW_UNKNOWNS_SOBOL_MOST);
-  pw_cli_report_tables (u->m->system, u->t_end);
-  pw_cli_engine_open (&u->engine, u->m->system, u->when,
-                      runs * starts * pw_method_steps (u->method, &u->settings, d.step, u->t_end));
+  pw_cli_report_tables (u->line->m.system, u->settings.span);
+  pw_cli_engine_open (&u->engine, u->line->m.system, u->when,
+                      runs * starts *
+                          pw_method_steps (u->method, &u->settings, u->line->m.defaults.step, u->settings.span));
   return PW_OK;
 }
 
@@ -92,7 +91,7 @@ static int unknown_add (pw_unknowns *u, const char *text, pw_error *error) {
   for (int i = 0; i < u->count; i++)
     if (strcmp (u->list[i].name, name) == 0) return pw_fail (error, PW_INPUT, "--free %s is given twice", name);
   u->count++;
-  int status = unknown_find (added, u->m, name, error);
+  int status = unknown_find (added, &u->line->m, name, error);
   if (added->parameter && added->parameter->domain == PW_COUNT)
     status = pw_fail (error, PW_INPUT, "--free %s: it is a count, and only continuous parameters can be free", name);
   if (status == PW_OK && text[size]) status = unknown_read_bounds (added, text + size + 1, error);
@@ -113,27 +112,25 @@ int pw_unknowns_read (pw_unknowns *u, const char **list, pw_error *error) {
 
 /* ---- Unknowns of --by ---- */
 
-static int unknown_of_run (pw_unknown *u, const pw_cli_model *m, const pw_run *r, const char *name, pw_error *error) {
-  int n = pw_system_coordinates (m->system), status = unknown_find (u, m, name, error);
-  if (status == PW_OK && u->state >= 0)
-    u->value = u->state < n ? pw_run_initial (r)->q[u->state] : pw_run_initial (r)->v[u->state - n];
-  if (status != PW_OK || u->parameter == NULL || u->parameter->domain != PW_COUNT) return status;
-  return pw_fail (error, PW_INPUT, "%s is a count (%g): derivatives need a number that varies continuously", name,
-                  u->value);
-}
-
 int pw_unknowns_differentiated (pw_unknowns *u, const char **list, pw_error *error) {
   while (list[u->count]) u->count++;
   u->list = calloc ((size_t)u->count, sizeof *u->list);
   if (u->list == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  const int n = pw_system_coordinates (u->line->m.system);
   pw_limit limit = { .seconds = u->limit };
   pw_settings settings = u->settings;
   settings.stop = pw_limit_over, settings.stop_context = &limit;
   pw_limit_start (&limit);
-  pw_run *r = pw_limit_open (u->m->system, u->method, &settings, error);
+  pw_run *r = pw_limit_open (u->line->m.system, u->method, &settings, error);
   int status = r ? PW_OK : error->status;
   for (int i = 0; i < u->count && status == PW_OK; i++) {
-    status = unknown_of_run (&u->list[i], u->m, r, list[i], error);
+    pw_unknown *x = &u->list[i];
+    status = unknown_find (x, &u->line->m, list[i], error);
+    if (status == PW_OK && x->state >= 0)
+      x->value = x->state < n ? pw_run_initial (r)->q[x->state] : pw_run_initial (r)->v[x->state - n];
+    if (status == PW_OK && x->parameter && x->parameter->domain == PW_COUNT)
+      status = pw_fail (error, PW_INPUT, "%s is a count (%g): derivatives need a number that varies continuously",
+                        list[i], x->value);
     for (int k = 0; k < i && status == PW_OK; k++)
       if (strcmp (list[k], list[i]) == 0) status = pw_fail (error, PW_INPUT, "--by %s is given twice", list[i]);
   }
@@ -145,7 +142,7 @@ int pw_unknowns_differentiated (pw_unknowns *u, const char **list, pw_error *err
 
 /* The model with these values of the unknowns, compiled.  Close it by pw_cli_close_model in every case. */
 static int unknowns_system (pw_cli_model *m, const pw_unknowns *u, const double *x, pw_error *error) {
-  *m = (pw_cli_model){ .model = pw_file_model (u->m->file, error) };
+  *m = (pw_cli_model){ .model = pw_file_model (u->line->m.file, error) };
   int status = m->model ? pw_cli_apply (m->model, "--set", u->line->sets, pw_model_set, error) : error->status;
   if (status == PW_OK) status = pw_cli_apply (m->model, "--start", u->line->starts, pw_model_set_initial, error);
   for (int i = 0; i < u->count && status == PW_OK; i++)
@@ -221,7 +218,7 @@ int pw_run_outputs_at (const pw_run_outputs *outputs, const double *x, double *v
   if (outputs->max_steps) run.settings.max_steps = outputs->max_steps;
   if (status == PW_OK)
     status = pw_outcomes_run (&outcomes, outputs->method ? outputs->method : outputs->unknowns->method, &run.settings,
-                              outputs->unknowns->t_end, outputs->t ? &rows : NULL, error);
+                              outputs->unknowns->settings.span, outputs->t ? &rows : NULL, error);
   for (int i = 0; status == PW_OK && value && i < outputs->count; i++) value[i] = pw_outcome_value (&outcomes, i);
   pw_outcomes_close (&outcomes);
   pw_unknown_run_close (&run);
@@ -234,12 +231,6 @@ double pw_unknowns_noise (const pw_unknowns *u) {
 
 /* ---- Starts and results of searches ---- */
 
-/* The value at a fraction, from 0 to 1, of the range in which searches begin. */
-static double unknowns_between (const pw_unknown *u, double fraction) {
-  double value = u->has_bounds ? u->low + fraction * u->scale : u->value + (2 * fraction - 1) * u->scale;
-  return fmin (fmax (value, u->low), u->high);
-}
-
 /* Stores the points after the first one; a status. */
 static int unknowns_sobol (const pw_unknowns *u, int count, double seed, double *out) {
   double point[PW_UNKNOWNS_SOBOL_MOST], shift[PW_UNKNOWNS_SOBOL_MOST];
@@ -249,7 +240,12 @@ static int unknowns_sobol (const pw_unknowns *u, int count, double seed, double 
   for (int j = 0; random && j < u->count; j++) shift[j] = gsl_rng_uniform (random);
   for (int i = 1; random && sobol && i < count; i++) {
     gsl_qrng_get (sobol, point);
-    for (int j = 0; j < u->count; j++) *out++ = unknowns_between (u->list + j, fmod (point[j] + shift[j], 1));
+    for (int j = 0; j < u->count; j++) { /* a fraction, from 0 to 1, of the range in which searches begin */
+      const pw_unknown *x = u->list + j;
+      double part = fmod (point[j] + shift[j], 1),
+             value = x->has_bounds ? x->low + part * x->scale : x->value + (2 * part - 1) * x->scale;
+      *out++ = fmin (fmax (value, x->low), x->high);
+    }
   }
   int status = random && sobol ? PW_OK : PW_RESOURCE;
   if (random) gsl_rng_free (random);
@@ -277,38 +273,33 @@ const char *pw_unknowns_options (const pw_unknowns *u, const double *x, char tex
 
 /* The option --vary of `steady` and `periodic`. */
 
-/* Refuses a parameter that is a count or also given by --set, and a range outside its domain. */
-static int vary_check (const pw_vary *v, const char *text, pw_error *error) {
-  const pw_parameter *p = v->parameter;
-  const double ends[] = { v->first, v->last };
-  if (p->domain == PW_COUNT)
-    return pw_fail (error, PW_INPUT,
-                    "--vary %s: %s counts something and cannot vary continuously; use `pinwheel sweep`", text, p->name);
-  for (int i = 0; i < 2; i++)
-    if (*pw_domain_check (p->domain, ends[i]))
-      return pw_fail (error, PW_INPUT, "--vary %s: expected %s", text, pw_domain_check (p->domain, ends[i]));
-  for (const char **set = v->unknowns.line->sets; set && *set; set++)
-    if (strncmp (*set, p->name, strlen (p->name)) == 0 && (*set)[strlen (p->name)] == '=')
-      return pw_fail (error, PW_INPUT, "%s is given by --vary and by --set", p->name);
-  return PW_OK;
-}
-
-int pw_vary_read (pw_vary *v, const pw_cli_line *line, const pw_cli_model *m, const char *text, pw_error *error) {
+int pw_vary_read (pw_vary *v, const pw_cli_line *line, const char *text, pw_error *error) {
   const size_t size = strcspn (text, "=");
   if (size == 0 || size >= sizeof v->unknown.name || strchr (text + size, ':') == NULL)
     return pw_fail (error, PW_INPUT, "--vary %s: expected NAME=FIRST:LAST", text);
   if (pw_cli_range (text + size + 1, &v->first, &v->last) != PW_OK || v->first == v->last)
     return pw_fail (error, PW_INPUT, "--vary %s: expected two different numbers FIRST:LAST", text);
   v->name = memcpy (v->unknown.name, text, size);
-  v->parameter = v->unknown.parameter = pw_cli_parameter (m->model, v->name);
-  v->unknowns = (pw_unknowns){ .line = line, .m = m, .list = &v->unknown, .count = 1 };
+  v->parameter = v->unknown.parameter = pw_cli_parameter (line->m.model, v->name);
+  v->unknowns = (pw_unknowns){ .line = line, .list = &v->unknown, .count = 1 };
   if (v->parameter == NULL) return PW_OK;
-  v->unit = v->parameter->unit ? v->parameter->unit : "";
-  return vary_check (v, text, error);
+  const pw_parameter *p = v->parameter;
+  v->unit = p->unit ? p->unit : "";
+  if (p->domain == PW_COUNT)
+    return pw_fail (error, PW_INPUT,
+                    "--vary %s: %s counts something and cannot vary continuously; use `pinwheel sweep`", text, p->name);
+  for (int i = 0; i < 2; i++)
+    if (*pw_domain_check (p->domain, i ? v->last : v->first))
+      return pw_fail (error, PW_INPUT, "--vary %s: expected %s", text,
+                      pw_domain_check (p->domain, i ? v->last : v->first));
+  for (const char **set = line->sets; set && *set; set++)
+    if (strncmp (*set, p->name, strlen (p->name)) == 0 && (*set)[strlen (p->name)] == '=')
+      return pw_fail (error, PW_INPUT, "%s is given by --vary and by --set", p->name);
+  return PW_OK;
 }
 
 void pw_vary_progress (const pw_vary *v, pw_progress *p, double from, double value, double to) {
-  if (p->title == NULL) pw_progress_start (p, pw_file_name (v->unknowns.m->file), "", 0, 1);
+  if (p->title == NULL) pw_progress_start (p, pw_file_name (v->unknowns.line->m.file), "", 0, 1);
   snprintf (p->note, sizeof p->note, "%.20s = %.4g", v->name, value);
   pw_progress_at (p, (value - from) / (to - from));
 }

@@ -22,19 +22,17 @@ typedef struct {
 /* Unknowns of the model of a command line, and the options of its runs. */
 typedef struct {
   const pw_cli_line *line;
-  const pw_cli_model *m;
   pw_unknown *list;
   int count;
   const char *method;
   pw_settings settings; /* without those that differ between runs (pw_unknown_run) */
-  double t_end;         /* [s] */
   double limit;         /* of the processor time of each run [s] */
   pw_specialise when;   /* of --specialise */
   pw_cli_engine engine;
 } pw_unknowns;
 
 /* Reads the options of runs; there are no unknowns yet.  Line and model must outlive it.  Close it in every case. */
-int pw_unknowns_open (pw_unknowns *u, const pw_cli_line *line, const pw_cli_model *m, pw_error *error);
+int pw_unknowns_open (pw_unknowns *u, const pw_cli_line *line, pw_error *error);
 void pw_unknowns_close (pw_unknowns *u);
 /* Reads unknowns from a list of "NAME" or "NAME=LOW:HIGH" of --free, ended by NULL.  PW_INPUT for a name that the model
  * does not have, a parameter that is a count, and bounds outside its domain or without its value between them. */
@@ -118,7 +116,7 @@ typedef struct {
 
 /* Reads the option into *v, which is zero-initialised and must not move later: it points to itself.  PW_INPUT if it is
  * malformed, or the parameter cannot vary in the range or is also given by --set. */
-int pw_vary_read (pw_vary *v, const pw_cli_line *line, const pw_cli_model *m, const char *text, pw_error *error);
+int pw_vary_read (pw_vary *v, const pw_cli_line *line, const char *text, pw_error *error);
 /* Shows the progress of a branch at a value between `from` and `to`; starts a progress that is zero-initialised. */
 void pw_vary_progress (const pw_vary *v, pw_progress *p, double from, double value, double to);
 /* The system at a value of the parameter: `compile` of pw_steady_settings and pw_periodic_settings, whose context is

@@ -18,11 +18,9 @@ typedef struct {
   const char *path;        /* of -o */
   char *source;            /* of the model, in place of a plug-in */
   const char *argument[2]; /* the arguments with it */
-  pw_cli_model compiled;
-  pw_page content; /* files for the engine */
-  char *base64;    /* scratch: the longest of these files as text */
-  pw_run *run;     /* for its consistent initial state */
-  double t_end;    /* [s] */
+  pw_page content;         /* files for the engine */
+  char *base64;            /* scratch: the longest of these files as text */
+  pw_run *run;             /* for its consistent initial state */
   pw_settings settings;
   pw_limit limit;
   char method[100];
@@ -44,66 +42,40 @@ static void page_file_json (pw_json *j, const pw_page_file *file, char *base64) 
   pw_json_text (j, file->name, base64);
 }
 
-/* Writes the consistent initial state, but values of --start as given, with a mark. */
-static void page_states_json (const page *cmd, pw_json *j) {
-  const pw_initial_report *initial = pw_run_initial (cmd->run);
-  int n = pw_system_coordinates (cmd->compiled.system);
-  pw_json_open (j, "states", '[');
-  for (int i = 0; i < 2 * n; i++) {
-    pw_json_open (j, NULL, '{');
-    int hidden = pw_system_state_hidden (cmd->compiled.system, i);
-    pw_json_text (j, "name", hidden ? "" : PW_NAME (pw_system_state_name, cmd->compiled.system, i));
-    pw_json_text (j, "unit", pw_system_state_unit (cmd->compiled.system, i));
-    int given = pw_initial_given (initial, i);
-    const double *q = given ? initial->q_given : initial->q, *v = given ? initial->v_given : initial->v;
-    pw_json_number (j, "value", i < n ? q[i] : v[i - n]);
-    pw_json_flag (j, "given", given);
-    pw_json_close (j, '}');
-  }
-  pw_json_close (j, ']');
-}
-
 static int page_has_method (const pw_method *m) {
   char hint[PW_HINT];
   return pw_find_name (page_integrators, sizeof *page_integrators, m->name, hint) >= 0;
 }
 
-static void page_methods_json (pw_json *j) {
-  pw_json_open (j, "methods", '[');
-  for (const pw_method *const *m = pw_methods; *m; m++)
-    for (int i = 0; page_has_method (*m) && (*m)->stabilisations[i].name; i++) {
-      pw_json_open (j, NULL, '{');
-      pw_json_text (j, "name", PW_PRINTED (100, "%s+%s", (*m)->name, (*m)->stabilisations[i].name));
-      pw_json_flag (j, "adaptive", (*m)->adaptive);
-      pw_json_close (j, '}');
-    }
-  pw_json_close (j, ']');
-}
-
-static void page_data_json (const page *cmd, FILE *f) {
-  pw_json j = { .f = f, .lines = 1 };
-  pw_json_open (&j, NULL, '{');
-  pw_json_text (&j, "name", pw_system_name (cmd->compiled.system));
-  pw_json_text (&j, "about", pw_model_table (cmd->compiled.model)->about);
-  pw_json_text (&j, "version", PW_VERSION);
-  pw_json_text (&j, "method", cmd->method);
-  pw_json_number (&j, "t_end", cmd->t_end);
-  pw_json_number (&j, "step", cmd->settings.step);
-  pw_json_number (&j, "rtol", cmd->settings.rtol > 0 ? cmd->settings.rtol : PW_RTOL);
-  page_methods_json (&j);
-  pw_animation_parameters (&j, cmd->compiled.model);
-  page_states_json (cmd, &j);
-  pw_json_open (&j, "files", '{');
-  for (int i = 0; i < cmd->content.files; i++) page_file_json (&j, &cmd->content.file[i], cmd->base64);
-  pw_json_close (&j, '}');
-  pw_json_close (&j, '}');
-}
-
 /* Writes the script, and the call that passes the data to it. */
 static void page_script (FILE *f, const void *context) {
+  const page *cmd = context;
+  const pw_system *s = cmd->line.m.system;
+  const pw_initial_report *initial = pw_run_initial (cmd->run);
+  pw_json json = { .f = f, .lines = 1 }, *j = &json;
+  int n = pw_system_coordinates (s);
   for (const char *const *line = page_js; *line; line++) fputs (*line, f);
   fputs ("start_page(", f);
-  page_data_json (context, f);
+  pw_json_print (j, "{name: %s, about: %s, version: %s, method: %s, t_end: %g, step: %g, rtol: %g, methods: [",
+                 pw_system_name (s), pw_model_table (cmd->line.m.model)->about, PW_VERSION, cmd->method,
+                 cmd->settings.span, cmd->settings.step, cmd->settings.rtol > 0 ? cmd->settings.rtol : PW_RTOL);
+  for (const pw_method *const *m = pw_methods; *m; m++)
+    for (int i = 0; page_has_method (*m) && (*m)->stabilisations[i].name; i++)
+      pw_json_print (j, "{name: %s, adaptive: %i}", PW_PRINTED (100, "%s+%s", (*m)->name, (*m)->stabilisations[i].name),
+                     (*m)->adaptive);
+  pw_json_close (j, ']');
+  pw_animation_parameters (j, cmd->line.m.model);
+  pw_json_open (j, "states", '['); /* the consistent initial state, but values of --start as given, with a mark */
+  for (int i = 0; i < 2 * n; i++) {
+    int given = pw_initial_given (initial, i);
+    const double *q = given ? initial->q_given : initial->q, *v = given ? initial->v_given : initial->v;
+    pw_json_print (j, "{name: %s, unit: %s, value: %g, given: %i}",
+                   pw_system_state_hidden (s, i) ? "" : PW_NAME (pw_system_state_name, s, i),
+                   pw_system_state_unit (s, i), i < n ? q[i] : v[i - n], given);
+  }
+  pw_json_print (j, "], files: {");
+  for (int i = 0; i < cmd->content.files; i++) page_file_json (j, &cmd->content.file[i], cmd->base64);
+  pw_json_print (j, "}}");
   fputs (");\n", f);
 }
 
@@ -111,10 +83,10 @@ static void page_script (FILE *f, const void *context) {
 
 /* Chooses the method of --method; without it that of the model, unless the engine lacks it, or it has options, or fixed
  * steps although no --step is given. */
-static int page_choose_method (page *cmd, const pw_run_defaults *d, pw_error *error) {
+static int page_choose_method (page *cmd, pw_error *error) {
   const pw_method *m;
   int stabilisation;
-  const char *wanted = cmd->line.method ? cmd->line.method : d->method;
+  const char *wanted = cmd->line.method ? cmd->line.method : cmd->line.m.defaults.method;
   if (pw_method_parse (wanted, &m, &stabilisation, error) != PW_OK) return error->status;
   int available = page_has_method (m);
   if (!available && cmd->line.method)
@@ -131,51 +103,40 @@ static int page_choose_method (page *cmd, const pw_run_defaults *d, pw_error *er
   return PW_OK;
 }
 
-static int page_open_files (page *cmd, pw_error *error) {
+static int page_is_plugin (const char *path) {
+  const char *ending = strrchr (path, '.');
+  return ending && strcmp (ending, ".so") == 0;
+}
+
+static int page_open (page *cmd, pw_error *error) {
+  pw_use use[] = { PW_CLI_MODEL_USE, { "-o", cmd->path, PW_WRITES, NULL } };
+  const char *model = *cmd->line.argument;
+  if (cmd->path == NULL) return pw_fail (error, PW_INPUT, "-o FILE.html is missing: the page to write");
+  if (pw_animation_check ("-o", cmd->path, error) != PW_OK) return error->status;
+  /* in place of the name of a plug-in, unless it is a path, the source next to it: browsers need another compilation */
+  if (strchr (model, '/') == NULL && !page_is_plugin (model) && (cmd->source = pw_file_find (model, error)) == NULL)
+    return error->status;
+  if (cmd->source && page_is_plugin (cmd->source)) {
+    strcpy (strrchr (cmd->source, '.'), ".c");
+    if (access (cmd->source, R_OK) == 0) *(cmd->line.argument = cmd->argument) = cmd->source;
+  }
+  int status = pw_cli_open (&cmd->line, error);
+  if (status == PW_OK) status = pw_cli_check_uses (&cmd->line, use, 2, error);
+  if (status == PW_OK) status = pw_cli_settings (&cmd->line, &cmd->line.m.defaults, &cmd->settings, &cmd->limit, error);
+  if (status == PW_OK) status = page_choose_method (cmd, error);
+  if (status == PW_OK) status = pw_page_open (&cmd->content, cmd->line.m.file, error);
+  if (status != PW_OK) return status;
   size_t longest = 0;
-  if (pw_page_open (&cmd->content, cmd->compiled.file, error) != PW_OK) return error->status;
   for (int i = 0; i < cmd->content.files; i++)
     if (longest < cmd->content.file[i].size) longest = cmd->content.file[i].size;
   cmd->base64 = malloc (longest * 4 / 3 + 5); /* 4 characters for every 3 bytes, rounded up, and 0 */
   return cmd->base64 ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
 }
 
-static int page_is_plugin (const char *path) {
-  const char *ending = strrchr (path, '.');
-  return ending && strcmp (ending, ".so") == 0;
-}
-
-/* Replaces the name of a plug-in, unless it is a path, by the source next to it: browsers need another compilation. */
-static int page_find_source (page *cmd, pw_error *error) {
-  const char *model = *cmd->line.argument;
-  if (strchr (model, '/') || page_is_plugin (model)) return PW_OK;
-  char *path = cmd->source = pw_file_find (model, error);
-  if (path && page_is_plugin (path)) {
-    strcpy (strrchr (path, '.'), ".c");
-    if (access (path, R_OK) == 0) *(cmd->line.argument = cmd->argument) = path;
-  }
-  return error->status;
-}
-
-static int page_open (page *cmd, pw_error *error) {
-  pw_use use[] = { PW_CLI_MODEL_USE, { "-o", cmd->path, PW_WRITES, NULL } };
-  if (cmd->path == NULL) return pw_fail (error, PW_INPUT, "-o FILE.html is missing: the page to write");
-  int status = pw_animation_check ("-o", cmd->path, error);
-  if (status == PW_OK) status = page_find_source (cmd, error);
-  if (status == PW_OK) status = pw_cli_open (&cmd->compiled, &cmd->line, error);
-  if (status == PW_OK) status = pw_cli_check_uses (&cmd->line, cmd->compiled.file, use, 2, error);
-  if (status != PW_OK) return status;
-  pw_run_defaults d = pw_cli_defaults (pw_file_table (cmd->compiled.file));
-  status = pw_cli_settings (&cmd->line, &d, &cmd->t_end, &cmd->settings, &cmd->limit, error);
-  if (status == PW_OK) status = page_choose_method (cmd, &d, error);
-  return status == PW_OK ? page_open_files (cmd, error) : status;
-}
-
 static int page_command (void *options, pw_error *error) {
   page *cmd = options;
   pw_output *o = NULL;
-  if (page_open (cmd, error) == PW_OK)
-    cmd->run = pw_run_open (cmd->compiled.system, cmd->method, &cmd->settings, error);
+  if (page_open (cmd, error) == PW_OK) cmd->run = pw_run_open (cmd->line.m.system, cmd->method, &cmd->settings, error);
   if (cmd->run) o = pw_output_open (cmd->path, error);
   if (o) pw_animation_page (pw_output_stream (o), page_html, page_script, cmd);
   if (o) pw_output_finish (o, error);
@@ -183,7 +144,6 @@ static int page_command (void *options, pw_error *error) {
   free (cmd->base64);
   free (cmd->source);
   pw_page_close (&cmd->content);
-  pw_cli_close_model (&cmd->compiled);
   return error->status;
 }
 

@@ -17,14 +17,13 @@ static void page_points (pw_json *j, const char *key, const double *at, int coun
   pw_json_close (j, ']');
 }
 
-/* ---- Shapes ---- */
-
-static void page_bodies (pw_json *j, const pw_plots *plots) {
+void pw_animation_scene (pw_json *j, const pw_plots *plots) {
+  j->digits = 9;
+  pw_json_print (j, "size: %g, symbol: %g", plots->size, plots->symbol_unit);
   pw_json_open (j, "bodies", '[');
   for (int b = 0; b < plots->bodies.drawn; b++) {
     const pw_plot_body *shape = &plots->shape[b];
-    pw_json_open (j, NULL, '{');
-    pw_json_text (j, "name", pw_plot_name (plots, &plots->bodies, b));
+    pw_json_print (j, "{name: %s", pw_plot_name (plots, &plots->bodies, b));
     page_points (j, "at", *shape->attachment, shape->attachments, NULL);
     page_points (j, "spokes", *shape->attachment, shape->attachments, shape);
     page_points (j, "outline", *shape->corner, shape->corners, NULL);
@@ -32,79 +31,39 @@ static void page_bodies (pw_json *j, const pw_plots *plots) {
   }
   pw_json_close (j, ']');
   page_points (j, "ground", *plots->ground, plots->grounds, NULL);
-}
-
-static void page_wheels (pw_json *j, const pw_plots *plots) {
   pw_json_open (j, "wheels", '[');
-  for (int w = 0; w < plots->wheels.drawn; w++) {
-    pw_json_open (j, NULL, '{');
-    pw_json_text (j, "name", pw_plot_name (plots, &plots->wheels, w));
-    pw_json_number (j, "body",
-                    plots->body_index[pw_system_element (plots->system, plots->wheels.system_index[w]).body[0]]);
-    pw_json_flag (j, "rolls", pw_plot_rolls (plots, w));
-    pw_json_close (j, '}');
-  }
-  pw_json_close (j, ']');
-}
-
-/* Each stroke of a symbol: 1 if it is closed + 2 if it is upright, then its vertices. */
-static void page_strokes (pw_json *j, const pw_plots *plots, const pw_plot_link *link) {
-  pw_plot_stroke stroke[PLOT_STROKES];
-  int strokes = pw_plot_strokes (plots, link, plots->samples, stroke);
-  pw_json_open (j, "strokes", '[');
-  for (const pw_plot_stroke *s = stroke; s < stroke + strokes; s++) {
-    pw_json_open (j, NULL, '[');
-    pw_json_number (j, NULL, s->closed + 2 * s->upright);
-    for (int k = 0; k < s->vertices; k++) pw_json_numbers (j, NULL, s->vertex[k], 4);
-    pw_json_close (j, ']');
-  }
-  pw_json_close (j, ']');
-}
-
-static void page_links (pw_json *j, const pw_plots *plots) {
-  pw_json_open (j, "links", '[');
+  for (int w = 0; w < plots->wheels.drawn; w++)
+    pw_json_print (j, "{name: %s, body: %d, rolls: %i}", pw_plot_name (plots, &plots->wheels, w),
+                   plots->body_index[pw_system_element (plots->system, plots->wheels.system_index[w]).body[0]],
+                   pw_plot_rolls (plots, w));
+  pw_json_print (j, "], links: [");
   for (const pw_plot_link *link = plots->link; link < plots->link + plots->links; link++) {
-    pw_json_open (j, NULL, '{');
-    pw_json_text (j, "name", pw_system_element (plots->system, link->element).name);
-    pw_json_number (j, "force_end", link->force_end);
-    pw_json_open (j, "ends", '[');
+    pw_json_print (j, "{name: %s, force_end: %d, ends: [", pw_system_element (plots->system, link->element).name,
+                   link->force_end);
     for (int n = 0; n < link->ends; n++) {
-      pw_json_open (j, NULL, '{');
-      pw_json_number (j, "body", link->end[n].body);
+      pw_json_print (j, "{body: %d", link->end[n].body);
       pw_json_numbers (j, "at", link->end[n].at, 2);
       pw_json_close (j, '}');
     }
-    pw_json_close (j, ']');
-    pw_json_number (j, "wheel", link->wheel);
-    pw_json_flag (j, "line", link->rail);
-    pw_json_number (j, "heading", pw_plot_heading (link));
-    page_strokes (j, plots, link);
-    pw_json_close (j, '}');
+    pw_json_print (j, "], wheel: %d, line: %i, heading: %g, strokes: [", link->wheel, link->rail,
+                   pw_plot_heading (link));
+    /* each stroke of the symbol: 1 if it is closed + 2 if it is upright, then its vertices */
+    pw_plot_stroke stroke[PLOT_STROKES];
+    int strokes = pw_plot_strokes (plots, link, plots->samples, stroke);
+    for (const pw_plot_stroke *s = stroke; s < stroke + strokes; s++) {
+      pw_json_print (j, "[%d", s->closed + 2 * s->upright);
+      for (int k = 0; k < s->vertices; k++) pw_json_numbers (j, NULL, s->vertex[k], 4);
+      pw_json_close (j, ']');
+    }
+    pw_json_print (j, "]}");
   }
-  pw_json_close (j, ']');
-}
-
-static void page_outputs (pw_json *j, const pw_plots *plots) {
-  char buffer[PW_NAME_BYTES];
-  const char *unit;
-  pw_json_open (j, "outputs", '[');
+  pw_json_print (j, "], outputs: [");
   for (int o = 0; o < plots->outputs; o++) {
-    pw_json_open (j, NULL, '{');
-    pw_json_text (j, "name", pw_plot_output (plots, o, buffer, &unit));
-    pw_json_text (j, "unit", unit);
-    pw_json_close (j, '}');
+    char buffer[PW_NAME_BYTES];
+    const char *unit, *name = pw_plot_output (plots, o, buffer, &unit);
+    pw_json_print (j, "{name: %s, unit: %s}", name, unit);
   }
   pw_json_close (j, ']');
-}
-
-void pw_animation_scene (pw_json *j, const pw_plots *plots) {
-  j->digits = 9;
-  pw_json_number (j, "size", plots->size);
-  pw_json_number (j, "symbol", plots->symbol_unit);
-  page_bodies (j, plots);
-  page_wheels (j, plots);
-  page_links (j, plots);
-  page_outputs (j, plots);
 }
 
 /* ---- The run ---- */
@@ -123,26 +82,17 @@ static void page_samples (pw_json *j, const pw_plots *plots, const char *key, in
 
 void pw_animation_parameters (pw_json *j, const pw_model *model) {
   pw_json_open (j, "parameters", '[');
-  for (const pw_parameter *p = pw_model_table (model)->parameters; p && p->name; p++) {
-    pw_json_open (j, NULL, '{');
-    pw_json_text (j, "name", p->name);
-    pw_json_text (j, "unit", p->unit);
-    pw_json_text (j, "about", p->about);
-    pw_json_text (j, "domain", pw_domain_names[p->domain]);
-    pw_json_number (j, "value", pw_model_parameter (model, p));
-    pw_json_close (j, '}');
-  }
+  for (const pw_parameter *p = pw_model_table (model)->parameters; p && p->name; p++)
+    pw_json_print (j, "{name: %s, unit: %s, about: %s, domain: %s, value: %g}", p->name, p->unit, p->about,
+                   pw_domain_names[p->domain], pw_model_parameter (model, p));
   pw_json_close (j, ']');
 }
 
 void pw_animation_run (FILE *f, const pw_plots *plots, const char *method, const char *reason) {
   pw_json j = { .f = f, .lines = 2 };
   const int wheels = plots->wheels.drawn, force_offset = plots->wheels.offset + 3 * wheels;
-  pw_json_open (&j, NULL, '{');
-  pw_json_text (&j, "model", plots->figures.model);
-  pw_json_text (&j, "about", plots->figures.about);
-  pw_json_text (&j, "method", method);
-  pw_json_text (&j, "reason", reason);
+  pw_json_print (&j, "{model: %s, about: %s, method: %s, reason: %s", plots->figures.model, plots->figures.about,
+                 method, reason);
   pw_animation_parameters (&j, plots->model);
   pw_animation_scene (&j, plots);
   j.lines = 1;

@@ -39,8 +39,7 @@ pw_output *pw_figure_open_data (const pw_figures *f, const char *name, pw_error 
   return o;
 }
 
-int pw_figure_lock_folder (const pw_cli_line *line, const pw_cli_model *model, const char *folder, const char *name,
-                           pw_files *files, pw_error *error) {
+int pw_figure_lock_folder (pw_cli_line *line, const char *folder, const char *name, pw_error *error) {
   static const char *const ending[] = { ".csv", ".json", ".dat", ".gp", ".svg", ".png", ".pdf" };
   enum { ENDINGS = sizeof ending / sizeof *ending };
   char text[ENDINGS][40];
@@ -48,7 +47,7 @@ int pw_figure_lock_folder (const pw_cli_line *line, const pw_cli_model *model, c
   for (int i = 0; i < ENDINGS; i++) snprintf (text[i], sizeof text[i], "%s%s", name, ending[i]), names[i] = text[i];
   pw_use use[] = { PW_CLI_MODEL_USE, { "-o", folder, PW_WRITES_INTO, names } };
   if (folder == NULL) return pw_cli_requires ("--width", line->width, "-o DIR", 0, error);
-  return pw_files_open (files, line, model, use, 2, error);
+  return pw_files_open (line, use, 2, error);
 }
 
 int pw_figure_write_tables (const char *folder, const char *name, int lines, const void *context,
@@ -136,24 +135,18 @@ int pw_figure_end (pw_output *o, const char *template_name, pw_error *error) {
 
 extern char **environ;
 
-/* Starts gnuplot in a folder, without input, with its output on standard error, in a locale with all characters of the
+/* Runs gnuplot in a folder, without input, with its output on standard error, in a locale with all characters of the
  * scripts; LC_ALL has no effect on this program, which never calls setlocale.  Returns 0 or an errno value. */
-static int gnuplot_start (const char *folder, char *const *argv, pid_t *child) {
+static int gnuplot_run (const char *folder, char *const *argv, int *wait_status) {
   posix_spawn_file_actions_t actions;
+  pid_t child;
   int failed = setenv ("LC_ALL", "C.UTF-8", 1) == 0 ? posix_spawn_file_actions_init (&actions) : ENOMEM;
   if (failed) return failed;
   failed = posix_spawn_file_actions_addchdir_np (&actions, folder);
   if (!failed) failed = posix_spawn_file_actions_addopen (&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
   if (!failed) failed = posix_spawn_file_actions_adddup2 (&actions, STDERR_FILENO, STDOUT_FILENO);
-  if (!failed) failed = posix_spawnp (child, argv[0], &actions, NULL, argv, environ);
+  if (!failed) failed = posix_spawnp (&child, argv[0], &actions, NULL, argv, environ);
   posix_spawn_file_actions_destroy (&actions);
-  return failed;
-}
-
-/* Runs gnuplot, likewise.  Returns 0 or an errno value. */
-static int gnuplot_run (const char *folder, char *const *argv, int *wait_status) {
-  pid_t child;
-  int failed = gnuplot_start (folder, argv, &child);
   while (!failed && waitpid (child, wait_status, 0) < 0)
     if (errno != EINTR) failed = errno;
   return failed;
@@ -209,11 +202,11 @@ int pw_figure_status (int drawn, const pw_error *drawing, int status, pw_error *
 
 /* ---- Panels of curves ---- */
 
-int pw_curves_open (pw_curves *c, const pw_cli_line *line, const pw_cli_model *model, const char *folder,
-                    const char *name, const char *title, pw_error *error) {
+int pw_curves_open (pw_curves *c, const pw_cli_line *line, const char *folder, const char *name, const char *title,
+                    pw_error *error) {
   pw_figures figures = { .folder = folder,
-                         .model = pw_file_name (model->file),
-                         .about = pw_file_table (model->file)->about };
+                         .model = pw_file_name (line->m.file),
+                         .about = pw_file_table (line->m.file)->about };
   *c = (pw_curves){ .folder = folder, .name = name };
   if (pw_figure_width (line->width, &figures.width, error) != PW_OK) return error->status;
   c->data = pw_figure_open_data (&figures, PW_PRINTED (60, "%s.dat", name), error);

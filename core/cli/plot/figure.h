@@ -34,10 +34,9 @@ int pw_figure_width (const char *text, double *width, pw_error *error);
 pw_output *pw_figure_open_file (const char *folder, const char *name, pw_error *error);
 pw_output *pw_figure_open_data (const pw_figures *f, const char *name, pw_error *error);
 
-/* Locks the folder of the option -o, in which NAME.csv, NAME.json and the figure NAME will be written, for `files`,
- * which the caller closes.  Without a folder (NULL) it only refuses --width.  A status. */
-int pw_figure_lock_folder (const pw_cli_line *line, const pw_cli_model *model, const char *folder, const char *name,
-                           pw_files *files, pw_error *error);
+/* Locks the folder of the option -o, in which NAME.csv, NAME.json and the figure NAME will be written.  Without a
+ * folder (NULL) it only refuses --width.  A status. */
+int pw_figure_lock_folder (pw_cli_line *line, const char *folder, const char *name, pw_error *error);
 /* Writes NAME.json, with this value of pw_json.lines, and, unless csv is NULL, NAME.csv into the folder.  A status. */
 int pw_figure_write_tables (const char *folder, const char *name, int lines, const void *context,
                             int (*csv) (const void *context, FILE *f, pw_error *error),
@@ -98,8 +97,8 @@ typedef struct {
 /* Opens NAME.dat and NAME.gp in the folder, of the width that the command line gives.  Then panels and curves are added
  * in turn, curves to the last panel, points to the last curve.  A panel without points is omitted unless its axes
  * are given, a figure without panels is not written.  PW_OK, PW_INPUT for the width, or PW_RESOURCE. */
-int pw_curves_open (pw_curves *c, const pw_cli_line *line, const pw_cli_model *model, const char *folder,
-                    const char *name, const char *title, pw_error *error);
+int pw_curves_open (pw_curves *c, const pw_cli_line *line, const char *folder, const char *name, const char *title,
+                    pw_error *error);
 void pw_curves_panel (pw_curves *c, const pw_panel *panel);
 /* Styles are those of `look` in panels.gp; `method STABILISATION` with the method as label.  Labels are in a legend
  * above the panel unless they are NULL, or it would repeat an earlier one. */

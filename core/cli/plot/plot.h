@@ -36,8 +36,7 @@ int pw_plots_finish (pw_plots *plots, int draw, pw_error *error);
 
 /* Writes the figure "outputs", a panel for each first-order state and output, and draws it as pw_plots_finish does;
  * nothing without outputs.  The same statuses. */
-int pw_plots_outputs (const pw_plots *plots, const pw_cli_line *line, const pw_cli_model *model, int draw,
-                      pw_error *error);
+int pw_plots_outputs (const pw_plots *plots, const pw_cli_line *line, int draw, pw_error *error);
 
 /* PW_INPUT unless the path of an animation, the value of an option, ends in .html. */
 int pw_animation_check (const char *option, const char *path, pw_error *error);

@@ -63,28 +63,6 @@ static int plot_allocate (pw_plots *plots, pw_error *error) {
   return plots->out_of_memory ? pw_fail (error, PW_RESOURCE, "plots: out of memory") : PW_OK;
 }
 
-/* Chooses the bodies, and the elements with a contact point, that are drawn, evenly from all. */
-static void plot_choose (pw_plots *plots) {
-  for (int b = 0; b < plots->bodies.count; b++) plots->body_index[b] = PLOT_HIDDEN;
-  plots->body_index[plots->bodies.count] = PLOT_GROUND;
-  for (int i = 0; i < plots->bodies.drawn; i++) {
-    plots->bodies.system_index[i] = pw_plot_pick (i, plots->bodies.drawn, plots->bodies.count);
-    plots->body_index[plots->bodies.system_index[i]] = i;
-  }
-  for (int e = 0, contacts = 0, i = 0; i < plots->wheels.drawn; e++)
-    if (pw_system_element (plots->system, e).contact >= 0 &&
-        contacts++ == pw_plot_pick (i, plots->wheels.drawn, plots->wheels.count))
-      plots->wheels.system_index[i++] = e;
-}
-
-/* Locks the folder; an error before the run if it cannot be written. */
-static int plot_try_folder (pw_plots *plots, pw_error *error) {
-  if (pw_folder_open (&plots->folder, plots->figures.folder, error) != PW_OK) return error->status;
-  pw_output *probe = pw_figure_open_data (&plots->figures, "motion.dat", error);
-  if (probe) pw_output_discard (probe);
-  return probe ? PW_OK : error->status;
-}
-
 pw_plots *pw_plots_open (const char *folder, int forces, const pw_model *model, const pw_system *system, double t_end,
                          pw_error *error) {
   pw_plots *plots = malloc (sizeof *plots);
@@ -96,15 +74,24 @@ pw_plots *pw_plots_open (const char *folder, int forces, const pw_model *model, 
     .t_end = t_end,
     .with_forces = forces
   };
-  if ((folder == NULL || plot_try_folder (plots, error) == PW_OK) && plot_allocate (plots, error) == PW_OK)
+  pw_tracks *bodies = &plots->bodies, *wheels = &plots->wheels;
+  pw_output *probe = NULL; /* an error before the run if the folder cannot be written */
+  if (folder && pw_folder_open (&plots->folder, folder, error) == PW_OK)
+    probe = pw_figure_open_data (&plots->figures, "motion.dat", error);
+  if (probe) pw_output_discard (probe);
+  if ((folder == NULL || probe) && plot_allocate (plots, error) == PW_OK)
     plots->workspace = pw_workspace_new (system, error);
-  if (plots->workspace) {
-    plot_choose (plots);
-    pw_plot_find_shapes (plots);
-    return plots;
-  }
-  pw_plots_close (plots);
-  return NULL;
+  if (plots->workspace == NULL) return pw_plots_close (plots), NULL;
+  /* the bodies, and the elements with a contact point, that are drawn, evenly from all */
+  for (int b = 0; b < bodies->count; b++) plots->body_index[b] = PLOT_HIDDEN;
+  plots->body_index[bodies->count] = PLOT_GROUND;
+  for (int i = 0; i < bodies->drawn; i++)
+    plots->body_index[bodies->system_index[i] = pw_plot_pick (i, bodies->drawn, bodies->count)] = i;
+  for (int e = 0, contacts = 0, i = 0; i < wheels->drawn; e++)
+    if (pw_system_element (system, e).contact >= 0 && contacts++ == pw_plot_pick (i, wheels->drawn, wheels->count))
+      wheels->system_index[i++] = e;
+  pw_plot_find_shapes (plots);
+  return plots;
 }
 
 int pw_plots_style (pw_plots *plots, const char *width, const char *colour, pw_error *error) {
@@ -150,8 +137,9 @@ void pw_plots_add (pw_plots *plots, const pw_sample *sample) {
   const int states = pw_system_states (plots->system);
   const double *state = sample->v + pw_system_coordinates (plots->system) - states;
   for (int o = 0; o < plots->outputs; o++)
-    pw_plot_sample (plots, i)[plots->sample_size - plots->outputs + o] =
-        o < states ? state[o] : sample->output[o - states];
+    pw_plot_sample (plots, i)[plots->sample_size - plots->outputs + o] = o < states       ? state[o]
+                                                                         : sample->output ? sample->output[o - states]
+                                                                                          : NAN;
   if (i == 0) pw_plot_measure (plots);
   if (plots->with_forces && plots->links > 0)
     pw_plot_forces (plots, sample, pw_plot_track (plots, i, &plots->wheels, plots->wheels.drawn));
@@ -192,20 +180,14 @@ static void data_row (FILE *f, const double *value, int count, const char *end) 
   fputs (end, f);
 }
 
-/* 1 if a body has attachment points, or there is a wheel or marker. */
-static int data_extended (const pw_plots *plots) {
-  int b = 0;
-  while (b < plots->bodies.drawn && plots->shape[b].attachments == 0) b++;
-  return b < plots->bodies.drawn || plots->wheels.drawn > 0;
-}
-
 /* Number of initial samples in a close-up, a separate panel for a mechanism that travels so far that it is small in a
  * figure of the whole run; 0: none.  A single point has no size. */
 static int data_closeup (const pw_plots *plots) {
   pw_plot_box all = pw_plot_ground (plots), first = PLOT_EMPTY;
   double diagonal = 0;
-  int n = 0;
-  if (!data_extended (plots)) return 0;
+  int n = 0, extended = plots->wheels.drawn > 0;
+  for (int b = 0; b < plots->bodies.drawn; b++) extended |= plots->shape[b].attachments > 0;
+  if (!extended) return 0;
   for (int i = 0; i < plots->samples; i++) diagonal = pw_plot_extend (&all, plots, i);
   if (diagonal < FIGURES_FAR * plots->size) return 0;
   while (n < plots->samples && pw_plot_extend (&first, plots, n) <= FIGURES_NEAR * plots->size) n++;
@@ -303,19 +285,6 @@ static void data_rods (FILE *f, const pw_plots *plots, int i) {
   }
 }
 
-/* The open or the closed strokes of a symbol at the last of n samples. */
-static void data_symbol (FILE *f, const pw_plots *plots, const pw_plot_link *link, int n, int closed) {
-  pw_plot_stroke stroke[PLOT_STROKES];
-  double point[PLOT_VERTICES][2];
-  int strokes = pw_plot_strokes (plots, link, n, stroke);
-  for (const pw_plot_stroke *s = stroke; s < stroke + strokes; s++) {
-    if (s->closed != closed) continue;
-    pw_plot_place (plots, n - 1, link, s, point);
-    for (int k = 0; k < s->vertices; k++)
-      data_vertex (f, point[k], pw_plot_sample (plots, n - 1)[PLOT_T], -1, k < s->vertices - 1 ? "\n" : "\n\n");
-  }
-}
-
 /* The number of samples from one snapshot to the next, of the first n: the body with the longest path moves by about a
  * third of the size of the mechanism. */
 static int data_stride (const pw_plots *plots, int n) {
@@ -355,44 +324,45 @@ static int data_mechanism (const pw_plots *plots, const char *name, int n, pw_er
     }
   for (int closed = 0; closed < 2; closed++) {
     fprintf (f, "\n\n# symbols, %s\n%s", closed ? "closed" : "open", first);
-    for (int i = 0; i < plots->links; i++) data_symbol (f, plots, &plots->link[i], n, closed);
+    for (const pw_plot_link *link = plots->link; link < plots->link + plots->links; link++) {
+      pw_plot_stroke stroke[PLOT_STROKES];
+      double point[PLOT_VERTICES][2];
+      int strokes = pw_plot_strokes (plots, link, n, stroke);
+      for (const pw_plot_stroke *s = stroke; s < stroke + strokes; s++) {
+        if (s->closed != closed) continue;
+        pw_plot_place (plots, n - 1, link, s, point);
+        for (int k = 0; k < s->vertices; k++)
+          data_vertex (f, point[k], pw_plot_sample (plots, n - 1)[PLOT_T], -1, k < s->vertices - 1 ? "\n" : "\n\n");
+      }
+    }
   }
   return pw_output_finish (o, error);
 }
 
-static int data_write (const pw_plots *plots, int closeup, pw_error *error) {
-  static const char energy[] = "t [s], kinetic [J], potential [J], work [J], loss [J], projection [J], balance [J]";
-  int status = data_tracks (plots, &plots->bodies, error);
-  if (status == PW_OK) status = data_tracks (plots, &plots->wheels, error);
-  if (status == PW_OK)
-    status =
-        data_table (plots, "energy.dat", energy, plots->data, plots->sample_size, PLOT_FIRST, plots->samples, error);
-  if (status == PW_OK)
-    status = data_table (plots, "ground.dat", "points of the ground: x [m], y [m]", *plots->ground, 2, 2,
-                         plots->grounds, error);
-  if (status == PW_OK) status = data_mechanism (plots, "mechanism.dat", plots->samples, error);
-  if (status == PW_OK && closeup > 0) status = data_mechanism (plots, "mechanism-closeup.dat", closeup, error);
-  return status;
-}
+/* ---- Scripts ---- */
 
-/* ---- Scripts: values of the templates' variables ---- */
-
-/* Curves, with a label each unless there are too many; which of them, from 0, are paths of markers. */
-static void figures_curves (FILE *f, const pw_plots *plots, const pw_tracks *tracks) {
+/* Writes the script of a figure: values of the template's variables. */
+static int figures_write (const pw_plots *plots, const char *name, int closeup, pw_error *error) {
+  int mechanism = strcmp (name, "mechanism") == 0, paths = mechanism || strcmp (name, "paths") == 0;
+  pw_output *o = pw_figure_begin (&plots->figures, name, error);
+  if (o == NULL) return PW_RESOURCE;
+  FILE *f = pw_output_stream (o);
+  fprintf (f, "t_end = %.9g\nt_closeup = %.9g\n", pw_plot_sample (plots, plots->samples - 1)[PLOT_T],
+           closeup > 0 ? pw_plot_sample (plots, closeup - 1)[PLOT_T] : 0);
+  const pw_tracks *tracks = paths && plots->wheels.drawn ? &plots->wheels : &plots->bodies;
   pw_figure_text (f, "data", tracks->file);
   pw_figure_text (f, "what", tracks->noun);
   fprintf (f, "curves = %d\nnumbers = %d\nnumber_column = %d\narray label[%d]\n", tracks->curves, tracks->count,
            tracks->numbers + 2, tracks->curves);
-  for (int i = 0; i < tracks->curves && tracks->curves <= FIGURES_NAMED; i++)
+  for (int i = 0; i < tracks->curves && tracks->curves <= FIGURES_NAMED; i++) /* labels unless there are too many */
     pw_figure_element (f, "label", i + 1, pw_plot_name (plots, tracks, i));
-  fputs ("markers = '", f);
+  fputs ("markers = '", f); /* which of the curves, from 0, are paths of markers */
   for (int i = 0; i < tracks->curves && tracks == &plots->wheels; i++)
     if (!pw_plot_rolls (plots, pw_plot_pick (i, tracks->curves, tracks->drawn))) fprintf (f, "%d ", i);
   fputs ("'\n", f);
-}
-
-/* The names of bodies unless there are too many, and the colours of those with an area. */
-static void figures_bodies (FILE *f, const pw_plots *plots) {
+  fprintf (f, "ground = %d\nby_time = %d\n", plots->grounds > 0, plots->by_time);
+  if (!mechanism) return pw_figure_end (o, name, error);
+  /* the names of bodies unless there are too many, and the colours of those with an area */
   int bodies = plots->bodies.drawn, named = bodies <= FIGURES_NAMED ? bodies : 0, area[FIGURES_COLOURS] = { 0 };
   fprintf (f, "bodies = %d\narray body[%d]\n", named, bodies);
   for (int b = 0; b < bodies; b++) area[b % FIGURES_COLOURS] |= plots->shape[b].corners > 0;
@@ -401,23 +371,12 @@ static void figures_bodies (FILE *f, const pw_plots *plots) {
     if (area[c]) fprintf (f, "%d ", c + 1);
   fputs ("'\n", f);
   for (int b = 0; b < named; b++) pw_figure_element (f, "body", b + 1, pw_plot_name (plots, &plots->bodies, b));
-}
-
-static int figures_write (const pw_plots *plots, const char *name, int closeup, pw_error *error) {
-  int mechanism = strcmp (name, "mechanism") == 0, paths = mechanism || strcmp (name, "paths") == 0;
-  pw_output *o = pw_figure_begin (&plots->figures, name, error);
-  if (o == NULL) return PW_RESOURCE;
-  FILE *f = pw_output_stream (o);
-  fprintf (f, "t_end = %.9g\nt_closeup = %.9g\n", pw_plot_sample (plots, plots->samples - 1)[PLOT_T],
-           closeup > 0 ? pw_plot_sample (plots, closeup - 1)[PLOT_T] : 0);
-  figures_curves (f, plots, paths && plots->wheels.drawn ? &plots->wheels : &plots->bodies);
-  fprintf (f, "ground = %d\nby_time = %d\n", plots->grounds > 0, plots->by_time);
-  if (mechanism) figures_bodies (f, plots);
   return pw_figure_end (o, name, error);
 }
 
 int pw_plots_finish (pw_plots *plots, int draw, pw_error *error) {
   static const char *const names[] = { "paths", "velocities", "angular", "energy", "mechanism", NULL };
+  static const char energy[] = "t [s], kinetic [J], potential [J], work [J], loss [J], projection [J], balance [J]";
   const char *folder = plots->figures.folder;
   if (folder == NULL) return PW_OK;
   if (plots->samples < 2) {
@@ -427,7 +386,16 @@ int pw_plots_finish (pw_plots *plots, int draw, pw_error *error) {
   if (plots->samples < plots->planned)
     snprintf (plots->figures.incomplete, sizeof plots->figures.incomplete, ", incomplete: up to t = %s s of %s s",
               PW_DIGITS (pw_plot_sample (plots, plots->samples - 1)[PLOT_T], 4), PW_DIGITS (plots->t_end, 4));
-  int closeup = data_closeup (plots), status = data_write (plots, closeup, error);
+  int closeup = data_closeup (plots), status = data_tracks (plots, &plots->bodies, error);
+  if (status == PW_OK) status = data_tracks (plots, &plots->wheels, error);
+  if (status == PW_OK)
+    status =
+        data_table (plots, "energy.dat", energy, plots->data, plots->sample_size, PLOT_FIRST, plots->samples, error);
+  if (status == PW_OK)
+    status = data_table (plots, "ground.dat", "points of the ground: x [m], y [m]", *plots->ground, 2, 2,
+                         plots->grounds, error);
+  if (status == PW_OK) status = data_mechanism (plots, "mechanism.dat", plots->samples, error);
+  if (status == PW_OK && closeup > 0) status = data_mechanism (plots, "mechanism-closeup.dat", closeup, error);
   for (const char *const *name = names; status == PW_OK && *name; name++)
     status = figures_write (plots, *name, closeup, error);
   if (status != PW_OK) return status;
@@ -441,11 +409,10 @@ const char *pw_plot_output (const pw_plots *plots, int o, char buffer[PW_NAME_BY
   return o < states ? pw_system_state_name (s, state, buffer, PW_NAME_BYTES) : pw_system_output_name (s, o - states);
 }
 
-int pw_plots_outputs (const pw_plots *plots, const pw_cli_line *line, const pw_cli_model *model, int draw,
-                      pw_error *error) {
+int pw_plots_outputs (const pw_plots *plots, const pw_cli_line *line, int draw, pw_error *error) {
   pw_curves c;
   if (plots->figures.folder == NULL || plots->outputs == 0 || plots->samples < 2) return PW_OK;
-  int status = pw_curves_open (&c, line, model, plots->figures.folder, "outputs", "outputs", error);
+  int status = pw_curves_open (&c, line, plots->figures.folder, "outputs", "outputs", error);
   for (int o = 0; status == PW_OK && o < plots->outputs; o++) {
     char buffer[PW_NAME_BYTES];
     const char *unit, *name = pw_plot_output (plots, o, buffer, &unit);

@@ -45,20 +45,17 @@ int pw_plot_inside (const pw_plot_body *shape, int k) {
   return 1;
 }
 
-/* Adds an attachment point unless it is there already; the centre of mass is always drawn. */
-static void shapes_add_point (pw_plot_body *shape, const double *at) {
-  if (shape->attachments == PLOT_ATTACHMENTS || (at[0] == 0 && at[1] == 0)) return;
-  for (int i = 0; i < shape->attachments; i++)
-    if (shape->attachment[i][0] == at[0] && shape->attachment[i][1] == at[1]) return;
-  memcpy (shape->attachment[shape->attachments++], at, 2 * sizeof *at);
-}
-
-/* The points of an element on the bodies drawn and on the ground. */
+/* The points of an element on the bodies drawn, each once and without the centre of mass, which is always drawn; and on
+ * the ground. */
 static void shapes_add_points (pw_plots *plots, const pw_element *e, const int *bodies) {
   for (int n = 0; n < e->kind->bodies; n++) {
     const double *at = pw_field_at (e->kind, e->definition, PW_POINT, n);
-    int b = plots->body_index[bodies[n]];
-    if (at && b >= 0) shapes_add_point (&plots->shape[b], at);
+    int b = plots->body_index[bodies[n]], known = 0;
+    pw_plot_body *shape = at && b >= 0 && (at[0] != 0 || at[1] != 0) ? &plots->shape[b] : NULL;
+    for (int i = 0; shape && i < shape->attachments; i++)
+      known |= shape->attachment[i][0] == at[0] && shape->attachment[i][1] == at[1];
+    if (shape && !known && shape->attachments < PLOT_ATTACHMENTS)
+      memcpy (shape->attachment[shape->attachments++], at, 2 * sizeof *at);
     if (at && b == PLOT_GROUND && plots->grounds < PLOT_DRAWN)
       memcpy (plots->ground[plots->grounds++], at, 2 * sizeof *at);
   }
@@ -95,13 +92,6 @@ static int shapes_without_points (const pw_element *e) {
   return at && at[0] == 0 && at[1] == 0 && at[2] == 0 && at[3] == 0;
 }
 
-/* The index among the wheels drawn of the contact point of an element; -1: none. */
-static int shapes_wheel (const pw_plots *plots, int element) {
-  int w = 0;
-  while (w < plots->wheels.drawn && plots->wheels.system_index[w] != element) w++;
-  return w < plots->wheels.drawn ? w : -1;
-}
-
 /* Fills a link; 0 if the element has no place, or one of its bodies is not drawn. */
 static int shapes_link (const pw_plots *plots, const pw_element *e, int element, pw_plot_link *link) {
   const pw_element_info info = pw_system_element (plots->system, element);
@@ -110,7 +100,8 @@ static int shapes_link (const pw_plots *plots, const pw_element *e, int element,
                           .definition = e->definition,
                           .rail = e->kind->symbol && strstr (e->kind->symbol, "inf"),
                           .force_end = -1,
-                          .wheel = shapes_wheel (plots, element) };
+                          .wheel = plots->wheels.drawn - 1 };
+  while (link->wheel >= 0 && plots->wheels.system_index[link->wheel] != element) link->wheel--;
   for (int n = 0; n < e->kind->bodies && link->ends < 2; n++) {
     const double *at = pw_field_at (e->kind, e->definition, PW_POINT, n);
     int body = plots->body_index[info.body[n]];
@@ -259,13 +250,6 @@ static void symbol_circle (pw_plot_stroke *stroke, const double *centre, double 
   }
 }
 
-/* A pitch circle of gears of the ratio i: the radii R1 and R2 = |i| R1 have R1 + R2 = |p2 - p1| if i < 0, and
- * |R1 - R2| = |p2 - p1| if i > 0 and one is a ring (Willis 1870); equal circles for i = 1. */
-static void symbol_gear (const pw_plot_link *link, pw_plot_stroke *stroke, int second) {
-  double i = symbol_field (link, "ratio", 5), first = i == 1 ? 0.5 : 1 / fabs (1 - i);
-  symbol_circle (stroke, (const double[]){ second, 0, 0 }, 0, second ? first * fabs (i) : first);
-}
-
 /* Reads numbers, at most `most`; returns how many there are. */
 static int symbol_numbers (const char **text, double *out, int most) {
   char *end;
@@ -286,7 +270,11 @@ static int symbol_next (const pw_plot_link *link, const char **text, pw_plot_str
   int drawn = symbol_condition (link, text);
   *text += strspn (*text, " ");
   if (**text == 'g') {
-    symbol_gear (link, stroke, (*text)[1] == '2');
+    /* a pitch circle of gears of the ratio i: the radii R1 and R2 = |i| R1 have R1 + R2 = |p2 - p1| if i < 0, and
+     * |R1 - R2| = |p2 - p1| if i > 0 and one is a ring (Willis 1870); equal circles for i = 1 */
+    const int second = (*text)[1] == '2';
+    double i = symbol_field (link, "ratio", 5), first = i == 1 ? 0.5 : 1 / fabs (1 - i);
+    symbol_circle (stroke, (const double[]){ second, 0, 0 }, 0, second ? first * fabs (i) : first);
   } else if (**text == 'o' && ++*text && symbol_numbers (text, number, 4) == 4) {
     symbol_circle (stroke, number, number[3], 0);
   } else {

@@ -33,8 +33,7 @@ typedef struct {
 typedef struct {
   pw_cli_line line;
   const char *json_path; /* NULL: not given */
-  pw_cli_model model;
-  pw_run *run; /* NULL: initialisation failed with `run_error` */
+  pw_run *run;           /* NULL: initialisation failed with `run_error` */
   pw_error run_error;
   pw_linear linear;       /* at the initial state; A is NULL if it was not computed */
   const char **redundant; /* a description of each redundant constraint equation, ended by NULL; or NULL */
@@ -60,22 +59,9 @@ PW_PRINTF (2, 3) static void check_add (pw_check_list *list, const char *format,
 
 /* ---- Initial conditions ---- */
 
-/* Opens a run by rk4+projection, whatever method the model selects. */
-static void check_open_run (pw_check *check) {
-  pw_run_defaults defaults = pw_cli_defaults (pw_file_table (check->model.file));
-  pw_settings settings = { .span = defaults.t_end, .step = defaults.step };
-  check->step = defaults.step;
-  check->uses_rk4 = strncmp (defaults.method, "rk4", 3) == 0;
-  check->run = pw_run_open (check->model.system, "rk4+projection", &settings, &check->run_error);
-  if (check->run == NULL)
-    check_add (&check->problem, "%s", check->run_error.text);
-  else
-    check->redundant = pw_report_redundancies (check->run);
-}
-
 /* Initial values specified by the model or given by the user that were changed by more than rounding. */
 static void check_given_values (pw_check *check) {
-  const pw_system *s = check->model.system;
+  const pw_system *s = check->line.m.system;
   const pw_initial_report *initial = pw_run_initial (check->run);
   for (int i = 0; i < 2 * pw_system_coordinates (s); i++) {
     char reason[300];
@@ -91,15 +77,15 @@ static void check_given_values (pw_check *check) {
 
 /* The model's reference solution must hold initially, up to round-off, unless the user gives initial values. */
 static int check_reference (pw_check *check, pw_error *error) {
-  int n = pw_system_coordinates (check->model.system);
-  if (check->line.starts || !pw_model_has_reference (check->model.model)) return PW_OK;
+  int n = pw_system_coordinates (check->line.m.system);
+  if (check->line.starts || !pw_model_has_reference (check->line.m.model)) return PW_OK;
   double *reference = malloc (2 * (size_t)n * sizeof *reference);
   if (reference == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  int status = pw_system_reference (check->model.model, check->model.system, 0, reference, reference + n, error);
+  int status = pw_system_reference (check->line.m.model, check->line.m.system, 0, reference, reference + n, error);
   for (int i = 0; i < 2 * n && status == PW_OK; i++) {
     if (isnan (reference[i])) continue;
     check->reference_states++;
-    const pw_state_change c = pw_cli_state_change (check->model.system, pw_run_initial (check->run), i);
+    const pw_state_change c = pw_cli_state_change (check->line.m.system, pw_run_initial (check->run), i);
     if (!(fabs (reference[i] - c.consistent) <= 1e-9 * (1 + fabs (c.consistent))))
       check_add (&check->problem, "the model's reference solution does not hold initially: %s is %s, not %s", c.name,
                  PW_DIGITS (c.consistent, 9), PW_DIGITS (reference[i], 9));
@@ -110,17 +96,6 @@ static int check_reference (pw_check *check, pw_error *error) {
 
 /* ---- Element types ---- */
 
-/* Tests an element type in random scenes; records the reason if none can be generated. */
-static int check_random (pw_checked_kind *k, pw_error *error) {
-  for (unsigned seed = 1; seed <= CHECK_SEEDS && !*k->untested; seed++) {
-    pw_error own = { 0 };
-    int status = pw_selftest (k->kind, seed, &k->random, &own);
-    if (status == PW_RESOURCE) return pw_fail (error, status, "%s", own.text);
-    if (status != PW_OK) snprintf (k->untested, sizeof k->untested, "%s", own.text);
-  }
-  return PW_OK;
-}
-
 /* The first check that fails, or NULL. */
 static const pw_selftest_check *check_fault (const pw_selftest_report *report) {
   for (int i = 0; i < report->checks; i++)
@@ -128,25 +103,18 @@ static const pw_selftest_check *check_fault (const pw_selftest_report *report) {
   return NULL;
 }
 
-/* Elements of one type are consecutive in a system. */
-static int check_list_kinds (pw_check *check, pw_error *error) {
-  const pw_system *s = check->model.system;
-  check->kind = calloc ((size_t)pw_system_elements (s) + 1, sizeof *check->kind);
-  if (check->kind == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  for (int i = 0; i < pw_system_elements (s); i++) {
-    const pw_kind *kind = pw_system_element (s, i).kind;
-    if (check->kinds == 0 || check->kind[check->kinds - 1].kind != kind) check->kind[check->kinds++].kind = kind;
-    check->kind[check->kinds - 1].count++;
-  }
-  return PW_OK;
-}
-
 /* Tests an element type in use; in the model only if the table of the type is consistent. */
 static int check_kind (pw_check *check, pw_checked_kind *k, pw_error *error) {
-  const pw_system *s = check->model.system;
+  const pw_system *s = check->line.m.system;
   const pw_initial_report *initial = check->run ? pw_run_initial (check->run) : NULL;
   const double *q = initial ? initial->q : pw_system_initial_q (s), *v = initial ? initial->v : pw_system_initial_v (s);
-  int status = check_random (k, error);
+  int status = PW_OK;
+  for (unsigned seed = 1; seed <= CHECK_SEEDS && !*k->untested; seed++) { /* unless no scene can be generated */
+    pw_error own = { 0 };
+    status = pw_selftest (k->kind, seed, &k->random, &own);
+    if (status == PW_RESOURCE) return pw_fail (error, status, "%s", own.text);
+    if (status != PW_OK) snprintf (k->untested, sizeof k->untested, "%s", own.text), status = PW_OK;
+  }
   const pw_selftest_check *fault = check_fault (&k->random);
   if (status == PW_OK && (fault == NULL || strcmp (fault->name, "table") != 0))
     status = pw_selftest_scene (s, check->run ? pw_run_scale (check->run)->time : 1, k->kind, 0, q, v, 1, &k->in_model,
@@ -164,44 +132,29 @@ static int check_kind (pw_check *check, pw_checked_kind *k, pw_error *error) {
  * g sin (a), which is below CHECK_SLOPE up to 45 degrees. */
 static const double CHECK_SLOPE = 7; /* m/s^2 */
 
-static void check_gravity (pw_check *check, const pw_element *gravity, const pw_element *wheel) {
-  const double *a = ((const pw_gravity *)gravity->definition)->acceleration, most = hypot (a[0], a[1]);
-  if (most > CHECK_SLOPE)
-    check_add (&check->finding,
-               "gravity %s acts with %s m/s^2 in the plane in which %s %s rolls: seen from above, gravity is "
-               "perpendicular to that plane and left out; on a slope of angle a it is 9.81 sin (a)",
-               pw_element_name (gravity), PW_DIGITS (most, 4), wheel->kind->name, pw_element_name (wheel));
-}
-
 static void check_wheels (pw_check *check) {
   int count, prescribed = 0;
   const pw_linear *linear = &check->linear;
-  const pw_element *element = pw_model_elements (check->model.model, &count), *wheel = NULL;
+  const pw_element *element = pw_model_elements (check->line.m.model, &count), *wheel = NULL;
   for (const pw_element *e = element; e < element + count; e++) {
     if (wheel == NULL && e->kind->contact && (e->kind->rows || e->kind->force)) wheel = e;
     prescribed |= e->kind->eta != NULL;
   }
   if (wheel == NULL) return;
   for (const pw_element *e = element; e < element + count; e++)
-    if (strcmp (e->kind->name, "gravity") == 0) check_gravity (check, e, wheel);
+    if (strcmp (e->kind->name, "gravity") == 0) {
+      const double *a = ((const pw_gravity *)e->definition)->acceleration, most = hypot (a[0], a[1]);
+      if (most > CHECK_SLOPE)
+        check_add (&check->finding,
+                   "gravity %s acts with %s m/s^2 in the plane in which %s %s rolls: seen from above, gravity is "
+                   "perpendicular to that plane and left out; on a slope of angle a it is 9.81 sin (a)",
+                   pw_element_name (e), PW_DIGITS (most, 4), wheel->kind->name, pw_element_name (wheel));
+    }
   if (check->run && linear->positions > 0 && linear->velocities == 0 && !prescribed)
     check_add (&check->finding, "the wheels allow no motion; wheels that slip sideways are of type tyre");
 }
 
 /* ---- Linearisation ---- */
-
-/* The fastest eigenvalue, and the largest step of RK4 that is stable for all; both without rigid displacements. */
-static void check_fastest (pw_check *check) {
-  const pw_linear *linear = &check->linear;
-  double most = 0;
-  for (int i = 0; i < linear->unknowns; i++) {
-    if (linear->rigid[i]) continue;
-    check->rk4_limit = fmin (check->rk4_limit, pw_rk4_limit (linear->re[i], linear->im[i]));
-    if (hypot (linear->re[i], linear->im[i]) <= most * (1 + 1e-12)) continue; /* not larger, up to round-off */
-    most = hypot (linear->re[i], linear->im[i]);
-    check->fastest = i;
-  }
-}
 
 static int check_linear (pw_check *check, pw_error *error) {
   pw_error own = { 0 };
@@ -212,11 +165,19 @@ static int check_linear (pw_check *check, pw_error *error) {
   }
   if (status != PW_OK) *error = own;
   if (status != PW_OK || check->linear.A == NULL) return status;
-  check_fastest (check);
+  /* the fastest eigenvalue, and the largest step of RK4 that is stable for all; both without rigid displacements */
+  const pw_linear *linear = &check->linear;
+  double most = 0;
+  for (int i = 0; i < linear->unknowns; i++) {
+    if (linear->rigid[i]) continue;
+    check->rk4_limit = fmin (check->rk4_limit, pw_rk4_limit (linear->re[i], linear->im[i]));
+    if (hypot (linear->re[i], linear->im[i]) <= most * (1 + 1e-12)) continue; /* not larger, up to round-off */
+    most = hypot (linear->re[i], linear->im[i]);
+    check->fastest = i;
+  }
   if (check->uses_rk4 && check->step > check->rk4_limit)
     check_add (&check->problem, "the model's step of %s s is too large for rk4, which is stable up to %s s",
                PW_DIGITS (check->step, 6), PW_DIGITS (check->rk4_limit, 3));
-  const pw_linear *linear = &check->linear;
   if (linear->steady != PW_STEADY || linear->unknowns == 0 || !(linear->re[0] > 0)) return PW_OK;
   check->doubling_time = log (2) / linear->re[0];
   check_add (&check->finding, "the motion is unstable: a perturbation doubles in %s s",
@@ -287,21 +248,8 @@ static const char *report_why_not_computed (const pw_linear *linear) {
   return linear->coordinates > CHECK_COORDINATES ? text : "the linearisation fails, see the findings";
 }
 
-static void report_singular_value (pw_json *j, const pw_check *check) {
-  const pw_linear *linear = &check->linear;
-  double length = check->run ? pw_run_scale (check->run)->length : NAN;
-  const char *label = linear->rank > 0 ? "smallest singular value of J" : NULL;
-  if (isnan (linear->least))
-    report_entry (j, "least_singular_value", NAN, label, "not computed: %s", report_why_not_computed (linear));
-  else
-    report_entry (j, "least_singular_value", check->run ? linear->least : NAN, label,
-                  "%s, rows scaled to length 1, angles multiplied by L = %s m", PW_DIGITS (linear->least, CHECK_DIGITS),
-                  PW_DIGITS (length, CHECK_DIGITS));
-  pw_json_number (j, "length_scale", length);
-}
-
 static void report_mobility (pw_json *j, const pw_check *check) {
-  const pw_system *s = check->model.system;
+  const pw_system *s = check->line.m.system;
   const pw_linear *linear = &check->linear;
   int coords = pw_system_coordinates (s), rows = pw_system_rows (s), holonomic = pw_system_holonomic (s), listed = 0;
   report_section (j, "mobility", '{', "Mobility");
@@ -320,7 +268,15 @@ static void report_mobility (pw_json *j, const pw_check *check) {
   for (int i = 0; i < 3; i++)
     report_entry (j, count[i].key, known ? (double)count[i].value : NAN, known ? count[i].label : NULL, "%d",
                   count[i].value);
-  report_singular_value (j, check);
+  double length = check->run ? pw_run_scale (check->run)->length : NAN;
+  const char *label = linear->rank > 0 ? "smallest singular value of J" : NULL;
+  if (isnan (linear->least))
+    report_entry (j, "least_singular_value", NAN, label, "not computed: %s", report_why_not_computed (linear));
+  else
+    report_entry (j, "least_singular_value", check->run ? linear->least : NAN, label,
+                  "%s, rows scaled to length 1, angles multiplied by L = %s m", PW_DIGITS (linear->least, CHECK_DIGITS),
+                  PW_DIGITS (length, CHECK_DIGITS));
+  pw_json_number (j, "length_scale", length);
   pw_json_close (j, '}');
   report_section (j, "redundant", '[', NULL);
   if (check->run) report_text (j, "redundant constraint equations", "%d", pw_run_redundant (check->run));
@@ -336,7 +292,7 @@ static void report_mass (pw_json *j, const pw_check *check) {
                           : check->run == NULL                ? NULL
                           : pw_run_redundant (check->run) > 0 ? "regular without the redundant constraint equations"
                                                               : "regular";
-  const pw_system *s = check->model.system;
+  const pw_system *s = check->line.m.system;
   const double *M = pw_system_mass (s);
   int lacking = 0, listed = 0;
   for (int b = 0; b < pw_system_bodies (s); b++) lacking += M[3 * b] == 0 || M[3 * b + 2] == 0;
@@ -361,21 +317,9 @@ static void report_mass (pw_json *j, const pw_check *check) {
 
 /* ---- Initial conditions ---- */
 
-static void report_change (pw_json *j, const pw_check *check, int i, int *listed) {
-  const pw_state_change c = pw_cli_state_change (check->model.system, pw_run_initial (check->run), i);
-  pw_json_open (j, NULL, '{');
-  pw_json_text (j, "state", c.name);
-  pw_json_number (j, "from", c.given);
-  pw_json_number (j, "to", c.consistent);
-  pw_json_close (j, '}');
-  report_item (j, listed, NULL,
-               PW_PRINTED (500, "%-20s from %s to %s, by %s %s", c.name, PW_DIGITS (c.given, 10),
-                           PW_DIGITS (c.consistent, 10), PW_DIGITS (c.consistent - c.given, 3), c.unit));
-}
-
 static void report_initial (pw_json *j, const pw_check *check) {
   static const char title[] = "Initial conditions";
-  int listed = 0, n = pw_system_coordinates (check->model.system);
+  int listed = 0, n = pw_system_coordinates (check->line.m.system);
   if (check->run == NULL) {
     report_line (j);
     pw_json_text (j, "start", NULL);
@@ -384,16 +328,20 @@ static void report_initial (pw_json *j, const pw_check *check) {
   }
   const pw_initial_report *initial = pw_run_initial (check->run);
   report_section (j, "start", '{', title);
-  pw_json_number (j, "moved", initial->moved);
-  pw_json_flag (j, "freed", initial->released);
-  pw_json_open (j, "changes", '[');
+  pw_json_print (j, "moved: %d, freed: %i, changes: [", initial->moved, initial->released);
   if (initial->moved == 0)
     report_print (j, "  consistent as described\n");
   else
     report_print (j, "  %d value%s changed%s\n", initial->moved, initial->moved == 1 ? " was" : "s were",
                   initial->released ? ", including given ones" : "");
   for (int i = 0; i < 2 * n; i++)
-    if (pw_initial_moved (check->model.system, initial, i)) report_change (j, check, i, &listed);
+    if (pw_initial_moved (check->line.m.system, initial, i)) {
+      const pw_state_change c = pw_cli_state_change (check->line.m.system, pw_run_initial (check->run), i);
+      pw_json_print (j, "{state: %s, from: %g, to: %g}", c.name, c.given, c.consistent);
+      report_item (j, &listed, NULL,
+                   PW_PRINTED (500, "%-20s from %s to %s, by %s %s", c.name, PW_DIGITS (c.given, 10),
+                               PW_DIGITS (c.consistent, 10), PW_DIGITS (c.consistent - c.given, 3), c.unit));
+    }
   report_end_list (j, listed);
   pw_json_close (j, '}');
   if (check->reference_states)
@@ -403,7 +351,7 @@ static void report_initial (pw_json *j, const pw_check *check) {
 
 /* The outputs at the initial state. */
 static void report_outputs (pw_json *j, const pw_check *check) {
-  const pw_system *s = check->model.system;
+  const pw_system *s = check->line.m.system;
   pw_sample sample;
   if (check->run == NULL || pw_system_outputs (s) == 0) return;
   if (pw_run_sample (check->run, pw_run_time (check->run), &sample, NULL) != PW_OK) return;
@@ -422,32 +370,9 @@ static void report_failures (pw_json *j, const pw_selftest_report *report, const
     if (!c->failed) continue;
     report_print (j, "    in %s: %s does not hold: off by %s, the bound is %s\n      %s\n", scenes, c->about,
                   PW_DIGITS (c->error, 2), PW_DIGITS (c->bound, 2), c->where);
-    pw_json_open (j, NULL, '{');
-    pw_json_text (j, "check", c->name);
-    pw_json_text (j, "in", scenes);
-    pw_json_text (j, "expected", c->about);
-    pw_json_number (j, "error", c->error);
-    pw_json_number (j, "bound", c->bound);
-    pw_json_text (j, "where", c->where);
-    pw_json_close (j, '}');
+    pw_json_print (j, "{check: %s, in: %s, expected: %s, error: %g, bound: %g, where: %s}", c->name, scenes, c->about,
+                   c->error, c->bound, c->where);
   }
-}
-
-static void report_kind (pw_json *j, const pw_checked_kind *k) {
-  report_line (j);
-  pw_json_open (j, NULL, '{');
-  pw_json_text (j, "kind", k->kind->name);
-  pw_json_number (j, "elements", k->count);
-  pw_json_number (j, "checks", k->random.checks + k->in_model.checks);
-  pw_json_open (j, "failed", '[');
-  report_text (j, PW_PRINTED (100, "%s (%s)", k->kind->name, PW_COUNTED (k->count, "element")),
-               "%s: %d checks in random scenes, %d in this model",
-               k->random.failed + k->in_model.failed ? "FAILED" : "good", k->random.checks, k->in_model.checks);
-  if (*k->untested) report_print (j, "    not tested in random scenes: %s\n", k->untested);
-  report_failures (j, &k->random, "random scenes");
-  report_failures (j, &k->in_model, "this model");
-  pw_json_close (j, ']');
-  pw_json_close (j, '}');
 }
 
 /* ---- Linearisation ---- */
@@ -459,15 +384,6 @@ static char *report_eigenvalue (const pw_linear *linear, int i, char buffer[100]
   return buffer;
 }
 
-/* Number of equal eigenvalues from i on, those of conjugate pairs included. */
-static int report_equal (const pw_linear *linear, int i) {
-  int k = i;
-  while (k < linear->unknowns && linear->re[k] == linear->re[i] && fabs (linear->im[k]) == fabs (linear->im[i]) &&
-         linear->rigid[k] == linear->rigid[i])
-    k++;
-  return k - i;
-}
-
 static void report_eigenvalues (const pw_linear *linear) {
   char text[100];
   for (int i = 0, lines = 0, same; i < linear->unknowns; i += same, lines++) {
@@ -475,7 +391,9 @@ static void report_eigenvalues (const pw_linear *linear) {
       printf ("    and %d more\n", linear->unknowns - i);
       return;
     }
-    same = report_equal (linear, i);
+    for (same = 1; i + same < linear->unknowns && linear->re[i + same] == linear->re[i] &&
+                   fabs (linear->im[i + same]) == fabs (linear->im[i]) && linear->rigid[i + same] == linear->rigid[i];)
+      same++; /* equal eigenvalues, those of conjugate pairs included */
     int multiplicity = linear->im[i] != 0 ? same / 2 : same;
     const char *times = multiplicity > 1 ? PW_PRINTED (30, ", %d times", multiplicity) : "";
     report_text (NULL, i == 0 ? "eigenvalues, rightmost first" : "", "%s%s%s", report_eigenvalue (linear, i, text),
@@ -555,8 +473,7 @@ static void report_linear (pw_json *j, const pw_check *check) {
   report_section (j, "eigenvalues", '[', NULL);
   for (int i = 0; i < linear->unknowns; i++)
     pw_json_numbers (j, NULL, (const double[]){ linear->re[i], linear->im[i] }, 2);
-  pw_json_close (j, ']');
-  pw_json_close (j, '}');
+  pw_json_print (j, "]}");
 }
 
 static void report_list (pw_json *j, const char *key, const char *one, const pw_check_list *list) {
@@ -577,20 +494,28 @@ static void report_lists (pw_json *j, const pw_check *check) {
 
 /* Writes the report: as JSON to j, or as text to standard output if j is NULL. */
 static void report_write (const pw_check *check, pw_json *j) {
-  const char *about = pw_file_table (check->model.file)->about;
-  pw_json_open (j, NULL, '{');
-  pw_json_number (j, "schema", 1);
-  pw_json_text (j, "model", pw_file_name (check->model.file));
-  pw_json_text (j, "status", check->problem.count ? "failed" : "ok");
+  const char *about = pw_file_table (check->line.m.file)->about;
+  pw_json_print (j, "{schema: %d, model: %s, status: %s", 1, pw_file_name (check->line.m.file),
+                 check->problem.count ? "failed" : "ok");
   if (j) report_lists (j, check);
-  report_print (j, "%s: %s\n", pw_file_name (check->model.file), about ? about : "");
+  report_print (j, "%s: %s\n", pw_file_name (check->line.m.file), about ? about : "");
   report_mobility (j, check);
   report_mass (j, check);
   report_initial (j, check);
   report_outputs (j, check);
   report_section (j, "kinds", '[',
                   "Self-test of the element types in use: each function against differences of other functions");
-  for (const pw_checked_kind *k = check->kind; k < check->kind + check->kinds; k++) report_kind (j, k);
+  for (const pw_checked_kind *k = check->kind; k < check->kind + check->kinds; k++) {
+    pw_json_print (j, "\n{kind: %s, elements: %d, checks: %d, failed: [", k->kind->name, k->count,
+                   k->random.checks + k->in_model.checks);
+    report_text (j, PW_PRINTED (100, "%s (%s)", k->kind->name, PW_COUNTED (k->count, "element")),
+                 "%s: %d checks in random scenes, %d in this model",
+                 k->random.failed + k->in_model.failed ? "FAILED" : "good", k->random.checks, k->in_model.checks);
+    if (*k->untested) report_print (j, "    not tested in random scenes: %s\n", k->untested);
+    report_failures (j, &k->random, "random scenes");
+    report_failures (j, &k->in_model, "this model");
+    pw_json_print (j, "]}");
+  }
   pw_json_close (j, ']');
   report_linear (j, check);
   report_line (j);
@@ -602,23 +527,36 @@ static void report_write (const pw_check *check, pw_json *j) {
 /* ---- The command ---- */
 
 static int check_model (pw_check *check, pw_error *error) {
-  const pw_system *s = check->model.system;
-  const double t_end = pw_cli_defaults (pw_file_table (check->model.file)).t_end;
+  const pw_system *s = check->line.m.system;
+  const pw_run_defaults *defaults = &check->line.m.defaults;
+  const pw_settings settings = { .span = defaults->t_end, .step = defaults->step };
   char notice[PW_NOTICE_BYTES];
   int status = PW_OK;
   check->rk4_limit = check->doubling_time = INFINITY;
   check->fastest = -1;
-  pw_report_model (&check->model);
+  pw_report_model (&check->line.m);
   for (int i = 0; i < pw_system_signals (s); i++) /* tables that do not cover the run, rows that are left out */
-    if (*pw_system_table_notice (s, i, t_end, notice, sizeof notice)) check_add (&check->finding, "%s", notice);
-  check_open_run (check);
+    if (*pw_system_table_notice (s, i, defaults->t_end, notice, sizeof notice))
+      check_add (&check->finding, "%s", notice);
+  check->step = defaults->step;
+  check->uses_rk4 = strncmp (defaults->method, "rk4", 3) == 0;
+  /* whatever method the model selects */
+  check->run = pw_run_open (s, "rk4+projection", &settings, &check->run_error);
+  if (check->run == NULL) check_add (&check->problem, "%s", check->run_error.text);
   if (check->run) {
+    check->redundant = pw_report_redundancies (check->run);
     check_given_values (check);
     status = check_reference (check, error);
     if (status == PW_OK) status = check_linear (check, error);
   }
   if (status == PW_OK) check_wheels (check);
-  if (status == PW_OK) status = check_list_kinds (check, error);
+  check->kind = calloc ((size_t)pw_system_elements (s) + 1, sizeof *check->kind);
+  if (status == PW_OK && check->kind == NULL) status = pw_fail (error, PW_RESOURCE, "out of memory");
+  for (int i = 0; check->kind && i < pw_system_elements (s); i++) { /* those of a type are consecutive */
+    const pw_kind *kind = pw_system_element (s, i).kind;
+    if (check->kinds == 0 || check->kind[check->kinds - 1].kind != kind) check->kind[check->kinds++].kind = kind;
+    check->kind[check->kinds - 1].count++;
+  }
   for (int i = 0; status == PW_OK && i < check->kinds; i++) status = check_kind (check, &check->kind[i], error);
   int out_of_memory = check->problem.out_of_memory || check->finding.out_of_memory;
   return status == PW_OK && out_of_memory ? pw_fail (error, PW_RESOURCE, "out of memory") : status;
@@ -626,28 +564,25 @@ static int check_model (pw_check *check, pw_error *error) {
 
 static int check_command (void *options, pw_error *error) {
   pw_check *check = options;
-  pw_files files = { .folder = { .made = 0 } };
   pw_use use[] = { PW_CLI_MODEL_USE, { "--json", check->json_path, PW_WRITES, pw_cli_json } };
-  int status = pw_cli_open (&check->model, &check->line, error);
-  if (status == PW_OK) status = pw_files_open (&files, &check->line, &check->model, use, 2, error);
+  int status = pw_cli_open (&check->line, error);
+  if (status == PW_OK) status = pw_files_open (&check->line, use, 2, error);
   if (status == PW_OK) status = check_model (check, error);
   if (status == PW_OK) {
-    FILE *json = pw_files_stream (&files, 1);
+    FILE *json = pw_files_stream (&check->line, 1);
     if (json != stdout) report_write (check, NULL);
     if (json) report_write (check, &(pw_json){ .f = json });
-    pw_files_finish (&files, error);
+    pw_files_finish (&check->line, error);
     if (check->problem.count) /* the exit status is that of a failed initialisation, otherwise that of bad input */
       pw_fail (error, check->run_error.status ? check->run_error.status : PW_INPUT, "%s%s", check->problem.text[0],
                check->problem.count > 1 ? "; and more, see above" : "");
   }
-  pw_files_close (&files);
   pw_linear_free (&check->linear);
   pw_run_close (check->run);
   free (check->redundant);
   free (check->kind);
   free (check->problem.text);
   free (check->finding.text);
-  pw_cli_close_model (&check->model);
   return error->status;
 }
 

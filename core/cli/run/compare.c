@@ -118,7 +118,7 @@ static int sampler_visit (pw_visitor *visitor, pw_run *run, pw_error *error) {
   while ((visitor->due = pw_motion_next_time (motion)) <= pw_run_time (run)) {
     int status = pw_run_sample (run, visitor->due, &sample, error);
     if (status != PW_OK) return status;
-    pw_motion_add (motion, visitor->study->compiled.system, &sample);
+    pw_motion_add (motion, visitor->study->line.m.system, &sample);
     visitor->row->balance = fmax (visitor->row->balance, fabs (sample.balance));
   }
   return PW_OK;
@@ -128,7 +128,7 @@ static int sampler_visit (pw_visitor *visitor, pw_run *run, pw_error *error) {
  * motion NULL: without samples, for the measurement of times. */
 static int compare_run (pw_study *study, pw_row *row, pw_motion *motion, pw_error *error) {
   sampler visitor = { { .visit = sampler_visit, .study = study, .row = row }, motion };
-  pw_settings settings = { .span = study->t_end, .ledger = motion != NULL };
+  pw_settings settings = { .span = study->settings.span, .ledger = motion != NULL };
   *(row->adaptive ? &settings.rtol : &settings.step) = row->level;
   if (motion) row->balance = motion->taken = 0;
   return pw_study_run (study, row, &settings, motion ? &visitor.base : NULL, error);
@@ -176,9 +176,9 @@ typedef struct {
 static int reference_run (void *context, int i, pw_error *error) {
   reference_candidate *candidate = (reference_candidate *)context + i;
   pw_study *study = candidate->study;
-  double loosest = candidate->row.adaptive ? REFERENCE_LOOSEST : study->t_end / REFERENCE_FEWEST;
+  double loosest = candidate->row.adaptive ? REFERENCE_LOOSEST : study->settings.span / REFERENCE_FEWEST;
   pw_error run_error = { 0 };
-  int status = pw_motion_open (&candidate->motion, study->compiled.system, MOTION_SAMPLES, study->t_end, error);
+  int status = pw_motion_open (&candidate->motion, study->line.m.system, MOTION_SAMPLES, study->settings.span, error);
   if (status != PW_OK) return status;
   status = PW_RETRY;
   while (status != PW_OK && candidate->row.level <= loosest) {
@@ -211,12 +211,6 @@ static void reference_name (const reference_candidate *candidate, char *text, si
             PW_DIGITS (candidate->row.level, 4), candidate->row.adaptive ? "" : " s");
 }
 
-/* 1 if two methods have the same integrator. */
-static int reference_same_integrator (const reference_candidate *a, const reference_candidate *b) {
-  size_t n = strcspn (a->row.method, "+");
-  return strncmp (a->row.method, b->row.method, n + 1) == 0;
-}
-
 /* The two candidates with the smallest distance, with different integrators if possible; 0 if there are none. */
 static int reference_pair (const pw_system *system, const reference_candidate *candidates, int *first, int *second) {
   double least = INFINITY;
@@ -224,7 +218,8 @@ static int reference_pair (const pw_system *system, const reference_candidate *c
     for (int i = 0; i < REFERENCE_CANDIDATES; i++)
       for (int j = i + 1; j < REFERENCE_CANDIDATES; j++) {
         const reference_candidate *a = &candidates[i], *b = &candidates[j];
-        if (!a->finished || !b->finished || reference_same_integrator (a, b) != same) continue;
+        int same_integrator = strncmp (a->row.method, b->row.method, strcspn (a->row.method, "+") + 1) == 0;
+        if (!a->finished || !b->finished || same_integrator != same) continue;
         double distance = reference_distance (system, &a->motion, &b->motion);
         if (distance < least) least = distance, *first = i, *second = j;
       }
@@ -238,31 +233,29 @@ static void reference_add_partner (pw_reference *reference, const pw_system *sys
   pw_motion_errors (system, &best->motion, &partner->motion, reference->partner[i].error);
 }
 
-/* Selects the reference: the first of the two candidates that agree best.  The second is its first partner. */
-static void reference_choose (pw_reference *reference, const pw_system *system, reference_candidate *list) {
-  int best = -1, second = -1;
-  if (!reference_pair (system, list, &best, &second)) return;
-  reference->known = 1;
-  reference_name (&list[best], reference->name, sizeof reference->name);
-  reference_add_partner (reference, system, &list[best], &list[second]);
-  memcpy (reference->uncertainty, reference->partner[0].error, sizeof reference->uncertainty);
-  for (int i = 0; i < REFERENCE_CANDIDATES; i++)
-    if (i != best && i != second && list[i].finished) reference_add_partner (reference, system, &list[best], &list[i]);
-  reference->motion = list[best].motion;
-  list[best].motion = (pw_motion){ .times = 0 };
-  reference_raise_uncertainty (system, reference);
-}
-
 static int reference_compute (pw_reference *reference, pw_study *study, double step, pw_error *error) {
   reference_candidate candidates[REFERENCE_CANDIDATES] = {
     { study, .row = { .method = "erk8+projection", .adaptive = 1, .level = 3e-14 /* the least is 2.2e-14 */ } },
-    { study, .row = { .method = "rk4+projection", .level = fmin (step, study->t_end / REFERENCE_STEPS) } },
+    { study, .row = { .method = "rk4+projection", .level = fmin (step, study->settings.span / REFERENCE_STEPS) } },
     { study, .row = { .method = "ida+ggl", .adaptive = 1, .level = 1e-13 } },
     { study, .row = { .method = "ida+baumgarte", .adaptive = 1, .level = 1e-13 } },
   };
+  const pw_system *system = study->line.m.system;
   pw_study_begin_progress (study, "reference", "methods", REFERENCE_CANDIDATES);
   int status = pw_study_parallel (study, REFERENCE_CANDIDATES, reference_run, candidates, error);
-  if (status == PW_OK) reference_choose (reference, study->compiled.system, candidates);
+  int best = -1, second = -1;
+  if (status == PW_OK && reference_pair (system, candidates, &best, &second)) {
+    reference->known = 1; /* the first of the two that agree best; the second is its first partner */
+    reference_name (&candidates[best], reference->name, sizeof reference->name);
+    reference_add_partner (reference, system, &candidates[best], &candidates[second]);
+    memcpy (reference->uncertainty, reference->partner[0].error, sizeof reference->uncertainty);
+    for (int i = 0; i < REFERENCE_CANDIDATES; i++)
+      if (i != best && i != second && candidates[i].finished)
+        reference_add_partner (reference, system, &candidates[best], &candidates[i]);
+    reference->motion = candidates[best].motion;
+    candidates[best].motion = (pw_motion){ .times = 0 };
+    reference_raise_uncertainty (system, reference);
+  }
   for (int i = 0; i < REFERENCE_CANDIDATES; i++) {
     reference->limited |= candidates[i].row.state == ROW_STOPPED;
     pw_motion_close (&candidates[i].motion);
@@ -270,23 +263,23 @@ static int reference_compute (pw_reference *reference, pw_study *study, double s
   return status;
 }
 
-/* Finds the reference.  step: the smallest step size of the comparison [s].  Sets the study's t_end to the end of a
+/* Finds the reference.  step: the smallest step size of the comparison [s].  Sets the study's span to the end of a
  * table unless --t-end is given.  Close the motion of the reference in every case. */
 static int reference_find (pw_reference *reference, pw_study *study, double step, pw_error *error) {
   const char *path = study->reference_path;
-  double t_end = path && study->line.t_end == NULL ? 0 : study->t_end; /* 0: that of the table */
+  double t_end = path && study->line.t_end == NULL ? 0 : study->settings.span; /* 0: that of the table */
   /* the model's solution holds only for its own initial values */
-  if (path == NULL && (study->line.starts || !pw_model_has_reference (study->compiled.model)))
+  if (path == NULL && (study->line.starts || !pw_model_has_reference (study->line.m.model)))
     return reference_compute (reference, study, step, error);
-  int status = pw_motion_open_reference (&reference->motion, &study->compiled, path, &t_end, error);
+  int status = pw_motion_open_reference (&reference->motion, &study->line.m, path, &t_end, error);
   if (status != PW_OK) return status;
-  pw_motion_gaps (study->compiled.system, &reference->motion, path ? 1 : reference->motion.times, reference->gaps);
+  pw_motion_gaps (study->line.m.system, &reference->motion, path ? 1 : reference->motion.times, reference->gaps);
   if (path == NULL && *reference->gaps) {
     pw_motion_close (&reference->motion);
     return reference_compute (reference, study, step, error);
   }
   pw_motion *motion = &reference->motion;
-  int n = pw_system_coordinates (study->compiled.system), complete = 1;
+  int n = pw_system_coordinates (study->line.m.system), complete = 1;
   for (int j = n; j < 2 * n && path == NULL; j++) complete &= pw_motion_known (motion, j) == motion->times;
   for (int k = 0; !complete && k < motion->times; k++) /* so that no error is that of a part of the velocities */
     for (int j = n; j < 2 * n; j++) pw_motion_at (motion, k)[j] = NAN;
@@ -296,10 +289,10 @@ static int reference_find (pw_reference *reference, pw_study *study, double step
                     "--reference %s: no row at the final time, t = %s s; the last one before it is at %s s", path,
                     PW_DIGITS (t_end, 9), PW_DIGITS (last, 9));
   snprintf (reference->name, sizeof reference->name, "%s", path ? path : "the exact solution of the model");
-  study->t_end = t_end;
+  study->settings.span = t_end;
   reference->known = 1;
   reference->from_table = path != NULL;
-  reference_raise_uncertainty (study->compiled.system, reference);
+  reference_raise_uncertainty (study->line.m.system, reference);
   return PW_OK;
 }
 
@@ -416,21 +409,6 @@ static conclusion_cost conclusion_least_cost (const pw_conclusion *conclusion, i
   return least;
 }
 
-/* Finds the cheapest method of each column for which the reference is accurate enough. */
-static void conclusion_find_cheapest (pw_conclusion *conclusion) {
-  for (int k = 0; k < CONCLUSION_COLUMNS; k++) {
-    conclusion->best[k] = -1;
-    conclusion->cheapest[k].cpu = NAN;
-    for (int i = 0; i < conclusion->compare->study.methods && conclusion->uncertainty <= conclusion_required[k].error;
-         i++) {
-      conclusion_cost candidate = conclusion_least_cost (conclusion, i, conclusion_required[k].error);
-      if (isnan (candidate.cpu) || conclusion->cheapest[k].cpu <= candidate.cpu) continue;
-      conclusion->cheapest[k] = candidate;
-      conclusion->best[k] = i;
-    }
-  }
-}
-
 static void conclusion_print_heading (const pw_conclusion *conclusion) {
   static const char *const unit[] = { "m", "rad" }, *const name[] = { "lengths", "angles" };
   const pw_reference *reference = &conclusion->compare->reference;
@@ -440,7 +418,7 @@ static void conclusion_print_heading (const pw_conclusion *conclusion) {
     printf ("%s%d", k == 0 ? "" : k + 1 < CONCLUSION_COLUMNS ? ", " : " and ", conclusion_required[k].digits);
   printf (" correct digits, relative to the cheapest method.\n"
           "Digits: the largest error of a coordinate at %d times up to %s s, relative to\n",
-          reference->motion.taken, PW_DIGITS (conclusion->compare->study.t_end, 6));
+          reference->motion.taken, PW_DIGITS (conclusion->compare->study.settings.span, 6));
   for (int i = MOTION_LENGTH; i <= MOTION_ANGLE; i++)
     if (reference->uncertainty[MOTION_LARGEST + i] > 0) {
       printf ("%s%s %s (%s)", between, PW_DIGITS (conclusion_scale (reference, i), 3), unit[i], name[i]);
@@ -510,19 +488,37 @@ static int conclusion_count_runs (const pw_study *study, int method, int states,
   return count;
 }
 
-static void conclusion_print_failures (const pw_study *study, int method) {
-  const pw_row *first, *any;
-  int failures = conclusion_count_runs (study, method, RUNS_FAILED, &first);
-  if (first == NULL) return;
-  int cut = strlen (first->reason) > CONCLUSION_REASON;
-  pw_cli_print (stdout, "%s: %d of %d runs %s, first at %s %s: %.*s%s\n", first->method, failures,
-                conclusion_count_runs (study, method, RUNS_ALL, &any),
-                first->state == ROW_FAILED ? "fail" : "are refused", first->adaptive ? "rtol" : "step",
-                PW_DIGITS (first->level, 4), CONCLUSION_REASON, first->reason, cut ? "..." : "");
-}
-
-/* One line for all methods with runs that the limit has stopped or prevented. */
-static void conclusion_print_limited (const pw_study *study) {
+static void conclusion_print (const pw_compare *compare) {
+  const pw_study *study = &compare->study;
+  const pw_reference *reference = &compare->reference;
+  pw_conclusion conclusion = { .compare = compare, .width = CONCLUSION_WIDTH };
+  conclusion.uncertainty = conclusion_error (reference, reference->uncertainty + MOTION_LARGEST);
+  for (int i = 0; i < study->methods; i++)
+    if ((int)strlen (study->method[i]) > conclusion.width) conclusion.width = (int)strlen (study->method[i]);
+  /* the cheapest method of each column for which the reference is accurate enough */
+  for (int k = 0; k < CONCLUSION_COLUMNS; k++) {
+    conclusion.best[k] = -1;
+    conclusion.cheapest[k].cpu = NAN;
+    for (int i = 0; i < study->methods && conclusion.uncertainty <= conclusion_required[k].error; i++) {
+      conclusion_cost candidate = conclusion_least_cost (&conclusion, i, conclusion_required[k].error);
+      if (isnan (candidate.cpu) || conclusion.cheapest[k].cpu <= candidate.cpu) continue;
+      conclusion.cheapest[k] = candidate;
+      conclusion.best[k] = i;
+    }
+  }
+  conclusion_print_heading (&conclusion);
+  conclusion_print_table (&conclusion);
+  for (int i = 0; i < study->methods; i++) {
+    const pw_row *first, *any;
+    int failures = conclusion_count_runs (study, i, RUNS_FAILED, &first);
+    if (first == NULL) continue;
+    int cut = strlen (first->reason) > CONCLUSION_REASON;
+    pw_cli_print (stdout, "%s: %d of %d runs %s, first at %s %s: %.*s%s\n", first->method, failures,
+                  conclusion_count_runs (study, i, RUNS_ALL, &any), first->state == ROW_FAILED ? "fail" : "are refused",
+                  first->adaptive ? "rtol" : "step", PW_DIGITS (first->level, 4), CONCLUSION_REASON, first->reason,
+                  cut ? "..." : "");
+  }
+  /* one line for all methods with runs that the limit has stopped or prevented */
   const char *beginning = PW_PRINTED (80, "stopped by the limit of %s s: ", PW_DIGITS (study->cpu_limit, 4));
   const char *before = beginning;
   for (int i = 0; i < study->methods; i++) {
@@ -532,20 +528,6 @@ static void conclusion_print_limited (const pw_study *study) {
     before = ", ";
   }
   if (before != beginning) putchar ('\n');
-}
-
-static void conclusion_print (const pw_compare *compare) {
-  const pw_study *study = &compare->study;
-  const pw_reference *reference = &compare->reference;
-  pw_conclusion conclusion = { .compare = compare, .width = CONCLUSION_WIDTH };
-  conclusion.uncertainty = conclusion_error (reference, reference->uncertainty + MOTION_LARGEST);
-  for (int i = 0; i < study->methods; i++)
-    if ((int)strlen (study->method[i]) > conclusion.width) conclusion.width = (int)strlen (study->method[i]);
-  conclusion_find_cheapest (&conclusion);
-  conclusion_print_heading (&conclusion);
-  conclusion_print_table (&conclusion);
-  for (int i = 0; i < study->methods; i++) conclusion_print_failures (study, i);
-  conclusion_print_limited (study);
 }
 
 /* ---- The rows ---- */
@@ -614,10 +596,10 @@ static int compare_plan_rows (pw_study *study, const compare_ladder ladders[2], 
 static int compare_plan (pw_study *study, pw_error *error) {
   pw_compare *compare = (pw_compare *)study;
   compare_ladder ladders[2] = { { 0.1, 1e-4 }, { 1e-3, 1e-12 } }; /* steps, tolerances */
-  study->t_end = pw_cli_defaults (pw_file_table (study->compiled.file)).t_end;
+  study->settings.span = study->line.m.defaults.t_end;
   study->cpu_limit = 10;
   compare->repeats = 9;
-  int status = pw_cli_number ("--t-end", study->line.t_end, PW_POSITIVE, &study->t_end, error);
+  int status = pw_cli_number ("--t-end", study->line.t_end, PW_POSITIVE, &study->settings.span, error);
   if (status == PW_OK) status = pw_cli_number ("--limit", study->line.limit, PW_POSITIVE, &study->cpu_limit, error);
   if (status == PW_OK) status = pw_cli_number ("--repeats", compare->repeats_text, PW_COUNT, &compare->repeats, error);
   if (status == PW_OK && compare->repeats > COMPARE_REPEATS)
@@ -637,7 +619,7 @@ static void compare_set_errors (const pw_compare *compare, const pw_motion *moti
   const pw_reference *reference = &compare->reference;
   double *error = &row->value[COLUMN_ERROR];
   if (!reference->known) return;
-  pw_motion_errors (compare->study.compiled.system, &reference->motion, motion, error);
+  pw_motion_errors (compare->study.line.m.system, &reference->motion, motion, error);
   for (int i = 0; i < MOTION_ERRORS; i++) {
     if (reference->uncertainty[i] == 0) error[i] = NAN;
     if (!(error[i] <= reference->uncertainty[i])) continue;
@@ -697,20 +679,6 @@ static double compare_predicted_time (const pw_row *row) {
   return fmax (coarser->cpu / coarser[-1].cpu, 1) * coarser->cpu;
 }
 
-/* A run with samples at the times of the reference, and its errors. */
-static int compare_measure_errors (pw_compare *compare, pw_row *row, pw_error *error) {
-  pw_study *study = &compare->study;
-  pw_motion motion;
-  int status = compare->reference.known
-                   ? pw_motion_open_at (&motion, study->compiled.system, &compare->reference.motion, error)
-                   : pw_motion_open (&motion, study->compiled.system, MOTION_SAMPLES, study->t_end, error);
-  if (status != PW_OK) return status;
-  status = compare_run (study, row, &motion, error);
-  if (status == PW_OK) compare_set_errors (compare, &motion, row);
-  pw_motion_close (&motion);
-  return status;
-}
-
 static int compare_measure (pw_study *study, pw_row *row, pw_error *error) {
   pw_compare *compare = (pw_compare *)study;
   pw_error run_error = { 0 };
@@ -723,7 +691,13 @@ static int compare_measure (pw_study *study, pw_row *row, pw_error *error) {
     return PW_OK;
   }
   row->balance = NAN;
-  int status = compare_measure_errors (compare, row, &run_error);
+  pw_motion motion; /* at the times of the reference */
+  int status = compare->reference.known
+                   ? pw_motion_open_at (&motion, study->line.m.system, &compare->reference.motion, &run_error)
+                   : pw_motion_open (&motion, study->line.m.system, MOTION_SAMPLES, study->settings.span, &run_error);
+  if (status == PW_OK) status = compare_run (study, row, &motion, &run_error);
+  if (status == PW_OK) compare_set_errors (compare, &motion, row);
+  pw_motion_close (&motion);
   if (status == PW_OK) status = compare_measure_times (compare, row, &run_error);
   if (row->state == ROW_STOPPED)
     snprintf (row->reason, sizeof row->reason, "too slow: the limit of %s s was reached at t = %s s", limit,
@@ -781,7 +755,7 @@ static int compare_figures (pw_study *study, pw_error *error) {
       const double e = row->state == ROW_DONE ? row->point[0][POINT_LENGTH + unit] : NAN;
       if (e > 0 && isfinite (e)) least = fmin (least, e), most = fmax (most, e);
     }
-    status = pw_curves_open (&c, &study->line, &study->compiled, study->folder, name[unit], title[unit], error);
+    status = pw_curves_open (&c, &study->line, study->folder, name[unit], title[unit], error);
     for (int k = 0; status == PW_OK && k < 2; k++) {
       pw_curves_panel (&c, &(pw_panel){ .x_label = axis[k],
                                         .y_label = label[unit],

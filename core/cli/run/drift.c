@@ -72,7 +72,7 @@ static int drift_read_values (pw_drift *drift, const char *text, pw_error *error
   int option = pw_find_name (drift_option, sizeof *drift_option, name, hint);
   if (option < 0) return pw_fail (error, PW_INPUT, "--vary %.100s: alpha, beta and every can be varied%s", text, hint);
   pw_axis *axis = &drift->axis[option];
-  int status = pw_axis_read (axis, text, &drift->study.arena, error);
+  int status = pw_axis_read (axis, text, &drift->study.line.arena, error);
   for (long i = 0; status == PW_OK && i < axis->count; i++) {
     const char *expected = pw_domain_check (option == DRIFT_EVERY ? PW_COUNT : PW_NONNEGATIVE, pw_axis_value (axis, i));
     if (*expected)
@@ -116,35 +116,8 @@ static int drift_add (pw_drift *drift, int group, int curve, const char *stabili
   return PW_OK;
 }
 
-/* Pairs of alpha and beta; the figure has a curve for each beta. */
-static int drift_plan_baumgarte (pw_drift *drift, pw_error *error) {
-  const pw_axis *alphas = &drift->axis[DRIFT_ALPHA], *betas = &drift->axis[DRIFT_BETA];
-  int status = PW_OK;
-  for (long j = 0; j < betas->count; j++)
-    for (long i = 0; i < alphas->count && status == PW_OK; i++) {
-      double alpha = pw_axis_value (alphas, i), beta = pw_axis_value (betas, j);
-      const char *label = PW_PRINTED (60, "beta = %s /s", PW_DIGITS (beta, 6));
-      const char *stabilisation =
-          PW_PRINTED (80, "baumgarte:alpha=%s:beta=%s", PW_DIGITS (alpha, 9), PW_DIGITS (beta, 9));
-      status = drift_add (drift, DRIFT_BAUMGARTE, (int)j, stabilisation, label, DRIFT_ALPHA, alpha, error);
-    }
-  return status;
-}
-
-/* Intervals between projections; the figure has a curve for each metric. */
-static int drift_plan_projection (pw_drift *drift, pw_error *error) {
-  static const char *const metric[] = { "metric=mass", "metric=identity" };
-  int status = PW_OK;
-  for (int j = 0; j < 2; j++)
-    for (long i = 0; i < drift->axis[DRIFT_EVERY].count && status == PW_OK; i++) {
-      double every = pw_axis_value (&drift->axis[DRIFT_EVERY], i);
-      const char *stabilisation = PW_PRINTED (80, "projection:%s:every=%.0f", metric[j], every);
-      status = drift_add (drift, DRIFT_PROJECTION, j, stabilisation, metric[j], DRIFT_EVERY, every, error);
-    }
-  return status;
-}
-
 static int drift_plan_rows (pw_drift *drift, pw_error *error) {
+  static const char *const metric[] = { "metric=mass", "metric=identity" };
   pw_study *study = &drift->study;
   const pw_axis *axis = drift->axis;
   double runs = study->methods + (double)axis[DRIFT_ALPHA].count * (double)axis[DRIFT_BETA].count +
@@ -153,18 +126,33 @@ static int drift_plan_rows (pw_drift *drift, pw_error *error) {
   for (int i = 0; i < study->methods; i++) {
     pw_row *row = pw_study_add (study, DRIFT_METHODS, i, study->method[i], DRIFT_PARTS, error);
     if (row == NULL) return PW_RESOURCE;
-    for (int k = 0; k < DRIFT_PARTS; k++) row->point[k][0] = study->t_end * (k + 1) / DRIFT_PARTS;
+    for (int k = 0; k < DRIFT_PARTS; k++) row->point[k][0] = study->settings.span * (k + 1) / DRIFT_PARTS;
   }
-  if (drift->only_methods) return PW_OK;
-  int status = drift_plan_baumgarte (drift, error);
-  return status == PW_OK ? drift_plan_projection (drift, error) : status;
+  int status = PW_OK;
+  /* pairs of alpha and beta; the figure has a curve for each beta */
+  for (int j = 0; !drift->only_methods && j < axis[DRIFT_BETA].count; j++)
+    for (long i = 0; i < axis[DRIFT_ALPHA].count && status == PW_OK; i++) {
+      double alpha = pw_axis_value (&axis[DRIFT_ALPHA], i), beta = pw_axis_value (&axis[DRIFT_BETA], j);
+      const char *label = PW_PRINTED (60, "beta = %s /s", PW_DIGITS (beta, 6));
+      const char *stabilisation =
+          PW_PRINTED (80, "baumgarte:alpha=%s:beta=%s", PW_DIGITS (alpha, 9), PW_DIGITS (beta, 9));
+      status = drift_add (drift, DRIFT_BAUMGARTE, j, stabilisation, label, DRIFT_ALPHA, alpha, error);
+    }
+  /* intervals between projections; the figure has a curve for each metric */
+  for (int j = 0; !drift->only_methods && j < 2; j++)
+    for (long i = 0; i < axis[DRIFT_EVERY].count && status == PW_OK; i++) {
+      double every = pw_axis_value (&axis[DRIFT_EVERY], i);
+      const char *stabilisation = PW_PRINTED (80, "projection:%s:every=%.0f", metric[j], every);
+      status = drift_add (drift, DRIFT_PROJECTION, j, stabilisation, metric[j], DRIFT_EVERY, every, error);
+    }
+  return status;
 }
 
 static int drift_plan (pw_study *study, pw_error *error) {
   pw_drift *drift = (pw_drift *)study;
-  pw_run_defaults defaults = pw_cli_defaults (pw_file_table (study->compiled.file));
+  pw_run_defaults defaults = study->line.m.defaults;
   if (defaults.rtol == 0) defaults.rtol = PW_RTOL;
-  int status = pw_cli_settings (&study->line, &defaults, &study->t_end, &study->settings, &study->limit, error);
+  int status = pw_cli_settings (&study->line, &defaults, &study->settings, &study->limit, error);
   study->settings.ledger = 1;
   if (status == PW_OK) status = pw_study_read_methods (study, "rk4+all,ida+all,galpha+all", error);
   for (int i = 0; status == PW_OK && i < DRIFT_OPTIONS; i++)
@@ -187,20 +175,15 @@ static void drift_raise_largest (double *largest, double value) {
   if (!isnan (*largest) && !(value <= *largest)) *largest = value;
 }
 
-/* The part of the run that contains a time; a time on the border of two parts, up to round-off, belongs to the earlier
- * one. */
-static int drift_part (const pw_study *study, double t) {
-  int k = (int)ceil (t / study->t_end * DRIFT_PARTS - 1e-9) - 1;
-  return k < 0 ? 0 : k < DRIFT_PARTS ? k : DRIFT_PARTS - 1;
-}
-
 /* Called after every accepted step: samples inside a step of a method with projection show no drift.  Last values and
  * points are NaN until a step ends in their part; fmax ignores that NaN. */
 static int drift_visit (pw_visitor *visitor, pw_run *run, pw_error *error) {
   pw_row *row = visitor->row;
   pw_sample sample;
   int status = pw_run_sample (run, pw_run_time (run), &sample, error);
-  int part = drift_part (visitor->study, pw_run_time (run));
+  /* the part of the run; a time on the border of two parts, up to round-off, belongs to the earlier one */
+  int part = (int)ceil (pw_run_time (run) / visitor->study->settings.span * DRIFT_PARTS - 1e-9) - 1;
+  part = part < 0 ? 0 : part < DRIFT_PARTS ? part : DRIFT_PARTS - 1;
   if (status != PW_OK) return status;
   const double now[DRIFT_QUANTITIES] = { sample.position, sample.velocity, fabs (sample.balance) };
   for (int i = 0; i < DRIFT_QUANTITIES; i++) {
@@ -240,7 +223,7 @@ static int drift_begin (pw_study *study, pw_error *error) {
   (void)error;
   printf (
       "%s, %s s, steps of %s s or rtol %s: the largest value of all steps and of the last %g %%, and its growth\n\n",
-      pw_file_name (study->compiled.file), PW_DIGITS (study->t_end, 6), PW_DIGITS (study->settings.step, 6),
+      pw_file_name (study->line.m.file), PW_DIGITS (study->settings.span, 6), PW_DIGITS (study->settings.step, 6),
       PW_DIGITS (study->settings.rtol, 6), 100.0 / DRIFT_PARTS);
   return PW_OK;
 }
@@ -273,12 +256,12 @@ static int drift_figures (pw_study *study, pw_error *error) {
   int status = drift_write_times (study, error);
   for (int group = 0; status == PW_OK && group < DRIFT_GROUPS; group++) {
     pw_curves c;
-    status = pw_curves_open (&c, &study->line, &study->compiled, study->folder, name[group], title[group], error);
+    status = pw_curves_open (&c, &study->line, study->folder, name[group], title[group], error);
     if (status != PW_OK) return status;
     for (int i = 0; i < DRIFT_QUANTITIES; i++) {
       pw_panel panel = { .x_label = axis[group], .y_label = label[i], .type = PW_PANEL_BELOW | PW_PANEL_LOG_Y };
       if (group == DRIFT_METHODS)
-        panel.x[1] = study->t_end;
+        panel.x[1] = study->settings.span;
       else
         panel.type |= PW_PANEL_LOG_X;
       pw_curves_panel (&c, &panel);

@@ -74,15 +74,6 @@ static double motion_largest_multiplier (const pw_system *system, const pw_motio
   return largest > 0 ? largest : 1;
 }
 
-/* What the error of a state is relative to: 1, but of a first-order state its largest value in the first samples, if
- * that is above 1. */
-static double motion_state_size (const pw_system *system, const pw_motion *reference, int samples, int state) {
-  double largest = 1;
-  if (!pw_system_state_hidden (system, state - pw_system_coordinates (system))) return 1;
-  for (int k = 0; k < samples; k++) largest = fmax (largest, fabs (pw_motion_at (reference, k)[state]));
-  return largest;
-}
-
 /* Increases *error, NaN at first, to a larger difference; one that is NaN, not known, makes it NaN for good. */
 static void motion_include (double *error, int *compared, double difference) {
   if (!*compared || difference > *error || isnan (difference)) *error = difference;
@@ -101,7 +92,9 @@ void pw_motion_errors (const pw_system *system, const pw_motion *reference, cons
     int is_state = j < states, state_unit = is_state ? pw_motion_unit (system, j) : 0, end = MOTION_END + state_unit;
     int largest = is_state ? MOTION_LARGEST + state_unit : MOTION_MULTIPLIERS;
     if (is_state && pw_system_state_hidden (system, j)) continue;
-    if (is_state) scale = motion_state_size (system, reference, motion->taken, j);
+    if (is_state) scale = 1;
+    for (int k = 0; is_state && pw_system_state_hidden (system, j - states / 2) && k <= last; k++)
+      scale = fmax (scale, fabs (pw_motion_at (reference, k)[j])); /* a first-order state may be larger than 1 */
     if (!is_state && (unit == NULL || strcmp (unit, pw_system_reaction_unit (system, j - states)) != 0)) {
       unit = pw_system_reaction_unit (system, j - states);
       scale = motion_largest_multiplier (system, reference, motion->taken, j - states);
@@ -187,50 +180,43 @@ static int table_select (const motion_table *table, const pw_system *system, pw_
   return known ? PW_OK : pw_fail (error, PW_INPUT, "%s: every value is nan", path);
 }
 
-static int motion_of_table (pw_motion *motion, const pw_system *system, const char *path, double *t_end,
-                            pw_error *error) {
-  motion_table table = { .rows = 0 };
-  int status = table_read (&table, system, path, error);
-  if (status == PW_OK) status = table_select (&table, system, motion, t_end, path, error);
-  free (table.value);
-  pw_arena_free (&table.arena);
-  return status;
-}
-
-/* The model's own reference solution; multipliers are not known. */
-static int motion_of_model (pw_motion *motion, const pw_cli_model *compiled, double t_end, pw_error *error) {
+int pw_motion_open_reference (pw_motion *motion, const pw_cli_model *compiled, const char *path, double *t_end,
+                              pw_error *error) {
   const pw_system *system = compiled->system;
-  int n = pw_system_coordinates (system), status = pw_motion_open (motion, system, MOTION_SAMPLES, t_end, error);
+  motion_table table = { .rows = 0 };
+  int n = pw_system_coordinates (system), status = PW_OK;
+  if (path) {
+    status = table_read (&table, system, path, error);
+    if (status == PW_OK) status = table_select (&table, system, motion, t_end, path, error);
+    free (table.value);
+    pw_arena_free (&table.arena);
+    return status;
+  }
+  status = pw_motion_open (motion, system, MOTION_SAMPLES, *t_end, error);
   for (; motion->taken < motion->times && status == PW_OK; motion->taken++) {
     double *state = pw_motion_at (motion, motion->taken);
-    for (int j = 2 * n; j < motion->width; j++) state[j] = NAN;
+    for (int j = 2 * n; j < motion->width; j++) state[j] = NAN; /* multipliers are not known */
     status = pw_system_reference (compiled->model, system, motion->t[motion->taken], state, state + n, error);
   }
   return status;
 }
 
-int pw_motion_open_reference (pw_motion *motion, const pw_cli_model *compiled, const char *path, double *t_end,
-                              pw_error *error) {
-  return path ? motion_of_table (motion, compiled->system, path, t_end, error)
-              : motion_of_model (motion, compiled, *t_end, error);
-}
-
 /* Compares a run with a reference solution: opens the reference, and computes the errors of the run at its times. */
 
-int pw_comparison_open (pw_comparison *comparison, const pw_cli_model *compiled, const char *path, int started,
-                        double t_end, pw_error *error) {
+int pw_comparison_open (pw_comparison *comparison, const pw_cli_line *line, const char *path, double t_end,
+                        pw_error *error) {
   *comparison = (pw_comparison){ .errors = { .source = path ? path : "the model" } };
-  if (path == NULL && !pw_model_has_reference (compiled->model)) return PW_OK;
-  if (path == NULL && started) {
+  if (path == NULL && !pw_model_has_reference (line->m.model)) return PW_OK;
+  if (path == NULL && line->starts) {
     pw_cli_say (
         "pinwheel: the model's reference solution holds for its own initial values: with --start errors are not "
         "computed\n");
     return PW_OK;
   }
-  int status = pw_motion_open_reference (&comparison->reference, compiled, path, &t_end, error);
+  int status = pw_motion_open_reference (&comparison->reference, &line->m, path, &t_end, error);
   if (status != PW_OK) return status;
-  pw_motion_gaps (compiled->system, &comparison->reference, 1, comparison->gaps);
-  return pw_motion_open_at (&comparison->motion, compiled->system, &comparison->reference, error);
+  pw_motion_gaps (line->m.system, &comparison->reference, 1, comparison->gaps);
+  return pw_motion_open_at (&comparison->motion, line->m.system, &comparison->reference, error);
 }
 
 void pw_comparison_close (pw_comparison *comparison) {

@@ -72,9 +72,9 @@ typedef struct {
 } pw_comparison;
 
 /* Opens the reference of a run up to t_end: the table at `path` or, if that is NULL, the model's reference solution
- * unless --start changes the initial values (`started`).  Close it in every case.  Errors: PW_INPUT, PW_RESOURCE. */
-int pw_comparison_open (pw_comparison *comparison, const pw_cli_model *compiled, const char *path, int started,
-                        double t_end, pw_error *error);
+ * unless --start changes the initial values.  Close it in every case.  Errors: PW_INPUT, PW_RESOURCE. */
+int pw_comparison_open (pw_comparison *comparison, const pw_cli_line *line, const char *path, double t_end,
+                        pw_error *error);
 void pw_comparison_close (pw_comparison *comparison);
 /* Saves the samples taken in a checkpoint, or loads them from one. */
 void pw_comparison_serialise (pw_comparison *comparison, pw_archive *a);

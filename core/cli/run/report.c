@@ -7,7 +7,6 @@
 
 enum {
   REPORT_MESSAGES = 8, /* messages of one kind, or changed states, that are printed at most */
-  REPORT_BODIES = 20,  /* bodies that are printed at most */
   REPORT_ROWS = 24,    /* reactions, or internal coordinates, that are printed at most */
   REPORT_EVENTS = 10,  /* listed */
   REPORT_TEXT = 400,   /* longest description of a redundant equation, end included */
@@ -23,25 +22,21 @@ static void report_more (FILE *f, int more, const char *hint) {
 
 /* ---- Settings ---- */
 
-/* An absolute tolerance within which a force saturates. */
-static void report_atol (pw_run *run, const pw_system *system, double atol) {
-  char element[PW_NAME_BYTES];
-  double saturation;
-  int state = atol > 0 ? pw_run_saturation (run, &saturation, element, sizeof element) : -1;
-  if (state >= 0 && atol > saturation)
-    pw_cli_say ("pinwheel: --atol %s is above %s %s, within which the force of %s reverses: methods with Newton's "
-                "iteration reduce the tolerance of the states that the force depends on, others may be wrong\n",
-                PW_DIGITS (atol, 3), PW_DIGITS (saturation, 3), pw_system_state_unit (system, state), element);
-}
-
 void pw_report_settings (pw_run *run, const pw_system *system, const char *method, const pw_cli_line *line,
                          const pw_settings *settings) {
   double step = fmin (settings->step, settings->span), time_scale = pw_run_scale (run)->time;
   pw_cli_report_unused (method, line);
   pw_cli_report_tables (system, settings->span);
-  if (pw_cli_adaptive (method) == 1)
-    report_atol (run, system, settings->atol);
-  else if (step > time_scale)
+  const int adaptive = pw_cli_adaptive (method) == 1;
+  char element[PW_NAME_BYTES];
+  double saturation;
+  int state = adaptive && settings->atol > 0 ? pw_run_saturation (run, &saturation, element, sizeof element) : -1;
+  if (state >= 0 && settings->atol > saturation)
+    pw_cli_say ("pinwheel: --atol %s is above %s %s, within which the force of %s reverses: methods with Newton's "
+                "iteration reduce the tolerance of the states that the force depends on, others may be wrong\n",
+                PW_DIGITS (settings->atol, 3), PW_DIGITS (saturation, 3), pw_system_state_unit (system, state),
+                element);
+  if (!adaptive && step > time_scale)
     pw_cli_say (
         "pinwheel: a step of %s s is long for a motion that changes within %s s, and nothing controls its error: "
         "compare with shorter ones\n",
@@ -58,22 +53,19 @@ static void report_angle (const char *kind, const char *name, const char *field,
               kind, name, field, PW_DIGITS (angle, 6), PW_DIGITS (fmod (angle * 180 / PW_PI, 360), 4));
 }
 
-/* Expressions that may jump when states change; steps do not end at such jumps. */
-static void report_jump (const pw_element *element, const char *field, const pw_signal *signal) {
-  if (signal->type != PW_FUNCTION || signal->function.text == NULL || signal->function.text->jump == NULL) return;
-  pw_cli_say (
-      "pinwheel: %s %s: %s: \"%.80s\" may jump as states change; steps do not end there, which costs accuracy\n",
-      element->kind->name, pw_element_name (element), field, signal->function.text->jump);
-}
-
+/* A heading that is probably in degrees; expressions that may jump when states change: steps do not end there. */
 static void report_field (const pw_element *element, const pw_field *field) {
   const void *value = (const char *)element->definition + field->offset;
+  const char *kind = element->kind->name, *name = pw_element_name (element);
   const pw_signal *signal = field->type == PW_SIGNAL ? value : NULL;
   const double *number = signal && signal->type == PW_CONSTANT ? &signal->constant : NULL;
   if (field->type == PW_NUMBER) number = value;
-  if (number && strcmp (field->name, "heading") == 0)
-    report_angle (element->kind->name, pw_element_name (element), field->name, *number);
-  for (int i = 0; signal && i < pw_field_count (field); i++) report_jump (element, field->name, signal + i);
+  if (number && strcmp (field->name, "heading") == 0) report_angle (kind, name, field->name, *number);
+  for (const pw_signal *s = signal; s && s < signal + pw_field_count (field); s++)
+    if (s->type == PW_FUNCTION && s->function.text && s->function.text->jump)
+      pw_cli_say (
+          "pinwheel: %s %s: %s: \"%.80s\" may jump as states change; steps do not end there, which costs accuracy\n",
+          kind, name, field->name, s->function.text->jump);
 }
 
 void pw_report_model (const pw_cli_model *m) {
@@ -157,22 +149,6 @@ static void report_value (pw_table *table, int width, const char *name, double v
   pw_cell (table, -1, unit);
 }
 
-static void report_bodies (const pw_system *system, const pw_sample *last) {
-  static const char *const head[] = { "body",     "x [m]",    "y [m]",         "phi [rad]",
-                                      "vx [m/s]", "vy [m/s]", "omega [rad/s]", NULL };
-  int bodies = pw_system_bodies (system), shown = bodies < REPORT_BODIES ? bodies : REPORT_BODIES;
-  for (pw_table table = { 0 }; pw_table_pass (&table);) {
-    pw_head (&table, -5, REPORT_WIDTH, head);
-    for (int b = 0; b < shown; b++) {
-      pw_cell (&table, -5, pw_system_body_name (system, b));
-      for (int i = 0; i < 6; i++)
-        pw_cell_number (&table, REPORT_WIDTH, i < 3 ? last->q[3 * b + i] : last->v[3 * b + i - 3], REPORT_DIGITS);
-      pw_row_end (&table);
-    }
-  }
-  report_more (stdout, bodies - shown, ": -o FILE.csv writes them all");
-}
-
 /* Internal coordinates of elements, and first-order states. */
 static void report_internal (const pw_system *system, const pw_sample *last) {
   int first = 3 * pw_system_bodies (system), n = pw_system_coordinates (system);
@@ -187,28 +163,18 @@ static void report_internal (const pw_system *system, const pw_sample *last) {
   report_more (stdout, n - end, "");
 }
 
-/* Reactions are -lambda; 0 - lambda is never -0. */
-static void report_reactions (const pw_system *system, const pw_sample *last) {
-  int rows = pw_system_rows (system), shown = rows < REPORT_ROWS ? rows : REPORT_ROWS;
-  if (rows > 0) printf ("\n  reaction\n");
+/* Reactions, which are -lambda (0 - lambda is never -0); or outputs. */
+static void report_list (const pw_system *s, const pw_sample *last, int outputs) {
+  const int count = outputs ? pw_system_outputs (s) : pw_system_rows (s);
+  if (count > 0) puts (outputs ? "\n  output" : "\n  reaction");
   for (pw_table table = { 0 }; pw_table_pass (&table);)
-    for (int i = 0; i < shown; i++) {
-      report_value (&table, -8, PW_NAME (pw_system_reaction_name, system, i), 0 - last->lambda[i],
-                    pw_system_reaction_unit (system, i));
+    for (int i = 0; i < count && i < REPORT_ROWS; i++) {
+      report_value (&table, -8, outputs ? pw_system_output_name (s, i) : PW_NAME (pw_system_reaction_name, s, i),
+                    outputs ? last->output[i] : 0 - last->lambda[i],
+                    outputs ? pw_system_output_unit (s, i) : pw_system_reaction_unit (s, i));
       pw_row_end (&table);
     }
-  report_more (stdout, rows - shown, ": -o FILE.csv writes them all");
-}
-
-static void report_outputs (const pw_system *system, const pw_sample *last) {
-  const int outputs = pw_system_outputs (system), shown = outputs < REPORT_ROWS ? outputs : REPORT_ROWS;
-  if (outputs > 0) printf ("\n  output\n");
-  for (pw_table table = { 0 }; pw_table_pass (&table);)
-    for (int i = 0; i < shown; i++) {
-      report_value (&table, -8, pw_system_output_name (system, i), last->output[i], pw_system_output_unit (system, i));
-      pw_row_end (&table);
-    }
-  report_more (stdout, outputs - shown, ": -o FILE.csv writes them all");
+  report_more (stdout, count - REPORT_ROWS, ": -o FILE.csv writes them all");
 }
 
 static void report_energy (const pw_sample *last) {
@@ -280,7 +246,7 @@ static const char *report_general_reason (const pw_run_cli *command) {
 
 pw_summary pw_run_summary (pw_run_cli *command, const pw_sample *last, const pw_error *error,
                            char reason[PW_RUN_REASON]) {
-  const pw_file *file = command->compiled.file;
+  const pw_file *file = command->line.m.file;
   const pw_run *run = command->run;
   pw_summary summary = { .model = file ? pw_file_name (file) : command->line.argument[0],
                          .method = command->method,
@@ -292,8 +258,7 @@ pw_summary pw_run_summary (pw_run_cli *command, const pw_sample *last, const pw_
                          .energy_defect = last ? pw_run_energy_defect (run, last) : NAN,
                          .redundant = command->redundant,
                          .general = run ? report_general_reason (command) : NULL,
-                         .reference =
-                             run ? pw_comparison_errors (&command->comparison, command->compiled.system) : NULL,
+                         .reference = run ? pw_comparison_errors (&command->comparison, command->line.m.system) : NULL,
                          .stated = command->stated.known ? &command->stated.result : NULL };
   if (run) summary.event = pw_run_events (run, &summary.events);
   if (error->status == PW_OK && pw_stop) {
@@ -318,13 +283,13 @@ void pw_report_warnings (const pw_run *run, const pw_system *system, double defe
 }
 
 void pw_report_end (const pw_run_cli *command, const pw_summary *summary, const pw_sample *last) {
-  const pw_system *system = command->compiled.system;
+  const pw_system *system = command->line.m.system;
   const pw_statistics *stats = pw_run_statistics (command->run);
   printf ("%s, %s, at t = %s s\n\n", summary->model, summary->method, PW_DIGITS (last->t, 8));
-  report_bodies (system, last);
+  pw_print_bodies (system, last->q, last->v, "body", -5, REPORT_WIDTH, REPORT_DIGITS, 0);
+  report_more (stdout, pw_system_bodies (system) - PW_BODIES_PRINTED, ": -o FILE.csv writes them all");
   report_internal (system, last);
-  report_reactions (system, last);
-  report_outputs (system, last);
+  for (int outputs = 0; outputs < 2; outputs++) report_list (system, last, outputs);
   if (command->with_energies) report_energy (last);
   report_errors (summary->reference, command->comparison.gaps, pw_system_states (command->compiled.system));
   printf ("\n  worst scaled residuals: position %s, velocity %s\n", PW_DIGITS (stats->position, 2),

@@ -36,7 +36,7 @@ static int checkpoints_open (pw_run_cli *command, pw_specialise *specialise, pw_
   if (checkpoints->path == NULL)
     return pw_fail (error, PW_INPUT, "--checkpoint-every %s: --checkpoint FILE is needed to save to",
                     checkpoints->interval_text);
-  checkpoints->interval = command->t_end / 10;
+  checkpoints->interval = command->settings.span / 10;
   if (checkpoints->resume_path) {
     if (pw_checkpoint_read (checkpoints->resume_path, &checkpoints->resumed, error) != PW_OK) return error->status;
     const char *interval = checkpoints_value (checkpoints, checkpoints_interval_key);
@@ -51,8 +51,8 @@ static int checkpoints_open (pw_run_cli *command, pw_specialise *specialise, pw_
 static int checkpoints_fingerprint (pw_run_cli *command, pw_error *error) {
   const unsigned short order = 1;
   pw_text *text = &command->checkpoints.fingerprint;
-  const pw_model *model = command->compiled.model;
-  if (pw_fingerprint_run (text, PW_CHECKPOINT_MAGIC, command->compiled.file, pw_fingerprint_tables (0, model),
+  const pw_model *model = command->line.m.model;
+  if (pw_fingerprint_run (text, PW_CHECKPOINT_MAGIC, command->line.m.file, pw_fingerprint_tables (0, model),
                           command->method, &command->settings, error) != PW_OK)
     return error->status;
   if (command->engine.code) pw_fingerprint_line (text, checkpoints_engine_key, NULL, "specialised");
@@ -76,18 +76,6 @@ static int checkpoints_fingerprint (pw_run_cli *command, pw_error *error) {
   return text->failed ? pw_fail (error, PW_RESOURCE, "out of memory") : PW_OK;
 }
 
-/* Refuses a checkpoint of another run. */
-static int checkpoints_check_fingerprint (const pw_checkpoints *checkpoints, pw_error *error) {
-  const pw_text *own = &checkpoints->fingerprint;
-  const pw_fingerprint there = { checkpoints->resumed.text, checkpoints->resumed.head_end, "there" };
-  const pw_fingerprint here = { own->chars, own->chars + own->length, "here" };
-  char difference[300];
-  if (checkpoints->resume_path && pw_fingerprint_differ (there, here, NULL, difference, sizeof difference))
-    return pw_fail (error, PW_INPUT, "the checkpoint %.100s belongs to another run: %.300s", checkpoints->resume_path,
-                    difference);
-  return PW_OK;
-}
-
 /* Before anything is written: locks the checkpoint file, verifies that a resumed checkpoint belongs to this run and
  * opens its table; without --resume, refuses a table that could not be continued. */
 static int checkpoints_prepare (pw_run_cli *command, pw_error *error) {
@@ -101,9 +89,15 @@ static int checkpoints_prepare (pw_run_cli *command, pw_error *error) {
   if (!pw_output_is_file (checkpoints->lock))
     return pw_fail (error, PW_INPUT, "%s: a checkpoint needs a regular file, which can be read again and replaced",
                     checkpoints->path);
-  int status = checkpoints_fingerprint (command, error);
-  if (status == PW_OK) status = checkpoints_check_fingerprint (checkpoints, error);
-  if (status != PW_OK || command->table_path == NULL) return status;
+  if (checkpoints_fingerprint (command, error) != PW_OK) return error->status;
+  const pw_text *own = &checkpoints->fingerprint;
+  const pw_fingerprint there = { checkpoints->resumed.text, checkpoints->resumed.head_end, "there" };
+  const pw_fingerprint here = { own->chars, own->chars + own->length, "here" };
+  char difference[300];
+  if (checkpoints->resume_path && pw_fingerprint_differ (there, here, NULL, difference, sizeof difference))
+    return pw_fail (error, PW_INPUT, "the checkpoint %.100s belongs to another run: %.300s", checkpoints->resume_path,
+                    difference);
+  if (command->table_path == NULL) return PW_OK;
   pw_output **table = &command->output[PW_RUN_TABLE];
   pw_mark mark = { 0 };
   if (checkpoints->resume_path == NULL)
@@ -136,7 +130,7 @@ static void checkpoints_serialise (pw_run_cli *command, pw_archive *archive) {
 static int checkpoints_plausible (const pw_run_cli *command) {
   double t = pw_run_time (command->run), rows = (double)command->rows, expected = rows, cpu = command->cpu;
   if (command->table && command->row_interval > 0) expected = floor (t / command->row_interval) + 1;
-  return t <= command->t_end && rows >= 0 && fabs (rows - expected) <= 1 && isfinite (cpu) && cpu >= 0;
+  return t <= command->settings.span && rows >= 0 && fabs (rows - expected) <= 1 && isfinite (cpu) && cpu >= 0;
 }
 
 /* After everything is open: loads the state of the checkpoint that is resumed, if any; schedules the next one. */
@@ -164,7 +158,7 @@ static int checkpoints_save (pw_run_cli *command, pw_error *error) {
   pw_output *table = command->output[PW_RUN_TABLE];
   double t = pw_run_time (command->run);
   pw_mark mark = { 0 };
-  if (t >= command->t_end) return PW_OK;
+  if (t >= command->settings.span) return PW_OK;
   if (table && pw_output_mark (table, &mark, error) != PW_OK) return error->status;
   pw_archive_clear (&checkpoints->state);
   if (table) pw_archive_bytes (&checkpoints->state, &mark, sizeof mark);
@@ -197,7 +191,7 @@ static int run_check_paths (pw_run_cli *command, pw_error *error) {
                    { "--json", command->summary_path, PW_WRITES, pw_cli_json },
                    { "--animate", command->page_path, PW_WRITES, NULL },
                    { "--plots", command->plots_path, PW_WRITES_INTO, pw_figure_endings } };
-  return pw_cli_check_uses (&command->line, command->compiled.file, use, sizeof use / sizeof *use, error);
+  return pw_cli_check_uses (&command->line, use, sizeof use / sizeof *use, error);
 }
 
 /* Opens an output file; a path of standard output becomes "-". */
@@ -232,87 +226,68 @@ static void run_discard (pw_run_cli *command, int which) {
   command->output[which] = NULL;
 }
 
-/* A summary is written of every run, but not over a table that the model reads. */
-static int run_open_model (pw_run_cli *command, pw_error *error) {
-  int status = pw_cli_open (&command->compiled, &command->line, error);
-  if (command->compiled.file == NULL || run_check_paths (command, status == PW_OK ? error : &(pw_error){ 0 }) == PW_OK)
-    return status;
-  run_discard (command, PW_RUN_SUMMARY);
-  return error->status;
-}
-
-/* Checks the method that the model selects; the error names the model. */
-static int run_check_model_method (const pw_run_cli *command, pw_error *error) {
+/* Reads the settings, of which the engine is a part: a resumed run uses the same one. */
+static int run_read_settings (pw_run_cli *command, pw_error *error) {
+  const pw_run_defaults *defaults = &command->line.m.defaults;
   const pw_method *method;
   int stabilisation;
+  pw_specialise when;
   pw_error reason = { 0 };
-  int status = pw_method_parse (command->method, &method, &stabilisation, &reason);
-  if (status == PW_OK) return PW_OK;
-  return pw_fail (error, status, "model %s: its default method: %s", pw_file_name (command->compiled.file),
-                  reason.text);
-}
-
-static int run_read_settings (pw_run_cli *command, pw_error *error) {
-  pw_run_defaults defaults = pw_cli_defaults (pw_file_table (command->compiled.file));
-  int status = pw_cli_settings (&command->line, &defaults, &command->t_end, &command->settings, &command->limit, error);
+  int status = pw_cli_settings (&command->line, defaults, &command->settings, &command->limit, error);
   if (status == PW_OK)
     status = pw_cli_number ("--every", command->row_interval_text, PW_POSITIVE, &command->row_interval, error);
-  command->method = command->line.method ? command->line.method : defaults.method;
-  if (status == PW_OK && command->line.method == NULL) status = run_check_model_method (command, error);
+  command->method = command->line.method ? command->line.method : defaults->method;
+  if (status == PW_OK && command->line.method == NULL &&
+      pw_method_parse (command->method, &method, &stabilisation, &reason) != PW_OK)
+    return pw_fail (error, reason.status, "model %s: its default method: %s", pw_file_name (command->line.m.file),
+                    reason.text);
   command->settings.ledger = command->with_energies || command->plots_path || command->page_path;
-  return status;
-}
-
-/* The engine is part of the settings: a resumed run uses the same one. */
-static int run_choose_engine (pw_run_cli *command, pw_error *error) {
-  pw_run_defaults defaults = pw_cli_defaults (pw_file_table (command->compiled.file));
-  pw_specialise when;
-  int status = pw_cli_read_specialise (command->line.specialise, &when, error);
+  if (status == PW_OK) status = pw_cli_read_specialise (command->line.specialise, &when, error);
   if (status == PW_OK) status = checkpoints_open (command, &when, error);
   if (status != PW_OK) return status;
-  pw_cli_engine_open (&command->engine, command->compiled.system, when,
-                      pw_method_steps (command->method, &command->settings, defaults.step, command->t_end));
+  pw_cli_engine_open (&command->engine, command->line.m.system, when,
+                      pw_method_steps (command->method, &command->settings, defaults->step, command->settings.span));
   command->settings.specialised = pw_scene_code_table (command->engine.code);
-  return PW_OK;
-}
-
-static int run_open_condition (pw_run_cli *command, pw_error *error) {
-  pw_error own = { 0 };
-  if (command->with_error)
-    return pw_fail (error, PW_INPUT, "--error compares complete runs: it cannot be given together with --until");
-  if (command->checkpoints.path) return pw_fail (error, PW_INPUT, "--checkpoint cannot be given together with --until");
-  command->condition = pw_condition_open (command->compiled.system, command->line.until, &own);
-  if (command->condition == NULL)
-    return pw_fail (error, own.status, "--until %.200s: %s", command->line.until, own.text);
-  command->settings.ledger |= pw_condition_needs_ledger (command->condition);
-  command->crossing = (pw_crossing){ .value = pw_condition_value, .context = command->condition };
-  command->stop_time = NAN;
   return PW_OK;
 }
 
 static int run_open (pw_run_cli *command, pw_error *error) {
   int status = run_open_outputs (command, error);
-  if (status == PW_OK) status = run_open_model (command, error);
+  if (status == PW_OK) {
+    status = pw_cli_open (&command->line, error);
+    /* a summary is written of every run, but not over a table that the model reads */
+    if (command->line.m.file && run_check_paths (command, status == PW_OK ? error : &(pw_error){ 0 }) != PW_OK)
+      run_discard (command, PW_RUN_SUMMARY), status = error->status;
+  }
   if (status == PW_OK) status = run_read_settings (command, error);
-  if (status == PW_OK) status = run_choose_engine (command, error);
   if (status == PW_OK) status = checkpoints_prepare (command, error);
   if (status != PW_OK) return status;
-  const pw_system *system = command->compiled.system;
+  const pw_system *system = command->line.m.system;
   if (command->plots_path || command->page_path) {
-    command->plots = pw_plots_open (command->plots_path, command->page_path != NULL, command->compiled.model, system,
-                                    command->t_end, error);
+    command->plots = pw_plots_open (command->plots_path, command->page_path != NULL, command->line.m.model, system,
+                                    command->settings.span, error);
     if (command->plots == NULL || pw_plots_style (command->plots, command->line.width, command->colour, error) != PW_OK)
       return error->status;
   }
-  status = pw_comparison_open (&command->comparison, &command->compiled, command->reference_path,
-                               command->line.starts != NULL, command->t_end, error);
+  status =
+      pw_comparison_open (&command->comparison, &command->line, command->reference_path, command->settings.span, error);
   if (status != PW_OK) return status;
-  if (command->line.until && run_open_condition (command, error) != PW_OK) return error->status;
+  const char *until = command->line.until;
+  pw_error own = { 0 };
+  command->stop_time = NAN;
+  if (until && command->with_error)
+    return pw_fail (error, PW_INPUT, "--error compares complete runs: it cannot be given together with --until");
+  if (until && command->checkpoints.path)
+    return pw_fail (error, PW_INPUT, "--checkpoint cannot be given together with --until");
+  if (until && (command->condition = pw_condition_open (system, until, &own)) == NULL)
+    return pw_fail (error, own.status, "--until %.200s: %s", until, own.text);
+  if (until) command->settings.ledger |= pw_condition_needs_ledger (command->condition);
+  command->crossing = (pw_crossing){ .value = pw_condition_value, .context = command->condition };
   pw_limit_start (&command->limit);
   command->run = pw_limit_open (system, command->method, &command->settings, error);
   if (command->run == NULL) return error->status;
   command->redundant = pw_report_redundancies (command->run);
-  pw_report_model (&command->compiled);
+  pw_report_model (&command->line.m);
   pw_report_settings (command->run, system, command->method, &command->line, &command->settings);
   pw_report_initialisation (command->run, system, command->redundant);
   pw_output *table = command->output[PW_RUN_TABLE];
@@ -330,8 +305,8 @@ static double run_next_row_time (const pw_run_cli *command) {
   if (command->table == NULL) return INFINITY;
   if (command->row_interval == 0) return 0;
   double t = (double)command->rows * command->row_interval;
-  double round_off = fmax (1e-9 * command->row_interval, 4 * DBL_EPSILON * command->t_end);
-  return t > 0 && fabs (t - command->t_end) <= round_off ? command->t_end : t;
+  double round_off = fmax (1e-9 * command->row_interval, 4 * DBL_EPSILON * command->settings.span);
+  return t > 0 && fabs (t - command->settings.span) <= round_off ? command->settings.span : t;
 }
 
 /* Searches the condition of --until in the last step. */
@@ -353,7 +328,7 @@ static int run_store_samples (pw_run_cli *command, pw_error *error) {
   int status = PW_OK;
   while (status == PW_OK && run_next_row_time (command) <= now) {
     status = pw_run_sample (run, command->row_interval > 0 ? run_next_row_time (command) : now, &sample, error);
-    if (status == PW_OK) status = pw_csv_write (command->table, command->compiled.system, &sample, error);
+    if (status == PW_OK) status = pw_csv_write (command->table, command->line.m.system, &sample, error);
     if (status != PW_OK) break;
     command->rows++;
     pw_progress_at (&command->progress, sample.t);
@@ -362,7 +337,7 @@ static int run_store_samples (pw_run_cli *command, pw_error *error) {
   if (status == PW_OK && command->table && command->row_interval > 0 && run_is_stopped (command) &&
       (double)(command->rows - 1) * command->row_interval < now) { /* the last row is not a multiple of the interval */
     status = pw_run_sample (run, now, &sample, error);
-    if (status == PW_OK) status = pw_csv_write (command->table, command->compiled.system, &sample, error);
+    if (status == PW_OK) status = pw_csv_write (command->table, command->line.m.system, &sample, error);
     command->rows++;
   }
   while (status == PW_OK && command->plots && pw_plots_next (command->plots) <= now) {
@@ -375,7 +350,7 @@ static int run_store_samples (pw_run_cli *command, pw_error *error) {
   }
   while (status == PW_OK && pw_motion_next_time (motion) <= now) {
     status = pw_run_sample (run, pw_motion_next_time (motion), &sample, error);
-    if (status == PW_OK) pw_motion_add (motion, command->compiled.system, &sample);
+    if (status == PW_OK) pw_motion_add (motion, command->line.m.system, &sample);
   }
   while (status == PW_OK && pw_error_run_next (&command->stated) <= now)
     status = pw_error_run_add (&command->stated, run, error);
@@ -384,7 +359,7 @@ static int run_store_samples (pw_run_cli *command, pw_error *error) {
 
 /* Advances to the next sample or checkpoint, the end of the batch, or a request to stop. */
 static int run_batch (pw_run_cli *command, pw_error *error) {
-  double due = fmin (command->checkpoints.next_time, command->t_end);
+  double due = fmin (command->checkpoints.next_time, command->settings.span);
   due = fmin (due, run_next_row_time (command));
   due = fmin (due, pw_motion_next_time (&command->comparison.motion));
   due = fmin (due, pw_error_run_next (&command->stated));
@@ -393,8 +368,8 @@ static int run_batch (pw_run_cli *command, pw_error *error) {
   int status;
   long steps = 0;
   do {
-    status = command->condition ? pw_run_advance (command->run, command->t_end, error)
-                                : pw_run_advance_towards (command->run, due, command->t_end, error);
+    status = command->condition ? pw_run_advance (command->run, command->settings.span, error)
+                                : pw_run_advance_towards (command->run, due, command->settings.span, error);
     if (status == PW_OK) status = run_check_condition (command, error);
     if (run_is_stopped (command)) break;
   } while (status == PW_OK && ++steps < command->batch && pw_run_time (command->run) < due && !pw_stop);
@@ -423,7 +398,8 @@ static int run_steps (pw_run_cli *command, pw_error *error) {
   /* a checkpoint has the samples up to its time */
   int status = run_check_condition (command, error);
   if (status == PW_OK && !command->checkpoints.resume_path) status = run_store_samples (command, error);
-  while (status == PW_OK && !run_is_stopped (command) && pw_run_time (command->run) < command->t_end && !pw_stop) {
+  while (status == PW_OK && !run_is_stopped (command) && pw_run_time (command->run) < command->settings.span &&
+         !pw_stop) {
     status = run_batch (command, error);
     if (status == PW_OK) status = run_store_samples (command, error);
     if (status == PW_OK && pw_run_time (command->run) >= command->checkpoints.next_time)
@@ -441,12 +417,12 @@ static int run_is_stdout (const char *path) {
 static int run_integrate (pw_run_cli *command, pw_error *error) {
   command->batch = 1;
   pw_stop_catch ();
-  pw_progress_start (&command->progress, pw_file_name (command->compiled.file), "s", pw_run_time (command->run),
-                     command->t_end);
+  pw_progress_start (&command->progress, pw_file_name (command->line.m.file), "s", pw_run_time (command->run),
+                     command->settings.span);
   command->progress.no_bar = run_is_stdout (command->table_path);
   int status = run_steps (command, error);
   pw_progress_end (&command->progress);
-  int complete = status == PW_OK && (run_is_stopped (command) || pw_run_time (command->run) >= command->t_end);
+  int complete = status == PW_OK && (run_is_stopped (command) || pw_run_time (command->run) >= command->settings.span);
   int stated = pw_error_run_finish (&command->stated, complete, error);
   pw_stop_release ();
   if (complete) {
@@ -494,7 +470,7 @@ static void run_write_json (pw_run_cli *command, const pw_summary *summary, cons
   pw_output *output = command->output[PW_RUN_SUMMARY];
   if (output == NULL) return;
   const pw_statistics *statistics = command->run ? pw_run_statistics (command->run) : NULL;
-  if (pw_json_write (summary, command->compiled.system, sample, command->with_energies, statistics, output,
+  if (pw_json_write (summary, command->line.m.system, sample, command->with_energies, statistics, output,
                      &write_error) != PW_OK)
     command->write_failed |= pw_output_is_file (output);
   run_add_error (error, &write_error);
@@ -519,7 +495,7 @@ static int run_finish_figures (pw_run_cli *command, const char *reason, pw_error
   int status = PW_OK, animated = 0;
   if (command->plots && command->run) status = pw_plots_finish (command->plots, !pw_stop, &draw_error);
   if (command->plots && command->run && status == PW_OK)
-    status = pw_plots_outputs (command->plots, &command->line, &command->compiled, !pw_stop, &draw_error);
+    status = pw_plots_outputs (command->plots, &command->line, !pw_stop, &draw_error);
   if (command->plots && command->run && command->output[PW_RUN_PAGE])
     animated = pw_animate (command->plots, command->page_path, command->output[PW_RUN_PAGE], command->method, reason);
   if (!animated) run_discard (command, PW_RUN_PAGE);
@@ -530,7 +506,7 @@ static int run_finish_figures (pw_run_cli *command, const char *reason, pw_error
 /* Everything after the last step, however that came about: table, summary, figures, messages.  Returns an exit
  * status. */
 static int run_finish (pw_run_cli *command, pw_error *error) {
-  const pw_system *system = command->compiled.system;
+  const pw_system *system = command->line.m.system;
   pw_run *run = command->run;
   static const char *const output_name[PW_RUN_OUTPUTS] = { "the table so far", "the page", "the summary" };
   char reason[PW_RUN_REASON] = "";
@@ -575,7 +551,6 @@ static int run_command (void *options, pw_error *error) {
   pw_condition_close (command->condition);
   free (command->redundant);
   pw_cli_engine_close (&command->engine);
-  pw_cli_close_model (&command->compiled);
   return status;
 }
 

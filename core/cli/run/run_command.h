@@ -51,12 +51,10 @@ typedef struct pw_run_cli {
   int with_energies, with_error; /* 1: --energy, --error */
   pw_checkpoints checkpoints;
   /* as understood */
-  pw_cli_model compiled;
   pw_cli_engine engine;
   const char *method;
   pw_settings settings;
   pw_limit limit;
-  double t_end;        /* [s] */
   double row_interval; /* of the table [s]; 0: each accepted step is a row */
   /* open */
   pw_output *output[PW_RUN_OUTPUTS]; /* NULL: not written */

@@ -25,12 +25,12 @@ int pw_error_run_start (pw_run_cli *command, pw_error *error) {
   if (command->checkpoints.resume_path)
     return pw_fail (error, PW_INPUT,
                     "--error compares the run from its beginning on: it cannot be combined with --resume");
-  pw_equal_times (command->t_end, MOTION_SAMPLES, e->t);
+  pw_equal_times (command->settings.span, MOTION_SAMPLES, e->t);
   e->settings = command->settings, e->limit = command->limit;
   e->settings.stop = error_stop, e->settings.stop_context = e;
   e->width = pw_run_record_width (command->run);
   e->repetition =
-      pw_repetition_open (command->compiled.system, command->method, &e->settings, e->t, MOTION_SAMPLES, error);
+      pw_repetition_open (command->line.m.system, command->method, &e->settings, e->t, MOTION_SAMPLES, error);
   if (e->repetition == NULL) return error->status;
   e->rows = calloc ((MOTION_SAMPLES + 2) * (size_t)e->width, sizeof *e->rows);
   if (e->rows == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
@@ -126,6 +126,6 @@ void pw_report_stated (const pw_run_cli *command, FILE *f) {
     return;
   }
   pw_cli_print (f, "\n  stated error at %s s, from a repetition with %s\n", PW_DIGITS (e->t, 6), e->repeated);
-  error_bodies (e, command->compiled.system, f);
-  error_columns (e, command->compiled.system, command->with_energies, f);
+  error_bodies (e, command->line.m.system, f);
+  error_columns (e, command->line.m.system, command->with_energies, f);
 }

@@ -62,7 +62,7 @@ int pw_study_read_methods (pw_study *study, const char *otherwise, pw_error *err
 
 pw_row *pw_study_add (pw_study *study, int group, int curve, const char *method, int points, pw_error *error) {
   pw_row *row = realloc (study->row, (size_t)(study->rows + 1) * sizeof *row);
-  double (*point)[STUDY_COORDINATES] = pw_arena_alloc (&study->arena, (size_t)points * sizeof *point);
+  double (*point)[STUDY_COORDINATES] = pw_arena_alloc (&study->line.arena, (size_t)points * sizeof *point);
   if (row) study->row = row;
   if (row == NULL || point == NULL) return pw_fail (error, PW_RESOURCE, "out of memory"), NULL;
   row += study->rows++;
@@ -93,21 +93,21 @@ static int study_advance (pw_study *study, pw_row *row, pw_run *run, const pw_li
                           pw_error *error) {
   int status = PW_OK;
   long batch = 8; /* calls of pw_run_advance_towards between readings of the clock, at first */
-  while (status == PW_OK && pw_run_time (run) < study->t_end) {
+  while (status == PW_OK && pw_run_time (run) < study->settings.span) {
     double start = pw_seconds (CLOCK_THREAD_CPUTIME_ID);
     long n = 0;
     do {
-      status = pw_run_advance_towards (run, visitor ? visitor->due : study->t_end, study->t_end, error);
+      status = pw_run_advance_towards (run, visitor ? visitor->due : study->settings.span, study->settings.span, error);
       if (status == PW_OK && visitor && pw_run_time (run) >= visitor->due)
         status = visitor->visit (visitor, run, error);
-    } while (status == PW_OK && ++n < batch && pw_run_time (run) < study->t_end);
+    } while (status == PW_OK && ++n < batch && pw_run_time (run) < study->settings.span);
     double used = pw_seconds (CLOCK_THREAD_CPUTIME_ID) - start;
     row->cpu += used;
     pw_batch_adapt (&batch, n, used);
-    pw_study_progress (study, row, study->run_share * (row->runs + pw_run_time (run) / study->t_end));
+    pw_study_progress (study, row, study->run_share * (row->runs + pw_run_time (run) / study->settings.span));
     int stopped = status == PW_STOPPED;
     if (stopped && (pw_stop || isinf (study->cpu_limit))) return pw_limit_status (limit, pw_run_time (run), error);
-    if (stopped || (status == PW_OK && row->cpu > study->cpu_limit && pw_run_time (run) < study->t_end)) {
+    if (stopped || (status == PW_OK && row->cpu > study->cpu_limit && pw_run_time (run) < study->settings.span)) {
       row->state = ROW_STOPPED;
       return PW_RETRY;
     }
@@ -124,7 +124,7 @@ int pw_study_run (pw_study *study, pw_row *row, const pw_settings *settings, pw_
   run_settings.stop = pw_limit_over;
   run_settings.stop_context = &limit;
   run_settings.specialised = pw_scene_code_table (study->engine.code);
-  pw_run *run = pw_run_open (study->compiled.system, row->method, &run_settings, error);
+  pw_run *run = pw_run_open (study->line.m.system, row->method, &run_settings, error);
   if (run == NULL && error->status == PW_STOPPED) {
     *error = (pw_error){ 0 };
     if (pw_stop || isinf (study->cpu_limit)) return pw_limit_status (&limit, settings->t, error);
@@ -171,19 +171,6 @@ const char *pw_study_status (const pw_row *row) {
   return status[row->state];
 }
 
-/* Opens the CSV file with its first line.  Rows are written as they finish, to NAME.part, which remains if the study
- * is stopped. */
-static int table_open (pw_study *study, pw_error *error) {
-  const pw_study_column *column = study->type->column;
-  pw_text line = { .chars = NULL };
-  study->csv = pw_figure_open_file (study->folder, study->type->table_names[0], error);
-  if (study->csv == NULL) return error->status;
-  for (int i = 0; i < study->type->columns; i++)
-    if (column[i].name) pw_text_name (&line, column[i].name, column[i].unit);
-  pw_text_cell (&line, "reason");
-  return pw_text_line (&line, pw_output_stream (study->csv), study->folder, error);
-}
-
 /* The width of the first column, which contains the methods. */
 static int table_width (const pw_study *study) {
   size_t width = strlen ("method");
@@ -192,34 +179,16 @@ static int table_width (const pw_study *study) {
   return (int)width;
 }
 
-static void table_heading (pw_study *study, int group) {
-  const pw_study_column *column = study->type->column;
-  int width = table_width (study);
-  printf ("%s%-*s%s\n%-*s", study->headed ? "\n" : "", width, study->type->group[group], study->type->heading_above,
-          width, "method");
-  for (int i = 0; i < study->type->columns; i++)
-    if (column[i].head) printf ("%*s", column[i].width, column[i].head);
-  putchar ('\n');
-  study->headed = group + 1;
-}
-
-/* Prints a value, "-" if it is unknown, "<1e-9" if it is an upper bound. */
-static void table_number (const pw_row *row, const pw_study_column *column, int value_index) {
-  char text[32] = "<", *number = text + (row->upper_bounds >> value_index & 1);
-  if (isnan (row->value[value_index]))
-    strcpy (number, "-");
-  else
-    snprintf (number, sizeof text - 1, column->format, row->value[value_index]);
-  printf ("%*s", column->width, text);
-}
-
 /* Prints a row: columns after the status only if its runs have reached the end, else the reason. */
 static void table_print (const pw_study *study, const pw_row *row) {
   const pw_study_column *column = study->type->column;
   int shown = 1;
   printf ("%-*s", table_width (study), row->method);
   for (int i = 0; shown && i < study->type->columns; i++) {
-    if (column[i].head) table_number (row, &column[i], i);
+    char text[32] = "<", *number = text + (row->upper_bounds >> i & 1); /* "-": unknown, "<1e-9": an upper bound */
+    snprintf (number, sizeof text - 1, isnan (row->value[i]) || column[i].format == NULL ? "-" : column[i].format,
+              row->value[i]);
+    if (column[i].head) printf ("%*s", column[i].width, text);
     if (column[i].text == pw_study_status) shown = row->state == ROW_DONE;
   }
   if (row->state != ROW_DONE) {
@@ -236,7 +205,15 @@ static void table_print (const pw_study *study, const pw_row *row) {
 static int table_write_row (pw_study *study, const pw_row *row, pw_error *error) {
   const pw_study_column *column = study->type->column;
   pw_text line = { .chars = NULL };
-  if (!study->quiet && study->headed != row->group + 1) table_heading (study, row->group);
+  if (!study->quiet && study->headed != row->group + 1) {
+    const int width = table_width (study);
+    printf ("%s%-*s%s\n%-*s", study->headed ? "\n" : "", width, study->type->group[row->group],
+            study->type->heading_above, width, "method");
+    for (int i = 0; i < study->type->columns; i++)
+      if (column[i].head) printf ("%*s", column[i].width, column[i].head);
+    putchar ('\n');
+    study->headed = row->group + 1;
+  }
   if (!study->quiet) table_print (study, row);
   if (study->csv == NULL) return PW_OK;
   for (int i = 0; i < study->type->columns; i++)
@@ -292,21 +269,15 @@ static int study_open_folder (pw_study *study, pw_error *error) {
   if (study->folder == NULL) return pw_cli_requires ("--width", study->line.width, "-o DIR", 0, error);
   double width;
   int status = pw_figure_width (study->line.width, &width, error);
-  if (status == PW_OK)
-    status = pw_files_open (&study->files, &study->line, &study->compiled, use, sizeof use / sizeof *use, error);
-  return status == PW_OK ? table_open (study, error) : status;
-}
-
-/* Estimated number of steps of all runs. */
-static double study_estimated_steps (const pw_study *study) {
-  pw_run_defaults defaults = pw_cli_defaults (pw_file_table (study->compiled.file));
-  double steps = 0;
-  for (const pw_row *row = study->row; row < study->row + study->rows; row++) {
-    pw_settings settings = study->settings;
-    if (row->level > 0) settings.step = settings.rtol = row->level;
-    steps += study->type->runs_per_row * pw_method_steps (row->method, &settings, defaults.step, study->t_end);
-  }
-  return steps;
+  if (status == PW_OK) status = pw_files_open (&study->line, use, sizeof use / sizeof *use, error);
+  if (status != PW_OK || (study->csv = pw_figure_open_file (study->folder, tables[0], error)) == NULL)
+    return error->status;
+  pw_text heading = { .chars =
+                          NULL }; /* rows follow as they finish, in NAME.part, which remains if the study is stopped */
+  for (const pw_study_column *c = study->type->column; c < study->type->column + study->type->columns; c++)
+    if (c->name) pw_text_name (&heading, c->name, c->unit);
+  pw_text_cell (&heading, "reason");
+  return pw_text_line (&heading, pw_output_stream (study->csv), study->folder, error);
 }
 
 static int study_open (pw_study *study, pw_error *error) {
@@ -314,15 +285,22 @@ static int study_open (pw_study *study, pw_error *error) {
   study->run_share = 1;
   study->cpu_limit = INFINITY;
   pthread_mutex_init (&study->mutex, NULL);
-  int status = pw_cli_open (&study->compiled, &study->line, error);
+  int status = pw_cli_open (&study->line, error);
   if (status == PW_OK) status = pw_parallel_jobs (study->jobs_text, &study->jobs, error);
   if (status == PW_OK) status = study->type->plan (study, error);
   if (status == PW_OK) status = pw_cli_read_specialise (study->line.specialise, &when, error);
-  if (status == PW_OK) status = pw_report_initial_state (&study->compiled, study->limit.seconds, error);
+  if (status == PW_OK) status = pw_report_initial_state (&study->line.m, study->limit.seconds, error);
   if (status != PW_OK) return status;
-  pw_cli_report_tables (study->compiled.system, study->t_end);
+  pw_cli_report_tables (study->line.m.system, study->settings.span);
+  double steps = 0; /* of all runs, estimated */
+  for (const pw_row *row = study->row; row < study->row + study->rows; row++) {
+    pw_settings settings = study->settings;
+    if (row->level > 0) settings.step = settings.rtol = row->level;
+    steps += study->type->runs_per_row *
+             pw_method_steps (row->method, &settings, study->line.m.defaults.step, study->settings.span);
+  }
   /* one engine for all runs, since `compare` compares their processor times */
-  pw_cli_engine_open (&study->engine, study->compiled.system, when, study_estimated_steps (study));
+  pw_cli_engine_open (&study->engine, study->line.m.system, when, steps);
   return study_open_folder (study, error);
 }
 
@@ -350,15 +328,6 @@ static int study_measure_method (void *context, int curve, pw_error *error) {
   return status;
 }
 
-/* Writes the measured rows after one that an interruption has stopped.  PW_RETRY, or the status of a failure. */
-static int study_write_kept (pw_study *study, pw_error *error) {
-  for (const pw_row *row = study->row + study->written; row < study->row + study->rows; row++) {
-    if (row->measured && table_write_row (study, row, error) != PW_OK) return error->status;
-    study->written += row->measured;
-  }
-  return PW_RETRY;
-}
-
 static int study_perform (pw_study *study, pw_error *error) {
   pw_stop_catch ();
   int status = study->type->begin (study, error);
@@ -366,11 +335,16 @@ static int study_perform (pw_study *study, pw_error *error) {
     printf ("all runs use %s%s\n\n",
             study->engine.code ? "code specialised for this scene, if their method can use it" : "the general engine: ",
             study->engine.code ? "" : study->engine.reason);
-  pw_study_begin_progress (study, pw_file_name (study->compiled.file), study->type->row_noun, study->rows);
+  pw_study_begin_progress (study, pw_file_name (study->line.m.file), study->type->row_noun, study->rows);
   if (status == PW_OK)
     status = study->type->timed ? pw_study_parallel (study, study->methods, study_measure_method, study, error)
                                 : pw_study_parallel (study, study->rows, study_measure_row, study, error);
-  if (status == PW_RETRY && pw_stop) status = study_write_kept (study, error);
+  /* those measured after the row that an interruption has stopped */
+  for (const pw_row *row = study->row + study->written, *end = study->row + study->rows;
+       status == PW_RETRY && pw_stop && row < end; row++) {
+    if (row->measured && table_write_row (study, row, error) != PW_OK) status = error->status;
+    study->written += row->measured && status == PW_RETRY;
+  }
   if (status == PW_OK && study->type->conclude) study->type->conclude (study);
   pw_stop_release ();
   return status;
@@ -393,30 +367,24 @@ static int study_finish (pw_study *study, int status, pw_error *error) {
   return status == PW_OK && study->scripts[0] ? pw_figure_draw (study->folder, study->scripts, error) : status;
 }
 
-/* A study in which no run has reached the end is a failure. */
-static int study_require_success (const pw_study *study, pw_error *error) {
-  const pw_row *failed = NULL;
-  for (const pw_row *row = study->row; row < study->row + study->rows; row++) {
-    if (row->state == ROW_DONE) return PW_OK;
-    if (row->state == ROW_FAILED || row->state == ROW_REFUSED) failed = row;
-  }
-  return failed ? pw_fail (error, PW_METHOD, "no method has reached the end; the last error: %s", failed->reason)
-                : pw_fail (error, PW_METHOD, "no method has reached the end within the limit; see --limit");
-}
-
 int pw_study_command (pw_study *study, const pw_study_type *type, pw_error *error) {
   study->type = type;
   int status = study_open (study, error);
   if (status == PW_OK) status = study_perform (study, error);
   status = study_finish (study, status, error);
-  if (status == PW_OK) status = study_require_success (study, error);
-  pw_files_close (&study->files);
+  const pw_row *failed = NULL, *done = NULL;
+  for (const pw_row *row = study->row; row < study->row + study->rows; row++) {
+    if (row->state == ROW_DONE) done = row;
+    if (row->state == ROW_FAILED || row->state == ROW_REFUSED) failed = row;
+  }
+  if (status == PW_OK && done == NULL && failed)
+    status = pw_fail (error, PW_METHOD, "no method has reached the end; the last error: %s", failed->reason);
+  else if (status == PW_OK && done == NULL)
+    status = pw_fail (error, PW_METHOD, "no method has reached the end within the limit; see --limit");
   if (type->close) type->close (study);
-  pw_arena_free (&study->arena);
   free (study->row);
   free (study->method);
   pthread_mutex_destroy (&study->mutex);
   pw_cli_engine_close (&study->engine);
-  pw_cli_close_model (&study->compiled);
   return status == PW_INTERRUPTED ? status : error->status;
 }

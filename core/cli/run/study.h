@@ -92,19 +92,15 @@ struct pw_study {
   const char *methods_text, *reference_path, *folder, *jobs_text;
   /* as understood */
   const pw_study_type *type;
-  pw_cli_engine engine;  /* of all runs */
-  pw_cli_model compiled; /* shared by all runs */
+  pw_cli_engine engine; /* of all runs */
   char (*method)[STUDY_NAME];
   int methods;
   int jobs; /* number of concurrent runs */
   pw_settings settings;
   pw_limit limit;   /* of a run with a visitor, checked in every step */
   double cpu_limit; /* of every run, checked between batches of steps [s]: ROW_STOPPED; INFINITY: the run fails */
-  double t_end;     /* [s] */
-  pw_arena arena;   /* of the points of rows, and of what a command keeps there */
   /* in progress */
-  pw_files files; /* the locked folder */
-  int quiet;      /* 1: rows are not printed */
+  int quiet; /* 1: rows are not printed */
   pw_row *row;
   int rows, written; /* all; those written to the table */
   int headed;        /* 1 + the group of the heading printed last; 0: none */

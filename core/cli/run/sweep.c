@@ -162,18 +162,6 @@ static row_system *system_of (sweep_rows *sweep, long row) {
 
 /* ---- One run ---- */
 
-/* The initial values that the grid varies, malloced, and their number. */
-static pw_initial_value *row_initial (const pw_plan *plan, const sweep_row *row, int *count) {
-  pw_initial_value *initial = malloc (((size_t)plan->grid.axes + 1) * sizeof *initial);
-  *count = 0;
-  for (int i = 0; initial && i < plan->grid.axes; i++)
-    if (plan->grid.axis[i].parameter == NULL)
-      initial[(*count)++] =
-          (pw_initial_value){ pw_system_find_state (row->system->model.system, plan->grid.axis[i].name, NULL),
-                              pw_grid_value (&plan->grid, i, row->number) };
-  return initial;
-}
-
 /* Makes the whole run and its repetition; stores the stated errors of the states at the end if they are known. */
 static void row_state_error (sweep_row *row, const pw_plan *plan, const pw_settings *settings) {
   enum { TIMES = MOTION_SAMPLES };
@@ -182,12 +170,12 @@ static void row_state_error (sweep_row *row, const pw_plan *plan, const pw_setti
                    *end = rows ? rows + TIMES * width : NULL;
   long recorded;
   pw_error own = { 0 };
-  pw_equal_times (plan->t_end, TIMES, t);
+  pw_equal_times (plan->settings.span, TIMES, t);
   row->state_error = malloc ((size_t)states * sizeof *end);
   if (rows == NULL || row->state_error == NULL)
     row->status = pw_fail (&row->error, PW_RESOURCE, "out of memory");
   else
-    row->status = pw_run_record (row->run, plan->t_end, t, TIMES, LONG_MAX, rows, &recorded, &row->error);
+    row->status = pw_run_record (row->run, plan->settings.span, t, TIMES, LONG_MAX, rows, &recorded, &row->error);
   int known = row->status == PW_OK;
   pw_repetition *r =
       !known ? NULL : pw_repetition_open (row->system->model.system, plan->method, settings, t, TIMES, &own);
@@ -214,7 +202,12 @@ static void row_open (sweep_row *row, const pw_plan *plan) {
   pw_settings settings = plan->settings;
   settings.stop_context = &row->limit;
   settings.specialised = row->system->code;
-  pw_initial_value *initial = row_initial (plan, row, &settings.initials);
+  pw_initial_value *initial = malloc (((size_t)plan->grid.axes + 1) * sizeof *initial); /* those that the grid varies */
+  for (int i = 0; initial && i < plan->grid.axes; i++)
+    if (plan->grid.axis[i].parameter == NULL)
+      initial[settings.initials++] =
+          (pw_initial_value){ pw_system_find_state (row->system->model.system, plan->grid.axis[i].name, NULL),
+                              pw_grid_value (&plan->grid, i, row->number) };
   settings.initial = initial;
   pw_limit_start (&row->limit);
   if (initial == NULL) pw_fail (&row->error, PW_RESOURCE, "out of memory");
@@ -226,13 +219,13 @@ static void row_open (sweep_row *row, const pw_plan *plan) {
     row->run = pw_limit_open (row->system->model.system, plan->method, &settings, &row->error);
   row->status = row->error.status;
   if (row->run && row_has_outcomes (plan))
-    row->status = pw_outcomes_begin (&row->of, row->run, plan->t_end, &row->error);
+    row->status = pw_outcomes_begin (&row->of, row->run, plan->settings.span, &row->error);
   if (row->run && plan->with_error) row_state_error (row, plan, &settings);
   free (initial);
 }
 
 static int row_ended (const sweep_row *row, const pw_plan *plan) {
-  return row->status != PW_OK || row->of.ended || !(pw_run_time (row->run) < plan->t_end);
+  return row->status != PW_OK || row->of.ended || !(pw_run_time (row->run) < plan->settings.span);
 }
 
 /* Closes the run and appends the cells of its row, without the end of the line, even if the run failed; returns its
@@ -276,25 +269,6 @@ static void rows_store (sweep_rows *sweep, const sweep_row *row, int status, con
   if (sweep->error->status != PW_OK) pw_stop = 1;
 }
 
-/* The next missing row of the part; -1 if there is none, or after a request to stop. */
-static long rows_next (sweep_rows *sweep) {
-  const pw_plan *plan = sweep->plan;
-  while (pw_stop == 0 && sweep->next < plan->grid.rows) {
-    long number = pw_grid_scheduled_row (&plan->grid, sweep->next++);
-    if (number % plan->parts == plan->part - 1 && sweep->journal->offset[number / plan->parts] == 0) return number;
-  }
-  return -1;
-}
-
-/* Counts a run that was opened; keeps the largest change of given initial values by the constraints. */
-static void rows_count_change (sweep_rows *sweep, double change, const char *text) {
-  sweep->opened_runs++;
-  sweep->changed_runs += change > 0;
-  if (!(change > sweep->largest_change)) return;
-  sweep->largest_change = change;
-  memcpy (sweep->largest_change_text, text, sizeof sweep->largest_change_text);
-}
-
 /* ---- Threads ---- */
 
 /* A thread and the rows that it computes at once.  With more than one there are neither --cpu nor --limit: both refer
@@ -310,8 +284,13 @@ typedef struct {
 
 /* Opens the run of the next row; 0 if there is none.  The caller holds the lock, which is released meanwhile. */
 static int worker_begin (sweep_rows *sweep, sweep_row *row) {
+  const pw_plan *plan = sweep->plan;
   char text[PW_CHANGE_TEXT];
-  long number = rows_next (sweep);
+  long number = -1; /* of the next missing row of the part; none after a request to stop */
+  while (number < 0 && pw_stop == 0 && sweep->next < plan->grid.rows) {
+    long next = pw_grid_scheduled_row (&plan->grid, sweep->next++);
+    if (next % plan->parts == plan->part - 1 && sweep->journal->offset[next / plan->parts] == 0) number = next;
+  }
   if (number < 0) return 0;
   *row = (sweep_row){ .number = number, .system = system_of (sweep, number) };
   if (row->system == NULL) {
@@ -319,23 +298,16 @@ static int worker_begin (sweep_rows *sweep, sweep_row *row) {
     return 0;
   }
   pthread_mutex_unlock (&sweep->lock);
-  row_open (row, sweep->plan);
+  row_open (row, plan);
   double change = row->run ? pw_cli_largest_change (row->run, row->system->model.system, text) : 0;
   pthread_mutex_lock (&sweep->lock);
-  if (row->run) rows_count_change (sweep, change, text);
+  sweep->opened_runs += row->run != NULL;
+  sweep->changed_runs += change > 0;
+  if (change > sweep->largest_change) {
+    sweep->largest_change = change;
+    memcpy (sweep->largest_change_text, text, sizeof text);
+  }
   return 1;
-}
-
-/* Stores a row whose run has ended.  The caller holds the lock, which is released meanwhile. */
-static void worker_end (sweep_worker *worker, sweep_row *row) {
-  sweep_rows *sweep = worker->sweep;
-  pthread_mutex_unlock (&sweep->lock);
-  pw_text_clear (&worker->text);
-  int status = row_close (row, sweep->plan, &worker->text);
-  pthread_mutex_lock (&sweep->lock);
-  rows_store (sweep, row, status, &worker->text);
-  system_release (row->system);
-  row->system = NULL;
 }
 
 /* Advances the runs until one of them ends: in lanes if all use the code of the plan's engine, else one after the
@@ -354,11 +326,13 @@ static void worker_advance (sweep_worker *worker) {
   }
   if (plan->by_steps) /* one run */
     while (!row_ended (running[0], plan))
-      running[0]->status = pw_outcomes_advance (&running[0]->of, run[0], plan->t_end, plan->t_end, &running[0]->error);
+      running[0]->status =
+          pw_outcomes_advance (&running[0]->of, run[0], plan->settings.span, plan->settings.span, &running[0]->error);
   if (plan->by_steps) return;
   while (!ended) {
-    pw_runs_advance (run, n, plan->t_end, same_code ? worker->lanes_code : NULL, worker->lanes_memory, status, error);
-    for (int i = 0; i < n; i++) ended |= status[i] != PW_OK || !(pw_run_time (run[i]) < plan->t_end);
+    pw_runs_advance (run, n, plan->settings.span, same_code ? worker->lanes_code : NULL, worker->lanes_memory, status,
+                     error);
+    for (int i = 0; i < n; i++) ended |= status[i] != PW_OK || !(pw_run_time (run[i]) < plan->settings.span);
   }
   for (int i = 0; i < n; i++) running[i]->status = status[i], running[i]->error = error[i];
 }
@@ -380,8 +354,16 @@ static int worker_thread (void *context, int i, pw_error *error) {
     pthread_mutex_unlock (&sweep->lock);
     if (rows) worker_advance (&worker);
     pthread_mutex_lock (&sweep->lock);
-    for (int k = 0; k < worker.width; k++)
-      if (worker.row[k].system && row_ended (&worker.row[k], sweep->plan)) worker_end (&worker, &worker.row[k]);
+    for (sweep_row *row = worker.row; row < worker.row + worker.width; row++) { /* stores those that have ended */
+      if (row->system == NULL || !row_ended (row, sweep->plan)) continue;
+      pthread_mutex_unlock (&sweep->lock);
+      pw_text_clear (&worker.text);
+      int status = row_close (row, sweep->plan, &worker.text);
+      pthread_mutex_lock (&sweep->lock);
+      rows_store (sweep, row, status, &worker.text);
+      system_release (row->system);
+      row->system = NULL;
+    }
   } while (rows > 0);
   pthread_mutex_unlock (&sweep->lock);
   pw_text_free (&worker.text);
@@ -398,7 +380,8 @@ static int rows_compute (const pw_plan *plan, pw_journal *journal, int jobs, pw_
   pthread_mutex_init (&sweep.lock, NULL);
   pthread_cond_init (&sweep.compiled, NULL);
   pw_stop_catch ();
-  pw_progress_start (&sweep.progress, pw_file_name (plan->file), "runs", (double)journal->done, (double)journal->rows);
+  pw_progress_start (&sweep.progress, pw_file_name (plan->line->m.file), "runs", (double)journal->done,
+                     (double)journal->rows);
   pw_parallel (sweep.jobs, sweep.jobs, worker_thread, &sweep, error);
   pw_progress_end (&sweep.progress);
   pw_stop_release (); /* the rest can be interrupted and repeated */
@@ -457,11 +440,28 @@ static const char *sweep_not_for_merge (const pw_sweep *sweep) {
   return NULL;
 }
 
-/* --part I/N; without it the sweep is its only part. */
-static int sweep_read_part (pw_sweep *sweep, pw_error *error) {
+#define SWEEP_LANES "1, 2, 4 or 8" /* the powers of 2 up to PW_LANES_MOST */
+_Static_assert(PW_LANES_MOST == 8, "SWEEP_LANES, and numbers of one digit");
+
+static int sweep_read_settings (pw_sweep *sweep, pw_error *error) {
   pw_plan *plan = &sweep->plan;
+  const pw_run_defaults *defaults = &sweep->line.m.defaults;
+  const char *lanes = sweep->lanes_text;
   char rest;
-  plan->part = plan->parts = 1;
+  plan->line = &sweep->line;
+  plan->method = sweep->line.method ? sweep->line.method : defaults->method;
+  if (plan->with_error && row_has_outcomes (plan))
+    return pw_fail (error, PW_INPUT, "--error compares complete runs: it cannot be given together with --%s",
+                    plan->of ? "of" : "until");
+  int status = pw_cli_settings (&sweep->line, defaults, &plan->settings, &plan->limit, error);
+  if (status == PW_OK) pw_cli_report_unused (plan->method, &sweep->line);
+  if (status == PW_OK) status = pw_cli_read_specialise (sweep->line.specialise, &plan->specialise, error);
+  if (status != PW_OK) return status;
+  plan->lanes = lanes ? *lanes - '0' : 0;
+  if (lanes && (plan->lanes < 1 || plan->lanes > PW_LANES_MOST || (plan->lanes & (plan->lanes - 1)) != 0 || lanes[1]))
+    return pw_fail (error, PW_INPUT, "--lanes %.60s: expected " SWEEP_LANES, lanes);
+  if (pw_parallel_jobs (sweep->jobs_text, &sweep->jobs, error) != PW_OK) return error->status;
+  plan->part = plan->parts = 1; /* without --part the sweep is its only part */
   if (sweep->part_text == NULL || (sscanf (sweep->part_text, "%7d/%7d%c", &plan->part, &plan->parts, &rest) == 2 &&
                                    1 <= plan->part && plan->part <= plan->parts && plan->parts <= 1000000))
     return PW_OK;
@@ -469,40 +469,11 @@ static int sweep_read_part (pw_sweep *sweep, pw_error *error) {
                   sweep->part_text);
 }
 
-#define SWEEP_LANES "1, 2, 4 or 8" /* the powers of 2 up to PW_LANES_MOST */
-_Static_assert(PW_LANES_MOST == 8, "SWEEP_LANES, and numbers of one digit");
-
-static int sweep_read_lanes (pw_sweep *sweep, pw_error *error) {
-  const char *text = sweep->lanes_text;
-  int lanes = sweep->plan.lanes = text ? *text - '0' : 0;
-  if (text && (lanes < 1 || lanes > PW_LANES_MOST || (lanes & (lanes - 1)) != 0 || text[1]))
-    return pw_fail (error, PW_INPUT, "--lanes %.60s: expected " SWEEP_LANES, text);
-  return PW_OK;
-}
-
-static int sweep_read_settings (pw_sweep *sweep, pw_error *error) {
-  pw_plan *plan = &sweep->plan;
-  pw_run_defaults defaults = pw_cli_defaults (pw_file_table (plan->file));
-  plan->line = &sweep->line;
-  plan->method = sweep->line.method ? sweep->line.method : defaults.method;
-  if (plan->with_error && row_has_outcomes (plan))
-    return pw_fail (error, PW_INPUT, "--error compares complete runs: it cannot be given together with --%s",
-                    plan->of ? "of" : "until");
-  int status = pw_cli_settings (&sweep->line, &defaults, &plan->t_end, &plan->settings, &plan->limit, error);
-  if (status == PW_OK) pw_cli_report_unused (plan->method, &sweep->line);
-  if (status == PW_OK) status = pw_cli_read_specialise (sweep->line.specialise, &plan->specialise, error);
-  if (status == PW_OK) status = sweep_read_lanes (sweep, error);
-  if (status == PW_OK) status = pw_parallel_jobs (sweep->jobs_text, &sweep->jobs, error);
-  return status == PW_OK ? sweep_read_part (sweep, error) : status;
-}
-
 static int sweep_open (pw_sweep *sweep, pw_error *error) {
   pw_use use[] = { PW_CLI_MODEL_USE, { "-o", sweep->path, PW_WRITES, pw_cli_csv } };
-  sweep->plan.file = pw_cli_file (&sweep->line, error);
-  if (sweep->plan.file == NULL) return error->status;
-  int status = sweep_read_settings (sweep, error);
-  if (status == PW_OK)
-    status = pw_cli_check_uses (&sweep->line, sweep->plan.file, use, sizeof use / sizeof *use, error);
+  int status = pw_cli_file (&sweep->line, error);
+  if (status == PW_OK) status = sweep_read_settings (sweep, error);
+  if (status == PW_OK) status = pw_cli_check_uses (&sweep->line, use, sizeof use / sizeof *use, error);
   if (status == PW_OK) status = pw_plan_open (&sweep->plan, sweep->ranges, error);
   if (status == PW_OK && sweep->plan.parts > sweep->plan.grid.rows)
     status = pw_fail (error, PW_INPUT, "--part %s: more parts than the %ld rows of the grid", sweep->part_text,
@@ -531,15 +502,6 @@ static int sweep_conclude (const pw_tally *tally, pw_error *error) {
   return PW_OK;
 }
 
-static int sweep_merge (pw_sweep *sweep, pw_error *error) {
-  pw_tally tally;
-  const char *option = sweep_not_for_merge (sweep);
-  if (option)
-    return pw_fail (error, PW_INPUT, "--%s cannot be combined with --merge: the parts define the sweep", option);
-  int status = pw_sweep_merge (sweep->line.argument, sweep->line.arguments, sweep->path, &tally, error);
-  return status == PW_OK ? sweep_conclude (&tally, error) : status;
-}
-
 static int sweep_finish (pw_sweep *sweep, pw_error *error) {
   pw_tally tally;
   if (sweep->journal.done == 0) {
@@ -560,18 +522,21 @@ static int sweep_finish (pw_sweep *sweep, pw_error *error) {
 
 static int sweep_command (void *options, pw_error *error) {
   pw_sweep *sweep = options;
+  pw_tally tally;
   sweep->journal.descriptor = -1;
   int status = sweep_check_options (sweep, error);
-  if (status == PW_OK && sweep->merge)
-    status = sweep_merge (sweep, error);
-  else if (status == PW_OK) {
-    status = sweep_open (sweep, error);
-    if (status == PW_OK) status = rows_compute (&sweep->plan, &sweep->journal, sweep->jobs, error);
-    if (status == PW_OK) status = sweep_finish (sweep, error);
+  const char *other = status == PW_OK && sweep->merge ? sweep_not_for_merge (sweep) : NULL;
+  if (other)
+    status = pw_fail (error, PW_INPUT, "--%s cannot be combined with --merge: the parts define the sweep", other);
+  if (status == PW_OK && sweep->merge) {
+    status = pw_sweep_merge (sweep->line.argument, sweep->line.arguments, sweep->path, &tally, error);
+    return status == PW_OK ? sweep_conclude (&tally, error) : status;
   }
+  if (status == PW_OK) status = sweep_open (sweep, error);
+  if (status == PW_OK) status = rows_compute (&sweep->plan, &sweep->journal, sweep->jobs, error);
+  if (status == PW_OK) status = sweep_finish (sweep, error);
   pw_journal_close (&sweep->journal);
   pw_plan_close (&sweep->plan);
-  pw_file_close (sweep->plan.file);
   return status;
 }
 

@@ -51,10 +51,8 @@ long pw_grid_parameter_index (const pw_grid *grid, long row);
 typedef struct {
   /* from the command line */
   const pw_cli_line *line;
-  pw_file *file;
   const char *method;
   pw_settings settings;
-  double t_end;    /* [s] */
   pw_limit limit;  /* of each run */
   int with_cpu;    /* 1: a column with each run's processor time */
   int with_error;  /* 1: columns with the stated errors of states */
@@ -81,7 +79,7 @@ typedef struct {
   pw_text fingerprint;      /* the first lines of a journal or part: everything that determines the rows */
 } pw_plan;
 
-/* Matches the ranges ("NAME=RANGE") to the model, whose file is open in plan->file and stays the caller's, and finds
+/* Matches the ranges ("NAME=RANGE") to the model, whose file is open in plan->line, and finds
  * the columns by compiling models of the grid.  Errors: PW_INPUT, PW_RESOURCE.  Close the plan in every case. */
 int pw_plan_open (pw_plan *plan, const char **ranges, pw_error *error);
 void pw_plan_close (pw_plan *plan);

@@ -34,44 +34,7 @@ static size_t axis_value_length (const char *list) {
   return n;
 }
 
-/* "V1,V2,..." */
-static int axis_read_list (pw_axis *axis, pw_arena *arena, pw_error *error) {
-  axis->count = 1;
-  for (const char *c = axis->range; *(c += axis_value_length (c)); c++) axis->count++;
-  axis->value = pw_arena_alloc (arena, (size_t)axis->count * sizeof *axis->value);
-  if (axis->value == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  char *c = axis->range;
-  for (long i = 0; i < axis->count; i++) {
-    size_t n = axis_value_length (c);
-    const char *why = PW_PRINTED (140, "\"%.*s\" is not a finite number", n < 100 ? (int)n : 100, c);
-    if (axis_read_number (c, n, axis->value + i) != PW_OK) return axis_fail (axis, why, error);
-    c += n + 1;
-  }
-  return PW_OK;
-}
-
-/* "lin:FIRST:LAST:COUNT" or "log:FIRST:LAST:COUNT" */
-static int axis_read_range (pw_axis *axis, pw_error *error) {
-  double number[3];
-  char *c = strchr (axis->range, ':') + 1;
-  const char *why = PW_PRINTED (80, "expected %.3s:FIRST:LAST:COUNT, three numbers", axis->range);
-  for (int i = 0; i < 3; i++) {
-    size_t n = strcspn (c, ":");
-    if (axis_read_number (c, n, number + i) != PW_OK || (c[n] == ':') != (i < 2)) return axis_fail (axis, why, error);
-    c += n + 1;
-  }
-  axis->first = number[0], axis->last = number[1];
-  if (*pw_domain_check (PW_COUNT, number[2]))
-    return axis_fail (axis, "expected a count that is a whole number >= 1", error);
-  if (number[2] > PW_GRID_MAX_ROWS) return axis_fail (axis, "too many values: at most 1e8 rows", error);
-  axis->count = (long)number[2];
-  if (axis->count == 1 && axis->first != axis->last)
-    return axis_fail (axis, "a range with two different ends needs at least 2 values", error);
-  if (axis->type == PW_AXIS_LOG && !(axis->first > 0 && axis->last > 0))
-    return axis_fail (axis, "the ends of a logarithmic range must be > 0", error);
-  return PW_OK;
-}
-
+/* "NAME=V1,V2,...", "NAME=lin:FIRST:LAST:COUNT" or "NAME=log:FIRST:LAST:COUNT" */
 int pw_axis_read (pw_axis *axis, const char *text, pw_arena *arena, pw_error *error) {
   *axis = (pw_axis){ .name = pw_arena_copy (arena, text) };
   if (axis->name == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
@@ -83,9 +46,33 @@ int pw_axis_read (pw_axis *axis, const char *text, pw_arena *arena, pw_error *er
   axis->type = strncmp (axis->range, "lin:", 4) == 0   ? PW_AXIS_LIN
                : strncmp (axis->range, "log:", 4) == 0 ? PW_AXIS_LOG
                                                        : PW_AXIS_LIST;
-  if (axis->type != PW_AXIS_LIST) return axis_read_range (axis, error);
-  if (strchr (axis->range, ':')) return axis_fail (axis, "a range begins with lin: or log:", error);
-  return axis_read_list (axis, arena, error);
+  const int is_list = axis->type == PW_AXIS_LIST;
+  double number[3], *value = number;
+  char *c = is_list ? axis->range : strchr (axis->range, ':') + 1;
+  axis->count = is_list ? 1 : 3; /* numbers that are read */
+  if (is_list && strchr (c, ':')) return axis_fail (axis, "a range begins with lin: or log:", error);
+  for (const char *d = c; is_list && *(d += axis_value_length (d)); d++) axis->count++;
+  if (is_list) value = axis->value = pw_arena_alloc (arena, (size_t)axis->count * sizeof *axis->value);
+  if (value == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  for (long i = 0; i < axis->count; i++) {
+    size_t n = is_list ? axis_value_length (c) : strcspn (c, ":");
+    const char *why = is_list ? PW_PRINTED (140, "\"%.*s\" is not a finite number", n < 100 ? (int)n : 100, c)
+                              : PW_PRINTED (80, "expected %.3s:FIRST:LAST:COUNT, three numbers", axis->range);
+    if (axis_read_number (c, n, value + i) != PW_OK || (!is_list && (c[n] == ':') != (i < 2)))
+      return axis_fail (axis, why, error);
+    c += n + 1;
+  }
+  if (is_list) return PW_OK;
+  axis->first = number[0], axis->last = number[1];
+  if (*pw_domain_check (PW_COUNT, number[2]))
+    return axis_fail (axis, "expected a count that is a whole number >= 1", error);
+  if (number[2] > PW_GRID_MAX_ROWS) return axis_fail (axis, "too many values: at most 1e8 rows", error);
+  axis->count = (long)number[2];
+  if (axis->count == 1 && axis->first != axis->last)
+    return axis_fail (axis, "a range with two different ends needs at least 2 values", error);
+  if (axis->type == PW_AXIS_LOG && !(axis->first > 0 && axis->last > 0))
+    return axis_fail (axis, "the ends of a logarithmic range must be > 0", error);
+  return PW_OK;
 }
 
 /* The ends are exact.  Values between them are divided only once, so that they are rounded as little as possible: the
@@ -127,20 +114,6 @@ long pw_grid_parameter_index (const pw_grid *grid, long row) {
   return index;
 }
 
-static int grid_count_rows (pw_grid *grid, pw_error *error) {
-  double rows = 1;
-  for (int i = 0; i < grid->axes; i++) rows *= (double)grid->axis[i].count;
-  if (rows > PW_GRID_MAX_ROWS)
-    return pw_fail (error, PW_INPUT, "the grid has %.15g rows: at most 1e8; use coarser ranges, or several sweeps",
-                    rows);
-  grid->rows = 1;
-  for (int i = grid->axes - 1; i >= 0; i--) {
-    grid->axis[i].stride = grid->rows;
-    grid->rows *= grid->axis[i].count;
-  }
-  return PW_OK;
-}
-
 /* Reads a NULL-terminated list of "NAME=RANGE".  PW_INPUT also if there are too many rows. */
 static int grid_read (pw_grid *grid, const char *const *ranges, pw_arena *arena, pw_error *error) {
   int n = 0, status = PW_OK;
@@ -154,25 +127,31 @@ static int grid_read (pw_grid *grid, const char *const *ranges, pw_arena *arena,
       if (strcmp (other->name, axis->name) == 0)
         status = pw_fail (error, PW_INPUT, "--vary %.200s is given twice", axis->name);
   }
-  return status == PW_OK ? grid_count_rows (grid, error) : status;
+  double rows = 1;
+  for (int i = 0; i < grid->axes; i++) rows *= (double)grid->axis[i].count;
+  if (status == PW_OK && rows > PW_GRID_MAX_ROWS)
+    status =
+        pw_fail (error, PW_INPUT, "the grid has %.15g rows: at most 1e8; use coarser ranges, or several sweeps", rows);
+  grid->rows = 1;
+  for (int i = grid->axes - 1; i >= 0 && status == PW_OK; i--) {
+    grid->axis[i].stride = grid->rows;
+    grid->rows *= grid->axis[i].count;
+  }
+  return status;
 }
 
 /* ---- Models ---- */
 
-/* Builds the model of a row: --set, varied parameters, --start.  Varied initial values are set when its run begins. */
-static int plan_build (const pw_plan *plan, long row, pw_model *model, pw_error *error) {
-  int status = pw_cli_apply (model, "--set", plan->line->sets, pw_model_set, error);
-  for (int i = 0; i < plan->grid.axes && status == PW_OK; i++)
+int pw_plan_compile (const pw_plan *plan, long row, pw_cli_model *compiled, pw_error *error) {
+  pw_model *model = pw_file_model (plan->line->m.file, error);
+  *compiled = (pw_cli_model){ .model = model };
+  int status = model ? pw_cli_apply (model, "--set", plan->line->sets, pw_model_set, error) : error->status;
+  for (int i = 0; i < plan->grid.axes && status == PW_OK; i++) /* varied initial values are set when the run begins */
     if (plan->grid.axis[i].parameter)
       status = pw_model_set (model, plan->grid.axis[i].name, pw_grid_value (&plan->grid, i, row), error);
   if (status == PW_OK) status = pw_cli_apply (model, "--start", plan->line->starts, pw_model_set_initial, error);
-  return status == PW_OK ? pw_model_build (model, error) : status;
-}
-
-int pw_plan_compile (const pw_plan *plan, long row, pw_cli_model *compiled, pw_error *error) {
-  *compiled = (pw_cli_model){ .model = pw_file_model (plan->file, error) };
-  if (compiled->model && plan_build (plan, row, compiled->model, error) == PW_OK)
-    compiled->system = pw_system_compile (compiled->model, error);
+  if (status == PW_OK) status = pw_model_build (model, error);
+  if (status == PW_OK) compiled->system = pw_system_compile (model, error);
   if (compiled->system == NULL) return error->status;
   for (const pw_axis *axis = plan->grid.axis; axis < plan->grid.axis + plan->grid.axes; axis++)
     if (axis->parameter == NULL && pw_system_find_state (compiled->system, axis->name, error) < 0) return PW_INPUT;
@@ -181,33 +160,24 @@ int pw_plan_compile (const pw_plan *plan, long row, pw_cli_model *compiled, pw_e
 
 /* ---- Axes ---- */
 
-/* 1 if a list of "NAME=VALUE", which ends with NULL or is NULL, has this name. */
-static int plan_has_name (const char **list, const char *name) {
-  size_t n = strlen (name);
-  for (; list && *list; list++)
-    if (strncmp (*list, name, n) == 0 && (*list)[n] == '=') return 1;
-  return 0;
-}
-
-/* Whether the model with its default parameters has a first-order state of this name, which has no dot. */
-static int plan_has_state (const pw_plan *plan, const char *name) {
-  pw_error none = { 0 };
-  pw_model *m = pw_file_model (plan->file, &none);
-  pw_system *s = m && pw_model_build (m, &none) == PW_OK ? pw_system_compile (m, &none) : NULL;
-  const int found = s && pw_system_find_state (s, name, &none) >= 0;
-  pw_system_free (s);
-  pw_model_free (m);
-  return found;
-}
-
 /* Finds the parameter of an axis, in whose domain all values must lie.  Other names are those of states, which exist
  * only in a compiled model. */
 static int plan_match_axis (const pw_plan *plan, pw_axis *axis, pw_model *model, pw_error *error) {
   const pw_parameter *parameter = axis->parameter = pw_cli_parameter (model, axis->name);
+  const size_t n = strlen (axis->name);
   if (parameter) axis->unit = parameter->unit;
-  if (plan_has_name (parameter ? plan->line->sets : plan->line->starts, axis->name))
-    return pw_fail (error, PW_INPUT, "%s is given by --vary and by %s", axis->name, parameter ? "--set" : "--start");
-  if (parameter == NULL && (strchr (axis->name, '.') || plan_has_state (plan, axis->name))) return PW_OK;
+  for (const char **given = parameter ? plan->line->sets : plan->line->starts; given && *given; given++)
+    if (strncmp (*given, axis->name, n) == 0 && (*given)[n] == '=')
+      return pw_fail (error, PW_INPUT, "%s is given by --vary and by %s", axis->name, parameter ? "--set" : "--start");
+  if (parameter == NULL) { /* a first-order state, whose name has no dot, may be in the model with its defaults */
+    pw_error none = { 0 };
+    pw_model *m = strchr (axis->name, '.') ? NULL : pw_file_model (plan->line->m.file, &none);
+    pw_system *s = m && pw_model_build (m, &none) == PW_OK ? pw_system_compile (m, &none) : NULL;
+    const int found = strchr (axis->name, '.') || (s && pw_system_find_state (s, axis->name, &none) >= 0);
+    pw_system_free (s);
+    pw_model_free (m);
+    if (found) return PW_OK;
+  }
   for (long i = 0; i < axis->count; i++)
     if (parameter == NULL || *pw_domain_check (parameter->domain, pw_axis_value (axis, i)))
       return pw_model_set (model, axis->name, pw_axis_value (axis, i), error); /* fails with the reason */
@@ -216,36 +186,28 @@ static int plan_match_axis (const pw_plan *plan, pw_axis *axis, pw_model *model,
 
 /* ---- Columns ---- */
 
-/* The index of the i-th state in the order of the table: positions and velocities of each body, then each internal
- * coordinate and its velocity.  In a system all coordinates come before all velocities. */
-static int plan_table_state (const pw_system *system, int i) {
-  int n = pw_system_coordinates (system), bodies = pw_system_bodies (system), internal = i - 6 * bodies;
-  if (internal >= 0) return 3 * bodies + internal / 2 + (internal % 2 ? n : 0);
-  return 3 * (i / 6) + i % 3 + (i % 6 < 3 ? 0 : n);
-}
-
-/* Makes room for a column; a larger hash table of names is filled anew. */
-static int plan_reserve_column (pw_plan *plan) {
-  if ((size_t)plan->columns < plan->column_room) return PW_OK;
-  if (pw_grow (&plan->column, (size_t)plan->columns, &plan->column_room, sizeof *plan->column) != PW_OK)
-    return PW_RESOURCE;
-  pw_names_close (&plan->column_of);
-  if (pw_names_open (&plan->column_of, plan->column_room) != PW_OK) return PW_RESOURCE;
-  for (int i = 0; i < plan->columns; i++) pw_names_add (&plan->column_of, plan->column[i].name, i);
-  return PW_OK;
-}
-
 /* Adds the new states of a system, and the units of varied initial values. */
 static int plan_add_columns (pw_plan *plan, const pw_system *system, pw_error *error) {
-  for (int i = 0; i < 2 * pw_system_coordinates (system); i++) {
-    int state = plan_table_state (system, i);
+  const int n = pw_system_coordinates (system), bodies = pw_system_bodies (system);
+  for (int i = 0; i < 2 * n; i++) {
+    /* the order of the table: positions and velocities of each body, then each internal coordinate and its velocity; in
+     * a system all coordinates come before all velocities */
+    int internal = i - 6 * bodies, state = internal >= 0 ? 3 * bodies + internal / 2 + (internal % 2 ? n : 0)
+                                                         : 3 * (i / 6) + i % 3 + (i % 6 < 3 ? 0 : n);
     const char *name = PW_NAME (pw_system_state_name, system, state);
     if (pw_system_state_hidden (system, state)) continue;
     if (plan->column_room && pw_names_find (&plan->column_of, name) >= 0) continue;
     const char *copy = pw_arena_copy (&plan->arena, name),
                *unit = pw_arena_copy (&plan->arena, pw_system_state_unit (system, state));
-    if (copy == NULL || unit == NULL || plan_reserve_column (plan) != PW_OK)
-      return pw_fail (error, PW_RESOURCE, "out of memory");
+    int status = copy && unit ? PW_OK : PW_RESOURCE;
+    if (status == PW_OK && (size_t)plan->columns == plan->column_room) { /* a larger hash table is filled anew */
+      status = pw_grow (&plan->column, (size_t)plan->columns, &plan->column_room, sizeof *plan->column);
+      pw_names_close (&plan->column_of);
+      if (status == PW_OK) status = pw_names_open (&plan->column_of, plan->column_room);
+      for (int k = 0; status == PW_OK && k < plan->columns; k++)
+        pw_names_add (&plan->column_of, plan->column[k].name, k);
+    }
+    if (status != PW_OK) return pw_fail (error, PW_RESOURCE, "out of memory");
     plan->column[plan->columns] = (struct pw_column){ copy, unit };
     pw_names_add (&plan->column_of, copy, plan->columns++);
   }
@@ -263,22 +225,6 @@ typedef struct {
   int failed;           /* number of the others */
   pw_error first_error; /* why the first of these failed */
 } plan_scan;
-
-/* Chooses what evaluates the equations, of one run and of several at once: the same in all parts of a sweep, since
- * results of different codes differ by round-off. */
-static void plan_open_engines (pw_plan *plan, const pw_system *system) {
-  pw_run_defaults defaults = pw_cli_defaults (pw_file_table (plan->file));
-  double steps = (double)plan->grid.rows * pw_method_steps (plan->method, &plan->settings, defaults.step, plan->t_end);
-  pw_cli_report_tables (system, plan->t_end);
-  pw_cli_engine_open (&plan->engine, system, plan->specialise, steps);
-  const char *reason = plan->with_cpu                   ? "--cpu measures each run"
-                       : plan->with_error               ? "--error repeats each run"
-                       : plan->by_steps                 ? "outputs and conditions follow each step"
-                       : isfinite (plan->limit.seconds) ? "--limit stops each run by itself"
-                                                        : NULL;
-  if (reason == NULL) plan->lanes_code = pw_cli_engine_lanes (&plan->engine, system, plan->method, plan->lanes, steps);
-  if (reason && plan->lanes > 1) pw_cli_say ("pinwheel: one run after the other: %s\n", reason);
-}
 
 /* Checks outputs and the condition of --until; stores names and units of outputs. */
 static int plan_open_outputs (pw_plan *plan, const pw_system *system, pw_error *error) {
@@ -311,7 +257,22 @@ static int plan_scan_row (pw_plan *plan, long row, plan_scan *scan, pw_error *er
   if (status == PW_OK && !scan->complete && (plan->of || plan->line->until) &&
       plan_open_outputs (plan, compiled.system, error) != PW_OK)
     status = PW_RESOURCE, row_error = *error;
-  if (status == PW_OK && !scan->complete) plan_open_engines (plan, compiled.system);
+  /* what evaluates the equations, of one run and of several at once: the same in all parts of a sweep, since results
+   * of different codes differ by round-off */
+  if (status == PW_OK && !scan->complete) {
+    double steps = (double)plan->grid.rows *
+                   pw_method_steps (plan->method, &plan->settings, plan->line->m.defaults.step, plan->settings.span);
+    pw_cli_report_tables (compiled.system, plan->settings.span);
+    pw_cli_engine_open (&plan->engine, compiled.system, plan->specialise, steps);
+    const char *reason = plan->with_cpu                   ? "--cpu measures each run"
+                         : plan->with_error               ? "--error repeats each run"
+                         : plan->by_steps                 ? "outputs and conditions follow each step"
+                         : isfinite (plan->limit.seconds) ? "--limit stops each run by itself"
+                                                          : NULL;
+    if (reason == NULL)
+      plan->lanes_code = pw_cli_engine_lanes (&plan->engine, compiled.system, plan->method, plan->lanes, steps);
+    if (reason && plan->lanes > 1) pw_cli_say ("pinwheel: one run after the other: %s\n", reason);
+  }
   scan->built |= compiled.system != NULL;
   pw_cli_close_model (&compiled);
   if (status == PW_RESOURCE) return pw_fail (error, status, "%s", row_error.text);
@@ -381,23 +342,10 @@ void pw_plan_cells (const pw_plan *plan, const pw_plan_row *row, pw_text *text) 
 
 /* ---- The fingerprint ---- */
 
-static void plan_fingerprint_grid (pw_plan *plan) {
-  pw_text *text = &plan->fingerprint;
-  pw_fingerprint_initial (text, plan->line->starts);
-  pw_text order = { .chars = NULL }; /* of the axes, which determines the order of the rows */
-  for (int i = 0; i < plan->grid.axes; i++) {
-    pw_fingerprint_line (text, "vary", plan->grid.axis[i].name, plan->grid.axis[i].range);
-    pw_text_cell (&order, plan->grid.axis[i].name);
-  }
-  text->failed |= order.failed;
-  pw_fingerprint_line (text, "order", NULL, order.chars ? order.chars : "");
-  pw_text_free (&order);
-}
-
 static int plan_fingerprint (pw_plan *plan, const pw_model *model, pw_error *error) {
   pw_text *text = &plan->fingerprint;
-  if (pw_fingerprint_run (text, PW_SWEEP_MAGIC, plan->file, plan->tables_sum, plan->method, &plan->settings, error) !=
-      PW_OK)
+  if (pw_fingerprint_run (text, PW_SWEEP_MAGIC, plan->line->m.file, plan->tables_sum, plan->method, &plan->settings,
+                          error) != PW_OK)
     return error->status;
   if (plan->settings.max_steps != PW_MAX_STEPS)
     pw_fingerprint_number (text, "max-steps", NULL, (double)plan->settings.max_steps);
@@ -410,7 +358,15 @@ static int plan_fingerprint (pw_plan *plan, const pw_model *model, pw_error *err
     for (int i = 0; i < plan->grid.axes; i++) is_varied |= plan->grid.axis[i].parameter == parameter;
     if (!is_varied) pw_fingerprint_number (text, "parameter", parameter->name, pw_model_parameter (model, parameter));
   }
-  plan_fingerprint_grid (plan);
+  pw_fingerprint_initial (text, plan->line->starts);
+  pw_text order = { .chars = NULL }; /* of the axes, which determines the order of the rows */
+  for (int i = 0; i < plan->grid.axes; i++) {
+    pw_fingerprint_line (text, "vary", plan->grid.axis[i].name, plan->grid.axis[i].range);
+    pw_text_cell (&order, plan->grid.axis[i].name);
+  }
+  text->failed |= order.failed;
+  pw_fingerprint_line (text, "order", NULL, order.chars ? order.chars : "");
+  pw_text_free (&order);
   pw_fingerprint_number (text, "rows", NULL, (double)plan->grid.rows);
   pw_fingerprint_line (text, "columns", NULL, plan->heading.chars ? plan->heading.chars : "");
   pw_fingerprint_line (text, "part", NULL, PW_PRINTED (60, "%d/%d", plan->part, plan->parts));
@@ -426,7 +382,7 @@ int pw_plan_open (pw_plan *plan, const char **ranges, pw_error *error) {
   int stabilisation, status = pw_method_parse (plan->method, &method, &stabilisation, error);
   if (status == PW_OK) status = grid_read (&plan->grid, (const char *const *)ranges, &plan->arena, error);
   if (status != PW_OK) return status;
-  pw_model *model = pw_file_model (plan->file, error);
+  pw_model *model = pw_file_model (plan->line->m.file, error);
   if (model == NULL) return error->status;
   status = pw_cli_apply (model, "--set", plan->line->sets, pw_model_set, error);
   for (int i = 0; i < plan->grid.axes && status == PW_OK; i++)
@@ -627,25 +583,21 @@ void pw_journal_close (pw_journal *journal) {
 
 /* ---- The table of a journal ---- */
 
-/* The reason is the last cell and the only one in quotes, which are doubled inside. */
-static void table_reason (const journal_line *line, char *reason, size_t size) {
-  const char *c = line->text, *end = line->text + line->text_size - 2;
-  while (c < end && !(c[0] == ',' && c[1] == '"')) c++;
-  size_t n = 0;
-  for (c += 2; c < end && n + 1 < size; c++) {
-    reason[n++] = *c;
-    if (*c == '"') c++;
-  }
-  reason[n] = 0;
-}
-
 /* Reads the line of a row, and counts how its run ended; 0 if it is another line. */
 static int table_read_row (const char *at, const char *end, long row, journal_line *line, pw_tally *tally) {
   if (!journal_line_read (at, end, line) || line->row != row) return 0;
   tally->rows++;
   if (line->status == 0 || tally->failed++ > 0) return 1;
   tally->status = line->status;
-  table_reason (line, tally->reason, sizeof tally->reason);
+  /* the reason is the last cell and the only one in quotes, which are doubled inside */
+  const char *c = line->text, *last = line->text + line->text_size - 2;
+  while (c < last && !(c[0] == ',' && c[1] == '"')) c++;
+  size_t n = 0;
+  for (c += 2; c < last && n + 1 < sizeof tally->reason; c++) {
+    tally->reason[n++] = *c;
+    if (*c == '"') c++;
+  }
+  tally->reason[n] = 0;
   return 1;
 }
 
@@ -656,21 +608,6 @@ static int table_close (pw_output *output, pw_error *error) {
   return error->status;
 }
 
-static int table_write (const pw_journal *journal, const pw_plan *plan, const journal_map *map, FILE *stream,
-                        pw_tally *tally, pw_error *error) {
-  int is_part = plan->parts > 1;
-  fputs (is_part ? plan->fingerprint.chars : plan->heading.chars, stream);
-  if (!is_part) putc ('\n', stream);
-  for (long k = 0; k < journal->rows; k++) {
-    const char *at = map->begin + journal->offset[k];
-    journal_line line;
-    if (!table_read_row (at, map->end, plan->part - 1 + k * plan->parts, &line, tally))
-      return pw_fail (error, PW_RESOURCE, "%s was changed by another program", journal->path);
-    fwrite (is_part ? at : line.text, 1, is_part ? line.line_size : line.text_size, stream);
-  }
-  return PW_OK;
-}
-
 int pw_sweep_finish (pw_journal *journal, const pw_plan *plan, pw_tally *tally, pw_error *error) {
   journal_map map;
   pw_error failure = { 0 };
@@ -678,7 +615,17 @@ int pw_sweep_finish (pw_journal *journal, const pw_plan *plan, pw_tally *tally, 
   if (journal_map_open (&map, journal->descriptor) != PW_OK)
     return pw_fail (error, PW_RESOURCE, "cannot read %s: %s", journal->path, strerror (errno));
   pw_output *output = pw_output_open_as (journal->table_path, ".sorted", &failure);
-  if (output) table_write (journal, plan, &map, pw_output_stream (output), tally, &failure);
+  FILE *stream = output ? pw_output_stream (output) : NULL;
+  const int is_part = plan->parts > 1;
+  if (output) fprintf (stream, is_part ? "%s" : "%s\n", is_part ? plan->fingerprint.chars : plan->heading.chars);
+  for (long k = 0; k < journal->rows && failure.status == PW_OK; k++) {
+    const char *at = map.begin + journal->offset[k];
+    journal_line line;
+    if (!table_read_row (at, map.end, plan->part - 1 + k * plan->parts, &line, tally))
+      pw_fail (&failure, PW_RESOURCE, "%s was changed by another program", journal->path);
+    else
+      fwrite (is_part ? at : line.text, 1, is_part ? line.line_size : line.text_size, stream);
+  }
   if (output) table_close (output, &failure);
   journal_map_close (&map);
   if (failure.status != PW_OK)
