@@ -407,9 +407,9 @@ static int decide_impacts (pw_run *r, const double *g, int *any, pw_error *error
     pw_saddle_close (saddle);
     return status;
   }
-  const int status = decision_push (r, saddle);
+  const int failed = decision_push (r, saddle) != PW_OK;
   pw_saddle_close (saddle);
-  if (status != PW_OK) return pw_fail_signal (r->t, error);
+  if (failed) return pw_fail_signal (r->t, error);
   const size_t bytes = (size_t)r->s->rows * sizeof *x->gamma;
   memcpy (x->gamma, x->lambda, bytes);
   events_u (r, r->v, 0, x->u); /* uses x->lambda */

@@ -1,5 +1,4 @@
-/* Modes of constraint equations whose multipliers have limits (pw_bounds), and the events at which they change
- * (events.c); a run without such equations has no pw_events. */
+/* Modes of constraint equations whose multipliers have limits, and the events at which they change (events.c). */
 #ifndef PW_EVENTS_H_
 #define PW_EVENTS_H_
 #include "method.h"
