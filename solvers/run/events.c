@@ -141,10 +141,6 @@ static void events_u (pw_run *r, const double *v, int g, double *u) {
   for (int i = 0; i < x->count; i++) u[i] = Jv[x->row[i]];
 }
 
-static int events_holonomic (const pw_run *r, int i) {
-  return r->events->row[i] < r->s->holonomic;
-}
-
 /* ---- Event functions, positive beyond an event: two for each equation ---- */
 
 /* Below this u [units] is 0 after its root: the error of the method. */
@@ -381,7 +377,7 @@ static void impact_ledger (pw_run *r) {
 /* 1 if a holonomic equation does not hold because g has left 0. */
 static int events_open (const pw_run *r, int i, double g) {
   const pw_events *x = r->events;
-  return events_holonomic (r, i) && !x->triggered[i] && x->mode[i] * g > EVENTS_SMALL * x->unit[i];
+  return (x->row[i] < r->s->holonomic) && !x->triggered[i] && x->mode[i] * g > EVENTS_SMALL * x->unit[i];
 }
 
 /* Impacts: equations that do not hold, and whose u would leave its side.  *any: 1 if there are. */
@@ -411,9 +407,9 @@ static int decide_impacts (pw_run *r, const double *g, int *any, pw_error *error
     pw_saddle_close (saddle);
     return status;
   }
-  const int status = decision_push (r, saddle);
+  const int failed = decision_push (r, saddle) != PW_OK;
   pw_saddle_close (saddle);
-  if (status != PW_OK) return pw_fail_signal (r->t, error);
+  if (failed) return pw_fail_signal (r->t, error);
   const size_t bytes = (size_t)r->s->rows * sizeof *x->gamma;
   memcpy (x->gamma, x->lambda, bytes);
   events_u (r, r->v, 0, x->u); /* uses x->lambda */
@@ -435,7 +431,7 @@ static void decide_list (pw_run *r, const double *g, int jumps) {
     const double u = x->u[i] / x->unit[i];
     const int open = !x->rests[i] && events_open (r, i, g[i]);
     if (jumps && fabs (u) > EVENTS_SMALL && !open) x->mode[i] = events_off (x, i, u);
-    const int rolls = x->mode[i] && !events_holonomic (r, i) && x->triggered[i] && !jumps;
+    const int rolls = x->mode[i] && !(x->row[i] < r->s->holonomic) && x->triggered[i] && !jumps;
     if (open || (x->mode[i] && !rolls && fabs (u) > EVENTS_SMALL)) continue;
     const double tighter = x->mode[i] == 0 && x->triggered[i] ? EVENTS_TIGHTER * x->force_unit[i] : 0;
     x->lo[x->n] = x->limit[i].least + tighter, x->hi[x->n] = x->limit[i].most - tighter;
@@ -522,7 +518,7 @@ static int events_project (pw_run *r, pw_error *error) {
 static int events_leave (pw_run *r, pw_error *error) {
   pw_events *x = r->events;
   int closes = 0, status = PW_OK;
-  for (int i = 0; i < x->count; i++) closes |= events_holonomic (r, i) && x->mode[i] == 0 && x->before[i] != 0;
+  for (int i = 0; i < x->count; i++) closes |= (x->row[i] < r->s->holonomic) && x->mode[i] == 0 && x->before[i] != 0;
   if (closes) status = events_project (r, error);
   if (status == PW_OK && closes) status = pw_run_evaluate (r, error);
   if (status == PW_OK && closes) status = r->method->restart (r, error);
@@ -560,8 +556,8 @@ static int events_prepare (pw_run *r, pw_error *error) {
   return status == PW_OK && pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK ? pw_fail_signal (r->t, error) : status;
 }
 
-/* Twice the distance of a function from its chord in the middle of the last step, from t0, by its values at the ends and
- * one step earlier; NaN: that one is not known. */
+/* Twice the distance of a function from its chord in the last step, from t0, by its values at the ends and one step
+ * earlier; NaN: that one is not known. */
 static double events_bend (const pw_run *r, double t0, int i) {
   const pw_events *x = r->events;
   const double h = r->t - t0, before = t0 - x->previous_t;
@@ -687,7 +683,7 @@ static void events_units (pw_run *r) {
     const double arm = pw_rank_multiplier_unit (r->w, x->row[i]), least = x->limit[i].least, most = x->limit[i].most;
     const double largest = fmax (isinf (least) ? 0 : -least, isinf (most) ? 0 : most);
     x->force_unit[i] = largest > 0 ? largest : force > 0 ? force * arm : 1;
-    x->unit[i] = L / arm / (events_holonomic (r, i) ? 1 : T);
+    x->unit[i] = L / arm / ((x->row[i] < r->s->holonomic) ? 1 : T);
   }
 }
 
@@ -700,7 +696,7 @@ static void events_initial (pw_run *r) {
   for (int i = 0; i < x->count; i++) {
     const int one_sided = isinf (x->limit[i].least) || isinf (x->limit[i].most);
     const signed char off = events_off (x, i, 0);
-    x->mode[i] = one_sided && (!events_holonomic (r, i) || off * x->u[i] >= -EVENTS_SMALL * x->unit[i]) ? off : 0;
+    x->mode[i] = one_sided && (!(x->row[i] < r->s->holonomic) || off * x->u[i] >= -EVENTS_SMALL * x->unit[i]) ? off : 0;
   }
   events_apply (r);
 }
@@ -723,7 +719,7 @@ static int events_consistent (pw_run *r, pw_error *error) {
 static int events_initial_sliding (pw_run *r, pw_error *error) {
   pw_events *x = r->events;
   for (int i = 0; i < x->count; i++)
-    if (x->mode[i] == 0 && !events_holonomic (r, i)) x->mode[i] = 1;
+    if (x->mode[i] == 0 && !(x->row[i] < r->s->holonomic)) x->mode[i] = 1;
   int status = events_consistent (r, error);
   if (status != PW_OK) return status;
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);

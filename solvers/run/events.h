@@ -1,5 +1,4 @@
-/* Modes of constraint equations whose multipliers have limits (pw_bounds), and the events at which they change
- * (events.c); a run without such equations has no pw_events. */
+/* Modes of constraint equations whose multipliers have limits, and the events at which they change (events.c). */
 #ifndef PW_EVENTS_H_
 #define PW_EVENTS_H_
 #include "method.h"
@@ -12,9 +11,8 @@ int pw_events_open (pw_run *r, pw_error *error);
  * opened.  Errors: as pw_run_evaluate. */
 int pw_events_begin (pw_run *r, pw_error *error);
 
-/* pw_run.advance: decides the modes at an event that has been located, or if multipliers have jumped beyond their
- * limits at a discontinuity, restarts the method, and makes a step; if there is an event in it, the state there becomes
- * the state reached. */
+/* pw_run.advance: decides the modes, if an event has been located or multipliers have jumped beyond their limits, and
+ * makes a step; if there is an event in it, the state there becomes the state reached. */
 int pw_events_advance (pw_run *r, double t_end, pw_error *error);
 
 /* Saves or loads the modes and the events so far. */
