@@ -101,6 +101,9 @@ void pw_animation_scene (pw_json *j, const pw_plots *plots) {
   j->digits = 9;
   pw_json_number (j, "size", plots->size);
   pw_json_number (j, "symbol", plots->symbol_unit);
+  pw_json_open (j, "paths", '[');
+  for (int k = 0; k < plots->paths; k++) page_points (j, NULL, *plots->path[k].point, plots->path[k].points, NULL);
+  pw_json_close (j, ']');
   page_bodies (j, plots);
   page_wheels (j, plots);
   page_links (j, plots);

@@ -57,6 +57,9 @@ static int plot_allocate (pw_plots *plots, pw_error *error) {
   plots->ground = plot_array (plots, PLOT_DRAWN, sizeof *plots->ground);
   plots->data = plot_array (plots, plots->planned, (size_t)plots->sample_size * sizeof *plots->data);
   plots->contact = plot_array (plots, wheels->count, sizeof *plots->contact);
+  plots->paths = pw_model_reference_text (plots->model)->paths;
+  if (plots->paths > PLOT_PATHS) plots->paths = PLOT_PATHS;
+  plots->path = plot_array (plots, plots->paths, sizeof *plots->path);
   plots->link = plot_array (plots, plots->links, sizeof *plots->link);
   plots->forces =
       plot_array (plots, plots->with_forces ? pw_system_force_size (plots->system) : 0, sizeof *plots->forces);
@@ -75,6 +78,25 @@ static void plot_choose (pw_plots *plots) {
     if (pw_system_element (plots->system, e).contact >= 0 &&
         contacts++ == pw_plot_pick (i, plots->wheels.drawn, plots->wheels.count))
       plots->wheels.system_index[i++] = e;
+}
+
+/* The points of the paths: those of a polyline, unless there are too many; else at equal distances. */
+static int plot_find_paths (pw_plots *plots, pw_error *error) {
+  const pw_path_text *text = pw_model_reference_text (plots->model)->path;
+  for (pw_plot_path *path = plots->path; path < plots->path + plots->paths; path++, text++) {
+    pw_path *p = pw_path_open (text->x, text->y, text->count, text->interpolation, text->closed, error);
+    pw_path_place at;
+    if (p == NULL) return error->status;
+    const int corners = text->interpolation == PW_LINEAR ? text->count + (text->closed != 0) : PLOT_PATH + 1;
+    path->points = corners > PLOT_PATH ? PLOT_PATH : corners;
+    for (int i = 0; i < path->points; i++) {
+      pw_path_at (p, pw_path_length (p) * i / (path->points - 1), &at);
+      path->point[i][0] = corners > PLOT_PATH ? at.x : text->x[i % text->count];
+      path->point[i][1] = corners > PLOT_PATH ? at.y : text->y[i % text->count];
+    }
+    pw_path_close (p);
+  }
+  return PW_OK;
 }
 
 /* Locks the folder; an error before the run if it cannot be written. */
@@ -96,7 +118,8 @@ pw_plots *pw_plots_open (const char *folder, int forces, const pw_model *model, 
     .t_end = t_end,
     .with_forces = forces
   };
-  if ((folder == NULL || plot_try_folder (plots, error) == PW_OK) && plot_allocate (plots, error) == PW_OK)
+  if ((folder == NULL || plot_try_folder (plots, error) == PW_OK) && plot_allocate (plots, error) == PW_OK &&
+      plot_find_paths (plots, error) == PW_OK)
     plots->workspace = pw_workspace_new (system, error);
   if (plots->workspace) {
     plot_choose (plots);
@@ -360,6 +383,16 @@ static int data_mechanism (const pw_plots *plots, const char *name, int n, pw_er
   return pw_output_finish (o, error);
 }
 
+static int data_paths (const pw_plots *plots, pw_error *error) {
+  pw_output *o = pw_figure_open_data (&plots->figures, "model-paths.dat", error);
+  if (o == NULL) return PW_RESOURCE;
+  fputs ("# paths of the model: x [m], y [m]\n", pw_output_stream (o));
+  for (const pw_plot_path *path = plots->path; path < plots->path + plots->paths; path++)
+    for (int i = 0; i < path->points; i++)
+      data_row (pw_output_stream (o), path->point[i], 2, i < path->points - 1 ? "\n" : "\n\n");
+  return pw_output_finish (o, error);
+}
+
 static int data_write (const pw_plots *plots, int closeup, pw_error *error) {
   static const char energy[] = "t [s], kinetic [J], potential [J], work [J], loss [J], projection [J], balance [J]";
   int status = data_tracks (plots, &plots->bodies, error);
@@ -370,6 +403,7 @@ static int data_write (const pw_plots *plots, int closeup, pw_error *error) {
   if (status == PW_OK)
     status = data_table (plots, "ground.dat", "points of the ground: x [m], y [m]", *plots->ground, 2, 2,
                          plots->grounds, error);
+  if (status == PW_OK && plots->paths) status = data_paths (plots, error);
   if (status == PW_OK) status = data_mechanism (plots, "mechanism.dat", plots->samples, error);
   if (status == PW_OK && closeup > 0) status = data_mechanism (plots, "mechanism-closeup.dat", closeup, error);
   return status;
@@ -411,7 +445,7 @@ static int figures_write (const pw_plots *plots, const char *name, int closeup, 
   fprintf (f, "t_end = %.9g\nt_closeup = %.9g\n", pw_plot_sample (plots, plots->samples - 1)[PLOT_T],
            closeup > 0 ? pw_plot_sample (plots, closeup - 1)[PLOT_T] : 0);
   figures_curves (f, plots, paths && plots->wheels.drawn ? &plots->wheels : &plots->bodies);
-  fprintf (f, "ground = %d\nby_time = %d\n", plots->grounds > 0, plots->by_time);
+  fprintf (f, "ground = %d\nby_time = %d\nmodel_paths = %d\n", plots->grounds > 0, plots->by_time, plots->paths);
   if (mechanism) figures_bodies (f, plots);
   return pw_figure_end (o, name, error);
 }
