@@ -1,4 +1,5 @@
 /* Figures: contents for several models, with gnuplot and without. */
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -283,6 +284,35 @@ TEST (ground) {
   assert_int_equal (cli_run ("PATH=/none pinwheel run andrews-squeezer --plots @/squeezer >/dev/null"), 0);
   assert_true (plots_has ("squeezer/ground.dat"));
   assert_null (cli_file ("squeezer/wheels.dat"));
+}
+
+/* The paths of a model: a polyline by its points, a longer one and a spline by 500 points at equal distances. */
+TEST (model_paths) {
+  static char text[20000];
+  int n = snprintf (text, sizeof text,
+                    "pinwheel: 1\nbodies: [{name: car, mass: 1, inertia: 1, rate: {vx: 1}}]\npaths:\n"
+                    "  - {name: triangle, closed: true, points: [[0, 0], [1, 0], [1, 2]]}\n"
+                    "  - {name: ring, closed: true, interpolation: cubic, points: [[3, 0], [0, 3], [-3, 0], [0, -3]]}\n"
+                    "  - name: long\n    points: [[0, 0]");
+  for (int i = 1; i < 999; i++) n += snprintf (text + n, sizeof text - (size_t)n, ", [%d, 0]", i);
+  snprintf (text + n, sizeof text - (size_t)n, "]\n");
+  cli_write ("roads.yaml", text);
+  cli_shell ("pinwheel run @/roads.yaml --t-end 1 --plots @/roads --animate @/roads.html");
+  const char *data = cli_file ("roads/model-paths.dat");
+  assert_non_null (data);
+  assert_non_null (strstr (data, "y [m]\n0 0\n1 0\n1 2\n0 0\n\n3 0\n"));
+  double x, y;
+  int points = 0, last = 0;
+  for (const char *p = strstr (data, "\n\n3 0\n") + 2; p && sscanf (p, "%lf %lf", &x, &y) == 2; points++) {
+    if (points < 500) check_close ("radius", hypot (x, y), 3, 0.1, "a spline through four points of a circle");
+    last = (int)x;
+    p += strspn (p, "\n");
+    p = strchr (p, '\n');
+  }
+  assert_int_equal (points, 1000);
+  assert_int_equal (last, 998);
+  assert_true (plots_has ("roads/paths.svg") && plots_has ("roads/mechanism.svg"));
+  cli_shell ("grep '\"paths\": \\[' @/roads.html");
 }
 
 /* The lines of symbols in a model's last snapshot. */

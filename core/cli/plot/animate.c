@@ -19,8 +19,9 @@ static void page_points (pw_json *j, const char *key, const double *at, int coun
 
 void pw_animation_scene (pw_json *j, const pw_plots *plots) {
   j->digits = 9;
-  pw_json_print (j, "size: %g, symbol: %g", plots->size, plots->symbol_unit);
-  pw_json_open (j, "bodies", '[');
+  pw_json_print (j, "size: %g, symbol: %g, paths: [", plots->size, plots->symbol_unit);
+  for (int k = 0; k < plots->paths; k++) page_points (j, NULL, *plots->path[k].point, plots->path[k].points, NULL);
+  pw_json_print (j, "], bodies: [");
   for (int b = 0; b < plots->bodies.drawn; b++) {
     const pw_plot_body *shape = &plots->shape[b];
     pw_json_print (j, "{name: %s", pw_plot_name (plots, &plots->bodies, b));

@@ -67,6 +67,8 @@ enum {
   PLOT_STROKES = 80,      /* of a symbol and of the ground at it, at most */
   PLOT_ATTACHMENTS = 24,  /* attachment points drawn of one body, at most */
   PLOT_CURVES = 60,       /* bodies, or wheels, with a curve, at most */
+  PLOT_PATHS = 20,        /* paths of the model drawn, at most */
+  PLOT_PATH = 500,        /* points of each, at most */
   PLOT_OUTPUTS = 12       /* first-order states and outputs with a panel, at most */
 };
 
@@ -121,6 +123,12 @@ typedef struct {
   double vertex[PLOT_VERTICES][4];
 } pw_plot_stroke;
 
+/* A path of the model, in gray below the scene. */
+typedef struct {
+  int points;
+  double point[PLOT_PATH][2]; /* [m] */
+} pw_plot_path;
+
 struct pw_plots {
   pw_figures figures; /* their folder is NULL without figures */
   int by_time;        /* 1: colours show the time, 0: the bodies */
@@ -137,6 +145,8 @@ struct pw_plots {
   pw_tracks bodies, wheels;
   int links, grounds;   /* elements drawn, before pw_plot_find_shapes at most; points of the ground */
   int with_forces;      /* 1: the forces of links are kept */
+  int paths;            /* of the model, drawn */
+  pw_plot_path *path;   /* paths */
   int *body_index;      /* of each body: its index among those drawn or PLOT_HIDDEN; PLOT_GROUND at the end */
   pw_plot_body *shape;  /* of the bodies drawn */
   double (*ground)[2];  /* grounds [m] */

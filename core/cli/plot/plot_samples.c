@@ -57,10 +57,32 @@ static int plot_allocate (pw_plots *plots, pw_error *error) {
   plots->ground = plot_array (plots, PLOT_DRAWN, sizeof *plots->ground);
   plots->data = plot_array (plots, plots->planned, (size_t)plots->sample_size * sizeof *plots->data);
   plots->contact = plot_array (plots, wheels->count, sizeof *plots->contact);
+  plots->paths = pw_model_reference_text (plots->model)->paths;
+  if (plots->paths > PLOT_PATHS) plots->paths = PLOT_PATHS;
+  plots->path = plot_array (plots, plots->paths, sizeof *plots->path);
   plots->link = plot_array (plots, plots->links, sizeof *plots->link);
   plots->forces =
       plot_array (plots, plots->with_forces ? pw_system_force_size (plots->system) : 0, sizeof *plots->forces);
   return plots->out_of_memory ? pw_fail (error, PW_RESOURCE, "plots: out of memory") : PW_OK;
+}
+
+/* The points of the paths: those of a polyline, unless there are too many; else at equal distances. */
+static int plot_find_paths (pw_plots *plots, pw_error *error) {
+  const pw_path_text *text = pw_model_reference_text (plots->model)->path;
+  for (pw_plot_path *path = plots->path; path < plots->path + plots->paths; path++, text++) {
+    pw_path *p = pw_path_open (text->x, text->y, text->count, text->interpolation, text->closed, error);
+    pw_path_place at;
+    if (p == NULL) return error->status;
+    const int corners = text->interpolation == PW_LINEAR ? text->count + (text->closed != 0) : PLOT_PATH + 1;
+    path->points = corners > PLOT_PATH ? PLOT_PATH : corners;
+    for (int i = 0; i < path->points; i++) {
+      pw_path_at (p, pw_path_length (p) * i / (path->points - 1), &at);
+      path->point[i][0] = corners > PLOT_PATH ? at.x : text->x[i % text->count];
+      path->point[i][1] = corners > PLOT_PATH ? at.y : text->y[i % text->count];
+    }
+    pw_path_close (p);
+  }
+  return PW_OK;
 }
 
 pw_plots *pw_plots_open (const char *folder, int forces, const pw_model *model, const pw_system *system, double t_end,
@@ -79,7 +101,7 @@ pw_plots *pw_plots_open (const char *folder, int forces, const pw_model *model, 
   if (folder && pw_folder_open (&plots->folder, folder, error) == PW_OK)
     probe = pw_figure_open_data (&plots->figures, "motion.dat", error);
   if (probe) pw_output_discard (probe);
-  if ((folder == NULL || probe) && plot_allocate (plots, error) == PW_OK)
+  if ((folder == NULL || probe) && plot_allocate (plots, error) == PW_OK && plot_find_paths (plots, error) == PW_OK)
     plots->workspace = pw_workspace_new (system, error);
   if (plots->workspace == NULL) return pw_plots_close (plots), NULL;
   /* the bodies, and the elements with a contact point, that are drawn, evenly from all */
@@ -339,6 +361,16 @@ static int data_mechanism (const pw_plots *plots, const char *name, int n, pw_er
   return pw_output_finish (o, error);
 }
 
+static int data_paths (const pw_plots *plots, pw_error *error) {
+  pw_output *o = pw_figure_open_data (&plots->figures, "model-paths.dat", error);
+  if (o == NULL) return PW_RESOURCE;
+  fputs ("# paths of the model: x [m], y [m]\n", pw_output_stream (o));
+  for (const pw_plot_path *path = plots->path; path < plots->path + plots->paths; path++)
+    for (int i = 0; i < path->points; i++)
+      data_row (pw_output_stream (o), path->point[i], 2, i < path->points - 1 ? "\n" : "\n\n");
+  return pw_output_finish (o, error);
+}
+
 /* ---- Scripts ---- */
 
 /* Writes the script of a figure: values of the template's variables. */
@@ -360,7 +392,7 @@ static int figures_write (const pw_plots *plots, const char *name, int closeup, 
   for (int i = 0; i < tracks->curves && tracks == &plots->wheels; i++)
     if (!pw_plot_rolls (plots, pw_plot_pick (i, tracks->curves, tracks->drawn))) fprintf (f, "%d ", i);
   fputs ("'\n", f);
-  fprintf (f, "ground = %d\nby_time = %d\n", plots->grounds > 0, plots->by_time);
+  fprintf (f, "ground = %d\nby_time = %d\nmodel_paths = %d\n", plots->grounds > 0, plots->by_time, plots->paths);
   if (!mechanism) return pw_figure_end (o, name, error);
   /* the names of bodies unless there are too many, and the colours of those with an area */
   int bodies = plots->bodies.drawn, named = bodies <= FIGURES_NAMED ? bodies : 0, area[FIGURES_COLOURS] = { 0 };
@@ -394,6 +426,7 @@ int pw_plots_finish (pw_plots *plots, int draw, pw_error *error) {
   if (status == PW_OK)
     status = data_table (plots, "ground.dat", "points of the ground: x [m], y [m]", *plots->ground, 2, 2,
                          plots->grounds, error);
+  if (status == PW_OK && plots->paths) status = data_paths (plots, error);
   if (status == PW_OK) status = data_mechanism (plots, "mechanism.dat", plots->samples, error);
   if (status == PW_OK && closeup > 0) status = data_mechanism (plots, "mechanism-closeup.dat", closeup, error);
   for (const char *const *name = names; status == PW_OK && *name; name++)

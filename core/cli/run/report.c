@@ -291,7 +291,7 @@ void pw_report_end (const pw_run_cli *command, const pw_summary *summary, const 
   report_internal (system, last);
   for (int outputs = 0; outputs < 2; outputs++) report_list (system, last, outputs);
   if (command->with_energies) report_energy (last);
-  report_errors (summary->reference, command->comparison.gaps, pw_system_states (command->compiled.system));
+  report_errors (summary->reference, command->comparison.gaps, pw_system_states (command->line.m.system));
   printf ("\n  worst scaled residuals: position %s, velocity %s\n", PW_DIGITS (stats->position, 2),
           PW_DIGITS (stats->velocity, 2));
   printf ("  %s, %ld rejected, %s, %s, %s, %s s of processor time\n", PW_COUNTED (stats->steps, "step"),

@@ -54,7 +54,7 @@ do for [form in forms] {
     set cbrange [0:i == 1 ? t_end : t_closeup]
     if (by_time) { eval sprintf('set colorbox horizontal user origin graph 0,screen %.6f size graph 1,screen %.6f', \
                                 1 - (py1[i] + 38)/height, 6.0/height) }
-    eval 'plot '.(i == 1 && strlen(names) ? names[3:*].images[i] : images[i][3:*])
+    eval 'plot '.(i == 1 && strlen(names) ? names[3:*].', '.below.images[i][3:*] : below.images[i][3:*])
   }
   eval finish
 }

@@ -22,7 +22,7 @@ do for [form in forms] {
   do for [i = 1:panels] {
     eval legend(i == panels)
     eval place(i)
-    eval draw(2, 3, 0, i == 1).points
+    eval 'plot '.below.draw(2, 3, 0, i == 1)[6:*].points
   }
   eval finish
 }

@@ -122,6 +122,8 @@ do for [k = 1:2*panels] {
   tics[k] = strlen(tics[k]) ? '('.tics[k][3:*].')' : 'autofreq'
 }
 axes = 'unset xzeroaxis'
+# The paths of the model (model_paths: their number), below the rest of a panel.
+below = model_paths ? "'model-paths.dat' using 1:2 with lines lw 0.7 dt 1 lc rgb '#999999' notitle, " : ''
 place(i) = panel(px0[i], px1[i], py0[i], py1[i]). \
   sprintf("; set xlabel '%s'; set ylabel '%s'; ", label_of[2*i - 1], label_of[2*i]). \
   sprintf('set xtics %s; set ytics %s; ', tics[2*i - 1], tics[2*i]). \
