@@ -434,7 +434,8 @@ static void scene_check (scene_trial *x, int event) {
         const double (*y)[SCENE_OUTPUTS] = (const double (*)[SCENE_OUTPUTS])f[size];
         d[size] = (8 * (y[2][i] - y[1][i]) - (y[3][i] - y[0][i])) / (12 * step[size]);
       }
-      snprintf (what, sizeof what, "%s: %s by %s", x->file, x->output[i], x->parameter[p]);
+      snprintf (what, sizeof what, "%s, %s = %.17g, %s = %.17g: %s by %s", x->file, x->parameter[0], x->value[0],
+                x->parameter[1], x->value[1], x->output[i], x->parameter[p]);
       campaign_count (what, derivative[2 * i + p], error[2 * i + p], d[0],
                       2 * fabs (d[1] - d[0]) + (1e-13 * fabs (f[0][0][i]) + 1e-14) / step[0], event);
     }
