@@ -108,8 +108,8 @@ TEST (gravity) {
 TEST (kinks) {
   static const char *const element[] = {
     "force: F, body: a, at: [0, 0], fx: \"-abs (a.x)\", fy: \"max (0, a.y) - 2*max (0, -a.x)\"",
-    "steered-wheel: F, body: a, at: [1, 0], heading: \"atan (road.curvature (a.x, a.y)) + road.heading (a.x, a.y) - "
-    "a.phi\"",
+    ("steered-wheel: F, body: a, at: [1, 0], heading: \"atan (road.curvature (a.x, a.y)) + road.heading (a.x, a.y) - "
+     "a.phi\""),
     "steered-wheel: F, body: a, at: [1, 0], heading: abs (a.x) + abs (a.y)",
     "on-curve: F, body: a, at: [0, 0], x: road.x (s), y: road.y (s), start: 0"
   };

@@ -186,8 +186,10 @@ static void table_print (const pw_study *study, const pw_row *row) {
   printf ("%-*s", table_width (study), row->method);
   for (int i = 0; shown && i < study->type->columns; i++) {
     char text[32] = "<", *number = text + (row->upper_bounds >> i & 1); /* "-": unknown, "<1e-9": an upper bound */
-    snprintf (number, sizeof text - 1, isnan (row->value[i]) || column[i].format == NULL ? "-" : column[i].format,
-              row->value[i]);
+    if (isnan (row->value[i]) || column[i].format == NULL)
+      strcpy (number, "-");
+    else
+      snprintf (number, sizeof text - 1, column[i].format, row->value[i]);
     if (column[i].head) printf ("%*s", column[i].width, text);
     if (column[i].text == pw_study_status) shown = row->state == ROW_DONE;
   }
