@@ -690,9 +690,11 @@ typedef enum {
  * not enforced: its multiplier is given, and u = J v - eta, of a holonomic equation u = g, stays >= 0 at the largest
  * multiplier, <= 0 at the smallest one. */
 typedef struct {
-  double least, most; /* multipliers with which the equation holds; both 0: it never does */
-  double sliding[2];  /* those given at the smallest and at the largest one; their magnitudes are not larger */
-  double restitution; /* of an infinite limit: velocity J v - eta after an impact over that before it, 0 to 1 */
+  double least, most;   /* multipliers with which the equation holds; both 0: it never does */
+  double sliding[2];    /* those given at the smallest and at the largest one; their magnitudes are not larger */
+  double restitution;   /* of an infinite limit: velocity J v - eta after an impact over that before it, 0 to 1 */
+  int initially_slides; /* 1: initial velocities need not satisfy the equation, as of friction; 0: they are changed so
+                         * that it holds, unless they are specified */
 } pw_bounds;
 
 /* An element type: one const table.  A NULL function is zero (the self-test verifies this); J of constraint equations

@@ -113,7 +113,7 @@ static inline int limit_check (const char *field, double most, double sliding, p
 static inline void limit_both_sides (double most, double sliding, pw_bounds *limit) {
   if (most == 0) return;
   if (sliding == 0) sliding = most;
-  *limit = (pw_bounds){ -most, most, { -sliding, sliding }, 0 };
+  *limit = (pw_bounds){ -most, most, { -sliding, sliding }, 0, 0 };
 }
 
 /* The vector w of an element; NULL where the batch has none. */

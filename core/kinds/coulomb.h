@@ -59,6 +59,7 @@ static inline double coulomb_saturation (const coulomb *law, double v, double de
   static void type##_limits (const void *definition, pw_bounds *limit) {    \
     const definition_type *x = definition;                                  \
     limit_both_sides (x->limit, x->limit_sliding, limit);                   \
+    limit->initially_slides = 1;                                            \
   }                                                                         \
   PER_ELEMENT (type##_exact_J, type, 6) {                                   \
     for (int i = 0; i < 6; i++) out[i] = now.S[i];                          \

@@ -438,7 +438,7 @@ static int compile_limits (const compilation *job) {
   const compiled *from = job->list;
   pw_bounds *limit = compile_alloc (job, (size_t)s->rows, sizeof *limit);
   if (limit == NULL) return PW_RESOURCE;
-  for (int i = 0; i < s->rows; i++) limit[i] = (pw_bounds){ -INFINITY, INFINITY, { NAN, NAN }, 0 };
+  for (int i = 0; i < s->rows; i++) limit[i] = (pw_bounds){ -INFINITY, INFINITY, { NAN, NAN }, 0, 0 };
   for (const pw_element_batch *k = s->batch; k < s->batch + s->constraints; k++)
     for (int e = 0; e < k->b.count; e++, from++)
       if (k->kind->limits) k->kind->limits (from->element->definition, limit + k->row + e * k->kind->rows);

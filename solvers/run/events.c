@@ -688,7 +688,7 @@ static void events_units (pw_run *r) {
 }
 
 /* Modes for the search of consistent positions and velocities: equations that may be free on one side are, unless that
- * side is left. */
+ * side is left, and friction is. */
 static void events_initial (pw_run *r) {
   pw_events *x = r->events;
   events_units (r);
@@ -697,6 +697,7 @@ static void events_initial (pw_run *r) {
     const int one_sided = isinf (x->limit[i].least) || isinf (x->limit[i].most);
     const signed char off = events_off (x, i, 0);
     x->mode[i] = one_sided && (!(x->row[i] < r->s->holonomic) || off * x->u[i] >= -EVENTS_SMALL * x->unit[i]) ? off : 0;
+    if (x->limit[i].initially_slides) x->mode[i] = 1;
   }
   events_apply (r);
 }
@@ -715,6 +716,26 @@ static int events_consistent (pw_run *r, pw_error *error) {
   return pw_run_make_consistent (r, r->origin, error);
 }
 
+/* 1 if the initial velocities do not satisfy an equation. */
+static int events_slides (const pw_events *x, int i) {
+  return fabs (x->u_before[i]) > 1e-9 * x->unit[i];
+}
+
+/* Friction holds if the velocities, consistent without it, satisfy its equation, else it slides. */
+static int events_initial_friction (pw_run *r, pw_error *error) {
+  pw_events *x = r->events;
+  int holds = 0;
+  if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
+  events_u (r, r->v, 0, x->u_before);
+  for (int i = 0; i < x->count; i++) {
+    if (!x->limit[i].initially_slides) continue;
+    x->mode[i] = events_slides (x, i) ? events_off (x, i, x->u_before[i]) : 0;
+    holds |= x->mode[i] == 0;
+  }
+  events_apply (r);
+  return holds ? events_consistent (r, error) : PW_OK;
+}
+
 /* Velocities of which some are not kept if all equations with two limits hold: as many hold as keep them. */
 static int events_initial_sliding (pw_run *r, pw_error *error) {
   pw_events *x = r->events;
@@ -726,9 +747,9 @@ static int events_initial_sliding (pw_run *r, pw_error *error) {
   events_u (r, r->v, 0, x->u_before);
   for (int i = 0; i < x->count; i++) {
     pw_error own = { 0 };
-    if (isinf (x->limit[i].least) || isinf (x->limit[i].most)) continue;
+    if (isinf (x->limit[i].least) || isinf (x->limit[i].most) || x->limit[i].initially_slides) continue;
     x->mode[i] = 0;
-    status = fabs (x->u_before[i]) > 1e-9 * x->unit[i] ? events_consistent (r, &own) : PW_OK;
+    status = events_slides (x, i) ? events_consistent (r, &own) : PW_OK;
     if (status == PW_STOPPED || status == PW_RESOURCE) return pw_fail (error, status, "%s", own.text);
     if (status != PW_OK || events_moved (r)) x->mode[i] = events_off (x, i, x->u_before[i]);
   }
@@ -749,10 +770,10 @@ int pw_events_open (pw_run *r, pw_error *error) {
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   events_initial (r);
   memcpy (r->q_at, r->q, 2 * ((size_t)s->coords + 3) * sizeof *r->q);
-  const int status = events_consistent (r, &own);
-  if (status == PW_OK && !events_moved (r)) return PW_OK;
+  int status = events_consistent (r, &own);
   if (status == PW_STOPPED || status == PW_RESOURCE) return pw_fail (error, status, "%s", own.text);
-  return events_initial_sliding (r, error);
+  if (status != PW_OK || events_moved (r)) status = events_initial_sliding (r, error);
+  return status == PW_OK ? events_initial_friction (r, error) : status;
 }
 
 int pw_events_begin (pw_run *r, pw_error *error) {

@@ -76,6 +76,8 @@ static const double INITIAL_RELAXED = 0.3, INITIAL_STEP = 0.7, INITIAL_PART = 1.
 
 /* How far prescribed values may change others: multiples of the least change, or a distance [units of L and rad]. */
 static const double INITIAL_AMPLIFIED = 10, INITIAL_CHANGE = 0.1;
+/* How much more than in the least change of all velocities change if the specified ones depend on the others. */
+static const double INITIAL_DEPENDENT = 1e7;
 /* Changes that may be due to the round-off of other values, relative. */
 static const double INITIAL_ROUND = 1e-10;
 /* Smaller changes, in units of the scene, are those of a value that was rounded. */
@@ -747,19 +749,37 @@ static int initial_open (initial_search *x, pw_run *r, initial_level level, cons
   return pw_sparse_open (&x->matrix, PW_SPARSE_REAL, s->coords + x->rows, x->map.colptr, x->map.rowind);
 }
 
+/* The largest change of a velocity, and the largest one described [units of L and rad, per s]. */
+static double initial_velocity_change (const initial_search *x, double *described) {
+  double change = *described = 0;
+  for (int j = 0; j < x->s->coords; j++) {
+    change = fmax (change, fabs (x->value[j] - x->given[j]) / pw_unit (x->s, j));
+    *described = fmax (*described, fabs (x->given[j]) / pw_unit (x->s, j));
+  }
+  return change;
+}
+
 /* Finds consistent values, by the least change of all where not all candidates can be kept; keeps what it can. */
 static int initial_find (initial_search *x) {
+  const size_t bytes = (size_t)x->s->coords * sizeof (double);
+  double described;
   int status;
   if (x->level == INITIAL_POSITIONS) {
     status = initial_search_positions (x);
     return status == PW_OK && initial_changes (x).candidate > 0 ? initial_keep (x) : status;
   }
   status = initial_prescribe_velocities (x, INITIAL_SPECIFIED);
-  if (status != PW_RETRY) return status;
+  const double change = status == PW_OK ? initial_velocity_change (x, &described) : INFINITY;
+  if (status < 0 || (status == PW_OK && change <= described)) return status;
+  memcpy (x->last, x->value, bytes);
   initial_stage_weights (x, &initial_least_change);
-  status = initial_project_velocities (x);
+  const int least = initial_project_velocities (x);
+  if (status == PW_OK && !(least == PW_OK && change > INITIAL_DEPENDENT * initial_velocity_change (x, &described))) {
+    memcpy (x->value, x->last, bytes);
+    return PW_OK;
+  }
   x->least = initial_changes (x).candidate;
-  return status == PW_OK ? initial_keep (x) : status;
+  return least == PW_OK ? initial_keep (x) : least;
 }
 
 /* Writes the elements whose equations for velocities contradict each other: those that the least squares of all leave

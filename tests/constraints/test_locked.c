@@ -118,6 +118,21 @@ TEST (crossed_wheels_locked) {
   pw_system_free (s);
 }
 
+/* A wheel across the velocity specified.  Its rolling direction has a component of 6e-17 along it, due to round-off. */
+SCENE (locked_across) {
+  pw_add_body (m, &(pw_body){ .name = "cart", .mass = 1, .inertia = 1, .rate = { 3 } });
+  pw_add_wheel (m, &(pw_wheel){ .name = "wheel", .body = "cart", .heading = PW_PI / 2 });
+}
+
+TEST (round_off_allows_no_motion) {
+  pw_error error = { 0 };
+  pw_system *s = scene_system (&locked_across_table, NULL);
+  assert_null (pw_run_open (s, "rk4", NULL, &error));
+  check_error (&error, PW_INITIAL,
+               "model scene: the given velocities would have to be removed entirely: wheel wheel allow no such motion");
+  pw_system_free (s);
+}
+
 /* A body specified at rest, whose wheel is specified to spin: the value that is not 0 is kept. */
 SCENE (locked_spin) {
   pw_add_body (m, &(pw_body){ .name = "cart",

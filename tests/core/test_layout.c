@@ -29,7 +29,7 @@ LAYOUT (pw_configuration, 64);
 LAYOUT (pw_batch, 72);
 LAYOUT (pw_kind, 312);
 LAYOUT (pw_path_place, 88);
-LAYOUT (pw_bounds, 40);
+LAYOUT (pw_bounds, 48);
 
 LAYOUT_AT (pw_error, text, 4);
 LAYOUT_AT (pw_signal, constant, 8);
@@ -133,6 +133,7 @@ LAYOUT_AT (pw_bounds, least, 0);
 LAYOUT_AT (pw_bounds, most, 8);
 LAYOUT_AT (pw_bounds, sliding, 16);
 LAYOUT_AT (pw_bounds, restitution, 32);
+LAYOUT_AT (pw_bounds, initially_slides, 40);
 
 LAYOUT_VALUE (PW_CONSTANT, 0);
 LAYOUT_VALUE (PW_HARMONIC, 1);
