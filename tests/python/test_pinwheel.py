@@ -609,6 +609,20 @@ def test_until():
         model.run("rk4", t_end=1, until="way > 2", error=True)
 
 
+def test_events():
+    """A block of 1 kg at 3 m/s sticks after 1.5 s of a friction of 2 N; at a stop at x = 1 m it rebounds with half its speed."""
+    block = pw.Body("block", mass=1, inertia=1, rate={"vx": 3})
+    friction = {"sliding-friction": "floor", "body": ["block", "ground"], "at": [[0, 0], [0, 0]], "limit": 2}
+    for method in ("erk8", "bdf+projection", "radau"):
+        held, = pw.describe(bodies=[block], elements=[friction]).run(method, t_end=2, rtol=1e-10).events
+        assert abs(held["t"] - 1.5) < 1e-8 and (held["from"], held["to"], held["impulse"]) == ("slides+", "holds", None)
+        assert "floor" in held["reaction"]
+        stop = {"stop": "wall", "body": ["block", "ground"], "what": "x", "high": 1, "sides": "high", "restitution": 0.5}
+        impact, = pw.describe(bodies=[block], elements=[stop]).run(method, t_end=2, rtol=1e-10).events
+        assert abs(impact["t"] - 1 / 3) < 1e-8 and abs(abs(impact["impulse"]) - 4.5) < 1e-8
+    assert pw.describe(bodies=[block], elements=[]).run("rk4", t_end=1).events == []
+
+
 def test_paths():
     """A bead on a circle, a spline through an array of points, swings like a pendulum of its radius."""
     angle = np.linspace(0, 2 * np.pi, 400, endpoint=False)

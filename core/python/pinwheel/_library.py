@@ -159,6 +159,7 @@ pw_settings = _structure(
 pw_statistics = _structure(
     "pw_statistics", steps=c.c_long, rejected=c.c_long, rhs=c.c_long, jacobians=c.c_long, factorisations=c.c_long,
     specialised=c.c_long, position=c.c_double, velocity=c.c_double, g=c.c_double, jv=c.c_double)
+pw_event = _structure("pw_event", t=c.c_double, impulse=c.c_double, row=c.c_int, to=c.c_int, impact=c.c_int, **{"from": c.c_int})
 pw_crossing = _structure("pw_crossing", value=c.c_void_p, context=c.c_void_p)
 pw_initial_report = _structure("pw_initial_report", q_given=_double_p, v_given=_double_p, q=_double_p, v=_double_p)
 pw_parameter = _structure("pw_parameter", name=c.c_char_p, value=c.c_double, unit=c.c_char_p, about=c.c_char_p)
@@ -220,6 +221,8 @@ _declare(core, _p, ("pw_repetition_open", _p, _s, c.POINTER(pw_settings), _p, c.
 _declare(core, _i, ("pw_repetition_run", _p, c.c_long, _e), ("pw_repetition_error", _p, _p, c.c_long, _p, _p, _e))
 _declare(core, None, ("pw_repetition_close", _p))
 _declare(core, _d, ("pw_run_time", _p))
+_declare(core, c.POINTER(pw_event), ("pw_run_events", _p, c.POINTER(_i)))
+_declare(core, _s, ("pw_system_mode_name", _p, _i, _i), ("pw_system_reaction_name", _p, _i, _s, _z))
 _declare(core, _i, ("pw_run_find_crossing", _p, c.POINTER(pw_crossing), _double_p, _e))
 _declare(files, _p, ("pw_condition_open", _p, _s, _e))
 _declare(files, _i, ("pw_condition_needs_ledger", _p))

@@ -32,6 +32,9 @@ class Result:
         Stated errors by column, at the end and the largest of the run, if :meth:`Model.run` was asked for them.
     error_unknown : str
         Why no errors can be stated, or "".
+    events : list of dict
+        Changes of constraint equations whose reactions have limits: t [s], reaction, from, to ("holds", "slides+",
+        "slides-", "free") and, of an impact, impulse [N s, N m s].
     stopped : float or None
         The time at which the condition ``until`` became true [s].
     model : Model or None
@@ -57,6 +60,7 @@ class Result:
         self.error: dict[str, tuple[float, float]] | None = None
         self.error_unknown = ""
         self.stopped: float | None = None
+        self.events: list[dict] = []
         self._column = {name: i for i, name in enumerate(units)}
         self.t = rows[:, 0]
 

@@ -355,7 +355,20 @@ class Simulation:
         result = Result(rows.used, groups, units, status, reason, self._statistics(run), self.model,
                         {"method": self.method, "t_end": t_end, **self._given})
         result.changed = self.changed
+        result.events = self._events(run)
         return result
+
+    def _events(self, run):
+        """The changes of equations whose reactions have limits, up to the time reached."""
+        count, s = c.c_int(), self._system.pointer
+        events = lib.core.pw_run_events(run, c.byref(count))
+
+        def event(e):
+            mode = [lib.core.pw_system_mode_name(s, e.row, mode).decode() for mode in (getattr(e, "from"), e.to)]
+            return {"t": e.t, "reaction": lib.name_of(lib.core.pw_system_reaction_name, s, e.row), "from": mode[0],
+                    "to": mode[1], "impulse": e.impulse if e.impact else None}
+
+        return [event(events[i]) for i in range(count.value)]
 
     def _state_error(self, result) -> None:
         """Repeats a complete run with a tenth of the tolerance or half the step, and states its errors (repetition.c)."""
