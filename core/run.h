@@ -44,7 +44,7 @@ typedef enum {
   PW_COLUMN_REACTION,
   PW_COLUMN_POSITION, /* scaled residuals of g = 0 and of J v = eta */
   PW_COLUMN_VELOCITY,
-  PW_COLUMN_KINETIC, /* energies; columns from PW_COLUMN_LEDGER on, but not outputs, need pw_settings.ledger */
+  PW_COLUMN_KINETIC, /* energies; columns from PW_COLUMN_LEDGER to PW_COLUMN_BALANCE need pw_settings.ledger */
   PW_COLUMN_POTENTIAL,
   PW_COLUMN_LEDGER, /* works and losses of elements */
   PW_COLUMN_PROJECTION,

@@ -40,7 +40,7 @@ typedef struct {
   pw_column column;
   double value;                           /* set by pw_outcomes_run */
   double t;                               /* time of the extremum so far, or that of PW_AT_TIME [s] */
-  double values[PW_FUNCTIONAL_TIMES + 1]; /* of the column: set by pw_outcomes_read */
+  double values[PW_FUNCTIONAL_TIMES + 1]; /* of the column: set by functional_read */
 } pw_functional;
 
 /* One output. */

@@ -177,8 +177,8 @@ static int build_value (pw_reader *r, const pw_node *node, int i, void *to) {
 
 static int build_field (pw_reader *r, const pw_node *node, const char *element) {
   static const char *const plural[] = { [PW_NUMBER] = "numbers",
-                                        [PW_POINT] = "points, each [x, y],",
-                                        [PW_VECTOR] = "vectors, each [x, y],",
+                                        [PW_POINT] = "points, each [x, y]",
+                                        [PW_VECTOR] = "vectors, each [x, y]",
                                         [PW_BODY] = "bodies",
                                         [PW_SIGNAL] = "signals",
                                         [PW_CHOICE] = "choices",
@@ -193,7 +193,7 @@ static int build_field (pw_reader *r, const pw_node *node, const char *element) 
   if (!world && pw_yaml_list_of (r, node, r->label, count, plural[f->type]) != PW_OK) return r->error->status;
   const pw_node *n = world ? node : node->first;
   if (!world && (f->type == PW_POINT || f->type == PW_VECTOR) && n->type == PW_YAML_SCALAR)
-    return read_fail (r, node->at, "%s: expected %d %s found numbers", r->label, count, plural[f->type]);
+    return read_fail (r, node->at, "%s: expected %d %s, found numbers", r->label, count, plural[f->type]);
   for (int i = 0; i < count; i++, to += pw_field_bytes (f->type), n = world ? n : n->next) build_value (r, n, i, to);
   return r->error->status;
 }

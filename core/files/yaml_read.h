@@ -57,7 +57,7 @@ typedef struct {
   pw_names states;              /* names of all first-order states */
   pw_names names;               /* of bodies and elements so far, to their offsets in the source */
   pw_names truth;               /* states in the reference solution so far */
-  pw_names elements; /* of elements so far, or all of this file (state_elements), to the index of their types */
+  pw_names elements; /* of elements so far, or all of this file (pw_index_elements), to the index of their types */
   pw_names contacts; /* names of wheels and markers so far, to the index of their elements */
   struct pw_output_function **output; /* outputs so far */
   pw_names outputs;                   /* their names, to their indices */

@@ -168,7 +168,7 @@ static int signal_add_column (pw_reader *r, const pw_node *node, pw_signal_funct
   if (place) return PW_OK;
   const int found = find_column (r, name, &c);
   if (found && c.type == PW_COLUMN_CONTACT && pw_names_find (&r->contacts, owner) >= 0)
-    return expression_fail (r, node, at, "%sthe name of its body cannot be used in expressions", where);
+    return expression_fail (r, node, at, "%sthe name of the body of %s cannot be used in expressions", where, owner);
   if (found && c.type == PW_COLUMN_CONTACT)
     return expression_fail (r, node, at, "%sdescribe %s before the signals that read its place", where, owner);
   if (found && c.type != PW_COLUMN_STATE && output)
@@ -256,7 +256,7 @@ static int signal_check_continuity (pw_reader *r, const pw_node *node, pw_signal
   const int is_curve = r->kind->of_coordinate;
   double t = is_curve ? -1000 : 0, before[3], after[3];
   if (f->states && f->jumps == PW_JUMPS)
-    return read_fail (r, node->at, "%s: %.60s jumps as states change, and that of a velocity constraint must not",
+    return read_fail (r, node->at, "%s: %.60s jumps as states change, and the signal of a velocity constraint must not",
                       r->label, f->text.jump);
   for (int k = 0; k < MAX_CHECKED_BREAKPOINTS; k++) {
     t = signal_breakpoint (f, t);
@@ -587,12 +587,12 @@ static int output_head (pw_reader *r, const pw_node *node) {
   if (pw_kind_find_column (NULL, own, &(pw_column){ 0 }))
     return read_fail (r, v[0]->at, "output \"%s\": this name is reserved: a column of tables", own);
   if (pw_names_find (&r->scope->index, own) >= 0)
-    return read_fail (r, v[0]->at, "output \"%s\": a parameter or a name of let is called so", own);
+    return read_fail (r, v[0]->at, "output \"%s\": a parameter, number of let or path has this name", own);
   if (v[1] == NULL) return read_fail (r, node->at, "output %s needs a value", own);
   if (v[1]->type != PW_YAML_SCALAR)
     return read_fail (r, v[1]->at, "output %s: expected an expression, found %s", own, pw_node_found (v[1]));
   if (r->output_count == PW_MOST_OUTPUTS)
-    return read_fail (r, node->at, "outputs: a model may have %d", PW_MOST_OUTPUTS);
+    return read_fail (r, node->at, "a model has at most %d outputs", PW_MOST_OUTPUTS);
   o->node = *v[1];
   if ((o->node.text = pw_yaml_renamed (&counter, v[1]->text, r->arena)) == NULL) return read_no_memory (r);
   o->reader = PW_OUTPUT_UNREAD;

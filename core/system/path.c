@@ -305,8 +305,13 @@ double pw_path_break (const pw_path *p, double s) {
   if (!isfinite (s) || (p->closed && !p->is_linear)) return INFINITY;
   if (!p->is_linear) return s < 0 ? 0 : s < p->length ? p->length : INFINITY;
   place at = place_at (p, s);
-  if (at.i + 1 < p->pieces) return p->piece[at.i + 1].s + at.lap * p->length;
-  return p->closed ? (at.lap + 1) * p->length : INFINITY;
+  for (int i = at.i + 1; i < p->pieces; i++) {
+    const double next = p->piece[i].s + at.lap * p->length;
+    if (next > s) return next;
+  }
+  if (!p->closed) return INFINITY;
+  const double lap = (at.lap + 1) * p->length; /* where s is rounded to the end of the lap before, it is s itself */
+  return lap > s ? lap : lap + p->piece[1].s;
 }
 
 /* ---- Nearest places ---- */

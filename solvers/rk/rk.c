@@ -51,6 +51,7 @@ struct pw_method_data {
    * -1: invalid; the time of the last sample inside the step, and the number of samples at increasing times up to it */
   pw_step_start node[RK_NODES];
   int nodes, samples;
+  double nodes_end; /* the end of the step whose nodes were evaluated: an event may have shortened it since then */
   double sampled;
   char *memory;
 };
@@ -514,7 +515,10 @@ static int dense_sample (pw_run *r, double t) {
   d->samples = t > d->sampled ? d->samples + 1 : 1;
   d->sampled = t;
   if (r->fixed_steps || d->samples < DENSE_FIRST) return 0;
-  if (d->nodes == 0) d->nodes = dense_open (r) ? 1 : -1;
+  if (d->nodes == 0 || d->nodes_end != r->t) {
+    d->nodes = dense_open (r) ? 1 : -1;
+    d->nodes_end = r->t;
+  }
   int status = PW_RETRY;
   if (d->nodes > 0) {
     dense_interpolate (r, t);

@@ -478,8 +478,8 @@ static int events_log (pw_run *r) {
   return PW_OK;
 }
 
-/* Decides the modes at the state reached.  jumps: 1 for initial velocities.  *changes: 1 if anything changes. */
-static int events_decide (pw_run *r, int jumps, int *changes, pw_error *error) {
+/* Decides the modes at the state reached.  jumps: 1 for initial velocities. */
+static int events_decide (pw_run *r, int jumps, pw_error *error) {
   pw_events *x = r->events;
   int impacts;
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
@@ -490,7 +490,6 @@ static int events_decide (pw_run *r, int jumps, int *changes, pw_error *error) {
   decide_list (r, x->now, jumps || impacts);
   status = decide_modes (r, error);
   if (status != PW_OK) return status;
-  *changes = impacts || memcmp (x->before, x->mode, (size_t)x->count) != 0;
   x->pending = x->fell = 0;
   memset (x->triggered, 0, (size_t)x->count);
   events_apply (r);
@@ -531,18 +530,21 @@ static int events_leave (pw_run *r, pw_error *error) {
 
 static int events_prepare (pw_run *r, pw_error *error) {
   pw_events *x = r->events;
-  int status = PW_OK, changes = 0;
+  int status = PW_OK;
   if (r->jumped) x->start_t = NAN;
   r->jumped = 0;
   for (int pass = 0; status == PW_OK && (x->pending || x->start_t != r->t); pass++) {
-    if (pass == EVENTS_PASSES)
+    if (pass == EVENTS_PASSES) {
+      int i = 0;
+      while (i < x->count - 1 && !x->triggered[i]) i++;
       return pw_fail (error, PW_METHOD, "t = %.6g s: modes change endlessly: %s", r->t,
-                      PW_NAME (pw_system_row_name, r->s, x->row[0]));
+                      PW_NAME (pw_system_row_name, r->s, x->row[i]));
+    }
     if (x->pending) {
       x->previous_t = NAN, x->longest = EVENTS_FIRST * r->w->scale.time, x->roughness = 0;
       memset (x->armed, 0, (size_t)x->count);
       status = events_project (r, error);
-      if (status == PW_OK) status = events_decide (r, 0, &changes, error);
+      if (status == PW_OK) status = events_decide (r, 0, error);
       r->watchdog.largest_sine = 0;
       if (status == PW_OK) status = pw_run_renew (r, error);
       if (status == PW_OK) pw_run_set_reference_level (r);
@@ -777,11 +779,10 @@ int pw_events_open (pw_run *r, pw_error *error) {
 }
 
 int pw_events_begin (pw_run *r, pw_error *error) {
-  int changes;
   if (r->events == NULL) return PW_OK;
   events_units (r);
   r->events->longest = EVENTS_FIRST * r->w->scale.time;
-  int status = events_decide (r, 1, &changes, error);
+  int status = events_decide (r, 1, error);
   if (status == PW_OK) status = pw_run_open_saddle (r, error);
   if (status == PW_OK) status = pw_run_evaluate (r, error);
   if (status == PW_OK) pw_run_set_references (r);
@@ -793,6 +794,7 @@ void pw_events_serialise (pw_run *r, pw_archive *a) {
   if (x == NULL) return;
   pw_archive_bytes (a, x->mode, (size_t)x->count);
   pw_archive_bytes (a, x->triggered, (size_t)x->count);
+  pw_archive_bytes (a, x->offset, (size_t)x->count * sizeof *x->offset);
   pw_archive_bytes (a, &x->pending, sizeof x->pending);
   pw_archive_bytes (a, &x->fell, sizeof x->fell);
   pw_archive_count (a, &r->event_count);
@@ -803,7 +805,7 @@ void pw_events_serialise (pw_run *r, pw_archive *a) {
   for (int i = 0; i < x->count; i++) {
     const signed char mode = x->mode[i];
     const double given = mode ? events_given (x, i) : 0;
-    a->failed |= mode < -1 || mode > 1 || !isfinite (given);
+    a->failed |= mode < -1 || mode > 1 || !isfinite (given) || !(x->offset[i] >= 0);
   }
   if (a->failed) r->event_count = 0;
   memset (x->armed, 0, (size_t)x->count);

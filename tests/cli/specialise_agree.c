@@ -12,22 +12,25 @@
 static int agree_compare (const char *a, const char *b, double *most) {
   char x[200000], *line = x, *rest, *other;
   const char *text = cli_file (a);
-  int columns = 0;
+  int columns = 0, rows = 0;
   *most = 0;
-  snprintf (x, sizeof x, "%s", text ? text : "");
+  if (text == NULL || strlen (text) >= sizeof x) return 0;
+  snprintf (x, sizeof x, "%s", text);
   const char *y = cli_file (b), *force = strstr (x, " [N");
   for (const char *c = x; *c && *c != '\n' && (force == NULL || c < force); c++) columns += *c == ',';
   while (y && (line = strchr (line, '\n')) != NULL && (y = strchr (y, '\n')) != NULL && line[1]) {
+    rows++;
     for (int i = 0; i < columns; i++, line = rest, y = other) {
       double u = strtod (line + 1, &rest), w = strtod (y + 1, &other);
       if (rest == line + 1 || other == y + 1) return 0;
       *most = fmax (*most, fabs (u - w) / (1 + fabs (u)));
     }
   }
-  return columns > 6;
+  return columns > 6 && rows > 1 && y != NULL && y[1] == 0;
 }
 
-static void agree_by (const char *model, const char *method, double bound) {
+/* 1 if the runs were compared, 0 if both failed alike. */
+static int agree_by (const char *model, const char *method, double bound) {
   char command[900];
   double most;
   const char *t = strcmp (model, "andrews-squeezer") == 0 ? "0.02" : "0.5";
@@ -38,9 +41,11 @@ static void agree_by (const char *model, const char *method, double bound) {
             model, method, t, model, method, t);
   if (cli_run (command) != 0) print_error ("%s, %s: other exit status\n%s", model, method, cli_err);
   assert_true (*cli_out);
-  if (strcmp (cli_out, "0\n") != 0) return;
-  if (!agree_compare ("a.csv", "b.csv", &most) || !(most <= bound)) print_error ("%s, %s: %g\n", model, method, most);
-  assert_true (most <= bound);
+  if (strcmp (cli_out, "0\n") != 0) return 0;
+  const int complete = agree_compare ("a.csv", "b.csv", &most);
+  if (!complete || !(most <= bound)) print_error ("%s, %s: %g\n", model, method, most);
+  assert_true (complete && most <= bound);
+  return 1;
 }
 
 /* A short time, in which round-off does not grow to the bound.  Steps of adaptive methods amplify it up to the errors
@@ -59,5 +64,8 @@ void specialise_agree (const char *model) {
                  { "ida+ggl --rtol 1e-9", 1e-6 },
                  { "galpha", 1e-10 },
                  { "leapfrog", 1e-10 } };
-  for (size_t i = 0; i < sizeof method / sizeof *method; i++) agree_by (model, method[i].name, method[i].bound);
+  int compared = 0;
+  for (size_t i = 0; i < sizeof method / sizeof *method; i++)
+    compared += agree_by (model, method[i].name, method[i].bound);
+  assert_true (compared >= 4);
 }

@@ -351,6 +351,30 @@ TEST (bad_elements) {
   }
 }
 
+/* Samples inside steps that an event has shortened; methods take them from what they know of the whole step. */
+TEST (samples_of_shortened_steps) {
+  pw_system *s = events_system ("sleigh", "");
+  char method[40];
+  pw_error error = { 0 };
+  for (int i = 0; runs_method (i, method); i++) {
+    const pw_method *m = runs_method (i, method);
+    pw_run *exact = runs_open (s, "rk4", &(pw_settings){ .step = 1e-3 });
+    pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-9 });
+    const double bound = strcmp (method, "galpha") == 0 || m->order == 2 ? 1e-4 : 1e-5;
+    for (int k = 1; k <= 4000; k++) {
+      pw_sample x, y;
+      while (pw_run_time (r) < 1e-3 * k) check_ok (pw_run_advance (r, 4, &error), &error);
+      check_ok (pw_run_sample (r, 1e-3 * k, &x, &error), &error);
+      y = runs_to (exact, 1e-3 * k);
+      for (int j = 0; j < 3; j++) check_close (method, x.q[j], y.q[j], bound, "the method's error");
+      for (int j = 0; j < 3; j++) check_close (method, x.v[j], y.v[j], bound, "the method's error");
+    }
+    pw_run_close (exact);
+    pw_run_close (r);
+  }
+  pw_system_free (s);
+}
+
 /* Which of two wheels on an axle slides first is not determined. */
 TEST (dependent) {
   pw_error error = { 0 };
