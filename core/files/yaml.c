@@ -434,13 +434,6 @@ static int include_parameters (pw_reader *r, const pw_yaml *file, const pw_node 
   return r->error->status;
 }
 
-/* Adds a path of an included file to the names of the file that includes it. */
-static int include_path (pw_reader *r, pw_scope *outer, const char *name, pw_path *path) {
-  if (pw_scope_reserve (outer, outer->names + 1, r->arena) != PW_OK) return read_no_memory (r);
-  pw_scope_add_path (outer, name, path);
-  return PW_OK;
-}
-
 /* Builds the lists of an included file in the model. */
 static int include_build (pw_reader *r, pw_yaml *file, const pw_node *set, const char *prefix, const pw_place *place) {
   const pw_reader outer = *r;
@@ -455,7 +448,8 @@ static int include_build (pw_reader *r, pw_yaml *file, const pw_node *set, const
     r->y = file, r->copies = NULL, r->scope = &scope, r->prefix = prefix, r->place = place;
     build_lists (r, value);
     for (int i = 0; i < scope.names && r->error->status == PW_OK; i++) /* expressions of the outer file may use them */
-      if (scope.path[i]) include_path (r, outer.scope, scope.name[i], scope.path[i]);
+      if (scope.path[i] && (i == 0 || scope.path[i] != scope.path[i - 1])) /* not a path's second name */
+        pw_yaml_name_path (r, outer.scope, outer.prefix, scope.name[i], scope.path[i]);
     r->y = outer.y, r->copies = outer.copies, r->scope = outer.scope, r->prefix = outer.prefix, r->place = outer.place,
     r->numbers = outer.numbers;
     r->has_index = 0; /* elements of the outer file come later */

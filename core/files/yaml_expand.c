@@ -156,7 +156,7 @@ static const char *rename_of (const pw_renames *names, const char *name, char to
   if (strchr (name, '.') || pw_names_find (names->states, to) >= 0 || pw_names_find (names->outputs, to) >= 0)
     return to;
   int i = pw_names_find (&names->scope->index, name);
-  return i < 0 ? NULL : pw_print (to, 200, "(%.17g)", names->scope->value[i]);
+  return i < 0 || names->scope->path[i] ? NULL : pw_print (to, 200, "(%.17g)", names->scope->value[i]);
 }
 
 const char *pw_yaml_renamed (const pw_renames *names, const char *text, pw_arena *arena) {

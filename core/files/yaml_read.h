@@ -178,6 +178,8 @@ int pw_build_fail (const pw_reader *r, const pw_node *node, const pw_error *caus
 /* ---- yaml_signal.c ---- */
 
 int pw_yaml_signal (pw_reader *r, const pw_node *node, pw_signal *signal);
+/* Adds a path to the names of a file by its name in the model and, without the prefix, by its name in the file. */
+int pw_yaml_name_path (const pw_reader *r, pw_scope *scope, const char *prefix, const char *name, pw_path *path);
 /* Reads a path, of which the following expressions can use functions. */
 int pw_yaml_path (pw_reader *r, const pw_node *node);
 

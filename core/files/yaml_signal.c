@@ -529,6 +529,14 @@ static pw_path_text *path_add (pw_reader *r) {
   return t->path ? &t->path[t->paths] : NULL;
 }
 
+int pw_yaml_name_path (const pw_reader *r, pw_scope *scope, const char *prefix, const char *name, pw_path *path) {
+  const char *own = name + strlen (prefix);
+  if (pw_scope_reserve (scope, scope->names + 2, r->arena) != PW_OK) return read_no_memory (r);
+  pw_scope_add_path (scope, name, path);
+  if (*prefix && pw_names_find (&scope->index, own) < 0) pw_scope_add_path (scope, own, path);
+  return PW_OK;
+}
+
 int pw_yaml_path (pw_reader *r, const pw_node *node) {
   static const char *const key[] = { "name", "points", "file", "columns", "interpolation", "closed", NULL };
   static const char *const interpolation[] = { [PW_LINEAR] = "linear", [PW_CUBIC] = "cubic", NULL };
@@ -554,10 +562,8 @@ int pw_yaml_path (pw_reader *r, const pw_node *node) {
   pw_path *path = pw_path_open (p.x, p.y, p.count, text->interpolation, text->closed, &cause);
   if (cause.status == PW_INPUT) return read_fail (r, (v[1] ? v[1] : v[2])->at, "%s: %s", label, cause.text);
   if (path == NULL || pw_model_keep (r->model, path, path_free) != PW_OK) return read_no_memory (r);
-  if (pw_scope_reserve (r->scope, r->scope->names + 1, r->arena) != PW_OK) return read_no_memory (r);
-  pw_scope_add_path (r->scope, text->name, path);
   r->reference->paths++;
-  return PW_OK;
+  return pw_yaml_name_path (r, r->scope, r->prefix, text->name, path);
 }
 
 /* ---- Outputs ---- */

@@ -248,3 +248,19 @@ TEST (refused) {
   check_error (&error, PW_INPUT, "the points are missing");
   pw_path_close (NULL);
 }
+
+/* Breaks of a closed polyline in many laps, each found from the one before: all corners, none twice. */
+TEST (breaks_of_laps) {
+  static const double x[] = { 0, 0.3, 0.7, 0.1 }, y[] = { 0, 0.1, 0.9, 1.3 };
+  pw_error error = { 0 };
+  pw_path *p = pw_path_open (x, y, 4, PW_LINEAR, 1, &error);
+  assert_non_null (p);
+  double corner[5] = { 0 };
+  for (int i = 0; i < 4; i++) corner[i + 1] = corner[i] + hypot (x[(i + 1) % 4] - x[i], y[(i + 1) % 4] - y[i]);
+  double s = -10.01 * corner[4];
+  for (int i = 0; i < 80; i++) {
+    s = pw_path_break (p, s);
+    check_close ("corner", s, (i / 4 - 10) * corner[4] + corner[i % 4], 40 * CHECK_EPS, "round-off of 10 laps");
+  }
+  pw_path_close (p);
+}

@@ -278,6 +278,25 @@ TEST (round_trip) {
   check_bits ("velocities", v[0], v[1], 3);
 }
 
+/* Numbers and expressions of an included file use its paths by their names there; those of the outer files with prefixes. */
+TEST (included) {
+  cli_write ("inner.yaml", "pinwheel: 1\npaths: [{name: road, points: [[0, 0], [3, 4], [6, 8]]}]\n"
+                           "bodies: [{name: car, mass: 1, inertia: 1, start: {x: \"road.x (5)\", y: \"road.y (5)\"}}]\n"
+                           "outputs: [{name: way, value: \"road.s (car.x, car.y)\"}]\n");
+  cli_write ("middle.yaml", "pinwheel: 1\ninclude: [{file: inner.yaml, prefix: a_}]\n"
+                            "bodies: [{name: car, mass: 1, inertia: 1, start: {x: \"a_road.x (2.5)\"}}]\n");
+  cli_write ("outer.yaml", "pinwheel: 1\ninclude: [{file: middle.yaml, prefix: b_}]\n"
+                           "bodies: [{name: car, mass: 1, inertia: 1, start: {y: \"b_a_road.y (2.5)\"}}]\n");
+  gallery_scene x = gallery_load (cli_path ("outer.yaml"), NULL);
+  const double *q = pw_system_initial_q (x.system), expected[] = { 3, 4, 0, 1.5, 0, 0, 0, 2, 0 };
+  for (int j = 0; j < 9; j++) check_close ("initial positions", q[j], expected[j], 4 * CHECK_EPS, "round-off");
+  gallery_close (&x);
+  cli_write ("inner.yaml", "pinwheel: 1\npaths: [{name: road, points: [[0, 0], [3, 4]]}]\n"
+                           "bodies: [{name: car, mass: 1, inertia: 1, start: {x: road}}]\n");
+  assert_int_equal (cli_run ("pinwheel check @/outer.yaml"), 2);
+  assert_non_null (strstr (cli_err, "\"road\" is a path"));
+}
+
 /* A run is not resumed after a point of its path, far ahead, has changed. */
 TEST (resume) {
   static const char track[] = "x,y\n0,0\n9,0\n900,0\n";
