@@ -278,7 +278,7 @@ TEST (round_trip) {
   check_bits ("velocities", v[0], v[1], 3);
 }
 
-/* Numbers and expressions of an included file use its paths by their names there; those of the outer files with prefixes. */
+/* Numbers and expressions of an included file use its paths by their names there, outer files by prefixed ones. */
 TEST (included) {
   cli_write ("inner.yaml", "pinwheel: 1\npaths: [{name: road, points: [[0, 0], [3, 4], [6, 8]]}]\n"
                            "bodies: [{name: car, mass: 1, inertia: 1, start: {x: \"road.x (5)\", y: \"road.y (5)\"}}]\n"
