@@ -402,13 +402,12 @@ typedef struct {
 
 /* Stop: a coordinate of a point of body 1, or the angle phi1 - phi2, as of a drive, stays within limits.  Two holonomic
  * constraint equations. */
-enum { PW_STOP_BOTH, PW_STOP_LOW, PW_STOP_HIGH };
 typedef struct {
   const char *name, *body[2]; /* the stopped body and the reference body, or "ground" for one of them */
   double at[2][2];            /* a point in each body's frame [m]; on the ground: in the world */
   int what;                   /* PW_DRIVE_... */
-  double low, high;           /* limits [m] or [rad] */
-  int sides;                  /* PW_STOP_...: which of them exist; the other one is 0 here */
+  double low, high;           /* limits [m] or [rad]; one that is 0 and not specified does not exist */
+  int specified[2];           /* 1: low, high are specified even if 0 */
   double restitution;         /* velocity after an impact over that before it, 0 to 1 */
 } pw_end_stop;
 

@@ -1,5 +1,5 @@
-/* A point of body 1 on a line of body 2: the equation of slot and slider.  A drive subtracts its signal
- * from this g.  sliding-friction, which has no constraint, uses g, G and H of the perpendicular line, whose g is the
+/* A point of body 1 on a line of body 2: the equation of slot and slider.  Drive and stop subtract a value from this g,
+ * or from the angle phi1 - phi2 in its place.  sliding-friction, which has no constraint, uses g, G and H of the perpendicular line, whose g is the
  * position along its own line.
  *
  *   g     = n . D - c = 0,  D = r1 + R(phi1) s1 - r2,  c = n . R(phi2) s2           (1 holonomic equation)
@@ -16,11 +16,11 @@
 #include "batch.h"
 
 typedef struct {
-  double s1[2];            /* the point in body 1's frame [m] */
-  double n[2];             /* normal of the line in body 2's frame */
-  double c;                /* offset of the line along n [m] */
-  double angle;            /* of a slider: phi1 - phi2 [rad] */
-  double prescribes_angle; /* 1 in a drive that prescribes phi1 - phi2, where n and c are 0; else 0 */
+  double s1[2];    /* the point in body 1's frame [m] */
+  double n[2];     /* normal of the line in body 2's frame */
+  double c;        /* offset of the line along n [m] */
+  double angle;    /* of a slider: phi1 - phi2 [rad] */
+  double is_angle; /* 1: phi1 - phi2 takes the place of the position along n, where n and c are 0; else 0 */
 } line;
 
 /* A line in the current state. */
@@ -114,6 +114,50 @@ PER_ELEMENT (line_gamma_v, line, 6) {
   };
   line_multiply_H (&now, -2, v, out);
 }
+
+/* ---- A coordinate of body 1 in the frame of body 2: x or y of a point, or the angle ---- */
+
+/* what: PW_DRIVE_... */
+static inline line line_of_coordinate (const double at[2][2], int what) {
+  line out = { .s1 = { at[0][0], at[0][1] }, .is_angle = what == PW_DRIVE_ANGLE };
+  if (what == PW_DRIVE_ANGLE) return out;
+  out.n[what] = 1;
+  out.c = at[1][what];
+  return out;
+}
+
+PER_ELEMENT (coordinate_g, line, 1) {
+  line_g_one (now, out);
+  *out += now.constants->is_angle * (now.body1->phi - now.body2->phi);
+}
+
+PER_ELEMENT (coordinate_g_size, line, 1) {
+  line_g_size_one (now, out);
+  *out += now.constants->is_angle * (fabs (now.body1->phi) + fabs (now.body2->phi));
+}
+
+PER_ELEMENT (coordinate_J, line, 6) {
+  line_J_one (now, out);
+  out[2] += now.constants->is_angle, out[5] -= now.constants->is_angle;
+}
+
+/* Names of PW_DRIVE_...; the unit of the multiplier. */
+static const char *const coordinate_what[] MAYBE_UNUSED = { "x", "y", "angle", NULL };
+
+MAYBE_UNUSED static const char *coordinate_unit (const void *element, int row) {
+  (void)row;
+  return ((const line *)element)->is_angle != 0 ? "N m" : "N";
+}
+
+/* Fields of a definition: the arguments of line_of_coordinate. */
+#define COORDINATE_FIELDS(type)                                                                                       \
+  { PW_AT (type, at), PW_POINT, .count = 2, .unit = "m",                                                              \
+    .about = "a point in each body's frame; for an angle it serves figures and the length scale only" },              \
+  {                                                                                                                   \
+    PW_AT (type, what), PW_CHOICE, .required = 1, .choices = coordinate_what,                                         \
+                                   .about = "the coordinate, from point 2 to point 1 in the frame of body 2, or the " \
+                                            "relative angle"                                                          \
+  }
 
 /* Fields of a definition: the arguments of line_make. */
 #define LINE_FIELDS(type)                                                                                              \

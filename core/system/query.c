@@ -371,7 +371,7 @@ int pw_system_limited (const pw_system *s) {
 const char *pw_system_mode_name (const pw_system *s, int row, int mode) {
   const pw_bounds *limit = s->limit ? &s->limit[row] : NULL;
   if (mode == 0) return "holds";
-  return limit && (isinf (limit->least) || isinf (limit->most)) ? "free" : mode > 0 ? "slides+" : "slides-";
+  return limit && pw_is_one_sided (limit) ? "free" : mode > 0 ? "slides+" : "slides-";
 }
 
 /* "torque T: value" */

@@ -168,6 +168,16 @@ static inline int pw_is_limited (const pw_system *s, int row) {
   return x && (x->least > -INFINITY || x->most < INFINITY);
 }
 
+/* 1 if one of two limits is infinite: the equation leaves or hits, and does not slide. */
+static inline int pw_is_one_sided (const pw_bounds *x) {
+  return isinf (x->least) || isinf (x->most);
+}
+
+/* 0 if both are 0: the equation never holds, as one of a stop that has no such limit. */
+static inline int pw_can_hold (const pw_bounds *x) {
+  return x->least < 0 || x->most > 0;
+}
+
 /* ---- Columns and outputs ---- */
 
 /* The offset in pw_sample of a column that is one of its numbers. */

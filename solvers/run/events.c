@@ -23,13 +23,23 @@
 #include "rank.h"
 #include "util.h"
 
-#define EVENTS_SMALL 1e-11     /* velocities [units] that count as 0 where modes are decided */
-#define EVENTS_TIGHTER 1e-10   /* by which a limit that is reached is narrowed: round-off must not undo the event */
-#define EVENTS_ROUND_OFF 1e-14 /* of an event function that has been farther from its root */
-#define EVENTS_SLOW 1e-6       /* impacts below this velocity [units] do not bounce: they would accumulate */
-#define EVENTS_FIRST 1e-3      /* longest first step after an event [T] */
-#define EVENTS_BEND 0.1        /* of multipliers in a step [limits], see events_longest */
-enum { EVENTS_PASSES = 10 };   /* most decisions at one instant */
+/* Velocities [units] that count as 0 where modes are decided: a hundred times the error, 1e-13, to which a root of u is
+ * located (events_tolerance), so that friction that has stopped is found at rest. */
+#define EVENTS_SMALL 1e-11
+/* By which a limit that is reached is narrowed: the multiplier of the decision, of a projected state, differs from that
+ * of the sample by round-off, about 1e-12 of the limit, which must not undo the event. */
+#define EVENTS_TIGHTER 1e-10
+#define EVENTS_ROUND_OFF 1e-14 /* of an event function that has been farther from its root: some tens of eps */
+/* Impacts below this velocity [units] do not bounce: the next ones, in sum, would move nothing by more than v^2 /
+ * acceleration, 1e-12 units. */
+#define EVENTS_SLOW 1e-6
+/* Longest first step after an event [T]: before it neither an error nor a bend of multipliers is known, and 1e-3 T
+ * resolves what the scene's own time scale does. */
+#define EVENTS_FIRST 1e-3
+/* Of multipliers in a step [limits]: the parabolas by which roots are suspected then err by less than the distance of a
+ * typical multiplier from its limit (events_longest). */
+#define EVENTS_BEND 0.1
+enum { EVENTS_PASSES = 10 }; /* most decisions at one instant: each but the first follows from a root at that instant */
 
 typedef struct pw_events {
   int count;                            /* equations with limits; arrays of this length, unless said otherwise */
@@ -114,7 +124,7 @@ static void events_apply (pw_run *r) {
   int off = 0;
   for (int i = 0; i < r->s->rows; i++) {
     const pw_bounds *limit = &r->s->limit[i];
-    x->enforced[i] = limit->least < 0 || limit->most > 0;
+    x->enforced[i] = pw_can_hold (limit);
     r->reaction[i] = 0;
     off |= !x->enforced[i];
   }
@@ -387,7 +397,7 @@ static int decide_impacts (pw_run *r, const double *g, int *any, pw_error *error
   events_u (r, r->v, 0, x->u_before);
   for (int i = 0; i < x->count; i++) {
     const double u = x->u_before[i] / x->unit[i];
-    const int one_sided = isinf (x->limit[i].least) || isinf (x->limit[i].most);
+    const int one_sided = pw_is_one_sided (&x->limit[i]);
     const int hits = x->mode[i] && x->mode[i] * u < -EVENTS_SMALL;
     x->impulse[i] = 0, x->rests[i] = 0;
     if (!one_sided || events_open (r, i, g[i]) || (x->mode[i] && x->mode[i] * u > EVENTS_SMALL)) continue;
@@ -696,7 +706,7 @@ static void events_initial (pw_run *r) {
   events_units (r);
   events_u (r, r->v, 1, x->u);
   for (int i = 0; i < x->count; i++) {
-    const int one_sided = isinf (x->limit[i].least) || isinf (x->limit[i].most);
+    const int one_sided = pw_is_one_sided (&x->limit[i]);
     const signed char off = events_off (x, i, 0);
     x->mode[i] = one_sided && (!(x->row[i] < r->s->holonomic) || off * x->u[i] >= -EVENTS_SMALL * x->unit[i]) ? off : 0;
     if (x->limit[i].initially_slides) x->mode[i] = 1;
@@ -749,7 +759,7 @@ static int events_initial_sliding (pw_run *r, pw_error *error) {
   events_u (r, r->v, 0, x->u_before);
   for (int i = 0; i < x->count; i++) {
     pw_error own = { 0 };
-    if (isinf (x->limit[i].least) || isinf (x->limit[i].most) || x->limit[i].initially_slides) continue;
+    if (pw_is_one_sided (&x->limit[i]) || x->limit[i].initially_slides) continue;
     x->mode[i] = 0;
     status = events_slides (x, i) ? events_consistent (r, &own) : PW_OK;
     if (status == PW_STOPPED || status == PW_RESOURCE) return pw_fail (error, status, "%s", own.text);
@@ -766,8 +776,7 @@ int pw_events_open (pw_run *r, pw_error *error) {
   if (events_allocate (r) != PW_OK) return pw_fail_memory (s, error);
   pw_events *x = r->events;
   for (int i = 0; i < s->rows; i++)
-    if (pw_is_limited (s, i) && (s->limit[i].least < 0 || s->limit[i].most > 0))
-      x->row[x->count] = i, x->limit[x->count++] = s->limit[i];
+    if (pw_is_limited (s, i) && pw_can_hold (&s->limit[i])) x->row[x->count] = i, x->limit[x->count++] = s->limit[i];
   x->start_t = x->previous_t = NAN;
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   events_initial (r);

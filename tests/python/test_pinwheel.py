@@ -617,7 +617,7 @@ def test_events():
         held, = pw.describe(bodies=[block], elements=[friction]).run(method, t_end=2, rtol=1e-10).events
         assert abs(held["t"] - 1.5) < 1e-8 and (held["from"], held["to"], held["impulse"]) == ("slides+", "holds", None)
         assert "floor" in held["reaction"]
-        stop = {"stop": "wall", "body": ["block", "ground"], "what": "x", "high": 1, "sides": "high", "restitution": 0.5}
+        stop = {"stop": "wall", "body": ["block", "ground"], "what": "x", "high": 1, "restitution": 0.5}
         impact, = pw.describe(bodies=[block], elements=[stop]).run(method, t_end=2, rtol=1e-10).events
         assert abs(impact["t"] - 1 / 3) < 1e-8 and abs(abs(impact["impulse"]) - 4.5) < 1e-8
     assert pw.describe(bodies=[block], elements=[]).run("rk4", t_end=1).events == []

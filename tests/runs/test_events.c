@@ -331,7 +331,7 @@ SCENE (events_bad) {
   if (strcmp (events_wrong, "smooth") == 0) friction.speed = 0.1;
   if (strcmp (events_wrong, "smooth") == 0 || strcmp (events_wrong, "friction") == 0) pw_add_friction (m, &friction);
   pw_end_stop stop = { .name = "S", .body = { both[0], both[1] }, .what = PW_DRIVE_ANGLE, .low = 1, .high = 1 };
-  if (strcmp (events_wrong, "side") == 0) stop.sides = PW_STOP_LOW;
+  if (strcmp (events_wrong, "side") == 0) stop.low = stop.high = 0;
   if (strcmp (events_wrong, "side") == 0 || strcmp (events_wrong, "stop") == 0) pw_add_end_stop (m, &stop);
 }
 
@@ -342,8 +342,8 @@ TEST (bad_elements) {
     { "grip", "model scene: wheel W: grip_sliding = 3: expected at most the grip, 2" },
     { "friction", "model scene: friction F: limit_sliding = 2: expected at most the limit, 1" },
     { "smooth", "model scene: friction F: limit_sliding = 2: expected 0, unless friction is exact: a limit, no speed" },
-    { "stop", "model scene: stop S: low = 1, high = 1: expected low < high, or sides: low or high" },
-    { "side", "model scene: stop S: high = 1 with sides: low: expected no such limit" },
+    { "stop", "model scene: stop S: low = 1, high = 1: expected low < high" },
+    { "side", "model scene: stop S: neither low nor high is given: expected one or both" },
   };
   for (size_t i = 0; i < sizeof of / sizeof *of; i++) {
     events_wrong = of[i].wrong;

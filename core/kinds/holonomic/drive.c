@@ -22,22 +22,17 @@ static inline drive_state drive_at (const pw_batch *batch, int e) {
 }
 
 PREPARE (drive_prepare, pw_drive, line) {
-  *element = (line){ .s1 = { definition->at[0][0], definition->at[0][1] },
-                     .prescribes_angle = definition->what == PW_DRIVE_ANGLE };
-  if (definition->what == PW_DRIVE_ANGLE) return PW_OK;
-  element->n[definition->what] = 1;
-  element->c = definition->at[1][definition->what];
+  *element = line_of_coordinate (definition->at, definition->what);
   return PW_OK;
 }
 
 PER_ELEMENT (drive_g, drive, 1) {
-  line_g_one (now.line, out);
-  *out = *out + now.line.constants->prescribes_angle * (now.line.body1->phi - now.line.body2->phi) - now.u[0];
+  coordinate_g_one (now.line, out);
+  *out -= now.u[0];
 }
 
 PER_ELEMENT (drive_g_size, drive, 1) {
-  line_g_size_one (now.line, out);
-  *out += now.line.constants->prescribes_angle * (fabs (now.line.body1->phi) + fabs (now.line.body2->phi));
+  coordinate_g_size_one (now.line, out);
   *out += fabs (now.u[0]);
 }
 
@@ -45,34 +40,19 @@ static void drive_eta (const pw_batch *batch, double *out) {
   for (int e = 0; e < batch->count; e++) out[e] = batch->u[3 * e + 1];
 }
 
-PER_ELEMENT (drive_J, line, 6) {
-  line_J_one (now, out);
-  out[2] += now.constants->prescribes_angle, out[5] -= now.constants->prescribes_angle;
-}
-
 PER_ELEMENT (drive_gamma, drive, 1) {
   line_gamma_one (now.line, out);
   *out += now.u[2];
 }
 
-static const char *const drive_what[] = { "x", "y", "angle", NULL };
-
 static const pw_field drive_fields[] = {
   { PW_AT (pw_drive, body), PW_BODY, .count = 2, .required = 1,
     .about = "the driven body and the reference body; one may be ground" },
-  { PW_AT (pw_drive, at), PW_POINT, .count = 2, .unit = "m",
-    .about = "a point in each body's frame; for an angle it serves figures and the length scale only" },
-  { PW_AT (pw_drive, what), PW_CHOICE, .required = 1, .choices = drive_what,
-    .about = "the coordinate, from point 2 to point 1 in the frame of body 2, or the relative angle" },
+  COORDINATE_FIELDS (pw_drive),
   { PW_AT (pw_drive, value), PW_SIGNAL, .unit = "m or rad", .required = 1,
     .about = "value as a function of time, with two derivatives" },
   { .name = NULL },
 };
-
-static const char *drive_unit (const void *element, int row) {
-  (void)row;
-  return ((const line *)element)->prescribes_angle != 0 ? "N m" : "N";
-}
 
 const pw_kind pw_kind_drive = {
   .name = "drive",
@@ -86,10 +66,10 @@ const pw_kind pw_kind_drive = {
   .signals = 1,
   .level = PW_HOLONOMIC,
   REACTION ("F", "N or N m", "force on the first body at its point along the prescribed coordinate, or moment on it"),
-  .reaction_unit = drive_unit,
+  .reaction_unit = coordinate_unit,
   POSITION (drive),
   .eta = drive_eta,
-  .J = drive_J,
+  .J = coordinate_J,
   .gamma = drive_gamma,
   DERIVATIVES (line),
 };
