@@ -174,7 +174,7 @@ static inline int pw_is_one_sided (const pw_bounds *x) {
 }
 
 /* 0 if both are 0: the equation never holds, as one of a stop that has no such limit. */
-static inline int pw_can_hold (const pw_bounds *x) {
+static inline unsigned char pw_can_hold (const pw_bounds *x) {
   return x->least < 0 || x->most > 0;
 }
 
