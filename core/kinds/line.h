@@ -1,6 +1,6 @@
 /* A point of body 1 on a line of body 2: the equation of slot and slider.  Drive and stop subtract a value from this g,
- * or from the angle phi1 - phi2 in its place.  sliding-friction, which has no constraint, uses g, G and H of the perpendicular line, whose g is the
- * position along its own line.
+ * or from the angle phi1 - phi2 in its place.  sliding-friction, which has no constraint, uses g, G and H of the
+ * perpendicular line, whose g is the position along its own line.
  *
  *   g     = n . D - c = 0,  D = r1 + R(phi1) s1 - r2,  c = n . R(phi2) s2           (1 holonomic equation)
  *   G     = [ n  t.a | -n  -t.D ]             t: along the line, n: t turned by +90 degrees, a = R(phi1) s1
