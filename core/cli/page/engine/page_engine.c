@@ -1,6 +1,7 @@
 /* The engine of interactive pages: models, methods and samples for figures, compiled to WebAssembly.  Its exported
  * functions are called by page.js.  Files are in memory; there is one model at a time. */
 #include <amd.h>
+#include <complex.h>
 #include <errno.h>
 #include <lapacke.h>
 #include <math.h>
@@ -270,12 +271,13 @@ lapack_int LAPACKE_dposv_work (int layout, char uplo, lapack_int n, lapack_int n
   return 0;
 }
 
-/* ---- Factorisation of a sparse matrix (sparse.h) as a dense one, by columns, with partial pivoting ---- */
+/* ---- Factorisation of a sparse matrix (sparse.h) as a dense one, by columns, with partial pivoting.  All numbers are
+ * complex; their real and imaginary parts are those of `value`, of which real matrices have the real ones only. ---- */
 
 int pw_sparse_open (pw_sparse *x, pw_sparse_numbers numbers, int n, int64_t *colptr, int64_t *rowind) {
   *x = (pw_sparse){ .numbers = numbers, .colptr = colptr, .rowind = rowind };
   x->symbolic = calloc (1, sizeof *x->symbolic);
-  x->factors = n <= LIBRARIES_NODES ? calloc ((size_t)n * (size_t)(n + 1) + 1, sizeof (double)) : NULL;
+  x->factors = n <= LIBRARIES_NODES ? calloc ((size_t)n * (size_t)(n + 1) + 1, sizeof (complex double)) : NULL;
   if (x->symbolic) x->symbolic->n = n;
   return x->symbolic && x->factors ? PW_OK : PW_RESOURCE;
 }
@@ -285,20 +287,26 @@ void pw_sparse_close (pw_sparse *x) {
   free (x->factors);
 }
 
+/* Pivots are selected anew in each factorisation. */
+void pw_sparse_forget_pivots (pw_sparse *x) {
+  (void)x;
+}
+
 /* The factors, column by column, and after them the row of each pivot. */
 int pw_sparse_factor (pw_sparse *x, double *value) {
-  const int n = (int)x->symbolic->n;
-  double *a = memset (x->factors, 0, (size_t)n * (size_t)(n + 1) * sizeof (double)), *row = a + n * n;
+  const int n = (int)x->symbolic->n, parts = x->numbers == PW_SPARSE_COMPLEX ? 2 : 1;
+  complex double *a = memset (x->factors, 0, (size_t)n * (size_t)(n + 1) * sizeof *a), *row = a + n * n;
   for (int j = 0; j < n; j++)
-    for (int64_t p = x->colptr[j]; p < x->colptr[j + 1]; p++) a[x->rowind[p] + j * n] = value[p];
+    for (int64_t p = x->colptr[j]; p < x->colptr[j + 1]; p++)
+      a[x->rowind[p] + j * n] = CMPLX (value[parts * p], parts == 2 ? value[2 * p + 1] : 0);
   for (int k = 0; k < n; k++) {
     int best = k;
     for (int i = k + 1; i < n; i++)
-      if (fabs (a[i + k * n]) > fabs (a[best + k * n])) best = i;
-    if (!(fabs (a[best + k * n]) > 0)) return PW_SINGULAR;
+      if (cabs (a[i + k * n]) > cabs (a[best + k * n])) best = i;
+    if (!(cabs (a[best + k * n]) > 0)) return PW_SINGULAR;
     row[k] = best;
     for (int j = 0; j < n; j++) {
-      const double swapped = a[best + j * n];
+      const complex double swapped = a[best + j * n];
       a[best + j * n] = a[k + j * n], a[k + j * n] = swapped;
     }
     for (int i = k + 1; i < n; i++) a[i + k * n] /= a[k + k * n];
@@ -309,18 +317,25 @@ int pw_sparse_factor (pw_sparse *x, double *value) {
 }
 
 int pw_sparse_solve (pw_sparse *x, double *right) {
-  const int n = (int)x->symbolic->n;
-  const double *a = (const double *)x->factors, *row = a + n * n;
+  const int n = (int)x->symbolic->n, parts = x->numbers == PW_SPARSE_COMPLEX ? 2 : 1;
+  const complex double *a = (const complex double *)x->factors, *row = a + n * n;
+  complex double *b = calloc ((size_t)n + 1, sizeof *b);
+  if (b == NULL) return PW_RESOURCE;
+  for (int k = 0; k < n; k++) b[k] = CMPLX (right[parts * k], parts == 2 ? right[2 * k + 1] : 0);
   for (int k = 0; k < n; k++) {
-    const int best = (int)row[k];
-    const double swapped = right[best];
-    right[best] = right[k], right[k] = swapped;
+    const int best = (int)creal (row[k]);
+    const complex double swapped = b[best];
+    b[best] = b[k], b[k] = swapped;
+    for (int i = 0; i < k; i++) b[k] -= a[k + i * n] * b[i];
   }
-  for (int k = 0; k < n; k++)
-    for (int i = k + 1; i < n; i++) right[i] -= a[i + k * n] * right[k];
   for (int k = n - 1; k >= 0; k--) {
-    right[k] /= a[k + k * n];
-    for (int i = 0; i < k; i++) right[i] -= a[i + k * n] * right[k];
+    for (int i = k + 1; i < n; i++) b[k] -= a[k + i * n] * b[i];
+    b[k] /= a[k + k * n];
   }
+  for (int k = 0; k < n; k++) {
+    right[parts * k] = creal (b[k]);
+    if (parts == 2) right[2 * k + 1] = cimag (b[k]);
+  }
+  free (b);
   return PW_OK;
 }
