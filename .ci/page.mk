@@ -3,7 +3,7 @@
 .PHONY: gallery
 
 gallery: all
-	@sh core/cli/page/gallery.sh $(PROGRAM) models $(BUILD)/site
+	@sh core/cli/page/gallery.sh $(PROGRAM) models docs/figures $(BUILD)/site
 
 # Only if the tools to compile it are installed; builds in $(BUILD)/variant do not need it.
 WASM_CC   ?= $(if $(findstring ccache,$(CC)),ccache )clang

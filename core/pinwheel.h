@@ -217,6 +217,14 @@ typedef struct {
   const char *method; /* "rk4+projection", ... */
 } pw_run_defaults;
 
+/* A run that an interactive page offers, such as one at which a method fails.  `settings` are words NAME=VALUE: method,
+ * step, rtol, t_end, a parameter of the model, or start.STATE, the initial value of a state. */
+typedef struct {
+  const char *name;     /* on a button: "drive it" */
+  const char *about;    /* what it shows, in one sentence */
+  const char *settings; /* "method=rk4+none step=0.1 l=2 start.bob.vx=1" */
+} pw_preset;
+
 typedef struct pw_kind pw_kind;
 
 /* What a plug-in exports as `pw_plugin`.  The parameters passed to its functions live as long as the model. */
@@ -227,6 +235,7 @@ typedef struct {
   const pw_parameter *parameters;                      /* ends with a NULL name; may be NULL */
   size_t parameters_size;                              /* sizeof the parameter structure */
   pw_run_defaults run;                                 /* default run settings */
+  const pw_preset *presets;                            /* ends with a NULL name; may be NULL */
   void (*build) (pw_model *m, const void *parameters); /* declares bodies and elements */
 
   /* The reference (exact) solution for the described initial conditions; may be NULL.  Stores the known entries of q

@@ -38,6 +38,15 @@ static void build (pw_model *m, const void *parameter) {
                                   .value = { PW_HARMONIC, .harmonic = { .amplitude = p->M0, .omega = p->omega } } });
 }
 
+static const pw_preset presets[] = {
+  { "drive it", "Twice the torque at the same rhythm: the vehicle goes farther with each swing.", "M0=0.2 t_end=60" },
+  { "break it", "Steps of a quarter of a swing without stabilisation: the pin opens until the run stops.",
+    "method=rk4+none step=0.5" },
+  { "mend it", "The same steps with projection: the pin stays closed; what remains is the error of the steps.",
+    "method=rk4+projection step=0.5" },
+  { .name = NULL },
+};
+
 PW_MODEL (.about = "two-segment ride-on propelled by swinging the steering hinge", .parameters = parameters,
           .parameters_size = sizeof (ezyroller), .run = { .t_end = 100, .step = 1e-3, .method = "rk4+projection" },
-          .build = build);
+          .presets = presets, .build = build);

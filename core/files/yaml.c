@@ -342,9 +342,46 @@ static int head_parameters (pw_yaml *y, const pw_reader *r, const pw_node *list,
   return PW_OK;
 }
 
+/* The settings of a preset as words NAME=VALUE. */
+static int head_settings (pw_yaml *y, const pw_reader *r, const pw_node *map, pw_preset *p) {
+  char text[1000] = "";
+  if (map->type != PW_YAML_MAP)
+    return read_fail (r, map->at, "settings: expected a map {method: .., step: .., NAME: NUMBER, ...}, found %s",
+                      pw_node_found (map));
+  for (const pw_node *n = map->first; n; n = n->next->next) {
+    const char *name, *value;
+    if (pw_yaml_text (r, n, "settings", &name) != PW_OK || pw_yaml_text (r, n->next, name, &value) != PW_OK)
+      return r->error->status;
+    if (strpbrk (name, " =") || strchr (value, ' '))
+      return read_fail (r, n->at, "settings: %s: expected a name and a number or method", name);
+    append (text, "%s%s=%s", *text ? " " : "", name, value);
+  }
+  if (strlen (text) + 1 == sizeof text) return read_fail (r, map->at, "settings: more than %zu bytes", sizeof text - 2);
+  p->settings = pw_arena_copy (&y->arena, text);
+  return p->settings ? PW_OK : read_no_memory (r);
+}
+
+static int head_presets (pw_yaml *y, const pw_reader *r, const pw_node *list) {
+  static const char *const key[] = { "name", "about", "settings", NULL };
+  const pw_node *v[sizeof key / sizeof *key];
+  if (list == NULL || pw_yaml_list (r, list, "presets") != PW_OK) return r->error->status;
+  pw_preset *p = pw_arena_alloc (&y->arena, ((size_t)list->count + 1) * sizeof *p);
+  if (p == NULL) return read_no_memory (r);
+  y->table.presets = p;
+  for (const pw_node *n = list->first; n; n = n->next, p++) {
+    if (pw_yaml_keys (r, n, key, "a preset", v) != PW_OK) return r->error->status;
+    if (v[0] == NULL || v[2] == NULL) return read_fail (r, n->at, "a preset needs a name and settings");
+    p->about = "";
+    pw_yaml_text (r, v[0], "name", &p->name);
+    pw_yaml_text (r, v[1], "about", &p->about);
+    if (head_settings (y, r, v[2], p) != PW_OK) return r->error->status;
+  }
+  return r->error->status;
+}
+
 static int read_head (pw_yaml *y, const pw_reader *r) {
-  static const char *const key[] = { "pinwheel", "about",  "run",     "parameters", "let",   "bodies", "elements",
-                                     "truth",    "states", "include", "outputs",    "paths", NULL };
+  static const char *const key[] = { "pinwheel", "about",  "run",     "parameters", "let",   "bodies",  "elements",
+                                     "truth",    "states", "include", "outputs",    "paths", "presets", NULL };
   static const char *const run_key[] = { "t_end", "step", "rtol", "method", NULL };
   const pw_node *v[sizeof key / sizeof *key], *run[sizeof run_key / sizeof *run_key];
   double *number[] = { &y->table.run.t_end, &y->table.run.step, &y->table.run.rtol };
@@ -370,6 +407,7 @@ static int read_head (pw_yaml *y, const pw_reader *r) {
   size_t count = parameters ? (size_t)parameters->count : 0;
   if (r->error->status == PW_OK && pw_names_open (&names, count) != PW_OK) read_no_memory (r);
   if (r->error->status == PW_OK) head_parameters (y, r, parameters, &names);
+  if (r->error->status == PW_OK) head_presets (y, r, v[12]);
   pw_names_close (&names);
   return r->error->status;
 }

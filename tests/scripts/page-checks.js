@@ -37,9 +37,10 @@ async function checkPlot (change, until) {
     for (const b of colours.slice(0, i)) demand("two methods look alike: " + a + "; " + b, Math.hypot(...a.map((x, k) => x - b[k])) > 40);
 
   let lines = 0; /* from point to point of the last method */
-  const lineTo = g.lineTo, last = page.methods[page.methods.length - 1].name, name = page.parameters[0].name;
+  const lineTo = g.lineTo, last = "erk8+nullspace", name = page.parameters[0].name;
   const colour = methodPen(last).colour;
   g.lineTo = function (x, y) { lines += this.strokeStyle === colour; lineTo.call(this, x, y); };
+  await change("#page-method", last, "change");
   for (const tolerance of [-8, -4, -7, -8]) await estimated("#page-accuracy", tolerance, "input");
   lines = 0;
   plotRuns();
@@ -93,10 +94,69 @@ async function checkWorker (change, until) {
   await until("the reset", () => root.simulated === "yes" && run.method === page.method);
 }
 
+/* A second run beside the first, curves over curves, a step with its stages, the model's own settings. */
+async function checkLesson (change, until) {
+  const root = document.documentElement.dataset, families = () => [...$("which").options].map(o => o.value);
+  const choose = (id, name) => { $(id).value = name; $(id).dispatchEvent(new Event("change", { bubbles: true })); };
+  await change("#page-method", "rk4+none", "change");
+  await change("#page-accuracy", -1.5, "input");
+  $("page-keep").click();
+  const before = csv().split("\n"), first = families().length;
+  await change("#page-method", "radau+ggl", "change");
+  demand("no differences: " + families(), $("which").value.startsWith("distance of A and B") && families().length === first);
+  const rows = [before, csv().split("\n")].map(lines => lines[lines.length - 2].split(",").map(Number));
+  choose("which", "distance of A and B");
+  const apart = chosen()[0].curves[0].at(count - 1), expected = Math.hypot(rows[0][1] - rows[1][1], rows[0][2] - rows[1][2]);
+  demand("a distance at the end of " + apart + ", not " + expected, expected > 0 && Math.abs(apart - expected) < 1e-12);
+  demand("runs begin at different places", chosen()[0].curves[0].at(0) === 0);
+  $("page-swap").click();
+  await until("the other run", () => root.simulated === "yes" && run.method === "rk4+none");
+  demand("B is not the former A: " + $("page-kept").textContent, $("page-kept").textContent.includes("radau+ggl"));
+  $("page-drop").click();
+  demand("differences of one run", families().length === first - 3);
+  choose("which", "angular velocity");
+  choose("over", "angle");
+  const box = $("curves").getBoundingClientRect(), i = Math.floor(count / 3), [x, y] = pixelsOf(0, i);
+  $("curves").dispatchEvent(new PointerEvent("pointerdown", { clientX: box.left + x, clientY: box.top + y, pointerId: 1 }));
+  demand("a point of a phase plot has another time: " + state.t, run.motion[6 * nearest(state.t) * bodies + 5] === run.motion[6 * i * bodies + 5]);
+  choose("over", "time");
+
+  $("page-step").click();
+  $("page-step-size").value = Math.log10(0.05);
+  $("page-step-size").dispatchEvent(new Event("input", { bubbles: true }));
+  seek(0.52);
+  await until("a step", () => oneStep && oneStep.h === 0.05 && !stepping);
+  const h = 0.05, m = oneStep.motion, at = (i, k) => m[6 * i * bodies + k];
+  demand("a step from " + oneStep.t[0], Math.abs(oneStep.t[0] - 0.5) < 1e-9 && Math.abs(oneStep.t[4] - 0.55) < 1e-9);
+  for (let b = 0; b < bodies; b++)
+    for (let k = 6 * b; k < 6 * b + 3; k++) {
+      demand("stage 2 is not half a step along stage 1", Math.abs(at(1, k) - at(0, k) - h / 2 * at(0, k + 3)) < 1e-13);
+      const mean = at(0, k) + h / 6 * (at(0, k + 3) + 2 * at(1, k + 3) + 2 * at(2, k + 3) + at(3, k + 3));
+      demand("the result is not the mean of the stages", Math.abs(at(4, k) - mean) < 1e-12);
+    }
+  const whole = await engine.call("run", { ...engineSettings(settings), method: "rk4+projection", step: h, end: 0.55 }, usualRun);
+  for (let k = 0; k < 6 * bodies; k++)
+    demand("the projected state is not that of a run", Math.abs(at(5, k) - whole.motion[whole.motion.length - 6 * bodies + k]) < 1e-9);
+  $("page-step-next").click();
+  await until("the next step", () => oneStep && Math.abs(oneStep.t[0] - 0.55) < 1e-9);
+  $("page-step").click();
+
+  for (const button of $("page-presets").children) {
+    root.simulated = "";
+    button.click();
+    await until("the run of " + button.textContent, () => root.simulated === "yes");
+    demand("its settings are not in the address", location.hash.length > 1 && $("page-preset").textContent === button.title);
+  }
+  demand("the model offers no runs", $("page-presets").children.length > 0);
+  $("page-reset").click();
+  await until("the reset", () => root.simulated === "yes" && run.method === page.method);
+}
+
 /* In a frame as wide as a phone: the verdict on sliders, picture and help. */
 async function checkPhone () {
   const wrong = [], sliders = [...document.querySelectorAll("input[type=range]")], box = item => item.getBoundingClientRect();
   for (const details of document.querySelectorAll("details")) details.open = true;
+  if ($("page-step")) $("page-step").click();
   for (const slider of sliders) {
     slider.scrollIntoView({ block: "nearest" });
     await later(20);

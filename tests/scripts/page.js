@@ -38,6 +38,7 @@
     if (!page.methods.some(m => m.name === "erk8+nullspace")) throw new Error("a method is missing");
     if (window.checkPlot) await checkPlot(change, until);
     if (window.checkWorker) await checkWorker(change, until);
+    if (window.checkLesson) await checkLesson(change, until);
     await change("#page-method", "erk5+projection", "change");
     await change("#page-accuracy", "-9", "input");
     await change('#parameters input[type=number][data-name="' + wanted.name + '"]', wanted.value, "change");

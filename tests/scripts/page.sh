@@ -25,7 +25,7 @@ hold='<script>{ const hold = document.createElement("iframe"); hold.hidden = tru
 
 # show PAGE: its verdict in $work/verdict, messages in $work/console
 show () {
-  timeout 120 "$browser" --headless --no-sandbox --disable-gpu --user-data-dir="$work/profile" --window-size=1200,800 \
+  timeout 300 "$browser" --headless --no-sandbox --disable-gpu --user-data-dir="$work/profile" --window-size=1200,800 \
     --enable-logging=stderr --v=0 --dump-dom "file://$1" >"$work/dom" 2>"$work/messages"
   grep ':CONSOLE' "$work/messages" >"$work/console"
   sed -n '/<pre id="verdict">/,/<\/pre>/p' "$work/dom" | sed 's/.*<pre id="verdict">//; s/<[^>]*>//g' >"$work/verdict"
@@ -189,8 +189,12 @@ for model in alone "$work/alone/alone.so" "$(dirname "$pinwheel")/models/ezyroll
   report "a compiled model without its source, or one by its path, is refused: ${model##*/}" $?
 done
 "$pinwheel" page snakeboard --method ida+ggl -o "$work/x.html" 2>"$work/log"
-[ $? = 2 ] && grep -q 'pages have rk4, erk5 and erk8' "$work/log" && [ ! -e "$work/x.html" ]
+[ $? = 2 ] && grep -q 'pages have rk4, erk5, erk8, radau' "$work/log" && [ ! -e "$work/x.html" ]
 report 'a method that pages do not have is refused' $?
+sed 's/trim: 0.1/trom: 0.1/' models/snakeboard.yaml >"$work/preset.yaml"
+"$pinwheel" page "$work/preset.yaml" -o "$work/x.html" 2>"$work/log"
+[ $? = 2 ] && grep -q 'preset "drive it": no setting or parameter "trom"; did you mean "trim"' "$work/log" && [ ! -e "$work/x.html" ]
+report 'an unknown name in a preset is refused, with the nearest one' $?
 "$pinwheel" page snakeboard -o "$work/x.pdf" 2>"$work/log"
 [ $? = 2 ] && grep -q 'ends in .html' "$work/log"
 report 'a name without .html is an error' $?

@@ -1,8 +1,8 @@
 #!/bin/sh
-# Writes an interactive page for every model of the gallery, and an index of them.
+# Writes an interactive page for every model of the gallery, and an index of them with pictures.
 #
-#   gallery.sh PROGRAM MODELS DIRECTORY
-program=$1 models=$2 site=$3
+#   gallery.sh PROGRAM MODELS FIGURES DIRECTORY
+program=$1 models=$2 figures=$3 site=$4
 set -e
 mkdir -p "$site"
 escape () { sed 's/&/\&amp;/g; s/</\&lt;/g; s/>/\&gt;/g'; }
@@ -13,12 +13,17 @@ escape () { sed 's/&/\&amp;/g; s/</\&lt;/g; s/>/\&gt;/g'; }
 <head>
 <meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1">
-<meta http-equiv="Content-Security-Policy" content="default-src 'none'; style-src 'unsafe-inline'">
+<meta http-equiv="Content-Security-Policy" content="default-src 'none'; style-src 'unsafe-inline'; img-src 'self' file:">
 <title>Pinwheel: gallery</title>
 <style>
 :root { color-scheme: light dark; }
-body { font: 16px/1.5 system-ui, "DejaVu Sans", sans-serif; max-width: 44rem; margin: 2rem auto; padding: 0 1rem; }
-li { margin: .4rem 0; }
+body { font: 16px/1.5 system-ui, "DejaVu Sans", sans-serif; max-width: 70rem; margin: 2rem auto; padding: 0 1rem; }
+ul { display: grid; grid-template-columns: repeat(auto-fill, minmax(15rem, 1fr)); gap: 1rem; list-style: none; padding: 0; }
+li { border: 1px solid #8886; border-radius: 8px; overflow: hidden; }
+li a { display: block; padding: 0 .8rem .8rem; color: inherit; text-decoration: none; height: 100%; }
+li a:hover strong, li a:focus-visible strong { text-decoration: underline; }
+img { width: calc(100% + 1.6rem); height: 11rem; margin: 0 -.8rem .5rem; object-fit: contain; background: #fff; display: block; }
+strong { display: block; }
 </style>
 </head>
 <body>
@@ -30,7 +35,10 @@ END
     name=${file%.*} path=$models/$file
     "$program" page "$path" -o "$site/$name.html" >&2
     about=$("$program" show "$path" | head -n 1 | escape)
-    echo "<li><a href=\"$name.html\">$name</a>: ${about#*: }</li>"
+    picture=$figures/gallery-$name.png
+    [ -f "$picture" ] || picture=$figures/$name-mechanism.png
+    cp "$picture" "$site/$name.png"
+    echo "<li><a href=\"$name.html\"><img src=\"$name.png\" alt=\"\" loading=\"lazy\"><strong>$name</strong>${about#*: }</a></li>"
   done
   echo '</ul>'
   echo '</body>'

@@ -1,5 +1,6 @@
 /* The command `page`: an interactive page, which simulates a model in the browser.  It consists of animate.html with
  * the panel page.html, the script page.js, the model, and the engine: integrators compiled to WebAssembly. */
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -10,6 +11,7 @@
 
 /* Integrators in the engine, which has no SUNDIALS. */
 static const char *const page_integrators[] = { "rk4", "erk5", "erk8", "radau", "galpha", "leapfrog", NULL };
+#define PAGE_METHODS "rk4, erk5, erk8, radau, galpha and leapfrog"
 #define PAGE_INTEGRATOR "erk8" /* in place of one of the model with fixed steps, which takes longer */
 #define PAGE_METHOD PAGE_INTEGRATOR "+projection" /* in place of a method that has options or that the engine lacks */
 
@@ -73,6 +75,9 @@ static void page_script (FILE *f, const void *context) {
                    pw_system_state_hidden (s, i) ? "" : PW_NAME (pw_system_state_name, s, i),
                    pw_system_state_unit (s, i), i < n ? q[i] : v[i - n], given);
   }
+  pw_json_print (j, "], presets: [");
+  for (const pw_preset *p = pw_model_table (cmd->line.m.model)->presets; p && p->name; p++)
+    pw_json_print (j, "{name: %s, about: %s, settings: %s}", p->name, p->about ? p->about : "", p->settings);
   pw_json_print (j, "], files: {");
   for (int i = 0; i < cmd->content.files; i++) page_file_json (j, &cmd->content.file[i], cmd->base64);
   pw_json_print (j, "}}");
@@ -89,8 +94,7 @@ static int page_choose_method (page *cmd, pw_error *error) {
   const char *wanted = cmd->line.method ? cmd->line.method : cmd->line.m.defaults.method;
   if (pw_method_parse (wanted, &m, &stabilisation, error) != PW_OK) return error->status;
   int available = page_has_method (m);
-  if (!available && cmd->line.method)
-    return pw_fail (error, PW_INPUT, "--method %s: pages have rk4, erk5 and erk8", wanted);
+  if (!available && cmd->line.method) return pw_fail (error, PW_INPUT, "--method %s: pages have " PAGE_METHODS, wanted);
   int options = strchr (wanted, ':') != NULL;
   if (options && cmd->line.method)
     return pw_fail (error, PW_INPUT, "--method %s: methods of pages have no options", wanted);
@@ -100,6 +104,42 @@ static int page_choose_method (page *cmd, pw_error *error) {
               m->stabilisations[stabilisation].name);
   else
     strcpy (cmd->method, PAGE_METHOD);
+  return PW_OK;
+}
+
+/* Checks a word of a preset's settings, NAME=VALUE. */
+static int page_check_word (const page *cmd, char *word, pw_error *error) {
+  static const char *const setting[] = { "step", "rtol", "t_end", NULL };
+  const pw_method *m;
+  int stabilisation;
+  char hint[PW_HINT], *value = strchr (word, '='), *end;
+  if (value == NULL) return pw_fail (error, PW_INPUT, "%s: expected NAME=VALUE", word);
+  *value++ = 0;
+  if (strcmp (word, "method") == 0) {
+    if (pw_method_parse (value, &m, &stabilisation, error) != PW_OK) return error->status;
+    if (page_has_method (m) && strchr (value, ':') == NULL) return PW_OK;
+    return pw_fail (error, PW_INPUT, "method=%s: pages have " PAGE_METHODS ", without options", value);
+  }
+  const double x = strtod (value, &end);
+  if (end == value || *end || !isfinite (x)) return pw_fail (error, PW_INPUT, "%s=%s: expected a number", word, value);
+  if (strncmp (word, "start.", 6) == 0)
+    return pw_system_find_state (cmd->line.m.system, word + 6, error) >= 0 ? PW_OK : PW_INPUT;
+  if (pw_find_name (setting, sizeof *setting, word, hint) >= 0) return PW_OK;
+  const pw_parameter *parameters = pw_model_table (cmd->line.m.model)->parameters;
+  if (pw_find_name (parameters, sizeof *parameters, word, hint) >= 0) return PW_OK;
+  return pw_fail (error, PW_INPUT, "no setting or parameter \"%s\"%s", word, hint);
+}
+
+static int page_check_presets (const page *cmd, pw_error *error) {
+  for (const pw_preset *p = pw_model_table (cmd->line.m.model)->presets; p && p->name; p++) {
+    pw_error cause = { 0 };
+    char *text = strdup (p->settings), *rest = NULL;
+    if (text == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+    for (char *word = strtok_r (text, " ", &rest); word && cause.status == PW_OK; word = strtok_r (NULL, " ", &rest))
+      page_check_word (cmd, word, &cause);
+    free (text);
+    if (cause.status != PW_OK) return pw_fail (error, PW_INPUT, "preset \"%s\": %s", p->name, cause.text);
+  }
   return PW_OK;
 }
 
@@ -124,6 +164,7 @@ static int page_open (page *cmd, pw_error *error) {
   if (status == PW_OK) status = pw_cli_check_uses (&cmd->line, use, 2, error);
   if (status == PW_OK) status = pw_cli_settings (&cmd->line, &cmd->line.m.defaults, &cmd->settings, &cmd->limit, error);
   if (status == PW_OK) status = page_choose_method (cmd, error);
+  if (status == PW_OK) status = page_check_presets (cmd, error);
   if (status == PW_OK) status = pw_page_open (&cmd->content, cmd->line.m.file, error);
   if (status != PW_OK) return status;
   size_t longest = 0;
@@ -152,10 +193,10 @@ static const struct poptOption page_options[] = {
   PW_TEXT_OPTION (page, path, "output", 'o', "FILE.html", "The page to write"),
   PW_MODEL_OPTIONS,
   PW_OPTION_GROUP ("Integration"),
-  PW_TEXT_OPTION (pw_cli_line, method, "method", 'm', "METHOD", "rk4, erk5 or erk8, and the stabilisation"),
+  PW_TEXT_OPTION (pw_cli_line, method, "method", 'm', "METHOD", PAGE_METHODS ", with a stabilisation"),
   PW_TEXT_OPTION (pw_cli_line, t_end, "t-end", 't', "T", "Final time [s]"),
-  PW_TEXT_OPTION (pw_cli_line, step, "step", 0, "H", "Step size of rk4 [s]"),
-  PW_TEXT_OPTION (pw_cli_line, rtol, "rtol", 0, "R", "Relative tolerance of erk5 and erk8"),
+  PW_TEXT_OPTION (pw_cli_line, step, "step", 0, "H", "Step size of methods with fixed steps [s]"),
+  PW_TEXT_OPTION (pw_cli_line, rtol, "rtol", 0, "R", "Relative tolerance of the others"),
   POPT_TABLEEND
 };
 
@@ -164,8 +205,8 @@ const pw_command pw_cli_page = {
   .synopsis = "MODEL -o FILE.html [OPTION...]",
   .summary = "write a page that simulates the model in the browser",
   .help =
-      "Write one file that needs no network and no server: the model, the integrators rk4, erk5 and erk8, sliders "
-      "for parameters, initial values, tolerance and final time, the animation, curves, and the error at the "
+      "Write one file that needs no network and no server: the model, the integrators " PAGE_METHODS ", "
+      "sliders for parameters, initial values, tolerance and final time, the animation, curves, and the error at the "
       "end next to the cost. The options set what the page begins with; erk8 takes the place of a model's rk4. A model "
       "in C is compiled from its source to WebAssembly by clang.",
   .options_size = sizeof (page),

@@ -54,20 +54,35 @@ class Engine {
   error () { return this.read(this.wasm.error()); }
   numbers (at, count) { return new Float64Array(this.wasm.memory.buffer, at, count); }
 
-  /* Integrates with { method, step, rtol, end, parameters, initial: [[state, value]] } for at most `limit` ms; returns the
-   * computing time [ms] and the reason of a failure, or "". */
-  integrate (s, limit, keepSamples) {
-    const wasm = this.wasm, method = this.text(s.method);
-    const parameters = wasm.allocate(8 * s.parameters.length), initial = wasm.allocate(16 * s.initial.length);
+  /* Calls begin() with the addresses of the parameters, the initial values and their number; returns the computing time
+   * [ms] and the reason of a failure, or "".  s: { method, step, rtol, end, parameters, initial: [[state, value]] }. */
+  timed (s, begin) {
+    const wasm = this.wasm, parameters = wasm.allocate(8 * s.parameters.length), initial = wasm.allocate(16 * s.initial.length);
     const view = new DataView(wasm.memory.buffer, initial); /* after the allocations, which may replace the buffer */
     this.numbers(parameters, s.parameters.length).set(s.parameters);
     /* a pw_initial_value has 16 bytes: the state at 0, the value at 8 */
     s.initial.forEach(([state, value], i) => { view.setInt32(16 * i, state, true); view.setFloat64(16 * i + 8, value, true); });
     const before = performance.now();
-    const status = wasm.run(method, s.step, s.rtol, s.end, limit, keepSamples, parameters, initial, s.initial.length);
+    const status = begin(parameters, initial, s.initial.length);
     const ms = performance.now() - before;
-    for (const at of [method, parameters, initial]) wasm.release(at);
+    for (const at of [parameters, initial]) wasm.release(at);
     return { ms, reason: status === 0 ? "" : this.error() };
+  }
+
+  /* Integrates with settings for at most `limit` ms. */
+  integrate (s, limit, keepSamples) {
+    const method = this.text(s.method);
+    const result = this.timed(s, (...data) => this.wasm.run(method, s.step, s.rtol, s.end, limit, keepSamples, ...data));
+    this.wasm.release(method);
+    return result;
+  }
+
+  /* The step by rk4+projection with the size h [s] of which t is a part: its samples are four stages, the result before the
+   * projection and after it. */
+  step (s, h, t, limit) {
+    const { reason } = this.timed(s, (...data) => this.wasm.step(h, t, limit, ...data)), scene = this.scene();
+    if (reason) throw new Error(reason);
+    return this.arrays(scene);
   }
 
   /* The least of three computing times, without samples [ms]. */
@@ -81,7 +96,7 @@ class Engine {
     if (tooLarge) throw new Error(tooLarge.name + " is too large for a page, which takes at most 200; use the program");
     const { ms, reason } = this.integrate(s, limit, 1), scene = this.scene();
     if (!scene || scene.samples < 2) throw new Error(reason || "the run has no samples");
-    return { ...scene, ...this.arrays(scene), model: this.page.name, about: this.page.about, method: s.method, reason, ms };
+    return { ...scene, ...this.arrays(scene), model: this.page.name, about: this.page.about, method: s.method, link: s.link, reason, ms };
   }
 
   /* Shapes, number and width of samples, and statistics of the last run; null without one. */
@@ -302,6 +317,18 @@ function fillPanel () {
   fillAccuracy();
 }
 
+/* The buttons of the runs that the model offers. */
+function fillPresets () {
+  $("presets").hidden = page.presets.length === 0;
+  $("page-presets").replaceChildren(...page.presets.map(({ name, about, settings }) => {
+    const button = Object.assign(document.createElement("button"), { type: "button", textContent: name, title: about });
+    const link = new URLSearchParams(settings.split(" ").map(word => word.split("=")).map(([key, value]) =>
+      [["step", "rtol"].includes(key) ? "accuracy" : key, value]));
+    button.addEventListener("click", () => { $("page-preset").textContent = about; use(link.toString()); });
+    return button;
+  }));
+}
+
 function fillAccuracy () {
   const adaptive = byName(settings.method).adaptive;
   $("page-accuracy-name").textContent = adaptive ? "Tolerance" : "Step size [s]";
@@ -356,8 +383,9 @@ async function showRun (change) {
     return;
   }
   const t = state.t;
-  if (run) { load(result); key(); seek(t); } else begin(result);
-  showCost(result, null);
+  oneStep = null; /* of other settings */
+  if (run) { load(result); fillFamilies(); key(); seek(t); } else begin(result);
+  showCost(result, result.reason ? undefined : null);
   showValues();
   if (change !== changes) return;
   if (!document.querySelector("#panel input:active")) setAddress();
@@ -435,9 +463,10 @@ function showValues () {
   fillTable("page-values", run.bodies.flatMap((body, b) => placement(b, at).map((x, k) => [body.name + [".x", ".y", ".phi"][k], x.toPrecision(10)])));
 }
 
-/* One colour for each method: warm ones for rk4, greens for erk5, blues for erk8; dashes by stabilisation. */
+/* One colour for each method; dashes by stabilisation. */
 const methodColours = ["#7a4f2a", "#cc6622", "#e0556a", "#b08a00", "#808080", "#2299bb", "#228833", "#66a61e",
-  "#5b45c8", "#d35fc6", "#3a74b4", "#aa3377"];
+  "#5b45c8", "#d35fc6", "#3a74b4", "#aa3377",
+  "#b01020", "#ff8c5a", "#d04a00", "#00a88f", "#57c7c0", "#8a7bd8"];
 function methodPen (method) {
   const i = page.methods.findIndex(m => m.name === method);
   return { colour: methodColours[i % methodColours.length], dash: dashes[i % dashes.length], sign: dashSigns[i % dashes.length] };
@@ -496,6 +525,118 @@ function fillRunKey (curves) {
   }));
 }
 
+/* ---- Another run, B, beside the one that is shown, A ---- */
+
+let kept = null; /* B: a run and its settings as `link`; null: none */
+
+const nameOf = (method, link) => [method, link.replace(/&?method=[^&]*/, "").replace(/^&/, "").replaceAll("&", ", ")].filter(Boolean).join(", ");
+/* B has the same bodies: with other counts in the model they cannot be compared. */
+const comparable = () => kept && kept.motion.length / kept.t.length === run.motion.length / run.t.length;
+
+function keep (other) {
+  kept = other;
+  $("page-kept").textContent = kept ? "B: " + nameOf(kept.method, kept.link) : "";
+  $("page-swap").hidden = $("page-drop").hidden = !kept;
+  families = allFamilies();
+  fillFamilies();
+  if (kept && comparable()) $("which").value = moreFamilies()[0].name;
+  key();
+  draw();
+}
+
+/* The differences of both runs at the samples of A; those of B are at the same times, or interpolated. */
+function differences () {
+  if (!comparable()) return [];
+  const places = [...run.t].map(t => place(Math.min(t, kept.t[kept.t.length - 1]), kept));
+  const apart = (b, i) => placement(b, places[i], kept).map((x, k) => run.motion[6 * (i * bodies + b) + k] - x);
+  const distance = (b, i) => Math.hypot(...apart(b, i).slice(0, 2)), each = at => run.bodies.slice(0, 8).map((body, b) => ({ name: body.name, at: i => at(b, i) }));
+  return [{ name: "distance of A and B, power of ten", unit: "m", curves: each((b, i) => Math.log10(Math.max(distance(b, i), 1e-17))) },
+    { name: "distance of A and B", unit: "m", curves: each(distance) }, { name: "angle of A less that of B", unit: "rad", curves: each((b, i) => apart(b, i)[2]) }];
+}
+
+function drawKept (g, s, X, Y) {
+  if (!comparable()) return;
+  const at = place(state.t, kept);
+  g.globalAlpha = 0.7;
+  drawBodies(g, X, Y, run.bodies.map((body, b) => placement(b, at, kept)), colours.trace);
+  g.globalAlpha = 1;
+  g.font = "12px system-ui, sans-serif";
+  g.fillStyle = colours.body;
+  g.fillText("A: " + nameOf(run.method, run.link), 40, s.height - 36);
+  g.fillStyle = colours.trace;
+  g.fillText("B: " + nameOf(kept.method, kept.link), 40, s.height - 20);
+}
+
+/* ---- One step of rk4+projection ---- */
+
+let oneStep = null;   /* the samples of Engine.step, of the time shown; null: not asked for, or not yet known */
+let stepping = false; /* one is being computed */
+const stepOn = () => $("page-step").getAttribute("aria-pressed") === "true";
+const stepSize = () => Number(Math.pow(10, Number($("page-step-size").value)).toPrecision(2));
+
+/* The step around the time shown, if it is not yet known. */
+async function findStep () {
+  if (stepping || !engine || (oneStep && oneStep.h === stepSize() && oneStep.t[0] <= state.t && state.t < oneStep.t[4])) return;
+  const t = state.t, h = stepSize();
+  stepping = true;
+  try {
+    oneStep = { ...await engine.call("step", engineSettings(settings), h, t, usualRun), h };
+    $("page-step-error").textContent = "";
+  } catch (error) {
+    oneStep = null;
+    if (error !== interrupted) $("page-step-error").textContent = error.message;
+  }
+  stepping = false;
+  showStep();
+  draw();
+}
+
+/* x, y, phi of each body in sample i of the step, and their changes by the projection. */
+const placesOfStep = i => run.bodies.map((body, b) => [0, 1, 2].map(k => oneStep.motion[6 * (i * bodies + b) + k]));
+const motionOfStep = (from, to) => placesOfStep(to).map((p, b) => p.map((x, k) => x - placesOfStep(from)[b][k]));
+const corrections = () => motionOfStep(4, 5);
+
+function showStep () {
+  if (!oneStep) return fillTable("page-step-values", []);
+  const all = corrections(), most = list => Math.max(...list.map(c => Math.hypot(c[0], c[1])));
+  fillTable("page-step-values", [["from t [s]", number(oneStep.t[0], 1e-6)], ["to t [s]", number(oneStep.t[4], 1e-6)],
+    ["largest motion of a body [m]", rounded(most(motionOfStep(0, 5)))],
+    ["largest correction of a position [m]", rounded(most(all))],
+    ["largest correction of an angle [rad]", rounded(Math.max(...all.map(c => Math.abs(c[2]))))]]);
+}
+
+const stepNames = ["stage 1: the state reached", "stage 2: half a step along stage 1", "stage 3: half a step along stage 2",
+  "stage 4: a step along stage 3", "result: the mean of the stages", "projected onto the constraints"];
+function drawStep (g, s, X, Y) {
+  findStep();
+  if (!oneStep) return;
+  g.font = "12px system-ui, sans-serif";
+  stepNames.forEach((name, i) => {
+    const colour = i < 4 ? palette[i] : i === 4 ? colours.force : colours.ink;
+    g.globalAlpha = i < 4 ? 0.55 : 1;
+    drawBodies(g, X, Y, placesOfStep(i), colour);
+    g.globalAlpha = 1;
+    g.fillText(name, 40, s.height - 20 - 16 * (stepNames.length - i));
+  });
+  drawCorrections(g, s, X, Y);
+}
+
+/* The corrections of centres of mass as arrows, magnified by a power of ten so that they are visible. */
+function drawCorrections (g, s, X, Y) {
+  const all = corrections(), most = Math.max(...all.map(c => Math.hypot(c[0], c[1])));
+  if (!(most * view.scale > 1e-14 * s.width)) return g.fillText("the projection changes no position", 40, s.height - 20);
+  const power = Math.floor(Math.log10(60 / (most * view.scale))), factor = Math.pow(10, Math.max(0, power));
+  g.strokeStyle = g.fillStyle = colours.force;
+  g.lineWidth = 2;
+  g.setLineDash([3, 2]);
+  all.forEach((c, b) => {
+    const [x, y] = placesOfStep(4)[b];
+    strokePath(g, [[X(x), Y(y)], [X(x + factor * c[0]), Y(y + factor * c[1])]]);
+  });
+  g.setLineDash([]);
+  g.fillText("dashed: corrections of positions" + (power > 0 ? ", 10" + raised(power) + " times as long" : ""), 40, s.height - 20);
+}
+
 /* ---- Links, files, controls ---- */
 
 /* What differs from the page's own settings, as in "method=rk4+projection&a=0.7&start.frame.x=1". */
@@ -541,7 +682,13 @@ function csv () {
   return lines.join("\n") + "\n";
 }
 
+function showStepSize () { $("page-step-value").textContent = number(stepSize(), stepSize() / 100) + " s"; }
+
 function addListeners () {
+  $("page-step-size").min = Math.floor(Math.log10(page.t_end)) - 6;
+  $("page-step-size").max = Math.floor(Math.log10(page.t_end)) - 0.5;
+  $("page-step-size").value = Math.log10(Math.min(100 * page.step, page.t_end / 20));
+  showStepSize();
   $("page-method").addEventListener("change", e => { settings.method = e.target.value; settings.accuracy = null; fillAccuracy(); simulate(); });
   $("page-accuracy").addEventListener("input", e => {
     settings.accuracy = Number(Math.pow(10, Number(e.target.value)).toPrecision(3));
@@ -561,6 +708,17 @@ function addListeners () {
       $("page-copied").textContent = "copy the address of this page";
     }
   });
+  $("page-keep").addEventListener("click", () => run && keep({ ...run }));
+  $("page-drop").addEventListener("click", () => keep(null));
+  $("page-swap").addEventListener("click", () => { const { link } = kept; keep({ ...run }); use(link); });
+  $("page-step").addEventListener("click", () => {
+    $("page-step").setAttribute("aria-pressed", !stepOn());
+    $("page-step-box").hidden = !stepOn();
+    draw();
+  });
+  $("page-step-size").addEventListener("input", () => { showStepSize(); draw(); });
+  $("page-step-next").addEventListener("click", () => seek(oneStep ? oneStep.t[4] : state.t + stepSize()));
+  $("page-step-back").addEventListener("click", () => seek(oneStep ? Math.max(0, oneStep.t[0] - stepSize() / 2) : state.t));
   $("values").addEventListener("toggle", showValues);
   $("scrub").addEventListener("input", showValues);
   window.addEventListener("resize", plotRuns);
@@ -573,7 +731,11 @@ async function start_page (data) {
   $("model").textContent = page.name;
   $("about").textContent = page.about;
   readLink(location.hash.slice(1));
+  moreFamilies = differences;
+  overlay = (...where) => stepOn() ? drawStep(...where) : drawKept(...where);
+  instead = () => stepOn() && oneStep ? placesOfStep(5) : null;
   fillPanel();
+  fillPresets();
   addListeners();
   if (typeof WebAssembly !== "object") {
     $("reason").textContent = "This page simulates with WebAssembly, which this browser does not have or has switched off.";

@@ -9,7 +9,7 @@
 #include <string.h>
 #include "plot.h"
 #include "yaml.h"
-#include "pinwheel.h"
+#include "pinwheel-method.h"
 #include "sparse.h"
 
 #define PAGE_EXPORT(name) __attribute__ ((export_name (#name)))
@@ -143,28 +143,88 @@ static int page_integrate (pw_run *r, double t_end) {
   return status;
 }
 
-/* Runs the model with the parameters and initial values given, for at most `limit` ms of computing time.  0, or a
- * negative status with the error set; the samples so far are kept.  With keep_samples 0 it only integrates, to be
- * timed. */
+/* Opens a run of the model with the parameters and initial values given, for at most `limit` ms of computing time. */
+static pw_run *page_run_open (const char *method, double limit, pw_settings settings, int forces,
+                              const double *parameter) {
+  if (page_compile (parameter) != PW_OK) return NULL;
+  page_deadline = pw_page_now () + limit;
+  settings.stop = page_is_late;
+  if (settings.ledger) page_plots = pw_plots_open (NULL, forces, page_model, page_system, settings.span, &page_error);
+  return page_error.status == PW_OK ? pw_run_open (page_system, method, &settings, &page_error) : NULL;
+}
+
+/* Integrates.  0, or a negative status with the error set; the samples so far are kept.  With keep_samples 0 it only
+ * integrates, to be timed. */
 PAGE_EXPORT (run)
 int page_run (const char *method, double step, double rtol, double t_end, double limit, int keep_samples,
               const double *parameter, const pw_initial_value *initial, int initials) {
-  if (page_compile (parameter) != PW_OK) return page_error.status;
-  page_deadline = pw_page_now () + limit;
-  const pw_settings settings = { .span = t_end,
-                                 .step = step,
-                                 .rtol = rtol,
-                                 .ledger = keep_samples,
-                                 .stop = page_is_late,
-                                 .initial = initial,
-                                 .initials = initials };
-  if (keep_samples) page_plots = pw_plots_open (NULL, 1, page_model, page_system, t_end, &page_error);
-  pw_run *r = page_error.status == PW_OK ? pw_run_open (page_system, method, &settings, &page_error) : NULL;
+  const pw_settings settings = {
+    .span = t_end, .step = step, .rtol = rtol, .ledger = keep_samples, .initial = initial, .initials = initials
+  };
+  pw_run *r = page_run_open (method, limit, settings, 1, parameter);
   int status = r ? page_integrate (r, t_end) : page_error.status;
   if (status == PW_STOPPED)
     status = pw_fail (&page_error, PW_METHOD,
                       "stopped at t = %.4g s, after %g s of computation; a larger step or tolerance is faster",
                       pw_run_time (r), limit / 1000);
+  pw_run_close (r);
+  return status;
+}
+
+/* ---- One step, as the page shows it ---- */
+
+enum { STAGES = 4 };
+
+/* Adds samples of a step h of rk4 from the state reached: the states of its four stages, then its result. */
+static int page_stages (pw_run *r, double h, double *memory) {
+  static const double node[STAGES] = { 0, 0.5, 0.5, 1 }, weight[STAGES] = { 1, 2, 2, 1 }; /* Kutta 1901 */
+  const pw_reached x = pw_run_state (r);
+  const size_t n = (size_t)pw_system_coordinates (x.system);
+  double *q = memory, *v = q + n, *a = v + n, *q_end = a + n, *v_end = q_end + n, *lambda = v_end + n;
+  memcpy (q_end, x.q, n * sizeof *q);
+  memcpy (v_end, x.v, n * sizeof *v);
+  for (int i = 0; i < STAGES; i++) {
+    for (size_t j = 0; j < n; j++) {
+      q[j] = x.q[j] + node[i] * h * v[j]; /* v, a: of the stage before */
+      v[j] = x.v[j] + node[i] * h * a[j];
+    }
+    const double t = pw_stage_time (r, x.t + node[i] * h);
+    if (pw_run_accelerate (r, t, q, v, a, lambda) != PW_OK)
+      return pw_fail (&page_error, PW_METHOD, "stage %d of the step has no accelerations", i + 1);
+    for (size_t j = 0; j < n; j++) q_end[j] += h / 6 * weight[i] * v[j], v_end[j] += h / 6 * weight[i] * a[j];
+    pw_plots_add (page_plots, &(pw_sample){ .t = t, .q = q, .v = v });
+  }
+  pw_plots_add (page_plots, &(pw_sample){ .t = x.t + h, .q = q_end, .v = v_end });
+  return PW_OK;
+}
+
+/* Runs by rk4+projection until a step of which `t` is a part.  Its samples: four stages, the result before the
+ * projection and after it.  As page_run. */
+PAGE_EXPORT (step)
+int page_step (double step, double t, double limit, const double *parameter, const pw_initial_value *initial,
+               int initials) {
+  const pw_settings settings = {
+    .span = t + 3 * step, .step = step, .ledger = 1, .initial = initial, .initials = initials
+  };
+  pw_run *r = page_run_open ("rk4+projection", limit, settings, 0, parameter);
+  int status = r ? PW_OK : page_error.status;
+  double h = step;
+  for (; status == PW_OK; status = pw_run_advance (r, settings.span, &page_error)) {
+    const pw_reached x = pw_run_state (r);
+    h = fmin (step, x.breakpoint > x.t ? x.breakpoint - x.t : step);
+    if (x.t + h > t) break;
+  }
+  double *memory =
+      r ? calloc ((size_t)(5 * pw_system_coordinates (page_system) + pw_system_rows (page_system)) + 1, sizeof *memory)
+        : NULL;
+  if (status == PW_OK)
+    status = memory ? page_stages (r, h, memory) : pw_fail (&page_error, PW_RESOURCE, "out of memory");
+  if (status == PW_OK) status = pw_run_advance (r, settings.span, &page_error);
+  pw_sample sample;
+  if (status == PW_OK) status = pw_run_sample (r, pw_run_time (r), &sample, &page_error);
+  if (status == PW_OK) pw_plots_add (page_plots, &sample);
+  if (status == PW_STOPPED) status = pw_fail (&page_error, PW_METHOD, "the steps before this one take too long");
+  free (memory);
   pw_run_close (r);
   return status;
 }
