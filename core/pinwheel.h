@@ -105,6 +105,9 @@ typedef struct {
   void *(*open) (void *context);
   void (*close) (void *context); /* frees a context made by open; may be NULL */
   const pw_signal_text *text;    /* NULL unless it comes from a text model */
+  /* Bounds of value[0] for all times from lo[0] to hi[0] and states x from lo + 1 to hi + 1: least and largest value,
+   * infinite if unknown.  Steps are then short enough to see what is narrow.  May be NULL. */
+  void (*range) (void *context, const double *lo, const double *hi, double bounds[2]);
 } pw_function;
 
 /* offset + amplitude cos (omega t + phase) */

@@ -108,7 +108,10 @@ struct pw_run {
   pw_event *event;               /* events so far: `event_count` of them */
   long event_count;
   size_t event_room;
-  int jumped; /* 1: multipliers may have jumped at a discontinuity since the last step */
+  struct pw_resolution *resolution; /* of signals that change within less than a step (resolution.h); NULL: none */
+  int predicted;                    /* 0: the state has changed since it was used to look ahead */
+  double resolved_until;            /* time until which fixed steps resolve them */
+  int jumped;                       /* 1: multipliers may have jumped at a discontinuity since the last step */
   int (*advance) (struct pw_run *r, double t_end, pw_error *error); /* the method's, or with events */
   int forces;                  /* 0: constant ones alone; 1: others, too; PW_FORCES_AT_LIMITS */
   int redundant_drive;         /* 1: one of them has an eta, or some are not enforced: work depends on multipliers */

@@ -140,6 +140,9 @@ typedef struct {
  * of smooth functions all where a parabola describes it over a sixteenth of the step. Errors: as pw_run_sample. */
 int pw_run_find_crossing (pw_run *r, pw_crossing *x, double *t, pw_error *error);
 
+/* Writes a signal that fixed steps did not resolve, "torque T: value", or "", to the buffer and returns it. */
+char *pw_run_unresolved (const pw_run *r, char *signal, size_t size);
+
 /* Energy defect of a sample, including energy added by projections, relative to the energy that the run has
  * exchanged: the largest of its kinetic energy, the change of its potential energy, and the kinetic energy of moving
  * by L and 1 rad in the span of the run.  If that is zero, relative to the larger of work and loss. */

@@ -100,6 +100,12 @@ void pw_expression_derivatives (const pw_expression *expression, const double *v
  * variables, and kinks at the end of a function's domain, as of sqrt (t^2). */
 double pw_expression_breakpoint (const pw_expression *expression, double t);
 
+/* Bounds of the value for all values of the variables between lo and hi, infinite if they are unknown. */
+void pw_expression_bounds (const pw_expression *expression, int variables, const double *lo, const double *hi,
+                           double bounds[2]);
+/* Whether the value may change much within a small range of its variables: not a polynomial of low degree. */
+int pw_expression_may_be_narrow (const pw_expression *expression);
+
 /* ---- Words ---- */
 
 /* Whether a text has the form of a name: a letter or _, then letters, digits and _, at most 63 bytes. */

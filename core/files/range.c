@@ -345,9 +345,10 @@ static pw_range range_apply (const pw_expression_code *c, const pw_range *x, int
   return r;
 }
 
-/* Evaluates operations on a stack; returns its top.  noisy may be NULL. */
-static pw_range *range_run (const pw_expression_code *code, int codes, const unsigned char *noisy, double lo, double hi,
-                            pw_range *top) {
+/* Evaluates operations on a stack; returns its top.  noisy may be NULL.  variable: ranges of the first `known`
+ * variables; the others are states of which nothing is known. */
+static pw_range *range_run (const pw_expression_code *code, int codes, const unsigned char *noisy,
+                            const pw_range *variable, int known, pw_range *top) {
   for (const pw_expression_code *c = code, *end = c + codes; c < end; c++) {
     int operands = pw_expression_operands (c->op), operands_break = 0;
     top -= operands;
@@ -357,8 +358,7 @@ static pw_range *range_run (const pw_expression_code *code, int codes, const uns
     else if (c->op == PW_OP_CONSTANT)
       *top = range_constant (c->value);
     else
-      *top = c->index == PW_EXPRESSION_TIME ? range_between (lo, hi)
-                                            : (pw_range){ .lo = -DBL_MAX, .hi = DBL_MAX, .of_states = 1 };
+      *top = c->index < known ? variable[c->index] : (pw_range){ .lo = -DBL_MAX, .hi = DBL_MAX, .of_states = 1 };
     if (noisy && noisy[c - code]) top->breaks &= operands_break;
     top++;
   }
@@ -366,8 +366,30 @@ static pw_range *range_run (const pw_expression_code *code, int codes, const uns
 }
 
 pw_range pw_expression_range (const pw_expression *expression, const unsigned char *noisy, double lo, double hi) {
-  pw_range stack[PW_EXPRESSION_STACK];
-  return range_run (expression->code, expression->codes, noisy, lo, hi, stack)[-1];
+  pw_range stack[PW_EXPRESSION_STACK], time = range_between (lo, hi);
+  return range_run (expression->code, expression->codes, noisy, &time, 1, stack)[-1];
+}
+
+void pw_expression_bounds (const pw_expression *expression, int variables, const double *lo, const double *hi,
+                           double bounds[2]) {
+  pw_range stack[PW_EXPRESSION_STACK], variable[PW_EXPRESSION_VARIABLES];
+  for (int i = 0; i < variables; i++) variable[i] = range_between (lo[i], hi[i]);
+  const pw_range r = range_run (expression->code, expression->codes, NULL, variable, variables, stack)[-1];
+  const int unknown = r.lo > r.hi || r.of_states || r.nan;
+  bounds[0] = unknown ? -INFINITY : r.lo, bounds[1] = unknown ? INFINITY : r.hi;
+}
+
+int pw_expression_may_be_narrow (const pw_expression *expression) {
+  for (int i = 0; i < expression->codes; i++) {
+    const pw_expression_code *c = &expression->code[i];
+    const int constant = i > 0 && c[-1].op == PW_OP_CONSTANT; /* the last operand */
+    if (c->op == PW_OP_TAN || c->op == PW_OP_FUNCTION_OF_ONE || c->op == PW_OP_FUNCTION_OF_TWO ||
+        c->op == PW_OP_ATAN2 || c->op == PW_OP_HYPOT)
+      return 1;
+    if ((c->op == PW_OP_DIVIDE && !constant) || (c->op == PW_OP_POWER && !(constant && fabs (c[-1].value - 2) <= 1)))
+      return 1;
+  }
+  return 0;
 }
 
 pw_jumps pw_expression_may_jump (const pw_expression_code *code, int codes) {
@@ -380,7 +402,7 @@ pw_jumps pw_expression_may_jump (const pw_expression_code *code, int codes) {
                                            : PW_JUMPS_NEVER;
   if (last->op == PW_OP_PATH_AT && (last->index < PW_PATH_HEADING || pw_path_is_smooth (last->path)))
     return last->index == PW_PATH_CURVATURE ? PW_JUMPS_RARELY : PW_JUMPS_NEVER; /* at the ends of an open path */
-  const pw_range *top = range_run (code, codes - 1, NULL, -DBL_MAX, DBL_MAX, stack);
+  const pw_range time = range_between (-DBL_MAX, DBL_MAX), *top = range_run (code, codes - 1, NULL, &time, 1, stack);
   if (!pw_expression_jumps (last->op) || !range_result (last, top - operands, operands).breaks) return PW_JUMPS_NEVER;
   return last->op == PW_OP_ATAN2 ? PW_JUMPS_RARELY : PW_JUMPS;
 }

@@ -49,6 +49,11 @@ static double signal_breakpoint (void *context, double t) {
   return first;
 }
 
+static void signal_range (void *context, const double *lo, const double *hi, double bounds[2]) {
+  const pw_signal_function *f = context;
+  pw_expression_bounds (f->expression[0], 1 + f->states, lo, hi, bounds);
+}
+
 static void *signal_open (void *context) {
   const pw_signal_function *f = context;
   size_t bytes[3] = { 0 };
@@ -295,6 +300,7 @@ static int signal_of_time (pw_reader *r, const pw_node *const node[3], pw_signal
     if (node[i] == NULL) continue;
     if (signal_expression (r, node[i], f, i) != PW_OK) return r->error->status;
     if (f->expression[i]->breaks) signal->function.breakpoint = signal_breakpoint;
+    if (i == 0 && pw_expression_may_be_narrow (f->expression[0])) signal->function.range = signal_range;
     if (i > 0 && f->derivatives && f->states)
       return read_fail (r, node[i]->at, "%s: a %s belongs to an expression of the time alone", r->label, key[i]);
     if (i > 0 && !f->states && signal_check_derivative (r, node[i], f, i, key[i]) != PW_OK) return r->error->status;
@@ -603,7 +609,7 @@ static int output_head (pw_reader *r, const pw_node *node) {
   if ((o->node.text = pw_yaml_renamed (&counter, v[1]->text, r->arena)) == NULL) return read_no_memory (r);
   o->reader = PW_OUTPUT_UNREAD;
   o->function.name[0] = "t";
-  o->output.value = (pw_function){ signal_eval, o, NULL, NULL, signal_open, signal_close, &o->function.text };
+  o->output.value = (pw_function){ signal_eval, o, NULL, NULL, signal_open, signal_close, &o->function.text, NULL };
   pw_names_add (&r->outputs, o->output.name, r->output_count);
   r->output[r->output_count++] = o;
   if (pw_yaml_si_unit (r, v[2], &o->output.unit) != PW_OK) return r->error->status;

@@ -151,6 +151,20 @@ static double table_breakpoint (const pw_signal *s, int kinks, double t) {
   return s->table.t[in_spline && !kinks ? n - 1 : next];
 }
 
+/* Bounds of a cubic table between two times: of its pieces by their control points as Bezier curves (de Boor 2001). */
+static void table_bounds (const pw_signal *s, const double *spline, double a, double b, double bounds[2]) {
+  double before[3], after[3];
+  bounds[0] = INFINITY, bounds[1] = -INFINITY;
+  for (int i = table_passed (s, a); a < b; i++) {
+    const double end = i < s->table.count ? fmin (s->table.t[i], b) : b, third = (end - a) / 3;
+    table_eval (s, spline, a, before);
+    table_eval (s, spline, nextafter (end, -INFINITY), after); /* at the last point the slope before it */
+    const double y[] = { before[0], before[0] + third * before[1], after[0] - third * after[1], after[0] };
+    for (int k = 0; k < 4; k++) bounds[0] = fmin (bounds[0], y[k]), bounds[1] = fmax (bounds[1], y[k]);
+    a = end;
+  }
+}
+
 /* ---- All signals ---- */
 
 /* Fails if a number that is needed is not finite, or no value is stored: a callback in another language that ends
@@ -200,6 +214,20 @@ int pw_signal_eval (const pw_source *source, double t) {
     break;
   }
   return 0;
+}
+
+int pw_signal_is_bounded (const pw_source *source) {
+  const pw_signal *s = &source->signal;
+  if (s->type == PW_TABLE) return s->table.interpolation == PW_CUBIC;
+  return s->type == PW_FUNCTION && s->function.range && !source->of_coordinate;
+}
+
+void pw_signal_bounds (const pw_source *source, const double *lo, const double *hi, double bounds[2]) {
+  const pw_signal *s = &source->signal;
+  if (s->type == PW_TABLE)
+    table_bounds (s, source->spline, *lo, *hi, bounds);
+  else
+    s->function.range (s->function.context, lo, hi, bounds);
 }
 
 double pw_signal_breakpoint (const pw_signal *s, int kinks, double t) {

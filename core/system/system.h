@@ -202,6 +202,12 @@ int pw_signal_eval (const pw_source *source, double t);
  * kink, at the points of a cubic table.  Of a function signal, what its breakpoint function returns. */
 double pw_signal_breakpoint (const pw_signal *s, int kinks, double t);
 
+/* 1 if bounds of the value over a time are known, and it is not linear between breakpoints. */
+int pw_signal_is_bounded (const pw_source *source);
+/* These bounds: least and largest value for times from lo[0] to hi[0] and the states that it reads from lo + 1 to
+ * hi + 1; infinite if unknown. */
+void pw_signal_bounds (const pw_source *source, const double *lo, const double *hi, double bounds[2]);
+
 /* 1 if the value may jump: that of a pulse; that of a function, of which this is not known. */
 static inline int pw_signal_value_may_jump (const pw_signal *s) {
   return s->type == PW_PULSE || s->type == PW_FUNCTION;

@@ -954,8 +954,8 @@ static int several_possible (const pw_run *r) {
     return 0;
   if (d->projects && (d->every > 1 || d->projector.owns_velocity)) return 0;
   return pw_specialised_suits (r) && r->redundant == 0 && r->alpha + r->beta == 0 && !r->settings.ledger &&
-         !r->interrupted && r->stalled == 0 && !(r->watchdog.saddle && r->watchdog.singular_ahead) &&
-         r->statistics.steps >= PW_CHECK_INTERVAL;
+         !r->interrupted && (r->resolution == NULL || r->predicted) && r->stalled == 0 &&
+         !(r->watchdog.saddle && r->watchdog.singular_ahead) && r->statistics.steps >= PW_CHECK_INTERVAL;
 }
 
 /* The number of whole steps that can be taken at once: up to t_end and the next breakpoint, with the tolerance of
@@ -963,7 +963,7 @@ static int several_possible (const pw_run *r) {
  * (run.c).  Each must be twice as long as a step that counts as stalled (run.c). */
 static int several_count (const pw_run *r, double t, double t_end) {
   const pw_method_data *d = r->data;
-  const double h = r->settings.step, stop = fmin (t_end, r->breakpoint) - PW_STEP_LONGER * h,
+  const double h = r->settings.step, stop = fmin (fmin (t_end, r->breakpoint), r->resolved_until) - PW_STEP_LONGER * h,
                shortest = 128 * DBL_EPSILON;
   int most = PW_CHECK_INTERVAL - (int)(r->statistics.steps % PW_CHECK_INTERVAL), n = 0;
   double reached = r->t;

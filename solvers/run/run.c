@@ -94,6 +94,7 @@ void pw_run_close (pw_run *r) {
 static int run_restart_method (pw_run *r, pw_error *error) {
   int status = pw_run_look_ahead (r, error);
   r->jumped = 1;
+  r->predicted = 0;
   if (status == PW_OK) status = pw_run_evaluate (r, error);
   return status == PW_OK ? r->method->restart (r, error) : status;
 }
@@ -305,6 +306,7 @@ int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error
   const pw_initial_report initial = r->initial;
   r->w->t_signal = NAN;
   run_exchange (r, q, v);
+  r->predicted = 0;
   status = run_continue_at (r, &after, error);
   if (status == PW_OK) {
     r->moved_from = r->t;

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "events.h"
+#include "resolution.h"
 #include "methods.h"
 #include "rank.h"
 #include "method.h"
@@ -225,6 +226,19 @@ static unsigned long long checkpoint_identity (const pw_run *r) {
 
 /* ---- Opening ---- */
 
+/* A step in which signals, events and conditions are watched. */
+static int run_watched_advance (pw_run *r, double t_end, pw_error *error) {
+  if (r->resolution) t_end = fmin (t_end, pw_resolution_end (r));
+  return (r->events ? pw_events_advance : r->method->advance) (r, t_end, error);
+}
+
+static int run_watch_steps (pw_run *r, pw_error *error) {
+  if (pw_update_kinematics (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
+  const int status = pw_resolution_open (r, error);
+  if (r->resolution) r->advance = run_watched_advance;
+  return status;
+}
+
 static int run_open (pw_run *r, const char *method, const pw_settings *settings, pw_error *error) {
   const pw_settings none = { 0 };
   if (settings == NULL) settings = &none;
@@ -263,6 +277,7 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   r->identity = checkpoint_identity (r);
   status = pw_specialised_open (r, error);
   if (status == PW_OK) status = run_check_stop (r, r->method->open (r, error));
+  if (status == PW_OK) status = run_watch_steps (r, error);
   if (status != PW_OK || !r->uses_derivatives) return status;
   return pw_run_check_derivatives (r, method, "needs", error);
 }
@@ -352,6 +367,7 @@ static void checkpoint_state (pw_run *r, pw_archive *a) {
 static int checkpoint_continue (pw_run *r, pw_archive *a, pw_error *error) {
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   r->near_singular = 0;
+  r->predicted = 0;
   if (r->method->serialise == NULL) r->statistics.restarts++;
   int status = pw_run_renew (r, error);
   if (status == PW_OK && r->method->serialise) r->method->serialise (r, a);

@@ -272,9 +272,15 @@ pw_summary pw_run_summary (pw_run_cli *command, const pw_sample *last, const pw_
 void pw_report_warnings (const pw_run *run, const pw_system *system, double defect) {
   int state;
   double power, growth = pw_run_growth (run, &state, &power);
+  const pw_statistics *stats = pw_run_statistics (run);
   if (defect > REPORT_DEFECT)
     pw_cli_say ("pinwheel: the energy does not balance: %s %% of it is unaccounted for; %s\n",
                 PW_DIGITS (100 * defect, 2), pw_run_energy_advice (run, defect));
+  if (stats->unresolved > 0)
+    pw_cli_say ("pinwheel: %ld of %s did not resolve %s, which changes more within a step than the step sees: take "
+                "shorter steps, or a method with adaptive ones\n",
+                stats->unresolved, PW_COUNTED (stats->steps, "step"),
+                pw_run_unresolved (run, (char[PW_NAME_BYTES]){ 0 }, PW_NAME_BYTES));
   if (growth != 0)
     pw_cli_say (
         "pinwheel: the motion grows without bound: %s has become %s times the scene's own speed and grows as t^%s; "

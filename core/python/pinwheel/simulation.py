@@ -250,8 +250,8 @@ class Simulation:
     @staticmethod
     def _statistics(run):
         s = lib.core.pw_run_statistics(run).contents
-        return {name: getattr(s, name) for name in ("steps", "rejected", "rhs", "jacobians", "factorisations", "specialised",
-                                                    "position", "velocity", "g", "jv")}
+        return {name: getattr(s, name) for name in ("steps", "rejected", "rhs", "jacobians", "factorisations",
+                                                    "specialised", "unresolved", "position", "velocity", "g", "jv")}
 
     def _columns(self):
         return columns(self._system.pointer, self._settings.ledger)

@@ -1,0 +1,210 @@
+/* Signals that change within less than a step: what the stages of a method do not see, its error estimate does not see
+ * either.  Steps are limited so that they see it.
+ *
+ * A time H is resolved if the signal's deviation from the straight lines through its values at the beginning, the
+ * middle and the end is at most a quarter of the largest difference of these, or has no effect: H times the deviation
+ * changes velocities by less than the tolerance.  The deviation is bounded by interval arithmetic, in parts that are
+ * halved while the bound is too large (Moore, Kearfott & Cloud 2009, Introduction to Interval Analysis, chapter 6).
+ * States that the signal reads are predicted by the velocities and accelerations of the state reached.
+ *
+ * Adaptive steps end within the time that is resolved; it is found by halving.  Fixed steps that are longer are
+ * counted. */
+#include <float.h>
+#include <math.h>
+#include <string.h>
+#include "resolution.h"
+#include "util.h"
+
+#define RESOLUTION_SEEN 0.25    /* deviation over the largest difference of the values seen */
+#define RESOLUTION_SHARE 0.1    /* of the tolerance, by which a step may miss what a signal does */
+#define RESOLUTION_FIXED 1e-6   /* the tolerance of fixed steps */
+#define RESOLUTION_LEAST 1e-10  /* of the span: shorter times are not examined: the bounds are too wide */
+enum { RESOLUTION_DEPTH = 5 };  /* most halvings of a part */
+enum { RESOLUTION_AHEAD = 16 }; /* fixed steps examined at once */
+
+typedef struct {
+  const pw_source *source;
+  pw_source at;   /* the same, evaluated away from the state reached */
+  double effect;  /* acceleration [velocity units / s] per unit of the signal; 0: unknown */
+  double size;    /* largest value, if bounds of it are known, else 1 */
+  double longest; /* time last resolved */
+  double end;     /* until which the signal is resolved in this sense; INFINITY: it is not examined */
+} resolution_signal;
+
+struct pw_resolution {
+  int count;
+  resolution_signal *signal;
+  double harmonic;         /* longest step that harmonic signals permit */
+  const pw_source *missed; /* a signal that fixed steps did not resolve */
+  double previous_t;       /* beginning of the last step */
+  double *lo, *hi;         /* of the time and the states that a signal reads */
+};
+
+/* ---- Values and bounds at the time t + s ---- */
+
+/* State j, as in pw_source.state. */
+static double resolution_state (const pw_run *r, int j, double s) {
+  const int n = r->s->coords;
+  return j < n ? r->q[j] + s * (r->v[j] + 0.5 * s * r->a[j]) : r->v[j - n] + s * r->a[j - n];
+}
+
+static double resolution_value (const pw_run *r, resolution_signal *x, double s) {
+  for (int i = 0; i < x->at.reads; i++) x->at.x[i] = resolution_state (r, x->at.state[i], s);
+  if (pw_signal_eval (&x->at, pw_before_breakpoint (r, r->t + s)) != 0) return NAN;
+  return x->at.u[0];
+}
+
+/* 1 if the deviation from the line from ya at a to yb at b is proved to be at most `most`, or bounds are unknown. */
+static int resolution_is_near (pw_run *r, const resolution_signal *x, double a, double b, double ya, double yb,
+                               double most, int depth) {
+  struct pw_resolution *d = r->resolution;
+  double bounds[2];
+  d->lo[0] = pw_before_breakpoint (r, r->t + a), d->hi[0] = pw_before_breakpoint (r, r->t + b);
+  for (int i = 0; i < x->at.reads; i++) {
+    const int j = x->at.state[i], position = j < r->s->coords;
+    const double from = resolution_state (r, j, a), to = resolution_state (r, j, b);
+    const double bend = position ? fabs (r->a[j]) * (b - a) * (b - a) / 8 : 0;
+    d->lo[i + 1] = fmin (from, to) - bend, d->hi[i + 1] = fmax (from, to) + bend;
+  }
+  pw_signal_bounds (&x->at, d->lo, d->hi, bounds);
+  if (!(bounds[1] - bounds[0] < INFINITY)) return 1;
+  if (fmax (bounds[1] - fmin (ya, yb), fmax (ya, yb) - bounds[0]) <= most) return 1;
+  if (depth == 0) return 0;
+  const double m = a + (b - a) / 2, ym = ya + (yb - ya) / 2;
+  return resolution_is_near (r, x, a, m, ya, ym, most, depth - 1) &&
+         resolution_is_near (r, x, m, b, ym, yb, most, depth - 1);
+}
+
+/* ---- The time that is resolved ---- */
+
+static int resolution_resolved (pw_run *r, resolution_signal *x, double H) {
+  const double m = H / 2, y0 = resolution_value (r, x, 0), y1 = resolution_value (r, x, m),
+               y2 = resolution_value (r, x, H), rtol = r->fixed_steps ? RESOLUTION_FIXED : r->settings.rtol;
+  const double missed = RESOLUTION_SHARE * rtol * (x->effect > 0 ? 1 / (x->effect * H) : x->size);
+  const double most = fmax (missed, RESOLUTION_SEEN * fmax (fabs (y1 - y0), fabs (y2 - y1)));
+  return resolution_is_near (r, x, 0, m, y0, y1, most, RESOLUTION_DEPTH) &&
+         resolution_is_near (r, x, m, H, y1, y2, most, RESOLUTION_DEPTH);
+}
+
+/* The time from r->t on that is resolved, halved from `longest` to `least`; 0: not even that is. */
+static double resolution_find (pw_run *r, resolution_signal *x, double longest, double least) {
+  for (double H = longest;; H = fmax (H / 2, least)) {
+    if (resolution_resolved (r, x, H)) return H;
+    if (!(H > least)) return 0;
+  }
+}
+
+/* Examines the signal from the state reached on; before: length of the last step. */
+static void resolution_examine (pw_run *r, resolution_signal *x, double before) {
+  const double remaining = r->breakpoint - r->t, predicted = x->at.reads > 0 ? 0 : 2 * x->longest;
+  const double growth = r->method->order > 0 ? 2 : 10; /* multistep methods lose their order if they grow slowly */
+  const double ahead = r->fixed_steps ? RESOLUTION_AHEAD * r->settings.step : growth * before;
+  const double longest = fmin (remaining, fmax (predicted, ahead));
+  const double least = r->fixed_steps ? r->settings.step : RESOLUTION_LEAST * r->settings.span;
+  x->longest = resolution_find (r, x, longest, fmin (longest, least));
+  x->end = r->t + x->longest;
+  if (x->longest > 0) return;
+  if (r->fixed_steps)
+    r->resolution->missed = x->source;
+  else /* its bounds are too wide */
+    x->end = x->at.reads > 0 ? r->t + ahead : INFINITY, x->longest = ahead;
+}
+
+double pw_resolution_end (pw_run *r) {
+  struct pw_resolution *d = r->resolution;
+  const double h = r->settings.step;
+  int missed = r->fixed_steps && h > d->harmonic;
+  if (!r->predicted) {
+    d->previous_t = NAN, r->predicted = 1;
+    for (resolution_signal *x = d->signal; x < d->signal + d->count; x++) x->longest = 0, x->end = -INFINITY;
+  }
+  double before = r->t - d->previous_t, end = r->fixed_steps ? INFINITY : r->t + d->harmonic;
+  if (!(before > 0)) before = r->fixed_steps ? h : pw_first_step (r);
+  for (resolution_signal *x = d->signal; x < d->signal + d->count; x++) {
+    if (r->fixed_steps ? r->t + h > x->end + 1e-9 * h : r->t >= x->end - x->longest / 2)
+      resolution_examine (r, x, before);
+    missed |= r->fixed_steps && x->longest == 0;
+    end = fmin (end, x->end);
+  }
+  r->statistics.unresolved += missed;
+  d->previous_t = r->t;
+  r->resolved_until = missed ? -INFINITY : end;
+  return r->fixed_steps ? INFINITY : end;
+}
+
+char *pw_run_unresolved (const pw_run *r, char *signal, size_t size) {
+  const pw_source *failed = r->w->failed;
+  const struct pw_resolution *d = r->resolution;
+  *signal = 0;
+  if (d == NULL || r->statistics.unresolved == 0 || d->missed == NULL) return signal;
+  r->w->failed = d->missed;
+  pw_failed_signal (r->w, signal, size);
+  r->w->failed = failed;
+  return signal;
+}
+
+/* ---- Opening ---- */
+
+/* The largest acceleration, in units of velocities per second, by a unit of a force's signal: without constraints,
+ * which reduce it (Gauss' principle).  0: unknown. */
+static double resolution_effect (pw_run *r, const pw_source *source) {
+  const pw_system *s = r->s;
+  double *f = r->scratch, *changed = f + s->coords + 3, most = 0;
+  if (!source->of_force) return 0;
+  pw_evaluate_force (r->w, f);
+  source->u[0] += 1;
+  pw_evaluate_force (r->w, changed);
+  source->u[0] -= 1;
+  for (int j = 0; j < s->coords; j++) {
+    const double change = fabs (changed[j] - f[j]);
+    if (change > 0) most = fmax (most, change / (s->mass[j] * pw_velocity_unit (r, j, r->v[j])));
+  }
+  return most < INFINITY ? most : 0;
+}
+
+static double resolution_size (pw_run *r, const pw_source *source) {
+  struct pw_resolution *d = r->resolution;
+  double bounds[2];
+  d->lo[0] = r->t, d->hi[0] = r->t + r->settings.span;
+  for (int i = 1; i <= source->reads; i++) d->lo[i] = -DBL_MAX, d->hi[i] = DBL_MAX;
+  pw_signal_bounds (source, d->lo, d->hi, bounds);
+  const double size = fmax (fabs (bounds[0]), fabs (bounds[1]));
+  return size > 0 && size < INFINITY ? size : 1;
+}
+
+/* The longest step that a harmonic signal permits: half a period, if its effect in it exceeds the tolerance. */
+static double resolution_harmonic (pw_run *r, const pw_source *source) {
+  const double rtol = r->fixed_steps ? RESOLUTION_FIXED : r->settings.rtol, effect = resolution_effect (r, source);
+  const double A = fabs (source->signal.harmonic.amplitude), half = PW_PI / fabs (source->signal.harmonic.omega);
+  return A == 0 ? INFINITY : effect > 0 ? fmax (half, RESOLUTION_SHARE * rtol / (effect * A)) : half;
+}
+
+int pw_resolution_open (pw_run *r, pw_error *error) {
+  const pw_system *s = r->s;
+  struct pw_resolution *d, found = { .harmonic = INFINITY };
+  int most = 0, reads = 0;
+  for (const pw_source *source = r->w->source; source < r->w->source + s->sources; source++) {
+    const int bounded = pw_signal_is_bounded (source);
+    found.count += bounded, most = source->reads > most ? source->reads : most, reads += bounded ? source->reads : 0;
+    if (source->signal.type != PW_HARMONIC || source->of_coordinate) continue;
+    const double longest = resolution_harmonic (r, source);
+    if (longest < found.harmonic) found.harmonic = longest, found.missed = source;
+  }
+  r->resolved_until = INFINITY;
+  if (found.count == 0 && !(found.harmonic < (r->fixed_steps ? r->settings.step : INFINITY))) return PW_OK;
+  d = r->resolution = pw_arena_alloc (&r->arena, sizeof *d);
+  resolution_signal *signal = pw_arena_alloc (&r->arena, (size_t)found.count * sizeof *signal);
+  double *x = pw_arena_alloc (&r->arena, (size_t)(2 * (most + 1) + 3 * found.count + 2 * reads) * sizeof *x);
+  if (d == NULL || signal == NULL || x == NULL) return pw_fail_memory (s, error);
+  *d = found;
+  d->signal = signal, d->lo = x, d->hi = x + most + 1, x += 2 * (most + 1);
+  for (const pw_source *source = r->w->source; source < r->w->source + s->sources; source++) {
+    if (!pw_signal_is_bounded (source)) continue;
+    *signal = (resolution_signal){ .at = *source, .source = source };
+    signal->effect = resolution_effect (r, source), signal->size = resolution_size (r, source);
+    signal->at.u = x, signal->at.x = x + 3, x += 3 + 2 * source->reads;
+    signal++;
+  }
+  r->resolved_until = -INFINITY;
+  return PW_OK;
+}
