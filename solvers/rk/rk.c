@@ -512,6 +512,7 @@ static int dense_open (pw_run *r) {
 static int dense_sample (pw_run *r, double t) {
   pw_method_data *d = r->data;
   pw_projector *p = d->projects ? &d->projector : NULL;
+  if (t == r->located) return 0;
   d->samples = t > d->sampled ? d->samples + 1 : 1;
   d->sampled = t;
   if (r->fixed_steps || d->samples < DENSE_FIRST) return 0;

@@ -7,6 +7,7 @@
 #include <float.h>
 #include <math.h>
 #include "crossing.h"
+#include "method.h"
 #include "util.h"
 
 enum { CROSSING_SEARCH = 30 /* evaluations for the largest value in a part, at most */ };
@@ -132,6 +133,7 @@ typedef struct {
 static int crossing_sample (void *context, double t, double *value, pw_error *error) {
   const crossing_condition *x = context;
   pw_sample sample;
+  x->run->located = t;
   const int status = pw_run_sample (x->run, t, &sample, error);
   if (status == PW_OK) *value = x->of->value (x->of->context, &sample);
   return status;
@@ -147,5 +149,6 @@ int pw_run_find_crossing (pw_run *r, pw_crossing *x, double *t, pw_error *error)
   if (!x->begun && value > 0) *t = end;
   if (x->begun && x->t < end && search.status == PW_OK) *t = pw_first_crossing (&search, x->t, &x->last, end, &value);
   x->begun = 1, x->t = end, x->last = value;
+  r->located = *t;
   return search.status;
 }

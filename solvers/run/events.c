@@ -191,6 +191,7 @@ static int events_at (void *context, double t, double *value, pw_error *error) {
   const int near_singular = r->near_singular;
   if (t == r->t && r->events->at_end) return events_values (r, r->v, r->lambda, value), PW_OK;
   r->events->samples = 1;
+  r->located = t;
   int status = r->method->at (r, t, error);
   r->alpha = r->beta = 0;
   if (status == PW_OK && pw_saddle_factor (r->saddle) == PW_OK)
