@@ -159,6 +159,7 @@ typedef struct {
 
 /* The number of constraint equations whose multipliers have limits. */
 int pw_system_limited (const pw_system *s);
+const pw_bounds *pw_system_limits (const pw_system *s, int row); /* of an equation; NULL: it has none */
 /* "holds"; "slides+", "slides-" where J v - eta is positive, negative; "free" of an equation with one limit. */
 const char *pw_system_mode_name (const pw_system *s, int row, int mode);
 

@@ -20,38 +20,82 @@ int pw_column_find (const pw_system *s, const char *name, const char *origin, pw
 
 /* ---- Texts ---- */
 
-static const char *const outcome_prefix[] = { "final:", "max:", "min:", "mean:", "integral:", "rms:" };
-#define OUTCOME_PREFIXES "final:, max:, min:, mean:, integral:, rms: and at TIME:"
+static const char *const outcome_prefix[] = { "final:",    "max:", "min:",    "mean:",
+                                              "integral:", "rms:", "events:", "event:" };
+#define OUTCOME_PREFIXES "final:, max:, min:, mean:, integral:, rms:, at TIME:, events:, event: and event N:"
 
-/* Reads the prefix of a functional at the beginning of a text, final: without one; *text is moved to the column; *t:
- * the time of "at TIME:". */
-static pw_functional_type outcome_type (const char **text, double *t) {
-  for (int i = 0; i <= PW_RMS; i++) {
-    size_t n = strlen (outcome_prefix[i]);
-    if (strncmp (*text, outcome_prefix[i], n) == 0) return *text += n, (pw_functional_type)i;
+/* Reads the prefix of a functional at the beginning of a text, final: without one; *text is moved to the name after it.
+ * Sets its type, and the time of "at TIME:" or the number of "event N:". */
+static pw_functional outcome_type (const char **text) {
+  for (int i = 0; i < PW_AT_TIME; i++) {
+    const size_t n = strlen (outcome_prefix[i]);
+    if (strncmp (*text, outcome_prefix[i], n) == 0)
+      return *text += n, (pw_functional){ .type = (pw_functional_type)i, .number = i == PW_EVENT };
   }
-  if (strncmp (*text, "at ", 3) != 0) return PW_FINAL;
+  const int is_event = strncmp (*text, "event ", 6) == 0;
+  const char *colon = strchr (*text, ':'), *begin = *text + (is_event ? 6 : 3);
   char number[40];
-  const char *colon = strchr (*text, ':');
-  if (colon == NULL) return PW_FINAL;
-  snprintf (number, sizeof number, "%.*s", (int)fmin (sizeof number - 1, (double)(colon - *text - 3)), *text + 3);
-  if (pw_read_number (number, t) != PW_OK) return PW_FINAL;
-  return *text = colon + 1, PW_AT_TIME;
+  double value;
+  if (colon == NULL || !(is_event || strncmp (*text, "at ", 3) == 0)) return (pw_functional){ .type = PW_FINAL };
+  snprintf (number, sizeof number, "%.*s", (int)fmin (sizeof number - 1, (double)(colon - begin)), begin);
+  if (pw_read_number (number, &value) != PW_OK) return (pw_functional){ .type = PW_FINAL };
+  *text = colon + 1;
+  if (is_event)
+    return (pw_functional){ .type = PW_EVENT, .number = *pw_domain_check (PW_COUNT, value) ? 0 : (long)value };
+  return (pw_functional){ .type = PW_AT_TIME, .t = value };
+}
+
+/* Finds the constraint equations of "events:NAME" or "event:NAME", those with limits from the first to the last one. */
+static int outcome_find_events (const pw_system *s, const char *name, const char *origin, pw_functional *f,
+                                pw_error *error) {
+  pw_nearest near = { .sought = name };
+  char element[PW_NAME_BYTES] = "", reaction[PW_NAME_BYTES];
+  for (int row = 0; row < pw_system_rows (s); row++) {
+    if (pw_system_limits (s, row) == NULL) continue;
+    const size_t n = strcspn (pw_system_reaction_name (s, row, reaction, sizeof reaction), ".");
+    if (strlen (element) != n || strncmp (element, reaction, n) != 0) {
+      snprintf (element, sizeof element, "%.*s", (int)n, reaction);
+      pw_nearest_try (&near, element);
+    }
+    if (strcmp (reaction, name) != 0 && strcmp (element, name) != 0) continue;
+    if (f->rows == 0) f->row = row;
+    f->rows = row - f->row + 1;
+  }
+  if (f->rows) return PW_OK;
+  if (pw_system_limited (s) == 0)
+    return pw_fail (error, PW_INPUT, "%s: no reaction of the model has a limit, so there are no events", origin);
+  return pw_fail (error, PW_INPUT, "%s: no element or reaction with a limit \"%.100s\"%s", origin, name,
+                  pw_nearest_text (&near));
+}
+
+/* The functional "[TYPE:]NAME"; `origin` begins messages. */
+static int outcome_functional (const pw_system *s, const char *text, const char *origin, pw_functional *f,
+                               pw_error *error) {
+  *f = outcome_type (&text);
+  const int is_event = f->type == PW_EVENTS || f->type == PW_EVENT;
+  int status = pw_column_find (s, is_event ? "t" : text, origin, &f->column, error);
+  if (f->type == PW_EVENT && f->number < 1) return pw_fail (error, PW_INPUT, "%s: events are counted from 1", origin);
+  if (is_event) return outcome_find_events (s, text, origin, f, error);
+  if (status == PW_OK || f->type != PW_FINAL || strcmp (text, "events") != 0) return status;
+  *error = (pw_error){ 0 }, f->type = PW_EVENTS;
+  return pw_column_find (s, "t", origin, &f->column, error);
 }
 
 /* The index of a functional, which is added unless it is there; -1 if out of memory. */
-static int outcome_add_functional (pw_outcomes *set, pw_functional_type type, pw_column c, double t) {
+static int outcome_add_functional (pw_outcomes *set, const pw_functional *added) {
+  const pw_column c = added->column;
   for (int i = 0; i < set->functionals; i++) {
     const pw_functional *f = set->functional + i;
-    if (f->type == type && f->column.type == c.type && f->column.index == c.index && (type != PW_AT_TIME || f->t == t))
+    if (f->type == added->type && f->column.type == c.type && f->column.index == c.index && f->t == added->t &&
+        f->row == added->row && f->rows == added->rows && f->number == added->number)
       return i;
   }
   pw_functional *more = realloc (set->functional, ((size_t)set->functionals + 1) * sizeof *more);
   if (more == NULL) return -1;
   set->functional = more;
-  set->functional[set->functionals] = (pw_functional){ .type = type, .column = c, .t = t };
+  set->functional[set->functionals] = *added;
   set->ledger |= c.type > PW_COLUMN_POTENTIAL && c.type < PW_COLUMN_OUTPUT;
-  set->extrema += pw_is_extremum (type), set->integrals += pw_is_integral (type);
+  set->extrema += pw_is_extremum (added->type), set->integrals += pw_is_integral (added->type);
   return set->functionals++;
 }
 
@@ -66,13 +110,13 @@ static const char *outcome_variable (char name[OUTCOME_VARIABLE], int i) {
  * next: the character after it in the text of the output, for the message about an unknown TYPE. */
 static int outcome_add_term (pw_outcomes *set, pw_outcome *o, const char *origin, const char *name, char next,
                              char variable[OUTCOME_VARIABLE], pw_error *error) {
-  pw_column c;
-  double t = 0;
-  pw_functional_type type = outcome_type (&name, &t);
+  pw_functional functional;
   pw_error own = { 0 };
-  if (pw_column_find (set->system, name, origin, &c, &own) != PW_OK)
+  if (outcome_functional (set->system, name, origin, &functional, &own) != PW_OK)
     return next == ':' ? pw_fail (error, PW_INPUT, "%s: no \"%s:\"; valid are " OUTCOME_PREFIXES, origin, name)
                        : pw_fail (error, PW_INPUT, "%s", own.text);
+  const pw_column c = functional.column;
+  const pw_functional_type type = functional.type;
   if (pw_is_integral (type) && (c.type == PW_COLUMN_POSITION || c.type == PW_COLUMN_VELOCITY ||
                                 c.type == PW_COLUMN_PROJECTION || c.type == PW_COLUMN_BALANCE))
     return pw_fail (error, PW_INPUT, "%s: %s describes the integration, not the motion: it has no %s", origin, name,
@@ -85,7 +129,7 @@ static int outcome_add_term (pw_outcomes *set, pw_outcome *o, const char *origin
   if (type == PW_RMS && pw_column_is_integrated (c.type))
     return pw_fail (error, PW_INPUT,
                     "%s: no rms: of work and losses; valid are final:, max:, min:, mean: and integral:", origin);
-  int f = outcome_add_functional (set, type, c, t), i = 0;
+  int f = outcome_add_functional (set, &functional), i = 0;
   if (f < 0) return pw_fail (error, PW_RESOURCE, "out of memory");
   while (i < o->terms && o->term[i] != f) i++;
   if (i == PW_FORMULA_NAMES) return pw_fail (error, PW_INPUT, "%s: more than %d columns", origin, PW_FORMULA_NAMES);
@@ -103,18 +147,18 @@ static size_t outcome_term_length (const pw_system *s, const char *text) {
   static const char *const constant[] = { "pi", "e", "deg" };
   const char *at = text;
   char name[300];
-  pw_column c;
+  pw_functional f;
   if (strspn (text, OUTCOME_LETTERS) == 0) return 0;
-  outcome_type (&at, &(double){ 0 });
+  outcome_type (&at);
   size_t prefix = (size_t)(at - text), word = strspn (at, OUTCOME_LETTERS "0123456789."),
          longest = strspn (at, OUTCOME_LETTERS "0123456789.-");
   for (int i = 0; i < 3 && prefix == 0; i++)
     if (strlen (constant[i]) == word && strncmp (constant[i], at, word) == 0) return 0;
   if (at[word + strspn (at + word, " ")] == '(') return 0;
   for (size_t n = longest; n > 0; n--)
-    if (n < sizeof name && (n == longest || at[n] == '-')) {
-      snprintf (name, sizeof name, "%.*s", (int)n, at);
-      if (pw_column_find (s, name, "", &c, NULL) == PW_OK) return prefix + n;
+    if (prefix + n < sizeof name && (n == longest || at[n] == '-')) {
+      snprintf (name, sizeof name, "%.*s", (int)(prefix + n), text);
+      if (outcome_functional (s, name, "", &f, &(pw_error){ 0 }) == PW_OK) return prefix + n;
     }
   return prefix + longest;
 }
@@ -122,11 +166,11 @@ static size_t outcome_term_length (const pw_system *s, const char *text) {
 /* Refuses a functional of an expression, "max:abs (A.N)", and one that is written as a function, "rms (A.N)". */
 static int outcome_refuse_call (const char *text, const char *origin, pw_error *error) {
   const char *column = text;
-  outcome_type (&column, &(double){ 0 });
+  outcome_type (&column);
   if (column != text)
     return pw_fail (error, PW_INPUT, "%s: %.*s takes a column; for an expression, define an output of the model",
                     origin, (int)(column - text), text);
-  for (int i = 0; i <= PW_RMS; i++) {
+  for (int i = 0; i < PW_AT_TIME; i++) {
     const size_t n = strlen (outcome_prefix[i]) - 1;
     if (strncmp (text, outcome_prefix[i], n) == 0 && text[n + strspn (text + n, " ")] == '(' && i != PW_MAX &&
         i != PW_MIN)
@@ -218,7 +262,7 @@ int pw_outcome_is_final (const pw_outcomes *set, int outcome) {
 const char *pw_outcome_unit (const pw_outcomes *set, int outcome, char *buffer, size_t size) {
   const pw_outcome *o = set->outcome + outcome;
   const pw_functional *f = set->functional + o->term[0];
-  const char *unit = o->formula ? "" : pw_system_column_unit (set->system, f->column);
+  const char *unit = o->formula || f->type == PW_EVENTS ? "" : pw_system_column_unit (set->system, f->column);
   int is_integral = !o->formula && f->type == PW_INTEGRAL, of_time = strcmp (unit, "s") == 0;
   snprintf (buffer, size, "%s%s", unit, !is_integral ? "" : of_time ? "^2" : *unit ? " s" : "s");
   return buffer;
@@ -473,6 +517,18 @@ int pw_outcomes_advance (pw_outcomes *set, pw_run *r, double t, double t_end, pw
   return step.status;
 }
 
+/* The number of events of a functional up to the end of the run, or the time of one; NaN: it has not occurred. */
+static double functional_of_events (const pw_outcomes *set, const pw_functional *f, const pw_run *r) {
+  int count;
+  long number = 0;
+  const pw_event *event = pw_run_events (r, &count);
+  for (const pw_event *e = event; e < event + count && e->t <= set->t; e++) {
+    if (f->rows && (e->row < f->row || e->row >= f->row + f->rows)) continue;
+    if (++number == f->number) return e->t;
+  }
+  return f->type == PW_EVENTS ? (double)number : NAN;
+}
+
 int pw_outcomes_end (pw_outcomes *set, pw_run *r, pw_error *error) {
   pw_sample s;
   if (!set->ended) set->t = pw_run_time (r);
@@ -481,6 +537,7 @@ int pw_outcomes_end (pw_outcomes *set, pw_run *r, pw_error *error) {
   for (pw_functional *f = set->functional; f < set->functional + set->functionals; f++) {
     if (pw_is_integral (f->type)) f->value = functional_of_integral (f, *s.integral++, set->t - set->begin);
     if (f->type == PW_FINAL) f->value = f->values[FUNCTIONAL_END];
+    if (f->type == PW_EVENTS || f->type == PW_EVENT) f->value = functional_of_events (set, f, r);
   }
   return PW_OK;
 }

@@ -1,8 +1,10 @@
 /* The OUTPUT of analyses, here called an outcome to distinguish it from files that are written: a number that a run
  * yields.
  *
- *   OUTPUT   an expression of [final:|max:|min:|mean:|integral:|rms:|at T:]COLUMN, such as "frame.x / rider.work"
+ *   OUTPUT   an expression of [final:|max:|min:|mean:|integral:|rms:|at T:]COLUMN, such as "frame.x / rider.work",
+ *            and of numbers and times of events: events, events:NAME, event:NAME, event N:NAME
  *   COLUMN   a column of the table of `run`, or the total work or loss
+ *   NAME     an element whose reactions have limits, or one of these reactions
  *
  * Values at the end or at a time, extrema, means and integrals of columns are functionals of the run.  They are as
  * accurate as the run: integrals are entries of its ledger (pw_settings.integrals), and extrema are located by its
@@ -13,6 +15,11 @@
 #include "pinwheel-files.h"
 #include "pinwheel-solvers.h"
 
+/* An OUTPUT in the help of an option. */
+#define PW_OUTPUT_HELP                                                                                      \
+  "a column of the table of `run` at the end; its max:, min:, mean:, integral:, rms: or at TIME:, such as " \
+  "max:B.Fx; events:ELEMENT, their number, or event:ELEMENT, the time of the first one; or an expression of these"
+
 /* The column of this name; `origin` begins messages ("--of max:B.Fx").  PW_INPUT, with the nearest name, if there is
  * none. */
 int pw_column_find (const pw_system *s, const char *name, const char *origin, pw_column *c, pw_error *error);
@@ -22,7 +29,17 @@ static inline int pw_column_is_integrated (pw_column_type type) {
   return type == PW_COLUMN_LEDGER || type == PW_COLUMN_WORK || type == PW_COLUMN_LOSS;
 }
 
-typedef enum { PW_FINAL, PW_MAX, PW_MIN, PW_MEAN, PW_INTEGRAL, PW_RMS, PW_AT_TIME } pw_functional_type;
+typedef enum {
+  PW_FINAL,
+  PW_MAX,
+  PW_MIN,
+  PW_MEAN,
+  PW_INTEGRAL,
+  PW_RMS,
+  PW_EVENTS, /* their number */
+  PW_EVENT,  /* the time of one of them */
+  PW_AT_TIME
+} pw_functional_type;
 
 enum { PW_FUNCTIONAL_TIMES = 9 }; /* at which a step of the run is sampled before refinements (outcome.c) */
 
@@ -34,10 +51,12 @@ static inline int pw_is_extremum (pw_functional_type type) {
   return type == PW_MAX || type == PW_MIN;
 }
 
-/* A functional of a column. */
+/* A functional of a column, or of the events of some constraint equations. */
 typedef struct {
   pw_functional_type type;
-  pw_column column;
+  pw_column column;                       /* of events: the time */
+  int row, rows;                          /* of events: the first equation, their number; rows 0: all events */
+  long number;                            /* of PW_EVENT, from 1 */
   double value;                           /* set by pw_outcomes_run */
   double t;                               /* time of the extremum so far, or that of PW_AT_TIME [s] */
   double values[PW_FUNCTIONAL_TIMES + 1]; /* of the column: set by functional_read */

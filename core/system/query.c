@@ -368,6 +368,10 @@ int pw_system_limited (const pw_system *s) {
   return s->limited;
 }
 
+const pw_bounds *pw_system_limits (const pw_system *s, int row) {
+  return pw_is_limited (s, row) ? &s->limit[row] : NULL;
+}
+
 const char *pw_system_mode_name (const pw_system *s, int row, int mode) {
   const pw_bounds *limit = s->limit ? &s->limit[row] : NULL;
   if (mode == 0) return "holds";

@@ -120,6 +120,46 @@ TEST (fast) {
                "10 rtol: an integral is in the error test of the run");
 }
 
+/* Events of a stop of 60 degrees and of one that is never reached: a pendulum on a horizontal plane that turns by
+ * 1 rad/s and bounces back by e = 1/2 at pi/3, then by 1/4 at the start, and so on. */
+TEST (events) {
+  cli_write ("stops.yaml", "pinwheel: 1\nbodies: [{name: bob, mass: 1, inertia: 1, rate: {omega: 1}}]\nelements:\n"
+                           "  - {pin: P, body: [bob, ground], at: [[0, 0], [0, 0]]}\n"
+                           "  - {stop: S, body: [bob, ground], what: angle, low: -1, high: 60*deg, restitution: 0.5}\n"
+                           "  - {stop: far-1, body: [bob, ground], what: angle, low: -9, high: 9}\n");
+  static const struct {
+    const char *text;
+    double value;
+  } of[] = { { "events", 2 },
+             { "events:S", 2 },
+             { "events:S.high", 1 },
+             { "events:S.low + events:far-1", 1 },
+             { "event:S", PW_PI / 3 },
+             { "event 2:S", PW_PI / 3 + 2 * (PW_PI / 3 + 1) },
+             { "event 2:S-event 1:S", 2 * (PW_PI / 3 + 1) },
+             { "event:S.low/event:S", 1 + 2 * (1 + 3 / PW_PI) },
+             { "event:far-1", NAN },
+             { "event 3:S", NAN } };
+  gallery_scene stops = gallery_load (cli_path ("stops.yaml"), NULL);
+  pw_system *const before = s;
+  s = stops.system;
+  for (size_t i = 0; i < sizeof of / sizeof *of; i++) {
+    const double value = outcome_run (of[i].text, "rk4+projection", 0.1, 0, 8);
+    if (isnan (of[i].value))
+      assert_true (isnan (value));
+    else
+      check_close (of[i].text, value, of[i].value, 1e-11, "constant velocities");
+  }
+  s = before;
+  gallery_close (&stops);
+  cli_bad ("pinwheel sensitivity @/stops.yaml --of events:far --by bob.omega", 2,
+           "--of events:far: no element or reaction with a limit \"far\"; did you mean \"far-1\"?");
+  cli_bad ("pinwheel sensitivity @/stops.yaml --of 'event 0:S' --by bob.omega", 2,
+           "--of event 0:S: events are counted from 1");
+  cli_bad ("pinwheel sensitivity @/functionals.yaml --of event:R --by w", 2,
+           "--of event:R: no reaction of the model has a limit, so there are no events");
+}
+
 TEST (units) {
   static const char *const text[] = { "t", "integral:t", "integral:wheel.phi", "integral:wheel.omega", "mean:t" };
   static const char *const unit[] = { "s", "s^2", "rad s", "rad/s s", "s" };
@@ -151,8 +191,8 @@ TEST (bad) {
     { "wheel.phy", "--of wheel.phy: no column \"wheel.phy\"; did you mean \"wheel.phi\"?" },
     { "max:motor-2.work", "--of max:motor-2.work: no column \"motor-2.work\"; did you mean \"motor-1.work\"?" },
     { "wheel.phi/works", "--of wheel.phi/works: no column \"works\"; did you mean \"work\"?" },
-    { "maxi:wheel.phi",
-      "--of maxi:wheel.phi: no \"maxi:\"; valid are final:, max:, min:, mean:, integral:, rms: and at TIME:" },
+    { "maxi:wheel.phi", "--of maxi:wheel.phi: no \"maxi:\"; valid are final:, max:, min:, mean:, integral:, rms:, at "
+                        "TIME:, events:, event: and event N:" },
     { "mean:balance", "--of mean:balance: balance describes the integration, not the motion: it has no mean" },
     { "rms:motor-1.work", "--of rms:motor-1.work: no rms: of work and losses; valid are final:, max:, min:, mean: and "
                           "integral:" },

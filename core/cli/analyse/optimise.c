@@ -841,10 +841,7 @@ static int optimise_command (void *options, pw_error *error) {
 
 static const struct poptOption optimise_options[] = {
   PW_OPTION_GROUP ("Optimisation"),
-  PW_TEXT_OPTION (
-      pw_optimise, maximise, "maximise", 0, "OUTPUT",
-      "Maximise max:COLUMN, min:, mean:, integral:, rms: or final: (default) of a column of the table of `run`, or an "
-      "expression of these, such as frame.x/work"),
+  PW_TEXT_OPTION (pw_optimise, maximise, "maximise", 0, "OUTPUT", "Maximise " PW_OUTPUT_HELP),
   PW_TEXT_OPTION (pw_optimise, minimise, "minimise", 0, "OUTPUT", "Minimise such an output"),
   PW_LIST_OPTION (pw_optimise, free, "free", 0, "NAME[=LOW:HIGH]",
                   "Vary a parameter or an initial value, such as frame.vx, between bounds; repeatable"),

@@ -406,10 +406,7 @@ static int sensitivity_command (void *options, pw_error *error) {
 
 static const struct poptOption sensitivity_options[] = {
   PW_OPTION_GROUP ("Sensitivity"),
-  PW_LIST_OPTION (
-      sensitivity, of, "of", 0, "OUTPUT",
-      "A column of the table of `run` at the end, or its max:, min:, mean:, integral:, rms: or at TIME:, such "
-      "as max:B.Fx; or an expression of these; repeatable"),
+  PW_LIST_OPTION (sensitivity, of, "of", 0, "OUTPUT", "Differentiate " PW_OUTPUT_HELP "; repeatable"),
   PW_LIST_OPTION (sensitivity, by, "by", 0, "NAME",
                   "A parameter, or the initial value of a state, such as body.vx; repeatable"),
   PW_TEXT_OPTION (sensitivity, every, "every", 0, "DT",

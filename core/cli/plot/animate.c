@@ -58,6 +58,13 @@ void pw_animation_scene (pw_json *j, const pw_plots *plots) {
     }
     pw_json_print (j, "]}");
   }
+  pw_json_print (j, "], events: [");
+  for (int end, row = 0; (row = pw_plot_marked (plots, row, &end)) >= 0; row = end) {
+    pw_json_print (j, "{name: %s, t: [", PW_NAME (pw_system_row_name, plots->system, row));
+    for (const pw_event *e = plots->event; e < plots->event + plots->events; e++)
+      if (e->row >= row && e->row < end) pw_json_number (j, NULL, e->t);
+    pw_json_print (j, "]}");
+  }
   pw_json_print (j, "], outputs: [");
   for (int o = 0; o < plots->outputs; o++) {
     char buffer[PW_NAME_BYTES];

@@ -207,10 +207,14 @@ int pw_curves_open (pw_curves *c, const pw_cli_line *line, const char *folder, c
   pw_figures figures = { .folder = folder,
                          .model = pw_file_name (line->m.file),
                          .about = pw_file_table (line->m.file)->about };
-  *c = (pw_curves){ .folder = folder, .name = name };
   if (pw_figure_width (line->width, &figures.width, error) != PW_OK) return error->status;
-  c->data = pw_figure_open_data (&figures, PW_PRINTED (60, "%s.dat", name), error);
-  c->script = c->data ? pw_figure_begin (&figures, name, error) : NULL;
+  return pw_curves_begin (c, &figures, name, title, error);
+}
+
+int pw_curves_begin (pw_curves *c, const pw_figures *figures, const char *name, const char *title, pw_error *error) {
+  *c = (pw_curves){ .folder = figures->folder, .name = name };
+  c->data = pw_figure_open_data (figures, PW_PRINTED (60, "%s.dat", name), error);
+  c->script = c->data ? pw_figure_begin (figures, name, error) : NULL;
   if (c->script) return pw_figure_text (pw_output_stream (c->script), "title", title), PW_OK;
   if (c->data) pw_output_discard (c->data);
   return PW_RESOURCE;

@@ -26,6 +26,8 @@ double pw_plots_next (const pw_plots *plots);
 void pw_plots_add (pw_plots *plots, const pw_sample *sample);
 /* Stores the last sample of a run that ends before t_end as it should. */
 void pw_plots_last (pw_plots *plots, const pw_sample *sample);
+/* Stores the events of a run that has ended, which curves mark; none if memory is exhausted. */
+void pw_plots_events (pw_plots *plots, const pw_run *run);
 /* Saves or loads the samples stored so far. */
 void pw_plots_serialise (pw_plots *plots, pw_archive *archive);
 
@@ -33,10 +35,6 @@ void pw_plots_serialise (pw_plots *plots, pw_archive *archive);
  * not installed, a notice says how to draw the figures.  Without a folder it does nothing, with fewer than two samples
  * it only prints a notice.  PW_RESOURCE if a file cannot be written or gnuplot fails; PW_INTERRUPTED. */
 int pw_plots_finish (pw_plots *plots, int draw, pw_error *error);
-
-/* Writes the figure "outputs", a panel for each first-order state and output, and draws it as pw_plots_finish does;
- * nothing without outputs.  The same statuses. */
-int pw_plots_outputs (const pw_plots *plots, const pw_cli_line *line, int draw, pw_error *error);
 
 /* PW_INPUT unless the path of an animation, the value of an option, ends in .html. */
 int pw_animation_check (const char *option, const char *path, pw_error *error);
@@ -138,10 +136,12 @@ struct pw_plots {
   pw_workspace *workspace; /* for contact points and forces */
   double t_end;            /* [s] */
   int samples, planned;    /* stored so far; in all */
-  int sample_size;         /* numbers of a sample */
-  int outputs;             /* first-order states and outputs drawn: the last numbers of a sample */
-  double size;             /* diagonal of the box around the initial configuration [m] */
-  double symbol_unit;      /* u of symbols [m] */
+  pw_event *event;         /* events */
+  int events;
+  int sample_size;    /* numbers of a sample */
+  int outputs;        /* first-order states and outputs drawn: the last numbers of a sample */
+  double size;        /* diagonal of the box around the initial configuration [m] */
+  double symbol_unit; /* u of symbols [m] */
   pw_tracks bodies, wheels;
   int links, grounds;   /* elements drawn, before pw_plot_find_shapes at most; points of the ground */
   int with_forces;      /* 1: the forces of links are kept */
@@ -170,6 +170,10 @@ static inline double *pw_plot_track (const pw_plots *plots, int i, const pw_trac
 static inline int pw_plot_pick (int i, int chosen, int all) {
   return (int)((long long)i * all / chosen);
 }
+
+/* The first constraint equation, from `row` on, of an element with events, whose last equation is before *end; -1: there
+ * is none. */
+int pw_plot_marked (const pw_plots *plots, int row, int *end);
 
 /* The name of body or wheel k of those drawn. */
 const char *pw_plot_name (const pw_plots *plots, const pw_tracks *tracks, int k);

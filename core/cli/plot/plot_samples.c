@@ -173,6 +173,13 @@ void pw_plots_last (pw_plots *plots, const pw_sample *sample) {
   plots->planned = plots->samples;
 }
 
+void pw_plots_events (pw_plots *plots, const pw_run *run) {
+  const pw_event *event = pw_run_events (run, &plots->events);
+  plots->event = pw_arena_alloc (&plots->arena, (size_t)plots->events * sizeof *plots->event);
+  if (plots->event == NULL) plots->events = 0;
+  if (plots->events) memcpy (plots->event, event, (size_t)plots->events * sizeof *event);
+}
+
 void pw_plots_serialise (pw_plots *plots, pw_archive *archive) {
   int samples = plots->samples;
   pw_archive_bytes (archive, &samples, sizeof samples);
@@ -373,15 +380,15 @@ static int data_paths (const pw_plots *plots, pw_error *error) {
 
 /* ---- Scripts ---- */
 
-/* Writes the script of a figure: values of the template's variables. */
+/* Writes the script of the paths or of the mechanism: values of the template's variables. */
 static int figures_write (const pw_plots *plots, const char *name, int closeup, pw_error *error) {
-  int mechanism = strcmp (name, "mechanism") == 0, paths = mechanism || strcmp (name, "paths") == 0;
+  const int mechanism = strcmp (name, "mechanism") == 0;
   pw_output *o = pw_figure_begin (&plots->figures, name, error);
   if (o == NULL) return PW_RESOURCE;
   FILE *f = pw_output_stream (o);
   fprintf (f, "t_end = %.9g\nt_closeup = %.9g\n", pw_plot_sample (plots, plots->samples - 1)[PLOT_T],
            closeup > 0 ? pw_plot_sample (plots, closeup - 1)[PLOT_T] : 0);
-  const pw_tracks *tracks = paths && plots->wheels.drawn ? &plots->wheels : &plots->bodies;
+  const pw_tracks *tracks = plots->wheels.drawn ? &plots->wheels : &plots->bodies;
   pw_figure_text (f, "data", tracks->file);
   pw_figure_text (f, "what", tracks->noun);
   fprintf (f, "curves = %d\nnumbers = %d\nnumber_column = %d\narray label[%d]\n", tracks->curves, tracks->count,
@@ -406,9 +413,155 @@ static int figures_write (const pw_plots *plots, const char *name, int closeup, 
   return pw_figure_end (o, name, error);
 }
 
+/* ---- Curves over time ---- */
+
+int pw_plot_marked (const pw_plots *plots, int row, int *end) {
+  const int rows = pw_system_rows (plots->system);
+  for (; row < rows; row = *end) {
+    char element[PW_NAME_BYTES];
+    int marked = 0;
+    pw_system_row_name (plots->system, row, element, sizeof element);
+    for (*end = row + 1; *end < rows; ++*end)
+      if (strcmp (PW_NAME (pw_system_row_name, plots->system, *end), element) != 0) break;
+    for (const pw_event *e = plots->event; e < plots->event + plots->events; e++)
+      marked |= e->row >= row && e->row < *end;
+    if (marked) return row;
+  }
+  return -1;
+}
+
+/* A panel from a time to the end of the run; number: the label of a scale of colours, or NULL. */
+static void figures_panel (pw_curves *c, const pw_plots *plots, const char *label, double from, const char *number) {
+  const double t_end = pw_plot_sample (plots, plots->samples - 1)[PLOT_T];
+  pw_curves_panel (c, &(pw_panel){ .x_label = "t [s]",
+                                   .y_label = label,
+                                   .z_label = number,
+                                   .x = { from, t_end },
+                                   .type = from == 0 ? PW_PANEL_BELOW : 0 });
+}
+
+/* Marks the events in the panel. */
+static void figures_events (pw_curves *c, const pw_plots *plots) {
+  for (int end, row = 0; (row = pw_plot_marked (plots, row, &end)) >= 0; row = end) {
+    pw_curves_add (c, "event", PW_NAME (pw_system_row_name, plots->system, row));
+    for (const pw_event *e = plots->event; e < plots->event + plots->events; e++)
+      if (e->row >= row && e->row < end) pw_curves_point (c, e->t, INFINITY, 0);
+  }
+}
+
+/* A curve of the number at this place of the samples. */
+static void figures_curve (pw_curves *c, const pw_plots *plots, const char *label, int place, int number) {
+  pw_curves_add (c, number ? "graded" : "line", label);
+  for (int i = 0; i < plots->samples; i++)
+    pw_curves_point (c, pw_plot_sample (plots, i)[PLOT_T], pw_plot_sample (plots, i)[place], number);
+}
+
+/* A panel with a curve of a number of each body; more than FIGURES_NAMED curves are coloured by the body's number. */
+static void figures_bodies (pw_curves *c, const pw_plots *plots, const char *label, int number, double from) {
+  const pw_tracks *bodies = &plots->bodies;
+  const int named = bodies->curves <= FIGURES_NAMED;
+  figures_panel (c, plots, label, from, named ? NULL : "number of the body");
+  for (int i = 0; i < bodies->curves; i++) {
+    const int k = pw_plot_pick (i, bodies->curves, bodies->drawn);
+    figures_curve (c, plots, named ? pw_plot_name (plots, bodies, k) : NULL,
+                   bodies->offset + bodies->numbers * k + number,
+                   named ? 0 : pw_plot_pick (k, bodies->drawn, bodies->count) + 1);
+  }
+  figures_events (c, plots);
+}
+
+/* The part of the run, 0 to 1, that shows angular velocities which oscillate often in detail: with at most 12 extrema,
+ * but not less than 2 %; 0: they do not. */
+static double figures_detail (const pw_plots *plots) {
+  int most = 0;
+  for (int i = 0; i < plots->bodies.curves; i++) {
+    const int place =
+        plots->bodies.offset + plots->bodies.numbers * pw_plot_pick (i, plots->bodies.curves, plots->bodies.drawn) + 5;
+    double largest = 0, sign = 0;
+    int extrema = 0;
+    for (int k = 0; k < plots->samples; k++) largest = fmax (largest, fabs (pw_plot_sample (plots, k)[place]));
+    for (int k = 1; k < plots->samples; k++) {
+      const double change = pw_plot_sample (plots, k)[place] - pw_plot_sample (plots, k - 1)[place];
+      if (fabs (change) <= 1e-6 * largest) continue; /* round-off */
+      extrema += change * sign < 0;
+      sign = change;
+    }
+    if (extrema > most) most = extrema;
+  }
+  return most < 30 ? 0 : most <= 60 ? 0.2 : most <= 120 ? 0.1 : most <= 240 ? 0.05 : 0.02;
+}
+
+static int figures_velocities (const pw_plots *plots, pw_error *error) {
+  pw_curves c;
+  int status = pw_curves_begin (&c, &plots->figures, "velocities", "velocities of the centres of mass", error);
+  if (status != PW_OK) return status;
+  figures_bodies (&c, plots, "vx [m/s]", 3, 0);
+  figures_bodies (&c, plots, "vy [m/s]", 4, 0);
+  return pw_curves_close (&c, PW_OK, error);
+}
+
+static int figures_angular (const pw_plots *plots, pw_error *error) {
+  pw_curves c;
+  const double detail = figures_detail (plots), t_end = pw_plot_sample (plots, plots->samples - 1)[PLOT_T];
+  const char *title = detail > 0 ? "angular velocities, and their last part in detail" : "angular velocities";
+  int status = pw_curves_begin (&c, &plots->figures, "angular", title, error);
+  if (status != PW_OK) return status;
+  figures_bodies (&c, plots, "ω [rad/s]", 5, 0);
+  if (detail > 0) figures_bodies (&c, plots, "ω [rad/s]", 5, t_end * (1 - detail));
+  return pw_curves_close (&c, PW_OK, error);
+}
+
+static int figures_energy (const pw_plots *plots, pw_error *error) {
+  static const struct {
+    const char *label;
+    int place, optional;
+  } curve[] = { { "kinetic", PLOT_KINETIC, 0 },
+                { "potential", PLOT_POTENTIAL, 1 },
+                { "dissipated", PLOT_LOSS, 1 },
+                { "work", PLOT_WORK, 0 } };
+  pw_curves c;
+  int status = pw_curves_begin (&c, &plots->figures, "energy", "energy, work and their balance", error);
+  if (status != PW_OK) return status;
+  figures_panel (&c, plots, "energy, work [J]", 0, NULL);
+  for (int k = 0; k < 4; k++) {
+    int shown = !curve[k].optional;
+    for (int i = 0; i < plots->samples; i++) shown |= pw_plot_sample (plots, i)[curve[k].place] != 0;
+    if (shown) figures_curve (&c, plots, curve[k].label, curve[k].place, 0);
+  }
+  figures_events (&c, plots);
+  figures_panel (&c, plots, "balance [J]", 0, NULL);
+  figures_curve (&c, plots, NULL, PLOT_BALANCE, 0);
+  figures_events (&c, plots);
+  return pw_curves_close (&c, PW_OK, error);
+}
+
+const char *pw_plot_output (const pw_plots *plots, int o, char buffer[PW_NAME_BYTES], const char **unit) {
+  const pw_system *s = plots->system;
+  const int states = pw_system_states (s), state = 2 * pw_system_coordinates (s) - states + o;
+  *unit = o < states ? pw_system_state_unit (s, state) : pw_system_output_unit (s, o - states);
+  return o < states ? pw_system_state_name (s, state, buffer, PW_NAME_BYTES) : pw_system_output_name (s, o - states);
+}
+
+/* A panel for each first-order state and output; no figure without them. */
+static int figures_outputs (const pw_plots *plots, pw_error *error) {
+  pw_curves c;
+  int status = pw_curves_begin (&c, &plots->figures, "outputs", "outputs", error);
+  if (status != PW_OK) return status;
+  for (int o = 0; o < plots->outputs; o++) {
+    char buffer[PW_NAME_BYTES];
+    const char *unit, *name = pw_plot_output (plots, o, buffer, &unit);
+    figures_panel (&c, plots, PW_FIGURE_LABEL (name, unit), 0, NULL);
+    figures_curve (&c, plots, NULL, plots->sample_size - plots->outputs + o, 0);
+    figures_events (&c, plots);
+  }
+  return pw_curves_close (&c, PW_OK, error);
+}
+
 int pw_plots_finish (pw_plots *plots, int draw, pw_error *error) {
-  static const char *const names[] = { "paths", "velocities", "angular", "energy", "mechanism", NULL };
-  static const char energy[] = "t [s], kinetic [J], potential [J], work [J], loss [J], projection [J], balance [J]";
+  const char *names[] = { "paths", "mechanism", "velocities", "angular", "energy", plots->outputs ? "outputs" : NULL,
+                          NULL };
+  static int (*const curves[]) (const pw_plots *plots, pw_error *error) = { figures_velocities, figures_angular,
+                                                                            figures_energy, figures_outputs };
   const char *folder = plots->figures.folder;
   if (folder == NULL) return PW_OK;
   if (plots->samples < 2) {
@@ -421,41 +574,13 @@ int pw_plots_finish (pw_plots *plots, int draw, pw_error *error) {
   int closeup = data_closeup (plots), status = data_tracks (plots, &plots->bodies, error);
   if (status == PW_OK) status = data_tracks (plots, &plots->wheels, error);
   if (status == PW_OK)
-    status =
-        data_table (plots, "energy.dat", energy, plots->data, plots->sample_size, PLOT_FIRST, plots->samples, error);
-  if (status == PW_OK)
     status = data_table (plots, "ground.dat", "points of the ground: x [m], y [m]", *plots->ground, 2, 2,
                          plots->grounds, error);
   if (status == PW_OK && plots->paths) status = data_paths (plots, error);
   if (status == PW_OK) status = data_mechanism (plots, "mechanism.dat", plots->samples, error);
   if (status == PW_OK && closeup > 0) status = data_mechanism (plots, "mechanism-closeup.dat", closeup, error);
-  for (const char *const *name = names; status == PW_OK && *name; name++)
-    status = figures_write (plots, *name, closeup, error);
+  for (int i = 0; i < 2 && status == PW_OK; i++) status = figures_write (plots, names[i], closeup, error);
+  for (int i = 0; i < 4 && status == PW_OK; i++) status = curves[i](plots, error);
   if (status != PW_OK) return status;
   return draw ? pw_figure_draw (folder, names, error) : pw_figure_undrawn (folder, names, "the run was interrupted");
-}
-
-const char *pw_plot_output (const pw_plots *plots, int o, char buffer[PW_NAME_BYTES], const char **unit) {
-  const pw_system *s = plots->system;
-  const int states = pw_system_states (s), state = 2 * pw_system_coordinates (s) - states + o;
-  *unit = o < states ? pw_system_state_unit (s, state) : pw_system_output_unit (s, o - states);
-  return o < states ? pw_system_state_name (s, state, buffer, PW_NAME_BYTES) : pw_system_output_name (s, o - states);
-}
-
-int pw_plots_outputs (const pw_plots *plots, const pw_cli_line *line, int draw, pw_error *error) {
-  pw_curves c;
-  if (plots->figures.folder == NULL || plots->outputs == 0 || plots->samples < 2) return PW_OK;
-  int status = pw_curves_open (&c, line, plots->figures.folder, "outputs", "outputs", error);
-  for (int o = 0; status == PW_OK && o < plots->outputs; o++) {
-    char buffer[PW_NAME_BYTES];
-    const char *unit, *name = pw_plot_output (plots, o, buffer, &unit);
-    pw_curves_panel (
-        &c, &(pw_panel){ .x_label = "t [s]", .y_label = PW_FIGURE_LABEL (name, unit), .type = o ? PW_PANEL_BELOW : 0 });
-    pw_curves_add (&c, "line", NULL);
-    for (int i = 0; i < plots->samples; i++) {
-      const double *sample = pw_plot_sample (plots, i);
-      pw_curves_point (&c, sample[PLOT_T], sample[plots->sample_size - plots->outputs + o], 0);
-    }
-  }
-  return draw ? pw_curves_draw (&c, status, error) : pw_curves_close (&c, status, error);
 }

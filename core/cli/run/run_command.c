@@ -493,9 +493,8 @@ static void run_name_files (pw_run_cli *command, pw_error *error) {
 static int run_finish_figures (pw_run_cli *command, const char *reason, pw_error *error) {
   pw_error draw_error = { 0 };
   int status = PW_OK, animated = 0;
+  if (command->plots && command->run) pw_plots_events (command->plots, command->run);
   if (command->plots && command->run) status = pw_plots_finish (command->plots, !pw_stop, &draw_error);
-  if (command->plots && command->run && status == PW_OK)
-    status = pw_plots_outputs (command->plots, &command->line, !pw_stop, &draw_error);
   if (command->plots && command->run && command->output[PW_RUN_PAGE])
     animated = pw_animate (command->plots, command->page_path, command->output[PW_RUN_PAGE], command->method, reason);
   if (!animated) run_discard (command, PW_RUN_PAGE);

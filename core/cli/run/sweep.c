@@ -545,9 +545,7 @@ static const struct poptOption sweep_options[] = {
   PW_LIST_OPTION (pw_sweep, ranges, "vary", 'v', "NAME=RANGE",
                   "Vary a parameter or an initial value such as frame.vx; repeatable, the last one varies fastest. "
                   "RANGE: lin:FIRST:LAST:COUNT, log:FIRST:LAST:COUNT, or a list V1,V2,..."),
-  PW_LIST_OPTION (pw_sweep, plan.of, "of", 0, "OUTPUT",
-                  "Add a column: a column of the table of `run` at the end, or its max:, min:, mean:, integral:, rms: "
-                  "or at TIME:, such as max:B.Fx; or an expression of these; repeatable"),
+  PW_LIST_OPTION (pw_sweep, plan.of, "of", 0, "OUTPUT", "Add a column: " PW_OUTPUT_HELP "; repeatable"),
   PW_TEXT_OPTION (pw_sweep, path, "output", 'o', "FILE.csv", "Write the table to this file"),
   PW_TEXT_OPTION (pw_sweep, jobs_text, "jobs", 'j', "N", "Number of threads (default: one per processor)"),
   PW_TEXT_OPTION (pw_sweep, lanes_text, "lanes", 0, "N",

@@ -167,6 +167,7 @@ int page_run (const char *method, double step, double rtol, double t_end, double
     status = pw_fail (&page_error, PW_METHOD,
                       "stopped at t = %.4g s, after %g s of computation; a larger step or tolerance is faster",
                       pw_run_time (r), limit / 1000);
+  if (page_plots) pw_plots_events (page_plots, r);
   pw_run_close (r);
   return status;
 }

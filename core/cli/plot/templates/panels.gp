@@ -24,6 +24,8 @@ look(s, i) = \
   s eq 'thin' ? 'lines '.line(0.8, '1', '777777') : \
   s eq 'change' ? 'vectors nohead '.line(0.7, '(2,4)', '000000') : \
   s eq 'fold' ? 'vectors nohead '.line(0.7, '(10,4,2,4)', 'c49a00') : \
+  s eq 'event' ? sprintf("vectors nohead lw 0.5 dt %s lc rgb '%s'", word(dashes, i % 4 + 1), colour(9 - i%8)) : \
+  s eq 'graded' ? 'lines lw 0.7 dt 1 lc palette' : \
   s eq 'band' ? "boxxyerror fc rgb '#e8e8e8' fs solid noborder" : \
   s eq 'bars' ? "yerrorbars pt 7 ps 0.35 lw 0.6 lc rgb '#888888'" : \
   s eq 'data' ? spot(7, 0.35, '888888') : \
@@ -33,10 +35,19 @@ look(s, i) = \
   s eq 'dots' ? spot(7, 0.6, 'cc6677') : \
   s eq 'rings' ? spot(6, 0.9, '777777') : \
   s eq 'numbered' ? 'points pt 7 ps 0.5 lc variable' : 'points pt 7 ps 0.35 lc palette'
-across(s) = s eq 'change' || s eq 'fold'
-part(s, k) = across(s) ? sprintf('1:(%g):(0):(%g)', limit(k, 3), limit(k, 4) - limit(k, 3)) : \
+array tens[max(1, panels)]
+do for [k = 1:panels] { tens[k] = is('logy', k) || get('aspect', k) > 0 ? 0 : power(limit(k, 3), limit(k, 4)) }
+shown_column(k, c) = tens[k] ? sprintf('($%d/1e%d)', c, tens[k]) : sprintf('%d', c)
+raised(n) = (number = sprintf('%d', n), shown = '', sum [j = 1:strlen(number)] (shown = shown. \
+  (number[j:j] eq '-' ? '⁻' : word('⁰ ¹ ² ³ ⁴ ⁵ ⁶ ⁷ ⁸ ⁹', number[j:j] + 1)), 0), shown)
+powered(label, n) = n == 0 ? label : (at = strstrt(label, '['), power_of_ten = '10'.raised(n), \
+  at ? label[1:at].power_of_ten.' '.label[at + 1:*] : label.' ['.power_of_ten.']')
+across(s) = s eq 'change' || s eq 'fold' || s eq 'event'
+shown_limit(k, i) = limit(k, i)/10.0**tens[k]
+part(s, k) = across(s) ? sprintf('1:(%g):(0):(%g)', shown_limit(k, 3), shown_limit(k, 4) - shown_limit(k, 3)) : \
   s eq 'band' ? sprintf('(%g):2:(%g):(%g):(%g):2', limit(k, 1), limit(k, 1), limit(k, 2), limit(k, 3)) : \
-  s eq 'bars' || s eq 'numbered' || s eq 'scale' ? '1:2:3' : '1:2'
+  s eq 'bars' ? '1:'.shown_column(k, 2).':'.shown_column(k, 3) : \
+  '1:'.shown_column(k, 2).(s eq 'numbered' || s eq 'scale' || s eq 'graded' ? ':3' : '')
 # A label of a method without its stabilisation.
 without(s) = (plus = strstrt(s, '+'), colon = strstrt(s, ':'), \
   plus == 0 ? s : s[1:plus - 1].(colon > plus ? s[colon:*] : ''))
@@ -60,6 +71,7 @@ do for [k = 1:panels] {
   methods = 0
   used = 0 # colours
   solid = 0 # curves of style `line`
+  marked = 0 # of style `event`
   longest = 8
   plots[k] = 'plot NaN notitle'
   legends[k] = 'plot NaN notitle'
@@ -70,6 +82,8 @@ do for [k = 1:panels] {
     s = word(get('style', c), 1)
     label = get('label', c)
     solid = solid + (s eq 'line')
+    marked = marked + (s eq 'event')
+    n = s eq 'line' ? solid : s eq 'event' ? marked : i
     if (s eq 'method') {
       stabilisation = word(get('style', c), 2)
       colour_of[i] = 0
@@ -88,7 +102,7 @@ do for [k = 1:panels] {
     }
     if (get('block', c) >= 0) {
       plots[k] = plots[k].sprintf(', data index %d using %s with %s notitle', get('block', c), part(s, k), \
-        s eq 'method' ? sprintf('lines ls %d', i) : look(s, i))
+        s eq 'method' ? sprintf('lines ls %d', i) : look(s, n))
     }
     if (get('block', c) >= 0 && s eq 'method') { # 10 to 19 marks, or all, at other places than those of other methods
       step = max(1, get('points', c)/10)
@@ -97,9 +111,9 @@ do for [k = 1:panels] {
     }
     if (strlen(label)) {
       entries[k] = entries[k] + 1
-      longest = max(longest, strlen(label))
+      longest = max(longest, strlen(short(label)))
       legend[k] = legend[k].label."\n"
-      legends[k] = legends[k].sprintf(", keyentry with %s title get('label', %d)", look(s, i), c)
+      legends[k] = legends[k].sprintf(", keyentry with %s title short(get('label', %d))", look(s, n), c)
     }
   }
   if (solid) { eval lines(max(4, solid)) }
@@ -115,7 +129,7 @@ array x0[panels] # [pt]
 array x1[panels]
 array y0[panels]
 array y1[panels]
-do for [k = 1:panels] { if (!is('logy', k)) { left = margin_of(limit(k, 3), limit(k, 4), 0) } }
+do for [k = 1:panels] { if (!is('logy', k)) { left = margin_of(limit(k, 3), limit(k, 4), tens[k]) } }
 full = width - left - right
 beside = 0 # 1: there is room on the right of the last panel
 do for [k = 1:panels] {
@@ -165,10 +179,10 @@ do for [form in forms] {
     set format y (is('logy', k) ? '10^{%T}' : '%g')
     set format cb '%g'
     set xlabel (joined(k + 1) ? '' : get('x', k)) noenhanced
-    set ylabel get('y', k) noenhanced
+    set ylabel powered(get('y', k), tens[k]) noenhanced
     set cblabel get('scale', k) offset 1.5,0 noenhanced
     set xrange [limit(k, 1):limit(k, 2)]
-    set yrange [limit(k, 3):limit(k, 4)]
+    set yrange [shown_limit(k, 3):shown_limit(k, 4)]
     set cbrange [limit(k, 5):limit(k, 6)]
     eval panel(x0[k], x1[k], y0[k], y1[k])
     eval plots[k]
