@@ -127,8 +127,8 @@ struct pw_run {
   pw_thresholds thresholds;                 /* of the watchdog */
   pw_watchdog watchdog;                     /* the sine, which measures the distance from a singular configuration */
   double refused_sine;                      /* largest sine at which an evaluation is refused */
-  double located; /* time of the last sample at which an event or a crossing was sought: it is not interpolated */
-  int near_singular;                        /* 1 after an evaluation near a singular configuration in the last step */
+  double located;    /* time of the last sample at which an event or a crossing was sought: it is not interpolated */
+  int near_singular; /* 1 after an evaluation near a singular configuration in the last step */
   double reference_level; /* largest acceleration norm away from singular configurations, in units of L / T^2; >= 1 */
   double previous_norm;   /* acceleration norm of the last such state */
   int uses_derivatives;   /* 1: the method uses the derivatives of the equations (tangent.h); only for opening */

@@ -375,8 +375,8 @@ TEST (samples_of_shortened_steps) {
   pw_system_free (s);
 }
 
-/* The first impact of the pendulum, whatever the number of samples with which it is located: samples of steps, with which
- * the modes are decided, are not those interpolated for tables. */
+/* The first impact of the pendulum, whatever the number of samples with which it is located: samples of steps, with
+ * which modes are decided, are not those interpolated for tables. */
 TEST (all_tolerances) {
   static const char *const methods[] = { "erk5+projection", "erk8+projection", "erk8+none", "erk8+baumgarte" };
   const double impulse = 1.6 * sqrt (2 * 9.81 * cos (PW_PI / 6));

@@ -94,9 +94,10 @@ typedef struct {
   int bars;                          /* 1: z is a standard deviation */
 } pw_curves;
 
-/* Opens NAME.dat and NAME.gp in the folder, of the width that the command line gives; or as `figures` says.  Then panels and curves are added
- * in turn, curves to the last panel, points to the last curve.  A panel without points is omitted unless its axes
- * are given, a figure without panels is not written.  PW_OK, PW_INPUT for the width, or PW_RESOURCE. */
+/* Opens NAME.dat and NAME.gp in the folder, of the width that the command line gives, or as `figures` says.  Panels
+ * and curves are added in turn, curves to the last panel, points to the last curve.  A panel without points is
+ * omitted unless its axes are given, a figure without panels is not written.  PW_OK, PW_INPUT for the width, or
+ * PW_RESOURCE. */
 int pw_curves_open (pw_curves *c, const pw_cli_line *line, const char *folder, const char *name, const char *title,
                     pw_error *error);
 int pw_curves_begin (pw_curves *c, const pw_figures *figures, const char *name, const char *title, pw_error *error);

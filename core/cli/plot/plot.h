@@ -171,8 +171,7 @@ static inline int pw_plot_pick (int i, int chosen, int all) {
   return (int)((long long)i * all / chosen);
 }
 
-/* The first constraint equation, from `row` on, of an element with events, whose last equation is before *end; -1: there
- * is none. */
+/* The first constraint equation of an element with events, from `row` on; *end: the one after its last; or -1. */
 int pw_plot_marked (const pw_plots *plots, int row, int *end);
 
 /* The name of body or wheel k of those drawn. */
