@@ -112,7 +112,9 @@ static int outcome_add_term (pw_outcomes *set, pw_outcome *o, const char *origin
                              char variable[OUTCOME_VARIABLE], pw_error *error) {
   pw_functional functional;
   pw_error own = { 0 };
-  if (outcome_functional (set->system, name, origin, &functional, &own) != PW_OK)
+  const int status = outcome_functional (set->system, name, origin, &functional, &own);
+  outcome_type (&name); /* the column in the messages below */
+  if (status != PW_OK)
     return next == ':' ? pw_fail (error, PW_INPUT, "%s: no \"%s:\"; valid are " OUTCOME_PREFIXES, origin, name)
                        : pw_fail (error, PW_INPUT, "%s", own.text);
   const pw_column c = functional.column;
