@@ -192,6 +192,9 @@ char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size);
  * velocity saturates a force.  adams, bdf, ida and radau keep their tolerances below it, whatever the settings. */
 int pw_run_saturation (pw_run *r, double *least, char *element, size_t size);
 
+/* The mode of a constraint equation at the state reached, as of pw_event; 0 without limits. */
+int pw_run_mode (const pw_run *r, int row);
+
 /* The events since the run was opened, in the order of time; valid until it advances. */
 const pw_event *pw_run_events (const pw_run *r, int *count);
 

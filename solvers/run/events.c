@@ -799,6 +799,13 @@ int pw_events_begin (pw_run *r, pw_error *error) {
   return status;
 }
 
+int pw_run_mode (const pw_run *r, int row) {
+  const pw_events *x = r ? r->events : NULL;
+  for (int i = 0; x && i < x->count; i++)
+    if (x->row[i] == row) return x->mode[i];
+  return 0;
+}
+
 void pw_events_serialise (pw_run *r, pw_archive *a) {
   pw_events *x = r->events;
   if (x == NULL) return;

@@ -6,6 +6,7 @@
 #include <string.h>
 #include "pinwheel-analysis.h"
 #include "pinwheel-selftest.h"
+#include "outcome.h"
 #include "report.h"
 
 enum {
@@ -21,6 +22,14 @@ typedef struct {
   pw_selftest_report random, in_model; /* of elements in random scenes; of those in this model */
   char untested[500];                  /* why there is no test in random scenes, or "" */
 } pw_checked_kind;
+
+/* A constraint equation with limits, in the run of the model. */
+typedef struct {
+  int row, mode;  /* mode: at the start */
+  double used, t; /* the largest part of the limit that the reaction uses, and when [s]; NaN: there is none */
+  double first;   /* time of the first event [s]; NaN: there is none */
+  double events;  /* their number; NaN: not known */
+} pw_checked_limit;
 
 /* Messages; `room`: number of those for which there is memory. */
 typedef struct {
@@ -39,6 +48,8 @@ typedef struct {
   const char **redundant; /* a description of each redundant constraint equation, ended by NULL; or NULL */
   pw_checked_kind *kind;  /* kinds: the element types in use */
   int kinds;
+  pw_checked_limit *limit; /* limits */
+  int limits;
   int reference_states; /* states of the model's reference solution, compared with the initial state */
   double step;          /* the model's step size [s] */
   int uses_rk4;         /* 1: the model's method is rk4 */
@@ -124,6 +135,57 @@ static int check_kind (pw_check *check, pw_checked_kind *k, pw_error *error) {
     check_add (&check->problem, "element type %s fails its self-test: %s (%s)", k->kind->name, fault->about,
                fault->where);
   return status;
+}
+
+/* ---- Limits of reactions ---- */
+
+enum { CHECK_LIMIT_OUTPUTS = 4, CHECK_LIMIT_SECONDS = 10 /* of processor time */ };
+
+static void check_limit (const pw_outcomes *set, pw_checked_limit *l, int first) {
+  const pw_bounds *bounds = pw_system_limits (set->system, l->row);
+  l->first = pw_outcome_value (set, first + 2), l->events = pw_outcome_value (set, first + 3);
+  for (int side = 0; side < 2; side++) { /* reactions are -lambda */
+    const pw_functional *f = &set->functional[set->outcome[first + side].term[0]];
+    const double most = side ? bounds->most : bounds->least, used = -f->value / most;
+    if (isfinite (most) && most != 0 && !(used <= l->used)) l->used = used, l->t = f->t;
+  }
+}
+
+/* Modes at the start, and what the run of the model uses of the limits. */
+static int check_limits (pw_check *check, pw_error *error) {
+  static const char *const prefix[CHECK_LIMIT_OUTPUTS] = { "max:", "min:", "event:", "events:" };
+  const pw_system *s = check->line.m.system;
+  const char *method = check->line.m.defaults.method;
+  const int n = pw_system_limited (s);
+  pw_arena *arena = &check->line.arena;
+  const char **text = pw_arena_alloc (arena, (CHECK_LIMIT_OUTPUTS * (size_t)n + 1) * sizeof *text);
+  check->limit = pw_arena_alloc (arena, ((size_t)n + 1) * sizeof *check->limit);
+  if (text == NULL || check->limit == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  for (int row = 0; row < pw_system_rows (s) && n > 0; row++) {
+    if (pw_system_limits (s, row) == NULL) continue;
+    for (int k = 0; k < CHECK_LIMIT_OUTPUTS; k++) {
+      const char *name = PW_NAME (pw_system_reaction_name, s, row);
+      const char **of = &text[CHECK_LIMIT_OUTPUTS * check->limits + k];
+      *of = pw_arena_copy (arena, PW_PRINTED (PW_NAME_BYTES + 10, "%s%s", prefix[k], name));
+      if (*of == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+    }
+    check->limit[check->limits++] = (pw_checked_limit){ row, pw_run_mode (check->run, row), NAN, NAN, NAN, NAN };
+  }
+  if (n == 0) return PW_OK;
+  pw_outcomes set;
+  pw_settings settings;
+  pw_limit seconds;
+  pw_error own = { 0 };
+  int status = pw_outcomes_open (&set, s, "check", text, CHECK_LIMIT_OUTPUTS * n, NULL, error);
+  if (status == PW_OK) status = pw_cli_settings (&check->line, &check->line.m.defaults, &settings, &seconds, error);
+  seconds.seconds = CHECK_LIMIT_SECONDS;
+  pw_limit_start (&seconds);
+  if (status == PW_OK && pw_outcomes_run (&set, method, &settings, settings.span, NULL, &own) != PW_OK)
+    check_add (&check->finding, "what the run uses of the limits of reactions is not known: %s", own.text);
+  for (int i = 0; status == PW_OK && own.status == PW_OK && i < check->limits; i++)
+    check_limit (&set, &check->limit[i], CHECK_LIMIT_OUTPUTS * i);
+  pw_outcomes_close (&set);
+  return own.status == PW_RESOURCE ? pw_fail (error, own.status, "%s", own.text) : status;
 }
 
 /* ---- Wheels ---- */
@@ -476,6 +538,27 @@ static void report_linear (pw_json *j, const pw_check *check) {
   pw_json_print (j, "]}");
 }
 
+static void report_limits (pw_json *j, const pw_check *check) {
+  const pw_system *s = check->line.m.system;
+  if (check->limits == 0) return;
+  report_section (j, "limits", '[', "Limits of reactions, in the run of the model");
+  for (const pw_checked_limit *l = check->limit; l < check->limit + check->limits; l++) {
+    const char *reaction = PW_NAME (pw_system_reaction_name, s, l->row),
+               *mode = pw_system_mode_name (s, l->row, l->mode);
+    pw_json_print (j, "\n{reaction: %s, element: %s, mode: %s, events: %g, first: %g, used: %g, t: %g}", reaction,
+                   PW_NAME (pw_system_row_name, s, l->row), mode, l->events, l->first, l->used, l->t);
+    if (l->events > 0)
+      report_text (j, reaction, "%s at the start; %s, the first at t = %s s", mode, PW_COUNTED (l->events, "event"),
+                   PW_DIGITS (l->first, 6));
+    else if (l->used >= 0)
+      report_text (j, reaction, "%s and uses %s %% of its limit at most, at t = %s s", mode,
+                   PW_DIGITS (100 * l->used, 3), PW_DIGITS (l->t, 4));
+    else
+      report_text (j, reaction, "%s at the start%s", mode, l->events == 0 ? "; no events" : "");
+  }
+  pw_json_close (j, ']');
+}
+
 static void report_list (pw_json *j, const char *key, const char *one, const pw_check_list *list) {
   if (list->count > 0) report_print (j, "\n%d %s\n", list->count, list->count == 1 ? one : key);
   report_section (j, key, '[', NULL);
@@ -517,6 +600,7 @@ static void report_write (const pw_check *check, pw_json *j) {
     pw_json_print (j, "]}");
   }
   pw_json_close (j, ']');
+  report_limits (j, check);
   report_linear (j, check);
   report_line (j);
   pw_json_close (j, '}');
@@ -547,6 +631,7 @@ static int check_model (pw_check *check, pw_error *error) {
     check->redundant = pw_report_redundancies (check->run);
     check_given_values (check);
     status = check_reference (check, error);
+    if (status == PW_OK) status = check_limits (check, error);
     if (status == PW_OK) status = check_linear (check, error);
   }
   if (status == PW_OK) check_wheels (check);
