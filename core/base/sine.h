@@ -57,20 +57,26 @@ static inline pw_lanes pw_cosine_polynomial (pw_lanes y, pw_lanes lo) {
   return w + (((1 - w) - half) + (z * (z * r) - y * lo));
 }
 
-/* For |x| < PW_SINE_LIMIT in all lanes. */
-static inline void pw_sin_cos_lanes (pw_lanes x, pw_lanes *sine, pw_lanes *cosine) {
+/* Reduces |x| < PW_SINE_LIMIT in all lanes to y + lo.  Returns n. */
+static inline pw_lane_bits pw_sine_reduce (pw_lanes x, pw_lanes *y, pw_lanes *lo) {
   const double two_by_pi = 6.36619772367581382433e-01;
   const double half_pi_1 = 1.57079632673412561417e+00, half_pi_2 = 6.07710050630396597660e-11,
                half_pi_3 = 2.02226624871116645580e-21, half_pi_tail = 8.47842766036889956997e-32;
   const double integers = 6755399441055744.0; /* 1.5 x 2^52: adding it rounds to an integer, in the sum's last bits */
   pw_lanes shifted = x * two_by_pi + integers, n = shifted - integers;
-  pw_lanes y1 = x - n * half_pi_1, part2 = n * half_pi_2, part3 = n * half_pi_3;
-  pw_lanes y2 = y1 - part2, y = y2 - part3;
+  pw_lanes y1 = x - n * half_pi_1, part2 = n * half_pi_2, part3 = n * half_pi_3, y2 = y1 - part2;
+  *y = y2 - part3;
   /* The round-off of both differences, exactly (Dekker 1971).  If the minuend is the smaller number, the difference
    * is exact and this gives 0. */
-  pw_lanes lo = (((y1 - y2) - part2) + ((y2 - y) - part3)) - n * half_pi_tail;
+  *lo = (((y1 - y2) - part2) + ((y2 - *y) - part3)) - n * half_pi_tail;
+  return pw_sine_bits (shifted);
+}
+
+/* For |x| < PW_SINE_LIMIT in all lanes. */
+static inline void pw_sin_cos_lanes (pw_lanes x, pw_lanes *sine, pw_lanes *cosine) {
+  pw_lanes y, lo;
   /* In odd quadrants sine and cosine are exchanged; bit 1 of n is the sign of the sine, of n + 1 that of the cosine. */
-  pw_lane_bits quadrant = pw_sine_bits (shifted), odd = 0 - (quadrant & 1);
+  pw_lane_bits quadrant = pw_sine_reduce (x, &y, &lo), odd = 0 - (quadrant & 1);
   pw_lane_bits sine_bits = pw_sine_bits (pw_sine_polynomial (y, lo)),
                cosine_bits = pw_sine_bits (pw_cosine_polynomial (y, lo)), swap = (sine_bits ^ cosine_bits) & odd;
   *sine = pw_sine_value (sine_bits ^ swap ^ (quadrant >> 1 << 63));

@@ -8,6 +8,19 @@
 #include <stdio.h>
 #include "pinwheel.h"
 
+/* Replaces `static` of a function that is compiled once per set of constant arguments, such as a size. */
+#define PW_INLINE static inline __attribute__ ((always_inline))
+
+/* The same of a function that few scenes call: inlined, it would add to the cost of its caller. */
+#define PW_SELDOM static __attribute__ ((noinline))
+
+/* Before a loop whose length, at most 10, is constant after inlining.  Clang unrolls it without a pragma. */
+#ifndef __clang__
+#define PW_UNROLL _Pragma ("GCC unroll 10")
+#else
+#define PW_UNROLL
+#endif
+
 /* PW_INPUT if object is NULL, the result of an earlier call that failed; type: "a system". */
 static inline int pw_require (const void *object, const char *type, pw_error *error) {
   return object ? PW_OK : pw_fail (error, PW_INPUT, "%s is missing", type);

@@ -533,7 +533,7 @@ static int compile_constant_forces (const compilation *job) {
   if (!constant) return PW_OK;
   pw_workspace *w = pw_workspace_new (s, job->error);
   if (w == NULL) return PW_RESOURCE;
-  pw_add_forces (w, 1, s->constant);
+  pw_add_constant_forces (w, s->constant);
   pw_workspace_free (w);
   return PW_OK;
 }

@@ -40,28 +40,42 @@ void pw_evaluate_gamma (pw_workspace *w, double *gamma) {
   evaluate_rows (w, offsetof (pw_kind, gamma), w->s->rows, gamma);
 }
 
-void pw_add_forces (const pw_workspace *w, int constant, double *f) {
+/* Calls f (..., bodies, internal) for a batch, with constants for the commonest numbers, so that its loops over the
+ * columns of an element are unrolled. */
+#define EVALUATE_UNROLLED(k, f, ...)                                                                          \
+  ((k)->kind->internal > 0 || (k)->kind->bodies > 2 ? f (__VA_ARGS__, (k)->kind->bodies, (k)->kind->internal) \
+   : (k)->kind->bodies == 2                         ? f (__VA_ARGS__, 2, 0)                                   \
+                                                    : f (__VA_ARGS__, 1, 0))
+
+PW_INLINE void evaluate_add_blocks (const pw_element_batch *k, double *f, int bodies, int internal) {
+  const double *block = k->block;
+  const int *column = k->column;
+  double *own = f + k->internal;
+  for (int e = k->b.count; e > 0; e--) {
+    PW_UNROLL for (int n = 0; n < bodies; n++, block += 3) {
+      double *to = f + *column++;
+      to[0] += block[0], to[1] += block[1], to[2] += block[2];
+    }
+    for (int n = 0; n < internal; n++) *own++ += *block++;
+  }
+}
+
+PW_INLINE void evaluate_add_forces (const pw_workspace *w, int constant, double *f) {
   const pw_element_batch *k = w->batch + (constant ? 0 : w->s->first_force), *end = w->batch + w->s->batches;
   for (; k < end; k++) {
-    const pw_kind *kind = k->kind;
-    if (kind->force == NULL || (kind->constant != 0) != constant) continue;
-    const double *block = k->block;
-    const int *column = k->column, bodies = kind->bodies, internals = kind->internal;
-    double *internal = f + k->internal;
-    kind->force (&k->b, k->block);
-    for (int e = k->b.count; e > 0; e--) {
-      for (int n = bodies; n > 0; n--, block += 3) {
-        double *to = f + *column++;
-        to[0] += block[0], to[1] += block[1], to[2] += block[2];
-      }
-      for (int n = internals; n > 0; n--) *internal++ += *block++;
-    }
+    if (k->kind->force == NULL || (k->kind->constant != 0) != constant) continue;
+    k->kind->force (&k->b, k->block);
+    EVALUATE_UNROLLED (k, evaluate_add_blocks, k, f);
   }
+}
+
+void pw_add_constant_forces (const pw_workspace *w, double *f) {
+  evaluate_add_forces (w, 1, f);
 }
 
 void pw_evaluate_force (pw_workspace *w, double *f) {
   memcpy (f, w->s->constant, (size_t)w->s->coords * sizeof *f);
-  pw_add_forces (w, 0, f);
+  evaluate_add_forces (w, 0, f);
 }
 
 double pw_potential (pw_workspace *w) {
@@ -131,15 +145,15 @@ void pw_worst_position (const pw_system *s, const double *g, const double *size,
 }
 
 /* Updates the worst residual J v - eta with a batch; eta NULL: zero; unit: L / T of a run. */
-static inline void evaluate_worst_velocity (const pw_element_batch *k, const double *eta, const unsigned char *enforced,
-                                            double unit, pw_residuals *worst) {
+PW_INLINE void evaluate_worst_velocity (const pw_element_batch *k, const double *eta, const unsigned char *enforced,
+                                        double unit, pw_residuals *worst, int bodies, int internal) {
   const double *J = k->J, *rate = k->b.v;
   const pw_configuration *configuration = k->b.configuration;
-  const int rows = k->kind->rows, bodies = k->kind->bodies, internal = k->kind->internal, *body = k->b.body;
-  for (int e = 0, i = k->row; e < k->b.count; e++, body += bodies, rate += internal)
-    for (const int end = i + rows; i < end; i++) {
+  const int *body = k->b.body;
+  for (int e = k->b.count, i = k->row; e > 0; e--, body += bodies, rate += internal)
+    for (const int end = i + k->kind->rows; i < end; i++) {
       double sum = 0, size = unit;
-      for (int n = 0; n < bodies; n++, J += 3) {
+      PW_UNROLL for (int n = 0; n < bodies; n++, J += 3) {
         const pw_configuration *p = configuration + body[n];
         double x = J[0] * p->vx, y = J[1] * p->vy, phi = J[2] * p->omega; /* terms of J v */
         sum += x + y + phi;
@@ -160,7 +174,7 @@ void pw_evaluate_velocity_residual (pw_workspace *w, const unsigned char *enforc
   double *eta = w->s->rheonomic ? w->scratch : NULL, unit = w->scale.length / w->scale.time;
   pw_residuals worst = { .row_velocity = -1 };
   if (eta) pw_evaluate_eta (w, eta);
-  PW_EACH_CONSTRAINT (k, w) evaluate_worst_velocity (k, eta, enforced, unit, &worst);
+  PW_EACH_CONSTRAINT (k, w) EVALUATE_UNROLLED (k, evaluate_worst_velocity, k, eta, enforced, unit, &worst);
   r->velocity = worst.velocity, r->jv = worst.jv, r->row_velocity = worst.row_velocity;
 }
 

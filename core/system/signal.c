@@ -181,10 +181,13 @@ static int signal_function (const pw_source *source, double t) {
 
 /* offset + A cos (omega t + phase) and its derivatives, A the amplitude */
 static void signal_harmonic (const pw_signal *s, double t, int derivatives, double u[3]) {
-  double A = s->harmonic.amplitude, omega = s->harmonic.omega, sine, cosine;
-  pw_sin_cos (omega * t + s->harmonic.phase, &sine, &cosine);
+  double A = s->harmonic.amplitude, omega = s->harmonic.omega, x = omega * t + s->harmonic.phase, sine, cosine;
+  if (!derivatives) {
+    u[0] = s->harmonic.offset + A * pw_cos (x);
+    return;
+  }
+  pw_sin_cos (x, &sine, &cosine);
   u[0] = s->harmonic.offset + A * cosine;
-  if (!derivatives) return;
   u[1] = -A * omega * sine;
   u[2] = -omega * omega * (A * cosine);
 }

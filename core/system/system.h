@@ -247,8 +247,8 @@ void pw_evaluate_g (pw_workspace *w, double *g);         /* holonomic */
 void pw_evaluate_g_size (pw_workspace *w, double *size); /* holonomic, in units of g; at least L, for angles L rad */
 void pw_evaluate_eta (pw_workspace *w, double *eta);
 void pw_evaluate_gamma (pw_workspace *w, double *gamma);
-void pw_evaluate_force (pw_workspace *w, double *f);                 /* constant forces included */
-void pw_add_forces (const pw_workspace *w, int constant, double *f); /* adds those that are constant, or the others */
+void pw_evaluate_force (pw_workspace *w, double *f); /* constant forces included */
+void pw_add_constant_forces (const pw_workspace *w, double *f);
 /* 2 coords: the smallest change of each state that reverses a saturating force or changes it by its own magnitude;
  * INFINITY if there is none. */
 void pw_evaluate_saturation (pw_workspace *w, double *least);

@@ -29,20 +29,7 @@
 #ifndef PW_BLOCK_LDL_H
 #define PW_BLOCK_LDL_H
 
-#include "pinwheel.h"
-
-/* Replaces `static` of a function that is compiled once per set of constant arguments, such as a size. */
-#define PW_INLINE static inline __attribute__ ((always_inline))
-
-/* The same of a function that few scenes call: inlined, it would add to the cost of its caller. */
-#define PW_SELDOM static __attribute__ ((noinline))
-
-/* Before a loop whose length, at most PW_DENSE, is constant after inlining.  Clang unrolls it without a pragma. */
-#ifndef __clang__
-#define PW_UNROLL _Pragma ("GCC unroll 10")
-#else
-#define PW_UNROLL
-#endif
+#include "util.h"
 
 enum {
   PW_DENSE = 10,       /* most equations of a dense S */

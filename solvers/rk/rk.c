@@ -266,23 +266,30 @@ static inline int rk_evaluate_stage (pw_run *r, double t, double *v, double *a, 
   return status;
 }
 
+/* The time of stage i of a step to t1 = t + h.  If it is the end, it must not differ by round-off: signals are evaluated
+ * once per time. */
+static double rk_stage_time (const pw_run *r, int i, double h, double t1) {
+  const double c = r->data->tableau->c[i];
+  return pw_before_breakpoint (r, c == 1 ? t1 : r->t + c * h);
+}
+
 /* Does what rk_stages does by specialised code: 1; 0 if none suits, or it refuses a stage. */
-static int rk_stages_specialised (pw_run *r, double h) {
+static int rk_stages_specialised (pw_run *r, double h, double t1) {
   pw_method_data *d = r->data;
   double t[PW_RK_STAGES];
   if (r->specialised == NULL || d->holds_signals || d->uses_nullspace) return 0;
-  for (int i = 1; i < d->tableau->stages; i++) t[i] = pw_before_breakpoint (r, r->t + d->tableau->c[i] * h);
+  for (int i = 1; i < d->tableau->stages; i++) t[i] = rk_stage_time (r, i, h, t1);
   return pw_specialised_stages (r, &(pw_scene_step){ d->tableau->stages, d->row, h, t, r->q, d->stage_v, d->stage_a,
                                                      d->stage_rate, d->q, d->v, d->lambda });
 }
 
 /* Evaluates stages 1, 2, ...; stage 0 is the state reached.  Then combines them into the new state.  Returns as
  * pw_run_accelerate. */
-static int rk_stages (pw_run *r, double h) {
+static int rk_stages (pw_run *r, double h, double t1) {
   pw_method_data *d = r->data;
   const pw_tableau *tableau = d->tableau;
   d->stage_v[0] = r->v, d->stage_a[0] = r->a, d->stage_rate[0] = r->rate;
-  if (rk_stages_specialised (r, h)) return PW_OK;
+  if (rk_stages_specialised (r, h, t1)) return PW_OK;
   int status = PW_OK;
   if (d->holds_signals) { /* since a sample or a rejected step, the workspace may be at another state */
     status = pw_update_kinematics (r->w, r->t, r->q, r->v);
@@ -290,8 +297,7 @@ static int rk_stages (pw_run *r, double h) {
   }
   for (int i = 1; i < tableau->stages && status == PW_OK; i++) {
     rk_combine (r, d->q, d->stage_v[i], &d->row[i], h);
-    double t = pw_before_breakpoint (r, r->t + tableau->c[i] * h);
-    status = rk_evaluate_stage (r, t, d->stage_v[i], d->stage_a[i], d->stage_rate[i]);
+    status = rk_evaluate_stage (r, rk_stage_time (r, i, h, t1), d->stage_v[i], d->stage_a[i], d->stage_rate[i]);
   }
   if (d->holds_signals) pw_hold_signals (r->w, PW_HOLD_NONE);
   if (status != PW_OK) return status;
@@ -305,7 +311,7 @@ static int rk_stages (pw_run *r, double h) {
 static int rk_step (pw_run *r, double h, double t1, int project, double *added_energy) {
   pw_method_data *d = r->data;
   int status = d->uses_nullspace ? nullspace_begin (&d->nullspace, r) : PW_OK;
-  if (status == PW_OK) status = rk_stages (r, h);
+  if (status == PW_OK) status = rk_stages (r, h, t1);
   if (status != PW_OK) return status;
   if (project) return pw_project_state (&d->projector, r, t1, d->q, d->v, d->a, d->lambda, added_energy);
   if (!d->uses_nullspace) return pw_run_accelerate (r, t1, d->q, d->v, d->a, d->lambda);
