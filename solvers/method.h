@@ -233,7 +233,8 @@ typedef struct {
  * multiple.  Times within 1e-9 h of each other differ by round-off only. */
 #define PW_STEP_LONGER 0.01
 static inline double pw_step_end (const pw_run *r, const pw_step_counter *c, double t_end, int *whole) {
-  double h = r->settings.step, t1 = c->base + (double)(c->count + 1) * h, stop = fmin (t_end, r->breakpoint);
+  double h = r->settings.step, t1 = c->base + (double)(c->count + 1) * h,
+         stop = t_end < r->breakpoint ? t_end : r->breakpoint;
   int is_before = t1 <= stop - PW_STEP_LONGER * h;
   *whole = is_before || fabs (t1 - stop) < 1e-9 * h;
   return is_before ? t1 : stop;
@@ -522,8 +523,14 @@ int pw_specialised_project (const pw_projector *p, pw_run *r, double t, double *
 /* The stages of a step, if specialised code can evaluate all of them: 1; 0 if not.  Kinematics and J are not
  * updated. */
 int pw_specialised_stages (pw_run *r, const struct pw_scene_step *x);
-/* 1 if specialised code may be called for the run's next evaluation; it can still refuse the state. */
-int pw_specialised_suits (const pw_run *r);
+/* 1 if specialised code may be called for the run's next evaluation; it can still refuse the state.  0 also where a
+ * singular configuration may be ahead and steps are fixed: the general functions then compute the sine of every stage.
+ * Adaptive methods need it only below the pivots that the specialised code accepts. */
+static inline int pw_specialised_suits (const pw_run *r) {
+  const pw_watchdog *watch = &r->watchdog;
+  return r->specialised && !r->redundant_drive && !(watch->singular_ahead && watch->saddle && r->fixed_steps) &&
+         !r->near_singular && !r->w->hold;
+}
 /* Adds to the statistics: evaluations, and iterations of projections, of specialised code. */
 void pw_specialised_count (pw_run *r, long evaluations, long iterations);
 

@@ -635,17 +635,17 @@ void pw_block_solve (const pw_block_ldl *l, const double *f, double *y, double *
  * (Golub & Van Loan 2013, Matrix Computations, algorithm 4.1.2), with n, the number of rows, constant where these
  * functions are inlined, so that all loops over rows are unrolled. */
 
-/* S += J W^-1 J^T and y += J W^-1 f for a group; neither if it is NULL.  With n = 1 a group has one row. */
-PW_INLINE void dense_assemble (int width, const pw_dense_group *p, const double *w, const double *f, double *S,
-                               double *y, int n) {
-  const int rows = n == 1 ? 1 : p->rows;
-  for (int r = 0; r < rows; r++) {
-    const block_row R = block_weigh (width, p->row[r].J, w + p->j);
-    const int i = n == 1 ? 0 : p->row[r].i;
-    if (f) y[i] += block_product (width, R, f + p->j);
-    double *row = S + i * n;
-    for (int q = 0; S && q <= r; q++) row[n == 1 ? 0 : p->row[q].i] += block_product (width, R, p->row[q].J);
-  }
+/* S += J W^-1 J^T, if `factors`, and y += J W^-1 f, if `solves`, for a group.  With n = 1 a group has one row. */
+PW_INLINE void dense_assemble (int width, const pw_dense_group *p, int n, int factors, int solves, const double *w,
+                               const double *f, double *S, double *y) {
+  const pw_dense_row *row = p->row, *end = row + (n == 1 ? 1 : p->rows);
+  do {
+    const block_row R = block_weigh (width, row->J, w + p->j);
+    const int i = n == 1 ? 0 : row->i;
+    if (solves) y[i] += block_product (width, R, f + p->j);
+    for (const pw_dense_row *other = p->row; factors && other <= row; other++)
+      S[n == 1 ? 0 : i * n + other->i] += block_product (width, R, other->J);
+  } while (++row < end);
 }
 
 /* L and D of S */
@@ -680,12 +680,17 @@ PW_INLINE void dense_accelerate (int width, const pw_dense_group *p, const doubl
 
 PW_INLINE void dense_run (int n, pw_block_ldl *l, int factors, const double *f, double *lambda, double *a) {
   const pw_dense *d = l->dense;
+  const double *w = l->inverse_weight;
   double S[PW_DENSE * PW_DENSE], y[PW_DENSE];
   if (lambda) PW_UNROLL for (int i = 0; i < n; i++) y[i] = -lambda[d->unknown[i]];
   if (factors) PW_UNROLL for (int i = 0; i < n; i++) PW_UNROLL for (int j = 0; j <= i; j++) S[i * n + j] = 0;
-  if (factors || f)
-    for (const pw_dense_group *p = d->group; p < d->group + d->coupled; p++)
-      BLOCK_WIDTH (p->width, dense_assemble, p, l->inverse_weight, f, factors ? S : NULL, y, n);
+  for (const pw_dense_group *p = d->group, *end = p + d->coupled; (factors || f) && p < end; p++)
+    if (!f)
+      BLOCK_WIDTH (p->width, dense_assemble, p, n, 1, 0, w, f, S, y);
+    else if (!factors)
+      BLOCK_WIDTH (p->width, dense_assemble, p, n, 0, 1, w, f, S, y);
+    else
+      BLOCK_WIDTH (p->width, dense_assemble, p, n, 1, 1, w, f, S, y);
   if (factors && n > 2 && d->padded) S[n * n - 1] = 1;
   if (factors) dense_factor (n, l, S);
   if (lambda == NULL) return;
@@ -699,15 +704,24 @@ PW_INLINE void dense_run (int n, pw_block_ldl *l, int factors, const double *f, 
     BLOCK_WIDTH (p->width, dense_accelerate, p, l->inverse_weight, f, y, a);
 }
 
-#define DENSE_CASE(n)                   \
-  case n:                               \
-    dense_run (n, l, factors, f, y, a); \
-    break;
+#define DENSE_RUN(n)                                                                                     \
+  static void dense_run_##n (pw_block_ldl *l, int factors, const double *f, double *lambda, double *a) { \
+    dense_run (n, l, factors, f, lambda, a);                                                             \
+  }
+
+DENSE_RUN (0)
+DENSE_RUN (1)
+DENSE_RUN (2)
+DENSE_RUN (4)
+DENSE_RUN (6)
+DENSE_RUN (8)
+DENSE_RUN (10)
 
 void pw_dense_run (pw_block_ldl *l, int factors, const double *f, double *y, double *a) {
-  switch (l->dense->n) {
-    DENSE_CASE (0) DENSE_CASE (1) DENSE_CASE (2) DENSE_CASE (4) DENSE_CASE (6) DENSE_CASE (8) DENSE_CASE (10)
-  }
+  static void (*const run[]) (pw_block_ldl *, int, const double *, double *,
+                              double *) = { [0] = dense_run_0, [1] = dense_run_1, [2] = dense_run_2,  [4] = dense_run_4,
+                                            [6] = dense_run_6, [8] = dense_run_8, [10] = dense_run_10 };
+  run[l->dense->n](l, factors, f, y, a);
 }
 
 /* ---- Elimination order ---- */

@@ -80,14 +80,16 @@ typedef struct {
   int includes_last; /* 1: the last pin is eliminated with the chain; 0: it only receives the update by the others */
 } pw_chain;
 
-/* The equations with entries in the columns of a group: these entries, and rows of the dense matrix, ascending. */
+/* A row of the dense matrix with its entries in the columns of a group. */
+typedef struct {
+  const double *J;
+  int i;
+} pw_dense_row;
+
 typedef struct {
   int j, width; /* first coordinate; columns */
   int rows;
-  struct {
-    const double *J;
-    int i;
-  } row[PW_DENSE];
+  pw_dense_row row[PW_DENSE]; /* rows, ascending */
 } pw_dense_group;
 
 /* S of a scene of few equations.  A matrix of an odd number of rows, 3 or more, has one more, that of the unit matrix,

@@ -279,7 +279,7 @@ PW_INLINE int massless_factor_P (int n, pw_component *c, double *P) {
   PW_UNROLL for (int i = 0; i < n * n; i++) P[i] = *c->entry[i];
   PW_UNROLL for (int p = 0; p < n; p++) {
     double pivot = fabs (P[p * n + p]) * c->row[p].pivot_scale, inverse = 1 / P[p * n + p];
-    if (!(pivot >= least)) least = pivot;
+    least = pivot < least ? pivot : least;
     if (!(pivot >= c->row[p].rematch_below)) return 0;
     P[p * n + p] = inverse;
     PW_UNROLL for (int i = p + 1; i < n; i++) {
@@ -331,27 +331,20 @@ PW_SELDOM void massless_unmatched (int n, pw_component *c) {
   }
 }
 
-/* Eliminates with the J last evaluated and the pivots matched before.  Returns as massless_factor_P. */
-PW_INLINE int massless_eliminate (int n, pw_component *c) {
-  double local[MASSLESS_LOCAL * MASSLESS_LOCAL];
-  if (!massless_factor_P (n, c, n <= MASSLESS_LOCAL ? local : c->P)) return 0;
-  if (n <= MASSLESS_LOCAL) PW_UNROLL for (int i = 0; i < n * n; i++) c->P[i] = local[i];
-  if (c->rows > n) massless_unmatched (n, c);
-  return 1;
-}
-
-PW_SELDOM int massless_eliminate_any (pw_component *c) {
-  return massless_eliminate (c->pivots, c);
-}
-
-PW_INLINE int massless_reduce (pw_component *c) {
-  return MASSLESS_PIVOTS (massless_eliminate, c);
-}
-
-/* gamma~, mu, f~ */
-PW_INLINE void massless_forward_component (int n, pw_component *c, double *f, double *gamma) {
+/* If `factors`, eliminates with the J last evaluated and the pivots matched before, and returns 0 if a pivot has become
+ * much smaller than when it was matched.  Then, unless gamma is NULL: gamma~, mu, f~. */
+PW_INLINE int massless_forward (int n, pw_component *c, int factors, double *f, double *gamma) {
   massless_row *row = c->row;
-  double local[MASSLESS_LOCAL], *mu = n <= MASSLESS_LOCAL ? local : c->x;
+  double local[MASSLESS_LOCAL * MASSLESS_LOCAL], local_mu[MASSLESS_LOCAL];
+  double *P = n <= MASSLESS_LOCAL ? local : c->P, *mu = n <= MASSLESS_LOCAL ? local_mu : c->x;
+  if (factors) {
+    if (!massless_factor_P (n, c, P)) return 0;
+    if (n <= MASSLESS_LOCAL) PW_UNROLL for (int i = 0; i < n * n; i++) c->P[i] = P[i];
+    if (c->rows > n) massless_unmatched (n, c);
+  } else if (n <= MASSLESS_LOCAL) {
+    PW_UNROLL for (int i = 0; i < n * n; i++) P[i] = c->P[i];
+  }
+  if (gamma == NULL) return 1;
   PW_UNROLL for (int p = 0; p < n; p++) row[p].gamma = gamma[row[p].equation], mu[p] = f[row[p].j];
   for (int i = n; i < c->rows; i++) {
     row[i].gamma = gamma[row[i].equation];
@@ -359,31 +352,35 @@ PW_INLINE void massless_forward_component (int n, pw_component *c, double *f, do
   }
   for (int i = n; i < c->rows; i++)
     if (c->unknown[i] >= 0) gamma[c->unknown[i]] = row[i].gamma;
-  massless_solve_PT (n, c->P, mu);
+  massless_solve_PT (n, P, mu);
   for (const massless_block *b = c->block, *end = b + c->blocks; b < end; b++) {
     double *F = f + b->j, x = mu[b->p];
     F[0] -= b->J[0] * x;
     if (b->width == 3) F[1] -= b->J[1] * x, F[2] -= b->J[2] * x;
   }
   PW_UNROLL for (int p = 0; p < n; p++) row[p].lambda = mu[p];
+  return 1;
 }
 
-PW_SELDOM void massless_forward_component_any (pw_component *c, double *f, double *gamma) {
-  massless_forward_component (c->pivots, c, f, gamma);
+PW_SELDOM int massless_forward_any (pw_component *c, int factors, double *f, double *gamma) {
+  return massless_forward (c->pivots, c, factors, f, gamma);
 }
 
 /* If `factors`, eliminates with the J last evaluated, and matches again if a pivot has become much smaller than when it
  * was matched.  Then, unless gamma is NULL, does the first half of a solution: saddle->force becomes f~ at the massive
  * coordinates, gamma becomes gamma~ at `unknown` of unmatched rows.  Returns the square of the least `least_pivot`, at
  * most 1; 0 if singular. */
-PW_INLINE double massless_forward (pw_saddle *saddle, int factors, double *gamma) {
+PW_INLINE double massless_forward_all (pw_saddle *saddle, int factors, double *gamma) {
   double least = 1;
-  pw_component *c = saddle->component;
-  for (int count = saddle->components; count > 0; count--, c++) {
-    for (int matched = 0; factors && !massless_reduce (c); matched = 1)
-      if (matched || massless_match (c) < c->pivots) return 0;
-    if (!(c->least_pivot >= least)) least = c->least_pivot;
-    if (gamma) MASSLESS_PIVOTS (massless_forward_component, c, saddle->force, gamma);
+  pw_component *c = saddle->component, *end = c + saddle->components;
+  for (int matched = 0; c < end;) {
+    if (MASSLESS_PIVOTS (massless_forward, c, factors, saddle->force, gamma)) {
+      if (!(c->least_pivot > 0)) return 0; /* or NaN */
+      least = c->least_pivot < least ? c->least_pivot : least;
+      c++, matched = 0;
+    } else if (matched++ || massless_match (c) < c->pivots) {
+      return 0;
+    }
   }
   return least * least;
 }
@@ -559,7 +556,7 @@ static int massless_check (const saddle_plan *p, pw_component *c, pw_error *erro
     for (int q = 0; q < found; q++) used |= c->row[q].pivot_column == n;
     if (c->is_massless[n] && !used) return massless_undetermined (s, c->global[n], error);
   }
-  massless_reduce (c);
+  massless_forward_any (c, 1, NULL, NULL);
   return PW_OK;
 }
 
@@ -1166,7 +1163,7 @@ PW_INLINE int saddle_run (pw_saddle *saddle, int massless, int factors, const do
   if (massless) {
     const size_t bytes = (size_t)saddle->s->coords * sizeof *f;
     if (y) f = f ? memcpy (saddle->force, f, bytes) : memset (saddle->force, 0, bytes);
-    double pivot = massless_forward (saddle, factors, y);
+    double pivot = massless_forward_all (saddle, factors, y);
     if (factors) saddle->pivot = pivot;
     if (factors && !(pivot > SADDLE_ROUND_OFF)) return PW_RETRY;
   }

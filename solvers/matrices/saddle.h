@@ -28,7 +28,7 @@ typedef struct {
   int *inactive;              /* rows outside massless components whose multiplier is 0 */
   int inactive_count;
   double pivot;  /* smallest when last factorised: of `block`, the squared sine of the angle between a row and those
-                  * before it; of massless coordinates, see massless_forward */
+                  * before it; of massless coordinates, see massless_forward_all */
   int pivot_row; /* that row; -1: none, or one of a massless component */
   char *memory, *component_memory;
 } pw_saddle;

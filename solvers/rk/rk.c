@@ -228,15 +228,12 @@ static int rk_projects_next (const pw_run *r) {
 static void rk_combine (const pw_run *r, double *q, double *v, const pw_rk_row *row, double h) {
   const pw_method_data *d = r->data;
   const double *q0 = r->q, *v0 = r->v;
-  const int n = r->s->coords;
   for (int j = 0; j < row->count; j++, q0 = q, v0 = v) {
     const double *dq = d->stage_v[row->stage[j]], *dv = d->stage_a[row->stage[j]], factor = h * row->weight[j];
-    int i = 0;
-    for (; i + 1 < n; i += 2) { /* two numbers at a time */
+    for (int i = 0, n = r->s->coords; i < n; i += 2) { /* two numbers at a time, the last one perhaps of the ground */
       *(pw_pair *)(q + i) = PW_PAIR (q0, i) + factor * PW_PAIR (dq, i);
       *(pw_pair *)(v + i) = PW_PAIR (v0, i) + factor * PW_PAIR (dv, i);
     }
-    if (i < n) q[i] = q0[i] + factor * dq[i], v[i] = v0[i] + factor * dv[i];
   }
 }
 
@@ -1055,7 +1052,7 @@ static int several_finish (pw_run *r, const pw_scene_steps *x, pw_error *error) 
 int pw_run_advance_towards (pw_run *r, double t, double t_end, pw_error *error) {
   pw_scene_steps x;
   if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
-  if (several_plan (r, t, t_end, &x) == 0) return pw_run_advance (r, t_end, error);
+  if (!pw_specialised_suits (r) || several_plan (r, t, t_end, &x) == 0) return pw_run_advance (r, t_end, error);
   r->stopped = 0;
   if (pw_run_stop_requested (r)) return PW_STOPPED;
   r->specialised->steps (r->scene, &x);

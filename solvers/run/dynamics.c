@@ -68,14 +68,6 @@ int pw_specialised_open (pw_run *r, pw_error *error) {
   return PW_OK;
 }
 
-/* 0 also where a singular configuration may be ahead and steps are fixed: the general functions then compute the sine
- * of every stage.  Adaptive methods need it only below the pivots that the specialised code accepts. */
-int pw_specialised_suits (const pw_run *r) {
-  const pw_watchdog *watch = &r->watchdog;
-  return r->specialised && !r->redundant_drive && !(watch->singular_ahead && watch->saddle && r->fixed_steps) &&
-         !r->near_singular && !r->w->hold;
-}
-
 void pw_specialised_count (pw_run *r, long evaluations, long iterations) {
   r->statistics.rhs += evaluations;
   r->statistics.specialised += evaluations;

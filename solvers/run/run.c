@@ -141,14 +141,14 @@ static void run_measure_independence (pw_run *r) {
 /* 1 if t is the time reached, up to round-off.  No step is made to such a time, since methods divide by its length.  It
  * may be that of a discontinuity meant to coincide with another one, at 0.3 and 0.1 + 0.2. */
 static int run_is_at (const pw_run *r, double t) {
-  return t - r->t <= 8 * DBL_EPSILON * fmax (fabs (r->t), r->w->scale.time);
+  return t - r->t <= 8 * DBL_EPSILON * pw_larger (fabs (r->t), r->w->scale.time);
 }
 
 /* If an evaluation fails at the next time, SUNDIALS repeats steps below the round-off of time endlessly.  Fixed steps
  * may be that short. */
 static int run_check_progress (pw_run *r, double before, pw_error *error) {
   double least = 64 * DBL_EPSILON * fabs (r->t);
-  if (r->fixed_steps) least = fmin (least, r->settings.step / 2);
+  if (r->fixed_steps && least > r->settings.step / 2) least = r->settings.step / 2;
   r->stalled = r->t - before > least ? 0 : r->stalled + 1;
   if (r->stalled < r->thresholds.stalled) return PW_OK;
   return pw_fail (error, PW_METHOD,
@@ -174,7 +174,7 @@ int pw_run_advance (pw_run *r, double t_end, pw_error *error) {
   if (r->interrupted) status = run_restart_method (r, error);
   if (status == PW_OK) r->interrupted = 0;
   if (status == PW_OK) status = run_reselect (r, error);
-  const double stop = fmin (t_end, r->breakpoint);
+  const double stop = t_end < r->breakpoint ? t_end : r->breakpoint;
   if (status == PW_OK && run_is_at (r, stop)) {
     if (r->t != r->moved_to) r->moved_from = r->t;
     r->moved_to = r->t = stop;
