@@ -263,7 +263,7 @@ static inline int rk_evaluate_stage (pw_run *r, double t, double *v, double *a, 
   return status;
 }
 
-/* The time of stage i of a step to t1 = t + h.  At its end there is no round-off: signals are evaluated once per time. */
+/* The time of stage i of a step to t1 = t + h; exactly t1 at its end, since signals are evaluated once per time. */
 static double rk_stage_time (const pw_run *r, int i, double h, double t1) {
   const double c = r->data->tableau->c[i];
   return pw_before_breakpoint (r, c == 1 ? t1 : r->t + c * h);
