@@ -102,7 +102,7 @@ help::
 
 # ---- Dependencies: targets that run something install missing libraries first ----
 
-ifneq ($(filter demo test test-all layers bench bench-quick bench-engine bench-effects hard san cov fuzz mutants,$(MAKECMDGOALS)),)
+ifneq ($(filter demo test test-all layers bench bench-check bench-quick bench-engine bench-effects hard san cov fuzz mutants,$(MAKECMDGOALS)),)
 ifndef NO_DEPS
 FIRST := deps
 endif

@@ -1,11 +1,12 @@
 #!/bin/sh
 # Finds the libraries and programs that Pinwheel needs, and installs those that are missing by apt; without apt, it lists all.
 #
-#   deps.sh [fresh] [style] [browser] [slurm] [reference] [page] [python]
+#   deps.sh [fresh] [style] [browser] [slurm] [reference] [page] [python] [counts]
 #
 # fresh: ignore the last result, which is kept in BUILD.  The other words add tools: style: clang and clang-format; browser: a
 # headless one, for the tests of pages; slurm: for tests/scripts/slurm.sh; reference: Python's numpy and scipy, for
-# tests/reference/reference.sh; page: a compiler for WebAssembly, for interactive pages; python: for tests of the package.
+# tests/reference/reference.sh; page: a compiler for WebAssembly, for interactive pages; python: for tests of the package; counts:
+# valgrind, for `make bench-check`.
 #
 # Reads CC, CPPFLAGS, LDFLAGS, BUILD, NO_DEPS.
 
@@ -23,6 +24,7 @@ for word; do
   python)
     needs="$needs python3-numpy python3-pytest python3-matplotlib python3-jsonschema python3-pycparser python3-pandas python3-xarray"
     needs="$needs python3-distributed python3-mpi4py" ;;
+  counts) needs="$needs valgrind" ;;
   page) needs="$needs clang wasm-ld wasi-libc wasi-builtins" ;;
   *) echo "deps.sh: unknown word \"$word\"" >&2; exit 2 ;;
   esac
@@ -113,7 +115,7 @@ look () {
   for n in $needs; do
     case $n in
     cc) links || missing="$missing $n" ;;
-    gnuplot | clang | clang-format | chromium | wasm-ld) command -v "$n" >/dev/null || missing="$missing $n" ;;
+    gnuplot | clang | clang-format | chromium | wasm-ld | valgrind) command -v "$n" >/dev/null || missing="$missing $n" ;;
     wasi-libc) [ -f /usr/include/wasm32-wasi/stdio.h ] || missing="$missing $n" ;;
     wasi-builtins) ls /usr/lib/llvm-*/lib/clang/*/lib/wasi/libclang_rt.builtins-wasm32.a >/dev/null 2>&1 || missing="$missing $n" ;;
     slurmctld | munged) [ -x "/usr/sbin/$n" ] || missing="$missing $n" ;;
@@ -131,7 +133,7 @@ package_of () {
   case $1 in
   cc) echo gcc libc6-dev ;;
   gnuplot) echo gnuplot-nox ;;
-  clang | clang-format | chromium | python3-* | wasi-libc) echo "$1" ;;
+  clang | clang-format | chromium | valgrind | python3-* | wasi-libc) echo "$1" ;;
   wasm-ld) echo lld ;;
   wasi-builtins) echo libclang-rt-14-dev-wasm32 ;;
   libfyaml) echo libfyaml-dev ;;

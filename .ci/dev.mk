@@ -1,6 +1,6 @@
 # What developers need: checks, further builds, fuzzing, benchmarks, packages.  Included by the Makefile.
 
-.PHONY: layers words san tsan valgrind fuzz fuzzers mutants cov clang gcc format format-check bench bench-quick bench-engine \
+.PHONY: layers words san tsan valgrind fuzz fuzzers mutants cov clang gcc format format-check bench bench-check bench-quick bench-engine \
         bench-effects hard basic figures deb
 
 help::
@@ -8,6 +8,7 @@ help::
 	@echo 'For developers:'
 	@echo 'make figures          all figures of README and docs, into docs/figures/'
 	@echo 'make bench            all measurements, and docs/benchmarks.md; continues where it was stopped'
+	@echo 'make bench-check      instructions per step against benchmarks/steps.txt; names those that grew by more than 3 %'
 	@echo 'make bench-quick      the processor time of runs on this machine'
 	@echo 'make bench-engine     the time of an evaluation and a step, compared with programs written by hand; growth with size'
 	@echo 'make bench-effects    instructions per evaluation with one further effect at a time; unused element types cost none'
@@ -157,6 +158,10 @@ basic:
 
 bench: all basic $(addprefix $(BUILD)/benchmarks/,peers engine effects)
 	@sh benchmarks/suite.sh $(BUILD)
+
+# FEW=1: only the rows that .ci/run checks; UPDATE=1: writes the file.
+bench-check: all
+	@sh benchmarks/check.sh $(PROGRAM) $(if $(FEW),few) $(if $(UPDATE),update)
 
 bench-quick: all $(BUILD)/benchmarks/quick
 	@$(BUILD)/benchmarks/quick
