@@ -1,5 +1,6 @@
 /* A square sparse matrix, real or complex, that is factorised repeatedly (KLU: Davis & Palamadai Natarajan 2010,
- * Algorithm 907): its columns are ordered once, its pivots kept while they remain accurate. */
+ * Algorithm 907): its unknowns are ordered once, at the latest with the first values, its pivots kept while they remain
+ * accurate.  Row i belongs to unknown i: their common entry, if there is one, is the preferred pivot. */
 #ifndef PW_SPARSE_H
 #define PW_SPARSE_H
 
@@ -14,8 +15,9 @@ typedef enum { PW_SPARSE_REAL, PW_SPARSE_COMPLEX } pw_sparse_numbers;
 
 typedef struct {
   pw_sparse_numbers numbers;
+  int n;
   klu_l_common common;
-  klu_l_symbolic *symbolic;
+  klu_l_symbolic *symbolic; /* NULL: not ordered yet */
   klu_l_numeric *factors;   /* NULL: none, or forgotten */
   int64_t *colptr, *rowind; /* the pattern, the caller's */
   double least_pivot_ratio; /* ratio of the least to the largest pivot (KLU) below which pivots are selected again */
