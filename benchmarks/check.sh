@@ -5,7 +5,7 @@
 #
 # few: only the rows marked *.  update: writes the counts into the file.  Fails if a step has grown by more than 3 %, and
 # names it.  Callgrind counts the instructions of two runs that differ in their final time alone: counts do not depend on
-# the load of the machine, but on the compiler.  With another one than that of the file they are shown and not judged.
+# the load of the machine, but on the compiler.  With another one than that of the file they are shown and not compared.
 set -eu
 program=$1 few= update=
 shift
@@ -29,8 +29,8 @@ count () {
 }
 
 sed -n '/^#/p' "$file" | sed "s|^# Compiler: .*|# Compiler: $compiler|" >"$work/new"
-judged=1
-[ -n "$update" ] || grep -qxF "# Compiler: $compiler" "$file" || judged=
+compared=1
+[ -n "$update" ] || grep -qxF "# Compiler: $compiler" "$file" || compared=
 grown=
 while read -r mark committed from to command; do
   case $mark in '#'* | '') continue ;; esac
@@ -45,8 +45,8 @@ while read -r mark committed from to command; do
 done <"$file"
 if [ -n "$update" ]; then
   [ -n "$few" ] || cp "$work/new" "$file"
-elif [ -z "$judged" ]; then
-  echo "bench-check: not judged, since $compiler is not the compiler of $file"
+elif [ -z "$compared" ]; then
+  echo "bench-check: not compared, since $compiler is not the compiler of $file"
 elif [ -n "$grown" ]; then
   echo "bench-check: more than 3 % dearer:$grown"
   exit 1
