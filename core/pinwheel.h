@@ -431,6 +431,17 @@ typedef struct {
   double restitution;         /* velocity after the rope has become taut over that before it, 0 to 1 */
 } pw_rope;
 
+/* Contact: a point or disc of body 1 stays on the left side of a line of body 2, or outside of a disc of body 2.  One
+ * holonomic constraint equation. */
+typedef struct {
+  const char *name, *body[2]; /* what touches, and what it touches, or "ground" for one of them */
+  double at[2][2];            /* the point or centre; a point of the line, or the centre, in each body's frame [m] */
+  double heading;             /* direction of the line in body 2's frame [rad] */
+  double radius;              /* of the disc of body 1 [m]; 0: a point */
+  double other_radius;        /* of the disc of body 2 [m]; 0: a line */
+  double restitution;         /* normal velocity after an impact over that before it, 0 to 1 */
+} pw_contact;
+
 /* Freewheel: body 1 does not turn more slowly than body 2.  One nonholonomic constraint equation. */
 typedef struct {
   const char *name, *body[2]; /* the two bodies, or "ground" for one of them */
@@ -604,6 +615,7 @@ typedef struct {
   PW_KIND (on_curve)           \
   PW_KIND (end_stop)           \
   PW_KIND (rope)               \
+  PW_KIND (contact)            \
   PW_KIND (wheel)              \
   PW_KIND (rolling_wheel)      \
   PW_KIND (steered_wheel)      \

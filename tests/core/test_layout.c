@@ -195,6 +195,7 @@ TEST (definitions) {
     { "gear", 0xf8074be7c4f42d05 },
     { "stop", 0xf1ebca61e446368d },
     { "rope", 0x63fe52bab6421076 },
+    { "contact", 0x1cfbb80a606b7611 },
     { "freewheel", 0x1b30733283cdb584 },
     { "drive", 0x7d987f91b3a3b54e },
     { "wheel", 0xdd5a544c9423325 },
