@@ -1,4 +1,4 @@
-/* contact: a disc of body 1 with the radius R, or a point, R = 0, stays on the left side of a line of body 2, or outside
+/* contact: a disc of body 1 with the radius R, or a point, R = 0, stays on the left of a line of body 2, or outside
  * of a disc of body 2 with the radius R2.
  *
  *   g = n . D - c - R >= 0                                line.h                        (1 holonomic equation, which

@@ -1,6 +1,6 @@
 /* rod: a massless bar keeps a point of body 1 and a point of body 2 at the distance L.  rope: at most at L.
  *
- * rod.h has the equation.  -lambda [N] is the force on body 1, positive away from body 2; body 2 receives the opposite. */
+ * rod.h has the equation.  -lambda [N] acts on body 1, positive away from body 2; body 2 receives the opposite. */
 #include "rod.h"
 
 PREPARE (rod_prepare, pw_rod, rod) {
