@@ -16,6 +16,7 @@
 #include "util.h"
 
 #define RESOLUTION_SEEN 0.25    /* deviation over the largest difference of the values seen */
+#define RESOLUTION_SHRINKS 0.6  /* of bounds when a part is halved, if they are only too wide: about 0.5 */
 #define RESOLUTION_SHARE 0.1    /* of the tolerance, by which a step may miss what a signal does */
 #define RESOLUTION_FIXED 1e-6   /* the tolerance of fixed steps */
 #define RESOLUTION_LEAST 1e-10  /* of the span: shorter times are not examined: the bounds are too wide */
@@ -54,9 +55,11 @@ static double resolution_value (const pw_run *r, resolution_signal *x, double s)
   return x->at.u[0];
 }
 
-/* 1 if the deviation from the line from ya at a to yb at b is proved to be at most `most`, or bounds are unknown. */
+/* 1 if the deviation from the line from ya at a to yb at b is proved to be at most `most`, or bounds are unknown.
+ * Bounds of functions of states are too wide, by an amount that shrinks with the part: `whole` is the deviation in the
+ * part that was halved. */
 static int resolution_is_near (pw_run *r, const resolution_signal *x, double a, double b, double ya, double yb,
-                               double most, int depth) {
+                               double most, int depth, double whole) {
   struct pw_resolution *d = r->resolution;
   double bounds[2];
   d->lo[0] = pw_before_breakpoint (r, r->t + a), d->hi[0] = pw_before_breakpoint (r, r->t + b);
@@ -68,11 +71,12 @@ static int resolution_is_near (pw_run *r, const resolution_signal *x, double a, 
   }
   pw_signal_bounds (&x->at, d->lo, d->hi, bounds);
   if (!(bounds[1] - bounds[0] < INFINITY)) return 1;
-  if (fmax (bounds[1] - fmin (ya, yb), fmax (ya, yb) - bounds[0]) <= most) return 1;
-  if (depth == 0) return 0;
+  const double deviation = fmax (bounds[1] - fmin (ya, yb), fmax (ya, yb) - bounds[0]);
+  if (deviation <= most) return 1;
+  if (depth == 0) return x->at.reads > 0 && deviation <= RESOLUTION_SHRINKS * whole;
   const double m = a + (b - a) / 2, ym = ya + (yb - ya) / 2;
-  return resolution_is_near (r, x, a, m, ya, ym, most, depth - 1) &&
-         resolution_is_near (r, x, m, b, ym, yb, most, depth - 1);
+  return resolution_is_near (r, x, a, m, ya, ym, most, depth - 1, deviation) &&
+         resolution_is_near (r, x, m, b, ym, yb, most, depth - 1, deviation);
 }
 
 /* ---- The time that is resolved ---- */
@@ -82,8 +86,8 @@ static int resolution_resolved (pw_run *r, resolution_signal *x, double H) {
                y2 = resolution_value (r, x, H), rtol = r->fixed_steps ? RESOLUTION_FIXED : r->settings.rtol;
   const double missed = RESOLUTION_SHARE * rtol * (x->effect > 0 ? 1 / (x->effect * H) : x->size);
   const double most = fmax (missed, RESOLUTION_SEEN * fmax (fabs (y1 - y0), fabs (y2 - y1)));
-  return resolution_is_near (r, x, 0, m, y0, y1, most, RESOLUTION_DEPTH) &&
-         resolution_is_near (r, x, m, H, y1, y2, most, RESOLUTION_DEPTH);
+  return resolution_is_near (r, x, 0, m, y0, y1, most, RESOLUTION_DEPTH, 0) &&
+         resolution_is_near (r, x, m, H, y1, y2, most, RESOLUTION_DEPTH, 0);
 }
 
 /* The time from r->t on that is resolved, halved from `longest` to `least`; 0: not even that is. */
