@@ -189,7 +189,7 @@ static int linear_arrays (pw_linearisation *x) {
                              { &x->probe, 2 * n },
                              { &x->probe_a, n },
                              { &x->probe_da, n },
-                             { &x->residual, 4 * (2 * m + n) + PW_LINEAR_SVD_WORK },
+                             { &x->residual, 3 * (2 * m + n) },
                              { &x->left_vectors, x->modes ? size * size + size : 0 },
                              { &x->upper_rows, 4 * size } };
   x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
@@ -230,7 +230,8 @@ void pw_linear_close (pw_linearisation *x) {
  * LINEAR_STEADY: below it the linearisation changes by that fraction within the time scale T, less than the accuracy of
  * initial values with 6 digits.  LINEAR_EXACT: round-off of accelerations, for which a rotating frame must not be
  * chosen. */
-static const double LINEAR_STEADY = 1e-6, LINEAR_EXACT = 1e-13;
+static const double LINEAR_STEADY = 1e-6, LINEAR_EXACT = 1e-13,
+                    LINEAR_ROUND_OFF = 1e-12; /* of singular values, relative to the largest one */
 enum {
   LINEAR_IN_TURN = 8,      /* states compared in a turn of the frame */
   LINEAR_MOST_SPANS = 1000 /* the part of a turn that is sampled, in spans */
@@ -350,12 +351,28 @@ static double linear_tolerance (const pw_linearisation *x) {
   return PW_LINEAR_SYMMETRIC + 1e-4 * PW_LINEAR_SYMMETRIC * most;
 }
 
+int pw_null_space (int rows, int n, double *M, double tolerance, double *out) {
+  double *work = malloc (((size_t)n * (size_t)n + 8 * (size_t)(rows + n)) * sizeof *work), *sigma = work,
+         *VT = sigma + n;
+  int count = 0;
+  if (work == NULL) return PW_RESOURCE;
+  if (LAPACKE_dgesvd_work (LAPACK_COL_MAJOR, 'N', 'A', rows, n, M, rows, sigma, NULL, 1, VT, n, VT + n * n,
+                           8 * (rows + n) - n))
+    count = PW_METHOD;
+  tolerance = fmax (tolerance, LINEAR_ROUND_OFF * sigma[0]);
+  while (count >= 0 && count < n && sigma[n - 1 - count] <= tolerance) {
+    for (int j = 0; j < n; j++) out[count * n + j] = VT[j * n + n - 1 - count];
+    count++;
+  }
+  free (work);
+  return count;
+}
+
 /* The number of rigid displacements of the whole (x, y, phi) under which the equations are invariant to first order: of
- * the null space of the asymmetries, from their singular value decomposition U sigma V^T.  x->symmetry becomes a basis
- * of it: sums of the three displacements, whose coefficients are the last rows of V^T. */
+ * the null space of the asymmetries.  x->symmetry becomes a basis of it.  A status < 0 if out of memory. */
 static int linear_symmetries (pw_linearisation *x) {
-  int length = x->holonomic + x->rank + x->n, symmetries = 0;
-  double tolerance = linear_tolerance (x), sigma[3], VT[9], *work = x->residual + 3 * length;
+  const int length = x->holonomic + x->rank + x->n;
+  double null[9];
   if (x->r->s->bodies == 0) return 0;
   for (int k = 0; k < 3; k++) {
     linear_displace (x, k);
@@ -364,16 +381,13 @@ static int linear_symmetries (pw_linearisation *x) {
   }
   for (int i = 0; i < 3 * length; i++)
     if (!isfinite (x->residual[i])) return 0;
-  if (LAPACKE_dgesvd_work (LAPACK_COL_MAJOR, 'N', 'A', length, 3, x->residual, length, sigma, NULL, 1, VT, 3, work,
-                           PW_LINEAR_SVD_WORK + length))
-    return 0;
-  while (symmetries < 3 && sigma[2 - symmetries] <= tolerance) symmetries++;
+  const int symmetries = pw_null_space (length, 3, x->residual, linear_tolerance (x), null);
   for (int c = 0; c < x->size; c++) {
     double S[3] = { x->symmetry[c], x->symmetry[x->size + c], x->symmetry[2 * x->size + c] };
     for (int k = 0; k < symmetries; k++)
-      x->symmetry[k * x->size + c] = VT[2 - k] * S[0] + VT[5 - k] * S[1] + VT[8 - k] * S[2];
+      x->symmetry[k * x->size + c] = null[3 * k] * S[0] + null[3 * k + 1] * S[1] + null[3 * k + 2] * S[2];
   }
-  return symmetries;
+  return symmetries == PW_METHOD ? 0 : symmetries;
 }
 
 /* ---- Steadiness ---- */
@@ -830,7 +844,7 @@ static int linear_compute (pw_linearisation *x, pw_linear *l, pw_error *error) {
     pw_linear_coordinates (x, dv, x->da, x->size, x->A + c);
   }
   if (x->modes && modes_matrices (x, l) != PW_OK) return PW_RESOURCE;
-  l->symmetries = linear_symmetries (x);
+  if ((l->symmetries = linear_symmetries (x)) < 0) return PW_RESOURCE;
   memcpy (l->twist, x->frame.twist, sizeof l->twist);
   l->acceleration = x->frame.acceleration;
   status = eigen_all (x, l, error);

@@ -36,7 +36,7 @@ typedef struct {
   double *product;               /* n + 2 m: derivatives of J^T lambda - f, gamma - J a, J v - eta, times dx */
   double *da;                    /* n + 3: the resulting variation of accelerations */
   double *scratch, *row_scratch; /* n + 3 m + 3, m */
-  double *residual;              /* 3 x (2 m + n): asymmetries of rigid displacements; then scratch for dgesvd */
+  double *residual;              /* 3 x (2 m + n): asymmetries of rigid displacements; scratch */
   double *probe, *probe_da;      /* 2 n, n: a variation at the current state, and its da */
   double *probe_a;               /* n: accelerations at the current state */
   double *later;                 /* 2 n: a later state */
@@ -46,9 +46,6 @@ typedef struct {
   double *upper_rows;   /* 3 x size: [ A11 A12 ] (linear.c); then scratch, size */
   double tau[3];        /* scalars of the reflections in `symmetry` */
 } pw_linearisation;
-
-/* LAPACK's dgesvd needs at most this scratch, plus the number of rows, for a matrix with 3 columns. */
-enum { PW_LINEAR_SVD_WORK = 15 };
 
 /* Round-off of derivatives of moderate size, relative to them. */
 #define PW_LINEAR_SYMMETRIC 1e-9
@@ -74,6 +71,9 @@ void pw_linear_coordinates (const pw_linearisation *x, const double *dq, const d
 void pw_linear_turn (const pw_linearisation *x, double w, const double *in, double *out);
 /* out = in with (x, y) of each body rotated by an angle. */
 void pw_linear_rotate (const pw_linearisation *x, double angle, const double *in, double *out);
+/* out: orthonormal rows of length n that span the null space of M (rows x n, by columns, destroyed; rows >= n > 0).
+ * Singular values up to the tolerance, or up to round-off, count as 0.  Returns the number of rows, or a status < 0. */
+int pw_null_space (int rows, int n, double *M, double tolerance, double *out);
 /* What the variation dx changes, in units of the scene, 0 for a symmetry: `holonomic` + `rank` residuals, then n
  * accelerations; turn: by what angle dx rotates the whole, with which accelerations rotate [rad]. */
 void pw_linear_asymmetry (pw_linearisation *x, double turn, double *out);

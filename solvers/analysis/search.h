@@ -92,9 +92,6 @@ void pw_steady_combine (const pw_steady *x, const double *coefficient, double un
 void pw_steady_velocities (const pw_steady *x, const double *rates, const double *q, double *v);
 /* Displaces a state at these rates for a time. */
 void pw_steady_displace (const pw_steady *x, const double *rates, double time, double *q, double *v);
-/* out: orthonormal rows of length n that span the null space of M (rows x n, by columns, destroyed; rows >= n > 0).
- * Singular values up to the tolerance, or up to round-off, count as 0.  Returns the number of rows, or a status < 0. */
-int pw_null_space (int rows, int n, double *M, double tolerance, double *out);
 /* A state at most `distance` units of the scene from the run's, perhaps off the constraints: an irregular one for each
  * `number`. */
 void pw_irregular_state (const pw_run *r, double distance, int number, double *q, double *v);

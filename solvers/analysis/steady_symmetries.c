@@ -2,7 +2,6 @@
  * these are changes of angles on which nothing depends, such as that of a wheel that rolls.  They span the null space
  * of the derivatives of the equations along all displacements, at states in general position, near the initial one and
  * far away, since forces may be constant over a region only; and at each solution (pw_steady_keep_symmetries). */
-#include <lapacke.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -16,7 +15,6 @@ enum {
   SYMMETRY_STATES = 8 /* the others are turned, and displaced by up to L, 3 L, 9 L, ..., if the whole can be */
 };
 static const double SYMMETRY_DISTANCE = 0.02, /* of a state from the initial or displaced one, in units of the scene */
-    SYMMETRY_ROUND_OFF = 1e-12,               /* of singular values, relative to the largest one */
     SYMMETRY_PIVOT = 1e-6,                    /* least rate that can be a pivot */
     SYMMETRY_ZERO = 1e-7,                     /* rates below it count as 0 */
     SYMMETRY_SAME = 1e-4; /* of equal states: a double root moves by the root of the residual, 3e-5, with a margin */
@@ -83,23 +81,6 @@ static void symmetry_reduce (int rows, int n, double *row) {
   }
   for (int k = 0; k < rows * n; k++)
     if (fabs (row[k]) < SYMMETRY_ZERO) row[k] = 0;
-}
-
-int pw_null_space (int rows, int n, double *M, double tolerance, double *out) {
-  double *work = malloc (((size_t)n * (size_t)n + 8 * (size_t)(rows + n)) * sizeof *work), *sigma = work,
-         *VT = sigma + n;
-  int count = 0;
-  if (work == NULL) return PW_RESOURCE;
-  if (LAPACKE_dgesvd_work (LAPACK_COL_MAJOR, 'N', 'A', rows, n, M, rows, sigma, NULL, 1, VT, n, VT + n * n,
-                           8 * (rows + n) - n))
-    count = PW_METHOD;
-  tolerance = fmax (tolerance, SYMMETRY_ROUND_OFF * sigma[0]);
-  while (count >= 0 && count < n && sigma[n - 1 - count] <= tolerance) {
-    for (int j = 0; j < n; j++) out[count * n + j] = VT[j * n + n - 1 - count];
-    count++;
-  }
-  free (work);
-  return count;
 }
 
 void pw_irregular_state (const pw_run *r, double distance, int number, double *q, double *v) {
