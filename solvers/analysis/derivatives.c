@@ -115,6 +115,7 @@ typedef struct difference {
   double *run_error;     /* outputs */
   difference_task *task;
   int tasks;
+  size_t task_room;
   atomic_int next, status;
   pthread_mutex_t lock;
   pw_error *error, first; /* first: of the first run that failed */
@@ -224,14 +225,8 @@ static void *difference_thread (void *argument) {
 }
 
 static int difference_add (difference *x, int parameter, int level, int neighbour) {
-  if ((x->tasks & (x->tasks + 1)) == 0) { /* room is doubled */
-    void *more = realloc (x->task, 2 * ((size_t)x->tasks + 1) * sizeof *x->task);
-    if (more == NULL) {
-      x->status = pw_fail (x->error, PW_RESOURCE, "out of memory");
-      return PW_RESOURCE;
-    }
-    x->task = more;
-  }
+  if (pw_grow (&x->task, (size_t)x->tasks, &x->task_room, sizeof *x->task) != PW_OK)
+    return x->status = pw_fail (x->error, PW_RESOURCE, "out of memory");
   x->task[x->tasks++] = (difference_task){ parameter, level, neighbour };
   return PW_OK;
 }
