@@ -29,21 +29,42 @@ void pw_list_elements (const pw_system *s, const unsigned char *which, int wante
   if (more > 0) snprintf (list + length, size - length, "%s%d more", length ? " and " : "", more);
 }
 
+/* The batch of an equation; *e: its element there; *J: its row of J in the columns of that element. */
+static const pw_element_batch *rank_find (const pw_workspace *w, int row, int *e, const double **J) {
+  const pw_element_batch *k = w->batch;
+  while (row >= k->row + k->b.count * k->kind->rows) k++;
+  *e = (row - k->row) / k->kind->rows;
+  *J = k->J + (row - k->row) * k->b.cols;
+  return k;
+}
+
+double pw_rank_norm (const pw_workspace *w, int row) {
+  int e;
+  const double *J;
+  double square = 0;
+  const pw_element_batch *k = rank_find (w, row, &e, &J);
+  for (int c = 0; c < k->b.cols; c++) {
+    int j = pw_global (k, e, c);
+    double x = j < w->s->coords ? J[c] / pw_length_factor (w->s, j) : 0;
+    square += x * x;
+  }
+  return sqrt (square);
+}
+
 void pw_rank_rows (const pw_workspace *w, double *rows, double *norm) {
   const pw_system *s = w->s;
-  int n = s->coords;
+  int n = s->coords, e;
+  const double *J;
   memset (rows, 0, (size_t)s->rows * (size_t)n * sizeof *rows);
-  PW_EACH_CONSTRAINT (k, w)
-    for (int i = 0; i < k->b.count * k->kind->rows; i++) {
-      double *row = rows + (size_t)(k->row + i) * (size_t)n, square = 0;
-      for (int c = 0; c < k->b.cols; c++) {
-        int j = pw_global (k, i / k->kind->rows, c);
-        if (j < n) row[j] += k->J[i * k->b.cols + c] / pw_length_factor (s, j);
-      }
-      for (int j = 0; j < n; j++) square += row[j] * row[j];
-      for (int j = 0; square > 0 && j < n; j++) row[j] /= sqrt (square);
-      if (norm) norm[k->row + i] = sqrt (square);
+  for (int i = 0; i < s->rows; i++, rows += n) {
+    const pw_element_batch *k = rank_find (w, i, &e, &J);
+    const double length = pw_rank_norm (w, i);
+    for (int c = 0; c < k->b.cols && length > 0; c++) {
+      int j = pw_global (k, e, c);
+      if (j < n) rows[j] += J[c] / pw_length_factor (s, j) / length;
     }
+    if (norm) norm[i] = length;
+  }
 }
 
 /* ---- Independent rows ---- */
@@ -86,18 +107,16 @@ static int rank_open (rank_basis *b, const pw_system *s) {
 /* Stores the entries of all rows, of length 1. */
 static void rank_read (rank_basis *b, const pw_workspace *w) {
   int entry = 0;
-  PW_EACH_CONSTRAINT (k, w)
-    for (int i = 0; i < k->b.count * k->kind->rows; i++, entry += k->b.cols) {
-      double square = 0;
-      b->first[k->row + i] = entry;
-      for (int c = 0; c < k->b.cols; c++) {
-        int j = pw_global (k, i / k->kind->rows, c), is_ground = j >= w->s->coords;
-        double x = is_ground ? 0 : k->J[i * k->b.cols + c] / pw_length_factor (w->s, j);
-        b->column[entry + c] = is_ground ? 0 : j, b->value[entry + c] = x;
-        square += x * x;
-      }
-      for (int c = entry; square > 0 && c < entry + k->b.cols; c++) b->value[c] /= sqrt (square);
+  for (int i = 0, e; i < w->s->rows; i++) {
+    const double *J, length = pw_rank_norm (w, i);
+    const pw_element_batch *k = rank_find (w, i, &e, &J);
+    b->first[i] = entry;
+    for (int c = 0; c < k->b.cols; c++, entry++) {
+      int j = pw_global (k, e, c), is_empty = j >= w->s->coords || length == 0;
+      b->column[entry] = is_empty ? 0 : j;
+      b->value[entry] = is_empty ? 0 : J[c] / pw_length_factor (w->s, j) / length;
     }
+  }
   b->first[w->s->rows] = entry;
 }
 
@@ -220,43 +239,20 @@ static int rank_select (rank_basis *b, const pw_workspace *w, double tol, int ma
  * span the multipliers without force, J^T n_i = 0, so the least-norm ones are lambda + N z, N = [n_1 n_2 ...], with z
  * from a least-squares problem.  N is not stored: products with it take a solution of the saddle-point system. */
 
-/* The batch of an equation; *e: its element there; *J: its row of J in the columns of that element. */
-static const pw_element_batch *redundancy_find (const pw_workspace *w, int row, int *e, const double **J) {
-  const pw_element_batch *k = w->batch;
-  while (row >= k->row + k->b.count * k->kind->rows) k++;
-  *e = (row - k->row) / k->kind->rows;
-  *J = k->J + (row - k->row) * k->b.cols;
-  return k;
-}
-
 double pw_rank_multiplier_unit (const pw_workspace *w, int row) {
   int e;
   const double *J;
-  const pw_element_batch *k = redundancy_find (w, row, &e, &J);
+  const pw_element_batch *k = rank_find (w, row, &e, &J);
   for (int b = 0; b < k->kind->bodies; b++)
     if (J[3 * b] != 0 || J[3 * b + 1] != 0) return 1;
   return w->scale.length;
-}
-
-/* The norm of a row as a derivative with respect to lengths (pw_length_factor). */
-static double redundancy_norm (const pw_workspace *w, int row) {
-  int e;
-  const double *J;
-  double square = 0;
-  const pw_element_batch *k = redundancy_find (w, row, &e, &J);
-  for (int c = 0; c < k->b.cols; c++) {
-    int j = pw_global (k, e, c);
-    double x = j < w->s->coords ? J[c] / pw_length_factor (w->s, j) : 0;
-    square += x * x;
-  }
-  return sqrt (square);
 }
 
 /* f += weight J_i^T */
 static void redundancy_add_row (const pw_workspace *w, int row, double weight, double *f) {
   int e;
   const double *J;
-  const pw_element_batch *k = redundancy_find (w, row, &e, &J);
+  const pw_element_batch *k = rank_find (w, row, &e, &J);
   for (int c = 0; c < k->b.cols; c++) f[pw_global (k, e, c)] += weight * J[c];
 }
 
@@ -272,13 +268,13 @@ double pw_rank_independence (pw_run *r) {
   double *c = r->coefficient /* overwritten: each user computes it first */, most = 0;
   for (int i = 0; i < r->redundant; i++) {
     int row = r->redundant_row[i];
-    double x = pw_irregular (0, row + 1), norm = redundancy_norm (r->w, row);
+    double x = pw_irregular (0, row + 1), norm = pw_rank_norm (r->w, row);
     double weight = (x + copysign (1, x)) / 2; /* of modulus 1/2 to 1 */
     if (norm > 0) redundancy_add_row (r->w, row, weight / norm, r->row_force);
   }
   redundancy_solve (r, c);
   for (int row = 0; row < r->s->rows; row++)
-    if (r->active[row]) most = pw_larger_or_nan (most, fabs (c[row]) * redundancy_norm (r->w, row));
+    if (r->active[row]) most = pw_larger_or_nan (most, fabs (c[row]) * pw_rank_norm (r->w, row));
   return isnan (most) ? 0 : 1 / most;
 }
 
@@ -372,9 +368,9 @@ char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size) {
   if (pw_saddle_factor (r->saddle) != PW_OK) return buffer;
   redundancy_add_row (r->w, row, 1, r->row_force);
   redundancy_solve (r, r->coefficient);
-  const double *c = r->coefficient, least = round_off * redundancy_norm (r->w, row);
+  const double *c = r->coefficient, least = round_off * pw_rank_norm (r->w, row);
   for (int a = 0; a < s->rows; a++) {
-    if (c[a] == 0 || fabs (c[a]) * redundancy_norm (r->w, a) <= least) continue;
+    if (c[a] == 0 || fabs (c[a]) * pw_rank_norm (r->w, a) <= least) continue;
     partners++, last = a;
     const char *element = PW_NAME (pw_system_row_name, s, a);
     if (elements > MAX_ELEMENTS || strcmp (element, own) == 0 || strcmp (element, before) == 0) continue;

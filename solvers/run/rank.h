@@ -15,6 +15,9 @@ static inline double pw_length_factor (const pw_system *s, int j) {
   return pw_is_angle (s, j) ? s->scale.length : 1;
 }
 
+/* The length of a row of the J last evaluated, as derivatives with respect to these lengths. */
+double pw_rank_norm (const pw_workspace *w, int row);
+
 /* All rows of the J last evaluated, dense (rows x coords), as derivatives with respect to these lengths, normalised to
  * length 1; `norm` (rows, or NULL): their former lengths; empty rows stay 0. */
 void pw_rank_rows (const pw_workspace *w, double *rows, double *norm);

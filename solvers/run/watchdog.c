@@ -242,16 +242,11 @@ static int change_stride (change_walk *walk, double part) {
   return PW_RETRY;
 }
 
-/* Length of the next stride: a part of the distance at which the sine could vanish. */
-static double change_length (const change_walk *walk) {
-  const pw_thresholds *limit = &walk->r->thresholds;
-  return fmax (fmin (limit->stride * walk->sine / walk->sine_slope, limit->stride), limit->floor);
-}
-
 /* Walks from the beginning of the step to its end. */
 static change_verdict change_follow (change_walk *walk) {
   pw_run *r = walk->r;
   const pw_watchdog *watch = &r->watchdog;
+  const pw_thresholds *limit = &r->thresholds;
   double sine;
   walk->t = watch->previous_t;
   walk->least_sine = INFINITY;
@@ -263,11 +258,13 @@ static change_verdict change_follow (change_walk *walk) {
     return CHANGE_UNKNOWN;
   for (int i = 0; i < CHANGE_STRIDES; i++) {
     double distance = change_distance (r->s, walk->q, walk->target);
-    if (distance <= r->thresholds.floor) return walk->turned ? CHANGE_OTHER_BRANCH : CHANGE_SAME_BRANCH;
-    double part = fmin (1, change_length (walk) / distance);
+    if (distance <= limit->floor) return walk->turned ? CHANGE_OTHER_BRANCH : CHANGE_SAME_BRANCH;
+    /* a part of the distance at which the sine could vanish */
+    double length = fmax (limit->stride * fmin (walk->sine / walk->sine_slope, 1), limit->floor);
+    double part = fmin (1, length / distance);
     if (change_stride (walk, part) != PW_OK) return CHANGE_UNKNOWN;
-    if (change_distance (r->s, walk->q, walk->target) <= distance * (1 - r->thresholds.progress * part)) continue;
-    if (walk->least_sine > r->thresholds.low * watch->largest_sine) return CHANGE_UNKNOWN;
+    if (change_distance (r->s, walk->q, walk->target) <= distance * (1 - limit->progress * part)) continue;
+    if (walk->least_sine > limit->low * watch->largest_sine) return CHANGE_UNKNOWN;
     return CHANGE_OTHER_BRANCH;
   }
   return CHANGE_UNKNOWN;
@@ -406,19 +403,11 @@ typedef struct {
 static double dead_ratio (dead_walk *walk) {
   pw_run *r = walk->r;
   double square = 0, *prescribed = &walk->prescribed;
-  memset (walk->row_length, 0, (size_t)r->s->rows * sizeof *walk->row_length);
-  PW_EACH_CONSTRAINT (k, r->w)
-    for (int i = 0; i < k->b.count * k->kind->rows; i++)
-      for (int c = 0; c < k->b.cols; c++) {
-        int j = pw_global (k, i / k->kind->rows, c);
-        double *length = &walk->row_length[k->row + i];
-        if (j < r->s->coords) *length = hypot (*length, k->J[i * k->b.cols + c] / pw_length_factor (r->s, j));
-      }
   pw_evaluate_eta (r->w, walk->eta);
   (void)pw_saddle_factor (r->watchdog.saddle); /* its smallest pivot may be near round-off */
   pw_saddle_solve (r->watchdog.saddle, NULL, walk->eta, walk->x, walk->mu);
   for (int i = 0; i < r->s->rows; i++) {
-    square -= walk->mu[i] * walk->eta[i];
+    square -= walk->mu[i] * walk->eta[i], walk->row_length[i] = pw_rank_norm (r->w, i);
     if (walk->row_length[i] > 0) *prescribed = fmax (*prescribed, fabs (walk->eta[i]) / walk->row_length[i]);
   }
   return *prescribed > 0 ? sqrt (square) / *prescribed : 0;
@@ -563,13 +552,6 @@ static int dead_check (pw_run *r, double t_end, pw_error *error) {
   return status;
 }
 
-/* PW_METHOD if the last step has passed a dead point. */
-static int dead_passed (pw_run *r, pw_error *error) {
-  const pw_watchdog *watch = &r->watchdog;
-  if (watch->checked_sine > r->thresholds.lipschitz * watch->largest_sine * watch->step_length) return PW_OK;
-  return dead_check (r, r->t, error);
-}
-
 int pw_dead_point_explain (pw_run *r, pw_error *error) {
   double step = r->fixed_steps ? r->settings.step : r->t - r->watchdog.previous_t;
   (void)dead_check (r, r->watchdog.previous_t + fmax (10 * step, 0.5 * r->w->scale.time), error);
@@ -635,7 +617,8 @@ static int watchdog_follow (pw_run *r, pw_error *error) {
     watchdog_record_sine (r, pw_watchdog_sine (r, &watch->dependent_row));
     status = pw_change_point_check (r, watch->checked_sine, error);
     if (status == PW_OK) status = change_resolve (r, last, error);
-    if (status == PW_OK) status = dead_passed (r, error);
+    if (!(watch->checked_sine > r->thresholds.lipschitz * watch->largest_sine * watch->step_length) && status == PW_OK)
+      status = dead_check (r, r->t, error);
     if (status != PW_OK) return status;
     watch->sine_before_checked = last;
   } else
