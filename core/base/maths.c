@@ -1,9 +1,9 @@
 /* Sine and cosine of an angle [rad], the same on every machine; for |x| >= PW_SINE_LIMIT, infinity and NaN those of the
  * C library.  Elliptic functions.  The placeholder of derivatives by differences, to which element types refer. */
+#include <float.h>
 #include <math.h>
 #include "pinwheel.h"
 #include "sine.h"
-#include "elliptic.h"
 
 void pw_sin_cos (double x, double *sine, double *cosine) {
   if (fabs (x) < PW_SINE_LIMIT) {
@@ -39,20 +39,36 @@ double pw_cos (double x) {
  *     K (m) = pi / (2 a_N),   am (u | m) = phi_0,
  *     phi_N = 2^N a_N u,      2 phi_(n-1) = phi_n + asin (c_n sin phi_n / a_n)
  *
- * with a_n and c_n of elliptic.h; c_by_a[n - 1] is c_n / a_n.
+ * with a_0 = 1, b_0 = sqrt (1 - m) and a_n = (a + b) / 2, b_n = sqrt (a b), c_n = (a - b) / 2 from those before.
  * (Abramowitz & Stegun 1964, sections 16.4 and 17.6.) */
 
+enum { ELLIPTIC_STEPS = 12 }; /* a and b agree to round-off after them for any m < 1, even -1e300 */
+
+/* m < 1.  Stores the mean in *a, and c_n / a_n in c_by_a[n - 1].  Returns the number of steps, at least 1. */
+static int elliptic_mean (double m, double *a, double c_by_a[ELLIPTIC_STEPS]) {
+  double b = sqrt (1 - m);
+  int n = 0;
+  *a = 1;
+  while (n == 0 || (n < ELLIPTIC_STEPS && fabs (*a - b) > 4 * DBL_EPSILON * *a)) {
+    double mean = (*a + b) / 2;
+    c_by_a[n++] = (*a - b) / 2 / mean;
+    b = sqrt (*a * b);
+    *a = mean;
+  }
+  return n;
+}
+
 double pw_elliptic_K (double m) {
-  double a, c_by_a[PW_ELLIPTIC_STEPS], c_by_m[PW_ELLIPTIC_STEPS];
+  double a, c_by_a[ELLIPTIC_STEPS];
   if (!(m < 1)) return m == 1 ? INFINITY : NAN;
-  pw_elliptic_mean (m, &a, c_by_a, c_by_m);
+  elliptic_mean (m, &a, c_by_a);
   return PW_PI / (2 * a);
 }
 
 double pw_jacobi_am (double u, double m) {
-  double a, c_by_a[PW_ELLIPTIC_STEPS], c_by_m[PW_ELLIPTIC_STEPS];
+  double a, c_by_a[ELLIPTIC_STEPS];
   if (!(m < 1)) return m == 1 ? 2 * atan (tanh (u / 2)) : NAN;
-  int n = pw_elliptic_mean (m, &a, c_by_a, c_by_m);
+  int n = elliptic_mean (m, &a, c_by_a);
   double phi = ldexp (a * u, n);
   while (n-- > 0) phi = (phi + asin (c_by_a[n] * pw_sin (phi))) / 2;
   return phi;

@@ -7,11 +7,11 @@
  * where f_x is the partial derivative with respect to operand x, and the prime the derivative with respect to the
  * chosen variable (Griewank & Walther 2008, Evaluating Derivatives, chapter 13).  The derivatives decide comparisons
  * of equal numbers, so that an expression has the value just after a jump, that is for a slightly larger variable. */
+#include <float.h>
 #include <math.h>
 #include <string.h>
 #include "expression_parts.h"
 #include "pinwheel.h"
-#include "elliptic.h"
 
 /* ---- Derivatives of functions (Abramowitz & Stegun 1964, chapters 4 and 17) ---- */
 
@@ -74,78 +74,22 @@ static double value_mod (double x, double y) {
   return r != 0 && (r < 0) != (y < 0) ? r + y : r;
 }
 
-/* ---- Elliptic functions ----
- *
- * With the arithmetic-geometric mean a, b, c of core/base/elliptic.h, the angles phi_n of am (maths.c), the
- * incomplete elliptic integral E of the second kind, s and c the sine and cosine of am, dn = sqrt (1 - m s^2), and R =
- * sum of 2^(n-1) c_n^2 / m from n = 1,
- *
- *   dK/dm = K (1/2 - R) / (2 (1 - m)),   m (1 - m) d2K/dm2 = K / 4 - (1 - 2 m) dK/dm
- *   N = (E (am | m) - (1 - m) u) / m = u (1/2 - R) + sum of c_n / m sin phi_n
- *   d am/du = dn,   d am/dm = -dn F,   F = (N - s c / dn) / (2 (1 - m))
- *   dN/dm = (dn d am/dm + u/2 - N/2) / m        with constant u
- *
- * In the code, NAME_m is the derivative of NAME with respect to m, and m1 = 1 - m. */
-
-static double partials_R (double m, int steps, const double c_by_m[PW_ELLIPTIC_STEPS]) {
-  double R = 0;
-  for (int n = 0; n < steps; n++) R += ldexp (m * c_by_m[n] * c_by_m[n], n);
-  return R;
-}
-
-#define SERIES_LIMIT 0.2 /* |m| below which the formula of d2K/dm2 loses digits, and 40 terms of its series suffice */
-
-/* d2K/dm2 from K = pi/2 sum of (1 3 ... (2 n - 1) / (2 4 ... 2 n))^2 m^n. */
-static double partials_K_series (double m) {
-  double coefficient = 1, sum = 0, power = 1;
-  for (int n = 1; n < 40; n++) {
-    double quotient = (2.0 * n - 1) / (2.0 * n);
-    coefficient *= quotient * quotient;
-    if (n >= 2) sum += n * (n - 1) * coefficient * power, power *= m;
-  }
-  return PW_PI / 2 * sum;
-}
-
-static pw_partials partials_elliptic_K (double m, double y, double K) {
-  double a, c_by_a[PW_ELLIPTIC_STEPS], c_by_m[PW_ELLIPTIC_STEPS];
-  (void)y;
-  int n = pw_elliptic_mean (m, &a, c_by_a, c_by_m);
-  double first = K * (0.5 - partials_R (m, n, c_by_m)) / (2 * (1 - m));
-  double formula = (K / 4 - (1 - 2 * m) * first) / (m * (1 - m));
-  return (pw_partials){ .x = first, .xx = fabs (m) < SERIES_LIMIT ? partials_K_series (m) : formula };
-}
-
+/* Of Jacobi's amplitude, whose parameter m is constant: d am/du = dn. */
 static pw_partials partials_jacobi_am (double u, double m, double phi) {
-  double a, c_by_a[PW_ELLIPTIC_STEPS], c_by_m[PW_ELLIPTIC_STEPS];
-  double s = pw_sin (phi), c = pw_cos (phi), dn = sqrt (1 - m * s * s);
-  int n = pw_elliptic_mean (m, &a, c_by_a, c_by_m);
-  double N = u * (0.5 - partials_R (m, n, c_by_m)), angle = ldexp (a * u, n), m1 = 1 - m;
-  for (; n > 0; n--) {
-    N += c_by_m[n - 1] * pw_sin (angle);
-    angle = (angle + asin (c_by_a[n - 1] * pw_sin (angle))) / 2;
-  }
-  double F = N / (2 * m1) - s * c / (2 * m1 * dn), am_m = -dn * F;
-  double dn_m = -(s * s + 2 * m * s * c * am_m) / (2 * dn), N_m = (dn * am_m + u / 2 - N / 2) / m;
-  double sc_m = ((c * c - s * s) * am_m - s * c * dn_m / dn) / dn;
-  double F_m = (N_m - sc_m) / (2 * m1) + F / m1;
-  pw_partials r = { dn, am_m, -m * s * c, dn_m, -(dn_m * F + dn * F_m) };
-  if (!(fabs (m) < 1e-5)) return r; /* also if m is NaN */
-  const double h = 1e-4; /* the error of N_m, a difference, would be 1e-15 / m; that of this difference is 1e-9 */
-  r.yy = (partials_jacobi_am (u, m + h, pw_jacobi_am (u, m + h)).y -
-          partials_jacobi_am (u, m - h, pw_jacobi_am (u, m - h)).y) /
-         (2 * h);
-  return r;
+  double s = pw_sin (phi), c = pw_cos (phi);
+  (void)u;
+  return (pw_partials){ .x = sqrt (1 - m * s * s), .xx = -m * s * c };
 }
 
 /* ---- List of functions and constants ---- */
 
 /* The entries are pw_expression_function. */
 #define FUNCTION_OF_ONE(name, f, trend, from, to) \
-  { #name, PW_OP_FUNCTION_OF_ONE, 1, 1, f, NULL, partials_##name, trend, from, to, 0 }
+  { #name, PW_OP_FUNCTION_OF_ONE, 1, 1, f, NULL, partials_##name, trend, from, to, 0, 0 }
 #define FUNCTION_OF_TWO(name, op, f) \
-  { #name, op, 2, 2, NULL, f, partials_##name, PW_NOT_MONOTONIC, 0, 0, 0 }
+  { #name, op, 2, 2, NULL, f, partials_##name, PW_NOT_MONOTONIC, 0, 0, 0, 0 }
 #define FUNCTION_WITHOUT_PARTIALS(name, op, least, most) \
-  { #name, op, least, most, NULL, NULL, NULL, PW_NOT_MONOTONIC, 0, 0, 0 }
+  { #name, op, least, most, NULL, NULL, NULL, PW_NOT_MONOTONIC, 0, 0, 0, 0 }
 
 const pw_expression_function pw_expression_functions[] = {
   { .name = "pi", .op = PW_OP_CONSTANT, .value = PW_PI },
@@ -153,7 +97,7 @@ const pw_expression_function pw_expression_functions[] = {
   { .name = "deg", .op = PW_OP_CONSTANT, .value = PW_PI / 180 },
   FUNCTION_OF_ONE (sin, pw_sin, PW_NOT_MONOTONIC, -DBL_MAX, DBL_MAX),
   FUNCTION_OF_ONE (cos, pw_cos, PW_NOT_MONOTONIC, -DBL_MAX, DBL_MAX),
-  { "tan", PW_OP_TAN, 1, 1, tan, NULL, partials_tan, PW_NOT_MONOTONIC, -DBL_MAX, DBL_MAX, 0 },
+  { "tan", PW_OP_TAN, 1, 1, tan, NULL, partials_tan, PW_NOT_MONOTONIC, -DBL_MAX, DBL_MAX, 0, 0 },
   FUNCTION_OF_ONE (asin, asin, PW_INCREASING, -1, 1),
   FUNCTION_OF_ONE (acos, acos, PW_DECREASING, -1, 1),
   FUNCTION_OF_ONE (atan, atan, PW_INCREASING, -INFINITY, INFINITY),
@@ -171,8 +115,8 @@ const pw_expression_function pw_expression_functions[] = {
   FUNCTION_WITHOUT_PARTIALS (sign, PW_OP_SIGN, 1, 1),
   FUNCTION_OF_TWO (atan2, PW_OP_ATAN2, atan2),
   FUNCTION_OF_TWO (hypot, PW_OP_HYPOT, hypot),
-  FUNCTION_OF_TWO (jacobi_am, PW_OP_FUNCTION_OF_TWO, pw_jacobi_am),
-  FUNCTION_OF_ONE (elliptic_K, pw_elliptic_K, PW_INCREASING, -INFINITY, 1),
+  { "jacobi_am", PW_OP_FUNCTION_OF_TWO, 2, 2, NULL, pw_jacobi_am, partials_jacobi_am, .constant = 2 },
+  { "elliptic_K", PW_OP_FUNCTION_OF_ONE, 1, 1, pw_elliptic_K, .constant = 1 },
   FUNCTION_WITHOUT_PARTIALS (mod, PW_OP_MOD, 2, 2),
   FUNCTION_WITHOUT_PARTIALS (min, PW_OP_MIN, 2, 0),
   FUNCTION_WITHOUT_PARTIALS (max, PW_OP_MAX, 2, 0),

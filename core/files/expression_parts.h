@@ -93,6 +93,7 @@ typedef struct {
   pw_trend trend;
   double from, to; /* domain of a function of one argument, NaN outside */
   double value;    /* of a constant, without arguments */
+  int constant;    /* the argument that must be a constant, from 1; 0: none */
 } pw_expression_function;
 
 extern const pw_expression_function pw_expression_functions[]; /* and constants; ends with a NULL name */

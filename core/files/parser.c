@@ -355,8 +355,11 @@ static parser_part parser_call (parser *p, int index, pw_path *path) {
     if (!parser_enter (p)) return part;
     parser_next (p);
     if (p->type == ')' && arguments == 0) break;
+    const size_t at = p->at;
     int depends = parser_choice (p).depends;
     p->depth--;
+    if (depends && path == NULL && arguments + 1 == f->constant)
+      return parser_fail (p, at, "%s: this argument must be a constant", f->name);
     if (most == 0 && arguments) part = parser_operation (p, part, depends, f->op, index);
     part.depends |= depends, arguments++;
   } while (p->type == ',' && p->status == PW_OK);

@@ -164,14 +164,6 @@ static pw_range range_hypot (const pw_range *x, const pw_range *y) {
   return r;
 }
 
-/* jacobi_am (x, y) is monotonic in each argument, and NaN for y > 1. */
-static pw_range range_jacobi_am (const pw_range *x, const pw_range *y) {
-  const pw_range in_domain = range_between (y->lo, fmin (y->hi, 1));
-  pw_range r = y->lo > 1 ? range_nan : range_corners (pw_jacobi_am, x, &in_domain);
-  r.nan |= y->hi > 1;
-  return r;
-}
-
 /* ---- Operations with jumps or kinks ---- */
 
 /* floor, ceil, round: one integer, or a break; includes values just after a jump at an end, in either direction. */
@@ -310,7 +302,7 @@ static pw_range range_operation (const pw_expression_code *c, const pw_range *x)
   case PW_OP_HYPOT:
     return range_hypot (x, y);
   case PW_OP_FUNCTION_OF_TWO:
-    return range_jacobi_am (x, y);
+    return y->lo > 1 ? range_nan : range_corners (pw_jacobi_am, x, y); /* jacobi_am increases with x */
   default:
     return range_compare (c->op, x, y);
   }

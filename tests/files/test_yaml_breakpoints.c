@@ -56,10 +56,7 @@ TEST (breakpoints) {
     { "sqrt(2 - t) > -1", 2, 0 },
     { "sqrt(t - 2) != -1 ? 1 : 0", 0, 0 },
     { "sqrt(t - 2) == sqrt(t - 2)", 2, -1 },
-    { "exp(elliptic_K(t/4)) > -1", 4, 0 },
-    { "sin(jacobi_am(t, t/2)) < 2", 2, 0 },
-    { "sin(jacobi_am(t, sqrt(3 - t))) < 2", 2, 3 },
-    { "jacobi_am(t/2, -t) > 1", 1.6950459364929928, 0 },
+    { "jacobi_am(t/2, -3) > 1", 1.561413132451377, 0 },
     { "(2 - t)^2.5 > -1", 2, 0 },
     { "acos(t)^0 > t - 4", 5, 0 },
     { "(t - 3)^(t < 1 ? 2 : sqrt(-1 - t)) > 1 ? 1 : 0", 1, 0 },
@@ -161,7 +158,7 @@ TEST (accumulating) {
 /* Where enclosures never decide, jumps a thousandth of the time apart are found all the same. */
 TEST (undecided) {
   static const char *const text[] = { "-0.5 - t > deg/((t < t) ? t - 1 : sin(t))",
-                                      "-jacobi_am(t, atan2(t, t))/(2*t) > deg/sin(t)" };
+                                      "-jacobi_am(t, pi/4)/(2*t) > deg/sin(t)" };
   for (size_t i = 0; i < sizeof text / sizeof *text; i++) {
     const pw_expression *x = expression_of (text[i]);
     int found = 0;

@@ -404,13 +404,13 @@ int LLVMFuzzerTestOneInput (const uint8_t *data, size_t size) {
 
 static fuzz_grammar expression_rules[] = {
   "e:$v`$n`($e)`-$e`$e$o$e`$e $o $e`$f($e)`$g($e,$e)`$e ? $e : "
-  "$e`min($e,$e,$e)`max($e)`$f($e)`($e)$o($e)`($e$c$e)`x-$n",
+  "$e`min($e,$e,$e)`max($e)`$f($e)`($e)$o($e)`($e$c$e)`x-$n`jacobi_am($e,$n)`elliptic_K($n)",
   "v:x`speed`x",
   "n:1`0`2`0.5`3`10`1e3`pi`deg`.25`7.5e-3`1.25`e",
   "o:+`-`*`/`^`$c",
   "c:<`<=`>`>=`==`!=`&&`||",
-  "f:sin`cos`tan`asin`acos`atan`sinh`cosh`tanh`exp`log`log10`sqrt`abs`floor`ceil`round`sign`elliptic_K",
-  "g:atan2`hypot`mod`min`max`jacobi_am",
+  "f:sin`cos`tan`asin`acos`atan`sinh`cosh`tanh`exp`log`log10`sqrt`abs`floor`ceil`round`sign",
+  "g:atan2`hypot`mod`min`max",
   NULL
 };
 
