@@ -153,9 +153,7 @@ struct pw_run {
 
   int stopped;     /* 1: settings.stop has requested a stop */
   int interrupted; /* 1: the method must be restarted: at a breakpoint, after a failed restart or an interrupted step */
-  struct {
-    double time, speed;           /* time since the start [s]; the largest speed then, in units of the scene (run.c) */
-  } speed_record, earlier_record; /* the last record; the one before, at half its time or less */
+  double checked_span; /* time since the start when pw_run_check_resolution last had a look [s] */
 
   double energy0, potential0; /* initial energy and potential energy [J]; energy0 includes changes by pw_run_restart */
   double exchanged;           /* the largest kinetic energy or change of potential energy so far [J] (run.c) */

@@ -151,10 +151,6 @@ double pw_run_energy_defect (const pw_run *r, const pw_sample *sample);
 /* Advice against an energy defect of this size, as pw_run_energy_defect returns it. */
 const char *pw_run_energy_advice (const pw_run *r, double defect);
 
-/* The largest velocity in units of L/T (lengths) or 1/T (angles), see pw_scale, if it exceeds 1e3 and still grows; else
- * 0.  *state: that velocity; *power: exponent p of its growth as t^p. */
-double pw_run_growth (const pw_run *r, int *state, double *power);
-
 /* Restarts from a state at the time reached, after the caller has changed something.  The state is made consistent
  * first.  q and v may be NULL: unchanged.  The ledger continues; the change of energy does not count in its balance.
  * Errors: PW_INPUT (a magnitude of 1e100 or more, or NaN), PW_INITIAL, PW_METHOD: the run stays where it was;

@@ -962,7 +962,7 @@ static int several_possible (const pw_run *r) {
 }
 
 /* The number of whole steps that can be taken at once: up to t_end and the next breakpoint, with the tolerance of
- * pw_step_end; up to the first that reaches t; up to a multiple of PW_CHECK_INTERVAL and the next record of speeds
+ * pw_step_end; up to the first that reaches t; up to the next look at coordinates that are too large
  * (run.c).  Each must be twice as long as a step that counts as stalled (run.c). */
 static int several_count (const pw_run *r, double t, double t_end) {
   const pw_method_data *d = r->data;
@@ -970,7 +970,7 @@ static int several_count (const pw_run *r, double t, double t_end) {
                shortest = 128 * DBL_EPSILON;
   int most = PW_CHECK_INTERVAL - (int)(r->statistics.steps % PW_CHECK_INTERVAL), n = 0;
   double reached = r->t;
-  while (n < most && reached < t && reached < t_end && reached - r->settings.t < 2 * r->speed_record.time) {
+  while (n < most && reached < t && reached < t_end && reached - r->settings.t < 2 * r->checked_span) {
     double next = d->counter.base + (double)(d->counter.count + n + 1) * h;
     if (!(next <= stop && h > shortest * fabs (next))) break;
     reached = next, n++;

@@ -353,8 +353,6 @@ static void checkpoint_state (pw_run *r, pw_archive *a) {
     &r->power, &r->reference_level, &r->previous_norm, &r->independence, &r->reselect_below, &r->watchdog.largest_sine
   };
   for (size_t i = 0; i < sizeof number / sizeof *number; i++) pw_archive_bytes (a, number[i], sizeof (double));
-  pw_archive_bytes (a, &r->speed_record, sizeof r->speed_record);
-  pw_archive_bytes (a, &r->earlier_record, sizeof r->earlier_record);
   pw_archive_bytes (a, r->q, n);
   pw_archive_bytes (a, r->v, n);
   pw_archive_bytes (a, r->ledger, entries);

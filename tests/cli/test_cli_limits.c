@@ -232,21 +232,15 @@ TEST (remaining) {
   }
 }
 
-/* Speeds that have grown a thousand times beyond the scene's are reported; the same speed from the start is not. */
+/* A torque that nothing opposes: the number of steps grows like the square of the time. */
 TEST (growth) {
-  cli_write ("spin.yaml", "pinwheel: 1\nabout: a rotor\nrun: {t_end: 3000, method: erk8+projection}\n"
-                          "parameters: [{name: T, value: 1}, {name: w, value: 0}, {name: a, value: 0}]\n"
-                          "bodies: [{name: rotor, mass: 1, inertia: 1, start: {x: a}, rate: {omega: w}}]\n"
-                          "elements:\n  - {pin: P, body: [rotor, ground], at: [[-a, 0], [0, 0]]}\n"
-                          "  - {torque: M, body: [rotor, ground], value: T}\n");
-  assert_int_equal (cli_run ("pinwheel run @/spin.yaml --json -"), 0);
-  assert_non_null (strstr (cli_err, "pinwheel: the motion grows without bound: rotor.omega has become 3e+03 times "));
-  cli_good ("pinwheel run @/spin.yaml --set w=3000 --set T=0 --json -");
-  assert_int_equal (cli_run ("pinwheel run @/spin.yaml --set a=0.5 --method erk8+projection --rtol 1e-4 "
-                             "--t-end 1e6 --max-steps 4e5"),
-                    4);
+  cli_write ("spin.yaml", "pinwheel: 1\nabout: a rotor\n"
+                          "bodies: [{name: rotor, mass: 1, inertia: 1, start: {x: 0.5}}]\n"
+                          "elements:\n  - {pin: P, body: [rotor, ground], at: [[-0.5, 0], [0, 0]]}\n"
+                          "  - {torque: M, body: [rotor, ground], value: 1}\n");
+  assert_int_equal (
+      cli_run ("pinwheel run @/spin.yaml --method erk8+projection --rtol 1e-4 --t-end 1e6 --max-steps 4e5"), 4);
   assert_non_null (strstr (cli_err, "max-steps is reached: 400000 attempted steps, "));
-  assert_non_null (strstr (cli_err, "rejected; the motion grows without bound: rotor.omega = "));
 }
 
 /* A signal during the last step interrupts nothing. */

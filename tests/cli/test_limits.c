@@ -138,57 +138,11 @@ TEST (stop_inside) {
 
 static const pw_parameter limits_list[] = { { .name = "torque" }, { .name = NULL } };
 
-/* A rotor on a pin with a constant torque; without it, as fast as it gets, it only turns. */
+/* A rotor on a pin with a constant torque; without it, it only turns. */
 SCENE_WITH (limits_rotor, limits_list, double) {
   pw_add_body (m, &(pw_body){ .name = "rotor", .mass = 1, .inertia = 1, .rate = { 0, 0, *p != 0 ? 0 : 5000 } });
   pw_add_pin (m, &(pw_pin){ .name = "P", .body = { "rotor", "ground" } });
   pw_add_torque (m, &(pw_torque){ .name = "T", .body = { "rotor", "ground" }, .value = { .constant = *p } });
-}
-
-/* T is 1 s: after t seconds the speed is t times its scale, and it grows with t. */
-TEST (growth) {
-  static const char *const method[] = { "rk4+projection", "erk8+projection", "bdf+projection", NULL };
-  for (const char *const *k = method; *k; k++)
-    for (int spins = 0; spins < 2; spins++) {
-      int which;
-      double power;
-      pw_system *s = scene_system (&limits_rotor_table, "torque", spins ? 0. : 1., NULL);
-      pw_run *r = runs_open (s, *k, &(pw_settings){ .step = 0.1, .span = 1 });
-      runs_to (r, 900);
-      assert_true (pw_run_growth (r, &which, &power) == 0);
-      runs_to (r, 3000);
-      double growth = pw_run_growth (r, &which, &power);
-      if (spins) assert_true (growth == 0);
-      if (!spins) check_close ("growth", growth, 3000, 3, "1e-3: the tolerance of bdf, with room");
-      if (!spins) check_close ("power", power, 1, 0.01, "speeds at two times that are good to 1e-3");
-      if (!spins) assert_int_equal (which, 5);
-      pw_run_close (r);
-      pw_system_free (s);
-    }
-}
-
-/* A torque that changes sign: the speed, (1 - cos w t) / w, was as large at half of the time as it is again. */
-SCENE_WITH (limits_swung, limits_list, double) {
-  const double omega = *p;
-  pw_add_body (m, &(pw_body){ .name = "rotor", .mass = 1, .inertia = 1 });
-  pw_add_pin (m, &(pw_pin){ .name = "P", .body = { "rotor", "ground" } });
-  pw_add_torque (
-      m, &(pw_torque){ .name = "T",
-                       .body = { "rotor", "ground" },
-                       .value = { PW_HARMONIC, .harmonic = { .amplitude = 1, .omega = omega, .phase = -PW_PI / 2 } } });
-}
-
-/* Growth is that since a mark at 8192 s or so, not that of the last step. */
-TEST (no_growth) {
-  int which;
-  const double omega = 3 * PW_PI / 8192, t = (6 * PW_PI + 2.2) / omega;
-  double power;
-  pw_system *s = scene_system (&limits_swung_table, "torque", omega, NULL);
-  pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1, .span = 1 });
-  check_close ("speed", runs_to (r, t).v[2], (1 - cos (2.2)) / omega, 1e-6 / omega, "1e-6: (w h)^4, with room");
-  assert_true (pw_run_growth (r, &which, &power) == 0 && power < 0);
-  pw_run_close (r);
-  pw_system_free (s);
 }
 
 /* At 4.5e13 rad an angle is known to 0.01 rad. */

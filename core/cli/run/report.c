@@ -269,9 +269,7 @@ pw_summary pw_run_summary (pw_run_cli *command, const pw_sample *last, const pw_
   return summary;
 }
 
-void pw_report_warnings (const pw_run *run, const pw_system *system, double defect) {
-  int state;
-  double power, growth = pw_run_growth (run, &state, &power);
+void pw_report_warnings (const pw_run *run, double defect) {
   const pw_statistics *stats = pw_run_statistics (run);
   if (defect > REPORT_DEFECT)
     pw_cli_say ("pinwheel: the energy does not balance: %s %% of it is unaccounted for; %s\n",
@@ -281,11 +279,6 @@ void pw_report_warnings (const pw_run *run, const pw_system *system, double defe
                 "shorter steps, or a method with adaptive ones\n",
                 stats->unresolved, PW_COUNTED (stats->steps, "step"),
                 pw_run_unresolved (run, (char[PW_NAME_BYTES]){ 0 }, PW_NAME_BYTES));
-  if (growth != 0)
-    pw_cli_say (
-        "pinwheel: the motion grows without bound: %s has become %s times the scene's own speed and grows as t^%s; "
-        "nothing opposes what drives it\n",
-        PW_NAME (pw_system_state_name, system, state), PW_DIGITS (growth, 2), PW_DIGITS (power, 2));
 }
 
 void pw_report_end (const pw_run_cli *command, const pw_summary *summary, const pw_sample *last) {

@@ -21,9 +21,9 @@ void pw_report_initialisation (pw_run *run, const pw_system *system, const char 
  * PW_RESOURCE. */
 int pw_report_initial_state (const pw_cli_model *m, double limit, pw_error *error);
 
-/* After the run: a relative energy defect of more than 1 % (NaN: not known), speeds that grow beyond any plausible
- * scale. */
-void pw_report_warnings (const pw_run *run, const pw_system *system, double defect);
+/* After the run: a relative energy defect of more than 1 % (NaN: not known), steps that did not resolve a
+ * change. */
+void pw_report_warnings (const pw_run *run, double defect);
 
 /* ---- Results ---- */
 

@@ -505,7 +505,6 @@ static int run_finish_figures (pw_run_cli *command, const char *reason, pw_error
 /* Everything after the last step, however that came about: table, summary, figures, messages.  Returns an exit
  * status. */
 static int run_finish (pw_run_cli *command, pw_error *error) {
-  const pw_system *system = command->line.m.system;
   pw_run *run = command->run;
   static const char *const output_name[PW_RUN_OUTPUTS] = { "the table so far", "the page", "the summary" };
   char reason[PW_RUN_REASON] = "";
@@ -517,7 +516,7 @@ static int run_finish (pw_run_cli *command, pw_error *error) {
   if (last && command->table_path == NULL && command->summary_path == NULL) pw_report_end (command, &summary, last);
   pw_report_stated (command,
                     run_is_stdout (command->table_path) || run_is_stdout (command->summary_path) ? stderr : stdout);
-  if (error->status == PW_OK) pw_report_warnings (run, system, summary.energy_defect);
+  if (error->status == PW_OK) pw_report_warnings (run, summary.energy_defect);
   int undrawn = run_finish_figures (command, summary.reason, error);
   if (!interrupted) summary.status = pw_cli_status_word (error->status); /* summary.reason is the text of the error */
   if (undrawn && error->status == PW_OK) summary.status = "interrupted", summary.reason = "gnuplot was interrupted";
