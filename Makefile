@@ -34,10 +34,10 @@ PW_CFLAGS = $(STRICT) $(THREADS) -D_POSIX_C_SOURCE=200809L $(INCLUDE) $(CPPFLAGS
 SUITESPARSE ?= /usr/include/suitesparse
 SYSTEM := -isystem $(SUITESPARSE)
 
-SOLVER_LIBS := -lsundials_idas -lsundials_cvodes -lsundials_nvecserial -lklu -lamd -llapacke -lm
+SOLVER_LIBS := -lsundials_idas -lsundials_cvodes -lsundials_nvecserial -lklu -lamd -lbtf -llapacke -lm
 FILES_LIBS  := -lfyaml -ldl -lm
 # What these need if they are linked statically; the Fortran libraries where the compiler has them.
-STATIC_LIBS  = -lbtf -lcolamd -lsuitesparseconfig -llapack -lblas $(foreach l,gfortran quadmath,$(if \
+STATIC_LIBS  = -lcolamd -lsuitesparseconfig -llapack -lblas $(foreach l,gfortran quadmath,$(if \
                $(filter /%,$(shell $(CC) -print-file-name=lib$l.a)),-l$l)) -lm
 CLI_LIBS    := -lpopt -lgsl -lgslcblas -lnlopt
 LINK         = $(CC) $(CFLAGS) $(SAN) $(LDFLAGS) -Wl,--as-needed

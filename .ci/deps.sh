@@ -54,7 +54,7 @@ C
   suitesparse) cat <<'C' ;;
 #include <klu.h>
 #include <amd.h>
-int try_suitesparse (void) { return klu_defaults && klu_l_defaults && amd_order && amd_l_order; }
+int try_suitesparse (void) { return klu_defaults && klu_l_defaults && amd_order && amd_l_order && btf_maxtrans; }
 C
   lapacke) cat <<'C' ;;
 #include <lapacke.h>
@@ -90,7 +90,7 @@ C
 libs_of () {
   case $1 in
   sundials) echo -lsundials_idas -lsundials_cvodes -lsundials_arkode -lsundials_nvecserial ;;
-  suitesparse) echo -lklu -lamd ;;
+  suitesparse) echo -lklu -lamd -lbtf ;;
   libfyaml) echo -lfyaml ;;
   gsl) echo -lgsl -lgslcblas ;;
   *) echo "-l$1" ;;

@@ -23,6 +23,7 @@
  * the massless ones.  Its solution yields
  *
  *     a_P = P^-1 (gamma_p - H a),       lambda_p = mu - Y^T lambda_i. */
+#include <btf.h>
 #include <float.h>
 #include <limits.h>
 #include <math.h>
@@ -712,57 +713,33 @@ static int condense_end (const saddle_plan *plan, int n) {
   return n + 1 < plan->nodes ? plan->node[n + 1].first_contribution : plan->contributions;
 }
 
-typedef struct {
-  saddle_plan *plan;
-  int *capacity; /* groups: coordinates that no equation takes yet */
-  int *taken;    /* contributions: equations of the node that take a coordinate of the group */
-  int *by, *of;  /* groups: the contribution by which the search has come, and that which gives way; -1: none */
-  int *queue, *visited, queued, search;
-} condense_matching;
-
-/* Queues the groups to which node n contributes; contribution `of` gives way to one of them (-1: a new equation). */
-static void matching_queue (condense_matching *m, int n, int of) {
-  const saddle_plan *plan = m->plan;
-  for (int p = plan->node[n].first_contribution; p < condense_end (plan, n); p++) {
-    int g = plan->contribution[p].group;
-    if (m->visited[g] == m->search) continue;
-    m->visited[g] = m->search, m->by[g] = p, m->of[g] = of;
-    m->queue[m->queued++] = g;
-  }
-}
-
-/* Lets an equation of node n take a coordinate; others give way to theirs.  0 if none is left (Berge 1957). */
-static int matching_augment (condense_matching *m, int n) {
-  const saddle_plan *plan = m->plan;
-  m->search++, m->queued = 0;
-  matching_queue (m, n, -1);
-  for (int i = 0; i < m->queued; i++) {
-    int g = m->queue[i];
-    for (int x = plan->start[g]; m->capacity[g] == 0 && x < plan->start[g + 1]; x++)
-      if (m->taken[plan->list[x]]) matching_queue (m, plan->contribution[plan->list[x]].node, plan->list[x]);
-    if (m->capacity[g] == 0) continue;
-    for (m->capacity[g]--; m->taken[m->by[g]]++, m->of[g] >= 0; g = plan->contribution[m->of[g]].group)
-      m->taken[m->of[g]]--;
-    return 1;
-  }
-  return 0;
-}
-
 /* Finds out whether the equations depend on each other in every configuration, since some of them are more than the
  * coordinates in which they have entries, such as those of ten pins between the same two bodies.  Then *row is one of
- * them, else it stays. */
+ * them, else it stays.  The largest matching of equations to coordinates leaves it out (Duff 1981, On algorithms for
+ * obtaining a maximum transversal). */
 static int condense_find_dependent (saddle_plan *plan, int *row) {
-  size_t groups = (size_t)plan->groups + 1;
-  condense_matching m = { .plan = plan, .capacity = pw_arena_alloc (&plan->arena, 5 * groups * sizeof (int)) };
-  m.taken = pw_arena_alloc (&plan->arena, ((size_t)plan->contributions + 1) * sizeof *m.taken);
-  if (m.capacity == NULL || m.taken == NULL) return PW_RESOURCE;
-  m.by = m.capacity + groups, m.of = m.by + groups, m.queue = m.of + groups, m.visited = m.queue + groups;
-  for (int j = 0; j < plan->saddle->s->coords; j++)
-    m.capacity[group_of (plan->saddle->s, j)] += plan->saddle->inverse_weight[j] > 0;
+  const pw_saddle *saddle = plan->saddle;
+  size_t coords = (size_t)saddle->s->coords, equations = 2 * (size_t)plan->nodes; /* at most */
+  int *match = pw_arena_alloc (&plan->arena, (coords + 8 * equations + 1) * sizeof *match), count = 0, entries = 0;
+  int *coordinate = pw_arena_alloc (&plan->arena, (6 * (size_t)plan->contributions + 1) * sizeof *coordinate);
+  if (match == NULL || coordinate == NULL) return PW_RESOURCE;
+  int *equation = match + coords, *is_matched = equation + equations, *first = is_matched + equations;
+  double work;
   for (int n = 0; n < plan->nodes; n++)
-    for (int i = 0; i < plan->node[n].size; i++)
-      if (!matching_augment (&m, n)) return *row = plan->node[n].unknown + i, PW_OK;
-  return PW_OK;
+    for (int i = 0; i < plan->node[n].size; i++) {
+      equation[count] = plan->node[n].unknown + i;
+      for (int p = plan->node[n].first_contribution; p < condense_end (plan, n); p++) {
+        int j = group_first (saddle->s, plan->contribution[p].group), end = j + group_width (saddle->s, j);
+        for (; j < end; j++)
+          if (saddle->inverse_weight[j] > 0) coordinate[entries++] = j;
+      }
+      first[++count] = entries;
+    }
+  if (btf_maxtrans ((int)coords, count, first, coordinate, 0, &work, match, first + count + 1) == count) return PW_OK;
+  for (size_t j = 0; j < coords; j++)
+    if (match[j] >= 0) is_matched[match[j]] = 1;
+  for (count = 0; is_matched[count];) count++;
+  return *row = equation[count], PW_OK;
 }
 
 /* ---- Ranks of the nodes of a scene with uncondensed bodies ----
