@@ -272,43 +272,15 @@ PAGE_EXPORT (release) void page_release (void *p) {
 }
 
 /* The functions of libraries that explicit methods call, for scenes small enough to run in a web page: AMD's
- * fill-reducing order, LAPACK's solution by a Cholesky factorisation, KLU's factorisation. */
+ * order, BTF's matching, LAPACK's solution by a Cholesky factorisation, KLU's factorisation. */
 
-enum { LIBRARIES_NODES = 4000 }; /* of a graph, at most: it takes a byte for each pair of nodes */
-
-/* Removes a node from a graph, given by its n x n adjacency matrix, and connects its neighbours with each other. */
-static void eliminate (int n, unsigned char *edge, int node) {
-  unsigned char *neighbour = edge + node * n;
-  for (int i = 0; i < n; i++)
-    if (neighbour[i])
-      for (int j = 0; j < n; j++) edge[i * n + j] |= neighbour[j] && j != i;
-  for (int i = 0; i < n; i++) neighbour[i] = edge[i * n + node] = 0;
-}
-
-static int degree (int n, const unsigned char *edge, int node) {
-  int count = 0;
-  for (int i = 0; i < n; i++) count += edge[node * n + i];
-  return count;
-}
-
-/* The order of elimination by the minimum degree algorithm: always a node with the fewest neighbours. */
+/* Nodes with few neighbours first; where that does not reduce fill-in, block_ldl.c keeps the natural order. */
 int amd_order (int n, const int Ap[], const int Ai[], int P[], double control[], double info[]) {
-  (void)control, (void)info;
-  unsigned char *edge = n <= LIBRARIES_NODES ? calloc ((size_t)n * (size_t)n + 1, 1) : NULL,
-                *done = calloc ((size_t)n + 1, 1);
-  for (int i = 0; edge && i < n; i++)
-    for (int k = Ap[i]; k < Ap[i + 1]; k++) edge[i * n + Ai[k]] = edge[Ai[k] * n + i] = Ai[k] != i;
-  for (int k = 0; edge && done && k < n; k++) {
-    int best = -1, least = n + 1;
+  (void)Ai, (void)control, (void)info;
+  for (int degree = 0, k = 0; k < n; degree++)
     for (int i = 0; i < n; i++)
-      if (!done[i] && degree (n, edge, i) < least) least = degree (n, edge, best = i);
-    eliminate (n, edge, P[k] = best);
-    done[best] = 1;
-  }
-  int status = edge && done ? AMD_OK : AMD_OUT_OF_MEMORY;
-  free (edge);
-  free (done);
-  return status;
+      if (Ap[i + 1] - Ap[i] == degree) P[k++] = i;
+  return AMD_OK;
 }
 
 /* As if all columns were matched: factorisation reveals dependent equations, too. */
@@ -342,10 +314,12 @@ lapack_int LAPACKE_dposv_work (int layout, char uplo, lapack_int n, lapack_int n
 /* ---- Factorisation of a sparse matrix (sparse.h) as a dense one, by columns, with partial pivoting.  All numbers are
  * complex; their real and imaginary parts are those of `value`, of which real matrices have the real ones only. ---- */
 
+enum { LIBRARIES_MOST = 4000 }; /* rows of a matrix, at most: it takes 16 bytes for each entry */
+
 int pw_sparse_open (pw_sparse *x, pw_sparse_numbers numbers, int n, int64_t *colptr, int64_t *rowind) {
   *x = (pw_sparse){ .numbers = numbers, .colptr = colptr, .rowind = rowind };
   x->symbolic = calloc (1, sizeof *x->symbolic);
-  x->factors = n <= LIBRARIES_NODES ? calloc ((size_t)n * (size_t)(n + 1) + 1, sizeof (complex double)) : NULL;
+  x->factors = n <= LIBRARIES_MOST ? calloc ((size_t)n * (size_t)(n + 1) + 1, sizeof (complex double)) : NULL;
   if (x->symbolic) x->symbolic->n = n;
   return x->symbolic && x->factors ? PW_OK : PW_RESOURCE;
 }
