@@ -477,7 +477,6 @@ typedef struct {
   int iterations;              /* of the last projection of positions */
   const unsigned char *active; /* rows that are enforced; NULL: all */
   int ignores_inactive;        /* 1: the residuals of the other rows are not checked */
-  int worst_row;               /* with the largest residual in the last projection of positions */
   int contradictory_row;       /* redundant row that is violated after it, or -1 */
 } pw_projector;
 

@@ -29,19 +29,14 @@ struct pw_csv {
   pw_npz npz;
 };
 
-/* Adds the next column to the archive. */
-static void csv_array (pw_csv *c, const char *name) {
-  size_t rows = c->columns ? c->values / c->columns : 0;
-  double *column = malloc ((rows + 1) * sizeof *column);
-  c->failed |= column == NULL;
-  for (size_t row = 0; column && row < rows; row++) column[row] = c->value[row * c->columns + (size_t)c->cells];
-  if (column) pw_npz_add (&c->npz, name, (long)rows, -1, 1, column);
-  free (column);
-}
-
 static void csv_name (pw_csv *c, const char *name, const char *unit) {
   if (c->is_archive) {
-    csv_array (c, name);
+    size_t rows = c->columns ? c->values / c->columns : 0;
+    double *column = malloc ((rows + 1) * sizeof *column);
+    c->failed |= column == NULL;
+    for (size_t row = 0; column && row < rows; row++) column[row] = c->value[row * c->columns + (size_t)c->cells];
+    if (column) pw_npz_add (&c->npz, name, (long)rows, -1, 1, column);
+    free (column);
   } else {
     fprintf (c->f, "%s%s", c->cells ? "," : "", name);
     if (unit && *unit) fprintf (c->f, " [%s]", unit);

@@ -110,12 +110,13 @@ static void json_elements (pw_json *j, const pw_system *s, const pw_sample *x) {
   pw_json_close (j, '}');
 }
 
-/* First-order states. */
-static void json_states (pw_json *j, const pw_system *s, const pw_sample *x) {
-  int n = pw_system_coordinates (s), states = pw_system_states (s);
-  if (states == 0) return;
-  pw_json_open (j, "states", '{');
-  for (int i = n - states; i < n; i++) pw_json_number (j, PW_NAME (pw_system_state_name, s, n + i), x->v[i]);
+/* The columns of a type from `first` on. */
+static void json_columns (pw_json *j, const char *key, const pw_system *s, pw_column_type type, int first, int count,
+                          const double *value) {
+  pw_json_open (j, key, '{');
+  for (int i = 0; i < count; i++)
+    pw_json_number (j, PW_NAME (pw_system_column_name, s, ((pw_column){ type, first + i })),
+                    type == PW_COLUMN_REACTION ? 0 - value[i] : value[i]);
   pw_json_close (j, '}');
 }
 
@@ -142,31 +143,15 @@ static void json_sample (pw_json *j, const pw_system *s, const pw_sample *x, int
   pw_json_number (j, "t", x->t);
   json_bodies (j, s, x);
   json_elements (j, s, x);
-  json_states (j, s, x);
-  pw_json_open (j, "reactions", '{');
-  for (int i = 0; i < pw_system_rows (s); i++)
-    pw_json_number (j, PW_NAME (pw_system_reaction_name, s, i), 0 - x->lambda[i]);
-  pw_json_close (j, '}');
-  if (pw_system_outputs (s) > 0) {
-    pw_json_open (j, "outputs", '{');
-    for (int i = 0; i < pw_system_outputs (s); i++) pw_json_number (j, pw_system_output_name (s, i), x->output[i]);
-    pw_json_close (j, '}');
-  }
+  const int n = pw_system_coordinates (s), states = pw_system_states (s), outputs = pw_system_outputs (s);
+  if (states > 0) json_columns (j, "states", s, PW_COLUMN_STATE, 2 * n - states, states, x->v + n - states);
+  json_columns (j, "reactions", s, PW_COLUMN_REACTION, 0, pw_system_rows (s), x->lambda);
+  if (outputs > 0) json_columns (j, "outputs", s, PW_COLUMN_OUTPUT, 0, outputs, x->output);
   const double energy[] = { x->kinetic, x->potential, x->work, x->loss, x->projection, x->balance };
   json_numbers (j, "energy", names, ledger ? energy : NULL, 6);
 }
 
 /* ---- The run ---- */
-
-static void json_lists (pw_json *j, const char *const *redundant, const pw_system *s) {
-  pw_json_open (j, "redundant", '[');
-  for (; redundant && *redundant; redundant++) pw_json_text (j, NULL, *redundant);
-  pw_json_close (j, ']');
-  pw_json_open (j, "differences", '[');
-  for (int i = 0, n = s ? pw_system_differences (s) : 0; i < n; i++)
-    pw_json_text (j, NULL, PW_NAME (pw_system_difference_name, s, i));
-  pw_json_close (j, ']');
-}
 
 static void json_events (pw_json *j, const pw_summary *summary, const pw_system *s) {
   pw_json_open (j, "events", '[');
@@ -242,7 +227,13 @@ int pw_json_write (const pw_summary *summary, const pw_system *s, const pw_sampl
                                              : PW_PRINTED (400, "%.300s at t = %s s", summary->until,
                                                            pw_format ((char[32]){ 0 }, summary->stop_time, 17)));
   pw_json_number (&j, "unbalanced", summary->energy_defect);
-  json_lists (&j, summary->redundant, s);
+  pw_json_open (&j, "redundant", '[');
+  for (const char *const *text = summary->redundant; text && *text; text++) pw_json_text (&j, NULL, *text);
+  pw_json_close (&j, ']');
+  pw_json_open (&j, "differences", '[');
+  for (int i = 0, n = s ? pw_system_differences (s) : 0; i < n; i++)
+    pw_json_text (&j, NULL, PW_NAME (pw_system_difference_name, s, i));
+  pw_json_close (&j, ']');
   if (s && pw_system_limited (s)) json_events (&j, summary, s);
   json_reference (&j, summary->reference);
   json_stated (&j, s, summary->stated);

@@ -376,12 +376,6 @@ static void elimination_backward (const elimination *ldl, emitter *to, term *y, 
     y[p] = emit_difference (to, y[p], term_negative (sum), ldl->inverse[p]);
 }
 
-/* Writes the statements that solve K x = right; x replaces the n terms of `right`. */
-static void elimination_solve (const elimination *ldl, emitter *to, term *right) {
-  for (int m = 0; m < ldl->pivots; m++) elimination_forward (ldl, to, right, m);
-  for (int m = ldl->pivots - 1; m >= 0; m--) elimination_backward (ldl, to, right, m);
-}
-
 /* ---- Sparsity of element types, found at random states of random scenes ----
  *
  * All entries of a plug-in's type count as variable: the force of a wall, for example, is 0 at most states.  So do
@@ -637,16 +631,6 @@ static void specialise_ledger (const generator *gen) {
   WRITE ("}\n");
 }
 
-static void specialise_elements (const generator *gen) {
-  specialise_rows (gen, "jacobian", "J", offsetof (pw_kind, J), gen->s->rows);
-  specialise_rows (gen, "constraints", "g", offsetof (pw_kind, g), gen->s->holonomic);
-  specialise_rows (gen, "sizes", "g_size", offsetof (pw_kind, g_size), gen->s->holonomic);
-  specialise_rows (gen, "right_sides", "eta", offsetof (pw_kind, eta), gen->s->rows);
-  specialise_rows (gen, "gammas", "gamma", offsetof (pw_kind, gamma), gen->s->rows);
-  specialise_forces (gen);
-  specialise_ledger (gen);
-}
-
 /* ---- Signals, data of a run ---- */
 
 /* 1 if all signals are constants or harmonics of time, which generated code evaluates itself. */
@@ -784,7 +768,8 @@ static int specialise_solve (generator *gen, const elimination *ldl, specialise_
          "  (void)C, (void)J, (void)F, (void)g, (void)a;\n",
          name[unknown], unknown == SPECIALISE_ACCELERATION ? "const double *f, " : "",
          unknown == SPECIALISE_ACCELERATION ? ", double *lambda" : "");
-  elimination_solve (ldl, &gen->emitter, right);
+  for (int m = 0; m < ldl->pivots; m++) elimination_forward (ldl, &gen->emitter, right, m);
+  for (int m = ldl->pivots - 1; m >= 0; m--) elimination_backward (ldl, &gen->emitter, right, m);
   for (int j = 0; j + 1 < s->coords; j += 2)
     WRITE ("  STORE_PAIR (a + %d, %s, %s);\n", j, term_text (right[j], text), term_text (right[j + 1], next));
   if (s->coords % 2) WRITE ("  a[%d] = %s;\n", s->coords - 1, term_text (right[s->coords - 1], text));
@@ -832,15 +817,6 @@ static int specialise_algebra (generator *gen) {
 
 /* ---- The file ---- */
 
-/* Lists the coordinates in pairs, X (0, pair) X (2, pair) and, if n is odd, X (4, one); and one by one. */
-static void specialise_coordinates (FILE *out, int n) {
-  fputs ("#define EACH_COORDINATES(X)", out);
-  for (int i = 0; i < n; i += 2) fprintf (out, i + 1 < n ? " X (%d, pair)" : " X (%d, one)", i);
-  fputs ("\n#define EACH_ONE(X)", out);
-  for (int i = 0; i < n; i++) fprintf (out, " X (%d, one)", i);
-  fputc ('\n', out);
-}
-
 static void specialise_constants (const generator *gen) {
   const pw_system *s = gen->s;
   WRITE ("\n/* ---- The scene ---- */\n\nenum { BODIES = %d, N = %d, ROWS = %d, HOLONOMIC = %d, INTERNAL = %d,\n"
@@ -852,7 +828,12 @@ static void specialise_constants (const generator *gen) {
   specialise_list (gen->out, "ROW", s->rows);
   specialise_list (gen->out, "HOLONOMIC", s->holonomic);
   specialise_list (gen->out, "INTERNAL", s->coords - 3 * s->bodies);
-  specialise_coordinates (gen->out, s->coords);
+  /* the coordinates in pairs, X (0, pair) X (2, pair) and, if their number is odd, X (4, one); and one by one */
+  WRITE ("#define EACH_COORDINATES(X)");
+  for (int i = 0; i < s->coords; i += 2) WRITE (i + 1 < s->coords ? " X (%d, pair)" : " X (%d, one)", i);
+  WRITE ("\n#define EACH_ONE(X)");
+  for (int i = 0; i < s->coords; i++) WRITE (" X (%d, one)", i);
+  WRITE ("\n");
   for (int b = 0; b < s->bodies; b++) WRITE ("/* body %d: %s */\n", b, s->body_name[b]);
   WRITE ("\nstatic const unsigned char independent[] = { ");
   for (int i = 0; i < s->rows; i++) WRITE ("%d, ", specialise_is_independent (gen, i));
@@ -897,7 +878,13 @@ static int specialise_write (generator *gen) {
   }
   specialise_constants (gen);
   specialise_text (gen->out, "scene_head.inc", done);
-  specialise_elements (gen);
+  specialise_rows (gen, "jacobian", "J", offsetof (pw_kind, J), gen->s->rows);
+  specialise_rows (gen, "constraints", "g", offsetof (pw_kind, g), gen->s->holonomic);
+  specialise_rows (gen, "sizes", "g_size", offsetof (pw_kind, g_size), gen->s->holonomic);
+  specialise_rows (gen, "right_sides", "eta", offsetof (pw_kind, eta), gen->s->rows);
+  specialise_rows (gen, "gammas", "gamma", offsetof (pw_kind, gamma), gen->s->rows);
+  specialise_forces (gen);
+  specialise_ledger (gen);
   int status = specialise_algebra (gen);
   specialise_data (gen);
   specialise_signals (gen);

@@ -380,11 +380,6 @@ static const double START_FAR = 0.2,      /* longest of its steps, in units of t
     START_GROW = 1.1, START_SHRINK = 0.4, /* factors of the next step */
     START_STILL = 1e-10;                  /* accelerations that count as round-off, in units of the scene */
 
-/* A random number between -1 and 1. */
-static double start_random (uint64_t *state) {
-  return (double)(int64_t)pw_random_bits (state) * 0x1p-63;
-}
-
 /* Makes the positions x->q consistent, if possible. */
 static int start_assemble (pw_steady *x, pw_projector *p) {
   double *q = x->scratch[0];
@@ -434,7 +429,10 @@ static int steady_start (pw_steady *x, int attempt, double *u, pw_error *error) 
   const int relaxed = attempt == 1 || attempt % 4 == 2, consistent = relaxed || attempt % 4 == 3;
   pw_projector p;
   for (int j = 0; attempt > 1 && j < steady_unknowns (x); j++)
-    u[j] += wide * start_random (&state) * (j >= x->n ? 2 : pw_is_angle (x->s, j) ? PW_PI : 1);
+    u[j] += wide * (double)(int64_t)pw_random_bits (&state) * 0x1p-63 *
+            (j >= x->n               ? 2
+             : pw_is_angle (x->s, j) ? PW_PI
+                                     : 1);
   if (status != PW_OK || !consistent) return status;
   steady_state (x, u);
   if (pw_evaluate_J_at (x->system.run->w, x->settings.t, x->q, x->v) != PW_OK) return PW_OK; /* as it is */

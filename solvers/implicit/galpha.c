@@ -169,14 +169,6 @@ static int galpha_solve (pw_run *r, double h, double t1) {
 
 /* ---- Opening ---- */
 
-/* The coefficients for order 2 with the least damping of low frequencies for a given rho (Chung & Hulbert 1993). */
-static void galpha_coefficients (pw_method_data *d, double rho) {
-  d->alpha_m = (2 * rho - 1) / (rho + 1);
-  d->alpha_f = rho / (rho + 1);
-  d->gamma = 0.5 + d->alpha_f - d->alpha_m;
-  d->beta = 0.25 * (d->gamma + 0.5) * (d->gamma + 0.5);
-}
-
 static int galpha_open (pw_run *r, pw_error *error) {
   pw_method_data *d = r->data = calloc (1, sizeof *d);
   const pw_system *s = r->s;
@@ -189,7 +181,11 @@ static int galpha_open (pw_run *r, pw_error *error) {
   int status = pw_implicit_open (&d->common, r, array, sizeof array / sizeof *array);
   pw_dae *x = &d->common.dae;
   if (status == PW_OK) {
-    galpha_coefficients (d, pw_run_option (r, "rho"));
+    const double rho = pw_run_option (r, "rho"); /* order 2, least damping of low frequencies (Chung & Hulbert 1993) */
+    d->alpha_m = (2 * rho - 1) / (rho + 1);
+    d->alpha_f = rho / (rho + 1);
+    d->gamma = 0.5 + d->alpha_f - d->alpha_m;
+    d->beta = 0.25 * (d->gamma + 0.5) * (d->gamma + 0.5);
     d->common.q1 = d->y, d->common.v1 = d->y + x->n;
     status = pw_dae_lay_out (x, d->common.v1, d->a1, d->y + 2 * x->n);
   }

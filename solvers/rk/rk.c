@@ -98,11 +98,6 @@ static int nullspace_open (rk_nullspace *b, pw_run *r, pw_error *error) {
   return PW_OK;
 }
 
-static void nullspace_close (rk_nullspace *b) {
-  free (b->memory);
-  free (b->active_index);
-}
-
 /* Computes K and mu = eta - J w with the J last evaluated. */
 static void nullspace_assemble (rk_nullspace *b, pw_run *r, const double *w) {
   const pw_system *s = r->s;
@@ -647,13 +642,6 @@ static int rk_advance_fixed (pw_run *r, double t_end, pw_error *error) {
 #define ADAPT_REDUCTION 0.2    /* its lower bound */
 #define ADAPT_LEAST_ERROR 1e-4 /* least err_last: smaller errors are accidental and would predict too small a step */
 
-/* Sets the size of the first step, and of the first one after a discontinuity. */
-static void rk_reset_step_size (pw_run *r) {
-  pw_method_data *d = r->data;
-  d->h = 0.1 * r->w->scale.time * pow (r->settings.rtol, d->tableau->exponent);
-  d->last_error = ADAPT_LEAST_ERROR;
-}
-
 /* out = sum_j weight_j slope_j: an error estimate from n derivatives at the stages, over h. */
 static void adapt_estimate (const pw_rk_row *e, double *const *slope, int n, double *out) {
   memset (out, 0, (size_t)n * sizeof *out);
@@ -916,7 +904,8 @@ int pw_rk_open (pw_run *r, const pw_tableau *tableau, pw_error *error) {
 
 void pw_rk_close (pw_run *r) {
   pw_projector_close (&r->data->projector);
-  nullspace_close (&r->data->nullspace);
+  free (r->data->nullspace.memory);
+  free (r->data->nullspace.active_index);
   free (r->data->memory);
   free (r->data);
 }
@@ -926,7 +915,10 @@ int pw_rk_restart (pw_run *r, pw_error *error) {
   (void)error;
   d->counter = (pw_step_counter){ .base = r->t };
   d->off_grid = 0;
-  if (!r->fixed_steps) rk_reset_step_size (r);
+  if (!r->fixed_steps) {
+    d->h = 0.1 * r->w->scale.time * pow (r->settings.rtol, d->tableau->exponent);
+    d->last_error = ADAPT_LEAST_ERROR;
+  }
   rk_begin_step (r);
   return PW_OK;
 }

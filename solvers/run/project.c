@@ -27,7 +27,6 @@ int pw_projector_open (pw_projector *p, pw_run *r, const double *weight_q, const
   *p = (pw_projector){ .owns_velocity = weight_v != NULL,
                        .velocity = weight_v ? NULL : r->saddle,
                        .active = r->active,
-                       .worst_row = -1,
                        .contradictory_row = -1 };
   p->position =
       weight_q ? pw_saddle_open (r->w, weight_q, s->holonomic, r->active, error) : project_open_mass_metric (r, error);
@@ -63,9 +62,7 @@ static int project_check_redundant (pw_projector *p, const pw_run *r, const doub
     double residual = p->active[i] || (r->enforced && !r->enforced[i]) ? 0 : fabs (g[i]) / size[i];
     if (residual > largest || isnan (residual)) largest = residual, p->contradictory_row = i;
   }
-  if (p->contradictory_row < 0) return PW_OK;
-  p->worst_row = p->contradictory_row;
-  return PW_RETRY;
+  return p->contradictory_row < 0 ? PW_OK : PW_RETRY;
 }
 
 double pw_largest_angle (const pw_system *s, const double *q) {
@@ -89,7 +86,6 @@ int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const
     pw_evaluate_g (r->w, g);
     if (!(previous < small)) pw_evaluate_g_size (r->w, size);
     pw_worst_position (s, g, size, p->active, &now);
-    p->worst_row = now.row_position;
     int stalled = now.position > previous / 4; /* at round-off, since convergence is quadratic */
     if (now.position <= PW_RESIDUAL_CONVERGED) break;
     if (stalled && now.position <= accepted) break;

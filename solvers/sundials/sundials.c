@@ -321,23 +321,6 @@ static int quadrature_degree (const pw_sun *x, int order) {
   return order + 1 < x->points ? order + 1 : x->points - 1;
 }
 
-/* 1 if the step is much longer than the previous ones whose rates are stored, together: its polynomial then depends
- * almost only on its ends. */
-static int quadrature_is_long (const pw_sun *x) {
-  const double ratio = 10;
-  return x->points > 2 && x->t[0] - x->t[1] > ratio * (x->t[1] - x->t[x->points - 1]);
-}
-
-/* Energy defect of a step: change of energy, less work, plus losses.  Stores the energy for the next step. */
-static double quadrature_defect (pw_sun *x) {
-  pw_run *r = x->run;
-  double before = x->energy;
-  x->energy = pw_energy (r, r->v);
-  double defect = x->energy - before;
-  for (int e = 0; e < r->s->entries; e++) defect -= r->s->entry[e].type == PW_WORK ? x->integral[e] : -x->integral[e];
-  return fabs (defect);
-}
-
 int pw_sun_integrate_ledger (pw_sun *x, int order) {
   pw_run *r = x->run;
   const double method_defect = 100; /* energy defect that the method itself may cause in a step, in tolerances */
@@ -354,8 +337,13 @@ int pw_sun_integrate_ledger (pw_sun *x, int order) {
   const int degree = quadrature_degree (x, order);
   (void)quadrature_gauss (x, degree, x->t[1], x->t[0], 1, x->integral);
   (void)quadrature_gauss (x, degree - 1, x->t[1], x->t[0], 1, x->finer);
-  const double error = quadrature_change (x, h), defect = quadrature_defect (x);
-  x->refined = defect > method_defect * pw_ledger_tolerance (r, h) || error > 1 || quadrature_is_long (x);
+  const double error = quadrature_change (x, h), before = x->energy;
+  x->energy = pw_energy (r, r->v);
+  double defect = x->energy - before; /* of the energy: its change, less work, plus losses */
+  for (int e = 0; e < r->s->entries; e++) defect -= r->s->entry[e].type == PW_WORK ? x->integral[e] : -x->integral[e];
+  /* the polynomial of a step much longer than those whose rates are stored, together, depends almost only on its ends */
+  const int is_long = x->points > 2 && x->t[0] - x->t[1] > 10 * (x->t[1] - x->t[x->points - 1]);
+  x->refined = fabs (defect) > method_defect * pw_ledger_tolerance (r, h) || error > 1 || is_long;
   if (x->refined) quadrature_refine (x, x->t[1], x->t[0]);
   for (int e = 0; e < entries; e++) r->ledger[e] += x->integral[e];
   return x->refined ? pw_evaluate_J_at (r->w, pw_before_breakpoint (r, r->t), r->q, r->v) : PW_OK;

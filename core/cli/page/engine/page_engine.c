@@ -102,19 +102,12 @@ static int page_is_late (void *context) {
   return pw_page_now () > page_deadline;
 }
 
-static void page_close (void) {
+/* Compiles the model with these values of the parameters, in the order of the table. */
+static int page_compile (const double *parameter) {
   pw_plots_close (page_plots);
   pw_system_free (page_system);
   pw_model_free (page_model);
-  page_plots = NULL;
-  page_system = NULL;
-  page_model = NULL;
-}
-
-/* Compiles the model with these values of the parameters, in the order of the table. */
-static int page_compile (const double *parameter) {
-  page_close ();
-  page_error = (pw_error){ 0 };
+  page_plots = NULL, page_system = NULL, page_error = (pw_error){ 0 };
   page_model = pw_model_new (page_name, page_table, &page_error);
   for (int i = 0; page_model && page_table->parameters && page_table->parameters[i].name; i++)
     pw_model_set (page_model, page_table->parameters[i].name, parameter[i], &page_error);
