@@ -341,7 +341,7 @@ int pw_sun_integrate_ledger (pw_sun *x, int order) {
   x->energy = pw_energy (r, r->v);
   double defect = x->energy - before; /* of the energy: its change, less work, plus losses */
   for (int e = 0; e < r->s->entries; e++) defect -= r->s->entry[e].type == PW_WORK ? x->integral[e] : -x->integral[e];
-  /* the polynomial of a step much longer than those whose rates are stored, together, depends almost only on its ends */
+  /* the polynomial of a step much longer than those stored before it, together, depends almost only on its ends */
   const int is_long = x->points > 2 && x->t[0] - x->t[1] > 10 * (x->t[1] - x->t[x->points - 1]);
   x->refined = fabs (defect) > method_defect * pw_ledger_tolerance (r, h) || error > 1 || is_long;
   if (x->refined) quadrature_refine (x, x->t[1], x->t[0]);
